@@ -1,0 +1,3 @@
+//! Decoder.
+#![no_std]
+#![forbid(unsafe_code)]

@@ -1,0 +1,43 @@
+//! The pinhole camera of the host, in f64; decoder-core has its own in f32.
+
+use glam::{DMat3, DVec3};
+
+/// A pinhole camera in the OpenCV frame: x right, y down, z forward.
+///
+/// A point projects as `u = fx·x/z + cx`, `v = fy·y/z + cy` with `(x, y, z) = R·p + t`; pixel `(i, j)` covers
+/// `[i, i+1) × [j, j+1)`, so its centre is at `(i + 0.5, j + 0.5)`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Camera {
+    /// World to camera rotation.
+    pub rotation: DMat3,
+    /// World to camera translation, in units of the world.
+    pub translation: DVec3,
+    /// Focal lengths `[fx, fy]`, pixels.
+    pub focal_px: [f64; 2],
+    /// Principal point `[cx, cy]`, pixels from the outer corner of the first pixel.
+    pub principal_px: [f64; 2],
+    /// Image width, pixels.
+    pub width_px: u32,
+    /// Image height, pixels.
+    pub height_px: u32,
+}
+
+impl Camera {
+    /// The camera's centre in world coordinates: `−Rᵀ·t`.
+    pub fn centre_world(&self) -> DVec3 {
+        -(self.rotation.transpose() * self.translation)
+    }
+
+    /// The same camera with its image scaled to `width_px × height_px`.
+    pub fn resized(&self, width_px: u32, height_px: u32) -> Self {
+        let sx = f64::from(width_px) / f64::from(self.width_px);
+        let sy = f64::from(height_px) / f64::from(self.height_px);
+        Self {
+            focal_px: [self.focal_px[0] * sx, self.focal_px[1] * sy],
+            principal_px: [self.principal_px[0] * sx, self.principal_px[1] * sy],
+            width_px,
+            height_px,
+            ..self.clone()
+        }
+    }
+}

@@ -1,0 +1,3 @@
+//! The `pocketsplat` command.
+
+fn main() {}

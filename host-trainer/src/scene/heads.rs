@@ -1,0 +1,109 @@
+//! The three anchor MLPs: opacity, covariance, colour.
+
+use super::ModelShape;
+
+/// What an output row of each head means for offset k.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OutputLayout {
+    /// K outputs: row k is the opacity logit, through tanh.
+    Opacity,
+    /// 7K outputs: rows 7k..7k+3 scale logits (sigmoid), 7k+3..7k+7 an unnormalised quaternion (w, x, y, z).
+    Covariance,
+    /// 3K outputs: rows 3k..3k+3 the colour logits (sigmoid).
+    Colour,
+}
+
+impl OutputLayout {
+    /// Outputs per offset.
+    pub const fn per_offset(self) -> usize {
+        match self {
+            Self::Opacity => 1,
+            Self::Covariance => 7,
+            Self::Colour => 3,
+        }
+    }
+}
+
+/// One head: `y = W2·relu(W1·x + b1) + b2`, hidden width F.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Head<R> {
+    /// Inputs.
+    pub n_in: usize,
+    /// Hidden units.
+    pub n_hidden: usize,
+    /// Outputs.
+    pub n_out: usize,
+    /// `[n_hidden, n_in]`, row-major.
+    pub w1: Vec<R>,
+    /// `[n_hidden]`.
+    pub b1: Vec<R>,
+    /// `[n_out, n_hidden]`, row-major.
+    pub w2: Vec<R>,
+    /// `[n_out]`.
+    pub b2: Vec<R>,
+}
+
+impl<R: Copy> Head<R> {
+    /// A head of the given widths with every parameter `value`.
+    pub fn filled(n_in: usize, n_hidden: usize, n_out: usize, value: R) -> Self {
+        Self {
+            n_in,
+            n_hidden,
+            n_out,
+            w1: vec![value; n_hidden * n_in],
+            b1: vec![value; n_hidden],
+            w2: vec![value; n_out * n_hidden],
+            b2: vec![value; n_out],
+        }
+    }
+
+    /// The parameter groups in file order: W1, b1, W2, b2.
+    pub fn groups(&self) -> [&[R]; 4] {
+        [&self.w1, &self.b1, &self.w2, &self.b2]
+    }
+
+    /// The parameter groups in file order, mutable.
+    pub fn groups_mut(&mut self) -> [&mut Vec<R>; 4] {
+        [&mut self.w1, &mut self.b1, &mut self.w2, &mut self.b2]
+    }
+
+    /// Number of parameters.
+    pub fn n_params(&self) -> usize {
+        self.groups().iter().map(|g| g.len()).sum()
+    }
+}
+
+/// The three heads of a model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Heads<R> {
+    /// [`OutputLayout::Opacity`].
+    pub opacity: Head<R>,
+    /// [`OutputLayout::Covariance`].
+    pub covariance: Head<R>,
+    /// [`OutputLayout::Colour`].
+    pub colour: Head<R>,
+}
+
+impl<R: Copy> Heads<R> {
+    /// Heads for `shape` with every parameter `value`.
+    pub fn filled(shape: &ModelShape, value: R) -> Self {
+        let head = |layout: OutputLayout| {
+            Head::filled(shape.head_inputs(), shape.feature_dim, layout.per_offset() * shape.n_offsets, value)
+        };
+        Self {
+            opacity: head(OutputLayout::Opacity),
+            covariance: head(OutputLayout::Covariance),
+            colour: head(OutputLayout::Colour),
+        }
+    }
+
+    /// The heads in file order: opacity, covariance, colour.
+    pub fn each(&self) -> [&Head<R>; 3] {
+        [&self.opacity, &self.covariance, &self.colour]
+    }
+
+    /// The heads in file order, mutable.
+    pub fn each_mut(&mut self) -> [&mut Head<R>; 3] {
+        [&mut self.opacity, &mut self.covariance, &mut self.colour]
+    }
+}

@@ -1,0 +1,73 @@
+//! The trainable scene: anchors on an integer lattice and the three heads that turn them into Gaussians.
+//!
+//! Everything is in the normalised frame of [`crate::dataset::Normalisation`].
+
+mod heads;
+
+pub use heads::{Head, Heads, OutputLayout};
+
+/// What a model consists of: its widths and the effects it pays for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct ModelShape {
+    /// Feature width F of an anchor.
+    pub feature_dim: usize,
+    /// Offsets, that is Gaussians, K of an anchor.
+    pub n_offsets: usize,
+    /// The heads see the unit vector from the camera to the anchor.
+    pub view_direction: bool,
+    /// The heads see the distance from the camera to the anchor, in normalised units.
+    pub view_distance: bool,
+    /// Opacity is multiplied by √(det Σ / det(Σ + 0.3 I)) (Yu et al. 2024, Mip-Splatting, eq. 8).
+    pub dilation_compensation: bool,
+}
+
+impl ModelShape {
+    /// Inputs of every head: feature, then direction (3), then distance (1), the last two if present.
+    pub fn head_inputs(&self) -> usize {
+        self.feature_dim + 3 * usize::from(self.view_direction) + usize::from(self.view_distance)
+    }
+
+    /// Trained values an anchor carries: F features, 6 log-scales, 3K offsets.
+    pub fn values_per_anchor(&self) -> usize {
+        self.feature_dim + 6 + 3 * self.n_offsets
+    }
+}
+
+/// Anchors as structure of arrays, one row an anchor.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Anchors<R> {
+    /// `[n_anchors]` lattice coordinates; the position is `lattice · voxel_size`.
+    pub lattice: Vec<[i32; 3]>,
+    /// `[n_anchors, F]` features.
+    pub features: Vec<R>,
+    /// `[n_anchors, 6]` natural logarithms: 0..3 scale the offsets (and are the anchor's own size in the prefilter),
+    /// 3..6 are the base size of its Gaussians.
+    pub log_scales: Vec<R>,
+    /// `[n_anchors, K, 3]` offsets in units of `exp(log_scales[0..3])`.
+    pub offsets: Vec<R>,
+}
+
+impl<R> Anchors<R> {
+    /// Number of anchors.
+    pub fn len(&self) -> usize {
+        self.lattice.len()
+    }
+
+    /// Whether there is no anchor.
+    pub fn is_empty(&self) -> bool {
+        self.lattice.is_empty()
+    }
+}
+
+/// A whole model: what the trainer optimises and the bundle stores.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene<R> {
+    /// Widths and effects.
+    pub shape: ModelShape,
+    /// Edge ε of a lattice cell, normalised units.
+    pub voxel_size: f64,
+    /// The anchors.
+    pub anchors: Anchors<R>,
+    /// The three heads.
+    pub heads: Heads<R>,
+}

@@ -1,0 +1,2 @@
+//! Annotates a bundle.
+fn main() {}

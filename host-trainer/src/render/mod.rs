@@ -1,1 +1,5 @@
-//! render
+//! Whole images from a scene, at leisure.
+//!
+//! [`reference`] is the oracle: f64, slow, plain, and sharing no line with the renderers that it judges.
+
+pub mod reference;

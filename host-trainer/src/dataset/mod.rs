@@ -1,8 +1,28 @@
 //! Captures: photographs with poses, normalised.
+//!
+//! [`load`] tells the layout of a folder by the files in it and hands it to that layout's reader. What every reader
+//! shares lives apart from them: pixels in `image`, pose checks in `pose`, the common frame in `normalise`.
+//! A view that cannot be used is left out and named in the [`LoadReport`]; only a capture that cannot be trained on
+//! at all is an error.
+
+use std::path::Path;
 
 use glam::DVec3;
 
 use crate::camera::Camera;
+
+mod blender;
+mod error;
+mod image;
+mod normalise;
+mod options;
+mod pose;
+mod report;
+
+pub use error::{DatasetError, ViewFault};
+pub use options::{Background, LoadOptions, UnknownBackground};
+pub use pose::PoseFault;
+pub use report::{LoadReport, SkippedView, Split};
 
 /// An 8-bit RGB image, row-major, interleaved.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -54,3 +74,23 @@ pub struct Capture {
 
 /// The extent every capture is scaled to, because constants such as the near cull 0.2 assume extents of about 5.
 pub const EXTENT: f64 = 5.0;
+
+/// Loads the capture in the folder `path`.
+///
+/// The layout is told by the files present: `transforms_train.json` means Blender (Synthetic-NeRF). Images are decoded
+/// on all threads, composited on [`LoadOptions::background`] and only then reduced, so that at most one full-size image
+/// per thread is held; the result does not depend on the number of threads.
+///
+/// # Errors
+/// [`DatasetError`] names the file, what was found, what is needed and what to do: a folder of unknown layout, a
+/// transforms file that cannot be read, fewer than three usable training views, or training cameras all in one place.
+pub fn load(path: &Path, options: &LoadOptions) -> Result<(Capture, LoadReport), DatasetError> {
+    options.check()?;
+    if !path.is_dir() {
+        return Err(DatasetError::NotAFolder { path: path.to_owned() });
+    }
+    if blender::is_layout_of(path) {
+        return blender::load(path, options);
+    }
+    Err(DatasetError::UnknownLayout { path: path.to_owned(), looked_for: blender::TRAIN_FILE })
+}

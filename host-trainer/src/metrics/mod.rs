@@ -1,1 +1,21 @@
-//! metrics
+//! How close an image is to the truth.
+//!
+//! All figures are of one image; those of a scene are means over its views. The truth is 8-bit, so the figures to
+//! report are of 8-bit images, as they are published for this family.
+
+mod baseline;
+mod psnr;
+mod ssim;
+
+pub use baseline::half_size_enlarged;
+pub use psnr::{psnr_db, psnr_of_floats_db};
+pub use ssim::ssim;
+
+use crate::dataset::Image;
+
+/// Stops where two images do not have the same size: there is no figure to give.
+#[track_caller]
+fn assert_same_size(a: &Image, b: &Image) {
+    let (size_a, size_b) = ((a.width_px, a.height_px), (b.width_px, b.height_px));
+    assert_eq!(size_a, size_b, "images to compare must have one size (width, height)");
+}

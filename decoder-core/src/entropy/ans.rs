@@ -1,0 +1,102 @@
+//! The reader of asymmetric numeral systems (Duda 2013), 32-bit state and 16-bit words.
+//!
+//! It reads what `constriction`'s `AnsCoder<u16, u32>` writes (Bamler 2022), its words in reverse order so that reading
+//! goes forward. That coder is the reference, and tests of the writer hold the two identical.
+
+use super::model::{FREQUENCY_TOTAL, PRECISION_BITS, SymbolModel};
+
+/// While words are left, the state never falls below this.
+const STATE_MIN: u32 = 1 << 16;
+
+/// Decodes the symbols of one stream; [`finish`](Self::finish) tells whether it was one.
+///
+/// Reading past the end is harmless: it yields symbols without meaning, and `finish` fails.
+#[derive(Clone, Copy, Debug)]
+#[must_use = "only `finish` tells whether the symbols were sound"]
+pub struct AnsReader<'a> {
+    state: u32,
+    words: &'a [[u8; 2]],
+    malformed: bool,
+}
+
+impl<'a> AnsReader<'a> {
+    /// Starts at the first word of a stream.
+    pub fn new(words: &'a [[u8; 2]]) -> Self {
+        let mut reader = Self { state: 0, words, malformed: false };
+        // The encoder writes no leading zero: such a stream would hold the same symbols as a shorter one.
+        reader.malformed = words.first() == Some(&[0, 0]);
+        reader.refill();
+        reader.refill();
+        reader
+    }
+
+    /// Decodes one symbol; the caller brings the model the encoder had at this place.
+    ///
+    /// # Budget
+    /// One multiplication and one look-up in the model.
+    #[inline]
+    pub fn symbol<M: SymbolModel>(&mut self, model: &M) -> M::Symbol {
+        const MASK: u32 = (1 << PRECISION_BITS) - 1;
+        // `MASK` keeps 12 bits, so nothing is cut off.
+        let quantile = (self.state & MASK) as u16;
+        let slot = model.slot(quantile);
+        let frequency = slot.frequency.min(FREQUENCY_TOTAL);
+        // Below 2²⁰ · 2¹² + 2¹²; wrapping costs nothing and says that no value can panic here.
+        self.state = (self.state >> PRECISION_BITS)
+            .wrapping_mul(u32::from(frequency))
+            .wrapping_add(u32::from(quantile.wrapping_sub(slot.start)));
+        self.refill();
+        slot.symbol
+    }
+
+    /// Ends the stream: its words must be used up and its state back at the encoder's start.
+    ///
+    /// # Errors
+    /// The number of bytes not read; 0 when the symbols ran past the end or ended in another state.
+    pub fn finish(self) -> Result<(), usize> {
+        if self.words.is_empty() && self.state == 0 && !self.malformed {
+            return Ok(());
+        }
+        Err(self.words.as_flattened().len())
+    }
+
+    #[inline]
+    fn refill(&mut self) {
+        if self.state < STATE_MIN
+            && let Some((&word, rest)) = self.words.split_first()
+        {
+            self.state = (self.state << 16) | u32::from(u16::from_le_bytes(word));
+            self.words = rest;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::AnsReader;
+    use crate::entropy::UniformByte;
+
+    #[test]
+    fn bytes_come_back_in_order() {
+        // By hand, last symbol first: 0 → 0x34·16, then (0x340/16)·4096 + 0x12·16.
+        let words = [[0x03, 0x00], [0x20, 0x41]];
+        let mut reader = AnsReader::new(&words);
+        assert_eq!((reader.symbol(&UniformByte), reader.symbol(&UniformByte)), (0x12, 0x34), "the two bytes");
+        assert_eq!(reader.finish(), Ok(()), "nothing left");
+        let mut reader = AnsReader::new(&words);
+        reader.symbol(&UniformByte);
+        assert_eq!(reader.finish(), Err(0), "a symbol is left in the state");
+    }
+
+    #[test]
+    fn leftover_words_are_counted() {
+        let words = [[1, 0], [2, 0], [3, 0], [4, 0]];
+        let reader = AnsReader::new(&words);
+        assert_eq!(reader.finish(), Err(4), "two words not read");
+    }
+
+    #[test]
+    fn an_empty_stream_is_sound() {
+        assert_eq!(AnsReader::new(&[]).finish(), Ok(()), "no words, no symbols");
+    }
+}

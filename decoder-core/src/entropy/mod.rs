@@ -1,0 +1,13 @@
+//! Entropy decoding: bytes to integer symbols, in integer arithmetic alone.
+//!
+//! Whatever decides a symbol lives here, once, and the trainer's encoder uses the same frequencies, so a bundle decodes
+//! to the same symbols on every target. The module knows nothing of anchors or of what a symbol means.
+#![deny(clippy::indexing_slicing, clippy::arithmetic_side_effects, clippy::unwrap_used, clippy::panic)]
+
+mod ans;
+mod bits;
+mod model;
+
+pub use ans::AnsReader;
+pub use bits::BitReader;
+pub use model::{FREQUENCY_TOTAL, PRECISION_BITS, Slot, SymbolModel, UniformByte};

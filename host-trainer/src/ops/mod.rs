@@ -1,1 +1,28 @@
-//! ops
+//! The differentiable operations of a training step, one file each: `forward`, `backward`, plain slices, no state.
+//!
+//! Order of a step: [`prefilter`] → [`head_input`] → [`head`] → [`neural_gaussians`] → [`project`] → [`tiles`] →
+//! [`rasterise`] → [`l1`], [`ssim`], [`volume`] → the same backwards → [`adam`].
+//!
+//! Every operation is generic over [`Real`]: the trainer runs it in f32, the tests compare its backward pass in f64
+//! with central differences of its forward pass, and f32 with f64.
+
+pub mod adam;
+pub mod head;
+pub mod head_input;
+pub mod l1;
+pub mod matmul;
+pub mod neural_gaussians;
+pub mod pinhole;
+pub mod prefilter;
+pub mod project;
+pub mod rasterise;
+mod real;
+pub mod ssim;
+pub mod tiles;
+pub mod volume;
+
+#[cfg(test)]
+pub(crate) mod finite_difference;
+
+pub use pinhole::Pinhole;
+pub use real::Real;

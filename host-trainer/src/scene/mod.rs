@@ -3,6 +3,7 @@
 //! Everything is in the normalised frame of [`crate::dataset::Normalisation`].
 
 mod heads;
+pub mod init;
 
 pub use heads::{Head, Heads, OutputLayout};
 
@@ -70,4 +71,42 @@ pub struct Scene<R> {
     pub anchors: Anchors<R>,
     /// The three heads.
     pub heads: Heads<R>,
+}
+
+impl<R: crate::ops::Real> Scene<R> {
+    /// Position of an anchor: its lattice coordinates times ε, the product rounded as the decoder rounds it.
+    #[inline]
+    pub fn position(&self, anchor: usize) -> [R; 3] {
+        let voxel_size = R::real(self.voxel_size);
+        self.anchors.lattice[anchor].map(|c| R::real(f64::from(c)) * voxel_size)
+    }
+
+    /// The same scene in another number type.
+    pub fn cast<T: crate::ops::Real>(&self) -> Scene<T> {
+        let all = |values: &[R]| values.iter().map(|v| T::real((*v).into())).collect::<Vec<T>>();
+        let head = |h: &Head<R>| Head {
+            n_in: h.n_in,
+            n_hidden: h.n_hidden,
+            n_out: h.n_out,
+            w1: all(&h.w1),
+            b1: all(&h.b1),
+            w2: all(&h.w2),
+            b2: all(&h.b2),
+        };
+        Scene {
+            shape: self.shape,
+            voxel_size: self.voxel_size,
+            anchors: Anchors {
+                lattice: self.anchors.lattice.clone(),
+                features: all(&self.anchors.features),
+                log_scales: all(&self.anchors.log_scales),
+                offsets: all(&self.anchors.offsets),
+            },
+            heads: Heads {
+                opacity: head(&self.heads.opacity),
+                covariance: head(&self.heads.covariance),
+                colour: head(&self.heads.colour),
+            },
+        }
+    }
 }

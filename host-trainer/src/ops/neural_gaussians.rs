@@ -1,0 +1,252 @@
+//! From head outputs to the Gaussians of a view.
+
+use super::Real;
+use crate::scene::ModelShape;
+
+/// A 3-D Gaussian with one colour, in the world frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Gaussian<R> {
+    /// Centre, world frame.
+    pub centre: [R; 3],
+    /// Standard deviations along its own axes, normalised units.
+    pub scale: [R; 3],
+    /// Unit quaternion (w, x, y, z).
+    pub rotation: [R; 4],
+    /// In (0, 1).
+    pub opacity: R,
+    /// RGB in (0, 1).
+    pub colour: [R; 3],
+}
+
+/// Where a Gaussian comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Source {
+    /// Row of the anchor within its block.
+    pub row: u32,
+    /// Offset k < K.
+    pub offset: u32,
+}
+
+/// Quaternions shorter than this are divided by it instead of by their length.
+const NORM_FLOOR: f64 = 1e-12;
+
+/// Raw outputs of the three heads over a block of n anchors, or gradients of the same shapes.
+#[derive(Clone, Debug, Default)]
+pub struct HeadOutputs<R> {
+    /// `[n, K]` opacity logits.
+    pub opacity: Vec<R>,
+    /// `[n, 7K]`: per offset 3 scale logits, 4 quaternion components.
+    pub covariance: Vec<R>,
+    /// `[n, 3K]` colour logits.
+    pub colour: Vec<R>,
+}
+
+impl<R: Real> HeadOutputs<R> {
+    /// Makes every array zero and right for `n` anchors.
+    pub fn reset(&mut self, shape: &ModelShape, n: usize) {
+        for (array, per_offset) in [(&mut self.opacity, 1), (&mut self.covariance, 7), (&mut self.colour, 3)] {
+            array.clear();
+            array.resize(n * shape.n_offsets * per_offset, R::ZERO);
+        }
+    }
+}
+
+/// Appends the Gaussians of a block of anchors whose opacity is positive.
+///
+/// α = tanh(logit), kept if α > 0; colour = sigmoid; scale = l_g ⊙ sigmoid; rotation = q/‖q‖;
+/// centre = x_a + O_k ⊙ l_a (Lu et al. 2024, Scaffold-GS, eqs. 5–8; layouts in section 1.3 and 1.5 of the method notes).
+///
+/// * `positions`: `[n]`. * `log_scales`: `[n, 6]`. * `offsets`: `[n, 3K]`. Order: anchors, then offsets, ascending.
+pub fn forward<R: Real>(
+    shape: &ModelShape,
+    positions: &[[R; 3]],
+    log_scales: &[R],
+    offsets: &[R],
+    outputs: &HeadOutputs<R>,
+    gaussians: &mut Vec<Gaussian<R>>,
+    sources: &mut Vec<Source>,
+) {
+    let k_all = shape.n_offsets;
+    for (row, position) in positions.iter().enumerate() {
+        let sizes: [R; 6] = std::array::from_fn(|i| log_scales[row * 6 + i].exp());
+        for k in 0..k_all {
+            let at = row * k_all + k;
+            let opacity = outputs.opacity[at].tanh();
+            if !(opacity > R::ZERO) {
+                continue;
+            }
+            let cov = &outputs.covariance[at * 7..at * 7 + 7];
+            let raw = [cov[3], cov[4], cov[5], cov[6]];
+            let inverse = R::ONE / length(raw).larger(R::real(NORM_FLOOR));
+            gaussians.push(Gaussian {
+                centre: std::array::from_fn(|i| position[i] + offsets[at * 3 + i] * sizes[i]),
+                scale: std::array::from_fn(|i| sizes[3 + i] * cov[i].sigmoid()),
+                rotation: raw.map(|q| q * inverse),
+                opacity,
+                colour: std::array::from_fn(|i| outputs.colour[at * 3 + i].sigmoid()),
+            });
+            sources.push(Source { row: index(row), offset: index(k) });
+        }
+    }
+}
+
+/// Gradients of [`forward`], given those of the Gaussians it appended.
+///
+/// * `d_outputs`, `d_log_scales` `[n, 6]`, `d_offsets` `[n, 3K]`: zero on entry, added to.
+#[expect(clippy::too_many_arguments, reason = "one slice per input and per gradient, as every operation has it")]
+pub fn backward<R: Real>(
+    shape: &ModelShape,
+    log_scales: &[R],
+    offsets: &[R],
+    outputs: &HeadOutputs<R>,
+    gaussians: &[Gaussian<R>],
+    sources: &[Source],
+    d_gaussians: &[Gaussian<R>],
+    d_outputs: &mut HeadOutputs<R>,
+    d_log_scales: &mut [R],
+    d_offsets: &mut [R],
+) {
+    for ((g, source), d) in gaussians.iter().zip(sources).zip(d_gaussians) {
+        let row = source.row as usize;
+        let at = row * shape.n_offsets + source.offset as usize;
+        d_outputs.opacity[at] += d.opacity * (R::ONE - g.opacity * g.opacity);
+        for i in 0..3 {
+            d_outputs.colour[at * 3 + i] += d.colour[i] * g.colour[i] * (R::ONE - g.colour[i]);
+            // scale = e^s · σ, so ∂/∂s = scale, and ∂/∂logit = scale · (1 − σ).
+            let sigma = outputs.covariance[at * 7 + i].sigmoid();
+            d_log_scales[row * 6 + 3 + i] += d.scale[i] * g.scale[i];
+            d_outputs.covariance[at * 7 + i] += d.scale[i] * g.scale[i] * (R::ONE - sigma);
+            let size = log_scales[row * 6 + i].exp();
+            d_offsets[at * 3 + i] += d.centre[i] * size;
+            d_log_scales[row * 6 + i] += d.centre[i] * offsets[at * 3 + i] * size;
+        }
+        let raw: [R; 4] = std::array::from_fn(|i| outputs.covariance[at * 7 + 3 + i]);
+        let norm = length(raw);
+        // Below the floor the division is by a constant, and nothing is projected out.
+        let radial = if norm > R::real(NORM_FLOOR) { dot(g.rotation, d.rotation) } else { R::ZERO };
+        let inverse = R::ONE / norm.larger(R::real(NORM_FLOOR));
+        for i in 0..4 {
+            d_outputs.covariance[at * 7 + 3 + i] += (d.rotation[i] - g.rotation[i] * radial) * inverse;
+        }
+    }
+}
+
+fn dot<R: Real>(a: [R; 4], b: [R; 4]) -> R {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
+}
+
+fn length<R: Real>(q: [R; 4]) -> R {
+    dot(q, q).sqrt()
+}
+
+fn index(i: usize) -> u32 {
+    u32::try_from(i).expect("a block holds a few hundred anchors")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ops::finite_difference::{assert_gradient, random};
+
+    const SHAPE: ModelShape = ModelShape {
+        feature_dim: 4,
+        n_offsets: 3,
+        view_direction: true,
+        view_distance: false,
+        dilation_compensation: false,
+    };
+    const N: usize = 4;
+
+    fn parts(g: &Gaussian<f64>) -> [f64; 14] {
+        let mut out = [0.0; 14];
+        out[..3].copy_from_slice(&g.centre);
+        out[3..6].copy_from_slice(&g.scale);
+        out[6..10].copy_from_slice(&g.rotation);
+        out[10] = g.opacity;
+        out[11..].copy_from_slice(&g.colour);
+        out
+    }
+
+    fn split(x: &[f64]) -> (HeadOutputs<f64>, Vec<f64>, Vec<f64>) {
+        let k = SHAPE.n_offsets;
+        let mut rest = x;
+        let mut take = |n: usize| {
+            let (a, b) = rest.split_at(n);
+            rest = b;
+            a.to_vec()
+        };
+        let outputs = HeadOutputs { opacity: take(N * k), covariance: take(N * 7 * k), colour: take(N * 3 * k) };
+        (outputs, take(N * 6), take(N * 3 * k))
+    }
+
+    fn run(x: &[f64]) -> (Vec<Gaussian<f64>>, Vec<Source>) {
+        let (outputs, log_scales, offsets) = split(x);
+        let (mut gaussians, mut sources) = (Vec::new(), Vec::new());
+        forward(&SHAPE, &[[0.1, 0.2, 0.3]; N], &log_scales, &offsets, &outputs, &mut gaussians, &mut sources);
+        (gaussians, sources)
+    }
+
+    #[test]
+    fn backward_agrees_with_finite_differences() {
+        let k = SHAPE.n_offsets;
+        let len = N * k * 11 + N * 6 + N * 3 * k;
+        for seed in 0..6 {
+            let mut x = random(seed, len);
+            for logit in &mut x[..N * k] {
+                *logit += 0.05 * logit.signum();
+            }
+            if seed == 4 {
+                // Saturated sigmoids and a large base size.
+                x[N * k..N * k + 3].copy_from_slice(&[30.0, -30.0, 8.0]);
+                x[N * k * 11 + 3] = 3.0;
+            }
+            if seed == 5 {
+                // A quaternion a thousand times shorter than the others.
+                for q in &mut x[N * k + 3..N * k + 7] {
+                    *q *= 1e-3;
+                }
+            }
+            let (gaussians, sources) = run(&x);
+            let weights = random(seed + 50, gaussians.len() * 14);
+            let f = |x: &[f64]| run(x).0.iter().flat_map(parts).zip(&weights).map(|(p, w)| p * w).sum::<f64>();
+            let d: Vec<Gaussian<f64>> = weights
+                .chunks_exact(14)
+                .map(|w| Gaussian {
+                    centre: [w[0], w[1], w[2]],
+                    scale: [w[3], w[4], w[5]],
+                    rotation: [w[6], w[7], w[8], w[9]],
+                    opacity: w[10],
+                    colour: [w[11], w[12], w[13]],
+                })
+                .collect();
+            let (outputs, log_scales, offsets) = split(&x);
+            let mut d_outputs = HeadOutputs::default();
+            d_outputs.reset(&SHAPE, N);
+            let (mut d_log_scales, mut d_offsets) = (vec![0.0; log_scales.len()], vec![0.0; offsets.len()]);
+            backward(
+                &SHAPE,
+                &log_scales,
+                &offsets,
+                &outputs,
+                &gaussians,
+                &sources,
+                &d,
+                &mut d_outputs,
+                &mut d_log_scales,
+                &mut d_offsets,
+            );
+            let analytic =
+                [d_outputs.opacity, d_outputs.covariance, d_outputs.colour, d_log_scales, d_offsets].concat();
+            assert_gradient("neural gaussians", &x, &analytic, f);
+        }
+    }
+
+    #[test]
+    fn a_zero_quaternion_gives_no_infinity() {
+        let mut x = vec![0.5; N * SHAPE.n_offsets * 11 + N * 6 + N * 3 * SHAPE.n_offsets];
+        let k = SHAPE.n_offsets;
+        x[N * k..N * k * 8].fill(0.0);
+        let (gaussians, _) = run(&x);
+        assert!(gaussians.iter().all(|g| parts(g).iter().all(|p| p.is_finite())));
+    }
+}

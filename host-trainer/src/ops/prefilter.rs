@@ -1,0 +1,74 @@
+//! Which anchors a view may show.
+
+use super::{Pinhole, Real, pinhole::NEAR, project::DILATION_PX2};
+
+/// Whether an anchor, taken as a Gaussian of scale `size` and identity rotation, reaches the image.
+///
+/// Σ' = J·W·diag(size²)·Wᵀ·Jᵀ + 0.3·I, radius = ⌈3·√λmax⌉ with λmax = m + √max(0.1, m² − det Σ'), m the mean of the
+/// diagonal (the frustum filter of Scaffold-GS); visible when the depth exceeds [`NEAR`] and the square of that radius
+/// around the projected centre overlaps the image. No gradient.
+///
+/// * `position`: world frame, normalised units. * `size`: `exp(log_scales[0..3])`.
+#[inline]
+pub fn anchor_is_visible<R: Real>(camera: &Pinhole<R>, position: [R; 3], size: [R; 3]) -> bool {
+    let [x, y, z] = camera.to_cam(position);
+    if !(z > R::real(NEAR)) {
+        return false;
+    }
+    let [fx, fy] = camera.focal_px;
+    let slope = [x / z, y / z].map(|s| s);
+    let [x_lo, x_hi] = camera.slope_bounds(0);
+    let [y_lo, y_hi] = camera.slope_bounds(1);
+    let (tx, ty) = (slope[0].larger(x_lo).smaller(x_hi), slope[1].larger(y_lo).smaller(y_hi));
+    let mut cov = [R::real(DILATION_PX2), R::ZERO, R::real(DILATION_PX2)];
+    for axis in 0..3 {
+        let column =
+            [camera.rotation[0][axis], camera.rotation[1][axis], camera.rotation[2][axis]].map(|r| r * size[axis]);
+        let a = fx / z * (column[0] - tx * column[2]);
+        let b = fy / z * (column[1] - ty * column[2]);
+        cov[0] += a * a;
+        cov[1] += a * b;
+        cov[2] += b * b;
+    }
+    let mid = R::real(0.5) * (cov[0] + cov[2]);
+    let det = cov[0] * cov[2] - cov[1] * cov[1];
+    if !(det > R::ZERO) {
+        return false;
+    }
+    let lambda_max = mid + (mid * mid - det).larger(R::real(0.1)).sqrt();
+    let radius: f64 = (R::real(3.0) * lambda_max.sqrt()).into();
+    let radius = R::real(radius.ceil());
+    let (u, v) = (fx * slope[0] + camera.principal_px[0], fy * slope[1] + camera.principal_px[1]);
+    let [width, height] = camera.size_px.map(|s| R::real(s as f64));
+    u + radius > R::ZERO && u - radius < width && v + radius > R::ZERO && v - radius < height
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::Camera;
+    use glam::{DMat3, DVec3};
+
+    fn camera() -> Pinhole<f64> {
+        Pinhole::new(&Camera {
+            rotation: DMat3::IDENTITY,
+            translation: DVec3::ZERO,
+            focal_px: [100.0; 2],
+            principal_px: [50.0; 2],
+            width_px: 100,
+            height_px: 100,
+        })
+    }
+
+    #[test]
+    fn an_anchor_outside_counts_only_if_it_reaches_in() {
+        let camera = camera();
+        assert!(anchor_is_visible(&camera, [0.0, 0.0, 1.0], [0.001; 3]));
+        assert!(!anchor_is_visible(&camera, [0.0, 0.0, 0.2], [0.001; 3]), "on the near plane");
+        assert!(!anchor_is_visible(&camera, [0.0, 0.0, -1.0], [0.5; 3]), "behind");
+        // 30 px outside on the right: a radius of 3 px does not reach, one of 60 px does.
+        assert!(!anchor_is_visible(&camera, [0.8, 0.0, 1.0], [0.001; 3]));
+        assert!(anchor_is_visible(&camera, [0.8, 0.0, 1.0], [0.2; 3]));
+        assert!(!anchor_is_visible(&camera, [f64::NAN, 0.0, 1.0], [0.2; 3]));
+    }
+}

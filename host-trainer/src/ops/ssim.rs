@@ -1,0 +1,223 @@
+//! Structural similarity of two images, and its gradient.
+//!
+//! Per pixel and channel S = (2μₓμᵧ + C₁)(2σₓᵧ + C₂)/((μₓ² + μᵧ² + C₁)(σₓ² + σᵧ² + C₂)), moments under an 11×11 Gaussian
+//! window of σ 1.5 with zero padding, C₁ = 0.01², C₂ = 0.03² (Wang et al. 2004, eq. 13; window and padding as the
+//! splatting literature has them). The value is the mean over pixels and channels.
+
+use pulp::Arch;
+use rayon::prelude::*;
+
+use super::Real;
+
+const TAPS: usize = 11;
+const RADIUS: usize = TAPS / 2;
+const SIGMA: f64 = 1.5;
+const C1: f64 = 0.01 * 0.01;
+const C2: f64 = 0.03 * 0.03;
+
+/// Rows blurred together by one task.
+const ROWS: usize = 16;
+
+fn window<R: Real>() -> [R; TAPS] {
+    let bell: [f64; TAPS] = std::array::from_fn(|i| {
+        let d = i as f64 - RADIUS as f64;
+        (-d * d / (2.0 * SIGMA * SIGMA)).exp()
+    });
+    let sum: f64 = bell.iter().sum();
+    bell.map(|b| R::real(b / sum))
+}
+
+/// Blurs `N` planes over rows `y0..y0 + rows` at once; `value(n, at)` gives plane n at index `at` of one channel.
+///
+/// * returns `[N][rows · width]`.
+#[inline(always)]
+fn blur<R: Real, const N: usize>(
+    window: &[R; TAPS],
+    [width, height]: [usize; 2],
+    y0: usize,
+    rows: usize,
+    value: impl Fn(usize, usize) -> R,
+) -> [Vec<R>; N] {
+    let padded_width = width + 2 * RADIUS;
+    let mut padded = vec![R::ZERO; padded_width];
+    let mut across = vec![R::ZERO; (rows + 2 * RADIUS) * width];
+    std::array::from_fn(|n| {
+        for (dy, line) in across.chunks_exact_mut(width).enumerate() {
+            line.fill(R::ZERO);
+            let Some(y) = (y0 + dy).checked_sub(RADIUS).filter(|y| *y < height) else { continue };
+            for (x, p) in padded[RADIUS..RADIUS + width].iter_mut().enumerate() {
+                *p = value(n, y * width + x);
+            }
+            for (tap, w) in window.iter().enumerate() {
+                for (out, p) in line.iter_mut().zip(&padded[tap..tap + width]) {
+                    *out += *w * *p;
+                }
+            }
+        }
+        let mut out = vec![R::ZERO; rows * width];
+        for (dy, line) in out.chunks_exact_mut(width).enumerate() {
+            for (tap, w) in window.iter().enumerate() {
+                for (o, a) in line.iter_mut().zip(&across[(dy + tap) * width..(dy + tap + 1) * width]) {
+                    *o += *w * *a;
+                }
+            }
+        }
+        out
+    })
+}
+
+/// Derivatives of the mean of S by the moments of x, which [`backward`] blurs back.
+#[derive(Clone, Debug)]
+pub struct Partials<R> {
+    /// `[3, height, width, 3]` as rows: ∂/∂μₓ, ∂/∂E\[x²\], ∂/∂E\[xy\], per block of rows and channel.
+    blocks: Vec<[Vec<R>; 3]>,
+    blocks_per_channel: usize,
+}
+
+/// Mean SSIM of `image` and `truth`, planes `[3, height, width]`, and what backward needs.
+pub fn forward<R: Real>(arch: Arch, image: &[R], truth: &[R], size_px: [usize; 2]) -> (R, Partials<R>) {
+    let [width, height] = size_px;
+    let plane = width * height;
+    let blocks_per_channel = height.div_ceil(ROWS);
+    let window = window::<R>();
+    let norm = R::ONE / R::real((3 * plane) as f64);
+    let (sums, blocks): (Vec<R>, Vec<[Vec<R>; 3]>) = (0..3 * blocks_per_channel)
+        .into_par_iter()
+        .map(|i| {
+            let (channel, y0) = (i / blocks_per_channel, i % blocks_per_channel * ROWS);
+            let x = &image[channel * plane..(channel + 1) * plane];
+            let y = &truth[channel * plane..(channel + 1) * plane];
+            arch.dispatch(
+                #[inline(always)]
+                || {
+                    let moments: [Vec<R>; 5] = blur(
+                        &window,
+                        size_px,
+                        y0,
+                        ROWS.min(height - y0),
+                        #[inline(always)]
+                        |n, at| match n {
+                            0 => x[at],
+                            1 => y[at],
+                            2 => x[at] * x[at],
+                            3 => y[at] * y[at],
+                            _ => x[at] * y[at],
+                        },
+                    );
+                    similarity(moments, norm)
+                },
+            )
+        })
+        .unzip();
+    (sums.into_iter().sum::<R>() * norm, Partials { blocks, blocks_per_channel })
+}
+
+/// Sum of S over one block, and its scaled derivatives by μₓ, E\[x²\], E\[xy\].
+#[inline(always)]
+fn similarity<R: Real>(moments: [Vec<R>; 5], norm: R) -> (R, [Vec<R>; 3]) {
+    let [mut mean_x, mean_y, mut xx, yy, mut xy] = moments;
+    let two = R::real(2.0);
+    let mut sum = R::ZERO;
+    let n = mean_x.len();
+    let (mean_y, yy) = (&mean_y[..n], &yy[..n]);
+    let mut values = vec![R::ZERO; n];
+    for i in 0..n {
+        let (mx, my) = (mean_x[i], mean_y[i]);
+        let a1 = two * mx * my + R::real(C1);
+        let a2 = two * (xy[i] - mx * my) + R::real(C2);
+        let b1 = mx * mx + my * my + R::real(C1);
+        let b2 = (xx[i] - mx * mx) + (yy[i] - my * my) + R::real(C2);
+        let inverse = R::ONE / (b1 * b2);
+        let s = a1 * a2 * inverse;
+        values[i] = s;
+        let d_xx = -s / b2;
+        let d_xy = two * a1 * inverse;
+        let d_mx = two * my * a2 * inverse - two * mx * s / b1 - two * mx * d_xx - my * d_xy;
+        mean_x[i] = d_mx * norm;
+        xx[i] = d_xx * norm;
+        xy[i] = d_xy * norm;
+    }
+    for v in values {
+        sum += v;
+    }
+    (sum, [mean_x, xx, xy])
+}
+
+/// Adds `weight · ∂(mean S)/∂image` to `d_image`.
+pub fn backward<R: Real>(
+    arch: Arch,
+    image: &[R],
+    truth: &[R],
+    size_px: [usize; 2],
+    partials: &Partials<R>,
+    weight: R,
+    d_image: &mut [R],
+) {
+    let [width, height] = size_px;
+    let plane = width * height;
+    let per_channel = partials.blocks_per_channel;
+    let window = window::<R>();
+    let two = R::real(2.0);
+    d_image.par_chunks_mut(plane).enumerate().for_each(|(channel, d_plane)| {
+        let x = &image[channel * plane..(channel + 1) * plane];
+        let y = &truth[channel * plane..(channel + 1) * plane];
+        let blocks = &partials.blocks[channel * per_channel..(channel + 1) * per_channel];
+        d_plane.par_chunks_mut(ROWS * width).enumerate().for_each(|(block, d)| {
+            arch.dispatch(
+                #[inline(always)]
+                || {
+                    let rows = d.len() / width;
+                    let [by_mean, by_xx, by_xy]: [Vec<R>; 3] = blur(
+                        &window,
+                        size_px,
+                        block * ROWS,
+                        rows,
+                        #[inline(always)]
+                        |n, at| blocks[at / (ROWS * width)][n][at % (ROWS * width)],
+                    );
+                    let start = block * ROWS * width;
+                    for (i, d) in d.iter_mut().enumerate() {
+                        let at = start + i;
+                        *d += weight * (by_mean[i] + two * x[at] * by_xx[i] + y[at] * by_xy[i]);
+                    }
+                },
+            );
+        });
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ops::finite_difference::{assert_gradient, random};
+
+    fn image(seed: u64, size: [usize; 2]) -> Vec<f64> {
+        random(seed, 3 * size[0] * size[1]).iter().map(|v| 0.5 + 0.5 * v).collect()
+    }
+
+    #[test]
+    fn equal_images_score_one() {
+        let size = [20, 33];
+        let x = image(1, size);
+        let (s, _) = forward(Arch::new(), &x, &x, size);
+        assert!((s - 1.0).abs() < 1e-12, "{s}");
+    }
+
+    #[test]
+    fn backward_agrees_with_finite_differences() {
+        for (seed, size) in [(1, [13, 7]), (2, [5, 19]), (3, [1, 1])] {
+            let (x, truth) = (image(seed, size), image(seed + 10, size));
+            let (_, partials) = forward(Arch::new(), &x, &truth, size);
+            let mut d = vec![0.0; x.len()];
+            backward(Arch::new(), &x, &truth, size, &partials, 0.2, &mut d);
+            assert_gradient("ssim", &x, &d, |x| 0.2 * forward(Arch::new(), x, &truth, size).0);
+        }
+        // Flat images: every variance is zero, only C2 keeps the quotient finite.
+        let size = [9, 9];
+        let (x, truth) = (vec![0.25; 243], vec![0.5; 243]);
+        let (_, partials) = forward(Arch::new(), &x, &truth, size);
+        let mut d = vec![0.0; x.len()];
+        backward(Arch::new(), &x, &truth, size, &partials, 1.0, &mut d);
+        assert_gradient("ssim, flat", &x, &d, |x| forward(Arch::new(), x, &truth, size).0);
+    }
+}

@@ -1,0 +1,176 @@
+//! What a run is made of: numbers a user may set, with the method's defaults.
+
+use serde::{Deserialize, Serialize};
+
+use crate::scene::ModelShape;
+
+/// A geometric path of a learning rate over the run: from `start` to `end`; equal values make it constant.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Rate {
+    /// At iteration 0.
+    pub start: f64,
+    /// At the last iteration.
+    pub end: f64,
+}
+
+impl Rate {
+    /// lr(t) = start^(1 − t/T) · end^(t/T) with `progress` = t/T.
+    pub fn at(&self, progress: f64) -> f64 {
+        if self.start <= 0.0 {
+            return 0.0;
+        }
+        (self.start.ln() * (1.0 - progress) + self.end.ln() * progress).exp()
+    }
+}
+
+/// Learning rates (Scaffold-GS, section 1.10 of the method notes).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Rates {
+    /// Offsets; multiplied by the capture's extent.
+    pub offset: Rate,
+    /// Anchor features.
+    pub feature: Rate,
+    /// Log-scales.
+    pub log_scale: Rate,
+    /// Opacity head.
+    pub opacity_head: Rate,
+    /// Covariance head.
+    pub covariance_head: Rate,
+    /// Colour head.
+    pub colour_head: Rate,
+}
+
+impl Default for Rates {
+    fn default() -> Self {
+        let constant = |rate| Rate { start: rate, end: rate };
+        Self {
+            offset: Rate { start: 0.01, end: 1e-4 },
+            feature: constant(0.0075),
+            log_scale: constant(0.007),
+            opacity_head: Rate { start: 0.002, end: 2e-5 },
+            covariance_head: constant(0.004),
+            colour_head: Rate { start: 0.008, end: 5e-5 },
+        }
+    }
+}
+
+/// Weights of the loss (Scaffold-GS, eq. 10).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LossWeights {
+    /// Share λ of 1 − SSIM; L1 has 1 − λ.
+    pub dssim: f64,
+    /// Mean volume of the Gaussians.
+    pub volume: f64,
+}
+
+impl Default for LossWeights {
+    fn default() -> Self {
+        Self { dssim: 0.2, volume: 0.01 }
+    }
+}
+
+/// When and how anchors come and go (sections 1.7 to 1.9 of the method notes).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Densification {
+    /// Shares of the run at which statistics start, growth starts and both end; 500, 1,500 and 15,000 of 30,000.
+    pub statistics_from: f64,
+    /// See `statistics_from`.
+    pub from: f64,
+    /// See `statistics_from`.
+    pub until: f64,
+    /// Iterations between two events; not scaled with the run.
+    pub interval: u32,
+    /// Share of an interval an anchor must have been seen in to be judged.
+    pub success: f64,
+    /// Mean screen gradient, half-image units, above which an offset asks for a new anchor at the coarsest level.
+    pub gradient_threshold: f64,
+    /// Voxel edge of the coarsest level, lattice cells; levels follow at a quarter each while at least one cell.
+    pub coarsest_cells: u32,
+    /// Levels at most.
+    pub levels: u32,
+    /// Anchors whose mean opacity sum is below are pruned.
+    pub min_opacity: f64,
+}
+
+impl Default for Densification {
+    fn default() -> Self {
+        Self {
+            statistics_from: 500.0 / 30_000.0,
+            from: 1_500.0 / 30_000.0,
+            until: 15_000.0 / 30_000.0,
+            interval: 100,
+            success: 0.8,
+            gradient_threshold: 2e-4,
+            coarsest_cells: 4,
+            levels: 3,
+            min_opacity: 0.005,
+        }
+    }
+}
+
+/// A whole run.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TrainConfig {
+    /// Widths and effects.
+    pub shape: ModelShape,
+    /// Optimiser steps; starting points and horizons scale with them.
+    pub iterations: u32,
+    /// Everything random follows from it.
+    pub seed: u64,
+    /// Edge ε of a lattice cell, normalised units.
+    pub voxel_size: f64,
+    /// Learning rates.
+    pub rates: Rates,
+    /// Loss weights.
+    pub loss: LossWeights,
+    /// Growth and pruning.
+    pub densification: Densification,
+}
+
+impl Default for TrainConfig {
+    fn default() -> Self {
+        Self {
+            shape: ModelShape {
+                feature_dim: 32,
+                n_offsets: 10,
+                view_direction: true,
+                view_distance: false,
+                dilation_compensation: false,
+            },
+            iterations: 30_000,
+            seed: 42,
+            voxel_size: 0.001,
+            rates: Rates::default(),
+            loss: LossWeights::default(),
+            densification: Densification::default(),
+        }
+    }
+}
+
+impl TrainConfig {
+    /// Refuses what no run can use, before any work starts.
+    ///
+    /// # Errors
+    /// A sentence that names the setting, its value and the accepted range.
+    pub fn validate(&self) -> Result<(), String> {
+        let within = |name: &str, value: f64, low: f64, high: f64| {
+            if value >= low && value <= high {
+                Ok(())
+            } else {
+                Err(format!("{name} is {value}, needs {low} to {high}"))
+            }
+        };
+        within("--iterations", f64::from(self.iterations), 1.0, 10_000_000.0)?;
+        within("--feature-dim", self.shape.feature_dim as f64, 1.0, 256.0)?;
+        within("--offsets", self.shape.n_offsets as f64, 1.0, 32.0)?;
+        within("--voxel-size", self.voxel_size, 1e-6, 1.0)?;
+        within("densification.interval", f64::from(self.densification.interval), 1.0, 1e9)
+    }
+
+    /// The iteration at share `share` of the run.
+    pub fn iteration_at(&self, share: f64) -> u32 {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "shares are in 0..=1")]
+        let at = (share * f64::from(self.iterations)).round() as u32;
+        at
+    }
+}

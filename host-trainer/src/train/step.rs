@@ -1,0 +1,344 @@
+//! One view through the whole chain, forward and backward.
+
+use pulp::Arch;
+use rayon::prelude::*;
+
+use super::config::LossWeights;
+use crate::ops::neural_gaussians::{Gaussian, HeadOutputs, Source};
+use crate::ops::project::{Footprint, Splat};
+use crate::ops::rasterise::TiledImage;
+use crate::ops::{
+    Pinhole, Real, head, head_input, l1, neural_gaussians, prefilter, project, rasterise, ssim, tiles, volume,
+};
+use crate::scene::{Heads, ModelShape, Scene};
+
+/// Anchors one task evaluates together; also the unit in which the gradients of the heads are summed, so that the sums
+/// do not depend on the number of threads.
+const BLOCK: usize = 256;
+
+/// The photograph a step compares with.
+#[derive(Clone, Copy, Debug)]
+pub struct Target<'a, R> {
+    /// The camera that took it.
+    pub camera: &'a Pinhole<R>,
+    /// Planes `[3, height, width]`, 0 to 1.
+    pub truth: &'a [R],
+    /// What lies behind everything.
+    pub background: [R; 3],
+}
+
+/// What a step gives back, besides the gradients it leaves in the [`Workspace`].
+#[derive(Clone, Copy, Debug)]
+pub struct StepReport<R> {
+    /// The whole loss.
+    pub loss: R,
+    /// Mean squared difference of image and photograph, before any rounding.
+    pub squared_error: f64,
+    /// Gaussians with positive opacity.
+    pub n_gaussians: usize,
+    /// Of these, what reached the image.
+    pub n_splats: usize,
+    /// (tile, splat) pairs.
+    pub n_pairs: usize,
+}
+
+/// A block of visible anchors on its way through the chain; buffers are kept from step to step.
+#[derive(Clone, Debug)]
+pub struct Block<R> {
+    /// Indices of its anchors in the scene, ascending.
+    pub anchors: Vec<u32>,
+    /// Gaussians with positive opacity.
+    pub gaussians: Vec<Gaussian<R>>,
+    /// Where each of them comes from.
+    pub sources: Vec<Source>,
+    /// Those of them that reached the image.
+    pub drawn: Vec<u32>,
+    /// Length of dL/d(mean) of each drawn one, in units of half the image (the growth statistic).
+    pub screen_gradients: Vec<R>,
+    /// dL/d(features) `[n, F]`.
+    pub d_features: Vec<R>,
+    /// dL/d(log-scales) `[n, 6]`.
+    pub d_log_scales: Vec<R>,
+    /// dL/d(offsets) `[n, 3K]`.
+    pub d_offsets: Vec<R>,
+    positions: Vec<[R; 3]>,
+    features: Vec<R>,
+    log_scales: Vec<R>,
+    offsets: Vec<R>,
+    input: Vec<R>,
+    hidden: [Vec<R>; 3],
+    outputs: HeadOutputs<R>,
+    splats: Vec<Splat<R>>,
+    footprints: Vec<Footprint<R>>,
+    d_gaussians: Vec<Gaussian<R>>,
+    d_outputs: HeadOutputs<R>,
+    d_hidden: Vec<R>,
+    d_input: Vec<R>,
+    d_heads: Heads<R>,
+}
+
+/// Buffers and gradients of a step.
+#[derive(Clone, Debug)]
+pub struct Workspace<R> {
+    arch: Arch,
+    blocks: Vec<Block<R>>,
+    n_blocks: usize,
+    /// dL/d(heads).
+    pub d_heads: Heads<R>,
+}
+
+fn refill<R: Real>(buffer: &mut Vec<R>, len: usize) {
+    buffer.clear();
+    buffer.resize(len, R::ZERO);
+}
+
+impl<R: Real> Block<R> {
+    fn new(shape: &ModelShape) -> Self {
+        Self {
+            anchors: Vec::new(),
+            gaussians: Vec::new(),
+            sources: Vec::new(),
+            drawn: Vec::new(),
+            screen_gradients: Vec::new(),
+            d_features: Vec::new(),
+            d_log_scales: Vec::new(),
+            d_offsets: Vec::new(),
+            positions: Vec::new(),
+            features: Vec::new(),
+            log_scales: Vec::new(),
+            offsets: Vec::new(),
+            input: Vec::new(),
+            hidden: Default::default(),
+            outputs: HeadOutputs::default(),
+            splats: Vec::new(),
+            footprints: Vec::new(),
+            d_gaussians: Vec::new(),
+            d_outputs: HeadOutputs::default(),
+            d_hidden: Vec::new(),
+            d_input: Vec::new(),
+            d_heads: Heads::filled(shape, R::ZERO),
+        }
+    }
+
+    /// Copies the rows of `anchors` out of the scene.
+    fn gather(&mut self, scene: &Scene<R>, anchors: &[u32]) {
+        let (f, o) = (scene.shape.feature_dim, 3 * scene.shape.n_offsets);
+        for buffer in [&mut self.features, &mut self.log_scales, &mut self.offsets] {
+            buffer.clear();
+        }
+        self.anchors.clear();
+        self.anchors.extend_from_slice(anchors);
+        self.positions.clear();
+        for a in anchors.iter().map(|a| *a as usize) {
+            self.positions.push(scene.position(a));
+            self.features.extend_from_slice(&scene.anchors.features[a * f..(a + 1) * f]);
+            self.log_scales.extend_from_slice(&scene.anchors.log_scales[a * 6..(a + 1) * 6]);
+            self.offsets.extend_from_slice(&scene.anchors.offsets[a * o..(a + 1) * o]);
+        }
+    }
+
+    /// From anchors to splats.
+    fn forward(&mut self, arch: Arch, scene: &Scene<R>, camera: &Pinhole<R>) {
+        let (shape, n) = (&scene.shape, self.anchors.len());
+        refill(&mut self.input, n * shape.head_inputs());
+        head_input::forward(shape, camera, &self.features, &self.positions, &mut self.input);
+        self.outputs.reset(shape, n);
+        let outputs = [&mut self.outputs.opacity, &mut self.outputs.covariance, &mut self.outputs.colour];
+        for ((weights, hidden), output) in scene.heads.each().into_iter().zip(&mut self.hidden).zip(outputs) {
+            hidden.resize(n * weights.n_hidden, R::ZERO);
+            head::forward(weights, &self.input, hidden, output);
+        }
+        self.gaussians.clear();
+        self.sources.clear();
+        self.splats.clear();
+        self.footprints.clear();
+        self.drawn.clear();
+        arch.dispatch(
+            #[inline(always)]
+            || {
+                neural_gaussians::forward(
+                    shape,
+                    &self.positions,
+                    &self.log_scales,
+                    &self.offsets,
+                    &self.outputs,
+                    &mut self.gaussians,
+                    &mut self.sources,
+                );
+                for (i, gaussian) in (0u32..).zip(&self.gaussians) {
+                    if let Some((splat, footprint)) = project::forward(camera, gaussian, shape.dilation_compensation) {
+                        self.splats.push(splat);
+                        self.footprints.push(footprint);
+                        self.drawn.push(i);
+                    }
+                }
+            },
+        );
+    }
+
+    /// From the gradients of its splats to those of its anchors and of the heads.
+    fn backward(
+        &mut self,
+        scene: &Scene<R>,
+        camera: &Pinhole<R>,
+        d_splats: &[Splat<R>],
+        volume_weight: R,
+        n_gaussians: usize,
+    ) {
+        let (shape, n) = (&scene.shape, self.anchors.len());
+        self.d_gaussians.clear();
+        self.d_gaussians.resize(self.gaussians.len(), Gaussian::default());
+        self.screen_gradients.clear();
+        let half = camera.size_px.map(|s| R::real(0.5 * s as f64));
+        for (drawn, d_splat) in self.drawn.iter().zip(d_splats) {
+            let i = *drawn as usize;
+            self.d_gaussians[i] = project::backward(camera, &self.gaussians[i], shape.dilation_compensation, d_splat);
+            let [x, y] = [d_splat.mean_px[0] * half[0], d_splat.mean_px[1] * half[1]];
+            self.screen_gradients.push((x * x + y * y).sqrt());
+        }
+        volume::backward(&self.gaussians, volume_weight, n_gaussians, &mut self.d_gaussians);
+        self.d_outputs.reset(shape, n);
+        refill(&mut self.d_log_scales, n * 6);
+        refill(&mut self.d_offsets, n * 3 * shape.n_offsets);
+        neural_gaussians::backward(
+            shape,
+            &self.log_scales,
+            &self.offsets,
+            &self.outputs,
+            &self.gaussians,
+            &self.sources,
+            &self.d_gaussians,
+            &mut self.d_outputs,
+            &mut self.d_log_scales,
+            &mut self.d_offsets,
+        );
+        refill(&mut self.d_input, n * shape.head_inputs());
+        let d_outputs = [&self.d_outputs.opacity, &self.d_outputs.covariance, &self.d_outputs.colour];
+        let heads = scene.heads.each().into_iter().zip(self.d_heads.each_mut());
+        for (((weights, d_weights), hidden), d_output) in heads.zip(&self.hidden).zip(d_outputs) {
+            for group in d_weights.groups_mut() {
+                group.fill(R::ZERO);
+            }
+            self.d_hidden.resize(n * weights.n_hidden, R::ZERO);
+            head::backward(weights, &self.input, hidden, d_output, &mut self.d_hidden, &mut self.d_input, d_weights);
+        }
+        refill(&mut self.d_features, n * shape.feature_dim);
+        head_input::backward(shape, &self.d_input, &mut self.d_features);
+    }
+}
+
+impl<R: Real> Workspace<R> {
+    /// Buffers for models of this shape.
+    pub fn new(shape: &ModelShape) -> Self {
+        Self { arch: Arch::new(), blocks: Vec::new(), n_blocks: 0, d_heads: Heads::filled(shape, R::ZERO) }
+    }
+
+    /// The blocks of visible anchors of the last step, with their gradients; anchors ascend through them.
+    pub fn blocks(&self) -> &[Block<R>] {
+        &self.blocks[..self.n_blocks]
+    }
+
+    /// Draws the view: the forward half of [`Self::step`].
+    ///
+    /// * returns the image in tile order, its tile lists and all splats.
+    fn draw(
+        &mut self,
+        scene: &Scene<R>,
+        camera: &Pinhole<R>,
+        background: [R; 3],
+    ) -> (TiledImage<R>, tiles::TileLists, Vec<Splat<R>>) {
+        let visible: Vec<u32> = (0..scene.anchors.len())
+            .into_par_iter()
+            .with_min_len(1024)
+            .filter(|a| {
+                let size = std::array::from_fn(|i| scene.anchors.log_scales[a * 6 + i].exp());
+                prefilter::anchor_is_visible(camera, scene.position(*a), size)
+            })
+            .map(|a| u32::try_from(a).expect("fewer than 2³² anchors"))
+            .collect();
+        self.n_blocks = visible.len().div_ceil(BLOCK);
+        while self.blocks.len() < self.n_blocks {
+            self.blocks.push(Block::new(&scene.shape));
+        }
+        let arch = self.arch;
+        self.blocks.par_iter_mut().zip(visible.par_chunks(BLOCK)).for_each(|(block, anchors)| {
+            block.gather(scene, anchors);
+            block.forward(arch, scene, camera);
+        });
+        let splats: Vec<Splat<R>> = self.blocks().iter().flat_map(|b| b.splats.iter().copied()).collect();
+        let footprints: Vec<Footprint<R>> = self.blocks().iter().flat_map(|b| b.footprints.iter().copied()).collect();
+        let lists = tiles::build(&splats, &footprints, camera.size_px);
+        let image = rasterise::forward(arch, &splats, &lists, background);
+        (image, lists, splats)
+    }
+
+    /// The image of a view, planes `[3, height, width]`, not clamped.
+    pub fn image(&mut self, scene: &Scene<R>, camera: &Pinhole<R>, background: [R; 3]) -> Vec<R> {
+        self.draw(scene, camera, background).0.to_planes(camera.size_px)
+    }
+
+    /// Loss and gradients of one view.
+    ///
+    /// L = (1 − λ)·L1 + λ·(1 − SSIM) + w·mean(s_x·s_y·s_z) (Lu et al. 2024, Scaffold-GS, eq. 10). Gradients of anchors are
+    /// left in [`Self::blocks`], those of the heads in [`Self::d_heads`].
+    pub fn step(&mut self, scene: &Scene<R>, target: &Target<'_, R>, weights: &LossWeights) -> StepReport<R> {
+        let size_px = target.camera.size_px;
+        let (tiled, lists, splats) = self.draw(scene, target.camera, target.background);
+        let image = tiled.to_planes(size_px);
+
+        let lambda = R::real(weights.dssim);
+        let (similarity, partials) = ssim::forward(self.arch, &image, target.truth, size_px);
+        let mut d_image = vec![R::ZERO; image.len()];
+        l1::backward(&image, target.truth, R::ONE - lambda, &mut d_image);
+        ssim::backward(self.arch, &image, target.truth, size_px, &partials, -lambda, &mut d_image);
+        let n_gaussians = self.blocks().iter().map(|b| b.gaussians.len()).sum();
+        let volume_weight = R::real(weights.volume);
+        let volumes: R = self.blocks().iter().map(|b| volume::forward(&b.gaussians, volume_weight, n_gaussians)).sum();
+        let loss = (R::ONE - lambda) * l1::forward(&image, target.truth) + lambda * (R::ONE - similarity) + volumes;
+
+        let d_tiled = TiledImage::from_planes(&d_image, size_px);
+        let d_splats = rasterise::backward(self.arch, &splats, &lists, &tiled, &d_tiled);
+        let mut rest = d_splats.as_slice();
+        let mut shares = Vec::with_capacity(self.n_blocks);
+        for block in self.blocks() {
+            let (share, after) = rest.split_at(block.drawn.len());
+            shares.push(share);
+            rest = after;
+        }
+        self.blocks[..self.n_blocks].par_iter_mut().zip(shares).for_each(|(block, d_splats)| {
+            block.backward(scene, target.camera, d_splats, volume_weight, n_gaussians);
+        });
+        self.sum_head_gradients();
+
+        let squared: f64 = image
+            .chunks(4096)
+            .zip(target.truth.chunks(4096))
+            .map(|(a, b)| a.iter().zip(b).map(|(x, y)| Into::<f64>::into((*x - *y) * (*x - *y))).sum::<f64>())
+            .sum();
+        StepReport {
+            loss,
+            squared_error: squared / image.len() as f64,
+            n_gaussians,
+            n_splats: splats.len(),
+            n_pairs: lists.entries.len(),
+        }
+    }
+
+    /// Adds the blocks' gradients of the heads in block order.
+    fn sum_head_gradients(&mut self) {
+        let blocks = &self.blocks[..self.n_blocks];
+        for (h, head) in self.d_heads.each_mut().into_iter().enumerate() {
+            for (g, group) in head.groups_mut().into_iter().enumerate() {
+                group.fill(R::ZERO);
+                for block in blocks {
+                    for (sum, part) in group.iter_mut().zip(block.d_heads.each()[h].groups()[g]) {
+                        *sum += *part;
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
-use serde::Deserialize;
 
 use super::image::{header_size_px, read_composited};
 use super::normalise::random_points_world;
@@ -14,6 +13,10 @@ use super::{
     Capture, DatasetError, EXTENT, LoadOptions, LoadReport, Normalisation, SkippedView, Split, View, ViewFault,
 };
 use crate::camera::Camera;
+
+mod transforms;
+
+use transforms::{Frame, Transforms, read_optional, read_transforms};
 
 /// The file that tells this layout.
 pub(super) const TRAIN_FILE: &str = "transforms_train.json";
@@ -26,28 +29,6 @@ const MIN_TRAIN_VIEWS: usize = 3;
 /// Whether the folder is of this layout.
 pub(super) fn is_layout_of(path: &Path) -> bool {
     path.join(TRAIN_FILE).is_file()
-}
-
-#[derive(Deserialize)]
-struct Transforms {
-    /// Horizontal field of view of all frames, radians.
-    camera_angle_x: f64,
-    frames: Vec<Frame>,
-}
-
-#[derive(Deserialize)]
-struct Frame {
-    /// Relative to the capture, usually without extension.
-    file_path: String,
-    /// Camera to world, OpenGL axes; `null` stands for a number that is none.
-    transform_matrix: Vec<Vec<Option<f64>>>,
-}
-
-impl Frame {
-    /// The path as people write it.
-    fn name(&self) -> &str {
-        self.file_path.trim_start_matches("./")
-    }
 }
 
 /// A frame whose pose and image header are sound.
@@ -68,7 +49,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<(Capture, LoadR
     let train = read_transforms(&train_file)?;
     let test = read_optional(path, TEST_FILE)?;
     if let Some(val) = read_optional(path, VAL_FILE)? {
-        notes.push(format!("the {} views of `{VAL_FILE}` are not used", val.frames.len()));
+        notes.push(format!("views in `{VAL_FILE}`, not used: {}", val.frames.len()));
     }
 
     let train_candidates = candidates(path, &train);
@@ -107,7 +88,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<(Capture, LoadR
     }
     if reader.n_without_alpha > 0 {
         notes.push(format!(
-            "{} images have no alpha channel, so what they show behind the object is trained as part of it; export \
+            "images without an alpha channel: {}; what they show behind the object is trained as part of it; export \
              RGBA to have the background {} there",
             reader.n_without_alpha, options.background
         ));
@@ -142,64 +123,12 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<(Capture, LoadR
     Ok((capture, report))
 }
 
-/// Reads a transforms file that need not be there.
-fn read_optional(folder: &Path, name: &str) -> Result<Option<Transforms>, DatasetError> {
-    let path = folder.join(name);
-    if path.exists() { read_transforms(&path).map(Some) } else { Ok(None) }
-}
-
-fn read_transforms(path: &Path) -> Result<Transforms, DatasetError> {
-    let text = std::fs::read_to_string(path).map_err(|source| DatasetError::Read { path: path.to_owned(), source })?;
-    let parsed = serde_json::from_str::<Transforms>(&text).or_else(|error| {
-        // Python writes the bare words NaN and Infinity, which JSON lacks; read as null they cost one view, not all.
-        // The first error is the one to tell: its column is right.
-        serde_json::from_str(&null_non_finite(&text)).map_err(|_| error)
-    });
-    let transforms = parsed.map_err(|source| DatasetError::Transforms { path: path.to_owned(), source })?;
-    let angle = transforms.camera_angle_x;
-    if angle > 0.0 && angle < std::f64::consts::PI {
-        Ok(transforms)
-    } else {
-        Err(DatasetError::FieldOfView { path: path.to_owned(), found: angle })
-    }
-}
-
-/// Replaces the bare words `NaN`, `Infinity` and `-Infinity` outside strings by `null`.
-fn null_non_finite(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    let mut inside_string = false;
-    let mut rest = text;
-    while let Some(c) = rest.chars().next() {
-        let word = ["NaN", "-Infinity", "Infinity"].into_iter().find(|word| !inside_string && rest.starts_with(word));
-        let taken = match word {
-            Some(word) => {
-                out.push_str("null");
-                word.len()
-            }
-            None => {
-                // A backslash takes the next character with it, so that \" does not end the string.
-                let escaped = if c == '\\' { rest[1..].chars().next().map_or(0, char::len_utf8) } else { 0 };
-                inside_string ^= c == '"';
-                out.push_str(&rest[..c.len_utf8() + escaped]);
-                c.len_utf8() + escaped
-            }
-        };
-        rest = &rest[taken..];
-    }
-    out
-}
-
 fn candidates(folder: &Path, transforms: &Transforms) -> Vec<Result<Candidate, ViewFault>> {
     transforms.frames.par_iter().map(|frame| candidate(folder, frame)).collect()
 }
 
 fn candidate(folder: &Path, frame: &Frame) -> Result<Candidate, ViewFault> {
-    let rows: Vec<Vec<f64>> = frame
-        .transform_matrix
-        .iter()
-        .map(|row| row.iter().map(|number| number.unwrap_or(f64::NAN)).collect())
-        .collect();
-    let (rotation, translation) = world_to_camera(&rows)?;
+    let (rotation, translation) = world_to_camera(&frame.rows())?;
     let literal = folder.join(frame.name());
     let mut with_extension = literal.clone().into_os_string();
     with_extension.push(".png");

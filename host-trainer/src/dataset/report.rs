@@ -79,7 +79,7 @@ impl fmt::Display for LoadReport {
             let of_split = || self.skipped.iter().filter(move |view| view.split == split);
             let n_skipped = of_split().count();
             if n_skipped > 0 {
-                write!(f, "\nleft out {n_skipped} {split} views:")?;
+                write!(f, "\n{split} views left out: {n_skipped}")?;
                 for view in of_split().take(FAULTS_SPELT_OUT) {
                     write!(f, "\n  {view}")?;
                 }
@@ -121,7 +121,7 @@ mod tests {
         };
         let text = report.to_string();
         assert!(text.starts_with("Blender capture: 7 views to train, 0 to test, 4×3 px (area-averaged from 8×6)"));
-        assert!(text.contains("left out 5 train views:\n  train/r_0: image missing"), "{text}");
+        assert!(text.contains("train views left out: 5\n  train/r_0: image missing"), "{text}");
         assert!(text.contains("train/r_2") && !text.contains("train/r_3"), "{text}");
         assert!(text.ends_with("… and 2 more\nnote: no test views"), "{text}");
     }

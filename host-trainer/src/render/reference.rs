@@ -3,11 +3,13 @@
 //! Nothing here is shared with the trainer's or the decoder's projection, networks or blending, so agreement means
 //! something. There are no tiles, no tables and no approximations; a pixel sees every splat in one global depth order.
 
+mod load;
+
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
 use crate::camera::Camera;
 use crate::dataset::Image;
-use crate::scene::{Head, Heads, ModelShape, Scene};
+use crate::scene::{Head, Heads, ModelShape};
 
 /// A centre at this depth or nearer is not drawn, normalised units.
 const NEAR: f64 = 0.2;
@@ -50,33 +52,6 @@ struct Splat {
 }
 
 impl ReferenceScene {
-    /// The scene that a trainer holds: every value widened, positions `lattice · voxel_size`.
-    pub fn from_scene<R: Copy + Into<f64>>(scene: &Scene<R>) -> Self {
-        let wide = |values: &[R]| values.iter().map(|&v| v.into()).collect::<Vec<f64>>();
-        let head = |h: &Head<R>| Head {
-            n_in: h.n_in,
-            n_hidden: h.n_hidden,
-            n_out: h.n_out,
-            w1: wide(&h.w1),
-            b1: wide(&h.b1),
-            w2: wide(&h.w2),
-            b2: wide(&h.b2),
-        };
-        let position = |cell: &[i32; 3]| DVec3::from(cell.map(f64::from)) * scene.voxel_size;
-        Self {
-            shape: scene.shape,
-            positions: scene.anchors.lattice.iter().map(position).collect(),
-            features: wide(&scene.anchors.features),
-            log_scales: wide(&scene.anchors.log_scales),
-            offsets: wide(&scene.anchors.offsets),
-            heads: Heads {
-                opacity: head(&scene.heads.opacity),
-                covariance: head(&scene.heads.covariance),
-                colour: head(&scene.heads.colour),
-            },
-        }
-    }
-
     /// Draws the scene.
     ///
     /// `C = Σᵢ cᵢ αᵢ Tᵢ + T·background`, front to back, `Tᵢ = Πⱼ₍ⱼ<ᵢ₎ (1 − αⱼ)` (Kerbl et al. 2023, eq. 3).

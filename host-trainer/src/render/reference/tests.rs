@@ -1,5 +1,5 @@
 use super::*;
-use crate::scene::Anchors;
+use crate::scene::{Anchors, Scene};
 
 const BACKGROUND: [f64; 3] = [0.1, 0.2, 0.3];
 const COLOUR: [f64; 3] = [0.9, 0.5, 0.2];

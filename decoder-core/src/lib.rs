@@ -8,10 +8,20 @@ extern crate std;
 mod camera;
 mod error;
 
+pub mod budget;
 pub mod bundle;
+mod decoder;
+#[cfg(feature = "embedded-graphics")]
+pub mod display;
 pub mod entropy;
 pub mod math;
+mod mlp;
+mod project;
+mod raster;
+mod scene;
 
+pub use budget::{Budget, MaxSplats, Plan};
 pub use bundle::Bundle;
 pub use camera::Camera;
+pub use decoder::{Decoder, FrameReport, TileSink};
 pub use error::{DecodeError, ErrorClass, Field, SectionKind};

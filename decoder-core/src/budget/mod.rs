@@ -1,0 +1,11 @@
+//! Memory as a contract: limits in, an exact number of bytes out, the caller's bytes carved into typed slices.
+//!
+//! A [`Plan`] says how many bytes of scratch memory a decoder needs; with that many it draws, with one fewer
+//! [`Decoder::bind`](crate::Decoder::bind) fails and names the number. Nothing is allocated later.
+#![deny(clippy::indexing_slicing, clippy::arithmetic_side_effects, clippy::unwrap_used, clippy::panic)]
+
+mod arena;
+mod plan;
+
+pub(crate) use arena::Arena;
+pub use plan::{Budget, MAX_FRAME_PX, MaxSplats, Plan};

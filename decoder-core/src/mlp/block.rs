@@ -1,0 +1,67 @@
+//! A dense layer cut into blocks of outputs.
+
+use crate::budget::Arena;
+use crate::bundle::Halves;
+use crate::error::DecodeError;
+
+/// A dense layer: `[n_blocks, 1 + n_in, B]`, each block beginning with its biases.
+pub(crate) struct Blocks<'s, const B: usize> {
+    rows_per_block: usize,
+    rows: &'s [[f32; B]],
+}
+
+/// Rows of `B` weights that a layer of `n_in` inputs and `n_out` outputs fills.
+pub(crate) const fn n_rows<const B: usize>(n_in: usize, n_out: usize) -> usize {
+    n_out.div_ceil(B) * (n_in + 1)
+}
+
+impl<'s, const B: usize> Blocks<'s, B> {
+    /// Converts a layer's weights `[n_out, n_in]` and biases `[n_out]`; outputs beyond `n_out` become 0.
+    pub(crate) fn convert(
+        arena: &mut Arena<'s>,
+        weights: &Halves<'_>,
+        biases: &Halves<'_>,
+        n_in: usize,
+    ) -> Result<Self, DecodeError> {
+        let n_out = biases.len();
+        let rows = arena.take::<[f32; B]>(n_rows::<B>(n_in, n_out))?;
+        let rows_per_block = n_in + 1;
+        for (block, block_rows) in rows.chunks_exact_mut(rows_per_block).enumerate() {
+            for (input, row) in block_rows.iter_mut().enumerate() {
+                for (lane, weight) in row.iter_mut().enumerate() {
+                    let output = block * B + lane;
+                    let stored = match input.checked_sub(1) {
+                        None => biases.get(output),
+                        Some(input) => weights.get(output * n_in + input),
+                    };
+                    *weight = if output < n_out { stored.unwrap_or(0.0) } else { 0.0 };
+                }
+            }
+        }
+        Ok(Self { rows_per_block, rows })
+    }
+
+    /// All blocks in order.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &'s [[f32; B]]> + use<'s, B> {
+        self.rows.chunks_exact(self.rows_per_block)
+    }
+
+    /// Block number `index`.
+    pub(crate) fn block(&self, index: usize) -> Option<&'s [[f32; B]]> {
+        let (_, from) = self.rows.split_at_checked(index * self.rows_per_block)?;
+        from.get(..self.rows_per_block)
+    }
+}
+
+/// The outputs of one block: bias, then `input·weight` added in order.
+#[inline]
+pub(crate) fn outputs<const B: usize>(block: &[[f32; B]], inputs: &[f32]) -> [f32; B] {
+    let Some((&biases, weights)) = block.split_first() else { return [0.0; B] };
+    let mut sums = biases;
+    for (row, &x) in weights.iter().zip(inputs) {
+        for (sum, &weight) in sums.iter_mut().zip(row) {
+            *sum += weight * x;
+        }
+    }
+    sums
+}

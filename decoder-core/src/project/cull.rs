@@ -1,0 +1,84 @@
+//! What a view can see: boxes of chunks, then anchors.
+
+use super::covariance::Covariance;
+use super::view::{NEAR, View};
+
+/// How far beyond its 3D extent a splat reaches on the image: √(2 ln 255 · 0.3) from the dilation, and rounding, pixels.
+const DILATION_REACH_PX: f32 = 1.9;
+
+impl View {
+    /// Whether anything inside a box can reach the image; true more often than needed, never false wrongly.
+    ///
+    /// The box holds, for each of its splats, the ball of radius r = √(2 ln 255)·σ_max around the centre (x, y, z). On
+    /// the image the splat reaches at most r·fx/z·√(1 + t²) from its centre, t being the clamped slope, plus the reach
+    /// of the dilation. So it ends left of the image when x + m·z + r·√(1 + t²) < 0 for m = (cx + reach)/fx, and if m
+    /// is taken no smaller than |t| can be, that follows from the whole ball lying beyond the plane x + m·z = 0.
+    pub(crate) fn sees_box(&self, (min, max): ([f32; 3], [f32; 3])) -> bool {
+        let [row_x, row_y, row_z] = self.rotation;
+        let [tx, ty, tz] = self.translation;
+        // The largest value of normal·p + shift over the box.
+        let reach = |normal: [f32; 3], shift: f32| {
+            let corners = normal.iter().zip(min.iter().zip(&max));
+            let farthest: f32 = corners.map(|(&n, (&low, &high))| n * if n > 0.0 { high } else { low }).sum();
+            let size: f32 =
+                normal.iter().zip(min.iter().zip(&max)).map(|(n, (a, b))| n.abs() * (a.abs() + b.abs())).sum();
+            // The sums above are rounded; a part in 10⁵ of their terms is well beyond that.
+            farthest + shift + 1e-5 * (size + shift.abs())
+        };
+        // NaN, from absurd cameras, counts as seen here and below.
+        if reach(row_z, tz) <= NEAR {
+            return false;
+        }
+        let sides = self.sides();
+        sides.into_iter().all(|(axis_x, sign, slope)| {
+            let (row, shift) = if axis_x { (row_x, tx) } else { (row_y, ty) };
+            let [a0, a1, a2] = row.map(|r| r * sign);
+            let [z0, z1, z2] = row_z.map(|r| r * slope);
+            let beyond = reach([a0 + z0, a1 + z1, a2 + z2], shift * sign + tz * slope) < 0.0;
+            !beyond
+        })
+    }
+
+    /// Left, right, top, bottom: which axis, its sign, and the slope m of the plane `sign·x + m·z = 0`.
+    fn sides(&self) -> [(bool, f32, f32); 4] {
+        let [fx, fy] = self.focal_px;
+        let [cx, cy] = self.principal_px;
+        let [width, height] = self.size_px;
+        let [min_x, min_y] = self.slope_min;
+        let [max_x, max_y] = self.slope_max;
+        let steepest = |from: f32, limit: f32, other: f32| {
+            // The slope of a splat beyond this side lies between the image's edge and the clamp.
+            let clamp = if limit.abs() > other.abs() { limit.abs() } else { other.abs() };
+            if from > clamp { from } else { clamp }
+        };
+        [
+            (true, 1.0, steepest((cx + DILATION_REACH_PX) / fx, min_x, max_x)),
+            (true, -1.0, steepest((width - cx + DILATION_REACH_PX) / fx, max_x, min_x)),
+            (false, 1.0, steepest((cy + DILATION_REACH_PX) / fy, min_y, max_y)),
+            (false, -1.0, steepest((height - cy + DILATION_REACH_PX) / fy, max_y, min_y)),
+        ]
+    }
+
+    /// The prefilter of anchors: an anchor counts as a Gaussian with deviations `extent` along the world's axes, and is
+    /// kept when the square of ⌈3·√λ_max⌉ pixels around its centre overlaps the image.
+    pub(crate) fn sees_anchor(&self, position: [f32; 3], extent: [f32; 3]) -> bool {
+        let point = self.to_camera(position);
+        let [_, _, z] = point;
+        let in_front = z > NEAR;
+        if !in_front {
+            return false;
+        }
+        let [l0, l1, l2] = extent;
+        let rows = self.jacobian(point).map(|[a, b, c]| [a * l0, b * l1, c * l2]);
+        let covariance = Covariance::from_rows(rows);
+        let half_difference = 0.5 * (covariance.xx - covariance.yy);
+        // mid² − det, written without the difference of two large numbers.
+        let spread = half_difference * half_difference + covariance.xy * covariance.xy;
+        let spread = if spread > 0.1 { spread } else { 0.1 };
+        let lambda_max = 0.5 * (covariance.xx + covariance.yy) + libm::sqrtf(spread);
+        let radius = libm::ceilf(3.0 * libm::sqrtf(lambda_max));
+        let [u, v] = self.to_image(point);
+        let [width, height] = self.size_px;
+        u + radius > 0.0 && u - radius < width && v + radius > 0.0 && v - radius < height
+    }
+}

@@ -1,0 +1,11 @@
+//! From the normalised frame to the image plane: which chunks and anchors a view can see, and the splats of Gaussians.
+//!
+//! Elliptical weighted average splatting (Zwicker et al. 2001), with the constants of the trainer.
+
+mod covariance;
+mod cull;
+mod splat;
+mod view;
+
+pub(crate) use splat::{LN_255, Splat};
+pub(crate) use view::View;

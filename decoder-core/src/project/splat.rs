@@ -1,0 +1,90 @@
+//! A splat: what remains of a Gaussian once projected, in the form in which rows of pixels are drawn.
+
+use bytemuck::{Pod, Zeroable};
+
+use super::covariance::Covariance;
+use super::view::{NEAR, View};
+use crate::raster::TileRect;
+use crate::scene::Gaussian;
+
+/// ln 255: opacity·255 = exp(log_opacity + LN_255).
+pub(crate) const LN_255: f32 = 5.541_263_5;
+
+/// A projected Gaussian, 40 bytes.
+///
+/// Completing the square, dᵀΣ'⁻¹d = (dx − shear·dy)²·det⁻¹Σ'yy + dy²/Σ'yy: along a row of pixels the exponent is one
+/// parabola around `u + shear·dy`. No term cancels another, which the usual conic does for long thin splats.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Splat {
+    /// Centre, pixels.
+    pub(crate) mean: [f32; 2],
+    /// Σ'xy/Σ'yy: how far the row's centre moves per row.
+    pub(crate) shear: f32,
+    /// Σ'yy/det Σ': inverse variance along a row, px⁻².
+    pub(crate) row_precision: f32,
+    /// 1/Σ'yy: inverse variance across rows, px⁻².
+    pub(crate) column_precision: f32,
+    /// Natural logarithm of the opacity, compensation included.
+    pub(crate) log_opacity: f32,
+    /// RGB, 0 to 1.
+    pub(crate) colour: [f32; 3],
+    /// z in the camera frame, positive.
+    pub(crate) depth: f32,
+}
+
+impl View {
+    /// Projects a Gaussian; `None` when it is too near, too faint, or draws no pixel of the image.
+    ///
+    /// # Budget
+    /// About 150 multiplications, one logarithm, two square roots, constant.
+    pub(crate) fn project(&self, gaussian: &Gaussian, dilation_compensation: bool) -> Option<(Splat, TileRect)> {
+        let point = self.to_camera(gaussian.centre);
+        let [_, _, depth] = point;
+        // Not `depth <= NEAR`: NaN leaves as well, here and below.
+        let in_front = depth > NEAR;
+        if !in_front {
+            return None;
+        }
+        let covariance = Covariance::from_rows(self.sphere_to_image(point, gaussian));
+        let mut opacity = gaussian.opacity;
+        if dilation_compensation {
+            opacity *= libm::sqrtf(covariance.det_bare / covariance.det);
+        }
+        let log_opacity = libm::logf(opacity);
+        // Squared Mahalanobis radius at which alpha reaches 1/255.
+        let reach = 2.0 * (log_opacity + LN_255);
+        if !(reach >= 0.0 && covariance.det.is_finite()) {
+            return None;
+        }
+        let mean = self.to_image(point);
+        let half_extent = [libm::sqrtf(reach * covariance.xx), libm::sqrtf(reach * covariance.yy)];
+        let rect = TileRect::covering(mean, half_extent, self.size_px)?;
+        let splat = Splat {
+            mean,
+            shear: covariance.xy / covariance.yy,
+            row_precision: covariance.yy / covariance.det,
+            column_precision: 1.0 / covariance.yy,
+            log_opacity,
+            colour: gaussian.colour,
+            depth,
+        };
+        Some((splat, rect))
+    }
+
+    /// The rows of J·R·Q·S, Q being the Gaussian's rotation and S its scales.
+    #[inline]
+    fn sphere_to_image(&self, point_cam: [f32; 3], gaussian: &Gaussian) -> [[f32; 3]; 2] {
+        let [w, x, y, z] = gaussian.rotation;
+        let [s0, s1, s2] = gaussian.scale;
+        let columns = [
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)],
+            [2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)],
+            [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)],
+        ];
+        self.jacobian(point_cam).map(|row| {
+            let [c0, c1, c2] = columns.map(|column| super::view::dot(row, column));
+            [c0 * s0, c1 * s1, c2 * s2]
+        })
+    }
+}

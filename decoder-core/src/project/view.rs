@@ -1,0 +1,90 @@
+//! A camera, with what depends on it alone computed once a frame.
+
+use crate::camera::Camera;
+use crate::error::DecodeError;
+
+/// Nothing nearer than this is drawn, normalised units.
+pub(super) const NEAR: f32 = 0.2;
+
+/// Beyond the image by this part of its size the Jacobian stops growing.
+const CLAMP_MARGIN: f32 = 0.15;
+
+/// A camera ready to project.
+pub(crate) struct View {
+    pub(super) rotation: [[f32; 3]; 3],
+    pub(super) translation: [f32; 3],
+    /// Where the camera stands, normalised frame.
+    pub(crate) eye: [f32; 3],
+    pub(super) focal_px: [f32; 2],
+    pub(super) principal_px: [f32; 2],
+    pub(super) size_px: [f32; 2],
+    /// Limits of x/z and y/z in the Jacobian.
+    pub(super) slope_min: [f32; 2],
+    pub(super) slope_max: [f32; 2],
+}
+
+impl View {
+    /// Checks the camera and prepares it.
+    pub(crate) fn new(camera: &Camera) -> Result<Self, DecodeError> {
+        camera.check()?;
+        let [r0, r1, r2, r3, r4, r5, r6, r7, r8] = camera.rotation;
+        let [fx, fy] = camera.focal_px;
+        let [cx, cy] = camera.principal_px;
+        let [width, height] = [f32::from(camera.width_px), f32::from(camera.height_px)];
+        let [margin_x, margin_y] = [CLAMP_MARGIN * width / fx, CLAMP_MARGIN * height / fy];
+        Ok(Self {
+            rotation: [[r0, r1, r2], [r3, r4, r5], [r6, r7, r8]],
+            translation: camera.translation,
+            eye: camera.centre(),
+            focal_px: camera.focal_px,
+            principal_px: camera.principal_px,
+            size_px: [width, height],
+            slope_min: [-(cx / fx + margin_x), -(cy / fy + margin_y)],
+            slope_max: [(width - cx) / fx + margin_x, (height - cy) / fy + margin_y],
+        })
+    }
+
+    /// Takes a point of the normalised frame to the camera's.
+    #[inline]
+    pub(super) fn to_camera(&self, point: [f32; 3]) -> [f32; 3] {
+        let [row_x, row_y, row_z] = self.rotation;
+        let [tx, ty, tz] = self.translation;
+        [dot(row_x, point) + tx, dot(row_y, point) + ty, dot(row_z, point) + tz]
+    }
+
+    /// Projects a point of the camera frame.
+    #[inline]
+    pub(super) fn to_image(&self, [x, y, z]: [f32; 3]) -> [f32; 2] {
+        let [fx, fy] = self.focal_px;
+        let [cx, cy] = self.principal_px;
+        [fx * x / z + cx, fy * y / z + cy]
+    }
+
+    /// The two rows of J·R, which takes small displacements at `point_cam` from the normalised frame to pixels.
+    ///
+    /// J = [fx/z, 0, −fx·tx/z; 0, fy/z, −fy·ty/z], tx and ty being x/z and y/z within the clamp.
+    #[inline]
+    pub(super) fn jacobian(&self, [x, y, z]: [f32; 3]) -> [[f32; 3]; 2] {
+        let [row_x, row_y, row_z] = self.rotation;
+        let [fx, fy] = self.focal_px;
+        let [min_x, min_y] = self.slope_min;
+        let [max_x, max_y] = self.slope_max;
+        let [slope_x, slope_y] = [clamp(x / z, min_x, max_x), clamp(y / z, min_y, max_y)];
+        let row = |scale: f32, [a0, a1, a2]: [f32; 3], slope: f32| {
+            let [z0, z1, z2] = row_z;
+            [scale * (a0 - slope * z0), scale * (a1 - slope * z1), scale * (a2 - slope * z2)]
+        };
+        [row(fx / z, row_x, slope_x), row(fy / z, row_y, slope_y)]
+    }
+}
+
+#[inline]
+pub(super) fn dot([a0, a1, a2]: [f32; 3], [b0, b1, b2]: [f32; 3]) -> f32 {
+    a0 * b0 + a1 * b1 + a2 * b2
+}
+
+#[inline]
+fn clamp(x: f32, min: f32, max: f32) -> f32 {
+    let x = if x < min { min } else { x };
+    if x > max { max } else { x }
+}

@@ -1,0 +1,11 @@
+//! From splats to pixels: order by depth, gather a row of tiles, blend tile after tile.
+//!
+//! All memory is the caller's; the module knows nothing of cameras and anchors.
+
+mod blend;
+mod depth;
+mod tile;
+
+pub(crate) use blend::{Canvas, TilePlace, blend_tile};
+pub(crate) use depth::{N_RADIX, sort_by_depth};
+pub(crate) use tile::{TILE_PIXELS, TILE_PX, TileRect};

@@ -1,0 +1,9 @@
+//! From an anchor's values to the Gaussians it stands for in one view.
+//!
+//! The module knows the meaning of channels and of the heads' inputs and outputs; it knows nothing of images.
+
+mod anchor;
+mod gaussian;
+
+pub(crate) use anchor::Anchor;
+pub(crate) use gaussian::{Gaussian, Workspace, for_each_gaussian};

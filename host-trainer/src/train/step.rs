@@ -233,6 +233,11 @@ impl<R: Real> Workspace<R> {
         Self { arch: Arch::new(), blocks: Vec::new(), n_blocks: 0, d_heads: Heads::filled(shape, R::ZERO) }
     }
 
+    /// The instruction set that the loops run under.
+    pub fn arch(&self) -> Arch {
+        self.arch
+    }
+
     /// The blocks of visible anchors of the last step, with their gradients; anchors ascend through them.
     pub fn blocks(&self) -> &[Block<R>] {
         &self.blocks[..self.n_blocks]

@@ -1,0 +1,208 @@
+//! Growth of anchors where the image pulls, and pruning of those that show nothing.
+
+use std::collections::{BTreeMap, HashSet};
+
+use glam::DVec3;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use super::config::Densification;
+use super::optimiser::{Optimiser, retain_rows};
+use super::statistics::Statistics;
+use crate::scene::Scene;
+use crate::scene::init::lattice_cell;
+
+/// Base log-scales above this are lowered to it at every event, as the published trainer does: l_g ≤ e^0.05.
+const MAX_BASE_LOG_SCALE: f32 = 0.05;
+
+/// Growth ratio of thresholds, and shrink ratio of voxel edges, from one level to the next finer.
+const THRESHOLD_RATIO: f64 = 2.0;
+const EDGE_RATIO: u32 = 4;
+
+/// Adds anchors where offsets that were drawn often enough have a large mean screen gradient.
+///
+/// Level i = 0, 1, …: threshold τ·2^i, kept with probability 1 − 0.5^(i+1), voxel edge ε·⌊cells/4^i⌋ (a level without a
+/// cell is skipped, and so is a finer one when nothing has grown yet). A new anchor takes the element-wise largest
+/// feature of the parents that fall into its voxel, log-scales ln(edge), offsets 0 (section 1.8 of the method notes).
+///
+/// * returns how many were added.
+pub fn grow(
+    scene: &mut Scene<f32>,
+    optimiser: &mut Optimiser<f32>,
+    statistics: &mut Statistics,
+    settings: &Densification,
+    rng: &mut ChaCha8Rng,
+) -> usize {
+    let (f, k) = (scene.shape.feature_dim, scene.shape.n_offsets);
+    let enough = f64::from(settings.interval) * settings.success * 0.5;
+    let n_before = scene.anchors.len();
+    let eligible: Vec<usize> =
+        (0..n_before * k).filter(|at| f64::from(statistics.n_drawn[*at]) > enough).collect();
+    let mean_gradient =
+        |at: usize| f64::from(statistics.gradient_sum[at]) / f64::from(statistics.n_drawn[at].max(1));
+    for level in 0..settings.levels {
+        let cells = settings.coarsest_cells / EDGE_RATIO.pow(level);
+        if cells == 0 || (level > 0 && scene.anchors.len() == n_before) {
+            continue;
+        }
+        let threshold = settings.gradient_threshold * THRESHOLD_RATIO.powf(f64::from(level));
+        let drop_below = 0.5f64.powf(f64::from(level + 1));
+        // Drawn for every offset, eligible or not, so that one more eligible offset does not change all later draws.
+        let lucky: Vec<bool> = (0..n_before * k).map(|_| rng.random::<f64>() > drop_below).collect();
+        let edge = scene.voxel_size * f64::from(cells);
+        let cell_of = |p: DVec3| lattice_cell(p, edge);
+        let position = |scene: &Scene<f32>, a: usize| DVec3::from(scene.anchors.lattice[a].map(f64::from)) * scene.voxel_size;
+        let occupied: HashSet<[i32; 3]> =
+            (0..scene.anchors.len()).map(|a| cell_of(position(scene, a))).collect();
+        let mut candidates: BTreeMap<[i32; 3], Vec<f32>> = BTreeMap::new();
+        for at in eligible.iter().copied().filter(|at| lucky[*at] && mean_gradient(*at) >= threshold) {
+            let anchor = at / k;
+            let offset = DVec3::from(std::array::from_fn(|i| {
+                f64::from(scene.anchors.offsets[at * 3 + i]) * f64::from(scene.anchors.log_scales[anchor * 6 + i]).exp()
+            }));
+            let cell = cell_of(position(scene, anchor) + offset);
+            if occupied.contains(&cell) {
+                continue;
+            }
+            let parent = &scene.anchors.features[anchor * f..(anchor + 1) * f];
+            let feature = candidates.entry(cell).or_insert_with(|| parent.to_vec());
+            for (largest, value) in feature.iter_mut().zip(parent) {
+                *largest = largest.max(*value);
+            }
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "the logarithm of an edge is small")]
+        let log_edge = edge.ln() as f32;
+        let cells = i32::try_from(cells).expect("a voxel spans a few cells");
+        for (cell, feature) in candidates {
+            scene.anchors.lattice.push(cell.map(|c| c.saturating_mul(cells)));
+            scene.anchors.features.extend(feature);
+            scene.anchors.log_scales.extend([log_edge; 6]);
+            scene.anchors.offsets.extend(std::iter::repeat_n(0.0, 3 * k));
+        }
+    }
+    for at in eligible {
+        statistics.gradient_sum[at] = 0.0;
+        statistics.n_drawn[at] = 0;
+    }
+    statistics.grow(scene.anchors.len(), k);
+    optimiser.grow(scene);
+    scene.anchors.len() - n_before
+}
+
+/// Removes anchors that were seen often enough and whose opacities sum to less than `min_opacity` a view on average.
+///
+/// Afterwards every anchor that was seen often enough starts counting afresh, and base log-scales are lowered to
+/// [`MAX_BASE_LOG_SCALE`] (section 1.9 of the method notes).
+///
+/// * returns how many were removed.
+pub fn prune(
+    scene: &mut Scene<f32>,
+    optimiser: &mut Optimiser<f32>,
+    statistics: &mut Statistics,
+    settings: &Densification,
+) -> usize {
+    let (f, k) = (scene.shape.feature_dim, scene.shape.n_offsets);
+    let enough = f64::from(settings.interval) * settings.success;
+    let n_before = scene.anchors.len();
+    let judged: Vec<bool> = statistics.n_views.iter().map(|n| f64::from(*n) > enough).collect();
+    let mut keep: Vec<bool> = (0..n_before)
+        .map(|a| {
+            let floor = settings.min_opacity * f64::from(statistics.n_views[a]);
+            !(judged[a] && f64::from(statistics.opacity_sum[a]) < floor)
+        })
+        .collect();
+    // A scene without anchors has nothing left to grow from.
+    if !keep.contains(&true) {
+        keep.fill(true);
+    }
+    for (a, judged) in judged.into_iter().enumerate() {
+        if judged {
+            statistics.opacity_sum[a] = 0.0;
+            statistics.n_views[a] = 0;
+        }
+    }
+    for base in scene.anchors.log_scales.chunks_exact_mut(6).flat_map(|s| &mut s[3..]) {
+        *base = base.min(MAX_BASE_LOG_SCALE);
+    }
+    retain_rows(&mut scene.anchors.lattice, 1, &keep);
+    retain_rows(&mut scene.anchors.features, f, &keep);
+    retain_rows(&mut scene.anchors.log_scales, 6, &keep);
+    retain_rows(&mut scene.anchors.offsets, 3 * k, &keep);
+    optimiser.retain(&keep, f, k);
+    statistics.retain(&keep, k);
+    n_before - scene.anchors.len()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::init::initial_scene;
+    use crate::train::TrainConfig;
+    use rand::SeedableRng;
+
+    fn start(points: &[DVec3]) -> (Scene<f32>, Optimiser<f32>, Statistics, ChaCha8Rng) {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let scene = initial_scene(TrainConfig::default().shape, 0.001, points, &mut rng);
+        let optimiser = Optimiser::new(&scene);
+        let statistics = Statistics::new(scene.anchors.len(), scene.shape.n_offsets);
+        (scene, optimiser, statistics, rng)
+    }
+
+    fn consistent(scene: &Scene<f32>, optimiser: &Optimiser<f32>, statistics: &Statistics) {
+        let n = scene.anchors.len();
+        assert_eq!(scene.anchors.features.len(), n * 32);
+        assert_eq!(scene.anchors.log_scales.len(), n * 6);
+        assert_eq!(scene.anchors.offsets.len(), n * 30);
+        assert_eq!(optimiser.features.first.len(), n * 32);
+        assert_eq!(optimiser.offsets.second.len(), n * 30);
+        assert_eq!(statistics.n_views.len(), n);
+        assert_eq!(statistics.gradient_sum.len(), n * 10);
+    }
+
+    #[test]
+    fn an_offset_that_is_pulled_hard_becomes_an_anchor_on_the_lattice() {
+        let (mut scene, mut optimiser, mut statistics, mut rng) = start(&[DVec3::ZERO, DVec3::ONE]);
+        scene.anchors.features[..32].fill(-2.0);
+        for k in 0..10 {
+            scene.anchors.log_scales[..3].fill(0.0);
+            scene.anchors.offsets[k * 3] = 0.1 * (k + 1) as f32;
+            statistics.n_drawn[k] = 41;
+            statistics.gradient_sum[k] = 41.0;
+        }
+        let added = grow(&mut scene, &mut optimiser, &mut statistics, &Densification::default(), &mut rng);
+        assert!((8..=10).contains(&added), "kept at ½ on the coarse level, then at ¾ of the rest: {added}");
+        consistent(&scene, &optimiser, &statistics);
+        for cell in &scene.anchors.lattice[2..] {
+            assert!(cell[0] % 100 == 0 && cell[0] > 0 && cell[1] == 0, "at a former offset: {cell:?}");
+        }
+        assert!(scene.anchors.features[64..].iter().all(|v| *v == -2.0), "the parent's feature");
+        assert!(statistics.n_drawn.iter().all(|n| *n == 0), "judged offsets start afresh");
+        let again = grow(&mut scene, &mut optimiser, &mut statistics, &Densification::default(), &mut rng);
+        assert_eq!(again, 0, "nothing is eligible");
+    }
+
+    #[test]
+    fn a_seldom_drawn_or_gentle_offset_grows_nothing() {
+        let (mut scene, mut optimiser, mut statistics, mut rng) = start(&[DVec3::ZERO, DVec3::ONE]);
+        statistics.n_drawn[0] = 40;
+        statistics.gradient_sum[0] = 40.0;
+        statistics.n_drawn[1] = 100;
+        statistics.gradient_sum[1] = 100.0 * 1.9e-4;
+        assert_eq!(grow(&mut scene, &mut optimiser, &mut statistics, &Densification::default(), &mut rng), 0);
+        assert_eq!(statistics.n_drawn[..2], [40, 0], "only the judged one is reset");
+    }
+
+    #[test]
+    fn an_anchor_that_showed_nothing_goes() {
+        let (mut scene, mut optimiser, mut statistics, _) = start(&[DVec3::ZERO, DVec3::ONE, -DVec3::ONE]);
+        statistics.n_views = vec![81, 81, 80];
+        statistics.opacity_sum = vec![0.4, 0.41, 0.0];
+        scene.anchors.log_scales[17] = 1.0;
+        let kept = scene.anchors.lattice[1..].to_vec();
+        assert_eq!(prune(&mut scene, &mut optimiser, &mut statistics, &Densification::default()), 1);
+        assert_eq!(scene.anchors.lattice, kept);
+        consistent(&scene, &optimiser, &statistics);
+        assert_eq!(statistics.n_views, [0, 80], "judged anchors start afresh, the other goes on");
+        assert_eq!(scene.anchors.log_scales[11], MAX_BASE_LOG_SCALE);
+    }
+}

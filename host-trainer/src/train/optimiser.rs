@@ -1,0 +1,175 @@
+//! Adam over a whole scene, with a rate per group.
+
+use rayon::prelude::*;
+
+use super::config::Rates;
+use super::step::{Block, Workspace};
+use crate::ops::Real;
+use crate::ops::adam::{self, Moments, Step};
+use crate::scene::{Anchors, Heads, Scene};
+
+/// Anchors one task updates.
+const ROWS: usize = 2048;
+
+/// Moments of every trained parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Optimiser<R> {
+    /// Optimiser steps taken.
+    pub n_steps: u32,
+    /// Of [`Anchors::features`].
+    pub features: Moments<R>,
+    /// Of [`Anchors::log_scales`].
+    pub log_scales: Moments<R>,
+    /// Of [`Anchors::offsets`].
+    pub offsets: Moments<R>,
+    /// Of the heads.
+    pub heads: [Heads<R>; 2],
+}
+
+/// One parameter array of the anchors with its moments, cut into tasks.
+struct Group<'a, R> {
+    width: usize,
+    step: Step<R>,
+    parameters: &'a mut [R],
+    moments: &'a mut Moments<R>,
+    gradient: fn(&Block<R>) -> &[R],
+}
+
+impl<R: Real> Optimiser<R> {
+    /// Zero moments for a scene.
+    pub fn new(scene: &Scene<R>) -> Self {
+        let Anchors { features, log_scales, offsets, .. } = &scene.anchors;
+        let heads = Heads::filled(&scene.shape, R::ZERO);
+        Self {
+            n_steps: 0,
+            features: Moments::zeros(features.len()),
+            log_scales: Moments::zeros(log_scales.len()),
+            offsets: Moments::zeros(offsets.len()),
+            heads: [heads.clone(), heads],
+        }
+    }
+
+    /// Moves every parameter by the gradients that the last step left in `workspace`.
+    ///
+    /// * `progress`: share of the run that is done, 0 to 1. * `extent`: of the capture; scales the rate of the offsets.
+    pub fn apply(&mut self, scene: &mut Scene<R>, workspace: &Workspace<R>, rates: &Rates, progress: f64, extent: f64) {
+        self.n_steps += 1;
+        let t = self.n_steps;
+        let step = |rate: f64| Step::new(rate, t);
+        // Where the gradient of each anchor lies: block and row, or nowhere for an anchor that the view did not see.
+        let mut gradient_of = vec![(u32::MAX, 0u32); scene.anchors.len()];
+        for (b, block) in (0u32..).zip(workspace.blocks()) {
+            for (row, anchor) in (0u32..).zip(&block.anchors) {
+                gradient_of[*anchor as usize] = (b, row);
+            }
+        }
+        let Scene { anchors, heads, shape, .. } = scene;
+        let groups = [
+            Group {
+                width: shape.feature_dim,
+                step: step(rates.feature.at(progress)),
+                parameters: &mut anchors.features,
+                moments: &mut self.features,
+                gradient: |b| &b.d_features,
+            },
+            Group {
+                width: 6,
+                step: step(rates.log_scale.at(progress)),
+                parameters: &mut anchors.log_scales,
+                moments: &mut self.log_scales,
+                gradient: |b| &b.d_log_scales,
+            },
+            Group {
+                width: 3 * shape.n_offsets,
+                step: step(rates.offset.at(progress) * extent),
+                parameters: &mut anchors.offsets,
+                moments: &mut self.offsets,
+                gradient: |b| &b.d_offsets,
+            },
+        ];
+        for group in groups {
+            group.update(workspace, &gradient_of);
+        }
+
+        let head_rates = [rates.opacity_head, rates.covariance_head, rates.colour_head];
+        let [first, second] = &mut self.heads;
+        let moments = first.each_mut().into_iter().zip(second.each_mut());
+        let all = heads.each_mut().into_iter().zip(workspace.d_heads.each()).zip(moments).zip(head_rates);
+        for (((head, gradient), (first, second)), rate) in all {
+            let step = step(rate.at(progress));
+            let moments = first.groups_mut().into_iter().zip(second.groups_mut());
+            for ((p, g), (m, v)) in head.groups_mut().into_iter().zip(gradient.groups()).zip(moments) {
+                adam::update(step, p, m, v, Some(g));
+            }
+        }
+    }
+
+    /// Appends zero moments for `n` new anchors.
+    pub fn grow(&mut self, scene: &Scene<R>) {
+        let Anchors { features, log_scales, offsets, .. } = &scene.anchors;
+        let moments = [&mut self.features, &mut self.log_scales, &mut self.offsets];
+        for (moments, len) in moments.into_iter().zip([features.len(), log_scales.len(), offsets.len()]) {
+            moments.first.resize(len, R::ZERO);
+            moments.second.resize(len, R::ZERO);
+        }
+    }
+
+    /// Drops the moments of anchors that `keep` does not mark.
+    pub fn retain(&mut self, keep: &[bool], feature_dim: usize, n_offsets: usize) {
+        let moments = [&mut self.features, &mut self.log_scales, &mut self.offsets];
+        for (moments, width) in moments.into_iter().zip([feature_dim, 6, 3 * n_offsets]) {
+            retain_rows(&mut moments.first, width, keep);
+            retain_rows(&mut moments.second, width, keep);
+        }
+    }
+}
+
+impl<R: Real> Group<'_, R> {
+    fn update(self, workspace: &Workspace<R>, gradient_of: &[(u32, u32)]) {
+        let Self { width, step, parameters, moments, gradient } = self;
+        let len = ROWS * width;
+        parameters
+            .par_chunks_mut(len)
+            .zip(moments.first.par_chunks_mut(len))
+            .zip(moments.second.par_chunks_mut(len))
+            .zip(gradient_of.par_chunks(ROWS))
+            .for_each(|(((p, m), v), gradient_of)| {
+                workspace.arch().dispatch(
+                    #[inline(always)]
+                    || {
+                        let rows =
+                            p.chunks_exact_mut(width).zip(m.chunks_exact_mut(width)).zip(v.chunks_exact_mut(width));
+                        for (((p, m), v), (block, row)) in rows.zip(gradient_of) {
+                            let g = workspace.blocks().get(*block as usize).map(|b| {
+                                let at = *row as usize * width;
+                                &gradient(b)[at..at + width]
+                            });
+                            adam::update(step, p, m, v, g);
+                        }
+                    },
+                );
+            });
+    }
+}
+
+/// Keeps the marked rows of a `[n, width]` array, in order.
+pub fn retain_rows<T: Copy>(values: &mut Vec<T>, width: usize, keep: &[bool]) {
+    let mut end = 0;
+    for (row, _) in keep.iter().enumerate().filter(|(_, keep)| **keep) {
+        values.copy_within(row * width..(row + 1) * width, end);
+        end += width;
+    }
+    values.truncate(end);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn retained_rows_keep_their_order() {
+        let mut values = vec![1, 1, 2, 2, 3, 3, 4, 4];
+        retain_rows(&mut values, 2, &[false, true, false, true]);
+        assert_eq!(values, [2, 2, 4, 4]);
+    }
+}

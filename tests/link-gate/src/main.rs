@@ -1,0 +1,84 @@
+//! Everything a firmware calls, linked without an allocator.
+//!
+//! It is never run. That it links proves that nothing in the decoder's graph wants an allocator; which panics it reaches
+//! is read from its symbols.
+#![no_std]
+#![no_main]
+
+use core::hint::black_box;
+use core::panic::PanicInfo;
+
+use embedded_graphics_core::Pixel;
+use embedded_graphics_core::draw_target::DrawTarget;
+use embedded_graphics_core::geometry::{Dimensions, Point, Size};
+use embedded_graphics_core::pixelcolor::Rgb888;
+use embedded_graphics_core::primitives::Rectangle;
+use pocketsplat_core::display::DisplaySink;
+use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, MaxSplats};
+
+/// The linker's entry point; `black_box` hides every argument, so no branch of the decoder is known to be dead.
+#[expect(unsafe_code, reason = "the linker looks for this very name")]
+#[unsafe(no_mangle)]
+extern "C" fn _start() -> ! {
+    let mut scratch = [0; 4096];
+    let camera = Camera {
+        rotation: [0.0; 9],
+        translation: [0.0; 3],
+        focal_px: [0.0; 2],
+        principal_px: [0.0; 2],
+        width_px: 0,
+        height_px: 0,
+    };
+    loop {
+        let _ = black_box(draw(black_box(&[]), black_box(&camera), black_box(&mut scratch)));
+        let _ = black_box(decode(black_box(&[]), black_box(&mut [[0; 3]]), black_box(&mut [0.0])));
+    }
+}
+
+/// Parse, plan, bind, draw.
+fn draw(bytes: &[u8], camera: &Camera, scratch: &mut [u8]) -> Result<FrameReport, DecodeError> {
+    let bundle = Bundle::parse(bytes)?;
+    let max_splats = if black_box(true) { MaxSplats::Worst } else { MaxSplats::AtMost(black_box(0)) };
+    let budget = Budget { width_px: camera.width_px, height_px: camera.height_px, max_splats };
+    let plan = bundle.plan(&budget)?;
+    let mut decoder = Decoder::bind(&bundle, plan, scratch)?;
+    let mut display = Display;
+    let mut sink = DisplaySink::new(&mut display, Point::zero());
+    let report = decoder.render(&camera.resized(black_box(1), black_box(1)), &mut sink);
+    let Ok(()) = sink.finish();
+    report
+}
+
+/// A chunk by itself.
+fn decode(bytes: &[u8], lattice: &mut [[i32; 3]], values: &mut [f32]) -> Result<(), DecodeError> {
+    let bundle = Bundle::parse(bytes)?;
+    bundle.chunk(black_box(0))?.decode_values(bundle.tables(), lattice, values)
+}
+
+/// A display that keeps nothing.
+struct Display;
+
+impl Dimensions for Display {
+    fn bounding_box(&self) -> Rectangle {
+        Rectangle::new(Point::zero(), Size::new(1, 1))
+    }
+}
+
+impl DrawTarget for Display {
+    type Color = Rgb888;
+    type Error = core::convert::Infallible;
+
+    fn draw_iter<I: IntoIterator<Item = Pixel<Rgb888>>>(&mut self, pixels: I) -> Result<(), Self::Error> {
+        pixels.into_iter().for_each(|pixel| _ = black_box(pixel));
+        Ok(())
+    }
+}
+
+/// Not inlined and not empty, so that every panic keeps its name in the symbols.
+#[panic_handler]
+#[inline(never)]
+fn panic(info: &PanicInfo<'_>) -> ! {
+    loop {
+        black_box(info);
+    }
+}

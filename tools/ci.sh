@@ -1,0 +1,153 @@
+#!/usr/bin/env bash
+# The checks of a change, by name; without a name all of them, in this order. Installs what it lacks.
+#
+#   tools/ci.sh              everything (half an hour at most on two cores)
+#   tools/ci.sh fmt clippy   some
+#   tools/ci.sh --list       their names
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+jobs=(fmt clippy doc test core-embedded format-doc link-gate firmware)
+
+embedded_target=thumbv7em-none-eabihf
+defmt_print_version=1.2.0
+# One folder for everything that is built, so that a clean-up is one `rm`; the bare-metal workspaces build below it.
+target=${CARGO_TARGET_DIR:-$PWD/target}
+case $target in /*) ;; *) target=$PWD/$target ;; esac
+embedded=$target/embedded
+export CARGO_TARGET_DIR=$target
+export CARGO_TERM_COLOR=${CARGO_TERM_COLOR:-never}
+export PATH="$target/tools/bin:${CARGO_HOME:-$HOME/.cargo}/bin:$PATH"
+
+fail() {
+  echo "ci: $*" >&2
+  exit 1
+}
+
+# --- What a job needs ------------------------------------------------------------------------------------------------
+
+# Debian packages, when the command they bring is missing.
+need_command() { # COMMAND PACKAGE…
+  local command=$1 as_root=() log
+  shift
+  command -v "$command" >/dev/null && return
+  command -v apt-get >/dev/null || fail "$command is missing: install it (Debian: apt-get install $*)"
+  if [ "$(id -u)" -ne 0 ]; then
+    sudo -n true 2>/dev/null || fail "$command is missing: run \`sudo apt-get install $*\`"
+    as_root=(sudo -n)
+  fi
+  echo "ci: $command is missing; installing $*"
+  log=$("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive sh -c 'apt-get update && apt-get install -y --no-install-recommends "$@"' \
+    sh "$@" 2>&1) || fail "$command is missing and \`apt-get install $*\` failed: ${log##*$'\n'}"
+}
+
+need_cargo() {
+  command -v cargo >/dev/null || fail "cargo is missing: install rustup from https://rustup.rs, which reads rust-toolchain.toml"
+  need_command cc gcc libc6-dev
+}
+
+need_embedded_target() {
+  [ -d "$(rustc --print sysroot)/lib/rustlib/$embedded_target/lib" ] && return
+  rustup target add "$embedded_target" || fail "the target $embedded_target is missing: run \`rustup target add $embedded_target\`"
+}
+
+# Prints the path of llvm-nm.
+llvm_nm() {
+  local nm
+  nm=$(rustc --print sysroot)/lib/rustlib/$(rustc --print host-tuple)/bin/llvm-nm
+  [ -x "$nm" ] || rustup component add llvm-tools >&2 || fail "llvm-nm is missing: run \`rustup component add llvm-tools\`"
+  echo "$nm"
+}
+
+need_defmt_print() {
+  command -v defmt-print >/dev/null && return
+  cargo install defmt-print --version "$defmt_print_version" --locked --root "$target/tools" \
+    --target-dir "$target/tools/build" ||
+    fail "defmt-print is missing: run \`cargo install defmt-print --version $defmt_print_version --locked\`"
+}
+
+# --- Jobs ------------------------------------------------------------------------------------------------------------
+
+job_fmt() {
+  cargo fmt --all --check
+  (cd firmware-example && cargo fmt --check)
+  (cd tests/link-gate && cargo fmt --check)
+}
+
+job_clippy() {
+  cargo clippy --workspace --all-targets --locked -- -D warnings
+}
+
+job_doc() {
+  RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked
+  RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked --document-private-items
+}
+
+job_test() {
+  cargo test --workspace --locked --no-fail-fast
+  # Not unified into the workspace's build: `defmt` wants a logger at link time, the firmware has one.
+  cargo test -p pocketsplat-core --features embedded-graphics --locked
+}
+
+job_core-embedded() {
+  need_embedded_target
+  local features
+  for features in "" defmt embedded-graphics defmt,embedded-graphics; do
+    echo "-- features: ${features:-none}"
+    cargo clippy -p pocketsplat-core --target "$embedded_target" --no-default-features --features "$features" --locked \
+      -- -D warnings
+  done
+}
+
+# The annotated bundle in the format's description is what the writer writes today.
+job_format-doc() {
+  cargo run -q -p tools --bin hexdump --locked -- --check
+}
+
+# decoder-core links without an allocator, and reaches no panic but those of a list that may only shrink.
+job_link-gate() {
+  need_embedded_target
+  (cd tests/link-gate && cargo build --release --locked --target-dir "$embedded")
+  tests/link-gate/panics.sh "$(llvm_nm)" "$embedded/$embedded_target/release/link-gate"
+}
+
+# A bundle drawn by a Cortex-M4 under QEMU is byte for byte what this machine draws.
+job_firmware() {
+  need_embedded_target
+  need_command qemu-system-arm qemu-system-arm
+  need_defmt_print
+  local out=$embedded/frame
+  mkdir -p "$out"
+  cargo run -q -p tools --bin sample_bundle --locked -- "$out/sample.psb"
+  cargo run -q -p tools --bin draw_preview --locked -- "$out/sample.psb" "$out/host.ppm"
+  (
+    cd firmware-example
+    export PSB_BUNDLE=$out/sample.psb
+    cargo clippy --release --locked --target-dir "$embedded" -- -D warnings
+    cargo build --release --locked --target-dir "$embedded"
+  )
+  rm -f "$out/frame.ppm"
+  (cd "$out" && "$OLDPWD/firmware-example/qemu.sh" "$embedded/$embedded_target/release/firmware-example")
+  cmp "$out/frame.ppm" "$out/host.ppm" || fail "the frame of the device differs from the host's"
+  echo "the device's frame is the host's: $(wc -c <"$out/frame.ppm") bytes, $out/frame.ppm"
+}
+
+# --- Running them ----------------------------------------------------------------------------------------------------
+
+if [ "${1:-}" = --list ]; then
+  printf '%s\n' "${jobs[@]}"
+  exit
+fi
+[ $# -gt 0 ] || set -- "${jobs[@]}"
+[ "$*" != all ] || set -- "${jobs[@]}"
+for job in "$@"; do
+  declare -F "job_$job" >/dev/null || fail "no job is called $job; there are: ${jobs[*]}"
+done
+need_cargo
+for job in "$@"; do
+  echo "== $job"
+  start=$SECONDS
+  "job_$job"
+  echo "== $job: passed in $((SECONDS - start)) s"
+done
+echo "== all passed in $SECONDS s: $*"

@@ -1,0 +1,96 @@
+//! Drawing with the decoder, and a sink that keeps the books.
+
+use glam::{DMat3, DVec3};
+use pocketsplat::bundle::{self, BundleInfo, QuantisationSteps};
+use pocketsplat::dataset::Normalisation;
+use pocketsplat::scene::Scene;
+use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, MaxSplats, TileSink};
+
+/// What lies behind the test scenes.
+pub const BACKGROUND: [u8; 3] = [13, 77, 200];
+
+/// A frame, and how often each of its pixels arrived.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Frame {
+    /// Width, pixels.
+    pub width_px: usize,
+    /// `[height, width, 3]`.
+    pub rgb: Vec<u8>,
+    /// `[height, width]`.
+    pub deliveries: Vec<u32>,
+}
+
+impl Frame {
+    /// A frame to which nothing was delivered.
+    pub fn new(width_px: u16, height_px: u16) -> Self {
+        let n_pixels = usize::from(width_px) * usize::from(height_px);
+        Self { width_px: width_px.into(), rgb: vec![0; 3 * n_pixels], deliveries: vec![0; n_pixels] }
+    }
+}
+
+impl TileSink for Frame {
+    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) {
+        let [x, y, width, height] = [x_px, y_px, width, height].map(usize::from);
+        assert_eq!(rgb.len(), width * height, "pixels of the tile at ({x}, {y})");
+        assert!(x + width <= self.width_px, "the tile at ({x}, {y}) ends at {}, the frame at {}", x + width, self.width_px);
+        for (row, pixels) in rgb.chunks_exact(width).enumerate() {
+            let start = (y + row) * self.width_px + x;
+            self.rgb[3 * start..][..3 * width].copy_from_slice(pixels.as_flattened());
+            self.deliveries[start..][..width].iter_mut().for_each(|n| *n += 1);
+        }
+    }
+}
+
+/// The decoder's camera of a host camera: the same numbers rounded to f32.
+pub fn to_core(camera: &pocketsplat::camera::Camera) -> Camera {
+    let size = |px: u32| u16::try_from(px).expect("test frames are small");
+    let rows = camera.rotation.transpose().to_cols_array();
+    Camera {
+        rotation: rows.map(|x| x as f32),
+        translation: camera.translation.to_array().map(|x| x as f32),
+        focal_px: camera.focal_px.map(|x| x as f32),
+        principal_px: camera.principal_px.map(|x| x as f32),
+        width_px: size(camera.width_px),
+        height_px: size(camera.height_px),
+    }
+}
+
+/// The host camera of a decoder's camera: the very same numbers, so that the oracle sees what the decoder sees.
+pub fn to_host(camera: &Camera) -> pocketsplat::camera::Camera {
+    pocketsplat::camera::Camera {
+        rotation: DMat3::from_cols_array(&camera.rotation.map(f64::from)).transpose(),
+        translation: DVec3::from(camera.translation.map(f64::from)),
+        focal_px: camera.focal_px.map(f64::from),
+        principal_px: camera.principal_px.map(f64::from),
+        width_px: camera.width_px.into(),
+        height_px: camera.height_px.into(),
+    }
+}
+
+/// The bundle of a scene, with the first of the test cameras as its preview.
+pub fn bundle_of(scene: &Scene<f32>, preview: &pocketsplat::camera::Camera) -> Vec<u8> {
+    let info = BundleInfo {
+        normalisation: Normalisation { centre: DVec3::ZERO, scale: 1.0 },
+        background: BACKGROUND,
+        training_px: [preview.width_px, preview.height_px],
+        preview: preview.clone(),
+    };
+    bundle::write(scene, &info, &QuantisationSteps::default()).expect("a test scene can be written")
+}
+
+/// A budget that is enough for every view of the size of `camera`.
+pub fn budget_for(camera: &Camera) -> Budget {
+    Budget { width_px: camera.width_px, height_px: camera.height_px, max_splats: MaxSplats::Worst }
+}
+
+/// Draws one frame in fresh memory.
+///
+/// # Errors
+/// The decoder's.
+pub fn draw(bundle: &Bundle<'_>, camera: &Camera) -> Result<(Frame, FrameReport), DecodeError> {
+    let plan = bundle.plan(&budget_for(camera))?;
+    let mut scratch = vec![0; plan.scratch_len()];
+    let mut frame = Frame::new(camera.width_px, camera.height_px);
+    let report = Decoder::bind(bundle, plan, &mut scratch)?.render(camera, &mut frame)?;
+    Ok((frame, report))
+}

@@ -36,6 +36,7 @@ pub struct AnchorReader<'a> {
     bits: [u8; 3],
     lattice: BitReader<'a>,
     symbols: AnsReader<'a>,
+    n_word_bytes: usize,
 }
 
 impl<'a> Chunk<'a> {
@@ -139,6 +140,7 @@ impl<'a> Chunk<'a> {
             bits,
             lattice: BitReader::new(lattice),
             symbols: AnsReader::new(words),
+            n_word_bytes: words.as_flattened().len(),
         })
     }
 
@@ -226,6 +228,12 @@ impl AnchorReader<'_> {
         for (value, table) in row.iter_mut().zip(self.tables.of_channels()) {
             *value = table.value(table.symbol(&mut self.symbols));
         }
+    }
+
+    /// Bytes of all the chunk's symbols.
+    #[must_use]
+    pub fn n_word_bytes(&self) -> usize {
+        self.n_word_bytes
     }
 
     /// Ends the chunk after its last anchor.

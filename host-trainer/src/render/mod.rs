@@ -2,4 +2,5 @@
 //!
 //! [`reference`] is the oracle: f64, slow, plain, and sharing no line with the renderers that it judges.
 
+pub mod decoder;
 pub mod reference;

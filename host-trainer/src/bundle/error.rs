@@ -1,0 +1,124 @@
+//! Why a scene can not be written.
+
+use std::fmt;
+
+use crate::scene::ModelShape;
+
+/// A channel of an anchor by name, for messages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ChannelName {
+    /// Feature dimension.
+    Feature(usize),
+    /// Log-scale 0..6.
+    LogScale(usize),
+    /// Offset and axis.
+    Offset(usize, usize),
+}
+
+impl ChannelName {
+    /// The name of channel `channel` of an anchor.
+    pub fn of(shape: &ModelShape, channel: usize) -> Self {
+        let [first_log_scale, first_offset] = [shape.feature_dim, shape.feature_dim + 6];
+        if channel < first_log_scale {
+            Self::Feature(channel)
+        } else if channel < first_offset {
+            Self::LogScale(channel - first_log_scale)
+        } else {
+            Self::Offset((channel - first_offset) / 3, (channel - first_offset) % 3)
+        }
+    }
+}
+
+impl fmt::Display for ChannelName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Feature(dim) => write!(f, "feature {dim}"),
+            Self::LogScale(index) => write!(f, "log-scale {index}"),
+            Self::Offset(offset, axis) => write!(f, "offset {offset} {}", ["x", "y", "z"].get(axis).unwrap_or(&"?")),
+        }
+    }
+}
+
+/// Why a scene can not be written as a bundle.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum WriteError {
+    /// A trained value is infinite or not a number: training diverged.
+    #[error("anchor {anchor}, {channel}: {value} is not finite; training diverged before this was written")]
+    NotFinite {
+        /// Its index in the scene.
+        anchor: usize,
+        /// Which value.
+        channel: ChannelName,
+        /// The value.
+        value: f32,
+    },
+    /// A value is more than 32767 steps from zero.
+    #[error("anchor {anchor}, {channel}: {value} is beyond ±32767 steps of {step}; use a larger step")]
+    BeyondSymbols {
+        /// Its index in the scene.
+        anchor: usize,
+        /// Which value.
+        channel: ChannelName,
+        /// The value.
+        value: f32,
+        /// The step.
+        step: f32,
+    },
+    /// A lattice coordinate is too large for f32 to hold its position.
+    #[error("anchor {anchor}: lattice coordinate {found} is beyond ±{limit}; use a larger voxel size")]
+    BeyondLattice {
+        /// Its index in the scene.
+        anchor: usize,
+        /// The coordinate.
+        found: i32,
+        /// The largest magnitude.
+        limit: i32,
+    },
+    /// A weight is not finite, or too large for half precision.
+    #[error("{head} head, weight {index}: {value} does not fit half precision (±65504)")]
+    Weight {
+        /// Which head.
+        head: &'static str,
+        /// Its index in file order.
+        index: usize,
+        /// The value.
+        value: f32,
+    },
+    /// An array of the scene has another length than its shape says.
+    #[error("{array} has {found} values, the scene's shape calls for {needed}")]
+    Length {
+        /// Which array.
+        array: &'static str,
+        /// Values needed.
+        needed: usize,
+        /// Values there.
+        found: usize,
+    },
+    /// A count or a size lies outside the format's limits.
+    #[error("{what} is {found}; the format holds {least} to {most}")]
+    Count {
+        /// Which.
+        what: &'static str,
+        /// Its value.
+        found: usize,
+        /// The smallest the format holds.
+        least: usize,
+        /// The largest the format holds.
+        most: usize,
+    },
+    /// A step, voxel size or normalisation is not a positive number, or the preview camera is unusable.
+    #[error("{what} is {value}, it must be finite and positive")]
+    NotPositive {
+        /// Which.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// The preview camera can not be drawn with.
+    #[error("preview camera: {0}")]
+    Preview(#[source] pocketsplat_core::DecodeError),
+    /// The decoder refuses the bundle just written: a mistake in the writer.
+    #[error("the bundle just written does not read back; please report it")]
+    ReadBack(#[source] pocketsplat_core::DecodeError),
+}

@@ -1,0 +1,42 @@
+//! Reading a bundle from a file.
+
+use std::path::{Path, PathBuf};
+
+use pocketsplat_core::{Bundle, DecodeError};
+
+/// Why a bundle file can not be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LoadError {
+    /// The file can not be read.
+    #[error("{}: can not be read", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The file is not a sound bundle.
+    #[error("{}: {source}", path.display())]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: DecodeError,
+    },
+}
+
+/// Reads a bundle file and checks all of it, every chunk's checksum included; `Bundle::parse` of the bytes succeeds.
+///
+/// # Errors
+/// [`LoadError`] with the path.
+pub fn load(path: &Path) -> Result<Vec<u8>, LoadError> {
+    let bytes = std::fs::read(path).map_err(|source| LoadError::Io { path: path.to_owned(), source })?;
+    check(&bytes).map_err(|source| LoadError::Malformed { path: path.to_owned(), source })?;
+    Ok(bytes)
+}
+
+fn check(bytes: &[u8]) -> Result<(), DecodeError> {
+    let bundle = Bundle::parse(bytes)?;
+    (0..bundle.header().n_chunks).try_for_each(|index| bundle.chunk(index)?.check())
+}

@@ -1,0 +1,90 @@
+//! The static frequency tables: one for each group of channels that is cheaper together than apart.
+
+mod draft;
+mod histogram;
+
+pub(super) use draft::{Place, TableDraft};
+use histogram::Histogram;
+
+use super::quantise::Rows;
+
+/// The tables of a bundle and which channel uses which.
+pub(super) struct TableSet {
+    pub(super) tables: Vec<TableDraft>,
+    /// `[n_channels]`.
+    pub(super) channel_tables: Vec<usize>,
+    /// Offsets of an anchor; their channels are the last.
+    pub(super) n_offsets: usize,
+}
+
+/// Channels that share a table.
+struct Group {
+    step: f32,
+    channels: Vec<usize>,
+    histogram: Histogram,
+    /// Bits of its table and its symbols.
+    bits: f64,
+}
+
+impl TableSet {
+    /// Counts the symbols of every channel and merges channels of equal step as long as the file gets shorter.
+    ///
+    /// Greedy: each round merges the pair that saves most. `O(n_channels²)` trial merges.
+    pub(super) fn build(rows: &Rows, n_offsets: usize) -> Self {
+        let mut groups: Vec<Group> = (0..rows.n_channels)
+            .map(|channel| {
+                let histogram = Histogram::count(rows.channel(channel));
+                Group { step: rows.steps[channel], channels: vec![channel], bits: histogram.trimmed().bits, histogram }
+            })
+            .collect();
+        merge_while_it_saves(&mut groups);
+        groups.sort_by_key(|group| group.channels.iter().min().copied());
+        let mut channel_tables = vec![0; rows.n_channels];
+        for (table, group) in groups.iter().enumerate() {
+            for &channel in &group.channels {
+                channel_tables[channel] = table;
+            }
+        }
+        let tables = groups.iter().map(|group| TableDraft::new(group.step, &group.histogram)).collect();
+        Self { tables, channel_tables, n_offsets }
+    }
+
+    /// The table of channel `channel`.
+    pub(super) fn of_channel(&self, channel: usize) -> &TableDraft {
+        &self.tables[self.channel_tables[channel]]
+    }
+}
+
+fn merge_while_it_saves(groups: &mut Vec<Group>) {
+    let saving = |a: &Group, b: &Group| {
+        if a.step != b.step {
+            return f64::NEG_INFINITY;
+        }
+        a.bits + b.bits - a.histogram.merged(&b.histogram).trimmed().bits
+    };
+    let mut savings: Vec<Vec<f64>> =
+        (0..groups.len()).map(|i| (0..i).map(|j| saving(&groups[i], &groups[j])).collect()).collect();
+    loop {
+        let pairs =
+            savings.iter().enumerate().flat_map(|(i, row)| row.iter().enumerate().map(move |(j, &s)| (i, j, s)));
+        let Some((i, j, saved)) = pairs.max_by(|a, b| a.2.total_cmp(&b.2)) else { break };
+        if saved <= 0.0 {
+            break;
+        }
+        // Group i, the later one, joins group j.
+        let joined = groups.remove(i);
+        savings.remove(i);
+        for row in savings.iter_mut().skip(i) {
+            row.remove(i);
+        }
+        let group = &mut groups[j];
+        group.histogram = group.histogram.merged(&joined.histogram);
+        group.bits = group.histogram.trimmed().bits;
+        group.channels.extend(joined.channels);
+        for k in 0..groups.len() {
+            if k != j {
+                savings[k.max(j)][k.min(j)] = saving(&groups[k], &groups[j]);
+            }
+        }
+    }
+}

@@ -1,0 +1,79 @@
+//! The decoder's own renderer, with memory from the heap: what a device would show.
+
+use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, FrameReport, MaxSplats, TileSink};
+
+use crate::camera::Camera;
+use crate::dataset::Image;
+
+/// An image by decoder-core, and what it took.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CoreFrame {
+    /// The image.
+    pub image: Image,
+    /// What the frame consisted of.
+    pub report: FrameReport,
+    /// Bytes of scratch memory that just suffice for this frame.
+    pub scratch_bytes: usize,
+}
+
+/// Draws `bundle` as `camera` sees it, the way a device does.
+///
+/// # Errors
+/// [`DecodeError`] for a damaged bundle or an unusable camera.
+pub fn core_image(bundle: &Bundle<'_>, camera: &Camera) -> Result<CoreFrame, DecodeError> {
+    let camera = core_camera(camera)?;
+    let plan_for =
+        |max_splats| bundle.plan(&Budget { width_px: camera.width_px, height_px: camera.height_px, max_splats });
+    let plan = plan_for(MaxSplats::Worst)?;
+    let mut scratch = vec![0; plan.scratch_len()];
+    let mut sink = ImageSink::new(camera.width_px, camera.height_px);
+    let report = Decoder::bind(bundle, plan, &mut scratch)?.render(&camera, &mut sink)?;
+    let scratch_bytes = plan_for(MaxSplats::AtMost(report.splats))?.scratch_len();
+    Ok(CoreFrame { image: sink.image, report, scratch_bytes })
+}
+
+/// Rounds a camera to the decoder's single precision.
+///
+/// # Errors
+/// [`DecodeError::OutOfRange`] when the image is larger than the decoder draws, and what
+/// [`pocketsplat_core::Camera::check`] finds.
+pub fn core_camera(camera: &Camera) -> Result<pocketsplat_core::Camera, DecodeError> {
+    use pocketsplat_core::Field;
+
+    let size = |field, px: u32| {
+        u16::try_from(px).map_err(|_| DecodeError::OutOfRange { field, found: px, limit: u16::MAX.into() })
+    };
+    let core = pocketsplat_core::Camera {
+        // glam stores columns.
+        rotation: camera.rotation.transpose().to_cols_array().map(|x| x as f32),
+        translation: camera.translation.to_array().map(|x| x as f32),
+        focal_px: camera.focal_px.map(|x| x as f32),
+        principal_px: camera.principal_px.map(|x| x as f32),
+        width_px: size(Field::FrameWidth, camera.width_px)?,
+        height_px: size(Field::FrameHeight, camera.height_px)?,
+    };
+    core.check()?;
+    Ok(core)
+}
+
+/// Copies tiles into an image.
+struct ImageSink {
+    image: Image,
+}
+
+impl ImageSink {
+    fn new(width_px: u16, height_px: u16) -> Self {
+        let n_bytes = 3 * usize::from(width_px) * usize::from(height_px);
+        Self { image: Image { width_px: width_px.into(), height_px: height_px.into(), rgb: vec![0; n_bytes] } }
+    }
+}
+
+impl TileSink for ImageSink {
+    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, _height: u16, rgb: &[[u8; 3]]) {
+        let stride = self.image.width_px as usize;
+        for (y, row) in rgb.chunks_exact(usize::from(width)).enumerate() {
+            let start = 3 * ((usize::from(y_px) + y) * stride + usize::from(x_px));
+            self.image.rgb[start..start + 3 * row.len()].copy_from_slice(row.as_flattened());
+        }
+    }
+}

@@ -4,6 +4,8 @@
 
 mod stop;
 
+// For its critical section, which the logger takes.
+use cortex_m as _;
 use cortex_m_rt::entry;
 use defmt_semihosting as _;
 use embedded_graphics::framebuffer::{Framebuffer, buffer_size};

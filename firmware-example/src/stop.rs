@@ -1,4 +1,5 @@
 //! The ways in which the program ends; each hands QEMU an exit code.
+#![expect(unsafe_code, reason = "cortex-m-rt wants the fault handler declared unsafe; its body is not")]
 
 use core::panic::PanicInfo;
 
@@ -22,7 +23,6 @@ fn panic(info: &PanicInfo) -> ! {
 }
 
 /// A bus, memory or usage fault: the default handler would loop for ever.
-#[expect(unsafe_code, reason = "cortex-m-rt declares this handler unsafe; the body does nothing unsafe")]
 #[exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
     defmt::error!("hard fault at {=u32:#010x}, called from {=u32:#010x}", frame.pc(), frame.lr());

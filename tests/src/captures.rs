@@ -15,6 +15,9 @@ pub fn find(name: &str, suite: &str) -> Option<PathBuf> {
     if folder.is_dir() {
         return Some(folder);
     }
-    eprintln!("SKIPPED: {suite}: no capture at {}; set POCKETSPLAT_DATA to a folder that has {name}/", folder.display());
+    eprintln!(
+        "SKIPPED: {suite}: no capture at {}; set POCKETSPLAT_DATA to a folder that has {name}/",
+        folder.display()
+    );
     None
 }

@@ -1,8 +1,9 @@
 //! Drawing with the decoder, and a sink that keeps the books.
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use pocketsplat::bundle::{self, BundleInfo, QuantisationSteps};
 use pocketsplat::dataset::Normalisation;
+use pocketsplat::render::decoder::core_camera;
 use pocketsplat::scene::Scene;
 use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, MaxSplats, TileSink};
 
@@ -32,7 +33,12 @@ impl TileSink for Frame {
     fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) {
         let [x, y, width, height] = [x_px, y_px, width, height].map(usize::from);
         assert_eq!(rgb.len(), width * height, "pixels of the tile at ({x}, {y})");
-        assert!(x + width <= self.width_px, "the tile at ({x}, {y}) ends at {}, the frame at {}", x + width, self.width_px);
+        assert!(
+            x + width <= self.width_px,
+            "the tile at ({x}, {y}) ends at {}, the frame at {}",
+            x + width,
+            self.width_px
+        );
         for (row, pixels) in rgb.chunks_exact(width).enumerate() {
             let start = (y + row) * self.width_px + x;
             self.rgb[3 * start..][..3 * width].copy_from_slice(pixels.as_flattened());
@@ -43,28 +49,7 @@ impl TileSink for Frame {
 
 /// The decoder's camera of a host camera: the same numbers rounded to f32.
 pub fn to_core(camera: &pocketsplat::camera::Camera) -> Camera {
-    let size = |px: u32| u16::try_from(px).expect("test frames are small");
-    let rows = camera.rotation.transpose().to_cols_array();
-    Camera {
-        rotation: rows.map(|x| x as f32),
-        translation: camera.translation.to_array().map(|x| x as f32),
-        focal_px: camera.focal_px.map(|x| x as f32),
-        principal_px: camera.principal_px.map(|x| x as f32),
-        width_px: size(camera.width_px),
-        height_px: size(camera.height_px),
-    }
-}
-
-/// The host camera of a decoder's camera: the very same numbers, so that the oracle sees what the decoder sees.
-pub fn to_host(camera: &Camera) -> pocketsplat::camera::Camera {
-    pocketsplat::camera::Camera {
-        rotation: DMat3::from_cols_array(&camera.rotation.map(f64::from)).transpose(),
-        translation: DVec3::from(camera.translation.map(f64::from)),
-        focal_px: camera.focal_px.map(f64::from),
-        principal_px: camera.principal_px.map(f64::from),
-        width_px: camera.width_px.into(),
-        height_px: camera.height_px.into(),
-    }
+    core_camera(camera).expect("a test camera is a sound one")
 }
 
 /// The bundle of a scene, with the first of the test cameras as its preview.

@@ -11,3 +11,4 @@ pub mod captures;
 pub mod difference;
 pub mod frame;
 pub mod scenes;
+pub mod seal;

@@ -35,8 +35,7 @@ pub const CASES: [Case; 6] = [
 ];
 
 /// Few bytes, so that every one of them can be damaged in turn.
-pub const TINY: Case =
-    Case { name: "tiny", shape: shape(4, 2, [true, false, true]), n_anchors: 5, seed: 7 };
+pub const TINY: Case = Case { name: "tiny", shape: shape(4, 2, [true, false, true]), n_anchors: 5, seed: 7 };
 
 /// A random ball of anchors around the origin, of radius 1.5, with heads of random weights.
 ///

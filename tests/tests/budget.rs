@@ -20,8 +20,7 @@ fn the_planned_bytes_suffice_and_one_less_is_refused_by_number() {
         assert!(Decoder::bind(&bundle, plan, &mut scratch).is_ok(), "{}: {needed} bytes suffice", case.name);
         for available in [needed - 1, needed / 2, 0] {
             let error = Decoder::bind(&bundle, plan, &mut scratch[..available]).err();
-            let expected =
-                DecodeError::ScratchTooSmall { needed: needed as u32, available: available as u32 };
+            let expected = DecodeError::ScratchTooSmall { needed: needed as u32, available: available as u32 };
             assert_eq!(error, Some(expected), "{}: {available} bytes are refused", case.name);
         }
     }
@@ -62,10 +61,9 @@ fn a_larger_frame_than_planned_is_refused() {
     let plan = bundle.plan(&budget_for(&camera)).expect("planned");
     let mut scratch = vec![0; plan.scratch_len()];
     let mut decoder = Decoder::bind(&bundle, plan, &mut scratch).expect("bound");
-    for larger in [
-        Camera { width_px: camera.width_px + 1, ..camera },
-        Camera { height_px: camera.height_px + 1, ..camera },
-    ] {
+    for larger in
+        [Camera { width_px: camera.width_px + 1, ..camera }, Camera { height_px: camera.height_px + 1, ..camera }]
+    {
         let error = decoder.render(&larger, &mut Frame::new(larger.width_px, larger.height_px)).err();
         assert_eq!(error.map(|e| e.class()), Some(ErrorClass::Misuse), "{} x {}", larger.width_px, larger.height_px);
     }

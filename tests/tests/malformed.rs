@@ -2,6 +2,7 @@
 
 use conformance::frame::{Frame, bundle_of, draw, to_core};
 use conformance::scenes::{TINY, cameras, random_scene};
+use conformance::seal::reseal;
 use pocketsplat_core::{Bundle, Camera, DecodeError, ErrorClass};
 
 fn tiny() -> (Vec<u8>, Camera) {
@@ -66,6 +67,35 @@ fn every_byte_set_to_a_border_value_is_noticed() {
         }
         bytes[byte] = before;
     }
+}
+
+#[test]
+fn a_sound_bundle_stays_as_it_is_when_sealed_again() {
+    let (bytes, _) = tiny();
+    let mut sealed = bytes.clone();
+    reseal(&mut sealed);
+    assert!(sealed == bytes, "the writer's checksums are the format's");
+}
+
+/// With its checksums made right a damaged bundle may be another scene, but nothing worse: the tests are built with
+/// overflow checks, and `Internal` is a mistake of the decoder.
+#[test]
+fn damage_behind_right_checksums_is_an_error_or_another_scene() {
+    let (sound, camera) = tiny();
+    let mut n_refused = 0;
+    for byte in 0..sound.len() {
+        for damage in [1, 2, 4, 8, 16, 32, 64, 128, 0xff, sound[byte], !sound[byte], sound[byte] ^ 0x7f] {
+            let mut bytes = sound.clone();
+            bytes[byte] ^= damage;
+            reseal(&mut bytes);
+            if let Err(error) = picture(&bytes, &camera) {
+                n_refused += 1;
+                assert_ne!(error.class(), ErrorClass::Internal, "byte {byte} with {damage:#04x} flipped: {error}");
+            }
+        }
+    }
+    println!("{n_refused} of {} refused", 12 * sound.len());
+    assert!(n_refused > sound.len(), "offsets, counts and limits are checked: {n_refused} refused");
 }
 
 #[test]

@@ -1,16 +1,17 @@
 //! The decoder draws what the f64 oracle draws, up to f32 and the rounding to 8 bits.
 
 use conformance::difference::Difference;
-use conformance::frame::{bundle_of, draw, to_core, to_host};
+use conformance::frame::{bundle_of, draw, to_core};
 use conformance::scenes::{CASES, cameras, random_scene};
+use pocketsplat::render::host_camera;
 use pocketsplat::render::reference::ReferenceScene;
 use pocketsplat_core::Bundle;
 
 /// Rounding to 8 bits alone leaves 58.9 dB.
 const MIN_PSNR_DB: f64 = 58.0;
-/// Half a step is rounding; a splat whose alpha is 1/255 in one arithmetic and a little less in the other is one step
-/// more, and a pixel may meet a few of those, or two splats whose depths f32 cannot tell apart.
-const MAX_WORST_STEPS: f64 = 2.5;
+/// Half a step is rounding; one step more is a splat whose alpha is 1/255 in one arithmetic and a little less in the
+/// other. Two splats whose depths f32 cannot tell apart could do worse, but these scenes have none where it shows.
+const MAX_WORST_STEPS: f64 = 1.5;
 /// Where f32 lands on the other side of a rounding.
 const MAX_SHARE_NOT_ROUNDED: f64 = 1e-3;
 
@@ -26,9 +27,10 @@ fn every_case_and_camera_is_within_rounding_of_the_oracle() {
         assert_eq!(oracle.positions.len(), case.n_anchors, "anchors of case {}", case.name);
         let background = bundle.header().background.map(|byte| f64::from(byte) / 255.0);
         for (view, camera) in &cameras {
+            // The oracle draws with the decoder's camera, rounded as it is.
             let camera = to_core(camera);
             let (frame, report) = draw(&bundle, &camera).expect("the worst case is planned for");
-            let expected = oracle.render(&to_host(&camera), background);
+            let expected = oracle.render(&host_camera(&camera), background);
             let difference = Difference::of(&frame.rgb, &expected, frame.width_px);
             println!("{:>11} {view:<10} {:>5} splats: {difference}", case.name, report.splats);
             let empty = expected.iter().all(|&colour| colour == background);

@@ -1,0 +1,179 @@
+//! Writes a small bundle made by hand: a banded planet with a ring, 160×120, every view effect in use.
+//!
+//! No training and no capture is behind it, so a firmware has something to draw from a fresh clone.
+
+use std::path::PathBuf;
+
+use anyhow::Context as _;
+use clap::Parser;
+use glam::{DMat3, DQuat, DVec3};
+use pocketsplat::bundle::{self, BundleInfo, QuantisationSteps};
+use pocketsplat::camera::Camera;
+use pocketsplat::dataset::Normalisation;
+use pocketsplat::scene::{Anchors, Head, Heads, ModelShape, Scene};
+
+/// Writes a small bundle made by hand.
+#[derive(Parser)]
+struct Args {
+    /// The file to write.
+    out: PathBuf,
+}
+
+const SHAPE: ModelShape = ModelShape {
+    feature_dim: 16,
+    n_offsets: 4,
+    view_direction: true,
+    view_distance: true,
+    dilation_compensation: true,
+};
+const VOXEL_SIZE: f64 = 1.0 / 64.0;
+const BACKGROUND: [u8; 3] = [8, 10, 24];
+/// Where the light comes from.
+const SUN: DVec3 = DVec3::new(0.62, -0.68, 0.39);
+
+// What the features of an anchor mean here; the rest are zero.
+const COLOUR: usize = 0;
+const QUATERNION: usize = 3;
+const OPACITY: usize = 7;
+/// Added before the ReLU and taken off after it, so that a signed feature passes through the hidden layer.
+const LIFT: f32 = 4.0;
+// Hidden units that are no feature's.
+const GLINT: usize = 8;
+const HAZE: usize = 9;
+
+/// A patch of surface: one anchor with four discs.
+struct Patch {
+    position: DVec3,
+    normal: DVec3,
+    /// Distance of the four discs to the patch's centre, and their radius.
+    reach: f64,
+    colour: DVec3,
+    opacity: f64,
+}
+
+fn planet() -> Vec<Patch> {
+    const N: usize = 220;
+    const RADIUS: f64 = 0.85;
+    let golden_angle = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+    let patch = |i: usize| {
+        let z = 1.0 - 2.0 * (i as f64 + 0.5) / N as f64;
+        let (sin, cos) = (golden_angle * i as f64).sin_cos();
+        let r = (1.0 - z * z).sqrt();
+        let normal = DVec3::new(r * cos, r * sin, z);
+        let band = match (4.5 * (z + 1.0)) as u32 {
+            1 | 7 => DVec3::new(0.55, 0.36, 0.24),
+            3 | 5 => DVec3::new(0.93, 0.62, 0.30),
+            4 => DVec3::new(0.75, 0.25, 0.16),
+            _ => DVec3::new(0.95, 0.85, 0.64),
+        };
+        Patch { position: RADIUS * normal, normal, reach: 0.10, colour: lit(band, normal), opacity: 0.97 }
+    };
+    (0..N).map(patch).collect()
+}
+
+fn ring() -> Vec<Patch> {
+    let tilt = DQuat::from_rotation_x(0.35) * DQuat::from_rotation_y(0.2);
+    let rows = [(1.25, 40, DVec3::new(0.50, 0.62, 0.85)), (1.55, 50, DVec3::new(0.80, 0.86, 0.95))];
+    let patch = |(radius, n, colour): (f64, usize, DVec3), i: usize| {
+        let (sin, cos) = (std::f64::consts::TAU * i as f64 / n as f64).sin_cos();
+        let normal = tilt * DVec3::Z;
+        Patch { position: tilt * (radius * DVec3::new(cos, sin, 0.0)), normal, reach: 0.085, colour, opacity: 0.8 }
+    };
+    rows.into_iter().flat_map(|row| (0..row.1).map(move |i| patch(row, i))).collect()
+}
+
+/// Lambert's law over a little ambient light.
+fn lit(colour: DVec3, normal: DVec3) -> DVec3 {
+    colour * (0.25 + 0.75 * normal.dot(SUN.normalize()).max(0.0))
+}
+
+fn scene() -> Scene<f32> {
+    let mut anchors =
+        Anchors { lattice: Vec::new(), features: Vec::new(), log_scales: Vec::new(), offsets: Vec::new() };
+    for patch in planet().into_iter().chain(ring()) {
+        anchors.lattice.push((patch.position / VOXEL_SIZE).round().as_ivec3().to_array());
+        let turn = DQuat::from_rotation_arc(DVec3::Z, patch.normal);
+        let mut feature = [0.0_f64; SHAPE.feature_dim];
+        feature[COLOUR..][..3].copy_from_slice(&patch.colour.map(|c| (c / (1.0 - c)).ln()).to_array());
+        feature[QUATERNION..][..4].copy_from_slice(&[turn.w, turn.x, turn.y, turn.z]);
+        feature[OPACITY] = patch.opacity.atanh();
+        anchors.features.extend(feature.map(|f| f as f32));
+        let log_reach = patch.reach.ln() as f32;
+        // The discs' radius: two thirds of their spacing, so that they overlap into a surface.
+        anchors.log_scales.extend([log_reach, log_reach, log_reach, log_reach, log_reach, log_reach]);
+        for [x, y] in [[-0.5, -0.5], [0.5, -0.5], [-0.5, 0.5], [0.5, 0.5]] {
+            anchors.offsets.extend((turn * DVec3::new(x, y, 0.0)).to_array().map(|o| o as f32));
+        }
+    }
+    Scene { shape: SHAPE, voxel_size: VOXEL_SIZE, anchors, heads: heads() }
+}
+
+/// Heads that read the features as [`scene`] wrote them, add a glint towards the sun and a haze with distance.
+fn heads() -> Heads<f32> {
+    let mut heads = Heads::filled(&SHAPE, 0.0);
+    for head in heads.each_mut() {
+        for unit in 0..=OPACITY {
+            head.w1[unit * head.n_in + unit] = 1.0;
+            head.b1[unit] = LIFT;
+        }
+    }
+    let direction = SHAPE.feature_dim;
+    let colour = &mut heads.colour;
+    for (axis, sun) in SUN.to_array().into_iter().enumerate() {
+        colour.w1[GLINT * colour.n_in + direction + axis] = sun as f32;
+    }
+    colour.w1[HAZE * colour.n_in + direction + 3] = 0.5;
+    colour.b1[HAZE] = -1.5;
+    for k in 0..SHAPE.n_offsets {
+        pass(&mut heads.opacity, k, OPACITY);
+        for axis in 0..3 {
+            // Discs: wide along x and y, thin along z.
+            heads.covariance.b2[7 * k + axis] = if axis == 2 { -2.5 } else { 0.3 };
+            let row = 3 * k + axis;
+            pass(&mut heads.colour, row, COLOUR + axis);
+            heads.colour.w2[row * SHAPE.feature_dim + GLINT] = 0.5;
+            heads.colour.w2[row * SHAPE.feature_dim + HAZE] = -0.25;
+        }
+        for part in 0..4 {
+            pass(&mut heads.covariance, 7 * k + 3 + part, QUATERNION + part);
+        }
+    }
+    heads
+}
+
+/// Makes an output the value of a feature.
+fn pass(head: &mut Head<f32>, output: usize, feature: usize) {
+    head.w2[output * head.n_hidden + feature] = 1.0;
+    head.b2[output] -= LIFT;
+}
+
+fn camera() -> Camera {
+    let eye = DVec3::new(2.6, -3.4, 1.5);
+    let forward = -eye.normalize();
+    let right = forward.cross(DVec3::Z).normalize();
+    let rotation = DMat3::from_cols(right, forward.cross(right), forward).transpose();
+    Camera {
+        rotation,
+        translation: -(rotation * eye),
+        focal_px: [190.0, 190.0],
+        principal_px: [80.0, 60.0],
+        width_px: 160,
+        height_px: 120,
+    }
+}
+
+fn main() -> anyhow::Result<()> {
+    let args = Args::parse();
+    let camera = camera();
+    let scene = scene();
+    let info = BundleInfo {
+        normalisation: Normalisation { centre: DVec3::ZERO, scale: 1.0 },
+        background: BACKGROUND,
+        training_px: [camera.width_px, camera.height_px],
+        preview: camera,
+    };
+    let bytes = bundle::write(&scene, &info, &QuantisationSteps::default()).context("cannot write the sample scene")?;
+    std::fs::write(&args.out, &bytes).with_context(|| format!("cannot write {}", args.out.display()))?;
+    println!("{}: {} anchors, {} bytes", args.out.display(), scene.anchors.len(), bytes.len());
+    Ok(())
+}

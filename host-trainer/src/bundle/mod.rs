@@ -14,6 +14,9 @@ mod quantise;
 mod size;
 mod table;
 
+#[cfg(test)]
+mod tests;
+
 pub use error::{ChannelName, WriteError};
 pub use load::{LoadError, load};
 pub use quantise::QuantisationSteps;

@@ -3,6 +3,9 @@
 use super::{ChannelName, WriteError};
 use crate::scene::Scene;
 
+/// Largest magnitude of a lattice coordinate: f32 holds every integer there, and a chunk may span it twice.
+const MAX_LATTICE: i32 = (1 << 22) - 1;
+
 /// Distance between neighbouring values of each kind of channel; the value of a symbol is `symbol · step`.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct QuantisationSteps {
@@ -83,6 +86,11 @@ pub(super) fn quantise(scene: &Scene<f32>, steps: &QuantisationSteps) -> Result<
         let needed = n_anchors * width;
         if values.len() != needed {
             return Err(WriteError::Length { array, needed, found: values.len() });
+        }
+    }
+    for (anchor, cell) in scene.anchors.lattice.iter().enumerate() {
+        if let Some(&found) = cell.iter().find(|c| c.unsigned_abs() > MAX_LATTICE.unsigned_abs()) {
+            return Err(WriteError::BeyondLattice { anchor, found, limit: MAX_LATTICE });
         }
     }
     let names: Vec<ChannelName> = (0..n_channels).map(|channel| ChannelName::of(shape, channel)).collect();

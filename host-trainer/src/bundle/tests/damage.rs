@@ -1,0 +1,92 @@
+use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, ErrorClass, MaxSplats, TileSink};
+
+use super::{SMALL, write_random};
+use crate::scene::ModelShape;
+
+/// The smallest model, so that every bit of its bundle can be tried.
+const TINY: ModelShape = ModelShape { feature_dim: 1, n_offsets: 1, ..SMALL };
+
+struct NoSink;
+
+impl TileSink for NoSink {
+    fn tile(&mut self, _: u16, _: u16, _: u16, _: u16, _: &[[u8; 3]]) {}
+}
+
+/// Everything a device does with a bundle.
+fn parse_and_draw(bytes: &[u8]) -> Result<(), DecodeError> {
+    let bundle = Bundle::parse(bytes)?;
+    let plan = bundle.plan(&Budget { width_px: 64, height_px: 48, max_splats: MaxSplats::Worst })?;
+    let mut scratch = vec![0; plan.scratch_len()];
+    let mut decoder = Decoder::bind(&bundle, plan, &mut scratch)?;
+    decoder.render(&bundle.header().preview.resized(64, 48), &mut NoSink)?;
+    Ok(())
+}
+
+#[test]
+fn every_truncation_is_an_error() {
+    let (_, bytes) = write_random(TINY, 7, 21, 3);
+    parse_and_draw(&bytes).expect("the whole bundle");
+    for len in 0..bytes.len() {
+        let error = parse_and_draw(&bytes[..len]).expect_err("a cut bundle");
+        assert_eq!(error.class(), ErrorClass::Malformed, "{len} bytes: {error}");
+    }
+}
+
+#[test]
+fn every_flipped_bit_is_an_error_and_damaged_chunks_are_named() {
+    let (_, mut bytes) = write_random(TINY, 7, 21, 3);
+    let bundle = Bundle::parse(&bytes).expect("a sound bundle");
+    let lens: Vec<usize> = bundle.chunks().map(|chunk| chunk.n_bytes()).collect();
+    let chunks_start = bytes.len() - lens.iter().sum::<usize>();
+    for bit in 0..8 * bytes.len() {
+        bytes[bit / 8] ^= 1 << (bit % 8);
+        let error = parse_and_draw(&bytes).expect_err("a damaged bundle");
+        if bit / 8 >= chunks_start {
+            let mut end = chunks_start;
+            let damaged = lens
+                .iter()
+                .take_while(|&len| {
+                    end += len;
+                    end <= bit / 8
+                })
+                .count() as u32;
+            let named = matches!(error, DecodeError::ChunkChecksum { chunk, .. } if chunk == damaged);
+            assert!(named, "bit {bit} lies in chunk {damaged}: {error}");
+        }
+        bytes[bit / 8] ^= 1 << (bit % 8);
+    }
+}
+
+#[test]
+fn bytes_after_the_end_are_ignored() {
+    let (_, mut bytes) = write_random(TINY, 7, 21, 3);
+    bytes.extend([0xFF; 100]);
+    parse_and_draw(&bytes).expect("a flash partition longer than its bundle");
+}
+
+#[test]
+fn scratch_one_byte_short_names_the_need() {
+    let (_, bytes) = write_random(SMALL, 50, 22, 16);
+    let bundle = Bundle::parse(&bytes).expect("a sound bundle");
+    let plan = bundle.plan(&Budget { width_px: 64, height_px: 48, max_splats: MaxSplats::Worst }).expect("a plan");
+    let mut scratch = vec![0; plan.scratch_len() - 1];
+    let error = Decoder::bind(&bundle, plan, &mut scratch).err().expect("one byte short");
+    let needed = plan.scratch_len() as u32;
+    assert_eq!(error, DecodeError::ScratchTooSmall { needed, available: needed - 1 }, "{error}");
+}
+
+#[test]
+fn too_many_splats_names_the_need_which_then_suffices() {
+    let (_, bytes) = write_random(SMALL, 50, 22, 16);
+    let bundle = Bundle::parse(&bytes).expect("a sound bundle");
+    let draw = |most| {
+        let budget = Budget { width_px: 64, height_px: 48, max_splats: MaxSplats::AtMost(most) };
+        let plan = bundle.plan(&budget).expect("a plan");
+        let mut scratch = vec![0xA5; plan.scratch_len()];
+        let mut decoder = Decoder::bind(&bundle, plan, &mut scratch).expect("planned memory");
+        decoder.render(&bundle.header().preview, &mut NoSink)
+    };
+    let Err(DecodeError::TooManySplats { needed, planned: 1 }) = draw(1) else { panic!("one splat is not enough") };
+    assert_eq!(draw(needed).map(|report| report.splats), Ok(needed), "the number named");
+    assert!(draw(needed - 1).is_err(), "one fewer");
+}

@@ -6,6 +6,7 @@
 //! * `delivery`: does a sink get every pixel once, whatever the scratch memory held and wherever it lay?
 //! * `budget`: do the planned bytes suffice, and does one byte less fail and say how many are needed?
 //! * `malformed`: does a damaged bundle fail, and never draw another picture?
+//! * `captures`: do captures load with the conventions that the renderers use?
 
 pub mod captures;
 pub mod difference;

@@ -17,6 +17,7 @@ pub mod prefilter;
 pub mod project;
 pub mod rasterise;
 mod real;
+pub mod simd;
 pub mod ssim;
 pub mod tiles;
 pub mod volume;

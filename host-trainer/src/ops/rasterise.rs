@@ -8,11 +8,11 @@
 //! chosen at run time. No multiplication is fused with an addition, so all of them give the same bits. Gradients go to
 //! one slot per (tile, splat) pair and are summed per splat in tile order: no result depends on the number of threads.
 
-use pulp::Arch;
 use rayon::prelude::*;
 
 use super::Real;
 use super::project::{ALPHA_CUTOFF, Splat};
+use super::simd::Level;
 use super::tiles::{TILE_PX, TileLists};
 
 /// Largest opacity of one contribution.
@@ -180,11 +180,11 @@ fn forward_tile<R: Real>(splats: &[Splat<R>], entries: &[u32], origin: [usize; 2
 ///
 /// * `splats`: `[n]`. * `background`: RGB. * returns the colour in tile order; pixels beyond the image's edge are drawn
 ///   like any other and dropped by [`TiledImage::to_planes`].
-pub fn forward<R: Real>(arch: Arch, splats: &[Splat<R>], lists: &TileLists, background: [R; 3]) -> TiledImage<R> {
+pub fn forward<R: Real>(level: Level, splats: &[Splat<R>], lists: &TileLists, background: [R; 3]) -> TiledImage<R> {
     let mut image = TiledImage::zeros(lists.grid);
     image.colour.par_chunks_mut(3 * TILE_VALUES).enumerate().for_each(|(t, out)| {
         let origin = [t % lists.grid[0] * TILE_PX, t / lists.grid[0] * TILE_PX];
-        arch.dispatch(
+        level.run(
             #[inline(always)]
             || forward_tile(splats, lists.tile(t), origin, background, out),
         );
@@ -315,7 +315,7 @@ fn lanes<R: Real>(row: &Row<R>) -> R {
 /// * `image`: what forward returned. * `d_image`: dL/d(image), tile order, zero beyond the image's edge.
 /// * returns `[n]`, zero for splats that no tile lists.
 pub fn backward<R: Real>(
-    arch: Arch,
+    level: Level,
     splats: &[Splat<R>],
     lists: &TileLists,
     image: &TiledImage<R>,
@@ -337,7 +337,7 @@ pub fn backward<R: Real>(
         .enumerate()
         .for_each(|(t, ((d_pairs, image), d_image))| {
             let origin = [t % lists.grid[0] * TILE_PX, t / lists.grid[0] * TILE_PX];
-            arch.dispatch(
+            level.run(
                 #[inline(always)]
                 || backward_tile(splats, lists.tile(t), origin, image, d_image, d_pairs),
             );
@@ -427,7 +427,7 @@ mod tests {
     }
 
     fn draw(splats: &[Splat<f64>], background: [f64; 3]) -> Vec<f64> {
-        forward(Arch::new(), splats, &lists(splats), background).to_planes(SIZE)
+        forward(Level::detect(), splats, &lists(splats), background).to_planes(SIZE)
     }
 
     /// The same pixels without tiles, rows or vectors.
@@ -482,12 +482,12 @@ mod tests {
             })
             .collect();
         let lists = lists(&unpack(&scene(5, 80, 1.0)));
-        let fast = forward(Arch::new(), &splats, &lists, [0.0; 3]);
-        let plain = forward(Arch::Scalar, &splats, &lists, [0.0; 3]);
+        let fast = forward(Level::detect(), &splats, &lists, [0.0; 3]);
+        let plain = forward(Level::Baseline, &splats, &lists, [0.0; 3]);
         assert_eq!(fast.colour, plain.colour);
         let d = TiledImage { colour: fast.colour.iter().map(|c| c - 0.3).collect() };
-        let a = backward(Arch::new(), &splats, &lists, &fast, &d);
-        let b = backward(Arch::Scalar, &splats, &lists, &fast, &d);
+        let a = backward(Level::detect(), &splats, &lists, &fast, &d);
+        let b = backward(Level::Baseline, &splats, &lists, &fast, &d);
         assert_eq!(a, b);
     }
 
@@ -502,7 +502,7 @@ mod tests {
             let f = |x: &[f64]| {
                 // The lists stay those of the base point, whose slack covers the steps.
                 let splats = unpack(x);
-                forward(Arch::new(), &splats, &lists(&splats), background)
+                forward(Level::detect(), &splats, &lists(&splats), background)
                     .to_planes(SIZE)
                     .iter()
                     .zip(&weights)
@@ -510,9 +510,9 @@ mod tests {
                     .sum::<f64>()
             };
             let lists = lists(&splats);
-            let image = forward(Arch::new(), &splats, &lists, background);
+            let image = forward(Level::detect(), &splats, &lists, background);
             let d_image = TiledImage::from_planes(&weights, SIZE);
-            let analytic = pack(&backward(Arch::new(), &splats, &lists, &image, &d_image));
+            let analytic = pack(&backward(Level::detect(), &splats, &lists, &image, &d_image));
             assert_piecewise_gradient("rasterise", &x, &analytic, f);
         }
     }

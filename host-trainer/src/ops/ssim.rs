@@ -4,10 +4,10 @@
 //! window of σ 1.5 with zero padding, C₁ = 0.01², C₂ = 0.03² (Wang et al. 2004, eq. 13; window and padding as the
 //! splatting literature has them). The value is the mean over pixels and channels.
 
-use pulp::Arch;
 use rayon::prelude::*;
 
 use super::Real;
+use super::simd::Level;
 
 const TAPS: usize = 11;
 const RADIUS: usize = TAPS / 2;
@@ -75,7 +75,7 @@ pub struct Partials<R> {
 }
 
 /// Mean SSIM of `image` and `truth`, planes `[3, height, width]`, and what backward needs.
-pub fn forward<R: Real>(arch: Arch, image: &[R], truth: &[R], size_px: [usize; 2]) -> (R, Partials<R>) {
+pub fn forward<R: Real>(level: Level, image: &[R], truth: &[R], size_px: [usize; 2]) -> (R, Partials<R>) {
     let [width, height] = size_px;
     let plane = width * height;
     let blocks_per_channel = height.div_ceil(ROWS);
@@ -87,7 +87,7 @@ pub fn forward<R: Real>(arch: Arch, image: &[R], truth: &[R], size_px: [usize; 2
             let (channel, y0) = (i / blocks_per_channel, i % blocks_per_channel * ROWS);
             let x = &image[channel * plane..(channel + 1) * plane];
             let y = &truth[channel * plane..(channel + 1) * plane];
-            arch.dispatch(
+            level.run(
                 #[inline(always)]
                 || {
                     let moments: [Vec<R>; 5] = blur(
@@ -145,7 +145,7 @@ fn similarity<R: Real>(moments: [Vec<R>; 5], norm: R) -> (R, [Vec<R>; 3]) {
 
 /// Adds `weight · ∂(mean S)/∂image` to `d_image`.
 pub fn backward<R: Real>(
-    arch: Arch,
+    level: Level,
     image: &[R],
     truth: &[R],
     size_px: [usize; 2],
@@ -163,7 +163,7 @@ pub fn backward<R: Real>(
         let y = &truth[channel * plane..(channel + 1) * plane];
         let blocks = &partials.blocks[channel * per_channel..(channel + 1) * per_channel];
         d_plane.par_chunks_mut(ROWS * width).enumerate().for_each(|(block, d)| {
-            arch.dispatch(
+            level.run(
                 #[inline(always)]
                 || {
                     let rows = d.len() / width;
@@ -199,7 +199,7 @@ mod tests {
     fn equal_images_score_one() {
         let size = [20, 33];
         let x = image(1, size);
-        let (s, _) = forward(Arch::new(), &x, &x, size);
+        let (s, _) = forward(Level::detect(), &x, &x, size);
         assert!((s - 1.0).abs() < 1e-12, "{s}");
     }
 
@@ -207,17 +207,17 @@ mod tests {
     fn backward_agrees_with_finite_differences() {
         for (seed, size) in [(1, [13, 7]), (2, [5, 19]), (3, [1, 1])] {
             let (x, truth) = (image(seed, size), image(seed + 10, size));
-            let (_, partials) = forward(Arch::new(), &x, &truth, size);
+            let (_, partials) = forward(Level::detect(), &x, &truth, size);
             let mut d = vec![0.0; x.len()];
-            backward(Arch::new(), &x, &truth, size, &partials, 0.2, &mut d);
-            assert_gradient("ssim", &x, &d, |x| 0.2 * forward(Arch::new(), x, &truth, size).0);
+            backward(Level::detect(), &x, &truth, size, &partials, 0.2, &mut d);
+            assert_gradient("ssim", &x, &d, |x| 0.2 * forward(Level::detect(), x, &truth, size).0);
         }
         // Flat images: every variance is zero, only C2 keeps the quotient finite.
         let size = [9, 9];
         let (x, truth) = (vec![0.25; 243], vec![0.5; 243]);
-        let (_, partials) = forward(Arch::new(), &x, &truth, size);
+        let (_, partials) = forward(Level::detect(), &x, &truth, size);
         let mut d = vec![0.0; x.len()];
-        backward(Arch::new(), &x, &truth, size, &partials, 1.0, &mut d);
-        assert_gradient("ssim, flat", &x, &d, |x| forward(Arch::new(), x, &truth, size).0);
+        backward(Level::detect(), &x, &truth, size, &partials, 1.0, &mut d);
+        assert_gradient("ssim, flat", &x, &d, |x| forward(Level::detect(), x, &truth, size).0);
     }
 }

@@ -36,10 +36,8 @@ pub fn grow(
     let (f, k) = (scene.shape.feature_dim, scene.shape.n_offsets);
     let enough = f64::from(settings.interval) * settings.success * 0.5;
     let n_before = scene.anchors.len();
-    let eligible: Vec<usize> =
-        (0..n_before * k).filter(|at| f64::from(statistics.n_drawn[*at]) > enough).collect();
-    let mean_gradient =
-        |at: usize| f64::from(statistics.gradient_sum[at]) / f64::from(statistics.n_drawn[at].max(1));
+    let eligible: Vec<usize> = (0..n_before * k).filter(|at| f64::from(statistics.n_drawn[*at]) > enough).collect();
+    let mean_gradient = |at: usize| f64::from(statistics.gradient_sum[at]) / f64::from(statistics.n_drawn[at].max(1));
     for level in 0..settings.levels {
         let cells = settings.coarsest_cells / EDGE_RATIO.pow(level);
         if cells == 0 || (level > 0 && scene.anchors.len() == n_before) {
@@ -51,9 +49,9 @@ pub fn grow(
         let lucky: Vec<bool> = (0..n_before * k).map(|_| rng.random::<f64>() > drop_below).collect();
         let edge = scene.voxel_size * f64::from(cells);
         let cell_of = |p: DVec3| lattice_cell(p, edge);
-        let position = |scene: &Scene<f32>, a: usize| DVec3::from(scene.anchors.lattice[a].map(f64::from)) * scene.voxel_size;
-        let occupied: HashSet<[i32; 3]> =
-            (0..scene.anchors.len()).map(|a| cell_of(position(scene, a))).collect();
+        let position =
+            |scene: &Scene<f32>, a: usize| DVec3::from(scene.anchors.lattice[a].map(f64::from)) * scene.voxel_size;
+        let occupied: HashSet<[i32; 3]> = (0..scene.anchors.len()).map(|a| cell_of(position(scene, a))).collect();
         let mut candidates: BTreeMap<[i32; 3], Vec<f32>> = BTreeMap::new();
         for at in eligible.iter().copied().filter(|at| lucky[*at] && mean_gradient(*at) >= threshold) {
             let anchor = at / k;

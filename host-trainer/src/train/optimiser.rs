@@ -134,7 +134,7 @@ impl<R: Real> Group<'_, R> {
             .zip(moments.second.par_chunks_mut(len))
             .zip(gradient_of.par_chunks(ROWS))
             .for_each(|(((p, m), v), gradient_of)| {
-                workspace.arch().dispatch(
+                workspace.level().run(
                     #[inline(always)]
                     || {
                         let rows =

@@ -1,12 +1,12 @@
 //! One view through the whole chain, forward and backward.
 
-use pulp::Arch;
 use rayon::prelude::*;
 
 use super::config::LossWeights;
 use crate::ops::neural_gaussians::{Gaussian, HeadOutputs, Source};
 use crate::ops::project::{Footprint, Splat};
 use crate::ops::rasterise::TiledImage;
+use crate::ops::simd::Level;
 use crate::ops::{
     Pinhole, Real, head, head_input, l1, neural_gaussians, prefilter, project, rasterise, ssim, tiles, volume,
 };
@@ -80,7 +80,7 @@ pub struct Block<R> {
 /// Buffers and gradients of a step.
 #[derive(Clone, Debug)]
 pub struct Workspace<R> {
-    arch: Arch,
+    level: Level,
     blocks: Vec<Block<R>>,
     n_blocks: usize,
     /// dL/d(heads).
@@ -138,7 +138,7 @@ impl<R: Real> Block<R> {
     }
 
     /// From anchors to splats.
-    fn forward(&mut self, arch: Arch, scene: &Scene<R>, camera: &Pinhole<R>) {
+    fn forward(&mut self, level: Level, scene: &Scene<R>, camera: &Pinhole<R>) {
         let (shape, n) = (&scene.shape, self.anchors.len());
         refill(&mut self.input, n * shape.head_inputs());
         head_input::forward(shape, camera, &self.features, &self.positions, &mut self.input);
@@ -153,7 +153,7 @@ impl<R: Real> Block<R> {
         self.splats.clear();
         self.footprints.clear();
         self.drawn.clear();
-        arch.dispatch(
+        level.run(
             #[inline(always)]
             || {
                 neural_gaussians::forward(
@@ -230,12 +230,12 @@ impl<R: Real> Block<R> {
 impl<R: Real> Workspace<R> {
     /// Buffers for models of this shape.
     pub fn new(shape: &ModelShape) -> Self {
-        Self { arch: Arch::new(), blocks: Vec::new(), n_blocks: 0, d_heads: Heads::filled(shape, R::ZERO) }
+        Self { level: Level::detect(), blocks: Vec::new(), n_blocks: 0, d_heads: Heads::filled(shape, R::ZERO) }
     }
 
     /// The instruction set that the loops run under.
-    pub fn arch(&self) -> Arch {
-        self.arch
+    pub fn level(&self) -> Level {
+        self.level
     }
 
     /// The blocks of visible anchors of the last step, with their gradients; anchors ascend through them.
@@ -265,15 +265,15 @@ impl<R: Real> Workspace<R> {
         while self.blocks.len() < self.n_blocks {
             self.blocks.push(Block::new(&scene.shape));
         }
-        let arch = self.arch;
+        let level = self.level;
         self.blocks.par_iter_mut().zip(visible.par_chunks(BLOCK)).for_each(|(block, anchors)| {
             block.gather(scene, anchors);
-            block.forward(arch, scene, camera);
+            block.forward(level, scene, camera);
         });
         let splats: Vec<Splat<R>> = self.blocks().iter().flat_map(|b| b.splats.iter().copied()).collect();
         let footprints: Vec<Footprint<R>> = self.blocks().iter().flat_map(|b| b.footprints.iter().copied()).collect();
         let lists = tiles::build(&splats, &footprints, camera.size_px);
-        let image = rasterise::forward(arch, &splats, &lists, background);
+        let image = rasterise::forward(level, &splats, &lists, background);
         (image, lists, splats)
     }
 
@@ -292,17 +292,17 @@ impl<R: Real> Workspace<R> {
         let image = tiled.to_planes(size_px);
 
         let lambda = R::real(weights.dssim);
-        let (similarity, partials) = ssim::forward(self.arch, &image, target.truth, size_px);
+        let (similarity, partials) = ssim::forward(self.level, &image, target.truth, size_px);
         let mut d_image = vec![R::ZERO; image.len()];
         l1::backward(&image, target.truth, R::ONE - lambda, &mut d_image);
-        ssim::backward(self.arch, &image, target.truth, size_px, &partials, -lambda, &mut d_image);
+        ssim::backward(self.level, &image, target.truth, size_px, &partials, -lambda, &mut d_image);
         let n_gaussians = self.blocks().iter().map(|b| b.gaussians.len()).sum();
         let volume_weight = R::real(weights.volume);
         let volumes: R = self.blocks().iter().map(|b| volume::forward(&b.gaussians, volume_weight, n_gaussians)).sum();
         let loss = (R::ONE - lambda) * l1::forward(&image, target.truth) + lambda * (R::ONE - similarity) + volumes;
 
         let d_tiled = TiledImage::from_planes(&d_image, size_px);
-        let d_splats = rasterise::backward(self.arch, &splats, &lists, &tiled, &d_tiled);
+        let d_splats = rasterise::backward(self.level, &splats, &lists, &tiled, &d_tiled);
         let mut rest = d_splats.as_slice();
         let mut shares = Vec::with_capacity(self.n_blocks);
         for block in self.blocks() {

@@ -1,0 +1,69 @@
+//! A bundle on disk and what it says about the capture it was trained on.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use pocketsplat::camera::Camera;
+use pocketsplat::dataset::{Background, Capture, Normalisation, View};
+use pocketsplat_core::Bundle;
+
+use super::capture::CaptureArgs;
+
+/// The bytes of a bundle and where they came from.
+pub(crate) struct BundleFile {
+    pub(crate) path: PathBuf,
+    pub(crate) bytes: Vec<u8>,
+}
+
+impl BundleFile {
+    pub(crate) fn read(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).with_context(|| format!("could not read the bundle {}", path.display()))?;
+        Ok(Self { path: path.to_owned(), bytes })
+    }
+
+    pub(crate) fn parse(&self) -> Result<Bundle<'_>> {
+        Bundle::parse(&self.bytes).with_context(|| format!("{} can not be used", self.path.display()))
+    }
+
+    /// Fills what the command line left open with what the bundle was trained with, and refuses what contradicts it.
+    pub(crate) fn capture_options(&self, bundle: &Bundle<'_>, args: &CaptureArgs) -> Result<CaptureArgs> {
+        let header = bundle.header();
+        let known = [Background::Black, Background::White].into_iter().find(|b| b.rgb8() == header.background);
+        if let (Some(asked), Some(trained)) = (args.background, known)
+            && asked != trained
+        {
+            bail!("{} was trained on {trained}, not on {asked}; leave --background out", self.path.display());
+        }
+        let [width, height] = header.training_px;
+        Ok(CaptureArgs {
+            max_resolution: args.max_resolution.or(Some(u32::from(width.max(height)))),
+            background: known.or(args.background),
+            ..args.clone()
+        })
+    }
+
+    /// The camera of a view in the frame of this bundle, which need not be the frame of the capture as loaded now.
+    pub(crate) fn camera(&self, bundle: &Bundle<'_>, capture: &Capture, view: &View) -> Camera {
+        let header = bundle.header();
+        let own = Normalisation { centre: header.normalisation_centre.into(), scale: header.normalisation_scale };
+        if own == capture.normalisation {
+            return view.camera.clone();
+        }
+        let centre_world = view.camera.centre_world() / capture.normalisation.scale + capture.normalisation.centre;
+        let translation = -(view.camera.rotation * own.point(centre_world));
+        Camera { translation, ..view.camera.clone() }
+    }
+
+    /// Entropy-decodes every chunk once, as a decoder that keeps its anchors in memory would.
+    pub(crate) fn decode_all(&self, bundle: &Bundle<'_>) -> Result<()> {
+        let header = bundle.header();
+        let n_chunk = usize::from(header.max_chunk_anchors);
+        let mut lattice = vec![[0; 3]; n_chunk];
+        let mut symbols = vec![0i16; n_chunk * header.n_channels()];
+        for chunk in bundle.chunks() {
+            let n = usize::from(chunk.n_anchors());
+            chunk.decode_symbols(bundle.tables(), &mut lattice[..n], &mut symbols[..n * header.n_channels()])?;
+        }
+        Ok(())
+    }
+}

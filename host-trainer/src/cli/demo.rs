@@ -1,0 +1,103 @@
+//! `pocketsplat demo`: the whole path once, on a capture it makes itself.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use pocketsplat::bundle::QuantisationSteps;
+use pocketsplat::dataset::{Background, Image};
+use pocketsplat::metrics::{half_size_enlarged, psnr_db};
+use pocketsplat::render::decoder::core_image;
+use pocketsplat::render::reference::ReferenceScene;
+use pocketsplat::synth::{SynthOptions, write_capture};
+use pocketsplat::train::TrainConfig;
+
+use super::bundle::BundleFile;
+use super::capture::{CaptureArgs, Split};
+use super::eval::{Renderer, evaluate, reference_image};
+use super::{output, train};
+
+/// Make a capture, train it, compress it, draw it with the decoder and compare: about three minutes on two cores.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Folder for everything; what an earlier demo left there is replaced.
+    #[arg(short, long, default_value = "demo")]
+    output: PathBuf,
+    /// Training steps.
+    #[arg(long, default_value_t = 4000)]
+    iterations: u32,
+    /// Width and height of the images, pixels.
+    #[arg(long, default_value_t = SynthOptions::default().size_px)]
+    size: u32,
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What an earlier demo may have left; anything else in the folder stays.
+const CAPTURE: &str = "capture";
+
+pub(crate) fn run(args: &Args) -> Result<()> {
+    let folder = &args.output;
+    let capture_folder = folder.join(CAPTURE);
+    clear_capture(&capture_folder)?;
+    eprintln!("1 of 4  ray-tracing a capture into {}", capture_folder.display());
+    write_capture(&capture_folder, &SynthOptions { size_px: args.size, ..SynthOptions::default() })?;
+
+    eprintln!("2 of 4  training {} steps", args.iterations);
+    let capture_args = CaptureArgs { dataset: capture_folder, max_resolution: None, background: None };
+    let config = TrainConfig { iterations: args.iterations, ..TrainConfig::default() };
+    let bundle_path = folder.join("scene.psb");
+    let capture = capture_args.load(config.seed)?;
+    let trained = train::train(&capture, Background::Black, config, &QuantisationSteps::default(), &bundle_path)?;
+
+    eprintln!("3 of 4  drawing the held-out views with the decoder");
+    let file = BundleFile::read(&bundle_path)?;
+    let evaluation = evaluate(&file, &capture_args, Split::Test, Renderer::Core, true)?;
+    let baseline = capture.test.iter().map(|v| psnr_db(&half_size_enlarged(&v.image), &v.image)).sum::<f64>()
+        / capture.test.len() as f64;
+
+    let picture = folder.join("truth_reference_decoder.png");
+    eprintln!("4 of 4  {}: truth | f64 reference | decoder", picture.display());
+    let bundle = file.parse()?;
+    let view = &capture.test[0];
+    let reference = reference_image(&bundle, &ReferenceScene::from_bundle(&bundle)?, &view.camera);
+    let decoder = core_image(&bundle, &view.camera)?.image;
+    side_by_side(&[&view.image, &reference, &decoder])
+        .write_png(&picture)
+        .with_context(|| format!("could not write {}", picture.display()))?;
+
+    let report = serde_json::json!({
+        "bundle": bundle_path,
+        "picture": picture,
+        "psnr_db": evaluation.psnr_db,
+        "half_size_copy_psnr_db": baseline,
+        "ssim": evaluation.ssim,
+        "decoder_to_reference_psnr_db": evaluation.psnr_to_reference_db,
+        "bundle_bytes": evaluation.bundle_bytes,
+        "n_anchors": evaluation.n_anchors,
+        "train_s": trained.train_s,
+        "render_s_per_view": evaluation.render_s_per_view,
+        "scratch_bytes": evaluation.scratch_bytes,
+    });
+    output::print(&report, args.json)
+}
+
+/// Removes the capture of an earlier demo, and nothing that is not one.
+fn clear_capture(folder: &Path) -> Result<()> {
+    if !folder.exists() {
+        return Ok(());
+    }
+    if !folder.join("transforms_train.json").is_file() {
+        bail!("{} exists and is not the capture of an earlier demo; choose another --output", folder.display());
+    }
+    std::fs::remove_dir_all(folder).with_context(|| format!("could not remove {}", folder.display()))
+}
+
+/// Images of one size next to each other.
+fn side_by_side(images: &[&Image]) -> Image {
+    let (width, height) = (images[0].width_px, images[0].height_px);
+    let row = 3 * width as usize;
+    let rgb =
+        (0..height as usize).flat_map(|y| images.iter().flat_map(move |i| &i.rgb[y * row..(y + 1) * row])).copied();
+    Image { width_px: width * u32::try_from(images.len()).unwrap_or(u32::MAX), height_px: height, rgb: rgb.collect() }
+}

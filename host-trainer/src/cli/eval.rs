@@ -1,0 +1,154 @@
+//! `pocketsplat eval`: how good a bundle is, how large, how fast.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use anyhow::Result;
+use pocketsplat::camera::Camera;
+use pocketsplat::dataset::Image;
+use pocketsplat::metrics::{psnr_db, ssim};
+use pocketsplat::render::decoder::core_image;
+use pocketsplat::render::reference::{ReferenceScene, to_image};
+use pocketsplat_core::Bundle;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::bundle::BundleFile;
+use super::capture::{CaptureArgs, Split};
+use super::output;
+
+/// What draws the frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum Renderer {
+    /// decoder-core: what a device draws, bit for bit.
+    Core,
+    /// The slow f64 reference.
+    Reference,
+}
+
+/// Compare a bundle's frames with the photographs of a capture.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// The bundle.
+    bundle: PathBuf,
+    #[command(flatten)]
+    capture: CaptureArgs,
+    /// Which views.
+    #[arg(long, value_enum, default_value_t = Split::Test)]
+    split: Split,
+    /// What draws the frames.
+    #[arg(long, value_enum, default_value_t = Renderer::Core)]
+    renderer: Renderer,
+    /// Also compare every frame with the f64 reference (`psnr_to_reference_db`, the lowest over the views).
+    #[arg(long)]
+    against_reference: bool,
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Figures of a bundle over a split of a capture; PSNR and SSIM are means over views of 8-bit images.
+#[derive(Debug, Serialize)]
+pub(crate) struct Evaluation {
+    pub(crate) psnr_db: f64,
+    pub(crate) ssim: f64,
+    pub(crate) bundle_bytes: usize,
+    pub(crate) n_anchors: u32,
+    pub(crate) n_views: usize,
+    pub(crate) split: String,
+    pub(crate) renderer: String,
+    pub(crate) width_px: u32,
+    pub(crate) height_px: u32,
+    pub(crate) background: String,
+    pub(crate) decode_s: f64,
+    pub(crate) render_s_per_view: f64,
+    pub(crate) scratch_bytes: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) psnr_to_reference_db: Option<f64>,
+}
+
+pub(crate) fn run(args: &Args) -> Result<()> {
+    let file = BundleFile::read(&args.bundle)?;
+    let evaluation = evaluate(&file, &args.capture, args.split, args.renderer, args.against_reference)?;
+    output::print(&evaluation, args.json)
+}
+
+/// One drawn view.
+struct Frame {
+    image: Image,
+    seconds: f64,
+    scratch_bytes: usize,
+}
+
+fn draw(bundle: &Bundle<'_>, reference: Option<&ReferenceScene>, camera: &Camera) -> Result<Frame> {
+    let started = Instant::now();
+    let (image, scratch_bytes) = match reference {
+        None => {
+            let frame = core_image(bundle, camera)?;
+            (frame.image, frame.scratch_bytes)
+        }
+        Some(scene) => (reference_image(bundle, scene, camera), 0),
+    };
+    Ok(Frame { image, seconds: started.elapsed().as_secs_f64(), scratch_bytes })
+}
+
+/// The f64 reference's frame on the bundle's background, 8 bit.
+pub(crate) fn reference_image(bundle: &Bundle<'_>, scene: &ReferenceScene, camera: &Camera) -> Image {
+    let background = bundle.header().background.map(|c| f64::from(c) / 255.0);
+    to_image(&scene.render(camera, background), camera.width_px, camera.height_px)
+}
+
+/// Draws and measures every view of a split.
+pub(crate) fn evaluate(
+    file: &BundleFile,
+    capture: &CaptureArgs,
+    split: Split,
+    renderer: Renderer,
+    against_reference: bool,
+) -> Result<Evaluation> {
+    let bundle = file.parse()?;
+    let options = file.capture_options(&bundle, capture)?;
+    let loaded = options.load(0)?;
+    let views = split.views(&loaded)?;
+    let started = Instant::now();
+    file.decode_all(&bundle)?;
+    let decode_s = started.elapsed().as_secs_f64();
+
+    let oracle = if renderer == Renderer::Reference || against_reference {
+        Some(ReferenceScene::from_bundle(&bundle)?)
+    } else {
+        None
+    };
+    let rows: Vec<(Frame, f64, f64, f64)> = views
+        .par_iter()
+        .map(|view| {
+            let camera = file.camera(&bundle, &loaded, view);
+            let drawn_by = oracle.as_ref().filter(|_| renderer == Renderer::Reference);
+            let frame = draw(&bundle, drawn_by, &camera)?;
+            let to_reference = match oracle.as_ref().filter(|_| against_reference) {
+                Some(scene) => psnr_db(&frame.image, &reference_image(&bundle, scene, &camera)),
+                None => f64::INFINITY,
+            };
+            let (psnr, similarity) = (psnr_db(&frame.image, &view.image), ssim(&frame.image, &view.image));
+            Ok((frame, psnr, similarity, to_reference))
+        })
+        .collect::<Result<_>>()?;
+    let mean = |value: &dyn Fn(&(Frame, f64, f64, f64)) -> f64| rows.iter().map(value).sum::<f64>() / rows.len() as f64;
+    let header = bundle.header();
+    Ok(Evaluation {
+        psnr_db: mean(&|row| row.1),
+        ssim: mean(&|row| row.2),
+        bundle_bytes: file.bytes.len(),
+        n_anchors: header.n_anchors,
+        n_views: rows.len(),
+        split: format!("{split:?}").to_lowercase(),
+        renderer: format!("{renderer:?}").to_lowercase(),
+        width_px: views[0].image.width_px,
+        height_px: views[0].image.height_px,
+        background: options.background.map_or_else(String::new, |b| b.to_string()),
+        decode_s,
+        render_s_per_view: mean(&|row| row.0.seconds),
+        scratch_bytes: rows.iter().map(|row| row.0.scratch_bytes).max().unwrap_or(0),
+        psnr_to_reference_db: against_reference.then(|| rows.iter().map(|row| row.3).fold(f64::INFINITY, f64::min)),
+    })
+}

@@ -1,0 +1,53 @@
+//! The commands, one file each; only these files print.
+
+mod bundle;
+mod capture;
+mod demo;
+mod eval;
+mod inspect;
+mod output;
+mod progress;
+mod render;
+mod synth;
+mod train;
+
+use anyhow::{Context, Result};
+use clap::{Parser, Subcommand};
+
+/// Train a neural Gaussian-splat scene, compress it to a fraction of a megabyte, draw it on a microcontroller.
+#[derive(Parser)]
+#[command(name = "pocketsplat", version, propagate_version = true)]
+struct Cli {
+    /// Threads; 0 takes one per core. No result depends on it.
+    #[arg(long, global = true, default_value_t = 0)]
+    threads: usize,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Train(train::Args),
+    Eval(eval::Args),
+    Render(render::Args),
+    Inspect(inspect::Args),
+    Synth(synth::Args),
+    Demo(demo::Args),
+}
+
+/// Parses the command line and runs the command.
+pub(crate) fn run() -> Result<()> {
+    let cli = Cli::parse();
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(cli.threads)
+        .build_global()
+        .with_context(|| format!("could not start {} threads", cli.threads))?;
+    match cli.command {
+        Command::Train(args) => train::run(&args),
+        Command::Eval(args) => eval::run(&args),
+        Command::Render(args) => render::run(&args),
+        Command::Inspect(args) => inspect::run(&args),
+        Command::Synth(args) => synth::run(&args),
+        Command::Demo(args) => demo::run(&args),
+    }
+}

@@ -1,0 +1,71 @@
+//! Writing results: files whole or not at all, tables for people, JSON for machines.
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+
+/// Fails now if `path` could not be written later, and makes its folder.
+pub(crate) fn check_writable(path: &Path) -> Result<()> {
+    let (folder, probe) = beside(path);
+    fs::create_dir_all(&folder).with_context(|| format!("could not make the folder {}", folder.display()))?;
+    fs::write(&probe, [])
+        .and_then(|()| fs::remove_file(&probe))
+        .with_context(|| format!("could not write to the folder {}; choose another --output", folder.display()))
+}
+
+/// Writes `bytes` to `path` by way of a file beside it, so that a full disk leaves an older file as it was.
+pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
+    let (_, partial) = beside(path);
+    let write = || -> std::io::Result<()> {
+        let mut file = fs::File::create(&partial)?;
+        file.write_all(bytes)?;
+        file.sync_all()?;
+        fs::rename(&partial, path)
+    };
+    write()
+        .map_err(|error| {
+            // Best effort: the error that matters is the one above.
+            let _ = fs::remove_file(&partial);
+            error
+        })
+        .with_context(|| format!("could not write {} ({} bytes)", path.display(), bytes.len()))
+}
+
+/// The folder of `path` and the name of a partial file in it.
+fn beside(path: &Path) -> (PathBuf, PathBuf) {
+    let folder = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
+        _ => PathBuf::from("."),
+    };
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(format!(".{}.partial", std::process::id()));
+    let partial = folder.join(name);
+    (folder, partial)
+}
+
+/// Prints `report` to stdout: as JSON, or as aligned `name value` lines.
+pub(crate) fn print<T: serde::Serialize>(report: &T, json: bool) -> Result<()> {
+    if json {
+        println!("{}", serde_json::to_string_pretty(report)?);
+        return Ok(());
+    }
+    let serde_json::Value::Object(fields) = serde_json::to_value(report)? else {
+        anyhow::bail!("a report is a set of named values");
+    };
+    let width = fields.keys().map(String::len).max().unwrap_or(0);
+    for (name, value) in &fields {
+        println!("{name:width$}  {}", plain(value));
+    }
+    Ok(())
+}
+
+fn plain(value: &serde_json::Value) -> String {
+    match value {
+        serde_json::Value::String(text) => text.clone(),
+        serde_json::Value::Number(number) if number.is_f64() => format!("{:.4}", number.as_f64().unwrap_or(f64::NAN)),
+        serde_json::Value::Array(items) => items.iter().map(plain).collect::<Vec<_>>().join(" "),
+        other => other.to_string(),
+    }
+}

@@ -1,9 +1,12 @@
 //! The view of a bundle's bytes: parsed and checked once, read in place ever after.
 //!
 //! [`Bundle::parse`] checks every offset, length, count, float and checksum but those of the chunks, so that nothing
-//! after it can read outside the bytes. `FORMAT.md` beside this file is the normative description. The module knows
+//! after it can read outside the bytes. [`format`] (`FORMAT.md` beside this file) is the normative description. The module knows
 //! nothing of rendering.
 #![deny(clippy::indexing_slicing, clippy::arithmetic_side_effects, clippy::unwrap_used, clippy::panic)]
+
+#[doc = include_str!("FORMAT.md")]
+pub mod format {}
 
 mod chunk;
 mod crc;

@@ -26,7 +26,7 @@ impl<'s, const B: usize> Blocks<'s, B> {
         let n_out = biases.len();
         let rows = arena.take::<[f32; B]>(n_rows::<B>(n_in, n_out))?;
         let rows_per_block = n_in + 1;
-        for (block, block_rows) in rows.chunks_exact_mut(rows_per_block).enumerate() {
+        for (block, block_rows) in rows.chunks_exact_mut(rows_per_block.max(1)).enumerate() {
             for (input, row) in block_rows.iter_mut().enumerate() {
                 for (lane, weight) in row.iter_mut().enumerate() {
                     let output = block * B + lane;
@@ -43,7 +43,8 @@ impl<'s, const B: usize> Blocks<'s, B> {
 
     /// All blocks in order.
     pub(crate) fn iter(&self) -> impl Iterator<Item = &'s [[f32; B]]> + use<'s, B> {
-        self.rows.chunks_exact(self.rows_per_block)
+        // `max(1)` shows the compiler what is true anyway, and a panic path less is linked.
+        self.rows.chunks_exact(self.rows_per_block.max(1))
     }
 
     /// Block number `index`.

@@ -1,10 +1,11 @@
 //! The writer of bundles: quantise, order, count, code, lay out.
 //!
 //! Stages in the order data flows through them: [`quantise`] → [`order`] → [`table`] → [`chunk`] → [`layout`]; beside them
-//! [`size`] says where the bytes of a bundle went. The format is described in
+//! [`size`] says where the bytes of a bundle went and [`annotate`] what each of them means. The format is described in
 //! `decoder-core/src/bundle/FORMAT.md`; what reads it is [`pocketsplat_core`], and nothing here decides a decoded
 //! symbol or value by itself.
 
+pub mod annotate;
 mod chunk;
 mod error;
 mod layout;

@@ -1,6 +1,7 @@
 use pocketsplat_core::Bundle;
 
 use super::{SMALL, camera, info, random_scene, write_random};
+use crate::bundle::annotate::annotate;
 use crate::bundle::{ChannelName, QuantisationSteps, SizeReport, WriteError, write};
 use crate::render::decoder::core_image;
 use crate::render::reference::ReferenceScene;
@@ -99,6 +100,17 @@ fn values_that_do_not_fit_are_named() {
     scene.anchors.lattice[3][1] = i32::MIN;
     let error = write(&scene, &info(), &QuantisationSteps::default()).expect_err("beyond the lattice");
     assert!(matches!(error, WriteError::BeyondLattice { anchor: 3, .. }), "unexpected {error}");
+}
+
+#[test]
+fn the_annotated_dump_shows_every_byte_once() {
+    let (_, bytes) = write_random(SMALL, 40, 9, 16);
+    let dump = annotate(&bytes).expect("a sound bundle");
+    let shown = dump.lines().filter_map(|line| {
+        let (hex, _) = line.get(8..)?.split_at_checked(23)?;
+        hex.trim().split(' ').map(|byte| u8::from_str_radix(byte, 16).ok()).collect::<Option<Vec<u8>>>()
+    });
+    assert_eq!(shown.flatten().collect::<Vec<u8>>(), bytes, "the hexadecimal column is the file");
 }
 
 #[test]

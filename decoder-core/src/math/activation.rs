@@ -11,7 +11,7 @@ const TANH_TAIL: [f32; 4] = [-0.333_333_1, 0.133_304_76, -0.053_387_11, 0.017_98
 /// Returns 1/(1 + e⁻ˣ) with a relative error below 4e-7 for x ≥ −87.
 ///
 /// # Budget
-/// One [`exp`] and one division.
+/// One [`exp()`] and one division.
 ///
 /// ```
 /// assert_eq!(pocketsplat_core::math::sigmoid(0.0), 0.5);
@@ -24,7 +24,7 @@ pub fn sigmoid(x: f32) -> f32 {
 /// Returns the hyperbolic tangent of x with a relative error below 4e-7; its sign is the sign of x.
 ///
 /// # Budget
-/// One [`exp`], one division and a polynomial; both branches are evaluated and one is selected.
+/// One [`exp()`], one division and a polynomial; both branches are evaluated and one is selected.
 ///
 /// ```
 /// assert_eq!(pocketsplat_core::math::tanh(0.0), 0.0);

@@ -1,7 +1,7 @@
 //! The writer of bundles: quantise, order, count, code, lay out.
 //!
-//! Stages in the order data flows through them: [`quantise`] → [`order`] → [`table`] → [`chunk`] → [`layout`]; beside them
-//! [`size`] says where the bytes of a bundle went and [`annotate`] what each of them means. The format is described in
+//! Stages in the order data flows through them: `quantise` → `order` → `table` → `chunk` → `layout`; beside them
+//! `size` says where the bytes of a bundle went and [`annotate`] what each of them means. The format is described in
 //! `decoder-core/src/bundle/FORMAT.md`; what reads it is [`pocketsplat_core`], and nothing here decides a decoded
 //! symbol or value by itself.
 

@@ -64,9 +64,10 @@ need_defmt_print() {
   cargo install defmt-print --version "$defmt_print_version" --locked --root "$target/tools" \
     --target-dir "$target/tools/build" ||
     fail "defmt-print is missing: run \`cargo install defmt-print --version $defmt_print_version --locked\`"
+  rm -rf "$target/tools/build"
 }
 
-# --- Jobs ------------------------------------------------------------------------------------------------------------
+# --- Jobs: `job_NAME` runs as NAME once NAME is in `jobs` -----------------------------------------------------------
 
 job_fmt() {
   cargo fmt --all --check
@@ -108,7 +109,9 @@ job_format-doc() {
 job_link-gate() {
   need_embedded_target
   (cd tests/link-gate && cargo build --release --locked --target-dir "$embedded")
-  tests/link-gate/panics.sh "$(llvm_nm)" "$embedded/$embedded_target/release/link-gate"
+  local nm
+  nm=$(llvm_nm)
+  tests/link-gate/panics.sh "$nm" "$embedded/$embedded_target/release/link-gate"
 }
 
 # A bundle drawn by a Cortex-M4 under QEMU is byte for byte what this machine draws.

@@ -111,7 +111,7 @@ impl<'b, 's> Decoder<'b, 's> {
     /// that no writer makes.
     ///
     /// # Budget
-    /// No memory beyond the bound one, under 2 KiB of stack. Work: every anchor of a chunk in view is decoded, the heads
+    /// No memory beyond the bound one, under 3 KiB of stack. Work: every anchor of a chunk in view is decoded, the heads
     /// run for anchors that pass the prefilter, and a pixel is finished when its transmittance falls below 1e-4.
     pub fn render(&mut self, camera: &Camera, sink: &mut impl TileSink) -> Result<FrameReport, DecodeError> {
         let view = View::new(camera)?;

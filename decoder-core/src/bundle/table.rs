@@ -101,7 +101,18 @@ impl<'a> Tables<'a> {
     /// The tables of all channels in order.
     pub fn of_channels(&self) -> impl Iterator<Item = Table<'a>> + use<'a> {
         let tables = *self;
-        tables.channel_tables.iter().filter_map(move |&table| tables.get(usize::from(u16::from_le_bytes(table))))
+        // Neighbouring channels mostly share a table, which is then looked up once.
+        let mut latest: Option<([u8; 2], Table<'a>)> = None;
+        tables.channel_tables.iter().filter_map(move |&index| {
+            if let Some((latest_index, table)) = latest
+                && latest_index == index
+            {
+                return Some(table);
+            }
+            let table = tables.get(usize::from(u16::from_le_bytes(index)))?;
+            latest = Some((index, table));
+            Some(table)
+        })
     }
 }
 

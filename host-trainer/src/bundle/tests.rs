@@ -1,5 +1,6 @@
 //! Laws of the writer and the decoder's reader together.
 
+mod culling;
 mod damage;
 mod entropy;
 mod figures;

@@ -1,0 +1,216 @@
+//! The one error of the decoder: what is wrong, where, and what would be right.
+
+mod message;
+mod place;
+
+pub use place::{Field, SectionKind};
+
+/// Whose fault an error is, which decides what can be done about it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum ErrorClass {
+    /// The bytes are not a sound bundle: fetch or flash them again.
+    Malformed,
+    /// A sound bundle that needs a newer or a fuller decoder.
+    Unsupported,
+    /// The bundle is fine and the memory planned is not enough.
+    OverBudget,
+    /// The call was wrong: an argument lies outside its limits.
+    Misuse,
+    /// A mistake in this crate; please report it.
+    Internal,
+}
+
+/// Everything that can go wrong between bytes and pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum DecodeError {
+    /// The first eight bytes are not a bundle's.
+    NotABundle,
+    /// The bundle has a version that this decoder does not read.
+    UnsupportedVersion {
+        /// Version in the file.
+        found: u16,
+        /// The version this decoder reads.
+        supported: u16,
+    },
+    /// The scene uses effects that this decoder does not know.
+    UnsupportedEffects {
+        /// The effect bits without a meaning here.
+        unknown_bits: u32,
+    },
+    /// A section ends before its content does.
+    Truncated {
+        /// Where.
+        section: SectionKind,
+        /// Bytes needed from the section's start (from the file's start for the header).
+        needed: u32,
+        /// Bytes there.
+        available: u32,
+    },
+    /// A section's length does not follow from the header's counts.
+    WrongLength {
+        /// Where.
+        section: SectionKind,
+        /// Bytes that the header's counts call for.
+        expected: u32,
+        /// Bytes in the section table.
+        found: u32,
+    },
+    /// A section, or a chunk in its section, does not begin where the one before it ends.
+    Misplaced {
+        /// Where.
+        section: SectionKind,
+        /// Offset that closes the gap.
+        expected: u32,
+        /// Offset stored.
+        found: u32,
+    },
+    /// The bytes of a section changed since they were written.
+    SectionChecksum {
+        /// Which.
+        section: SectionKind,
+        /// CRC-32 in the file.
+        stored: u32,
+        /// CRC-32 of the bytes.
+        computed: u32,
+    },
+    /// The bytes of a chunk changed since they were written.
+    ChunkChecksum {
+        /// Which, from 0.
+        chunk: u32,
+        /// CRC-32 in the directory.
+        stored: u32,
+        /// CRC-32 of the bytes.
+        computed: u32,
+    },
+    /// A number lies outside its limits.
+    OutOfRange {
+        /// Which number.
+        field: Field,
+        /// Its value.
+        found: u32,
+        /// The limit that it violates.
+        limit: u32,
+    },
+    /// A float is infinite, not a number, or of the wrong sign.
+    BadFloat {
+        /// Which.
+        field: Field,
+        /// Its index among the field's floats.
+        index: u32,
+    },
+    /// The cumulative frequencies of a table fall somewhere.
+    NotIncreasing {
+        /// Which table, from 0.
+        table: u32,
+        /// Index of the entry that is smaller than the one before, or beyond the limit.
+        entry: u32,
+    },
+    /// A channel refers to a table that is not there.
+    NoSuchTable {
+        /// Which channel, from 0.
+        channel: u32,
+        /// The table it names.
+        table: u32,
+        /// Tables there are.
+        n_tables: u32,
+    },
+    /// A chunk is shorter than its fixed fields and lattice offsets.
+    ChunkTooShort {
+        /// Which, from 0.
+        chunk: u32,
+        /// Bytes needed.
+        needed: u32,
+        /// Bytes there.
+        available: u32,
+    },
+    /// The coded symbols of a chunk do not end where its bytes end.
+    ChunkStream {
+        /// Which, from 0.
+        chunk: u32,
+        /// Bytes left over after the last symbol; 0 when the symbols ran past the end.
+        left_bytes: u32,
+    },
+    /// There is no such chunk.
+    NoSuchChunk {
+        /// The one asked for.
+        chunk: u32,
+        /// Chunks there are.
+        n_chunks: u32,
+    },
+    /// The plan needs more bytes than this machine can address.
+    PlanTooLarge {
+        /// Splats asked for.
+        max_splats: u32,
+    },
+    /// The caller's scratch memory is shorter than the plan says.
+    ScratchTooSmall {
+        /// Bytes needed.
+        needed: u32,
+        /// Bytes given.
+        available: u32,
+    },
+    /// A frame holds more splats than were planned for.
+    TooManySplats {
+        /// Splats of this frame.
+        needed: u32,
+        /// Splats planned.
+        planned: u32,
+    },
+    /// The plan was made for another bundle.
+    PlanMismatch {
+        /// Bytes this bundle would need.
+        needed: u32,
+        /// Bytes in the plan.
+        planned: u32,
+    },
+    /// A buffer passed to a decoding function is too short.
+    BufferTooShort {
+        /// Which.
+        field: Field,
+        /// Elements needed.
+        needed: u32,
+        /// Elements given.
+        available: u32,
+    },
+    /// A state that parsing rules out.
+    Internal,
+}
+
+// An error travels through every `Result` of the hot paths; four words fit a Cortex-M's registers.
+const _: () = assert!(size_of::<DecodeError>() <= 16, "DecodeError grew beyond four words");
+
+impl DecodeError {
+    /// Whose fault it is.
+    ///
+    /// ```
+    /// use pocketsplat_core::{Bundle, ErrorClass};
+    ///
+    /// assert_eq!(Bundle::parse(b"not a bundle").unwrap_err().class(), ErrorClass::Malformed);
+    /// ```
+    pub const fn class(&self) -> ErrorClass {
+        match self {
+            Self::UnsupportedVersion { .. } | Self::UnsupportedEffects { .. } => ErrorClass::Unsupported,
+            Self::PlanTooLarge { .. } | Self::ScratchTooSmall { .. } | Self::TooManySplats { .. } => {
+                ErrorClass::OverBudget
+            }
+            Self::NoSuchChunk { .. } | Self::PlanMismatch { .. } | Self::BufferTooShort { .. } => ErrorClass::Misuse,
+            Self::OutOfRange { field, .. } | Self::BadFloat { field, .. } => field.class(),
+            Self::Internal => ErrorClass::Internal,
+            Self::NotABundle
+            | Self::Truncated { .. }
+            | Self::WrongLength { .. }
+            | Self::Misplaced { .. }
+            | Self::SectionChecksum { .. }
+            | Self::ChunkChecksum { .. }
+            | Self::NotIncreasing { .. }
+            | Self::NoSuchTable { .. }
+            | Self::ChunkTooShort { .. }
+            | Self::ChunkStream { .. } => ErrorClass::Malformed,
+        }
+    }
+}
+
+impl core::error::Error for DecodeError {}

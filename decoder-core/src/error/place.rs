@@ -20,7 +20,7 @@ pub enum SectionKind {
     Chunks,
 }
 
-/// A value that has limits of its own; names what [`DecodeError::OutOfRange`] and its kin speak of.
+/// A value that has limits of its own; names what [`OutOfRange`](super::DecodeError::OutOfRange) and its kin speak of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(missing_docs, reason = "each variant is the name of a field of FORMAT.md or of `Camera`")]

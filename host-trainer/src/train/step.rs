@@ -77,6 +77,14 @@ pub struct Block<R> {
     d_heads: Heads<R>,
 }
 
+/// A drawn view and what its backward pass needs.
+struct Drawing<R> {
+    image: TiledImage<R>,
+    lists: tiles::TileLists,
+    splats: Vec<Splat<R>>,
+    footprints: Vec<Footprint<R>>,
+}
+
 /// Buffers and gradients of a step.
 #[derive(Clone, Debug)]
 pub struct Workspace<R> {
@@ -244,14 +252,7 @@ impl<R: Real> Workspace<R> {
     }
 
     /// Draws the view: the forward half of [`Self::step`].
-    ///
-    /// * returns the image in tile order, its tile lists and all splats.
-    fn draw(
-        &mut self,
-        scene: &Scene<R>,
-        camera: &Pinhole<R>,
-        background: [R; 3],
-    ) -> (TiledImage<R>, tiles::TileLists, Vec<Splat<R>>) {
+    fn draw(&mut self, scene: &Scene<R>, camera: &Pinhole<R>, background: [R; 3]) -> Drawing<R> {
         let visible: Vec<u32> = (0..scene.anchors.len())
             .into_par_iter()
             .with_min_len(1024)
@@ -273,13 +274,13 @@ impl<R: Real> Workspace<R> {
         let splats: Vec<Splat<R>> = self.blocks().iter().flat_map(|b| b.splats.iter().copied()).collect();
         let footprints: Vec<Footprint<R>> = self.blocks().iter().flat_map(|b| b.footprints.iter().copied()).collect();
         let lists = tiles::build(&splats, &footprints, camera.size_px);
-        let image = rasterise::forward(level, &splats, &lists, background);
-        (image, lists, splats)
+        let image = rasterise::forward(level, &splats, &footprints, &lists, background);
+        Drawing { image, lists, splats, footprints }
     }
 
     /// The image of a view, planes `[3, height, width]`, not clamped.
     pub fn image(&mut self, scene: &Scene<R>, camera: &Pinhole<R>, background: [R; 3]) -> Vec<R> {
-        self.draw(scene, camera, background).0.to_planes(camera.size_px)
+        self.draw(scene, camera, background).image.to_planes(camera.size_px)
     }
 
     /// Loss and gradients of one view.
@@ -288,7 +289,7 @@ impl<R: Real> Workspace<R> {
     /// left in [`Self::blocks`], those of the heads in [`Self::d_heads`].
     pub fn step(&mut self, scene: &Scene<R>, target: &Target<'_, R>, weights: &LossWeights) -> StepReport<R> {
         let size_px = target.camera.size_px;
-        let (tiled, lists, splats) = self.draw(scene, target.camera, target.background);
+        let Drawing { image: tiled, lists, splats, footprints } = self.draw(scene, target.camera, target.background);
         let image = tiled.to_planes(size_px);
 
         let lambda = R::real(weights.dssim);
@@ -302,7 +303,7 @@ impl<R: Real> Workspace<R> {
         let loss = (R::ONE - lambda) * l1::forward(&image, target.truth) + lambda * (R::ONE - similarity) + volumes;
 
         let d_tiled = TiledImage::from_planes(&d_image, size_px);
-        let d_splats = rasterise::backward(self.level, &splats, &lists, &tiled, &d_tiled);
+        let d_splats = rasterise::backward(self.level, &splats, &footprints, &lists, &tiled, &d_tiled);
         let mut rest = d_splats.as_slice();
         let mut shares = Vec::with_capacity(self.n_blocks);
         for block in self.blocks() {

@@ -1,8 +1,8 @@
-//! What can be wrong with a capture as a whole, and with one view of it.
+//! What can be wrong with a capture as a whole.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use super::PoseFault;
+use super::Layout;
 
 /// Why a capture cannot be loaded; each message names the place, what was found, what is needed and the remedy.
 #[derive(Debug, thiserror::Error)]
@@ -16,15 +16,21 @@ pub enum DatasetError {
     },
     /// No known layout fits the folder.
     #[error(
-        "`{}` is no capture that can be read: looked for `{looked_for}` (Blender layout) and did not find it; \
-         give the folder that holds that file",
-        path.display()
+        "`{}` is no capture that can be read: looked for {} and found none of them; {}",
+        path.display(),
+        looked_for.join(", "),
+        match inside {
+            Some(inside) => format!("its folder `{}` is one, give that", inside.display()),
+            None => "give the folder that holds one of them".to_owned(),
+        }
     )]
     UnknownLayout {
         /// The folder given.
         path: PathBuf,
-        /// The file whose presence would have told the layout.
-        looked_for: &'static str,
+        /// The files whose presence would have told a layout.
+        looked_for: Vec<&'static str>,
+        /// A folder in it that is a capture.
+        inside: Option<PathBuf>,
     },
     /// A file of the capture cannot be read.
     #[error("cannot read `{}`: {source}; check that the file is there and may be read", path.display())]
@@ -36,8 +42,8 @@ pub enum DatasetError {
     },
     /// A transforms file is no such JSON; the source gives line and column.
     #[error(
-        "`{}` is not a transforms file: {source}; it needs `camera_angle_x` and `frames`, each frame with `file_path` \
-         and a `transform_matrix` of 4 rows of 4 numbers",
+        "`{}` is not a transforms file: {source}; it needs `fl_x` or `camera_angle_x` and `frames`, each frame \
+         with `file_path` and a `transform_matrix` of 4 rows of 4 numbers",
         path.display()
     )]
     Transforms {
@@ -57,6 +63,60 @@ pub enum DatasetError {
         path: PathBuf,
         /// The value in it.
         found: f64,
+    },
+    /// A transforms file gives no focal length.
+    #[error(
+        "`{}`: neither `fl_x` nor `camera_angle_x` is a number, for all frames or in the frame `{frame}`; give the \
+         focal length in pixels or the horizontal field of view in radians",
+        path.display()
+    )]
+    NoFocal {
+        /// The file.
+        path: PathBuf,
+        /// The first frame without.
+        frame: String,
+    },
+    /// A file of a COLMAP model is damaged.
+    #[error("`{}`: {place}: {found}; export the model again, or copy it again if the file was cut", path.display())]
+    Model {
+        /// The file.
+        path: PathBuf,
+        /// Line, or record and byte.
+        place: String,
+        /// What is wrong there, with what is needed.
+        found: String,
+    },
+    /// A camera model that cannot be undistorted.
+    #[error(
+        "`{}`: {camera} has the camera model `{model}`, needed: PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL, RADIAL or \
+         OPENCV; undistort the capture first (COLMAP: image_undistorter) or reconstruct it with one of these",
+        path.display()
+    )]
+    CameraModel {
+        /// The file that says so.
+        path: PathBuf,
+        /// Which camera.
+        camera: String,
+        /// The model's name.
+        model: String,
+    },
+    /// There is no folder of images, or more than one to choose from.
+    #[error("`{}` {}", path.display(), image_folder(wanted.as_deref(), present))]
+    ImageFolder {
+        /// The capture.
+        path: PathBuf,
+        /// The folder asked for.
+        wanted: Option<String>,
+        /// Folders of images in the capture.
+        present: Vec<String>,
+    },
+    /// A point cloud is damaged or of an unknown kind.
+    #[error("`{}` {found}; write it again, or take `ply_file_path` out to start from random points", path.display())]
+    Ply {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        found: String,
     },
     /// Too few training views are left after the unusable ones are set aside.
     #[error(
@@ -79,7 +139,7 @@ pub enum DatasetError {
     /// The training cameras span no space, so the scene has no scale.
     #[error(
         "`{}`: all training cameras stand within {spread:e} of one point, so the scene has no scale; give views from \
-         different places, or check the last column of each `transform_matrix`",
+         different places, or check the translations of the poses",
         path.display()
     )]
     NoBaseline {
@@ -94,6 +154,35 @@ pub enum DatasetError {
         /// The value given.
         found: u32,
     },
+    /// Every view would be held out.
+    #[error(
+        "one view in {found} is to be held out, needed: at least 2, so that some are left to train on; 0 holds out none"
+    )]
+    TestEvery {
+        /// The value given.
+        found: u32,
+    },
+}
+
+impl DatasetError {
+    /// The error of a folder that is no capture; looks whether a folder in it is one.
+    pub(super) fn unknown_layout(path: &Path) -> Self {
+        let entries = std::fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path());
+        let inside = entries.filter(|path| path.is_dir() && Layout::of(path).is_some()).min();
+        Self::UnknownLayout { path: path.to_owned(), looked_for: Layout::LOOKED_FOR.to_vec(), inside }
+    }
+}
+
+fn image_folder(wanted: Option<&str>, present: &[String]) -> String {
+    let there = match present {
+        [] => "there is neither `images` nor `images_…`".to_owned(),
+        present => format!("there are `{}`", present.join("`, `")),
+    };
+    match (wanted, present) {
+        (Some(wanted), _) => format!("has no folder `{wanted}`: {there}; give `--images` one that is there"),
+        (None, []) => format!("has no folder of images: {there}; put the photographs into `images`"),
+        (None, _) => format!("has several folders of images: {there}; choose one with `--images`"),
+    }
 }
 
 /// How many faults a message spells out before it counts the rest.
@@ -109,44 +198,4 @@ fn list_faults(faults: &[String]) -> String {
         text.push_str(&format!("\n  … and {} more", faults.len() - FAULTS_SPELT_OUT));
     }
     text
-}
-
-/// Why one view cannot be used.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ViewFault {
-    /// The image is not there.
-    #[error(
-        "image missing: neither `{}` nor the same with `.png` exists; restore it or take the frame out of the \
-         transforms file",
-        path.display()
-    )]
-    Missing {
-        /// The path as the capture gives it.
-        path: PathBuf,
-    },
-    /// The image cannot be decoded.
-    #[error("image unreadable: `{}`: {message}; replace it with a whole PNG or JPEG", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// What the decoder said.
-        message: String,
-    },
-    /// The image's size is not the capture's.
-    #[error(
-        "`{}` is {}×{} px, the training images are {}×{} px; export it again at that size",
-        path.display(), found_px.0, found_px.1, needed_px.0, needed_px.1
-    )]
-    Size {
-        /// The file.
-        path: PathBuf,
-        /// Its width and height.
-        found_px: (u32, u32),
-        /// Width and height of most training images.
-        needed_px: (u32, u32),
-    },
-    /// The pose is no rigid motion.
-    #[error("`transform_matrix` {0}")]
-    Pose(#[from] PoseFault),
 }

@@ -2,28 +2,58 @@
 
 use std::path::Path;
 
-use super::{Background, Image};
+use ::image::ImageDecoder;
 
-/// Width and height of the image file `path`, from its header alone.
-///
-/// # Errors
-/// What the decoder or the system said, for people.
-pub(super) fn header_size_px(path: &Path) -> Result<(u32, u32), String> {
-    let reader = ::image::ImageReader::open(path).and_then(|reader| reader.with_guessed_format());
-    reader.map_err(|error| error.to_string())?.into_dimensions().map_err(|error| error.to_string())
+use super::{Background, Image, Mask};
+
+/// What an image file says about itself before its pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Header {
+    /// Width and height as stored, pixels.
+    pub(super) size_px: (u32, u32),
+    /// Whether there is an alpha channel.
+    pub(super) has_alpha: bool,
+    /// The EXIF orientation, 1 to 8; 1 means upright, and so does its absence.
+    pub(super) exif_orientation: u8,
 }
 
-/// Decodes the image file `path` and composites it on `background`; also says whether it has an alpha channel.
+/// Reads the header of the image file `path`.
 ///
 /// # Errors
 /// What the decoder or the system said, for people.
-pub(super) fn read_composited(path: &Path, background: Background) -> Result<(Image, bool), String> {
+pub(super) fn read_header(path: &Path) -> Result<Header, String> {
     let reader = ::image::ImageReader::open(path).and_then(|reader| reader.with_guessed_format());
-    let decoded = reader.map_err(|error| error.to_string())?.decode().map_err(|error| error.to_string())?;
-    let has_alpha = decoded.color().has_alpha();
-    let rgba = decoded.into_rgba8();
+    let decoder = reader.map_err(|error| error.to_string())?.into_decoder();
+    let mut decoder = decoder.map_err(|error| error.to_string())?;
+    let exif_orientation = decoder.orientation().map_or(1, |orientation| orientation.to_exif());
+    Ok(Header { size_px: decoder.dimensions(), has_alpha: decoder.color_type().has_alpha(), exif_orientation })
+}
+
+/// Decodes a mask: black pixels do not count.
+///
+/// # Errors
+/// What the decoder or the system said, for people.
+pub(super) fn read_mask(path: &Path) -> Result<Mask, String> {
+    let luma = decode(path)?.into_luma8();
+    let (width_px, height_px) = luma.dimensions();
+    Ok(Mask { width_px, height_px, valid: luma.as_raw().iter().map(|&value| value > 0).collect() })
+}
+
+/// Decodes an image as it is stored: an EXIF orientation is not applied, because poses and intrinsics are for the
+/// pixels as stored.
+fn decode(path: &Path) -> Result<::image::DynamicImage, String> {
+    let reader = ::image::ImageReader::open(path).and_then(|reader| reader.with_guessed_format());
+    reader.map_err(|error| error.to_string())?.decode().map_err(|error| error.to_string())
+}
+
+/// Decodes the image file `path` and composites it on `background`.
+///
+/// # Errors
+/// What the decoder or the system said, for people.
+pub(super) fn read_composited(path: &Path, background: Background) -> Result<Image, String> {
+    let rgba = decode(path)?.into_rgba8();
     let (width_px, height_px) = rgba.dimensions();
-    Ok((Image { width_px, height_px, rgb: composite(rgba.as_raw(), background) }, has_alpha))
+    Ok(Image { width_px, height_px, rgb: composite(rgba.as_raw(), background) })
 }
 
 /// Composites straight-alpha pixels on a background: `⌊(c·a + b·(255 − a)) / 255⌋` per channel.

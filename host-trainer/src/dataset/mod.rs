@@ -1,9 +1,10 @@
 //! Captures: photographs with poses, normalised.
 //!
-//! [`load`] tells the layout of a folder by the files in it and hands it to that layout's reader. What every reader
-//! shares lives apart from them: pixels in `image`, pose checks in `pose`, the common frame in `normalise`.
+//! [`load`] tells the layout of a folder by the files in it; that layout's reader lists the views (poses, lenses, image
+//! headers), and what all layouts share makes a capture of the listing: pixels in `image`, `lens` and `undistort`, the
+//! common frame in `normalise`, initial points in `ply` and `frusta`.
 //! A view that cannot be used is left out and named in the [`LoadReport`]; only a capture that cannot be trained on
-//! at all is an error.
+//! at all is an error. [`diagnose`] looks at the same listing and says what may go wrong.
 
 use std::path::Path;
 
@@ -11,18 +12,37 @@ use glam::DVec3;
 
 use crate::camera::Camera;
 
+mod assemble;
 mod blender;
+mod colmap;
 mod error;
+mod frusta;
 mod image;
+mod image_folder;
+mod layout;
+mod lens;
+mod listing;
+mod mask;
+mod nerfstudio;
 mod normalise;
 mod options;
+mod photo;
+mod ply;
 mod pose;
 mod report;
+mod spacing;
+mod transforms;
+mod undistort;
+mod view_fault;
 
-pub use error::{DatasetError, ViewFault};
+pub use error::DatasetError;
+pub use layout::Layout;
+pub use mask::Mask;
 pub use options::{Background, LoadOptions, UnknownBackground};
 pub use pose::PoseFault;
 pub use report::{LoadReport, SkippedView, Split};
+pub use spacing::{PUBLISHED_VOXEL_SIZE, nearest_squared, suggested_voxel_size};
+pub use view_fault::ViewFault;
 
 /// An 8-bit RGB image, row-major, interleaved.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -42,8 +62,10 @@ pub struct View {
     pub name: String,
     /// Camera in the normalised frame, for this image's size.
     pub camera: Camera,
-    /// The photograph, composited on the capture's background.
+    /// The photograph, composited on the capture's background and undistorted.
     pub image: Image,
+    /// Which pixels count; all where there is none.
+    pub mask: Option<Mask>,
 }
 
 /// The similarity that takes the capture's world to the normalised frame: `p_norm = (p_world − centre) · scale`.
@@ -55,6 +77,15 @@ pub struct Normalisation {
     pub scale: f64,
 }
 
+/// Where initial points come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PointsOrigin {
+    /// From the capture: on surfaces, as dense as the photographs' features.
+    Capture,
+    /// Drawn at random where the cameras look.
+    Random,
+}
+
 /// A capture ready for training.
 #[derive(Clone, Debug)]
 pub struct Capture {
@@ -64,6 +95,8 @@ pub struct Capture {
     pub test: Vec<View>,
     /// Points to start from, normalised frame.
     pub points: Vec<DVec3>,
+    /// Where they come from.
+    pub points_origin: PointsOrigin,
     /// Takes capture coordinates to the normalised frame.
     pub normalisation: Normalisation,
     /// 1.1 × the largest distance of a training camera to their mean, normalised units: [`EXTENT`] by construction.
@@ -75,22 +108,41 @@ pub struct Capture {
 /// The extent every capture is scaled to, because constants such as the near cull 0.2 assume extents of about 5.
 pub const EXTENT: f64 = 5.0;
 
+impl Capture {
+    /// The voxel size for anchors, normalised units: [`suggested_voxel_size`] of the capture's points, and
+    /// [`PUBLISHED_VOXEL_SIZE`] where they are random and their spacing says nothing about the scene.
+    pub fn suggested_voxel_size(&self) -> f64 {
+        match self.points_origin {
+            PointsOrigin::Capture => suggested_voxel_size(&self.points),
+            PointsOrigin::Random => PUBLISHED_VOXEL_SIZE,
+        }
+    }
+}
+
 /// Loads the capture in the folder `path`.
 ///
-/// The layout is told by the files present: `transforms_train.json` means Blender (Synthetic-NeRF). Images are decoded
-/// on all threads, composited on [`LoadOptions::background`] and only then reduced, so that at most one full-size image
-/// per thread is held; the result does not depend on the number of threads.
+/// The layout is told by the files present, see [`Layout`]. Images are decoded on all threads, composited on
+/// [`LoadOptions::background`], undistorted, and only then reduced, so that at most one full-size image per thread is
+/// held; the result does not depend on the number of threads.
 ///
 /// # Errors
-/// [`DatasetError`] names the file, what was found, what is needed and what to do: a folder of unknown layout, a
-/// transforms file that cannot be read, fewer than three usable training views, or training cameras all in one place.
+/// [`DatasetError`] names the file, what was found, what is needed and what to do: a folder of unknown layout, a file of
+/// poses that cannot be read, a camera model that cannot be undistorted, fewer than three usable training views, or
+/// training cameras all in one place.
 pub fn load(path: &Path, options: &LoadOptions) -> Result<(Capture, LoadReport), DatasetError> {
+    assemble::assemble(list(path, options)?, options)
+}
+
+/// Lists the capture in the folder `path`, without decoding pixels.
+fn list(path: &Path, options: &LoadOptions) -> Result<listing::Listing, DatasetError> {
     options.check()?;
     if !path.is_dir() {
         return Err(DatasetError::NotAFolder { path: path.to_owned() });
     }
-    if blender::is_layout_of(path) {
-        return blender::load(path, options);
+    match Layout::of(path) {
+        Some(Layout::Blender) => blender::list(path),
+        Some(Layout::Colmap) => colmap::list(path, options),
+        Some(Layout::Nerfstudio) => nerfstudio::list(path, options),
+        None => Err(DatasetError::unknown_layout(path)),
     }
-    Err(DatasetError::UnknownLayout { path: path.to_owned(), looked_for: blender::TRAIN_FILE })
 }

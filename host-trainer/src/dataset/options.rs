@@ -70,20 +70,37 @@ pub struct LoadOptions {
     pub seed: u64,
     /// How many random initial points a capture that brings none gets.
     pub n_random_points: usize,
+    /// The folder of images to read, for captures that hold several (`images`, `images_2`, …).
+    ///
+    /// Without it the only one there is, or `images`. Blender captures name each image by its path and ignore it.
+    pub images: Option<String>,
+    /// Every this many-th view, sorted by name and counted from the first, is held out where the capture gives no
+    /// split of its own; 0 holds out none. Views whose image is missing count, so that the split does not depend on
+    /// which files are there.
+    pub test_every: u32,
 }
 
 impl Default for LoadOptions {
     fn default() -> Self {
         // 10 000 points is what the anchor-based family starts Synthetic-NeRF scenes from.
-        Self { max_resolution: None, background: Background::Black, seed: 42, n_random_points: 10_000 }
+        Self {
+            max_resolution: None,
+            background: Background::Black,
+            seed: 42,
+            n_random_points: 10_000,
+            images: None,
+            // As every published figure on COLMAP captures.
+            test_every: 8,
+        }
     }
 }
 
 impl LoadOptions {
     /// Refuses values that no capture can be loaded with.
     pub(super) fn check(&self) -> Result<(), DatasetError> {
-        match self.max_resolution {
-            Some(0) => Err(DatasetError::MaxResolution { found: 0 }),
+        match (self.max_resolution, self.test_every) {
+            (Some(0), _) => Err(DatasetError::MaxResolution { found: 0 }),
+            (_, 1) => Err(DatasetError::TestEvery { found: 1 }),
             _ => Ok(()),
         }
     }

@@ -3,10 +3,10 @@
 use std::fmt;
 
 use super::error::FAULTS_SPELT_OUT;
-use super::{Background, ViewFault};
+use super::{Background, Layout, PointsOrigin, ViewFault};
 
 /// The part of a capture a view belongs to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Split {
     /// Views to train on.
     Train,
@@ -44,21 +44,27 @@ impl fmt::Display for SkippedView {
 #[derive(Debug)]
 pub struct LoadReport {
     /// The layout the capture was read as.
-    pub layout: &'static str,
+    pub layout: Layout,
     /// What transparent pixels were composited on.
     pub background: Background,
     /// Views to train on.
     pub n_train: usize,
     /// Views held out.
     pub n_test: usize,
-    /// Width and height of the images in the capture, pixels.
+    /// Width and height of most training images in the capture, pixels.
     pub source_size_px: (u32, u32),
-    /// Width and height they were loaded at, pixels.
+    /// Width and height these were loaded at, pixels.
     pub size_px: (u32, u32),
+    /// How many different sizes the images have.
+    pub n_sizes: usize,
     /// Initial points.
     pub n_points: usize,
+    /// Where they come from.
+    pub points_origin: PointsOrigin,
     /// Views left out, in the capture's order, training views first.
     pub skipped: Vec<SkippedView>,
+    /// Images that lie with the others but have no pose, by name; they are not read.
+    pub unposed: Vec<String>,
     /// Everything else worth knowing, each with its remedy where there is one.
     pub notes: Vec<String>,
 }
@@ -74,7 +80,11 @@ impl fmt::Display for LoadReport {
         if self.size_px != self.source_size_px {
             write!(f, " (area-averaged from {}×{})", self.source_size_px.0, self.source_size_px.1)?;
         }
-        write!(f, ", on {}, {} initial points", self.background, self.n_points)?;
+        if self.n_sizes > 1 {
+            write!(f, " and {} other sizes", self.n_sizes - 1)?;
+        }
+        let random = if self.points_origin == PointsOrigin::Random { "random " } else { "" };
+        write!(f, ", on {}, {} {random}initial points", self.background, self.n_points)?;
         for split in [Split::Train, Split::Test] {
             let of_split = || self.skipped.iter().filter(move |view| view.split == split);
             let n_skipped = of_split().count();
@@ -88,11 +98,23 @@ impl fmt::Display for LoadReport {
                 }
             }
         }
+        if !self.unposed.is_empty() {
+            write!(f, "\nimages without a pose, not used: {} ({})", self.unposed.len(), first_few(&self.unposed))?;
+        }
         for note in &self.notes {
             write!(f, "\nnote: {note}")?;
         }
         Ok(())
     }
+}
+
+/// The first names, and how many more there are.
+pub(super) fn first_few(names: &[String]) -> String {
+    let mut text = names.iter().take(FAULTS_SPELT_OUT).map(String::as_str).collect::<Vec<_>>().join(", ");
+    if names.len() > FAULTS_SPELT_OUT {
+        text.push_str(&format!(", … and {} more", names.len() - FAULTS_SPELT_OUT));
+    }
+    text
 }
 
 #[cfg(test)]
@@ -105,24 +127,33 @@ mod tests {
             .map(|i| SkippedView {
                 split: Split::Train,
                 name: format!("train/r_{i}"),
-                fault: ViewFault::Missing { path: format!("/capture/train/r_{i}").into() },
+                fault: ViewFault::Missing {
+                    path: format!("/capture/train/r_{i}").into(),
+                    or_png: true,
+                    listed_in: "the transforms file",
+                },
             })
             .collect();
         let report = LoadReport {
-            layout: "Blender",
+            layout: Layout::Blender,
             background: Background::Black,
             n_train: 7,
             n_test: 0,
             source_size_px: (8, 6),
             size_px: (4, 3),
+            n_sizes: 2,
             n_points: 10,
+            points_origin: PointsOrigin::Random,
             skipped,
+            unposed: ["a.jpg", "b.jpg", "c.jpg", "d.jpg"].map(str::to_owned).to_vec(),
             notes: vec!["no test views".to_owned()],
         };
         let text = report.to_string();
         assert!(text.starts_with("Blender capture: 7 views to train, 0 to test, 4×3 px (area-averaged from 8×6)"));
+        assert!(text.contains(" and 1 other sizes, on black, 10 random initial points\n"), "{text}");
+        assert!(text.contains("images without a pose, not used: 4 (a.jpg, b.jpg, c.jpg, … and 1 more)"), "{text}");
         assert!(text.contains("train views left out: 5\n  train/r_0: image missing"), "{text}");
         assert!(text.contains("train/r_2") && !text.contains("train/r_3"), "{text}");
-        assert!(text.ends_with("… and 2 more\nnote: no test views"), "{text}");
+        assert!(text.contains("\n  … and 2 more\n") && text.ends_with("\nnote: no test views"), "{text}");
     }
 }

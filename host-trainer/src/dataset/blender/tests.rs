@@ -1,10 +1,11 @@
 use std::fmt::Write as _;
 use std::fs;
+use std::path::PathBuf;
 
 use glam::{DMat3, DVec3};
 
 use super::*;
-use crate::dataset::{Background, load};
+use crate::dataset::{Background, Capture, LoadOptions, LoadReport, load};
 
 /// A capture of 6×4 px images from `n` cameras on a circle of radius 4, looking at the origin.
 struct Fixture {
@@ -180,7 +181,7 @@ fn broken_transforms_name_file_place_and_remedy() {
         ("40.0", ["`camera_angle_x` is 40", "between 0 and π", "degrees"]),
         ("-0.5", ["`camera_angle_x` is -0.5", TRAIN_FILE, "radians"]),
         ("\"wide\"", ["line 1 column 25", TRAIN_FILE, "invalid type: string"]),
-        ("NaN", ["line 1 column 20", TRAIN_FILE, "expected value"]),
+        ("NaN", ["neither `fl_x` nor `camera_angle_x` is a number", TRAIN_FILE, "`train/r_0`"]),
     ] {
         fixture.write(TRAIN_FILE, &transforms(angle, &fixture.frames));
         assert_says(&fixture.error(), &parts);
@@ -207,7 +208,7 @@ fn cameras_in_one_place_are_refused() {
 #[test]
 fn what_is_no_capture_is_refused_by_what_was_looked_for() {
     let fixture = Fixture::new(3);
-    assert_says(&fixture.error(), &["looked for `transforms_train.json`", "give the folder that holds that file"]);
+    assert_says(&fixture.error(), &["looked for `transforms_train.json`", "give the folder that holds one of them"]);
     let nowhere = fixture.path().join("nowhere");
     let error = load(&nowhere, &LoadOptions::default()).expect_err("no folder").to_string();
     assert_says(&error, &["nowhere` is not a folder"]);

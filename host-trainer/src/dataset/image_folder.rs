@@ -1,0 +1,50 @@
+//! Which folder of images to read: captures often hold the photographs at several sizes.
+
+use std::path::Path;
+
+use super::{DatasetError, LoadOptions};
+
+/// The folder of full-size images.
+const DEFAULT: &str = "images";
+
+/// The name of the folder to read images from: the one asked for, the only one there is, or `images`; says what else
+/// there is. `None` where there is none.
+///
+/// # Errors
+/// [`DatasetError::ImageFolder`] where the one asked for is missing, or several are there but not `images`.
+pub(super) fn choose(
+    folder: &Path,
+    options: &LoadOptions,
+    notes: &mut Vec<String>,
+) -> Result<Option<String>, DatasetError> {
+    let present = present(folder);
+    if let Some(name) = &options.images {
+        if folder.join(name).is_dir() {
+            return Ok(Some(name.clone()));
+        }
+        return Err(DatasetError::ImageFolder { path: folder.to_owned(), wanted: Some(name.clone()), present });
+    }
+    match present.as_slice() {
+        [] => Ok(None),
+        [only] => Ok(Some(only.clone())),
+        several if several.iter().any(|name| name == DEFAULT) => {
+            let others: Vec<&str> = several.iter().filter(|name| *name != DEFAULT).map(String::as_str).collect();
+            notes.push(format!(
+                "images are read from `{DEFAULT}`; the capture also has `{}`, which `--images` selects",
+                others.join("`, `")
+            ));
+            Ok(Some(DEFAULT.to_owned()))
+        }
+        _ => Err(DatasetError::ImageFolder { path: folder.to_owned(), wanted: None, present }),
+    }
+}
+
+/// The folders named `images` or `images_…`, sorted.
+fn present(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let names =
+        entries.filter(|entry| entry.path().is_dir()).map(|entry| entry.file_name().to_string_lossy().into_owned());
+    let mut names: Vec<String> = names.filter(|name| name == DEFAULT || name.starts_with("images_")).collect();
+    names.sort_unstable();
+    names
+}

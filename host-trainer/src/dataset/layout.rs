@@ -1,0 +1,49 @@
+//! How captures are laid out on disk.
+
+use std::fmt;
+use std::path::Path;
+
+use super::{blender, colmap, nerfstudio};
+
+/// A layout that can be read, told by the files present; the first that fits is taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Layout {
+    /// Synthetic-NeRF: `transforms_train.json` and its like beside RGBA images.
+    Blender,
+    /// A sparse model in `sparse/0`, binary or text, beside `images`.
+    Colmap,
+    /// nerfstudio and instant-ngp: one `transforms.json`.
+    Nerfstudio,
+}
+
+impl Layout {
+    /// The layout of the folder `path`.
+    pub(super) fn of(path: &Path) -> Option<Self> {
+        if path.join(blender::TRAIN_FILE).is_file() {
+            Some(Self::Blender)
+        } else if colmap::is_layout_of(path) {
+            Some(Self::Colmap)
+        } else if path.join(nerfstudio::FILE).is_file() {
+            Some(Self::Nerfstudio)
+        } else {
+            None
+        }
+    }
+
+    /// What tells each layout, for messages.
+    pub(super) const LOOKED_FOR: [&str; 3] = [
+        "`transforms_train.json` (Blender)",
+        "`sparse/0/cameras.bin` or `sparse/0/cameras.txt` (COLMAP)",
+        "`transforms.json` (nerfstudio, instant-ngp)",
+    ];
+}
+
+impl fmt::Display for Layout {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Blender => "Blender",
+            Self::Colmap => "COLMAP",
+            Self::Nerfstudio => "nerfstudio",
+        })
+    }
+}

@@ -1,0 +1,130 @@
+//! What a reader of one layout finds, before any pixel is decoded: the common ground of loading and diagnosing.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use glam::{DMat3, DVec3};
+
+use super::image::Header;
+use super::lens::Lens;
+use super::{Layout, Split, ViewFault};
+
+/// A capture as its files list it.
+pub(super) struct Listing {
+    pub(super) layout: Layout,
+    /// The file that lists the views.
+    pub(super) source: PathBuf,
+    /// The listed views, in the order in which they are handed on.
+    pub(super) views: Vec<ListedView>,
+    /// Points the capture brings, capture units, and the file they are from.
+    pub(super) points: Option<(PathBuf, Vec<DVec3>)>,
+    /// Images that lie with the others but have no pose, by name.
+    pub(super) unposed: Vec<String>,
+    /// What a person should know about how the capture was read.
+    pub(super) notes: Vec<String>,
+}
+
+/// One view of a listing.
+pub(super) struct ListedView {
+    pub(super) split: Split,
+    /// As the capture gives it.
+    pub(super) name: String,
+    /// The photograph and its pose, or why there is none.
+    pub(super) shot: Result<Shot, ViewFault>,
+}
+
+/// A photograph whose pose, lens and image header are sound.
+#[derive(Clone)]
+pub(super) struct Shot {
+    pub(super) path: PathBuf,
+    pub(super) header: Header,
+    /// World to camera, OpenCV axes.
+    pub(super) rotation: DMat3,
+    pub(super) translation: DVec3,
+    /// For the image as it is stored.
+    pub(super) lens: Lens,
+    /// A mask image of the same size; its black pixels do not count.
+    pub(super) mask: Option<PathBuf>,
+}
+
+impl Listing {
+    /// The sound views of a split.
+    pub(super) fn shots(&self, split: Split) -> impl Iterator<Item = &Shot> {
+        self.views.iter().filter(move |view| view.split == split).filter_map(|view| view.shot.as_ref().ok())
+    }
+
+    /// How many views the capture lists for a split, sound or not.
+    pub(super) fn n_listed(&self, split: Split) -> usize {
+        self.views.iter().filter(|view| view.split == split).count()
+    }
+}
+
+/// The value most of an iterator's items have, the first of equals; `None` without items.
+pub(super) fn commonest<T: Copy + Ord>(items: impl Iterator<Item = T>) -> Option<T> {
+    // Count and, to break ties, how early the value was first seen.
+    let mut counts = BTreeMap::new();
+    for (i, item) in items.enumerate() {
+        counts.entry(item).or_insert((0_usize, std::cmp::Reverse(i))).0 += 1;
+    }
+    counts.into_iter().max_by_key(|&(_, rank)| rank).map(|(item, _)| item)
+}
+
+/// Gives every `test_every`-th of `n` views, counted from the first, to the test split; none where it is 0.
+pub(super) fn every_nth(test_every: u32, i: usize) -> Split {
+    if test_every > 0 && i.is_multiple_of(test_every as usize) { Split::Test } else { Split::Train }
+}
+
+/// The names of image files below `folder`, relative to it with `/` between their parts, sorted.
+///
+/// Links to folders are not followed, so that the walk ends.
+pub(super) fn image_names_below(folder: &Path) -> Vec<String> {
+    let mut names = Vec::new();
+    let mut waiting = vec![(folder.to_owned(), String::new())];
+    while let Some((folder, prefix)) = waiting.pop() {
+        for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+            let name = format!("{prefix}{}", entry.file_name().to_string_lossy());
+            if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+                waiting.push((entry.path(), name + "/"));
+            } else if is_image_name(&name) && entry.path().is_file() {
+                names.push(name);
+            }
+        }
+    }
+    names.sort_unstable();
+    names
+}
+
+/// Whether a file of this name can be a photograph.
+pub(super) fn is_image_name(name: &str) -> bool {
+    let extension = name.rsplit_once('.').map(|(_, extension)| extension.to_ascii_lowercase());
+    extension.is_some_and(|extension| ["jpg", "jpeg", "png"].contains(&extension.as_str()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_of_equally_common_values_wins() {
+        assert_eq!(commonest([3, 1, 1, 3, 2].into_iter()), Some(3));
+        assert_eq!(commonest(std::iter::empty::<u8>()), None);
+    }
+
+    #[test]
+    fn every_nth_view_counts_from_the_first() {
+        let held_out = |n| (0..10).filter(|&i| every_nth(n, i) == Split::Test).collect::<Vec<_>>();
+        assert_eq!(held_out(8), [0, 8]);
+        assert_eq!(held_out(3), [0, 3, 6, 9]);
+        assert_eq!(held_out(0), Vec::<usize>::new());
+    }
+
+    #[test]
+    fn images_are_found_in_folders_below_by_their_extension() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        std::fs::create_dir_all(folder.path().join("left/b.jpg")).expect("folders");
+        for name in ["z.PNG", "left/a.jpeg", "left/b.jpg/c.jpg", "notes.txt", "jpg"] {
+            std::fs::write(folder.path().join(name), "").expect("a file");
+        }
+        assert_eq!(image_names_below(folder.path()), ["left/a.jpeg", "left/b.jpg/c.jpg", "z.PNG"]);
+    }
+}

@@ -1,0 +1,98 @@
+//! Captures of nerfstudio and instant-ngp: one `transforms.json` beside photographs.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use rayon::prelude::*;
+
+use super::listing::{ListedView, Listing, every_nth, image_names_below};
+use super::transforms::{Transforms, read_transforms};
+use super::{DatasetError, Layout, LoadOptions, Split, image_folder, ply};
+
+/// The file that tells this layout.
+pub(super) const FILE: &str = "transforms.json";
+
+/// Lists the capture in `folder`, views sorted by name.
+///
+/// # Errors
+/// As [`super::load`], as far as files but no pixels tell.
+pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, DatasetError> {
+    let source = folder.join(FILE);
+    let mut transforms = read_transforms(&source)?;
+    transforms.check_model(&source)?;
+    transforms.frames.sort_by(|a, b| a.name().cmp(b.name()));
+    let mut notes = Vec::new();
+    let named = transforms.image_folder().map(str::to_owned);
+    let images = match (&options.images, &named) {
+        // The folder that the file names is the one to read unless another is asked for or it is not there.
+        (None, Some(named)) if folder.join(named).is_dir() => None,
+        (None, None) => None,
+        _ => image_folder::choose(folder, options, &mut notes)?,
+    };
+    let splits = splits(&transforms, options, &mut notes);
+    let views: Vec<ListedView> = transforms
+        .frames
+        .par_iter()
+        .zip(splits)
+        .filter_map(|(frame, split)| {
+            let shot = frame.shot(folder, images.as_deref(), &transforms.shared);
+            Some(ListedView { split: split?, name: frame.name().to_owned(), shot })
+        })
+        .collect();
+    let points = match &transforms.ply_file_path {
+        Some(path) => {
+            let path = folder.join(path);
+            let points = ply::read_points(&path)?;
+            Some((path, points))
+        }
+        None => None,
+    };
+    let unposed = unposed(folder, images.as_deref().or(named.as_deref()), &transforms);
+    Ok(Listing { layout: Layout::Nerfstudio, source, views, points, unposed, notes })
+}
+
+/// The split of every frame: as the file gives it, or every n-th held out; `None` for frames of no used split.
+fn splits(transforms: &Transforms, options: &LoadOptions, notes: &mut Vec<String>) -> Vec<Option<Split>> {
+    let [train, val, test] = &transforms.splits;
+    if train.is_none() && val.is_none() && test.is_none() {
+        return (0..transforms.frames.len()).map(|i| Some(every_nth(options.test_every, i))).collect();
+    }
+    let held_out = test.as_ref().or(val.as_ref());
+    if test.is_some()
+        && let Some(val) = val
+    {
+        notes.push(format!("views in `val_filenames`, not used: {}", val.len()));
+    }
+    let mut by_name = HashMap::new();
+    for (names, split) in [(train.as_ref(), Split::Train), (held_out, Split::Test)] {
+        for name in names.into_iter().flatten() {
+            by_name.insert(name.trim_start_matches("./"), split);
+        }
+    }
+    let splits: Vec<_> = transforms.frames.iter().map(|frame| by_name.get(frame.name()).copied()).collect();
+    let n_unused = splits.iter().filter(|split| split.is_none()).count();
+    if n_unused > 0 {
+        notes.push(format!("frames that no used split of `{FILE}` names, left out: {n_unused}"));
+    }
+    let n_named = splits.iter().flatten().count();
+    if n_named < by_name.len() {
+        notes.push(format!(
+            "names in the splits of `{FILE}` that no frame has: {}; they must be spelt like `file_path`",
+            by_name.len() - n_named
+        ));
+    }
+    splits
+}
+
+/// Images beside the listed ones that no frame names.
+fn unposed(folder: &Path, images: Option<&str>, transforms: &Transforms) -> Vec<String> {
+    let Some(images) = images else { return Vec::new() };
+    let listed: std::collections::HashSet<&str> = transforms
+        .frames
+        .iter()
+        .map(|frame| frame.name().split_once('/').map_or(frame.name(), |(_, rest)| rest))
+        .collect();
+    let is_listed =
+        |name: &str| listed.contains(name) || name.strip_suffix(".png").is_some_and(|stem| listed.contains(stem));
+    image_names_below(&folder.join(images)).into_iter().filter(|name| !is_listed(name)).collect()
+}

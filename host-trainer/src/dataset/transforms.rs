@@ -1,0 +1,121 @@
+//! Frames of transforms files, whichever layout they belong to.
+
+use std::path::{Path, PathBuf};
+
+use super::image::{Header, read_header};
+use super::lens::Lens;
+use super::listing::{Shot, is_image_name};
+use super::pose::world_to_camera;
+use super::{DatasetError, ViewFault};
+
+mod json;
+
+pub(super) use json::{Frame, Intrinsics, Transforms, read_transforms};
+
+/// Camera models whose parameters the fields of a transforms file spell out.
+const KNOWN_MODELS: [&str; 6] = ["OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "PERSPECTIVE"];
+
+impl Transforms {
+    /// Refuses a camera model of all frames that cannot be undistorted.
+    ///
+    /// # Errors
+    /// [`DatasetError::CameraModel`].
+    pub(super) fn check_model(&self, path: &Path) -> Result<(), DatasetError> {
+        match unknown_model(&self.shared) {
+            Some(model) => {
+                Err(DatasetError::CameraModel { path: path.to_owned(), camera: "all frames".to_owned(), model })
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// The first part that all frames' paths share, such as `images`.
+    pub(super) fn image_folder(&self) -> Option<&str> {
+        let mut folders = self.frames.iter().map(|frame| frame.name().split_once('/').map(|(folder, _)| folder));
+        let first = folders.next()??;
+        folders.all(|folder| folder == Some(first)).then_some(first)
+    }
+}
+
+impl Frame {
+    /// The frame's photograph.
+    ///
+    /// * `images`: a folder that stands in for the first part of the frame's path.
+    ///
+    /// # Errors
+    /// [`ViewFault`] says why the frame cannot be used.
+    pub(super) fn shot(&self, folder: &Path, images: Option<&str>, shared: &Intrinsics) -> Result<Shot, ViewFault> {
+        let (rotation, translation) = world_to_camera(&self.rows())?;
+        if let Some(model) = unknown_model(&self.own) {
+            return Err(ViewFault::CameraModel { model });
+        }
+        let path = self.existing_path(folder, images)?;
+        let header = match read_header(&path) {
+            Ok(header) => header,
+            Err(message) => return Err(ViewFault::Unreadable { path, message }),
+        };
+        let lens = self.lens(&path, &header, shared)?;
+        let mask = self.mask_path.as_ref().map(|mask| folder.join(json::plain(mask)));
+        if let Some(path) = mask.as_ref().filter(|path| !path.is_file()) {
+            return Err(ViewFault::Mask { path: path.clone(), message: "does not exist".to_owned() });
+        }
+        Ok(Shot { path, header, rotation, translation, lens, mask })
+    }
+
+    fn existing_path(&self, folder: &Path, images: Option<&str>) -> Result<PathBuf, ViewFault> {
+        let name = self.name();
+        let literal = match images {
+            Some(images) => folder.join(images).join(name.split_once('/').map_or(name, |(_, rest)| rest)),
+            None => folder.join(name),
+        };
+        let mut with_extension = literal.clone().into_os_string();
+        with_extension.push(".png");
+        let candidates = [literal.clone(), PathBuf::from(with_extension)];
+        let or_png = !is_image_name(name);
+        let found = candidates.into_iter().find(|path| path.is_file());
+        found.ok_or(ViewFault::Missing { path: literal, or_png, listed_in: "the transforms file" })
+    }
+
+    /// The lens for the image as it is stored: the frame's own numbers before the shared ones, the focal length before
+    /// the field of view, the middle of the image where no principal point is given.
+    fn lens(&self, path: &Path, header: &Header, shared: &Intrinsics) -> Result<Lens, ViewFault> {
+        let either = |number: fn(&Intrinsics) -> Option<f64>| number(&self.own).or_else(|| number(shared));
+        let size_px = match (either(|i| i.w), either(|i| i.h)) {
+            (Some(w), Some(h)) => {
+                // Not whole, or out of range: 0, which `fault` refuses.
+                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked on this line")]
+                let whole = |side: f64| if side.fract() == 0.0 && (1.0..1e6).contains(&side) { side as u32 } else { 0 };
+                (whole(w), whole(h))
+            }
+            _ => header.size_px,
+        };
+        let focal = |i: &Intrinsics| {
+            let of = |angle: f64, side_px: u32| 0.5 * f64::from(side_px) / (0.5 * angle).tan();
+            let x = i.fl_x.or_else(|| i.camera_angle_x.map(|angle| of(angle, size_px.0)))?;
+            let from_angle = || i.camera_angle_y.filter(|_| i.fl_x.is_none()).map(|angle| of(angle, size_px.1));
+            Some([x, i.fl_y.or_else(from_angle).unwrap_or(x)])
+        };
+        let focal_px = focal(&self.own).or_else(|| focal(shared)).unwrap_or([f64::NAN; 2]);
+        let central = Lens::central(size_px, focal_px);
+        let lens = Lens {
+            principal_px: [
+                either(|i| i.cx).unwrap_or(central.principal_px[0]),
+                either(|i| i.cy).unwrap_or(central.principal_px[1]),
+            ],
+            radial: [either(|i| i.k1), either(|i| i.k2), either(|i| i.k3), either(|i| i.k4)]
+                .map(Option::unwrap_or_default),
+            tangential: [either(|i| i.p1), either(|i| i.p2)].map(Option::unwrap_or_default),
+            ..central
+        };
+        lens.for_image(path, header.size_px)
+    }
+}
+
+/// The name of a camera model whose distortion the fields do not spell out.
+fn unknown_model(intrinsics: &Intrinsics) -> Option<String> {
+    if intrinsics.is_fisheye == Some(true) {
+        return Some("is_fisheye".to_owned());
+    }
+    let model = intrinsics.camera_model.as_deref()?;
+    (!KNOWN_MODELS.contains(&model.to_ascii_uppercase().as_str())).then(|| model.to_owned())
+}

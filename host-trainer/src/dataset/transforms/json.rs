@@ -1,0 +1,152 @@
+//! Transforms files: JSON with intrinsics, for all frames or for each, and one pose per frame.
+
+use std::path::Path;
+
+use serde::Deserialize;
+
+use crate::dataset::DatasetError;
+
+/// What a transforms file holds, as far as it is used.
+pub(in crate::dataset) struct Transforms {
+    /// Of all frames that give none of their own.
+    pub(in crate::dataset) shared: Intrinsics,
+    pub(in crate::dataset) frames: Vec<Frame>,
+    /// A point cloud, relative to the capture.
+    pub(in crate::dataset) ply_file_path: Option<String>,
+    /// `train_filenames`, `val_filenames`, `test_filenames`.
+    pub(in crate::dataset) splits: [Option<Vec<String>>; 3],
+}
+
+/// The numbers of a camera, each for all frames or for one; a number that is none counts as not given.
+#[derive(Clone, Default, Deserialize)]
+#[serde(default)]
+pub(in crate::dataset) struct Intrinsics {
+    /// Fields of view, radians.
+    pub(super) camera_angle_x: Option<f64>,
+    pub(super) camera_angle_y: Option<f64>,
+    /// Focal lengths and principal point, pixels.
+    pub(super) fl_x: Option<f64>,
+    pub(super) fl_y: Option<f64>,
+    pub(super) cx: Option<f64>,
+    pub(super) cy: Option<f64>,
+    /// The image size they are for, pixels; written as floats by some.
+    pub(super) w: Option<f64>,
+    pub(super) h: Option<f64>,
+    pub(super) k1: Option<f64>,
+    pub(super) k2: Option<f64>,
+    pub(super) k3: Option<f64>,
+    pub(super) k4: Option<f64>,
+    pub(super) p1: Option<f64>,
+    pub(super) p2: Option<f64>,
+    pub(super) camera_model: Option<String>,
+    pub(super) is_fisheye: Option<bool>,
+}
+
+/// The rest of the file, read apart from the shared intrinsics so that an error in these tells its own column.
+#[derive(Deserialize)]
+struct Contents {
+    frames: Vec<Frame>,
+    ply_file_path: Option<String>,
+    train_filenames: Option<Vec<String>>,
+    val_filenames: Option<Vec<String>>,
+    test_filenames: Option<Vec<String>>,
+}
+
+/// One photograph.
+#[derive(Deserialize)]
+pub(in crate::dataset) struct Frame {
+    /// Relative to the capture, in Blender captures usually without extension.
+    file_path: String,
+    /// Camera to world, OpenGL axes; `null` stands for a number that is none.
+    transform_matrix: Vec<Vec<Option<f64>>>,
+    /// An image whose black pixels do not count.
+    pub(super) mask_path: Option<String>,
+    #[serde(flatten)]
+    pub(super) own: Intrinsics,
+}
+
+impl Frame {
+    /// The path as people write it.
+    pub(in crate::dataset) fn name(&self) -> &str {
+        plain(&self.file_path)
+    }
+
+    /// The matrix by rows; numbers that are none are NaN.
+    pub(super) fn rows(&self) -> Vec<Vec<f64>> {
+        self.transform_matrix.iter().map(|row| row.iter().map(|x| x.unwrap_or(f64::NAN)).collect()).collect()
+    }
+}
+
+/// A path without a leading `./`.
+pub(super) fn plain(path: &str) -> &str {
+    path.trim_start_matches("./")
+}
+
+/// Reads and checks a transforms file.
+///
+/// # Errors
+/// [`DatasetError::Read`], [`DatasetError::Transforms`], [`DatasetError::FieldOfView`] or [`DatasetError::NoFocal`],
+/// naming the file.
+pub(in crate::dataset) fn read_transforms(path: &Path) -> Result<Transforms, DatasetError> {
+    let text = std::fs::read_to_string(path).map_err(|source| DatasetError::Read { path: path.to_owned(), source })?;
+    let parsed = parse(&text).or_else(|error| {
+        // Python writes the bare words NaN and Infinity, which JSON lacks; read as null they cost one view, not all.
+        // The first error is the one to tell: its column is right.
+        parse(&null_non_finite(&text)).map_err(|_| error)
+    });
+    let transforms = parsed.map_err(|source| DatasetError::Transforms { path: path.to_owned(), source })?;
+    let angle = transforms.shared.camera_angle_x;
+    if let Some(found) = angle.filter(|&angle| !(angle > 0.0 && angle < std::f64::consts::PI)) {
+        return Err(DatasetError::FieldOfView { path: path.to_owned(), found });
+    }
+    let has_focal = |i: &Intrinsics| i.fl_x.is_some() || i.camera_angle_x.is_some();
+    if !has_focal(&transforms.shared)
+        && let Some(frame) = transforms.frames.iter().find(|frame| !has_focal(&frame.own))
+    {
+        return Err(DatasetError::NoFocal { path: path.to_owned(), frame: frame.name().to_owned() });
+    }
+    Ok(transforms)
+}
+
+fn parse(text: &str) -> serde_json::Result<Transforms> {
+    let shared = serde_json::from_str(text)?;
+    let contents: Contents = serde_json::from_str(text)?;
+    let Contents { frames, ply_file_path, train_filenames, val_filenames, test_filenames } = contents;
+    Ok(Transforms { shared, frames, ply_file_path, splits: [train_filenames, val_filenames, test_filenames] })
+}
+
+/// Replaces the bare words `NaN`, `Infinity` and `-Infinity` outside strings by `null`.
+fn null_non_finite(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    let mut inside_string = false;
+    let mut rest = text;
+    while let Some(c) = rest.chars().next() {
+        let word = ["NaN", "-Infinity", "Infinity"].into_iter().find(|word| !inside_string && rest.starts_with(word));
+        let taken = match word {
+            Some(word) => {
+                out.push_str("null");
+                word.len()
+            }
+            None => {
+                // A backslash takes the next character with it, so that \" does not end the string.
+                let escaped = if c == '\\' { rest[1..].chars().next().map_or(0, char::len_utf8) } else { 0 };
+                inside_string ^= c == '"';
+                out.push_str(&rest[..c.len_utf8() + escaped]);
+                c.len_utf8() + escaped
+            }
+        };
+        rest = &rest[taken..];
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_bare_words_become_null() {
+        let text = r#"{"a \" NaN": [NaN, -Infinity, Infinity], "é\\": NaN}"#;
+        assert_eq!(null_non_finite(text), r#"{"a \" NaN": [null, null, null], "é\\": null}"#);
+    }
+}

@@ -1,0 +1,6 @@
+//! Captures on disk, through the public interface: sound ones of every layout, broken ones with the message each must
+//! give, and real ones where they are at hand.
+
+mod fixture;
+mod real;
+mod sound;

@@ -8,14 +8,21 @@ mod psnr;
 mod ssim;
 
 pub use baseline::half_size_enlarged;
-pub use psnr::{psnr_db, psnr_of_floats_db};
-pub use ssim::ssim;
+pub use psnr::{psnr_db, psnr_db_masked, psnr_of_floats_db};
+pub use ssim::{ssim, ssim_masked};
 
-use crate::dataset::Image;
+use crate::dataset::{Image, Mask};
 
 /// Stops where two images do not have the same size: there is no figure to give.
 #[track_caller]
 fn assert_same_size(a: &Image, b: &Image) {
     let (size_a, size_b) = ((a.width_px, a.height_px), (b.width_px, b.height_px));
     assert_eq!(size_a, size_b, "images to compare must have one size (width, height)");
+}
+
+/// Stops where a mask is not of the image's size: it is another image's.
+#[track_caller]
+fn assert_mask_fits(image: &Image, mask: &Mask) {
+    let (image_px, mask_px) = ((image.width_px, image.height_px), (mask.width_px, mask.height_px));
+    assert_eq!(image_px, mask_px, "a mask must have the image's size (width, height)");
 }

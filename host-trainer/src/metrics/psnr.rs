@@ -1,7 +1,7 @@
 //! Peak signal-to-noise ratio.
 
-use super::assert_same_size;
-use crate::dataset::Image;
+use super::{assert_mask_fits, assert_same_size};
+use crate::dataset::{Image, Mask};
 
 /// PSNR of two 8-bit images: `10·log10(255² / MSE)` with one mean over all pixels and channels, dB.
 ///
@@ -13,6 +13,23 @@ pub fn psnr_db(a: &Image, b: &Image) -> f64 {
     assert_same_size(a, b);
     let squares: u64 = a.rgb.iter().zip(&b.rgb).map(|(&x, &y)| u64::from(x.abs_diff(y)).pow(2)).sum();
     let mse = squares as f64 / a.rgb.len() as f64;
+    10.0 * (255.0 * 255.0 / mse).log10()
+}
+
+/// [`psnr_db`] over the pixels that count: the mean squared error of these alone, dB.
+///
+/// Without a mask all count. Where no pixel counts the result is NaN: there is nothing to compare.
+///
+/// # Panics
+/// When the sizes differ.
+pub fn psnr_db_masked(a: &Image, b: &Image, mask: Option<&Mask>) -> f64 {
+    let Some(mask) = mask else { return psnr_db(a, b) };
+    assert_same_size(a, b);
+    assert_mask_fits(a, mask);
+    let pixels = a.rgb.chunks_exact(3).zip(b.rgb.chunks_exact(3)).zip(&mask.valid);
+    let counted = pixels.filter(|(_, valid)| **valid).flat_map(|((a, b), _)| a.iter().zip(b));
+    let squares: u64 = counted.map(|(&x, &y)| u64::from(x.abs_diff(y)).pow(2)).sum();
+    let mse = squares as f64 / (3 * mask.n_valid()) as f64;
     10.0 * (255.0 * 255.0 / mse).log10()
 }
 
@@ -51,6 +68,18 @@ mod tests {
     fn equal_images_are_infinitely_close_and_order_does_not_matter() {
         assert_eq!(psnr_db(&flat(3), &flat(3)), f64::INFINITY);
         assert_eq!(psnr_db(&flat(3), &flat(9)), psnr_db(&flat(9), &flat(3)));
+    }
+
+    #[test]
+    fn only_pixels_that_count_enter_the_mean() {
+        let (a, mut b) = (flat(100), flat(110));
+        let mut mask = Mask { width_px: 5, height_px: 4, valid: vec![true; 20] };
+        b.rgb[..3].fill(255);
+        mask.valid[0] = false;
+        assert!((psnr_db_masked(&a, &b, Some(&mask)) - psnr_db(&flat(100), &flat(110))).abs() < 1e-12);
+        assert_eq!(psnr_db_masked(&a, &b, None), psnr_db(&a, &b));
+        mask.valid.fill(false);
+        assert!(psnr_db_masked(&a, &b, Some(&mask)).is_nan());
     }
 
     #[test]

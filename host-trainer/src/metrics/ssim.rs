@@ -1,7 +1,7 @@
 //! Structural similarity.
 
-use super::assert_same_size;
-use crate::dataset::Image;
+use super::{assert_mask_fits, assert_same_size};
+use crate::dataset::{Image, Mask};
 
 /// Half the window: 11 taps.
 const RADIUS: usize = 5;
@@ -22,11 +22,40 @@ const C2: f64 = 0.03 * 0.03;
 /// When the sizes differ.
 pub fn ssim(a: &Image, b: &Image) -> f64 {
     assert_same_size(a, b);
+    let map = similarity(a, b);
+    map.iter().sum::<f64>() / a.rgb.len() as f64
+}
+
+/// [`ssim`] over the pixels that count: the mean of the map at these alone.
+///
+/// Windows reach over pixels that do not count; there `a` is taken as `b`, so that these can neither add nor hide a
+/// difference. Without a mask all count. Where no pixel counts the result is NaN.
+///
+/// * `b`: the truth.
+///
+/// # Panics
+/// When the sizes differ.
+pub fn ssim_masked(a: &Image, b: &Image, mask: Option<&Mask>) -> f64 {
+    let Some(mask) = mask else { return ssim(a, b) };
+    assert_same_size(a, b);
+    assert_mask_fits(a, mask);
+    let mut filled = a.clone();
+    for ((pixel, truth), &valid) in filled.rgb.chunks_exact_mut(3).zip(b.rgb.chunks_exact(3)).zip(&mask.valid) {
+        if !valid {
+            pixel.copy_from_slice(truth);
+        }
+    }
+    let counted = similarity(&filled, b).into_iter().zip(&mask.valid).filter(|(_, valid)| **valid);
+    counted.map(|(similarity, _)| similarity).sum::<f64>() / (3 * mask.n_valid()) as f64
+}
+
+/// The similarity at every pixel, summed over the channels: `[height, width]`.
+fn similarity(a: &Image, b: &Image) -> Vec<f64> {
     let (width, height) = (a.width_px as usize, a.height_px as usize);
     let channel = |image: &Image, c: usize| -> Vec<f64> {
         image.rgb.iter().skip(c).step_by(3).map(|&value| f64::from(value) / 255.0).collect()
     };
-    let mut sum = 0.0;
+    let mut map = vec![0.0; width * height];
     for c in 0..3 {
         let (x, y) = (channel(a, c), channel(b, c));
         let windowed = |product: &dyn Fn(f64, f64) -> f64| {
@@ -35,13 +64,13 @@ pub fn ssim(a: &Image, b: &Image) -> f64 {
         };
         let (mean_x, mean_y) = (windowed(&|x, _| x), windowed(&|_, y| y));
         let (mean_xx, mean_yy, mean_xy) = (windowed(&|x, _| x * x), windowed(&|_, y| y * y), windowed(&|x, y| x * y));
-        for i in 0..x.len() {
+        for (i, sum) in map.iter_mut().enumerate() {
             let (mx, my) = (mean_x[i], mean_y[i]);
             let (var_x, var_y, cov) = (mean_xx[i] - mx * mx, mean_yy[i] - my * my, mean_xy[i] - mx * my);
-            sum += ((2.0 * mx * my + C1) * (2.0 * cov + C2)) / ((mx * mx + my * my + C1) * (var_x + var_y + C2));
+            *sum += ((2.0 * mx * my + C1) * (2.0 * cov + C2)) / ((mx * mx + my * my + C1) * (var_x + var_y + C2));
         }
     }
-    sum / a.rgb.len() as f64
+    map
 }
 
 /// The window's weights, which sum to 1.
@@ -133,6 +162,22 @@ mod tests {
         let expected =
             ((2.0 * w * w * a * b + C1) * (2.0 * cov + C2)) / ((w * w * (a * a + b * b) + C1) * (var_a + var_b + C2));
         assert!((ssim(&pixel(200), &pixel(100)) - expected).abs() < 1e-12);
+    }
+
+    #[test]
+    fn differences_where_no_pixel_counts_change_nothing() {
+        let truth = noise(1, 40, 30);
+        let mut drawn = noise(2, 40, 30);
+        let mut mask = Mask { width_px: 40, height_px: 30, valid: vec![false; 1200] };
+        for i in (0..1200).filter(|i| i % 40 < 25) {
+            mask.valid[i] = true;
+            drawn.rgb[i * 3..][..3].copy_from_slice(&truth.rgb[i * 3..][..3]);
+        }
+        assert!((ssim_masked(&drawn, &truth, Some(&mask)) - 1.0).abs() < 1e-12, "equal where it counts");
+        assert!(ssim(&drawn, &truth) < 0.9, "but not elsewhere");
+        mask.valid.fill(true);
+        let all = ssim_masked(&drawn, &truth, Some(&mask));
+        assert!((all - ssim(&drawn, &truth)).abs() < 1e-12 && all == ssim_masked(&drawn, &truth, None));
     }
 
     #[test]

@@ -80,6 +80,14 @@ struct Frame {
     scratch_bytes: usize,
 }
 
+/// One drawn view and how it compares.
+struct Row {
+    frame: Frame,
+    psnr_db: f64,
+    ssim: f64,
+    psnr_to_reference_db: f64,
+}
+
 fn draw(bundle: &Bundle<'_>, reference: Option<&ReferenceScene>, camera: &Camera) -> Result<Frame> {
     let started = Instant::now();
     let (image, scratch_bytes) = match reference {
@@ -119,7 +127,7 @@ pub(crate) fn evaluate(
     } else {
         None
     };
-    let rows: Vec<(Frame, f64, f64, f64)> = views
+    let rows: Vec<Row> = views
         .par_iter()
         .map(|view| {
             let camera = file.camera(&bundle, &loaded, view);
@@ -129,15 +137,19 @@ pub(crate) fn evaluate(
                 Some(scene) => psnr_db(&frame.image, &reference_image(&bundle, scene, &camera)),
                 None => f64::INFINITY,
             };
-            let (psnr, similarity) = (psnr_db(&frame.image, &view.image), ssim(&frame.image, &view.image));
-            Ok((frame, psnr, similarity, to_reference))
+            Ok(Row {
+                psnr_db: psnr_db(&frame.image, &view.image),
+                ssim: ssim(&frame.image, &view.image),
+                psnr_to_reference_db: to_reference,
+                frame,
+            })
         })
         .collect::<Result<_>>()?;
-    let mean = |value: &dyn Fn(&(Frame, f64, f64, f64)) -> f64| rows.iter().map(value).sum::<f64>() / rows.len() as f64;
+    let mean = |value: fn(&Row) -> f64| rows.iter().map(value).sum::<f64>() / rows.len() as f64;
     let header = bundle.header();
     Ok(Evaluation {
-        psnr_db: mean(&|row| row.1),
-        ssim: mean(&|row| row.2),
+        psnr_db: mean(|row| row.psnr_db),
+        ssim: mean(|row| row.ssim),
         bundle_bytes: file.bytes.len(),
         n_anchors: header.n_anchors,
         n_views: rows.len(),
@@ -147,8 +159,9 @@ pub(crate) fn evaluate(
         height_px: views[0].image.height_px,
         background: options.background.map_or_else(String::new, |b| b.to_string()),
         decode_s,
-        render_s_per_view: mean(&|row| row.0.seconds),
-        scratch_bytes: rows.iter().map(|row| row.0.scratch_bytes).max().unwrap_or(0),
-        psnr_to_reference_db: against_reference.then(|| rows.iter().map(|row| row.3).fold(f64::INFINITY, f64::min)),
+        render_s_per_view: mean(|row| row.frame.seconds),
+        scratch_bytes: rows.iter().map(|row| row.frame.scratch_bytes).max().unwrap_or(0),
+        psnr_to_reference_db: against_reference
+            .then(|| rows.iter().map(|row| row.psnr_to_reference_db).fold(f64::INFINITY, f64::min)),
     })
 }

@@ -25,10 +25,9 @@ pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
         fs::rename(&partial, path)
     };
     write()
-        .map_err(|error| {
+        .inspect_err(|_| {
             // Best effort: the error that matters is the one above.
             let _ = fs::remove_file(&partial);
-            error
         })
         .with_context(|| format!("could not write {} ({} bytes)", path.display(), bytes.len()))
 }

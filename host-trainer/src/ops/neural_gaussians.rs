@@ -1,6 +1,7 @@
 //! From head outputs to the Gaussians of a view.
 
 use super::Real;
+use super::real::per_axis;
 use crate::scene::ModelShape;
 
 /// A 3-D Gaussian with one colour, in the world frame.
@@ -68,7 +69,8 @@ pub fn forward<R: Real>(
 ) {
     let k_all = shape.n_offsets;
     for (row, position) in positions.iter().enumerate() {
-        let sizes: [R; 6] = std::array::from_fn(|i| log_scales[row * 6 + i].exp());
+        let sizes = |first: usize| per_axis(|i| log_scales[row * 6 + first + i].exp());
+        let (l_a, l_g) = (sizes(0), sizes(3));
         for k in 0..k_all {
             let at = row * k_all + k;
             let opacity = outputs.opacity[at].tanh();
@@ -79,11 +81,11 @@ pub fn forward<R: Real>(
             let raw = [cov[3], cov[4], cov[5], cov[6]];
             let inverse = R::ONE / length(raw).larger(R::real(NORM_FLOOR));
             gaussians.push(Gaussian {
-                centre: std::array::from_fn(|i| position[i] + offsets[at * 3 + i] * sizes[i]),
-                scale: std::array::from_fn(|i| sizes[3 + i] * cov[i].sigmoid()),
+                centre: per_axis(|i| position[i] + offsets[at * 3 + i] * l_a[i]),
+                scale: per_axis(|i| l_g[i] * cov[i].sigmoid()),
                 rotation: raw.map(|q| q * inverse),
                 opacity,
-                colour: std::array::from_fn(|i| outputs.colour[at * 3 + i].sigmoid()),
+                colour: per_axis(|i| outputs.colour[at * 3 + i].sigmoid()),
             });
             sources.push(Source { row: index(row), offset: index(k) });
         }
@@ -120,7 +122,8 @@ pub fn backward<R: Real>(
             d_offsets[at * 3 + i] += d.centre[i] * size;
             d_log_scales[row * 6 + i] += d.centre[i] * offsets[at * 3 + i] * size;
         }
-        let raw: [R; 4] = std::array::from_fn(|i| outputs.covariance[at * 7 + 3 + i]);
+        let cov = &outputs.covariance[at * 7..at * 7 + 7];
+        let raw = [cov[3], cov[4], cov[5], cov[6]];
         let norm = length(raw);
         // Below the floor the division is by a constant, and nothing is projected out.
         let radial = if norm > R::real(NORM_FLOOR) { dot(g.rotation, d.rotation) } else { R::ZERO };

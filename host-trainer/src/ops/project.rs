@@ -2,6 +2,7 @@
 
 use super::neural_gaussians::Gaussian;
 use super::pinhole::NEAR;
+use super::real::per_axis;
 use super::{Pinhole, Real};
 
 /// Low-pass term added to both diagonal entries of a projected covariance, px² (3DGS).
@@ -50,6 +51,7 @@ struct Projection<R> {
 }
 
 /// R(q) of a unit quaternion (w, x, y, z).
+#[inline(always)]
 fn rotation_matrix<R: Real>([w, x, y, z]: [R; 4]) -> [[R; 3]; 3] {
     let two = R::real(2.0);
     [
@@ -59,6 +61,7 @@ fn rotation_matrix<R: Real>([w, x, y, z]: [R; 4]) -> [[R; 3]; 3] {
     ]
 }
 
+#[inline(always)]
 fn prepare<R: Real>(camera: &Pinhole<R>, gaussian: &Gaussian<R>) -> Option<Projection<R>> {
     let point_cam = camera.to_cam(gaussian.centre);
     let [x, y, z] = point_cam;
@@ -66,22 +69,24 @@ fn prepare<R: Real>(camera: &Pinhole<R>, gaussian: &Gaussian<R>) -> Option<Proje
         return None;
     }
     let exact = [x / z, y / z];
-    let slope: [R; 2] = std::array::from_fn(|i| {
+    let bounded = |i: usize| {
         let [low, high] = camera.slope_bounds(i);
         exact[i].larger(low).smaller(high)
-    });
+    };
+    let slope = [bounded(0), bounded(1)];
     let free = [slope[0] == exact[0], slope[1] == exact[1]];
     let world = rotation_matrix(gaussian.rotation);
-    let axes_cam: [[R; 3]; 3] = std::array::from_fn(|i| {
-        std::array::from_fn(|j| {
+    let axes_cam = per_axis(|i| {
+        per_axis(|j| {
             let w = &camera.rotation[i];
             w[0] * world[0][j] + w[1] * world[1][j] + w[2] * world[2][j]
         })
     });
-    let t: [[R; 3]; 2] = std::array::from_fn(|i| {
+    let lever = |i: usize| {
         let f = camera.focal_px[i] / z;
-        std::array::from_fn(|j| f * (axes_cam[i][j] - slope[i] * axes_cam[2][j]) * gaussian.scale[j])
-    });
+        per_axis(|j| f * (axes_cam[i][j] - slope[i] * axes_cam[2][j]) * gaussian.scale[j])
+    };
+    let t = [lever(0), lever(1)];
     let dot = |a: &[R; 3], b: &[R; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let sharp = [dot(&t[0], &t[0]), dot(&t[0], &t[1]), dot(&t[1], &t[1])];
     let dilation = R::real(DILATION_PX2);
@@ -115,8 +120,8 @@ pub fn forward<R: Real>(
     let dilation = R::real(DILATION_PX2);
     let cov = [p.sharp[0] + dilation, p.sharp[1], p.sharp[2] + dilation];
     let inverse = R::ONE / p.det;
-    let mean_px: [R; 2] =
-        std::array::from_fn(|i| camera.focal_px[i] * (p.point_cam[i] / p.point_cam[2]) + camera.principal_px[i]);
+    let mean = |i: usize| camera.focal_px[i] * (p.point_cam[i] / p.point_cam[2]) + camera.principal_px[i];
+    let mean_px = [mean(0), mean(1)];
     let reach = R::real(2.0) * (opacity * R::real(1.0 / ALPHA_CUTOFF)).ln();
     let half_extent_px = [(reach * cov[0]).sqrt(), (reach * cov[2]).sqrt()];
     for i in 0..2 {
@@ -195,13 +200,13 @@ pub fn backward<R: Real>(
     d.centre = camera.gradient_to_world(d_cam);
 
     // axes = W·R(q), so dR = Wᵀ·d_axes, column by column.
-    let columns: [[R; 3]; 3] =
-        std::array::from_fn(|j| camera.gradient_to_world([d_axes[0][j], d_axes[1][j], d_axes[2][j]]));
+    let columns = per_axis(|j| camera.gradient_to_world([d_axes[0][j], d_axes[1][j], d_axes[2][j]]));
     d.rotation = quaternion_gradient(gaussian.rotation, &columns);
     d
 }
 
-/// dL/dq for L depending on R(q), with `columns[j][i]` = ∂L/∂R[i][j].
+/// dL/dq for L depending on R(q), with `columns[j][i]` = `∂L/∂R[i][j]`.
+#[inline(always)]
 fn quaternion_gradient<R: Real>([w, x, y, z]: [R; 4], columns: &[[R; 3]; 3]) -> [R; 4] {
     let two = R::real(2.0);
     let m = |i: usize, j: usize| columns[j][i];

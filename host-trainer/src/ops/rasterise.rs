@@ -82,7 +82,7 @@ fn rows<R: Real>(mean_y: R, half_extent_y: R, tile_y: usize) -> (usize, usize) {
     let limit = TILE_PX as f64;
     let first = (centre - half).larger(-1.0).smaller(limit);
     let end = (centre + half).larger(-1.0).smaller(limit);
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 17 after the shift by 2")]
+    #[expect(clippy::cast_possible_truncation, reason = "1 to 17 after the shift by 2")]
     let bounds = ((first + 2.0) as i32, (end + 2.0) as i32);
     // ceil(first) and floor(end) + 1, with the shift taken off; truncation is floor for what is positive.
     let first = bounds.0 - 2 + i32::from(f64::from(bounds.0) < first + 2.0);

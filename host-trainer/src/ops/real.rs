@@ -96,10 +96,6 @@ macro_rules! real {
             const ONE: Self = 1.0;
 
             #[inline(always)]
-            #[expect(
-                clippy::cast_possible_truncation,
-                reason = "constants are rounded to the nearest value on purpose"
-            )]
             fn real(value: f64) -> Self {
                 value as Self
             }
@@ -140,6 +136,12 @@ macro_rules! real {
 
 real!(f32, matrixmultiply::sgemm, pocketsplat_core::math::exp);
 real!(f64, matrixmultiply::dgemm, f64::exp);
+
+/// `[f(0), f(1), f(2)]`, one value an axis; unlike `std::array::from_fn` it is always inlined.
+#[inline(always)]
+pub(super) fn per_axis<T>(f: impl Fn(usize) -> T) -> [T; 3] {
+    [f(0), f(1), f(2)]
+}
 
 #[cfg(test)]
 mod tests {

@@ -61,7 +61,7 @@ pub fn mean_squared_spacing(points: &[DVec3]) -> Vec<f64> {
     let extent = (high - low).max_element().max(1e-12);
     let cells = ((n as f64 / 2.0).cbrt().ceil()).clamp(1.0, 256.0);
     let edge = extent / cells * (1.0 + 1e-9);
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 256 cells an axis")]
+    #[expect(clippy::cast_possible_truncation, reason = "1 to 256 cells an axis")]
     let side = cells as i64;
     #[expect(clippy::cast_possible_truncation, reason = "at most 256")]
     let cell_of = |p: DVec3| ((p - low) / edge).to_array().map(|c| (c as i64).clamp(0, side - 1));

@@ -90,7 +90,7 @@ pub fn grow(
 /// Removes anchors that were seen often enough and whose opacities sum to less than `min_opacity` a view on average.
 ///
 /// Afterwards every anchor that was seen often enough starts counting afresh, and base log-scales are lowered to
-/// [`MAX_BASE_LOG_SCALE`] (section 1.9 of the method notes).
+/// 0.05 (section 1.9 of the method notes).
 ///
 /// * returns how many were removed.
 pub fn prune(

@@ -7,7 +7,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-jobs=(fmt clippy doc test core-embedded format-doc link-gate firmware)
+jobs=(fmt clippy doc test core-embedded format-doc link-gate firmware demo)
 
 embedded_target=thumbv7em-none-eabihf
 defmt_print_version=1.2.0
@@ -133,6 +133,11 @@ job_firmware() {
   (cd "$out" && "$OLDPWD/firmware-example/qemu.sh" "$embedded/$embedded_target/release/firmware-example")
   cmp "$out/frame.ppm" "$out/host.ppm" || fail "the frame of the device differs from the host's"
   echo "the device's frame is the host's: $(wc -c <"$out/frame.ppm") bytes, $out/frame.ppm"
+}
+
+# The main job in small: the same path as `cargo run --release -- demo`, a few hundred steps on small images.
+job_demo() {
+  cargo run --release --locked -- demo --output "$target/demo" --size 64 --iterations 400
 }
 
 # --- Running them ----------------------------------------------------------------------------------------------------

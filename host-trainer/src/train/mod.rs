@@ -18,7 +18,7 @@ use crate::scene::Scene;
 use crate::scene::init::initial_scene;
 use optimiser::Optimiser;
 use statistics::Statistics;
-use step::{StepReport, Target, Workspace};
+use step::{StepReport, Target, Workspace, clear_masked};
 
 /// Hears of every step of a run.
 pub trait Observer {
@@ -117,8 +117,11 @@ impl<'a> Trainer<'a> {
             self.queue.shuffle(&mut self.rng);
         }
         let view = self.queue.pop().expect("refilled above");
-        let truth = planes(&self.capture.train[view].image);
-        let target = Target { camera: &self.cameras[view], truth: &truth, background: self.background };
+        let View { image, mask, .. } = &self.capture.train[view];
+        let mask = mask.as_ref().map(|mask| mask.valid.as_slice());
+        let mut truth = planes(image);
+        clear_masked(&mut truth, mask);
+        let target = Target { camera: &self.cameras[view], truth: &truth, mask, background: self.background };
         let report = self.workspace.step(&self.scene, &target, &self.config.loss);
 
         let settings = self.config.densification;

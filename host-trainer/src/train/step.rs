@@ -1,5 +1,7 @@
 //! One view through the whole chain, forward and backward.
 
+use std::time::Instant;
+
 use rayon::prelude::*;
 
 use super::config::LossWeights;
@@ -23,6 +25,8 @@ pub struct Target<'a, R> {
     pub camera: &'a Pinhole<R>,
     /// Planes `[3, height, width]`, 0 to 1.
     pub truth: &'a [R],
+    /// `[height, width]` pixels that count, all of them without a mask; at the others `truth` is 0.
+    pub mask: Option<&'a [bool]>,
     /// What lies behind everything.
     pub background: [R; 3],
 }
@@ -32,7 +36,7 @@ pub struct Target<'a, R> {
 pub struct StepReport<R> {
     /// The whole loss.
     pub loss: R,
-    /// Mean squared difference of image and photograph, before any rounding.
+    /// Mean squared difference of image and photograph over the pixels that count, before any rounding.
     pub squared_error: f64,
     /// Gaussians with positive opacity.
     pub n_gaussians: usize,
@@ -40,6 +44,39 @@ pub struct StepReport<R> {
     pub n_splats: usize,
     /// (tile, splat) pairs.
     pub n_pairs: usize,
+    /// Where the time went.
+    pub stages: StageSeconds,
+}
+
+/// Wall-clock seconds of the stages of a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StageSeconds {
+    /// Prefilter, heads, Gaussians, projection.
+    pub anchors: f64,
+    /// Sorting and tile lists.
+    pub tiles: f64,
+    /// Blending.
+    pub rasterise: f64,
+    /// L1, SSIM and their gradients.
+    pub loss: f64,
+    /// From the image's gradient to the splats'.
+    pub rasterise_backward: f64,
+    /// From the splats' gradients to the anchors' and the heads'.
+    pub anchors_backward: f64,
+}
+
+/// Reads the time since the last reading.
+struct Stopwatch(Instant);
+
+impl Stopwatch {
+    fn start() -> Self {
+        Self(Instant::now())
+    }
+
+    fn lap(&mut self) -> f64 {
+        let now = Instant::now();
+        now.duration_since(std::mem::replace(&mut self.0, now)).as_secs_f64()
+    }
 }
 
 /// A block of visible anchors on its way through the chain; buffers are kept from step to step.
@@ -79,6 +116,7 @@ pub struct Block<R> {
 
 /// A drawn view and what its backward pass needs.
 struct Drawing<R> {
+    stages: StageSeconds,
     image: TiledImage<R>,
     lists: tiles::TileLists,
     splats: Vec<Splat<R>>,
@@ -93,6 +131,23 @@ pub struct Workspace<R> {
     n_blocks: usize,
     /// dL/d(heads).
     pub d_heads: Heads<R>,
+}
+
+impl<R> Target<'_, R> {
+    /// Pixels that count, at least 1.
+    fn n_counted(&self) -> usize {
+        self.mask.map_or(self.truth.len() / 3, |mask| mask.iter().filter(|valid| **valid).count()).max(1)
+    }
+}
+
+/// Makes the pixels that do not count zero in every plane: as in the photograph, so that no loss sees them.
+pub(super) fn clear_masked<R: Real>(planes: &mut [R], mask: Option<&[bool]>) {
+    let Some(mask) = mask else { return };
+    for plane in planes.chunks_exact_mut(mask.len()) {
+        for (value, valid) in plane.iter_mut().zip(mask) {
+            *value = if *valid { *value } else { R::ZERO };
+        }
+    }
 }
 
 fn refill<R: Real>(buffer: &mut Vec<R>, len: usize) {
@@ -236,9 +291,14 @@ impl<R: Real> Block<R> {
 }
 
 impl<R: Real> Workspace<R> {
-    /// Buffers for models of this shape.
+    /// Buffers for models of this shape; the loops run under the widest instruction set of this CPU.
     pub fn new(shape: &ModelShape) -> Self {
-        Self { level: Level::detect(), blocks: Vec::new(), n_blocks: 0, d_heads: Heads::filled(shape, R::ZERO) }
+        Self::with_level(shape, Level::detect())
+    }
+
+    /// As [`Self::new`] with the instruction set chosen.
+    pub fn with_level(shape: &ModelShape, level: Level) -> Self {
+        Self { level, blocks: Vec::new(), n_blocks: 0, d_heads: Heads::filled(shape, R::ZERO) }
     }
 
     /// The instruction set that the loops run under.
@@ -253,6 +313,7 @@ impl<R: Real> Workspace<R> {
 
     /// Draws the view: the forward half of [`Self::step`].
     fn draw(&mut self, scene: &Scene<R>, camera: &Pinhole<R>, background: [R; 3]) -> Drawing<R> {
+        let mut stopwatch = Stopwatch::start();
         let visible: Vec<u32> = (0..scene.anchors.len())
             .into_par_iter()
             .with_min_len(1024)
@@ -273,9 +334,12 @@ impl<R: Real> Workspace<R> {
         });
         let splats: Vec<Splat<R>> = self.blocks().iter().flat_map(|b| b.splats.iter().copied()).collect();
         let footprints: Vec<Footprint<R>> = self.blocks().iter().flat_map(|b| b.footprints.iter().copied()).collect();
+        let anchors = stopwatch.lap();
         let lists = tiles::build(&splats, &footprints, camera.size_px);
+        let tiles = stopwatch.lap();
         let image = rasterise::forward(level, &splats, &footprints, &lists, background);
-        Drawing { image, lists, splats, footprints }
+        let stages = StageSeconds { anchors, tiles, rasterise: stopwatch.lap(), ..StageSeconds::default() };
+        Drawing { stages, image, lists, splats, footprints }
     }
 
     /// The image of a view, planes `[3, height, width]`, not clamped.
@@ -289,14 +353,19 @@ impl<R: Real> Workspace<R> {
     /// left in [`Self::blocks`], those of the heads in [`Self::d_heads`].
     pub fn step(&mut self, scene: &Scene<R>, target: &Target<'_, R>, weights: &LossWeights) -> StepReport<R> {
         let size_px = target.camera.size_px;
-        let Drawing { image: tiled, lists, splats, footprints } = self.draw(scene, target.camera, target.background);
-        let image = tiled.to_planes(size_px);
+        let Drawing { mut stages, image: tiled, lists, splats, footprints } =
+            self.draw(scene, target.camera, target.background);
+        let mut stopwatch = Stopwatch::start();
+        let mut image = tiled.to_planes(size_px);
+        clear_masked(&mut image, target.mask);
 
         let lambda = R::real(weights.dssim);
         let (similarity, partials) = ssim::forward(self.level, &image, target.truth, size_px);
         let mut d_image = vec![R::ZERO; image.len()];
         l1::backward(&image, target.truth, R::ONE - lambda, &mut d_image);
         ssim::backward(self.level, &image, target.truth, size_px, &partials, -lambda, &mut d_image);
+        clear_masked(&mut d_image, target.mask);
+        stages.loss = stopwatch.lap();
         let n_gaussians = self.blocks().iter().map(|b| b.gaussians.len()).sum();
         let volume_weight = R::real(weights.volume);
         let volumes: R = self.blocks().iter().map(|b| volume::forward(&b.gaussians, volume_weight, n_gaussians)).sum();
@@ -304,6 +373,7 @@ impl<R: Real> Workspace<R> {
 
         let d_tiled = TiledImage::from_planes(&d_image, size_px);
         let d_splats = rasterise::backward(self.level, &splats, &footprints, &lists, &tiled, &d_tiled);
+        stages.rasterise_backward = stopwatch.lap();
         let mut rest = d_splats.as_slice();
         let mut shares = Vec::with_capacity(self.n_blocks);
         for block in self.blocks() {
@@ -315,6 +385,7 @@ impl<R: Real> Workspace<R> {
             block.backward(scene, target.camera, d_splats, volume_weight, n_gaussians);
         });
         self.sum_head_gradients();
+        stages.anchors_backward = stopwatch.lap();
 
         let squared: f64 = image
             .chunks(4096)
@@ -323,10 +394,11 @@ impl<R: Real> Workspace<R> {
             .sum();
         StepReport {
             loss,
-            squared_error: squared / image.len() as f64,
+            squared_error: squared / (3 * target.n_counted()) as f64,
             n_gaussians,
             n_splats: splats.len(),
             n_pairs: lists.entries.len(),
+            stages,
         }
     }
 

@@ -108,6 +108,16 @@ fn alpha_row<R: Real>(splat: &Splat<R>, dx0: R, dy: R) -> (Row<R>, Row<R>, Row<R
     (alpha, bell, dx)
 }
 
+/// Whether an ellipse's bounding box brought up a row that the ellipse does not reach.
+#[inline(always)]
+fn draws_nothing<R: Real>(alpha: &Row<R>) -> bool {
+    let mut any = false;
+    for a in alpha {
+        any |= *a > R::ZERO;
+    }
+    !any
+}
+
 /// Applies the stop rule to one row: gives the weights T·α and moves T on.
 ///
 /// A stopped pixel keeps its transmittance with a negative sign.
@@ -179,6 +189,9 @@ fn forward_tile<R: Real>(tile: &Tile<'_, R>, background: [R; 3], out: &mut [R]) 
             }
             let dy = R::real((tile.origin[1] + y) as f64 + 0.5) - splat.mean_px[1];
             let (mut alpha, _, _) = alpha_row(splat, dx0, dy);
+            if draws_nothing(&alpha) {
+                continue;
+            }
             let weight = step_row(&mut alpha, &mut transmittance[y]);
             for (plane, c) in colour.iter_mut().zip(splat.colour) {
                 for (out, w) in plane[y].iter_mut().zip(&weight) {
@@ -307,6 +320,9 @@ fn backward_tile<R: Real>(tile: &Tile<'_, R>, image: &[R], d_image: &[R], d_pair
             }
             let dy = R::real((tile.origin[1] + y) as f64 + 0.5) - splat.mean_px[1];
             let (mut alpha, bell, dx) = alpha_row(splat, dx0, dy);
+            if draws_nothing(&alpha) {
+                continue;
+            }
             let before = transmittance[y];
             let weight = step_row(&mut alpha, &mut transmittance[y]);
             let [d_red, d_green, d_blue] = [&d_rows[0][y], &d_rows[1][y], &d_rows[2][y]];

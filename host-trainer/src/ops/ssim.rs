@@ -16,7 +16,7 @@ const C1: f64 = 0.01 * 0.01;
 const C2: f64 = 0.03 * 0.03;
 
 /// Rows blurred together by one task.
-const ROWS: usize = 16;
+const ROWS: usize = 32;
 
 fn window<R: Real>() -> [R; TAPS] {
     let bell: [f64; TAPS] = std::array::from_fn(|i| {
@@ -27,7 +27,35 @@ fn window<R: Real>() -> [R; TAPS] {
     bell.map(|b| R::real(b / sum))
 }
 
-/// Blurs `N` planes over rows `y0..y0 + rows` at once; `value(n, at)` gives plane n at index `at` of one channel.
+/// Lanes that are summed in registers before they are stored.
+const LANES: usize = 16;
+
+/// `out[i] = Σ_tap window[tap]·source(tap)[i]`, in registers over the taps.
+#[inline(always)]
+fn weighted_sum<'a, R: Real>(window: &[R; TAPS], out: &mut [R], source: impl Fn(usize) -> &'a [R]) {
+    let n = out.len();
+    let mut start = 0;
+    while start + LANES <= n {
+        let mut sum = [R::ZERO; LANES];
+        for (tap, w) in window.iter().enumerate() {
+            let values = &source(tap)[start..start + LANES];
+            for i in 0..LANES {
+                sum[i] += *w * values[i];
+            }
+        }
+        out[start..start + LANES].copy_from_slice(&sum);
+        start += LANES;
+    }
+    for i in start..n {
+        let mut sum = R::ZERO;
+        for (tap, w) in window.iter().enumerate() {
+            sum += *w * source(tap)[i];
+        }
+        out[i] = sum;
+    }
+}
+
+/// Blurs `N` planes over rows `y0..y0 + rows` at once; `fill(n, y, line)` writes row y of plane n.
 ///
 /// * returns `[N][rows · width]`.
 #[inline(always)]
@@ -36,34 +64,26 @@ fn blur<R: Real, const N: usize>(
     [width, height]: [usize; 2],
     y0: usize,
     rows: usize,
-    value: impl Fn(usize, usize) -> R,
+    fill: impl Fn(usize, usize, &mut [R]),
 ) -> [Vec<R>; N] {
-    let padded_width = width + 2 * RADIUS;
-    let mut padded = vec![R::ZERO; padded_width];
+    let mut padded = vec![R::ZERO; width + 2 * RADIUS];
     let mut across = vec![R::ZERO; (rows + 2 * RADIUS) * width];
-    std::array::from_fn(|n| {
+    let mut planes: [Vec<R>; N] = [const { Vec::new() }; N];
+    for (n, out) in planes.iter_mut().enumerate() {
         for (dy, line) in across.chunks_exact_mut(width).enumerate() {
-            line.fill(R::ZERO);
-            let Some(y) = (y0 + dy).checked_sub(RADIUS).filter(|y| *y < height) else { continue };
-            for (x, p) in padded[RADIUS..RADIUS + width].iter_mut().enumerate() {
-                *p = value(n, y * width + x);
-            }
-            for (tap, w) in window.iter().enumerate() {
-                for (out, p) in line.iter_mut().zip(&padded[tap..tap + width]) {
-                    *out += *w * *p;
-                }
-            }
+            let Some(y) = (y0 + dy).checked_sub(RADIUS).filter(|y| *y < height) else {
+                line.fill(R::ZERO);
+                continue;
+            };
+            fill(n, y, &mut padded[RADIUS..RADIUS + width]);
+            weighted_sum(window, line, |tap| &padded[tap..tap + width]);
         }
-        let mut out = vec![R::ZERO; rows * width];
+        out.resize(rows * width, R::ZERO);
         for (dy, line) in out.chunks_exact_mut(width).enumerate() {
-            for (tap, w) in window.iter().enumerate() {
-                for (o, a) in line.iter_mut().zip(&across[(dy + tap) * width..(dy + tap + 1) * width]) {
-                    *o += *w * *a;
-                }
-            }
+            weighted_sum(window, line, |tap| &across[(dy + tap) * width..(dy + tap + 1) * width]);
         }
-        out
-    })
+    }
+    planes
 }
 
 /// Derivatives of the mean of S by the moments of x, which [`backward`] blurs back.
@@ -90,20 +110,19 @@ pub fn forward<R: Real>(level: Level, image: &[R], truth: &[R], size_px: [usize;
             level.run(
                 #[inline(always)]
                 || {
-                    let moments: [Vec<R>; 5] = blur(
-                        &window,
-                        size_px,
-                        y0,
-                        ROWS.min(height - y0),
-                        #[inline(always)]
-                        |n, at| match n {
-                            0 => x[at],
-                            1 => y[at],
-                            2 => x[at] * x[at],
-                            3 => y[at] * y[at],
-                            _ => x[at] * y[at],
-                        },
-                    );
+                    let fill = |n: usize, row: usize, line: &mut [R]| {
+                        let (x, y) = (&x[row * width..(row + 1) * width], &y[row * width..(row + 1) * width]);
+                        for i in 0..width {
+                            line[i] = match n {
+                                0 => x[i],
+                                1 => y[i],
+                                2 => x[i] * x[i],
+                                3 => y[i] * y[i],
+                                _ => x[i] * y[i],
+                            };
+                        }
+                    };
+                    let moments = blur(&window, size_px, y0, ROWS.min(height - y0), fill);
                     similarity(moments, norm)
                 },
             )
@@ -167,14 +186,11 @@ pub fn backward<R: Real>(
                 #[inline(always)]
                 || {
                     let rows = d.len() / width;
-                    let [by_mean, by_xx, by_xy]: [Vec<R>; 3] = blur(
-                        &window,
-                        size_px,
-                        block * ROWS,
-                        rows,
-                        #[inline(always)]
-                        |n, at| blocks[at / (ROWS * width)][n][at % (ROWS * width)],
-                    );
+                    let fill = |n: usize, row: usize, line: &mut [R]| {
+                        let at = row % ROWS * width;
+                        line.copy_from_slice(&blocks[row / ROWS][n][at..at + width]);
+                    };
+                    let [by_mean, by_xx, by_xy] = blur(&window, size_px, block * ROWS, rows, fill);
                     let start = block * ROWS * width;
                     for (i, d) in d.iter_mut().enumerate() {
                         let at = start + i;

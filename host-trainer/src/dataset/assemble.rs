@@ -35,7 +35,8 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
         let faults = faults.filter_map(|view| Some(format!("{}: {}", view.name, view.shot.as_ref().err()?)));
         return Err(too_few_views(&listing, listed, faults.collect()));
     }
-    let Listing { layout, source, views, points, unposed, mut notes } = listing;
+    let Listing { layout, source, views, points, unposed, notes } = listing;
+    let mut notes: Vec<String> = notes.into_iter().map(|note| note.text).collect();
     let read: Vec<(Split, String, Result<View, ViewFault>)> = views
         .into_par_iter()
         .map(|view| {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use super::listing::{ListedView, Listing, commonest};
+use super::listing::{ListedView, Listing, Note, commonest};
 use super::transforms::{Transforms, read_transforms};
 use super::{DatasetError, Layout, Split, ViewFault};
 
@@ -23,7 +23,7 @@ pub(super) fn list(folder: &Path) -> Result<Listing, DatasetError> {
     let test = read_optional(folder, TEST_FILE)?;
     let mut notes = Vec::new();
     if let Some(val) = read_optional(folder, VAL_FILE)? {
-        notes.push(format!("views in `{VAL_FILE}`, not used: {}", val.frames.len()));
+        notes.push(Note::new("unused-split", format!("views in `{VAL_FILE}`, not used: {}", val.frames.len())));
     }
     train.check_model(&source)?;
     let mut views = views(folder, Split::Train, &train);
@@ -41,11 +41,12 @@ pub(super) fn list(folder: &Path) -> Result<Listing, DatasetError> {
     }
     if !views.iter().any(|view| view.split == Split::Test && view.shot.is_ok()) {
         let why = if test.is_some() { "lists no usable view" } else { "is missing" };
-        notes.push(format!(
+        let text = format!(
             "no views are held out, so quality on unseen views cannot be measured: `{}` {why}; move some frames of \
              `{TRAIN_FILE}` into it",
             folder.join(TEST_FILE).display()
-        ));
+        );
+        notes.push(Note::new("no-test-views", text));
     }
     Ok(Listing { layout: Layout::Blender, source, views, points: None, unposed: Vec::new(), notes })
 }

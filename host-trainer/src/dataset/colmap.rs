@@ -7,8 +7,8 @@ use glam::{DMat3, DQuat, DVec3};
 use rayon::prelude::*;
 
 use super::image::read_header;
-use super::listing::{ListedView, Listing, Shot, every_nth, image_names_below};
-use super::{DatasetError, Layout, LoadOptions, Split, ViewFault, image_folder};
+use super::listing::{ListedView, Listing, Note, Shot, every_nth, image_names_below};
+use super::{DatasetError, Layout, LoadOptions, ViewFault, image_folder};
 
 mod binary;
 mod model;
@@ -83,14 +83,16 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
     };
     if points.as_ref().is_none_or(|(_, points)| points.is_empty()) {
         let why = if points.is_some() { "is empty" } else { "is missing" };
-        notes.push(format!(
+        let text = format!(
             "`{}` {why}, so training starts from random points where the cameras look; triangulate points for a better \
              start",
             points_path.display()
-        ));
+        );
+        notes.push(Note::new("no-points", text));
     }
     if model.ends_with("0") && folder.join("sparse/1").is_dir() {
-        notes.push("the capture has several models; only `sparse/0` is read, others hold other images".to_owned());
+        let text = "the capture has several models, of which only `sparse/0` is read; merge them if images of the others are needed";
+        notes.push(Note::new("several-models", text));
     }
     let image_folder = image_folder::choose(folder, options, &mut notes)?;
     let Some(image_folder) = image_folder.map(|name| folder.join(name)) else {
@@ -107,14 +109,11 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
         .collect();
     let posed: HashSet<&str> = images.iter().map(|image| image.name.as_str()).collect();
     let unposed = image_names_below(&image_folder).into_iter().filter(|name| !posed.contains(name.as_str())).collect();
-    if options.test_every == 0 || !views.iter().any(|view| view.split == Split::Test && view.shot.is_ok()) {
-        notes.push(
-            "no views are held out, so quality on unseen views cannot be measured; hold every eighth out with \
-             `--test-every 8`"
-                .to_owned(),
-        );
+    let mut listing = Listing { layout: Layout::Colmap, source: path("images"), views, points, unposed, notes };
+    if !listing.has_test_views() {
+        listing.notes.push(Note::no_test_views());
     }
-    Ok(Listing { layout: Layout::Colmap, source: path("images"), views, points, unposed, notes })
+    Ok(listing)
 }
 
 /// Reads one file of the model in either encoding.

@@ -9,7 +9,7 @@ use super::Layout;
 #[non_exhaustive]
 pub enum DatasetError {
     /// The path is no folder.
-    #[error("`{}` is not a folder: give the folder that holds the capture", path.display())]
+    #[error("`{}` is not a folder; give the folder that holds the capture", path.display())]
     NotAFolder {
         /// The path given.
         path: PathBuf,
@@ -138,7 +138,7 @@ pub enum DatasetError {
     },
     /// The training cameras span no space, so the scene has no scale.
     #[error(
-        "`{}`: all training cameras stand within {spread:e} of one point, so the scene has no scale; give views from \
+        "`{}`: all training cameras stand within {spread:.1e} of one point, so the scene has no scale; give views from \
          different places, or check the translations of the poses",
         path.display()
     )]
@@ -165,6 +165,24 @@ pub enum DatasetError {
 }
 
 impl DatasetError {
+    /// The kind of error, as a code of [`Finding`](super::Finding).
+    pub(super) fn code(&self) -> &'static str {
+        match self {
+            Self::NotAFolder { .. } => "not-a-folder",
+            Self::UnknownLayout { .. } => "unknown-layout",
+            Self::Read { .. } => "unreadable-file",
+            Self::Transforms { .. } => "bad-transforms",
+            Self::FieldOfView { .. } | Self::NoFocal { .. } => "bad-intrinsics",
+            Self::Model { .. } => "bad-model",
+            Self::CameraModel { .. } => "camera-model",
+            Self::ImageFolder { .. } => "image-folder",
+            Self::Ply { .. } => "bad-points",
+            Self::TooFewViews { .. } => "too-few-views",
+            Self::NoBaseline { .. } => "no-baseline",
+            Self::MaxResolution { .. } | Self::TestEvery { .. } => "bad-option",
+        }
+    }
+
     /// The error of a folder that is no capture; looks whether a folder in it is one.
     pub(super) fn unknown_layout(path: &Path) -> Self {
         let entries = std::fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path());

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::listing::Note;
 use super::{DatasetError, LoadOptions};
 
 /// The folder of full-size images.
@@ -15,7 +16,7 @@ const DEFAULT: &str = "images";
 pub(super) fn choose(
     folder: &Path,
     options: &LoadOptions,
-    notes: &mut Vec<String>,
+    notes: &mut Vec<Note>,
 ) -> Result<Option<String>, DatasetError> {
     let present = present(folder);
     if let Some(name) = &options.images {
@@ -29,10 +30,11 @@ pub(super) fn choose(
         [only] => Ok(Some(only.clone())),
         several if several.iter().any(|name| name == DEFAULT) => {
             let others: Vec<&str> = several.iter().filter(|name| *name != DEFAULT).map(String::as_str).collect();
-            notes.push(format!(
-                "images are read from `{DEFAULT}`; the capture also has `{}`, which `--images` selects",
+            let text = format!(
+                "images are read from `{DEFAULT}` although `{}` is there, too; choose another folder with `--images`",
                 others.join("`, `")
-            ));
+            );
+            notes.push(Note::new("several-image-folders", text));
             Ok(Some(DEFAULT.to_owned()))
         }
         _ => Err(DatasetError::ImageFolder { path: folder.to_owned(), wanted: None, present }),

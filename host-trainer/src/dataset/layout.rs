@@ -3,10 +3,13 @@
 use std::fmt;
 use std::path::Path;
 
+use serde::Serialize;
+
 use super::{blender, colmap, nerfstudio};
 
 /// A layout that can be read, told by the files present; the first that fits is taken.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Layout {
     /// Synthetic-NeRF: `transforms_train.json` and its like beside RGBA images.
     Blender,

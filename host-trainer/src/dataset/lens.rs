@@ -125,6 +125,20 @@ impl Lens {
         corners.map(|corner| self.direction(corner)).map(|[x, y]| x * x + y * y).into_iter().fold(0.0, f64::max)
     }
 
+    /// How far the distortion moves a point of the border of the pinhole image at most, pixels.
+    pub(super) fn largest_shift_px(&self) -> f64 {
+        let (width_px, height_px) = (f64::from(self.size_px.0), f64::from(self.size_px.1));
+        let steps = (0..=16).map(|i| f64::from(i) / 16.0);
+        let border = steps.flat_map(|t| {
+            [[t * width_px, 0.0], [t * width_px, height_px], [0.0, t * height_px], [width_px, t * height_px]]
+        });
+        let shift = |from: [f64; 2]| {
+            let to = self.pixel(self.distorted(self.direction(from)));
+            (to[0] - from[0]).hypot(to[1] - from[1])
+        };
+        border.map(shift).fold(0.0, f64::max)
+    }
+
     /// The pinhole camera of the undistorted image: same size, same focal lengths, same principal point.
     pub(super) fn camera(&self, rotation: glam::DMat3, translation: glam::DVec3) -> Camera {
         let (width_px, height_px) = self.size_px;

@@ -21,7 +21,29 @@ pub(super) struct Listing {
     /// Images that lie with the others but have no pose, by name.
     pub(super) unposed: Vec<String>,
     /// What a person should know about how the capture was read.
-    pub(super) notes: Vec<String>,
+    pub(super) notes: Vec<Note>,
+}
+
+/// Something about how a capture was read, with its remedy behind the last semicolon where there is one.
+pub(super) struct Note {
+    /// One of the codes of [`Finding`](super::Finding).
+    pub(super) code: &'static str,
+    pub(super) text: String,
+}
+
+impl Note {
+    pub(super) fn new(code: &'static str, text: impl Into<String>) -> Self {
+        Self { code, text: text.into() }
+    }
+
+    /// No view is held out of a capture that names no split of its own.
+    pub(super) fn no_test_views() -> Self {
+        Self::new(
+            "no-test-views",
+            "no views are held out, so quality on unseen views cannot be measured; hold every eighth out with \
+             `--test-every 8`",
+        )
+    }
 }
 
 /// One view of a listing.
@@ -47,10 +69,22 @@ pub(super) struct Shot {
     pub(super) mask: Option<PathBuf>,
 }
 
+impl Shot {
+    /// The camera's centre, capture units.
+    pub(super) fn centre_world(&self) -> DVec3 {
+        -(self.rotation.transpose() * self.translation)
+    }
+}
+
 impl Listing {
     /// The sound views of a split.
     pub(super) fn shots(&self, split: Split) -> impl Iterator<Item = &Shot> {
         self.views.iter().filter(move |view| view.split == split).filter_map(|view| view.shot.as_ref().ok())
+    }
+
+    /// Whether a view to test on can be used.
+    pub(super) fn has_test_views(&self) -> bool {
+        self.shots(Split::Test).next().is_some()
     }
 
     /// How many views the capture lists for a split, sound or not.

@@ -4,7 +4,7 @@
 //! headers), and what all layouts share makes a capture of the listing: pixels in `image`, `lens` and `undistort`, the
 //! common frame in `normalise`, initial points in `ply` and `frusta`.
 //! A view that cannot be used is left out and named in the [`LoadReport`]; only a capture that cannot be trained on
-//! at all is an error. [`diagnose`] looks at the same listing and says what may go wrong.
+//! at all is an error. [`diagnose()`] looks at the same listing and says what may go wrong.
 
 use std::path::Path;
 
@@ -15,6 +15,7 @@ use crate::camera::Camera;
 mod assemble;
 mod blender;
 mod colmap;
+mod diagnose;
 mod error;
 mod frusta;
 mod image;
@@ -35,6 +36,7 @@ mod transforms;
 mod undistort;
 mod view_fault;
 
+pub use diagnose::{Diagnosis, Finding, Severity, diagnose, diagnose_cheaply};
 pub use error::DatasetError;
 pub use layout::Layout;
 pub use mask::Mask;

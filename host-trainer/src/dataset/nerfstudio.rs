@@ -5,7 +5,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use super::listing::{ListedView, Listing, every_nth, image_names_below};
+use super::listing::{ListedView, Listing, Note, every_nth, image_names_below};
 use super::transforms::{Transforms, read_transforms};
 use super::{DatasetError, Layout, LoadOptions, Split, image_folder, ply};
 
@@ -48,11 +48,20 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
         None => None,
     };
     let unposed = unposed(folder, images.as_deref().or(named.as_deref()), &transforms);
-    Ok(Listing { layout: Layout::Nerfstudio, source, views, points, unposed, notes })
+    if points.as_ref().is_none_or(|(_, points)| points.is_empty()) {
+        let text = "the capture brings no points, so training starts from random points where the cameras look; name a \
+                    point cloud in `ply_file_path` for a better start";
+        notes.push(Note::new("no-points", text));
+    }
+    let mut listing = Listing { layout: Layout::Nerfstudio, source, views, points, unposed, notes };
+    if !listing.has_test_views() {
+        listing.notes.push(Note::no_test_views());
+    }
+    Ok(listing)
 }
 
 /// The split of every frame: as the file gives it, or every n-th held out; `None` for frames of no used split.
-fn splits(transforms: &Transforms, options: &LoadOptions, notes: &mut Vec<String>) -> Vec<Option<Split>> {
+fn splits(transforms: &Transforms, options: &LoadOptions, notes: &mut Vec<Note>) -> Vec<Option<Split>> {
     let [train, val, test] = &transforms.splits;
     if train.is_none() && val.is_none() && test.is_none() {
         return (0..transforms.frames.len()).map(|i| Some(every_nth(options.test_every, i))).collect();
@@ -61,7 +70,7 @@ fn splits(transforms: &Transforms, options: &LoadOptions, notes: &mut Vec<String
     if test.is_some()
         && let Some(val) = val
     {
-        notes.push(format!("views in `val_filenames`, not used: {}", val.len()));
+        notes.push(Note::new("unused-split", format!("views in `val_filenames`, not used: {}", val.len())));
     }
     let mut by_name = HashMap::new();
     for (names, split) in [(train.as_ref(), Split::Train), (held_out, Split::Test)] {
@@ -72,14 +81,16 @@ fn splits(transforms: &Transforms, options: &LoadOptions, notes: &mut Vec<String
     let splits: Vec<_> = transforms.frames.iter().map(|frame| by_name.get(frame.name()).copied()).collect();
     let n_unused = splits.iter().filter(|split| split.is_none()).count();
     if n_unused > 0 {
-        notes.push(format!("frames that no used split of `{FILE}` names, left out: {n_unused}"));
+        let text = format!("frames that no used split of `{FILE}` names, left out: {n_unused}");
+        notes.push(Note::new("unused-split", text));
     }
     let n_named = splits.iter().flatten().count();
     if n_named < by_name.len() {
-        notes.push(format!(
+        let text = format!(
             "names in the splits of `{FILE}` that no frame has: {}; they must be spelt like `file_path`",
             by_name.len() - n_named
-        ));
+        );
+        notes.push(Note::new("unknown-names", text));
     }
     splits
 }

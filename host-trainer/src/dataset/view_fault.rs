@@ -1,6 +1,6 @@
 //! What can be wrong with one view of a capture.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::PoseFault;
 
@@ -108,4 +108,33 @@ pub enum ViewFault {
     /// The pose is no rigid motion.
     #[error("`transform_matrix` {0}")]
     Pose(#[from] PoseFault),
+}
+
+impl ViewFault {
+    /// The kind of fault, as a code of [`Finding`](super::Finding).
+    pub(super) fn code(&self) -> &'static str {
+        match self {
+            Self::Missing { .. } => "missing-image",
+            Self::Unreadable { .. } => "unreadable-image",
+            Self::Size { .. } => "image-size",
+            Self::Shape { .. } => "image-shape",
+            Self::Lens { .. } => "bad-intrinsics",
+            Self::CameraModel { .. } => "camera-model",
+            Self::NoCamera { .. } => "missing-camera",
+            Self::Quaternion { .. } | Self::Translation { .. } | Self::Pose(_) => "bad-pose",
+            Self::Mask { .. } => "bad-mask",
+        }
+    }
+
+    /// The file at fault, where it is the view's own.
+    pub(super) fn path(&self) -> Option<&Path> {
+        match self {
+            Self::Missing { path, .. }
+            | Self::Unreadable { path, .. }
+            | Self::Size { path, .. }
+            | Self::Shape { path, .. }
+            | Self::Mask { path, .. } => Some(path),
+            _ => None,
+        }
+    }
 }

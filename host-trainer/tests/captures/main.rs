@@ -1,6 +1,7 @@
 //! Captures on disk, through the public interface: sound ones of every layout, broken ones with the message each must
 //! give, and real ones where they are at hand.
 
+mod broken;
 mod fixture;
 mod real;
 mod sound;

@@ -202,7 +202,7 @@ fn cameras_in_one_place_are_refused() {
         fixture.frames[i] = frame_with(&format!("train/r_{i}"), DMat3::IDENTITY, DVec3::ONE);
     }
     fixture.write_transforms();
-    assert_says(&fixture.error(), &["all training cameras stand within 0e0", "views from different places"]);
+    assert_says(&fixture.error(), &["all training cameras stand within 0.0e0", "views from different places"]);
 }
 
 #[test]

@@ -1,0 +1,92 @@
+//! One thing found out about a capture.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+/// How much a finding matters; the worst compares smallest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    /// The capture cannot be trained on.
+    Error,
+    /// The result will suffer, or is not what was meant.
+    Warning,
+    /// Worth knowing.
+    Note,
+}
+
+impl fmt::Display for Severity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Error => "error",
+            Self::Warning => "warning",
+            Self::Note => "note",
+        })
+    }
+}
+
+/// One thing found out about a capture.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Finding {
+    /// How much it matters.
+    pub severity: Severity,
+    /// The kind, such as `missing-image`: stable, for programs.
+    pub code: &'static str,
+    /// What was found, for people.
+    pub message: String,
+    /// What to do about it; empty where nothing needs to be done.
+    pub remedy: String,
+    /// The files it is about, all of them.
+    pub files: Vec<PathBuf>,
+    /// The numbers behind the message.
+    pub numbers: BTreeMap<&'static str, f64>,
+}
+
+impl Finding {
+    pub(super) fn new(severity: Severity, code: &'static str, message: String, remedy: &str) -> Self {
+        let remedy = remedy.to_owned();
+        Self { severity, code, message, remedy, files: Vec::new(), numbers: BTreeMap::new() }
+    }
+
+    /// A finding of a message that ends with its remedy behind the last semicolon, as all messages of this module do.
+    pub(super) fn told(severity: Severity, code: &'static str, text: &str) -> Self {
+        let (message, remedy) = text.rsplit_once("; ").unwrap_or((text, ""));
+        Self::new(severity, code, message.to_owned(), remedy)
+    }
+
+    pub(super) fn files(mut self, files: impl IntoIterator<Item = PathBuf>) -> Self {
+        self.files.extend(files);
+        self
+    }
+
+    pub(super) fn number(mut self, name: &'static str, value: f64) -> Self {
+        self.numbers.insert(name, value);
+        self
+    }
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}[{}]: {}", self.severity, self.code, self.message)?;
+        if !self.remedy.is_empty() {
+            write!(f, "\n  remedy: {}", self.remedy)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_remedy_stands_behind_the_last_semicolon() {
+        let finding = Finding::told(Severity::Warning, "bad-pose", "has a; b, needed: c; do d");
+        assert_eq!((finding.message.as_str(), finding.remedy.as_str()), ("has a; b, needed: c", "do d"));
+        assert_eq!(finding.to_string(), "warning[bad-pose]: has a; b, needed: c\n  remedy: do d");
+        assert_eq!(Finding::told(Severity::Note, "x", "so it is").to_string(), "note[x]: so it is");
+    }
+}

@@ -1,0 +1,73 @@
+//! Findings about initial points, and about cameras and points together.
+
+use glam::DVec3;
+
+use super::poses::median;
+use super::{Finding, Severity};
+use crate::dataset::listing::{Listing, Shot};
+
+/// Fewer points than this outline no scene.
+const FEW_POINTS: usize = 100;
+
+/// How many points are projected at most; enough for a share to a few per cent.
+const N_PROJECTED: usize = 1000;
+
+/// Triangulated points are all in some image; where fewer are, points and poses are not of one reconstruction.
+const MIN_SEEN_SHARE: f64 = 0.5;
+
+/// A scene this many times the cameras' spread away shows no parallax.
+const MAX_DEPTH_RATIO: f64 = 50.0;
+
+/// * `centres`: of the training cameras that can be used, capture units.
+pub(super) fn check(listing: &Listing, centres: &[DVec3], findings: &mut Vec<Finding>) {
+    let Some((path, points)) = listing.points.as_ref().filter(|(_, points)| !points.is_empty()) else { return };
+    if points.len() < FEW_POINTS {
+        let message = format!(
+            "`{}` holds {} points, needed: at least {FEW_POINTS} to outline a scene",
+            path.display(),
+            points.len()
+        );
+        let remedy = "reconstruct again with more matches, or take the file out to start from random points";
+        let finding = Finding::new(Severity::Warning, "few-points", message, remedy).files([path.clone()]);
+        findings.push(finding.number("points", points.len() as f64).number("needed", FEW_POINTS as f64));
+    }
+    if centres.is_empty() {
+        return;
+    }
+    let projected: Vec<DVec3> = points.iter().copied().step_by(points.len().div_ceil(N_PROJECTED)).collect();
+    let shots: Vec<&Shot> = listing.views.iter().flat_map(|view| &view.shot).collect();
+    let n_seen = projected.iter().filter(|point| shots.iter().any(|shot| sees(shot, **point))).count();
+    let share = n_seen as f64 / projected.len() as f64;
+    if share < MIN_SEEN_SHARE {
+        let message = format!(
+            "only {:.0} % of the points of `{}` fall into an image, needed: at least {:.0} %, so points and poses do not fit",
+            100.0 * share,
+            path.display(),
+            100.0 * MIN_SEEN_SHARE
+        );
+        let remedy = "use points and poses of one reconstruction, in one frame and one unit";
+        let finding = Finding::new(Severity::Warning, "points-unseen", message, remedy).files([path.clone()]);
+        findings.push(finding.number("seen_share", share));
+    }
+    let mean = centres.iter().sum::<DVec3>() / centres.len() as f64;
+    let spread = centres.iter().map(|centre| centre.distance(mean)).fold(0.0, f64::max);
+    let depth = median(projected.iter().map(|point| point.distance(mean)).collect());
+    if spread > 0.0 && depth > MAX_DEPTH_RATIO * spread {
+        let message = format!(
+            "the cameras stand within {spread:.3e} of each other and the scene {depth:.3e} away, {:.0} times as far, so \
+             there is hardly any parallax",
+            depth / spread
+        );
+        let remedy = "take photographs from places farther apart, not only in other directions";
+        let finding = Finding::new(Severity::Warning, "little-parallax", message, remedy);
+        findings.push(finding.number("spread", spread).number("median_depth", depth));
+    }
+}
+
+/// Whether a point falls into the undistorted image.
+fn sees(shot: &Shot, point_world: DVec3) -> bool {
+    let cam = shot.rotation * point_world + shot.translation;
+    let [u, v] = shot.lens.pixel([cam.x / cam.z, cam.y / cam.z]);
+    let (width_px, height_px) = shot.lens.size_px;
+    cam.z > 0.0 && (0.0..=f64::from(width_px)).contains(&u) && (0.0..=f64::from(height_px)).contains(&v)
+}

@@ -1,0 +1,177 @@
+//! Findings about views: which cannot be used, and what is unusual about the others.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use super::{Finding, Severity};
+use crate::dataset::assemble::MIN_TRAIN_VIEWS;
+use crate::dataset::listing::{ListedView, Listing, Shot, commonest};
+use crate::dataset::report::first_few;
+use crate::dataset::{Layout, Split};
+
+/// With fewer views than this, most places are seen from too few sides to be more than guessed.
+const FEW_TRAIN_VIEWS: usize = 20;
+
+pub(super) fn check(listing: &Listing, findings: &mut Vec<Finding>) {
+    left_out(listing, findings);
+    counts(listing, findings);
+    unposed(listing, findings);
+    repeated_names(listing, findings);
+    lenses(listing, findings);
+    alpha(listing, findings);
+    orientation(listing, findings);
+    sizes(listing, findings);
+}
+
+/// The views that can be used, with their names.
+fn sound(listing: &Listing) -> impl Iterator<Item = (&str, &Shot)> {
+    listing.views.iter().filter_map(|view| Some((view.name.as_str(), view.shot.as_ref().ok()?)))
+}
+
+/// A finding about some of the sound views; none where there are none.
+fn about(views: &[(&str, &Shot)], severity: Severity, code: &'static str, what: &str, remedy: &str) -> Option<Finding> {
+    let names: Vec<String> = views.iter().map(|(name, _)| (*name).to_owned()).collect();
+    let message = format!("{what}: {} ({})", names.len(), first_few(&names));
+    let files = views.iter().map(|(_, shot)| shot.path.clone());
+    let finding = Finding::new(severity, code, message, remedy).files(files).number("views", names.len() as f64);
+    (!views.is_empty()).then_some(finding)
+}
+
+/// One finding for each kind of fault, told by the first view that has it.
+fn left_out(listing: &Listing, findings: &mut Vec<Finding>) {
+    let mut by_code: BTreeMap<&'static str, Vec<&ListedView>> = BTreeMap::new();
+    for view in &listing.views {
+        if let Err(fault) = &view.shot {
+            by_code.entry(fault.code()).or_default().push(view);
+        }
+    }
+    let n_listed = listing.views.len();
+    for (code, views) in by_code {
+        let Some(Err(first)) = views.first().map(|view| &view.shot) else { continue };
+        let names: Vec<String> = views.iter().map(|view| view.name.clone()).collect();
+        let text = format!("views left out: {} of {n_listed} ({}); the first: {first}", names.len(), first_few(&names));
+        let paths = views.iter().filter_map(|view| view.shot.as_ref().err()?.path().map(PathBuf::from));
+        let finding = Finding::told(Severity::Warning, code, &text).files(paths);
+        findings.push(finding.number("views", names.len() as f64).number("listed", n_listed as f64));
+    }
+}
+
+fn counts(listing: &Listing, findings: &mut Vec<Finding>) {
+    let (usable, listed) = (listing.shots(Split::Train).count(), listing.n_listed(Split::Train));
+    let (severity, code, needed, remedy) = if usable < MIN_TRAIN_VIEWS {
+        (
+            Severity::Error,
+            "too-few-views",
+            MIN_TRAIN_VIEWS,
+            "repair the views that were left out, or take more photographs",
+        )
+    } else if usable < FEW_TRAIN_VIEWS {
+        (
+            Severity::Warning,
+            "few-views",
+            FEW_TRAIN_VIEWS,
+            "take more photographs from other places, overlapping by half",
+        )
+    } else {
+        return;
+    };
+    let message = format!(
+        "`{}`: {usable} of {listed} training views can be used, needed: at least {needed}{}",
+        listing.source.display(),
+        if severity == Severity::Error { "" } else { " for a good scene" }
+    );
+    let finding = Finding::new(severity, code, message, remedy).files([listing.source.clone()]);
+    findings.push(finding.number("usable", usable as f64).number("needed", needed as f64));
+}
+
+fn unposed(listing: &Listing, findings: &mut Vec<Finding>) {
+    let n = listing.unposed.len();
+    if n > 0 {
+        let message = format!("images without a pose: {n} ({})", first_few(&listing.unposed));
+        let remedy = "they are not used; reconstruct again with more matches if they are needed";
+        let files = listing.unposed.iter().map(PathBuf::from);
+        let finding = Finding::new(Severity::Warning, "unposed-image", message, remedy).files(files);
+        findings.push(finding.number("images", n as f64).number("posed", listing.views.len() as f64));
+    }
+}
+
+fn repeated_names(listing: &Listing, findings: &mut Vec<Finding>) {
+    let mut names: Vec<&str> = listing.views.iter().map(|view| view.name.as_str()).collect();
+    names.sort_unstable();
+    let repeated: Vec<String> = names
+        .chunk_by(|a, b| a == b)
+        .filter(|names| names.len() > 1)
+        .filter_map(|names| names.first().map(|name| (*name).to_owned()))
+        .collect();
+    if !repeated.is_empty() {
+        let message = format!("images listed more than once: {} ({})", repeated.len(), first_few(&repeated));
+        let remedy = "list each image once; the copies weigh more in training and may be in both splits";
+        let finding = Finding::new(Severity::Warning, "repeated-image", message, remedy);
+        findings.push(finding.number("images", repeated.len() as f64).files(repeated.iter().map(PathBuf::from)));
+    }
+}
+
+fn lenses(listing: &Listing, findings: &mut Vec<Finding>) {
+    let n_distorted = sound(listing).filter(|(_, shot)| !shot.lens.is_pinhole()).count();
+    if n_distorted > 0 {
+        let shift_px = sound(listing).map(|(_, shot)| shot.lens.largest_shift_px()).fold(0.0, f64::max);
+        let message = format!(
+            "images with lens distortion: {n_distorted}; it moves pixels by up to {shift_px:.1} px and is undone on loading"
+        );
+        let finding = Finding::new(Severity::Note, "distortion", message, "");
+        findings.push(finding.number("views", n_distorted as f64).number("largest_shift_px", shift_px));
+    }
+    let outside: Vec<_> = sound(listing)
+        .filter(|(_, shot)| {
+            let ([x, y], (width_px, height_px)) = (shot.lens.principal_px, shot.lens.size_px);
+            !(0.0..=f64::from(width_px)).contains(&x) || !(0.0..=f64::from(height_px)).contains(&y)
+        })
+        .collect();
+    findings.extend(about(
+        &outside,
+        Severity::Warning,
+        "principal-point",
+        "images whose principal point lies outside them",
+        "check cx and cy: they are pixels from the image's corner, for the size that the intrinsics give",
+    ));
+}
+
+fn alpha(listing: &Listing, findings: &mut Vec<Finding>) {
+    let (with, without): (Vec<_>, Vec<_>) = sound(listing).partition(|(_, shot)| shot.header.has_alpha);
+    let finding = if listing.layout == Layout::Blender {
+        about(
+            &without,
+            Severity::Note,
+            "no-alpha",
+            "images without an alpha channel, whose background is trained as part of the scene",
+            "export RGBA to have the chosen background there",
+        )
+    } else {
+        about(
+            &with,
+            Severity::Warning,
+            "alpha",
+            "photographs with an alpha channel, which are composited on the chosen background",
+            "if the alpha marks pixels to leave out, give them as masks; else remove the channel",
+        )
+    };
+    findings.extend(finding);
+}
+
+fn orientation(listing: &Listing, findings: &mut Vec<Finding>) {
+    let turned: Vec<_> = sound(listing).filter(|(_, shot)| shot.header.exif_orientation != 1).collect();
+    findings.extend(about(
+        &turned,
+        Severity::Warning,
+        "exif-orientation",
+        "images with an EXIF orientation, which is not applied: pixels are taken as they are stored",
+        "if the poses were made from upright images, store the pixels upright and remove the tag",
+    ));
+}
+
+fn sizes(listing: &Listing, findings: &mut Vec<Finding>) {
+    let Some(common_px) = commonest(sound(listing).map(|(_, shot)| shot.header.size_px)) else { return };
+    let other: Vec<_> = sound(listing).filter(|(_, shot)| shot.header.size_px != common_px).collect();
+    let what = format!("images of another size than the {}×{} px of most", common_px.0, common_px.1);
+    findings.extend(about(&other, Severity::Note, "mixed-sizes", &what, ""));
+}

@@ -15,6 +15,9 @@ use crate::camera::Camera;
 use crate::dataset::Normalisation;
 use crate::scene::{Anchors, Heads, ModelShape, Scene};
 
+/// One step for every channel, so that a test can compute symbols by itself.
+const STEPS: QuantisationSteps = QuantisationSteps { feature: 0.02, log_scale: 0.02, offset: 0.02 };
+
 /// A scene of random anchors in a cube before the camera, the same for the same arguments.
 fn random_scene(shape: ModelShape, n_anchors: usize, seed: u64) -> Scene<f32> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -63,6 +66,6 @@ fn info() -> BundleInfo {
 
 fn write_random(shape: ModelShape, n_anchors: usize, seed: u64, chunk_anchors: u16) -> (Scene<f32>, Vec<u8>) {
     let scene = random_scene(shape, n_anchors, seed);
-    let bytes = super::write_chunked(&scene, &info(), &QuantisationSteps::default(), chunk_anchors);
+    let bytes = super::write_chunked(&scene, &info(), &STEPS, chunk_anchors);
     (scene, bytes.expect("a sound scene"))
 }

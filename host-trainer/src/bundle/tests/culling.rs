@@ -4,8 +4,8 @@ use pocketsplat_core::bundle::{HEADER_LEN, crc32};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{SMALL, info, random_scene};
-use crate::bundle::{QuantisationSteps, write_chunked};
+use super::{SMALL, STEPS, info, random_scene};
+use crate::bundle::write_chunked;
 use crate::camera::Camera;
 use crate::render::decoder::core_image;
 use crate::scene::{ModelShape, Scene};
@@ -62,7 +62,7 @@ fn tightly_boxed_scene() -> Scene<f32> {
 
 #[test]
 fn culling_chunks_changes_no_pixel() {
-    let boxed = write_chunked(&tightly_boxed_scene(), &info(), &QuantisationSteps::default(), 1).expect("sound");
+    let boxed = write_chunked(&tightly_boxed_scene(), &info(), &STEPS, 1).expect("sound");
     let unboxed = without_boxes(&boxed);
     let (boxed, unboxed) = (Bundle::parse(&boxed).expect("sound"), Bundle::parse(&unboxed).expect("sealed again"));
     let mut rng = ChaCha8Rng::seed_from_u64(32);

@@ -1,8 +1,8 @@
 use pocketsplat_core::Bundle;
 
-use super::{SMALL, camera, info, random_scene, write_random};
+use super::{SMALL, STEPS, camera, info, random_scene, write_random};
 use crate::bundle::annotate::annotate;
-use crate::bundle::{ChannelName, QuantisationSteps, SizeReport, WriteError, write};
+use crate::bundle::{ChannelName, SizeReport, WriteError, write};
 use crate::render::decoder::core_image;
 use crate::render::reference::ReferenceScene;
 use crate::scene::{Heads, Scene};
@@ -42,7 +42,7 @@ fn every_symbol_comes_back() {
         // Far outliers take the escape.
         scene.anchors.offsets[0] = 600.0;
         scene.anchors.features[0] = -655.0;
-        let bytes = write(&scene, &info(), &QuantisationSteps::default()).expect("a sound scene");
+        let bytes = write(&scene, &info(), &STEPS).expect("a sound scene");
         let bundle = Bundle::parse(&bytes).expect("a sound bundle");
         let (mut expected, mut found) = (rows_of_scene(&scene, 0.02), rows_of_bundle(&bundle));
         // The bundle is in Morton order.
@@ -55,7 +55,7 @@ fn every_symbol_comes_back() {
 #[test]
 fn an_empty_scene_is_a_bundle_of_background() {
     let scene = random_scene(SMALL, 0, 1);
-    let bytes = write(&scene, &info(), &QuantisationSteps::default()).expect("an empty scene");
+    let bytes = write(&scene, &info(), &STEPS).expect("an empty scene");
     let bundle = Bundle::parse(&bytes).expect("a sound bundle");
     let frame = core_image(&bundle, &camera(20, 20)).expect("a frame");
     assert!(frame.image.rgb.as_chunks().0.iter().all(|&pixel| pixel == [10, 20, 30]), "background everywhere");
@@ -75,7 +75,7 @@ fn weights_come_back_as_halves() {
 fn values_that_do_not_fit_are_named() {
     let mut scene = random_scene(SMALL, 10, 7);
     scene.anchors.log_scales[6 * 4 + 1] = f32::NAN;
-    let error = write(&scene, &info(), &QuantisationSteps::default()).expect_err("NaN");
+    let error = write(&scene, &info(), &STEPS).expect_err("NaN");
     assert!(
         matches!(error, WriteError::NotFinite { anchor: 4, channel: ChannelName::LogScale(1), .. }),
         "unexpected {error}"
@@ -87,18 +87,18 @@ fn values_that_do_not_fit_are_named() {
     );
     let mut scene = random_scene(SMALL, 10, 7);
     scene.anchors.offsets[9 * 2 + 4] = 1e4;
-    let error = write(&scene, &info(), &QuantisationSteps::default()).expect_err("too far");
+    let error = write(&scene, &info(), &STEPS).expect_err("too far");
     assert!(
         matches!(error, WriteError::BeyondSymbols { anchor: 2, channel: ChannelName::Offset(1, 1), .. }),
         "unexpected {error}"
     );
     let mut scene = random_scene(SMALL, 10, 7);
     scene.heads.opacity.b1[2] = 1e6;
-    let error = write(&scene, &info(), &QuantisationSteps::default()).expect_err("too large for half");
+    let error = write(&scene, &info(), &STEPS).expect_err("too large for half");
     assert!(matches!(error, WriteError::Weight { head: "opacity", .. }), "unexpected {error}");
     let mut scene = random_scene(SMALL, 10, 7);
     scene.anchors.lattice[3][1] = i32::MIN;
-    let error = write(&scene, &info(), &QuantisationSteps::default()).expect_err("beyond the lattice");
+    let error = write(&scene, &info(), &STEPS).expect_err("beyond the lattice");
     assert!(matches!(error, WriteError::BeyondLattice { anchor: 3, .. }), "unexpected {error}");
 }
 

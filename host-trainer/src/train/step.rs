@@ -1,18 +1,18 @@
 //! One view through the whole chain, forward and backward.
 
+mod block;
+
 use std::time::Instant;
 
 use rayon::prelude::*;
 
 use super::config::LossWeights;
-use crate::ops::neural_gaussians::{Gaussian, HeadOutputs, Source};
 use crate::ops::project::{Footprint, Splat};
 use crate::ops::rasterise::TiledImage;
 use crate::ops::simd::Level;
-use crate::ops::{
-    Pinhole, Real, head, head_input, l1, neural_gaussians, prefilter, project, rasterise, ssim, tiles, volume,
-};
+use crate::ops::{Pinhole, Real, l1, prefilter, rasterise, ssim, tiles, volume};
 use crate::scene::{Heads, ModelShape, Scene};
+pub use block::Block;
 
 /// Anchors one task evaluates together; also the unit in which the gradients of the heads are summed, so that the sums
 /// do not depend on the number of threads.
@@ -79,41 +79,6 @@ impl Stopwatch {
     }
 }
 
-/// A block of visible anchors on its way through the chain; buffers are kept from step to step.
-#[derive(Clone, Debug)]
-pub struct Block<R> {
-    /// Indices of its anchors in the scene, ascending.
-    pub anchors: Vec<u32>,
-    /// Gaussians with positive opacity.
-    pub gaussians: Vec<Gaussian<R>>,
-    /// Where each of them comes from.
-    pub sources: Vec<Source>,
-    /// Those of them that reached the image.
-    pub drawn: Vec<u32>,
-    /// Length of dL/d(mean) of each drawn one, in units of half the image (the growth statistic).
-    pub screen_gradients: Vec<R>,
-    /// dL/d(features) `[n, F]`.
-    pub d_features: Vec<R>,
-    /// dL/d(log-scales) `[n, 6]`.
-    pub d_log_scales: Vec<R>,
-    /// dL/d(offsets) `[n, 3K]`.
-    pub d_offsets: Vec<R>,
-    positions: Vec<[R; 3]>,
-    features: Vec<R>,
-    log_scales: Vec<R>,
-    offsets: Vec<R>,
-    input: Vec<R>,
-    hidden: [Vec<R>; 3],
-    outputs: HeadOutputs<R>,
-    splats: Vec<Splat<R>>,
-    footprints: Vec<Footprint<R>>,
-    d_gaussians: Vec<Gaussian<R>>,
-    d_outputs: HeadOutputs<R>,
-    d_hidden: Vec<R>,
-    d_input: Vec<R>,
-    d_heads: Heads<R>,
-}
-
 /// A drawn view and what its backward pass needs.
 struct Drawing<R> {
     stages: StageSeconds,
@@ -147,146 +112,6 @@ pub(super) fn clear_masked<R: Real>(planes: &mut [R], mask: Option<&[bool]>) {
         for (value, valid) in plane.iter_mut().zip(mask) {
             *value = if *valid { *value } else { R::ZERO };
         }
-    }
-}
-
-fn refill<R: Real>(buffer: &mut Vec<R>, len: usize) {
-    buffer.clear();
-    buffer.resize(len, R::ZERO);
-}
-
-impl<R: Real> Block<R> {
-    fn new(shape: &ModelShape) -> Self {
-        Self {
-            anchors: Vec::new(),
-            gaussians: Vec::new(),
-            sources: Vec::new(),
-            drawn: Vec::new(),
-            screen_gradients: Vec::new(),
-            d_features: Vec::new(),
-            d_log_scales: Vec::new(),
-            d_offsets: Vec::new(),
-            positions: Vec::new(),
-            features: Vec::new(),
-            log_scales: Vec::new(),
-            offsets: Vec::new(),
-            input: Vec::new(),
-            hidden: Default::default(),
-            outputs: HeadOutputs::default(),
-            splats: Vec::new(),
-            footprints: Vec::new(),
-            d_gaussians: Vec::new(),
-            d_outputs: HeadOutputs::default(),
-            d_hidden: Vec::new(),
-            d_input: Vec::new(),
-            d_heads: Heads::filled(shape, R::ZERO),
-        }
-    }
-
-    /// Copies the rows of `anchors` out of the scene.
-    fn gather(&mut self, scene: &Scene<R>, anchors: &[u32]) {
-        let (f, o) = (scene.shape.feature_dim, 3 * scene.shape.n_offsets);
-        for buffer in [&mut self.features, &mut self.log_scales, &mut self.offsets] {
-            buffer.clear();
-        }
-        self.anchors.clear();
-        self.anchors.extend_from_slice(anchors);
-        self.positions.clear();
-        for a in anchors.iter().map(|a| *a as usize) {
-            self.positions.push(scene.position(a));
-            self.features.extend_from_slice(&scene.anchors.features[a * f..(a + 1) * f]);
-            self.log_scales.extend_from_slice(&scene.anchors.log_scales[a * 6..(a + 1) * 6]);
-            self.offsets.extend_from_slice(&scene.anchors.offsets[a * o..(a + 1) * o]);
-        }
-    }
-
-    /// From anchors to splats.
-    fn forward(&mut self, level: Level, scene: &Scene<R>, camera: &Pinhole<R>) {
-        let (shape, n) = (&scene.shape, self.anchors.len());
-        refill(&mut self.input, n * shape.head_inputs());
-        head_input::forward(shape, camera, &self.features, &self.positions, &mut self.input);
-        self.outputs.reset(shape, n);
-        let outputs = [&mut self.outputs.opacity, &mut self.outputs.covariance, &mut self.outputs.colour];
-        for ((weights, hidden), output) in scene.heads.each().into_iter().zip(&mut self.hidden).zip(outputs) {
-            hidden.resize(n * weights.n_hidden, R::ZERO);
-            head::forward(weights, &self.input, hidden, output);
-        }
-        self.gaussians.clear();
-        self.sources.clear();
-        self.splats.clear();
-        self.footprints.clear();
-        self.drawn.clear();
-        level.run(
-            #[inline(always)]
-            || {
-                neural_gaussians::forward(
-                    shape,
-                    &self.positions,
-                    &self.log_scales,
-                    &self.offsets,
-                    &self.outputs,
-                    &mut self.gaussians,
-                    &mut self.sources,
-                );
-                for (i, gaussian) in (0u32..).zip(&self.gaussians) {
-                    if let Some((splat, footprint)) = project::forward(camera, gaussian, shape.dilation_compensation) {
-                        self.splats.push(splat);
-                        self.footprints.push(footprint);
-                        self.drawn.push(i);
-                    }
-                }
-            },
-        );
-    }
-
-    /// From the gradients of its splats to those of its anchors and of the heads.
-    fn backward(
-        &mut self,
-        scene: &Scene<R>,
-        camera: &Pinhole<R>,
-        d_splats: &[Splat<R>],
-        volume_weight: R,
-        n_gaussians: usize,
-    ) {
-        let (shape, n) = (&scene.shape, self.anchors.len());
-        self.d_gaussians.clear();
-        self.d_gaussians.resize(self.gaussians.len(), Gaussian::default());
-        self.screen_gradients.clear();
-        let half = camera.size_px.map(|s| R::real(0.5 * s as f64));
-        for (drawn, d_splat) in self.drawn.iter().zip(d_splats) {
-            let i = *drawn as usize;
-            self.d_gaussians[i] = project::backward(camera, &self.gaussians[i], shape.dilation_compensation, d_splat);
-            let [x, y] = [d_splat.mean_px[0] * half[0], d_splat.mean_px[1] * half[1]];
-            self.screen_gradients.push((x * x + y * y).sqrt());
-        }
-        volume::backward(&self.gaussians, volume_weight, n_gaussians, &mut self.d_gaussians);
-        self.d_outputs.reset(shape, n);
-        refill(&mut self.d_log_scales, n * 6);
-        refill(&mut self.d_offsets, n * 3 * shape.n_offsets);
-        neural_gaussians::backward(
-            shape,
-            &self.log_scales,
-            &self.offsets,
-            &self.outputs,
-            &self.gaussians,
-            &self.sources,
-            &self.d_gaussians,
-            &mut self.d_outputs,
-            &mut self.d_log_scales,
-            &mut self.d_offsets,
-        );
-        refill(&mut self.d_input, n * shape.head_inputs());
-        let d_outputs = [&self.d_outputs.opacity, &self.d_outputs.covariance, &self.d_outputs.colour];
-        let heads = scene.heads.each().into_iter().zip(self.d_heads.each_mut());
-        for (((weights, d_weights), hidden), d_output) in heads.zip(&self.hidden).zip(d_outputs) {
-            for group in d_weights.groups_mut() {
-                group.fill(R::ZERO);
-            }
-            self.d_hidden.resize(n * weights.n_hidden, R::ZERO);
-            head::backward(weights, &self.input, hidden, d_output, &mut self.d_hidden, &mut self.d_input, d_weights);
-        }
-        refill(&mut self.d_features, n * shape.feature_dim);
-        head_input::backward(shape, &self.d_input, &mut self.d_features);
     }
 }
 

@@ -1,0 +1,67 @@
+//! From splats to pixels.
+
+use rayon::prelude::*;
+
+use super::row::{LOOK_EVERY, alpha_row, draws_nothing, mark_dead, step_row};
+use super::{TILE_VALUES, Tile, TiledImage};
+use crate::ops::Real;
+use crate::ops::project::{Footprint, Splat};
+use crate::ops::simd::Level;
+use crate::ops::tiles::{TILE_PX, TileLists};
+
+/// Draws all tiles.
+///
+/// * `splats`, `footprints`: `[n]`. * `background`: RGB. * returns the colour in tile order; pixels beyond the image's
+///   edge are drawn like any other and dropped by [`TiledImage::to_planes`].
+pub fn forward<R: Real>(
+    level: Level,
+    splats: &[Splat<R>],
+    footprints: &[Footprint<R>],
+    lists: &TileLists,
+    background: [R; 3],
+) -> TiledImage<R> {
+    let mut image = TiledImage::zeros(lists.grid);
+    image.colour.par_chunks_mut(3 * TILE_VALUES).enumerate().for_each(|(t, out)| {
+        let tile = Tile::new(splats, footprints, lists, t);
+        level.run(
+            #[inline(always)]
+            || forward_tile(&tile, background, out),
+        );
+    });
+    image
+}
+
+#[inline(always)]
+fn forward_tile<R: Real>(tile: &Tile<'_, R>, background: [R; 3], out: &mut [R]) {
+    let mut transmittance = [[R::ONE; TILE_PX]; TILE_PX];
+    let mut colour = [[[R::ZERO; TILE_PX]; TILE_PX]; 3];
+    let mut dead = [false; TILE_PX];
+    for (n, entry) in tile.entries.iter().enumerate() {
+        let (splat, first, end) = tile.splat(*entry);
+        let dx0 = R::real(tile.origin[0] as f64 + 0.5) - splat.mean_px[0];
+        for y in first..end {
+            if dead[y] {
+                continue;
+            }
+            let dy = R::real((tile.origin[1] + y) as f64 + 0.5) - splat.mean_px[1];
+            let (mut alpha, _, _) = alpha_row(splat, dx0, dy);
+            if draws_nothing(&alpha) {
+                continue;
+            }
+            let weight = step_row(&mut alpha, &mut transmittance[y]);
+            for (plane, c) in colour.iter_mut().zip(splat.colour) {
+                for (out, w) in plane[y].iter_mut().zip(&weight) {
+                    *out += *w * c;
+                }
+            }
+        }
+        if n % LOOK_EVERY == 0 && mark_dead(&transmittance, &mut dead) {
+            break;
+        }
+    }
+    for ((plane, bg), out) in colour.iter().zip(background).zip(out.chunks_exact_mut(TILE_VALUES)) {
+        for ((c, t), o) in plane.as_flattened().iter().zip(transmittance.as_flattened()).zip(out) {
+            *o = *c + t.abs() * bg;
+        }
+    }
+}

@@ -1,0 +1,157 @@
+//! The rasteriser against plain loops, against finite differences, and against itself on other instruction sets.
+
+use super::*;
+use crate::ops::finite_difference::{assert_piecewise_gradient, random};
+use crate::ops::simd::Level;
+use crate::ops::tiles;
+
+const SIZE: [usize; 2] = [37, 21];
+
+fn unpack(x: &[f64]) -> Vec<Splat<f64>> {
+    x.chunks_exact(9)
+        .map(|v| Splat { mean_px: [v[0], v[1]], conic: [v[2], v[3], v[4]], opacity: v[5], colour: [v[6], v[7], v[8]] })
+        .collect()
+}
+
+fn pack(splats: &[Splat<f64>]) -> Vec<f64> {
+    splats.iter().flat_map(|s| [&s.mean_px[..], &s.conic, &[s.opacity], &s.colour].concat()).collect()
+}
+
+fn footprints(splats: &[Splat<f64>]) -> Vec<Footprint<f64>> {
+    splats
+        .iter()
+        .enumerate()
+        .map(|(i, s)| {
+            let det = s.conic[0] * s.conic[2] - s.conic[1] * s.conic[1];
+            let reach = 2.0 * (255.0 * s.opacity).ln();
+            let half_extent_px = [(reach * s.conic[2] / det).sqrt(), (reach * s.conic[0] / det).sqrt()];
+            Footprint { depth: 1.0 + i as f64, half_extent_px }
+        })
+        .collect()
+}
+
+fn lists(splats: &[Splat<f64>]) -> TileLists {
+    tiles::build(splats, &footprints(splats), SIZE)
+}
+
+fn scene(seed: u64, n: usize, opacity: f64) -> Vec<f64> {
+    random(seed, n * 9)
+        .chunks_exact(9)
+        .flat_map(|v| {
+            let (sx, sy) = (3.0 + 2.5 * v[2], 3.0 + 2.5 * v[3]);
+            let rho = 0.8 * v[4];
+            let k = 1.0 / (1.0 - rho * rho);
+            [
+                SIZE[0] as f64 * (0.5 + 0.6 * v[0]),
+                SIZE[1] as f64 * (0.5 + 0.6 * v[1]),
+                k / (sx * sx),
+                -k * rho / (sx * sy),
+                k / (sy * sy),
+                opacity * (0.6 + 0.35 * v[5]),
+                v[6].abs(),
+                v[7].abs(),
+                v[8].abs(),
+            ]
+        })
+        .collect()
+}
+
+fn draw(splats: &[Splat<f64>], background: [f64; 3]) -> Vec<f64> {
+    forward(Level::detect(), splats, &footprints(splats), &lists(splats), background).to_planes(SIZE)
+}
+
+/// The same pixels without tiles, rows or vectors.
+fn draw_plainly(splats: &[Splat<f64>], background: [f64; 3]) -> Vec<f64> {
+    let [width, height] = SIZE;
+    let mut planes = vec![0.0; 3 * width * height];
+    for p in 0..width * height {
+        let (px, py) = ((p % width) as f64 + 0.5, (p / width) as f64 + 0.5);
+        let (mut t, mut colour) = (1.0, [0.0; 3]);
+        for s in splats {
+            let (dx, dy) = (px - s.mean_px[0], py - s.mean_px[1]);
+            let power = -0.5 * (s.conic[0] * dx * dx + s.conic[2] * dy * dy) - s.conic[1] * dx * dy;
+            let alpha = (s.opacity * power.exp()).min(0.99);
+            if alpha < 1.0 / 255.0 {
+                continue;
+            }
+            if t * (1.0 - alpha) < 1e-4 {
+                break;
+            }
+            for i in 0..3 {
+                colour[i] += t * alpha * s.colour[i];
+            }
+            t *= 1.0 - alpha;
+        }
+        for i in 0..3 {
+            planes[i * width * height + p] = colour[i] + t * background[i];
+        }
+    }
+    planes
+}
+
+#[test]
+fn tiles_and_vectors_change_nothing() {
+    for (seed, opacity) in [(1, 1.0), (2, 0.2), (3, 1.4)] {
+        let splats = unpack(&scene(seed, 60, opacity));
+        let background = [0.2, 0.4, 0.6];
+        for (a, b) in draw(&splats, background).iter().zip(draw_plainly(&splats, background)) {
+            assert!((a - b).abs() < 1e-12, "{a} against {b}");
+        }
+    }
+}
+
+#[test]
+fn every_simd_level_gives_the_same_bits() {
+    let exact = unpack(&scene(5, 80, 1.0));
+    let lists = lists(&exact);
+    let round = |v: f64| v as f32;
+    let splats: Vec<Splat<f32>> = exact
+        .iter()
+        .map(|s| Splat {
+            mean_px: s.mean_px.map(round),
+            conic: s.conic.map(round),
+            opacity: round(s.opacity),
+            colour: s.colour.map(round),
+        })
+        .collect();
+    let reach: Vec<Footprint<f32>> = footprints(&exact)
+        .iter()
+        .map(|f| Footprint { depth: round(f.depth), half_extent_px: f.half_extent_px.map(round) })
+        .collect();
+    let draw = |level| {
+        let image = forward(level, &splats, &reach, &lists, [0.0; 3]);
+        let d_image = TiledImage { colour: image.colour.iter().map(|c| c - 0.3).collect() };
+        let d_splats = backward(level, &splats, &reach, &lists, &image, &d_image);
+        (image.colour, d_splats)
+    };
+    let expected = draw(Level::Baseline);
+    for level in Level::available() {
+        assert!(draw(level) == expected, "{level} differs from the baseline");
+    }
+}
+
+#[test]
+fn backward_agrees_with_finite_differences() {
+    // The image jumps where alpha crosses 1/255 or 0.99 and where a pixel stops: pieces, each smooth.
+    for (seed, n, opacity) in [(1, 12, 1.0), (2, 25, 0.3), (3, 6, 1.03)] {
+        let x = scene(seed, n, opacity);
+        let splats = unpack(&x);
+        let background = [0.3, 0.1, 0.7];
+        let weights = random(seed + 70, 3 * SIZE[0] * SIZE[1]);
+        let f = |x: &[f64]| {
+            // The lists stay those of the base point, whose slack covers the steps.
+            let splats = unpack(x);
+            forward(Level::detect(), &splats, &footprints(&splats), &lists(&splats), background)
+                .to_planes(SIZE)
+                .iter()
+                .zip(&weights)
+                .map(|(p, w)| p * w)
+                .sum::<f64>()
+        };
+        let lists = lists(&splats);
+        let image = forward(Level::detect(), &splats, &footprints(&splats), &lists, background);
+        let d_image = TiledImage::from_planes(&weights, SIZE);
+        let analytic = pack(&backward(Level::detect(), &splats, &footprints(&splats), &lists, &image, &d_image));
+        assert_piecewise_gradient("rasterise", &x, &analytic, f);
+    }
+}

@@ -1,4 +1,5 @@
-//! The `pocketsplat` command: results to stdout, progress to stderr, exit code 0, 1 (failed) or 2 (wrong usage).
+//! The `pocketsplat` command: results to stdout, progress to stderr, exit code 0, 1 (failed), 2 (wrong
+//! usage) or 130 (training interrupted, with a checkpoint to go on from).
 
 mod cli;
 
@@ -6,7 +7,7 @@ use std::process::ExitCode;
 
 fn main() -> ExitCode {
     match cli::run() {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(code) => code,
         Err(error) => {
             eprintln!("error: {error:#}");
             ExitCode::FAILURE

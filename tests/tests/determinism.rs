@@ -35,7 +35,7 @@ fn train(capture: &Capture, seed: u64, n_threads: usize) -> (Vec<u8>, Vec<usize>
     pool.install(|| {
         let mut counts = AnchorCounts::default();
         let mut trainer = Trainer::new(capture, config).expect("the capture trains");
-        trainer.run(&mut counts);
+        trainer.run(&mut counts).expect("no step is dropped");
         let info = BundleInfo {
             normalisation: capture.normalisation,
             background: [0; 3],

@@ -7,7 +7,7 @@ use pocketsplat::camera::Camera;
 use pocketsplat::dataset::{Background, Capture, Normalisation, View};
 use pocketsplat_core::Bundle;
 
-use super::capture::CaptureArgs;
+use super::capture::{CaptureArgs, CaptureOptions};
 
 /// The bytes of a bundle and where they came from.
 pub(crate) struct BundleFile {
@@ -29,17 +29,14 @@ impl BundleFile {
     pub(crate) fn capture_options(&self, bundle: &Bundle<'_>, args: &CaptureArgs) -> Result<CaptureArgs> {
         let header = bundle.header();
         let known = [Background::Black, Background::White].into_iter().find(|b| b.rgb8() == header.background);
-        if let (Some(asked), Some(trained)) = (args.background, known)
+        if let (Some(asked), Some(trained)) = (args.options.background, known)
             && asked != trained
         {
             bail!("{} was trained on {trained}, not on {asked}; leave --background out", self.path.display());
         }
         let [width, height] = header.training_px;
-        Ok(CaptureArgs {
-            max_resolution: args.max_resolution.or(Some(u32::from(width.max(height)))),
-            background: known.or(args.background),
-            ..args.clone()
-        })
+        let trained_with = CaptureOptions { max_resolution: Some(u32::from(width.max(height))), background: known };
+        Ok(CaptureArgs { dataset: args.dataset.clone(), options: args.options.or(&trained_with) })
     }
 
     /// The camera of a view in the frame of this bundle, which need not be the frame of the capture as loaded now.

@@ -12,7 +12,7 @@ use pocketsplat::synth::{SynthOptions, write_capture};
 use pocketsplat::train::TrainConfig;
 
 use super::bundle::BundleFile;
-use super::capture::{CaptureArgs, Split};
+use super::capture::{CaptureArgs, CaptureOptions, Split};
 use super::eval::{Renderer, evaluate, reference_image};
 use super::{output, train};
 
@@ -44,7 +44,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     write_capture(&capture_folder, &SynthOptions { size_px: args.size, ..SynthOptions::default() })?;
 
     eprintln!("2 of 4  training {} steps", args.iterations);
-    let capture_args = CaptureArgs { dataset: capture_folder, max_resolution: None, background: None };
+    let capture_args = CaptureArgs { dataset: capture_folder, options: CaptureOptions::default() };
     let config = TrainConfig { iterations: args.iterations, ..TrainConfig::default() };
     let bundle_path = folder.join("scene.psb");
     let capture = capture_args.load(config.seed)?;

@@ -157,7 +157,7 @@ pub(crate) fn evaluate(
         renderer: format!("{renderer:?}").to_lowercase(),
         width_px: views[0].image.width_px,
         height_px: views[0].image.height_px,
-        background: options.background.map_or_else(String::new, |b| b.to_string()),
+        background: options.options.background.map_or_else(String::new, |b| b.to_string()),
         decode_s,
         render_s_per_view: mean(|row| row.frame.seconds),
         scratch_bytes: rows.iter().map(|row| row.frame.scratch_bytes).max().unwrap_or(0),

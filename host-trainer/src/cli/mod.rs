@@ -8,8 +8,12 @@ mod inspect;
 mod output;
 mod progress;
 mod render;
+mod run_config;
 mod synth;
 mod train;
+mod train_args;
+
+use std::process::ExitCode;
 
 use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
@@ -27,7 +31,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    Train(train::Args),
+    Train(train_args::Args),
     Eval(eval::Args),
     Render(render::Args),
     Inspect(inspect::Args),
@@ -36,18 +40,19 @@ enum Command {
 }
 
 /// Parses the command line and runs the command.
-pub(crate) fn run() -> Result<()> {
+pub(crate) fn run() -> Result<ExitCode> {
     let cli = Cli::parse();
     rayon::ThreadPoolBuilder::new()
         .num_threads(cli.threads)
         .build_global()
         .with_context(|| format!("could not start {} threads", cli.threads))?;
     match cli.command {
-        Command::Train(args) => train::run(&args),
+        Command::Train(args) => return train::run(&args),
         Command::Eval(args) => eval::run(&args),
         Command::Render(args) => render::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Synth(args) => synth::run(&args),
         Command::Demo(args) => demo::run(&args),
     }
+    .map(|()| ExitCode::SUCCESS)
 }

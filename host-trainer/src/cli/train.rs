@@ -1,67 +1,30 @@
 //! `pocketsplat train`: a capture in, a bundle out.
 
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
-use anyhow::Result;
+use anyhow::{Context, Result, bail};
 use pocketsplat::bundle::{self, BundleInfo, QuantisationSteps};
 use pocketsplat::dataset::{Background, Capture};
-use pocketsplat::scene::{ModelShape, Scene};
+use pocketsplat::scene::Scene;
+use pocketsplat::train::run::{Ending, Interval, RunFolder};
 use pocketsplat::train::{TrainConfig, Trainer};
 use serde::Serialize;
+use signal_hook::consts::{SIGINT, SIGTERM};
 
 use super::capture::CaptureArgs;
 use super::output;
 use super::progress::Progress;
+use super::run_config::RunConfig;
+use super::train_args::Args;
 
-/// The kinds of scene that can be trained.
-#[derive(Clone, Copy, Debug, clap::ValueEnum)]
-enum Backbone {
-    /// Scaffold-GS: anchors, three heads, static entropy tables.
-    Scaffold,
-}
+/// Seconds between checkpoints unless the user says otherwise: what an accident may cost.
+const CHECKPOINT_SECONDS: f64 = 60.0;
 
-/// Train a scene from a capture and write it as a bundle.
-#[derive(clap::Args)]
-pub(crate) struct Args {
-    #[command(flatten)]
-    capture: CaptureArgs,
-    /// The bundle to write.
-    #[arg(short, long, value_name = "OUT.psb")]
-    output: PathBuf,
-    /// Kind of scene.
-    #[arg(long, value_enum, default_value_t = Backbone::Scaffold)]
-    backbone: Backbone,
-    /// Training steps; schedules scale with them.
-    #[arg(long, default_value_t = TrainConfig::default().iterations)]
-    iterations: u32,
-    /// Everything random follows from it: same seed, same machine, same bundle.
-    #[arg(long, default_value_t = TrainConfig::default().seed)]
-    seed: u64,
-    /// Feature width of an anchor, and hidden width of the heads.
-    #[arg(long, value_name = "F", default_value_t = TrainConfig::default().shape.feature_dim)]
-    feature_dim: usize,
-    /// Gaussians of an anchor.
-    #[arg(long, value_name = "K", default_value_t = TrainConfig::default().shape.n_offsets)]
-    offsets: usize,
-    /// Do not show the heads the direction of view.
-    #[arg(long)]
-    no_view_direction: bool,
-    /// Show the heads the distance of view.
-    #[arg(long)]
-    view_distance: bool,
-    /// Compensate opacities for the 0.3 px² dilation, for drawing at other resolutions than the training one.
-    #[arg(long)]
-    dilation_compensation: bool,
-    /// Edge of a lattice cell, normalised units (the cameras span about 5).
-    #[arg(long, default_value_t = TrainConfig::default().voxel_size)]
-    voxel_size: f64,
-    /// Quantisation step of the anchor features.
-    #[arg(long, default_value_t = QuantisationSteps::default().feature)]
-    feature_step: f32,
-    /// Print the result as JSON.
-    #[arg(long)]
-    json: bool,
-}
+/// Exit code of a process that Ctrl-C ended.
+const INTERRUPTED: u8 = 130;
 
 /// What a finished run reports.
 #[derive(Debug, Serialize)]
@@ -71,35 +34,108 @@ pub(crate) struct TrainResult {
     pub(crate) n_anchors: usize,
     pub(crate) bytes_per_anchor: f64,
     pub(crate) iterations: u32,
+    pub(crate) dropped_steps: u32,
     pub(crate) train_s: f64,
     pub(crate) iterations_per_s: f64,
     pub(crate) background: String,
 }
 
-pub(crate) fn run(args: &Args) -> Result<()> {
-    let Backbone::Scaffold = args.backbone;
-    let config = TrainConfig {
-        shape: ModelShape {
-            feature_dim: args.feature_dim,
-            n_offsets: args.offsets,
-            view_direction: !args.no_view_direction,
-            view_distance: args.view_distance,
-            dilation_compensation: args.dilation_compensation,
-        },
-        iterations: args.iterations,
-        seed: args.seed,
-        voxel_size: args.voxel_size,
-        ..TrainConfig::default()
+pub(crate) fn run(args: &Args) -> Result<ExitCode> {
+    let (config, folder) = match args.resume() {
+        Some(path) => {
+            let folder = RunFolder::reopen(path)?;
+            let begun = RunConfig::parse(&folder.config()?);
+            let begun = begun.with_context(|| format!("the config.toml in {} can not be used", path.display()))?;
+            let config = args.applied_to(begun.clone())?;
+            if let Some(difference) = begun.difference(&config)? {
+                bail!("the run began with another setting than the command line asks for: {difference}; leave it out");
+            }
+            output::check_writable(&config.output)?;
+            (config, folder)
+        }
+        None => {
+            let config = args.resolved()?;
+            output::check_writable(&config.output)?;
+            let folder = RunFolder::start(&args.run_folder(&config)?, &config.to_toml()?, args.overwrite())?;
+            (config, folder)
+        }
     };
-    config.validate().map_err(anyhow::Error::msg)?;
-    let steps = QuantisationSteps { feature: args.feature_step, ..QuantisationSteps::default() };
-    output::check_writable(&args.output)?;
-    let capture = args.capture.load(args.seed)?;
-    let result = train(&capture, args.capture.background.unwrap_or(Background::Black), config, &steps, &args.output)?;
-    output::print(&result, args.json)
+    let source = CaptureArgs { dataset: config.dataset.clone(), options: config.capture.clone() };
+    let capture = source.load(config.train.seed)?;
+    train_in(folder, &config, &capture, args)
 }
 
-/// Trains and writes the bundle.
+/// Trains in a run folder from wherever the run stands there.
+fn train_in(mut folder: RunFolder, config: &RunConfig, capture: &Capture, args: &Args) -> Result<ExitCode> {
+    let path = folder.path().to_owned();
+    let mut trainer = match args.resume() {
+        None => Trainer::new(capture, config.train)?,
+        Some(_) => resumed(&folder, config, capture)?,
+    };
+    let interval = config.checkpoint_every.map_or(Interval::Seconds(CHECKPOINT_SECONDS), Interval::Iterations);
+    let how_to_go_on = || format!("go on with `pocketsplat train --resume {}`", path.display());
+    let mut progress = Progress::new(trainer.iteration, config.train.iterations);
+    let stop = stop_flag()?;
+    let ending = folder.train(&mut trainer, &mut progress, interval, &stop).with_context(|| {
+        format!("training stopped at iteration {}; to retry, {}", trainer.iteration, how_to_go_on())
+    })?;
+    if ending == Ending::Interrupted {
+        eprintln!(
+            "interrupted after iteration {} of {}; {}",
+            trainer.iteration,
+            config.train.iterations,
+            how_to_go_on()
+        );
+        return Ok(ExitCode::from(INTERRUPTED));
+    }
+    let background = config.capture.background.unwrap_or_default();
+    let result = write_bundle(&trainer, capture, background, &config.quantisation, &config.output)
+        .with_context(|| format!("the training is done and kept; {}", how_to_go_on()))?;
+    folder.finish(&serde_json::to_string_pretty(&result)?, config.keep_checkpoints)?;
+    output::print(&result, args.json())?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The run as its newest sound checkpoint has it, or at its start where it was stopped before the first one.
+fn resumed<'a>(folder: &RunFolder, config: &RunConfig, capture: &'a Capture) -> Result<Trainer<'a>> {
+    let Some(resumed) = folder.resume(capture)? else {
+        eprintln!("the run in {} has no checkpoint yet; it begins anew", folder.path().display());
+        return Ok(Trainer::new(capture, config.train)?);
+    };
+    for fault in &resumed.passed_over {
+        eprintln!("warning: a checkpoint is damaged, so the run goes on from an older one: {fault}");
+    }
+    let trainer = resumed.restored.trainer;
+    let at_checkpoint = RunConfig { train: *trainer.config(), ..config.clone() };
+    if let Some(difference) = config.difference(&at_checkpoint)? {
+        bail!("config.toml and the checkpoint disagree: {difference}; write back what the run began with");
+    }
+    let (then, now) = (&resumed.restored.written_by, trainer.kernels());
+    if *then != now {
+        eprintln!(
+            "warning: the checkpoint was computed with {then}; this is {now}. The run goes on, but will not end in the \
+             same bits as there"
+        );
+    }
+    eprintln!("going on after iteration {} of {}", trainer.iteration, config.train.iterations);
+    Ok(trainer)
+}
+
+/// A flag that Ctrl-C or SIGTERM sets; a second of them ends the process at once.
+///
+/// SIGHUP is left alone, so that `nohup` works.
+fn stop_flag() -> Result<Arc<AtomicBool>> {
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [SIGINT, SIGTERM] {
+        // In this order: the first signal finds the flag unset, and then sets it.
+        signal_hook::flag::register_conditional_shutdown(signal, i32::from(INTERRUPTED), Arc::clone(&stop))
+            .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&stop)))
+            .context("could not listen to Ctrl-C")?;
+    }
+    Ok(stop)
+}
+
+/// Trains without a run folder and writes the bundle.
 pub(crate) fn train(
     capture: &Capture,
     background: Background,
@@ -108,9 +144,17 @@ pub(crate) fn train(
     output: &Path,
 ) -> Result<TrainResult> {
     let mut trainer = Trainer::new(capture, config)?;
-    let mut progress = Progress::new(config.iterations);
-    trainer.run(&mut progress);
-    let train_s = progress.elapsed().as_secs_f64();
+    trainer.run(&mut Progress::new(0, config.iterations))?;
+    write_bundle(&trainer, capture, background, steps, output)
+}
+
+fn write_bundle(
+    trainer: &Trainer<'_>,
+    capture: &Capture,
+    background: Background,
+    steps: &QuantisationSteps,
+    output: &Path,
+) -> Result<TrainResult> {
     let bytes = encode(&trainer.scene, capture, background, steps)?;
     output::write_whole(output, &bytes)?;
     let n_anchors = trainer.scene.anchors.len();
@@ -119,9 +163,10 @@ pub(crate) fn train(
         bundle_bytes: bytes.len(),
         n_anchors,
         bytes_per_anchor: bytes.len() as f64 / n_anchors as f64,
-        iterations: config.iterations,
-        train_s,
-        iterations_per_s: f64::from(config.iterations) / train_s,
+        iterations: trainer.iteration,
+        dropped_steps: trainer.n_dropped(),
+        train_s: trainer.seconds,
+        iterations_per_s: f64::from(trainer.iteration) / trainer.seconds,
         background: background.to_string(),
     })
 }

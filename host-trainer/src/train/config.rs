@@ -164,7 +164,27 @@ impl TrainConfig {
         within("--feature-dim", self.shape.feature_dim as f64, 1.0, 256.0)?;
         within("--offsets", self.shape.n_offsets as f64, 1.0, 32.0)?;
         within("--voxel-size", self.voxel_size, 1e-6, 1.0)?;
-        within("densification.interval", f64::from(self.densification.interval), 1.0, 1e9)
+        // The largest integer of TOML, in which configurations are kept.
+        within("--seed", self.seed as f64, 0.0, i64::MAX as f64)?;
+        let Rates { offset, feature, log_scale, opacity_head, covariance_head, colour_head } = self.rates;
+        for (name, rate) in [
+            ("offset", offset),
+            ("feature", feature),
+            ("log_scale", log_scale),
+            ("opacity_head", opacity_head),
+            ("covariance_head", covariance_head),
+            ("colour_head", colour_head),
+        ] {
+            within(&format!("train.rates.{name}.start"), rate.start, 0.0, 10.0)?;
+            within(&format!("train.rates.{name}.end"), rate.end, 0.0, 10.0)?;
+        }
+        within("train.loss.dssim", self.loss.dssim, 0.0, 1.0)?;
+        within("train.loss.volume", self.loss.volume, 0.0, 1e6)?;
+        let Densification { statistics_from, from, until, interval, .. } = self.densification;
+        within("train.densification.statistics_from", statistics_from, 0.0, 1.0)?;
+        within("train.densification.from", from, 0.0, 1.0)?;
+        within("train.densification.until", until, 0.0, 1.0)?;
+        within("train.densification.interval", f64::from(interval), 1.0, 1e9)
     }
 
     /// The iteration at share `share` of the run.

@@ -1,33 +1,57 @@
-//! Training: one step, the optimiser, growth and pruning, and the loop around them.
+//! Training: one step, the optimiser, growth and pruning, the loop around them, and the folder that lets it go on after
+//! an interruption.
 
+pub mod checkpoint;
 pub mod config;
 pub mod densify;
 pub mod optimiser;
+pub mod run;
 pub mod statistics;
 pub mod step;
+#[cfg(test)]
+mod test_capture;
+pub mod watchdog;
+
+use std::time::Instant;
 
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
 pub use config::TrainConfig;
+pub use watchdog::DroppedStep;
 
 use crate::dataset::{Capture, Image, View};
 use crate::ops::Pinhole;
-use crate::scene::Scene;
 use crate::scene::init::initial_scene;
+use crate::scene::{Anchors, Heads, Scene};
+use checkpoint::{CaptureSignature, Kernels};
 use optimiser::Optimiser;
 use statistics::Statistics;
 use step::{StepReport, Target, Workspace, clear_masked};
+use watchdog::Watchdog;
 
 /// Hears of every step of a run.
 pub trait Observer {
     /// After iteration `iteration` (from 1).
     fn step(&mut self, iteration: u32, report: &StepReport<f32>, scene: &Scene<f32>);
+
+    /// When an iteration changed nothing, because of what `step` says; [`Self::step`] follows.
+    fn dropped(&mut self, _step: &DroppedStep) {}
 }
 
-/// Why a run can not start.
+/// What an iteration gives back.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// Loss and sizes of the step.
+    pub report: StepReport<f32>,
+    /// Why it was not applied, if so: parameters, moments and statistics are as before.
+    pub dropped: Option<DroppedStep>,
+}
+
+/// Why a run can not start, or go on.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum TrainError {
     /// A setting is out of range.
     #[error("{0}")]
@@ -38,6 +62,17 @@ pub enum TrainError {
     /// No point to start from.
     #[error("the capture has no point to start from; check its bounds")]
     NoPoints,
+    /// The cause of dropped steps does not pass.
+    #[error(
+        "{n} steps in a row would have made parameters infinite or NaN and were dropped, the last one so: {last}; \
+         lower the learning rates, or look at the photograph of that view"
+    )]
+    Diverged {
+        /// Steps dropped in a row.
+        n: u32,
+        /// The last one.
+        last: DroppedStep,
+    },
 }
 
 /// The state of a run: everything the next iteration depends on.
@@ -45,17 +80,21 @@ pub enum TrainError {
 pub struct Trainer<'a> {
     config: TrainConfig,
     capture: &'a Capture,
+    signature: CaptureSignature,
     cameras: Vec<Pinhole<f32>>,
     background: [f32; 3],
     /// Iterations done.
     pub iteration: u32,
     /// The scene as it stands.
     pub scene: Scene<f32>,
+    /// Wall-clock seconds spent in iterations.
+    pub seconds: f64,
+    watchdog: Watchdog,
     optimiser: Optimiser<f32>,
     statistics: Statistics,
     rng: ChaCha8Rng,
     /// Views left of the current pass over the capture, taken from the end.
-    queue: Vec<usize>,
+    queue: Vec<u32>,
     workspace: Workspace<f32>,
 }
 
@@ -77,70 +116,143 @@ impl<'a> Trainer<'a> {
     /// # Errors
     /// [`TrainError`] when a setting is out of range or the capture has no view or point.
     pub fn new(capture: &'a Capture, config: TrainConfig) -> Result<Self, TrainError> {
+        if capture.points.is_empty() {
+            return Err(TrainError::NoPoints);
+        }
+        let mut trainer = Self::without_scene(capture, config)?;
+        trainer.scene = initial_scene(config.shape, config.voxel_size, &capture.points, &mut trainer.rng);
+        trainer.optimiser = Optimiser::new(&trainer.scene);
+        trainer.statistics = Statistics::new(trainer.scene.anchors.len(), config.shape.n_offsets);
+        Ok(trainer)
+    }
+
+    /// Everything but anchors and what belongs to them.
+    fn without_scene(capture: &'a Capture, config: TrainConfig) -> Result<Self, TrainError> {
         config.validate().map_err(TrainError::Config)?;
         if capture.train.is_empty() {
             return Err(TrainError::NoViews);
         }
-        if capture.points.is_empty() {
-            return Err(TrainError::NoPoints);
-        }
-        let mut rng = ChaCha8Rng::seed_from_u64(config.seed);
-        let scene = initial_scene(config.shape, config.voxel_size, &capture.points, &mut rng);
+        let anchors = Anchors { lattice: vec![], features: vec![], log_scales: vec![], offsets: vec![] };
+        let heads = Heads::filled(&config.shape, 0.0);
+        let scene = Scene { shape: config.shape, voxel_size: config.voxel_size, anchors, heads };
         Ok(Self {
+            signature: CaptureSignature::of(capture),
             cameras: capture.train.iter().map(|v| Pinhole::new(&v.camera)).collect(),
             background: capture.background,
             iteration: 0,
+            seconds: 0.0,
+            watchdog: Watchdog::default(),
             optimiser: Optimiser::new(&scene),
-            statistics: Statistics::new(scene.anchors.len(), config.shape.n_offsets),
+            statistics: Statistics::default(),
             workspace: Workspace::new(&config.shape),
             queue: Vec::new(),
+            rng: ChaCha8Rng::seed_from_u64(config.seed),
             config,
             capture,
             scene,
-            rng,
         })
     }
 
-    /// Runs to the last iteration.
-    pub fn run(&mut self, observer: &mut impl Observer) {
-        while self.iteration < self.config.iterations {
-            let report = self.advance();
-            observer.step(self.iteration, &report, &self.scene);
-        }
+    /// The configuration.
+    pub fn config(&self) -> &TrainConfig {
+        &self.config
     }
 
-    /// One iteration: a view drawn without replacement, a step, statistics, growth and pruning, the optimiser.
-    pub fn advance(&mut self) -> StepReport<f32> {
+    /// Whether all iterations are done.
+    pub fn is_done(&self) -> bool {
+        self.iteration >= self.config.iterations
+    }
+
+    /// Steps that were not applied so far.
+    pub fn n_dropped(&self) -> u32 {
+        self.watchdog.n_dropped
+    }
+
+    /// What this run is computed with.
+    pub fn kernels(&self) -> Kernels {
+        Kernels::of_this_machine(self.workspace.level())
+    }
+
+    /// Runs to the last iteration.
+    ///
+    /// # Errors
+    /// [`TrainError::Diverged`], see [`Self::advance`].
+    pub fn run(&mut self, observer: &mut impl Observer) -> Result<(), TrainError> {
+        while !self.is_done() {
+            self.observed_advance(observer)?;
+        }
+        Ok(())
+    }
+
+    /// [`Self::advance`], and tells `observer`.
+    fn observed_advance(&mut self, observer: &mut impl Observer) -> Result<Outcome, TrainError> {
+        let outcome = self.advance()?;
+        if let Some(dropped) = &outcome.dropped {
+            observer.dropped(dropped);
+        }
+        observer.step(self.iteration, &outcome.report, &self.scene);
+        Ok(outcome)
+    }
+
+    /// One iteration: a view drawn without replacement, a step, the optimiser, statistics, growth and pruning.
+    ///
+    /// A step with a loss or gradient that is not finite does nothing of the latter four.
+    ///
+    /// # Errors
+    /// [`TrainError::Diverged`] when more than [`watchdog::MAX_DROPPED_IN_A_ROW`] steps in a row did nothing; the
+    /// scene is as it was before them.
+    pub fn advance(&mut self) -> Result<Outcome, TrainError> {
+        let started = Instant::now();
+        let outcome = self.iterate();
+        self.seconds += started.elapsed().as_secs_f64();
+        outcome
+    }
+
+    fn iterate(&mut self) -> Result<Outcome, TrainError> {
         self.iteration += 1;
         if self.queue.is_empty() {
-            self.queue = (0..self.cameras.len()).collect();
+            self.queue = (0u32..).zip(&self.cameras).map(|(view, _)| view).collect();
             self.queue.shuffle(&mut self.rng);
         }
-        let view = self.queue.pop().expect("refilled above");
-        let View { image, mask, .. } = &self.capture.train[view];
+        let index = self.queue.pop().expect("refilled above") as usize;
+        let View { name, image, mask, .. } = &self.capture.train[index];
         let mask = mask.as_ref().map(|mask| mask.valid.as_slice());
         let mut truth = planes(image);
         clear_masked(&mut truth, mask);
-        let target = Target { camera: &self.cameras[view], truth: &truth, mask, background: self.background };
+        let target = Target { camera: &self.cameras[index], truth: &truth, mask, background: self.background };
         let report = self.workspace.step(&self.scene, &target, &self.config.loss);
-
-        let settings = self.config.densification;
-        let until = self.config.iteration_at(settings.until);
+        if let Some(cause) = watchdog::inspect(&self.scene, &truth, self.background, &self.workspace, &report) {
+            let dropped = DroppedStep { iteration: self.iteration, view: name.clone(), cause };
+            return if self.watchdog.dropped() {
+                Err(TrainError::Diverged { n: self.watchdog.n_in_a_row, last: dropped })
+            } else {
+                Ok(Outcome { report, dropped: Some(dropped) })
+            };
+        }
+        self.watchdog.passed();
         // The published loop leaves the parameters of its last iteration as they are.
         if self.iteration < self.config.iterations {
             let progress = f64::from(self.iteration) / f64::from(self.config.iterations);
             self.optimiser.apply(&mut self.scene, &self.workspace, &self.config.rates, progress, self.capture.extent);
         }
-        if self.iteration < until && self.iteration > self.config.iteration_at(settings.statistics_from) {
-            self.statistics.add(&self.workspace, self.config.shape.n_offsets);
-            let due = self.iteration.is_multiple_of(settings.interval);
-            if due && self.iteration > self.config.iteration_at(settings.from) {
-                let Self { scene, optimiser, statistics, rng, .. } = self;
-                densify::grow(scene, optimiser, statistics, &settings, rng);
-                densify::prune(scene, optimiser, statistics, &settings);
-            }
+        self.densify();
+        Ok(Outcome { report, dropped: None })
+    }
+
+    /// Statistics of the step in the workspace, and growth and pruning when they are due.
+    fn densify(&mut self) {
+        let settings = self.config.densification;
+        let until = self.config.iteration_at(settings.until);
+        if self.iteration >= until || self.iteration <= self.config.iteration_at(settings.statistics_from) {
+            return;
         }
-        report
+        self.statistics.add(&self.workspace, self.config.shape.n_offsets);
+        let due = self.iteration.is_multiple_of(settings.interval);
+        if due && self.iteration > self.config.iteration_at(settings.from) {
+            let Self { scene, optimiser, statistics, rng, .. } = self;
+            densify::grow(scene, optimiser, statistics, &settings, rng);
+            densify::prune(scene, optimiser, statistics, &settings);
+        }
     }
 
     /// The current scene's image of a view, 8 bit.

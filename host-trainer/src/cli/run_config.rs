@@ -1,0 +1,130 @@
+//! The configuration of a run as TOML: written into its folder, read by `--config`.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use pocketsplat::bundle::QuantisationSteps;
+use pocketsplat::dataset::Background;
+use pocketsplat::train::TrainConfig;
+use serde::{Deserialize, Serialize};
+use toml::{Table, Value};
+
+use super::capture::CaptureOptions;
+
+/// The kinds of scene that can be trained.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Backbone {
+    /// Scaffold-GS: anchors, three heads, static entropy tables.
+    Scaffold,
+}
+
+/// Everything a run was asked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct RunConfig {
+    /// Folder of the capture.
+    pub(crate) dataset: PathBuf,
+    /// The bundle to write.
+    pub(crate) output: PathBuf,
+    pub(crate) backbone: Backbone,
+    /// Iterations from one checkpoint to the next; by time without.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) checkpoint_every: Option<u32>,
+    pub(crate) keep_checkpoints: bool,
+    pub(crate) capture: CaptureOptions,
+    pub(crate) train: TrainConfig,
+    pub(crate) quantisation: QuantisationSteps,
+}
+
+impl Default for RunConfig {
+    fn default() -> Self {
+        Self {
+            dataset: PathBuf::new(),
+            output: PathBuf::new(),
+            backbone: Backbone::Scaffold,
+            checkpoint_every: None,
+            keep_checkpoints: false,
+            capture: CaptureOptions { background: Some(Background::Black), ..CaptureOptions::default() },
+            train: TrainConfig::default(),
+            quantisation: QuantisationSteps::default(),
+        }
+    }
+}
+
+impl RunConfig {
+    /// Reads a configuration; keys that are missing have their defaults.
+    pub(crate) fn read(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path);
+        let text = text.with_context(|| format!("could not read the configuration {}", path.display()))?;
+        Self::parse(&text).with_context(|| format!("the configuration {} can not be used", path.display()))
+    }
+
+    /// As [`Self::read`], from its text.
+    pub(crate) fn parse(text: &str) -> Result<Self> {
+        let given: Table = text.parse()?;
+        let mut all = Table::try_from(Self::default())?;
+        merge(&mut all, &given);
+        let config: Self = all.try_into()?;
+        // What is not written again was not understood.
+        refuse_unknown(&given, &Table::try_from(&config)?, "")?;
+        Ok(config)
+    }
+
+    /// As TOML that [`Self::parse`] reads back.
+    pub(crate) fn to_toml(&self) -> Result<String> {
+        Ok(toml::to_string(self)?)
+    }
+
+    /// The first key at which two configurations differ in what decides the result, with both values.
+    ///
+    /// Where the capture lies, where the bundle goes and when checkpoints are written do not.
+    pub(crate) fn difference(&self, other: &Self) -> Result<Option<String>> {
+        let deciding = |config: &Self| {
+            let Self { backbone, capture, train, quantisation, .. } = config.clone();
+            Table::try_from(Self { backbone, capture, train, quantisation, ..Self::default() })
+        };
+        Ok(first_difference(&deciding(self)?, &deciding(other)?, ""))
+    }
+}
+
+/// Replaces values of `into` by those of `from`, table by table.
+fn merge(into: &mut Table, from: &Table) {
+    for (key, value) in from {
+        match (into.get_mut(key), value) {
+            (Some(Value::Table(into)), Value::Table(from)) => merge(into, from),
+            // A rate of `1` means 1.0.
+            (Some(Value::Float(into)), Value::Integer(from)) => *into = *from as f64,
+            _ => {
+                into.insert(key.clone(), value.clone());
+            }
+        }
+    }
+}
+
+fn refuse_unknown(given: &Table, known: &Table, at: &str) -> Result<()> {
+    for (key, value) in given {
+        match (known.get(key), value) {
+            (Some(Value::Table(known)), Value::Table(given)) => refuse_unknown(given, known, &format!("{at}{key}."))?,
+            (Some(_), _) => {}
+            (None, _) => {
+                let keys: Vec<&str> = known.keys().map(String::as_str).collect();
+                bail!("unknown key `{at}{key}`; known here: {}", keys.join(", "));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn first_difference(a: &Table, b: &Table, at: &str) -> Option<String> {
+    let keys = a.keys().chain(b.keys().filter(|key| !a.contains_key(*key)));
+    keys.filter(|key| a.get(*key) != b.get(*key)).find_map(|key| match (a.get(key), b.get(key)) {
+        (Some(Value::Table(a)), Some(Value::Table(b))) => first_difference(a, b, &format!("{at}{key}.")),
+        (a, b) => {
+            let text = |value: Option<&Value>| value.map_or("nothing".to_owned(), ToString::to_string);
+            Some(format!("`{at}{key}` is {} and {}", text(a), text(b)))
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,61 @@
+use super::*;
+
+#[test]
+fn a_written_configuration_reads_back_to_the_last_bit() {
+    let mut config = RunConfig {
+        dataset: "/captures/desk lamp".into(),
+        output: "out/lamp.psb".into(),
+        checkpoint_every: Some(700),
+        keep_checkpoints: true,
+        capture: CaptureOptions { max_resolution: Some(400), background: Some(Background::White) },
+        ..RunConfig::default()
+    };
+    for i in 1..200u32 {
+        let x = 1.0 / f64::from(i).powf(1.7);
+        config.train.voxel_size = x;
+        config.train.rates.offset.end = x * 1e-9;
+        config.quantisation.feature = (x * 0.1) as f32;
+        config.train.seed = u64::from(i).pow(7) % i64::MAX as u64;
+        assert_eq!(RunConfig::parse(&config.to_toml().unwrap()).unwrap(), config, "{i}");
+    }
+    assert_eq!(RunConfig::parse("").unwrap(), RunConfig::default());
+}
+
+#[test]
+fn a_few_keys_are_enough() {
+    let config = RunConfig::parse("[train]\niterations = 7\n[train.rates.offset]\nstart = 1\n").unwrap();
+    assert_eq!(config.train.iterations, 7);
+    assert_eq!(config.train.rates.offset.start, 1.0);
+    assert_eq!(config.train.rates.offset.end, TrainConfig::default().rates.offset.end);
+    assert_eq!(
+        RunConfig::parse("[capture]\nbackground = \"white\"").unwrap().capture.background,
+        Some(Background::White)
+    );
+}
+
+#[test]
+fn what_is_not_understood_is_refused_by_its_name() {
+    for (text, part) in [
+        ("[train.rates]\nfeatures = 1", "unknown key `train.rates.features`; known here: "),
+        ("iterations = 3", "unknown key `iterations`; known here: "),
+        ("[train]\niterations = \"many\"", "iterations"),
+        ("[train]\niterations = -1", "iterations"),
+        ("[capture]\nbackground = \"grey\"", "`black` or `white`"),
+        ("train = 3", "train"),
+        ("[train\n", "line 1"),
+    ] {
+        let message = format!("{:#}", RunConfig::parse(text).unwrap_err());
+        assert!(message.contains(part), "{text}: {message}");
+    }
+}
+
+#[test]
+fn only_what_decides_the_result_counts_as_a_difference() {
+    let a = RunConfig::default();
+    let mut b = RunConfig { output: "elsewhere".into(), checkpoint_every: Some(3), ..a.clone() };
+    assert_eq!(a.difference(&b).unwrap(), None);
+    b.train.shape.n_offsets = 5;
+    assert_eq!(a.difference(&b).unwrap().unwrap(), "`train.shape.n_offsets` is 10 and 5");
+    b = RunConfig { capture: CaptureOptions { max_resolution: Some(200), ..a.capture.clone() }, ..a.clone() };
+    assert_eq!(a.difference(&b).unwrap().unwrap(), "`capture.max_resolution` is nothing and 200");
+}

@@ -1,0 +1,154 @@
+//! The options of `pocketsplat train`, each of which may also stand in a configuration.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use clap::ArgAction;
+use pocketsplat::bundle::QuantisationSteps;
+use pocketsplat::train::TrainConfig;
+
+use super::capture::CaptureOptions;
+use super::run_config::{Backbone, RunConfig};
+
+/// Train a scene from a capture and write it as a bundle.
+///
+/// Works in a run folder beside the bundle, from which an interrupted run goes on with --resume and ends in the same
+/// bytes.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Folder of the capture.
+    #[arg(required_unless_present_any = ["config", "resume"])]
+    dataset: Option<PathBuf>,
+    #[command(flatten)]
+    capture: CaptureOptions,
+    /// The bundle to write.
+    #[arg(short, long, value_name = "OUT.psb", required_unless_present_any = ["config", "resume"])]
+    output: Option<PathBuf>,
+    /// Folder for configuration, progress and checkpoints. [default: OUT.run]
+    #[arg(long, value_name = "DIR", conflicts_with = "resume")]
+    run: Option<PathBuf>,
+    /// Read the configuration, as a run folder has it; options given beside it count more.
+    #[arg(long, value_name = "FILE.toml", conflicts_with = "resume")]
+    config: Option<PathBuf>,
+    /// Go on with the run in this folder. A capture that has moved since is given as DATASET.
+    #[arg(long, value_name = "OUT.run")]
+    resume: Option<PathBuf>,
+    /// Start anew where an unfinished run lies.
+    #[arg(short = 'w', long, conflicts_with = "resume")]
+    overwrite: bool,
+    /// Iterations from one checkpoint to the next; 0: only on interruption. [default: by time, every minute]
+    #[arg(long, value_name = "N")]
+    checkpoint_every: Option<u32>,
+    /// Keep the last two checkpoints of the finished run.
+    #[arg(long)]
+    keep_checkpoints: bool,
+    /// Kind of scene. [default: scaffold]
+    #[arg(long, value_enum)]
+    backbone: Option<Backbone>,
+    #[arg(long, help = with_default("Training steps; schedules scale with them", TrainConfig::default().iterations))]
+    iterations: Option<u32>,
+    #[arg(long, help = with_default("Everything random follows from it: same seed, same machine, same bundle",
+        TrainConfig::default().seed))]
+    seed: Option<u64>,
+    #[arg(long, value_name = "F", help = with_default("Feature width of an anchor, and hidden width of the heads",
+        TrainConfig::default().shape.feature_dim))]
+    feature_dim: Option<usize>,
+    #[arg(long, value_name = "K", help = with_default("Gaussians of an anchor", TrainConfig::default().shape.n_offsets))]
+    offsets: Option<usize>,
+    /// Do not show the heads the direction of view.
+    #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true",
+        action = ArgAction::Set)]
+    no_view_direction: Option<bool>,
+    /// Show the heads the distance of view.
+    #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true",
+        action = ArgAction::Set)]
+    view_distance: Option<bool>,
+    /// Compensate opacities for the 0.3 px² dilation, for drawing at other resolutions than the training one.
+    #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true",
+        action = ArgAction::Set)]
+    dilation_compensation: Option<bool>,
+    #[arg(long, help = with_default("Edge of a lattice cell, normalised units (the cameras span about 5)",
+        TrainConfig::default().voxel_size))]
+    voxel_size: Option<f64>,
+    #[arg(long, help = with_default("Quantisation step of the anchor features", QuantisationSteps::default().feature))]
+    feature_step: Option<f32>,
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+fn with_default(help: &str, default: impl std::fmt::Display) -> String {
+    format!("{help} [default: {default}]")
+}
+
+impl Args {
+    /// The run folder to go on in, if any.
+    pub(crate) fn resume(&self) -> Option<&Path> {
+        self.resume.as_deref()
+    }
+
+    /// Whether an unfinished run may be replaced.
+    pub(crate) fn overwrite(&self) -> bool {
+        self.overwrite
+    }
+
+    /// Whether the result is printed as JSON.
+    pub(crate) fn json(&self) -> bool {
+        self.json
+    }
+
+    /// The configuration of a new run: defaults, then `--config`, then what else the command line says.
+    pub(crate) fn resolved(&self) -> Result<RunConfig> {
+        let base = match &self.config {
+            Some(path) => RunConfig::read(path)?,
+            None => RunConfig::default(),
+        };
+        let config = self.applied_to(base)?;
+        for (path, name, option) in [(&config.dataset, "dataset", "DATASET"), (&config.output, "output", "--output")] {
+            if path.as_os_str().is_empty() {
+                bail!("the configuration names no `{name}`; give it there or as {option}");
+            }
+        }
+        config.train.validate().map_err(anyhow::Error::msg)?;
+        Ok(config)
+    }
+
+    /// `config` with everything replaced that the command line says.
+    pub(crate) fn applied_to(&self, mut config: RunConfig) -> Result<RunConfig> {
+        fn set<T: Clone>(into: &mut T, given: &Option<T>) {
+            if let Some(value) = given {
+                *into = value.clone();
+            }
+        }
+        // Absolute, so that the run can go on from any folder.
+        for (into, given) in [(&mut config.dataset, &self.dataset), (&mut config.output, &self.output)] {
+            if let Some(path) = given {
+                *into = std::path::absolute(path).with_context(|| format!("{} is no path", path.display()))?;
+            }
+        }
+        config.capture = self.capture.or(&config.capture);
+        config.checkpoint_every = self.checkpoint_every.or(config.checkpoint_every);
+        config.keep_checkpoints |= self.keep_checkpoints;
+        set(&mut config.backbone, &self.backbone);
+        set(&mut config.quantisation.feature, &self.feature_step);
+        let train = &mut config.train;
+        set(&mut train.iterations, &self.iterations);
+        set(&mut train.seed, &self.seed);
+        set(&mut train.voxel_size, &self.voxel_size);
+        set(&mut train.shape.feature_dim, &self.feature_dim);
+        set(&mut train.shape.n_offsets, &self.offsets);
+        set(&mut train.shape.view_direction, &self.no_view_direction.map(|no| !no));
+        set(&mut train.shape.view_distance, &self.view_distance);
+        set(&mut train.shape.dilation_compensation, &self.dilation_compensation);
+        Ok(config)
+    }
+
+    /// Where a new run works.
+    pub(crate) fn run_folder(&self, config: &RunConfig) -> Result<PathBuf> {
+        let folder = self.run.clone().unwrap_or_else(|| config.output.with_extension("run"));
+        if std::path::absolute(&folder).ok() == std::path::absolute(&config.output).ok() {
+            bail!("{} can not be both bundle and run folder; choose another folder with --run", folder.display());
+        }
+        Ok(folder)
+    }
+}

@@ -1,0 +1,178 @@
+//! The folder of a run: what it was asked for, how it went, and how to go on with it.
+//!
+//! | file | what |
+//! |---|---|
+//! | `config.toml` | the resolved configuration |
+//! | `progress.csv` | loss and PSNR over the run, see [`ProgressLog`] |
+//! | `iteration-00001500.checkpoint` | the state of the run, see [`super::checkpoint`]; the last two are kept |
+//! | `result.json` | what the finished run reports; with it, the run is over |
+//! | `lock` | locked by the process that works in the folder; the system frees it when that process ends, however |
+
+mod error;
+mod files;
+mod progress_log;
+mod store;
+
+#[cfg(test)]
+mod tests;
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+pub use error::RunError;
+pub use progress_log::ProgressLog;
+pub use store::Resumed;
+
+use super::{Observer, Trainer};
+
+const CONFIG: &str = "config.toml";
+const LOG: &str = "progress.csv";
+const RESULT: &str = "result.json";
+const LOCK: &str = "lock";
+
+/// Checkpoints every so many seconds are put off until they take at most this share of the time.
+const LARGEST_SHARE: f64 = 0.02;
+
+/// When checkpoints are written; the bits of the result do not depend on it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Interval {
+    /// After every so many iterations; 0 means only at the end and on interruption.
+    Iterations(u32),
+    /// After so many seconds, or later where writing would take more than 2 % of the time.
+    Seconds(f64),
+}
+
+/// How a run came to its end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// All iterations are done.
+    Finished,
+    /// It was asked to stop; a checkpoint is written.
+    Interrupted,
+}
+
+/// A run folder that this process works in, and no other.
+#[derive(Debug)]
+pub struct RunFolder {
+    path: PathBuf,
+    _lock: File,
+}
+
+impl RunFolder {
+    /// Takes the folder `path` for a new run and keeps its configuration there; makes the folder where there is none.
+    ///
+    /// What a finished run left there is replaced; an unfinished one only with `overwrite`.
+    ///
+    /// # Errors
+    /// [`RunError`] when another process works in the folder, it holds an unfinished run or something else, or it can
+    /// not be written.
+    pub fn start(path: &Path, config: &str, overwrite: bool) -> Result<Self, RunError> {
+        fs::create_dir_all(path).map_err(|source| RunError::io("make the folder", path, source))?;
+        let ours = |name: &Path| name == Path::new(LOCK) || name.extension().is_some_and(|e| e == files::PARTIAL);
+        let occupied = files::names(path)?.into_iter().any(|name| !ours(Path::new(&name)));
+        if occupied && !path.join(CONFIG).is_file() && !path.join(RESULT).is_file() {
+            return Err(RunError::Foreign { path: path.to_owned() });
+        }
+        let folder = Self::locked(path)?;
+        if !overwrite && !folder.is_finished() && !folder.checkpoints()?.is_empty() {
+            return Err(RunError::Unfinished { path: path.to_owned() });
+        }
+        folder.clear_checkpoints()?;
+        for name in [RESULT, LOG] {
+            files::remove(&path.join(name))?;
+        }
+        files::write_whole(&path.join(CONFIG), |out| out.write_all(config.as_bytes()))?;
+        Ok(folder)
+    }
+
+    /// Takes the folder of an unfinished run.
+    ///
+    /// # Errors
+    /// [`RunError`] when there is none, it is finished, or another process works in it.
+    pub fn reopen(path: &Path) -> Result<Self, RunError> {
+        if !path.join(CONFIG).is_file() {
+            return Err(RunError::NoRun { path: path.to_owned() });
+        }
+        let folder = Self::locked(path)?;
+        if folder.is_finished() {
+            return Err(RunError::Finished { path: path.to_owned() });
+        }
+        Ok(folder)
+    }
+
+    fn locked(path: &Path) -> Result<Self, RunError> {
+        let name = path.join(LOCK);
+        let open = File::options().read(true).write(true).create(true).truncate(false).open(&name);
+        let lock = open.map_err(|source| RunError::io("open", &name, source))?;
+        match lock.try_lock() {
+            Ok(()) => Ok(Self { path: path.to_owned(), _lock: lock }),
+            Err(fs::TryLockError::WouldBlock) => Err(RunError::InUse { path: path.to_owned() }),
+            Err(fs::TryLockError::Error(source)) => Err(RunError::io("lock", &name, source)),
+        }
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    fn is_finished(&self) -> bool {
+        self.path.join(RESULT).is_file()
+    }
+
+    /// The configuration the run began with.
+    ///
+    /// # Errors
+    /// [`RunError::Io`] when it can not be read.
+    pub fn config(&self) -> Result<String, RunError> {
+        let path = self.path.join(CONFIG);
+        fs::read_to_string(&path).map_err(|source| RunError::io("read", &path, source))
+    }
+
+    /// Trains to the end, or until `stop` is set, which is looked at after every iteration; writes checkpoints and the
+    /// log on the way.
+    ///
+    /// # Errors
+    /// [`RunError`] when something can not be written or the run diverges. The checkpoints so far stay.
+    pub fn train(
+        &mut self,
+        trainer: &mut Trainer<'_>,
+        observer: &mut impl Observer,
+        interval: Interval,
+        stop: &AtomicBool,
+    ) -> Result<Ending, RunError> {
+        let mut log = ProgressLog::open(&self.path.join(LOG), trainer.iteration, trainer.config().iterations)?;
+        let (mut saved_at, mut write_s) = (Instant::now(), 0.0);
+        let mut saved_iteration = None;
+        loop {
+            let asked = stop.load(Ordering::Relaxed);
+            let ends = asked || trainer.is_done();
+            let due = match interval {
+                Interval::Iterations(n) => n > 0 && trainer.iteration > 0 && trainer.iteration.is_multiple_of(n),
+                Interval::Seconds(s) => saved_at.elapsed().as_secs_f64() >= f64::max(s, write_s / LARGEST_SHARE),
+            };
+            if (ends || due) && saved_iteration != Some(trainer.iteration) {
+                let started = Instant::now();
+                self.save(trainer)?;
+                write_s = started.elapsed().as_secs_f64();
+                (saved_at, saved_iteration) = (Instant::now(), Some(trainer.iteration));
+            }
+            if ends {
+                return Ok(if trainer.is_done() { Ending::Finished } else { Ending::Interrupted });
+            }
+            let outcome = trainer.observed_advance(observer)?;
+            log.add(trainer, &outcome)?;
+        }
+    }
+
+    /// Ends the run: keeps `result`, and removes the checkpoints unless they are to be kept.
+    ///
+    /// # Errors
+    /// [`RunError::Io`].
+    pub fn finish(self, result: &str, keep_checkpoints: bool) -> Result<(), RunError> {
+        files::write_whole(&self.path.join(RESULT), |out| out.write_all(result.as_bytes()))?;
+        if keep_checkpoints { Ok(()) } else { self.clear_checkpoints() }
+    }
+}

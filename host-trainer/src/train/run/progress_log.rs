@@ -1,0 +1,81 @@
+//! How a run went, as a table for plots.
+
+use std::fs::{self, File};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use super::{RunError, files};
+use crate::train::{Outcome, Trainer};
+
+const HEADER: &str = "iteration,loss,psnr_db,anchors,seconds,dropped";
+
+/// Rows of a whole run, about.
+const ROWS: u32 = 500;
+
+/// A CSV file with one row every five hundredth of a run: iterations done, means of loss and PSNR (dB) since the row
+/// before, anchors, seconds spent in iterations, steps dropped so far.
+#[derive(Debug)]
+pub struct ProgressLog {
+    path: PathBuf,
+    file: File,
+    every: u32,
+    loss: f64,
+    psnr_db: f64,
+    n: u32,
+}
+
+impl ProgressLog {
+    /// Opens the log of a run that has done `done` of `iterations`, and drops rows of later ones: they were written
+    /// after the checkpoint from which the run goes on, and will be written again.
+    ///
+    /// # Errors
+    /// [`RunError`] when it can not be read or written.
+    pub fn open(path: &Path, done: u32, iterations: u32) -> Result<Self, RunError> {
+        let older = match fs::read_to_string(path) {
+            Ok(text) => text,
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => String::new(),
+            Err(source) => return Err(RunError::io("read", path, source)),
+        };
+        let valid = |row: &&str| row.split(',').next().and_then(|n| n.parse().ok()).is_some_and(|n: u32| n <= done);
+        files::write_whole(path, |out| {
+            writeln!(out, "{HEADER}")?;
+            // A last row without its end was cut off.
+            older
+                .split_inclusive('\n')
+                .filter(|row| row.ends_with('\n'))
+                .filter(valid)
+                .try_for_each(|row| write!(out, "{row}"))
+        })?;
+        let file = File::options().append(true).open(path).map_err(|source| RunError::io("open", path, source))?;
+        let every = (iterations / ROWS).max(1);
+        Ok(Self { path: path.to_owned(), file, every, loss: 0.0, psnr_db: 0.0, n: 0 })
+    }
+
+    /// Adds an iteration.
+    ///
+    /// # Errors
+    /// [`RunError::Write`] when a row was due and could not be written.
+    pub fn add(&mut self, trainer: &Trainer<'_>, outcome: &Outcome) -> Result<(), RunError> {
+        if outcome.dropped.is_none() {
+            self.loss += f64::from(outcome.report.loss);
+            self.psnr_db -= 10.0 * outcome.report.squared_error.log10();
+            self.n += 1;
+        }
+        if !trainer.iteration.is_multiple_of(self.every) && !trainer.is_done() {
+            return Ok(());
+        }
+        let n = f64::from(self.n);
+        let row = format!(
+            "{},{:.6},{:.3},{},{:.3},{}\n",
+            trainer.iteration,
+            self.loss / n,
+            self.psnr_db / n,
+            trainer.scene.anchors.len(),
+            trainer.seconds,
+            trainer.n_dropped()
+        );
+        (self.loss, self.psnr_db, self.n) = (0.0, 0.0, 0);
+        // In one piece, so that rows are not cut by a crash of the process.
+        self.file.write_all(row.as_bytes()).map_err(|source| RunError::Write { path: self.path.clone(), source })
+    }
+}

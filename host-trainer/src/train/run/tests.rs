@@ -1,0 +1,147 @@
+use std::fs;
+use std::sync::atomic::AtomicBool;
+
+use super::*;
+use crate::train::step::StepReport;
+use crate::train::test_capture::{tiny_capture, tiny_config};
+
+const ITERATIONS: u32 = 40;
+
+/// Asks the run to stop after some iteration.
+struct StopAfter<'s>(u32, &'s AtomicBool);
+
+impl Observer for StopAfter<'_> {
+    fn step(&mut self, iteration: u32, _: &StepReport<f32>, _: &crate::scene::Scene<f32>) {
+        if iteration == self.0 {
+            self.1.store(true, Ordering::Relaxed);
+        }
+    }
+}
+
+/// Trains until after iteration `until`, from wherever the folder stands.
+fn train(folder: &mut RunFolder, interval: Interval, until: u32) -> (Ending, crate::scene::Scene<f32>, Vec<String>) {
+    let capture = tiny_capture();
+    let resumed = folder.resume(&capture).unwrap();
+    let (mut trainer, passed_over) = match resumed {
+        Some(resumed) => (resumed.restored.trainer, resumed.passed_over),
+        None => (Trainer::new(&capture, tiny_config(ITERATIONS)).unwrap(), Vec::new()),
+    };
+    let stop = AtomicBool::new(false);
+    let ending = folder.train(&mut trainer, &mut StopAfter(until, &stop), interval, &stop).unwrap();
+    (ending, trainer.scene, passed_over)
+}
+
+fn names(folder: &RunFolder) -> Vec<String> {
+    let mut names: Vec<_> =
+        files::names(folder.path()).unwrap().into_iter().map(|n| n.into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn a_folder_takes_a_run_through_interruption_and_damage_to_the_same_end() {
+    let home = tempfile::tempdir().unwrap();
+    let mut whole = RunFolder::start(&home.path().join("whole.run"), "a = 1", false).unwrap();
+    let (ending, scene, _) = train(&mut whole, Interval::Iterations(7), u32::MAX);
+    assert_eq!(ending, Ending::Finished);
+    assert_eq!(
+        names(&whole),
+        ["config.toml", "iteration-00000035.checkpoint", "iteration-00000040.checkpoint", "lock", "progress.csv"]
+    );
+    let log = fs::read_to_string(whole.path().join(LOG)).unwrap();
+
+    let path = home.path().join("broken.run");
+    let mut folder = RunFolder::start(&path, "a = 1", false).unwrap();
+    assert_eq!(train(&mut folder, Interval::Iterations(9), 23).0, Ending::Interrupted);
+    drop(folder);
+    // The newest checkpoint turns out damaged.
+    let newest = path.join("iteration-00000023.checkpoint");
+    let mut bytes = fs::read(&newest).unwrap();
+    bytes[1000] ^= 1;
+    fs::write(&newest, bytes).unwrap();
+    fs::write(path.join("iteration-00000030.checkpoint.partial"), "half").unwrap();
+    let mut folder = RunFolder::reopen(&path).unwrap();
+    assert_eq!(folder.config().unwrap(), "a = 1");
+    let (ending, resumed_scene, passed_over) = train(&mut folder, Interval::Iterations(9), u32::MAX);
+    assert_eq!(ending, Ending::Finished);
+    assert!(passed_over.len() == 1 && passed_over[0].contains("iteration-00000023.checkpoint: its content"));
+    assert!(resumed_scene == scene, "the same bits");
+    let without_seconds = |log: &str| {
+        let row = |row: &str| row.split(',').enumerate().filter(|(i, _)| *i != 4).map(|(_, v)| v.to_owned()).collect();
+        log.lines().map(row).collect::<Vec<Vec<String>>>()
+    };
+    let resumed_log = fs::read_to_string(path.join(LOG)).unwrap();
+    assert_eq!(without_seconds(&resumed_log), without_seconds(&log));
+    assert_eq!(log.lines().count(), 1 + ITERATIONS as usize);
+
+    folder.finish("{}", false).unwrap();
+    let error = RunFolder::reopen(&path).unwrap_err();
+    assert!(matches!(error, RunError::Finished { .. }), "{error}");
+    let again = RunFolder::start(&path, "a = 2", false).unwrap();
+    assert_eq!(names(&again), ["config.toml", "lock"]);
+}
+
+#[test]
+fn checkpoints_by_time_wait_for_their_time() {
+    let home = tempfile::tempdir().unwrap();
+    for (seconds, at_least) in [(0.0, 2), (1e9, 1)] {
+        let mut folder = RunFolder::start(home.path(), "", true).unwrap();
+        train(&mut folder, Interval::Seconds(seconds), u32::MAX);
+        assert_eq!(folder.checkpoints().unwrap().len(), at_least, "every {seconds} s");
+    }
+}
+
+#[test]
+fn an_unfinished_run_is_not_overwritten_by_accident() {
+    let home = tempfile::tempdir().unwrap();
+    let path = home.path().join("a.run");
+    let mut folder = RunFolder::start(&path, "", false).unwrap();
+    train(&mut folder, Interval::Iterations(0), 3);
+    let error = RunFolder::start(&path, "", false).unwrap_err();
+    assert!(matches!(error, RunError::InUse { .. }), "{error}");
+    assert!(matches!(RunFolder::reopen(&path), Err(RunError::InUse { .. })));
+    drop(folder);
+    let error = RunFolder::start(&path, "", false).unwrap_err();
+    assert!(matches!(error, RunError::Unfinished { .. }), "{error}");
+    assert!(error.to_string().contains("--resume") && error.to_string().contains("--overwrite"), "{error}");
+    RunFolder::start(&path, "", true).unwrap();
+}
+
+#[test]
+fn other_folders_are_left_alone() {
+    let home = tempfile::tempdir().unwrap();
+    let error = RunFolder::reopen(home.path()).unwrap_err();
+    assert!(matches!(error, RunError::NoRun { .. }), "{error}");
+    fs::write(home.path().join("photo.png"), "").unwrap();
+    for overwrite in [false, true] {
+        let error = RunFolder::start(home.path(), "", overwrite).unwrap_err();
+        assert!(matches!(error, RunError::Foreign { .. }), "{error}");
+    }
+    assert_eq!(files::names(home.path()).unwrap(), ["photo.png"]);
+}
+
+#[test]
+fn when_no_checkpoint_is_sound_all_are_named() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = RunFolder::start(home.path(), "", false).unwrap();
+    assert!(folder.resume(&tiny_capture()).unwrap().is_none());
+    for iteration in [3, 4] {
+        fs::write(home.path().join(format!("iteration-{iteration:08}.checkpoint")), "nothing").unwrap();
+    }
+    let message = folder.resume(&tiny_capture()).unwrap_err().to_string();
+    assert!(message.contains("iteration-00000003") && message.contains("iteration-00000004"), "{message}");
+}
+
+#[test]
+fn a_write_that_fails_leaves_the_older_file() {
+    let home = tempfile::tempdir().unwrap();
+    let path = home.path().join("file");
+    fs::write(&path, "older").unwrap();
+    let error = files::write_whole(&path, |out| {
+        out.write_all(&vec![0; 100_000])?;
+        Err(std::io::ErrorKind::StorageFull.into())
+    });
+    assert!(matches!(error, Err(RunError::Write { .. })), "{error:?}");
+    assert_eq!(fs::read(&path).unwrap(), b"older");
+    assert_eq!(files::names(home.path()).unwrap(), ["file"]);
+}

@@ -35,7 +35,11 @@ impl BundleFile {
             bail!("{} was trained on {trained}, not on {asked}; leave --background out", self.path.display());
         }
         let [width, height] = header.training_px;
-        let trained_with = CaptureOptions { max_resolution: Some(u32::from(width.max(height))), background: known };
+        let trained_with = CaptureOptions {
+            max_resolution: Some(u32::from(width.max(height))),
+            background: known,
+            ..CaptureOptions::default()
+        };
         Ok(CaptureArgs { dataset: args.dataset.clone(), options: args.options.or(&trained_with) })
     }
 

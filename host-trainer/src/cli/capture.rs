@@ -4,13 +4,14 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 use clap::ValueEnum;
-use pocketsplat::dataset::{self, Background, Capture, LoadOptions, View};
+use pocketsplat::dataset::{self, Background, Capture, LoadOptions, Severity, View};
 use serde::{Deserialize, Serialize};
 
 /// Where photographs come from and how they are prepared.
 #[derive(clap::Args, Clone, Debug)]
 pub(crate) struct CaptureArgs {
-    /// Folder of the capture: transforms_train.json (Blender, Synthetic-NeRF).
+    /// Folder of the capture: transforms_train.json (Blender, Synthetic-NeRF), sparse/0 (COLMAP) or transforms.json
+    /// (nerfstudio, instant-ngp).
     pub(crate) dataset: PathBuf,
     #[command(flatten)]
     pub(crate) options: CaptureOptions,
@@ -27,6 +28,14 @@ pub(crate) struct CaptureOptions {
     #[arg(long)]
     #[serde(default, with = "background_name", skip_serializing_if = "Option::is_none")]
     pub(crate) background: Option<Background>,
+    /// Folder of images to read, for captures that hold several (images, images_2, …). [default: the only one, or images]
+    #[arg(long, value_name = "NAME")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) images: Option<String>,
+    /// Hold out every N-th view by name where the capture has no split of its own; 0 holds out none. [default: 8]
+    #[arg(long, value_name = "N")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) test_every: Option<u32>,
 }
 
 impl CaptureOptions {
@@ -35,6 +44,8 @@ impl CaptureOptions {
         Self {
             max_resolution: self.max_resolution.or(other.max_resolution),
             background: self.background.or(other.background),
+            images: self.images.clone().or_else(|| other.images.clone()),
+            test_every: self.test_every.or(other.test_every),
         }
     }
 }
@@ -54,14 +65,25 @@ mod background_name {
 }
 
 impl CaptureArgs {
-    /// Loads the capture and says on stderr what was found.
-    pub(crate) fn load(&self, seed: u64) -> Result<Capture> {
-        let options = LoadOptions {
+    fn load_options(&self, seed: u64) -> LoadOptions {
+        let default = LoadOptions::default();
+        LoadOptions {
             max_resolution: self.options.max_resolution,
             background: self.options.background.unwrap_or(Background::Black),
             seed,
-            ..LoadOptions::default()
-        };
+            images: self.options.images.clone(),
+            test_every: self.options.test_every.unwrap_or(default.test_every),
+            ..default
+        }
+    }
+
+    /// Loads the capture and says on stderr what was found.
+    pub(crate) fn load(&self, seed: u64) -> Result<Capture> {
+        let options = self.load_options(seed);
+        let findings = dataset::diagnose_cheaply(&self.dataset, &options);
+        if findings.count(Severity::Warning) > 0 {
+            eprintln!("`pocketsplat doctor {}` has something to say", self.dataset.display());
+        }
         let (capture, report) = dataset::load(&self.dataset, &options)
             .with_context(|| format!("could not load the capture {}", self.dataset.display()))?;
         eprintln!("{report}");

@@ -6,7 +6,7 @@ use std::time::Instant;
 use anyhow::Result;
 use pocketsplat::camera::Camera;
 use pocketsplat::dataset::Image;
-use pocketsplat::metrics::{psnr_db, ssim};
+use pocketsplat::metrics::{psnr_db, psnr_db_masked, ssim_masked};
 use pocketsplat::render::decoder::core_image;
 use pocketsplat::render::reference::{ReferenceScene, to_image};
 use pocketsplat_core::Bundle;
@@ -138,8 +138,8 @@ pub(crate) fn evaluate(
                 None => f64::INFINITY,
             };
             Ok(Row {
-                psnr_db: psnr_db(&frame.image, &view.image),
-                ssim: ssim(&frame.image, &view.image),
+                psnr_db: psnr_db_masked(&frame.image, &view.image, view.mask.as_ref()),
+                ssim: ssim_masked(&frame.image, &view.image, view.mask.as_ref()),
                 psnr_to_reference_db: to_reference,
                 frame,
             })

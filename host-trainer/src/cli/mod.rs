@@ -3,6 +3,7 @@
 mod bundle;
 mod capture;
 mod demo;
+mod doctor;
 mod eval;
 mod inspect;
 mod output;
@@ -37,6 +38,7 @@ enum Command {
     Inspect(inspect::Args),
     Synth(synth::Args),
     Demo(demo::Args),
+    Doctor(doctor::Args),
 }
 
 /// Parses the command line and runs the command.
@@ -52,6 +54,7 @@ pub(crate) fn run() -> Result<ExitCode> {
         Command::Render(args) => render::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Synth(args) => synth::run(&args),
+        Command::Doctor(args) => doctor::run(&args),
         Command::Demo(args) => demo::run(&args),
     }
     .map(|()| ExitCode::SUCCESS)

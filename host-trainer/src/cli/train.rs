@@ -10,6 +10,8 @@ use pocketsplat::bundle::{self, BundleInfo, QuantisationSteps};
 use pocketsplat::dataset::{Background, Capture};
 use pocketsplat::scene::Scene;
 use pocketsplat::train::run::{Ending, Interval, RunFolder};
+use pocketsplat::train::step::Workspace;
+use pocketsplat::train::undrawn::zero_undrawn_offsets;
 use pocketsplat::train::{TrainConfig, Trainer};
 use serde::Serialize;
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -32,6 +34,7 @@ pub(crate) struct TrainResult {
     pub(crate) bundle: PathBuf,
     pub(crate) bundle_bytes: usize,
     pub(crate) n_anchors: usize,
+    pub(crate) undrawn_offsets: usize,
     pub(crate) bytes_per_anchor: f64,
     pub(crate) iterations: u32,
     pub(crate) dropped_steps: u32,
@@ -62,6 +65,7 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     };
     let source = CaptureArgs { dataset: config.dataset.clone(), options: config.capture.clone() };
     let capture = source.load(config.train.seed)?;
+    eprintln!("voxel size {:.5}, normalised units", config.train.voxel_size_for(&capture));
     train_in(folder, &config, &capture, args)
 }
 
@@ -155,13 +159,16 @@ fn write_bundle(
     steps: &QuantisationSteps,
     output: &Path,
 ) -> Result<TrainResult> {
-    let bytes = encode(&trainer.scene, capture, background, steps)?;
+    let mut scene = trainer.scene.clone();
+    let n_zeroed = zero_undrawn_offsets(&mut scene, &mut Workspace::new(&trainer.scene.shape), trainer.cameras());
+    let bytes = encode(&scene, capture, background, steps)?;
     output::write_whole(output, &bytes)?;
     let n_anchors = trainer.scene.anchors.len();
     Ok(TrainResult {
         bundle: output.to_owned(),
         bundle_bytes: bytes.len(),
         n_anchors,
+        undrawn_offsets: n_zeroed,
         bytes_per_anchor: bytes.len() as f64 / n_anchors as f64,
         iterations: trainer.iteration,
         dropped_steps: trainer.n_dropped(),

@@ -67,9 +67,12 @@ pub(crate) struct Args {
     #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true",
         action = ArgAction::Set)]
     dilation_compensation: Option<bool>,
-    #[arg(long, help = with_default("Edge of a lattice cell, normalised units (the cameras span about 5)",
-        TrainConfig::default().voxel_size))]
+    /// Edge of a lattice cell, normalised units (the cameras span about 5). [default: from the points' spacing]
+    #[arg(long)]
     voxel_size: Option<f64>,
+    /// Grow no further than this many anchors; the candidates with the largest gradients come first. [default: no limit]
+    #[arg(long, value_name = "N")]
+    max_anchors: Option<usize>,
     #[arg(long, help = with_default("Quantisation step of the anchor features", QuantisationSteps::default().feature))]
     feature_step: Option<f32>,
     /// Print the result as JSON.
@@ -134,7 +137,8 @@ impl Args {
         let train = &mut config.train;
         set(&mut train.iterations, &self.iterations);
         set(&mut train.seed, &self.seed);
-        set(&mut train.voxel_size, &self.voxel_size);
+        train.voxel_size = self.voxel_size.or(train.voxel_size);
+        train.densification.max_anchors = self.max_anchors.or(train.densification.max_anchors);
         set(&mut train.shape.feature_dim, &self.feature_dim);
         set(&mut train.shape.n_offsets, &self.offsets);
         set(&mut train.shape.view_direction, &self.no_view_direction.map(|no| !no));

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::dataset::{Capture, PointsOrigin};
 use crate::scene::ModelShape;
 
 /// A geometric path of a learning rate over the run: from `start` to `end`; equal values make it constant.
@@ -85,11 +86,17 @@ pub struct Densification {
     /// Mean screen gradient, half-image units, above which an offset asks for a new anchor at the coarsest level.
     pub gradient_threshold: f64,
     /// Voxel edge of the coarsest level, lattice cells; levels follow at a quarter each while at least one cell.
-    pub coarsest_cells: u32,
+    /// Without it what the method publishes: 4 where training starts from random points, 16 where it starts from a
+    /// capture's own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub coarsest_cells: Option<u32>,
     /// Levels at most.
     pub levels: u32,
     /// Anchors whose mean opacity sum is below are pruned.
     pub min_opacity: f64,
+    /// Growth stops here; of the candidates that still fit, those with the largest gradient sums are taken.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_anchors: Option<usize>,
 }
 
 impl Default for Densification {
@@ -101,9 +108,10 @@ impl Default for Densification {
             interval: 100,
             success: 0.8,
             gradient_threshold: 2e-4,
-            coarsest_cells: 4,
+            coarsest_cells: None,
             levels: 3,
             min_opacity: 0.005,
+            max_anchors: None,
         }
     }
 }
@@ -117,8 +125,9 @@ pub struct TrainConfig {
     pub iterations: u32,
     /// Everything random follows from it.
     pub seed: u64,
-    /// Edge ε of a lattice cell, normalised units.
-    pub voxel_size: f64,
+    /// Edge ε of a lattice cell, normalised units; without it [`Capture::suggested_voxel_size`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub voxel_size: Option<f64>,
     /// Learning rates.
     pub rates: Rates,
     /// Loss weights.
@@ -139,7 +148,7 @@ impl Default for TrainConfig {
             },
             iterations: 30_000,
             seed: 42,
-            voxel_size: 0.001,
+            voxel_size: None,
             rates: Rates::default(),
             loss: LossWeights::default(),
             densification: Densification::default(),
@@ -163,7 +172,8 @@ impl TrainConfig {
         within("--iterations", f64::from(self.iterations), 1.0, 10_000_000.0)?;
         within("--feature-dim", self.shape.feature_dim as f64, 1.0, 256.0)?;
         within("--offsets", self.shape.n_offsets as f64, 1.0, 32.0)?;
-        within("--voxel-size", self.voxel_size, 1e-6, 1.0)?;
+        within("--voxel-size", self.voxel_size.unwrap_or(1e-3), 1e-6, 1.0)?;
+        within("densification.coarsest_cells", f64::from(self.densification.coarsest_cells.unwrap_or(1)), 1.0, 1e6)?;
         // The largest integer of TOML, in which configurations are kept.
         within("--seed", self.seed as f64, 0.0, i64::MAX as f64)?;
         let Rates { offset, feature, log_scale, opacity_head, covariance_head, colour_head } = self.rates;
@@ -185,6 +195,19 @@ impl TrainConfig {
         within("train.densification.from", from, 0.0, 1.0)?;
         within("train.densification.until", until, 0.0, 1.0)?;
         within("train.densification.interval", f64::from(interval), 1.0, 1e9)
+    }
+
+    /// The voxel size for a capture.
+    pub fn voxel_size_for(&self, capture: &Capture) -> f64 {
+        self.voxel_size.unwrap_or_else(|| capture.suggested_voxel_size())
+    }
+
+    /// The coarsest voxel edge of growth for a capture, lattice cells.
+    pub fn coarsest_cells_for(&self, capture: &Capture) -> u32 {
+        self.densification.coarsest_cells.unwrap_or(match capture.points_origin {
+            PointsOrigin::Random => 4,
+            PointsOrigin::Capture => 16,
+        })
     }
 
     /// The iteration at share `share` of the run.

@@ -25,12 +25,13 @@ const EDGE_RATIO: u32 = 4;
 /// cell is skipped, and so is a finer one when nothing has grown yet). A new anchor takes the element-wise largest
 /// feature of the parents that fall into its voxel, log-scales ln(edge), offsets 0 (section 1.8 of the method notes).
 ///
-/// * returns how many were added.
+/// * `coarsest_cells`: voxel edge of level 0. * returns how many were added.
 pub fn grow(
     scene: &mut Scene<f32>,
     optimiser: &mut Optimiser<f32>,
     statistics: &mut Statistics,
     settings: &Densification,
+    coarsest_cells: u32,
     rng: &mut ChaCha8Rng,
 ) -> usize {
     let (f, k) = (scene.shape.feature_dim, scene.shape.n_offsets);
@@ -39,7 +40,7 @@ pub fn grow(
     let eligible: Vec<usize> = (0..n_before * k).filter(|at| f64::from(statistics.n_drawn[*at]) > enough).collect();
     let mean_gradient = |at: usize| f64::from(statistics.gradient_sum[at]) / f64::from(statistics.n_drawn[at].max(1));
     for level in 0..settings.levels {
-        let cells = settings.coarsest_cells / EDGE_RATIO.pow(level);
+        let cells = coarsest_cells / EDGE_RATIO.pow(level);
         if cells == 0 || (level > 0 && scene.anchors.len() == n_before) {
             continue;
         }
@@ -52,7 +53,7 @@ pub fn grow(
         let position =
             |scene: &Scene<f32>, a: usize| DVec3::from(scene.anchors.lattice[a].map(f64::from)) * scene.voxel_size;
         let occupied: HashSet<[i32; 3]> = (0..scene.anchors.len()).map(|a| cell_of(position(scene, a))).collect();
-        let mut candidates: BTreeMap<[i32; 3], Vec<f32>> = BTreeMap::new();
+        let mut candidates: BTreeMap<[i32; 3], Candidate> = BTreeMap::new();
         for at in eligible.iter().copied().filter(|at| lucky[*at] && mean_gradient(*at) >= threshold) {
             let anchor = at / k;
             let offset = DVec3::from(std::array::from_fn(|i| {
@@ -63,15 +64,18 @@ pub fn grow(
                 continue;
             }
             let parent = &scene.anchors.features[anchor * f..(anchor + 1) * f];
-            let feature = candidates.entry(cell).or_insert_with(|| parent.to_vec());
-            for (largest, value) in feature.iter_mut().zip(parent) {
+            let candidate =
+                candidates.entry(cell).or_insert_with(|| Candidate { feature: parent.to_vec(), support: 0.0 });
+            candidate.support += mean_gradient(at);
+            for (largest, value) in candidate.feature.iter_mut().zip(parent) {
                 *largest = largest.max(*value);
             }
         }
         #[expect(clippy::cast_possible_truncation, reason = "the logarithm of an edge is small")]
         let log_edge = edge.ln() as f32;
         let cells = i32::try_from(cells).expect("a voxel spans a few cells");
-        for (cell, feature) in candidates {
+        let room = settings.max_anchors.map_or(usize::MAX, |most| most.saturating_sub(scene.anchors.len()));
+        for (cell, feature) in best_supported(candidates, room) {
             scene.anchors.lattice.push(cell.map(|c| c.saturating_mul(cells)));
             scene.anchors.features.extend(feature);
             scene.anchors.log_scales.extend([log_edge; 6]);
@@ -85,6 +89,26 @@ pub fn grow(
     statistics.grow(scene.anchors.len(), k);
     optimiser.grow(scene);
     scene.anchors.len() - n_before
+}
+
+/// A voxel that asks for an anchor.
+struct Candidate {
+    /// Element-wise largest feature of the parents.
+    feature: Vec<f32>,
+    /// Sum of the mean gradients of the offsets in it.
+    support: f64,
+}
+
+/// The `room` candidates with the largest support, in the order of their cells.
+fn best_supported(candidates: BTreeMap<[i32; 3], Candidate>, room: usize) -> Vec<([i32; 3], Vec<f32>)> {
+    let mut all: Vec<([i32; 3], Candidate)> = candidates.into_iter().collect();
+    if all.len() > room {
+        // The sort is stable: equal support leaves the smaller cell first.
+        all.sort_by(|a, b| b.1.support.total_cmp(&a.1.support));
+        all.truncate(room);
+        all.sort_by_key(|(cell, _)| *cell);
+    }
+    all.into_iter().map(|(cell, candidate)| (cell, candidate.feature)).collect()
 }
 
 /// Removes anchors that were seen often enough and whose opacities sum to less than `min_opacity` a view on average.
@@ -167,7 +191,7 @@ mod tests {
             statistics.n_drawn[k] = 41;
             statistics.gradient_sum[k] = 41.0;
         }
-        let added = grow(&mut scene, &mut optimiser, &mut statistics, &Densification::default(), &mut rng);
+        let added = grow(&mut scene, &mut optimiser, &mut statistics, &Densification::default(), 4, &mut rng);
         assert!((8..=10).contains(&added), "kept at ½ on the coarse level, then at ¾ of the rest: {added}");
         consistent(&scene, &optimiser, &statistics);
         for cell in &scene.anchors.lattice[2..] {
@@ -175,7 +199,7 @@ mod tests {
         }
         assert!(scene.anchors.features[64..].iter().all(|v| *v == -2.0), "the parent's feature");
         assert!(statistics.n_drawn.iter().all(|n| *n == 0), "judged offsets start afresh");
-        let again = grow(&mut scene, &mut optimiser, &mut statistics, &Densification::default(), &mut rng);
+        let again = grow(&mut scene, &mut optimiser, &mut statistics, &Densification::default(), 4, &mut rng);
         assert_eq!(again, 0, "nothing is eligible");
     }
 
@@ -186,8 +210,27 @@ mod tests {
         statistics.gradient_sum[0] = 40.0;
         statistics.n_drawn[1] = 100;
         statistics.gradient_sum[1] = 100.0 * 1.9e-4;
-        assert_eq!(grow(&mut scene, &mut optimiser, &mut statistics, &Densification::default(), &mut rng), 0);
+        assert_eq!(grow(&mut scene, &mut optimiser, &mut statistics, &Densification::default(), 4, &mut rng), 0);
         assert_eq!(statistics.n_drawn[..2], [40, 0], "only the judged one is reset");
+    }
+
+    #[test]
+    fn a_cap_keeps_the_candidates_that_are_pulled_hardest() {
+        let (mut scene, mut optimiser, mut statistics, mut rng) = start(&[DVec3::ZERO, DVec3::ONE]);
+        scene.anchors.log_scales[..3].fill(0.0);
+        for k in 0..10 {
+            scene.anchors.offsets[k * 3] = 0.1 * (k + 1) as f32;
+            statistics.n_drawn[k] = 41;
+            statistics.gradient_sum[k] = (k + 1) as f32;
+        }
+        let settings = Densification { max_anchors: Some(5), levels: 1, ..Densification::default() };
+        let added = grow(&mut scene, &mut optimiser, &mut statistics, &settings, 4, &mut rng);
+        assert_eq!((added, scene.anchors.len()), (3, 5));
+        let cells: Vec<i32> = scene.anchors.lattice[2..].iter().map(|c| c[0]).collect();
+        assert!(cells.is_sorted() && cells[0] >= 400, "the far, hard-pulled ones: {cells:?}");
+        consistent(&scene, &optimiser, &statistics);
+        let again = grow(&mut scene, &mut optimiser, &mut statistics, &settings, 4, &mut rng);
+        assert_eq!(again, 0, "full");
     }
 
     #[test]

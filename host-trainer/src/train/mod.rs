@@ -10,6 +10,7 @@ pub mod statistics;
 pub mod step;
 #[cfg(test)]
 mod test_capture;
+pub mod undrawn;
 pub mod watchdog;
 
 use std::time::Instant;
@@ -120,7 +121,7 @@ impl<'a> Trainer<'a> {
             return Err(TrainError::NoPoints);
         }
         let mut trainer = Self::without_scene(capture, config)?;
-        trainer.scene = initial_scene(config.shape, config.voxel_size, &capture.points, &mut trainer.rng);
+        trainer.scene = initial_scene(config.shape, trainer.scene.voxel_size, &capture.points, &mut trainer.rng);
         trainer.optimiser = Optimiser::new(&trainer.scene);
         trainer.statistics = Statistics::new(trainer.scene.anchors.len(), config.shape.n_offsets);
         Ok(trainer)
@@ -134,7 +135,7 @@ impl<'a> Trainer<'a> {
         }
         let anchors = Anchors { lattice: vec![], features: vec![], log_scales: vec![], offsets: vec![] };
         let heads = Heads::filled(&config.shape, 0.0);
-        let scene = Scene { shape: config.shape, voxel_size: config.voxel_size, anchors, heads };
+        let scene = Scene { shape: config.shape, voxel_size: config.voxel_size_for(capture), anchors, heads };
         Ok(Self {
             signature: CaptureSignature::of(capture),
             cameras: capture.train.iter().map(|v| Pinhole::new(&v.camera)).collect(),
@@ -156,6 +157,11 @@ impl<'a> Trainer<'a> {
     /// The configuration.
     pub fn config(&self) -> &TrainConfig {
         &self.config
+    }
+
+    /// The cameras of the training views.
+    pub fn cameras(&self) -> &[Pinhole<f32>] {
+        &self.cameras
     }
 
     /// Whether all iterations are done.
@@ -250,7 +256,8 @@ impl<'a> Trainer<'a> {
         let due = self.iteration.is_multiple_of(settings.interval);
         if due && self.iteration > self.config.iteration_at(settings.from) {
             let Self { scene, optimiser, statistics, rng, .. } = self;
-            densify::grow(scene, optimiser, statistics, &settings, rng);
+            let coarsest_cells = self.config.coarsest_cells_for(self.capture);
+            densify::grow(scene, optimiser, statistics, &settings, coarsest_cells, rng);
             densify::prune(scene, optimiser, statistics, &settings);
         }
     }

@@ -58,7 +58,7 @@ pub(super) fn tiny_config(iterations: u32) -> TrainConfig {
     TrainConfig {
         shape: ModelShape { feature_dim: 8, n_offsets: 4, ..TrainConfig::default().shape },
         iterations,
-        voxel_size: 0.02,
+        voxel_size: Some(0.02),
         densification: Densification {
             statistics_from: 0.05,
             from: 0.1,

@@ -7,12 +7,17 @@ fn a_written_configuration_reads_back_to_the_last_bit() {
         output: "out/lamp.psb".into(),
         checkpoint_every: Some(700),
         keep_checkpoints: true,
-        capture: CaptureOptions { max_resolution: Some(400), background: Some(Background::White) },
+        capture: CaptureOptions {
+            max_resolution: Some(400),
+            background: Some(Background::White),
+            images: Some("images_2".to_owned()),
+            test_every: Some(5),
+        },
         ..RunConfig::default()
     };
     for i in 1..200u32 {
         let x = 1.0 / f64::from(i).powf(1.7);
-        config.train.voxel_size = x;
+        config.train.voxel_size = Some(x);
         config.train.rates.offset.end = x * 1e-9;
         config.quantisation.feature = (x * 0.1) as f32;
         config.train.seed = u64::from(i).pow(7) % i64::MAX as u64;

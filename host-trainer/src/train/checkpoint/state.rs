@@ -131,7 +131,7 @@ impl<'a> Trainer<'a> {
         let (features, f) = array("features", feature_dim)?;
         let (log_scales, s) = array("log-scales", 6)?;
         let (offsets, o) = array("offsets", 3 * n_offsets)?;
-        let TrainConfig { shape, voxel_size, .. } = self.config;
+        let (shape, voxel_size) = (self.config.shape, self.config.voxel_size_for(self.capture));
         let mut heads = || {
             let mut heads = Heads::filled(&shape, 0.0f32);
             for group in heads.each_mut().into_iter().flat_map(|head| head.groups_mut()) {

@@ -44,7 +44,7 @@ pub(crate) struct TrainResult {
 }
 
 pub(crate) fn run(args: &Args) -> Result<ExitCode> {
-    let (config, folder) = match args.resume() {
+    let (mut config, folder) = match args.resume() {
         Some(path) => {
             let folder = RunFolder::reopen(path)?;
             let begun = RunConfig::parse(&folder.config()?);
@@ -65,6 +65,7 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     };
     let source = CaptureArgs { dataset: config.dataset.clone(), options: config.capture.clone() };
     let capture = source.load(config.train.seed)?;
+    config.train = config.train.resolved_for(&capture);
     eprintln!("voxel size {:.5}, normalised units", config.train.voxel_size_for(&capture));
     train_in(folder, &config, &capture, args)
 }
@@ -76,6 +77,7 @@ fn train_in(mut folder: RunFolder, config: &RunConfig, capture: &Capture, args: 
         None => Trainer::new(capture, config.train)?,
         Some(_) => resumed(&folder, config, capture)?,
     };
+    folder.write_config(&config.to_toml()?)?;
     let interval = config.checkpoint_every.map_or(Interval::Seconds(CHECKPOINT_SECONDS), Interval::Iterations);
     let how_to_go_on = || format!("go on with `pocketsplat train --resume {}`", path.display());
     let mut progress = Progress::new(trainer.iteration, config.train.iterations);

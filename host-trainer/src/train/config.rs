@@ -210,6 +210,13 @@ impl TrainConfig {
         })
     }
 
+    /// The same with nothing left to the capture: what a run keeps, so that it does not change with the capture's points.
+    pub fn resolved_for(&self, capture: &Capture) -> Self {
+        let coarsest_cells = Some(self.coarsest_cells_for(capture));
+        let densification = Densification { coarsest_cells, ..self.densification };
+        Self { voxel_size: Some(self.voxel_size_for(capture)), densification, ..*self }
+    }
+
     /// The iteration at share `share` of the run.
     pub fn iteration_at(&self, share: f64) -> u32 {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "shares are in 0..=1")]

@@ -133,6 +133,7 @@ impl<'a> Trainer<'a> {
         if capture.train.is_empty() {
             return Err(TrainError::NoViews);
         }
+        let config = config.resolved_for(capture);
         let anchors = Anchors { lattice: vec![], features: vec![], log_scales: vec![], offsets: vec![] };
         let heads = Heads::filled(&config.shape, 0.0);
         let scene = Scene { shape: config.shape, voxel_size: config.voxel_size_for(capture), anchors, heads };
@@ -154,7 +155,7 @@ impl<'a> Trainer<'a> {
         })
     }
 
-    /// The configuration.
+    /// The configuration, resolved for the capture.
     pub fn config(&self) -> &TrainConfig {
         &self.config
     }

@@ -83,7 +83,7 @@ impl RunFolder {
         for name in [RESULT, LOG] {
             files::remove(&path.join(name))?;
         }
-        files::write_whole(&path.join(CONFIG), |out| out.write_all(config.as_bytes()))?;
+        folder.write_config(config)?;
         Ok(folder)
     }
 
@@ -107,7 +107,11 @@ impl RunFolder {
         let open = File::options().read(true).write(true).create(true).truncate(false).open(&name);
         let lock = open.map_err(|source| RunError::io("open", &name, source))?;
         match lock.try_lock() {
-            Ok(()) => Ok(Self { path: path.to_owned(), _lock: lock }),
+            Ok(()) => {
+                let folder = Self { path: path.to_owned(), _lock: lock };
+                folder.clear_partial_files()?;
+                Ok(folder)
+            }
             Err(fs::TryLockError::WouldBlock) => Err(RunError::InUse { path: path.to_owned() }),
             Err(fs::TryLockError::Error(source)) => Err(RunError::io("lock", &name, source)),
         }
@@ -129,6 +133,14 @@ impl RunFolder {
     pub fn config(&self) -> Result<String, RunError> {
         let path = self.path.join(CONFIG);
         fs::read_to_string(&path).map_err(|source| RunError::io("read", &path, source))
+    }
+
+    /// Replaces the configuration by one that says more, or other things that do not decide the result.
+    ///
+    /// # Errors
+    /// [`RunError::Write`].
+    pub fn write_config(&self, config: &str) -> Result<(), RunError> {
+        files::write_whole(&self.path.join(CONFIG), |out| out.write_all(config.as_bytes()))
     }
 
     /// Trains to the end, or until `stop` is set, which is looked at after every iteration; writes checkpoints and the

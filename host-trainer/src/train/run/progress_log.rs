@@ -31,8 +31,9 @@ impl ProgressLog {
     /// # Errors
     /// [`RunError`] when it can not be read or written.
     pub fn open(path: &Path, done: u32, iterations: u32) -> Result<Self, RunError> {
-        let older = match fs::read_to_string(path) {
-            Ok(text) => text,
+        let older = match fs::read(path) {
+            // A power cut may leave anything.
+            Ok(bytes) => String::from_utf8_lossy(&bytes).into_owned(),
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => String::new(),
             Err(source) => return Err(RunError::io("read", path, source)),
         };

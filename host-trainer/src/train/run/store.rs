@@ -69,15 +69,16 @@ impl RunFolder {
         if passed_over.is_empty() { Ok(None) } else { Err(RunError::AllDamaged { faults: passed_over }) }
     }
 
-    /// Removes all checkpoints, and what writing one may have left.
+    /// Removes all checkpoints.
     pub(super) fn clear_checkpoints(&self) -> Result<(), RunError> {
-        for name in files::names(&self.path)? {
-            let path = self.path.join(name);
-            let partial = path.extension().is_some_and(|extension| extension == files::PARTIAL);
-            if partial || self.checkpoints()?.contains(&path) {
-                files::remove(&path)?;
-            }
-        }
-        Ok(())
+        self.checkpoints()?.iter().try_for_each(|path| files::remove(path))
+    }
+
+    /// Removes what a process left that died while it wrote.
+    pub(super) fn clear_partial_files(&self) -> Result<(), RunError> {
+        let names = files::names(&self.path)?.into_iter().map(|name| self.path.join(name));
+        names
+            .filter(|path| path.extension().is_some_and(|extension| extension == files::PARTIAL))
+            .try_for_each(|path| files::remove(&path))
     }
 }

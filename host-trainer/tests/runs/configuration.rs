@@ -1,0 +1,78 @@
+//! What a run was asked for: written, read back, overridden, contradicted.
+
+use std::fs;
+
+use crate::fixture::{ITERATIONS, fails, folder, pocketsplat, resume, starts, succeeds, train, undisturbed, wait_for};
+
+#[test]
+fn a_written_configuration_gives_the_same_bundle_again() {
+    let home = folder("config");
+    let output = home.join("a.psb");
+    succeeds(train(&output).args(["--run".as_ref(), home.join("notes").as_os_str()]));
+    assert!(!home.join("a.run").exists());
+    let config = home.join("notes/config.toml");
+    let log = fs::read_to_string(home.join("notes/progress.csv")).unwrap();
+    assert!(log.starts_with("iteration,loss,psnr_db,anchors,seconds,dropped\n"), "{log}");
+    assert_eq!(log.lines().last().unwrap().split(',').next(), Some(ITERATIONS.to_string().as_str()));
+    let result = fs::read_to_string(home.join("notes/result.json")).unwrap();
+    assert!(result.contains("\"dropped_steps\": 0"), "{result}");
+
+    let again = home.join("b.psb");
+    succeeds(pocketsplat().arg("train").arg("--config").arg(&config).arg("-o").arg(&again));
+    assert!(fs::read(&again).unwrap() == undisturbed(), "from the configuration");
+    let written = fs::read_to_string(home.join("b.run/config.toml")).unwrap();
+    let first = fs::read_to_string(&config).unwrap();
+    assert_eq!(written.replace("b.psb", "a.psb"), first);
+
+    // What stands on the command line counts more.
+    let other = home.join("c.psb");
+    let mut command = pocketsplat();
+    command.arg("train").arg("--config").arg(&config).arg("-o").arg(&other);
+    succeeds(command.args(["--iterations", "5", "--view-distance", "--no-view-direction=true", "--keep-checkpoints"]));
+    let written = fs::read_to_string(home.join("c.run/config.toml")).unwrap();
+    for line in
+        ["iterations = 5", "view_distance = true", "view_direction = false", "n_offsets = 3", "voxel_size = 0.001"]
+    {
+        assert!(written.lines().any(|l| l == line), "{line}: {written}");
+    }
+    assert!(home.join("c.run/iteration-00000005.checkpoint").exists());
+}
+
+#[test]
+fn what_a_configuration_can_not_say_is_refused_by_name() {
+    let home = folder("bad-config");
+    let config = home.join("my.toml");
+    let mut command = pocketsplat();
+    command.arg("train").arg("--config").arg(&config);
+    fs::write(&config, "[train]\niteration = 3\n").unwrap();
+    let error = fails(&mut command);
+    assert!(error.contains("my.toml") && error.contains("unknown key `train.iteration`"), "{error}");
+    fs::write(&config, "output = \"a.psb\"\n").unwrap();
+    let error = fails(&mut command);
+    assert!(error.contains("names no `dataset`"), "{error}");
+    fs::write(&config, "dataset = \"x\"\noutput = \"a.psb\"\n[train.rates.feature]\nstart = nan\n").unwrap();
+    let error = fails(&mut command);
+    assert!(error.contains("train.rates.feature.start is NaN, needs 0 to 10"), "{error}");
+}
+
+#[test]
+fn a_run_goes_on_only_with_what_it_began_with() {
+    let home = folder("contradiction");
+    let (output, run) = (home.join("a.psb"), home.join("a.run"));
+    let mut child = starts(&mut train(&output));
+    wait_for(&run, 30, &mut child);
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let error = fails(resume(&run).args(["--iterations", "400"]));
+    assert!(error.contains("`train.iterations` is 160 and 400"), "{error}");
+    let config = run.join("config.toml");
+    let begun = fs::read_to_string(&config).unwrap();
+    fs::write(&config, begun.replace("seed = 42", "seed = 43")).unwrap();
+    let error = fails(&mut resume(&run));
+    assert!(error.contains("config.toml and the checkpoint disagree: `train.seed` is 43 and 42"), "{error}");
+    fs::write(&config, begun).unwrap();
+    // Where the bundle goes does not decide what it is.
+    let elsewhere = home.join("b.psb");
+    succeeds(resume(&run).arg("-o").arg(&elsewhere).args(["--checkpoint-every", "1000"]));
+    assert!(fs::read(&elsewhere).unwrap() == undisturbed());
+}

@@ -1,0 +1,7 @@
+//! `pocketsplat train` through interruptions, full disks and accidents, as a user has them: with the program itself.
+#![cfg(unix)]
+
+mod accidents;
+mod configuration;
+mod fixture;
+mod interruption;

@@ -5,6 +5,7 @@ pub mod checkpoint;
 pub mod config;
 pub mod densify;
 pub mod optimiser;
+mod outcome;
 pub mod run;
 pub mod statistics;
 pub mod step;
@@ -20,6 +21,7 @@ use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
 pub use config::TrainConfig;
+pub use outcome::{Observer, Outcome, TrainError};
 pub use watchdog::DroppedStep;
 
 use crate::dataset::{Capture, Image, View};
@@ -29,52 +31,8 @@ use crate::scene::{Anchors, Heads, Scene};
 use checkpoint::{CaptureSignature, Kernels};
 use optimiser::Optimiser;
 use statistics::Statistics;
-use step::{StepReport, Target, Workspace, clear_masked};
+use step::{Target, Workspace, clear_masked};
 use watchdog::Watchdog;
-
-/// Hears of every step of a run.
-pub trait Observer {
-    /// After iteration `iteration` (from 1).
-    fn step(&mut self, iteration: u32, report: &StepReport<f32>, scene: &Scene<f32>);
-
-    /// When an iteration changed nothing, because of what `step` says; [`Self::step`] follows.
-    fn dropped(&mut self, _step: &DroppedStep) {}
-}
-
-/// What an iteration gives back.
-#[derive(Clone, Debug)]
-pub struct Outcome {
-    /// Loss and sizes of the step.
-    pub report: StepReport<f32>,
-    /// Why it was not applied, if so: parameters, moments and statistics are as before.
-    pub dropped: Option<DroppedStep>,
-}
-
-/// Why a run can not start, or go on.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum TrainError {
-    /// A setting is out of range.
-    #[error("{0}")]
-    Config(String),
-    /// No view to train on.
-    #[error("the capture has no training view; check that its training split names images that exist")]
-    NoViews,
-    /// No point to start from.
-    #[error("the capture has no point to start from; check its bounds")]
-    NoPoints,
-    /// The cause of dropped steps does not pass.
-    #[error(
-        "{n} steps in a row would have made parameters infinite or NaN and were dropped, the last one so: {last}; \
-         lower the learning rates, or look at the photograph of that view"
-    )]
-    Diverged {
-        /// Steps dropped in a row.
-        n: u32,
-        /// The last one.
-        last: DroppedStep,
-    },
-}
 
 /// The state of a run: everything the next iteration depends on.
 #[derive(Clone, Debug)]

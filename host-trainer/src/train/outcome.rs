@@ -1,0 +1,49 @@
+//! What a run gives back: to whom it reports, what an iteration did, why it stopped.
+
+use super::step::StepReport;
+use super::watchdog::DroppedStep;
+use crate::scene::Scene;
+
+/// Hears of every step of a run.
+pub trait Observer {
+    /// After iteration `iteration` (from 1).
+    fn step(&mut self, iteration: u32, report: &StepReport<f32>, scene: &Scene<f32>);
+
+    /// When an iteration changed nothing, because of what `step` says; [`Self::step`] follows.
+    fn dropped(&mut self, _step: &DroppedStep) {}
+}
+
+/// What an iteration gives back.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// Loss and sizes of the step.
+    pub report: StepReport<f32>,
+    /// Why it was not applied, if so: parameters, moments and statistics are as before.
+    pub dropped: Option<DroppedStep>,
+}
+
+/// Why a run can not start, or go on.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TrainError {
+    /// A setting is out of range.
+    #[error("{0}")]
+    Config(String),
+    /// No view to train on.
+    #[error("the capture has no training view; check that its training split names images that exist")]
+    NoViews,
+    /// No point to start from.
+    #[error("the capture has no point to start from; check its bounds")]
+    NoPoints,
+    /// The cause of dropped steps does not pass.
+    #[error(
+        "{n} steps in a row would have made parameters infinite or NaN and were dropped, the last one so: {last}; \
+         lower the learning rates, or look at the photograph of that view"
+    )]
+    Diverged {
+        /// Steps dropped in a row.
+        n: u32,
+        /// The last one.
+        last: DroppedStep,
+    },
+}

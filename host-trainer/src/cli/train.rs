@@ -44,29 +44,35 @@ pub(crate) struct TrainResult {
 }
 
 pub(crate) fn run(args: &Args) -> Result<ExitCode> {
-    let (mut config, folder) = match args.resume() {
+    let load = |config: &mut RunConfig| -> Result<Capture> {
+        let source = CaptureArgs { dataset: config.dataset.clone(), options: config.capture.clone() };
+        let capture = source.load(config.train.seed)?;
+        config.train = config.train.resolved_for(&capture);
+        eprintln!("voxel size {:.5}, normalised units", config.train.voxel_size_for(&capture));
+        Ok(capture)
+    };
+    let (config, capture, folder) = match args.resume() {
         Some(path) => {
             let folder = RunFolder::reopen(path)?;
             let begun = RunConfig::parse(&folder.config()?);
             let begun = begun.with_context(|| format!("the config.toml in {} can not be used", path.display()))?;
-            let config = args.applied_to(begun.clone())?;
+            let mut config = args.applied_to(begun.clone())?;
             if let Some(difference) = begun.difference(&config)? {
                 bail!("the run began with another setting than the command line asks for: {difference}; leave it out");
             }
             output::check_writable(&config.output)?;
-            (config, folder)
+            let capture = load(&mut config)?;
+            (config, capture, folder)
         }
         None => {
-            let config = args.resolved()?;
+            let mut config = args.resolved()?;
             output::check_writable(&config.output)?;
+            // Before the folder is touched: a capture that does not load must not cost an earlier run its results.
+            let capture = load(&mut config)?;
             let folder = RunFolder::start(&args.run_folder(&config)?, &config.to_toml()?, args.overwrite())?;
-            (config, folder)
+            (config, capture, folder)
         }
     };
-    let source = CaptureArgs { dataset: config.dataset.clone(), options: config.capture.clone() };
-    let capture = source.load(config.train.seed)?;
-    config.train = config.train.resolved_for(&capture);
-    eprintln!("voxel size {:.5}, normalised units", config.train.voxel_size_for(&capture));
     train_in(folder, &config, &capture, args)
 }
 

@@ -9,7 +9,7 @@ use crate::ops::project::{Footprint, Splat};
 use crate::ops::simd::Level;
 use crate::ops::tiles::{TILE_PX, TileLists};
 
-/// Gradient of [`forward`](super::forward) with respect to every splat.
+/// Gradient of [`forward`](super::forward()) with respect to every splat.
 ///
 /// * `image`: what forward returned. * `d_image`: dL/d(image), tile order, zero beyond the image's edge.
 /// * returns `[n]`, zero for splats that no tile lists.

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::row::{ALPHA_MAX, LOOK_EVERY, Row, alpha_row, draws_nothing, mark_dead, reduce, step_row};
-use super::{TILE_VALUES, Tile, TiledImage};
+use super::{TILE_VALUES, Tile, TileSplat, TiledImage};
 use crate::ops::Real;
 use crate::ops::project::{Footprint, Splat};
 use crate::ops::simd::Level;
@@ -102,7 +102,7 @@ impl<R: Real> PairSums<R> {
 }
 
 #[inline(always)]
-fn backward_tile<R: Real>(tile: &Tile<'_, R>, image: &[R], d_image: &[R], d_pairs: &mut [Splat<R>]) {
+fn backward_tile<R: Real>(tile: &Tile<R>, image: &[R], d_image: &[R], d_pairs: &mut [Splat<R>]) {
     let zero = [R::ZERO; TILE_PX];
     let mut transmittance = [[R::ONE; TILE_PX]; TILE_PX];
     let mut dead = [false; TILE_PX];
@@ -119,12 +119,11 @@ fn backward_tile<R: Real>(tile: &Tile<'_, R>, image: &[R], d_image: &[R], d_pair
             }
         }
     }
-    for (n, (entry, d_pair)) in tile.entries.iter().zip(d_pairs).enumerate() {
-        let (splat, first, end) = tile.splat(*entry);
+    for (n, (TileSplat { splat, rows: (first, end) }, d_pair)) in tile.splats.iter().zip(d_pairs).enumerate() {
         let dx0 = R::real(tile.origin[0] as f64 + 0.5) - splat.mean_px[0];
         let [red, green, blue] = splat.colour;
         let mut sums = PairSums::<R>::default();
-        for y in first..end {
+        for y in *first..*end {
             if dead[y] {
                 continue;
             }

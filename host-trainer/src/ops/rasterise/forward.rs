@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::row::{LOOK_EVERY, alpha_row, draws_nothing, mark_dead, step_row};
-use super::{TILE_VALUES, Tile, TiledImage};
+use super::{TILE_VALUES, Tile, TileSplat, TiledImage};
 use crate::ops::Real;
 use crate::ops::project::{Footprint, Splat};
 use crate::ops::simd::Level;
@@ -32,14 +32,13 @@ pub fn forward<R: Real>(
 }
 
 #[inline(always)]
-fn forward_tile<R: Real>(tile: &Tile<'_, R>, background: [R; 3], out: &mut [R]) {
+fn forward_tile<R: Real>(tile: &Tile<R>, background: [R; 3], out: &mut [R]) {
     let mut transmittance = [[R::ONE; TILE_PX]; TILE_PX];
     let mut colour = [[[R::ZERO; TILE_PX]; TILE_PX]; 3];
     let mut dead = [false; TILE_PX];
-    for (n, entry) in tile.entries.iter().enumerate() {
-        let (splat, first, end) = tile.splat(*entry);
+    for (n, TileSplat { splat, rows: (first, end) }) in tile.splats.iter().enumerate() {
         let dx0 = R::real(tile.origin[0] as f64 + 0.5) - splat.mean_px[0];
-        for y in first..end {
+        for y in *first..*end {
             if dead[y] {
                 continue;
             }

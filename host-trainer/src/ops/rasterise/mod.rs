@@ -27,26 +27,28 @@ use row::rows;
 /// Values of one channel of a tile.
 const TILE_VALUES: usize = TILE_PX * TILE_PX;
 
-/// What one tile draws.
-struct Tile<'a, R> {
-    splats: &'a [Splat<R>],
-    footprints: &'a [Footprint<R>],
-    entries: &'a [u32],
+/// A splat in a tile, and the rows of the tile that it reaches.
+#[derive(Clone, Copy)]
+struct TileSplat<R> {
+    splat: Splat<R>,
+    rows: (usize, usize),
+}
+
+/// What one tile draws, nearest first.
+struct Tile<R> {
+    /// Copies: gathered one after the other, so that the loads overlap, where the blending loop would wait for each.
+    splats: Vec<TileSplat<R>>,
     /// Its first pixel.
     origin: [usize; 2],
 }
 
-impl<'a, R: Real> Tile<'a, R> {
-    fn new(splats: &'a [Splat<R>], footprints: &'a [Footprint<R>], lists: &'a TileLists, t: usize) -> Self {
+impl<R: Real> Tile<R> {
+    fn new(splats: &[Splat<R>], footprints: &[Footprint<R>], lists: &TileLists, t: usize) -> Self {
         let origin = [t % lists.grid[0] * TILE_PX, t / lists.grid[0] * TILE_PX];
-        Self { splats, footprints, entries: lists.tile(t), origin }
-    }
-
-    /// A splat and the rows of the tile that it reaches.
-    #[inline(always)]
-    fn splat(&self, entry: u32) -> (&'a Splat<R>, usize, usize) {
-        let splat = &self.splats[entry as usize];
-        let (first, end) = rows(splat.mean_px[1], self.footprints[entry as usize].half_extent_px[1], self.origin[1]);
-        (splat, first, end)
+        let gather = |entry: &u32| {
+            let (splat, footprint) = (splats[*entry as usize], &footprints[*entry as usize]);
+            TileSplat { splat, rows: rows(splat.mean_px[1], footprint.half_extent_px[1], origin[1]) }
+        };
+        Self { splats: lists.tile(t).iter().map(gather).collect(), origin }
     }
 }

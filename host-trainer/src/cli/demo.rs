@@ -93,11 +93,21 @@ fn clear_capture(folder: &Path) -> Result<()> {
     std::fs::remove_dir_all(folder).with_context(|| format!("could not remove {}", folder.display()))
 }
 
-/// Images of one size next to each other.
+/// Width that a small picture is enlarged to, about, so that a person sees its pixels.
+const PICTURE_PX: u32 = 1000;
+
+/// Images of one size next to each other, each pixel as a square of pixels where they are small.
 fn side_by_side(images: &[&Image]) -> Image {
     let (width, height) = (images[0].width_px, images[0].height_px);
-    let row = 3 * width as usize;
-    let rgb =
-        (0..height as usize).flat_map(|y| images.iter().flat_map(move |i| &i.rgb[y * row..(y + 1) * row])).copied();
-    Image { width_px: width * u32::try_from(images.len()).unwrap_or(u32::MAX), height_px: height, rgb: rgb.collect() }
+    let n = u32::try_from(images.len()).unwrap_or(u32::MAX);
+    let zoom = (PICTURE_PX / (n * width)).max(1);
+    let pixel = |x: u32, y: u32| {
+        let (image, x) = (images[(x / width) as usize], x % width);
+        let at = 3 * (y * width + x) as usize;
+        [image.rgb[at], image.rgb[at + 1], image.rgb[at + 2]]
+    };
+    let (width_px, height_px) = (n * width * zoom, height * zoom);
+    let pixel = &pixel;
+    let rgb = (0..height_px).flat_map(|y| (0..width_px).flat_map(move |x| pixel(x / zoom, y / zoom))).collect();
+    Image { width_px, height_px, rgb }
 }

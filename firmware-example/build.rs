@@ -14,6 +14,9 @@ fn main() {
     println!("cargo::rerun-if-env-changed=PSB_BUNDLE");
     // For memory.x.
     println!("cargo::rustc-link-search={here}");
+    // Here and not in .cargo/config.toml, where a RUSTFLAGS of the environment would replace them.
+    println!("cargo::rustc-link-arg-bins=-Tlink.x");
+    println!("cargo::rustc-link-arg-bins=-Tdefmt.x");
     let Some(path) = env::var_os("PSB_BUNDLE").map(PathBuf::from) else {
         println!("cargo::error=PSB_BUNDLE is not set: set it to the absolute path of a bundle, as README.md shows");
         return;

@@ -16,8 +16,10 @@ target=${CARGO_TARGET_DIR:-$PWD/target}
 case $target in /*) ;; *) target=$PWD/$target ;; esac
 embedded=$target/embedded
 export CARGO_TARGET_DIR=$target
+# Flags meant for this machine's CPU would reach the microcontroller's builds too.
+unset RUSTFLAGS CARGO_ENCODED_RUSTFLAGS
 export CARGO_TERM_COLOR=${CARGO_TERM_COLOR:-never}
-export PATH="$target/tools/bin:${CARGO_HOME:-$HOME/.cargo}/bin:$PATH"
+export PATH="$target/tools/bin:${CARGO_HOME:-${HOME:-}/.cargo}/bin:$PATH"
 
 fail() {
   echo "ci: $*" >&2
@@ -44,6 +46,8 @@ need_command() { # COMMAND PACKAGE…
 need_cargo() {
   command -v cargo >/dev/null || fail "cargo is missing: install rustup from https://rustup.rs, which reads rust-toolchain.toml"
   need_command cc gcc libc6-dev
+  cargo fmt --version >/dev/null 2>&1 && cargo clippy --version >/dev/null 2>&1 || rustup component add rustfmt clippy ||
+    fail "rustfmt or clippy is missing: run \`rustup component add rustfmt clippy\`"
 }
 
 need_embedded_target() {

@@ -7,6 +7,7 @@
 //! * `budget`: do the planned bytes suffice, and does one byte less fail and say how many are needed?
 //! * `malformed`: does a damaged bundle fail, and never draw another picture?
 //! * `captures`: do captures load with the conventions that the renderers use?
+//! * `determinism`: does the same seed give the same bundle for any number of threads?
 
 pub mod captures;
 pub mod difference;

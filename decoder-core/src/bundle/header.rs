@@ -19,7 +19,8 @@ pub const MAX_FEATURE_DIM: u16 = 256;
 pub const MAX_OFFSETS: u16 = 32;
 /// Most anchors; with [`MAX_OFFSETS`] the number of splats stays below 2³².
 pub const MAX_ANCHORS: u32 = 1 << 24;
-/// Most anchors in a chunk; it bounds the work that a few hostile bytes can ask for.
+/// Most anchors in a chunk. A directory record and a chunk without words take 56 bytes, so these bound the anchors that a
+/// hostile file of a given length can ask to be evaluated.
 pub const MAX_CHUNK_ANCHORS: u16 = 1024;
 /// The only camera convention: OpenCV, x right, y down, z forward.
 const CONVENTION_OPENCV: u8 = 0;

@@ -62,7 +62,7 @@ pub(crate) fn blend_tile(
             continue;
         }
         work.splats += 1;
-        work.pixels += blend_splat(place, splat, canvas.pixels, &mut alive);
+        work.pixels = work.pixels.saturating_add(blend_splat(place, splat, canvas.pixels, &mut alive));
         if alive == 0 {
             break;
         }

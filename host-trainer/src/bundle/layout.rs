@@ -12,7 +12,7 @@ use super::{BundleInfo, WriteError};
 use crate::render::decoder::core_camera;
 use crate::scene::{Heads, Scene};
 
-/// Puts the parts together and reads the result once, as a device would.
+/// Puts the parts together, and parses the result once: everything but the chunks' words is checked again.
 pub(super) fn assemble(
     scene: &Scene<f32>,
     info: &BundleInfo,

@@ -17,7 +17,7 @@ pub enum LoadError {
         source: std::io::Error,
     },
     /// The file is not a sound bundle.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: not a sound bundle", path.display())]
     Malformed {
         /// The file.
         path: PathBuf,

@@ -32,7 +32,8 @@ pub(crate) struct CaptureOptions {
     #[arg(long, value_name = "NAME")]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) images: Option<String>,
-    /// Hold out every N-th view by name where the capture has no split of its own; 0 holds out none. [default: 8]
+    /// Hold out every N-th view by name where the capture has no split of its own; 0 holds out none. To be repeated for
+    /// eval and render, as is --images. [default: 8]
     #[arg(long, value_name = "N")]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) test_every: Option<u32>,

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use pocketsplat::bundle::QuantisationSteps;
 use pocketsplat::dataset::{Background, Image};
-use pocketsplat::metrics::{half_size_enlarged, psnr_db};
 use pocketsplat::render::decoder::core_image;
 use pocketsplat::render::reference::ReferenceScene;
 use pocketsplat::synth::{SynthOptions, write_capture};
@@ -33,8 +32,10 @@ pub(crate) struct Args {
     json: bool,
 }
 
-/// What an earlier demo may have left; anything else in the folder stays.
+/// Where the demo's capture lies.
 const CAPTURE: &str = "capture";
+/// Lies in a capture that a demo made, and only there: without it nothing is removed.
+const MARKER: &str = ".made-by-pocketsplat-demo";
 
 pub(crate) fn run(args: &Args) -> Result<()> {
     let folder = &args.output;
@@ -42,6 +43,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     clear_capture(&capture_folder)?;
     eprintln!("1 of 4  ray-tracing a capture into {}", capture_folder.display());
     write_capture(&capture_folder, &SynthOptions { size_px: args.size, ..SynthOptions::default() })?;
+    output::write_whole(&capture_folder.join(MARKER), b"")?;
 
     eprintln!("2 of 4  training {} steps", args.iterations);
     let capture_args = CaptureArgs { dataset: capture_folder, options: CaptureOptions::default() };
@@ -53,8 +55,6 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     eprintln!("3 of 4  drawing the held-out views with the decoder");
     let file = BundleFile::read(&bundle_path)?;
     let evaluation = evaluate(&file, &capture_args, Split::Test, Renderer::Core, true)?;
-    let baseline = capture.test.iter().map(|v| psnr_db(&half_size_enlarged(&v.image), &v.image)).sum::<f64>()
-        / capture.test.len() as f64;
 
     let picture = folder.join("truth_reference_decoder.png");
     eprintln!("4 of 4  {}: truth | f64 reference | decoder", picture.display());
@@ -70,7 +70,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         "bundle": bundle_path,
         "picture": picture,
         "psnr_db": evaluation.psnr_db,
-        "half_size_copy_psnr_db": baseline,
+        "half_size_copy_psnr_db": evaluation.half_size_copy_psnr_db,
         "ssim": evaluation.ssim,
         "decoder_to_reference_psnr_db": evaluation.psnr_to_reference_db,
         "bundle_bytes": evaluation.bundle_bytes,
@@ -87,7 +87,7 @@ fn clear_capture(folder: &Path) -> Result<()> {
     if !folder.exists() {
         return Ok(());
     }
-    if !folder.join("transforms_train.json").is_file() {
+    if !folder.join(MARKER).is_file() {
         bail!("{} exists and is not the capture of an earlier demo; choose another --output", folder.display());
     }
     std::fs::remove_dir_all(folder).with_context(|| format!("could not remove {}", folder.display()))

@@ -6,7 +6,7 @@ use std::time::Instant;
 use anyhow::Result;
 use pocketsplat::camera::Camera;
 use pocketsplat::dataset::Image;
-use pocketsplat::metrics::{psnr_db, psnr_db_masked, ssim_masked};
+use pocketsplat::metrics::{half_size_enlarged, psnr_db, psnr_db_masked, ssim_masked};
 use pocketsplat::render::decoder::core_image;
 use pocketsplat::render::reference::{ReferenceScene, to_image};
 use pocketsplat_core::Bundle;
@@ -52,6 +52,8 @@ pub(crate) struct Args {
 pub(crate) struct Evaluation {
     pub(crate) psnr_db: f64,
     pub(crate) ssim: f64,
+    /// Of a copy of each photograph at half the size, enlarged again: what no detail at all scores.
+    pub(crate) half_size_copy_psnr_db: f64,
     pub(crate) bundle_bytes: usize,
     pub(crate) n_anchors: u32,
     pub(crate) n_views: usize,
@@ -86,6 +88,7 @@ struct Row {
     psnr_db: f64,
     ssim: f64,
     psnr_to_reference_db: f64,
+    half_size_copy_psnr_db: f64,
 }
 
 fn draw(bundle: &Bundle<'_>, reference: Option<&ReferenceScene>, camera: &Camera) -> Result<Frame> {
@@ -141,6 +144,11 @@ pub(crate) fn evaluate(
                 psnr_db: psnr_db_masked(&frame.image, &view.image, view.mask.as_ref()),
                 ssim: ssim_masked(&frame.image, &view.image, view.mask.as_ref()),
                 psnr_to_reference_db: to_reference,
+                half_size_copy_psnr_db: psnr_db_masked(
+                    &half_size_enlarged(&view.image),
+                    &view.image,
+                    view.mask.as_ref(),
+                ),
                 frame,
             })
         })
@@ -150,6 +158,7 @@ pub(crate) fn evaluate(
     Ok(Evaluation {
         psnr_db: mean(|row| row.psnr_db),
         ssim: mean(|row| row.ssim),
+        half_size_copy_psnr_db: mean(|row| row.half_size_copy_psnr_db),
         bundle_bytes: file.bytes.len(),
         n_anchors: header.n_anchors,
         n_views: rows.len(),

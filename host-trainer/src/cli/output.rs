@@ -46,24 +46,30 @@ fn beside(path: &Path) -> (PathBuf, PathBuf) {
 
 /// Prints `report` to stdout: as JSON, or as aligned `name value` lines.
 pub(crate) fn print<T: serde::Serialize>(report: &T, json: bool) -> Result<()> {
-    if json {
-        println!("{}", serde_json::to_string_pretty(report)?);
-        return Ok(());
-    }
-    let serde_json::Value::Object(fields) = serde_json::to_value(report)? else {
-        anyhow::bail!("a report is a set of named values");
+    let text = if json {
+        serde_json::to_string_pretty(report)? + "\n"
+    } else {
+        let serde_json::Value::Object(fields) = serde_json::to_value(report)? else {
+            anyhow::bail!("a report is a set of named values");
+        };
+        let width = fields.keys().map(String::len).max().unwrap_or(0);
+        fields.iter().map(|(name, value)| format!("{name:width$}  {}\n", plain(value))).collect()
     };
-    let width = fields.keys().map(String::len).max().unwrap_or(0);
-    for (name, value) in &fields {
-        println!("{name:width$}  {}", plain(value));
+    match std::io::stdout().write_all(text.as_bytes()) {
+        // The reader has seen enough, as `head` does.
+        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        written => written.context("could not write to stdout"),
     }
-    Ok(())
 }
 
 fn plain(value: &serde_json::Value) -> String {
     match value {
         serde_json::Value::String(text) => text.clone(),
-        serde_json::Value::Number(number) if number.is_f64() => format!("{:.4}", number.as_f64().unwrap_or(f64::NAN)),
+        serde_json::Value::Number(number) if number.is_f64() => {
+            let value = number.as_f64().unwrap_or(f64::NAN);
+            let digits = if value.abs() < 0.1 { 7 } else { 4 };
+            format!("{value:.digits$}")
+        }
         serde_json::Value::Array(items) => items.iter().map(plain).collect::<Vec<_>>().join(" "),
         other => other.to_string(),
     }

@@ -51,8 +51,11 @@ impl Observer for Progress {
     fn step(&mut self, iteration: u32, report: &StepReport<f32>, scene: &Scene<f32>) {
         let (loss, psnr_db) = (f64::from(report.loss), -10.0 * report.squared_error.log10());
         let newest = NEWEST.max(1.0 / f64::from(iteration - self.from));
-        self.loss += newest * (loss - self.loss);
-        self.psnr_db += newest * (psnr_db - self.psnr_db);
+        // A step that was dropped may have no number to show.
+        if loss.is_finite() && psnr_db.is_finite() {
+            self.loss += newest * (loss - self.loss);
+            self.psnr_db += newest * (psnr_db - self.psnr_db);
+        }
         let state = format!("loss {:.4}  PSNR {:.2} dB  {} anchors", self.loss, self.psnr_db, scene.anchors.len());
         if self.on_terminal {
             self.bar.set_position(u64::from(iteration));

@@ -77,11 +77,12 @@ impl RunConfig {
 
     /// The first key at which two configurations differ in what decides the result, with both values.
     ///
-    /// Where the capture lies, where the bundle goes and when checkpoints are written do not.
+    /// Where the capture lies, where the bundle goes, how it is quantised and when checkpoints are written do not: the
+    /// bundle is written anew from what was trained.
     pub(crate) fn difference(&self, other: &Self) -> Result<Option<String>> {
         let deciding = |config: &Self| {
-            let Self { backbone, capture, train, quantisation, .. } = config.clone();
-            Table::try_from(Self { backbone, capture, train, quantisation, ..Self::default() })
+            let Self { backbone, capture, train, .. } = config.clone();
+            Table::try_from(Self { backbone, capture, train, ..Self::default() })
         };
         Ok(first_difference(&deciding(self)?, &deciding(other)?, ""))
     }

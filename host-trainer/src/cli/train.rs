@@ -9,10 +9,11 @@ use anyhow::{Context, Result, bail};
 use pocketsplat::bundle::{self, BundleInfo, QuantisationSteps};
 use pocketsplat::dataset::{Background, Capture};
 use pocketsplat::scene::Scene;
-use pocketsplat::train::run::{Ending, Interval, RunFolder};
+use pocketsplat::train::run::{Ending, Interval, RunError, RunFolder};
 use pocketsplat::train::step::Workspace;
 use pocketsplat::train::undrawn::zero_undrawn_offsets;
 use pocketsplat::train::{TrainConfig, Trainer};
+use pocketsplat_core::budget::MAX_FRAME_PX;
 use serde::Serialize;
 use signal_hook::consts::{SIGINT, SIGTERM};
 
@@ -47,6 +48,12 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     let load = |config: &mut RunConfig| -> Result<Capture> {
         let source = CaptureArgs { dataset: config.dataset.clone(), options: config.capture.clone() };
         let capture = source.load(config.train.seed)?;
+        let (largest, most) = (largest_px(&capture).into_iter().max().unwrap_or(0), u32::from(MAX_FRAME_PX));
+        if largest > most {
+            bail!(
+                "the photographs are {largest} px wide or high and the decoder draws {most}; use --max-resolution {most}"
+            );
+        }
         config.train = config.train.resolved_for(&capture);
         eprintln!("voxel size {:.5}, normalised units", config.train.voxel_size_for(&capture));
         Ok(capture)
@@ -88,8 +95,14 @@ fn train_in(mut folder: RunFolder, config: &RunConfig, capture: &Capture, args: 
     let how_to_go_on = || format!("go on with `pocketsplat train --resume {}`", path.display());
     let mut progress = Progress::new(trainer.iteration, config.train.iterations);
     let stop = stop_flag()?;
-    let ending = folder.train(&mut trainer, &mut progress, interval, &stop).with_context(|| {
-        format!("training stopped at iteration {}; to retry, {}", trainer.iteration, how_to_go_on())
+    let ending = folder.train(&mut trainer, &mut progress, interval, &stop);
+    let ending = ending.map_err(|error| {
+        let stopped = format!("training stopped at iteration {}", trainer.iteration);
+        match error {
+            // It would come to the same end again.
+            RunError::Train(_) => anyhow::Error::new(error).context(stopped),
+            _ => anyhow::Error::new(error).context(format!("{stopped}; to retry, {}", how_to_go_on())),
+        }
     })?;
     if ending == Ending::Interrupted {
         eprintln!(
@@ -186,11 +199,17 @@ fn write_bundle(
     })
 }
 
+/// Size of the training view with the longest side: what `eval` reduces photographs to unless told otherwise.
+fn largest_px(capture: &Capture) -> [u32; 2] {
+    let sizes = capture.train.iter().map(|view| [view.camera.width_px, view.camera.height_px]);
+    sizes.max_by_key(|size| size[0].max(size[1])).unwrap_or_default()
+}
+
 fn encode(scene: &Scene<f32>, capture: &Capture, background: Background, steps: &QuantisationSteps) -> Result<Vec<u8>> {
     let info = BundleInfo {
         normalisation: capture.normalisation,
         background: background.rgb8(),
-        training_px: [capture.train[0].camera.width_px, capture.train[0].camera.height_px],
+        training_px: largest_px(capture),
         // Any training view will do for a device that has no camera of its own; the first is as good as another.
         preview: capture.train[0].camera.clone(),
     };

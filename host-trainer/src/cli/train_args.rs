@@ -106,13 +106,23 @@ impl Args {
             Some(path) => RunConfig::read(path)?,
             None => RunConfig::default(),
         };
-        let config = self.applied_to(base)?;
+        let mut config = self.applied_to(base)?;
         for (path, name, option) in [(&config.dataset, "dataset", "DATASET"), (&config.output, "output", "--output")] {
             if path.as_os_str().is_empty() {
                 bail!("the configuration names no `{name}`; give it there or as {option}");
             }
         }
         config.train.validate().map_err(anyhow::Error::msg)?;
+        let QuantisationSteps { feature, log_scale, offset } = config.quantisation;
+        for (name, step) in [("feature", feature), ("log_scale", log_scale), ("offset", offset)] {
+            if !(step > 0.0 && step.is_finite()) {
+                bail!("the quantisation step of `{name}` is {step}, needs a positive number");
+            }
+        }
+        // Absolute, so that the run can go on from any folder.
+        for path in [&mut config.dataset, &mut config.output] {
+            *path = std::path::absolute(&path).with_context(|| format!("{} is no path", path.display()))?;
+        }
         Ok(config)
     }
 

@@ -6,7 +6,7 @@ use crate::scene::ModelShape;
 /// Writes the input rows `[feature F, direction 3, distance 1]` of some anchors, the last two if the shape has them.
 ///
 /// direction = (x_a − c)/‖x_a − c‖ (zero at the camera itself), distance = ‖x_a − c‖ in normalised units
-/// (Scaffold-GS, section 1.3 of the method notes: the raw distance).
+/// (Lu et al. 2024, Scaffold-GS, section 3.2.1).
 ///
 /// * `features`: `[n, F]`. * `positions`: `[n]`, world frame. * `out`: `[n, shape.head_inputs()]`, overwritten.
 pub fn forward<R: Real>(shape: &ModelShape, camera: &Pinhole<R>, features: &[R], positions: &[[R; 3]], out: &mut [R]) {
@@ -43,5 +43,59 @@ pub fn forward<R: Real>(shape: &ModelShape, camera: &Pinhole<R>, features: &[R],
 pub fn backward<R: Real>(shape: &ModelShape, d_input: &[R], d_features: &mut [R]) {
     for (row, out) in d_input.chunks_exact(shape.head_inputs()).zip(d_features.chunks_exact_mut(shape.feature_dim)) {
         out.copy_from_slice(&row[..shape.feature_dim]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::Camera;
+    use crate::ops::finite_difference::{assert_gradient, random};
+    use glam::{DMat3, DVec3};
+
+    fn camera() -> Pinhole<f64> {
+        Pinhole::new(&Camera {
+            rotation: DMat3::from_rotation_x(0.3),
+            translation: DVec3::new(0.1, 0.2, 3.0),
+            focal_px: [50.0; 2],
+            principal_px: [16.0; 2],
+            width_px: 32,
+            height_px: 32,
+        })
+    }
+
+    fn shape(view_direction: bool, view_distance: bool) -> ModelShape {
+        ModelShape { feature_dim: 3, n_offsets: 1, view_direction, view_distance, dilation_compensation: false }
+    }
+
+    #[test]
+    fn a_row_is_feature_then_direction_then_distance() {
+        let camera = camera();
+        let mut position = camera.centre_world;
+        position[1] -= 2.0;
+        let mut row = [9.0; 7];
+        forward(&shape(true, true), &camera, &[1.0, 2.0, 3.0], &[position], &mut row);
+        for (found, expected) in row.iter().zip([1.0, 2.0, 3.0, 0.0, -1.0, 0.0, 2.0]) {
+            assert!((found - expected).abs() < 1e-12, "{row:?}");
+        }
+        forward(&shape(true, true), &camera, &[1.0, 2.0, 3.0], &[camera.centre_world], &mut row);
+        assert_eq!(row[3..], [0.0; 4], "at the camera itself there is no direction");
+    }
+
+    #[test]
+    fn backward_agrees_with_finite_differences() {
+        let positions = [[0.3, -0.2, 0.9], [1.0, 0.0, 0.1]];
+        for (view_direction, view_distance) in [(false, false), (true, false), (false, true), (true, true)] {
+            let shape = shape(view_direction, view_distance);
+            let features = random(1, 6);
+            let weights = random(2, 2 * shape.head_inputs());
+            let mut d_features = vec![9.0; 6];
+            backward(&shape, &weights, &mut d_features);
+            assert_gradient("head input", &features, &d_features, |features| {
+                let mut rows = vec![0.0; weights.len()];
+                forward(&shape, &camera(), features, &positions, &mut rows);
+                rows.iter().zip(&weights).map(|(r, w)| r * w).sum()
+            });
+        }
     }
 }

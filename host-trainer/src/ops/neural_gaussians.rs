@@ -55,7 +55,7 @@ impl<R: Real> HeadOutputs<R> {
 /// Appends the Gaussians of a block of anchors whose opacity is positive.
 ///
 /// α = tanh(logit), kept if α > 0; colour = sigmoid; scale = l_g ⊙ sigmoid; rotation = q/‖q‖;
-/// centre = x_a + O_k ⊙ l_a (Lu et al. 2024, Scaffold-GS, eqs. 5–8; layouts in section 1.3 and 1.5 of the method notes).
+/// centre = x_a + O_k ⊙ l_a (Lu et al. 2024, Scaffold-GS, eqs. 5–8; layouts as [`OutputLayout`](crate::scene::OutputLayout) has them).
 ///
 /// * `positions`: `[n]`. * `log_scales`: `[n, 6]`. * `offsets`: `[n, 3K]`. Order: anchors, then offsets, ascending.
 pub fn forward<R: Real>(

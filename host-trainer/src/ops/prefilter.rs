@@ -16,7 +16,7 @@ pub fn anchor_is_visible<R: Real>(camera: &Pinhole<R>, position: [R; 3], size: [
         return false;
     }
     let [fx, fy] = camera.focal_px;
-    let slope = [x / z, y / z].map(|s| s);
+    let slope = [x / z, y / z];
     let [x_lo, x_hi] = camera.slope_bounds(0);
     let [y_lo, y_hi] = camera.slope_bounds(1);
     let (tx, ty) = (slope[0].larger(x_lo).smaller(x_hi), slope[1].larger(y_lo).smaller(y_hi));

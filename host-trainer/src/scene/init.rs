@@ -13,7 +13,7 @@ use crate::ops::Real;
 /// Squared distances below this are lifted to it before the logarithm.
 const MIN_SQUARED_SPACING: f64 = 1e-7;
 
-/// Builds the starting scene from points (Scaffold-GS; section 1.2 and 1.3 of the method notes).
+/// Builds the starting scene from points (Lu et al. 2024, Scaffold-GS, section 3.1).
 ///
 /// Anchors sit at unique(round(p/ε))·ε in lexicographic order; offsets and features are 0; all six log-scales are
 /// ln √(mean squared distance to the three nearest anchors); heads are drawn from U(−1/√n_in, 1/√n_in).

@@ -24,7 +24,7 @@ impl Rate {
     }
 }
 
-/// Learning rates (Scaffold-GS, section 1.10 of the method notes).
+/// Learning rates, as the published Scaffold-GS trainer has them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Rates {
     /// Offsets; multiplied by the capture's extent.
@@ -70,7 +70,7 @@ impl Default for LossWeights {
     }
 }
 
-/// When and how anchors come and go (sections 1.7 to 1.9 of the method notes).
+/// When and how anchors come and go (Lu et al. 2024, Scaffold-GS, section 3.3; constants of the published trainer).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Densification {
     /// Shares of the run at which statistics start, growth starts and both end; 500, 1,500 and 15,000 of 30,000.
@@ -173,7 +173,12 @@ impl TrainConfig {
         within("--feature-dim", self.shape.feature_dim as f64, 1.0, 256.0)?;
         within("--offsets", self.shape.n_offsets as f64, 1.0, 32.0)?;
         within("--voxel-size", self.voxel_size.unwrap_or(1e-3), 1e-6, 1.0)?;
-        within("densification.coarsest_cells", f64::from(self.densification.coarsest_cells.unwrap_or(1)), 1.0, 1e6)?;
+        within(
+            "train.densification.coarsest_cells",
+            f64::from(self.densification.coarsest_cells.unwrap_or(1)),
+            1.0,
+            1e6,
+        )?;
         // The largest integer of TOML, in which configurations are kept.
         within("--seed", self.seed as f64, 0.0, i64::MAX as f64)?;
         let Rates { offset, feature, log_scale, opacity_head, covariance_head, colour_head } = self.rates;
@@ -186,11 +191,18 @@ impl TrainConfig {
             ("colour_head", colour_head),
         ] {
             within(&format!("train.rates.{name}.start"), rate.start, 0.0, 10.0)?;
-            within(&format!("train.rates.{name}.end"), rate.end, 0.0, 10.0)?;
+            // A path to 0 has no logarithm; a rate that starts at 0 stays there.
+            let least_end = if rate.start > 0.0 { f64::MIN_POSITIVE } else { 0.0 };
+            within(&format!("train.rates.{name}.end"), rate.end, least_end, 10.0)?;
         }
         within("train.loss.dssim", self.loss.dssim, 0.0, 1.0)?;
         within("train.loss.volume", self.loss.volume, 0.0, 1e6)?;
-        let Densification { statistics_from, from, until, interval, .. } = self.densification;
+        let Densification { statistics_from, from, until, interval, success, levels, .. } = self.densification;
+        let Densification { gradient_threshold, min_opacity, .. } = self.densification;
+        within("train.densification.success", success, 0.0, 1.0)?;
+        within("train.densification.levels", f64::from(levels), 0.0, 10.0)?;
+        within("train.densification.gradient_threshold", gradient_threshold, 0.0, 1e6)?;
+        within("train.densification.min_opacity", min_opacity, 0.0, 1e6)?;
         within("train.densification.statistics_from", statistics_from, 0.0, 1.0)?;
         within("train.densification.from", from, 0.0, 1.0)?;
         within("train.densification.until", until, 0.0, 1.0)?;

@@ -23,7 +23,7 @@ const EDGE_RATIO: u32 = 4;
 ///
 /// Level i = 0, 1, …: threshold τ·2^i, kept with probability 1 − 0.5^(i+1), voxel edge ε·⌊cells/4^i⌋ (a level without a
 /// cell is skipped, and so is a finer one when nothing has grown yet). A new anchor takes the element-wise largest
-/// feature of the parents that fall into its voxel, log-scales ln(edge), offsets 0 (section 1.8 of the method notes).
+/// feature of the parents that fall into its voxel, log-scales ln(edge), offsets 0 (Lu et al. 2024, Scaffold-GS, section 3.3).
 ///
 /// * `coarsest_cells`: voxel edge of level 0. * returns how many were added.
 pub fn grow(
@@ -114,7 +114,7 @@ fn best_supported(candidates: BTreeMap<[i32; 3], Candidate>, room: usize) -> Vec
 /// Removes anchors that were seen often enough and whose opacities sum to less than `min_opacity` a view on average.
 ///
 /// Afterwards every anchor that was seen often enough starts counting afresh, and base log-scales are lowered to
-/// 0.05 (section 1.9 of the method notes).
+/// 0.05 (as the published trainer does).
 ///
 /// * returns how many were removed.
 pub fn prune(

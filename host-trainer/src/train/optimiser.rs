@@ -22,7 +22,7 @@ pub struct Optimiser<R> {
     pub log_scales: Moments<R>,
     /// Of [`Anchors::offsets`].
     pub offsets: Moments<R>,
-    /// Of the heads.
+    /// First and second moments of the heads.
     pub heads: [Heads<R>; 2],
 }
 
@@ -104,7 +104,7 @@ impl<R: Real> Optimiser<R> {
         }
     }
 
-    /// Appends zero moments for `n` new anchors.
+    /// Appends zero moments for the anchors that `scene` has gained.
     pub fn grow(&mut self, scene: &Scene<R>) {
         let Anchors { features, log_scales, offsets, .. } = &scene.anchors;
         let moments = [&mut self.features, &mut self.log_scales, &mut self.offsets];

@@ -38,7 +38,7 @@ pub enum TrainError {
     /// The cause of dropped steps does not pass.
     #[error(
         "{n} steps in a row would have made parameters infinite or NaN and were dropped, the last one so: {last}; \
-         lower the learning rates, or look at the photograph of that view"
+         look at the photograph of that view, or start a new run with lower `train.rates` in a --config"
     )]
     Diverged {
         /// Steps dropped in a row.

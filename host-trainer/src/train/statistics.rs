@@ -3,7 +3,7 @@
 use super::optimiser::retain_rows;
 use super::step::Workspace;
 
-/// Running sums since an anchor, or an offset, was last judged (section 1.7 of the method notes).
+/// Running sums since an anchor, or an offset, was last judged (Lu et al. 2024, Scaffold-GS, section 3.3).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Statistics {
     /// `[n]` Σ over views of Σ_k max(α, 0).
@@ -12,7 +12,7 @@ pub struct Statistics {
     pub n_views: Vec<u32>,
     /// `[n, K]` Σ over views of ‖∂L/∂mean‖, units of half the image.
     pub gradient_sum: Vec<f32>,
-    /// `[n, K]` views that drew the offset.
+    /// `[n, K]` views in which the offset reached a pixel. (The published count also takes Gaussians too faint to draw.)
     pub n_drawn: Vec<u32>,
 }
 

@@ -57,7 +57,7 @@ pub struct StageSeconds {
     pub tiles: f64,
     /// Blending.
     pub rasterise: f64,
-    /// L1, SSIM and their gradients.
+    /// Image to planes and back, L1, SSIM, their gradients, the squared error.
     pub loss: f64,
     /// From the image's gradient to the splats'.
     pub rasterise_backward: f64,
@@ -190,13 +190,18 @@ impl<R: Real> Workspace<R> {
         l1::backward(&image, target.truth, R::ONE - lambda, &mut d_image);
         ssim::backward(self.level, &image, target.truth, size_px, &partials, -lambda, &mut d_image);
         clear_masked(&mut d_image, target.mask);
-        stages.loss = stopwatch.lap();
         let n_gaussians = self.blocks().iter().map(|b| b.gaussians.len()).sum();
         let volume_weight = R::real(weights.volume);
         let volumes: R = self.blocks().iter().map(|b| volume::forward(&b.gaussians, volume_weight, n_gaussians)).sum();
         let loss = (R::ONE - lambda) * l1::forward(&image, target.truth) + lambda * (R::ONE - similarity) + volumes;
 
+        let squared: f64 = image
+            .chunks(4096)
+            .zip(target.truth.chunks(4096))
+            .map(|(a, b)| a.iter().zip(b).map(|(x, y)| Into::<f64>::into((*x - *y) * (*x - *y))).sum::<f64>())
+            .sum();
         let d_tiled = TiledImage::from_planes(&d_image, size_px);
+        stages.loss = stopwatch.lap();
         let d_splats = rasterise::backward(self.level, &splats, &footprints, &lists, &tiled, &d_tiled);
         stages.rasterise_backward = stopwatch.lap();
         let mut rest = d_splats.as_slice();
@@ -211,12 +216,6 @@ impl<R: Real> Workspace<R> {
         });
         self.sum_head_gradients();
         stages.anchors_backward = stopwatch.lap();
-
-        let squared: f64 = image
-            .chunks(4096)
-            .zip(target.truth.chunks(4096))
-            .map(|(a, b)| a.iter().zip(b).map(|(x, y)| Into::<f64>::into((*x - *y) * (*x - *y))).sum::<f64>())
-            .sum();
         StepReport {
             loss,
             squared_error: squared / (3 * target.n_counted()) as f64,

@@ -6,7 +6,7 @@ use super::TILE_VALUES;
 use crate::ops::Real;
 use crate::ops::tiles::TILE_PX;
 
-/// An image in tile order with the transmittance that is left, as [`forward`](super::forward()) writes and [`backward`](super::backward()) reads it.
+/// An image in tile order, as [`forward`](super::forward()) writes and [`backward`](super::backward()) reads it.
 #[derive(Clone, Debug, Default)]
 pub struct TiledImage<R> {
     /// `[n_tiles, 3, 16, 16]` colour, background included.

@@ -76,12 +76,16 @@ impl ReferenceScene {
         for index in 0..header.n_chunks {
             let chunk = bundle.chunk(index)?;
             let mut lattice = vec![[0; 3]; chunk.n_anchors().into()];
-            let mut values = vec![0.0; lattice.len() * shape.values_per_anchor()];
-            chunk.decode_values(bundle.tables(), &mut lattice, &mut values)?;
+            let mut symbols = vec![0i16; lattice.len() * shape.values_per_anchor()];
+            chunk.decode_symbols(bundle.tables(), &mut lattice, &mut symbols)?;
             // The position itself is an f32 by definition of the format.
             let position = |cell: &[i32; 3]| DVec3::from(cell.map(|c| f64::from(c as f32 * header.voxel_size)));
             scene.positions.extend(lattice.iter().map(position));
-            for row in values.chunks_exact(shape.values_per_anchor()) {
+            for symbols in symbols.chunks_exact(shape.values_per_anchor()) {
+                // FORMAT.md, section 4: value = origin + symbol·step, both operations rounded to f32.
+                let tables = bundle.tables().of_channels();
+                let row: Vec<f32> =
+                    symbols.iter().zip(tables).map(|(&s, t)| f32::from(s) * t.step + t.origin).collect();
                 let (features, rest) = row.split_at(shape.feature_dim);
                 let (log_scales, offsets) = rest.split_at(6);
                 scene.features.extend(features.iter().map(|&v| f64::from(v)));

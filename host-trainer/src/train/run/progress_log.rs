@@ -65,12 +65,14 @@ impl ProgressLog {
         if !trainer.iteration.is_multiple_of(self.every) && !trainer.is_done() {
             return Ok(());
         }
-        let n = f64::from(self.n);
+        let means = match self.n {
+            // Nothing but dropped steps: no number, rather than NaN.
+            0 => ",".to_owned(),
+            n => format!("{:.6},{:.3}", self.loss / f64::from(n), self.psnr_db / f64::from(n)),
+        };
         let row = format!(
-            "{},{:.6},{:.3},{},{:.3},{}\n",
+            "{},{means},{},{:.3},{}\n",
             trainer.iteration,
-            self.loss / n,
-            self.psnr_db / n,
             trainer.scene.anchors.len(),
             trainer.seconds,
             trainer.n_dropped()

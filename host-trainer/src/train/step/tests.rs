@@ -150,3 +150,28 @@ fn a_view_that_sees_nothing_has_zero_gradients() {
     assert!(report.loss.is_finite() && report.n_splats == 0);
     assert!(gradients(&scene, &workspace).iter().all(|g| *g == 0.0));
 }
+
+#[test]
+fn blocks_of_anchors_add_up() {
+    // The heads' gradients are sums over blocks; along random directions, because there are hundreds of weights.
+    let shape = shapes()[0];
+    let points: Vec<DVec3> = random(5, 3 * 700).chunks_exact(3).map(|p| DVec3::from_slice(p) * 0.6).collect();
+    let mut scene = initial_scene(shape, 0.001, &points, &mut ChaCha8Rng::seed_from_u64(5)).cast::<f64>();
+    assert!(scene.anchors.len() > 2 * BLOCK, "several blocks");
+    scene.anchors.features = random(6, scene.anchors.features.len());
+    scene.anchors.log_scales.iter_mut().for_each(|s| *s -= 0.5);
+    let (_, analytic) = step(&scene);
+    let x: Vec<f64> = flatten(&mut scene).into_iter().map(|p| *p).collect();
+    let first_weight = x.len() - scene.heads.each().iter().map(|h| h.n_params()).sum::<usize>();
+    for seed in 0..4 {
+        let direction = random(90 + seed, x.len() - first_weight);
+        let along: f64 = direction.iter().zip(&analytic[first_weight..]).map(|(d, g)| d * g).sum();
+        assert_piecewise_gradient("heads", &[0.0], &[along], |t| {
+            let mut moved = scene.clone();
+            for (p, d) in flatten(&mut moved).into_iter().skip(first_weight).zip(&direction) {
+                *p += t[0] * d;
+            }
+            step(&moved).0
+        });
+    }
+}

@@ -66,6 +66,7 @@ impl Level {
     }
 
     /// [`Self::detect`], asked once.
+    #[cfg(target_arch = "x86_64")]
     fn widest() -> Self {
         static WIDEST: std::sync::OnceLock<Level> = std::sync::OnceLock::new();
         *WIDEST.get_or_init(Self::detect)

@@ -102,8 +102,9 @@ impl ReferenceScene {
         let (n_features, n_offsets) = (self.shape.feature_dim, self.shape.n_offsets);
         let position = self.positions[anchor];
         let log_scales = &self.log_scales[anchor * 6..][..6];
-        let anchor_size = DVec3::from_slice(&log_scales[..3]).exp();
-        let base_size = DVec3::from_slice(&log_scales[3..]).exp();
+        // FORMAT.md, section 7: arguments outside this range are clamped to it.
+        let size = |log: &[f64]| DVec3::from_slice(log).clamp(DVec3::splat(-87.0), DVec3::splat(88.0)).exp();
+        let (anchor_size, base_size) = (size(&log_scales[..3]), size(&log_scales[3..]));
         if !anchor_is_visible(position, anchor_size, camera) {
             return Vec::new();
         }

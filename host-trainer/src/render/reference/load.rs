@@ -5,33 +5,21 @@ use pocketsplat_core::bundle::{Halves, HeadView};
 use pocketsplat_core::{Bundle, DecodeError};
 
 use super::ReferenceScene;
+use crate::ops::Real;
 use crate::scene::{Head, Heads, ModelShape, Scene};
 
 impl ReferenceScene {
     /// The scene that a trainer holds: every value widened, positions `lattice · voxel_size`.
-    pub fn from_scene<R: Copy + Into<f64>>(scene: &Scene<R>) -> Self {
-        let wide = |values: &[R]| values.iter().map(|&v| v.into()).collect::<Vec<f64>>();
-        let head = |h: &Head<R>| Head {
-            n_in: h.n_in,
-            n_hidden: h.n_hidden,
-            n_out: h.n_out,
-            w1: wide(&h.w1),
-            b1: wide(&h.b1),
-            w2: wide(&h.w2),
-            b2: wide(&h.b2),
-        };
-        let position = |cell: &[i32; 3]| DVec3::from(cell.map(f64::from)) * scene.voxel_size;
+    pub fn from_scene<R: Real>(scene: &Scene<R>) -> Self {
+        let Scene { shape, voxel_size, anchors, heads } = scene.cast::<f64>();
+        let position = |cell: &[i32; 3]| DVec3::from(cell.map(f64::from)) * voxel_size;
         Self {
-            shape: scene.shape,
-            positions: scene.anchors.lattice.iter().map(position).collect(),
-            features: wide(&scene.anchors.features),
-            log_scales: wide(&scene.anchors.log_scales),
-            offsets: wide(&scene.anchors.offsets),
-            heads: Heads {
-                opacity: head(&scene.heads.opacity),
-                covariance: head(&scene.heads.covariance),
-                colour: head(&scene.heads.colour),
-            },
+            shape,
+            positions: anchors.lattice.iter().map(position).collect(),
+            features: anchors.features,
+            log_scales: anchors.log_scales,
+            offsets: anchors.offsets,
+            heads,
         }
     }
 

@@ -104,8 +104,9 @@ job_core-embedded() {
   done
 }
 
-# The annotated bundle in the format's description is what the writer writes today.
+# The annotated bundle in the format's description is what the writer writes today, and so are the decoder's tables.
 job_format-doc() {
+  cargo run -q -p tools --bin normal_tables --locked -- --check
   cargo run -q -p tools --bin hexdump --locked -- --check
 }
 

@@ -10,6 +10,7 @@ mod error;
 
 pub mod budget;
 pub mod bundle;
+pub mod context;
 mod decoder;
 #[cfg(feature = "embedded-graphics")]
 pub mod display;

@@ -46,7 +46,7 @@ pub fn random_scene(case: &Case) -> Scene<f32> {
     let mut rng = ChaCha8Rng::seed_from_u64(case.seed);
     let (f, k) = (case.shape.feature_dim, case.shape.n_offsets);
     let mut anchors =
-        Anchors { lattice: Vec::new(), features: Vec::new(), log_scales: Vec::new(), offsets: Vec::new() };
+        Anchors { lattice: vec![], features: vec![], log_scales: vec![], offsets: vec![], mask_logits: vec![] };
     while anchors.len() < case.n_anchors {
         let cell: [i32; 3] = std::array::from_fn(|_| rng.random_range(-RADIUS_CELLS..=RADIUS_CELLS));
         let inside = cell.iter().map(|c| c * c).sum::<i32>() <= RADIUS_CELLS * RADIUS_CELLS;
@@ -59,6 +59,7 @@ pub fn random_scene(case: &Case) -> Scene<f32> {
     anchors.features = (0..n * f).map(|_| rng.random_range(-1.0..1.0)).collect();
     // e^-3.2 … e^-1.2: 0.04 … 0.3 units.
     anchors.log_scales = (0..n * 6).map(|_| rng.random_range(-3.2..-1.2)).collect();
+    anchors.mask_logits = vec![1.0; n * k];
     anchors.offsets = (0..n * k * 3).map(|_| rng.random_range(-1.0..1.0)).collect();
     let mut heads = Heads::filled(&case.shape, 0.0_f32);
     for head in heads.each_mut() {
@@ -69,7 +70,7 @@ pub fn random_scene(case: &Case) -> Scene<f32> {
         head.w2.fill_with(|| rng.random_range(-reach_out..reach_out));
         head.b2.fill_with(|| rng.random_range(-0.3..0.3));
     }
-    Scene { shape: case.shape, voxel_size: VOXEL_SIZE, anchors, heads }
+    Scene { shape: case.shape, voxel_size: VOXEL_SIZE, anchors, heads, context: None }
 }
 
 /// A camera at `eye` that looks at `target`, with the world's z up.

@@ -203,7 +203,7 @@ impl Header {
 }
 
 /// Checks `least <= found <= most` and names the limit that does not hold.
-pub(super) fn in_range(field: Field, found: u32, least: u32, most: u32) -> Result<(), DecodeError> {
+pub(crate) fn in_range(field: Field, found: u32, least: u32, most: u32) -> Result<(), DecodeError> {
     if found < least {
         return Err(DecodeError::OutOfRange { field, found, limit: least });
     }

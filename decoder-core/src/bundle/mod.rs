@@ -18,7 +18,8 @@ mod table;
 
 pub use chunk::{AnchorReader, Chunk};
 pub use crc::crc32;
-pub(crate) use cursor::saturate;
+pub(crate) use cursor::{Cursor, saturate};
+pub(crate) use header::in_range;
 pub use header::{
     Effects, HEADER_LEN, Header, MAGIC, MAX_ANCHORS, MAX_CHUNK_ANCHORS, MAX_FEATURE_DIM, MAX_OFFSETS, VERSION,
 };

@@ -7,7 +7,10 @@
 mod ans;
 mod bits;
 mod model;
+mod normal;
+mod normal_tables;
 
 pub use ans::AnsReader;
 pub use bits::BitReader;
 pub use model::{FREQUENCY_TOTAL, PRECISION_BITS, Slot, SymbolModel, UniformByte};
+pub use normal::{EIGHTHS, N_PHASES, N_SCALES, NormalModel, SCALE_ONE, SymbolSlots};

@@ -18,6 +18,8 @@ pub enum SectionKind {
     Directory,
     /// The chunks' coded anchors.
     Chunks,
+    /// The context model.
+    Context,
 }
 
 /// A value that has limits of its own; names what [`OutOfRange`](super::DecodeError::OutOfRange) and its kin speak of.
@@ -49,6 +51,14 @@ pub enum Field {
     InkBox,
     LatticeBase,
     LatticeBits,
+    ContextLevels,
+    ContextHidden,
+    ContextShift,
+    ContextBias,
+    ContextStep,
+    GridKind,
+    GridResolution,
+    GridRows,
     CameraPose,
     CameraFocal,
     CameraPrincipal,
@@ -82,6 +92,7 @@ impl fmt::Display for SectionKind {
             Self::Tables => "section tables",
             Self::Directory => "section directory",
             Self::Chunks => "section chunks",
+            Self::Context => "section context",
         })
     }
 }
@@ -113,6 +124,14 @@ impl fmt::Display for Field {
             Self::InkBox => "ink box of a chunk",
             Self::LatticeBase => "lattice base of a chunk",
             Self::LatticeBits => "lattice bits of a chunk",
+            Self::ContextLevels => "grid levels of the context",
+            Self::ContextHidden => "hidden units of the context",
+            Self::ContextShift => "shift of a context layer",
+            Self::ContextBias => "bias of a context layer",
+            Self::ContextStep => "base step of the context",
+            Self::GridKind => "kind of a grid level",
+            Self::GridResolution => "resolution of a grid level",
+            Self::GridRows => "rows of a grid level (all nodes, or a power of two)",
             Self::CameraPose => "camera pose",
             Self::CameraFocal => "camera focal length",
             Self::CameraPrincipal => "camera principal point",

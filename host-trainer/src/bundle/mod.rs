@@ -7,6 +7,7 @@
 
 pub mod annotate;
 mod chunk;
+pub mod context;
 mod error;
 mod layout;
 mod load;

@@ -28,6 +28,7 @@ fn random_scene(shape: ModelShape, n_anchors: usize, seed: u64) -> Scene<f32> {
         features: (0..n_anchors * shape.feature_dim).map(|_| bell(0.6)).collect(),
         log_scales: (0..n_anchors * 6).map(|_| -2.5 + bell(0.7)).collect(),
         offsets: (0..n_anchors * 3 * shape.n_offsets).map(|_| bell(1.0)).collect(),
+        mask_logits: vec![1.0; n_anchors * shape.n_offsets],
     };
     let mut heads = Heads::filled(&shape, 0.0);
     for head in heads.each_mut() {
@@ -37,7 +38,7 @@ fn random_scene(shape: ModelShape, n_anchors: usize, seed: u64) -> Scene<f32> {
     }
     // About two offsets in three are visible.
     heads.opacity.b2.iter_mut().for_each(|bias| *bias += 0.3);
-    Scene { shape, voxel_size: 0.01, anchors, heads }
+    Scene { shape, voxel_size: 0.01, anchors, heads, context: None }
 }
 
 /// A small shape with every effect.

@@ -6,7 +6,7 @@ use glam::DVec3;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::{Anchors, Heads, ModelShape, Scene};
+use super::{Anchors, Heads, INITIAL_MASK_LOGIT, ModelShape, Scene};
 use crate::dataset::nearest_squared;
 use crate::ops::Real;
 
@@ -30,6 +30,7 @@ pub fn initial_scene(shape: ModelShape, voxel_size: f64, points: &[DVec3], rng: 
         features: vec![0.0; n * shape.feature_dim],
         log_scales,
         offsets: vec![0.0; n * shape.n_offsets * 3],
+        mask_logits: vec![f32::real(INITIAL_MASK_LOGIT); n * shape.n_offsets],
     };
     let mut heads = Heads::filled(&shape, 0.0f32);
     for head in heads.each_mut() {
@@ -41,7 +42,7 @@ pub fn initial_scene(shape: ModelShape, voxel_size: f64, points: &[DVec3], rng: 
             }
         }
     }
-    Scene { shape, voxel_size, anchors, heads }
+    Scene { shape, voxel_size, anchors, heads, context: None }
 }
 
 /// The lattice cell nearest to a point, ties to even.

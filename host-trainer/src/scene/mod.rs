@@ -2,9 +2,11 @@
 //!
 //! Everything is in the normalised frame of [`crate::dataset::Normalisation`].
 
+mod context;
 mod heads;
 pub mod init;
 
+pub use context::ContextModel;
 pub use heads::{Head, Heads, OutputLayout};
 
 /// What a model consists of: its widths and the effects it pays for.
@@ -34,6 +36,11 @@ impl ModelShape {
     }
 }
 
+/// Mask logits above this are drawn: sigmoid(m) > 0.01.
+pub const MASK_THRESHOLD: f64 = -4.595_119_850_134_59;
+/// Where mask logits start.
+pub const INITIAL_MASK_LOGIT: f64 = 1.0;
+
 /// Anchors as structure of arrays, one row an anchor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Anchors<R> {
@@ -46,12 +53,24 @@ pub struct Anchors<R> {
     pub log_scales: Vec<R>,
     /// `[n_anchors, K, 3]` offsets in units of `exp(log_scales[0..3])`.
     pub offsets: Vec<R>,
+    /// `[n_anchors, K]` mask logits: an offset is drawn, and coded, only where its logit is above [`MASK_THRESHOLD`]
+    /// (Chen et al. 2024, HAC, section 4.3).
+    pub mask_logits: Vec<R>,
 }
 
 impl<R> Anchors<R> {
     /// Number of anchors.
     pub fn len(&self) -> usize {
         self.lattice.len()
+    }
+
+    /// Whether offset `offset` of all anchors' offsets, counted through, is drawn.
+    #[inline]
+    pub fn is_drawn(&self, offset: usize) -> bool
+    where
+        R: crate::ops::Real,
+    {
+        self.mask_logits[offset] > R::real(MASK_THRESHOLD)
     }
 
     /// Whether there is no anchor.
@@ -71,6 +90,8 @@ pub struct Scene<R> {
     pub anchors: Anchors<R>,
     /// The three heads.
     pub heads: Heads<R>,
+    /// What places say about values, once training has come to it; scenes without are coded with static tables.
+    pub context: Option<ContextModel<R>>,
 }
 
 impl<R: crate::ops::Real> Scene<R> {
@@ -101,12 +122,20 @@ impl<R: crate::ops::Real> Scene<R> {
                 features: all(&self.anchors.features),
                 log_scales: all(&self.anchors.log_scales),
                 offsets: all(&self.anchors.offsets),
+                mask_logits: all(&self.anchors.mask_logits),
             },
             heads: Heads {
                 opacity: head(&self.heads.opacity),
                 covariance: head(&self.heads.covariance),
                 colour: head(&self.heads.colour),
             },
+            context: self.context.as_ref().map(|context| ContextModel {
+                frame: context.frame,
+                levels: context.levels.clone(),
+                rows: all(&context.rows),
+                mlp: head(&context.mlp),
+                base_steps: context.base_steps,
+            }),
         }
     }
 }

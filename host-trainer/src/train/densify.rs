@@ -9,8 +9,8 @@ use rand_chacha::ChaCha8Rng;
 use super::config::Densification;
 use super::optimiser::{Optimiser, retain_rows};
 use super::statistics::Statistics;
-use crate::scene::Scene;
 use crate::scene::init::lattice_cell;
+use crate::scene::{INITIAL_MASK_LOGIT, Scene};
 
 /// Base log-scales above this are lowered to it at every event, as the published trainer does: l_g ≤ e^0.05.
 const MAX_BASE_LOG_SCALE: f32 = 0.05;
@@ -80,6 +80,7 @@ pub fn grow(
             scene.anchors.features.extend(feature);
             scene.anchors.log_scales.extend([log_edge; 6]);
             scene.anchors.offsets.extend(std::iter::repeat_n(0.0, 3 * k));
+            scene.anchors.mask_logits.extend(std::iter::repeat_n(INITIAL_MASK_LOGIT as f32, k));
         }
     }
     for at in eligible {
@@ -150,6 +151,7 @@ pub fn prune(
     retain_rows(&mut scene.anchors.features, f, &keep);
     retain_rows(&mut scene.anchors.log_scales, 6, &keep);
     retain_rows(&mut scene.anchors.offsets, 3 * k, &keep);
+    retain_rows(&mut scene.anchors.mask_logits, k, &keep);
     optimiser.retain(&keep, f, k);
     statistics.retain(&keep, k);
     n_before - scene.anchors.len()

@@ -92,9 +92,11 @@ impl<'a> Trainer<'a> {
             return Err(TrainError::NoViews);
         }
         let config = config.resolved_for(capture);
-        let anchors = Anchors { lattice: vec![], features: vec![], log_scales: vec![], offsets: vec![] };
+        let anchors =
+            Anchors { lattice: vec![], features: vec![], log_scales: vec![], offsets: vec![], mask_logits: vec![] };
         let heads = Heads::filled(&config.shape, 0.0);
-        let scene = Scene { shape: config.shape, voxel_size: config.voxel_size_for(capture), anchors, heads };
+        let voxel_size = config.voxel_size_for(capture);
+        let scene = Scene { shape: config.shape, voxel_size, anchors, heads, context: None };
         Ok(Self {
             signature: CaptureSignature::of(capture),
             cameras: capture.train.iter().map(|v| Pinhole::new(&v.camera)).collect(),

@@ -87,8 +87,10 @@ fn example() -> Result<Vec<u8>> {
             features: vec![0.5, -0.25, 0.75, -50.0],
             log_scales: vec![-1.0, -1.0, -1.0, -1.5, -1.5, -2.0, -1.0, -1.0, -1.25, -1.5, -1.5, -1.5],
             offsets: vec![0.25, 0.0, -0.5, 0.0, 0.5, 0.25],
+            mask_logits: vec![1.0; 2],
         },
         heads,
+        context: None,
     };
     let info = BundleInfo {
         normalisation: Normalisation { centre: DVec3::new(1.0, 2.0, -0.5), scale: 2.0 },

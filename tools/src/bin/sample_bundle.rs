@@ -89,7 +89,7 @@ fn lit(colour: DVec3, normal: DVec3) -> DVec3 {
 
 fn scene() -> Scene<f32> {
     let mut anchors =
-        Anchors { lattice: Vec::new(), features: Vec::new(), log_scales: Vec::new(), offsets: Vec::new() };
+        Anchors { lattice: vec![], features: vec![], log_scales: vec![], offsets: vec![], mask_logits: vec![] };
     for patch in planet().into_iter().chain(ring()) {
         anchors.lattice.push((patch.position / VOXEL_SIZE).round().as_ivec3().to_array());
         let turn = DQuat::from_rotation_arc(DVec3::Z, patch.normal);
@@ -102,10 +102,11 @@ fn scene() -> Scene<f32> {
         // The discs' radius: two thirds of their spacing, so that they overlap into a surface.
         anchors.log_scales.extend([log_reach, log_reach, log_reach, log_reach, log_reach, log_reach]);
         for [x, y] in [[-0.5, -0.5], [0.5, -0.5], [-0.5, 0.5], [0.5, 0.5]] {
+            anchors.mask_logits.push(1.0);
             anchors.offsets.extend((turn * DVec3::new(x, y, 0.0)).to_array().map(|o| o as f32));
         }
     }
-    Scene { shape: SHAPE, voxel_size: VOXEL_SIZE, anchors, heads: heads() }
+    Scene { shape: SHAPE, voxel_size: VOXEL_SIZE, anchors, heads: heads(), context: None }
 }
 
 /// Heads that read the features as [`scene`] wrote them, add a glint towards the sun and a haze with distance.

@@ -11,7 +11,7 @@ use crate::scene::{Head, Heads, ModelShape, Scene};
 impl ReferenceScene {
     /// The scene that a trainer holds: every value widened, positions `lattice · voxel_size`.
     pub fn from_scene<R: Real>(scene: &Scene<R>) -> Self {
-        let Scene { shape, voxel_size, anchors, heads } = scene.cast::<f64>();
+        let Scene { shape, voxel_size, anchors, heads, .. } = scene.cast::<f64>();
         let position = |cell: &[i32; 3]| DVec3::from(cell.map(f64::from)) * voxel_size;
         Self {
             shape,

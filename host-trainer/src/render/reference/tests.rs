@@ -255,8 +255,10 @@ fn a_scene_is_widened_value_by_value() {
             features: vec![0.5],
             log_scales: vec![0.1; 6],
             offsets: vec![1.0, 2.0, 3.0],
+            mask_logits: vec![1.0],
         },
         heads: Heads::filled(&shape, 0.125),
+        context: None,
     };
     let wide = ReferenceScene::from_scene(&scene);
     assert_eq!(wide.positions, [DVec3::new(1.0, -0.5, 0.0)], "lattice times voxel size");

@@ -60,8 +60,9 @@ impl<'a> Trainer<'a> {
         out.value(self.rng.get_word_pos())?;
         out.values(&self.queue)?;
 
-        let Anchors { lattice, features, log_scales, offsets } = &self.scene.anchors;
+        let Anchors { lattice, features, log_scales, offsets, mask_logits } = &self.scene.anchors;
         out.values(lattice)?;
+        out.values(mask_logits)?;
         let Optimiser { features: f, log_scales: s, offsets: o, .. } = &self.optimiser;
         for (values, moments) in [(features, f), (log_scales, s), (offsets, o)] {
             out.values(values)?;
@@ -122,6 +123,7 @@ impl<'a> Trainer<'a> {
 
         let lattice: Vec<[i32; 3]> = from.values("lattice")?;
         let n = lattice.len();
+        let mask_logits = from.exactly("mask logits", n * n_offsets)?;
         let mut array = |what, width: usize| -> Result<_, CheckpointFault> {
             let len = n * width;
             let values: Vec<f32> = from.exactly(what, len)?;
@@ -139,8 +141,8 @@ impl<'a> Trainer<'a> {
             }
             Ok::<_, CheckpointFault>(heads)
         };
-        let anchors = Anchors { lattice, features, log_scales, offsets };
-        self.scene = Scene { shape, voxel_size, anchors, heads: heads()? };
+        let anchors = Anchors { lattice, features, log_scales, offsets, mask_logits };
+        self.scene = Scene { shape, voxel_size, anchors, heads: heads()?, context: None };
         let heads = [heads()?, heads()?];
         self.optimiser = Optimiser { n_steps, features: f, log_scales: s, offsets: o, heads };
         self.statistics = Statistics {

@@ -1,0 +1,226 @@
+//! The context model: what an anchor's place says about its symbols (Chen et al. 2024, HAC, section 4), in integers.
+//!
+//! grid features → hidden units → per channel a mean and a scale, per group a quantisation step. Training runs the same
+//! quantities in floats and ends on these integers; whatever decides a symbol is computed here and nowhere else.
+#![deny(clippy::indexing_slicing, clippy::arithmetic_side_effects, clippy::unwrap_used, clippy::panic)]
+
+mod grid;
+mod mlp;
+mod steps;
+
+pub use grid::{Corners, FEATURES_PER_LEVEL, GridFrame, GridLevel, LevelKind, WEIGHT_ONE};
+pub use mlp::{MAX_BIAS, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS};
+pub use steps::{Group, MAX_STEP_EXPONENT, MEAN_PARTS, MIN_STEP_EXPONENT, N_GROUPS, Steps};
+
+use crate::bundle::{Cursor, in_range, saturate};
+use crate::entropy::{EIGHTHS, NormalModel, SCALE_ONE};
+use crate::error::{DecodeError, Field, SectionKind};
+use mlp::Layer;
+use steps::check_base_steps;
+
+/// Length of a level's record, bytes.
+const LEVEL_LEN: usize = 8;
+/// Bits by which a weighted sum of rows is shortened to a feature: a feature of one is 2¹⁴.
+const FEATURE_SHIFT: u32 = 10;
+
+/// A feature of one.
+pub const FEATURE_ONE: i16 = 1 << 14;
+
+/// The context section of a bundle, checked.
+#[derive(Clone, Copy, Debug)]
+pub struct Context<'a> {
+    frame: GridFrame,
+    base_steps: [f32; N_GROUPS],
+    levels: &'a [[u8; LEVEL_LEN]],
+    hidden: Layer<'a>,
+    output: Layer<'a>,
+    /// Four bits a row, set for +1; two rows a byte, the first in the low half.
+    grid: &'a [u8],
+    feature_dim: usize,
+    n_channels: usize,
+}
+
+impl<'a> Context<'a> {
+    /// Checks a section for anchors of `n_channels` channels, the first `feature_dim` of them features.
+    ///
+    /// # Errors
+    /// [`DecodeError`] naming the section or the number outside its limits.
+    pub fn parse(section: &'a [u8], feature_dim: usize, n_channels: usize) -> Result<Self, DecodeError> {
+        let mut cursor = Cursor::new(section, SectionKind::Context);
+        let mut min = [0; 3];
+        for coordinate in &mut min {
+            *coordinate = cursor.i32()?;
+        }
+        let mut scale = [0; 3];
+        for factor in &mut scale {
+            *factor = cursor.u32()?;
+        }
+        let base_steps = check_base_steps(cursor.f32s()?)?;
+        let [n_levels, reserved] = cursor.array()?;
+        in_range(Field::Reserved, reserved.into(), 0, 0)?;
+        in_range(Field::ContextLevels, n_levels.into(), 1, MAX_CONTEXT_LEVELS.into())?;
+        let n_hidden = cursor.u16()?;
+        in_range(Field::ContextHidden, n_hidden.into(), 1, MAX_CONTEXT_HIDDEN.into())?;
+        let n_levels = usize::from(n_levels);
+        let n_hidden = usize::from(n_hidden);
+        let (levels, _) = cursor.bytes(n_levels.saturating_mul(LEVEL_LEN))?.as_chunks();
+        let mut n_rows = 0_u32;
+        for record in levels {
+            n_rows = n_rows.saturating_add(checked_level(record)?.n_rows);
+        }
+        let n_inputs = n_levels.saturating_mul(FEATURES_PER_LEVEL);
+        let n_outputs = n_channels.saturating_mul(2).saturating_add(N_GROUPS);
+        let [hidden_shifts, output_shifts] = [cursor.bytes(n_hidden)?, cursor.bytes(n_outputs)?];
+        let (hidden_biases, _) = cursor.bytes(n_hidden.saturating_mul(4))?.as_chunks();
+        let (output_biases, _) = cursor.bytes(n_outputs.saturating_mul(4))?.as_chunks();
+        let hidden_weights = cursor.bytes(n_inputs.saturating_mul(n_hidden))?;
+        let output_weights = cursor.bytes(n_hidden.saturating_mul(n_outputs))?;
+        let hidden = Layer { weights: hidden_weights, biases: hidden_biases, shifts: hidden_shifts, n_in: n_inputs };
+        let output = Layer { weights: output_weights, biases: output_biases, shifts: output_shifts, n_in: n_hidden };
+        hidden.check()?;
+        output.check()?;
+        let grid = cursor.bytes((n_rows as usize).div_ceil(2))?;
+        if !cursor.rest().is_empty() {
+            return Err(DecodeError::WrongLength {
+                section: SectionKind::Context,
+                expected: saturate(cursor.position()),
+                found: saturate(section.len()),
+            });
+        }
+        Ok(Self { frame: GridFrame { min, scale }, base_steps, levels, hidden, output, grid, feature_dim, n_channels })
+    }
+
+    /// Inputs of the network: [`FEATURES_PER_LEVEL`] a level.
+    #[must_use]
+    pub fn n_inputs(&self) -> usize {
+        self.hidden.n_in
+    }
+
+    /// Hidden units.
+    #[must_use]
+    pub fn n_hidden(&self) -> usize {
+        self.output.n_in
+    }
+
+    /// Outputs: C means, C scales, three steps.
+    #[must_use]
+    pub fn n_outputs(&self) -> usize {
+        self.output.biases.len()
+    }
+
+    /// Where the grid lies.
+    #[must_use]
+    pub fn frame(&self) -> GridFrame {
+        self.frame
+    }
+
+    /// Steps of the three groups where the network says nothing.
+    #[must_use]
+    pub fn base_steps(&self) -> [f32; N_GROUPS] {
+        self.base_steps
+    }
+
+    /// The levels in the order of the inputs.
+    pub fn levels(&self) -> impl Iterator<Item = GridLevel> + use<'a> {
+        self.levels.iter().filter_map(level)
+    }
+
+    /// Group of a channel.
+    #[must_use]
+    pub fn group(&self, channel: usize) -> Group {
+        Group::of_channel(channel, self.feature_dim)
+    }
+
+    /// The grid's features at an anchor.
+    ///
+    /// Per level and feature `(Σ ±weight + 512) >> 10` over the corners: one is [`FEATURE_ONE`].
+    ///
+    /// * `features`: `[n_inputs]`, filled.
+    ///
+    /// # Budget
+    /// 8 look-ups a volume, 4 a plane, of four features each.
+    #[inline]
+    pub fn features(&self, lattice: [i32; 3], features: &mut [i16]) {
+        let unit = self.frame.unit(lattice);
+        let mut first_row = 0_u32;
+        for (level, out) in self.levels().zip(features.as_chunks_mut::<FEATURES_PER_LEVEL>().0) {
+            let mut sums = [1_i32 << (FEATURE_SHIFT - 1); FEATURES_PER_LEVEL];
+            for (row, weight) in level.corners(unit).iter() {
+                let bits = self.row_bits(first_row.wrapping_add(row));
+                // Weights add up to 2²⁴.
+                for (bit, sum) in sums.iter_mut().enumerate() {
+                    let weight = weight as i32;
+                    *sum = sum.wrapping_add(if bits >> bit & 1 == 1 { weight } else { weight.wrapping_neg() });
+                }
+            }
+            *out = sums.map(|sum| (sum >> FEATURE_SHIFT) as i16);
+            first_row = first_row.wrapping_add(level.n_rows);
+        }
+    }
+
+    /// The hidden units: `(W1·x + b1) >> shift`, limited to 0..=32767.
+    ///
+    /// * `features`: `[n_inputs]`. * `hidden`: `[n_hidden]`, filled.
+    #[inline(always)]
+    pub fn hidden(&self, features: &[i16], hidden: &mut [i16]) {
+        self.hidden.rectified(features, hidden);
+    }
+
+    /// One output: `(W2·h + b2) >> shift`, limited to i16.
+    #[inline(always)]
+    #[must_use]
+    pub fn output(&self, row: usize, hidden: &[i16]) -> i16 {
+        self.output.output(row, hidden).clamp(i16::MIN.into(), i16::MAX.into()) as i16
+    }
+
+    /// The anchor's quantisation steps.
+    #[inline]
+    #[must_use]
+    pub fn steps(&self, hidden: &[i16]) -> Steps {
+        let first = self.n_channels.saturating_mul(2);
+        let raw = [0, 1, 2].map(|group: usize| self.output(first.saturating_add(group), hidden));
+        Steps::new(self.base_steps, raw)
+    }
+
+    /// The distribution of a channel's symbol.
+    ///
+    /// # Budget
+    /// Two rows of the network.
+    #[inline]
+    #[must_use]
+    pub fn model(&self, channel: usize, steps: &Steps, hidden: &[i16]) -> NormalModel {
+        let group = self.group(channel);
+        let mean = self.output(channel, hidden);
+        let scale = self.output(channel.saturating_add(self.n_channels), hidden);
+        let exponent = steps.exponent(group);
+        let scale = i32::from(scale).saturating_sub(exponent).saturating_add(SCALE_ONE);
+        NormalModel::new(steps.mean_eighths(group, mean), scale)
+    }
+
+    fn row_bits(&self, row: u32) -> u8 {
+        let byte = self.grid.get((row >> 1) as usize).copied().unwrap_or_default();
+        if row & 1 == 0 { byte & 0xF } else { byte >> 4 }
+    }
+}
+
+/// A level as its record has it.
+fn level(record: &[u8; LEVEL_LEN]) -> Option<GridLevel> {
+    let [kind, _, r0, r1, n_rows @ ..] = *record;
+    let kind = LevelKind::from_code(kind)?;
+    Some(GridLevel { kind, resolution: u16::from_le_bytes([r0, r1]), n_rows: u32::from_le_bytes(n_rows) })
+}
+
+fn checked_level(record: &[u8; LEVEL_LEN]) -> Result<GridLevel, DecodeError> {
+    let [kind, reserved, ..] = *record;
+    in_range(Field::Reserved, reserved.into(), 0, 0)?;
+    let unknown = DecodeError::OutOfRange { field: Field::GridKind, found: kind.into(), limit: 3 };
+    let level = level(record).ok_or(unknown)?;
+    in_range(Field::GridResolution, level.resolution.into(), 2, 1 << 15)?;
+    if !level.is_dense() && !level.n_rows.is_power_of_two() {
+        let limit = level.n_nodes().unwrap_or(u32::MAX);
+        return Err(DecodeError::OutOfRange { field: Field::GridRows, found: level.n_rows, limit });
+    }
+    Ok(level)
+}
+
+const _: () = assert!(EIGHTHS == 8, "scale outputs and the tables count octaves alike");

@@ -1,0 +1,140 @@
+//! Quantisation steps of an anchor, from a table: 2^(q/8) times the scene's base steps.
+
+use crate::error::{DecodeError, Field};
+
+/// Groups of channels that share a step.
+pub const N_GROUPS: usize = 3;
+/// Smallest exponent: an eighth of the base step.
+pub const MIN_STEP_EXPONENT: i32 = -24;
+/// Largest exponent: 1.83 base steps; HAC's 1 + tanh stays below 2.
+pub const MAX_STEP_EXPONENT: i32 = 7;
+/// Means leave the network in parts of a base step.
+pub const MEAN_PARTS: i32 = 64;
+
+/// 2^(i/8), the part of an octave.
+const PART_OF_OCTAVE: [f32; 8] =
+    [1.0, 1.090_507_7, 1.189_207_1, 1.296_839_6, core::f32::consts::SQRT_2, 1.542_210_8, 1.681_792_9, 1.834_008_1];
+/// round(4096·2^(−i/8)).
+const INVERSE_PART_OF_OCTAVE: [i32; 8] = [4096, 3756, 3444, 3158, 2896, 2656, 2435, 2233];
+/// 2⁻¹² of the inverse, and from 64ths to eighths.
+const MEAN_SHIFT: u32 = 15;
+
+/// Channels that share a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Group {
+    /// The F features.
+    Feature,
+    /// The six log-scales.
+    LogScale,
+    /// The 3K offsets.
+    Offset,
+}
+
+impl Group {
+    pub(super) const fn of_channel(channel: usize, feature_dim: usize) -> Self {
+        if channel < feature_dim {
+            Self::Feature
+        } else if channel < feature_dim.saturating_add(6) {
+            Self::LogScale
+        } else {
+            Self::Offset
+        }
+    }
+}
+
+/// The steps of one anchor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Steps {
+    exponents: [i8; N_GROUPS],
+    values: [f32; N_GROUPS],
+}
+
+impl Steps {
+    /// Steps base·2^(q/8), the exponents q limited to [`MIN_STEP_EXPONENT`]..=[`MAX_STEP_EXPONENT`].
+    #[must_use]
+    pub fn new(base_steps: [f32; N_GROUPS], exponents: [i16; N_GROUPS]) -> Self {
+        let exponents = exponents.map(|q| i32::from(q).clamp(MIN_STEP_EXPONENT, MAX_STEP_EXPONENT) as i8);
+        let mut values = base_steps;
+        for (value, &exponent) in values.iter_mut().zip(&exponents) {
+            let part = PART_OF_OCTAVE.get(usize::from(exponent as u8 & 7)).copied().unwrap_or(1.0);
+            // Octaves −3 to 0, as exact powers of two.
+            let octave = match exponent >> 3 {
+                ..=-3 => 0.125,
+                -2 => 0.25,
+                -1 => 0.5,
+                0.. => 1.0,
+            };
+            *value = *value * part * octave;
+        }
+        Self { exponents, values }
+    }
+
+    /// q, in eighths of an octave.
+    #[inline]
+    #[must_use]
+    pub fn exponent(&self, group: Group) -> i32 {
+        let [feature, log_scale, offset] = self.exponents;
+        i32::from(match group {
+            Group::Feature => feature,
+            Group::LogScale => log_scale,
+            Group::Offset => offset,
+        })
+    }
+
+    /// Distance between neighbouring symbols' values; the value of a symbol is `f32(symbol)·step`.
+    #[inline]
+    #[must_use]
+    pub fn value(&self, group: Group) -> f32 {
+        let [feature, log_scale, offset] = self.values;
+        match group {
+            Group::Feature => feature,
+            Group::LogScale => log_scale,
+            Group::Offset => offset,
+        }
+    }
+
+    /// A mean in 1/[`MEAN_PARTS`] of a base step, in eighths of this step: `(mean·T + 2¹⁴) >> 15`, T = 4096·2^(−q/8).
+    #[inline]
+    pub(super) fn mean_eighths(&self, group: Group, mean: i16) -> i32 {
+        let exponent = self.exponent(group);
+        let part = INVERSE_PART_OF_OCTAVE.get((exponent & 7) as usize).copied().unwrap_or(4096);
+        // q = 8·octave + part, so T = INVERSE[part]·2^(−octave) with octaves −3..=0: at most 2¹⁵, the product at most 2³⁰.
+        let octaves = (exponent >> 3).min(0).unsigned_abs();
+        let factor = part.wrapping_shl(octaves);
+        i32::from(mean).wrapping_mul(factor).wrapping_add(1 << (MEAN_SHIFT - 1)) >> MEAN_SHIFT
+    }
+}
+
+pub(super) fn check_base_steps(base_steps: [f32; N_GROUPS]) -> Result<[f32; N_GROUPS], DecodeError> {
+    for (index, step) in (0..).zip(base_steps) {
+        // With 16 bits of symbol and 1.83 on top, a value stays below 10¹⁸, so that no product of two overflows.
+        if !(step.is_finite() && step > 1e-12 && step < 1e12) {
+            return Err(DecodeError::BadFloat { field: Field::ContextStep, index });
+        }
+    }
+    Ok(base_steps)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_are_eighths_of_octaves() {
+        for q in -40..=20_i16 {
+            let steps = Steps::new([1.0, 0.1, 0.2], [q; 3]);
+            let clamped = f64::from(q).clamp(-24.0, 7.0);
+            let expected = 2f64.powf(clamped / 8.0);
+            let found = f64::from(steps.value(Group::Feature));
+            assert!((found / expected - 1.0).abs() < 1e-6, "q {q}: {found} against {expected}");
+            for mean in [-32768, -640, -1, 0, 5, 64, 32767_i16] {
+                let expected = f64::from(mean) / 64.0 / expected * 8.0;
+                let found = f64::from(steps.mean_eighths(Group::Offset, mean));
+                assert!(
+                    (found - expected).abs() <= 0.5 + expected.abs() * 2e-4,
+                    "q {q}, mean {mean}: {found}, {expected}"
+                );
+            }
+        }
+    }
+}

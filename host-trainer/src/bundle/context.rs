@@ -1,0 +1,239 @@
+//! A trained context model as integers: the context section of a bundle, and what its integers mean in floats.
+//!
+//! Weights become i8 with a power-of-two scale a row; the scale is the largest that keeps the row's largest weight and its
+//! bias in range. Inputs are in 2⁻¹⁴, hidden units in 2⁻¹⁰, outputs in the units of [`pocketsplat_core::context`].
+
+use pocketsplat_core::context::{MAX_BIAS, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS, MEAN_PARTS};
+use pocketsplat_core::entropy::EIGHTHS;
+
+use super::WriteError;
+use crate::scene::{ContextModel, Head};
+
+/// Bits of the fraction of an input: [`pocketsplat_core::context::FEATURE_ONE`].
+const INPUT_BITS: i32 = 14;
+/// Bits of the fraction of a hidden unit, which reaches up to 32.
+pub const HIDDEN_BITS: i32 = 10;
+/// Finest scale of a weight; beyond it every weight of the row would be below 0.008.
+const MAX_WEIGHT_BITS: i32 = 13;
+/// Coarsest: the shift by [`HIDDEN_BITS`] less the output's fraction bits, 6 at most, must not become negative.
+const MIN_WEIGHT_BITS: i32 = -4;
+
+/// One row of a layer in integers.
+struct Row {
+    /// Bits of the fraction of its weights.
+    weight_bits: i32,
+    weights: Vec<i8>,
+    bias: i32,
+    shift: u8,
+}
+
+/// The context section of a bundle.
+///
+/// # Errors
+/// [`WriteError::Count`] when the model has more levels or hidden units than the format, [`WriteError::ContextWeight`] for a
+/// weight that is not finite or too large.
+pub fn section(model: &ContextModel<f32>, n_channels: usize) -> Result<Vec<u8>, WriteError> {
+    let within = |what, found: usize, most: usize| match found {
+        1.. if found <= most => Ok(()),
+        _ => Err(WriteError::Count { what, found, least: 1, most }),
+    };
+    within("grid levels of the context", model.levels.len(), MAX_CONTEXT_LEVELS.into())?;
+    within("hidden units of the context", model.mlp.n_hidden, MAX_CONTEXT_HIDDEN.into())?;
+    let [hidden, output] = rows(model, n_channels)?;
+
+    let mut bytes = Vec::new();
+    bytes.extend(model.frame.min.iter().flat_map(|c| c.to_le_bytes()));
+    bytes.extend(model.frame.scale.iter().flat_map(|s| s.to_le_bytes()));
+    bytes.extend(model.base_steps.iter().flat_map(|s| s.to_le_bytes()));
+    bytes.extend([model.levels.len() as u8, 0]);
+    bytes.extend((model.mlp.n_hidden as u16).to_le_bytes());
+    for level in &model.levels {
+        bytes.extend([level.kind.code(), 0]);
+        bytes.extend(level.resolution.to_le_bytes());
+        bytes.extend(level.n_rows.to_le_bytes());
+    }
+    for layer in [&hidden, &output] {
+        bytes.extend(layer.iter().map(|row| row.shift));
+    }
+    for layer in [&hidden, &output] {
+        bytes.extend(layer.iter().flat_map(|row| row.bias.to_le_bytes()));
+    }
+    for layer in [&hidden, &output] {
+        bytes.extend(layer.iter().flat_map(|row| &row.weights).map(|weight| weight.cast_unsigned()));
+    }
+    bytes.extend(grid_bytes(&model.rows));
+    Ok(bytes)
+}
+
+/// The network whose floats are exactly what the section's integers stand for: what gradients pass straight through.
+///
+/// # Errors
+/// As [`section`].
+pub fn rounded(model: &ContextModel<f32>, n_channels: usize) -> Result<Head<f32>, WriteError> {
+    let [hidden, output] = rows(model, n_channels)?;
+    let weights = |layer: &[Row]| -> Vec<f32> {
+        let row = |row: &Row| {
+            let unit = power_of_two(-row.weight_bits) as f32;
+            row.weights.iter().map(move |weight| f32::from(*weight) * unit).collect::<Vec<_>>()
+        };
+        layer.iter().flat_map(row).collect()
+    };
+    let (w1, w2) = (weights(&hidden), weights(&output));
+    Ok(Head { w1, w2, ..model.mlp.clone() })
+}
+
+/// Both layers in integers.
+fn rows(model: &ContextModel<f32>, n_channels: usize) -> Result<[Vec<Row>; 2], WriteError> {
+    let mlp = &model.mlp;
+    // Fraction bits of what goes in and of what comes out.
+    let layer = |weights: &[f32], n_in: usize, biases: &[f32], bits_in: i32, bits_out: &dyn Fn(usize) -> i32| {
+        let rows = weights.chunks_exact(n_in).zip(biases).enumerate();
+        rows.map(|(index, (row, bias))| integer_row(index, row, *bias, bits_in, bits_out(index)))
+            .collect::<Result<Vec<_>, _>>()
+    };
+    let output_bits = |index: usize| if index < n_channels { MEAN_PARTS.ilog2() } else { EIGHTHS.ilog2() } as i32;
+    Ok([
+        layer(&mlp.w1, mlp.n_in, &mlp.b1, INPUT_BITS, &|_| HIDDEN_BITS)?,
+        layer(&mlp.w2, mlp.n_hidden, &mlp.b2, HIDDEN_BITS, &output_bits)?,
+    ])
+}
+
+fn integer_row(index: usize, weights: &[f32], bias: f32, bits_in: i32, bits_out: i32) -> Result<Row, WriteError> {
+    let largest = weights.iter().fold(0.0_f32, |largest, weight| largest.max(weight.abs()));
+    if let Some(&value) = weights.iter().chain([&bias]).find(|w| !w.is_finite()) {
+        return Err(WriteError::ContextWeight { row: index, value });
+    }
+    // Room for the half that rounds the shift.
+    let bias_room = f64::from(MAX_BIAS / 2);
+    let weight_bits = (MIN_WEIGHT_BITS..=MAX_WEIGHT_BITS).rev().find(|&bits| {
+        f64::from(largest) * power_of_two(bits) <= f64::from(i8::MAX)
+            && f64::from(bias.abs()) * power_of_two(bits + bits_in) <= bias_room
+    });
+    let too_large = WriteError::ContextWeight { row: index, value: largest.max(bias.abs()) };
+    let weight_bits = weight_bits.ok_or(too_large)?;
+    let shift = weight_bits + bits_in - bits_out;
+    let half = if shift > 0 { 1 << (shift - 1) } else { 0 };
+    let weights = weights.iter().map(|w| (f64::from(*w) * power_of_two(weight_bits)).round() as i8).collect();
+    let bias = (f64::from(bias) * power_of_two(weight_bits + bits_in)).round() as i32 + half;
+    Ok(Row { weight_bits, weights, bias, shift: shift as u8 })
+}
+
+fn power_of_two(exponent: i32) -> f64 {
+    f64::from(exponent).exp2()
+}
+
+/// Four bits a row, set for +1; two rows a byte, the first in the low half.
+fn grid_bytes(rows: &[f32]) -> impl Iterator<Item = u8> + '_ {
+    let nibble = |row: &[f32]| (0..).zip(row).fold(0, |bits, (i, v)| bits | u8::from(*v >= 0.0) << i);
+    rows.chunks(8).map(move |pair| nibble(&pair[..4]) | pair.get(4..).map_or(0, nibble) << 4)
+}
+
+#[cfg(test)]
+mod tests {
+    use pocketsplat_core::context::{Context, FEATURE_ONE, GridFrame, GridLevel, Group, LevelKind};
+
+    use super::*;
+    use crate::ops::finite_difference::random;
+    use crate::ops::head;
+    use crate::scene::ModelShape;
+
+    const SHAPE: ModelShape = ModelShape {
+        feature_dim: 5,
+        n_offsets: 2,
+        view_direction: true,
+        view_distance: false,
+        dilation_compensation: false,
+    };
+
+    fn model(seed: u64, width: f64) -> ContextModel<f32> {
+        let levels = vec![
+            GridLevel { kind: LevelKind::Volume, resolution: 5, n_rows: 125 },
+            GridLevel { kind: LevelKind::Volume, resolution: 60, n_rows: 256 },
+            GridLevel { kind: LevelKind::Xz, resolution: 90, n_rows: 64 },
+        ];
+        let frame = GridFrame::spanning([-40, -30, 7], [200, 70, 90]);
+        let mut model = ContextModel::filled(&SHAPE, frame, levels, 16, [1.0, 0.1, 0.2], 0.0);
+        let fill = |values: &mut [f32], seed: u64, width: f64| {
+            let numbers = random(seed, values.len());
+            values.iter_mut().zip(numbers).for_each(|(value, x)| *value = (x * width) as f32);
+        };
+        fill(&mut model.rows, seed, 1.0);
+        for (group, values) in (1..).zip(model.mlp.groups_mut()) {
+            fill(values, seed + group, width);
+        }
+        model
+    }
+
+    #[test]
+    fn the_integers_compute_what_the_floats_do() {
+        let n_channels = SHAPE.values_per_anchor();
+        for seed in 0..20 {
+            let model = model(100 * seed, 0.5);
+            let bytes = section(&model, n_channels).expect("a sound model");
+            let context = Context::parse(&bytes, SHAPE.feature_dim, n_channels).expect("a sound section");
+            let rounded = rounded(&model, n_channels).expect("a sound model");
+            for lattice in [[-40, -30, 7], [0, 0, 50], [199, 69, 89], [500, -500, 33]] {
+                let (mut features, mut hidden) = (vec![0; context.n_inputs()], vec![0; context.n_hidden()]);
+                context.features(lattice, &mut features);
+                context.hidden(&features, &mut hidden);
+                let input: Vec<f32> = features.iter().map(|f| f32::from(*f) / f32::from(FEATURE_ONE)).collect();
+                let (mut float_hidden, mut expected) = (vec![0.0; 16], vec![0.0; context.n_outputs()]);
+                head::forward(&rounded, &input, &mut float_hidden, &mut expected);
+                for (row, expected) in expected.iter().enumerate() {
+                    let parts = if row < n_channels { 64.0 } else { 8.0 };
+                    let found = f32::from(context.output(row, &hidden)) / parts;
+                    // Half a part, and sixteen hidden units that are half of 2⁻¹⁰ off.
+                    let tolerance = 0.51 / parts + 16.0 * 0.5 / 2048.0;
+                    assert!((found - expected).abs() < tolerance, "row {row}: {found} against {expected}");
+                }
+                let steps = context.steps(&hidden);
+                for (group, base, output) in
+                    [(Group::Feature, 1.0, 0), (Group::LogScale, 0.1, 1), (Group::Offset, 0.2, 2)]
+                {
+                    let exponent = expected[2 * n_channels + output].clamp(-3.0, 0.875);
+                    let ratio = steps.value(group) / (base * exponent.exp2());
+                    assert!((ratio.log2() * 8.0).abs() < 0.6, "{group:?}: {ratio}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn features_are_the_interpolated_signs() {
+        let model = model(7, 0.5);
+        let n_channels = SHAPE.values_per_anchor();
+        let bytes = section(&model, n_channels).expect("a sound model");
+        let context = Context::parse(&bytes, SHAPE.feature_dim, n_channels).expect("a sound section");
+        let mut features = vec![0; context.n_inputs()];
+        for lattice in [[-40, -30, 7], [3, 21, 50], [111, 69, 89]] {
+            context.features(lattice, &mut features);
+            let unit = model.frame.unit(lattice);
+            let mut first = 0;
+            for (level, found) in model.levels.iter().zip(features.chunks_exact(4)) {
+                for (f, found) in found.iter().enumerate() {
+                    let expected: f64 = level
+                        .corners(unit)
+                        .iter()
+                        .map(|(row, weight)| {
+                            let sign = if model.rows[(first + row as usize) * 4 + f] >= 0.0 { 1.0 } else { -1.0 };
+                            sign * f64::from(weight) / f64::from(1 << 24)
+                        })
+                        .sum();
+                    let found = f64::from(*found) / f64::from(FEATURE_ONE);
+                    assert!((found - expected).abs() <= 0.5 / f64::from(FEATURE_ONE), "{found} against {expected}");
+                }
+                first += level.n_rows as usize;
+            }
+        }
+    }
+
+    #[test]
+    fn weights_out_of_range_are_named() {
+        let mut model = model(1, 0.5);
+        model.mlp.w2[3 * 16] = f32::NAN;
+        let error = section(&model, SHAPE.values_per_anchor()).expect_err("not a number");
+        assert!(matches!(error, WriteError::ContextWeight { row: 3, .. }), "{error}");
+        model.mlp.w2[3 * 16] = 1e6;
+        assert!(section(&model, SHAPE.values_per_anchor()).is_err(), "no shift is left for it");
+    }
+}

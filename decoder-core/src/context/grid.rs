@@ -163,11 +163,12 @@ impl GridLevel {
     #[inline]
     fn volume(&self, [x, y, z]: [(u32, u32); 3]) -> Corners {
         let mut corners = Corners { n: 8, ..Corners::default() };
+        let dense = self.is_dense();
         let slots = corners.rows.iter_mut().zip(&mut corners.weights);
         for (bits, (row, weight)) in (0_u32..).zip(slots) {
             let [(node_x, weight_x), (node_y, weight_y), (node_z, weight_z)] =
                 [corner(x, bits & 1), corner(y, bits >> 1 & 1), corner(z, bits >> 2)];
-            *row = self.row([node_x, node_y, node_z]);
+            *row = self.row([node_x, node_y, node_z], dense);
             *weight = weight_x.wrapping_mul(weight_y).wrapping_mul(weight_z);
         }
         corners
@@ -176,18 +177,19 @@ impl GridLevel {
     #[inline]
     fn plane(&self, [a, b]: [(u32, u32); 2]) -> Corners {
         let mut corners = Corners { n: 4, ..Corners::default() };
+        let dense = self.is_dense();
         let slots = corners.rows.iter_mut().zip(&mut corners.weights);
         for (bits, (row, weight)) in (0_u32..4).zip(slots) {
             let [(node_a, weight_a), (node_b, weight_b)] = [corner(a, bits & 1), corner(b, bits >> 1)];
-            *row = self.row([node_a, node_b, 0]);
+            *row = self.row([node_a, node_b, 0], dense);
             *weight = weight_a.wrapping_mul(weight_b) << 8;
         }
         corners
     }
 
     #[inline]
-    fn row(&self, [a, b, c]: [u32; 3]) -> u32 {
-        if self.is_dense() {
+    fn row(&self, [a, b, c]: [u32; 3], dense: bool) -> u32 {
+        if dense {
             let r = u32::from(self.resolution);
             return c.wrapping_mul(r).wrapping_add(b).wrapping_mul(r).wrapping_add(a);
         }

@@ -1,6 +1,6 @@
 //! Structural similarity.
 
-use super::{assert_mask_fits, assert_same_size};
+use super::{assert_same_size, with_truth_where_masked};
 use crate::dataset::{Image, Mask};
 
 /// Half the window: 11 taps.
@@ -37,14 +37,7 @@ pub fn ssim(a: &Image, b: &Image) -> f64 {
 /// When the sizes differ.
 pub fn ssim_masked(a: &Image, b: &Image, mask: Option<&Mask>) -> f64 {
     let Some(mask) = mask else { return ssim(a, b) };
-    assert_same_size(a, b);
-    assert_mask_fits(a, mask);
-    let mut filled = a.clone();
-    for ((pixel, truth), &valid) in filled.rgb.chunks_exact_mut(3).zip(b.rgb.chunks_exact(3)).zip(&mask.valid) {
-        if !valid {
-            pixel.copy_from_slice(truth);
-        }
-    }
+    let filled = with_truth_where_masked(a, b, Some(mask));
     let counted = similarity(&filled, b).into_iter().zip(&mask.valid).filter(|(_, valid)| **valid);
     counted.map(|(similarity, _)| similarity).sum::<f64>() / (3 * mask.n_valid()) as f64
 }

@@ -54,7 +54,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 
     eprintln!("3 of 4  drawing the held-out views with the decoder");
     let file = BundleFile::read(&bundle_path)?;
-    let evaluation = evaluate(&file, &capture_args, Split::Test, Renderer::Core, true)?;
+    let evaluation = evaluate(&file, &capture_args, Split::Test, Renderer::Core, true, None)?;
 
     let picture = folder.join("truth_reference_decoder.png");
     eprintln!("4 of 4  {}: truth | f64 reference | decoder", picture.display());

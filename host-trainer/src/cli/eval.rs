@@ -5,8 +5,8 @@ use std::time::Instant;
 
 use anyhow::Result;
 use pocketsplat::camera::Camera;
-use pocketsplat::dataset::Image;
-use pocketsplat::metrics::{half_size_enlarged, psnr_db, psnr_db_masked, ssim_masked};
+use pocketsplat::dataset::{Image, View};
+use pocketsplat::metrics::{Lpips, half_size_enlarged, psnr_db, psnr_db_masked, ssim_masked};
 use pocketsplat::render::decoder::core_image;
 use pocketsplat::render::reference::{ReferenceScene, to_image};
 use pocketsplat_core::Bundle;
@@ -15,6 +15,7 @@ use serde::Serialize;
 
 use super::bundle::BundleFile;
 use super::capture::{CaptureArgs, Split};
+use super::lpips::{LpipsArgs, NO_WEIGHTS};
 use super::output;
 
 /// What draws the frames.
@@ -42,16 +43,23 @@ pub(crate) struct Args {
     /// Also compare every frame with the f64 reference (`psnr_to_reference_db`, the lowest over the views).
     #[arg(long)]
     against_reference: bool,
+    #[command(flatten)]
+    lpips: LpipsArgs,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
 }
 
-/// Figures of a bundle over a split of a capture; PSNR and SSIM are means over views of 8-bit images.
+/// Figures of a bundle over a split of a capture; PSNR, SSIM and LPIPS are means over views of 8-bit images.
 #[derive(Debug, Serialize)]
 pub(crate) struct Evaluation {
     pub(crate) psnr_db: f64,
     pub(crate) ssim: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) lpips: Option<f64>,
+    /// Which LPIPS: a figure of another network or range is another figure.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) lpips_of: Option<String>,
     /// Of a copy of each photograph at half the size, enlarged again: what no detail at all scores.
     pub(crate) half_size_copy_psnr_db: f64,
     pub(crate) bundle_bytes: usize,
@@ -71,7 +79,11 @@ pub(crate) struct Evaluation {
 
 pub(crate) fn run(args: &Args) -> Result<()> {
     let file = BundleFile::read(&args.bundle)?;
-    let evaluation = evaluate(&file, &args.capture, args.split, args.renderer, args.against_reference)?;
+    let lpips = args.lpips.load()?;
+    if lpips.is_none() {
+        eprintln!("{NO_WEIGHTS}");
+    }
+    let evaluation = evaluate(&file, &args.capture, args.split, args.renderer, args.against_reference, lpips.as_ref())?;
     output::print(&evaluation, args.json)
 }
 
@@ -116,6 +128,7 @@ pub(crate) fn evaluate(
     split: Split,
     renderer: Renderer,
     against_reference: bool,
+    lpips: Option<&Lpips>,
 ) -> Result<Evaluation> {
     let bundle = file.parse()?;
     let options = file.capture_options(&bundle, capture)?;
@@ -153,11 +166,19 @@ pub(crate) fn evaluate(
             })
         })
         .collect::<Result<_>>()?;
+    // One view after another: the features of a view fill hundreds of bytes a pixel, and fill every thread by themselves.
+    let mean_lpips = |lpips: &Lpips| -> Result<f64> {
+        let distance = |(row, view): (&Row, &View)| lpips.distance(&row.frame.image, &view.image, view.mask.as_ref());
+        let of_views = rows.iter().zip(views).map(distance).collect::<Result<Vec<_>, _>>()?;
+        Ok(of_views.iter().sum::<f64>() / of_views.len() as f64)
+    };
     let mean = |value: fn(&Row) -> f64| rows.iter().map(value).sum::<f64>() / rows.len() as f64;
     let header = bundle.header();
     Ok(Evaluation {
         psnr_db: mean(|row| row.psnr_db),
         ssim: mean(|row| row.ssim),
+        lpips: lpips.map(mean_lpips).transpose()?,
+        lpips_of: lpips.map(|lpips| format!("VGG16, input in {}", lpips.range())),
         half_size_copy_psnr_db: mean(|row| row.half_size_copy_psnr_db),
         bundle_bytes: file.bytes.len(),
         n_anchors: header.n_anchors,

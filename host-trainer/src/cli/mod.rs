@@ -6,6 +6,7 @@ mod demo;
 mod doctor;
 mod eval;
 mod inspect;
+mod lpips;
 mod output;
 mod progress;
 mod render;

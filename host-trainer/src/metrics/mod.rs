@@ -4,11 +4,14 @@
 //! report are of 8-bit images, as they are published for this family.
 
 mod baseline;
+mod bjontegaard;
 mod lpips;
+mod pchip;
 mod psnr;
 mod ssim;
 
 pub use baseline::half_size_enlarged;
+pub use bjontegaard::{BjontegaardError, RatePoint, bd_psnr_db, bd_rate_percent};
 pub use lpips::{InputRange, Lpips, LpipsError};
 pub use psnr::{psnr_db, psnr_db_masked, psnr_of_floats_db};
 pub use ssim::{ssim, ssim_masked};

@@ -8,6 +8,7 @@ mod eval;
 mod inspect;
 mod lpips;
 mod output;
+mod plot;
 mod progress;
 mod render;
 mod run_config;
@@ -37,6 +38,7 @@ enum Command {
     Eval(eval::Args),
     Render(render::Args),
     Inspect(inspect::Args),
+    Plot(plot::Args),
     Synth(synth::Args),
     Demo(demo::Args),
     Doctor(doctor::Args),
@@ -54,6 +56,7 @@ pub(crate) fn run() -> Result<ExitCode> {
         Command::Eval(args) => eval::run(&args),
         Command::Render(args) => render::run(&args),
         Command::Inspect(args) => inspect::run(&args),
+        Command::Plot(args) => plot::run(&args),
         Command::Synth(args) => synth::run(&args),
         Command::Doctor(args) => doctor::run(&args),
         Command::Demo(args) => demo::run(&args),

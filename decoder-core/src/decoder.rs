@@ -1,7 +1,7 @@
 //! The façade: a bundle, a plan and the caller's memory bound together, drawing frames.
 
 use crate::budget::{Arena, Plan};
-use crate::bundle::{Bundle, Chunk};
+use crate::bundle::{AnchorModels, Bundle, Chunk, saturate};
 use crate::camera::Camera;
 use crate::error::{DecodeError, Field};
 use crate::mlp::{self, Heads};
@@ -23,6 +23,11 @@ pub trait TileSink {
 pub struct FrameReport {
     /// Chunks whose ink box the camera sees.
     pub chunks_decoded: u32,
+    /// Damaged chunks among those, which were left out; always 0 unless bound with
+    /// [`Decoder::bind_skipping_damage`].
+    pub chunks_damaged: u32,
+    /// The first of them.
+    pub first_damaged: Option<u32>,
     /// Anchors in them.
     pub anchors_decoded: u32,
     /// Anchors that passed the prefilter, so that their heads ran.
@@ -39,7 +44,9 @@ pub struct FrameReport {
 pub struct Decoder<'b, 's> {
     bundle: Bundle<'b>,
     plan: Plan,
+    skip_damage: bool,
     heads: Heads<'s>,
+    models: AnchorModels<'b, 's>,
     /// `[n_channels]` of the anchor in work.
     row: &'s mut [f32],
     work: Workspace<'s>,
@@ -51,7 +58,7 @@ pub struct Decoder<'b, 's> {
 }
 
 impl<'b, 's> Decoder<'b, 's> {
-    /// Takes `scratch`, converts the heads' weights into it and compares the checksum of every chunk.
+    /// Takes `scratch`, converts the heads' weights into it and compares the checksum of every chunk of the planned tiers.
     ///
     /// # Errors
     /// [`DecodeError::ScratchTooSmall`] names the bytes needed; [`DecodeError::PlanMismatch`] when `plan` is another
@@ -60,8 +67,31 @@ impl<'b, 's> Decoder<'b, 's> {
     /// # Budget
     /// Exactly [`Plan::scratch_len`] bytes of `scratch`; reads the whole bundle once, about 8 instructions a byte.
     pub fn bind(bundle: &Bundle<'b>, plan: Plan, scratch: &'s mut [u8]) -> Result<Self, DecodeError> {
-        use crate::bundle::saturate;
+        let decoder = Self::bind_unchecked(bundle, plan, scratch, false)?;
+        for chunk in decoder.planned_chunks() {
+            chunk.check()?;
+        }
+        Ok(decoder)
+    }
 
+    /// As [`bind`](Self::bind), but leaves checksums for later: each frame compares those of the chunks it needs, leaves
+    /// damaged chunks out and says so in its report.
+    ///
+    /// # Errors
+    /// [`DecodeError::ScratchTooSmall`] and [`DecodeError::PlanMismatch`] as for [`bind`](Self::bind).
+    ///
+    /// # Budget
+    /// As for [`bind`](Self::bind); about 8 instructions a byte of the chunks in view are added to every frame.
+    pub fn bind_skipping_damage(bundle: &Bundle<'b>, plan: Plan, scratch: &'s mut [u8]) -> Result<Self, DecodeError> {
+        Self::bind_unchecked(bundle, plan, scratch, true)
+    }
+
+    fn bind_unchecked(
+        bundle: &Bundle<'b>,
+        plan: Plan,
+        scratch: &'s mut [u8],
+        skip_damage: bool,
+    ) -> Result<Self, DecodeError> {
         let needed = bundle.plan(plan.budget())?;
         if needed != plan {
             return Err(DecodeError::PlanMismatch {
@@ -74,9 +104,6 @@ impl<'b, 's> Decoder<'b, 's> {
             let needed = saturate(plan.scratch_len());
             return Err(DecodeError::ScratchTooSmall { needed, available: saturate(available) });
         };
-        for chunk in bundle.chunks() {
-            chunk.check()?;
-        }
         let header = bundle.header();
         let n_splats = plan.max_splats() as usize;
         let mut arena = Arena::new(scratch);
@@ -84,7 +111,9 @@ impl<'b, 's> Decoder<'b, 's> {
         Ok(Self {
             bundle: *bundle,
             plan,
+            skip_damage,
             heads: Heads::convert(&mut arena, bundle.heads())?,
+            models: bundle.anchor_models(arena.take(bundle.anchor_scratch_words())?)?,
             row: arena.take(header.n_channels())?,
             work: Workspace { inputs: arena.take(header.head_inputs())?, hidden: arena.take(mlp::hidden_len(header))? },
             counts: arena.take(N_RADIX)?,
@@ -126,10 +155,9 @@ impl<'b, 's> Decoder<'b, 's> {
         }
         let mut report = FrameReport::default();
         self.splats.n = 0;
-        for index in 0..self.bundle.header().n_chunks {
-            let chunk = self.bundle.chunk(index)?;
+        for chunk in self.planned_chunks() {
             if view.sees_box(chunk.ink_box()) {
-                self.project_chunk(&chunk, &view, &mut report)?;
+                self.project_sound_chunk(&chunk, &view, &mut report)?;
             }
         }
         report.splats = self.splats.n;
@@ -141,17 +169,51 @@ impl<'b, 's> Decoder<'b, 's> {
         Ok(report)
     }
 
+    /// The chunks of the tiers that are drawn.
+    fn planned_chunks(&self) -> impl Iterator<Item = Chunk<'b>> + use<'b> {
+        let n_chunks = self.bundle.up_to_tier(self.plan.n_tiers()).n_chunks;
+        self.bundle.chunks().take(n_chunks as usize)
+    }
+
+    /// Keeps the splats of a chunk, or none of them and a note in the report if it is damaged and that is allowed.
+    fn project_sound_chunk(
+        &mut self,
+        chunk: &Chunk<'b>,
+        view: &View,
+        report: &mut FrameReport,
+    ) -> Result<(), DecodeError> {
+        report.chunks_decoded += 1;
+        if !self.skip_damage {
+            return self.project_chunk(chunk, view, report);
+        }
+        let (n_splats, before) = (self.splats.n, *report);
+        let result = match chunk.check() {
+            Ok(()) => self.project_chunk(chunk, view, report),
+            Err(error) => Err(error),
+        };
+        match result {
+            Err(DecodeError::ChunkChecksum { chunk, .. } | DecodeError::ChunkStream { chunk, .. }) => {
+                self.splats.n = n_splats;
+                *report = before;
+                report.chunks_damaged += 1;
+                report.first_damaged = report.first_damaged.or(Some(chunk));
+                Ok(())
+            }
+            result => result,
+        }
+    }
+
     /// Decodes a chunk and keeps the splats of its anchors.
     fn project_chunk(&mut self, chunk: &Chunk<'b>, view: &View, report: &mut FrameReport) -> Result<(), DecodeError> {
         let header = self.bundle.header();
-        let effects = header.effects;
-        let mut anchors = chunk.anchors(self.bundle.tables())?;
-        report.chunks_decoded += 1;
+        let effects = header.features.effects;
+        let mut anchors = chunk.anchors(&mut self.models);
         for _ in 0..chunk.n_anchors() {
             report.anchors_decoded += 1;
-            let position = self.bundle.position(anchors.lattice());
+            let site = anchors.site();
+            let position = self.bundle.position(site.lattice);
             anchors.values(self.row);
-            let anchor = Anchor::from_row(header, position, self.row).ok_or(DecodeError::Internal)?;
+            let anchor = Anchor::from_row(header, position, site.mask, self.row).ok_or(DecodeError::Internal)?;
             if !view.sees_anchor(position, anchor.extent) {
                 continue;
             }

@@ -14,7 +14,7 @@ pub const MAX_FRAME_PX: u16 = 255 * 16;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum MaxSplats {
-    /// Every offset of every anchor: always enough.
+    /// Every offset of every anchor of the tiers drawn: always enough.
     Worst,
     /// So many; a view that holds more fails with [`DecodeError::TooManySplats`], which names the number.
     AtMost(u32),
@@ -30,6 +30,8 @@ pub struct Budget {
     pub height_px: u16,
     /// Splats of a frame.
     pub max_splats: MaxSplats,
+    /// Tiers to draw at most; [`u8::MAX`] draws all that the file holds. Fewer are a coarser scene that costs less.
+    pub tiers: u8,
 }
 
 /// What a decoder of one bundle needs within a [`Budget`]; made by [`Bundle::plan`].
@@ -37,6 +39,7 @@ pub struct Budget {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Plan {
     budget: Budget,
+    n_tiers: u8,
     max_splats: u32,
     scratch_len: usize,
 }
@@ -46,6 +49,12 @@ impl Plan {
     #[must_use]
     pub fn scratch_len(&self) -> usize {
         self.scratch_len
+    }
+
+    /// Tiers that are drawn.
+    #[must_use]
+    pub fn n_tiers(&self) -> u8 {
+        self.n_tiers
     }
 
     /// Splats of a frame at most.
@@ -76,7 +85,9 @@ impl Bundle<'_> {
                 return Err(DecodeError::OutOfRange { field, found: size_px.into(), limit });
             }
         }
-        let worst = self.header().n_splats_worst();
+        let n_tiers = budget.tiers.min(self.n_tiers());
+        // At most 2²⁴ anchors of 32 offsets.
+        let worst = self.up_to_tier(n_tiers).n_anchors.saturating_mul(self.header().n_offsets.into());
         let max_splats = match budget.max_splats {
             MaxSplats::Worst => worst,
             MaxSplats::AtMost(most) => most.min(worst),
@@ -86,13 +97,14 @@ impl Bundle<'_> {
             .and_then(Arena::bytes_for)
             .filter(|&len| len < isize::MAX as usize && saturate(len) < u32::MAX)
             .ok_or(DecodeError::PlanTooLarge { max_splats })?;
-        Ok(Plan { budget: *budget, max_splats, scratch_len })
+        Ok(Plan { budget: *budget, n_tiers, max_splats, scratch_len })
     }
 
     /// The sum over the slices that `Decoder::bind` takes, in its order.
     fn scratch_words(&self, n_splats: usize) -> Option<usize> {
         let parts = [
             words_for::<f32>(mlp::n_weights(self.header()))?,
+            self.anchor_scratch_words(),
             words_for::<f32>(self.header().n_channels())?,
             words_for::<f32>(self.header().head_inputs())?,
             words_for::<f32>(mlp::hidden_len(self.header()))?,

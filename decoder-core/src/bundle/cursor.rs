@@ -25,6 +25,15 @@ impl<'a> Cursor<'a> {
         self.rest
     }
 
+    /// The section must end here.
+    pub(crate) fn end(&self) -> Result<(), DecodeError> {
+        if self.rest.is_empty() {
+            return Ok(());
+        }
+        let [expected, found] = [self.position(), self.len].map(saturate);
+        Err(DecodeError::WrongLength { section: self.section, expected, found })
+    }
+
     pub(crate) fn array<const N: usize>(&mut self) -> Result<[u8; N], DecodeError> {
         let Some((head, rest)) = self.rest.split_first_chunk::<N>() else { return Err(self.truncated(N)) };
         self.rest = rest;
@@ -70,6 +79,22 @@ impl<'a> Cursor<'a> {
 
     pub(crate) fn f64(&mut self) -> Result<f64, DecodeError> {
         Ok(f64::from_le_bytes(self.array()?))
+    }
+
+    pub(crate) fn u16s<const N: usize>(&mut self) -> Result<[u16; N], DecodeError> {
+        let mut numbers = [0; N];
+        for number in &mut numbers {
+            *number = self.u16()?;
+        }
+        Ok(numbers)
+    }
+
+    pub(crate) fn u32s<const N: usize>(&mut self) -> Result<[u32; N], DecodeError> {
+        let mut numbers = [0; N];
+        for number in &mut numbers {
+            *number = self.u32()?;
+        }
+        Ok(numbers)
     }
 
     pub(crate) fn f32s<const N: usize>(&mut self) -> Result<[f32; N], DecodeError> {

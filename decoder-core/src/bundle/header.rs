@@ -1,90 +1,63 @@
 //! The header: fixed fields, then the section table, then its own checksum.
 
+use super::crc32;
 use super::cursor::Cursor;
-use super::{crc32, section::Section};
+use super::features::Features;
+use super::section::SECTION_LEN;
 use crate::camera::Camera;
 use crate::error::{DecodeError, Field, SectionKind};
 
 /// The first bytes of every bundle. As in PNG: not ASCII, then a name, then line ends that text transfers would change.
 pub const MAGIC: [u8; 8] = *b"\x89PSB\r\n\x1a\n";
 /// The format version this crate reads.
-pub const VERSION: u16 = 0;
-/// Length of the header with its section table and checksum, bytes.
-pub const HEADER_LEN: usize = 216;
-/// The part of the header that its checksum covers: all but the checksum.
-const CHECKED_LEN: usize = HEADER_LEN - 4;
+pub const VERSION: u16 = 1;
+/// Length of the header's fields before the section table, bytes.
+pub const HEADER_FIXED_LEN: usize = 156;
 /// Widest feature: a hidden layer has as many units, so it bounds the work of an anchor.
 pub const MAX_FEATURE_DIM: u16 = 256;
 /// Most offsets, that is splats, of an anchor.
 pub const MAX_OFFSETS: u16 = 32;
 /// Most anchors; with [`MAX_OFFSETS`] the number of splats stays below 2³².
 pub const MAX_ANCHORS: u32 = 1 << 24;
-/// Most anchors in a chunk. A directory record and a chunk without words take 56 bytes, so these bound the anchors that a
-/// hostile file of a given length can ask to be evaluated.
+/// Most anchors in a chunk. A directory record takes 24 bytes, so these bound the anchors that a hostile file of a given
+/// length can ask to be evaluated.
 pub const MAX_CHUNK_ANCHORS: u16 = 1024;
+/// Most tiers.
+pub const MAX_TIERS: u8 = 8;
 /// The only camera convention: OpenCV, x right, y down, z forward.
 const CONVENTION_OPENCV: u8 = 0;
+/// Heads, lattice, tables or context, manifest, directory, chunks.
+const MIN_SECTIONS: u8 = 6;
 
-/// What a scene's heads and opacities take into account; anything else is absent and costs nothing.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Effects {
-    /// The heads see the unit vector from the camera to the anchor.
-    pub view_direction: bool,
-    /// The heads see the distance from the camera to the anchor, normalised units.
-    pub view_distance: bool,
-    /// Opacity is multiplied by √(det Σ / det(Σ + 0.3 I)) (Yu et al. 2024, Mip-Splatting, eq. 8).
-    pub dilation_compensation: bool,
-}
-
-impl Effects {
-    const VIEW_DIRECTION: u32 = 1;
-    const VIEW_DISTANCE: u32 = 2;
-    const DILATION_COMPENSATION: u32 = 4;
-
-    /// The bits as the header stores them.
-    #[must_use]
-    pub const fn to_bits(self) -> u32 {
-        (if self.view_direction { Self::VIEW_DIRECTION } else { 0 })
-            | (if self.view_distance { Self::VIEW_DISTANCE } else { 0 })
-            | (if self.dilation_compensation { Self::DILATION_COMPENSATION } else { 0 })
-    }
-
-    /// The effects that `bits` stand for.
-    ///
-    /// # Errors
-    /// [`DecodeError::UnsupportedEffects`] with the bits that have no meaning in this version.
-    pub const fn from_bits(bits: u32) -> Result<Self, DecodeError> {
-        let unknown_bits = bits & !(Self::VIEW_DIRECTION | Self::VIEW_DISTANCE | Self::DILATION_COMPENSATION);
-        if unknown_bits != 0 {
-            return Err(DecodeError::UnsupportedEffects { unknown_bits });
-        }
-        Ok(Self {
-            view_direction: bits & Self::VIEW_DIRECTION != 0,
-            view_distance: bits & Self::VIEW_DISTANCE != 0,
-            dilation_compensation: bits & Self::DILATION_COMPENSATION != 0,
-        })
-    }
+/// Length of a header with `n_sections` sections, its section table and checksum included, bytes.
+#[must_use]
+pub const fn header_len(n_sections: u8) -> usize {
+    // At most 160 + 16·255.
+    (n_sections as usize).wrapping_mul(SECTION_LEN).wrapping_add(HEADER_FIXED_LEN).wrapping_add(4)
 }
 
 /// The scene-wide facts of a bundle, checked.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Header {
-    /// Length of the bundle, bytes.
+    /// Length of the header, bytes.
+    pub header_len: u16,
+    /// Length of the whole bundle, bytes.
     pub file_len: u32,
-    /// What the scene takes into account.
-    pub effects: Effects,
+    /// What it requires of a decoder.
+    pub features: Features,
     /// Feature width F of an anchor, 1..=[`MAX_FEATURE_DIM`].
     pub feature_dim: u16,
     /// Offsets K of an anchor, 1..=[`MAX_OFFSETS`].
     pub n_offsets: u16,
-    /// Anchors of the scene.
+    /// Anchors of all tiers.
     pub n_anchors: u32,
-    /// Chunks of the scene.
+    /// Chunks of all tiers.
     pub n_chunks: u32,
     /// No chunk has more anchors than this, 1..=[`MAX_CHUNK_ANCHORS`].
     pub max_chunk_anchors: u16,
+    /// Tiers the bundle was written with, 1..=[`MAX_TIERS`].
+    pub n_tiers: u8,
     /// Size `[width, height]` of the images the scene was trained on, pixels; drawn at other sizes it loses quality.
     pub training_px: [u16; 2],
     /// What lies behind everything.
@@ -103,8 +76,9 @@ impl Header {
     /// Inputs of every head: feature, then direction (3), then distance (1), the last two if present.
     #[must_use]
     pub fn head_inputs(&self) -> usize {
-        let direction = if self.effects.view_direction { 3 } else { 0 };
-        usize::from(self.feature_dim).saturating_add(direction).saturating_add(usize::from(self.effects.view_distance))
+        let effects = self.features.effects;
+        let direction = if effects.view_direction { 3 } else { 0 };
+        usize::from(self.feature_dim).saturating_add(direction).saturating_add(usize::from(effects.view_distance))
     }
 
     /// Channels of an anchor: F features, 6 log-scales, 3K offsets.
@@ -113,14 +87,8 @@ impl Header {
         usize::from(self.feature_dim).saturating_add(6).saturating_add(usize::from(self.n_offsets).saturating_mul(3))
     }
 
-    /// Splats that the scene holds at most: one per offset.
-    #[must_use]
-    pub fn n_splats_worst(&self) -> u32 {
-        self.n_anchors.saturating_mul(u32::from(self.n_offsets))
-    }
-
-    /// Reads and checks the header and the section table.
-    pub(super) fn parse(bytes: &[u8]) -> Result<(Self, [Section; 4]), DecodeError> {
+    /// Reads and checks the header; returns it with the section table.
+    pub(super) fn parse(bytes: &[u8]) -> Result<(Self, &[[u8; SECTION_LEN]]), DecodeError> {
         let mut cursor = Cursor::new(bytes, SectionKind::Header);
         if cursor.array() != Ok(MAGIC) {
             return Err(DecodeError::NotABundle);
@@ -129,30 +97,36 @@ impl Header {
         if found != VERSION {
             return Err(DecodeError::UnsupportedVersion { found, supported: VERSION });
         }
-        let header_len = cursor.u16()?;
-        in_range(Field::HeaderLen, header_len.into(), HEADER_LEN as u32, HEADER_LEN as u32)?;
+        let len = cursor.u16()?;
+        let [least, most] = [MIN_SECTIONS, u8::MAX].map(|n| header_len(n) as u32);
+        in_range(Field::HeaderLen, len.into(), least, most)?;
+        let checked_len = usize::from(len).saturating_sub(4);
         let mut whole = Cursor::new(bytes, SectionKind::Header);
-        let computed = crc32(whole.bytes(CHECKED_LEN)?);
+        let computed = crc32(whole.bytes(checked_len)?);
         let stored = whole.u32()?;
         if stored != computed {
             return Err(DecodeError::SectionChecksum { section: SectionKind::Header, stored, computed });
         }
-        let header = Self::parse_fields(&mut cursor)?;
-        let sections = Section::parse_table(&mut cursor, header.file_len)?;
-        Ok((header, sections))
+        let (header, n_sections) = Self::parse_fields(&mut cursor, len)?;
+        let expected = header_len(n_sections) as u32;
+        in_range(Field::HeaderLen, len.into(), expected, expected)?;
+        let (table, _) = cursor.bytes(usize::from(n_sections).saturating_mul(SECTION_LEN))?.as_chunks();
+        Ok((header, table))
     }
 
-    fn parse_fields(cursor: &mut Cursor<'_>) -> Result<Self, DecodeError> {
+    fn parse_fields(cursor: &mut Cursor<'_>, header_len: u16) -> Result<(Self, u8), DecodeError> {
         let file_len = cursor.u32()?;
-        let effects = Effects::from_bits(cursor.u32()?)?;
+        let features = Features::from_bits(cursor.u32()?)?;
+        let _optional_features = cursor.u32()?;
         let [feature_dim, n_offsets] = [cursor.u16()?, cursor.u16()?];
         let [n_anchors, n_chunks] = [cursor.u32()?, cursor.u32()?];
         let max_chunk_anchors = cursor.u16()?;
         let [convention, n_sections] = cursor.array()?;
         let training_px = [cursor.u16()?, cursor.u16()?];
         let background = cursor.array()?;
-        let reserved = cursor.u8()?;
+        let n_tiers = cursor.u8()?;
         let voxel_size = cursor.f32()?;
+        let reserved = cursor.u32()?;
         let normalisation_centre = [cursor.f64()?, cursor.f64()?, cursor.f64()?];
         let normalisation_scale = cursor.f64()?;
         let preview = Camera {
@@ -169,8 +143,9 @@ impl Header {
         in_range(Field::NChunks, n_chunks, 0, n_anchors)?;
         in_range(Field::MaxChunkAnchors, max_chunk_anchors.into(), 1, MAX_CHUNK_ANCHORS.into())?;
         in_range(Field::CameraConvention, convention.into(), 0, CONVENTION_OPENCV.into())?;
-        in_range(Field::NSections, n_sections.into(), 4, 4)?;
-        in_range(Field::Reserved, reserved.into(), 0, 0)?;
+        in_range(Field::NSections, n_sections.into(), MIN_SECTIONS.into(), u8::MAX.into())?;
+        in_range(Field::NTiers, n_tiers.into(), 1, MAX_TIERS.into())?;
+        in_range(Field::Reserved, reserved, 0, 0)?;
         for size_px in training_px {
             in_range(Field::TrainingSize, size_px.into(), 1, u32::from(u16::MAX))?;
         }
@@ -184,21 +159,24 @@ impl Header {
         if preview.check().is_err() {
             return Err(DecodeError::BadFloat { field: Field::PreviewCamera, index: 0 });
         }
-        Ok(Self {
+        let header = Self {
+            header_len,
             file_len,
-            effects,
+            features,
             feature_dim,
             n_offsets,
             n_anchors,
             n_chunks,
             max_chunk_anchors,
+            n_tiers,
             training_px,
             background,
             voxel_size,
             normalisation_centre,
             normalisation_scale,
             preview,
-        })
+        };
+        Ok((header, n_sections))
     }
 }
 

@@ -1,13 +1,20 @@
-//! The heads section: f16 weights, read where they lie.
+//! The heads section: f16 biases, and matrices of f16 or of coded steps.
+
+mod weights;
+
+pub use weights::{CodedHeads, LayerWeights, WeightReader};
 
 use half::f16;
 
-use super::cursor::{Cursor, saturate};
+use super::cursor::Cursor;
 use super::header::Header;
 use crate::error::{DecodeError, Field, SectionKind};
 
+/// Matrices of all heads: W1 and W2 of opacity, covariance, colour.
+const N_MATRICES: usize = 6;
+
 /// IEEE half-precision numbers in flash, each read when asked for.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Halves<'a>(&'a [[u8; 2]]);
 
 impl<'a> Halves<'a> {
@@ -33,9 +40,21 @@ impl<'a> Halves<'a> {
     pub fn iter(&self) -> impl ExactSizeIterator<Item = f32> + use<'a> {
         self.0.iter().map(|&bytes| f16::from_le_bytes(bytes).to_f32())
     }
+
+    /// Takes `n` numbers; an infinite one would make frames of NaN without any notice.
+    fn parse(cursor: &mut Cursor<'a>, n: usize) -> Result<Self, DecodeError> {
+        let first = cursor.position() >> 1;
+        let halves = cursor.pairs(n)?;
+        for (index, pair) in (first..).zip(halves) {
+            if !f16::from_le_bytes(*pair).is_finite() {
+                return Err(DecodeError::BadFloat { field: Field::HeadWeight, index: super::saturate(index) });
+            }
+        }
+        Ok(Self(halves))
+    }
 }
 
-/// One head of the file: `y = W2·relu(W1·x + b1) + b2`.
+/// One head of the file, `y = W2·relu(W1·x + b1) + b2`; its matrices come from [`HeadsView::weights`].
 #[derive(Clone, Copy, Debug)]
 pub struct HeadView<'a> {
     /// Inputs.
@@ -44,12 +63,8 @@ pub struct HeadView<'a> {
     pub n_hidden: usize,
     /// Outputs.
     pub n_out: usize,
-    /// `[n_hidden, n_in]`, row-major.
-    pub w1: Halves<'a>,
     /// `[n_hidden]`.
     pub b1: Halves<'a>,
-    /// `[n_out, n_hidden]`, row-major.
-    pub w2: Halves<'a>,
     /// `[n_out]`.
     pub b2: Halves<'a>,
 }
@@ -63,44 +78,81 @@ pub struct HeadsView<'a> {
     pub covariance: HeadView<'a>,
     /// 3K outputs: rows 3k..3k+3 the colour logits.
     pub colour: HeadView<'a>,
+    matrices: Matrices<'a>,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Matrices<'a> {
+    Raw([Halves<'a>; N_MATRICES]),
+    Coded(CodedHeads<'a>),
 }
 
 impl<'a> HeadsView<'a> {
-    pub(super) fn parse(bytes: &'a [u8], header: &Header) -> Result<Self, DecodeError> {
-        let mut cursor = Cursor::new(bytes, SectionKind::Heads);
-        let [opacity, covariance, colour] =
-            [1, 7, 3].map(|per_offset| HeadView::parse(&mut cursor, header, per_offset));
-        let heads = Self { opacity: opacity?, covariance: covariance?, colour: colour? };
-        if !cursor.rest().is_empty() {
-            return Err(DecodeError::WrongLength {
-                section: SectionKind::Heads,
-                expected: saturate(cursor.position()),
-                found: saturate(bytes.len()),
-            });
-        }
-        // One pass over all weights: an infinite one would make frames of NaN without any notice.
-        for (index, pair) in (0..).zip(bytes.as_chunks::<2>().0) {
-            if !f16::from_le_bytes(*pair).is_finite() {
-                return Err(DecodeError::BadFloat { field: Field::HeadWeight, index });
+    pub(super) fn parse(section: &'a [u8], header: &Header) -> Result<Self, DecodeError> {
+        let mut cursor = Cursor::new(section, SectionKind::Heads);
+        let shape = |per_offset: usize| HeadView {
+            n_in: header.head_inputs(),
+            n_hidden: header.feature_dim.into(),
+            n_out: usize::from(header.n_offsets).saturating_mul(per_offset),
+            b1: Halves::default(),
+            b2: Halves::default(),
+        };
+        let mut heads = [shape(1), shape(7), shape(3)];
+        let matrices = if header.features.coded_heads {
+            let tables = CodedHeads::parse_tables(&mut cursor)?;
+            for head in &mut heads {
+                head.b1 = Halves::parse(&mut cursor, head.n_hidden)?;
+                head.b2 = Halves::parse(&mut cursor, head.n_out)?;
             }
-        }
+            Matrices::Coded(CodedHeads::new(tables, cursor.rest())?)
+        } else {
+            let mut matrices = [Halves::default(); N_MATRICES];
+            for (head, [w1, w2]) in heads.iter_mut().zip(matrices.as_chunks_mut().0) {
+                *w1 = Halves::parse(&mut cursor, head.n_hidden.saturating_mul(head.n_in))?;
+                head.b1 = Halves::parse(&mut cursor, head.n_hidden)?;
+                *w2 = Halves::parse(&mut cursor, head.n_out.saturating_mul(head.n_hidden))?;
+                head.b2 = Halves::parse(&mut cursor, head.n_out)?;
+            }
+            cursor.end()?;
+            Matrices::Raw(matrices)
+        };
+        let [opacity, covariance, colour] = heads;
+        let heads = Self { opacity, covariance, colour, matrices };
+        heads.check()?;
         Ok(heads)
     }
-}
 
-impl<'a> HeadView<'a> {
-    fn parse(cursor: &mut Cursor<'a>, header: &Header, per_offset: usize) -> Result<Self, DecodeError> {
-        let n_in = header.head_inputs();
-        let n_hidden = usize::from(header.feature_dim);
-        let n_out = usize::from(header.n_offsets).saturating_mul(per_offset);
-        Ok(Self {
-            n_in,
-            n_hidden,
-            n_out,
-            w1: Halves(cursor.pairs(n_hidden.saturating_mul(n_in))?),
-            b1: Halves(cursor.pairs(n_hidden)?),
-            w2: Halves(cursor.pairs(n_out.saturating_mul(n_hidden))?),
-            b2: Halves(cursor.pairs(n_out)?),
-        })
+    /// Opacity, covariance, colour.
+    #[must_use]
+    pub fn each(&self) -> [HeadView<'a>; 3] {
+        [self.opacity, self.covariance, self.colour]
+    }
+
+    /// How the matrices are coded, if they are.
+    #[must_use]
+    pub fn coded(&self) -> Option<&CodedHeads<'a>> {
+        match &self.matrices {
+            Matrices::Raw(_) => None,
+            Matrices::Coded(coded) => Some(coded),
+        }
+    }
+
+    /// Starts reading the matrices, one after the other.
+    #[must_use]
+    pub fn weights(&self) -> WeightReader<'a> {
+        let sizes =
+            self.each().map(|head| [head.n_hidden.saturating_mul(head.n_in), head.n_out.saturating_mul(head.n_hidden)]);
+        WeightReader::new(&self.matrices, sizes)
+    }
+
+    /// Coded matrices end where the section ends.
+    fn check(&self) -> Result<(), DecodeError> {
+        let mut weights = self.weights();
+        if self.coded().is_some() {
+            for _ in 0..N_MATRICES {
+                weights.next_layer().for_each(drop);
+            }
+        }
+        weights.finish().map_err(|left| DecodeError::HeadStream { left_bytes: super::saturate(left) })
     }
 }

@@ -8,59 +8,97 @@
 #[doc = include_str!("FORMAT.md")]
 pub mod format {}
 
+mod anchor;
 mod chunk;
 mod crc;
 mod cursor;
+mod directory;
+mod features;
 mod header;
 mod heads;
+mod lattice;
+mod manifest;
+mod masks;
 mod section;
-mod table;
+mod tables;
 
-pub use chunk::{AnchorReader, Chunk};
+pub use anchor::{AnchorModels, AnchorReader, AnchorSite};
+pub use chunk::Chunk;
 pub use crc::crc32;
 pub(crate) use cursor::{Cursor, saturate};
+pub use directory::{CHUNK_RECORD_LEN, Directory, INK_FRAME_LEN, InkFrame, TIER_RECORD_LEN, Tier};
+pub use features::{Effects, Features};
 pub(crate) use header::in_range;
 pub use header::{
-    Effects, HEADER_LEN, Header, MAGIC, MAX_ANCHORS, MAX_CHUNK_ANCHORS, MAX_FEATURE_DIM, MAX_OFFSETS, VERSION,
+    HEADER_FIXED_LEN, Header, MAGIC, MAX_ANCHORS, MAX_CHUNK_ANCHORS, MAX_FEATURE_DIM, MAX_OFFSETS, MAX_TIERS, VERSION,
+    header_len,
 };
-pub use heads::{Halves, HeadView, HeadsView};
-pub use table::{Table, Tables};
+pub use heads::{CodedHeads, Halves, HeadView, HeadsView, LayerWeights, WeightReader};
+pub use lattice::{Lattice, MAX_LATTICE_BITS};
+pub use manifest::{MANIFEST_RECORD_LEN, TierMeasures};
+pub use section::{SECTION_LEN, Section};
+pub use tables::{Table, Tables};
 
+use crate::context::Context;
+use crate::entropy::MaskModel;
 use crate::error::{DecodeError, SectionKind};
+use section::Sections;
+
+/// Where the models of the channels come from.
+#[derive(Clone, Copy, Debug)]
+pub enum Coder<'a> {
+    /// From tables, the same for all anchors.
+    Static(Tables<'a>),
+    /// From what lies around each anchor.
+    Context(Context<'a>),
+}
 
 /// A bundle in memory or flash, checked.
 #[derive(Clone, Copy, Debug)]
 pub struct Bundle<'a> {
     header: Header,
+    section_table: &'a [[u8; SECTION_LEN]],
     heads: HeadsView<'a>,
-    tables: Tables<'a>,
-    directory: &'a [[u8; chunk::RECORD_LEN]],
+    lattice: Lattice<'a>,
+    masks: Option<MaskModel<'a>>,
+    coder: Coder<'a>,
+    manifest: &'a [[u8; MANIFEST_RECORD_LEN]],
+    directory: Directory<'a>,
+    /// Tiers in the file.
+    n_tiers: u8,
+    /// The chunks of these tiers.
     chunks: &'a [u8],
 }
 
 impl<'a> Bundle<'a> {
     /// Checks `bytes` and returns the view of them; bytes after the bundle's end are ignored, so a whole flash partition
-    /// can be passed.
+    /// can be passed. A file that ends where a tier ends is a smaller scene, of [`n_tiers`](Self::n_tiers) tiers.
     ///
     /// # Errors
     /// [`DecodeError`] of class malformed or unsupported, naming the section and the numbers that disagree.
     ///
     /// # Budget
-    /// No scratch. Reads header, heads, tables and directory once; the chunks' checksums wait for
+    /// No scratch. Reads everything before the chunks once, coded heads twice; the chunks' checksums wait for
     /// [`Decoder::bind`](crate::Decoder::bind).
     pub fn parse(bytes: &'a [u8]) -> Result<Self, DecodeError> {
-        let (header, [heads, tables, directory, chunks]) = Header::parse(bytes)?;
-        let heads = HeadsView::parse(heads.bytes(bytes)?, &header)?;
-        let tables = Tables::parse(tables.bytes(bytes)?, header.n_channels())?;
-        let (directory, odd_bytes) = directory.bytes(bytes)?.as_chunks();
-        let found = saturate(directory.as_flattened().len()).saturating_add(saturate(odd_bytes.len()));
-        let expected = header.n_chunks.saturating_mul(saturate(chunk::RECORD_LEN));
-        if found != expected {
-            return Err(DecodeError::WrongLength { section: SectionKind::Directory, expected, found });
-        }
-        let bundle = Self { header, heads, tables, directory, chunks: chunks.bytes(bytes)? };
-        bundle.check_directory()?;
-        Ok(bundle)
+        let (header, section_table) = Header::parse(bytes)?;
+        let sections = Sections::parse(section_table, header.features, header.header_len, header.file_len, bytes)?;
+        let heads = HeadsView::parse(sections.heads.bytes(bytes)?, &header)?;
+        let lattice = Lattice::parse(sections.lattice.bytes(bytes)?)?;
+        let masks = match sections.masks {
+            Some(section) => Some(masks::parse(section.bytes(bytes)?, header.n_offsets)?),
+            None => None,
+        };
+        let coder = sections.coder.bytes(bytes)?;
+        let coder = if header.features.context {
+            Coder::Context(Context::parse(coder, header.feature_dim.into(), header.n_channels())?)
+        } else {
+            Coder::Static(Tables::parse(coder, header.n_channels())?)
+        };
+        let manifest = manifest::parse(sections.manifest.bytes(bytes)?, header.n_tiers)?;
+        let directory = Directory::parse(sections.directory.bytes(bytes)?, &header, sections.chunks.len)?;
+        let (n_tiers, chunks) = tiers_in(bytes, &sections.chunks, &directory, header.n_tiers)?;
+        Ok(Self { header, section_table, heads, lattice, masks, coder, manifest, directory, n_tiers, chunks })
     }
 
     /// The scene-wide facts.
@@ -69,33 +107,117 @@ impl<'a> Bundle<'a> {
         &self.header
     }
 
+    /// The section table, those that this decoder skips included.
+    pub fn sections(&self) -> impl Iterator<Item = Section> + use<'a> {
+        self.section_table.iter().filter_map(|row| Section::parse(row).ok())
+    }
+
     /// The weights of the heads.
     #[must_use]
     pub fn heads(&self) -> &HeadsView<'a> {
         &self.heads
     }
 
-    /// Quantisation and frequencies of the channels.
+    /// The cells of the anchors and the model of their positions.
     #[must_use]
-    pub fn tables(&self) -> &Tables<'a> {
-        &self.tables
+    pub fn lattice(&self) -> &Lattice<'a> {
+        &self.lattice
+    }
+
+    /// The model of which offsets are drawn; without it all are.
+    #[must_use]
+    pub fn masks(&self) -> Option<&MaskModel<'a>> {
+        self.masks.as_ref()
+    }
+
+    /// Where the models of the channels come from.
+    #[must_use]
+    pub fn coder(&self) -> &Coder<'a> {
+        &self.coder
+    }
+
+    /// Quantisation and frequencies of the channels, unless they follow from a context.
+    #[must_use]
+    pub fn tables(&self) -> Option<&Tables<'a>> {
+        match &self.coder {
+            Coder::Static(tables) => Some(tables),
+            Coder::Context(_) => None,
+        }
+    }
+
+    /// The context model, unless the channels have tables.
+    #[must_use]
+    pub fn context(&self) -> Option<&Context<'a>> {
+        match &self.coder {
+            Coder::Static(_) => None,
+            Coder::Context(context) => Some(context),
+        }
+    }
+
+    /// What tier `tier` and those before it were measured to look like and to cost, whether they are in the file or not.
+    #[must_use]
+    pub fn measures(&self, tier: u8) -> Option<TierMeasures> {
+        TierMeasures::parse(self.manifest.get(usize::from(tier))?, tier.into()).ok()
+    }
+
+    /// Tiers and chunk records.
+    #[must_use]
+    pub fn directory(&self) -> &Directory<'a> {
+        &self.directory
+    }
+
+    /// Tiers in the file; fewer than [`Header::n_tiers`] when it was cut where a tier ends.
+    #[must_use]
+    pub fn n_tiers(&self) -> u8 {
+        self.n_tiers
+    }
+
+    /// Tier number `tier`, whether it is in the file or not.
+    #[must_use]
+    pub fn tier(&self, tier: u8) -> Option<Tier> {
+        self.directory.tier(tier)
+    }
+
+    /// Anchors in the file.
+    #[must_use]
+    pub fn n_anchors(&self) -> u32 {
+        self.up_to_tier(self.n_tiers).n_anchors
+    }
+
+    /// Chunks in the file.
+    #[must_use]
+    pub fn n_chunks(&self) -> u32 {
+        self.up_to_tier(self.n_tiers).n_chunks
+    }
+
+    /// What the first `n_tiers` tiers consist of, those beyond the file's left out.
+    pub(crate) fn up_to_tier(&self, n_tiers: u8) -> Tier {
+        let last = n_tiers.min(self.n_tiers).checked_sub(1);
+        last.and_then(|last| self.tier(last)).unwrap_or_default()
     }
 
     /// Chunk number `index`.
     ///
     /// # Errors
-    /// [`DecodeError::NoSuchChunk`].
+    /// [`DecodeError::NoSuchChunk`] beyond the tiers in the file.
+    ///
+    /// # Budget
+    /// Adds up the lengths of all chunks before it.
     pub fn chunk(&self, index: u32) -> Result<Chunk<'a>, DecodeError> {
-        let no_such = DecodeError::NoSuchChunk { chunk: index, n_chunks: self.header.n_chunks };
-        let record = self.directory.get(index as usize).ok_or(no_such)?;
-        let (chunk, _, _) = Chunk::parse(record, index, &self.header, self.chunks)?;
-        Ok(chunk)
+        let no_such = DecodeError::NoSuchChunk { chunk: index, n_chunks: self.n_chunks() };
+        self.chunks().nth(index as usize).ok_or(no_such)
     }
 
-    /// All chunks in order.
+    /// All chunks in the file, in order.
     pub fn chunks(&self) -> impl Iterator<Item = Chunk<'a>> + use<'a> {
-        let bundle = *self;
-        (0..bundle.header.n_chunks).filter_map(move |index| bundle.chunk(index).ok())
+        let Self { directory, chunks, .. } = *self;
+        let mut offset = 0_u32;
+        (0..self.n_chunks()).map_while(move |index| {
+            let record = directory.record(index)?;
+            let chunk = Chunk::new(index, offset, record, directory.ink_frame, chunks);
+            offset = offset.saturating_add(record.len);
+            chunk
+        })
     }
 
     /// Position of a lattice cell, normalised frame.
@@ -104,23 +226,25 @@ impl<'a> Bundle<'a> {
     pub fn position(&self, lattice: [i32; 3]) -> [f32; 3] {
         lattice.map(|cell| cell as f32 * self.header.voxel_size)
     }
+}
 
-    /// The chunks lie one after the other and hold all anchors.
-    fn check_directory(&self) -> Result<(), DecodeError> {
-        let mut expected = 0;
-        let mut n_anchors = 0_u32;
-        for (index, record) in (0..).zip(self.directory) {
-            let (chunk, found, end) = Chunk::parse(record, index, &self.header, self.chunks)?;
-            if found != expected {
-                return Err(DecodeError::Misplaced { section: SectionKind::Chunks, expected, found });
-            }
-            expected = end;
-            n_anchors = n_anchors.saturating_add(chunk.n_anchors().into());
-        }
-        if expected != saturate(self.chunks.len()) {
-            let found = saturate(self.chunks.len());
-            return Err(DecodeError::WrongLength { section: SectionKind::Chunks, expected, found });
-        }
-        header::in_range(crate::error::Field::NAnchors, n_anchors, self.header.n_anchors, self.header.n_anchors)
+/// How many tiers `file` holds, and their chunks: all of them, or those up to a tier at whose end the file ends.
+fn tiers_in<'a>(
+    file: &'a [u8],
+    section: &Section,
+    directory: &Directory<'_>,
+    n_tiers: u8,
+) -> Result<(u8, &'a [u8]), DecodeError> {
+    let available = file.get(section.offset as usize..).unwrap_or_default();
+    if let Some(chunks) = available.get(..section.len as usize) {
+        return Ok((n_tiers, chunks));
     }
+    for tier in (0..n_tiers).rev() {
+        let end = directory.tier(tier).map(|tier| tier.end as usize);
+        if end == Some(available.len()) {
+            return Ok((tier.saturating_add(1), available));
+        }
+    }
+    let available = saturate(available.len());
+    Err(DecodeError::Truncated { section: SectionKind::Chunks, needed: section.len, available })
 }

@@ -1,58 +1,139 @@
 //! The section table: where each part lies, and its checksum.
 
-use super::cursor::Cursor;
-use super::header::{HEADER_LEN, in_range};
+use super::cursor::{Cursor, saturate};
+use super::features::Features;
+use super::header::in_range;
 use crate::error::{DecodeError, Field, SectionKind};
+
+/// Length of a row of the section table, bytes.
+pub const SECTION_LEN: usize = 16;
+/// Sections of this kind and above may be skipped by a decoder that does not know them.
+const FIRST_OPTIONAL_CODE: u8 = 128;
 
 /// One row of the section table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Section {
-    kind: SectionKind,
-    offset: u32,
-    len: u32,
-    crc: u32,
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Section {
+    /// Which section.
+    pub kind: SectionKind,
+    /// The number that the file has for its kind.
+    pub code: u8,
+    /// Where it begins, bytes from the start of the file.
+    pub offset: u32,
+    /// Its length, bytes.
+    pub len: u32,
+    /// Its checksum; 0 for the chunks, which have their own.
+    pub crc: u32,
 }
 
-/// The sections in file order and the code of each.
-const ORDER: [(SectionKind, u8); 4] =
-    [(SectionKind::Heads, 1), (SectionKind::Tables, 2), (SectionKind::Directory, 3), (SectionKind::Chunks, 4)];
+/// The sections that a decoder reads.
+pub(super) struct Sections {
+    pub(super) heads: Section,
+    pub(super) lattice: Section,
+    pub(super) masks: Option<Section>,
+    /// Tables or context.
+    pub(super) coder: Section,
+    pub(super) manifest: Section,
+    pub(super) directory: Section,
+    pub(super) chunks: Section,
+}
 
 impl Section {
-    /// Reads the table; the sections follow the header in order, without gaps, and end at `file_len`.
-    pub(super) fn parse_table(cursor: &mut Cursor<'_>, file_len: u32) -> Result<[Self; 4], DecodeError> {
-        let mut expected = HEADER_LEN as u32;
-        let mut sections = [Self { kind: SectionKind::Header, offset: 0, len: 0, crc: 0 }; 4];
-        for (section, (kind, code)) in sections.iter_mut().zip(ORDER) {
-            let [found, reserved @ ..] = cursor.array::<4>()?;
-            in_range(Field::SectionKind, found.into(), code.into(), code.into())?;
-            in_range(Field::Reserved, u8::from(reserved != [0; 3]).into(), 0, 0)?;
-            let [offset, len, crc] = [cursor.u32()?, cursor.u32()?, cursor.u32()?];
-            if offset != expected {
-                return Err(DecodeError::Misplaced { section: kind, expected, found: offset });
-            }
-            let Some(end) = offset.checked_add(len).filter(|&end| end <= file_len) else {
-                let needed = offset.saturating_add(len);
-                return Err(DecodeError::Truncated { section: kind, needed, available: file_len });
-            };
-            expected = end;
-            *section = Self { kind, offset, len, crc };
-        }
-        if expected != file_len {
-            return Err(DecodeError::WrongLength { section: SectionKind::Chunks, expected: file_len, found: expected });
-        }
-        Ok(sections)
+    pub(super) fn parse(row: &[u8; SECTION_LEN]) -> Result<Self, DecodeError> {
+        let mut cursor = Cursor::new(row, SectionKind::Header);
+        let [code, reserved @ ..] = cursor.array::<4>()?;
+        in_range(Field::Reserved, u8::from(reserved != [0; 3]).into(), 0, 0)?;
+        let [offset, len, crc] = [cursor.u32()?, cursor.u32()?, cursor.u32()?];
+        Ok(Self { kind: kind_of(code)?, code, offset, len, crc })
     }
 
-    /// The bytes of the section, their checksum compared; the chunks have theirs in the directory.
+    /// The bytes of the section, their checksum compared.
     pub(super) fn bytes<'a>(&self, file: &'a [u8]) -> Result<&'a [u8], DecodeError> {
-        let needed = self.offset.saturating_add(self.len);
-        let truncated =
-            DecodeError::Truncated { section: self.kind, needed, available: super::cursor::saturate(file.len()) };
-        let bytes = file.get(self.offset as usize..needed as usize).ok_or(truncated)?;
-        let computed = if self.kind == SectionKind::Chunks { 0 } else { super::crc32(bytes) };
+        let end = self.offset.saturating_add(self.len);
+        let available = saturate(file.len()).saturating_sub(self.offset);
+        let truncated = DecodeError::Truncated { section: self.kind, needed: self.len, available };
+        let bytes = file.get(self.offset as usize..end as usize).ok_or(truncated)?;
+        let computed = super::crc32(bytes);
         if computed != self.crc {
             return Err(DecodeError::SectionChecksum { section: self.kind, stored: self.crc, computed });
         }
         Ok(bytes)
     }
+}
+
+impl Sections {
+    /// Reads the table: sections follow the header in order, without gaps, and end at `file_len`. Compares the checksums
+    /// of those that are to be skipped.
+    pub(super) fn parse(
+        table: &[[u8; SECTION_LEN]],
+        features: Features,
+        header_len: u16,
+        file_len: u32,
+        file: &[u8],
+    ) -> Result<Self, DecodeError> {
+        let mut rows = table.iter();
+        let mut start = u32::from(header_len);
+        let mut next = |wanted: SectionKind| {
+            for row in rows.by_ref() {
+                let section = Section::parse(row)?;
+                if section.offset != start {
+                    let Section { kind: section, offset: found, .. } = section;
+                    return Err(DecodeError::Misplaced { section, expected: start, found });
+                }
+                let Some(end) = start.checked_add(section.len).filter(|&end| end <= file_len) else {
+                    let available = file_len.saturating_sub(start);
+                    return Err(DecodeError::Truncated { section: section.kind, needed: section.len, available });
+                };
+                start = end;
+                if section.kind == wanted {
+                    return Ok(section);
+                }
+                let SectionKind::Other(_) = section.kind else {
+                    return Err(DecodeError::UnexpectedSection { found: section.kind, expected: wanted });
+                };
+                section.bytes(file)?;
+            }
+            Err(DecodeError::MissingSection { section: wanted })
+        };
+        let sections = Self {
+            heads: next(SectionKind::Heads)?,
+            lattice: next(SectionKind::Lattice)?,
+            masks: if features.masks { Some(next(SectionKind::Masks)?) } else { None },
+            coder: next(if features.context { SectionKind::Context } else { SectionKind::Tables })?,
+            manifest: next(SectionKind::Manifest)?,
+            directory: next(SectionKind::Directory)?,
+            chunks: next(SectionKind::Chunks)?,
+        };
+        if let Some(row) = rows.next() {
+            let Section { kind: found, .. } = Section::parse(row)?;
+            return Err(DecodeError::UnexpectedSection { found, expected: SectionKind::Chunks });
+        }
+        if start != file_len {
+            return Err(DecodeError::WrongLength { section: SectionKind::Chunks, expected: file_len, found: start });
+        }
+        // Each chunk has its own checksum, so that a device need not read all of them to draw some.
+        if sections.chunks.crc != 0 {
+            let stored = sections.chunks.crc;
+            return Err(DecodeError::SectionChecksum { section: SectionKind::Chunks, stored, computed: 0 });
+        }
+        Ok(sections)
+    }
+}
+
+fn kind_of(code: u8) -> Result<SectionKind, DecodeError> {
+    Ok(match code {
+        1 => SectionKind::Heads,
+        2 => SectionKind::Lattice,
+        3 => SectionKind::Masks,
+        4 => SectionKind::Tables,
+        5 => SectionKind::Context,
+        6 => SectionKind::Manifest,
+        7 => SectionKind::Directory,
+        8 => SectionKind::Chunks,
+        FIRST_OPTIONAL_CODE.. => SectionKind::Other(code),
+        _ => {
+            let limit = FIRST_OPTIONAL_CODE.into();
+            return Err(DecodeError::OutOfRange { field: Field::SectionKind, found: code.into(), limit });
+        }
+    })
 }

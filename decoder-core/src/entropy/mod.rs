@@ -5,12 +5,16 @@
 #![deny(clippy::indexing_slicing, clippy::arithmetic_side_effects, clippy::unwrap_used, clippy::panic)]
 
 mod ans;
-mod bits;
+mod mask;
 mod model;
 mod normal;
 mod normal_tables;
+#[cfg(test)]
+pub(crate) mod testing;
+mod trie;
 
 pub use ans::AnsReader;
-pub use bits::BitReader;
+pub use mask::{MaskModel, N_MASK_CONTEXTS};
 pub use model::{FREQUENCY_TOTAL, PRECISION_BITS, Slot, SymbolModel, UniformByte};
 pub use normal::{EIGHTHS, N_PHASES, N_SCALES, NormalModel, SCALE_ONE, SymbolSlots};
+pub use trie::{Children, MAX_TRIE_LEVELS, N_TRIE_CONTEXTS, NodeModel, TrieModel, TrieReader};

@@ -11,8 +11,8 @@ impl fmt::Display for DecodeError {
             Self::UnsupportedVersion { found, supported } => {
                 write!(f, "bundle version {found}, this decoder reads {supported}; use matching releases")
             }
-            Self::UnsupportedEffects { unknown_bits } => {
-                write!(f, "the scene needs effects {unknown_bits:#x} unknown to this decoder; use a newer one")
+            Self::UnsupportedFeatures { unknown_bits } => {
+                write!(f, "the bundle needs features {unknown_bits:#x} unknown to this decoder; use a newer one")
             }
             Self::Truncated { section, needed, available } => {
                 write!(f, "{section} needs {needed} bytes and has {available}; the file is cut, copy it again")
@@ -23,6 +23,10 @@ impl fmt::Display for DecodeError {
             Self::Misplaced { section, expected, found } => {
                 write!(f, "{section} has a part at offset {found} that must begin at {expected}")
             }
+            Self::UnexpectedSection { found, expected } => {
+                write!(f, "the section table has {found} where {expected} must follow")
+            }
+            Self::MissingSection { section } => write!(f, "the section table lacks {section}"),
             Self::SectionChecksum { section, stored, computed } => {
                 write!(f, "{section} is damaged: CRC {computed:#010x}, stored {stored:#010x}; copy the file again")
             }
@@ -33,17 +37,23 @@ impl fmt::Display for DecodeError {
             Self::BadFloat { field, index } => {
                 write!(f, "{field}, float {index}: not finite, or not positive where it must be")
             }
-            Self::NotIncreasing { table, entry } => {
-                write!(f, "table {table}, entry {entry}: cumulative frequencies must not fall and end below 4096")
+            Self::NotIncreasing { section, table, entry } => {
+                write!(
+                    f,
+                    "{section}, table {table}, entry {entry}: cumulative frequencies must not fall and end below 4096"
+                )
             }
             Self::NoSuchTable { channel, table, n_tables } => {
                 write!(f, "channel {channel} refers to table {table} of {n_tables}")
             }
-            Self::ChunkTooShort { chunk, needed, available } => {
-                write!(f, "chunk {chunk} has {available} bytes, its anchors need at least {needed}")
+            Self::HeadStream { left_bytes: 0 } => {
+                write!(f, "section heads: the coded weights do not end cleanly at the section's last byte")
+            }
+            Self::HeadStream { left_bytes } => {
+                write!(f, "section heads: {left_bytes} bytes left after the last coded weight")
             }
             Self::ChunkStream { chunk, left_bytes: 0 } => {
-                write!(f, "chunk {chunk}: the symbols do not end cleanly at the chunk's last byte")
+                write!(f, "chunk {chunk}: its anchors do not end cleanly at its last byte")
             }
             Self::ChunkStream { chunk, left_bytes } => {
                 write!(f, "chunk {chunk}: {left_bytes} bytes left after its last symbol")

@@ -35,9 +35,9 @@ pub enum DecodeError {
         /// The version this decoder reads.
         supported: u16,
     },
-    /// The scene uses effects that this decoder does not know.
-    UnsupportedEffects {
-        /// The effect bits without a meaning here.
+    /// The bundle requires features that this decoder does not know.
+    UnsupportedFeatures {
+        /// The feature bits without a meaning here.
         unknown_bits: u32,
     },
     /// A section ends before its content does.
@@ -66,6 +66,18 @@ pub enum DecodeError {
         expected: u32,
         /// Offset stored.
         found: u32,
+    },
+    /// The section table has another section than the features call for at this place.
+    UnexpectedSection {
+        /// The section there.
+        found: SectionKind,
+        /// The section that must come next.
+        expected: SectionKind,
+    },
+    /// The section table ends before all sections came.
+    MissingSection {
+        /// The first that is missing.
+        section: SectionKind,
     },
     /// The bytes of a section changed since they were written.
     SectionChecksum {
@@ -103,8 +115,10 @@ pub enum DecodeError {
     },
     /// The cumulative frequencies of a table fall somewhere.
     NotIncreasing {
+        /// Where.
+        section: SectionKind,
         /// Which table, from 0.
-        table: u32,
+        table: u16,
         /// Index of the entry that is smaller than the one before, or beyond the limit.
         entry: u32,
     },
@@ -117,20 +131,16 @@ pub enum DecodeError {
         /// Tables there are.
         n_tables: u32,
     },
-    /// A chunk is shorter than its fixed fields and lattice offsets.
-    ChunkTooShort {
-        /// Which, from 0.
-        chunk: u32,
-        /// Bytes needed.
-        needed: u32,
-        /// Bytes there.
-        available: u32,
+    /// The coded weights of the heads do not end where their section ends.
+    HeadStream {
+        /// Bytes left over after the last weight; 0 when the weights ran past the end.
+        left_bytes: u32,
     },
-    /// The coded symbols of a chunk do not end where its bytes end.
+    /// The coded anchors of a chunk do not end where its bytes end, or are not as many as its record says.
     ChunkStream {
         /// Which, from 0.
         chunk: u32,
-        /// Bytes left over after the last symbol; 0 when the symbols ran past the end.
+        /// Bytes left over after the last symbol; 0 when there are none but the symbols are not those of the anchors.
         left_bytes: u32,
     },
     /// There is no such chunk.
@@ -192,7 +202,7 @@ impl DecodeError {
     /// ```
     pub const fn class(&self) -> ErrorClass {
         match self {
-            Self::UnsupportedVersion { .. } | Self::UnsupportedEffects { .. } => ErrorClass::Unsupported,
+            Self::UnsupportedVersion { .. } | Self::UnsupportedFeatures { .. } => ErrorClass::Unsupported,
             Self::PlanTooLarge { .. } | Self::ScratchTooSmall { .. } | Self::TooManySplats { .. } => {
                 ErrorClass::OverBudget
             }
@@ -203,11 +213,13 @@ impl DecodeError {
             | Self::Truncated { .. }
             | Self::WrongLength { .. }
             | Self::Misplaced { .. }
+            | Self::UnexpectedSection { .. }
+            | Self::MissingSection { .. }
             | Self::SectionChecksum { .. }
             | Self::ChunkChecksum { .. }
             | Self::NotIncreasing { .. }
             | Self::NoSuchTable { .. }
-            | Self::ChunkTooShort { .. }
+            | Self::HeadStream { .. }
             | Self::ChunkStream { .. } => ErrorClass::Malformed,
         }
     }

@@ -12,14 +12,22 @@ pub enum SectionKind {
     Header,
     /// Weights of the three heads.
     Heads,
+    /// Where anchors may lie, and the frequencies of their positions.
+    Lattice,
+    /// How often each offset is drawn.
+    Masks,
     /// Quantisation and frequency tables.
     Tables,
-    /// One record per chunk.
+    /// The context model.
+    Context,
+    /// What each tier was measured to look like and to cost.
+    Manifest,
+    /// The tiers, and one record a chunk.
     Directory,
     /// The chunks' coded anchors.
     Chunks,
-    /// The context model.
-    Context,
+    /// One that this decoder does not know and skips.
+    Other(u8),
 }
 
 /// A value that has limits of its own; names what [`OutOfRange`](super::DecodeError::OutOfRange) and its kin speak of.
@@ -34,6 +42,7 @@ pub enum Field {
     NAnchors,
     NChunks,
     MaxChunkAnchors,
+    NTiers,
     NSections,
     SectionKind,
     Reserved,
@@ -42,15 +51,24 @@ pub enum Field {
     Normalisation,
     PreviewCamera,
     HeadWeight,
+    HeadStep,
     NTables,
     NChannels,
     TableOffset,
     TableSymbols,
     TableScale,
-    ChunkAnchors,
-    InkBox,
-    LatticeBase,
+    LatticeMin,
     LatticeBits,
+    TrieFrequency,
+    MaskFrequency,
+    ManifestPsnr,
+    TierChunks,
+    TierAnchors,
+    TierEnd,
+    ChunkAnchors,
+    ChunkLen,
+    InkFrame,
+    InkBox,
     ContextLevels,
     ContextHidden,
     ContextShift,
@@ -65,7 +83,8 @@ pub enum Field {
     FrameWidth,
     FrameHeight,
     ChannelBuffer,
-    LatticeBuffer,
+    SiteBuffer,
+    ModelBuffer,
 }
 
 impl Field {
@@ -78,7 +97,8 @@ impl Field {
             | Self::FrameWidth
             | Self::FrameHeight
             | Self::ChannelBuffer
-            | Self::LatticeBuffer => ErrorClass::Misuse,
+            | Self::SiteBuffer
+            | Self::ModelBuffer => ErrorClass::Misuse,
             _ => ErrorClass::Malformed,
         }
     }
@@ -89,10 +109,14 @@ impl fmt::Display for SectionKind {
         f.write_str(match self {
             Self::Header => "the header",
             Self::Heads => "section heads",
+            Self::Lattice => "section lattice",
+            Self::Masks => "section masks",
             Self::Tables => "section tables",
+            Self::Context => "section context",
+            Self::Manifest => "section manifest",
             Self::Directory => "section directory",
             Self::Chunks => "section chunks",
-            Self::Context => "section context",
+            Self::Other(code) => return write!(f, "section of unknown kind {code}"),
         })
     }
 }
@@ -107,6 +131,7 @@ impl fmt::Display for Field {
             Self::NAnchors => "number of anchors",
             Self::NChunks => "number of chunks",
             Self::MaxChunkAnchors => "largest number of anchors in a chunk",
+            Self::NTiers => "number of tiers",
             Self::NSections => "number of sections",
             Self::SectionKind => "kind of a section",
             Self::Reserved => "a reserved byte",
@@ -115,15 +140,24 @@ impl fmt::Display for Field {
             Self::Normalisation => "normalisation",
             Self::PreviewCamera => "preview camera",
             Self::HeadWeight => "weight of a head",
+            Self::HeadStep => "origin or step of coded heads",
             Self::NTables => "number of tables",
             Self::NChannels => "number of channels",
             Self::TableOffset => "offset of a table",
             Self::TableSymbols => "symbols of a table",
             Self::TableScale => "origin or step of a table",
+            Self::LatticeMin => "lowest lattice coordinate",
+            Self::LatticeBits => "lattice bits an axis",
+            Self::TrieFrequency => "cumulative frequency of positions",
+            Self::MaskFrequency => "frequency of a drawn offset",
+            Self::ManifestPsnr => "PSNR of a tier",
+            Self::TierChunks => "chunks of a tier and those before it",
+            Self::TierAnchors => "anchors of a tier and those before it",
+            Self::TierEnd => "end of a tier in the chunks",
             Self::ChunkAnchors => "anchors of a chunk",
+            Self::ChunkLen => "odd bytes of a chunk's length",
+            Self::InkFrame => "frame of the ink boxes",
             Self::InkBox => "ink box of a chunk",
-            Self::LatticeBase => "lattice base of a chunk",
-            Self::LatticeBits => "lattice bits of a chunk",
             Self::ContextLevels => "grid levels of the context",
             Self::ContextHidden => "hidden units of the context",
             Self::ContextShift => "shift of a context layer",
@@ -138,7 +172,8 @@ impl fmt::Display for Field {
             Self::FrameWidth => "frame width",
             Self::FrameHeight => "frame height",
             Self::ChannelBuffer => "buffer for channels",
-            Self::LatticeBuffer => "buffer for lattice coordinates",
+            Self::SiteBuffer => "buffer for anchors' sites",
+            Self::ModelBuffer => "memory for the models of anchors",
         })
     }
 }

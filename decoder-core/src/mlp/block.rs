@@ -19,22 +19,21 @@ impl<'s, const B: usize> Blocks<'s, B> {
     /// Converts a layer's weights `[n_out, n_in]` and biases `[n_out]`; outputs beyond `n_out` become 0.
     pub(crate) fn convert(
         arena: &mut Arena<'s>,
-        weights: &Halves<'_>,
+        mut weights: impl Iterator<Item = f32>,
         biases: &Halves<'_>,
         n_in: usize,
     ) -> Result<Self, DecodeError> {
         let n_out = biases.len();
         let rows = arena.take::<[f32; B]>(n_rows::<B>(n_in, n_out))?;
+        rows.fill([0.0; B]);
         let rows_per_block = n_in + 1;
-        for (block, block_rows) in rows.chunks_exact_mut(rows_per_block.max(1)).enumerate() {
-            for (input, row) in block_rows.iter_mut().enumerate() {
-                for (lane, weight) in row.iter_mut().enumerate() {
-                    let output = block * B + lane;
-                    let stored = match input.checked_sub(1) {
-                        None => biases.get(output),
-                        Some(input) => weights.get(output * n_in + input),
-                    };
-                    *weight = if output < n_out { stored.unwrap_or(0.0) } else { 0.0 };
+        for (output, bias) in biases.iter().enumerate() {
+            // `max(1)` shows the compiler what is true anyway, and a panic path less is linked.
+            let Some(block) = rows.chunks_exact_mut(rows_per_block.max(1)).nth(output / B) else { break };
+            let lane = output % B;
+            for (row, weight) in block.iter_mut().zip(core::iter::once(bias).chain(weights.by_ref())) {
+                if let Some(slot) = row.get_mut(lane) {
+                    *slot = weight;
                 }
             }
         }
@@ -43,7 +42,6 @@ impl<'s, const B: usize> Blocks<'s, B> {
 
     /// All blocks in order.
     pub(crate) fn iter(&self) -> impl Iterator<Item = &'s [[f32; B]]> + use<'s, B> {
-        // `max(1)` shows the compiler what is true anyway, and a panic path less is linked.
         self.rows.chunks_exact(self.rows_per_block.max(1))
     }
 

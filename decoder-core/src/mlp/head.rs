@@ -2,7 +2,7 @@
 
 use super::block::{Blocks, n_rows, outputs};
 use crate::budget::Arena;
-use crate::bundle::{HeadView, Header, HeadsView};
+use crate::bundle::{HeadView, Header, HeadsView, WeightReader};
 use crate::error::DecodeError;
 
 /// Outputs computed together in layers whose outputs are all needed.
@@ -39,19 +39,25 @@ pub(crate) fn hidden_len(header: &Header) -> usize {
 impl<'s> Heads<'s> {
     /// Converts the file's weights; takes [`n_weights`] floats.
     pub(crate) fn convert(arena: &mut Arena<'s>, heads: &HeadsView<'_>) -> Result<Self, DecodeError> {
+        let mut weights = heads.weights();
+        // In the order of the file.
         Ok(Self {
-            opacity: Head::convert(arena, &heads.opacity)?,
-            covariance: Head::convert(arena, &heads.covariance)?,
-            colour: Head::convert(arena, &heads.colour)?,
+            opacity: Head::convert(arena, &heads.opacity, &mut weights)?,
+            covariance: Head::convert(arena, &heads.covariance, &mut weights)?,
+            colour: Head::convert(arena, &heads.colour, &mut weights)?,
         })
     }
 }
 
 impl<'s, const B: usize> Head<'s, B> {
-    fn convert(arena: &mut Arena<'s>, head: &HeadView<'_>) -> Result<Self, DecodeError> {
+    fn convert(
+        arena: &mut Arena<'s>,
+        head: &HeadView<'_>,
+        weights: &mut WeightReader<'_>,
+    ) -> Result<Self, DecodeError> {
         Ok(Self {
-            hidden: Blocks::convert(arena, &head.w1, &head.b1, head.n_in)?,
-            output: Blocks::convert(arena, &head.w2, &head.b2, head.n_hidden)?,
+            hidden: Blocks::convert(arena, weights.next_layer(), &head.b1, head.n_in)?,
+            output: Blocks::convert(arena, weights.next_layer(), &head.b2, head.n_hidden)?,
             n_hidden: head.n_hidden,
         })
     }

@@ -34,7 +34,8 @@ pub(crate) struct Workspace<'s> {
 
 /// Calls `draw` with each Gaussian of `anchor` that a camera at `eye` can see, offsets ascending.
 ///
-/// The covariance and colour heads run only when an opacity is positive, and only for those offsets.
+/// Masked offsets take no part. The covariance and colour heads run only when an opacity is positive, and only for those
+/// offsets.
 ///
 /// # Budget
 /// The opacity head, and at most the other two: `3F(F + 4) + 11KF` multiply-adds.
@@ -89,13 +90,16 @@ fn opacities(anchor: &Anchor<'_>, heads: &Heads<'_>, work: &mut Workspace<'_>) -
     let mut visible = 0_u32;
     let hidden = heads.opacity.activate(work.inputs, work.hidden);
     for (block, opacities) in opacities.chunks_exact_mut(8).enumerate() {
+        let mask = anchor.mask >> (8 * block) & 0xFF;
+        if mask == 0 {
+            continue;
+        }
         let Some(logits) = heads.opacity.block(block, hidden) else { break };
         for (lane, (opacity, logit)) in opacities.iter_mut().zip(logits).enumerate() {
             // tanh keeps the sign and the order, so most offsets leave before it.
-            if logit > 0.0 {
+            if logit > 0.0 && mask >> lane & 1 == 1 {
                 *opacity = tanh(logit);
-                let drawn = *opacity >= OPACITY_MIN && block * 8 + lane < anchor.offsets.len();
-                visible |= u32::from(drawn) << ((block * 8 + lane) & 31);
+                visible |= u32::from(*opacity >= OPACITY_MIN) << ((block * 8 + lane) & 31);
             }
         }
     }

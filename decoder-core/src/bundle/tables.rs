@@ -1,5 +1,9 @@
 //! The tables section: per channel a quantisation step and the frequencies of its symbols.
 
+mod index;
+
+pub(super) use index::{IndexedTable, IndexedTables};
+
 use super::cursor::{Cursor, saturate};
 use super::header::in_range;
 use crate::entropy::{AnsReader, FREQUENCY_TOTAL, Slot, SymbolModel, UniformByte};
@@ -54,15 +58,9 @@ impl<'a> Tables<'a> {
             let offset = u32::from_le_bytes(offset);
             let expected = saturate(cursor.position());
             in_range(Field::TableOffset, offset, expected, expected)?;
-            Table::parse(&mut cursor)?.check(table)?;
+            Table::parse(&mut cursor)?.check(SectionKind::Tables, table)?;
         }
-        if !cursor.rest().is_empty() {
-            return Err(DecodeError::WrongLength {
-                section: SectionKind::Tables,
-                expected: saturate(cursor.position()),
-                found: saturate(section.len()),
-            });
-        }
+        cursor.end()?;
         Ok(Self { channel_tables, offsets, section })
     }
 
@@ -85,6 +83,7 @@ impl<'a> Tables<'a> {
     }
 
     /// Which table channel `channel` uses.
+    #[inline]
     #[must_use]
     pub fn table_of(&self, channel: usize) -> Option<usize> {
         self.channel_tables.get(channel).map(|&table| usize::from(u16::from_le_bytes(table)))
@@ -93,31 +92,28 @@ impl<'a> Tables<'a> {
     /// Table number `table`.
     #[must_use]
     pub fn get(&self, table: usize) -> Option<Table<'a>> {
-        let offset = u32::from_le_bytes(*self.offsets.get(table)?);
-        let bytes = self.section.get(offset as usize..)?;
+        let bytes = self.section.get(self.offset_of(table)?..)?;
         Table::parse(&mut Cursor::new(bytes, SectionKind::Tables)).ok()
     }
 
     /// The tables of all channels in order.
     pub fn of_channels(&self) -> impl Iterator<Item = Table<'a>> + use<'a> {
         let tables = *self;
-        // Neighbouring channels mostly share a table, which is then looked up once.
-        let mut latest: Option<([u8; 2], Table<'a>)> = None;
-        tables.channel_tables.iter().filter_map(move |&index| {
-            if let Some((latest_index, table)) = latest
-                && latest_index == index
-            {
-                return Some(table);
-            }
-            let table = tables.get(usize::from(u16::from_le_bytes(index)))?;
-            latest = Some((index, table));
-            Some(table)
-        })
+        (0..tables.n_channels()).filter_map(move |channel| tables.get(tables.table_of(channel)?))
+    }
+
+    /// Where table number `table` begins in the section.
+    fn offset_of(&self, table: usize) -> Option<usize> {
+        self.offsets.get(table).map(|&offset| u32::from_le_bytes(offset) as usize)
     }
 }
 
 impl<'a> Table<'a> {
-    fn parse(cursor: &mut Cursor<'a>) -> Result<Self, DecodeError> {
+    /// Length of a table before its ends, bytes.
+    const FIXED_LEN: usize = 12;
+
+    /// Reads a table; the section of `cursor` goes into errors.
+    pub(super) fn parse(cursor: &mut Cursor<'a>) -> Result<Self, DecodeError> {
         let [origin, step] = cursor.f32s()?;
         let min_symbol = cursor.i16()?;
         let n_symbols = cursor.u16()?;
@@ -148,17 +144,10 @@ impl<'a> Table<'a> {
     /// Decodes the next symbol of `reader`, an escaped one included.
     #[inline]
     pub fn symbol(&self, reader: &mut AnsReader<'_>) -> i16 {
-        match reader.symbol(self) {
-            Some(symbol) => symbol,
-            None => {
-                let high = reader.symbol(&UniformByte);
-                let low = reader.symbol(&UniformByte);
-                i16::from_be_bytes([high, low])
-            }
-        }
+        reader.symbol(self).unwrap_or_else(|| escaped(reader))
     }
 
-    fn check(&self, table: u32) -> Result<(), DecodeError> {
+    pub(super) fn check(&self, section: SectionKind, table: u32) -> Result<(), DecodeError> {
         if !(self.step.is_finite() && self.step > 0.0 && self.step * 32768.0 + self.origin.abs() < MAX_VALUE) {
             return Err(DecodeError::BadFloat { field: Field::TableScale, index: table });
         }
@@ -169,12 +158,20 @@ impl<'a> Table<'a> {
         for (entry, end) in (0..).zip(self.ends()) {
             // The escape keeps at least one slot, so that every i16 can be coded.
             if end < before || end >= FREQUENCY_TOTAL {
-                return Err(DecodeError::NotIncreasing { table, entry });
+                return Err(DecodeError::NotIncreasing { section, table: table as u16, entry });
             }
             before = end;
         }
         Ok(())
     }
+}
+
+/// The symbol after an escape: two raw bytes, high then low.
+#[cold]
+fn escaped(reader: &mut AnsReader<'_>) -> i16 {
+    let high = reader.symbol(&UniformByte);
+    let low = reader.symbol(&UniformByte);
+    i16::from_be_bytes([high, low])
 }
 
 impl SymbolModel for Table<'_> {

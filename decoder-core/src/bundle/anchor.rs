@@ -1,0 +1,215 @@
+//! The anchors of a chunk, one after the other: where each stands, which offsets it draws, and its channels.
+
+use super::cursor::saturate;
+use super::header::Header;
+use super::lattice::Lattice;
+use super::tables::{IndexedTable, IndexedTables};
+use super::{Bundle, Coder};
+use crate::context::{Context, N_GROUPS};
+use crate::entropy::{AnsReader, MaskModel, TrieReader};
+use crate::error::{DecodeError, Field};
+
+/// Where an anchor stands and which of its offsets are drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct AnchorSite {
+    /// Lattice coordinates; the position is `lattice · voxel_size`.
+    pub lattice: [i32; 3],
+    /// Bit k is set when offset k is drawn; the channels of the others are not in the file and read as 0.
+    pub mask: u32,
+}
+
+/// The models of everything an anchor consists of, with the memory they work in; made by [`Bundle::anchor_models`].
+#[derive(Debug)]
+pub struct AnchorModels<'b, 's> {
+    lattice: Lattice<'b>,
+    masks: Option<MaskModel<'b>>,
+    /// F features and 6 log-scales.
+    n_scalars: usize,
+    n_offsets: u16,
+    channels: ChannelModels<'b, 's>,
+}
+
+/// The models of the channels.
+#[derive(Debug)]
+enum ChannelModels<'b, 's> {
+    Static(IndexedTables<'b, 's>),
+    Context { context: Context<'b>, features: &'s mut [i16], hidden: &'s mut [i16] },
+}
+
+/// Decodes the anchors of one chunk in their order, one at a time.
+#[derive(Debug)]
+#[must_use = "only `finish` tells whether the anchors were sound"]
+pub struct AnchorReader<'b, 's, 'm> {
+    chunk: u32,
+    codes: TrieReader<'b>,
+    symbols: AnsReader<'b>,
+    models: &'m mut AnchorModels<'b, 's>,
+    site: AnchorSite,
+}
+
+impl<'b> Bundle<'b> {
+    /// Words of memory that [`anchor_models`](Self::anchor_models) takes.
+    #[must_use]
+    pub fn anchor_scratch_words(&self) -> usize {
+        let bytes = match self.coder() {
+            Coder::Static(tables) => tables.len().saturating_mul(size_of::<IndexedTable>()),
+            Coder::Context(context) => context_lens(context).into_iter().sum::<usize>().saturating_mul(4),
+        };
+        bytes.div_ceil(4)
+    }
+
+    /// Prepares the models of the anchors in `scratch`, whose content does not matter.
+    ///
+    /// * `scratch`: [`anchor_scratch_words`](Self::anchor_scratch_words).
+    ///
+    /// # Errors
+    /// [`DecodeError::BufferTooShort`].
+    ///
+    /// # Budget
+    /// With tables about 32 bisections each; with a context nothing.
+    pub fn anchor_models<'s>(&self, scratch: &'s mut [u32]) -> Result<AnchorModels<'b, 's>, DecodeError> {
+        let [needed, available] = [self.anchor_scratch_words(), scratch.len()];
+        let too_short = DecodeError::BufferTooShort {
+            field: Field::ModelBuffer,
+            needed: saturate(needed),
+            available: saturate(available),
+        };
+        let scratch = scratch.get_mut(..needed).ok_or(too_short)?;
+        let channels = match self.coder() {
+            Coder::Static(tables) => {
+                let slots = bytemuck::try_cast_slice_mut(scratch).map_err(|_| DecodeError::Internal)?;
+                ChannelModels::Static(IndexedTables::new(tables, slots)?)
+            }
+            Coder::Context(context) => {
+                let [n_feature_words, _] = context_lens(context);
+                let (features, hidden) = scratch.split_at_mut_checked(n_feature_words).ok_or(DecodeError::Internal)?;
+                let halves = |words, n| -> Result<&'s mut [i16], DecodeError> {
+                    let halves: &mut [i16] = bytemuck::try_cast_slice_mut(words).map_err(|_| DecodeError::Internal)?;
+                    halves.get_mut(..n).ok_or(DecodeError::Internal)
+                };
+                ChannelModels::Context {
+                    context: *context,
+                    features: halves(features, context.n_inputs())?,
+                    hidden: halves(hidden, context.n_hidden())?,
+                }
+            }
+        };
+        let Header { feature_dim, n_offsets, .. } = *self.header();
+        Ok(AnchorModels {
+            lattice: *self.lattice(),
+            masks: self.masks().copied(),
+            n_scalars: usize::from(feature_dim).saturating_add(6),
+            n_offsets,
+            channels,
+        })
+    }
+}
+
+/// Words of the context's features and of its hidden units.
+fn context_lens(context: &Context<'_>) -> [usize; 2] {
+    [context.n_inputs().div_ceil(2), context.n_hidden().div_ceil(2)]
+}
+
+impl AnchorModels<'_, '_> {
+    /// Channels of an anchor.
+    #[must_use]
+    pub fn n_channels(&self) -> usize {
+        self.n_scalars.saturating_add(usize::from(self.n_offsets).saturating_mul(3))
+    }
+}
+
+impl<'b, 's, 'm> AnchorReader<'b, 's, 'm> {
+    pub(super) fn new(chunk: u32, words: &'b [[u8; 2]], models: &'m mut AnchorModels<'b, 's>) -> Self {
+        let codes = models.lattice.trie.codes();
+        Self { chunk, codes, symbols: AnsReader::new(words), models, site: AnchorSite::default() }
+    }
+
+    /// Where the next anchor stands; one call an anchor, before its channels.
+    #[inline]
+    pub fn site(&mut self) -> AnchorSite {
+        let lattice = self.models.lattice.cell(self.codes.next(&mut self.symbols));
+        let mask = match &self.models.masks {
+            Some(masks) => masks.mask(&mut self.symbols),
+            // There are 1 to 32 offsets.
+            None => u32::MAX.wrapping_shr(u32::BITS.wrapping_sub(self.models.n_offsets.into())),
+        };
+        self.site = AnchorSite { lattice, mask };
+        self.site
+    }
+
+    /// The anchor's symbols, one a channel; one call of this or of [`values`](Self::values) an anchor.
+    pub fn symbols(&mut self, row: &mut [i16]) {
+        self.channels(row, 0, |symbol, _, _| symbol);
+    }
+
+    /// The anchor's values, one a channel; one call of this or of [`symbols`](Self::symbols) an anchor.
+    pub fn values(&mut self, row: &mut [f32]) {
+        self.channels(row, 0.0, |symbol, origin, step| origin + f32::from(symbol) * step);
+    }
+
+    /// Ends the chunk after its last anchor.
+    ///
+    /// # Errors
+    /// [`DecodeError::ChunkStream`] when anchors are missing or too many, or their symbols do not end where the bytes end.
+    pub fn finish(self) -> Result<(), DecodeError> {
+        let chunk = self.chunk;
+        match self.symbols.finish() {
+            Ok(()) if self.codes.is_complete() => Ok(()),
+            Ok(()) => Err(DecodeError::ChunkStream { chunk, left_bytes: 0 }),
+            Err(left) => Err(DecodeError::ChunkStream { chunk, left_bytes: saturate(left) }),
+        }
+    }
+
+    /// Fills `row` with what `of` makes of each symbol and of the origin and the step of its values.
+    #[inline]
+    fn channels<T: Copy>(&mut self, row: &mut [T], undrawn: T, of: impl Fn(i16, f32, f32) -> T) {
+        let Self { models, symbols, site, .. } = self;
+        let n_scalars = models.n_scalars;
+        match &mut models.channels {
+            ChannelModels::Static(tables) => {
+                for_each_drawn(row, n_scalars, site.mask, undrawn, |channel, slot| {
+                    let (symbol, origin, step) = tables.symbol(channel, symbols);
+                    *slot = of(symbol, origin, step);
+                });
+            }
+            ChannelModels::Context { context, features, hidden } => {
+                context.features(site.lattice, features);
+                context.hidden(features, hidden);
+                let steps = context.steps(hidden);
+                for_each_drawn(row, n_scalars, site.mask, undrawn, |channel, slot| {
+                    let symbol = context.model(channel, &steps, hidden).symbol(symbols);
+                    *slot = of(symbol, 0.0, steps.value(context.group(channel)));
+                });
+            }
+        }
+    }
+}
+
+/// Calls `read` with the number and the slot of each channel that is in the file; the others become `undrawn`.
+#[inline]
+fn for_each_drawn<T: Copy>(
+    row: &mut [T],
+    n_scalars: usize,
+    mask: u32,
+    undrawn: T,
+    mut read: impl FnMut(usize, &mut T),
+) {
+    let Some((scalars, offsets)) = row.split_at_mut_checked(n_scalars) else { return };
+    for (channel, slot) in scalars.iter_mut().enumerate() {
+        read(channel, slot);
+    }
+    let mut mask = mask;
+    for (offset, first) in offsets.as_chunks_mut::<3>().0.iter_mut().zip((n_scalars..).step_by(3)) {
+        if mask & 1 == 1 {
+            for (slot, channel) in offset.iter_mut().zip(first..) {
+                read(channel, slot);
+            }
+        } else {
+            *offset = [undrawn; 3];
+        }
+        mask >>= 1;
+    }
+}
+
+const _: () = assert!(N_GROUPS == 3, "features, log-scales, offsets");

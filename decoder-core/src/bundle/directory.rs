@@ -1,0 +1,149 @@
+//! The directory: the tiers, and one record a chunk.
+
+use super::cursor::Cursor;
+use super::header::{Header, in_range};
+use crate::error::{DecodeError, Field, SectionKind};
+
+/// Length of a tier's record, bytes.
+pub const TIER_RECORD_LEN: usize = 12;
+/// Length of the ink frame, bytes.
+pub const INK_FRAME_LEN: usize = 24;
+/// Length of a chunk's record, bytes.
+pub const CHUNK_RECORD_LEN: usize = 24;
+
+/// What a scene consists of up to the end of a tier.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Tier {
+    /// Chunks of this tier and those before it.
+    pub n_chunks: u32,
+    /// Anchors in them.
+    pub n_anchors: u32,
+    /// Where the last of them ends, bytes from the start of the chunks section.
+    pub end: u32,
+}
+
+/// What the corners of ink boxes are counted in, normalised frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct InkFrame {
+    /// The corner of all zeros.
+    pub min: [f32; 3],
+    /// Distance of neighbouring coordinates.
+    pub step: [f32; 3],
+}
+
+/// The tiers, the ink frame and the chunk records, checked.
+#[derive(Clone, Copy, Debug)]
+pub struct Directory<'a> {
+    tiers: &'a [[u8; TIER_RECORD_LEN]],
+    /// What the corners of ink boxes are counted in.
+    pub ink_frame: InkFrame,
+    records: &'a [[u8; CHUNK_RECORD_LEN]],
+}
+
+/// One chunk's record.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Record {
+    pub(super) len: u32,
+    pub(super) crc: u32,
+    pub(super) n_anchors: u16,
+    pub(super) low: [u16; 3],
+    pub(super) high: [u16; 3],
+}
+
+impl InkFrame {
+    /// The point at coordinates `q`: `min + f32(q)·step`, multiplied, rounded, then added.
+    #[inline]
+    #[must_use]
+    pub fn corner(&self, q: [u16; 3]) -> [f32; 3] {
+        let ([x, y, z], [step_x, step_y, step_z]) = (self.min, self.step);
+        let [q_x, q_y, q_z] = q.map(f32::from);
+        [x + q_x * step_x, y + q_y * step_y, z + q_z * step_z]
+    }
+
+    fn check(&self) -> Result<(), DecodeError> {
+        let farthest = self.corner([u16::MAX; 3]);
+        for (index, ((min, step), farthest)) in (0..).zip(self.min.iter().zip(&self.step).zip(farthest)) {
+            if !(min.is_finite() && *step >= 0.0 && farthest.is_finite()) {
+                return Err(DecodeError::BadFloat { field: Field::InkFrame, index });
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Record {
+    fn parse(record: &[u8; CHUNK_RECORD_LEN]) -> Result<Self, DecodeError> {
+        let mut cursor = Cursor::new(record, SectionKind::Directory);
+        let [len, crc] = cursor.u32s()?;
+        let [n_anchors, reserved, low_x, low_y, low_z, high_x, high_y, high_z] = cursor.u16s()?;
+        in_range(Field::Reserved, reserved.into(), 0, 0)?;
+        Ok(Self { len, crc, n_anchors, low: [low_x, low_y, low_z], high: [high_x, high_y, high_z] })
+    }
+
+    fn check(&self, header: &Header) -> Result<(), DecodeError> {
+        in_range(Field::ChunkAnchors, self.n_anchors.into(), 1, header.max_chunk_anchors.into())?;
+        in_range(Field::ChunkLen, self.len & 1, 0, 0)?;
+        for (low, high) in self.low.into_iter().zip(self.high) {
+            in_range(Field::InkBox, low.into(), 0, high.into())?;
+        }
+        Ok(())
+    }
+}
+
+impl<'a> Directory<'a> {
+    /// Reads the section; `chunks_len` is the length of the chunks section.
+    pub(super) fn parse(section: &'a [u8], header: &Header, chunks_len: u32) -> Result<Self, DecodeError> {
+        let mut cursor = Cursor::new(section, SectionKind::Directory);
+        let (tiers, _) = cursor.bytes(usize::from(header.n_tiers).saturating_mul(TIER_RECORD_LEN))?.as_chunks();
+        let ink_frame = InkFrame { min: cursor.f32s()?, step: cursor.f32s()? };
+        ink_frame.check()?;
+        let records_len = usize::try_from(header.n_chunks).unwrap_or(usize::MAX).saturating_mul(CHUNK_RECORD_LEN);
+        let (records, _) = cursor.bytes(records_len)?.as_chunks();
+        cursor.end()?;
+        let directory = Self { tiers, ink_frame, records };
+        directory.check(header, chunks_len)?;
+        Ok(directory)
+    }
+
+    /// Tier number `tier`.
+    #[must_use]
+    pub fn tier(&self, tier: u8) -> Option<Tier> {
+        let [n_chunks, n_anchors, end] =
+            Cursor::new(self.tiers.get(usize::from(tier))?, SectionKind::Directory).u32s().ok()?;
+        Some(Tier { n_chunks, n_anchors, end })
+    }
+
+    /// The record of chunk number `index`.
+    pub(super) fn record(&self, index: u32) -> Option<Record> {
+        Record::parse(self.records.get(index as usize)?).ok()
+    }
+
+    /// Tiers and chunks add up, chunk by chunk and tier by tier.
+    fn check(&self, header: &Header, chunks_len: u32) -> Result<(), DecodeError> {
+        let mut sums = Tier::default();
+        let mut records = self.records.iter();
+        for tier in 0..header.n_tiers {
+            let stored = self.tier(tier).ok_or(DecodeError::Internal)?;
+            in_range(Field::TierChunks, stored.n_chunks, sums.n_chunks, header.n_chunks)?;
+            let n_new = stored.n_chunks.saturating_sub(sums.n_chunks);
+            for record in records.by_ref().take(n_new as usize) {
+                let record = Record::parse(record)?;
+                record.check(header)?;
+                sums.n_anchors = sums.n_anchors.saturating_add(record.n_anchors.into());
+                sums.end = sums.end.saturating_add(record.len);
+            }
+            sums.n_chunks = stored.n_chunks;
+            in_range(Field::TierAnchors, stored.n_anchors, sums.n_anchors, sums.n_anchors)?;
+            in_range(Field::TierEnd, stored.end, sums.end, sums.end)?;
+        }
+        in_range(Field::TierChunks, sums.n_chunks, header.n_chunks, header.n_chunks)?;
+        in_range(Field::NAnchors, sums.n_anchors, header.n_anchors, header.n_anchors)?;
+        if sums.end != chunks_len {
+            let [expected, found] = [sums.end, chunks_len];
+            return Err(DecodeError::WrongLength { section: SectionKind::Chunks, expected, found });
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,75 @@
+//! The feature field: what a decoder must know to draw a scene.
+
+use crate::error::DecodeError;
+
+/// What a scene's heads and opacities take into account; anything else is absent and costs nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Effects {
+    /// The heads see the unit vector from the camera to the anchor.
+    pub view_direction: bool,
+    /// The heads see the distance from the camera to the anchor, normalised units.
+    pub view_distance: bool,
+    /// Opacity is multiplied by √(det Σ / det(Σ + 0.3 I)) (Yu et al. 2024, Mip-Splatting, eq. 8).
+    pub dilation_compensation: bool,
+}
+
+/// What a bundle requires of its decoder: the scene's effects, and how its numbers are stored.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Features {
+    /// What the renderer has to take into account.
+    pub effects: Effects,
+    /// Each anchor says which of its offsets are drawn.
+    pub masks: bool,
+    /// The channels' models follow from a context; without it they are static tables.
+    pub context: bool,
+    /// The matrices of the heads are coded, not raw halves.
+    pub coded_heads: bool,
+}
+
+impl Features {
+    /// Bits that have a meaning in this version.
+    const N_BITS: u32 = 6;
+
+    /// The bits as the header stores them.
+    #[must_use]
+    pub fn to_bits(self) -> u32 {
+        let Effects { view_direction, view_distance, dilation_compensation } = self.effects;
+        let flags = [view_direction, view_distance, dilation_compensation, self.masks, self.context, self.coded_heads];
+        (0..).zip(flags).fold(0, |bits, (shift, flag)| bits | (u32::from(flag) << shift))
+    }
+
+    /// The features that `bits` stand for.
+    ///
+    /// # Errors
+    /// [`DecodeError::UnsupportedFeatures`] with the bits that have no meaning in this version.
+    pub fn from_bits(bits: u32) -> Result<Self, DecodeError> {
+        let unknown_bits = bits >> Self::N_BITS << Self::N_BITS;
+        if unknown_bits != 0 {
+            return Err(DecodeError::UnsupportedFeatures { unknown_bits });
+        }
+        let has = |bit: u32| bits & bit != 0;
+        Ok(Self {
+            effects: Effects { view_direction: has(1), view_distance: has(2), dilation_compensation: has(4) },
+            masks: has(8),
+            context: has(16),
+            coded_heads: has(32),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Features;
+    use crate::DecodeError;
+
+    #[test]
+    fn known_bits_come_back_and_unknown_ones_are_named() {
+        for bits in 0..64 {
+            assert_eq!(Features::from_bits(bits).map(Features::to_bits), Ok(bits), "bits {bits:#b}");
+        }
+        let error = DecodeError::UnsupportedFeatures { unknown_bits: 0x8000_0040 };
+        assert_eq!(Features::from_bits(0x8000_0041), Err(error), "the first and the last unknown bit");
+    }
+}

@@ -1,0 +1,73 @@
+//! The manifest: what each tier was measured to look like and to cost.
+
+use super::cursor::Cursor;
+use crate::error::{DecodeError, Field, SectionKind};
+
+/// Length of a tier's record, bytes.
+pub const MANIFEST_RECORD_LEN: usize = 60;
+
+/// The bits that stand for "not measured".
+const NOT_MEASURED: u32 = 0x7FC0_0000;
+
+/// Quality and work of the scene that consists of a tier and those before it.
+///
+/// The maxima are over [`n_cameras`](Self::n_cameras) views, each at the training size; another view may need more.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct TierMeasures {
+    /// Mean PSNR over held-out training views, dB; `None` when not measured.
+    pub psnr_db: Option<f32>,
+    /// Views it is the mean of.
+    pub n_views: u16,
+    /// Views over which the maxima below were taken.
+    pub n_cameras: u16,
+    /// Anchors of a frame that pass the prefilter.
+    pub max_visible_anchors: u32,
+    /// Splats of a frame.
+    pub max_splats: u32,
+    /// Splats of a strip when the frame is cut into 1, 2, 4, 8 horizontal strips.
+    pub max_strip_splats: [u32; 4],
+    /// Pairs of a 16×16 tile and a splat in such a strip.
+    pub max_strip_pairs: [u32; 4],
+    /// Multiply-adds of the heads in a frame, in units of 1024.
+    pub max_head_kilo_macs: u32,
+    /// Pixel evaluations of a frame, in units of 1024.
+    pub max_kilo_pixels: u32,
+    /// Anchors in the chunks in view.
+    pub max_decoded_anchors: u32,
+}
+
+impl TierMeasures {
+    /// Reads the record of tier number `tier`.
+    pub(super) fn parse(record: &[u8; MANIFEST_RECORD_LEN], tier: u32) -> Result<Self, DecodeError> {
+        let mut cursor = Cursor::new(record, SectionKind::Manifest);
+        let psnr_bits = cursor.u32()?;
+        let psnr_db = (psnr_bits != NOT_MEASURED).then_some(f32::from_bits(psnr_bits));
+        if psnr_db.is_some_and(|psnr_db| !psnr_db.is_finite()) {
+            return Err(DecodeError::BadFloat { field: Field::ManifestPsnr, index: tier });
+        }
+        Ok(Self {
+            psnr_db,
+            n_views: cursor.u16()?,
+            n_cameras: cursor.u16()?,
+            max_visible_anchors: cursor.u32()?,
+            max_splats: cursor.u32()?,
+            max_strip_splats: cursor.u32s()?,
+            max_strip_pairs: cursor.u32s()?,
+            max_head_kilo_macs: cursor.u32()?,
+            max_kilo_pixels: cursor.u32()?,
+            max_decoded_anchors: cursor.u32()?,
+        })
+    }
+}
+
+/// Reads and checks the records of all tiers.
+pub(super) fn parse(section: &[u8], n_tiers: u8) -> Result<&[[u8; MANIFEST_RECORD_LEN]], DecodeError> {
+    let mut cursor = Cursor::new(section, SectionKind::Manifest);
+    let (records, _) = cursor.bytes(usize::from(n_tiers).saturating_mul(MANIFEST_RECORD_LEN))?.as_chunks();
+    cursor.end()?;
+    for (tier, record) in (0..).zip(records) {
+        TierMeasures::parse(record, tier)?;
+    }
+    Ok(records)
+}

@@ -1,0 +1,19 @@
+//! The masks section: how often each offset is drawn.
+
+use super::cursor::Cursor;
+use super::header::in_range;
+use crate::entropy::{FREQUENCY_TOTAL, MaskModel, N_MASK_CONTEXTS};
+use crate::error::{DecodeError, Field, SectionKind};
+
+/// Reads and checks the frequencies of `n_offsets` offsets.
+pub(super) fn parse(section: &[u8], n_offsets: u16) -> Result<MaskModel<'_>, DecodeError> {
+    let mut cursor = Cursor::new(section, SectionKind::Masks);
+    let frequencies = cursor.pairs(usize::from(n_offsets).saturating_mul(N_MASK_CONTEXTS))?;
+    cursor.end()?;
+    for &frequency in frequencies {
+        let most = FREQUENCY_TOTAL.saturating_sub(1);
+        in_range(Field::MaskFrequency, u16::from_le_bytes(frequency).into(), 1, most.into())?;
+    }
+    let (offsets, _) = frequencies.as_chunks();
+    Ok(MaskModel::new(offsets))
+}

@@ -248,3 +248,6 @@ fn tiers_in<'a>(
     let available = saturate(available.len());
     Err(DecodeError::Truncated { section: SectionKind::Chunks, needed: section.len, available })
 }
+
+#[cfg(test)]
+mod tests;

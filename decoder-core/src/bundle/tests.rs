@@ -1,0 +1,189 @@
+//! Bundles made by hand come back as what went into them.
+
+mod builder;
+
+use std::vec;
+use std::vec::Vec;
+
+use builder::{Anchor, C, F, ORIGIN, STEP, Variant, bundle, cell, tiers, weight};
+
+use crate::bundle::{AnchorSite, Bundle, Coder};
+use crate::error::{DecodeError, SectionKind};
+use crate::{Budget, Decoder, FrameReport, MaxSplats, TileSink};
+
+fn variants() -> impl Iterator<Item = Variant> {
+    (0..16).map(|bits| {
+        let [masks, context, coded_heads, unknown_section] = [1, 2, 4, 8].map(|bit| bits & bit != 0);
+        Variant { masks, context, coded_heads, unknown_section }
+    })
+}
+
+/// Decodes every chunk of a file: sites and symbols, chunk by chunk.
+fn symbols(bundle: &Bundle<'_>) -> Vec<(Vec<AnchorSite>, Vec<i16>)> {
+    let mut scratch = vec![u32::MAX; bundle.anchor_scratch_words()];
+    let mut models = bundle.anchor_models(&mut scratch).expect("enough memory");
+    let decoded = bundle.chunks().map(|chunk| {
+        let n = usize::from(chunk.n_anchors());
+        let (mut sites, mut symbols) = (vec![AnchorSite::default(); n], vec![-1; n * C]);
+        chunk.decode_symbols(&mut models, &mut sites, &mut symbols).expect("a sound chunk");
+        (sites, symbols)
+    });
+    decoded.collect()
+}
+
+fn expected(chunks: &[Vec<Anchor>]) -> Vec<(Vec<AnchorSite>, Vec<i16>)> {
+    let chunk = |anchors: &Vec<Anchor>| {
+        let sites = anchors.iter().map(|anchor| AnchorSite { lattice: cell(anchor.code), mask: anchor.mask });
+        (sites.collect(), anchors.iter().flat_map(|anchor| anchor.symbols).collect())
+    };
+    chunks.iter().map(chunk).collect()
+}
+
+#[test]
+fn anchors_come_back_whatever_the_features() {
+    for variant in variants() {
+        let bytes = bundle(variant);
+        let bundle = Bundle::parse(&bytes).unwrap_or_else(|error| panic!("{variant:?}: {error}"));
+        assert_eq!(symbols(&bundle), expected(&tiers(variant).concat()), "{variant:?}");
+        assert_eq!((bundle.n_tiers(), bundle.n_chunks(), bundle.n_anchors()), (3, 5, 15), "{variant:?}");
+        assert_eq!(bundle.sections().count(), 6 + usize::from(variant.masks) + usize::from(variant.unknown_section));
+    }
+}
+
+#[test]
+fn values_are_symbols_times_steps() {
+    for variant in variants() {
+        let bytes = bundle(variant);
+        let bundle = Bundle::parse(&bytes).expect("sound");
+        let mut scratch = vec![0; bundle.anchor_scratch_words()];
+        let mut models = bundle.anchor_models(&mut scratch).expect("enough memory");
+        for (chunk, anchors) in bundle.chunks().zip(tiers(variant).concat()) {
+            let (mut sites, mut values) = (vec![AnchorSite::default(); anchors.len()], vec![9.0; anchors.len() * C]);
+            chunk.decode_values(&mut models, &mut sites, &mut values).expect("a sound chunk");
+            for (anchor, row) in anchors.iter().zip(values.chunks(C)) {
+                for (channel, (&symbol, &value)) in anchor.symbols.iter().zip(row).enumerate() {
+                    let drawn = channel < F + 6 || anchor.mask >> ((channel - F - 6) / 3) & 1 == 1;
+                    let expected = match bundle.coder() {
+                        _ if !drawn => 0.0,
+                        Coder::Static(_) => f32::from(symbol) * STEP + ORIGIN,
+                        Coder::Context(context) => {
+                            let (mut features, mut hidden) = (vec![0; context.n_inputs()], vec![0; context.n_hidden()]);
+                            context.features(cell(anchor.code), &mut features);
+                            context.hidden(&features, &mut hidden);
+                            f32::from(symbol) * context.steps(&hidden).value(context.group(channel))
+                        }
+                    };
+                    assert_eq!(value, expected, "{variant:?}, channel {channel}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn heads_come_back_raw_and_coded() {
+    for variant in variants() {
+        let bytes = bundle(variant);
+        let bundle = Bundle::parse(&bytes).expect("sound");
+        let mut weights = bundle.heads().weights();
+        for layer in 0..6 {
+            let found: Vec<f32> = weights.next_layer().collect();
+            let expected: Vec<f32> = (0..found.len()).map(|index| weight(layer, index)).collect();
+            assert_eq!(found, expected, "{variant:?}, layer {layer}");
+        }
+        assert_eq!(weights.next_layer().count(), 0, "there is no seventh");
+        assert_eq!(bundle.heads().coded().is_some(), variant.coded_heads);
+    }
+}
+
+#[test]
+fn the_manifest_says_what_was_measured() {
+    let bytes = bundle(Variant { masks: true, context: false, coded_heads: false, unknown_section: false });
+    let bundle = Bundle::parse(&bytes).expect("sound");
+    let [first, last] = [0, 2].map(|tier| bundle.measures(tier).expect("a tier"));
+    assert_eq!((first.psnr_db, last.psnr_db), (None, Some(32.0)));
+    assert_eq!((last.n_views, last.n_cameras, last.max_visible_anchors), (4, 9, 200));
+    assert_eq!((last.max_strip_splats, last.max_strip_pairs), ([202, 203, 204, 205], [206, 207, 208, 209]));
+    assert_eq!((last.max_head_kilo_macs, last.max_kilo_pixels, last.max_decoded_anchors), (210, 211, 212));
+    assert_eq!(bundle.measures(3), None, "three tiers");
+}
+
+#[test]
+fn a_file_cut_where_a_tier_ends_is_a_smaller_scene_and_any_other_is_refused() {
+    for variant in variants() {
+        let bytes = bundle(variant);
+        let whole = Bundle::parse(&bytes).expect("sound");
+        let chunks_at = bytes.len() - whole.tier(2).expect("the last tier").end as usize;
+        let ends: Vec<usize> = (0..3).map(|tier| chunks_at + whole.tier(tier).expect("a tier").end as usize).collect();
+        for len in 0..=bytes.len() {
+            match (Bundle::parse(&bytes[..len]), ends.iter().position(|&end| end == len)) {
+                (Ok(bundle), Some(tier)) => {
+                    assert_eq!(usize::from(bundle.n_tiers()), tier + 1, "cut to {len} bytes");
+                    assert_eq!(symbols(&bundle), expected(&tiers(variant)[..=tier].concat()), "cut to {len} bytes");
+                    assert_eq!(bundle.header().n_tiers, 3, "as written");
+                }
+                (Err(DecodeError::NotABundle), None) => assert!(len < 8, "cut to {len} bytes"),
+                (Err(DecodeError::Truncated { section, .. }), None) => {
+                    assert_eq!(section == SectionKind::Chunks, len >= chunks_at, "cut to {len} bytes: {section}");
+                }
+                (result, tier) => panic!("cut to {len} bytes: {tier:?}, {:?}", result.err()),
+            }
+        }
+    }
+}
+
+/// Keeps all pixels.
+#[derive(Default, PartialEq)]
+struct Pixels(Vec<[u8; 3]>);
+
+impl TileSink for Pixels {
+    fn tile(&mut self, _x_px: u16, _y_px: u16, _width: u16, _height: u16, rgb: &[[u8; 3]]) {
+        self.0.extend_from_slice(rgb);
+    }
+}
+
+fn draw(bytes: &[u8], tiers: u8, skip_damage: bool) -> Result<(Pixels, FrameReport, u8), DecodeError> {
+    let bundle = Bundle::parse(bytes)?;
+    let plan = bundle.plan(&Budget { width_px: 32, height_px: 24, max_splats: MaxSplats::Worst, tiers })?;
+    let mut scratch = vec![0x5A; plan.scratch_len()];
+    let bind = if skip_damage { Decoder::bind_skipping_damage } else { Decoder::bind };
+    let mut pixels = Pixels::default();
+    let report = bind(&bundle, plan, &mut scratch)?.render(&bundle.header().preview, &mut pixels)?;
+    Ok((pixels, report, plan.n_tiers()))
+}
+
+#[test]
+fn a_budget_of_tiers_draws_what_a_cut_file_draws() {
+    for variant in variants() {
+        let bytes = bundle(variant);
+        let whole = Bundle::parse(&bytes).expect("sound");
+        let chunks_at = bytes.len() - whole.tier(2).expect("the last tier").end as usize;
+        for n_tiers in 1..=3 {
+            let cut = &bytes[..chunks_at + whole.tier(n_tiers - 1).expect("a tier").end as usize];
+            let (planned, report, planned_tiers) = draw(&bytes, n_tiers, false).expect("drawn");
+            let (short, short_report, short_tiers) = draw(cut, u8::MAX, false).expect("drawn");
+            assert!(planned == short, "{variant:?}: the same picture with {n_tiers} tiers");
+            assert_eq!((report, planned_tiers), (short_report, short_tiers), "{variant:?}");
+            assert_eq!(report.chunks_decoded, [2, 3, 5][usize::from(n_tiers) - 1], "{variant:?}: all are in view");
+        }
+        assert_eq!(draw(&bytes, 0, false).map(|(_, report, _)| report.splats), Ok(0), "no tiers, no splats");
+    }
+}
+
+#[test]
+fn a_damaged_chunk_is_named_or_left_out() {
+    for variant in variants() {
+        let sound = bundle(variant);
+        let whole = Bundle::parse(&sound).expect("sound");
+        let chunk = whole.chunk(3).expect("a chunk");
+        let chunks_at = sound.len() - whole.tier(2).expect("the last tier").end as usize;
+        let mut bytes = sound.clone();
+        bytes[chunks_at + chunk.offset() as usize] ^= 4;
+        let error = draw(&bytes, 3, false).err();
+        assert!(matches!(error, Some(DecodeError::ChunkChecksum { chunk: 3, .. })), "{variant:?}: {error:?}");
+        let (_, report, _) = draw(&bytes, 3, true).expect("the others draw");
+        assert_eq!((report.chunks_damaged, report.first_damaged), (1, Some(3)), "{variant:?}");
+        assert_eq!(report.anchors_decoded, 13, "{variant:?}: two of 15 are in the damaged chunk");
+        assert_eq!(draw(&bytes, 2, false).err(), None, "{variant:?}: the first two tiers are sound");
+    }
+}

@@ -258,4 +258,11 @@ mod tests {
         assert_eq!(model.slots(i16::MIN).as_slice().len(), 4);
         assert_eq!(NormalModel::new(i32::MAX, 99).slots(i16::MAX).as_slice().len(), 4, "whatever the mean");
     }
+
+    #[test]
+    fn the_format_names_the_checksum_of_the_tables() {
+        let bytes: std::vec::Vec<u8> = ENDS.iter().flat_map(|end| end.to_le_bytes()).collect();
+        let crc = std::format!("they have the CRC {:#010X}.", crate::bundle::crc32(&bytes));
+        assert!(include_str!("../bundle/FORMAT.md").contains(&crc.replace("0X", "0x")), "{crc}");
+    }
 }

@@ -1,11 +1,15 @@
 //! The anchors of a chunk, one after the other: where each stands, which offsets it draws, and its channels.
 
+mod channels;
+
+use channels::{ChannelModels, ContextModels};
+
 use super::cursor::saturate;
 use super::header::Header;
 use super::lattice::Lattice;
 use super::tables::{IndexedTable, IndexedTables};
 use super::{Bundle, Coder};
-use crate::context::{Context, N_GROUPS};
+use crate::context::Context;
 use crate::entropy::{AnsReader, MaskModel, TrieReader};
 use crate::error::{DecodeError, Field};
 
@@ -28,13 +32,6 @@ pub struct AnchorModels<'b, 's> {
     n_scalars: usize,
     n_offsets: u16,
     channels: ChannelModels<'b, 's>,
-}
-
-/// The models of the channels.
-#[derive(Debug)]
-enum ChannelModels<'b, 's> {
-    Static(IndexedTables<'b, 's>),
-    Context { context: Context<'b>, features: &'s mut [i16], hidden: &'s mut [i16] },
 }
 
 /// Decodes the anchors of one chunk in their order, one at a time.
@@ -88,11 +85,11 @@ impl<'b> Bundle<'b> {
                     let halves: &mut [i16] = bytemuck::try_cast_slice_mut(words).map_err(|_| DecodeError::Internal)?;
                     halves.get_mut(..n).ok_or(DecodeError::Internal)
                 };
-                ChannelModels::Context {
+                ChannelModels::Context(ContextModels {
                     context: *context,
                     features: halves(features, context.n_inputs())?,
                     hidden: halves(hidden, context.n_hidden())?,
-                }
+                })
             }
         };
         let Header { feature_dim, n_offsets, .. } = *self.header();
@@ -140,12 +137,12 @@ impl<'b, 's, 'm> AnchorReader<'b, 's, 'm> {
 
     /// The anchor's symbols, one a channel; one call of this or of [`values`](Self::values) an anchor.
     pub fn symbols(&mut self, row: &mut [i16]) {
-        self.channels(row, 0, |symbol, _, _| symbol);
+        self.symbols = self.models.channels.read(self.site, self.models.n_scalars, self.symbols, row);
     }
 
     /// The anchor's values, one a channel; one call of this or of [`symbols`](Self::symbols) an anchor.
     pub fn values(&mut self, row: &mut [f32]) {
-        self.channels(row, 0.0, |symbol, origin, step| origin + f32::from(symbol) * step);
+        self.symbols = self.models.channels.read(self.site, self.models.n_scalars, self.symbols, row);
     }
 
     /// Ends the chunk after its last anchor.
@@ -160,56 +157,4 @@ impl<'b, 's, 'm> AnchorReader<'b, 's, 'm> {
             Err(left) => Err(DecodeError::ChunkStream { chunk, left_bytes: saturate(left) }),
         }
     }
-
-    /// Fills `row` with what `of` makes of each symbol and of the origin and the step of its values.
-    #[inline]
-    fn channels<T: Copy>(&mut self, row: &mut [T], undrawn: T, of: impl Fn(i16, f32, f32) -> T) {
-        let Self { models, symbols, site, .. } = self;
-        let n_scalars = models.n_scalars;
-        match &mut models.channels {
-            ChannelModels::Static(tables) => {
-                for_each_drawn(row, n_scalars, site.mask, undrawn, |channel, slot| {
-                    let (symbol, origin, step) = tables.symbol(channel, symbols);
-                    *slot = of(symbol, origin, step);
-                });
-            }
-            ChannelModels::Context { context, features, hidden } => {
-                context.features(site.lattice, features);
-                context.hidden(features, hidden);
-                let steps = context.steps(hidden);
-                for_each_drawn(row, n_scalars, site.mask, undrawn, |channel, slot| {
-                    let symbol = context.model(channel, &steps, hidden).symbol(symbols);
-                    *slot = of(symbol, 0.0, steps.value(context.group(channel)));
-                });
-            }
-        }
-    }
 }
-
-/// Calls `read` with the number and the slot of each channel that is in the file; the others become `undrawn`.
-#[inline]
-fn for_each_drawn<T: Copy>(
-    row: &mut [T],
-    n_scalars: usize,
-    mask: u32,
-    undrawn: T,
-    mut read: impl FnMut(usize, &mut T),
-) {
-    let Some((scalars, offsets)) = row.split_at_mut_checked(n_scalars) else { return };
-    for (channel, slot) in scalars.iter_mut().enumerate() {
-        read(channel, slot);
-    }
-    let mut mask = mask;
-    for (offset, first) in offsets.as_chunks_mut::<3>().0.iter_mut().zip((n_scalars..).step_by(3)) {
-        if mask & 1 == 1 {
-            for (slot, channel) in offset.iter_mut().zip(first..) {
-                read(channel, slot);
-            }
-        } else {
-            *offset = [undrawn; 3];
-        }
-        mask >>= 1;
-    }
-}
-
-const _: () = assert!(N_GROUPS == 3, "features, log-scales, offsets");

@@ -32,7 +32,7 @@ impl<'a> Lattice<'a> {
         in_range(Field::LatticeBits, bits.into(), 0, MAX_LATTICE_BITS.into())?;
         in_range(Field::Reserved, u8::from(reserved != [0; 3]).into(), 0, 0)?;
         let n_nodes = usize::from(bits).saturating_mul(3).saturating_mul(N_TRIE_CONTEXTS);
-        let (nodes, _) = cursor.bytes(n_nodes.saturating_mul(4))?.as_chunks::<4>();
+        let (nodes, _) = cursor.pairs(n_nodes.saturating_mul(2))?.as_chunks::<2>();
         cursor.end()?;
         let (levels, _) = nodes.as_chunks();
         let trie = TrieModel::new(levels);

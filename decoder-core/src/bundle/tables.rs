@@ -6,7 +6,7 @@ pub(super) use index::{IndexedTable, IndexedTables};
 
 use super::cursor::{Cursor, saturate};
 use super::header::in_range;
-use crate::entropy::{AnsReader, FREQUENCY_TOTAL, Slot, SymbolModel, UniformByte};
+use crate::entropy::{AnsReader, FREQUENCY_TOTAL, Slot, SymbolModel};
 use crate::error::{DecodeError, Field, SectionKind};
 
 /// Largest magnitude of a dequantised value: e^±88 and more is clamped anyway, and no product of two overflows.
@@ -27,7 +27,8 @@ pub struct Tables<'a> {
 
 /// The quantisation and the frequencies of a channel's symbols.
 ///
-/// `ends[i]` is the sum of the frequencies of symbols `0..=i`; what is left up to [`FREQUENCY_TOTAL`] is the escape's.
+/// Entry i owns the slots from `bounds[i]` to `bounds[i + 1]`, and the last piece, up to [`FREQUENCY_TOTAL`], is the
+/// escape's.
 #[derive(Clone, Copy, Debug)]
 pub struct Table<'a> {
     /// Value of symbol 0.
@@ -36,7 +37,8 @@ pub struct Table<'a> {
     pub step: f32,
     /// The symbol that the first entry stands for.
     pub min_symbol: i16,
-    ends: &'a [[u8; 2]],
+    /// `[n_symbols + 2]`, from 0 to [`FREQUENCY_TOTAL`].
+    bounds: &'a [[u8; 2]],
 }
 
 impl<'a> Tables<'a> {
@@ -92,7 +94,8 @@ impl<'a> Tables<'a> {
     /// Table number `table`.
     #[must_use]
     pub fn get(&self, table: usize) -> Option<Table<'a>> {
-        let bytes = self.section.get(self.offset_of(table)?..)?;
+        let offset = u32::from_le_bytes(*self.offsets.get(table)?);
+        let bytes = self.section.get(offset as usize..)?;
         Table::parse(&mut Cursor::new(bytes, SectionKind::Tables)).ok()
     }
 
@@ -101,34 +104,26 @@ impl<'a> Tables<'a> {
         let tables = *self;
         (0..tables.n_channels()).filter_map(move |channel| tables.get(tables.table_of(channel)?))
     }
-
-    /// Where table number `table` begins in the section.
-    fn offset_of(&self, table: usize) -> Option<usize> {
-        self.offsets.get(table).map(|&offset| u32::from_le_bytes(offset) as usize)
-    }
 }
 
 impl<'a> Table<'a> {
-    /// Length of a table before its ends, bytes.
-    const FIXED_LEN: usize = 12;
-
     /// Reads a table; the section of `cursor` goes into errors.
     pub(super) fn parse(cursor: &mut Cursor<'a>) -> Result<Self, DecodeError> {
         let [origin, step] = cursor.f32s()?;
         let min_symbol = cursor.i16()?;
         let n_symbols = cursor.u16()?;
-        Ok(Self { origin, step, min_symbol, ends: cursor.pairs(n_symbols.into())? })
+        Ok(Self { origin, step, min_symbol, bounds: cursor.pairs(usize::from(n_symbols).saturating_add(2))? })
     }
 
     /// Number of symbols that have an entry of their own.
     #[must_use]
     pub fn n_symbols(&self) -> usize {
-        self.ends.len()
+        self.bounds.len().saturating_sub(2)
     }
 
-    /// Sums of frequencies up to and with each entry.
-    pub fn ends(&self) -> impl ExactSizeIterator<Item = u16> + use<'a> {
-        self.ends.iter().map(|&end| u16::from_le_bytes(end))
+    /// `[n_symbols + 2]` where the entries begin, then where the escape begins and where it ends.
+    pub fn bounds(&self) -> impl ExactSizeIterator<Item = u16> + use<'a> {
+        self.bounds.iter().map(|&bound| u16::from_le_bytes(bound))
     }
 
     /// The value that a symbol stands for: `origin + symbol·step`, multiplied, rounded, then added.
@@ -144,7 +139,7 @@ impl<'a> Table<'a> {
     /// Decodes the next symbol of `reader`, an escaped one included.
     #[inline]
     pub fn symbol(&self, reader: &mut AnsReader<'_>) -> i16 {
-        reader.symbol(self).unwrap_or_else(|| escaped(reader))
+        reader.symbol(self).unwrap_or_else(|| reader.escaped())
     }
 
     pub(super) fn check(&self, section: SectionKind, table: u32) -> Result<(), DecodeError> {
@@ -153,44 +148,38 @@ impl<'a> Table<'a> {
         }
         // The last entry's symbol must still be an i16.
         let most = i32::from(i16::MAX).abs_diff(i32::from(self.min_symbol)).saturating_add(1);
-        in_range(Field::TableSymbols, saturate(self.ends.len()), 0, most)?;
+        in_range(Field::TableSymbols, saturate(self.n_symbols()), 0, most)?;
         let mut before = 0;
-        for (entry, end) in (0..).zip(self.ends()) {
+        for (entry, bound) in (0..).zip(self.bounds()) {
             // The escape keeps at least one slot, so that every i16 can be coded.
-            if end < before || end >= FREQUENCY_TOTAL {
-                return Err(DecodeError::NotIncreasing { section, table: table as u16, entry });
+            let sound = match self.n_symbols().checked_sub(entry) {
+                _ if entry == 0 => bound == 0,
+                Some(_) => before <= bound && bound < FREQUENCY_TOTAL,
+                None => bound == FREQUENCY_TOTAL,
+            };
+            if !sound {
+                return Err(DecodeError::BadBound { section, table: table as u16, entry: saturate(entry) });
             }
-            before = end;
+            before = bound;
         }
         Ok(())
     }
-}
-
-/// The symbol after an escape: two raw bytes, high then low.
-#[cold]
-fn escaped(reader: &mut AnsReader<'_>) -> i16 {
-    let high = reader.symbol(&UniformByte);
-    let low = reader.symbol(&UniformByte);
-    i16::from_be_bytes([high, low])
 }
 
 impl SymbolModel for Table<'_> {
     /// `None` is the escape: the symbol follows as two raw bytes, high then low.
     type Symbol = Option<i16>;
 
-    /// Finds the first entry whose end lies beyond the quantile, by bisection.
+    /// Finds the last bound that is not beyond the quantile, by bisection.
     #[inline]
     fn slot(&self, quantile: u16) -> Slot<Option<i16>> {
-        let index = self.ends.partition_point(|&end| u16::from_le_bytes(end) <= quantile);
-        let start = match index.checked_sub(1).and_then(|before| self.ends.get(before)) {
-            Some(&end) => u16::from_le_bytes(end),
-            None => 0,
-        };
-        let (end, symbol) = match self.ends.get(index) {
-            // `check` made sure that min_symbol + index is an i16.
-            Some(&end) => (u16::from_le_bytes(end), Some(self.min_symbol.wrapping_add(index as i16))),
-            None => (FREQUENCY_TOTAL, None),
-        };
-        Slot { symbol, start, frequency: end.wrapping_sub(start) }
+        // The first bound is 0 and the last beyond every quantile.
+        let next = self.bounds.partition_point(|&bound| u16::from_le_bytes(bound) <= quantile);
+        let entry = next.wrapping_sub(1);
+        let bound = |index: usize| self.bounds.get(index).map_or(0, |&bound| u16::from_le_bytes(bound));
+        let start = bound(entry);
+        // `check` made sure that min_symbol + entry is an i16.
+        let symbol = (entry < self.n_symbols()).then_some(self.min_symbol.wrapping_add(entry as i16));
+        Slot { symbol, start, frequency: bound(next).wrapping_sub(start) }
     }
 }

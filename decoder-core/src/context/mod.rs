@@ -2,7 +2,9 @@
 //!
 //! grid features → hidden units → per channel a mean and a scale, per group a quantisation step. Training runs the same
 //! quantities in floats and ends on these integers; whatever decides a symbol is computed here and nowhere else.
-#![deny(clippy::indexing_slicing, clippy::arithmetic_side_effects, clippy::unwrap_used, clippy::panic)]
+// Tests may index and add as they like; this is about bytes that nobody vouches for.
+#![cfg_attr(not(test), deny(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
+#![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::panic))]
 
 mod grid;
 mod mlp;

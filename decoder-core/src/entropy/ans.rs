@@ -3,7 +3,7 @@
 //! It reads what `constriction`'s `AnsCoder<u16, u32>` writes (Bamler 2022), its words in reverse order so that reading
 //! goes forward. That coder is the reference, and tests of the writer hold the two identical.
 
-use super::model::{FREQUENCY_TOTAL, PRECISION_BITS, SymbolModel};
+use super::model::{PRECISION_BITS, SymbolModel, UniformByte};
 
 /// While words are left, the state never falls below this.
 const STATE_MIN: u32 = 1 << 16;
@@ -36,17 +36,33 @@ impl<'a> AnsReader<'a> {
     /// One multiplication and one look-up in the model.
     #[inline]
     pub fn symbol<M: SymbolModel>(&mut self, model: &M) -> M::Symbol {
-        const MASK: u32 = (1 << PRECISION_BITS) - 1;
-        // `MASK` keeps 12 bits, so nothing is cut off.
-        let quantile = (self.state & MASK) as u16;
-        let slot = model.slot(quantile);
-        let frequency = slot.frequency.min(FREQUENCY_TOTAL);
-        // Below 2²⁰ · 2¹² + 2¹²; wrapping costs nothing and says that no value can panic here.
-        self.state = (self.state >> PRECISION_BITS)
-            .wrapping_mul(u32::from(frequency))
-            .wrapping_add(u32::from(quantile.wrapping_sub(slot.start)));
-        self.refill();
+        // 12 bits, so nothing is cut off.
+        let slot = model.slot(self.quantile() as u16);
+        self.advance(slot.start.into(), slot.frequency.into());
         slot.symbol
+    }
+
+    /// What the next symbol's slot contains, below [`FREQUENCY_TOTAL`](super::FREQUENCY_TOTAL).
+    #[inline]
+    pub(crate) fn quantile(&self) -> u32 {
+        self.state & ((1 << PRECISION_BITS) - 1)
+    }
+
+    /// Leaves the next symbol behind, whose slot contains the quantile.
+    #[inline]
+    pub(crate) fn advance(&mut self, start: u32, frequency: u32) {
+        // Below 2²⁰ · 2¹² + 2¹²; wrapping costs nothing and says that no value can panic here.
+        let offset = self.quantile().wrapping_sub(start);
+        self.state = (self.state >> PRECISION_BITS).wrapping_mul(frequency).wrapping_add(offset);
+        self.refill();
+    }
+
+    /// The symbol after an escape: two raw bytes, high then low.
+    #[inline(always)]
+    pub(crate) fn escaped(&mut self) -> i16 {
+        let high = self.symbol(&UniformByte);
+        let low = self.symbol(&UniformByte);
+        i16::from_be_bytes([high, low])
     }
 
     /// Ends the stream: its words must be used up and its state back at the encoder's start.

@@ -2,7 +2,9 @@
 //!
 //! Whatever decides a symbol lives here, once, and the trainer's encoder uses the same frequencies, so a bundle decodes
 //! to the same symbols on every target. The module knows nothing of anchors or of what a symbol means.
-#![deny(clippy::indexing_slicing, clippy::arithmetic_side_effects, clippy::unwrap_used, clippy::panic)]
+// Tests may index and add as they like; this is about bytes that nobody vouches for.
+#![cfg_attr(not(test), deny(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
+#![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::panic))]
 
 mod ans;
 mod mask;

@@ -35,6 +35,7 @@ pub struct UniformByte;
 impl SymbolModel for UniformByte {
     type Symbol = u8;
 
+    #[inline]
     fn slot(&self, quantile: u16) -> Slot<u8> {
         const FREQUENCY: u16 = FREQUENCY_TOTAL >> 8;
         let [symbol, ..] = (quantile >> (PRECISION_BITS - 8)).to_le_bytes();

@@ -19,7 +19,7 @@ impl AnsWriter {
                 words.push((state as u16).to_le_bytes());
                 state >>= 16;
             }
-            state = (state / frequency << PRECISION_BITS) + state % frequency + u32::from(slot.start);
+            state = ((state / frequency) << PRECISION_BITS) + state % frequency + u32::from(slot.start);
         }
         while state > 0 {
             words.push((state as u16).to_le_bytes());

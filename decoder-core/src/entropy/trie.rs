@@ -12,14 +12,17 @@ pub const N_TRIE_CONTEXTS: usize = 3;
 /// Most levels: the codes and the marks of a path fit a u64.
 pub const MAX_TRIE_LEVELS: usize = 63;
 
-/// The context for the last three ancestors, the nearest lowest, a bit set for each that has both children.
-const CONTEXT_OF: [u8; 8] = [0, 1, 1, 2, 1, 2, 2, 2];
+/// The contexts for all patterns of the last three ancestors, two bits each; a pattern has a bit for each ancestor, the
+/// nearest lowest, set if it has both children.
+const CONTEXTS: u32 = 0b10_10_10_01_10_01_01_00;
+/// Levels that are walked in 32-bit registers before they join the path.
+const LEVELS_AT_ONCE: usize = 32;
 
 /// The frequencies of a trie's symbols, level by level from the root.
 #[derive(Clone, Copy, Debug)]
 pub struct TrieModel<'a> {
-    /// `[n_levels][N_TRIE_CONTEXTS]` of `end_both`, `end_zero`, two bytes each.
-    levels: &'a [[[u8; 4]; N_TRIE_CONTEXTS]],
+    /// `[n_levels][N_TRIE_CONTEXTS]` of `end_both`, `end_zero`.
+    levels: &'a [[[[u8; 2]; 2]; N_TRIE_CONTEXTS]],
 }
 
 /// The frequencies of one node's symbol.
@@ -34,22 +37,20 @@ pub struct NodeModel {
 /// Which children a node has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Children {
-    /// 0 and 1.
-    Both,
     /// 0 alone.
-    Zero,
+    Zero = 0,
     /// 1 alone.
-    One,
+    One = 1,
+    /// 0 and 1.
+    Both = 2,
 }
 
 /// Walks over one trie, code by code.
 #[derive(Clone, Copy, Debug)]
 pub struct TrieReader<'a> {
-    levels: &'a [[[u8; 4]; N_TRIE_CONTEXTS]],
+    levels: &'a [[[[u8; 2]; 2]; N_TRIE_CONTEXTS]],
     /// The path taken, its last branch lowest.
     code: u64,
-    /// The nodes of the path whose child 1 is still due.
-    due: u64,
     /// The nodes of the path that have both children.
     both: u64,
     started: bool,
@@ -60,7 +61,7 @@ impl<'a> TrieModel<'a> {
     /// Takes the frequencies of a trie with as many levels as given; the caller has checked that each `end_both` ≤
     /// `end_zero` ≤ [`FREQUENCY_TOTAL`].
     #[must_use]
-    pub fn new(levels: &'a [[[u8; 4]; N_TRIE_CONTEXTS]]) -> Self {
+    pub fn new(levels: &'a [[[[u8; 2]; 2]; N_TRIE_CONTEXTS]]) -> Self {
         Self { levels }
     }
 
@@ -79,18 +80,15 @@ impl<'a> TrieModel<'a> {
     /// Starts a trie at its root.
     #[must_use]
     pub fn codes(&self) -> TrieReader<'a> {
-        TrieReader { levels: self.levels, code: 0, due: 0, both: 0, started: false, exhausted: false }
+        TrieReader { levels: self.levels, code: 0, both: 0, started: false, exhausted: false }
     }
 }
 
 impl NodeModel {
     /// Reads `end_both` and `end_zero`.
     #[inline]
-    fn from_bytes([both_low, both_high, zero_low, zero_high]: [u8; 4]) -> Self {
-        Self {
-            end_both: u16::from_le_bytes([both_low, both_high]),
-            end_zero: u16::from_le_bytes([zero_low, zero_high]),
-        }
+    fn from_bytes([end_both, end_zero]: [[u8; 2]; 2]) -> Self {
+        Self { end_both: u16::from_le_bytes(end_both), end_zero: u16::from_le_bytes(end_zero) }
     }
 }
 
@@ -118,37 +116,56 @@ impl TrieReader<'_> {
     #[inline]
     pub fn next(&mut self, symbols: &mut AnsReader<'_>) -> u64 {
         let n_new = if self.started {
-            if self.due == 0 {
+            let due = self.due();
+            if due == 0 {
                 self.exhausted = true;
                 return self.code;
             }
             // Back to the deepest node whose child 1 is due, and into that child.
-            let n_up = self.due.trailing_zeros();
+            let n_up = due.trailing_zeros();
             self.code = (self.code >> n_up) | 1;
-            self.due = (self.due >> n_up) & !1;
             self.both >>= n_up;
             n_up as usize
         } else {
             self.started = true;
             self.levels.len()
         };
-        let first = self.levels.len().saturating_sub(n_new);
-        for contexts in self.levels.get(first..).unwrap_or_default() {
-            let context = CONTEXT_OF.get((self.both & 7) as usize).copied().unwrap_or_default();
-            let node = contexts.get(usize::from(context)).copied().unwrap_or_default();
-            let children = symbols.symbol(&NodeModel::from_bytes(node));
-            let [both, one] = [children == Children::Both, children == Children::One].map(u64::from);
-            self.code = (self.code << 1) | one;
-            self.due = (self.due << 1) | both;
-            self.both = (self.both << 1) | both;
+        let (_, below) = self.levels.split_at_checked(self.levels.len().wrapping_sub(n_new)).unwrap_or_default();
+        for levels in below.chunks(LEVELS_AT_ONCE) {
+            self.descend(levels, symbols);
         }
         self.code
+    }
+
+    /// Goes down by at most [`LEVELS_AT_ONCE`] levels.
+    #[inline]
+    fn descend(&mut self, levels: &[[[[u8; 2]; 2]; N_TRIE_CONTEXTS]], symbols: &mut AnsReader<'_>) {
+        // A copy of its own stays in registers.
+        let mut reader = *symbols;
+        let (mut code, mut both) = (0_u32, self.both as u32);
+        for contexts in levels {
+            let context = CONTEXTS >> ((both & 7) << 1) & 3;
+            let node = contexts.get(context as usize).copied().unwrap_or_default();
+            let children = reader.symbol(&NodeModel::from_bytes(node)) as u32;
+            code = (code << 1) | (children & 1);
+            both = (both << 1) | (children >> 1);
+        }
+        *symbols = reader;
+        let n = levels.len() as u32 & 63;
+        self.code = (self.code << n) | u64::from(code);
+        // The bits above the new ones are those below them in the path.
+        self.both = (self.both << n) | (u64::from(both) & (1_u64 << n).wrapping_sub(1));
+    }
+
+    /// The nodes of the path whose child 1 is still due: they have both, and the path goes through 0.
+    fn due(&self) -> u64 {
+        self.both & !self.code
     }
 
     /// Whether every code was read and no more than those.
     #[must_use]
     pub fn is_complete(&self) -> bool {
-        self.due == 0 && !self.exhausted
+        self.due() == 0 && !self.exhausted
     }
 }
 
@@ -156,17 +173,16 @@ impl TrieReader<'_> {
 mod tests {
     use std::vec::Vec;
 
-    use super::{CONTEXT_OF, Children, N_TRIE_CONTEXTS, NodeModel, TrieModel};
+    use super::{CONTEXTS, Children, N_TRIE_CONTEXTS, NodeModel, TrieModel};
     use crate::entropy::testing::{AnsWriter, slot_of};
     use crate::entropy::{AnsReader, Slot};
 
     /// Another model at each level and in each context.
-    fn levels(n: usize) -> Vec<[[u8; 4]; N_TRIE_CONTEXTS]> {
+    fn levels(n: usize) -> Vec<[[[u8; 2]; 2]; N_TRIE_CONTEXTS]> {
         let node = |level: usize, context: usize| {
             let end_both = (300 + 97 * (level % 10) + 1000 * context) as u16;
             let end_zero = end_both + 150 + 31 * (level as u16 % 20);
-            let [[a, b], [c, d]] = [end_both, end_zero].map(u16::to_le_bytes);
-            [a, b, c, d]
+            [end_both, end_zero].map(u16::to_le_bytes)
         };
         (0..n).map(|level| std::array::from_fn(|context| node(level, context))).collect()
     }
@@ -235,8 +251,9 @@ mod tests {
 
     #[test]
     fn contexts_count_the_ancestors_with_both_children() {
-        let counts: Vec<u8> = (0..8_u8).map(|bits| bits.count_ones().min(2) as u8).collect();
-        assert_eq!(CONTEXT_OF.to_vec(), counts, "for each pattern of the last three");
+        for pattern in 0..8_u32 {
+            assert_eq!(CONTEXTS >> (2 * pattern) & 3, pattern.count_ones().min(2), "pattern {pattern:03b}");
+        }
     }
 
     #[test]

@@ -37,10 +37,10 @@ impl fmt::Display for DecodeError {
             Self::BadFloat { field, index } => {
                 write!(f, "{field}, float {index}: not finite, or not positive where it must be")
             }
-            Self::NotIncreasing { section, table, entry } => {
+            Self::BadBound { section, table, entry } => {
                 write!(
                     f,
-                    "{section}, table {table}, entry {entry}: cumulative frequencies must not fall and end below 4096"
+                    "{section}, table {table}, bound {entry}: bounds begin with 0, do not fall, and only the last is 4096"
                 )
             }
             Self::NoSuchTable { channel, table, n_tables } => {

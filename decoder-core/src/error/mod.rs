@@ -113,13 +113,13 @@ pub enum DecodeError {
         /// Its index among the field's floats.
         index: u32,
     },
-    /// The cumulative frequencies of a table fall somewhere.
-    NotIncreasing {
+    /// The bounds of a table do not begin with 0, fall somewhere, or do not end with 4096.
+    BadBound {
         /// Where.
         section: SectionKind,
         /// Which table, from 0.
         table: u16,
-        /// Index of the entry that is smaller than the one before, or beyond the limit.
+        /// Index of the first bound that is wrong.
         entry: u32,
     },
     /// A channel refers to a table that is not there.
@@ -217,7 +217,7 @@ impl DecodeError {
             | Self::MissingSection { .. }
             | Self::SectionChecksum { .. }
             | Self::ChunkChecksum { .. }
-            | Self::NotIncreasing { .. }
+            | Self::BadBound { .. }
             | Self::NoSuchTable { .. }
             | Self::HeadStream { .. }
             | Self::ChunkStream { .. } => ErrorClass::Malformed,

@@ -2,56 +2,66 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::{Table, Tables, escaped};
-use crate::entropy::{AnsReader, FREQUENCY_TOTAL, PRECISION_BITS, Slot, SymbolModel};
+use super::{Table, Tables};
+use crate::entropy::{AnsReader, FREQUENCY_TOTAL, PRECISION_BITS};
 use crate::error::DecodeError;
 
 /// Pieces of the range that have a short cut.
-const N_SHORT_CUTS: usize = 32;
+const N_SHORT_CUTS: usize = 64;
 /// Bits of a quantile within such a piece.
 const PIECE_BITS: u32 = PRECISION_BITS - N_SHORT_CUTS.ilog2();
-/// Entries looked at one by one before the rest is bisected; hostile tables have thousands of empty ones in a row.
-const MAX_STEPS: usize = 16;
+/// Bounds in memory. Powers of two make every index a sound one without a comparison.
+const N_BOUNDS: usize = 64;
+/// Most entries in memory: a bound more says where the last of them ends, and one ends every search.
+const MAX_ENTRIES: usize = N_BOUNDS - 2;
 
-/// A table as the decoder reads it.
+/// The most frequent entries of a table, neighbours all of them; the others are looked up in the file.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(in crate::bundle) struct IndexedTable {
-    origin: f32,
-    step: f32,
-    /// Where its ends begin, in pairs of bytes from the section's start.
-    first: u32,
-    n_symbols: u16,
-    min_symbol: i16,
-    /// For each piece of the range an entry at or before the first that ends beyond the piece's start.
+    pub(in crate::bundle) origin: f32,
+    pub(in crate::bundle) step: f32,
+    /// The symbol of the first entry.
+    first_symbol: i32,
+    n_entries: u32,
+    /// For each piece of the range the last entry that begins at or before its start, or the first.
     short_cuts: [u8; N_SHORT_CUTS],
+    /// Where the entries begin, where the last ends, and then [`FREQUENCY_TOTAL`].
+    bounds: [u16; N_BOUNDS],
 }
 
 /// All tables of a bundle, unpacked.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::bundle) struct IndexedTables<'a, 's> {
-    channel_tables: &'a [[u8; 2]],
-    section: &'a [[u8; 2]],
-    tables: &'s [IndexedTable],
-}
-
-/// The frequencies of one table.
-struct IndexedModel<'a, 's> {
-    table: &'s IndexedTable,
-    ends: &'a [[u8; 2]],
+    tables: Tables<'a>,
+    indexed: &'s [IndexedTable],
 }
 
 impl IndexedTable {
-    fn new(table: &Table<'_>, first: u32) -> Self {
+    fn new(table: &Table<'_>) -> Self {
+        let n_entries = table.n_symbols().min(MAX_ENTRIES);
+        // The entries with the most slots.
+        let slots = |bounds: &[[u8; 2]]| {
+            let [first, last] = [bounds.first(), bounds.last()].map(|b| b.map_or(0, |&b| u16::from_le_bytes(b)));
+            last.wrapping_sub(first)
+        };
+        let inner = table.bounds.split_last().map_or(&[][..], |(_, inner)| inner);
+        let windows = (0..).zip(inner.windows(n_entries.saturating_add(1)));
+        let (first, window) = windows.max_by_key(|(_, window)| slots(window)).unwrap_or_default();
+        let mut bounds = [FREQUENCY_TOTAL; N_BOUNDS];
+        for (bound, &stored) in bounds.iter_mut().zip(window) {
+            *bound = u16::from_le_bytes(stored);
+        }
         let mut short_cuts = [0; N_SHORT_CUTS];
         for (piece, short_cut) in (0_u16..).zip(&mut short_cuts) {
             let start = piece << PIECE_BITS;
-            let entry = table.ends.partition_point(|&end| u16::from_le_bytes(end) <= start);
-            // A table is longer than that when its steps are fine; the search then starts early and walks.
-            *short_cut = u8::try_from(entry).unwrap_or(u8::MAX);
+            let next = bounds.partition_point(|&bound| bound <= start);
+            *short_cut = next.saturating_sub(1) as u8;
         }
-        let Table { origin, step, min_symbol, ends } = *table;
-        Self { origin, step, first, n_symbols: ends.len() as u16, min_symbol, short_cuts }
+        let Table { origin, step, min_symbol, .. } = *table;
+        // `Table::check` made sure that the symbol of every entry is an i16.
+        let first_symbol = i32::from(min_symbol).wrapping_add(first);
+        Self { origin, step, first_symbol, n_entries: n_entries as u32, short_cuts, bounds }
     }
 }
 
@@ -59,56 +69,67 @@ impl<'a, 's> IndexedTables<'a, 's> {
     /// Unpacks `tables` into `slots`, one each.
     pub(in crate::bundle) fn new(tables: &Tables<'a>, slots: &'s mut [IndexedTable]) -> Result<Self, DecodeError> {
         for (index, slot) in slots.iter_mut().enumerate() {
-            let (Some(offset), Some(table)) = (tables.offset_of(index), tables.get(index)) else {
-                return Err(DecodeError::Internal);
-            };
-            // Every part of the section has an even length, so ends begin at even offsets.
-            *slot = IndexedTable::new(&table, (offset.saturating_add(Table::FIXED_LEN) >> 1) as u32);
+            *slot = IndexedTable::new(&tables.get(index).ok_or(DecodeError::Internal)?);
         }
-        let (section, _) = tables.section.as_chunks();
-        Ok(Self { channel_tables: tables.channel_tables, section, tables: slots })
+        Ok(Self { tables: *tables, indexed: slots })
     }
 
-    /// Decodes the next symbol of channel `channel`, with the origin and the step of its values.
-    #[inline]
-    pub(in crate::bundle) fn symbol(&self, channel: usize, reader: &mut AnsReader<'_>) -> (i16, f32, f32) {
-        let number = self.channel_tables.get(channel).map_or(0, |&table| usize::from(u16::from_le_bytes(table)));
-        let Some(table) = self.tables.get(number) else { return (0, 0.0, 0.0) };
-        let first = table.first as usize;
-        let ends = self.section.get(first..first.wrapping_add(table.n_symbols.into())).unwrap_or_default();
-        let symbol = reader.symbol(&IndexedModel { table, ends }).unwrap_or_else(|| escaped(reader));
-        (symbol, table.origin, table.step)
+    /// `[n_channels]` the table of each channel, as bytes of its number.
+    pub(in crate::bundle) fn of_channels(&self) -> &'a [[u8; 2]] {
+        self.tables.channel_tables
+    }
+
+    /// Decodes the next symbol of `reader` with table number `number`; returns it, an i16, with its table.
+    ///
+    /// # Budget
+    /// About 55 instructions on a Cortex-M4; 200 for a symbol that has no entry in memory.
+    #[inline(always)]
+    pub(in crate::bundle) fn symbol(
+        &self,
+        number: [u8; 2],
+        reader: &mut AnsReader<'_>,
+    ) -> Option<(i32, &'s IndexedTable)> {
+        let number = usize::from(u16::from_le_bytes(number));
+        let table = self.indexed.get(number)?;
+        if let Some((symbol, start, frequency)) = table.slot(reader.quantile()) {
+            reader.advance(start, frequency);
+            return Some((symbol, table));
+        }
+        let (after, symbol) = rare_symbol(&self.tables, number, *reader);
+        *reader = after;
+        Some((symbol, table))
     }
 }
 
-impl SymbolModel for IndexedModel<'_, '_> {
-    type Symbol = Option<i16>;
+/// The next symbol of `reader`, looked up in the file; by value, so that the reader of a loop stays in registers.
+#[cold]
+fn rare_symbol<'a>(tables: &Tables<'_>, number: usize, mut reader: AnsReader<'a>) -> (AnsReader<'a>, i32) {
+    let symbol = tables.get(number).map_or(0, |table| table.symbol(&mut reader));
+    (reader, symbol.into())
+}
 
-    /// Walks from the short cut of the quantile's piece.
-    #[inline]
-    fn slot(&self, quantile: u16) -> Slot<Option<i16>> {
-        let piece = usize::from(quantile >> PIECE_BITS);
-        let mut index = self.table.short_cuts.get(piece).map_or(0, |&entry| usize::from(entry));
-        let mut start = match index.checked_sub(1).and_then(|before| self.ends.get(before)) {
-            Some(&end) => u16::from_le_bytes(end),
-            None => 0,
-        };
-        let rest = self.ends.get(index..).unwrap_or_default();
-        for &end in rest.iter().take(MAX_STEPS) {
-            let end = u16::from_le_bytes(end);
+impl IndexedTable {
+    /// Symbol, start and frequency of the entry that has the quantile, found by walking from the short cut of its piece;
+    /// `None` when no entry in memory has it.
+    #[inline(always)]
+    fn slot(&self, quantile: u32) -> Option<(i32, u32, u32)> {
+        const LAST: u32 = N_BOUNDS as u32 - 1;
+        let bound = |index: u32| self.bounds.get((index & LAST) as usize).map_or(0, |&bound| u32::from(bound));
+        let mut entry = self.short_cuts.get((quantile >> PIECE_BITS) as usize).map_or(0, |&entry| u32::from(entry));
+        let mut start = bound(entry);
+        if quantile < start {
+            return None;
+        }
+        loop {
+            let next = entry.wrapping_add(1);
+            let end = bound(next);
+            // The last bound is beyond every quantile.
             if quantile < end {
-                // `Table::check` made sure that min_symbol + index is an i16.
-                let symbol = self.table.min_symbol.wrapping_add(index as i16);
-                return Slot { symbol: Some(symbol), start, frequency: end.wrapping_sub(start) };
+                let symbol = self.first_symbol.wrapping_add(entry as i32);
+                return (entry < self.n_entries).then_some((symbol, start, end.wrapping_sub(start)));
             }
-            start = end;
-            index = index.wrapping_add(1);
+            (entry, start) = (next, end);
         }
-        if rest.len() > MAX_STEPS {
-            let table = Table { origin: 0.0, step: 0.0, min_symbol: self.table.min_symbol, ends: self.ends };
-            return table.slot(quantile);
-        }
-        Slot { symbol: None, start, frequency: FREQUENCY_TOTAL.wrapping_sub(start) }
     }
 }
 
@@ -116,14 +137,14 @@ impl SymbolModel for IndexedModel<'_, '_> {
 mod tests {
     use std::{vec, vec::Vec};
 
-    use super::{IndexedModel, IndexedTable};
+    use super::IndexedTable;
     use crate::bundle::Table;
-    use crate::entropy::{FREQUENCY_TOTAL, SymbolModel};
+    use crate::entropy::{FREQUENCY_TOTAL, Slot, SymbolModel};
 
     /// Tables of all kinds: wide, narrow, long with empty entries, empty.
     fn tables() -> Vec<Vec<[u8; 2]>> {
         let bell = |n: u32| {
-            let weight = move |i: u32| (i * (n - 1 - i) + 1) as u64;
+            let weight = move |i: u32| u64::from(i * (n - 1 - i) + 1);
             let total: u64 = (0..n).map(weight).sum::<u64>() + 1;
             (0..n).scan(0, move |sum, i| {
                 *sum += weight(i);
@@ -131,20 +152,34 @@ mod tests {
             })
         };
         let empty_run = (0..1000).map(|i| if i < 990 { 70 } else { 70 + i - 990 });
-        [vec![], vec![4095], bell(5).collect(), bell(60).collect(), bell(1000).collect(), empty_run.collect()]
-            .map(|ends: Vec<u16>| ends.into_iter().map(u16::to_le_bytes).collect())
+        [vec![], vec![4095], bell(5).collect(), bell(62).collect(), bell(1000).collect(), empty_run.collect()]
+            .map(|ends: Vec<u16>| [vec![0], ends, vec![FREQUENCY_TOTAL]].concat())
+            .map(|bounds| bounds.into_iter().map(u16::to_le_bytes).collect())
             .into()
     }
 
     #[test]
-    fn short_cuts_lead_where_bisection_leads() {
-        for ends in tables() {
-            let table = Table { origin: 0.0, step: 1.0, min_symbol: -7, ends: &ends };
-            let indexed = IndexedTable::new(&table, 0);
-            let model = IndexedModel { table: &indexed, ends: &ends };
+    fn short_cuts_lead_where_bisection_leads_or_nowhere() {
+        for bounds in tables() {
+            let table = Table { origin: 0.0, step: 1.0, min_symbol: -7, bounds: &bounds };
+            let indexed = IndexedTable::new(&table);
+            let mut n_found = 0;
             for quantile in 0..FREQUENCY_TOTAL {
-                assert_eq!(model.slot(quantile), table.slot(quantile), "{} entries, quantile {quantile}", ends.len());
+                let expected = table.slot(quantile);
+                match indexed.slot(quantile.into()) {
+                    Some((symbol, start, frequency)) => {
+                        n_found += 1;
+                        let [start, frequency] = [start, frequency].map(|n| n as u16);
+                        let found = Slot { symbol: Some(symbol as i16), start, frequency };
+                        assert_eq!(found, expected, "{} bounds, quantile {quantile}", bounds.len());
+                    }
+                    None => assert!(expected.symbol.is_none() || bounds.len() > 64, "{} bounds", bounds.len()),
+                }
             }
+            // The fullest entries are those of the window that was taken.
+            let bound = |index: usize| u16::from_le_bytes(bounds[index]);
+            let most = (62..bounds.len() - 1).map(|last| bound(last) - bound(last - 62)).max();
+            assert_eq!(n_found, most.unwrap_or(bound(bounds.len() - 2)), "{} bounds", bounds.len());
         }
     }
 }

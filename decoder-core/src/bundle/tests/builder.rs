@@ -95,7 +95,7 @@ fn halves(values: impl Iterator<Item = f32>) -> Vec<u8> {
 
 /// A table of 5 symbols from −2 on.
 fn table(origin: f32, step: f32) -> Vec<u8> {
-    [f32s(&[origin, step]), (-2_i16).to_le_bytes().into(), u16s(&[5, 400, 1500, 2600, 3600, 4000])].concat()
+    [f32s(&[origin, step]), (-2_i16).to_le_bytes().into(), u16s(&[5, 0, 400, 1500, 2600, 3600, 4000, 4096])].concat()
 }
 
 struct StaticModel;
@@ -144,11 +144,9 @@ fn heads(coded: bool) -> Vec<u8> {
     bytes
 }
 
-fn trie_nodes() -> Vec<[[u8; 4]; 3]> {
-    let node = |level: usize, context: usize| {
-        let [[a, b], [c, d]] = [800 + 100 * level as u16 + 300 * context as u16, 2900].map(u16::to_le_bytes);
-        [a, b, c, d]
-    };
+fn trie_nodes() -> Vec<[[[u8; 2]; 2]; 3]> {
+    let node =
+        |level: usize, context: usize| [800 + 100 * level as u16 + 300 * context as u16, 2900].map(u16::to_le_bytes);
     (0..3 * B).map(|level| std::array::from_fn(|context| node(level, context))).collect()
 }
 
@@ -254,7 +252,7 @@ pub(super) fn bundle(variant: Variant) -> Vec<u8> {
     let lattice = [
         LATTICE_MIN.iter().flat_map(|x| x.to_le_bytes()).collect(),
         vec![B as u8, 0, 0, 0],
-        trie_nodes().into_flattened().into_flattened(),
+        trie_nodes().into_flattened().into_flattened().into_flattened(),
     ]
     .concat();
     let tables = [u16s(&[1, C as u16]), u16s(&[0; C]), u32s(&[8 + 2 * C as u32]), table(ORIGIN, STEP)].concat();

@@ -32,7 +32,8 @@ fn embed(path: &Path, out: &Path) -> Result<(), Box<dyn Error>> {
     let bytes = fs::read(path)?;
     let bundle = Bundle::parse(&bytes)?;
     let camera = bundle.header().preview;
-    let mut budget = Budget { width_px: camera.width_px, height_px: camera.height_px, max_splats: MaxSplats::Worst };
+    let mut budget =
+        Budget { width_px: camera.width_px, height_px: camera.height_px, max_splats: MaxSplats::Worst, tiers: u8::MAX };
     // Memory for every splat of the scene is more than a microcontroller has to spare: the firmware draws one view, so
     // it gets what this view needs.
     let plan = bundle.plan(&budget)?;

@@ -119,14 +119,21 @@ job_link-gate() {
   tests/link-gate/panics.sh "$nm" "$embedded/$embedded_target/release/link-gate"
 }
 
-# A bundle drawn by a Cortex-M4 under QEMU is byte for byte what this machine draws.
+# A bundle drawn by a Cortex-M4 under QEMU is byte for byte what this machine draws, under either coder.
 job_firmware() {
   need_embedded_target
   need_command qemu-system-arm qemu-system-arm
   need_defmt_print
-  local out=$embedded/frame
+  local coder
+  for coder in static context; do
+    firmware_frame "$coder" "$embedded/frame/$coder"
+  done
+}
+
+firmware_frame() { # CODER FOLDER
+  local coder=$1 out=$2
   mkdir -p "$out"
-  cargo run -q -p tools --bin sample_bundle --locked -- "$out/sample.psb"
+  cargo run -q -p tools --bin sample_bundle --locked -- --coder "$coder" "$out/sample.psb"
   cargo run -q -p tools --bin draw_preview --locked -- "$out/sample.psb" "$out/host.ppm"
   (
     cd firmware-example
@@ -136,8 +143,8 @@ job_firmware() {
   )
   rm -f "$out/frame.ppm"
   (cd "$out" && "$OLDPWD/firmware-example/qemu.sh" "$embedded/$embedded_target/release/firmware-example")
-  cmp "$out/frame.ppm" "$out/host.ppm" || fail "the frame of the device differs from the host's"
-  echo "the device's frame is the host's: $(wc -c <"$out/frame.ppm") bytes, $out/frame.ppm"
+  cmp "$out/frame.ppm" "$out/host.ppm" || fail "the frame of the device differs from the host's, coder $coder"
+  echo "the device's frame is the host's, coder $coder: $(wc -c <"$out/frame.ppm") bytes, $out/frame.ppm"
 }
 
 # The main job in small: the same path as `cargo run --release -- demo`, a few hundred steps on small images.

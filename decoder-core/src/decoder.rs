@@ -248,6 +248,25 @@ impl<'b, 's> Decoder<'b, 's> {
     }
 }
 
+impl<'b> Bundle<'b> {
+    /// The chunks of the first `tiers` tiers that a frame of `camera` needs: those whose ink box it can see, in file order.
+    ///
+    /// # Errors
+    /// [`DecodeError::BadFloat`] or [`DecodeError::OutOfRange`] for an unusable camera.
+    ///
+    /// # Budget
+    /// About 100 multiplications a chunk; reads the directory and no chunk.
+    pub fn chunks_in_view(
+        &self,
+        camera: &Camera,
+        tiers: u8,
+    ) -> Result<impl Iterator<Item = Chunk<'b>> + use<'b>, DecodeError> {
+        let view = View::new(camera)?;
+        let n_chunks = self.up_to_tier(tiers.min(self.n_tiers())).n_chunks;
+        Ok(self.chunks().take(n_chunks as usize).filter(move |chunk| view.sees_box(chunk.ink_box())))
+    }
+}
+
 /// The splats of the frame in work; counts on when full, to tell how many there are.
 struct SplatStore<'s> {
     splats: &'s mut [Splat],

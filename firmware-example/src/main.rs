@@ -67,8 +67,12 @@ fn draw(frame: &mut Frame, scratch: &mut [u8]) -> Result<(), Failure> {
     if size.map(usize::from) != [WIDTH_PX, HEIGHT_PX] {
         return Err(Failure::FrameSize { needed: size, available: [WIDTH_PX, HEIGHT_PX] });
     }
-    let budget =
-        Budget { width_px: camera.width_px, height_px: camera.height_px, max_splats: MaxSplats::AtMost(MAX_SPLATS) };
+    let budget = Budget {
+        width_px: camera.width_px,
+        height_px: camera.height_px,
+        max_splats: MaxSplats::AtMost(MAX_SPLATS),
+        tiers: u8::MAX,
+    };
     let plan = bundle.plan(&budget)?;
     defmt::info!("memory: {} bytes of scratch, {} of frame", plan.scratch_len(), frame.data().len());
 

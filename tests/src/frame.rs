@@ -1,7 +1,7 @@
 //! Drawing with the decoder, and a sink that keeps the books.
 
 use glam::DVec3;
-use pocketsplat::bundle::{self, BundleInfo, QuantisationSteps};
+use pocketsplat::bundle::{self, BundleInfo, WriteOptions};
 use pocketsplat::dataset::Normalisation;
 use pocketsplat::render::decoder::core_camera;
 use pocketsplat::scene::Scene;
@@ -60,12 +60,12 @@ pub fn bundle_of(scene: &Scene<f32>, preview: &pocketsplat::camera::Camera) -> V
         training_px: [preview.width_px, preview.height_px],
         preview: preview.clone(),
     };
-    bundle::write(scene, &info, &QuantisationSteps::default()).expect("a test scene can be written")
+    bundle::write(scene, &info, &WriteOptions::default()).expect("a test scene can be written").bytes
 }
 
 /// A budget that is enough for every view of the size of `camera`.
 pub fn budget_for(camera: &Camera) -> Budget {
-    Budget { width_px: camera.width_px, height_px: camera.height_px, max_splats: MaxSplats::Worst }
+    Budget { width_px: camera.width_px, height_px: camera.height_px, max_splats: MaxSplats::Worst, tiers: u8::MAX }
 }
 
 /// Draws one frame in fresh memory.

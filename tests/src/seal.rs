@@ -1,36 +1,50 @@
 //! Checksums made right again after damage, so that a hostile bundle reaches the checks behind them.
 
-use pocketsplat_core::bundle::{HEADER_LEN, crc32};
+use pocketsplat_core::bundle::{
+    CHUNK_RECORD_LEN, HEADER_FIXED_LEN, INK_FRAME_LEN, SECTION_LEN, TIER_RECORD_LEN, crc32,
+};
 
-/// Rows of the section table, and the length of one.
-const N_SECTIONS: usize = 4;
-const SECTION_LEN: usize = 16;
-/// The table ends where the header's checksum begins.
-const TABLE_OFFSET: usize = HEADER_LEN - 4 - N_SECTIONS * SECTION_LEN;
-/// Length of a record of the chunk directory.
-const RECORD_LEN: usize = 40;
+/// Where the header has the number of sections, of tiers, and its own length.
+const N_SECTIONS: usize = 39;
+const N_TIERS: usize = 47;
+const HEADER_LEN: usize = 10;
+/// Kinds of the two last sections.
+const DIRECTORY: u8 = 7;
+const CHUNKS: u8 = 8;
 
 /// Recomputes every checksum that offsets and lengths still lead to: chunks, then sections, then the header.
 ///
 /// Written from `FORMAT.md`, not with the writer, which makes only sound bundles.
 pub fn reseal(bytes: &mut [u8]) {
-    let sections: [_; N_SECTIONS] = std::array::from_fn(|row| {
-        let at = TABLE_OFFSET + row * SECTION_LEN;
-        let [offset, len] = [4, 8].map(|field| read_u32(bytes, at + field) as usize);
-        (at + 12, offset, offset.saturating_add(len))
-    });
-    let [_, _, (_, directory, directory_end), (_, chunks, _)] = sections;
-    let end = directory_end.min(bytes.len());
-    for record in (directory..end.saturating_sub(RECORD_LEN - 1)).step_by(RECORD_LEN) {
-        let start = chunks.saturating_add(read_u32(bytes, record) as usize);
-        let end = start.saturating_add(read_u32(bytes, record + 4) as usize);
-        write_crc(bytes, record + 8, start, end);
+    let byte = |at: usize| bytes.get(at).copied().unwrap_or(0);
+    let (n_sections, n_tiers) = (usize::from(byte(N_SECTIONS)), usize::from(byte(N_TIERS)));
+    let header_len = usize::from(u16::from_le_bytes([byte(HEADER_LEN), byte(HEADER_LEN + 1)]));
+    let sections: Vec<(u8, usize, usize, usize)> = (0..n_sections)
+        .map(|row| {
+            let at = HEADER_FIXED_LEN + row * SECTION_LEN;
+            let [offset, len] = [4, 8].map(|field| read_u32(bytes, at + field) as usize);
+            (byte(at), at + 12, offset, offset.saturating_add(len))
+        })
+        .collect();
+    let place = |kind: u8| sections.iter().find(|section| section.0 == kind);
+    if let (Some(&(_, _, directory, end)), Some(&(_, _, mut start, _))) = (place(DIRECTORY), place(CHUNKS)) {
+        let first = directory.saturating_add(n_tiers * TIER_RECORD_LEN + INK_FRAME_LEN);
+        let end = end.min(bytes.len());
+        for record in (first..end.saturating_sub(CHUNK_RECORD_LEN - 1)).step_by(CHUNK_RECORD_LEN) {
+            let end = start.saturating_add(read_u32(bytes, record) as usize);
+            write_crc(bytes, record + 4, start, end);
+            start = end;
+        }
     }
-    // The section of the chunks has no checksum of its own.
-    for (crc_at, start, end) in sections.into_iter().take(N_SECTIONS - 1) {
-        write_crc(bytes, crc_at, start, end);
+    for (kind, crc_at, start, end) in sections {
+        // The section of the chunks has no checksum of its own.
+        if kind != CHUNKS {
+            write_crc(bytes, crc_at, start, end);
+        }
     }
-    write_crc(bytes, HEADER_LEN - 4, 0, HEADER_LEN - 4);
+    if let Some(crc_at) = header_len.checked_sub(4) {
+        write_crc(bytes, crc_at, 0, crc_at);
+    }
 }
 
 fn read_u32(bytes: &[u8], at: usize) -> u32 {

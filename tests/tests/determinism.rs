@@ -1,6 +1,6 @@
 //! Same seed, same machine, any number of threads: the same bundle, byte for byte.
 
-use pocketsplat::bundle::{self, BundleInfo, QuantisationSteps};
+use pocketsplat::bundle::{self, BundleInfo, WriteOptions};
 use pocketsplat::dataset::{Capture, LoadOptions, load};
 use pocketsplat::scene::{ModelShape, Scene};
 use pocketsplat::synth::{SynthOptions, write_capture};
@@ -42,7 +42,7 @@ fn train(capture: &Capture, seed: u64, n_threads: usize) -> (Vec<u8>, Vec<usize>
             training_px: [40; 2],
             preview: capture.train[0].camera.clone(),
         };
-        let bytes = bundle::write(&trainer.scene, &info, &QuantisationSteps::default()).expect("the scene is finite");
+        let bytes = bundle::write(&trainer.scene, &info, &WriteOptions::default()).expect("the scene is finite").bytes;
         (bytes, counts.0)
     })
 }

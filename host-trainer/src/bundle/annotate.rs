@@ -1,171 +1,282 @@
 //! A bundle byte by byte: every field with its offset, its bytes and its meaning.
 
-use std::fmt::{Display, Write};
+mod dump;
 
 use half::f16;
-use pocketsplat_core::bundle::{Chunk, HEADER_LEN};
-use pocketsplat_core::{Bundle, DecodeError};
+use pocketsplat_core::bundle::{AnchorModels, AnchorSite, Chunk, Section};
 
-/// Bytes on a line of the dump.
-const LINE_BYTES: usize = 8;
+use pocketsplat_core::{Bundle, DecodeError, SectionKind};
 
-/// Walks over the file and writes a line for every few bytes.
-struct Dump<'f> {
-    bytes: &'f [u8],
-    position: usize,
-    text: String,
-}
+use dump::Dump;
 
-/// Returns the annotated dump of a bundle; each of its bytes appears exactly once.
+/// Returns the annotated dump of a bundle, in file order.
+///
+/// * `array_lines`: lines of an array, of the chunk records and of a chunk's anchors at most, the rest is counted; with
+///   `usize::MAX` each of the file's bytes appears exactly once.
 ///
 /// # Errors
 /// [`DecodeError`] when `bytes` is not a sound bundle.
-pub fn annotate(bytes: &[u8]) -> Result<String, DecodeError> {
+pub fn annotate(bytes: &[u8], array_lines: usize) -> Result<String, DecodeError> {
     let bundle = Bundle::parse(bytes)?;
-    let mut dump = Dump { bytes, position: 0, text: String::new() };
-    dump.header();
-    dump.heads(&bundle);
-    dump.tables(&bundle);
-    for chunk in bundle.chunks() {
-        dump.record(&chunk);
+    let mut annotator = Annotator { dump: Dump::new(bytes, array_lines), bundle };
+    annotator.header();
+    for section in bundle.sections() {
+        annotator.section(&section)?;
     }
-    for chunk in bundle.chunks() {
-        chunk.check()?;
-        dump.chunk(&bundle, &chunk)?;
-    }
-    Ok(dump.text)
+    Ok(annotator.dump.into_text())
 }
 
-impl Dump<'_> {
-    fn heading(&mut self, title: &str) {
-        let rule = if self.position == 0 { "" } else { "\n" };
-        // Writing to a string never fails.
-        let _ = writeln!(self.text, "{rule}{:06x}  -- {title}", self.position);
-    }
+/// Writes the fields of a bundle section by section.
+struct Annotator<'f> {
+    dump: Dump<'f>,
+    bundle: Bundle<'f>,
+}
 
-    /// The next `N` bytes, one field.
-    fn field<const N: usize, T: Display>(&mut self, name: &str, meaning: impl Fn([u8; N]) -> T) {
-        let bytes: [u8; N] = std::array::from_fn(|i| self.bytes.get(self.position + i).copied().unwrap_or_default());
-        self.line(N, &format!("{name}: {}", meaning(bytes)));
+/// Section names as `FORMAT.md` has them.
+fn name(kind: SectionKind) -> &'static str {
+    match kind {
+        SectionKind::Heads => "heads",
+        SectionKind::Lattice => "lattice",
+        SectionKind::Masks => "masks",
+        SectionKind::Tables => "tables",
+        SectionKind::Context => "context",
+        SectionKind::Manifest => "manifest",
+        SectionKind::Directory => "directory",
+        SectionKind::Chunks => "chunks",
+        _ => "unknown",
     }
+}
 
-    /// The next `n` fields of `N` bytes, several to a line.
-    fn array<const N: usize, T: Display>(&mut self, name: &str, n: usize, meaning: impl Fn([u8; N]) -> T) {
-        let per_line = LINE_BYTES / N;
-        for first in (0..n).step_by(per_line) {
-            let n_here = per_line.min(n - first);
-            let items = self.bytes[self.position..self.position + n_here * N].as_chunks::<N>().0;
-            let values: Vec<String> = items.iter().map(|&item| meaning(item).to_string()).collect();
-            self.line(n_here * N, &format!("{name}[{first}..{}]: {}", first + n_here, values.join(" ")));
-        }
-    }
-
-    fn line(&mut self, n_bytes: usize, meaning: &str) {
-        let end = self.position + n_bytes;
-        let mut meaning = Some(meaning);
-        for bytes in self.bytes[self.position..end].chunks(LINE_BYTES) {
-            let hex: Vec<String> = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
-            let line = format!("{:06x}  {:23}  {}", self.position, hex.join(" "), meaning.take().unwrap_or_default());
-            let _ = writeln!(self.text, "{}", line.trim_end());
-            self.position += bytes.len();
-        }
-    }
-
+impl<'f> Annotator<'f> {
     fn header(&mut self) {
-        self.heading("header");
-        self.field::<8, _>("magic", |bytes| bytes.escape_ascii().to_string());
-        self.field("version", u16::from_le_bytes);
-        self.field("header_len", u16::from_le_bytes);
-        self.field("file_len", u32::from_le_bytes);
-        self.field("effects", |bytes| format!("{:#05b}", u32::from_le_bytes(bytes)));
-        self.field("F", u16::from_le_bytes);
-        self.field("K", u16::from_le_bytes);
-        self.field("n_anchors", u32::from_le_bytes);
-        self.field("n_chunks", u32::from_le_bytes);
-        self.field("max_chunk_anchors", u16::from_le_bytes);
-        self.field::<1, _>("camera convention", |[byte]| byte);
-        self.field::<1, _>("n_sections", |[byte]| byte);
-        self.array("training size", 2, u16::from_le_bytes);
-        self.array::<1, _>("background", 3, |[byte]| byte);
-        self.field::<1, _>("reserved", |[byte]| byte);
-        self.field("voxel_size", f32::from_le_bytes);
-        self.array("normalisation centre", 3, f64::from_le_bytes);
-        self.field("normalisation scale", f64::from_le_bytes);
-        self.array("preview rotation", 9, f32::from_le_bytes);
-        self.array("preview translation", 3, f32::from_le_bytes);
-        self.array("preview focal", 2, f32::from_le_bytes);
-        self.array("preview principal", 2, f32::from_le_bytes);
-        self.array("preview size", 2, u16::from_le_bytes);
-        for name in ["heads", "tables", "directory", "chunks"] {
-            self.field::<4, _>(&format!("section {name}, kind"), |[kind, ..]| kind);
-            self.field(&format!("section {name}, offset"), u32::from_le_bytes);
-            self.field(&format!("section {name}, len"), u32::from_le_bytes);
-            self.crc(&format!("section {name}, crc"));
+        let dump = &mut self.dump;
+        dump.heading("header");
+        dump.field::<8, _>("magic", |bytes| bytes.escape_ascii().to_string());
+        dump.field("version", u16::from_le_bytes);
+        dump.field("header_len", u16::from_le_bytes);
+        dump.field("file_len", u32::from_le_bytes);
+        dump.field("required features", |bytes| format!("{:#08b}", u32::from_le_bytes(bytes)));
+        dump.field("optional features", |bytes| format!("{:#b}", u32::from_le_bytes(bytes)));
+        dump.field("F", u16::from_le_bytes);
+        dump.field("K", u16::from_le_bytes);
+        dump.field("n_anchors", u32::from_le_bytes);
+        dump.field("n_chunks", u32::from_le_bytes);
+        dump.field("max_chunk_anchors", u16::from_le_bytes);
+        dump.field::<1, _>("camera convention", |[byte]| byte);
+        dump.field::<1, _>("n_sections", |[byte]| byte);
+        dump.array("training size", 2, u16::from_le_bytes);
+        dump.array::<1, _>("background", 3, |[byte]| byte);
+        dump.field::<1, _>("n_tiers", |[byte]| byte);
+        dump.field("voxel_size", f32::from_le_bytes);
+        dump.field("reserved", u32::from_le_bytes);
+        dump.array("normalisation centre", 3, f64::from_le_bytes);
+        dump.field("normalisation scale", f64::from_le_bytes);
+        dump.array("preview rotation", 9, f32::from_le_bytes);
+        dump.array("preview translation", 3, f32::from_le_bytes);
+        dump.array("preview focal", 2, f32::from_le_bytes);
+        dump.array("preview principal", 2, f32::from_le_bytes);
+        dump.array("preview size", 2, u16::from_le_bytes);
+        for section in self.bundle.sections() {
+            let name = name(section.kind);
+            dump.field::<4, _>(&format!("section {name}, kind"), |[kind, ..]| kind);
+            dump.field(&format!("section {name}, offset"), u32::from_le_bytes);
+            dump.field(&format!("section {name}, len"), u32::from_le_bytes);
+            dump.crc(&format!("section {name}, crc"));
         }
-        self.crc("header crc");
-        debug_assert_eq!(self.position, HEADER_LEN, "the header's fields fill it");
+        dump.crc("header crc");
     }
 
-    fn crc(&mut self, name: &str) {
-        self.field(name, |bytes| format!("{:#010x}", u32::from_le_bytes(bytes)));
-    }
-
-    fn heads(&mut self, bundle: &Bundle<'_>) {
-        let heads = bundle.heads();
-        for (name, head) in [("opacity", heads.opacity), ("covariance", heads.covariance), ("colour", heads.colour)] {
-            self.heading(&format!("{name} head"));
-            for (part, halves) in [("W1", head.w1), ("b1", head.b1), ("W2", head.w2), ("b2", head.b2)] {
-                self.array(part, halves.len(), f16::from_le_bytes);
+    fn section(&mut self, section: &Section) -> Result<(), DecodeError> {
+        match section.kind {
+            SectionKind::Heads => self.heads(section),
+            SectionKind::Lattice => self.lattice(),
+            SectionKind::Masks => self.masks(),
+            SectionKind::Tables => self.tables(),
+            SectionKind::Context => self.context(),
+            SectionKind::Manifest => self.manifest(),
+            SectionKind::Directory => self.directory(),
+            SectionKind::Chunks => return self.chunks(),
+            _ => {
+                self.dump.heading(&format!("section of kind {}", section.code));
+                self.dump.array::<1, _>("bytes", section.len as usize, |[byte]| byte);
             }
-        }
-    }
-
-    fn tables(&mut self, bundle: &Bundle<'_>) {
-        let tables = bundle.tables();
-        self.heading("tables");
-        self.field("n_tables", u16::from_le_bytes);
-        self.field("n_channels", u16::from_le_bytes);
-        self.array("table of channel", tables.n_channels(), u16::from_le_bytes);
-        self.array("table offset", tables.len(), u32::from_le_bytes);
-        for (index, table) in (0..tables.len()).filter_map(|index| Some((index, tables.get(index)?))) {
-            self.heading(&format!("table {index}"));
-            self.field("origin", f32::from_le_bytes);
-            self.field("step", f32::from_le_bytes);
-            self.field("min_symbol", i16::from_le_bytes);
-            self.field("n_symbols", u16::from_le_bytes);
-            self.array("ends", table.n_symbols(), u16::from_le_bytes);
-        }
-    }
-
-    fn record(&mut self, chunk: &Chunk<'_>) {
-        self.heading(&format!("directory record of chunk {}", chunk.index()));
-        self.field("offset", u32::from_le_bytes);
-        self.field("len", u32::from_le_bytes);
-        self.crc("crc");
-        self.field("n_anchors", u16::from_le_bytes);
-        self.field("reserved", u16::from_le_bytes);
-        self.array("ink box, lowest", 3, f32::from_le_bytes);
-        self.array("ink box, highest", 3, f32::from_le_bytes);
-    }
-
-    /// The chunk's fields, then what they decode to, in lines without bytes.
-    fn chunk(&mut self, bundle: &Bundle<'_>, chunk: &Chunk<'_>) -> Result<(), DecodeError> {
-        const FIXED_LEN: usize = 16;
-        let tables = bundle.tables();
-        let n_word_bytes = chunk.anchors(tables)?.n_word_bytes();
-        self.heading(&format!("chunk {}", chunk.index()));
-        self.array("lattice base", 3, i32::from_le_bytes);
-        self.array::<1, _>("offset bits", 3, |[byte]| byte);
-        self.field::<1, _>("reserved", |[byte]| byte);
-        let n_lattice_bytes = chunk.n_bytes() - FIXED_LEN - n_word_bytes;
-        self.array::<1, _>("packed offsets", n_lattice_bytes, |[byte]| format!("{byte:08b}"));
-        self.array("words", n_word_bytes / 2, |bytes| format!("{:04x}", u16::from_le_bytes(bytes)));
-        let n_anchors = usize::from(chunk.n_anchors());
-        let (mut lattice, mut symbols) = (vec![[0; 3]; n_anchors], vec![0; n_anchors * tables.n_channels()]);
-        chunk.decode_symbols(tables, &mut lattice, &mut symbols)?;
-        for (cell, row) in lattice.iter().zip(symbols.chunks(tables.n_channels())) {
-            let _ = writeln!(self.text, "{:33}anchor at {cell:?}: symbols {row:?}", "");
         }
         Ok(())
     }
+
+    fn heads(&mut self, section: &Section) {
+        let heads = *self.bundle.heads();
+        let names = ["opacity", "covariance", "colour"];
+        let views = [heads.opacity, heads.covariance, heads.colour];
+        let dump = &mut self.dump;
+        let Some(coded) = heads.coded() else {
+            for (name, head) in names.into_iter().zip(views) {
+                dump.heading(&format!("{name} head"));
+                let (w1, w2) = (head.n_hidden * head.n_in, head.n_out * head.n_hidden);
+                for (part, n) in [("W1", w1), ("b1", head.n_hidden), ("W2", w2), ("b2", head.n_out)] {
+                    dump.array(part, n, f16::from_le_bytes);
+                }
+            }
+            return;
+        };
+        let begin = dump.position();
+        for (layer, table) in ["W1", "W2"].into_iter().zip(coded.tables) {
+            dump.heading(&format!("heads, table of all {layer}"));
+            table_record(dump, table.n_symbols());
+        }
+        dump.heading("heads, biases");
+        for (name, head) in names.into_iter().zip(views) {
+            dump.array(&format!("{name} b1"), head.n_hidden, f16::from_le_bytes);
+            dump.array(&format!("{name} b2"), head.n_out, f16::from_le_bytes);
+        }
+        dump.heading("heads, stream");
+        let n_words = (section.len as usize - (dump.position() - begin)) / 2;
+        dump.array("words", n_words, word);
+    }
+
+    fn lattice(&mut self) {
+        let n_levels = self.bundle.lattice().trie.n_levels();
+        self.dump.heading("lattice");
+        self.dump.array("min", 3, i32::from_le_bytes);
+        self.dump.field::<1, _>("bits an axis", |[byte]| byte);
+        self.dump.array::<1, _>("reserved", 3, |[byte]| byte);
+        for level in 0..n_levels {
+            // Three contexts of two ends.
+            self.dump.array(&format!("level {level}"), 6, u16::from_le_bytes);
+        }
+    }
+
+    fn masks(&mut self) {
+        self.dump.heading("masks");
+        for offset in 0..usize::from(self.bundle.header().n_offsets) {
+            self.dump.array(&format!("offset {offset}"), 4, u16::from_le_bytes);
+        }
+    }
+
+    fn tables(&mut self) {
+        let Some(tables) = self.bundle.tables() else { return };
+        let dump = &mut self.dump;
+        dump.heading("tables");
+        dump.field("n_tables", u16::from_le_bytes);
+        dump.field("n_channels", u16::from_le_bytes);
+        dump.array("table of channel", tables.n_channels(), u16::from_le_bytes);
+        dump.array("table offset", tables.len(), u32::from_le_bytes);
+        for (index, table) in (0..tables.len()).filter_map(|index| Some((index, tables.get(index)?))) {
+            dump.heading(&format!("table {index}"));
+            table_record(dump, table.n_symbols());
+        }
+    }
+
+    fn context(&mut self) {
+        let Some(context) = self.bundle.context() else { return };
+        let (n_in, n_hidden, n_out) = (context.n_inputs(), context.n_hidden(), context.n_outputs());
+        let dump = &mut self.dump;
+        dump.heading("context");
+        dump.array("grid min", 3, i32::from_le_bytes);
+        dump.array("grid scale", 3, u32::from_le_bytes);
+        dump.array("base steps", 3, f32::from_le_bytes);
+        dump.field::<1, _>("n_levels", |[byte]| byte);
+        dump.field::<1, _>("reserved", |[byte]| byte);
+        dump.field("n_hidden", u16::from_le_bytes);
+        let mut n_rows = 0;
+        for (index, level) in context.levels().enumerate() {
+            dump.field::<1, _>(&format!("level {index}, kind"), |[byte]| byte);
+            dump.field::<1, _>(&format!("level {index}, reserved"), |[byte]| byte);
+            dump.field(&format!("level {index}, resolution"), u16::from_le_bytes);
+            dump.field(&format!("level {index}, n_rows"), u32::from_le_bytes);
+            n_rows += level.n_rows as usize;
+        }
+        dump.array::<1, _>("shift1", n_hidden, |[byte]| byte);
+        dump.array::<1, _>("shift2", n_out, |[byte]| byte);
+        dump.array("b1", n_hidden, i32::from_le_bytes);
+        dump.array("b2", n_out, i32::from_le_bytes);
+        dump.array("W1", n_hidden * n_in, i8::from_le_bytes);
+        dump.array("W2", n_out * n_hidden, i8::from_le_bytes);
+
+        dump.array::<1, _>("grid rows", n_rows.div_ceil(2), |[byte]| format!("{byte:08b}"));
+    }
+
+    fn manifest(&mut self) {
+        let dump = &mut self.dump;
+        for tier in 0..self.bundle.header().n_tiers {
+            dump.heading(&format!("manifest, tiers up to {tier}"));
+            dump.field("PSNR, dB", f32::from_le_bytes);
+            dump.field("n_views", u16::from_le_bytes);
+            dump.field("n_cameras", u16::from_le_bytes);
+            dump.field("most visible anchors", u32::from_le_bytes);
+            dump.field("most splats", u32::from_le_bytes);
+            dump.array("most splats of a strip of 1, 2, 4, 8", 4, u32::from_le_bytes);
+            dump.array("most tile pairs of a strip of 1, 2, 4, 8", 4, u32::from_le_bytes);
+            dump.field("most multiply-adds of the heads, 1024s", u32::from_le_bytes);
+            dump.field("most pixel evaluations, 1024s", u32::from_le_bytes);
+            dump.field("most decoded anchors", u32::from_le_bytes);
+        }
+    }
+
+    fn directory(&mut self) {
+        let dump = &mut self.dump;
+        dump.heading("directory");
+        for tier in 0..self.bundle.header().n_tiers {
+            dump.array(&format!("tiers up to {tier}: n_chunks, n_anchors, end"), 3, u32::from_le_bytes);
+        }
+        dump.array("ink frame, min", 3, f32::from_le_bytes);
+        dump.array("ink frame, step", 3, f32::from_le_bytes);
+        let n_chunks = self.bundle.header().n_chunks as usize;
+        let n_shown = dump.n_shown(n_chunks);
+        for index in 0..n_shown {
+            dump.heading(&format!("directory record of chunk {index}"));
+            dump.field("len", u32::from_le_bytes);
+            dump.crc("crc");
+            dump.field("n_anchors", u16::from_le_bytes);
+            dump.field("reserved", u16::from_le_bytes);
+            dump.array("ink box, low", 3, u16::from_le_bytes);
+            dump.array("ink box, high", 3, u16::from_le_bytes);
+        }
+        dump.skip(pocketsplat_core::bundle::CHUNK_RECORD_LEN * (n_chunks - n_shown), "records of other chunks");
+    }
+
+    fn chunks(&mut self) -> Result<(), DecodeError> {
+        let bundle = self.bundle;
+        let mut words = vec![0; bundle.anchor_scratch_words()];
+        let mut models = bundle.anchor_models(&mut words)?;
+        let n_shown = self.dump.n_shown(bundle.n_chunks() as usize);
+        let (shown, rest): (Vec<_>, Vec<_>) = bundle.chunks().partition(|chunk| (chunk.index() as usize) < n_shown);
+        for chunk in &shown {
+            self.chunk(chunk, &mut models)?;
+        }
+        self.dump.skip(rest.iter().map(Chunk::n_bytes).sum(), "words of other chunks");
+        Ok(())
+    }
+
+    /// The chunk's words, then what they decode to, in lines without bytes.
+    fn chunk(&mut self, chunk: &Chunk<'f>, models: &mut AnchorModels<'f, '_>) -> Result<(), DecodeError> {
+        let dump = &mut self.dump;
+        dump.heading(&format!("chunk {}", chunk.index()));
+        dump.array("words", chunk.n_bytes() / 2, word);
+        let (n_anchors, n_channels) = (usize::from(chunk.n_anchors()), self.bundle.header().n_channels());
+        let (mut sites, mut symbols) = (vec![AnchorSite::default(); n_anchors], vec![0; n_anchors * n_channels]);
+        chunk.decode_symbols(models, &mut sites, &mut symbols)?;
+        let n_shown = dump.n_shown(n_anchors);
+        for (site, row) in sites.iter().zip(symbols.chunks(n_channels)).take(n_shown) {
+            let mask = format!("{:0k$b}", site.mask, k = usize::from(self.bundle.header().n_offsets));
+            dump.remark(&format!("anchor at {:?}, drawn {mask}: symbols {row:?}", site.lattice));
+        }
+        if n_shown < n_anchors {
+            dump.remark(&format!("… {} more anchors", n_anchors - n_shown));
+        }
+        Ok(())
+    }
+}
+
+/// A table's fields and its `n_symbols` entries.
+fn table_record(dump: &mut Dump<'_>, n_symbols: usize) {
+    dump.field("origin", f32::from_le_bytes);
+    dump.field("step", f32::from_le_bytes);
+    dump.field("min_symbol", i16::from_le_bytes);
+    dump.field("n_symbols", u16::from_le_bytes);
+    dump.array("bounds", n_symbols + 2, u16::from_le_bytes);
+}
+
+fn word(bytes: [u8; 2]) -> String {
+    format!("{:04x}", u16::from_le_bytes(bytes))
 }

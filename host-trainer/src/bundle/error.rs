@@ -1,43 +1,6 @@
 //! Why a scene can not be written.
 
-use std::fmt;
-
-use crate::scene::ModelShape;
-
-/// A channel of an anchor by name, for messages.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ChannelName {
-    /// Feature dimension.
-    Feature(usize),
-    /// Log-scale 0..6.
-    LogScale(usize),
-    /// Offset and axis.
-    Offset(usize, usize),
-}
-
-impl ChannelName {
-    /// The name of channel `channel` of an anchor.
-    pub fn of(shape: &ModelShape, channel: usize) -> Self {
-        let [first_log_scale, first_offset] = [shape.feature_dim, shape.feature_dim + 6];
-        if channel < first_log_scale {
-            Self::Feature(channel)
-        } else if channel < first_offset {
-            Self::LogScale(channel - first_log_scale)
-        } else {
-            Self::Offset((channel - first_offset) / 3, (channel - first_offset) % 3)
-        }
-    }
-}
-
-impl fmt::Display for ChannelName {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match *self {
-            Self::Feature(dim) => write!(f, "feature {dim}"),
-            Self::LogScale(index) => write!(f, "log-scale {index}"),
-            Self::Offset(offset, axis) => write!(f, "offset {offset} {}", ["x", "y", "z"].get(axis).unwrap_or(&"?")),
-        }
-    }
-}
+use super::ChannelName;
 
 /// Why a scene can not be written as a bundle.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -75,6 +38,35 @@ pub enum WriteError {
         /// The largest magnitude.
         limit: i32,
     },
+    /// The lattice cells of the scene are too far apart for a Morton code.
+    #[error("the scene is {found} lattice cells wide, the format holds {limit}; use a larger voxel size")]
+    LatticeTooWide {
+        /// Cells along the widest axis, less one.
+        found: u32,
+        /// The most the format holds.
+        limit: u32,
+    },
+    /// Two anchors share a lattice cell, which a trie of cells can not tell apart.
+    #[error("anchors {} and {} share the lattice cell {cell:?}; keep one of them", anchors[0], anchors[1])]
+    SharedCell {
+        /// Their indices in the scene.
+        anchors: [usize; 2],
+        /// The cell.
+        cell: [i32; 3],
+    },
+    /// The tiers' pruning rates do not describe nested scenes.
+    #[error("tiers of pruning rates {found:?}; 1 to {most} rates below 1 must fall to 0")]
+    Tiers {
+        /// The rates asked for.
+        found: Vec<f32>,
+        /// Most tiers of a bundle.
+        most: usize,
+    },
+    /// The context coder is asked for and the scene has no context model.
+    #[error(
+        "the context coder needs a scene with a context model; train one with the backbone hac or use --coder static"
+    )]
+    NoContext,
     /// A weight is not finite, or too large for half precision.
     #[error("{head} head, weight {index}: {value} does not fit half precision (±65504)")]
     Weight {

@@ -28,6 +28,8 @@ pub enum LoadError {
 
 /// Reads a bundle file and checks all of it, every chunk's checksum included; `Bundle::parse` of the bytes succeeds.
 ///
+/// A file that is cut at the end of a tier is sound, with fewer tiers than it was written with.
+///
 /// # Errors
 /// [`LoadError`] with the path.
 pub fn load(path: &Path) -> Result<Vec<u8>, LoadError> {
@@ -38,5 +40,5 @@ pub fn load(path: &Path) -> Result<Vec<u8>, LoadError> {
 
 fn check(bytes: &[u8]) -> Result<(), DecodeError> {
     let bundle = Bundle::parse(bytes)?;
-    (0..bundle.header().n_chunks).try_for_each(|index| bundle.chunk(index)?.check())
+    bundle.chunks().try_for_each(|chunk| chunk.check())
 }

@@ -1,43 +1,107 @@
-//! The order of anchors in a bundle: along the Morton curve, so that neighbours in the file are neighbours in space.
+//! Which anchors a bundle holds and in which order: tiers by importance, in each the Morton curve, cut into chunks.
 
-use super::quantise::Rows;
+use std::ops::Range;
 
-/// Sorts anchors by the interleaved bits of their lattice coordinates; anchors of one cell keep their order.
-pub(super) fn in_morton_order(rows: Rows) -> Rows {
-    let lowest: [i32; 3] =
-        core::array::from_fn(|axis| rows.lattice.iter().map(|cell| cell[axis]).min().unwrap_or_default());
-    let mut order: Vec<usize> = (0..rows.lattice.len()).collect();
-    order.sort_by_cached_key(|&anchor| {
-        morton(core::array::from_fn(|axis| rows.lattice[anchor][axis].abs_diff(lowest[axis])))
-    });
-    let n_channels = rows.n_channels;
-    Rows {
-        lattice: order.iter().map(|&anchor| rows.lattice[anchor]).collect(),
-        symbols: order
-            .iter()
-            .flat_map(|&anchor| &rows.symbols[anchor * n_channels..(anchor + 1) * n_channels])
-            .copied()
-            .collect(),
-        ..rows
+use super::WriteError;
+use super::lattice::LatticeFrame;
+use crate::scene::Scene;
+
+/// Most tiers of a bundle.
+const MAX_TIERS: usize = 8;
+
+/// The anchors of a scene as a bundle holds them.
+pub(super) struct Placement {
+    pub(super) frame: LatticeFrame,
+    /// `[n]` index in the scene, in file order.
+    pub(super) order: Vec<usize>,
+    /// `[n]` Morton codes, ascending within a tier.
+    pub(super) codes: Vec<u64>,
+    /// `[n]` bit k is set iff offset k is drawn; at least one is.
+    pub(super) drawn: Vec<u32>,
+    /// Anchors of each chunk, in file order.
+    pub(super) chunks: Vec<Range<usize>>,
+    /// `[n_tiers]` chunks up to and with each tier.
+    pub(super) tier_chunks: Vec<usize>,
+}
+
+impl Placement {
+    /// Leaves out anchors without a drawn offset and sorts the others: the more important ones into earlier tiers.
+    ///
+    /// * `importance`: `[n_anchors]` of the scene; without it there is one tier.
+    /// * `pruning_rates`: of the scene that ends with each tier: the share of anchors that it lacks.
+    ///
+    /// # Errors
+    /// [`WriteError::Tiers`], [`WriteError::Length`], [`WriteError::SharedCell`], and those of [`LatticeFrame::of`].
+    pub(super) fn of(
+        scene: &Scene<f32>,
+        importance: Option<&[f32]>,
+        pruning_rates: &[f32],
+        chunk_anchors: usize,
+    ) -> Result<Self, WriteError> {
+        let n_offsets = scene.shape.n_offsets;
+        let frame = LatticeFrame::of(&scene.anchors.lattice)?;
+        let drawn_bits = |anchor: usize| {
+            (0..n_offsets).fold(0, |bits, k| bits | (u32::from(scene.anchors.is_drawn(anchor * n_offsets + k)) << k))
+        };
+        let all_drawn: Vec<u32> = (0..scene.anchors.len()).map(drawn_bits).collect();
+        let code = |&anchor: &usize| frame.code(scene.anchors.lattice[anchor]);
+        let mut order: Vec<usize> = (0..scene.anchors.len()).filter(|&anchor| all_drawn[anchor] != 0).collect();
+        order.sort_by_cached_key(code);
+        if let Some(&[first, second]) = order.array_windows().find(|[a, b]| code(a) == code(b)) {
+            let cell = scene.anchors.lattice[first];
+            return Err(WriteError::SharedCell { anchors: [first, second], cell });
+        }
+        let tier_ends = match importance {
+            None => vec![order.len()],
+            Some(importance) => {
+                if importance.len() != scene.anchors.len() {
+                    let (needed, found) = (scene.anchors.len(), importance.len());
+                    return Err(WriteError::Length { array: "importance", needed, found });
+                }
+                // Stable: of equally important anchors the earlier on the curve comes first.
+                order.sort_by(|&a, &b| importance[b].total_cmp(&importance[a]));
+                tier_ends(order.len(), pruning_rates)?
+            }
+        };
+        let (mut chunks, mut tier_chunks, mut begin) = (Vec::new(), Vec::new(), 0);
+        for end in tier_ends {
+            order[begin..end].sort_by_cached_key(code);
+            // Chunks of a tier differ by one anchor at most.
+            let (n, n_chunks) = (end - begin, (end - begin).div_ceil(chunk_anchors));
+            chunks.extend((0..n_chunks).map(|i| begin + i * n / n_chunks..begin + (i + 1) * n / n_chunks));
+            tier_chunks.push(chunks.len());
+            begin = end;
+        }
+        let codes = order.iter().map(code).collect();
+        let drawn = order.iter().map(|&anchor| all_drawn[anchor]).collect();
+        Ok(Self { frame, order, codes, drawn, chunks, tier_chunks })
     }
 }
 
-/// Bits of x, y and z in turn, x lowest.
-fn morton(cell: [u32; 3]) -> u128 {
-    (0..32).fold(0, |code, bit| {
-        (0..3).fold(code, |code, axis| code | (u128::from((cell[axis] >> bit) & 1) << (3 * bit + axis)))
-    })
+/// Anchors up to and with each tier.
+fn tier_ends(n_anchors: usize, pruning_rates: &[f32]) -> Result<Vec<usize>, WriteError> {
+    let falling = pruning_rates.iter().is_sorted_by(|a, b| a >= b);
+    let inside = pruning_rates.iter().all(|rate| (0.0..1.0).contains(rate));
+    if pruning_rates.last() != Some(&0.0) || pruning_rates.len() > MAX_TIERS || !falling || !inside {
+        return Err(WriteError::Tiers { found: pruning_rates.to_vec(), most: MAX_TIERS });
+    }
+    Ok(pruning_rates.iter().map(|&rate| ((1.0 - f64::from(rate)) * n_anchors as f64).round() as usize).collect())
 }
 
 #[cfg(test)]
 mod tests {
-    use super::morton;
+    use super::tier_ends;
 
     #[test]
-    fn morton_interleaves_x_lowest() {
-        assert_eq!(morton([1, 0, 0]), 0b001, "x");
-        assert_eq!(morton([0, 1, 0]), 0b010, "y");
-        assert_eq!(morton([0, 0, 1]), 0b100, "z");
-        assert_eq!(morton([3, 0, 2]), 0b101_001, "two bits an axis");
+    fn tiers_end_where_their_rates_say() {
+        assert_eq!(tier_ends(10, &[0.4, 0.25, 0.0]), Ok(vec![6, 8, 10]), "7.5 rounds up");
+        assert_eq!(tier_ends(0, &[0.5, 0.0]), Ok(vec![0, 0]), "no anchors");
+    }
+
+    #[test]
+    fn rates_must_fall_to_zero() {
+        for rates in [&[0.4_f32, 0.5, 0.0][..], &[0.4], &[], &[1.0, 0.0], &[f32::NAN, 0.0], &[0.0; 9]] {
+            assert!(tier_ends(10, rates).is_err(), "{rates:?}");
+        }
     }
 }

@@ -1,10 +1,12 @@
 //! From trained floats to integer symbols.
 
-use super::{ChannelName, WriteError};
-use crate::scene::Scene;
+use pocketsplat_core::context::Context;
+use rayon::prelude::*;
 
-/// Largest magnitude of a lattice coordinate: f32 holds every integer there, and a chunk may span it twice.
-const MAX_LATTICE: i32 = (1 << 22) - 1;
+use super::WriteError;
+use super::channels::{ChannelName, ContextWork, GROUPS};
+use super::order::Placement;
+use crate::scene::Scene;
 
 /// Distance between neighbouring values of each kind of channel; the value of a symbol is `symbol · step`.
 ///
@@ -25,86 +27,114 @@ impl Default for QuantisationSteps {
     }
 }
 
-impl QuantisationSteps {
-    /// The step of channel `channel`.
-    fn of(&self, name: ChannelName) -> f32 {
-        match name {
-            ChannelName::Feature(_) => self.feature,
-            ChannelName::LogScale(_) => self.log_scale,
-            ChannelName::Offset(..) => self.offset,
-        }
-    }
+/// Where an anchor's steps come from.
+#[derive(Clone, Copy)]
+pub(super) enum StepSource<'c> {
+    /// The same for all: of features, log-scales, offsets.
+    Fixed([f32; 3]),
+    /// The context model, anchor by anchor.
+    Context(&'c Context<'c>),
 }
 
-/// All anchors as integers.
+/// The anchors of a bundle as integers, in file order.
 pub(super) struct Rows {
     pub(super) n_channels: usize,
-    /// `[n_anchors]`.
+    /// `[n]`.
     pub(super) lattice: Vec<[i32; 3]>,
-    /// `[n_anchors, n_channels]`.
+    /// `[n]` bit k is set iff offset k is drawn.
+    pub(super) drawn: Vec<u32>,
+    /// `[n, n_channels]`; those of offsets that are not drawn are 0.
     pub(super) symbols: Vec<i16>,
-    /// `[n_channels]` step of each channel.
-    pub(super) steps: Vec<f32>,
-}
-
-/// A run of anchors as integers.
-#[derive(Clone, Copy)]
-pub(super) struct RowSlice<'r> {
-    pub(super) lattice: &'r [[i32; 3]],
-    pub(super) symbols: &'r [i16],
+    /// `[n]` steps of features, log-scales, offsets.
+    pub(super) steps: Vec<[f32; 3]>,
 }
 
 impl Rows {
-    /// The anchors in runs of `n`.
-    pub(super) fn chunks(&self, n: usize) -> impl Iterator<Item = RowSlice<'_>> {
-        let symbols = self.symbols.chunks(n * self.n_channels);
-        self.lattice.chunks(n).zip(symbols).map(|(lattice, symbols)| RowSlice { lattice, symbols })
-    }
-
-    /// The symbols of one channel over all anchors.
-    pub(super) fn channel(&self, channel: usize) -> impl Iterator<Item = i16> {
-        self.symbols.iter().skip(channel).step_by(self.n_channels).copied()
+    /// The symbols of anchor `anchor`.
+    pub(super) fn symbols_of(&self, anchor: usize) -> &[i16] {
+        &self.symbols[anchor * self.n_channels..][..self.n_channels]
     }
 }
 
-/// Rounds every trained value to its nearest symbol, ties to even.
-pub(super) fn quantise(scene: &Scene<f32>, steps: &QuantisationSteps) -> Result<Rows, WriteError> {
-    for (what, step) in
-        [("feature step", steps.feature), ("log-scale step", steps.log_scale), ("offset step", steps.offset)]
-    {
-        if !(step.is_finite() && step > 0.0) {
-            return Err(WriteError::NotPositive { what, value: step.into() });
-        }
-    }
-    let shape = &scene.shape;
-    let n_anchors = scene.anchors.len();
-    let n_channels = shape.values_per_anchor();
+/// Checks that the scene's arrays have the lengths its shape calls for.
+pub(super) fn check_lengths(scene: &Scene<f32>) -> Result<(), WriteError> {
+    let (shape, anchors, n) = (&scene.shape, &scene.anchors, scene.anchors.len());
     let arrays = [
-        ("features", &scene.anchors.features, shape.feature_dim),
-        ("log-scales", &scene.anchors.log_scales, 6),
-        ("offsets", &scene.anchors.offsets, 3 * shape.n_offsets),
+        ("features", anchors.features.len(), shape.feature_dim),
+        ("log-scales", anchors.log_scales.len(), 6),
+        ("offsets", anchors.offsets.len(), 3 * shape.n_offsets),
+        ("masks", anchors.mask_logits.len(), shape.n_offsets),
     ];
-    for (array, values, width) in arrays {
-        let needed = n_anchors * width;
-        if values.len() != needed {
-            return Err(WriteError::Length { array, needed, found: values.len() });
+    for (array, found, width) in arrays {
+        let needed = n * width;
+        if found != needed {
+            return Err(WriteError::Length { array, needed, found });
         }
     }
-    for (anchor, cell) in scene.anchors.lattice.iter().enumerate() {
-        if let Some(&found) = cell.iter().find(|c| c.unsigned_abs() > MAX_LATTICE.unsigned_abs()) {
-            return Err(WriteError::BeyondLattice { anchor, found, limit: MAX_LATTICE });
+    Ok(())
+}
+
+/// Rounds every value that is coded to its nearest symbol, ties to even.
+///
+/// # Errors
+/// [`WriteError::NotFinite`], [`WriteError::BeyondSymbols`], [`WriteError::NotPositive`].
+pub(super) fn quantise(scene: &Scene<f32>, placement: &Placement, steps: StepSource<'_>) -> Result<Rows, WriteError> {
+    if let StepSource::Fixed(steps) = steps {
+        for (what, step) in ["feature step", "log-scale step", "offset step"].into_iter().zip(steps) {
+            if !(step.is_finite() && step > 0.0) {
+                return Err(WriteError::NotPositive { what, value: step.into() });
+            }
         }
     }
-    let names: Vec<ChannelName> = (0..n_channels).map(|channel| ChannelName::of(shape, channel)).collect();
-    let mut symbols = Vec::with_capacity(n_anchors * n_channels);
-    for anchor in 0..n_anchors {
-        let values = arrays.iter().flat_map(|&(_, values, width)| &values[anchor * width..(anchor + 1) * width]);
-        for (&value, &channel) in values.zip(&names) {
-            symbols.push(symbol(value, steps.of(channel), anchor, channel)?);
+    let n_channels = scene.shape.values_per_anchor();
+    let lattice: Vec<[i32; 3]> = placement.order.iter().map(|&anchor| scene.anchors.lattice[anchor]).collect();
+    let parts = placement.chunks.par_iter().map(|chunk| {
+        let mut work = ContextWork::default();
+        let mut rows = (Vec::with_capacity(chunk.len() * n_channels), Vec::with_capacity(chunk.len()));
+        for row in chunk.clone() {
+            let steps = match steps {
+                StepSource::Fixed(steps) => steps,
+                StepSource::Context(context) => {
+                    let steps = work.enter(context, lattice[row]);
+                    GROUPS.map(|group| steps.value(group))
+                }
+            };
+            push_symbols(scene, placement.order[row], placement.drawn[row], steps, &mut rows.0)?;
+            rows.1.push(steps);
         }
+        Ok(rows)
+    });
+    let mut rows = Rows {
+        n_channels,
+        lattice: Vec::new(),
+        drawn: placement.drawn.clone(),
+        symbols: Vec::new(),
+        steps: Vec::new(),
+    };
+    for (symbols, steps) in parts.collect::<Result<Vec<_>, WriteError>>()? {
+        rows.symbols.extend(symbols);
+        rows.steps.extend(steps);
     }
-    let steps = names.iter().map(|&name| steps.of(name)).collect();
-    Ok(Rows { n_channels, lattice: scene.anchors.lattice.clone(), symbols, steps })
+    Ok(Rows { lattice, ..rows })
+}
+
+/// Appends the symbols of one anchor of the scene.
+fn push_symbols(
+    scene: &Scene<f32>,
+    anchor: usize,
+    drawn: u32,
+    steps: [f32; 3],
+    symbols: &mut Vec<i16>,
+) -> Result<(), WriteError> {
+    let (shape, anchors) = (&scene.shape, &scene.anchors);
+    let arrays =
+        [(&anchors.features, shape.feature_dim), (&anchors.log_scales, 6), (&anchors.offsets, 3 * shape.n_offsets)];
+    let values = arrays.into_iter().flat_map(|(values, width)| &values[anchor * width..][..width]);
+    for (channel, &value) in values.enumerate() {
+        let channel = ChannelName::of(shape, channel);
+        symbols.push(if channel.is_coded(drawn) { symbol(value, steps[channel.group()], anchor, channel)? } else { 0 });
+    }
+    Ok(())
 }
 
 fn symbol(value: f32, step: f32, anchor: usize, channel: ChannelName) -> Result<i16, WriteError> {

@@ -1,95 +1,160 @@
 //! Where the bytes of a bundle went.
 
-use pocketsplat_core::entropy::{FREQUENCY_TOTAL, SymbolModel};
-use pocketsplat_core::{Bundle, DecodeError};
+use pocketsplat_core::bundle::AnchorSite;
+use pocketsplat_core::{Bundle, DecodeError, SectionKind};
 
-/// Bytes of a bundle by what they hold, and bits that its tables promise.
+use super::PartBits;
+use super::chunk::{ChunkRows, Models};
+
+/// Bytes of a bundle by what they hold; all of them together are the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct SizeReport {
     /// Anchors of the scene.
     pub n_anchors: usize,
-    /// The whole file.
+    /// Offsets that are drawn.
+    pub n_drawn_offsets: usize,
+    /// The whole file, up to the last tier that it has.
     pub total: usize,
     /// Header with the section table.
     pub header: usize,
-    /// f16 weights.
+    /// Weights of the heads.
     pub heads: usize,
-    /// Quantisation and frequency tables.
+    /// Frame and frequencies of the lattice trie.
+    pub lattice_model: usize,
+    /// Frequencies of the masks.
+    pub mask_model: usize,
+    /// Static tables.
     pub tables: usize,
-    /// Records of the chunks.
+    /// Network and levels of the context model.
+    pub context_weights: usize,
+    /// Signs of the context model's grid.
+    pub grid: usize,
+    /// Measures of the tiers.
+    pub manifest: usize,
+    /// Ends of the tiers, records of the chunks.
     pub directory: usize,
-    /// Fixed fields of the chunks and packed lattice offsets.
-    pub lattice: usize,
-    /// ANS words.
-    pub symbols: usize,
-    /// Bits of the features by their tables' frequencies, before ANS rounds them to words.
-    pub feature_bits: f64,
-    /// Bits of the log-scales, likewise.
-    pub log_scale_bits: f64,
-    /// Bits of the offsets, likewise.
-    pub offset_bits: f64,
+    /// Sections that this version does not know.
+    pub other: usize,
+    /// ANS streams: what the models leave of positions, masks and channels.
+    pub streams: usize,
+    /// Bits of the streams by the models' own frequencies, before ANS rounds each of them to words.
+    pub ideal: PartBits,
+}
+
+/// One line of the account.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct SizePart {
+    /// What it is.
+    pub name: &'static str,
+    /// Its bytes; those of the streams' parts are the ideal ones, and [`SizeReport::states`] what comes on top.
+    pub bytes: f64,
+    /// The same over the anchors of the scene.
+    pub bits_per_anchor: f64,
+    /// It belongs to the container: no anchor's data, but what makes them a file.
+    pub container: bool,
 }
 
 impl SizeReport {
-    /// Adds up the parts of `bundle`; decodes all of it.
+    /// Adds up the parts of `bundle`; decodes all of it, and codes it again in mind.
     ///
     /// # Errors
     /// [`DecodeError`] naming a damaged chunk.
     pub fn of(bundle: &Bundle<'_>) -> Result<Self, DecodeError> {
-        let header = bundle.header();
-        let heads = bundle.heads();
-        let halves: usize = [heads.opacity, heads.covariance, heads.colour]
-            .iter()
-            .map(|head| head.w1.len() + head.b1.len() + head.w2.len() + head.b2.len())
-            .sum();
-        let tables = bundle.tables();
-        let table_bytes: usize = (0..tables.len()).filter_map(|i| tables.get(i)).map(|t| 16 + 2 * t.n_symbols()).sum();
         let mut report = Self {
-            n_anchors: header.n_anchors as usize,
-            total: header.file_len as usize,
-            header: pocketsplat_core::bundle::HEADER_LEN,
-            heads: 2 * halves,
-            tables: 4 + 2 * tables.n_channels() + table_bytes,
-            directory: 40 * header.n_chunks as usize,
+            n_anchors: bundle.n_anchors() as usize,
+            header: bundle.header().header_len.into(),
             ..Self::default()
         };
-        let first_log_scale = usize::from(header.feature_dim);
-        let costs: Vec<_> = tables.of_channels().collect();
-        for chunk in bundle.chunks() {
-            let n_anchors = usize::from(chunk.n_anchors());
-            let mut lattice = vec![[0; 3]; n_anchors];
-            let mut symbols = vec![0; n_anchors * costs.len()];
-            chunk.decode_symbols(tables, &mut lattice, &mut symbols)?;
-            let words = chunk.anchors(tables)?.n_word_bytes();
-            report.symbols += words;
-            report.lattice += chunk.n_bytes() - words;
-            for row in symbols.chunks_exact(costs.len()) {
-                for (channel, (&symbol, table)) in row.iter().zip(&costs).enumerate() {
-                    let bits = symbol_bits(table, symbol);
-                    match channel.checked_sub(first_log_scale) {
-                        None => report.feature_bits += bits,
-                        Some(0..6) => report.log_scale_bits += bits,
-                        Some(_) => report.offset_bits += bits,
-                    }
-                }
-            }
+        for section in bundle.sections() {
+            let part = match section.kind {
+                SectionKind::Heads => &mut report.heads,
+                SectionKind::Lattice => &mut report.lattice_model,
+                SectionKind::Masks => &mut report.mask_model,
+                SectionKind::Tables => &mut report.tables,
+                SectionKind::Context => &mut report.context_weights,
+                SectionKind::Manifest => &mut report.manifest,
+                SectionKind::Directory => &mut report.directory,
+                // Counted below, as far as it is there.
+                SectionKind::Chunks => continue,
+                _ => &mut report.other,
+            };
+            *part += section.len as usize;
         }
+        if let Some(context) = bundle.context() {
+            let n_rows: usize = context.levels().map(|level| level.n_rows as usize).sum();
+            report.grid = n_rows.div_ceil(2);
+            report.context_weights -= report.grid;
+        }
+        report.add_chunks(bundle)?;
+        report.total = report.fixed_bytes() + report.streams;
         Ok(report)
     }
 
-    /// Bytes of the chunks per anchor, directory included; what more anchors would cost.
-    pub fn bytes_per_anchor(&self) -> f64 {
-        (self.directory + self.lattice + self.symbols) as f64 / self.n_anchors.max(1) as f64
+    fn add_chunks(&mut self, bundle: &Bundle<'_>) -> Result<(), DecodeError> {
+        let coders = Models::of(bundle);
+        let mut words = vec![0; bundle.anchor_scratch_words()];
+        let mut decoders = bundle.anchor_models(&mut words)?;
+        for chunk in bundle.chunks() {
+            let n = usize::from(chunk.n_anchors());
+            let mut sites = vec![AnchorSite::default(); n];
+            let mut symbols = vec![0; n * bundle.header().n_channels()];
+            chunk.decode_symbols(&mut decoders, &mut sites, &mut symbols)?;
+            let lattice: Vec<[i32; 3]> = sites.iter().map(|site| site.lattice).collect();
+            let drawn: Vec<u32> = sites.iter().map(|site| site.mask).collect();
+            self.n_drawn_offsets += drawn.iter().map(|drawn| drawn.count_ones() as usize).sum::<usize>();
+            self.streams += chunk.n_bytes();
+            self.ideal += coders.slots(ChunkRows { lattice: &lattice, drawn: &drawn, symbols: &symbols }).bits;
+        }
+        Ok(())
     }
-}
 
-/// Information content of `symbol`, with the 16 raw bits of an escaped one.
-fn symbol_bits(table: &pocketsplat_core::bundle::Table<'_>, symbol: i16) -> f64 {
-    let bits = |frequency: u16| (f64::from(FREQUENCY_TOTAL) / f64::from(frequency)).log2();
-    let entry = usize::try_from(i32::from(symbol) - i32::from(table.min_symbol)).ok();
-    let start = |entry: usize| entry.checked_sub(1).and_then(|before| table.ends().nth(before)).unwrap_or(0);
-    match entry.and_then(|entry| table.ends().nth(entry).map(|end| end - start(entry))) {
-        Some(frequency) if frequency > 0 => bits(frequency),
-        _ => bits(table.slot(FREQUENCY_TOTAL - 1).frequency) + 16.0,
+    fn fixed_bytes(&self) -> usize {
+        let models = self.heads + self.lattice_model + self.mask_model + self.tables + self.context_weights + self.grid;
+        self.header + models + self.manifest + self.directory + self.other
+    }
+
+    /// Bytes of the streams beyond their ideal length: the coder's states and its rounding.
+    pub fn states(&self) -> f64 {
+        self.streams as f64 - self.ideal.total() / 8.0
+    }
+
+    /// The account, line by line.
+    pub fn parts(&self) -> Vec<SizePart> {
+        let PartBits { positions, masks, features, log_scales, offsets } = self.ideal;
+        let bytes = |n: usize| n as f64;
+        [
+            ("heads", bytes(self.heads), false),
+            ("lattice model", bytes(self.lattice_model), false),
+            ("positions", positions / 8.0, false),
+            ("mask model", bytes(self.mask_model), false),
+            ("masks", masks / 8.0, false),
+            ("tables", bytes(self.tables), false),
+            ("context weights", bytes(self.context_weights), false),
+            ("grid", bytes(self.grid), false),
+            ("features", features / 8.0, false),
+            ("log-scales", log_scales / 8.0, false),
+            ("offsets", offsets / 8.0, false),
+            ("header", bytes(self.header), true),
+            ("manifest", bytes(self.manifest), true),
+            ("directory", bytes(self.directory), true),
+            ("other sections", bytes(self.other), true),
+            ("states", self.states(), true),
+        ]
+        .map(|(name, bytes, container)| {
+            let bits_per_anchor = 8.0 * bytes / self.n_anchors.max(1) as f64;
+            SizePart { name, bytes, bits_per_anchor, container }
+        })
+        .to_vec()
+    }
+
+    /// Bytes of the container: header, manifest, directory, unknown sections, states.
+    pub fn container(&self) -> f64 {
+        self.parts().iter().filter(|part| part.container).map(|part| part.bytes).sum()
+    }
+
+    /// Bits an anchor that positions take with everything that finds them: model, directory, boxes.
+    pub fn position_bits_per_anchor(&self) -> f64 {
+        let bytes = self.ideal.positions / 8.0 + (self.lattice_model + self.directory) as f64;
+        8.0 * bytes / self.n_anchors.max(1) as f64
     }
 }

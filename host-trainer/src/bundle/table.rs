@@ -3,18 +3,19 @@
 mod draft;
 mod histogram;
 
-pub(super) use draft::{Place, TableDraft};
+pub(super) use draft::TableDraft;
 use histogram::Histogram;
+use pocketsplat_core::bundle::Tables;
 
+use super::channels::ChannelName;
 use super::quantise::Rows;
+use crate::scene::ModelShape;
 
 /// The tables of a bundle and which channel uses which.
 pub(super) struct TableSet {
     pub(super) tables: Vec<TableDraft>,
     /// `[n_channels]`.
     pub(super) channel_tables: Vec<usize>,
-    /// Offsets of an anchor; their channels are the last.
-    pub(super) n_offsets: usize,
 }
 
 /// Channels that share a table.
@@ -30,11 +31,16 @@ impl TableSet {
     /// Counts the symbols of every channel and merges channels of equal step as long as the file gets shorter.
     ///
     /// Greedy: each round merges the pair that saves most. `O(n_channels²)` trial merges.
-    pub(super) fn build(rows: &Rows, n_offsets: usize) -> Self {
+    ///
+    /// * `steps`: of features, log-scales, offsets.
+    pub(super) fn build(rows: &Rows, shape: &ModelShape, steps: [f32; 3]) -> Self {
         let mut groups: Vec<Group> = (0..rows.n_channels)
             .map(|channel| {
-                let histogram = Histogram::count(rows.channel(channel));
-                Group { step: rows.steps[channel], channels: vec![channel], bits: histogram.trimmed().bits, histogram }
+                let name = ChannelName::of(shape, channel);
+                let coded = (0..rows.drawn.len()).filter(|&anchor| name.is_coded(rows.drawn[anchor]));
+                let histogram = Histogram::count(coded.map(|anchor| rows.symbols_of(anchor)[channel]));
+                let step = steps[name.group()];
+                Group { step, channels: vec![channel], bits: histogram.trimmed().bits, histogram }
             })
             .collect();
         merge_while_it_saves(&mut groups);
@@ -46,12 +52,47 @@ impl TableSet {
             }
         }
         let tables = groups.iter().map(|group| TableDraft::new(group.step, &group.histogram)).collect();
-        Self { tables, channel_tables, n_offsets }
+        Self { tables, channel_tables }
+    }
+
+    /// The tables of a bundle.
+    pub(super) fn of(tables: &Tables<'_>) -> Self {
+        let drafts = (0..tables.len()).filter_map(|table| tables.get(table)).map(|table| TableDraft {
+            step: table.step,
+            min_symbol: table.min_symbol,
+            bounds: table.bounds().collect(),
+        });
+        let of_channel = (0..tables.n_channels()).filter_map(|channel| tables.table_of(channel));
+        Self { tables: drafts.collect(), channel_tables: of_channel.collect() }
     }
 
     /// The table of channel `channel`.
     pub(super) fn of_channel(&self, channel: usize) -> &TableDraft {
         &self.tables[self.channel_tables[channel]]
+    }
+}
+
+impl TableSet {
+    /// The section's bytes.
+    pub(super) fn section(&self) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let u16_bytes = |x: usize| (x as u16).to_le_bytes();
+        bytes.extend(u16_bytes(self.tables.len()));
+        bytes.extend(u16_bytes(self.channel_tables.len()));
+        bytes.extend(self.channel_tables.iter().flat_map(|&table| u16_bytes(table)));
+        let mut offset = bytes.len() + 4 * self.tables.len();
+        for table in &self.tables {
+            bytes.extend((offset as u32).to_le_bytes());
+            offset += 12 + 2 * table.bounds.len();
+        }
+        for table in &self.tables {
+            // The origin is 0: symbol 0 is the value 0, and channels of equal step can share a table.
+            bytes.extend([0.0, table.step].iter().flat_map(|x| x.to_le_bytes()));
+            bytes.extend(table.min_symbol.to_le_bytes());
+            bytes.extend(u16_bytes(table.n_symbols()));
+            bytes.extend(table.bounds.iter().flat_map(|bound| bound.to_le_bytes()));
+        }
+        bytes
     }
 }
 

@@ -6,6 +6,7 @@ use anyhow::{Context, Result, bail};
 use pocketsplat::camera::Camera;
 use pocketsplat::dataset::{Background, Capture, Normalisation, View};
 use pocketsplat_core::Bundle;
+use pocketsplat_core::bundle::AnchorSite;
 
 use super::capture::{CaptureArgs, CaptureOptions};
 
@@ -21,8 +22,19 @@ impl BundleFile {
         Ok(Self { path: path.to_owned(), bytes })
     }
 
+    /// Checks the file; says so when it is cut at the end of a tier.
     pub(crate) fn parse(&self) -> Result<Bundle<'_>> {
-        Bundle::parse(&self.bytes).with_context(|| format!("{} can not be used", self.path.display()))
+        let bundle = Bundle::parse(&self.bytes).with_context(|| format!("{} can not be used", self.path.display()))?;
+        let (n_tiers, n_written) = (bundle.n_tiers(), bundle.header().n_tiers);
+        if n_tiers < n_written {
+            eprintln!(
+                "{} is cut after tier {n_tiers} of {n_written}: a smaller scene of {} of {} anchors",
+                self.path.display(),
+                bundle.n_anchors(),
+                bundle.header().n_anchors
+            );
+        }
+        Ok(bundle)
     }
 
     /// Fills what the command line left open with what the bundle was trained with, and refuses what contradicts it.
@@ -59,11 +71,13 @@ impl BundleFile {
     pub(crate) fn decode_all(&self, bundle: &Bundle<'_>) -> Result<()> {
         let header = bundle.header();
         let n_chunk = usize::from(header.max_chunk_anchors);
-        let mut lattice = vec![[0; 3]; n_chunk];
+        let mut words = vec![0; bundle.anchor_scratch_words()];
+        let mut models = bundle.anchor_models(&mut words)?;
+        let mut sites = vec![AnchorSite::default(); n_chunk];
         let mut symbols = vec![0i16; n_chunk * header.n_channels()];
         for chunk in bundle.chunks() {
             let n = usize::from(chunk.n_anchors());
-            chunk.decode_symbols(bundle.tables(), &mut lattice[..n], &mut symbols[..n * header.n_channels()])?;
+            chunk.decode_symbols(&mut models, &mut sites[..n], &mut symbols[..n * header.n_channels()])?;
         }
         Ok(())
     }

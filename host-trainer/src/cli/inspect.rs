@@ -3,13 +3,15 @@
 use std::path::PathBuf;
 
 use anyhow::Result;
-use pocketsplat::bundle::SizeReport;
+use pocketsplat::bundle::annotate::annotate;
+use pocketsplat::bundle::{SizePart, SizeReport};
+use pocketsplat_core::Bundle;
 use serde::Serialize;
 
 use super::bundle::BundleFile;
 use super::output;
 
-/// Show a bundle's header, dimensions, and its bytes part by part.
+/// Show a bundle's header, its tiers, and its bytes part by part.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// The bundle.
@@ -17,17 +19,27 @@ pub(crate) struct Args {
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
+    /// Print the file byte by byte with the meaning of each, long arrays abbreviated.
+    #[arg(long, conflicts_with = "json")]
+    hexdump: bool,
+    /// Lines of an array in the dump at most.
+    #[arg(long, value_name = "N", default_value_t = 4, requires = "hexdump")]
+    lines: usize,
 }
 
-/// Header and sizes of a bundle.
+/// What a bundle is.
 #[derive(Serialize)]
-struct Inspection {
+struct Facts {
     format_version: u16,
-    n_anchors: u32,
+    coder: &'static str,
+    n_anchors: usize,
     n_chunks: u32,
     max_chunk_anchors: u16,
+    n_tiers: u8,
+    n_tiers_written: u8,
     feature_dim: u16,
     n_offsets: u16,
+    drawn_offsets_per_anchor: f64,
     view_direction: bool,
     view_distance: bool,
     dilation_compensation: bool,
@@ -37,54 +49,148 @@ struct Inspection {
     normalisation_centre: [f64; 3],
     normalisation_scale: f64,
     total_bytes: usize,
-    header_bytes: usize,
-    heads_bytes: usize,
-    tables_bytes: usize,
-    directory_bytes: usize,
-    lattice_bytes: usize,
-    symbols_bytes: usize,
     bytes_per_anchor: f64,
-    lattice_bits_per_anchor: f64,
-    feature_bits_per_anchor: f64,
-    log_scale_bits_per_anchor: f64,
-    offset_bits_per_anchor: f64,
-    symbols_over_estimate: f64,
+    container_percent: f64,
+    stream_bytes: usize,
+    stream_ideal_bytes: f64,
+    streams_over_ideal_percent: f64,
+    position_bits_per_anchor: f64,
+}
+
+/// The scene of one tier and those before it.
+#[derive(Serialize)]
+struct TierFacts {
+    tier: u8,
+    n_anchors: u32,
+    n_chunks: u32,
+    /// Length of the file cut here.
+    bytes: u32,
+    psnr_db: Option<f32>,
+    n_views: u16,
+    n_cameras: u16,
+    max_decoded_anchors: u32,
+    max_visible_anchors: u32,
+    max_splats: u32,
+    max_strip_splats: [u32; 4],
+    max_strip_pairs: [u32; 4],
+    max_head_kilo_macs: u32,
+    max_kilo_pixels: u32,
+}
+
+#[derive(Serialize)]
+struct Inspection {
+    #[serde(flatten)]
+    facts: Facts,
+    parts: Vec<SizePart>,
+    tiers: Vec<TierFacts>,
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
     let file = BundleFile::read(&args.bundle)?;
     let bundle = file.parse()?;
-    let (header, size) = (bundle.header(), SizeReport::of(&bundle)?);
-    let per_anchor = |bits: f64| bits / size.n_anchors.max(1) as f64;
-    let estimate_bits = size.feature_bits + size.log_scale_bits + size.offset_bits;
-    let inspection = Inspection {
+    if args.hexdump {
+        return output::print_text(&annotate(&file.bytes, args.lines)?);
+    }
+    let size = SizeReport::of(&bundle)?;
+    let inspection = Inspection { facts: facts(&bundle, &size), parts: size.parts(), tiers: tiers(&bundle) };
+    if args.json {
+        return output::print(&inspection, true);
+    }
+    output::print(&inspection.facts, false)?;
+    output::print_text(&format!("\n{}\n{}", parts_table(&inspection.parts, &size), tiers_table(&inspection.tiers)))
+}
+
+fn facts(bundle: &Bundle<'_>, size: &SizeReport) -> Facts {
+    let header = bundle.header();
+    let effects = header.features.effects;
+    let anchors = size.n_anchors.max(1) as f64;
+    let ideal_bytes = size.ideal.total() / 8.0;
+    Facts {
         format_version: pocketsplat_core::bundle::VERSION,
-        n_anchors: header.n_anchors,
-        n_chunks: header.n_chunks,
+        coder: if header.features.context { "context" } else { "static" },
+        n_anchors: size.n_anchors,
+        n_chunks: bundle.n_chunks(),
         max_chunk_anchors: header.max_chunk_anchors,
+        n_tiers: bundle.n_tiers(),
+        n_tiers_written: header.n_tiers,
         feature_dim: header.feature_dim,
         n_offsets: header.n_offsets,
-        view_direction: header.effects.view_direction,
-        view_distance: header.effects.view_distance,
-        dilation_compensation: header.effects.dilation_compensation,
+        drawn_offsets_per_anchor: size.n_drawn_offsets as f64 / anchors,
+        view_direction: effects.view_direction,
+        view_distance: effects.view_distance,
+        dilation_compensation: effects.dilation_compensation,
         training_px: header.training_px,
         background_rgb8: header.background,
         voxel_size: header.voxel_size,
         normalisation_centre: header.normalisation_centre,
         normalisation_scale: header.normalisation_scale,
         total_bytes: size.total,
-        header_bytes: size.header,
-        heads_bytes: size.heads,
-        tables_bytes: size.tables,
-        directory_bytes: size.directory,
-        lattice_bytes: size.lattice,
-        symbols_bytes: size.symbols,
-        bytes_per_anchor: size.bytes_per_anchor(),
-        lattice_bits_per_anchor: per_anchor(8.0 * size.lattice as f64),
-        feature_bits_per_anchor: per_anchor(size.feature_bits),
-        log_scale_bits_per_anchor: per_anchor(size.log_scale_bits),
-        offset_bits_per_anchor: per_anchor(size.offset_bits),
-        symbols_over_estimate: 8.0 * size.symbols as f64 / estimate_bits.max(1.0),
+        bytes_per_anchor: size.total as f64 / anchors,
+        container_percent: 100.0 * size.container() / size.total as f64,
+        stream_bytes: size.streams,
+        stream_ideal_bytes: ideal_bytes,
+        streams_over_ideal_percent: 100.0 * (size.streams as f64 / ideal_bytes.max(1.0) - 1.0),
+        position_bits_per_anchor: size.position_bits_per_anchor(),
+    }
+}
+
+fn tiers(bundle: &Bundle<'_>) -> Vec<TierFacts> {
+    let chunks_start = bundle.sections().last().map_or(0, |section| section.offset);
+    let tier = |tier: u8| {
+        let (content, measures) = (bundle.tier(tier)?, bundle.measures(tier)?);
+        Some(TierFacts {
+            tier,
+            n_anchors: content.n_anchors,
+            n_chunks: content.n_chunks,
+            bytes: chunks_start + content.end,
+            psnr_db: measures.psnr_db,
+            n_views: measures.n_views,
+            n_cameras: measures.n_cameras,
+            max_decoded_anchors: measures.max_decoded_anchors,
+            max_visible_anchors: measures.max_visible_anchors,
+            max_splats: measures.max_splats,
+            max_strip_splats: measures.max_strip_splats,
+            max_strip_pairs: measures.max_strip_pairs,
+            max_head_kilo_macs: measures.max_head_kilo_macs,
+            max_kilo_pixels: measures.max_kilo_pixels,
+        })
     };
-    output::print(&inspection, args.json)
+    (0..bundle.n_tiers()).filter_map(tier).collect()
+}
+
+/// The account of bytes, payload before container.
+fn parts_table(parts: &[SizePart], size: &SizeReport) -> String {
+    let line = |name: &str, bytes: f64| {
+        let (bits, share) = (8.0 * bytes / size.n_anchors.max(1) as f64, 100.0 * bytes / size.total as f64);
+        format!("{name:<22}{bytes:>12.1}{bits:>12.3}{share:>9.2}\n")
+    };
+    let mut text = format!("{:<22}{:>12}{:>12}{:>9}\n", "part", "bytes", "bits/anchor", "%");
+    for container in [false, true] {
+        for part in parts.iter().filter(|part| part.container == container && part.bytes != 0.0) {
+            text += &line(part.name, part.bytes);
+        }
+        let sum = parts.iter().filter(|part| part.container == container).map(|part| part.bytes).sum();
+        text += &line(if container { "= container" } else { "= payload" }, sum);
+    }
+    text + &line("= file", size.total as f64)
+}
+
+/// A line a tier: the file cut there, and what it was measured to take.
+fn tiers_table(tiers: &[TierFacts]) -> String {
+    let mut text = format!(
+        "{:<6}{:>10}{:>10}{:>9}{:>10}{:>10}{:>10}{:>12}{:>12}\n",
+        "tiers", "anchors", "bytes", "PSNR", "decoded", "visible", "splats", "tile pairs", "head kMACs"
+    );
+    for tier in tiers {
+        let psnr = tier.psnr_db.map_or_else(|| "-".to_owned(), |psnr| format!("{psnr:.2}"));
+        text += &format!("{:<6}{:>10}{:>10}{psnr:>9}", format!("0..={}", tier.tier), tier.n_anchors, tier.bytes);
+        if tier.n_cameras == 0 {
+            text += "  not measured\n";
+            continue;
+        }
+        let [decoded, visible, splats] = [tier.max_decoded_anchors, tier.max_visible_anchors, tier.max_splats];
+        let [pairs, ..] = tier.max_strip_pairs;
+        text += &format!("{decoded:>10}{visible:>10}{splats:>10}{pairs:>12}{:>12}\n", tier.max_head_kilo_macs);
+    }
+    text
 }

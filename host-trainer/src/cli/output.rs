@@ -55,6 +55,11 @@ pub(crate) fn print<T: serde::Serialize>(report: &T, json: bool) -> Result<()> {
         let width = fields.keys().map(String::len).max().unwrap_or(0);
         fields.iter().map(|(name, value)| format!("{name:width$}  {}\n", plain(value))).collect()
     };
+    print_text(&text)
+}
+
+/// Prints `text` to stdout.
+pub(crate) fn print_text(text: &str) -> Result<()> {
     match std::io::stdout().write_all(text.as_bytes()) {
         // The reader has seen enough, as `head` does.
         Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),

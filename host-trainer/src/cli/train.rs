@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result, bail};
-use pocketsplat::bundle::{self, BundleInfo, QuantisationSteps};
+use pocketsplat::bundle::{self, BundleInfo, QuantisationSteps, WriteOptions};
 use pocketsplat::dataset::{Background, Capture};
 use pocketsplat::scene::Scene;
 use pocketsplat::train::run::{Ending, Interval, RunError, RunFolder};
@@ -213,5 +213,6 @@ fn encode(scene: &Scene<f32>, capture: &Capture, background: Background, steps: 
         // Any training view will do for a device that has no camera of its own; the first is as good as another.
         preview: capture.train[0].camera.clone(),
     };
-    Ok(bundle::write(scene, &info, steps)?)
+    let options = WriteOptions { steps: *steps, ..WriteOptions::default() };
+    Ok(bundle::write(scene, &info, &options)?.bytes)
 }

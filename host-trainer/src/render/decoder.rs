@@ -21,9 +21,17 @@ pub struct CoreFrame {
 /// # Errors
 /// [`DecodeError`] for a damaged bundle or an unusable camera.
 pub fn core_image(bundle: &Bundle<'_>, camera: &Camera) -> Result<CoreFrame, DecodeError> {
+    core_image_of_tiers(bundle, camera, u8::MAX)
+}
+
+/// As [`core_image`], with the first `tiers` tiers at most.
+///
+/// # Errors
+/// As [`core_image`].
+pub fn core_image_of_tiers(bundle: &Bundle<'_>, camera: &Camera, tiers: u8) -> Result<CoreFrame, DecodeError> {
     let camera = core_camera(camera)?;
-    let plan_for =
-        |max_splats| bundle.plan(&Budget { width_px: camera.width_px, height_px: camera.height_px, max_splats });
+    let (width_px, height_px) = (camera.width_px, camera.height_px);
+    let plan_for = |max_splats| bundle.plan(&Budget { width_px, height_px, max_splats, tiers });
     let plan = plan_for(MaxSplats::Worst)?;
     let mut scratch = vec![0; plan.scratch_len()];
     let mut sink = ImageSink::new(camera.width_px, camera.height_px);

@@ -35,6 +35,8 @@ pub struct ReferenceScene {
     pub log_scales: Vec<f64>,
     /// `[n_anchors, K, 3]` offsets in units of `exp(log_scales[0..3])`.
     pub offsets: Vec<f64>,
+    /// `[n_anchors, K]` whether an offset is drawn at all.
+    pub drawn: Vec<bool>,
     /// The three heads.
     pub heads: Heads<f64>,
 }
@@ -124,7 +126,7 @@ impl ReferenceScene {
         let mut splats = Vec::new();
         for k in 0..n_offsets {
             let opacity = opacities[k].tanh();
-            if opacity <= 0.0 {
+            if !self.drawn[anchor * n_offsets + k] || opacity <= 0.0 {
                 continue;
             }
             let offset = DVec3::from_slice(&self.offsets[(anchor * n_offsets + k) * 3..]);

@@ -13,6 +13,7 @@ use embedded_graphics_core::draw_target::DrawTarget;
 use embedded_graphics_core::geometry::{Dimensions, Point, Size};
 use embedded_graphics_core::pixelcolor::Rgb888;
 use embedded_graphics_core::primitives::Rectangle;
+use pocketsplat_core::bundle::AnchorSite;
 use pocketsplat_core::display::DisplaySink;
 use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, MaxSplats};
 
@@ -21,6 +22,7 @@ use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport
 #[unsafe(no_mangle)]
 extern "C" fn _start() -> ! {
     let mut scratch = [0; 4096];
+    let mut words = [0; 64];
     let camera = Camera {
         rotation: [0.0; 9],
         translation: [0.0; 3],
@@ -31,7 +33,7 @@ extern "C" fn _start() -> ! {
     };
     loop {
         let _ = black_box(draw(black_box(&[]), black_box(&camera), black_box(&mut scratch)));
-        let _ = black_box(decode(black_box(&[]), black_box(&mut [[0; 3]]), black_box(&mut [0.0])));
+        let _ = black_box(decode(black_box(&[]), black_box(&mut words), black_box(&mut [0.0])));
     }
 }
 
@@ -39,9 +41,13 @@ extern "C" fn _start() -> ! {
 fn draw(bytes: &[u8], camera: &Camera, scratch: &mut [u8]) -> Result<FrameReport, DecodeError> {
     let bundle = Bundle::parse(bytes)?;
     let max_splats = if black_box(true) { MaxSplats::Worst } else { MaxSplats::AtMost(black_box(0)) };
-    let budget = Budget { width_px: camera.width_px, height_px: camera.height_px, max_splats };
+    let budget = Budget { width_px: camera.width_px, height_px: camera.height_px, max_splats, tiers: u8::MAX };
     let plan = bundle.plan(&budget)?;
-    let mut decoder = Decoder::bind(&bundle, plan, scratch)?;
+    let mut decoder = if black_box(true) {
+        Decoder::bind(&bundle, plan, scratch)?
+    } else {
+        Decoder::bind_skipping_damage(&bundle, plan, scratch)?
+    };
     let mut display = Display;
     let mut sink = DisplaySink::new(&mut display, Point::zero());
     let report = decoder.render(&camera.resized(black_box(1), black_box(1)), &mut sink);
@@ -50,9 +56,10 @@ fn draw(bytes: &[u8], camera: &Camera, scratch: &mut [u8]) -> Result<FrameReport
 }
 
 /// A chunk by itself.
-fn decode(bytes: &[u8], lattice: &mut [[i32; 3]], values: &mut [f32]) -> Result<(), DecodeError> {
+fn decode(bytes: &[u8], words: &mut [u32], values: &mut [f32]) -> Result<(), DecodeError> {
     let bundle = Bundle::parse(bytes)?;
-    bundle.chunk(black_box(0))?.decode_values(bundle.tables(), lattice, values)
+    let mut models = bundle.anchor_models(words)?;
+    bundle.chunk(black_box(0))?.decode_values(&mut models, &mut [AnchorSite::default()], values)
 }
 
 /// A display that keeps nothing.

@@ -1,77 +1,99 @@
 //! Prints a bundle byte by byte, every byte with the field it belongs to.
 //!
-//! With `--check FORMAT.md` it compares the example of the format document, and `example.psb` beside it, with the dump and
-//! the bytes of a scene made by hand; with `--write FORMAT.md` it puts them there.
+//! With `--check FORMAT.md` it compares the examples of the format document, and their bundles beside it, with the dumps and
+//! the bytes of scenes made by hand; with `--write FORMAT.md` it puts them there.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use clap::Parser;
 use glam::{DMat3, DVec3};
-use pocketsplat::bundle::{self, BundleInfo, QuantisationSteps, annotate::annotate};
+use pocketsplat::bundle::{self, BundleInfo, Coder, QuantisationSteps, WriteOptions, annotate::annotate};
 use pocketsplat::camera::Camera;
 use pocketsplat::dataset::Normalisation;
-use pocketsplat::scene::{Anchors, Heads, ModelShape, Scene};
+use pocketsplat::scene::{Anchors, ContextModel, Heads, ModelShape, Scene};
+use pocketsplat_core::context::{GridFrame, GridLevel, LevelKind};
 
 /// The document when none is named.
 const FORMAT_DOC: &str = "decoder-core/src/bundle/FORMAT.md";
-/// Before the dump in the document.
-const BEGIN: &str = "<!-- hexdump begin -->\n";
-/// After the dump in the document.
-const END: &str = "<!-- hexdump end -->\n";
+/// The examples: name in the document's markers, coder, bundle beside the document.
+const EXAMPLES: [(&str, Coder, &str); 2] =
+    [("static", Coder::Static, "example.psb"), ("context", Coder::Context, "example-context.psb")];
 
-/// Annotates a bundle, or the format document's example.
+/// Annotates a bundle, or the format document's examples.
 #[derive(Parser)]
 struct Args {
-    /// The bundle to print; without it, the example.
+    /// The bundle to print; without it, the examples.
     bundle: Option<PathBuf>,
-    /// Compare the example in this document and fail on a difference.
+    /// Compare the examples in this document and fail on a difference.
     #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = FORMAT_DOC)]
     #[arg(conflicts_with_all = ["bundle", "write"])]
     check: Option<PathBuf>,
-    /// Put the example into this document.
+    /// Put the examples into this document.
     #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = FORMAT_DOC, conflicts_with = "bundle")]
     write: Option<PathBuf>,
 }
 
 fn main() -> Result<()> {
     let args = Args::parse();
-    let bytes = match &args.bundle {
-        Some(path) => std::fs::read(path).with_context(|| format!("{}: can not be read", path.display()))?,
-        None => example()?,
-    };
-    let dump = annotate(&bytes).context("not a sound bundle")?;
+    if let Some(path) = &args.bundle {
+        let bytes = std::fs::read(path).with_context(|| format!("{}: can not be read", path.display()))?;
+        print!("{}", dump(&bytes)?);
+        return Ok(());
+    }
     let Some(document) = args.check.as_ref().or(args.write.as_ref()) else {
-        print!("{dump}");
+        for (name, coder, _) in EXAMPLES {
+            println!("{name}\n{}", dump(&example(coder)?)?);
+        }
         return Ok(());
     };
     let text = std::fs::read_to_string(document).with_context(|| format!("{}: can not be read", document.display()))?;
-    let fresh = with_example(&text, &dump).with_context(|| format!("{}: no place for the dump", document.display()))?;
-    let bundle_path = document.with_file_name("example.psb");
+    let mut fresh = text.clone();
+    for (name, coder, file) in EXAMPLES {
+        let bytes = example(coder)?;
+        fresh = with_example(&fresh, name, &dump(&bytes)?)
+            .with_context(|| format!("{}: no place for the dump", document.display()))?;
+        let bundle = document.with_file_name(file);
+        if args.check.is_some() {
+            ensure!(std::fs::read(&bundle).is_ok_and(|stored| stored == bytes), differs(document, &bundle));
+        } else {
+            std::fs::write(&bundle, bytes).with_context(|| format!("{}: can not be written", bundle.display()))?;
+        }
+    }
     if args.check.is_some() {
-        ensure!(
-            text == fresh && std::fs::read(&bundle_path).is_ok_and(|stored| stored == bytes),
-            "{0}: the example or its bundle differs from the writer's bytes; run `cargo run -p tools --bin hexdump -- --write {0}` and read the change",
-            document.display()
-        );
+        ensure!(text == fresh, differs(document, document));
         return Ok(());
     }
-    std::fs::write(&bundle_path, bytes).with_context(|| format!("{}: can not be written", bundle_path.display()))?;
     std::fs::write(document, fresh).with_context(|| format!("{}: can not be written", document.display()))
 }
 
-/// The document with the text between its markers replaced.
-fn with_example(text: &str, dump: &str) -> Result<String> {
-    let Some((before, rest)) = text.split_once(BEGIN) else { bail!("marker {BEGIN:?} missing") };
-    let Some((_, after)) = rest.split_once(END) else { bail!("marker {END:?} missing") };
-    Ok(format!("{before}{BEGIN}```text\n{dump}```\n{END}{after}"))
+fn dump(bytes: &[u8]) -> Result<String> {
+    annotate(bytes, usize::MAX).context("not a sound bundle")
 }
 
-/// Two anchors, one with a value so far out that it takes the escape.
-fn example() -> Result<Vec<u8>> {
+fn differs(document: &Path, file: &Path) -> String {
+    format!(
+        "{}: the example differs from the writer's bytes; run `cargo run -p tools --bin hexdump -- --write {}` and read the \
+         change",
+        file.display(),
+        document.display()
+    )
+}
+
+/// The document with the text between an example's markers replaced.
+fn with_example(text: &str, name: &str, dump: &str) -> Result<String> {
+    let [begin, end] = ["begin", "end"].map(|edge| format!("<!-- hexdump {name} {edge} -->\n"));
+    let (before, rest) = text.split_once(&begin).with_context(|| format!("marker {begin:?} missing"))?;
+    let (_, after) = rest.split_once(&end).with_context(|| format!("marker {end:?} missing"))?;
+    Ok(format!("{before}{begin}```text\n{dump}```\n{end}{after}"))
+}
+
+/// Three anchors in two tiers, one of them with a hidden offset, one with a value so far out that it takes the escape; the
+/// other example has a context model of one level and two hidden units.
+fn example(coder: Coder) -> Result<Vec<u8>> {
     let shape = ModelShape {
         feature_dim: 2,
-        n_offsets: 1,
+        n_offsets: 2,
         view_direction: false,
         view_distance: false,
         dilation_compensation: true,
@@ -83,14 +105,16 @@ fn example() -> Result<Vec<u8>> {
         shape,
         voxel_size: 0.125,
         anchors: Anchors {
-            lattice: vec![[-3, 0, 5], [2, 1, 5]],
-            features: vec![0.5, -0.25, 0.75, -50.0],
-            log_scales: vec![-1.0, -1.0, -1.0, -1.5, -1.5, -2.0, -1.0, -1.0, -1.25, -1.5, -1.5, -1.5],
-            offsets: vec![0.25, 0.0, -0.5, 0.0, 0.5, 0.25],
-            mask_logits: vec![1.0; 2],
+            lattice: vec![[-3, 0, 5], [2, 1, 5], [2, 0, 5]],
+            features: vec![0.5, -0.25, 0.75, -50.0, 0.5, 0.0],
+            log_scales: [-1.0, -1.0, -1.0, -1.5, -1.5, -2.0].repeat(3),
+            offsets: vec![
+                0.25, 0.0, -0.5, 0.5, 0.5, 0.0, 0.0, 0.5, 0.25, 0.0, 0.0, 0.0, 0.25, 0.25, 0.0, -0.25, 0.0, 0.0,
+            ],
+            mask_logits: vec![1.0, 1.0, 1.0, -10.0, 1.0, 1.0],
         },
         heads,
-        context: None,
+        context: (coder == Coder::Context).then(|| context(&shape)),
     };
     let info = BundleInfo {
         normalisation: Normalisation { centre: DVec3::new(1.0, 2.0, -0.5), scale: 2.0 },
@@ -105,6 +129,31 @@ fn example() -> Result<Vec<u8>> {
             height_px: 24,
         },
     };
-    let steps = QuantisationSteps { feature: 0.25, log_scale: 0.25, offset: 0.25 };
-    bundle::write(&scene, &info, &steps).context("the example can not be written")
+    let options = WriteOptions {
+        steps: QuantisationSteps { feature: 0.25, log_scale: 0.25, offset: 0.25 },
+        coder,
+        importance: Some(vec![3.0, 1.0, 2.0]),
+        pruning_rates: vec![0.4, 0.0],
+        ..WriteOptions::default()
+    };
+    Ok(bundle::write(&scene, &info, &options).context("the example can not be written")?.bytes)
+}
+
+/// Means at 0, deviations of one to four base steps, steps of a base step at one end of the x axis and half of one at the
+/// other.
+fn context(shape: &ModelShape) -> ContextModel<f32> {
+    let frame = GridFrame::spanning([-3, 0, 5], [2, 1, 5]);
+    let levels = vec![GridLevel { kind: LevelKind::Volume, resolution: 2, n_rows: 8 }];
+    let mut model = ContextModel::filled(shape, frame, levels, 2, [0.25, 0.25, 0.25], 0.0);
+    // x is the axis that changes fastest from row to row.
+    for (row, signs) in model.rows.chunks_mut(4).enumerate() {
+        signs.fill(if row % 2 == 1 { 1.0 } else { -1.0 });
+    }
+    model.mlp.w1[0] = 1.0;
+    let n_channels = shape.values_per_anchor();
+    model.mlp.b2[n_channels..2 * n_channels].fill(1.0);
+    for output in n_channels..model.mlp.n_out {
+        model.mlp.w2[2 * output] = if output < 2 * n_channels { 1.0 } else { -1.0 };
+    }
+    model
 }

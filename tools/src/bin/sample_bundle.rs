@@ -1,4 +1,5 @@
-//! Writes a small bundle made by hand: a banded planet with a ring, 160×120, every view effect in use.
+//! Writes a small bundle made by hand: a banded planet with a ring, 160×120, every view effect in use; the ring is a tier
+//! of its own, and its patches hide a disc each.
 //!
 //! No training and no capture is behind it, so a firmware has something to draw from a fresh clone.
 
@@ -7,16 +8,20 @@ use std::path::PathBuf;
 use anyhow::Context as _;
 use clap::Parser;
 use glam::{DMat3, DQuat, DVec3};
-use pocketsplat::bundle::{self, BundleInfo, QuantisationSteps};
+use pocketsplat::bundle::{self, BundleInfo, Coder, WriteOptions};
 use pocketsplat::camera::Camera;
 use pocketsplat::dataset::Normalisation;
-use pocketsplat::scene::{Anchors, Head, Heads, ModelShape, Scene};
+use pocketsplat::scene::{Anchors, ContextModel, Head, Heads, ModelShape, Scene};
+use pocketsplat_core::context::{GridFrame, GridLevel, LevelKind};
 
 /// Writes a small bundle made by hand.
 #[derive(Parser)]
 struct Args {
     /// The file to write.
     out: PathBuf,
+    /// What gives the symbols their frequencies; a context model is made of the channels' means and deviations.
+    #[arg(long, value_enum, default_value_t = Coder::Static)]
+    coder: Coder,
 }
 
 const SHAPE: ModelShape = ModelShape {
@@ -90,7 +95,8 @@ fn lit(colour: DVec3, normal: DVec3) -> DVec3 {
 fn scene() -> Scene<f32> {
     let mut anchors =
         Anchors { lattice: vec![], features: vec![], log_scales: vec![], offsets: vec![], mask_logits: vec![] };
-    for patch in planet().into_iter().chain(ring()) {
+    let n_planet = planet().len();
+    for (index, patch) in planet().into_iter().chain(ring()).enumerate() {
         anchors.lattice.push((patch.position / VOXEL_SIZE).round().as_ivec3().to_array());
         let turn = DQuat::from_rotation_arc(DVec3::Z, patch.normal);
         let mut feature = [0.0_f64; SHAPE.feature_dim];
@@ -101,8 +107,9 @@ fn scene() -> Scene<f32> {
         let log_reach = patch.reach.ln() as f32;
         // The discs' radius: two thirds of their spacing, so that they overlap into a surface.
         anchors.log_scales.extend([log_reach, log_reach, log_reach, log_reach, log_reach, log_reach]);
-        for [x, y] in [[-0.5, -0.5], [0.5, -0.5], [-0.5, 0.5], [0.5, 0.5]] {
-            anchors.mask_logits.push(1.0);
+        for (k, [x, y]) in [[-0.5, -0.5], [0.5, -0.5], [-0.5, 0.5], [0.5, 0.5]].into_iter().enumerate() {
+            // The ring is thinner by a disc a patch.
+            anchors.mask_logits.push(if index >= n_planet && k == 2 { -10.0 } else { 1.0 });
             anchors.offsets.extend((turn * DVec3::new(x, y, 0.0)).to_array().map(|o| o as f32));
         }
     }
@@ -163,17 +170,66 @@ fn camera() -> Camera {
     }
 }
 
+/// A context model that predicts each channel's mean and deviation everywhere, and steps a little finer on one side.
+fn context(scene: &Scene<f32>) -> ContextModel<f32> {
+    const RESOLUTION: u16 = 4;
+    let along = |axis: usize| scene.anchors.lattice.iter().map(move |cell| cell[axis]);
+    let corner = |pick: fn(i32, i32) -> i32| std::array::from_fn(|axis| along(axis).reduce(pick).unwrap_or(0));
+    let frame = GridFrame::spanning(corner(i32::min), corner(i32::max));
+    let n_rows = u32::from(RESOLUTION).pow(3);
+    let levels = vec![GridLevel { kind: LevelKind::Volume, resolution: RESOLUTION, n_rows }];
+    let base_steps = [0.1, 0.05, 0.1];
+    let mut model = ContextModel::filled(&SHAPE, frame, levels, 4, base_steps, 0.0);
+    for (row, signs) in model.rows.chunks_mut(4).enumerate() {
+        signs.fill(if row % 4 < 2 { 1.0 } else { -1.0 });
+    }
+    model.mlp.w1[0] = 1.0;
+    let n_channels = SHAPE.values_per_anchor();
+    let groups = [
+        (&scene.anchors.features, SHAPE.feature_dim),
+        (&scene.anchors.log_scales, 6),
+        (&scene.anchors.offsets, 3 * SHAPE.n_offsets),
+    ];
+    let mut channel = 0;
+    for ((values, width), base_step) in groups.into_iter().zip(base_steps) {
+        for column in 0..width {
+            let values: Vec<f32> = values.iter().skip(column).step_by(width).map(|v| v / base_step).collect();
+            let n = values.len() as f32;
+            let mean = values.iter().sum::<f32>() / n;
+            let deviation = (values.iter().map(|v| (v - mean) * (v - mean)).sum::<f32>() / n).sqrt();
+            model.mlp.b2[channel] = mean;
+            model.mlp.b2[n_channels + channel] = deviation.max(0.1).log2();
+            channel += 1;
+        }
+    }
+    for output in 2 * n_channels..model.mlp.n_out {
+        model.mlp.w2[output * model.mlp.n_hidden] = -0.25;
+    }
+    model
+}
+
 fn main() -> anyhow::Result<()> {
     let args = Args::parse();
     let camera = camera();
-    let scene = scene();
+    let mut scene = scene();
+    if args.coder != Coder::Static {
+        scene.context = Some(context(&scene));
+    }
     let info = BundleInfo {
         normalisation: Normalisation { centre: DVec3::ZERO, scale: 1.0 },
         background: BACKGROUND,
         training_px: [camera.width_px, camera.height_px],
         preview: camera,
     };
-    let bytes = bundle::write(&scene, &info, &QuantisationSteps::default()).context("cannot write the sample scene")?;
+    let n_planet = planet().len();
+    let options = WriteOptions {
+        coder: args.coder,
+        importance: Some((0..scene.anchors.len()).map(|anchor| if anchor < n_planet { 1.0 } else { 0.0 }).collect()),
+        pruning_rates: vec![(scene.anchors.len() - n_planet) as f32 / scene.anchors.len() as f32, 0.0],
+        chunk_anchors: 64,
+        ..WriteOptions::default()
+    };
+    let bytes = bundle::write(&scene, &info, &options).context("cannot write the sample scene")?.bytes;
     std::fs::write(&args.out, &bytes).with_context(|| format!("cannot write {}", args.out.display()))?;
     println!("{}: {} anchors, {} bytes", args.out.display(), scene.anchors.len(), bytes.len());
     Ok(())

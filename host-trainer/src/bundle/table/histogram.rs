@@ -3,7 +3,7 @@
 /// Bits of a table entry.
 const ENTRY_BITS: f64 = 16.0;
 /// Bits of a table without its entries: fixed fields and its place in the list of tables.
-const TABLE_BITS: f64 = 128.0;
+const TABLE_BITS: f64 = 160.0;
 /// Bits of an escaped symbol after the escape.
 const ESCAPE_BITS: f64 = 16.0;
 /// Most entries of a table: 4 KiB of flash, and fewer than there are slots.

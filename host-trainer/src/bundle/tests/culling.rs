@@ -1,37 +1,41 @@
 use glam::{DMat3, DVec3};
-use pocketsplat_core::Bundle;
-use pocketsplat_core::bundle::{HEADER_LEN, crc32};
+use pocketsplat_core::bundle::{CHUNK_RECORD_LEN, INK_FRAME_LEN, TIER_RECORD_LEN, crc32};
+use pocketsplat_core::{Bundle, SectionKind};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{SMALL, STEPS, info, random_scene};
-use crate::bundle::write_chunked;
+use super::{SMALL, options, random_scene, write_bytes};
+use crate::bundle::Coder;
+use crate::bundle::layout::section_crc_offset;
 use crate::camera::Camera;
 use crate::render::decoder::core_image;
 use crate::scene::{ModelShape, Scene};
 
 /// Views tried.
 const N_VIEWS: u32 = 1500;
-/// Where the directory's row of the section table lies, and its length.
-const DIRECTORY_ROW: usize = 148 + 2 * 16;
-/// Length of a record, and where its ink box lies.
-const RECORD_LEN: usize = 40;
-const INK_BOX: usize = 16;
+/// Where a chunk's record has its ink box.
+const INK_BOX: usize = 12;
 
 /// The same bundle with ink boxes that no camera misses.
 fn without_boxes(bytes: &[u8]) -> Vec<u8> {
+    let bundle = Bundle::parse(bytes).expect("a sound bundle");
+    let header_len = usize::from(bundle.header().header_len);
+    let (row, section) =
+        bundle.sections().enumerate().find(|(_, section)| section.kind == SectionKind::Directory).expect("a directory");
+    let (start, len) = (section.offset as usize, section.len as usize);
+    let frame = start + TIER_RECORD_LEN * usize::from(bundle.header().n_tiers);
     let mut bytes = bytes.to_vec();
-    let word = |bytes: &[u8], at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes")) as usize;
-    let [start, len] = [4, 8].map(|field| word(&bytes, DIRECTORY_ROW + field));
-    for record in bytes[start..start + len].chunks_exact_mut(RECORD_LEN) {
-        for (corner, value) in record[INK_BOX..].chunks_exact_mut(12).zip([-1e6_f32, 1e6]) {
-            corner.copy_from_slice([value.to_le_bytes(); 3].as_flattened());
-        }
+    bytes[frame..frame + 12].copy_from_slice([(-1e6_f32).to_le_bytes(); 3].as_flattened());
+    bytes[frame + 12..frame + 24].copy_from_slice([(2e6_f32 / 65535.0).to_le_bytes(); 3].as_flattened());
+    for record in bytes[frame + INK_FRAME_LEN..start + len].chunks_exact_mut(CHUNK_RECORD_LEN) {
+        record[INK_BOX..INK_BOX + 6].fill(0);
+        record[INK_BOX + 6..INK_BOX + 12].fill(0xFF);
     }
+    let crc_at = section_crc_offset(row);
     let crc = crc32(&bytes[start..start + len]);
-    bytes[DIRECTORY_ROW + 12..DIRECTORY_ROW + 16].copy_from_slice(&crc.to_le_bytes());
-    let crc = crc32(&bytes[..HEADER_LEN - 4]);
-    bytes[HEADER_LEN - 4..HEADER_LEN].copy_from_slice(&crc.to_le_bytes());
+    bytes[crc_at..crc_at + 4].copy_from_slice(&crc.to_le_bytes());
+    let crc = crc32(&bytes[..header_len - 4]);
+    bytes[header_len - 4..header_len].copy_from_slice(&crc.to_le_bytes());
     bytes
 }
 
@@ -55,6 +59,7 @@ fn any_camera(rng: &mut ChaCha8Rng) -> Camera {
 fn tightly_boxed_scene() -> Scene<f32> {
     let mut scene = random_scene(ModelShape { n_offsets: 1, dilation_compensation: false, ..SMALL }, 200, 31);
     scene.anchors.offsets.fill(0.0);
+    scene.anchors.mask_logits.fill(1.0);
     scene.heads.opacity.b2.fill(9.0);
     scene.heads.covariance.b2[..3].fill(12.0);
     scene
@@ -62,7 +67,7 @@ fn tightly_boxed_scene() -> Scene<f32> {
 
 #[test]
 fn culling_chunks_changes_no_pixel() {
-    let boxed = write_chunked(&tightly_boxed_scene(), &info(), &STEPS, 1).expect("sound");
+    let boxed = write_bytes(&tightly_boxed_scene(), &options(Coder::Static, 1));
     let unboxed = without_boxes(&boxed);
     let (boxed, unboxed) = (Bundle::parse(&boxed).expect("sound"), Bundle::parse(&unboxed).expect("sealed again"));
     let mut rng = ChaCha8Rng::seed_from_u64(32);

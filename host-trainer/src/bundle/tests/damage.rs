@@ -1,6 +1,7 @@
 use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, ErrorClass, MaxSplats, TileSink};
 
-use super::{SMALL, write_random};
+use super::{SMALL, info, options, random_scene, write_random};
+use crate::bundle::{Coder, WriteOptions, write};
 use crate::scene::ModelShape;
 
 /// The smallest model, so that every bit of its bundle can be tried.
@@ -15,60 +16,77 @@ impl TileSink for NoSink {
 /// Everything a device does with a bundle.
 fn parse_and_draw(bytes: &[u8]) -> Result<(), DecodeError> {
     let bundle = Bundle::parse(bytes)?;
-    let plan = bundle.plan(&Budget { width_px: 64, height_px: 48, max_splats: MaxSplats::Worst })?;
+    let plan = bundle.plan(&Budget { width_px: 64, height_px: 48, max_splats: MaxSplats::Worst, tiers: u8::MAX })?;
     let mut scratch = vec![0; plan.scratch_len()];
     let mut decoder = Decoder::bind(&bundle, plan, &mut scratch)?;
     decoder.render(&bundle.header().preview.resized(64, 48), &mut NoSink)?;
     Ok(())
 }
 
+/// A tiny bundle of two tiers.
+fn tiny(coder: Coder) -> Vec<u8> {
+    let scene = super::with_context(random_scene(TINY, 7, 21), 22);
+    let importance = Some(vec![1.0, 7.0, 3.0, 2.0, 5.0, 6.0, 4.0]);
+    let options = WriteOptions { importance, pruning_rates: vec![0.5, 0.0], ..options(coder, 3) };
+    let mut scene = scene;
+    scene.anchors.mask_logits.fill(1.0);
+    write(&scene, &info(), &options).expect("a sound scene").bytes
+}
+
 #[test]
-fn every_truncation_is_an_error() {
-    let (_, bytes) = write_random(TINY, 7, 21, 3);
+fn every_truncation_is_an_error_or_a_smaller_scene() {
+    let bytes = tiny(Coder::Static);
     parse_and_draw(&bytes).expect("the whole bundle");
+    let bundle = Bundle::parse(&bytes).expect("a sound bundle");
+    let end = |tier: u8| bundle.tier(tier).expect("a tier").end as usize;
+    let smaller = bytes.len() - end(1) + end(0);
     for len in 0..bytes.len() {
-        let error = parse_and_draw(&bytes[..len]).expect_err("a cut bundle");
-        assert_eq!(error.class(), ErrorClass::Malformed, "{len} bytes: {error}");
+        match parse_and_draw(&bytes[..len]) {
+            Ok(()) => assert_eq!(len, smaller, "cut at the end of a tier"),
+            Err(error) => assert_eq!(error.class(), ErrorClass::Malformed, "{len} bytes: {error}"),
+        }
     }
+    assert_eq!(Bundle::parse(&bytes[..smaller]).map(|bundle| bundle.n_tiers()), Ok(1), "one tier of two");
 }
 
 #[test]
 fn every_flipped_bit_is_an_error_and_damaged_chunks_are_named() {
-    let (_, mut bytes) = write_random(TINY, 7, 21, 3);
-    let bundle = Bundle::parse(&bytes).expect("a sound bundle");
-    let lens: Vec<usize> = bundle.chunks().map(|chunk| chunk.n_bytes()).collect();
-    let chunks_start = bytes.len() - lens.iter().sum::<usize>();
-    for bit in 0..8 * bytes.len() {
-        bytes[bit / 8] ^= 1 << (bit % 8);
-        let error = parse_and_draw(&bytes).expect_err("a damaged bundle");
-        if bit / 8 >= chunks_start {
-            let mut end = chunks_start;
-            let damaged = lens
-                .iter()
-                .take_while(|&len| {
+    for coder in [Coder::Static, Coder::Context] {
+        let mut bytes = tiny(coder);
+        let bundle = Bundle::parse(&bytes).expect("a sound bundle");
+        let lens: Vec<usize> = bundle.chunks().map(|chunk| chunk.n_bytes()).collect();
+        let chunks_start = bytes.len() - lens.iter().sum::<usize>();
+        for bit in 0..8 * bytes.len() {
+            bytes[bit / 8] ^= 1 << (bit % 8);
+            let error = parse_and_draw(&bytes).expect_err("a damaged bundle");
+            if bit / 8 >= chunks_start {
+                let mut end = chunks_start;
+                let before = lens.iter().take_while(|&len| {
                     end += len;
                     end <= bit / 8
-                })
-                .count() as u32;
-            let named = matches!(error, DecodeError::ChunkChecksum { chunk, .. } if chunk == damaged);
-            assert!(named, "bit {bit} lies in chunk {damaged}: {error}");
+                });
+                let damaged = before.count() as u32;
+                let named = matches!(error, DecodeError::ChunkChecksum { chunk, .. } if chunk == damaged);
+                assert!(named, "{coder:?}: bit {bit} lies in chunk {damaged}: {error}");
+            }
+            bytes[bit / 8] ^= 1 << (bit % 8);
         }
-        bytes[bit / 8] ^= 1 << (bit % 8);
     }
 }
 
 #[test]
 fn bytes_after_the_end_are_ignored() {
-    let (_, mut bytes) = write_random(TINY, 7, 21, 3);
+    let mut bytes = tiny(Coder::Context);
     bytes.extend([0xFF; 100]);
     parse_and_draw(&bytes).expect("a flash partition longer than its bundle");
 }
 
 #[test]
 fn scratch_one_byte_short_names_the_need() {
-    let (_, bytes) = write_random(SMALL, 50, 22, 16);
+    let (_, bytes) = write_random(Coder::Static, SMALL, 50, 22, 16);
     let bundle = Bundle::parse(&bytes).expect("a sound bundle");
-    let plan = bundle.plan(&Budget { width_px: 64, height_px: 48, max_splats: MaxSplats::Worst }).expect("a plan");
+    let budget = Budget { width_px: 64, height_px: 48, max_splats: MaxSplats::Worst, tiers: u8::MAX };
+    let plan = bundle.plan(&budget).expect("a plan");
     let mut scratch = vec![0; plan.scratch_len() - 1];
     let error = Decoder::bind(&bundle, plan, &mut scratch).err().expect("one byte short");
     let needed = plan.scratch_len() as u32;
@@ -77,10 +95,10 @@ fn scratch_one_byte_short_names_the_need() {
 
 #[test]
 fn too_many_splats_names_the_need_which_then_suffices() {
-    let (_, bytes) = write_random(SMALL, 50, 22, 16);
+    let (_, bytes) = write_random(Coder::Static, SMALL, 50, 22, 16);
     let bundle = Bundle::parse(&bytes).expect("a sound bundle");
     let draw = |most| {
-        let budget = Budget { width_px: 64, height_px: 48, max_splats: MaxSplats::AtMost(most) };
+        let budget = Budget { width_px: 64, height_px: 48, max_splats: MaxSplats::AtMost(most), tiers: u8::MAX };
         let plan = bundle.plan(&budget).expect("a plan");
         let mut scratch = vec![0xA5; plan.scratch_len()];
         let mut decoder = Decoder::bind(&bundle, plan, &mut scratch).expect("planned memory");

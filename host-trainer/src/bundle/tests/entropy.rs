@@ -3,8 +3,13 @@ use std::num::NonZeroU16;
 use constriction::stream::Decode;
 use constriction::stream::model::{DecoderModel, EntropyModel};
 use constriction::stream::stack::AnsCoder;
+use pocketsplat_core::Bundle;
 use pocketsplat_core::entropy::{AnsReader, FREQUENCY_TOTAL, Slot, SymbolModel};
 use proptest::prelude::*;
+
+use super::{SMALL, decoded_rows, write_random};
+use crate::bundle::Coder;
+use crate::bundle::chunk::{ChunkRows, Models};
 
 /// A table over 0..n, for both readers.
 #[derive(Clone, Debug)]
@@ -62,5 +67,51 @@ proptest! {
             prop_assert_eq!(reader.symbol(model), expected, "symbol {}", i);
         }
         prop_assert_eq!(reader.finish().is_ok(), reference.is_empty());
+    }
+}
+
+/// Expects one known slot, as a decoder would that knows what comes.
+struct Expected {
+    start: u16,
+    frequency: u16,
+}
+
+impl EntropyModel<12> for Expected {
+    type Symbol = bool;
+    type Probability = u16;
+}
+
+impl DecoderModel<12> for Expected {
+    fn quantile_function(&self, quantile: u16) -> (bool, u16, NonZeroU16) {
+        let inside = (self.start..self.start + self.frequency).contains(&quantile);
+        (inside, self.start, NonZeroU16::new(self.frequency).expect("a coded slot"))
+    }
+}
+
+/// What our reader makes of a bundle is what constriction's own decoder finds in its streams, slot by slot.
+#[test]
+fn constriction_reads_real_streams_as_our_reader_does() {
+    for coder in [Coder::Static, Coder::Context] {
+        let (_, bytes) = write_random(coder, SMALL, 500, 71, 64);
+        let bundle = Bundle::parse(&bytes).expect("a sound bundle");
+        let models = Models::of(&bundle);
+        let chunks_start = bytes.len() - bundle.chunks().map(|chunk| chunk.n_bytes()).sum::<usize>();
+        let mut rows = decoded_rows(&bundle).into_iter();
+        let mut start = chunks_start;
+        for chunk in bundle.chunks() {
+            let (sites, symbols): (Vec<_>, Vec<_>) = rows.by_ref().take(chunk.n_anchors().into()).unzip();
+            let (lattice, drawn): (Vec<_>, Vec<_>) = sites.iter().map(|site| (site.lattice, site.mask)).unzip();
+            let list = models.slots(ChunkRows { lattice: &lattice, drawn: &drawn, symbols: &symbols.concat() });
+            let stream = &bytes[start..start + chunk.n_bytes()];
+            start += chunk.n_bytes();
+            let stack: Vec<u16> = stream.as_chunks().0.iter().rev().map(|&word| u16::from_le_bytes(word)).collect();
+            let mut reference = AnsCoder::<u16, u32>::from_compressed(stack).expect("no leading zero");
+            for (i, [start, frequency]) in list.slots().enumerate() {
+                let Ok(inside) = reference.decode_symbol(Expected { start, frequency });
+                assert!(inside, "{coder:?}, chunk {}, slot {i}", chunk.index());
+            }
+            assert!(reference.is_empty(), "{coder:?}, chunk {}: all is read", chunk.index());
+            assert_eq!(list.into_bytes(), stream, "{coder:?}, chunk {}: coded again", chunk.index());
+        }
     }
 }

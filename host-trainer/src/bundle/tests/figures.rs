@@ -1,12 +1,11 @@
 //! Figures, not laws: `cargo test --release -p pocketsplat --lib bundle::tests::figures -- --ignored --nocapture`.
 
-use std::collections::HashMap;
 use std::time::Instant;
 
 use pocketsplat_core::{Budget, Bundle, Decoder, MaxSplats, TileSink};
 
-use super::{camera, write_random};
-use crate::bundle::SizeReport;
+use super::{camera, decoded_rows, write_random};
+use crate::bundle::{Coder, SizeReport};
 use crate::scene::ModelShape;
 
 struct NoSink;
@@ -15,26 +14,15 @@ impl TileSink for NoSink {
     fn tile(&mut self, _: u16, _: u16, _: u16, _: u16, _: &[[u8; 3]]) {}
 }
 
-/// Bits of all symbols by each channel's own empirical entropy.
-fn entropy_bits(bundle: &Bundle<'_>) -> f64 {
-    let n_channels = bundle.header().n_channels();
-    let mut counts = vec![HashMap::<i16, f64>::new(); n_channels];
-    for chunk in bundle.chunks() {
-        let n = usize::from(chunk.n_anchors());
-        let (mut lattice, mut symbols) = (vec![[0; 3]; n], vec![0; n * n_channels]);
-        chunk.decode_symbols(bundle.tables(), &mut lattice, &mut symbols).expect("a sound chunk");
-        for (i, symbol) in symbols.into_iter().enumerate() {
-            *counts[i % n_channels].entry(symbol).or_default() += 1.0;
-        }
-    }
-    let total = f64::from(bundle.header().n_anchors);
-    counts.iter().flat_map(HashMap::values).map(|n| -n * (n / total).log2()).sum()
-}
-
 #[test]
 #[ignore = "prints figures of random scenes and takes seconds"]
 fn bytes_and_times_of_random_scenes() {
-    for (n_anchors, feature_dim, n_offsets) in [(2_000, 16, 4), (2_000, 32, 10), (40_000, 32, 10)] {
+    for (coder, n_anchors, feature_dim, n_offsets) in [
+        (Coder::Static, 2_000, 16, 4),
+        (Coder::Context, 2_000, 16, 4),
+        (Coder::Static, 40_000, 50, 10),
+        (Coder::Context, 40_000, 50, 10),
+    ] {
         let shape = ModelShape {
             feature_dim,
             n_offsets,
@@ -43,21 +31,21 @@ fn bytes_and_times_of_random_scenes() {
             dilation_compensation: true,
         };
         let start = Instant::now();
-        let (_, bytes) = write_random(shape, n_anchors, 1, 128);
-        let written = start.elapsed();
+        let (_, bytes) = write_random(coder, shape, n_anchors, 1, 256);
+        println!("{coder:?}, {n_anchors} anchors, F {feature_dim}, K {n_offsets}: made in {:?}", start.elapsed());
         let bundle = Bundle::parse(&bytes).expect("a sound bundle");
         let report = SizeReport::of(&bundle).expect("sound chunks");
-        let model_bits = report.feature_bits + report.log_scale_bits + report.offset_bits;
-        println!("{n_anchors} anchors, F {feature_dim}, K {n_offsets}: written in {written:?}, {report:?}");
+        let ideal = report.ideal.total() / 8.0;
         println!(
-            "  {} tables; {:.2} bytes an anchor; ANS +{:.3} % on the tables, all +{:.3} % on the channels' entropy",
-            bundle.tables().len(),
-            report.bytes_per_anchor(),
-            100.0 * (8.0 * report.symbols as f64 / model_bits - 1.0),
-            100.0 * (8.0 * (report.symbols + report.tables) as f64 / entropy_bits(&bundle) - 1.0),
+            "  {} bytes; streams +{:.3} % on the models' cross entropy, container {:.2} % of the file",
+            report.total,
+            100.0 * (report.streams as f64 / ideal - 1.0),
+            100.0 * report.container() / report.total as f64,
         );
-        let plan =
-            bundle.plan(&Budget { width_px: 400, height_px: 400, max_splats: MaxSplats::Worst }).expect("a plan");
+        let start = Instant::now();
+        println!("  {} anchors decoded in {:?}", decoded_rows(&bundle).len(), start.elapsed());
+        let budget = Budget { width_px: 400, height_px: 400, max_splats: MaxSplats::Worst, tiers: u8::MAX };
+        let plan = bundle.plan(&budget).expect("a plan");
         let mut scratch = vec![0; plan.scratch_len()];
         let mut decoder = Decoder::bind(&bundle, plan, &mut scratch).expect("planned memory");
         let camera = crate::render::decoder::core_camera(&camera(400, 400)).expect("a sound camera");

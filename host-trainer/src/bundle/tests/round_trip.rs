@@ -1,135 +1,245 @@
-use pocketsplat_core::Bundle;
+use std::collections::BTreeMap;
 
-use super::{SMALL, STEPS, camera, info, random_scene, write_random};
+use pocketsplat_core::Bundle;
+use pocketsplat_core::context::Group;
+
+use super::{SMALL, camera, decoded_rows, info, options, random_scene, with_context, write_bytes, write_random};
 use crate::bundle::annotate::annotate;
-use crate::bundle::{ChannelName, SizeReport, WriteError, write};
+use crate::bundle::channels::ContextWork;
+use crate::bundle::{ChannelName, Coder, SizeReport, WriteError, WriteOptions, decoded_scene, write};
 use crate::render::decoder::core_image;
 use crate::render::reference::ReferenceScene;
-use crate::scene::{Heads, Scene};
+use crate::scene::{Heads, ModelShape, Scene};
 
-/// One anchor as the trainer has it and as the bundle returns it: lattice and symbols.
-type Row = ([i32; 3], Vec<i16>);
+/// Drawn offsets and symbols of the anchors that a bundle keeps, by their cells.
+type Rows = BTreeMap<[i32; 3], (u32, Vec<i16>)>;
 
-fn rows_of_scene(scene: &Scene<f32>, step: f32) -> Vec<Row> {
-    let symbol = |x: &f32| (f64::from(*x) / f64::from(step)).round_ties_even() as i16;
-    let anchors = &scene.anchors;
-    (0..anchors.len())
-        .map(|a| {
-            let part = |values: &[f32], n: usize| values[a * n..(a + 1) * n].iter().map(symbol).collect::<Vec<_>>();
-            let features = part(&anchors.features, scene.shape.feature_dim);
-            let offsets = part(&anchors.offsets, 3 * scene.shape.n_offsets);
-            (anchors.lattice[a], [features, part(&anchors.log_scales, 6), offsets].concat())
-        })
-        .collect()
-}
-
-fn rows_of_bundle(bundle: &Bundle<'_>) -> Vec<Row> {
-    let n_channels = bundle.header().n_channels();
-    let mut rows = Vec::new();
-    for chunk in bundle.chunks() {
-        let n = usize::from(chunk.n_anchors());
-        let (mut lattice, mut symbols) = (vec![[0; 3]; n], vec![0; n * n_channels]);
-        chunk.decode_symbols(bundle.tables(), &mut lattice, &mut symbols).expect("a sound chunk");
-        rows.extend(lattice.into_iter().zip(symbols.chunks_exact(n_channels).map(<[i16]>::to_vec)));
+/// What the bundle of a scene holds, `steps` being those at a cell: features, log-scales, offsets.
+fn rows_of_scene(scene: &Scene<f32>, steps: impl Fn([i32; 3]) -> [f32; 3]) -> Rows {
+    let (f, k, anchors) = (scene.shape.feature_dim, scene.shape.n_offsets, &scene.anchors);
+    let mut rows = Rows::new();
+    for (a, &cell) in anchors.lattice.iter().enumerate() {
+        let steps = steps(cell).map(f64::from);
+        let symbols = |values: &[f32], step: f64| {
+            values.iter().map(|&x| (f64::from(x) / step).round_ties_even() as i16).collect::<Vec<_>>()
+        };
+        let features = symbols(&anchors.features[a * f..][..f], steps[0]);
+        let log_scales = symbols(&anchors.log_scales[a * 6..][..6], steps[1]);
+        let mut offsets = symbols(&anchors.offsets[a * 3 * k..][..3 * k], steps[2]);
+        let mut drawn = 0;
+        for offset in 0..k {
+            if anchors.mask_logits[a * k + offset] > -4.595_12 {
+                drawn |= 1 << offset;
+            } else {
+                offsets[3 * offset..][..3].fill(0);
+            }
+        }
+        if drawn != 0 {
+            rows.insert(cell, (drawn, [features, log_scales, offsets].concat()));
+        }
     }
     rows
 }
 
+fn rows_of_bundle(bundle: &Bundle<'_>) -> Rows {
+    decoded_rows(bundle).into_iter().map(|(site, symbols)| (site.lattice, (site.mask, symbols))).collect()
+}
+
 #[test]
-fn every_symbol_comes_back() {
+fn every_symbol_comes_back_under_static_tables() {
     for (n_anchors, chunk_anchors) in [(1, 128), (300, 128), (129, 1), (500, 1024)] {
-        let (mut scene, _) = write_random(SMALL, n_anchors, 3, chunk_anchors);
+        let mut scene = random_scene(SMALL, n_anchors, 3);
         // Far outliers take the escape.
         scene.anchors.offsets[0] = 600.0;
         scene.anchors.features[0] = -655.0;
-        let bytes = write(&scene, &info(), &STEPS).expect("a sound scene");
+        scene.anchors.mask_logits[0] = 1.0;
+        let bytes = write_bytes(&scene, &options(Coder::Auto, chunk_anchors));
         let bundle = Bundle::parse(&bytes).expect("a sound bundle");
-        let (mut expected, mut found) = (rows_of_scene(&scene, 0.02), rows_of_bundle(&bundle));
-        // The bundle is in Morton order.
-        expected.sort();
-        found.sort();
-        assert_eq!(expected, found, "{n_anchors} anchors in chunks of {chunk_anchors}");
+        assert!(bundle.tables().is_some(), "a scene without context");
+        let expected = rows_of_scene(&scene, |_| [0.02; 3]);
+        assert_eq!(rows_of_bundle(&bundle), expected, "{n_anchors} anchors in chunks of {chunk_anchors}");
+        assert_eq!(bundle.n_anchors() as usize, expected.len(), "{n_anchors} anchors in chunks of {chunk_anchors}");
+    }
+}
+
+#[test]
+fn every_symbol_comes_back_under_a_context() {
+    for (n_anchors, chunk_anchors) in [(1, 128), (300, 128), (129, 1), (500, 1024)] {
+        let mut scene = with_context(random_scene(SMALL, n_anchors, 4), 5);
+        // A byte beyond the table, and three.
+        scene.anchors.offsets[..3].copy_from_slice(&[18.0, -18.0, 1000.0]);
+        scene.anchors.features[..2].copy_from_slice(&[655.0, -655.0]);
+        scene.anchors.mask_logits[0] = 1.0;
+        let bytes = write_bytes(&scene, &options(Coder::Context, chunk_anchors));
+        let bundle = Bundle::parse(&bytes).expect("a sound bundle");
+        let context = bundle.context().expect("the coder asked for");
+        let expected = rows_of_scene(&scene, |cell| {
+            let steps = ContextWork::default().enter(context, cell);
+            [Group::Feature, Group::LogScale, Group::Offset].map(|group| steps.value(group))
+        });
+        assert_eq!(rows_of_bundle(&bundle), expected, "{n_anchors} anchors in chunks of {chunk_anchors}");
+    }
+}
+
+#[test]
+fn the_static_coder_keeps_a_contexts_mean_steps() {
+    let scene = with_context(random_scene(SMALL, 200, 4), 5);
+    let bytes = write_bytes(&scene, &options(Coder::Static, 64));
+    let bundle = Bundle::parse(&bytes).expect("a sound bundle");
+    let steps: Vec<f32> = bundle.tables().expect("the coder asked for").of_channels().map(|table| table.step).collect();
+    let n_channels = SMALL.values_per_anchor();
+    let base = scene.context.as_ref().map(|context| context.base_steps).expect("a context");
+    for (channel, group) in [(0, 0), (SMALL.feature_dim, 1), (n_channels - 1, 2)] {
+        let octaves = (steps[channel] / base[group]).log2();
+        assert!((-3.0..=0.875).contains(&octaves), "channel {channel}: {octaves} octaves from the base step");
+    }
+    assert_eq!(
+        rows_of_bundle(&bundle),
+        rows_of_scene(&scene, |_| [steps[0], steps[SMALL.feature_dim], steps[n_channels - 1]])
+    );
+}
+
+#[test]
+fn auto_takes_the_shorter_file() {
+    for n_anchors in [20, 3000] {
+        let scene = with_context(random_scene(SMALL, n_anchors, 4), 5);
+        let [auto, fixed, context] =
+            [Coder::Auto, Coder::Static, Coder::Context].map(|coder| write_bytes(&scene, &options(coder, 128)));
+        assert_eq!(auto.len(), fixed.len().min(context.len()), "{n_anchors} anchors");
     }
 }
 
 #[test]
 fn an_empty_scene_is_a_bundle_of_background() {
     let scene = random_scene(SMALL, 0, 1);
-    let bytes = write(&scene, &info(), &STEPS).expect("an empty scene");
+    let bytes = write_bytes(&scene, &WriteOptions::default());
     let bundle = Bundle::parse(&bytes).expect("a sound bundle");
     let frame = core_image(&bundle, &camera(20, 20)).expect("a frame");
     assert!(frame.image.rgb.as_chunks().0.iter().all(|&pixel| pixel == [10, 20, 30]), "background everywhere");
 }
 
 #[test]
+fn without_hidden_offsets_masks_cost_nothing() {
+    let mut scene = random_scene(SMALL, 100, 2);
+    scene.anchors.mask_logits.fill(1.0);
+    let written = write(&scene, &info(), &WriteOptions::default()).expect("a sound scene");
+    let report = written.report;
+    assert_eq!((report.mask_model, report.ideal.masks), (0, 0.0), "{report:?}");
+    assert_eq!(report.n_drawn_offsets, 300, "all of them");
+}
+
+#[test]
 fn weights_come_back_as_halves() {
-    let (scene, bytes) = write_random(SMALL, 10, 5, 128);
+    let (scene, bytes) = write_random(Coder::Auto, SMALL, 10, 5, 128);
     let bundle = Bundle::parse(&bytes).expect("a sound bundle");
+    let rounded = |weights: &[f32]| weights.iter().map(|&w| half::f16::from_f32(w).to_f32()).collect::<Vec<f32>>();
     let Heads { colour, .. } = &scene.heads;
-    let stored: Vec<f32> = bundle.heads().colour.w2.iter().collect();
-    let rounded: Vec<f32> = colour.w2.iter().map(|&w| half::f16::from_f32(w).to_f32()).collect();
-    assert_eq!(stored, rounded, "colour W2");
+    let decoded = decoded_scene(&bundle).expect("a sound bundle").heads.colour;
+    for (stored, trained) in decoded.groups().into_iter().zip(colour.groups()) {
+        assert_eq!(stored, rounded(trained), "colour head");
+    }
 }
 
 #[test]
 fn values_that_do_not_fit_are_named() {
-    let mut scene = random_scene(SMALL, 10, 7);
+    let fails = |scene: &Scene<f32>, why: &str| write(scene, &info(), &options(Coder::Auto, 64)).expect_err(why);
+    let shown = || {
+        let mut scene = random_scene(SMALL, 10, 7);
+        scene.anchors.mask_logits.fill(1.0);
+        scene
+    };
+    let mut scene = shown();
     scene.anchors.log_scales[6 * 4 + 1] = f32::NAN;
-    let error = write(&scene, &info(), &STEPS).expect_err("NaN");
-    assert!(
-        matches!(error, WriteError::NotFinite { anchor: 4, channel: ChannelName::LogScale(1), .. }),
-        "unexpected {error}"
-    );
+    let error = fails(&scene, "NaN");
+    assert!(matches!(error, WriteError::NotFinite { anchor: 4, channel: ChannelName::LogScale(1), .. }), "{error}");
     assert_eq!(
         error.to_string(),
         "anchor 4, log-scale 1: NaN is not finite; training diverged before this was written",
         "message"
     );
-    let mut scene = random_scene(SMALL, 10, 7);
+    let mut scene = shown();
     scene.anchors.offsets[9 * 2 + 4] = 1e4;
-    let error = write(&scene, &info(), &STEPS).expect_err("too far");
+    let error = fails(&scene, "too far");
     assert!(
         matches!(error, WriteError::BeyondSymbols { anchor: 2, channel: ChannelName::Offset(1, 1), .. }),
-        "unexpected {error}"
+        "{error}"
     );
-    let mut scene = random_scene(SMALL, 10, 7);
+    scene.anchors.mask_logits[3 * 2 + 1] = -10.0;
+    write(&scene, &info(), &options(Coder::Auto, 64)).expect("what is not drawn is not coded");
+    let mut scene = shown();
     scene.heads.opacity.b1[2] = 1e6;
-    let error = write(&scene, &info(), &STEPS).expect_err("too large for half");
-    assert!(matches!(error, WriteError::Weight { head: "opacity", .. }), "unexpected {error}");
-    let mut scene = random_scene(SMALL, 10, 7);
+    let error = fails(&scene, "too large for half");
+    assert!(matches!(error, WriteError::Weight { head: "opacity", .. }), "{error}");
+    let mut scene = shown();
     scene.anchors.lattice[3][1] = i32::MIN;
-    let error = write(&scene, &info(), &STEPS).expect_err("beyond the lattice");
-    assert!(matches!(error, WriteError::BeyondLattice { anchor: 3, .. }), "unexpected {error}");
+    let error = fails(&scene, "beyond the lattice");
+    assert!(matches!(error, WriteError::BeyondLattice { anchor: 3, .. }), "{error}");
+    scene.anchors.lattice[3][1] = 1 << 22;
+    let error = fails(&scene, "too wide");
+    assert!(matches!(error, WriteError::LatticeTooWide { .. }), "{error}");
+    let mut scene = shown();
+    scene.anchors.lattice[8] = scene.anchors.lattice[5];
+    let error = fails(&scene, "two of a cell");
+    assert!(matches!(error, WriteError::SharedCell { anchors: [5, 8], .. }), "{error}");
+    let error = write(&shown(), &info(), &options(Coder::Context, 64)).expect_err("no context to code with");
+    assert_eq!(error, WriteError::NoContext, "{error}");
 }
 
 #[test]
 fn the_annotated_dump_shows_every_byte_once() {
-    let (_, bytes) = write_random(SMALL, 40, 9, 16);
-    let dump = annotate(&bytes).expect("a sound bundle");
-    let shown = dump.lines().filter_map(|line| {
-        let (hex, _) = line.get(8..)?.split_at_checked(23)?;
-        hex.trim().split(' ').map(|byte| u8::from_str_radix(byte, 16).ok()).collect::<Option<Vec<u8>>>()
-    });
-    assert_eq!(shown.flatten().collect::<Vec<u8>>(), bytes, "the hexadecimal column is the file");
+    for coder in [Coder::Static, Coder::Context] {
+        let (_, bytes) = write_random(coder, SMALL, 40, 9, 16);
+        let dump = annotate(&bytes, usize::MAX).expect("a sound bundle");
+        let shown = dump.lines().filter_map(|line| {
+            let (hex, _) = line.get(8..)?.split_at_checked(23)?;
+            hex.trim().split(' ').map(|byte| u8::from_str_radix(byte, 16).ok()).collect::<Option<Vec<u8>>>()
+        });
+        assert_eq!(shown.flatten().collect::<Vec<u8>>(), bytes, "{coder:?}: the hexadecimal column is the file");
+        let short = annotate(&bytes, 2).expect("a sound bundle");
+        assert!(short.lines().count() < dump.lines().count() / 2, "{coder:?}: arrays are abbreviated");
+    }
 }
 
 #[test]
 fn the_size_report_accounts_for_every_byte() {
-    let (_, bytes) = write_random(SMALL, 700, 9, 128);
-    let report = SizeReport::of(&Bundle::parse(&bytes).expect("a sound bundle")).expect("sound chunks");
-    let parts = [report.header, report.heads, report.tables, report.directory, report.lattice, report.symbols];
-    assert_eq!(parts.iter().sum::<usize>(), bytes.len(), "{report:?}");
-    let ideal_bytes = (report.feature_bits + report.log_scale_bits + report.offset_bits) / 8.0;
-    let n_chunks = 700_usize.div_ceil(128);
-    let overhead = report.symbols as f64 - ideal_bytes;
-    assert!((0.0..6.0 * n_chunks as f64).contains(&overhead), "{overhead} bytes over {n_chunks} chunks");
+    for coder in [Coder::Static, Coder::Context] {
+        let scene = with_context(random_scene(SMALL, 700, 9), 10);
+        let importance = Some((0..700).map(|i| (i % 13) as f32).collect());
+        let written = write(&scene, &info(), &WriteOptions { importance, ..options(coder, 128) }).expect("sound");
+        let report = written.report;
+        let bundle = Bundle::parse(&written.bytes).expect("a sound bundle");
+        assert_eq!(SizeReport::of(&bundle), Ok(report), "{coder:?}: as the bundle tells");
+        let sum: f64 = report.parts().iter().map(|part| part.bytes).sum();
+        assert!((sum - written.bytes.len() as f64).abs() < 1e-6, "{coder:?}: {report:?}");
+        // Each stream ends in two words of state, of which half a word on average says nothing.
+        let per_chunk = report.states() / f64::from(bundle.n_chunks());
+        assert!((0.0..6.0).contains(&per_chunk), "{coder:?}: {per_chunk} bytes a chunk");
+    }
+}
+
+#[test]
+fn large_scenes_pay_little_for_states_and_container() {
+    let shape = ModelShape { feature_dim: 16, n_offsets: 6, ..SMALL };
+    for coder in [Coder::Static, Coder::Context] {
+        let scene = with_context(random_scene(shape, 6000, 9), 10);
+        let importance = Some((0..6000).map(|i| (i % 101) as f32).collect());
+        let options = WriteOptions { importance, ..WriteOptions { coder, ..WriteOptions::default() } };
+        let written = write(&scene, &info(), &options).expect("a sound scene");
+        let report = written.report;
+        let over = report.states() / (report.ideal.total() / 8.0);
+        assert!((0.0..0.005).contains(&over), "{coder:?}: {over} over the models' cross entropy");
+        let container = report.container() / report.total as f64;
+        assert!(container < 0.02, "{coder:?}: {container} of the file, {report:?}");
+    }
 }
 
 #[test]
 fn the_decoder_draws_what_the_oracle_draws() {
-    for (seed, compensation) in [(11, false), (12, true)] {
-        let shape = crate::scene::ModelShape { dilation_compensation: compensation, ..SMALL };
-        let (_, bytes) = write_random(shape, 1500, seed, 128);
+    for (seed, coder, compensation) in
+        [(11, Coder::Static, false), (12, Coder::Static, true), (13, Coder::Context, true)]
+    {
+        let shape = ModelShape { dilation_compensation: compensation, ..SMALL };
+        let (_, bytes) = write_random(coder, shape, 1500, seed, 128);
         let bundle = Bundle::parse(&bytes).expect("a sound bundle");
         let camera = camera(100, 70);
         let frame = core_image(&bundle, &camera).expect("a frame");

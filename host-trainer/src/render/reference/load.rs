@@ -1,12 +1,14 @@
 //! Where the oracle's scenes come from.
 
 use glam::DVec3;
-use pocketsplat_core::bundle::{Halves, HeadView};
+use pocketsplat_core::bundle::{AnchorSite, Coder};
+use pocketsplat_core::context::{Context, Group};
 use pocketsplat_core::{Bundle, DecodeError};
 
 use super::ReferenceScene;
+use crate::bundle::{decoded_heads, shape_of};
 use crate::ops::Real;
-use crate::scene::{Head, Heads, ModelShape, Scene};
+use crate::scene::{Head, Heads, Scene};
 
 impl ReferenceScene {
     /// The scene that a trainer holds: every value widened, positions `lattice · voxel_size`.
@@ -16,6 +18,7 @@ impl ReferenceScene {
         Self {
             shape,
             positions: anchors.lattice.iter().map(position).collect(),
+            drawn: (0..anchors.mask_logits.len()).map(|offset| anchors.is_drawn(offset)).collect(),
             features: anchors.features,
             log_scales: anchors.log_scales,
             offsets: anchors.offsets,
@@ -23,23 +26,18 @@ impl ReferenceScene {
         }
     }
 
-    /// The scene that a bundle holds: dequantised values and f16 weights, widened.
+    /// The scene that a bundle holds: dequantised values and weights, widened.
     ///
-    /// Only the symbols come from the decoder, since there is one truth about those.
+    /// Only the symbols, and the integers behind an anchor's steps, come from the decoder, since there is one truth about
+    /// those.
     ///
     /// # Errors
     /// [`DecodeError`] of the first chunk that does not decode.
     pub fn from_bundle(bundle: &Bundle<'_>) -> Result<Self, DecodeError> {
-        let header = bundle.header();
-        let shape = ModelShape {
-            feature_dim: header.feature_dim.into(),
-            n_offsets: header.n_offsets.into(),
-            view_direction: header.effects.view_direction,
-            view_distance: header.effects.view_distance,
-            dilation_compensation: header.effects.dilation_compensation,
-        };
-        let wide = |weights: &Halves<'_>| weights.iter().map(f64::from).collect::<Vec<f64>>();
-        let head = |h: &HeadView<'_>| Head {
+        let (header, shape) = (bundle.header(), shape_of(bundle));
+        let n_channels = shape.values_per_anchor();
+        let wide = |weights: &[f32]| weights.iter().map(|&w| f64::from(w)).collect::<Vec<f64>>();
+        let head = |h: &Head<f32>| Head {
             n_in: h.n_in,
             n_hidden: h.n_hidden,
             n_out: h.n_out,
@@ -48,39 +46,61 @@ impl ReferenceScene {
             w2: wide(&h.w2),
             b2: wide(&h.b2),
         };
-        let heads = bundle.heads();
+        let Heads { opacity, covariance, colour } = decoded_heads(bundle);
         let mut scene = Self {
             shape,
             positions: Vec::new(),
             features: Vec::new(),
             log_scales: Vec::new(),
             offsets: Vec::new(),
-            heads: Heads {
-                opacity: head(&heads.opacity),
-                covariance: head(&heads.covariance),
-                colour: head(&heads.colour),
-            },
+            drawn: Vec::new(),
+            heads: Heads { opacity: head(&opacity), covariance: head(&covariance), colour: head(&colour) },
         };
-        for index in 0..header.n_chunks {
-            let chunk = bundle.chunk(index)?;
-            let mut lattice = vec![[0; 3]; chunk.n_anchors().into()];
-            let mut symbols = vec![0i16; lattice.len() * shape.values_per_anchor()];
-            chunk.decode_symbols(bundle.tables(), &mut lattice, &mut symbols)?;
-            // The position itself is an f32 by definition of the format.
-            let position = |cell: &[i32; 3]| DVec3::from(cell.map(|c| f64::from(c as f32 * header.voxel_size)));
-            scene.positions.extend(lattice.iter().map(position));
-            for symbols in symbols.chunks_exact(shape.values_per_anchor()) {
-                // FORMAT.md, section 4: value = origin + symbol·step, both operations rounded to f32.
-                let tables = bundle.tables().of_channels();
-                let row: Vec<f32> =
-                    symbols.iter().zip(tables).map(|(&s, t)| f32::from(s) * t.step + t.origin).collect();
+        let mut words = vec![0; bundle.anchor_scratch_words()];
+        let mut models = bundle.anchor_models(&mut words)?;
+        for chunk in bundle.chunks() {
+            let mut sites = vec![AnchorSite::default(); chunk.n_anchors().into()];
+            let mut symbols = vec![0i16; sites.len() * n_channels];
+            chunk.decode_symbols(&mut models, &mut sites, &mut symbols)?;
+            for (site, symbols) in sites.iter().zip(symbols.chunks_exact(n_channels)) {
+                // The position itself is an f32 by definition of the format.
+                let position = site.lattice.map(|c| f64::from(c as f32 * header.voxel_size));
+                scene.positions.push(DVec3::from(position));
+                scene.drawn.extend((0..shape.n_offsets).map(|k| (site.mask >> k) & 1 == 1));
+                let row: Vec<f64> = match bundle.coder() {
+                    Coder::Static(tables) => {
+                        // value = origin + symbol·step, both operations rounded to f32.
+                        let values =
+                            symbols.iter().zip(tables.of_channels()).map(|(&s, t)| f32::from(s) * t.step + t.origin);
+                        values.map(f64::from).collect()
+                    }
+                    Coder::Context(context) => {
+                        let steps = steps(context, site.lattice);
+                        let step_of = |channel: usize| match channel.checked_sub(shape.feature_dim) {
+                            None => steps[0],
+                            Some(0..6) => steps[1],
+                            Some(_) => steps[2],
+                        };
+                        symbols.iter().enumerate().map(|(channel, &s)| f64::from(s) * step_of(channel)).collect()
+                    }
+                };
                 let (features, rest) = row.split_at(shape.feature_dim);
                 let (log_scales, offsets) = rest.split_at(6);
-                scene.features.extend(features.iter().map(|&v| f64::from(v)));
-                scene.log_scales.extend(log_scales.iter().map(|&v| f64::from(v)));
-                scene.offsets.extend(offsets.iter().map(|&v| f64::from(v)));
+                scene.features.extend(features);
+                scene.log_scales.extend(log_scales);
+                scene.offsets.extend(offsets);
             }
         }
         Ok(scene)
     }
+}
+
+/// base·2^(q/8) of the three groups, exact where the decoder multiplies tabulated factors.
+fn steps(context: &Context<'_>, lattice: [i32; 3]) -> [f64; 3] {
+    let (mut features, mut hidden) = (vec![0; context.n_inputs()], vec![0; context.n_hidden()]);
+    context.features(lattice, &mut features);
+    context.hidden(&features, &mut hidden);
+    let steps = context.steps(&hidden);
+    let exponents = [Group::Feature, Group::LogScale, Group::Offset].map(|group| steps.exponent(group));
+    std::array::from_fn(|i| f64::from(context.base_steps()[i]) * (f64::from(exponents[i]) / 8.0).exp2())
 }

@@ -61,7 +61,7 @@ fn scene_of(balls: &[Ball]) -> ReferenceScene {
         }
     }
     let positions = balls.iter().map(|b| DVec3::from(b.position)).collect();
-    ReferenceScene { shape, positions, features, log_scales, offsets: vec![0.0; 3 * n], heads }
+    ReferenceScene { shape, positions, features, log_scales, offsets: vec![0.0; 3 * n], drawn: vec![true; n], heads }
 }
 
 fn camera() -> Camera {

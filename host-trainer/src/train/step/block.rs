@@ -32,8 +32,10 @@ pub struct Block<R> {
     input: Vec<R>,
     hidden: [Vec<R>; 3],
     outputs: HeadOutputs<R>,
-    pub(super) splats: Vec<Splat<R>>,
-    pub(super) footprints: Vec<Footprint<R>>,
+    /// Their splats.
+    pub splats: Vec<Splat<R>>,
+    /// How far these reach.
+    pub footprints: Vec<Footprint<R>>,
     d_gaussians: Vec<Gaussian<R>>,
     d_outputs: HeadOutputs<R>,
     d_hidden: Vec<R>,

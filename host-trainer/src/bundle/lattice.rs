@@ -1,0 +1,182 @@
+//! Positions: the lattice cells of a chunk as a binary trie over their Morton codes.
+//!
+//! The trie is walked depth first, 0 before 1, and each inner node says which children it has. That takes 9 to 13 bits an
+//! anchor on trained scenes, where packed coordinates take 20 and more. The idea of coding occupancy by depth is that of
+//! octrees (Meagher 1982); one bit at a time needs three symbols instead of 255, and learns as much from its ancestors.
+
+use pocketsplat_core::bundle::{Lattice, MAX_LATTICE_BITS};
+use pocketsplat_core::entropy::{FREQUENCY_TOTAL, N_TRIE_CONTEXTS, Slot};
+
+use super::WriteError;
+use super::frequencies::frequencies;
+use super::stream::{Part, SlotList};
+
+/// Largest magnitude of a lattice coordinate: f32 holds every integer up to twice that.
+const MAX_LATTICE: i32 = 1 << 23;
+/// The bit of the root in a set of levels.
+const TOP_LEVEL: u64 = 1 << 63;
+/// Ancestors of a node that its context looks at.
+const N_ANCESTORS: u32 = 3;
+
+/// Where Morton codes count from, and how long they are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct LatticeFrame {
+    pub(super) min: [i32; 3],
+    pub(super) bits_per_axis: u32,
+}
+
+/// Which children a node of the trie has; the order is that of the slots.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Children {
+    Both,
+    Zero,
+    One,
+}
+
+/// A node as its children are coded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Node {
+    /// Its depth; the root has 0.
+    level: usize,
+    context: usize,
+    children: Children,
+}
+
+/// How often nodes of each level and context have which children.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct LatticeModel {
+    pub(super) frame: LatticeFrame,
+    /// `[3·bits_per_axis, N_TRIE_CONTEXTS]` ends of the slots of "both" and of "only 0"; "only 1" has the rest.
+    pub(super) ends: Vec<[[u16; 2]; N_TRIE_CONTEXTS]>,
+}
+
+impl LatticeFrame {
+    /// The smallest frame of all `cells`.
+    ///
+    /// # Errors
+    /// [`WriteError::BeyondLattice`] and [`WriteError::LatticeTooWide`].
+    pub(super) fn of(cells: &[[i32; 3]]) -> Result<Self, WriteError> {
+        for (anchor, cell) in cells.iter().enumerate() {
+            if let Some(&found) = cell.iter().find(|c| c.unsigned_abs() > MAX_LATTICE.unsigned_abs()) {
+                return Err(WriteError::BeyondLattice { anchor, found, limit: MAX_LATTICE });
+            }
+        }
+        let along = |axis: usize| cells.iter().map(move |cell| cell[axis]);
+        let min: [i32; 3] = std::array::from_fn(|axis| along(axis).min().unwrap_or_default());
+        let spans = (0..3).map(|axis| along(axis).max().unwrap_or_default().abs_diff(min[axis]));
+        let span = spans.max().unwrap_or_default();
+        let bits_per_axis = u32::BITS - span.leading_zeros();
+        if bits_per_axis > u32::from(MAX_LATTICE_BITS) {
+            return Err(WriteError::LatticeTooWide { found: span, limit: (1 << MAX_LATTICE_BITS) - 1 });
+        }
+        Ok(Self { min, bits_per_axis })
+    }
+
+    /// Morton code of a cell: bits of z, y and x in turn from the highest on, x lowest.
+    pub(super) fn code(&self, cell: [i32; 3]) -> u64 {
+        let offset: [u32; 3] = std::array::from_fn(|axis| cell[axis].abs_diff(self.min[axis]));
+        (0..self.bits_per_axis).fold(0, |code, bit| {
+            (0..3).fold(code, |code, axis| code | (u64::from((offset[axis] >> bit) & 1) << (3 * bit + axis as u32)))
+        })
+    }
+
+    /// Levels of the trie, leaves apart.
+    pub(super) fn n_levels(&self) -> u32 {
+        3 * self.bits_per_axis
+    }
+}
+
+/// A walk over the trie of a chunk, in coding order.
+pub(super) struct Walk<'c> {
+    /// Morton codes, ascending.
+    codes: &'c [u64],
+    n_levels: u32,
+    /// Levels on the path to the latest anchor whose node has both children, the root's bit highest.
+    both: u64,
+}
+
+impl<'c> Walk<'c> {
+    /// Starts at the root.
+    pub(super) fn new(frame: &LatticeFrame, codes: &'c [u64]) -> Self {
+        Self { codes, n_levels: frame.n_levels(), both: 0 }
+    }
+
+    /// Visits the nodes that anchor `anchor` is the first to reach; anchors come one after the other.
+    fn visit(&mut self, anchor: usize, mut node: impl FnMut(Node)) {
+        let Some((&code, later)) = self.codes[anchor..].split_first() else { return };
+        let first_level = match anchor.checked_sub(1) {
+            None => 0,
+            // Where it leaves the path of the anchor before it, it takes the branch that is due; new nodes lie below.
+            Some(before) => self.n_levels - (self.codes[before] ^ code).ilog2(),
+        };
+        for level in first_level..self.n_levels {
+            let below = self.n_levels - 1 - level;
+            let has_zero = (code >> below) & 1 == 0;
+            // Codes that share the path to this node come first among the later ones.
+            let n_shared = later.partition_point(|other| (other ^ code) >> below <= 1);
+            let has_one = !has_zero || later[..n_shared].last().is_some_and(|last| (last >> below) & 1 == 1);
+            let children = match (has_zero, has_one) {
+                (true, true) => Children::Both,
+                (true, false) => Children::Zero,
+                (false, _) => Children::One,
+            };
+            let ancestors = self.both.unbounded_shr(u64::BITS - level) & ((1 << N_ANCESTORS) - 1);
+            let context = (ancestors.count_ones() as usize).min(N_TRIE_CONTEXTS - 1);
+            let place = TOP_LEVEL >> level;
+            self.both = if children == Children::Both { self.both | place } else { self.both & !place };
+            node(Node { level: level as usize, context, children });
+        }
+    }
+}
+
+impl LatticeModel {
+    /// Counts the nodes of all chunks; the codes of each ascend.
+    pub(super) fn count<'c>(frame: LatticeFrame, chunks: impl Iterator<Item = &'c [u64]>) -> Self {
+        let mut counts = vec![[[0_u64; 3]; N_TRIE_CONTEXTS]; frame.n_levels() as usize];
+        for codes in chunks {
+            let mut walk = Walk::new(&frame, codes);
+            for anchor in 0..codes.len() {
+                walk.visit(anchor, |node| counts[node.level][node.context][node.children as usize] += 1);
+            }
+        }
+        let ends = |counts: [u64; 3]| {
+            let frequencies = frequencies(&counts, None);
+            [frequencies[0] as u16, (frequencies[0] + frequencies[1]) as u16]
+        };
+        Self { frame, ends: counts.iter().map(|level| level.map(ends)).collect() }
+    }
+
+    /// The model of a bundle.
+    pub(super) fn of(lattice: &Lattice<'_>) -> Self {
+        let ends = |level: usize, context: usize| {
+            lattice.trie.node(level, context).map_or([0; 2], |node| [node.end_both, node.end_zero])
+        };
+        Self {
+            frame: LatticeFrame { min: lattice.min, bits_per_axis: lattice.bits.into() },
+            ends: (0..lattice.trie.n_levels())
+                .map(|level| std::array::from_fn(|context| ends(level, context)))
+                .collect(),
+        }
+    }
+
+    /// Appends the slots of the next anchor of a walk.
+    pub(super) fn push(&self, walk: &mut Walk<'_>, anchor: usize, list: &mut SlotList) {
+        walk.visit(anchor, |node| {
+            let [end_both, end_zero] = self.ends[node.level][node.context];
+            let (start, end) = match node.children {
+                Children::Both => (0, end_both),
+                Children::Zero => (end_both, end_zero),
+                Children::One => (end_zero, FREQUENCY_TOTAL),
+            };
+            list.push(Part::Position, &Slot { symbol: (), start, frequency: end - start });
+        });
+    }
+
+    /// The section's bytes.
+    pub(super) fn section(&self) -> Vec<u8> {
+        let mut bytes: Vec<u8> = self.frame.min.iter().flat_map(|c| c.to_le_bytes()).collect();
+        bytes.extend([self.frame.bits_per_axis as u8, 0, 0, 0]);
+        bytes.extend(self.ends.as_flattened().as_flattened().iter().flat_map(|end| end.to_le_bytes()));
+        bytes
+    }
+}

@@ -7,7 +7,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-jobs=(fmt clippy doc test core-embedded format-doc link-gate firmware demo)
+jobs=(fmt clippy doc test core-embedded format-doc link-gate digests firmware demo)
 
 embedded_target=thumbv7em-none-eabihf
 defmt_print_version=1.2.0
@@ -50,9 +50,13 @@ need_cargo() {
     fail "rustfmt or clippy is missing: run \`rustup component add rustfmt clippy\`"
 }
 
+need_target() { # TARGET
+  [ -d "$(rustc --print sysroot)/lib/rustlib/$1/lib" ] && return
+  rustup target add "$1" || fail "the target $1 is missing: run \`rustup target add $1\`"
+}
+
 need_embedded_target() {
-  [ -d "$(rustc --print sysroot)/lib/rustlib/$embedded_target/lib" ] && return
-  rustup target add "$embedded_target" || fail "the target $embedded_target is missing: run \`rustup target add $embedded_target\`"
+  need_target "$embedded_target"
 }
 
 # Prints the path of llvm-nm.
@@ -77,6 +81,8 @@ job_fmt() {
   cargo fmt --all --check
   (cd firmware-example && cargo fmt --check)
   (cd tests/link-gate && cargo fmt --check)
+  (cd tests/digest && cargo fmt --check)
+  (cd fuzz && cargo fmt --check)
 }
 
 job_clippy() {
@@ -117,6 +123,48 @@ job_link-gate() {
   local nm
   nm=$(llvm_nm)
   tests/link-gate/panics.sh "$nm" "$embedded/$embedded_target/release/link-gate"
+}
+
+# Two bundles, one of each coder, decode to the same symbols and values on every target.
+job_digests() {
+  local out=$target/digests host found name
+  need_target aarch64-unknown-linux-gnu
+  need_target armv7-unknown-linux-gnueabihf
+  need_target riscv32imac-unknown-none-elf
+  need_embedded_target
+  need_command aarch64-linux-gnu-gcc gcc-aarch64-linux-gnu libc6-dev-arm64-cross libgcc-12-dev-arm64-cross
+  need_command arm-linux-gnueabihf-gcc gcc-arm-linux-gnueabihf libc6-dev-armhf-cross libgcc-12-dev-armhf-cross
+  need_command qemu-aarch64 qemu-user
+  need_command qemu-system-arm qemu-system-arm
+  need_command qemu-system-riscv32 qemu-system-misc
+  cargo run -q -p conformance --bin digest_bundles --locked -- "$out"
+  digest_of() { # NAME CARGO_ARGUMENTS… -- RUNNER…
+    local name=$1 arguments=()
+    shift
+    while [ "$1" != -- ]; do arguments+=("$1") && shift; done
+    shift
+    (
+      cd tests/digest
+      export PSB_STATIC=$out/static.psb PSB_CONTEXT=$out/context.psb
+      cargo build -q --locked --target-dir "$out/build" "${arguments[@]}"
+    )
+    found=$(timeout 120 "$@" </dev/null) || fail "the digest of $name failed: $found"
+    [ -n "${host:-}" ] || { host=$found && echo "$host"; }
+    [ "$found" = "$host" ] || fail "$name decodes something else: $found"
+    echo "$name: the same"
+  }
+  local build=$out/build semihosting=(-display none -monitor none -serial none -semihosting-config enable=on,target=native)
+  digest_of "this machine, release" --release -- "$build/release/digest"
+  digest_of "this machine, debug" -- "$build/debug/digest"
+  for name in aarch64-unknown-linux-gnu:qemu-aarch64 armv7-unknown-linux-gnueabihf:qemu-arm; do
+    digest_of "${name%:*}" --release --target "${name%:*}" -- "${name#*:}" "$build/${name%:*}/release/digest"
+  done
+  name=thumbv7em-none-eabihf
+  digest_of $name --release --target $name -- \
+    qemu-system-arm -M mps2-an386 "${semihosting[@]}" -kernel "$build/$name/release/digest"
+  name=riscv32imac-unknown-none-elf
+  digest_of $name --release --target $name -- \
+    qemu-system-riscv32 -M virt -bios none "${semihosting[@]}" -kernel "$build/$name/release/digest"
 }
 
 # A bundle drawn by a Cortex-M4 under QEMU is byte for byte what this machine draws, under either coder.

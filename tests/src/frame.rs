@@ -52,15 +52,20 @@ pub fn to_core(camera: &pocketsplat::camera::Camera) -> Camera {
     core_camera(camera).expect("a test camera is a sound one")
 }
 
-/// The bundle of a scene, with the first of the test cameras as its preview.
-pub fn bundle_of(scene: &Scene<f32>, preview: &pocketsplat::camera::Camera) -> Vec<u8> {
-    let info = BundleInfo {
+/// What a bundle says besides its scene, with `preview` as its preview.
+pub fn info_for(preview: &pocketsplat::camera::Camera) -> BundleInfo {
+    BundleInfo {
         normalisation: Normalisation { centre: DVec3::ZERO, scale: 1.0 },
         background: BACKGROUND,
         training_px: [preview.width_px, preview.height_px],
         preview: preview.clone(),
-    };
-    bundle::write(scene, &info, &WriteOptions::default()).expect("a test scene can be written").bytes
+    }
+}
+
+/// The bundle of a scene, with the first of the test cameras as its preview.
+pub fn bundle_of(scene: &Scene<f32>, preview: &pocketsplat::camera::Camera) -> Vec<u8> {
+    let written = bundle::write(scene, &info_for(preview), &WriteOptions::default());
+    written.expect("a test scene can be written").bytes
 }
 
 /// A budget that is enough for every view of the size of `camera`.

@@ -5,12 +5,20 @@
 //! * `parity`: does the decoder draw what the f64 oracle draws?
 //! * `delivery`: does a sink get every pixel once, whatever the scratch memory held and wherever it lay?
 //! * `budget`: do the planned bytes suffice, and does one byte less fail and say how many are needed?
-//! * `malformed`: does a damaged bundle fail, and never draw another picture?
+//! * `malformed`: does a damaged bundle fail and name the place, or report the damaged chunk, and never draw another
+//!   picture in silence?
+//! * `tiers`: is each tier's scene part of the next one's, and is a file cut at its end that scene?
+//! * `digests`: do symbols not depend on the number of threads?
+//! * `fuzzing`: do the bodies of the fuzz targets hold on a seeded walk?
 //! * `captures`: do captures load with the conventions that the renderers use?
 //! * `determinism`: does the same seed give the same bundle for any number of threads?
 
+pub mod bundles;
 pub mod captures;
 pub mod difference;
+#[path = "../digest/src/digest.rs"]
+pub mod digest;
 pub mod frame;
+pub mod fuzz;
 pub mod scenes;
 pub mod seal;

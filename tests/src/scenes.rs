@@ -2,7 +2,8 @@
 
 use glam::{DMat3, DVec3};
 use pocketsplat::camera::Camera;
-use pocketsplat::scene::{Anchors, Heads, ModelShape, Scene};
+use pocketsplat::scene::{Anchors, ContextModel, Heads, MASK_THRESHOLD, ModelShape, Scene};
+use pocketsplat_core::context::{GridFrame, GridLevel, LevelKind};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -71,6 +72,48 @@ pub fn random_scene(case: &Case) -> Scene<f32> {
         head.b2.fill_with(|| rng.random_range(-0.3..0.3));
     }
     Scene { shape: case.shape, voxel_size: VOXEL_SIZE, anchors, heads, context: None }
+}
+
+/// The scene with about a third of its offsets masked, and now and then all of an anchor's.
+pub fn masked(mut scene: Scene<f32>, seed: u64) -> Scene<f32> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    for logit in &mut scene.anchors.mask_logits {
+        let drawn = rng.random_range(0..3) > 0;
+        *logit = MASK_THRESHOLD as f32 + if drawn { 1.0 } else { -1.0 };
+    }
+    scene
+}
+
+/// The scene with a context model of random weights around its own statistics: hashed and dense levels of all kinds.
+pub fn with_context(scene: Scene<f32>, seed: u64) -> Scene<f32> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let level = |kind, resolution, n_rows| GridLevel { kind, resolution, n_rows };
+    let levels = vec![
+        level(LevelKind::Volume, 4, 64),
+        level(LevelKind::Volume, 50, 256),
+        level(LevelKind::Xy, 9, 81),
+        level(LevelKind::Xz, 30, 64),
+        level(LevelKind::Yz, 30, 64),
+    ];
+    let along = |axis: usize| scene.anchors.lattice.iter().map(move |cell| cell[axis]);
+    let frame = GridFrame::spanning(
+        std::array::from_fn(|axis| along(axis).min().unwrap_or(0)),
+        std::array::from_fn(|axis| along(axis).max().unwrap_or(1)),
+    );
+    let base_steps = [0.1, 0.05, 0.1];
+    let mut model = ContextModel::filled(&scene.shape, frame, levels, 8, base_steps, 0.0);
+    model.rows.fill_with(|| rng.random_range(-1.0..1.0));
+    for group in model.mlp.groups_mut() {
+        group.fill_with(|| rng.random_range(-0.3..0.3));
+    }
+    // The values of `random_scene` are uniform: deviations of 0.58, log-scales around −2.2.
+    let (f, n_channels) = (scene.shape.feature_dim, scene.shape.values_per_anchor());
+    for channel in 0..n_channels {
+        let group = usize::from(channel >= f) + usize::from(channel >= f + 6);
+        model.mlp.b2[channel] += [0.0, -44.0, 0.0][group];
+        model.mlp.b2[n_channels + channel] += [2.5, 3.5, 2.5][group];
+    }
+    Scene { context: Some(model), ..scene }
 }
 
 /// A camera at `eye` that looks at `target`, with the world's z up.

@@ -1,0 +1,65 @@
+//! Decodes two bundles, one of each coder, and prints what came out as numbers: the same on every target.
+//!
+//! `PSB_STATIC` and `PSB_CONTEXT` name the bundles when it is built.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+mod digest;
+
+use core::fmt;
+
+use pocketsplat_core::{Bundle, DecodeError};
+
+static BUNDLES: [(&str, &[u8]); 2] =
+    [("static", include_bytes!(env!("PSB_STATIC"))), ("context", include_bytes!(env!("PSB_CONTEXT")))];
+
+/// Words that the models of an anchor may take.
+const SCRATCH_WORDS: usize = 16 * 1024;
+
+/// Hands `print` a line for each bundle.
+fn run(print: impl Fn(fmt::Arguments<'_>)) -> Result<(), DecodeError> {
+    let mut scratch = [0; SCRATCH_WORDS];
+    for (name, bytes) in BUNDLES {
+        let bundle = Bundle::parse(bytes)?;
+        let [symbols, values] = digest::digests(&bundle, &mut scratch)?;
+        print(format_args!(
+            "{name}: {} anchors, symbols {:016x}, values {:016x}",
+            bundle.n_anchors(),
+            symbols.0,
+            values.0
+        ));
+    }
+    Ok(())
+}
+
+#[cfg(not(target_os = "none"))]
+fn main() -> Result<(), DecodeError> {
+    run(|line| println!("{line}"))
+}
+
+#[cfg(target_os = "none")]
+mod bare {
+    use core::panic::PanicInfo;
+
+    #[cfg(target_arch = "arm")]
+    use cortex_m_rt::entry;
+    #[cfg(target_arch = "riscv32")]
+    use riscv_rt::entry;
+    use semihosting::{println, process};
+
+    #[entry]
+    fn main() -> ! {
+        match super::run(|line| println!("{line}")) {
+            Ok(()) => process::exit(0),
+            Err(error) => {
+                println!("{error}");
+                process::exit(1)
+            }
+        }
+    }
+
+    #[panic_handler]
+    fn panic(info: &PanicInfo<'_>) -> ! {
+        println!("{info}");
+        process::exit(1)
+    }
+}

@@ -1,0 +1,39 @@
+//! Bundles with everything that the format offers, of both coders.
+
+use pocketsplat::bundle::{self, Coder, WriteOptions};
+use pocketsplat_core::Bundle;
+
+use crate::frame::info_for;
+use crate::scenes::{Case, cameras, masked, random_scene, with_context};
+
+/// The coders, each by force.
+pub const CODERS: [Coder; 2] = [Coder::Static, Coder::Context];
+
+/// The pruning rates of the tiers: half of the anchors, three quarters, all.
+const PRUNING_RATES: [f32; 3] = [0.5, 0.25, 0.0];
+
+/// A bundle of three tiers with masks, the later anchors of the scene in the earlier tiers.
+///
+/// * `chunk_anchors`: anchors of a chunk at most.
+pub fn tiered(case: &Case, coder: Coder, chunk_anchors: u16) -> Vec<u8> {
+    let scene = with_context(masked(random_scene(case), case.seed), case.seed);
+    let options = WriteOptions {
+        coder,
+        importance: Some((0..scene.anchors.len()).map(|anchor| anchor as f32).collect()),
+        pruning_rates: PRUNING_RATES.to_vec(),
+        chunk_anchors,
+        ..WriteOptions::default()
+    };
+    bundle::write(&scene, &info_for(&cameras()[0].1), &options).expect("a test scene can be written").bytes
+}
+
+/// Where the chunks of a bundle begin, bytes from the start of its file.
+pub fn chunks_offset(bundle: &Bundle<'_>) -> usize {
+    bundle.sections().last().expect("a bundle has sections").offset as usize
+}
+
+/// The lengths at which a file of this bundle is a sound smaller scene or itself, one a tier.
+pub fn tier_ends(bundle: &Bundle<'_>) -> Vec<usize> {
+    let end = |tier| bundle.tier(tier).map(|tier| chunks_offset(bundle) + tier.end as usize);
+    (0..bundle.header().n_tiers).filter_map(end).collect()
+}

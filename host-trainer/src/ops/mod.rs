@@ -7,15 +7,23 @@
 //! with central differences of its forward pass, and f32 with f64.
 
 pub mod adam;
+pub mod adaptive_step;
+pub mod anchor_bits;
+pub mod grid_bits;
 pub mod head;
 pub mod head_input;
 pub mod l1;
+pub mod mask;
 pub mod matmul;
 pub mod neural_gaussians;
+pub mod noise;
+pub mod normal;
+pub mod perturb;
 pub mod pinhole;
 pub mod prefilter;
 pub mod project;
 pub mod rasterise;
+pub mod rate;
 mod real;
 pub mod simd;
 pub mod ssim;

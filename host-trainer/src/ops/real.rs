@@ -35,6 +35,10 @@ pub trait Real:
     fn exp(self) -> Self;
     /// Natural logarithm.
     fn ln(self) -> Self;
+    /// Binary logarithm of a positive, normal number. In f32 a series that vectorises.
+    fn log2(self) -> Self;
+    /// The nearest integer, ties to even.
+    fn round_ties_even(self) -> Self;
     /// Square root.
     fn sqrt(self) -> Self;
     /// Absolute value.
@@ -90,7 +94,7 @@ pub trait Real:
 }
 
 macro_rules! real {
-    ($t:ty, $gemm:path, $exp:expr) => {
+    ($t:ty, $gemm:path, $exp:expr, $log2:expr) => {
         impl Real for $t {
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
@@ -106,6 +110,14 @@ macro_rules! real {
             #[inline(always)]
             fn ln(self) -> Self {
                 self.ln()
+            }
+            #[inline(always)]
+            fn log2(self) -> Self {
+                $log2(self)
+            }
+            #[inline(always)]
+            fn round_ties_even(self) -> Self {
+                self.round_ties_even()
             }
             #[inline(always)]
             fn sqrt(self) -> Self {
@@ -134,8 +146,23 @@ macro_rules! real {
     };
 }
 
-real!(f32, matrixmultiply::sgemm, pocketsplat_core::math::exp);
-real!(f64, matrixmultiply::dgemm, f64::exp);
+real!(f32, matrixmultiply::sgemm, pocketsplat_core::math::exp, log2_series);
+real!(f64, matrixmultiply::dgemm, f64::exp, f64::log2);
+
+/// log₂ x = n + 2·artanh((m − 1)/(m + 1))/ln 2 with x = 2ⁿ·m, m in [√½, √2), where five terms leave less than 1e-9.
+#[inline(always)]
+fn log2_series(x: f32) -> f32 {
+    /// 2/ln 2 · 1/(2i + 1).
+    const TERMS: [f32; 5] = [2.885_390_1, 0.961_796_7, 0.577_078_04, 0.412_198_6, 0.320_598_9];
+    let sqrt_half = std::f32::consts::FRAC_1_SQRT_2.to_bits();
+    let shifted = x.to_bits().wrapping_sub(sqrt_half);
+    let n = (shifted.cast_signed() >> 23) as f32;
+    let m = f32::from_bits((shifted & 0x007f_ffff).wrapping_add(sqrt_half));
+    let s = (m - 1.0) / (m + 1.0);
+    let square = s * s;
+    let [t0, t1, t2, t3, t4] = TERMS;
+    n + s * ((((t4 * square + t3) * square + t2) * square + t1) * square + t0)
+}
 
 /// `[f(0), f(1), f(2)]`, one value an axis; unlike `std::array::from_fn` it is always inlined.
 #[inline(always)]
@@ -146,6 +173,19 @@ pub(super) fn per_axis<T>(f: impl Fn(usize) -> T) -> [T; 3] {
 #[cfg(test)]
 mod tests {
     use super::Real;
+
+    #[test]
+    fn the_binary_logarithm_agrees_with_std() {
+        for i in -126..127 {
+            for j in 0..300 {
+                let x = (i as f32 + j as f32 / 300.0).exp2();
+                let exact = f64::from(x).log2();
+                let error = (f64::from(Real::log2(x)) - exact).abs();
+                assert!(error <= 2e-7 * exact.abs().max(1.0), "log2({x}) errs by {error}");
+            }
+        }
+        assert_eq!(Real::log2(1.0f32), 0.0);
+    }
 
     #[test]
     fn tanh_agrees_with_std_on_both_branches() {

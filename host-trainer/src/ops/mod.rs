@@ -10,6 +10,7 @@ pub mod adam;
 pub mod adaptive_step;
 pub mod anchor_bits;
 pub mod grid_bits;
+pub mod hash_grid;
 pub mod head;
 pub mod head_input;
 pub mod l1;

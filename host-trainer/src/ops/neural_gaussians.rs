@@ -1,8 +1,8 @@
 //! From head outputs to the Gaussians of a view.
 
-use super::Real;
 use super::real::per_axis;
-use crate::scene::ModelShape;
+use super::{Real, mask};
+use crate::scene::{MASK_THRESHOLD, ModelShape};
 
 /// A 3-D Gaussian with one colour, in the world frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -52,17 +52,20 @@ impl<R: Real> HeadOutputs<R> {
     }
 }
 
-/// Appends the Gaussians of a block of anchors whose opacity is positive.
+/// Appends the Gaussians of a block of anchors that their mask draws and whose opacity is positive.
 ///
-/// α = tanh(logit), kept if α > 0; colour = sigmoid; scale = l_g ⊙ sigmoid; rotation = q/‖q‖;
+/// α = tanh(logit), kept if α > 0 and the mask logit is above [`MASK_THRESHOLD`]; colour = sigmoid; scale = l_g ⊙ sigmoid; rotation = q/‖q‖;
 /// centre = x_a + O_k ⊙ l_a (Lu et al. 2024, Scaffold-GS, eqs. 5–8; layouts as [`OutputLayout`](crate::scene::OutputLayout) has them).
 ///
-/// * `positions`: `[n]`. * `log_scales`: `[n, 6]`. * `offsets`: `[n, 3K]`. Order: anchors, then offsets, ascending.
+/// * `positions`: `[n]`. * `log_scales`: `[n, 6]`. * `offsets`: `[n, 3K]`. * `mask_logits`: `[n, K]`.
+/// * `gaussians`, `sources`: anchors, then offsets, ascending.
+#[expect(clippy::too_many_arguments, reason = "one slice per input and output, as every operation has it")]
 pub fn forward<R: Real>(
     shape: &ModelShape,
     positions: &[[R; 3]],
     log_scales: &[R],
     offsets: &[R],
+    mask_logits: &[R],
     outputs: &HeadOutputs<R>,
     gaussians: &mut Vec<Gaussian<R>>,
     sources: &mut Vec<Source>,
@@ -73,6 +76,9 @@ pub fn forward<R: Real>(
         let (l_a, l_g) = (sizes(0), sizes(3));
         for k in 0..k_all {
             let at = row * k_all + k;
+            if !(mask_logits[at] > R::real(MASK_THRESHOLD)) {
+                continue;
+            }
             let opacity = outputs.opacity[at].tanh();
             if !(opacity > R::ZERO) {
                 continue;
@@ -94,12 +100,15 @@ pub fn forward<R: Real>(
 
 /// Gradients of [`forward`], given those of the Gaussians it appended.
 ///
-/// * `d_outputs`, `d_log_scales` `[n, 6]`, `d_offsets` `[n, 3K]`: zero on entry, added to.
+/// The opacity is α·b with b the hard mask, so dL/db = α·dL/d(opacity), which reaches the logit as [`mask::slope`] has it.
+///
+/// * `d_outputs`, `d_log_scales` `[n, 6]`, `d_offsets` `[n, 3K]`, `d_mask_logits` `[n, K]`: zero on entry, added to.
 #[expect(clippy::too_many_arguments, reason = "one slice per input and per gradient, as every operation has it")]
 pub fn backward<R: Real>(
     shape: &ModelShape,
     log_scales: &[R],
     offsets: &[R],
+    mask_logits: &[R],
     outputs: &HeadOutputs<R>,
     gaussians: &[Gaussian<R>],
     sources: &[Source],
@@ -107,11 +116,13 @@ pub fn backward<R: Real>(
     d_outputs: &mut HeadOutputs<R>,
     d_log_scales: &mut [R],
     d_offsets: &mut [R],
+    d_mask_logits: &mut [R],
 ) {
     for ((g, source), d) in gaussians.iter().zip(sources).zip(d_gaussians) {
         let row = source.row as usize;
         let at = row * shape.n_offsets + source.offset as usize;
         d_outputs.opacity[at] += d.opacity * (R::ONE - g.opacity * g.opacity);
+        d_mask_logits[at] += d.opacity * g.opacity * mask::slope(mask_logits[at]);
         for i in 0..3 {
             d_outputs.colour[at * 3 + i] += d.colour[i] * g.colour[i] * (R::ONE - g.colour[i]);
             // scale = e^s · σ, so ∂/∂s = scale, and ∂/∂logit = scale · (1 − σ).
@@ -182,11 +193,26 @@ mod tests {
         (outputs, take(N * 6), take(N * 3 * k))
     }
 
+    /// Every fifth offset is masked.
+    fn mask_logits() -> Vec<f64> {
+        (0..N * SHAPE.n_offsets).map(|i| if i % 5 == 4 { MASK_THRESHOLD } else { i as f64 - 4.0 }).collect()
+    }
+
     fn run(x: &[f64]) -> (Vec<Gaussian<f64>>, Vec<Source>) {
         let (outputs, log_scales, offsets) = split(x);
         let (mut gaussians, mut sources) = (Vec::new(), Vec::new());
-        forward(&SHAPE, &[[0.1, 0.2, 0.3]; N], &log_scales, &offsets, &outputs, &mut gaussians, &mut sources);
+        let positions = [[0.1, 0.2, 0.3]; N];
+        let logits = mask_logits();
+        forward(&SHAPE, &positions, &log_scales, &offsets, &logits, &outputs, &mut gaussians, &mut sources);
         (gaussians, sources)
+    }
+
+    #[test]
+    fn what_is_masked_is_not_drawn() {
+        let mut x = random(3, N * SHAPE.n_offsets * 11 + N * 6 + N * 3 * SHAPE.n_offsets);
+        x[..N * SHAPE.n_offsets].fill(0.5);
+        let drawn: Vec<u32> = run(&x).1.iter().map(|s| s.row * 3 + s.offset).collect();
+        assert_eq!(drawn, [0, 1, 2, 3, 5, 6, 7, 8, 10, 11]);
     }
 
     #[test]
@@ -226,10 +252,12 @@ mod tests {
             let mut d_outputs = HeadOutputs::default();
             d_outputs.reset(&SHAPE, N);
             let (mut d_log_scales, mut d_offsets) = (vec![0.0; log_scales.len()], vec![0.0; offsets.len()]);
+            let (logits, mut d_mask_logits) = (mask_logits(), vec![0.0; N * k]);
             backward(
                 &SHAPE,
                 &log_scales,
                 &offsets,
+                &logits,
                 &outputs,
                 &gaussians,
                 &sources,
@@ -237,7 +265,15 @@ mod tests {
                 &mut d_outputs,
                 &mut d_log_scales,
                 &mut d_offsets,
+                &mut d_mask_logits,
             );
+            // The mask stands for a factor 1 + σ(m) − σ(m₀) of the opacity.
+            let mut expected = vec![0.0; N * k];
+            for ((gaussian, source), d) in gaussians.iter().zip(&sources).zip(&d) {
+                let at = (source.row * 3 + source.offset) as usize;
+                expected[at] = d.opacity * gaussian.opacity * mask::slope(logits[at]);
+            }
+            assert_eq!(d_mask_logits, expected);
             let analytic =
                 [d_outputs.opacity, d_outputs.covariance, d_outputs.colour, d_log_scales, d_offsets].concat();
             assert_gradient("neural gaussians", &x, &analytic, f);

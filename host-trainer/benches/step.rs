@@ -13,6 +13,7 @@ use pocketsplat::scene::init::initial_scene;
 use pocketsplat::train::TrainConfig;
 use pocketsplat::train::config::{LossWeights, Rates};
 use pocketsplat::train::optimiser::Optimiser;
+use pocketsplat::train::step::coding::Coding;
 use pocketsplat::train::step::{StageSeconds, StepReport, Target, Workspace};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -62,14 +63,14 @@ fn benchmark(criterion: &mut Criterion) {
         let mut workspace = Workspace::with_level(&scene.shape, level);
         let mut reports = Vec::new();
         group.bench_function(level.to_string(), |bencher| {
-            bencher.iter(|| reports.push(workspace.step(&scene, &target, &LossWeights::default())));
+            bencher.iter(|| reports.push(workspace.step(&scene, &target, &LossWeights::default(), &Coding::Raw)));
         });
         print_stages(level, &reports);
     }
     let mut workspace = Workspace::new(&scene.shape);
     let mut moving = scene.clone();
     let mut optimiser = Optimiser::new(&moving);
-    workspace.step(&moving, &target, &LossWeights::default());
+    workspace.step(&moving, &target, &LossWeights::default(), &Coding::Raw);
     group.bench_function("optimiser", |bencher| {
         bencher.iter(|| optimiser.apply(&mut moving, &workspace, &Rates::default(), 0.5, 5.0));
     });
@@ -84,17 +85,19 @@ fn print_stages(level: Level, reports: &[StepReport<f32>]) {
         ms[ms.len() / 2]
     };
     println!(
-        "{level}: {} Gaussians, {} splats, {} pairs; medians in ms: anchors {:.1}, tiles {:.1}, rasterise {:.1}, loss {:.1}, \
-         rasterise backward {:.1}, anchors backward {:.1}",
+        "{level}: {} Gaussians, {} splats, {} pairs; medians in ms: context {:.1}, anchors {:.1}, tiles {:.1}, rasterise {:.1}, loss {:.1}, \
+         rasterise backward {:.1}, anchors backward {:.1}, context backward {:.1}",
         last.n_gaussians,
         last.n_splats,
         last.n_pairs,
+        median(|s| s.context),
         median(|s| s.anchors),
         median(|s| s.tiles),
         median(|s| s.rasterise),
         median(|s| s.loss),
         median(|s| s.rasterise_backward),
         median(|s| s.anchors_backward),
+        median(|s| s.context_backward),
     );
 }
 

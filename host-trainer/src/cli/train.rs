@@ -11,7 +11,7 @@ use pocketsplat::dataset::{Background, Capture};
 use pocketsplat::scene::Scene;
 use pocketsplat::train::run::{Ending, Interval, RunError, RunFolder};
 use pocketsplat::train::step::Workspace;
-use pocketsplat::train::undrawn::zero_undrawn_offsets;
+use pocketsplat::train::survey::Survey;
 use pocketsplat::train::{TrainConfig, Trainer};
 use pocketsplat_core::budget::MAX_FRAME_PX;
 use serde::Serialize;
@@ -181,7 +181,9 @@ fn write_bundle(
     output: &Path,
 ) -> Result<TrainResult> {
     let mut scene = trainer.scene.clone();
-    let n_zeroed = zero_undrawn_offsets(&mut scene, &mut Workspace::new(&trainer.scene.shape), trainer.cameras());
+    let cameras: Vec<_> = trainer.cameras().iter().collect();
+    let survey = Survey::new(&scene, &mut Workspace::new(&scene.shape), &cameras);
+    let n_masked = survey.mask_undrawn(&mut scene);
     let bytes = encode(&scene, capture, background, steps)?;
     output::write_whole(output, &bytes)?;
     let n_anchors = trainer.scene.anchors.len();
@@ -189,7 +191,7 @@ fn write_bundle(
         bundle: output.to_owned(),
         bundle_bytes: bytes.len(),
         n_anchors,
-        undrawn_offsets: n_zeroed,
+        undrawn_offsets: n_masked,
         bytes_per_anchor: bytes.len() as f64 / n_anchors as f64,
         iterations: trainer.iteration,
         dropped_steps: trainer.n_dropped(),

@@ -19,7 +19,7 @@ pub fn clamp_backward<R: Real>(value: R, [low, high]: [f64; 2], gradient: R) -> 
     if leads_out { R::ZERO } else { gradient }
 }
 
-/// step = base·2^e, e clamped to [`EXPONENTS`] (our form of the adaptive quantisation of Chen et al. 2024, HAC, section 4.2:
+/// step = base·2^e, e clamped to [`EXPONENTS`] (our form of the adaptive quantisation of Chen et al. 2024, HAC:
 /// there step = base·(1 + tanh e)).
 ///
 /// * `exponents`, `steps`: `[n, 3]` for features, log-scales, offsets; `steps` is overwritten.

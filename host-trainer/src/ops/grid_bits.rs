@@ -5,7 +5,7 @@ use super::Real;
 /// Shares are kept this far from 0 and 1.
 const MARGIN: f64 = 1e-6;
 
-/// n₊·(−log₂ p) + n₋·(−log₂(1 − p)) with p = n₊/n (Chen et al. 2024, HAC, eq. 8), and its gradient through the signs, which
+/// n₊·(−log₂ p) + n₋·(−log₂(1 − p)) with p = n₊/n (Chen et al. 2024, HAC), and its gradient through the signs, which
 /// passes where |row| ≤ 1.
 ///
 /// With p depending on the counts, ∂bits/∂n₊ = log₂((1 − p)/p) while n stays; a sign that changes by 2 moves n₊ by 1.

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::Real;
 
-/// Writes Σ weight·sign(row) over the corners of every level (Chen et al. 2024, HAC, section 4.1), the weights those of the
+/// Writes Σ weight·sign(row) over the corners of every level (Chen et al. 2024, HAC), the weights those of the
 /// decoder: multiples of 2⁻²⁴ whose sums are exact in any order.
 ///
 /// * `rows`: `[Σ n_rows, 4]`, level after level; a sign is + from 0 on. * `units`: `[n]` places in the unit cube.

@@ -1,9 +1,15 @@
 //! Which offsets are drawn: a hard mask over trained logits, with the gradient of a soft one.
 
 use super::Real;
+use crate::scene::MASK_THRESHOLD;
 
-/// σ'(logit) = σ·(1 − σ): the gradient that stands in for that of the hard mask (straight through; Chen et al. 2024, HAC,
-/// section 4.4).
+/// Whether an offset with this mask logit is drawn: the logit is above [`MASK_THRESHOLD`].
+#[inline(always)]
+pub fn is_open<R: Real>(logit: R) -> bool {
+    logit > R::real(MASK_THRESHOLD)
+}
+
+/// σ'(logit) = σ·(1 − σ): the gradient that stands in for that of the hard mask (straight through; Chen et al. 2024, HAC).
 #[inline(always)]
 pub fn slope<R: Real>(logit: R) -> R {
     let open = logit.sigmoid();

@@ -2,7 +2,7 @@
 
 use super::real::per_axis;
 use super::{Real, mask};
-use crate::scene::{MASK_THRESHOLD, ModelShape};
+use crate::scene::ModelShape;
 
 /// A 3-D Gaussian with one colour, in the world frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -54,7 +54,7 @@ impl<R: Real> HeadOutputs<R> {
 
 /// Appends the Gaussians of a block of anchors that their mask draws and whose opacity is positive.
 ///
-/// α = tanh(logit), kept if α > 0 and the mask logit is above [`MASK_THRESHOLD`]; colour = sigmoid; scale = l_g ⊙ sigmoid; rotation = q/‖q‖;
+/// α = tanh(logit), kept if α > 0 and the [`mask`] is open; colour = sigmoid; scale = l_g ⊙ sigmoid; rotation = q/‖q‖;
 /// centre = x_a + O_k ⊙ l_a (Lu et al. 2024, Scaffold-GS, eqs. 5–8; layouts as [`OutputLayout`](crate::scene::OutputLayout) has them).
 ///
 /// * `positions`: `[n]`. * `log_scales`: `[n, 6]`. * `offsets`: `[n, 3K]`. * `mask_logits`: `[n, K]`.
@@ -76,7 +76,7 @@ pub fn forward<R: Real>(
         let (l_a, l_g) = (sizes(0), sizes(3));
         for k in 0..k_all {
             let at = row * k_all + k;
-            if !(mask_logits[at] > R::real(MASK_THRESHOLD)) {
+            if !mask::is_open(mask_logits[at]) {
                 continue;
             }
             let opacity = outputs.opacity[at].tanh();
@@ -161,6 +161,7 @@ fn index(i: usize) -> u32 {
 mod tests {
     use super::*;
     use crate::ops::finite_difference::{assert_gradient, random};
+    use crate::scene::MASK_THRESHOLD;
 
     const SHAPE: ModelShape = ModelShape {
         feature_dim: 4,

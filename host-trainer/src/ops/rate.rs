@@ -17,7 +17,7 @@ pub struct Bits<R> {
     pub d_log2_scale: R,
 }
 
-/// bits = −log₂ max(Φ((x + ½ − μ)/σ) − Φ((x − ½ − μ)/σ), 1e-6) (Chen et al. 2024, HAC, eq. 7), all in units of the
+/// bits = −log₂ max(Φ((x + ½ − μ)/σ) − Φ((x − ½ − μ)/σ), 1e-6) (Chen et al. 2024, HAC), all in units of the
 /// quantisation step.
 ///
 /// With d = |x − μ|, a = (d − ½)/σ and b = (d + ½)/σ the probability is p = Q(a) − Q(b), which keeps its digits in the tail;

@@ -73,6 +73,16 @@ impl<R> Anchors<R> {
         self.mask_logits[offset] > R::real(MASK_THRESHOLD)
     }
 
+    /// Whether any offset of an anchor is drawn; an anchor without is invisible and costs nothing.
+    #[inline]
+    pub fn has_drawn(&self, anchor: usize) -> bool
+    where
+        R: crate::ops::Real,
+    {
+        let k = self.mask_logits.len() / self.len();
+        (anchor * k..(anchor + 1) * k).any(|offset| self.is_drawn(offset))
+    }
+
     /// Whether there is no anchor.
     pub fn is_empty(&self) -> bool {
         self.lattice.is_empty()

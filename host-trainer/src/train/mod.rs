@@ -9,9 +9,9 @@ mod outcome;
 pub mod run;
 pub mod statistics;
 pub mod step;
+pub mod survey;
 #[cfg(test)]
 mod test_capture;
-pub mod undrawn;
 pub mod watchdog;
 
 use std::time::Instant;
@@ -31,6 +31,7 @@ use crate::scene::{Anchors, Heads, Scene};
 use checkpoint::{CaptureSignature, Kernels};
 use optimiser::Optimiser;
 use statistics::Statistics;
+use step::coding::Coding;
 use step::{Target, Workspace, clear_masked};
 use watchdog::Watchdog;
 
@@ -187,7 +188,7 @@ impl<'a> Trainer<'a> {
         let mut truth = planes(image);
         clear_masked(&mut truth, mask);
         let target = Target { camera: &self.cameras[index], truth: &truth, mask, background: self.background };
-        let report = self.workspace.step(&self.scene, &target, &self.config.loss);
+        let report = self.workspace.step(&self.scene, &target, &self.config.loss, &Coding::Raw);
         if let Some(cause) = watchdog::inspect(&self.scene, &truth, self.background, &self.workspace, &report) {
             let dropped = DroppedStep { iteration: self.iteration, view: name.clone(), cause };
             return if self.watchdog.dropped() {

@@ -1,8 +1,10 @@
 //! One view through the whole chain, forward and backward.
 
 mod block;
-
-use std::time::Instant;
+mod coded;
+pub mod coding;
+mod context;
+mod stages;
 
 use rayon::prelude::*;
 
@@ -13,6 +15,11 @@ use crate::ops::simd::Level;
 use crate::ops::{Pinhole, Real, l1, prefilter, rasterise, ssim, tiles, volume};
 use crate::scene::{Heads, ModelShape, Scene};
 pub use block::Block;
+use coded::{Network, Weights};
+use coding::{Coding, RateReport};
+pub use context::ContextGradients;
+pub use stages::StageSeconds;
+use stages::Stopwatch;
 
 /// Anchors one task evaluates together; also the unit in which the gradients of the heads are summed, so that the sums
 /// do not depend on the number of threads.
@@ -44,39 +51,10 @@ pub struct StepReport<R> {
     pub n_splats: usize,
     /// (tile, splat) pairs.
     pub n_pairs: usize,
+    /// What coding with context cost.
+    pub rate: Option<RateReport>,
     /// Where the time went.
     pub stages: StageSeconds,
-}
-
-/// Wall-clock seconds of the stages of a step.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct StageSeconds {
-    /// Prefilter, heads, Gaussians, projection.
-    pub anchors: f64,
-    /// Sorting and tile lists.
-    pub tiles: f64,
-    /// Blending.
-    pub rasterise: f64,
-    /// Image to planes and back, L1, SSIM, their gradients, the squared error.
-    pub loss: f64,
-    /// From the image's gradient to the splats'.
-    pub rasterise_backward: f64,
-    /// From the splats' gradients to the anchors' and the heads'.
-    pub anchors_backward: f64,
-}
-
-/// Reads the time since the last reading.
-struct Stopwatch(Instant);
-
-impl Stopwatch {
-    fn start() -> Self {
-        Self(Instant::now())
-    }
-
-    fn lap(&mut self) -> f64 {
-        let now = Instant::now();
-        now.duration_since(std::mem::replace(&mut self.0, now)).as_secs_f64()
-    }
 }
 
 /// A drawn view and what its backward pass needs.
@@ -96,6 +74,8 @@ pub struct Workspace<R> {
     n_blocks: usize,
     /// dL/d(heads).
     pub d_heads: Heads<R>,
+    /// dL/d(context model), where the last step asked it.
+    pub d_context: Option<ContextGradients<R>>,
 }
 
 impl<R> Target<'_, R> {
@@ -123,7 +103,8 @@ impl<R: Real> Workspace<R> {
 
     /// As [`Self::new`] with the instruction set chosen.
     pub fn with_level(shape: &ModelShape, level: Level) -> Self {
-        Self { level, blocks: Vec::new(), n_blocks: 0, d_heads: Heads::filled(shape, R::ZERO) }
+        let d_heads = Heads::filled(shape, R::ZERO);
+        Self { level, blocks: Vec::new(), n_blocks: 0, d_heads, d_context: None }
     }
 
     /// The instruction set that the loops run under.
@@ -137,14 +118,21 @@ impl<R: Real> Workspace<R> {
     }
 
     /// Draws the view: the forward half of [`Self::step`].
-    fn draw(&mut self, scene: &Scene<R>, camera: &Pinhole<R>, background: [R; 3]) -> Drawing<R> {
+    fn draw(
+        &mut self,
+        scene: &Scene<R>,
+        camera: &Pinhole<R>,
+        background: [R; 3],
+        coding: &Coding<'_, R>,
+        network: Option<Network<'_, R>>,
+    ) -> Drawing<R> {
         let mut stopwatch = Stopwatch::start();
         let visible: Vec<u32> = (0..scene.anchors.len())
             .into_par_iter()
             .with_min_len(1024)
             .filter(|a| {
                 let size = std::array::from_fn(|i| scene.anchors.log_scales[a * 6 + i].exp());
-                prefilter::anchor_is_visible(camera, scene.position(*a), size)
+                scene.anchors.has_drawn(*a) && prefilter::anchor_is_visible(camera, scene.position(*a), size)
             })
             .map(|a| u32::try_from(a).expect("fewer than 2³² anchors"))
             .collect();
@@ -155,31 +143,43 @@ impl<R: Real> Workspace<R> {
         let level = self.level;
         self.blocks.par_iter_mut().zip(visible.par_chunks(BLOCK)).for_each(|(block, anchors)| {
             block.gather(scene, anchors);
-            block.forward(level, scene, camera);
+            block.code(level, scene, coding, network);
         });
+        let context = stopwatch.lap();
+        self.blocks[..self.n_blocks].par_iter_mut().for_each(|block| block.forward(level, scene, camera));
         let splats: Vec<Splat<R>> = self.blocks().iter().flat_map(|b| b.splats.iter().copied()).collect();
         let footprints: Vec<Footprint<R>> = self.blocks().iter().flat_map(|b| b.footprints.iter().copied()).collect();
         let anchors = stopwatch.lap();
         let lists = tiles::build(&splats, &footprints, camera.size_px);
         let tiles = stopwatch.lap();
         let image = rasterise::forward(level, &splats, &footprints, &lists, background);
-        let stages = StageSeconds { anchors, tiles, rasterise: stopwatch.lap(), ..StageSeconds::default() };
+        let rasterise = stopwatch.lap();
+        let stages = StageSeconds { context, anchors, tiles, rasterise, ..StageSeconds::default() };
         Drawing { stages, image, lists, splats, footprints }
     }
 
     /// The image of a view, planes `[3, height, width]`, not clamped.
     pub fn image(&mut self, scene: &Scene<R>, camera: &Pinhole<R>, background: [R; 3]) -> Vec<R> {
-        self.draw(scene, camera, background).image.to_planes(camera.size_px)
+        self.draw(scene, camera, background, &Coding::Raw, None).image.to_planes(camera.size_px)
     }
 
     /// Loss and gradients of one view.
     ///
-    /// L = (1 − λ)·L1 + λ·(1 − SSIM) + w·mean(s_x·s_y·s_z) (Lu et al. 2024, Scaffold-GS, eq. 10). Gradients of anchors are
-    /// left in [`Self::blocks`], those of the heads in [`Self::d_heads`].
-    pub fn step(&mut self, scene: &Scene<R>, target: &Target<'_, R>, weights: &LossWeights) -> StepReport<R> {
+    /// L = (1 − λ)·L1 + λ·(1 − SSIM) + w·mean(s_x·s_y·s_z) (Lu et al. 2024, Scaffold-GS, eq. 10), and the terms of
+    /// [`RateTerms`](coding::RateTerms) where `coding` has them. Gradients of anchors are left in [`Self::blocks`], those
+    /// of the heads in [`Self::d_heads`], those of the context model in [`Self::d_context`].
+    pub fn step(
+        &mut self,
+        scene: &Scene<R>,
+        target: &Target<'_, R>,
+        weights: &LossWeights,
+        coding: &Coding<'_, R>,
+    ) -> StepReport<R> {
         let size_px = target.camera.size_px;
+        let steps_head = context::steps_head(scene, coding);
+        let network = context::network(scene, coding, steps_head.as_ref());
         let Drawing { mut stages, image: tiled, lists, splats, footprints } =
-            self.draw(scene, target.camera, target.background);
+            self.draw(scene, target.camera, target.background, coding, network);
         let mut stopwatch = Stopwatch::start();
         let mut image = tiled.to_planes(size_px);
         clear_masked(&mut image, target.mask);
@@ -193,7 +193,7 @@ impl<R: Real> Workspace<R> {
         let n_gaussians = self.blocks().iter().map(|b| b.gaussians.len()).sum();
         let volume_weight = R::real(weights.volume);
         let volumes: R = self.blocks().iter().map(|b| volume::forward(&b.gaussians, volume_weight, n_gaussians)).sum();
-        let loss = (R::ONE - lambda) * l1::forward(&image, target.truth) + lambda * (R::ONE - similarity) + volumes;
+        let mut loss = (R::ONE - lambda) * l1::forward(&image, target.truth) + lambda * (R::ONE - similarity) + volumes;
 
         let squared: f64 = image
             .chunks(4096)
@@ -216,12 +216,25 @@ impl<R: Real> Workspace<R> {
         });
         self.sum_head_gradients();
         stages.anchors_backward = stopwatch.lap();
+        let rate = match (coding, network) {
+            (Coding::Context { rate, .. }, Some(network)) => {
+                let (term, report) = self.rate(scene, network, rate);
+                loss += term;
+                Some(report)
+            }
+            _ => {
+                self.d_context = None;
+                None
+            }
+        };
+        stages.context_backward = stopwatch.lap();
         StepReport {
             loss,
             squared_error: squared / (3 * target.n_counted()) as f64,
             n_gaussians,
             n_splats: splats.len(),
             n_pairs: lists.entries.len(),
+            rate,
             stages,
         }
     }

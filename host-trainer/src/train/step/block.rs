@@ -1,5 +1,7 @@
 //! A block of anchors: from parameters to splats, and back.
 
+use super::coded::{Coded, Network, Weights};
+use super::coding::Coding;
 use crate::ops::neural_gaussians::{Gaussian, HeadOutputs, Source};
 use crate::ops::project::{Footprint, Splat};
 use crate::ops::simd::Level;
@@ -25,10 +27,14 @@ pub struct Block<R> {
     pub d_log_scales: Vec<R>,
     /// dL/d(offsets) `[n, 3K]`.
     pub d_offsets: Vec<R>,
+    /// dL/d(mask logits) `[n, K]`.
+    pub d_mask_logits: Vec<R>,
     positions: Vec<[R; 3]>,
     features: Vec<R>,
     log_scales: Vec<R>,
     offsets: Vec<R>,
+    mask_logits: Vec<R>,
+    pub(super) coded: Coded<R>,
     input: Vec<R>,
     hidden: [Vec<R>; 3],
     outputs: HeadOutputs<R>,
@@ -43,7 +49,7 @@ pub struct Block<R> {
     pub(super) d_heads: Heads<R>,
 }
 
-fn refill<R: Real>(buffer: &mut Vec<R>, len: usize) {
+pub(super) fn refill<R: Real>(buffer: &mut Vec<R>, len: usize) {
     buffer.clear();
     buffer.resize(len, R::ZERO);
 }
@@ -59,10 +65,13 @@ impl<R: Real> Block<R> {
             d_features: Vec::new(),
             d_log_scales: Vec::new(),
             d_offsets: Vec::new(),
+            d_mask_logits: Vec::new(),
             positions: Vec::new(),
             features: Vec::new(),
             log_scales: Vec::new(),
             offsets: Vec::new(),
+            mask_logits: Vec::new(),
+            coded: Coded::default(),
             input: Vec::new(),
             hidden: Default::default(),
             outputs: HeadOutputs::default(),
@@ -78,8 +87,8 @@ impl<R: Real> Block<R> {
 
     /// Copies the rows of `anchors` out of the scene.
     pub(super) fn gather(&mut self, scene: &Scene<R>, anchors: &[u32]) {
-        let (f, o) = (scene.shape.feature_dim, 3 * scene.shape.n_offsets);
-        for buffer in [&mut self.features, &mut self.log_scales, &mut self.offsets] {
+        let (f, k) = (scene.shape.feature_dim, scene.shape.n_offsets);
+        for buffer in [&mut self.features, &mut self.log_scales, &mut self.offsets, &mut self.mask_logits] {
             buffer.clear();
         }
         self.anchors.clear();
@@ -89,8 +98,35 @@ impl<R: Real> Block<R> {
             self.positions.push(scene.position(a));
             self.features.extend_from_slice(&scene.anchors.features[a * f..(a + 1) * f]);
             self.log_scales.extend_from_slice(&scene.anchors.log_scales[a * 6..(a + 1) * 6]);
-            self.offsets.extend_from_slice(&scene.anchors.offsets[a * o..(a + 1) * o]);
+            self.offsets.extend_from_slice(&scene.anchors.offsets[3 * a * k..3 * (a + 1) * k]);
+            self.mask_logits.extend_from_slice(&scene.anchors.mask_logits[a * k..(a + 1) * k]);
         }
+    }
+
+    /// Puts coding's traces into the values.
+    pub(super) fn code(
+        &mut self,
+        level: Level,
+        scene: &Scene<R>,
+        coding: &Coding<'_, R>,
+        network: Option<Network<'_, R>>,
+    ) {
+        let values = [&mut self.features, &mut self.log_scales, &mut self.offsets];
+        self.coded.forward(level, scene, coding, network, &self.anchors, values);
+    }
+
+    /// [`Self::code`] backwards, where it asked the context; after [`Self::backward`].
+    pub(super) fn code_backward(
+        &mut self,
+        level: Level,
+        shape: &ModelShape,
+        network: Network<'_, R>,
+        weights: Weights<R>,
+    ) {
+        let values = [&mut self.features, &mut self.log_scales, &mut self.offsets];
+        let d_values = [&mut self.d_features, &mut self.d_log_scales, &mut self.d_offsets];
+        let (logits, d_logits) = (&self.mask_logits, &mut self.d_mask_logits);
+        self.coded.backward(level, shape, network, weights, [values, d_values], logits, d_logits);
     }
 
     /// From anchors to splats.
@@ -117,6 +153,7 @@ impl<R: Real> Block<R> {
                     &self.positions,
                     &self.log_scales,
                     &self.offsets,
+                    &self.mask_logits,
                     &self.outputs,
                     &mut self.gaussians,
                     &mut self.sources,
@@ -156,10 +193,12 @@ impl<R: Real> Block<R> {
         self.d_outputs.reset(shape, n);
         refill(&mut self.d_log_scales, n * 6);
         refill(&mut self.d_offsets, n * 3 * shape.n_offsets);
+        refill(&mut self.d_mask_logits, n * shape.n_offsets);
         neural_gaussians::backward(
             shape,
             &self.log_scales,
             &self.offsets,
+            &self.mask_logits,
             &self.outputs,
             &self.gaussians,
             &self.sources,
@@ -167,6 +206,7 @@ impl<R: Real> Block<R> {
             &mut self.d_outputs,
             &mut self.d_log_scales,
             &mut self.d_offsets,
+            &mut self.d_mask_logits,
         );
         refill(&mut self.d_input, n * shape.head_inputs());
         let d_outputs = [&self.d_outputs.opacity, &self.d_outputs.covariance, &self.d_outputs.colour];

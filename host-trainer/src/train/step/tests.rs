@@ -4,9 +4,15 @@ use glam::{DMat3, DVec3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
+use pocketsplat_core::context::{Context, GridFrame, GridLevel, Group, LevelKind};
+
+use super::coding::{Exact, RateTerms};
 use super::*;
+use crate::bundle::context::{rounded, section};
 use crate::camera::Camera;
 use crate::ops::finite_difference::{assert_piecewise_gradient, random};
+use crate::ops::noise::Stream;
+use crate::scene::ContextModel;
 use crate::scene::init::initial_scene;
 
 const SIZE: [u32; 2] = [26, 19];
@@ -55,12 +61,13 @@ fn truth() -> Vec<f64> {
     random(77, 3 * (SIZE[0] * SIZE[1]) as usize).iter().map(|v| 0.5 + 0.5 * v).collect()
 }
 
-/// Every parameter of a scene in one vector: features, log-scales, offsets, then the heads in file order.
+/// Every parameter of a scene in one vector that is no sign or mask: features, log-scales, offsets, the heads in file
+/// order, the context network.
 fn flatten<R: Real>(scene: &mut Scene<R>) -> Vec<&mut R> {
-    let Scene { anchors, heads, .. } = scene;
+    let Scene { anchors, heads, context, .. } = scene;
     let mut all: Vec<&mut R> =
         anchors.features.iter_mut().chain(&mut anchors.log_scales).chain(&mut anchors.offsets).collect();
-    for head in heads.each_mut() {
+    for head in heads.each_mut().into_iter().chain(context.as_mut().map(|context| &mut context.mlp)) {
         for group in head.groups_mut() {
             all.extend(group.iter_mut());
         }
@@ -83,6 +90,9 @@ fn gradients<R: Real>(scene: &Scene<R>, workspace: &Workspace<R>) -> Vec<f64> {
         }
     }
     d.heads = workspace.d_heads.clone();
+    if let (Some(context), Some(found)) = (&mut d.context, &workspace.d_context) {
+        context.mlp = found.mlp.clone();
+    }
     flatten(&mut d).into_iter().map(|g| (*g).into()).collect()
 }
 
@@ -92,6 +102,11 @@ fn mask(shape: &ModelShape) -> Option<Vec<bool>> {
 }
 
 fn step<R: Real>(scene: &Scene<R>) -> (f64, Vec<f64>) {
+    let (report, workspace) = coded_step(scene, &Coding::Raw);
+    (report.loss.into(), gradients(scene, &workspace))
+}
+
+fn coded_step<R: Real>(scene: &Scene<R>, coding: &Coding<'_, R>) -> (StepReport<R>, Workspace<R>) {
     let mut workspace = Workspace::new(&scene.shape);
     let mask = mask(&scene.shape);
     let mut truth: Vec<R> = truth().into_iter().map(R::real).collect();
@@ -102,9 +117,28 @@ fn step<R: Real>(scene: &Scene<R>) -> (f64, Vec<f64>) {
         mask: mask.as_deref(),
         background: [0.1, 0.2, 0.3].map(R::real),
     };
-    let report = workspace.step(scene, &target, &LossWeights::default());
+    let report = workspace.step(scene, &target, &LossWeights::default(), coding);
     assert!(report.n_splats > 5, "the scene must be seen: {report:?}");
-    (report.loss.into(), gradients(scene, &workspace))
+    (report, workspace)
+}
+
+/// A context whose grid and network say something.
+fn context(seed: u64, scene: &Scene<f64>) -> ContextModel<f64> {
+    let levels = [(LevelKind::Volume, 5, 125), (LevelKind::Volume, 40, 64), (LevelKind::Xz, 9, 81)];
+    let levels = levels.map(|(kind, resolution, n_rows)| GridLevel { kind, resolution, n_rows }).to_vec();
+    let frame = GridFrame::spanning([-60; 3], [60; 3]);
+    let mut model = ContextModel::filled(&scene.shape, frame, levels, 6, [1.0, 0.1, 0.2], 0.0);
+    model.rows = random(seed, model.rows.len());
+    // Outputs of less than 0.8, so that no step or scale is at the end of its range.
+    for (i, (group, size)) in (1..).zip(model.mlp.groups_mut().into_iter().zip([0.4, 0.4, 0.05, 0.3])) {
+        *group = random(seed + i, group.len()).iter().map(|v| size * v).collect();
+    }
+    model
+}
+
+fn rate(grid: f64) -> RateTerms {
+    // Bits that weigh as much as the image, so that a wrong gradient shows.
+    RateTerms { lambda: 0.3, sample: 0.6, mask: 0.1, grid }
 }
 
 #[test]
@@ -146,7 +180,7 @@ fn a_view_that_sees_nothing_has_zero_gradients() {
     let mut workspace = Workspace::new(&scene.shape);
     let truth = truth();
     let target = Target { camera: &Pinhole::new(&camera()), truth: &truth, mask: None, background: [0.0; 3] };
-    let report = workspace.step(&scene, &target, &LossWeights::default());
+    let report = workspace.step(&scene, &target, &LossWeights::default(), &Coding::Raw);
     assert!(report.loss.is_finite() && report.n_splats == 0);
     assert!(gradients(&scene, &workspace).iter().all(|g| *g == 0.0));
 }
@@ -174,4 +208,120 @@ fn blocks_of_anchors_add_up() {
             step(&moved).0
         });
     }
+}
+
+#[test]
+fn a_step_with_noise_and_rate_agrees_with_finite_differences() {
+    let stream = Stream::of_run(31);
+    let codings = [
+        (shapes()[2], Coding::Noise { stream, steps: [0.3, 0.1, 0.2] }),
+        (shapes()[1], Coding::Context { stream, rate: rate(0.0), exact: None }),
+    ];
+    for (shape, coding) in codings {
+        let mut scene = scene(31, shape);
+        if matches!(coding, Coding::Context { .. }) {
+            scene.context = Some(context(31, &scene));
+        }
+        let (report, workspace) = coded_step(&scene, &coding);
+        let sampled = report.rate.map_or(0, |rate| rate.n_sampled);
+        assert!((5..20).contains(&sampled) || scene.context.is_none(), "{sampled} of 20 anchors are in the sample");
+        let analytic = gradients(&scene, &workspace);
+        let x: Vec<f64> = flatten(&mut scene).into_iter().map(|p| *p).collect();
+        assert_piecewise_gradient("step", &x, &analytic, |x| {
+            let mut moved = scene.clone();
+            for (p, v) in flatten(&mut moved).into_iter().zip(x) {
+                *p = *v;
+            }
+            coded_step(&moved, &coding).0.loss
+        });
+    }
+}
+
+/// Shifting a feature of all anchors is shifting the biases behind it, and all rows of its level together.
+#[test]
+fn the_gradients_of_the_grid_are_those_of_its_features() {
+    let mut scene = scene(41, shapes()[0]);
+    scene.context = Some(context(41, &scene));
+    let coding = Coding::Context { stream: Stream::of_run(1), rate: rate(0.0), exact: None };
+    let (_, workspace) = coded_step(&scene, &coding);
+    let (model, gradients) = (scene.context.unwrap(), workspace.d_context.unwrap());
+    let mut rows = gradients.rows.as_slice();
+    for (l, level) in model.levels.iter().enumerate() {
+        let (own, after) = rows.split_at(level.n_rows as usize * 4);
+        rows = after;
+        for f in 0..4 {
+            let by_rows: f64 = own.iter().skip(f).step_by(4).sum();
+            let weights = model.mlp.w1.iter().skip(4 * l + f).step_by(model.mlp.n_in);
+            let by_biases: f64 = weights.zip(&gradients.mlp.b1).map(|(w, d)| w * d).sum();
+            assert!((by_rows - by_biases).abs() < 1e-12 && by_rows != 0.0, "{by_rows} and {by_biases}");
+        }
+    }
+}
+
+#[test]
+fn masks_hide_save_bits_and_are_pushed_shut() {
+    let mut scene = scene(51, shapes()[0]);
+    let open = coded_step(&scene, &Coding::Raw).0;
+    let k = scene.shape.n_offsets;
+    for logit in scene.anchors.mask_logits.iter_mut().step_by(k) {
+        *logit = -5.0;
+    }
+    scene.anchors.mask_logits[k..2 * k].fill(-5.0);
+    scene.context = Some(context(51, &scene));
+    let coding = Coding::Context { stream: Stream::of_run(1), rate: rate(1.0), exact: None };
+    let (report, workspace) = coded_step(&scene, &coding);
+    assert!(report.n_gaussians < open.n_gaussians);
+    for block in workspace.blocks() {
+        assert!(!block.anchors.contains(&1), "an anchor without a drawn offset is invisible");
+        assert!(block.sources.iter().all(|source| source.offset != 0));
+        for (row, anchor) in block.anchors.iter().enumerate() {
+            let logits = &scene.anchors.mask_logits[*anchor as usize * k..];
+            assert!(block.d_mask_logits[row * k] > 0.0, "only the mask term: {}", logits[0]);
+        }
+    }
+    let without = coded_step(&scene, &Coding::Context { stream: Stream::of_run(1), rate: rate(0.0), exact: None }).0;
+    assert!(report.loss > without.loss, "the grid's bits count");
+}
+
+/// In the last phase the step draws the very values that a decoder reads.
+#[test]
+fn rounded_values_are_symbols_of_the_integer_model() {
+    let mut exact = scene(61, shapes()[1]);
+    exact.context = Some(context(61, &exact));
+    let scene = exact.cast::<f32>();
+    let (model, n_channels) = (scene.context.as_ref().unwrap(), scene.shape.values_per_anchor());
+    let section = section(model, n_channels).unwrap();
+    let context = Context::parse(&section, scene.shape.feature_dim, n_channels).unwrap();
+    let network = rounded(model, n_channels).unwrap();
+    let step = |scene: &Scene<f32>| {
+        let exact = Some(Exact { context, network: &network });
+        coded_step(scene, &Coding::Context { stream: Stream::of_run(3), rate: rate(0.0), exact })
+    };
+    let (report, workspace) = step(&scene);
+    let mut snapped = scene.clone();
+    for (a, cell) in scene.anchors.lattice.iter().enumerate() {
+        let (mut features, mut hidden) = (vec![0; context.n_inputs()], vec![0; context.n_hidden()]);
+        context.features(*cell, &mut features);
+        context.hidden(&features, &mut hidden);
+        let steps = context.steps(&hidden);
+        let arrays = [
+            (Group::Feature, &mut snapped.anchors.features, scene.shape.feature_dim),
+            (Group::LogScale, &mut snapped.anchors.log_scales, 6),
+            (Group::Offset, &mut snapped.anchors.offsets, 3 * scene.shape.n_offsets),
+        ];
+        for (group, values, width) in arrays {
+            for value in &mut values[a * width..(a + 1) * width] {
+                *value = (*value / steps.value(group)).round_ties_even() * steps.value(group);
+            }
+        }
+    }
+    let (again, repeated) = step(&snapped);
+    assert_eq!(
+        (again.squared_error, again.loss),
+        (report.squared_error, report.loss),
+        "rounding twice is rounding once"
+    );
+    assert_eq!(coded_step(&snapped, &Coding::Raw).0.squared_error, report.squared_error);
+    let n = flatten(&mut snapped).len() - network.n_params();
+    assert!(gradients(&scene, &workspace)[..n] == gradients(&snapped, &repeated)[..n], "straight through");
 }

@@ -1,0 +1,352 @@
+//! The values of a block of anchors as coding leaves them, and their rate.
+
+use pocketsplat_core::context::{FEATURES_PER_LEVEL, Group, MEAN_PARTS, N_GROUPS};
+use pocketsplat_core::entropy::EIGHTHS;
+
+use super::block::refill;
+use super::coding::{Coding, Exact};
+use crate::ops::noise::Stream;
+use crate::ops::simd::Level;
+use crate::ops::{Real, adaptive_step, anchor_bits, hash_grid, head, mask, perturb};
+use crate::scene::{ContextModel, Head, ModelShape, Scene};
+
+/// Number of the draw that decides whether an anchor is in the sample; channels are fewer.
+const SAMPLE_DRAW: u32 = u32::MAX;
+
+/// The values of a block, or their gradients: `[n, F]`, `[n, 6]`, `[n, 3K]`.
+pub(super) type Values<'a, R> = [&'a mut Vec<R>; N_GROUPS];
+
+/// The context network of a step.
+#[derive(Clone, Copy)]
+pub(super) struct Network<'a, R> {
+    pub(super) model: &'a ContextModel<R>,
+    /// All its outputs: for the sample of the rate.
+    pub(super) whole: &'a Head<R>,
+    /// [`steps_of`] it: for every visible anchor.
+    pub(super) steps: &'a Head<R>,
+}
+
+/// Weights of a step's rate terms.
+#[derive(Clone, Copy)]
+pub(super) struct Weights<R> {
+    /// Of a bit of the sample.
+    pub(super) bit: R,
+    /// Of the opening of one mask.
+    pub(super) mask: R,
+}
+
+/// What coding did to a block, kept for the way back; buffers are kept from step to step.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Coded<R> {
+    /// `[n]` places in the grid's cube.
+    pub(super) units: Vec<[u16; 3]>,
+    /// dL/d(grid features), `[n, 4·levels]`.
+    pub(super) d_inputs: Vec<R>,
+    /// Rows that are in the sample of the rate.
+    pub(super) sampled: Vec<u32>,
+    /// Bits of the sample.
+    pub(super) bits: [f64; N_GROUPS],
+    /// The mask term of the loss.
+    pub(super) mask_term: R,
+    /// dL/d(network): through the steps of all anchors, and through the distributions of the sample.
+    pub(super) d_steps_head: Option<Head<R>>,
+    pub(super) d_whole: Option<Head<R>>,
+    inputs: Vec<R>,
+    hidden: Vec<R>,
+    d_hidden: Vec<R>,
+    /// log₂(step/base) `[n, 3]` as the network gives it, and the steps.
+    exponents: Vec<R>,
+    steps: Vec<R>,
+    d_steps: Vec<R>,
+    d_exponents: Vec<R>,
+    /// Noise, or what rounding took, in steps.
+    residuals: [Vec<R>; N_GROUPS],
+    sample: Sample<R>,
+}
+
+/// The whole network's way for the anchors of the sample.
+#[derive(Clone, Debug, Default)]
+struct Sample<R> {
+    inputs: Vec<R>,
+    hidden: Vec<R>,
+    outputs: Vec<R>,
+    d_outputs: Vec<R>,
+    d_hidden: Vec<R>,
+    d_inputs: Vec<R>,
+    d_drawn: Vec<R>,
+    drawn: Vec<bool>,
+    scratch: anchor_bits::Scratch<R>,
+}
+
+/// The network without its rows for means and scales.
+pub(super) fn steps_of<R: Real>(network: &Head<R>) -> Head<R> {
+    let first = network.n_out - N_GROUPS;
+    Head {
+        n_out: N_GROUPS,
+        w1: network.w1.clone(),
+        b1: network.b1.clone(),
+        w2: network.w2[first * network.n_hidden..].to_vec(),
+        b2: network.b2[first..].to_vec(),
+        ..*network
+    }
+}
+
+fn widths(shape: &ModelShape) -> [usize; N_GROUPS] {
+    [shape.feature_dim, 6, 3 * shape.n_offsets]
+}
+
+/// A head of zeros as wide as `like`, in the place of whatever was there.
+fn zeroed<'a, R: Real>(slot: &'a mut Option<Head<R>>, like: &Head<R>) -> &'a mut Head<R> {
+    let head = slot.get_or_insert_with(|| Head::filled(like.n_in, like.n_hidden, like.n_out, R::ZERO));
+    for group in head.groups_mut() {
+        group.fill(R::ZERO);
+    }
+    head
+}
+
+impl<R: Real> Coded<R> {
+    /// Puts coding's traces into the values of a block.
+    ///
+    /// * `network`: where `coding` asks the context.
+    pub(super) fn forward(
+        &mut self,
+        level: Level,
+        scene: &Scene<R>,
+        coding: &Coding<'_, R>,
+        network: Option<Network<'_, R>>,
+        anchors: &[u32],
+        values: Values<'_, R>,
+    ) {
+        self.sampled.clear();
+        let n = anchors.len();
+        match (coding, network) {
+            (Coding::Noise { stream, steps }, _) => {
+                let steps = steps.map(|step| R::real(step.into()));
+                self.steps.clear();
+                self.steps.extend(std::iter::repeat_n(steps, n).flatten());
+                self.perturb(level, &scene.shape, Some(*stream), anchors, values);
+            }
+            (Coding::Context { stream, rate, exact }, Some(network)) => {
+                self.sampled.extend((0u32..).zip(anchors).filter_map(|(row, anchor)| {
+                    let draw = stream.branch(*anchor).uniform(SAMPLE_DRAW);
+                    (f64::from(draw) < rate.sample).then_some(row)
+                }));
+                self.ask(scene, network, anchors);
+                if let Some(exact) = exact {
+                    self.ask_exactly(scene, exact, anchors);
+                }
+                self.perturb(level, &scene.shape, exact.is_none().then_some(*stream), anchors, values);
+            }
+            _ => {}
+        }
+    }
+
+    /// Asks the network for the steps of all anchors and the distributions of the sample.
+    fn ask(&mut self, scene: &Scene<R>, network: Network<'_, R>, anchors: &[u32]) {
+        let (model, n) = (network.model, anchors.len());
+        let lattice = anchors.iter().map(|a| scene.anchors.lattice[*a as usize]);
+        self.units.clear();
+        self.units.extend(lattice.map(|cell| model.frame.unit(cell)));
+        let n_in = model.levels.len() * FEATURES_PER_LEVEL;
+        self.inputs.resize(n * n_in, R::ZERO);
+        hash_grid::forward(&model.levels, &model.rows, &self.units, &mut self.inputs);
+        self.hidden.resize(n * network.steps.n_hidden, R::ZERO);
+        self.exponents.resize(n * N_GROUPS, R::ZERO);
+        head::forward(network.steps, &self.inputs, &mut self.hidden, &mut self.exponents);
+        self.steps.resize(n * N_GROUPS, R::ZERO);
+        let base_steps = model.base_steps.map(|step| R::real(step.into()));
+        adaptive_step::forward(base_steps, &self.exponents, &mut self.steps);
+
+        let sample = &mut self.sample;
+        sample.inputs.clear();
+        for row in self.sampled.iter().map(|row| *row as usize) {
+            sample.inputs.extend_from_slice(&self.inputs[row * n_in..(row + 1) * n_in]);
+        }
+        sample.hidden.resize(self.sampled.len() * network.whole.n_hidden, R::ZERO);
+        sample.outputs.resize(self.sampled.len() * network.whole.n_out, R::ZERO);
+        head::forward(network.whole, &sample.inputs, &mut sample.hidden, &mut sample.outputs);
+    }
+
+    /// Puts what the integers say in the place of what the floats say.
+    fn ask_exactly(&mut self, scene: &Scene<R>, exact: &Exact<'_, R>, anchors: &[u32]) {
+        let context = &exact.context;
+        let n_channels = scene.shape.values_per_anchor();
+        let part = |output: i16, parts: i32| R::real(f64::from(output) / f64::from(parts));
+        let (mut features, mut hidden) = (vec![0; context.n_inputs()], vec![0; context.n_hidden()]);
+        let mut sampled = self.sampled.iter().zip(self.sample.outputs.chunks_exact_mut(context.n_outputs())).peekable();
+        let rows = self.exponents.chunks_exact_mut(N_GROUPS).zip(self.steps.chunks_exact_mut(N_GROUPS));
+        for ((row, anchor), (exponents, steps)) in (0u32..).zip(anchors).zip(rows) {
+            context.features(scene.anchors.lattice[*anchor as usize], &mut features);
+            context.hidden(&features, &mut hidden);
+            let exact_steps = context.steps(&hidden);
+            for (i, group) in [Group::Feature, Group::LogScale, Group::Offset].into_iter().enumerate() {
+                exponents[i] = part(context.output(2 * n_channels + i, &hidden), EIGHTHS);
+                steps[i] = R::real(exact_steps.value(group).into());
+            }
+            if let Some((_, outputs)) = sampled.next_if(|(sampled, _)| **sampled == row) {
+                for (i, output) in outputs.iter_mut().enumerate() {
+                    let parts = if i < n_channels { MEAN_PARTS } else { EIGHTHS };
+                    *output = part(context.output(i, &hidden), parts);
+                }
+            }
+        }
+    }
+
+    /// Noise from `stream`, or rounding without.
+    fn perturb(
+        &mut self,
+        level: Level,
+        shape: &ModelShape,
+        stream: Option<Stream>,
+        anchors: &[u32],
+        values: Values<'_, R>,
+    ) {
+        let mut first = 0u32;
+        for (group, (values, width)) in values.into_iter().zip(widths(shape)).enumerate() {
+            let residuals = &mut self.residuals[group];
+            residuals.resize(values.len(), R::ZERO);
+            let steps = &self.steps;
+            level.run(
+                #[inline(always)]
+                || {
+                    let rows = values.chunks_exact_mut(width).zip(residuals.chunks_exact_mut(width));
+                    let rows = rows.zip(steps.chunks_exact(N_GROUPS)).zip(anchors);
+                    for (((values, residuals), steps), anchor) in rows {
+                        match stream {
+                            Some(stream) => {
+                                perturb::with_noise(stream.branch(*anchor), first, steps[group], values, residuals);
+                            }
+                            None => perturb::rounded(steps[group], values, residuals),
+                        }
+                    }
+                },
+            );
+            first += u32::try_from(width).expect("a few hundred channels");
+        }
+    }
+
+    /// Adds the rate's share to the gradients of a block that coding with context drew, and takes all of them on to the
+    /// network and the grid's features.
+    ///
+    /// * `values`: as [`Self::forward`] left them. * `d_values`: of image and volumes. * `d_mask_logits`: added to.
+    pub(super) fn backward(
+        &mut self,
+        level: Level,
+        shape: &ModelShape,
+        network: Network<'_, R>,
+        weights: Weights<R>,
+        [values, d_values]: [Values<'_, R>; 2],
+        mask_logits: &[R],
+        d_mask_logits: &mut [R],
+    ) {
+        let [features, log_scales, offsets] = values;
+        let [d_features, d_log_scales, d_offsets] = d_values;
+        let n = mask_logits.len() / shape.n_offsets;
+        level.run(
+            #[inline(always)]
+            || {
+                self.mask_term = mask::term(mask_logits, weights.mask, d_mask_logits);
+                let rows = [&**features, &**log_scales, &**offsets];
+                let d_rows = [&mut **d_features, &mut **d_log_scales, &mut **d_offsets];
+                self.rate(shape, network.model, weights.bit, rows, d_rows, mask_logits, d_mask_logits);
+            },
+        );
+        self.d_steps.resize(n * N_GROUPS, R::ZERO);
+        let gradients = [&**d_features, &**d_log_scales, &**d_offsets];
+        for (group, (d_values, width)) in gradients.into_iter().zip(widths(shape)).enumerate() {
+            let rows = d_values.chunks_exact(width).zip(self.residuals[group].chunks_exact(width));
+            for ((d_values, residuals), d_steps) in rows.zip(self.d_steps.chunks_exact_mut(N_GROUPS)) {
+                d_steps[group] = perturb::backward(d_values, residuals);
+            }
+        }
+        refill(&mut self.d_exponents, n * N_GROUPS);
+        adaptive_step::backward(&self.exponents, &self.steps, &self.d_steps, &mut self.d_exponents);
+
+        refill(&mut self.d_inputs, self.inputs.len());
+        self.d_hidden.resize(self.hidden.len(), R::ZERO);
+        let d_steps_head = zeroed(&mut self.d_steps_head, network.steps);
+        head::backward(
+            network.steps,
+            &self.inputs,
+            &self.hidden,
+            &self.d_exponents,
+            &mut self.d_hidden,
+            &mut self.d_inputs,
+            d_steps_head,
+        );
+        let sample = &mut self.sample;
+        refill(&mut sample.d_inputs, sample.inputs.len());
+        sample.d_hidden.resize(sample.hidden.len(), R::ZERO);
+        let d_whole = zeroed(&mut self.d_whole, network.whole);
+        head::backward(
+            network.whole,
+            &sample.inputs,
+            &sample.hidden,
+            &sample.d_outputs,
+            &mut sample.d_hidden,
+            &mut sample.d_inputs,
+            d_whole,
+        );
+        let n_in = network.whole.n_in;
+        for (row, d_sample) in self.sampled.iter().zip(sample.d_inputs.chunks_exact(n_in)) {
+            let d_inputs = &mut self.d_inputs[*row as usize * n_in..(*row as usize + 1) * n_in];
+            for (d, d_sample) in d_inputs.iter_mut().zip(d_sample) {
+                *d += *d_sample;
+            }
+        }
+    }
+
+    /// Bits of the sample, and their gradients.
+    #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "one slice per input and per gradient")]
+    fn rate(
+        &mut self,
+        shape: &ModelShape,
+        model: &ContextModel<R>,
+        weight: R,
+        values: [&[R]; N_GROUPS],
+        d_values: [&mut [R]; N_GROUPS],
+        mask_logits: &[R],
+        d_mask_logits: &mut [R],
+    ) {
+        let (k, n_out) = (shape.n_offsets, model.mlp.n_out);
+        let widths = widths(shape);
+        let base_steps = model.base_steps.map(|step| R::real(step.into()));
+        let Sample { outputs, d_outputs, d_drawn, drawn, scratch, .. } = &mut self.sample;
+        refill(d_outputs, outputs.len());
+        self.bits = [0.0; N_GROUPS];
+        let [d_features, d_log_scales, d_offsets] = d_values;
+        let rows = self.sampled.iter().zip(outputs.chunks_exact(n_out)).zip(d_outputs.chunks_exact_mut(n_out));
+        for ((row, outputs), d_outputs) in rows {
+            let row = *row as usize;
+            let of = |width: usize| row * width..(row + 1) * width;
+            drawn.clear();
+            drawn.extend(mask_logits[of(k)].iter().map(|logit| mask::is_open(*logit)));
+            refill(d_drawn, k);
+            let rows = anchor_bits::Rows {
+                shape,
+                base_steps,
+                values: [&values[0][of(widths[0])], &values[1][of(widths[1])], &values[2][of(widths[2])]],
+                drawn,
+                outputs,
+            };
+            let mut gradients = anchor_bits::Gradients {
+                values: [
+                    &mut d_features[of(widths[0])],
+                    &mut d_log_scales[of(widths[1])],
+                    &mut d_offsets[of(widths[2])],
+                ],
+                outputs: d_outputs,
+                drawn: d_drawn,
+            };
+            let bits = anchor_bits::forward_backward(&rows, weight, scratch, &mut gradients);
+            for (sum, bits) in self.bits.iter_mut().zip(bits) {
+                *sum += bits;
+            }
+            let d_logits = d_mask_logits[of(k)].iter_mut().zip(&mask_logits[of(k)]);
+            for ((d_logit, logit), d_drawn) in d_logits.zip(&*d_drawn) {
+                *d_logit += *d_drawn * mask::slope(*logit);
+            }
+        }
+    }
+}

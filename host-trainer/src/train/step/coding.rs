@@ -1,0 +1,60 @@
+//! What coding does to the values of anchors, and what it costs, as a step is told.
+
+use pocketsplat_core::context::Context;
+
+use crate::ops::noise::Stream;
+use crate::scene::Head;
+
+/// What happens to the values of the visible anchors before they are drawn.
+#[derive(Clone, Copy, Debug)]
+pub enum Coding<'a, R> {
+    /// Nothing.
+    Raw,
+    /// Noise as wide as fixed steps, so that the scene becomes one that survives rounding.
+    Noise {
+        /// Of this iteration.
+        stream: Stream,
+        /// Of features, log-scales and offsets.
+        steps: [f32; 3],
+    },
+    /// Noise as wide as the steps of the scene's context model, and the rate under it.
+    Context {
+        /// Of this iteration.
+        stream: Stream,
+        /// The terms of the loss.
+        rate: RateTerms,
+        /// With it values are rounded, and steps and distributions are those of its integers: what a decoder sees.
+        exact: Option<Exact<'a, R>>,
+    },
+}
+
+/// The integer form of the scene's context model.
+#[derive(Clone, Copy, Debug)]
+pub struct Exact<'a, R> {
+    /// What decides.
+    pub context: Context<'a>,
+    /// The network that its integers stand for, through which gradients pass.
+    pub network: &'a Head<R>,
+}
+
+/// How much bits weigh in the loss.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RateTerms {
+    /// λ: weight of the mean bits of a value.
+    pub lambda: f64,
+    /// Share of the visible anchors that the mean is taken over.
+    pub sample: f64,
+    /// Weight of the mean opening of the visible anchors' masks.
+    pub mask: f64,
+    /// Weight of the bits of the grid's signs, relative to those of the values.
+    pub grid: f64,
+}
+
+/// What a step found out about the rate.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RateReport {
+    /// Anchors that the rest is estimated from.
+    pub n_sampled: usize,
+    /// Mean bits of an anchor: features, log-scales, offsets.
+    pub bits: [f64; 3],
+}

@@ -153,7 +153,7 @@ real!(f64, matrixmultiply::dgemm, f64::exp, f64::log2);
 #[inline(always)]
 fn log2_series(x: f32) -> f32 {
     /// 2/ln 2 · 1/(2i + 1).
-    const TERMS: [f32; 5] = [2.885_390_1, 0.961_796_7, 0.577_078_04, 0.412_198_6, 0.320_598_9];
+    const TERMS: [f32; 5] = [2.885_39, 0.961_796_7, 0.577_078_04, 0.412_198_6, 0.320_598_9];
     let sqrt_half = std::f32::consts::FRAC_1_SQRT_2.to_bits();
     let shifted = x.to_bits().wrapping_sub(sqrt_half);
     let n = (shifted.cast_signed() >> 23) as f32;

@@ -125,8 +125,8 @@ impl<R: Real> Block<R> {
     ) {
         let values = [&mut self.features, &mut self.log_scales, &mut self.offsets];
         let d_values = [&mut self.d_features, &mut self.d_log_scales, &mut self.d_offsets];
-        let (logits, d_logits) = (&self.mask_logits, &mut self.d_mask_logits);
-        self.coded.backward(level, shape, network, weights, [values, d_values], logits, d_logits);
+        let masks = (self.mask_logits.as_slice(), self.d_mask_logits.as_mut_slice());
+        self.coded.backward(level, shape, network, weights, [values, d_values], masks);
     }
 
     /// From anchors to splats.

@@ -169,7 +169,7 @@ impl<R: Real> Coded<R> {
 
     /// Puts what the integers say in the place of what the floats say.
     fn ask_exactly(&mut self, scene: &Scene<R>, exact: &Exact<'_, R>, anchors: &[u32]) {
-        let context = &exact.context;
+        let context = exact.context;
         let n_channels = scene.shape.values_per_anchor();
         let part = |output: i16, parts: i32| R::real(f64::from(output) / f64::from(parts));
         let (mut features, mut hidden) = (vec![0; context.n_inputs()], vec![0; context.n_hidden()]);
@@ -228,7 +228,8 @@ impl<R: Real> Coded<R> {
     /// Adds the rate's share to the gradients of a block that coding with context drew, and takes all of them on to the
     /// network and the grid's features.
     ///
-    /// * `values`: as [`Self::forward`] left them. * `d_values`: of image and volumes. * `d_mask_logits`: added to.
+    /// `values` are as [`Self::forward`] left them, `d_values` those of image and volumes; mask logits stand beside their
+    /// gradients, which are added to.
     pub(super) fn backward(
         &mut self,
         level: Level,
@@ -236,8 +237,7 @@ impl<R: Real> Coded<R> {
         network: Network<'_, R>,
         weights: Weights<R>,
         [values, d_values]: [Values<'_, R>; 2],
-        mask_logits: &[R],
-        d_mask_logits: &mut [R],
+        (mask_logits, d_mask_logits): (&[R], &mut [R]),
     ) {
         let [features, log_scales, offsets] = values;
         let [d_features, d_log_scales, d_offsets] = d_values;

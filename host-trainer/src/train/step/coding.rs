@@ -32,7 +32,7 @@ pub enum Coding<'a, R> {
 #[derive(Clone, Copy, Debug)]
 pub struct Exact<'a, R> {
     /// What decides.
-    pub context: Context<'a>,
+    pub context: &'a Context<'a>,
     /// The network that its integers stand for, through which gradients pass.
     pub network: &'a Head<R>,
 }

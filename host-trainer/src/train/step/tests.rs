@@ -294,7 +294,7 @@ fn rounded_values_are_symbols_of_the_integer_model() {
     let context = Context::parse(&section, scene.shape.feature_dim, n_channels).unwrap();
     let network = rounded(model, n_channels).unwrap();
     let step = |scene: &Scene<f32>| {
-        let exact = Some(Exact { context, network: &network });
+        let exact = Some(Exact { context: &context, network: &network });
         coded_step(scene, &Coding::Context { stream: Stream::of_run(3), rate: rate(0.0), exact })
     };
     let (report, workspace) = step(&scene);

@@ -56,7 +56,14 @@ impl Observer for Progress {
             self.loss += newest * (loss - self.loss);
             self.psnr_db += newest * (psnr_db - self.psnr_db);
         }
-        let state = format!("loss {:.4}  PSNR {:.2} dB  {} anchors", self.loss, self.psnr_db, scene.anchors.len());
+        let bits = report.rate.map(|rate| format!("  {:.0} bits each", rate.bits.iter().sum::<f64>()));
+        let state = format!(
+            "loss {:.4}  PSNR {:.2} dB  {} anchors{}",
+            self.loss,
+            self.psnr_db,
+            scene.anchors.len(),
+            bits.unwrap_or_default()
+        );
         if self.on_terminal {
             self.bar.set_position(u64::from(iteration));
             self.bar.set_message(state);

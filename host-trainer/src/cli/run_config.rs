@@ -6,18 +6,11 @@ use anyhow::{Context, Result, bail};
 use pocketsplat::bundle::QuantisationSteps;
 use pocketsplat::dataset::Background;
 use pocketsplat::train::TrainConfig;
+use pocketsplat::train::config::Backbone;
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
 use super::capture::CaptureOptions;
-
-/// The kinds of scene that can be trained.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub(crate) enum Backbone {
-    /// Scaffold-GS: anchors, three heads, static entropy tables.
-    Scaffold,
-}
 
 /// Everything a run was asked for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -26,7 +19,6 @@ pub(crate) struct RunConfig {
     pub(crate) dataset: PathBuf,
     /// The bundle to write.
     pub(crate) output: PathBuf,
-    pub(crate) backbone: Backbone,
     /// Iterations from one checkpoint to the next; by time without.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) checkpoint_every: Option<u32>,
@@ -41,7 +33,6 @@ impl Default for RunConfig {
         Self {
             dataset: PathBuf::new(),
             output: PathBuf::new(),
-            backbone: Backbone::Scaffold,
             checkpoint_every: None,
             keep_checkpoints: false,
             capture: CaptureOptions { background: Some(Background::Black), ..CaptureOptions::default() },
@@ -62,7 +53,8 @@ impl RunConfig {
     /// As [`Self::read`], from its text.
     pub(crate) fn parse(text: &str) -> Result<Self> {
         let given: Table = text.parse()?;
-        let mut all = Table::try_from(Self::default())?;
+        let train = TrainConfig::of(given_backbone(&given)?);
+        let mut all = Table::try_from(Self { train, ..Self::default() })?;
         merge(&mut all, &given);
         let config: Self = all.try_into()?;
         // What is not written again was not understood.
@@ -81,11 +73,17 @@ impl RunConfig {
     /// bundle is written anew from what was trained.
     pub(crate) fn difference(&self, other: &Self) -> Result<Option<String>> {
         let deciding = |config: &Self| {
-            let Self { backbone, capture, train, .. } = config.clone();
-            Table::try_from(Self { backbone, capture, train, ..Self::default() })
+            let Self { capture, train, .. } = config.clone();
+            Table::try_from(Self { capture, train, ..Self::default() })
         };
         Ok(first_difference(&deciding(self)?, &deciding(other)?, ""))
     }
+}
+
+/// The backbone that a configuration names; its defaults stand for what else is missing.
+fn given_backbone(given: &Table) -> Result<Backbone> {
+    let named = given.get("train").and_then(|train| train.get("backbone"));
+    named.map_or(Ok(Backbone::default()), |name| Ok(name.clone().try_into()?))
 }
 
 /// Replaces values of `into` by those of `from`, table by table.

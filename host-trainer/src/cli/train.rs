@@ -9,9 +9,8 @@ use anyhow::{Context, Result, bail};
 use pocketsplat::bundle::{self, BundleInfo, QuantisationSteps, WriteOptions};
 use pocketsplat::dataset::{Background, Capture};
 use pocketsplat::scene::Scene;
+use pocketsplat::train::finish::Finished;
 use pocketsplat::train::run::{Ending, Interval, RunError, RunFolder};
-use pocketsplat::train::step::Workspace;
-use pocketsplat::train::survey::Survey;
 use pocketsplat::train::{TrainConfig, Trainer};
 use pocketsplat_core::budget::MAX_FRAME_PX;
 use serde::Serialize;
@@ -35,7 +34,12 @@ pub(crate) struct TrainResult {
     pub(crate) bundle: PathBuf,
     pub(crate) bundle_bytes: usize,
     pub(crate) n_anchors: usize,
+    /// Of these, with a drawn offset; the others are not coded.
+    pub(crate) n_valid_anchors: usize,
+    pub(crate) drawn_offsets: usize,
     pub(crate) undrawn_offsets: usize,
+    /// Bytes of features, log-scales and offsets under the float context model.
+    pub(crate) estimated_bytes: Option<[f64; 3]>,
     pub(crate) bytes_per_anchor: f64,
     pub(crate) iterations: u32,
     pub(crate) dropped_steps: u32,
@@ -180,10 +184,7 @@ fn write_bundle(
     steps: &QuantisationSteps,
     output: &Path,
 ) -> Result<TrainResult> {
-    let mut scene = trainer.scene.clone();
-    let cameras: Vec<_> = trainer.cameras().iter().collect();
-    let survey = Survey::new(&scene, &mut Workspace::new(&scene.shape), &cameras);
-    let n_masked = survey.mask_undrawn(&mut scene);
+    let Finished { scene, n_undrawn, estimated_bits, .. } = trainer.finish()?;
     let bytes = encode(&scene, capture, background, steps)?;
     output::write_whole(output, &bytes)?;
     let n_anchors = trainer.scene.anchors.len();
@@ -191,7 +192,10 @@ fn write_bundle(
         bundle: output.to_owned(),
         bundle_bytes: bytes.len(),
         n_anchors,
-        undrawn_offsets: n_masked,
+        n_valid_anchors: (0..n_anchors).filter(|a| scene.anchors.has_drawn(*a)).count(),
+        drawn_offsets: (0..scene.anchors.mask_logits.len()).filter(|offset| scene.anchors.is_drawn(*offset)).count(),
+        undrawn_offsets: n_undrawn,
+        estimated_bytes: estimated_bits.map(|bits| bits.map(|bits| bits / 8.0)),
         bytes_per_anchor: bytes.len() as f64 / n_anchors as f64,
         iterations: trainer.iteration,
         dropped_steps: trainer.n_dropped(),

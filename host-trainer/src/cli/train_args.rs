@@ -6,9 +6,10 @@ use anyhow::{Context, Result, bail};
 use clap::ArgAction;
 use pocketsplat::bundle::QuantisationSteps;
 use pocketsplat::train::TrainConfig;
+use pocketsplat::train::config::{Backbone, Hac};
 
 use super::capture::CaptureOptions;
-use super::run_config::{Backbone, RunConfig};
+use super::run_config::RunConfig;
 
 /// Train a scene from a capture and write it as a bundle.
 ///
@@ -44,14 +45,19 @@ pub(crate) struct Args {
     keep_checkpoints: bool,
     /// Kind of scene. [default: scaffold]
     #[arg(long, value_enum)]
-    backbone: Option<Backbone>,
+    backbone: Option<BackboneName>,
+    #[arg(long, help = with_default("Weight of a value's bits in the loss, for `--backbone hac`", Hac::default().lambda))]
+    lambda: Option<f64>,
+    #[arg(long, value_name = "N", help = with_default("Hold out every N-th training view, to measure with; 0: none",
+        TrainConfig::default().validation_every))]
+    validation_every: Option<u32>,
     #[arg(long, help = with_default("Training steps; schedules scale with them", TrainConfig::default().iterations))]
     iterations: Option<u32>,
     #[arg(long, help = with_default("Everything random follows from it: same seed, same machine, same bundle",
         TrainConfig::default().seed))]
     seed: Option<u64>,
-    #[arg(long, value_name = "F", help = with_default("Feature width of an anchor, and hidden width of the heads",
-        TrainConfig::default().shape.feature_dim))]
+    /// Feature width of an anchor, and hidden width of the heads. [default: 32, with `--backbone hac` 50]
+    #[arg(long, value_name = "F")]
     feature_dim: Option<usize>,
     #[arg(long, value_name = "K", help = with_default("Gaussians of an anchor", TrainConfig::default().shape.n_offsets))]
     offsets: Option<usize>,
@@ -59,7 +65,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true",
         action = ArgAction::Set)]
     no_view_direction: Option<bool>,
-    /// Show the heads the distance of view.
+    /// Show the heads the distance of view. [default: false, with `--backbone hac` true]
     #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true",
         action = ArgAction::Set)]
     view_distance: Option<bool>,
@@ -78,6 +84,24 @@ pub(crate) struct Args {
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
+}
+
+/// [`Backbone`] on the command line.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum BackboneName {
+    /// Scaffold-GS: anchors and three heads, trained for the image alone.
+    Scaffold,
+    /// HAC: the same, trained for image and bits, with a context model.
+    Hac,
+}
+
+impl From<BackboneName> for Backbone {
+    fn from(name: BackboneName) -> Self {
+        match name {
+            BackboneName::Scaffold => Self::Scaffold,
+            BackboneName::Hac => Self::Hac,
+        }
+    }
 }
 
 fn with_default(help: &str, default: impl std::fmt::Display) -> String {
@@ -142,11 +166,15 @@ impl Args {
         config.capture = self.capture.or(&config.capture);
         config.checkpoint_every = self.checkpoint_every.or(config.checkpoint_every);
         config.keep_checkpoints |= self.keep_checkpoints;
-        set(&mut config.backbone, &self.backbone);
+        if let Some(backbone) = self.backbone {
+            config.train = config.train.with_backbone(backbone.into());
+        }
         set(&mut config.quantisation.feature, &self.feature_step);
         let train = &mut config.train;
         set(&mut train.iterations, &self.iterations);
         set(&mut train.seed, &self.seed);
+        set(&mut train.hac.lambda, &self.lambda);
+        set(&mut train.validation_every, &self.validation_every);
         train.voxel_size = self.voxel_size.or(train.voxel_size);
         train.densification.max_anchors = self.max_anchors.or(train.densification.max_anchors);
         set(&mut train.shape.feature_dim, &self.feature_dim);

@@ -3,6 +3,7 @@
 use super::Real;
 use super::adaptive_step::{EXPONENTS, clamp, clamp_backward};
 use super::rate;
+use super::simd::Level;
 use crate::scene::ModelShape;
 
 /// Least and largest log₂(scale/step): what the coder's tables reach, −32 and 31 eighths of an octave.
@@ -140,6 +141,21 @@ pub fn forward_backward<R: Real>(
     sums
 }
 
+/// Bits of the drawn values of features, log-scales and offsets, without gradients.
+pub fn forward<R: Real>(level: Level, rows: &Rows<'_, R>) -> [f64; 3] {
+    let mut d_values = rows.values.map(|values| vec![R::ZERO; values.len()]);
+    let (mut d_outputs, mut d_drawn) = (vec![R::ZERO; rows.outputs.len()], vec![R::ZERO; rows.drawn.len()]);
+    let mut scratch = Scratch::default();
+    level.run(
+        #[inline(always)]
+        || {
+            let values = d_values.each_mut().map(Vec::as_mut_slice);
+            let mut unused = Gradients { values, outputs: &mut d_outputs, drawn: &mut d_drawn };
+            forward_backward(rows, R::ZERO, &mut scratch, &mut unused)
+        },
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -217,6 +233,7 @@ mod tests {
     fn masks_save_the_bits_of_their_offsets() {
         let (x, drawn) = inputs(5);
         let found = run(&x, &drawn, 1.0);
+        assert_eq!(run(&x, &drawn, 0.0).bits, found.bits);
         let saved: f64 = found.drawn.iter().sum();
         assert!((saved - found.bits[2]).abs() < 1e-9);
         for (i, drawn) in drawn.iter().enumerate() {

@@ -112,7 +112,8 @@ fn best_supported(candidates: BTreeMap<[i32; 3], Candidate>, room: usize) -> Vec
     all.into_iter().map(|(cell, candidate)| (cell, candidate.feature)).collect()
 }
 
-/// Removes anchors that were seen often enough and whose opacities sum to less than `min_opacity` a view on average.
+/// Removes anchors that were seen often enough and whose opacities sum to less than `min_opacity` a view on average, and
+/// those whose offsets are all masked.
 ///
 /// Afterwards every anchor that was seen often enough starts counting afresh, and base log-scales are lowered to
 /// 0.05 (as the published trainer does).
@@ -131,7 +132,7 @@ pub fn prune(
     let mut keep: Vec<bool> = (0..n_before)
         .map(|a| {
             let floor = settings.min_opacity * f64::from(statistics.n_views[a]);
-            !(judged[a] && f64::from(statistics.opacity_sum[a]) < floor)
+            scene.anchors.has_drawn(a) && !(judged[a] && f64::from(statistics.opacity_sum[a]) < floor)
         })
         .collect();
     // A scene without anchors has nothing left to grow from.
@@ -179,6 +180,8 @@ mod tests {
         assert_eq!(scene.anchors.offsets.len(), n * 30);
         assert_eq!(optimiser.features.first.len(), n * 32);
         assert_eq!(optimiser.offsets.second.len(), n * 30);
+        assert_eq!(scene.anchors.mask_logits.len(), n * 10);
+        assert_eq!(optimiser.mask_logits.first.len(), n * 10);
         assert_eq!(statistics.n_views.len(), n);
         assert_eq!(statistics.gradient_sum.len(), n * 10);
     }
@@ -247,5 +250,9 @@ mod tests {
         consistent(&scene, &optimiser, &statistics);
         assert_eq!(statistics.n_views, [0, 80], "judged anchors start afresh, the other goes on");
         assert_eq!(scene.anchors.log_scales[11], MAX_BASE_LOG_SCALE);
+        scene.anchors.mask_logits[10..].fill(-5.0);
+        assert_eq!(prune(&mut scene, &mut optimiser, &mut statistics, &Densification::default()), 1);
+        assert_eq!(scene.anchors.lattice, kept[..1], "an anchor that is masked as a whole goes too");
+        consistent(&scene, &optimiser, &statistics);
     }
 }

@@ -2,8 +2,11 @@
 //! an interruption.
 
 pub mod checkpoint;
+mod coding;
 pub mod config;
+pub mod context_start;
 pub mod densify;
+pub mod finish;
 pub mod optimiser;
 mod outcome;
 pub mod run;
@@ -29,9 +32,10 @@ use crate::ops::Pinhole;
 use crate::scene::init::initial_scene;
 use crate::scene::{Anchors, Heads, Scene};
 use checkpoint::{CaptureSignature, Kernels};
+use coding::Integers;
+use config::{Backbone, Phase, Rate, Rates};
 use optimiser::Optimiser;
 use statistics::Statistics;
-use step::coding::Coding;
 use step::{Target, Workspace, clear_masked};
 use watchdog::Watchdog;
 
@@ -42,6 +46,8 @@ pub struct Trainer<'a> {
     capture: &'a Capture,
     signature: CaptureSignature,
     cameras: Vec<Pinhole<f32>>,
+    /// Training views that are not held out.
+    trained: Vec<u32>,
     background: [f32; 3],
     /// Iterations done.
     pub iteration: u32,
@@ -101,6 +107,11 @@ impl<'a> Trainer<'a> {
         Ok(Self {
             signature: CaptureSignature::of(capture),
             cameras: capture.train.iter().map(|v| Pinhole::new(&v.camera)).collect(),
+            trained: (0u32..)
+                .zip(&capture.train)
+                .filter(|(i, _)| !config.holds_out(*i as usize, capture.train.len()))
+                .map(|(i, _)| i)
+                .collect(),
             background: capture.background,
             iteration: 0,
             seconds: 0.0,
@@ -121,9 +132,15 @@ impl<'a> Trainer<'a> {
         &self.config
     }
 
-    /// The cameras of the training views.
+    /// The cameras of the training views, held out or not.
     pub fn cameras(&self) -> &[Pinhole<f32>] {
         &self.cameras
+    }
+
+    /// The training views that are held out: nothing of the scene follows from them, so it can be measured with them.
+    pub fn validation_views(&self) -> impl Iterator<Item = &'a View> + use<'a> {
+        let (config, views) = (self.config, &self.capture.train);
+        views.iter().enumerate().filter(move |(i, _)| config.holds_out(*i, views.len())).map(|(_, view)| view)
     }
 
     /// Whether all iterations are done.
@@ -178,8 +195,9 @@ impl<'a> Trainer<'a> {
 
     fn iterate(&mut self) -> Result<Outcome, TrainError> {
         self.iteration += 1;
+        self.begin_context();
         if self.queue.is_empty() {
-            self.queue = (0u32..).zip(&self.cameras).map(|(view, _)| view).collect();
+            self.queue.clone_from(&self.trained);
             self.queue.shuffle(&mut self.rng);
         }
         let index = self.queue.pop().expect("refilled above") as usize;
@@ -188,7 +206,13 @@ impl<'a> Trainer<'a> {
         let mut truth = planes(image);
         clear_masked(&mut truth, mask);
         let target = Target { camera: &self.cameras[index], truth: &truth, mask, background: self.background };
-        let report = self.workspace.step(&self.scene, &target, &self.config.loss, &Coding::Raw);
+        let integers = match self.config.phase(self.iteration) {
+            Phase::Exact => Some(Integers::of(&self.scene)?),
+            _ => None,
+        };
+        let context = integers.as_ref().map(|integers| integers.context(&self.scene)).transpose()?;
+        let coding = coding::coding(&self.config, self.iteration, context.as_ref().zip(integers.as_ref()));
+        let report = self.workspace.step(&self.scene, &target, &self.config.loss, &coding);
         if let Some(cause) = watchdog::inspect(&self.scene, &truth, self.background, &self.workspace, &report) {
             let dropped = DroppedStep { iteration: self.iteration, view: name.clone(), cause };
             return if self.watchdog.dropped() {
@@ -201,17 +225,27 @@ impl<'a> Trainer<'a> {
         // The published loop leaves the parameters of its last iteration as they are.
         if self.iteration < self.config.iterations {
             let progress = f64::from(self.iteration) / f64::from(self.config.iterations);
-            self.optimiser.apply(&mut self.scene, &self.workspace, &self.config.rates, progress, self.capture.extent);
+            let rates = self.rates();
+            self.optimiser.apply(&mut self.scene, &self.workspace, &rates, progress, self.capture.extent);
         }
         self.densify();
         Ok(Outcome { report, dropped: None })
+    }
+
+    /// The learning rates; masks move only where bits count.
+    fn rates(&self) -> Rates {
+        match self.config.backbone {
+            Backbone::Scaffold => Rates { mask: Rate { start: 0.0, end: 0.0 }, ..self.config.rates },
+            Backbone::Hac => self.config.rates,
+        }
     }
 
     /// Statistics of the step in the workspace, and growth and pruning when they are due.
     fn densify(&mut self) {
         let settings = self.config.densification;
         let until = self.config.iteration_at(settings.until);
-        if self.iteration >= until || self.iteration <= self.config.iteration_at(settings.statistics_from) {
+        let from = self.config.iteration_at(settings.statistics_from);
+        if self.iteration >= until || self.iteration <= from || self.config.pauses_at(self.iteration) {
             return;
         }
         self.statistics.add(&self.workspace, self.config.shape.n_offsets);
@@ -235,3 +269,6 @@ impl<'a> Trainer<'a> {
         Image { width_px: view.camera.width_px, height_px: view.camera.height_px, rgb }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -6,7 +6,7 @@ use super::config::Rates;
 use super::step::{Block, Workspace};
 use crate::ops::Real;
 use crate::ops::adam::{self, Moments, Step};
-use crate::scene::{Anchors, Heads, Scene};
+use crate::scene::{Anchors, ContextModel, Head, Heads, Scene};
 
 /// Anchors one task updates.
 const ROWS: usize = 2048;
@@ -22,8 +22,32 @@ pub struct Optimiser<R> {
     pub log_scales: Moments<R>,
     /// Of [`Anchors::offsets`].
     pub offsets: Moments<R>,
+    /// Of [`Anchors::mask_logits`].
+    pub mask_logits: Moments<R>,
     /// First and second moments of the heads.
     pub heads: [Heads<R>; 2],
+    /// Of the context model, once there is one.
+    pub context: Option<ContextMoments<R>>,
+}
+
+/// Moments of a context model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ContextMoments<R> {
+    /// Steps taken with it.
+    pub n_steps: u32,
+    /// Of the grid's rows.
+    pub rows: Moments<R>,
+    /// First and second moments of the network.
+    pub mlp: [Head<R>; 2],
+}
+
+impl<R: Real> ContextMoments<R> {
+    /// Zero moments.
+    pub fn zeros(model: &ContextModel<R>) -> Self {
+        let Head { n_in, n_hidden, n_out, .. } = model.mlp;
+        let mlp = Head::filled(n_in, n_hidden, n_out, R::ZERO);
+        Self { n_steps: 0, rows: Moments::zeros(model.rows.len()), mlp: [mlp.clone(), mlp] }
+    }
 }
 
 /// One parameter array of the anchors with its moments, cut into tasks.
@@ -38,20 +62,30 @@ struct Group<'a, R> {
 impl<R: Real> Optimiser<R> {
     /// Zero moments for a scene.
     pub fn new(scene: &Scene<R>) -> Self {
-        let Anchors { features, log_scales, offsets, .. } = &scene.anchors;
+        let Anchors { features, log_scales, offsets, mask_logits, .. } = &scene.anchors;
         let heads = Heads::filled(&scene.shape, R::ZERO);
         Self {
             n_steps: 0,
             features: Moments::zeros(features.len()),
             log_scales: Moments::zeros(log_scales.len()),
             offsets: Moments::zeros(offsets.len()),
+            mask_logits: Moments::zeros(mask_logits.len()),
             heads: [heads.clone(), heads],
+            context: scene.context.as_ref().map(ContextMoments::zeros),
         }
+    }
+
+    /// Zero moments for the context model that the scene has now.
+    pub fn begin_context(&mut self, scene: &Scene<R>) {
+        self.context = scene.context.as_ref().map(ContextMoments::zeros);
     }
 
     /// Moves every parameter by the gradients that the last step left in `workspace`.
     ///
-    /// * `progress`: share of the run that is done, 0 to 1. * `extent`: of the capture; scales the rate of the offsets.
+    /// Mask logits move only where their rate is above 0.
+    ///
+    /// * `progress`: share of the run that is done, 0 to 1. * `extent`: of the capture; scales the rates of the offsets and
+    ///   of their masks.
     pub fn apply(&mut self, scene: &mut Scene<R>, workspace: &Workspace<R>, rates: &Rates, progress: f64, extent: f64) {
         self.n_steps += 1;
         let t = self.n_steps;
@@ -63,7 +97,8 @@ impl<R: Real> Optimiser<R> {
                 gradient_of[*anchor as usize] = (b, row);
             }
         }
-        let Scene { anchors, heads, shape, .. } = scene;
+        let Scene { anchors, heads, shape, context, .. } = scene;
+        let mask_rate = rates.mask.at(progress) * extent;
         let groups = [
             Group {
                 width: shape.feature_dim,
@@ -86,8 +121,16 @@ impl<R: Real> Optimiser<R> {
                 moments: &mut self.offsets,
                 gradient: |b| &b.d_offsets,
             },
+            Group {
+                width: shape.n_offsets,
+                step: step(mask_rate),
+                parameters: &mut anchors.mask_logits,
+                moments: &mut self.mask_logits,
+                gradient: |b| &b.d_mask_logits,
+            },
         ];
-        for group in groups {
+        let n_moving = if mask_rate > 0.0 { groups.len() } else { groups.len() - 1 };
+        for group in groups.into_iter().take(n_moving) {
             group.update(workspace, &gradient_of);
         }
 
@@ -96,19 +139,32 @@ impl<R: Real> Optimiser<R> {
         let moments = first.each_mut().into_iter().zip(second.each_mut());
         let all = heads.each_mut().into_iter().zip(workspace.d_heads.each()).zip(moments).zip(head_rates);
         for (((head, gradient), (first, second)), rate) in all {
-            let step = step(rate.at(progress));
-            let moments = first.groups_mut().into_iter().zip(second.groups_mut());
-            for ((p, g), (m, v)) in head.groups_mut().into_iter().zip(gradient.groups()).zip(moments) {
-                adam::update(step, p, m, v, Some(g));
-            }
+            update_head(step(rate.at(progress)), head, gradient, [first, second]);
+        }
+        if let (Some(model), Some(gradient), Some(moments)) = (context, &workspace.d_context, &mut self.context) {
+            moments.n_steps += 1;
+            let [first, second] = &mut moments.mlp;
+            let of_mlp = Step::new(rates.context.at(progress), moments.n_steps);
+            update_head(of_mlp, &mut model.mlp, &gradient.mlp, [first, second]);
+            let of_rows = Step::new(rates.grid.at(progress), moments.n_steps);
+            let Moments { first, second } = &mut moments.rows;
+            let parts = model.rows.par_chunks_mut(ROWS).zip(gradient.rows.par_chunks(ROWS));
+            let parts = parts.zip(first.par_chunks_mut(ROWS)).zip(second.par_chunks_mut(ROWS));
+            parts.for_each(|(((p, g), m), v)| {
+                workspace.level().run(
+                    #[inline(always)]
+                    || adam::update(of_rows, p, m, v, Some(g)),
+                );
+            });
         }
     }
 
     /// Appends zero moments for the anchors that `scene` has gained.
     pub fn grow(&mut self, scene: &Scene<R>) {
-        let Anchors { features, log_scales, offsets, .. } = &scene.anchors;
-        let moments = [&mut self.features, &mut self.log_scales, &mut self.offsets];
-        for (moments, len) in moments.into_iter().zip([features.len(), log_scales.len(), offsets.len()]) {
+        let Anchors { features, log_scales, offsets, mask_logits, .. } = &scene.anchors;
+        let moments = [&mut self.features, &mut self.log_scales, &mut self.offsets, &mut self.mask_logits];
+        let lens = [features.len(), log_scales.len(), offsets.len(), mask_logits.len()];
+        for (moments, len) in moments.into_iter().zip(lens) {
             moments.first.resize(len, R::ZERO);
             moments.second.resize(len, R::ZERO);
         }
@@ -116,11 +172,18 @@ impl<R: Real> Optimiser<R> {
 
     /// Drops the moments of anchors that `keep` does not mark.
     pub fn retain(&mut self, keep: &[bool], feature_dim: usize, n_offsets: usize) {
-        let moments = [&mut self.features, &mut self.log_scales, &mut self.offsets];
-        for (moments, width) in moments.into_iter().zip([feature_dim, 6, 3 * n_offsets]) {
+        let moments = [&mut self.features, &mut self.log_scales, &mut self.offsets, &mut self.mask_logits];
+        for (moments, width) in moments.into_iter().zip([feature_dim, 6, 3 * n_offsets, n_offsets]) {
             retain_rows(&mut moments.first, width, keep);
             retain_rows(&mut moments.second, width, keep);
         }
+    }
+}
+
+fn update_head<R: Real>(step: Step<R>, head: &mut Head<R>, gradient: &Head<R>, [first, second]: [&mut Head<R>; 2]) {
+    let moments = first.groups_mut().into_iter().zip(second.groups_mut());
+    for ((p, g), (m, v)) in head.groups_mut().into_iter().zip(gradient.groups()).zip(moments) {
+        adam::update(step, p, m, v, Some(g));
     }
 }
 

@@ -35,6 +35,9 @@ pub enum TrainError {
     /// No point to start from.
     #[error("the capture has no point to start from; check its bounds")]
     NoPoints,
+    /// The context model has no integer form.
+    #[error("the context model can not be written in integers: {0}; start anew with lower `train.rates` in a --config")]
+    Context(String),
     /// The cause of dropped steps does not pass.
     #[error(
         "{n} steps in a row would have made parameters infinite or NaN and were dropped, the last one so: {last}; \

@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use super::TrainConfig;
-use super::config::Densification;
+use super::config::{Backbone, Densification};
 use crate::camera::Camera;
 use crate::dataset::{Capture, EXTENT, Image, Normalisation, PointsOrigin, View};
 use crate::scene::ModelShape;
@@ -70,4 +70,9 @@ pub(super) fn tiny_config(iterations: u32) -> TrainConfig {
         },
         ..TrainConfig::default()
     }
+}
+
+/// The same with the rate of HAC.
+pub(super) fn tiny_hac_config(iterations: u32) -> TrainConfig {
+    TrainConfig { backbone: Backbone::Hac, ..tiny_config(iterations) }
 }

@@ -4,7 +4,7 @@ use std::fmt;
 
 use rayon::prelude::*;
 
-use super::step::{StepReport, Workspace};
+use super::step::{Block, StepReport, Workspace};
 use crate::ops::neural_gaussians::Gaussian;
 use crate::scene::{Heads, Scene};
 
@@ -89,13 +89,14 @@ pub(super) fn inspect(
     report: &StepReport<f32>,
 ) -> Option<Cause> {
     let blocks_sound = workspace.blocks().par_iter().all(|block| {
-        let arrays = [&block.screen_gradients, &block.d_features, &block.d_log_scales, &block.d_offsets];
+        let Block { screen_gradients, d_features, d_log_scales, d_offsets, d_mask_logits, .. } = block;
+        let arrays = [screen_gradients, d_features, d_log_scales, d_offsets, d_mask_logits];
         workspace.level().run(
             #[inline(always)]
             || arrays.iter().all(|gradients| sound(gradients)),
         )
     });
-    let heads_sound = groups(&workspace.d_heads).all(sound);
+    let heads_sound = groups(&workspace.d_heads).chain(context_gradients(workspace)).all(sound);
     if report.loss.is_finite() && blocks_sound && heads_sound {
         return None;
     }
@@ -119,6 +120,10 @@ fn cause(array: &'static str, anchor: Option<usize>, value: f32) -> Cause {
     Cause { array, anchor, value }
 }
 
+fn context_gradients(workspace: &Workspace<f32>) -> impl Iterator<Item = &[f32]> {
+    workspace.d_context.iter().flat_map(|found| found.mlp.groups().into_iter().chain([found.rows.as_slice()]))
+}
+
 fn groups(heads: &Heads<f32>) -> impl Iterator<Item = &[f32]> {
     heads.each().into_iter().flat_map(|head| head.groups())
 }
@@ -137,6 +142,7 @@ fn input_fault(scene: &Scene<f32>, truth: &[f32], background: [f32; 3]) -> Optio
         ("a feature", &anchors.features, f),
         ("a log-scale", &anchors.log_scales, 6),
         ("an offset", &anchors.offsets, 3 * k),
+        ("a mask logit", &anchors.mask_logits, k),
     ]
     .into_iter()
     .find_map(|(array, values, width)| {
@@ -145,6 +151,12 @@ fn input_fault(scene: &Scene<f32>, truth: &[f32], background: [f32; 3]) -> Optio
     .or_else(|| {
         let heads = groups(&scene.heads).find_map(|group| refused(group, 1, f32::MAX));
         heads.map(|(_, value)| cause("a weight of the heads", None, value))
+    })
+    .or_else(|| {
+        let model = scene.context.as_ref()?;
+        let mut arrays = model.mlp.groups().into_iter().chain([model.rows.as_slice()]);
+        let (_, value) = arrays.find_map(|array| refused(array, 1, f32::MAX))?;
+        Some(cause("a weight of the context model", None, value))
     })
     .or_else(|| refused(truth, 1, f32::MAX).map(|(_, value)| cause("a pixel of the photograph", None, value)))
     .or_else(|| refused(&background, 1, f32::MAX).map(|(_, value)| cause("the background", None, value)))
@@ -182,6 +194,7 @@ fn gradient_fault(workspace: &Workspace<f32>) -> Option<Cause> {
             ("the gradient of a log-scale", &block.d_log_scales),
             ("the gradient of an offset", &block.d_offsets),
             ("the gradient of a feature", &block.d_features),
+            ("the gradient of a mask logit", &block.d_mask_logits),
         ]
         .into_iter()
         .find_map(|(array, gradients)| {
@@ -191,7 +204,10 @@ fn gradient_fault(workspace: &Workspace<f32>) -> Option<Cause> {
     });
     in_blocks.or_else(|| {
         let heads = groups(&workspace.d_heads).find_map(|group| refused(group, 1, LARGEST_GRADIENT));
-        heads.map(|(_, value)| cause("the gradient of the heads", None, value))
+        heads.map(|(_, value)| cause("the gradient of the heads", None, value)).or_else(|| {
+            let found = context_gradients(workspace).find_map(|group| refused(group, 1, LARGEST_GRADIENT));
+            found.map(|(_, value)| cause("the gradient of the context model", None, value))
+        })
     })
 }
 

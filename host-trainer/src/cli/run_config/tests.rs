@@ -39,8 +39,18 @@ fn a_few_keys_are_enough() {
 }
 
 #[test]
+fn what_is_missing_follows_the_backbone() {
+    let config = RunConfig::parse("[train]\nbackbone = \"hac\"\niterations = 7").unwrap();
+    assert_eq!(config.train, TrainConfig { iterations: 7, ..TrainConfig::of(Backbone::Hac) });
+    let config = RunConfig::parse("[train]\nbackbone = \"hac\"\n[train.shape]\nfeature_dim = 32").unwrap();
+    assert_eq!(config.train.shape.feature_dim, 32);
+    assert_eq!(RunConfig::parse(&config.to_toml().unwrap()).unwrap(), config);
+}
+
+#[test]
 fn what_is_not_understood_is_refused_by_its_name() {
     for (text, part) in [
+        ("[train]\nbackbone = \"haç\"", "`scaffold`, `hac`"),
         ("[train.rates]\nfeatures = 1", "unknown key `train.rates.features`; known here: "),
         ("iterations = 3", "unknown key `iterations`; known here: "),
         ("[train]\niterations = \"many\"", "iterations"),

@@ -10,12 +10,13 @@
 //! | configuration | text, TOML: [`crate::train::TrainConfig`] |
 //! | kernels | text and u32: [`Kernels`] |
 //! | capture | [`CaptureSignature`] |
-//! | state | counters, random state, view queue, scene, moments, statistics |
+//! | state | counters, random state, view queue, scene, moments, context model, statistics |
 //! | checksum | CRC-32 of all before it |
 //!
 //! Texts and arrays are a u64 count and their elements.
 
 mod codec;
+mod context;
 mod kernels;
 mod signature;
 mod state;
@@ -28,7 +29,7 @@ pub use signature::{CaptureDifference, CaptureSignature};
 pub use state::{RestoreError, Restored};
 
 /// The version that is written and read.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 /// Like PNG's: a byte that is no text, and line ends that a transfer as text would change.
 const MAGIC: [u8; 8] = *b"\x8bPSRUN\r\n";

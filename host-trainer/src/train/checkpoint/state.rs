@@ -6,6 +6,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::codec::{Decoder, Encoder};
+use super::context;
 use super::{CaptureDifference, CaptureSignature, CheckpointFault, Kernels};
 use crate::dataset::Capture;
 use crate::ops::adam::Moments;
@@ -62,9 +63,8 @@ impl<'a> Trainer<'a> {
 
         let Anchors { lattice, features, log_scales, offsets, mask_logits } = &self.scene.anchors;
         out.values(lattice)?;
-        out.values(mask_logits)?;
-        let Optimiser { features: f, log_scales: s, offsets: o, .. } = &self.optimiser;
-        for (values, moments) in [(features, f), (log_scales, s), (offsets, o)] {
+        let Optimiser { features: f, log_scales: s, offsets: o, mask_logits: m, .. } = &self.optimiser;
+        for (values, moments) in [(features, f), (log_scales, s), (offsets, o), (mask_logits, m)] {
             out.values(values)?;
             out.values(&moments.first)?;
             out.values(&moments.second)?;
@@ -74,6 +74,7 @@ impl<'a> Trainer<'a> {
                 out.values(group)?;
             }
         }
+        context::encode(&mut out, self.scene.context.as_ref(), self.optimiser.context.as_ref())?;
         let Statistics { opacity_sum, n_views, gradient_sum, n_drawn } = &self.statistics;
         out.values(opacity_sum)?;
         out.values(n_views)?;
@@ -123,7 +124,6 @@ impl<'a> Trainer<'a> {
 
         let lattice: Vec<[i32; 3]> = from.values("lattice")?;
         let n = lattice.len();
-        let mask_logits = from.exactly("mask logits", n * n_offsets)?;
         let mut array = |what, width: usize| -> Result<_, CheckpointFault> {
             let len = n * width;
             let values: Vec<f32> = from.exactly(what, len)?;
@@ -133,6 +133,7 @@ impl<'a> Trainer<'a> {
         let (features, f) = array("features", feature_dim)?;
         let (log_scales, s) = array("log-scales", 6)?;
         let (offsets, o) = array("offsets", 3 * n_offsets)?;
+        let (mask_logits, m) = array("mask logits", n_offsets)?;
         let (shape, voxel_size) = (self.config.shape, self.config.voxel_size_for(self.capture));
         let mut heads = || {
             let mut heads = Heads::filled(&shape, 0.0f32);
@@ -144,7 +145,10 @@ impl<'a> Trainer<'a> {
         let anchors = Anchors { lattice, features, log_scales, offsets, mask_logits };
         self.scene = Scene { shape, voxel_size, anchors, heads: heads()?, context: None };
         let heads = [heads()?, heads()?];
-        self.optimiser = Optimiser { n_steps, features: f, log_scales: s, offsets: o, heads };
+        let (model, moments) = context::decode(from, &shape)?.unzip();
+        self.scene.context = model;
+        self.optimiser =
+            Optimiser { n_steps, features: f, log_scales: s, offsets: o, mask_logits: m, heads, context: moments };
         self.statistics = Statistics {
             opacity_sum: from.exactly("opacity sums", n)?,
             n_views: from.exactly("view counts", n)?,

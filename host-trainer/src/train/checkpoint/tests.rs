@@ -4,8 +4,8 @@ use rand_chacha::ChaCha8Rng;
 
 use super::*;
 use crate::dataset::Mask;
-use crate::train::test_capture::{tiny_capture, tiny_config};
-use crate::train::{Observer, TrainError, Trainer};
+use crate::train::test_capture::{tiny_capture, tiny_config, tiny_hac_config};
+use crate::train::{Observer, TrainConfig, TrainError, Trainer};
 
 struct Silent;
 
@@ -24,11 +24,16 @@ fn timeless(trainer: &Trainer<'_>) -> Vec<u8> {
     saved(&Trainer { seconds: 0.0, ..trainer.clone() })
 }
 
-/// Twenty runs, each stopped after a random iteration and taken up again by a new trainer.
+/// Twenty runs of each backbone, each stopped after a random iteration and taken up again by a new trainer.
 #[test]
 fn a_run_taken_up_again_ends_in_the_same_bits() {
-    let (capture, iterations) = (tiny_capture(), 90);
-    let mut whole = Trainer::new(&capture, tiny_config(iterations)).unwrap();
+    taken_up_again(tiny_config(90));
+    taken_up_again(tiny_hac_config(90));
+}
+
+fn taken_up_again(config: TrainConfig) {
+    let (capture, iterations) = (tiny_capture(), config.iterations);
+    let mut whole = Trainer::new(&capture, config).unwrap();
     let mut along_the_way = vec![saved(&whole)];
     let mut n_anchors = vec![whole.scene.anchors.len()];
     while !whole.is_done() {
@@ -47,7 +52,7 @@ fn a_run_taken_up_again_ends_in_the_same_bits() {
         assert_eq!(trainer.iteration as usize, stopped_after);
         assert_eq!(saved(&trainer), along_the_way[stopped_after], "restoring and saving is the identity");
         trainer.run(&mut Silent).unwrap();
-        assert!(timeless(&trainer) == last, "stopped after {stopped_after}");
+        assert!(timeless(&trainer) == last, "{:?} stopped after {stopped_after}", config.backbone);
     }
 }
 

@@ -7,13 +7,15 @@ use std::path::{Path, PathBuf};
 use super::{RunError, files};
 use crate::train::{Outcome, Trainer};
 
-const HEADER: &str = "iteration,loss,psnr_db,anchors,seconds,dropped";
+const HEADER: &str =
+    "iteration,loss,psnr_db,anchors,seconds,dropped,feature_bits,log_scale_bits,offset_bits,drawn_offsets";
 
 /// Rows of a whole run, about.
 const ROWS: u32 = 500;
 
 /// A CSV file with one row every five hundredth of a run: iterations done, means of loss and PSNR (dB) since the row
-/// before, anchors, seconds spent in iterations, steps dropped so far.
+/// before, anchors, seconds spent in iterations, steps dropped so far; mean bits of an anchor's features, log-scales and
+/// offsets since the row before, where there is a rate, and offsets that are drawn, of all anchors.
 #[derive(Debug)]
 pub struct ProgressLog {
     path: PathBuf,
@@ -22,6 +24,8 @@ pub struct ProgressLog {
     loss: f64,
     psnr_db: f64,
     n: u32,
+    bits: [f64; 3],
+    n_sampled: usize,
 }
 
 impl ProgressLog {
@@ -49,7 +53,8 @@ impl ProgressLog {
         })?;
         let file = File::options().append(true).open(path).map_err(|source| RunError::io("open", path, source))?;
         let every = (iterations / ROWS).max(1);
-        Ok(Self { path: path.to_owned(), file, every, loss: 0.0, psnr_db: 0.0, n: 0 })
+        let path = path.to_owned();
+        Ok(Self { path, file, every, loss: 0.0, psnr_db: 0.0, n: 0, bits: [0.0; 3], n_sampled: 0 })
     }
 
     /// Adds an iteration.
@@ -61,6 +66,11 @@ impl ProgressLog {
             self.loss += f64::from(outcome.report.loss);
             self.psnr_db -= 10.0 * outcome.report.squared_error.log10();
             self.n += 1;
+            if let Some(rate) = outcome.report.rate {
+                let n = rate.n_sampled as f64;
+                self.bits = std::array::from_fn(|i| self.bits[i] + n * rate.bits[i]);
+                self.n_sampled += rate.n_sampled;
+            }
         }
         if !trainer.iteration.is_multiple_of(self.every) && !trainer.is_done() {
             return Ok(());
@@ -70,14 +80,21 @@ impl ProgressLog {
             0 => ",".to_owned(),
             n => format!("{:.6},{:.3}", self.loss / f64::from(n), self.psnr_db / f64::from(n)),
         };
+        let bits = match self.n_sampled {
+            0 => ",,".to_owned(),
+            n => self.bits.map(|bits| format!("{:.2}", bits / n as f64)).join(","),
+        };
+        let anchors = &trainer.scene.anchors;
         let row = format!(
-            "{},{means},{},{:.3},{}\n",
+            "{},{means},{},{:.3},{},{bits},{}\n",
             trainer.iteration,
-            trainer.scene.anchors.len(),
+            anchors.len(),
             trainer.seconds,
-            trainer.n_dropped()
+            trainer.n_dropped(),
+            (0..anchors.mask_logits.len()).filter(|offset| anchors.is_drawn(*offset)).count()
         );
         (self.loss, self.psnr_db, self.n) = (0.0, 0.0, 0);
+        (self.bits, self.n_sampled) = ([0.0; 3], 0);
         // In one piece, so that rows are not cut by a crash of the process.
         self.file.write_all(row.as_bytes()).map_err(|source| RunError::Write { path: self.path.clone(), source })
     }

@@ -1,6 +1,10 @@
 //! What a run is made of: numbers a user may set, with the method's defaults.
 
+mod hac;
+
 use serde::{Deserialize, Serialize};
+
+pub use hac::{Backbone, Hac, Phase};
 
 use crate::dataset::{Capture, PointsOrigin};
 use crate::scene::ModelShape;
@@ -24,7 +28,7 @@ impl Rate {
     }
 }
 
-/// Learning rates, as the published Scaffold-GS trainer has them.
+/// Learning rates, as the published trainers of Scaffold-GS and HAC have them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Rates {
     /// Offsets; multiplied by the capture's extent.
@@ -39,6 +43,12 @@ pub struct Rates {
     pub covariance_head: Rate,
     /// Colour head.
     pub colour_head: Rate,
+    /// Mask logits; multiplied by the capture's extent. For [`Backbone::Hac`], as those below.
+    pub mask: Rate,
+    /// Grid of the context model.
+    pub grid: Rate,
+    /// Network of the context model.
+    pub context: Rate,
 }
 
 impl Default for Rates {
@@ -51,6 +61,9 @@ impl Default for Rates {
             opacity_head: Rate { start: 0.002, end: 2e-5 },
             covariance_head: constant(0.004),
             colour_head: Rate { start: 0.008, end: 5e-5 },
+            mask: Rate { start: 0.01, end: 1e-4 },
+            grid: Rate { start: 0.005, end: 1e-5 },
+            context: Rate { start: 0.005, end: 1e-5 },
         }
     }
 }
@@ -119,6 +132,8 @@ impl Default for Densification {
 /// A whole run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrainConfig {
+    /// Kind of scene.
+    pub backbone: Backbone,
     /// Widths and effects.
     pub shape: ModelShape,
     /// Optimiser steps; starting points and horizons scale with them.
@@ -128,17 +143,26 @@ pub struct TrainConfig {
     /// Edge ε of a lattice cell, normalised units; without it [`Capture::suggested_voxel_size`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub voxel_size: Option<f64>,
+    /// Every so many training views one is held out, to measure with and never to train on; 0: none. A capture with fewer
+    /// than [`MIN_VIEWS_TO_HOLD_OUT`] has none to spare.
+    pub validation_every: u32,
     /// Learning rates.
     pub rates: Rates,
     /// Loss weights.
     pub loss: LossWeights,
     /// Growth and pruning.
     pub densification: Densification,
+    /// The rate, for [`Backbone::Hac`].
+    pub hac: Hac,
 }
+
+/// Training views without which none is held out.
+pub const MIN_VIEWS_TO_HOLD_OUT: usize = 12;
 
 impl Default for TrainConfig {
     fn default() -> Self {
         Self {
+            backbone: Backbone::Scaffold,
             shape: ModelShape {
                 feature_dim: 32,
                 n_offsets: 10,
@@ -149,14 +173,41 @@ impl Default for TrainConfig {
             iterations: 30_000,
             seed: 42,
             voxel_size: None,
+            validation_every: 24,
             rates: Rates::default(),
             loss: LossWeights::default(),
             densification: Densification::default(),
+            hac: Hac::default(),
         }
     }
 }
 
 impl TrainConfig {
+    /// The defaults of a backbone: HAC's anchors have 50 features, and its heads see the distance of view.
+    pub fn of(backbone: Backbone) -> Self {
+        let scaffold = Self::default();
+        match backbone {
+            Backbone::Scaffold => scaffold,
+            Backbone::Hac => {
+                let shape = ModelShape { feature_dim: 50, view_distance: true, ..scaffold.shape };
+                Self { backbone, shape, ..scaffold }
+            }
+        }
+    }
+
+    /// The same with another backbone; what stands at the default of the former takes that of the latter.
+    pub fn with_backbone(self, backbone: Backbone) -> Self {
+        let (from, to) = (Self::of(self.backbone).shape, Self::of(backbone).shape);
+        let mut shape = self.shape;
+        if shape.feature_dim == from.feature_dim {
+            shape.feature_dim = to.feature_dim;
+        }
+        if shape.view_distance == from.view_distance {
+            shape.view_distance = to.view_distance;
+        }
+        Self { backbone, shape, ..self }
+    }
+
     /// Refuses what no run can use, before any work starts.
     ///
     /// # Errors
@@ -181,7 +232,16 @@ impl TrainConfig {
         )?;
         // The largest integer of TOML, in which configurations are kept.
         within("--seed", self.seed as f64, 0.0, i64::MAX as f64)?;
-        let Rates { offset, feature, log_scale, opacity_head, covariance_head, colour_head } = self.rates;
+        if self.validation_every == 1 {
+            return Err(
+                "--validation-every is 1, needs 0 (none) or at least 2: some views have to be trained on".into()
+            );
+        }
+        for (name, value, low, high) in self.hac.ranges() {
+            within(name, value, low, high)?;
+        }
+        let Rates { offset, feature, log_scale, opacity_head, covariance_head, colour_head, .. } = self.rates;
+        let Rates { mask, grid, context, .. } = self.rates;
         for (name, rate) in [
             ("offset", offset),
             ("feature", feature),
@@ -189,6 +249,9 @@ impl TrainConfig {
             ("opacity_head", opacity_head),
             ("covariance_head", covariance_head),
             ("colour_head", colour_head),
+            ("mask", mask),
+            ("grid", grid),
+            ("context", context),
         ] {
             within(&format!("train.rates.{name}.start"), rate.start, 0.0, 10.0)?;
             // A path to 0 has no logarithm; a rate that starts at 0 stays there.
@@ -229,6 +292,29 @@ impl TrainConfig {
         Self { voxel_size: Some(self.voxel_size_for(capture)), densification, ..*self }
     }
 
+    /// What iteration `iteration`, from 1, does to the values of anchors.
+    pub fn phase(&self, iteration: u32) -> Phase {
+        let after = |share: f64| iteration > self.iteration_at(share);
+        match self.backbone {
+            Backbone::Hac if after(self.hac.exact_from) => Phase::Exact,
+            Backbone::Hac if after(self.hac.context_from) => Phase::Context,
+            Backbone::Hac if after(self.hac.noise_from) => Phase::Noise,
+            _ => Phase::Raw,
+        }
+    }
+
+    /// Whether growth and pruning pause at `iteration`, so that the heads get used to the noise first.
+    pub fn pauses_at(&self, iteration: u32) -> bool {
+        let pause = self.iteration_at(self.hac.noise_from)..self.iteration_at(self.hac.pause_until);
+        self.backbone == Backbone::Hac && pause.contains(&iteration)
+    }
+
+    /// Whether training view `index` of `n_views` is held out.
+    pub fn holds_out(&self, index: usize, n_views: usize) -> bool {
+        let every = self.validation_every as usize;
+        every > 0 && n_views >= MIN_VIEWS_TO_HOLD_OUT && index % every == (MIN_VIEWS_TO_HOLD_OUT.min(every) - 1)
+    }
+
     /// The iteration at share `share` of the run.
     pub fn iteration_at(&self, share: f64) -> u32 {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "shares are in 0..=1")]
@@ -236,3 +322,6 @@ impl TrainConfig {
         at
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,75 @@
+//! What the steps of each phase do to the values of anchors, and the context model's beginning.
+
+use pocketsplat_core::context::Context;
+
+use super::config::{Phase, TrainConfig};
+use super::step::coding::{Coding, Exact, RateTerms};
+use super::{TrainError, Trainer, context_start};
+use crate::bundle::context as integers;
+use crate::ops::noise::Stream;
+use crate::scene::{Head, Scene};
+
+/// The integer form of a scene's context model, as bytes and as the network that they stand for.
+#[derive(Clone, Debug)]
+pub(super) struct Integers {
+    pub(super) section: Vec<u8>,
+    pub(super) network: Head<f32>,
+}
+
+impl Integers {
+    /// Of the scene's context model.
+    ///
+    /// # Errors
+    /// [`TrainError::Context`] when there is none, or a weight has no integer form.
+    pub(super) fn of(scene: &Scene<f32>) -> Result<Self, TrainError> {
+        let n_channels = scene.shape.values_per_anchor();
+        let model = scene.context.as_ref().ok_or_else(|| TrainError::Context("the scene has none".to_owned()))?;
+        let refused = |error: crate::bundle::WriteError| TrainError::Context(error.to_string());
+        Ok(Self {
+            section: integers::section(model, n_channels).map_err(refused)?,
+            network: integers::rounded(model, n_channels).map_err(refused)?,
+        })
+    }
+
+    /// What a decoder makes of the bytes.
+    ///
+    /// # Errors
+    /// As [`Self::of`].
+    pub(super) fn context(&self, scene: &Scene<f32>) -> Result<Context<'_>, TrainError> {
+        Context::parse(&self.section, scene.shape.feature_dim, scene.shape.values_per_anchor())
+            .map_err(|error| TrainError::Context(error.to_string()))
+    }
+}
+
+impl Trainer<'_> {
+    /// Makes the context model where this iteration is the first to need it.
+    pub(super) fn begin_context(&mut self) {
+        let phase = self.config.phase(self.iteration);
+        if self.scene.context.is_none() && matches!(phase, Phase::Context | Phase::Exact) {
+            let base_steps = self.config.hac.base_steps();
+            self.scene.context = Some(context_start::initial_context(&self.scene, base_steps, &mut self.rng));
+            self.optimiser.begin_context(&self.scene);
+        }
+    }
+}
+
+/// What iteration `iteration` does.
+///
+/// * `exact`: the integers, in the phase that needs them.
+pub(super) fn coding<'a>(
+    config: &TrainConfig,
+    iteration: u32,
+    exact: Option<(&'a Context<'a>, &'a Integers)>,
+) -> Coding<'a, f32> {
+    let hac = &config.hac;
+    let stream = Stream::of_run(config.seed).branch(iteration);
+    let rate = RateTerms { lambda: hac.lambda, sample: hac.sample, mask: hac.mask_weight, grid: hac.grid_weight };
+    match config.phase(iteration) {
+        Phase::Raw => Coding::Raw,
+        Phase::Noise => Coding::Noise { stream, steps: hac.base_steps() },
+        Phase::Context | Phase::Exact => {
+            let exact = exact.map(|(context, integers)| Exact { context, network: &integers.network });
+            Coding::Context { stream, rate, exact }
+        }
+    }
+}

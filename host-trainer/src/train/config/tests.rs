@@ -1,0 +1,55 @@
+use super::*;
+
+#[test]
+fn the_defaults_of_each_backbone_are_accepted() {
+    for backbone in [Backbone::Scaffold, Backbone::Hac] {
+        assert_eq!(TrainConfig::of(backbone).validate(), Ok(()));
+        assert_eq!(TrainConfig::of(backbone).backbone, backbone);
+    }
+    assert_eq!(TrainConfig::of(Backbone::Scaffold), TrainConfig::default());
+}
+
+#[test]
+fn only_what_stands_at_its_default_follows_the_backbone() {
+    assert_eq!(TrainConfig::default().with_backbone(Backbone::Hac), TrainConfig::of(Backbone::Hac));
+    let mut chosen = TrainConfig::default();
+    chosen.shape.feature_dim = 16;
+    let hac = chosen.with_backbone(Backbone::Hac);
+    assert_eq!((hac.shape.feature_dim, hac.shape.view_distance), (16, true));
+    assert_eq!(hac.with_backbone(Backbone::Scaffold), chosen);
+}
+
+#[test]
+fn phases_follow_each_other_at_their_shares_of_the_run() {
+    let config = TrainConfig { iterations: 30_000, ..TrainConfig::of(Backbone::Hac) };
+    for (iteration, phase) in [
+        (1, Phase::Raw),
+        (3_000, Phase::Raw),
+        (3_001, Phase::Noise),
+        (10_000, Phase::Noise),
+        (10_001, Phase::Context),
+        (28_500, Phase::Context),
+        (28_501, Phase::Exact),
+        (30_000, Phase::Exact),
+    ] {
+        assert_eq!(config.phase(iteration), phase, "{iteration}");
+        assert_eq!(TrainConfig::default().phase(iteration), Phase::Raw);
+    }
+    assert!(!config.pauses_at(2_999) && config.pauses_at(3_000) && config.pauses_at(3_999) && !config.pauses_at(4_000));
+    assert!(!TrainConfig::default().pauses_at(3_500));
+}
+
+#[test]
+fn a_few_views_are_held_out_where_there_are_enough() {
+    let held_out = |every: u32, n: usize| {
+        let config = TrainConfig { validation_every: every, ..TrainConfig::default() };
+        (0..n).filter(|i| config.holds_out(*i, n)).collect::<Vec<_>>()
+    };
+    assert!(held_out(24, 11).is_empty());
+    assert_eq!(held_out(24, 12), [11]);
+    assert_eq!(held_out(24, 100), [11, 35, 59, 83]);
+    assert_eq!(held_out(2, 12), [1, 3, 5, 7, 9, 11]);
+    assert!(held_out(0, 100).is_empty());
+    let refused = TrainConfig { validation_every: 1, ..TrainConfig::default() }.validate().unwrap_err();
+    assert!(refused.contains("--validation-every"), "{refused}");
+}

@@ -1,0 +1,119 @@
+//! What a finished run hands to the writer of bundles.
+
+use pocketsplat_core::context::{Context, Group, N_GROUPS};
+use rayon::prelude::*;
+
+use super::coding::Integers;
+use super::step::Workspace;
+use super::survey::Survey;
+use super::{TrainError, Trainer};
+use crate::ops::simd::Level;
+use crate::ops::{Pinhole, anchor_bits, hash_grid, head, mask, perturb};
+use crate::scene::Scene;
+
+/// Anchors that one task looks at.
+const ROWS: usize = 512;
+
+/// A trained scene and what is known of it.
+#[derive(Clone, Debug)]
+pub struct Finished {
+    /// The scene; offsets that no view draws are masked, and with a context model every value is one that a decoder reads.
+    pub scene: Scene<f32>,
+    /// `[n]` aggregated opacity, see [`Survey::importance`].
+    pub importance: Vec<f32>,
+    /// Offsets that were masked because no view draws them.
+    pub n_undrawn: usize,
+    /// Bits of features, log-scales and drawn offsets under the float context model, in all; none without such a model.
+    pub estimated_bits: Option<[f64; N_GROUPS]>,
+}
+
+impl Trainer<'_> {
+    /// Rounds, masks and surveys the scene as it stands, with the views that training sees.
+    ///
+    /// Cost: one forward pass over the views.
+    ///
+    /// # Errors
+    /// [`TrainError::Context`] when the context model has no integer form.
+    pub fn finish(&self) -> Result<Finished, TrainError> {
+        let mut scene = self.scene.clone();
+        let integers = scene.context.is_some().then(|| Integers::of(&scene)).transpose()?;
+        let context = integers.as_ref().map(|integers| integers.context(&self.scene)).transpose()?;
+        if let Some(context) = &context {
+            round_values(&mut scene, context);
+        }
+        let cameras: Vec<&Pinhole<f32>> = self.trained.iter().map(|view| &self.cameras[*view as usize]).collect();
+        let survey = Survey::new(&scene, &mut Workspace::new(&scene.shape), &cameras);
+        let n_undrawn = survey.mask_undrawn(&mut scene);
+        let estimated_bits = context.as_ref().map(|context| estimated_bits(&scene, context));
+        Ok(Finished { scene, importance: survey.importance, n_undrawn, estimated_bits })
+    }
+}
+
+/// The steps of an anchor, in the order of the channels.
+fn steps(context: &Context<'_>, lattice: [i32; 3], features: &mut [i16], hidden: &mut [i16]) -> [f32; N_GROUPS] {
+    context.features(lattice, features);
+    context.hidden(features, hidden);
+    let steps = context.steps(hidden);
+    [Group::Feature, Group::LogScale, Group::Offset].map(|group| steps.value(group))
+}
+
+/// Makes every value a symbol times its step, as the integer model has it.
+fn round_values(scene: &mut Scene<f32>, context: &Context<'_>) {
+    let (f, o) = (scene.shape.feature_dim, 3 * scene.shape.n_offsets);
+    let anchors = &mut scene.anchors;
+    let rows = anchors.lattice.par_chunks(ROWS).zip(anchors.features.par_chunks_mut(ROWS * f));
+    let rows = rows.zip(anchors.log_scales.par_chunks_mut(ROWS * 6)).zip(anchors.offsets.par_chunks_mut(ROWS * o));
+    rows.for_each(|(((lattice, features), log_scales), offsets)| {
+        let (mut inputs, mut hidden) = (vec![0; context.n_inputs()], vec![0; context.n_hidden()]);
+        let mut residuals = vec![0.0; f.max(6).max(o)];
+        let rows = features.chunks_exact_mut(f).zip(log_scales.chunks_exact_mut(6)).zip(offsets.chunks_exact_mut(o));
+        for (cell, ((features, log_scales), offsets)) in lattice.iter().zip(rows) {
+            let steps = steps(context, *cell, &mut inputs, &mut hidden);
+            for (values, step) in [features, log_scales, offsets].into_iter().zip(steps) {
+                perturb::rounded(step, values, &mut residuals);
+            }
+        }
+    });
+}
+
+/// Bits of all drawn values, rounded by the integer model's steps, under the float model's means and scales.
+fn estimated_bits(scene: &Scene<f32>, context: &Context<'_>) -> [f64; N_GROUPS] {
+    let Some(model) = &scene.context else { return [0.0; N_GROUPS] };
+    let (shape, anchors) = (&scene.shape, &scene.anchors);
+    let (f, k, n_out) = (shape.feature_dim, shape.n_offsets, model.mlp.n_out);
+    let valid: Vec<usize> = (0..anchors.len()).filter(|a| anchors.has_drawn(*a)).collect();
+    let parts: Vec<[f64; N_GROUPS]> = valid
+        .par_chunks(ROWS)
+        .map(|rows| {
+            let n = rows.len();
+            let units: Vec<[u16; 3]> = rows.iter().map(|a| model.frame.unit(anchors.lattice[*a])).collect();
+            let mut inputs = vec![0.0; n * model.mlp.n_in];
+            hash_grid::forward(&model.levels, &model.rows, &units, &mut inputs);
+            let (mut hidden, mut outputs) = (vec![0.0; n * model.mlp.n_hidden], vec![0.0; n * n_out]);
+            head::forward(&model.mlp, &inputs, &mut hidden, &mut outputs);
+            let (mut features, mut units) = (vec![0; context.n_inputs()], vec![0; context.n_hidden()]);
+            let gather = |values: &[f32], width: usize| -> Vec<f32> {
+                rows.iter().flat_map(|a| values[a * width..(a + 1) * width].iter().copied()).collect()
+            };
+            for (a, output) in rows.iter().zip(outputs.chunks_exact_mut(n_out)) {
+                let exact = steps(context, anchors.lattice[*a], &mut features, &mut units);
+                let exponents = &mut output[n_out - N_GROUPS..];
+                for (exponent, (step, base)) in exponents.iter_mut().zip(exact.iter().zip(model.base_steps)) {
+                    *exponent = (step / base).log2();
+                }
+            }
+            let values =
+                [gather(&anchors.features, f), gather(&anchors.log_scales, 6), gather(&anchors.offsets, 3 * k)];
+            let drawn: Vec<bool> = gather(&anchors.mask_logits, k).into_iter().map(mask::is_open).collect();
+            let rows = anchor_bits::Rows {
+                shape,
+                base_steps: model.base_steps,
+                values: values.each_ref().map(Vec::as_slice),
+                drawn: &drawn,
+                outputs: &outputs,
+            };
+            anchor_bits::forward(Level::detect(), &rows)
+        })
+        .collect();
+    parts.iter().fold([0.0; N_GROUPS], |sum, part| std::array::from_fn(|i| sum[i] + part[i]))
+}

@@ -1,0 +1,82 @@
+//! A run with the rate of HAC, from its first iteration to what it hands to the writer.
+
+use super::config::Phase;
+use super::finish::Finished;
+use super::step::coding::RateReport;
+use super::test_capture::{tiny_capture, tiny_hac_config};
+use super::*;
+
+/// All steps of a run: phase and rate of each.
+fn trained(trainer: &mut Trainer<'_>) -> Vec<(Phase, Option<RateReport>)> {
+    let mut steps = Vec::new();
+    while !trainer.is_done() {
+        let outcome = trainer.advance().unwrap();
+        assert_eq!(outcome.dropped, None);
+        steps.push((trainer.config.phase(trainer.iteration), outcome.report.rate));
+    }
+    steps
+}
+
+#[test]
+fn the_rate_falls_and_masks_close_where_bits_weigh() {
+    let capture = tiny_capture();
+    let mut ends = Vec::new();
+    for lambda in [0.0, 0.5] {
+        let mut config = tiny_hac_config(300);
+        config.hac = config::Hac { lambda, sample: 1.0, ..config.hac };
+        let mut trainer = Trainer::new(&capture, config).unwrap();
+        let steps = trained(&mut trainer);
+        for (phase, rate) in &steps {
+            assert_eq!(rate.is_some(), matches!(phase, Phase::Context | Phase::Exact));
+        }
+        let rates: Vec<f64> = steps.iter().filter_map(|(_, rate)| Some(rate.as_ref()?.bits.iter().sum())).collect();
+        let finished = trainer.finish().unwrap();
+        let n_drawn =
+            (0..finished.scene.anchors.mask_logits.len()).filter(|i| finished.scene.anchors.is_drawn(*i)).count();
+        ends.push((rates[0], rates[rates.len() - 1], n_drawn));
+    }
+    let [free, weighed] = [ends[0], ends[1]];
+    assert!(weighed.1 < 0.7 * weighed.0 && weighed.1 < 0.7 * free.1, "bits an anchor, first and last: {ends:?}");
+    assert!(weighed.2 <= free.2, "drawn offsets: {ends:?}");
+}
+
+/// The scene that is handed over is what the last phase trained: rounding it again, or drawing it without any coding,
+/// gives the same.
+#[test]
+fn the_finished_scene_is_what_the_last_step_drew() {
+    let capture = tiny_capture();
+    let mut trainer = Trainer::new(&capture, tiny_hac_config(80)).unwrap();
+    trained(&mut trainer);
+    let Finished { scene, importance, estimated_bits, .. } = trainer.finish().unwrap();
+    assert_eq!(importance.len(), scene.anchors.len());
+    assert!(estimated_bits.unwrap().iter().all(|bits| *bits > 0.0));
+    let again = Trainer { scene: scene.clone(), ..trainer.clone() }.finish().unwrap();
+    assert!(again.scene == scene && again.importance == importance && again.estimated_bits == estimated_bits);
+    let camera = &trainer.cameras[0];
+    let integers = Integers::of(&trainer.scene).unwrap();
+    let context = integers.context(&trainer.scene).unwrap();
+    let coding = coding::coding(&trainer.config, trainer.iteration, Some((&context, &integers)));
+    let truth = vec![0.0; 3 * camera.size_px.iter().map(|s| *s as usize).product::<usize>()];
+    let target = Target { camera, truth: &truth, mask: None, background: [0.0; 3] };
+    let mut draw =
+        |scene: &Scene<f32>, coding| trainer.workspace.step(scene, &target, &trainer.config.loss, coding).squared_error;
+    assert_eq!(draw(&trainer.scene, &coding), draw(&scene, &step::coding::Coding::Raw));
+}
+
+#[test]
+fn held_out_views_are_never_trained_on() {
+    let mut capture = tiny_capture();
+    let views = capture.train.clone();
+    capture.train = views.iter().cycle().take(13).cloned().collect();
+    for (i, view) in capture.train.iter_mut().enumerate() {
+        view.name = format!("{i}");
+    }
+    let mut trainer = Trainer::new(&capture, tiny_hac_config(60)).unwrap();
+    assert_eq!(trainer.validation_views().map(|view| view.name.as_str()).collect::<Vec<_>>(), ["11"]);
+    trained(&mut trainer);
+    let mut without = capture.clone();
+    without.train[11].image.rgb.fill(77);
+    let mut other = Trainer::new(&without, tiny_hac_config(60)).unwrap();
+    trained(&mut other);
+    assert!(trainer.scene == other.scene, "its pixels change nothing");
+}

@@ -56,7 +56,7 @@ fn the_finished_scene_is_what_the_last_step_drew() {
     let integers = Integers::of(&trainer.scene).unwrap();
     let context = integers.context(&trainer.scene).unwrap();
     let coding = coding::coding(&trainer.config, trainer.iteration, Some((&context, &integers)));
-    let truth = vec![0.0; 3 * camera.size_px.iter().map(|s| *s as usize).product::<usize>()];
+    let truth = vec![0.0; 3 * camera.size_px.iter().product::<usize>()];
     let target = Target { camera, truth: &truth, mask: None, background: [0.0; 3] };
     let mut draw =
         |scene: &Scene<f32>, coding| trainer.workspace.step(scene, &target, &trainer.config.loss, coding).squared_error;

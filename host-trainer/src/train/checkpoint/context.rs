@@ -10,6 +10,8 @@ use crate::ops::adam::Moments;
 use crate::scene::{ContextModel, Head, ModelShape};
 use crate::train::optimiser::ContextMoments;
 
+type WithMoments = (ContextModel<f32>, ContextMoments<f32>);
+
 /// Writes whether there is a model, and it.
 pub(super) fn encode<W: Write>(
     out: &mut Encoder<W>,
@@ -34,10 +36,7 @@ pub(super) fn encode<W: Write>(
 }
 
 /// Reads what [`encode`] wrote.
-pub(super) fn decode(
-    from: &mut Decoder<'_>,
-    shape: &ModelShape,
-) -> Result<Option<(ContextModel<f32>, ContextMoments<f32>)>, CheckpointFault> {
+pub(super) fn decode(from: &mut Decoder<'_>, shape: &ModelShape) -> Result<Option<WithMoments>, CheckpointFault> {
     let n_hidden: u32 = from.value("hidden units of the context")?;
     if n_hidden == 0 {
         return Ok(None);

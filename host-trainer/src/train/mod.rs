@@ -39,6 +39,9 @@ use statistics::Statistics;
 use step::{Target, Workspace, clear_masked};
 use watchdog::Watchdog;
 
+/// Length of the published runs, iterations.
+const PUBLISHED_ITERATIONS: f64 = 30_000.0;
+
 /// The state of a run: everything the next iteration depends on.
 #[derive(Clone, Debug)]
 pub struct Trainer<'a> {
@@ -232,12 +235,18 @@ impl<'a> Trainer<'a> {
         Ok(Outcome { report, dropped: None })
     }
 
-    /// The learning rates; masks move only where bits count.
+    /// The learning rates of this iteration.
+    ///
+    /// Masks move only where bits count. A mask has a fixed way to go, from its start to the threshold; so that it comes as
+    /// far in a shorter run, its rate is that of [`PUBLISHED_ITERATIONS`] times their ratio, once there is a rate term.
     fn rates(&self) -> Rates {
-        match self.config.backbone {
-            Backbone::Scaffold => Rates { mask: Rate { start: 0.0, end: 0.0 }, ..self.config.rates },
-            Backbone::Hac => self.config.rates,
-        }
+        let Rates { mask, .. } = self.config.rates;
+        let factor = match self.config.phase(self.iteration) {
+            _ if self.config.backbone == Backbone::Scaffold => 0.0,
+            Phase::Raw | Phase::Noise => 1.0,
+            Phase::Context | Phase::Exact => PUBLISHED_ITERATIONS / f64::from(self.config.iterations),
+        };
+        Rates { mask: Rate { start: mask.start * factor, end: mask.end * factor }, ..self.config.rates }
     }
 
     /// Statistics of the step in the workspace, and growth and pruning when they are due.

@@ -12,7 +12,7 @@ fn a_written_configuration_gives_the_same_bundle_again() {
     assert!(!home.join("a.run").exists());
     let config = home.join("notes/config.toml");
     let log = fs::read_to_string(home.join("notes/progress.csv")).unwrap();
-    assert!(log.starts_with("iteration,loss,psnr_db,anchors,seconds,dropped\n"), "{log}");
+    assert!(log.starts_with("iteration,loss,psnr_db,anchors,seconds,dropped,"), "{log}");
     assert_eq!(log.lines().last().unwrap().split(',').next(), Some(ITERATIONS.to_string().as_str()));
     let result = fs::read_to_string(home.join("notes/result.json")).unwrap();
     assert!(result.contains("\"dropped_steps\": 0"), "{result}");

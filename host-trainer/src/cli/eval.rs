@@ -64,6 +64,8 @@ pub(crate) struct Evaluation {
     pub(crate) half_size_copy_psnr_db: f64,
     pub(crate) bundle_bytes: usize,
     pub(crate) n_anchors: u32,
+    /// What there is to draw: the Gaussians of all anchors.
+    pub(crate) n_gaussians: u64,
     pub(crate) n_views: usize,
     pub(crate) split: String,
     pub(crate) renderer: String,
@@ -182,6 +184,7 @@ pub(crate) fn evaluate(
         half_size_copy_psnr_db: mean(|row| row.half_size_copy_psnr_db),
         bundle_bytes: file.bytes.len(),
         n_anchors: header.n_anchors,
+        n_gaussians: u64::from(header.n_anchors) * u64::from(header.n_offsets),
         n_views: rows.len(),
         split: format!("{split:?}").to_lowercase(),
         renderer: format!("{renderer:?}").to_lowercase(),

@@ -12,6 +12,7 @@ mod plot;
 mod progress;
 mod render;
 mod run_config;
+mod stop;
 mod synth;
 mod train;
 mod train_args;

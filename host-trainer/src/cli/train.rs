@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result, bail};
@@ -14,19 +13,15 @@ use pocketsplat::train::run::{Ending, Interval, RunError, RunFolder};
 use pocketsplat::train::{TrainConfig, Trainer};
 use pocketsplat_core::budget::MAX_FRAME_PX;
 use serde::Serialize;
-use signal_hook::consts::{SIGINT, SIGTERM};
 
 use super::capture::CaptureArgs;
-use super::output;
 use super::progress::Progress;
 use super::run_config::RunConfig;
 use super::train_args::Args;
+use super::{output, stop};
 
 /// Seconds between checkpoints unless the user says otherwise: what an accident may cost.
 const CHECKPOINT_SECONDS: f64 = 60.0;
-
-/// Exit code of a process that Ctrl-C ended.
-const INTERRUPTED: u8 = 130;
 
 /// What a finished run reports.
 #[derive(Debug, Serialize)]
@@ -49,19 +44,6 @@ pub(crate) struct TrainResult {
 }
 
 pub(crate) fn run(args: &Args) -> Result<ExitCode> {
-    let load = |config: &mut RunConfig| -> Result<Capture> {
-        let source = CaptureArgs { dataset: config.dataset.clone(), options: config.capture.clone() };
-        let capture = source.load(config.train.seed)?;
-        let (largest, most) = (largest_px(&capture).into_iter().max().unwrap_or(0), u32::from(MAX_FRAME_PX));
-        if largest > most {
-            bail!(
-                "the photographs are {largest} px wide or high and the decoder draws {most}; use --max-resolution {most}"
-            );
-        }
-        config.train = config.train.resolved_for(&capture);
-        eprintln!("voxel size {:.5}, normalised units", config.train.voxel_size_for(&capture));
-        Ok(capture)
-    };
     let (config, capture, folder) = match args.resume() {
         Some(path) => {
             let folder = RunFolder::reopen(path)?;
@@ -84,22 +66,45 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
             (config, capture, folder)
         }
     };
-    train_in(folder, &config, &capture, args)
+    // Not before: until here there is nothing to keep, and Ctrl-C may end the process at once.
+    let stop = stop::flag()?;
+    match train_in(folder, &config, &capture, args.resume().is_some(), &stop)? {
+        Some(result) => output::print(&result, args.json()).map(|()| ExitCode::SUCCESS),
+        None => Ok(ExitCode::from(stop::INTERRUPTED)),
+    }
 }
 
-/// Trains in a run folder from wherever the run stands there.
-fn train_in(mut folder: RunFolder, config: &RunConfig, capture: &Capture, args: &Args) -> Result<ExitCode> {
+/// Loads the capture that a run is configured for, and decides what the configuration left to it.
+pub(crate) fn load(config: &mut RunConfig) -> Result<Capture> {
+    let source = CaptureArgs { dataset: config.dataset.clone(), options: config.capture.clone() };
+    let capture = source.load(config.train.seed)?;
+    let (largest, most) = (largest_px(&capture).into_iter().max().unwrap_or(0), u32::from(MAX_FRAME_PX));
+    if largest > most {
+        bail!(
+            "the photographs are {largest} px wide or high and the decoder draws {most}; use --max-resolution {most}"
+        );
+    }
+    config.train = config.train.resolved_for(&capture);
+    eprintln!("voxel size {:.5}, normalised units", config.train.voxel_size_for(&capture));
+    Ok(capture)
+}
+
+/// Trains in a run folder, from its checkpoint where the run `resumes`, and writes the bundle; `None` when `stop` was set
+/// before the end.
+pub(crate) fn train_in(
+    mut folder: RunFolder,
+    config: &RunConfig,
+    capture: &Capture,
+    resumes: bool,
+    stop: &AtomicBool,
+) -> Result<Option<TrainResult>> {
     let path = folder.path().to_owned();
-    let mut trainer = match args.resume() {
-        None => Trainer::new(capture, config.train)?,
-        Some(_) => resumed(&folder, config, capture)?,
-    };
+    let mut trainer = if resumes { resumed(&folder, config, capture)? } else { Trainer::new(capture, config.train)? };
     folder.write_config(&config.to_toml()?)?;
     let interval = config.checkpoint_every.map_or(Interval::Seconds(CHECKPOINT_SECONDS), Interval::Iterations);
     let how_to_go_on = || format!("go on with `pocketsplat train --resume {}`", path.display());
     let mut progress = Progress::new(trainer.iteration, config.train.iterations);
-    let stop = stop_flag()?;
-    let ending = folder.train(&mut trainer, &mut progress, interval, &stop);
+    let ending = folder.train(&mut trainer, &mut progress, interval, stop);
     let ending = ending.map_err(|error| {
         let stopped = format!("training stopped at iteration {}", trainer.iteration);
         match error {
@@ -115,14 +120,13 @@ fn train_in(mut folder: RunFolder, config: &RunConfig, capture: &Capture, args: 
             config.train.iterations,
             how_to_go_on()
         );
-        return Ok(ExitCode::from(INTERRUPTED));
+        return Ok(None);
     }
     let background = config.capture.background.unwrap_or_default();
     let result = write_bundle(&trainer, capture, background, &config.quantisation, &config.output)
         .with_context(|| format!("the training is done and kept; {}", how_to_go_on()))?;
     folder.finish(&serde_json::to_string_pretty(&result)?, config.keep_checkpoints)?;
-    output::print(&result, args.json())?;
-    Ok(ExitCode::SUCCESS)
+    Ok(Some(result))
 }
 
 /// The run as its newest sound checkpoint has it, or at its start where it was stopped before the first one.
@@ -148,20 +152,6 @@ fn resumed<'a>(folder: &RunFolder, config: &RunConfig, capture: &'a Capture) -> 
     }
     eprintln!("going on after iteration {} of {}", trainer.iteration, config.train.iterations);
     Ok(trainer)
-}
-
-/// A flag that Ctrl-C or SIGTERM sets; a second of them ends the process at once.
-///
-/// SIGHUP is left alone, so that `nohup` works.
-fn stop_flag() -> Result<Arc<AtomicBool>> {
-    let stop = Arc::new(AtomicBool::new(false));
-    for signal in [SIGINT, SIGTERM] {
-        // In this order: the first signal finds the flag unset, and then sets it.
-        signal_hook::flag::register_conditional_shutdown(signal, i32::from(INTERRUPTED), Arc::clone(&stop))
-            .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&stop)))
-            .context("could not listen to Ctrl-C")?;
-    }
-    Ok(stop)
 }
 
 /// Trains without a run folder and writes the bundle.

@@ -12,7 +12,9 @@ mod plot;
 mod progress;
 mod render;
 mod run_config;
+mod settings;
 mod stop;
+mod sweep;
 mod synth;
 mod train;
 mod train_args;
@@ -40,6 +42,7 @@ enum Command {
     Render(render::Args),
     Inspect(inspect::Args),
     Plot(plot::Args),
+    Sweep(sweep::Args),
     Synth(synth::Args),
     Demo(demo::Args),
     Doctor(doctor::Args),
@@ -54,6 +57,7 @@ pub(crate) fn run() -> Result<ExitCode> {
         .with_context(|| format!("could not start {} threads", cli.threads))?;
     match cli.command {
         Command::Train(args) => return train::run(&args),
+        Command::Sweep(args) => return sweep::run(&args),
         Command::Eval(args) => eval::run(&args),
         Command::Render(args) => render::run(&args),
         Command::Inspect(args) => inspect::run(&args),

@@ -67,6 +67,18 @@ impl RunConfig {
         Ok(toml::to_string(self)?)
     }
 
+    /// Refuses what no run can use, before any work starts.
+    pub(crate) fn check(&self) -> Result<()> {
+        self.train.validate().map_err(anyhow::Error::msg)?;
+        let QuantisationSteps { feature, log_scale, offset } = self.quantisation;
+        for (name, step) in [("feature", feature), ("log_scale", log_scale), ("offset", offset)] {
+            if !(step > 0.0 && step.is_finite()) {
+                bail!("the quantisation step of `{name}` is {step}, needs a positive number");
+            }
+        }
+        Ok(())
+    }
+
     /// The first key at which two configurations differ in what decides the result, with both values.
     ///
     /// Where the capture lies, where the bundle goes, how it is quantised and when checkpoints are written do not: the

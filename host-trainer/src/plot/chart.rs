@@ -45,7 +45,7 @@ impl<E: std::error::Error + Send + Sync> From<DrawingAreaErrorKind<E>> for DrawE
 }
 
 /// The part of a figure that one chart fills.
-type Panel<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
+pub(super) type Panel<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
 
 /// A chart under construction.
 pub(super) type Chart<'a, 'b, X> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<X, RangedCoordf64>>;
@@ -146,6 +146,19 @@ pub(super) fn padded(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> 
     if low.is_finite() && high.is_finite() { low - pad..high + pad } else { 0.0..1.0 }
 }
 
+/// The range from 0 to a twentieth above the largest of `values`.
+pub(super) fn from_zero(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
+    let high = values.fold(0.0, f64::max);
+    0.0..if high > 0.0 { 1.05 * high } else { 1.0 }
+}
+
+/// The digits after the point that tell the marks of an axis over `range` apart.
+pub(super) fn decimals(range: &std::ops::Range<f64>) -> usize {
+    // Eight marks, about.
+    let step = (range.end - range.start) / 8.0;
+    (0..9).find(|&digits| step * 10f64.powi(digits) >= 1.0).map_or(9, |digits| digits as usize)
+}
+
 /// A whole number with its thousands apart.
 pub(super) fn thousands(value: f64) -> String {
     let digits = format!("{:.0}", value.abs());
@@ -170,9 +183,15 @@ mod tests {
     }
 
     #[test]
+    fn marks_have_the_digits_that_tell_them_apart() {
+        assert_eq!([0.0..80.0, 30.0..35.0, 12.6..12.601].map(|range| decimals(&range)), [0, 1, 4]);
+    }
+
+    #[test]
     fn a_range_is_never_empty() {
         assert_eq!(padded([1.0, 3.0].into_iter()), 0.9..3.1);
         assert_eq!(padded([2.0].into_iter()), 1.0..3.0);
         assert_eq!(padded(std::iter::empty()), 0.0..1.0);
+        assert_eq!((from_zero([2.0].into_iter()), from_zero(std::iter::empty())), (0.0..2.1, 0.0..1.0));
     }
 }

@@ -39,15 +39,17 @@ where
     X::CoordDescType: Ranged<ValueType = f64> + ValueFormatter<f64>,
 {
     chart::figure(1, |panels| {
+        let all = curves.iter().flat_map(|curve| &curve.what).map(|row| row.psnr_db);
+        let psnr_db = chart::padded(all);
+        let digits = chart::decimals(&psnr_db);
         let labels = Labels {
             title: "Quality over size",
             x: "size, MB (10⁶ bytes)",
             y: "PSNR, dB",
             x_tick: &|x| significant(*x),
-            y_tick: &|y| format!("{y:.1}"),
+            y_tick: &|y| format!("{y:.digits$}"),
         };
-        let all = curves.iter().flat_map(|curve| &curve.what).map(|row| row.psnr_db);
-        let mut chart = chart::axes(&panels[0], sizes, chart::padded(all), &labels)?;
+        let mut chart = chart::axes(&panels[0], sizes, psnr_db, &labels)?;
         for (i, curve) in curves.iter().enumerate() {
             let colour = chart::colour(i);
             let mut rows: Vec<&ResultRow> = curve.what.iter().collect();

@@ -56,6 +56,22 @@ pub struct LearningRow {
     pub psnr_db: Option<f64>,
     /// Anchors now.
     pub anchors: u64,
+    /// Mean bits of an anchor's features since the row before, where the run has a rate.
+    #[serde(default)]
+    pub feature_bits: Option<f64>,
+    /// Of its log-scales, likewise.
+    #[serde(default)]
+    pub log_scale_bits: Option<f64>,
+    /// Of its offsets, likewise.
+    #[serde(default)]
+    pub offset_bits: Option<f64>,
+}
+
+impl LearningRow {
+    /// Mean bits of an anchor's values, where the run has a rate.
+    pub fn bits(&self) -> Option<f64> {
+        Some(self.feature_bits? + self.log_scale_bits? + self.offset_bits?)
+    }
 }
 
 /// One row of results: a method at one rate, with means over views or scenes.
@@ -178,10 +194,16 @@ mod tests {
 
     #[test]
     fn columns_are_told_by_name() {
-        let text = "iteration,rate_bits,psnr_db,anchors\n3,7.5,10.5,54381\n6,,,54400\n";
-        let row = |iteration, psnr_db, anchors| LearningRow { iteration, psnr_db, anchors };
-        let rows = vec![row(3, Some(10.5), 54_381), row(6, None, 54_400)];
+        let text = "iteration,weather,psnr_db,anchors\n3,7.5,10.5,54381\n6,,,54400\n";
+        let row = |iteration, psnr_db, anchors, [feature_bits, log_scale_bits, offset_bits]: [Option<f64>; 3]| {
+            LearningRow { iteration, psnr_db, anchors, feature_bits, log_scale_bits, offset_bits }
+        };
+        let rows = vec![row(3, Some(10.5), 54_381, [None; 3]), row(6, None, 54_400, [None; 3])];
         assert_eq!(read(text).unwrap(), Recording::Learning(rows));
+        let text = "offset_bits,iteration,psnr_db,anchors,feature_bits,log_scale_bits\n3.5,3,10.5,7,60.0,9.0\n";
+        let with_rate = row(3, Some(10.5), 7, [Some(60.0), Some(9.0), Some(3.5)]);
+        assert_eq!(with_rate.bits(), Some(72.5));
+        assert_eq!(read(text).unwrap(), Recording::Learning(vec![with_rate]));
     }
 
     #[test]

@@ -5,3 +5,4 @@ mod accidents;
 mod configuration;
 mod fixture;
 mod interruption;
+mod sweep;

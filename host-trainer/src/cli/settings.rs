@@ -1,0 +1,111 @@
+//! What decides how a run trains, as options of every command that trains; each may also stand in a configuration.
+
+use clap::ArgAction;
+use pocketsplat::bundle::QuantisationSteps;
+use pocketsplat::train::TrainConfig;
+use pocketsplat::train::config::Backbone;
+
+use super::capture::CaptureOptions;
+use super::run_config::RunConfig;
+
+/// Options by which a run differs from the default one.
+#[derive(clap::Args)]
+pub(crate) struct Settings {
+    #[command(flatten)]
+    capture: CaptureOptions,
+    /// Iterations from one checkpoint to the next; 0: only on interruption. [default: by time, every minute]
+    #[arg(long, value_name = "N")]
+    checkpoint_every: Option<u32>,
+    /// Keep the last two checkpoints of the finished run.
+    #[arg(long)]
+    keep_checkpoints: bool,
+    /// Kind of scene. [default: scaffold for train, hac for sweep]
+    #[arg(long, value_enum)]
+    backbone: Option<BackboneName>,
+    #[arg(long, value_name = "N", help = with_default("Hold out every N-th training view, to measure with; 0: none",
+        TrainConfig::default().validation_every))]
+    validation_every: Option<u32>,
+    #[arg(long, help = with_default("Training steps; schedules scale with them", TrainConfig::default().iterations))]
+    iterations: Option<u32>,
+    #[arg(long, help = with_default("Everything random follows from it: same seed, same machine, same bundle",
+        TrainConfig::default().seed))]
+    seed: Option<u64>,
+    /// Feature width of an anchor, and hidden width of the heads. [default: 32, with `--backbone hac` 50]
+    #[arg(long, value_name = "F")]
+    feature_dim: Option<usize>,
+    #[arg(long, value_name = "K", help = with_default("Gaussians of an anchor", TrainConfig::default().shape.n_offsets))]
+    offsets: Option<usize>,
+    /// Do not show the heads the direction of view.
+    #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true",
+        action = ArgAction::Set)]
+    no_view_direction: Option<bool>,
+    /// Show the heads the distance of view. [default: false, with `--backbone hac` true]
+    #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true",
+        action = ArgAction::Set)]
+    view_distance: Option<bool>,
+    /// Compensate opacities for the 0.3 px² dilation, for drawing at other resolutions than the training one.
+    #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true",
+        action = ArgAction::Set)]
+    dilation_compensation: Option<bool>,
+    /// Edge of a lattice cell, normalised units (the cameras span about 5). [default: from the points' spacing]
+    #[arg(long)]
+    voxel_size: Option<f64>,
+    /// Grow no further than this many anchors; the candidates with the largest gradients come first. [default: no limit]
+    #[arg(long, value_name = "N")]
+    max_anchors: Option<usize>,
+    #[arg(long, help = with_default("Quantisation step of the anchor features", QuantisationSteps::default().feature))]
+    feature_step: Option<f32>,
+}
+
+/// [`Backbone`] on the command line.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum BackboneName {
+    /// Scaffold-GS: anchors and three heads, trained for the image alone.
+    Scaffold,
+    /// HAC: the same, trained for image and bits, with a context model.
+    Hac,
+}
+
+impl From<BackboneName> for Backbone {
+    fn from(name: BackboneName) -> Self {
+        match name {
+            BackboneName::Scaffold => Self::Scaffold,
+            BackboneName::Hac => Self::Hac,
+        }
+    }
+}
+
+/// A help text with the value that stands where the option is not given.
+pub(super) fn with_default(help: &str, default: impl std::fmt::Display) -> String {
+    format!("{help} [default: {default}]")
+}
+
+impl Settings {
+    /// `config` with everything replaced that the command line says.
+    pub(crate) fn applied_to(&self, mut config: RunConfig) -> RunConfig {
+        fn set<T: Clone>(into: &mut T, given: &Option<T>) {
+            if let Some(value) = given {
+                *into = value.clone();
+            }
+        }
+        config.capture = self.capture.or(&config.capture);
+        config.checkpoint_every = self.checkpoint_every.or(config.checkpoint_every);
+        config.keep_checkpoints |= self.keep_checkpoints;
+        if let Some(backbone) = self.backbone {
+            config.train = config.train.with_backbone(backbone.into());
+        }
+        set(&mut config.quantisation.feature, &self.feature_step);
+        let train = &mut config.train;
+        set(&mut train.iterations, &self.iterations);
+        set(&mut train.seed, &self.seed);
+        set(&mut train.validation_every, &self.validation_every);
+        train.voxel_size = self.voxel_size.or(train.voxel_size);
+        train.densification.max_anchors = self.max_anchors.or(train.densification.max_anchors);
+        set(&mut train.shape.feature_dim, &self.feature_dim);
+        set(&mut train.shape.n_offsets, &self.offsets);
+        set(&mut train.shape.view_direction, &self.no_view_direction.map(|no| !no));
+        set(&mut train.shape.view_distance, &self.view_distance);
+        set(&mut train.shape.dilation_compensation, &self.dilation_compensation);
+        config
+    }
+}

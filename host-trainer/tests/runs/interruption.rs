@@ -36,7 +36,9 @@ fn kill_9_at_random_moments_costs_at_most_one_interval_and_no_bit() {
             child.kill().unwrap();
             let said = text(&child.wait_with_output().unwrap().stderr);
             let from = going_on_after(&said);
-            assert!(from + CHECKPOINT_EVERY >= reached, "reached {reached}, went on after {from}");
+            // Killed while still loading it says nothing yet.
+            let began = said.contains("going on after") || said.contains("begins anew");
+            assert!(!began || from + CHECKPOINT_EVERY >= reached, "reached {reached}, went on after {from}");
             if ended {
                 assert!(!said.contains("error"), "{said}");
                 break;

@@ -67,18 +67,21 @@ impl BundleFile {
         Camera { translation, ..view.camera.clone() }
     }
 
-    /// Entropy-decodes every chunk once, as a decoder that keeps its anchors in memory would.
-    pub(crate) fn decode_all(&self, bundle: &Bundle<'_>) -> Result<()> {
+    /// Entropy-decodes every chunk once, as a decoder that keeps its anchors in memory would; returns the number of Gaussians
+    /// that there are to draw: the offsets that no mask takes away.
+    pub(crate) fn decode_all(&self, bundle: &Bundle<'_>) -> Result<u64> {
         let header = bundle.header();
         let n_chunk = usize::from(header.max_chunk_anchors);
         let mut words = vec![0; bundle.anchor_scratch_words()];
         let mut models = bundle.anchor_models(&mut words)?;
         let mut sites = vec![AnchorSite::default(); n_chunk];
         let mut symbols = vec![0i16; n_chunk * header.n_channels()];
+        let mut n_drawn = 0;
         for chunk in bundle.chunks() {
             let n = usize::from(chunk.n_anchors());
             chunk.decode_symbols(&mut models, &mut sites[..n], &mut symbols[..n * header.n_channels()])?;
+            n_drawn += sites[..n].iter().map(|site| u64::from(site.mask.count_ones())).sum::<u64>();
         }
-        Ok(())
+        Ok(n_drawn)
     }
 }

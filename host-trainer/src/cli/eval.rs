@@ -64,7 +64,7 @@ pub(crate) struct Evaluation {
     pub(crate) half_size_copy_psnr_db: f64,
     pub(crate) bundle_bytes: usize,
     pub(crate) n_anchors: u32,
-    /// What there is to draw: the Gaussians of all anchors.
+    /// What there is to draw: offsets that no mask takes away.
     pub(crate) n_gaussians: u64,
     pub(crate) n_views: usize,
     pub(crate) split: String,
@@ -137,7 +137,7 @@ pub(crate) fn evaluate(
     let loaded = options.load(0)?;
     let views = split.views(&loaded)?;
     let started = Instant::now();
-    file.decode_all(&bundle)?;
+    let n_gaussians = file.decode_all(&bundle)?;
     let decode_s = started.elapsed().as_secs_f64();
 
     let oracle = if renderer == Renderer::Reference || against_reference {
@@ -175,7 +175,6 @@ pub(crate) fn evaluate(
         Ok(of_views.iter().sum::<f64>() / of_views.len() as f64)
     };
     let mean = |value: fn(&Row) -> f64| rows.iter().map(value).sum::<f64>() / rows.len() as f64;
-    let header = bundle.header();
     Ok(Evaluation {
         psnr_db: mean(|row| row.psnr_db),
         ssim: mean(|row| row.ssim),
@@ -183,8 +182,8 @@ pub(crate) fn evaluate(
         lpips_of: lpips.map(|lpips| format!("VGG16, input in {}", lpips.range())),
         half_size_copy_psnr_db: mean(|row| row.half_size_copy_psnr_db),
         bundle_bytes: file.bytes.len(),
-        n_anchors: header.n_anchors,
-        n_gaussians: u64::from(header.n_anchors) * u64::from(header.n_offsets),
+        n_anchors: bundle.n_anchors(),
+        n_gaussians,
         n_views: rows.len(),
         split: format!("{split:?}").to_lowercase(),
         renderer: format!("{renderer:?}").to_lowercase(),

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-use pocketsplat::bundle::QuantisationSteps;
 use pocketsplat::dataset::{Background, Image};
 use pocketsplat::render::decoder::core_image;
 use pocketsplat::render::reference::ReferenceScene;
@@ -12,6 +11,7 @@ use pocketsplat::train::TrainConfig;
 
 use super::bundle::BundleFile;
 use super::capture::{CaptureArgs, CaptureOptions, Split};
+use super::encode::Encoding;
 use super::eval::{Renderer, evaluate, reference_image};
 use super::{output, train};
 
@@ -50,7 +50,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let config = TrainConfig { iterations: args.iterations, ..TrainConfig::default() };
     let bundle_path = folder.join("scene.psb");
     let capture = capture_args.load(config.seed)?;
-    let trained = train::train(&capture, Background::Black, config, &QuantisationSteps::default(), &bundle_path)?;
+    let trained = train::train(&capture, Background::Black, config, &Encoding::default(), &bundle_path)?;
 
     eprintln!("3 of 4  drawing the held-out views with the decoder");
     let file = BundleFile::read(&bundle_path)?;

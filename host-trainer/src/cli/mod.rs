@@ -4,6 +4,7 @@ mod bundle;
 mod capture;
 mod demo;
 mod doctor;
+mod encode;
 mod eval;
 mod inspect;
 mod lpips;

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-use pocketsplat::bundle::QuantisationSteps;
 use pocketsplat::dataset::Background;
 use pocketsplat::train::TrainConfig;
 use pocketsplat::train::config::Backbone;
@@ -11,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
 use super::capture::CaptureOptions;
+use super::encode::Encoding;
 
 /// Everything a run was asked for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -25,7 +25,7 @@ pub(crate) struct RunConfig {
     pub(crate) keep_checkpoints: bool,
     pub(crate) capture: CaptureOptions,
     pub(crate) train: TrainConfig,
-    pub(crate) quantisation: QuantisationSteps,
+    pub(crate) encoding: Encoding,
 }
 
 impl Default for RunConfig {
@@ -37,7 +37,7 @@ impl Default for RunConfig {
             keep_checkpoints: false,
             capture: CaptureOptions { background: Some(Background::Black), ..CaptureOptions::default() },
             train: TrainConfig::default(),
-            quantisation: QuantisationSteps::default(),
+            encoding: Encoding::default(),
         }
     }
 }
@@ -70,13 +70,7 @@ impl RunConfig {
     /// Refuses what no run can use, before any work starts.
     pub(crate) fn check(&self) -> Result<()> {
         self.train.validate().map_err(anyhow::Error::msg)?;
-        let QuantisationSteps { feature, log_scale, offset } = self.quantisation;
-        for (name, step) in [("feature", feature), ("log_scale", log_scale), ("offset", offset)] {
-            if !(step > 0.0 && step.is_finite()) {
-                bail!("the quantisation step of `{name}` is {step}, needs a positive number");
-            }
-        }
-        Ok(())
+        self.encoding.validate()
     }
 
     /// The first key at which two configurations differ in what decides the result, with both values.

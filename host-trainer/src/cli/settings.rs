@@ -1,7 +1,7 @@
 //! What decides how a run trains, as options of every command that trains; each may also stand in a configuration.
 
 use clap::ArgAction;
-use pocketsplat::bundle::QuantisationSteps;
+use pocketsplat::bundle::{Coder, QuantisationSteps};
 use pocketsplat::train::TrainConfig;
 use pocketsplat::train::config::Backbone;
 
@@ -55,6 +55,13 @@ pub(crate) struct Settings {
     max_anchors: Option<usize>,
     #[arg(long, help = with_default("Quantisation step of the anchor features", QuantisationSteps::default().feature))]
     feature_step: Option<f32>,
+    /// What gives the symbols their frequencies. [default: auto]
+    #[arg(long, value_enum)]
+    coder: Option<Coder>,
+    /// Pruning rates of the bundle's tiers, falling to 0: the shares of anchors that a smaller device leaves out.
+    /// [default: 0.4,0.3,0.2,0.1,0.05,0]
+    #[arg(long, value_name = "RATES", value_delimiter = ',')]
+    tiers: Option<Vec<f32>>,
 }
 
 /// [`Backbone`] on the command line.
@@ -94,7 +101,10 @@ impl Settings {
         if let Some(backbone) = self.backbone {
             config.train = config.train.with_backbone(backbone.into());
         }
-        set(&mut config.quantisation.feature, &self.feature_step);
+        let encoding = &mut config.encoding;
+        set(&mut encoding.quantisation.feature, &self.feature_step);
+        set(&mut encoding.coder, &self.coder);
+        set(&mut encoding.tiers, &self.tiers);
         let train = &mut config.train;
         set(&mut train.iterations, &self.iterations);
         set(&mut train.seed, &self.seed);

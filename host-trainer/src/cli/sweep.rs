@@ -145,7 +145,7 @@ fn trained(config: &RunConfig, capture: &Capture, stop: &AtomicBool) -> Result<b
 fn refuse_other(begun: &RunConfig, config: &RunConfig, folder: &Path) -> Result<()> {
     let difference = match begun.difference(config)? {
         Some(difference) => difference,
-        None if begun.quantisation != config.quantisation => "its bundle has other quantisation steps".to_owned(),
+        None if begun.encoding != config.encoding => "its bundle is coded in another way".to_owned(),
         None if begun.dataset != config.dataset => {
             format!("its capture is {}, not {}", begun.dataset.display(), config.dataset.display())
         }

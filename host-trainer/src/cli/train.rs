@@ -5,16 +5,17 @@ use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result, bail};
-use pocketsplat::bundle::{self, BundleInfo, QuantisationSteps, WriteOptions};
-use pocketsplat::dataset::{Background, Capture};
-use pocketsplat::scene::Scene;
+use pocketsplat::bundle::Written;
+use pocketsplat::dataset::{Background, Capture, View};
 use pocketsplat::train::finish::Finished;
 use pocketsplat::train::run::{Ending, Interval, RunError, RunFolder};
 use pocketsplat::train::{TrainConfig, Trainer};
+use pocketsplat_core::Bundle;
 use pocketsplat_core::budget::MAX_FRAME_PX;
 use serde::Serialize;
 
 use super::capture::CaptureArgs;
+use super::encode::{Encoding, largest_px};
 use super::progress::Progress;
 use super::run_config::RunConfig;
 use super::train_args::Args;
@@ -33,6 +34,8 @@ pub(crate) struct TrainResult {
     pub(crate) n_valid_anchors: usize,
     pub(crate) drawn_offsets: usize,
     pub(crate) undrawn_offsets: usize,
+    /// What coded the symbols: the shorter of the two unless the configuration forces one.
+    pub(crate) coder: &'static str,
     /// Bytes of features, log-scales and offsets under the float context model.
     pub(crate) estimated_bytes: Option<[f64; 3]>,
     pub(crate) bytes_per_anchor: f64,
@@ -123,7 +126,7 @@ pub(crate) fn train_in(
         return Ok(None);
     }
     let background = config.capture.background.unwrap_or_default();
-    let result = write_bundle(&trainer, capture, background, &config.quantisation, &config.output)
+    let result = write_bundle(&trainer, capture, background, &config.encoding, &config.output)
         .with_context(|| format!("the training is done and kept; {}", how_to_go_on()))?;
     folder.finish(&serde_json::to_string_pretty(&result)?, config.keep_checkpoints)?;
     Ok(Some(result))
@@ -159,25 +162,27 @@ pub(crate) fn train(
     capture: &Capture,
     background: Background,
     config: TrainConfig,
-    steps: &QuantisationSteps,
+    encoding: &Encoding,
     output: &Path,
 ) -> Result<TrainResult> {
     let mut trainer = Trainer::new(capture, config)?;
     trainer.run(&mut Progress::new(0, config.iterations))?;
-    write_bundle(&trainer, capture, background, steps, output)
+    write_bundle(&trainer, capture, background, encoding, output)
 }
 
 fn write_bundle(
     trainer: &Trainer<'_>,
     capture: &Capture,
     background: Background,
-    steps: &QuantisationSteps,
+    encoding: &Encoding,
     output: &Path,
 ) -> Result<TrainResult> {
-    let Finished { scene, n_undrawn, estimated_bits, .. } = trainer.finish()?;
-    let bytes = encode(&scene, capture, background, steps)?;
+    let finished = trainer.finish()?;
+    let held_out: Vec<View> = trainer.validation_views().cloned().collect();
+    let Written { bytes, .. } = encoding.encode(&finished, capture, background, &held_out)?;
     output::write_whole(output, &bytes)?;
-    let n_anchors = trainer.scene.anchors.len();
+    let Finished { scene, n_undrawn, estimated_bits, .. } = finished;
+    let n_anchors = scene.anchors.len();
     Ok(TrainResult {
         bundle: output.to_owned(),
         bundle_bytes: bytes.len(),
@@ -185,6 +190,7 @@ fn write_bundle(
         n_valid_anchors: (0..n_anchors).filter(|a| scene.anchors.has_drawn(*a)).count(),
         drawn_offsets: (0..scene.anchors.mask_logits.len()).filter(|offset| scene.anchors.is_drawn(*offset)).count(),
         undrawn_offsets: n_undrawn,
+        coder: if Bundle::parse(&bytes)?.context().is_some() { "context" } else { "static" },
         estimated_bytes: estimated_bits.map(|bits| bits.map(|bits| bits / 8.0)),
         bytes_per_anchor: bytes.len() as f64 / n_anchors as f64,
         iterations: trainer.iteration,
@@ -193,22 +199,4 @@ fn write_bundle(
         iterations_per_s: f64::from(trainer.iteration) / trainer.seconds,
         background: background.to_string(),
     })
-}
-
-/// Size of the training view with the longest side: what `eval` reduces photographs to unless told otherwise.
-fn largest_px(capture: &Capture) -> [u32; 2] {
-    let sizes = capture.train.iter().map(|view| [view.camera.width_px, view.camera.height_px]);
-    sizes.max_by_key(|size| size[0].max(size[1])).unwrap_or_default()
-}
-
-fn encode(scene: &Scene<f32>, capture: &Capture, background: Background, steps: &QuantisationSteps) -> Result<Vec<u8>> {
-    let info = BundleInfo {
-        normalisation: capture.normalisation,
-        background: background.rgb8(),
-        training_px: largest_px(capture),
-        // Any training view will do for a device that has no camera of its own; the first is as good as another.
-        preview: capture.train[0].camera.clone(),
-    };
-    let options = WriteOptions { steps: *steps, ..WriteOptions::default() };
-    Ok(bundle::write(scene, &info, &options)?.bytes)
 }

@@ -19,7 +19,7 @@ fn a_written_configuration_reads_back_to_the_last_bit() {
         let x = 1.0 / f64::from(i).powf(1.7);
         config.train.voxel_size = Some(x);
         config.train.rates.offset.end = x * 1e-9;
-        config.quantisation.feature = (x * 0.1) as f32;
+        config.encoding.quantisation.feature = (x * 0.1) as f32;
         config.train.seed = u64::from(i).pow(7) % i64::MAX as u64;
         assert_eq!(RunConfig::parse(&config.to_toml().unwrap()).unwrap(), config, "{i}");
     }

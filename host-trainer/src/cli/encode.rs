@@ -1,0 +1,83 @@
+//! From a finished run to a bundle: coded, measured tier by tier, accounted for.
+
+use anyhow::{Result, bail};
+use pocketsplat::bundle::manifest::{cameras_to_measure, install, measure};
+use pocketsplat::bundle::{self, BundleInfo, Coder, QuantisationSteps, WriteOptions, Written};
+use pocketsplat::dataset::{Background, Capture, View};
+use pocketsplat::train::finish::Finished;
+use pocketsplat_core::Bundle;
+use serde::{Deserialize, Serialize};
+
+/// How a run's scene becomes a bundle; decides nothing of its training.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Encoding {
+    /// What gives the symbols their frequencies.
+    pub(crate) coder: Coder,
+    /// Pruning rates of the tiers, falling to 0.
+    pub(crate) tiers: Vec<f32>,
+    /// Steps of scenes without a context model.
+    pub(crate) quantisation: QuantisationSteps,
+}
+
+impl Default for Encoding {
+    fn default() -> Self {
+        let WriteOptions { steps, coder, pruning_rates, .. } = WriteOptions::default();
+        Self { quantisation: steps, coder, tiers: pruning_rates }
+    }
+}
+
+impl Encoding {
+    /// What can be refused before anything is trained.
+    ///
+    /// # Errors
+    /// A step that is not positive; rates that do not fall to 0.
+    pub(crate) fn validate(&self) -> Result<()> {
+        let QuantisationSteps { feature, log_scale, offset } = self.quantisation;
+        for (name, step) in [("feature", feature), ("log_scale", log_scale), ("offset", offset)] {
+            if !(step.is_finite() && step > 0.0) {
+                bail!("the quantisation step of `{name}` is {step}, needs a positive number");
+            }
+        }
+        let falls = self.tiers.windows(2).all(|pair| pair[0] > pair[1]);
+        let within = self.tiers.iter().all(|rate| (0.0..1.0).contains(rate));
+        if !(falls && within && self.tiers.last() == Some(&0.0)) {
+            bail!("the tiers' pruning rates are {:?}, need to fall from below 1 to 0, as 0.4,0.2,0", self.tiers);
+        }
+        Ok(())
+    }
+
+    /// Codes a finished scene in tiers, measures each over training views and an orbit, and writes that into the bundle.
+    pub(crate) fn encode(
+        &self,
+        finished: &Finished,
+        capture: &Capture,
+        background: Background,
+        held_out: &[View],
+    ) -> Result<Written> {
+        let info = BundleInfo {
+            normalisation: capture.normalisation,
+            background: background.rgb8(),
+            training_px: largest_px(capture),
+            // Any training view will do for a device that has no camera of its own; the first is as good as another.
+            preview: capture.train[0].camera.clone(),
+        };
+        let options = WriteOptions {
+            steps: self.quantisation,
+            coder: self.coder,
+            importance: Some(finished.importance.clone()),
+            pruning_rates: self.tiers.clone(),
+            ..WriteOptions::default()
+        };
+        let mut written = bundle::write(&finished.scene, &info, &options)?;
+        let cameras: Vec<_> = capture.train.iter().map(|view| view.camera.clone()).collect();
+        let measures = measure(&Bundle::parse(&written.bytes)?, &cameras_to_measure(&cameras), held_out)?;
+        install(&mut written.bytes, &measures)?;
+        Ok(written)
+    }
+}
+
+/// Size of the training view with the longest side: what `eval` reduces photographs to unless told otherwise.
+pub(crate) fn largest_px(capture: &Capture) -> [u32; 2] {
+    let sizes = capture.train.iter().map(|view| [view.camera.width_px, view.camera.height_px]);
+    sizes.max_by_key(|size| size[0].max(size[1])).unwrap_or_default()
+}

@@ -28,7 +28,30 @@ pub(super) struct Layer<'a> {
     pub(super) n_in: usize,
 }
 
-impl Layer<'_> {
+/// What one output of a layer is made with.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Row<'a> {
+    weights: &'a [u8],
+    bias: [u8; 4],
+    shift: u8,
+}
+
+impl Row<'_> {
+    /// `(Σ weights·inputs + bias) >> shift`.
+    ///
+    /// # Budget
+    /// n_in multiply-adds, about 3.3 instructions each on a Cortex-M4.
+    #[inline(always)]
+    pub(super) fn output(&self, inputs: &[i16]) -> i32 {
+        // Order does not matter: integers add up the same in any, and no sum overflows.
+        let sum = self.weights.iter().zip(inputs).fold(i32::from_le_bytes(self.bias), |sum, (&weight, &input)| {
+            sum.wrapping_add(i32::from(weight as i8).wrapping_mul(i32::from(input)))
+        });
+        sum.wrapping_shr(self.shift.into())
+    }
+}
+
+impl<'a> Layer<'a> {
     pub(super) fn check(&self) -> Result<(), DecodeError> {
         for &shift in self.shifts {
             if shift > MAX_SHIFT {
@@ -52,28 +75,31 @@ impl Layer<'_> {
         Ok(())
     }
 
-    /// Output `index`, shifted.
-    ///
-    /// # Budget
-    /// n_in multiply-adds, about 3.3 instructions each on a Cortex-M4.
-    #[inline(always)]
-    pub(super) fn output(&self, index: usize, inputs: &[i16]) -> i32 {
-        let first = index.saturating_mul(self.n_in);
-        let row = self.weights.get(first..first.saturating_add(self.n_in)).unwrap_or_default();
-        let bias = self.biases.get(index).map_or(0, |&bias| i32::from_le_bytes(bias));
-        let shift = self.shifts.get(index).map_or(0, |&shift| u32::from(shift));
-        // Order does not matter: integers add up the same in any, and no sum overflows.
-        let sum = row.iter().zip(inputs).fold(bias, |sum, (&weight, &input)| {
-            sum.wrapping_add(i32::from(weight as i8).wrapping_mul(i32::from(input)))
-        });
-        sum.wrapping_shr(shift)
+    /// The rows from `first` on.
+    #[inline]
+    pub(super) fn rows(&self, first: usize) -> impl Iterator<Item = Row<'a>> + use<'a> {
+        let weights = self.weights.get(first.saturating_mul(self.n_in)..).unwrap_or_default();
+        let biases = self.biases.get(first..).unwrap_or_default();
+        let shifts = self.shifts.get(first..).unwrap_or_default();
+        // `max(1)`: a chunk size of zero would panic; there is always an input.
+        let rows = weights.chunks_exact(self.n_in.max(1)).zip(biases.iter().zip(shifts));
+        rows.map(|(weights, (&bias, &shift))| Row { weights, bias, shift })
+    }
+
+    /// The outputs from `first` on, limited to i16.
+    // On its own it gets the registers that it needs.
+    #[inline(never)]
+    pub(super) fn limited(&self, first: usize, inputs: &[i16], outputs: &mut [i16]) {
+        for (row, output) in self.rows(first).zip(outputs) {
+            *output = row.output(inputs).clamp(i16::MIN.into(), i16::MAX.into()) as i16;
+        }
     }
 
     /// All outputs, limited to 0..=32767: a rectified hidden layer.
     #[inline(always)]
     pub(super) fn rectified(&self, inputs: &[i16], outputs: &mut [i16]) {
-        for (index, output) in outputs.iter_mut().enumerate() {
-            *output = self.output(index, inputs).clamp(0, i16::MAX.into()) as i16;
+        for (row, output) in self.rows(0).zip(outputs) {
+            *output = row.output(inputs).clamp(0, i16::MAX.into()) as i16;
         }
     }
 }

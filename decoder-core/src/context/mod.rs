@@ -12,10 +12,10 @@ mod steps;
 
 pub use grid::{Corners, FEATURES_PER_LEVEL, GridFrame, GridLevel, LevelKind, WEIGHT_ONE};
 pub use mlp::{MAX_BIAS, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS};
-pub use steps::{Group, MAX_STEP_EXPONENT, MEAN_PARTS, MIN_STEP_EXPONENT, N_GROUPS, Steps};
+pub use steps::{Group, GroupStep, MAX_STEP_EXPONENT, MEAN_PARTS, MIN_STEP_EXPONENT, N_GROUPS, Steps};
 
 use crate::bundle::{Cursor, in_range, saturate};
-use crate::entropy::{EIGHTHS, NormalModel, SCALE_ONE};
+use crate::entropy::{EIGHTHS, NormalModel};
 use crate::error::{DecodeError, Field, SectionKind};
 use mlp::Layer;
 use steps::check_base_steps;
@@ -110,6 +110,12 @@ impl<'a> Context<'a> {
         self.output.biases.len()
     }
 
+    /// Features of an anchor.
+    #[must_use]
+    pub fn feature_dim(&self) -> usize {
+        self.feature_dim
+    }
+
     /// Where the grid lies.
     #[must_use]
     pub fn frame(&self) -> GridFrame {
@@ -172,7 +178,10 @@ impl<'a> Context<'a> {
     #[inline(always)]
     #[must_use]
     pub fn output(&self, row: usize, hidden: &[i16]) -> i16 {
-        self.output.output(row, hidden).clamp(i16::MIN.into(), i16::MAX.into()) as i16
+        let mut output = [0];
+        self.output.limited(row, hidden, &mut output);
+        let [output] = output;
+        output
     }
 
     /// The anchor's quantisation steps.
@@ -188,15 +197,23 @@ impl<'a> Context<'a> {
     ///
     /// # Budget
     /// Two rows of the network.
-    #[inline]
     #[must_use]
     pub fn model(&self, channel: usize, steps: &Steps, hidden: &[i16]) -> NormalModel {
-        let group = self.group(channel);
         let mean = self.output(channel, hidden);
         let scale = self.output(channel.saturating_add(self.n_channels), hidden);
-        let exponent = steps.exponent(group);
-        let scale = i32::from(scale).saturating_sub(exponent).saturating_add(SCALE_ONE);
-        NormalModel::new(steps.mean_eighths(group, mean), scale)
+        steps.of(self.group(channel)).model(mean, scale)
+    }
+
+    /// Means of the channels from `first` on, in 1/[`MEAN_PARTS`] of a base step.
+    #[inline]
+    pub(crate) fn means(&self, first: usize, hidden: &[i16], means: &mut [i16]) {
+        self.output.limited(first, hidden, means);
+    }
+
+    /// Scales of the channels from `first` on, in eighths of an octave of a base step.
+    #[inline]
+    pub(crate) fn scales(&self, first: usize, hidden: &[i16], scales: &mut [i16]) {
+        self.output.limited(first.saturating_add(self.n_channels), hidden, scales);
     }
 
     fn row_bits(&self, row: u32) -> u8 {

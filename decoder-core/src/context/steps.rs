@@ -1,5 +1,6 @@
 //! Quantisation steps of an anchor, from a table: 2^(q/8) times the scene's base steps.
 
+use crate::entropy::{EIGHTHS, NormalModel, SCALE_ONE};
 use crate::error::{DecodeError, Field};
 
 /// Groups of channels that share a step.
@@ -18,6 +19,8 @@ const PART_OF_OCTAVE: [f32; 8] =
 const INVERSE_PART_OF_OCTAVE: [i32; 8] = [4096, 3756, 3444, 3158, 2896, 2656, 2435, 2233];
 /// 2⁻¹² of the inverse, and from 64ths to eighths.
 const MEAN_SHIFT: u32 = 15;
+/// Half of an eighth, which rounds, and half of a step.
+const HALF_STEP: i32 = (1 << (MEAN_SHIFT - 1)) + ((EIGHTHS / 2) << MEAN_SHIFT);
 
 /// Channels that share a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,6 +43,17 @@ impl Group {
             Self::Offset
         }
     }
+}
+
+/// The step of one group of an anchor's channels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GroupStep {
+    /// Distance between neighbouring symbols' values; the value of a symbol is `f32(symbol)·step`.
+    pub value: f32,
+    /// 32 − q, from a scale in base steps to a scale index.
+    scale_shift: i32,
+    /// T, from means to eighths of the step.
+    mean_factor: i32,
 }
 
 /// The steps of one anchor.
@@ -93,15 +107,27 @@ impl Steps {
         }
     }
 
-    /// A mean in 1/[`MEAN_PARTS`] of a base step, in eighths of this step: `(mean·T + 2¹⁴) >> 15`, T = 4096·2^(−q/8).
+    /// The step of `group`.
     #[inline]
-    pub(super) fn mean_eighths(&self, group: Group, mean: i16) -> i32 {
+    #[must_use]
+    pub fn of(&self, group: Group) -> GroupStep {
         let exponent = self.exponent(group);
         let part = INVERSE_PART_OF_OCTAVE.get((exponent & 7) as usize).copied().unwrap_or(4096);
-        // q = 8·octave + part, so T = INVERSE[part]·2^(−octave) with octaves −3..=0: at most 2¹⁵, the product at most 2³⁰.
+        // q = 8·octave + part, so T = INVERSE[part]·2^(−octave) with octaves −3..=0: at most 2¹⁵.
         let octaves = (exponent >> 3).min(0).unsigned_abs();
-        let factor = part.wrapping_shl(octaves);
-        i32::from(mean).wrapping_mul(factor).wrapping_add(1 << (MEAN_SHIFT - 1)) >> MEAN_SHIFT
+        let scale_shift = SCALE_ONE.wrapping_sub(exponent);
+        GroupStep { value: self.value(group), scale_shift, mean_factor: part.wrapping_shl(octaves) }
+    }
+}
+
+impl GroupStep {
+    /// The distribution of a symbol, from a mean in 1/[`MEAN_PARTS`] of a base step and a scale in eighths of an octave of
+    /// it: the mean in eighths of the step is `(mean·T + 2¹⁴) >> 15`, T = 4096·2^(−q/8).
+    #[inline(always)]
+    pub(crate) fn model(&self, mean: i16, scale: i16) -> NormalModel {
+        // An i16 times at most 2¹⁵; half a step is added before the shift, as the tables want it.
+        let shifted = i32::from(mean).wrapping_mul(self.mean_factor).wrapping_add(HALF_STEP) >> MEAN_SHIFT;
+        NormalModel::from_shifted(shifted, i32::from(scale).wrapping_add(self.scale_shift))
     }
 }
 
@@ -129,11 +155,12 @@ mod tests {
             assert!((found / expected - 1.0).abs() < 1e-6, "q {q}: {found} against {expected}");
             for mean in [-32768, -640, -1, 0, 5, 64, 32767_i16] {
                 let expected = f64::from(mean) / 64.0 / expected * 8.0;
-                let found = f64::from(steps.mean_eighths(Group::Offset, mean));
-                assert!(
-                    (found - expected).abs() <= 0.5 + expected.abs() * 2e-4,
-                    "q {q}, mean {mean}: {found}, {expected}"
-                );
+                let model = steps.of(Group::Offset).model(mean, 0);
+                let near = |found: i32| (f64::from(found) - expected).abs() <= 0.5 + expected.abs() * 2e-4;
+                let found = (expected.round() as i32 - 8..).take(16).find(|&found| {
+                    near(found) && NormalModel::new(found, SCALE_ONE - i32::from(steps.exponents[2])) == model
+                });
+                assert!(found.is_some(), "q {q}, mean {mean}: {expected}");
             }
         }
     }

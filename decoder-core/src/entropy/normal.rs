@@ -5,7 +5,7 @@
 //! means are in eighths, of which five tables do, because a mean of −p/8 is the mirror image of +p/8. Means and scales
 //! between those of the tables cost 0.1 % of the bits. `tools/src/bin/normal_tables.rs` writes the tables.
 
-use super::normal_tables::{ENDS, FIRST, REACH};
+use super::normal_tables::{BOUNDS, SCALES};
 use super::{AnsReader, FREQUENCY_TOTAL, PRECISION_BITS, Slot, SymbolModel, UniformByte};
 
 /// Number of scales.
@@ -17,8 +17,26 @@ pub const EIGHTHS: i32 = 8;
 /// Tables of one scale: means of 0, ⅛, ¼, ⅜ and ½.
 pub const N_PHASES: usize = 5;
 
+/// Pieces of the range that have a short cut into the tables.
+pub const N_NORMAL_SHORT_CUTS: usize = 32;
+
+/// Bounds that a model looks at; the longest table has 125. A power of two makes every index a sound one without a
+/// comparison.
+pub const NORMAL_WINDOW: usize = 128;
+
 /// An escape byte up to here holds how far beyond the table, and the sign; above it, the symbol follows as two bytes.
 const ESCAPE_NEAR: u8 = 253;
+
+/// The tables of one scale.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct Scale {
+    /// Where the table of each δ begins in [`BOUNDS`], δ from −4 to 3; those of −δ and δ are the same.
+    pub(super) first: [u16; EIGHTHS as usize],
+    /// D, the farthest symbol that has an entry.
+    pub(super) reach: u16,
+    /// For each piece of the range an entry that begins at or before the piece's start, whatever the phase.
+    pub(super) short_cuts: [u8; N_NORMAL_SHORT_CUTS],
+}
 
 /// The distribution N(mean, σ) of an integer symbol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,8 +45,9 @@ pub struct NormalModel {
     centre: i32,
     /// The mean lies below `centre`: the table is read as its mirror image.
     mirrored: bool,
-    /// `[2D + 1]` sums of frequencies up to and with each entry.
-    ends: &'static [u16],
+    scale: &'static Scale,
+    /// Where each entry begins, where the escape begins and where it ends; then those of other tables.
+    bounds: &'static [u16; NORMAL_WINDOW],
 }
 
 /// The slots that stand for one symbol, in the order in which a decoder reads them.
@@ -58,60 +77,80 @@ impl SymbolSlots {
     }
 }
 
+/// Stands where no table does, which is nowhere.
+const ANY_TABLE: &[u16; NORMAL_WINDOW] = match BOUNDS.first_chunk() {
+    Some(table) => table,
+    None => panic!("the tables are longer"),
+};
+
 impl NormalModel {
     /// The model of mean `mean_eighths`/8 and σ = 2^((`scale` − 32)/8), `scale` limited to 0..=63.
     #[inline]
     #[must_use]
     pub fn new(mean_eighths: i32, scale: i32) -> Self {
-        let centre = mean_eighths.saturating_add(EIGHTHS / 2) >> 3;
-        // −4..=3 whatever the mean, so nothing wraps.
-        let delta = mean_eighths.wrapping_sub(centre.wrapping_mul(EIGHTHS));
-        let mirrored = delta < 0;
-        let phase = delta.unsigned_abs() as usize;
-        let scale = scale.clamp(0, 63) as usize;
-        let reach = REACH.get(scale).map_or(0, |&reach| usize::from(reach));
-        let n_entries = reach.wrapping_mul(2).wrapping_add(1);
-        let first = FIRST.get(scale).map_or(0, |&first| usize::from(first)).wrapping_add(phase.wrapping_mul(n_entries));
-        let ends = ENDS.get(first..first.wrapping_add(n_entries)).unwrap_or_default();
-        Self { centre, mirrored, ends }
+        Self::from_shifted(mean_eighths.saturating_add(EIGHTHS / 2), scale)
+    }
+
+    /// The model of mean (`shifted` − 4)/8.
+    #[inline(always)]
+    pub(crate) fn from_shifted(shifted: i32, scale: i32) -> Self {
+        let [narrowest, ..] = &SCALES;
+        let scale = SCALES.get(scale.clamp(0, 63) as usize).unwrap_or(narrowest);
+        // δ + 4: how far the mean lies from half a step below the centre.
+        let part = shifted & (EIGHTHS - 1);
+        let first = scale.first.get(part as usize).map_or(0, |&first| usize::from(first));
+        let bounds = BOUNDS.get(first..).and_then(|bounds| bounds.first_chunk()).unwrap_or(ANY_TABLE);
+        Self { centre: shifted >> 3, mirrored: part < EIGHTHS / 2, scale, bounds }
     }
 
     /// Decodes the next symbol of `reader`, an escaped one included.
-    #[inline]
+    ///
+    /// # Budget
+    /// About 45 instructions on a Cortex-M4.
+    #[inline(always)]
     pub fn symbol(&self, reader: &mut AnsReader<'_>) -> i16 {
-        let distance = match reader.symbol(self) {
-            Some(distance) => distance,
-            None => match reader.symbol(&UniformByte) {
-                near @ ..=ESCAPE_NEAR => {
-                    let beyond = self.reach().wrapping_add(1).wrapping_add(i32::from(near >> 1));
-                    if near & 1 == 0 { beyond } else { beyond.wrapping_neg() }
-                }
-                _ => {
-                    let high = reader.symbol(&UniformByte);
-                    let low = reader.symbol(&UniformByte);
-                    return i16::from_be_bytes([high, low]);
-                }
-            },
-        };
-        let distance = if self.mirrored { distance.wrapping_neg() } else { distance };
-        // A writer codes such symbols only where the sum is an i16.
-        self.centre.wrapping_add(distance) as i16
+        // Means that a context computes stay below 4096, so the sum is an i16.
+        self.wide_symbol(reader) as i16
+    }
+
+    /// The next symbol, not yet cut to 16 bits.
+    #[inline(always)]
+    pub(crate) fn wide_symbol(&self, reader: &mut AnsReader<'_>) -> i32 {
+        let (entry, start, frequency) = self.find(reader.quantile());
+        reader.advance(start, frequency);
+        let distance = (entry as i32).wrapping_sub(self.reach());
+        if distance > self.reach() { self.escaped(reader) } else { self.centre.wrapping_add(self.signed(distance)) }
+    }
+
+    /// The symbol after an escape.
+    #[inline(always)]
+    fn escaped(&self, reader: &mut AnsReader<'_>) -> i32 {
+        let near @ ..=ESCAPE_NEAR = reader.symbol(&UniformByte) else { return reader.escaped().into() };
+        let beyond = self.reach().wrapping_add(1).wrapping_add(i32::from(near >> 1));
+        let distance = if near & 1 == 0 { beyond } else { beyond.wrapping_neg() };
+        self.centre.wrapping_add(self.signed(distance))
+    }
+
+    /// A distance from the centre in the table's orientation, or back.
+    #[inline(always)]
+    fn signed(&self, distance: i32) -> i32 {
+        if self.mirrored { distance.wrapping_neg() } else { distance }
     }
 
     /// The slots of `symbol`, for encoders.
     #[must_use]
     pub fn slots(&self, symbol: i16) -> SymbolSlots {
         let mut slots = SymbolSlots::default();
-        let distance = i32::from(symbol).saturating_sub(self.centre);
-        let distance = if self.mirrored { distance.saturating_neg() } else { distance };
-        let entry = usize::try_from(distance.saturating_add(self.reach())).ok();
-        if let Some((index, &end)) = entry.and_then(|index| Some((index, self.ends.get(index)?))) {
-            let start = self.end_before(index);
-            slots.push(start, end.wrapping_sub(start));
+        let distance = self.signed(i32::from(symbol).saturating_sub(self.centre));
+        let entry =
+            distance.clamp(self.reach().wrapping_neg(), self.reach().wrapping_add(1)).wrapping_add(self.reach());
+        let entry = if distance.abs() > self.reach() { self.reach().wrapping_mul(2).wrapping_add(1) } else { entry };
+        let start = self.bound(entry.unsigned_abs());
+        let frequency = self.bound(entry.unsigned_abs().wrapping_add(1)).wrapping_sub(start);
+        slots.push(start as u16, frequency as u16);
+        if distance.abs() <= self.reach() {
             return slots;
         }
-        let escape = self.ends.last().copied().unwrap_or_default();
-        slots.push(escape, FREQUENCY_TOTAL.wrapping_sub(escape));
         let beyond = distance.unsigned_abs().saturating_sub(self.reach().unsigned_abs()).saturating_sub(1);
         let near = beyond.saturating_mul(2).saturating_add(u32::from(distance < 0));
         match u8::try_from(near) {
@@ -127,13 +166,35 @@ impl NormalModel {
     }
 
     /// D: symbols farther than this from the centre are escaped.
+    #[inline]
     fn reach(&self) -> i32 {
-        (self.ends.len() >> 1) as i32
+        self.scale.reach.into()
     }
 
-    #[inline]
-    fn end_before(&self, index: usize) -> u16 {
-        index.checked_sub(1).and_then(|before| self.ends.get(before)).copied().unwrap_or_default()
+    /// Bound `index` of the table.
+    #[inline(always)]
+    fn bound(&self, index: u32) -> u32 {
+        const LAST: u32 = NORMAL_WINDOW as u32 - 1;
+        self.bounds.get((index & LAST) as usize).map_or(0, |&bound| bound.into())
+    }
+
+    /// Entry, start and frequency of the slot that contains `quantile`; the entry after the last is the escape.
+    ///
+    /// Walks from the short cut of the quantile's piece: one to three steps, whatever the scale.
+    #[inline(always)]
+    fn find(&self, quantile: u32) -> (u32, u32, u32) {
+        const PIECE_BITS: u32 = PRECISION_BITS - N_NORMAL_SHORT_CUTS.ilog2();
+        let mut entry = self.scale.short_cuts.get((quantile >> PIECE_BITS) as usize).map_or(0, |&entry| entry.into());
+        let mut start = self.bound(entry);
+        loop {
+            let next = entry.wrapping_add(1);
+            let end = self.bound(next);
+            // The last bound is beyond every quantile.
+            if quantile < end {
+                return (entry, start, end.wrapping_sub(start));
+            }
+            (entry, start) = (next, end);
+        }
     }
 }
 
@@ -141,31 +202,12 @@ impl SymbolModel for NormalModel {
     /// Distance from the centre, in the table's orientation; `None` is the escape.
     type Symbol = Option<i32>;
 
-    /// Searches from the middle outwards, where most symbols are: about 0.8·σ steps.
     #[inline]
     fn slot(&self, quantile: u16) -> Slot<Option<i32>> {
-        let middle = self.ends.len() >> 1;
-        let mut index = middle;
-        let mut start = self.end_before(index);
-        if quantile < start {
-            // Some entry holds the quantile, at the latest the first, which begins at 0.
-            while quantile < start {
-                index = index.wrapping_sub(1);
-                start = self.end_before(index);
-            }
-            let end = self.ends.get(index).copied().unwrap_or(FREQUENCY_TOTAL);
-            let distance = index.wrapping_sub(middle) as i32;
-            return Slot { symbol: Some(distance), start, frequency: end.wrapping_sub(start) };
-        }
-        for &end in self.ends.get(index..).unwrap_or_default() {
-            if quantile < end {
-                let distance = index.wrapping_sub(middle) as i32;
-                return Slot { symbol: Some(distance), start, frequency: end.wrapping_sub(start) };
-            }
-            start = end;
-            index = index.wrapping_add(1);
-        }
-        Slot { symbol: None, start, frequency: FREQUENCY_TOTAL.wrapping_sub(start) }
+        let (entry, start, frequency) = self.find(quantile.into());
+        let distance = (entry as i32).wrapping_sub(self.reach());
+        let symbol = (distance <= self.reach()).then_some(distance);
+        Slot { symbol, start: start as u16, frequency: frequency as u16 }
     }
 }
 
@@ -202,8 +244,7 @@ mod tests {
                 let slot = model.slot(start);
                 assert_eq!((slot.start, slot.frequency), (start, frequency), "{symbol} under {model:?}");
                 if let Some(distance) = slot.symbol {
-                    let signed = if model.mirrored { -distance } else { distance };
-                    assert_eq!(model.centre + signed, symbol.into(), "{model:?}");
+                    assert_eq!(model.centre + model.signed(distance), symbol.into(), "{model:?}");
                     assert_eq!(slots.as_slice().len(), 1);
                 }
             }
@@ -261,8 +302,19 @@ mod tests {
 
     #[test]
     fn the_format_names_the_checksum_of_the_tables() {
-        let bytes: std::vec::Vec<u8> = ENDS.iter().flat_map(|end| end.to_le_bytes()).collect();
-        let crc = std::format!("they have the CRC {:#010X}.", crate::bundle::crc32(&bytes));
+        let tables = &BOUNDS[..BOUNDS.len() - NORMAL_WINDOW];
+        let bytes: std::vec::Vec<u8> = tables.iter().flat_map(|bound| bound.to_le_bytes()).collect();
+        let crc = std::format!("the CRC {:#010X}.", crate::bundle::crc32(&bytes));
         assert!(include_str!("../bundle/FORMAT.md").contains(&crc.replace("0X", "0x")), "{crc}");
+    }
+
+    #[test]
+    fn short_cuts_never_lead_beyond_a_quantile() {
+        for model in models() {
+            for quantile in 0..u32::from(FREQUENCY_TOTAL) {
+                let (_, start, frequency) = model.find(quantile);
+                assert!(start <= quantile && quantile < start + frequency, "{quantile} of {model:?}");
+            }
+        }
     }
 }

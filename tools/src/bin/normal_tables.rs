@@ -7,7 +7,9 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use anyhow::{Result, bail};
-use pocketsplat_core::entropy::{FREQUENCY_TOTAL, N_PHASES, N_SCALES, SCALE_ONE};
+use pocketsplat_core::entropy::{
+    EIGHTHS, FREQUENCY_TOTAL, N_NORMAL_SHORT_CUTS, N_PHASES, N_SCALES, NORMAL_WINDOW, SCALE_ONE,
+};
 
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../decoder-core/src/entropy/normal_tables.rs");
 
@@ -23,28 +25,65 @@ fn main() -> Result<()> {
 }
 
 fn source() -> String {
-    let (mut reach, mut first, mut ends) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut scales, mut all_bounds) = (String::new(), Vec::new());
     for scale in 0..N_SCALES {
         let sigma = 2f64.powf((scale as f64 - f64::from(SCALE_ONE)) / 8.0);
-        let farthest = (4.0 * sigma).ceil() as i32 + 2;
-        reach.push(farthest as usize);
-        first.push(ends.len());
-        for phase in 0..N_PHASES {
-            let mut sum = 0;
-            ends.extend(frequencies(phase as f64 / 8.0, sigma, farthest).into_iter().map(|frequency| {
-                sum += frequency;
-                sum
-            }));
+        let reach = (4.0 * sigma).ceil() as i32 + 2;
+        let tables = (0..N_PHASES).map(|phase| bounds(&frequencies(phase as f64 / 8.0, sigma, reach)));
+        let tables: Vec<Vec<usize>> = tables.collect();
+        let table_of = |delta: i32| all_bounds.len() + delta.unsigned_abs() as usize * (2 * reach as usize + 3);
+        let first: Vec<usize> = (-EIGHTHS / 2..EIGHTHS / 2).map(table_of).collect();
+        let short_cuts = short_cuts(&tables);
+        let _ = write!(scales, "\n    Scale {{ first: {first:?}, reach: {reach}, short_cuts: {short_cuts:?} }},");
+        all_bounds.extend(tables.concat());
+    }
+    // A decoder looks at as many from the start of any table.
+    all_bounds.extend([usize::from(FREQUENCY_TOTAL); NORMAL_WINDOW]);
+    let mut text = String::from(
+        "//! Tables of [`normal`](super::normal), written by `cargo run -p tools --bin normal_tables -- --write`.
+
+use super::normal::{N_SCALES, Scale};
+
+/// Of each scale where its tables begin in [`BOUNDS`], how far they reach, and short cuts into them.
+#[rustfmt::skip]
+pub(super) static SCALES: [Scale; N_SCALES] = [",
+    );
+    text.push_str(&scales);
+    let _ = write!(
+        text,
+        "\n];
+
+/// Per scale and phase `[2D + 3]` where each entry begins, where the escape begins, and where it ends; padding at the end.
+#[rustfmt::skip]
+pub(super) static BOUNDS: [u16; {}] = [",
+        all_bounds.len()
+    );
+    for row in all_bounds.chunks(20) {
+        text.push_str("\n   ");
+        for bound in row {
+            let _ = write!(text, " {bound},");
         }
     }
-    let mut text = String::from(
-        "//! Tables of [`normal`](super::normal), written by `cargo run -p tools --bin normal_tables -- --write`.\n",
-    );
-    array(&mut text, "`[scale]` D, the farthest symbol that has an entry.", "REACH: [u8; N_SCALES]", &reach);
-    array(&mut text, "`[scale]` where its tables begin in [`ENDS`].", "FIRST: [u16; N_SCALES]", &first);
-    let name = format!("ENDS: [u16; {}]", ends.len());
-    array(&mut text, "Per scale and phase `[2D + 1]` sums of frequencies.", &name, &ends);
-    text.replacen("\n\n", "\n\nuse super::normal::N_SCALES;\n\n", 1)
+    text.push_str("\n];\n");
+    text
+}
+
+/// Where each entry begins, where the escape begins, and where it ends.
+fn bounds(frequencies: &[usize]) -> Vec<usize> {
+    let ends = frequencies.iter().scan(0, |sum, frequency| {
+        *sum += frequency;
+        Some(*sum)
+    });
+    [0].into_iter().chain(ends).chain([FREQUENCY_TOTAL.into()]).collect()
+}
+
+/// For each piece of the range the last entry that begins at or before the piece's start in all tables.
+fn short_cuts(tables: &[Vec<usize>]) -> [usize; N_NORMAL_SHORT_CUTS] {
+    std::array::from_fn(|piece| {
+        let start = piece * usize::from(FREQUENCY_TOTAL) / N_NORMAL_SHORT_CUTS;
+        let entry = |bounds: &Vec<usize>| bounds.partition_point(|&bound| bound <= start) - 1;
+        tables.iter().map(entry).min().unwrap_or_default()
+    })
 }
 
 /// The frequencies of −D..=D: masses scaled so that, rounded and at least 1 each, they and the escape fill the range.
@@ -72,15 +111,4 @@ fn frequencies(mean: f64, sigma: f64, farthest: i32) -> Vec<usize> {
     frequencies[largest] += left_over;
     frequencies.pop();
     frequencies
-}
-
-fn array(text: &mut String, doc: &str, name: &str, values: &[usize]) {
-    let _ = write!(text, "\n/// {doc}\n#[rustfmt::skip]\npub(super) static {name} = [");
-    for row in values.chunks(20) {
-        text.push_str("\n   ");
-        for value in row {
-            let _ = write!(text, " {value},");
-        }
-    }
-    text.push_str("\n];\n");
 }

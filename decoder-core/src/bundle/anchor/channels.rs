@@ -2,7 +2,7 @@
 
 use super::AnchorSite;
 use crate::bundle::tables::IndexedTables;
-use crate::context::Context;
+use crate::context::{Context, Group, GroupStep};
 use crate::entropy::AnsReader;
 
 /// The models of the channels.
@@ -29,6 +29,9 @@ pub(super) trait Channel: Copy {
 
     /// From a symbol, an i16, and the origin and the step of its values.
     fn from_symbol(symbol: i32, origin: f32, step: f32) -> Self;
+
+    /// The same for values without an origin.
+    fn from_scaled(symbol: i32, step: f32) -> Self;
 }
 
 impl Channel for i16 {
@@ -36,6 +39,11 @@ impl Channel for i16 {
 
     #[inline(always)]
     fn from_symbol(symbol: i32, _origin: f32, _step: f32) -> Self {
+        symbol as Self
+    }
+
+    #[inline(always)]
+    fn from_scaled(symbol: i32, _step: f32) -> Self {
         symbol as Self
     }
 }
@@ -46,6 +54,11 @@ impl Channel for f32 {
     #[inline(always)]
     fn from_symbol(symbol: i32, origin: f32, step: f32) -> Self {
         origin + symbol as Self * step
+    }
+
+    #[inline(always)]
+    fn from_scaled(symbol: i32, step: f32) -> Self {
+        symbol as Self * step
     }
 }
 
@@ -70,6 +83,7 @@ impl<'b> ChannelModels<'b, '_> {
 }
 
 /// Fills scalars and offsets with symbols of tables.
+// On its own it gets the registers that it needs.
 #[inline(never)]
 fn read_static<'b, T: Channel>(
     tables: IndexedTables<'b, '_>,
@@ -103,40 +117,119 @@ fn read_static<'b, T: Channel>(
     symbols
 }
 
+/// Channels whose models are computed before their symbols are read: few enough for the stack, a multiple of three.
+const BLOCK: usize = 24;
+
+/// The outputs of the network for the channels of a block.
+struct Block {
+    means: [i16; BLOCK],
+    scales: [i16; BLOCK],
+    len: usize,
+}
+
 impl<'b> ContextModels<'b, '_> {
     /// Fills scalars and offsets with symbols of models that follow from the anchor's place.
-    #[inline(never)]
     fn read<T: Channel>(
         &mut self,
         site: AnchorSite,
-        symbols: AnsReader<'b>,
+        mut symbols: AnsReader<'b>,
         scalars: &mut [T],
         offsets: &mut [[T; 3]],
     ) -> AnsReader<'b> {
-        // As above.
-        let mut symbols = symbols;
         let Self { context, features, hidden } = self;
         context.features(site.lattice, features);
         context.hidden(features, hidden);
         let steps = context.steps(hidden);
-        let first_offset = scalars.len();
-        let mut read = |slot: &mut T, channel: usize| {
-            let symbol = context.model(channel, &steps, hidden).symbol(&mut symbols);
-            *slot = T::from_symbol(symbol.into(), 0.0, steps.value(context.group(channel)));
-        };
-        for (channel, slot) in scalars.iter_mut().enumerate() {
-            read(slot, channel);
-        }
-        let mut mask = site.mask;
-        for (offset, first) in offsets.iter_mut().zip((first_offset..).step_by(3)) {
-            *offset = [T::UNDRAWN; 3];
-            if mask & 1 == 1 {
-                for (slot, channel) in offset.iter_mut().zip(first..) {
-                    read(slot, channel);
-                }
+        let mut block = Block { means: [0; BLOCK], scales: [0; BLOCK], len: 0 };
+        let n_scalars = scalars.len();
+        let (feature, log_scales) = scalars.split_at_mut_checked(context.feature_dim()).unwrap_or_default();
+        let mut first = 0_usize;
+        for (group, slots) in [(Group::Feature, feature), (Group::LogScale, log_scales)] {
+            for slots in slots.chunks_mut(BLOCK) {
+                block.push(context, hidden, first, slots.len());
+                symbols = block.read(&steps.of(group), symbols, slots);
+                first = first.saturating_add(slots.len());
             }
-            mask >>= 1;
+        }
+        // Those drawn are read side by side, so that they fill blocks, and then go to their places.
+        let mut slots = offsets.as_flattened_mut();
+        let step = steps.of(Group::Offset);
+        let mut mask = site.mask;
+        while mask != 0 {
+            let offset = (mask.trailing_zeros() as usize).saturating_mul(3);
+            mask &= mask.wrapping_sub(1);
+            block.push(context, hidden, n_scalars.saturating_add(offset), 3);
+            if block.len == BLOCK || mask == 0 {
+                let Some((now, later)) = slots.split_at_mut_checked(block.len) else { break };
+                symbols = block.read(&step, symbols, now);
+                slots = later;
+            }
+        }
+        spread(offsets, site.mask);
+        symbols
+    }
+}
+
+impl Block {
+    /// Adds `len` channels from `first` on.
+    fn push(&mut self, context: &Context<'_>, hidden: &[i16], first: usize, len: usize) {
+        let end = self.len.saturating_add(len);
+        let (Some(means), Some(scales)) = (self.means.get_mut(self.len..end), self.scales.get_mut(self.len..end))
+        else {
+            return;
+        };
+        context.means(first, hidden, means);
+        context.scales(first, hidden, scales);
+        self.len = end;
+    }
+
+    /// Fills `slots` with the block's symbols and empties it.
+    // On its own it gets the registers that it needs.
+    #[inline(never)]
+    fn read<'b, T: Channel>(&mut self, step: &GroupStep, symbols: AnsReader<'b>, slots: &mut [T]) -> AnsReader<'b> {
+        self.len = 0;
+        let (step, mut symbols) = (*step, symbols);
+        for (slot, (&mean, &scale)) in slots.iter_mut().zip(self.means.iter().zip(&self.scales)) {
+            let symbol = step.model(mean, scale).wide_symbol(&mut symbols);
+            *slot = T::from_scaled(symbol, step.value);
         }
         symbols
+    }
+}
+
+/// Moves the offsets at the front to the places that `mask` has for them.
+fn spread<T: Channel>(offsets: &mut [[T; 3]], mask: u32) {
+    let mut n_left = mask.count_ones() as usize;
+    for place in (0..offsets.len()).rev() {
+        // Offsets 0 to `place` are all drawn, and in their places.
+        if n_left > place {
+            return;
+        }
+        let drawn = mask.wrapping_shr(place as u32) & 1 == 1;
+        n_left = n_left.saturating_sub(drawn.into());
+        let offset = if drawn { offsets.get(n_left).copied() } else { None };
+        if let Some(slot) = offsets.get_mut(place) {
+            *slot = offset.unwrap_or([T::UNDRAWN; 3]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::spread;
+
+    #[test]
+    fn offsets_go_to_the_places_of_the_mask() {
+        for mask in 0..1_u32 << 7 {
+            let mut offsets: [[i16; 3]; 7] = std::array::from_fn(|i| [i as i16 + 1; 3]);
+            spread(&mut offsets, mask);
+            let mut n = 0;
+            let expected: [[i16; 3]; 7] = std::array::from_fn(|k| {
+                let drawn = (mask >> k & 1) as i16;
+                n += drawn;
+                [drawn * n; 3]
+            });
+            assert_eq!(offsets, expected, "mask {mask:07b}");
+        }
     }
 }

@@ -1,5 +1,6 @@
 //! The decoder draws what the f64 oracle draws, up to f32 and the rounding to 8 bits.
 
+use conformance::bundles::{CODERS, tiered};
 use conformance::difference::Difference;
 use conformance::frame::{bundle_of, draw, to_core};
 use conformance::scenes::{CASES, cameras, random_scene};
@@ -16,34 +17,40 @@ const MAX_WORST_STEPS: f64 = 1.5;
 const MAX_SHARE_NOT_ROUNDED: f64 = 1e-3;
 
 #[test]
-fn every_case_and_camera_is_within_rounding_of_the_oracle() {
+fn every_case_coder_and_camera_is_within_rounding_of_the_oracle() {
     let mut failures = Vec::new();
     for case in CASES {
-        let scene = random_scene(&case);
-        let cameras = cameras();
-        let bytes = bundle_of(&scene, &cameras[0].1);
-        let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
-        let oracle = ReferenceScene::from_bundle(&bundle).expect("its chunks decode");
-        assert_eq!(oracle.positions.len(), case.n_anchors, "anchors of case {}", case.name);
-        let background = bundle.header().background.map(|byte| f64::from(byte) / 255.0);
-        for (view, camera) in &cameras {
-            // The oracle draws with the decoder's camera, rounded as it is.
-            let camera = to_core(camera);
-            let (frame, report) = draw(&bundle, &camera).expect("the worst case is planned for");
-            let expected = oracle.render(&host_camera(&camera), background);
-            let difference = Difference::of(&frame.rgb, &expected, frame.width_px);
-            println!("{:>11} {view:<10} {:>5} splats: {difference}", case.name, report.splats);
-            let empty = expected.iter().all(|&colour| colour == background);
-            assert_eq!(empty, *view == "away", "case {}: only the camera that looks away sees nothing", case.name);
-            // One pixel's PSNR is as good as its luck in rounding.
-            let too_noisy = frame.deliveries.len() > 100 && difference.psnr_db() < MIN_PSNR_DB;
-            if too_noisy
-                || difference.worst_steps > MAX_WORST_STEPS
-                || difference.share_not_rounded > MAX_SHARE_NOT_ROUNDED
-            {
-                failures.push(format!("{} {view}: {difference}", case.name));
-            }
+        let plain = bundle_of(&random_scene(&case), &cameras()[0].1);
+        let tiered = CODERS.map(|coder| (format!("{} {coder:?}", case.name), tiered(&case, coder, 64)));
+        for (name, bytes) in [(case.name.to_owned(), plain)].into_iter().chain(tiered) {
+            let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
+            let oracle = ReferenceScene::from_bundle(&bundle).expect("its chunks decode");
+            assert_eq!(oracle.positions.len(), bundle.n_anchors() as usize, "anchors of case {name}");
+            failures.extend(beyond_rounding(&bundle, &oracle, &name));
         }
     }
     assert!(failures.is_empty(), "beyond the bounds:\n{}", failures.join("\n"));
+}
+
+/// The cameras from which the two differ by more than rounding.
+fn beyond_rounding(bundle: &Bundle<'_>, oracle: &ReferenceScene, name: &str) -> Vec<String> {
+    let mut failures = Vec::new();
+    let background = bundle.header().background.map(|byte| f64::from(byte) / 255.0);
+    for (view, camera) in cameras() {
+        // The oracle draws with the decoder's camera, rounded as it is.
+        let camera = to_core(&camera);
+        let (frame, report) = draw(bundle, &camera).expect("the worst case is planned for");
+        let expected = oracle.render(&host_camera(&camera), background);
+        let difference = Difference::of(&frame.rgb, &expected, frame.width_px);
+        println!("{name:>19} {view:<10} {:>5} splats: {difference}", report.splats);
+        let empty = expected.iter().all(|&colour| colour == background);
+        assert_eq!(empty, view == "away", "case {name}: only the camera that looks away sees nothing");
+        // One pixel's PSNR is as good as its luck in rounding.
+        let too_noisy = frame.deliveries.len() > 100 && difference.psnr_db() < MIN_PSNR_DB;
+        if too_noisy || difference.worst_steps > MAX_WORST_STEPS || difference.share_not_rounded > MAX_SHARE_NOT_ROUNDED
+        {
+            failures.push(format!("{name} {view}: {difference}"));
+        }
+    }
+    failures
 }

@@ -8,6 +8,7 @@ use pocketsplat::render::decoder::core_image;
 use pocketsplat::render::reference::ReferenceScene;
 use pocketsplat::synth::{SynthOptions, write_capture};
 use pocketsplat::train::TrainConfig;
+use pocketsplat::train::config::Backbone;
 
 use super::bundle::BundleFile;
 use super::capture::{CaptureArgs, CaptureOptions, Split};
@@ -47,7 +48,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 
     eprintln!("2 of 4  training {} steps", args.iterations);
     let capture_args = CaptureArgs { dataset: capture_folder, options: CaptureOptions::default() };
-    let config = TrainConfig { iterations: args.iterations, ..TrainConfig::default() };
+    let config = TrainConfig { iterations: args.iterations, ..TrainConfig::of(Backbone::Hac) };
     let bundle_path = folder.join("scene.psb");
     let capture = capture_args.load(config.seed)?;
     let trained = train::train(&capture, Background::Black, config, &Encoding::default(), &bundle_path)?;

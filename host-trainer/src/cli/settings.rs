@@ -39,7 +39,7 @@ pub(crate) struct Settings {
     #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true",
         action = ArgAction::Set)]
     no_view_direction: Option<bool>,
-    /// Show the heads the distance of view. [default: false, with `--backbone hac` true]
+    /// Show the heads the distance of view.
     #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true",
         action = ArgAction::Set)]
     view_distance: Option<bool>,

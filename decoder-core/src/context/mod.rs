@@ -178,10 +178,7 @@ impl<'a> Context<'a> {
     #[inline(always)]
     #[must_use]
     pub fn output(&self, row: usize, hidden: &[i16]) -> i16 {
-        let mut output = [0];
-        self.output.limited(row, hidden, &mut output);
-        let [output] = output;
-        output
+        self.output.limited(row, hidden)
     }
 
     /// The anchor's quantisation steps.
@@ -204,16 +201,10 @@ impl<'a> Context<'a> {
         steps.of(self.group(channel)).model(mean, scale)
     }
 
-    /// Means of the channels from `first` on, in 1/[`MEAN_PARTS`] of a base step.
+    /// Mean and scale of each channel from `first` on, in 1/[`MEAN_PARTS`] of a base step and in eighths of an octave of one.
     #[inline]
-    pub(crate) fn means(&self, first: usize, hidden: &[i16], means: &mut [i16]) {
-        self.output.limited(first, hidden, means);
-    }
-
-    /// Scales of the channels from `first` on, in eighths of an octave of a base step.
-    #[inline]
-    pub(crate) fn scales(&self, first: usize, hidden: &[i16], scales: &mut [i16]) {
-        self.output.limited(first.saturating_add(self.n_channels), hidden, scales);
+    pub(crate) fn moments(&self, first: usize, hidden: &[i16], moments: &mut [[i16; 2]]) {
+        self.output.pairs(first, first.saturating_add(self.n_channels), hidden, moments);
     }
 
     fn row_bits(&self, row: u32) -> u8 {

@@ -118,12 +118,11 @@ fn read_static<'b, T: Channel>(
 }
 
 /// Channels whose models are computed before their symbols are read: few enough for the stack, a multiple of three.
-const BLOCK: usize = 24;
+const BLOCK: usize = 63;
 
-/// The outputs of the network for the channels of a block.
+/// Mean and scale of each channel of a block.
 struct Block {
-    means: [i16; BLOCK],
-    scales: [i16; BLOCK],
+    moments: [[i16; 2]; BLOCK],
     len: usize,
 }
 
@@ -140,7 +139,7 @@ impl<'b> ContextModels<'b, '_> {
         context.features(site.lattice, features);
         context.hidden(features, hidden);
         let steps = context.steps(hidden);
-        let mut block = Block { means: [0; BLOCK], scales: [0; BLOCK], len: 0 };
+        let mut block = Block { moments: [[0; 2]; BLOCK], len: 0 };
         let n_scalars = scalars.len();
         let (feature, log_scales) = scalars.split_at_mut_checked(context.feature_dim()).unwrap_or_default();
         let mut first = 0_usize;
@@ -174,13 +173,10 @@ impl Block {
     /// Adds `len` channels from `first` on.
     fn push(&mut self, context: &Context<'_>, hidden: &[i16], first: usize, len: usize) {
         let end = self.len.saturating_add(len);
-        let (Some(means), Some(scales)) = (self.means.get_mut(self.len..end), self.scales.get_mut(self.len..end))
-        else {
-            return;
-        };
-        context.means(first, hidden, means);
-        context.scales(first, hidden, scales);
-        self.len = end;
+        if let Some(moments) = self.moments.get_mut(self.len..end) {
+            context.moments(first, hidden, moments);
+            self.len = end;
+        }
     }
 
     /// Fills `slots` with the block's symbols and empties it.
@@ -189,7 +185,7 @@ impl Block {
     fn read<'b, T: Channel>(&mut self, step: &GroupStep, symbols: AnsReader<'b>, slots: &mut [T]) -> AnsReader<'b> {
         self.len = 0;
         let (step, mut symbols) = (*step, symbols);
-        for (slot, (&mean, &scale)) in slots.iter_mut().zip(self.means.iter().zip(&self.scales)) {
+        for (slot, &[mean, scale]) in slots.iter_mut().zip(&self.moments) {
             let symbol = step.model(mean, scale).wide_symbol(&mut symbols);
             *slot = T::from_scaled(symbol, step.value);
         }

@@ -1,6 +1,5 @@
 //! Header, sections and their checksums, in file order.
 
-use half::f16;
 use pocketsplat_core::bundle::{
     Effects, Features, HEADER_FIXED_LEN, MAGIC, MAX_ANCHORS, MAX_CHUNK_ANCHORS, MAX_FEATURE_DIM, MAX_OFFSETS,
     SECTION_LEN, VERSION, crc32, header_len,
@@ -8,7 +7,7 @@ use pocketsplat_core::bundle::{
 
 use super::{BundleInfo, WriteError};
 use crate::render::decoder::core_camera;
-use crate::scene::{Heads, Scene};
+use crate::scene::Scene;
 
 /// A section of the file; the numbers are the format's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -113,21 +112,6 @@ fn push_fields(
     bytes.extend(floats.flat_map(|x| x.to_le_bytes()));
     bytes.extend([preview.width_px, preview.height_px].iter().flat_map(|x| x.to_le_bytes()));
     Ok(())
-}
-
-/// The weights of the heads as halves.
-pub(super) fn heads_section(heads: &Heads<f32>) -> Result<Vec<u8>, WriteError> {
-    let mut bytes = Vec::new();
-    for (head, name) in heads.each().into_iter().zip(["opacity", "covariance", "colour"]) {
-        for (index, &value) in head.groups().into_iter().flatten().enumerate() {
-            let weight = f16::from_f32(value);
-            if !weight.is_finite() {
-                return Err(WriteError::Weight { head: name, index, value });
-            }
-            bytes.extend(weight.to_le_bytes());
-        }
-    }
-    Ok(bytes)
 }
 
 fn count(what: &'static str, found: usize, least: usize, most: usize) -> Result<usize, WriteError> {

@@ -61,7 +61,7 @@ pub fn measure(bundle: &Bundle<'_>, cameras: &[Camera], held_out: &[View]) -> Re
     let mut maxima = vec![TierCounts::default(); ends.len()];
     for camera in cameras {
         workspace.image(&scene, &Pinhole::new(camera), background);
-        let counts = frame::count(&scene, workspace.blocks(), &ends, camera);
+        let counts = frame::count(&scene.shape, workspace.blocks(), &ends, camera);
         for (most, counts) in maxima.iter_mut().zip(counts) {
             most.raise_to(&counts);
         }

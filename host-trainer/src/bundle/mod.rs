@@ -13,6 +13,7 @@ mod decoded;
 mod directory;
 mod error;
 mod frequencies;
+mod heads;
 mod ink;
 mod lattice;
 mod layout;

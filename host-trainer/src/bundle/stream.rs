@@ -70,15 +70,19 @@ pub(super) struct SlotList {
 }
 
 impl SlotList {
-    /// Appends a slot; its frequency is at least 1.
+    /// Appends a slot of a chunk; its frequency is at least 1.
     pub(super) fn push<S>(&mut self, part: Part, slot: &Slot<S>) {
-        debug_assert!(slot.frequency > 0, "a slot that can not be coded: {part:?}");
-        // What is certain changes no state and takes no bits.
-        if slot.frequency >= FREQUENCY_TOTAL {
-            return;
-        }
-        self.slots.push(FixedSlot { start: slot.start, frequency: slot.frequency });
+        self.append(slot);
         *self.bits.of(part) += f64::from(FREQUENCY_TOTAL).log2() - f64::from(slot.frequency).log2();
+    }
+
+    /// Appends a slot without counting its bits.
+    pub(super) fn append<S>(&mut self, slot: &Slot<S>) {
+        debug_assert!(slot.frequency > 0, "a slot that can not be coded");
+        // What is certain changes no state and takes no bits.
+        if slot.frequency < FREQUENCY_TOTAL {
+            self.slots.push(FixedSlot { start: slot.start, frequency: slot.frequency });
+        }
     }
 
     /// Start and frequency of each slot that takes bits.

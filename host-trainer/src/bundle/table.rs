@@ -85,13 +85,7 @@ impl TableSet {
             bytes.extend((offset as u32).to_le_bytes());
             offset += 12 + 2 * table.bounds.len();
         }
-        for table in &self.tables {
-            // The origin is 0: symbol 0 is the value 0, and channels of equal step can share a table.
-            bytes.extend([0.0, table.step].iter().flat_map(|x| x.to_le_bytes()));
-            bytes.extend(table.min_symbol.to_le_bytes());
-            bytes.extend(u16_bytes(table.n_symbols()));
-            bytes.extend(table.bounds.iter().flat_map(|bound| bound.to_le_bytes()));
-        }
+        bytes.extend(self.tables.iter().flat_map(TableDraft::record));
         bytes
     }
 }

@@ -4,6 +4,7 @@ mod culling;
 mod damage;
 mod entropy;
 mod figures;
+mod heads;
 mod measures;
 mod round_trip;
 mod tiers;

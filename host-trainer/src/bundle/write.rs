@@ -14,7 +14,7 @@ use super::mask::MaskModel;
 use super::order::Placement;
 use super::quantise::{Rows, StepSource, check_lengths, quantise};
 use super::table::TableSet;
-use super::{BundleInfo, QuantisationSteps, SizeReport, WriteError, context, directory, manifest};
+use super::{BundleInfo, QuantisationSteps, SizeReport, WriteError, context, directory, heads, manifest};
 use crate::scene::Scene;
 
 /// What gives the symbols of the channels their frequencies.
@@ -41,6 +41,9 @@ pub struct WriteOptions {
     pub importance: Option<Vec<f32>>,
     /// Pruning rates of the tiers, falling to 0: the share of anchors that the scene of tiers up to each one lacks.
     pub pruning_rates: Vec<f32>,
+    /// Bits of the fraction of the heads' weights, those of W1 and of W2, where coding them saves a tenth of their bytes;
+    /// without it they stay halves. Nine cost no more than 0.01 dB and save a fifth to a third (`docs/benchmarks.md`).
+    pub head_fraction_bits: Option<[u8; 2]>,
     /// Anchors of a chunk at most: neighbours enough to pay for its record, few enough to skip.
     pub chunk_anchors: u16,
 }
@@ -52,6 +55,7 @@ impl Default for WriteOptions {
             coder: Coder::Auto,
             importance: None,
             pruning_rates: vec![0.40, 0.30, 0.20, 0.10, 0.05, 0.0],
+            head_fraction_bits: Some([9, 9]),
             chunk_anchors: 256,
         }
     }
@@ -77,7 +81,7 @@ pub fn write(scene: &Scene<f32>, info: &BundleInfo, options: &WriteOptions) -> R
     check_lengths(scene)?;
     let n_chunk = usize::from(options.chunk_anchors).max(1);
     let placement = Placement::of(scene, options.importance.as_deref(), &options.pruning_rates, n_chunk)?;
-    let writer = Writer { scene, info, placement, chunk_anchors: options.chunk_anchors };
+    let writer = Writer { scene, info, placement, options };
     let bytes = match (&scene.context, options.coder) {
         (None, Coder::Context) => return Err(WriteError::NoContext),
         (None, Coder::Auto | Coder::Static) => {
@@ -106,7 +110,7 @@ struct Writer<'s> {
     scene: &'s Scene<f32>,
     info: &'s BundleInfo,
     placement: Placement,
-    chunk_anchors: u16,
+    options: &'s WriteOptions,
 }
 
 impl Writer<'_> {
@@ -163,16 +167,14 @@ impl Writer<'_> {
         });
         let (chunks, boxes): (Vec<Vec<u8>>, Vec<InkBox>) = coded.unzip();
         let n_tiers = placement.tier_chunks.len();
-        let mut sections = vec![
-            (SectionCode::Heads, layout::heads_section(&self.scene.heads)?),
-            (SectionCode::Lattice, models.lattice.section()),
-        ];
+        let heads = heads::section(&self.scene.heads, self.options.head_fraction_bits)?;
+        let mut sections = vec![(SectionCode::Heads, heads.bytes), (SectionCode::Lattice, models.lattice.section())];
         sections.extend(models.masks.as_ref().map(|masks| (SectionCode::Masks, masks.section())));
         let features = Features {
             effects: layout::effects(self.scene),
             masks: models.masks.is_some(),
             context: coder_section.0 == SectionCode::Context,
-            ..Features::default()
+            coded_heads: heads.is_coded,
         };
         sections.extend([
             coder_section,
@@ -184,7 +186,7 @@ impl Writer<'_> {
             features,
             n_anchors: placement.order.len(),
             n_chunks: placement.chunks.len(),
-            max_chunk_anchors: self.chunk_anchors,
+            max_chunk_anchors: self.options.chunk_anchors,
             n_tiers,
         };
         layout::assemble(self.scene, self.info, &counts, &sections)

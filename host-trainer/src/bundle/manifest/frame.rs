@@ -3,10 +3,9 @@
 use pocketsplat_core::bundle::TierMeasures;
 
 use crate::camera::Camera;
-use crate::ops::neural_gaussians::Source;
 use crate::ops::project::{ALPHA_CUTOFF, Footprint, Splat};
 use crate::ops::tiles::TILE_PX;
-use crate::scene::{ModelShape, Scene};
+use crate::scene::ModelShape;
 use crate::train::step::Block;
 
 /// Numbers of horizontal strips that a frame is cut into.
@@ -83,17 +82,13 @@ struct Added {
 /// Counts a frame just drawn: those of the scene up to each tier.
 ///
 /// * `ends`: `[n_tiers]` anchors up to and with each tier; the anchors of `blocks` are in file order.
-pub(super) fn count(scene: &Scene<f32>, blocks: &[Block<f32>], ends: &[u32], camera: &Camera) -> Vec<TierCounts> {
-    let k = scene.shape.n_offsets;
+pub(super) fn count(shape: &ModelShape, blocks: &[Block<f32>], ends: &[u32], camera: &Camera) -> Vec<TierCounts> {
     let mut added = vec![Added::default(); ends.len()];
     let tier_of = |anchor: u32| ends.partition_point(|end| *end <= anchor).min(ends.len() - 1);
     let size_px = [camera.width_px, camera.height_px];
     for block in blocks {
-        let is_drawn = |source: &Source| {
-            scene.anchors.is_drawn(block.anchors[source.row as usize] as usize * k + source.offset as usize)
-        };
         let mut open = vec![false; block.anchors.len()];
-        for source in block.sources.iter().filter(|source| is_drawn(source)) {
+        for source in &block.sources {
             open[source.row as usize] = true;
             added[tier_of(block.anchors[source.row as usize])].gaussians += 1;
         }
@@ -103,14 +98,12 @@ pub(super) fn count(scene: &Scene<f32>, blocks: &[Block<f32>], ends: &[u32], cam
             tier.open_anchors += u64::from(open);
         }
         for ((drawn, splat), footprint) in block.drawn.iter().zip(&block.splats).zip(&block.footprints) {
-            let source = &block.sources[*drawn as usize];
-            if is_drawn(source) {
-                added[tier_of(block.anchors[source.row as usize])].add_splat(splat, footprint, size_px);
-            }
+            let row = block.sources[*drawn as usize].row;
+            added[tier_of(block.anchors[row as usize])].add_splat(splat, footprint, size_px);
         }
     }
     let mut sum = Added::default();
-    added.iter().map(|tier| sum.add(tier).counts(&scene.shape)).collect()
+    added.iter().map(|tier| sum.add(tier).counts(shape)).collect()
 }
 
 impl Added {

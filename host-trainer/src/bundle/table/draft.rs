@@ -31,6 +31,21 @@ impl TableDraft {
         Self { step, min_symbol, bounds }
     }
 
+    /// The table for `symbols`.
+    pub(in crate::bundle) fn of(step: f32, symbols: impl Iterator<Item = i16>) -> Self {
+        Self::new(step, &Histogram::count(symbols))
+    }
+
+    /// Its bytes in the file.
+    pub(in crate::bundle) fn record(&self) -> Vec<u8> {
+        // The origin is 0: symbol 0 is the value 0, and channels of equal step can share a table.
+        let mut bytes: Vec<u8> = [0.0, self.step].iter().flat_map(|x| x.to_le_bytes()).collect();
+        bytes.extend(self.min_symbol.to_le_bytes());
+        bytes.extend((self.n_symbols() as u16).to_le_bytes());
+        bytes.extend(self.bounds.iter().flat_map(|bound| bound.to_le_bytes()));
+        bytes
+    }
+
     /// Symbols with an entry of their own.
     pub(super) fn n_symbols(&self) -> usize {
         self.bounds.len() - 2

@@ -6,10 +6,10 @@ use pocketsplat_core::context::Group;
 use super::{SMALL, camera, decoded_rows, info, options, random_scene, with_context, write_bytes, write_random};
 use crate::bundle::annotate::annotate;
 use crate::bundle::channels::ContextWork;
-use crate::bundle::{ChannelName, Coder, SizeReport, WriteError, WriteOptions, decoded_scene, write};
+use crate::bundle::{ChannelName, Coder, SizeReport, WriteError, WriteOptions, write};
 use crate::render::decoder::core_image;
 use crate::render::reference::ReferenceScene;
-use crate::scene::{Heads, ModelShape, Scene};
+use crate::scene::{ModelShape, Scene};
 
 /// Drawn offsets and symbols of the anchors that a bundle keeps, by their cells.
 type Rows = BTreeMap<[i32; 3], (u32, Vec<i16>)>;
@@ -126,18 +126,6 @@ fn without_hidden_offsets_masks_cost_nothing() {
     let report = written.report;
     assert_eq!((report.mask_model, report.ideal.masks), (0, 0.0), "{report:?}");
     assert_eq!(report.n_drawn_offsets, 300, "all of them");
-}
-
-#[test]
-fn weights_come_back_as_halves() {
-    let (scene, bytes) = write_random(Coder::Auto, SMALL, 10, 5, 128);
-    let bundle = Bundle::parse(&bytes).expect("a sound bundle");
-    let rounded = |weights: &[f32]| weights.iter().map(|&w| half::f16::from_f32(w).to_f32()).collect::<Vec<f32>>();
-    let Heads { colour, .. } = &scene.heads;
-    let decoded = decoded_scene(&bundle).expect("a sound bundle").heads.colour;
-    for (stored, trained) in decoded.groups().into_iter().zip(colour.groups()) {
-        assert_eq!(stored, rounded(trained), "colour head");
-    }
 }
 
 #[test]

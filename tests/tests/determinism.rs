@@ -4,6 +4,8 @@ use pocketsplat::bundle::{self, BundleInfo, WriteOptions};
 use pocketsplat::dataset::{Capture, LoadOptions, load};
 use pocketsplat::scene::{ModelShape, Scene};
 use pocketsplat::synth::{SynthOptions, write_capture};
+use pocketsplat::train::config::Backbone;
+use pocketsplat::train::finish::Finished;
 use pocketsplat::train::step::StepReport;
 use pocketsplat::train::{Observer, TrainConfig, Trainer};
 
@@ -24,8 +26,9 @@ fn small_capture() -> Capture {
     load(folder.path(), &LoadOptions::default()).expect("the capture loads").0
 }
 
-fn train(capture: &Capture, seed: u64, n_threads: usize) -> (Vec<u8>, Vec<usize>) {
+fn train(capture: &Capture, backbone: Backbone, seed: u64, n_threads: usize) -> (Vec<u8>, Vec<usize>) {
     let config = TrainConfig {
+        backbone,
         shape: ModelShape { feature_dim: 8, n_offsets: 3, ..TrainConfig::default().shape },
         iterations: 420,
         seed,
@@ -42,7 +45,9 @@ fn train(capture: &Capture, seed: u64, n_threads: usize) -> (Vec<u8>, Vec<usize>
             training_px: [40; 2],
             preview: capture.train[0].camera.clone(),
         };
-        let bytes = bundle::write(&trainer.scene, &info, &WriteOptions::default()).expect("the scene is finite").bytes;
+        let Finished { scene, importance, .. } = trainer.finish().expect("the context has an integer form");
+        let options = WriteOptions { importance: Some(importance), ..WriteOptions::default() };
+        let bytes = bundle::write(&scene, &info, &options).expect("the scene is finite").bytes;
         (bytes, counts.0)
     })
 }
@@ -50,13 +55,15 @@ fn train(capture: &Capture, seed: u64, n_threads: usize) -> (Vec<u8>, Vec<usize>
 #[test]
 fn threads_change_no_byte_and_the_seed_changes_many() {
     let capture = small_capture();
-    let (one, counts) = train(&capture, 7, 1);
-    let (two, _) = train(&capture, 7, 2);
-    let (three, _) = train(&capture, 7, 3);
-    assert!(one == two && one == three, "the bundle depends on the number of threads");
-    let grown = counts.windows(2).any(|n| n[1] > n[0]);
-    let pruned = counts.windows(2).any(|n| n[1] < n[0]);
-    assert!(grown || pruned, "the run must go through densification: {counts:?}");
-    let (other, _) = train(&capture, 8, 2);
-    assert!(one != other, "another seed, another scene");
+    for backbone in [Backbone::Scaffold, Backbone::Hac] {
+        let (one, counts) = train(&capture, backbone, 7, 1);
+        let (two, _) = train(&capture, backbone, 7, 2);
+        let (three, _) = train(&capture, backbone, 7, 3);
+        assert!(one == two && one == three, "the bundle depends on the number of threads");
+        let grown = counts.windows(2).any(|n| n[1] > n[0]);
+        let pruned = counts.windows(2).any(|n| n[1] < n[0]);
+        assert!(grown || pruned, "the run must go through densification: {counts:?}");
+        let (other, _) = train(&capture, backbone, 8, 2);
+        assert_ne!(one, other, "the seed must matter");
+    }
 }

@@ -49,8 +49,6 @@ impl Survey {
         for offset in 0..self.drawn.len() {
             if !self.drawn[offset] && scene.anchors.is_drawn(offset) {
                 scene.anchors.mask_logits[offset] = MASKED;
-                // A writer that knows no masks draws the Gaussian at its anchor, and codes it as the likeliest symbol.
-                scene.anchors.offsets[3 * offset..3 * offset + 3].fill(0.0);
                 n_masked += 1;
             }
         }

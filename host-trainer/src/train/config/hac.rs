@@ -5,13 +5,13 @@ use serde::{Deserialize, Serialize};
 use crate::bundle::QuantisationSteps;
 
 /// The kinds of scene that can be trained.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Backbone {
-    /// Scaffold-GS (Lu et al. 2024): anchors and three heads, trained for the image alone.
+    /// Anchors and three heads, trained for the image alone (Lu et al. 2024, Scaffold-GS).
     #[default]
     Scaffold,
-    /// HAC (Chen et al. 2024): the same, trained for image and bits, with a context model and masks.
+    /// The same, trained for image and bits, with a context model and masks (Chen et al. 2024, HAC).
     Hac,
 }
 

@@ -15,9 +15,9 @@ pub(crate) struct Head<'s, const B: usize> {
     n_hidden: usize,
 }
 
-/// The three heads. All outputs of the opacity head are needed; of the others only the blocks of visible offsets.
+/// The three heads, one block of outputs an offset: none is computed for an offset that is not drawn.
 pub(crate) struct Heads<'s> {
-    pub(crate) opacity: Head<'s, LANES>,
+    pub(crate) opacity: Head<'s, 1>,
     pub(crate) covariance: Head<'s, 7>,
     pub(crate) colour: Head<'s, 3>,
 }
@@ -25,10 +25,7 @@ pub(crate) struct Heads<'s> {
 /// Floats of all three heads in scratch memory.
 pub(crate) fn n_weights(header: &Header) -> usize {
     let [n_in, f, k] = [header.head_inputs(), header.feature_dim.into(), header.n_offsets.into()];
-    3 * LANES * n_rows::<LANES>(n_in, f)
-        + LANES * n_rows::<LANES>(f, k)
-        + 7 * n_rows::<7>(f, 7 * k)
-        + 3 * n_rows::<3>(f, 3 * k)
+    3 * LANES * n_rows::<LANES>(n_in, f) + n_rows::<1>(f, k) + 7 * n_rows::<7>(f, 7 * k) + 3 * n_rows::<3>(f, 3 * k)
 }
 
 /// Floats of the hidden layer's activations.

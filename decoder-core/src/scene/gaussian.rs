@@ -89,18 +89,16 @@ fn opacities(anchor: &Anchor<'_>, heads: &Heads<'_>, work: &mut Workspace<'_>) -
     let mut opacities = [0.0; MAX_K];
     let mut visible = 0_u32;
     let hidden = heads.opacity.activate(work.inputs, work.hidden);
-    for (block, opacities) in opacities.chunks_exact_mut(8).enumerate() {
-        let mask = anchor.mask >> (8 * block) & 0xFF;
-        if mask == 0 {
+    for (offset, opacity) in opacities.iter_mut().take(anchor.offsets.len()).enumerate() {
+        let bit = 1_u32 << (offset & 31);
+        if anchor.mask & bit == 0 {
             continue;
         }
-        let Some(logits) = heads.opacity.block(block, hidden) else { break };
-        for (lane, (opacity, logit)) in opacities.iter_mut().zip(logits).enumerate() {
-            // tanh keeps the sign and the order, so most offsets leave before it.
-            if logit > 0.0 && mask >> lane & 1 == 1 {
-                *opacity = tanh(logit);
-                visible |= u32::from(*opacity >= OPACITY_MIN) << ((block * 8 + lane) & 31);
-            }
+        let [logit] = heads.opacity.block(offset, hidden)?;
+        // tanh keeps the sign and the order, so most offsets leave before it.
+        if logit > 0.0 {
+            *opacity = tanh(logit);
+            visible |= if *opacity >= OPACITY_MIN { bit } else { 0 };
         }
     }
     (visible != 0).then_some((opacities, visible))

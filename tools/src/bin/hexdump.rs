@@ -89,7 +89,7 @@ fn with_example(text: &str, name: &str, dump: &str) -> Result<String> {
 }
 
 /// Three anchors in two tiers, one of them with a hidden offset, one with a value so far out that it takes the escape; the
-/// other example has a context model of one level and two hidden units.
+/// other example has a context model of one level and two hidden units, and coded heads.
 fn example(coder: Coder) -> Result<Vec<u8>> {
     let shape = ModelShape {
         feature_dim: 2,
@@ -99,8 +99,8 @@ fn example(coder: Coder) -> Result<Vec<u8>> {
         dilation_compensation: true,
     };
     let mut heads = Heads::filled(&shape, 0.25);
-    heads.opacity.b2[0] = 1.0;
-    heads.colour.b2[0] = 2.0;
+    (heads.opacity.w1[0], heads.covariance.w2[3]) = (0.5, -0.25);
+    (heads.opacity.b2[0], heads.colour.b2[0]) = (1.0, 2.0);
     let scene = Scene {
         shape,
         voxel_size: 0.125,
@@ -134,6 +134,7 @@ fn example(coder: Coder) -> Result<Vec<u8>> {
         coder,
         importance: Some(vec![3.0, 1.0, 2.0]),
         pruning_rates: vec![0.4, 0.0],
+        head_fraction_bits: (coder == Coder::Context).then_some([2, 2]),
         ..WriteOptions::default()
     };
     Ok(bundle::write(&scene, &info, &options).context("the example can not be written")?.bytes)

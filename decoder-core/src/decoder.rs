@@ -115,7 +115,11 @@ impl<'b, 's> Decoder<'b, 's> {
             heads: Heads::convert(&mut arena, bundle.heads())?,
             models: bundle.anchor_models(arena.take(bundle.anchor_scratch_words())?)?,
             row: arena.take(header.n_channels())?,
-            work: Workspace { inputs: arena.take(header.head_inputs())?, hidden: arena.take(mlp::hidden_len(header))? },
+            work: Workspace {
+                inputs: arena.take(header.head_inputs())?,
+                hidden: arena.take(mlp::hidden_len(header))?,
+                detail_sums: arena.take(mlp::sums_len(header))?,
+            },
             counts: arena.take(N_RADIX)?,
             canvas: Canvas { pixels: arena.take(TILE_PIXELS)?, rgb: arena.take(TILE_PIXELS)? },
             splats: SplatStore { splats: arena.take(n_splats)?, rects: arena.take(n_splats)?, n: 0 },

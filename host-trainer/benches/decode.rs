@@ -18,13 +18,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 const N_ANCHORS: usize = 40_000;
-const SHAPE: ModelShape = ModelShape {
-    feature_dim: 50,
-    n_offsets: 10,
-    view_direction: true,
-    view_distance: true,
-    dilation_compensation: false,
-};
+const SHAPE: ModelShape = ModelShape { view_direction: true, view_distance: true, ..ModelShape::plain(50, 10) };
 const BASE_STEPS: [f32; 3] = [1.0, 0.1, 0.2];
 
 /// Anchors on a sphere's surface, their values spread over a few steps, with a context model as training starts it.
@@ -41,6 +35,7 @@ fn scene() -> Scene<f32> {
         log_scales: spread(N_ANCHORS * 6, 0.3).iter().map(|x| x - 3.0).collect(),
         offsets: spread(N_ANCHORS * 3 * SHAPE.n_offsets, 1.0),
         mask_logits: spread(N_ANCHORS * SHAPE.n_offsets, 1.0).iter().map(|x| x - 4.8).collect(),
+        places: Vec::new(),
         lattice: lattice.into_iter().collect(),
     };
     let mut scene =

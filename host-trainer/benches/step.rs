@@ -17,7 +17,7 @@ use pocketsplat::train::config::{Backbone, Hac, LossWeights, Rates};
 use pocketsplat::train::context_start::initial_context;
 use pocketsplat::train::optimiser::Optimiser;
 use pocketsplat::train::step::coding::{Coding, RateTerms};
-use pocketsplat::train::step::{StageSeconds, StepReport, Target, Workspace};
+use pocketsplat::train::step::{Loss, StageSeconds, StepReport, Target, Workspace};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -83,14 +83,14 @@ fn steps(criterion: &mut Criterion, name: &str, scene: &Scene<f32>, coding: &Cod
         let mut workspace = Workspace::with_level(&scene.shape, level);
         let mut reports = Vec::new();
         group.bench_function(level.to_string(), |bencher| {
-            bencher.iter(|| reports.push(workspace.step(scene, &target, &LossWeights::default(), coding)));
+            bencher.iter(|| reports.push(workspace.step(scene, &target, &Loss::plain(LossWeights::default()), coding)));
         });
         print_stages(level, &reports);
     }
     let mut workspace = Workspace::new(&scene.shape);
     let mut moving = scene.clone();
     let mut optimiser = Optimiser::new(&moving);
-    workspace.step(&moving, &target, &LossWeights::default(), coding);
+    workspace.step(&moving, &target, &Loss::plain(LossWeights::default()), coding);
     group.bench_function("optimiser", |bencher| {
         bencher.iter(|| optimiser.apply(&mut moving, &workspace, &Rates::default(), 0.5, 5.0));
     });

@@ -22,17 +22,21 @@ pub struct Case {
 
 const fn shape(feature_dim: usize, n_offsets: usize, effects: [bool; 3]) -> ModelShape {
     let [view_direction, view_distance, dilation_compensation] = effects;
-    ModelShape { feature_dim, n_offsets, view_direction, view_distance, dilation_compensation }
+    ModelShape { view_direction, view_distance, dilation_compensation, ..ModelShape::plain(feature_dim, n_offsets) }
 }
 
+/// A residual on the colours, and a colour head of a width of its own.
+const DETAILED: ModelShape = ModelShape { colour_hidden: 20, detail_hidden: 9, ..shape(12, 4, [true, false, false]) };
+
 /// Every effect on and off, narrow and wide, fewer anchors than a chunk holds and several chunks.
-pub const CASES: [Case; 6] = [
+pub const CASES: [Case; 7] = [
     Case { name: "device", shape: shape(16, 4, [true, true, false]), n_anchors: 700, seed: 1 },
     Case { name: "plain", shape: shape(8, 2, [false, false, false]), n_anchors: 300, seed: 2 },
     Case { name: "direction", shape: shape(12, 3, [true, false, false]), n_anchors: 129, seed: 3 },
     Case { name: "distance", shape: shape(5, 1, [false, true, false]), n_anchors: 128, seed: 4 },
     Case { name: "compensated", shape: shape(16, 4, [true, true, true]), n_anchors: 500, seed: 5 },
     Case { name: "wide", shape: shape(32, 10, [true, true, true]), n_anchors: 150, seed: 6 },
+    Case { name: "detailed", shape: DETAILED, n_anchors: 400, seed: 8 },
 ];
 
 /// Few bytes, so that every one of them can be damaged in turn.
@@ -46,8 +50,14 @@ pub fn random_scene(case: &Case) -> Scene<f32> {
     const RADIUS_CELLS: i32 = 96;
     let mut rng = ChaCha8Rng::seed_from_u64(case.seed);
     let (f, k) = (case.shape.feature_dim, case.shape.n_offsets);
-    let mut anchors =
-        Anchors { lattice: vec![], features: vec![], log_scales: vec![], offsets: vec![], mask_logits: vec![] };
+    let mut anchors = Anchors {
+        lattice: vec![],
+        features: vec![],
+        log_scales: vec![],
+        offsets: vec![],
+        mask_logits: vec![],
+        places: vec![],
+    };
     while anchors.len() < case.n_anchors {
         let cell: [i32; 3] = std::array::from_fn(|_| rng.random_range(-RADIUS_CELLS..=RADIUS_CELLS));
         let inside = cell.iter().map(|c| c * c).sum::<i32>() <= RADIUS_CELLS * RADIUS_CELLS;

@@ -108,6 +108,7 @@ impl Bundle<'_> {
             words_for::<f32>(self.header().n_channels())?,
             words_for::<f32>(self.header().head_inputs())?,
             words_for::<f32>(mlp::hidden_len(self.header()))?,
+            words_for::<f32>(mlp::sums_len(self.header()))?,
             words_for::<u32>(N_RADIX)?,
             words_for::<[f32; 4]>(TILE_PIXELS)?,
             words_for::<[u8; 3]>(TILE_PIXELS)?,

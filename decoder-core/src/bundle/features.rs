@@ -12,6 +12,8 @@ pub struct Effects {
     pub view_distance: bool,
     /// Opacity is multiplied by √(det Σ / det(Σ + 0.3 I)) (Yu et al. 2024, Mip-Splatting, eq. 8).
     pub dilation_compensation: bool,
+    /// A detail head adds a residual to each Gaussian's colour.
+    pub detail: bool,
 }
 
 /// What a bundle requires of its decoder: the scene's effects, and how its numbers are stored.
@@ -30,13 +32,14 @@ pub struct Features {
 
 impl Features {
     /// Bits that have a meaning in this version.
-    const N_BITS: u32 = 6;
+    const N_BITS: u32 = 7;
 
     /// The bits as the header stores them.
     #[must_use]
     pub fn to_bits(self) -> u32 {
-        let Effects { view_direction, view_distance, dilation_compensation } = self.effects;
-        let flags = [view_direction, view_distance, dilation_compensation, self.masks, self.context, self.coded_heads];
+        let Effects { view_direction, view_distance, dilation_compensation, detail } = self.effects;
+        let flags =
+            [view_direction, view_distance, dilation_compensation, self.masks, self.context, self.coded_heads, detail];
         (0..).zip(flags).fold(0, |bits, (shift, flag)| bits | (u32::from(flag) << shift))
     }
 
@@ -51,7 +54,12 @@ impl Features {
         }
         let has = |bit: u32| bits & bit != 0;
         Ok(Self {
-            effects: Effects { view_direction: has(1), view_distance: has(2), dilation_compensation: has(4) },
+            effects: Effects {
+                view_direction: has(1),
+                view_distance: has(2),
+                dilation_compensation: has(4),
+                detail: has(64),
+            },
             masks: has(8),
             context: has(16),
             coded_heads: has(32),
@@ -66,10 +74,10 @@ mod tests {
 
     #[test]
     fn known_bits_come_back_and_unknown_ones_are_named() {
-        for bits in 0..64 {
+        for bits in 0..128 {
             assert_eq!(Features::from_bits(bits).map(Features::to_bits), Ok(bits), "bits {bits:#b}");
         }
-        let error = DecodeError::UnsupportedFeatures { unknown_bits: 0x8000_0040 };
-        assert_eq!(Features::from_bits(0x8000_0041), Err(error), "the first and the last unknown bit");
+        let error = DecodeError::UnsupportedFeatures { unknown_bits: 0x8000_0080 };
+        assert_eq!(Features::from_bits(0x8000_0081), Err(error), "the first and the last unknown bit");
     }
 }

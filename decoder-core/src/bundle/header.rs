@@ -13,7 +13,7 @@ pub const MAGIC: [u8; 8] = *b"\x89PSB\r\n\x1a\n";
 pub const VERSION: u16 = 1;
 /// Length of the header's fields before the section table, bytes.
 pub const HEADER_FIXED_LEN: usize = 156;
-/// Widest feature: a hidden layer has as many units, so it bounds the work of an anchor.
+/// Widest feature and hidden layer; bounds the work of an anchor.
 pub const MAX_FEATURE_DIM: u16 = 256;
 /// Most offsets, that is splats, of an anchor.
 pub const MAX_OFFSETS: u16 = 32;
@@ -64,6 +64,10 @@ pub struct Header {
     pub background: [u8; 3],
     /// Edge of a lattice cell, normalised units.
     pub voxel_size: f32,
+    /// Hidden width of the colour head, 1..=[`MAX_FEATURE_DIM`]; the other two have F.
+    pub colour_hidden: u16,
+    /// Hidden width of the detail head, 1..=[`MAX_FEATURE_DIM`]; 0 where the scene has none.
+    pub detail_hidden: u16,
     /// Centre of the normalisation `p_norm = (p_world − centre)·scale`, capture units.
     pub normalisation_centre: [f64; 3],
     /// Scale of the normalisation, normalised units per capture unit.
@@ -73,7 +77,7 @@ pub struct Header {
 }
 
 impl Header {
-    /// Inputs of every head: feature, then direction (3), then distance (1), the last two if present.
+    /// Inputs of every head but that of detail: feature, then direction (3), then distance (1), the last two if present.
     #[must_use]
     pub fn head_inputs(&self) -> usize {
         let effects = self.features.effects;
@@ -126,7 +130,7 @@ impl Header {
         let background = cursor.array()?;
         let n_tiers = cursor.u8()?;
         let voxel_size = cursor.f32()?;
-        let reserved = cursor.u32()?;
+        let [colour_hidden, detail_hidden] = [cursor.u16()?, cursor.u16()?];
         let normalisation_centre = [cursor.f64()?, cursor.f64()?, cursor.f64()?];
         let normalisation_scale = cursor.f64()?;
         let preview = Camera {
@@ -145,7 +149,9 @@ impl Header {
         in_range(Field::CameraConvention, convention.into(), 0, CONVENTION_OPENCV.into())?;
         in_range(Field::NSections, n_sections.into(), MIN_SECTIONS.into(), u8::MAX.into())?;
         in_range(Field::NTiers, n_tiers.into(), 1, MAX_TIERS.into())?;
-        in_range(Field::Reserved, reserved, 0, 0)?;
+        in_range(Field::ColourHidden, colour_hidden.into(), 1, MAX_FEATURE_DIM.into())?;
+        let [least, most] = if features.effects.detail { [1, MAX_FEATURE_DIM.into()] } else { [0, 0] };
+        in_range(Field::DetailHidden, detail_hidden.into(), least, most)?;
         for size_px in training_px {
             in_range(Field::TrainingSize, size_px.into(), 1, u32::from(u16::MAX))?;
         }
@@ -172,6 +178,8 @@ impl Header {
             training_px,
             background,
             voxel_size,
+            colour_hidden,
+            detail_hidden,
             normalisation_centre,
             normalisation_scale,
             preview,

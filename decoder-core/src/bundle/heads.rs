@@ -10,8 +10,8 @@ use super::cursor::Cursor;
 use super::header::Header;
 use crate::error::{DecodeError, Field, SectionKind};
 
-/// Matrices of all heads: W1 and W2 of opacity, covariance, colour.
-const N_MATRICES: usize = 6;
+/// Matrices of all heads at most: W1 and W2 of opacity, covariance, colour, detail.
+const N_MATRICES: usize = 8;
 
 /// IEEE half-precision numbers in flash, each read when asked for.
 #[derive(Clone, Copy, Debug, Default)]
@@ -59,7 +59,7 @@ impl<'a> Halves<'a> {
 pub struct HeadView<'a> {
     /// Inputs.
     pub n_in: usize,
-    /// Hidden units F.
+    /// Hidden units.
     pub n_hidden: usize,
     /// Outputs.
     pub n_out: usize,
@@ -69,7 +69,7 @@ pub struct HeadView<'a> {
     pub b2: Halves<'a>,
 }
 
-/// The three heads of the file.
+/// The heads of the file.
 #[derive(Clone, Copy, Debug)]
 pub struct HeadsView<'a> {
     /// K outputs: row k is the opacity logit of offset k, through tanh.
@@ -78,6 +78,8 @@ pub struct HeadsView<'a> {
     pub covariance: HeadView<'a>,
     /// 3K outputs: rows 3k..3k+3 the colour logits.
     pub colour: HeadView<'a>,
+    /// From feature and colour of a Gaussian to what is added to the colour, if the scene has it.
+    pub detail: Option<HeadView<'a>>,
     matrices: Matrices<'a>,
 }
 
@@ -90,17 +92,25 @@ enum Matrices<'a> {
 impl<'a> HeadsView<'a> {
     pub(super) fn parse(section: &'a [u8], header: &Header) -> Result<Self, DecodeError> {
         let mut cursor = Cursor::new(section, SectionKind::Heads);
-        let shape = |per_offset: usize| HeadView {
-            n_in: header.head_inputs(),
-            n_hidden: header.feature_dim.into(),
-            n_out: usize::from(header.n_offsets).saturating_mul(per_offset),
+        let shape = |n_in, n_hidden: u16, n_out| HeadView {
+            n_in,
+            n_hidden: n_hidden.into(),
+            n_out,
             b1: Halves::default(),
             b2: Halves::default(),
         };
-        let mut heads = [shape(1), shape(7), shape(3)];
+        let (n_in, k) = (header.head_inputs(), usize::from(header.n_offsets));
+        let mut all = [
+            shape(n_in, header.feature_dim, k),
+            shape(n_in, header.feature_dim, k.saturating_mul(7)),
+            shape(n_in, header.colour_hidden, k.saturating_mul(3)),
+            shape(usize::from(header.feature_dim).saturating_add(3), header.detail_hidden, 3),
+        ];
+        let n_heads = if header.features.effects.detail { 4 } else { 3 };
+        let heads = all.get_mut(..n_heads).unwrap_or_default();
         let matrices = if header.features.coded_heads {
             let tables = CodedHeads::parse_tables(&mut cursor)?;
-            for head in &mut heads {
+            for head in &mut *heads {
                 head.b1 = Halves::parse(&mut cursor, head.n_hidden)?;
                 head.b2 = Halves::parse(&mut cursor, head.n_out)?;
             }
@@ -116,16 +126,16 @@ impl<'a> HeadsView<'a> {
             cursor.end()?;
             Matrices::Raw(matrices)
         };
-        let [opacity, covariance, colour] = heads;
-        let heads = Self { opacity, covariance, colour, matrices };
+        let [opacity, covariance, colour, detail] = all;
+        let detail = header.features.effects.detail.then_some(detail);
+        let heads = Self { opacity, covariance, colour, detail, matrices };
         heads.check()?;
         Ok(heads)
     }
 
-    /// Opacity, covariance, colour.
-    #[must_use]
-    pub fn each(&self) -> [HeadView<'a>; 3] {
-        [self.opacity, self.covariance, self.colour]
+    /// Opacity, covariance, colour, then detail if there is one.
+    pub fn each(&self) -> impl Iterator<Item = HeadView<'a>> + use<'a> {
+        [self.opacity, self.covariance, self.colour].into_iter().chain(self.detail)
     }
 
     /// How the matrices are coded, if they are.
@@ -140,8 +150,10 @@ impl<'a> HeadsView<'a> {
     /// Starts reading the matrices, one after the other.
     #[must_use]
     pub fn weights(&self) -> WeightReader<'a> {
-        let sizes =
-            self.each().map(|head| [head.n_hidden.saturating_mul(head.n_in), head.n_out.saturating_mul(head.n_hidden)]);
+        let mut sizes = [[0; 2]; N_MATRICES / 2];
+        for (size, head) in sizes.iter_mut().zip(self.each()) {
+            *size = [head.n_hidden.saturating_mul(head.n_in), head.n_out.saturating_mul(head.n_hidden)];
+        }
         WeightReader::new(&self.matrices, sizes)
     }
 

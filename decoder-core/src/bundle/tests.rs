@@ -12,9 +12,9 @@ use crate::error::{DecodeError, SectionKind};
 use crate::{Budget, Decoder, FrameReport, MaxSplats, TileSink};
 
 fn variants() -> impl Iterator<Item = Variant> {
-    (0..16).map(|bits| {
-        let [masks, context, coded_heads, unknown_section] = [1, 2, 4, 8].map(|bit| bits & bit != 0);
-        Variant { masks, context, coded_heads, unknown_section }
+    (0..32).map(|bits| {
+        let [masks, context, coded_heads, unknown_section, detail] = [1, 2, 4, 8, 16].map(|bit| bits & bit != 0);
+        Variant { masks, context, coded_heads, unknown_section, detail }
     })
 }
 
@@ -86,19 +86,20 @@ fn heads_come_back_raw_and_coded() {
         let bytes = bundle(variant);
         let bundle = Bundle::parse(&bytes).expect("sound");
         let mut weights = bundle.heads().weights();
-        for layer in 0..6 {
+        for layer in 0..if variant.detail { 8 } else { 6 } {
             let found: Vec<f32> = weights.next_layer().collect();
             let expected: Vec<f32> = (0..found.len()).map(|index| weight(layer, index)).collect();
             assert_eq!(found, expected, "{variant:?}, layer {layer}");
         }
-        assert_eq!(weights.next_layer().count(), 0, "there is no seventh");
+        assert_eq!(weights.next_layer().count(), 0, "there is no other");
         assert_eq!(bundle.heads().coded().is_some(), variant.coded_heads);
     }
 }
 
 #[test]
 fn the_manifest_says_what_was_measured() {
-    let bytes = bundle(Variant { masks: true, context: false, coded_heads: false, unknown_section: false });
+    let bytes =
+        bundle(Variant { masks: true, context: false, coded_heads: false, unknown_section: false, detail: false });
     let bundle = Bundle::parse(&bytes).expect("sound");
     let [first, last] = [0, 2].map(|tier| bundle.measures(tier).expect("a tier"));
     assert_eq!((first.psnr_db, last.psnr_db), (None, Some(32.0)));

@@ -10,7 +10,7 @@ use super::ErrorClass;
 pub enum SectionKind {
     /// Fixed-size fields and the section table.
     Header,
-    /// Weights of the three heads.
+    /// Weights of the heads.
     Heads,
     /// Where anchors may lie, and the frequencies of their positions.
     Lattice,
@@ -46,6 +46,8 @@ pub enum Field {
     NSections,
     SectionKind,
     Reserved,
+    ColourHidden,
+    DetailHidden,
     TrainingSize,
     VoxelSize,
     Normalisation,
@@ -135,6 +137,8 @@ impl fmt::Display for Field {
             Self::NSections => "number of sections",
             Self::SectionKind => "kind of a section",
             Self::Reserved => "a reserved byte",
+            Self::ColourHidden => "hidden width of the colour head",
+            Self::DetailHidden => "hidden width of the detail head",
             Self::TrainingSize => "training image size",
             Self::VoxelSize => "voxel size",
             Self::Normalisation => "normalisation",

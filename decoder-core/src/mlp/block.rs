@@ -56,7 +56,12 @@ impl<'s, const B: usize> Blocks<'s, B> {
 #[inline]
 pub(crate) fn outputs<const B: usize>(block: &[[f32; B]], inputs: &[f32]) -> [f32; B] {
     let Some((&biases, weights)) = block.split_first() else { return [0.0; B] };
-    let mut sums = biases;
+    continued(biases, weights, inputs)
+}
+
+/// `sums` with `input·weight` added in order.
+#[inline]
+pub(crate) fn continued<const B: usize>(mut sums: [f32; B], weights: &[[f32; B]], inputs: &[f32]) -> [f32; B] {
     for (row, &x) in weights.iter().zip(inputs) {
         for (sum, &weight) in sums.iter_mut().zip(row) {
             *sum += weight * x;

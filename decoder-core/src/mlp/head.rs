@@ -1,12 +1,13 @@
 //! A head: hidden layer with ReLU, output layer of one block per offset.
 
 use super::block::{Blocks, n_rows, outputs};
+use super::detail::{self, Detail};
 use crate::budget::Arena;
 use crate::bundle::{HeadView, Header, HeadsView, WeightReader};
 use crate::error::DecodeError;
 
 /// Outputs computed together in layers whose outputs are all needed.
-const LANES: usize = 8;
+pub(super) const LANES: usize = 8;
 
 /// One head; its output layer has blocks of `B` outputs.
 pub(crate) struct Head<'s, const B: usize> {
@@ -15,22 +16,26 @@ pub(crate) struct Head<'s, const B: usize> {
     n_hidden: usize,
 }
 
-/// The three heads, one block of outputs an offset: none is computed for an offset that is not drawn.
+/// The heads, one block of outputs an offset: none is computed for an offset that is not drawn.
 pub(crate) struct Heads<'s> {
     pub(crate) opacity: Head<'s, 1>,
     pub(crate) covariance: Head<'s, 7>,
     pub(crate) colour: Head<'s, 3>,
+    pub(crate) detail: Option<Detail<'s>>,
 }
 
-/// Floats of all three heads in scratch memory.
+/// Floats of all heads in scratch memory.
 pub(crate) fn n_weights(header: &Header) -> usize {
-    let [n_in, f, k] = [header.head_inputs(), header.feature_dim.into(), header.n_offsets.into()];
-    3 * LANES * n_rows::<LANES>(n_in, f) + n_rows::<1>(f, k) + 7 * n_rows::<7>(f, 7 * k) + 3 * n_rows::<3>(f, 3 * k)
+    let [n_in, f, c, k] =
+        [header.head_inputs(), header.feature_dim.into(), header.colour_hidden.into(), header.n_offsets.into()];
+    let first_layers = LANES * (2 * n_rows::<LANES>(n_in, f) + n_rows::<LANES>(n_in, c));
+    let outputs = n_rows::<1>(f, k) + 7 * n_rows::<7>(f, 7 * k) + 3 * n_rows::<3>(c, 3 * k);
+    first_layers + outputs + detail::n_weights(header)
 }
 
-/// Floats of the hidden layer's activations.
+/// Floats of the widest hidden layer's activations.
 pub(crate) fn hidden_len(header: &Header) -> usize {
-    usize::from(header.feature_dim).next_multiple_of(LANES)
+    usize::from(header.feature_dim.max(header.colour_hidden).max(header.detail_hidden)).next_multiple_of(LANES)
 }
 
 impl<'s> Heads<'s> {
@@ -42,6 +47,10 @@ impl<'s> Heads<'s> {
             opacity: Head::convert(arena, &heads.opacity, &mut weights)?,
             covariance: Head::convert(arena, &heads.covariance, &mut weights)?,
             colour: Head::convert(arena, &heads.colour, &mut weights)?,
+            detail: match &heads.detail {
+                Some(head) => Some(Detail::convert(arena, head, &mut weights)?),
+                None => None,
+            },
         })
     }
 }

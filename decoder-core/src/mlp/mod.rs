@@ -1,10 +1,12 @@
-//! The three heads in the decoder's memory: weights as f32, in the order in which they are read.
+//! The heads in the decoder's memory: weights as f32, in the order in which they are read.
 //!
 //! Sums are ordered: bias first, then inputs ascending, one accumulator per output. Outputs are computed in blocks of
 //! `B`, so that a block's accumulators stay in registers and one input serves them all; that changes no sum. The module
 //! knows nothing of what inputs and outputs mean.
 
 mod block;
+mod detail;
 mod head;
 
+pub(crate) use detail::sums_len;
 pub(crate) use head::{Heads, hidden_len, n_weights};

@@ -20,7 +20,7 @@ pub(crate) struct Gaussian {
     pub(crate) rotation: [f32; 4],
     /// In (0, 1].
     pub(crate) opacity: f32,
-    /// RGB, 0 to 1.
+    /// RGB, 0 to 1 but for what the detail head adds.
     pub(crate) colour: [f32; 3],
 }
 
@@ -30,6 +30,8 @@ pub(crate) struct Workspace<'s> {
     pub(crate) inputs: &'s mut [f32],
     /// `[hidden_len]`.
     pub(crate) hidden: &'s mut [f32],
+    /// [`crate::mlp::sums_len`] floats.
+    pub(crate) detail_sums: &'s mut [f32],
 }
 
 /// Calls `draw` with each Gaussian of `anchor` that a camera at `eye` can see, offsets ascending.
@@ -38,7 +40,8 @@ pub(crate) struct Workspace<'s> {
 /// offsets.
 ///
 /// # Budget
-/// The opacity head, and at most the other two: `3F(F + 4) + 11KF` multiply-adds.
+/// The opacity head, and at most the others: `3F(F + 4) + 11KF` multiply-adds, and with a detail head of H units
+/// `H(F + 6K)` more.
 pub(crate) fn for_each_gaussian(
     anchor: &Anchor<'_>,
     effects: Effects,
@@ -57,13 +60,29 @@ pub(crate) fn for_each_gaussian(
             *covariance = heads.covariance.block(offset, hidden).unwrap_or_default();
         }
     }
+    // Only then the buffer is free for the detail head.
+    let mut colours = [[0.0; 3]; MAX_K];
     let hidden = heads.colour.activate(work.inputs, work.hidden);
-    for (k, ((offset, covariance), opacity)) in anchor.offsets.iter().zip(&covariances).zip(opacities).enumerate() {
-        if visible & (1 << k) == 0 {
-            continue;
+    for (k, colour) in colours.iter_mut().enumerate() {
+        if visible & (1 << k) != 0 {
+            *colour = heads.colour.block(k, hidden).unwrap_or_default().map(sigmoid);
         }
-        let colour = heads.colour.block(k, hidden).unwrap_or_default().map(sigmoid);
-        draw(&gaussian(anchor, *offset, *covariance, opacity, colour));
+    }
+    if let Some(detail) = &heads.detail {
+        detail.begin(anchor.feature, work.detail_sums);
+        for (k, colour) in colours.iter_mut().enumerate() {
+            if visible & (1 << k) != 0 {
+                let [r, g, b] = detail.residual(*colour, work.detail_sums, work.hidden);
+                let [plain_r, plain_g, plain_b] = *colour;
+                *colour = [plain_r + r, plain_g + g, plain_b + b];
+            }
+        }
+    }
+    let outputs = covariances.iter().zip(opacities).zip(colours);
+    for (k, (offset, ((covariance, opacity), colour))) in anchor.offsets.iter().zip(outputs).enumerate() {
+        if visible & (1 << k) != 0 {
+            draw(&gaussian(anchor, *offset, *covariance, opacity, colour));
+        }
     }
 }
 

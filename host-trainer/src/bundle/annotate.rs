@@ -55,7 +55,7 @@ impl<'f> Annotator<'f> {
         dump.field("version", u16::from_le_bytes);
         dump.field("header_len", u16::from_le_bytes);
         dump.field("file_len", u32::from_le_bytes);
-        dump.field("required features", |bytes| format!("{:#08b}", u32::from_le_bytes(bytes)));
+        dump.field("required features", |bytes| format!("{:#09b}", u32::from_le_bytes(bytes)));
         dump.field("optional features", |bytes| format!("{:#b}", u32::from_le_bytes(bytes)));
         dump.field("F", u16::from_le_bytes);
         dump.field("K", u16::from_le_bytes);
@@ -68,7 +68,8 @@ impl<'f> Annotator<'f> {
         dump.array::<1, _>("background", 3, |[byte]| byte);
         dump.field::<1, _>("n_tiers", |[byte]| byte);
         dump.field("voxel_size", f32::from_le_bytes);
-        dump.field("reserved", u32::from_le_bytes);
+        dump.field("colour hidden", u16::from_le_bytes);
+        dump.field("detail hidden", u16::from_le_bytes);
         dump.array("normalisation centre", 3, f64::from_le_bytes);
         dump.field("normalisation scale", f64::from_le_bytes);
         dump.array("preview rotation", 9, f32::from_le_bytes);
@@ -106,11 +107,10 @@ impl<'f> Annotator<'f> {
 
     fn heads(&mut self, section: &Section) {
         let heads = *self.bundle.heads();
-        let names = ["opacity", "covariance", "colour"];
-        let views = [heads.opacity, heads.covariance, heads.colour];
+        let names = ["opacity", "covariance", "colour", "detail"];
         let dump = &mut self.dump;
         let Some(coded) = heads.coded() else {
-            for (name, head) in names.into_iter().zip(views) {
+            for (name, head) in names.into_iter().zip(heads.each()) {
                 dump.heading(&format!("{name} head"));
                 let (w1, w2) = (head.n_hidden * head.n_in, head.n_out * head.n_hidden);
                 for (part, n) in [("W1", w1), ("b1", head.n_hidden), ("W2", w2), ("b2", head.n_out)] {
@@ -125,7 +125,7 @@ impl<'f> Annotator<'f> {
             table_record(dump, table.n_symbols());
         }
         dump.heading("heads, biases");
-        for (name, head) in names.into_iter().zip(views) {
+        for (name, head) in names.into_iter().zip(heads.each()) {
             dump.array(&format!("{name} b1"), head.n_hidden, f16::from_le_bytes);
             dump.array(&format!("{name} b2"), head.n_out, f16::from_le_bytes);
         }

@@ -137,13 +137,7 @@ mod tests {
     use crate::ops::head;
     use crate::scene::ModelShape;
 
-    const SHAPE: ModelShape = ModelShape {
-        feature_dim: 5,
-        n_offsets: 2,
-        view_direction: true,
-        view_distance: false,
-        dilation_compensation: false,
-    };
+    const SHAPE: ModelShape = ModelShape { view_direction: true, ..ModelShape::plain(5, 2) };
 
     fn model(seed: u64, width: f64) -> ContextModel<f32> {
         let levels = vec![

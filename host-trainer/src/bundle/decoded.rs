@@ -15,6 +15,8 @@ pub fn shape_of(bundle: &Bundle<'_>) -> ModelShape {
         view_direction: effects.view_direction,
         view_distance: effects.view_distance,
         dilation_compensation: effects.dilation_compensation,
+        colour_hidden: header.colour_hidden.into(),
+        detail_hidden: header.detail_hidden.into(),
     }
 }
 
@@ -32,6 +34,7 @@ pub fn decoded_scene(bundle: &Bundle<'_>) -> Result<Scene<f32>, DecodeError> {
         log_scales: Vec::new(),
         offsets: Vec::new(),
         mask_logits: Vec::new(),
+        places: Vec::new(),
     };
     let mut words = vec![0; bundle.anchor_scratch_words()];
     let mut models = bundle.anchor_models(&mut words)?;
@@ -68,5 +71,10 @@ pub fn decoded_heads(bundle: &Bundle<'_>) -> Heads<f32> {
         b2: view.b2.iter().collect(),
     };
     let views = bundle.heads();
-    Heads { opacity: head(&views.opacity), covariance: head(&views.covariance), colour: head(&views.colour) }
+    Heads {
+        opacity: head(&views.opacity),
+        covariance: head(&views.covariance),
+        colour: head(&views.colour),
+        detail: views.detail.as_ref().map(head),
+    }
 }

@@ -36,7 +36,7 @@ pub(super) fn section(heads: &Heads<f32>, fraction_bits: Option<[u8; 2]>) -> Res
 
 fn raw(heads: &Heads<f32>) -> Result<Vec<u8>, WriteError> {
     let mut bytes = Vec::new();
-    for (head, name) in heads.each().into_iter().zip(["opacity", "covariance", "colour"]) {
+    for (head, name) in heads.each().zip(["opacity", "covariance", "colour", "detail"]) {
         for (index, &value) in head.groups().into_iter().flatten().enumerate() {
             let weight = f16::from_f32(value);
             if !weight.is_finite() {
@@ -58,13 +58,14 @@ fn coded(heads: &Heads<f32>, fraction_bits: [u8; 2]) -> Option<Vec<u8>> {
         };
         weights.iter().map(symbol).collect::<Option<Vec<i16>>>()
     };
-    let matrices = heads.each().map(|Head { w1, w2, .. }| Some([symbols(w1, steps_1)?, symbols(w2, steps_2)?]));
-    let [opacity, covariance, colour] = matrices;
-    let matrices = [opacity?, covariance?, colour?];
+    let matrices: Vec<[Vec<i16>; 2]> = heads
+        .each()
+        .map(|Head { w1, w2, .. }| Some([symbols(w1, steps_1)?, symbols(w2, steps_2)?]))
+        .collect::<Option<_>>()?;
     let table = |layer: usize, step: f32| TableDraft::of(step, matrices.iter().flat_map(|head| &head[layer]).copied());
     let tables = [table(0, steps_1), table(1, steps_2)];
     let mut bytes: Vec<u8> = tables.iter().flat_map(TableDraft::record).collect();
-    let biases = heads.each().into_iter().flat_map(|head| head.b1.iter().chain(&head.b2));
+    let biases = heads.each().flat_map(|head| head.b1.iter().chain(&head.b2));
     bytes.extend(biases.flat_map(|&bias| f16::from_f32(bias).to_le_bytes()));
     let mut list = SlotList::default();
     for head in &matrices {

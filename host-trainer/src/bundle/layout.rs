@@ -42,6 +42,7 @@ pub(super) fn effects(scene: &Scene<f32>) -> Effects {
         view_direction: scene.shape.view_direction,
         view_distance: scene.shape.view_distance,
         dilation_compensation: scene.shape.dilation_compensation,
+        detail: scene.heads.detail.is_some(),
     }
 }
 
@@ -83,6 +84,12 @@ fn push_fields(
 ) -> Result<(), WriteError> {
     let feature_dim = count("feature width", scene.shape.feature_dim, 1, MAX_FEATURE_DIM.into())?;
     let n_offsets = count("number of offsets", scene.shape.n_offsets, 1, MAX_OFFSETS.into())?;
+    let most_hidden = MAX_FEATURE_DIM.into();
+    let colour_hidden = count("hidden width of the colour head", scene.heads.colour.n_hidden, 1, most_hidden)?;
+    let detail_hidden = match &scene.heads.detail {
+        Some(detail) => count("hidden width of the detail head", detail.n_hidden, 1, most_hidden)?,
+        None => 0,
+    };
     let n_anchors = count("number of anchors", counts.n_anchors, 0, MAX_ANCHORS as usize)?;
     let chunk_anchors = count("anchors of a chunk", counts.max_chunk_anchors.into(), 1, MAX_CHUNK_ANCHORS.into())?;
     let [width, height] = info.training_px.map(|px| px as usize);
@@ -104,7 +111,7 @@ fn push_fields(
     bytes.extend(info.background);
     bytes.push(counts.n_tiers as u8);
     bytes.extend((scene.voxel_size as f32).to_le_bytes());
-    bytes.extend([0; 4]);
+    bytes.extend([colour_hidden as u16, detail_hidden as u16].iter().flat_map(|x| x.to_le_bytes()));
     let [x, y, z] = normalisation.centre.to_array();
     bytes.extend([x, y, z, normalisation.scale].iter().flat_map(|x| x.to_le_bytes()));
     let pose = preview.rotation.iter().chain(&preview.translation);

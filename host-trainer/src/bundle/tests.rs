@@ -47,6 +47,7 @@ fn random_scene(shape: ModelShape, n_anchors: usize, seed: u64) -> Scene<f32> {
         log_scales: (0..n_anchors * 6).map(|_| -2.5 + bell(0.7)).collect(),
         offsets: (0..n_anchors * 3 * shape.n_offsets).map(|_| bell(1.0)).collect(),
         mask_logits: (0..n_anchors * shape.n_offsets).map(|_| -4.2 + bell(1.0)).collect(),
+        places: Vec::new(),
     };
     let mut heads = Heads::filled(&shape, 0.0);
     for head in heads.each_mut() {
@@ -93,7 +94,7 @@ fn with_context(scene: Scene<f32>, seed: u64) -> Scene<f32> {
 
 /// A small shape with every effect.
 const SMALL: ModelShape =
-    ModelShape { feature_dim: 6, n_offsets: 3, view_direction: true, view_distance: true, dilation_compensation: true };
+    ModelShape { view_direction: true, view_distance: true, dilation_compensation: true, ..ModelShape::plain(6, 3) };
 
 fn camera(width_px: u32, height_px: u32) -> Camera {
     Camera {

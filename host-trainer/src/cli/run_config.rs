@@ -62,6 +62,30 @@ impl RunConfig {
         Ok(config)
     }
 
+    /// The same with some keys set, each given as `table.key=value`; what is no TOML value is taken as text.
+    pub(crate) fn with_keys(&self, keys: &[String]) -> Result<Self> {
+        let mut all = Table::try_from(self)?;
+        let mut given = Table::new();
+        for key in keys {
+            let Some((path, value)) = key.split_once('=') else {
+                bail!("`{key}` sets nothing; needs KEY=VALUE, as train.hac.sample=0.1");
+            };
+            let value = format!("x = {value}").parse::<Table>().ok().and_then(|mut table| table.remove("x"));
+            let value = value.unwrap_or_else(|| Value::String(key[path.len() + 1..].to_owned()));
+            let nested = path
+                .trim()
+                .rsplit('.')
+                .fold(value, |inner, name| Value::Table(Table::from_iter([(name.to_owned(), inner)])));
+            if let Value::Table(nested) = nested {
+                merge(&mut given, &nested);
+            }
+        }
+        merge(&mut all, &given);
+        let config: Self = all.try_into()?;
+        refuse_unknown(&given, &Table::try_from(&config)?, "")?;
+        Ok(config)
+    }
+
     /// As TOML that [`Self::parse`] reads back.
     pub(crate) fn to_toml(&self) -> Result<String> {
         Ok(toml::to_string(self)?)

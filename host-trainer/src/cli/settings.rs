@@ -1,9 +1,11 @@
 //! What decides how a run trains, as options of every command that trains; each may also stand in a configuration.
 
+use anyhow::{Result, bail};
 use clap::ArgAction;
 use pocketsplat::bundle::{Coder, QuantisationSteps};
 use pocketsplat::train::TrainConfig;
 use pocketsplat::train::config::Backbone;
+use pocketsplat::train::module::{Modules, Pruning, pruning};
 
 use super::capture::CaptureOptions;
 use super::run_config::RunConfig;
@@ -62,6 +64,18 @@ pub(crate) struct Settings {
     /// [default: 0.4,0.3,0.2,0.1,0.05,0]
     #[arg(long, value_name = "RATES", value_delimiter = ',')]
     tiers: Option<Vec<f32>>,
+    /// Modules to attach, of distribution, pruning, detail; none: without those of the configuration. [default: none]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    modules: Option<Vec<String>>,
+    /// Attach the pruning module: hard deletes anchors once, tiered trains one scene for every pruning rate up to it.
+    #[arg(long, value_enum)]
+    prune: Option<pruning::Form>,
+    #[arg(long, value_name = "RATE", help = with_default("Share of the anchors that the pruning module takes",
+        Pruning::default().rate))]
+    prune_rate: Option<f64>,
+    /// Set any key of the configuration, as train.modules.distribution.target=0.5; may be given several times.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
 }
 
 /// [`Backbone`] on the command line.
@@ -89,7 +103,10 @@ pub(super) fn with_default(help: &str, default: impl std::fmt::Display) -> Strin
 
 impl Settings {
     /// `config` with everything replaced that the command line says.
-    pub(crate) fn applied_to(&self, mut config: RunConfig) -> RunConfig {
+    ///
+    /// # Errors
+    /// A module or a key that there is not.
+    pub(crate) fn applied_to(&self, mut config: RunConfig) -> Result<RunConfig> {
         fn set<T: Clone>(into: &mut T, given: &Option<T>) {
             if let Some(value) = given {
                 *into = value.clone();
@@ -116,6 +133,28 @@ impl Settings {
         set(&mut train.shape.view_direction, &self.no_view_direction.map(|no| !no));
         set(&mut train.shape.view_distance, &self.view_distance);
         set(&mut train.shape.dilation_compensation, &self.dilation_compensation);
-        config
+        self.attach_modules(&mut train.modules)?;
+        if self.set.is_empty() { Ok(config) } else { config.with_keys(&self.set) }
+    }
+
+    fn attach_modules(&self, modules: &mut Modules) -> Result<()> {
+        if let Some(names) = &self.modules {
+            *modules = Modules::default();
+            for name in names.iter().filter(|name| *name != "none") {
+                if !modules.attach(name) {
+                    bail!("there is no module `{name}`; needs some of {}, or none", Modules::NAMES.join(", "));
+                }
+            }
+        }
+        if self.prune.is_some() || self.prune_rate.is_some() {
+            let pruning = modules.pruning.get_or_insert_default();
+            pruning.form = self.prune.unwrap_or(pruning.form);
+            pruning.rate = self.prune_rate.unwrap_or(match self.prune {
+                // The whole range of the memory knob.
+                Some(pruning::Form::Tiered) => pruning.pool,
+                _ => pruning.rate,
+            });
+        }
+        Ok(())
     }
 }

@@ -94,7 +94,7 @@ impl Args {
         let absolute =
             |path: &Path| std::path::absolute(path).with_context(|| format!("`{}` is no path", path.display()));
         let (dataset, output) = (absolute(&dataset)?, absolute(&self.output)?);
-        let base = self.settings.applied_to(RunConfig { dataset, output, ..base });
+        let base = self.settings.applied_to(RunConfig { dataset, output, ..base })?;
         if base.train.backbone != Backbone::Hac {
             bail!(
                 "a sweep varies the weight of the bits, and they have none in this configuration; use --backbone hac"

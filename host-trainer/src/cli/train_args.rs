@@ -85,11 +85,10 @@ impl Args {
                 *into = std::path::absolute(path).with_context(|| format!("{} is no path", path.display()))?;
             }
         }
-        config = self.settings.applied_to(config);
         if let Some(lambda) = self.lambda {
             config.train.hac.lambda = lambda;
         }
-        Ok(config)
+        self.settings.applied_to(config)
     }
 
     /// Where a new run works.

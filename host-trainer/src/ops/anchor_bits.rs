@@ -161,13 +161,7 @@ mod tests {
     use super::*;
     use crate::ops::finite_difference::{assert_piecewise_gradient, random};
 
-    const SHAPE: ModelShape = ModelShape {
-        feature_dim: 4,
-        n_offsets: 3,
-        view_direction: true,
-        view_distance: false,
-        dilation_compensation: false,
-    };
+    const SHAPE: ModelShape = ModelShape { view_direction: true, ..ModelShape::plain(4, 3) };
     const N: usize = 5;
     /// Channels: 4 features, 6 log-scales, 9 offsets.
     const C: usize = 19;

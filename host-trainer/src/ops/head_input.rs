@@ -65,7 +65,7 @@ mod tests {
     }
 
     fn shape(view_direction: bool, view_distance: bool) -> ModelShape {
-        ModelShape { feature_dim: 3, n_offsets: 1, view_direction, view_distance, dilation_compensation: false }
+        ModelShape { view_direction, view_distance, ..ModelShape::plain(3, 1) }
     }
 
     #[test]

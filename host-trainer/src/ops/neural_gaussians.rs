@@ -15,8 +15,23 @@ pub struct Gaussian<R> {
     pub rotation: [R; 4],
     /// In (0, 1).
     pub opacity: R,
-    /// RGB in (0, 1).
+    /// RGB in (0, 1), but for what [`super::detail`] adds.
     pub colour: [R; 3],
+}
+
+impl<R: Real> Gaussian<R> {
+    /// Adds number by number, as gradients of the same Gaussian add up.
+    pub fn add(&mut self, other: &Self) {
+        let pairs =
+            [(&mut self.centre, &other.centre), (&mut self.scale, &other.scale), (&mut self.colour, &other.colour)];
+        for (sum, part) in pairs.into_iter().flat_map(|(sums, parts)| sums.iter_mut().zip(parts)) {
+            *sum += *part;
+        }
+        for (sum, part) in self.rotation.iter_mut().zip(other.rotation) {
+            *sum += part;
+        }
+        self.opacity += other.opacity;
+    }
 }
 
 /// Where a Gaussian comes from.
@@ -124,7 +139,9 @@ pub fn backward<R: Real>(
         d_outputs.opacity[at] += d.opacity * (R::ONE - g.opacity * g.opacity);
         d_mask_logits[at] += d.opacity * g.opacity * mask::slope(mask_logits[at]);
         for i in 0..3 {
-            d_outputs.colour[at * 3 + i] += d.colour[i] * g.colour[i] * (R::ONE - g.colour[i]);
+            // Not that of the Gaussian, to which others may have added.
+            let colour = outputs.colour[at * 3 + i].sigmoid();
+            d_outputs.colour[at * 3 + i] += d.colour[i] * colour * (R::ONE - colour);
             // scale = e^s · σ, so ∂/∂s = scale, and ∂/∂logit = scale · (1 − σ).
             let sigma = outputs.covariance[at * 7 + i].sigmoid();
             d_log_scales[row * 6 + 3 + i] += d.scale[i] * g.scale[i];
@@ -163,13 +180,7 @@ mod tests {
     use crate::ops::finite_difference::{assert_gradient, random};
     use crate::scene::MASK_THRESHOLD;
 
-    const SHAPE: ModelShape = ModelShape {
-        feature_dim: 4,
-        n_offsets: 3,
-        view_direction: true,
-        view_distance: false,
-        dilation_compensation: false,
-    };
+    const SHAPE: ModelShape = ModelShape { view_direction: true, ..ModelShape::plain(4, 3) };
     const N: usize = 4;
 
     fn parts(g: &Gaussian<f64>) -> [f64; 14] {

@@ -37,7 +37,7 @@ pub struct ReferenceScene {
     pub offsets: Vec<f64>,
     /// `[n_anchors, K]` whether an offset is drawn at all.
     pub drawn: Vec<bool>,
-    /// The three heads.
+    /// The heads.
     pub heads: Heads<f64>,
 }
 
@@ -136,7 +136,11 @@ impl ReferenceScene {
             let norm = (w * w + x * x + y * y + z * z).sqrt().max(1e-12);
             let rotation = rotation_of([w / norm, x / norm, y / norm, z / norm]);
             let axes = rotation * DMat3::from_diagonal(scale);
-            let colour = DVec3::from_slice(&colours[k * 3..]).map(sigmoid);
+            let mut colour = DVec3::from_slice(&colours[k * 3..]).map(sigmoid);
+            if let Some(detail) = &self.heads.detail {
+                let feature = &self.features[anchor * n_features..][..n_features];
+                colour += DVec3::from_slice(&evaluate(detail, &[feature, &colour.to_array()].concat()));
+            }
             splats.extend(splat(
                 position + offset * anchor_size,
                 axes * axes.transpose(),

@@ -1,4 +1,4 @@
-//! The three anchor MLPs: opacity, covariance, colour.
+//! The anchor MLPs: opacity, covariance, colour, and the residual of detail.
 
 use super::ModelShape;
 
@@ -24,7 +24,7 @@ impl OutputLayout {
     }
 }
 
-/// One head: `y = W2·relu(W1·x + b1) + b2`, hidden width F.
+/// One head: `y = W2·relu(W1·x + b1) + b2`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Head<R> {
     /// Inputs.
@@ -73,7 +73,7 @@ impl<R: Copy> Head<R> {
     }
 }
 
-/// The three heads of a model.
+/// The heads of a model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Heads<R> {
     /// [`OutputLayout::Opacity`].
@@ -82,28 +82,45 @@ pub struct Heads<R> {
     pub covariance: Head<R>,
     /// [`OutputLayout::Colour`].
     pub colour: Head<R>,
+    /// From `[feature F, colour 3]` of a Gaussian to what is added to its colour, where the shape has it: see
+    /// [`crate::ops::detail`].
+    pub detail: Option<Head<R>>,
 }
 
 impl<R: Copy> Heads<R> {
     /// Heads for `shape` with every parameter `value`.
     pub fn filled(shape: &ModelShape, value: R) -> Self {
-        let head = |layout: OutputLayout| {
-            Head::filled(shape.head_inputs(), shape.feature_dim, layout.per_offset() * shape.n_offsets, value)
+        let head = |layout: OutputLayout, n_hidden| {
+            Head::filled(shape.head_inputs(), n_hidden, layout.per_offset() * shape.n_offsets, value)
         };
+        let detail = |n_hidden| Head::filled(shape.feature_dim + 3, n_hidden, 3, value);
         Self {
-            opacity: head(OutputLayout::Opacity),
-            covariance: head(OutputLayout::Covariance),
-            colour: head(OutputLayout::Colour),
+            opacity: head(OutputLayout::Opacity, shape.feature_dim),
+            covariance: head(OutputLayout::Covariance, shape.feature_dim),
+            colour: head(OutputLayout::Colour, shape.colour_width()),
+            detail: (shape.detail_hidden > 0).then(|| detail(shape.detail_hidden)),
         }
     }
+}
 
-    /// The heads in file order: opacity, covariance, colour.
-    pub fn each(&self) -> [&Head<R>; 3] {
-        [&self.opacity, &self.covariance, &self.colour]
+impl<R> Heads<R> {
+    /// The heads in file order: opacity, covariance, colour, then detail if there is one.
+    pub fn each(&self) -> impl Iterator<Item = &Head<R>> {
+        [&self.opacity, &self.covariance, &self.colour].into_iter().chain(&self.detail)
     }
 
     /// The heads in file order, mutable.
-    pub fn each_mut(&mut self) -> [&mut Head<R>; 3] {
-        [&mut self.opacity, &mut self.covariance, &mut self.colour]
+    pub fn each_mut(&mut self) -> impl Iterator<Item = &mut Head<R>> {
+        [&mut self.opacity, &mut self.covariance, &mut self.colour].into_iter().chain(&mut self.detail)
+    }
+
+    /// The same heads with each replaced by what `f` makes of it.
+    pub fn map<T>(&self, f: impl Fn(&Head<R>) -> Head<T>) -> Heads<T> {
+        Heads {
+            opacity: f(&self.opacity),
+            covariance: f(&self.covariance),
+            colour: f(&self.colour),
+            detail: self.detail.as_ref().map(&f),
+        }
     }
 }

@@ -16,7 +16,8 @@ const MIN_SQUARED_SPACING: f64 = 1e-7;
 /// Builds the starting scene from points (Lu et al. 2024, Scaffold-GS, section 3.1).
 ///
 /// Anchors sit at unique(round(p/ε))·ε in lexicographic order; offsets and features are 0; all six log-scales are
-/// ln √(mean squared distance to the three nearest anchors); heads are drawn from U(−1/√n_in, 1/√n_in).
+/// ln √(mean squared distance to the three nearest anchors); heads are drawn from U(−1/√n_in, 1/√n_in), but that of detail
+/// ends in zeros, so that it adds nothing at first.
 pub fn initial_scene(shape: ModelShape, voxel_size: f64, points: &[DVec3], rng: &mut ChaCha8Rng) -> Scene<f32> {
     let cells: BTreeSet<[i32; 3]> = points.iter().map(|p| lattice_cell(*p, voxel_size)).collect();
     let lattice: Vec<[i32; 3]> = cells.into_iter().collect();
@@ -31,6 +32,7 @@ pub fn initial_scene(shape: ModelShape, voxel_size: f64, points: &[DVec3], rng: 
         log_scales,
         offsets: vec![0.0; n * shape.n_offsets * 3],
         mask_logits: vec![f32::real(INITIAL_MASK_LOGIT); n * shape.n_offsets],
+        places: Vec::new(),
     };
     let mut heads = Heads::filled(&shape, 0.0f32);
     for head in heads.each_mut() {
@@ -41,6 +43,10 @@ pub fn initial_scene(shape: ModelShape, voxel_size: f64, points: &[DVec3], rng: 
                 *weight = rng.random_range(-bound..bound);
             }
         }
+    }
+    if let Some(detail) = &mut heads.detail {
+        detail.w2.fill(0.0);
+        detail.b2.fill(0.0);
     }
     Scene { shape, voxel_size, anchors, heads, context: None }
 }

@@ -1,4 +1,4 @@
-//! The trainable scene: anchors on an integer lattice and the three heads that turn them into Gaussians.
+//! The trainable scene: anchors on an integer lattice and the heads that turn them into Gaussians.
 //!
 //! Everything is in the normalised frame of [`crate::dataset::Normalisation`].
 
@@ -22,12 +22,41 @@ pub struct ModelShape {
     pub view_distance: bool,
     /// Opacity is multiplied by √(det Σ / det(Σ + 0.3 I)) (Yu et al. 2024, Mip-Splatting, eq. 8).
     pub dilation_compensation: bool,
+    /// Hidden width of the colour head; 0: F, as that of the others.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub colour_hidden: usize,
+    /// Hidden width of the detail head; 0: there is none.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub detail_hidden: usize,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference")]
+fn is_zero(width: &usize) -> bool {
+    *width == 0
 }
 
 impl ModelShape {
+    /// F features, K offsets, no effects.
+    pub const fn plain(feature_dim: usize, n_offsets: usize) -> Self {
+        Self {
+            feature_dim,
+            n_offsets,
+            view_direction: false,
+            view_distance: false,
+            dilation_compensation: false,
+            colour_hidden: 0,
+            detail_hidden: 0,
+        }
+    }
+
     /// Inputs of every head: feature, then direction (3), then distance (1), the last two if present.
     pub fn head_inputs(&self) -> usize {
         self.feature_dim + 3 * usize::from(self.view_direction) + usize::from(self.view_distance)
+    }
+
+    /// Hidden width of the colour head.
+    pub fn colour_width(&self) -> usize {
+        if self.colour_hidden == 0 { self.feature_dim } else { self.colour_hidden }
     }
 
     /// Trained values an anchor carries: F features, 6 log-scales, 3K offsets.
@@ -38,6 +67,9 @@ impl ModelShape {
 
 /// Mask logits above this are drawn: sigmoid(m) > 0.01.
 pub const MASK_THRESHOLD: f64 = -4.595_119_850_134_59;
+/// Where masks are switched off.
+const MASKED: f64 = -11.5;
+const _: () = assert!(MASKED < MASK_THRESHOLD);
 /// Where mask logits start.
 pub const INITIAL_MASK_LOGIT: f64 = 1.0;
 
@@ -56,6 +88,9 @@ pub struct Anchors<R> {
     /// `[n_anchors, K]` mask logits: an offset is drawn, and coded, only where its logit is above [`MASK_THRESHOLD`]
     /// (Chen et al. 2024, HAC, section 4.3).
     pub mask_logits: Vec<R>,
+    /// `[n_anchors]`, or empty where nothing has given out places: the share of the anchors that goes before this one when
+    /// anchors are left out.
+    pub places: Vec<f32>,
 }
 
 impl<R> Anchors<R> {
@@ -83,6 +118,16 @@ impl<R> Anchors<R> {
         (anchor * k..(anchor + 1) * k).any(|offset| self.is_drawn(offset))
     }
 
+    /// Switches offsets off, counted through all anchors': sigmoid of their logits is 1e-5 then.
+    pub fn mask(&mut self, offsets: &[usize])
+    where
+        R: crate::ops::Real,
+    {
+        for offset in offsets {
+            self.mask_logits[*offset] = R::real(MASKED);
+        }
+    }
+
     /// Whether there is no anchor.
     pub fn is_empty(&self) -> bool {
         self.lattice.is_empty()
@@ -98,7 +143,7 @@ pub struct Scene<R> {
     pub voxel_size: f64,
     /// The anchors.
     pub anchors: Anchors<R>,
-    /// The three heads.
+    /// The heads.
     pub heads: Heads<R>,
     /// What places say about values, once training has come to it; scenes without are coded with static tables.
     pub context: Option<ContextModel<R>>,
@@ -133,12 +178,9 @@ impl<R: crate::ops::Real> Scene<R> {
                 log_scales: all(&self.anchors.log_scales),
                 offsets: all(&self.anchors.offsets),
                 mask_logits: all(&self.anchors.mask_logits),
+                places: self.anchors.places.clone(),
             },
-            heads: Heads {
-                opacity: head(&self.heads.opacity),
-                covariance: head(&self.heads.covariance),
-                colour: head(&self.heads.colour),
-            },
+            heads: self.heads.map(head),
             context: self.context.as_ref().map(|context| ContextModel {
                 frame: context.frame,
                 levels: context.levels.clone(),

@@ -10,7 +10,7 @@ use super::config::Densification;
 use super::optimiser::{Optimiser, retain_rows};
 use super::statistics::Statistics;
 use crate::scene::init::lattice_cell;
-use crate::scene::{INITIAL_MASK_LOGIT, Scene};
+use crate::scene::{Anchors, INITIAL_MASK_LOGIT, Scene};
 
 /// Base log-scales above this are lowered to it at every event, as the published trainer does: l_g ≤ e^0.05.
 const MAX_BASE_LOG_SCALE: f32 = 0.05;
@@ -81,6 +81,9 @@ pub fn grow(
             scene.anchors.log_scales.extend([log_edge; 6]);
             scene.anchors.offsets.extend(std::iter::repeat_n(0.0, 3 * k));
             scene.anchors.mask_logits.extend(std::iter::repeat_n(INITIAL_MASK_LOGIT as f32, k));
+            if !scene.anchors.places.is_empty() {
+                scene.anchors.places.push(1.0);
+            }
         }
     }
     for at in eligible {
@@ -125,7 +128,6 @@ pub fn prune(
     statistics: &mut Statistics,
     settings: &Densification,
 ) -> usize {
-    let (f, k) = (scene.shape.feature_dim, scene.shape.n_offsets);
     let enough = f64::from(settings.interval) * settings.success;
     let n_before = scene.anchors.len();
     let judged: Vec<bool> = statistics.n_views.iter().map(|n| f64::from(*n) > enough).collect();
@@ -148,14 +150,23 @@ pub fn prune(
     for base in scene.anchors.log_scales.chunks_exact_mut(6).flat_map(|s| &mut s[3..]) {
         *base = base.min(MAX_BASE_LOG_SCALE);
     }
-    retain_rows(&mut scene.anchors.lattice, 1, &keep);
-    retain_rows(&mut scene.anchors.features, f, &keep);
-    retain_rows(&mut scene.anchors.log_scales, 6, &keep);
-    retain_rows(&mut scene.anchors.offsets, 3 * k, &keep);
-    retain_rows(&mut scene.anchors.mask_logits, k, &keep);
-    optimiser.retain(&keep, f, k);
-    statistics.retain(&keep, k);
+    retain(scene, optimiser, statistics, &keep);
     n_before - scene.anchors.len()
+}
+
+/// Drops the anchors that `keep` does not mark, with all that belongs to them.
+pub fn retain(scene: &mut Scene<f32>, optimiser: &mut Optimiser<f32>, statistics: &mut Statistics, keep: &[bool]) {
+    let (f, k) = (scene.shape.feature_dim, scene.shape.n_offsets);
+    let Anchors { lattice, features, log_scales, offsets, mask_logits, places } = &mut scene.anchors;
+    retain_rows(lattice, 1, keep);
+    for (values, width) in [(features, f), (log_scales, 6), (offsets, 3 * k), (mask_logits, k)] {
+        retain_rows(values, width, keep);
+    }
+    if !places.is_empty() {
+        retain_rows(places, 1, keep);
+    }
+    optimiser.retain(keep, f, k);
+    statistics.retain(keep, k);
 }
 
 #[cfg(test)]

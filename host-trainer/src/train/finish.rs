@@ -8,7 +8,7 @@ use super::step::Workspace;
 use super::survey::Survey;
 use super::{TrainError, Trainer};
 use crate::ops::simd::Level;
-use crate::ops::{Pinhole, anchor_bits, hash_grid, head, mask, perturb};
+use crate::ops::{anchor_bits, hash_grid, head, mask, perturb};
 use crate::scene::Scene;
 
 /// Anchors that one task looks at.
@@ -19,7 +19,8 @@ const ROWS: usize = 512;
 pub struct Finished {
     /// The scene; offsets that no view draws are masked, and with a context model every value is one that a decoder reads.
     pub scene: Scene<f32>,
-    /// `[n]` aggregated opacity, see [`Survey::importance`].
+    /// `[n]` which anchors matter: their [places](crate::scene::Anchors::places) if they have any, else their aggregated
+    /// opacity, see [`Survey::importance`]. The order of the tiers.
     pub importance: Vec<f32>,
     /// Offsets that were masked because no view draws them.
     pub n_undrawn: usize,
@@ -41,11 +42,12 @@ impl Trainer<'_> {
         if let Some(context) = &context {
             round_values(&mut scene, context);
         }
-        let cameras: Vec<&Pinhole<f32>> = self.trained.iter().map(|view| &self.cameras[*view as usize]).collect();
-        let survey = Survey::new(&scene, &mut Workspace::new(&scene.shape), &cameras);
+        let survey = Survey::new(&scene, &mut Workspace::new(&scene.shape), &self.trained_cameras(), false);
         let n_undrawn = survey.mask_undrawn(&mut scene);
         let estimated_bits = context.as_ref().map(|context| estimated_bits(&scene, context));
-        Ok(Finished { scene, importance: survey.importance, n_undrawn, estimated_bits })
+        // Places that training has given out decide; it has prepared the scene for them.
+        let importance = if scene.anchors.places.is_empty() { survey.importance } else { scene.anchors.places.clone() };
+        Ok(Finished { scene, importance, n_undrawn, estimated_bits })
     }
 }
 

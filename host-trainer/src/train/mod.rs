@@ -7,6 +7,7 @@ pub mod config;
 pub mod context_start;
 pub mod densify;
 pub mod finish;
+pub mod module;
 pub mod optimiser;
 mod outcome;
 pub mod run;
@@ -29,14 +30,17 @@ pub use watchdog::DroppedStep;
 
 use crate::dataset::{Capture, Image, View};
 use crate::ops::Pinhole;
+use crate::ops::noise::Stream;
 use crate::scene::init::initial_scene;
 use crate::scene::{Anchors, Heads, Scene};
 use checkpoint::{CaptureSignature, Kernels};
 use coding::Integers;
 use config::{Backbone, Phase, Rate, Rates};
+use module::Moment;
 use optimiser::Optimiser;
 use statistics::Statistics;
-use step::{Target, Workspace, clear_masked};
+use step::{Loss, Target, Workspace, clear_masked};
+use survey::Survey;
 use watchdog::Watchdog;
 
 /// Length of the published runs, iterations.
@@ -89,9 +93,10 @@ impl<'a> Trainer<'a> {
             return Err(TrainError::NoPoints);
         }
         let mut trainer = Self::without_scene(capture, config)?;
-        trainer.scene = initial_scene(config.shape, trainer.scene.voxel_size, &capture.points, &mut trainer.rng);
+        let shape = trainer.config.shape;
+        trainer.scene = initial_scene(shape, trainer.scene.voxel_size, &capture.points, &mut trainer.rng);
         trainer.optimiser = Optimiser::new(&trainer.scene);
-        trainer.statistics = Statistics::new(trainer.scene.anchors.len(), config.shape.n_offsets);
+        trainer.statistics = Statistics::new(trainer.scene.anchors.len(), shape.n_offsets);
         Ok(trainer)
     }
 
@@ -102,8 +107,14 @@ impl<'a> Trainer<'a> {
             return Err(TrainError::NoViews);
         }
         let config = config.resolved_for(capture);
-        let anchors =
-            Anchors { lattice: vec![], features: vec![], log_scales: vec![], offsets: vec![], mask_logits: vec![] };
+        let anchors = Anchors {
+            lattice: vec![],
+            features: vec![],
+            log_scales: vec![],
+            offsets: vec![],
+            mask_logits: vec![],
+            places: vec![],
+        };
         let heads = Heads::filled(&config.shape, 0.0);
         let voxel_size = config.voxel_size_for(capture);
         let scene = Scene { shape: config.shape, voxel_size, anchors, heads, context: None };
@@ -215,7 +226,11 @@ impl<'a> Trainer<'a> {
         };
         let context = integers.as_ref().map(|integers| integers.context(&self.scene)).transpose()?;
         let coding = coding::coding(&self.config, self.iteration, context.as_ref().zip(integers.as_ref()));
-        let report = self.workspace.step(&self.scene, &target, &self.config.loss, &coding);
+        let (modules, at) = (self.config.modules, self.moment());
+        let pruned_share = modules.each().iter().map(|module| module.pruned_share(&at)).fold(0.0, f32::max);
+        let terms = modules.terms();
+        let loss = Loss { weights: self.config.loss, modules: Some((&terms, &at)), pruned_share };
+        let report = self.workspace.step(&self.scene, &target, &loss, &coding);
         if let Some(cause) = watchdog::inspect(&self.scene, &truth, self.background, &self.workspace, &report) {
             let dropped = DroppedStep { iteration: self.iteration, view: name.clone(), cause };
             return if self.watchdog.dropped() {
@@ -232,7 +247,35 @@ impl<'a> Trainer<'a> {
             self.optimiser.apply(&mut self.scene, &self.workspace, &rates, progress, self.capture.extent);
         }
         self.densify();
+        modules.each().into_iter().for_each(|module| module.event(&at, self));
         Ok(Outcome { report, dropped: None })
+    }
+
+    /// What modules are told of this iteration.
+    fn moment(&self) -> Moment {
+        let phase = self.config.phase(self.iteration);
+        Moment {
+            iteration: self.iteration,
+            iterations: self.config.iterations,
+            phase,
+            scaled: self.config.backbone == Backbone::Scaffold || phase != Phase::Raw,
+            base_steps: self.config.hac.base_steps(),
+            stream: Stream::of_run(self.config.seed).branch(self.iteration),
+        }
+    }
+
+    fn trained_cameras(&self) -> Vec<&Pinhole<f32>> {
+        self.trained.iter().map(|view| &self.cameras[*view as usize]).collect()
+    }
+
+    /// What the views that training sees show of the scene as it stands; see [`Survey::new`].
+    pub fn survey(&self, contributions: bool) -> Survey {
+        Survey::new(&self.scene, &mut Workspace::new(&self.scene.shape), &self.trained_cameras(), contributions)
+    }
+
+    /// Drops the anchors that `keep` does not mark.
+    pub fn keep_anchors(&mut self, keep: &[bool]) {
+        densify::retain(&mut self.scene, &mut self.optimiser, &mut self.statistics, keep);
     }
 
     /// The learning rates of this iteration.

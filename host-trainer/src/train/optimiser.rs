@@ -134,10 +134,11 @@ impl<R: Real> Optimiser<R> {
             group.update(workspace, &gradient_of);
         }
 
-        let head_rates = [rates.opacity_head, rates.covariance_head, rates.colour_head];
+        // The detail head goes on with colours, at their rate.
+        let head_rates = [rates.opacity_head, rates.covariance_head, rates.colour_head, rates.colour_head];
         let [first, second] = &mut self.heads;
-        let moments = first.each_mut().into_iter().zip(second.each_mut());
-        let all = heads.each_mut().into_iter().zip(workspace.d_heads.each()).zip(moments).zip(head_rates);
+        let moments = first.each_mut().zip(second.each_mut());
+        let all = heads.each_mut().zip(workspace.d_heads.each()).zip(moments).zip(head_rates);
         for (((head, gradient), (first, second)), rate) in all {
             update_head(step(rate.at(progress)), head, gradient, [first, second]);
         }

@@ -9,11 +9,12 @@ mod stages;
 use rayon::prelude::*;
 
 use super::config::LossWeights;
+use super::module::{Moment, Pictures, Terms};
 use crate::ops::project::{Footprint, Splat};
 use crate::ops::rasterise::TiledImage;
 use crate::ops::simd::Level;
 use crate::ops::{Pinhole, Real, l1, prefilter, rasterise, ssim, tiles, volume};
-use crate::scene::{Heads, ModelShape, Scene};
+use crate::scene::{Head, Heads, ModelShape, Scene};
 pub use block::Block;
 use coded::{Network, Weights};
 use coding::{Coding, RateReport};
@@ -36,6 +37,24 @@ pub struct Target<'a, R> {
     pub mask: Option<&'a [bool]>,
     /// What lies behind everything.
     pub background: [R; 3],
+}
+
+/// What a step's loss consists of besides the rate.
+#[derive(Clone, Copy)]
+pub struct Loss<'a, R> {
+    /// Weights of the image's terms.
+    pub weights: LossWeights,
+    /// The terms of modules, and what they are told of the run.
+    pub modules: Option<(&'a [&'a dyn Terms<R>], &'a Moment)>,
+    /// Anchors whose [place](crate::scene::Anchors::places) is below are not there.
+    pub pruned_share: f32,
+}
+
+impl<R> Loss<'_, R> {
+    /// The image's terms alone.
+    pub fn plain(weights: LossWeights) -> Self {
+        Self { weights, modules: None, pruned_share: 0.0 }
+    }
 }
 
 /// What a step gives back, besides the gradients it leaves in the [`Workspace`].
@@ -125,14 +144,18 @@ impl<R: Real> Workspace<R> {
         background: [R; 3],
         coding: &Coding<'_, R>,
         network: Option<Network<'_, R>>,
+        pruned_share: f32,
     ) -> Drawing<R> {
         let mut stopwatch = Stopwatch::start();
+        let is_kept = |a: usize| scene.anchors.places.get(a).is_none_or(|place| *place >= pruned_share);
         let visible: Vec<u32> = (0..scene.anchors.len())
             .into_par_iter()
             .with_min_len(1024)
             .filter(|a| {
                 let size = std::array::from_fn(|i| scene.anchors.log_scales[a * 6 + i].exp());
-                scene.anchors.has_drawn(*a) && prefilter::anchor_is_visible(camera, scene.position(*a), size)
+                is_kept(*a)
+                    && scene.anchors.has_drawn(*a)
+                    && prefilter::anchor_is_visible(camera, scene.position(*a), size)
             })
             .map(|a| u32::try_from(a).expect("fewer than 2³² anchors"))
             .collect();
@@ -160,26 +183,41 @@ impl<R: Real> Workspace<R> {
 
     /// The image of a view, planes `[3, height, width]`, not clamped.
     pub fn image(&mut self, scene: &Scene<R>, camera: &Pinhole<R>, background: [R; 3]) -> Vec<R> {
-        self.draw(scene, camera, background, &Coding::Raw, None).image.to_planes(camera.size_px)
+        self.draw(scene, camera, background, &Coding::Raw, None, 0.0).image.to_planes(camera.size_px)
+    }
+
+    /// Σ of α·T over the pixels of a view, for each splat: block by block, in the order of [`Block::drawn`].
+    ///
+    /// It is the derivative of the sum of a channel of the image by the splat's colour in it.
+    pub fn contributions(&mut self, scene: &Scene<R>, camera: &Pinhole<R>) -> Vec<R> {
+        let drawing = self.draw(scene, camera, [R::ZERO; 3], &Coding::Raw, None, 0.0);
+        let mut d_image = vec![R::ZERO; 3 * camera.size_px[0] * camera.size_px[1]];
+        let n_pixels = d_image.len() / 3;
+        d_image[..n_pixels].fill(R::ONE);
+        let d_tiled = TiledImage::from_planes(&d_image, camera.size_px);
+        let Drawing { image, lists, splats, footprints, .. } = &drawing;
+        let d_splats = rasterise::backward(self.level, splats, footprints, lists, image, &d_tiled);
+        d_splats.iter().map(|d| d.colour[0]).collect()
     }
 
     /// Loss and gradients of one view.
     ///
-    /// L = (1 − λ)·L1 + λ·(1 − SSIM) + w·mean(s_x·s_y·s_z) (Lu et al. 2024, Scaffold-GS, eq. 10), and the terms of
-    /// [`RateTerms`](coding::RateTerms) where `coding` has them. Gradients of anchors are left in [`Self::blocks`], those
+    /// L = (1 − λ)·L1 + λ·(1 − SSIM) + w·mean(s_x·s_y·s_z) (Lu et al. 2024, Scaffold-GS, eq. 10), the terms of modules, and
+    /// those of [`RateTerms`](coding::RateTerms) where `coding` has them. Gradients of anchors are left in [`Self::blocks`], those
     /// of the heads in [`Self::d_heads`], those of the context model in [`Self::d_context`].
     pub fn step(
         &mut self,
         scene: &Scene<R>,
         target: &Target<'_, R>,
-        weights: &LossWeights,
+        terms: &Loss<'_, R>,
         coding: &Coding<'_, R>,
     ) -> StepReport<R> {
+        let weights = &terms.weights;
         let size_px = target.camera.size_px;
         let steps_head = context::steps_head(scene, coding);
         let network = context::network(scene, coding, steps_head.as_ref());
         let Drawing { mut stages, image: tiled, lists, splats, footprints } =
-            self.draw(scene, target.camera, target.background, coding, network);
+            self.draw(scene, target.camera, target.background, coding, network, terms.pruned_share);
         let mut stopwatch = Stopwatch::start();
         let mut image = tiled.to_planes(size_px);
         clear_masked(&mut image, target.mask);
@@ -189,11 +227,22 @@ impl<R: Real> Workspace<R> {
         let mut d_image = vec![R::ZERO; image.len()];
         l1::backward(&image, target.truth, R::ONE - lambda, &mut d_image);
         ssim::backward(self.level, &image, target.truth, size_px, &partials, -lambda, &mut d_image);
+        let mut by_modules = R::ZERO;
+        let (modules, at) = terms.modules.unzip();
+        let modules = modules.into_iter().flatten().zip(at.into_iter().cycle());
+        for (module, at) in modules.clone() {
+            let pictures = Pictures { image: &image, truth: target.truth, size_px, level: self.level };
+            by_modules += module.on_image(at, &pictures, &mut d_image);
+            by_modules += module.on_gaussians(at, scene, &mut self.blocks[..self.n_blocks]);
+        }
         clear_masked(&mut d_image, target.mask);
         let n_gaussians = self.blocks().iter().map(|b| b.gaussians.len()).sum();
         let volume_weight = R::real(weights.volume);
         let volumes: R = self.blocks().iter().map(|b| volume::forward(&b.gaussians, volume_weight, n_gaussians)).sum();
-        let mut loss = (R::ONE - lambda) * l1::forward(&image, target.truth) + lambda * (R::ONE - similarity) + volumes;
+        let mut loss = (R::ONE - lambda) * l1::forward(&image, target.truth)
+            + lambda * (R::ONE - similarity)
+            + volumes
+            + by_modules;
 
         let squared: f64 = image
             .chunks(4096)
@@ -228,6 +277,9 @@ impl<R: Real> Workspace<R> {
             }
         };
         stages.context_backward = stopwatch.lap();
+        for (module, at) in modules {
+            loss += module.on_anchors(at, scene, &mut self.blocks[..self.n_blocks]);
+        }
         StepReport {
             loss,
             squared_error: squared / (3 * target.n_counted()) as f64,
@@ -241,14 +293,14 @@ impl<R: Real> Workspace<R> {
 
     /// Adds the blocks' gradients of the heads in block order.
     fn sum_head_gradients(&mut self) {
-        let blocks = &self.blocks[..self.n_blocks];
-        for (h, head) in self.d_heads.each_mut().into_iter().enumerate() {
-            for (g, group) in head.groups_mut().into_iter().enumerate() {
-                group.fill(R::ZERO);
-                for block in blocks {
-                    for (sum, part) in group.iter_mut().zip(block.d_heads.each()[h].groups()[g]) {
-                        *sum += *part;
-                    }
+        for group in self.d_heads.each_mut().flat_map(Head::groups_mut) {
+            group.fill(R::ZERO);
+        }
+        for block in &self.blocks[..self.n_blocks] {
+            let parts = block.d_heads.each().flat_map(Head::groups);
+            for (sums, parts) in self.d_heads.each_mut().flat_map(Head::groups_mut).zip(parts) {
+                for (sum, part) in sums.iter_mut().zip(parts) {
+                    *sum += *part;
                 }
             }
         }

@@ -3,11 +3,7 @@
 
 use super::step::Workspace;
 use crate::ops::Pinhole;
-use crate::scene::{MASK_THRESHOLD, Scene};
-
-/// Where masks are switched off: sigmoid is 1e-5.
-const MASKED: f32 = -11.5;
-const _: () = assert!((MASKED as f64) < MASK_THRESHOLD);
+use crate::scene::Scene;
 
 /// One pass over some views.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,16 +13,34 @@ pub struct Survey {
     /// `[n]` aggregated opacity: the mean over the views of the summed opacities of the anchor's Gaussians that reach the
     /// image; a view that does not show the anchor counts as 0.
     pub importance: Vec<f32>,
+    /// `[n]` share of the views that show the anchor: in which it passes the prefilter.
+    pub shown: Vec<f32>,
+    /// `[n]` Σ of α·T over the pixels of all views and the anchor's Gaussians, where asked for; else empty.
+    pub contribution: Vec<f32>,
 }
 
 impl Survey {
-    /// Draws every view once.
-    pub fn new(scene: &Scene<f32>, workspace: &mut Workspace<f32>, cameras: &[&Pinhole<f32>]) -> Self {
+    /// Draws every view once; with `contributions` also backwards, which takes three times as long.
+    pub fn new(
+        scene: &Scene<f32>,
+        workspace: &mut Workspace<f32>,
+        cameras: &[&Pinhole<f32>],
+        contributions: bool,
+    ) -> Self {
         let (n, k) = (scene.anchors.len(), scene.shape.n_offsets);
-        let mut survey = Self { drawn: vec![false; n * k], importance: vec![0.0; n] };
+        let contribution = vec![0.0; if contributions { n } else { 0 }];
+        let mut survey =
+            Self { drawn: vec![false; n * k], importance: vec![0.0; n], shown: vec![0.0; n], contribution };
         for camera in cameras {
-            workspace.image(scene, camera, [0.0; 3]);
+            if contributions {
+                survey.add_contributions(scene, workspace, camera);
+            } else {
+                workspace.image(scene, camera, [0.0; 3]);
+            }
             for block in workspace.blocks() {
+                for anchor in &block.anchors {
+                    survey.shown[*anchor as usize] += 1.0;
+                }
                 for i in block.drawn.iter().map(|i| *i as usize) {
                     let source = block.sources[i];
                     let anchor = block.anchors[source.row as usize] as usize;
@@ -35,24 +49,34 @@ impl Survey {
                 }
             }
         }
-        for sum in &mut survey.importance {
+        for sum in survey.importance.iter_mut().chain(&mut survey.shown) {
             *sum /= cameras.len().max(1) as f32;
         }
         survey
+    }
+
+    /// `[n]` the mean of the summed opacities over the views that show the anchor; 0 where none does.
+    pub fn opacity_per_view(&self) -> Vec<f32> {
+        let pairs = self.importance.iter().zip(&self.shown);
+        pairs.map(|(sum, shown)| if *shown > 0.0 { sum / shown } else { 0.0 }).collect()
+    }
+
+    fn add_contributions(&mut self, scene: &Scene<f32>, workspace: &mut Workspace<f32>, camera: &Pinhole<f32>) {
+        let weights = workspace.contributions(scene, camera);
+        let drawn = workspace.blocks().iter().flat_map(|block| block.drawn.iter().map(move |i| (block, *i as usize)));
+        for ((block, i), weight) in drawn.zip(weights) {
+            self.contribution[block.anchors[block.sources[i].row as usize] as usize] += weight;
+        }
     }
 
     /// Switches off the masks of offsets that no view draws: they would cost bits and show nothing.
     ///
     /// * returns how many were on.
     pub fn mask_undrawn(&self, scene: &mut Scene<f32>) -> usize {
-        let mut n_masked = 0;
-        for offset in 0..self.drawn.len() {
-            if !self.drawn[offset] && scene.anchors.is_drawn(offset) {
-                scene.anchors.mask_logits[offset] = MASKED;
-                n_masked += 1;
-            }
-        }
-        n_masked
+        let undrawn = (0..self.drawn.len()).filter(|offset| !self.drawn[*offset] && scene.anchors.is_drawn(*offset));
+        let undrawn: Vec<usize> = undrawn.collect();
+        scene.anchors.mask(&undrawn);
+        undrawn.len()
     }
 }
 
@@ -72,14 +96,14 @@ mod tests {
         let mut scene = trainer.scene.clone();
         let mut workspace = Workspace::new(&scene.shape);
         let cameras: Vec<&Pinhole<f32>> = trainer.cameras().iter().collect();
-        let survey = Survey::new(&scene, &mut workspace, &cameras);
+        let survey = Survey::new(&scene, &mut workspace, &cameras, false);
         let before: Vec<Vec<f32>> = cameras.iter().map(|c| workspace.image(&scene, c, [0.0; 3])).collect();
         let n_masked = survey.mask_undrawn(&mut scene);
         assert!(n_masked > 0 && n_masked == survey.drawn.iter().filter(|drawn| !**drawn).count());
         for (camera, before) in cameras.iter().zip(before) {
             assert!(workspace.image(&scene, camera, [0.0; 3]) == before);
         }
-        assert_eq!(Survey::new(&scene, &mut workspace, &cameras), survey);
+        assert_eq!(Survey::new(&scene, &mut workspace, &cameras, false), survey);
         for (a, importance) in survey.importance.iter().enumerate() {
             assert_eq!(*importance > 0.0, scene.anchors.has_drawn(a), "anchor {a}");
         }

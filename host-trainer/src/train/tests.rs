@@ -58,8 +58,9 @@ fn the_finished_scene_is_what_the_last_step_drew() {
     let coding = coding::coding(&trainer.config, trainer.iteration, Some((&context, &integers)));
     let truth = vec![0.0; 3 * camera.size_px.iter().product::<usize>()];
     let target = Target { camera, truth: &truth, mask: None, background: [0.0; 3] };
-    let mut draw =
-        |scene: &Scene<f32>, coding| trainer.workspace.step(scene, &target, &trainer.config.loss, coding).squared_error;
+    let mut draw = |scene: &Scene<f32>, coding| {
+        trainer.workspace.step(scene, &target, &Loss::plain(trainer.config.loss), coding).squared_error
+    };
     assert_eq!(draw(&trainer.scene, &coding), draw(&scene, &step::coding::Coding::Raw));
 }
 

@@ -125,7 +125,7 @@ fn context_gradients(workspace: &Workspace<f32>) -> impl Iterator<Item = &[f32]>
 }
 
 fn groups(heads: &Heads<f32>) -> impl Iterator<Item = &[f32]> {
-    heads.each().into_iter().flat_map(|head| head.groups())
+    heads.each().flat_map(|head| head.groups())
 }
 
 /// Row and value of the first number whose magnitude is not at most `limit`.

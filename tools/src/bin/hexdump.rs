@@ -89,15 +89,10 @@ fn with_example(text: &str, name: &str, dump: &str) -> Result<String> {
 }
 
 /// Three anchors in two tiers, one of them with a hidden offset, one with a value so far out that it takes the escape; the
-/// other example has a context model of one level and two hidden units, and coded heads.
+/// other example has a context model of one level and two hidden units, coded heads, and a detail head of one unit.
 fn example(coder: Coder) -> Result<Vec<u8>> {
-    let shape = ModelShape {
-        feature_dim: 2,
-        n_offsets: 2,
-        view_direction: false,
-        view_distance: false,
-        dilation_compensation: true,
-    };
+    let detail_hidden = usize::from(coder == Coder::Context);
+    let shape = ModelShape { dilation_compensation: true, detail_hidden, ..ModelShape::plain(2, 2) };
     let mut heads = Heads::filled(&shape, 0.25);
     (heads.opacity.w1[0], heads.covariance.w2[3]) = (0.5, -0.25);
     (heads.opacity.b2[0], heads.colour.b2[0]) = (1.0, 2.0);
@@ -112,6 +107,7 @@ fn example(coder: Coder) -> Result<Vec<u8>> {
                 0.25, 0.0, -0.5, 0.5, 0.5, 0.0, 0.0, 0.5, 0.25, 0.0, 0.0, 0.0, 0.25, 0.25, 0.0, -0.25, 0.0, 0.0,
             ],
             mask_logits: vec![1.0, 1.0, 1.0, -10.0, 1.0, 1.0],
+            places: vec![],
         },
         heads,
         context: (coder == Coder::Context).then(|| context(&shape)),

@@ -1,4 +1,4 @@
-//! Writes a small bundle made by hand: a banded planet with a ring, 160×120, every view effect in use; the ring is a tier
+//! Writes a small bundle made by hand: a banded planet with a ring, 160×120, every effect in use; the ring is a tier
 //! of its own, and its patches hide a disc each.
 //!
 //! No training and no capture is behind it, so a firmware has something to draw from a fresh clone.
@@ -25,11 +25,11 @@ struct Args {
 }
 
 const SHAPE: ModelShape = ModelShape {
-    feature_dim: 16,
-    n_offsets: 4,
     view_direction: true,
     view_distance: true,
     dilation_compensation: true,
+    detail_hidden: 8,
+    ..ModelShape::plain(16, 4)
 };
 const VOXEL_SIZE: f64 = 1.0 / 64.0;
 const BACKGROUND: [u8; 3] = [8, 10, 24];
@@ -93,8 +93,14 @@ fn lit(colour: DVec3, normal: DVec3) -> DVec3 {
 }
 
 fn scene() -> Scene<f32> {
-    let mut anchors =
-        Anchors { lattice: vec![], features: vec![], log_scales: vec![], offsets: vec![], mask_logits: vec![] };
+    let mut anchors = Anchors {
+        lattice: vec![],
+        features: vec![],
+        log_scales: vec![],
+        offsets: vec![],
+        mask_logits: vec![],
+        places: vec![],
+    };
     let n_planet = planet().len();
     for (index, patch) in planet().into_iter().chain(ring()).enumerate() {
         anchors.lattice.push((patch.position / VOXEL_SIZE).round().as_ivec3().to_array());
@@ -116,10 +122,11 @@ fn scene() -> Scene<f32> {
     Scene { shape: SHAPE, voxel_size: VOXEL_SIZE, anchors, heads: heads(), context: None }
 }
 
-/// Heads that read the features as [`scene`] wrote them, add a glint towards the sun and a haze with distance.
+/// Heads that read the features as [`scene`] wrote them, add a glint towards the sun, a haze with distance, and a glow by
+/// night.
 fn heads() -> Heads<f32> {
     let mut heads = Heads::filled(&SHAPE, 0.0);
-    for head in heads.each_mut() {
+    for head in [&mut heads.opacity, &mut heads.covariance, &mut heads.colour] {
         for unit in 0..=OPACITY {
             head.w1[unit * head.n_in + unit] = 1.0;
             head.b1[unit] = LIFT;
@@ -144,6 +151,14 @@ fn heads() -> Heads<f32> {
         }
         for part in 0..4 {
             pass(&mut heads.covariance, 7 * k + 3 + part, QUATERNION + part);
+        }
+    }
+    if let Some(detail) = &mut heads.detail {
+        // The darker a disc, the more it glows; its red, green and blue are the last inputs.
+        detail.w1[SHAPE.feature_dim..detail.n_in].fill(-1.0);
+        detail.b1[0] = 0.9;
+        for (channel, glow) in [0.10, 0.02, 0.12].into_iter().enumerate() {
+            detail.w2[channel * detail.n_hidden] = glow;
         }
     }
     heads

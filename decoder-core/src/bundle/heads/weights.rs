@@ -12,14 +12,14 @@ const STEPS: core::ops::RangeInclusive<f32> = 1.0 / 16_777_216.0..=1.0;
 pub struct CodedHeads<'a> {
     /// Of all first layers, of all second layers.
     pub tables: [Table<'a>; 2],
-    /// Words of the one stream that holds W1 and W2 of opacity, covariance, colour, each row-major.
+    /// Words of the one stream that holds W1 and W2 of each head, row-major.
     pub words: &'a [[u8; 2]],
 }
 
-/// Reads the six matrices in their order: W1 and W2 of opacity, covariance, colour.
+/// Reads the matrices in their order: W1 and W2 of opacity, covariance, colour, and of detail if there is one.
 #[derive(Clone, Copy, Debug)]
 pub struct WeightReader<'a> {
-    sizes: [[usize; 2]; 3],
+    sizes: [[usize; 2]; N_MATRICES / 2],
     n_read: usize,
     source: Source<'a>,
 }
@@ -66,7 +66,7 @@ impl<'a> CodedHeads<'a> {
 }
 
 impl<'a> WeightReader<'a> {
-    pub(super) fn new(matrices: &Matrices<'a>, sizes: [[usize; 2]; 3]) -> Self {
+    pub(super) fn new(matrices: &Matrices<'a>, sizes: [[usize; 2]; N_MATRICES / 2]) -> Self {
         let source = match matrices {
             Matrices::Raw(halves) => Source::Raw(*halves),
             Matrices::Coded(coded) => Source::Coded(coded.tables, AnsReader::new(coded.words)),
@@ -74,7 +74,7 @@ impl<'a> WeightReader<'a> {
         Self { sizes, n_read: 0, source }
     }
 
-    /// The next matrix; empty after the sixth.
+    /// The next matrix; empty after the last.
     ///
     /// # Budget
     /// A conversion or a symbol a weight.
@@ -89,7 +89,7 @@ impl<'a> WeightReader<'a> {
         LayerWeights { n_left, source }
     }
 
-    /// Ends after the sixth matrix; tells how many bytes of a coded stream are left when it does not end there.
+    /// Ends after the last matrix; tells how many bytes of a coded stream are left when it does not end there.
     pub(super) fn finish(self) -> Result<(), usize> {
         match self.source {
             Source::Raw(_) => Ok(()),

@@ -12,6 +12,8 @@ pub(super) const F: usize = 2;
 pub(super) const K: usize = 3;
 pub(super) const C: usize = F + 6 + 3 * K;
 const N_HIDDEN: usize = 3;
+/// Hidden units of the detail head.
+pub(super) const DETAIL_HIDDEN: u16 = 5;
 /// Bits of the lattice along an axis.
 const B: usize = 3;
 pub(super) const LATTICE_MIN: [i32; 3] = [-4, 10, -2];
@@ -25,6 +27,7 @@ pub(super) struct Variant {
     pub(super) masks: bool,
     pub(super) context: bool,
     pub(super) coded_heads: bool,
+    pub(super) detail: bool,
     /// A section of an unknown kind before the manifest.
     pub(super) unknown_section: bool,
 }
@@ -75,9 +78,13 @@ fn f32s(values: &[f32]) -> Vec<u8> {
 }
 
 /// (inputs, outputs) of the layers, W1 and W2 of each head; view direction is on.
-fn layers() -> [(usize, usize); 6] {
-    let n_in = F + 3;
-    [(n_in, F), (F, K), (n_in, F), (F, 7 * K), (n_in, F), (F, 3 * K)]
+fn layers(variant: Variant) -> Vec<(usize, usize)> {
+    let (n_in, detail) = (F + 3, DETAIL_HIDDEN.into());
+    let mut layers = vec![(n_in, F), (F, K), (n_in, F), (F, 7 * K), (n_in, F), (F, 3 * K)];
+    if variant.detail {
+        layers.extend([(F + 3, detail), (detail, 3)]);
+    }
+    layers
 }
 
 /// Weights that both storages hold exactly: multiples of 1/8.
@@ -119,11 +126,11 @@ fn push_static(slots: &mut Vec<Slot<()>>, symbol: i16) {
     }
 }
 
-fn heads(coded: bool) -> Vec<u8> {
+fn heads(variant: Variant) -> Vec<u8> {
     let n_weights = |(n_in, n_out): (usize, usize)| n_in * n_out;
     let mut bytes = Vec::new();
-    if !coded {
-        for (layer, size) in layers().into_iter().enumerate() {
+    if !variant.coded_heads {
+        for (layer, size) in layers(variant).into_iter().enumerate() {
             bytes.extend(halves((0..n_weights(size)).map(|i| weight(layer, i))));
             bytes.extend(halves((0..size.1).map(|i| bias(layer, i))));
         }
@@ -131,11 +138,11 @@ fn heads(coded: bool) -> Vec<u8> {
     }
     bytes.extend(table(0.0, 0.125));
     bytes.extend(table(0.0, 0.125));
-    for (layer, (_, n_out)) in layers().into_iter().enumerate() {
+    for (layer, (_, n_out)) in layers(variant).into_iter().enumerate() {
         bytes.extend(halves((0..n_out).map(|i| bias(layer, i))));
     }
     let mut slots = Vec::new();
-    for (layer, size) in layers().into_iter().enumerate() {
+    for (layer, size) in layers(variant).into_iter().enumerate() {
         for i in 0..n_weights(size) {
             push_static(&mut slots, (weight(layer, i) * 8.0) as i16);
         }
@@ -280,7 +287,7 @@ pub(super) fn bundle(variant: Variant) -> Vec<u8> {
         })
         .collect();
 
-    let mut sections = vec![(1, heads(variant.coded_heads)), (2, lattice)];
+    let mut sections = vec![(1, heads(variant)), (2, lattice)];
     if variant.masks {
         sections.push((3, mask_frequencies().concat().into_flattened()));
     }
@@ -292,8 +299,11 @@ pub(super) fn bundle(variant: Variant) -> Vec<u8> {
     let n_sections = sections.len();
     let header_len = 160 + 16 * n_sections;
     let file_len = header_len + sections.iter().map(|(_, bytes)| bytes.len()).sum::<usize>();
-    let features =
-        1 | u32::from(variant.masks) << 3 | u32::from(variant.context) << 4 | u32::from(variant.coded_heads) << 5;
+    let features = 1
+        | u32::from(variant.masks) << 3
+        | u32::from(variant.context) << 4
+        | u32::from(variant.coded_heads) << 5
+        | u32::from(variant.detail) << 6;
     let camera = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 6.0, 30.0, 30.0, 16.0, 12.0];
     let mut file = [
         MAGIC.to_vec(),
@@ -306,7 +316,7 @@ pub(super) fn bundle(variant: Variant) -> Vec<u8> {
         u16s(&[32, 24]),
         vec![10, 20, 30, tiers.len() as u8],
         f32s(&[0.125]),
-        u32s(&[0]),
+        u16s(&[F as u16, if variant.detail { DETAIL_HIDDEN } else { 0 }]),
         [0.0_f64, 0.0, 0.0, 1.0].iter().flat_map(|x| x.to_le_bytes()).collect(),
         f32s(&camera),
         u16s(&[32, 24]),

@@ -151,8 +151,12 @@ impl Added {
             [shape.feature_dim * shape.head_inputs(), shape.feature_dim, shape.n_offsets].map(|n| n as u64);
         // The opacity head runs for every visible anchor; hidden layers of the others for those it opens, their outputs
         // for the Gaussians it opens.
-        let head_macs =
-            self.visible_anchors * (hidden + f * k) + self.open_anchors * 2 * hidden + self.gaussians * 10 * f;
+        let [c, d] = [shape.colour_width(), shape.detail_hidden].map(|n| n as u64);
+        let per_open_anchor = hidden + c * shape.head_inputs() as u64 + d * f;
+        let per_gaussian = 7 * f + 3 * c + 6 * d;
+        let head_macs = self.visible_anchors * (hidden + f * k)
+            + self.open_anchors * per_open_anchor
+            + self.gaussians * per_gaussian;
         let largest = |strips: [u64; 8]| strips.into_iter().max().unwrap_or_default();
         TierCounts {
             visible_anchors: self.visible_anchors,

@@ -24,11 +24,10 @@ fn bytes_and_times_of_random_scenes() {
         (Coder::Context, 40_000, 50, 10),
     ] {
         let shape = ModelShape {
-            feature_dim,
-            n_offsets,
             view_direction: true,
             view_distance: true,
             dilation_compensation: true,
+            ..ModelShape::plain(feature_dim, n_offsets)
         };
         let start = Instant::now();
         let (_, bytes) = write_random(coder, shape, n_anchors, 1, 256);

@@ -25,12 +25,12 @@ fn raw_weights_come_back_as_halves() {
     let scene = random_scene(SMALL, 10, 81);
     let (heads, is_coded, n_bytes) = written(&scene, None);
     assert!(!is_coded, "nothing asked for");
-    for (stored, trained) in heads.each().into_iter().zip(scene.heads.each()) {
+    for (stored, trained) in heads.each().zip(scene.heads.each()) {
         for (stored, trained) in stored.groups().into_iter().zip(trained.groups()) {
             assert_eq!(stored, halves(trained));
         }
     }
-    assert_eq!(n_bytes, 2 * scene.heads.each().iter().map(|head| head.n_params()).sum::<usize>(), "two bytes each");
+    assert_eq!(n_bytes, 2 * scene.heads.each().map(|head| head.n_params()).sum::<usize>(), "two bytes each");
 }
 
 #[test]
@@ -41,7 +41,7 @@ fn coded_weights_come_back_within_half_a_step_and_save_bytes() {
     let (_, _, raw_bytes) = written(&scene, None);
     let (heads, is_coded, n_bytes) = written(&scene, Some([8, 7]));
     assert!(is_coded && 10 * n_bytes < 9 * raw_bytes, "{n_bytes} of {raw_bytes} bytes");
-    for (stored, trained) in heads.each().into_iter().zip(scene.heads.each()) {
+    for (stored, trained) in heads.each().zip(scene.heads.each()) {
         for (stored, trained, step) in [(&stored.w1, &trained.w1, 1.0 / 256.0), (&stored.w2, &trained.w2, 1.0 / 128.0)]
         {
             let farthest = stored.iter().zip(trained).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);

@@ -1,4 +1,5 @@
 use super::*;
+use pocketsplat::train::module::pruning;
 
 #[test]
 fn a_written_configuration_reads_back_to_the_last_bit() {
@@ -61,6 +62,27 @@ fn what_is_not_understood_is_refused_by_its_name() {
     ] {
         let message = format!("{:#}", RunConfig::parse(text).unwrap_err());
         assert!(message.contains(part), "{text}: {message}");
+    }
+}
+
+#[test]
+fn any_key_can_be_set_by_its_path() {
+    let config = RunConfig::default();
+    let keys =
+        ["train.iterations=9", "train.modules.pruning.form=tiered", "train.hac.sample = 1", "encoding.tiers=[0.5, 0]"];
+    let set = config.with_keys(&keys.map(str::to_owned)).unwrap();
+    let pruning = set.train.modules.pruning.unwrap();
+    assert_eq!((set.train.iterations, set.train.hac.sample, set.encoding.tiers.as_slice()), (9, 1.0, &[0.5, 0.0][..]));
+    assert_eq!((pruning.form, pruning.beta), (pruning::Form::Tiered, 1e-3), "the rest has its defaults");
+    assert_eq!(RunConfig::parse(&set.to_toml().unwrap()).unwrap(), set);
+    for (key, part) in [
+        ("train.iterations", "needs KEY=VALUE"),
+        ("train.steps=3", "unknown key `train.steps`; known here: "),
+        ("train.modules.pruning.depth=3", "unknown key `train.modules.pruning.depth`"),
+        ("train.modules.pruning.form=soft", "soft"),
+    ] {
+        let message = format!("{:#}", config.with_keys(&[key.to_owned()]).unwrap_err());
+        assert!(message.contains(part), "{key}: {message}");
     }
 }
 

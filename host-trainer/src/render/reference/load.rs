@@ -8,7 +8,7 @@ use pocketsplat_core::{Bundle, DecodeError};
 use super::ReferenceScene;
 use crate::bundle::{decoded_heads, shape_of};
 use crate::ops::Real;
-use crate::scene::{Head, Heads, Scene};
+use crate::scene::{Head, Scene};
 
 impl ReferenceScene {
     /// The scene that a trainer holds: every value widened, positions `lattice · voxel_size`.
@@ -46,7 +46,6 @@ impl ReferenceScene {
             w2: wide(&h.w2),
             b2: wide(&h.b2),
         };
-        let Heads { opacity, covariance, colour } = decoded_heads(bundle);
         let mut scene = Self {
             shape,
             positions: Vec::new(),
@@ -54,7 +53,7 @@ impl ReferenceScene {
             log_scales: Vec::new(),
             offsets: Vec::new(),
             drawn: Vec::new(),
-            heads: Heads { opacity: head(&opacity), covariance: head(&covariance), colour: head(&colour) },
+            heads: decoded_heads(bundle).map(head),
         };
         let mut words = vec![0; bundle.anchor_scratch_words()];
         let mut models = bundle.anchor_models(&mut words)?;

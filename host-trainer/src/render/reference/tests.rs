@@ -34,13 +34,7 @@ fn logit(p: f64) -> f64 {
 /// column i of W2 holds the outputs of anchor i.
 fn scene_of(balls: &[Ball]) -> ReferenceScene {
     let n = balls.len();
-    let shape = ModelShape {
-        feature_dim: n,
-        n_offsets: 1,
-        view_direction: false,
-        view_distance: false,
-        dilation_compensation: false,
-    };
+    let shape = ModelShape { ..ModelShape::plain(n, 1) };
     let mut heads = Heads::filled(&shape, 0.0);
     let mut features = vec![0.0; n * n];
     let mut log_scales = Vec::new();
@@ -240,13 +234,7 @@ fn heads_see_direction_and_distance_after_the_feature() {
 
 #[test]
 fn a_scene_is_widened_value_by_value() {
-    let shape = ModelShape {
-        feature_dim: 1,
-        n_offsets: 1,
-        view_direction: false,
-        view_distance: true,
-        dilation_compensation: false,
-    };
+    let shape = ModelShape { view_distance: true, ..ModelShape::plain(1, 1) };
     let scene = Scene::<f32> {
         shape,
         voxel_size: 0.25,
@@ -256,6 +244,7 @@ fn a_scene_is_widened_value_by_value() {
             log_scales: vec![0.1; 6],
             offsets: vec![1.0, 2.0, 3.0],
             mask_logits: vec![1.0],
+            places: Vec::new(),
         },
         heads: Heads::filled(&shape, 0.125),
         context: None,

@@ -61,8 +61,9 @@ impl<'a> Trainer<'a> {
         out.value(self.rng.get_word_pos())?;
         out.values(&self.queue)?;
 
-        let Anchors { lattice, features, log_scales, offsets, mask_logits } = &self.scene.anchors;
+        let Anchors { lattice, features, log_scales, offsets, mask_logits, places } = &self.scene.anchors;
         out.values(lattice)?;
+        out.values(places)?;
         let Optimiser { features: f, log_scales: s, offsets: o, mask_logits: m, .. } = &self.optimiser;
         for (values, moments) in [(features, f), (log_scales, s), (offsets, o), (mask_logits, m)] {
             out.values(values)?;
@@ -70,7 +71,7 @@ impl<'a> Trainer<'a> {
             out.values(&moments.second)?;
         }
         for heads in [&self.scene.heads, &self.optimiser.heads[0], &self.optimiser.heads[1]] {
-            for group in heads.each().into_iter().flat_map(|head| head.groups()) {
+            for group in heads.each().flat_map(|head| head.groups()) {
                 out.values(group)?;
             }
         }
@@ -124,6 +125,11 @@ impl<'a> Trainer<'a> {
 
         let lattice: Vec<[i32; 3]> = from.values("lattice")?;
         let n = lattice.len();
+        let places: Vec<f32> = from.values("places")?;
+        if !(places.is_empty() || places.len() == n) {
+            let [found, needed] = [places.len(), n].map(|n| n as u64);
+            return Err(CheckpointFault::Content { what: "number of places", found, needed });
+        }
         let mut array = |what, width: usize| -> Result<_, CheckpointFault> {
             let len = n * width;
             let values: Vec<f32> = from.exactly(what, len)?;
@@ -137,12 +143,12 @@ impl<'a> Trainer<'a> {
         let (shape, voxel_size) = (self.config.shape, self.config.voxel_size_for(self.capture));
         let mut heads = || {
             let mut heads = Heads::filled(&shape, 0.0f32);
-            for group in heads.each_mut().into_iter().flat_map(|head| head.groups_mut()) {
+            for group in heads.each_mut().flat_map(|head| head.groups_mut()) {
                 *group = from.exactly("heads", group.len())?;
             }
             Ok::<_, CheckpointFault>(heads)
         };
-        let anchors = Anchors { lattice, features, log_scales, offsets, mask_logits };
+        let anchors = Anchors { lattice, features, log_scales, offsets, mask_logits, places };
         self.scene = Scene { shape, voxel_size, anchors, heads: heads()?, context: None };
         let heads = [heads()?, heads()?];
         let (model, moments) = context::decode(from, &shape)?.unzip();

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 pub use hac::{Backbone, Hac, Phase};
 
+use super::module::Modules;
 use crate::dataset::{Capture, PointsOrigin};
 use crate::scene::ModelShape;
 
@@ -154,6 +155,9 @@ pub struct TrainConfig {
     pub densification: Densification,
     /// The rate, for [`Backbone::Hac`].
     pub hac: Hac,
+    /// What is plugged in.
+    #[serde(default)]
+    pub modules: Modules,
 }
 
 /// Training views without which none is held out.
@@ -163,13 +167,7 @@ impl Default for TrainConfig {
     fn default() -> Self {
         Self {
             backbone: Backbone::Scaffold,
-            shape: ModelShape {
-                feature_dim: 32,
-                n_offsets: 10,
-                view_direction: true,
-                view_distance: false,
-                dilation_compensation: false,
-            },
+            shape: ModelShape { view_direction: true, ..ModelShape::plain(32, 10) },
             iterations: 30_000,
             seed: 42,
             voxel_size: None,
@@ -178,6 +176,7 @@ impl Default for TrainConfig {
             loss: LossWeights::default(),
             densification: Densification::default(),
             hac: Hac::default(),
+            modules: Modules::default(),
         }
     }
 }
@@ -220,9 +219,12 @@ impl TrainConfig {
                 Err(format!("{name} is {value}, needs {low} to {high}"))
             }
         };
+        self.modules.each().into_iter().try_for_each(|module| module.check())?;
         within("--iterations", f64::from(self.iterations), 1.0, 10_000_000.0)?;
         within("--feature-dim", self.shape.feature_dim as f64, 1.0, 256.0)?;
         within("--offsets", self.shape.n_offsets as f64, 1.0, 32.0)?;
+        within("train.shape.colour_hidden", self.shape.colour_hidden as f64, 0.0, 256.0)?;
+        within("train.shape.detail_hidden", self.shape.detail_hidden as f64, 0.0, 256.0)?;
         within("--voxel-size", self.voxel_size.unwrap_or(1e-3), 1e-6, 1.0)?;
         within(
             "train.densification.coarsest_cells",
@@ -289,7 +291,8 @@ impl TrainConfig {
     pub fn resolved_for(&self, capture: &Capture) -> Self {
         let coarsest_cells = Some(self.coarsest_cells_for(capture));
         let densification = Densification { coarsest_cells, ..self.densification };
-        Self { voxel_size: Some(self.voxel_size_for(capture)), densification, ..*self }
+        let shape = self.modules.shape(self.shape);
+        Self { voxel_size: Some(self.voxel_size_for(capture)), densification, shape, ..*self }
     }
 
     /// What iteration `iteration`, from 1, does to the values of anchors.

@@ -5,8 +5,8 @@ use super::coding::Coding;
 use crate::ops::neural_gaussians::{Gaussian, HeadOutputs, Source};
 use crate::ops::project::{Footprint, Splat};
 use crate::ops::simd::Level;
-use crate::ops::{Pinhole, Real, head, head_input, neural_gaussians, project, volume};
-use crate::scene::{Heads, ModelShape, Scene};
+use crate::ops::{Pinhole, Real, detail, head, head_input, neural_gaussians, project, volume};
+use crate::scene::{Head, Heads, ModelShape, Scene};
 
 /// A block of visible anchors on its way through the chain; buffers are kept from step to step.
 #[derive(Clone, Debug)]
@@ -42,7 +42,10 @@ pub struct Block<R> {
     pub splats: Vec<Splat<R>>,
     /// How far these reach.
     pub footprints: Vec<Footprint<R>>,
-    d_gaussians: Vec<Gaussian<R>>,
+    /// dL/d(Gaussians): zero after the forward pass, for terms on Gaussians to add to.
+    pub d_gaussians: Vec<Gaussian<R>>,
+    /// Residuals of the detail head, if the scene has one.
+    pub detail: detail::Kept<R>,
     d_outputs: HeadOutputs<R>,
     d_hidden: Vec<R>,
     d_input: Vec<R>,
@@ -78,6 +81,7 @@ impl<R: Real> Block<R> {
             splats: Vec::new(),
             footprints: Vec::new(),
             d_gaussians: Vec::new(),
+            detail: detail::Kept::default(),
             d_outputs: HeadOutputs::default(),
             d_hidden: Vec::new(),
             d_input: Vec::new(),
@@ -136,7 +140,7 @@ impl<R: Real> Block<R> {
         head_input::forward(shape, camera, &self.features, &self.positions, &mut self.input);
         self.outputs.reset(shape, n);
         let outputs = [&mut self.outputs.opacity, &mut self.outputs.covariance, &mut self.outputs.colour];
-        for ((weights, hidden), output) in scene.heads.each().into_iter().zip(&mut self.hidden).zip(outputs) {
+        for ((weights, hidden), output) in scene.heads.each().zip(&mut self.hidden).zip(outputs) {
             hidden.resize(n * weights.n_hidden, R::ZERO);
             head::forward(weights, &self.input, hidden, output);
         }
@@ -158,6 +162,16 @@ impl<R: Real> Block<R> {
                     &mut self.gaussians,
                     &mut self.sources,
                 );
+            },
+        );
+        if let Some(head) = &scene.heads.detail {
+            detail::forward(head, &self.features, &self.sources, &mut self.gaussians, &mut self.detail);
+        }
+        self.d_gaussians.clear();
+        self.d_gaussians.resize(self.gaussians.len(), Gaussian::default());
+        level.run(
+            #[inline(always)]
+            || {
                 for (i, gaussian) in (0u32..).zip(&self.gaussians) {
                     if let Some((splat, footprint)) = project::forward(camera, gaussian, shape.dilation_compensation) {
                         self.splats.push(splat);
@@ -167,6 +181,24 @@ impl<R: Real> Block<R> {
                 }
             },
         );
+    }
+
+    /// `[gaussians, 3]` what the colour head says of features that coding has not touched.
+    pub fn uncoded_colours(&self, scene: &Scene<R>) -> Vec<[R; 3]> {
+        let (shape, n) = (&scene.shape, self.anchors.len());
+        let mut input = self.input.clone();
+        for (row, a) in input.chunks_exact_mut(shape.head_inputs()).zip(&self.anchors) {
+            let at = *a as usize * shape.feature_dim;
+            row[..shape.feature_dim].copy_from_slice(&scene.anchors.features[at..at + shape.feature_dim]);
+        }
+        let weights = &scene.heads.colour;
+        let (mut hidden, mut output) = (vec![R::ZERO; n * weights.n_hidden], vec![R::ZERO; n * weights.n_out]);
+        head::forward(weights, &input, &mut hidden, &mut output);
+        let colours = self.sources.iter().map(|source| {
+            let at = 3 * (source.row as usize * shape.n_offsets + source.offset as usize);
+            std::array::from_fn(|i| output[at + i].sigmoid())
+        });
+        colours.collect()
     }
 
     /// From the gradients of its splats to those of its anchors and of the heads.
@@ -179,17 +211,24 @@ impl<R: Real> Block<R> {
         n_gaussians: usize,
     ) {
         let (shape, n) = (&scene.shape, self.anchors.len());
-        self.d_gaussians.clear();
-        self.d_gaussians.resize(self.gaussians.len(), Gaussian::default());
         self.screen_gradients.clear();
         let half = camera.size_px.map(|s| R::real(0.5 * s as f64));
         for (drawn, d_splat) in self.drawn.iter().zip(d_splats) {
             let i = *drawn as usize;
-            self.d_gaussians[i] = project::backward(camera, &self.gaussians[i], shape.dilation_compensation, d_splat);
+            let d = project::backward(camera, &self.gaussians[i], shape.dilation_compensation, d_splat);
+            self.d_gaussians[i].add(&d);
             let [x, y] = [d_splat.mean_px[0] * half[0], d_splat.mean_px[1] * half[1]];
             self.screen_gradients.push((x * x + y * y).sqrt());
         }
         volume::backward(&self.gaussians, volume_weight, n_gaussians, &mut self.d_gaussians);
+        for group in self.d_heads.each_mut().flat_map(Head::groups_mut) {
+            group.fill(R::ZERO);
+        }
+        let mut by_detail = vec![R::ZERO; if scene.heads.detail.is_some() { n * shape.feature_dim } else { 0 }];
+        if let (Some(head), Some(d_head)) = (&scene.heads.detail, &mut self.d_heads.detail) {
+            let Self { features, sources, detail, d_gaussians, .. } = self;
+            detail::backward(head, features, sources, detail, d_gaussians, &mut by_detail, d_head);
+        }
         self.d_outputs.reset(shape, n);
         refill(&mut self.d_log_scales, n * 6);
         refill(&mut self.d_offsets, n * 3 * shape.n_offsets);
@@ -210,15 +249,15 @@ impl<R: Real> Block<R> {
         );
         refill(&mut self.d_input, n * shape.head_inputs());
         let d_outputs = [&self.d_outputs.opacity, &self.d_outputs.covariance, &self.d_outputs.colour];
-        let heads = scene.heads.each().into_iter().zip(self.d_heads.each_mut());
+        let heads = scene.heads.each().zip(self.d_heads.each_mut());
         for (((weights, d_weights), hidden), d_output) in heads.zip(&self.hidden).zip(d_outputs) {
-            for group in d_weights.groups_mut() {
-                group.fill(R::ZERO);
-            }
             self.d_hidden.resize(n * weights.n_hidden, R::ZERO);
             head::backward(weights, &self.input, hidden, d_output, &mut self.d_hidden, &mut self.d_input, d_weights);
         }
         refill(&mut self.d_features, n * shape.feature_dim);
         head_input::backward(shape, &self.d_input, &mut self.d_features);
+        for (d, by_detail) in self.d_features.iter_mut().zip(by_detail) {
+            *d += by_detail;
+        }
     }
 }

@@ -12,8 +12,15 @@ use crate::bundle::context::{rounded, section};
 use crate::camera::Camera;
 use crate::ops::finite_difference::{assert_piecewise_gradient, random};
 use crate::ops::noise::Stream;
+use crate::ops::normality::{self, Spread};
+use crate::ops::opacity_target::Normalisation;
 use crate::scene::ContextModel;
 use crate::scene::init::initial_scene;
+use crate::train::config::Phase;
+use crate::train::module::detail::Teaching;
+use crate::train::module::distribution::Vectors;
+use crate::train::module::pruning::Count;
+use crate::train::module::{Detail, Distribution, Modules, Pruning};
 
 const SIZE: [u32; 2] = [26, 19];
 
@@ -39,21 +46,19 @@ fn scene(seed: u64, shape: ModelShape) -> Scene<f64> {
     }
     // Most Gaussians drawn, some not.
     scene.heads.opacity.b2.fill(0.3);
+    if let Some(detail) = &mut scene.heads.detail {
+        detail.w2 = random(seed + 4, detail.w2.len());
+    }
     scene
 }
 
-fn shapes() -> [ModelShape; 3] {
-    let base = ModelShape {
-        feature_dim: 6,
-        n_offsets: 3,
-        view_direction: true,
-        view_distance: false,
-        dilation_compensation: false,
-    };
+fn shapes() -> [ModelShape; 4] {
+    let base = ModelShape { view_direction: true, ..ModelShape::plain(6, 3) };
     [
         base,
         ModelShape { view_distance: true, dilation_compensation: true, ..base },
         ModelShape { view_direction: false, n_offsets: 1, ..base },
+        ModelShape { detail_hidden: 5, colour_hidden: 8, ..base },
     ]
 }
 
@@ -67,7 +72,7 @@ fn flatten<R: Real>(scene: &mut Scene<R>) -> Vec<&mut R> {
     let Scene { anchors, heads, context, .. } = scene;
     let mut all: Vec<&mut R> =
         anchors.features.iter_mut().chain(&mut anchors.log_scales).chain(&mut anchors.offsets).collect();
-    for head in heads.each_mut().into_iter().chain(context.as_mut().map(|context| &mut context.mlp)) {
+    for head in heads.each_mut().chain(context.as_mut().map(|context| &mut context.mlp)) {
         for group in head.groups_mut() {
             all.extend(group.iter_mut());
         }
@@ -107,6 +112,10 @@ fn step<R: Real>(scene: &Scene<R>) -> (f64, Vec<f64>) {
 }
 
 fn coded_step<R: Real>(scene: &Scene<R>, coding: &Coding<'_, R>) -> (StepReport<R>, Workspace<R>) {
+    step_with(scene, coding, &Loss::plain(LossWeights::default()))
+}
+
+fn step_with<R: Real>(scene: &Scene<R>, coding: &Coding<'_, R>, loss: &Loss<'_, R>) -> (StepReport<R>, Workspace<R>) {
     let mut workspace = Workspace::new(&scene.shape);
     let mask = mask(&scene.shape);
     let mut truth: Vec<R> = truth().into_iter().map(R::real).collect();
@@ -117,7 +126,7 @@ fn coded_step<R: Real>(scene: &Scene<R>, coding: &Coding<'_, R>) -> (StepReport<
         mask: mask.as_deref(),
         background: [0.1, 0.2, 0.3].map(R::real),
     };
-    let report = workspace.step(scene, &target, &LossWeights::default(), coding);
+    let report = workspace.step(scene, &target, loss, coding);
     assert!(report.n_splats > 5, "the scene must be seen: {report:?}");
     (report, workspace)
 }
@@ -180,7 +189,7 @@ fn a_view_that_sees_nothing_has_zero_gradients() {
     let mut workspace = Workspace::new(&scene.shape);
     let truth = truth();
     let target = Target { camera: &Pinhole::new(&camera()), truth: &truth, mask: None, background: [0.0; 3] };
-    let report = workspace.step(&scene, &target, &LossWeights::default(), &Coding::Raw);
+    let report = workspace.step(&scene, &target, &Loss::plain(LossWeights::default()), &Coding::Raw);
     assert!(report.loss.is_finite() && report.n_splats == 0);
     assert!(gradients(&scene, &workspace).iter().all(|g| *g == 0.0));
 }
@@ -196,7 +205,7 @@ fn blocks_of_anchors_add_up() {
     scene.anchors.log_scales.iter_mut().for_each(|s| *s -= 0.5);
     let (_, analytic) = step(&scene);
     let x: Vec<f64> = flatten(&mut scene).into_iter().map(|p| *p).collect();
-    let first_weight = x.len() - scene.heads.each().iter().map(|h| h.n_params()).sum::<usize>();
+    let first_weight = x.len() - scene.heads.each().map(|h| h.n_params()).sum::<usize>();
     for seed in 0..4 {
         let direction = random(90 + seed, x.len() - first_weight);
         let along: f64 = direction.iter().zip(&analytic[first_weight..]).map(|(d, g)| d * g).sum();
@@ -324,4 +333,84 @@ fn rounded_values_are_symbols_of_the_integer_model() {
     assert_eq!(coded_step(&snapped, &Coding::Raw).0.squared_error, report.squared_error);
     let n = flatten(&mut snapped).len() - network.n_params();
     assert!(gradients(&scene, &workspace)[..n] == gradients(&snapped, &repeated)[..n], "straight through");
+}
+
+/// Every module and every option that has a gradient of its own, weighed so that a wrong one shows.
+fn modules() -> Vec<Modules> {
+    let distribution = Distribution { divergence: 0.05, spread: 0.07, target: 0.4, ..Distribution::default() };
+    let pruning = Pruning { weight: 0.3, ..Pruning::default() };
+    let detail = |teaching| Detail { hidden: 5, teaching, weight: 0.5 };
+    let with = |distribution, pruning, detail| Modules { distribution, pruning, detail };
+    vec![
+        with(Some(distribution), None, None),
+        with(Some(Distribution { vectors: Vectors::All, reading: Spread::Variance, ..distribution }), None, None),
+        with(Some(Distribution { form: normality::Form::Histogram, ..distribution }), None, None),
+        with(None, Some(pruning), None),
+        with(None, Some(Pruning { normalisation: Normalisation::Literal, count: Count::Drawn, ..pruning }), None),
+        with(None, None, Some(detail(Teaching::Small))),
+        with(None, None, Some(detail(Teaching::HighPass))),
+        with(Some(distribution), Some(pruning), Some(detail(Teaching::HighPass))),
+    ]
+}
+
+#[test]
+fn a_step_with_modules_agrees_with_finite_differences() {
+    let stream = Stream::of_run(5);
+    let at =
+        Moment { iteration: 80, iterations: 100, phase: Phase::Raw, scaled: true, base_steps: [1.0, 0.1, 0.2], stream };
+    for (seed, modules) in (71..).zip(modules()) {
+        let shape = ModelShape { view_direction: false, ..modules.shape(shapes()[0]) };
+        let mut scene = scene(seed, shape);
+        let terms = modules.terms();
+        let loss = Loss { modules: Some((&terms, &at)), ..Loss::plain(LossWeights::default()) };
+        let (report, workspace) = step_with(&scene, &Coding::Raw, &loss);
+        assert!(report.loss != coded_step(&scene, &Coding::Raw).0.loss, "{modules:?} adds nothing");
+        let analytic = gradients(&scene, &workspace);
+        let x: Vec<f64> = flatten(&mut scene).into_iter().map(|p| *p).collect();
+        assert_piecewise_gradient("step", &x, &analytic, |x| {
+            let mut moved = scene.clone();
+            for (p, v) in flatten(&mut moved).into_iter().zip(x) {
+                *p = *v;
+            }
+            step_with(&moved, &Coding::Raw, &loss).0.loss
+        });
+    }
+}
+
+/// The colours that teach a residual are those of the features before any noise; no gradient passes through them.
+#[test]
+fn uncoded_colours_are_those_of_the_scene_itself() {
+    let scene = scene(81, ModelShape { detail_hidden: 5, ..shapes()[0] });
+    let mut plain = scene.clone();
+    plain.heads.detail = None;
+    plain.shape.detail_hidden = 0;
+    let drawn = coded_step(&plain, &Coding::Raw).1;
+    let noise = Coding::Noise { stream: Stream::of_run(5), steps: [0.01; 3] };
+    let at = Moment {
+        iteration: 1,
+        iterations: 1,
+        phase: Phase::Noise,
+        scaled: true,
+        base_steps: [1.0; 3],
+        stream: Stream::of_run(5),
+    };
+    let modules =
+        Modules { detail: Some(Detail { hidden: 5, teaching: Teaching::Uncoded, weight: 3.0 }), ..Modules::default() };
+    let terms = modules.terms();
+    let loss = Loss { modules: Some((&terms, &at)), ..Loss::plain(LossWeights::default()) };
+    let (taught, workspace) = step_with(&scene, &noise, &loss);
+    let mut squares = 0.0;
+    let mut n = 0;
+    for (block, drawn) in workspace.blocks().iter().zip(drawn.blocks()) {
+        assert_eq!(block.sources, drawn.sources, "the noise is too small to make one appear or vanish");
+        for ((target, gaussian), plain) in
+            block.uncoded_colours(&scene).iter().zip(&block.gaussians).zip(&drawn.gaussians)
+        {
+            assert_eq!(*target, plain.colour);
+            squares += (0..3).map(|i| (gaussian.colour[i] - target[i]).powi(2)).sum::<f64>();
+            n += 1;
+        }
+    }
+    let difference = taught.loss - coded_step(&scene, &noise).0.loss;
+    assert!((difference - 3.0 * squares / f64::from(n)).abs() < 1e-12 && squares > 0.0);
 }

@@ -1,5 +1,6 @@
 //! The commands, one file each; only these files print.
 
+mod ablate;
 mod bundle;
 mod capture;
 mod demo;
@@ -10,6 +11,7 @@ mod inspect;
 mod lpips;
 mod output;
 mod plot;
+mod point;
 mod progress;
 mod render;
 mod run_config;
@@ -44,6 +46,7 @@ enum Command {
     Inspect(inspect::Args),
     Plot(plot::Args),
     Sweep(sweep::Args),
+    Ablate(ablate::Args),
     Synth(synth::Args),
     Demo(demo::Args),
     Doctor(doctor::Args),
@@ -59,6 +62,7 @@ pub(crate) fn run() -> Result<ExitCode> {
     match cli.command {
         Command::Train(args) => return train::run(&args),
         Command::Sweep(args) => return sweep::run(&args),
+        Command::Ablate(args) => return ablate::run(&args),
         Command::Eval(args) => eval::run(&args),
         Command::Render(args) => render::run(&args),
         Command::Inspect(args) => inspect::run(&args),

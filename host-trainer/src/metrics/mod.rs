@@ -8,12 +8,14 @@ mod bjontegaard;
 mod lpips;
 mod pchip;
 mod psnr;
+mod seeds;
 mod ssim;
 
 pub use baseline::half_size_enlarged;
 pub use bjontegaard::{BjontegaardError, RatePoint, bd_psnr_db, bd_rate_percent};
 pub use lpips::{InputRange, Lpips, LpipsError};
 pub use psnr::{psnr_db, psnr_db_masked, psnr_of_floats_db};
+pub use seeds::{RateDifference, ln_excess, rate_difference};
 pub use ssim::{ssim, ssim_masked};
 
 use std::borrow::Cow;

@@ -49,7 +49,7 @@ pub struct Hac {
     /// (HAC codes them; 1.)
     pub grid_weight: f64,
     /// Steps of the noise at first, and what the context's steps are relative to. (HAC rounds sizes, not their logarithms,
-    /// at 0.001.)
+    /// at 0.001, and has 0.2 for offsets; learned steps of offsets and log-scales then went to the upper end of their range.)
     pub base_steps: QuantisationSteps,
 }
 
@@ -64,7 +64,7 @@ impl Default for Hac {
             sample: 0.05,
             mask_weight: 5e-4,
             grid_weight: 0.0,
-            base_steps: QuantisationSteps { feature: 1.0, log_scale: 0.1, offset: 0.2 },
+            base_steps: QuantisationSteps { feature: 1.0, log_scale: 0.2, offset: 0.35 },
         }
     }
 }

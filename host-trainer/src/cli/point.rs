@@ -1,0 +1,87 @@
+//! One run among several: trained where it is not yet, measured where it was not yet.
+
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use anyhow::{Context, Result, bail};
+use pocketsplat::dataset::Capture;
+use pocketsplat::metrics::Lpips;
+use pocketsplat::train::run::{RunError, RunFolder};
+use pocketsplat_core::bundle::crc32;
+use serde::{Deserialize, Serialize};
+
+use super::bundle::BundleFile;
+use super::capture::{CaptureArgs, Split};
+use super::eval::{Evaluation, Renderer, evaluate};
+use super::run_config::RunConfig;
+use super::{output, train};
+
+/// The configuration in a run folder.
+const CONFIG: &str = "config.toml";
+
+/// Figures of a bundle, and which bundle that was.
+#[derive(Serialize, Deserialize)]
+struct Kept {
+    bundle_crc: u32,
+    evaluation: Evaluation,
+}
+
+/// What all points share: `config` with capture and folder, absolute, so that a point can be gone on with from anywhere.
+pub(super) fn base(config: RunConfig, dataset: Option<&Path>, folder: &Path) -> Result<RunConfig> {
+    let absolute = |path: &Path| std::path::absolute(path).with_context(|| format!("`{}` is no path", path.display()));
+    let dataset = absolute(dataset.unwrap_or(&config.dataset))?;
+    Ok(RunConfig { dataset, output: absolute(folder)?, ..config })
+}
+
+/// Brings a point to its end, from wherever it stands; false when it was interrupted before.
+pub(super) fn trained(config: &RunConfig, capture: &Capture, stop: &AtomicBool) -> Result<bool> {
+    let path = config.output.with_extension("run");
+    let (folder, resumes) = match RunFolder::reopen(&path) {
+        Ok(folder) => {
+            refuse_other(&RunConfig::read(&path.join(CONFIG))?, config, &path)?;
+            (folder, true)
+        }
+        Err(RunError::Finished { .. }) if config.output.is_file() => {
+            refuse_other(&RunConfig::read(&path.join(CONFIG))?, config, &path)?;
+            eprintln!("trained before");
+            return Ok(true);
+        }
+        // Finished without its bundle: somebody removed it.
+        Err(RunError::NoRun { .. } | RunError::Finished { .. }) => {
+            (RunFolder::start(&path, &config.to_toml()?, false)?, false)
+        }
+        Err(error) => return Err(error.into()),
+    };
+    Ok(train::train_in(folder, config, capture, resumes, stop)?.is_some())
+}
+
+/// Stops where the run in a point's folder is not the one that is asked for, in its bundle's bytes or its capture.
+fn refuse_other(begun: &RunConfig, config: &RunConfig, folder: &Path) -> Result<()> {
+    let difference = match begun.difference(config)? {
+        Some(difference) => difference,
+        None if begun.encoding != config.encoding => "its bundle is coded in another way".to_owned(),
+        None if begun.dataset != config.dataset => {
+            format!("its capture is {}, not {}", begun.dataset.display(), config.dataset.display())
+        }
+        None => return Ok(()),
+    };
+    bail!("the run in {} is not the one that is asked for: {difference}; choose another --output", folder.display())
+}
+
+/// The figures of a point on the held-out views, kept beside its bundle so that they are taken once.
+pub(super) fn measured(config: &RunConfig, lpips: Option<&Lpips>) -> Result<Evaluation> {
+    let file = BundleFile::read(&config.output)?;
+    let path = config.output.with_extension("json");
+    let bundle_crc = crc32(&file.bytes);
+    let kept = std::fs::read(&path).ok().and_then(|bytes| serde_json::from_slice::<Kept>(&bytes).ok());
+    if let Some(kept) = kept.filter(|kept| kept.bundle_crc == bundle_crc)
+        && (lpips.is_none() || kept.evaluation.lpips.is_some())
+    {
+        return Ok(kept.evaluation);
+    }
+    let capture = CaptureArgs { dataset: config.dataset.clone(), options: config.capture.clone() };
+    let evaluation = evaluate(&file, &capture, Split::Test, Renderer::Core, false, lpips)?;
+    let kept = Kept { bundle_crc, evaluation };
+    output::write_whole(&path, serde_json::to_string_pretty(&kept)?.as_bytes())?;
+    Ok(kept.evaluation)
+}

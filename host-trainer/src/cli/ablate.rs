@@ -81,6 +81,8 @@ struct Line {
     gaussians: u64,
     decode_s: f64,
     render_s: f64,
+    /// Where the run is tiered: `rate:dB` of each tier.
+    tiers: String,
 }
 
 /// One line of summary.csv: a row against `none`.
@@ -280,6 +282,12 @@ impl Run {
             gaussians: evaluation.n_gaussians,
             decode_s: evaluation.decode_s,
             render_s: evaluation.render_s_per_view,
+            tiers: evaluation
+                .tiers
+                .iter()
+                .map(|tier| format!("{:.2}:{:.3}", tier.pruning_rate, tier.psnr_db))
+                .collect::<Vec<_>>()
+                .join(" "),
         }
     }
 }

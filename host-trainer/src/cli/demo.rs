@@ -13,7 +13,7 @@ use pocketsplat::train::config::Backbone;
 use super::bundle::BundleFile;
 use super::capture::{CaptureArgs, CaptureOptions, Split};
 use super::encode::Encoding;
-use super::eval::{Renderer, evaluate, reference_image};
+use super::eval::{Measurements, Renderer, evaluate, reference_image};
 use super::{output, train};
 
 /// Make a capture, train it, compress it, draw it with the decoder and compare: about three minutes on two cores.
@@ -55,7 +55,8 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 
     eprintln!("3 of 4  drawing the held-out views with the decoder");
     let file = BundleFile::read(&bundle_path)?;
-    let evaluation = evaluate(&file, &capture_args, Split::Test, Renderer::Core, true, None)?;
+    let what = Measurements { against_reference: true, ..Measurements::default() };
+    let evaluation = evaluate(&file, &capture_args, Split::Test, Renderer::Core, &what)?;
 
     let picture = folder.join("truth_reference_decoder.png");
     eprintln!("4 of 4  {}: truth | f64 reference | decoder", picture.display());

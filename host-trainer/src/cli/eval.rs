@@ -5,10 +5,10 @@ use std::time::Instant;
 
 use anyhow::Result;
 use pocketsplat::camera::Camera;
-use pocketsplat::dataset::{Image, View};
+use pocketsplat::dataset::{Capture, Image, View};
 use pocketsplat::metrics::{Lpips, half_size_enlarged, psnr_db, psnr_db_masked, ssim_masked};
 use pocketsplat::plot::ResultRow;
-use pocketsplat::render::decoder::core_image;
+use pocketsplat::render::decoder::{core_image, core_image_of_tiers};
 use pocketsplat::render::reference::{ReferenceScene, to_image};
 use pocketsplat_core::Bundle;
 use rayon::prelude::*;
@@ -44,6 +44,9 @@ pub(crate) struct Args {
     /// Also compare every frame with the f64 reference (`psnr_to_reference_db`, the lowest over the views).
     #[arg(long)]
     against_reference: bool,
+    /// Also measure the scene of each tier and those before it: what a smaller device draws.
+    #[arg(long)]
+    per_tier: bool,
     #[command(flatten)]
     lpips: LpipsArgs,
     /// Print the result as JSON.
@@ -78,6 +81,25 @@ pub(crate) struct Evaluation {
     pub(crate) scratch_bytes: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) psnr_to_reference_db: Option<f64>,
+    /// The scene of each tier and those before it, where asked for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) tiers: Vec<TierEvaluation>,
+}
+
+/// Figures of the scene that consists of a tier and those before it.
+#[derive(Debug, Serialize, Deserialize)]
+pub(crate) struct TierEvaluation {
+    /// Share of the anchors that it leaves out.
+    pub(crate) pruning_rate: f64,
+    pub(crate) psnr_db: f64,
+}
+
+/// What is measured besides PSNR and SSIM.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Measurements<'a> {
+    pub(crate) against_reference: bool,
+    pub(crate) per_tier: bool,
+    pub(crate) lpips: Option<&'a Lpips>,
 }
 
 impl Evaluation {
@@ -100,7 +122,9 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     if lpips.is_none() {
         eprintln!("{NO_WEIGHTS}");
     }
-    let evaluation = evaluate(&file, &args.capture, args.split, args.renderer, args.against_reference, lpips.as_ref())?;
+    let what =
+        Measurements { against_reference: args.against_reference, per_tier: args.per_tier, lpips: lpips.as_ref() };
+    let evaluation = evaluate(&file, &args.capture, args.split, args.renderer, &what)?;
     output::print(&evaluation, args.json)
 }
 
@@ -141,15 +165,32 @@ pub(crate) fn reference_image(bundle: &Bundle<'_>, scene: &ReferenceScene, camer
     to_image(&scene.render(camera, background), camera.width_px, camera.height_px)
 }
 
+/// Draws every view with each number of tiers.
+fn tiers(file: &BundleFile, bundle: &Bundle<'_>, capture: &Capture, views: &[View]) -> Result<Vec<TierEvaluation>> {
+    let evaluated = (1..=bundle.n_tiers()).map(|n_tiers| {
+        let psnr = |view: &View| -> Result<f64> {
+            let image = core_image_of_tiers(bundle, &file.camera(bundle, capture, view), n_tiers)?.image;
+            Ok(psnr_db_masked(&image, &view.image, view.mask.as_ref()))
+        };
+        let of_views = views.par_iter().map(psnr).collect::<Result<Vec<f64>>>()?;
+        let n_anchors = bundle.tier(n_tiers - 1).map_or(0, |tier| tier.n_anchors);
+        Ok(TierEvaluation {
+            pruning_rate: 1.0 - f64::from(n_anchors) / f64::from(bundle.header().n_anchors.max(1)),
+            psnr_db: of_views.iter().sum::<f64>() / of_views.len() as f64,
+        })
+    });
+    evaluated.collect()
+}
+
 /// Draws and measures every view of a split.
 pub(crate) fn evaluate(
     file: &BundleFile,
     capture: &CaptureArgs,
     split: Split,
     renderer: Renderer,
-    against_reference: bool,
-    lpips: Option<&Lpips>,
+    what: &Measurements<'_>,
 ) -> Result<Evaluation> {
+    let Measurements { against_reference, per_tier, lpips } = *what;
     let bundle = file.parse()?;
     let options = file.capture_options(&bundle, capture)?;
     let loaded = options.load(0)?;
@@ -216,6 +257,7 @@ pub(crate) fn evaluate(
         decode_s,
         render_s_per_view: mean(|row| row.frame.seconds),
         scratch_bytes: rows.iter().map(|row| row.frame.scratch_bytes).max().unwrap_or(0),
+        tiers: if per_tier { tiers(file, &bundle, &loaded, views)? } else { Vec::new() },
         psnr_to_reference_db: against_reference
             .then(|| rows.iter().map(|row| row.psnr_to_reference_db).fold(f64::INFINITY, f64::min)),
     })

@@ -6,13 +6,14 @@ use std::sync::atomic::AtomicBool;
 use anyhow::{Context, Result, bail};
 use pocketsplat::dataset::Capture;
 use pocketsplat::metrics::Lpips;
+use pocketsplat::train::module::pruning::Form;
 use pocketsplat::train::run::{RunError, RunFolder};
 use pocketsplat_core::bundle::crc32;
 use serde::{Deserialize, Serialize};
 
 use super::bundle::BundleFile;
 use super::capture::{CaptureArgs, Split};
-use super::eval::{Evaluation, Renderer, evaluate};
+use super::eval::{Evaluation, Measurements, Renderer, evaluate};
 use super::run_config::RunConfig;
 use super::{output, train};
 
@@ -80,7 +81,10 @@ pub(super) fn measured(config: &RunConfig, lpips: Option<&Lpips>) -> Result<Eval
         return Ok(kept.evaluation);
     }
     let capture = CaptureArgs { dataset: config.dataset.clone(), options: config.capture.clone() };
-    let evaluation = evaluate(&file, &capture, Split::Test, Renderer::Core, false, lpips)?;
+    // Tiers that nothing was trained for show only that.
+    let per_tier = config.train.modules.pruning.is_some_and(|pruning| pruning.form == Form::Tiered);
+    let what = Measurements { per_tier, lpips, ..Measurements::default() };
+    let evaluation = evaluate(&file, &capture, Split::Test, Renderer::Core, &what)?;
     let kept = Kept { bundle_crc, evaluation };
     output::write_whole(&path, serde_json::to_string_pretty(&kept)?.as_bytes())?;
     Ok(kept.evaluation)

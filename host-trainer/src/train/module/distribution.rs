@@ -33,6 +33,9 @@ pub struct Distribution {
     pub spread: f64,
     /// σ₀. At 1 the two terms agree; below, they settle between.
     pub target: f64,
+    /// What counts as 1: values are divided by it. Features go about as far as a run has steps, so that a short one does not
+    /// fill a deviation of 1 by itself.
+    pub unit: f64,
     /// How the distribution of a channel is described.
     pub form: Form,
     /// Whether σ is the deviation or the variance.
@@ -50,6 +53,7 @@ impl Default for Distribution {
             divergence: 1e-3,
             spread: 1e-3,
             target: 1.0,
+            unit: 1.0,
             form: Form::Moments,
             reading: Spread::Deviation,
             vectors: Vectors::Features,
@@ -63,6 +67,7 @@ impl Module for Distribution {
         within("distribution.divergence", self.divergence, 0.0, 1e3)?;
         within("distribution.spread", self.spread, 0.0, 1e3)?;
         within("distribution.target", self.target, 0.0, 1e3)?;
+        within("distribution.unit", self.unit, 1e-6, 1e6)?;
         within("distribution.from", self.from.unwrap_or(0.0), 0.0, 1.0)
     }
 }
@@ -112,9 +117,8 @@ impl<R: Real> Terms<R> for Distribution {
             return R::ZERO;
         }
         let steps = match self.vectors {
-            // As they are: the heads decide what a unit is.
-            Vectors::Features => [R::ONE; 3],
-            Vectors::All => at.base_steps.map(|step| R::real(step.into())),
+            Vectors::Features => [R::real(self.unit); 3],
+            Vectors::All => at.base_steps.map(|step| R::real(self.unit * f64::from(step))),
         };
         let width = arrays(self.vectors, &scene.shape).map(|(_, width)| width).sum();
         let values: Vec<Vec<R>> = blocks.par_iter().map(|block| self.values(steps, scene, block)).collect();

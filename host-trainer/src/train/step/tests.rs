@@ -343,7 +343,11 @@ fn modules() -> Vec<Modules> {
     let with = |distribution, pruning, detail| Modules { distribution, pruning, detail };
     vec![
         with(Some(distribution), None, None),
-        with(Some(Distribution { vectors: Vectors::All, reading: Spread::Variance, ..distribution }), None, None),
+        with(
+            Some(Distribution { vectors: Vectors::All, reading: Spread::Variance, unit: 0.7, ..distribution }),
+            None,
+            None,
+        ),
         with(Some(Distribution { form: normality::Form::Histogram, ..distribution }), None, None),
         with(None, Some(pruning), None),
         with(None, Some(Pruning { normalisation: Normalisation::Literal, count: Count::Drawn, ..pruning }), None),

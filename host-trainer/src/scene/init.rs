@@ -35,7 +35,11 @@ pub fn initial_scene(shape: ModelShape, voxel_size: f64, points: &[DVec3], rng: 
         places: Vec::new(),
     };
     let mut heads = Heads::filled(&shape, 0.0f32);
-    for head in heads.each_mut() {
+    // A stream of its own: with a detail head or without, everything else begins and grows alike.
+    let mut of_detail = rng.clone();
+    of_detail.set_stream(2);
+    for (i, head) in heads.each_mut().enumerate() {
+        let rng = if i < 3 { &mut *rng } else { &mut of_detail };
         let fans = [head.n_in, head.n_in, head.n_hidden, head.n_hidden];
         for (group, fan_in) in head.groups_mut().into_iter().zip(fans) {
             let bound = f32::real(1.0 / (fan_in as f64).sqrt());

@@ -5,4 +5,5 @@ mod accidents;
 mod configuration;
 mod fixture;
 mod interruption;
+mod modules;
 mod sweep;

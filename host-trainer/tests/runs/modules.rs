@@ -1,0 +1,65 @@
+//! Modules from the command line: attached, resumed, refused, compared.
+
+use std::fs;
+
+use crate::fixture::{capture, fails, folder, pocketsplat, resume, starts, succeeds, train, wait_for};
+
+#[test]
+fn a_run_with_every_module_goes_on_in_the_same_bytes_on_either_backbone() {
+    for backbone in ["scaffold", "hac"] {
+        let home = folder(&format!("modules-{backbone}"));
+        let modules = ["--backbone", backbone, "--modules", "distribution,pruning,detail", "--prune", "tiered"];
+        let whole = home.join("whole.psb");
+        succeeds(train(&whole).args(modules));
+        let written = fs::read_to_string(home.join("whole.run/config.toml")).unwrap();
+        for line in ["[train.modules.distribution]", "form = \"tiered\"", "rate = 0.4", "detail_hidden = 32"] {
+            assert!(written.lines().any(|l| l == line), "{line}: {written}");
+        }
+        // Killed where places have been given out.
+        let output = home.join("killed.psb");
+        let mut child = starts(train(&output).args(modules));
+        wait_for(&home.join("killed.run"), 110, &mut child);
+        child.kill().unwrap();
+        child.wait().unwrap();
+        succeeds(&mut resume(&home.join("killed.run")));
+        assert!(fs::read(&output).unwrap() == fs::read(&whole).unwrap(), "{backbone}");
+        assert!(fs::read(&whole).unwrap() != crate::fixture::undisturbed());
+    }
+}
+
+#[test]
+fn a_module_that_there_is_not_is_refused_by_its_name() {
+    let output = folder("no-module").join("a.psb");
+    let error = fails(train(&output).args(["--modules", "distribution,sharpening"]));
+    assert!(error.contains("`sharpening`") && error.contains("distribution, pruning, detail, or none"), "{error}");
+    let error = fails(train(&output).args(["--prune-rate", "0.7"]));
+    assert!(error.contains("train.modules.pruning.rate is 0.7, needs 0 to 0.4"), "{error}");
+    let error = fails(train(&output).args(["--set", "train.modules.detail.depth=3"]));
+    assert!(error.contains("unknown key `train.modules.detail.depth`"), "{error}");
+}
+
+#[test]
+fn an_ablation_keeps_what_is_done_and_compares_it_with_the_backbone_alone() {
+    let home = folder("ablation");
+    let ablate = |rows: &str| {
+        let mut command = pocketsplat();
+        command.arg("ablate").arg(capture()).arg("-o").arg(&home).args(["--lambda", "0.02,0.0005", "--rows", rows]);
+        command.args(["--iterations", "60", "--feature-dim", "8", "--offsets", "3", "--seeds", "2"]);
+        command
+    };
+    succeeds(&mut ablate("none,pruning-20"));
+    let said = succeeds(&mut ablate("none,all,pruning-20,tiered"));
+    assert_eq!(said.matches("trained before").count(), 4, "two rates and a second seed of one row, an option: {said}");
+    let table = fs::read_to_string(home.join("ablation.csv")).unwrap();
+    assert_eq!(table.lines().count(), 1 + 2 * 3 + 2, "{table}");
+    let tiered = table.lines().find(|line| line.starts_with("tiered,")).unwrap();
+    assert!(tiered.ends_with(|c: char| c.is_ascii_digit()) && tiered.contains("0.00:"), "{tiered}");
+    let summary = fs::read_to_string(home.join("summary.csv")).unwrap();
+    let rows: Vec<&str> = summary.lines().map(|line| line.split(',').next().unwrap()).collect();
+    assert_eq!(rows.len(), 4, "{summary}");
+    assert!(["all", "tiered", "pruning-20"].iter().all(|row| rows.contains(row)), "{summary}");
+    let figure = fs::read_to_string(home.join("rate_distortion.svg")).unwrap();
+    assert!(figure.contains("none") && figure.contains("all"));
+    let error = fails(&mut ablate("sharpening"));
+    assert!(error.contains("sharpening"), "{error}");
+}

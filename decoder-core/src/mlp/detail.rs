@@ -1,7 +1,7 @@
 //! The detail head: what is added to a Gaussian's colour, its first layer split into a part per anchor and one per Gaussian.
 
-use super::block::{Blocks, continued, n_rows, outputs};
-use super::head::LANES;
+use super::block::{continued, n_rows, outputs};
+use super::head::{Head, LANES};
 use crate::budget::Arena;
 use crate::bundle::{HeadView, Header, WeightReader};
 use crate::error::DecodeError;
@@ -10,9 +10,7 @@ use crate::error::DecodeError;
 ///
 /// Inputs are taken in ascending order, so the sums over the feature are the same for all Gaussians of an anchor.
 pub(crate) struct Detail<'s> {
-    hidden: Blocks<'s, LANES>,
-    output: Blocks<'s, 3>,
-    n_hidden: usize,
+    head: Head<'s, 3>,
     feature_dim: usize,
 }
 
@@ -36,19 +34,14 @@ impl<'s> Detail<'s> {
         head: &HeadView<'_>,
         weights: &mut WeightReader<'_>,
     ) -> Result<Self, DecodeError> {
-        Ok(Self {
-            hidden: Blocks::convert(arena, weights.next_layer(), &head.b1, head.n_in)?,
-            output: Blocks::convert(arena, weights.next_layer(), &head.b2, head.n_hidden)?,
-            n_hidden: head.n_hidden,
-            feature_dim: head.n_in.saturating_sub(3),
-        })
+        Ok(Self { feature_dim: head.n_in.saturating_sub(3), head: Head::convert(arena, head, weights)? })
     }
 
     /// The part per anchor: fills `sums` with `b1 + W1·feature`.
     ///
     /// * `sums`: [`sums_len`] floats.
     pub(crate) fn begin(&self, feature: &[f32], sums: &mut [f32]) {
-        for (sums, block) in sums.as_chunks_mut::<LANES>().0.iter_mut().zip(self.hidden.iter()) {
+        for (sums, block) in sums.as_chunks_mut::<LANES>().0.iter_mut().zip(self.head.hidden.iter()) {
             *sums = outputs(block, feature);
         }
     }
@@ -58,14 +51,14 @@ impl<'s> Detail<'s> {
     /// * `sums`: as [`Self::begin`] left them. * `hidden`: at least as many floats.
     pub(crate) fn residual(&self, colour: [f32; 3], sums: &[f32], hidden: &mut [f32]) -> [f32; 3] {
         let units = hidden.as_chunks_mut::<LANES>().0.iter_mut();
-        for ((units, sums), block) in units.zip(sums.as_chunks::<LANES>().0).zip(self.hidden.iter()) {
+        for ((units, sums), block) in units.zip(sums.as_chunks::<LANES>().0).zip(self.head.hidden.iter()) {
             // The row of biases, then one an input.
             let rows = block.get(1..).and_then(|rows| rows.get(self.feature_dim..)).unwrap_or_default();
             for (unit, sum) in units.iter_mut().zip(continued(*sums, rows, &colour)) {
                 *unit = if sum > 0.0 { sum } else { 0.0 };
             }
         }
-        let hidden = hidden.get(..self.n_hidden).unwrap_or_default();
-        self.output.block(0).map(|block| outputs(block, hidden)).unwrap_or_default()
+        let hidden = hidden.get(..self.head.n_hidden).unwrap_or_default();
+        self.head.block(0, hidden).unwrap_or_default()
     }
 }

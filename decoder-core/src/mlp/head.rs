@@ -11,9 +11,9 @@ pub(super) const LANES: usize = 8;
 
 /// One head; its output layer has blocks of `B` outputs.
 pub(crate) struct Head<'s, const B: usize> {
-    hidden: Blocks<'s, LANES>,
+    pub(super) hidden: Blocks<'s, LANES>,
     output: Blocks<'s, B>,
-    n_hidden: usize,
+    pub(super) n_hidden: usize,
 }
 
 /// The heads, one block of outputs an offset: none is computed for an offset that is not drawn.
@@ -56,7 +56,7 @@ impl<'s> Heads<'s> {
 }
 
 impl<'s, const B: usize> Head<'s, B> {
-    fn convert(
+    pub(super) fn convert(
         arena: &mut Arena<'s>,
         head: &HeadView<'_>,
         weights: &mut WeightReader<'_>,

@@ -148,11 +148,7 @@ impl Args {
         if !base.train.modules.attached().is_empty() {
             bail!("the rows of an ablation attach the modules; leave --modules and --prune out");
         }
-        for (i, lambda) in self.lambdas.iter().enumerate() {
-            if self.lambdas[..i].contains(lambda) {
-                bail!("--lambda names {lambda} twice; each point needs a weight of its own");
-            }
-        }
+        point::check_distinct(&self.lambdas)?;
         Ok(base)
     }
 

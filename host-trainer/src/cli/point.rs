@@ -34,6 +34,16 @@ pub(super) fn base(config: RunConfig, dataset: Option<&Path>, folder: &Path) -> 
     Ok(RunConfig { dataset, output: absolute(folder)?, ..config })
 }
 
+/// Refuses a weight that is named twice: each point has a file of its own.
+pub(super) fn check_distinct(lambdas: &[f64]) -> Result<()> {
+    for (i, lambda) in lambdas.iter().enumerate() {
+        if lambdas[..i].contains(lambda) {
+            bail!("--lambda names {lambda} twice; each point needs a weight of its own");
+        }
+    }
+    Ok(())
+}
+
 /// Brings a point to its end, from wherever it stands; false when it was interrupted before.
 pub(super) fn trained(config: &RunConfig, capture: &Capture, stop: &AtomicBool) -> Result<bool> {
     let path = config.output.with_extension("run");

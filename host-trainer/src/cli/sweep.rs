@@ -45,12 +45,8 @@ const FIGURE: &str = "rate_distortion.svg";
 pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     let mut base = args.base()?;
     // All of them before the first is trained for an hour.
-    for (i, &lambda) in args.lambdas.iter().enumerate() {
-        if args.lambdas[..i].contains(&lambda) {
-            bail!("--lambda names {lambda} twice; each point needs a weight of its own");
-        }
-        Args::point(&base, lambda).check()?;
-    }
+    point::check_distinct(&args.lambdas)?;
+    args.lambdas.iter().try_for_each(|lambda| Args::point(&base, *lambda).check())?;
     let lpips = args.lpips.load()?;
     if lpips.is_none() {
         eprintln!("{NO_WEIGHTS}");

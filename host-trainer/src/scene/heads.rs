@@ -67,6 +67,13 @@ impl<R: Copy> Head<R> {
         [&mut self.w1, &mut self.b1, &mut self.w2, &mut self.b2]
     }
 
+    /// The same head with each parameter replaced by what `f` makes of it.
+    pub fn map<T>(&self, f: impl Fn(R) -> T) -> Head<T> {
+        let all = |values: &[R]| values.iter().map(|value| f(*value)).collect();
+        let Self { n_in, n_hidden, n_out, w1, b1, w2, b2 } = self;
+        Head { n_in: *n_in, n_hidden: *n_hidden, n_out: *n_out, w1: all(w1), b1: all(b1), w2: all(w2), b2: all(b2) }
+    }
+
     /// Number of parameters.
     pub fn n_params(&self) -> usize {
         self.groups().iter().map(|g| g.len()).sum()

@@ -160,15 +160,7 @@ impl<R: crate::ops::Real> Scene<R> {
     /// The same scene in another number type.
     pub fn cast<T: crate::ops::Real>(&self) -> Scene<T> {
         let all = |values: &[R]| values.iter().map(|v| T::real((*v).into())).collect::<Vec<T>>();
-        let head = |h: &Head<R>| Head {
-            n_in: h.n_in,
-            n_hidden: h.n_hidden,
-            n_out: h.n_out,
-            w1: all(&h.w1),
-            b1: all(&h.b1),
-            w2: all(&h.w2),
-            b2: all(&h.b2),
-        };
+        let head = |h: &Head<R>| h.map(|w| T::real(w.into()));
         Scene {
             shape: self.shape,
             voxel_size: self.voxel_size,

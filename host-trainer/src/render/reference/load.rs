@@ -8,7 +8,7 @@ use pocketsplat_core::{Bundle, DecodeError};
 use super::ReferenceScene;
 use crate::bundle::{decoded_heads, shape_of};
 use crate::ops::Real;
-use crate::scene::{Head, Scene};
+use crate::scene::Scene;
 
 impl ReferenceScene {
     /// The scene that a trainer holds: every value widened, positions `lattice · voxel_size`.
@@ -36,16 +36,6 @@ impl ReferenceScene {
     pub fn from_bundle(bundle: &Bundle<'_>) -> Result<Self, DecodeError> {
         let (header, shape) = (bundle.header(), shape_of(bundle));
         let n_channels = shape.values_per_anchor();
-        let wide = |weights: &[f32]| weights.iter().map(|&w| f64::from(w)).collect::<Vec<f64>>();
-        let head = |h: &Head<f32>| Head {
-            n_in: h.n_in,
-            n_hidden: h.n_hidden,
-            n_out: h.n_out,
-            w1: wide(&h.w1),
-            b1: wide(&h.b1),
-            w2: wide(&h.w2),
-            b2: wide(&h.b2),
-        };
         let mut scene = Self {
             shape,
             positions: Vec::new(),
@@ -53,7 +43,7 @@ impl ReferenceScene {
             log_scales: Vec::new(),
             offsets: Vec::new(),
             drawn: Vec::new(),
-            heads: decoded_heads(bundle).map(head),
+            heads: decoded_heads(bundle).map(|head| head.map(f64::from)),
         };
         let mut words = vec![0; bundle.anchor_scratch_words()];
         let mut models = bundle.anchor_models(&mut words)?;

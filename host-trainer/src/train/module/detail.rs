@@ -14,9 +14,9 @@ pub enum Teaching {
     /// Nothing.
     Off,
     /// Small residuals: the mean over the drawn Gaussians of ‖H − x‖², as the paper's eq. 6 reads.
-    #[default]
     Small,
-    /// The mean squared difference of image and photograph in high frequencies.
+    /// The mean squared difference of image and photograph in high frequencies, what the paper's words ask for.
+    #[default]
     HighPass,
     /// The mean over the drawn Gaussians of ‖H − c‖², c being the colour from features that coding has not touched.
     Uncoded,
@@ -30,13 +30,13 @@ pub struct Detail {
     pub hidden: usize,
     /// What teaches it.
     pub teaching: Teaching,
-    /// Weight of that.
+    /// Weight of that. (The paper's is 5e-4, for [`Teaching::Small`].)
     pub weight: f64,
 }
 
 impl Default for Detail {
     fn default() -> Self {
-        Self { hidden: 32, teaching: Teaching::Small, weight: 5e-4 }
+        Self { hidden: 32, teaching: Teaching::HighPass, weight: 1.0 }
     }
 }
 

@@ -20,10 +20,22 @@ pub enum Vectors {
     All,
 }
 
+/// What becomes of the terms of the channels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Reduction {
+    /// Their sum, as eqs. 2 and 3 are printed: 50 features then weigh as much as the image, and cost quality.
+    Sum,
+    /// Their mean.
+    #[default]
+    Mean,
+}
+
 /// Pulls the values of each channel, over the anchors of a view, towards the standard normal distribution, and their spread
 /// towards a target (the plug-and-play paper, eqs. 2 and 3).
 ///
-/// `divergence·Σᵢ D(Pᵢ ‖ N(0, 1)) + spread·Σᵢ (σᵢ − σ₀)²` over the channels i; raw values, before noise or rounding.
+/// `divergence·Σᵢ D(Pᵢ ‖ N(0, 1)) + spread·Σᵢ (σᵢ − σ₀)²` over the channels i, or the means; raw values, before noise or
+/// rounding.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Distribution {
@@ -38,6 +50,8 @@ pub struct Distribution {
     pub unit: f64,
     /// How the distribution of a channel is described.
     pub form: Form,
+    /// Sum or mean over the channels.
+    pub reduction: Reduction,
     /// Whether σ is the deviation or the variance.
     pub reading: Spread,
     /// Which values.
@@ -45,6 +59,9 @@ pub struct Distribution {
     /// Share of the run from which on; without it as soon as values have a scale: from the first noise on.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub from: Option<f64>,
+    /// Share of the run after which the terms are gone; without it they stay.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub until: Option<f64>,
 }
 
 impl Default for Distribution {
@@ -55,9 +72,11 @@ impl Default for Distribution {
             target: 1.0,
             unit: 1.0,
             form: Form::Moments,
+            reduction: Reduction::Mean,
             reading: Spread::Deviation,
             vectors: Vectors::Features,
             from: None,
+            until: None,
         }
     }
 }
@@ -68,7 +87,8 @@ impl Module for Distribution {
         within("distribution.spread", self.spread, 0.0, 1e3)?;
         within("distribution.target", self.target, 0.0, 1e3)?;
         within("distribution.unit", self.unit, 1e-6, 1e6)?;
-        within("distribution.from", self.from.unwrap_or(0.0), 0.0, 1.0)
+        within("distribution.from", self.from.unwrap_or(0.0), 0.0, 1.0)?;
+        within("distribution.until", self.until.unwrap_or(1.0), 0.0, 1.0)
     }
 }
 
@@ -113,19 +133,24 @@ impl Distribution {
 
 impl<R: Real> Terms<R> for Distribution {
     fn on_anchors(&self, at: &Moment, scene: &Scene<R>, blocks: &mut [Block<R>]) -> R {
-        if !self.from.map_or(at.scaled, |from| at.is_after(from)) {
+        let begun = self.from.map_or(at.scaled, |from| at.is_after(from));
+        if !begun || self.until.is_some_and(|until| at.is_after(until)) {
             return R::ZERO;
         }
         let steps = match self.vectors {
             Vectors::Features => [R::real(self.unit); 3],
             Vectors::All => at.base_steps.map(|step| R::real(self.unit * f64::from(step))),
         };
-        let width = arrays(self.vectors, &scene.shape).map(|(_, width)| width).sum();
+        let width = arrays(self.vectors, &scene.shape).map(|(_, width)| width).sum::<usize>();
         let values: Vec<Vec<R>> = blocks.par_iter().map(|block| self.values(steps, scene, block)).collect();
         let parts: Vec<&[R]> = values.iter().map(Vec::as_slice).collect();
+        let share = match self.reduction {
+            Reduction::Sum => 1.0,
+            Reduction::Mean => 1.0 / width.max(1) as f64,
+        };
         let weights = Weights {
-            divergence: R::real(self.divergence),
-            spread: R::real(self.spread),
+            divergence: R::real(self.divergence * share),
+            spread: R::real(self.spread * share),
             target: R::real(self.target),
         };
         let by_moments = self.form == Form::Moments;

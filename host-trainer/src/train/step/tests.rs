@@ -18,7 +18,7 @@ use crate::scene::ContextModel;
 use crate::scene::init::initial_scene;
 use crate::train::config::Phase;
 use crate::train::module::detail::Teaching;
-use crate::train::module::distribution::Vectors;
+use crate::train::module::distribution::{Reduction, Vectors};
 use crate::train::module::pruning::Count;
 use crate::train::module::{Detail, Distribution, Modules, Pruning};
 
@@ -337,14 +337,26 @@ fn rounded_values_are_symbols_of_the_integer_model() {
 
 /// Every module and every option that has a gradient of its own, weighed so that a wrong one shows.
 fn modules() -> Vec<Modules> {
-    let distribution = Distribution { divergence: 0.05, spread: 0.07, target: 0.4, ..Distribution::default() };
+    let distribution = Distribution {
+        divergence: 0.05,
+        spread: 0.07,
+        target: 0.4,
+        reduction: Reduction::Sum,
+        ..Distribution::default()
+    };
     let pruning = Pruning { weight: 0.3, ..Pruning::default() };
     let detail = |teaching| Detail { hidden: 5, teaching, weight: 0.5 };
     let with = |distribution, pruning, detail| Modules { distribution, pruning, detail };
     vec![
         with(Some(distribution), None, None),
         with(
-            Some(Distribution { vectors: Vectors::All, reading: Spread::Variance, unit: 0.7, ..distribution }),
+            Some(Distribution {
+                vectors: Vectors::All,
+                reading: Spread::Variance,
+                unit: 0.7,
+                reduction: Reduction::Mean,
+                ..distribution
+            }),
             None,
             None,
         ),

@@ -146,14 +146,15 @@ impl Settings {
                 }
             }
         }
-        if self.prune.is_some() || self.prune_rate.is_some() {
-            let pruning = modules.pruning.get_or_insert_default();
-            pruning.form = self.prune.unwrap_or(pruning.form);
-            pruning.rate = self.prune_rate.unwrap_or(match self.prune {
-                // The whole range of the memory knob.
-                Some(pruning::Form::Tiered) => pruning.pool,
-                _ => pruning.rate,
-            });
+        if let Some(form) = self.prune {
+            let kept = modules.pruning.filter(|pruning| pruning.form == form);
+            modules.pruning = Some(kept.unwrap_or_else(|| match form {
+                pruning::Form::Hard => Pruning::default(),
+                pruning::Form::Tiered => Pruning::tiered(),
+            }));
+        }
+        if let Some(rate) = self.prune_rate {
+            modules.pruning.get_or_insert_default().rate = rate;
         }
         Ok(())
     }

@@ -75,14 +75,14 @@ pub(super) fn rows() -> Vec<Row> {
         ("pruning-10", "10 %", "rate=0.1"),
         ("pruning-20", "20 %", "rate=0.2"),
         ("pruning-40", "40 %", "rate=0.4"),
-        ("tiered", "tiers to 40 %, nothing deleted", "form=tiered rate=0.4"),
-        ("tiered-contribution", "the same, ranked by contribution", "form=tiered rate=0.4 rank=contribution"),
         (
-            "tiered-ordered",
-            "the same without the random choice",
+            "tiered",
+            "tiers to 40 %, nothing deleted, by contribution",
             "form=tiered rate=0.4 rank=contribution choice=lowest",
         ),
-        ("tiered-80", "tiers to 80 %, by contribution", "form=tiered rate=0.8 rank=contribution choice=lowest"),
+        ("tiered-random", "the same with the random choice", "form=tiered rate=0.4 rank=contribution"),
+        ("tiered-opacity", "the same, ranked by opacity", "form=tiered rate=0.4"),
+        ("tiered-80", "tiers to 80 %", "form=tiered rate=0.8 rank=contribution choice=lowest"),
     ];
     let detail: &[_] = &[
         ("detail-free", "taught by the image's loss alone", "teaching=off"),

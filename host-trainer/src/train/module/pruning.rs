@@ -125,6 +125,13 @@ const WHOLE_DRAW: u32 = 0x5449_4552;
 const TIER_DRAW: u32 = WHOLE_DRAW + 1;
 
 impl Pruning {
+    /// [`Form::Tiered`] as it measures best: in the order of contribution. (A random choice within the pool, as the paper
+    /// deletes it, takes anchors that matter from the scene that is left.)
+    pub fn tiered() -> Self {
+        let hard = Self::default();
+        Self { form: Form::Tiered, rate: hard.pool, rank: Rank::Contribution, choice: Choice::Lowest, ..hard }
+    }
+
     /// The place of every anchor, 0 to 1: the share of the anchors that goes before it.
     ///
     /// The pool's places are given out at random, all others by rank; equal ranks keep their order.

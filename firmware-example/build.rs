@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
-use pocketsplat_core::{Budget, Bundle, Decoder, MaxSplats, TileSink};
+use pocketsplat_core::{Budget, Bundle, Decoder, MaxSplats, Residency, Strips, TileSink};
 
 fn main() {
     let here = env::var("CARGO_MANIFEST_DIR").expect("cargo sets CARGO_MANIFEST_DIR");
@@ -32,18 +32,20 @@ fn embed(path: &Path, out: &Path) -> Result<(), Box<dyn Error>> {
     let bytes = fs::read(path)?;
     let bundle = Bundle::parse(&bytes)?;
     let camera = bundle.header().preview;
-    let mut budget =
-        Budget { width_px: camera.width_px, height_px: camera.height_px, max_splats: MaxSplats::Worst, tiers: u8::MAX };
+    let mut budget = Budget::for_frame(camera.width_px, camera.height_px)
+        .with_max_splats(MaxSplats::Worst)
+        .with_residency(Residency::Streamed)
+        .with_strips(Strips::Exactly(1));
     // Memory for every splat of the scene is more than a microcontroller has to spare: the firmware draws one view, so
     // it gets what this view needs.
     let plan = bundle.plan(&budget)?;
     let mut scratch = vec![0; plan.scratch_len()];
     let report = Decoder::bind(&bundle, plan, &mut scratch)?.render(&camera, &mut Nowhere)?;
-    budget.max_splats = MaxSplats::AtMost(report.splats);
+    budget.max_splats = MaxSplats::AtMost(report.max_splats);
     let scratch_len = bundle.plan(&budget)?.scratch_len();
     let sizes = format!(
         "const WIDTH_PX: usize = {};\nconst HEIGHT_PX: usize = {};\nconst MAX_SPLATS: u32 = {};\nconst SCRATCH_LEN: usize = {scratch_len};\n",
-        camera.width_px, camera.height_px, report.splats,
+        camera.width_px, camera.height_px, report.max_splats,
     );
     fs::write(out.join("bundle.psb"), &bytes)?;
     fs::write(out.join("sizes.rs"), sizes)?;

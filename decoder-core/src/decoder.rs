@@ -1,13 +1,27 @@
 //! The façade: a bundle, a plan and the caller's memory bound together, drawing frames.
 
-use crate::budget::{Arena, Plan};
-use crate::bundle::{AnchorModels, Bundle, Chunk, saturate};
+mod gather;
+mod report;
+mod source;
+mod splats;
+mod strip;
+mod tally;
+
+pub use report::FrameReport;
+
+use crate::budget::{Arena, Plan, ScratchShape};
+use crate::bundle::{AnchorRecords, Bundle, Chunk, RecordMemory, Tables, in_range, saturate};
 use crate::camera::Camera;
 use crate::error::{DecodeError, Field};
-use crate::mlp::{self, Heads};
-use crate::project::{Splat, View};
+use crate::mlp::{HeadShape, Heads};
+use crate::project::View;
 use crate::raster::{Canvas, N_RADIX, TILE_PIXELS, TILE_PX, TilePlace, TileRect, blend_tile, sort_by_depth};
-use crate::scene::{Anchor, Workspace, for_each_gaussian};
+use crate::scene::Workspace;
+use gather::Frame;
+use source::AnchorSource;
+use splats::SplatStore;
+use strip::{Strip, StripLayout};
+use tally::Tally;
 
 /// Takes finished tiles, for instance to a display.
 pub trait TileSink {
@@ -17,36 +31,13 @@ pub trait TileSink {
     fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]);
 }
 
-/// What a frame consisted of and what it cost.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct FrameReport {
-    /// Chunks whose ink box the camera sees.
-    pub chunks_decoded: u32,
-    /// Damaged chunks among those, which were left out; always 0 unless bound with
-    /// [`Decoder::bind_skipping_damage`].
-    pub chunks_damaged: u32,
-    /// The first of them.
-    pub first_damaged: Option<u32>,
-    /// Anchors in them.
-    pub anchors_decoded: u32,
-    /// Anchors that passed the prefilter, so that their heads ran.
-    pub anchors_visible: u32,
-    /// Splats drawn; the number to plan for.
-    pub splats: u32,
-    /// Pairs of a tile and a splat blended into it.
-    pub tile_splats: u32,
-    /// Pairs of a pixel and a splat evaluated for it.
-    pub pixel_splats: u32,
-}
-
 /// Draws frames of one bundle with the memory it was bound to.
 pub struct Decoder<'b, 's> {
     bundle: Bundle<'b>,
     plan: Plan,
     skip_damage: bool,
     heads: Heads<'s>,
-    models: AnchorModels<'b, 's>,
+    source: AnchorSource<'b, 's>,
     /// `[n_channels]` of the anchor in work.
     row: &'s mut [f32],
     work: Workspace<'s>,
@@ -58,35 +49,41 @@ pub struct Decoder<'b, 's> {
 }
 
 impl<'b, 's> Decoder<'b, 's> {
-    /// Takes `scratch`, converts the heads' weights into it and compares the checksum of every chunk of the planned tiers.
+    /// Takes `scratch`, converts the heads' weights into it, compares the checksum of every chunk of the planned tiers, and
+    /// decodes them if the plan says so.
     ///
     /// # Errors
     /// [`DecodeError::ScratchTooSmall`] names the bytes needed; [`DecodeError::PlanMismatch`] when `plan` is another
-    /// bundle's; [`DecodeError::ChunkChecksum`] names the damaged chunk.
+    /// bundle's; [`DecodeError::ChunkChecksum`] names the damaged chunk, and so does [`DecodeError::ChunkStream`] for
+    /// resident anchors.
     ///
     /// # Budget
-    /// Exactly [`Plan::scratch_len`] bytes of `scratch`; reads the whole bundle once, about 8 instructions a byte.
+    /// Exactly [`Plan::scratch_len`] bytes of `scratch`; reads the whole bundle once, about 8 instructions a byte, and for
+    /// resident anchors 55 to 80 a symbol.
     pub fn bind(bundle: &Bundle<'b>, plan: Plan, scratch: &'s mut [u8]) -> Result<Self, DecodeError> {
-        let decoder = Self::bind_unchecked(bundle, plan, scratch, false)?;
-        for chunk in decoder.planned_chunks() {
-            chunk.check()?;
+        let decoder = Self::bind_with(bundle, plan, scratch, false)?;
+        // Resident anchors were compared before they were decoded.
+        if !decoder.source.is_resident() {
+            for (chunk, _) in decoder.planned_chunks() {
+                chunk.check()?;
+            }
         }
         Ok(decoder)
     }
 
-    /// As [`bind`](Self::bind), but leaves checksums for later: each frame compares those of the chunks it needs, leaves
-    /// damaged chunks out and says so in its report.
+    /// As [`bind`](Self::bind), but leaves damaged chunks out, and each frame that needs some says so in its report.
     ///
     /// # Errors
     /// [`DecodeError::ScratchTooSmall`] and [`DecodeError::PlanMismatch`] as for [`bind`](Self::bind).
     ///
     /// # Budget
-    /// As for [`bind`](Self::bind); about 8 instructions a byte of the chunks in view are added to every frame.
+    /// As for [`bind`](Self::bind) when anchors are resident. Streamed, checksums are compared in the frames that need the
+    /// chunks: about 8 instructions a byte of those in view.
     pub fn bind_skipping_damage(bundle: &Bundle<'b>, plan: Plan, scratch: &'s mut [u8]) -> Result<Self, DecodeError> {
-        Self::bind_unchecked(bundle, plan, scratch, true)
+        Self::bind_with(bundle, plan, scratch, true)
     }
 
-    fn bind_unchecked(
+    fn bind_with(
         bundle: &Bundle<'b>,
         plan: Plan,
         scratch: &'s mut [u8],
@@ -99,27 +96,36 @@ impl<'b, 's> Decoder<'b, 's> {
                 planned: saturate(plan.scratch_len()),
             });
         }
-        let available = scratch.len();
+        let available = saturate(scratch.len());
         let Some((scratch, _)) = scratch.split_at_mut_checked(plan.scratch_len()) else {
-            let needed = saturate(plan.scratch_len());
-            return Err(DecodeError::ScratchTooSmall { needed, available: saturate(available) });
+            return Err(DecodeError::ScratchTooSmall { needed: saturate(plan.scratch_len()), available });
         };
         let header = bundle.header();
+        let shape = HeadShape::of(header);
         let n_splats = plan.max_splats() as usize;
         let mut arena = Arena::new(scratch);
-        // The order of `Bundle::scratch_words`.
+        // What `ScratchShape` adds up.
+        let heads = Heads::convert(&mut arena, bundle.heads(), shape)?;
+        let row = arena.take(header.n_channels())?;
+        let work = Workspace {
+            inputs: arena.take(shape.inputs)?,
+            hidden: arena.take(shape.hidden_len())?,
+            detail_sums: arena.take(shape.sums_len())?,
+            outputs: arena.take(shape.offsets)?,
+        };
+        let source = if plan.is_resident() {
+            AnchorSource::Resident(decode_anchors(bundle, &plan, &mut arena, skip_damage)?)
+        } else {
+            AnchorSource::Streamed(bundle.anchor_models(arena.take(bundle.anchor_scratch_words())?)?)
+        };
         Ok(Self {
             bundle: *bundle,
             plan,
             skip_damage,
-            heads: Heads::convert(&mut arena, bundle.heads())?,
-            models: bundle.anchor_models(arena.take(bundle.anchor_scratch_words())?)?,
-            row: arena.take(header.n_channels())?,
-            work: Workspace {
-                inputs: arena.take(header.head_inputs())?,
-                hidden: arena.take(mlp::hidden_len(header))?,
-                detail_sums: arena.take(mlp::sums_len(header))?,
-            },
+            heads,
+            source,
+            row,
+            work,
             counts: arena.take(N_RADIX)?,
             canvas: Canvas { pixels: arena.take(TILE_PIXELS)?, rgb: arena.take(TILE_PIXELS)? },
             splats: SplatStore { splats: arena.take(n_splats)?, rects: arena.take(n_splats)?, n: 0 },
@@ -136,109 +142,62 @@ impl<'b, 's> Decoder<'b, 's> {
 
     /// Draws the scene as `camera` sees it and hands it to `sink` tile by tile.
     ///
-    /// Nothing reaches the sink unless the whole frame can be drawn.
+    /// A view with more splats than planned draws those of the file's first anchors, in all strips the same, and reports how
+    /// many it left out.
     ///
     /// # Errors
-    /// [`DecodeError::TooManySplats`] names how many splats this view needs; [`DecodeError::OutOfRange`] for a frame
-    /// larger than planned; [`DecodeError::BadFloat`] for an unusable camera; [`DecodeError::ChunkStream`] for a chunk
-    /// that no writer makes.
+    /// [`DecodeError::OutOfRange`] for a frame larger than planned and [`DecodeError::BadFloat`] for an unusable camera,
+    /// before the first tile; [`DecodeError::ChunkStream`] for a chunk that no writer makes, which with strips and streamed
+    /// anchors may come after some.
     ///
     /// # Budget
-    /// No memory beyond the bound one, under 3 KiB of stack. Work: every anchor of a chunk in view is decoded, the heads
-    /// run for anchors that pass the prefilter, and a pixel is finished when its transmittance falls below 1e-4.
+    /// No memory beyond the bound one, under 3 KiB of stack. Work of one strip: every anchor of a chunk in view is decoded
+    /// unless it is resident, the heads run for anchors that pass the prefilter, and a pixel is finished when its
+    /// transmittance falls below 1e-4. Of several strips each does so for the chunks and anchors that can reach it; but the
+    /// first one goes over the whole view to see that all strips have places enough, unless that follows from the
+    /// directory.
     pub fn render(&mut self, camera: &Camera, sink: &mut impl TileSink) -> Result<FrameReport, DecodeError> {
         let view = View::new(camera)?;
         let budget = *self.plan.budget();
-        for (field, found, limit) in [
-            (Field::FrameWidth, camera.width_px, budget.width_px),
-            (Field::FrameHeight, camera.height_px, budget.height_px),
-        ] {
-            if found > limit {
-                return Err(DecodeError::OutOfRange { field, found: found.into(), limit: limit.into() });
-            }
+        in_range(Field::FrameWidth, camera.width_px.into(), 1, budget.width_px.into())?;
+        in_range(Field::FrameHeight, camera.height_px.into(), 1, budget.height_px.into())?;
+        let strips = StripLayout::new(camera.height_px, self.plan.n_strips());
+        let tallies = strips.len() == 1 || !self.surely_fits(&view, strips);
+        let tally = Tally::new(self.plan.max_splats());
+        let mut frame = Frame { view, strips, tallies, tally, report: FrameReport::default() };
+        let mut most_in_memory = 0;
+        for strip in strips.iter() {
+            self.gather(strip, &mut frame)?;
+            most_in_memory = self.splats.n.max(most_in_memory);
+            self.draw(strip, camera, sink, &mut frame.report);
         }
-        let mut report = FrameReport::default();
-        self.splats.n = 0;
-        for chunk in self.planned_chunks() {
-            if view.sees_box(chunk.ink_box()) {
-                self.project_sound_chunk(&chunk, &view, &mut report)?;
-            }
-        }
-        report.splats = self.splats.n;
-        if self.splats.n > self.plan.max_splats() {
-            let planned = self.plan.max_splats();
-            return Err(DecodeError::TooManySplats { needed: self.splats.n, planned });
-        }
-        self.draw(camera, sink, &mut report);
+        let Frame { tally, mut report, .. } = frame;
+        report.splats_dropped = tally.n_dropped();
+        report.max_splats = report.max_splats.max(tally.max_demand());
+        report.scratch_used = saturate(ScratchShape { max_splats: most_in_memory, ..*self.plan.shape() }.scratch_len());
         Ok(report)
     }
 
-    /// The chunks of the tiers that are drawn.
-    fn planned_chunks(&self) -> impl Iterator<Item = Chunk<'b>> + use<'b> {
+    /// The chunks of the tiers that are drawn, each with the number of its first anchor.
+    fn planned_chunks(&self) -> impl Iterator<Item = (Chunk<'b>, u32)> + use<'b> {
         let n_chunks = self.bundle.up_to_tier(self.plan.n_tiers()).n_chunks;
-        self.bundle.chunks().take(n_chunks as usize)
+        let mut n_anchors = 0_u32;
+        self.bundle.chunks().take(n_chunks as usize).map(move |chunk| {
+            let first = n_anchors;
+            n_anchors = n_anchors.saturating_add(chunk.n_anchors().into());
+            (chunk, first)
+        })
     }
 
-    /// Keeps the splats of a chunk, or none of them and a note in the report if it is damaged and that is allowed.
-    fn project_sound_chunk(
-        &mut self,
-        chunk: &Chunk<'b>,
-        view: &View,
-        report: &mut FrameReport,
-    ) -> Result<(), DecodeError> {
-        report.chunks_decoded += 1;
-        if !self.skip_damage {
-            return self.project_chunk(chunk, view, report);
-        }
-        let (n_splats, before) = (self.splats.n, *report);
-        let result = match chunk.check() {
-            Ok(()) => self.project_chunk(chunk, view, report),
-            Err(error) => Err(error),
-        };
-        match result {
-            Err(DecodeError::ChunkChecksum { chunk, .. } | DecodeError::ChunkStream { chunk, .. }) => {
-                self.splats.n = n_splats;
-                *report = before;
-                report.chunks_damaged += 1;
-                report.first_damaged = report.first_damaged.or(Some(chunk));
-                Ok(())
-            }
-            result => result,
-        }
-    }
-
-    /// Decodes a chunk and keeps the splats of its anchors.
-    fn project_chunk(&mut self, chunk: &Chunk<'b>, view: &View, report: &mut FrameReport) -> Result<(), DecodeError> {
-        let header = self.bundle.header();
-        let effects = header.features.effects;
-        let mut anchors = chunk.anchors(&mut self.models);
-        for _ in 0..chunk.n_anchors() {
-            report.anchors_decoded += 1;
-            let site = anchors.site();
-            let position = self.bundle.position(site.lattice);
-            anchors.values(self.row);
-            let anchor = Anchor::from_row(header, position, site.mask, self.row).ok_or(DecodeError::Internal)?;
-            if !view.sees_anchor(position, anchor.extent) {
-                continue;
-            }
-            report.anchors_visible += 1;
-            for_each_gaussian(&anchor, effects, view.eye, &self.heads, &mut self.work, |gaussian| {
-                if let Some((splat, rect)) = view.project(gaussian, effects.dilation_compensation) {
-                    self.splats.push(splat, rect);
-                }
-            });
-        }
-        anchors.finish()
-    }
-
-    /// Orders the splats and draws tile after tile.
-    fn draw(&mut self, camera: &Camera, sink: &mut impl TileSink, report: &mut FrameReport) {
+    /// Orders the splats of a strip and draws tile after tile.
+    fn draw(&mut self, strip: Strip, camera: &Camera, sink: &mut impl TileSink, report: &mut FrameReport) {
         let n = self.splats.n as usize;
         let (Some(splats), Some(rects)) = (self.splats.splats.get(..n), self.splats.rects.get(..n)) else { return };
         let (Some(order), Some(spare)) = (self.order.get_mut(..n), self.spare.get_mut(..n)) else { return };
         let (order, row_list) = sort_by_depth(splats, order, spare, self.counts);
         let background = self.bundle.header().background.map(|byte| f32::from(byte) / 255.0);
-        for (row, (y_px, height)) in (0..).zip(tiles_along(camera.height_px)) {
+        let rows = (0..).zip(tiles_along(camera.height_px));
+        for (row, (y_px, height)) in rows.take(strip.end_row.into()).skip(strip.first_row.into()) {
             let list = gather_row(order, rects, row, row_list);
             for (column, (x_px, width)) in (0..).zip(tiles_along(camera.width_px)) {
                 let place = TilePlace { column, row, width, height };
@@ -271,22 +230,23 @@ impl<'b> Bundle<'b> {
     }
 }
 
-/// The splats of the frame in work; counts on when full, to tell how many there are.
-struct SplatStore<'s> {
-    splats: &'s mut [Splat],
-    rects: &'s mut [TileRect],
-    n: u32,
-}
-
-impl SplatStore<'_> {
-    fn push(&mut self, splat: Splat, rect: TileRect) {
-        let slot = self.n as usize;
-        if let (Some(splat_slot), Some(rect_slot)) = (self.splats.get_mut(slot), self.rects.get_mut(slot)) {
-            *splat_slot = splat;
-            *rect_slot = rect;
-        }
-        self.n = self.n.saturating_add(1);
-    }
+/// Decodes the planned tiers into memory of `arena`; their models work in what the frame will use later.
+fn decode_anchors<'b, 's>(
+    bundle: &Bundle<'b>,
+    plan: &Plan,
+    arena: &mut Arena<'s>,
+    skip_damage: bool,
+) -> Result<AnchorRecords<'b, 's>, DecodeError> {
+    let tier = bundle.up_to_tier(plan.n_tiers());
+    let n_numbers = bundle.record_layout().len().saturating_mul(tier.n_anchors as usize);
+    let memory = RecordMemory {
+        records: arena.take(n_numbers)?,
+        damaged: arena.take(tier.n_chunks.div_ceil(u32::BITS) as usize)?,
+        scales: arena.take(bundle.tables().map_or(0, Tables::len))?,
+    };
+    let mut free = arena.borrow();
+    let mut models = bundle.anchor_models(free.take(bundle.anchor_scratch_words())?)?;
+    AnchorRecords::decode(bundle, tier.n_chunks, memory, &mut models, skip_damage)
 }
 
 /// First pixel and size of each tile along an axis.

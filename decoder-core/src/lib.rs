@@ -21,7 +21,7 @@ mod project;
 mod raster;
 mod scene;
 
-pub use budget::{Budget, MaxSplats, Plan};
+pub use budget::{Budget, MaxSplats, Plan, Residency, ScratchShape, Strips, Work};
 pub use bundle::Bundle;
 pub use camera::Camera;
 pub use decoder::{Decoder, FrameReport, TileSink};

@@ -13,7 +13,7 @@ use embedded_graphics::geometry::Point;
 use embedded_graphics::pixelcolor::Rgb888;
 use embedded_graphics::pixelcolor::raw::{BigEndian, RawU24};
 use pocketsplat_core::display::DisplaySink;
-use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, MaxSplats};
+use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, MaxSplats, Residency, Strips};
 use semihosting::{fs, io::Write as _};
 use static_cell::ConstStaticCell;
 
@@ -67,12 +67,11 @@ fn draw(frame: &mut Frame, scratch: &mut [u8]) -> Result<(), Failure> {
     if size.map(usize::from) != [WIDTH_PX, HEIGHT_PX] {
         return Err(Failure::FrameSize { needed: size, available: [WIDTH_PX, HEIGHT_PX] });
     }
-    let budget = Budget {
-        width_px: camera.width_px,
-        height_px: camera.height_px,
-        max_splats: MaxSplats::AtMost(MAX_SPLATS),
-        tiers: u8::MAX,
-    };
+    let budget = Budget::for_frame(camera.width_px, camera.height_px)
+        .in_bytes(scratch.len())
+        .with_max_splats(MaxSplats::AtMost(MAX_SPLATS))
+        .with_residency(Residency::Streamed)
+        .with_strips(Strips::Exactly(1));
     let plan = bundle.plan(&budget)?;
     defmt::info!("memory: {} bytes of scratch, {} of frame", plan.scratch_len(), frame.data().len());
 

@@ -5,7 +5,9 @@ use pocketsplat::bundle::{self, BundleInfo, WriteOptions};
 use pocketsplat::dataset::Normalisation;
 use pocketsplat::render::decoder::core_camera;
 use pocketsplat::scene::Scene;
-use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, MaxSplats, TileSink};
+use pocketsplat_core::{
+    Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, MaxSplats, Residency, Strips, TileSink,
+};
 
 /// What lies behind the test scenes.
 pub const BACKGROUND: [u8; 3] = [13, 77, 200];
@@ -68,9 +70,12 @@ pub fn bundle_of(scene: &Scene<f32>, preview: &pocketsplat::camera::Camera) -> V
     written.expect("a test scene can be written").bytes
 }
 
-/// A budget that is enough for every view of the size of `camera`.
+/// A budget that is enough for every view of the size of `camera`, in one strip, with anchors that stay in the bundle.
 pub fn budget_for(camera: &Camera) -> Budget {
-    Budget { width_px: camera.width_px, height_px: camera.height_px, max_splats: MaxSplats::Worst, tiers: u8::MAX }
+    Budget::for_frame(camera.width_px, camera.height_px)
+        .with_max_splats(MaxSplats::Worst)
+        .with_residency(Residency::Streamed)
+        .with_strips(Strips::Exactly(1))
 }
 
 /// Draws one frame in fresh memory.

@@ -4,9 +4,9 @@
 
 use pocketsplat_core::bundle::AnchorSite;
 use pocketsplat_core::entropy::{AnsReader, NormalModel};
-use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, ErrorClass, FrameReport, MaxSplats};
+use pocketsplat_core::{Bundle, DecodeError, Decoder, ErrorClass, FrameReport, MaxSplats, Residency, Strips};
 
-use crate::frame::Frame;
+use crate::frame::{Frame, budget_for};
 use crate::seal::reseal;
 
 /// Frames are drawn no larger than this, pixels: what is looked for does not depend on it, the time does.
@@ -43,19 +43,33 @@ pub fn draw(bytes: &[u8]) {
     let mut bytes = bytes.to_vec();
     reseal(&mut bytes);
     let Ok(bundle) = Bundle::parse(&bytes) else { return };
-    let strict = draw_one(&bundle, false);
-    let skipping = draw_one(&bundle, true);
-    match (strict, skipping) {
+    for n_strips in [1, 2, 8] {
+        let [streamed, resident] = [Residency::Streamed, Residency::Resident].map(|residency| {
+            draw_either(&bundle, residency, n_strips)
+                .map(|(frame, report)| (frame, report.splats, report.splats_dropped, report.first_damaged))
+        });
+        assert!(streamed == resident, "{n_strips} strips: where anchors wait changes nothing");
+    }
+}
+
+/// Draws with damage left out and, if there is none, without leave.
+fn draw_either(bundle: &Bundle<'_>, residency: Residency, n_strips: u8) -> Result<(Frame, FrameReport), DecodeError> {
+    let strict = draw_one(bundle, residency, n_strips, false);
+    let skipping = draw_one(bundle, residency, n_strips, true);
+    match (strict, &skipping) {
         (Ok(strict), Ok(skipping)) => {
-            assert!(strict == skipping, "without damage both draw the same");
+            assert!(strict == *skipping, "without damage both draw the same");
             assert_eq!(skipping.1.chunks_damaged, 0, "nothing is left out in silence");
         }
         (Err(DecodeError::ChunkChecksum { chunk, .. } | DecodeError::ChunkStream { chunk, .. }), Ok((_, report))) => {
-            assert!(report.first_damaged <= Some(chunk), "{report:?} against chunk {chunk}");
+            // A resident chunk is damaged whether it is in view or not.
+            let named = report.first_damaged <= Some(chunk) || residency == Residency::Resident;
+            assert!(named, "{report:?} against chunk {chunk}");
         }
         (Err(strict), Err(skipping)) => assert_eq!(strict.class(), skipping.class(), "{strict} against {skipping}"),
-        (strict, skipping) => panic!("{:?} against {:?}", strict.err(), skipping.err()),
+        (strict, skipping) => panic!("{:?} against {:?}", strict.err(), skipping.as_ref().err()),
     }
+    skipping
 }
 
 /// Symbols decode, and to the same values however they are read.
@@ -117,11 +131,18 @@ impl pocketsplat_core::entropy::SymbolModel for Slot {
     }
 }
 
-fn draw_one(bundle: &Bundle<'_>, skip_damage: bool) -> Result<(Frame, FrameReport), DecodeError> {
+fn draw_one(
+    bundle: &Bundle<'_>,
+    residency: Residency,
+    n_strips: u8,
+    skip_damage: bool,
+) -> Result<(Frame, FrameReport), DecodeError> {
     let preview = bundle.header().preview;
     let camera = preview.resized(preview.width_px.min(MAX_FRAME_PX), preview.height_px.min(MAX_FRAME_PX));
-    let max_splats = MaxSplats::AtMost(100_000);
-    let budget = Budget { width_px: camera.width_px, height_px: camera.height_px, max_splats, tiers: u8::MAX };
+    let budget = budget_for(&camera)
+        .with_max_splats(MaxSplats::AtMost(100_000))
+        .with_residency(residency)
+        .with_strips(Strips::Exactly(n_strips));
     let plan = bundle.plan(&budget)?;
     let mut scratch = vec![0; plan.scratch_len()];
     let bind = if skip_damage { Decoder::bind_skipping_damage } else { Decoder::bind };

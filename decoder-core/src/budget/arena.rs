@@ -26,6 +26,11 @@ impl<'s> Arena<'s> {
         Self { rest: bytemuck::try_cast_slice_mut(words).unwrap_or_default() }
     }
 
+    /// The same memory for a while.
+    pub(crate) fn borrow(&mut self) -> Arena<'_> {
+        Arena { rest: self.rest }
+    }
+
     /// The next `n` values of `T`, whose size must divide the words taken; their content is arbitrary.
     pub(crate) fn take<T: Pod>(&mut self, n: usize) -> Result<&'s mut [T], DecodeError> {
         let n_words = words_for::<T>(n).ok_or(DecodeError::Internal)?;

@@ -1,51 +1,31 @@
 //! From limits to a number of bytes.
 
-use super::arena::{Arena, words_for};
-use crate::bundle::{Bundle, saturate};
-use crate::error::{DecodeError, Field};
-use crate::mlp;
-use crate::project::Splat;
-use crate::raster::{N_RADIX, TILE_PIXELS, TileRect};
+use super::limits::{Budget, MaxSplats, Residency, Strips};
+use super::scratch::ScratchShape;
+use super::work::{Work, decoding_macs};
+use crate::bundle::{Bundle, TierMeasures, saturate};
+use crate::error::DecodeError;
+use crate::mlp::HeadShape;
+use crate::raster::TILE_PX;
 
-/// Largest width and height of a frame, pixels: a tile's column and row fit a byte.
-pub const MAX_FRAME_PX: u16 = 255 * 16;
+/// Numbers of strips that the manifest has maxima for, and that plans try.
+const STRIPS: [u8; 4] = [1, 2, 4, 8];
 
-/// How many splats a frame may hold.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum MaxSplats {
-    /// Every offset of every anchor of the tiers drawn: always enough.
-    Worst,
-    /// So many; a view that holds more fails with [`DecodeError::TooManySplats`], which names the number.
-    AtMost(u32),
-}
-
-/// The limits a caller sets.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Budget {
-    /// Widest frame, pixels, 1..=[`MAX_FRAME_PX`].
-    pub width_px: u16,
-    /// Highest frame, pixels, 1..=[`MAX_FRAME_PX`].
-    pub height_px: u16,
-    /// Splats of a frame.
-    pub max_splats: MaxSplats,
-    /// Tiers to draw at most; [`u8::MAX`] draws all that the file holds. Fewer are a coarser scene that costs less.
-    pub tiers: u8,
-}
-
-/// What a decoder of one bundle needs within a [`Budget`]; made by [`Bundle::plan`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// What a decoder of one bundle needs and does within a [`Budget`]; made by [`Bundle::plan`].
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Plan {
     budget: Budget,
     n_tiers: u8,
-    max_splats: u32,
+    n_strips: u8,
+    shape: ScratchShape,
     scratch_len: usize,
+    pruning_rate: f32,
+    work: Option<Work>,
 }
 
 impl Plan {
-    /// Bytes of scratch memory, whatever their alignment.
+    /// Bytes of scratch memory, exactly so many, whatever their alignment.
     #[must_use]
     pub fn scratch_len(&self) -> usize {
         self.scratch_len
@@ -57,10 +37,43 @@ impl Plan {
         self.n_tiers
     }
 
-    /// Splats of a frame at most.
+    /// The part of the scene's anchors that is not drawn, 0 to 1.
+    #[must_use]
+    pub fn pruning_rate(&self) -> f32 {
+        self.pruning_rate
+    }
+
+    /// Whether anchors are decoded once when bound; if not, every frame decodes those in view.
+    #[must_use]
+    pub fn is_resident(&self) -> bool {
+        self.shape.resident_chunks > 0
+    }
+
+    /// Horizontal strips of a frame.
+    #[must_use]
+    pub fn n_strips(&self) -> u8 {
+        self.n_strips
+    }
+
+    /// Splats that there is memory for at once.
     #[must_use]
     pub fn max_splats(&self) -> u32 {
-        self.max_splats
+        self.shape.max_splats
+    }
+
+    /// What the size of the scratch memory follows from.
+    #[must_use]
+    pub fn shape(&self) -> &ScratchShape {
+        &self.shape
+    }
+
+    /// A bound on the work of a frame: of the views in the manifest, for cameras of at most the budget's size; another
+    /// view may need more. `None` when the manifest is not measured.
+    ///
+    /// With n strips heads and decoding count n times, because each strip may need every anchor; most need few.
+    #[must_use]
+    pub fn work(&self) -> Option<Work> {
+        self.work
     }
 
     /// The limits it was made for.
@@ -71,52 +84,133 @@ impl Plan {
 }
 
 impl Bundle<'_> {
-    /// Computes the scratch memory that drawing this bundle within `budget` takes.
+    /// Finds the best scene that fits a budget: the lowest pruning rate, that is the most tiers, in `ram_bytes`, and
+    /// among the ways to draw these tiers the one of least predicted work.
     ///
-    /// The frame's size has no influence, because tiles leave one by one; a splat takes 52 bytes.
+    /// Work is predicted in multiply-adds. One strip goes over the scene once, several together about twice; going over it
+    /// costs the heads' (from the manifest, else of all anchors), and decoding when anchors are streamed. Of equals the
+    /// fewest strips are taken. The frame's size decides about memory only through the splats of a strip, because tiles
+    /// leave one by one; a splat takes 52 bytes.
     ///
     /// # Errors
-    /// [`DecodeError::OutOfRange`] for an empty or too large frame, [`DecodeError::PlanTooLarge`] beyond the address
-    /// space.
+    /// [`DecodeError::BudgetTooSmall`] names the bytes that the smallest plan within the other limits needs;
+    /// [`DecodeError::OutOfRange`] for an empty or too large frame or number of strips; [`DecodeError::PlanTooLarge`] beyond
+    /// the address space.
+    ///
+    /// # Budget
+    /// At most 64 sums; reads the manifest and the directory's tiers, no chunk.
     pub fn plan(&self, budget: &Budget) -> Result<Plan, DecodeError> {
-        for (field, size_px) in [(Field::FrameWidth, budget.width_px), (Field::FrameHeight, budget.height_px)] {
-            if size_px == 0 || size_px > MAX_FRAME_PX {
-                let limit = if size_px == 0 { 1 } else { MAX_FRAME_PX.into() };
-                return Err(DecodeError::OutOfRange { field, found: size_px.into(), limit });
+        budget.check()?;
+        let most_tiers = budget.tiers.min(self.n_tiers());
+        let mut smallest: Option<Plan> = None;
+        for n_tiers in (most_tiers.min(1)..=most_tiers).rev() {
+            let mut best: Option<(u64, Plan)> = None;
+            for (cost, plan) in self.plans(budget, n_tiers) {
+                if smallest.is_none_or(|smallest| plan.scratch_len < smallest.scratch_len) {
+                    smallest = Some(plan);
+                }
+                let fits = plan.scratch_len <= budget.ram_bytes && plan.scratch_len < usize::MAX;
+                if fits && best.is_none_or(|(least, _)| cost < least) {
+                    best = Some((cost, plan));
+                }
+            }
+            if let Some((_, plan)) = best {
+                return Ok(plan);
             }
         }
-        let n_tiers = budget.tiers.min(self.n_tiers());
-        // At most 2²⁴ anchors of 32 offsets.
-        let worst = self.up_to_tier(n_tiers).n_anchors.saturating_mul(self.header().n_offsets.into());
-        let max_splats = match budget.max_splats {
-            MaxSplats::Worst => worst,
-            MaxSplats::AtMost(most) => most.min(worst),
+        let Some(Plan { scratch_len, n_tiers, n_strips, shape, .. }) = smallest else {
+            return Err(DecodeError::Internal);
         };
-        let scratch_len = self
-            .scratch_words(max_splats as usize)
-            .and_then(Arena::bytes_for)
-            .filter(|&len| len < isize::MAX as usize && saturate(len) < u32::MAX)
-            .ok_or(DecodeError::PlanTooLarge { max_splats })?;
-        Ok(Plan { budget: *budget, n_tiers, max_splats, scratch_len })
+        if scratch_len == usize::MAX {
+            return Err(DecodeError::PlanTooLarge { max_splats: shape.max_splats });
+        }
+        let [needed, available] = [scratch_len, budget.ram_bytes].map(saturate);
+        Err(DecodeError::BudgetTooSmall { needed, available, n_tiers, n_strips })
     }
 
-    /// The sum over the slices that `Decoder::bind` takes, in its order.
-    fn scratch_words(&self, n_splats: usize) -> Option<usize> {
-        let parts = [
-            words_for::<f32>(mlp::n_weights(self.header()))?,
-            self.anchor_scratch_words(),
-            words_for::<f32>(self.header().n_channels())?,
-            words_for::<f32>(self.header().head_inputs())?,
-            words_for::<f32>(mlp::hidden_len(self.header()))?,
-            words_for::<f32>(mlp::sums_len(self.header()))?,
-            words_for::<u32>(N_RADIX)?,
-            words_for::<[f32; 4]>(TILE_PIXELS)?,
-            words_for::<[u8; 3]>(TILE_PIXELS)?,
-            words_for::<Splat>(n_splats)?,
-            words_for::<TileRect>(n_splats)?,
-            words_for::<u32>(n_splats)?,
-            words_for::<u32>(n_splats)?,
-        ];
-        parts.into_iter().try_fold(0_usize, usize::checked_add)
+    /// The ways to draw `n_tiers` tiers that the budget leaves open, fewest strips first, each with its predicted cost.
+    fn plans(&self, budget: &Budget, n_tiers: u8) -> impl Iterator<Item = (u64, Plan)> {
+        let (given, tried) = match budget.strips {
+            Strips::Exactly(n) => (Some(n), &[][..]),
+            Strips::Auto => (None, &STRIPS[..]),
+        };
+        let residencies = match budget.residency {
+            Residency::Auto => &[true, false][..],
+            Residency::Resident => &[true],
+            Residency::Streamed => &[false],
+        };
+        let n_strips = given.into_iter().chain(tried.iter().copied());
+        let ways = n_strips.flat_map(move |n_strips| residencies.iter().map(move |&resident| (n_strips, resident)));
+        ways.map(move |(n_strips, resident)| self.one_plan(budget, n_tiers, n_strips, resident))
     }
+
+    fn one_plan(&self, budget: &Budget, n_tiers: u8, n_strips: u8, resident: bool) -> (u64, Plan) {
+        let header = self.header();
+        let tier = self.up_to_tier(n_tiers);
+        let measures = self.tier_measures(n_tiers);
+        let shape = ScratchShape::of(self, self.splats_to_hold(budget, n_tiers, n_strips), resident.then_some(tier));
+        let plan = Plan {
+            budget: *budget,
+            n_tiers,
+            n_strips,
+            shape,
+            scratch_len: shape.scratch_len(),
+            pruning_rate: 1.0 - tier.n_anchors as f32 / header.n_anchors.max(1) as f32,
+            work: measures.map(|m| Work::most(&m, header.training_px, budget, n_strips, !resident)),
+        };
+        let (head_macs, n_decoded) = match measures {
+            Some(measures) => {
+                (u64::from(measures.max_head_kilo_macs).saturating_mul(1024), measures.max_decoded_anchors)
+            }
+            None => {
+                let (heads, k) = (HeadShape::of(header), usize::from(header.n_offsets));
+                let per_anchor = heads.opacity_macs(k).saturating_add(heads.open_macs(k)) as u64;
+                (per_anchor.saturating_mul(tier.n_anchors.into()), tier.n_anchors)
+            }
+        };
+        let decoding = if resident { 0 } else { decoding_macs(self).saturating_mul(n_decoded.into()) };
+        let passes = if n_strips > 1 { 2 } else { 1 };
+        (head_macs.saturating_add(decoding).saturating_mul(passes), plan)
+    }
+
+    /// What the manifest says about the first `n_tiers` tiers, if they were measured.
+    fn tier_measures(&self, n_tiers: u8) -> Option<TierMeasures> {
+        self.measures(n_tiers.checked_sub(1)?).filter(|measures| measures.n_cameras > 0)
+    }
+
+    /// Splats of a strip that a budget asks memory for.
+    fn splats_to_hold(&self, budget: &Budget, n_tiers: u8, n_strips: u8) -> u32 {
+        // At most 2²⁴ anchors of 32 offsets.
+        let worst = self.up_to_tier(n_tiers).n_anchors.saturating_mul(self.header().n_offsets.into());
+        match budget.max_splats {
+            MaxSplats::Worst => worst,
+            MaxSplats::AtMost(most) => most.min(worst),
+            MaxSplats::Measured => match self.tier_measures(n_tiers) {
+                None => worst,
+                Some(measures) => {
+                    let [_, training_height_px] = self.header().training_px;
+                    let most = fullest_strip(&measures, training_height_px, budget.height_px, n_strips);
+                    most.saturating_add(most.div_ceil(16)).min(worst)
+                }
+            },
+        }
+    }
+}
+
+/// Splats of the fullest strip measured whose strips are as high a part of their frame as those of `n_strips` strips of a
+/// frame of `height_px`: whole rows of tiles make up different parts of different frames.
+fn fullest_strip(measures: &TierMeasures, training_height_px: u16, height_px: u16, n_strips: u8) -> u32 {
+    let rows = |height_px: u16, n_strips: u8| height_px.div_ceil(TILE_PX).div_ceil(u16::from(n_strips).max(1));
+    let part = |height_px: u16, n_strips: u8| {
+        let strip_px = u32::from(rows(height_px, n_strips)).saturating_mul(TILE_PX.into()).min(height_px.into());
+        (strip_px, u32::from(height_px).max(1))
+    };
+    let (strip_px, frame_px) = part(height_px, n_strips);
+    let as_high = |&(measured_strips, _): &(u8, u32)| {
+        let (measured_px, measured_frame_px) = part(training_height_px, measured_strips);
+        // As products of two 16-bit numbers, the parts compare without rounding.
+        measured_px.saturating_mul(frame_px) >= strip_px.saturating_mul(measured_frame_px)
+    };
+    let measured = STRIPS.into_iter().zip(measures.max_strip_splats);
+    measured.filter(as_high).map(|(_, splats)| splats).min().unwrap_or(measures.max_splats)
 }

@@ -1,8 +1,10 @@
 //! The anchors of a chunk, one after the other: where each stands, which offsets it draws, and its channels.
 
 mod channels;
+mod record;
 
 use channels::{ChannelModels, ContextModels};
+pub(crate) use record::{AnchorRecords, RecordLayout, RecordMemory};
 
 use super::cursor::saturate;
 use super::header::Header;
@@ -42,6 +44,7 @@ pub struct AnchorReader<'b, 's, 'm> {
     codes: TrieReader<'b>,
     symbols: AnsReader<'b>,
     models: &'m mut AnchorModels<'b, 's>,
+    code: u64,
     site: AnchorSite,
 }
 
@@ -49,11 +52,11 @@ impl<'b> Bundle<'b> {
     /// Words of memory that [`anchor_models`](Self::anchor_models) takes.
     #[must_use]
     pub fn anchor_scratch_words(&self) -> usize {
-        let bytes = match self.coder() {
-            Coder::Static(tables) => tables.len().saturating_mul(size_of::<IndexedTable>()),
-            Coder::Context(context) => context_lens(context).into_iter().sum::<usize>().saturating_mul(4),
-        };
-        bytes.div_ceil(4)
+        // At most 360 tables, 128 inputs, 256 hidden units.
+        match self.coder() {
+            Coder::Static(tables) => model_words(tables.len() as u16, 0, 0),
+            Coder::Context(context) => model_words(0, context.n_inputs() as u16, context.n_hidden() as u16),
+        }
     }
 
     /// Prepares the models of the anchors in `scratch`, whose content does not matter.
@@ -89,6 +92,7 @@ impl<'b> Bundle<'b> {
                     context: *context,
                     features: halves(features, context.n_inputs())?,
                     hidden: halves(hidden, context.n_hidden())?,
+                    step_bits: 0,
                 })
             }
         };
@@ -101,6 +105,13 @@ impl<'b> Bundle<'b> {
             channels,
         })
     }
+}
+
+/// Words that so many tables take, or a context of such widths; whichever are more.
+pub(crate) const fn model_words(n_tables: u16, context_inputs: u16, context_hidden: u16) -> usize {
+    let tables = (n_tables as usize).saturating_mul(size_of::<IndexedTable>().div_ceil(4));
+    let context = (context_inputs.div_ceil(2) as usize).saturating_add(context_hidden.div_ceil(2) as usize);
+    if tables > context { tables } else { context }
 }
 
 /// Words of the context's features and of its hidden units.
@@ -119,13 +130,14 @@ impl AnchorModels<'_, '_> {
 impl<'b, 's, 'm> AnchorReader<'b, 's, 'm> {
     pub(super) fn new(chunk: u32, words: &'b [[u8; 2]], models: &'m mut AnchorModels<'b, 's>) -> Self {
         let codes = models.lattice.trie.codes();
-        Self { chunk, codes, symbols: AnsReader::new(words), models, site: AnchorSite::default() }
+        Self { chunk, codes, symbols: AnsReader::new(words), models, code: 0, site: AnchorSite::default() }
     }
 
     /// Where the next anchor stands; one call an anchor, before its channels.
     #[inline]
     pub fn site(&mut self) -> AnchorSite {
-        let lattice = self.models.lattice.cell(self.codes.next(&mut self.symbols));
+        self.code = self.codes.next(&mut self.symbols);
+        let lattice = self.models.lattice.cell(self.code);
         let mask = match &self.models.masks {
             Some(masks) => masks.mask(&mut self.symbols),
             // There are 1 to 32 offsets.
@@ -143,6 +155,19 @@ impl<'b, 's, 'm> AnchorReader<'b, 's, 'm> {
     /// The anchor's values, one a channel; one call of this or of [`symbols`](Self::symbols) an anchor.
     pub fn values(&mut self, row: &mut [f32]) {
         self.symbols = self.models.channels.read(self.site, self.models.n_scalars, self.symbols, row);
+    }
+
+    /// The code of the cell that [`site`](Self::site) came to.
+    pub(crate) fn code(&self) -> u64 {
+        self.code
+    }
+
+    /// The exponents of the quantisation steps of the anchor whose channels were read last, as [`Steps::to_bits`] has
+    /// them; 0 with tables.
+    ///
+    /// [`Steps::to_bits`]: crate::context::Steps::to_bits
+    pub(crate) fn step_bits(&self) -> u16 {
+        self.models.channels.step_bits()
     }
 
     /// Ends the chunk after its last anchor.

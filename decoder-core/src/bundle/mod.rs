@@ -25,6 +25,7 @@ mod section;
 mod tables;
 
 pub use anchor::{AnchorModels, AnchorReader, AnchorSite};
+pub(crate) use anchor::{AnchorRecords, RecordLayout, RecordMemory, model_words};
 pub use chunk::Chunk;
 pub use crc::crc32;
 pub(crate) use cursor::{Cursor, saturate};

@@ -99,6 +99,11 @@ impl<'a> Tables<'a> {
         Table::parse(&mut Cursor::new(bytes, SectionKind::Tables)).ok()
     }
 
+    /// `[n_channels]` the table of each channel, as bytes of its number.
+    pub(super) fn of_channel_numbers(&self) -> &'a [[u8; 2]] {
+        self.channel_tables
+    }
+
     /// The tables of all channels in order.
     pub fn of_channels(&self) -> impl Iterator<Item = Table<'a>> + use<'a> {
         let tables = *self;

@@ -7,9 +7,11 @@ use std::vec::Vec;
 
 use builder::{Anchor, C, F, ORIGIN, STEP, Variant, bundle, cell, tiers, weight};
 
+use crate::budget::Arena;
+use crate::bundle::{AnchorRecords, RecordMemory, Tables};
 use crate::bundle::{AnchorSite, Bundle, Coder};
 use crate::error::{DecodeError, SectionKind};
-use crate::{Budget, Decoder, FrameReport, MaxSplats, TileSink};
+use crate::{Budget, Decoder, FrameReport, MaxSplats, Residency, ScratchShape, Strips, TileSink};
 
 fn variants() -> impl Iterator<Item = Variant> {
     (0..32).map(|bits| {
@@ -143,9 +145,19 @@ impl TileSink for Pixels {
     }
 }
 
+/// One strip, anchors in the file, places for every splat.
+const BUDGET: Budget = Budget::for_frame(32, 24)
+    .with_max_splats(MaxSplats::Worst)
+    .with_residency(Residency::Streamed)
+    .with_strips(Strips::Exactly(1));
+
 fn draw(bytes: &[u8], tiers: u8, skip_damage: bool) -> Result<(Pixels, FrameReport, u8), DecodeError> {
+    draw_within(bytes, &BUDGET.with_tiers(tiers), skip_damage)
+}
+
+fn draw_within(bytes: &[u8], budget: &Budget, skip_damage: bool) -> Result<(Pixels, FrameReport, u8), DecodeError> {
     let bundle = Bundle::parse(bytes)?;
-    let plan = bundle.plan(&Budget { width_px: 32, height_px: 24, max_splats: MaxSplats::Worst, tiers })?;
+    let plan = bundle.plan(budget)?;
     let mut scratch = vec![0x5A; plan.scratch_len()];
     let bind = if skip_damage { Decoder::bind_skipping_damage } else { Decoder::bind };
     let mut pixels = Pixels::default();
@@ -186,5 +198,75 @@ fn a_damaged_chunk_is_named_or_left_out() {
         assert_eq!((report.chunks_damaged, report.first_damaged), (1, Some(3)), "{variant:?}");
         assert_eq!(report.anchors_decoded, 13, "{variant:?}: two of 15 are in the damaged chunk");
         assert_eq!(draw(&bytes, 2, false).err(), None, "{variant:?}: the first two tiers are sound");
+    }
+}
+
+#[test]
+fn anchors_in_memory_have_the_values_of_the_file() {
+    for variant in variants() {
+        let bytes = bundle(variant);
+        let bundle = Bundle::parse(&bytes).expect("sound");
+        let (n_anchors, layout) = (bundle.n_anchors() as usize, bundle.record_layout());
+        let mut scratch = vec![u32::MAX; bundle.anchor_scratch_words()];
+        let mut models = bundle.anchor_models(&mut scratch).expect("enough memory");
+        let mut memory = vec![0xA5; Arena::bytes_for(4000).expect("few")];
+        let mut arena = Arena::new(&mut memory);
+        let memory = RecordMemory {
+            records: arena.take(n_anchors * layout.len()).expect("enough"),
+            damaged: arena.take(1).expect("enough"),
+            scales: arena.take(bundle.tables().map_or(0, Tables::len)).expect("enough"),
+        };
+        let records = AnchorRecords::decode(&bundle, bundle.n_chunks(), memory, &mut models, false).expect("sound");
+        let mut index = 0;
+        for chunk in bundle.chunks() {
+            let mut anchors = chunk.anchors(&mut models);
+            for _ in 0..chunk.n_anchors() {
+                let (site, mut expected, mut row) = (anchors.site(), [0.0; C], [f32::NAN; C]);
+                anchors.values(&mut expected);
+                assert_eq!(records.read(index, &mut row), Some(site), "{variant:?}: site of anchor {index}");
+                assert_eq!(row.map(f32::to_bits), expected.map(f32::to_bits), "{variant:?}: values of anchor {index}");
+                index += 1;
+            }
+        }
+        assert_eq!(index as usize, n_anchors, "{variant:?}: all of them");
+    }
+}
+
+#[test]
+fn damage_is_left_out_alike_wherever_anchors_wait_and_in_all_strips() {
+    for variant in variants() {
+        let sound = bundle(variant);
+        let whole = Bundle::parse(&sound).expect("sound");
+        let chunk = whole.chunk(1).expect("a chunk");
+        let chunks_at = sound.len() - whole.tier(2).expect("the last tier").end as usize;
+        let mut bytes = sound.clone();
+        bytes[chunks_at + chunk.offset() as usize] ^= 4;
+        let (expected, expected_report, _) = draw(&bytes, 3, true).expect("the others draw");
+        for (residency, n_strips) in [(Residency::Resident, 1), (Residency::Resident, 2), (Residency::Streamed, 2)] {
+            let budget = BUDGET.with_residency(residency).with_strips(Strips::Exactly(n_strips));
+            let (pixels, report, _) = draw_within(&bytes, &budget, true).expect("the others draw");
+            assert!(pixels == expected, "{variant:?}: {residency:?}, {n_strips} strips");
+            let damage = |report: FrameReport| (report.chunks_damaged, report.first_damaged, report.splats);
+            assert_eq!(damage(report), damage(expected_report), "{variant:?}: {residency:?}, {n_strips} strips");
+            let error = draw_within(&bytes, &budget, false).err();
+            assert!(matches!(error, Some(DecodeError::ChunkChecksum { chunk: 1, .. })), "{variant:?}: {error:?}");
+        }
+    }
+}
+
+#[test]
+fn the_largest_shape_suffices_for_every_plan() {
+    for variant in variants() {
+        let bytes = bundle(variant);
+        let bundle = Bundle::parse(&bytes).expect("sound");
+        for residency in [Residency::Resident, Residency::Streamed] {
+            let plan = bundle.plan(&BUDGET.with_residency(residency)).expect("a plan");
+            assert_eq!(plan.scratch_len(), plan.shape().scratch_len(), "{variant:?}: its own shape");
+            let ScratchShape { feature_dim, n_offsets, max_splats, resident_anchors, resident_chunks, .. } =
+                *plan.shape();
+            let most = ScratchShape::most(feature_dim, n_offsets);
+            let most = ScratchShape { max_splats, resident_anchors, resident_chunks, ..most };
+            assert!(most.scratch_len() >= plan.scratch_len(), "{variant:?}, {residency:?}: {most:?}");
+        }
     }
 }

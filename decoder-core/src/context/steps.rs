@@ -83,6 +83,21 @@ impl Steps {
         Self { exponents, values }
     }
 
+    /// The exponents, five bits each.
+    pub(crate) fn to_bits(self) -> u16 {
+        self.exponents.iter().rev().fold(0, |bits, &exponent| (bits << 5) | u16::from(exponent as u8 & 31))
+    }
+
+    /// The steps whose exponents [`to_bits`](Self::to_bits) gave.
+    pub(crate) fn from_bits(base_steps: [f32; N_GROUPS], bits: u16) -> Self {
+        // −24..=7 are 32 numbers, so five bits tell them apart: 0..=7 stand for themselves.
+        let exponent = |group: u32| {
+            let low = (bits >> group.wrapping_mul(5) & 31) as i16;
+            if low <= MAX_STEP_EXPONENT as i16 { low } else { low.wrapping_sub(32) }
+        };
+        Self::new(base_steps, [exponent(0), exponent(1), exponent(2)])
+    }
+
     /// q, in eighths of an octave.
     #[inline]
     #[must_use]
@@ -149,6 +164,7 @@ mod tests {
     fn steps_are_eighths_of_octaves() {
         for q in -40..=20_i16 {
             let steps = Steps::new([1.0, 0.1, 0.2], [q; 3]);
+            assert_eq!(Steps::from_bits([1.0, 0.1, 0.2], steps.to_bits()), steps, "q {q} comes back");
             let clamped = f64::from(q).clamp(-24.0, 7.0);
             let expected = 2f64.powf(clamped / 8.0);
             let found = f64::from(steps.value(Group::Feature));

@@ -65,9 +65,11 @@ impl fmt::Display for DecodeError {
             Self::ScratchTooSmall { needed, available } => {
                 write!(f, "scratch memory of {available} bytes, the plan needs {needed}")
             }
-            Self::TooManySplats { needed, planned } => {
-                write!(f, "the frame has {needed} splats, the plan {planned}; plan for at least {needed}")
-            }
+            Self::BudgetTooSmall { needed, available, n_tiers, n_strips } => write!(
+                f,
+                "a budget of {available} bytes, the smallest plan ({n_tiers} tiers, {n_strips} strips) needs {needed}: \
+                 allow that many, or fewer splats, more strips, or streamed anchors where the budget rules them out"
+            ),
             Self::PlanMismatch { needed, planned } => write!(
                 f,
                 "the plan ({planned} bytes) was made for another bundle; this one needs {needed}, plan with it"

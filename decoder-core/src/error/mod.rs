@@ -162,12 +162,16 @@ pub enum DecodeError {
         /// Bytes given.
         available: u32,
     },
-    /// A frame holds more splats than were planned for.
-    TooManySplats {
-        /// Splats of this frame.
+    /// No plan fits the budget's bytes; with those of the smallest one it would.
+    BudgetTooSmall {
+        /// Bytes of the smallest plan within the budget's other limits.
         needed: u32,
-        /// Splats planned.
-        planned: u32,
+        /// Bytes in the budget.
+        available: u32,
+        /// Tiers of the smallest plan.
+        n_tiers: u8,
+        /// Its strips.
+        n_strips: u8,
     },
     /// The plan was made for another bundle.
     PlanMismatch {
@@ -203,7 +207,7 @@ impl DecodeError {
     pub const fn class(&self) -> ErrorClass {
         match self {
             Self::UnsupportedVersion { .. } | Self::UnsupportedFeatures { .. } => ErrorClass::Unsupported,
-            Self::PlanTooLarge { .. } | Self::ScratchTooSmall { .. } | Self::TooManySplats { .. } => {
+            Self::PlanTooLarge { .. } | Self::ScratchTooSmall { .. } | Self::BudgetTooSmall { .. } => {
                 ErrorClass::OverBudget
             }
             Self::NoSuchChunk { .. } | Self::PlanMismatch { .. } | Self::BufferTooShort { .. } => ErrorClass::Misuse,

@@ -84,6 +84,7 @@ pub enum Field {
     CameraPrincipal,
     FrameWidth,
     FrameHeight,
+    Strips,
     ChannelBuffer,
     SiteBuffer,
     ModelBuffer,
@@ -98,6 +99,7 @@ impl Field {
             | Self::CameraPrincipal
             | Self::FrameWidth
             | Self::FrameHeight
+            | Self::Strips
             | Self::ChannelBuffer
             | Self::SiteBuffer
             | Self::ModelBuffer => ErrorClass::Misuse,
@@ -175,6 +177,7 @@ impl fmt::Display for Field {
             Self::CameraPrincipal => "camera principal point",
             Self::FrameWidth => "frame width",
             Self::FrameHeight => "frame height",
+            Self::Strips => "number of strips",
             Self::ChannelBuffer => "buffer for channels",
             Self::SiteBuffer => "buffer for anchors' sites",
             Self::ModelBuffer => "memory for the models of anchors",

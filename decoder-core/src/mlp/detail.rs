@@ -1,9 +1,9 @@
 //! The detail head: what is added to a Gaussian's colour, its first layer split into a part per anchor and one per Gaussian.
 
-use super::block::{continued, n_rows, outputs};
+use super::block::{continued, outputs};
 use super::head::{Head, LANES};
 use crate::budget::Arena;
-use crate::bundle::{HeadView, Header, WeightReader};
+use crate::bundle::{HeadView, WeightReader};
 use crate::error::DecodeError;
 
 /// `W2·relu(W1·[feature, colour] + b1) + b2`.
@@ -12,20 +12,6 @@ use crate::error::DecodeError;
 pub(crate) struct Detail<'s> {
     head: Head<'s, 3>,
     feature_dim: usize,
-}
-
-/// Floats of the head in scratch memory.
-pub(super) fn n_weights(header: &Header) -> usize {
-    let [f, hidden] = [header.feature_dim, header.detail_hidden].map(usize::from);
-    if hidden == 0 {
-        return 0;
-    }
-    LANES * n_rows::<LANES>(f + 3, hidden) + 3 * n_rows::<3>(hidden, 3)
-}
-
-/// Floats of [`Detail::begin`]'s sums.
-pub(crate) fn sums_len(header: &Header) -> usize {
-    usize::from(header.detail_hidden).next_multiple_of(LANES)
 }
 
 impl<'s> Detail<'s> {
@@ -39,7 +25,7 @@ impl<'s> Detail<'s> {
 
     /// The part per anchor: fills `sums` with `b1 + W1·feature`.
     ///
-    /// * `sums`: [`sums_len`] floats.
+    /// * `sums`: [`sums_len`](super::HeadShape::sums_len) floats.
     pub(crate) fn begin(&self, feature: &[f32], sums: &mut [f32]) {
         for (sums, block) in sums.as_chunks_mut::<LANES>().0.iter_mut().zip(self.head.hidden.iter()) {
             *sums = outputs(block, feature);

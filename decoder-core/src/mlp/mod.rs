@@ -7,6 +7,7 @@
 mod block;
 mod detail;
 mod head;
+mod shape;
 
-pub(crate) use detail::sums_len;
-pub(crate) use head::{Heads, hidden_len, n_weights};
+pub(crate) use head::Heads;
+pub(crate) use shape::HeadShape;

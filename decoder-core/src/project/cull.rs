@@ -4,7 +4,7 @@ use super::covariance::Covariance;
 use super::view::{NEAR, View};
 
 /// How far beyond its 3D extent a splat reaches on the image: √(2 ln 255 · 0.3) from the dilation, and rounding, pixels.
-const DILATION_REACH_PX: f32 = 1.9;
+pub(super) const DILATION_REACH_PX: f32 = 1.9;
 
 impl View {
     /// Whether anything inside a box can reach the image; true more often than needed, never false wrongly.

@@ -2,10 +2,12 @@
 //!
 //! Elliptical weighted average splatting (Zwicker et al. 2001), with the constants of the trainer.
 
+mod band;
 mod covariance;
 mod cull;
 mod splat;
 mod view;
 
+pub(crate) use band::Band;
 pub(crate) use splat::{LN_255, Splat};
 pub(crate) use view::View;

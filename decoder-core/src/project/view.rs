@@ -10,6 +10,7 @@ pub(super) const NEAR: f32 = 0.2;
 const CLAMP_MARGIN: f32 = 0.15;
 
 /// A camera ready to project.
+#[derive(Debug)]
 pub(crate) struct View {
     pub(super) rotation: [[f32; 3]; 3],
     pub(super) translation: [f32; 3],

@@ -4,6 +4,7 @@ use crate::bundle::Header;
 use crate::math::exp;
 
 /// One decoded anchor.
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Anchor<'r> {
     /// Position, normalised frame.
     pub(crate) position: [f32; 3],

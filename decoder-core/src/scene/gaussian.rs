@@ -1,5 +1,7 @@
 //! The Gaussians of one anchor seen from one place.
 
+use bytemuck::{Pod, Zeroable};
+
 use super::Anchor;
 use crate::bundle::Effects;
 use crate::math::{sigmoid, tanh};
@@ -24,17 +26,30 @@ pub(crate) struct Gaussian {
     pub(crate) colour: [f32; 3],
 }
 
+/// What the heads say about one offset.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct HeadOutputs {
+    opacity: f32,
+    /// Scale logits, then an unnormalised quaternion.
+    covariance: [f32; 7],
+    colour: [f32; 3],
+}
+
 /// Scratch memory of the heads.
 pub(crate) struct Workspace<'s> {
     /// `[head_inputs]`.
     pub(crate) inputs: &'s mut [f32],
     /// `[hidden_len]`.
     pub(crate) hidden: &'s mut [f32],
-    /// [`crate::mlp::sums_len`] floats.
+    /// `[sums_len]`, see [`crate::mlp::HeadShape`].
     pub(crate) detail_sums: &'s mut [f32],
+    /// `[K]`.
+    pub(crate) outputs: &'s mut [HeadOutputs],
 }
 
-/// Calls `draw` with each Gaussian of `anchor` that a camera at `eye` can see, offsets ascending.
+/// Calls `draw` with the offset and each Gaussian of `anchor` that a camera at `eye` can see, offsets ascending; returns the
+/// multiply-adds that it took.
 ///
 /// Masked offsets take no part. The covariance and colour heads run only when an opacity is positive, and only for those
 /// offsets.
@@ -48,46 +63,45 @@ pub(crate) fn for_each_gaussian(
     eye: [f32; 3],
     heads: &Heads<'_>,
     work: &mut Workspace<'_>,
-    mut draw: impl FnMut(&Gaussian),
-) {
-    fill_inputs(anchor, effects, eye, work.inputs);
-    let Some((opacities, visible)) = opacities(anchor, heads, work) else { return };
+    mut draw: impl FnMut(usize, &Gaussian),
+) -> u64 {
+    let Workspace { inputs, hidden, detail_sums, outputs } = work;
+    fill_inputs(anchor, effects, eye, inputs);
+    let opacity_macs = heads.shape.opacity_macs(anchor.mask.count_ones() as usize);
+    let visible = fill_opacities(anchor, heads, inputs, hidden, outputs);
+    if visible == 0 {
+        return opacity_macs as u64;
+    }
     // The hidden layers share one buffer, so the colours of all visible offsets follow the covariances of all.
-    let mut covariances = [[0.0; 7]; MAX_K];
-    let hidden = heads.covariance.activate(work.inputs, work.hidden);
-    for (offset, covariance) in covariances.iter_mut().enumerate() {
-        if visible & (1 << offset) != 0 {
-            *covariance = heads.covariance.block(offset, hidden).unwrap_or_default();
-        }
+    let units = heads.covariance.activate(inputs, hidden);
+    for (k, output) in visible_only(outputs, visible) {
+        output.covariance = heads.covariance.block(k, units).unwrap_or_default();
+    }
+    let units = heads.colour.activate(inputs, hidden);
+    for (k, output) in visible_only(outputs, visible) {
+        output.colour = heads.colour.block(k, units).unwrap_or_default().map(sigmoid);
     }
     // Only then the buffer is free for the detail head.
-    let mut colours = [[0.0; 3]; MAX_K];
-    let hidden = heads.colour.activate(work.inputs, work.hidden);
-    for (k, colour) in colours.iter_mut().enumerate() {
-        if visible & (1 << k) != 0 {
-            *colour = heads.colour.block(k, hidden).unwrap_or_default().map(sigmoid);
-        }
-    }
     if let Some(detail) = &heads.detail {
-        detail.begin(anchor.feature, work.detail_sums);
-        for (k, colour) in colours.iter_mut().enumerate() {
-            if visible & (1 << k) != 0 {
-                let [r, g, b] = detail.residual(*colour, work.detail_sums, work.hidden);
-                let [plain_r, plain_g, plain_b] = *colour;
-                *colour = [plain_r + r, plain_g + g, plain_b + b];
-            }
+        detail.begin(anchor.feature, detail_sums);
+        for (_, output) in visible_only(outputs, visible) {
+            let [r, g, b] = detail.residual(output.colour, detail_sums, hidden);
+            let [plain_r, plain_g, plain_b] = output.colour;
+            output.colour = [plain_r + r, plain_g + g, plain_b + b];
         }
     }
-    let outputs = covariances.iter().zip(opacities).zip(colours);
-    for (k, (offset, ((covariance, opacity), colour))) in anchor.offsets.iter().zip(outputs).enumerate() {
-        if visible & (1 << k) != 0 {
-            draw(&gaussian(anchor, *offset, *covariance, opacity, colour));
+    for (k, output) in visible_only(outputs, visible) {
+        if let Some(offset) = anchor.offsets.get(k) {
+            draw(k, &gaussian(anchor, *offset, output));
         }
     }
+    (opacity_macs + heads.shape.open_macs(visible.count_ones() as usize)) as u64
 }
 
-/// Most offsets of an anchor, as a length.
-const MAX_K: usize = crate::bundle::MAX_OFFSETS as usize;
+/// The outputs of the offsets that are drawn, each with the offset's number.
+fn visible_only(outputs: &mut [HeadOutputs], visible: u32) -> impl Iterator<Item = (usize, &mut HeadOutputs)> {
+    outputs.iter_mut().enumerate().filter(move |(k, _)| visible & (1 << (k & 31)) != 0)
+}
 
 /// Concatenates feature, direction and distance, the last two if the scene has them.
 fn fill_inputs(anchor: &Anchor<'_>, effects: Effects, eye: [f32; 3], inputs: &mut [f32]) {
@@ -103,39 +117,40 @@ fn fill_inputs(anchor: &Anchor<'_>, effects: Effects, eye: [f32; 3], inputs: &mu
     }
 }
 
-/// The opacities and a bit for each offset that is opaque enough to draw; `None` when there is none.
-fn opacities(anchor: &Anchor<'_>, heads: &Heads<'_>, work: &mut Workspace<'_>) -> Option<([f32; MAX_K], u32)> {
-    let mut opacities = [0.0; MAX_K];
+/// Fills in opacities; returns a bit for each offset that is opaque enough to draw.
+fn fill_opacities(
+    anchor: &Anchor<'_>,
+    heads: &Heads<'_>,
+    inputs: &[f32],
+    hidden: &mut [f32],
+    outputs: &mut [HeadOutputs],
+) -> u32 {
     let mut visible = 0_u32;
-    let hidden = heads.opacity.activate(work.inputs, work.hidden);
-    for (offset, opacity) in opacities.iter_mut().take(anchor.offsets.len()).enumerate() {
-        let bit = 1_u32 << (offset & 31);
-        if anchor.mask & bit == 0 {
-            continue;
-        }
-        let [logit] = heads.opacity.block(offset, hidden)?;
+    let units = heads.opacity.activate(inputs, hidden);
+    for (k, output) in visible_only(outputs, anchor.mask) {
+        let [logit] = heads.opacity.block(k, units).unwrap_or_default();
         // tanh keeps the sign and the order, so most offsets leave before it.
         if logit > 0.0 {
-            *opacity = tanh(logit);
-            visible |= if *opacity >= OPACITY_MIN { bit } else { 0 };
+            output.opacity = tanh(logit);
+            visible |= if output.opacity >= OPACITY_MIN { 1 << (k & 31) } else { 0 };
         }
     }
-    (visible != 0).then_some((opacities, visible))
+    visible
 }
 
-fn gaussian(anchor: &Anchor<'_>, offset: [f32; 3], covariance: [f32; 7], opacity: f32, colour: [f32; 3]) -> Gaussian {
+fn gaussian(anchor: &Anchor<'_>, offset: [f32; 3], output: &HeadOutputs) -> Gaussian {
     let [x, y, z] = anchor.position;
     let [lx, ly, lz] = anchor.extent;
     let [gx, gy, gz] = anchor.base_scale;
     let [ox, oy, oz] = offset;
-    let [s0, s1, s2, w, i, j, k] = covariance;
+    let [s0, s1, s2, w, i, j, k] = output.covariance;
     let norm = libm::sqrtf(w * w + i * i + j * j + k * k);
     let norm = if norm > QUATERNION_NORM_MIN { norm } else { QUATERNION_NORM_MIN };
     Gaussian {
         centre: [x + ox * lx, y + oy * ly, z + oz * lz],
         scale: [gx * sigmoid(s0), gy * sigmoid(s1), gz * sigmoid(s2)],
         rotation: [w / norm, i / norm, j / norm, k / norm],
-        opacity,
-        colour,
+        opacity: output.opacity,
+        colour: output.colour,
     }
 }

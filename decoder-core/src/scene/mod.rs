@@ -6,4 +6,4 @@ mod anchor;
 mod gaussian;
 
 pub(crate) use anchor::Anchor;
-pub(crate) use gaussian::{Gaussian, Workspace, for_each_gaussian};
+pub(crate) use gaussian::{Gaussian, HeadOutputs, Workspace, for_each_gaussian};

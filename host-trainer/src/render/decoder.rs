@@ -1,6 +1,6 @@
 //! The decoder's own renderer, with memory from the heap: what a device would show.
 
-use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, FrameReport, MaxSplats, TileSink};
+use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, FrameReport, MaxSplats, Residency, Strips, TileSink};
 
 use crate::camera::Camera;
 use crate::dataset::Image;
@@ -12,7 +12,7 @@ pub struct CoreFrame {
     pub image: Image,
     /// What the frame consisted of.
     pub report: FrameReport,
-    /// Bytes of scratch memory that just suffice for this frame.
+    /// Bytes of scratch memory that just suffice for this frame in one strip of streamed anchors.
     pub scratch_bytes: usize,
 }
 
@@ -30,14 +30,17 @@ pub fn core_image(bundle: &Bundle<'_>, camera: &Camera) -> Result<CoreFrame, Dec
 /// As [`core_image`].
 pub fn core_image_of_tiers(bundle: &Bundle<'_>, camera: &Camera, tiers: u8) -> Result<CoreFrame, DecodeError> {
     let camera = core_camera(camera)?;
-    let (width_px, height_px) = (camera.width_px, camera.height_px);
-    let plan_for = |max_splats| bundle.plan(&Budget { width_px, height_px, max_splats, tiers });
-    let plan = plan_for(MaxSplats::Worst)?;
+    // Each frame is bound anew, so that anchors are decoded once whatever the residency.
+    let budget = Budget::for_frame(camera.width_px, camera.height_px)
+        .with_tiers(tiers)
+        .with_max_splats(MaxSplats::Worst)
+        .with_residency(Residency::Streamed)
+        .with_strips(Strips::Exactly(1));
+    let plan = bundle.plan(&budget)?;
     let mut scratch = vec![0; plan.scratch_len()];
     let mut sink = ImageSink::new(camera.width_px, camera.height_px);
     let report = Decoder::bind(bundle, plan, &mut scratch)?.render(&camera, &mut sink)?;
-    let scratch_bytes = plan_for(MaxSplats::AtMost(report.splats))?.scratch_len();
-    Ok(CoreFrame { image: sink.image, report, scratch_bytes })
+    Ok(CoreFrame { image: sink.image, report, scratch_bytes: report.scratch_used as usize })
 }
 
 /// Rounds a camera to the decoder's single precision.

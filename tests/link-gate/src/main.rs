@@ -15,7 +15,9 @@ use embedded_graphics_core::pixelcolor::Rgb888;
 use embedded_graphics_core::primitives::Rectangle;
 use pocketsplat_core::bundle::AnchorSite;
 use pocketsplat_core::display::DisplaySink;
-use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, MaxSplats};
+use pocketsplat_core::{
+    Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, MaxSplats, Residency, ScratchShape, Strips,
+};
 
 /// The linker's entry point; `black_box` hides every argument, so no branch of the decoder is known to be dead.
 #[expect(unsafe_code, reason = "the linker looks for this very name")]
@@ -40,9 +42,23 @@ extern "C" fn _start() -> ! {
 /// Parse, plan, bind, draw.
 fn draw(bytes: &[u8], camera: &Camera, scratch: &mut [u8]) -> Result<FrameReport, DecodeError> {
     let bundle = Bundle::parse(bytes)?;
-    let max_splats = if black_box(true) { MaxSplats::Worst } else { MaxSplats::AtMost(black_box(0)) };
-    let budget = Budget { width_px: camera.width_px, height_px: camera.height_px, max_splats, tiers: u8::MAX };
+    let [max_splats, residency, strips] = black_box([0_u8; 3]);
+    let budget = Budget::for_frame(camera.width_px, camera.height_px)
+        .in_bytes(black_box(ScratchShape::most(black_box(16), 4).scratch_len()))
+        .with_tiers(black_box(u8::MAX))
+        .with_max_splats(match max_splats {
+            0 => MaxSplats::Measured,
+            1 => MaxSplats::Worst,
+            n => MaxSplats::AtMost(n.into()),
+        })
+        .with_residency(match residency {
+            0 => Residency::Auto,
+            1 => Residency::Resident,
+            _ => Residency::Streamed,
+        })
+        .with_strips(if strips == 0 { Strips::Auto } else { Strips::Exactly(strips) });
     let plan = bundle.plan(&budget)?;
+    black_box((plan.work(), plan.pruning_rate(), plan.n_strips(), plan.is_resident()));
     let mut decoder = if black_box(true) {
         Decoder::bind(&bundle, plan, scratch)?
     } else {

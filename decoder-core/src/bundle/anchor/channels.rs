@@ -20,6 +20,8 @@ pub(super) struct ContextModels<'b, 's> {
     pub(super) features: &'s mut [i16],
     /// `[n_hidden]`.
     pub(super) hidden: &'s mut [i16],
+    /// The exponents of the steps of the anchor read last.
+    pub(super) step_bits: u16,
 }
 
 /// What a row is made of: symbols, or the values they stand for.
@@ -63,6 +65,14 @@ impl Channel for f32 {
 }
 
 impl<'b> ChannelModels<'b, '_> {
+    /// The exponents of the steps of the anchor read last; 0 with tables.
+    pub(super) fn step_bits(&self) -> u16 {
+        match self {
+            Self::Static(_) => 0,
+            Self::Context(models) => models.step_bits,
+        }
+    }
+
     /// Fills `row` with the next anchor's channels; returns the reader behind them.
     ///
     /// * `n_scalars`: channels before the offsets'.
@@ -135,10 +145,11 @@ impl<'b> ContextModels<'b, '_> {
         scalars: &mut [T],
         offsets: &mut [[T; 3]],
     ) -> AnsReader<'b> {
-        let Self { context, features, hidden } = self;
+        let Self { context, features, hidden, step_bits } = self;
         context.features(site.lattice, features);
         context.hidden(features, hidden);
         let steps = context.steps(hidden);
+        *step_bits = steps.to_bits();
         let mut block = Block { moments: [[0; 2]; BLOCK], len: 0 };
         let n_scalars = scalars.len();
         let (feature, log_scales) = scalars.split_at_mut_checked(context.feature_dim()).unwrap_or_default();

@@ -16,7 +16,7 @@ impl TileSink for NoSink {
 /// Everything a device does with a bundle.
 fn parse_and_draw(bytes: &[u8]) -> Result<(), DecodeError> {
     let bundle = Bundle::parse(bytes)?;
-    let plan = bundle.plan(&Budget { width_px: 64, height_px: 48, max_splats: MaxSplats::Worst, tiers: u8::MAX })?;
+    let plan = bundle.plan(&Budget::for_frame(64, 48))?;
     let mut scratch = vec![0; plan.scratch_len()];
     let mut decoder = Decoder::bind(&bundle, plan, &mut scratch)?;
     decoder.render(&bundle.header().preview.resized(64, 48), &mut NoSink)?;
@@ -85,8 +85,7 @@ fn bytes_after_the_end_are_ignored() {
 fn scratch_one_byte_short_names_the_need() {
     let (_, bytes) = write_random(Coder::Static, SMALL, 50, 22, 16);
     let bundle = Bundle::parse(&bytes).expect("a sound bundle");
-    let budget = Budget { width_px: 64, height_px: 48, max_splats: MaxSplats::Worst, tiers: u8::MAX };
-    let plan = bundle.plan(&budget).expect("a plan");
+    let plan = bundle.plan(&Budget::for_frame(64, 48)).expect("a plan");
     let mut scratch = vec![0; plan.scratch_len() - 1];
     let error = Decoder::bind(&bundle, plan, &mut scratch).err().expect("one byte short");
     let needed = plan.scratch_len() as u32;
@@ -94,17 +93,17 @@ fn scratch_one_byte_short_names_the_need() {
 }
 
 #[test]
-fn too_many_splats_names_the_need_which_then_suffices() {
+fn too_many_splats_are_counted_and_that_many_then_suffice() {
     let (_, bytes) = write_random(Coder::Static, SMALL, 50, 22, 16);
     let bundle = Bundle::parse(&bytes).expect("a sound bundle");
     let draw = |most| {
-        let budget = Budget { width_px: 64, height_px: 48, max_splats: MaxSplats::AtMost(most), tiers: u8::MAX };
-        let plan = bundle.plan(&budget).expect("a plan");
+        let plan = bundle.plan(&Budget::for_frame(64, 48).with_max_splats(MaxSplats::AtMost(most))).expect("a plan");
         let mut scratch = vec![0xA5; plan.scratch_len()];
         let mut decoder = Decoder::bind(&bundle, plan, &mut scratch).expect("planned memory");
-        decoder.render(&bundle.header().preview, &mut NoSink)
+        let report = decoder.render(&bundle.header().preview, &mut NoSink).expect("drawn");
+        (report.splats, report.splats_dropped, report.max_splats)
     };
-    let Err(DecodeError::TooManySplats { needed, planned: 1 }) = draw(1) else { panic!("one splat is not enough") };
-    assert_eq!(draw(needed).map(|report| report.splats), Ok(needed), "the number named");
-    assert!(draw(needed - 1).is_err(), "one fewer");
+    let (1, dropped, needed) = draw(1) else { panic!("one splat is drawn") };
+    assert_eq!(draw(needed), (1 + dropped, 0, needed), "the number named");
+    assert_eq!(draw(needed - 1), (dropped, 1, needed), "one fewer");
 }

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use pocketsplat_core::{Budget, Bundle, Decoder, MaxSplats, TileSink};
+use pocketsplat_core::{Budget, Bundle, Decoder, TileSink};
 
 use super::{camera, decoded_rows, write_random};
 use crate::bundle::{Coder, SizeReport};
@@ -43,8 +43,7 @@ fn bytes_and_times_of_random_scenes() {
         );
         let start = Instant::now();
         println!("  {} anchors decoded in {:?}", decoded_rows(&bundle).len(), start.elapsed());
-        let budget = Budget { width_px: 400, height_px: 400, max_splats: MaxSplats::Worst, tiers: u8::MAX };
-        let plan = bundle.plan(&budget).expect("a plan");
+        let plan = bundle.plan(&Budget::for_frame(400, 400)).expect("a plan");
         let mut scratch = vec![0; plan.scratch_len()];
         let mut decoder = Decoder::bind(&bundle, plan, &mut scratch).expect("planned memory");
         let camera = crate::render::decoder::core_camera(&camera(400, 400)).expect("a sound camera");

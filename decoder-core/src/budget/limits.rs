@@ -1,0 +1,133 @@
+//! What a caller wants of a plan, and within what.
+
+use crate::bundle::in_range;
+use crate::error::{DecodeError, Field};
+
+/// Largest width and height of a frame, pixels: a tile's column and row fit a byte.
+pub const MAX_FRAME_PX: u16 = 255 * 16;
+/// Most horizontal strips of a frame.
+pub const MAX_STRIPS: u8 = 8;
+
+/// How many splats there is memory for at once: those of a frame, or with strips those of a strip.
+///
+/// A view that needs more draws those of the file's first anchors and
+/// [reports](crate::FrameReport::splats_dropped) how many it left out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum MaxSplats {
+    /// As many as the fullest of the views in the bundle's manifest has, and a sixteenth more; if the manifest is not
+    /// measured, [`Worst`](Self::Worst). A frame with a wider lens or nearer to the scene may need more.
+    Measured,
+    /// Every offset of every anchor of the tiers drawn: always enough.
+    Worst,
+    /// So many.
+    AtMost(u32),
+}
+
+/// Where anchors wait between frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Residency {
+    /// Whichever is less work and fits.
+    Auto,
+    /// In memory, as integers, decoded once when bound.
+    Resident,
+    /// In the bundle; each frame decodes those in view again, one at a time.
+    Streamed,
+}
+
+/// In how many horizontal strips a frame is produced; only one strip's splats are in memory.
+///
+/// A strip has ⌈tile rows / n⌉ rows of 16×16 tiles, so the last ones of a low frame may be missing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Strips {
+    /// The fewest of 1, 2, 4 and 8 that fit.
+    Auto,
+    /// So many, 1..=[`MAX_STRIPS`].
+    Exactly(u8),
+}
+
+/// The limits a caller sets.
+///
+/// ```
+/// use pocketsplat_core::{Budget, MaxSplats, Residency};
+///
+/// const BUDGET: Budget = Budget::for_frame(160, 120).in_bytes(96 * 1024);
+/// let by_hand = BUDGET.with_max_splats(MaxSplats::AtMost(900)).with_residency(Residency::Streamed);
+/// assert_eq!((BUDGET.ram_bytes, by_hand.width_px), (98304, 160));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Budget {
+    /// Bytes of scratch memory there are.
+    pub ram_bytes: usize,
+    /// Widest frame, pixels, 1..=[`MAX_FRAME_PX`].
+    pub width_px: u16,
+    /// Highest frame, pixels, 1..=[`MAX_FRAME_PX`].
+    pub height_px: u16,
+    /// Tiers to draw at most; [`u8::MAX`] draws all that the file holds. Fewer are a coarser scene that costs less.
+    pub tiers: u8,
+    /// Splats in memory.
+    pub max_splats: MaxSplats,
+    /// Where anchors wait.
+    pub residency: Residency,
+    /// Parts of a frame.
+    pub strips: Strips,
+}
+
+impl Budget {
+    /// Frames of at most `width_px × height_px`, everything else as good as memory allows, memory without limit.
+    #[must_use]
+    pub const fn for_frame(width_px: u16, height_px: u16) -> Self {
+        Self {
+            ram_bytes: usize::MAX,
+            width_px,
+            height_px,
+            tiers: u8::MAX,
+            max_splats: MaxSplats::Measured,
+            residency: Residency::Auto,
+            strips: Strips::Auto,
+        }
+    }
+
+    /// The same in at most `ram_bytes` of scratch memory.
+    #[must_use]
+    pub const fn in_bytes(self, ram_bytes: usize) -> Self {
+        Self { ram_bytes, ..self }
+    }
+
+    /// The same with at most `tiers` tiers.
+    #[must_use]
+    pub const fn with_tiers(self, tiers: u8) -> Self {
+        Self { tiers, ..self }
+    }
+
+    /// The same with memory for other numbers of splats.
+    #[must_use]
+    pub const fn with_max_splats(self, max_splats: MaxSplats) -> Self {
+        Self { max_splats, ..self }
+    }
+
+    /// The same with anchors elsewhere.
+    #[must_use]
+    pub const fn with_residency(self, residency: Residency) -> Self {
+        Self { residency, ..self }
+    }
+
+    /// The same in so many strips.
+    #[must_use]
+    pub const fn with_strips(self, strips: Strips) -> Self {
+        Self { strips, ..self }
+    }
+
+    /// Frame and strips lie within their limits.
+    pub(super) fn check(&self) -> Result<(), DecodeError> {
+        in_range(Field::FrameWidth, self.width_px.into(), 1, MAX_FRAME_PX.into())?;
+        in_range(Field::FrameHeight, self.height_px.into(), 1, MAX_FRAME_PX.into())?;
+        match self.strips {
+            Strips::Auto => Ok(()),
+            Strips::Exactly(n) => in_range(Field::Strips, n.into(), 1, MAX_STRIPS.into()),
+        }
+    }
+}

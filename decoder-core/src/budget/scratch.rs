@@ -1,0 +1,268 @@
+//! How many bytes of scratch memory what takes: one sum for plans and for static buffers.
+
+use super::arena::{Arena, words_for};
+use crate::bundle::{Bundle, Coder, MAX_FEATURE_DIM, MAX_LATTICE_BITS, MAX_OFFSETS, RecordLayout, Tier, model_words};
+use crate::context::{FEATURES_PER_LEVEL, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS};
+use crate::mlp::HeadShape;
+use crate::project::Splat;
+use crate::raster::{N_RADIX, TILE_PIXELS, TileRect};
+use crate::scene::HeadOutputs;
+
+/// What the size of the scratch memory follows from.
+///
+/// More of anything never takes fewer bytes, so the length of a shape suffices for every plan of every bundle within it that
+/// is resident, or streamed, as the shape is:
+///
+/// ```
+/// use pocketsplat_core::ScratchShape;
+///
+/// const LEN: usize = ScratchShape {
+///     colour_hidden: 16,
+///     detail_hidden: 0,
+///     n_tables: 0,
+///     max_splats: 1500,
+///     ..ScratchShape::most(16, 4)
+/// }
+/// .scratch_len();
+/// static SCRATCH: [u8; LEN] = [0; LEN];
+/// # assert_eq!(SCRATCH.len(), LEN);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ScratchShape {
+    /// Feature width F, 1..=[`MAX_FEATURE_DIM`].
+    pub feature_dim: u16,
+    /// Offsets K of an anchor, 1..=[`MAX_OFFSETS`].
+    pub n_offsets: u16,
+    /// Inputs of the heads besides the feature, at most 4.
+    pub n_view_inputs: u16,
+    /// Hidden width of the colour head.
+    pub colour_hidden: u16,
+    /// Hidden width of the detail head, 0 without one.
+    pub detail_hidden: u16,
+    /// Frequency tables; 0 for bundles with a context.
+    pub n_tables: u16,
+    /// Inputs of the context, four a grid level; 0 for bundles with tables.
+    pub context_inputs: u16,
+    /// Hidden units of the context; 0 for bundles with tables.
+    pub context_hidden: u16,
+    /// Bits of a lattice coordinate.
+    pub lattice_bits: u8,
+    /// Whether anchors say which of their offsets are drawn.
+    pub masks: bool,
+    /// Splats in memory.
+    pub max_splats: u32,
+    /// Anchors in memory; 0 when they are streamed.
+    pub resident_anchors: u32,
+    /// Chunks of those.
+    pub resident_chunks: u32,
+}
+
+impl ScratchShape {
+    /// The largest bundles of F features and K offsets that the writer makes, streamed; without memory for splats yet.
+    #[must_use]
+    pub const fn most(feature_dim: u16, n_offsets: u16) -> Self {
+        Self {
+            feature_dim,
+            n_offsets,
+            n_view_inputs: 4,
+            colour_hidden: MAX_FEATURE_DIM,
+            detail_hidden: MAX_FEATURE_DIM,
+            n_tables: feature_dim.saturating_add(6).saturating_add(n_offsets.saturating_mul(3)),
+            context_inputs: (MAX_CONTEXT_LEVELS as u16).saturating_mul(FEATURES_PER_LEVEL as u16),
+            context_hidden: MAX_CONTEXT_HIDDEN,
+            lattice_bits: MAX_LATTICE_BITS,
+            masks: true,
+            max_splats: 0,
+            resident_anchors: 0,
+            resident_chunks: 0,
+        }
+    }
+
+    /// The shape of one bundle's scratch memory.
+    ///
+    /// * `resident`: the tiers kept in memory, if any.
+    pub(crate) fn of(bundle: &Bundle<'_>, max_splats: u32, resident: Option<Tier>) -> Self {
+        let header = bundle.header();
+        let few = |n: usize| u16::try_from(n).unwrap_or(u16::MAX);
+        let [n_tables, context_inputs, context_hidden] = match bundle.coder() {
+            Coder::Static(tables) => [few(tables.len()), 0, 0],
+            Coder::Context(context) => [0, few(context.n_inputs()), few(context.n_hidden())],
+        };
+        let tier = resident.unwrap_or_default();
+        Self {
+            feature_dim: header.feature_dim,
+            n_offsets: header.n_offsets,
+            n_view_inputs: few(header.head_inputs()).saturating_sub(header.feature_dim),
+            colour_hidden: header.colour_hidden,
+            detail_hidden: header.detail_hidden,
+            n_tables,
+            context_inputs,
+            context_hidden,
+            lattice_bits: bundle.lattice().bits,
+            masks: bundle.masks().is_some(),
+            max_splats,
+            resident_anchors: tier.n_anchors,
+            resident_chunks: tier.n_chunks,
+        }
+    }
+
+    /// Bytes of scratch memory, whatever their alignment; [`usize::MAX`] beyond the address space.
+    #[must_use]
+    pub const fn scratch_len(&self) -> usize {
+        let for_anchor = self.head_words().saturating_add(self.anchor_words());
+        let models = model_words(self.n_tables, self.context_inputs, self.context_hidden);
+        let frame = self.frame_words();
+        let words = if self.resident_chunks == 0 {
+            for_anchor.saturating_add(models).saturating_add(frame)
+        } else {
+            // The models are used when bound, the frame's memory later.
+            for_anchor.saturating_add(self.resident_words()).saturating_add(if models > frame { models } else { frame })
+        };
+        match Arena::bytes_for(words) {
+            Some(len) if len < isize::MAX as usize => len,
+            _ => usize::MAX,
+        }
+    }
+
+    /// Bytes of one anchor in memory.
+    #[must_use]
+    pub const fn resident_anchor_len(&self) -> usize {
+        self.record_layout().len().saturating_mul(2)
+    }
+
+    const fn heads(&self) -> HeadShape {
+        let [f, k] = [limited(self.feature_dim, MAX_FEATURE_DIM), limited(self.n_offsets, MAX_OFFSETS)];
+        HeadShape {
+            inputs: f.saturating_add(self.n_view_inputs as usize),
+            feature: f,
+            colour: limited(self.colour_hidden, MAX_FEATURE_DIM),
+            detail: limited(self.detail_hidden, MAX_FEATURE_DIM),
+            offsets: k,
+        }
+    }
+
+    const fn n_channels(&self) -> usize {
+        (self.feature_dim as usize).saturating_add(6).saturating_add((self.n_offsets as usize).saturating_mul(3))
+    }
+
+    const fn record_layout(&self) -> RecordLayout {
+        let masked_offsets = if self.masks { self.n_offsets } else { 0 };
+        RecordLayout::new(self.n_channels(), self.lattice_bits, masked_offsets, self.context_hidden > 0)
+    }
+
+    const fn head_words(&self) -> usize {
+        self.heads().n_weights()
+    }
+
+    /// Channels, inputs, activations and outputs of the anchor in work.
+    const fn anchor_words(&self) -> usize {
+        let heads = self.heads();
+        let outputs = match words_for::<HeadOutputs>(heads.offsets) {
+            Some(outputs) => outputs,
+            None => usize::MAX,
+        };
+        self.n_channels()
+            .saturating_add(heads.inputs)
+            .saturating_add(heads.hidden_len())
+            .saturating_add(heads.sums_len())
+            .saturating_add(outputs)
+    }
+
+    /// Records, a bit a chunk, and the scale of each table.
+    const fn resident_words(&self) -> usize {
+        let n_numbers = self.record_layout().len().saturating_mul(self.resident_anchors as usize);
+        n_numbers
+            .div_ceil(2)
+            .saturating_add(self.resident_chunks.div_ceil(u32::BITS) as usize)
+            .saturating_add((self.n_tables as usize).saturating_mul(2))
+    }
+
+    /// Counts of the sort, a tile, and the splats with their order.
+    const fn frame_words(&self) -> usize {
+        let n = self.max_splats as usize;
+        let fixed = match (words_for::<[f32; 4]>(TILE_PIXELS), words_for::<[u8; 3]>(TILE_PIXELS)) {
+            (Some(pixels), Some(rgb)) => N_RADIX.saturating_add(pixels).saturating_add(rgb),
+            _ => usize::MAX,
+        };
+        let per_splat = match (words_for::<Splat>(1), words_for::<TileRect>(1)) {
+            // Its place in the order, and in the order before.
+            (Some(splat), Some(rect)) => splat.saturating_add(rect).saturating_add(2),
+            _ => usize::MAX,
+        };
+        fixed.saturating_add(per_splat.saturating_mul(n))
+    }
+}
+
+/// A width as a length, not above what a bundle may have: no product of two then overflows.
+const fn limited(width: u16, most: u16) -> usize {
+    (if width < most { width } else { most }) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ScratchShape;
+
+    #[test]
+    fn more_never_takes_less() {
+        let mut state = 1_u32;
+        let mut random = move |n: u32| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) % n
+        };
+        for _ in 0..20_000 {
+            let resident = random(2);
+            let mut pair = || {
+                let mut up_to = |n: u32| random(n) as u16;
+                let context = up_to(2);
+                ScratchShape {
+                    feature_dim: 1 + up_to(256),
+                    n_offsets: 1 + up_to(32),
+                    n_view_inputs: up_to(5),
+                    colour_hidden: 1 + up_to(256),
+                    detail_hidden: up_to(257),
+                    n_tables: (1 - context) * up_to(360),
+                    context_inputs: context * 4 * (1 + up_to(32)),
+                    context_hidden: context * (1 + up_to(256)),
+                    lattice_bits: up_to(22) as u8,
+                    masks: up_to(2) == 1,
+                    max_splats: random(100_000),
+                    resident_anchors: resident * (1 + random(30_000)),
+                    resident_chunks: resident * (1 + random(200)),
+                }
+            };
+            let (a, b) = (pair(), pair());
+            let both = ScratchShape {
+                feature_dim: a.feature_dim.max(b.feature_dim),
+                n_offsets: a.n_offsets.max(b.n_offsets),
+                n_view_inputs: a.n_view_inputs.max(b.n_view_inputs),
+                colour_hidden: a.colour_hidden.max(b.colour_hidden),
+                detail_hidden: a.detail_hidden.max(b.detail_hidden),
+                n_tables: a.n_tables.max(b.n_tables),
+                context_inputs: a.context_inputs.max(b.context_inputs),
+                context_hidden: a.context_hidden.max(b.context_hidden),
+                lattice_bits: a.lattice_bits.max(b.lattice_bits),
+                masks: a.masks | b.masks,
+                max_splats: a.max_splats.max(b.max_splats),
+                resident_anchors: a.resident_anchors.max(b.resident_anchors),
+                resident_chunks: a.resident_chunks.max(b.resident_chunks),
+            };
+            let [len_a, len_b, len] = [a, b, both].map(|shape| shape.scratch_len());
+            assert!(len >= len_a.max(len_b), "{a:?} takes {len_a}, {b:?} {len_b}, both {len}");
+        }
+    }
+
+    #[test]
+    fn a_resident_anchor_takes_what_its_symbols_take_and_little_more() {
+        let shape = ScratchShape { lattice_bits: 10, context_hidden: 32, masks: true, ..ScratchShape::most(16, 4) };
+        assert_eq!(shape.resident_anchor_len(), 2 * (16 + 6 + 12) + 4 + 2 + 2, "34 symbols, cell, mask, steps");
+        let shape = ScratchShape { n_tables: 9, context_hidden: 0, masks: false, ..shape };
+        assert_eq!(shape.resident_anchor_len(), 2 * 34 + 4, "34 symbols, cell");
+    }
+
+    #[test]
+    fn beyond_the_address_space_is_said_so() {
+        let shape = ScratchShape { max_splats: u32::MAX, ..ScratchShape::most(256, 32) };
+        assert!(size_of::<usize>() > 4 || shape.scratch_len() == usize::MAX, "no wrapped sum");
+    }
+}

@@ -1,0 +1,66 @@
+//! What a frame costs in time, as counts that no clock is needed for.
+
+use super::limits::Budget;
+use crate::bundle::{Bundle, Coder, TierMeasures};
+
+/// What a symbol takes in multiply-adds of f32, of which each takes 2.5 instructions on a Cortex-M4; a symbol takes 64.
+const SYMBOL_MACS: usize = 26;
+/// The same of a multiply-add of the context's network: 4.8 instructions.
+const NETWORK_MACS: usize = 2;
+/// The same of one of its inputs: 82 instructions for its share of a grid level's corners.
+const INPUT_MACS: usize = 33;
+
+/// Work of a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Work {
+    /// Multiply-adds of the heads.
+    pub head_macs: u64,
+    /// Anchors decoded from the bundle.
+    pub decoded_anchors: u64,
+    /// Pairs of a pixel and a splat evaluated for it.
+    pub pixel_splats: u64,
+}
+
+impl Work {
+    /// A bound on the work of the views that `measures` were taken over, at the budget's size.
+    ///
+    /// Each strip may go over the whole scene. A frame smaller than those measured counts as one of their size.
+    ///
+    /// * `decode`: whether anchors are decoded in each frame.
+    pub(super) fn most(
+        measures: &TierMeasures,
+        training_px: [u16; 2],
+        budget: &Budget,
+        n_strips: u8,
+        decode: bool,
+    ) -> Self {
+        let passes = u64::from(n_strips);
+        let area = |[width, height]: [u16; 2]| u64::from(width).saturating_mul(height.into()).max(1);
+        let (measured, planned) = (area(training_px), area([budget.width_px, budget.height_px]));
+        let pixels = u64::from(measures.max_kilo_pixels).saturating_mul(1024);
+        let larger = pixels.saturating_mul(planned).div_ceil(measured);
+        let anchors = if decode { u64::from(measures.max_decoded_anchors) } else { 0 };
+        Self {
+            head_macs: u64::from(measures.max_head_kilo_macs).saturating_mul(1024).saturating_mul(passes),
+            decoded_anchors: anchors.saturating_mul(passes),
+            pixel_splats: if planned > measured { larger } else { pixels },
+        }
+    }
+}
+
+/// Multiply-adds that decoding an anchor is worth.
+pub(super) fn decoding_macs(bundle: &Bundle<'_>) -> u64 {
+    let n_channels = bundle.header().n_channels();
+    let symbols = n_channels.saturating_mul(SYMBOL_MACS);
+    let macs = match bundle.coder() {
+        Coder::Static(_) => symbols,
+        Coder::Context(context) => {
+            let [inputs, hidden] = [context.n_inputs(), context.n_hidden()];
+            let layers = hidden.saturating_mul(inputs.saturating_add(context.n_outputs()));
+            let grid = inputs.saturating_mul(INPUT_MACS);
+            symbols.saturating_add(layers.saturating_mul(NETWORK_MACS)).saturating_add(grid)
+        }
+    };
+    macs as u64
+}

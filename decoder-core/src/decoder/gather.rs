@@ -1,0 +1,148 @@
+//! From the anchors in view to the splats of one strip.
+
+use super::source::AnchorSource;
+use super::strip::{Strip, StripLayout};
+use super::tally::{Tally, place};
+use super::{Decoder, FrameReport};
+use crate::bundle::Chunk;
+use crate::error::DecodeError;
+use crate::project::{Band, View};
+use crate::scene::{Anchor, for_each_gaussian};
+
+/// One frame in work.
+pub(super) struct Frame {
+    pub(super) view: View,
+    pub(super) strips: StripLayout,
+    /// Whether the first strip goes over the whole scene and decides which splats all strips draw. It need not when the
+    /// chunks in each strip's view have no more offsets than there are places.
+    pub(super) tallies: bool,
+    pub(super) tally: Tally,
+    pub(super) report: FrameReport,
+}
+
+/// One strip of it.
+#[derive(Clone, Copy)]
+struct Pass {
+    strip: Strip,
+    /// What the pass can leave out; nothing when it goes over the whole scene.
+    band: Option<Band>,
+}
+
+impl Frame {
+    /// What the pass of a strip has to look at.
+    fn band(&self, strip: Strip) -> Option<Band> {
+        let whole = self.strips.len() == 1 || (self.tallies && strip.index == 0);
+        let [first_px, end_px] = self.strips.pixels(strip);
+        (!whole).then(|| self.view.band(first_px, end_px))
+    }
+
+    /// Whether the pass of a strip needs a chunk.
+    fn needs(&self, strip: Strip, chunk: &Chunk<'_>) -> bool {
+        self.band(strip).is_none_or(|band| band.sees_box(chunk.ink_box()))
+    }
+}
+
+impl<'b> Decoder<'b, '_> {
+    /// Whether each strip surely has a place for all of its splats: all offsets of all anchors of the chunks it sees.
+    ///
+    /// # Budget
+    /// About 100 multiplications a chunk and strip; reads the directory alone.
+    pub(super) fn surely_fits(&self, view: &View, strips: StripLayout) -> bool {
+        let n_offsets = u64::from(self.bundle.header().n_offsets);
+        strips.iter().all(|strip| {
+            let [first_px, end_px] = strips.pixels(strip);
+            let band = view.band(first_px, end_px);
+            let seen = self.planned_chunks().map(|(chunk, _)| chunk);
+            let seen = seen.filter(|chunk| view.sees_box(chunk.ink_box()) && band.sees_box(chunk.ink_box()));
+            let n_anchors: u64 = seen.map(|chunk| u64::from(chunk.n_anchors())).sum();
+            n_anchors.saturating_mul(n_offsets) <= self.plan.max_splats().into()
+        })
+    }
+
+    /// Fills the splat memory with the splats of one strip.
+    pub(super) fn gather(&mut self, strip: Strip, frame: &mut Frame) -> Result<(), DecodeError> {
+        self.splats.n = 0;
+        let pass = Pass { strip, band: frame.band(strip) };
+        frame.report.decode_passes += u8::from(!self.source.is_resident());
+        for (chunk, first_anchor) in self.planned_chunks() {
+            let ink_box = chunk.ink_box();
+            if frame.view.sees_box(ink_box) && pass.band.is_none_or(|band| band.sees_box(ink_box)) {
+                self.gather_sound_chunk(&chunk, first_anchor, pass, frame)?;
+            }
+        }
+        if !frame.tallies {
+            frame.report.max_splats = frame.report.max_splats.max(self.splats.n);
+        }
+        Ok(())
+    }
+
+    /// Keeps the splats of a chunk, or none of them and a note in the report if it is damaged and that is allowed.
+    fn gather_sound_chunk(
+        &mut self,
+        chunk: &Chunk<'b>,
+        first_anchor: u32,
+        pass: Pass,
+        frame: &mut Frame,
+    ) -> Result<(), DecodeError> {
+        let (n_splats, tally, before) = (self.splats.n, frame.tally, frame.report);
+        let sound = match &self.source {
+            AnchorSource::Resident(records) => !records.is_damaged(chunk.index()),
+            AnchorSource::Streamed(_) => !self.skip_damage || chunk.check().is_ok(),
+        };
+        if sound {
+            match self.gather_chunk(chunk, first_anchor, pass, frame) {
+                Err(DecodeError::ChunkStream { .. }) if self.skip_damage => {}
+                result => return result,
+            }
+        }
+        (self.splats.n, frame.tally, frame.report) = (n_splats, tally, before);
+        // Once a frame.
+        let mut earlier = frame.strips.iter().take(pass.strip.index.into());
+        if !earlier.any(|strip| frame.needs(strip, chunk)) {
+            frame.report.chunks_damaged += 1;
+        }
+        let first = frame.report.first_damaged.map_or(chunk.index(), |first| first.min(chunk.index()));
+        frame.report.first_damaged = Some(first);
+        Ok(())
+    }
+
+    /// Keeps the splats of a chunk's anchors that lie in the strip.
+    fn gather_chunk(
+        &mut self,
+        chunk: &Chunk<'b>,
+        first_anchor: u32,
+        pass: Pass,
+        frame: &mut Frame,
+    ) -> Result<(), DecodeError> {
+        let Self { bundle, source, heads, work, splats, .. } = self;
+        let header = bundle.header();
+        let effects = header.features.effects;
+        let Frame { view, strips, tallies, tally, report } = frame;
+        let decoded = u32::from(!source.is_resident());
+        report.chunks_decoded += decoded;
+        source.for_each(chunk, first_anchor, self.row, |number, site, row| {
+            report.anchors_decoded += decoded;
+            let position = bundle.position(site.lattice);
+            let anchor = Anchor::from_row(header, position, site.mask, row).ok_or(DecodeError::Internal)?;
+            if !view.sees_anchor(position, anchor.extent) || pass.band.is_some_and(|band| !band.sees_anchor(&anchor)) {
+                return Ok(());
+            }
+            report.anchors_visible += 1;
+            let macs = for_each_gaussian(&anchor, effects, view.eye, heads, work, |offset, gaussian| {
+                let Some((splat, rect)) = view.project(gaussian, effects.dilation_compensation) else { return };
+                let place = place(number, offset);
+                let touched = strips.touched(rect);
+                let index = usize::from(pass.strip.index);
+                let first = *touched.start();
+                let lies_here = touched.contains(&index);
+                let drawn = if *tallies && index == 0 { tally.admit(place, touched) } else { tally.admits(place) };
+                if drawn && lies_here {
+                    splats.push(splat, rect);
+                    report.splats += u32::from(first == index);
+                }
+            });
+            report.head_macs = report.head_macs.saturating_add(macs);
+            Ok(())
+        })
+    }
+}

@@ -1,0 +1,51 @@
+//! What a frame took.
+
+use crate::budget::Work;
+
+/// What a frame consisted of and what it cost.
+///
+/// With strips a chunk or an anchor counts once for each strip that needs it; splats and pixels do not depend on strips.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct FrameReport {
+    /// Times the chunks in view were decoded: once a strip, never when the anchors are resident.
+    pub decode_passes: u8,
+    /// Chunks decoded: those whose ink box the camera sees.
+    pub chunks_decoded: u32,
+    /// Different damaged chunks in view, which were left out; always 0 unless bound with
+    /// [`Decoder::bind_skipping_damage`](crate::Decoder::bind_skipping_damage).
+    pub chunks_damaged: u32,
+    /// The first of them.
+    pub first_damaged: Option<u32>,
+    /// Anchors decoded.
+    pub anchors_decoded: u32,
+    /// Anchors that passed the prefilter, so that their heads ran.
+    pub anchors_visible: u32,
+    /// Multiply-adds of the heads.
+    pub head_macs: u64,
+    /// Splats drawn.
+    pub splats: u32,
+    /// Splats left out because there was no memory for them: all of the file's anchors and offsets from the first one on
+    /// that some strip had no place for.
+    pub splats_dropped: u32,
+    /// Splats of the fullest strip, those left out included; the number to plan for.
+    pub max_splats: u32,
+    /// Pairs of a tile and a splat blended into it.
+    pub tile_splats: u32,
+    /// Pairs of a pixel and a splat evaluated for it.
+    pub pixel_splats: u32,
+    /// Bytes of the planned memory that this frame needed; no fewer would have drawn it in this way.
+    pub scratch_used: u32,
+}
+
+impl FrameReport {
+    /// What [`Plan::work`](crate::Plan::work) bounds.
+    #[must_use]
+    pub fn work(&self) -> Work {
+        Work {
+            head_macs: self.head_macs,
+            decoded_anchors: self.anchors_decoded.into(),
+            pixel_splats: self.pixel_splats.into(),
+        }
+    }
+}

@@ -1,0 +1,53 @@
+//! Where a frame's anchors come from: decoded again, or kept in memory.
+
+use crate::bundle::{AnchorModels, AnchorRecords, AnchorSite, Chunk};
+use crate::error::DecodeError;
+
+/// The anchors of the planned tiers.
+pub(super) enum AnchorSource<'b, 's> {
+    /// Decoded chunk by chunk, one anchor at a time.
+    Streamed(AnchorModels<'b, 's>),
+    /// Decoded when bound.
+    Resident(AnchorRecords<'b, 's>),
+}
+
+impl<'b> AnchorSource<'b, '_> {
+    /// Whether anchors wait in memory.
+    pub(super) fn is_resident(&self) -> bool {
+        matches!(self, Self::Resident(_))
+    }
+
+    /// Calls `each` with the number in the file, the site and the values of each anchor of `chunk`, in order.
+    ///
+    /// * `first`: the number of the chunk's first anchor. * `row`: `[n_channels]`.
+    ///
+    /// # Errors
+    /// [`DecodeError::ChunkStream`] after the last anchor when they were not sound; never when resident.
+    pub(super) fn for_each(
+        &mut self,
+        chunk: &Chunk<'b>,
+        first: u32,
+        row: &mut [f32],
+        mut each: impl FnMut(u32, AnchorSite, &[f32]) -> Result<(), DecodeError>,
+    ) -> Result<(), DecodeError> {
+        let numbers = (first..).take(chunk.n_anchors().into());
+        match self {
+            Self::Streamed(models) => {
+                let mut anchors = chunk.anchors(models);
+                for number in numbers {
+                    let site = anchors.site();
+                    anchors.values(row);
+                    each(number, site, row)?;
+                }
+                anchors.finish()
+            }
+            Self::Resident(records) => {
+                for number in numbers {
+                    let site = records.read(number, row).ok_or(DecodeError::Internal)?;
+                    each(number, site, row)?;
+                }
+                Ok(())
+            }
+        }
+    }
+}

@@ -1,0 +1,66 @@
+//! Widths of the heads, and what follows from them: floats in memory and multiply-adds.
+
+use super::block::n_rows;
+use super::head::LANES;
+use crate::bundle::Header;
+
+/// Widths of the heads of a scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct HeadShape {
+    /// Inputs of all heads but that of detail.
+    pub(crate) inputs: usize,
+    /// F, which is also the hidden width of the opacity and covariance heads.
+    pub(crate) feature: usize,
+    /// Hidden width of the colour head.
+    pub(crate) colour: usize,
+    /// Hidden width of the detail head; 0 without one.
+    pub(crate) detail: usize,
+    /// K.
+    pub(crate) offsets: usize,
+}
+
+impl HeadShape {
+    pub(crate) fn of(header: &Header) -> Self {
+        Self {
+            inputs: header.head_inputs(),
+            feature: header.feature_dim.into(),
+            colour: header.colour_hidden.into(),
+            detail: header.detail_hidden.into(),
+            offsets: header.n_offsets.into(),
+        }
+    }
+
+    /// Floats of all heads in scratch memory.
+    pub(crate) const fn n_weights(&self) -> usize {
+        let Self { inputs, feature: f, colour: c, detail: d, offsets: k } = *self;
+        let first_layers = LANES * (2 * n_rows::<LANES>(inputs, f) + n_rows::<LANES>(inputs, c));
+        let outputs = n_rows::<1>(f, k) + 7 * n_rows::<7>(f, 7 * k) + 3 * n_rows::<3>(c, 3 * k);
+        let detail = if d == 0 { 0 } else { LANES * n_rows::<LANES>(f + 3, d) + 3 * n_rows::<3>(d, 3) };
+        first_layers + outputs + detail
+    }
+
+    /// Floats of the widest hidden layer's activations.
+    pub(crate) const fn hidden_len(&self) -> usize {
+        let widest = if self.feature > self.colour { self.feature } else { self.colour };
+        let widest = if widest > self.detail { widest } else { self.detail };
+        widest.next_multiple_of(LANES)
+    }
+
+    /// Floats of the detail head's sums, see [`Detail::begin`](super::detail::Detail::begin).
+    pub(crate) const fn sums_len(&self) -> usize {
+        self.detail.next_multiple_of(LANES)
+    }
+
+    /// Multiply-adds of the opacity head, which every visible anchor takes, with `n_drawn` offsets.
+    pub(crate) const fn opacity_macs(&self, n_drawn: usize) -> usize {
+        self.feature * (self.inputs + n_drawn)
+    }
+
+    /// Multiply-adds of the other heads for an anchor with `n_open` offsets of positive opacity.
+    pub(crate) const fn open_macs(&self, n_open: usize) -> usize {
+        let Self { inputs, feature: f, colour: c, detail: d, .. } = *self;
+        let per_anchor = (f + c) * inputs + d * f;
+        let per_gaussian = 7 * f + 3 * c + 6 * d;
+        per_anchor + n_open * per_gaussian
+    }
+}

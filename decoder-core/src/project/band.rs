@@ -1,0 +1,199 @@
+//! What a horizontal band of the image can see: a second test after that of the whole image.
+
+use super::cull::DILATION_REACH_PX;
+use super::view::{View, dot};
+use crate::scene::Anchor;
+
+/// Even an opaque Gaussian is fainter than 1/255 beyond √(2 ln 255) = 3.329 deviations.
+const INK_DEVIATIONS: f32 = 3.33;
+/// The rectangle of tiles of a splat may begin or end half a pixel beyond its ink; rounding is far below the rest.
+const RECT_SLACK_PX: f32 = 1.0;
+/// Rounding of the sums below, relative to their terms.
+const ROUNDING: f32 = 1e-5;
+
+/// The image between two rows of pixels.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Band {
+    above: Side,
+    below: Side,
+}
+
+/// One border of a band: whatever lies beyond it draws nothing inside.
+///
+/// A splat of centre (x, y, z) whose Gaussian has deviations of at most σ reaches r·fy/z·√(1 + t²) and the dilation's reach
+/// from its mean, with r = 3.33·σ and t its slope within the limits of the Jacobian. So it ends above row y₀ when
+/// `y + m·z + r·s < 0` for m = (cy − y₀ + reach)/fy and any s ≥ √(1 + t²). Below the band it is the same with −y.
+#[derive(Clone, Copy, Debug)]
+struct Side {
+    /// ±(row y of the rotation) + m·(row z): y + m·z is `normal·p + shift` for a point p of the normalised frame.
+    normal: [f32; 3],
+    shift: f32,
+    /// s.
+    stretch: f32,
+}
+
+impl View {
+    /// The band from row `first_px` up to row `end_px`.
+    pub(crate) fn band(&self, first_px: u16, end_px: u16) -> Band {
+        let ([_, fy], [_, cy]) = (self.focal_px, self.principal_px);
+        let reach = DILATION_REACH_PX + RECT_SLACK_PX;
+        let [_, row_y, row_z] = self.rotation;
+        let [_, ty, tz] = self.translation;
+        let ([_, min], [_, max]) = (self.slope_min, self.slope_max);
+        let steepest = if min.abs() > max.abs() { min } else { max };
+        let stretch = libm::sqrtf(1.0 + steepest * steepest);
+        let side = |sign: f32, slope: f32| {
+            let ([y0, y1, y2], [z0, z1, z2]) = (row_y, row_z);
+            let normal = [sign * y0 + slope * z0, sign * y1 + slope * z1, sign * y2 + slope * z2];
+            Side { normal, shift: sign * ty + slope * tz, stretch }
+        };
+        Band {
+            above: side(1.0, (cy - f32::from(first_px) + reach) / fy),
+            below: side(-1.0, (f32::from(end_px) - cy + reach) / fy),
+        }
+    }
+}
+
+impl Band {
+    /// Whether a splat inside an ink box can reach the band; true more often than needed, never false wrongly.
+    ///
+    /// # Budget
+    /// About 40 multiplications and a square root.
+    pub(crate) fn sees_box(&self, ink: ([f32; 3], [f32; 3])) -> bool {
+        !(self.above.is_beyond_box(ink) || self.below.is_beyond_box(ink))
+    }
+
+    /// Whether an offset that `anchor` draws can reach the band; likewise.
+    ///
+    /// # Budget
+    /// 12 multiplications an offset.
+    pub(crate) fn sees_anchor(&self, anchor: &Anchor<'_>) -> bool {
+        let [g0, g1, g2] = anchor.base_scale;
+        let widest = if g0 > g1 { g0 } else { g1 };
+        let radius = INK_DEVIATIONS * if widest > g2 { widest } else { g2 };
+        !(self.above.is_beyond_anchor(anchor, radius) || self.below.is_beyond_anchor(anchor, radius))
+    }
+}
+
+impl Side {
+    /// Whether all splats of a box lie beyond: the box holds their balls of radius r, whose farthest points have
+    /// `y + m·z + r·|normal|`; where s is more than that, half of the box's shortest edge bounds r.
+    fn is_beyond_box(&self, (min, max): ([f32; 3], [f32; 3])) -> bool {
+        let ([n0, n1, n2], [low0, low1, low2], [high0, high1, high2]) = (self.normal, min, max);
+        let farther = |n: f32, low: f32, high: f32| n * if n > 0.0 { high } else { low };
+        let farthest = farther(n0, low0, high0) + farther(n1, low1, high1) + farther(n2, low2, high2);
+        let terms = |n: f32, low: f32, high: f32| n.abs() * (low.abs() + high.abs());
+        let size = terms(n0, low0, high0) + terms(n1, low1, high1) + terms(n2, low2, high2) + self.shift.abs();
+        let edges = [high0 - low0, high1 - low1, high2 - low2];
+        let shortest = edges.into_iter().fold(f32::INFINITY, |least, edge| if edge < least { edge } else { least });
+        let excess = self.stretch - libm::sqrtf(dot(self.normal, self.normal));
+        let excess = if excess > 0.0 { 0.5 * shortest * excess } else { 0.0 };
+        // NaN, from absurd cameras, counts as seen here and below.
+        farthest + self.shift + excess + ROUNDING * (size + excess) < 0.0
+    }
+
+    /// Whether all offsets that an anchor draws lie beyond, each the centre of a ball of `radius`.
+    fn is_beyond_anchor(&self, anchor: &Anchor<'_>, radius: f32) -> bool {
+        let ([n0, n1, n2], [l0, l1, l2], [p0, p1, p2]) = (self.normal, anchor.extent, anchor.position);
+        let along = [n0 * l0, n1 * l1, n2 * l2];
+        let ball = radius * self.stretch;
+        let centre = dot(self.normal, anchor.position) + self.shift + ball;
+        let size = n0.abs() * p0.abs() + n1.abs() * p1.abs() + n2.abs() * p2.abs() + self.shift.abs() + ball;
+        let mut mask = anchor.mask;
+        for offset in anchor.offsets {
+            let drawn = mask & 1 == 1;
+            mask >>= 1;
+            let ([along0, along1, along2], [o0, o1, o2]) = (along, *offset);
+            let [a, b, c] = [along0 * o0, along1 * o1, along2 * o2];
+            let beyond = centre + (a + b + c) + ROUNDING * (size + a.abs() + b.abs() + c.abs()) < 0.0;
+            if drawn && !beyond {
+                return false;
+            }
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::View;
+    use crate::camera::Camera;
+    use crate::scene::{Anchor, Gaussian};
+
+    const HEIGHT_PX: u16 = 90;
+
+    /// A stream of numbers, the same every time.
+    struct Numbers(u32);
+
+    impl Numbers {
+        fn between(&mut self, low: f32, high: f32) -> f32 {
+            self.0 = self.0.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            low + (high - low) * (self.0 >> 8) as f32 / 16_777_216.0
+        }
+    }
+
+    fn view(random: &mut Numbers) -> View {
+        // A turn about x, then one about z, some distance away: orthonormal within rounding.
+        let [(s, c), (sz, cz)] = [random.between(-0.7, 0.7), random.between(-3.0, 3.0)].map(f32::sin_cos);
+        let camera = Camera {
+            rotation: [cz, -sz, 0.0, c * sz, c * cz, -s, s * sz, s * cz, c],
+            translation: [random.between(-1.0, 1.0), random.between(-1.0, 1.0), random.between(-0.5, 4.0)],
+            focal_px: [80.0, random.between(30.0, 300.0)],
+            principal_px: [40.0, random.between(-20.0, 120.0)],
+            width_px: 80,
+            height_px: HEIGHT_PX,
+        };
+        View::new(&camera).expect("a sound camera")
+    }
+
+    #[test]
+    fn nothing_that_a_strip_draws_is_left_out_and_most_of_the_rest_is() {
+        let mut random = Numbers(1);
+        let [mut n_needless, mut n_kept, mut n_boxes_kept] = [0; 3];
+        for _ in 0..20_000 {
+            let view = view(&mut random);
+            let first_row = (random.between(0.0, 5.0) as u8).min(4);
+            let band = view.band(u16::from(first_row) * 16, (u16::from(first_row) * 16 + 16).min(HEIGHT_PX));
+            let offsets = [(); 3].map(|()| [(); 3].map(|()| random.between(-2.0, 2.0)));
+            let size = random.between(0.001, 0.3);
+            let anchor = Anchor {
+                position: [(); 3].map(|()| random.between(-2.0, 2.0)),
+                feature: &[],
+                extent: [(); 3].map(|()| random.between(0.01, 0.4)),
+                base_scale: [(); 3].map(|()| size * random.between(0.1, 1.0)),
+                offsets: &offsets,
+                mask: random.between(0.0, 8.0) as u32,
+            };
+            let radius = 3.33 * anchor.base_scale.into_iter().fold(0.0, f32::max);
+            let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+            let mut drawn = false;
+            for (k, offset) in offsets.iter().enumerate().filter(|(k, _)| anchor.mask >> k & 1 == 1) {
+                let centre: [f32; 3] =
+                    std::array::from_fn(|axis| anchor.position[axis] + offset[axis] * anchor.extent[axis]);
+                for axis in 0..3 {
+                    low[axis] = low[axis].min(centre[axis] - radius);
+                    high[axis] = high[axis].max(centre[axis] + radius);
+                }
+                let quaternion = [(); 4].map(|()| random.between(-1.0, 1.0));
+                let norm = quaternion.iter().map(|q| q * q).sum::<f32>().sqrt().max(1e-3);
+                let gaussian = Gaussian {
+                    centre,
+                    scale: anchor.base_scale,
+                    rotation: quaternion.map(|q| q / norm),
+                    opacity: if k == 0 { 1.0 } else { random.between(0.01, 1.0) },
+                    colour: [0.0; 3],
+                };
+                let rect = view.project(&gaussian, false).map(|(_, rect)| rect);
+                drawn |= rect.is_some_and(|rect| rect.first_row <= first_row && first_row <= rect.last_row);
+            }
+            let (kept, box_kept) = (band.sees_anchor(&anchor), band.sees_box((low, high)));
+            assert!(!drawn || kept, "{view:?}, {band:?}, {anchor:?}");
+            assert!(!drawn || box_kept, "{view:?}, {band:?}, {low:?} to {high:?}");
+            n_needless += u32::from(!drawn);
+            n_kept += u32::from(!drawn && kept);
+            n_boxes_kept += u32::from(!drawn && box_kept && anchor.mask != 0);
+        }
+        assert!(n_kept * 3 < n_needless, "{n_kept} of {n_needless} needless anchors are kept");
+        assert!(n_boxes_kept * 2 < n_needless, "{n_boxes_kept} of {n_needless} needless boxes are kept");
+    }
+}

@@ -1,6 +1,7 @@
 //! Bundles with everything that the format offers, of both coders.
 
-use pocketsplat::bundle::{self, Coder, WriteOptions};
+use pocketsplat::bundle::{self, Coder, WriteOptions, manifest};
+use pocketsplat::camera::Camera;
 use pocketsplat_core::Bundle;
 
 use crate::frame::info_for;
@@ -25,6 +26,14 @@ pub fn tiered(case: &Case, coder: Coder, chunk_anchors: u16) -> Vec<u8> {
         ..WriteOptions::default()
     };
     bundle::write(&scene, &info_for(&cameras()[0].1), &options).expect("a test scene can be written").bytes
+}
+
+/// The same with chunks of 32 anchors and a manifest measured over `views`, which are of the size of the first test camera.
+pub fn measured(case: &Case, coder: Coder, views: &[Camera]) -> Vec<u8> {
+    let mut bytes = tiered(case, coder, 32);
+    let measures = manifest::measure(&Bundle::parse(&bytes).expect("the writer's bundle is sound"), views, &[]);
+    manifest::install(&mut bytes, &measures.expect("sound chunks")).expect("a sound bundle");
+    bytes
 }
 
 /// Where the chunks of a bundle begin, bytes from the start of its file.

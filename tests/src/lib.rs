@@ -5,6 +5,7 @@
 //! * `parity`: does the decoder draw what the f64 oracle draws?
 //! * `delivery`: does a sink get every pixel once, whatever the scratch memory held and wherever it lay?
 //! * `budget`: do the planned bytes suffice, and does one byte less fail and say how many are needed?
+//! * `memory`: do all ways to use memory draw the same pixels, touch nothing else, and say how much they needed?
 //! * `malformed`: does a damaged bundle fail and name the place, or report the damaged chunk, and never draw another
 //!   picture in silence?
 //! * `tiers`: is each tier's scene part of the next one's, and is a file cut at its end that scene?

@@ -145,6 +145,19 @@ pub fn look_at(eye: DVec3, target: DVec3, focal: f64, [width_px, height_px]: [u3
     }
 }
 
+/// Cameras on a circle around the ball of [`random_scene`], of the size of the first of [`cameras`].
+pub fn orbit(n_cameras: usize) -> Vec<Camera> {
+    let (mut eye, mut cameras) = (DVec3::new(4.0, 0.3, 1.3), Vec::new());
+    // A turn by about 360°/n as a matrix of rational numbers: no sine of the host's.
+    let half = 3.0 / n_cameras as f64;
+    let (cos, sin) = ((1.0 - half * half) / (1.0 + half * half), 2.0 * half / (1.0 + half * half));
+    for _ in 0..n_cameras {
+        cameras.push(look_at(eye, DVec3::ZERO, 1.2, [160, 120]));
+        eye = DVec3::new(cos * eye.x - sin * eye.y, sin * eye.x + cos * eye.y, eye.z);
+    }
+    cameras
+}
+
 /// Named cameras around and inside the ball of [`random_scene`]: sizes that tiles divide and sizes that they do not,
 /// skewed focal lengths, a principal point off the centre, and a view that misses everything.
 pub fn cameras() -> Vec<(&'static str, Camera)> {

@@ -1,0 +1,271 @@
+//! The memory contract: a plan's bytes suffice, one fewer is refused by number, nothing else is touched, and neither where
+//! anchors wait nor in how many strips a frame is drawn changes a pixel.
+
+use conformance::bundles::{CODERS, measured, tiered};
+use conformance::frame::{Frame, budget_for, to_core};
+use conformance::scenes::{CASES, cameras, orbit};
+use pocketsplat_core::{
+    Budget, Bundle, Camera, DecodeError, Decoder, ErrorClass, FrameReport, MaxSplats, Plan, Residency, ScratchShape,
+    Strips,
+};
+
+const RESIDENCIES: [Residency; 2] = [Residency::Resident, Residency::Streamed];
+/// Bytes before and after the memory that a decoder gets.
+const GUARD: usize = 64;
+
+/// Every way to draw what `budget` says.
+fn ways(budget: Budget) -> impl Iterator<Item = Budget> {
+    let strips = [1, 2, 4, 8].map(Strips::Exactly);
+    RESIDENCIES
+        .into_iter()
+        .flat_map(move |residency| strips.map(|strips| budget.with_residency(residency).with_strips(strips)))
+}
+
+/// A bundle for each case, of either coder in turn, with masks and three tiers.
+fn files() -> impl Iterator<Item = (&'static str, Vec<u8>)> {
+    CASES.iter().enumerate().map(|(i, case)| (case.name, tiered(case, CODERS[i % 2], 64)))
+}
+
+/// Views of the test scenes: from outside, with a skewed lens, from within.
+fn views() -> [Camera; 3] {
+    let cameras = cameras();
+    [0, 2, 3].map(|view: usize| to_core(&cameras[view].1))
+}
+
+/// A frame drawn in memory between two guards, all filled with `fill` before, that begins `start` bytes after the first.
+struct Drawn {
+    frame: Frame,
+    report: FrameReport,
+    /// The memory of the plan as the frame left it.
+    memory: Vec<u8>,
+}
+
+fn draw(bundle: &Bundle<'_>, plan: Plan, camera: &Camera, fill: u8, start: usize) -> Drawn {
+    let mut memory = vec![fill; GUARD + start + plan.scratch_len() + GUARD];
+    let (before, rest) = memory.split_at_mut(GUARD + start);
+    let (scratch, after) = rest.split_at_mut(plan.scratch_len());
+    let mut frame = Frame::new(camera.width_px, camera.height_px);
+    let mut decoder = Decoder::bind(bundle, plan, scratch).expect("as many bytes as planned");
+    let report = decoder.render(camera, &mut frame).expect("drawn");
+    assert!(before.iter().chain(&*after).all(|&byte| byte == fill), "bytes beside the memory are untouched: {plan:?}");
+    assert!(frame.deliveries.iter().all(|&n| n == 1), "every pixel arrives once: {plan:?}");
+    Drawn { frame, report, memory: scratch.to_vec() }
+}
+
+#[test]
+fn residency_and_strips_change_no_pixel() {
+    for (name, bytes) in files() {
+        let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
+        for camera in views() {
+            for tiers in 1..=3 {
+                let budget = budget_for(&camera).with_tiers(tiers);
+                let expected = draw(&bundle, bundle.plan(&budget).expect("planned"), &camera, 0, 0);
+                for way in ways(budget) {
+                    let plan = bundle.plan(&way).expect("planned");
+                    let Drawn { frame, report, .. } = draw(&bundle, plan, &camera, 0xA5, 1);
+                    assert!(frame == expected.frame, "{name}, {tiers} tiers: {plan:?}");
+                    let scene = |r: FrameReport| (r.splats, r.splats_dropped, r.tile_splats, r.pixel_splats);
+                    assert_eq!(scene(report), scene(expected.report), "{name}, {tiers} tiers: {plan:?}");
+                    assert_eq!(report.anchors_decoded > 0, !plan.is_resident(), "{name}: decoded when streamed");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_planned_bytes_suffice_and_one_less_is_refused_by_number() {
+    for (name, bytes) in files() {
+        let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
+        let budget = budget_for(&views()[0]);
+        for max_splats in [MaxSplats::Worst, MaxSplats::AtMost(100), MaxSplats::AtMost(0)] {
+            for way in ways(budget.with_max_splats(max_splats)) {
+                let plan = bundle.plan(&way).expect("planned");
+                let needed = plan.scratch_len();
+                let mut scratch = vec![0; needed];
+                for skip_damage in [false, true] {
+                    let mut bind = |len: usize| {
+                        let bind = if skip_damage { Decoder::bind_skipping_damage } else { Decoder::bind };
+                        bind(&bundle, plan, &mut scratch[..len]).err()
+                    };
+                    let available = needed as u32 - 1;
+                    let expected = DecodeError::ScratchTooSmall { needed: needed as u32, available };
+                    assert_eq!((bind(needed), bind(needed - 1)), (None, Some(expected)), "{name}: {plan:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn memory_content_and_alignment_do_not_show_and_the_mark_covers_what_was_touched() {
+    for (name, bytes) in files() {
+        let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
+        let camera = views()[0];
+        for way in ways(budget_for(&camera)) {
+            let plan = bundle.plan(&way).expect("planned");
+            let drawn = [(0x00, 0), (0xFF, 0), (0x5A, 1), (0x11, 2), (0xC3, 3)]
+                .map(|(fill, start)| (fill, draw(&bundle, plan, &camera, fill, start)));
+            let [(_, zeros), (_, ones), ..] = &drawn;
+            for (fill, other) in &drawn {
+                assert!(other.frame == zeros.frame && other.report == zeros.report, "{name}, {fill:#04x}: {plan:?}");
+            }
+            // A byte that a frame writes has the same value after both; one that it leaves alone has the fill's.
+            let n_touched = zeros.memory.iter().zip(&ones.memory).filter(|&(&a, &b)| (a, b) != (0x00, 0xFF)).count();
+            let mark = zeros.report.scratch_used as usize;
+            assert!(n_touched <= mark && mark <= plan.scratch_len(), "{name}: {n_touched} of {mark} bytes: {plan:?}");
+            assert!(n_touched * 10 >= mark * 9, "{name}: {n_touched} of {mark} bytes: {plan:?}");
+        }
+    }
+}
+
+#[test]
+fn measured_plans_hold_the_views_measured_and_waste_little() {
+    for (case, coder) in CASES.iter().zip(CODERS.into_iter().cycle()) {
+        let views = orbit(12);
+        let bytes = measured(case, coder, &views);
+        let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
+        let views: Vec<Camera> = views.iter().map(to_core).collect();
+        for tiers in [1, 3] {
+            let budget = budget_for(&views[0]).with_max_splats(MaxSplats::Measured).with_tiers(tiers);
+            for way in ways(budget) {
+                let plan = bundle.plan(&way).expect("planned");
+                let reports: Vec<_> = views.iter().map(|camera| draw(&bundle, plan, camera, 0, 0).report).collect();
+                let most = reports.iter().map(|report| report.scratch_used as usize).max().unwrap_or(0);
+                let worst = bundle.plan(&way.with_max_splats(MaxSplats::Worst)).expect("planned").max_splats();
+                assert!(reports.iter().all(|report| report.splats_dropped == 0), "{}: {plan:?}", case.name);
+                assert!(plan.max_splats() <= worst, "{}: never above the worst case", case.name);
+                assert!(most * 10 >= plan.scratch_len() * 9, "{}: {most} bytes of {plan:?}", case.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn predicted_work_bounds_the_work_of_the_views_measured_closely() {
+    for (case, coder) in CASES.iter().zip(CODERS.into_iter().cycle()) {
+        let views = orbit(12);
+        let bytes = measured(case, coder, &views);
+        let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
+        for way in ways(budget_for(&to_core(&views[0]))) {
+            let plan = bundle.plan(&way).expect("planned");
+            let bound = plan.work().expect("measured");
+            let work: Vec<_> =
+                views.iter().map(|view| draw(&bundle, plan, &to_core(view), 0, 0).report.work()).collect();
+            let most = |count: fn(&pocketsplat_core::Work) -> u64| work.iter().map(count).max().unwrap_or(0);
+            for (what, most, bound) in [
+                ("multiply-adds", most(|w| w.head_macs), bound.head_macs),
+                ("anchors", most(|w| w.decoded_anchors), bound.decoded_anchors),
+                ("pixels", most(|w| w.pixel_splats), bound.pixel_splats),
+            ] {
+                assert!(most <= bound, "{}: {most} {what} of {bound}: {plan:?}", case.name);
+                let closely = plan.n_strips() == 1 && what != "pixels";
+                assert!(!closely || most * 10 >= bound * 9, "{}: {most} {what} of {bound}: {plan:?}", case.name);
+            }
+        }
+    }
+}
+
+/// What is drawn of a view that needs more than there is memory for are the file's first splats: of one strip with memory
+/// for just as many they are the whole frame.
+#[test]
+fn too_many_splats_leave_out_the_last_of_the_file_in_all_strips_alike() {
+    for (name, bytes) in files() {
+        let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
+        for camera in views() {
+            let whole = draw(&bundle, bundle.plan(&budget_for(&camera)).expect("planned"), &camera, 0, 0).report;
+            for most in [0, 1, whole.splats / 7, whole.splats / 2, whole.splats.saturating_sub(1)] {
+                for way in ways(budget_for(&camera).with_max_splats(MaxSplats::AtMost(most))) {
+                    let plan = bundle.plan(&way).expect("planned");
+                    let Drawn { frame, report, .. } = draw(&bundle, plan, &camera, 0, 0);
+                    assert_eq!(report.splats + report.splats_dropped, whole.splats, "{name}, {most}: {report:?}");
+                    assert_eq!(report.splats_dropped > 0, report.max_splats > most, "{name}, {most}: {report:?}");
+                    assert!(report.scratch_used as usize <= plan.scratch_len(), "{name}, {most}: {report:?}");
+                    let first = budget_for(&camera).with_max_splats(MaxSplats::AtMost(report.splats));
+                    let first = draw(&bundle, bundle.plan(&first).expect("planned"), &camera, 0, 0);
+                    assert_eq!(first.report.splats, report.splats, "{name}, {most}: as many");
+                    assert!(frame == first.frame, "{name}, {most}: {plan:?}");
+                    let enough = way.with_max_splats(MaxSplats::AtMost(report.max_splats));
+                    let enough = draw(&bundle, bundle.plan(&enough).expect("planned"), &camera, 0, 0).report;
+                    assert_eq!(enough.splats_dropped, 0, "{name}, {most}: the number to plan for");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_most_tiers_that_fit_are_planned() {
+    for coder in CODERS {
+        let bytes = measured(&CASES[0], coder, &orbit(4));
+        let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
+        let free = Budget::for_frame(160, 120);
+        let largest = bundle.plan(&free).expect("planned");
+        assert_eq!(
+            (largest.n_tiers(), largest.n_strips(), largest.pruning_rate()),
+            (3, 1, 0.0),
+            "with memory to spare"
+        );
+        assert!(largest.is_resident(), "decoding once is less work");
+        let mut tiers_planned = Vec::new();
+        for ram_bytes in (0..largest.scratch_len() + 500).step_by(500) {
+            // By hand: all there is, one at a time.
+            let by_hand = |tiers: u8| {
+                let plans = ways(free.with_tiers(tiers)).map(|way| bundle.plan(&way).expect("planned"));
+                plans.filter(|plan| plan.scratch_len() <= ram_bytes).map(|plan| plan.n_tiers()).max()
+            };
+            let expected = (1..=3).rev().find_map(by_hand);
+            match bundle.plan(&free.in_bytes(ram_bytes)) {
+                Ok(plan) => {
+                    assert!(plan.scratch_len() <= ram_bytes, "{ram_bytes} bytes: {plan:?}");
+                    assert_eq!(Some(plan.n_tiers()), expected, "{ram_bytes} bytes: {plan:?}");
+                    let anchors = bundle.tier(plan.n_tiers() - 1).expect("a tier").n_anchors as f32;
+                    let rate = 1.0 - anchors / bundle.header().n_anchors as f32;
+                    assert_eq!(plan.pruning_rate(), rate, "{ram_bytes} bytes: {plan:?}");
+                    let again = bundle.plan(&free.in_bytes(plan.scratch_len())).map(|plan| plan.n_tiers());
+                    assert_eq!(again, Ok(plan.n_tiers()), "its own bytes do: {plan:?}");
+                    tiers_planned.push(plan.n_tiers());
+                }
+                Err(error) => {
+                    assert_eq!((expected, error.class()), (None, ErrorClass::OverBudget), "{ram_bytes} bytes: {error}");
+                    let DecodeError::BudgetTooSmall { needed, available, .. } = error else { panic!("{error}") };
+                    assert_eq!(available as usize, ram_bytes, "{error}");
+                    let just = free.in_bytes(needed as usize);
+                    assert_eq!(bundle.plan(&just).map(|plan| plan.scratch_len()), Ok(needed as usize), "{error}");
+                    assert!(bundle.plan(&just.in_bytes(needed as usize - 1)).is_err(), "one byte less than {needed}");
+                }
+            }
+        }
+        assert!(tiers_planned.is_sorted() && tiers_planned.first() == Some(&1), "{coder:?}: {tiers_planned:?}");
+    }
+}
+
+#[test]
+fn a_constant_bounds_every_plan() {
+    for (name, bytes) in files() {
+        let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
+        for max_splats in [MaxSplats::Worst, MaxSplats::AtMost(321)] {
+            for way in ways(budget_for(&views()[0]).with_max_splats(max_splats)) {
+                let plan = bundle.plan(&way).expect("planned");
+                let ScratchShape { feature_dim, n_offsets, max_splats, resident_anchors, resident_chunks, .. } =
+                    *plan.shape();
+                let most = ScratchShape {
+                    max_splats,
+                    resident_anchors,
+                    resident_chunks,
+                    ..ScratchShape::most(feature_dim, n_offsets)
+                };
+                assert!(most.scratch_len() >= plan.scratch_len(), "{name}: {plan:?}");
+                let widths = ScratchShape {
+                    colour_hidden: plan.shape().colour_hidden,
+                    detail_hidden: plan.shape().detail_hidden,
+                    n_tables: plan.shape().n_tables,
+                    ..most
+                };
+                assert!(widths.scratch_len() >= plan.scratch_len(), "{name}: with the widths known: {plan:?}");
+                assert!(widths.scratch_len() <= most.scratch_len(), "{name}: knowing more takes no more");
+                assert_eq!(plan.shape().scratch_len(), plan.scratch_len(), "{name}: knowing all takes just that");
+            }
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! What the ways to draw a bundle take, in bytes and in this machine's time: residency and strips, frame by frame in turn.
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use anyhow::ensure;
+use clap::Parser;
+use pocketsplat::bundle;
+use pocketsplat::dataset::{self, LoadOptions, Normalisation};
+use pocketsplat::render::decoder::core_camera;
+use pocketsplat_core::{Budget, Bundle, Camera, Decoder, FrameReport, Residency, Strips, TileSink};
+
+/// Draws views of a bundle in every way there is and prints what each takes.
+#[derive(Parser)]
+struct Args {
+    /// The bundle.
+    bundle: PathBuf,
+    /// The capture it was trained on, whose held-out views are drawn; without it the bundle's preview is.
+    capture: Option<PathBuf>,
+    /// Held-out views at most, evenly picked.
+    #[arg(long, default_value_t = 8)]
+    views: usize,
+    /// Frames of each way and view; medians count.
+    #[arg(long, default_value_t = 5)]
+    frames: usize,
+    /// Tiers to draw at most.
+    #[arg(long, default_value_t = u8::MAX)]
+    tiers: u8,
+}
+
+/// A decoder with the name of its way and what its frames took.
+struct Way<'b> {
+    residency: Residency,
+    n_strips: u8,
+    scratch_len: usize,
+    decoder: Decoder<'b, 'b>,
+    /// Sum over the views of their median times, ms.
+    time_ms: f64,
+    reports: Vec<FrameReport>,
+}
+
+struct Nowhere;
+
+impl TileSink for Nowhere {
+    fn tile(&mut self, _x_px: u16, _y_px: u16, _width: u16, _height: u16, rgb: &[[u8; 3]]) {
+        std::hint::black_box(rgb);
+    }
+}
+
+fn main() -> anyhow::Result<()> {
+    let args = Args::parse();
+    let bytes = bundle::load(&args.bundle)?;
+    let bundle = Bundle::parse(&bytes)?;
+    let cameras = match &args.capture {
+        None => vec![bundle.header().preview],
+        Some(capture) => held_out(&bundle, capture, args.views)?,
+    };
+    let [width_px, height_px] = bundle.header().training_px;
+    let mut ways = Vec::new();
+    for residency in [Residency::Resident, Residency::Streamed] {
+        for n_strips in [1, 2, 4, 8] {
+            let budget = Budget::for_frame(width_px, height_px)
+                .with_tiers(args.tiers)
+                .with_residency(residency)
+                .with_strips(Strips::Exactly(n_strips));
+            let plan = bundle.plan(&budget)?;
+            let decoder = Decoder::bind(&bundle, plan, vec![0; plan.scratch_len()].leak())?;
+            let (scratch_len, reports) = (plan.scratch_len(), Vec::new());
+            ways.push(Way { residency, n_strips, scratch_len, decoder, time_ms: 0.0, reports });
+        }
+    }
+    println!(
+        "{}: {} bytes, {} anchors, {width_px}x{height_px}, means over {} views",
+        args.bundle.display(),
+        bytes.len(),
+        bundle.n_anchors(),
+        cameras.len(),
+    );
+    for camera in &cameras {
+        let mut times = vec![Vec::new(); ways.len()];
+        // In turn, so that all suffer alike from what else the machine does.
+        for frame in 0..args.frames {
+            for (way, times) in ways.iter_mut().zip(&mut times) {
+                let start = Instant::now();
+                let report = way.decoder.render(camera, &mut Nowhere)?;
+                times.push(start.elapsed());
+                if frame == 0 {
+                    way.reports.push(report);
+                }
+            }
+        }
+        for (way, times) in ways.iter_mut().zip(&mut times) {
+            way.time_ms += median_ms(times);
+        }
+    }
+    let first_ms = ways.first().map_or(1.0, |way| way.time_ms);
+    println!("way              bytes  most used  decoded  visible  head Mmac   splats  dropped  Mpixels     ms  ratio");
+    for Way { residency, n_strips, scratch_len, time_ms, reports, .. } in &ways {
+        let n = cameras.len() as f64;
+        let mean = |count: fn(&FrameReport) -> f64| reports.iter().map(count).sum::<f64>() / n;
+        println!(
+            "{:8} {n_strips} {scratch_len:>11} {:>10} {:>8.0} {:>8.0} {:>10.2} {:>8.0} {:>8.0} {:>8.2} {:>6.2} {:>6.2}",
+            format!("{residency:?}"),
+            reports.iter().map(|report| report.scratch_used).max().unwrap_or(0),
+            mean(|report| report.anchors_decoded.into()),
+            mean(|report| report.anchors_visible.into()),
+            mean(|report| report.head_macs as f64 / 1e6),
+            mean(|report| report.splats.into()),
+            mean(|report| report.splats_dropped.into()),
+            mean(|report| f64::from(report.pixel_splats) / 1e6),
+            time_ms / n,
+            time_ms / first_ms,
+        );
+    }
+    Ok(())
+}
+
+/// The held-out views of a capture, in the frame that the bundle was trained in.
+fn held_out(bundle: &Bundle<'_>, capture: &Path, most: usize) -> anyhow::Result<Vec<Camera>> {
+    let header = bundle.header();
+    let longest_px = header.training_px.into_iter().max().map(u32::from);
+    let (capture, _) = dataset::load(capture, &LoadOptions { max_resolution: longest_px, ..LoadOptions::default() })?;
+    let own = Normalisation { centre: header.normalisation_centre.into(), scale: header.normalisation_scale };
+    ensure!(
+        own == capture.normalisation,
+        "the capture is normalised otherwise than the bundle: load it as training did"
+    );
+    let n = capture.test.len().min(most);
+    (0..n).map(|i| Ok(core_camera(&capture.test[i * capture.test.len() / n].camera)?)).collect()
+}
+
+fn median_ms(times: &mut [Duration]) -> f64 {
+    times.sort_unstable();
+    times.get(times.len() / 2).copied().unwrap_or_default().as_secs_f64() * 1e3
+}

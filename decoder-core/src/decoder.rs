@@ -83,6 +83,8 @@ impl<'b, 's> Decoder<'b, 's> {
         Self::bind_with(bundle, plan, scratch, true)
     }
 
+    // Not inlined, here and below: a caller's stack frame would keep what only one of the steps needs.
+    #[inline(never)]
     fn bind_with(
         bundle: &Bundle<'b>,
         plan: Plan,
@@ -156,6 +158,7 @@ impl<'b, 's> Decoder<'b, 's> {
     /// transmittance falls below 1e-4. Of several strips each does so for the chunks and anchors that can reach it; but the
     /// first one goes over the whole view to see that all strips have places enough, unless that follows from the
     /// directory.
+    #[inline(never)]
     pub fn render(&mut self, camera: &Camera, sink: &mut impl TileSink) -> Result<FrameReport, DecodeError> {
         let view = View::new(camera)?;
         let budget = *self.plan.budget();

@@ -99,6 +99,8 @@ impl Bundle<'_> {
     ///
     /// # Budget
     /// At most 64 sums; reads the manifest and the directory's tiers, no chunk.
+    // Not inlined: a caller's stack frame would keep what only planning needs.
+    #[inline(never)]
     pub fn plan(&self, budget: &Budget) -> Result<Plan, DecodeError> {
         budget.check()?;
         let most_tiers = budget.tiers.min(self.n_tiers());

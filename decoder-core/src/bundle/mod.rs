@@ -83,6 +83,8 @@ impl<'a> Bundle<'a> {
     /// # Budget
     /// No scratch. Reads everything before the chunks once, coded heads twice; the chunks' checksums wait for
     /// [`Decoder::bind`](crate::Decoder::bind).
+    // Not inlined: a caller's stack frame would keep what only parsing needs.
+    #[inline(never)]
     pub fn parse(bytes: &'a [u8]) -> Result<Self, DecodeError> {
         let (header, section_table) = Header::parse(bytes)?;
         let sections = Sections::parse(section_table, header.features, header.header_len, header.file_len, bytes)?;

@@ -199,8 +199,10 @@ impl Bundle<'_> {
     }
 }
 
-/// Splats of the fullest strip measured whose strips are as high a part of their frame as those of `n_strips` strips of a
-/// frame of `height_px`: whole rows of tiles make up different parts of different frames.
+/// Splats of the fullest strip of the finest cut that was measured whose strips are as high a part of their frame as those of
+/// `n_strips` strips of a frame of `height_px`: whole rows of tiles make up different parts of different frames. At the
+/// training size that is the cut itself, which matters because finer strips can be fuller where they straddle a border of
+/// coarser ones.
 fn fullest_strip(measures: &TierMeasures, training_height_px: u16, height_px: u16, n_strips: u8) -> u32 {
     let rows = |height_px: u16, n_strips: u8| height_px.div_ceil(TILE_PX).div_ceil(u16::from(n_strips).max(1));
     let part = |height_px: u16, n_strips: u8| {
@@ -214,5 +216,32 @@ fn fullest_strip(measures: &TierMeasures, training_height_px: u16, height_px: u1
         measured_px.saturating_mul(frame_px) >= strip_px.saturating_mul(measured_frame_px)
     };
     let measured = STRIPS.into_iter().zip(measures.max_strip_splats);
-    measured.filter(as_high).map(|(_, splats)| splats).min().unwrap_or(measures.max_splats)
+    measured.rev().find(as_high).map_or(measures.max_splats, |(_, splats)| splats)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{TierMeasures, fullest_strip};
+
+    #[test]
+    fn strips_count_as_those_measured_that_are_as_high() {
+        let measures = TierMeasures {
+            psnr_db: None,
+            n_views: 0,
+            n_cameras: 1,
+            max_visible_anchors: 0,
+            max_splats: 100,
+            max_strip_splats: [100, 60, 70, 30],
+            max_strip_pairs: [0; 4],
+            max_head_kilo_macs: 0,
+            max_kilo_pixels: 0,
+            max_decoded_anchors: 0,
+        };
+        let splats = |height_px, n_strips| fullest_strip(&measures, 200, height_px, n_strips);
+        assert_eq!([1, 2, 4, 8].map(|n| splats(200, n)), [100, 60, 70, 30], "each cut at the size measured");
+        assert_eq!(splats(200, 3), 60, "a third fits in a half");
+        // 13 rows of tiles in eight strips are two a strip, 16 % of the frame; of 112 pixels one row is 14 %, of 96 17 %.
+        assert_eq!([splats(112, 8), splats(96, 8)], [30, 70], "one row of few is a larger part");
+        assert_eq!(splats(16, 8), 100, "a frame of one row is one strip");
+    }
 }

@@ -216,7 +216,8 @@ fn fullest_strip(measures: &TierMeasures, training_height_px: u16, height_px: u1
         measured_px.saturating_mul(frame_px) >= strip_px.saturating_mul(measured_frame_px)
     };
     let measured = STRIPS.into_iter().zip(measures.max_strip_splats);
-    measured.rev().find(as_high).map_or(measures.max_splats, |(_, splats)| splats)
+    // The last one counts. (Going backwards through pairs would link a panic.)
+    measured.filter(as_high).fold(measures.max_splats, |_, (_, splats)| splats)
 }
 
 #[cfg(test)]

@@ -50,14 +50,7 @@ pub fn random_scene(case: &Case) -> Scene<f32> {
     const RADIUS_CELLS: i32 = 96;
     let mut rng = ChaCha8Rng::seed_from_u64(case.seed);
     let (f, k) = (case.shape.feature_dim, case.shape.n_offsets);
-    let mut anchors = Anchors {
-        lattice: vec![],
-        features: vec![],
-        log_scales: vec![],
-        offsets: vec![],
-        mask_logits: vec![],
-        places: vec![],
-    };
+    let mut anchors = Anchors::default();
     while anchors.len() < case.n_anchors {
         let cell: [i32; 3] = std::array::from_fn(|_| rng.random_range(-RADIUS_CELLS..=RADIUS_CELLS));
         let inside = cell.iter().map(|c| c * c).sum::<i32>() <= RADIUS_CELLS * RADIUS_CELLS;

@@ -28,14 +28,7 @@ pub fn shape_of(bundle: &Bundle<'_>) -> ModelShape {
 /// [`DecodeError`] of the first chunk that does not decode.
 pub fn decoded_scene(bundle: &Bundle<'_>) -> Result<Scene<f32>, DecodeError> {
     let shape = shape_of(bundle);
-    let mut anchors = Anchors {
-        lattice: Vec::new(),
-        features: Vec::new(),
-        log_scales: Vec::new(),
-        offsets: Vec::new(),
-        mask_logits: Vec::new(),
-        places: Vec::new(),
-    };
+    let mut anchors = Anchors::default();
     let mut words = vec![0; bundle.anchor_scratch_words()];
     let mut models = bundle.anchor_models(&mut words)?;
     for chunk in bundle.chunks() {

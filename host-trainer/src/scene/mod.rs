@@ -74,7 +74,7 @@ const _: () = assert!(MASKED < MASK_THRESHOLD);
 pub const INITIAL_MASK_LOGIT: f64 = 1.0;
 
 /// Anchors as structure of arrays, one row an anchor.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Anchors<R> {
     /// `[n_anchors]` lattice coordinates; the position is `lattice · voxel_size`.
     pub lattice: Vec<[i32; 3]>,

@@ -107,17 +107,9 @@ impl<'a> Trainer<'a> {
             return Err(TrainError::NoViews);
         }
         let config = config.resolved_for(capture);
-        let anchors = Anchors {
-            lattice: vec![],
-            features: vec![],
-            log_scales: vec![],
-            offsets: vec![],
-            mask_logits: vec![],
-            places: vec![],
-        };
         let heads = Heads::filled(&config.shape, 0.0);
         let voxel_size = config.voxel_size_for(capture);
-        let scene = Scene { shape: config.shape, voxel_size, anchors, heads, context: None };
+        let scene = Scene { shape: config.shape, voxel_size, anchors: Anchors::default(), heads, context: None };
         Ok(Self {
             signature: CaptureSignature::of(capture),
             cameras: capture.train.iter().map(|v| Pinhole::new(&v.camera)).collect(),

@@ -93,14 +93,7 @@ fn lit(colour: DVec3, normal: DVec3) -> DVec3 {
 }
 
 fn scene() -> Scene<f32> {
-    let mut anchors = Anchors {
-        lattice: vec![],
-        features: vec![],
-        log_scales: vec![],
-        offsets: vec![],
-        mask_logits: vec![],
-        places: vec![],
-    };
+    let mut anchors = Anchors::default();
     let n_planet = planet().len();
     for (index, patch) in planet().into_iter().chain(ring()).enumerate() {
         anchors.lattice.push((patch.position / VOXEL_SIZE).round().as_ivec3().to_array());

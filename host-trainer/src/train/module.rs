@@ -101,7 +101,16 @@ pub struct Moment {
 impl Moment {
     /// Whether more than `share` of the run is done.
     pub fn is_after(&self, share: f64) -> bool {
-        f64::from(self.iteration) > (share * f64::from(self.iterations)).round()
+        f64::from(self.iteration) > self.iteration_at(share)
+    }
+
+    /// Whether just `share` of the run is done.
+    pub fn is_at(&self, share: f64) -> bool {
+        f64::from(self.iteration) == self.iteration_at(share)
+    }
+
+    fn iteration_at(&self, share: f64) -> f64 {
+        (share * f64::from(self.iterations)).round()
     }
 }
 
@@ -221,14 +230,5 @@ impl Modules {
     /// The shape that the attached modules work on.
     pub fn shape(&self, shape: ModelShape) -> ModelShape {
         self.each().into_iter().fold(shape, |shape, module| module.shape(shape))
-    }
-}
-
-/// Refuses a setting outside its range.
-fn within(name: &str, value: f64, low: f64, high: f64) -> Result<(), String> {
-    if value >= low && value <= high {
-        Ok(())
-    } else {
-        Err(format!("train.modules.{name} is {value}, needs {low} to {high}"))
     }
 }

@@ -212,13 +212,6 @@ impl TrainConfig {
     /// # Errors
     /// A sentence that names the setting, its value and the accepted range.
     pub fn validate(&self) -> Result<(), String> {
-        let within = |name: &str, value: f64, low: f64, high: f64| {
-            if value >= low && value <= high {
-                Ok(())
-            } else {
-                Err(format!("{name} is {value}, needs {low} to {high}"))
-            }
-        };
         self.modules.each().into_iter().try_for_each(|module| module.check())?;
         within("--iterations", f64::from(self.iterations), 1.0, 10_000_000.0)?;
         within("--feature-dim", self.shape.feature_dim as f64, 1.0, 256.0)?;
@@ -324,6 +317,11 @@ impl TrainConfig {
         let at = (share * f64::from(self.iterations)).round() as u32;
         at
     }
+}
+
+/// Refuses a setting outside its range; NaN is outside of all.
+pub(in crate::train) fn within(name: &str, value: f64, low: f64, high: f64) -> Result<(), String> {
+    if value >= low && value <= high { Ok(()) } else { Err(format!("{name} is {value}, needs {low} to {high}")) }
 }
 
 #[cfg(test)]

@@ -2,9 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Module, Moment, Pictures, Terms, within};
+use super::{Module, Moment, Pictures, Terms};
 use crate::ops::{Real, high_pass};
 use crate::scene::{ModelShape, Scene};
+use crate::train::config::within;
 use crate::train::step::Block;
 
 /// What teaches the residual besides the image's own loss.
@@ -42,8 +43,8 @@ impl Default for Detail {
 
 impl Module for Detail {
     fn check(&self) -> Result<(), String> {
-        within("detail.hidden", self.hidden as f64, 1.0, 256.0)?;
-        within("detail.weight", self.weight, 0.0, 1e3)
+        within("train.modules.detail.hidden", self.hidden as f64, 1.0, 256.0)?;
+        within("train.modules.detail.weight", self.weight, 0.0, 1e3)
     }
 
     fn shape(&self, shape: ModelShape) -> ModelShape {

@@ -3,10 +3,11 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::{Module, Moment, Terms, within};
+use super::{Module, Moment, Terms};
 use crate::ops::Real;
 use crate::ops::normality::{Form, Histograms, Moments, Spread, Weights};
 use crate::scene::{Anchors, ModelShape, Scene};
+use crate::train::config::within;
 use crate::train::step::Block;
 
 /// Which values are regularised.
@@ -83,12 +84,12 @@ impl Default for Distribution {
 
 impl Module for Distribution {
     fn check(&self) -> Result<(), String> {
-        within("distribution.divergence", self.divergence, 0.0, 1e3)?;
-        within("distribution.spread", self.spread, 0.0, 1e3)?;
-        within("distribution.target", self.target, 0.0, 1e3)?;
-        within("distribution.unit", self.unit, 1e-6, 1e6)?;
-        within("distribution.from", self.from.unwrap_or(0.0), 0.0, 1.0)?;
-        within("distribution.until", self.until.unwrap_or(1.0), 0.0, 1.0)
+        within("train.modules.distribution.divergence", self.divergence, 0.0, 1e3)?;
+        within("train.modules.distribution.spread", self.spread, 0.0, 1e3)?;
+        within("train.modules.distribution.target", self.target, 0.0, 1e3)?;
+        within("train.modules.distribution.unit", self.unit, 1e-6, 1e6)?;
+        within("train.modules.distribution.from", self.from.unwrap_or(0.0), 0.0, 1.0)?;
+        within("train.modules.distribution.until", self.until.unwrap_or(1.0), 0.0, 1.0)
     }
 }
 

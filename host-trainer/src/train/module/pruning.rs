@@ -5,11 +5,12 @@ use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use super::{Module, Moment, Terms, within};
+use super::{Module, Moment, Terms};
 use crate::ops::Real;
 use crate::ops::opacity_target::{Normalisation, forward_backward};
 use crate::scene::Scene;
 use crate::train::Trainer;
+use crate::train::config::within;
 use crate::train::step::Block;
 
 /// What the event does with the anchors it picks.
@@ -154,25 +155,21 @@ impl Pruning {
         }
         places
     }
-
-    fn is_due(&self, at: &Moment) -> bool {
-        f64::from(at.iteration) == (self.at * f64::from(at.iterations)).round()
-    }
 }
 
 impl Module for Pruning {
     fn check(&self) -> Result<(), String> {
-        within("pruning.weight", self.weight, 0.0, 1e6)?;
-        within("pruning.beta", self.beta, 0.0, 1.0)?;
-        within("pruning.from", self.from, 0.0, 1.0)?;
-        within("pruning.at", self.at, 0.0, 1.0)?;
-        within("pruning.pool", self.pool, 0.0, 1.0)?;
+        within("train.modules.pruning.weight", self.weight, 0.0, 1e6)?;
+        within("train.modules.pruning.beta", self.beta, 0.0, 1.0)?;
+        within("train.modules.pruning.from", self.from, 0.0, 1.0)?;
+        within("train.modules.pruning.at", self.at, 0.0, 1.0)?;
+        within("train.modules.pruning.pool", self.pool, 0.0, 1.0)?;
         let most = if self.form == Form::Hard && self.unit == Unit::Anchors { self.pool } else { 0.95 };
-        within("pruning.rate", self.rate, 0.0, most)
+        within("train.modules.pruning.rate", self.rate, 0.0, most)
     }
 
     fn event(&self, at: &Moment, trainer: &mut Trainer<'_>) {
-        if !self.is_due(at) || trainer.scene.anchors.is_empty() {
+        if !at.is_at(self.at) || trainer.scene.anchors.is_empty() {
             return;
         }
         let survey = trainer.survey(self.rank == Rank::Contribution);

@@ -142,19 +142,27 @@ impl Pruning {
         let n = rank.len();
         let mut order: Vec<usize> = (0..n).collect();
         order.sort_by(|a, b| rank[*a].total_cmp(&rank[*b]));
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a length")]
-        let pool = (self.pool * n as f64).round() as usize;
         if self.choice == Choice::Random {
-            order[..pool.min(n)].shuffle(rng);
+            order[..of_length(self.pool, n)].shuffle(rng);
         }
         let mut places = vec![0.0; n];
         for (place, anchor) in order.into_iter().enumerate() {
-            #[expect(clippy::cast_possible_truncation, reason = "a share")]
-            let share = (place as f64 / n as f64) as f32;
-            places[anchor] = share;
+            places[anchor] = as_place(place as f64 / n as f64);
         }
         places
     }
+}
+
+/// A share as anchors' [places](crate::scene::Anchors::places) are kept, so that it compares equal with them.
+#[expect(clippy::cast_possible_truncation, reason = "places are f32")]
+fn as_place(share: f64) -> f32 {
+    share as f32
+}
+
+/// A share of `n` items, to the nearest; at most all of them.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a length")]
+fn of_length(share: f64, n: usize) -> usize {
+    ((share * n as f64).round() as usize).min(n)
 }
 
 impl Module for Pruning {
@@ -181,24 +189,18 @@ impl Module for Pruning {
         let mut rng = ChaCha8Rng::seed_from_u64(trainer.config().seed);
         rng.set_stream(1);
         let places = self.places(&rank, &mut rng);
-        #[expect(clippy::cast_possible_truncation, reason = "compared with f32 places")]
-        let rate = self.rate as f32;
         match (self.form, self.unit) {
             (Form::Tiered, _) => trainer.scene.anchors.places = places,
             (Form::Hard, Unit::Anchors) => {
-                let keep: Vec<bool> = places.iter().map(|place| *place >= rate).collect();
+                let keep: Vec<bool> = places.iter().map(|place| *place >= as_place(self.rate)).collect();
                 trainer.keep_anchors(&keep);
             }
             (Form::Hard, Unit::Offsets) => {
                 let k = trainer.config().shape.n_offsets;
-                #[expect(clippy::cast_possible_truncation, reason = "compared with f32 places")]
-                let pool = self.pool as f32;
-                let of_pool = (0..places.len()).filter(|a| places[*a] < pool);
+                let of_pool = (0..places.len()).filter(|a| places[*a] < as_place(self.pool));
                 let mut offsets: Vec<usize> = of_pool.flat_map(|a| a * k..(a + 1) * k).collect();
                 offsets.shuffle(&mut rng);
-                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a length")]
-                let n = (self.rate * offsets.len() as f64).round() as usize;
-                trainer.scene.anchors.mask(&offsets[..n]);
+                trainer.scene.anchors.mask(&offsets[..of_length(self.rate, offsets.len())]);
             }
         }
     }
@@ -209,9 +211,7 @@ impl Module for Pruning {
         }
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the number of shares")]
         let tier = (at.stream.uniform(TIER_DRAW) * TIER_SHARES.len() as f32) as usize;
-        #[expect(clippy::cast_possible_truncation, reason = "compared with f32 places")]
-        let share = (self.rate * TIER_SHARES[tier]) as f32;
-        share
+        as_place(self.rate * TIER_SHARES[tier])
     }
 }
 

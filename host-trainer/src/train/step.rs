@@ -228,12 +228,12 @@ impl<R: Real> Workspace<R> {
         l1::backward(&image, target.truth, R::ONE - lambda, &mut d_image);
         ssim::backward(self.level, &image, target.truth, size_px, &partials, -lambda, &mut d_image);
         let mut by_modules = R::ZERO;
-        let (modules, at) = terms.modules.unzip();
-        let modules = modules.into_iter().flatten().zip(at.into_iter().cycle());
-        for (module, at) in modules.clone() {
+        if let Some((modules, at)) = terms.modules {
             let pictures = Pictures { image: &image, truth: target.truth, size_px, level: self.level };
-            by_modules += module.on_image(at, &pictures, &mut d_image);
-            by_modules += module.on_gaussians(at, scene, &mut self.blocks[..self.n_blocks]);
+            for module in modules {
+                by_modules += module.on_image(at, &pictures, &mut d_image);
+                by_modules += module.on_gaussians(at, scene, &mut self.blocks[..self.n_blocks]);
+            }
         }
         clear_masked(&mut d_image, target.mask);
         let n_gaussians = self.blocks().iter().map(|b| b.gaussians.len()).sum();
@@ -277,8 +277,10 @@ impl<R: Real> Workspace<R> {
             }
         };
         stages.context_backward = stopwatch.lap();
-        for (module, at) in modules {
-            loss += module.on_anchors(at, scene, &mut self.blocks[..self.n_blocks]);
+        if let Some((modules, at)) = terms.modules {
+            for module in modules {
+                loss += module.on_anchors(at, scene, &mut self.blocks[..self.n_blocks]);
+            }
         }
         StepReport {
             loss,

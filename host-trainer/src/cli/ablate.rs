@@ -11,7 +11,7 @@ use pocketsplat::train::TrainConfig;
 use pocketsplat::train::config::Backbone;
 
 use super::capture::Split;
-use super::lpips::{LpipsArgs, NO_WEIGHTS};
+use super::lpips::LpipsArgs;
 use super::run_config::RunConfig;
 use super::settings::Settings;
 use super::{output, point, stop, train};
@@ -67,9 +67,6 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     }
     let mut base = args.base()?;
     let lpips = args.lpips.load()?;
-    if lpips.is_none() {
-        eprintln!("{NO_WEIGHTS}");
-    }
     output::check_writable(&args.output.join("ablation.csv"))?;
     let capture = train::load(&mut base)?;
     Split::Test.views(&capture).context("an ablation measures on held-out views; see --test-every")?;

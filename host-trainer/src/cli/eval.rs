@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use super::bundle::BundleFile;
 use super::capture::{CaptureArgs, Split};
-use super::lpips::{LpipsArgs, NO_WEIGHTS};
+use super::lpips::LpipsArgs;
 use super::output;
 
 /// What draws the frames.
@@ -119,9 +119,6 @@ impl Evaluation {
 pub(crate) fn run(args: &Args) -> Result<()> {
     let file = BundleFile::read(&args.bundle)?;
     let lpips = args.lpips.load()?;
-    if lpips.is_none() {
-        eprintln!("{NO_WEIGHTS}");
-    }
     let what =
         Measurements { against_reference: args.against_reference, per_tier: args.per_tier, lpips: lpips.as_ref() };
     let evaluation = evaluate(&file, &args.capture, args.split, args.renderer, &what)?;

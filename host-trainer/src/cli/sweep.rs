@@ -9,7 +9,7 @@ use pocketsplat::train::TrainConfig;
 use pocketsplat::train::config::Backbone;
 
 use super::capture::Split;
-use super::lpips::{LpipsArgs, NO_WEIGHTS};
+use super::lpips::LpipsArgs;
 use super::run_config::RunConfig;
 use super::settings::Settings;
 use super::{output, point, stop, train};
@@ -48,9 +48,6 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     point::check_distinct(&args.lambdas)?;
     args.lambdas.iter().try_for_each(|lambda| Args::point(&base, *lambda).check())?;
     let lpips = args.lpips.load()?;
-    if lpips.is_none() {
-        eprintln!("{NO_WEIGHTS}");
-    }
     output::check_writable(&args.output.join(RESULTS))?;
     let capture = train::load(&mut base)?;
     Split::Test.views(&capture).context("a sweep measures on held-out views; see --test-every")?;

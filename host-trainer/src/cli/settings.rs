@@ -133,13 +133,21 @@ impl Settings {
         set(&mut train.shape.view_direction, &self.no_view_direction.map(|no| !no));
         set(&mut train.shape.view_distance, &self.view_distance);
         set(&mut train.shape.dilation_compensation, &self.dilation_compensation);
-        self.attach_modules(&mut train.modules)?;
-        if self.set.is_empty() { Ok(config) } else { config.with_keys(&self.set) }
+        self.attach_modules(train)?;
+        if !self.set.is_empty() {
+            config = config.with_keys(&self.set)?;
+        }
+        // As a run keeps it: the same options again are no other setting.
+        config.train.shape = config.train.modules.shape(config.train.shape);
+        Ok(config)
     }
 
-    fn attach_modules(&self, modules: &mut Modules) -> Result<()> {
+    fn attach_modules(&self, train: &mut TrainConfig) -> Result<()> {
+        let modules = &mut train.modules;
         if let Some(names) = &self.modules {
             *modules = Modules::default();
+            // A configuration that a run wrote has the shape that its modules gave it.
+            train.shape.detail_hidden = 0;
             for name in names.iter().filter(|name| *name != "none") {
                 if !modules.attach(name) {
                     bail!("there is no module `{name}`; needs some of {}, or none", Modules::NAMES.join(", "));

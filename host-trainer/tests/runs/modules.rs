@@ -2,6 +2,8 @@
 
 use std::fs;
 
+use pocketsplat_core::Bundle;
+
 use crate::fixture::{capture, fails, folder, pocketsplat, resume, starts, succeeds, train, wait_for};
 
 #[test]
@@ -25,6 +27,31 @@ fn a_run_with_every_module_goes_on_in_the_same_bytes_on_either_backbone() {
         assert!(fs::read(&output).unwrap() == fs::read(&whole).unwrap(), "{backbone}");
         assert!(fs::read(&whole).unwrap() != crate::fixture::undisturbed());
     }
+}
+
+#[test]
+fn the_modules_of_the_command_line_replace_those_of_a_configuration_and_their_heads() {
+    let home = folder("modules-replaced");
+    let detailed = home.join("detailed.psb");
+    succeeds(train(&detailed).args(["--modules", "detail", "--set", "train.iterations=5"]));
+    let config = home.join("detailed.run/config.toml");
+    assert!(fs::read_to_string(&config).unwrap().contains("detail_hidden = 32"));
+    for (modules, detail) in [("none", false), ("pruning", false), ("pruning,detail", true)] {
+        let output = home.join(format!("{modules}.psb"));
+        let mut command = pocketsplat();
+        command.arg("train").arg("--config").arg(&config).arg("-o").arg(&output).args(["--modules", modules]);
+        succeeds(&mut command);
+        let written = fs::read_to_string(output.with_extension("run").join("config.toml")).unwrap();
+        assert_eq!(written.contains("detail_hidden = 32"), detail, "{modules}: {written}");
+        let bytes = fs::read(output).unwrap();
+        assert_eq!(Bundle::parse(&bytes).unwrap().header().detail_hidden, if detail { 32 } else { 0 }, "{modules}");
+    }
+    // The modules that a run began with are no other setting: it goes on.
+    let run = home.join("detailed.run");
+    fs::remove_file(run.join("result.json")).unwrap();
+    let error = fails(resume(&run).args(["--modules", "none"]));
+    assert!(error.contains("the run began with another setting"), "{error}");
+    succeeds(resume(&run).args(["--modules", "detail"]));
 }
 
 #[test]

@@ -1,0 +1,245 @@
+//! Captures that load but are doubtful.
+
+use glam::DVec3;
+
+use super::Harm::Doubt;
+use super::{Case, case, flat_image, look_away, turned_image};
+use crate::fixture::Kind::{Blender, ColmapBinary, ColmapText, Nerfstudio};
+
+pub(super) fn cases() -> Vec<Case> {
+    vec![
+        case(
+            "images without a pose",
+            ColmapText,
+            Doubt,
+            "unposed-image",
+            &["images without a pose: 4 (p_08.png, p_09.png, p_10.png, … and 1 more)"],
+            |f| {
+                f.photos.truncate(8);
+                f.write_files();
+            },
+        ),
+        case(
+            "few views",
+            Blender,
+            Doubt,
+            "few-views",
+            &["10 of 10 training views can be used, needed: at least 20 for a good scene"],
+            |f| {
+                f.write_files();
+            },
+        ),
+        case(
+            "no test split",
+            Blender,
+            Doubt,
+            "no-test-views",
+            &["warning[no-test-views]: no views are held out", "transforms_test.json` is missing"],
+            |f| {
+                f.write_files().remove("transforms_test.json");
+            },
+        ),
+        case(
+            "a camera far away",
+            ColmapBinary,
+            Doubt,
+            "pose-outlier",
+            &["cameras far from the others: 1 (p_07.png)", "take these views out"],
+            |f| {
+                f.photos[7].centre *= 100.0;
+                f.write_files();
+            },
+        ),
+        case(
+            "coordinates of a map",
+            ColmapText,
+            Doubt,
+            "far-from-origin",
+            &["7.071e6 from the origin", "subtract a common offset"],
+            |f| {
+                let offset = DVec3::new(5e6, 5e6, 0.0);
+                f.photos.iter_mut().for_each(|photo| photo.centre += offset);
+                f.points.iter_mut().for_each(|point| *point += offset);
+                f.write_files();
+            },
+        ),
+        case(
+            "a scene far away",
+            ColmapBinary,
+            Doubt,
+            "little-parallax",
+            &["there is hardly any parallax", "places farther apart"],
+            |f| {
+                f.photos.iter_mut().for_each(|photo| photo.centre *= 0.0005);
+                f.write_files();
+            },
+        ),
+        case(
+            "two views of one pose",
+            Nerfstudio,
+            Doubt,
+            "repeated-pose",
+            &["views that share their pose with another: 2 (images/p_04.png, images/p_05.png)"],
+            |f| {
+                (f.photos[5].rotation, f.photos[5].centre) = (f.photos[4].rotation, f.photos[4].centre);
+                f.write_files();
+            },
+        ),
+        case(
+            "an image listed twice",
+            ColmapBinary,
+            Doubt,
+            "repeated-image",
+            &["images listed more than once: 1 (p_05.png)"],
+            |f| {
+                f.photos[6].name = f.photos[5].name.clone();
+                f.write_files();
+            },
+        ),
+        case(
+            "distortion",
+            ColmapBinary,
+            Doubt,
+            "distortion",
+            &["note[distortion]: images with lens distortion: 12; it moves pixels by up to 1.5 px"],
+            |f| {
+                f.cameras[0].model = (2, "SIMPLE_RADIAL");
+                f.cameras[0].parameters = vec![20.0, 12.0, 8.0, 0.2];
+                f.write_files();
+            },
+        ),
+        case(
+            "a principal point outside",
+            ColmapText,
+            Doubt,
+            "principal-point",
+            &["images whose principal point lies outside them: 12"],
+            |f| {
+                f.cameras[0].parameters[2] = 48.0;
+                f.write_files();
+            },
+        ),
+        case(
+            "photographs with alpha",
+            Nerfstudio,
+            Doubt,
+            "alpha",
+            &["photographs with an alpha channel", ": 1 (images/p_03.png)", "give them as masks"],
+            |f| {
+                let rgba = [90; 24 * 16 * 4];
+                image::save_buffer(
+                    f.write_files().at("images/p_03.png"),
+                    &rgba,
+                    24,
+                    16,
+                    image::ExtendedColorType::Rgba8,
+                )
+                .expect("an image");
+            },
+        ),
+        case(
+            "renderings without alpha",
+            Blender,
+            Doubt,
+            "no-alpha",
+            &["images without an alpha channel", ": 1 (images/p_03.png)"],
+            |f| {
+                flat_image(f.write_files(), "images/p_03.png");
+            },
+        ),
+        case(
+            "an image of a single colour",
+            ColmapText,
+            Doubt,
+            "flat-image",
+            &["images of a single colour: 1 (p_03.png)"],
+            |f| {
+                flat_image(f.write_files(), "images/p_03.png");
+            },
+        ),
+        case(
+            "an EXIF orientation",
+            ColmapBinary,
+            Doubt,
+            "exif-orientation",
+            &["images with an EXIF orientation, which is not applied", ": 1 (p_03.png)"],
+            |f| {
+                turned_image(f.write_files(), "images/p_03.png");
+            },
+        ),
+        case(
+            "a distortion beyond sense",
+            Nerfstudio,
+            Doubt,
+            "mostly-masked",
+            &["images of which less than 10 % counts: 12"],
+            |f| {
+                f.shared.push_str(", \"k1\": 500.0");
+                f.write_files();
+            },
+        ),
+        case(
+            "images of several sizes",
+            ColmapText,
+            Doubt,
+            "mixed-sizes",
+            &["images of another size than the 24×16 px of most: 1 (p_03.png)"],
+            |f| {
+                f.write_files().write_image("images/p_03.png", (48, 32));
+            },
+        ),
+        case(
+            "no points",
+            ColmapBinary,
+            Doubt,
+            "no-points",
+            &["points3D.bin` is missing, so training starts from random points"],
+            |f| {
+                f.write_files().remove("sparse/0/points3D.bin");
+            },
+        ),
+        case(
+            "an empty list of points",
+            ColmapText,
+            Doubt,
+            "no-points",
+            &["points3D.txt` is empty, so training starts from random points"],
+            |f| {
+                f.points.clear();
+                f.write_files();
+            },
+        ),
+        case(
+            "few points",
+            ColmapText,
+            Doubt,
+            "few-points",
+            &["points3D.txt` holds 7 points, needed: at least 100"],
+            |f| {
+                f.points.truncate(7);
+                f.write_files();
+            },
+        ),
+        case(
+            "points of another reconstruction",
+            ColmapBinary,
+            Doubt,
+            "points-unseen",
+            &["only 0 % of the points", "points and poses of one reconstruction"],
+            |f| {
+                look_away(f);
+                f.write_files();
+            },
+        ),
+        case(
+            "several models",
+            ColmapBinary,
+            Doubt,
+            "several-models",
+            &["the capture has several models, of which only `sparse/0` is read"],
+            |f| {
+                f.write_files().write("sparse/1/cameras.bin", "");
+            },
+        ),
+    ]
+}

@@ -1,0 +1,182 @@
+//! COLMAP models whose files are missing, damaged, hostile, or of a camera that is not read.
+
+use super::Harm::Fatal;
+use super::{Case, case, cut};
+use crate::fixture::Fixture;
+use crate::fixture::Kind::{ColmapBinary, ColmapText};
+
+/// Changes the text of a written file.
+fn edit(fixture: &Fixture, name: &str, change: impl Fn(String) -> String) {
+    let text = std::fs::read_to_string(fixture.at(name)).expect("it was written");
+    fixture.write(name, change(text));
+}
+
+/// Overwrites bytes of a written file.
+fn poke(fixture: &Fixture, name: &str, at: usize, with: &[u8]) {
+    let mut bytes = std::fs::read(fixture.at(name)).expect("it was written");
+    bytes[at..at + with.len()].copy_from_slice(with);
+    fixture.write(name, bytes);
+}
+
+pub(super) fn cases() -> Vec<Case> {
+    vec![
+        case("images.bin missing", ColmapBinary, Fatal, "unreadable-file", &["sparse/0/images.bin`: "], |f| {
+            f.write_files().remove("sparse/0/images.bin");
+        }),
+        case(
+            "cameras.bin empty",
+            ColmapBinary,
+            Fatal,
+            "bad-model",
+            &["cameras.bin`: byte 0: the file has 0 bytes, needed: 8 for the count of cameras; export the model again"],
+            |f| f.write_files().write("sparse/0/cameras.bin", ""),
+        ),
+        case(
+            "a hostile count of cameras",
+            ColmapBinary,
+            Fatal,
+            "bad-model",
+            &[
+                "cameras.bin`: byte 0: 18446744073709551615 cameras are announced, but the 56 bytes that follow hold at most 2",
+            ],
+            |f| poke(f.write_files(), "sparse/0/cameras.bin", 0, &[255; 8]),
+        ),
+        case(
+            "a hostile count of observations",
+            ColmapBinary,
+            Fatal,
+            "bad-model",
+            &["images.bin`: image 1 of 12, byte 89: 9223372036854775808 observations are announced, but only "],
+            // Behind the count, the number, seven doubles, the camera's number and `p_00.png\0`.
+            |f| poke(f.write_files(), "sparse/0/images.bin", 8 + 4 + 56 + 4 + 9, &(1_u64 << 63).to_le_bytes()),
+        ),
+        case(
+            "a hostile track",
+            ColmapBinary,
+            Fatal,
+            "bad-model",
+            &["points3D.bin`: point 1 of 120, byte 59: 2305843009213693952 track elements are announced"],
+            |f| poke(f.write_files(), "sparse/0/points3D.bin", 8 + 43, &(1_u64 << 61).to_le_bytes()),
+        ),
+        case(
+            "images.bin cut",
+            ColmapBinary,
+            Fatal,
+            "bad-model",
+            &[
+                "images.bin`: image 9 of 12, byte 1",
+                "bytes follow; export the model again, or copy it again if the file was cut",
+            ],
+            |f| {
+                // Enough bytes for 12 of the smallest images.
+                cut(f.write_files(), "sparse/0/images.bin", 1160);
+            },
+        ),
+        case(
+            "a name without end",
+            ColmapBinary,
+            Fatal,
+            "bad-model",
+            &["images.bin`: image 12 of 12, byte", "the name does not end within 4096 bytes or the file"],
+            |f| {
+                f.photos[11].name = "n".repeat(5000);
+                f.write_files();
+            },
+        ),
+        case(
+            "a camera model of the future",
+            ColmapBinary,
+            Fatal,
+            "bad-model",
+            &["cameras.bin`: camera 1 of 1, byte 32: the camera model has the number 77, known: 0 to 11"],
+            |f| {
+                f.cameras[0].model.0 = 77;
+                f.write_files();
+            },
+        ),
+        case(
+            "a fisheye in a binary model",
+            ColmapBinary,
+            Fatal,
+            "camera-model",
+            &["camera 1 has the camera model `OPENCV_FISHEYE`, needed: PINHOLE", "image_undistorter"],
+            |f| {
+                f.cameras[0].model.0 = 5;
+                f.cameras[0].parameters.resize(8, 0.0);
+                f.write_files();
+            },
+        ),
+        case(
+            "an unheard-of model in a text model",
+            ColmapText,
+            Fatal,
+            "camera-model",
+            &["cameras.txt`: camera 1 has the camera model `FULL_OPENCV`, needed: PINHOLE"],
+            |f| {
+                f.cameras[0].model.1 = "FULL_OPENCV";
+                f.cameras[0].parameters.resize(12, 0.0);
+                f.write_files();
+            },
+        ),
+        case(
+            "a parameter too few",
+            ColmapText,
+            Fatal,
+            "bad-model",
+            &["cameras.txt`: line 2: PINHOLE has 3 parameters, needed: 4"],
+            |f| {
+                f.cameras[0].parameters.pop();
+                f.write_files();
+            },
+        ),
+        case("a camera listed twice", ColmapText, Fatal, "bad-model", &["line 3: camera 1 is listed twice"], |f| {
+            f.cameras.push(f.cameras[0].clone());
+            f.write_files();
+        }),
+        case(
+            "a word where a number is needed",
+            ColmapText,
+            Fatal,
+            "bad-model",
+            &["images.txt`: line 2: `east` is no quaternion"],
+            |f| {
+                edit(f.write_files(), "sparse/0/images.txt", |text| {
+                    text.replacen("1 1.0", "1 east", 1).replacen("1 0.9", "1 east 0.9", 1)
+                })
+            },
+        ),
+        case(
+            "the empty lines of images.txt taken out",
+            ColmapText,
+            Fatal,
+            "bad-model",
+            &[
+                "images.txt`: line 5: 10 numbers of observations, needed: 3 for each; one of an image's two lines is missing",
+            ],
+            |f| edit(f.write_files(), "sparse/0/images.txt", |text| text.replace("\n\n", "\n")),
+        ),
+        case(
+            "a line cut",
+            ColmapText,
+            Fatal,
+            "bad-model",
+            &["points3D.txt`: line 3: the line ends where the coordinate"],
+            |f| {
+                edit(f.write_files(), "sparse/0/points3D.txt", |text| {
+                    text.lines().take(2).collect::<Vec<_>>().join("\n") + "\n0 1.5"
+                });
+            },
+        ),
+        case(
+            "no image posed",
+            ColmapBinary,
+            Fatal,
+            "too-few-views",
+            &["0 of 0 training views can be used, needed: at least 3"],
+            |f| {
+                f.photos.clear();
+                f.write_files();
+            },
+        ),
+    ]
+}

@@ -1,0 +1,221 @@
+//! Views that cannot be used: left out where enough others are sound.
+
+use glam::DVec3;
+
+use super::Harm::{Fatal, Views};
+use super::{Case, N_VIEWS, case, cut};
+use crate::fixture::Camera;
+use crate::fixture::Kind::{Blender, ColmapBinary, ColmapText, Nerfstudio};
+
+pub(super) fn cases() -> Vec<Case> {
+    vec![
+        case(
+            "images missing",
+            ColmapText,
+            Views,
+            "missing-image",
+            &[
+                "train views left out: 2",
+                "p_03.png: image missing: `",
+                "does not exist; restore it or take the view out of the model",
+            ],
+            |f| {
+                f.write_files().remove("images/p_03.png");
+                f.remove("images/p_04.png");
+            },
+        ),
+        case(
+            "all images missing",
+            Nerfstudio,
+            Fatal,
+            "too-few-views",
+            &["0 of 10 training views can be used", "images/p_01.png: image missing", "and 7 more"],
+            |f| {
+                f.write_files();
+                (0..N_VIEWS).for_each(|i| f.remove(&format!("images/p_{i:02}.png")));
+            },
+        ),
+        case(
+            "an image without content",
+            Nerfstudio,
+            Views,
+            "unreadable-image",
+            &["images/p_05.png: image unreadable: `", "replace it with a whole PNG or JPEG"],
+            |f| {
+                f.write_files().write("images/p_05.png", "");
+            },
+        ),
+        case(
+            "an image cut behind its header",
+            ColmapBinary,
+            Views,
+            "unreadable-image",
+            &["p_05.png: image unreadable"],
+            |f| {
+                cut(f.write_files(), "images/p_05.png", 60);
+            },
+        ),
+        case(
+            "a format that is not read",
+            Blender,
+            Views,
+            "unreadable-image",
+            &["images/p_05.png: image unreadable", "replace it with a whole PNG or JPEG"],
+            |f| {
+                f.write_files().write("images/p_05.png", b"RIFF\x24\0\0\0WEBPVP8 ");
+            },
+        ),
+        case(
+            "an image of another size among renderings",
+            Blender,
+            Views,
+            "image-size",
+            &["p_06.png` is 12×8 px, the training images are 24×16 px; export it again at that size"],
+            |f| {
+                f.write_files().write_image("images/p_06.png", (12, 8));
+            },
+        ),
+        case(
+            "an image turned on its side",
+            ColmapBinary,
+            Views,
+            "image-shape",
+            &["p_06.png` is 16×24 px, its camera is for 24×16 px", "it is turned on its side; store it as"],
+            |f| {
+                f.write_files().write_image("images/p_06.png", (16, 24));
+            },
+        ),
+        case(
+            "an image cropped",
+            Nerfstudio,
+            Views,
+            "image-shape",
+            &["p_06.png` is 24×10 px, its camera is for 24×16 px, which is another shape; use the images"],
+            |f| {
+                f.write_files().write_image("images/p_06.png", (24, 10));
+            },
+        ),
+        case(
+            "a camera that is not there",
+            ColmapText,
+            Views,
+            "missing-camera",
+            &["p_02.png: its camera 9 is not among the model's cameras"],
+            |f| {
+                f.photos[2].camera_id = 9;
+                f.write_files();
+            },
+        ),
+        case(
+            "a quaternion of length 0",
+            ColmapBinary,
+            Views,
+            "bad-pose",
+            &["p_02.png: its rotation is a quaternion of length 0.000000, needed: 1"],
+            |f| {
+                f.photos[2].quaternion_length = 0.0;
+                f.write_files();
+            },
+        ),
+        case(
+            "a translation of NaN",
+            ColmapBinary,
+            Views,
+            "bad-pose",
+            &["p_02.png: its translation is [NaN, ", "needed: finite numbers"],
+            |f| {
+                f.photos[2].centre.x = f64::NAN;
+                f.write_files();
+            },
+        ),
+        case(
+            "a pose with scale",
+            Nerfstudio,
+            Views,
+            "bad-pose",
+            &["images/p_02.png: `transform_matrix` scales by 2.000000"],
+            |f| {
+                f.photos[2].rotation *= 2.0;
+                f.write_files();
+            },
+        ),
+        case(
+            "a mirrored pose",
+            Nerfstudio,
+            Views,
+            "bad-pose",
+            &["images/p_02.png: `transform_matrix` is a reflection"],
+            |f| {
+                f.photos[2].rotation *= -1.0;
+                f.write_files();
+            },
+        ),
+        case(
+            "a focal length of 0",
+            ColmapText,
+            Views,
+            "bad-intrinsics",
+            &["p_02.png: the focal length is 0 px, needed: a positive number; correct the camera's numbers"],
+            |f| {
+                f.cameras.push(Camera { id: 2, parameters: vec![0.0, 20.0, 12.0, 8.0], ..f.cameras[0].clone() });
+                f.photos[2].camera_id = 2;
+                f.write_files();
+            },
+        ),
+        case(
+            "an image size of nothing",
+            Nerfstudio,
+            Views,
+            "bad-intrinsics",
+            &["images/p_02.png: the image size is 0×16 px"],
+            |f| {
+                f.photos[2].extra = "\"w\": -24, ".to_owned();
+                f.write_files();
+            },
+        ),
+        case(
+            "one frame with a fisheye",
+            Nerfstudio,
+            Views,
+            "camera-model",
+            &["images/p_02.png: its camera model is `is_fisheye`"],
+            |f| {
+                f.photos[2].extra = "\"is_fisheye\": true, ".to_owned();
+                f.write_files();
+            },
+        ),
+        case(
+            "a mask missing",
+            Nerfstudio,
+            Views,
+            "bad-mask",
+            &["images/p_02.png: its mask `", "masks/2.png` does not exist; restore the mask"],
+            |f| {
+                f.photos[2].extra = "\"mask_path\": \"masks/2.png\", ".to_owned();
+                f.write_files();
+            },
+        ),
+        case(
+            "a mask of another size",
+            Nerfstudio,
+            Views,
+            "bad-mask",
+            &["is 5×4 px, its image 24×16 px; restore the mask"],
+            |f| {
+                f.photos[2].extra = "\"mask_path\": \"masks/2.png\", ".to_owned();
+                f.write_files().write_image("masks/2.png", (5, 4));
+            },
+        ),
+        case(
+            "cameras in one place",
+            Nerfstudio,
+            Fatal,
+            "no-baseline",
+            &["of one point, so the scene has no scale", "views from different places"],
+            |f| {
+                f.photos.iter_mut().for_each(|photo| photo.centre = DVec3::ONE);
+                f.write_files();
+            },
+        ),
+    ]
+}

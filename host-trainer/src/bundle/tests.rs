@@ -3,7 +3,6 @@
 mod culling;
 mod damage;
 mod entropy;
-mod figures;
 mod heads;
 mod measures;
 mod round_trip;

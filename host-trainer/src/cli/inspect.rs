@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use pocketsplat::bundle::annotate::annotate;
-use pocketsplat::bundle::{SizePart, SizeReport};
+use pocketsplat::bundle::{SizePart, SizeReport, decoded_scene};
 use pocketsplat_core::Bundle;
 use serde::Serialize;
 
@@ -55,6 +55,8 @@ struct Facts {
     stream_ideal_bytes: f64,
     streams_over_ideal_percent: f64,
     position_bits_per_anchor: f64,
+    /// Of a feature's channels over the anchors.
+    feature_deviation_min_median_max: [f64; 3],
 }
 
 /// The scene of one tier and those before it.
@@ -92,7 +94,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         return output::print_text(&annotate(&file.bytes, args.lines)?);
     }
     let size = SizeReport::of(&bundle)?;
-    let inspection = Inspection { facts: facts(&bundle, &size), parts: size.parts(), tiers: tiers(&bundle) };
+    let inspection = Inspection { facts: facts(&bundle, &size)?, parts: size.parts(), tiers: tiers(&bundle) };
     if args.json {
         return output::print(&inspection, true);
     }
@@ -100,12 +102,13 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     output::print_text(&format!("\n{}\n{}", parts_table(&inspection.parts, &size), tiers_table(&inspection.tiers)))
 }
 
-fn facts(bundle: &Bundle<'_>, size: &SizeReport) -> Facts {
+fn facts(bundle: &Bundle<'_>, size: &SizeReport) -> Result<Facts> {
     let header = bundle.header();
     let effects = header.features.effects;
     let anchors = size.n_anchors.max(1) as f64;
     let ideal_bytes = size.ideal.total() / 8.0;
-    Facts {
+    let scene = decoded_scene(bundle)?;
+    Ok(Facts {
         format_version: pocketsplat_core::bundle::VERSION,
         coder: if header.features.context { "context" } else { "static" },
         n_anchors: size.n_anchors,
@@ -131,7 +134,23 @@ fn facts(bundle: &Bundle<'_>, size: &SizeReport) -> Facts {
         stream_ideal_bytes: ideal_bytes,
         streams_over_ideal_percent: 100.0 * (size.streams as f64 / ideal_bytes.max(1.0) - 1.0),
         position_bits_per_anchor: size.position_bits_per_anchor(),
-    }
+        feature_deviation_min_median_max: deviations(&scene.anchors.features, scene.shape.feature_dim),
+    })
+}
+
+/// Least, median and largest standard deviation of the columns of `values`.
+///
+/// * `values`: `[n, n_columns]`.
+fn deviations(values: &[f32], n_columns: usize) -> [f64; 3] {
+    let n = (values.len() / n_columns).max(1) as f64;
+    let deviation = |column: usize| {
+        let column = || values.iter().skip(column).step_by(n_columns).map(|value| f64::from(*value));
+        let mean = column().sum::<f64>() / n;
+        (column().map(|value| (value - mean).powi(2)).sum::<f64>() / n).sqrt()
+    };
+    let mut sorted: Vec<f64> = (0..n_columns).map(deviation).collect();
+    sorted.sort_by(f64::total_cmp);
+    [0, n_columns / 2, n_columns - 1].map(|i| sorted[i])
 }
 
 fn tiers(bundle: &Bundle<'_>) -> Vec<TierFacts> {
@@ -193,4 +212,17 @@ fn tiers_table(tiers: &[TierFacts]) -> String {
         text += &format!("{decoded:>10}{visible:>10}{splats:>10}{pairs:>12}{:>12}\n", tier.max_head_kilo_macs);
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::deviations;
+
+    #[test]
+    fn deviations_are_of_each_column_around_its_own_mean() {
+        // Columns of deviation 2, 0, 1, the last far from 0.
+        let values = [2.0, 5.0, 101.0, -2.0, 5.0, 99.0, 2.0, 5.0, 99.0, -2.0, 5.0, 101.0];
+        assert_eq!(deviations(&values, 3), [0.0, 1.0, 2.0]);
+        assert_eq!(deviations(&[], 3), [0.0; 3]);
+    }
 }

@@ -17,6 +17,7 @@ use crate::mlp::{HeadShape, Heads};
 use crate::project::View;
 use crate::raster::{Canvas, N_RADIX, TILE_PIXELS, TILE_PX, TilePlace, TileRect, blend_tile, sort_by_depth};
 use crate::scene::Workspace;
+use crate::stopwatch::{Stage, Stopwatch};
 use gather::Frame;
 use source::AnchorSource;
 use splats::SplatStore;
@@ -158,8 +159,22 @@ impl<'b, 's> Decoder<'b, 's> {
     /// transmittance falls below 1e-4. Of several strips each does so for the chunks and anchors that can reach it; but the
     /// first one goes over the whole view to see that all strips have places enough, unless that follows from the
     /// directory.
-    #[inline(never)]
     pub fn render(&mut self, camera: &Camera, sink: &mut impl TileSink) -> Result<FrameReport, DecodeError> {
+        self.render_watched(camera, sink, &mut ())
+    }
+
+    /// As [`render`](Self::render), and tells `watch` where the work goes.
+    ///
+    /// # Errors
+    /// As for [`render`](Self::render).
+    #[inline(never)]
+    pub fn render_watched(
+        &mut self,
+        camera: &Camera,
+        sink: &mut impl TileSink,
+        watch: &mut impl Stopwatch,
+    ) -> Result<FrameReport, DecodeError> {
+        watch.enter(Stage::Project);
         let view = View::new(camera)?;
         let budget = *self.plan.budget();
         in_range(Field::FrameWidth, camera.width_px.into(), 1, budget.width_px.into())?;
@@ -170,9 +185,9 @@ impl<'b, 's> Decoder<'b, 's> {
         let mut frame = Frame { view, strips, tallies, tally, report: FrameReport::default() };
         let mut most_in_memory = 0;
         for strip in strips.iter() {
-            self.gather(strip, &mut frame)?;
+            self.gather(strip, &mut frame, watch)?;
             most_in_memory = self.splats.n.max(most_in_memory);
-            self.draw(strip, camera, sink, &mut frame.report);
+            self.draw(strip, camera, sink, &mut frame.report, watch);
         }
         let Frame { tally, mut report, .. } = frame;
         report.splats_dropped = tally.n_dropped();
@@ -193,7 +208,15 @@ impl<'b, 's> Decoder<'b, 's> {
     }
 
     /// Orders the splats of a strip and draws tile after tile.
-    fn draw(&mut self, strip: Strip, camera: &Camera, sink: &mut impl TileSink, report: &mut FrameReport) {
+    fn draw(
+        &mut self,
+        strip: Strip,
+        camera: &Camera,
+        sink: &mut impl TileSink,
+        report: &mut FrameReport,
+        watch: &mut impl Stopwatch,
+    ) {
+        watch.enter(Stage::Sort);
         let n = self.splats.n as usize;
         let (Some(splats), Some(rects)) = (self.splats.splats.get(..n), self.splats.rects.get(..n)) else { return };
         let (Some(order), Some(spare)) = (self.order.get_mut(..n), self.spare.get_mut(..n)) else { return };
@@ -201,13 +224,16 @@ impl<'b, 's> Decoder<'b, 's> {
         let background = self.bundle.header().background.map(|byte| f32::from(byte) / 255.0);
         let rows = (0..).zip(tiles_along(camera.height_px));
         for (row, (y_px, height)) in rows.take(strip.end_row.into()).skip(strip.first_row.into()) {
+            watch.enter(Stage::Sort);
             let list = gather_row(order, rects, row, row_list);
             for (column, (x_px, width)) in (0..).zip(tiles_along(camera.width_px)) {
+                watch.enter(Stage::Blend);
                 let place = TilePlace { column, row, width, height };
                 let work = blend_tile(place, splats, rects, list, background, &mut self.canvas);
                 report.tile_splats = report.tile_splats.saturating_add(work.splats);
                 report.pixel_splats = report.pixel_splats.saturating_add(work.pixels);
                 let n_pixels = usize::from(width) * usize::from(height);
+                watch.enter(Stage::Output);
                 sink.tile(x_px, y_px, width, height, self.canvas.rgb.get(..n_pixels).unwrap_or_default());
             }
         }

@@ -20,9 +20,11 @@ mod mlp;
 mod project;
 mod raster;
 mod scene;
+mod stopwatch;
 
 pub use budget::{Budget, MaxSplats, Plan, Residency, ScratchShape, Strips, Work};
 pub use bundle::Bundle;
 pub use camera::Camera;
 pub use decoder::{Decoder, FrameReport, TileSink};
 pub use error::{DecodeError, ErrorClass, Field, SectionKind};
+pub use stopwatch::{Stage, Stopwatch};

@@ -14,6 +14,7 @@ use super::{Bundle, Coder};
 use crate::context::Context;
 use crate::entropy::{AnsReader, MaskModel, TrieReader};
 use crate::error::{DecodeError, Field};
+use crate::stopwatch::Stopwatch;
 
 /// Where an anchor stands and which of its offsets are drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -149,12 +150,17 @@ impl<'b, 's, 'm> AnchorReader<'b, 's, 'm> {
 
     /// The anchor's symbols, one a channel; one call of this or of [`values`](Self::values) an anchor.
     pub fn symbols(&mut self, row: &mut [i16]) {
-        self.symbols = self.models.channels.read(self.site, self.models.n_scalars, self.symbols, row);
+        self.symbols = self.models.channels.read(self.site, self.models.n_scalars, self.symbols, row, &mut ());
     }
 
     /// The anchor's values, one a channel; one call of this or of [`symbols`](Self::symbols) an anchor.
     pub fn values(&mut self, row: &mut [f32]) {
-        self.symbols = self.models.channels.read(self.site, self.models.n_scalars, self.symbols, row);
+        self.values_watched(row, &mut ());
+    }
+
+    /// As [`values`](Self::values); `watch` is in the stage of decoding before and after.
+    pub(crate) fn values_watched(&mut self, row: &mut [f32], watch: &mut impl Stopwatch) {
+        self.symbols = self.models.channels.read(self.site, self.models.n_scalars, self.symbols, row, watch);
     }
 
     /// The code of the cell that [`site`](Self::site) came to.

@@ -8,6 +8,7 @@ use crate::bundle::Chunk;
 use crate::error::DecodeError;
 use crate::project::{Band, View};
 use crate::scene::{Anchor, for_each_gaussian};
+use crate::stopwatch::{Stage, Stopwatch};
 
 /// One frame in work.
 pub(super) struct Frame {
@@ -60,14 +61,20 @@ impl<'b> Decoder<'b, '_> {
     }
 
     /// Fills the splat memory with the splats of one strip.
-    pub(super) fn gather(&mut self, strip: Strip, frame: &mut Frame) -> Result<(), DecodeError> {
+    pub(super) fn gather(
+        &mut self,
+        strip: Strip,
+        frame: &mut Frame,
+        watch: &mut impl Stopwatch,
+    ) -> Result<(), DecodeError> {
         self.splats.n = 0;
         let pass = Pass { strip, band: frame.band(strip) };
         frame.report.decode_passes += u8::from(!self.source.is_resident());
         for (chunk, first_anchor) in self.planned_chunks() {
+            watch.enter(Stage::Project);
             let ink_box = chunk.ink_box();
             if frame.view.sees_box(ink_box) && pass.band.is_none_or(|band| band.sees_box(ink_box)) {
-                self.gather_sound_chunk(&chunk, first_anchor, pass, frame)?;
+                self.gather_sound_chunk(&chunk, first_anchor, pass, frame, watch)?;
             }
         }
         if !frame.tallies {
@@ -83,14 +90,16 @@ impl<'b> Decoder<'b, '_> {
         first_anchor: u32,
         pass: Pass,
         frame: &mut Frame,
+        watch: &mut impl Stopwatch,
     ) -> Result<(), DecodeError> {
+        watch.enter(Stage::Decode);
         let (n_splats, tally, before) = (self.splats.n, frame.tally, frame.report);
         let sound = match &self.source {
             AnchorSource::Resident(records) => !records.is_damaged(chunk.index()),
             AnchorSource::Streamed(_) => !self.skip_damage || chunk.check().is_ok(),
         };
         if sound {
-            match self.gather_chunk(chunk, first_anchor, pass, frame) {
+            match self.gather_chunk(chunk, first_anchor, pass, frame, watch) {
                 Err(DecodeError::ChunkStream { .. }) if self.skip_damage => {}
                 result => return result,
             }
@@ -113,6 +122,7 @@ impl<'b> Decoder<'b, '_> {
         first_anchor: u32,
         pass: Pass,
         frame: &mut Frame,
+        watch: &mut impl Stopwatch,
     ) -> Result<(), DecodeError> {
         let Self { bundle, source, heads, work, splats, .. } = self;
         let header = bundle.header();
@@ -120,7 +130,8 @@ impl<'b> Decoder<'b, '_> {
         let Frame { view, strips, tallies, tally, report } = frame;
         let decoded = u32::from(!source.is_resident());
         report.chunks_decoded += decoded;
-        source.for_each(chunk, first_anchor, self.row, |number, site, row| {
+        source.for_each(chunk, first_anchor, self.row, watch, |number, site, row, watch| {
+            watch.enter(Stage::Project);
             report.anchors_decoded += decoded;
             let position = bundle.position(site.lattice);
             let anchor = Anchor::from_row(header, position, site.mask, row).ok_or(DecodeError::Internal)?;
@@ -128,7 +139,7 @@ impl<'b> Decoder<'b, '_> {
                 return Ok(());
             }
             report.anchors_visible += 1;
-            let macs = for_each_gaussian(&anchor, effects, view.eye, heads, work, |offset, gaussian| {
+            let macs = for_each_gaussian(&anchor, effects, view.eye, heads, work, watch, |offset, gaussian| {
                 let Some((splat, rect)) = view.project(gaussian, effects.dilation_compensation) else { return };
                 let place = place(number, offset);
                 let touched = strips.touched(rect);

@@ -2,6 +2,7 @@
 
 use crate::bundle::{AnchorModels, AnchorRecords, AnchorSite, Chunk};
 use crate::error::DecodeError;
+use crate::stopwatch::{Stage, Stopwatch};
 
 /// The anchors of the planned tiers.
 pub(super) enum AnchorSource<'b, 's> {
@@ -23,28 +24,31 @@ impl<'b> AnchorSource<'b, '_> {
     ///
     /// # Errors
     /// [`DecodeError::ChunkStream`] after the last anchor when they were not sound; never when resident.
-    pub(super) fn for_each(
+    pub(super) fn for_each<W: Stopwatch>(
         &mut self,
         chunk: &Chunk<'b>,
         first: u32,
         row: &mut [f32],
-        mut each: impl FnMut(u32, AnchorSite, &[f32]) -> Result<(), DecodeError>,
+        watch: &mut W,
+        mut each: impl FnMut(u32, AnchorSite, &[f32], &mut W) -> Result<(), DecodeError>,
     ) -> Result<(), DecodeError> {
         let numbers = (first..).take(chunk.n_anchors().into());
         match self {
             Self::Streamed(models) => {
                 let mut anchors = chunk.anchors(models);
                 for number in numbers {
+                    watch.enter(Stage::Decode);
                     let site = anchors.site();
-                    anchors.values(row);
-                    each(number, site, row)?;
+                    anchors.values_watched(row, watch);
+                    each(number, site, row, watch)?;
                 }
                 anchors.finish()
             }
             Self::Resident(records) => {
                 for number in numbers {
+                    watch.enter(Stage::Decode);
                     let site = records.read(number, row).ok_or(DecodeError::Internal)?;
-                    each(number, site, row)?;
+                    each(number, site, row, watch)?;
                 }
                 Ok(())
             }

@@ -6,6 +6,7 @@ use super::Anchor;
 use crate::bundle::Effects;
 use crate::math::{sigmoid, tanh};
 use crate::mlp::Heads;
+use crate::stopwatch::{Stage, Stopwatch};
 
 /// Opacities below one step of an 8-bit channel draw nothing.
 const OPACITY_MIN: f32 = 1.0 / 255.0;
@@ -63,8 +64,10 @@ pub(crate) fn for_each_gaussian(
     eye: [f32; 3],
     heads: &Heads<'_>,
     work: &mut Workspace<'_>,
+    watch: &mut impl Stopwatch,
     mut draw: impl FnMut(usize, &Gaussian),
 ) -> u64 {
+    watch.enter(Stage::Heads);
     let Workspace { inputs, hidden, detail_sums, outputs } = work;
     fill_inputs(anchor, effects, eye, inputs);
     let opacity_macs = heads.shape.opacity_macs(anchor.mask.count_ones() as usize);
@@ -90,6 +93,7 @@ pub(crate) fn for_each_gaussian(
             output.colour = [plain_r + r, plain_g + g, plain_b + b];
         }
     }
+    watch.enter(Stage::Project);
     for (k, output) in visible_only(outputs, visible) {
         if let Some(offset) = anchor.offsets.get(k) {
             draw(k, &gaussian(anchor, *offset, output));

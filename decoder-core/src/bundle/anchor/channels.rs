@@ -4,6 +4,7 @@ use super::AnchorSite;
 use crate::bundle::tables::IndexedTables;
 use crate::context::{Context, Group, GroupStep};
 use crate::entropy::AnsReader;
+use crate::stopwatch::{Stage, Stopwatch};
 
 /// The models of the channels.
 #[derive(Debug)]
@@ -82,12 +83,13 @@ impl<'b> ChannelModels<'b, '_> {
         n_scalars: usize,
         symbols: AnsReader<'b>,
         row: &mut [T],
+        watch: &mut impl Stopwatch,
     ) -> AnsReader<'b> {
         let Some((scalars, offsets)) = row.split_at_mut_checked(n_scalars) else { return symbols };
         let (offsets, _) = offsets.as_chunks_mut();
         match self {
             Self::Static(tables) => read_static(*tables, site.mask, symbols, scalars, offsets),
-            Self::Context(models) => models.read(site, symbols, scalars, offsets),
+            Self::Context(models) => models.read(site, symbols, scalars, offsets, watch),
         }
     }
 }
@@ -144,7 +146,9 @@ impl<'b> ContextModels<'b, '_> {
         mut symbols: AnsReader<'b>,
         scalars: &mut [T],
         offsets: &mut [[T; 3]],
+        watch: &mut impl Stopwatch,
     ) -> AnsReader<'b> {
+        watch.enter(Stage::Context);
         let Self { context, features, hidden, step_bits } = self;
         context.features(site.lattice, features);
         context.hidden(features, hidden);
@@ -157,7 +161,9 @@ impl<'b> ContextModels<'b, '_> {
         for (group, slots) in [(Group::Feature, feature), (Group::LogScale, log_scales)] {
             for slots in slots.chunks_mut(BLOCK) {
                 block.push(context, hidden, first, slots.len());
+                watch.enter(Stage::Decode);
                 symbols = block.read(&steps.of(group), symbols, slots);
+                watch.enter(Stage::Context);
                 first = first.saturating_add(slots.len());
             }
         }
@@ -171,10 +177,13 @@ impl<'b> ContextModels<'b, '_> {
             block.push(context, hidden, n_scalars.saturating_add(offset), 3);
             if block.len == BLOCK || mask == 0 {
                 let Some((now, later)) = slots.split_at_mut_checked(block.len) else { break };
+                watch.enter(Stage::Decode);
                 symbols = block.read(&step, symbols, now);
+                watch.enter(Stage::Context);
                 slots = later;
             }
         }
+        watch.enter(Stage::Decode);
         spread(offsets, site.mask);
         symbols
     }

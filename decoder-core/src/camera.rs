@@ -60,6 +60,52 @@ impl Camera {
         [-(r00 * x + r10 * y + r20 * z), -(r01 * x + r11 * y + r21 * z), -(r02 * x + r12 * y + r22 * z)]
     }
 
+    /// The camera carried around the scene by `angle`, radians; from above it moves counter-clockwise.
+    ///
+    /// With Q the turn by `angle` about the axis and p a point of it, R' = R·Qᵀ and t' = t + R·p − R'·p. The axis is that
+    /// coordinate axis of the normalised frame to which the camera's up is nearest, either way round; p is the point of the
+    /// camera's line of sight nearest to the origin, which the training cameras surround. Distance, height and what is in
+    /// the middle of the image stay: of cameras that look at one point it is the circle that the manifest's orbit takes.
+    /// Sine and cosine are `libm`'s, so every machine gets the same bits.
+    ///
+    /// ```
+    /// # use pocketsplat_core::Camera;
+    /// // At (0, -3, 0), looking along y, z up.
+    /// let camera = Camera {
+    ///     rotation: [1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0],
+    ///     translation: [0.0, 0.0, 3.0],
+    ///     focal_px: [100.0, 100.0],
+    ///     principal_px: [40.0, 30.0],
+    ///     width_px: 80,
+    ///     height_px: 60,
+    /// };
+    /// let [x, y, z] = camera.orbited(core::f32::consts::FRAC_PI_2).centre();
+    /// assert!((x - 3.0).abs() < 1e-6 && y.abs() < 1e-6 && z == 0.0);
+    /// ```
+    #[must_use]
+    pub fn orbited(&self, angle: f32) -> Self {
+        let [x0, x1, x2, y0, y1, y2, z0, z1, z2] = self.rotation;
+        let (right, down, forward) = ([x0, x1, x2], [y0, y1, y2], [z0, z1, z2]);
+        let (axis, sign) = nearest_axis([-y0, -y1, -y2]);
+        let (sin, cos) = (sign * libm::sinf(angle), libm::cosf(angle));
+        let eye = self.centre();
+        let ([e0, e1, e2], along) = (eye, dot(eye, forward));
+        let pivot = [e0 - along * z0, e1 - along * z1, e2 - along * z2];
+        let [right_after, down_after, forward_after] = [right, down, forward].map(|row| turned(row, axis, sin, cos));
+        let shifted = |t: f32, row, row_after| t + (dot(row, pivot) - dot(row_after, pivot));
+        let ([a0, a1, a2], [b0, b1, b2], [c0, c1, c2]) = (right_after, down_after, forward_after);
+        let [t0, t1, t2] = self.translation;
+        Self {
+            rotation: [a0, a1, a2, b0, b1, b2, c0, c1, c2],
+            translation: [
+                shifted(t0, right, right_after),
+                shifted(t1, down, down_after),
+                shifted(t2, forward, forward_after),
+            ],
+            ..*self
+        }
+    }
+
     /// Checks that every float is finite, the focal lengths positive and the frame not empty.
     ///
     /// # Errors
@@ -78,6 +124,32 @@ impl Camera {
     }
 }
 
+/// The number of the coordinate axis nearest to a direction, and its sign.
+fn nearest_axis([x, y, z]: [f32; 3]) -> (u8, f32) {
+    let [size_x, size_y, size_z] = [x.abs(), y.abs(), z.abs()];
+    let (axis, component) = if size_z >= size_x && size_z >= size_y {
+        (2, z)
+    } else if size_y >= size_x {
+        (1, y)
+    } else {
+        (0, x)
+    };
+    (axis, if component < 0.0 { -1.0 } else { 1.0 })
+}
+
+/// A vector turned about a coordinate axis.
+fn turned([x, y, z]: [f32; 3], axis: u8, sin: f32, cos: f32) -> [f32; 3] {
+    match axis {
+        0 => [x, cos * y - sin * z, sin * y + cos * z],
+        1 => [cos * x + sin * z, y, cos * z - sin * x],
+        _ => [cos * x - sin * y, sin * x + cos * y, z],
+    }
+}
+
+fn dot([a0, a1, a2]: [f32; 3], [b0, b1, b2]: [f32; 3]) -> f32 {
+    a0 * b0 + a1 * b1 + a2 * b2
+}
+
 /// Names the first float that is not `good`.
 fn check_floats<'f>(
     field: Field,
@@ -90,4 +162,57 @@ fn check_floats<'f>(
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use core::f32::consts::TAU;
+
+    use super::{Camera, dot};
+
+    #[test]
+    fn an_orbit_keeps_distance_height_and_the_middle_of_the_image() {
+        let up_along = |[y0, y1, y2]: [f32; 3], [z0, z1, z2]: [f32; 3]| {
+            let right = [y1 * z2 - y2 * z1, y2 * z0 - y0 * z2, y0 * z1 - y1 * z0];
+            let [x0, x1, x2] = right;
+            [x0, x1, x2, y0, y1, y2, z0, z1, z2]
+        };
+        // Looking 0.6 down and 0.8 ahead, with each of the axes up.
+        for (axis, rotation) in [
+            (0, up_along([-0.8, 0.6, 0.0], [-0.6, -0.8, 0.0])),
+            (1, up_along([0.0, -0.8, 0.6], [0.0, -0.6, -0.8])),
+            (2, up_along([0.6, 0.0, -0.8], [-0.8, 0.0, -0.6])),
+            (2, up_along([0.6, 0.0, 0.8], [0.8, 0.0, -0.6])),
+        ] {
+            let camera = Camera {
+                rotation,
+                translation: [0.1, -0.2, 2.5],
+                focal_px: [90.0, 80.0],
+                principal_px: [30.0, 20.0],
+                width_px: 60,
+                height_px: 40,
+            };
+            let [.., z0, z1, z2] = rotation;
+            let eye = camera.centre();
+            let along = dot(eye, [z0, z1, z2]);
+            let pivot = [eye[0] - along * z0, eye[1] - along * z1, eye[2] - along * z2];
+            let to_pivot = |eye: [f32; 3]| [0, 1, 2].map(|i| pivot[i] - eye[i]);
+            for step in 0..9 {
+                let after = camera.orbited(TAU * step as f32 / 8.0);
+                let [x0, x1, x2, y0, y1, y2, z0, z1, z2] = after.rotation;
+                let near = |found: f32, expected: f32| {
+                    assert!((found - expected).abs() < 1e-5, "axis {axis}, step {step}: {found}, not {expected}");
+                };
+                let offset = to_pivot(after.centre());
+                near(dot(offset, [x0, x1, x2]), 0.0);
+                near(dot(offset, [y0, y1, y2]), 0.0);
+                near(dot(offset, [z0, z1, z2]), -along);
+                near(after.centre()[axis], eye[axis]);
+                near(dot([x0, x1, x2], [y0, y1, y2]), 0.0);
+            }
+            let whole = camera.orbited(TAU).centre();
+            assert!([0, 1, 2].iter().all(|&i| (whole[i] - eye[i]).abs() < 1e-5), "a whole turn: {whole:?}, {eye:?}");
+            assert!((camera.orbited(0.5).centre()[(axis + 1) % 3] - eye[(axis + 1) % 3]).abs() > 0.1, "it moves");
+        }
+    }
 }

@@ -61,7 +61,11 @@ impl<'s, const B: usize> Head<'s, B> {
     ///
     /// * `hidden`: [`hidden_len`](super::HeadShape::hidden_len) floats.
     pub(crate) fn activate<'h>(&self, inputs: &[f32], hidden: &'h mut [f32]) -> &'h [f32] {
-        for (units, block) in hidden.chunks_exact_mut(LANES).zip(self.hidden.iter()) {
+        // Not zipped: blocks are of a length that the compiler does not know, and their number would be a division, which
+        // it may take for one by zero.
+        let mut blocks = self.hidden.iter();
+        for units in hidden.as_chunks_mut::<LANES>().0 {
+            let Some(block) = blocks.next() else { break };
             for (unit, sum) in units.iter_mut().zip(outputs(block, inputs)) {
                 *unit = if sum > 0.0 { sum } else { 0.0 };
             }

@@ -1,60 +1,104 @@
-//! Puts a bundle into flash and sizes the static buffers for its preview view, which the build machine draws once.
+//! Puts a bundle into flash, and lays out the memory of the board and of the device class that the firmware is built for.
+//!
+//! | variable | what | without it |
+//! |---|---|---|
+//! | `PSB_BUNDLE` | absolute path of the bundle | an error |
+//! | `BOARD` | `mps2-an386`, `mps2-an500`, or `virt` for RISC-V | `mps2-an386`; for RISC-V `virt` |
+//! | `RAM_KIB` | RAM in all: statics, scratch memory, stack | 256, 1024, 512 |
+//! | `SIZE` | frames, `WIDTHxHEIGHT` | the preview's |
+//! | `FRAMES` | frames of the orbit, at most 10 | 4 |
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
-use pocketsplat_core::{Budget, Bundle, Decoder, MaxSplats, Residency, Strips, TileSink};
+use pocketsplat_core::Bundle;
+
+/// Bytes reserved for the stack; the firmware fails when it comes near.
+const STACK_LEN: usize = 10 * 1024;
+/// Bytes of all statics beside the scratch memory, which gets the rest: the logger's and the flags of the cells.
+const OTHER_STATICS: usize = 512;
+
+/// A board: its name, the architecture of its processor, RAM of its usual device class in KiB, memory.
+const BOARDS: [(&str, &str, usize, &str); 3] = [
+    ("mps2-an386", "arm", 256, include_str!("src/board/mps2-an386.x")),
+    ("mps2-an500", "arm", 1024, include_str!("src/board/mps2-an500.x")),
+    ("virt", "riscv32", 512, include_str!("src/board/virt.x")),
+];
+
+/// The display's memory, and room for the stack; the symbols are those of the boards' start-up code.
+const SECTIONS: &str = r#"
+SECTIONS
+{
+  .panel : { *(.panel) } > PANEL
+}
+ASSERT(_stack_start - _stack_end >= STACK_LEN, "
+ERROR(firmware-example): no room for the stack; OTHER_STATICS of build.rs is too small");
+"#;
 
 fn main() {
-    let here = env::var("CARGO_MANIFEST_DIR").expect("cargo sets CARGO_MANIFEST_DIR");
-    let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
-    println!("cargo::rerun-if-changed=build.rs");
-    println!("cargo::rerun-if-changed=memory.x");
-    println!("cargo::rerun-if-env-changed=PSB_BUNDLE");
-    // For memory.x.
-    println!("cargo::rustc-link-search={here}");
-    // Here and not in .cargo/config.toml, where a RUSTFLAGS of the environment would replace them.
-    println!("cargo::rustc-link-arg-bins=-Tlink.x");
-    println!("cargo::rustc-link-arg-bins=-Tdefmt.x");
-    let Some(path) = env::var_os("PSB_BUNDLE").map(PathBuf::from) else {
-        println!("cargo::error=PSB_BUNDLE is not set: set it to the absolute path of a bundle, as README.md shows");
-        return;
-    };
-    println!("cargo::rerun-if-changed={}", path.display());
-    if let Err(error) = embed(&path, &out) {
-        println!("cargo::error=bundle {}: {error}", path.display());
+    if let Err(error) = prepare() {
+        println!("cargo::error={error}");
     }
 }
 
-/// Copies the bundle to where `include_bytes!` finds it, and writes the sizes of the buffers as constants.
-fn embed(path: &Path, out: &Path) -> Result<(), Box<dyn Error>> {
-    let bytes = fs::read(path)?;
-    let bundle = Bundle::parse(&bytes)?;
-    let camera = bundle.header().preview;
-    let mut budget = Budget::for_frame(camera.width_px, camera.height_px)
-        .with_max_splats(MaxSplats::Worst)
-        .with_residency(Residency::Streamed)
-        .with_strips(Strips::Exactly(1));
-    // Memory for every splat of the scene is more than a microcontroller has to spare: the firmware draws one view, so
-    // it gets what this view needs.
-    let plan = bundle.plan(&budget)?;
-    let mut scratch = vec![0; plan.scratch_len()];
-    let report = Decoder::bind(&bundle, plan, &mut scratch)?.render(&camera, &mut Nowhere)?;
-    budget.max_splats = MaxSplats::AtMost(report.max_splats);
-    let scratch_len = bundle.plan(&budget)?.scratch_len();
-    let sizes = format!(
-        "const WIDTH_PX: usize = {};\nconst HEIGHT_PX: usize = {};\nconst MAX_SPLATS: u32 = {};\nconst SCRATCH_LEN: usize = {scratch_len};\n",
-        camera.width_px, camera.height_px, report.max_splats,
-    );
+fn prepare() -> Result<(), Box<dyn Error>> {
+    let out = PathBuf::from(env::var("OUT_DIR")?);
+    let arch = env::var("CARGO_CFG_TARGET_ARCH")?;
+    println!("cargo::rerun-if-changed=build.rs");
+    let usual = BOARDS.iter().find(|board| board.1 == arch).map(|board| board.0);
+    let name = variable("BOARD").or(usual.map(Into::into)).ok_or("no board has this target's architecture")?;
+    let (name, _, usual_ram_kib, memory) = BOARDS
+        .into_iter()
+        .find(|board| board.0 == name && board.1 == arch)
+        .ok_or_else(|| format!("BOARD={name} is no board of architecture {arch}: see build.rs"))?;
+    let ram_kib = variable("RAM_KIB").map_or(Ok(usual_ram_kib), |text| text.parse())?;
+    lay_out(memory, ram_kib, &out)?;
+
+    let path = variable("PSB_BUNDLE")
+        .ok_or("PSB_BUNDLE is not set: set it to the absolute path of a bundle, as README.md shows")?;
+    println!("cargo::rerun-if-changed={path}");
+    let bytes = fs::read(&path).map_err(|error| format!("bundle {path}: {error}"))?;
+    let preview = Bundle::parse(&bytes).map_err(|error| format!("bundle {path}: {error}"))?.header().preview;
     fs::write(out.join("bundle.psb"), &bytes)?;
-    fs::write(out.join("sizes.rs"), sizes)?;
+    let (width_px, height_px) = match variable("SIZE") {
+        None => (preview.width_px, preview.height_px),
+        Some(size) => {
+            let (width, height) = size.split_once('x').ok_or("SIZE is not WIDTHxHEIGHT, for instance 160x120")?;
+            (width.parse()?, height.parse()?)
+        }
+    };
+    let n_frames: u8 = variable("FRAMES").map_or(Ok(4), |text| text.parse())?;
+    let scratch_len = (ram_kib * 1024)
+        .checked_sub(STACK_LEN + OTHER_STATICS)
+        .ok_or_else(|| format!("RAM_KIB={ram_kib} leaves no scratch memory beside {STACK_LEN} bytes of stack"))?;
+    let settings = format!(
+        "const BOARD: &str = {name:?};\nconst RAM_KIB: usize = {ram_kib};\nconst STACK_LEN: usize = {STACK_LEN};\n\
+         const SCRATCH_LEN: usize = {scratch_len};\nconst WIDTH_PX: usize = {width_px};\n\
+         const HEIGHT_PX: usize = {height_px};\nconst N_FRAMES: u8 = {n_frames};\n"
+    );
+    Ok(fs::write(out.join("settings.rs"), settings)?)
+}
+
+/// Writes the linker's `memory.x` and asks for it and the scripts of start-up code and logger.
+fn lay_out(memory: &str, ram_kib: usize, out: &Path) -> Result<(), Box<dyn Error>> {
+    // Numbers, because flip-link reads them too.
+    let numbers = |text: &str| {
+        text.replace("RAM_KIB * 1024", &(ram_kib * 1024).to_string()).replace("STACK_LEN", &STACK_LEN.to_string())
+    };
+    fs::write(out.join("memory.x"), numbers(memory) + &numbers(SECTIONS))?;
+    println!("cargo::rustc-link-search={}", out.display());
+    // Here and not in .cargo/config.toml, where a RUSTFLAGS of the environment would replace them.
+    if memory.contains("REGION_ALIAS") {
+        println!("cargo::rustc-link-arg-bins=-Tmemory.x");
+    }
+    println!("cargo::rustc-link-arg-bins=-Tlink.x");
+    println!("cargo::rustc-link-arg-bins=-Tdefmt.x");
     Ok(())
 }
 
-/// Takes tiles and forgets them.
-struct Nowhere;
-
-impl TileSink for Nowhere {
-    fn tile(&mut self, _x_px: u16, _y_px: u16, _width: u16, _height: u16, _rgb: &[[u8; 3]]) {}
+/// A variable of the environment, which decides about this build.
+fn variable(name: &str) -> Option<String> {
+    println!("cargo::rerun-if-env-changed={name}");
+    env::var(name).ok()
 }

@@ -1,9 +1,18 @@
 #!/usr/bin/env bash
-# Runs a firmware image on QEMU's Cortex-M4 and prints its decoded log; ends with the firmware's exit code.
-# The firmware writes frame.ppm into the current folder.
+# Runs a firmware image on the emulated BOARD and prints its decoded log; ends with the firmware's exit code.
+# The firmware writes its files into the current folder. Instructions are counted: QEMU takes one nanosecond for each.
 set -euo pipefail
 elf=${1:?usage: qemu.sh ELF}
 
+case ${BOARD:-} in
+virt) qemu=(qemu-system-riscv32 -M virt -bios none) ;;
+mps2-*) qemu=(qemu-system-arm -M "$BOARD") ;;
+'') case $elf in
+  *riscv32*) qemu=(qemu-system-riscv32 -M virt -bios none) ;;
+  *) qemu=(qemu-system-arm -M mps2-an386) ;;
+  esac ;;
+*) echo "qemu.sh: BOARD=$BOARD is none of mps2-an386, mps2-an500, virt" >&2 && exit 2 ;;
+esac
 # QEMU waits for ever on a firmware that hangs.
-timeout "${QEMU_TIMEOUT_S:-300}" qemu-system-arm -M mps2-an386 -display none -monitor none -serial none \
+timeout "${QEMU_TIMEOUT_S:-300}" "${qemu[@]}" -icount shift=0 -display none -monitor none -serial none \
   -semihosting-config enable=on,target=native -kernel "$elf" </dev/null | defmt-print -e "$elf"

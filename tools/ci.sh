@@ -11,6 +11,7 @@ jobs=(fmt clippy doc test core-embedded format-doc link-gate digests firmware de
 
 embedded_target=thumbv7em-none-eabihf
 defmt_print_version=1.2.0
+flip_link_version=0.1.12
 # One folder for everything that is built, so that a clean-up is one `rm`; the bare-metal workspaces build below it.
 target=${CARGO_TARGET_DIR:-$PWD/target}
 case $target in /*) ;; *) target=$PWD/$target ;; esac
@@ -59,19 +60,19 @@ need_embedded_target() {
   need_target "$embedded_target"
 }
 
-# Prints the path of llvm-nm.
-llvm_nm() {
-  local nm
-  nm=$(rustc --print sysroot)/lib/rustlib/$(rustc --print host-tuple)/bin/llvm-nm
-  [ -x "$nm" ] || rustup component add llvm-tools >&2 || fail "llvm-nm is missing: run \`rustup component add llvm-tools\`"
-  echo "$nm"
+# Prints the folder of llvm-nm and llvm-size.
+llvm_tools() {
+  local tools
+  tools=$(rustc --print sysroot)/lib/rustlib/$(rustc --print host-tuple)/bin
+  [ -x "$tools/llvm-size" ] || rustup component add llvm-tools >&2 || fail "llvm-size is missing: run \`rustup component add llvm-tools\`"
+  echo "$tools"
 }
 
-need_defmt_print() {
-  command -v defmt-print >/dev/null && return
-  cargo install defmt-print --version "$defmt_print_version" --locked --root "$target/tools" \
-    --target-dir "$target/tools/build" ||
-    fail "defmt-print is missing: run \`cargo install defmt-print --version $defmt_print_version --locked\`"
+# A program from the registry.
+need_tool() { # CRATE VERSION
+  command -v "$1" >/dev/null && return
+  cargo install "$1" --version "$2" --locked --root "$target/tools" --target-dir "$target/tools/build" ||
+    fail "$1 is missing: run \`cargo install $1 --version $2 --locked\`"
   rm -rf "$target/tools/build"
 }
 
@@ -116,13 +117,11 @@ job_format-doc() {
   cargo run -q -p tools --bin hexdump --locked -- --check
 }
 
-# decoder-core links without an allocator, and reaches no panic but those of a list that may only shrink.
+# decoder-core links without an allocator, is no larger than sizes.csv says, and reaches no panic but those of a list that
+# may only shrink.
 job_link-gate() {
   need_embedded_target
-  (cd tests/link-gate && cargo build --release --locked --target-dir "$embedded")
-  local nm
-  nm=$(llvm_nm)
-  tests/link-gate/panics.sh "$nm" "$embedded/$embedded_target/release/link-gate"
+  tests/link-gate/build.sh "$(llvm_tools)" "$embedded/link-gate"
 }
 
 # Two bundles, one of each coder, decode to the same symbols and values on every target.
@@ -167,32 +166,56 @@ job_digests() {
     qemu-system-riscv32 -M virt -bios none "${semihosting[@]}" -kernel "$build/$name/release/digest"
 }
 
-# A bundle drawn by a Cortex-M4 under QEMU is byte for byte what this machine draws, under either coder.
+# Boards with the RAM that they get, KiB: as much as such a device has, and so little that anchors are decoded in each frame.
+firmware_runs=("mps2-an386 256" "mps2-an386 96" "mps2-an500 1024" "virt 96")
+
+# Every board draws an orbit of a bundle of either coder in its RAM, byte for byte as this machine does, and takes as many
+# instructions as it took when docs/results/instructions.csv was written, within 1 %.
 job_firmware() {
-  need_embedded_target
-  need_command qemu-system-arm qemu-system-arm
-  need_defmt_print
-  local coder
-  for coder in static context; do
-    firmware_frame "$coder" "$embedded/frame/$coder"
-  done
+  local measured=$target/firmware/instructions.csv
+  measure_firmware "$measured"
+  firmware-example/compare.sh docs/results/instructions.csv "$measured" ||
+    fail "if that is meant, run \`tools/ci.sh bless-instructions\` and commit its table"
 }
 
-firmware_frame() { # CODER FOLDER
-  local coder=$1 out=$2
-  mkdir -p "$out"
-  cargo run -q -p tools --bin sample_bundle --locked -- --coder "$coder" "$out/sample.psb"
-  cargo run -q -p tools --bin draw_preview --locked -- "$out/sample.psb" "$out/host.ppm"
+# Not one of `jobs`: writes the table that `firmware` compares with.
+job_bless-instructions() {
+  measure_firmware docs/results/instructions.csv
+}
+
+measure_firmware() { # CSV
+  local coder run bundle out bytes frame
+  need_embedded_target
+  need_target riscv32imac-unknown-none-elf
+  need_command qemu-system-arm qemu-system-arm
+  need_command qemu-system-riscv32 qemu-system-misc
+  need_tool defmt-print "$defmt_print_version"
+  need_tool flip-link "$flip_link_version"
+  mkdir -p "$target/firmware"
+  : >"$1"
+  for coder in static context; do
+    bundle=$target/firmware/sample-$coder.psb
+    cargo run -q -p tools --bin sample_bundle --locked -- --coder "$coder" "$bundle"
+    for run in "${firmware_runs[@]}"; do
+      out=$target/firmware/$coder-${run/ /-}
+      # shellcheck disable=SC2086 # a board and its RAM
+      CARGO_TARGET_DIR=$embedded firmware-example/measure.sh "$bundle" $run "" "$out" >"$out.csv"
+      bytes=$(sed -n 's/.*scratch: \([0-9]*\) bytes.*/\1/p' "$out/log.txt")
+      cargo run -q -p tools --bin draw_orbit --locked -- "$bundle" "$out/host" --bytes "$bytes" >/dev/null
+      for frame in "$out"/frame*.ppm; do
+        cmp "$frame" "$out/host/${frame##*/}" || fail "a frame of $run KiB differs from this machine's, coder $coder"
+      done
+      echo "$run KiB, $coder: $(ls "$out"/frame*.ppm | wc -l) frames as on this machine; $(sed -n 's/.*\(stack: [0-9]*\).*/\1/p' "$out/log.txt")"
+      if [ -s "$1" ]; then sed 1d "$out.csv" >>"$1"; else cat "$out.csv" >"$1"; fi
+    done
+  done
   (
     cd firmware-example
-    export PSB_BUNDLE=$out/sample.psb
-    cargo clippy --release --locked --target-dir "$embedded" -- -D warnings
-    cargo build --release --locked --target-dir "$embedded"
+    export PSB_BUNDLE=$bundle
+    for out in "$embedded_target" riscv32imac-unknown-none-elf; do
+      cargo clippy -q --release --locked --target "$out" --target-dir "$embedded" -- -D warnings
+    done
   )
-  rm -f "$out/frame.ppm"
-  (cd "$out" && "$OLDPWD/firmware-example/qemu.sh" "$embedded/$embedded_target/release/firmware-example")
-  cmp "$out/frame.ppm" "$out/host.ppm" || fail "the frame of the device differs from the host's, coder $coder"
-  echo "the device's frame is the host's, coder $coder: $(wc -c <"$out/frame.ppm") bytes, $out/frame.ppm"
 }
 
 # The main job in small: the same path as `cargo run --release -- demo`, a few hundred steps on small images.

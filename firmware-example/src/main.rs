@@ -2,30 +2,33 @@
 #![no_std]
 #![no_main]
 
+mod board;
+mod instructions;
+mod panel;
+mod stack;
 mod stop;
 
+use core::f32::consts::TAU;
+
 // For its critical section, which the logger takes.
+#[cfg(target_arch = "arm")]
 use cortex_m as _;
-use cortex_m_rt::entry;
 use defmt_semihosting as _;
-use embedded_graphics::framebuffer::{Framebuffer, buffer_size};
 use embedded_graphics::geometry::Point;
-use embedded_graphics::pixelcolor::Rgb888;
-use embedded_graphics::pixelcolor::raw::{BigEndian, RawU24};
+use instructions::{Instructions, Table};
+use panel::{PANEL, Panel, write_ppm};
 use pocketsplat_core::display::DisplaySink;
-use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, MaxSplats, Residency, Strips};
-use semihosting::{fs, io::Write as _};
+use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, Stage, Stopwatch as _};
+#[cfg(target_arch = "riscv32")]
+use riscv as _;
+use semihosting::io;
 use static_cell::ConstStaticCell;
 
-// WIDTH_PX, HEIGHT_PX, MAX_SPLATS and SCRATCH_LEN: build.rs plans for the bundle that it puts into flash.
-include!(concat!(env!("OUT_DIR"), "/sizes.rs"));
+// BOARD, RAM_KIB, STACK_LEN, SCRATCH_LEN, WIDTH_PX, HEIGHT_PX, N_FRAMES.
+include!(concat!(env!("OUT_DIR"), "/settings.rs"));
 static BUNDLE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/bundle.psb"));
 
-/// Red, green, blue: in this order big-endian pixels are the bytes of a PPM file.
-type Frame =
-    Framebuffer<Rgb888, RawU24, BigEndian, WIDTH_PX, HEIGHT_PX, { buffer_size::<Rgb888>(WIDTH_PX, HEIGHT_PX) }>;
-
-static FRAME: ConstStaticCell<Frame> = ConstStaticCell::new(Frame::new());
+/// All RAM that stack and other statics leave.
 static SCRATCH: ConstStaticCell<[u8; SCRATCH_LEN]> = ConstStaticCell::new([0; SCRATCH_LEN]);
 
 /// Why there is no picture.
@@ -33,10 +36,10 @@ static SCRATCH: ConstStaticCell<[u8; SCRATCH_LEN]> = ConstStaticCell::new([0; SC
 enum Failure {
     /// The bundle, or the memory for it.
     Decode(DecodeError),
-    /// The preview's size in pixels and the frame buffer's.
-    FrameSize { needed: [u16; 2], available: [usize; 2] },
-    /// The host does not take the file.
+    /// The host does not take a file.
     File,
+    /// The stack came nearer to its end than it may, bytes.
+    Stack { used: usize, most: usize },
 }
 
 impl From<DecodeError> for Failure {
@@ -45,9 +48,19 @@ impl From<DecodeError> for Failure {
     }
 }
 
-#[entry]
+impl From<io::Error> for Failure {
+    fn from(_: io::Error) -> Self {
+        Self::File
+    }
+}
+
+/// Draws, looks at the stack, and ends.
+#[board::entry]
 fn main() -> ! {
-    match draw(FRAME.take(), SCRATCH.take()) {
+    stack::paint();
+    board::start();
+    let drawn = draw_orbit(PANEL.take(), SCRATCH.take()).and_then(|()| check_stack());
+    match drawn {
         Ok(()) => stop::success(),
         Err(failure) => {
             defmt::error!("{}", failure);
@@ -56,40 +69,49 @@ fn main() -> ! {
     }
 }
 
-/// Draws the bundle's preview into `frame` and sends that to the host.
-fn draw(frame: &mut Frame, scratch: &mut [u8]) -> Result<(), Failure> {
+/// Draws the frames of an orbit on the panel, and sends each and the instructions that it took to the host.
+fn draw_orbit(panel: &mut Panel, scratch: &mut [u8]) -> Result<(), Failure> {
     let bundle = Bundle::parse(BUNDLE)?;
     let header = bundle.header();
+    defmt::info!("{=str}: {=usize} KiB of RAM in all, {=usize} bytes of stack", BOARD, RAM_KIB, stack::len());
     defmt::info!("bundle: {} bytes, {} anchors of {} splats", BUNDLE.len(), header.n_anchors, header.n_offsets);
 
-    let camera = header.preview;
-    let size = [camera.width_px, camera.height_px];
-    if size.map(usize::from) != [WIDTH_PX, HEIGHT_PX] {
-        return Err(Failure::FrameSize { needed: size, available: [WIDTH_PX, HEIGHT_PX] });
-    }
-    let budget = Budget::for_frame(camera.width_px, camera.height_px)
-        .in_bytes(scratch.len())
-        .with_max_splats(MaxSplats::AtMost(MAX_SPLATS))
-        .with_residency(Residency::Streamed)
-        .with_strips(Strips::Exactly(1));
-    let plan = bundle.plan(&budget)?;
-    defmt::info!("memory: {} bytes of scratch, {} of frame", plan.scratch_len(), frame.data().len());
-
+    // The build script's sizes fit these types, or the panel would not exist.
+    let preview = header.preview.resized(WIDTH_PX as u16, HEIGHT_PX as u16);
+    let plan = bundle.plan(&Budget::for_frame(preview.width_px, preview.height_px).in_bytes(scratch.len()))?;
+    defmt::info!("scratch: {} bytes, of which the plan takes {}", scratch.len(), plan.scratch_len());
+    defmt::info!(
+        "plan: {} of {} tiers, pruning rate {}, resident {}, {} strips of at most {} splats, {}",
+        plan.n_tiers(),
+        bundle.n_tiers(),
+        plan.pruning_rate(),
+        plan.is_resident(),
+        plan.n_strips(),
+        plan.max_splats(),
+        plan.work()
+    );
+    let before = board::instructions();
     let mut decoder = Decoder::bind(&bundle, plan, scratch)?;
-    let mut display = DisplaySink::new(frame, Point::zero());
-    let report = decoder.render(&camera, &mut display)?;
-    // A frame buffer has no errors.
-    let Ok(()) = display.finish();
-    defmt::info!("{}", report);
-
-    write_ppm(frame).map_err(|_| Failure::File)?;
-    defmt::info!("wrote frame.ppm, {} x {}", WIDTH_PX, HEIGHT_PX);
+    let mut table = Table::create(board::instructions() - before)?;
+    for frame in 0..N_FRAMES {
+        let camera = preview.orbited(TAU * f32::from(frame) / f32::from(N_FRAMES));
+        let mut display = DisplaySink::new(panel, Point::zero());
+        let mut instructions = Instructions::start();
+        let report = decoder.render_watched(&camera, &mut display, &mut instructions)?;
+        instructions.enter(Stage::Output);
+        // A frame buffer has no errors.
+        let Ok(()) = display.finish();
+        defmt::info!("frame {}: {}", frame, report);
+        defmt::info!("instructions: {}", instructions.spent);
+        table.add(frame, &instructions)?;
+        write_ppm(panel, frame)?;
+    }
     Ok(())
 }
 
-/// Writes `frame.ppm` into the folder in which QEMU runs.
-fn write_ppm(frame: &Frame) -> semihosting::io::Result<()> {
-    let mut file = fs::File::create(c"frame.ppm")?;
-    write!(file, "P6\n{WIDTH_PX} {HEIGHT_PX}\n255\n")?;
-    file.write_all(frame.data())
+/// A fifth of the stack is to stay untouched.
+fn check_stack() -> Result<(), Failure> {
+    let (used, most) = (stack::most_used(), STACK_LEN * 4 / 5);
+    defmt::info!("stack: {} bytes used, {} may be", used, most);
+    if used > most { Err(Failure::Stack { used, most }) } else { Ok(()) }
 }

@@ -38,9 +38,21 @@ pub fn core_image_of_tiers(bundle: &Bundle<'_>, camera: &Camera, tiers: u8) -> R
         .with_strips(Strips::Exactly(1));
     let plan = bundle.plan(&budget)?;
     let mut scratch = vec![0; plan.scratch_len()];
+    let (image, report) = image_of(&mut Decoder::bind(bundle, plan, &mut scratch)?, &camera)?;
+    Ok(CoreFrame { image, report, scratch_bytes: report.scratch_used as usize })
+}
+
+/// Draws a frame of a decoder that is bound already, within the plan that it is bound to.
+///
+/// # Errors
+/// As [`Decoder::render`].
+pub fn image_of(
+    decoder: &mut Decoder<'_, '_>,
+    camera: &pocketsplat_core::Camera,
+) -> Result<(Image, FrameReport), DecodeError> {
     let mut sink = ImageSink::new(camera.width_px, camera.height_px);
-    let report = Decoder::bind(bundle, plan, &mut scratch)?.render(&camera, &mut sink)?;
-    Ok(CoreFrame { image: sink.image, report, scratch_bytes: report.scratch_used as usize })
+    let report = decoder.render(camera, &mut sink)?;
+    Ok((sink.image, report))
 }
 
 /// Rounds a camera to the decoder's single precision.

@@ -1,0 +1,24 @@
+#!/usr/bin/env bash
+# Compares two tables of instructions row by row: counts within 1 %, no row more, none fewer.
+#
+#   compare.sh KNOWN.csv MEASURED.csv
+set -euo pipefail
+known=${1:?usage: compare.sh KNOWN MEASURED} measured=${2:?usage: compare.sh KNOWN MEASURED}
+
+awk -F, -v known_file="$known" '
+  { key = $1 FS $2 FS $3 FS $4 FS $5 }
+  FILENAME == known_file { known[key] = $6; next }
+  FNR == 1 { next }
+  !(key in known) { print "compare: not in " known_file ": " $0; bad = 1; next }
+  {
+    difference = $6 - known[key]
+    if (difference < 0) difference = -difference
+    if (100 * difference > known[key]) { print "compare: " key " took " $6 " instructions, known are " known[key]; bad = 1 }
+    delete known[key]
+    n++
+  }
+  END {
+    for (key in known) if (key !~ /^board,/) { print "compare: not measured: " key; bad = 1 }
+    if (!bad) print "compare: " n " rows within 1 %"
+    exit bad
+  }' "$known" "$measured"

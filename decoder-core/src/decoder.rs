@@ -117,7 +117,7 @@ impl<'b, 's> Decoder<'b, 's> {
             outputs: arena.take(shape.offsets)?,
         };
         let source = if plan.is_resident() {
-            AnchorSource::Resident(decode_anchors(bundle, &plan, &mut arena, skip_damage)?)
+            AnchorSource::Resident(decode_anchors(bundle, &plan, row, &mut arena, skip_damage)?)
         } else {
             AnchorSource::Streamed(bundle.anchor_models(arena.take(bundle.anchor_scratch_words())?)?)
         };
@@ -260,9 +260,12 @@ impl<'b> Bundle<'b> {
 }
 
 /// Decodes the planned tiers into memory of `arena`; their models work in what the frame will use later.
+///
+/// * `row`: `[n_channels]`, for the symbols of the anchor in work.
 fn decode_anchors<'b, 's>(
     bundle: &Bundle<'b>,
     plan: &Plan,
+    row: &mut [f32],
     arena: &mut Arena<'s>,
     skip_damage: bool,
 ) -> Result<AnchorRecords<'b, 's>, DecodeError> {
@@ -275,7 +278,8 @@ fn decode_anchors<'b, 's>(
     };
     let mut free = arena.borrow();
     let mut models = bundle.anchor_models(free.take(bundle.anchor_scratch_words())?)?;
-    AnchorRecords::decode(bundle, tier.n_chunks, memory, &mut models, skip_damage)
+    let row = bytemuck::try_cast_slice_mut(row).unwrap_or_default();
+    AnchorRecords::decode(bundle, tier.n_chunks, memory, row, &mut models, skip_damage)
 }
 
 /// First pixel and size of each tile along an axis.

@@ -1,4 +1,4 @@
-//! The decoder draws what the f64 oracle draws, up to f32 and the rounding to 8 bits.
+//! The decoder draws what the f64 oracle draws, up to f32, splats of eleven bits and the rounding to 8 bits.
 
 use conformance::bundles::{CODERS, tiered};
 use conformance::difference::Difference;
@@ -11,10 +11,12 @@ use pocketsplat_core::Bundle;
 /// Rounding to 8 bits alone leaves 58.9 dB.
 const MIN_PSNR_DB: f64 = 58.0;
 /// Half a step is rounding; one step more is a splat whose alpha is 1/255 in one arithmetic and a little less in the
-/// other. Two splats whose depths f32 cannot tell apart could do worse, but these scenes have none where it shows.
+/// other, and several where a detail head of random weights makes colours far beyond white. Two splats whose depths f32 cannot tell apart could do worse, but these scenes have none where it shows.
 const MAX_WORST_STEPS: f64 = 1.5;
-/// Where f32 lands on the other side of a rounding.
-const MAX_SHARE_NOT_ROUNDED: f64 = 1e-3;
+const MAX_WORST_STEPS_DETAILED: f64 = 5.0;
+/// Where the eleven bits of a splat's numbers in memory land on the other side of a rounding: what they move a channel by
+/// is a few hundredths of a step.
+const MAX_SHARE_NOT_ROUNDED: f64 = 0.03;
 
 #[test]
 fn every_case_coder_and_camera_is_within_rounding_of_the_oracle() {
@@ -36,6 +38,8 @@ fn every_case_coder_and_camera_is_within_rounding_of_the_oracle() {
 fn beyond_rounding(bundle: &Bundle<'_>, oracle: &ReferenceScene, name: &str) -> Vec<String> {
     let mut failures = Vec::new();
     let background = bundle.header().background.map(|byte| f64::from(byte) / 255.0);
+    let detailed = bundle.header().features.effects.detail;
+    let max_worst_steps = if detailed { MAX_WORST_STEPS_DETAILED } else { MAX_WORST_STEPS };
     for (view, camera) in cameras() {
         // The oracle draws with the decoder's camera, rounded as it is.
         let camera = to_core(&camera);
@@ -45,10 +49,10 @@ fn beyond_rounding(bundle: &Bundle<'_>, oracle: &ReferenceScene, name: &str) -> 
         println!("{name:>19} {view:<10} {:>5} splats: {difference}", report.splats);
         let empty = expected.iter().all(|&colour| colour == background);
         assert_eq!(empty, view == "away", "case {name}: only the camera that looks away sees nothing");
-        // One pixel's PSNR is as good as its luck in rounding.
-        let too_noisy = frame.deliveries.len() > 100 && difference.psnr_db() < MIN_PSNR_DB;
-        if too_noisy || difference.worst_steps > MAX_WORST_STEPS || difference.share_not_rounded > MAX_SHARE_NOT_ROUNDED
-        {
+        // One pixel is as good as its luck in rounding.
+        let many = frame.deliveries.len() > 100;
+        let noisy = difference.psnr_db() < MIN_PSNR_DB || difference.share_not_rounded > MAX_SHARE_NOT_ROUNDED;
+        if many && noisy || difference.worst_steps > max_worst_steps {
             failures.push(format!("{name} {view}: {difference}"));
         }
     }

@@ -90,7 +90,7 @@ impl Bundle<'_> {
     /// Work is predicted in multiply-adds. One strip goes over the scene once, several together about twice; going over it
     /// costs the heads' (from the manifest, else of all anchors), and decoding when anchors are streamed. Of equals the
     /// fewest strips are taken. The frame's size decides about memory only through the splats of a strip, because tiles
-    /// leave one by one; a splat takes 52 bytes.
+    /// leave one by one; a splat takes 40 bytes.
     ///
     /// # Errors
     /// [`DecodeError::BudgetTooSmall`] names the bytes that the smallest plan within the other limits needs;

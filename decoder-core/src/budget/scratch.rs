@@ -4,7 +4,7 @@ use super::arena::{Arena, words_for};
 use crate::bundle::{Bundle, Coder, MAX_FEATURE_DIM, MAX_LATTICE_BITS, MAX_OFFSETS, RecordLayout, Tier, model_words};
 use crate::context::{FEATURES_PER_LEVEL, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS};
 use crate::mlp::HeadShape;
-use crate::project::Splat;
+use crate::project::PackedSplat;
 use crate::raster::{N_RADIX, TILE_PIXELS, TileRect};
 use crate::scene::HeadOutputs;
 
@@ -46,6 +46,8 @@ pub struct ScratchShape {
     pub context_inputs: u16,
     /// Hidden units of the context; 0 for bundles with tables.
     pub context_hidden: u16,
+    /// Bits of the symbols of features, log-scales and offsets in memory, each at most 16.
+    pub symbol_bits: [u8; 3],
     /// Bits of a lattice coordinate.
     pub lattice_bits: u8,
     /// Whether anchors say which of their offsets are drawn.
@@ -71,6 +73,7 @@ impl ScratchShape {
             n_tables: feature_dim.saturating_add(6).saturating_add(n_offsets.saturating_mul(3)),
             context_inputs: (MAX_CONTEXT_LEVELS as u16).saturating_mul(FEATURES_PER_LEVEL as u16),
             context_hidden: MAX_CONTEXT_HIDDEN,
+            symbol_bits: [16; 3],
             lattice_bits: MAX_LATTICE_BITS,
             masks: true,
             max_splats: 0,
@@ -99,6 +102,7 @@ impl ScratchShape {
             n_tables,
             context_inputs,
             context_hidden,
+            symbol_bits: header.symbol_bits,
             lattice_bits: bundle.lattice().bits,
             masks: bundle.masks().is_some(),
             max_splats,
@@ -148,7 +152,14 @@ impl ScratchShape {
 
     const fn record_layout(&self) -> RecordLayout {
         let masked_offsets = if self.masks { self.n_offsets } else { 0 };
-        RecordLayout::new(self.n_channels(), self.lattice_bits, masked_offsets, self.context_hidden > 0)
+        RecordLayout::new(
+            self.feature_dim,
+            self.n_offsets,
+            self.symbol_bits,
+            self.lattice_bits,
+            masked_offsets,
+            self.context_hidden > 0,
+        )
     }
 
     const fn head_words(&self) -> usize {
@@ -185,7 +196,7 @@ impl ScratchShape {
             (Some(pixels), Some(rgb)) => N_RADIX.saturating_add(pixels).saturating_add(rgb),
             _ => usize::MAX,
         };
-        let per_splat = match (words_for::<Splat>(1), words_for::<TileRect>(1)) {
+        let per_splat = match (words_for::<PackedSplat>(1), words_for::<TileRect>(1)) {
             // Its place in the order, and in the order before.
             (Some(splat), Some(rect)) => splat.saturating_add(rect).saturating_add(2),
             _ => usize::MAX,
@@ -224,6 +235,7 @@ mod tests {
                     n_tables: (1 - context) * up_to(360),
                     context_inputs: context * 4 * (1 + up_to(32)),
                     context_hidden: context * (1 + up_to(256)),
+                    symbol_bits: [1 + up_to(16) as u8, 1 + up_to(16) as u8, 1 + up_to(16) as u8],
                     lattice_bits: up_to(22) as u8,
                     masks: up_to(2) == 1,
                     max_splats: random(100_000),
@@ -241,6 +253,7 @@ mod tests {
                 n_tables: a.n_tables.max(b.n_tables),
                 context_inputs: a.context_inputs.max(b.context_inputs),
                 context_hidden: a.context_hidden.max(b.context_hidden),
+                symbol_bits: std::array::from_fn(|group| a.symbol_bits[group].max(b.symbol_bits[group])),
                 lattice_bits: a.lattice_bits.max(b.lattice_bits),
                 masks: a.masks | b.masks,
                 max_splats: a.max_splats.max(b.max_splats),
@@ -255,9 +268,10 @@ mod tests {
     #[test]
     fn a_resident_anchor_takes_what_its_symbols_take_and_little_more() {
         let shape = ScratchShape { lattice_bits: 10, context_hidden: 32, masks: true, ..ScratchShape::most(16, 4) };
-        assert_eq!(shape.resident_anchor_len(), 2 * (16 + 6 + 12) + 4 + 2 + 2, "34 symbols, cell, mask, steps");
-        let shape = ScratchShape { n_tables: 9, context_hidden: 0, masks: false, ..shape };
-        assert_eq!(shape.resident_anchor_len(), 2 * 34 + 4, "34 symbols, cell");
+        // 34 symbols of 16 bits, cell, mask, steps.
+        assert_eq!(shape.resident_anchor_len(), 2 * (34 * 16 + 30 + 4 + 16_usize).div_ceil(16), "of any symbols");
+        let shape = ScratchShape { n_tables: 9, context_hidden: 0, masks: false, symbol_bits: [6, 8, 7], ..shape };
+        assert_eq!(shape.resident_anchor_len(), 2 * (16 * 6 + 6 * 8 + 12 * 7 + 30_usize).div_ceil(16), "of small ones");
     }
 
     #[test]

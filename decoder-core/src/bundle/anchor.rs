@@ -1,5 +1,6 @@
 //! The anchors of a chunk, one after the other: where each stands, which offsets it draws, and its channels.
 
+mod bits;
 mod channels;
 mod record;
 

@@ -5,6 +5,7 @@ use super::cursor::Cursor;
 use super::features::Features;
 use super::section::SECTION_LEN;
 use crate::camera::Camera;
+use crate::context::N_GROUPS;
 use crate::error::{DecodeError, Field, SectionKind};
 
 /// The first bytes of every bundle. As in PNG: not ASCII, then a name, then line ends that text transfers would change.
@@ -12,7 +13,7 @@ pub const MAGIC: [u8; 8] = *b"\x89PSB\r\n\x1a\n";
 /// The format version this crate reads.
 pub const VERSION: u16 = 1;
 /// Length of the header's fields before the section table, bytes.
-pub const HEADER_FIXED_LEN: usize = 156;
+pub const HEADER_FIXED_LEN: usize = 160;
 /// Widest feature and hidden layer; bounds the work of an anchor.
 pub const MAX_FEATURE_DIM: u16 = 256;
 /// Most offsets, that is splats, of an anchor.
@@ -32,7 +33,7 @@ const MIN_SECTIONS: u8 = 6;
 /// Length of a header with `n_sections` sections, its section table and checksum included, bytes.
 #[must_use]
 pub const fn header_len(n_sections: u8) -> usize {
-    // At most 160 + 16·255.
+    // At most 164 + 16·255.
     (n_sections as usize).wrapping_mul(SECTION_LEN).wrapping_add(HEADER_FIXED_LEN).wrapping_add(4)
 }
 
@@ -68,6 +69,8 @@ pub struct Header {
     pub colour_hidden: u16,
     /// Hidden width of the detail head, 1..=[`MAX_FEATURE_DIM`]; 0 where the scene has none.
     pub detail_hidden: u16,
+    /// Bits that hold, as a signed number, every symbol of a feature, of a log-scale, of a coordinate of an offset, 1..=16.
+    pub symbol_bits: [u8; N_GROUPS],
     /// Centre of the normalisation `p_norm = (p_world − centre)·scale`, capture units.
     pub normalisation_centre: [f64; 3],
     /// Scale of the normalisation, normalised units per capture unit.
@@ -141,6 +144,8 @@ impl Header {
             width_px: cursor.u16()?,
             height_px: cursor.u16()?,
         };
+        let [feature_bits, log_scale_bits, offset_bits, reserved] = cursor.array()?;
+        let symbol_bits = [feature_bits, log_scale_bits, offset_bits];
         in_range(Field::FeatureDim, feature_dim.into(), 1, MAX_FEATURE_DIM.into())?;
         in_range(Field::NOffsets, n_offsets.into(), 1, MAX_OFFSETS.into())?;
         in_range(Field::NAnchors, n_anchors, 0, MAX_ANCHORS)?;
@@ -152,6 +157,10 @@ impl Header {
         in_range(Field::ColourHidden, colour_hidden.into(), 1, MAX_FEATURE_DIM.into())?;
         let [least, most] = if features.effects.detail { [1, MAX_FEATURE_DIM.into()] } else { [0, 0] };
         in_range(Field::DetailHidden, detail_hidden.into(), least, most)?;
+        for bits in symbol_bits {
+            in_range(Field::SymbolBits, bits.into(), 1, 16)?;
+        }
+        in_range(Field::Reserved, reserved.into(), 0, 0)?;
         for size_px in training_px {
             in_range(Field::TrainingSize, size_px.into(), 1, u32::from(u16::MAX))?;
         }
@@ -180,6 +189,7 @@ impl Header {
             voxel_size,
             colour_hidden,
             detail_hidden,
+            symbol_bits,
             normalisation_centre,
             normalisation_scale,
             preview,

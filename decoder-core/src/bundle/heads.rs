@@ -4,11 +4,10 @@ mod weights;
 
 pub use weights::{CodedHeads, LayerWeights, WeightReader};
 
-use half::f16;
-
 use super::cursor::Cursor;
 use super::header::Header;
 use crate::error::{DecodeError, Field, SectionKind};
+use crate::math::{from_half, is_finite_half};
 
 /// Matrices of all heads at most: W1 and W2 of opacity, covariance, colour, detail.
 const N_MATRICES: usize = 8;
@@ -33,12 +32,12 @@ impl<'a> Halves<'a> {
     /// Number `index`.
     #[must_use]
     pub fn get(&self, index: usize) -> Option<f32> {
-        self.0.get(index).map(|&bytes| f16::from_le_bytes(bytes).to_f32())
+        self.0.get(index).map(|&bytes| from_half(u16::from_le_bytes(bytes)))
     }
 
     /// All numbers in file order.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = f32> + use<'a> {
-        self.0.iter().map(|&bytes| f16::from_le_bytes(bytes).to_f32())
+        self.0.iter().map(|&bytes| from_half(u16::from_le_bytes(bytes)))
     }
 
     /// Takes `n` numbers; an infinite one would make frames of NaN without any notice.
@@ -46,7 +45,7 @@ impl<'a> Halves<'a> {
         let first = cursor.position() >> 1;
         let halves = cursor.pairs(n)?;
         for (index, pair) in (first..).zip(halves) {
-            if !f16::from_le_bytes(*pair).is_finite() {
+            if !is_finite_half(u16::from_le_bytes(*pair)) {
                 return Err(DecodeError::BadFloat { field: Field::HeadWeight, index: super::saturate(index) });
             }
         }

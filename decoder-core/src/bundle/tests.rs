@@ -8,9 +8,8 @@ use std::vec::Vec;
 use builder::{Anchor, C, F, ORIGIN, STEP, Variant, bundle, cell, tiers, weight};
 
 use crate::budget::Arena;
-use crate::bundle::{AnchorRecords, RecordMemory, Tables};
-use crate::bundle::{AnchorSite, Bundle, Coder};
-use crate::error::{DecodeError, SectionKind};
+use crate::bundle::{AnchorRecords, AnchorSite, Bundle, Coder, RecordMemory, Tables, crc32};
+use crate::error::{DecodeError, Field, SectionKind};
 use crate::{Budget, Decoder, FrameReport, MaxSplats, Residency, ScratchShape, Strips, TileSink};
 
 fn variants() -> impl Iterator<Item = Variant> {
@@ -216,7 +215,8 @@ fn anchors_in_memory_have_the_values_of_the_file() {
             damaged: arena.take(1).expect("enough"),
             scales: arena.take(bundle.tables().map_or(0, Tables::len)).expect("enough"),
         };
-        let records = AnchorRecords::decode(&bundle, bundle.n_chunks(), memory, &mut models, false).expect("sound");
+        let records = AnchorRecords::decode(&bundle, bundle.n_chunks(), memory, &mut [0; C], &mut models, false);
+        let records = records.expect("sound");
         let mut index = 0;
         for chunk in bundle.chunks() {
             let mut anchors = chunk.anchors(&mut models);
@@ -229,6 +229,35 @@ fn anchors_in_memory_have_the_values_of_the_file() {
             }
         }
         assert_eq!(index as usize, n_anchors, "{variant:?}: all of them");
+    }
+}
+
+#[test]
+fn symbols_beyond_the_bits_of_the_header_are_refused_in_memory() {
+    for variant in variants() {
+        let whole = bundle(variant);
+        let header_len = usize::from(Bundle::parse(&whole).expect("sound").header().header_len);
+        let with_bits = |bits: u8| {
+            let mut bytes = whole.clone();
+            bytes[156..159].fill(bits);
+            let crc = crc32(&bytes[..header_len - 4]);
+            bytes[header_len - 4..header_len].copy_from_slice(&crc.to_le_bytes());
+            bytes
+        };
+        let most = (tiers(variant).iter().flatten().flatten())
+            .flat_map(|anchor| anchor.symbols)
+            .map(|symbol| (0..16).find(|&bits| i32::from(symbol) >= -1 << bits && i32::from(symbol) < 1 << bits))
+            .max();
+        let most = 1 + most.flatten().expect("symbols have 16 bits") as u8;
+        let resident = |bytes: &[u8]| {
+            draw_within(bytes, &BUDGET.with_residency(Residency::Resident), false).map(|(pixels, ..)| pixels)
+        };
+        assert!(resident(&with_bits(most)) == resident(&whole), "{variant:?}: bits enough change nothing");
+        let error = resident(&with_bits(most - 1)).err();
+        assert!(matches!(error, Some(DecodeError::ChunkStream { .. })), "{variant:?}: {error:?}");
+        let error = Bundle::parse(&with_bits(17)).err();
+        let expected = DecodeError::OutOfRange { field: Field::SymbolBits, found: 17, limit: 16 };
+        assert_eq!(error, Some(expected), "{variant:?}");
     }
 }
 

@@ -148,7 +148,7 @@ impl<'b> Decoder<'b, '_> {
                 let lies_here = touched.contains(&index);
                 let drawn = if *tallies && index == 0 { tally.admit(place, touched) } else { tally.admits(place) };
                 if drawn && lies_here {
-                    splats.push(splat, rect);
+                    splats.push(&splat, rect);
                     report.splats += u32::from(first == index);
                 }
             });

@@ -48,6 +48,8 @@ pub enum Field {
     Reserved,
     ColourHidden,
     DetailHidden,
+    /// Bits of the symbols of a group of channels.
+    SymbolBits,
     TrainingSize,
     VoxelSize,
     Normalisation,
@@ -141,6 +143,7 @@ impl fmt::Display for Field {
             Self::Reserved => "a reserved byte",
             Self::ColourHidden => "hidden width of the colour head",
             Self::DetailHidden => "hidden width of the detail head",
+            Self::SymbolBits => "bits of a symbol",
             Self::TrainingSize => "training image size",
             Self::VoxelSize => "voxel size",
             Self::Normalisation => "normalisation",

@@ -6,6 +6,8 @@
 
 mod activation;
 mod exp;
+mod half;
 
 pub use activation::{sigmoid, tanh};
 pub use exp::{EXP_MAX, EXP_MIN, exp};
+pub use half::{from_half, is_finite_half, to_half};

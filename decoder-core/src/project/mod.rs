@@ -5,9 +5,11 @@
 mod band;
 mod covariance;
 mod cull;
+mod packed;
 mod splat;
 mod view;
 
 pub(crate) use band::Band;
+pub(crate) use packed::PackedSplat;
 pub(crate) use splat::{LN_255, Splat};
 pub(crate) use view::View;

@@ -1,7 +1,5 @@
 //! A splat: what remains of a Gaussian once projected, in the form in which rows of pixels are drawn.
 
-use bytemuck::{Pod, Zeroable};
-
 use super::covariance::Covariance;
 use super::view::{NEAR, View};
 use crate::raster::TileRect;
@@ -10,12 +8,11 @@ use crate::scene::Gaussian;
 /// ln 255: opacity·255 = exp(log_opacity + LN_255).
 pub(crate) const LN_255: f32 = 5.541_263_5;
 
-/// A projected Gaussian, 40 bytes.
+/// A projected Gaussian.
 ///
 /// Completing the square, dᵀΣ'⁻¹d = (dx − shear·dy)²·det⁻¹Σ'yy + dy²/Σ'yy: along a row of pixels the exponent is one
 /// parabola around `u + shear·dy`. No term cancels another, which the usual conic does for long thin splats.
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-#[repr(C)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Splat {
     /// Centre, pixels.
     pub(crate) mean: [f32; 2],

@@ -2,7 +2,7 @@
 
 use super::tile::{TILE_PX, TileRect};
 use crate::math::exp;
-use crate::project::{LN_255, Splat};
+use crate::project::{LN_255, PackedSplat, Splat};
 
 /// No splat is opaque; it keeps the light behind it computable.
 const ALPHA_MAX: f32 = 0.99;
@@ -46,7 +46,7 @@ pub(crate) struct TileWork {
 /// Per splat and row of pixels two exponentials, per pixel two multiplications and the blend.
 pub(crate) fn blend_tile(
     place: TilePlace,
-    splats: &[Splat],
+    splats: &[PackedSplat],
     rects: &[TileRect],
     list: &[u32],
     background: [f32; 3],
@@ -62,7 +62,7 @@ pub(crate) fn blend_tile(
             continue;
         }
         work.splats += 1;
-        work.pixels = work.pixels.saturating_add(blend_splat(place, splat, canvas.pixels, &mut alive));
+        work.pixels = work.pixels.saturating_add(blend_splat(place, &splat.unpack(), canvas.pixels, &mut alive));
         if alive == 0 {
             break;
         }

@@ -1,6 +1,6 @@
 //! Order by depth: a radix sort of indices, stable, without recursion.
 
-use crate::project::Splat;
+use crate::project::PackedSplat;
 
 /// Values of one digit.
 pub(crate) const N_RADIX: usize = 256;
@@ -16,7 +16,7 @@ pub(crate) const N_RADIX: usize = 256;
 /// # Budget
 /// At most eight passes over the splats.
 pub(crate) fn sort_by_depth<'o>(
-    splats: &[Splat],
+    splats: &[PackedSplat],
     mut order: &'o mut [u32],
     mut spare: &'o mut [u32],
     counts: &mut [u32],
@@ -61,15 +61,17 @@ mod tests {
     use bytemuck::Zeroable;
 
     use super::{N_RADIX, sort_by_depth};
-    use crate::project::Splat;
+    use crate::project::PackedSplat;
 
     #[test]
     fn nearest_first_and_ties_in_order() {
         let mut state = 1_u32;
-        let splats: Vec<Splat> = (0..1000)
+        let splats: Vec<PackedSplat> = (0..1000)
             .map(|_| {
                 state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                Splat { depth: 0.2 + (state >> 22) as f32 * 0.03, ..Splat::zeroed() }
+                let mut splat = PackedSplat::zeroed();
+                splat.depth = 0.2 + (state >> 22) as f32 * 0.03;
+                splat
             })
             .collect();
         let (mut a, mut b) = ([0; 1000], [0; 1000]);

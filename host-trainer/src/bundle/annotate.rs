@@ -77,6 +77,8 @@ impl<'f> Annotator<'f> {
         dump.array("preview focal", 2, f32::from_le_bytes);
         dump.array("preview principal", 2, f32::from_le_bytes);
         dump.array("preview size", 2, u16::from_le_bytes);
+        dump.array::<1, _>("symbol bits", 3, |[byte]| byte);
+        dump.field::<1, _>("reserved", |[byte]| byte);
         for section in self.bundle.sections() {
             let name = name(section.kind);
             dump.field::<4, _>(&format!("section {name}, kind"), |[kind, ..]| kind);

@@ -4,6 +4,7 @@ use pocketsplat_core::bundle::{
     Effects, Features, HEADER_FIXED_LEN, MAGIC, MAX_ANCHORS, MAX_CHUNK_ANCHORS, MAX_FEATURE_DIM, MAX_OFFSETS,
     SECTION_LEN, VERSION, crc32, header_len,
 };
+use pocketsplat_core::context::N_GROUPS;
 
 use super::{BundleInfo, WriteError};
 use crate::render::decoder::core_camera;
@@ -34,6 +35,8 @@ pub(super) struct Counts {
     pub(super) n_chunks: usize,
     pub(super) max_chunk_anchors: u16,
     pub(super) n_tiers: usize,
+    /// Bits of the symbols of features, log-scales and offsets.
+    pub(super) symbol_bits: [u8; N_GROUPS],
 }
 
 /// What the scene's heads and opacities take into account.
@@ -118,6 +121,8 @@ fn push_fields(
     let floats = pose.chain(&preview.focal_px).chain(&preview.principal_px);
     bytes.extend(floats.flat_map(|x| x.to_le_bytes()));
     bytes.extend([preview.width_px, preview.height_px].iter().flat_map(|x| x.to_le_bytes()));
+    bytes.extend(counts.symbol_bits);
+    bytes.push(0);
     Ok(())
 }
 

@@ -1,12 +1,12 @@
 //! From trained floats to integer symbols.
 
-use pocketsplat_core::context::Context;
+use pocketsplat_core::context::{Context, N_GROUPS};
 use rayon::prelude::*;
 
 use super::WriteError;
 use super::channels::{ChannelName, ContextWork, GROUPS};
 use super::order::Placement;
-use crate::scene::Scene;
+use crate::scene::{ModelShape, Scene};
 
 /// Distance between neighbouring values of each kind of channel; the value of a symbol is `symbol · step`.
 ///
@@ -53,6 +53,20 @@ impl Rows {
     /// The symbols of anchor `anchor`.
     pub(super) fn symbols_of(&self, anchor: usize) -> &[i16] {
         &self.symbols[anchor * self.n_channels..][..self.n_channels]
+    }
+
+    /// Bits that hold every symbol of a feature, of a log-scale, of a coordinate of an offset as a signed number.
+    pub(super) fn symbol_bits(&self, shape: &ModelShape) -> [u8; N_GROUPS] {
+        let group_of: Vec<usize> = (0..self.n_channels).map(|c| ChannelName::of(shape, c).group()).collect();
+        let mut bits = [1; N_GROUPS];
+        for row in self.symbols.chunks_exact(self.n_channels) {
+            for (&symbol, &group) in row.iter().zip(&group_of) {
+                // A sign, and what is not all sign.
+                let magnitude = if symbol < 0 { !symbol } else { symbol };
+                bits[group] = bits[group].max(17 - magnitude.leading_zeros() as u8);
+            }
+        }
+        bits
     }
 }
 

@@ -188,6 +188,7 @@ impl Writer<'_> {
             n_chunks: placement.chunks.len(),
             max_chunk_anchors: self.options.chunk_anchors,
             n_tiers,
+            symbol_bits: rows.symbol_bits(&shape),
         };
         layout::assemble(self.scene, self.info, &counts, &sections)
     }

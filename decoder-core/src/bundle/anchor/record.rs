@@ -1,25 +1,30 @@
-//! Decoded anchors in memory: symbols as they are coded, and what makes values of them.
+//! Decoded anchors in memory: symbols in as few bits as they all need, and what makes values of them.
 
 use super::AnchorSite;
+use super::bits::{BitReader, BitWriter, fits};
 use super::channels::Channel;
 use crate::bundle::lattice::Lattice;
-use crate::bundle::{AnchorModels, Bundle, Chunk, Coder};
+use crate::bundle::{AnchorModels, Bundle, Chunk, Coder, Header};
 use crate::context::{Group, N_GROUPS, Steps};
 use crate::error::{DecodeError, Field};
 
-/// What a record holds, in numbers of 16 bits: symbols, then the code of the cell, the mask, the exponents of the steps.
+/// Bits of the exponents of an anchor's steps.
+const STEP_BITS: u8 = 16;
+
+/// What a record holds, bit by bit: the code of the cell, the mask, the exponents of the steps, then the symbols.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct RecordLayout {
-    pub(crate) n_channels: usize,
-    n_code: usize,
-    n_mask: usize,
-    n_steps: usize,
+    code_bits: u8,
+    mask_bits: u8,
+    step_bits: u8,
+    /// Features, log-scales, coordinates of offsets: how many, and of how many bits.
+    groups: [(u16, u8); N_GROUPS],
 }
 
 /// The memory that anchors are kept in.
 pub(crate) struct RecordMemory<'s> {
     /// `[n_anchors, RecordLayout::len]`.
-    pub(crate) records: &'s mut [i16],
+    pub(crate) records: &'s mut [u16],
     /// One bit a chunk.
     pub(crate) damaged: &'s mut [u32],
     /// `[n_tables]` origin and step.
@@ -30,20 +35,12 @@ pub(crate) struct RecordMemory<'s> {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AnchorRecords<'b, 's> {
     layout: RecordLayout,
-    records: &'s [i16],
+    records: &'s [u16],
     damaged: &'s [u32],
     lattice: Lattice<'b>,
     /// The mask of an anchor that stores none.
     full_mask: u32,
-    scalars: Scalars,
     values: Values<'b, 's>,
-}
-
-/// How many channels come before the offsets'.
-#[derive(Clone, Copy, Debug)]
-struct Scalars {
-    n_features: usize,
-    n_all: usize,
 }
 
 /// How symbols become values.
@@ -54,37 +51,56 @@ enum Values<'b, 's> {
 }
 
 impl RecordLayout {
-    /// * `masked_offsets`: offsets that a mask has a bit for, 0 without masks. * `context`: the steps are the anchor's own.
-    pub(crate) const fn new(n_channels: usize, lattice_bits: u8, masked_offsets: u16, context: bool) -> Self {
+    /// * `symbol_bits`: of a feature, a log-scale, a coordinate of an offset. * `masked_offsets`: offsets that a mask has a bit
+    ///   for, 0 without masks. * `context`: the steps are the anchor's own.
+    pub(crate) const fn new(
+        feature_dim: u16,
+        n_offsets: u16,
+        symbol_bits: [u8; N_GROUPS],
+        lattice_bits: u8,
+        masked_offsets: u16,
+        context: bool,
+    ) -> Self {
+        let [feature, log_scale, offset] = symbol_bits;
         Self {
-            n_channels,
-            n_code: (lattice_bits as usize).wrapping_mul(3).div_ceil(16),
-            n_mask: masked_offsets.div_ceil(16) as usize,
-            n_steps: context as usize,
+            code_bits: lattice_bits.saturating_mul(3),
+            mask_bits: masked_offsets as u8,
+            step_bits: if context { STEP_BITS } else { 0 },
+            groups: [(feature_dim, feature), (6, log_scale), (n_offsets.saturating_mul(3), offset)],
         }
     }
 
-    /// Numbers of a record.
+    /// Words of 16 bits of a record.
     pub(crate) const fn len(&self) -> usize {
-        self.n_channels.saturating_add(self.n_code).saturating_add(self.n_mask).saturating_add(self.n_steps)
+        let [(n_features, feature), (n_log_scales, log_scale), (n_offsets, offset)] = self.groups;
+        // At most 256 · 16 + 6 · 16 + 96 · 16 + 63 + 32 + 16.
+        let bits = (n_features as usize)
+            .wrapping_mul(feature as usize)
+            .wrapping_add((n_log_scales as usize).wrapping_mul(log_scale as usize))
+            .wrapping_add((n_offsets as usize).wrapping_mul(offset as usize))
+            .wrapping_add(self.code_bits as usize)
+            .wrapping_add(self.mask_bits as usize)
+            .wrapping_add(self.step_bits as usize);
+        bits.div_ceil(16)
     }
 
-    /// Symbols, code, mask, exponents.
-    fn split<'r>(&self, record: &'r [i16]) -> Option<[&'r [i16]; 4]> {
-        let (symbols, rest) = record.split_at_checked(self.n_channels)?;
-        let (code, rest) = rest.split_at_checked(self.n_code)?;
-        let (mask, steps) = rest.split_at_checked(self.n_mask)?;
-        Some([symbols, code, mask, steps])
-    }
-
-    /// Writes all but the symbols.
-    fn write(&self, record: &mut [i16], code: u64, mask: u32, steps: u16) {
-        let Some((_, rest)) = record.split_at_mut_checked(self.n_channels) else { return };
-        let Some((code_slots, rest)) = rest.split_at_mut_checked(self.n_code) else { return };
-        let Some((mask_slots, steps_slots)) = rest.split_at_mut_checked(self.n_mask) else { return };
-        write_halves(code_slots, code);
-        write_halves(mask_slots, mask.into());
-        write_halves(steps_slots, steps.into());
+    /// Writes a record; says whether every symbol has a place in its bits.
+    fn write(&self, record: &mut [u16], symbols: &[i16], code: u64, mask: u32, steps: u16) -> bool {
+        let mut writer = BitWriter::new(record);
+        writer.push_wide(code, self.code_bits.into());
+        writer.push_wide(mask.into(), self.mask_bits.into());
+        writer.push(steps.into(), self.step_bits.into());
+        let (mut rest, mut sound) = (symbols, true);
+        for (n, bits) in self.groups {
+            let (group, after) = rest.split_at_checked(n.into()).unwrap_or_default();
+            for &symbol in group {
+                sound &= fits(symbol, bits.into());
+                writer.push(symbol.cast_unsigned().into(), bits.into());
+            }
+            rest = after;
+        }
+        writer.finish();
+        sound
     }
 }
 
@@ -93,31 +109,42 @@ impl Bundle<'_> {
     pub(crate) fn record_layout(&self) -> RecordLayout {
         let header = self.header();
         let masked_offsets = if self.masks().is_some() { header.n_offsets } else { 0 };
-        RecordLayout::new(header.n_channels(), self.lattice().bits, masked_offsets, self.context().is_some())
+        let Header { feature_dim, n_offsets, symbol_bits, .. } = *header;
+        RecordLayout::new(
+            feature_dim,
+            n_offsets,
+            symbol_bits,
+            self.lattice().bits,
+            masked_offsets,
+            self.context().is_some(),
+        )
     }
 }
 
 impl<'b, 's> AnchorRecords<'b, 's> {
     /// Decodes the first `n_chunks` chunks into `memory`.
     ///
-    /// * `skip_damage`: leaves damaged chunks out and remembers which.
+    /// * `row`: `[n_channels]` at least, for the symbols of the anchor in work. * `skip_damage`: leaves damaged chunks out and remembers which.
     ///
     /// # Errors
-    /// [`DecodeError::ChunkChecksum`] or [`DecodeError::ChunkStream`] for damage that is not left out.
+    /// [`DecodeError::ChunkChecksum`] or [`DecodeError::ChunkStream`] for damage that is not left out; a symbol beyond the
+    /// header's bits is such damage.
     pub(crate) fn decode(
         bundle: &Bundle<'b>,
         n_chunks: u32,
         memory: RecordMemory<'s>,
+        row: &mut [i16],
         models: &mut AnchorModels<'b, '_>,
         skip_damage: bool,
     ) -> Result<Self, DecodeError> {
         let RecordMemory { records, damaged, scales } = memory;
         let layout = bundle.record_layout();
         damaged.fill(0);
+        let row = row.get_mut(..bundle.header().n_channels()).unwrap_or_default();
         // `max(1)`: a chunk size of zero would panic; there are always at least 6 channels.
         let mut slots = records.chunks_exact_mut(layout.len().max(1));
         for chunk in bundle.chunks().take(n_chunks as usize) {
-            match decode_chunk(&chunk, &layout, &mut slots, models) {
+            match decode_chunk(&chunk, &layout, &mut slots, row, models) {
                 Err(DecodeError::ChunkChecksum { .. } | DecodeError::ChunkStream { .. }) if skip_damage => {
                     let (word, bit) = place(chunk.index());
                     if let Some(word) = damaged.get_mut(word) {
@@ -137,16 +164,13 @@ impl<'b, 's> AnchorRecords<'b, 's> {
                 Values::Static { table_of_channel: tables.of_channel_numbers(), scales }
             }
         };
-        let header = bundle.header();
-        let n_features = usize::from(header.feature_dim);
         Ok(Self {
             layout,
             records,
             damaged,
             lattice: *bundle.lattice(),
             // There are 1 to 32 offsets.
-            full_mask: u32::MAX.wrapping_shr(u32::BITS.wrapping_sub(header.n_offsets.into())),
-            scalars: Scalars { n_features, n_all: n_features.saturating_add(6) },
+            full_mask: u32::MAX.wrapping_shr(u32::BITS.wrapping_sub(bundle.header().n_offsets.into())),
             values,
         })
     }
@@ -160,51 +184,45 @@ impl<'b, 's> AnchorRecords<'b, 's> {
     /// Where anchor `index` of the file stands; fills `row` with its values, those of undrawn offsets with 0.
     ///
     /// # Budget
-    /// A conversion and a multiplication a channel, about 10 instructions on a Cortex-M4.
+    /// A few shifts, a conversion and a multiplication a channel.
     pub(crate) fn read(&self, index: u32, row: &mut [f32]) -> Option<AnchorSite> {
         let start = (index as usize).checked_mul(self.layout.len())?;
         let record = self.records.get(start..)?.get(..self.layout.len())?;
-        let [symbols, code, mask, steps] = self.layout.split(record)?;
-        let mask = if mask.is_empty() { self.full_mask } else { read_halves(mask) as u32 };
-        let (scalar_symbols, offset_symbols) = symbols.split_at_checked(self.scalars.n_all)?;
-        let (scalars, offsets) = row.split_at_mut_checked(self.scalars.n_all)?;
-        let (offsets, offset_symbols) = (offsets.as_chunks_mut::<3>().0, offset_symbols.as_chunks::<3>().0);
+        let RecordLayout { code_bits, mask_bits, step_bits, groups } = self.layout;
+        let mut reader = BitReader::new(record);
+        let code = reader.wide(code_bits.into());
+        let mask = if mask_bits == 0 { self.full_mask } else { reader.wide(mask_bits.into()) as u32 };
+        let step_bits = reader.unsigned(step_bits.into());
+        let mut slots = row.iter_mut();
         match self.values {
             Values::Static { table_of_channel, scales } => {
-                let (scalar_tables, offset_tables) = table_of_channel.split_at_checked(self.scalars.n_all)?;
-                let value = |symbol: i16, table: [u8; 2]| {
-                    let [origin, step] =
-                        scales.get(usize::from(u16::from_le_bytes(table))).copied().unwrap_or_default();
-                    f32::from_symbol(symbol.into(), origin, step)
-                };
-                for ((slot, &symbol), &table) in scalars.iter_mut().zip(scalar_symbols).zip(scalar_tables) {
-                    *slot = value(symbol, table);
+                let mut tables = table_of_channel.iter();
+                for (n, bits) in groups {
+                    for (slot, &table) in slots.by_ref().zip(&mut tables).take(n.into()) {
+                        let [origin, step] =
+                            scales.get(usize::from(u16::from_le_bytes(table))).copied().unwrap_or_default();
+                        *slot = f32::from_symbol(reader.signed(bits.into()), origin, step);
+                    }
                 }
-                let offset_tables = offset_tables.as_chunks::<3>().0;
-                let mut left = mask;
-                for ((slots, symbols), tables) in offsets.iter_mut().zip(offset_symbols).zip(offset_tables) {
-                    let ([x, y, z], [table_x, table_y, table_z]) = (*symbols, *tables);
-                    let drawn = left & 1 == 1;
-                    *slots = if drawn { [value(x, table_x), value(y, table_y), value(z, table_z)] } else { [0.0; 3] };
-                    left >>= 1;
+                let [(n_features, _), (n_log_scales, _), _] = groups;
+                let offsets = row.get_mut(usize::from(n_features).saturating_add(n_log_scales.into())..);
+                for (k, offset) in (0..).zip(offsets.unwrap_or_default().as_chunks_mut::<3>().0) {
+                    if mask.wrapping_shr(k) & 1 == 0 {
+                        *offset = [0.0; 3];
+                    }
                 }
             }
             Values::Context { base_steps } => {
-                let steps = Steps::from_bits(base_steps, read_halves(steps) as u16);
-                let step_of = |group| steps.value(group);
-                let (feature, log_scale, offset) =
-                    (step_of(Group::Feature), step_of(Group::LogScale), step_of(Group::Offset));
-                for (channel, (slot, &symbol)) in scalars.iter_mut().zip(scalar_symbols).enumerate() {
-                    let step = if channel < self.scalars.n_features { feature } else { log_scale };
-                    *slot = f32::from_scaled(symbol.into(), step);
-                }
-                // Symbols of undrawn offsets are 0.
-                for (slot, &symbol) in offsets.as_flattened_mut().iter_mut().zip(offset_symbols.as_flattened()) {
-                    *slot = f32::from_scaled(symbol.into(), offset);
+                let steps = Steps::from_bits(base_steps, step_bits as u16);
+                for ((n, bits), group) in groups.into_iter().zip([Group::Feature, Group::LogScale, Group::Offset]) {
+                    let step = steps.value(group);
+                    for slot in slots.by_ref().take(n.into()) {
+                        *slot = f32::from_scaled(reader.signed(bits.into()), step);
+                    }
                 }
             }
         }
-        Some(AnchorSite { lattice: self.lattice.cell(read_halves(code)), mask })
+        Some(AnchorSite { lattice: self.lattice.cell(code), mask })
     }
 }
 
@@ -212,10 +230,11 @@ impl<'b, 's> AnchorRecords<'b, 's> {
 fn decode_chunk<'b, 'r>(
     chunk: &Chunk<'b>,
     layout: &RecordLayout,
-    records: &mut impl Iterator<Item = &'r mut [i16]>,
+    records: &mut impl Iterator<Item = &'r mut [u16]>,
+    row: &mut [i16],
     models: &mut AnchorModels<'b, '_>,
 ) -> Result<(), DecodeError> {
-    let sound = chunk.check();
+    let mut sound = chunk.check();
     let mut anchors = chunk.anchors(models);
     for n_done in 0..chunk.n_anchors() {
         let record = records.next().ok_or(DecodeError::BufferTooShort {
@@ -224,8 +243,10 @@ fn decode_chunk<'b, 'r>(
             available: n_done.into(),
         })?;
         let site = anchors.site();
-        anchors.symbols(record.get_mut(..layout.n_channels).unwrap_or_default());
-        layout.write(record, anchors.code(), site.mask, anchors.step_bits());
+        anchors.symbols(row);
+        if !layout.write(record, row, anchors.code(), site.mask, anchors.step_bits()) && sound.is_ok() {
+            sound = Err(DecodeError::ChunkStream { chunk: chunk.index(), left_bytes: 0 });
+        }
     }
     sound.and(anchors.finish())
 }
@@ -233,17 +254,4 @@ fn decode_chunk<'b, 'r>(
 /// Word and bit of a chunk.
 const fn place(chunk: u32) -> (usize, u32) {
     ((chunk / u32::BITS) as usize, 1_u32.wrapping_shl(chunk))
-}
-
-/// Spreads a number over as many pieces of 16 bits as there are slots, the lowest first.
-fn write_halves(slots: &mut [i16], mut number: u64) {
-    for slot in slots {
-        *slot = number as i16;
-        number >>= 16;
-    }
-}
-
-/// The number that [`write_halves`] spread.
-fn read_halves(slots: &[i16]) -> u64 {
-    slots.iter().rev().fold(0, |number, &half| (number << 16) | u64::from(half.cast_unsigned()))
 }

@@ -3,6 +3,7 @@
 use super::{Cursor, DecodeError, Field, Halves, Matrices, N_MATRICES, SectionKind};
 use crate::bundle::tables::Table;
 use crate::entropy::AnsReader;
+use crate::math::from_half;
 
 /// Limits of the step of a coded weight: a power of two, and |weight| ≤ 32768·step within the range of an f16.
 const STEPS: core::ops::RangeInclusive<f32> = 1.0 / 16_777_216.0..=1.0;
@@ -108,7 +109,7 @@ impl Iterator for LayerWeights<'_, '_> {
             LayerSource::Raw(Halves(halves)) => {
                 let (&first, rest) = halves.split_first()?;
                 *halves = rest;
-                Some(half::f16::from_le_bytes(first).to_f32())
+                Some(from_half(u16::from_le_bytes(first)))
             }
             LayerSource::Coded(table, symbols) => Some(table.value(table.symbol(symbols))),
         }

@@ -297,7 +297,7 @@ pub(super) fn bundle(variant: Variant) -> Vec<u8> {
     }
     sections.extend([(6, manifest), (7, directory), (8, chunks)]);
     let n_sections = sections.len();
-    let header_len = 160 + 16 * n_sections;
+    let header_len = 164 + 16 * n_sections;
     let file_len = header_len + sections.iter().map(|(_, bytes)| bytes.len()).sum::<usize>();
     let features = 1
         | u32::from(variant.masks) << 3
@@ -320,6 +320,7 @@ pub(super) fn bundle(variant: Variant) -> Vec<u8> {
         [0.0_f64, 0.0, 0.0, 1.0].iter().flat_map(|x| x.to_le_bytes()).collect(),
         f32s(&camera),
         u16s(&[32, 24]),
+        vec![16, 16, 16, 0],
     ]
     .concat();
     let mut offset = header_len;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 use clap::ValueEnum;
-use pocketsplat::dataset::{self, Background, Capture, LoadOptions, Severity, View};
+use pocketsplat::dataset::{self, Background, Capture, FrameSize, LoadOptions, Severity, View};
 use serde::{Deserialize, Serialize};
 
 /// Where photographs come from and how they are prepared.
@@ -24,6 +24,11 @@ pub(crate) struct CaptureOptions {
     /// [default: as they are for train, the bundle's training resolution elsewhere]
     #[arg(long, value_name = "PX")]
     pub(crate) max_resolution: Option<u32>,
+    /// Reduce images until they just cover such a frame and keep their middle: what a display shows. To be repeated for eval
+    /// and render where it cuts something off.
+    #[arg(long, value_name = "WxH", conflicts_with = "max_resolution")]
+    #[serde(default, with = "frame_size", skip_serializing_if = "Option::is_none")]
+    pub(crate) resolution: Option<FrameSize>,
     /// What transparent images are composited on. [default: black for train, the bundle's elsewhere]
     #[arg(long)]
     #[serde(default, with = "background_name", skip_serializing_if = "Option::is_none")]
@@ -42,12 +47,30 @@ pub(crate) struct CaptureOptions {
 impl CaptureOptions {
     /// What is chosen here, and what `other` chooses where nothing is.
     pub(crate) fn or(&self, other: &Self) -> Self {
+        // One way to say the size replaces the other.
+        let size_said = self.max_resolution.is_some() || self.resolution.is_some();
+        let size = if size_said { self } else { other };
         Self {
-            max_resolution: self.max_resolution.or(other.max_resolution),
+            max_resolution: size.max_resolution,
+            resolution: size.resolution,
             background: self.background.or(other.background),
             images: self.images.clone().or_else(|| other.images.clone()),
             test_every: self.test_every.or(other.test_every),
         }
+    }
+}
+
+/// Sizes of frames as text.
+mod frame_size {
+    use pocketsplat::dataset::FrameSize;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+
+    pub(super) fn serialize<S: Serializer>(size: &Option<FrameSize>, to: S) -> Result<S::Ok, S::Error> {
+        size.map(|size| size.to_string()).serialize(to)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Option<FrameSize>, D::Error> {
+        String::deserialize(from)?.parse().map(Some).map_err(de::Error::custom)
     }
 }
 
@@ -70,6 +93,7 @@ impl CaptureArgs {
         let default = LoadOptions::default();
         LoadOptions {
             max_resolution: self.options.max_resolution,
+            frame: self.options.resolution,
             background: self.options.background.unwrap_or(Background::Black),
             seed,
             images: self.options.images.clone(),

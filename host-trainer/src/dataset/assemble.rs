@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::framing::Framing;
 use super::listing::{Listing, commonest};
 use super::normalise::random_points_world;
 use super::{
@@ -100,7 +101,7 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
         n_train: train.len(),
         n_test: test.len(),
         source_size_px,
-        size_px: options.loaded_size_px(source_size_px.0, source_size_px.1),
+        size_px: Framing::of(source_size_px, options).map_or(source_size_px, |framing| framing.size_px),
         n_sizes,
         n_points: points.len(),
         points_origin,

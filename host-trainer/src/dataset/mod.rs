@@ -17,6 +17,7 @@ mod blender;
 mod colmap;
 mod diagnose;
 mod error;
+mod framing;
 mod frusta;
 mod image;
 mod image_folder;
@@ -38,6 +39,7 @@ mod view_fault;
 
 pub use diagnose::{Diagnosis, Finding, Severity, diagnose, diagnose_cheaply};
 pub use error::DatasetError;
+pub use framing::{FrameSize, NoFrameSize};
 pub use layout::Layout;
 pub use mask::Mask;
 pub use options::{Background, LoadOptions, UnknownBackground};

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::DatasetError;
+use super::{DatasetError, FrameSize};
 
 /// What stands behind everything: the colour that transparent pixels are composited on.
 ///
@@ -64,6 +64,9 @@ impl FromStr for Background {
 pub struct LoadOptions {
     /// Images whose larger side exceeds this many pixels are reduced to it, intrinsics with them; none are enlarged.
     pub max_resolution: Option<u32>,
+    /// Images are reduced until they just cover such a frame, and their middle is kept, intrinsics with them; instead of
+    /// [`max_resolution`](Self::max_resolution), which then says nothing. Smaller images are left out.
+    pub frame: Option<FrameSize>,
     /// What transparent pixels are composited on.
     pub background: Background,
     /// Decides the random initial points of captures that bring none.
@@ -85,6 +88,7 @@ impl Default for LoadOptions {
         // 10 000 points is what the anchor-based family starts Synthetic-NeRF scenes from.
         Self {
             max_resolution: None,
+            frame: None,
             background: Background::Black,
             seed: 42,
             n_random_points: 10_000,
@@ -104,37 +108,11 @@ impl LoadOptions {
             _ => Ok(()),
         }
     }
-
-    /// The size an image of `width_px × height_px` is loaded at, never larger and never without a pixel.
-    pub(super) fn loaded_size_px(&self, width_px: u32, height_px: u32) -> (u32, u32) {
-        let largest_px = width_px.max(height_px);
-        match self.max_resolution {
-            Some(limit_px) if limit_px < largest_px => {
-                let reduced = |side_px: u32| {
-                    let scaled = (u64::from(side_px) * u64::from(limit_px) * 2 + u64::from(largest_px))
-                        / (2 * u64::from(largest_px));
-                    u32::try_from(scaled).map_or(limit_px, |px| px.max(1))
-                };
-                (reduced(width_px), reduced(height_px))
-            }
-            _ => (width_px, height_px),
-        }
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_larger_side_becomes_the_limit_and_none_is_enlarged() {
-        let options = LoadOptions { max_resolution: Some(400), ..LoadOptions::default() };
-        assert_eq!(options.loaded_size_px(800, 800), (400, 400));
-        assert_eq!(options.loaded_size_px(540, 960), (225, 400));
-        assert_eq!(options.loaded_size_px(400, 20), (400, 20));
-        assert_eq!(options.loaded_size_px(10_000, 3), (400, 1));
-        assert_eq!(LoadOptions::default().loaded_size_px(801, 7), (801, 7));
-    }
 
     #[test]
     fn background_names_read_back() {

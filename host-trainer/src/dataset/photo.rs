@@ -1,5 +1,6 @@
-//! One photograph on its way into memory: decoded, composited, undistorted, reduced.
+//! One photograph on its way into memory: decoded, composited, undistorted, reduced, cut.
 
+use super::framing::Framing;
 use super::image::{read_composited, read_mask};
 use super::listing::Shot;
 use super::undistort::undistorted;
@@ -8,11 +9,11 @@ use super::{LoadOptions, Mask, View, ViewFault};
 impl Shot {
     /// Decodes the photograph as the view of a pinhole camera in capture units.
     ///
-    /// Composites on the background, undistorts at full resolution where the lens distorts, then reduces by area; the
-    /// camera and the mask follow.
+    /// Composites on the background, undistorts at full resolution where the lens distorts, then reduces by area and cuts to
+    /// the frame asked for; the camera and the mask follow.
     ///
     /// # Errors
-    /// [`ViewFault::Unreadable`] or [`ViewFault::Mask`].
+    /// [`ViewFault::Unreadable`], [`ViewFault::Mask`] or [`ViewFault::Small`].
     pub(super) fn read(&self, name: &str, options: &LoadOptions) -> Result<View, ViewFault> {
         let unreadable = |message| ViewFault::Unreadable { path: self.path.clone(), message };
         let mut image = read_composited(&self.path, options.background).map_err(unreadable)?;
@@ -21,12 +22,16 @@ impl Shot {
             (image, mask) = undistorted(&image, mask.as_ref(), &self.lens);
         }
         let mut camera = self.lens.camera(self.rotation, self.translation);
-        let (source_width_px, source_height_px) = self.header.size_px;
-        let (width_px, height_px) = options.loaded_size_px(source_width_px, source_height_px);
-        if (width_px, height_px) != self.header.size_px {
-            image = image.area_resized(width_px, height_px);
-            mask = mask.map(|mask| mask.area_resized(width_px, height_px));
-            camera = camera.resized(width_px, height_px);
+        let source_px = self.header.size_px;
+        let framing = Framing::of(source_px, options).ok_or_else(|| ViewFault::Small {
+            path: self.path.clone(),
+            found_px: source_px,
+            needed_px: options.frame.map_or((0, 0), |frame| (frame.width_px, frame.height_px)),
+        })?;
+        if framing.size_px != source_px {
+            image = framing.image(&image);
+            mask = mask.as_ref().map(|mask| framing.mask(mask));
+            camera = framing.camera(&camera);
         }
         Ok(View { name: name.to_owned(), camera, image, mask })
     }

@@ -64,6 +64,19 @@ pub enum ViewFault {
         /// Width and height the intrinsics are for.
         needed_px: (u32, u32),
     },
+    /// The image does not cover the frame asked for.
+    #[error(
+        "`{}` is {}×{} px and does not cover the frame of {}×{} px; ask for a smaller frame",
+        path.display(), found_px.0, found_px.1, needed_px.0, needed_px.1
+    )]
+    Small {
+        /// The file.
+        path: PathBuf,
+        /// Its width and height.
+        found_px: (u32, u32),
+        /// Width and height of the frame.
+        needed_px: (u32, u32),
+    },
     /// The intrinsics are no lens.
     #[error("{found}; correct the camera's numbers or take the view out")]
     Lens {
@@ -116,7 +129,7 @@ impl ViewFault {
         match self {
             Self::Missing { .. } => "missing-image",
             Self::Unreadable { .. } => "unreadable-image",
-            Self::Size { .. } => "image-size",
+            Self::Size { .. } | Self::Small { .. } => "image-size",
             Self::Shape { .. } => "image-shape",
             Self::Lens { .. } => "bad-intrinsics",
             Self::CameraModel { .. } => "camera-model",
@@ -133,6 +146,7 @@ impl ViewFault {
             | Self::Unreadable { path, .. }
             | Self::Size { path, .. }
             | Self::Shape { path, .. }
+            | Self::Small { path, .. }
             | Self::Mask { path, .. } => Some(path),
             _ => None,
         }

@@ -10,6 +10,7 @@ fn a_written_configuration_reads_back_to_the_last_bit() {
         keep_checkpoints: true,
         capture: CaptureOptions {
             max_resolution: Some(400),
+            resolution: None,
             background: Some(Background::White),
             images: Some("images_2".to_owned()),
             test_every: Some(5),

@@ -7,6 +7,7 @@ mod demo;
 mod doctor;
 mod encode;
 mod eval;
+mod fit;
 mod inspect;
 mod lpips;
 mod output;
@@ -44,6 +45,7 @@ enum Command {
     Eval(eval::Args),
     Render(render::Args),
     Inspect(inspect::Args),
+    Fit(fit::Args),
     Plot(plot::Args),
     Sweep(sweep::Args),
     Ablate(ablate::Args),
@@ -66,6 +68,7 @@ pub(crate) fn run() -> Result<ExitCode> {
         Command::Eval(args) => eval::run(&args),
         Command::Render(args) => render::run(&args),
         Command::Inspect(args) => inspect::run(&args),
+        Command::Fit(args) => fit::run(&args),
         Command::Plot(args) => plot::run(&args),
         Command::Synth(args) => synth::run(&args),
         Command::Doctor(args) => doctor::run(&args),

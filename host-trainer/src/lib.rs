@@ -6,6 +6,7 @@
 pub mod bundle;
 pub mod camera;
 pub mod dataset;
+pub mod device;
 pub mod metrics;
 pub mod ops;
 pub mod plot;
@@ -13,3 +14,4 @@ pub mod render;
 pub mod scene;
 pub mod synth;
 pub mod train;
+pub mod verify;

@@ -2,24 +2,10 @@
 //! anchors wait nor in how many strips a frame is drawn changes a pixel.
 
 use conformance::bundles::{CODERS, measured, tiered};
-use conformance::frame::{Frame, budget_for, to_core};
+use conformance::frame::{budget_for, to_core};
 use conformance::scenes::{CASES, cameras, orbit};
-use pocketsplat_core::{
-    Budget, Bundle, Camera, DecodeError, Decoder, ErrorClass, FrameReport, MaxSplats, Plan, Residency, ScratchShape,
-    Strips,
-};
-
-const RESIDENCIES: [Residency; 2] = [Residency::Resident, Residency::Streamed];
-/// Bytes before and after the memory that a decoder gets.
-const GUARD: usize = 64;
-
-/// Every way to draw what `budget` says.
-fn ways(budget: Budget) -> impl Iterator<Item = Budget> {
-    let strips = [1, 2, 4, 8].map(Strips::Exactly);
-    RESIDENCIES
-        .into_iter()
-        .flat_map(move |residency| strips.map(|strips| budget.with_residency(residency).with_strips(strips)))
-}
+use pocketsplat::verify::{Touched, Trial, Violation, exact_bytes, memory_does_not_show, ways, ways_agree};
+use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, ErrorClass, MaxSplats, Plan, ScratchShape};
 
 /// A bundle for each case, of either coder in turn, with masks and three tiers.
 fn files() -> impl Iterator<Item = (&'static str, Vec<u8>)> {
@@ -32,24 +18,13 @@ fn views() -> [Camera; 3] {
     [0, 2, 3].map(|view: usize| to_core(&cameras[view].1))
 }
 
-/// A frame drawn in memory between two guards, all filled with `fill` before, that begins `start` bytes after the first.
-struct Drawn {
-    frame: Frame,
-    report: FrameReport,
-    /// The memory of the plan as the frame left it.
-    memory: Vec<u8>,
+fn draw(bundle: &Bundle<'_>, plan: Plan, camera: &Camera) -> Trial {
+    Trial::run(bundle, plan, camera, 0, 0).unwrap_or_else(|breach| panic!("{breach}: {plan:?}"))
 }
 
-fn draw(bundle: &Bundle<'_>, plan: Plan, camera: &Camera, fill: u8, start: usize) -> Drawn {
-    let mut memory = vec![fill; GUARD + start + plan.scratch_len() + GUARD];
-    let (before, rest) = memory.split_at_mut(GUARD + start);
-    let (scratch, after) = rest.split_at_mut(plan.scratch_len());
-    let mut frame = Frame::new(camera.width_px, camera.height_px);
-    let mut decoder = Decoder::bind(bundle, plan, scratch).expect("as many bytes as planned");
-    let report = decoder.render(camera, &mut frame).expect("drawn");
-    assert!(before.iter().chain(&*after).all(|&byte| byte == fill), "bytes beside the memory are untouched: {plan:?}");
-    assert!(frame.deliveries.iter().all(|&n| n == 1), "every pixel arrives once: {plan:?}");
-    Drawn { frame, report, memory: scratch.to_vec() }
+/// Panics with the law's name and the violation.
+fn holds<T>(law: &str, result: Result<T, Violation>) -> T {
+    result.unwrap_or_else(|violation| panic!("{law}: {violation}"))
 }
 
 #[test]
@@ -58,16 +33,7 @@ fn residency_and_strips_change_no_pixel() {
         let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
         for camera in views() {
             for tiers in 1..=3 {
-                let budget = budget_for(&camera).with_tiers(tiers);
-                let expected = draw(&bundle, bundle.plan(&budget).expect("planned"), &camera, 0, 0);
-                for way in ways(budget) {
-                    let plan = bundle.plan(&way).expect("planned");
-                    let Drawn { frame, report, .. } = draw(&bundle, plan, &camera, 0xA5, 1);
-                    assert!(frame == expected.frame, "{name}, {tiers} tiers: {plan:?}");
-                    let scene = |r: FrameReport| (r.splats, r.splats_dropped, r.tile_splats, r.pixel_splats);
-                    assert_eq!(scene(report), scene(expected.report), "{name}, {tiers} tiers: {plan:?}");
-                    assert_eq!(report.anchors_decoded > 0, !plan.is_resident(), "{name}: decoded when streamed");
-                }
+                holds(name, ways_agree(&bundle, budget_for(&camera).with_tiers(tiers), &camera));
             }
         }
     }
@@ -80,21 +46,7 @@ fn the_planned_bytes_suffice_and_fewer_are_refused_by_number() {
         let budget = budget_for(&views()[0]);
         for max_splats in [MaxSplats::Worst, MaxSplats::AtMost(100), MaxSplats::AtMost(0)] {
             for way in ways(budget.with_max_splats(max_splats)) {
-                let plan = bundle.plan(&way).expect("planned");
-                let needed = plan.scratch_len();
-                let mut scratch = vec![0; needed];
-                for skip_damage in [false, true] {
-                    let mut bind = |len: usize| {
-                        let bind = if skip_damage { Decoder::bind_skipping_damage } else { Decoder::bind };
-                        bind(&bundle, plan, &mut scratch[..len]).err()
-                    };
-                    assert_eq!(bind(needed), None, "{name}: {plan:?}");
-                    for available in [needed - 1, needed / 2, 0] {
-                        let [needed, len] = [needed, available].map(|n| n as u32);
-                        let expected = DecodeError::ScratchTooSmall { needed, available: len };
-                        assert_eq!(bind(available), Some(expected), "{name}, {available} bytes: {plan:?}");
-                    }
-                }
+                holds(name, exact_bytes(&bundle, bundle.plan(&way).expect("planned")));
             }
         }
     }
@@ -107,17 +59,8 @@ fn memory_content_and_alignment_do_not_show_and_the_mark_covers_what_was_touched
         let camera = views()[0];
         for way in ways(budget_for(&camera)) {
             let plan = bundle.plan(&way).expect("planned");
-            let drawn = [(0x00, 0), (0xFF, 0), (0x5A, 1), (0x11, 2), (0xC3, 3)]
-                .map(|(fill, start)| (fill, draw(&bundle, plan, &camera, fill, start)));
-            let [(_, zeros), (_, ones), ..] = &drawn;
-            for (fill, other) in &drawn {
-                assert!(other.frame == zeros.frame && other.report == zeros.report, "{name}, {fill:#04x}: {plan:?}");
-            }
-            // A byte that a frame writes has the same value after both; one that it leaves alone has the fill's.
-            let n_touched = zeros.memory.iter().zip(&ones.memory).filter(|&(&a, &b)| (a, b) != (0x00, 0xFF)).count();
-            let mark = zeros.report.scratch_used as usize;
-            assert!(n_touched <= mark && mark <= plan.scratch_len(), "{name}: {n_touched} of {mark} bytes: {plan:?}");
-            assert!(n_touched * 10 >= mark * 9, "{name}: {n_touched} of {mark} bytes: {plan:?}");
+            let Touched { bytes, mark } = holds(name, memory_does_not_show(&bundle, plan, &camera));
+            assert!(bytes * 10 >= mark * 9, "{name}: {bytes} of {mark} bytes: {plan:?}");
         }
     }
 }
@@ -133,7 +76,7 @@ fn measured_plans_hold_the_views_measured_and_waste_little() {
             let budget = budget_for(&views[0]).with_max_splats(MaxSplats::Measured).with_tiers(tiers);
             for way in ways(budget) {
                 let plan = bundle.plan(&way).expect("planned");
-                let reports: Vec<_> = views.iter().map(|camera| draw(&bundle, plan, camera, 0, 0).report).collect();
+                let reports: Vec<_> = views.iter().map(|camera| draw(&bundle, plan, camera).report).collect();
                 let most = reports.iter().map(|report| report.scratch_used as usize).max().unwrap_or(0);
                 let worst = bundle.plan(&way.with_max_splats(MaxSplats::Worst)).expect("planned").max_splats();
                 assert!(reports.iter().all(|report| report.splats_dropped == 0), "{}: {plan:?}", case.name);
@@ -153,8 +96,7 @@ fn predicted_work_bounds_the_work_of_the_views_measured_closely() {
         for way in ways(budget_for(&to_core(&views[0]))) {
             let plan = bundle.plan(&way).expect("planned");
             let bound = plan.work().expect("measured");
-            let work: Vec<_> =
-                views.iter().map(|view| draw(&bundle, plan, &to_core(view), 0, 0).report.work()).collect();
+            let work: Vec<_> = views.iter().map(|view| draw(&bundle, plan, &to_core(view)).report.work()).collect();
             let most = |count: fn(&pocketsplat_core::Work) -> u64| work.iter().map(count).max().unwrap_or(0);
             for (what, most, bound) in [
                 ("multiply-adds", most(|w| w.head_macs), bound.head_macs),
@@ -177,23 +119,23 @@ fn too_many_splats_leave_out_the_last_of_the_file_in_all_strips_alike() {
         let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
         for camera in views() {
             let whole_plan = bundle.plan(&budget_for(&camera)).expect("planned");
-            let Drawn { frame: whole_frame, report: whole, .. } = draw(&bundle, whole_plan, &camera, 0, 0);
+            let Trial { rgb: whole_frame, report: whole, .. } = draw(&bundle, whole_plan, &camera);
             for most in [0, 1, whole.splats / 7, whole.splats / 2, whole.splats.saturating_sub(1)] {
                 for way in ways(budget_for(&camera).with_max_splats(MaxSplats::AtMost(most))) {
                     let plan = bundle.plan(&way).expect("planned");
-                    let Drawn { frame, report, .. } = draw(&bundle, plan, &camera, 0, 0);
+                    let Trial { rgb: frame, report, .. } = draw(&bundle, plan, &camera);
                     assert_eq!(report.splats + report.splats_dropped, whole.splats, "{name}, {most}: {report:?}");
                     assert_eq!(report.splats_dropped > 0, report.max_splats > most, "{name}, {most}: {report:?}");
                     assert!(report.scratch_used as usize <= plan.scratch_len(), "{name}, {most}: {report:?}");
                     let first = budget_for(&camera).with_max_splats(MaxSplats::AtMost(report.splats));
-                    let first = draw(&bundle, bundle.plan(&first).expect("planned"), &camera, 0, 0);
+                    let first = draw(&bundle, bundle.plan(&first).expect("planned"), &camera);
                     assert_eq!(first.report.splats, report.splats, "{name}, {most}: as many");
-                    assert!(frame == first.frame, "{name}, {most}: {plan:?}");
+                    assert!(frame == first.rgb, "{name}, {most}: {plan:?}");
                     let enough = way.with_max_splats(MaxSplats::AtMost(report.max_splats));
                     let enough = bundle.plan(&enough).expect("planned");
                     let saves = plan.scratch_len() < enough.scratch_len();
                     assert!(saves || report.splats_dropped == 0, "{name}, {most}: fewer splats take less memory");
-                    let Drawn { frame, report, .. } = draw(&bundle, enough, &camera, 0, 0);
+                    let Trial { rgb: frame, report, .. } = draw(&bundle, enough, &camera);
                     assert_eq!(report.splats_dropped, 0, "{name}, {most}: the number to plan for");
                     assert!(frame == whole_frame, "{name}, {most}: the picture of the worst case's memory");
                 }

@@ -4,8 +4,9 @@ use anyhow::{Result, bail};
 use pocketsplat::bundle::manifest::{cameras_to_measure, install, measure};
 use pocketsplat::bundle::{self, BundleInfo, Coder, QuantisationSteps, WriteOptions, Written};
 use pocketsplat::dataset::{Background, Capture, View};
+use pocketsplat::device::{Fitted, Limits, NoFit, fitted};
 use pocketsplat::train::finish::Finished;
-use pocketsplat_core::Bundle;
+use pocketsplat_core::{Budget, Bundle};
 use serde::{Deserialize, Serialize};
 
 /// How a run's scene becomes a bundle; decides nothing of its training.
@@ -17,12 +18,15 @@ pub(crate) struct Encoding {
     pub(crate) tiers: Vec<f32>,
     /// Steps of scenes without a context model.
     pub(crate) quantisation: QuantisationSteps,
+    /// What the bundle has to fit into.
+    #[serde(default, skip_serializing_if = "Limits::is_none")]
+    pub(crate) limits: Limits,
 }
 
 impl Default for Encoding {
     fn default() -> Self {
         let WriteOptions { steps, coder, pruning_rates, .. } = WriteOptions::default();
-        Self { quantisation: steps, coder, tiers: pruning_rates }
+        Self { quantisation: steps, coder, tiers: pruning_rates, limits: Limits::default() }
     }
 }
 
@@ -46,14 +50,29 @@ impl Encoding {
         Ok(())
     }
 
-    /// Codes a finished scene in tiers, measures each over training views and an orbit, and writes that into the bundle.
+    /// Codes a finished scene in tiers, as much of it as fits, measures each over training views and an orbit, and writes that
+    /// into the bundle.
     pub(crate) fn encode(
+        &self,
+        finished: Finished,
+        capture: &Capture,
+        background: Background,
+        held_out: &[View],
+    ) -> Result<Fitted> {
+        // Photographs are not larger than frames may be: loading has seen to it.
+        let [width_px, height_px] = largest_px(capture).map(|px| px as u16);
+        let frame = Budget::for_frame(width_px, height_px);
+        let write = |finished: &Finished| self.write(finished, capture, background, held_out);
+        Ok(fitted(finished, &self.limits, &frame, write)?)
+    }
+
+    fn write(
         &self,
         finished: &Finished,
         capture: &Capture,
         background: Background,
         held_out: &[View],
-    ) -> Result<Written> {
+    ) -> Result<Written, NoFit> {
         let info = BundleInfo {
             normalisation: capture.normalisation,
             background: background.rgb8(),

@@ -22,6 +22,7 @@ mod sweep;
 mod synth;
 mod train;
 mod train_args;
+mod verify;
 
 use std::process::ExitCode;
 
@@ -46,6 +47,7 @@ enum Command {
     Render(render::Args),
     Inspect(inspect::Args),
     Fit(fit::Args),
+    Verify(verify::Args),
     Plot(plot::Args),
     Sweep(sweep::Args),
     Ablate(ablate::Args),
@@ -65,6 +67,7 @@ pub(crate) fn run() -> Result<ExitCode> {
         Command::Train(args) => return train::run(&args),
         Command::Sweep(args) => return sweep::run(&args),
         Command::Ablate(args) => return ablate::run(&args),
+        Command::Verify(args) => return verify::run(&args),
         Command::Eval(args) => eval::run(&args),
         Command::Render(args) => render::run(&args),
         Command::Inspect(args) => inspect::run(&args),

@@ -3,6 +3,7 @@
 use anyhow::{Result, bail};
 use clap::ArgAction;
 use pocketsplat::bundle::{Coder, QuantisationSteps};
+use pocketsplat::device::Choice;
 use pocketsplat::train::TrainConfig;
 use pocketsplat::train::config::Backbone;
 use pocketsplat::train::module::{Modules, Pruning, pruning};
@@ -55,6 +56,10 @@ pub(crate) struct Settings {
     /// Grow no further than this many anchors; the candidates with the largest gradients come first. [default: no limit]
     #[arg(long, value_name = "N")]
     max_anchors: Option<usize>,
+    /// When growth ends, half-way, keep this many anchors: those that contribute most to the training views.
+    /// [default: all]
+    #[arg(long, value_name = "N")]
+    keep_anchors: Option<usize>,
     #[arg(long, help = with_default("Quantisation step of the anchor features", QuantisationSteps::default().feature))]
     feature_step: Option<f32>,
     /// What gives the symbols their frequencies. [default: auto]
@@ -128,6 +133,7 @@ impl Settings {
         set(&mut train.validation_every, &self.validation_every);
         train.voxel_size = self.voxel_size.or(train.voxel_size);
         train.densification.max_anchors = self.max_anchors.or(train.densification.max_anchors);
+        train.densification.kept_anchors = self.keep_anchors.or(train.densification.kept_anchors);
         set(&mut train.shape.feature_dim, &self.feature_dim);
         set(&mut train.shape.n_offsets, &self.offsets);
         set(&mut train.shape.view_direction, &self.no_view_direction.map(|no| !no));
@@ -140,6 +146,31 @@ impl Settings {
         // As a run keeps it: the same options again are no other setting.
         config.train.shape = config.train.modules.shape(config.train.shape);
         Ok(config)
+    }
+
+    /// `config` with what a device affords, where the command line leaves it open: HAC, the widths, the cap, trained tiers.
+    pub(crate) fn chosen(&self, config: RunConfig, choice: &Choice) -> RunConfig {
+        let mut config = config;
+        let train = &mut config.train;
+        if self.backbone.is_none() {
+            *train = train.with_backbone(Backbone::Hac);
+        }
+        if self.feature_dim.is_none() {
+            train.shape.feature_dim = choice.feature_dim;
+        }
+        if self.offsets.is_none() {
+            train.shape.n_offsets = choice.n_offsets;
+        }
+        if self.max_anchors.is_none() {
+            train.densification.max_anchors = Some(choice.max_anchors);
+        }
+        if self.keep_anchors.is_none() {
+            train.densification.kept_anchors = Some(choice.max_anchors);
+        }
+        if self.modules.is_none() && self.prune.is_none() {
+            train.modules.pruning.get_or_insert_with(Pruning::tiered);
+        }
+        config
     }
 
     fn attach_modules(&self, train: &mut TrainConfig) -> Result<()> {

@@ -7,6 +7,7 @@ use std::sync::atomic::AtomicBool;
 use anyhow::{Context, Result, bail};
 use pocketsplat::bundle::Written;
 use pocketsplat::dataset::{Background, Capture, View};
+use pocketsplat::device::Fitted;
 use pocketsplat::train::finish::Finished;
 use pocketsplat::train::run::{Ending, Interval, RunError, RunFolder};
 use pocketsplat::train::{TrainConfig, Trainer};
@@ -179,8 +180,12 @@ fn write_bundle(
 ) -> Result<TrainResult> {
     let finished = trainer.finish()?;
     let held_out: Vec<View> = trainer.validation_views().cloned().collect();
-    let Written { bytes, .. } = encoding.encode(&finished, capture, background, &held_out)?;
+    let Fitted { written: Written { bytes, .. }, finished, n_cut } =
+        encoding.encode(finished, capture, background, &held_out)?;
     output::write_whole(output, &bytes)?;
+    if n_cut > 0 {
+        eprintln!("left out the {n_cut} least important anchors, so that the bundle fits");
+    }
     let Finished { scene, n_undrawn, estimated_bits, .. } = finished;
     let n_anchors = scene.anchors.len();
     Ok(TrainResult {

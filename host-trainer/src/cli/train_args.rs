@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
+use bytesize::ByteSize;
+use pocketsplat::device::{Choice, Limits, Target, choose};
 use pocketsplat::train::config::Hac;
 
 use super::run_config::RunConfig;
@@ -35,10 +37,38 @@ pub(crate) struct Args {
     #[arg(long, help = with_default("Weight of a value's bits in the loss, for `--backbone hac`", Hac::default().lambda))]
     lambda: Option<f64>,
     #[command(flatten)]
+    device: DeviceArgs,
+    #[command(flatten)]
     settings: Settings,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
+}
+
+/// What the device has that the bundle is for; what else the command line leaves open is chosen by it.
+#[derive(clap::Args)]
+#[command(next_help_heading = "Device")]
+struct DeviceArgs {
+    /// Scratch memory of the decoder, as 192KiB: the whole scene is to be drawn in it, the lowest tier surely is. Besides it a
+    /// firmware needs its stack and what it shows the frame with.
+    #[arg(long, value_name = "BYTES")]
+    ram: Option<ByteSize>,
+    /// The bundle's size at most, as 1MiB.
+    #[arg(long, value_name = "BYTES")]
+    flash: Option<ByteSize>,
+    /// The processor, which says how many instructions a frame may take.
+    #[arg(long, value_enum)]
+    target: Option<Target>,
+}
+
+impl DeviceArgs {
+    fn limits(&self) -> Limits {
+        Limits {
+            ram_bytes: self.ram.map(|bytes| bytes.as_u64()),
+            flash_bytes: self.flash.map(|bytes| bytes.as_u64()),
+            frame_instructions: self.target.map(Target::frame_instructions),
+        }
+    }
 }
 
 impl Args {
@@ -64,6 +94,18 @@ impl Args {
             None => RunConfig::default(),
         };
         let mut config = self.applied_to(base)?;
+        let limits = self.device.limits();
+        // A configuration that is given has been decided about.
+        if !limits.is_none() && self.config.is_none() {
+            let choice = choose(&limits)?;
+            config = self.settings.chosen(config, &choice);
+            config.train.hac.lambda = self.lambda.unwrap_or(choice.lambda);
+            let Choice { feature_dim, n_offsets, max_anchors, lambda, deciding } = choice;
+            eprintln!(
+                "for this device: features of width {feature_dim}, {n_offsets} offsets, at most {max_anchors} anchors ({deciding} \
+                 decides), lambda {lambda}, where the command line says nothing else"
+            );
+        }
         for (path, name, option) in [(&config.dataset, "dataset", "DATASET"), (&config.output, "output", "--output")] {
             if path.as_os_str().is_empty() {
                 bail!("the configuration names no `{name}`; give it there or as {option}");
@@ -84,6 +126,10 @@ impl Args {
             if let Some(path) = given {
                 *into = std::path::absolute(path).with_context(|| format!("{} is no path", path.display()))?;
             }
+        }
+        let limits = self.device.limits();
+        if !limits.is_none() {
+            config.encoding.limits = limits;
         }
         if let Some(lambda) = self.lambda {
             config.train.hac.lambda = lambda;

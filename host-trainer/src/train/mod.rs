@@ -35,7 +35,7 @@ use crate::scene::init::initial_scene;
 use crate::scene::{Anchors, Heads, Scene};
 use checkpoint::{CaptureSignature, Kernels};
 use coding::Integers;
-use config::{Backbone, Phase, Rate, Rates};
+use config::{Backbone, Densification, Phase, Rate, Rates};
 use module::Moment;
 use optimiser::Optimiser;
 use statistics::Statistics;
@@ -239,6 +239,7 @@ impl<'a> Trainer<'a> {
             self.optimiser.apply(&mut self.scene, &self.workspace, &rates, progress, self.capture.extent);
         }
         self.densify();
+        self.keep_the_best();
         modules.each().into_iter().for_each(|module| module.event(&at, self));
         Ok(Outcome { report, dropped: None })
     }
@@ -299,6 +300,20 @@ impl<'a> Trainer<'a> {
             let coarsest_cells = self.config.coarsest_cells_for(self.capture);
             densify::grow(scene, optimiser, statistics, &settings, coarsest_cells, rng);
             densify::prune(scene, optimiser, statistics, &settings);
+        }
+    }
+
+    /// When growth ends: drops all but the anchors that contribute most to the training views, where a number is set.
+    fn keep_the_best(&mut self) {
+        let Densification { until, kept_anchors, .. } = self.config.densification;
+        let Some(most) = kept_anchors.filter(|most| *most < self.scene.anchors.len()) else { return };
+        if self.iteration == self.config.iteration_at(until) {
+            let Survey { contribution, .. } = self.survey(true);
+            let mut order: Vec<usize> = (0..contribution.len()).collect();
+            order.sort_by(|a, b| contribution[*b].total_cmp(&contribution[*a]));
+            let mut keep = vec![false; contribution.len()];
+            order[..most].iter().for_each(|anchor| keep[*anchor] = true);
+            self.keep_anchors(&keep);
         }
     }
 

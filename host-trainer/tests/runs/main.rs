@@ -3,6 +3,7 @@
 
 mod accidents;
 mod configuration;
+mod device;
 mod fixture;
 mod interruption;
 mod modules;

@@ -111,6 +111,9 @@ pub struct Densification {
     /// Growth stops here; of the candidates that still fit, those with the largest gradient sums are taken.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_anchors: Option<usize>,
+    /// Of the anchors that there are when growth ends, those that contribute most to the training views are kept, so many.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub kept_anchors: Option<usize>,
 }
 
 impl Default for Densification {
@@ -126,6 +129,7 @@ impl Default for Densification {
             levels: 3,
             min_opacity: 0.005,
             max_anchors: None,
+            kept_anchors: None,
         }
     }
 }

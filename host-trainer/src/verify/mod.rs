@@ -1,0 +1,126 @@
+//! The memory contract as laws that any bundle can be held to.
+//!
+//! The conformance suite holds synthetic bundles to them, `pocketsplat verify` a user's own.
+
+mod trial;
+
+use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, Plan, Residency, Strips, Work};
+
+pub use trial::{Breach, Trial};
+
+/// Content of the memory and bytes that it begins behind a word.
+const FILLS: [(u8, usize); 5] = [(0x00, 0), (0xFF, 0), (0x5A, 1), (0x11, 2), (0xC3, 3)];
+
+/// Every way to draw what `budget` says: residency and strips, whatever its limit of memory.
+pub fn ways(budget: Budget) -> impl Iterator<Item = Budget> {
+    let strips = [1, 2, 4, 8].map(Strips::Exactly);
+    [Residency::Resident, Residency::Streamed]
+        .into_iter()
+        .flat_map(move |residency| strips.map(|strips| budget.with_residency(residency).with_strips(strips)))
+        .map(|budget| budget.in_bytes(usize::MAX))
+}
+
+/// How much of its memory a frame used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Touched {
+    /// Bytes that it wrote to.
+    pub bytes: usize,
+    /// Bytes that the decoder says it needed.
+    pub mark: usize,
+}
+
+/// A law that does not hold, in words.
+pub type Violation = String;
+
+/// The planned bytes suffice, and fewer are refused with their number, whether or not damage is to be skipped.
+///
+/// # Errors
+/// A sentence that says what happened instead.
+pub fn exact_bytes(bundle: &Bundle<'_>, plan: Plan) -> Result<(), Violation> {
+    let needed = plan.scratch_len();
+    let mut scratch = vec![0; needed];
+    for skip_damage in [false, true] {
+        let mut bind = |len: usize| {
+            let bind = if skip_damage { Decoder::bind_skipping_damage } else { Decoder::bind };
+            bind(bundle, plan, &mut scratch[..len]).err()
+        };
+        if let Some(error) = bind(needed) {
+            return Err(format!("{needed} bytes do not suffice: {error}"));
+        }
+        for available in [needed.saturating_sub(1), needed / 2, 0] {
+            let [needed, len] = [needed, available].map(|n| n as u32);
+            let (found, expected) = (bind(available), DecodeError::ScratchTooSmall { needed, available: len });
+            if found.as_ref() != Some(&expected) {
+                return Err(format!("{available} bytes: expected {expected:?}, found {found:?}"));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Neither content nor alignment of the memory shows, nothing beside it is touched, and the decoder's mark of what it used
+/// covers what it wrote and is no more than planned.
+///
+/// # Errors
+/// A sentence that says what happened instead.
+pub fn memory_does_not_show(bundle: &Bundle<'_>, plan: Plan, camera: &Camera) -> Result<Touched, Violation> {
+    let trials = FILLS.map(|(fill, start)| Trial::run(bundle, plan, camera, fill, start));
+    let mut sound = Vec::new();
+    for trial in trials {
+        sound.push(trial.map_err(|breach| breach.to_string())?);
+    }
+    let [zeros, ones, ..] = &sound[..] else { unreachable!("there are fills") };
+    for ((fill, start), other) in FILLS.iter().zip(&sound) {
+        if (&other.rgb, other.report) != (&zeros.rgb, zeros.report) {
+            return Err(format!("memory filled with {fill:#04x} at {start} draws another frame"));
+        }
+    }
+    // A byte that a frame writes has the same value after both; one that it leaves alone has the fill's.
+    let n_touched = zeros.memory.iter().zip(&ones.memory).filter(|&(&a, &b)| (a, b) != (0x00, 0xFF)).count();
+    let mark = zeros.report.scratch_used as usize;
+    if n_touched > mark || mark > plan.scratch_len() {
+        return Err(format!("{n_touched} bytes touched, {mark} reported, {} planned", plan.scratch_len()));
+    }
+    Ok(Touched { bytes: n_touched, mark })
+}
+
+/// Where anchors wait and in how many strips a frame is drawn changes no pixel.
+///
+/// # Errors
+/// A sentence that says what happened instead.
+pub fn ways_agree(bundle: &Bundle<'_>, budget: Budget, camera: &Camera) -> Result<(), Violation> {
+    let draw = |budget: &Budget| -> Result<Trial, Breach> { Trial::run(bundle, bundle.plan(budget)?, camera, 0, 0) };
+    let scene = |r: &FrameReport| (r.splats, r.tile_splats, r.pixel_splats);
+    let expected = draw(&budget).map_err(|breach| breach.to_string())?;
+    for way in ways(budget) {
+        let Budget { residency, strips, .. } = way;
+        let drawn = draw(&way).map_err(|breach| format!("{residency:?}, {strips:?}: {breach}"))?;
+        // With less memory for splats than the view has, what a strip has no place for differs from way to way.
+        let whole = expected.report.splats_dropped == 0 && drawn.report.splats_dropped == 0;
+        if whole && (&drawn.rgb, scene(&drawn.report)) != (&expected.rgb, scene(&expected.report)) {
+            return Err(format!("{residency:?}, {strips:?}: another frame"));
+        }
+        if drawn.report.anchors_decoded > 0 && residency == Residency::Resident {
+            return Err(format!("{residency:?}, {strips:?}: decoded anchors that wait in memory"));
+        }
+    }
+    Ok(())
+}
+
+/// No frame takes more work than the plan says, if the plan says anything.
+///
+/// # Errors
+/// A sentence that says what happened instead.
+pub fn work_is_bounded(plan: Plan, work: &Work) -> Result<(), Violation> {
+    let Some(bound) = plan.work() else { return Ok(()) };
+    for (what, found, bound) in [
+        ("multiply-adds of the heads", work.head_macs, bound.head_macs),
+        ("decoded anchors", work.decoded_anchors, bound.decoded_anchors),
+        ("pixel evaluations", work.pixel_splats, bound.pixel_splats),
+    ] {
+        if found > bound {
+            return Err(format!("{found} {what}, at most {bound} were predicted"));
+        }
+    }
+    Ok(())
+}

@@ -20,6 +20,9 @@ runner=$PWD/qemu.sh
 rm -f "$out"/frame*.ppm "$out/instructions.csv"
 cd "$out"
 "$runner" "$target/$processor/release/firmware-example" >log.txt || { cat log.txt >&2 && exit 1; }
-name=$(basename "$bundle" .psb)
-echo board,ram_kib,bundle,frame,stage,instructions
-sed 1d instructions.csv | sed "s/^/$BOARD,$ram_kib,$name,/"
+scratch=$(sed -n 's/.*scratch: \([0-9]*\) bytes.*/\1/p' log.txt)
+size=$(sed -n 2p frame0.ppm)
+n_frames=$(ls frame*.ppm | wc -l)
+# Everything that a host needs to draw the same frames.
+echo board,ram_kib,scratch,width,height,bundle,frames,frame,stage,instructions
+sed 1d instructions.csv | sed "s/^/$BOARD,$ram_kib,$scratch,${size/ /,},$(basename "$bundle" .psb),$n_frames,/"

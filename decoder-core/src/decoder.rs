@@ -187,6 +187,7 @@ impl<'b, 's> Decoder<'b, 's> {
         for strip in strips.iter() {
             self.gather(strip, &mut frame, watch)?;
             most_in_memory = self.splats.n.max(most_in_memory);
+            frame.report.strip_splats = frame.report.strip_splats.saturating_add(self.splats.n);
             self.draw(strip, camera, sink, &mut frame.report, watch);
         }
         let Frame { tally, mut report, .. } = frame;
@@ -231,6 +232,7 @@ impl<'b, 's> Decoder<'b, 's> {
                 let place = TilePlace { column, row, width, height };
                 let work = blend_tile(place, splats, rects, list, background, &mut self.canvas);
                 report.tile_splats = report.tile_splats.saturating_add(work.splats);
+                report.row_splats = report.row_splats.saturating_add(work.rows);
                 report.pixel_splats = report.pixel_splats.saturating_add(work.pixels);
                 let n_pixels = usize::from(width) * usize::from(height);
                 watch.enter(Stage::Output);

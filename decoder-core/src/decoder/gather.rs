@@ -127,12 +127,16 @@ impl<'b> Decoder<'b, '_> {
         let Self { bundle, source, heads, work, splats, .. } = self;
         let header = bundle.header();
         let effects = header.features.effects;
+        let n_scalars = u32::from(header.feature_dim) + 6;
         let Frame { view, strips, tallies, tally, report } = frame;
         let decoded = u32::from(!source.is_resident());
         report.chunks_decoded += decoded;
         source.for_each(chunk, first_anchor, self.row, watch, |number, site, row, watch| {
             watch.enter(Stage::Project);
+            report.anchors_read += 1;
             report.anchors_decoded += decoded;
+            let n_channels = 3 * site.mask.count_ones() + n_scalars;
+            report.symbols_decoded += u64::from(decoded * n_channels);
             let position = bundle.position(site.lattice);
             let anchor = Anchor::from_row(header, position, site.mask, row).ok_or(DecodeError::Internal)?;
             if !view.sees_anchor(position, anchor.extent) || pass.band.is_some_and(|band| !band.sees_anchor(&anchor)) {
@@ -140,6 +144,7 @@ impl<'b> Decoder<'b, '_> {
             }
             report.anchors_visible += 1;
             let macs = for_each_gaussian(&anchor, effects, view.eye, heads, work, watch, |offset, gaussian| {
+                report.gaussians += 1;
                 let Some((splat, rect)) = view.project(gaussian, effects.dilation_compensation) else { return };
                 let place = place(number, offset);
                 let touched = strips.touched(rect);

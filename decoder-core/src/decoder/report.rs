@@ -17,12 +17,18 @@ pub struct FrameReport {
     pub chunks_damaged: u32,
     /// The first of them.
     pub first_damaged: Option<u32>,
+    /// Anchors gone over, decoded or from memory.
+    pub anchors_read: u32,
     /// Anchors decoded.
     pub anchors_decoded: u32,
+    /// Symbols of their channels, those of masked offsets not among them.
+    pub symbols_decoded: u64,
     /// Anchors that passed the prefilter, so that their heads ran.
     pub anchors_visible: u32,
     /// Multiply-adds of the heads.
     pub head_macs: u64,
+    /// Gaussians that the heads made, before they were projected.
+    pub gaussians: u32,
     /// Splats drawn.
     pub splats: u32,
     /// Splats left out because there was no memory for them: all of the file's anchors and offsets from the first one on
@@ -30,8 +36,12 @@ pub struct FrameReport {
     pub splats_dropped: u32,
     /// Splats of the fullest strip, those left out included; the number to plan for.
     pub max_splats: u32,
+    /// Splats of all strips together, one that lies in two counted twice.
+    pub strip_splats: u32,
     /// Pairs of a tile and a splat blended into it.
     pub tile_splats: u32,
+    /// Pairs of a row of a tile's pixels and a splat that reaches it.
+    pub row_splats: u32,
     /// Pairs of a pixel and a splat evaluated for it.
     pub pixel_splats: u32,
     /// Bytes of the planned memory that this frame needed; no fewer would have drawn it in this way.

@@ -34,6 +34,8 @@ pub(crate) struct TilePlace {
 pub(crate) struct TileWork {
     /// Splats blended into it.
     pub(crate) splats: u32,
+    /// Rows of pixels that a splat reaches.
+    pub(crate) rows: u32,
     /// Pixels for which a splat was evaluated.
     pub(crate) pixels: u32,
 }
@@ -61,8 +63,10 @@ pub(crate) fn blend_tile(
         if place.column < rect.first_column || place.column > rect.last_column {
             continue;
         }
+        let [rows, pixels] = blend_splat(place, &splat.unpack(), canvas.pixels, &mut alive);
         work.splats += 1;
-        work.pixels = work.pixels.saturating_add(blend_splat(place, &splat.unpack(), canvas.pixels, &mut alive));
+        work.rows += rows;
+        work.pixels = work.pixels.saturating_add(pixels);
         if alive == 0 {
             break;
         }
@@ -77,12 +81,12 @@ pub(crate) fn blend_tile(
     work
 }
 
-/// Blends one splat into the rows of the tile; returns how many pixels it was evaluated for.
+/// Blends one splat into the rows of the tile; returns how many rows it reaches and how many pixels it was evaluated for.
 ///
 /// Along a row alpha is a Gaussian of x, so the step from pixel to pixel is a factor, which itself changes by a constant
 /// factor: two multiplications replace an exponential. Over 16 pixels the rounding grows to about 1e-5 of alpha.
 #[inline]
-fn blend_splat(place: TilePlace, splat: &Splat, pixels: &mut [[f32; 4]], alive: &mut u32) -> u32 {
+fn blend_splat(place: TilePlace, splat: &Splat, pixels: &mut [[f32; 4]], alive: &mut u32) -> [u32; 2] {
     let [mean_x, mean_y] = splat.mean;
     // In pixels of the tile, measured from the centre of its first one.
     let centre_x = mean_x - f32::from(u16::from(place.column) * TILE_PX) - 0.5;
@@ -91,7 +95,7 @@ fn blend_splat(place: TilePlace, splat: &Splat, pixels: &mut [[f32; 4]], alive: 
     let row_variance = 1.0 / splat.row_precision;
     let ratio_step = exp(-splat.row_precision);
     let half_height = sqrt_above(reach / splat.column_precision) + SLACK_PX;
-    let Some((first, last)) = span(centre_y, half_height, place.height) else { return 0 };
+    let Some((first, last)) = span(centre_y, half_height, place.height) else { return [0; 2] };
     let mut n_evaluated = 0;
     let rows = pixels.chunks_exact_mut(TILE_PX.into()).enumerate();
     for (y, row) in rows.take(last + 1).skip(first) {
@@ -114,7 +118,7 @@ fn blend_splat(place: TilePlace, splat: &Splat, pixels: &mut [[f32; 4]], alive: 
             ratio *= ratio_step;
         }
     }
-    n_evaluated
+    [(last + 1 - first) as u32, n_evaluated]
 }
 
 /// Blends one splat into one pixel; returns 1 when the pixel is finished by it.

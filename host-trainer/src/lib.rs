@@ -7,6 +7,7 @@ pub mod bundle;
 pub mod camera;
 pub mod dataset;
 pub mod device;
+pub mod instructions;
 pub mod metrics;
 pub mod ops;
 pub mod plot;

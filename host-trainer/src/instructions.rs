@@ -1,0 +1,175 @@
+//! How many instructions a device takes for a frame: what the frame consists of, times what each part costs on a target.
+//!
+//! The costs are fitted to counts of emulated boards by `cargo run -p tools --bin fit_instructions`; they are instructions, not
+//! cycles.
+
+use pocketsplat_core::bundle::Coder;
+use pocketsplat_core::context::LevelKind;
+use pocketsplat_core::{Bundle, FrameReport, Plan, Stage};
+
+use Stage::{Blend, Context, Decode, Heads, Output, Project, Sort};
+
+/// A family of processors that run the same code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Target {
+    /// Cortex-M4 and M7 with an FPU of single precision: `thumbv7em-none-eabihf`.
+    CortexM,
+    /// RISC-V without an FPU: `riscv32imac-unknown-none-elf`.
+    RiscV32,
+}
+
+impl Target {
+    /// The target of a board of `firmware-example`.
+    pub fn of_board(board: &str) -> Option<Self> {
+        match board {
+            "mps2-an386" | "mps2-an500" => Some(Self::CortexM),
+            "virt" => Some(Self::RiscV32),
+            _ => None,
+        }
+    }
+}
+
+/// Parts of a frame that have a cost, in the order of `costs.csv`.
+pub const N_TERMS: usize = 21;
+
+/// One part of a frame, and how much of it there is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Term {
+    /// What is counted.
+    pub name: &'static str,
+    /// Where it is spent.
+    pub stage: Stage,
+    /// How much there is of it.
+    pub count: f64,
+}
+
+/// What a frame consists of.
+///
+/// * `report`: of the frame, drawn by any machine by `plan`. * `size_px`: its width and height.
+pub fn terms(bundle: &Bundle<'_>, plan: &Plan, report: &FrameReport, size_px: [u16; 2]) -> [Term; N_TERMS] {
+    let header = bundle.header();
+    let decoded = f64::from(report.anchors_decoded);
+    let symbols = report.symbols_decoded as f64;
+    let from_memory = f64::from(report.anchors_read - report.anchors_decoded);
+    let (table_symbols, context_symbols, corners, outputs, macs) = match bundle.coder() {
+        Coder::Static(_) => (symbols, 0.0, 0.0, 0.0, 0.0),
+        Coder::Context(context) => {
+            let [inputs, hidden] = [context.n_inputs(), context.n_hidden()].map(|n| n as f64);
+            let corners: u32 = context.levels().map(|level| if level.kind == LevelKind::Volume { 8 } else { 4 }).sum();
+            // A mean and a scale for each symbol, and three steps.
+            let rows = 2.0 * symbols + 3.0 * decoded;
+            (0.0, symbols, decoded * f64::from(corners), rows + decoded * hidden, hidden * (decoded * inputs + rows))
+        }
+    };
+    let [width, height] = size_px.map(f64::from);
+    let rows_of_strip = f64::from(size_px[1].div_ceil(16).div_ceil(plan.n_strips().into()));
+    let chunk_tests = f64::from(bundle.n_chunks()) * f64::from(plan.n_strips());
+    let count = |n: u32| f64::from(n);
+    let term = |stage, name, count| Term { name, stage, count };
+    [
+        term(Decode, "anchor decoded", decoded),
+        term(Decode, "symbol of a table", table_symbols),
+        term(Decode, "symbol of a context", context_symbols),
+        term(Decode, "anchor from memory", from_memory),
+        term(Decode, "channel from memory", from_memory * header.n_channels() as f64),
+        term(Context, "corner of the grid", corners),
+        term(Context, "unit of the context", outputs),
+        term(Context, "multiply-add of the context", macs),
+        term(Heads, "multiply-add of the heads", report.head_macs as f64),
+        term(Heads, "visible anchor", count(report.anchors_visible)),
+        term(Heads, "Gaussian", count(report.gaussians)),
+        term(Project, "chunk and strip", chunk_tests),
+        term(Project, "anchor", count(report.anchors_read)),
+        term(Project, "Gaussian", count(report.gaussians)),
+        term(Sort, "splat and strip", count(report.strip_splats)),
+        term(Sort, "splat and row of tiles", count(report.strip_splats) * rows_of_strip),
+        term(Blend, "pixel", width * height),
+        term(Blend, "splat and tile", count(report.tile_splats)),
+        term(Blend, "splat and row of pixels", count(report.row_splats)),
+        term(Blend, "splat and pixel", count(report.pixel_splats)),
+        term(Output, "pixel", width * height),
+    ]
+}
+
+/// Instructions of each term on each target.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Costs([[f64; N_TERMS]; 2]);
+
+impl Costs {
+    /// Those that were measured.
+    ///
+    /// # Panics
+    /// Never: a test reads the table.
+    pub fn measured() -> Self {
+        Self::parse(include_str!("instructions/costs.csv")).expect("the table in the source is sound")
+    }
+
+    /// All zero.
+    pub fn none() -> Self {
+        Self([[0.0; N_TERMS]; 2])
+    }
+
+    /// Reads a table, whose rows are the terms in their order; `None` when it is another's.
+    pub fn parse(csv: &str) -> Option<Self> {
+        let mut costs = Self::none();
+        let mut rows = csv.lines().skip(1);
+        for term in 0..N_TERMS {
+            let mut fields = rows.next()?.split(',').skip(2);
+            for target in &mut costs.0 {
+                target[term] = fields.next()?.parse().ok()?;
+            }
+        }
+        rows.next().is_none().then_some(costs)
+    }
+
+    /// The table of `terms`.
+    pub fn to_csv(&self, terms: &[Term; N_TERMS]) -> String {
+        let mut csv = String::from("stage,term,cortex-m,riscv32\n");
+        let [cortex_m, riscv32] = &self.0;
+        for ((term, m), v) in terms.iter().zip(cortex_m).zip(riscv32) {
+            csv += &format!("{},{},{m:.2},{v:.2}\n", term.stage.name(), term.name);
+        }
+        csv
+    }
+
+    /// The costs on a target, in the order of the terms.
+    pub fn of(&mut self, target: Target) -> &mut [f64; N_TERMS] {
+        &mut self.0[target as usize]
+    }
+
+    /// Predicted instructions of each stage, as [`Stage::ALL`] orders them.
+    pub fn predict(&self, target: Target, terms: &[Term; N_TERMS]) -> [f64; Stage::ALL.len()] {
+        let mut stages = [0.0; Stage::ALL.len()];
+        for (term, cost) in terms.iter().zip(&self.0[target as usize]) {
+            stages[term.stage as usize] += term.count * cost;
+        }
+        stages
+    }
+}
+
+/// Predicted instructions of each stage of a frame, as [`Stage::ALL`] orders them; their sum is within 10 % of what the boards
+/// of `firmware-example` took for the bundles that were measured.
+///
+/// * `report`: of the frame, drawn by any machine by `plan`. * `size_px`: its width and height.
+pub fn predict(
+    target: Target,
+    bundle: &Bundle<'_>,
+    plan: &Plan,
+    report: &FrameReport,
+    size_px: [u16; 2],
+) -> [f64; Stage::ALL.len()] {
+    Costs::measured().predict(target, &terms(bundle, plan, report, size_px))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Costs, Target};
+
+    #[test]
+    fn the_table_is_sound_and_comes_back() {
+        let mut costs = Costs::measured();
+        assert!(costs.of(Target::CortexM).iter().all(|cost| *cost >= 0.0), "no part saves instructions");
+        assert!(costs.of(Target::RiscV32)[8] > 10.0 * costs.of(Target::CortexM)[8], "without an FPU");
+        assert_eq!(Costs::parse("stage,term,cortex-m,riscv32\n"), None, "rows are missing");
+    }
+}

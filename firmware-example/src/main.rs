@@ -109,9 +109,9 @@ fn draw_orbit(panel: &mut Panel, scratch: &mut [u8]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A fifth of the stack is to stay untouched.
+/// A tenth of the stack is to stay untouched.
 fn check_stack() -> Result<(), Failure> {
-    let (used, most) = (stack::most_used(), STACK_LEN * 4 / 5);
+    let (used, most) = (stack::most_used(), STACK_LEN * 9 / 10);
     defmt::info!("stack: {} bytes used, {} may be", used, most);
     if used > most { Err(Failure::Stack { used, most }) } else { Ok(()) }
 }

@@ -244,6 +244,7 @@ mod tests {
                 }
             };
             let (a, b) = (pair(), pair());
+            let ([a0, a1, a2], [b0, b1, b2]) = (a.symbol_bits, b.symbol_bits);
             let both = ScratchShape {
                 feature_dim: a.feature_dim.max(b.feature_dim),
                 n_offsets: a.n_offsets.max(b.n_offsets),
@@ -253,7 +254,7 @@ mod tests {
                 n_tables: a.n_tables.max(b.n_tables),
                 context_inputs: a.context_inputs.max(b.context_inputs),
                 context_hidden: a.context_hidden.max(b.context_hidden),
-                symbol_bits: std::array::from_fn(|group| a.symbol_bits[group].max(b.symbol_bits[group])),
+                symbol_bits: [a0.max(b0), a1.max(b1), a2.max(b2)],
                 lattice_bits: a.lattice_bits.max(b.lattice_bits),
                 masks: a.masks | b.masks,
                 max_splats: a.max_splats.max(b.max_splats),

@@ -62,13 +62,26 @@ impl Encoding {
         // Photographs are not larger than frames may be: loading has seen to it.
         let [width_px, height_px] = largest_px(capture).map(|px| px as u16);
         let frame = Budget::for_frame(width_px, height_px);
-        let write = |finished: &Finished| self.write(finished, capture, background, held_out);
+        // A device that decodes in every frame pays six times as much for the context as for tables, whatever it saves.
+        let first = match (self.coder, self.limits.frame_instructions) {
+            (Coder::Auto, Some(_)) => Coder::Static,
+            (coder, _) => coder,
+        };
+        let write = |finished: &Finished| {
+            let written = self.write(finished, first, capture, background, held_out)?;
+            let fits = self.limits.flash_bytes.is_none_or(|most| written.bytes.len() as u64 <= most);
+            if fits || first == self.coder {
+                return Ok(written);
+            }
+            self.write(finished, self.coder, capture, background, held_out)
+        };
         Ok(fitted(finished, &self.limits, &frame, write)?)
     }
 
     fn write(
         &self,
         finished: &Finished,
+        coder: Coder,
         capture: &Capture,
         background: Background,
         held_out: &[View],
@@ -82,7 +95,7 @@ impl Encoding {
         };
         let options = WriteOptions {
             steps: self.quantisation,
-            coder: self.coder,
+            coder,
             importance: Some(finished.importance.clone()),
             pruning_rates: self.tiers.clone(),
             ..WriteOptions::default()

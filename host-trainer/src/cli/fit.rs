@@ -5,6 +5,9 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, bail};
 use bytesize::ByteSize;
 use pocketsplat::dataset::FrameSize;
+use pocketsplat::device::Target;
+use pocketsplat::instructions::predict;
+use pocketsplat::verify::Trial;
 use pocketsplat_core::budget::MAX_FRAME_PX;
 use pocketsplat_core::{Budget, Bundle, DecodeError, Plan};
 use serde::Serialize;
@@ -26,6 +29,9 @@ pub(crate) struct Args {
     /// The largest frame. [default: the size that the bundle was trained at]
     #[arg(long, value_name = "WxH")]
     resolution: Option<FrameSize>,
+    /// Also predict the instructions of a frame of the bundle's preview on such a processor.
+    #[arg(long, value_enum)]
+    target: Option<Target>,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
@@ -51,6 +57,9 @@ pub(crate) struct Point {
     head_macs: Option<u64>,
     decoded_anchors: Option<u64>,
     pixel_splats: Option<u64>,
+    /// Of the preview, predicted; anchors kept in memory were decoded before.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    instructions: Option<u64>,
 }
 
 #[derive(Serialize)]
@@ -67,11 +76,20 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let file = BundleFile::read(&args.bundle)?;
     let bundle = file.parse()?;
     let frame = frame_budget(&bundle, args.resolution)?;
-    let points = if args.ram.is_empty() {
+    let plans = if args.ram.is_empty() {
         ladder(&bundle, &frame)?
     } else {
-        args.ram.iter().map(|ram| point_within(&bundle, &frame, ram.as_u64())).collect::<Result<_>>()?
+        let within = |ram: &ByteSize| {
+            let plan = plan_within(&bundle, &frame, ram.as_u64()).with_context(|| format!("{ram} do not suffice"))?;
+            Ok((ram.as_u64(), plan))
+        };
+        args.ram.iter().map(within).collect::<Result<_>>()?
     };
+    let points = plans.iter().map(|(ram_bytes, plan)| {
+        let instructions = args.target.map(|target| preview_instructions(&bundle, plan, target)).transpose()?;
+        Ok(Point { instructions, ..point(&bundle, *ram_bytes, plan) })
+    });
+    let points = points.collect::<Result<_>>()?;
     let fit = Fit {
         bundle: args.bundle.clone(),
         bundle_bytes: file.bytes.len(),
@@ -113,10 +131,13 @@ pub(crate) fn plan_within(bundle: &Bundle<'_>, frame: &Budget, ram_bytes: u64) -
     })
 }
 
-fn point_within(bundle: &Bundle<'_>, frame: &Budget, ram_bytes: u64) -> Result<Point> {
-    let plan =
-        plan_within(bundle, frame, ram_bytes).with_context(|| format!("{} do not suffice", ByteSize(ram_bytes)))?;
-    Ok(point(bundle, ram_bytes, &plan))
+/// Draws the preview in the plan's size, and predicts from what it consists of.
+fn preview_instructions(bundle: &Bundle<'_>, plan: &Plan, target: Target) -> Result<u64> {
+    let Budget { width_px, height_px, .. } = *plan.budget();
+    let camera = bundle.header().preview.resized(width_px, height_px);
+    let Trial { report, .. } = Trial::run(bundle, *plan, &camera, 0, 0)?;
+    let stages = predict(target.costs(), bundle, plan, &report, [width_px, height_px]);
+    Ok(stages.iter().sum::<f64>() as u64)
 }
 
 fn point(bundle: &Bundle<'_>, ram_bytes: u64, plan: &Plan) -> Point {
@@ -135,32 +156,33 @@ fn point(bundle: &Bundle<'_>, ram_bytes: u64, plan: &Plan) -> Point {
         head_macs: work.map(|work| work.head_macs),
         decoded_anchors: work.map(|work| work.decoded_anchors),
         pixel_splats: work.map(|work| work.pixel_splats),
+        instructions: None,
     }
 }
 
 /// The memories at which something changes: from the least that does to where more is of no use.
-fn ladder(bundle: &Bundle<'_>, frame: &Budget) -> Result<Vec<Point>> {
-    let mut points = Vec::new();
+fn ladder(bundle: &Bundle<'_>, frame: &Budget) -> Result<Vec<(u64, Plan)>> {
+    let mut plans = Vec::new();
     // What the best plan within a budget leaves out of it, the next smaller budget lacks.
     let mut ram_bytes = bundle.plan(frame)?.scratch_len();
     loop {
         match bundle.plan(&frame.in_bytes(ram_bytes)) {
             Ok(plan) => {
                 let scratch_len = plan.scratch_len();
-                points.push(point(bundle, scratch_len as u64, &plan));
+                plans.push((scratch_len as u64, plan));
                 ram_bytes = scratch_len.saturating_sub(1);
             }
             Err(DecodeError::BudgetTooSmall { .. }) => break,
             Err(error) => return Err(error.into()),
         }
     }
-    points.reverse();
-    Ok(points)
+    plans.reverse();
+    Ok(plans)
 }
 
 fn table(fit: &Fit) -> String {
     let mut text = format!(
-        "{}: {} bytes, {} anchors, frames of {}x{} px\n\n{:>10}{:>10}{:>8}{:>9}{:>10}{:>7}{:>9}{:>8}{:>11}{:>9}{:>12}\n",
+        "{}: {} bytes, {} anchors, frames of {}x{} px\n\n{:>10}{:>10}{:>8}{:>9}{:>10}{:>7}{:>9}{:>8}{:>11}{:>9}{:>12}{:>9}\n",
         fit.bundle.display(),
         fit.bundle_bytes,
         fit.n_anchors,
@@ -176,14 +198,15 @@ fn table(fit: &Fit) -> String {
         "PSNR",
         "head MMAC",
         "decoded",
-        "Mpixels"
+        "Mpixels",
+        if fit.points.iter().any(|point| point.instructions.is_some()) { "Minstr" } else { "" }
     );
     for point in &fit.points {
         let psnr = point.psnr_db.map_or_else(|| "-".to_owned(), |psnr| format!("{psnr:.2}"));
         let millions = |count: Option<u64>| count.map_or_else(|| "-".to_owned(), |n| format!("{:.2}", n as f64 / 1e6));
         let decoded = point.decoded_anchors.map_or_else(|| "-".to_owned(), |n| n.to_string());
         text += &format!(
-            "{:>10}{:>10}{:>7.1}%{:>9}{:>10}{:>7}{:>9}{psnr:>8}{:>11}{decoded:>9}{:>12}\n",
+            "{:>10}{:>10}{:>7.1}%{:>9}{:>10}{:>7}{:>9}{psnr:>8}{:>11}{decoded:>9}{:>12}{:>9}\n",
             point.ram_bytes,
             point.scratch_bytes,
             100.0 * point.pruning_rate,
@@ -193,6 +216,7 @@ fn table(fit: &Fit) -> String {
             point.max_splats,
             millions(point.head_macs),
             millions(point.pixel_splats),
+            point.instructions.map_or_else(String::new, |n| format!("{:.1}", n as f64 / 1e6)),
         );
     }
     text

@@ -11,6 +11,8 @@ pub use fitting::{Fitted, NoFit, fitted};
 
 use serde::{Deserialize, Serialize};
 
+use crate::instructions;
+
 /// What a device has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Limits {
@@ -40,6 +42,8 @@ pub enum Target {
     CortexM4,
     /// A Cortex-M7: frames of 250 million instructions.
     CortexM7,
+    /// RISC-V without an FPU (RV32IMAC): frames of 1,000 million instructions.
+    Riscv32imac,
 }
 
 impl Target {
@@ -48,6 +52,15 @@ impl Target {
         match self {
             Self::CortexM4 => 80_000_000,
             Self::CortexM7 => 250_000_000,
+            Self::Riscv32imac => 1_000_000_000,
+        }
+    }
+
+    /// Whose costs it has.
+    pub fn costs(self) -> instructions::Target {
+        match self {
+            Self::CortexM4 | Self::CortexM7 => instructions::Target::CortexM,
+            Self::Riscv32imac => instructions::Target::RiscV32,
         }
     }
 }

@@ -37,6 +37,8 @@ pub struct WriteOptions {
     pub steps: QuantisationSteps,
     /// What gives the symbols their frequencies.
     pub coder: Coder,
+    /// Steps of static tables for a scene that has a context model, in units of the mean steps of that.
+    pub mean_step_share: f32,
     /// `[n_anchors]` larger for anchors that matter more; they come into earlier tiers. Without it there is one tier.
     pub importance: Option<Vec<f32>>,
     /// Pruning rates of the tiers, falling to 0: the share of anchors that the scene of tiers up to each one lacks.
@@ -53,6 +55,7 @@ impl Default for WriteOptions {
         Self {
             steps: QuantisationSteps::default(),
             coder: Coder::Auto,
+            mean_step_share: 1.0,
             importance: None,
             pruning_rates: vec![0.40, 0.30, 0.20, 0.10, 0.05, 0.0],
             head_fraction_bits: Some([9, 9]),
@@ -126,7 +129,7 @@ impl Writer<'_> {
         self.assemble(&rows, ChannelCoder::Context(*context), (SectionCode::Context, section.to_vec()))
     }
 
-    /// `base·2^(q̄/8)` for each group, q̄ being the mean exponent over the anchors.
+    /// `share·base·2^(q̄/8)` for each group, q̄ being the mean exponent over the anchors.
     fn mean_steps(&self, context: &Context<'_>, base_steps: [f32; 3]) -> [f32; 3] {
         let mut work = ContextWork::default();
         let mut sums = [0_i64; 3];
@@ -137,7 +140,8 @@ impl Writer<'_> {
             }
         }
         let n = self.placement.order.len().max(1) as f64;
-        std::array::from_fn(|group| base_steps[group] * (sums[group] as f64 / n / 8.0).exp2() as f32)
+        let share = self.options.mean_step_share;
+        std::array::from_fn(|group| share * base_steps[group] * (sums[group] as f64 / n / 8.0).exp2() as f32)
     }
 
     fn assemble(

@@ -23,6 +23,9 @@ pub(crate) struct Encoding {
     pub(crate) limits: Limits,
 }
 
+/// Shares of the mean steps for devices, finest first.
+const FOR_DEVICES: [f32; 4] = [0.5, 0.65, 0.8, 1.0];
+
 impl Default for Encoding {
     fn default() -> Self {
         let WriteOptions { steps, coder, pruning_rates, .. } = WriteOptions::default();
@@ -62,26 +65,32 @@ impl Encoding {
         // Photographs are not larger than frames may be: loading has seen to it.
         let [width_px, height_px] = largest_px(capture).map(|px| px as u16);
         let frame = Budget::for_frame(width_px, height_px);
-        // A device that decodes in every frame pays six times as much for the context as for tables, whatever it saves.
-        let first = match (self.coder, self.limits.frame_instructions) {
-            (Coder::Auto, Some(_)) => Coder::Static,
-            (coder, _) => coder,
-        };
         let write = |finished: &Finished| {
-            let written = self.write(finished, first, capture, background, held_out)?;
-            let fits = self.limits.flash_bytes.is_none_or(|most| written.bytes.len() as u64 <= most);
-            if fits || first == self.coder {
-                return Ok(written);
+            for (coder, mean_step_share) in self.ways_to_code() {
+                let written = self.write(finished, coder, mean_step_share, capture, background, held_out)?;
+                if self.limits.flash_bytes.is_none_or(|most| written.bytes.len() as u64 <= most) {
+                    return Ok(written);
+                }
             }
-            self.write(finished, self.coder, capture, background, held_out)
+            self.write(finished, self.coder, 1.0, capture, background, held_out)
         };
         Ok(fitted(finished, &self.limits, &frame, write)?)
+    }
+
+    /// Coders with their share of the mean steps, in the order in which they are tried.
+    ///
+    /// A device that decodes in every frame pays six times as much for the context as for tables. The finer steps that make
+    /// up for steps that do not follow the place are worth the bytes where there are any left.
+    fn ways_to_code(&self) -> impl Iterator<Item = (Coder, f32)> {
+        let for_device = self.coder == Coder::Auto && self.limits.frame_instructions.is_some();
+        FOR_DEVICES.into_iter().filter(move |_| for_device).map(|share| (Coder::Static, share))
     }
 
     fn write(
         &self,
         finished: &Finished,
         coder: Coder,
+        mean_step_share: f32,
         capture: &Capture,
         background: Background,
         held_out: &[View],
@@ -96,6 +105,7 @@ impl Encoding {
         let options = WriteOptions {
             steps: self.quantisation,
             coder,
+            mean_step_share,
             importance: Some(finished.importance.clone()),
             pruning_rates: self.tiers.clone(),
             ..WriteOptions::default()

@@ -28,6 +28,16 @@ impl Camera {
         -(self.rotation.transpose() * self.translation)
     }
 
+    /// The same lens at `eye`, looking at `target`, the image's up as near to `up` as that allows.
+    ///
+    /// The three must not lie on one line: there is no such camera.
+    pub fn looking_at(&self, eye: DVec3, target: DVec3, up: DVec3) -> Self {
+        let forward = (target - eye).normalize();
+        let right = forward.cross(up).normalize();
+        let rotation = DMat3::from_cols(right, forward.cross(right), forward).transpose();
+        Self { rotation, translation: -(rotation * eye), ..self.clone() }
+    }
+
     /// The same camera with its image scaled to `width_px × height_px`.
     pub fn resized(&self, width_px: u32, height_px: u32) -> Self {
         let sx = f64::from(width_px) / f64::from(self.width_px);

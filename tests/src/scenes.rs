@@ -123,19 +123,16 @@ pub fn with_context(scene: Scene<f32>, seed: u64) -> Scene<f32> {
 ///
 /// * `focal`: focal length in units of the image's width.
 pub fn look_at(eye: DVec3, target: DVec3, focal: f64, [width_px, height_px]: [u32; 2]) -> Camera {
-    let forward = (target - eye).normalize();
-    let right = forward.cross(DVec3::Z).normalize();
-    let down = forward.cross(right);
-    let rotation = DMat3::from_cols(right, down, forward).transpose();
     let focal_px = focal * f64::from(width_px);
-    Camera {
-        rotation,
-        translation: -(rotation * eye),
+    let lens = Camera {
+        rotation: DMat3::IDENTITY,
+        translation: DVec3::ZERO,
         focal_px: [focal_px, focal_px],
         principal_px: [f64::from(width_px) / 2.0, f64::from(height_px) / 2.0],
         width_px,
         height_px,
-    }
+    };
+    lens.looking_at(eye, target, DVec3::Z)
 }
 
 /// Cameras on a circle around the ball of [`random_scene`], of the size of the first of [`cameras`].

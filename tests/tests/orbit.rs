@@ -3,31 +3,17 @@
 use std::f64::consts::TAU;
 
 use conformance::frame::to_core;
-use glam::{DMat3, DVec3};
+use conformance::scenes::look_at;
+use glam::DVec3;
 use pocketsplat::bundle::manifest::cameras_to_measure;
 use pocketsplat::camera::Camera;
-
-/// A camera that looks at the origin, z up.
-fn at(eye: DVec3) -> Camera {
-    let forward = -eye.normalize();
-    let right = forward.cross(DVec3::Z).normalize();
-    let rotation = DMat3::from_cols(right, forward.cross(right), forward).transpose();
-    Camera {
-        rotation,
-        translation: -(rotation * eye),
-        focal_px: [50.0, 55.0],
-        principal_px: [20.0, 15.0],
-        width_px: 40,
-        height_px: 30,
-    }
-}
 
 #[test]
 fn carrying_a_camera_around_the_scene_takes_the_manifests_circle() {
     let ring: Vec<Camera> = (0..12)
         .map(|i| {
             let (sin, cos) = (TAU * f64::from(i) / 12.0).sin_cos();
-            at(DVec3::new(2.0 * cos, 2.0 * sin, 0.8))
+            look_at(DVec3::new(2.0 * cos, 2.0 * sin, 0.8), DVec3::ZERO, 1.25, [40, 30])
         })
         .collect();
     let orbit: Vec<_> = cameras_to_measure(&ring)[ring.len()..].iter().map(to_core).collect();

@@ -2,9 +2,9 @@
 
 use anyhow::{Result, bail};
 use pocketsplat::bundle::manifest::{cameras_to_measure, install, measure};
-use pocketsplat::bundle::{self, BundleInfo, Coder, QuantisationSteps, WriteOptions, Written};
+use pocketsplat::bundle::{self, BundleInfo, Coder, QuantisationSteps, WriteError, WriteOptions, Written};
 use pocketsplat::dataset::{Background, Capture, View};
-use pocketsplat::device::{Fitted, Limits, NoFit, fitted};
+use pocketsplat::device::{Fitted, Limits, fitted};
 use pocketsplat::train::finish::Finished;
 use pocketsplat_core::{Budget, Bundle};
 use serde::{Deserialize, Serialize};
@@ -66,24 +66,30 @@ impl Encoding {
         let [width_px, height_px] = largest_px(capture).map(|px| px as u16);
         let frame = Budget::for_frame(width_px, height_px);
         let write = |finished: &Finished| {
-            for (coder, mean_step_share) in self.ways_to_code() {
-                let written = self.write(finished, coder, mean_step_share, capture, background, held_out)?;
-                if self.limits.flash_bytes.is_none_or(|most| written.bytes.len() as u64 <= most) {
-                    return Ok(written);
-                }
-            }
-            self.write(finished, self.coder, 1.0, capture, background, held_out)
+            let mut written = self.coded(finished, capture, background)?;
+            let cameras: Vec<_> = capture.train.iter().map(|view| view.camera.clone()).collect();
+            let measures = measure(&Bundle::parse(&written.bytes)?, &cameras_to_measure(&cameras), held_out)?;
+            install(&mut written.bytes, &measures)?;
+            Ok(written)
         };
         Ok(fitted(finished, &self.limits, &frame, write)?)
     }
 
-    /// Coders with their share of the mean steps, in the order in which they are tried.
+    /// Codes a scene, for a device with the finest tables that its flash has room for.
     ///
-    /// A device that decodes in every frame pays six times as much for the context as for tables. The finer steps that make
-    /// up for steps that do not follow the place are worth the bytes where there are any left.
-    fn ways_to_code(&self) -> impl Iterator<Item = (Coder, f32)> {
-        let for_device = self.coder == Coder::Auto && self.limits.frame_instructions.is_some();
-        FOR_DEVICES.into_iter().filter(move |_| for_device).map(|share| (Coder::Static, share))
+    /// A device that decodes in every frame pays six times as much for the context as for tables. Finer steps make up for
+    /// steps that do not follow the place.
+    fn coded(&self, finished: &Finished, capture: &Capture, background: Background) -> Result<Written, WriteError> {
+        let chooses = self.coder == Coder::Auto && finished.scene.context.is_some();
+        if chooses && self.limits.frame_instructions.is_some() {
+            for mean_step_share in FOR_DEVICES {
+                let written = self.write(finished, Coder::Static, mean_step_share, capture, background)?;
+                if self.limits.flash_bytes.is_none_or(|most| written.bytes.len() as u64 <= most) {
+                    return Ok(written);
+                }
+            }
+        }
+        self.write(finished, self.coder, 1.0, capture, background)
     }
 
     fn write(
@@ -93,8 +99,7 @@ impl Encoding {
         mean_step_share: f32,
         capture: &Capture,
         background: Background,
-        held_out: &[View],
-    ) -> Result<Written, NoFit> {
+    ) -> Result<Written, WriteError> {
         let info = BundleInfo {
             normalisation: capture.normalisation,
             background: background.rgb8(),
@@ -110,11 +115,7 @@ impl Encoding {
             pruning_rates: self.tiers.clone(),
             ..WriteOptions::default()
         };
-        let mut written = bundle::write(&finished.scene, &info, &options)?;
-        let cameras: Vec<_> = capture.train.iter().map(|view| view.camera.clone()).collect();
-        let measures = measure(&Bundle::parse(&written.bytes)?, &cameras_to_measure(&cameras), held_out)?;
-        install(&mut written.bytes, &measures)?;
-        Ok(written)
+        bundle::write(&finished.scene, &info, &options)
     }
 }
 

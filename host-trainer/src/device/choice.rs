@@ -8,23 +8,22 @@ use super::Limits;
 
 /// Feature widths F and offsets K, widest first, and the splats that an anchor of them draws in the fullest view.
 ///
-/// Measured on lego at 120×120 pixels (`docs/benchmarks.md`): of equal memory for splats, fewer offsets an anchor and more
-/// anchors gain.
+/// Splats are measured for two, three and four offsets with features of 16 on lego at 120×120 pixels (`docs/benchmarks.md`), where
+/// fewer offsets and more anchors gain, and carried on to five; a frame filled with photographs has a quarter more.
 const MODELS: [Model; 4] = [
     Model { feature_dim: 32, n_offsets: 5, splats_per_anchor: 2.8 },
     Model { feature_dim: 24, n_offsets: 4, splats_per_anchor: 2.4 },
     Model { feature_dim: 16, n_offsets: 3, splats_per_anchor: 1.55 },
-    Model { feature_dim: 8, n_offsets: 2, splats_per_anchor: 1.2 },
+    Model { feature_dim: 8, n_offsets: 2, splats_per_anchor: 1.0 },
 ];
 /// Anchors without which a wider model is of no use.
 const ENOUGH_ANCHORS: usize = 4_000;
 /// Fewer than these show nothing.
 const FEWEST_ANCHORS: usize = 64;
-/// Share of a frame's splats that the fuller of two strips has.
+/// Share of a frame's splats that the fuller of two strips has, and below how often the heads then run for an anchor: lego's.
 const SHARE_OF_TWO_STRIPS: f64 = 0.78;
-/// Times that the heads run for an anchor when a frame is drawn in two strips.
 const HEAD_PASSES: f64 = 1.6;
-/// Instructions of a Cortex-M4 for a multiply-add of the heads and for a symbol.
+/// Instructions of a Cortex-M4 for a multiply-add of the heads and for a symbol, before a frame is there to predict from.
 const PER_MAC: f64 = 2.5;
 const PER_SYMBOL: f64 = 64.0;
 /// Share of a frame's instructions that goes into anchors; the rest projects, sorts and blends.

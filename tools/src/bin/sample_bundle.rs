@@ -164,18 +164,15 @@ fn pass(head: &mut Head<f32>, output: usize, feature: usize) {
 }
 
 fn camera() -> Camera {
-    let eye = DVec3::new(2.6, -3.4, 1.5);
-    let forward = -eye.normalize();
-    let right = forward.cross(DVec3::Z).normalize();
-    let rotation = DMat3::from_cols(right, forward.cross(right), forward).transpose();
-    Camera {
-        rotation,
-        translation: -(rotation * eye),
+    let lens = Camera {
+        rotation: DMat3::IDENTITY,
+        translation: DVec3::ZERO,
         focal_px: [190.0, 190.0],
         principal_px: [80.0, 60.0],
         width_px: 160,
         height_px: 120,
-    }
+    };
+    lens.looking_at(DVec3::new(2.6, -3.4, 1.5), DVec3::ZERO, DVec3::Z)
 }
 
 /// A context model that predicts each channel's mean and deviation everywhere, and steps a little finer on one side.

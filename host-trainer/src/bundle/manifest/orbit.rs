@@ -37,24 +37,16 @@ pub(super) fn around(cameras: &[Camera]) -> Vec<Camera> {
         .map(|i| {
             let (sin, cos) = (TAU * f64::from(i) / f64::from(N_CAMERAS)).sin_cos();
             let eye = centre + radius * (cos * side + sin * front) + height * up;
-            looking_at(centre, eye, up, first)
+            first.looking_at(eye, centre, up)
         })
         .collect()
-}
-
-/// A camera at `eye` with another's lens.
-fn looking_at(target: DVec3, eye: DVec3, up: DVec3, lens: &Camera) -> Camera {
-    let forward = (target - eye).normalize();
-    let right = forward.cross(up).normalize();
-    let rotation = DMat3::from_cols(right, forward.cross(right), forward).transpose();
-    Camera { rotation, translation: -(rotation * eye), ..lens.clone() }
 }
 
 #[cfg(test)]
 mod tests {
     use glam::{DMat3, DVec3};
 
-    use super::{around, looking_at};
+    use super::around;
     use crate::camera::Camera;
 
     const LENS: Camera = Camera {
@@ -74,7 +66,7 @@ mod tests {
                 let (sin, cos) = (2.4 * f64::from(i)).sin_cos();
                 let z = 0.05 + 0.9 * f64::from(i) / 40.0;
                 let r = (1.0 - z * z).sqrt();
-                looking_at(TARGET, TARGET + 3.0 * DVec3::new(r * cos, r * sin, z), DVec3::Z, &LENS)
+                LENS.looking_at(TARGET + 3.0 * DVec3::new(r * cos, r * sin, z), TARGET, DVec3::Z)
             })
             .collect()
     }

@@ -34,6 +34,15 @@ pub fn exp(x: f32) -> f32 {
     // Comparisons, not `f32::max`: NaN passes through, and no library call remains on a Cortex-M4.
     let x = if x < EXP_MIN { EXP_MIN } else { x };
     let x = if x > EXP_MAX { EXP_MAX } else { x };
+    exp_near(x)
+}
+
+/// [`exp`] without its clamp: for arguments known to lie in [`EXP_MIN`]..=[`EXP_MAX`]; others give some number or NaN.
+///
+/// # Budget
+/// About 15 instructions, no division, no branch.
+#[inline(always)]
+pub(crate) fn exp_near(x: f32) -> f32 {
     let shifted = x * core::f32::consts::LOG2_E + ROUNDER;
     let n = shifted - ROUNDER;
     let r = (x - n * LN_2_HIGH) - n * LN_2_LOW;

@@ -9,5 +9,6 @@ mod exp;
 mod half;
 
 pub use activation::{sigmoid, tanh};
+pub(crate) use exp::exp_near;
 pub use exp::{EXP_MAX, EXP_MIN, exp};
 pub use half::{from_half, is_finite_half, to_half};

@@ -1,7 +1,7 @@
 //! Front-to-back compositing of one tile.
 
 use super::tile::{TILE_PX, TileRect};
-use crate::math::exp;
+use crate::math::{exp, exp_near};
 use crate::project::{LN_255, PackedSplat, Splat};
 
 /// No splat is opaque; it keeps the light behind it computable.
@@ -85,7 +85,8 @@ pub(crate) fn blend_tile(
 ///
 /// Along a row alpha is a Gaussian of x, so the step from pixel to pixel is a factor, which itself changes by a constant
 /// factor: two multiplications replace an exponential. Over 16 pixels the rounding grows to about 1e-5 of alpha.
-#[inline]
+// Not inlined: among everything that a frame needs its loops would not stay in registers.
+#[inline(never)]
 fn blend_splat(place: TilePlace, splat: &Splat, pixels: &mut [[f32; 4]], alive: &mut u32) -> [u32; 2] {
     let [mean_x, mean_y] = splat.mean;
     // In pixels of the tile, measured from the centre of its first one.
@@ -96,47 +97,50 @@ fn blend_splat(place: TilePlace, splat: &Splat, pixels: &mut [[f32; 4]], alive: 
     let ratio_step = exp(-splat.row_precision);
     let half_height = sqrt_above(reach / splat.column_precision) + SLACK_PX;
     let Some((first, last)) = span(centre_y, half_height, place.height) else { return [0; 2] };
+    let (rows, _) = pixels.as_chunks_mut::<{ TILE_PX as usize }>();
+    let Some(rows) = rows.get_mut(first..=last) else { return [0; 2] };
+    let n_rows = rows.len() as u32;
     let mut n_evaluated = 0;
-    let rows = pixels.chunks_exact_mut(TILE_PX.into()).enumerate();
-    for (y, row) in rows.take(last + 1).skip(first) {
-        let dy = y as f32 - centre_y;
+    let mut dy = first as f32 - centre_y;
+    for row in rows {
         let across = dy * dy * splat.column_precision;
-        let left = reach - across;
         let row_centre = centre_x + splat.shear * dy;
+        dy += 1.0;
+        let left = reach - across;
         let half_width = sqrt_above(if left > 0.0 { left * row_variance } else { 0.0 }) + SLACK_PX;
         let Some((first, last)) = span(row_centre, half_width, place.width) else { continue };
-        let dx = first as f32 - row_centre;
-        let mut gauss = exp(splat.log_opacity - 0.5 * (across + dx * dx * splat.row_precision));
-        let mut ratio = exp(-splat.row_precision * (dx + 0.5));
         let Some(pixels) = row.get_mut(first..=last) else { continue };
+        let dx = first as f32 - row_centre;
+        let mut gauss = exp_near(splat.log_opacity - 0.5 * (across + dx * dx * splat.row_precision));
+        let mut ratio = exp_near(-splat.row_precision * (dx + 0.5));
         n_evaluated += pixels.len() as u32;
         for pixel in pixels {
-            if gauss >= ALPHA_MIN {
-                *alive -= blend_pixel(pixel, gauss, splat.colour);
+            if gauss >= ALPHA_MIN && blend_pixel(pixel, gauss, splat.colour) {
+                *alive -= 1;
             }
             gauss *= ratio;
             ratio *= ratio_step;
         }
     }
-    [(last + 1 - first) as u32, n_evaluated]
+    [n_rows, n_evaluated]
 }
 
-/// Blends one splat into one pixel; returns 1 when the pixel is finished by it.
-#[inline]
-fn blend_pixel(pixel: &mut [f32; 4], gauss: f32, [red, green, blue]: [f32; 3]) -> u32 {
+/// Blends one splat into one pixel; returns whether the pixel is finished by it.
+#[inline(always)]
+fn blend_pixel(pixel: &mut [f32; 4], gauss: f32, [red, green, blue]: [f32; 3]) -> bool {
     let alpha = if gauss > ALPHA_MAX { ALPHA_MAX } else { gauss };
     let [r, g, b, transmittance] = *pixel;
     let next = transmittance * (1.0 - alpha);
     if next >= TRANSMITTANCE_MIN {
         let weight = alpha * transmittance;
         *pixel = [r + weight * red, g + weight * green, b + weight * blue, next];
-        return 0;
+        return false;
     }
-    if transmittance > 0.0 {
+    let finished = transmittance > 0.0;
+    if finished {
         *pixel = [r, g, b, -transmittance];
-        return 1;
     }
-    0
+    finished
 }
 
 /// Adds the background and rounds to bytes.
@@ -150,22 +154,23 @@ fn finish_pixel([r, g, b, transmittance]: [f32; 4], [back_r, back_g, back_b]: [f
 
 /// Slack for rounding of a span's ends, pixels; the test of alpha decides about the pixels it adds.
 const SLACK_PX: f32 = 1e-3;
+/// Rounds a span's beginning up when added before digits are cut off, except for the last thousandth of a pixel.
+const ALMOST_ONE: f32 = 0.999;
 
-/// First and last pixel within `half` of `centre` among `0..n`; pixel i lies at i.
+/// First and last pixel within `half` of `centre` among `0..n`, and maybe one before them; pixel i lies at i.
 #[inline]
 fn span(centre: f32, half: f32, n: u16) -> Option<(usize, usize)> {
     let low = centre - half;
     let high = centre + half;
-    let end = f32::from(n);
-    // Written so that NaN leaves as well.
-    if !(high >= 0.0 && low < end) {
+    if high < 0.0 {
         return None;
     }
-    // Both casts round towards zero and saturate there; `low` is rounded up by hand.
-    let first = low as u16;
-    let first = if f32::from(first) < low { first + 1 } else { first };
-    let last = if high < end { high as u16 } else { n - 1 };
-    (first <= last && last < n).then_some((first.into(), last.into()))
+    // Both casts round towards zero and saturate; NaN gives the first pixel, which the test of alpha leaves alone.
+    let first = (low + ALMOST_ONE) as u32;
+    let last = high as u32;
+    let end = u32::from(n);
+    let last = if last < end { last } else { end.wrapping_sub(1) };
+    (first <= last && last < end).then_some((first as usize, last as usize))
 }
 
 /// A number not below √x and at most 0.2 % above it, for spans that may be too long but not too short.

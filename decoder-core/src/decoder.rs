@@ -9,18 +9,20 @@ mod tally;
 
 pub use report::FrameReport;
 
-use crate::budget::{Arena, Plan, ScratchShape};
+use crate::budget::{Arena, Overflow, Plan, ScratchShape};
 use crate::bundle::{AnchorRecords, Bundle, Chunk, RecordMemory, Tables, in_range, saturate};
 use crate::camera::Camera;
 use crate::error::{DecodeError, Field};
 use crate::mlp::{HeadShape, Heads};
 use crate::project::View;
-use crate::raster::{Canvas, N_RADIX, TILE_PIXELS, TILE_PX, TilePlace, TileRect, blend_tile, sort_by_depth};
+use crate::raster::{
+    EMPTY, N_RADIX, Pixel, TILE_PIXELS, TILE_PX, TilePlace, TileRect, blend_tile, finish_tile, sort_by_depth,
+};
 use crate::scene::Workspace;
 use crate::stopwatch::{Stage, Stopwatch};
 use gather::Frame;
 use source::AnchorSource;
-use splats::SplatStore;
+use splats::{Slab, SplatStore};
 use strip::{Strip, StripLayout};
 use tally::Tally;
 
@@ -42,11 +44,11 @@ pub struct Decoder<'b, 's> {
     /// `[n_channels]` of the anchor in work.
     row: &'s mut [f32],
     work: Workspace<'s>,
-    counts: &'s mut [u32],
-    canvas: Canvas<'s>,
+    /// `[TILE_PIXELS]` of the tile in work, or of each tile of a strip when strips are drawn in slabs.
+    pixels: &'s mut [Pixel],
+    /// `[TILE_PIXELS]` a finished tile.
+    rgb: &'s mut [[u8; 3]],
     splats: SplatStore<'s>,
-    order: &'s mut [u32],
-    spare: &'s mut [u32],
 }
 
 impl<'b, 's> Decoder<'b, 's> {
@@ -129,11 +131,16 @@ impl<'b, 's> Decoder<'b, 's> {
             source,
             row,
             work,
-            counts: arena.take(N_RADIX)?,
-            canvas: Canvas { pixels: arena.take(TILE_PIXELS)?, rgb: arena.take(TILE_PIXELS)? },
-            splats: SplatStore { splats: arena.take(n_splats)?, rects: arena.take(n_splats)?, n: 0 },
-            order: arena.take(n_splats)?,
-            spare: arena.take(n_splats)?,
+            pixels: arena.take(TILE_PIXELS.saturating_mul(plan.shape().canvas_tiles as usize))?,
+            rgb: arena.take(TILE_PIXELS)?,
+            splats: SplatStore {
+                counts: arena.take(N_RADIX)?,
+                splats: arena.take(n_splats)?,
+                rects: arena.take(n_splats)?,
+                n: 0,
+                order: arena.take(n_splats)?,
+                spare: arena.take(n_splats)?,
+            },
         })
     }
 
@@ -146,7 +153,7 @@ impl<'b, 's> Decoder<'b, 's> {
     /// Draws the scene as `camera` sees it and hands it to `sink` tile by tile.
     ///
     /// A view with more splats than planned draws those of the file's first anchors, in all strips the same, and reports how
-    /// many it left out.
+    /// many it left out; or it draws a strip in several slabs of depth if the [budget](crate::Overflow) says so.
     ///
     /// # Errors
     /// [`DecodeError::OutOfRange`] for a frame larger than planned and [`DecodeError::BadFloat`] for an unusable camera,
@@ -180,18 +187,39 @@ impl<'b, 's> Decoder<'b, 's> {
         in_range(Field::FrameWidth, camera.width_px.into(), 1, budget.width_px.into())?;
         in_range(Field::FrameHeight, camera.height_px.into(), 1, budget.height_px.into())?;
         let strips = StripLayout::new(camera.height_px, self.plan.n_strips());
-        let tallies = strips.len() == 1 || !self.surely_fits(&view, strips);
+        let in_slabs = budget.overflow == Overflow::Slabs;
+        let tallies = !in_slabs && (strips.len() == 1 || !self.surely_fits(&view, strips));
         let tally = Tally::new(self.plan.max_splats());
-        let mut frame = Frame { view, strips, tallies, tally, report: FrameReport::default() };
+        let mut frame = Frame { view, strips, tallies, in_slabs, tally, report: FrameReport::default() };
         let mut most_in_memory = 0;
         for strip in strips.iter() {
-            self.gather(strip, &mut frame, watch)?;
-            most_in_memory = self.splats.n.max(most_in_memory);
-            frame.report.strip_splats = frame.report.strip_splats.saturating_add(self.splats.n);
-            self.draw(strip, camera, sink, &mut frame.report, watch);
+            let (mut from, mut in_strip) = (0.0, 0_u32);
+            loop {
+                let slab = self.gather(strip, from, &mut frame, watch)?;
+                let n = self.splats.n;
+                most_in_memory = n.max(most_in_memory);
+                in_strip = in_strip.saturating_add(n);
+                let rects = self.splats.rects.iter().take(n as usize);
+                let first_here =
+                    rects.filter(|rect| *strips.touched(**rect).start() == usize::from(strip.index)).count();
+                frame.report.splats = frame.report.splats.saturating_add(first_here as u32);
+                let alive = self.draw(strip, slab, camera, sink, &mut frame.report, watch);
+                if !slab.ends() {
+                    break;
+                }
+                from = slab.end;
+                if !alive {
+                    // Nothing behind can be seen: the strip goes out as it is.
+                    self.splats.n = 0;
+                    self.draw(strip, Slab::behind(from), camera, sink, &mut frame.report, watch);
+                    break;
+                }
+            }
+            frame.report.strip_splats = frame.report.strip_splats.saturating_add(in_strip);
+            frame.report.max_splats = frame.report.max_splats.max(in_strip);
         }
         let Frame { tally, mut report, .. } = frame;
-        report.splats_dropped = tally.n_dropped();
+        report.splats_dropped = report.splats_dropped.saturating_add(tally.n_dropped());
         report.max_splats = report.max_splats.max(tally.max_demand());
         report.scratch_used = saturate(ScratchShape { max_splats: most_in_memory, ..*self.plan.shape() }.scratch_len());
         Ok(report)
@@ -208,20 +236,27 @@ impl<'b, 's> Decoder<'b, 's> {
         })
     }
 
-    /// Orders the splats of a strip and draws tile after tile.
+    /// Orders the splats of a strip's slab and draws tile after tile; behind the last slab tiles go to `sink`. Returns whether
+    /// more can be seen behind them.
     fn draw(
         &mut self,
         strip: Strip,
+        slab: Slab,
         camera: &Camera,
         sink: &mut impl TileSink,
         report: &mut FrameReport,
         watch: &mut impl Stopwatch,
-    ) {
+    ) -> bool {
         watch.enter(Stage::Sort);
-        let n = self.splats.n as usize;
-        let (Some(splats), Some(rects)) = (self.splats.splats.get(..n), self.splats.rects.get(..n)) else { return };
-        let (Some(order), Some(spare)) = (self.order.get_mut(..n), self.spare.get_mut(..n)) else { return };
-        let (order, row_list) = sort_by_depth(splats, order, spare, self.counts);
+        report.slabs = report.slabs.saturating_add(1);
+        let SplatStore { splats, rects, n, order, spare, counts } = &mut self.splats;
+        let n = *n as usize;
+        let (Some(splats), Some(rects)) = (splats.get(..n), rects.get(..n)) else { return false };
+        let (Some(order), Some(spare)) = (order.get_mut(..n), spare.get_mut(..n)) else { return false };
+        let (order, row_list) = sort_by_depth(splats, order, spare, counts);
+        // One after the other, or all at once.
+        let keeps_tiles = self.plan.shape().canvas_tiles > 1;
+        let (mut n_tiles, mut alive) = (0, 0);
         let background = self.bundle.header().background.map(|byte| f32::from(byte) / 255.0);
         let rows = (0..).zip(tiles_along(camera.height_px));
         for (row, (y_px, height)) in rows.take(strip.end_row.into()).skip(strip.first_row.into()) {
@@ -230,15 +265,28 @@ impl<'b, 's> Decoder<'b, 's> {
             for (column, (x_px, width)) in (0..).zip(tiles_along(camera.width_px)) {
                 watch.enter(Stage::Blend);
                 let place = TilePlace { column, row, width, height };
-                let work = blend_tile(place, splats, rects, list, background, &mut self.canvas);
+                let Some(pixels) = self.pixels.chunks_exact_mut(TILE_PIXELS).nth(if keeps_tiles { n_tiles } else { 0 })
+                else {
+                    return false;
+                };
+                n_tiles += 1;
+                if slab.from == 0.0 {
+                    pixels.fill(EMPTY);
+                }
+                let work = blend_tile(place, splats, rects, list, pixels);
+                alive += work.alive;
                 report.tile_splats = report.tile_splats.saturating_add(work.splats);
                 report.row_splats = report.row_splats.saturating_add(work.rows);
                 report.pixel_splats = report.pixel_splats.saturating_add(work.pixels);
-                let n_pixels = usize::from(width) * usize::from(height);
-                watch.enter(Stage::Output);
-                sink.tile(x_px, y_px, width, height, self.canvas.rgb.get(..n_pixels).unwrap_or_default());
+                if !slab.ends() {
+                    finish_tile(place, pixels, background, self.rgb);
+                    let n_pixels = usize::from(width) * usize::from(height);
+                    watch.enter(Stage::Output);
+                    sink.tile(x_px, y_px, width, height, self.rgb.get(..n_pixels).unwrap_or_default());
+                }
             }
         }
+        alive > 0
     }
 }
 

@@ -18,7 +18,7 @@ use embedded_graphics::geometry::Point;
 use instructions::{Instructions, Table};
 use panel::{PANEL, Panel, write_ppm};
 use pocketsplat_core::display::DisplaySink;
-use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, Stage, Stopwatch as _};
+use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, Overflow, Stage, Stopwatch as _};
 #[cfg(target_arch = "riscv32")]
 use riscv as _;
 use semihosting::io;
@@ -78,15 +78,18 @@ fn draw_orbit(panel: &mut Panel, scratch: &mut [u8]) -> Result<(), Failure> {
 
     // The build script's sizes fit these types, or the panel would not exist.
     let preview = header.preview.resized(WIDTH_PX as u16, HEIGHT_PX as u16);
-    let plan = bundle.plan(&Budget::for_frame(preview.width_px, preview.height_px).in_bytes(scratch.len()))?;
+    let budget = Budget::for_frame(preview.width_px, preview.height_px).in_bytes(scratch.len());
+    // A scene that no pruning rate makes small enough still fits in slabs of depth, which take longer.
+    let plan = bundle.plan(&budget).or_else(|_| bundle.plan(&budget.with_overflow(Overflow::Slabs)))?;
     defmt::info!("scratch: {} bytes, of which the plan takes {}", scratch.len(), plan.scratch_len());
     defmt::info!(
-        "plan: {} of {} tiers, pruning rate {}, resident {}, {} strips of at most {} splats, {}",
+        "plan: {} of {} tiers, pruning rate {}, resident {}, {} strips of at most {} slabs of at most {} splats, {}",
         plan.n_tiers(),
         bundle.n_tiers(),
         plan.pruning_rate(),
         plan.is_resident(),
         plan.n_strips(),
+        plan.n_slabs(),
         plan.max_splats(),
         plan.work()
     );

@@ -61,10 +61,10 @@ pub fn terms(bundle: &Bundle<'_>, plan: &Plan, report: &FrameReport, size_px: [u
             (0.0, symbols, decoded * f64::from(corners), rows + decoded * hidden, hidden * (decoded * inputs + rows))
         }
     };
+    let count = |n: u32| f64::from(n);
     let [width, height] = size_px.map(f64::from);
     let rows_of_strip = f64::from(size_px[1].div_ceil(16).div_ceil(plan.n_strips().into()));
-    let chunk_tests = f64::from(bundle.n_chunks()) * f64::from(plan.n_strips());
-    let count = |n: u32| f64::from(n);
+    let chunk_tests = f64::from(bundle.n_chunks()) * count(report.slabs);
     let term = |stage, name, count| Term { name, stage, count };
     [
         term(Decode, "anchor decoded", decoded),
@@ -78,12 +78,13 @@ pub fn terms(bundle: &Bundle<'_>, plan: &Plan, report: &FrameReport, size_px: [u
         term(Heads, "multiply-add of the heads", report.head_macs as f64),
         term(Heads, "visible anchor", count(report.anchors_visible)),
         term(Heads, "Gaussian", count(report.gaussians)),
-        term(Project, "chunk and strip", chunk_tests),
+        term(Project, "chunk and slab", chunk_tests),
         term(Project, "anchor", count(report.anchors_read)),
         term(Project, "Gaussian", count(report.gaussians)),
         term(Sort, "splat and strip", count(report.strip_splats)),
         term(Sort, "splat and row of tiles", count(report.strip_splats) * rows_of_strip),
-        term(Blend, "pixel", width * height),
+        // Each slab of a strip looks at the strip's pixels again.
+        term(Blend, "pixel", width * height * count(report.slabs) / f64::from(plan.n_strips())),
         term(Blend, "splat and tile", count(report.tile_splats)),
         term(Blend, "splat and row of pixels", count(report.row_splats)),
         term(Blend, "splat and pixel", count(report.pixel_splats)),

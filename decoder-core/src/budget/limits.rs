@@ -48,6 +48,19 @@ pub enum Strips {
     Exactly(u8),
 }
 
+/// What becomes of the splats of a strip that there is no place for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Overflow {
+    /// Those of the file's last anchors are left out, and [reported](crate::FrameReport::splats_dropped): the work of a frame
+    /// is bounded.
+    LeaveOut,
+    /// They are drawn later: a strip is produced from near to far, in as many slabs of depth as it takes, each of which goes
+    /// over the anchors again, until nothing more can be seen. The frame is the one that more memory would draw; the pixels of
+    /// a whole strip are in memory, 16 bytes each.
+    Slabs,
+}
+
 /// The limits a caller sets.
 ///
 /// ```
@@ -74,6 +87,8 @@ pub struct Budget {
     pub residency: Residency,
     /// Parts of a frame.
     pub strips: Strips,
+    /// Splats that have no place.
+    pub overflow: Overflow,
 }
 
 impl Budget {
@@ -88,6 +103,7 @@ impl Budget {
             max_splats: MaxSplats::Measured,
             residency: Residency::Auto,
             strips: Strips::Auto,
+            overflow: Overflow::LeaveOut,
         }
     }
 
@@ -119,6 +135,12 @@ impl Budget {
     #[must_use]
     pub const fn with_strips(self, strips: Strips) -> Self {
         Self { strips, ..self }
+    }
+
+    /// The same with splats that have no place left out or drawn later.
+    #[must_use]
+    pub const fn with_overflow(self, overflow: Overflow) -> Self {
+        Self { overflow, ..self }
     }
 
     /// Frame and strips lie within their limits.

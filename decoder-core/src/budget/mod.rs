@@ -12,7 +12,7 @@ mod scratch;
 mod work;
 
 pub(crate) use arena::Arena;
-pub use limits::{Budget, MAX_FRAME_PX, MAX_STRIPS, MaxSplats, Residency, Strips};
+pub use limits::{Budget, MAX_FRAME_PX, MAX_STRIPS, MaxSplats, Overflow, Residency, Strips};
 pub use plan::Plan;
 pub use scratch::ScratchShape;
 pub use work::Work;

@@ -1,6 +1,6 @@
 //! From limits to a number of bytes.
 
-use super::limits::{Budget, MaxSplats, Residency, Strips};
+use super::limits::{Budget, MaxSplats, Overflow, Residency, Strips};
 use super::scratch::ScratchShape;
 use super::work::{Work, decoding_macs};
 use crate::bundle::{Bundle, TierMeasures, saturate};
@@ -11,6 +11,9 @@ use crate::raster::TILE_PX;
 /// Numbers of strips that the manifest has maxima for, and that plans try.
 const STRIPS: [u8; 4] = [1, 2, 4, 8];
 
+/// Fewer splats to a slab are not planned.
+const MIN_SLAB_SPLATS: u32 = 256;
+
 /// What a decoder of one bundle needs and does within a [`Budget`]; made by [`Bundle::plan`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -18,6 +21,7 @@ pub struct Plan {
     budget: Budget,
     n_tiers: u8,
     n_strips: u8,
+    n_slabs: u32,
     shape: ScratchShape,
     scratch_len: usize,
     pruning_rate: f32,
@@ -55,6 +59,13 @@ impl Plan {
         self.n_strips
     }
 
+    /// Slabs of depth that the fullest strip of the measured views takes at most; 1 if there are places for all of its splats.
+    /// Coincident depths may take more.
+    #[must_use]
+    pub fn n_slabs(&self) -> u32 {
+        self.n_slabs
+    }
+
     /// Splats that there is memory for at once.
     #[must_use]
     pub fn max_splats(&self) -> u32 {
@@ -70,7 +81,7 @@ impl Plan {
     /// A bound on the work of a frame: of the views in the manifest, for cameras of at most the budget's size; another
     /// view may need more. `None` when the manifest is not measured.
     ///
-    /// With n strips heads and decoding count n times, because each strip may need every anchor; most need few.
+    /// With n strips, or slabs of them, heads and decoding count n times, because each may need every anchor; most need few.
     #[must_use]
     pub fn work(&self) -> Option<Work> {
         self.work
@@ -91,6 +102,9 @@ impl Bundle<'_> {
     /// costs the heads' (from the manifest, else of all anchors), and decoding when anchors are streamed. Of equals the
     /// fewest strips are taken. The frame's size decides about memory only through the splats of a strip, because tiles
     /// leave one by one; a splat takes 40 bytes.
+    ///
+    /// When [slabs](Overflow::Slabs) are allowed, fewer places than splats will do, down to 256: then nearly every scene fits
+    /// whole, and going over it counts once more for each slab.
     ///
     /// # Errors
     /// [`DecodeError::BudgetTooSmall`] names the bytes that the smallest plan within the other limits needs;
@@ -150,15 +164,32 @@ impl Bundle<'_> {
         let header = self.header();
         let tier = self.up_to_tier(n_tiers);
         let measures = self.tier_measures(n_tiers);
-        let shape = ScratchShape::of(self, self.splats_to_hold(budget, n_tiers, n_strips), resident.then_some(tier));
+        let in_slabs = budget.overflow == Overflow::Slabs;
+        let canvas_tiles = if in_slabs { tiles_of_strip([budget.width_px, budget.height_px], n_strips) } else { 1 };
+        let wanted = self.splats_to_hold(budget, n_tiers, n_strips);
+        let mut shape = ScratchShape::of(self, canvas_tiles, wanted, resident.then_some(tier));
+        if in_slabs {
+            shape.max_splats = shape.splats_within(budget.ram_bytes).max(wanted.min(MIN_SLAB_SPLATS));
+        }
+        // Each slab but the last keeps at least half of the places.
+        let fullest = match budget.max_splats {
+            MaxSplats::AtMost(_) => {
+                self.splats_to_hold(&budget.with_max_splats(MaxSplats::Measured), n_tiers, n_strips)
+            }
+            MaxSplats::Measured | MaxSplats::Worst => wanted,
+        };
+        let places = shape.max_splats.max(1);
+        let n_slabs = if !in_slabs || fullest <= places { 1 } else { fullest.saturating_mul(2).div_ceil(places) };
+        let passes = u64::from(n_strips).saturating_mul(n_slabs.into());
         let plan = Plan {
             budget: *budget,
             n_tiers,
             n_strips,
+            n_slabs,
             shape,
             scratch_len: shape.scratch_len(),
             pruning_rate: 1.0 - tier.n_anchors as f32 / header.n_anchors.max(1) as f32,
-            work: measures.map(|m| Work::most(&m, header.training_px, budget, n_strips, !resident)),
+            work: measures.map(|m| Work::most(&m, header.training_px, budget, passes, !resident)),
         };
         let (head_macs, n_decoded) = match measures {
             Some(measures) => {
@@ -171,8 +202,8 @@ impl Bundle<'_> {
             }
         };
         let decoding = if resident { 0 } else { decoding_macs(self).saturating_mul(n_decoded.into()) };
-        let passes = if n_strips > 1 { 2 } else { 1 };
-        (head_macs.saturating_add(decoding).saturating_mul(passes), plan)
+        let times = u64::from(n_slabs).saturating_mul(if n_strips > 1 { 2 } else { 1 });
+        (head_macs.saturating_add(decoding).saturating_mul(times), plan)
     }
 
     /// What the manifest says about the first `n_tiers` tiers, if they were measured.
@@ -197,6 +228,12 @@ impl Bundle<'_> {
             },
         }
     }
+}
+
+/// Tiles of a strip.
+fn tiles_of_strip([width_px, height_px]: [u16; 2], n_strips: u8) -> u32 {
+    let rows = height_px.div_ceil(TILE_PX).div_ceil(u16::from(n_strips).max(1));
+    u32::from(rows).saturating_mul(width_px.div_ceil(TILE_PX).into())
 }
 
 /// Splats of the fullest strip of the finest cut that was measured whose strips are as high a part of their frame as those of

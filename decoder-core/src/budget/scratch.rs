@@ -5,7 +5,7 @@ use crate::bundle::{Bundle, Coder, MAX_FEATURE_DIM, MAX_LATTICE_BITS, MAX_OFFSET
 use crate::context::{FEATURES_PER_LEVEL, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS};
 use crate::mlp::HeadShape;
 use crate::project::PackedSplat;
-use crate::raster::{N_RADIX, TILE_PIXELS, TileRect};
+use crate::raster::{N_RADIX, Pixel, TILE_PIXELS, TileRect};
 use crate::scene::HeadOutputs;
 
 /// What the size of the scratch memory follows from.
@@ -52,6 +52,8 @@ pub struct ScratchShape {
     pub lattice_bits: u8,
     /// Whether anchors say which of their offsets are drawn.
     pub masks: bool,
+    /// Tiles in work at once: 1, or those of a strip that is drawn in [slabs](crate::Overflow::Slabs).
+    pub canvas_tiles: u32,
     /// Splats in memory.
     pub max_splats: u32,
     /// Anchors in memory; 0 when they are streamed.
@@ -76,6 +78,7 @@ impl ScratchShape {
             symbol_bits: [16; 3],
             lattice_bits: MAX_LATTICE_BITS,
             masks: true,
+            canvas_tiles: 1,
             max_splats: 0,
             resident_anchors: 0,
             resident_chunks: 0,
@@ -85,7 +88,7 @@ impl ScratchShape {
     /// The shape of one bundle's scratch memory.
     ///
     /// * `resident`: the tiers kept in memory, if any.
-    pub(crate) fn of(bundle: &Bundle<'_>, max_splats: u32, resident: Option<Tier>) -> Self {
+    pub(crate) fn of(bundle: &Bundle<'_>, canvas_tiles: u32, max_splats: u32, resident: Option<Tier>) -> Self {
         let header = bundle.header();
         let few = |n: usize| u16::try_from(n).unwrap_or(u16::MAX);
         let [n_tables, context_inputs, context_hidden] = match bundle.coder() {
@@ -105,6 +108,7 @@ impl ScratchShape {
             symbol_bits: header.symbol_bits,
             lattice_bits: bundle.lattice().bits,
             masks: bundle.masks().is_some(),
+            canvas_tiles,
             max_splats,
             resident_anchors: tier.n_anchors,
             resident_chunks: tier.n_chunks,
@@ -114,19 +118,38 @@ impl ScratchShape {
     /// Bytes of scratch memory, whatever their alignment; [`usize::MAX`] beyond the address space.
     #[must_use]
     pub const fn scratch_len(&self) -> usize {
-        let for_anchor = self.head_words().saturating_add(self.anchor_words());
-        let models = model_words(self.n_tables, self.context_inputs, self.context_hidden);
-        let frame = self.frame_words();
-        let words = if self.resident_chunks == 0 {
-            for_anchor.saturating_add(models).saturating_add(frame)
-        } else {
-            // The models are used when bound, the frame's memory later.
-            for_anchor.saturating_add(self.resident_words()).saturating_add(if models > frame { models } else { frame })
-        };
+        let (before, models, frame) = (self.words_before_frame(), self.model_words(), self.frame_words());
+        // Of resident anchors the models are used when bound, the frame's memory later.
+        let last = if self.resident_chunks > 0 && models > frame { models } else { frame };
+        let words = before.saturating_add(last);
         match Arena::bytes_for(words) {
             Some(len) if len < isize::MAX as usize => len,
             _ => usize::MAX,
         }
+    }
+
+    /// The most splats, up to those of the shape, that `len` bytes have places for; 0 if not even the rest fits.
+    pub(crate) const fn splats_within(&self, len: usize) -> u32 {
+        let room = (len.saturating_sub(3) / 4).saturating_sub(self.words_before_frame());
+        if self.resident_chunks > 0 && self.model_words() > room {
+            return 0;
+        }
+        let rest = Self { max_splats: 0, ..*self }.frame_words();
+        let places = match room.saturating_sub(rest).checked_div(Self::splat_words()) {
+            Some(places) => places,
+            None => 0,
+        };
+        if places < self.max_splats as usize { places as u32 } else { self.max_splats }
+    }
+
+    const fn model_words(&self) -> usize {
+        model_words(self.n_tables, self.context_inputs, self.context_hidden)
+    }
+
+    /// Heads, the anchor in work, and where anchors come from.
+    const fn words_before_frame(&self) -> usize {
+        let for_anchor = self.head_words().saturating_add(self.anchor_words());
+        for_anchor.saturating_add(if self.resident_chunks == 0 { self.model_words() } else { self.resident_words() })
     }
 
     /// Bytes of one anchor in memory.
@@ -189,19 +212,22 @@ impl ScratchShape {
             .saturating_add((self.n_tables as usize).saturating_mul(2))
     }
 
-    /// Counts of the sort, a tile, and the splats with their order.
+    /// Counts of the sort, tiles, and the splats with their order.
     const fn frame_words(&self) -> usize {
-        let n = self.max_splats as usize;
-        let fixed = match (words_for::<[f32; 4]>(TILE_PIXELS), words_for::<[u8; 3]>(TILE_PIXELS)) {
-            (Some(pixels), Some(rgb)) => N_RADIX.saturating_add(pixels).saturating_add(rgb),
-            _ => usize::MAX,
+        let [n_tiles, n_splats] = [self.canvas_tiles as usize, self.max_splats as usize];
+        let (pixels, rgb) = match (words_for::<Pixel>(TILE_PIXELS), words_for::<[u8; 3]>(TILE_PIXELS)) {
+            (Some(pixels), Some(rgb)) => (pixels.saturating_mul(n_tiles), rgb),
+            _ => (usize::MAX, 0),
         };
-        let per_splat = match (words_for::<PackedSplat>(1), words_for::<TileRect>(1)) {
-            // Its place in the order, and in the order before.
+        N_RADIX.saturating_add(pixels).saturating_add(rgb).saturating_add(Self::splat_words().saturating_mul(n_splats))
+    }
+
+    /// A splat, its tiles, its place in the order and in the order before.
+    const fn splat_words() -> usize {
+        match (words_for::<PackedSplat>(1), words_for::<TileRect>(1)) {
             (Some(splat), Some(rect)) => splat.saturating_add(rect).saturating_add(2),
             _ => usize::MAX,
-        };
-        fixed.saturating_add(per_splat.saturating_mul(n))
+        }
     }
 }
 
@@ -238,6 +264,7 @@ mod tests {
                     symbol_bits: [1 + up_to(16) as u8, 1 + up_to(16) as u8, 1 + up_to(16) as u8],
                     lattice_bits: up_to(22) as u8,
                     masks: up_to(2) == 1,
+                    canvas_tiles: 1 + random(100),
                     max_splats: random(100_000),
                     resident_anchors: resident * (1 + random(30_000)),
                     resident_chunks: resident * (1 + random(200)),
@@ -257,6 +284,7 @@ mod tests {
                 symbol_bits: [a0.max(b0), a1.max(b1), a2.max(b2)],
                 lattice_bits: a.lattice_bits.max(b.lattice_bits),
                 masks: a.masks | b.masks,
+                canvas_tiles: a.canvas_tiles.max(b.canvas_tiles),
                 max_splats: a.max_splats.max(b.max_splats),
                 resident_anchors: a.resident_anchors.max(b.resident_anchors),
                 resident_chunks: a.resident_chunks.max(b.resident_chunks),
@@ -273,6 +301,26 @@ mod tests {
         assert_eq!(shape.resident_anchor_len(), 2 * (34 * 16 + 30 + 4 + 16_usize).div_ceil(16), "of any symbols");
         let shape = ScratchShape { n_tables: 9, context_hidden: 0, masks: false, symbol_bits: [6, 8, 7], ..shape };
         assert_eq!(shape.resident_anchor_len(), 2 * (16 * 6 + 6 * 8 + 12 * 7 + 30_usize).div_ceil(16), "of small ones");
+    }
+
+    #[test]
+    fn splats_within_a_length_fill_it() {
+        for resident in [0, 40] {
+            let shape = ScratchShape {
+                max_splats: 5000,
+                resident_anchors: resident,
+                resident_chunks: resident,
+                ..ScratchShape::most(16, 4)
+            };
+            for len in [100_000, 150_001, 999_999] {
+                let within = ScratchShape { max_splats: shape.splats_within(len), ..shape };
+                assert!(
+                    within.scratch_len() <= len && (within.max_splats == 5000 || within.scratch_len() + 40 > len),
+                    "{within:?} in {len}"
+                );
+            }
+            assert_eq!(shape.splats_within(1000), 0, "not even the heads");
+        }
     }
 
     #[test]

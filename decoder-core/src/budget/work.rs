@@ -25,17 +25,16 @@ pub struct Work {
 impl Work {
     /// A bound on the work of the views that `measures` were taken over, at the budget's size.
     ///
-    /// Each strip may go over the whole scene. A frame smaller than those measured counts as one of their size.
+    /// Each strip, or slab of one, may go over the whole scene. A frame smaller than those measured counts as one of their size.
     ///
     /// * `decode`: whether anchors are decoded in each frame.
     pub(super) fn most(
         measures: &TierMeasures,
         training_px: [u16; 2],
         budget: &Budget,
-        n_strips: u8,
+        passes: u64,
         decode: bool,
     ) -> Self {
-        let passes = u64::from(n_strips);
         let area = |[width, height]: [u16; 2]| u64::from(width).saturating_mul(height.into()).max(1);
         let (measured, planned) = (area(training_px), area([budget.width_px, budget.height_px]));
         let pixels = u64::from(measures.max_kilo_pixels).saturating_mul(1024);

@@ -1,6 +1,7 @@
-//! From the anchors in view to the splats of one strip.
+//! From the anchors in view to the splats of one strip, or of a slab of its depth.
 
 use super::source::AnchorSource;
+use super::splats::Slab;
 use super::strip::{Strip, StripLayout};
 use super::tally::{Tally, place};
 use super::{Decoder, FrameReport};
@@ -17,24 +18,33 @@ pub(super) struct Frame {
     /// Whether the first strip goes over the whole scene and decides which splats all strips draw. It need not when the
     /// chunks in each strip's view have no more offsets than there are places.
     pub(super) tallies: bool,
+    /// Whether strips are drawn in slabs of depth when they have more splats than there are places.
+    pub(super) in_slabs: bool,
     pub(super) tally: Tally,
     pub(super) report: FrameReport,
 }
 
-/// One strip of it.
-#[derive(Clone, Copy)]
+/// Going over the scene once, for a strip.
 struct Pass {
     strip: Strip,
+    slab: Slab,
     /// What the pass can leave out; nothing when it goes over the whole scene.
     band: Option<Band>,
+}
+
+impl Pass {
+    /// Also leaves out what lies beyond the slab.
+    fn end_earlier(&mut self, view: &View) {
+        let band = self.band.unwrap_or(Band::WHOLE);
+        self.band = Some(band.between_depths(view, self.slab.from, self.slab.end));
+    }
 }
 
 impl Frame {
     /// What the pass of a strip has to look at.
     fn band(&self, strip: Strip) -> Option<Band> {
         let whole = self.strips.len() == 1 || (self.tallies && strip.index == 0);
-        let [first_px, end_px] = self.strips.pixels(strip);
-        (!whole).then(|| self.view.band(first_px, end_px))
+        (!whole).then(|| self.view.band(self.strips.pixels(strip)))
     }
 
     /// Whether the pass of a strip needs a chunk.
@@ -51,8 +61,7 @@ impl<'b> Decoder<'b, '_> {
     pub(super) fn surely_fits(&self, view: &View, strips: StripLayout) -> bool {
         let n_offsets = u64::from(self.bundle.header().n_offsets);
         strips.iter().all(|strip| {
-            let [first_px, end_px] = strips.pixels(strip);
-            let band = view.band(first_px, end_px);
+            let band = view.band(strips.pixels(strip));
             let seen = self.planned_chunks().map(|(chunk, _)| chunk);
             let seen = seen.filter(|chunk| view.sees_box(chunk.ink_box()) && band.sees_box(chunk.ink_box()));
             let n_anchors: u64 = seen.map(|chunk| u64::from(chunk.n_anchors())).sum();
@@ -60,27 +69,31 @@ impl<'b> Decoder<'b, '_> {
         })
     }
 
-    /// Fills the splat memory with the splats of one strip.
+    /// Fills the splat memory with the splats of one strip from depth `from` on, and returns the slab that they fill: all of
+    /// the rest when there are places enough, or when splats are left out instead.
     pub(super) fn gather(
         &mut self,
         strip: Strip,
+        from: f32,
         frame: &mut Frame,
         watch: &mut impl Stopwatch,
-    ) -> Result<(), DecodeError> {
+    ) -> Result<Slab, DecodeError> {
         self.splats.n = 0;
-        let pass = Pass { strip, band: frame.band(strip) };
-        frame.report.decode_passes += u8::from(!self.source.is_resident());
+        let mut pass = Pass { strip, slab: Slab::behind(from), band: frame.band(strip) };
+        if from > 0.0 {
+            pass.end_earlier(&frame.view);
+        }
+        let decodes = u8::from(!self.source.is_resident());
+        frame.report.decode_passes = frame.report.decode_passes.saturating_add(decodes);
         for (chunk, first_anchor) in self.planned_chunks() {
             watch.enter(Stage::Project);
             let ink_box = chunk.ink_box();
             if frame.view.sees_box(ink_box) && pass.band.is_none_or(|band| band.sees_box(ink_box)) {
-                self.gather_sound_chunk(&chunk, first_anchor, pass, frame, watch)?;
+                self.gather_sound_chunk(&chunk, first_anchor, &mut pass, frame, watch)?;
             }
         }
-        if !frame.tallies {
-            frame.report.max_splats = frame.report.max_splats.max(self.splats.n);
-        }
-        Ok(())
+        frame.report.splats_dropped = frame.report.splats_dropped.saturating_add(pass.slab.n_left_out);
+        Ok(pass.slab)
     }
 
     /// Keeps the splats of a chunk, or none of them and a note in the report if it is damaged and that is allowed.
@@ -88,7 +101,7 @@ impl<'b> Decoder<'b, '_> {
         &mut self,
         chunk: &Chunk<'b>,
         first_anchor: u32,
-        pass: Pass,
+        pass: &mut Pass,
         frame: &mut Frame,
         watch: &mut impl Stopwatch,
     ) -> Result<(), DecodeError> {
@@ -100,7 +113,8 @@ impl<'b> Decoder<'b, '_> {
         };
         if sound {
             match self.gather_chunk(chunk, first_anchor, pass, frame, watch) {
-                Err(DecodeError::ChunkStream { .. }) if self.skip_damage => {}
+                // What its splats displaced is gone when strips are drawn in slabs.
+                Err(DecodeError::ChunkStream { .. }) if self.skip_damage && !frame.in_slabs => {}
                 result => return result,
             }
         }
@@ -120,7 +134,7 @@ impl<'b> Decoder<'b, '_> {
         &mut self,
         chunk: &Chunk<'b>,
         first_anchor: u32,
-        pass: Pass,
+        pass: &mut Pass,
         frame: &mut Frame,
         watch: &mut impl Stopwatch,
     ) -> Result<(), DecodeError> {
@@ -128,7 +142,7 @@ impl<'b> Decoder<'b, '_> {
         let header = bundle.header();
         let effects = header.features.effects;
         let n_scalars = u32::from(header.feature_dim) + 6;
-        let Frame { view, strips, tallies, tally, report } = frame;
+        let Frame { view, strips, tallies, in_slabs, tally, report } = frame;
         let decoded = u32::from(!source.is_resident());
         report.chunks_decoded += decoded;
         source.for_each(chunk, first_anchor, self.row, watch, |number, site, row, watch| {
@@ -139,7 +153,9 @@ impl<'b> Decoder<'b, '_> {
             report.symbols_decoded += u64::from(decoded * n_channels);
             let position = bundle.position(site.lattice);
             let anchor = Anchor::from_row(header, position, site.mask, row).ok_or(DecodeError::Internal)?;
-            if !view.sees_anchor(position, anchor.extent) || pass.band.is_some_and(|band| !band.sees_anchor(&anchor)) {
+            if !view.sees_anchor(position, anchor.extent)
+                || pass.band.as_ref().is_some_and(|band| !band.sees_anchor(&anchor))
+            {
                 return Ok(());
             }
             report.anchors_visible += 1;
@@ -149,12 +165,20 @@ impl<'b> Decoder<'b, '_> {
                 let place = place(number, offset);
                 let touched = strips.touched(rect);
                 let index = usize::from(pass.strip.index);
-                let first = *touched.start();
                 let lies_here = touched.contains(&index);
+                if *in_slabs {
+                    if lies_here {
+                        let end = pass.slab.end;
+                        splats.push_into(&mut pass.slab, &splat, rect);
+                        if pass.slab.end < end {
+                            pass.end_earlier(view);
+                        }
+                    }
+                    return;
+                }
                 let drawn = if *tallies && index == 0 { tally.admit(place, touched) } else { tally.admits(place) };
                 if drawn && lies_here {
                     splats.push(&splat, rect);
-                    report.splats += u32::from(first == index);
                 }
             });
             report.head_macs = report.head_macs.saturating_add(macs);

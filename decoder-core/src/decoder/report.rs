@@ -8,7 +8,7 @@ use crate::budget::Work;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FrameReport {
-    /// Times the chunks in view were decoded: once a strip, never when the anchors are resident.
+    /// Times the chunks in view were decoded: once a strip, or a slab of it, never when the anchors are resident.
     pub decode_passes: u8,
     /// Chunks decoded: those whose ink box the camera sees.
     pub chunks_decoded: u32,
@@ -34,6 +34,8 @@ pub struct FrameReport {
     /// Splats left out because there was no memory for them: all of the file's anchors and offsets from the first one on
     /// that some strip had no place for.
     pub splats_dropped: u32,
+    /// Slabs of depth drawn, one of each strip where there were places for all of its splats.
+    pub slabs: u32,
     /// Splats of the fullest strip, those left out included; the number to plan for.
     pub max_splats: u32,
     /// Splats of all strips together, one that lies in two counted twice.

@@ -1,13 +1,38 @@
-//! The splats in memory.
+//! The splats in memory, and their order.
 
 use crate::project::{PackedSplat, Splat};
-use crate::raster::TileRect;
+use crate::raster::{TileRect, sort_by_depth};
 
-/// The splats of the strip in work, in the order of the file.
+/// The splats of the strip in work, or of a slab of its depth, in the order of the file.
 pub(super) struct SplatStore<'s> {
     pub(super) splats: &'s mut [PackedSplat],
     pub(super) rects: &'s mut [TileRect],
     pub(super) n: u32,
+    pub(super) order: &'s mut [u32],
+    pub(super) spare: &'s mut [u32],
+    pub(super) counts: &'s mut [u32],
+}
+
+/// A slab of depth: what lies at its beginning or behind it, and before its end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Slab {
+    pub(super) from: f32,
+    pub(super) end: f32,
+    /// Splats in it that have no place, because too many lie at exactly one depth; and that depth.
+    pub(super) n_left_out: u32,
+    left_out_at: f32,
+}
+
+impl Slab {
+    /// Everything from a depth on.
+    pub(super) const fn behind(from: f32) -> Self {
+        Self { from, end: f32::INFINITY, n_left_out: 0, left_out_at: 0.0 }
+    }
+
+    /// Whether something is left behind it.
+    pub(super) fn ends(&self) -> bool {
+        self.end < f32::INFINITY
+    }
 }
 
 impl SplatStore<'_> {
@@ -19,5 +44,146 @@ impl SplatStore<'_> {
             *rect_slot = rect;
             self.n = self.n.saturating_add(1);
         }
+    }
+
+    /// Keeps a splat if it lies in `slab`; when there is no place, the slab ends earlier, and what lies behind its end then
+    /// makes room: about the farther half.
+    ///
+    /// # Budget
+    /// When there is no place a sort, which as many splats as half the places pay for.
+    pub(super) fn push_into(&mut self, slab: &mut Slab, splat: &Splat, rect: TileRect) {
+        let lies_in = |slab: &Slab| slab.from <= splat.depth && splat.depth < slab.end;
+        if !lies_in(slab) {
+            return;
+        }
+        if self.n as usize >= self.splats.len() {
+            match self.earlier_end(splat.depth) {
+                Some(end) => self.end_slab(slab, end),
+                None => {
+                    slab.n_left_out = slab.n_left_out.saturating_add(1);
+                    slab.left_out_at = splat.depth;
+                    return;
+                }
+            }
+            if !lies_in(slab) {
+                return;
+            }
+        }
+        self.push(splat, rect);
+    }
+
+    /// A depth before which some of the splats in memory and one more at `depth` lie, and some not; `None` if all lie at one.
+    fn earlier_end(&mut self, depth: f32) -> Option<f32> {
+        let n = self.n as usize;
+        let splats = self.splats.get(..n)?;
+        let (order, spare) = (self.order.get_mut(..n)?, self.spare.get_mut(..n)?);
+        let (order, _) = sort_by_depth(splats, order, spare, self.counts);
+        let depth_of = |index: &u32| splats.get(*index as usize).map_or(0.0, |splat| splat.depth);
+        let nearest = order.first().map_or(depth, depth_of);
+        let nearest = if depth < nearest { depth } else { nearest };
+        let mut later = order.get(n / 2..).unwrap_or_default().iter().map(depth_of);
+        later.find(|&end| end > nearest).or((depth > nearest).then_some(depth))
+    }
+
+    /// Lets go of what does not lie before `end`.
+    fn end_slab(&mut self, slab: &mut Slab, end: f32) {
+        slab.end = end;
+        if end <= slab.left_out_at {
+            slab.n_left_out = 0;
+        }
+        let mut n_kept = 0;
+        for i in 0..self.n as usize {
+            let (Some(&splat), Some(&rect)) = (self.splats.get(i), self.rects.get(i)) else { break };
+            if splat.depth < end
+                && let (Some(splat_slot), Some(rect_slot)) = (self.splats.get_mut(n_kept), self.rects.get_mut(n_kept))
+            {
+                (*splat_slot, *rect_slot) = (splat, rect);
+                n_kept += 1;
+            }
+        }
+        self.n = n_kept as u32;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::vec::Vec;
+
+    use bytemuck::Zeroable;
+
+    use super::{Slab, SplatStore};
+    use crate::project::{PackedSplat, Splat};
+    use crate::raster::{N_RADIX, TileRect};
+
+    const RECT: TileRect = TileRect { first_column: 0, last_column: 0, first_row: 0, last_row: 0 };
+
+    fn splat(depth: f32) -> Splat {
+        Splat {
+            mean: [0.0; 2],
+            shear: 0.0,
+            row_precision: 1.0,
+            column_precision: 1.0,
+            log_opacity: 0.0,
+            colour: [0.0; 3],
+            depth,
+        }
+    }
+
+    /// The depths that each slab draws, with places for `n_places`, and how many found no room.
+    fn slabs(depths: &[f32], n_places: usize) -> (Vec<Vec<f32>>, u32) {
+        let (mut slabs, mut n_dropped, mut from) = (Vec::new(), 0, 0.0);
+        loop {
+            let mut store = SplatStore {
+                splats: &mut std::vec![PackedSplat::zeroed(); n_places],
+                rects: &mut std::vec![RECT; n_places],
+                n: 0,
+                order: &mut std::vec![0; n_places],
+                spare: &mut std::vec![0; n_places],
+                counts: &mut [0; N_RADIX],
+            };
+            let mut slab = Slab::behind(from);
+            for &depth in depths {
+                store.push_into(&mut slab, &splat(depth), RECT);
+            }
+            n_dropped += slab.n_left_out;
+            slabs.push(store.splats.iter().take(store.n as usize).map(|splat| splat.depth).collect());
+            if !slab.ends() {
+                return (slabs, n_dropped);
+            }
+            from = slab.end;
+        }
+    }
+
+    #[test]
+    fn slabs_hold_every_splat_once_from_near_to_far() {
+        let mut state = 7_u32;
+        let depths: Vec<f32> = (0..500)
+            .map(|_| {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                0.2 + (state >> 25) as f32 * 0.125
+            })
+            .collect();
+        let mut sorted = depths.clone();
+        sorted.sort_by(f32::total_cmp);
+        for n_places in [16, 40, 499, 500] {
+            let (slabs, n_dropped) = slabs(&depths, n_places);
+            assert_eq!(n_dropped, 0, "{n_places} places, at most 13 splats at one depth");
+            for pair in slabs.windows(2) {
+                let [near, far] = pair else { unreachable!("pairs") };
+                let (farthest, nearest) =
+                    (near.iter().copied().fold(0.0, f32::max), far.iter().copied().fold(99.0, f32::min));
+                assert!(farthest < nearest, "{farthest} before {nearest}");
+            }
+            let mut drawn = slabs.concat();
+            drawn.sort_by(f32::total_cmp);
+            assert_eq!(drawn, sorted, "{n_places} places");
+        }
+    }
+
+    #[test]
+    fn splats_at_one_depth_that_have_no_room_are_said() {
+        let depths = [3.0, 2.0, 2.0, 2.0, 1.0, 2.0, 4.0];
+        let (slabs, n_dropped) = slabs(&depths, 2);
+        assert_eq!((slabs.concat(), n_dropped), (std::vec![1.0, 2.0, 2.0, 3.0, 4.0], 2), "two of the four at 2");
     }
 }

@@ -1,4 +1,4 @@
-//! What a horizontal band of the image can see: a second test after that of the whole image.
+//! What a horizontal band of the image, or of depth, can see: a second test after that of the whole image.
 
 use super::cull::DILATION_REACH_PX;
 use super::view::{View, dot};
@@ -11,14 +11,15 @@ const RECT_SLACK_PX: f32 = 1.0;
 /// Rounding of the sums below, relative to their terms.
 const ROUNDING: f32 = 1e-5;
 
-/// The image between two rows of pixels.
+/// The image between two rows of pixels, and between two depths.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Band {
-    above: Side,
-    below: Side,
+    rows: Option<[Side; 2]>,
+    depths: Option<[Side; 2]>,
 }
 
-/// One border of a band: whatever lies beyond it draws nothing inside.
+/// One border of a band: whatever lies beyond it draws nothing inside. For depths that is a plane, which the centre of a
+/// splat lies before or behind. For rows:
 ///
 /// A splat of centre (x, y, z) whose Gaussian has deviations of at most σ reaches r·fy/z·√(1 + t²) and the dilation's reach
 /// from its mean, with r = 3.33·σ and t its slope within the limits of the Jacobian. So it ends above row y₀ when
@@ -34,7 +35,7 @@ struct Side {
 
 impl View {
     /// The band from row `first_px` up to row `end_px`.
-    pub(crate) fn band(&self, first_px: u16, end_px: u16) -> Band {
+    pub(crate) fn band(&self, [first_px, end_px]: [u16; 2]) -> Band {
         let ([_, fy], [_, cy]) = (self.focal_px, self.principal_px);
         let reach = DILATION_REACH_PX + RECT_SLACK_PX;
         let [_, row_y, row_z] = self.rotation;
@@ -47,31 +48,46 @@ impl View {
             let normal = [sign * y0 + slope * z0, sign * y1 + slope * z1, sign * y2 + slope * z2];
             Side { normal, shift: sign * ty + slope * tz, stretch }
         };
-        Band {
-            above: side(1.0, (cy - f32::from(first_px) + reach) / fy),
-            below: side(-1.0, (f32::from(end_px) - cy + reach) / fy),
-        }
+        let above = side(1.0, (cy - f32::from(first_px) + reach) / fy);
+        let below = side(-1.0, (f32::from(end_px) - cy + reach) / fy);
+        Band { rows: Some([above, below]), depths: None }
     }
 }
 
 impl Band {
+    /// The whole image.
+    pub(crate) const WHOLE: Self = Self { rows: None, depths: None };
+
+    /// The part of it from depth `from` up to depth `end`, which may be infinite.
+    pub(crate) fn between_depths(self, view: &View, from: f32, end: f32) -> Self {
+        let [_, _, row_z] = view.rotation;
+        let [_, _, tz] = view.translation;
+        let side =
+            |sign: f32, depth: f32| Side { normal: row_z.map(|z| sign * z), shift: sign * (tz - depth), stretch: 0.0 };
+        Self { depths: Some([side(1.0, from), side(-1.0, end)]), ..self }
+    }
+
+    fn sides(&self) -> impl Iterator<Item = &Side> {
+        self.rows.iter().chain(&self.depths).flatten()
+    }
+
     /// Whether a splat inside an ink box can reach the band; true more often than needed, never false wrongly.
     ///
     /// # Budget
-    /// About 40 multiplications and a square root.
+    /// About 20 multiplications and a square root a border.
     pub(crate) fn sees_box(&self, ink: ([f32; 3], [f32; 3])) -> bool {
-        !(self.above.is_beyond_box(ink) || self.below.is_beyond_box(ink))
+        !self.sides().any(|side| side.is_beyond_box(ink))
     }
 
     /// Whether an offset that `anchor` draws can reach the band; likewise.
     ///
     /// # Budget
-    /// 12 multiplications an offset.
+    /// 6 multiplications an offset and border.
     pub(crate) fn sees_anchor(&self, anchor: &Anchor<'_>) -> bool {
         let [g0, g1, g2] = anchor.base_scale;
         let widest = if g0 > g1 { g0 } else { g1 };
         let radius = INK_DEVIATIONS * if widest > g2 { widest } else { g2 };
-        !(self.above.is_beyond_anchor(anchor, radius) || self.below.is_beyond_anchor(anchor, radius))
+        !self.sides().any(|side| side.is_beyond_anchor(anchor, radius))
     }
 }
 
@@ -149,11 +165,14 @@ mod tests {
     #[test]
     fn nothing_that_a_strip_draws_is_left_out_and_most_of_the_rest_is() {
         let mut random = Numbers(1);
-        let [mut n_needless, mut n_kept, mut n_boxes_kept] = [0; 3];
+        let [mut n_needless, mut n_kept, mut n_boxes_kept, mut n_needless_in_slab, mut n_kept_in_slab] = [0; 5];
         for _ in 0..20_000 {
             let view = view(&mut random);
             let first_row = (random.between(0.0, 5.0) as u8).min(4);
-            let band = view.band(u16::from(first_row) * 16, (u16::from(first_row) * 16 + 16).min(HEIGHT_PX));
+            let band = view.band([u16::from(first_row) * 16, (u16::from(first_row) * 16 + 16).min(HEIGHT_PX)]);
+            let from = random.between(0.0, 6.0);
+            let end = if random.between(0.0, 3.0) < 1.0 { f32::INFINITY } else { from + random.between(0.0, 2.0) };
+            let slab = band.between_depths(&view, from, end);
             let offsets = [(); 3].map(|()| [(); 3].map(|()| random.between(-2.0, 2.0)));
             let size = random.between(0.001, 0.3);
             let anchor = Anchor {
@@ -166,7 +185,7 @@ mod tests {
             };
             let radius = 3.33 * anchor.base_scale.into_iter().fold(0.0, f32::max);
             let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-            let mut drawn = false;
+            let (mut drawn, mut drawn_in_slab) = (false, false);
             for (k, offset) in offsets.iter().enumerate().filter(|(k, _)| anchor.mask >> k & 1 == 1) {
                 let centre: [f32; 3] =
                     std::array::from_fn(|axis| anchor.position[axis] + offset[axis] * anchor.extent[axis]);
@@ -183,17 +202,26 @@ mod tests {
                     opacity: if k == 0 { 1.0 } else { random.between(0.01, 1.0) },
                     colour: [0.0; 3],
                 };
-                let rect = view.project(&gaussian, false).map(|(_, rect)| rect);
-                drawn |= rect.is_some_and(|rect| rect.first_row <= first_row && first_row <= rect.last_row);
+                let Some((splat, rect)) = view.project(&gaussian, false) else { continue };
+                if rect.first_row <= first_row && first_row <= rect.last_row {
+                    drawn = true;
+                    drawn_in_slab |= from <= splat.depth && splat.depth < end;
+                }
             }
             let (kept, box_kept) = (band.sees_anchor(&anchor), band.sees_box((low, high)));
             assert!(!drawn || kept, "{view:?}, {band:?}, {anchor:?}");
             assert!(!drawn || box_kept, "{view:?}, {band:?}, {low:?} to {high:?}");
+            let (slab_kept, slab_box_kept) = (slab.sees_anchor(&anchor), slab.sees_box((low, high)));
+            assert!(!drawn_in_slab || slab_kept, "{view:?}, {slab:?}, {anchor:?}");
+            assert!(!drawn_in_slab || slab_box_kept, "{view:?}, {slab:?}, {low:?} to {high:?}");
+            n_kept_in_slab += u32::from(!drawn_in_slab && slab_kept);
+            n_needless_in_slab += u32::from(!drawn_in_slab);
             n_needless += u32::from(!drawn);
             n_kept += u32::from(!drawn && kept);
             n_boxes_kept += u32::from(!drawn && box_kept && anchor.mask != 0);
         }
         assert!(n_kept * 3 < n_needless, "{n_kept} of {n_needless} needless anchors are kept");
+        assert!(n_kept_in_slab * 5 < n_needless_in_slab, "{n_kept_in_slab} of {n_needless_in_slab} in slabs");
         assert!(n_boxes_kept * 2 < n_needless, "{n_boxes_kept} of {n_needless} needless boxes are kept");
     }
 }

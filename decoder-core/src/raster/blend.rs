@@ -11,14 +11,12 @@ const ALPHA_MIN: f32 = 1.0 / 255.0;
 /// Once less light than this would come through, all later splats together move a channel by less than half a step.
 const TRANSMITTANCE_MIN: f32 = 1e-4;
 
-/// The tile in work.
-pub(crate) struct Canvas<'s> {
-    /// `[TILE_PIXELS]` red, green, blue and transmittance; the transmittance of a finished pixel is negated, so that it
-    /// fails every later test without a flag of its own.
-    pub(crate) pixels: &'s mut [[f32; 4]],
-    /// `[TILE_PIXELS]` the result.
-    pub(crate) rgb: &'s mut [[u8; 3]],
-}
+/// Red, green, blue and transmittance of a pixel in work; the transmittance of a finished one is negated, so that it fails
+/// every later test without a flag of its own.
+pub(crate) type Pixel = [f32; 4];
+
+/// Nothing drawn yet.
+pub(crate) const EMPTY: Pixel = [0.0, 0.0, 0.0, 1.0];
 
 /// Where a tile lies; it ends early at the frame's right and lower border.
 #[derive(Clone, Copy)]
@@ -38,11 +36,14 @@ pub(crate) struct TileWork {
     pub(crate) rows: u32,
     /// Pixels for which a splat was evaluated.
     pub(crate) pixels: u32,
+    /// Pixels that are not finished.
+    pub(crate) alive: u32,
 }
 
-/// Draws the splats of `list`, in its order, over `background` into a tile.
+/// Draws the splats of `list`, in its order, behind what is in a tile.
 ///
 /// * `list`: indices into `splats` and `rects`, nearest first; entries beside the tile's columns are skipped.
+/// * `pixels`: `[TILE_PIXELS]`, [`EMPTY`] at first.
 ///
 /// # Budget
 /// Per splat and row of pixels two exponentials, per pixel two multiplications and the blend.
@@ -51,34 +52,37 @@ pub(crate) fn blend_tile(
     splats: &[PackedSplat],
     rects: &[TileRect],
     list: &[u32],
-    background: [f32; 3],
-    canvas: &mut Canvas<'_>,
+    pixels: &mut [Pixel],
 ) -> TileWork {
-    let n_pixels = usize::from(place.width) * usize::from(place.height);
+    let rows = pixels.chunks_exact(TILE_PX.into()).take(place.height.into());
+    let in_tile = rows.flat_map(|row| row.iter().take(place.width.into()));
+    let mut alive = in_tile.filter(|[.., transmittance]| *transmittance > 0.0).count() as u32;
     let mut work = TileWork::default();
-    canvas.pixels.fill([0.0, 0.0, 0.0, 1.0]);
-    let mut alive = n_pixels as u32;
     for &index in list {
+        if alive == 0 {
+            break;
+        }
         let (Some(rect), Some(splat)) = (rects.get(index as usize), splats.get(index as usize)) else { continue };
         if place.column < rect.first_column || place.column > rect.last_column {
             continue;
         }
-        let [rows, pixels] = blend_splat(place, &splat.unpack(), canvas.pixels, &mut alive);
+        let [rows, evaluated] = blend_splat(place, &splat.unpack(), pixels, &mut alive);
         work.splats += 1;
         work.rows += rows;
-        work.pixels = work.pixels.saturating_add(pixels);
-        if alive == 0 {
-            break;
-        }
+        work.pixels = work.pixels.saturating_add(evaluated);
     }
-    let rows = canvas.pixels.chunks_exact(TILE_PX.into());
-    let out_rows = canvas.rgb.chunks_exact_mut(usize::from(place.width).max(1));
+    TileWork { alive, ..work }
+}
+
+/// Puts the background behind a tile and rounds to bytes, `[height, width]` row by row.
+pub(crate) fn finish_tile(place: TilePlace, pixels: &[Pixel], background: [f32; 3], rgb: &mut [[u8; 3]]) {
+    let rows = pixels.chunks_exact(TILE_PX.into());
+    let out_rows = rgb.chunks_exact_mut(usize::from(place.width).max(1));
     for (out_row, row) in out_rows.zip(rows).take(place.height.into()) {
         for (out, pixel) in out_row.iter_mut().zip(row) {
             *out = finish_pixel(*pixel, background);
         }
     }
-    work
 }
 
 /// Blends one splat into the rows of the tile; returns how many rows it reaches and how many pixels it was evaluated for.
@@ -87,7 +91,7 @@ pub(crate) fn blend_tile(
 /// factor: two multiplications replace an exponential. Over 16 pixels the rounding grows to about 1e-5 of alpha.
 // Not inlined: among everything that a frame needs its loops would not stay in registers.
 #[inline(never)]
-fn blend_splat(place: TilePlace, splat: &Splat, pixels: &mut [[f32; 4]], alive: &mut u32) -> [u32; 2] {
+fn blend_splat(place: TilePlace, splat: &Splat, pixels: &mut [Pixel], alive: &mut u32) -> [u32; 2] {
     let [mean_x, mean_y] = splat.mean;
     // In pixels of the tile, measured from the centre of its first one.
     let centre_x = mean_x - f32::from(u16::from(place.column) * TILE_PX) - 0.5;
@@ -127,7 +131,7 @@ fn blend_splat(place: TilePlace, splat: &Splat, pixels: &mut [[f32; 4]], alive: 
 
 /// Blends one splat into one pixel; returns whether the pixel is finished by it.
 #[inline(always)]
-fn blend_pixel(pixel: &mut [f32; 4], gauss: f32, [red, green, blue]: [f32; 3]) -> bool {
+fn blend_pixel(pixel: &mut Pixel, gauss: f32, [red, green, blue]: [f32; 3]) -> bool {
     let alpha = if gauss > ALPHA_MAX { ALPHA_MAX } else { gauss };
     let [r, g, b, transmittance] = *pixel;
     let next = transmittance * (1.0 - alpha);
@@ -145,7 +149,7 @@ fn blend_pixel(pixel: &mut [f32; 4], gauss: f32, [red, green, blue]: [f32; 3]) -
 
 /// Adds the background and rounds to bytes.
 #[inline]
-fn finish_pixel([r, g, b, transmittance]: [f32; 4], [back_r, back_g, back_b]: [f32; 3]) -> [u8; 3] {
+fn finish_pixel([r, g, b, transmittance]: Pixel, [back_r, back_g, back_b]: [f32; 3]) -> [u8; 3] {
     let through = transmittance.abs();
     // A float cast saturates: negative becomes 0, and so does NaN; 255.5 and more become 255.
     let byte = |c: f32| (c * 255.0 + 0.5) as u8;

@@ -9,7 +9,7 @@ use pocketsplat::device::Target;
 use pocketsplat::instructions::predict;
 use pocketsplat::verify::Trial;
 use pocketsplat_core::budget::MAX_FRAME_PX;
-use pocketsplat_core::{Budget, Bundle, DecodeError, Plan};
+use pocketsplat_core::{Budget, Bundle, DecodeError, Overflow, Plan};
 use serde::Serialize;
 
 use super::bundle::BundleFile;
@@ -29,6 +29,9 @@ pub(crate) struct Args {
     /// The largest frame. [default: the size that the bundle was trained at]
     #[arg(long, value_name = "WxH")]
     resolution: Option<FrameSize>,
+    /// Draw strips that have too many splats for the memory in slabs of depth, one after the other, instead of fewer anchors.
+    #[arg(long, requires = "ram")]
+    slabs: bool,
     /// Also predict the instructions of a frame of the bundle's preview on such a processor.
     #[arg(long, value_enum)]
     target: Option<Target>,
@@ -50,6 +53,8 @@ pub(crate) struct Point {
     /// Whether anchors are decoded once, not in every frame.
     resident: bool,
     n_strips: u8,
+    /// Slabs of depth of the fullest strip, at most.
+    n_slabs: u32,
     max_splats: u32,
     /// Of the tiers drawn; none where the manifest was not measured.
     psnr_db: Option<f32>,
@@ -75,7 +80,8 @@ struct Fit {
 pub(crate) fn run(args: &Args) -> Result<()> {
     let file = BundleFile::read(&args.bundle)?;
     let bundle = file.parse()?;
-    let frame = frame_budget(&bundle, args.resolution)?;
+    let overflow = if args.slabs { Overflow::Slabs } else { Overflow::LeaveOut };
+    let frame = frame_budget(&bundle, args.resolution)?.with_overflow(overflow);
     let plans = if args.ram.is_empty() {
         ladder(&bundle, &frame)?
     } else {
@@ -123,7 +129,7 @@ pub(crate) fn plan_within(bundle: &Bundle<'_>, frame: &Budget, ram_bytes: u64) -
     bundle.plan(&budget).map_err(|error| match error {
         DecodeError::BudgetTooSmall { needed, .. } => anyhow::anyhow!(
             "the smallest scene of this bundle takes {needed} bytes for {}x{} px; give --ram {needed} or more, a smaller \
-             --resolution, or train a bundle for this memory with `pocketsplat train --ram {ram_bytes}`",
+             --resolution, time for `fit --slabs`, or train a bundle for this memory with `pocketsplat train --ram {ram_bytes}`",
             frame.width_px,
             frame.height_px
         ),
@@ -151,6 +157,7 @@ fn point(bundle: &Bundle<'_>, ram_bytes: u64, plan: &Plan) -> Point {
         n_anchors: tier.and_then(|tier| bundle.tier(tier)).map_or(0, |tier| tier.n_anchors),
         resident: plan.is_resident(),
         n_strips: plan.n_strips(),
+        n_slabs: plan.n_slabs(),
         max_splats: plan.max_splats(),
         psnr_db: tier.and_then(|tier| bundle.measures(tier)).and_then(|measures| measures.psnr_db),
         head_macs: work.map(|work| work.head_macs),
@@ -182,7 +189,7 @@ fn ladder(bundle: &Bundle<'_>, frame: &Budget) -> Result<Vec<(u64, Plan)>> {
 
 fn table(fit: &Fit) -> String {
     let mut text = format!(
-        "{}: {} bytes, {} anchors, frames of {}x{} px\n\n{:>10}{:>10}{:>8}{:>9}{:>10}{:>7}{:>9}{:>8}{:>11}{:>9}{:>12}{:>9}\n",
+        "{}: {} bytes, {} anchors, frames of {}x{} px\n\n{:>10}{:>10}{:>8}{:>9}{:>10}{:>7}{:>6}{:>9}{:>8}{:>11}{:>9}{:>12}{:>9}\n",
         fit.bundle.display(),
         fit.bundle_bytes,
         fit.n_anchors,
@@ -194,6 +201,7 @@ fn table(fit: &Fit) -> String {
         "anchors",
         "kept in",
         "strips",
+        "slabs",
         "splats",
         "PSNR",
         "head MMAC",
@@ -206,13 +214,14 @@ fn table(fit: &Fit) -> String {
         let millions = |count: Option<u64>| count.map_or_else(|| "-".to_owned(), |n| format!("{:.2}", n as f64 / 1e6));
         let decoded = point.decoded_anchors.map_or_else(|| "-".to_owned(), |n| n.to_string());
         text += &format!(
-            "{:>10}{:>10}{:>7.1}%{:>9}{:>10}{:>7}{:>9}{psnr:>8}{:>11}{decoded:>9}{:>12}{:>9}\n",
+            "{:>10}{:>10}{:>7.1}%{:>9}{:>10}{:>7}{:>6}{:>9}{psnr:>8}{:>11}{decoded:>9}{:>12}{:>9}\n",
             point.ram_bytes,
             point.scratch_bytes,
             100.0 * point.pruning_rate,
             point.n_anchors,
             if point.resident { "memory" } else { "bundle" },
             point.n_strips,
+            point.n_slabs,
             point.max_splats,
             millions(point.head_macs),
             millions(point.pixel_splats),

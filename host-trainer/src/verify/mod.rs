@@ -4,7 +4,9 @@
 
 mod trial;
 
-use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, Plan, Residency, Strips, Work};
+use pocketsplat_core::{
+    Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, MaxSplats, Overflow, Plan, Residency, Strips, Work,
+};
 
 pub use trial::{Breach, Trial};
 
@@ -84,7 +86,7 @@ pub fn memory_does_not_show(bundle: &Bundle<'_>, plan: Plan, camera: &Camera) ->
     Ok(Touched { bytes: n_touched, mark })
 }
 
-/// Where anchors wait and in how many strips a frame is drawn changes no pixel.
+/// Where anchors wait, in how many strips a frame is drawn and in how many slabs of depth changes no pixel.
 ///
 /// # Errors
 /// A sentence that says what happened instead.
@@ -102,6 +104,13 @@ pub fn ways_agree(bundle: &Bundle<'_>, budget: Budget, camera: &Camera) -> Resul
         }
         if drawn.report.anchors_decoded > 0 && residency == Residency::Resident {
             return Err(format!("{residency:?}, {strips:?}: decoded anchors that wait in memory"));
+        }
+        // A third of the places that the fullest strip asks for.
+        let few = MaxSplats::AtMost((drawn.report.max_splats / 3).max(1));
+        let in_slabs = draw(&way.with_max_splats(few).with_overflow(Overflow::Slabs));
+        let in_slabs = in_slabs.map_err(|breach| format!("{residency:?}, {strips:?}, slabs: {breach}"))?;
+        if whole && in_slabs.report.splats_dropped == 0 && in_slabs.rgb != expected.rgb {
+            return Err(format!("{residency:?}, {strips:?}, {} slabs: another frame", in_slabs.report.slabs));
         }
     }
     Ok(())

@@ -16,7 +16,7 @@ use crate::error::{DecodeError, Field};
 use crate::mlp::{HeadShape, Heads};
 use crate::project::View;
 use crate::raster::{
-    EMPTY, N_RADIX, Pixel, TILE_PIXELS, TILE_PX, TilePlace, TileRect, blend_tile, finish_tile, sort_by_depth,
+    BlendRule, EMPTY, N_RADIX, Pixel, TILE_PIXELS, TILE_PX, TilePlace, TileRect, blend_tile, finish_tile, sort_by_depth,
 };
 use crate::scene::Workspace;
 use crate::stopwatch::{Stage, Stopwatch};
@@ -106,7 +106,11 @@ impl<'b, 's> Decoder<'b, 's> {
             return Err(DecodeError::ScratchTooSmall { needed: saturate(plan.scratch_len()), available });
         };
         let header = bundle.header();
-        let shape = HeadShape::of(header);
+        let detail = plan.budget().quality.detail;
+        let mut shape = HeadShape::of(header);
+        if !detail {
+            shape.detail = 0;
+        }
         let n_splats = plan.max_splats() as usize;
         let mut arena = Arena::new(scratch);
         // What `ScratchShape` adds up.
@@ -182,8 +186,9 @@ impl<'b, 's> Decoder<'b, 's> {
         watch: &mut impl Stopwatch,
     ) -> Result<FrameReport, DecodeError> {
         watch.enter(Stage::Project);
-        let view = View::new(camera)?;
         let budget = *self.plan.budget();
+        let view = View::new(camera)?.cutting_at(budget.quality.alpha_cut);
+        let rule = BlendRule::of(budget.quality);
         in_range(Field::FrameWidth, camera.width_px.into(), 1, budget.width_px.into())?;
         in_range(Field::FrameHeight, camera.height_px.into(), 1, budget.height_px.into())?;
         let strips = StripLayout::new(camera.height_px, self.plan.n_strips());
@@ -203,7 +208,7 @@ impl<'b, 's> Decoder<'b, 's> {
                 let first_here =
                     rects.filter(|rect| *strips.touched(**rect).start() == usize::from(strip.index)).count();
                 frame.report.splats = frame.report.splats.saturating_add(first_here as u32);
-                let alive = self.draw(strip, slab, camera, sink, &mut frame.report, watch);
+                let alive = self.draw(strip, slab, camera, &rule, sink, &mut frame.report, watch);
                 if !slab.ends() {
                     break;
                 }
@@ -211,7 +216,7 @@ impl<'b, 's> Decoder<'b, 's> {
                 if !alive {
                     // Nothing behind can be seen: the strip goes out as it is.
                     self.splats.n = 0;
-                    self.draw(strip, Slab::behind(from), camera, sink, &mut frame.report, watch);
+                    self.draw(strip, Slab::behind(from), camera, &rule, sink, &mut frame.report, watch);
                     break;
                 }
             }
@@ -243,6 +248,7 @@ impl<'b, 's> Decoder<'b, 's> {
         strip: Strip,
         slab: Slab,
         camera: &Camera,
+        rule: &BlendRule,
         sink: &mut impl TileSink,
         report: &mut FrameReport,
         watch: &mut impl Stopwatch,
@@ -273,7 +279,7 @@ impl<'b, 's> Decoder<'b, 's> {
                 if slab.from == 0.0 {
                     pixels.fill(EMPTY);
                 }
-                let work = blend_tile(place, splats, rects, list, pixels);
+                let work = blend_tile(place, splats, rects, list, rule, pixels);
                 alive += work.alive;
                 report.tile_splats = report.tile_splats.saturating_add(work.splats);
                 report.row_splats = report.row_splats.saturating_add(work.rows);

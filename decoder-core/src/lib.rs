@@ -22,7 +22,7 @@ mod raster;
 mod scene;
 mod stopwatch;
 
-pub use budget::{Budget, MaxSplats, Overflow, Plan, Residency, ScratchShape, Strips, Work};
+pub use budget::{Budget, MaxSplats, Overflow, Plan, Quality, Residency, ScratchShape, Strips, Work};
 pub use bundle::Bundle;
 pub use camera::Camera;
 pub use decoder::{Decoder, FrameReport, TileSink};

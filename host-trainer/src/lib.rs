@@ -5,6 +5,7 @@
 
 pub mod bundle;
 pub mod camera;
+pub mod cost;
 pub mod dataset;
 pub mod device;
 pub mod instructions;

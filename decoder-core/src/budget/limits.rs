@@ -1,5 +1,6 @@
 //! What a caller wants of a plan, and within what.
 
+use super::quality::Quality;
 use crate::bundle::in_range;
 use crate::error::{DecodeError, Field};
 
@@ -89,6 +90,8 @@ pub struct Budget {
     pub strips: Strips,
     /// Splats that have no place.
     pub overflow: Overflow,
+    /// Accuracy.
+    pub quality: Quality,
 }
 
 impl Budget {
@@ -104,6 +107,7 @@ impl Budget {
             residency: Residency::Auto,
             strips: Strips::Auto,
             overflow: Overflow::LeaveOut,
+            quality: Quality::EXACT,
         }
     }
 
@@ -143,10 +147,17 @@ impl Budget {
         Self { overflow, ..self }
     }
 
-    /// Frame and strips lie within their limits.
+    /// The same less or more exactly.
+    #[must_use]
+    pub const fn with_quality(self, quality: Quality) -> Self {
+        Self { quality, ..self }
+    }
+
+    /// Frame, strips and quality lie within their limits.
     pub(super) fn check(&self) -> Result<(), DecodeError> {
         in_range(Field::FrameWidth, self.width_px.into(), 1, MAX_FRAME_PX.into())?;
         in_range(Field::FrameHeight, self.height_px.into(), 1, MAX_FRAME_PX.into())?;
+        self.quality.check()?;
         match self.strips {
             Strips::Auto => Ok(()),
             Strips::Exactly(n) => in_range(Field::Strips, n.into(), 1, MAX_STRIPS.into()),

@@ -8,11 +8,13 @@
 mod arena;
 mod limits;
 mod plan;
+mod quality;
 mod scratch;
 mod work;
 
 pub(crate) use arena::Arena;
 pub use limits::{Budget, MAX_FRAME_PX, MAX_STRIPS, MaxSplats, Overflow, Residency, Strips};
 pub use plan::Plan;
+pub use quality::{MAX_ALPHA_CUT, MAX_TRANSMITTANCE_STOP, Quality};
 pub use scratch::ScratchShape;
 pub use work::Work;

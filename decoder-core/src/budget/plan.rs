@@ -168,6 +168,9 @@ impl Bundle<'_> {
         let canvas_tiles = if in_slabs { tiles_of_strip([budget.width_px, budget.height_px], n_strips) } else { 1 };
         let wanted = self.splats_to_hold(budget, n_tiers, n_strips);
         let mut shape = ScratchShape::of(self, canvas_tiles, wanted, resident.then_some(tier));
+        if !budget.quality.detail {
+            shape.detail_hidden = 0;
+        }
         if in_slabs {
             shape.max_splats = shape.splats_within(budget.ram_bytes).max(wanted.min(MIN_SLAB_SPLATS));
         }

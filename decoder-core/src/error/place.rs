@@ -87,6 +87,10 @@ pub enum Field {
     FrameWidth,
     FrameHeight,
     Strips,
+    /// The alpha that a budget's quality cuts at.
+    AlphaCut,
+    /// The transmittance that it stops at.
+    TransmittanceStop,
     ChannelBuffer,
     SiteBuffer,
     ModelBuffer,
@@ -102,6 +106,8 @@ impl Field {
             | Self::FrameWidth
             | Self::FrameHeight
             | Self::Strips
+            | Self::AlphaCut
+            | Self::TransmittanceStop
             | Self::ChannelBuffer
             | Self::SiteBuffer
             | Self::ModelBuffer => ErrorClass::Misuse,
@@ -181,6 +187,8 @@ impl fmt::Display for Field {
             Self::FrameWidth => "frame width",
             Self::FrameHeight => "frame height",
             Self::Strips => "number of strips",
+            Self::AlphaCut => "alpha to cut at, in 255ths",
+            Self::TransmittanceStop => "transmittance to stop at, in 10 000ths",
             Self::ChannelBuffer => "buffer for channels",
             Self::SiteBuffer => "buffer for anchors' sites",
             Self::ModelBuffer => "memory for the models of anchors",

@@ -37,8 +37,8 @@ impl<'s> Heads<'s> {
             covariance: Head::convert(arena, &heads.covariance, &mut weights)?,
             colour: Head::convert(arena, &heads.colour, &mut weights)?,
             detail: match &heads.detail {
-                Some(head) => Some(Detail::convert(arena, head, &mut weights)?),
-                None => None,
+                Some(head) if shape.detail > 0 => Some(Detail::convert(arena, head, &mut weights)?),
+                _ => None,
             },
         })
     }

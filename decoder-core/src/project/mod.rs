@@ -11,5 +11,5 @@ mod view;
 
 pub(crate) use band::Band;
 pub(crate) use packed::PackedSplat;
-pub(crate) use splat::{LN_255, Splat};
+pub(crate) use splat::{Splat, log_cut};
 pub(crate) use view::View;

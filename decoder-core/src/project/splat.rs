@@ -5,8 +5,13 @@ use super::view::{NEAR, View};
 use crate::raster::TileRect;
 use crate::scene::Gaussian;
 
-/// ln 255: opacity·255 = exp(log_opacity + LN_255).
-pub(crate) const LN_255: f32 = 5.541_263_5;
+/// ln 255.
+pub(super) const LN_255: f32 = 5.541_263_5;
+
+/// −ln(`steps`/255): a splat reaches as far as its opacity times this as a power of e is 1.
+pub(crate) fn log_cut(steps: u8) -> f32 {
+    LN_255 - libm::logf(steps.max(1).into())
+}
 
 /// A projected Gaussian.
 ///
@@ -49,8 +54,8 @@ impl View {
             opacity *= libm::sqrtf(covariance.det_bare / covariance.det);
         }
         let log_opacity = libm::logf(opacity);
-        // Squared Mahalanobis radius at which alpha reaches 1/255.
-        let reach = 2.0 * (log_opacity + LN_255);
+        // Squared Mahalanobis radius at which alpha is the least that draws.
+        let reach = 2.0 * (log_opacity + self.log_cut);
         if !(reach >= 0.0 && covariance.det.is_finite()) {
             return None;
         }

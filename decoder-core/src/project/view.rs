@@ -1,5 +1,6 @@
 //! A camera, with what depends on it alone computed once a frame.
 
+use super::splat::{LN_255, log_cut};
 use crate::camera::Camera;
 use crate::error::DecodeError;
 
@@ -22,6 +23,8 @@ pub(crate) struct View {
     /// Limits of x/z and y/z in the Jacobian.
     pub(super) slope_min: [f32; 2],
     pub(super) slope_max: [f32; 2],
+    /// −ln of the alpha below which a splat draws nothing.
+    pub(super) log_cut: f32,
 }
 
 impl View {
@@ -42,7 +45,13 @@ impl View {
             size_px: [width, height],
             slope_min: [-(cx / fx + margin_x), -(cy / fy + margin_y)],
             slope_max: [(width - cx) / fx + margin_x, (height - cy) / fy + margin_y],
+            log_cut: LN_255,
         })
+    }
+
+    /// The same with splats drawn down to an alpha of `steps`/255 only.
+    pub(crate) fn cutting_at(self, steps: u8) -> Self {
+        Self { log_cut: log_cut(steps), ..self }
     }
 
     /// Takes a point of the normalised frame to the camera's.

@@ -1,15 +1,35 @@
 //! Front-to-back compositing of one tile.
 
 use super::tile::{TILE_PX, TileRect};
+use crate::budget::Quality;
 use crate::math::{exp, exp_near};
-use crate::project::{LN_255, PackedSplat, Splat};
+use crate::project::{PackedSplat, Splat, log_cut};
 
 /// No splat is opaque; it keeps the light behind it computable.
 const ALPHA_MAX: f32 = 0.99;
-/// One step of an 8-bit channel: fainter contributions were skipped in training.
-const ALPHA_MIN: f32 = 1.0 / 255.0;
-/// Once less light than this would come through, all later splats together move a channel by less than half a step.
+/// A splat that would leave less light than this is left out, and the pixel is finished, as in training: all later splats
+/// together move a channel by less than half a step of 8 bits.
 const TRANSMITTANCE_MIN: f32 = 1e-4;
+
+/// Which contributions are left out.
+pub(crate) struct BlendRule {
+    /// The least alpha.
+    alpha_min: f32,
+    /// −ln of it.
+    log_cut: f32,
+    /// A pixel that less light comes through is finished.
+    transmittance_stop: f32,
+}
+
+impl BlendRule {
+    pub(crate) fn of(quality: Quality) -> Self {
+        Self {
+            alpha_min: f32::from(quality.alpha_cut) / 255.0,
+            log_cut: log_cut(quality.alpha_cut),
+            transmittance_stop: f32::from(quality.transmittance_stop) * TRANSMITTANCE_MIN,
+        }
+    }
+}
 
 /// Red, green, blue and transmittance of a pixel in work; the transmittance of a finished one is negated, so that it fails
 /// every later test without a flag of its own.
@@ -52,6 +72,7 @@ pub(crate) fn blend_tile(
     splats: &[PackedSplat],
     rects: &[TileRect],
     list: &[u32],
+    rule: &BlendRule,
     pixels: &mut [Pixel],
 ) -> TileWork {
     let rows = pixels.chunks_exact(TILE_PX.into()).take(place.height.into());
@@ -66,7 +87,7 @@ pub(crate) fn blend_tile(
         if place.column < rect.first_column || place.column > rect.last_column {
             continue;
         }
-        let [rows, evaluated] = blend_splat(place, &splat.unpack(), pixels, &mut alive);
+        let [rows, evaluated] = blend_splat(place, &splat.unpack(), rule, pixels, &mut alive);
         work.splats += 1;
         work.rows += rows;
         work.pixels = work.pixels.saturating_add(evaluated);
@@ -91,12 +112,12 @@ pub(crate) fn finish_tile(place: TilePlace, pixels: &[Pixel], background: [f32; 
 /// factor: two multiplications replace an exponential. Over 16 pixels the rounding grows to about 1e-5 of alpha.
 // Not inlined: among everything that a frame needs its loops would not stay in registers.
 #[inline(never)]
-fn blend_splat(place: TilePlace, splat: &Splat, pixels: &mut [Pixel], alive: &mut u32) -> [u32; 2] {
+fn blend_splat(place: TilePlace, splat: &Splat, rule: &BlendRule, pixels: &mut [Pixel], alive: &mut u32) -> [u32; 2] {
     let [mean_x, mean_y] = splat.mean;
     // In pixels of the tile, measured from the centre of its first one.
     let centre_x = mean_x - f32::from(u16::from(place.column) * TILE_PX) - 0.5;
     let centre_y = mean_y - f32::from(u16::from(place.row) * TILE_PX) - 0.5;
-    let reach = 2.0 * (splat.log_opacity + LN_255);
+    let reach = 2.0 * (splat.log_opacity + rule.log_cut);
     let row_variance = 1.0 / splat.row_precision;
     let ratio_step = exp(-splat.row_precision);
     let half_height = sqrt_above(reach / splat.column_precision) + SLACK_PX;
@@ -119,7 +140,7 @@ fn blend_splat(place: TilePlace, splat: &Splat, pixels: &mut [Pixel], alive: &mu
         let mut ratio = exp_near(-splat.row_precision * (dx + 0.5));
         n_evaluated += pixels.len() as u32;
         for pixel in pixels {
-            if gauss >= ALPHA_MIN && blend_pixel(pixel, gauss, splat.colour) {
+            if gauss >= rule.alpha_min && blend_pixel(pixel, gauss, splat.colour, rule.transmittance_stop) {
                 *alive -= 1;
             }
             gauss *= ratio;
@@ -131,20 +152,24 @@ fn blend_splat(place: TilePlace, splat: &Splat, pixels: &mut [Pixel], alive: &mu
 
 /// Blends one splat into one pixel; returns whether the pixel is finished by it.
 #[inline(always)]
-fn blend_pixel(pixel: &mut Pixel, gauss: f32, [red, green, blue]: [f32; 3]) -> bool {
+fn blend_pixel(pixel: &mut Pixel, gauss: f32, [red, green, blue]: [f32; 3], stop: f32) -> bool {
     let alpha = if gauss > ALPHA_MAX { ALPHA_MAX } else { gauss };
     let [r, g, b, transmittance] = *pixel;
     let next = transmittance * (1.0 - alpha);
-    if next >= TRANSMITTANCE_MIN {
-        let weight = alpha * transmittance;
+    let weight = alpha * transmittance;
+    if next >= stop {
         *pixel = [r + weight * red, g + weight * green, b + weight * blue, next];
         return false;
     }
-    let finished = transmittance > 0.0;
-    if finished {
-        *pixel = [r, g, b, -transmittance];
+    let alive = transmittance > 0.0;
+    if alive {
+        *pixel = if next >= TRANSMITTANCE_MIN {
+            [r + weight * red, g + weight * green, b + weight * blue, -next]
+        } else {
+            [r, g, b, -transmittance]
+        };
     }
-    finished
+    alive
 }
 
 /// Adds the background and rounds to bytes.

@@ -3,6 +3,7 @@
 mod ablate;
 mod bundle;
 mod capture;
+mod cost;
 mod demo;
 mod doctor;
 mod encode;
@@ -47,6 +48,7 @@ enum Command {
     Render(render::Args),
     Inspect(inspect::Args),
     Fit(fit::Args),
+    Cost(cost::Args),
     Verify(verify::Args),
     Plot(plot::Args),
     Sweep(sweep::Args),
@@ -72,6 +74,7 @@ pub(crate) fn run() -> Result<ExitCode> {
         Command::Render(args) => render::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Fit(args) => fit::run(&args),
+        Command::Cost(args) => cost::run(&args),
         Command::Plot(args) => plot::run(&args),
         Command::Synth(args) => synth::run(&args),
         Command::Doctor(args) => doctor::run(&args),

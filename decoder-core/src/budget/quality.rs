@@ -1,0 +1,36 @@
+//! What accuracy a frame may give up to be drawn sooner.
+
+use crate::bundle::in_range;
+use crate::error::{DecodeError, Field};
+
+/// Largest [`Quality::alpha_cut`].
+pub const MAX_ALPHA_CUT: u8 = 64;
+/// Largest [`Quality::transmittance_stop`].
+pub const MAX_TRANSMITTANCE_STOP: u16 = 1000;
+
+/// How exactly a frame is drawn.
+///
+/// What it costs and what it saves is measured in the repository's `docs/accuracy-and-time.md`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Quality {
+    /// A splat leaves pixels alone where its alpha is below this, in 255ths, 1..=[`MAX_ALPHA_CUT`]; 1 in training. More
+    /// makes splats smaller.
+    pub alpha_cut: u8,
+    /// A pixel is finished once less light than this comes through it, in 10 000ths, 1..=[`MAX_TRANSMITTANCE_STOP`]; 1 in
+    /// training.
+    pub transmittance_stop: u16,
+    /// Whether the detail head runs, if the bundle has one; if not, its weights take no memory.
+    pub detail: bool,
+}
+
+impl Quality {
+    /// As trained: the f64 reference within rounding.
+    pub const EXACT: Self = Self { alpha_cut: 1, transmittance_stop: 1, detail: true };
+
+    /// Field and value lie within their limits.
+    pub(super) fn check(self) -> Result<(), DecodeError> {
+        in_range(Field::AlphaCut, self.alpha_cut.into(), 1, MAX_ALPHA_CUT.into())?;
+        in_range(Field::TransmittanceStop, self.transmittance_stop.into(), 1, MAX_TRANSMITTANCE_STOP.into())
+    }
+}

@@ -1,0 +1,101 @@
+//! What accuracy costs in time: one bundle drawn in many ways, each measured against the f64 reference, the photographs and
+//! the instructions that it takes.
+
+mod front;
+mod setting;
+
+use std::time::Instant;
+
+use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, Stage};
+
+pub use front::on_front;
+pub use setting::{Setting, knobs, quality_grid};
+
+use crate::dataset::{Image, Mask};
+use crate::instructions::{Target, predict};
+use crate::metrics::{psnr_db, psnr_db_masked};
+use crate::render::decoder::image_of;
+
+/// A view to draw, and what it is compared with.
+pub struct Sight<'a> {
+    /// The camera, in the bundle's frame.
+    pub camera: Camera,
+    /// What the f64 reference draws of the whole scene.
+    pub reference: Image,
+    /// The photograph, and where it shows the scene.
+    pub photograph: (&'a Image, Option<&'a Mask>),
+}
+
+/// What a setting does; means over the views where nothing else is said.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Measured {
+    /// What was set.
+    pub setting: Setting,
+    /// PSNR to the f64 reference of the worst view, dB; infinite when all bytes agree.
+    pub psnr_to_reference_db: f64,
+    /// Largest difference of a channel to the reference, of all views, 255ths.
+    pub worst_channel: u8,
+    /// PSNR to the photographs, dB.
+    pub psnr_db: f64,
+    /// Time of a frame on this machine, s.
+    pub host_s: f64,
+    /// Instructions of a frame on the target, by stage, predicted.
+    pub instructions: [f64; Stage::ALL.len()],
+    /// Scratch memory of the plan, bytes.
+    pub scratch_bytes: usize,
+}
+
+impl Measured {
+    /// Instructions of a frame in all stages.
+    pub fn total_instructions(&self) -> f64 {
+        self.instructions.iter().sum()
+    }
+}
+
+/// Draws all views as `setting` says within `budget`, and measures.
+///
+/// Cost: two frames a view, one by one: the first warms the caches for the second, which is timed.
+///
+/// # Errors
+/// [`DecodeError`] when the budget is too small or the bundle damaged.
+///
+/// # Panics
+/// Without views.
+pub fn measure(
+    bundle: &Bundle<'_>,
+    sights: &[Sight<'_>],
+    setting: &Setting,
+    budget: Budget,
+    target: Target,
+) -> Result<Measured, DecodeError> {
+    assert!(!sights.is_empty(), "views to measure with");
+    let plan = bundle.plan(&setting.of(budget))?;
+    let mut scratch = vec![0; plan.scratch_len()];
+    let mut decoder = Decoder::bind(bundle, plan, &mut scratch)?;
+    let n = sights.len() as f64;
+    let mut measured = Measured {
+        setting: setting.clone(),
+        psnr_to_reference_db: f64::INFINITY,
+        worst_channel: 0,
+        psnr_db: 0.0,
+        host_s: 0.0,
+        instructions: [0.0; Stage::ALL.len()],
+        scratch_bytes: plan.scratch_len(),
+    };
+    for sight in sights {
+        image_of(&mut decoder, &sight.camera)?;
+        let started = Instant::now();
+        let (image, report): (Image, FrameReport) = image_of(&mut decoder, &sight.camera)?;
+        measured.host_s += started.elapsed().as_secs_f64() / n;
+        let (photograph, mask) = sight.photograph;
+        measured.psnr_db += psnr_db_masked(&image, photograph, mask) / n;
+        measured.psnr_to_reference_db = measured.psnr_to_reference_db.min(psnr_db(&image, &sight.reference));
+        let differences = image.rgb.iter().zip(&sight.reference.rgb).map(|(a, b)| a.abs_diff(*b));
+        measured.worst_channel = measured.worst_channel.max(differences.max().unwrap_or(0));
+        let size_px = [sight.camera.width_px, sight.camera.height_px];
+        for (sum, stage) in measured.instructions.iter_mut().zip(predict(target, bundle, &plan, &report, size_px)) {
+            *sum += stage / n;
+        }
+    }
+    Ok(measured)
+}

@@ -1,0 +1,110 @@
+//! The knobs of decoder-core, each by itself, and those of quality together.
+
+use pocketsplat_core::{Budget, Bundle, Quality, Residency, Strips};
+
+/// One way to draw a bundle.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Setting {
+    /// Which knob is turned; `quality` for several at once.
+    pub knob: &'static str,
+    /// How far, in words.
+    pub name: String,
+    /// Accuracy.
+    pub quality: Quality,
+    /// Tiers that are drawn at most.
+    pub tiers: u8,
+    /// Share of the anchors that this leaves out.
+    pub pruning_rate: f64,
+    /// Where anchors wait.
+    pub residency: Residency,
+    /// Parts of a frame.
+    pub strips: Strips,
+}
+
+impl Setting {
+    /// As trained, and as the budget plans it.
+    pub fn exact() -> Self {
+        Self {
+            knob: "none",
+            name: "exact".to_owned(),
+            quality: Quality::EXACT,
+            tiers: u8::MAX,
+            pruning_rate: 0.0,
+            residency: Residency::Auto,
+            strips: Strips::Auto,
+        }
+    }
+
+    /// `budget` with the knobs turned.
+    pub fn of(&self, budget: Budget) -> Budget {
+        budget.with_tiers(self.tiers).with_quality(self.quality).with_residency(self.residency).with_strips(self.strips)
+    }
+}
+
+/// Alphas to cut at, 255ths.
+const ALPHA_CUTS: [u8; 5] = [2, 3, 4, 6, 8];
+/// Transmittances to stop at, 10 000ths.
+const TRANSMITTANCE_STOPS: [u16; 4] = [10, 40, 100, 300];
+
+/// The share of the anchors that the first `tiers` tiers leave out.
+fn pruning_rate(bundle: &Bundle<'_>, tiers: u8) -> Option<f64> {
+    let tier = bundle.tier(tiers.checked_sub(1)?)?;
+    Some(1.0 - f64::from(tier.n_anchors) / f64::from(bundle.n_anchors().max(1)))
+}
+
+/// Each knob by itself, [exact](Setting::exact) first.
+pub fn knobs(bundle: &Bundle<'_>) -> Vec<Setting> {
+    let exact = Setting::exact();
+    let mut all = vec![exact.clone()];
+    for alpha_cut in ALPHA_CUTS {
+        let quality = Quality { alpha_cut, ..Quality::EXACT };
+        all.push(Setting { knob: "alpha cut", name: format!("{alpha_cut}/255"), quality, ..exact.clone() });
+    }
+    for transmittance_stop in TRANSMITTANCE_STOPS {
+        let quality = Quality { transmittance_stop, ..Quality::EXACT };
+        let name = format!("{}", f64::from(transmittance_stop) / 1e4);
+        all.push(Setting { knob: "transmittance stop", name, quality, ..exact.clone() });
+    }
+    if bundle.header().detail_hidden > 0 {
+        let quality = Quality { detail: false, ..Quality::EXACT };
+        all.push(Setting { knob: "detail head", name: "off".to_owned(), quality, ..exact.clone() });
+    }
+    for tiers in (1..bundle.n_tiers()).rev() {
+        let Some(pruning_rate) = pruning_rate(bundle, tiers) else { continue };
+        let name = format!("{:.0} %", 100.0 * pruning_rate);
+        all.push(Setting { knob: "pruning rate", name, tiers, pruning_rate, ..exact.clone() });
+    }
+    for (name, residency) in [("resident", Residency::Resident), ("streamed", Residency::Streamed)] {
+        let strips = Strips::Exactly(1);
+        all.push(Setting { knob: "residency", name: name.to_owned(), residency, strips, ..exact.clone() });
+    }
+    for n_strips in [2, 4, 8] {
+        let strips = Strips::Exactly(n_strips);
+        all.push(Setting { knob: "strips", name: n_strips.to_string(), strips, ..exact.clone() });
+    }
+    all
+}
+
+/// Alpha cuts, transmittance stops, the detail head and the first tiers in all combinations.
+pub fn quality_grid(bundle: &Bundle<'_>) -> Vec<Setting> {
+    let details: &[bool] = if bundle.header().detail_hidden > 0 { &[true, false] } else { &[true] };
+    let mut all = Vec::new();
+    for tiers in (1..=bundle.n_tiers()).rev() {
+        let Some(pruning_rate) = pruning_rate(bundle, tiers) else { continue };
+        for alpha_cut in [1, 2, 3, 4, 6] {
+            for transmittance_stop in [1, 40, 100] {
+                for &detail in details {
+                    let name = format!(
+                        "{:.0} % pruned, alpha {alpha_cut}/255, stop {}{}",
+                        100.0 * pruning_rate,
+                        f64::from(transmittance_stop) / 1e4,
+                        if detail { "" } else { ", no detail" }
+                    );
+                    let quality = Quality { alpha_cut, transmittance_stop, detail };
+                    all.push(Setting { knob: "quality", name, quality, tiers, pruning_rate, ..Setting::exact() });
+                }
+            }
+        }
+    }
+    all
+}

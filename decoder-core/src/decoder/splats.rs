@@ -73,6 +73,8 @@ impl SplatStore<'_> {
     }
 
     /// A depth before which some of the splats in memory and one more at `depth` lie, and some not; `None` if all lie at one.
+    // Not inlined, here and below: rare, in the middle of a loop that is not.
+    #[inline(never)]
     fn earlier_end(&mut self, depth: f32) -> Option<f32> {
         let n = self.n as usize;
         let splats = self.splats.get(..n)?;
@@ -86,6 +88,7 @@ impl SplatStore<'_> {
     }
 
     /// Lets go of what does not lie before `end`.
+    #[inline(never)]
     fn end_slab(&mut self, slab: &mut Slab, end: f32) {
         slab.end = end;
         if end <= slab.left_out_at {

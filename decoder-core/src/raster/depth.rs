@@ -15,6 +15,8 @@ pub(crate) const N_RADIX: usize = 256;
 ///
 /// # Budget
 /// At most eight passes over the splats.
+// Not inlined: it has two callers.
+#[inline(never)]
 pub(crate) fn sort_by_depth<'o>(
     splats: &[PackedSplat],
     mut order: &'o mut [u32],

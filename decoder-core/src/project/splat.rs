@@ -53,7 +53,7 @@ impl View {
         if dilation_compensation {
             opacity *= libm::sqrtf(covariance.det_bare / covariance.det);
         }
-        let log_opacity = libm::logf(opacity);
+        let log_opacity = libm::logf(opacity + self.lost_opacity);
         // Squared Mahalanobis radius at which alpha is the least that draws.
         let reach = 2.0 * (log_opacity + self.log_cut);
         if !(reach >= 0.0 && covariance.det.is_finite()) {
@@ -88,5 +88,53 @@ impl View {
             let [c0, c1, c2] = columns.map(|column| super::view::dot(row, column));
             [c0 * s0, c1 * s1, c2 * s2]
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::log_cut;
+    use crate::camera::Camera;
+    use crate::project::View;
+    use crate::scene::Gaussian;
+
+    #[test]
+    fn a_splat_cut_earlier_keeps_its_sum() {
+        let camera = Camera {
+            rotation: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+            translation: [0.0; 3],
+            focal_px: [100.0; 2],
+            principal_px: [50.0; 2],
+            width_px: 100,
+            height_px: 100,
+        };
+        let gaussian = Gaussian {
+            centre: [0.0, 0.0, 2.0],
+            scale: [0.2, 0.3, 0.1],
+            rotation: [1.0, 0.0, 0.0, 0.0],
+            opacity: 0.3,
+            colour: [1.0; 3],
+        };
+        let sum_at = |steps: u8| {
+            let view = View::new(&camera).expect("sound").cutting_at(steps);
+            let (splat, _) = view.project(&gaussian, false).expect("in view");
+            let least = (-f64::from(log_cut(steps))).exp();
+            let mut sum = 0.0;
+            for y in 0..100 {
+                for x in 0..100 {
+                    let dy = f64::from(y) + 0.5 - f64::from(splat.mean[1]);
+                    let dx = f64::from(x) + 0.5 - f64::from(splat.mean[0]) - f64::from(splat.shear) * dy;
+                    let square = dx * dx * f64::from(splat.row_precision) + dy * dy * f64::from(splat.column_precision);
+                    let alpha = (f64::from(splat.log_opacity) - 0.5 * square).exp();
+                    sum += if alpha >= least { alpha } else { 0.0 };
+                }
+            }
+            sum
+        };
+        let exact = sum_at(1);
+        for steps in [2, 4, 8, 16] {
+            let cut = sum_at(steps);
+            assert!((cut / exact - 1.0).abs() < 0.01, "{steps}/255: {cut} against {exact}");
+        }
     }
 }

@@ -25,6 +25,8 @@ pub(crate) struct View {
     pub(super) slope_max: [f32; 2],
     /// −ln of the alpha below which a splat draws nothing.
     pub(super) log_cut: f32,
+    /// How much more of a splat's rim that leaves out than in training, as opacity.
+    pub(super) lost_opacity: f32,
 }
 
 impl View {
@@ -46,12 +48,17 @@ impl View {
             slope_min: [-(cx / fx + margin_x), -(cy / fy + margin_y)],
             slope_max: [(width - cx) / fx + margin_x, (height - cy) / fy + margin_y],
             log_cut: LN_255,
+            lost_opacity: 0.0,
         })
     }
 
-    /// The same with splats drawn down to an alpha of `steps`/255 only.
+    /// The same with splats drawn down to an alpha of `steps`/255 only, and so much more opaque that each keeps its sum.
+    ///
+    /// The sum of o·exp(−r²/2) over the plane down to alpha c is 2πσ²·(o − c): what a higher c takes off the rim, a higher o
+    /// puts in the middle.
     pub(crate) fn cutting_at(self, steps: u8) -> Self {
-        Self { log_cut: log_cut(steps), ..self }
+        let lost_opacity = f32::from(steps.saturating_sub(1)) / 255.0;
+        Self { log_cut: log_cut(steps), lost_opacity, ..self }
     }
 
     /// Takes a point of the normalised frame to the camera's.

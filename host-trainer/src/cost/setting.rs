@@ -5,7 +5,7 @@ use pocketsplat_core::{Budget, Bundle, Quality, Residency, Strips};
 /// One way to draw a bundle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
-    /// Which knob is turned; `quality` for several at once.
+    /// Which knob is turned; `quality` for several at once, `level` for those that have a name.
     pub knob: &'static str,
     /// How far, in words.
     pub name: String,
@@ -25,7 +25,7 @@ impl Setting {
     /// As trained, and as the budget plans it.
     pub fn exact() -> Self {
         Self {
-            knob: "none",
+            knob: "level",
             name: "exact".to_owned(),
             quality: Quality::EXACT,
             tiers: u8::MAX,
@@ -56,6 +56,9 @@ fn pruning_rate(bundle: &Bundle<'_>, tiers: u8) -> Option<f64> {
 pub fn knobs(bundle: &Bundle<'_>) -> Vec<Setting> {
     let exact = Setting::exact();
     let mut all = vec![exact.clone()];
+    for (name, quality) in [("balanced", Quality::BALANCED), ("draft", Quality::DRAFT)] {
+        all.push(Setting { knob: "level", name: name.to_owned(), quality, ..exact.clone() });
+    }
     for alpha_cut in ALPHA_CUTS {
         let quality = Quality { alpha_cut, ..Quality::EXACT };
         all.push(Setting { knob: "alpha cut", name: format!("{alpha_cut}/255"), quality, ..exact.clone() });
@@ -91,8 +94,8 @@ pub fn quality_grid(bundle: &Bundle<'_>) -> Vec<Setting> {
     let mut all = Vec::new();
     for tiers in (1..=bundle.n_tiers()).rev() {
         let Some(pruning_rate) = pruning_rate(bundle, tiers) else { continue };
-        for alpha_cut in [1, 2, 3, 4, 6] {
-            for transmittance_stop in [1, 40, 100] {
+        for alpha_cut in [1, 2, 3, 4, 6, 8] {
+            for transmittance_stop in [1, 10, 100] {
                 for &detail in details {
                     let name = format!(
                         "{:.0} % pruned, alpha {alpha_cut}/255, stop {}{}",

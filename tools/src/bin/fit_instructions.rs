@@ -10,7 +10,7 @@ use clap::Parser;
 use pocketsplat::bundle;
 use pocketsplat::instructions::{Costs, N_TERMS, Target, Term, terms};
 use pocketsplat::render::decoder::image_of;
-use pocketsplat_core::{Budget, Bundle, Decoder, Stage};
+use pocketsplat_core::{Budget, Bundle, Decoder, Overflow, Stage};
 
 /// Most that a frame may differ from its prediction.
 const TOLERANCE: f64 = 0.1;
@@ -94,7 +94,9 @@ fn read(path: &Path, folders: &[PathBuf]) -> anyhow::Result<Vec<Frame>> {
         let bundle = Bundle::parse(&bytes)?;
         let size_px: [u16; 2] = [width.parse()?, height.parse()?];
         let n_frames: u8 = n_frames.parse()?;
-        let plan = bundle.plan(&Budget::for_frame(size_px[0], size_px[1]).in_bytes(scratch.parse()?))?;
+        let budget = Budget::for_frame(size_px[0], size_px[1]).in_bytes(scratch.parse()?);
+        // As the firmware.
+        let plan = bundle.plan(&budget).or_else(|_| bundle.plan(&budget.with_overflow(Overflow::Slabs)))?;
         let mut memory = vec![0; plan.scratch_len()];
         let mut decoder = Decoder::bind(&bundle, plan, &mut memory)?;
         let preview = bundle.header().preview.resized(size_px[0], size_px[1]);

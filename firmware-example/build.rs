@@ -7,6 +7,7 @@
 //! | `RAM_KIB` | RAM in all: statics, scratch memory, stack | 256, 1024, 512 |
 //! | `SIZE` | frames, `WIDTHxHEIGHT` | the preview's |
 //! | `FRAMES` | frames of the orbit, at most 10 | 4 |
+//! | `QUALITY` | `EXACT`, `BALANCED` or `DRAFT` | `EXACT` |
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -69,13 +70,18 @@ fn prepare() -> Result<(), Box<dyn Error>> {
         }
     };
     let n_frames: u8 = variable("FRAMES").map_or(Ok(4), |text| text.parse())?;
+    let quality = variable("QUALITY").unwrap_or_else(|| "EXACT".into());
+    if !["EXACT", "BALANCED", "DRAFT"].contains(&quality.as_str()) {
+        return Err(format!("QUALITY={quality} is none of EXACT, BALANCED, DRAFT").into());
+    }
     let scratch_len = (ram_kib * 1024)
         .checked_sub(STACK_LEN + OTHER_STATICS)
         .ok_or_else(|| format!("RAM_KIB={ram_kib} leaves no scratch memory beside {STACK_LEN} bytes of stack"))?;
     let settings = format!(
         "const BOARD: &str = {name:?};\nconst RAM_KIB: usize = {ram_kib};\nconst STACK_LEN: usize = {STACK_LEN};\n\
          const SCRATCH_LEN: usize = {scratch_len};\nconst WIDTH_PX: usize = {width_px};\n\
-         const HEIGHT_PX: usize = {height_px};\nconst N_FRAMES: u8 = {n_frames};\n"
+         const HEIGHT_PX: usize = {height_px};\nconst N_FRAMES: u8 = {n_frames};\n\
+         const QUALITY: Quality = Quality::{quality};\n"
     );
     Ok(fs::write(out.join("settings.rs"), settings)?)
 }

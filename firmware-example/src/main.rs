@@ -18,13 +18,13 @@ use embedded_graphics::geometry::Point;
 use instructions::{Instructions, Table};
 use panel::{PANEL, Panel, write_ppm};
 use pocketsplat_core::display::DisplaySink;
-use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, Overflow, Stage, Stopwatch as _};
+use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, Overflow, Quality, Stage, Stopwatch as _};
 #[cfg(target_arch = "riscv32")]
 use riscv as _;
 use semihosting::io;
 use static_cell::ConstStaticCell;
 
-// BOARD, RAM_KIB, STACK_LEN, SCRATCH_LEN, WIDTH_PX, HEIGHT_PX, N_FRAMES.
+// BOARD, RAM_KIB, STACK_LEN, SCRATCH_LEN, WIDTH_PX, HEIGHT_PX, N_FRAMES, QUALITY.
 include!(concat!(env!("OUT_DIR"), "/settings.rs"));
 static BUNDLE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/bundle.psb"));
 
@@ -78,7 +78,7 @@ fn draw_orbit(panel: &mut Panel, scratch: &mut [u8]) -> Result<(), Failure> {
 
     // The build script's sizes fit these types, or the panel would not exist.
     let preview = header.preview.resized(WIDTH_PX as u16, HEIGHT_PX as u16);
-    let budget = Budget::for_frame(preview.width_px, preview.height_px).in_bytes(scratch.len());
+    let budget = Budget::for_frame(preview.width_px, preview.height_px).in_bytes(scratch.len()).with_quality(QUALITY);
     // A scene that no pruning rate makes small enough still fits in slabs of depth, which take longer.
     let plan = bundle.plan(&budget).or_else(|_| bundle.plan(&budget.with_overflow(Overflow::Slabs)))?;
     defmt::info!("scratch: {} bytes, of which the plan takes {}", scratch.len(), plan.scratch_len());

@@ -99,12 +99,14 @@ job_test() {
   cargo test --workspace --locked --no-fail-fast
   # Not unified into the workspace's build: `defmt` wants a logger at link time, the firmware has one.
   cargo test -p pocketsplat-core --features embedded-graphics --locked
+  # Refusals of what a decoder is built without.
+  cargo test -p pocketsplat-core --no-default-features --lib --locked bundle::features
 }
 
 job_core-embedded() {
   need_embedded_target
   local features
-  for features in "" defmt embedded-graphics defmt,embedded-graphics; do
+  for features in "" defmt embedded-graphics defmt,embedded-graphics context detail view,dilation-compensation default; do
     echo "-- features: ${features:-none}"
     cargo clippy -p pocketsplat-core --target "$embedded_target" --no-default-features --features "$features" --locked \
       -- -D warnings

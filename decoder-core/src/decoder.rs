@@ -188,7 +188,6 @@ impl<'b, 's> Decoder<'b, 's> {
         watch.enter(Stage::Project);
         let budget = *self.plan.budget();
         let view = View::new(camera)?.cutting_at(budget.quality.alpha_cut);
-        let rule = BlendRule::of(budget.quality);
         in_range(Field::FrameWidth, camera.width_px.into(), 1, budget.width_px.into())?;
         in_range(Field::FrameHeight, camera.height_px.into(), 1, budget.height_px.into())?;
         let strips = StripLayout::new(camera.height_px, self.plan.n_strips());
@@ -208,7 +207,7 @@ impl<'b, 's> Decoder<'b, 's> {
                 let first_here =
                     rects.filter(|rect| *strips.touched(**rect).start() == usize::from(strip.index)).count();
                 frame.report.splats = frame.report.splats.saturating_add(first_here as u32);
-                let alive = self.draw(strip, slab, camera, &rule, sink, &mut frame.report, watch);
+                let alive = self.draw(strip, slab, camera, sink, &mut frame.report, watch);
                 if !slab.ends() {
                     break;
                 }
@@ -216,7 +215,7 @@ impl<'b, 's> Decoder<'b, 's> {
                 if !alive {
                     // Nothing behind can be seen: the strip goes out as it is.
                     self.splats.n = 0;
-                    self.draw(strip, Slab::behind(from), camera, &rule, sink, &mut frame.report, watch);
+                    self.draw(strip, Slab::behind(from), camera, sink, &mut frame.report, watch);
                     break;
                 }
             }
@@ -248,7 +247,6 @@ impl<'b, 's> Decoder<'b, 's> {
         strip: Strip,
         slab: Slab,
         camera: &Camera,
-        rule: &BlendRule,
         sink: &mut impl TileSink,
         report: &mut FrameReport,
         watch: &mut impl Stopwatch,
@@ -263,6 +261,7 @@ impl<'b, 's> Decoder<'b, 's> {
         // One after the other, or all at once.
         let keeps_tiles = self.plan.shape().canvas_tiles > 1;
         let (mut n_tiles, mut alive) = (0, 0);
+        let rule = BlendRule::of(self.plan.budget().quality);
         let background = self.bundle.header().background.map(|byte| f32::from(byte) / 255.0);
         let rows = (0..).zip(tiles_along(camera.height_px));
         for (row, (y_px, height)) in rows.take(strip.end_row.into()).skip(strip.first_row.into()) {
@@ -279,7 +278,7 @@ impl<'b, 's> Decoder<'b, 's> {
                 if slab.from == 0.0 {
                     pixels.fill(EMPTY);
                 }
-                let work = blend_tile(place, splats, rects, list, rule, pixels);
+                let work = blend_tile(place, splats, rects, list, &rule, pixels);
                 alive += work.alive;
                 report.tile_splats = report.tile_splats.saturating_add(work.splats);
                 report.row_splats = report.row_splats.saturating_add(work.rows);

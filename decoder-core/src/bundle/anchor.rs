@@ -83,6 +83,8 @@ impl<'b> Bundle<'b> {
                 let slots = bytemuck::try_cast_slice_mut(scratch).map_err(|_| DecodeError::Internal)?;
                 ChannelModels::Static(IndexedTables::new(tables, slots)?)
             }
+            // What bundles were refused for is not linked, here and below.
+            Coder::Context(_) if !cfg!(feature = "context") => return Err(DecodeError::Internal),
             Coder::Context(context) => {
                 let [n_feature_words, _] = context_lens(context);
                 let (features, hidden) = scratch.split_at_mut_checked(n_feature_words).ok_or(DecodeError::Internal)?;

@@ -34,23 +34,44 @@ impl Features {
     /// Bits that have a meaning in this version.
     const N_BITS: u32 = 7;
 
+    /// What this decoder is built with.
+    const BUILT: u32 = {
+        let view = cfg!(feature = "view");
+        let effects = Effects {
+            view_direction: view,
+            view_distance: view,
+            dilation_compensation: cfg!(feature = "dilation-compensation"),
+            detail: cfg!(feature = "detail"),
+        };
+        Self { effects, masks: true, context: cfg!(feature = "context"), coded_heads: true }.to_bits()
+    };
+
     /// The bits as the header stores them.
     #[must_use]
-    pub fn to_bits(self) -> u32 {
+    pub const fn to_bits(self) -> u32 {
         let Effects { view_direction, view_distance, dilation_compensation, detail } = self.effects;
-        let flags =
-            [view_direction, view_distance, dilation_compensation, self.masks, self.context, self.coded_heads, detail];
-        (0..).zip(flags).fold(0, |bits, (shift, flag)| bits | (u32::from(flag) << shift))
+        (view_direction as u32)
+            | (view_distance as u32) << 1
+            | (dilation_compensation as u32) << 2
+            | (self.masks as u32) << 3
+            | (self.context as u32) << 4
+            | (self.coded_heads as u32) << 5
+            | (detail as u32) << 6
     }
 
     /// The features that `bits` stand for.
     ///
     /// # Errors
-    /// [`DecodeError::UnsupportedFeatures`] with the bits that have no meaning in this version.
+    /// [`DecodeError::UnsupportedFeatures`] with the bits that have no meaning in this version;
+    /// [`DecodeError::NotBuilt`] with what the decoder was built without.
     pub fn from_bits(bits: u32) -> Result<Self, DecodeError> {
         let unknown_bits = bits >> Self::N_BITS << Self::N_BITS;
         if unknown_bits != 0 {
             return Err(DecodeError::UnsupportedFeatures { unknown_bits });
+        }
+        let missing_bits = bits & !Self::BUILT;
+        if missing_bits != 0 {
+            return Err(DecodeError::NotBuilt { missing_bits });
         }
         let has = |bit: u32| bits & bit != 0;
         Ok(Self {
@@ -69,15 +90,28 @@ impl Features {
 
 #[cfg(test)]
 mod tests {
+    use std::string::ToString;
+
     use super::Features;
     use crate::DecodeError;
 
     #[test]
     fn known_bits_come_back_and_unknown_ones_are_named() {
         for bits in 0..128 {
-            assert_eq!(Features::from_bits(bits).map(Features::to_bits), Ok(bits), "bits {bits:#b}");
+            let missing_bits = bits & !Features::BUILT;
+            let expected = if missing_bits == 0 { Ok(bits) } else { Err(DecodeError::NotBuilt { missing_bits }) };
+            assert_eq!(Features::from_bits(bits).map(Features::to_bits), expected, "bits {bits:#b}");
         }
         let error = DecodeError::UnsupportedFeatures { unknown_bits: 0x8000_0080 };
         assert_eq!(Features::from_bits(0x8000_0081), Err(error), "the first and the last unknown bit");
+    }
+
+    #[test]
+    fn what_a_decoder_is_built_without_is_named() {
+        let text = |missing_bits| DecodeError::NotBuilt { missing_bits }.to_string();
+        for (bits, name) in [(1, "view"), (2, "view"), (4, "dilation-compensation"), (16, "context"), (64, "detail")] {
+            assert!(text(bits).contains(name), "{bits:#b}: {}", text(bits));
+        }
+        assert!(!text(64).contains("context"), "nothing else: {}", text(64));
     }
 }

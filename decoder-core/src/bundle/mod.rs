@@ -95,7 +95,7 @@ impl<'a> Bundle<'a> {
             None => None,
         };
         let coder = sections.coder.bytes(bytes)?;
-        let coder = if header.features.context {
+        let coder = if cfg!(feature = "context") && header.features.context {
             Coder::Context(Context::parse(coder, header.feature_dim.into(), header.n_channels())?)
         } else {
             Coder::Static(Tables::parse(coder, header.n_channels())?)

@@ -14,6 +14,18 @@ impl fmt::Display for DecodeError {
             Self::UnsupportedFeatures { unknown_bits } => {
                 write!(f, "the bundle needs features {unknown_bits:#x} unknown to this decoder; use a newer one")
             }
+            Self::NotBuilt { missing_bits } => {
+                write!(
+                    f,
+                    "the bundle needs what this decoder was built without; build pocketsplat-core with the features"
+                )?;
+                let names =
+                    [(0b11, "view"), (0b100, "dilation-compensation"), (0b1_0000, "context"), (0b100_0000, "detail")];
+                for (_, name) in names.into_iter().filter(|(bits, _)| missing_bits & bits != 0) {
+                    write!(f, " {name}")?;
+                }
+                Ok(())
+            }
             Self::Truncated { section, needed, available } => {
                 write!(f, "{section} needs {needed} bytes and has {available}; the file is cut, copy it again")
             }

@@ -40,6 +40,11 @@ pub enum DecodeError {
         /// The feature bits without a meaning here.
         unknown_bits: u32,
     },
+    /// The bundle needs what this decoder was built without.
+    NotBuilt {
+        /// The feature bits of it.
+        missing_bits: u32,
+    },
     /// A section ends before its content does.
     Truncated {
         /// Where.
@@ -206,7 +211,9 @@ impl DecodeError {
     /// ```
     pub const fn class(&self) -> ErrorClass {
         match self {
-            Self::UnsupportedVersion { .. } | Self::UnsupportedFeatures { .. } => ErrorClass::Unsupported,
+            Self::UnsupportedVersion { .. } | Self::UnsupportedFeatures { .. } | Self::NotBuilt { .. } => {
+                ErrorClass::Unsupported
+            }
             Self::PlanTooLarge { .. } | Self::ScratchTooSmall { .. } | Self::BudgetTooSmall { .. } => {
                 ErrorClass::OverBudget
             }

@@ -37,7 +37,9 @@ impl<'s> Heads<'s> {
             covariance: Head::convert(arena, &heads.covariance, &mut weights)?,
             colour: Head::convert(arena, &heads.colour, &mut weights)?,
             detail: match &heads.detail {
-                Some(head) if shape.detail > 0 => Some(Detail::convert(arena, head, &mut weights)?),
+                Some(head) if cfg!(feature = "detail") && shape.detail > 0 => {
+                    Some(Detail::convert(arena, head, &mut weights)?)
+                }
                 _ => None,
             },
         })

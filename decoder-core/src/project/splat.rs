@@ -50,7 +50,7 @@ impl View {
         }
         let covariance = Covariance::from_rows(self.sphere_to_image(point, gaussian));
         let mut opacity = gaussian.opacity;
-        if dilation_compensation {
+        if cfg!(feature = "dilation-compensation") && dilation_compensation {
             opacity *= libm::sqrtf(covariance.det_bare / covariance.det);
         }
         let log_opacity = libm::logf(opacity + self.lost_opacity);

@@ -85,7 +85,9 @@ pub(crate) fn for_each_gaussian(
         output.colour = heads.colour.block(k, units).unwrap_or_default().map(sigmoid);
     }
     // Only then the buffer is free for the detail head.
-    if let Some(detail) = &heads.detail {
+    if cfg!(feature = "detail")
+        && let Some(detail) = &heads.detail
+    {
         detail.begin(anchor.feature, detail_sums);
         for (_, output) in visible_only(outputs, visible) {
             let [r, g, b] = detail.residual(output.colour, detail_sums, hidden);
@@ -114,8 +116,8 @@ fn fill_inputs(anchor: &Anchor<'_>, effects: Effects, eye: [f32; 3], inputs: &mu
     let [dx, dy, dz] = [ax - ex, ay - ey, az - ez];
     let distance = libm::sqrtf(dx * dx + dy * dy + dz * dz);
     let direction = if distance > 0.0 { [dx / distance, dy / distance, dz / distance] } else { [0.0; 3] };
-    let direction = direction.iter().take(if effects.view_direction { 3 } else { 0 });
-    let distance = core::iter::once(&distance).take(effects.view_distance.into());
+    let direction = direction.iter().take(if cfg!(feature = "view") && effects.view_direction { 3 } else { 0 });
+    let distance = core::iter::once(&distance).take((cfg!(feature = "view") && effects.view_distance).into());
     for (input, &value) in inputs.iter_mut().zip(anchor.feature.iter().chain(direction).chain(distance)) {
         *input = value;
     }

@@ -89,6 +89,7 @@ impl<'b> ChannelModels<'b, '_> {
         let (offsets, _) = offsets.as_chunks_mut();
         match self {
             Self::Static(tables) => read_static(*tables, site.mask, symbols, scalars, offsets),
+            Self::Context(_) if !cfg!(feature = "context") => symbols,
             Self::Context(models) => models.read(site, symbols, scalars, offsets, watch),
         }
     }

@@ -5,25 +5,28 @@ use bytemuck::{Pod, Zeroable};
 use super::splat::Splat;
 use crate::math::{from_half, to_half};
 
-/// Precisions lie between 1/0.3 px⁻², the dilation's, and those of splats far larger than a frame: times 2¹² they keep a
-/// half's eleven bits down to a standard deviation of 8,000 pixels.
-const PRECISION_UNIT: f32 = 1.0 / 4096.0;
+/// Bits of 2⁻⁶², which stands for every smaller precision: a deviation of 2·10⁹ px.
+const LEAST_PRECISION: u32 = (127 - 62) << 23;
+/// What a float has more digits than are kept.
+const DIGITS_DROPPED: u32 = 13;
 
-/// A [`Splat`], its place and depth as they are, everything else rounded to eleven bits.
+/// A [`Splat`], its place, depth and shear as they are, everything else rounded to eleven bits.
 ///
-/// What that costs: each number moves by at most 2⁻¹² of itself, so at the rim, where the exponent is 5.5, alpha by 0.3 %
-/// of what is left there, and a colour by a sixteenth of a step of 8 bits.
+/// Shear is multiplied by the distance from the centre: eleven bits of it would move the far end of a needle that crosses a
+/// frame of 500 pixels by an eighth of a pixel, and one whose centre lies as far outside by as much more.
+///
+/// What the others cost: each number moves by at most 2⁻¹² of itself, so at the rim, where the exponent is 5.5, alpha by
+/// 0.3 % of what is left there, and a colour by a sixteenth of a step of 8 bits.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct PackedSplat {
     mean: [f32; 2],
     pub(crate) depth: f32,
-    shear: u16,
+    shear: f32,
     row_precision: u16,
     column_precision: u16,
     log_opacity: u16,
     colour: [u16; 3],
-    _unused: u16,
 }
 
 impl PackedSplat {
@@ -32,12 +35,11 @@ impl PackedSplat {
         Self {
             mean: splat.mean,
             depth: splat.depth,
-            shear: to_half(splat.shear),
-            row_precision: to_half(splat.row_precision / PRECISION_UNIT),
-            column_precision: to_half(splat.column_precision / PRECISION_UNIT),
+            shear: splat.shear,
+            row_precision: pack_precision(splat.row_precision),
+            column_precision: pack_precision(splat.column_precision),
             log_opacity: to_half(splat.log_opacity),
             colour: splat.colour.map(to_half),
-            _unused: 0,
         }
     }
 
@@ -47,13 +49,27 @@ impl PackedSplat {
         Splat {
             mean: self.mean,
             depth: self.depth,
-            shear: from_half(self.shear),
-            row_precision: from_half(self.row_precision) * PRECISION_UNIT,
-            column_precision: from_half(self.column_precision) * PRECISION_UNIT,
+            shear: self.shear,
+            row_precision: unpack_precision(self.row_precision),
+            column_precision: unpack_precision(self.column_precision),
             log_opacity: from_half(self.log_opacity),
             colour: self.colour.map(from_half),
         }
     }
+}
+
+/// Rounds a precision to eleven bits, as a half has them; but six bits of exponent and no sign, because precisions lie
+/// between 1/0.3 px⁻², the dilation's, and those of splats far larger than a frame whose rim alone may cross it.
+fn pack_precision(precision: f32) -> u16 {
+    let above = precision.to_bits().saturating_sub(LEAST_PRECISION);
+    let rounded = above.saturating_add(1 << (DIGITS_DROPPED - 1)) >> DIGITS_DROPPED;
+    // Not reached: the largest stands for 4.
+    rounded.min(u16::MAX.into()) as u16
+}
+
+#[inline]
+fn unpack_precision(packed: u16) -> f32 {
+    f32::from_bits((u32::from(packed) << DIGITS_DROPPED).wrapping_add(LEAST_PRECISION))
 }
 
 #[cfg(test)]
@@ -63,7 +79,7 @@ mod tests {
 
     #[test]
     fn splats_of_all_sizes_keep_eleven_bits() {
-        for sigma_px in [0.55_f32, 1.0, 7.3, 120.0, 5000.0] {
+        for sigma_px in [0.55_f32, 1.0, 7.3, 120.0, 5000.0, 1e5, 1e9] {
             let precision = 1.0 / (sigma_px * sigma_px);
             let splat = Splat {
                 mean: [-123.456, 7.891],
@@ -75,10 +91,11 @@ mod tests {
                 depth: 3.21,
             };
             let kept = PackedSplat::new(&splat).unpack();
-            assert_eq!((kept.mean, kept.depth), (splat.mean, splat.depth), "as they are");
+            let exact = |s: &Splat| (s.mean, s.depth, s.shear);
+            assert_eq!(exact(&kept), exact(&splat), "as they are");
             let numbers = |s: &Splat| {
                 let [red, green, blue] = s.colour;
-                [s.shear, s.row_precision, s.column_precision, s.log_opacity, red, green, blue]
+                [s.row_precision, s.column_precision, s.log_opacity, red, green, blue]
             };
             for (kept, whole) in numbers(&kept).into_iter().zip(numbers(&splat)) {
                 assert!((kept - whole).abs() <= whole.abs() / 2048.0, "{kept} for {whole} at {sigma_px} px");

@@ -173,7 +173,8 @@ impl Added {
 /// Pixel centres of the image inside the ellipse where alpha reaches the cutoff.
 fn pixels_inside(splat: &Splat<f32>, footprint: &Footprint<f32>, size_px: [u32; 2]) -> u64 {
     let [mean_x, mean_y] = splat.mean_px.map(f64::from);
-    let [a, b, c] = splat.conic.map(f64::from);
+    let [shear, row_precision, column_precision] =
+        [splat.shear, splat.row_precision, splat.column_precision].map(f64::from);
     let reach = 2.0 * (f64::from(splat.opacity) / ALPHA_CUTOFF).ln();
     let half_height = f64::from(footprint.half_extent_px[1]);
     // First and end of the pixels whose centres lie within `half` of `mean`.
@@ -184,11 +185,10 @@ fn pixels_inside(splat: &Splat<f32>, footprint: &Footprint<f32>, size_px: [u32; 
     };
     let (first_row, end_row) = span(mean_y, half_height, size_px[1]);
     let row = |y: u64| {
-        // a·dx² + 2b·dx·dy + c·dy² ≤ reach.
         let dy = y as f64 + 0.5 - mean_y;
-        let discriminant = (b * dy) * (b * dy) - a * (c * dy * dy - reach);
-        let (first, end) = span(mean_x - b * dy / a, discriminant.max(0.0).sqrt() / a, size_px[0]);
-        if discriminant < 0.0 { 0 } else { end - first }
+        let left = reach - dy * dy * column_precision;
+        let (first, end) = span(mean_x + shear * dy, (left.max(0.0) / row_precision).sqrt(), size_px[0]);
+        if left < 0.0 { 0 } else { end - first }
     };
     (first_row..end_row).map(row).sum()
 }
@@ -201,7 +201,14 @@ mod tests {
     #[test]
     fn pixels_inside_are_those_the_cutoff_leaves() {
         let (conic, opacity) = ([0.08_f32, 0.03, 0.05], 0.8_f32);
-        let splat = Splat { mean_px: [9.3, 7.9], conic, opacity, colour: [0.0; 3] };
+        let splat = Splat {
+            mean_px: [9.3, 7.9],
+            shear: -conic[1] / conic[0],
+            row_precision: conic[0],
+            column_precision: conic[2] - conic[1] * conic[1] / conic[0],
+            opacity,
+            colour: [0.0; 3],
+        };
         let determinant = conic[0] * conic[2] - conic[1] * conic[1];
         let reach = 2.0 * (255.0 * opacity).ln();
         let half_extent_px = [conic[2], conic[0]].map(|c| (reach * c / determinant).sqrt());

@@ -60,13 +60,16 @@ fn add<R: Real>(sum: &mut Splat<R>, part: &Splat<R>) {
         sum.mean_px[i] += part.mean_px[i];
     }
     for i in 0..3 {
-        sum.conic[i] += part.conic[i];
         sum.colour[i] += part.colour[i];
     }
+    sum.shear += part.shear;
+    sum.row_precision += part.row_precision;
+    sum.column_precision += part.column_precision;
     sum.opacity += part.opacity;
 }
 
-/// Lane sums of one (tile, splat) pair's gradient; dp is dL/d(power), dx and dy the distance to the splat's centre.
+/// Lane sums of one (tile, splat) pair's gradient; dp is dL/d(power), dy the distance to the
+/// splat's centre across rows, dx that to the row's centre along it.
 #[derive(Default)]
 struct PairSums<R> {
     dp_dx: Row<R>,
@@ -79,7 +82,7 @@ struct PairSums<R> {
 }
 
 impl<R: Real> PairSums<R> {
-    /// From power = −½(a·dx² + c·dy²) − b·dx·dy.
+    /// From power = −½(p·dx² + k·dy²) with dx = x − mean − s·dy.
     #[inline(always)]
     fn gradient(&self, splat: &Splat<R>) -> Splat<R> {
         let sum = |row: &Row<R>| {
@@ -89,12 +92,14 @@ impl<R: Real> PairSums<R> {
                 |a, b| a + b,
             )
         };
-        let [a, b, c] = splat.conic;
+        let Splat { shear, row_precision, column_precision, .. } = *splat;
         let half = R::real(-0.5);
-        let (dx, dy) = (sum(&self.dp_dx), sum(&self.dp_dy));
+        let (along, across) = (row_precision * sum(&self.dp_dx), column_precision * sum(&self.dp_dy));
         Splat {
-            mean_px: [a * dx + b * dy, b * dx + c * dy],
-            conic: [half * sum(&self.dp_dx_dx), -sum(&self.dp_dx_dy), half * sum(&self.dp_dy_dy)],
+            mean_px: [along, across - shear * along],
+            shear: row_precision * sum(&self.dp_dx_dy),
+            row_precision: half * sum(&self.dp_dx_dx),
+            column_precision: half * sum(&self.dp_dy_dy),
             opacity: sum(&self.opacity),
             colour: [sum(&self.colour[0]), sum(&self.colour[1]), sum(&self.colour[2])],
         }

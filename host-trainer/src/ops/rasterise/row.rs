@@ -31,16 +31,15 @@ pub(super) fn rows<R: Real>(mean_y: R, half_extent_y: R, tile_y: usize) -> (usiz
 
 /// Alpha along one row, before the stop rule; zero where it is not drawn.
 ///
-/// Also gives exp(power) and dx for the backward pass.
+/// Also gives exp(power) and dx − shear·dy for the backward pass.
 #[inline(always)]
 pub(super) fn alpha_row<R: Real>(splat: &Splat<R>, dx0: R, dy: R) -> (Row<R>, Row<R>, Row<R>) {
-    let [a, b, c] = splat.conic;
-    let (half_a, slope, constant) = (R::real(-0.5) * a, -(b * dy), R::real(-0.5) * c * dy * dy);
+    let (half, sheared) = (R::real(-0.5) * splat.row_precision, dx0 - splat.shear * dy);
+    let constant = R::real(-0.5) * splat.column_precision * dy * dy;
     let (mut alpha, mut bell, mut dx) = ([R::ZERO; TILE_PX], [R::ZERO; TILE_PX], [R::ZERO; TILE_PX]);
     for i in 0..TILE_PX {
-        dx[i] = dx0 + R::real(i as f64);
-        // Rounding can lift the exponent of a degenerate conic above zero.
-        let power = (constant + (half_a * dx[i] + slope) * dx[i]).smaller(R::ZERO);
+        dx[i] = sheared + R::real(i as f64);
+        let power = constant + half * dx[i] * dx[i];
         bell[i] = power.larger(R::real(-80.0)).exp();
         let raw = splat.opacity * bell[i];
         alpha[i] = if raw < R::real(ALPHA_CUTOFF) { R::ZERO } else { raw.smaller(R::real(ALPHA_MAX)) };

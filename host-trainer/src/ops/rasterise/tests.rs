@@ -9,12 +9,22 @@ const SIZE: [usize; 2] = [37, 21];
 
 fn unpack(x: &[f64]) -> Vec<Splat<f64>> {
     x.chunks_exact(9)
-        .map(|v| Splat { mean_px: [v[0], v[1]], conic: [v[2], v[3], v[4]], opacity: v[5], colour: [v[6], v[7], v[8]] })
+        .map(|v| Splat {
+            mean_px: [v[0], v[1]],
+            shear: v[2],
+            row_precision: v[3],
+            column_precision: v[4],
+            opacity: v[5],
+            colour: [v[6], v[7], v[8]],
+        })
         .collect()
 }
 
 fn pack(splats: &[Splat<f64>]) -> Vec<f64> {
-    splats.iter().flat_map(|s| [&s.mean_px[..], &s.conic, &[s.opacity], &s.colour].concat()).collect()
+    let of = |s: &Splat<f64>| {
+        [&s.mean_px[..], &[s.shear, s.row_precision, s.column_precision, s.opacity], &s.colour].concat()
+    };
+    splats.iter().flat_map(of).collect()
 }
 
 fn footprints(splats: &[Splat<f64>]) -> Vec<Footprint<f64>> {
@@ -22,9 +32,9 @@ fn footprints(splats: &[Splat<f64>]) -> Vec<Footprint<f64>> {
         .iter()
         .enumerate()
         .map(|(i, s)| {
-            let det = s.conic[0] * s.conic[2] - s.conic[1] * s.conic[1];
             let reach = 2.0 * (255.0 * s.opacity).ln();
-            let half_extent_px = [(reach * s.conic[2] / det).sqrt(), (reach * s.conic[0] / det).sqrt()];
+            let yy = 1.0 / s.column_precision;
+            let half_extent_px = [1.0 / s.row_precision + s.shear * s.shear * yy, yy].map(|v| (reach * v).sqrt());
             Footprint { depth: 1.0 + i as f64, half_extent_px }
         })
         .collect()
@@ -40,13 +50,12 @@ fn scene(seed: u64, n: usize, opacity: f64) -> Vec<f64> {
         .flat_map(|v| {
             let (sx, sy) = (3.0 + 2.5 * v[2], 3.0 + 2.5 * v[3]);
             let rho = 0.8 * v[4];
-            let k = 1.0 / (1.0 - rho * rho);
             [
                 SIZE[0] as f64 * (0.5 + 0.6 * v[0]),
                 SIZE[1] as f64 * (0.5 + 0.6 * v[1]),
-                k / (sx * sx),
-                -k * rho / (sx * sy),
-                k / (sy * sy),
+                rho * sx / sy,
+                1.0 / (sx * sx * (1.0 - rho * rho)),
+                1.0 / (sy * sy),
                 opacity * (0.6 + 0.35 * v[5]),
                 v[6].abs(),
                 v[7].abs(),
@@ -69,7 +78,9 @@ fn draw_plainly(splats: &[Splat<f64>], background: [f64; 3]) -> Vec<f64> {
         let (mut t, mut colour) = (1.0, [0.0; 3]);
         for s in splats {
             let (dx, dy) = (px - s.mean_px[0], py - s.mean_px[1]);
-            let power = -0.5 * (s.conic[0] * dx * dx + s.conic[2] * dy * dy) - s.conic[1] * dx * dy;
+            let [a, b] = [s.row_precision, -s.row_precision * s.shear];
+            let c = s.column_precision - b * s.shear;
+            let power = -0.5 * (a * dx * dx + c * dy * dy) - b * dx * dy;
             let alpha = (s.opacity * power.exp()).min(0.99);
             if alpha < 1.0 / 255.0 {
                 continue;
@@ -109,7 +120,9 @@ fn every_simd_level_gives_the_same_bits() {
         .iter()
         .map(|s| Splat {
             mean_px: s.mean_px.map(round),
-            conic: s.conic.map(round),
+            shear: round(s.shear),
+            row_precision: round(s.row_precision),
+            column_precision: round(s.column_precision),
             opacity: round(s.opacity),
             colour: s.colour.map(round),
         })

@@ -30,12 +30,11 @@ pub fn anchor_is_visible<R: Real>(camera: &Pinhole<R>, position: [R; 3], size: [
         cov[1] += a * b;
         cov[2] += b * b;
     }
-    let mid = R::real(0.5) * (cov[0] + cov[2]);
-    let det = cov[0] * cov[2] - cov[1] * cov[1];
-    if !(det > R::ZERO) {
-        return false;
-    }
-    let lambda_max = mid + (mid * mid - det).larger(R::real(0.1)).sqrt();
+    let half = R::real(0.5);
+    let half_difference = half * (cov[0] - cov[2]);
+    // m² − det Σ' without the difference of two large numbers, which for a needle's rounding could even make det negative.
+    let spread = half_difference * half_difference + cov[1] * cov[1];
+    let lambda_max = half * (cov[0] + cov[2]) + spread.larger(R::real(0.1)).sqrt();
     let radius: f64 = (R::real(3.0) * lambda_max.sqrt()).into();
     let radius = R::real(radius.ceil());
     let (u, v) = (fx * slope[0] + camera.principal_px[0], fy * slope[1] + camera.principal_px[1]);
@@ -70,5 +69,23 @@ mod tests {
         assert!(!anchor_is_visible(&camera, [0.8, 0.0, 1.0], [0.001; 3]));
         assert!(anchor_is_visible(&camera, [0.8, 0.0, 1.0], [0.2; 3]));
         assert!(!anchor_is_visible(&camera, [f64::NAN, 0.0, 1.0], [0.2; 3]));
+    }
+
+    #[test]
+    fn a_needle_of_an_anchor_is_seen_in_f32() {
+        // Seen askew it lies across the image's diagonal: det Σ' is a small difference of large numbers.
+        for turn in 0..40 {
+            let rotation = DMat3::from_rotation_z(0.6 + 0.01 * f64::from(turn));
+            let camera = Camera {
+                rotation,
+                translation: DVec3::new(0.0, 0.0, 2.0),
+                focal_px: [100.0; 2],
+                principal_px: [50.0; 2],
+                width_px: 100,
+                height_px: 100,
+            };
+            let camera = Pinhole::<f32>::new(&camera);
+            assert!(anchor_is_visible(&camera, [0.0; 3], [200.0, 1e-3, 1e-3]), "turned by {turn} hundredths");
+        }
     }
 }

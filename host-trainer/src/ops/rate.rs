@@ -38,13 +38,14 @@ pub fn bits<R: Real>(value: R, mean: R, log2_scale: R) -> Bits<R> {
     let probability = above_a - tail_b;
     let floor = R::real(FLOOR);
     let lifted = probability.larger(floor);
-    // −log₂ e/p, or no gradient where p was lifted.
-    let slope = if probability > floor { -(R::real(std::f64::consts::LOG2_E) / lifted) } else { R::ZERO };
-    let d_distance = slope * (density_b - density_a) * inverse_scale;
+    let slope = -(R::real(std::f64::consts::LOG2_E) / lifted);
+    // No gradient where p was lifted: chosen, not multiplied, because a and b may be infinite there.
+    let where_likely = |gradient: R| if probability > floor { gradient } else { R::ZERO };
+    let d_distance = where_likely(slope * (density_b - density_a) * inverse_scale);
     Bits {
         bits: -lifted.log2(),
         d_value: if signed < R::ZERO { -d_distance } else { d_distance },
-        d_log2_scale: slope * ln_2 * (a * density_a - b * density_b),
+        d_log2_scale: where_likely(slope * ln_2 * (a * density_a - b * density_b)),
     }
 }
 
@@ -138,6 +139,8 @@ mod tests {
                 "{found:?}"
             );
         }
+        let beyond_f32 = bits(1e30f32, 0.0, -50.0);
+        assert_eq!((beyond_f32.d_value, beyond_f32.d_log2_scale), (0.0, 0.0), "deviations that are infinite");
         assert_eq!(bits(0.0f32, 0.0, -50.0).bits, 0.0, "a certain value costs nothing");
     }
 }

@@ -12,6 +12,8 @@
 //! * `digests`: do symbols not depend on the number of threads?
 //! * `fuzzing`: do the bodies of the fuzz targets hold on a seeded walk?
 //! * `captures`: do captures load with the conventions that the renderers use?
+//! * `hard_cases`, `hard_neighbourhoods`: do named hard cases, and what lies near them, keep the bounds that
+//!   `docs/numerical-stability.md` states?
 //! * `determinism`: does the same seed give the same bundle for any number of threads?
 
 pub mod bundles;
@@ -21,5 +23,6 @@ pub mod difference;
 pub mod digest;
 pub mod frame;
 pub mod fuzz;
+pub mod hard_cases;
 pub mod scenes;
 pub mod seal;

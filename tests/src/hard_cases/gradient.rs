@@ -1,0 +1,107 @@
+//! The trainer's gradients of a whole step: finite, right in f64, and about the same in f32.
+
+use pocketsplat::camera::Camera;
+use pocketsplat::ops::{Pinhole, Real};
+use pocketsplat::scene::Scene;
+use pocketsplat::train::config::LossWeights;
+use pocketsplat::train::step::coding::Coding;
+use pocketsplat::train::step::{Loss, Target, Workspace};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// Steps of the differences; where one crosses a cutoff of the blending, a smaller one may not.
+const STEPS: [f64; 7] = [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10];
+/// No smaller step is tried once a difference is as near as this.
+const ENOUGH: f64 = 1e-7;
+/// Directions below are judged as if their terms summed to it: the loss itself is only known to 1e-16.
+const LEAST_SLOPE: f64 = 1e-4;
+/// Gradients below are judged as if they were this large.
+const LEAST_GRADIENT: f64 = 1e-6;
+
+/// `len` values in [−1, 1), the same for the same seed.
+pub fn random(seed: u64, len: usize) -> Vec<f64> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    (0..len).map(|_| rng.random_range(-1.0..1.0)).collect()
+}
+
+/// How far a slope is from a fourth-order central difference of `f` around 0, of `scale`: the first as near as
+/// 10⁻⁷, or the best.
+pub fn difference_error(slope: f64, scale: f64, mut f: impl FnMut(f64) -> f64) -> f64 {
+    let mut best = f64::INFINITY;
+    for h in STEPS {
+        let found = (8.0 * (f(h) - f(-h)) - (f(2.0 * h) - f(-2.0 * h))) / (12.0 * h);
+        best = best.min((found - slope).abs() / scale.max(LEAST_SLOPE));
+        if best <= ENOUGH {
+            break;
+        }
+    }
+    best
+}
+
+/// The trained numbers of a scene by kind: features, log-scales, offsets, weights of the heads.
+fn kinds<R: Real>(scene: &mut Scene<R>) -> [Vec<&mut R>; 4] {
+    let Scene { anchors, heads, .. } = scene;
+    [
+        anchors.features.iter_mut().collect(),
+        anchors.log_scales.iter_mut().collect(),
+        anchors.offsets.iter_mut().collect(),
+        heads.each_mut().flat_map(|head| head.groups_mut()).flatten().collect(),
+    ]
+}
+
+/// Loss and gradients of a step towards a picture of noise, without the term on volumes, which would drown the others.
+fn step<R: Real>(scene: &Scene<R>, camera: &Camera, truth: &[f64], background: [f64; 3]) -> (f64, [Vec<f64>; 4]) {
+    let truth: Vec<R> = truth.iter().map(|v| R::real(*v)).collect();
+    let camera = Pinhole::new(camera);
+    let target = Target { camera: &camera, truth: &truth, mask: None, background: background.map(R::real) };
+    let weights = LossWeights { volume: 0.0, ..LossWeights::default() };
+    let mut workspace = Workspace::new(&scene.shape);
+    let report = workspace.step(scene, &target, &Loss::plain(weights), &Coding::Raw);
+    let mut d = scene.clone();
+    kinds(&mut d).into_iter().flatten().for_each(|g| *g = R::ZERO);
+    let (f, o) = (scene.shape.feature_dim, 3 * scene.shape.n_offsets);
+    for block in workspace.blocks() {
+        for (row, a) in block.anchors.iter().map(|a| *a as usize).enumerate() {
+            d.anchors.features[a * f..(a + 1) * f].copy_from_slice(&block.d_features[row * f..(row + 1) * f]);
+            d.anchors.log_scales[a * 6..(a + 1) * 6].copy_from_slice(&block.d_log_scales[row * 6..(row + 1) * 6]);
+            d.anchors.offsets[a * o..(a + 1) * o].copy_from_slice(&block.d_offsets[row * o..(row + 1) * o]);
+        }
+    }
+    d.heads = workspace.d_heads.clone();
+    let gradients = kinds(&mut d).map(|kind| kind.into_iter().map(|g| (*g).into()).collect());
+    (report.loss.into(), gradients)
+}
+
+/// Error of the gradients in f32 against f64, and in f64 against differences; infinite where one is not finite.
+pub fn errors(scene: &Scene<f32>, camera: &Camera, background: [f64; 3]) -> [f64; 2] {
+    let n_pixels = (camera.width_px * camera.height_px) as usize;
+    let truth: Vec<f64> = random(77, 3 * n_pixels).iter().map(|v| 0.5 + 0.5 * v).collect();
+    let mut exact_scene = scene.cast::<f64>();
+    let (rounded_loss, rounded) = step(scene, camera, &truth, background);
+    let (loss, exact) = step(&exact_scene, camera, &truth, background);
+    if !exact.iter().chain(&rounded).flatten().chain([&loss, &rounded_loss]).all(|v| v.is_finite()) {
+        return [f64::INFINITY; 2];
+    }
+    let mut worst = [0.0_f64; 2];
+    for kind in 0..4 {
+        let scale = exact[kind].iter().fold(LEAST_GRADIENT, |scale, g| scale.max(g.abs()));
+        let error = exact[kind].iter().zip(&rounded[kind]).fold(0.0_f64, |worst, (a, b)| worst.max((a - b).abs()));
+        worst[0] = worst[0].max(error / scale);
+
+        // Every number moves in proportion to itself.
+        let start: Vec<f64> = kinds(&mut exact_scene)[kind].iter().map(|x| **x).collect();
+        let direction: Vec<f64> =
+            random(5, start.len()).iter().zip(&start).map(|(r, x)| r * x.abs().max(1e-2)).collect();
+        let terms = exact[kind].iter().zip(&direction).map(|(g, d)| g * d);
+        let (slope, scale) = terms.fold((0.0, 0.0), |(slope, scale), term| (slope + term, scale + term.abs()));
+        let mut moved = exact_scene.clone();
+        let error = difference_error(slope, scale, |t| {
+            for ((x, start), d) in kinds(&mut moved)[kind].iter_mut().zip(&start).zip(&direction) {
+                **x = start + t * d;
+            }
+            step(&moved, camera, &truth, background).0
+        });
+        worst[1] = worst[1].max(error);
+    }
+    worst
+}

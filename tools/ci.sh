@@ -146,7 +146,7 @@ job_digests() {
     shift
     (
       cd tests/digest
-      export PSB_STATIC=$out/static.psb PSB_CONTEXT=$out/context.psb
+      export PSB_STATIC=$out/static.psb PSB_CONTEXT=$out/context.psb PSB_HARD=$out/hard.psb
       cargo build -q --locked --target-dir "$out/build" "${arguments[@]}"
     )
     found=$(timeout 120 "$@" </dev/null) || fail "the digest of $name failed: $found"

@@ -11,9 +11,9 @@ const MAX_CHANNELS: usize = 256 + 6 + 3 * 32;
 pub struct Digest(pub u64);
 
 impl Digest {
-    const EMPTY: Self = Self(0xCBF2_9CE4_8422_2325);
+    pub(crate) const EMPTY: Self = Self(0xCBF2_9CE4_8422_2325);
 
-    fn add(&mut self, bytes: impl IntoIterator<Item = u8>) {
+    pub(crate) fn add(&mut self, bytes: impl IntoIterator<Item = u8>) {
         for byte in bytes {
             self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x100_0000_01B3);
         }

@@ -1,31 +1,41 @@
-//! Decodes two bundles, one of each coder, and prints what came out as numbers: the same on every target.
+//! Decodes and draws bundles, one of each coder and one of hard cases, and prints what came out as numbers: the same on
+//! every target.
 //!
-//! `PSB_STATIC` and `PSB_CONTEXT` name the bundles when it is built.
+//! `PSB_STATIC`, `PSB_CONTEXT` and `PSB_HARD` name the bundles when it is built.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 mod digest;
+mod frame;
 
 use core::fmt;
 
 use pocketsplat_core::{Bundle, DecodeError};
 
-static BUNDLES: [(&str, &[u8]); 2] =
-    [("static", include_bytes!(env!("PSB_STATIC"))), ("context", include_bytes!(env!("PSB_CONTEXT")))];
+static BUNDLES: [(&str, &[u8]); 3] = [
+    ("static", include_bytes!(env!("PSB_STATIC"))),
+    ("context", include_bytes!(env!("PSB_CONTEXT"))),
+    ("hard", include_bytes!(env!("PSB_HARD"))),
+];
 
 /// Words that the models of an anchor may take.
 const SCRATCH_WORDS: usize = 16 * 1024;
+/// Bytes that a frame may take.
+const SCRATCH_BYTES: usize = 512 * 1024;
 
 /// Hands `print` a line for each bundle.
 fn run(print: impl Fn(fmt::Arguments<'_>)) -> Result<(), DecodeError> {
     let mut scratch = [0; SCRATCH_WORDS];
+    let mut memory = [0; SCRATCH_BYTES];
     for (name, bytes) in BUNDLES {
         let bundle = Bundle::parse(bytes)?;
         let [symbols, values] = digest::digests(&bundle, &mut scratch)?;
+        let frame = frame::frame_digest(&bundle, &mut memory)?;
         print(format_args!(
-            "{name}: {} anchors, symbols {:016x}, values {:016x}",
+            "{name}: {} anchors, symbols {:016x}, values {:016x}, frame {:016x}",
             bundle.n_anchors(),
             symbols.0,
-            values.0
+            values.0,
+            frame.0
         ));
     }
     Ok(())

@@ -1,8 +1,9 @@
-//! Writes the two bundles that `tests/digest` decodes on every target: `static.psb` and `context.psb`.
+//! Writes the bundles that `tests/digest` decodes and draws on every target: `static.psb`, `context.psb` and `hard.psb`.
 
 use std::path::PathBuf;
 
 use conformance::bundles::{CODERS, tiered};
+use conformance::hard_cases;
 use conformance::scenes::CASES;
 
 fn main() -> std::io::Result<()> {
@@ -11,5 +12,5 @@ fn main() -> std::io::Result<()> {
     for (coder, name) in CODERS.into_iter().zip(["static.psb", "context.psb"]) {
         std::fs::write(folder.join(name), tiered(&CASES[0], coder, 64))?;
     }
-    Ok(())
+    std::fs::write(folder.join("hard.psb"), hard_cases::gathered())
 }

@@ -1,0 +1,31 @@
+//! One number for the pixels of a frame.
+
+use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, MaxSplats, Residency, Strips, TileSink};
+
+use super::digest::Digest;
+
+/// Digest of the frame that a bundle's preview camera sees, tile by tile.
+///
+/// * `scratch`: as many bytes as a plan of one strip, streamed anchors and every splat takes.
+///
+/// # Errors
+/// The decoder's.
+pub fn frame_digest(bundle: &Bundle<'_>, scratch: &mut [u8]) -> Result<Digest, DecodeError> {
+    let camera = bundle.header().preview;
+    let budget = Budget::for_frame(camera.width_px, camera.height_px)
+        .with_max_splats(MaxSplats::Worst)
+        .with_residency(Residency::Streamed)
+        .with_strips(Strips::Exactly(1));
+    let mut tiles = Tiles(Digest::EMPTY);
+    Decoder::bind(bundle, bundle.plan(&budget)?, scratch)?.render(&camera, &mut tiles)?;
+    Ok(tiles.0)
+}
+
+struct Tiles(Digest);
+
+impl TileSink for Tiles {
+    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) {
+        self.0.add([x_px, y_px, width, height].into_iter().flat_map(u16::to_le_bytes));
+        self.0.add(rgb.as_flattened().iter().copied());
+    }
+}

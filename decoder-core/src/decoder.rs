@@ -13,7 +13,7 @@ use crate::budget::{Arena, Overflow, Plan, ScratchShape};
 use crate::bundle::{AnchorRecords, Bundle, Chunk, RecordMemory, Tables, in_range, saturate};
 use crate::camera::Camera;
 use crate::error::{DecodeError, Field};
-use crate::mlp::{HeadShape, Heads};
+use crate::mlp::Heads;
 use crate::project::View;
 use crate::raster::{
     BlendRule, EMPTY, N_RADIX, Pixel, TILE_PIXELS, TILE_PX, TilePlace, TileRect, blend_tile, finish_tile, sort_by_depth,
@@ -74,7 +74,8 @@ impl<'b, 's> Decoder<'b, 's> {
         Ok(decoder)
     }
 
-    /// As [`bind`](Self::bind), but leaves damaged chunks out, and each frame that needs some says so in its report.
+    /// As [`bind`](Self::bind), but leaves damaged chunks out, and each frame that needs some says so in its report. Drawn in
+    /// [slabs](crate::Overflow::Slabs), a frame still fails for a chunk whose checksum is right and whose stream is not.
     ///
     /// # Errors
     /// [`DecodeError::ScratchTooSmall`] and [`DecodeError::PlanMismatch`] as for [`bind`](Self::bind).
@@ -106,11 +107,7 @@ impl<'b, 's> Decoder<'b, 's> {
             return Err(DecodeError::ScratchTooSmall { needed: saturate(plan.scratch_len()), available });
         };
         let header = bundle.header();
-        let detail = plan.budget().quality.detail;
-        let mut shape = HeadShape::of(header);
-        if !detail {
-            shape.detail = 0;
-        }
+        let shape = plan.shape().heads();
         let n_splats = plan.max_splats() as usize;
         let mut arena = Arena::new(scratch);
         // What `ScratchShape` adds up.
@@ -195,11 +192,15 @@ impl<'b, 's> Decoder<'b, 's> {
         let tallies = !in_slabs && (strips.len() == 1 || !self.surely_fits(&view, strips));
         let tally = Tally::new(self.plan.max_splats());
         let mut frame = Frame { view, strips, tallies, in_slabs, tally, report: FrameReport::default() };
+        if in_slabs && self.skip_damage {
+            self.note_damage(&mut frame);
+        }
         let mut most_in_memory = 0;
         for strip in strips.iter() {
             let (mut from, mut in_strip) = (0.0, 0_u32);
             loop {
                 let slab = self.gather(strip, from, &mut frame, watch)?;
+                frame.report.slabs = frame.report.slabs.saturating_add(1);
                 let n = self.splats.n;
                 most_in_memory = n.max(most_in_memory);
                 in_strip = in_strip.saturating_add(n);
@@ -252,7 +253,6 @@ impl<'b, 's> Decoder<'b, 's> {
         watch: &mut impl Stopwatch,
     ) -> bool {
         watch.enter(Stage::Sort);
-        report.slabs = report.slabs.saturating_add(1);
         let SplatStore { splats, rects, n, order, spare, counts } = &mut self.splats;
         let n = *n as usize;
         let (Some(splats), Some(rects)) = (splats.get(..n), rects.get(..n)) else { return false };

@@ -5,7 +5,6 @@ use super::scratch::ScratchShape;
 use super::work::{Work, decoding_macs};
 use crate::bundle::{Bundle, TierMeasures, saturate};
 use crate::error::DecodeError;
-use crate::mlp::HeadShape;
 use crate::raster::TILE_PX;
 
 /// Numbers of strips that the manifest has maxima for, and that plans try.
@@ -199,7 +198,7 @@ impl Bundle<'_> {
                 (u64::from(measures.max_head_kilo_macs).saturating_mul(1024), measures.max_decoded_anchors)
             }
             None => {
-                let (heads, k) = (HeadShape::of(header), usize::from(header.n_offsets));
+                let (heads, k) = (shape.heads(), usize::from(header.n_offsets));
                 let per_anchor = heads.opacity_macs(k).saturating_add(heads.open_macs(k)) as u64;
                 (per_anchor.saturating_mul(tier.n_anchors.into()), tier.n_anchors)
             }

@@ -27,9 +27,9 @@ pub struct Quality {
 impl Quality {
     /// As trained: the f64 reference within rounding.
     pub const EXACT: Self = Self { alpha_cut: 1, transmittance_stop: 1, detail: true };
-    /// What photographs hardly tell from exact: up to a quarter fewer instructions for at most 0.1 dB on the scenes measured.
+    /// What photographs hardly tell from exact: up to a fifth fewer instructions for at most 0.1 dB on the scenes measured.
     pub const BALANCED: Self = Self { alpha_cut: 4, transmittance_stop: 10, detail: true };
-    /// A third fewer where splats are large, for half a decibel.
+    /// A third fewer where splats are large, for 0.6 dB.
     pub const DRAFT: Self = Self { alpha_cut: 8, transmittance_stop: 100, detail: false };
 
     /// Field and value lie within their limits.

@@ -158,7 +158,8 @@ impl ScratchShape {
         self.record_layout().len().saturating_mul(2)
     }
 
-    const fn heads(&self) -> HeadShape {
+    /// Widths of the heads that are converted.
+    pub(crate) const fn heads(&self) -> HeadShape {
         let [f, k] = [limited(self.feature_dim, MAX_FEATURE_DIM), limited(self.n_offsets, MAX_OFFSETS)];
         HeadShape {
             inputs: f.saturating_add(self.n_view_inputs as usize),

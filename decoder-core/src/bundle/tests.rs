@@ -10,7 +10,7 @@ use builder::{Anchor, C, F, ORIGIN, STEP, Variant, bundle, cell, tiers, weight};
 use crate::budget::Arena;
 use crate::bundle::{AnchorRecords, AnchorSite, Bundle, Coder, RecordMemory, Tables, crc32};
 use crate::error::{DecodeError, Field, SectionKind};
-use crate::{Budget, Decoder, FrameReport, MaxSplats, Residency, ScratchShape, Strips, TileSink};
+use crate::{Budget, Decoder, FrameReport, MaxSplats, Overflow, Residency, ScratchShape, Strips, TileSink};
 
 fn variants() -> impl Iterator<Item = Variant> {
     (0..32).map(|bits| {
@@ -271,12 +271,27 @@ fn damage_is_left_out_alike_wherever_anchors_wait_and_in_all_strips() {
         let mut bytes = sound.clone();
         bytes[chunks_at + chunk.offset() as usize] ^= 4;
         let (expected, expected_report, _) = draw(&bytes, 3, true).expect("the others draw");
-        for (residency, n_strips) in [(Residency::Resident, 1), (Residency::Resident, 2), (Residency::Streamed, 2)] {
-            let budget = BUDGET.with_residency(residency).with_strips(Strips::Exactly(n_strips));
+        let ways = [
+            (Residency::Resident, 1, Overflow::LeaveOut),
+            (Residency::Resident, 2, Overflow::LeaveOut),
+            (Residency::Streamed, 2, Overflow::LeaveOut),
+            (Residency::Resident, 1, Overflow::Slabs),
+            (Residency::Streamed, 2, Overflow::Slabs),
+        ];
+        for (residency, n_strips, overflow) in ways {
+            let budget =
+                BUDGET.with_residency(residency).with_strips(Strips::Exactly(n_strips)).with_overflow(overflow);
+            let few = MaxSplats::AtMost(expected_report.splats / 4);
+            let budget = if overflow == Overflow::Slabs { budget.with_max_splats(few) } else { budget };
             let (pixels, report, _) = draw_within(&bytes, &budget, true).expect("the others draw");
-            assert!(pixels == expected, "{variant:?}: {residency:?}, {n_strips} strips");
+            assert!(pixels == expected, "{variant:?}: {residency:?}, {n_strips} strips, {overflow:?}");
+            assert_eq!(report.slabs > 2, overflow == Overflow::Slabs, "{variant:?}: {report:?}");
             let damage = |report: FrameReport| (report.chunks_damaged, report.first_damaged, report.splats);
-            assert_eq!(damage(report), damage(expected_report), "{variant:?}: {residency:?}, {n_strips} strips");
+            assert_eq!(
+                damage(report),
+                damage(expected_report),
+                "{variant:?}: {residency:?}, {n_strips} strips, {overflow:?}"
+            );
             let error = draw_within(&bytes, &budget, false).err();
             assert!(matches!(error, Some(DecodeError::ChunkChecksum { chunk: 1, .. })), "{variant:?}: {error:?}");
         }

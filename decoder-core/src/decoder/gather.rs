@@ -69,6 +69,24 @@ impl<'b> Decoder<'b, '_> {
         })
     }
 
+    /// Notes the damaged chunks in view, before strips are drawn in slabs, whose passes look at a chunk any number of times.
+    pub(super) fn note_damage(&self, frame: &mut Frame) {
+        let in_view =
+            self.planned_chunks().map(|(chunk, _)| chunk).filter(|chunk| frame.view.sees_box(chunk.ink_box()));
+        for chunk in in_view.filter(|chunk| !self.is_sound(chunk)) {
+            frame.report.chunks_damaged += 1;
+            frame.report.first_damaged = frame.report.first_damaged.or(Some(chunk.index()));
+        }
+    }
+
+    /// Whether a chunk is known to be undamaged, or damage is an error.
+    fn is_sound(&self, chunk: &Chunk<'b>) -> bool {
+        match &self.source {
+            AnchorSource::Resident(records) => !records.is_damaged(chunk.index()),
+            AnchorSource::Streamed(_) => !self.skip_damage || chunk.check().is_ok(),
+        }
+    }
+
     /// Fills the splat memory with the splats of one strip from depth `from` on, and returns the slab that they fill: all of
     /// the rest when there are places enough, or when splats are left out instead.
     pub(super) fn gather(
@@ -107,16 +125,15 @@ impl<'b> Decoder<'b, '_> {
     ) -> Result<(), DecodeError> {
         watch.enter(Stage::Decode);
         let (n_splats, tally, before) = (self.splats.n, frame.tally, frame.report);
-        let sound = match &self.source {
-            AnchorSource::Resident(records) => !records.is_damaged(chunk.index()),
-            AnchorSource::Streamed(_) => !self.skip_damage || chunk.check().is_ok(),
-        };
-        if sound {
+        if self.is_sound(chunk) {
             match self.gather_chunk(chunk, first_anchor, pass, frame, watch) {
                 // What its splats displaced is gone when strips are drawn in slabs.
                 Err(DecodeError::ChunkStream { .. }) if self.skip_damage && !frame.in_slabs => {}
                 result => return result,
             }
+        }
+        if frame.in_slabs {
+            return Ok(());
         }
         (self.splats.n, frame.tally, frame.report) = (n_splats, tally, before);
         // Once a frame.

@@ -36,7 +36,8 @@ pub struct FrameReport {
     pub splats_dropped: u32,
     /// Slabs of depth drawn, one of each strip where there were places for all of its splats.
     pub slabs: u32,
-    /// Splats of the fullest strip, those left out included; the number to plan for.
+    /// Splats of the fullest strip, those left out included; the number to plan for. In slabs those drawn before nothing more
+    /// could be seen.
     pub max_splats: u32,
     /// Splats of all strips together, one that lies in two counted twice.
     pub strip_splats: u32,

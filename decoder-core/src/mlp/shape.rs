@@ -2,7 +2,6 @@
 
 use super::block::n_rows;
 use super::head::LANES;
-use crate::bundle::Header;
 
 /// Widths of the heads of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,16 +19,6 @@ pub(crate) struct HeadShape {
 }
 
 impl HeadShape {
-    pub(crate) fn of(header: &Header) -> Self {
-        Self {
-            inputs: header.head_inputs(),
-            feature: header.feature_dim.into(),
-            colour: header.colour_hidden.into(),
-            detail: header.detail_hidden.into(),
-            offsets: header.n_offsets.into(),
-        }
-    }
-
     /// Floats of all heads in scratch memory.
     pub(crate) const fn n_weights(&self) -> usize {
         let Self { inputs, feature: f, colour: c, detail: d, offsets: k } = *self;

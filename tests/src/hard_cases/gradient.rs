@@ -59,14 +59,7 @@ fn step<R: Real>(scene: &Scene<R>, camera: &Camera, truth: &[f64], background: [
     let report = workspace.step(scene, &target, &Loss::plain(weights), &Coding::Raw);
     let mut d = scene.clone();
     kinds(&mut d).into_iter().flatten().for_each(|g| *g = R::ZERO);
-    let (f, o) = (scene.shape.feature_dim, 3 * scene.shape.n_offsets);
-    for block in workspace.blocks() {
-        for (row, a) in block.anchors.iter().map(|a| *a as usize).enumerate() {
-            d.anchors.features[a * f..(a + 1) * f].copy_from_slice(&block.d_features[row * f..(row + 1) * f]);
-            d.anchors.log_scales[a * 6..(a + 1) * 6].copy_from_slice(&block.d_log_scales[row * 6..(row + 1) * 6]);
-            d.anchors.offsets[a * o..(a + 1) * o].copy_from_slice(&block.d_offsets[row * o..(row + 1) * o]);
-        }
-    }
+    workspace.blocks().iter().for_each(|block| block.copy_gradients(&scene.shape, &mut d.anchors));
     d.heads = workspace.d_heads.clone();
     let gradients = kinds(&mut d).map(|kind| kind.into_iter().map(|g| (*g).into()).collect());
     (report.loss.into(), gradients)

@@ -6,7 +6,7 @@ use crate::ops::neural_gaussians::{Gaussian, HeadOutputs, Source};
 use crate::ops::project::{Footprint, Splat};
 use crate::ops::simd::Level;
 use crate::ops::{Pinhole, Real, detail, head, head_input, neural_gaussians, project, volume};
-use crate::scene::{Head, Heads, ModelShape, Scene};
+use crate::scene::{Anchors, Head, Heads, ModelShape, Scene};
 
 /// A block of visible anchors on its way through the chain; buffers are kept from step to step.
 #[derive(Clone, Debug)]
@@ -58,6 +58,18 @@ pub(super) fn refill<R: Real>(buffer: &mut Vec<R>, len: usize) {
 }
 
 impl<R: Real> Block<R> {
+    /// Copies the gradients of its anchors into arrays of all anchors: `[N, F]` features, `[N, 6]` log-scales, `[N, 3K]` offsets.
+    pub fn copy_gradients(&self, shape: &ModelShape, d_anchors: &mut Anchors<R>) {
+        let copy = |from: &[R], to: &mut [R], len: usize| {
+            for (row, &anchor) in from.chunks_exact(len).zip(&self.anchors) {
+                to[anchor as usize * len..][..len].copy_from_slice(row);
+            }
+        };
+        copy(&self.d_features, &mut d_anchors.features, shape.feature_dim);
+        copy(&self.d_log_scales, &mut d_anchors.log_scales, 6);
+        copy(&self.d_offsets, &mut d_anchors.offsets, 3 * shape.n_offsets);
+    }
+
     pub(super) fn new(shape: &ModelShape) -> Self {
         Self {
             anchors: Vec::new(),

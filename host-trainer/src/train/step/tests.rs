@@ -86,14 +86,7 @@ fn gradients<R: Real>(scene: &Scene<R>, workspace: &Workspace<R>) -> Vec<f64> {
     for g in flatten(&mut d) {
         *g = R::ZERO;
     }
-    let (f, o) = (scene.shape.feature_dim, 3 * scene.shape.n_offsets);
-    for block in workspace.blocks() {
-        for (row, a) in block.anchors.iter().map(|a| *a as usize).enumerate() {
-            d.anchors.features[a * f..(a + 1) * f].copy_from_slice(&block.d_features[row * f..(row + 1) * f]);
-            d.anchors.log_scales[a * 6..(a + 1) * 6].copy_from_slice(&block.d_log_scales[row * 6..(row + 1) * 6]);
-            d.anchors.offsets[a * o..(a + 1) * o].copy_from_slice(&block.d_offsets[row * o..(row + 1) * o]);
-        }
-    }
+    workspace.blocks().iter().for_each(|block| block.copy_gradients(&scene.shape, &mut d.anchors));
     d.heads = workspace.d_heads.clone();
     if let (Some(context), Some(found)) = (&mut d.context, &workspace.d_context) {
         context.mlp = found.mlp.clone();

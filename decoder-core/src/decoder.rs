@@ -9,6 +9,7 @@ mod tally;
 
 pub use report::FrameReport;
 
+use crate::bake::{BakedGaussians, BakedMemory, bake};
 use crate::budget::{Arena, Overflow, Plan, ScratchShape};
 use crate::bundle::{AnchorRecords, Bundle, Chunk, RecordMemory, Tables, in_range, saturate};
 use crate::camera::Camera;
@@ -21,7 +22,7 @@ use crate::raster::{
 use crate::scene::Workspace;
 use crate::stopwatch::{Stage, Stopwatch};
 use gather::Frame;
-use source::AnchorSource;
+use source::{AnchorSource, Anchors, GaussianSource};
 use splats::{Slab, SplatStore};
 use strip::{Strip, StripLayout};
 use tally::Tally;
@@ -39,11 +40,7 @@ pub struct Decoder<'b, 's> {
     bundle: Bundle<'b>,
     plan: Plan,
     skip_damage: bool,
-    heads: Heads<'s>,
-    source: AnchorSource<'b, 's>,
-    /// `[n_channels]` of the anchor in work.
-    row: &'s mut [f32],
-    work: Workspace<'s>,
+    source: GaussianSource<'b, 's>,
     /// `[TILE_PIXELS]` of the tile in work, or of each tile of a strip when strips are drawn in slabs.
     pixels: &'s mut [Pixel],
     /// `[TILE_PIXELS]` a finished tile.
@@ -53,20 +50,20 @@ pub struct Decoder<'b, 's> {
 
 impl<'b, 's> Decoder<'b, 's> {
     /// Takes `scratch`, converts the heads' weights into it, compares the checksum of every chunk of the planned tiers, and
-    /// decodes them if the plan says so.
+    /// decodes them, or evaluates their Gaussians, if the plan says so.
     ///
     /// # Errors
     /// [`DecodeError::ScratchTooSmall`] names the bytes needed; [`DecodeError::PlanMismatch`] when `plan` is another
     /// bundle's; [`DecodeError::ChunkChecksum`] names the damaged chunk, and so does [`DecodeError::ChunkStream`] for
-    /// resident anchors.
+    /// resident anchors and baked Gaussians; [`DecodeError::OutOfRange`] when those are more than the bundle says.
     ///
     /// # Budget
     /// Exactly [`Plan::scratch_len`] bytes of `scratch`; reads the whole bundle once, about 8 instructions a byte, and for
-    /// resident anchors 55 to 80 a symbol.
+    /// resident anchors 55 to 80 a symbol; baked Gaussians take the heads of every anchor besides.
     pub fn bind(bundle: &Bundle<'b>, plan: Plan, scratch: &'s mut [u8]) -> Result<Self, DecodeError> {
         let decoder = Self::bind_with(bundle, plan, scratch, false)?;
-        // Resident anchors were compared before they were decoded.
-        if !decoder.source.is_resident() {
+        // What is in memory was compared before it was decoded.
+        if decoder.source.is_streamed() {
             for (chunk, _) in decoder.planned_chunks() {
                 chunk.check()?;
             }
@@ -106,32 +103,30 @@ impl<'b, 's> Decoder<'b, 's> {
         let Some((scratch, _)) = scratch.split_at_mut_checked(plan.scratch_len()) else {
             return Err(DecodeError::ScratchTooSmall { needed: saturate(plan.scratch_len()), available });
         };
-        let header = bundle.header();
-        let shape = plan.shape().heads();
-        let n_splats = plan.max_splats() as usize;
         let mut arena = Arena::new(scratch);
-        // What `ScratchShape` adds up.
-        let heads = Heads::convert(&mut arena, bundle.heads(), shape)?;
-        let row = arena.take(header.n_channels())?;
-        let work = Workspace {
-            inputs: arena.take(shape.inputs)?,
-            hidden: arena.take(shape.hidden_len())?,
-            detail_sums: arena.take(shape.sums_len())?,
-            outputs: arena.take(shape.offsets)?,
-        };
-        let source = if plan.is_resident() {
-            AnchorSource::Resident(decode_anchors(bundle, &plan, row, &mut arena, skip_damage)?)
-        } else {
-            AnchorSource::Streamed(bundle.anchor_models(arena.take(bundle.anchor_scratch_words())?)?)
-        };
+        // Apart from the rest, because it calls deeply.
+        let baked = if plan.is_baked() { Some(bake_scene(bundle, &plan, &mut arena, skip_damage)?) } else { None };
+        Self::in_arena(bundle, plan, arena, baked, skip_damage)
+    }
+
+    /// Takes from `arena` what `ScratchShape` adds up, but for Gaussians that are baked already.
+    #[inline(never)]
+    fn in_arena(
+        bundle: &Bundle<'b>,
+        plan: Plan,
+        mut arena: Arena<'s>,
+        baked: Option<BakedGaussians<'s>>,
+        skip_damage: bool,
+    ) -> Result<Self, DecodeError> {
+        let n_splats = plan.max_splats() as usize;
         Ok(Self {
             bundle: *bundle,
             plan,
             skip_damage,
-            heads,
-            source,
-            row,
-            work,
+            source: match baked {
+                Some(baked) => GaussianSource::Baked(baked),
+                None => GaussianSource::Anchors(take_anchors(bundle, &plan, &mut arena, skip_damage)?),
+            },
             pixels: arena.take(TILE_PIXELS.saturating_mul(plan.shape().canvas_tiles as usize))?,
             rgb: arena.take(TILE_PIXELS)?,
             splats: SplatStore {
@@ -163,7 +158,7 @@ impl<'b, 's> Decoder<'b, 's> {
     ///
     /// # Budget
     /// No memory beyond the bound one, under 3 KiB of stack. Work of one strip: every anchor of a chunk in view is decoded
-    /// unless it is resident, the heads run for anchors that pass the prefilter, and a pixel is finished when its
+    /// unless it is resident, the heads run for anchors that pass the prefilter, unless Gaussians are baked, and a pixel is finished when its
     /// transmittance falls below 1e-4. Of several strips each does so for the chunks and anchors that can reach it; but the
     /// first one goes over the whole view to see that all strips have places enough, unless that follows from the
     /// directory.
@@ -312,6 +307,41 @@ impl<'b> Bundle<'b> {
         let n_chunks = self.up_to_tier(tiers.min(self.n_tiers())).n_chunks;
         Ok(self.chunks().take(n_chunks as usize).filter(move |chunk| view.sees_box(chunk.ink_box())))
     }
+}
+
+/// Evaluates the Gaussians of the planned tiers into memory of `arena`; works in what the frame will use later.
+fn bake_scene<'s>(
+    bundle: &Bundle<'_>,
+    plan: &Plan,
+    arena: &mut Arena<'s>,
+    skip_damage: bool,
+) -> Result<BakedGaussians<'s>, DecodeError> {
+    let ScratchShape { baked_gaussians, baked_chunks, .. } = *plan.shape();
+    let memory = BakedMemory {
+        records: arena.take(baked_gaussians as usize)?,
+        starts: arena.take((baked_chunks as usize).saturating_add(1))?,
+    };
+    bake(bundle, baked_chunks, memory, plan.shape().heads(), arena, skip_damage)
+}
+
+/// Converts the heads into memory of `arena`, and prepares where the anchors of the planned tiers come from.
+#[inline(never)]
+fn take_anchors<'b, 's>(
+    bundle: &Bundle<'b>,
+    plan: &Plan,
+    arena: &mut Arena<'s>,
+    skip_damage: bool,
+) -> Result<Anchors<'b, 's>, DecodeError> {
+    let shape = plan.shape().heads();
+    let heads = Heads::convert(arena, bundle.heads(), shape)?;
+    let row = arena.take(bundle.header().n_channels())?;
+    let work = Workspace::take(arena, shape)?;
+    let source = if plan.is_resident() {
+        AnchorSource::Resident(decode_anchors(bundle, plan, row, arena, skip_damage)?)
+    } else {
+        AnchorSource::Streamed(bundle.anchor_models(arena.take(bundle.anchor_scratch_words())?)?)
+    };
+    Ok(Anchors { source, heads, row, work })
 }
 
 /// Decodes the planned tiers into memory of `arena`; their models work in what the frame will use later.

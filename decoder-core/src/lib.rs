@@ -8,6 +8,7 @@ extern crate std;
 mod camera;
 mod error;
 
+mod bake;
 pub mod budget;
 pub mod bundle;
 pub mod context;

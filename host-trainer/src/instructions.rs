@@ -30,7 +30,7 @@ impl Target {
 }
 
 /// Parts of a frame that have a cost, in the order of `costs.csv`.
-pub const N_TERMS: usize = 21;
+pub const N_TERMS: usize = 22;
 
 /// One part of a frame, and how much of it there is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,6 +62,7 @@ pub fn terms(bundle: &Bundle<'_>, plan: &Plan, report: &FrameReport, size_px: [u
         }
     };
     let count = |n: u32| f64::from(n);
+    let evaluated = if plan.is_baked() { 0.0 } else { count(report.gaussians) };
     let [width, height] = size_px.map(f64::from);
     let rows_of_strip = f64::from(size_px[1].div_ceil(16).div_ceil(plan.n_strips().into()));
     let chunk_tests = f64::from(bundle.n_chunks()) * count(report.slabs);
@@ -77,10 +78,11 @@ pub fn terms(bundle: &Bundle<'_>, plan: &Plan, report: &FrameReport, size_px: [u
         term(Context, "multiply-add of the context", macs),
         term(Heads, "multiply-add of the heads", report.head_macs as f64),
         term(Heads, "visible anchor", count(report.anchors_visible)),
-        term(Heads, "Gaussian", count(report.gaussians)),
+        term(Heads, "Gaussian", evaluated),
         term(Project, "chunk and slab", chunk_tests),
         term(Project, "anchor", count(report.anchors_read)),
-        term(Project, "Gaussian", count(report.gaussians)),
+        term(Project, "Gaussian", evaluated),
+        term(Project, "Gaussian from memory", count(report.gaussians) - evaluated),
         term(Sort, "splat and strip", count(report.strip_splats)),
         term(Sort, "splat and row of tiles", count(report.strip_splats) * rows_of_strip),
         // Each slab of a strip looks at the strip's pixels again.

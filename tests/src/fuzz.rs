@@ -4,7 +4,7 @@
 
 use pocketsplat_core::bundle::AnchorSite;
 use pocketsplat_core::entropy::{AnsReader, NormalModel};
-use pocketsplat_core::{Bundle, DecodeError, Decoder, ErrorClass, FrameReport, MaxSplats, Residency, Strips};
+use pocketsplat_core::{Bundle, DecodeError, Decoder, ErrorClass, Field, FrameReport, MaxSplats, Residency, Strips};
 
 use crate::frame::{Frame, budget_for};
 use crate::seal::reseal;
@@ -51,6 +51,14 @@ pub fn draw(bytes: &[u8]) {
                 .map(|(frame, report)| (frame, report.splats, report.splats_dropped, report.first_damaged))
         });
         assert!(!fit || streamed == resident, "{n_strips} strips: where anchors wait changes nothing");
+        if bundle.n_gaussians(0).is_none() {
+            continue;
+        }
+        let baked = draw_either(&bundle, Residency::Baked, n_strips)
+            .map(|(frame, report)| (frame, report.splats, report.splats_dropped, report.first_damaged));
+        // Or the file says too few.
+        let refused = matches!(baked, Err(DecodeError::OutOfRange { field: Field::TierGaussians, .. }));
+        assert!(refused || baked == streamed, "{n_strips} strips: nor does it when Gaussians are kept");
     }
 }
 
@@ -90,8 +98,8 @@ fn draw_either(bundle: &Bundle<'_>, residency: Residency, n_strips: u8) -> Resul
             assert_eq!(skipping.1.chunks_damaged, 0, "nothing is left out in silence");
         }
         (Err(DecodeError::ChunkChecksum { chunk, .. } | DecodeError::ChunkStream { chunk, .. }), Ok((_, report))) => {
-            // A resident chunk is damaged whether it is in view or not.
-            let named = report.first_damaged <= Some(chunk) || residency == Residency::Resident;
+            // A chunk in memory is damaged whether it is in view or not.
+            let named = report.first_damaged <= Some(chunk) || residency != Residency::Streamed;
             assert!(named, "{report:?} against chunk {chunk}");
         }
         (Err(strict), Err(skipping)) => assert_eq!(strict.class(), skipping.class(), "{strict} against {skipping}"),

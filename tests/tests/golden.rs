@@ -21,8 +21,8 @@ fn checksum(bundle: &Bundle<'_>, plan: Plan, camera: &Camera) -> u32 {
 
 /// Every residency and number of strips, with memory for all splats and with memory for few, in slabs of depth.
 fn plans(bundle: &Bundle<'_>, budget: Budget) -> Vec<Plan> {
-    let with_few = ways(budget.with_max_splats(MaxSplats::AtMost(150)).with_overflow(Overflow::Slabs));
-    ways(budget).chain(with_few).map(|way| bundle.plan(&way).expect("planned")).collect()
+    let with_few = ways(bundle, budget.with_max_splats(MaxSplats::AtMost(150)).with_overflow(Overflow::Slabs));
+    ways(bundle, budget).chain(with_few).map(|way| bundle.plan(&way).expect("planned")).collect()
 }
 
 #[test]

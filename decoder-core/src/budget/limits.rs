@@ -31,6 +31,9 @@ pub enum MaxSplats {
 pub enum Residency {
     /// Whichever is less work and fits.
     Auto,
+    /// Nowhere: their Gaussians are evaluated once when bound, and are in memory, 32 bytes each. For scenes that
+    /// [look the same](crate::Bundle::n_gaussians) from everywhere.
+    Baked,
     /// In memory, as integers, decoded once when bound.
     Resident,
     /// In the bundle; each frame decodes those in view again, one at a time.

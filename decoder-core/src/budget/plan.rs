@@ -2,13 +2,16 @@
 
 use super::limits::{Budget, MaxSplats, Overflow, Residency, Strips};
 use super::scratch::ScratchShape;
-use super::work::{Work, decoding_macs};
+use super::work::{Kept, Work, decoding_macs};
 use crate::bundle::{Bundle, TierMeasures, saturate};
 use crate::error::DecodeError;
 use crate::raster::TILE_PX;
 
 /// Numbers of strips that the manifest has maxima for, and that plans try.
 const STRIPS: [u8; 4] = [1, 2, 4, 8];
+
+/// What reading a baked Gaussian is worth in multiply-adds.
+const READING_MACS: u64 = 150;
 
 /// Fewer splats to a slab are not planned.
 const MIN_SLAB_SPLATS: u32 = 256;
@@ -50,6 +53,12 @@ impl Plan {
     #[must_use]
     pub fn is_resident(&self) -> bool {
         self.shape.resident_chunks > 0
+    }
+
+    /// Whether Gaussians are evaluated once when bound; if not, every frame runs the heads of the anchors in view.
+    #[must_use]
+    pub fn is_baked(&self) -> bool {
+        cfg!(feature = "baked") && self.shape.baked_chunks > 0
     }
 
     /// Horizontal strips of a frame.
@@ -98,7 +107,8 @@ impl Bundle<'_> {
     /// among the ways to draw these tiers the one of least predicted work.
     ///
     /// Work is predicted in multiply-adds. One strip goes over the scene once, several together about twice; going over it
-    /// costs the heads' (from the manifest, else of all anchors), and decoding when anchors are streamed. Of equals the
+    /// costs the heads' (from the manifest, else of all anchors), and decoding when anchors are streamed; or 150 a Gaussian when
+    /// they are baked. Of equals the
     /// fewest strips are taken. The frame's size decides about memory only through the splats of a strip, because tiles
     /// leave one by one; a splat takes 40 bytes.
     ///
@@ -107,6 +117,7 @@ impl Bundle<'_> {
     ///
     /// # Errors
     /// [`DecodeError::BudgetTooSmall`] names the bytes that the smallest plan within the other limits needs;
+    /// [`DecodeError::NotBakeable`] for a residency that the scene does not have;
     /// [`DecodeError::OutOfRange`] for an empty or too large frame or number of strips; [`DecodeError::PlanTooLarge`] beyond
     /// the address space.
     ///
@@ -116,6 +127,9 @@ impl Bundle<'_> {
     #[inline(never)]
     pub fn plan(&self, budget: &Budget) -> Result<Plan, DecodeError> {
         budget.check()?;
+        if budget.residency == Residency::Baked && self.n_gaussians(0).is_none() {
+            return Err(DecodeError::NotBakeable);
+        }
         let most_tiers = budget.tiers.min(self.n_tiers());
         let mut smallest: Option<Plan> = None;
         for n_tiers in (most_tiers.min(1)..=most_tiers).rev() {
@@ -150,23 +164,25 @@ impl Bundle<'_> {
             Strips::Auto => (None, &STRIPS[..]),
         };
         let residencies = match budget.residency {
-            Residency::Auto => &[true, false][..],
-            Residency::Resident => &[true],
-            Residency::Streamed => &[false],
+            Residency::Auto if self.n_gaussians(0).is_none() => &[Kept::Anchors, Kept::Nothing][..],
+            Residency::Auto => &[Kept::Gaussians, Kept::Anchors, Kept::Nothing],
+            Residency::Baked => &[Kept::Gaussians],
+            Residency::Resident => &[Kept::Anchors],
+            Residency::Streamed => &[Kept::Nothing],
         };
         let n_strips = given.into_iter().chain(tried.iter().copied());
-        let ways = n_strips.flat_map(move |n_strips| residencies.iter().map(move |&resident| (n_strips, resident)));
-        ways.map(move |(n_strips, resident)| self.one_plan(budget, n_tiers, n_strips, resident))
+        let ways = n_strips.flat_map(move |n_strips| residencies.iter().map(move |&kept| (n_strips, kept)));
+        ways.map(move |(n_strips, kept)| self.one_plan(budget, n_tiers, n_strips, kept))
     }
 
-    fn one_plan(&self, budget: &Budget, n_tiers: u8, n_strips: u8, resident: bool) -> (u64, Plan) {
+    fn one_plan(&self, budget: &Budget, n_tiers: u8, n_strips: u8, kept: Kept) -> (u64, Plan) {
         let header = self.header();
         let tier = self.up_to_tier(n_tiers);
         let measures = self.tier_measures(n_tiers);
         let in_slabs = budget.overflow == Overflow::Slabs;
         let canvas_tiles = if in_slabs { tiles_of_strip([budget.width_px, budget.height_px], n_strips) } else { 1 };
         let wanted = self.splats_to_hold(budget, n_tiers, n_strips);
-        let mut shape = ScratchShape::of(self, canvas_tiles, wanted, resident.then_some(tier));
+        let mut shape = ScratchShape::of(self, canvas_tiles, wanted, n_tiers, kept);
         if !budget.quality.detail {
             shape.detail_hidden = 0;
         }
@@ -191,7 +207,7 @@ impl Bundle<'_> {
             shape,
             scratch_len: shape.scratch_len(),
             pruning_rate: 1.0 - tier.n_anchors as f32 / header.n_anchors.max(1) as f32,
-            work: measures.map(|m| Work::most(&m, header.training_px, budget, passes, !resident)),
+            work: measures.map(|m| Work::most(&m, header.training_px, budget, passes, kept)),
         };
         let (head_macs, n_decoded) = match measures {
             Some(measures) => {
@@ -203,9 +219,14 @@ impl Bundle<'_> {
                 (per_anchor.saturating_mul(tier.n_anchors.into()), tier.n_anchors)
             }
         };
-        let decoding = if resident { 0 } else { decoding_macs(self).saturating_mul(n_decoded.into()) };
+        let decoding = decoding_macs(self).saturating_mul(n_decoded.into());
+        let once = match kept {
+            Kept::Gaussians if cfg!(feature = "baked") => READING_MACS.saturating_mul(shape.baked_gaussians.into()),
+            Kept::Gaussians | Kept::Anchors => head_macs,
+            Kept::Nothing => head_macs.saturating_add(decoding),
+        };
         let times = u64::from(n_slabs).saturating_mul(if n_strips > 1 { 2 } else { 1 });
-        (head_macs.saturating_add(decoding).saturating_mul(times), plan)
+        (once.saturating_mul(times), plan)
     }
 
     /// What the manifest says about the first `n_tiers` tiers, if they were measured.
@@ -216,7 +237,8 @@ impl Bundle<'_> {
     /// Splats of a strip that a budget asks memory for.
     fn splats_to_hold(&self, budget: &Budget, n_tiers: u8, n_strips: u8) -> u32 {
         // At most 2²⁴ anchors of 32 offsets.
-        let worst = self.up_to_tier(n_tiers).n_anchors.saturating_mul(self.header().n_offsets.into());
+        let offsets = self.up_to_tier(n_tiers).n_anchors.saturating_mul(self.header().n_offsets.into());
+        let worst = self.n_gaussians(n_tiers).unwrap_or(offsets);
         match budget.max_splats {
             MaxSplats::Worst => worst,
             MaxSplats::AtMost(most) => most.min(worst),

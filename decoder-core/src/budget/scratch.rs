@@ -1,6 +1,8 @@
 //! How many bytes of scratch memory what takes: one sum for plans and for static buffers.
 
 use super::arena::{Arena, words_for};
+use super::work::Kept;
+use crate::bake::BakedGaussian;
 use crate::bundle::{Bundle, Coder, MAX_FEATURE_DIM, MAX_LATTICE_BITS, MAX_OFFSETS, RecordLayout, Tier, model_words};
 use crate::context::{FEATURES_PER_LEVEL, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS};
 use crate::mlp::HeadShape;
@@ -11,7 +13,7 @@ use crate::scene::HeadOutputs;
 /// What the size of the scratch memory follows from.
 ///
 /// More of anything never takes fewer bytes, so the length of a shape suffices for every plan of every bundle within it that
-/// is resident, or streamed, as the shape is:
+/// is baked, resident or streamed, as the shape is:
 ///
 /// ```
 /// use pocketsplat_core::ScratchShape;
@@ -60,6 +62,10 @@ pub struct ScratchShape {
     pub resident_anchors: u32,
     /// Chunks of those.
     pub resident_chunks: u32,
+    /// Gaussians in memory, evaluated when bound.
+    pub baked_gaussians: u32,
+    /// Chunks of those; 0 when Gaussians are evaluated in each frame.
+    pub baked_chunks: u32,
 }
 
 impl ScratchShape {
@@ -82,20 +88,29 @@ impl ScratchShape {
             max_splats: 0,
             resident_anchors: 0,
             resident_chunks: 0,
+            baked_gaussians: 0,
+            baked_chunks: 0,
         }
+    }
+
+    /// The shape of one bundle's heads and models.
+    pub(crate) fn of_heads(bundle: &Bundle<'_>) -> Self {
+        Self::of(bundle, 1, 0, 0, Kept::Nothing)
     }
 
     /// The shape of one bundle's scratch memory.
     ///
-    /// * `resident`: the tiers kept in memory, if any.
-    pub(crate) fn of(bundle: &Bundle<'_>, canvas_tiles: u32, max_splats: u32, resident: Option<Tier>) -> Self {
+    /// * `kept`: what of the first `n_tiers` tiers is in memory.
+    pub(super) fn of(bundle: &Bundle<'_>, canvas_tiles: u32, max_splats: u32, n_tiers: u8, kept: Kept) -> Self {
         let header = bundle.header();
         let few = |n: usize| u16::try_from(n).unwrap_or(u16::MAX);
         let [n_tables, context_inputs, context_hidden] = match bundle.coder() {
             Coder::Static(tables) => [few(tables.len()), 0, 0],
             Coder::Context(context) => [0, few(context.n_inputs()), few(context.n_hidden())],
         };
-        let tier = resident.unwrap_or_default();
+        let tier = bundle.up_to_tier(n_tiers);
+        let resident = if kept == Kept::Anchors { tier } else { Tier::default() };
+        let is_baked = cfg!(feature = "baked") && kept == Kept::Gaussians;
         Self {
             feature_dim: header.feature_dim,
             n_offsets: header.n_offsets,
@@ -110,18 +125,18 @@ impl ScratchShape {
             masks: bundle.masks().is_some(),
             canvas_tiles,
             max_splats,
-            resident_anchors: tier.n_anchors,
-            resident_chunks: tier.n_chunks,
+            resident_anchors: resident.n_anchors,
+            resident_chunks: resident.n_chunks,
+            baked_gaussians: if is_baked { bundle.n_gaussians(n_tiers).unwrap_or_default() } else { 0 },
+            baked_chunks: if is_baked { tier.n_chunks } else { 0 },
         }
     }
 
     /// Bytes of scratch memory, whatever their alignment; [`usize::MAX`] beyond the address space.
     #[must_use]
     pub const fn scratch_len(&self) -> usize {
-        let (before, models, frame) = (self.words_before_frame(), self.model_words(), self.frame_words());
-        // Of resident anchors the models are used when bound, the frame's memory later.
-        let last = if self.resident_chunks > 0 && models > frame { models } else { frame };
-        let words = before.saturating_add(last);
+        let (before, when_bound, frame) = (self.words_before_frame(), self.words_when_bound(), self.frame_words());
+        let words = before.saturating_add(if when_bound > frame { when_bound } else { frame });
         match Arena::bytes_for(words) {
             Some(len) if len < isize::MAX as usize => len,
             _ => usize::MAX,
@@ -131,7 +146,7 @@ impl ScratchShape {
     /// The most splats, up to those of the shape, that `len` bytes have places for; 0 if not even the rest fits.
     pub(crate) const fn splats_within(&self, len: usize) -> u32 {
         let room = (len.saturating_sub(3) / 4).saturating_sub(self.words_before_frame());
-        if self.resident_chunks > 0 && self.model_words() > room {
+        if self.words_when_bound() > room {
             return 0;
         }
         let rest = Self { max_splats: 0, ..*self }.frame_words();
@@ -146,10 +161,30 @@ impl ScratchShape {
         model_words(self.n_tables, self.context_inputs, self.context_hidden)
     }
 
-    /// Heads, the anchor in work, and where anchors come from.
+    /// Gaussians, or heads, the anchor in work, and where anchors come from.
     const fn words_before_frame(&self) -> usize {
+        if cfg!(feature = "baked") && self.baked_chunks > 0 {
+            return self.baked_words();
+        }
         let for_anchor = self.head_words().saturating_add(self.anchor_words());
         for_anchor.saturating_add(if self.resident_chunks == 0 { self.model_words() } else { self.resident_words() })
+    }
+
+    /// What binding works in, where later the frame's memory lies: the models of resident anchors, and for Gaussians heads and the
+    /// anchor in work as well.
+    const fn words_when_bound(&self) -> usize {
+        if cfg!(feature = "baked") && self.baked_chunks > 0 {
+            self.words_to_evaluate()
+        } else if self.resident_chunks > 0 {
+            self.model_words()
+        } else {
+            0
+        }
+    }
+
+    /// Words that evaluating the Gaussians of the scene takes besides an entry a chunk.
+    pub(crate) const fn words_to_evaluate(&self) -> usize {
+        self.model_words().saturating_add(self.head_words()).saturating_add(self.anchor_words())
     }
 
     /// Bytes of one anchor in memory.
@@ -213,6 +248,14 @@ impl ScratchShape {
             .saturating_add((self.n_tables as usize).saturating_mul(2))
     }
 
+    /// Records, and where those of each chunk begin and end.
+    const fn baked_words(&self) -> usize {
+        match words_for::<BakedGaussian>(self.baked_gaussians as usize) {
+            Some(records) => records.saturating_add(self.baked_chunks as usize).saturating_add(1),
+            None => usize::MAX,
+        }
+    }
+
     /// Counts of the sort, tiles, and the splats with their order.
     const fn frame_words(&self) -> usize {
         let [n_tiles, n_splats] = [self.canvas_tiles as usize, self.max_splats as usize];
@@ -249,7 +292,8 @@ mod tests {
             (state >> 8) % n
         };
         for _ in 0..20_000 {
-            let resident = random(2);
+            let kept = random(3);
+            let [resident, baked] = [kept % 2, kept / 2];
             let mut pair = || {
                 let mut up_to = |n: u32| random(n) as u16;
                 let context = up_to(2);
@@ -269,6 +313,8 @@ mod tests {
                     max_splats: random(100_000),
                     resident_anchors: resident * (1 + random(30_000)),
                     resident_chunks: resident * (1 + random(200)),
+                    baked_gaussians: baked * random(200_000),
+                    baked_chunks: baked * (1 + random(200)),
                 }
             };
             let (a, b) = (pair(), pair());
@@ -289,6 +335,8 @@ mod tests {
                 max_splats: a.max_splats.max(b.max_splats),
                 resident_anchors: a.resident_anchors.max(b.resident_anchors),
                 resident_chunks: a.resident_chunks.max(b.resident_chunks),
+                baked_gaussians: a.baked_gaussians.max(b.baked_gaussians),
+                baked_chunks: a.baked_chunks.max(b.baked_chunks),
             };
             let [len_a, len_b, len] = [a, b, both].map(|shape| shape.scratch_len());
             assert!(len >= len_a.max(len_b), "{a:?} takes {len_a}, {b:?} {len_b}, both {len}");
@@ -306,11 +354,13 @@ mod tests {
 
     #[test]
     fn splats_within_a_length_fill_it() {
-        for resident in [0, 40] {
+        for [resident, baked] in [[0, 0], [40, 0], [0, 40]] {
             let shape = ScratchShape {
                 max_splats: 5000,
                 resident_anchors: resident,
                 resident_chunks: resident,
+                baked_gaussians: baked,
+                baked_chunks: baked,
                 ..ScratchShape::most(16, 4)
             };
             for len in [100_000, 150_001, 999_999] {

@@ -10,6 +10,17 @@ const NETWORK_MACS: usize = 2;
 /// The same of one of its inputs: 82 instructions for its share of a grid level's corners.
 const INPUT_MACS: usize = 33;
 
+/// What is in memory between frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kept {
+    /// Gaussians.
+    Gaussians,
+    /// Anchors.
+    Anchors,
+    /// Neither.
+    Nothing,
+}
+
 /// Work of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -27,22 +38,23 @@ impl Work {
     ///
     /// Each strip, or slab of one, may go over the whole scene. A frame smaller than those measured counts as one of their size.
     ///
-    /// * `decode`: whether anchors are decoded in each frame.
     pub(super) fn most(
         measures: &TierMeasures,
         training_px: [u16; 2],
         budget: &Budget,
         passes: u64,
-        decode: bool,
+        kept: Kept,
     ) -> Self {
         let area = |[width, height]: [u16; 2]| u64::from(width).saturating_mul(height.into()).max(1);
         let (measured, planned) = (area(training_px), area([budget.width_px, budget.height_px]));
         let pixels = u64::from(measures.max_kilo_pixels).saturating_mul(1024);
         let larger = pixels.saturating_mul(planned).div_ceil(measured);
-        let anchors = if decode { u64::from(measures.max_decoded_anchors) } else { 0 };
+        let anchors = if kept == Kept::Nothing { measures.max_decoded_anchors } else { 0 };
+        let kilo_macs =
+            if cfg!(feature = "baked") && kept == Kept::Gaussians { 0 } else { measures.max_head_kilo_macs };
         Self {
-            head_macs: u64::from(measures.max_head_kilo_macs).saturating_mul(1024).saturating_mul(passes),
-            decoded_anchors: anchors.saturating_mul(passes),
+            head_macs: u64::from(kilo_macs).saturating_mul(1024).saturating_mul(passes),
+            decoded_anchors: u64::from(anchors).saturating_mul(passes),
             pixel_splats: if planned > measured { larger } else { pixels },
         }
     }

@@ -16,6 +16,7 @@ mod crc;
 mod cursor;
 mod directory;
 mod features;
+mod gaussians;
 mod header;
 mod heads;
 mod lattice;
@@ -45,6 +46,7 @@ pub use tables::{Table, Tables};
 use crate::context::Context;
 use crate::entropy::MaskModel;
 use crate::error::{DecodeError, SectionKind};
+use gaussians::GaussianCounts;
 use section::Sections;
 
 /// Where the models of the channels come from.
@@ -67,6 +69,7 @@ pub struct Bundle<'a> {
     coder: Coder<'a>,
     manifest: &'a [[u8; MANIFEST_RECORD_LEN]],
     directory: Directory<'a>,
+    gaussians: Option<GaussianCounts<'a>>,
     /// Tiers in the file.
     n_tiers: u8,
     /// The chunks of these tiers.
@@ -102,8 +105,27 @@ impl<'a> Bundle<'a> {
         };
         let manifest = manifest::parse(sections.manifest.bytes(bytes)?, header.n_tiers)?;
         let directory = Directory::parse(sections.directory.bytes(bytes)?, &header, sections.chunks.len)?;
+        let gaussians = match sections.gaussians {
+            // Without the feature it is a section like any other that a decoder does not know.
+            Some(section) if cfg!(feature = "baked") => {
+                Some(GaussianCounts::parse(section.bytes(bytes)?, &header, &directory)?)
+            }
+            _ => None,
+        };
         let (n_tiers, chunks) = tiers_in(bytes, &sections.chunks, &directory, header.n_tiers)?;
-        Ok(Self { header, section_table, heads, lattice, masks, coder, manifest, directory, n_tiers, chunks })
+        Ok(Self {
+            header,
+            section_table,
+            heads,
+            lattice,
+            masks,
+            coder,
+            manifest,
+            directory,
+            gaussians,
+            n_tiers,
+            chunks,
+        })
     }
 
     /// The scene-wide facts.
@@ -169,6 +191,16 @@ impl<'a> Bundle<'a> {
     #[must_use]
     pub fn directory(&self) -> &Directory<'a> {
         &self.directory
+    }
+
+    /// Gaussians that the first `n_tiers` tiers consist of, those beyond the file's left out, if they are the same in every
+    /// frame: the heads see neither direction nor distance of view, the bundle says how many they make, and the decoder is built
+    /// with the feature `baked`.
+    #[must_use]
+    pub fn n_gaussians(&self, n_tiers: u8) -> Option<u32> {
+        let Effects { view_direction, view_distance, .. } = self.header.features.effects;
+        let counts = self.gaussians.filter(|_| cfg!(feature = "baked") && !view_direction && !view_distance)?;
+        Some(counts.up_to(n_tiers.min(self.n_tiers)))
     }
 
     /// Tiers in the file; fewer than [`Header::n_tiers`] when it was cut where a tier ends.

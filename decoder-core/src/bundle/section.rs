@@ -35,6 +35,7 @@ pub(super) struct Sections {
     pub(super) coder: Section,
     pub(super) manifest: Section,
     pub(super) directory: Section,
+    pub(super) gaussians: Option<Section>,
     pub(super) chunks: Section,
 }
 
@@ -73,6 +74,7 @@ impl Sections {
     ) -> Result<Self, DecodeError> {
         let mut rows = table.iter();
         let mut start = u32::from(header_len);
+        let mut gaussians = None;
         let mut next = |wanted: SectionKind| {
             for row in rows.by_ref() {
                 let section = Section::parse(row)?;
@@ -88,14 +90,17 @@ impl Sections {
                 if section.kind == wanted {
                     return Ok(section);
                 }
-                let SectionKind::Other(_) = section.kind else {
-                    return Err(DecodeError::UnexpectedSection { found: section.kind, expected: wanted });
-                };
+                match section.kind {
+                    SectionKind::Gaussians if gaussians.is_none() => gaussians = Some(section),
+                    SectionKind::Other(_) => {}
+                    found => return Err(DecodeError::UnexpectedSection { found, expected: wanted }),
+                }
                 section.bytes(file)?;
             }
             Err(DecodeError::MissingSection { section: wanted })
         };
-        let sections = Self {
+        let mut sections = Self {
+            gaussians: None,
             heads: next(SectionKind::Heads)?,
             lattice: next(SectionKind::Lattice)?,
             masks: if features.masks { Some(next(SectionKind::Masks)?) } else { None },
@@ -104,6 +109,7 @@ impl Sections {
             directory: next(SectionKind::Directory)?,
             chunks: next(SectionKind::Chunks)?,
         };
+        sections.gaussians = gaussians;
         if let Some(row) = rows.next() {
             let Section { kind: found, .. } = Section::parse(row)?;
             return Err(DecodeError::UnexpectedSection { found, expected: SectionKind::Chunks });
@@ -130,7 +136,8 @@ fn kind_of(code: u8) -> Result<SectionKind, DecodeError> {
         6 => SectionKind::Manifest,
         7 => SectionKind::Directory,
         8 => SectionKind::Chunks,
-        FIRST_OPTIONAL_CODE.. => SectionKind::Other(code),
+        FIRST_OPTIONAL_CODE => SectionKind::Gaussians,
+        129.. => SectionKind::Other(code),
         _ => {
             let limit = FIRST_OPTIONAL_CODE.into();
             return Err(DecodeError::OutOfRange { field: Field::SectionKind, found: code.into(), limit });

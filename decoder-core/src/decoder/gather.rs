@@ -1,14 +1,15 @@
 //! From the anchors in view to the splats of one strip, or of a slab of its depth.
 
-use super::source::AnchorSource;
-use super::splats::Slab;
+use super::source::{AnchorSource, Anchors, GaussianSource};
+use super::splats::{Slab, SplatStore};
 use super::strip::{Strip, StripLayout};
 use super::tally::{Tally, place};
 use super::{Decoder, FrameReport};
-use crate::bundle::Chunk;
+use crate::bake::BakedGaussian;
+use crate::bundle::{Chunk, Effects};
 use crate::error::DecodeError;
 use crate::project::{Band, View};
-use crate::scene::{Anchor, for_each_gaussian};
+use crate::scene::{Anchor, Gaussian, for_each_gaussian};
 use crate::stopwatch::{Stage, Stopwatch};
 
 /// One frame in work.
@@ -54,7 +55,8 @@ impl Frame {
 }
 
 impl<'b> Decoder<'b, '_> {
-    /// Whether each strip surely has a place for all of its splats: all offsets of all anchors of the chunks it sees.
+    /// Whether each strip surely has a place for all of its splats: all baked Gaussians, or all offsets of all anchors, of the
+    /// chunks it sees.
     ///
     /// # Budget
     /// About 100 multiplications a chunk and strip; reads the directory alone.
@@ -64,8 +66,12 @@ impl<'b> Decoder<'b, '_> {
             let band = view.band(strips.pixels(strip));
             let seen = self.planned_chunks().map(|(chunk, _)| chunk);
             let seen = seen.filter(|chunk| view.sees_box(chunk.ink_box()) && band.sees_box(chunk.ink_box()));
-            let n_anchors: u64 = seen.map(|chunk| u64::from(chunk.n_anchors())).sum();
-            n_anchors.saturating_mul(n_offsets) <= self.plan.max_splats().into()
+            let most_of = |chunk: Chunk<'_>| match &self.source {
+                GaussianSource::Baked(baked) if cfg!(feature = "baked") => baked.n_of_chunk(chunk.index()).into(),
+                _ => u64::from(chunk.n_anchors()).saturating_mul(n_offsets),
+            };
+            let most: u64 = seen.map(most_of).sum();
+            most <= self.plan.max_splats().into()
         })
     }
 
@@ -82,8 +88,11 @@ impl<'b> Decoder<'b, '_> {
     /// Whether a chunk is known to be undamaged, or damage is an error.
     fn is_sound(&self, chunk: &Chunk<'b>) -> bool {
         match &self.source {
-            AnchorSource::Resident(records) => !records.is_damaged(chunk.index()),
-            AnchorSource::Streamed(_) => !self.skip_damage || chunk.check().is_ok(),
+            GaussianSource::Baked(baked) => !(cfg!(feature = "baked") && baked.is_damaged(chunk.index())),
+            GaussianSource::Anchors(Anchors { source: AnchorSource::Resident(records), .. }) => {
+                !records.is_damaged(chunk.index())
+            }
+            GaussianSource::Anchors(_) => !self.skip_damage || chunk.check().is_ok(),
         }
     }
 
@@ -101,7 +110,7 @@ impl<'b> Decoder<'b, '_> {
         if from > 0.0 {
             pass.end_earlier(&frame.view);
         }
-        let decodes = u8::from(!self.source.is_resident());
+        let decodes = u8::from(self.source.is_streamed());
         frame.report.decode_passes = frame.report.decode_passes.saturating_add(decodes);
         for (chunk, first_anchor) in self.planned_chunks() {
             watch.enter(Stage::Project);
@@ -146,7 +155,7 @@ impl<'b> Decoder<'b, '_> {
         Ok(())
     }
 
-    /// Keeps the splats of a chunk's anchors that lie in the strip.
+    /// Keeps the splats of a chunk that lie in the strip.
     fn gather_chunk(
         &mut self,
         chunk: &Chunk<'b>,
@@ -155,14 +164,32 @@ impl<'b> Decoder<'b, '_> {
         frame: &mut Frame,
         watch: &mut impl Stopwatch,
     ) -> Result<(), DecodeError> {
-        let Self { bundle, source, heads, work, splats, .. } = self;
+        let Self { bundle, source, splats, .. } = self;
+        let Frame { view, strips, tallies, in_slabs, tally, report } = frame;
         let header = bundle.header();
         let effects = header.features.effects;
+        let mut keeper = Keeper { view, strips, tallies: *tallies, in_slabs: *in_slabs, tally, pass, splats };
+        let Anchors { source, heads, row, work } = match source {
+            GaussianSource::Anchors(anchors) => anchors,
+            // Never made then, which the compiler does not know.
+            GaussianSource::Baked(_) if !cfg!(feature = "baked") => return Err(DecodeError::Internal),
+            GaussianSource::Baked(baked) => {
+                watch.enter(Stage::Project);
+                report.gaussians = report.gaussians.saturating_add(baked.n_of_chunk(chunk.index()));
+                for (number, gaussian) in baked.of_chunk(chunk.index()) {
+                    if keeper.pass.band.is_none_or(|band| band.sees_gaussian(&gaussian)) {
+                        keeper.project(number, &gaussian, effects);
+                    }
+                }
+                return Ok(());
+            }
+        };
+        // As if its Gaussians were baked, which know nothing of the anchor's extent.
+        let as_baked = bundle.n_gaussians(0).is_some();
         let n_scalars = u32::from(header.feature_dim) + 6;
-        let Frame { view, strips, tallies, in_slabs, tally, report } = frame;
         let decoded = u32::from(!source.is_resident());
         report.chunks_decoded += decoded;
-        source.for_each(chunk, first_anchor, self.row, watch, |number, site, row, watch| {
+        source.for_each(chunk, first_anchor, row, watch, |number, site, row, watch| {
             watch.enter(Stage::Project);
             report.anchors_read += 1;
             report.anchors_decoded += decoded;
@@ -170,36 +197,59 @@ impl<'b> Decoder<'b, '_> {
             report.symbols_decoded += u64::from(decoded * n_channels);
             let position = bundle.position(site.lattice);
             let anchor = Anchor::from_row(header, position, site.mask, row).ok_or(DecodeError::Internal)?;
-            if !view.sees_anchor(position, anchor.extent)
-                || pass.band.as_ref().is_some_and(|band| !band.sees_anchor(&anchor))
-            {
+            let is_seen =
+                if as_baked { view.sees_box(anchor.ink_box()) } else { view.sees_anchor(position, anchor.extent) };
+            if !is_seen || keeper.pass.band.as_ref().is_some_and(|band| !band.sees_anchor(&anchor)) {
                 return Ok(());
             }
             report.anchors_visible += 1;
             let macs = for_each_gaussian(&anchor, effects, view.eye, heads, work, watch, |offset, gaussian| {
                 report.gaussians += 1;
-                let Some((splat, rect)) = view.project(gaussian, effects.dilation_compensation) else { return };
                 let place = place(number, offset);
-                let touched = strips.touched(rect);
-                let index = usize::from(pass.strip.index);
-                let lies_here = touched.contains(&index);
-                if *in_slabs {
-                    if lies_here {
-                        let end = pass.slab.end;
-                        splats.push_into(&mut pass.slab, &splat, rect);
-                        if pass.slab.end < end {
-                            pass.end_earlier(view);
-                        }
-                    }
-                    return;
-                }
-                let drawn = if *tallies && index == 0 { tally.admit(place, touched) } else { tally.admits(place) };
-                if drawn && lies_here {
-                    splats.push(&splat, rect);
+                if as_baked {
+                    keeper.project(place, &BakedGaussian::rounded(gaussian), effects);
+                } else {
+                    keeper.project(place, gaussian, effects);
                 }
             });
             report.head_macs = report.head_macs.saturating_add(macs);
             Ok(())
         })
+    }
+}
+
+/// Projects Gaussians and keeps the splats that a pass draws.
+struct Keeper<'f, 's> {
+    view: &'f View,
+    strips: &'f StripLayout,
+    tallies: bool,
+    in_slabs: bool,
+    tally: &'f mut Tally,
+    pass: &'f mut Pass,
+    splats: &'f mut SplatStore<'s>,
+}
+
+impl Keeper<'_, '_> {
+    /// * `place`: ascends in the order of the file.
+    fn project(&mut self, place: u32, gaussian: &Gaussian, effects: Effects) {
+        let Some((splat, rect)) = self.view.project(gaussian, effects.dilation_compensation) else { return };
+        let touched = self.strips.touched(rect);
+        let index = usize::from(self.pass.strip.index);
+        let lies_here = touched.contains(&index);
+        if self.in_slabs {
+            if lies_here {
+                let end = self.pass.slab.end;
+                self.splats.push_into(&mut self.pass.slab, &splat, rect);
+                if self.pass.slab.end < end {
+                    self.pass.end_earlier(self.view);
+                }
+            }
+            return;
+        }
+        let drawn =
+            if self.tallies && index == 0 { self.tally.admit(place, touched) } else { self.tally.admits(place) };
+        if drawn && lies_here {
+            self.splats.push(&splat, rect);
+        }
     }
 }

@@ -27,7 +27,7 @@ pub struct FrameReport {
     pub anchors_visible: u32,
     /// Multiply-adds of the heads.
     pub head_macs: u64,
-    /// Gaussians that the heads made, before they were projected.
+    /// Gaussians gone over, before they were projected: made by the heads, or [baked](crate::Residency::Baked).
     pub gaussians: u32,
     /// Splats drawn.
     pub splats: u32,

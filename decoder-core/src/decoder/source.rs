@@ -1,8 +1,29 @@
-//! Where a frame's anchors come from: decoded again, or kept in memory.
+//! Where a frame's Gaussians come from: anchors decoded again or kept in memory, or Gaussians kept in memory.
 
+use crate::bake::BakedGaussians;
 use crate::bundle::{AnchorModels, AnchorRecords, AnchorSite, Chunk};
 use crate::error::DecodeError;
+use crate::mlp::Heads;
+use crate::scene::Workspace;
 use crate::stopwatch::{Stage, Stopwatch};
+
+/// The scene of the planned tiers.
+#[expect(clippy::large_enum_variant, reason = "a decoder has one, and there is no allocator to box with")]
+pub(super) enum GaussianSource<'b, 's> {
+    /// Evaluated in each frame.
+    Anchors(Anchors<'b, 's>),
+    /// Evaluated when bound.
+    Baked(BakedGaussians<'s>),
+}
+
+/// Anchors, and what evaluates them.
+pub(super) struct Anchors<'b, 's> {
+    pub(super) source: AnchorSource<'b, 's>,
+    pub(super) heads: Heads<'s>,
+    /// `[n_channels]` of the anchor in work.
+    pub(super) row: &'s mut [f32],
+    pub(super) work: Workspace<'s>,
+}
 
 /// The anchors of the planned tiers.
 pub(super) enum AnchorSource<'b, 's> {
@@ -10,6 +31,13 @@ pub(super) enum AnchorSource<'b, 's> {
     Streamed(AnchorModels<'b, 's>),
     /// Decoded when bound.
     Resident(AnchorRecords<'b, 's>),
+}
+
+impl GaussianSource<'_, '_> {
+    /// Whether each frame decodes.
+    pub(super) fn is_streamed(&self) -> bool {
+        matches!(self, Self::Anchors(anchors) if !anchors.source.is_resident())
+    }
 }
 
 impl<'b> AnchorSource<'b, '_> {

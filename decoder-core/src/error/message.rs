@@ -82,6 +82,12 @@ impl fmt::Display for DecodeError {
                 "a budget of {available} bytes, the smallest plan ({n_tiers} tiers, {n_strips} strips) needs {needed}: \
                  allow that many, or fewer splats, more strips, or streamed anchors where the budget rules them out"
             ),
+            Self::NotBakeable => {
+                write!(
+                    f,
+                    "Gaussians depend on the view, or the bundle or this decoder lacks baked; plan another residency"
+                )
+            }
             Self::PlanMismatch { needed, planned } => write!(
                 f,
                 "the plan ({planned} bytes) was made for another bundle; this one needs {needed}, plan with it"

@@ -178,6 +178,9 @@ pub enum DecodeError {
         /// Its strips.
         n_strips: u8,
     },
+    /// A budget asks for Gaussians evaluated when bound, and the scene's depend on the view, or the bundle does not say how many
+    /// they are.
+    NotBakeable,
     /// The plan was made for another bundle.
     PlanMismatch {
         /// Bytes this bundle would need.
@@ -217,7 +220,9 @@ impl DecodeError {
             Self::PlanTooLarge { .. } | Self::ScratchTooSmall { .. } | Self::BudgetTooSmall { .. } => {
                 ErrorClass::OverBudget
             }
-            Self::NoSuchChunk { .. } | Self::PlanMismatch { .. } | Self::BufferTooShort { .. } => ErrorClass::Misuse,
+            Self::NoSuchChunk { .. } | Self::PlanMismatch { .. } | Self::NotBakeable | Self::BufferTooShort { .. } => {
+                ErrorClass::Misuse
+            }
             Self::OutOfRange { field, .. } | Self::BadFloat { field, .. } => field.class(),
             Self::Internal => ErrorClass::Internal,
             Self::NotABundle

@@ -26,6 +26,8 @@ pub enum SectionKind {
     Directory,
     /// The chunks' coded anchors.
     Chunks,
+    /// How many Gaussians a scene has that looks the same from everywhere.
+    Gaussians,
     /// One that this decoder does not know and skips.
     Other(u8),
 }
@@ -69,6 +71,7 @@ pub enum Field {
     TierChunks,
     TierAnchors,
     TierEnd,
+    TierGaussians,
     ChunkAnchors,
     ChunkLen,
     InkFrame,
@@ -128,6 +131,7 @@ impl fmt::Display for SectionKind {
             Self::Manifest => "section manifest",
             Self::Directory => "section directory",
             Self::Chunks => "section chunks",
+            Self::Gaussians => "section gaussians",
             Self::Other(code) => return write!(f, "section of unknown kind {code}"),
         })
     }
@@ -169,6 +173,7 @@ impl fmt::Display for Field {
             Self::TierChunks => "chunks of a tier and those before it",
             Self::TierAnchors => "anchors of a tier and those before it",
             Self::TierEnd => "end of a tier in the chunks",
+            Self::TierGaussians => "number of Gaussians",
             Self::ChunkAnchors => "anchors of a chunk",
             Self::ChunkLen => "odd bytes of a chunk's length",
             Self::InkFrame => "frame of the ink boxes",

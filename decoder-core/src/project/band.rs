@@ -2,10 +2,8 @@
 
 use super::cull::DILATION_REACH_PX;
 use super::view::{View, dot};
-use crate::scene::Anchor;
+use crate::scene::{Anchor, Gaussian, ink_radius};
 
-/// Even an opaque Gaussian is fainter than 1/255 beyond √(2 ln 255) = 3.329 deviations.
-const INK_DEVIATIONS: f32 = 3.33;
 /// The rectangle of tiles of a splat may begin or end half a pixel beyond its ink; rounding is far below the rest.
 const RECT_SLACK_PX: f32 = 1.0;
 /// Rounding of the sums below, relative to their terms.
@@ -84,10 +82,17 @@ impl Band {
     /// # Budget
     /// 6 multiplications an offset and border.
     pub(crate) fn sees_anchor(&self, anchor: &Anchor<'_>) -> bool {
-        let [g0, g1, g2] = anchor.base_scale;
-        let widest = if g0 > g1 { g0 } else { g1 };
-        let radius = INK_DEVIATIONS * if widest > g2 { widest } else { g2 };
+        let radius = ink_radius(anchor.base_scale);
         !self.sides().any(|side| side.is_beyond_anchor(anchor, radius))
+    }
+
+    /// Whether a Gaussian can reach the band; likewise.
+    ///
+    /// # Budget
+    /// 7 multiplications a border.
+    pub(crate) fn sees_gaussian(&self, gaussian: &Gaussian) -> bool {
+        let radius = ink_radius(gaussian.scale);
+        !self.sides().any(|side| side.is_beyond_ball(gaussian.centre, radius))
     }
 }
 
@@ -106,6 +111,15 @@ impl Side {
         let excess = if excess > 0.0 { 0.5 * shortest * excess } else { 0.0 };
         // NaN, from absurd cameras, counts as seen here and below.
         farthest + self.shift + excess + ROUNDING * (size + excess) < 0.0
+    }
+
+    /// Whether a ball lies beyond.
+    fn is_beyond_ball(&self, centre: [f32; 3], radius: f32) -> bool {
+        let ([n0, n1, n2], [x, y, z]) = (self.normal, centre);
+        let [a, b, c] = [n0 * x, n1 * y, n2 * z];
+        let ball = radius * self.stretch;
+        let size = a.abs() + b.abs() + c.abs() + self.shift.abs() + ball;
+        (a + b + c) + self.shift + ball + ROUNDING * size < 0.0
     }
 
     /// Whether all offsets that an anchor draws lie beyond, each the centre of a ball of `radius`.

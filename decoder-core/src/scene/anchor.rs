@@ -20,6 +20,9 @@ pub(crate) struct Anchor<'r> {
     pub(crate) mask: u32,
 }
 
+/// Even an opaque Gaussian is fainter than 1/255 beyond √(2 ln 255) = 3.329 deviations.
+const INK_DEVIATIONS: f32 = 3.33;
+
 impl<'r> Anchor<'r> {
     /// Names the parts of a row of channels; `None` when the row is too short.
     pub(crate) fn from_row(header: &Header, position: [f32; 3], mask: u32, row: &'r [f32]) -> Option<Self> {
@@ -35,4 +38,28 @@ impl<'r> Anchor<'r> {
             mask,
         })
     }
+
+    /// A box that holds the balls of ink of all offsets that it draws, as that of a chunk does; empty without any.
+    pub(crate) fn ink_box(&self) -> ([f32; 3], [f32; 3]) {
+        let ([px, py, pz], [lx, ly, lz]) = (self.position, self.extent);
+        let radius = ink_radius(self.base_scale);
+        let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+        let mut mask = self.mask;
+        for [ox, oy, oz] in self.offsets {
+            let drawn = mask & 1 == 1;
+            mask >>= 1;
+            let centre = [px + ox * lx, py + oy * ly, pz + oz * lz];
+            for ((low, high), x) in low.iter_mut().zip(&mut high).zip(centre).filter(|_| drawn) {
+                *low = if x - radius < *low { x - radius } else { *low };
+                *high = if x + radius > *high { x + radius } else { *high };
+            }
+        }
+        (low, high)
+    }
+}
+
+/// How far a Gaussian of these scales draws at most.
+pub(crate) fn ink_radius([s0, s1, s2]: [f32; 3]) -> f32 {
+    let widest = if s0 > s1 { s0 } else { s1 };
+    INK_DEVIATIONS * if widest > s2 { widest } else { s2 }
 }

@@ -3,9 +3,11 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::Anchor;
+use crate::budget::Arena;
 use crate::bundle::Effects;
+use crate::error::DecodeError;
 use crate::math::{sigmoid, tanh};
-use crate::mlp::Heads;
+use crate::mlp::{HeadShape, Heads};
 use crate::stopwatch::{Stage, Stopwatch};
 
 /// Opacities below one step of an 8-bit channel draw nothing.
@@ -47,6 +49,18 @@ pub(crate) struct Workspace<'s> {
     pub(crate) detail_sums: &'s mut [f32],
     /// `[K]`.
     pub(crate) outputs: &'s mut [HeadOutputs],
+}
+
+impl<'s> Workspace<'s> {
+    /// As much of `arena` as heads of `shape` work in.
+    pub(crate) fn take(arena: &mut Arena<'s>, shape: HeadShape) -> Result<Self, DecodeError> {
+        Ok(Self {
+            inputs: arena.take(shape.inputs)?,
+            hidden: arena.take(shape.hidden_len())?,
+            detail_sums: arena.take(shape.sums_len())?,
+            outputs: arena.take(shape.offsets)?,
+        })
+    }
 }
 
 /// Calls `draw` with the offset and each Gaussian of `anchor` that a camera at `eye` can see, offsets ascending; returns the

@@ -5,5 +5,5 @@
 mod anchor;
 mod gaussian;
 
-pub(crate) use anchor::Anchor;
+pub(crate) use anchor::{Anchor, ink_radius};
 pub(crate) use gaussian::{Gaussian, HeadOutputs, Workspace, for_each_gaussian};

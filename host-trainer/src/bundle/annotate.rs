@@ -43,6 +43,7 @@ fn name(kind: SectionKind) -> &'static str {
         SectionKind::Manifest => "manifest",
         SectionKind::Directory => "directory",
         SectionKind::Chunks => "chunks",
+        SectionKind::Gaussians => "gaussians",
         _ => "unknown",
     }
 }
@@ -99,6 +100,10 @@ impl<'f> Annotator<'f> {
             SectionKind::Manifest => self.manifest(),
             SectionKind::Directory => self.directory(),
             SectionKind::Chunks => return self.chunks(),
+            SectionKind::Gaussians => {
+                self.dump.heading("gaussians");
+                self.dump.array("Gaussians up to each tier", section.len as usize / 4, u32::from_le_bytes);
+            }
             _ => {
                 self.dump.heading(&format!("section of kind {}", section.code));
                 self.dump.array::<1, _>("bytes", section.len as usize, |[byte]| byte);

@@ -21,6 +21,7 @@ pub(super) enum SectionCode {
     Manifest = 6,
     Directory = 7,
     Chunks = 8,
+    Gaussians = 128,
 }
 
 /// Where the checksum of the section in row `row` of the section table lies.

@@ -72,7 +72,8 @@ impl SizeReport {
                 SectionKind::Masks => &mut report.mask_model,
                 SectionKind::Tables => &mut report.tables,
                 SectionKind::Context => &mut report.context_weights,
-                SectionKind::Manifest => &mut report.manifest,
+                // What was measured, as the manifest.
+                SectionKind::Manifest | SectionKind::Gaussians => &mut report.manifest,
                 SectionKind::Directory => &mut report.directory,
                 // Counted below, as far as it is there.
                 SectionKind::Chunks => continue,

@@ -1,8 +1,8 @@
 //! From a scene to the bytes of a bundle.
 
-use pocketsplat_core::Bundle;
 use pocketsplat_core::bundle::Features;
 use pocketsplat_core::context::Context;
+use pocketsplat_core::{Bundle, DecodeError};
 use rayon::prelude::*;
 
 use super::channels::{ChannelCoder, ContextWork, GROUPS};
@@ -108,6 +108,13 @@ pub fn write(scene: &Scene<f32>, info: &BundleInfo, options: &WriteOptions) -> R
     Ok(Written { bytes, report })
 }
 
+/// The section of Gaussian counts of a bundle that has none yet.
+fn gaussian_counts(bytes: &[u8]) -> Result<Vec<u8>, DecodeError> {
+    let bundle = Bundle::parse(bytes)?;
+    let counts = bundle.count_gaussians(&mut vec![0; bundle.count_scratch_len()])?;
+    Ok(counts.iter().take(bundle.n_tiers().into()).flat_map(|count| count.to_le_bytes()).collect())
+}
+
 /// A scene whose anchors have their places.
 struct Writer<'s> {
     scene: &'s Scene<f32>,
@@ -194,6 +201,13 @@ impl Writer<'_> {
             n_tiers,
             symbol_bits: rows.symbol_bits(&shape),
         };
+        let bytes = layout::assemble(self.scene, self.info, &counts, &sections)?;
+        if shape.sees_view() {
+            return Ok(bytes);
+        }
+        // What the decoder itself makes of it: it plans by these counts.
+        let section = gaussian_counts(&bytes).map_err(WriteError::ReadBack)?;
+        sections.insert(sections.len() - 1, (SectionCode::Gaussians, section));
         layout::assemble(self.scene, self.info, &counts, &sections)
     }
 }

@@ -52,6 +52,7 @@ pub(crate) struct Point {
     n_anchors: u32,
     /// Whether anchors are decoded once, not in every frame.
     resident: bool,
+    baked: bool,
     n_strips: u8,
     /// Slabs of depth of the fullest strip, at most.
     n_slabs: u32,
@@ -157,6 +158,7 @@ fn point(bundle: &Bundle<'_>, ram_bytes: u64, plan: &Plan) -> Point {
         pruning_rate: plan.pruning_rate(),
         n_anchors: tier.and_then(|tier| bundle.tier(tier)).map_or(0, |tier| tier.n_anchors),
         resident: plan.is_resident(),
+        baked: plan.is_baked(),
         n_strips: plan.n_strips(),
         n_slabs: plan.n_slabs(),
         max_splats: plan.max_splats(),
@@ -220,7 +222,11 @@ fn table(fit: &Fit) -> String {
             point.scratch_bytes,
             100.0 * point.pruning_rate,
             point.n_anchors,
-            if point.resident { "memory" } else { "bundle" },
+            match (point.baked, point.resident) {
+                (true, _) => "baked",
+                (_, true) => "memory",
+                _ => "bundle",
+            },
             point.n_strips,
             point.n_slabs,
             point.max_splats,

@@ -77,7 +77,10 @@ pub fn knobs(bundle: &Bundle<'_>) -> Vec<Setting> {
         let name = format!("{:.0} %", 100.0 * pruning_rate);
         all.push(Setting { knob: "pruning rate", name, tiers, pruning_rate, ..exact.clone() });
     }
-    for (name, residency) in [("resident", Residency::Resident), ("streamed", Residency::Streamed)] {
+    let baked = bundle.n_gaussians(0).map(|_| ("baked", Residency::Baked));
+    for (name, residency) in
+        baked.into_iter().chain([("resident", Residency::Resident), ("streamed", Residency::Streamed)])
+    {
         let strips = Strips::Exactly(1);
         all.push(Setting { knob: "residency", name: name.to_owned(), residency, strips, ..exact.clone() });
     }

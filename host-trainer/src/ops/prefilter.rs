@@ -1,6 +1,48 @@
 //! Which anchors a view may show.
 
 use super::{Pinhole, Real, pinhole::NEAR, project::DILATION_PX2};
+use crate::scene::Scene;
+
+/// Even an opaque Gaussian is fainter than 1/255 beyond √(2 ln 255) = 3.329 deviations.
+const INK_DEVIATIONS: f64 = 3.33;
+/// √(2 ln 255 · 0.3) from the dilation, and rounding, pixels.
+const DILATION_REACH_PX: f64 = 1.9;
+
+/// Whether the view draws anything of an anchor: by [`anchor_is_visible`] where the heads see the view; where they don't, by
+/// [`offset_reaches`], which leaves nothing out, because a decoder that evaluates such Gaussians once knows no anchors any more.
+pub fn shows<R: Real>(scene: &Scene<R>, anchor: usize, camera: &Pinhole<R>) -> bool {
+    let position = scene.position(anchor);
+    let size = |i: usize| scene.anchors.log_scales[anchor * 6 + i].exp();
+    let extent = [size(0), size(1), size(2)];
+    if scene.shape.sees_view() {
+        return anchor_is_visible(camera, position, extent);
+    }
+    let radius = R::real(INK_DEVIATIONS) * size(3).larger(size(4)).larger(size(5));
+    let n_offsets = scene.shape.n_offsets;
+    (anchor * n_offsets..(anchor + 1) * n_offsets).filter(|offset| scene.anchors.is_drawn(*offset)).any(|offset| {
+        let along = &scene.anchors.offsets[offset * 3..][..3];
+        offset_reaches(camera, std::array::from_fn(|i| position[i] + along[i] * extent[i]), radius)
+    })
+}
+
+/// Whether a Gaussian whose ink lies in a ball may reach the image; true more often than needed, never false wrongly.
+///
+/// At slope t within the limits of the Jacobian it reaches r·f/z·√(1 + t²) and the dilation's reach from its centre.
+fn offset_reaches<R: Real>(camera: &Pinhole<R>, centre: [R; 3], radius: R) -> bool {
+    let [x, y, z] = camera.to_cam(centre);
+    if !(z > R::real(NEAR)) {
+        return false;
+    }
+    [(0, x / z), (1, y / z)].into_iter().all(|(axis, slope)| {
+        let [low, high] = camera.slope_bounds(axis);
+        let t = slope.larger(low).smaller(high);
+        let stretch = (R::ONE + t * t).sqrt();
+        let focal_px = camera.focal_px[axis];
+        let reach = radius * focal_px / z * stretch + R::real(DILATION_REACH_PX);
+        let at = focal_px * slope + camera.principal_px[axis];
+        at + reach > R::ZERO && at - reach < R::real(camera.size_px[axis] as f64)
+    })
+}
 
 /// Whether an anchor, taken as a Gaussian of scale `size` and identity rotation, reaches the image.
 ///

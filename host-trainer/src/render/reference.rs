@@ -27,6 +27,8 @@ const TRANSMITTANCE_MIN: f64 = 1e-4;
 pub struct ReferenceScene {
     /// Widths and effects.
     pub shape: ModelShape,
+    /// Whether anchors whose own ellipsoid misses the image draw nothing.
+    pub prefilters: bool,
     /// `[n_anchors]` anchor positions, normalised frame.
     pub positions: Vec<DVec3>,
     /// `[n_anchors, F]` features.
@@ -107,7 +109,7 @@ impl ReferenceScene {
         // FORMAT.md, section 7: arguments outside this range are clamped to it.
         let size = |log: &[f64]| DVec3::from_slice(log).clamp(DVec3::splat(-87.0), DVec3::splat(88.0)).exp();
         let (anchor_size, base_size) = (size(&log_scales[..3]), size(&log_scales[3..]));
-        if !anchor_is_visible(position, anchor_size, camera) {
+        if self.prefilters && !anchor_is_visible(position, anchor_size, camera) {
             return Vec::new();
         }
 

@@ -54,6 +54,11 @@ impl ModelShape {
         self.feature_dim + 3 * usize::from(self.view_direction) + usize::from(self.view_distance)
     }
 
+    /// Whether the heads see anything of the view: if not, a Gaussian is the same in every frame.
+    pub fn sees_view(&self) -> bool {
+        self.view_direction || self.view_distance
+    }
+
     /// Hidden width of the colour head.
     pub fn colour_width(&self) -> usize {
         if self.colour_hidden == 0 { self.feature_dim } else { self.colour_hidden }

@@ -151,12 +151,7 @@ impl<R: Real> Workspace<R> {
         let visible: Vec<u32> = (0..scene.anchors.len())
             .into_par_iter()
             .with_min_len(1024)
-            .filter(|a| {
-                let size = std::array::from_fn(|i| scene.anchors.log_scales[a * 6 + i].exp());
-                is_kept(*a)
-                    && scene.anchors.has_drawn(*a)
-                    && prefilter::anchor_is_visible(camera, scene.position(*a), size)
-            })
+            .filter(|a| is_kept(*a) && scene.anchors.has_drawn(*a) && prefilter::shows(scene, *a, camera))
             .map(|a| u32::try_from(a).expect("fewer than 2³² anchors"))
             .collect();
         self.n_blocks = visible.len().div_ceil(BLOCK);

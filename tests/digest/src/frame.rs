@@ -6,15 +6,18 @@ use super::digest::Digest;
 
 /// Digest of the frame that a bundle's preview camera sees, tile by tile.
 ///
-/// * `scratch`: as many bytes as a plan of one strip, streamed anchors and every splat takes.
+/// Gaussians are baked if they are the same in every frame, otherwise anchors are streamed.
+///
+/// * `scratch`: as many bytes as a plan of that, of one strip and every splat takes.
 ///
 /// # Errors
 /// The decoder's.
 pub fn frame_digest(bundle: &Bundle<'_>, scratch: &mut [u8]) -> Result<Digest, DecodeError> {
     let camera = bundle.header().preview;
+    let residency = if bundle.n_gaussians(0).is_some() { Residency::Baked } else { Residency::Streamed };
     let budget = Budget::for_frame(camera.width_px, camera.height_px)
         .with_max_splats(MaxSplats::Worst)
-        .with_residency(Residency::Streamed)
+        .with_residency(residency)
         .with_strips(Strips::Exactly(1));
     let mut tiles = Tiles(Digest::EMPTY);
     Decoder::bind(bundle, bundle.plan(&budget)?, scratch)?.render(&camera, &mut tiles)?;

@@ -48,11 +48,12 @@ fn draw(bytes: &[u8], camera: &Camera, scratch: &mut [u8]) -> Result<FrameReport
         .with_residency(match residency {
             0 => Residency::Auto,
             1 => Residency::Resident,
+            2 => Residency::Baked,
             _ => Residency::Streamed,
         })
         .with_strips(if strips == 0 { Strips::Auto } else { Strips::Exactly(strips) });
     let plan = bundle.plan(&budget)?;
-    black_box((plan.work(), plan.pruning_rate(), plan.n_strips(), plan.is_resident()));
+    black_box((plan.work(), plan.pruning_rate(), plan.n_strips(), plan.is_resident(), plan.is_baked()));
     let mut decoder = if black_box(true) {
         Decoder::bind(&bundle, plan, scratch)?
     } else {

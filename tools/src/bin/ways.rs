@@ -57,7 +57,8 @@ fn main() -> anyhow::Result<()> {
     };
     let [width_px, height_px] = bundle.header().training_px;
     let mut ways = Vec::new();
-    for residency in [Residency::Resident, Residency::Streamed] {
+    let baked = bundle.n_gaussians(0).map(|_| Residency::Baked);
+    for residency in baked.into_iter().chain([Residency::Resident, Residency::Streamed]) {
         for n_strips in [1, 2, 4, 8] {
             let budget = Budget::for_frame(width_px, height_px)
                 .with_tiers(args.tiers)

@@ -17,6 +17,7 @@ impl ReferenceScene {
         let position = |cell: &[i32; 3]| DVec3::from(cell.map(f64::from)) * voxel_size;
         Self {
             shape,
+            prefilters: shape.sees_view(),
             positions: anchors.lattice.iter().map(position).collect(),
             drawn: (0..anchors.mask_logits.len()).map(|offset| anchors.is_drawn(offset)).collect(),
             features: anchors.features,
@@ -38,6 +39,7 @@ impl ReferenceScene {
         let n_channels = shape.values_per_anchor();
         let mut scene = Self {
             shape,
+            prefilters: bundle.n_gaussians(0).is_none(),
             positions: Vec::new(),
             features: Vec::new(),
             log_scales: Vec::new(),

@@ -55,7 +55,8 @@ fn scene_of(balls: &[Ball]) -> ReferenceScene {
         }
     }
     let positions = balls.iter().map(|b| DVec3::from(b.position)).collect();
-    ReferenceScene { shape, positions, features, log_scales, offsets: vec![0.0; 3 * n], drawn: vec![true; n], heads }
+    let (offsets, drawn) = (vec![0.0; 3 * n], vec![true; n]);
+    ReferenceScene { shape, prefilters: true, positions, features, log_scales, offsets, drawn, heads }
 }
 
 fn camera() -> Camera {

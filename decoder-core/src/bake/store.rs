@@ -1,0 +1,130 @@
+//! Baked Gaussians in memory, chunk by chunk.
+
+use super::record::BakedGaussian;
+use crate::scene::Gaussian;
+
+/// Set in the entry of a chunk that was left out because of damage; there are never so many Gaussians.
+const DAMAGED: u32 = 1 << 31;
+
+/// The memory that Gaussians are kept in.
+pub(crate) struct BakedMemory<'s> {
+    /// `[n_gaussians]`.
+    pub(crate) records: &'s mut [BakedGaussian],
+    /// `[n_chunks + 1]`.
+    pub(crate) starts: &'s mut [u32],
+}
+
+/// Takes Gaussians chunk by chunk.
+pub(super) struct Baker<'s> {
+    memory: BakedMemory<'s>,
+    n_chunks: usize,
+    /// Gaussians so far, those without a place included.
+    pub(super) n: u32,
+}
+
+/// Gaussians evaluated when bound.
+pub(crate) struct BakedGaussians<'s> {
+    records: &'s [BakedGaussian],
+    starts: &'s [u32],
+}
+
+impl<'s> Baker<'s> {
+    pub(super) fn new(memory: BakedMemory<'s>) -> Self {
+        memory.starts.fill(0);
+        Self { memory, n_chunks: 0, n: 0 }
+    }
+
+    /// Keeps the next Gaussian of a chunk, if there is a place.
+    pub(super) fn push(&mut self, gaussian: &Gaussian) {
+        if let Some(record) = self.memory.records.get_mut(self.n as usize) {
+            *record = BakedGaussian::new(gaussian);
+        }
+        self.n = self.n.saturating_add(1);
+    }
+
+    /// Ends a chunk whose first Gaussian was number `first`; of a damaged one nothing is kept.
+    pub(super) fn end_chunk(&mut self, first: u32, is_damaged: bool) {
+        if is_damaged {
+            self.n = first;
+        }
+        let end = self.n;
+        if let Some([start, next, ..]) = self.memory.starts.get_mut(self.n_chunks..) {
+            *start = first | if is_damaged { DAMAGED } else { 0 };
+            *next = end;
+        }
+        self.n_chunks = self.n_chunks.saturating_add(1);
+    }
+
+    /// What was kept.
+    pub(super) fn finish(self) -> BakedGaussians<'s> {
+        BakedGaussians { records: self.memory.records, starts: self.memory.starts }
+    }
+}
+
+impl BakedGaussians<'_> {
+    /// Whether a chunk was left out because of damage.
+    pub(crate) fn is_damaged(&self, chunk: u32) -> bool {
+        self.starts.get(chunk as usize).is_some_and(|start| start & DAMAGED != 0)
+    }
+
+    /// Gaussians of the first `n_chunks` chunks.
+    pub(super) fn n_of_first(&self, n_chunks: u32) -> u32 {
+        self.starts.get(n_chunks as usize).map_or(0, |start| start & !DAMAGED)
+    }
+
+    /// Gaussians of a chunk.
+    pub(crate) fn n_of_chunk(&self, chunk: u32) -> u32 {
+        let [first, end] = self.range(chunk);
+        end.saturating_sub(first)
+    }
+
+    /// The Gaussians of a chunk in the order of the file, each with its number.
+    pub(crate) fn of_chunk(&self, chunk: u32) -> impl Iterator<Item = (u32, Gaussian)> {
+        let [first, end] = self.range(chunk);
+        let records = self.records.get(first as usize..end as usize).unwrap_or_default();
+        (first..).zip(records).map(move |(number, record)| (number, record.unpack()))
+    }
+
+    fn range(&self, chunk: u32) -> [u32; 2] {
+        match self.starts.get(chunk as usize..) {
+            Some([first, end, ..]) => [first & !DAMAGED, end & !DAMAGED],
+            _ => [0; 2],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bytemuck::Zeroable;
+
+    use super::{BakedGaussian, BakedMemory, Baker};
+    use crate::scene::Gaussian;
+
+    #[test]
+    fn a_damaged_chunk_leaves_nothing_behind() {
+        let gaussian = |opacity: f32| Gaussian {
+            centre: [0.0; 3],
+            scale: [1.0; 3],
+            rotation: [1.0, 0.0, 0.0, 0.0],
+            opacity,
+            colour: [0.5; 3],
+        };
+        let mut records = [BakedGaussian::zeroed(); 3];
+        let mut starts = [9; 4];
+        let mut baker = Baker::new(BakedMemory { records: &mut records, starts: &mut starts });
+        for (opacities, is_damaged) in [(&[0.1, 0.2][..], false), (&[0.9, 0.9, 0.9, 0.9], true), (&[0.3], false)] {
+            let first = baker.n;
+            for &opacity in opacities {
+                baker.push(&gaussian(opacity));
+            }
+            baker.end_chunk(first, is_damaged);
+        }
+        assert_eq!(baker.n, 3, "two and one");
+        let baked = baker.finish();
+        assert_eq!([0, 1, 2, 3].map(|chunk| baked.n_of_chunk(chunk)), [2, 0, 1, 0], "the fourth is none");
+        assert_eq!([0, 1, 2].map(|chunk| baked.is_damaged(chunk)), [false, true, false], "the second");
+        let kept: std::vec::Vec<f32> = baked.records.iter().map(|record| record.unpack().opacity).collect();
+        let near = kept.iter().zip([0.1, 0.2, 0.3]).all(|(kept, whole)| (kept - whole).abs() < 2e-4);
+        assert!(near && kept.len() == 3, "{kept:?}");
+    }
+}

@@ -170,6 +170,8 @@ job_digests() {
 
 # Boards with the RAM that they get, KiB: as much as such a device has, and so little that anchors are decoded in each frame.
 firmware_runs=("mps2-an386 256" "mps2-an386 76" "mps2-an500 1024" "virt 76")
+# The same of a bundle whose Gaussians are evaluated once.
+baked_runs=("mps2-an386 256" "virt 256")
 
 # Every board draws an orbit of a bundle of either coder in its RAM, byte for byte as this machine does, and takes as many
 # instructions as it took when docs/results/instructions.csv was written, within 1 %, and as are predicted, within 10 %.
@@ -187,7 +189,7 @@ job_bless-instructions() {
 }
 
 measure_firmware() { # CSV
-  local coder run bundle out bytes frame
+  local coder run runs options bundle out bytes frame
   need_embedded_target
   need_target riscv32imac-unknown-none-elf
   need_command qemu-system-arm qemu-system-arm
@@ -196,19 +198,24 @@ measure_firmware() { # CSV
   need_tool flip-link "$flip_link_version"
   mkdir -p "$target/firmware"
   : >"$1"
-  for coder in static context; do
+  for coder in static context matte; do
     bundle=$target/firmware/sample-$coder.psb
-    cargo run -q -p tools --bin sample_bundle --locked -- --coder "$coder" "$bundle"
-    for run in "${firmware_runs[@]}"; do
+    if [ "$coder" = matte ]; then
+      runs=("${baked_runs[@]}") options=(--matte)
+    else
+      runs=("${firmware_runs[@]}") options=(--coder "$coder")
+    fi
+    cargo run -q -p tools --bin sample_bundle --locked -- "${options[@]}" "$bundle"
+    for run in "${runs[@]}"; do
       out=$target/firmware/$coder-${run/ /-}
       # shellcheck disable=SC2086 # a board and its RAM
       CARGO_TARGET_DIR=$embedded firmware-example/measure.sh "$bundle" $run "" "$out" >"$out.csv"
       bytes=$(sed -n 's/.*scratch: \([0-9]*\) bytes.*/\1/p' "$out/log.txt")
       cargo run -q -p tools --bin draw_orbit --locked -- "$bundle" "$out/host" --bytes "$bytes" >/dev/null
       for frame in "$out"/frame*.ppm; do
-        cmp "$frame" "$out/host/${frame##*/}" || fail "a frame of $run KiB differs from this machine's, coder $coder"
+        cmp "$frame" "$out/host/${frame##*/}" || fail "a frame of $run KiB differs from this machine's, sample $coder"
       done
-      echo "$run KiB, $coder: $(ls "$out"/frame*.ppm | wc -l) frames as on this machine; $(sed -n 's/.*\(stack: [0-9]*\).*/\1/p' "$out/log.txt")"
+      echo "$run KiB, sample $coder: $(ls "$out"/frame*.ppm | wc -l) frames as on this machine; $(sed -n 's/.*\(stack: [0-9]*\).*/\1/p' "$out/log.txt")"
       if [ -s "$1" ]; then sed 1d "$out.csv" >>"$1"; else cat "$out.csv" >"$1"; fi
     done
   done

@@ -22,6 +22,9 @@ struct Args {
     /// What gives the symbols their frequencies; a context model is made of the channels' means and deviations.
     #[arg(long, value_enum, default_value_t = Coder::Static)]
     coder: Coder,
+    /// Without glint and haze: as the same from everywhere.
+    #[arg(long)]
+    matte: bool,
 }
 
 const SHAPE: ModelShape = ModelShape {
@@ -92,7 +95,7 @@ fn lit(colour: DVec3, normal: DVec3) -> DVec3 {
     colour * (0.25 + 0.75 * normal.dot(SUN.normalize()).max(0.0))
 }
 
-fn scene() -> Scene<f32> {
+fn scene(shape: ModelShape) -> Scene<f32> {
     let mut anchors = Anchors::default();
     let n_planet = planet().len();
     for (index, patch) in planet().into_iter().chain(ring()).enumerate() {
@@ -112,13 +115,13 @@ fn scene() -> Scene<f32> {
             anchors.offsets.extend((turn * DVec3::new(x, y, 0.0)).to_array().map(|o| o as f32));
         }
     }
-    Scene { shape: SHAPE, voxel_size: VOXEL_SIZE, anchors, heads: heads(), context: None }
+    Scene { shape, voxel_size: VOXEL_SIZE, anchors, heads: heads(&shape), context: None }
 }
 
-/// Heads that read the features as [`scene`] wrote them, add a glint towards the sun, a haze with distance, and a glow by
-/// night.
-fn heads() -> Heads<f32> {
-    let mut heads = Heads::filled(&SHAPE, 0.0);
+/// Heads that read the features as [`scene`] wrote them, add a glint towards the sun and a haze with distance, if they see the view,
+/// and a glow by night.
+fn heads(shape: &ModelShape) -> Heads<f32> {
+    let mut heads = Heads::filled(shape, 0.0);
     for head in [&mut heads.opacity, &mut heads.covariance, &mut heads.colour] {
         for unit in 0..=OPACITY {
             head.w1[unit * head.n_in + unit] = 1.0;
@@ -127,10 +130,12 @@ fn heads() -> Heads<f32> {
     }
     let direction = SHAPE.feature_dim;
     let colour = &mut heads.colour;
-    for (axis, sun) in SUN.to_array().into_iter().enumerate() {
-        colour.w1[GLINT * colour.n_in + direction + axis] = sun as f32;
+    if shape.sees_view() {
+        for (axis, sun) in SUN.to_array().into_iter().enumerate() {
+            colour.w1[GLINT * colour.n_in + direction + axis] = sun as f32;
+        }
+        colour.w1[HAZE * colour.n_in + direction + 3] = 0.5;
     }
-    colour.w1[HAZE * colour.n_in + direction + 3] = 0.5;
     colour.b1[HAZE] = -1.5;
     for k in 0..SHAPE.n_offsets {
         pass(&mut heads.opacity, k, OPACITY);
@@ -184,7 +189,7 @@ fn context(scene: &Scene<f32>) -> ContextModel<f32> {
     let n_rows = u32::from(RESOLUTION).pow(3);
     let levels = vec![GridLevel { kind: LevelKind::Volume, resolution: RESOLUTION, n_rows }];
     let base_steps = [0.1, 0.05, 0.1];
-    let mut model = ContextModel::filled(&SHAPE, frame, levels, 4, base_steps, 0.0);
+    let mut model = ContextModel::filled(&scene.shape, frame, levels, 4, base_steps, 0.0);
     for (row, signs) in model.rows.chunks_mut(4).enumerate() {
         signs.fill(if row % 4 < 2 { 1.0 } else { -1.0 });
     }
@@ -216,7 +221,7 @@ fn context(scene: &Scene<f32>) -> ContextModel<f32> {
 fn main() -> anyhow::Result<()> {
     let args = Args::parse();
     let camera = camera();
-    let mut scene = scene();
+    let mut scene = scene(ModelShape { view_direction: !args.matte, view_distance: !args.matte, ..SHAPE });
     if args.coder != Coder::Static {
         scene.context = Some(context(&scene));
     }

@@ -9,13 +9,14 @@ mod tally;
 
 pub use report::FrameReport;
 
+use crate::arithmetic::{Arithmetic, Exact};
 use crate::bake::{BakedGaussians, BakedMemory, bake};
 use crate::budget::{Arena, Overflow, Plan, ScratchShape};
 use crate::bundle::{AnchorRecords, Bundle, Chunk, RecordMemory, Tables, in_range, saturate};
 use crate::camera::Camera;
 use crate::error::{DecodeError, Field};
-use crate::mlp::Heads;
-use crate::project::View;
+use crate::mlp::{HeadNumbers, Heads};
+use crate::project::{PackedSplat, View};
 use crate::raster::{
     BlendRule, EMPTY, N_RADIX, Pixel, TILE_PIXELS, TILE_PX, TilePlace, TileRect, blend_tile, finish_tile, sort_by_depth,
 };
@@ -35,17 +36,17 @@ pub trait TileSink {
     fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]);
 }
 
-/// Draws frames of one bundle with the memory it was bound to.
-pub struct Decoder<'b, 's> {
+/// Draws frames of one bundle with the memory it was bound to, computed as `A` says.
+pub struct Decoder<'b, 's, A: Arithmetic = Exact> {
     bundle: Bundle<'b>,
     plan: Plan,
     skip_damage: bool,
-    source: GaussianSource<'b, 's>,
+    source: GaussianSource<'b, 's, A::Heads>,
     /// `[TILE_PIXELS]` of the tile in work, or of each tile of a strip when strips are drawn in slabs.
     pixels: &'s mut [Pixel],
     /// `[TILE_PIXELS]` a finished tile.
     rgb: &'s mut [[u8; 3]],
-    splats: SplatStore<'s>,
+    splats: SplatStore<'s, A>,
 }
 
 impl<'b, 's> Decoder<'b, 's> {
@@ -61,7 +62,22 @@ impl<'b, 's> Decoder<'b, 's> {
     /// Exactly [`Plan::scratch_len`] bytes of `scratch`; reads the whole bundle once, about 8 instructions a byte, and for
     /// resident anchors 55 to 80 a symbol; baked Gaussians take the heads of every anchor besides.
     pub fn bind(bundle: &Bundle<'b>, plan: Plan, scratch: &'s mut [u8]) -> Result<Self, DecodeError> {
-        let decoder = Self::bind_with(bundle, plan, scratch, false)?;
+        Self::bind_in(bundle, plan, scratch)
+    }
+
+    /// As [`bind`](Self::bind), with another arithmetic: `Decoder::bind_in::<With<I16>>(…)`.
+    ///
+    /// # Errors
+    /// As for [`bind`](Self::bind).
+    ///
+    /// # Budget
+    /// As for [`bind`](Self::bind); no arithmetic takes more memory than the exact one.
+    pub fn bind_in<A: Arithmetic>(
+        bundle: &Bundle<'b>,
+        plan: Plan,
+        scratch: &'s mut [u8],
+    ) -> Result<Decoder<'b, 's, A>, DecodeError> {
+        let decoder = Decoder::bind_with(bundle, plan, scratch, false)?;
         // What is in memory was compared before it was decoded.
         if decoder.source.is_streamed() {
             for (chunk, _) in decoder.planned_chunks() {
@@ -83,7 +99,9 @@ impl<'b, 's> Decoder<'b, 's> {
     pub fn bind_skipping_damage(bundle: &Bundle<'b>, plan: Plan, scratch: &'s mut [u8]) -> Result<Self, DecodeError> {
         Self::bind_with(bundle, plan, scratch, true)
     }
+}
 
+impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
     // Not inlined, here and below: a caller's stack frame would keep what only one of the steps needs.
     #[inline(never)]
     fn bind_with(
@@ -118,7 +136,7 @@ impl<'b, 's> Decoder<'b, 's> {
         baked: Option<BakedGaussians<'s>>,
         skip_damage: bool,
     ) -> Result<Self, DecodeError> {
-        let n_splats = plan.max_splats() as usize;
+        let n_splats = places_for::<A>(&plan) as usize;
         Ok(Self {
             bundle: *bundle,
             plan,
@@ -185,7 +203,7 @@ impl<'b, 's> Decoder<'b, 's> {
         let strips = StripLayout::new(camera.height_px, self.plan.n_strips());
         let in_slabs = budget.overflow == Overflow::Slabs;
         let tallies = !in_slabs && (strips.len() == 1 || !self.surely_fits(&view, strips));
-        let tally = Tally::new(self.plan.max_splats());
+        let tally = Tally::new(places_for::<A>(&self.plan));
         let mut frame = Frame { view, strips, tallies, in_slabs, tally, report: FrameReport::default() };
         if in_slabs && self.skip_damage {
             self.note_damage(&mut frame);
@@ -226,7 +244,7 @@ impl<'b, 's> Decoder<'b, 's> {
     }
 
     /// The chunks of the tiers that are drawn, each with the number of its first anchor.
-    fn planned_chunks(&self) -> impl Iterator<Item = (Chunk<'b>, u32)> + use<'b> {
+    fn planned_chunks(&self) -> impl Iterator<Item = (Chunk<'b>, u32)> + use<'b, A> {
         let n_chunks = self.bundle.up_to_tier(self.plan.n_tiers()).n_chunks;
         let mut n_anchors = 0_u32;
         self.bundle.chunks().take(n_chunks as usize).map(move |chunk| {
@@ -252,7 +270,7 @@ impl<'b, 's> Decoder<'b, 's> {
         let n = *n as usize;
         let (Some(splats), Some(rects)) = (splats.get(..n), rects.get(..n)) else { return false };
         let (Some(order), Some(spare)) = (order.get_mut(..n), spare.get_mut(..n)) else { return false };
-        let (order, row_list) = sort_by_depth(splats, order, spare, counts);
+        let (order, row_list) = sort_by_depth::<A>(splats, order, spare, counts);
         // One after the other, or all at once.
         let keeps_tiles = self.plan.shape().canvas_tiles > 1;
         let (mut n_tiles, mut alive) = (0, 0);
@@ -273,13 +291,13 @@ impl<'b, 's> Decoder<'b, 's> {
                 if slab.from == 0.0 {
                     pixels.fill(EMPTY);
                 }
-                let work = blend_tile(place, splats, rects, list, &rule, pixels);
+                let work = blend_tile::<A>(place, splats, rects, list, &rule, pixels);
                 alive += work.alive;
                 report.tile_splats = report.tile_splats.saturating_add(work.splats);
                 report.row_splats = report.row_splats.saturating_add(work.rows);
                 report.pixel_splats = report.pixel_splats.saturating_add(work.pixels);
                 if !slab.ends() {
-                    finish_tile(place, pixels, background, self.rgb);
+                    finish_tile::<A::Colours>(place, pixels, background, self.rgb);
                     let n_pixels = usize::from(width) * usize::from(height);
                     watch.enter(Stage::Output);
                     sink.tile(x_px, y_px, width, height, self.rgb.get(..n_pixels).unwrap_or_default());
@@ -326,12 +344,12 @@ fn bake_scene<'s>(
 
 /// Converts the heads into memory of `arena`, and prepares where the anchors of the planned tiers come from.
 #[inline(never)]
-fn take_anchors<'b, 's>(
+fn take_anchors<'b, 's, N: HeadNumbers>(
     bundle: &Bundle<'b>,
     plan: &Plan,
     arena: &mut Arena<'s>,
     skip_damage: bool,
-) -> Result<Anchors<'b, 's>, DecodeError> {
+) -> Result<Anchors<'b, 's, N>, DecodeError> {
     let shape = plan.shape().heads();
     let heads = Heads::convert(arena, bundle.heads(), shape)?;
     let row = arena.take(bundle.header().n_channels())?;
@@ -365,6 +383,15 @@ fn decode_anchors<'b, 's>(
     let mut models = bundle.anchor_models(free.take(bundle.anchor_scratch_words())?)?;
     let row = bytemuck::try_cast_slice_mut(row).unwrap_or_default();
     AnchorRecords::decode(bundle, tier.n_chunks, memory, row, &mut models, skip_damage)
+}
+
+/// Splats that the planned memory has places for: as many as planned, or fewer larger ones.
+fn places_for<A: Arithmetic>(plan: &Plan) -> u32 {
+    let (planned, taken) = (size_of::<PackedSplat>(), size_of::<A::Splat>());
+    if taken <= planned {
+        return plan.max_splats();
+    }
+    (u64::from(plan.max_splats()) * planned as u64 / taken as u64) as u32
 }
 
 /// First pixel and size of each tile along an axis.

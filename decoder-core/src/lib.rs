@@ -8,6 +8,7 @@ extern crate std;
 mod camera;
 mod error;
 
+pub mod arithmetic;
 mod bake;
 pub mod budget;
 pub mod bundle;

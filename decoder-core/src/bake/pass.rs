@@ -1,6 +1,7 @@
 //! Going over a scene once, when it is bound.
 
 use super::store::{BakedGaussians, BakedMemory, Baker};
+use crate::arithmetic::{Exact, F32, Precise};
 use crate::budget::{Arena, ScratchShape};
 use crate::bundle::{AnchorModels, Bundle, Chunk, MAX_TIERS, saturate};
 use crate::error::{DecodeError, Field};
@@ -11,7 +12,8 @@ use crate::scene::{Anchor, Workspace, for_each_gaussian};
 struct Evaluator<'b, 's> {
     bundle: Bundle<'b>,
     models: AnchorModels<'b, 's>,
-    heads: Heads<'s>,
+    // Exact, whatever frames are computed with: it runs once, and the bundle's counts are of it.
+    heads: Heads<'s, F32>,
     row: &'s mut [f32],
     work: Workspace<'s>,
 }
@@ -80,10 +82,10 @@ impl<'b> Evaluator<'b, '_> {
             let site = anchors.site();
             anchors.values(row);
             let position = bundle.position(site.lattice);
-            let anchor = Anchor::from_row(header, position, site.mask, row).ok_or(DecodeError::Internal)?;
+            let anchor = Anchor::from_row::<Precise>(header, position, site.mask, row).ok_or(DecodeError::Internal)?;
             // Seen from anywhere.
             let eye = [0.0; 3];
-            for_each_gaussian(&anchor, header.features.effects, eye, heads, work, &mut (), |_, gaussian| {
+            for_each_gaussian::<Exact>(&anchor, header.features.effects, eye, heads, work, &mut (), |_, gaussian| {
                 baker.push(gaussian);
             });
         }

@@ -4,7 +4,8 @@ use super::source::{AnchorSource, Anchors, GaussianSource};
 use super::splats::{Slab, SplatStore};
 use super::strip::{Strip, StripLayout};
 use super::tally::{Tally, place};
-use super::{Decoder, FrameReport};
+use super::{Decoder, FrameReport, places_for};
+use crate::arithmetic::Arithmetic;
 use crate::bake::BakedGaussian;
 use crate::bundle::{Chunk, Effects};
 use crate::error::DecodeError;
@@ -54,7 +55,7 @@ impl Frame {
     }
 }
 
-impl<'b> Decoder<'b, '_> {
+impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
     /// Whether each strip surely has a place for all of its splats: all baked Gaussians, or all offsets of all anchors, of the
     /// chunks it sees.
     ///
@@ -71,7 +72,7 @@ impl<'b> Decoder<'b, '_> {
                 _ => u64::from(chunk.n_anchors()).saturating_mul(n_offsets),
             };
             let most: u64 = seen.map(most_of).sum();
-            most <= self.plan.max_splats().into()
+            most <= places_for::<A>(&self.plan).into()
         })
     }
 
@@ -196,14 +197,18 @@ impl<'b> Decoder<'b, '_> {
             let n_channels = 3 * site.mask.count_ones() + n_scalars;
             report.symbols_decoded += u64::from(decoded * n_channels);
             let position = bundle.position(site.lattice);
-            let anchor = Anchor::from_row(header, position, site.mask, row).ok_or(DecodeError::Internal)?;
-            let is_seen =
-                if as_baked { view.sees_box(anchor.ink_box()) } else { view.sees_anchor(position, anchor.extent) };
+            let anchor =
+                Anchor::from_row::<A::Functions>(header, position, site.mask, row).ok_or(DecodeError::Internal)?;
+            let is_seen = if as_baked {
+                view.sees_box(anchor.ink_box())
+            } else {
+                view.sees_anchor::<A::Roots>(position, anchor.extent)
+            };
             if !is_seen || keeper.pass.band.as_ref().is_some_and(|band| !band.sees_anchor(&anchor)) {
                 return Ok(());
             }
             report.anchors_visible += 1;
-            let macs = for_each_gaussian(&anchor, effects, view.eye, heads, work, watch, |offset, gaussian| {
+            let macs = for_each_gaussian::<A>(&anchor, effects, view.eye, heads, work, watch, |offset, gaussian| {
                 report.gaussians += 1;
                 let place = place(number, offset);
                 if as_baked {
@@ -219,20 +224,20 @@ impl<'b> Decoder<'b, '_> {
 }
 
 /// Projects Gaussians and keeps the splats that a pass draws.
-struct Keeper<'f, 's> {
+struct Keeper<'f, 's, A: Arithmetic> {
     view: &'f View,
     strips: &'f StripLayout,
     tallies: bool,
     in_slabs: bool,
     tally: &'f mut Tally,
     pass: &'f mut Pass,
-    splats: &'f mut SplatStore<'s>,
+    splats: &'f mut SplatStore<'s, A>,
 }
 
-impl Keeper<'_, '_> {
+impl<A: Arithmetic> Keeper<'_, '_, A> {
     /// * `place`: ascends in the order of the file.
     fn project(&mut self, place: u32, gaussian: &Gaussian, effects: Effects) {
-        let Some((splat, rect)) = self.view.project(gaussian, effects.dilation_compensation) else { return };
+        let Some((splat, rect)) = self.view.project::<A>(gaussian, effects.dilation_compensation) else { return };
         let touched = self.strips.touched(rect);
         let index = usize::from(self.pass.strip.index);
         let lies_here = touched.contains(&index);

@@ -3,23 +3,23 @@
 use crate::bake::BakedGaussians;
 use crate::bundle::{AnchorModels, AnchorRecords, AnchorSite, Chunk};
 use crate::error::DecodeError;
-use crate::mlp::Heads;
+use crate::mlp::{HeadNumbers, Heads};
 use crate::scene::Workspace;
 use crate::stopwatch::{Stage, Stopwatch};
 
 /// The scene of the planned tiers.
 #[expect(clippy::large_enum_variant, reason = "a decoder has one, and there is no allocator to box with")]
-pub(super) enum GaussianSource<'b, 's> {
+pub(super) enum GaussianSource<'b, 's, N: HeadNumbers> {
     /// Evaluated in each frame.
-    Anchors(Anchors<'b, 's>),
+    Anchors(Anchors<'b, 's, N>),
     /// Evaluated when bound.
     Baked(BakedGaussians<'s>),
 }
 
 /// Anchors, and what evaluates them.
-pub(super) struct Anchors<'b, 's> {
+pub(super) struct Anchors<'b, 's, N: HeadNumbers> {
     pub(super) source: AnchorSource<'b, 's>,
-    pub(super) heads: Heads<'s>,
+    pub(super) heads: Heads<'s, N>,
     /// `[n_channels]` of the anchor in work.
     pub(super) row: &'s mut [f32],
     pub(super) work: Workspace<'s>,
@@ -33,7 +33,7 @@ pub(super) enum AnchorSource<'b, 's> {
     Resident(AnchorRecords<'b, 's>),
 }
 
-impl GaussianSource<'_, '_> {
+impl<N: HeadNumbers> GaussianSource<'_, '_, N> {
     /// Whether each frame decodes.
     pub(super) fn is_streamed(&self) -> bool {
         matches!(self, Self::Anchors(anchors) if !anchors.source.is_resident())

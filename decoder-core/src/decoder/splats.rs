@@ -1,11 +1,12 @@
 //! The splats in memory, and their order.
 
-use crate::project::{PackedSplat, Splat};
+use crate::arithmetic::Choices;
+use crate::project::{Splat, SplatRecord};
 use crate::raster::{TileRect, sort_by_depth};
 
 /// The splats of the strip in work, or of a slab of its depth, in the order of the file.
-pub(super) struct SplatStore<'s> {
-    pub(super) splats: &'s mut [PackedSplat],
+pub(super) struct SplatStore<'s, A: Choices> {
+    pub(super) splats: &'s mut [A::Splat],
     pub(super) rects: &'s mut [TileRect],
     pub(super) n: u32,
     pub(super) order: &'s mut [u32],
@@ -35,12 +36,12 @@ impl Slab {
     }
 }
 
-impl SplatStore<'_> {
+impl<A: Choices> SplatStore<'_, A> {
     /// Keeps a splat; the caller has counted that there is a place.
     pub(super) fn push(&mut self, splat: &Splat, rect: TileRect) {
         let slot = self.n as usize;
         if let (Some(splat_slot), Some(rect_slot)) = (self.splats.get_mut(slot), self.rects.get_mut(slot)) {
-            *splat_slot = PackedSplat::new(splat);
+            *splat_slot = A::Splat::new(splat);
             *rect_slot = rect;
             self.n = self.n.saturating_add(1);
         }
@@ -79,8 +80,8 @@ impl SplatStore<'_> {
         let n = self.n as usize;
         let splats = self.splats.get(..n)?;
         let (order, spare) = (self.order.get_mut(..n)?, self.spare.get_mut(..n)?);
-        let (order, _) = sort_by_depth(splats, order, spare, self.counts);
-        let depth_of = |index: &u32| splats.get(*index as usize).map_or(0.0, |splat| splat.depth);
+        let (order, _) = sort_by_depth::<A>(splats, order, spare, self.counts);
+        let depth_of = |index: &u32| splats.get(*index as usize).map_or(0.0, SplatRecord::depth);
         let nearest = order.first().map_or(depth, depth_of);
         let nearest = if depth < nearest { depth } else { nearest };
         let mut later = order.get(n / 2..).unwrap_or_default().iter().map(depth_of);
@@ -97,7 +98,7 @@ impl SplatStore<'_> {
         let mut n_kept = 0;
         for i in 0..self.n as usize {
             let (Some(&splat), Some(&rect)) = (self.splats.get(i), self.rects.get(i)) else { break };
-            if splat.depth < end
+            if splat.depth() < end
                 && let (Some(splat_slot), Some(rect_slot)) = (self.splats.get_mut(n_kept), self.rects.get_mut(n_kept))
             {
                 (*splat_slot, *rect_slot) = (splat, rect);
@@ -115,7 +116,8 @@ mod tests {
     use bytemuck::Zeroable;
 
     use super::{Slab, SplatStore};
-    use crate::project::{PackedSplat, Splat};
+    use crate::arithmetic::Exact;
+    use crate::project::{PackedSplat, Splat, SplatRecord};
     use crate::raster::{N_RADIX, TileRect};
 
     const RECT: TileRect = TileRect { first_column: 0, last_column: 0, first_row: 0, last_row: 0 };
@@ -136,7 +138,7 @@ mod tests {
     fn slabs(depths: &[f32], n_places: usize) -> (Vec<Vec<f32>>, u32) {
         let (mut slabs, mut n_dropped, mut from) = (Vec::new(), 0, 0.0);
         loop {
-            let mut store = SplatStore {
+            let mut store = SplatStore::<Exact> {
                 splats: &mut std::vec![PackedSplat::zeroed(); n_places],
                 rects: &mut std::vec![RECT; n_places],
                 n: 0,
@@ -149,7 +151,7 @@ mod tests {
                 store.push_into(&mut slab, &splat(depth), RECT);
             }
             n_dropped += slab.n_left_out;
-            slabs.push(store.splats.iter().take(store.n as usize).map(|splat| splat.depth).collect());
+            slabs.push(store.splats.iter().take(store.n as usize).map(SplatRecord::depth).collect());
             if !slab.ends() {
                 return (slabs, n_dropped);
             }

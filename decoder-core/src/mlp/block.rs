@@ -3,11 +3,12 @@
 use crate::budget::Arena;
 use crate::bundle::Halves;
 use crate::error::DecodeError;
+use crate::mlp::weight::Weight;
 
 /// A dense layer: `[n_blocks, 1 + n_in, B]`, each block beginning with its biases.
-pub(crate) struct Blocks<'s, const B: usize> {
+pub(crate) struct Blocks<'s, W, const B: usize> {
     rows_per_block: usize,
-    rows: &'s [[f32; B]],
+    rows: &'s [[W; B]],
 }
 
 /// Rows of `B` weights that a layer of `n_in` inputs and `n_out` outputs fills.
@@ -15,7 +16,7 @@ pub(crate) const fn n_rows<const B: usize>(n_in: usize, n_out: usize) -> usize {
     n_out.div_ceil(B) * (n_in + 1)
 }
 
-impl<'s, const B: usize> Blocks<'s, B> {
+impl<'s, W: Weight, const B: usize> Blocks<'s, W, B> {
     /// Converts a layer's weights `[n_out, n_in]` and biases `[n_out]`; outputs beyond `n_out` become 0.
     pub(crate) fn convert(
         arena: &mut Arena<'s>,
@@ -24,8 +25,9 @@ impl<'s, const B: usize> Blocks<'s, B> {
         n_in: usize,
     ) -> Result<Self, DecodeError> {
         let n_out = biases.len();
-        let rows = arena.take::<[f32; B]>(n_rows::<B>(n_in, n_out))?;
-        rows.fill([0.0; B]);
+        // Not as rows: those of an odd number of halves do not divide into words.
+        let (rows, _) = arena.take::<W>(B * n_rows::<B>(n_in, n_out))?.as_chunks_mut::<B>();
+        rows.fill([W::zeroed(); B]);
         let rows_per_block = n_in + 1;
         for (output, bias) in biases.iter().enumerate() {
             // `max(1)` shows the compiler what is true anyway, and a panic path less is linked.
@@ -33,7 +35,7 @@ impl<'s, const B: usize> Blocks<'s, B> {
             let lane = output % B;
             for (row, weight) in block.iter_mut().zip(core::iter::once(bias).chain(weights.by_ref())) {
                 if let Some(slot) = row.get_mut(lane) {
-                    *slot = weight;
+                    *slot = W::keep(weight);
                 }
             }
         }
@@ -41,12 +43,12 @@ impl<'s, const B: usize> Blocks<'s, B> {
     }
 
     /// All blocks in order.
-    pub(crate) fn iter(&self) -> impl Iterator<Item = &'s [[f32; B]]> + use<'s, B> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &'s [[W; B]]> + use<'s, W, B> {
         self.rows.chunks_exact(self.rows_per_block.max(1))
     }
 
     /// Block number `index`.
-    pub(crate) fn block(&self, index: usize) -> Option<&'s [[f32; B]]> {
+    pub(crate) fn block(&self, index: usize) -> Option<&'s [[W; B]]> {
         let (_, from) = self.rows.split_at_checked(index * self.rows_per_block)?;
         from.get(..self.rows_per_block)
     }
@@ -54,17 +56,17 @@ impl<'s, const B: usize> Blocks<'s, B> {
 
 /// The outputs of one block: bias, then `input·weight` added in order.
 #[inline]
-pub(crate) fn outputs<const B: usize>(block: &[[f32; B]], inputs: &[f32]) -> [f32; B] {
-    let Some((&biases, weights)) = block.split_first() else { return [0.0; B] };
-    continued(biases, weights, inputs)
+pub(crate) fn outputs<W: Weight, const B: usize>(block: &[[W; B]], inputs: &[f32]) -> [f32; B] {
+    let Some((biases, weights)) = block.split_first() else { return [0.0; B] };
+    continued(biases.map(W::value), weights, inputs)
 }
 
 /// `sums` with `input·weight` added in order.
 #[inline]
-pub(crate) fn continued<const B: usize>(mut sums: [f32; B], weights: &[[f32; B]], inputs: &[f32]) -> [f32; B] {
+pub(crate) fn continued<W: Weight, const B: usize>(mut sums: [f32; B], weights: &[[W; B]], inputs: &[f32]) -> [f32; B] {
     for (row, &x) in weights.iter().zip(inputs) {
         for (sum, &weight) in sums.iter_mut().zip(row) {
-            *sum += weight * x;
+            *sum = weight.added(*sum, x);
         }
     }
     sums

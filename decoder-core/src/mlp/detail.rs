@@ -2,6 +2,7 @@
 
 use super::block::{continued, outputs};
 use super::head::{Head, LANES};
+use super::weight::Weight;
 use crate::budget::Arena;
 use crate::bundle::{HeadView, WeightReader};
 use crate::error::DecodeError;
@@ -9,18 +10,18 @@ use crate::error::DecodeError;
 /// `W2·relu(W1·[feature, colour] + b1) + b2`.
 ///
 /// Inputs are taken in ascending order, so the sums over the feature are the same for all Gaussians of an anchor.
-pub(crate) struct Detail<'s> {
-    head: Head<'s, 3>,
+pub(crate) struct Detail<'s, W> {
+    head: Head<'s, W, 3>,
     feature_dim: usize,
 }
 
-impl<'s> Detail<'s> {
+impl<'s, W: Weight> Detail<'s, W> {
     pub(super) fn convert(
         arena: &mut Arena<'s>,
         head: &HeadView<'_>,
         weights: &mut WeightReader<'_>,
     ) -> Result<Self, DecodeError> {
-        Ok(Self { feature_dim: head.n_in.saturating_sub(3), head: Head::convert(arena, head, weights)? })
+        Ok(Self { feature_dim: head.n_in.saturating_sub(3), head: Head::converted(arena, head, weights)? })
     }
 
     /// The part per anchor: fills `sums` with `b1 + W1·feature`.
@@ -45,6 +46,6 @@ impl<'s> Detail<'s> {
             }
         }
         let hidden = hidden.get(..self.head.n_hidden).unwrap_or_default();
-        self.head.block(0, hidden).unwrap_or_default()
+        self.head.outputs(0, hidden).unwrap_or_default()
     }
 }

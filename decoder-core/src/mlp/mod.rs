@@ -1,13 +1,17 @@
-//! The heads in the decoder's memory: weights as f32, in the order in which they are read.
+//! The heads in the decoder's memory: weights in the order in which they are read, in the numbers that the arithmetic asks for.
 //!
-//! Sums are ordered: bias first, then inputs ascending, one accumulator per output. Outputs are computed in blocks of
-//! `B`, so that a block's accumulators stay in registers and one input serves them all; that changes no sum. The module
+//! Sums of floats are ordered: bias first, then inputs ascending, one accumulator per output. Outputs are computed in blocks
+//! of `B`, so that a block's accumulators stay in registers and one input serves them all; that changes no sum. The module
 //! knows nothing of what inputs and outputs mean.
 
 mod block;
 mod detail;
 mod head;
+mod integer;
+mod numbers;
 mod shape;
+mod weight;
 
 pub(crate) use head::Heads;
+pub(crate) use numbers::{HeadNumbers, TwoLayers};
 pub(crate) use shape::HeadShape;

@@ -24,8 +24,10 @@ impl HeadShape {
         let Self { inputs, feature: f, colour: c, detail: d, offsets: k } = *self;
         let first_layers = LANES * (2 * n_rows::<LANES>(inputs, f) + n_rows::<LANES>(inputs, c));
         let outputs = n_rows::<1>(f, k) + 7 * n_rows::<7>(f, 7 * k) + 3 * n_rows::<3>(c, 3 * k);
+        // Integers take a step and a bias for each output, which one pair less a unit pays for when there are two units.
+        let steps = if f == 1 { 8 * k } else { 0 } + if c == 1 { 3 * k } else { 0 };
         let detail = if d == 0 { 0 } else { LANES * n_rows::<LANES>(f + 3, d) + 3 * n_rows::<3>(d, 3) };
-        first_layers + outputs + detail
+        first_layers + outputs + steps + detail
     }
 
     /// Floats of the widest hidden layer's activations.

@@ -147,6 +147,7 @@ impl Side {
 #[cfg(test)]
 mod tests {
     use super::View;
+    use crate::arithmetic::Exact;
     use crate::camera::Camera;
     use crate::scene::{Anchor, Gaussian};
 
@@ -216,7 +217,7 @@ mod tests {
                     opacity: if k == 0 { 1.0 } else { random.between(0.01, 1.0) },
                     colour: [0.0; 3],
                 };
-                let Some((splat, rect)) = view.project(&gaussian, false) else { continue };
+                let Some((splat, rect)) = view.project::<Exact>(&gaussian, false) else { continue };
                 if rect.first_row <= first_row && first_row <= rect.last_row {
                     drawn = true;
                     drawn_in_slab |= from <= splat.depth && splat.depth < end;

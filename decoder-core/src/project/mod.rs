@@ -10,6 +10,6 @@ mod splat;
 mod view;
 
 pub(crate) use band::Band;
-pub(crate) use packed::PackedSplat;
+pub(crate) use packed::{PackedSplat, SplatRecord};
 pub(crate) use splat::{Splat, log_cut};
 pub(crate) use view::View;

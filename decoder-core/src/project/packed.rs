@@ -3,12 +3,49 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::splat::Splat;
+use crate::arithmetic::{Mixed, SplatChoice, Wide};
 use crate::math::{from_half, to_half};
 
 /// Bits of 2⁻⁶², which stands for every smaller precision: a deviation of 2·10⁹ px.
 const LEAST_PRECISION: u32 = (127 - 62) << 23;
 /// What a float has more digits than are kept.
 const DIGITS_DROPPED: u32 = 13;
+
+/// A splat as it waits in memory.
+pub(crate) trait SplatRecord: Pod {
+    /// Rounds a splat.
+    fn new(splat: &Splat) -> Self;
+
+    /// The splat, rounded.
+    fn unpack(&self) -> Splat;
+
+    /// z in the camera frame, positive.
+    fn depth(&self) -> f32;
+}
+
+impl SplatChoice for Mixed {
+    type Record = PackedSplat;
+}
+
+impl SplatChoice for Wide {
+    type Record = Splat;
+}
+
+impl SplatRecord for Splat {
+    fn new(splat: &Splat) -> Self {
+        *splat
+    }
+
+    #[inline]
+    fn unpack(&self) -> Splat {
+        *self
+    }
+
+    #[inline]
+    fn depth(&self) -> f32 {
+        self.depth
+    }
+}
 
 /// A [`Splat`], its place, depth and shear as they are, everything else rounded to eleven bits.
 ///
@@ -21,7 +58,7 @@ const DIGITS_DROPPED: u32 = 13;
 #[repr(C)]
 pub(crate) struct PackedSplat {
     mean: [f32; 2],
-    pub(crate) depth: f32,
+    depth: f32,
     shear: f32,
     row_precision: u16,
     column_precision: u16,
@@ -29,9 +66,8 @@ pub(crate) struct PackedSplat {
     colour: [u16; 3],
 }
 
-impl PackedSplat {
-    /// Rounds a splat.
-    pub(crate) fn new(splat: &Splat) -> Self {
+impl SplatRecord for PackedSplat {
+    fn new(splat: &Splat) -> Self {
         Self {
             mean: splat.mean,
             depth: splat.depth,
@@ -43,9 +79,8 @@ impl PackedSplat {
         }
     }
 
-    /// The splat, rounded.
     #[inline]
-    pub(crate) fn unpack(&self) -> Splat {
+    fn unpack(&self) -> Splat {
         Splat {
             mean: self.mean,
             depth: self.depth,
@@ -55,6 +90,11 @@ impl PackedSplat {
             log_opacity: from_half(self.log_opacity),
             colour: self.colour.map(from_half),
         }
+    }
+
+    #[inline]
+    fn depth(&self) -> f32 {
+        self.depth
     }
 }
 
@@ -74,7 +114,7 @@ fn unpack_precision(packed: u16) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use super::PackedSplat;
+    use super::{PackedSplat, SplatRecord};
     use crate::project::Splat;
 
     #[test]

@@ -1,7 +1,10 @@
 //! A splat: what remains of a Gaussian once projected, in the form in which rows of pixels are drawn.
 
+use bytemuck::{Pod, Zeroable};
+
 use super::covariance::Covariance;
 use super::view::{NEAR, View};
+use crate::arithmetic::{Choices, Functions, Roots};
 use crate::raster::TileRect;
 use crate::scene::Gaussian;
 
@@ -17,7 +20,8 @@ pub(crate) fn log_cut(steps: u8) -> f32 {
 ///
 /// Completing the square, dᵀΣ'⁻¹d = (dx − shear·dy)²·det⁻¹Σ'yy + dy²/Σ'yy: along a row of pixels the exponent is one
 /// parabola around `u + shear·dy`. No term cancels another, which the usual conic does for long thin splats.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
 pub(crate) struct Splat {
     /// Centre, pixels.
     pub(crate) mean: [f32; 2],
@@ -40,7 +44,11 @@ impl View {
     ///
     /// # Budget
     /// About 150 multiplications, one logarithm, two square roots, constant.
-    pub(crate) fn project(&self, gaussian: &Gaussian, dilation_compensation: bool) -> Option<(Splat, TileRect)> {
+    pub(crate) fn project<A: Choices>(
+        &self,
+        gaussian: &Gaussian,
+        dilation_compensation: bool,
+    ) -> Option<(Splat, TileRect)> {
         let point = self.to_camera(gaussian.centre);
         let [_, _, depth] = point;
         // Not `depth <= NEAR`: NaN leaves as well, here and below.
@@ -51,22 +59,23 @@ impl View {
         let covariance = Covariance::from_rows(self.sphere_to_image(point, gaussian));
         let mut opacity = gaussian.opacity;
         if cfg!(feature = "dilation-compensation") && dilation_compensation {
-            opacity *= libm::sqrtf(covariance.det_bare / covariance.det);
+            opacity *= A::Roots::sqrt(covariance.det_bare / covariance.det);
         }
-        let log_opacity = libm::logf(opacity + self.lost_opacity);
+        let log_opacity = A::Functions::ln(opacity + self.lost_opacity);
         // Squared Mahalanobis radius at which alpha is the least that draws.
         let reach = 2.0 * (log_opacity + self.log_cut);
         if !(reach >= 0.0 && covariance.det.is_finite()) {
             return None;
         }
         let mean = self.to_image(point);
-        let half_extent = [libm::sqrtf(reach * covariance.xx), libm::sqrtf(reach * covariance.yy)];
+        let half_extent = [reach * covariance.xx, reach * covariance.yy].map(A::Roots::sqrt);
         let rect = TileRect::covering(mean, half_extent, self.size_px)?;
+        let [shear, column_precision] = A::Roots::quotients([covariance.xy, 1.0], covariance.yy);
         let splat = Splat {
             mean,
-            shear: covariance.xy / covariance.yy,
+            shear,
             row_precision: covariance.yy / covariance.det,
-            column_precision: 1.0 / covariance.yy,
+            column_precision,
             log_opacity,
             colour: gaussian.colour,
             depth,
@@ -94,6 +103,7 @@ impl View {
 #[cfg(test)]
 mod tests {
     use super::log_cut;
+    use crate::arithmetic::Exact;
     use crate::camera::Camera;
     use crate::project::View;
     use crate::scene::Gaussian;
@@ -117,7 +127,7 @@ mod tests {
         };
         let sum_at = |steps: u8| {
             let view = View::new(&camera).expect("sound").cutting_at(steps);
-            let (splat, _) = view.project(&gaussian, false).expect("in view");
+            let (splat, _) = view.project::<Exact>(&gaussian, false).expect("in view");
             let least = (-f64::from(log_cut(steps))).exp();
             let mut sum = 0.0;
             for y in 0..100 {

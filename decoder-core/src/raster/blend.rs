@@ -1,9 +1,10 @@
 //! Front-to-back compositing of one tile.
 
 use super::tile::{TILE_PX, TileRect};
+use crate::arithmetic::{Choices, Colours, Functions};
 use crate::budget::Quality;
-use crate::math::{exp, exp_near};
-use crate::project::{PackedSplat, Splat, log_cut};
+use crate::math::exp;
+use crate::project::{Splat, SplatRecord, log_cut};
 
 /// No splat is opaque; it keeps the light behind it computable.
 const ALPHA_MAX: f32 = 0.99;
@@ -67,9 +68,9 @@ pub(crate) struct TileWork {
 ///
 /// # Budget
 /// Per splat and row of pixels two exponentials, per pixel two multiplications and the blend.
-pub(crate) fn blend_tile(
+pub(crate) fn blend_tile<A: Choices>(
     place: TilePlace,
-    splats: &[PackedSplat],
+    splats: &[A::Splat],
     rects: &[TileRect],
     list: &[u32],
     rule: &BlendRule,
@@ -87,7 +88,7 @@ pub(crate) fn blend_tile(
         if place.column < rect.first_column || place.column > rect.last_column {
             continue;
         }
-        let [rows, evaluated] = blend_splat(place, &splat.unpack(), rule, pixels, &mut alive);
+        let [rows, evaluated] = blend_splat::<A::Functions>(place, &splat.unpack(), rule, pixels, &mut alive);
         work.splats += 1;
         work.rows += rows;
         work.pixels = work.pixels.saturating_add(evaluated);
@@ -96,12 +97,12 @@ pub(crate) fn blend_tile(
 }
 
 /// Puts the background behind a tile and rounds to bytes, `[height, width]` row by row.
-pub(crate) fn finish_tile(place: TilePlace, pixels: &[Pixel], background: [f32; 3], rgb: &mut [[u8; 3]]) {
+pub(crate) fn finish_tile<C: Colours>(place: TilePlace, pixels: &[Pixel], background: [f32; 3], rgb: &mut [[u8; 3]]) {
     let rows = pixels.chunks_exact(TILE_PX.into());
     let out_rows = rgb.chunks_exact_mut(usize::from(place.width).max(1));
-    for (out_row, row) in out_rows.zip(rows).take(place.height.into()) {
-        for (out, pixel) in out_row.iter_mut().zip(row) {
-            *out = finish_pixel(*pixel, background);
+    for (y, (out_row, row)) in out_rows.zip(rows).take(place.height.into()).enumerate() {
+        for (x, (out, pixel)) in out_row.iter_mut().zip(row).enumerate() {
+            *out = C::bytes(finished(*pixel, background), x, y);
         }
     }
 }
@@ -112,13 +113,20 @@ pub(crate) fn finish_tile(place: TilePlace, pixels: &[Pixel], background: [f32; 
 /// factor: two multiplications replace an exponential. Over 16 pixels the rounding grows to about 1e-5 of alpha.
 // Not inlined: among everything that a frame needs its loops would not stay in registers.
 #[inline(never)]
-fn blend_splat(place: TilePlace, splat: &Splat, rule: &BlendRule, pixels: &mut [Pixel], alive: &mut u32) -> [u32; 2] {
+fn blend_splat<F: Functions>(
+    place: TilePlace,
+    splat: &Splat,
+    rule: &BlendRule,
+    pixels: &mut [Pixel],
+    alive: &mut u32,
+) -> [u32; 2] {
     let [mean_x, mean_y] = splat.mean;
     // In pixels of the tile, measured from the centre of its first one.
     let centre_x = mean_x - f32::from(u16::from(place.column) * TILE_PX) - 0.5;
     let centre_y = mean_y - f32::from(u16::from(place.row) * TILE_PX) - 0.5;
     let reach = 2.0 * (splat.log_opacity + rule.log_cut);
     let row_variance = 1.0 / splat.row_precision;
+    // Whatever the functions: its error grows with the square of a pixel's distance.
     let ratio_step = exp(-splat.row_precision);
     let half_height = sqrt_above(reach / splat.column_precision) + SLACK_PX;
     let Some((first, last)) = span(centre_y, half_height, place.height) else { return [0; 2] };
@@ -136,8 +144,8 @@ fn blend_splat(place: TilePlace, splat: &Splat, rule: &BlendRule, pixels: &mut [
         let Some((first, last)) = span(row_centre, half_width, place.width) else { continue };
         let Some(pixels) = row.get_mut(first..=last) else { continue };
         let dx = first as f32 - row_centre;
-        let mut gauss = exp_near(splat.log_opacity - 0.5 * (across + dx * dx * splat.row_precision));
-        let mut ratio = exp_near(-splat.row_precision * (dx + 0.5));
+        let mut gauss = F::exp_near(splat.log_opacity - 0.5 * (across + dx * dx * splat.row_precision));
+        let mut ratio = F::exp_near(-splat.row_precision * (dx + 0.5));
         n_evaluated += pixels.len() as u32;
         for pixel in pixels {
             if gauss >= rule.alpha_min && blend_pixel(pixel, gauss, splat.colour, rule.transmittance_stop) {
@@ -172,13 +180,11 @@ fn blend_pixel(pixel: &mut Pixel, gauss: f32, [red, green, blue]: [f32; 3], stop
     alive
 }
 
-/// Adds the background and rounds to bytes.
+/// The colour with the background behind it, in 255ths.
 #[inline]
-fn finish_pixel([r, g, b, transmittance]: Pixel, [back_r, back_g, back_b]: [f32; 3]) -> [u8; 3] {
+fn finished([r, g, b, transmittance]: Pixel, [back_r, back_g, back_b]: [f32; 3]) -> [f32; 3] {
     let through = transmittance.abs();
-    // A float cast saturates: negative becomes 0, and so does NaN; 255.5 and more become 255.
-    let byte = |c: f32| (c * 255.0 + 0.5) as u8;
-    [byte(r + through * back_r), byte(g + through * back_g), byte(b + through * back_b)]
+    [r + through * back_r, g + through * back_g, b + through * back_b].map(|c| c * 255.0)
 }
 
 /// Slack for rounding of a span's ends, pixels; the test of alpha decides about the pixels it adds.

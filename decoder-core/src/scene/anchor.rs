@@ -1,7 +1,7 @@
 //! An anchor's values by name.
 
+use crate::arithmetic::Functions;
 use crate::bundle::Header;
-use crate::math::exp;
 
 /// One decoded anchor.
 #[derive(Clone, Copy, Debug)]
@@ -25,15 +25,20 @@ const INK_DEVIATIONS: f32 = 3.33;
 
 impl<'r> Anchor<'r> {
     /// Names the parts of a row of channels; `None` when the row is too short.
-    pub(crate) fn from_row(header: &Header, position: [f32; 3], mask: u32, row: &'r [f32]) -> Option<Self> {
+    pub(crate) fn from_row<F: Functions>(
+        header: &Header,
+        position: [f32; 3],
+        mask: u32,
+        row: &'r [f32],
+    ) -> Option<Self> {
         let (feature, rest) = row.split_at_checked(header.feature_dim.into())?;
         let (&[a0, a1, a2, g0, g1, g2], rest) = rest.split_first_chunk::<6>()?;
         let (offsets, _) = rest.as_chunks::<3>();
         Some(Self {
             position,
             feature,
-            extent: [exp(a0), exp(a1), exp(a2)],
-            base_scale: [exp(g0), exp(g1), exp(g2)],
+            extent: [a0, a1, a2].map(F::exp),
+            base_scale: [g0, g1, g2].map(F::exp),
             offsets,
             mask,
         })

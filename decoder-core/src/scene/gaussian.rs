@@ -3,11 +3,11 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::Anchor;
+use crate::arithmetic::{Choices, Functions, Roots};
 use crate::budget::Arena;
 use crate::bundle::Effects;
 use crate::error::DecodeError;
-use crate::math::{sigmoid, tanh};
-use crate::mlp::{HeadShape, Heads};
+use crate::mlp::{HeadNumbers, HeadShape, Heads, TwoLayers};
 use crate::stopwatch::{Stage, Stopwatch};
 
 /// Opacities below one step of an 8-bit channel draw nothing.
@@ -72,20 +72,21 @@ impl<'s> Workspace<'s> {
 /// # Budget
 /// The opacity head, and at most the others: `3F(F + 4) + 11KF` multiply-adds, and with a detail head of H units
 /// `H(F + 6K)` more.
-pub(crate) fn for_each_gaussian(
+pub(crate) fn for_each_gaussian<A: Choices>(
     anchor: &Anchor<'_>,
     effects: Effects,
     eye: [f32; 3],
-    heads: &Heads<'_>,
+    heads: &Heads<'_, A::Heads>,
     work: &mut Workspace<'_>,
     watch: &mut impl Stopwatch,
     mut draw: impl FnMut(usize, &Gaussian),
 ) -> u64 {
     watch.enter(Stage::Heads);
     let Workspace { inputs, hidden, detail_sums, outputs } = work;
-    fill_inputs(anchor, effects, eye, inputs);
+    fill_inputs::<A::Roots>(anchor, effects, eye, inputs);
+    let inputs = A::Heads::values(inputs);
     let opacity_macs = heads.shape.opacity_macs(anchor.mask.count_ones() as usize);
-    let visible = fill_opacities(anchor, heads, inputs, hidden, outputs);
+    let visible = fill_opacities::<A>(anchor, heads, inputs, hidden, outputs);
     if visible == 0 {
         return opacity_macs as u64;
     }
@@ -96,7 +97,7 @@ pub(crate) fn for_each_gaussian(
     }
     let units = heads.colour.activate(inputs, hidden);
     for (k, output) in visible_only(outputs, visible) {
-        output.colour = heads.colour.block(k, units).unwrap_or_default().map(sigmoid);
+        output.colour = heads.colour.block(k, units).unwrap_or_default().map(A::Functions::sigmoid);
     }
     // Only then the buffer is free for the detail head.
     if cfg!(feature = "detail")
@@ -112,7 +113,7 @@ pub(crate) fn for_each_gaussian(
     watch.enter(Stage::Project);
     for (k, output) in visible_only(outputs, visible) {
         if let Some(offset) = anchor.offsets.get(k) {
-            draw(k, &gaussian(anchor, *offset, output));
+            draw(k, &gaussian::<A>(anchor, *offset, output));
         }
     }
     (opacity_macs + heads.shape.open_macs(visible.count_ones() as usize)) as u64
@@ -124,12 +125,12 @@ fn visible_only(outputs: &mut [HeadOutputs], visible: u32) -> impl Iterator<Item
 }
 
 /// Concatenates feature, direction and distance, the last two if the scene has them.
-fn fill_inputs(anchor: &Anchor<'_>, effects: Effects, eye: [f32; 3], inputs: &mut [f32]) {
+fn fill_inputs<R: Roots>(anchor: &Anchor<'_>, effects: Effects, eye: [f32; 3], inputs: &mut [f32]) {
     let [ax, ay, az] = anchor.position;
     let [ex, ey, ez] = eye;
     let [dx, dy, dz] = [ax - ex, ay - ey, az - ez];
-    let distance = libm::sqrtf(dx * dx + dy * dy + dz * dz);
-    let direction = if distance > 0.0 { [dx / distance, dy / distance, dz / distance] } else { [0.0; 3] };
+    let distance = R::sqrt(dx * dx + dy * dy + dz * dz);
+    let direction = if distance > 0.0 { R::quotients([dx, dy, dz], distance) } else { [0.0; 3] };
     let direction = direction.iter().take(if cfg!(feature = "view") && effects.view_direction { 3 } else { 0 });
     let distance = core::iter::once(&distance).take((cfg!(feature = "view") && effects.view_distance).into());
     for (input, &value) in inputs.iter_mut().zip(anchor.feature.iter().chain(direction).chain(distance)) {
@@ -138,10 +139,10 @@ fn fill_inputs(anchor: &Anchor<'_>, effects: Effects, eye: [f32; 3], inputs: &mu
 }
 
 /// Fills in opacities; returns a bit for each offset that is opaque enough to draw.
-fn fill_opacities(
+fn fill_opacities<A: Choices>(
     anchor: &Anchor<'_>,
-    heads: &Heads<'_>,
-    inputs: &[f32],
+    heads: &Heads<'_, A::Heads>,
+    inputs: <A::Heads as HeadNumbers>::Values<'_>,
     hidden: &mut [f32],
     outputs: &mut [HeadOutputs],
 ) -> u32 {
@@ -151,25 +152,25 @@ fn fill_opacities(
         let [logit] = heads.opacity.block(k, units).unwrap_or_default();
         // tanh keeps the sign and the order, so most offsets leave before it.
         if logit > 0.0 {
-            output.opacity = tanh(logit);
+            output.opacity = A::Functions::tanh(logit);
             visible |= if output.opacity >= OPACITY_MIN { 1 << (k & 31) } else { 0 };
         }
     }
     visible
 }
 
-fn gaussian(anchor: &Anchor<'_>, offset: [f32; 3], output: &HeadOutputs) -> Gaussian {
+fn gaussian<A: Choices>(anchor: &Anchor<'_>, offset: [f32; 3], output: &HeadOutputs) -> Gaussian {
     let [x, y, z] = anchor.position;
     let [lx, ly, lz] = anchor.extent;
     let [gx, gy, gz] = anchor.base_scale;
     let [ox, oy, oz] = offset;
     let [s0, s1, s2, w, i, j, k] = output.covariance;
-    let norm = libm::sqrtf(w * w + i * i + j * j + k * k);
+    let norm = A::Roots::sqrt(w * w + i * i + j * j + k * k);
     let norm = if norm > QUATERNION_NORM_MIN { norm } else { QUATERNION_NORM_MIN };
     Gaussian {
         centre: [x + ox * lx, y + oy * ly, z + oz * lz],
-        scale: [gx * sigmoid(s0), gy * sigmoid(s1), gz * sigmoid(s2)],
-        rotation: [w / norm, i / norm, j / norm, k / norm],
+        scale: [gx * A::Functions::sigmoid(s0), gy * A::Functions::sigmoid(s1), gz * A::Functions::sigmoid(s2)],
+        rotation: A::Roots::quotients([w, i, j, k], norm),
         opacity: output.opacity,
         colour: output.colour,
     }

@@ -1,0 +1,269 @@
+//! Heads in integers: weights of 16 or 8 bits, inputs and hidden units of 16, sums of 32, which never overflow.
+//!
+//! An output is `t·Σ v·h + b`: v integers, t one step an output, h the hidden units as integers. What a step of hidden unit j
+//! is worth goes into the weights that read it, because relu(c·x) = c·relu(x) for c > 0: so all units have one scale, and
+//! nothing is a float between the inputs and the outputs.
+
+use core::cell::Cell;
+
+use bytemuck::{Pod, Zeroable};
+
+use super::numbers::{HeadNumbers, TwoLayers};
+use crate::budget::Arena;
+use crate::bundle::{HeadView, WeightReader};
+use crate::error::DecodeError;
+
+/// Units computed together: their sums, a pair of inputs and the addresses fill the registers of a Cortex-M.
+const LANES: usize = 4;
+/// Largest magnitude of an input or a hidden unit.
+const MOST: f32 = 32_767.0;
+/// Largest sum of the magnitudes of a row's weights, in steps: times [`MOST`] it is below 2³¹, with 128 steps of rounding of 257
+/// weights.
+const MOST_OF_A_ROW: f32 = 65_400.0;
+/// Added, it leaves a float of less than 2²² rounded to an integer in the low bits: 1.5 · 2²³.
+const ROUNDER: f32 = 12_582_912.0;
+
+/// Two neighbouring weights of an output.
+pub(crate) trait Pair: Pod {
+    /// Largest magnitude of a weight.
+    const LIMIT: f32;
+
+    /// From the low 16 bits of each.
+    fn of(low: u32, high: u32) -> Self;
+
+    /// `sum` with both products added; `x` holds two values, the first in its low half.
+    fn added(self, sum: i32, x: u32) -> i32;
+}
+
+/// 16 bits each.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(transparent)]
+pub(crate) struct Pair16(u32);
+
+impl Pair for Pair16 {
+    const LIMIT: f32 = 32_767.0;
+
+    fn of(low: u32, high: u32) -> Self {
+        Self(packed(low, high))
+    }
+
+    // On a Cortex-M4 two instructions, SMLABB and SMLATT.
+    #[inline(always)]
+    fn added(self, sum: i32, x: u32) -> i32 {
+        let low = i32::from(self.0 as i16).wrapping_mul(i32::from(x as i16));
+        let high = (self.0 as i32 >> 16).wrapping_mul(x as i32 >> 16);
+        sum.wrapping_add(low).wrapping_add(high)
+    }
+}
+
+/// 8 bits each.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(transparent)]
+pub(crate) struct Pair8(u16);
+
+impl Pair for Pair8 {
+    const LIMIT: f32 = 127.0;
+
+    fn of(low: u32, high: u32) -> Self {
+        Self((low & 0xFF | high << 8) as u16)
+    }
+
+    #[inline(always)]
+    fn added(self, sum: i32, x: u32) -> i32 {
+        let low = i32::from(self.0 as i8).wrapping_mul(i32::from(x as i16));
+        let high = i32::from(self.0 as i16 >> 8).wrapping_mul(x as i32 >> 16);
+        sum.wrapping_add(low).wrapping_add(high)
+    }
+}
+
+/// Values as integers, two a word, times one scale.
+#[derive(Clone, Copy)]
+pub(crate) struct Quantised<'v> {
+    pairs: &'v [u32],
+    scale: f32,
+}
+
+impl<'v> Quantised<'v> {
+    /// The heads' inputs and a 1 behind them, which multiplies the bias, in the inputs' own memory.
+    ///
+    /// # Budget
+    /// About 10 instructions an input.
+    pub(crate) fn of(inputs: &'v mut [f32]) -> Self {
+        let mut largest = 1.0_f32;
+        for x in &*inputs {
+            let magnitude = x.abs();
+            largest = if magnitude > largest { magnitude } else { largest };
+        }
+        let steps_per_unit = MOST / largest;
+        let steps = |x: &Cell<f32>| (x.get() * steps_per_unit + ROUNDER).to_bits();
+        let one = (steps_per_unit + ROUNDER).to_bits();
+        // A word is written when both of the pair, which lie at or behind it, have been read.
+        let cells = Cell::from_mut(&mut *inputs).as_slice_of_cells();
+        let (pairs, last) = cells.as_chunks::<2>();
+        for (slot, [low, high]) in cells.iter().zip(pairs) {
+            slot.set(f32::from_bits(packed(steps(low), steps(high))));
+        }
+        let end = match last {
+            [x] => packed(steps(x), one),
+            _ => one & 0xFFFF,
+        };
+        let n_pairs = pairs.len();
+        if let Some(slot) = cells.get(n_pairs) {
+            slot.set(f32::from_bits(end));
+        }
+        Self { pairs: words(inputs).get(..=n_pairs).unwrap_or_default(), scale: largest / MOST }
+    }
+}
+
+/// One head; its output layer has blocks of `B` outputs.
+pub(crate) struct IntegerHead<'s, P, const B: usize> {
+    /// `[n_blocks, ⌈(1 + n_in)/2⌉, LANES]`, the bias behind the weights.
+    hidden: &'s [[P; LANES]],
+    pairs_per_unit: usize,
+    /// `[n_blocks, ⌈n_hidden/2⌉, B]`.
+    output: &'s [[P; B]],
+    pairs_per_output: usize,
+    /// `[n_blocks, B]`: what a step is worth for hidden units of scale 1, and the bias.
+    ends: &'s [[[f32; 2]; B]],
+    n_hidden: usize,
+}
+
+impl<'s, N, P, const B: usize> TwoLayers<'s, N, B> for IntegerHead<'s, P, B>
+where
+    N: for<'v> HeadNumbers<Values<'v> = Quantised<'v>>,
+    P: Pair,
+{
+    fn convert(
+        arena: &mut Arena<'s>,
+        head: &HeadView<'_>,
+        weights: &mut WeightReader<'_>,
+    ) -> Result<Self, DecodeError> {
+        let HeadView { n_in, n_hidden, .. } = *head;
+        let (pairs_per_unit, pairs_per_output) = (n_in / 2 + 1, n_hidden.div_ceil(2));
+        let n_blocks = head.b2.len().div_ceil(B);
+        let hidden = take_rows::<P, LANES>(arena, n_hidden.div_ceil(LANES) * pairs_per_unit)?;
+        let output = take_rows::<P, B>(arena, n_blocks * pairs_per_output)?;
+        let ends = arena.take::<[[f32; 2]; B]>(n_blocks)?;
+        // Needed until the weights are integers: what a step of each hidden unit is worth, and a row.
+        let mut free = arena.borrow();
+        let steps = free.take::<f32>(n_hidden)?;
+        let row = free.take::<f32>(n_hidden.max(n_in + 1))?;
+
+        let mut w1 = weights.next_layer();
+        for (unit, (bias, step)) in head.b1.iter().zip(&mut *steps).enumerate() {
+            let row = row.get_mut(..=n_in).unwrap_or_default();
+            for (slot, weight) in row.iter_mut().zip(w1.by_ref().take(n_in).chain([bias])) {
+                *slot = weight;
+            }
+            *step = put_row(row, hidden, unit, pairs_per_unit);
+        }
+        let mut w2 = weights.next_layer();
+        for (index, bias) in head.b2.iter().enumerate() {
+            let row = row.get_mut(..n_hidden).unwrap_or_default();
+            for ((slot, step), weight) in row.iter_mut().zip(&*steps).zip(w2.by_ref()) {
+                *slot = weight * step;
+            }
+            let step = put_row(row, output, index, pairs_per_output);
+            if let Some(end) = ends.as_flattened_mut().get_mut(index) {
+                *end = [step, bias];
+            }
+        }
+        Ok(Self { hidden, pairs_per_unit, output, pairs_per_output, ends, n_hidden })
+    }
+
+    fn activate<'h>(&self, inputs: Quantised<'_>, hidden: &'h mut [f32]) -> Quantised<'h> {
+        let mut blocks = self.hidden.chunks_exact(self.pairs_per_unit.max(1));
+        let mut all_bits = 0;
+        for units in words_mut(hidden).as_chunks_mut::<LANES>().0 {
+            let Some(block) = blocks.next() else { break };
+            for (unit, sum) in units.iter_mut().zip(sums(block, inputs.pairs)) {
+                *unit = sum.max(0) as u32;
+                all_bits |= *unit;
+            }
+        }
+        // To 15 bits; the sign's is never set.
+        let shift = 17_u32.saturating_sub(all_bits.leading_zeros()) & 31;
+        let (used, _) = words_mut(hidden).split_at_mut_checked(self.n_hidden).unwrap_or_default();
+        // As for the inputs.
+        let cells = Cell::from_mut(used).as_slice_of_cells();
+        let (pairs, last) = cells.as_chunks::<2>();
+        for (slot, [low, high]) in cells.iter().zip(pairs) {
+            slot.set(low.get() >> shift | high.get() >> shift << 16);
+        }
+        if let (Some(slot), [unit]) = (cells.get(pairs.len()), last) {
+            slot.set(unit.get() >> shift);
+        }
+        let two_to_shift = f32::from_bits((127 + shift) << 23);
+        let pairs = words(hidden).get(..self.pairs_per_output).unwrap_or_default();
+        Quantised { pairs, scale: inputs.scale * two_to_shift }
+    }
+
+    fn block(&self, index: usize, hidden: Quantised<'_>) -> Option<[f32; B]> {
+        let (_, from) = self.output.split_at_checked(index * self.pairs_per_output)?;
+        let sums = sums(from.get(..self.pairs_per_output)?, hidden.pairs);
+        let mut outputs = [0.0; B];
+        for ((output, sum), [step, bias]) in outputs.iter_mut().zip(sums).zip(self.ends.get(index)?) {
+            *output = sum as f32 * (hidden.scale * step) + bias;
+        }
+        Some(outputs)
+    }
+}
+
+/// The sums of one block.
+#[inline]
+fn sums<P: Pair, const B: usize>(block: &[[P; B]], values: &[u32]) -> [i32; B] {
+    let mut sums = [0; B];
+    for (row, &x) in block.iter().zip(values) {
+        for (sum, pair) in sums.iter_mut().zip(row) {
+            *sum = pair.added(*sum, x);
+        }
+    }
+    sums
+}
+
+/// `n` rows of `B` pairs, all zero; not taken as rows, because those of an odd number of halves do not divide into words.
+fn take_rows<'s, P: Pair, const B: usize>(arena: &mut Arena<'s>, n: usize) -> Result<&'s mut [[P; B]], DecodeError> {
+    let (rows, _) = arena.take::<P>(B * n)?.as_chunks_mut::<B>();
+    rows.fill([P::zeroed(); B]);
+    Ok(rows)
+}
+
+/// Rounds the weights of output `index` and puts them into its lane; returns what a step is worth.
+fn put_row<P: Pair, const B: usize>(
+    weights: &[f32],
+    rows: &mut [[P; B]],
+    index: usize,
+    pairs_per_output: usize,
+) -> f32 {
+    let (mut largest, mut sum) = (0.0, 0.0);
+    for weight in weights {
+        let magnitude = weight.abs();
+        largest = if magnitude > largest { magnitude } else { largest };
+        sum += magnitude;
+    }
+    let [by_largest, by_sum] = [largest / P::LIMIT, sum / MOST_OF_A_ROW];
+    let step = if by_largest > by_sum { by_largest } else { by_sum };
+    let step = if step > f32::MIN_POSITIVE { step } else { f32::MIN_POSITIVE };
+    let block = rows.chunks_exact_mut(pairs_per_output.max(1)).nth(index / B).unwrap_or_default();
+    let steps = |weight: &f32| (weight / step + ROUNDER).to_bits();
+    for (row, pair) in block.iter_mut().zip(weights.chunks(2)) {
+        if let (Some(slot), Some(low)) = (row.get_mut(index % B), pair.first()) {
+            *slot = P::of(steps(low), pair.get(1).map_or(0, steps));
+        }
+    }
+    step
+}
+
+/// The low halves of two words in one.
+fn packed(low: u32, high: u32) -> u32 {
+    low & 0xFFFF | high << 16
+}
+
+// Floats and words have one size and one alignment.
+fn words(floats: &[f32]) -> &[u32] {
+    bytemuck::try_cast_slice(floats).unwrap_or_default()
+}
+
+fn words_mut(floats: &mut [f32]) -> &mut [u32] {
+    bytemuck::try_cast_slice_mut(floats).unwrap_or_default()
+}

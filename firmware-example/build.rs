@@ -8,6 +8,7 @@
 //! | `SIZE` | frames, `WIDTHxHEIGHT` | the preview's |
 //! | `FRAMES` | frames of the orbit, at most 10 | 4 |
 //! | `QUALITY` | `EXACT`, `BALANCED` or `DRAFT` | `EXACT` |
+//! | `ARITHMETIC` | types of `pocketsplat_core::arithmetic` in the order of `With`: `I16,Polynomial,Fast` | those of `Exact` |
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -74,14 +75,20 @@ fn prepare() -> Result<(), Box<dyn Error>> {
     if !["EXACT", "BALANCED", "DRAFT"].contains(&quality.as_str()) {
         return Err(format!("QUALITY={quality} is none of EXACT, BALANCED, DRAFT").into());
     }
+    // A name that is none is an error of the compiler's.
+    let arithmetic = variable("ARITHMETIC").unwrap_or_default();
     let scratch_len = (ram_kib * 1024)
         .checked_sub(STACK_LEN + OTHER_STATICS)
         .ok_or_else(|| format!("RAM_KIB={ram_kib} leaves no scratch memory beside {STACK_LEN} bytes of stack"))?;
+    let arithmetic: Vec<String> =
+        arithmetic.split_terminator(',').map(|name| format!("pocketsplat_core::arithmetic::{}", name.trim())).collect();
+    let arithmetic = arithmetic.join(", ");
     let settings = format!(
         "const BOARD: &str = {name:?};\nconst RAM_KIB: usize = {ram_kib};\nconst STACK_LEN: usize = {STACK_LEN};\n\
          const SCRATCH_LEN: usize = {scratch_len};\nconst WIDTH_PX: usize = {width_px};\n\
          const HEIGHT_PX: usize = {height_px};\nconst N_FRAMES: u8 = {n_frames};\n\
-         const QUALITY: Quality = Quality::{quality};\n"
+         const QUALITY: Quality = Quality::{quality};\n\
+         type Chosen = pocketsplat_core::arithmetic::With<{arithmetic}>;\n"
     );
     Ok(fs::write(out.join("settings.rs"), settings)?)
 }

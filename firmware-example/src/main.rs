@@ -24,7 +24,7 @@ use riscv as _;
 use semihosting::io;
 use static_cell::ConstStaticCell;
 
-// BOARD, RAM_KIB, STACK_LEN, SCRATCH_LEN, WIDTH_PX, HEIGHT_PX, N_FRAMES, QUALITY.
+// BOARD, RAM_KIB, STACK_LEN, SCRATCH_LEN, WIDTH_PX, HEIGHT_PX, N_FRAMES, QUALITY, Chosen.
 include!(concat!(env!("OUT_DIR"), "/settings.rs"));
 static BUNDLE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/bundle.psb"));
 
@@ -94,7 +94,7 @@ fn draw_orbit(panel: &mut Panel, scratch: &mut [u8]) -> Result<(), Failure> {
         plan.work()
     );
     let before = board::instructions();
-    let mut decoder = Decoder::bind(&bundle, plan, scratch)?;
+    let mut decoder = Decoder::bind_in::<Chosen>(&bundle, plan, scratch)?;
     let mut table = Table::create(board::instructions() - before)?;
     for frame in 0..N_FRAMES {
         let camera = preview.orbited(TAU * f32::from(frame) / f32::from(N_FRAMES));

@@ -23,7 +23,8 @@ use super::output;
 /// saves in time.
 ///
 /// Writes cost.csv, cost.svg and cost.md: for each setting PSNR to the f64 reference and to the photographs, the time of a
-/// frame here, and the instructions of each stage on the target, predicted from what the frames consist of.
+/// frame here, and the instructions of each stage on the target, predicted from what the frames consist of where the arithmetic is
+/// the one whose costs were counted.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// The bundle.
@@ -62,14 +63,14 @@ struct Line<'a> {
     worst_channel: u8,
     host_s: f64,
     scratch_bytes: usize,
-    instructions: u64,
-    decode: u64,
-    context: u64,
-    heads: u64,
-    project: u64,
-    sort: u64,
-    blend: u64,
-    output: u64,
+    instructions: Option<u64>,
+    decode: Option<u64>,
+    context: Option<u64>,
+    heads: Option<u64>,
+    project: Option<u64>,
+    sort: Option<u64>,
+    blend: Option<u64>,
+    output: Option<u64>,
     on_front: bool,
 }
 
@@ -126,8 +127,12 @@ fn sights<'a>(file: &BundleFile, bundle: &Bundle<'_>, capture: &Capture, views: 
 }
 
 fn write(args: &Args, measured: &[Measured], n_views: usize) -> Result<()> {
-    let points: Vec<(f64, f64)> = measured.iter().map(|m| (m.total_instructions(), m.psnr_db)).collect();
-    let front = on_front(&points);
+    // What nobody counted is on no front.
+    let points = measured.iter().map(|m| (m.total_instructions().unwrap_or(f64::INFINITY), m.psnr_db));
+    let mut front = on_front(&points.collect::<Vec<_>>());
+    for (on_front, m) in front.iter_mut().zip(measured) {
+        *on_front &= m.instructions.is_some();
+    }
     std::fs::create_dir_all(&args.output).with_context(|| format!("could not make {}", args.output.display()))?;
     let mut table = csv::Writer::from_writer(Vec::new());
     for (m, &on_front) in measured.iter().zip(&front) {
@@ -137,12 +142,14 @@ fn write(args: &Args, measured: &[Measured], n_views: usize) -> Result<()> {
     let points: Vec<TimePoint> = measured
         .iter()
         .zip(&front)
-        .map(|(m, &on_front)| TimePoint {
-            knob: m.setting.knob.to_owned(),
-            name: m.setting.name.clone(),
-            instructions: m.total_instructions(),
-            psnr_db: m.psnr_db,
-            on_front,
+        .filter_map(|(m, &on_front)| {
+            Some(TimePoint {
+                knob: m.setting.knob.to_owned(),
+                name: m.setting.name.clone(),
+                instructions: m.total_instructions()?,
+                psnr_db: m.psnr_db,
+                on_front,
+            })
         })
         .collect();
     output::write_whole(&args.output.join("cost.svg"), time_accuracy_svg(&points)?.as_bytes())?;
@@ -152,7 +159,7 @@ fn write(args: &Args, measured: &[Measured], n_views: usize) -> Result<()> {
 }
 
 fn line(m: &Measured, on_front: bool) -> Line<'_> {
-    let of = |stage: Stage| m.instructions[stage as usize].round() as u64;
+    let of = |stage: Stage| m.instructions.map(|stages| stages[stage as usize].round() as u64);
     Line {
         knob: m.setting.knob,
         setting: &m.setting.name,
@@ -165,7 +172,7 @@ fn line(m: &Measured, on_front: bool) -> Line<'_> {
         worst_channel: m.worst_channel,
         host_s: m.host_s,
         scratch_bytes: m.scratch_bytes,
-        instructions: m.total_instructions().round() as u64,
+        instructions: m.total_instructions().map(|total| total.round() as u64),
         decode: of(Stage::Decode),
         context: of(Stage::Context),
         heads: of(Stage::Heads),
@@ -189,18 +196,22 @@ fn page(args: &Args, measured: &[Measured], front: &[bool], n_views: usize) -> S
         args.bundle.file_name().unwrap_or_default().display(),
         args.target,
     );
+    let of_exact = |m: &Measured| {
+        let share = m.total_instructions().zip(exact.total_instructions()).map(|(total, exact)| total / exact);
+        share.map_or_else(String::new, |share| format!("{share:.2}"))
+    };
     for (m, &on_front) in measured.iter().zip(front).filter(|(m, on_front)| m.setting.knob != "quality" || **on_front) {
         let mark = if on_front { "**" } else { "" };
         text += &format!(
-            "| {} | {mark}{}{mark} | {:.2} | {:.1} | {} | {:.1} | {:.1} | {:.2} | {} |\n",
+            "| {} | {mark}{}{mark} | {:.2} | {:.1} | {} | {:.1} | {} | {} | {} |\n",
             m.setting.knob,
             m.setting.name,
             m.psnr_db,
             m.psnr_to_reference_db,
             m.worst_channel,
             1e3 * m.host_s,
-            m.total_instructions() / 1e6,
-            m.total_instructions() / exact.total_instructions(),
+            m.total_instructions().map_or_else(String::new, |total| format!("{:.1}", total / 1e6)),
+            of_exact(m),
             m.scratch_bytes,
         );
     }

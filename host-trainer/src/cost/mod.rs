@@ -1,13 +1,16 @@
 //! What accuracy costs in time: one bundle drawn in many ways, each measured against the f64 reference, the photographs and
 //! the instructions that it takes.
 
+mod arithmetic;
 mod front;
 mod setting;
 
 use std::time::Instant;
 
+use pocketsplat_core::arithmetic::Arithmetic;
 use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, Stage};
 
+pub use arithmetic::{Choice, WithArithmetic};
 pub use front::on_front;
 pub use setting::{Setting, knobs, quality_grid};
 
@@ -39,16 +42,16 @@ pub struct Measured {
     pub psnr_db: f64,
     /// Time of a frame on this machine, s.
     pub host_s: f64,
-    /// Instructions of a frame on the target, by stage, predicted.
-    pub instructions: [f64; Stage::ALL.len()],
+    /// Instructions of a frame on the target, by stage, predicted; only of the exact arithmetic, whose costs were counted.
+    pub instructions: Option<[f64; Stage::ALL.len()]>,
     /// Scratch memory of the plan, bytes.
     pub scratch_bytes: usize,
 }
 
 impl Measured {
     /// Instructions of a frame in all stages.
-    pub fn total_instructions(&self) -> f64 {
-        self.instructions.iter().sum()
+    pub fn total_instructions(&self) -> Option<f64> {
+        self.instructions.map(|stages| stages.iter().sum())
     }
 }
 
@@ -68,10 +71,32 @@ pub fn measure(
     budget: Budget,
     target: Target,
 ) -> Result<Measured, DecodeError> {
+    setting.arithmetic.call(Measurement { bundle, sights, setting, budget, target })
+}
+
+/// The arguments of [`measure`].
+struct Measurement<'a, 'b> {
+    bundle: &'a Bundle<'b>,
+    sights: &'a [Sight<'a>],
+    setting: &'a Setting,
+    budget: Budget,
+    target: Target,
+}
+
+impl WithArithmetic for Measurement<'_, '_> {
+    type Output = Result<Measured, DecodeError>;
+
+    fn call<A: Arithmetic>(self) -> Self::Output {
+        measure_in::<A>(&self)
+    }
+}
+
+fn measure_in<A: Arithmetic>(of: &Measurement<'_, '_>) -> Result<Measured, DecodeError> {
+    let Measurement { bundle, sights, setting, budget, target } = *of;
     assert!(!sights.is_empty(), "views to measure with");
     let plan = bundle.plan(&setting.of(budget))?;
     let mut scratch = vec![0; plan.scratch_len()];
-    let mut decoder = Decoder::bind(bundle, plan, &mut scratch)?;
+    let mut decoder = Decoder::bind_in::<A>(bundle, plan, &mut scratch)?;
     let n = sights.len() as f64;
     let mut measured = Measured {
         setting: setting.clone(),
@@ -79,7 +104,7 @@ pub fn measure(
         worst_channel: 0,
         psnr_db: 0.0,
         host_s: 0.0,
-        instructions: [0.0; Stage::ALL.len()],
+        instructions: (setting.arithmetic == Choice::Exact).then_some([0.0; Stage::ALL.len()]),
         scratch_bytes: plan.scratch_len(),
     };
     for sight in sights {
@@ -93,7 +118,8 @@ pub fn measure(
         let differences = image.rgb.iter().zip(&sight.reference.rgb).map(|(a, b)| a.abs_diff(*b));
         measured.worst_channel = measured.worst_channel.max(differences.max().unwrap_or(0));
         let size_px = [sight.camera.width_px, sight.camera.height_px];
-        for (sum, stage) in measured.instructions.iter_mut().zip(predict(target, bundle, &plan, &report, size_px)) {
+        let stages = predict(target, bundle, &plan, &report, size_px);
+        for (sum, stage) in measured.instructions.iter_mut().flatten().zip(stages) {
             *sum += stage / n;
         }
     }

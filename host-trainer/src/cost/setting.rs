@@ -1,5 +1,6 @@
 //! The knobs of decoder-core, each by itself, and those of quality together.
 
+use super::Choice;
 use pocketsplat_core::{Budget, Bundle, Quality, Residency, Strips};
 
 /// One way to draw a bundle.
@@ -19,6 +20,8 @@ pub struct Setting {
     pub residency: Residency,
     /// Parts of a frame.
     pub strips: Strips,
+    /// What it is computed with.
+    pub arithmetic: Choice,
 }
 
 impl Setting {
@@ -32,6 +35,7 @@ impl Setting {
             pruning_rate: 0.0,
             residency: Residency::Auto,
             strips: Strips::Auto,
+            arithmetic: Choice::Exact,
         }
     }
 
@@ -87,6 +91,10 @@ pub fn knobs(bundle: &Bundle<'_>) -> Vec<Setting> {
     for n_strips in [2, 4, 8] {
         let strips = Strips::Exactly(n_strips);
         all.push(Setting { knob: "strips", name: n_strips.to_string(), strips, ..exact.clone() });
+    }
+    for &arithmetic in Choice::TURNED {
+        let (knob, name) = arithmetic.name();
+        all.push(Setting { knob, name: name.to_owned(), arithmetic, ..exact.clone() });
     }
     all
 }

@@ -1,5 +1,6 @@
 //! The decoder's own renderer, with memory from the heap: what a device would show.
 
+use pocketsplat_core::arithmetic::Arithmetic;
 use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, FrameReport, MaxSplats, Residency, Strips, TileSink};
 
 use crate::camera::Camera;
@@ -46,8 +47,8 @@ pub fn core_image_of_tiers(bundle: &Bundle<'_>, camera: &Camera, tiers: u8) -> R
 ///
 /// # Errors
 /// As [`Decoder::render`].
-pub fn image_of(
-    decoder: &mut Decoder<'_, '_>,
+pub fn image_of<A: Arithmetic>(
+    decoder: &mut Decoder<'_, '_, A>,
     camera: &pocketsplat_core::Camera,
 ) -> Result<(Image, FrameReport), DecodeError> {
     let mut sink = ImageSink::new(camera.width_px, camera.height_px);

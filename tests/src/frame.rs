@@ -2,9 +2,11 @@
 
 use glam::DVec3;
 use pocketsplat::bundle::{self, BundleInfo, WriteOptions};
+use pocketsplat::cost::{Choice, WithArithmetic};
 use pocketsplat::dataset::Normalisation;
 use pocketsplat::render::decoder::core_camera;
 use pocketsplat::scene::Scene;
+use pocketsplat_core::arithmetic::Arithmetic;
 use pocketsplat_core::{
     Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, MaxSplats, Residency, Strips, TileSink,
 };
@@ -83,9 +85,35 @@ pub fn budget_for(camera: &Camera) -> Budget {
 /// # Errors
 /// The decoder's.
 pub fn draw(bundle: &Bundle<'_>, camera: &Camera) -> Result<(Frame, FrameReport), DecodeError> {
+    draw_in(Choice::Exact, bundle, camera)
+}
+
+/// As [`draw`], with another arithmetic.
+///
+/// # Errors
+/// The decoder's.
+pub fn draw_in(choice: Choice, bundle: &Bundle<'_>, camera: &Camera) -> Result<(Frame, FrameReport), DecodeError> {
+    choice.call(Drawing { bundle, camera })
+}
+
+/// The arguments of [`draw_in`].
+struct Drawing<'a, 'b> {
+    bundle: &'a Bundle<'b>,
+    camera: &'a Camera,
+}
+
+impl WithArithmetic for Drawing<'_, '_> {
+    type Output = Result<(Frame, FrameReport), DecodeError>;
+
+    fn call<A: Arithmetic>(self) -> Self::Output {
+        drawn::<A>(self.bundle, self.camera)
+    }
+}
+
+fn drawn<A: Arithmetic>(bundle: &Bundle<'_>, camera: &Camera) -> Result<(Frame, FrameReport), DecodeError> {
     let plan = bundle.plan(&budget_for(camera))?;
     let mut scratch = vec![0; plan.scratch_len()];
     let mut frame = Frame::new(camera.width_px, camera.height_px);
-    let report = Decoder::bind(bundle, plan, &mut scratch)?.render(camera, &mut frame)?;
+    let report = Decoder::bind_in::<A>(bundle, plan, &mut scratch)?.render(camera, &mut frame)?;
     Ok((frame, report))
 }

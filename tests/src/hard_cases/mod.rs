@@ -16,6 +16,7 @@ mod codec;
 mod gathered;
 mod layers;
 mod refusals;
+mod roundings;
 mod scales;
 mod scenes;
 mod splats;
@@ -134,6 +135,7 @@ pub fn families() -> Vec<Family> {
         scenes::family(),
         codec::family(),
         arithmetic::family(),
+        roundings::family(),
         captures::family(),
         training::family(),
         refusals::family(),

@@ -162,7 +162,7 @@ fn distance(found: f64, exact: f64) -> f64 {
 }
 
 /// The largest of the tiles' mean errors, steps of 8 bits.
-fn worst_tile(found: &[u8], exact: &[[f64; 3]], width_px: usize) -> f64 {
+pub(super) fn worst_tile(found: &[u8], exact: &[[f64; 3]], width_px: usize) -> f64 {
     let height_px = exact.len() / width_px;
     let error_at = |x: usize, y: usize| {
         let i = y * width_px + x;

@@ -267,3 +267,81 @@ fn words(floats: &[f32]) -> &[u32] {
 fn words_mut(floats: &mut [f32]) -> &mut [u32] {
     bytemuck::try_cast_slice_mut(floats).unwrap_or_default()
 }
+
+#[cfg(test)]
+mod tests {
+    use std::vec::Vec;
+
+    use super::{Pair, Pair8, Pair16, Quantised, put_row, sums};
+
+    /// A stream of numbers between −1 and 1, the same every time.
+    fn numbers(seed: u32) -> impl FnMut() -> f32 {
+        let mut state = seed;
+        move || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / 8_388_608.0 - 1.0
+        }
+    }
+
+    /// The integers of quantised values, in order.
+    fn integers(values: &Quantised<'_>) -> Vec<i64> {
+        values.pairs.iter().flat_map(|&pair| [i64::from(pair as i16), i64::from((pair >> 16) as i16)]).collect()
+    }
+
+    #[test]
+    fn inputs_are_right_to_half_a_step_and_followed_by_one() {
+        let mut random = numbers(1);
+        for n in 1..70 {
+            for size in [1e-6, 0.5, 1.0, 30.0, 1e9] {
+                let inputs: Vec<f32> = (0..n).map(|_| size * random()).collect();
+                let mut memory = inputs.clone();
+                let values = Quantised::of(&mut memory);
+                let found = integers(&values);
+                let expected = inputs.iter().chain([&1.0]);
+                for (found, expected) in found.iter().zip(expected) {
+                    let error = *found as f64 * f64::from(values.scale) - f64::from(*expected);
+                    assert!(error.abs() <= 0.51 * f64::from(values.scale), "{found} for {expected} of {size}");
+                }
+                assert!(found[n + 1..].iter().all(|&rest| rest == 0), "nothing behind them");
+            }
+        }
+    }
+
+    /// Sums of random rows against f64, and those of the largest values against i64.
+    fn rows_sum_as_they_should<P: Pair>() {
+        let mut random = numbers(2);
+        for n in [1_usize, 2, 3, 16, 33, 257] {
+            // One weight far above the others, all alike, and random ones.
+            for kind in 0..3 {
+                let weights: Vec<f32> = (0..n)
+                    .map(|i| match kind {
+                        0 if i > 0 => 1e-6 * random(),
+                        2 => random(),
+                        _ => -60_000.0,
+                    })
+                    .collect();
+                let n_pairs = n.div_ceil(2);
+                let mut rows = std::vec![[P::zeroed(); 3]; n_pairs];
+                let step = f64::from(put_row(&weights, &mut rows, 1, n_pairs));
+                let steps: Vec<i64> =
+                    (0..2 * n_pairs).map(|i| sums(&rows[i / 2..], &[1_u32 << (16 * (i % 2))])[1].into()).collect();
+                for (found, weight) in steps.iter().zip(&weights) {
+                    let error = *found as f64 * step - f64::from(*weight);
+                    assert!(error.abs() <= 0.51 * step, "{found} steps of {step} for {weight}");
+                }
+                for x in [i16::MAX, -i16::MAX] {
+                    let pair = u32::from(x as u16) * 0x1_0001;
+                    let exact = steps.iter().map(|&step| step * i64::from(x)).sum::<i64>();
+                    assert_eq!(i64::from(sums(&rows, &std::vec![pair; n_pairs])[1]), exact, "{n} weights, kind {kind}");
+                }
+                assert_eq!(sums(&rows, &std::vec![0x7FFF_7FFF; n_pairs])[0], 0, "the other lanes");
+            }
+        }
+    }
+
+    #[test]
+    fn rows_are_right_to_half_a_step_and_never_overflow() {
+        rows_sum_as_they_should::<Pair16>();
+        rows_sum_as_they_should::<Pair8>();
+    }
+}

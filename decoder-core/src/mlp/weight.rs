@@ -80,3 +80,27 @@ impl Weight for StrictHalf {
 fn rounded(x: f32) -> f32 {
     from_half(to_half(x))
 }
+
+#[cfg(test)]
+mod tests {
+    use half::f16;
+
+    use super::{Half, StrictHalf, Weight};
+
+    #[test]
+    fn sums_are_those_of_the_format() {
+        let mut state = 3_u32;
+        let mut random = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / 8_388_608.0 - 1.0
+        };
+        for _ in 0..10_000 {
+            let [sum, weight, x] = [10.0 * random(), random(), 3.0 * random()];
+            let weight_half = f16::from_f32(weight);
+            assert_eq!(Half::keep(weight).added(sum, x), sum + weight_half.to_f32() * x, "products and sums of floats");
+            let product = f16::from_f32(weight_half.to_f32() * f16::from_f32(x).to_f32());
+            let expected = f16::from_f32(sum + product.to_f32()).to_f32();
+            assert_eq!(StrictHalf::keep(weight).added(sum, x), expected, "products and sums of halves");
+        }
+    }
+}

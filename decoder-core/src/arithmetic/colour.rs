@@ -21,9 +21,9 @@ const BAYER: [[u8; 4]; 4] = [[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 
 
 impl Colours for Rgb888 {
     #[inline(always)]
-    fn bytes(colour: [f32; 3], _: usize, _: usize) -> [u8; 3] {
+    fn bytes([red, green, blue]: [f32; 3], _: usize, _: usize) -> [u8; 3] {
         // A float cast saturates: negative becomes 0, and so does NaN; 255.5 and more become 255.
-        colour.map(|c| (c + 0.5) as u8)
+        [(red + 0.5) as u8, (green + 0.5) as u8, (blue + 0.5) as u8]
     }
 }
 

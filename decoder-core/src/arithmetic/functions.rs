@@ -29,7 +29,7 @@ pub(crate) trait Functions {
     }
 }
 
-/// Those of [`math`](crate::math), right to 4·10⁻⁷; the logarithm is libm's.
+/// Those of [`math`], right to 4·10⁻⁷; the logarithm is libm's.
 #[derive(Clone, Copy, Debug)]
 pub struct Precise;
 

@@ -62,7 +62,7 @@ pub struct With<H = F32, F = Precise, R = Ieee, S = Mixed, D = Depth32, C = Rgb8
 pub type Exact = With;
 /// Fewer instructions in every part that floats take, for errors far below a step of 8 bits.
 pub type Quick = With<F32, Polynomial, Fast>;
-/// The same for processors without an FPU, whose heads take a sixth of the time in integers.
+/// The same for processors without an FPU, whose heads take a sixth of the instructions in integers.
 pub type QuickWithoutFpu = With<I16, Polynomial, Fast>;
 
 impl<H, F, R, S, D, C> Choices for With<H, F, R, S, D, C>

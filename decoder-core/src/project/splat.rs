@@ -68,7 +68,7 @@ impl View {
             return None;
         }
         let mean = self.to_image(point);
-        let half_extent = [reach * covariance.xx, reach * covariance.yy].map(A::Roots::sqrt);
+        let half_extent = [A::Roots::sqrt(reach * covariance.xx), A::Roots::sqrt(reach * covariance.yy)];
         let rect = TileRect::covering(mean, half_extent, self.size_px)?;
         let [shear, column_precision] = A::Roots::quotients([covariance.xy, 1.0], covariance.yy);
         let splat = Splat {

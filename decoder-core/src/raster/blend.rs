@@ -184,7 +184,7 @@ fn blend_pixel(pixel: &mut Pixel, gauss: f32, [red, green, blue]: [f32; 3], stop
 #[inline]
 fn finished([r, g, b, transmittance]: Pixel, [back_r, back_g, back_b]: [f32; 3]) -> [f32; 3] {
     let through = transmittance.abs();
-    [r + through * back_r, g + through * back_g, b + through * back_b].map(|c| c * 255.0)
+    [(r + through * back_r) * 255.0, (g + through * back_g) * 255.0, (b + through * back_b) * 255.0]
 }
 
 /// Slack for rounding of a span's ends, pixels; the test of alpha decides about the pixels it adds.

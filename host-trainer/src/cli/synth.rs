@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::Result;
-use pocketsplat::synth::{SynthOptions, write_capture};
+use pocketsplat::synth::{SurfaceFinish, SynthOptions, write_capture};
 
 /// Write a procedural capture: an analytic scene, ray-traced from known cameras, in Blender's format.
 #[derive(clap::Args)]
@@ -22,6 +22,9 @@ pub(crate) struct Args {
     /// Decides the textures and the cameras.
     #[arg(long, default_value_t = SynthOptions::default().seed)]
     seed: u64,
+    /// How the surfaces throw back the light.
+    #[arg(long, value_enum, default_value_t = SynthOptions::default().finish)]
+    surface: SurfaceFinish,
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
@@ -30,6 +33,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         n_train: args.train_views,
         n_test: args.test_views,
         seed: args.seed,
+        finish: args.surface,
         ..SynthOptions::default()
     };
     let report = write_capture(&args.folder, &options)?;

@@ -17,6 +17,18 @@ mod trace;
 use cameras::{CAMERA_ANGLE_X, Pose};
 use scene::Scene;
 
+/// How the scene's surfaces throw back the light.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum SurfaceFinish {
+    /// All matt: a point of a surface has the same colour from everywhere.
+    Matte,
+    /// A narrow highlight on the ball, all else matt.
+    #[default]
+    Mixed,
+    /// Broad highlights on ground and box besides the ball's; only the wires are matt.
+    Glossy,
+}
+
 /// What to ray-trace.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SynthOptions {
@@ -28,13 +40,15 @@ pub struct SynthOptions {
     pub n_test: u32,
     /// Decides the textures' noise and where the cameras' spirals start.
     pub seed: u64,
+    /// How surfaces throw back the light.
+    pub finish: SurfaceFinish,
     /// Rays per pixel along each axis: 4 means 16 rays per pixel.
     pub samples_per_axis: u32,
 }
 
 impl Default for SynthOptions {
     fn default() -> Self {
-        Self { size_px: 128, n_train: 60, n_test: 12, seed: 42, samples_per_axis: 4 }
+        Self { size_px: 128, n_train: 60, n_test: 12, seed: 42, finish: SurfaceFinish::Mixed, samples_per_axis: 4 }
     }
 }
 
@@ -128,7 +142,7 @@ pub fn write_capture(dir: &Path, options: &SynthOptions) -> Result<SynthReport, 
         return Err(SynthError::Occupied { path: dir.to_owned() });
     }
 
-    let scene = Scene::new(options.seed);
+    let scene = Scene::new(options.seed, options.finish);
     let mut alpha_sum = 0.0;
     let splits = [
         ("train", cameras::train(options.n_train, options.seed)),

@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 
+use super::SurfaceFinish;
 use super::surface::{Ray, Surface};
 use super::texture::Texture;
 
@@ -20,31 +21,56 @@ pub(super) struct Scene {
 struct Body {
     surface: Surface,
     texture: Texture,
-    /// Height of the highlight; 0 is matt.
-    gloss: f64,
+    highlight: Highlight,
+}
+
+/// Blinn's lobe around the direction that mirrors the light.
+#[derive(Clone, Copy, Debug)]
+struct Highlight {
+    /// At its middle; 0 is matt.
+    height: f64,
+    /// Blinn's exponent: the lower, the wider.
+    shininess: f64,
 }
 
 const GROUND_Z: f64 = -0.5;
 /// Part of the light that comes from everywhere.
 const AMBIENT: f64 = 0.45;
-/// Blinn's exponent: the highlight is about a fifth of the ball wide.
-const SHININESS: f64 = 40.0;
+const MATT: Highlight = Highlight { height: 0.0, shininess: 1.0 };
+/// About a fifth of the ball wide.
+const ON_BALL: Highlight = Highlight { height: 0.8, shininess: 40.0 };
+/// So wide that a quarter of all cameras see some of it on a plane.
+const SHEEN: Highlight = Highlight { height: 0.6, shininess: 12.0 };
 
 impl Scene {
     /// The scene with the noise of its textures drawn from `seed`.
-    pub(super) fn new(seed: u64) -> Self {
-        let matt = |surface, texture| Body { surface, texture, gloss: 0.0 };
+    pub(super) fn new(seed: u64, finish: SurfaceFinish) -> Self {
+        let (ball, solid) = match finish {
+            SurfaceFinish::Matte => (MATT, MATT),
+            SurfaceFinish::Mixed => (ON_BALL, MATT),
+            SurfaceFinish::Glossy => (ON_BALL, SHEEN),
+        };
+        let matt = |surface, texture| Body { surface, texture, highlight: MATT };
         let wire = Texture::Plain(DVec3::new(0.72, 0.66, 0.52));
         let mut bodies = vec![
-            matt(Surface::Disk { centre: DVec3::new(0.0, 0.0, GROUND_Z), radius: 1.15 }, Texture::Tiles),
-            matt(
-                Surface::Box { centre: DVec3::new(-0.42, 0.25, -0.12), half: DVec3::new(0.3, 0.3, 0.38), yaw: 0.5 },
-                Texture::Stripes,
-            ),
+            Body {
+                surface: Surface::Disk { centre: DVec3::new(0.0, 0.0, GROUND_Z), radius: 1.15 },
+                texture: Texture::Tiles,
+                highlight: solid,
+            },
+            Body {
+                surface: Surface::Box {
+                    centre: DVec3::new(-0.42, 0.25, -0.12),
+                    half: DVec3::new(0.3, 0.3, 0.38),
+                    yaw: 0.5,
+                },
+                texture: Texture::Stripes,
+                highlight: solid,
+            },
             Body {
                 surface: Surface::Sphere { centre: DVec3::new(0.42, -0.22, -0.08), radius: 0.42 },
                 texture: Texture::Dots,
-                gloss: 0.8,
+                highlight: ball,
             },
             matt(Surface::Ring { centre: DVec3::new(0.0, 0.0, 0.1), radius: 1.05, wire_radius: 0.02 }, wire),
         ];
@@ -60,13 +86,14 @@ impl Scene {
     /// The colour a ray sees, each channel in [0, 1], or `None` where it meets nothing.
     ///
     /// Lambert's law plus Blinn's highlight, `ambient + (1 − ambient)·max(0, n·l)` times the texture plus
-    /// `gloss·max(0, n·h)^shininess` (Blinn 1977) with h halfway between light and viewer; no shadows.
+    /// `height·max(0, n·h)^shininess` (Blinn 1977) with h halfway between light and viewer; no shadows.
     pub(super) fn colour(&self, ray: &Ray) -> Option<DVec3> {
         let hits = self.bodies.iter().filter_map(|body| Some((body, body.surface.hit(ray)?)));
         let (body, hit) = hits.min_by(|(_, a), (_, b)| a.t.total_cmp(&b.t))?;
         let diffuse = AMBIENT + (1.0 - AMBIENT) * hit.normal.dot(self.to_light).max(0.0);
         let half_way = (self.to_light - ray.direction).normalize();
-        let highlight = body.gloss * hit.normal.dot(half_way).max(0.0).powf(SHININESS);
+        let Highlight { height, shininess } = body.highlight;
+        let highlight = height * hit.normal.dot(half_way).max(0.0).powf(shininess);
         let colour = body.texture.colour(hit.local, self.seed) * diffuse + DVec3::splat(highlight);
         Some(colour.clamp(DVec3::ZERO, DVec3::ONE))
     }
@@ -82,7 +109,7 @@ mod tests {
 
     #[test]
     fn rays_past_the_scene_meet_nothing() {
-        let scene = Scene::new(1);
+        let scene = Scene::new(1, SurfaceFinish::Mixed);
         for i in 0..64 {
             let (sin, cos) = (TAU * f64::from(i) / 64.0).sin_cos();
             // Straight down outside the cube that initial points fill.
@@ -92,16 +119,27 @@ mod tests {
         }
     }
 
+    /// How far the colours of a point differ, seen from `left` and from the right.
+    fn change(scene: &Scene, point: DVec3, left: DVec3) -> f64 {
+        let right = DVec3::new(3.0, 1.2, 3.0);
+        (colour_from(scene, left, point).expect("met") - colour_from(scene, right, point).expect("met")).length()
+    }
+
     #[test]
-    fn the_ball_changes_with_the_view_and_the_ground_does_not() {
-        let scene = Scene::new(1);
-        let (left, right) = (DVec3::new(0.2, -2.2, 3.0), DVec3::new(3.0, 1.2, 3.0));
-        // The point of the ball that mirrors the light to the left.
-        let centre = DVec3::new(0.42, -0.22, -0.08);
-        let ball = centre + 0.42 * (scene.to_light + (left - centre).normalize()).normalize();
-        let change =
-            |p| (colour_from(&scene, left, p).expect("met") - colour_from(&scene, right, p).expect("met")).length();
-        assert!(change(ball) > 0.1, "highlight: {}", change(ball));
-        assert!(change(DVec3::new(0.1, 0.6, GROUND_Z)) < 1e-9, "ground");
+    fn the_finish_decides_which_surfaces_change_with_the_view() {
+        use SurfaceFinish::{Glossy, Matte, Mixed};
+        for (finish, ball_changes, ground_changes) in
+            [(Matte, false, false), (Mixed, true, false), (Glossy, true, true)]
+        {
+            let scene = Scene::new(1, finish);
+            // The point of the ball that mirrors the light to the left, and a place to which the ground mirrors it.
+            let (left, centre) = (DVec3::new(0.2, -2.2, 3.0), DVec3::new(0.42, -0.22, -0.08));
+            let on_ball = centre + 0.42 * (scene.to_light + (left - centre).normalize()).normalize();
+            let on_ground = DVec3::new(0.1, 0.6, GROUND_Z);
+            let mirrored = on_ground + 3.0 * scene.to_light * DVec3::new(-1.0, -1.0, 1.0);
+            let (ball, ground) = (change(&scene, on_ball, left), change(&scene, on_ground, mirrored));
+            assert!(if ball_changes { ball > 0.1 } else { ball < 1e-9 }, "{finish:?} ball: {ball}");
+            assert!(if ground_changes { ground > 0.1 } else { ground < 1e-9 }, "{finish:?} ground: {ground}");
+        }
     }
 }

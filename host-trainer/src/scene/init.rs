@@ -6,7 +6,7 @@ use glam::DVec3;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::{Anchors, Heads, INITIAL_MASK_LOGIT, ModelShape, Scene};
+use super::{Anchors, Head, Heads, INITIAL_MASK_LOGIT, ModelShape, Scene};
 use crate::dataset::nearest_squared;
 use crate::ops::Real;
 
@@ -52,7 +52,21 @@ pub fn initial_scene(shape: ModelShape, voxel_size: f64, points: &[DVec3], rng: 
         detail.w2.fill(0.0);
         detail.b2.fill(0.0);
     }
+    if shape.head_inputs() == shape.feature_dim {
+        draw_all_at_first(&mut heads.opacity);
+    }
     Scene { shape, voxel_size, anchors, heads, context: None }
+}
+
+/// Turns the biases of an opacity head that sees features alone, all of them 0 at first, so that no opacity begins below 0.
+///
+/// An offset whose opacity is below 0 is not drawn and learns nothing; where the view counts, another view may draw it.
+fn draw_all_at_first(opacity: &mut Head<f32>) {
+    let rows = opacity.w2.chunks_exact(opacity.n_hidden).zip(&mut opacity.b2);
+    for (row, bias) in rows {
+        let hidden: f32 = row.iter().zip(&opacity.b1).map(|(w, b)| w * b.max(0.0)).sum();
+        *bias = (hidden + *bias).abs() - hidden;
+    }
 }
 
 /// The lattice cell nearest to a point, ties to even.
@@ -92,6 +106,19 @@ mod tests {
             assert!((found - expected).abs() < 1e-12, "point {i}: {found} against {expected}");
         }
         assert_eq!(mean_squared_spacing(&[DVec3::ONE]).collect::<Vec<_>>(), [0.0]);
+    }
+
+    #[test]
+    fn without_view_inputs_every_offset_begins_drawn() {
+        let plain = ModelShape::plain(8, 10);
+        for seed in 0..20 {
+            let Head { n_hidden, w2, b1, b2, .. } =
+                initial_scene(plain, 0.1, &[DVec3::ZERO], &mut ChaCha8Rng::seed_from_u64(seed)).heads.opacity;
+            for (row, bias) in w2.chunks_exact(n_hidden).zip(&b2) {
+                let logit: f32 = row.iter().zip(&b1).map(|(w, b)| w * b.max(0.0)).sum::<f32>() + bias;
+                assert!(logit > 0.0, "seed {seed}: {logit}");
+            }
+        }
     }
 
     #[test]

@@ -8,6 +8,7 @@ pub mod camera;
 pub mod cost;
 pub mod dataset;
 pub mod device;
+pub mod effects;
 pub mod instructions;
 pub mod metrics;
 pub mod ops;

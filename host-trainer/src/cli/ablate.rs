@@ -101,6 +101,7 @@ impl Args {
         if !base.train.modules.attached().is_empty() {
             bail!("the rows of an ablation attach the modules; leave --modules and --prune out");
         }
+        point::check_effects(&base)?;
         point::check_distinct(&self.lambdas)?;
         Ok(base)
     }

@@ -6,6 +6,7 @@ mod capture;
 mod cost;
 mod demo;
 mod doctor;
+mod effects;
 mod encode;
 mod eval;
 mod fit;

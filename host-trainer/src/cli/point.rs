@@ -34,6 +34,16 @@ pub(super) fn base(config: RunConfig, dataset: Option<&Path>, folder: &Path) -> 
     Ok(RunConfig { dataset, output: absolute(folder)?, ..config })
 }
 
+/// Refuses effects that are still to be measured: points compare only if they have the same.
+pub(super) fn check_effects(config: &RunConfig) -> Result<()> {
+    if config.effects.auto {
+        bail!(
+            "runs that are compared need the same effects; force them, as --effects +view-direction, and leave auto to train"
+        );
+    }
+    Ok(())
+}
+
 /// Refuses a weight that is named twice: each point has a file of its own.
 pub(super) fn check_distinct(lambdas: &[f64]) -> Result<()> {
     for (i, lambda) in lambdas.iter().enumerate() {

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
 use super::capture::CaptureOptions;
+use super::effects::EffectsConfig;
 use super::encode::Encoding;
 
 /// Everything a run was asked for.
@@ -26,6 +27,7 @@ pub(crate) struct RunConfig {
     pub(crate) capture: CaptureOptions,
     pub(crate) train: TrainConfig,
     pub(crate) encoding: Encoding,
+    pub(crate) effects: EffectsConfig,
 }
 
 impl Default for RunConfig {
@@ -38,6 +40,7 @@ impl Default for RunConfig {
             capture: CaptureOptions { background: Some(Background::Black), ..CaptureOptions::default() },
             train: TrainConfig::default(),
             encoding: Encoding::default(),
+            effects: EffectsConfig::default(),
         }
     }
 }

@@ -4,6 +4,7 @@ use anyhow::{Result, bail};
 use clap::ArgAction;
 use pocketsplat::bundle::{Coder, QuantisationSteps};
 use pocketsplat::device::Choice;
+use pocketsplat::effects::{Effect, Request};
 use pocketsplat::train::TrainConfig;
 use pocketsplat::train::config::Backbone;
 use pocketsplat::train::module::{Modules, Pruning, pruning};
@@ -38,6 +39,11 @@ pub(crate) struct Settings {
     feature_dim: Option<usize>,
     #[arg(long, value_name = "K", help = with_default("Gaussians of an anchor", TrainConfig::default().shape.n_offsets))]
     offsets: Option<usize>,
+    /// What the scene takes into account, of view-direction, view-distance, dilation-compensation and detail: auto trains short
+    /// pilots and keeps what pays; none, all, +NAME and -NAME in a list force. [default: auto for train without --config,
+    /// view-direction elsewhere]
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    effects: Option<Request>,
     /// Do not show the heads the direction of view.
     #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true",
         action = ArgAction::Set)]
@@ -110,7 +116,7 @@ impl Settings {
     /// `config` with everything replaced that the command line says.
     ///
     /// # Errors
-    /// A module or a key that there is not.
+    /// A module or a key that there is not; effects that two options say different things about.
     pub(crate) fn applied_to(&self, mut config: RunConfig) -> Result<RunConfig> {
         fn set<T: Clone>(into: &mut T, given: &Option<T>) {
             if let Some(value) = given {
@@ -143,6 +149,7 @@ impl Settings {
         if !self.set.is_empty() {
             config = config.with_keys(&self.set)?;
         }
+        self.decide_effects(&mut config)?;
         // As a run keeps it: the same options again are no other setting.
         config.train.shape = config.train.modules.shape(config.train.shape);
         Ok(config)
@@ -171,6 +178,43 @@ impl Settings {
             train.modules.pruning.get_or_insert_with(Pruning::tiered);
         }
         config
+    }
+
+    /// Whether an option other than `--effects` decides about an effect.
+    fn decides(&self, effect: Effect) -> bool {
+        let by_option = match effect {
+            Effect::ViewDirection => self.no_view_direction.is_some(),
+            Effect::ViewDistance => self.view_distance.is_some(),
+            Effect::DilationCompensation => self.dilation_compensation.is_some(),
+            Effect::Detail => self.modules.iter().flatten().any(|name| name == effect.name() || name == "none"),
+        };
+        by_option || self.set.iter().any(|key| key.trim_start().starts_with(effect.key()))
+    }
+
+    fn decide_effects(&self, config: &mut RunConfig) -> Result<()> {
+        let decided = Effect::ALL.into_iter().find(|effect| self.decides(*effect));
+        config.effects.auto &= self.effects.is_none() && decided.is_none();
+        match (&self.effects, decided) {
+            (None, _) => {}
+            (Some(Request::Auto), Some(effect)) => {
+                bail!(
+                    "--effects auto measures every effect, and another option decides about {effect}; leave one of them out"
+                )
+            }
+            (Some(Request::Auto), None) => config.effects.auto = true,
+            (Some(Request::Forced(list)), _) => {
+                for (effect, on) in list {
+                    if self.decides(*effect) && effect.is_in(&config.train) != *on {
+                        let word = if *on { "with" } else { "without" };
+                        bail!(
+                            "--effects asks for a scene {word} {effect}, and another option for the opposite; leave one of them out"
+                        );
+                    }
+                    effect.set(&mut config.train, *on);
+                }
+            }
+        }
+        Ok(())
     }
 
     fn attach_modules(&self, train: &mut TrainConfig) -> Result<()> {

@@ -77,6 +77,7 @@ impl Args {
         };
         let base = point::base(base, self.dataset.as_deref(), &self.output)?;
         let base = self.settings.applied_to(base)?;
+        point::check_effects(&base)?;
         if base.train.backbone != Backbone::Hac {
             bail!(
                 "a sweep varies the weight of the bits, and they have none in this configuration; use --backbone hac"

@@ -8,6 +8,7 @@ use anyhow::{Context, Result, bail};
 use pocketsplat::bundle::Written;
 use pocketsplat::dataset::{Background, Capture, View};
 use pocketsplat::device::Fitted;
+use pocketsplat::effects::Effect;
 use pocketsplat::train::finish::Finished;
 use pocketsplat::train::run::{Ending, Interval, RunError, RunFolder};
 use pocketsplat::train::{TrainConfig, Trainer};
@@ -20,7 +21,7 @@ use super::encode::{Encoding, largest_px};
 use super::progress::Progress;
 use super::run_config::RunConfig;
 use super::train_args::Args;
-use super::{output, stop};
+use super::{effects, output, stop};
 
 /// Seconds between checkpoints unless the user says otherwise: what an accident may cost.
 const CHECKPOINT_SECONDS: f64 = 60.0;
@@ -45,10 +46,11 @@ pub(crate) struct TrainResult {
     pub(crate) train_s: f64,
     pub(crate) iterations_per_s: f64,
     pub(crate) background: String,
+    pub(crate) effects: String,
 }
 
 pub(crate) fn run(args: &Args) -> Result<ExitCode> {
-    let (config, capture, folder) = match args.resume() {
+    let (mut config, capture, folder) = match args.resume() {
         Some(path) => {
             let folder = RunFolder::reopen(path)?;
             let begun = RunConfig::parse(&folder.config()?);
@@ -57,6 +59,8 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
             if let Some(difference) = begun.difference(&config)? {
                 bail!("the run began with another setting than the command line asks for: {difference}; leave it out");
             }
+            // What was chosen stays; what an accident kept from being chosen is measured now.
+            config.effects = begun.effects;
             output::check_writable(&config.output)?;
             let capture = load(&mut config)?;
             (config, capture, folder)
@@ -70,6 +74,7 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
             (config, capture, folder)
         }
     };
+    effects::resolve(&mut config, &capture, folder.path())?;
     // Not before: until here there is nothing to keep, and Ctrl-C may end the process at once.
     let stop = stop::flag()?;
     match train_in(folder, &config, &capture, args.resume().is_some(), &stop)? {
@@ -203,5 +208,6 @@ fn write_bundle(
         train_s: trainer.seconds,
         iterations_per_s: f64::from(trainer.iteration) / trainer.seconds,
         background: background.to_string(),
+        effects: Effect::names(&Effect::all_in(trainer.config())),
     })
 }

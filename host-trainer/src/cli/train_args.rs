@@ -7,6 +7,7 @@ use bytesize::ByteSize;
 use pocketsplat::device::{Choice, Limits, Target, choose};
 use pocketsplat::train::config::Hac;
 
+use super::effects::EffectsConfig;
 use super::run_config::RunConfig;
 use super::settings::{Settings, with_default};
 
@@ -91,7 +92,10 @@ impl Args {
     pub(crate) fn resolved(&self) -> Result<RunConfig> {
         let base = match &self.config {
             Some(path) => RunConfig::read(path)?,
-            None => RunConfig::default(),
+            None => {
+                let effects = EffectsConfig { auto: true, ..EffectsConfig::default() };
+                RunConfig { effects, ..RunConfig::default() }
+            }
         };
         let mut config = self.applied_to(base)?;
         let limits = self.device.limits();
@@ -131,6 +135,7 @@ impl Args {
         if !limits.is_none() {
             config.encoding.limits = limits;
         }
+        config.effects.target = self.device.target.or(config.effects.target);
         if let Some(lambda) = self.lambda {
             config.train.hac.lambda = lambda;
         }

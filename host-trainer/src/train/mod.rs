@@ -15,7 +15,7 @@ pub mod statistics;
 pub mod step;
 pub mod survey;
 #[cfg(test)]
-mod test_capture;
+pub(crate) mod test_capture;
 pub mod watchdog;
 
 use std::time::Instant;

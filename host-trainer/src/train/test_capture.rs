@@ -8,10 +8,15 @@ use crate::camera::Camera;
 use crate::dataset::{Capture, EXTENT, Image, Normalisation, PointsOrigin, View};
 use crate::scene::ModelShape;
 
-pub(super) const SIZE_PX: u32 = 24;
+pub(crate) const SIZE_PX: u32 = 24;
 
 /// Five cameras around coloured discs.
-pub(super) fn tiny_capture() -> Capture {
+pub(crate) fn tiny_capture() -> Capture {
+    many_views(5)
+}
+
+/// As [`tiny_capture`], with more cameras.
+pub(crate) fn many_views(n: u32) -> Capture {
     let view = |i: u32| {
         let angle = f64::from(i) * 1.1;
         let rotation = DMat3::from_rotation_y(angle);
@@ -26,7 +31,7 @@ pub(super) fn tiny_capture() -> Capture {
         let rgb = (0..SIZE_PX * SIZE_PX)
             .flat_map(|p| {
                 let (x, y) = (p % SIZE_PX, p / SIZE_PX);
-                let inside = (x.abs_diff(12 + i)).pow(2) + y.abs_diff(12).pow(2) < 60;
+                let inside = (x.abs_diff(12 + i % 5)).pow(2) + y.abs_diff(12).pow(2) < 60;
                 let level = |c: u32| u8::try_from(40 + (x * 7 + y * 3 + c * 50 + i * 11) % 200).unwrap();
                 if inside { [level(0), level(1), level(2)] } else { [0; 3] }
             })
@@ -43,7 +48,7 @@ pub(super) fn tiny_capture() -> Capture {
         DVec3::new((t * 0.73).sin(), (t * 1.37).sin(), (t * 2.11).sin()) * 0.8
     });
     Capture {
-        train: (0..5).map(view).collect(),
+        train: (0..n).map(view).collect(),
         test: Vec::new(),
         points: points.collect(),
         points_origin: PointsOrigin::Random,
@@ -54,7 +59,7 @@ pub(super) fn tiny_capture() -> Capture {
 }
 
 /// `iterations` steps, with growth and pruning every seventh of them.
-pub(super) fn tiny_config(iterations: u32) -> TrainConfig {
+pub(crate) fn tiny_config(iterations: u32) -> TrainConfig {
     TrainConfig {
         shape: ModelShape { feature_dim: 8, n_offsets: 4, ..TrainConfig::default().shape },
         iterations,
@@ -73,6 +78,6 @@ pub(super) fn tiny_config(iterations: u32) -> TrainConfig {
 }
 
 /// The same with the rate of HAC.
-pub(super) fn tiny_hac_config(iterations: u32) -> TrainConfig {
+pub(crate) fn tiny_hac_config(iterations: u32) -> TrainConfig {
     TrainConfig { backbone: Backbone::Hac, ..tiny_config(iterations) }
 }

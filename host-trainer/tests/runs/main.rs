@@ -4,6 +4,7 @@
 mod accidents;
 mod configuration;
 mod device;
+mod effects;
 mod fixture;
 mod interruption;
 mod modules;

@@ -3,6 +3,7 @@
 //! | file | what |
 //! |---|---|
 //! | `config.toml` | the resolved configuration |
+//! | `effects.csv` | what each effect was worth in pilots, where they were measured |
 //! | `progress.csv` | loss and PSNR over the run, see [`ProgressLog`] |
 //! | `iteration-00001500.checkpoint` | the state of the run, see [`super::checkpoint`]; the last two are kept |
 //! | `result.json` | what the finished run reports; with it, the run is over |
@@ -29,6 +30,7 @@ use super::{Observer, Trainer};
 
 const CONFIG: &str = "config.toml";
 const LOG: &str = "progress.csv";
+const EFFECTS: &str = "effects.csv";
 const RESULT: &str = "result.json";
 const LOCK: &str = "lock";
 
@@ -80,7 +82,7 @@ impl RunFolder {
             return Err(RunError::Unfinished { path: path.to_owned() });
         }
         folder.clear_checkpoints()?;
-        for name in [RESULT, LOG] {
+        for name in [RESULT, LOG, EFFECTS] {
             files::remove(&path.join(name))?;
         }
         folder.write_config(config)?;

@@ -1,0 +1,134 @@
+//! Which effects a scene is worth having: named, forced by the command line, or measured and weighed.
+//!
+//! [`measure`] trains short pilots of a capture, without effects and with each, and draws training views that the pilots did not
+//! see with the decoder; [`Price`] says what an effect's bytes and instructions cost in dB, and [`choose`] takes what gains most
+//! beyond that.
+
+mod pilot;
+mod price;
+mod request;
+
+use std::fmt;
+
+pub use pilot::{Drawing, LEAST_ITERATIONS, PilotCapture, Trial, Trials, measure};
+pub use price::{Price, Worth, choose};
+pub use request::{NoRequest, Request};
+
+use crate::train::TrainConfig;
+use crate::train::module::Detail;
+
+/// Something that a scene may take into account; a scene without it has no part for it, and its decoder does no work for it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Effect {
+    /// The heads see the unit vector from the camera to the anchor.
+    ViewDirection,
+    /// The heads see the distance from the camera to the anchor.
+    ViewDistance,
+    /// Opacities are compensated for the 0.3 px² dilation.
+    DilationCompensation,
+    /// The detail module's head adds to colours.
+    Detail,
+}
+
+impl Effect {
+    /// All there are, in the order in which they are measured and named.
+    pub const ALL: [Self; 4] = [Self::ViewDirection, Self::ViewDistance, Self::DilationCompensation, Self::Detail];
+
+    /// Those that are measured: at one size of the image dilation compensation shows nothing of what it is for.
+    pub const MEASURED: [Self; 3] = [Self::ViewDirection, Self::ViewDistance, Self::Detail];
+
+    /// Its name on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::ViewDirection => "view-direction",
+            Self::ViewDistance => "view-distance",
+            Self::DilationCompensation => "dilation-compensation",
+            Self::Detail => "detail",
+        }
+    }
+
+    /// The key of a configuration that decides about it, or the start of such keys.
+    pub const fn key(self) -> &'static str {
+        match self {
+            Self::ViewDirection => "train.shape.view_direction",
+            Self::ViewDistance => "train.shape.view_distance",
+            Self::DilationCompensation => "train.shape.dilation_compensation",
+            Self::Detail => "train.modules.detail",
+        }
+    }
+
+    /// Whether a run has it.
+    pub fn is_in(self, config: &TrainConfig) -> bool {
+        match self {
+            Self::ViewDirection => config.shape.view_direction,
+            Self::ViewDistance => config.shape.view_distance,
+            Self::DilationCompensation => config.shape.dilation_compensation,
+            Self::Detail => config.modules.detail.is_some(),
+        }
+    }
+
+    /// Gives it to a run, or takes it; settings that a module has are kept.
+    pub fn set(self, config: &mut TrainConfig, on: bool) {
+        match self {
+            Self::ViewDirection => config.shape.view_direction = on,
+            Self::ViewDistance => config.shape.view_distance = on,
+            Self::DilationCompensation => config.shape.dilation_compensation = on,
+            Self::Detail if on => {
+                let Detail { hidden, .. } = *config.modules.detail.get_or_insert_default();
+                config.shape.detail_hidden = hidden;
+            }
+            Self::Detail => {
+                config.modules.detail = None;
+                config.shape.detail_hidden = 0;
+            }
+        }
+    }
+
+    /// Those of [`Self::MEASURED`] that a run has.
+    pub fn measured_in(config: &TrainConfig) -> Vec<Self> {
+        Self::MEASURED.into_iter().filter(|effect| effect.is_in(config)).collect()
+    }
+
+    /// `config` with these of [`Self::MEASURED`] and no other; what is not measured stays.
+    pub fn measured_only(effects: &[Self], config: &TrainConfig) -> TrainConfig {
+        let mut config = *config;
+        Self::MEASURED.into_iter().for_each(|effect| effect.set(&mut config, effects.contains(&effect)));
+        config
+    }
+
+    /// Those that a run has.
+    pub fn all_in(config: &TrainConfig) -> Vec<Self> {
+        Self::ALL.into_iter().filter(|effect| effect.is_in(config)).collect()
+    }
+
+    /// Names of several, joined; `none` for none.
+    pub fn names(effects: &[Self]) -> String {
+        if effects.is_empty() {
+            return "none".to_owned();
+        }
+        effects.iter().map(|effect| effect.name()).collect::<Vec<_>>().join(" + ")
+    }
+}
+
+impl fmt::Display for Effect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_has_the_effects_it_is_given_and_a_shape_to_match() {
+        let given = TrainConfig::default();
+        for bits in 0..8 {
+            let wanted: Vec<Effect> = (0..3).filter(|i| bits >> i & 1 == 1).map(|i| Effect::MEASURED[i]).collect();
+            let config = Effect::measured_only(&wanted, &given);
+            assert_eq!((Effect::measured_in(&config), Effect::all_in(&config)), (wanted.clone(), wanted));
+            assert_eq!(config.modules.shape(config.shape), config.shape);
+            assert_eq!(Effect::measured_only(&Effect::measured_in(&given), &config), given, "nothing else changes");
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! What an effect costs, in dB, and whether it is worth that.
+
+use serde::{Deserialize, Serialize};
+
+/// What a scene is worth and takes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Worth {
+    /// PSNR over views that were not trained on, dB.
+    pub psnr_db: f64,
+    /// Instructions of a frame on the target, predicted, mean over those views.
+    pub instructions: f64,
+    /// Bytes of the bundle.
+    pub bytes: usize,
+}
+
+impl Worth {
+    pub(super) fn mean_with(&self, other: &Self) -> Self {
+        Self {
+            psnr_db: self.psnr_db.midpoint(other.psnr_db),
+            instructions: self.instructions.midpoint(other.instructions),
+            bytes: self.bytes.midpoint(other.bytes),
+        }
+    }
+}
+
+/// What effects have to gain.
+///
+/// 0.05 dB is what a reader of a table takes for a difference; on the curves that λ moves runs along, 0.1 dB is worth about 4 % of
+/// the bytes (`docs/modules.md`), so a tenth of them for 0.05 dB is a low price.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Price {
+    /// For each effect, dB; all of them together at least what chance gains.
+    pub effect_db: f64,
+    /// For each 10 % more instructions of a frame, dB.
+    pub instructions_db: f64,
+    /// For each 10 % more bytes, dB.
+    pub bytes_db: f64,
+}
+
+impl Default for Price {
+    fn default() -> Self {
+        Self { effect_db: 0.05, instructions_db: 0.05, bytes_db: 0.05 }
+    }
+}
+
+impl Price {
+    /// What `with`, a scene with `n_effects`, has to gain over `without`, a scene without any, dB:
+    /// `max(effect_db · n, chance_db) + instructions_db · 10·(I/I₀ − 1) + bytes_db · 10·(B/B₀ − 1)`.
+    ///
+    /// Less than nothing where it saves more than its effects cost. * `chance_db`: by how much scenes differ that differ in nothing
+    /// but their seeds.
+    pub fn of(&self, n_effects: usize, with: &Worth, without: &Worth, chance_db: f64) -> f64 {
+        let tenths_more = |with: f64, without: f64| 10.0 * (with / without - 1.0);
+        (self.effect_db * n_effects as f64).max(chance_db)
+            + self.instructions_db * tenths_more(with.instructions, without.instructions)
+            + self.bytes_db * tenths_more(with.bytes as f64, without.bytes as f64)
+    }
+}
+
+/// The index of the trial whose gain is furthest above its price; 0, the one without effects, where none gains more than its price.
+///
+/// * `trials`: number of effects and worth of each; the first is without. * `chance_db`: as in [`Price::of`].
+pub fn choose(price: &Price, trials: &[(usize, Worth)], chance_db: f64) -> usize {
+    let Some((_, without)) = trials.first() else { return 0 };
+    let left = |(n, with): &(usize, Worth)| {
+        let gain_db = with.psnr_db - without.psnr_db;
+        if gain_db > 0.0 { gain_db - price.of(*n, with, without, chance_db) } else { f64::NEG_INFINITY }
+    };
+    let best = trials.iter().enumerate().skip(1).fold((0, 0.0), |(best, most), (i, trial)| {
+        let left = left(trial);
+        if left > most { (i, left) } else { (best, most) }
+    });
+    best.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NONE: (usize, Worth) = (0, Worth { psnr_db: 30.0, instructions: 50e6, bytes: 100_000 });
+
+    fn trial(n: usize, gain_db: f64, instructions: f64, bytes: usize) -> (usize, Worth) {
+        (n, Worth { psnr_db: 30.0 + gain_db, instructions, bytes })
+    }
+
+    #[test]
+    fn a_price_is_what_effects_instructions_and_bytes_cost_together() {
+        let price = Price { effect_db: 0.05, instructions_db: 0.04, bytes_db: 0.03 };
+        let (n, with) = trial(2, 0.0, 60e6, 110_000);
+        assert!((price.of(n, &with, &NONE.1, 0.0) - (0.10 + 0.08 + 0.03)).abs() < 1e-12);
+        assert!((price.of(n, &with, &NONE.1, 0.3) - (0.30 + 0.08 + 0.03)).abs() < 1e-12, "chance");
+    }
+
+    #[test]
+    fn what_gains_no_more_than_its_price_is_left_out() {
+        let choose = |trials: &[(usize, Worth)], chance_db| choose(&Price::default(), trials, chance_db);
+        assert_eq!(choose(&[NONE], 0.0), 0);
+        assert_eq!(choose(&[NONE, trial(1, 0.049, 50e6, 100_000)], 0.0), 0, "the effect itself");
+        assert_eq!(choose(&[NONE, trial(1, 0.051, 50e6, 100_000)], 0.0), 1);
+        assert_eq!(choose(&[NONE, trial(1, 0.051, 50e6, 100_000)], 0.1), 0, "no more than chance");
+        assert_eq!(choose(&[NONE, trial(1, 0.29, 100e6, 100_000)], 0.0), 0, "twice the instructions");
+        assert_eq!(choose(&[NONE, trial(1, 0.09, 50e6, 110_000)], 0.0), 0, "a tenth more bytes");
+        assert_eq!(choose(&[NONE, trial(1, -0.1, 10e6, 10_000)], 0.0), 0, "a worse picture never pays");
+    }
+
+    #[test]
+    fn of_those_that_pay_the_one_that_leaves_most_is_kept() {
+        let choose = |trials: &[(usize, Worth)]| choose(&Price::default(), trials, 0.0);
+        let alone = [trial(1, 0.2, 55e6, 100_000), trial(1, 0.4, 55e6, 100_000)];
+        assert_eq!(choose(&[NONE, alone[0], alone[1], trial(2, 0.44, 56e6, 100_000)]), 2);
+        assert_eq!(choose(&[NONE, alone[0], alone[1], trial(2, 0.6, 56e6, 100_000)]), 3);
+        assert_eq!(choose(&[NONE, alone[1], alone[1]]), 1, "of equal ones the first");
+    }
+}

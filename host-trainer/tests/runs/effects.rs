@@ -1,0 +1,91 @@
+//! Effects: forced, contradicted, measured, and kept with the run.
+
+use std::fs;
+use std::path::PathBuf;
+use std::process::Command;
+
+use pocketsplat_core::Bundle;
+use pocketsplat_core::bundle::Effects;
+
+use crate::fixture::{capture, fails, folder, pocketsplat, succeeds, train};
+
+fn effects_of(bundle: &PathBuf) -> Effects {
+    let bytes = fs::read(bundle).unwrap();
+    Bundle::parse(&bytes).unwrap().header().features.effects
+}
+
+#[test]
+fn forced_effects_are_those_of_the_bundle() {
+    let home = folder("forced-effects");
+    let output = home.join("a.psb");
+    succeeds(train(&output).args(["--effects", "+detail,-view-direction,+view-distance"]));
+    let expected = Effects { detail: true, view_distance: true, ..Effects::default() };
+    assert_eq!(effects_of(&output), expected);
+    succeeds(train(&output).args(["--effects", "-view-direction"]));
+    assert_eq!(effects_of(&output), Effects::default());
+}
+
+#[test]
+fn options_that_contradict_each_other_are_refused() {
+    let output = folder("contradictions").join("a.psb");
+    let with = |options: &[&str]| fails(train(&output).args(options));
+    for (options, part) in [
+        (
+            &["--effects", "+view-direction", "--no-view-direction"][..],
+            "a scene with view-direction, and another option",
+        ),
+        (&["--effects", "-detail", "--modules", "detail"], "a scene without detail, and another option"),
+        (&["--effects", "none", "--set", "train.shape.view_distance=true"], "without view-distance, and another"),
+        (&["--effects", "auto", "--view-distance"], "another option decides about view-distance"),
+    ] {
+        let said = with(options);
+        assert!(said.contains(part), "{options:?}: {said}");
+    }
+    assert!(!output.exists() && !output.with_extension("run").exists(), "before anything was done");
+    let agreeing = ["--effects", "+detail,-view-direction", "--modules", "detail", "--no-view-direction"];
+    succeeds(train(&output).args(agreeing));
+    let mut sweep = pocketsplat();
+    sweep.arg("sweep").arg(capture()).arg("-o").arg(output.with_extension("sweep"));
+    let said = fails(sweep.args(["--lambda", "0.004", "--effects", "auto"]));
+    assert!(said.contains("need the same effects"), "{said}");
+}
+
+#[test]
+fn a_run_too_short_to_measure_keeps_its_effects_and_says_so() {
+    let output = folder("short-effects").join("a.psb");
+    let said = succeeds(&mut train(&output));
+    assert!(said.contains("effects: view-direction; a run needs 2000 iterations"), "{said}");
+    let said = succeeds(train(&output).args(["--set", "effects.least_iterations=1"]));
+    assert!(said.contains("effects: view-direction; the capture has too few training views"), "{said}");
+    let said = succeeds(train(&output).args(["--effects", "view-direction"]));
+    assert!(!said.contains("effects:"), "{said}");
+}
+
+#[test]
+fn effects_are_measured_once_and_stay_with_the_run() {
+    let home = folder("measured-effects");
+    let views = home.join("capture");
+    succeeds(pocketsplat().arg("synth").arg(&views).args(["--size", "24", "--train-views", "13", "--test-views", "2"]));
+    let run = |name: &str| -> (PathBuf, Command) {
+        let output = home.join(name);
+        let mut command = pocketsplat();
+        command.arg("train").arg("-o").arg(&output);
+        (output, command)
+    };
+    let (output, mut command) = run("a.psb");
+    command.arg(&views).args(["--iterations", "80", "--feature-dim", "8", "--offsets", "3"]);
+    // So dear that nothing pays, whatever it is worth.
+    command.args(["--set", "effects.least_iterations=80", "--set", "effects.price.effect_db=1000"]);
+    let said = succeeds(&mut command);
+    assert!(said.contains("effects: pilot with detail") && said.contains("effects: none, measured in"), "{said}");
+    assert_eq!(effects_of(&output), Effects::default());
+    let kept = home.join("a.run");
+    let table = fs::read_to_string(kept.join("effects.csv")).unwrap();
+    assert!(table.lines().count() >= 5 && table.lines().filter(|line| line.ends_with("true")).count() == 1, "{table}");
+    let config = fs::read_to_string(kept.join("config.toml")).unwrap();
+    assert!(config.contains("auto = false") && config.contains("view_direction = false"), "{config}");
+    let (again, mut command) = run("b.psb");
+    let said = succeeds(command.arg("--config").arg(kept.join("config.toml")));
+    assert!(!said.contains("effects:"), "nothing is measured again: {said}");
+    assert!(fs::read(output).unwrap() == fs::read(again).unwrap());
+}

@@ -21,7 +21,8 @@ impl Observer for AnchorCounts {
 
 fn small_capture() -> Capture {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let options = SynthOptions { size_px: 40, n_train: 8, n_test: 1, seed: 1, samples_per_axis: 2 };
+    let options =
+        SynthOptions { size_px: 40, n_train: 8, n_test: 1, seed: 1, samples_per_axis: 2, ..SynthOptions::default() };
     write_capture(folder.path(), &options).expect("the capture is written");
     load(folder.path(), &LoadOptions::default()).expect("the capture loads").0
 }

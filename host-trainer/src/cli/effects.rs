@@ -129,5 +129,5 @@ fn table(trials: &Trials, target: Target) -> String {
             trial.worth.bytes,
         );
     }
-    text + &format!("  a seed alone changes {:.3} dB\n", trials.chance_db)
+    text + &format!("  up to {:.3} dB may be chance\n", trials.chance_db)
 }

@@ -22,6 +22,11 @@ pub const LEAST_ITERATIONS: u32 = 2_000;
 /// At half the resolution and for the image alone an iteration takes about a quarter of one of the run's with `hac`, so the six or
 /// seven pilots take less than a quarter of its time.
 const PILOT_SHARE: f64 = 0.125;
+/// So many times the difference of two seeds is taken for chance.
+///
+/// Of three numbers of one normal distribution the third is above the mean of the first two by more than twice their difference about
+/// once in eight times: (c − (a + b)/2) / |a − b| is √(3/4) times a Cauchy variable.
+const CHANCE: f64 = 2.0;
 /// Of so many training views one is held out to measure with.
 const HOLD_OUT_EVERY: usize = 8;
 
@@ -78,7 +83,7 @@ pub struct Drawing {
 /// What pilots came to.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trials {
-    /// By how much the two pilots without effects differ that differ in their seeds, dB.
+    /// What may be chance: twice the difference of the two pilots without effects, which differ in their seeds, dB.
     pub chance_db: f64,
     /// Each pilot; the first is the mean of those two.
     pub each: Vec<Trial>,
@@ -126,7 +131,7 @@ pub fn measure<E: From<TrainError> + From<DecodeError>>(
         Ok(worth(&bytes, capture, drawing)?)
     };
     let (one, other) = (worth_of(&[], config)?, worth_of(&[], &TrainConfig { seed: config.seed ^ 1, ..*config })?);
-    let (without, chance_db) = (one.mean_with(&other), (one.psnr_db - other.psnr_db).abs());
+    let (without, chance_db) = (one.mean_with(&other), CHANCE * (one.psnr_db - other.psnr_db).abs());
     let mut all = vec![(Vec::new(), without)];
     for effect in Effect::MEASURED {
         all.push((vec![effect], worth_of(&[effect], config)?));

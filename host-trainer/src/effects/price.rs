@@ -48,8 +48,8 @@ impl Price {
     /// What `with`, a scene with `n_effects`, has to gain over `without`, a scene without any, dB:
     /// `max(effect_db · n, chance_db) + instructions_db · 10·(I/I₀ − 1) + bytes_db · 10·(B/B₀ − 1)`.
     ///
-    /// Less than nothing where it saves more than its effects cost. * `chance_db`: by how much scenes differ that differ in nothing
-    /// but their seeds.
+    /// Less than nothing where it saves more than its effects cost. * `chance_db`: what scenes gain that differ in nothing but their
+    /// seeds.
     pub fn of(&self, n_effects: usize, with: &Worth, without: &Worth, chance_db: f64) -> f64 {
         let tenths_more = |with: f64, without: f64| 10.0 * (with / without - 1.0);
         (self.effect_db * n_effects as f64).max(chance_db)

@@ -40,8 +40,7 @@ pub(crate) struct Settings {
     #[arg(long, value_name = "K", help = with_default("Gaussians of an anchor", TrainConfig::default().shape.n_offsets))]
     offsets: Option<usize>,
     /// What the scene takes into account, of view-direction, view-distance, dilation-compensation and detail: auto trains short
-    /// pilots and keeps what pays; none, all, +NAME and -NAME in a list force. [default: auto for train without --config,
-    /// view-direction elsewhere]
+    /// pilots and keeps what pays; none, all, +NAME and -NAME in a list force. [default: view-direction]
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     effects: Option<Request>,
     /// Do not show the heads the direction of view.

@@ -7,7 +7,6 @@ use bytesize::ByteSize;
 use pocketsplat::device::{Choice, Limits, Target, choose};
 use pocketsplat::train::config::Hac;
 
-use super::effects::EffectsConfig;
 use super::run_config::RunConfig;
 use super::settings::{Settings, with_default};
 
@@ -92,10 +91,7 @@ impl Args {
     pub(crate) fn resolved(&self) -> Result<RunConfig> {
         let base = match &self.config {
             Some(path) => RunConfig::read(path)?,
-            None => {
-                let effects = EffectsConfig { auto: true, ..EffectsConfig::default() };
-                RunConfig { effects, ..RunConfig::default() }
-            }
+            None => RunConfig::default(),
         };
         let mut config = self.applied_to(base)?;
         let limits = self.device.limits();

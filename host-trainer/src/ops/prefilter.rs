@@ -9,7 +9,7 @@ const INK_DEVIATIONS: f64 = 3.33;
 const DILATION_REACH_PX: f64 = 1.9;
 
 /// Whether the view draws anything of an anchor: by [`anchor_is_visible`] where the heads see the view; where they don't, by
-/// [`offset_reaches`], which leaves nothing out, because a decoder that evaluates such Gaussians once knows no anchors any more.
+/// `offset_reaches`, which leaves nothing out, because a decoder that evaluates such Gaussians once knows no anchors any more.
 pub fn shows<R: Real>(scene: &Scene<R>, anchor: usize, camera: &Pinhole<R>) -> bool {
     let position = scene.position(anchor);
     let size = |i: usize| scene.anchors.log_scales[anchor * 6 + i].exp();

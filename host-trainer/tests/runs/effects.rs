@@ -53,12 +53,12 @@ fn options_that_contradict_each_other_are_refused() {
 #[test]
 fn a_run_too_short_to_measure_keeps_its_effects_and_says_so() {
     let output = folder("short-effects").join("a.psb");
-    let said = succeeds(&mut train(&output));
+    let said = succeeds(train(&output).args(["--effects", "auto"]));
     assert!(said.contains("effects: view-direction; a run needs 2000 iterations"), "{said}");
-    let said = succeeds(train(&output).args(["--set", "effects.least_iterations=1"]));
+    let said = succeeds(train(&output).args(["--effects", "auto", "--set", "effects.least_iterations=1"]));
     assert!(said.contains("effects: view-direction; the capture has too few training views"), "{said}");
-    let said = succeeds(train(&output).args(["--effects", "view-direction"]));
-    assert!(!said.contains("effects:"), "{said}");
+    let said = succeeds(&mut train(&output));
+    assert!(!said.contains("effects:"), "nothing is measured unasked: {said}");
 }
 
 #[test]
@@ -75,7 +75,14 @@ fn effects_are_measured_once_and_stay_with_the_run() {
     let (output, mut command) = run("a.psb");
     command.arg(&views).args(["--iterations", "80", "--feature-dim", "8", "--offsets", "3"]);
     // So dear that nothing pays, whatever it is worth.
-    command.args(["--set", "effects.least_iterations=80", "--set", "effects.price.effect_db=1000"]);
+    command.args([
+        "--effects",
+        "auto",
+        "--set",
+        "effects.least_iterations=80",
+        "--set",
+        "effects.price.effect_db=1000",
+    ]);
     let said = succeeds(&mut command);
     assert!(said.contains("effects: pilot with detail") && said.contains("effects: none, measured in"), "{said}");
     assert_eq!(effects_of(&output), Effects::default());

@@ -339,7 +339,7 @@ fn bake_scene<'s>(
         records: arena.take(baked_gaussians as usize)?,
         starts: arena.take((baked_chunks as usize).saturating_add(1))?,
     };
-    bake(bundle, baked_chunks, memory, plan.shape().heads(), arena, skip_damage)
+    bake(bundle, baked_chunks, memory, plan.shape().heads(), arena, skip_damage)?.finish()
 }
 
 /// Converts the heads into memory of `arena`, and prepares where the anchors of the planned tiers come from.

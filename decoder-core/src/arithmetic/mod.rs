@@ -3,18 +3,20 @@
 //! [`Exact`] is what [`Decoder::bind`](crate::Decoder::bind) uses and what the trainer's reference is compared with.
 //! [`Decoder::bind_in`](crate::Decoder::bind_in) takes any other:
 //!
-//! ```no_run
+//! ```
 //! # fn main() -> Result<(), pocketsplat_core::DecodeError> {
-//! # let (bytes, mut scratch, camera) = ([0; 8], [0; 8], todo!());
+//! # let bytes = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/bundle/example.psb"));
+//! # let mut scratch = [0; 8 * 1024];
 //! # struct Sink;
 //! # impl pocketsplat_core::TileSink for Sink { fn tile(&mut self, _: u16, _: u16, _: u16, _: u16, _: &[[u8; 3]]) {} }
 //! use pocketsplat_core::arithmetic::QuickWithoutFpu;
 //! use pocketsplat_core::{Budget, Bundle, Decoder};
 //!
-//! let bundle = Bundle::parse(&bytes)?;
-//! let plan = bundle.plan(&Budget::for_frame(160, 120))?;
+//! let bundle = Bundle::parse(bytes)?;
+//! let plan = bundle.plan(&Budget::for_frame(32, 24))?;
 //! let mut decoder = Decoder::bind_in::<QuickWithoutFpu>(&bundle, plan, &mut scratch)?;
-//! decoder.render(camera, &mut Sink)?;
+//! let report = decoder.render(&bundle.header().preview, &mut Sink)?;
+//! assert_eq!(report.splats, 5);
 //! # Ok(())
 //! # }
 //! ```

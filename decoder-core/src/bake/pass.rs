@@ -1,10 +1,10 @@
 //! Going over a scene once, when it is bound.
 
-use super::store::{BakedGaussians, BakedMemory, Baker};
+use super::store::{BakedMemory, Baker};
 use crate::arithmetic::{Exact, F32, Precise};
 use crate::budget::{Arena, ScratchShape};
-use crate::bundle::{AnchorModels, Bundle, Chunk, MAX_TIERS, saturate};
-use crate::error::{DecodeError, Field};
+use crate::bundle::{AnchorModels, Bundle, Chunk, MAX_TIERS};
+use crate::error::DecodeError;
 use crate::mlp::{HeadShape, Heads};
 use crate::scene::{Anchor, Workspace, for_each_gaussian};
 
@@ -24,27 +24,10 @@ struct Evaluator<'b, 's> {
 ///   chunks out and remembers which.
 ///
 /// # Errors
-/// [`DecodeError::ChunkChecksum`] or [`DecodeError::ChunkStream`] for damage that is not left out;
-/// [`DecodeError::OutOfRange`] when there are more Gaussians than places: the bundle says too few.
+/// [`DecodeError::ChunkChecksum`] or [`DecodeError::ChunkStream`] for damage that is not left out.
 // Not inlined: a caller's stack frame would keep what only baking needs.
 #[inline(never)]
 pub(crate) fn bake<'s>(
-    bundle: &Bundle<'_>,
-    n_chunks: u32,
-    memory: BakedMemory<'s>,
-    shape: HeadShape,
-    arena: &mut Arena<'_>,
-    skip_damage: bool,
-) -> Result<BakedGaussians<'s>, DecodeError> {
-    let n_places = saturate(memory.records.len());
-    let baker = evaluate_all(bundle, n_chunks, memory, shape, arena, skip_damage)?;
-    if baker.n > n_places {
-        return Err(DecodeError::OutOfRange { field: Field::TierGaussians, found: baker.n, limit: n_places });
-    }
-    Ok(baker.finish())
-}
-
-fn evaluate_all<'s>(
     bundle: &Bundle<'_>,
     n_chunks: u32,
     memory: BakedMemory<'s>,
@@ -113,10 +96,10 @@ impl Bundle<'_> {
         let mut arena = Arena::new(scratch);
         let memory = BakedMemory { records: &mut [], starts: arena.take(self.n_starts())? };
         let shape = ScratchShape::of_heads(self).heads();
-        let baked = evaluate_all(self, self.n_chunks(), memory, shape, &mut arena, false)?.finish();
+        let baker = bake(self, self.n_chunks(), memory, shape, &mut arena, false)?;
         let mut counts = [0; MAX_TIERS as usize];
         for (tier, count) in (1..).zip(&mut counts) {
-            *count = baked.n_of_first(self.up_to_tier(tier).n_chunks);
+            *count = baker.n_of_first(self.up_to_tier(tier).n_chunks);
         }
         Ok(counts)
     }

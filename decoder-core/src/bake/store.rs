@@ -1,6 +1,8 @@
 //! Baked Gaussians in memory, chunk by chunk.
 
 use super::record::BakedGaussian;
+use crate::bundle::saturate;
+use crate::error::{DecodeError, Field};
 use crate::scene::Gaussian;
 
 /// Set in the entry of a chunk that was left out because of damage; there are never so many Gaussians.
@@ -15,7 +17,7 @@ pub(crate) struct BakedMemory<'s> {
 }
 
 /// Takes Gaussians chunk by chunk.
-pub(super) struct Baker<'s> {
+pub(crate) struct Baker<'s> {
     memory: BakedMemory<'s>,
     n_chunks: usize,
     /// Gaussians so far, those without a place included.
@@ -55,9 +57,22 @@ impl<'s> Baker<'s> {
         self.n_chunks = self.n_chunks.saturating_add(1);
     }
 
+    /// Gaussians of the first `n_chunks` chunks, those without a place included.
+    pub(super) fn n_of_first(&self, n_chunks: u32) -> u32 {
+        self.memory.starts.get(n_chunks as usize).map_or(0, |start| start & !DAMAGED)
+    }
+
     /// What was kept.
-    pub(super) fn finish(self) -> BakedGaussians<'s> {
-        BakedGaussians { records: self.memory.records, starts: self.memory.starts }
+    ///
+    /// # Errors
+    /// [`DecodeError::OutOfRange`] when there were more Gaussians than places: the bundle says too few.
+    pub(crate) fn finish(self) -> Result<BakedGaussians<'s>, DecodeError> {
+        let BakedMemory { records, starts } = self.memory;
+        let n_places = saturate(records.len());
+        if self.n > n_places {
+            return Err(DecodeError::OutOfRange { field: Field::TierGaussians, found: self.n, limit: n_places });
+        }
+        Ok(BakedGaussians { records, starts })
     }
 }
 
@@ -65,11 +80,6 @@ impl BakedGaussians<'_> {
     /// Whether a chunk was left out because of damage.
     pub(crate) fn is_damaged(&self, chunk: u32) -> bool {
         self.starts.get(chunk as usize).is_some_and(|start| start & DAMAGED != 0)
-    }
-
-    /// Gaussians of the first `n_chunks` chunks.
-    pub(super) fn n_of_first(&self, n_chunks: u32) -> u32 {
-        self.starts.get(n_chunks as usize).map_or(0, |start| start & !DAMAGED)
     }
 
     /// Gaussians of a chunk.
@@ -97,7 +107,7 @@ impl BakedGaussians<'_> {
 mod tests {
     use bytemuck::Zeroable;
 
-    use super::{BakedGaussian, BakedMemory, Baker};
+    use super::{BakedGaussian, BakedMemory, Baker, DecodeError, Field};
     use crate::scene::Gaussian;
 
     #[test]
@@ -120,11 +130,29 @@ mod tests {
             baker.end_chunk(first, is_damaged);
         }
         assert_eq!(baker.n, 3, "two and one");
-        let baked = baker.finish();
+        let baked = baker.finish().expect("a place for each");
         assert_eq!([0, 1, 2, 3].map(|chunk| baked.n_of_chunk(chunk)), [2, 0, 1, 0], "the fourth is none");
         assert_eq!([0, 1, 2].map(|chunk| baked.is_damaged(chunk)), [false, true, false], "the second");
         let kept: std::vec::Vec<f32> = baked.records.iter().map(|record| record.unpack().opacity).collect();
         let near = kept.iter().zip([0.1, 0.2, 0.3]).all(|(kept, whole)| (kept - whole).abs() < 2e-4);
         assert!(near && kept.len() == 3, "{kept:?}");
+    }
+
+    #[test]
+    fn more_than_there_are_places_for_are_refused_by_number() {
+        let gaussian = Gaussian {
+            centre: [0.0; 3],
+            scale: [1.0; 3],
+            rotation: [1.0, 0.0, 0.0, 0.0],
+            opacity: 0.5,
+            colour: [0.5; 3],
+        };
+        let (mut records, mut starts) = ([BakedGaussian::zeroed(); 2], [0; 2]);
+        let mut baker = Baker::new(BakedMemory { records: &mut records, starts: &mut starts });
+        (0..3).for_each(|_| baker.push(&gaussian));
+        baker.end_chunk(0, false);
+        assert_eq!(baker.n_of_first(1), 3, "counted all the same");
+        let expected = DecodeError::OutOfRange { field: Field::TierGaussians, found: 3, limit: 2 };
+        assert_eq!(baker.finish().err(), Some(expected), "the bundle said two");
     }
 }

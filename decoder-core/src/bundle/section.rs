@@ -136,8 +136,8 @@ fn kind_of(code: u8) -> Result<SectionKind, DecodeError> {
         6 => SectionKind::Manifest,
         7 => SectionKind::Directory,
         8 => SectionKind::Chunks,
-        FIRST_OPTIONAL_CODE => SectionKind::Gaussians,
-        129.. => SectionKind::Other(code),
+        128 => SectionKind::Gaussians,
+        _ if code >= FIRST_OPTIONAL_CODE => SectionKind::Other(code),
         _ => {
             let limit = FIRST_OPTIONAL_CODE.into();
             return Err(DecodeError::OutOfRange { field: Field::SectionKind, found: code.into(), limit });

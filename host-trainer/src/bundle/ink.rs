@@ -3,10 +3,9 @@
 use std::ops::Range;
 
 use super::quantise::Rows;
+use crate::ops::prefilter::INK_DEVIATIONS;
 use crate::scene::ModelShape;
 
-/// A splat of opacity 1 falls to 1/255 at √(2 ln 255) = 3.3290 deviations; the rest covers the decoder's rounding.
-const INK_DEVIATIONS: f64 = 3.33;
 /// Rounding of a float32 and then some, relative to the largest coordinate.
 const ROUNDING: f64 = 1e-6;
 /// Largest magnitude of a coordinate: the sums of the format stay finite. Such a scene draws nothing out there anyway.

@@ -3,8 +3,8 @@
 use super::{Pinhole, Real, pinhole::NEAR, project::DILATION_PX2};
 use crate::scene::Scene;
 
-/// Even an opaque Gaussian is fainter than 1/255 beyond √(2 ln 255) = 3.329 deviations.
-const INK_DEVIATIONS: f64 = 3.33;
+/// A splat of opacity 1 falls to 1/255 at √(2 ln 255) = 3.3290 deviations; the rest covers rounding.
+pub const INK_DEVIATIONS: f64 = 3.33;
 /// √(2 ln 255 · 0.3) from the dilation, and rounding, pixels.
 const DILATION_REACH_PX: f64 = 1.9;
 
@@ -88,7 +88,11 @@ pub fn anchor_is_visible<R: Real>(camera: &Pinhole<R>, position: [R; 3], size: [
 mod tests {
     use super::*;
     use crate::camera::Camera;
+    use crate::ops::neural_gaussians::Gaussian;
+    use crate::ops::project;
     use glam::{DMat3, DVec3};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
 
     fn camera() -> Pinhole<f64> {
         Pinhole::new(&Camera {
@@ -99,6 +103,29 @@ mod tests {
             width_px: 100,
             height_px: 100,
         })
+    }
+
+    #[test]
+    fn whatever_draws_a_pixel_may_reach_the_image() {
+        let camera = camera();
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let (mut n_drawn, mut n_left_out) = (0, 0);
+        for _ in 0..50_000 {
+            let depth = rng.random_range(-0.5..4.0);
+            let centre = [rng.random_range(-4.0..4.0), rng.random_range(-4.0..4.0), depth];
+            let scale = [0; 3].map(|_| 10.0_f64.powf(rng.random_range(-4.0..0.5)));
+            let rotation = [0; 4].map(|_| rng.random_range(-1.0..1.0_f64));
+            let norm = rotation.iter().map(|q| q * q).sum::<f64>().sqrt();
+            let gaussian =
+                Gaussian { centre, scale, rotation: rotation.map(|q| q / norm), opacity: 1.0, colour: [0.5; 3] };
+            let widest = scale.into_iter().fold(0.0, f64::max);
+            let reaches = offset_reaches(&camera, centre, INK_DEVIATIONS * widest);
+            let is_drawn = project::forward(&camera, &gaussian, false).is_some();
+            assert!(reaches || !is_drawn, "{gaussian:?}");
+            n_drawn += u32::from(is_drawn);
+            n_left_out += u32::from(!reaches);
+        }
+        assert!(n_drawn > 5_000 && n_left_out > 5_000, "{n_drawn} drawn, {n_left_out} left out");
     }
 
     #[test]

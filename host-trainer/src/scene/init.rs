@@ -52,7 +52,7 @@ pub fn initial_scene(shape: ModelShape, voxel_size: f64, points: &[DVec3], rng: 
         detail.w2.fill(0.0);
         detail.b2.fill(0.0);
     }
-    if shape.head_inputs() == shape.feature_dim {
+    if !shape.sees_view() {
         draw_all_at_first(&mut heads.opacity);
     }
     Scene { shape, voxel_size, anchors, heads, context: None }

@@ -45,17 +45,21 @@ impl Work {
         passes: u64,
         kept: Kept,
     ) -> Self {
-        let area = |[width, height]: [u16; 2]| u64::from(width).saturating_mul(height.into()).max(1);
-        let (measured, planned) = (area(training_px), area([budget.width_px, budget.height_px]));
+        let sides = [budget.width_px, budget.height_px].into_iter().zip(training_px);
+        let area = |[width, height]: [u16; 2]| u32::from(width).saturating_mul(height.into());
+        let is_larger = area([budget.width_px, budget.height_px]) > area(training_px);
+        // In 1024ths, each side by itself: a division of 64 bits would link a kilobyte of text.
+        let larger = sides.fold(u64::from(measures.max_kilo_pixels), |pixels, (planned, measured)| {
+            pixels.saturating_mul((u32::from(planned) << 10).div_ceil(u32::from(measured).max(1)).into())
+        });
         let pixels = u64::from(measures.max_kilo_pixels).saturating_mul(1024);
-        let larger = pixels.saturating_mul(planned).div_ceil(measured);
         let anchors = if kept == Kept::Nothing { measures.max_decoded_anchors } else { 0 };
         let kilo_macs =
             if cfg!(feature = "baked") && kept == Kept::Gaussians { 0 } else { measures.max_head_kilo_macs };
         Self {
             head_macs: u64::from(kilo_macs).saturating_mul(1024).saturating_mul(passes),
             decoded_anchors: u64::from(anchors).saturating_mul(passes),
-            pixel_splats: if planned > measured { larger } else { pixels },
+            pixel_splats: if is_larger { larger.div_ceil(1024) } else { pixels },
         }
     }
 }

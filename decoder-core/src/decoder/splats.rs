@@ -97,11 +97,17 @@ impl<A: Choices> SplatStore<'_, A> {
         }
         let mut n_kept = 0;
         for i in 0..self.n as usize {
-            let (Some(&splat), Some(&rect)) = (self.splats.get(i), self.rects.get(i)) else { break };
-            if splat.depth() < end
-                && let (Some(splat_slot), Some(rect_slot)) = (self.splats.get_mut(n_kept), self.rects.get_mut(n_kept))
-            {
-                (*splat_slot, *rect_slot) = (splat, rect);
+            let Some((before, [splat, ..])) = self.splats.split_at_mut_checked(i) else { break };
+            if splat.depth() < end {
+                // Swapped: to copy within a slice would link a routine of 1.6 KB, for parts that overlap.
+                if let Some(slot) = before.get_mut(n_kept) {
+                    core::mem::swap(slot, splat);
+                }
+                if let Some(&rect) = self.rects.get(i)
+                    && let Some(slot) = self.rects.get_mut(n_kept)
+                {
+                    *slot = rect;
+                }
                 n_kept += 1;
             }
         }

@@ -44,6 +44,8 @@ pub(crate) struct TrainResult {
     pub(crate) iterations: u32,
     pub(crate) dropped_steps: u32,
     pub(crate) train_s: f64,
+    /// Processor time of all threads.
+    pub(crate) train_processor_s: f64,
     pub(crate) iterations_per_s: f64,
     pub(crate) background: String,
     pub(crate) effects: String,
@@ -206,6 +208,7 @@ fn write_bundle(
         iterations: trainer.iteration,
         dropped_steps: trainer.n_dropped(),
         train_s: trainer.seconds,
+        train_processor_s: trainer.processor_seconds,
         iterations_per_s: f64::from(trainer.iteration) / trainer.seconds,
         background: background.to_string(),
         effects: Effect::names(&Effect::all_in(trainer.config())),

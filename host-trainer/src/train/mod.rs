@@ -20,6 +20,8 @@ pub mod watchdog;
 
 use std::time::Instant;
 
+use cpu_time::ProcessTime;
+
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -62,6 +64,8 @@ pub struct Trainer<'a> {
     pub scene: Scene<f32>,
     /// Wall-clock seconds spent in iterations.
     pub seconds: f64,
+    /// Seconds of processor time spent in iterations, of all threads: what does not depend on what else the machine does.
+    pub processor_seconds: f64,
     watchdog: Watchdog,
     optimiser: Optimiser<f32>,
     statistics: Statistics,
@@ -121,6 +125,7 @@ impl<'a> Trainer<'a> {
             background: capture.background,
             iteration: 0,
             seconds: 0.0,
+            processor_seconds: 0.0,
             watchdog: Watchdog::default(),
             optimiser: Optimiser::new(&scene),
             statistics: Statistics::default(),
@@ -193,9 +198,10 @@ impl<'a> Trainer<'a> {
     /// [`TrainError::Diverged`] when more than [`watchdog::MAX_DROPPED_IN_A_ROW`] steps in a row did nothing; the
     /// scene is as it was before them.
     pub fn advance(&mut self) -> Result<Outcome, TrainError> {
-        let started = Instant::now();
+        let started = (Instant::now(), ProcessTime::now());
         let outcome = self.iterate();
-        self.seconds += started.elapsed().as_secs_f64();
+        self.seconds += started.0.elapsed().as_secs_f64();
+        self.processor_seconds += started.1.elapsed().as_secs_f64();
         outcome
     }
 

@@ -55,7 +55,7 @@ impl<'a> Trainer<'a> {
 
         out.value([self.iteration, self.optimiser.n_steps])?;
         out.value([self.watchdog.n_dropped, self.watchdog.n_in_a_row])?;
-        out.value(self.seconds)?;
+        out.value([self.seconds, self.processor_seconds])?;
         out.value(self.rng.get_seed())?;
         out.value(self.rng.get_stream())?;
         out.value(self.rng.get_word_pos())?;
@@ -112,7 +112,7 @@ impl<'a> Trainer<'a> {
         self.iteration = iteration;
         let [n_dropped, n_in_a_row] = from.value("dropped steps")?;
         self.watchdog = Watchdog { n_dropped, n_in_a_row };
-        self.seconds = from.value("seconds")?;
+        [self.seconds, self.processor_seconds] = from.value("seconds")?;
         self.rng = ChaCha8Rng::from_seed(from.value("random seed")?);
         self.rng.set_stream(from.value("random stream")?);
         self.rng.set_word_pos(from.value("random position")?);

@@ -21,7 +21,7 @@ fn saved(trainer: &Trainer<'_>) -> Vec<u8> {
 
 /// Everything but the time it took.
 fn timeless(trainer: &Trainer<'_>) -> Vec<u8> {
-    saved(&Trainer { seconds: 0.0, ..trainer.clone() })
+    saved(&Trainer { seconds: 0.0, processor_seconds: 0.0, ..trainer.clone() })
 }
 
 /// Twenty runs of each backbone, each stopped after a random iteration and taken up again by a new trainer.

@@ -4,9 +4,12 @@ use anyhow::{Result, bail};
 use pocketsplat::bundle::manifest::{cameras_to_measure, install, measure};
 use pocketsplat::bundle::{self, BundleInfo, Coder, QuantisationSteps, WriteError, WriteOptions, Written};
 use pocketsplat::dataset::{Background, Capture, View};
-use pocketsplat::device::{Fitted, Limits, fitted};
+use pocketsplat::device::{Fitted, Limits, NoFit, fitted};
+use pocketsplat::metrics::psnr_db_masked;
+use pocketsplat::render::decoder::core_image;
 use pocketsplat::train::finish::Finished;
-use pocketsplat_core::{Budget, Bundle};
+use pocketsplat_core::{Budget, Bundle, DecodeError};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// How a run's scene becomes a bundle; decides nothing of its training.
@@ -23,8 +26,12 @@ pub(crate) struct Encoding {
     pub(crate) limits: Limits,
 }
 
-/// Shares of the mean steps for devices, finest first.
-const FOR_DEVICES: [f32; 4] = [0.5, 0.65, 0.8, 1.0];
+/// Steps of tables, as shares of the context's mean steps, finest first.
+const MEAN_STEP_SHARES: [f32; 4] = [0.5, 0.65, 0.8, 1.0];
+/// What tables may cost against the context that a scene was trained with, where nobody needs them for their speed.
+const LARGEST_LOSS_DB: f64 = 0.02;
+/// Training views, evenly picked, that say what they cost.
+const JUDGED_VIEWS: usize = 8;
 
 impl Default for Encoding {
     fn default() -> Self {
@@ -75,21 +82,36 @@ impl Encoding {
         Ok(fitted(finished, &self.limits, &frame, write)?)
     }
 
-    /// Codes a scene, for a device with the finest tables that its flash has room for.
+    /// Codes a scene: by its context, or by tables where they pay.
     ///
-    /// A device that decodes in every frame pays six times as much for the context as for tables. Finer steps make up for
-    /// steps that do not follow the place.
-    fn coded(&self, finished: &Finished, capture: &Capture, background: Background) -> Result<Written, WriteError> {
-        let chooses = self.coder == Coder::Auto && finished.scene.context.is_some();
-        if chooses && self.limits.frame_instructions.is_some() {
-            for mean_step_share in FOR_DEVICES {
-                let written = self.write(finished, Coder::Static, mean_step_share, capture, background)?;
+    /// A device that decodes in every frame pays six times as much for the context as for tables, and gets the finest that its flash
+    /// has room for. Elsewhere tables have to be shorter and cost no more than [`LARGEST_LOSS_DB`]: their steps do not follow the
+    /// place, and where a run's do, tables of the mean steps cost decibels.
+    fn coded(&self, finished: &Finished, capture: &Capture, background: Background) -> Result<Written, NoFit> {
+        let write = |coder, share| self.write(finished, coder, share, capture, background);
+        if self.coder != Coder::Auto || finished.scene.context.is_none() {
+            return Ok(write(self.coder, 1.0)?);
+        }
+        if self.limits.frame_instructions.is_some() {
+            for share in MEAN_STEP_SHARES {
+                let written = write(Coder::Static, share)?;
                 if self.limits.flash_bytes.is_none_or(|most| written.bytes.len() as u64 <= most) {
                     return Ok(written);
                 }
             }
         }
-        self.write(finished, self.coder, 1.0, capture, background)
+        let context = write(Coder::Context, 1.0)?;
+        let least_psnr_db = judged_psnr_db(&context.bytes, capture)? - LARGEST_LOSS_DB;
+        for share in MEAN_STEP_SHARES.into_iter().rev() {
+            let tables = write(Coder::Static, share)?;
+            if tables.bytes.len() >= context.bytes.len() {
+                break;
+            }
+            if judged_psnr_db(&tables.bytes, capture)? >= least_psnr_db {
+                return Ok(tables);
+            }
+        }
+        Ok(context)
     }
 
     fn write(
@@ -117,6 +139,19 @@ impl Encoding {
         };
         bundle::write(&finished.scene, &info, &options)
     }
+}
+
+/// PSNR of a bundle's frames, mean over [`JUDGED_VIEWS`] training views, dB.
+fn judged_psnr_db(bytes: &[u8], capture: &Capture) -> Result<f64, DecodeError> {
+    let bundle = Bundle::parse(bytes)?;
+    let n = JUDGED_VIEWS.min(capture.train.len());
+    let psnr_db = (0..n).into_par_iter().map(|i| {
+        let view = &capture.train[i * capture.train.len() / n];
+        let frame = core_image(&bundle, &view.camera)?;
+        Ok(psnr_db_masked(&frame.image, &view.image, view.mask.as_ref()) / n as f64)
+    });
+    // One after the other, so that the sum does not depend on the number of threads.
+    Ok(psnr_db.collect::<Result<Vec<_>, DecodeError>>()?.iter().sum())
 }
 
 /// Size of the training view with the longest side: what `eval` reduces photographs to unless told otherwise.

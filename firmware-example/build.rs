@@ -7,7 +7,9 @@
 //! | `RAM_KIB` | RAM in all: statics, scratch memory, stack | 256, 1024, 512 |
 //! | `SIZE` | frames, `WIDTHxHEIGHT` | the preview's |
 //! | `FRAMES` | frames of the orbit, at most 10 | 4 |
+//! | `VIEWS` | absolute path of cameras to draw instead, at most 10: a line each of the numbers of a `Camera`, in its order | an orbit |
 //! | `QUALITY` | `EXACT`, `BALANCED` or `DRAFT` | `EXACT` |
+//! | `BUDGET` | what else is asked of the `Budget`, in Rust: `.with_tiers(2)` | nothing |
 //! | `ARITHMETIC` | types of `pocketsplat_core::arithmetic` in the order of `With`: `I16,Polynomial,Fast` | those of `Exact` |
 
 use std::error::Error;
@@ -70,12 +72,17 @@ fn prepare() -> Result<(), Box<dyn Error>> {
             (width.parse()?, height.parse()?)
         }
     };
-    let n_frames: u8 = variable("FRAMES").map_or(Ok(4), |text| text.parse())?;
+    let views = variable("VIEWS").map_or(Ok(Vec::new()), |path| cameras(&path))?;
+    let n_frames = match views.len() {
+        0 => variable("FRAMES").map_or(Ok(4), |text| text.parse())?,
+        n => n,
+    };
     let quality = variable("QUALITY").unwrap_or_else(|| "EXACT".into());
     if !["EXACT", "BALANCED", "DRAFT"].contains(&quality.as_str()) {
         return Err(format!("QUALITY={quality} is none of EXACT, BALANCED, DRAFT").into());
     }
-    // A name that is none is an error of the compiler's.
+    // Names that are none are errors of the compiler's.
+    let budget = variable("BUDGET").unwrap_or_default();
     let arithmetic = variable("ARITHMETIC").unwrap_or_default();
     let scratch_len = (ram_kib * 1024)
         .checked_sub(STACK_LEN + OTHER_STATICS)
@@ -83,11 +90,13 @@ fn prepare() -> Result<(), Box<dyn Error>> {
     let arithmetic: Vec<String> =
         arithmetic.split_terminator(',').map(|name| format!("pocketsplat_core::arithmetic::{}", name.trim())).collect();
     let arithmetic = arithmetic.join(", ");
+    let views = views.concat();
     let settings = format!(
         "const BOARD: &str = {name:?};\nconst RAM_KIB: usize = {ram_kib};\nconst STACK_LEN: usize = {STACK_LEN};\n\
          const SCRATCH_LEN: usize = {scratch_len};\nconst WIDTH_PX: usize = {width_px};\n\
          const HEIGHT_PX: usize = {height_px};\nconst N_FRAMES: u8 = {n_frames};\n\
-         const QUALITY: Quality = Quality::{quality};\n\
+         const VIEWS: &[Camera] = &[{views}];\nconst QUALITY: Quality = Quality::{quality};\n\
+         fn asked(budget: Budget) -> Budget {{ budget.with_quality(QUALITY){budget} }}\n\
          type Chosen = pocketsplat_core::arithmetic::With<{arithmetic}>;\n"
     );
     Ok(fs::write(out.join("settings.rs"), settings)?)
@@ -108,6 +117,26 @@ fn lay_out(memory: &str, ram_kib: usize, out: &Path) -> Result<(), Box<dyn Error
     println!("cargo::rustc-link-arg-bins=-Tlink.x");
     println!("cargo::rustc-link-arg-bins=-Tdefmt.x");
     Ok(())
+}
+
+/// Each line of a file as a camera in Rust.
+fn cameras(path: &str) -> Result<Vec<String>, Box<dyn Error>> {
+    println!("cargo::rerun-if-changed={path}");
+    let text = fs::read_to_string(path).map_err(|error| format!("views {path}: {error}"))?;
+    let camera = |line: &str| -> Result<String, Box<dyn Error>> {
+        let numbers: Vec<f32> = line.split_whitespace().map(str::parse).collect::<Result<_, _>>()?;
+        let [rotation @ .., t0, t1, t2, fx, fy, cx, cy, width, height] = numbers.as_slice() else {
+            return Err(format!("views {path}: a line of {} numbers; a camera has 18", numbers.len()).into());
+        };
+        Ok(format!(
+            "Camera {{ rotation: {rotation:?}, translation: {:?}, focal_px: {:?}, principal_px: {:?}, width_px: {width}, \
+             height_px: {height} }},",
+            [t0, t1, t2],
+            [fx, fy],
+            [cx, cy]
+        ))
+    };
+    text.lines().map(camera).collect()
 }
 
 /// A variable of the environment, which decides about this build.

@@ -3,8 +3,8 @@
 #
 #   measure.sh BUNDLE BOARD RAM_KIB [WIDTHxHEIGHT] [OUT]
 #
-# Frames and log stay in OUT, which is target/measured here without it. FRAMES is 4 when it is not set; QUALITY and ARITHMETIC
-# are build.rs's.
+# Frames and log stay in OUT, which is target/measured here without it. FRAMES is 4 when it is not set; VIEWS, QUALITY,
+# BUDGET and ARITHMETIC are build.rs's.
 set -euo pipefail
 usage="usage: measure.sh BUNDLE mps2-an386|mps2-an500|virt RAM_KIB [WIDTHxHEIGHT] [OUT]"
 bundle=$(realpath "${1:?$usage}") ram_kib=${3:?$usage} size=${4:-}

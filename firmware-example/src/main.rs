@@ -18,13 +18,13 @@ use embedded_graphics::geometry::Point;
 use instructions::{Instructions, Table};
 use panel::{PANEL, Panel, write_ppm};
 use pocketsplat_core::display::DisplaySink;
-use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, Overflow, Quality, Stage, Stopwatch as _};
+use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, Overflow, Quality, Stage, Stopwatch as _};
 #[cfg(target_arch = "riscv32")]
 use riscv as _;
 use semihosting::io;
 use static_cell::ConstStaticCell;
 
-// BOARD, RAM_KIB, STACK_LEN, SCRATCH_LEN, WIDTH_PX, HEIGHT_PX, N_FRAMES, QUALITY, Chosen.
+// BOARD, RAM_KIB, STACK_LEN, SCRATCH_LEN, WIDTH_PX, HEIGHT_PX, N_FRAMES, VIEWS, asked, Chosen.
 include!(concat!(env!("OUT_DIR"), "/settings.rs"));
 static BUNDLE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/bundle.psb"));
 
@@ -69,7 +69,7 @@ fn main() -> ! {
     }
 }
 
-/// Draws the frames of an orbit on the panel, and sends each and the instructions that it took to the host.
+/// Draws the frames of an orbit, or the views that were asked for, on the panel, and sends each and the instructions that it took to the host.
 fn draw_orbit(panel: &mut Panel, scratch: &mut [u8]) -> Result<(), Failure> {
     let bundle = Bundle::parse(BUNDLE)?;
     let header = bundle.header();
@@ -78,7 +78,7 @@ fn draw_orbit(panel: &mut Panel, scratch: &mut [u8]) -> Result<(), Failure> {
 
     // The build script's sizes fit these types, or the panel would not exist.
     let preview = header.preview.resized(WIDTH_PX as u16, HEIGHT_PX as u16);
-    let budget = Budget::for_frame(preview.width_px, preview.height_px).in_bytes(scratch.len()).with_quality(QUALITY);
+    let budget = asked(Budget::for_frame(preview.width_px, preview.height_px).in_bytes(scratch.len()));
     // A scene that no pruning rate makes small enough still fits in slabs of depth, which take longer.
     let plan = bundle.plan(&budget).or_else(|_| bundle.plan(&budget.with_overflow(Overflow::Slabs)))?;
     defmt::info!("scratch: {} bytes, of which the plan takes {}", scratch.len(), plan.scratch_len());
@@ -97,7 +97,8 @@ fn draw_orbit(panel: &mut Panel, scratch: &mut [u8]) -> Result<(), Failure> {
     let mut decoder = Decoder::bind_in::<Chosen>(&bundle, plan, scratch)?;
     let mut table = Table::create(board::instructions() - before)?;
     for frame in 0..N_FRAMES {
-        let camera = preview.orbited(TAU * f32::from(frame) / f32::from(N_FRAMES));
+        let orbited = || preview.orbited(TAU * f32::from(frame) / f32::from(N_FRAMES));
+        let camera = VIEWS.get(usize::from(frame)).copied().unwrap_or_else(orbited);
         let mut display = DisplaySink::new(panel, Point::zero());
         let mut instructions = Instructions::start();
         let report = decoder.render_watched(&camera, &mut display, &mut instructions)?;

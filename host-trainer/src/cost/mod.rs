@@ -2,6 +2,7 @@
 //! the instructions that it takes.
 
 mod arithmetic;
+mod counter;
 mod front;
 mod setting;
 
@@ -11,11 +12,13 @@ use pocketsplat_core::arithmetic::Arithmetic;
 use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, Stage};
 
 pub use arithmetic::{Choice, WithArithmetic};
+pub use counter::{CountError, Counter, MOST_VIEWS};
 pub use front::on_front;
 pub use setting::{Setting, knobs, quality_grid};
 
 use crate::dataset::{Image, Mask};
-use crate::instructions::{Target, predict};
+use crate::device::Target;
+use crate::instructions::predict;
 use crate::metrics::{psnr_db, psnr_db_masked};
 use crate::render::decoder::image_of;
 
@@ -27,6 +30,27 @@ pub struct Sight<'a> {
     pub reference: Image,
     /// The photograph, and where it shows the scene.
     pub photograph: (&'a Image, Option<&'a Mask>),
+    /// Whether its instructions are among those of a setting.
+    pub counts: bool,
+}
+
+/// Instructions of a frame, in the order of [`Stage::ALL`].
+pub type Stages = [f64; Stage::ALL.len()];
+
+/// Instructions of a frame on a target, and how they are known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Instructions {
+    /// Of each stage.
+    pub stages: Stages,
+    /// Whether an emulated board counted them; predicted from what the frame consists of, if not.
+    pub counted: bool,
+}
+
+impl Instructions {
+    /// Of all stages.
+    pub fn total(&self) -> f64 {
+        self.stages.iter().sum()
+    }
 }
 
 /// What a setting does; means over the views where nothing else is said.
@@ -42,17 +66,11 @@ pub struct Measured {
     pub psnr_db: f64,
     /// Time of a frame on this machine, s.
     pub host_s: f64,
-    /// Instructions of a frame on the target, by stage, predicted; only of the exact arithmetic, whose costs were counted.
-    pub instructions: Option<[f64; Stage::ALL.len()]>,
+    /// Instructions of a frame on each target, of the views that [count](Sight::counts); predicted ones are of the exact arithmetic
+    /// alone, to which the costs were fitted.
+    pub instructions: Vec<Option<Instructions>>,
     /// Scratch memory of the plan, bytes.
     pub scratch_bytes: usize,
-}
-
-impl Measured {
-    /// Instructions of a frame in all stages.
-    pub fn total_instructions(&self) -> Option<f64> {
-        self.instructions.map(|stages| stages.iter().sum())
-    }
 }
 
 /// Draws all views as `setting` says within `budget`, and measures.
@@ -69,9 +87,9 @@ pub fn measure(
     sights: &[Sight<'_>],
     setting: &Setting,
     budget: Budget,
-    target: Target,
+    targets: &[Target],
 ) -> Result<Measured, DecodeError> {
-    setting.arithmetic.call(Measurement { bundle, sights, setting, budget, target })
+    setting.arithmetic.call(Measurement { bundle, sights, setting, budget, targets })
 }
 
 /// The arguments of [`measure`].
@@ -80,7 +98,7 @@ struct Measurement<'a, 'b> {
     sights: &'a [Sight<'a>],
     setting: &'a Setting,
     budget: Budget,
-    target: Target,
+    targets: &'a [Target],
 }
 
 impl WithArithmetic for Measurement<'_, '_> {
@@ -92,19 +110,20 @@ impl WithArithmetic for Measurement<'_, '_> {
 }
 
 fn measure_in<A: Arithmetic>(of: &Measurement<'_, '_>) -> Result<Measured, DecodeError> {
-    let Measurement { bundle, sights, setting, budget, target } = *of;
+    let Measurement { bundle, sights, setting, budget, targets } = *of;
     assert!(!sights.is_empty(), "views to measure with");
     let plan = bundle.plan(&setting.of(budget))?;
     let mut scratch = vec![0; plan.scratch_len()];
     let mut decoder = Decoder::bind_in::<A>(bundle, plan, &mut scratch)?;
-    let n = sights.len() as f64;
+    let (n, n_counted) = (sights.len() as f64, sights.iter().filter(|sight| sight.counts).count() as f64);
+    let mut predicted = vec![[0.0; Stage::ALL.len()]; targets.len()];
     let mut measured = Measured {
         setting: setting.clone(),
         psnr_to_reference_db: f64::INFINITY,
         worst_channel: 0,
         psnr_db: 0.0,
         host_s: 0.0,
-        instructions: (setting.arithmetic == Choice::Exact).then_some([0.0; Stage::ALL.len()]),
+        instructions: vec![None; targets.len()],
         scratch_bytes: plan.scratch_len(),
     };
     for sight in sights {
@@ -117,11 +136,17 @@ fn measure_in<A: Arithmetic>(of: &Measurement<'_, '_>) -> Result<Measured, Decod
         measured.psnr_to_reference_db = measured.psnr_to_reference_db.min(psnr_db(&image, &sight.reference));
         let differences = image.rgb.iter().zip(&sight.reference.rgb).map(|(a, b)| a.abs_diff(*b));
         measured.worst_channel = measured.worst_channel.max(differences.max().unwrap_or(0));
-        let size_px = [sight.camera.width_px, sight.camera.height_px];
-        let stages = predict(target, bundle, &plan, &report, size_px);
-        for (sum, stage) in measured.instructions.iter_mut().flatten().zip(stages) {
-            *sum += stage / n;
+        if sight.counts {
+            let size_px = [sight.camera.width_px, sight.camera.height_px];
+            for (sums, target) in predicted.iter_mut().zip(targets) {
+                let stages = predict(target.costs(), bundle, &plan, &report, size_px);
+                sums.iter_mut().zip(stages).for_each(|(sum, stage)| *sum += stage / n_counted);
+            }
         }
+    }
+    if setting.arithmetic == Choice::Exact {
+        measured.instructions =
+            predicted.into_iter().map(|stages| Some(Instructions { stages, counted: false })).collect();
     }
     Ok(measured)
 }

@@ -15,7 +15,7 @@ pub use learning::learning_curves_svg;
 pub use names::names_of;
 pub use rate_distortion::{SizeAxis, rate_distortion_svg};
 pub use recording::{LearningRow, Recording, RecordingError, ResultRow, results_csv};
-pub use time_accuracy::{TimePoint, time_accuracy_svg};
+pub use time_accuracy::{TimePanel, TimePoint, time_accuracy_svg};
 
 /// Something with the name that a legend gives it.
 #[derive(Clone, Debug, PartialEq)]

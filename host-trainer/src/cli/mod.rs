@@ -3,6 +3,7 @@
 mod ablate;
 mod bundle;
 mod capture;
+mod compare;
 mod cost;
 mod demo;
 mod doctor;
@@ -54,6 +55,7 @@ enum Command {
     Plot(plot::Args),
     Sweep(sweep::Args),
     Ablate(ablate::Args),
+    Compare(compare::Args),
     Synth(synth::Args),
     Demo(demo::Args),
     Doctor(doctor::Args),
@@ -76,6 +78,7 @@ pub(crate) fn run() -> Result<ExitCode> {
         Command::Inspect(args) => inspect::run(&args),
         Command::Fit(args) => fit::run(&args),
         Command::Cost(args) => cost::run(&args),
+        Command::Compare(args) => compare::run(&args),
         Command::Plot(args) => plot::run(&args),
         Command::Synth(args) => synth::run(&args),
         Command::Doctor(args) => doctor::run(&args),

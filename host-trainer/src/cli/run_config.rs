@@ -105,12 +105,28 @@ impl RunConfig {
     /// Where the capture lies, where the bundle goes, how it is quantised and when checkpoints are written do not: the
     /// bundle is written anew from what was trained.
     pub(crate) fn difference(&self, other: &Self) -> Result<Option<String>> {
+        let first = self.differences(other)?.into_iter().next();
+        Ok(first.map(|Difference { key, one, other }| format!("`{key}` is {one} and {other}")))
+    }
+
+    /// All keys at which they differ in that.
+    pub(crate) fn differences(&self, other: &Self) -> Result<Vec<Difference>> {
         let deciding = |config: &Self| {
             let Self { capture, train, .. } = config.clone();
             Table::try_from(Self { capture, train, ..Self::default() })
         };
-        Ok(first_difference(&deciding(self)?, &deciding(other)?, ""))
+        let mut all = Vec::new();
+        collect_differences(&deciding(self)?, &deciding(other)?, "", &mut all);
+        Ok(all)
     }
+}
+
+/// A key at which two configurations differ, and both values as TOML; `nothing` for none.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Difference {
+    pub(crate) key: String,
+    pub(crate) one: String,
+    pub(crate) other: String,
 }
 
 /// The backbone that a configuration names; its defaults stand for what else is missing.
@@ -147,15 +163,17 @@ fn refuse_unknown(given: &Table, known: &Table, at: &str) -> Result<()> {
     Ok(())
 }
 
-fn first_difference(a: &Table, b: &Table, at: &str) -> Option<String> {
+fn collect_differences(a: &Table, b: &Table, at: &str, all: &mut Vec<Difference>) {
     let keys = a.keys().chain(b.keys().filter(|key| !a.contains_key(*key)));
-    keys.filter(|key| a.get(*key) != b.get(*key)).find_map(|key| match (a.get(key), b.get(key)) {
-        (Some(Value::Table(a)), Some(Value::Table(b))) => first_difference(a, b, &format!("{at}{key}.")),
-        (a, b) => {
-            let text = |value: Option<&Value>| value.map_or("nothing".to_owned(), ToString::to_string);
-            Some(format!("`{at}{key}` is {} and {}", text(a), text(b)))
+    for key in keys.filter(|key| a.get(*key) != b.get(*key)) {
+        match (a.get(key), b.get(key)) {
+            (Some(Value::Table(a)), Some(Value::Table(b))) => collect_differences(a, b, &format!("{at}{key}."), all),
+            (a, b) => {
+                let text = |value: Option<&Value>| value.map_or("nothing".to_owned(), ToString::to_string);
+                all.push(Difference { key: format!("{at}{key}"), one: text(a), other: text(b) });
+            }
         }
-    })
+    }
 }
 
 #[cfg(test)]

@@ -4,18 +4,18 @@
 //! a kind into one figure; `chart` is what both share. No fonts are needed to draw: text stays text.
 
 mod chart;
+mod cost;
 mod learning;
 mod names;
 mod rate_distortion;
 mod recording;
-mod time_accuracy;
 
 pub use chart::DrawError;
+pub use cost::{CostPanel, CostPoint, cost_svg};
 pub use learning::learning_curves_svg;
 pub use names::names_of;
 pub use rate_distortion::{SizeAxis, rate_distortion_svg};
 pub use recording::{LearningRow, Recording, RecordingError, ResultRow, results_csv};
-pub use time_accuracy::{TimePanel, TimePoint, time_accuracy_svg};
 
 /// Something with the name that a legend gives it.
 #[derive(Clone, Debug, PartialEq)]

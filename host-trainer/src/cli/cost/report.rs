@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 use pocketsplat::cost::{Measured, on_front};
-use pocketsplat::plot::{TimePanel, TimePoint, time_accuracy_svg};
+use pocketsplat::plot::{CostPanel, CostPoint, cost_svg};
 use pocketsplat_core::Stage;
 
 use super::super::output;
@@ -103,20 +103,20 @@ impl Report<'_> {
     }
 
     fn figure(&self, columns: &[Column]) -> Result<String> {
-        let panel = |Column { machine, place, front }: &Column| TimePanel {
-            title: machine.to_string(),
+        let panel = |Column { machine, place, front }: &Column| CostPanel {
+            title: format!("Quality over time: {machine}"),
             unit: machine.unit().to_owned(),
             points: self
                 .measured
                 .iter()
                 .zip(front)
                 .filter_map(|(m, &on_front)| {
-                    let time = machine.time(m, *place)?;
-                    Some(TimePoint { knob: m.setting.knob.to_owned(), time, psnr_db: m.psnr_db, on_front })
+                    let cost = machine.time(m, *place)?;
+                    Some(CostPoint { knob: m.setting.knob.to_owned(), cost, psnr_db: m.psnr_db, on_front })
                 })
                 .collect(),
         };
-        Ok(time_accuracy_svg(&columns.iter().map(panel).collect::<Vec<_>>())?)
+        Ok(cost_svg(&columns.iter().map(panel).collect::<Vec<_>>())?)
     }
 
     /// The table as a page; of the combinations those that are on a front.

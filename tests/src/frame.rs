@@ -8,7 +8,7 @@ use pocketsplat::render::decoder::core_camera;
 use pocketsplat::scene::Scene;
 use pocketsplat_core::arithmetic::Arithmetic;
 use pocketsplat_core::{
-    Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, MaxSplats, Residency, Strips, TileSink,
+    Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, MaxSplats, Quality, Residency, Strips, TileSink,
 };
 
 /// What lies behind the test scenes.
@@ -93,25 +93,38 @@ pub fn draw(bundle: &Bundle<'_>, camera: &Camera) -> Result<(Frame, FrameReport)
 /// # Errors
 /// The decoder's.
 pub fn draw_in(choice: Choice, bundle: &Bundle<'_>, camera: &Camera) -> Result<(Frame, FrameReport), DecodeError> {
-    choice.call(Drawing { bundle, camera })
+    choice.call(Drawing { bundle, camera, budget: budget_for(camera) })
 }
 
-/// The arguments of [`draw_in`].
+/// As [`draw`], of another quality.
+///
+/// # Errors
+/// The decoder's.
+pub fn draw_at(quality: Quality, bundle: &Bundle<'_>, camera: &Camera) -> Result<(Frame, FrameReport), DecodeError> {
+    Choice::Exact.call(Drawing { bundle, camera, budget: budget_for(camera).with_quality(quality) })
+}
+
+/// A frame to draw.
 struct Drawing<'a, 'b> {
     bundle: &'a Bundle<'b>,
     camera: &'a Camera,
+    budget: Budget,
 }
 
 impl WithArithmetic for Drawing<'_, '_> {
     type Output = Result<(Frame, FrameReport), DecodeError>;
 
     fn call<A: Arithmetic>(self) -> Self::Output {
-        drawn::<A>(self.bundle, self.camera)
+        drawn::<A>(self.bundle, self.camera, &self.budget)
     }
 }
 
-fn drawn<A: Arithmetic>(bundle: &Bundle<'_>, camera: &Camera) -> Result<(Frame, FrameReport), DecodeError> {
-    let plan = bundle.plan(&budget_for(camera))?;
+fn drawn<A: Arithmetic>(
+    bundle: &Bundle<'_>,
+    camera: &Camera,
+    budget: &Budget,
+) -> Result<(Frame, FrameReport), DecodeError> {
+    let plan = bundle.plan(budget)?;
     let mut scratch = vec![0; plan.scratch_len()];
     let mut frame = Frame::new(camera.width_px, camera.height_px);
     let report = Decoder::bind_in::<A>(bundle, plan, &mut scratch)?.render(camera, &mut frame)?;

@@ -6,6 +6,7 @@
 mod load;
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
+use pocketsplat_core::Quality;
 
 use crate::camera::Camera;
 use crate::dataset::Image;
@@ -49,7 +50,7 @@ struct Splat {
     mean_px: DVec2,
     /// Inverse covariance `[xx, xy, yy]`, px⁻².
     conic: [f64; 3],
-    /// Half extents of the box around the ellipse where alpha reaches [`ALPHA_MIN`], px.
+    /// Half extents of the box around the ellipse where alpha reaches the least that is drawn, px.
     reach_px: DVec2,
     opacity: f64,
     colour: DVec3,
@@ -66,8 +67,17 @@ impl ReferenceScene {
     /// # Budget
     /// All Gaussians of the view in memory; work proportional to the area of their ellipses.
     pub fn render(&self, camera: &Camera, background: [f64; 3]) -> Vec<[f64; 3]> {
+        self.render_with(Quality::EXACT, camera, background)
+    }
+
+    /// As [`Self::render`] by the rules of another quality: with an alpha cut of c/255 a splat keeps its sum by gaining (c − 1)/255 of
+    /// opacity, and a pixel that less light than the stop comes through is finished by the splat that took it.
+    pub fn render_with(&self, quality: Quality, camera: &Camera, background: [f64; 3]) -> Vec<[f64; 3]> {
+        let alpha_min = f64::from(quality.alpha_cut) * ALPHA_MIN;
+        let stop = f64::from(quality.transmittance_stop) * TRANSMITTANCE_MIN;
         let (width, height) = (camera.width_px as usize, camera.height_px as usize);
-        let mut splats: Vec<Splat> = (0..self.positions.len()).flat_map(|a| self.splats_of(a, camera)).collect();
+        let splats_of = |a| self.splats_of(a, camera, quality);
+        let mut splats: Vec<Splat> = (0..self.positions.len()).flat_map(splats_of).collect();
         // Stable: equal depths stay in the order of anchor, then offset.
         splats.sort_by(|a, b| a.depth.total_cmp(&b.depth));
         let mut colour = vec![DVec3::ZERO; width * height];
@@ -84,7 +94,7 @@ impl ReferenceScene {
                     let [xx, xy, yy] = splat.conic;
                     let distance_squared = xx * d.x * d.x + 2.0 * xy * d.x * d.y + yy * d.y * d.y;
                     let alpha = (splat.opacity * (-0.5 * distance_squared).exp()).min(ALPHA_MAX);
-                    if ended[i] || alpha < ALPHA_MIN {
+                    if ended[i] || alpha < alpha_min {
                         continue;
                     }
                     let next = transmittance[i] * (1.0 - alpha);
@@ -94,6 +104,7 @@ impl ReferenceScene {
                     }
                     colour[i] += splat.colour * (alpha * transmittance[i]);
                     transmittance[i] = next;
+                    ended[i] = next < stop;
                 }
             }
         }
@@ -102,7 +113,7 @@ impl ReferenceScene {
     }
 
     /// The Gaussians of one anchor that this view draws, in the order of their offsets.
-    fn splats_of(&self, anchor: usize, camera: &Camera) -> Vec<Splat> {
+    fn splats_of(&self, anchor: usize, camera: &Camera, quality: Quality) -> Vec<Splat> {
         let (n_features, n_offsets) = (self.shape.feature_dim, self.shape.n_offsets);
         let position = self.positions[anchor];
         let log_scales = &self.log_scales[anchor * 6..][..6];
@@ -139,7 +150,7 @@ impl ReferenceScene {
             let rotation = rotation_of([w / norm, x / norm, y / norm, z / norm]);
             let axes = rotation * DMat3::from_diagonal(scale);
             let mut colour = DVec3::from_slice(&colours[k * 3..]).map(sigmoid);
-            if let Some(detail) = &self.heads.detail {
+            if let Some(detail) = self.heads.detail.as_ref().filter(|_| quality.detail) {
                 let feature = &self.features[anchor * n_features..][..n_features];
                 colour += DVec3::from_slice(&evaluate(detail, &[feature, &colour.to_array()].concat()));
             }
@@ -150,6 +161,7 @@ impl ReferenceScene {
                 colour,
                 self.shape.dilation_compensation,
                 camera,
+                f64::from(quality.alpha_cut),
             ));
         }
         splats
@@ -221,6 +233,7 @@ fn splat(
     colour: DVec3,
     compensate: bool,
     camera: &Camera,
+    alpha_cut: f64,
 ) -> Option<Splat> {
     let (mean_px, depth, [xx, xy, yy]) = project(position, covariance, camera)?;
     let plain_determinant = xx * yy - xy * xy;
@@ -236,8 +249,9 @@ fn splat(
     if opacity < ALPHA_MIN {
         return None;
     }
-    // alpha ≥ ALPHA_MIN is an ellipse; its box is √(reach²·Σ'xx) by √(reach²·Σ'yy).
-    let reach_squared = 2.0 * (opacity / ALPHA_MIN).ln();
+    let opacity = opacity + (alpha_cut - 1.0) * ALPHA_MIN;
+    // Where alpha is large enough is an ellipse; its box is √(reach²·Σ'xx) by √(reach²·Σ'yy).
+    let reach_squared = 2.0 * (opacity / (alpha_cut * ALPHA_MIN)).ln();
     Some(Splat {
         depth,
         mean_px,

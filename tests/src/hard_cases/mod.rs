@@ -15,6 +15,7 @@ mod captures;
 mod codec;
 mod gathered;
 mod layers;
+mod qualities;
 mod refusals;
 mod roundings;
 mod scales;
@@ -136,10 +137,18 @@ pub fn families() -> Vec<Family> {
         codec::family(),
         arithmetic::family(),
         roundings::family(),
+        qualities::family(),
         captures::family(),
         training::family(),
         refusals::family(),
     ]
+}
+
+/// The pictures of all families.
+fn pictures() -> impl Iterator<Item = Case> {
+    let families = [splats::family, cameras::family, layers::family, scales::family, scenes::family, codec::family];
+    let cases = families.into_iter().chain([arithmetic::family as fn() -> Family]).flat_map(|family| family().cases);
+    cases.filter(|case| matches!(case.probe, Probe::Picture { .. }))
 }
 
 /// A picture with something in it and the usual bounds.

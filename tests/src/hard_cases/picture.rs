@@ -152,7 +152,7 @@ impl Picture {
     }
 }
 
-fn background() -> [f64; 3] {
+pub(super) fn background() -> [f64; 3] {
     BACKGROUND.map(|byte| f64::from(byte) / 255.0)
 }
 

@@ -5,7 +5,7 @@ use pocketsplat::cost::Choice;
 use pocketsplat_core::Bundle;
 
 use super::picture::worst_tile;
-use super::{Case, Family, Probe, arithmetic, cameras, codec, error, layers, scales, scenes, splats};
+use super::{Case, Family, Probe, error, pictures};
 use crate::frame::{draw, draw_in, info_for, to_core};
 
 const ANALYSIS: &str = "\
@@ -19,10 +19,8 @@ flank rises by 1.1 a pixel: 28 steps along an edge one pixel wide, 32 with the o
 
 /// The worst channel of all pictures, and the worst mean of a tile, against the exact decoder; steps of 8 bits.
 fn worst(choice: Choice) -> [f64; 2] {
-    let families = [splats::family, cameras::family, layers::family, scales::family, scenes::family, codec::family];
-    let cases = families.into_iter().chain([arithmetic::family as fn() -> Family]).flat_map(|family| family().cases);
     let mut worst = [0.0_f64; 2];
-    for case in cases {
+    for case in pictures() {
         let Probe::Picture { picture, .. } = case.probe else { continue };
         let picture = picture();
         let info = info_for(&picture.camera);

@@ -107,6 +107,10 @@ pub struct Mixed;
 #[derive(Clone, Copy, Debug)]
 pub struct Wide;
 
+/// Splats in 20 bytes, every number in 16 bits: centres in eighths of a pixel, the order by the upper half of the depth.
+#[derive(Clone, Copy, Debug)]
+pub struct Narrow;
+
 /// Which record a choice of splats stands for.
 pub(crate) trait SplatChoice {
     type Record: SplatRecord;

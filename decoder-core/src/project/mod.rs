@@ -5,6 +5,7 @@
 mod band;
 mod covariance;
 mod cull;
+mod narrow;
 mod packed;
 mod splat;
 mod view;

@@ -100,7 +100,7 @@ impl SplatRecord for PackedSplat {
 
 /// Rounds a precision to eleven bits, as a half has them; but six bits of exponent and no sign, because precisions lie
 /// between 1/0.3 px⁻², the dilation's, and those of splats far larger than a frame whose rim alone may cross it.
-fn pack_precision(precision: f32) -> u16 {
+pub(super) fn pack_precision(precision: f32) -> u16 {
     let above = precision.to_bits().saturating_sub(LEAST_PRECISION);
     let rounded = above.saturating_add(1 << (DIGITS_DROPPED - 1)) >> DIGITS_DROPPED;
     // Not reached: the largest stands for 4.
@@ -108,7 +108,7 @@ fn pack_precision(precision: f32) -> u16 {
 }
 
 #[inline]
-fn unpack_precision(packed: u16) -> f32 {
+pub(super) fn unpack_precision(packed: u16) -> f32 {
     f32::from_bits((u32::from(packed) << DIGITS_DROPPED).wrapping_add(LEAST_PRECISION))
 }
 

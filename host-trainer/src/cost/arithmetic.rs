@@ -1,8 +1,8 @@
 //! The decoder's choices of arithmetic by name: types there, values here.
 
 use pocketsplat_core::arithmetic::{
-    Arithmetic, Depth16, Depth32, Exact, F16, F32, Fast, I8, I16, Ieee, Libm, Mixed, Polynomial, Precise, Quick,
-    QuickWithoutFpu, Rgb565, Rgb565Dithered, StrictF16, Table, Wide, With,
+    Arithmetic, Depth16, Depth32, Exact, F16, F32, Fast, I8, I16, Ieee, Libm, Mixed, Narrow, Polynomial, Precise,
+    Quick, QuickWithoutFpu, Rgb565, Rgb565Dithered, StrictF16, Table, Wide, With,
 };
 
 /// Names each choice once, and calls a generic function for it.
@@ -58,6 +58,7 @@ choices! {
     Polynomial, "functions", "polynomial", With<F32, Polynomial>, "Functions right to 10⁻⁴.";
     Table, "functions", "table", With<F32, Table>, "Functions from a table.";
     Fast, "roots", "fast", With<F32, Precise, Fast>, "Roots right to 10⁻⁶.";
+    Narrow, "splats", "16 bits", With<F32, Precise, Ieee, Narrow>, "Splats in 20 bytes.";
     Wide, "splats", "f32", With<F32, Precise, Ieee, Wide>, "Splats in 40 bytes.";
     Depth16, "depth keys", "16 bits", With<F32, Precise, Ieee, Mixed, Depth16>, "Order by the upper half of the depth.";
     Rgb565, "colours", "5-6-5", With<F32, Precise, Ieee, Mixed, Depth32, Rgb565>, "5, 6 and 5 bits a channel.";

@@ -54,7 +54,7 @@ fn options_that_contradict_each_other_are_refused() {
 fn a_run_too_short_to_measure_keeps_its_effects_and_says_so() {
     let output = folder("short-effects").join("a.psb");
     let said = succeeds(train(&output).args(["--effects", "auto"]));
-    assert!(said.contains("effects: view-direction; a run needs 2000 iterations"), "{said}");
+    assert!(said.contains("effects: view-direction; a run needs 16000 iterations"), "{said}");
     let said = succeeds(train(&output).args(["--effects", "auto", "--set", "effects.least_iterations=1"]));
     assert!(said.contains("effects: view-direction; the capture has too few training views"), "{said}");
     let said = succeeds(&mut train(&output));

@@ -60,8 +60,12 @@ impl Band {
     pub(crate) fn between_depths(self, view: &View, from: f32, end: f32) -> Self {
         let [_, _, row_z] = view.rotation;
         let [_, _, tz] = view.translation;
-        let side =
-            |sign: f32, depth: f32| Side { normal: row_z.map(|z| sign * z), shift: sign * (tz - depth), stretch: 0.0 };
+        // A depth is rounded before it is compared, here the difference is: of a centre next to a border one says before, the
+        // other behind.
+        let side = |sign: f32, depth: f32| {
+            let shift = sign * (tz - depth) + ROUNDING * (tz.abs() + depth);
+            Side { normal: row_z.map(|z| sign * z), shift, stretch: 0.0 }
+        };
         Self { depths: Some([side(1.0, from), side(-1.0, end)]), ..self }
     }
 
@@ -146,7 +150,7 @@ impl Side {
 
 #[cfg(test)]
 mod tests {
-    use super::View;
+    use super::{Band, View};
     use crate::arithmetic::Exact;
     use crate::camera::Camera;
     use crate::scene::{Anchor, Gaussian};
@@ -238,5 +242,36 @@ mod tests {
         assert!(n_kept * 3 < n_needless, "{n_kept} of {n_needless} needless anchors are kept");
         assert!(n_kept_in_slab * 5 < n_needless_in_slab, "{n_kept_in_slab} of {n_needless_in_slab} in slabs");
         assert!(n_boxes_kept * 2 < n_needless, "{n_boxes_kept} of {n_needless} needless boxes are kept");
+    }
+
+    #[test]
+    fn a_depth_that_rounding_moves_onto_a_border_is_not_left_out() {
+        let random = &mut Numbers(2);
+        let mut camera = Camera {
+            rotation: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+            translation: [0.0; 3],
+            focal_px: [80.0; 2],
+            principal_px: [40.0, 45.0],
+            width_px: 80,
+            height_px: HEIGHT_PX,
+        };
+        for _ in 0..1000 {
+            camera.translation[2] = random.between(1.0, 9.0);
+            let view = View::new(&camera).expect("a sound camera");
+            let z = random.between(-2e-7, 2e-7);
+            let anchor = Anchor {
+                position: [0.0, 0.0, z],
+                feature: &[],
+                extent: [0.1; 3],
+                base_scale: [0.1; 3],
+                offsets: &[[0.0; 3]],
+                mask: 1,
+            };
+            let depth = z + camera.translation[2];
+            for (from, end) in [(depth, f32::INFINITY), (0.0, depth.next_up())] {
+                let slab = Band::WHOLE.between_depths(&view, from, end);
+                assert!(slab.sees_anchor(&anchor), "{view:?}, {slab:?}, {anchor:?}");
+            }
+        }
     }
 }

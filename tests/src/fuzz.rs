@@ -33,7 +33,7 @@ pub fn parse(bytes: &[u8]) {
         assert!(bundle.tier(tier).is_some() && bundle.measures(tier).is_some(), "tier {tier}");
     }
     let mut weights = bundle.heads().weights();
-    assert!((0..6).all(|_| weights.next_layer().all(f32::is_finite)), "weights are finite");
+    assert!((0..10).all(|_| weights.next_layer().all(f32::is_finite)), "weights are finite");
 }
 
 /// A bundle draws or is refused, and with damage left out it draws or is refused for another reason.

@@ -14,6 +14,8 @@ pub struct Effects {
     pub dilation_compensation: bool,
     /// A detail head adds a residual to each Gaussian's colour.
     pub detail: bool,
+    /// The heads see a mixture of the feature at three resolutions, weighted by where it is seen from.
+    pub feature_bank: bool,
 }
 
 /// What a bundle requires of its decoder: the scene's effects, and how its numbers are stored.
@@ -31,8 +33,8 @@ pub struct Features {
 }
 
 impl Features {
-    /// Bits that have a meaning in this version.
-    const N_BITS: u32 = 7;
+    /// Bits that have a meaning in this version; 7 and 8 have none.
+    const KNOWN: u32 = 0b10_0111_1111;
 
     /// What this decoder is built with.
     const BUILT: u32 = {
@@ -42,6 +44,7 @@ impl Features {
             view_distance: view,
             dilation_compensation: cfg!(feature = "dilation-compensation"),
             detail: cfg!(feature = "detail"),
+            feature_bank: cfg!(feature = "feature-bank"),
         };
         Self { effects, masks: true, context: cfg!(feature = "context"), coded_heads: true }.to_bits()
     };
@@ -49,7 +52,7 @@ impl Features {
     /// The bits as the header stores them.
     #[must_use]
     pub const fn to_bits(self) -> u32 {
-        let Effects { view_direction, view_distance, dilation_compensation, detail } = self.effects;
+        let Effects { view_direction, view_distance, dilation_compensation, detail, feature_bank } = self.effects;
         (view_direction as u32)
             | (view_distance as u32) << 1
             | (dilation_compensation as u32) << 2
@@ -57,6 +60,7 @@ impl Features {
             | (self.context as u32) << 4
             | (self.coded_heads as u32) << 5
             | (detail as u32) << 6
+            | (feature_bank as u32) << 9
     }
 
     /// The features that `bits` stand for.
@@ -65,7 +69,7 @@ impl Features {
     /// [`DecodeError::UnsupportedFeatures`] with the bits that have no meaning in this version;
     /// [`DecodeError::NotBuilt`] with what the decoder was built without.
     pub fn from_bits(bits: u32) -> Result<Self, DecodeError> {
-        let unknown_bits = bits >> Self::N_BITS << Self::N_BITS;
+        let unknown_bits = bits & !Self::KNOWN;
         if unknown_bits != 0 {
             return Err(DecodeError::UnsupportedFeatures { unknown_bits });
         }
@@ -80,6 +84,7 @@ impl Features {
                 view_distance: has(2),
                 dilation_compensation: has(4),
                 detail: has(64),
+                feature_bank: has(512),
             },
             masks: has(8),
             context: has(16),
@@ -97,19 +102,31 @@ mod tests {
 
     #[test]
     fn known_bits_come_back_and_unknown_ones_are_named() {
-        for bits in 0..128 {
-            let missing_bits = bits & !Features::BUILT;
-            let expected = if missing_bits == 0 { Ok(bits) } else { Err(DecodeError::NotBuilt { missing_bits }) };
+        for bits in 0..1024 {
+            let [unknown_bits, missing_bits] = [bits & !Features::KNOWN, bits & !Features::BUILT];
+            let expected = match (unknown_bits, missing_bits) {
+                (0, 0) => Ok(bits),
+                (0, _) => Err(DecodeError::NotBuilt { missing_bits }),
+                _ => Err(DecodeError::UnsupportedFeatures { unknown_bits }),
+            };
             assert_eq!(Features::from_bits(bits).map(Features::to_bits), expected, "bits {bits:#b}");
         }
-        let error = DecodeError::UnsupportedFeatures { unknown_bits: 0x8000_0080 };
-        assert_eq!(Features::from_bits(0x8000_0081), Err(error), "the first and the last unknown bit");
+        let error = DecodeError::UnsupportedFeatures { unknown_bits: 0x8000_0400 };
+        assert_eq!(Features::from_bits(0x8000_0401), Err(error), "the first after the known ones and the last");
     }
 
     #[test]
     fn what_a_decoder_is_built_without_is_named() {
         let text = |missing_bits| DecodeError::NotBuilt { missing_bits }.to_string();
-        for (bits, name) in [(1, "view"), (2, "view"), (4, "dilation-compensation"), (16, "context"), (64, "detail")] {
+        let all = [
+            (1, "view"),
+            (2, "view"),
+            (4, "dilation-compensation"),
+            (16, "context"),
+            (64, "detail"),
+            (512, "feature-bank"),
+        ];
+        for (bits, name) in all {
             assert!(text(bits).contains(name), "{bits:#b}: {}", text(bits));
         }
         assert!(!text(64).contains("context"), "nothing else: {}", text(64));

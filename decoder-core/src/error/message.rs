@@ -19,8 +19,13 @@ impl fmt::Display for DecodeError {
                     f,
                     "the bundle needs what this decoder was built without; build pocketsplat-core with the features"
                 )?;
-                let names =
-                    [(0b11, "view"), (0b100, "dilation-compensation"), (0b1_0000, "context"), (0b100_0000, "detail")];
+                let names = [
+                    (0b11, "view"),
+                    (0b100, "dilation-compensation"),
+                    (0b1_0000, "context"),
+                    (0b100_0000, "detail"),
+                    (0b10_0000_0000, "feature-bank"),
+                ];
                 for (_, name) in names.into_iter().filter(|(bits, _)| missing_bits & bits != 0) {
                     write!(f, " {name}")?;
                 }

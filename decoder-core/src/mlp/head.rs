@@ -1,5 +1,6 @@
 //! A head: hidden layer with ReLU, output layer of one block per offset.
 
+use super::bank::Bank;
 use super::block::{Blocks, outputs};
 use super::detail::Detail;
 use super::numbers::{HeadNumbers, TwoLayers};
@@ -26,6 +27,7 @@ pub(crate) struct Heads<'s, N: HeadNumbers> {
     pub(crate) covariance: N::Head<'s, 7>,
     pub(crate) colour: N::Head<'s, 3>,
     pub(crate) detail: Option<Detail<'s, N::Detail>>,
+    pub(crate) bank: Option<Bank<'s>>,
 }
 
 impl<'s, N: HeadNumbers> Heads<'s, N> {
@@ -42,6 +44,16 @@ impl<'s, N: HeadNumbers> Heads<'s, N> {
                 Some(head) if cfg!(feature = "detail") && shape.detail > 0 => {
                     Some(Detail::convert(arena, head, &mut weights)?)
                 }
+                // Left out of the plan, and before the next in the file.
+                Some(_) if cfg!(feature = "feature-bank") => {
+                    weights.next_layer().for_each(drop);
+                    weights.next_layer().for_each(drop);
+                    None
+                }
+                _ => None,
+            },
+            bank: match &heads.bank {
+                Some(head) if cfg!(feature = "feature-bank") => Some(Bank::convert(arena, head, &mut weights)?),
                 _ => None,
             },
         })

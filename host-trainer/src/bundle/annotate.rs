@@ -114,10 +114,11 @@ impl<'f> Annotator<'f> {
 
     fn heads(&mut self, section: &Section) {
         let heads = *self.bundle.heads();
-        let names = ["opacity", "covariance", "colour", "detail"];
+        let detail = heads.detail.map(|_| "detail");
+        let names = ["opacity", "covariance", "colour"].into_iter().chain(detail).chain(["feature bank"]);
         let dump = &mut self.dump;
         let Some(coded) = heads.coded() else {
-            for (name, head) in names.into_iter().zip(heads.each()) {
+            for (name, head) in names.zip(heads.each()) {
                 dump.heading(&format!("{name} head"));
                 let (w1, w2) = (head.n_hidden * head.n_in, head.n_out * head.n_hidden);
                 for (part, n) in [("W1", w1), ("b1", head.n_hidden), ("W2", w2), ("b2", head.n_out)] {
@@ -132,7 +133,7 @@ impl<'f> Annotator<'f> {
             table_record(dump, table.n_symbols());
         }
         dump.heading("heads, biases");
-        for (name, head) in names.into_iter().zip(heads.each()) {
+        for (name, head) in names.zip(heads.each()) {
             dump.array(&format!("{name} b1"), head.n_hidden, f16::from_le_bytes);
             dump.array(&format!("{name} b2"), head.n_out, f16::from_le_bytes);
         }

@@ -36,7 +36,7 @@ pub(super) fn section(heads: &Heads<f32>, fraction_bits: Option<[u8; 2]>) -> Res
 
 fn raw(heads: &Heads<f32>) -> Result<Vec<u8>, WriteError> {
     let mut bytes = Vec::new();
-    for (head, name) in heads.each().zip(["opacity", "covariance", "colour", "detail"]) {
+    for (head, name) in heads.each().zip(heads.names()) {
         for (index, &value) in head.groups().into_iter().flatten().enumerate() {
             let weight = f16::from_f32(value);
             if !weight.is_finite() {

@@ -39,8 +39,8 @@ pub(crate) struct Settings {
     feature_dim: Option<usize>,
     #[arg(long, value_name = "K", help = with_default("Gaussians of an anchor", TrainConfig::default().shape.n_offsets))]
     offsets: Option<usize>,
-    /// What the scene takes into account, of view-direction, view-distance, dilation-compensation and detail: auto trains short
-    /// pilots and keeps what pays; none, all, +NAME and -NAME in a list force. [default: view-direction]
+    /// What the scene takes into account, of view-direction, view-distance, dilation-compensation, detail and feature-bank: auto
+    /// trains short pilots and keeps what pays; none, all, +NAME and -NAME in a list force. [default: view-direction]
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     effects: Option<Request>,
     /// Do not show the heads the direction of view.
@@ -186,6 +186,7 @@ impl Settings {
             Effect::ViewDistance => self.view_distance.is_some(),
             Effect::DilationCompensation => self.dilation_compensation.is_some(),
             Effect::Detail => self.modules.iter().flatten().any(|name| name == effect.name() || name == "none"),
+            Effect::FeatureBank => false,
         };
         by_option || self.set.iter().any(|key| key.trim_start().starts_with(effect.key()))
     }

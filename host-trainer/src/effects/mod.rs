@@ -28,13 +28,17 @@ pub enum Effect {
     DilationCompensation,
     /// The detail module's head adds to colours.
     Detail,
+    /// The heads see features at several resolutions, mixed by where they are seen from.
+    FeatureBank,
 }
 
 impl Effect {
     /// All there are, in the order in which they are measured and named.
-    pub const ALL: [Self; 4] = [Self::ViewDirection, Self::ViewDistance, Self::DilationCompensation, Self::Detail];
+    pub const ALL: [Self; 5] =
+        [Self::ViewDirection, Self::ViewDistance, Self::DilationCompensation, Self::Detail, Self::FeatureBank];
 
-    /// Those that are measured: at one size of the image dilation compensation shows nothing of what it is for.
+    /// Those that are measured: at one size of the image dilation compensation shows nothing of what it is for, and a feature bank
+    /// calls for a feature width divisible by 4, which HAC's is not.
     pub const MEASURED: [Self; 3] = [Self::ViewDirection, Self::ViewDistance, Self::Detail];
 
     /// Its name on the command line.
@@ -44,6 +48,7 @@ impl Effect {
             Self::ViewDistance => "view-distance",
             Self::DilationCompensation => "dilation-compensation",
             Self::Detail => "detail",
+            Self::FeatureBank => "feature-bank",
         }
     }
 
@@ -54,6 +59,7 @@ impl Effect {
             Self::ViewDistance => "train.shape.view_distance",
             Self::DilationCompensation => "train.shape.dilation_compensation",
             Self::Detail => "train.modules.detail",
+            Self::FeatureBank => "train.shape.feature_bank",
         }
     }
 
@@ -64,6 +70,7 @@ impl Effect {
             Self::ViewDistance => config.shape.view_distance,
             Self::DilationCompensation => config.shape.dilation_compensation,
             Self::Detail => config.modules.detail.is_some(),
+            Self::FeatureBank => config.shape.feature_bank,
         }
     }
 
@@ -81,6 +88,7 @@ impl Effect {
                 config.modules.detail = None;
                 config.shape.detail_hidden = 0;
             }
+            Self::FeatureBank => config.shape.feature_bank = on,
         }
     }
 

@@ -85,7 +85,7 @@ mod tests {
         };
         assert_eq!(forced("+detail,-view-distance"), [(Detail, true), (ViewDistance, false)]);
         assert_eq!(forced("detail"), [(Detail, true)]);
-        assert_eq!(forced("none").len(), 4);
+        assert_eq!(forced("none").len(), Effect::ALL.len());
         assert!(forced("none").iter().all(|(_, on)| !on) && forced("all").iter().all(|(_, on)| *on));
         let all_but = forced("all, -dilation-compensation");
         assert!(all_but.contains(&(DilationCompensation, false)) && all_but.contains(&(ViewDirection, true)));

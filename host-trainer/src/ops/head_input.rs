@@ -3,10 +3,22 @@
 use super::{Pinhole, Real};
 use crate::scene::ModelShape;
 
+/// The direction (x_a − c)/‖x_a − c‖ to an anchor, zero at the camera itself, and the distance ‖x_a − c‖ in normalised units.
+///
+/// * `position`: world frame.
+pub fn seen_from<R: Real>(camera: &Pinhole<R>, position: [R; 3]) -> ([R; 3], R) {
+    let mut ray = position;
+    for (r, c) in ray.iter_mut().zip(camera.centre_world) {
+        *r -= c;
+    }
+    let distance = (ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2]).sqrt();
+    let inverse = if distance > R::ZERO { R::ONE / distance } else { R::ZERO };
+    (ray.map(|r| r * inverse), distance)
+}
+
 /// Writes the input rows `[feature F, direction 3, distance 1]` of some anchors, the last two if the shape has them.
 ///
-/// direction = (x_a − c)/‖x_a − c‖ (zero at the camera itself), distance = ‖x_a − c‖ in normalised units
-/// (Lu et al. 2024, Scaffold-GS, section 3.2.1).
+/// Both are those of [`seen_from`] (Lu et al. 2024, Scaffold-GS, section 3.2.1).
 ///
 /// * `features`: `[n, F]`. * `positions`: `[n]`, world frame. * `out`: `[n, shape.head_inputs()]`, overwritten.
 pub fn forward<R: Real>(shape: &ModelShape, camera: &Pinhole<R>, features: &[R], positions: &[[R; 3]], out: &mut [R]) {
@@ -17,18 +29,11 @@ pub fn forward<R: Real>(shape: &ModelShape, camera: &Pinhole<R>, features: &[R],
     {
         let (head, tail) = row.split_at_mut(shape.feature_dim);
         head.copy_from_slice(feature);
-        let mut ray = *position;
-        for (r, c) in ray.iter_mut().zip(camera.centre_world) {
-            *r -= c;
-        }
-        let distance = (ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2]).sqrt();
+        let (direction, distance) = seen_from(camera, *position);
         let mut rest = tail;
         if shape.view_direction {
-            let inverse = if distance > R::ZERO { R::ONE / distance } else { R::ZERO };
-            let (direction, after) = rest.split_at_mut(3);
-            for (d, r) in direction.iter_mut().zip(ray) {
-                *d = r * inverse;
-            }
+            let (slots, after) = rest.split_at_mut(3);
+            slots.copy_from_slice(&direction);
             rest = after;
         }
         if let Some(last) = rest.first_mut() {

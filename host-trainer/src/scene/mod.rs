@@ -7,7 +7,7 @@ mod heads;
 pub mod init;
 
 pub use context::ContextModel;
-pub use heads::{Head, Heads, OutputLayout};
+pub use heads::{BANK_WEIGHTS, Head, Heads, OutputLayout};
 
 /// What a model consists of: its widths and the effects it pays for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -28,6 +28,10 @@ pub struct ModelShape {
     /// Hidden width of the detail head; 0: there is none.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub detail_hidden: usize,
+    /// The heads see the feature at three resolutions, mixed by where it is seen from ([`crate::ops::feature_bank`]); F is then
+    /// divisible by 4.
+    #[serde(default)]
+    pub feature_bank: bool,
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference")]
@@ -46,17 +50,18 @@ impl ModelShape {
             dilation_compensation: false,
             colour_hidden: 0,
             detail_hidden: 0,
+            feature_bank: false,
         }
     }
 
-    /// Inputs of every head: feature, then direction (3), then distance (1), the last two if present.
+    /// Inputs of the first three heads: feature, then direction (3), then distance (1), the last two if present.
     pub fn head_inputs(&self) -> usize {
         self.feature_dim + 3 * usize::from(self.view_direction) + usize::from(self.view_distance)
     }
 
-    /// Whether the heads see anything of the view: if not, a Gaussian is the same in every frame.
+    /// Whether the heads see anything of the view, if only through the feature bank: if not, a Gaussian is the same in every frame.
     pub fn sees_view(&self) -> bool {
-        self.view_direction || self.view_distance
+        self.view_direction || self.view_distance || self.feature_bank
     }
 
     /// Hidden width of the colour head.

@@ -8,7 +8,7 @@ use crate::context::Context;
 use crate::entropy::testing::{AnsWriter, slot_of};
 use crate::entropy::{Children, MaskModel, Slot, SymbolModel, TrieModel};
 
-pub(super) const F: usize = 2;
+pub(super) const F: usize = 4;
 pub(super) const K: usize = 3;
 pub(super) const C: usize = F + 6 + 3 * K;
 const N_HIDDEN: usize = 3;
@@ -28,6 +28,8 @@ pub(super) struct Variant {
     pub(super) context: bool,
     pub(super) coded_heads: bool,
     pub(super) detail: bool,
+    /// A feature bank, if decoders are built with it.
+    pub(super) bank: bool,
     /// A section of an unknown kind before the manifest.
     pub(super) unknown_section: bool,
 }
@@ -83,6 +85,9 @@ fn layers(variant: Variant) -> Vec<(usize, usize)> {
     let mut layers = vec![(n_in, F), (F, K), (n_in, F), (F, 7 * K), (n_in, F), (F, 3 * K)];
     if variant.detail {
         layers.extend([(F + 3, detail), (detail, 3)]);
+    }
+    if variant.bank {
+        layers.extend([(4, F), (F, 3)]);
     }
     layers
 }
@@ -278,7 +283,8 @@ pub(super) fn bundle(variant: Variant) -> Vec<u8> {
         }
         tier_records.extend(u32s(&[n_chunks, n_anchors, chunks.len() as u32]));
     }
-    let ink_frame = f32s(&[-100.0, -100.0, -100.0, 2.0, 2.0, 2.0]);
+    // Escaped symbols put offsets anywhere.
+    let ink_frame = f32s(&[-1e30, -1e30, -1e30, 2e28, 2e28, 2e28]);
     let directory = [tier_records, ink_frame, chunk_records].concat();
     let manifest: Vec<u8> = (0..3)
         .flat_map(|tier| {
@@ -303,7 +309,8 @@ pub(super) fn bundle(variant: Variant) -> Vec<u8> {
         | u32::from(variant.masks) << 3
         | u32::from(variant.context) << 4
         | u32::from(variant.coded_heads) << 5
-        | u32::from(variant.detail) << 6;
+        | u32::from(variant.detail) << 6
+        | u32::from(variant.bank) << 9;
     let camera = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 6.0, 30.0, 30.0, 16.0, 12.0];
     let mut file = [
         MAGIC.to_vec(),

@@ -52,13 +52,15 @@ fn scene(seed: u64, shape: ModelShape) -> Scene<f64> {
     scene
 }
 
-fn shapes() -> [ModelShape; 4] {
+fn shapes() -> [ModelShape; 6] {
     let base = ModelShape { view_direction: true, ..ModelShape::plain(6, 3) };
     [
         base,
         ModelShape { view_distance: true, dilation_compensation: true, ..base },
         ModelShape { view_direction: false, n_offsets: 1, ..base },
         ModelShape { detail_hidden: 5, colour_hidden: 8, ..base },
+        ModelShape { feature_bank: true, ..ModelShape::plain(4, 2) },
+        ModelShape { feature_bank: true, detail_hidden: 3, feature_dim: 8, ..base },
     ]
 }
 

@@ -19,7 +19,7 @@ fn bound(choice: Choice) -> f64 {
         Choice::StrictF16 => 3.0,
         Choice::Rgb565 => 3.0,
         Choice::Rgb565Dithered => 4.0,
-        Choice::I8 | Choice::Depth16 | Choice::FastPolynomialDepth16 => 8.0,
+        Choice::I8 | Choice::Depth16 | Choice::FastPolynomialDepth16 | Choice::Narrow => 8.0,
     }
 }
 

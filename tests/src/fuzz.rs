@@ -69,7 +69,7 @@ fn symbols_fit(bundle: &Bundle<'_>) -> bool {
     let [feature, log_scale, offset] = header.symbol_bits;
     let bits_of = |channel: usize| match channel.checked_sub(n_features) {
         None => feature,
-        Some(0..6) => log_scale,
+        Some(index) if index < usize::from(header.n_log_scales()) => log_scale,
         Some(_) => offset,
     };
     let mut words = vec![0; bundle.anchor_scratch_words()];

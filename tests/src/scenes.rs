@@ -31,9 +31,14 @@ const DETAILED: ModelShape = ModelShape { colour_hidden: 20, detail_hidden: 9, .
 /// Features mixed by the view, which the heads do not see otherwise.
 const BANKED: ModelShape = ModelShape { feature_bank: true, ..shape(8, 3, [false, false, false]) };
 const BANKED_DETAILED: ModelShape = ModelShape { feature_bank: true, view_distance: true, ..DETAILED };
+/// Balls.
+const ISOTROPIC: ModelShape = ModelShape { anisotropic: false, ..shape(12, 4, [true, false, false]) };
+
+/// Balls that look the same from everywhere, so that they may be baked.
+const PLAIN_ISOTROPIC: ModelShape = ModelShape { anisotropic: false, ..shape(8, 3, [false, false, true]) };
 
 /// Every effect on and off, narrow and wide, fewer anchors than a chunk holds and several chunks.
-pub const CASES: [Case; 9] = [
+pub const CASES: [Case; 11] = [
     Case { name: "device", shape: shape(16, 4, [true, true, false]), n_anchors: 700, seed: 1 },
     Case { name: "plain", shape: shape(8, 2, [false, false, false]), n_anchors: 300, seed: 2 },
     Case { name: "direction", shape: shape(12, 3, [true, false, false]), n_anchors: 129, seed: 3 },
@@ -43,6 +48,8 @@ pub const CASES: [Case; 9] = [
     Case { name: "detailed", shape: DETAILED, n_anchors: 400, seed: 8 },
     Case { name: "banked", shape: BANKED, n_anchors: 300, seed: 9 },
     Case { name: "banked, detailed", shape: BANKED_DETAILED, n_anchors: 400, seed: 11 },
+    Case { name: "isotropic", shape: ISOTROPIC, n_anchors: 400, seed: 12 },
+    Case { name: "plain isotropic", shape: PLAIN_ISOTROPIC, n_anchors: 300, seed: 13 },
 ];
 
 /// Few bytes, so that every one of them can be damaged in turn.
@@ -71,7 +78,7 @@ pub fn random_scene(case: &Case) -> Scene<f32> {
     let n = case.n_anchors;
     anchors.features = (0..n * f).map(|_| rng.random_range(-1.0..1.0)).collect();
     // e^-3.2 … e^-1.2: 0.04 … 0.3 units.
-    anchors.log_scales = (0..n * 6).map(|_| rng.random_range(-3.2..-1.2)).collect();
+    anchors.log_scales = (0..n * case.shape.n_log_scales()).map(|_| rng.random_range(-3.2..-1.2)).collect();
     anchors.mask_logits = vec![1.0; n * k];
     anchors.offsets = (0..n * k * 3).map(|_| rng.random_range(-1.0..1.0)).collect();
     let mut heads = Heads::filled(&case.shape, 0.0_f32);

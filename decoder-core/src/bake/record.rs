@@ -2,8 +2,9 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use crate::bundle::Effects;
 use crate::math::{from_half, to_half};
-use crate::scene::Gaussian;
+use crate::scene::{Gaussian, NO_ROTATION};
 
 /// Largest number of 12 bits, for colours.
 const MAX_12: u32 = (1 << 12) - 1;
@@ -52,22 +53,26 @@ impl BakedGaussian {
     }
 
     /// What a Gaussian is in every frame, whether it is kept or evaluated again.
-    pub(crate) fn rounded(gaussian: &Gaussian) -> Gaussian {
-        Self::new(gaussian).unpack()
+    pub(crate) fn rounded(gaussian: &Gaussian, effects: Effects) -> Gaussian {
+        Self::new(gaussian).unpack(effects)
     }
 
     /// The Gaussian, rounded.
     ///
     /// # Budget
-    /// About 40 multiplications and shifts, a square root.
+    /// About 40 multiplications and shifts, a square root; less where Gaussians are isotropic, which have no rotation.
     #[inline]
-    pub(crate) fn unpack(&self) -> Gaussian {
+    pub(crate) fn unpack(&self, effects: Effects) -> Gaussian {
         let [w3, w4, w5, w6, w7] = self.words;
         let colour = |word: u32| COLOUR_MIN + COLOUR_RANGE * ((word >> 20) as f32 * (1.0 / MAX_12 as f32));
         Gaussian {
             centre: self.centre,
             scale: [w3, w3 >> 15, w4].map(unpack_scale),
-            rotation: unit_quaternion(w3 >> 30, [w5, w6, w7]),
+            rotation: if cfg!(feature = "anisotropy") && effects.anisotropic {
+                unit_quaternion(w3 >> 30, [w5, w6, w7])
+            } else {
+                NO_ROTATION
+            },
             opacity: ((w4 >> 15) & MAX_16) as f32 * (1.0 / MAX_16 as f32),
             colour: [w5, w6, w7].map(colour),
         }
@@ -131,8 +136,16 @@ fn unit_quaternion(largest: u32, others: [u32; 3]) -> [f32; 4] {
 
 #[cfg(test)]
 mod tests {
-    use super::BakedGaussian;
+    use super::{BakedGaussian, Effects};
     use crate::scene::Gaussian;
+
+    const ANISOTROPIC: Effects = Effects {
+        view_direction: false,
+        view_distance: false,
+        dilation_compensation: false,
+        detail: false,
+        anisotropic: true,
+    };
 
     #[test]
     fn a_gaussian_comes_back_within_its_steps() {
@@ -151,7 +164,7 @@ mod tests {
                 opacity: random(),
                 colour: [random(), 1.49 * random(), -0.5 * random()],
             };
-            let kept = BakedGaussian::new(&whole).unpack();
+            let kept = BakedGaussian::new(&whole).unpack(ANISOTROPIC);
             let near = |kept: f32, whole: f32, step: f32, what: &str| {
                 assert!((kept - whole).abs() <= step, "{what}: {kept} for {whole}");
             };
@@ -178,7 +191,7 @@ mod tests {
             opacity: 1.0,
             colour: [7.0, -7.0, f32::NAN],
         };
-        let kept = BakedGaussian::new(&beyond).unpack();
+        let kept = BakedGaussian::new(&beyond).unpack(ANISOTROPIC);
         assert_eq!(kept.colour, [1.5, -0.5, -0.5], "the ends of the range");
         assert_eq!((kept.scale, kept.opacity), ([65504.0, 0.0, f32::INFINITY], 1.0), "the largest half");
         assert!(kept.rotation[0] > 0.999_999 && kept.rotation[1].abs() < 2e-6, "no rotation: {:?}", kept.rotation);

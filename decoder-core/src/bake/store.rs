@@ -1,7 +1,7 @@
 //! Baked Gaussians in memory, chunk by chunk.
 
 use super::record::BakedGaussian;
-use crate::bundle::saturate;
+use crate::bundle::{Effects, saturate};
 use crate::error::{DecodeError, Field};
 use crate::scene::Gaussian;
 
@@ -89,10 +89,10 @@ impl BakedGaussians<'_> {
     }
 
     /// The Gaussians of a chunk in the order of the file, each with its number.
-    pub(crate) fn of_chunk(&self, chunk: u32) -> impl Iterator<Item = (u32, Gaussian)> {
+    pub(crate) fn of_chunk(&self, chunk: u32, effects: Effects) -> impl Iterator<Item = (u32, Gaussian)> {
         let [first, end] = self.range(chunk);
         let records = self.records.get(first as usize..end as usize).unwrap_or_default();
-        (first..).zip(records).map(move |(number, record)| (number, record.unpack()))
+        (first..).zip(records).map(move |(number, record)| (number, record.unpack(effects)))
     }
 
     fn range(&self, chunk: u32) -> [u32; 2] {
@@ -107,7 +107,7 @@ impl BakedGaussians<'_> {
 mod tests {
     use bytemuck::Zeroable;
 
-    use super::{BakedGaussian, BakedMemory, Baker, DecodeError, Field};
+    use super::{BakedGaussian, BakedMemory, Baker, DecodeError, Effects, Field};
     use crate::scene::Gaussian;
 
     #[test]
@@ -133,7 +133,8 @@ mod tests {
         let baked = baker.finish().expect("a place for each");
         assert_eq!([0, 1, 2, 3].map(|chunk| baked.n_of_chunk(chunk)), [2, 0, 1, 0], "the fourth is none");
         assert_eq!([0, 1, 2].map(|chunk| baked.is_damaged(chunk)), [false, true, false], "the second");
-        let kept: std::vec::Vec<f32> = baked.records.iter().map(|record| record.unpack().opacity).collect();
+        let kept: std::vec::Vec<f32> =
+            baked.records.iter().map(|record| record.unpack(Effects::default()).opacity).collect();
         let near = kept.iter().zip([0.1, 0.2, 0.3]).all(|(kept, whole)| (kept - whole).abs() < 2e-4);
         assert!(near && kept.len() == 3, "{kept:?}");
     }

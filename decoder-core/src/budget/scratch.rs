@@ -3,7 +3,9 @@
 use super::arena::{Arena, words_for};
 use super::work::Kept;
 use crate::bake::BakedGaussian;
-use crate::bundle::{Bundle, Coder, MAX_FEATURE_DIM, MAX_LATTICE_BITS, MAX_OFFSETS, RecordLayout, Tier, model_words};
+use crate::bundle::{
+    Bundle, Coder, MAX_FEATURE_DIM, MAX_LATTICE_BITS, MAX_OFFSETS, RecordLayout, Tier, model_words, n_log_scales,
+};
 use crate::context::{FEATURES_PER_LEVEL, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS};
 use crate::mlp::HeadShape;
 use crate::project::PackedSplat;
@@ -36,6 +38,8 @@ pub struct ScratchShape {
     pub feature_dim: u16,
     /// Offsets K of an anchor, 1..=[`MAX_OFFSETS`].
     pub n_offsets: u16,
+    /// Whether Gaussians have three deviations and a rotation.
+    pub anisotropic: bool,
     /// Inputs of the heads besides the feature, at most 4.
     pub n_view_inputs: u16,
     /// Hidden width of the colour head.
@@ -77,11 +81,12 @@ impl ScratchShape {
         Self {
             feature_dim,
             n_offsets,
+            anisotropic: true,
             n_view_inputs: 4,
             colour_hidden: MAX_FEATURE_DIM,
             detail_hidden: MAX_FEATURE_DIM,
             feature_bank: cfg!(feature = "feature-bank"),
-            n_tables: feature_dim.saturating_add(6).saturating_add(n_offsets.saturating_mul(3)),
+            n_tables: feature_dim.saturating_add(n_log_scales(true)).saturating_add(n_offsets.saturating_mul(3)),
             context_inputs: (MAX_CONTEXT_LEVELS as u16).saturating_mul(FEATURES_PER_LEVEL as u16),
             context_hidden: MAX_CONTEXT_HIDDEN,
             symbol_bits: [16; 3],
@@ -117,6 +122,7 @@ impl ScratchShape {
         Self {
             feature_dim: header.feature_dim,
             n_offsets: header.n_offsets,
+            anisotropic: header.features.effects.anisotropic,
             n_view_inputs: few(header.head_inputs()).saturating_sub(header.feature_dim),
             colour_hidden: header.colour_hidden,
             detail_hidden: header.detail_hidden,
@@ -203,6 +209,7 @@ impl ScratchShape {
         HeadShape {
             inputs: f.saturating_add(self.n_view_inputs as usize),
             feature: f,
+            covariance: if self.anisotropic { 7 } else { 1 },
             colour: limited(self.colour_hidden, MAX_FEATURE_DIM),
             detail: limited(self.detail_hidden, MAX_FEATURE_DIM),
             bank: cfg!(feature = "feature-bank") && self.feature_bank,
@@ -211,13 +218,16 @@ impl ScratchShape {
     }
 
     const fn n_channels(&self) -> usize {
-        (self.feature_dim as usize).saturating_add(6).saturating_add((self.n_offsets as usize).saturating_mul(3))
+        (self.feature_dim as usize)
+            .saturating_add(n_log_scales(self.anisotropic) as usize)
+            .saturating_add((self.n_offsets as usize).saturating_mul(3))
     }
 
     const fn record_layout(&self) -> RecordLayout {
         let masked_offsets = if self.masks { self.n_offsets } else { 0 };
         RecordLayout::new(
             self.feature_dim,
+            n_log_scales(self.anisotropic),
             self.n_offsets,
             self.symbol_bits,
             self.lattice_bits,
@@ -305,6 +315,7 @@ mod tests {
                 ScratchShape {
                     feature_dim: 1 + up_to(256),
                     n_offsets: 1 + up_to(32),
+                    anisotropic: up_to(2) == 1,
                     n_view_inputs: up_to(5),
                     colour_hidden: 1 + up_to(256),
                     detail_hidden: up_to(257),
@@ -328,6 +339,7 @@ mod tests {
             let both = ScratchShape {
                 feature_dim: a.feature_dim.max(b.feature_dim),
                 n_offsets: a.n_offsets.max(b.n_offsets),
+                anisotropic: a.anisotropic | b.anisotropic,
                 n_view_inputs: a.n_view_inputs.max(b.n_view_inputs),
                 colour_hidden: a.colour_hidden.max(b.colour_hidden),
                 detail_hidden: a.detail_hidden.max(b.detail_hidden),

@@ -8,7 +8,6 @@ use channels::{ChannelModels, ContextModels};
 pub(crate) use record::{AnchorRecords, RecordLayout, RecordMemory};
 
 use super::cursor::saturate;
-use super::header::Header;
 use super::lattice::Lattice;
 use super::tables::{IndexedTable, IndexedTables};
 use super::{Bundle, Coder};
@@ -32,7 +31,7 @@ pub struct AnchorSite {
 pub struct AnchorModels<'b, 's> {
     lattice: Lattice<'b>,
     masks: Option<MaskModel<'b>>,
-    /// F features and 6 log-scales.
+    /// F features and the log-scales.
     n_scalars: usize,
     n_offsets: u16,
     channels: ChannelModels<'b, 's>,
@@ -100,12 +99,11 @@ impl<'b> Bundle<'b> {
                 })
             }
         };
-        let Header { feature_dim, n_offsets, .. } = *self.header();
         Ok(AnchorModels {
             lattice: *self.lattice(),
             masks: self.masks().copied(),
-            n_scalars: usize::from(feature_dim).saturating_add(6),
-            n_offsets,
+            n_scalars: self.header().n_scalars(),
+            n_offsets: self.header().n_offsets,
             channels,
         })
     }

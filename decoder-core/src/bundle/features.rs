@@ -16,6 +16,8 @@ pub struct Effects {
     pub detail: bool,
     /// The heads see a mixture of the feature at three resolutions, weighted by where it is seen from.
     pub feature_bank: bool,
+    /// Gaussians have three deviations and a rotation; without it one deviation, the same in every direction.
+    pub anisotropic: bool,
 }
 
 /// What a bundle requires of its decoder: the scene's effects, and how its numbers are stored.
@@ -33,10 +35,13 @@ pub struct Features {
 }
 
 impl Features {
-    /// Bits that have a meaning in this version; 7 and 8 have none.
-    const KNOWN: u32 = 0b10_0111_1111;
+    /// Bits that have a meaning in this version; 8 has none.
+    const KNOWN: u32 = 0b10_1111_1111;
 
-    /// What this decoder is built with.
+    /// The bit that says what a scene lacks, where the others say what it has: bundles without it are older than the choice.
+    const ISOTROPIC: u32 = 1 << 7;
+
+    /// What this decoder is built with, a bit for each; that of [`Self::ISOTROPIC`] for its opposite.
     const BUILT: u32 = {
         let view = cfg!(feature = "view");
         let effects = Effects {
@@ -45,14 +50,17 @@ impl Features {
             dilation_compensation: cfg!(feature = "dilation-compensation"),
             detail: cfg!(feature = "detail"),
             feature_bank: cfg!(feature = "feature-bank"),
+            anisotropic: cfg!(feature = "anisotropy"),
         };
-        Self { effects, masks: true, context: cfg!(feature = "context"), coded_heads: true }.to_bits()
+        let built = Self { effects, masks: true, context: cfg!(feature = "context"), coded_heads: true };
+        built.to_bits() ^ Self::ISOTROPIC
     };
 
     /// The bits as the header stores them.
     #[must_use]
     pub const fn to_bits(self) -> u32 {
-        let Effects { view_direction, view_distance, dilation_compensation, detail, feature_bank } = self.effects;
+        let Effects { view_direction, view_distance, dilation_compensation, detail, feature_bank, anisotropic } =
+            self.effects;
         (view_direction as u32)
             | (view_distance as u32) << 1
             | (dilation_compensation as u32) << 2
@@ -60,6 +68,7 @@ impl Features {
             | (self.context as u32) << 4
             | (self.coded_heads as u32) << 5
             | (detail as u32) << 6
+            | if anisotropic { 0 } else { Self::ISOTROPIC }
             | (feature_bank as u32) << 9
     }
 
@@ -73,7 +82,7 @@ impl Features {
         if unknown_bits != 0 {
             return Err(DecodeError::UnsupportedFeatures { unknown_bits });
         }
-        let missing_bits = bits & !Self::BUILT;
+        let missing_bits = (bits ^ Self::ISOTROPIC) & !Self::BUILT;
         if missing_bits != 0 {
             return Err(DecodeError::NotBuilt { missing_bits });
         }
@@ -85,6 +94,7 @@ impl Features {
                 dilation_compensation: has(4),
                 detail: has(64),
                 feature_bank: has(512),
+                anisotropic: !has(Self::ISOTROPIC),
             },
             masks: has(8),
             context: has(16),
@@ -103,7 +113,8 @@ mod tests {
     #[test]
     fn known_bits_come_back_and_unknown_ones_are_named() {
         for bits in 0..1024 {
-            let [unknown_bits, missing_bits] = [bits & !Features::KNOWN, bits & !Features::BUILT];
+            let unknown_bits = bits & !Features::KNOWN;
+            let missing_bits = (bits ^ Features::ISOTROPIC) & !Features::BUILT;
             let expected = match (unknown_bits, missing_bits) {
                 (0, 0) => Ok(bits),
                 (0, _) => Err(DecodeError::NotBuilt { missing_bits }),
@@ -125,6 +136,7 @@ mod tests {
             (16, "context"),
             (64, "detail"),
             (512, "feature-bank"),
+            (128, "anisotropy"),
         ];
         for (bits, name) in all {
             assert!(text(bits).contains(name), "{bits:#b}: {}", text(bits));

@@ -88,10 +88,23 @@ impl Header {
         usize::from(self.feature_dim).saturating_add(direction).saturating_add(usize::from(effects.view_distance))
     }
 
-    /// Channels of an anchor: F features, 6 log-scales, 3K offsets.
+    /// Channels of an anchor: F features, log-scales, 3K offsets.
     #[must_use]
     pub fn n_channels(&self) -> usize {
-        usize::from(self.feature_dim).saturating_add(6).saturating_add(usize::from(self.n_offsets).saturating_mul(3))
+        self.n_scalars().saturating_add(usize::from(self.n_offsets).saturating_mul(3))
+    }
+
+    /// Channels of an anchor before those of its offsets: F features, log-scales.
+    #[must_use]
+    pub fn n_scalars(&self) -> usize {
+        usize::from(self.feature_dim).saturating_add(self.n_log_scales().into())
+    }
+
+    /// Log-scales of an anchor: three of its extent, and the base size of its Gaussians, which where they are anisotropic is
+    /// three as well.
+    #[must_use]
+    pub fn n_log_scales(&self) -> u16 {
+        n_log_scales(self.features.effects.anisotropic)
     }
 
     /// Reads and checks the header; returns it with the section table.
@@ -199,6 +212,11 @@ impl Header {
         };
         Ok((header, n_sections))
     }
+}
+
+/// Log-scales of an anchor.
+pub(crate) const fn n_log_scales(anisotropic: bool) -> u16 {
+    if anisotropic { 6 } else { 4 }
 }
 
 /// Checks `least <= found <= most` and names the limit that does not hold.

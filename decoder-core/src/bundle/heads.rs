@@ -77,7 +77,8 @@ pub struct HeadView<'a> {
 pub struct HeadsView<'a> {
     /// K outputs: row k is the opacity logit of offset k, through tanh.
     pub opacity: HeadView<'a>,
-    /// 7K outputs: rows 7k..7k+3 scale logits, 7k+3..7k+7 an unnormalised quaternion (w, x, y, z).
+    /// 7K outputs: rows 7k..7k+3 scale logits, 7k+3..7k+7 an unnormalised quaternion (w, x, y, z). Where Gaussians are
+    /// isotropic K outputs: row k the scale logit.
     pub covariance: HeadView<'a>,
     /// 3K outputs: rows 3k..3k+3 the colour logits.
     pub colour: HeadView<'a>,
@@ -108,7 +109,7 @@ impl<'a> HeadsView<'a> {
         let (n_in, k) = (header.head_inputs(), usize::from(header.n_offsets));
         let mut all = [
             shape(n_in, header.feature_dim, k),
-            shape(n_in, header.feature_dim, k.saturating_mul(7)),
+            shape(n_in, header.feature_dim, k.saturating_mul(if header.features.effects.anisotropic { 7 } else { 1 })),
             shape(n_in, header.colour_hidden, k.saturating_mul(3)),
             shape(usize::from(header.feature_dim).saturating_add(3), header.detail_hidden, 3),
         ];

@@ -32,11 +32,11 @@ pub use crc::crc32;
 pub(crate) use cursor::{Cursor, saturate};
 pub use directory::{CHUNK_RECORD_LEN, Directory, INK_FRAME_LEN, InkFrame, TIER_RECORD_LEN, Tier};
 pub use features::{Effects, Features};
-pub(crate) use header::in_range;
 pub use header::{
     HEADER_FIXED_LEN, Header, MAGIC, MAX_ANCHORS, MAX_CHUNK_ANCHORS, MAX_FEATURE_DIM, MAX_OFFSETS, MAX_TIERS, VERSION,
     header_len,
 };
+pub(crate) use header::{in_range, n_log_scales};
 pub(crate) use heads::{BANK_INPUTS, BANK_WEIGHTS};
 pub use heads::{CodedHeads, Halves, HeadView, HeadsView, LayerWeights, WeightReader};
 pub use lattice::{Lattice, MAX_LATTICE_BITS};
@@ -100,7 +100,12 @@ impl<'a> Bundle<'a> {
         };
         let coder = sections.coder.bytes(bytes)?;
         let coder = if cfg!(feature = "context") && header.features.context {
-            Coder::Context(Context::parse(coder, header.feature_dim.into(), header.n_channels())?)
+            Coder::Context(Context::parse(
+                coder,
+                header.feature_dim.into(),
+                header.n_log_scales().into(),
+                header.n_channels(),
+            )?)
         } else {
             Coder::Static(Tables::parse(coder, header.n_channels())?)
         };

@@ -39,15 +39,21 @@ pub struct Context<'a> {
     /// Four bits a row, set for +1; two rows a byte, the first in the low half.
     grid: &'a [u8],
     feature_dim: usize,
+    n_log_scales: usize,
     n_channels: usize,
 }
 
 impl<'a> Context<'a> {
-    /// Checks a section for anchors of `n_channels` channels, the first `feature_dim` of them features.
+    /// Checks a section for anchors of `n_channels` channels, the first `feature_dim` of them features, then `n_log_scales`.
     ///
     /// # Errors
     /// [`DecodeError`] naming the section or the number outside its limits.
-    pub fn parse(section: &'a [u8], feature_dim: usize, n_channels: usize) -> Result<Self, DecodeError> {
+    pub fn parse(
+        section: &'a [u8],
+        feature_dim: usize,
+        n_log_scales: usize,
+        n_channels: usize,
+    ) -> Result<Self, DecodeError> {
         let mut cursor = Cursor::new(section, SectionKind::Context);
         let mut min = [0; 3];
         for coordinate in &mut min {
@@ -89,7 +95,17 @@ impl<'a> Context<'a> {
                 found: saturate(section.len()),
             });
         }
-        Ok(Self { frame: GridFrame { min, scale }, base_steps, levels, hidden, output, grid, feature_dim, n_channels })
+        Ok(Self {
+            frame: GridFrame { min, scale },
+            base_steps,
+            levels,
+            hidden,
+            output,
+            grid,
+            feature_dim,
+            n_log_scales,
+            n_channels,
+        })
     }
 
     /// Inputs of the network: [`FEATURES_PER_LEVEL`] a level.
@@ -136,7 +152,7 @@ impl<'a> Context<'a> {
     /// Group of a channel.
     #[must_use]
     pub fn group(&self, channel: usize) -> Group {
-        Group::of_channel(channel, self.feature_dim)
+        Group::of_channel(channel, self.feature_dim, self.n_log_scales)
     }
 
     /// The grid's features at an anchor.

@@ -27,17 +27,17 @@ const HALF_STEP: i32 = (1 << (MEAN_SHIFT - 1)) + ((EIGHTHS / 2) << MEAN_SHIFT);
 pub enum Group {
     /// The F features.
     Feature,
-    /// The six log-scales.
+    /// The log-scales.
     LogScale,
     /// The 3K offsets.
     Offset,
 }
 
 impl Group {
-    pub(super) const fn of_channel(channel: usize, feature_dim: usize) -> Self {
+    pub(super) const fn of_channel(channel: usize, feature_dim: usize, n_log_scales: usize) -> Self {
         if channel < feature_dim {
             Self::Feature
-        } else if channel < feature_dim.saturating_add(6) {
+        } else if channel < feature_dim.saturating_add(n_log_scales) {
             Self::LogScale
         } else {
             Self::Offset

@@ -177,7 +177,7 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
             GaussianSource::Baked(baked) => {
                 watch.enter(Stage::Project);
                 report.gaussians = report.gaussians.saturating_add(baked.n_of_chunk(chunk.index()));
-                for (number, gaussian) in baked.of_chunk(chunk.index()) {
+                for (number, gaussian) in baked.of_chunk(chunk.index(), effects) {
                     if keeper.pass.band.is_none_or(|band| band.sees_gaussian(&gaussian)) {
                         keeper.project(number, &gaussian, effects);
                     }
@@ -187,7 +187,7 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
         };
         // As if its Gaussians were baked, which know nothing of the anchor's extent.
         let as_baked = bundle.n_gaussians(0).is_some();
-        let n_scalars = u32::from(header.feature_dim) + 6;
+        let n_scalars = u32::from(header.feature_dim) + u32::from(header.n_log_scales());
         let decoded = u32::from(!source.is_resident());
         report.chunks_decoded += decoded;
         source.for_each(chunk, first_anchor, row, watch, |number, site, row, watch| {
@@ -212,7 +212,7 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
                 report.gaussians += 1;
                 let place = place(number, offset);
                 if as_baked {
-                    keeper.project(place, &BakedGaussian::rounded(gaussian), effects);
+                    keeper.project(place, &BakedGaussian::rounded(gaussian, effects), effects);
                 } else {
                     keeper.project(place, gaussian, effects);
                 }
@@ -237,7 +237,7 @@ struct Keeper<'f, 's, A: Arithmetic> {
 impl<A: Arithmetic> Keeper<'_, '_, A> {
     /// * `place`: ascends in the order of the file.
     fn project(&mut self, place: u32, gaussian: &Gaussian, effects: Effects) {
-        let Some((splat, rect)) = self.view.project::<A>(gaussian, effects.dilation_compensation) else { return };
+        let Some((splat, rect)) = self.view.project::<A>(gaussian, effects) else { return };
         let touched = self.strips.touched(rect);
         let index = usize::from(self.pass.strip.index);
         let lies_here = touched.contains(&index);

@@ -1,7 +1,7 @@
 //! A dense layer cut into blocks of outputs.
 
 use crate::budget::Arena;
-use crate::bundle::Halves;
+use crate::bundle::{Halves, LayerWeights};
 use crate::error::DecodeError;
 use crate::mlp::weight::Weight;
 
@@ -20,26 +20,15 @@ impl<'s, W: Weight, const B: usize> Blocks<'s, W, B> {
     /// Converts a layer's weights `[n_out, n_in]` and biases `[n_out]`; outputs beyond `n_out` become 0.
     pub(crate) fn convert(
         arena: &mut Arena<'s>,
-        mut weights: impl Iterator<Item = f32>,
+        weights: LayerWeights<'_, '_>,
         biases: &Halves<'_>,
         n_in: usize,
     ) -> Result<Self, DecodeError> {
-        let n_out = biases.len();
         // Not as rows: those of an odd number of halves do not divide into words.
-        let (rows, _) = arena.take::<W>(B * n_rows::<B>(n_in, n_out))?.as_chunks_mut::<B>();
-        rows.fill([W::zeroed(); B]);
-        let rows_per_block = n_in + 1;
-        for (output, bias) in biases.iter().enumerate() {
-            // `max(1)` shows the compiler what is true anyway, and a panic path less is linked.
-            let Some(block) = rows.chunks_exact_mut(rows_per_block.max(1)).nth(output / B) else { break };
-            let lane = output % B;
-            for (row, weight) in block.iter_mut().zip(core::iter::once(bias).chain(weights.by_ref())) {
-                if let Some(slot) = row.get_mut(lane) {
-                    *slot = W::keep(weight);
-                }
-            }
-        }
-        Ok(Self { rows_per_block, rows })
+        let values = arena.take::<W>(B * n_rows::<B>(n_in, biases.len()))?;
+        fill(values, weights, biases, n_in + 1, B);
+        let (rows, _) = values.as_chunks::<B>();
+        Ok(Self { rows_per_block: n_in + 1, rows })
     }
 
     /// All blocks in order.
@@ -51,6 +40,28 @@ impl<'s, W: Weight, const B: usize> Blocks<'s, W, B> {
     pub(crate) fn block(&self, index: usize) -> Option<&'s [[W; B]]> {
         let (_, from) = self.rows.split_at_checked(index * self.rows_per_block)?;
         from.get(..self.rows_per_block)
+    }
+}
+
+/// Fills the blocks of a layer, each `[rows_per_block, lanes]`.
+// Not inlined: one of it serves blocks of all widths.
+#[inline(never)]
+fn fill<W: Weight>(
+    values: &mut [W],
+    mut weights: LayerWeights<'_, '_>,
+    biases: &Halves<'_>,
+    rows_per_block: usize,
+    lanes: usize,
+) {
+    values.fill(W::zeroed());
+    // `max(1)` shows the compiler what is true anyway, and a panic path less is linked.
+    let lanes = lanes.max(1);
+    for (output, bias) in biases.iter().enumerate() {
+        let Some(block) = values.chunks_exact_mut((rows_per_block * lanes).max(1)).nth(output / lanes) else { break };
+        let lane = block.get_mut(output % lanes..).unwrap_or_default();
+        for (slot, weight) in lane.iter_mut().step_by(lanes).zip(core::iter::once(bias).chain(weights.by_ref())) {
+            *slot = W::keep(weight);
+        }
     }
 }
 

@@ -28,7 +28,7 @@ impl<'s, W: Weight> Detail<'s, W> {
     ///
     /// * `sums`: [`sums_len`](super::HeadShape::sums_len) floats.
     pub(crate) fn begin(&self, feature: &[f32], sums: &mut [f32]) {
-        for (sums, block) in sums.as_chunks_mut::<LANES>().0.iter_mut().zip(self.head.hidden.iter()) {
+        for (sums, block) in sums.as_chunks_mut::<LANES>().0.iter_mut().zip(self.head.hidden.blocks.iter()) {
             *sums = outputs(block, feature);
         }
     }
@@ -38,14 +38,14 @@ impl<'s, W: Weight> Detail<'s, W> {
     /// * `sums`: as [`Self::begin`] left them. * `hidden`: at least as many floats.
     pub(crate) fn residual(&self, colour: [f32; 3], sums: &[f32], hidden: &mut [f32]) -> [f32; 3] {
         let units = hidden.as_chunks_mut::<LANES>().0.iter_mut();
-        for ((units, sums), block) in units.zip(sums.as_chunks::<LANES>().0).zip(self.head.hidden.iter()) {
+        for ((units, sums), block) in units.zip(sums.as_chunks::<LANES>().0).zip(self.head.hidden.blocks.iter()) {
             // The row of biases, then one an input.
             let rows = block.get(1..).and_then(|rows| rows.get(self.feature_dim..)).unwrap_or_default();
             for (unit, sum) in units.iter_mut().zip(continued(*sums, rows, &colour)) {
                 *unit = if sum > 0.0 { sum } else { 0.0 };
             }
         }
-        let hidden = hidden.get(..self.head.n_hidden).unwrap_or_default();
+        let hidden = hidden.get(..self.head.hidden.n_units).unwrap_or_default();
         self.head.outputs(0, hidden).unwrap_or_default()
     }
 }

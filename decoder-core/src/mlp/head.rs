@@ -15,19 +15,53 @@ pub(super) const LANES: usize = 8;
 
 /// One head in floats; its output layer has blocks of `B` outputs.
 pub(crate) struct Head<'s, W, const B: usize> {
-    pub(super) hidden: Blocks<'s, W, LANES>,
+    pub(super) hidden: Hidden<'s, W>,
     output: Blocks<'s, W, B>,
-    pub(super) n_hidden: usize,
+}
+
+/// The hidden layer of a head.
+pub(super) struct Hidden<'s, W> {
+    pub(super) blocks: Blocks<'s, W, LANES>,
+    pub(super) n_units: usize,
 }
 
 /// The heads, one block of outputs an offset: none is computed for an offset that is not drawn.
 pub(crate) struct Heads<'s, N: HeadNumbers> {
     pub(crate) shape: HeadShape,
     pub(crate) opacity: N::Head<'s, 1>,
-    pub(crate) covariance: N::Head<'s, 7>,
+    pub(crate) covariance: Covariance<'s, N>,
     pub(crate) colour: N::Head<'s, 3>,
     pub(crate) detail: Option<Detail<'s, N::Detail>>,
     pub(crate) bank: Option<Bank<'s>>,
+}
+
+/// The covariance head.
+pub(crate) enum Covariance<'s, N: HeadNumbers> {
+    /// A scale logit an offset.
+    Isotropic(N::Head<'s, 1>),
+    /// Three, and a quaternion.
+    Anisotropic(N::Head<'s, 7>),
+}
+
+impl<'s, N: HeadNumbers> Covariance<'s, N> {
+    /// As [`TwoLayers::activate`].
+    pub(crate) fn activate<'h>(&self, inputs: N::Values<'_>, hidden: &'h mut [f32]) -> N::Values<'h> {
+        match self {
+            Self::Isotropic(head) => head.activate(inputs, hidden),
+            // Never made then, which the compiler does not know, here and below.
+            Self::Anisotropic(_) if !cfg!(feature = "anisotropy") => N::values(hidden),
+            Self::Anisotropic(head) => head.activate(inputs, hidden),
+        }
+    }
+
+    /// As [`TwoLayers::block`]; of an isotropic Gaussian the first output alone means something.
+    pub(crate) fn block(&self, index: usize, hidden: N::Values<'_>) -> Option<[f32; 7]> {
+        match self {
+            Self::Isotropic(head) => head.block(index, hidden).map(|[logit]| [logit, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+            Self::Anisotropic(_) if !cfg!(feature = "anisotropy") => None,
+            Self::Anisotropic(head) => head.block(index, hidden),
+        }
+    }
 }
 
 impl<'s, N: HeadNumbers> Heads<'s, N> {
@@ -38,7 +72,11 @@ impl<'s, N: HeadNumbers> Heads<'s, N> {
         Ok(Self {
             shape,
             opacity: N::Head::convert(arena, &heads.opacity, &mut weights)?,
-            covariance: N::Head::convert(arena, &heads.covariance, &mut weights)?,
+            covariance: if cfg!(feature = "anisotropy") && shape.covariance > 1 {
+                Covariance::Anisotropic(N::Head::convert(arena, &heads.covariance, &mut weights)?)
+            } else {
+                Covariance::Isotropic(N::Head::convert(arena, &heads.covariance, &mut weights)?)
+            },
             colour: N::Head::convert(arena, &heads.colour, &mut weights)?,
             detail: match &heads.detail {
                 Some(head) if cfg!(feature = "detail") && shape.detail > 0 => {
@@ -74,20 +112,28 @@ where
     }
 
     fn activate<'h>(&self, inputs: &[f32], hidden: &'h mut [f32]) -> &'h [f32] {
+        self.hidden.activate(inputs, hidden)
+    }
+
+    fn block(&self, index: usize, hidden: &[f32]) -> Option<[f32; B]> {
+        self.outputs(index, hidden)
+    }
+}
+
+impl<W: Weight> Hidden<'_, W> {
+    // Not inlined: one of it serves all heads.
+    #[inline(never)]
+    fn activate<'h>(&self, inputs: &[f32], units: &'h mut [f32]) -> &'h [f32] {
         // Not zipped: blocks are of a length that the compiler does not know, and their number would be a division, which
         // it may take for one by zero.
-        let mut blocks = self.hidden.iter();
-        for units in hidden.as_chunks_mut::<LANES>().0 {
+        let mut blocks = self.blocks.iter();
+        for units in units.as_chunks_mut::<LANES>().0 {
             let Some(block) = blocks.next() else { break };
             for (unit, sum) in units.iter_mut().zip(outputs(block, inputs)) {
                 *unit = if sum > 0.0 { sum } else { 0.0 };
             }
         }
-        hidden.get(..self.n_hidden).unwrap_or_default()
-    }
-
-    fn block(&self, index: usize, hidden: &[f32]) -> Option<[f32; B]> {
-        self.outputs(index, hidden)
+        units.get(..self.n_units).unwrap_or_default()
     }
 }
 
@@ -98,9 +144,11 @@ impl<'s, W: Weight, const B: usize> Head<'s, W, B> {
         weights: &mut WeightReader<'_>,
     ) -> Result<Self, DecodeError> {
         Ok(Self {
-            hidden: Blocks::convert(arena, weights.next_layer(), &head.b1, head.n_in)?,
+            hidden: Hidden {
+                blocks: Blocks::convert(arena, weights.next_layer(), &head.b1, head.n_in)?,
+                n_units: head.n_hidden,
+            },
             output: Blocks::convert(arena, weights.next_layer(), &head.b2, head.n_hidden)?,
-            n_hidden: head.n_hidden,
         })
     }
 

@@ -11,6 +11,8 @@ pub(crate) struct HeadShape {
     pub(crate) inputs: usize,
     /// F, which is also the hidden width of the opacity and covariance heads.
     pub(crate) feature: usize,
+    /// Outputs of the covariance head an offset: 7, or 1 where Gaussians are isotropic.
+    pub(crate) covariance: usize,
     /// Hidden width of the colour head.
     pub(crate) colour: usize,
     /// Hidden width of the detail head; 0 without one.
@@ -24,11 +26,11 @@ pub(crate) struct HeadShape {
 impl HeadShape {
     /// Floats of all heads in scratch memory.
     pub(crate) const fn n_weights(&self) -> usize {
-        let Self { inputs, feature: f, colour: c, detail: d, bank, offsets: k } = *self;
+        let Self { inputs, feature: f, covariance: v, colour: c, detail: d, bank, offsets: k } = *self;
         let first_layers = LANES * (2 * n_rows::<LANES>(inputs, f) + n_rows::<LANES>(inputs, c));
-        let outputs = n_rows::<1>(f, k) + 7 * n_rows::<7>(f, 7 * k) + 3 * n_rows::<3>(c, 3 * k);
+        let outputs = n_rows::<1>(f, k) + v * n_rows::<1>(f, k) + 3 * n_rows::<3>(c, 3 * k);
         // Integers take a step and a bias for each output, which one pair less a unit pays for when there are two units.
-        let steps = if f == 1 { 8 * k } else { 0 } + if c == 1 { 3 * k } else { 0 };
+        let steps = if f == 1 { (1 + v) * k } else { 0 } + if c == 1 { 3 * k } else { 0 };
         let detail = if d == 0 { 0 } else { LANES * n_rows::<LANES>(f + 3, d) + 3 * n_rows::<3>(d, 3) };
         const W: usize = BANK_WEIGHTS;
         let bank = if bank { LANES * n_rows::<LANES>(BANK_INPUTS, f) + W * n_rows::<W>(f, W) } else { 0 };
@@ -56,11 +58,11 @@ impl HeadShape {
 
     /// Multiply-adds of the other heads for an anchor with `n_open` offsets of positive opacity.
     pub(crate) const fn open_macs(&self, n_open: usize) -> usize {
-        let Self { inputs, feature: f, colour: c, detail: d, bank, .. } = *self;
+        let Self { inputs, feature: f, covariance: v, colour: c, detail: d, bank, .. } = *self;
         // The detail head's share of an anchor mixes again.
         let again = if bank && d > 0 { BANK_WEIGHTS * f } else { 0 };
         let per_anchor = (f + c) * inputs + d * f + again;
-        let per_gaussian = 7 * f + 3 * c + 6 * d;
+        let per_gaussian = v * f + 3 * c + 6 * d;
         per_anchor + n_open * per_gaussian
     }
 }

@@ -152,6 +152,7 @@ impl Side {
 mod tests {
     use super::{Band, View};
     use crate::arithmetic::Exact;
+    use crate::bundle::Effects;
     use crate::camera::Camera;
     use crate::scene::{Anchor, Gaussian};
 
@@ -185,6 +186,7 @@ mod tests {
     fn nothing_that_a_strip_draws_is_left_out_and_most_of_the_rest_is() {
         let mut random = Numbers(1);
         let [mut n_needless, mut n_kept, mut n_boxes_kept, mut n_needless_in_slab, mut n_kept_in_slab] = [0; 5];
+        let effects = Effects { anisotropic: cfg!(feature = "anisotropy"), ..Effects::default() };
         for _ in 0..20_000 {
             let view = view(&mut random);
             let first_row = (random.between(0.0, 5.0) as u8).min(4);
@@ -221,7 +223,7 @@ mod tests {
                     opacity: if k == 0 { 1.0 } else { random.between(0.01, 1.0) },
                     colour: [0.0; 3],
                 };
-                let Some((splat, rect)) = view.project::<Exact>(&gaussian, false) else { continue };
+                let Some((splat, rect)) = view.project::<Exact>(&gaussian, effects) else { continue };
                 if rect.first_row <= first_row && first_row <= rect.last_row {
                     drawn = true;
                     drawn_in_slab |= from <= splat.depth && splat.depth < end;

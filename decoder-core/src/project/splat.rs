@@ -5,6 +5,7 @@ use bytemuck::{Pod, Zeroable};
 use super::covariance::Covariance;
 use super::view::{NEAR, View};
 use crate::arithmetic::{Choices, Functions, Roots};
+use crate::bundle::Effects;
 use crate::raster::TileRect;
 use crate::scene::Gaussian;
 
@@ -43,12 +44,8 @@ impl View {
     /// Projects a Gaussian; `None` when it is too near, too faint, or draws no pixel of the image.
     ///
     /// # Budget
-    /// About 150 multiplications, one logarithm, two square roots, constant.
-    pub(crate) fn project<A: Choices>(
-        &self,
-        gaussian: &Gaussian,
-        dilation_compensation: bool,
-    ) -> Option<(Splat, TileRect)> {
+    /// About 150 multiplications, 80 where Gaussians are isotropic, one logarithm, two square roots, constant.
+    pub(crate) fn project<A: Choices>(&self, gaussian: &Gaussian, effects: Effects) -> Option<(Splat, TileRect)> {
         let point = self.to_camera(gaussian.centre);
         let [_, _, depth] = point;
         // Not `depth <= NEAR`: NaN leaves as well, here and below.
@@ -56,9 +53,14 @@ impl View {
         if !in_front {
             return None;
         }
-        let covariance = Covariance::from_rows(self.sphere_to_image(point, gaussian));
+        let covariance = if cfg!(feature = "anisotropy") && effects.anisotropic {
+            Covariance::from_rows(self.sphere_to_image(point, gaussian))
+        } else {
+            let [deviation, ..] = gaussian.scale;
+            Covariance::of_ball(self.slopes(point), self.focal_px.map(|f| f / depth * deviation))
+        };
         let mut opacity = gaussian.opacity;
-        if cfg!(feature = "dilation-compensation") && dilation_compensation {
+        if cfg!(feature = "dilation-compensation") && effects.dilation_compensation {
             opacity *= A::Roots::sqrt(covariance.det_bare / covariance.det);
         }
         let log_opacity = A::Functions::ln(opacity + self.lost_opacity);
@@ -104,6 +106,7 @@ impl View {
 mod tests {
     use super::log_cut;
     use crate::arithmetic::Exact;
+    use crate::bundle::Effects;
     use crate::camera::Camera;
     use crate::project::View;
     use crate::scene::Gaussian;
@@ -125,9 +128,10 @@ mod tests {
             opacity: 0.3,
             colour: [1.0; 3],
         };
+        let effects = Effects { anisotropic: cfg!(feature = "anisotropy"), ..Effects::default() };
         let sum_at = |steps: u8| {
             let view = View::new(&camera).expect("sound").cutting_at(steps);
-            let (splat, _) = view.project::<Exact>(&gaussian, false).expect("in view");
+            let (splat, _) = view.project::<Exact>(&gaussian, effects).expect("in view");
             let least = (-f64::from(log_cut(steps))).exp();
             let mut sum = 0.0;
             for y in 0..100 {

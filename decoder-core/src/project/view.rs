@@ -77,16 +77,23 @@ impl View {
         [fx * x / z + cx, fy * y / z + cy]
     }
 
-    /// The two rows of J·R, which takes small displacements at `point_cam` from the normalised frame to pixels.
-    ///
-    /// J = [fx/z, 0, −fx·tx/z; 0, fy/z, −fy·ty/z], tx and ty being x/z and y/z within the clamp.
+    /// x/z and y/z within the clamp.
     #[inline]
-    pub(super) fn jacobian(&self, [x, y, z]: [f32; 3]) -> [[f32; 3]; 2] {
-        let [row_x, row_y, row_z] = self.rotation;
-        let [fx, fy] = self.focal_px;
+    pub(super) fn slopes(&self, [x, y, z]: [f32; 3]) -> [f32; 2] {
         let [min_x, min_y] = self.slope_min;
         let [max_x, max_y] = self.slope_max;
-        let [slope_x, slope_y] = [clamp(x / z, min_x, max_x), clamp(y / z, min_y, max_y)];
+        [clamp(x / z, min_x, max_x), clamp(y / z, min_y, max_y)]
+    }
+
+    /// The two rows of J·R, which takes small displacements at `point_cam` from the normalised frame to pixels.
+    ///
+    /// J = [fx/z, 0, −fx·tx/z; 0, fy/z, −fy·ty/z], tx and ty being the [slopes](Self::slopes).
+    #[inline]
+    pub(super) fn jacobian(&self, point_cam: [f32; 3]) -> [[f32; 3]; 2] {
+        let [row_x, row_y, row_z] = self.rotation;
+        let [fx, fy] = self.focal_px;
+        let [_, _, z] = point_cam;
+        let [slope_x, slope_y] = self.slopes(point_cam);
         let row = |scale: f32, [a0, a1, a2]: [f32; 3], slope: f32| {
             let [z0, z1, z2] = row_z;
             [scale * (a0 - slope * z0), scale * (a1 - slope * z1), scale * (a2 - slope * z2)]

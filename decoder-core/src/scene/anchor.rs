@@ -12,7 +12,7 @@ pub(crate) struct Anchor<'r> {
     pub(crate) feature: &'r [f32],
     /// l_a, which scales the offsets and is the anchor's own size, normalised units.
     pub(crate) extent: [f32; 3],
-    /// l_g, the base size of its Gaussians, normalised units.
+    /// l_g, the base size of its Gaussians, normalised units; of isotropic ones the same along all axes.
     pub(crate) base_scale: [f32; 3],
     /// `[K]` offsets in units of `extent`.
     pub(crate) offsets: &'r [[f32; 3]],
@@ -32,16 +32,16 @@ impl<'r> Anchor<'r> {
         row: &'r [f32],
     ) -> Option<Self> {
         let (feature, rest) = row.split_at_checked(header.feature_dim.into())?;
-        let (&[a0, a1, a2, g0, g1, g2], rest) = rest.split_first_chunk::<6>()?;
+        let (&[a0, a1, a2, g0], rest) = rest.split_first_chunk::<4>()?;
+        let g0 = F::exp(g0);
+        let (base_scale, rest) = if cfg!(feature = "anisotropy") && header.features.effects.anisotropic {
+            let (&[g1, g2], rest) = rest.split_first_chunk::<2>()?;
+            ([g0, F::exp(g1), F::exp(g2)], rest)
+        } else {
+            ([g0; 3], rest)
+        };
         let (offsets, _) = rest.as_chunks::<3>();
-        Some(Self {
-            position,
-            feature,
-            extent: [a0, a1, a2].map(F::exp),
-            base_scale: [g0, g1, g2].map(F::exp),
-            offsets,
-            mask,
-        })
+        Some(Self { position, feature, extent: [a0, a1, a2].map(F::exp), base_scale, offsets, mask })
     }
 
     /// A box that holds the balls of ink of all offsets that it draws, as that of a chunk does; empty without any.

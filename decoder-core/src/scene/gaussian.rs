@@ -19,9 +19,9 @@ const QUATERNION_NORM_MIN: f32 = 1e-12;
 /// One 3D Gaussian, normalised frame.
 pub(crate) struct Gaussian {
     pub(crate) centre: [f32; 3],
-    /// Standard deviations along its own axes, normalised units.
+    /// Standard deviations along its own axes, normalised units; of an isotropic one all the same.
     pub(crate) scale: [f32; 3],
-    /// Unit quaternion w, x, y, z from its own axes to the world's.
+    /// Unit quaternion w, x, y, z from its own axes to the world's; of an isotropic one [`NO_ROTATION`].
     pub(crate) rotation: [f32; 4],
     /// In (0, 1].
     pub(crate) opacity: f32,
@@ -29,12 +29,15 @@ pub(crate) struct Gaussian {
     pub(crate) colour: [f32; 3],
 }
 
+/// The quaternion that turns nothing.
+pub(crate) const NO_ROTATION: [f32; 4] = [1.0, 0.0, 0.0, 0.0];
+
 /// What the heads say about one offset.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct HeadOutputs {
     opacity: f32,
-    /// Scale logits, then an unnormalised quaternion.
+    /// Scale logits, then an unnormalised quaternion; or one scale logit.
     covariance: [f32; 7],
     colour: [f32; 3],
 }
@@ -70,8 +73,8 @@ impl<'s> Workspace<'s> {
 /// offsets.
 ///
 /// # Budget
-/// The opacity head, and at most the others: `3F(F + 4) + 11KF` multiply-adds, and with a detail head of H units
-/// `H(F + 6K)` more; a feature bank 10F and three exponentials, twice 3F of it with a detail head.
+/// The opacity head, and at most the others: `3F(F + 4) + 11KF` multiply-adds (`5KF` of isotropic Gaussians), with a detail head
+/// of H units `H(F + 6K)` more; a feature bank 10F and three exponentials, twice 3F of it with a detail head.
 pub(crate) fn for_each_gaussian<A: Choices>(
     anchor: &Anchor<'_>,
     effects: Effects,
@@ -121,7 +124,7 @@ pub(crate) fn for_each_gaussian<A: Choices>(
     watch.enter(Stage::Project);
     for (k, output) in visible_only(outputs, visible) {
         if let Some(offset) = anchor.offsets.get(k) {
-            draw(k, &gaussian::<A>(anchor, *offset, output));
+            draw(k, &gaussian::<A>(anchor, effects, *offset, output));
         }
     }
     (opacity_macs + heads.shape.open_macs(visible.count_ones() as usize)) as u64
@@ -181,18 +184,25 @@ fn fill_opacities<A: Choices>(
     visible
 }
 
-fn gaussian<A: Choices>(anchor: &Anchor<'_>, offset: [f32; 3], output: &HeadOutputs) -> Gaussian {
+fn gaussian<A: Choices>(anchor: &Anchor<'_>, effects: Effects, offset: [f32; 3], output: &HeadOutputs) -> Gaussian {
     let [x, y, z] = anchor.position;
     let [lx, ly, lz] = anchor.extent;
     let [gx, gy, gz] = anchor.base_scale;
     let [ox, oy, oz] = offset;
     let [s0, s1, s2, w, i, j, k] = output.covariance;
-    let norm = A::Roots::sqrt(w * w + i * i + j * j + k * k);
-    let norm = if norm > QUATERNION_NORM_MIN { norm } else { QUATERNION_NORM_MIN };
+    let s0 = gx * A::Functions::sigmoid(s0);
+    let (scale, rotation) = if cfg!(feature = "anisotropy") && effects.anisotropic {
+        let norm = A::Roots::sqrt(w * w + i * i + j * j + k * k);
+        let norm = if norm > QUATERNION_NORM_MIN { norm } else { QUATERNION_NORM_MIN };
+        let scale = [s0, gy * A::Functions::sigmoid(s1), gz * A::Functions::sigmoid(s2)];
+        (scale, A::Roots::quotients([w, i, j, k], norm))
+    } else {
+        ([s0; 3], NO_ROTATION)
+    };
     Gaussian {
         centre: [x + ox * lx, y + oy * ly, z + oz * lz],
-        scale: [gx * A::Functions::sigmoid(s0), gy * A::Functions::sigmoid(s1), gz * A::Functions::sigmoid(s2)],
-        rotation: A::Roots::quotients([w, i, j, k], norm),
+        scale,
+        rotation,
         opacity: output.opacity,
         colour: output.colour,
     }

@@ -14,7 +14,7 @@ use crate::scene::ModelShape;
 pub enum ChannelName {
     /// Feature dimension.
     Feature(usize),
-    /// Log-scale 0..6.
+    /// Log-scale 0..6, or 0..4 where Gaussians are isotropic.
     LogScale(usize),
     /// Offset and axis.
     Offset(usize, usize),
@@ -23,7 +23,7 @@ pub enum ChannelName {
 impl ChannelName {
     /// The name of channel `channel` of an anchor.
     pub fn of(shape: &ModelShape, channel: usize) -> Self {
-        let [first_log_scale, first_offset] = [shape.feature_dim, shape.feature_dim + 6];
+        let [first_log_scale, first_offset] = [shape.feature_dim, shape.feature_dim + shape.n_log_scales()];
         if channel < first_log_scale {
             Self::Feature(channel)
         } else if channel < first_offset {

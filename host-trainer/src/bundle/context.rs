@@ -3,11 +3,12 @@
 //! Weights become i8 with a power-of-two scale a row; the scale is the largest that keeps the row's largest weight and its
 //! bias in range. Inputs are in 2⁻¹⁴, hidden units in 2⁻¹⁰, outputs in the units of [`pocketsplat_core::context`].
 
-use pocketsplat_core::context::{MAX_BIAS, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS, MEAN_PARTS};
+use pocketsplat_core::DecodeError;
+use pocketsplat_core::context::{Context, MAX_BIAS, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS, MEAN_PARTS};
 use pocketsplat_core::entropy::EIGHTHS;
 
 use super::WriteError;
-use crate::scene::{ContextModel, Head};
+use crate::scene::{ContextModel, Head, ModelShape};
 
 /// Bits of the fraction of an input: [`pocketsplat_core::context::FEATURE_ONE`].
 const INPUT_BITS: i32 = 14;
@@ -25,6 +26,14 @@ struct Row {
     weights: Vec<i8>,
     bias: i32,
     shift: u8,
+}
+
+/// The context of a section, for anchors of a shape.
+///
+/// # Errors
+/// Those of [`Context::parse`].
+pub fn parse<'s>(section: &'s [u8], shape: &ModelShape) -> Result<Context<'s>, DecodeError> {
+    Context::parse(section, shape.feature_dim, shape.n_log_scales(), shape.values_per_anchor())
 }
 
 /// The context section of a bundle.
@@ -130,7 +139,7 @@ fn grid_bytes(rows: &[f32]) -> impl Iterator<Item = u8> + '_ {
 
 #[cfg(test)]
 mod tests {
-    use pocketsplat_core::context::{Context, FEATURE_ONE, GridFrame, GridLevel, Group, LevelKind};
+    use pocketsplat_core::context::{FEATURE_ONE, GridFrame, GridLevel, Group, LevelKind};
 
     use super::*;
     use crate::ops::finite_difference::random;
@@ -164,7 +173,7 @@ mod tests {
         for seed in 0..20 {
             let model = model(100 * seed, 0.5);
             let bytes = section(&model, n_channels).expect("a sound model");
-            let context = Context::parse(&bytes, SHAPE.feature_dim, n_channels).expect("a sound section");
+            let context = parse(&bytes, &SHAPE).expect("a sound section");
             let rounded = rounded(&model, n_channels).expect("a sound model");
             for lattice in [[-40, -30, 7], [0, 0, 50], [199, 69, 89], [500, -500, 33]] {
                 let (mut features, mut hidden) = (vec![0; context.n_inputs()], vec![0; context.n_hidden()]);
@@ -197,7 +206,7 @@ mod tests {
         let model = model(7, 0.5);
         let n_channels = SHAPE.values_per_anchor();
         let bytes = section(&model, n_channels).expect("a sound model");
-        let context = Context::parse(&bytes, SHAPE.feature_dim, n_channels).expect("a sound section");
+        let context = parse(&bytes, &SHAPE).expect("a sound section");
         let mut features = vec![0; context.n_inputs()];
         for lattice in [[-40, -30, 7], [3, 21, 50], [111, 69, 89]] {
             context.features(lattice, &mut features);

@@ -15,6 +15,7 @@ pub fn shape_of(bundle: &Bundle<'_>) -> ModelShape {
         view_direction: effects.view_direction,
         view_distance: effects.view_distance,
         dilation_compensation: effects.dilation_compensation,
+        anisotropic: effects.anisotropic,
         colour_hidden: header.colour_hidden.into(),
         detail_hidden: header.detail_hidden.into(),
         feature_bank: effects.feature_bank,
@@ -39,7 +40,7 @@ pub fn decoded_scene(bundle: &Bundle<'_>) -> Result<Scene<f32>, DecodeError> {
         chunk.decode_values(&mut models, &mut sites, &mut values)?;
         for (site, row) in sites.iter().zip(values.chunks_exact(shape.values_per_anchor())) {
             let (features, rest) = row.split_at(shape.feature_dim);
-            let (log_scales, offsets) = rest.split_at(6);
+            let (log_scales, offsets) = rest.split_at(shape.n_log_scales());
             anchors.lattice.push(site.lattice);
             anchors.features.extend(features);
             anchors.log_scales.extend(log_scales);

@@ -34,9 +34,9 @@ impl InkBox {
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         for anchor in anchors {
             let (row, [_, log_scale_step, offset_step]) = (rows.symbols_of(anchor), rows.steps[anchor]);
-            let (log_scales, offsets) = row[shape.feature_dim..].split_at(6);
+            let (log_scales, offsets) = row[shape.feature_dim..].split_at(shape.n_log_scales());
             let scale = |i: usize| (f64::from(log_scales[i]) * f64::from(log_scale_step)).exp();
-            let radius = INK_DEVIATIONS * scale(3).max(scale(4)).max(scale(5));
+            let radius = INK_DEVIATIONS * (3..log_scales.len()).map(scale).fold(0.0, f64::max);
             let drawn = (0..shape.n_offsets).filter(|k| (rows.drawn[anchor] >> k) & 1 == 1);
             for offset in drawn.map(|k| &offsets[3 * k..][..3]) {
                 for axis in 0..3 {

@@ -48,6 +48,7 @@ pub(super) fn effects(scene: &Scene<f32>) -> Effects {
         dilation_compensation: scene.shape.dilation_compensation,
         detail: scene.heads.detail.is_some(),
         feature_bank: scene.heads.bank.is_some(),
+        anisotropic: scene.shape.anisotropic,
     }
 }
 

@@ -15,7 +15,7 @@ use crate::scene::{ModelShape, Scene};
 pub struct QuantisationSteps {
     /// Of the features.
     pub feature: f32,
-    /// Of the six log-scales: 0.05 is 5 % of size.
+    /// Of the log-scales: 0.05 is 5 % of size.
     pub log_scale: f32,
     /// Of the offsets, in units of the anchor's extent.
     pub offset: f32,
@@ -75,7 +75,7 @@ pub(super) fn check_lengths(scene: &Scene<f32>) -> Result<(), WriteError> {
     let (shape, anchors, n) = (&scene.shape, &scene.anchors, scene.anchors.len());
     let arrays = [
         ("features", anchors.features.len(), shape.feature_dim),
-        ("log-scales", anchors.log_scales.len(), 6),
+        ("log-scales", anchors.log_scales.len(), shape.n_log_scales()),
         ("offsets", anchors.offsets.len(), 3 * shape.n_offsets),
         ("masks", anchors.mask_logits.len(), shape.n_offsets),
     ];
@@ -141,8 +141,11 @@ fn push_symbols(
     symbols: &mut Vec<i16>,
 ) -> Result<(), WriteError> {
     let (shape, anchors) = (&scene.shape, &scene.anchors);
-    let arrays =
-        [(&anchors.features, shape.feature_dim), (&anchors.log_scales, 6), (&anchors.offsets, 3 * shape.n_offsets)];
+    let arrays = [
+        (&anchors.features, shape.feature_dim),
+        (&anchors.log_scales, shape.n_log_scales()),
+        (&anchors.offsets, 3 * shape.n_offsets),
+    ];
     let values = arrays.into_iter().flat_map(|(values, width)| &values[anchor * width..][..width]);
     for (channel, &value) in values.enumerate() {
         let channel = ChannelName::of(shape, channel);

@@ -93,9 +93,8 @@ pub fn write(scene: &Scene<f32>, info: &BundleInfo, options: &WriteOptions) -> R
             writer.with_tables([feature, log_scale, offset])?
         }
         (Some(model), coder) => {
-            let (feature_dim, n_channels) = (scene.shape.feature_dim, scene.shape.values_per_anchor());
-            let section = context::section(model, n_channels)?;
-            let context = Context::parse(&section, feature_dim, n_channels).map_err(WriteError::ReadBack)?;
+            let section = context::section(model, scene.shape.values_per_anchor())?;
+            let context = context::parse(&section, &scene.shape).map_err(WriteError::ReadBack)?;
             let candidates = [
                 (coder != Coder::Static).then(|| writer.with_context(&context, &section)),
                 (coder != Coder::Context).then(|| writer.with_tables(writer.mean_steps(&context, model.base_steps))),

@@ -39,8 +39,9 @@ pub(crate) struct Settings {
     feature_dim: Option<usize>,
     #[arg(long, value_name = "K", help = with_default("Gaussians of an anchor", TrainConfig::default().shape.n_offsets))]
     offsets: Option<usize>,
-    /// What the scene takes into account, of view-direction, view-distance, dilation-compensation, detail and feature-bank: auto
-    /// trains short pilots and keeps what pays; none, all, +NAME and -NAME in a list force. [default: view-direction]
+    /// What the scene takes into account, of view-direction, view-distance, dilation-compensation, detail, feature-bank and
+    /// anisotropy: auto trains short pilots and keeps what pays; none, all, +NAME and -NAME in a list force.
+    /// [default: view-direction,anisotropy]
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     effects: Option<Request>,
     /// Do not show the heads the direction of view.
@@ -185,6 +186,8 @@ impl Settings {
             Effect::ViewDirection => self.no_view_direction.is_some(),
             Effect::ViewDistance => self.view_distance.is_some(),
             Effect::DilationCompensation => self.dilation_compensation.is_some(),
+            // There is no option beside `--effects`.
+            Effect::Anisotropy => false,
             Effect::Detail => self.modules.iter().flatten().any(|name| name == effect.name() || name == "none"),
             Effect::FeatureBank => false,
         };

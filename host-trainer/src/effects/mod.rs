@@ -30,16 +30,25 @@ pub enum Effect {
     Detail,
     /// The heads see features at several resolutions, mixed by where they are seen from.
     FeatureBank,
+    /// Gaussians have three deviations and a rotation, not one deviation.
+    Anisotropy,
 }
 
 impl Effect {
     /// All there are, in the order in which they are measured and named.
-    pub const ALL: [Self; 5] =
-        [Self::ViewDirection, Self::ViewDistance, Self::DilationCompensation, Self::Detail, Self::FeatureBank];
+    pub const ALL: [Self; 6] =
+        [
+            Self::ViewDirection,
+            Self::ViewDistance,
+            Self::DilationCompensation,
+            Self::Detail,
+            Self::FeatureBank,
+            Self::Anisotropy,
+        ];
 
     /// Those that are measured: at one size of the image dilation compensation shows nothing of what it is for, and a feature bank
     /// calls for a feature width divisible by 4, which HAC's is not.
-    pub const MEASURED: [Self; 3] = [Self::ViewDirection, Self::ViewDistance, Self::Detail];
+    pub const MEASURED: [Self; 4] = [Self::ViewDirection, Self::ViewDistance, Self::Detail, Self::Anisotropy];
 
     /// Its name on the command line.
     pub const fn name(self) -> &'static str {
@@ -49,6 +58,7 @@ impl Effect {
             Self::DilationCompensation => "dilation-compensation",
             Self::Detail => "detail",
             Self::FeatureBank => "feature-bank",
+            Self::Anisotropy => "anisotropy",
         }
     }
 
@@ -60,6 +70,7 @@ impl Effect {
             Self::DilationCompensation => "train.shape.dilation_compensation",
             Self::Detail => "train.modules.detail",
             Self::FeatureBank => "train.shape.feature_bank",
+            Self::Anisotropy => "train.shape.anisotropic",
         }
     }
 
@@ -71,6 +82,7 @@ impl Effect {
             Self::DilationCompensation => config.shape.dilation_compensation,
             Self::Detail => config.modules.detail.is_some(),
             Self::FeatureBank => config.shape.feature_bank,
+            Self::Anisotropy => config.shape.anisotropic,
         }
     }
 
@@ -80,6 +92,7 @@ impl Effect {
             Self::ViewDirection => config.shape.view_direction = on,
             Self::ViewDistance => config.shape.view_distance = on,
             Self::DilationCompensation => config.shape.dilation_compensation = on,
+            Self::Anisotropy => config.shape.anisotropic = on,
             Self::Detail if on => {
                 let Detail { hidden, .. } = *config.modules.detail.get_or_insert_default();
                 config.shape.detail_hidden = hidden;
@@ -131,8 +144,8 @@ mod tests {
     #[test]
     fn a_run_has_the_effects_it_is_given_and_a_shape_to_match() {
         let given = TrainConfig::default();
-        for bits in 0..8 {
-            let wanted: Vec<Effect> = (0..3).filter(|i| bits >> i & 1 == 1).map(|i| Effect::MEASURED[i]).collect();
+        for bits in 0..16 {
+            let wanted: Vec<Effect> = (0..4).filter(|i| bits >> i & 1 == 1).map(|i| Effect::MEASURED[i]).collect();
             let config = Effect::measured_only(&wanted, &given);
             assert_eq!((Effect::measured_in(&config), Effect::all_in(&config)), (wanted.clone(), wanted));
             assert_eq!(config.modules.shape(config.shape), config.shape);

@@ -251,7 +251,7 @@ mod tests {
         let mut begun = Vec::new();
         let begins = |effects: &[Effect]| begun.push(Effect::names(effects));
         let trials = measure(&pilots, &tiny_config(160), &dear, drawing, encode, begins).expect("pilots");
-        assert_eq!(begun, ["none", "none", "view-direction", "view-distance", "detail"]);
+        assert_eq!(begun, ["none", "none", "view-direction", "view-distance", "detail", "anisotropy"]);
         assert!(trials.chance_db > 0.0, "two seeds, two scenes");
         assert!(trials.each.iter().all(|trial| trial.worth.instructions > 0.0 && trial.worth.psnr_db.is_finite()));
         let chosen: Vec<_> = trials.each.iter().filter(|trial| trial.chosen).map(|trial| &trial.effects).collect();

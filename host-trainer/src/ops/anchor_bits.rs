@@ -69,8 +69,10 @@ pub fn forward_backward<R: Real>(
     gradients: &mut Gradients<'_, R>,
 ) -> [f64; 3] {
     let (f, k, n_channels) = (rows.shape.feature_dim, rows.shape.n_offsets, rows.shape.values_per_anchor());
+    let n_log_scales = rows.shape.n_log_scales();
+    let first_offset = f + n_log_scales;
     // First channel and width of the groups.
-    let groups = [(0, f), (f, 6), (f + 6, 3 * k)];
+    let groups = [(0, f), (f, n_log_scales), (first_offset, 3 * k)];
     let ln_2 = R::real(std::f64::consts::LN_2);
     scratch.resize(n_channels);
     let mut sums = [0.0; 3];
@@ -104,7 +106,7 @@ pub fn forward_backward<R: Real>(
         );
         let drawn = &rows.drawn[row * k..(row + 1) * k];
         for (offset, drawn) in drawn.iter().enumerate() {
-            let channels = f + 6 + 3 * offset..f + 9 + 3 * offset;
+            let channels = first_offset + 3 * offset..first_offset + 3 * (offset + 1);
             if *drawn {
                 let bits: R = scratch.bits[channels].iter().copied().sum();
                 gradients.drawn[row * k + offset] += weight * bits;

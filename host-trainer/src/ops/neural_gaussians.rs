@@ -51,7 +51,7 @@ const NORM_FLOOR: f64 = 1e-12;
 pub struct HeadOutputs<R> {
     /// `[n, K]` opacity logits.
     pub opacity: Vec<R>,
-    /// `[n, 7K]`: per offset 3 scale logits, 4 quaternion components.
+    /// `[n, 7K]`: per offset 3 scale logits, 4 quaternion components; `[n, K]` scale logits of isotropic Gaussians.
     pub covariance: Vec<R>,
     /// `[n, 3K]` colour logits.
     pub colour: Vec<R>,
@@ -60,7 +60,9 @@ pub struct HeadOutputs<R> {
 impl<R: Real> HeadOutputs<R> {
     /// Makes every array zero and right for `n` anchors.
     pub fn reset(&mut self, shape: &ModelShape, n: usize) {
-        for (array, per_offset) in [(&mut self.opacity, 1), (&mut self.covariance, 7), (&mut self.colour, 3)] {
+        let arrays =
+            [(&mut self.opacity, 1), (&mut self.covariance, shape.covariance_outputs()), (&mut self.colour, 3)];
+        for (array, per_offset) in arrays {
             array.clear();
             array.resize(n * shape.n_offsets * per_offset, R::ZERO);
         }
@@ -69,10 +71,12 @@ impl<R: Real> HeadOutputs<R> {
 
 /// Appends the Gaussians of a block of anchors that their mask draws and whose opacity is positive.
 ///
+/// Where they are isotropic there is one scale and no rotation: scale = l_g·sigmoid in all directions.
+///
 /// α = tanh(logit), kept if α > 0 and the [`mask`] is open; colour = sigmoid; scale = l_g ⊙ sigmoid; rotation = q/‖q‖;
 /// centre = x_a + O_k ⊙ l_a (Lu et al. 2024, Scaffold-GS, eqs. 5–8; layouts as [`OutputLayout`](crate::scene::OutputLayout) has them).
 ///
-/// * `positions`: `[n]`. * `log_scales`: `[n, 6]`. * `offsets`: `[n, 3K]`. * `mask_logits`: `[n, K]`.
+/// * `positions`: `[n]`. * `log_scales`: `[n, 6]` or `[n, 4]`. * `offsets`: `[n, 3K]`. * `mask_logits`: `[n, K]`.
 /// * `gaussians`, `sources`: anchors, then offsets, ascending.
 #[expect(clippy::too_many_arguments, reason = "one slice per input and output, as every operation has it")]
 pub fn forward<R: Real>(
@@ -87,8 +91,9 @@ pub fn forward<R: Real>(
 ) {
     let k_all = shape.n_offsets;
     for (row, position) in positions.iter().enumerate() {
-        let sizes = |first: usize| per_axis(|i| log_scales[row * 6 + first + i].exp());
-        let (l_a, l_g) = (sizes(0), sizes(3));
+        let sizes = &log_scales[row * shape.n_log_scales()..][..shape.n_log_scales()];
+        let l_a = per_axis(|i| sizes[i].exp());
+        let l_g = if shape.anisotropic { per_axis(|i| sizes[3 + i].exp()) } else { [sizes[3].exp(); 3] };
         for k in 0..k_all {
             let at = row * k_all + k;
             if !mask::is_open(mask_logits[at]) {
@@ -98,13 +103,20 @@ pub fn forward<R: Real>(
             if !(opacity > R::ZERO) {
                 continue;
             }
-            let cov = &outputs.covariance[at * 7..at * 7 + 7];
-            let raw = [cov[3], cov[4], cov[5], cov[6]];
-            let inverse = R::ONE / length(raw).larger(R::real(NORM_FLOOR));
+            let (scale, rotation) = match outputs.covariance[at * shape.covariance_outputs()..] {
+                [s0, s1, s2, w, x, y, z, ..] if shape.anisotropic => {
+                    let raw = [w, x, y, z];
+                    let inverse = R::ONE / length(raw).larger(R::real(NORM_FLOOR));
+                    let logits = [s0, s1, s2];
+                    (per_axis(|i| l_g[i] * logits[i].sigmoid()), raw.map(|q| q * inverse))
+                }
+                [logit, ..] => ([l_g[0] * logit.sigmoid(); 3], [R::ONE, R::ZERO, R::ZERO, R::ZERO]),
+                [] => unreachable!("a row for each offset"),
+            };
             gaussians.push(Gaussian {
                 centre: per_axis(|i| position[i] + offsets[at * 3 + i] * l_a[i]),
-                scale: per_axis(|i| l_g[i] * cov[i].sigmoid()),
-                rotation: raw.map(|q| q * inverse),
+                scale,
+                rotation,
                 opacity,
                 colour: per_axis(|i| outputs.colour[at * 3 + i].sigmoid()),
             });
@@ -117,7 +129,7 @@ pub fn forward<R: Real>(
 ///
 /// The opacity is α·b with b the hard mask, so dL/db = α·dL/d(opacity), which reaches the logit as [`mask::slope`] has it.
 ///
-/// * `d_outputs`, `d_log_scales` `[n, 6]`, `d_offsets` `[n, 3K]`, `d_mask_logits` `[n, K]`: zero on entry, added to.
+/// * `d_outputs`, `d_log_scales` `[n, 6]` or `[n, 4]`, `d_offsets` `[n, 3K]`, `d_mask_logits` `[n, K]`: zero on entry, added to.
 #[expect(clippy::too_many_arguments, reason = "one slice per input and per gradient, as every operation has it")]
 pub fn backward<R: Real>(
     shape: &ModelShape,
@@ -133,6 +145,7 @@ pub fn backward<R: Real>(
     d_offsets: &mut [R],
     d_mask_logits: &mut [R],
 ) {
+    let (n_log_scales, n_outputs) = (shape.n_log_scales(), shape.covariance_outputs());
     for ((g, source), d) in gaussians.iter().zip(sources).zip(d_gaussians) {
         let row = source.row as usize;
         let at = row * shape.n_offsets + source.offset as usize;
@@ -142,13 +155,18 @@ pub fn backward<R: Real>(
             // Not that of the Gaussian, to which others may have added.
             let colour = outputs.colour[at * 3 + i].sigmoid();
             d_outputs.colour[at * 3 + i] += d.colour[i] * colour * (R::ONE - colour);
-            // scale = e^s · σ, so ∂/∂s = scale, and ∂/∂logit = scale · (1 − σ).
-            let sigma = outputs.covariance[at * 7 + i].sigmoid();
-            d_log_scales[row * 6 + 3 + i] += d.scale[i] * g.scale[i];
-            d_outputs.covariance[at * 7 + i] += d.scale[i] * g.scale[i] * (R::ONE - sigma);
-            let size = log_scales[row * 6 + i].exp();
+            // scale = e^s · σ, so ∂/∂s = scale, and ∂/∂logit = scale · (1 − σ); of a ball all three are one.
+            let axis = if shape.anisotropic { i } else { 0 };
+            let (log_scale, logit) = (row * n_log_scales + 3 + axis, at * n_outputs + axis);
+            let sigma = outputs.covariance[logit].sigmoid();
+            d_log_scales[log_scale] += d.scale[i] * g.scale[i];
+            d_outputs.covariance[logit] += d.scale[i] * g.scale[i] * (R::ONE - sigma);
+            let size = log_scales[row * n_log_scales + i].exp();
             d_offsets[at * 3 + i] += d.centre[i] * size;
-            d_log_scales[row * 6 + i] += d.centre[i] * offsets[at * 3 + i] * size;
+            d_log_scales[row * n_log_scales + i] += d.centre[i] * offsets[at * 3 + i] * size;
+        }
+        if !shape.anisotropic {
+            continue;
         }
         let cov = &outputs.covariance[at * 7..at * 7 + 7];
         let raw = [cov[3], cov[4], cov[5], cov[6]];
@@ -181,7 +199,13 @@ mod tests {
     use crate::scene::MASK_THRESHOLD;
 
     const SHAPE: ModelShape = ModelShape { view_direction: true, ..ModelShape::plain(4, 3) };
+    const BALLS: ModelShape = ModelShape { anisotropic: false, ..SHAPE };
     const N: usize = 4;
+
+    /// Numbers that decide about a block: outputs of the heads, log-scales, offsets.
+    fn n_inputs(shape: &ModelShape) -> usize {
+        N * (shape.n_offsets * (7 + shape.covariance_outputs()) + shape.n_log_scales())
+    }
 
     fn parts(g: &Gaussian<f64>) -> [f64; 14] {
         let mut out = [0.0; 14];
@@ -193,16 +217,17 @@ mod tests {
         out
     }
 
-    fn split(x: &[f64]) -> (HeadOutputs<f64>, Vec<f64>, Vec<f64>) {
-        let k = SHAPE.n_offsets;
+    fn split(shape: &ModelShape, x: &[f64]) -> (HeadOutputs<f64>, Vec<f64>, Vec<f64>) {
+        let k = shape.n_offsets;
         let mut rest = x;
         let mut take = |n: usize| {
             let (a, b) = rest.split_at(n);
             rest = b;
             a.to_vec()
         };
-        let outputs = HeadOutputs { opacity: take(N * k), covariance: take(N * 7 * k), colour: take(N * 3 * k) };
-        (outputs, take(N * 6), take(N * 3 * k))
+        let covariance = N * k * shape.covariance_outputs();
+        let outputs = HeadOutputs { opacity: take(N * k), covariance: take(covariance), colour: take(N * 3 * k) };
+        (outputs, take(N * shape.n_log_scales()), take(N * 3 * k))
     }
 
     /// Every fifth offset is masked.
@@ -210,46 +235,45 @@ mod tests {
         (0..N * SHAPE.n_offsets).map(|i| if i % 5 == 4 { MASK_THRESHOLD } else { i as f64 - 4.0 }).collect()
     }
 
-    fn run(x: &[f64]) -> (Vec<Gaussian<f64>>, Vec<Source>) {
-        let (outputs, log_scales, offsets) = split(x);
+    fn run(shape: &ModelShape, x: &[f64]) -> (Vec<Gaussian<f64>>, Vec<Source>) {
+        let (outputs, log_scales, offsets) = split(shape, x);
         let (mut gaussians, mut sources) = (Vec::new(), Vec::new());
         let positions = [[0.1, 0.2, 0.3]; N];
         let logits = mask_logits();
-        forward(&SHAPE, &positions, &log_scales, &offsets, &logits, &outputs, &mut gaussians, &mut sources);
+        forward(shape, &positions, &log_scales, &offsets, &logits, &outputs, &mut gaussians, &mut sources);
         (gaussians, sources)
     }
 
     #[test]
     fn what_is_masked_is_not_drawn() {
-        let mut x = random(3, N * SHAPE.n_offsets * 11 + N * 6 + N * 3 * SHAPE.n_offsets);
+        let mut x = random(3, n_inputs(&SHAPE));
         x[..N * SHAPE.n_offsets].fill(0.5);
-        let drawn: Vec<u32> = run(&x).1.iter().map(|s| s.row * 3 + s.offset).collect();
+        let drawn: Vec<u32> = run(&SHAPE, &x).1.iter().map(|s| s.row * 3 + s.offset).collect();
         assert_eq!(drawn, [0, 1, 2, 3, 5, 6, 7, 8, 10, 11]);
     }
 
     #[test]
     fn backward_agrees_with_finite_differences() {
         let k = SHAPE.n_offsets;
-        let len = N * k * 11 + N * 6 + N * 3 * k;
-        for seed in 0..6 {
-            let mut x = random(seed, len);
+        for (shape, seed) in [SHAPE, BALLS].iter().flat_map(|shape| (0..6).map(move |seed| (shape, seed))) {
+            let mut x = random(seed, n_inputs(shape));
             for logit in &mut x[..N * k] {
                 *logit += 0.05 * logit.signum();
             }
             if seed == 4 {
                 // Saturated sigmoids and a large base size.
                 x[N * k..N * k + 3].copy_from_slice(&[30.0, -30.0, 8.0]);
-                x[N * k * 11 + 3] = 3.0;
+                x[N * k * (4 + shape.covariance_outputs()) + 3] = 3.0;
             }
-            if seed == 5 {
+            if seed == 5 && shape.anisotropic {
                 // A quaternion a thousand times shorter than the others.
                 for q in &mut x[N * k + 3..N * k + 7] {
                     *q *= 1e-3;
                 }
             }
-            let (gaussians, sources) = run(&x);
+            let (gaussians, sources) = run(shape, &x);
             let weights = random(seed + 50, gaussians.len() * 14);
-            let f = |x: &[f64]| run(x).0.iter().flat_map(parts).zip(&weights).map(|(p, w)| p * w).sum::<f64>();
+            let f = |x: &[f64]| run(shape, x).0.iter().flat_map(parts).zip(&weights).map(|(p, w)| p * w).sum::<f64>();
             let d: Vec<Gaussian<f64>> = weights
                 .chunks_exact(14)
                 .map(|w| Gaussian {
@@ -260,13 +284,13 @@ mod tests {
                     colour: [w[11], w[12], w[13]],
                 })
                 .collect();
-            let (outputs, log_scales, offsets) = split(&x);
+            let (outputs, log_scales, offsets) = split(shape, &x);
             let mut d_outputs = HeadOutputs::default();
-            d_outputs.reset(&SHAPE, N);
+            d_outputs.reset(shape, N);
             let (mut d_log_scales, mut d_offsets) = (vec![0.0; log_scales.len()], vec![0.0; offsets.len()]);
             let (logits, mut d_mask_logits) = (mask_logits(), vec![0.0; N * k]);
             backward(
-                &SHAPE,
+                shape,
                 &log_scales,
                 &offsets,
                 &logits,
@@ -293,11 +317,24 @@ mod tests {
     }
 
     #[test]
+    fn isotropic_gaussians_are_balls() {
+        let x = random(9, n_inputs(&BALLS));
+        let (gaussians, sources) = run(&BALLS, &x);
+        let (outputs, log_scales, _) = split(&BALLS, &x);
+        assert!(!gaussians.is_empty());
+        for (gaussian, source) in gaussians.iter().zip(sources) {
+            let at = (source.row * 3 + source.offset) as usize;
+            let deviation = log_scales[source.row as usize * 4 + 3].exp() * outputs.covariance[at].sigmoid();
+            assert_eq!((gaussian.scale, gaussian.rotation), ([deviation; 3], [1.0, 0.0, 0.0, 0.0]));
+        }
+    }
+
+    #[test]
     fn a_zero_quaternion_gives_no_infinity() {
-        let mut x = vec![0.5; N * SHAPE.n_offsets * 11 + N * 6 + N * 3 * SHAPE.n_offsets];
+        let mut x = vec![0.5; n_inputs(&SHAPE)];
         let k = SHAPE.n_offsets;
         x[N * k..N * k * 8].fill(0.0);
-        let (gaussians, _) = run(&x);
+        let (gaussians, _) = run(&SHAPE, &x);
         assert!(gaussians.iter().all(|g| parts(g).iter().all(|p| p.is_finite())));
     }
 }

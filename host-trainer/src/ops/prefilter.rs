@@ -12,12 +12,13 @@ const DILATION_REACH_PX: f64 = 1.9;
 /// `offset_reaches`, which leaves nothing out, because a decoder that evaluates such Gaussians once knows no anchors any more.
 pub fn shows<R: Real>(scene: &Scene<R>, anchor: usize, camera: &Pinhole<R>) -> bool {
     let position = scene.position(anchor);
-    let size = |i: usize| scene.anchors.log_scales[anchor * 6 + i].exp();
-    let extent = [size(0), size(1), size(2)];
+    let n_log_scales = scene.shape.n_log_scales();
+    let (extent, base) = scene.anchors.log_scales[anchor * n_log_scales..][..n_log_scales].split_at(3);
+    let extent = [extent[0].exp(), extent[1].exp(), extent[2].exp()];
     if scene.shape.sees_view() {
         return anchor_is_visible(camera, position, extent);
     }
-    let radius = R::real(INK_DEVIATIONS) * size(3).larger(size(4)).larger(size(5));
+    let radius = R::real(INK_DEVIATIONS) * base.iter().fold(R::ZERO, |widest, size| widest.larger(size.exp()));
     let n_offsets = scene.shape.n_offsets;
     (anchor * n_offsets..(anchor + 1) * n_offsets).filter(|offset| scene.anchors.is_drawn(*offset)).any(|offset| {
         let along = &scene.anchors.offsets[offset * 3..][..3];

@@ -34,7 +34,7 @@ pub struct ReferenceScene {
     pub positions: Vec<DVec3>,
     /// `[n_anchors, F]` features.
     pub features: Vec<f64>,
-    /// `[n_anchors, 6]` natural logarithms, as in [`crate::scene::Anchors`].
+    /// `[n_anchors, 6]`, or 4 where Gaussians are isotropic, natural logarithms, as in [`crate::scene::Anchors`].
     pub log_scales: Vec<f64>,
     /// `[n_anchors, K, 3]` offsets in units of `exp(log_scales[0..3])`.
     pub offsets: Vec<f64>,
@@ -116,10 +116,12 @@ impl ReferenceScene {
     fn splats_of(&self, anchor: usize, camera: &Camera, quality: Quality) -> Vec<Splat> {
         let (n_features, n_offsets) = (self.shape.feature_dim, self.shape.n_offsets);
         let position = self.positions[anchor];
-        let log_scales = &self.log_scales[anchor * 6..][..6];
+        let n_log_scales = if self.shape.anisotropic { 6 } else { 4 };
+        let log_scales = &self.log_scales[anchor * n_log_scales..][..n_log_scales];
         // FORMAT.md, section 7: arguments outside this range are clamped to it.
         let size = |log: &[f64]| DVec3::from_slice(log).clamp(DVec3::splat(-87.0), DVec3::splat(88.0)).exp();
-        let (anchor_size, base_size) = (size(&log_scales[..3]), size(&log_scales[3..]));
+        let anchor_size = size(&log_scales[..3]);
+        let base_size = if self.shape.anisotropic { size(&log_scales[3..]) } else { size(&[log_scales[3]; 3]) };
         if self.prefilters && !anchor_is_visible(position, anchor_size, camera) {
             return Vec::new();
         }
@@ -147,19 +149,25 @@ impl ReferenceScene {
                 continue;
             }
             let offset = DVec3::from_slice(&self.offsets[(anchor * n_offsets + k) * 3..]);
-            let logits = &covariances[k * 7..][..7];
-            let scale = base_size * DVec3::from_slice(logits).map(sigmoid);
-            let [w, x, y, z] = [logits[3], logits[4], logits[5], logits[6]];
-            let norm = (w * w + x * x + y * y + z * z).sqrt().max(1e-12);
-            let rotation = rotation_of([w / norm, x / norm, y / norm, z / norm]);
-            let axes = rotation * DMat3::from_diagonal(scale);
+            let covariance = if self.shape.anisotropic {
+                let logits = &covariances[k * 7..][..7];
+                let scale = base_size * DVec3::from_slice(logits).map(sigmoid);
+                let [w, x, y, z] = [logits[3], logits[4], logits[5], logits[6]];
+                let norm = (w * w + x * x + y * y + z * z).sqrt().max(1e-12);
+                let rotation = rotation_of([w / norm, x / norm, y / norm, z / norm]);
+                let axes = rotation * DMat3::from_diagonal(scale);
+                axes * axes.transpose()
+            } else {
+                let deviation = base_size * sigmoid(covariances[k]);
+                DMat3::from_diagonal(deviation * deviation)
+            };
             let mut colour = DVec3::from_slice(&colours[k * 3..]).map(sigmoid);
             if let Some(detail) = self.heads.detail.as_ref().filter(|_| quality.detail) {
                 colour += DVec3::from_slice(&evaluate(detail, &[&feature[..], &colour.to_array()].concat()));
             }
             splats.extend(splat(
                 position + offset * anchor_size,
-                axes * axes.transpose(),
+                covariance,
                 opacity,
                 colour,
                 self.shape.dilation_compensation,

@@ -12,7 +12,8 @@ pub const BANK_WEIGHTS: usize = 3;
 pub enum OutputLayout {
     /// K outputs: row k is the opacity logit, through tanh.
     Opacity,
-    /// 7K outputs: rows 7k..7k+3 scale logits (sigmoid), 7k+3..7k+7 an unnormalised quaternion (w, x, y, z).
+    /// 7K outputs: rows 7k..7k+3 scale logits (sigmoid), 7k+3..7k+7 an unnormalised quaternion (w, x, y, z). Of isotropic
+    /// Gaussians K outputs: row k the scale logit.
     Covariance,
     /// 3K outputs: rows 3k..3k+3 the colour logits (sigmoid).
     Colour,
@@ -20,10 +21,10 @@ pub enum OutputLayout {
 
 impl OutputLayout {
     /// Outputs per offset.
-    pub const fn per_offset(self) -> usize {
+    pub const fn per_offset(self, shape: &ModelShape) -> usize {
         match self {
             Self::Opacity => 1,
-            Self::Covariance => 7,
+            Self::Covariance => shape.covariance_outputs(),
             Self::Colour => 3,
         }
     }
@@ -106,7 +107,7 @@ impl<R: Copy> Heads<R> {
     /// Heads for `shape` with every parameter `value`.
     pub fn filled(shape: &ModelShape, value: R) -> Self {
         let head = |layout: OutputLayout, n_hidden| {
-            Head::filled(shape.head_inputs(), n_hidden, layout.per_offset() * shape.n_offsets, value)
+            Head::filled(shape.head_inputs(), n_hidden, layout.per_offset(shape) * shape.n_offsets, value)
         };
         let detail = |n_hidden| Head::filled(shape.feature_dim + 3, n_hidden, 3, value);
         Self {

@@ -15,7 +15,7 @@ const MIN_SQUARED_SPACING: f64 = 1e-7;
 
 /// Builds the starting scene from points (Lu et al. 2024, Scaffold-GS, section 3.1).
 ///
-/// Anchors sit at unique(round(p/ε))·ε in lexicographic order; offsets and features are 0; all six log-scales are
+/// Anchors sit at unique(round(p/ε))·ε in lexicographic order; offsets and features are 0; all log-scales are
 /// ln √(mean squared distance to the three nearest anchors); heads are drawn from U(−1/√n_in, 1/√n_in), but that of detail
 /// ends in zeros, so that it adds nothing at first.
 pub fn initial_scene(shape: ModelShape, voxel_size: f64, points: &[DVec3], rng: &mut ChaCha8Rng) -> Scene<f32> {
@@ -23,7 +23,9 @@ pub fn initial_scene(shape: ModelShape, voxel_size: f64, points: &[DVec3], rng: 
     let lattice: Vec<[i32; 3]> = cells.into_iter().collect();
     let positions: Vec<DVec3> = lattice.iter().map(|c| DVec3::from(c.map(f64::from)) * voxel_size).collect();
     let log_scales = mean_squared_spacing(&positions)
-        .flat_map(|squared| [f32::real(0.5 * squared.max(MIN_SQUARED_SPACING).ln()); 6])
+        .flat_map(|squared| {
+            std::iter::repeat_n(f32::real(0.5 * squared.max(MIN_SQUARED_SPACING).ln()), shape.n_log_scales())
+        })
         .collect();
     let n = lattice.len();
     let anchors = Anchors {

@@ -22,6 +22,9 @@ pub struct ModelShape {
     pub view_distance: bool,
     /// Opacity is multiplied by √(det Σ / det(Σ + 0.3 I)) (Yu et al. 2024, Mip-Splatting, eq. 8).
     pub dilation_compensation: bool,
+    /// Gaussians have three deviations and a rotation; without it one deviation, the same in every direction.
+    #[serde(default = "anisotropic")]
+    pub anisotropic: bool,
     /// Hidden width of the colour head; 0: F, as that of the others.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub colour_hidden: usize,
@@ -34,13 +37,18 @@ pub struct ModelShape {
     pub feature_bank: bool,
 }
 
+/// What a configuration means that is older than the choice.
+const fn anisotropic() -> bool {
+    true
+}
+
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference")]
 fn is_zero(width: &usize) -> bool {
     *width == 0
 }
 
 impl ModelShape {
-    /// F features, K offsets, no effects.
+    /// F features, K offsets, anisotropic Gaussians, no other effect.
     pub const fn plain(feature_dim: usize, n_offsets: usize) -> Self {
         Self {
             feature_dim,
@@ -48,6 +56,7 @@ impl ModelShape {
             view_direction: false,
             view_distance: false,
             dilation_compensation: false,
+            anisotropic: true,
             colour_hidden: 0,
             detail_hidden: 0,
             feature_bank: false,
@@ -69,9 +78,20 @@ impl ModelShape {
         if self.colour_hidden == 0 { self.feature_dim } else { self.colour_hidden }
     }
 
-    /// Trained values an anchor carries: F features, 6 log-scales, 3K offsets.
+    /// Log-scales an anchor carries: three that scale its offsets, and as base size of its Gaussians three, or one where they
+    /// are isotropic.
+    pub const fn n_log_scales(&self) -> usize {
+        if self.anisotropic { 6 } else { 4 }
+    }
+
+    /// Outputs of the covariance head an offset: three scale logits and a quaternion (w, x, y, z), or one scale logit.
+    pub const fn covariance_outputs(&self) -> usize {
+        if self.anisotropic { 7 } else { 1 }
+    }
+
+    /// Trained values an anchor carries: F features, log-scales, 3K offsets.
     pub fn values_per_anchor(&self) -> usize {
-        self.feature_dim + 6 + 3 * self.n_offsets
+        self.feature_dim + self.n_log_scales() + 3 * self.n_offsets
     }
 }
 
@@ -90,8 +110,8 @@ pub struct Anchors<R> {
     pub lattice: Vec<[i32; 3]>,
     /// `[n_anchors, F]` features.
     pub features: Vec<R>,
-    /// `[n_anchors, 6]` natural logarithms: 0..3 scale the offsets (and are the anchor's own size in the prefilter),
-    /// 3..6 are the base size of its Gaussians.
+    /// `[n_anchors, 6]`, or `[n_anchors, 4]` where Gaussians are isotropic, natural logarithms: 0..3 scale the offsets (and are
+    /// the anchor's own size in the prefilter), those from 3 on are the base size of its Gaussians.
     pub log_scales: Vec<R>,
     /// `[n_anchors, K, 3]` offsets in units of `exp(log_scales[0..3])`.
     pub offsets: Vec<R>,

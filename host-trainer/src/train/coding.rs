@@ -36,8 +36,7 @@ impl Integers {
     /// # Errors
     /// As [`Self::of`].
     pub(super) fn context(&self, scene: &Scene<f32>) -> Result<Context<'_>, TrainError> {
-        Context::parse(&self.section, scene.shape.feature_dim, scene.shape.values_per_anchor())
-            .map_err(|error| TrainError::Context(error.to_string()))
+        integers::parse(&self.section, &scene.shape).map_err(|error| TrainError::Context(error.to_string()))
     }
 }
 

@@ -165,7 +165,7 @@ mod tests {
             }
         }
         // The mean log-scale, from its output.
-        let mean = scene.anchors.log_scales.iter().step_by(6).sum::<f32>() / n as f32;
+        let mean = scene.anchors.log_scales.iter().step_by(scene.shape.n_log_scales()).sum::<f32>() / n as f32;
         assert!((model.mlp.b2[scene.shape.feature_dim] * 0.1 - mean).abs() < 1e-3);
     }
 }

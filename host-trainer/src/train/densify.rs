@@ -57,7 +57,8 @@ pub fn grow(
         for at in eligible.iter().copied().filter(|at| lucky[*at] && mean_gradient(*at) >= threshold) {
             let anchor = at / k;
             let offset = DVec3::from(std::array::from_fn(|i| {
-                f64::from(scene.anchors.offsets[at * 3 + i]) * f64::from(scene.anchors.log_scales[anchor * 6 + i]).exp()
+                f64::from(scene.anchors.offsets[at * 3 + i])
+                    * f64::from(scene.anchors.log_scales[anchor * scene.shape.n_log_scales() + i]).exp()
             }));
             let cell = cell_of(position(scene, anchor) + offset);
             if occupied.contains(&cell) {
@@ -78,7 +79,7 @@ pub fn grow(
         for (cell, feature) in best_supported(candidates, room) {
             scene.anchors.lattice.push(cell.map(|c| c.saturating_mul(cells)));
             scene.anchors.features.extend(feature);
-            scene.anchors.log_scales.extend([log_edge; 6]);
+            scene.anchors.log_scales.extend(std::iter::repeat_n(log_edge, scene.shape.n_log_scales()));
             scene.anchors.offsets.extend(std::iter::repeat_n(0.0, 3 * k));
             scene.anchors.mask_logits.extend(std::iter::repeat_n(INITIAL_MASK_LOGIT as f32, k));
             if !scene.anchors.places.is_empty() {
@@ -147,7 +148,7 @@ pub fn prune(
             statistics.n_views[a] = 0;
         }
     }
-    for base in scene.anchors.log_scales.chunks_exact_mut(6).flat_map(|s| &mut s[3..]) {
+    for base in scene.anchors.log_scales.chunks_exact_mut(scene.shape.n_log_scales()).flat_map(|s| &mut s[3..]) {
         *base = base.min(MAX_BASE_LOG_SCALE);
     }
     retain(scene, optimiser, statistics, &keep);
@@ -156,10 +157,10 @@ pub fn prune(
 
 /// Drops the anchors that `keep` does not mark, with all that belongs to them.
 pub fn retain(scene: &mut Scene<f32>, optimiser: &mut Optimiser<f32>, statistics: &mut Statistics, keep: &[bool]) {
-    let (f, k) = (scene.shape.feature_dim, scene.shape.n_offsets);
+    let (f, s, k) = (scene.shape.feature_dim, scene.shape.n_log_scales(), scene.shape.n_offsets);
     let Anchors { lattice, features, log_scales, offsets, mask_logits, places } = &mut scene.anchors;
     retain_rows(lattice, 1, keep);
-    for (values, width) in [(features, f), (log_scales, 6), (offsets, 3 * k), (mask_logits, k)] {
+    for (values, width) in [(features, f), (log_scales, s), (offsets, 3 * k), (mask_logits, k)] {
         retain_rows(values, width, keep);
     }
     if !places.is_empty() {

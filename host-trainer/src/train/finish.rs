@@ -61,14 +61,14 @@ fn steps(context: &Context<'_>, lattice: [i32; 3], features: &mut [i16], hidden:
 
 /// Makes every value a symbol times its step, as the integer model has it.
 fn round_values(scene: &mut Scene<f32>, context: &Context<'_>) {
-    let (f, o) = (scene.shape.feature_dim, 3 * scene.shape.n_offsets);
+    let (f, s, o) = (scene.shape.feature_dim, scene.shape.n_log_scales(), 3 * scene.shape.n_offsets);
     let anchors = &mut scene.anchors;
     let rows = anchors.lattice.par_chunks(ROWS).zip(anchors.features.par_chunks_mut(ROWS * f));
-    let rows = rows.zip(anchors.log_scales.par_chunks_mut(ROWS * 6)).zip(anchors.offsets.par_chunks_mut(ROWS * o));
+    let rows = rows.zip(anchors.log_scales.par_chunks_mut(ROWS * s)).zip(anchors.offsets.par_chunks_mut(ROWS * o));
     rows.for_each(|(((lattice, features), log_scales), offsets)| {
         let (mut inputs, mut hidden) = (vec![0; context.n_inputs()], vec![0; context.n_hidden()]);
-        let mut residuals = vec![0.0; f.max(6).max(o)];
-        let rows = features.chunks_exact_mut(f).zip(log_scales.chunks_exact_mut(6)).zip(offsets.chunks_exact_mut(o));
+        let mut residuals = vec![0.0; f.max(s).max(o)];
+        let rows = features.chunks_exact_mut(f).zip(log_scales.chunks_exact_mut(s)).zip(offsets.chunks_exact_mut(o));
         for (cell, ((features, log_scales), offsets)) in lattice.iter().zip(rows) {
             let steps = steps(context, *cell, &mut inputs, &mut hidden);
             for (values, step) in [features, log_scales, offsets].into_iter().zip(steps) {
@@ -104,8 +104,11 @@ fn estimated_bits(scene: &Scene<f32>, context: &Context<'_>) -> [f64; N_GROUPS] 
                     *exponent = (step / base).log2();
                 }
             }
-            let values =
-                [gather(&anchors.features, f), gather(&anchors.log_scales, 6), gather(&anchors.offsets, 3 * k)];
+            let values = [
+                gather(&anchors.features, f),
+                gather(&anchors.log_scales, shape.n_log_scales()),
+                gather(&anchors.offsets, 3 * k),
+            ];
             let drawn: Vec<bool> = gather(&anchors.mask_logits, k).into_iter().map(mask::is_open).collect();
             let rows = anchor_bits::Rows {
                 shape,

@@ -108,7 +108,7 @@ impl<R: Real> Optimiser<R> {
                 gradient: |b| &b.d_features,
             },
             Group {
-                width: 6,
+                width: shape.n_log_scales(),
                 step: step(rates.log_scale.at(progress)),
                 parameters: &mut anchors.log_scales,
                 moments: &mut self.log_scales,

@@ -140,7 +140,7 @@ fn input_fault(scene: &Scene<f32>, truth: &[f32], background: [f32; 3]) -> Optio
     let anchors = &scene.anchors;
     [
         ("a feature", &anchors.features, f),
-        ("a log-scale", &anchors.log_scales, 6),
+        ("a log-scale", &anchors.log_scales, scene.shape.n_log_scales()),
         ("an offset", &anchors.offsets, 3 * k),
         ("a mask logit", &anchors.mask_logits, k),
     ]

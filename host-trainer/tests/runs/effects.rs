@@ -19,9 +19,11 @@ fn forced_effects_are_those_of_the_bundle() {
     let home = folder("forced-effects");
     let output = home.join("a.psb");
     succeeds(train(&output).args(["--effects", "+detail,-view-direction,+view-distance"]));
-    let expected = Effects { detail: true, view_distance: true, ..Effects::default() };
+    let expected = Effects { detail: true, view_distance: true, anisotropic: true, ..Effects::default() };
     assert_eq!(effects_of(&output), expected);
     succeeds(train(&output).args(["--effects", "-view-direction"]));
+    assert_eq!(effects_of(&output), Effects { anisotropic: true, ..Effects::default() });
+    succeeds(train(&output).args(["--effects", "none"]));
     assert_eq!(effects_of(&output), Effects::default());
     let banked = ["--effects", "-view-direction,+feature-bank", "--set"];
     succeeds(train(&output).args(banked).arg("train.shape.feature_dim=4"));
@@ -59,9 +61,9 @@ fn options_that_contradict_each_other_are_refused() {
 fn a_run_too_short_to_measure_keeps_its_effects_and_says_so() {
     let output = folder("short-effects").join("a.psb");
     let said = succeeds(train(&output).args(["--effects", "auto"]));
-    assert!(said.contains("effects: view-direction; a run needs 16000 iterations"), "{said}");
+    assert!(said.contains("effects: view-direction + anisotropy; a run needs 16000 iterations"), "{said}");
     let said = succeeds(train(&output).args(["--effects", "auto", "--set", "effects.least_iterations=1"]));
-    assert!(said.contains("effects: view-direction; the capture has too few training views"), "{said}");
+    assert!(said.contains("effects: view-direction + anisotropy; the capture has too few training views"), "{said}");
     let said = succeeds(&mut train(&output));
     assert!(!said.contains("effects:"), "nothing is measured unasked: {said}");
 }

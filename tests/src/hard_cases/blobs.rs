@@ -7,9 +7,9 @@ use pocketsplat::scene::{Anchors, Heads, ModelShape, Scene};
 pub struct Blob {
     /// Centre, normalised frame; an anchor stands on the lattice cell nearest to it.
     pub position: [f64; 3],
-    /// Deviations along its own axes, normalised units.
+    /// Deviations along its own axes, normalised units; the first alone counts in a scene of isotropic Gaussians.
     pub scale: [f64; 3],
-    /// w, x, y, z, of any length.
+    /// w, x, y, z, of any length; none in a scene of isotropic Gaussians.
     pub quaternion: [f32; 4],
     /// Before tanh.
     pub opacity_logit: f32,
@@ -62,12 +62,15 @@ impl Default for Blobs {
 }
 
 /// The head outputs of an anchor's Gaussians.
-fn outputs(blobs: &[Blob]) -> [Vec<f32>; 3] {
+fn outputs(shape: &ModelShape, blobs: &[Blob]) -> [Vec<f32>; 3] {
     let logit = |p: f64| (p / (1.0 - p)).ln() as f32;
     [
         blobs.iter().map(|blob| blob.opacity_logit).collect(),
         // The sigmoid of a zero logit halves the base size.
-        blobs.iter().flat_map(|blob| [0.0; 3].into_iter().chain(blob.quaternion)).collect(),
+        blobs
+            .iter()
+            .flat_map(|blob| [0.0; 3].into_iter().chain(blob.quaternion).take(shape.covariance_outputs()))
+            .collect(),
         blobs.iter().flat_map(|blob| blob.colour.map(logit)).collect(),
     ]
 }
@@ -86,7 +89,7 @@ impl Blobs {
         let material_of: Vec<usize> = groups
             .iter()
             .map(|group| {
-                let outputs = outputs(group);
+                let outputs = outputs(&self.effects, group);
                 materials.iter().position(|known| *known == outputs).unwrap_or_else(|| {
                     materials.push(outputs);
                     materials.len() - 1
@@ -112,7 +115,7 @@ impl Blobs {
             anchors.features.extend((0..f).map(|m| if m == material { 1.0 } else { 0.0 }));
             let longest = scale.into_iter().fold(0.0, f64::max);
             anchors.log_scales.extend([longest.ln() as f32; 3]);
-            anchors.log_scales.extend(scale.map(|s| (2.0 * s).ln() as f32));
+            anchors.log_scales.extend(scale.map(|s| (2.0 * s).ln() as f32).iter().take(shape.n_log_scales() - 3));
             anchors.offsets.extend(std::iter::repeat_n(0.0, 3 * self.per_anchor));
             anchors.mask_logits.extend(std::iter::repeat_n(1.0, self.per_anchor));
         }

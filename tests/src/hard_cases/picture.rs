@@ -193,7 +193,7 @@ pub fn codec_error(scene: &Scene<f32>, bundle: &Bundle<'_>) -> f64 {
         let [before, after] = [&scene.anchors, &decoded.anchors];
         for (values, decoded, width, step) in [
             (&before.features, &after.features, shape.feature_dim, steps.feature),
-            (&before.log_scales, &after.log_scales, 6, steps.log_scale),
+            (&before.log_scales, &after.log_scales, shape.n_log_scales(), steps.log_scale),
             (&before.offsets, &after.offsets, 3 * shape.n_offsets, steps.offset),
         ] {
             for i in 0..width {

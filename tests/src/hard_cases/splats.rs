@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_PI_4, FRAC_PI_8};
 
 use glam::{DMat3, DQuat, DVec3};
 use pocketsplat::camera::Camera;
-use pocketsplat::scene::ModelShape;
+use pocketsplat::scene::{ModelShape, Scene};
 
 use super::blobs::{Blob, Blobs};
 use super::picture::{Figures, Picture, camera};
@@ -70,6 +70,11 @@ fn pancake(angle: f64) -> Blob {
 fn compensated(blob: Blob) -> Picture {
     let effects = ModelShape { dilation_compensation: true, ..ModelShape::plain(1, 1) };
     Picture::of(Blobs { effects, ..Blobs::of([blob]) }.scene())
+}
+
+/// The same Gaussians in a scene that knows one deviation of each, the first.
+fn balls(blobs: impl IntoIterator<Item = Blob>) -> Scene<f32> {
+    Blobs { effects: ModelShape { anisotropic: false, ..ModelShape::plain(1, 1) }, ..Blobs::of(blobs) }.scene()
 }
 
 fn wall_of_specks() -> Picture {
@@ -154,6 +159,25 @@ pub(super) fn family() -> Family {
             let camera = Camera { focal_px: [300.0; 2], ..camera() };
             Picture::of(Blobs::of([Blob { position: [200.0, 0.2, 0.6], ..wide(280.0) }]).scene()).through(camera)
         }),
+        picture("isotropic specks", "five of 3·10⁻⁴ px, in a scene that knows no shapes", || {
+            let position = |i: i32| [f64::from(i) / 8.0, f64::from(i) / 16.0, 2.0];
+            Picture::of(balls((-2..=2).map(|i| Blob { position: position(i), ..speck() })))
+        }),
+        picture("isotropic and wide", "600 px in a frame of 48, half of it from a centre 3,000 px outside", || {
+            let beside = Blob { position: [100.0, -40.0, 2.0], ..wide(200.0) };
+            Picture::of(balls([wide(20.0), beside]))
+        }),
+        picture(
+            "no isotropic needle",
+            "a needle and a pancake of ratio 10⁶ whose scene knows no shapes: balls, of anchors like needles",
+            || {
+                let mut scene = balls([needle(0.1, 1e6), Blob { position: [0.2, 0.1, 2.5], ..pancake(FRAC_PI_4) }]);
+                for log_scales in scene.anchors.log_scales.chunks_exact_mut(scene.shape.n_log_scales()) {
+                    log_scales[..3].copy_from_slice(&[400_f32.ln(), 1e-3_f32.ln(), 1e-3_f32.ln()]);
+                }
+                Picture::of(scene)
+            },
+        ),
     ];
     Family { title: "Shapes of splats", analysis: ANALYSIS, cases }
 }

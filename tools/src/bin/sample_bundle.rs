@@ -25,6 +25,9 @@ struct Args {
     /// Without glint and haze: as the same from everywhere.
     #[arg(long)]
     matte: bool,
+    /// Of balls, not of discs.
+    #[arg(long)]
+    isotropic: bool,
 }
 
 const SHAPE: ModelShape = ModelShape {
@@ -108,7 +111,7 @@ fn scene(shape: ModelShape) -> Scene<f32> {
         anchors.features.extend(feature.map(|f| f as f32));
         let log_reach = patch.reach.ln() as f32;
         // The discs' radius: two thirds of their spacing, so that they overlap into a surface.
-        anchors.log_scales.extend([log_reach, log_reach, log_reach, log_reach, log_reach, log_reach]);
+        anchors.log_scales.extend(std::iter::repeat_n(log_reach, shape.n_log_scales()));
         for (k, [x, y]) in [[-0.5, -0.5], [0.5, -0.5], [-0.5, 0.5], [0.5, 0.5]].into_iter().enumerate() {
             // The ring is thinner by a disc a patch.
             anchors.mask_logits.push(if index >= n_planet && k == 2 { -10.0 } else { 1.0 });
@@ -139,16 +142,18 @@ fn heads(shape: &ModelShape) -> Heads<f32> {
     colour.b1[HAZE] = -1.5;
     for k in 0..SHAPE.n_offsets {
         pass(&mut heads.opacity, k, OPACITY);
-        for axis in 0..3 {
+        if shape.anisotropic {
             // Discs: wide along x and y, thin along z.
-            heads.covariance.b2[7 * k + axis] = if axis == 2 { -2.5 } else { 0.3 };
+            heads.covariance.b2[7 * k..][..3].copy_from_slice(&[0.3, 0.3, -2.5]);
+            for part in 0..4 {
+                pass(&mut heads.covariance, 7 * k + 3 + part, QUATERNION + part);
+            }
+        }
+        for axis in 0..3 {
             let row = 3 * k + axis;
             pass(&mut heads.colour, row, COLOUR + axis);
             heads.colour.w2[row * SHAPE.feature_dim + GLINT] = 0.5;
             heads.colour.w2[row * SHAPE.feature_dim + HAZE] = -0.25;
-        }
-        for part in 0..4 {
-            pass(&mut heads.covariance, 7 * k + 3 + part, QUATERNION + part);
         }
     }
     if let Some(detail) = &mut heads.detail {
@@ -194,10 +199,10 @@ fn context(scene: &Scene<f32>) -> ContextModel<f32> {
         signs.fill(if row % 4 < 2 { 1.0 } else { -1.0 });
     }
     model.mlp.w1[0] = 1.0;
-    let n_channels = SHAPE.values_per_anchor();
+    let n_channels = scene.shape.values_per_anchor();
     let groups = [
         (&scene.anchors.features, SHAPE.feature_dim),
-        (&scene.anchors.log_scales, 6),
+        (&scene.anchors.log_scales, scene.shape.n_log_scales()),
         (&scene.anchors.offsets, 3 * SHAPE.n_offsets),
     ];
     let mut channel = 0;
@@ -221,7 +226,8 @@ fn context(scene: &Scene<f32>) -> ContextModel<f32> {
 fn main() -> anyhow::Result<()> {
     let args = Args::parse();
     let camera = camera();
-    let mut scene = scene(ModelShape { view_direction: !args.matte, view_distance: !args.matte, ..SHAPE });
+    let (sees_view, anisotropic) = (!args.matte, !args.isotropic);
+    let mut scene = scene(ModelShape { view_direction: sees_view, view_distance: sees_view, anisotropic, ..SHAPE });
     if args.coder != Coder::Static {
         scene.context = Some(context(&scene));
     }

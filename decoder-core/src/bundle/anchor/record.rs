@@ -55,6 +55,7 @@ impl RecordLayout {
     ///   for, 0 without masks. * `context`: the steps are the anchor's own.
     pub(crate) const fn new(
         feature_dim: u16,
+        n_log_scales: u16,
         n_offsets: u16,
         symbol_bits: [u8; N_GROUPS],
         lattice_bits: u8,
@@ -66,7 +67,7 @@ impl RecordLayout {
             code_bits: lattice_bits.saturating_mul(3),
             mask_bits: masked_offsets as u8,
             step_bits: if context { STEP_BITS } else { 0 },
-            groups: [(feature_dim, feature), (6, log_scale), (n_offsets.saturating_mul(3), offset)],
+            groups: [(feature_dim, feature), (n_log_scales, log_scale), (n_offsets.saturating_mul(3), offset)],
         }
     }
 
@@ -112,6 +113,7 @@ impl Bundle<'_> {
         let Header { feature_dim, n_offsets, symbol_bits, .. } = *header;
         RecordLayout::new(
             feature_dim,
+            header.n_log_scales(),
             n_offsets,
             symbol_bits,
             self.lattice().bits,
@@ -141,7 +143,7 @@ impl<'b, 's> AnchorRecords<'b, 's> {
         let layout = bundle.record_layout();
         damaged.fill(0);
         let row = row.get_mut(..bundle.header().n_channels()).unwrap_or_default();
-        // `max(1)`: a chunk size of zero would panic; there are always at least 6 channels.
+        // `max(1)`: a chunk size of zero would panic; there are always at least 5 channels.
         let mut slots = records.chunks_exact_mut(layout.len().max(1));
         for chunk in bundle.chunks().take(n_chunks as usize) {
             match decode_chunk(&chunk, &layout, &mut slots, row, models) {

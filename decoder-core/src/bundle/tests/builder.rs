@@ -202,7 +202,7 @@ fn chunk_words(anchors: &[Anchor], variant: Variant) -> Vec<u8> {
     let frequencies = mask_frequencies();
     let masks = MaskModel::new(&frequencies);
     let section = context_section();
-    let context = Context::parse(&section, F, C).expect("a sound context");
+    let context = Context::parse(&section, F, 6, C).expect("a sound context");
     let mut slots = Vec::new();
     for (index, anchor) in anchors.iter().enumerate() {
         // The levels that this anchor's path shares with the one before are coded already.

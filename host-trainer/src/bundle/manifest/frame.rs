@@ -158,7 +158,7 @@ impl Added {
             (true, detail) => [10 * f, if detail { 3 * f } else { 0 }],
         };
         let per_open_anchor = hidden + c * shape.head_inputs() as u64 + d * f + again;
-        let per_gaussian = 7 * f + 3 * c + 6 * d;
+        let per_gaussian = shape.covariance_outputs() as u64 * f + 3 * c + 6 * d;
         let head_macs = self.visible_anchors * (hidden + f * k + bank)
             + self.open_anchors * per_open_anchor
             + self.gaussians * per_gaussian;

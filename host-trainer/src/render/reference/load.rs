@@ -69,14 +69,14 @@ impl ReferenceScene {
                         let steps = steps(context, site.lattice);
                         let step_of = |channel: usize| match channel.checked_sub(shape.feature_dim) {
                             None => steps[0],
-                            Some(0..6) => steps[1],
+                            Some(log_scale) if log_scale < shape.n_log_scales() => steps[1],
                             Some(_) => steps[2],
                         };
                         symbols.iter().enumerate().map(|(channel, &s)| f64::from(s) * step_of(channel)).collect()
                     }
                 };
                 let (features, rest) = row.split_at(shape.feature_dim);
-                let (log_scales, offsets) = rest.split_at(6);
+                let (log_scales, offsets) = rest.split_at(shape.n_log_scales());
                 scene.features.extend(features);
                 scene.log_scales.extend(log_scales);
                 scene.offsets.extend(offsets);

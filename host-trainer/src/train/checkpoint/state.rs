@@ -103,7 +103,8 @@ impl<'a> Trainer<'a> {
     }
 
     fn decode_state(&mut self, from: &mut Decoder<'_>) -> Result<(), CheckpointFault> {
-        let ModelShape { feature_dim, n_offsets, .. } = self.config.shape;
+        let shape = self.config.shape;
+        let ModelShape { feature_dim, n_offsets, .. } = shape;
         let [iteration, n_steps] = from.value("iteration")?;
         if iteration > self.config.iterations {
             let [found, needed] = [iteration, self.config.iterations].map(u64::from);
@@ -137,10 +138,10 @@ impl<'a> Trainer<'a> {
             Ok((values, moments))
         };
         let (features, f) = array("features", feature_dim)?;
-        let (log_scales, s) = array("log-scales", 6)?;
+        let (log_scales, s) = array("log-scales", shape.n_log_scales())?;
         let (offsets, o) = array("offsets", 3 * n_offsets)?;
         let (mask_logits, m) = array("mask logits", n_offsets)?;
-        let (shape, voxel_size) = (self.config.shape, self.config.voxel_size_for(self.capture));
+        let voxel_size = self.config.voxel_size_for(self.capture);
         let mut heads = || {
             let mut heads = Heads::filled(&shape, 0.0f32);
             for group in heads.each_mut().flat_map(|head| head.groups_mut()) {

@@ -23,7 +23,7 @@ pub struct Block<R> {
     pub screen_gradients: Vec<R>,
     /// dL/d(features) `[n, F]`.
     pub d_features: Vec<R>,
-    /// dL/d(log-scales) `[n, 6]`.
+    /// dL/d(log-scales) `[n, 6]` or `[n, 4]`.
     pub d_log_scales: Vec<R>,
     /// dL/d(offsets) `[n, 3K]`.
     pub d_offsets: Vec<R>,
@@ -61,7 +61,7 @@ pub(super) fn refill<R: Real>(buffer: &mut Vec<R>, len: usize) {
 }
 
 impl<R: Real> Block<R> {
-    /// Copies the gradients of its anchors into arrays of all anchors: `[N, F]` features, `[N, 6]` log-scales, `[N, 3K]` offsets.
+    /// Copies the gradients of its anchors into arrays of all anchors: `[N, F]` features, `[N, 6]` or `[N, 4]` log-scales, `[N, 3K]` offsets.
     pub fn copy_gradients(&self, shape: &ModelShape, d_anchors: &mut Anchors<R>) {
         let copy = |from: &[R], to: &mut [R], len: usize| {
             for (row, &anchor) in from.chunks_exact(len).zip(&self.anchors) {
@@ -69,7 +69,7 @@ impl<R: Real> Block<R> {
             }
         };
         copy(&self.d_features, &mut d_anchors.features, shape.feature_dim);
-        copy(&self.d_log_scales, &mut d_anchors.log_scales, 6);
+        copy(&self.d_log_scales, &mut d_anchors.log_scales, shape.n_log_scales());
         copy(&self.d_offsets, &mut d_anchors.offsets, 3 * shape.n_offsets);
     }
 
@@ -108,7 +108,7 @@ impl<R: Real> Block<R> {
 
     /// Copies the rows of `anchors` out of the scene.
     pub(super) fn gather(&mut self, scene: &Scene<R>, anchors: &[u32]) {
-        let (f, k) = (scene.shape.feature_dim, scene.shape.n_offsets);
+        let (f, s, k) = (scene.shape.feature_dim, scene.shape.n_log_scales(), scene.shape.n_offsets);
         for buffer in [&mut self.features, &mut self.log_scales, &mut self.offsets, &mut self.mask_logits] {
             buffer.clear();
         }
@@ -118,7 +118,7 @@ impl<R: Real> Block<R> {
         for a in anchors.iter().map(|a| *a as usize) {
             self.positions.push(scene.position(a));
             self.features.extend_from_slice(&scene.anchors.features[a * f..(a + 1) * f]);
-            self.log_scales.extend_from_slice(&scene.anchors.log_scales[a * 6..(a + 1) * 6]);
+            self.log_scales.extend_from_slice(&scene.anchors.log_scales[a * s..(a + 1) * s]);
             self.offsets.extend_from_slice(&scene.anchors.offsets[3 * a * k..3 * (a + 1) * k]);
             self.mask_logits.extend_from_slice(&scene.anchors.mask_logits[a * k..(a + 1) * k]);
         }
@@ -258,7 +258,7 @@ impl<R: Real> Block<R> {
             detail::backward(head, features, sources, detail, d_gaussians, &mut by_detail, d_head);
         }
         self.d_outputs.reset(shape, n);
-        refill(&mut self.d_log_scales, n * 6);
+        refill(&mut self.d_log_scales, n * shape.n_log_scales());
         refill(&mut self.d_offsets, n * 3 * shape.n_offsets);
         refill(&mut self.d_mask_logits, n * shape.n_offsets);
         neural_gaussians::backward(

@@ -13,7 +13,7 @@ use crate::scene::{ContextModel, Head, ModelShape, Scene};
 /// Number of the draw that decides whether an anchor is in the sample; channels are fewer.
 const SAMPLE_DRAW: u32 = u32::MAX;
 
-/// The values of a block, or their gradients: `[n, F]`, `[n, 6]`, `[n, 3K]`.
+/// The values of a block, or their gradients: `[n, F]`, `[n, 6]` or `[n, 4]`, `[n, 3K]`.
 pub(super) type Values<'a, R> = [&'a mut Vec<R>; N_GROUPS];
 
 /// The context network of a step.
@@ -92,7 +92,7 @@ pub(super) fn steps_of<R: Real>(network: &Head<R>) -> Head<R> {
 }
 
 fn widths(shape: &ModelShape) -> [usize; N_GROUPS] {
-    [shape.feature_dim, 6, 3 * shape.n_offsets]
+    [shape.feature_dim, shape.n_log_scales(), 3 * shape.n_offsets]
 }
 
 /// A head of zeros as wide as `like`, in the place of whatever was there.

@@ -4,11 +4,11 @@ use glam::{DMat3, DVec3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use pocketsplat_core::context::{Context, GridFrame, GridLevel, Group, LevelKind};
+use pocketsplat_core::context::{GridFrame, GridLevel, Group, LevelKind};
 
 use super::coding::{Exact, RateTerms};
 use super::*;
-use crate::bundle::context::{rounded, section};
+use crate::bundle::context::{parse, rounded, section};
 use crate::camera::Camera;
 use crate::ops::finite_difference::{assert_piecewise_gradient, random};
 use crate::ops::noise::Stream;
@@ -52,7 +52,7 @@ fn scene(seed: u64, shape: ModelShape) -> Scene<f64> {
     scene
 }
 
-fn shapes() -> [ModelShape; 6] {
+fn shapes() -> [ModelShape; 7] {
     let base = ModelShape { view_direction: true, ..ModelShape::plain(6, 3) };
     [
         base,
@@ -61,6 +61,7 @@ fn shapes() -> [ModelShape; 6] {
         ModelShape { detail_hidden: 5, colour_hidden: 8, ..base },
         ModelShape { feature_bank: true, ..ModelShape::plain(4, 2) },
         ModelShape { feature_bank: true, detail_hidden: 3, feature_dim: 8, ..base },
+        ModelShape { anisotropic: false, ..base },
     ]
 }
 
@@ -220,6 +221,7 @@ fn a_step_with_noise_and_rate_agrees_with_finite_differences() {
     let codings = [
         (shapes()[2], Coding::Noise { stream, steps: [0.3, 0.1, 0.2] }),
         (shapes()[1], Coding::Context { stream, rate: rate(0.0), exact: None }),
+        (shapes()[6], Coding::Context { stream, rate: rate(0.0), exact: None }),
     ];
     for (shape, coding) in codings {
         let mut scene = scene(31, shape);
@@ -290,12 +292,17 @@ fn masks_hide_save_bits_and_are_pushed_shut() {
 /// In the last phase the step draws the very values that a decoder reads.
 #[test]
 fn rounded_values_are_symbols_of_the_integer_model() {
-    let mut exact = scene(61, shapes()[1]);
+    rounding_twice_is_rounding_once(shapes()[1]);
+    rounding_twice_is_rounding_once(shapes()[6]);
+}
+
+fn rounding_twice_is_rounding_once(shape: ModelShape) {
+    let mut exact = scene(61, shape);
     exact.context = Some(context(61, &exact));
     let scene = exact.cast::<f32>();
     let (model, n_channels) = (scene.context.as_ref().unwrap(), scene.shape.values_per_anchor());
     let section = section(model, n_channels).unwrap();
-    let context = Context::parse(&section, scene.shape.feature_dim, n_channels).unwrap();
+    let context = parse(&section, &scene.shape).unwrap();
     let network = rounded(model, n_channels).unwrap();
     let step = |scene: &Scene<f32>| {
         let exact = Some(Exact { context: &context, network: &network });
@@ -310,7 +317,7 @@ fn rounded_values_are_symbols_of_the_integer_model() {
         let steps = context.steps(&hidden);
         let arrays = [
             (Group::Feature, &mut snapped.anchors.features, scene.shape.feature_dim),
-            (Group::LogScale, &mut snapped.anchors.log_scales, 6),
+            (Group::LogScale, &mut snapped.anchors.log_scales, shape.n_log_scales()),
             (Group::Offset, &mut snapped.anchors.offsets, 3 * scene.shape.n_offsets),
         ];
         for (group, values, width) in arrays {

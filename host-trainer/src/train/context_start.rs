@@ -90,13 +90,14 @@ fn n_hidden(n_anchors: usize) -> usize {
 /// Mean and log₂ of the standard deviation of every channel, in base steps; steps are the base steps.
 fn output_biases(scene: &Scene<f32>, base_steps: [f32; N_GROUPS]) -> Vec<f32> {
     let (f, k, n_channels) = (scene.shape.feature_dim, scene.shape.n_offsets, scene.shape.values_per_anchor());
+    let s = scene.shape.n_log_scales();
     let anchors = &scene.anchors;
     let mut biases = vec![0.0; 2 * n_channels + N_GROUPS];
     for channel in 0..n_channels {
         let (values, width, at, group) = match channel {
             c if c < f => (&anchors.features, f, c, 0),
-            c if c < f + 6 => (&anchors.log_scales, 6, c - f, 1),
-            c => (&anchors.offsets, 3 * k, c - f - 6, 2),
+            c if c < f + s => (&anchors.log_scales, s, c - f, 1),
+            c => (&anchors.offsets, 3 * k, c - f - s, 2),
         };
         let (mut n, mut sum, mut squares) = (0.0, 0.0, 0.0);
         for (a, row) in values.chunks_exact(width).enumerate() {

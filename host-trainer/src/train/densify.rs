@@ -166,20 +166,25 @@ pub fn retain(scene: &mut Scene<f32>, optimiser: &mut Optimiser<f32>, statistics
     if !places.is_empty() {
         retain_rows(places, 1, keep);
     }
-    optimiser.retain(keep, f, k);
+    optimiser.retain(keep, &scene.shape);
     statistics.retain(keep, k);
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::ModelShape;
     use crate::scene::init::initial_scene;
     use crate::train::TrainConfig;
     use rand::SeedableRng;
 
     fn start(points: &[DVec3]) -> (Scene<f32>, Optimiser<f32>, Statistics, ChaCha8Rng) {
+        start_with(TrainConfig::default().shape, points)
+    }
+
+    fn start_with(shape: ModelShape, points: &[DVec3]) -> (Scene<f32>, Optimiser<f32>, Statistics, ChaCha8Rng) {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
-        let scene = initial_scene(TrainConfig::default().shape, 0.001, points, &mut rng);
+        let scene = initial_scene(shape, 0.001, points, &mut rng);
         let optimiser = Optimiser::new(&scene);
         let statistics = Statistics::new(scene.anchors.len(), scene.shape.n_offsets);
         (scene, optimiser, statistics, rng)
@@ -188,7 +193,8 @@ mod tests {
     fn consistent(scene: &Scene<f32>, optimiser: &Optimiser<f32>, statistics: &Statistics) {
         let n = scene.anchors.len();
         assert_eq!(scene.anchors.features.len(), n * 32);
-        assert_eq!(scene.anchors.log_scales.len(), n * 6);
+        assert_eq!(scene.anchors.log_scales.len(), n * scene.shape.n_log_scales());
+        assert_eq!(optimiser.log_scales.first.len(), n * scene.shape.n_log_scales());
         assert_eq!(scene.anchors.offsets.len(), n * 30);
         assert_eq!(optimiser.features.first.len(), n * 32);
         assert_eq!(optimiser.offsets.second.len(), n * 30);
@@ -248,6 +254,28 @@ mod tests {
         consistent(&scene, &optimiser, &statistics);
         let again = grow(&mut scene, &mut optimiser, &mut statistics, &settings, 4, &mut rng);
         assert_eq!(again, 0, "full");
+    }
+
+    #[test]
+    fn isotropic_scenes_grow_and_lose_anchors_alike() {
+        let shape = ModelShape { anisotropic: false, ..TrainConfig::default().shape };
+        let (mut scene, mut optimiser, mut statistics, mut rng) = start_with(shape, &[DVec3::ZERO, DVec3::ONE]);
+        for k in 0..10 {
+            scene.anchors.log_scales[..3].fill(0.0);
+            scene.anchors.offsets[k * 3] = 0.1 * (k + 1) as f32;
+            statistics.n_drawn[k] = 41;
+            statistics.gradient_sum[k] = 41.0;
+        }
+        assert!(grow(&mut scene, &mut optimiser, &mut statistics, &Densification::default(), 4, &mut rng) > 0);
+        consistent(&scene, &optimiser, &statistics);
+        statistics.n_views[1] = 81;
+        scene.anchors.log_scales[3] = 1.0;
+        let kept = [&scene.anchors.log_scales[..4], &scene.anchors.log_scales[8..]].concat();
+        assert_eq!(prune(&mut scene, &mut optimiser, &mut statistics, &Densification::default()), 1);
+        consistent(&scene, &optimiser, &statistics);
+        assert_eq!(scene.anchors.log_scales[3], MAX_BASE_LOG_SCALE);
+        assert_eq!(scene.anchors.log_scales[..3], kept[..3]);
+        assert_eq!(scene.anchors.log_scales[4..], kept[4..]);
     }
 
     #[test]

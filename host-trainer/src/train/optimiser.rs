@@ -6,7 +6,7 @@ use super::config::Rates;
 use super::step::{Block, Workspace};
 use crate::ops::Real;
 use crate::ops::adam::{self, Moments, Step};
-use crate::scene::{Anchors, ContextModel, Head, Heads, Scene};
+use crate::scene::{Anchors, ContextModel, Head, Heads, ModelShape, Scene};
 
 /// Anchors one task updates.
 const ROWS: usize = 2048;
@@ -174,9 +174,11 @@ impl<R: Real> Optimiser<R> {
     }
 
     /// Drops the moments of anchors that `keep` does not mark.
-    pub fn retain(&mut self, keep: &[bool], feature_dim: usize, n_offsets: usize) {
+    pub fn retain(&mut self, keep: &[bool], shape: &ModelShape) {
         let moments = [&mut self.features, &mut self.log_scales, &mut self.offsets, &mut self.mask_logits];
-        for (moments, width) in moments.into_iter().zip([feature_dim, 6, 3 * n_offsets, n_offsets]) {
+        let ModelShape { feature_dim, n_offsets, .. } = *shape;
+        let widths = [feature_dim, shape.n_log_scales(), 3 * n_offsets, n_offsets];
+        for (moments, width) in moments.into_iter().zip(widths) {
             retain_rows(&mut moments.first, width, keep);
             retain_rows(&mut moments.second, width, keep);
         }

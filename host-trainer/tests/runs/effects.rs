@@ -33,6 +33,18 @@ fn forced_effects_are_those_of_the_bundle() {
 }
 
 #[test]
+fn isotropic_runs_go_through_every_phase_and_module() {
+    let output = folder("isotropic").join("a.psb");
+    let mut command = train(&output);
+    command.args(["--effects", "-anisotropy", "--backbone", "hac", "--modules", "distribution,pruning,detail"]);
+    succeeds(command.args(["--set", "train.modules.distribution.vectors=all"]));
+    let bytes = fs::read(&output).unwrap();
+    let bundle = Bundle::parse(&bytes).unwrap();
+    assert!(!bundle.header().features.effects.anisotropic && bundle.n_anchors() > 0);
+    assert_eq!(bundle.heads().covariance.n_out, 3, "a scale logit an offset");
+}
+
+#[test]
 fn options_that_contradict_each_other_are_refused() {
     let output = folder("contradictions").join("a.psb");
     let with = |options: &[&str]| fails(train(&output).args(options));

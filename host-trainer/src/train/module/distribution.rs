@@ -95,7 +95,7 @@ impl Module for Distribution {
 
 /// Which arrays of an anchor are regularised: index in the order of the base steps, width.
 fn arrays(vectors: Vectors, shape: &ModelShape) -> impl Iterator<Item = (usize, usize)> + use<> {
-    let widths = [shape.feature_dim, 6, 3 * shape.n_offsets];
+    let widths = [shape.feature_dim, shape.n_log_scales(), 3 * shape.n_offsets];
     let n = if vectors == Vectors::Features { 1 } else { widths.len() };
     widths.into_iter().enumerate().take(n)
 }

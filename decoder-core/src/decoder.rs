@@ -275,7 +275,9 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
         let keeps_tiles = self.plan.shape().canvas_tiles > 1;
         let (mut n_tiles, mut alive) = (0, 0);
         let rule = BlendRule::of(self.plan.budget().quality);
-        let background = self.bundle.header().background.map(|byte| f32::from(byte) / 255.0);
+        let header = self.bundle.header();
+        let has_background = cfg!(feature = "background") && header.features.effects.background;
+        let background = has_background.then(|| header.background.map(|byte| f32::from(byte) / 255.0));
         let rows = (0..).zip(tiles_along(camera.height_px));
         for (row, (y_px, height)) in rows.take(strip.end_row.into()).skip(strip.first_row.into()) {
             watch.enter(Stage::Sort);

@@ -18,6 +18,8 @@ pub struct Effects {
     pub feature_bank: bool,
     /// Gaussians have three deviations and a rotation; without it one deviation, the same in every direction.
     pub anisotropic: bool,
+    /// Something lies behind the scene: a colour.
+    pub background: bool,
 }
 
 /// What a bundle requires of its decoder: the scene's effects, and how its numbers are stored.
@@ -35,8 +37,8 @@ pub struct Features {
 }
 
 impl Features {
-    /// Bits that have a meaning in this version; 8 has none.
-    const KNOWN: u32 = 0b10_1111_1111;
+    /// Bits that have a meaning in this version.
+    const KNOWN: u32 = 0b11_1111_1111;
 
     /// The bit that says what a scene lacks, where the others say what it has: bundles without it are older than the choice.
     const ISOTROPIC: u32 = 1 << 7;
@@ -51,6 +53,7 @@ impl Features {
             detail: cfg!(feature = "detail"),
             feature_bank: cfg!(feature = "feature-bank"),
             anisotropic: cfg!(feature = "anisotropy"),
+            background: cfg!(feature = "background"),
         };
         let built = Self { effects, masks: true, context: cfg!(feature = "context"), coded_heads: true };
         built.to_bits() ^ Self::ISOTROPIC
@@ -59,8 +62,9 @@ impl Features {
     /// The bits as the header stores them.
     #[must_use]
     pub const fn to_bits(self) -> u32 {
-        let Effects { view_direction, view_distance, dilation_compensation, detail, feature_bank, anisotropic } =
-            self.effects;
+        let effects = self.effects;
+        let Effects { view_direction, view_distance, dilation_compensation, detail, .. } = effects;
+        let Effects { feature_bank, anisotropic, background, .. } = effects;
         (view_direction as u32)
             | (view_distance as u32) << 1
             | (dilation_compensation as u32) << 2
@@ -69,6 +73,7 @@ impl Features {
             | (self.coded_heads as u32) << 5
             | (detail as u32) << 6
             | if anisotropic { 0 } else { Self::ISOTROPIC }
+            | (background as u32) << 8
             | (feature_bank as u32) << 9
     }
 
@@ -95,6 +100,7 @@ impl Features {
                 detail: has(64),
                 feature_bank: has(512),
                 anisotropic: !has(Self::ISOTROPIC),
+                background: has(256),
             },
             masks: has(8),
             context: has(16),
@@ -137,6 +143,7 @@ mod tests {
             (64, "detail"),
             (512, "feature-bank"),
             (128, "anisotropy"),
+            (256, "background"),
         ];
         for (bits, name) in all {
             assert!(text(bits).contains(name), "{bits:#b}: {}", text(bits));

@@ -61,7 +61,7 @@ pub struct Header {
     pub n_tiers: u8,
     /// Size `[width, height]` of the images the scene was trained on, pixels; drawn at other sizes it loses quality.
     pub training_px: [u16; 2],
-    /// What lies behind everything.
+    /// What lies behind everything; black without its feature.
     pub background: [u8; 3],
     /// Edge of a lattice cell, normalised units.
     pub voxel_size: f32,
@@ -177,6 +177,9 @@ impl Header {
             in_range(Field::SymbolBits, bits.into(), 1, 16)?;
         }
         in_range(Field::Reserved, reserved.into(), 0, 0)?;
+        for channel in background {
+            in_range(Field::Background, channel.into(), 0, if features.effects.background { 255 } else { 0 })?;
+        }
         for size_px in training_px {
             in_range(Field::TrainingSize, size_px.into(), 1, u32::from(u16::MAX))?;
         }

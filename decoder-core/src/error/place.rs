@@ -50,6 +50,8 @@ pub enum Field {
     NSections,
     SectionKind,
     Reserved,
+    /// A channel of the background of a scene that has none.
+    Background,
     ColourHidden,
     DetailHidden,
     /// Bits of the symbols of a group of channels.
@@ -154,6 +156,7 @@ impl fmt::Display for Field {
             Self::NSections => "number of sections",
             Self::SectionKind => "kind of a section",
             Self::Reserved => "a reserved byte",
+            Self::Background => "the background of a scene without",
             Self::ColourHidden => "hidden width of the colour head",
             Self::DetailHidden => "hidden width of the detail head",
             Self::SymbolBits => "bits of a symbol",

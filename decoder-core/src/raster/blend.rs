@@ -96,13 +96,26 @@ pub(crate) fn blend_tile<A: Choices>(
     TileWork { alive, ..work }
 }
 
-/// Puts the background behind a tile and rounds to bytes, `[height, width]` row by row.
-pub(crate) fn finish_tile<C: Colours>(place: TilePlace, pixels: &[Pixel], background: [f32; 3], rgb: &mut [[u8; 3]]) {
+/// Puts the background behind a tile, if there is one, and rounds to bytes, `[height, width]` row by row.
+pub(crate) fn finish_tile<C: Colours>(
+    place: TilePlace,
+    pixels: &[Pixel],
+    background: Option<[f32; 3]>,
+    rgb: &mut [[u8; 3]],
+) {
+    match background {
+        Some(background) => finish::<C>(place, pixels, rgb, |pixel| behind(pixel, background)),
+        None => finish::<C>(place, pixels, rgb, |[red, green, blue, _]| [red, green, blue]),
+    }
+}
+
+/// Rounds what `colour` makes of each pixel to bytes.
+fn finish<C: Colours>(place: TilePlace, pixels: &[Pixel], rgb: &mut [[u8; 3]], colour: impl Fn(Pixel) -> [f32; 3]) {
     let rows = pixels.chunks_exact(TILE_PX.into());
     let out_rows = rgb.chunks_exact_mut(usize::from(place.width).max(1));
     for (y, (out_row, row)) in out_rows.zip(rows).take(place.height.into()).enumerate() {
         for (x, (out, pixel)) in out_row.iter_mut().zip(row).enumerate() {
-            *out = C::bytes(finished(*pixel, background), x, y);
+            *out = C::bytes(colour(*pixel).map(|channel| channel * 255.0), x, y);
         }
     }
 }
@@ -180,11 +193,11 @@ fn blend_pixel(pixel: &mut Pixel, gauss: f32, [red, green, blue]: [f32; 3], stop
     alive
 }
 
-/// The colour with the background behind it, in 255ths.
+/// The colour with the background behind it.
 #[inline]
-fn finished([r, g, b, transmittance]: Pixel, [back_r, back_g, back_b]: [f32; 3]) -> [f32; 3] {
+fn behind([r, g, b, transmittance]: Pixel, [back_r, back_g, back_b]: [f32; 3]) -> [f32; 3] {
     let through = transmittance.abs();
-    [(r + through * back_r) * 255.0, (g + through * back_g) * 255.0, (b + through * back_b) * 255.0]
+    [r + through * back_r, g + through * back_g, b + through * back_b]
 }
 
 /// Slack for rounding of a span's ends, pixels; the test of alpha decides about the pixels it adds.

@@ -40,8 +40,8 @@ pub(super) struct Counts {
     pub(super) symbol_bits: [u8; N_GROUPS],
 }
 
-/// What the scene's heads and opacities take into account.
-pub(super) fn effects(scene: &Scene<f32>) -> Effects {
+/// What the scene takes into account.
+pub(super) fn effects(scene: &Scene<f32>, info: &BundleInfo) -> Effects {
     Effects {
         view_direction: scene.shape.view_direction,
         view_distance: scene.shape.view_distance,
@@ -49,6 +49,7 @@ pub(super) fn effects(scene: &Scene<f32>) -> Effects {
         detail: scene.heads.detail.is_some(),
         feature_bank: scene.heads.bank.is_some(),
         anisotropic: scene.shape.anisotropic,
+        background: info.background != [0; 3],
     }
 }
 

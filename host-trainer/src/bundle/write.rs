@@ -182,7 +182,7 @@ impl Writer<'_> {
         let mut sections = vec![(SectionCode::Heads, heads.bytes), (SectionCode::Lattice, models.lattice.section())];
         sections.extend(models.masks.as_ref().map(|masks| (SectionCode::Masks, masks.section())));
         let features = Features {
-            effects: layout::effects(self.scene),
+            effects: layout::effects(self.scene, self.info),
             masks: models.masks.is_some(),
             context: coder_section.0 == SectionCode::Context,
             coded_heads: heads.is_coded,

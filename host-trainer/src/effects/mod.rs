@@ -36,15 +36,14 @@ pub enum Effect {
 
 impl Effect {
     /// All there are, in the order in which they are measured and named.
-    pub const ALL: [Self; 6] =
-        [
-            Self::ViewDirection,
-            Self::ViewDistance,
-            Self::DilationCompensation,
-            Self::Detail,
-            Self::FeatureBank,
-            Self::Anisotropy,
-        ];
+    pub const ALL: [Self; 6] = [
+        Self::ViewDirection,
+        Self::ViewDistance,
+        Self::DilationCompensation,
+        Self::Detail,
+        Self::FeatureBank,
+        Self::Anisotropy,
+    ];
 
     /// Those that are measured: at one size of the image dilation compensation shows nothing of what it is for, and a feature bank
     /// calls for a feature width divisible by 4, which HAC's is not.

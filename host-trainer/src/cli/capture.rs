@@ -29,7 +29,8 @@ pub(crate) struct CaptureOptions {
     #[arg(long, value_name = "WxH", conflicts_with = "max_resolution")]
     #[serde(default, with = "frame_size", skip_serializing_if = "Option::is_none")]
     pub(crate) resolution: Option<FrameSize>,
-    /// What transparent images are composited on. [default: black for train, the bundle's elsewhere]
+    /// What transparent images are composited on: black or white; learned: black, and the colour behind the scene is trained
+    /// with it. [default: black for train, the bundle's elsewhere]
     #[arg(long)]
     #[serde(default, with = "background_name", skip_serializing_if = "Option::is_none")]
     pub(crate) background: Option<Background>,

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-use pocketsplat::dataset::{Background, Image};
+use pocketsplat::dataset::Image;
 use pocketsplat::render::decoder::core_image;
 use pocketsplat::render::reference::ReferenceScene;
 use pocketsplat::synth::{SynthOptions, write_capture};
@@ -58,7 +58,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let config = TrainConfig { iterations: args.iterations, modules, ..TrainConfig::of(Backbone::Hac) };
     let bundle_path = folder.join("scene.psb");
     let capture = capture_args.load(config.seed)?;
-    let trained = train::train(&capture, Background::Black, config, &Encoding::default(), &bundle_path)?;
+    let trained = train::train(&capture, config, &Encoding::default(), &bundle_path)?;
 
     eprintln!("3 of 4  drawing the held-out views with the decoder");
     let file = BundleFile::read(&bundle_path)?;

@@ -71,10 +71,9 @@ pub(crate) fn resolve(config: &mut RunConfig, capture: &Capture, folder: &Path) 
     let started = Instant::now();
     let target = config.effects.target.unwrap_or(Target::CortexM4);
     let drawing = Drawing { ram_bytes: config.encoding.limits.ram_bytes, target };
-    let background = config.capture.background.unwrap_or_default();
     let encoding = for_pilots(&config.encoding);
     let encode = |finished: Finished, capture: &Capture| {
-        let fitted = encoding.encode(finished, capture, background, &[])?;
+        let fitted = encoding.encode(finished, capture, &[])?;
         Ok::<_, anyhow::Error>(fitted.written.bytes)
     };
     let begins = |effects: &[Effect]| eprintln!("effects: pilot with {}", Effect::names(effects));

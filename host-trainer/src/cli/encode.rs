@@ -3,7 +3,7 @@
 use anyhow::{Result, bail};
 use pocketsplat::bundle::manifest::{cameras_to_measure, install, measure};
 use pocketsplat::bundle::{self, BundleInfo, Coder, QuantisationSteps, WriteError, WriteOptions, Written};
-use pocketsplat::dataset::{Background, Capture, View};
+use pocketsplat::dataset::{Capture, View};
 use pocketsplat::device::{Fitted, Limits, NoFit, fitted};
 use pocketsplat::metrics::psnr_db_masked;
 use pocketsplat::render::decoder::core_image;
@@ -62,18 +62,12 @@ impl Encoding {
 
     /// Codes a finished scene in tiers, as much of it as fits, measures each over training views and an orbit, and writes that
     /// into the bundle.
-    pub(crate) fn encode(
-        &self,
-        finished: Finished,
-        capture: &Capture,
-        background: Background,
-        held_out: &[View],
-    ) -> Result<Fitted> {
+    pub(crate) fn encode(&self, finished: Finished, capture: &Capture, held_out: &[View]) -> Result<Fitted> {
         // Photographs are not larger than frames may be: loading has seen to it.
         let [width_px, height_px] = largest_px(capture).map(|px| px as u16);
         let frame = Budget::for_frame(width_px, height_px);
         let write = |finished: &Finished| {
-            let mut written = self.coded(finished, capture, background)?;
+            let mut written = self.coded(finished, capture)?;
             let cameras: Vec<_> = capture.train.iter().map(|view| view.camera.clone()).collect();
             let measures = measure(&Bundle::parse(&written.bytes)?, &cameras_to_measure(&cameras), held_out)?;
             install(&mut written.bytes, &measures)?;
@@ -87,8 +81,8 @@ impl Encoding {
     /// A device that decodes in every frame pays six times as much for the context as for tables, and gets the finest that its flash
     /// has room for. Elsewhere tables have to be shorter and cost no more than [`LARGEST_LOSS_DB`]: their steps do not follow the
     /// place, and where a run's do, tables of the mean steps cost decibels.
-    fn coded(&self, finished: &Finished, capture: &Capture, background: Background) -> Result<Written, NoFit> {
-        let write = |coder, share| self.write(finished, coder, share, capture, background);
+    fn coded(&self, finished: &Finished, capture: &Capture) -> Result<Written, NoFit> {
+        let write = |coder, share| self.write(finished, coder, share, capture);
         if self.coder != Coder::Auto || finished.scene.context.is_none() {
             return Ok(write(self.coder, 1.0)?);
         }
@@ -120,11 +114,10 @@ impl Encoding {
         coder: Coder,
         mean_step_share: f32,
         capture: &Capture,
-        background: Background,
     ) -> Result<Written, WriteError> {
         let info = BundleInfo {
             normalisation: capture.normalisation,
-            background: background.rgb8(),
+            background: finished.background,
             training_px: largest_px(capture),
             // Any training view will do for a device that has no camera of its own; the first is as good as another.
             preview: capture.train[0].camera.clone(),

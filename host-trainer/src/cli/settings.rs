@@ -3,6 +3,7 @@
 use anyhow::{Result, bail};
 use clap::ArgAction;
 use pocketsplat::bundle::{Coder, QuantisationSteps};
+use pocketsplat::dataset::Background;
 use pocketsplat::device::Choice;
 use pocketsplat::effects::{Effect, Request};
 use pocketsplat::train::TrainConfig;
@@ -145,6 +146,7 @@ impl Settings {
         set(&mut train.shape.view_direction, &self.no_view_direction.map(|no| !no));
         set(&mut train.shape.view_distance, &self.view_distance);
         set(&mut train.shape.dilation_compensation, &self.dilation_compensation);
+        train.learns_background |= config.capture.background == Some(Background::Learned);
         self.attach_modules(train)?;
         if !self.set.is_empty() {
             config = config.with_keys(&self.set)?;

@@ -133,8 +133,7 @@ pub(crate) fn train_in(
         );
         return Ok(None);
     }
-    let background = config.capture.background.unwrap_or_default();
-    let result = write_bundle(&trainer, capture, background, &config.encoding, &config.output)
+    let result = write_bundle(&trainer, capture, &config.encoding, &config.output)
         .with_context(|| format!("the training is done and kept; {}", how_to_go_on()))?;
     folder.finish(&serde_json::to_string_pretty(&result)?, config.keep_checkpoints)?;
     Ok(Some(result))
@@ -166,34 +165,21 @@ fn resumed<'a>(folder: &RunFolder, config: &RunConfig, capture: &'a Capture) -> 
 }
 
 /// Trains without a run folder and writes the bundle.
-pub(crate) fn train(
-    capture: &Capture,
-    background: Background,
-    config: TrainConfig,
-    encoding: &Encoding,
-    output: &Path,
-) -> Result<TrainResult> {
+pub(crate) fn train(capture: &Capture, config: TrainConfig, encoding: &Encoding, output: &Path) -> Result<TrainResult> {
     let mut trainer = Trainer::new(capture, config)?;
     trainer.run(&mut Progress::new(0, config.iterations))?;
-    write_bundle(&trainer, capture, background, encoding, output)
+    write_bundle(&trainer, capture, encoding, output)
 }
 
-fn write_bundle(
-    trainer: &Trainer<'_>,
-    capture: &Capture,
-    background: Background,
-    encoding: &Encoding,
-    output: &Path,
-) -> Result<TrainResult> {
+fn write_bundle(trainer: &Trainer<'_>, capture: &Capture, encoding: &Encoding, output: &Path) -> Result<TrainResult> {
     let finished = trainer.finish()?;
     let held_out: Vec<View> = trainer.validation_views().cloned().collect();
-    let Fitted { written: Written { bytes, .. }, finished, n_cut } =
-        encoding.encode(finished, capture, background, &held_out)?;
+    let Fitted { written: Written { bytes, .. }, finished, n_cut } = encoding.encode(finished, capture, &held_out)?;
     output::write_whole(output, &bytes)?;
     if n_cut > 0 {
         eprintln!("left out the {n_cut} least important anchors, so that the bundle fits");
     }
-    let Finished { scene, n_undrawn, estimated_bits, .. } = finished;
+    let Finished { scene, background, n_undrawn, estimated_bits, .. } = finished;
     let n_anchors = scene.anchors.len();
     Ok(TrainResult {
         bundle: output.to_owned(),
@@ -210,7 +196,10 @@ fn write_bundle(
         train_s: trainer.seconds,
         train_processor_s: trainer.processor_seconds,
         iterations_per_s: f64::from(trainer.iteration) / trainer.seconds,
-        background: background.to_string(),
+        background: match [Background::Black, Background::White].into_iter().find(|known| known.rgb8() == background) {
+            Some(known) => known.to_string(),
+            None => format!("{background:?}"),
+        },
         effects: Effect::names(&Effect::all_in(trainer.config())),
     })
 }

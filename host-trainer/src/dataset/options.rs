@@ -16,13 +16,15 @@ pub enum Background {
     Black,
     /// RGB 255, 255, 255.
     White,
+    /// Black for what is transparent; behind the scene whatever colour training finds.
+    Learned,
 }
 
 impl Background {
     /// The colour as 8-bit RGB.
     pub fn rgb8(self) -> [u8; 3] {
         match self {
-            Self::Black => [0; 3],
+            Self::Black | Self::Learned => [0; 3],
             Self::White => [255; 3],
         }
     }
@@ -38,13 +40,14 @@ impl fmt::Display for Background {
         f.write_str(match self {
             Self::Black => "black",
             Self::White => "white",
+            Self::Learned => "learned",
         })
     }
 }
 
 /// A background was asked for by a name that is none.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown background `{0}`: give `black` or `white`")]
+#[error("unknown background `{0}`: give `black`, `white` or `learned`")]
 pub struct UnknownBackground(pub String);
 
 impl FromStr for Background {
@@ -54,6 +57,7 @@ impl FromStr for Background {
         match name {
             "black" => Ok(Self::Black),
             "white" => Ok(Self::White),
+            "learned" => Ok(Self::Learned),
             _ => Err(UnknownBackground(name.to_owned())),
         }
     }
@@ -116,7 +120,7 @@ mod tests {
 
     #[test]
     fn background_names_read_back() {
-        for background in [Background::Black, Background::White] {
+        for background in [Background::Black, Background::White, Background::Learned] {
             assert_eq!(background.to_string().parse(), Ok(background));
         }
         assert_eq!("grey".parse::<Background>(), Err(UnknownBackground("grey".to_owned())));

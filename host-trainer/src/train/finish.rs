@@ -22,6 +22,8 @@ pub struct Finished {
     /// `[n]` which anchors matter: their [places](crate::scene::Anchors::places) if they have any, else their aggregated
     /// opacity, see [`Survey::importance`]. The order of the tiers.
     pub importance: Vec<f32>,
+    /// What lies behind it, rounded.
+    pub background: [u8; 3],
     /// Offsets that were masked because no view draws them.
     pub n_undrawn: usize,
     /// Bits of features, log-scales and drawn offsets under the float context model, in all; none without such a model.
@@ -47,7 +49,9 @@ impl Trainer<'_> {
         let estimated_bits = context.as_ref().map(|context| estimated_bits(&scene, context));
         // Places that training has given out decide; it has prepared the scene for them.
         let importance = if scene.anchors.places.is_empty() { survey.importance } else { scene.anchors.places.clone() };
-        Ok(Finished { scene, importance, n_undrawn, estimated_bits })
+        // It is between 0 and 1.
+        let background = self.background.map(|channel| (channel * 255.0).round() as u8);
+        Ok(Finished { scene, importance, background, n_undrawn, estimated_bits })
     }
 }
 

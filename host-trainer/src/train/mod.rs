@@ -243,6 +243,10 @@ impl<'a> Trainer<'a> {
             let progress = f64::from(self.iteration) / f64::from(self.config.iterations);
             let rates = self.rates();
             self.optimiser.apply(&mut self.scene, &self.workspace, &rates, progress, self.capture.extent);
+            if self.config.learns_background {
+                let rate = rates.background.at(progress);
+                self.optimiser.apply_to_background(&mut self.background, &self.workspace, rate);
+            }
         }
         self.densify();
         self.keep_the_best();

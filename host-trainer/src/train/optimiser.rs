@@ -26,6 +26,8 @@ pub struct Optimiser<R> {
     pub mask_logits: Moments<R>,
     /// First and second moments of the heads.
     pub heads: [Heads<R>; 2],
+    /// Of the background.
+    pub background: Moments<R>,
     /// Of the context model, once there is one.
     pub context: Option<ContextMoments<R>>,
 }
@@ -71,6 +73,7 @@ impl<R: Real> Optimiser<R> {
             offsets: Moments::zeros(offsets.len()),
             mask_logits: Moments::zeros(mask_logits.len()),
             heads: [heads.clone(), heads],
+            background: Moments::zeros(3),
             context: scene.context.as_ref().map(ContextMoments::zeros),
         }
     }
@@ -78,6 +81,13 @@ impl<R: Real> Optimiser<R> {
     /// Zero moments for the context model that the scene has now.
     pub fn begin_context(&mut self, scene: &Scene<R>) {
         self.context = scene.context.as_ref().map(ContextMoments::zeros);
+    }
+
+    /// Moves the background by the gradient that the last step left in `workspace`, after [`Self::apply`]; it stays a colour.
+    pub fn apply_to_background(&mut self, background: &mut [R; 3], workspace: &Workspace<R>, rate: f64) {
+        let Moments { first, second } = &mut self.background;
+        adam::update(Step::new(rate, self.n_steps), background, first, second, Some(&workspace.d_background));
+        *background = background.map(|channel| channel.larger(R::ZERO).smaller(R::ONE));
     }
 
     /// Moves every parameter by the gradients that the last step left in `workspace`.

@@ -93,6 +93,8 @@ pub struct Workspace<R> {
     n_blocks: usize,
     /// dL/d(heads).
     pub d_heads: Heads<R>,
+    /// dL/d(background).
+    pub d_background: [R; 3],
     /// dL/d(context model), where the last step asked it.
     pub d_context: Option<ContextGradients<R>>,
 }
@@ -123,7 +125,7 @@ impl<R: Real> Workspace<R> {
     /// As [`Self::new`] with the instruction set chosen.
     pub fn with_level(shape: &ModelShape, level: Level) -> Self {
         let d_heads = Heads::filled(shape, R::ZERO);
-        Self { level, blocks: Vec::new(), n_blocks: 0, d_heads, d_context: None }
+        Self { level, blocks: Vec::new(), n_blocks: 0, d_heads, d_background: [R::ZERO; 3], d_context: None }
     }
 
     /// The instruction set that the loops run under.
@@ -199,7 +201,7 @@ impl<R: Real> Workspace<R> {
     ///
     /// L = (1 − λ)·L1 + λ·(1 − SSIM) + w·mean(s_x·s_y·s_z) (Lu et al. 2024, Scaffold-GS, eq. 10), the terms of modules, and
     /// those of [`RateTerms`](coding::RateTerms) where `coding` has them. Gradients of anchors are left in [`Self::blocks`], those
-    /// of the heads in [`Self::d_heads`], those of the context model in [`Self::d_context`].
+    /// of the heads in [`Self::d_heads`], of the background in [`Self::d_background`], of the context model in [`Self::d_context`].
     pub fn step(
         &mut self,
         scene: &Scene<R>,
@@ -247,6 +249,7 @@ impl<R: Real> Workspace<R> {
         let d_tiled = TiledImage::from_planes(&d_image, size_px);
         stages.loss = stopwatch.lap();
         let d_splats = rasterise::backward(self.level, &splats, &footprints, &lists, &tiled, &d_tiled);
+        self.d_background = rasterise::background_gradient(&tiled, &d_tiled);
         stages.rasterise_backward = stopwatch.lap();
         let mut rest = d_splats.as_slice();
         let mut shares = Vec::with_capacity(self.n_blocks);

@@ -3,7 +3,7 @@
 use super::config::Phase;
 use super::finish::Finished;
 use super::step::coding::RateReport;
-use super::test_capture::{tiny_capture, tiny_hac_config};
+use super::test_capture::{tiny_capture, tiny_config, tiny_hac_config};
 use super::*;
 
 /// All steps of a run: phase and rate of each.
@@ -80,4 +80,23 @@ fn held_out_views_are_never_trained_on() {
     let mut other = Trainer::new(&without, tiny_hac_config(60)).unwrap();
     trained(&mut other);
     assert!(trainer.scene == other.scene, "its pixels change nothing");
+}
+
+#[test]
+fn a_learned_background_comes_to_the_colour_behind_the_scene() {
+    let behind = [60, 120, 180];
+    let mut capture = tiny_capture();
+    for pixel in capture.train.iter_mut().flat_map(|view| view.image.rgb.as_chunks_mut::<3>().0) {
+        if *pixel == [0; 3] {
+            *pixel = behind;
+        }
+    }
+    let trained = |learns_background: bool| {
+        let mut trainer = Trainer::new(&capture, TrainConfig { learns_background, ..tiny_config(400) }).unwrap();
+        trained(&mut trainer);
+        trainer.finish().unwrap().background
+    };
+    assert_eq!(trained(false), [0; 3], "the capture's");
+    let found = trained(true);
+    assert!(found.iter().zip(behind).all(|(found, behind)| found.abs_diff(behind) < 25), "{found:?}");
 }

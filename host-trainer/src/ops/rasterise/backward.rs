@@ -55,6 +55,20 @@ pub fn backward<R: Real>(
         .collect()
 }
 
+/// Gradient of [`forward`](super::forward()) with respect to the background: Σ T·∂L/∂C over the pixels.
+///
+/// * `image`: what forward returned. * `d_image`: dL/d(image), tile order, zero beyond the image's edge.
+pub fn background_gradient<R: Real>(image: &TiledImage<R>, d_image: &TiledImage<R>) -> [R; 3] {
+    let mut sums = [R::ZERO; 3];
+    let tiles = image.transmittance.chunks_exact(TILE_VALUES).zip(d_image.colour.chunks_exact(3 * TILE_VALUES));
+    for (through, d_tile) in tiles {
+        for (sum, d_plane) in sums.iter_mut().zip(d_tile.chunks_exact(TILE_VALUES)) {
+            *sum += through.iter().zip(d_plane).map(|(t, d)| *t * *d).sum::<R>();
+        }
+    }
+    sums
+}
+
 fn add<R: Real>(sum: &mut Splat<R>, part: &Splat<R>) {
     for i in 0..2 {
         sum.mean_px[i] += part.mean_px[i];

@@ -21,18 +21,19 @@ pub fn forward<R: Real>(
     background: [R; 3],
 ) -> TiledImage<R> {
     let mut image = TiledImage::zeros(lists.grid);
-    image.colour.par_chunks_mut(3 * TILE_VALUES).enumerate().for_each(|(t, out)| {
+    let tiles = image.colour.par_chunks_mut(3 * TILE_VALUES).zip(image.transmittance.par_chunks_mut(TILE_VALUES));
+    tiles.enumerate().for_each(|(t, (out, through))| {
         let tile = Tile::new(splats, footprints, lists, t);
         level.run(
             #[inline(always)]
-            || forward_tile(&tile, background, out),
+            || forward_tile(&tile, background, out, through),
         );
     });
     image
 }
 
 #[inline(always)]
-fn forward_tile<R: Real>(tile: &Tile<R>, background: [R; 3], out: &mut [R]) {
+fn forward_tile<R: Real>(tile: &Tile<R>, background: [R; 3], out: &mut [R], through: &mut [R]) {
     let mut transmittance = [[R::ONE; TILE_PX]; TILE_PX];
     let mut colour = [[[R::ZERO; TILE_PX]; TILE_PX]; 3];
     let mut dead = [false; TILE_PX];
@@ -58,9 +59,12 @@ fn forward_tile<R: Real>(tile: &Tile<R>, background: [R; 3], out: &mut [R]) {
             break;
         }
     }
+    for (o, t) in through.iter_mut().zip(transmittance.as_flattened()) {
+        *o = t.abs();
+    }
     for ((plane, bg), out) in colour.iter().zip(background).zip(out.chunks_exact_mut(TILE_VALUES)) {
-        for ((c, t), o) in plane.as_flattened().iter().zip(transmittance.as_flattened()).zip(out) {
-            *o = *c + t.abs() * bg;
+        for ((c, t), o) in plane.as_flattened().iter().zip(&*through).zip(out) {
+            *o = *c + *t * bg;
         }
     }
 }

@@ -11,13 +11,16 @@ use crate::ops::tiles::TILE_PX;
 pub struct TiledImage<R> {
     /// `[n_tiles, 3, 16, 16]` colour, background included.
     pub colour: Vec<R>,
+    /// `[n_tiles, 16, 16]` the share of the background that comes through, where an image was drawn.
+    pub transmittance: Vec<R>,
 }
 
 /// Copies between tile order and planes `[3, height, width]`.
 impl<R: Real> TiledImage<R> {
     /// An image of zeros for a grid of tiles.
     pub fn zeros(grid: [usize; 2]) -> Self {
-        Self { colour: vec![R::ZERO; grid[0] * grid[1] * 3 * TILE_VALUES] }
+        let n_pixels = grid[0] * grid[1] * TILE_VALUES;
+        Self { colour: vec![R::ZERO; 3 * n_pixels], transmittance: vec![R::ZERO; n_pixels] }
     }
 
     /// Row-major planes `[3, height, width]`.

@@ -15,7 +15,7 @@ mod row;
 #[cfg(test)]
 mod tests;
 
-pub use backward::backward;
+pub use backward::{background_gradient, backward};
 pub use forward::forward;
 pub use image::TiledImage;
 

@@ -1,7 +1,7 @@
 //! The rasteriser against plain loops, against finite differences, and against itself on other instruction sets.
 
 use super::*;
-use crate::ops::finite_difference::{assert_piecewise_gradient, random};
+use crate::ops::finite_difference::{assert_gradient, assert_piecewise_gradient, random};
 use crate::ops::simd::Level;
 use crate::ops::tiles;
 
@@ -133,7 +133,7 @@ fn every_simd_level_gives_the_same_bits() {
         .collect();
     let draw = |level| {
         let image = forward(level, &splats, &reach, &lists, [0.0; 3]);
-        let d_image = TiledImage { colour: image.colour.iter().map(|c| c - 0.3).collect() };
+        let d_image = TiledImage { colour: image.colour.iter().map(|c| c - 0.3).collect(), ..TiledImage::default() };
         let d_splats = backward(level, &splats, &reach, &lists, &image, &d_image);
         (image.colour, d_splats)
     };
@@ -166,5 +166,10 @@ fn backward_agrees_with_finite_differences() {
         let d_image = TiledImage::from_planes(&weights, SIZE);
         let analytic = pack(&backward(Level::detect(), &splats, &footprints(&splats), &lists, &image, &d_image));
         assert_piecewise_gradient("rasterise", &x, &analytic, f);
+        assert_gradient("background", &background, &background_gradient(&image, &d_image), |background| {
+            let background = [background[0], background[1], background[2]];
+            let planes = forward(Level::detect(), &splats, &footprints(&splats), &lists, background).to_planes(SIZE);
+            planes.iter().zip(&weights).map(|(p, w)| p * w).sum()
+        });
     }
 }

@@ -75,6 +75,11 @@ impl<'a> Trainer<'a> {
                 out.values(group)?;
             }
         }
+        if self.config.learns_background {
+            out.value(self.background)?;
+            out.values(&self.optimiser.background.first)?;
+            out.values(&self.optimiser.background.second)?;
+        }
         context::encode(&mut out, self.scene.context.as_ref(), self.optimiser.context.as_ref())?;
         let Statistics { opacity_sum, n_views, gradient_sum, n_drawn } = &self.statistics;
         out.values(opacity_sum)?;
@@ -152,10 +157,23 @@ impl<'a> Trainer<'a> {
         let anchors = Anchors { lattice, features, log_scales, offsets, mask_logits, places };
         self.scene = Scene { shape, voxel_size, anchors, heads: heads()?, context: None };
         let heads = [heads()?, heads()?];
+        let mut background = Moments::zeros(3);
+        if self.config.learns_background {
+            self.background = from.value("background")?;
+            background = Moments { first: from.exactly("background", 3)?, second: from.exactly("background", 3)? };
+        }
         let (model, moments) = context::decode(from, &shape)?.unzip();
         self.scene.context = model;
-        self.optimiser =
-            Optimiser { n_steps, features: f, log_scales: s, offsets: o, mask_logits: m, heads, context: moments };
+        self.optimiser = Optimiser {
+            n_steps,
+            features: f,
+            log_scales: s,
+            offsets: o,
+            mask_logits: m,
+            heads,
+            background,
+            context: moments,
+        };
         self.statistics = Statistics {
             opacity_sum: from.exactly("opacity sums", n)?,
             n_views: from.exactly("view counts", n)?,

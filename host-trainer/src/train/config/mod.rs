@@ -53,6 +53,14 @@ pub struct Rates {
     pub grid: Rate,
     /// Network of the context model.
     pub context: Rate,
+    /// Background, where it is learned.
+    #[serde(default = "background_rate")]
+    pub background: Rate,
+}
+
+/// The rate of the background.
+const fn background_rate() -> Rate {
+    Rate { start: 0.01, end: 1e-4 }
 }
 
 impl Default for Rates {
@@ -69,6 +77,7 @@ impl Default for Rates {
             mask: Rate { start: 0.01, end: 1e-4 },
             grid: Rate { start: 0.005, end: 1e-5 },
             context: Rate { start: 0.005, end: 1e-5 },
+            background: background_rate(),
         }
     }
 }
@@ -163,6 +172,9 @@ pub struct TrainConfig {
     pub validation_every: u32,
     /// Learning rates.
     pub rates: Rates,
+    /// Whether the colour behind the scene is trained with it; it begins as the capture's.
+    #[serde(default)]
+    pub learns_background: bool,
     /// Loss weights.
     pub loss: LossWeights,
     /// Growth and pruning.
@@ -187,6 +199,7 @@ impl Default for TrainConfig {
             voxel_size: None,
             validation_every: 24,
             rates: Rates::default(),
+            learns_background: false,
             loss: LossWeights::default(),
             densification: Densification::default(),
             hac: Hac::default(),
@@ -258,7 +271,7 @@ impl TrainConfig {
             within(name, value, low, high)?;
         }
         let Rates { offset, feature, log_scale, opacity_head, covariance_head, colour_head, .. } = self.rates;
-        let Rates { mask, grid, context, feature_bank, .. } = self.rates;
+        let Rates { mask, grid, context, feature_bank, background, .. } = self.rates;
         for (name, rate) in [
             ("offset", offset),
             ("feature", feature),
@@ -270,6 +283,7 @@ impl TrainConfig {
             ("mask", mask),
             ("grid", grid),
             ("context", context),
+            ("background", background),
         ] {
             within(&format!("train.rates.{name}.start"), rate.start, 0.0, 10.0)?;
             // A path to 0 has no logarithm; a rate that starts at 0 stays there.

@@ -139,13 +139,9 @@ mod tests {
     use super::{BakedGaussian, Effects};
     use crate::scene::Gaussian;
 
-    const ANISOTROPIC: Effects = Effects {
-        view_direction: false,
-        view_distance: false,
-        dilation_compensation: false,
-        detail: false,
-        anisotropic: true,
-    };
+    fn anisotropic() -> Effects {
+        Effects { anisotropic: true, ..Effects::default() }
+    }
 
     #[test]
     fn a_gaussian_comes_back_within_its_steps() {
@@ -164,7 +160,7 @@ mod tests {
                 opacity: random(),
                 colour: [random(), 1.49 * random(), -0.5 * random()],
             };
-            let kept = BakedGaussian::new(&whole).unpack(ANISOTROPIC);
+            let kept = BakedGaussian::new(&whole).unpack(anisotropic());
             let near = |kept: f32, whole: f32, step: f32, what: &str| {
                 assert!((kept - whole).abs() <= step, "{what}: {kept} for {whole}");
             };
@@ -191,7 +187,7 @@ mod tests {
             opacity: 1.0,
             colour: [7.0, -7.0, f32::NAN],
         };
-        let kept = BakedGaussian::new(&beyond).unpack(ANISOTROPIC);
+        let kept = BakedGaussian::new(&beyond).unpack(anisotropic());
         assert_eq!(kept.colour, [1.5, -0.5, -0.5], "the ends of the range");
         assert_eq!((kept.scale, kept.opacity), ([65504.0, 0.0, f32::INFINITY], 1.0), "the largest half");
         assert!(kept.rotation[0] > 0.999_999 && kept.rotation[1].abs() < 2e-6, "no rotation: {:?}", kept.rotation);

@@ -91,6 +91,8 @@ fn a_learned_background_comes_to_the_colour_behind_the_scene() {
             *pixel = behind;
         }
     }
+    // Else splats cover all of it.
+    capture.points.iter_mut().for_each(|point| *point *= 0.25);
     let trained = |learns_background: bool| {
         let mut trainer = Trainer::new(&capture, TrainConfig { learns_background, ..tiny_config(400) }).unwrap();
         trained(&mut trainer);
@@ -98,5 +100,5 @@ fn a_learned_background_comes_to_the_colour_behind_the_scene() {
     };
     assert_eq!(trained(false), [0; 3], "the capture's");
     let found = trained(true);
-    assert!(found.iter().zip(behind).all(|(found, behind)| found.abs_diff(behind) < 25), "{found:?}");
+    assert!(found.iter().zip(behind).all(|(found, behind)| found.abs_diff(behind) < 20), "{found:?}");
 }

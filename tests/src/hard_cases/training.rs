@@ -113,7 +113,7 @@ pub(super) fn diverging(edit: impl Fn(&mut Capture, &mut TrainConfig)) -> String
 fn spiked(factor: f64) -> Rates {
     let all = |rate: Rate| Rate { start: rate.start * factor, end: rate.end * factor };
     let Rates { offset, feature, log_scale, opacity_head, covariance_head, colour_head, .. } = Rates::default();
-    let Rates { feature_bank, mask, grid, context, .. } = Rates::default();
+    let Rates { feature_bank, mask, grid, context, background, .. } = Rates::default();
     Rates {
         offset: all(offset),
         feature: all(feature),
@@ -125,6 +125,7 @@ fn spiked(factor: f64) -> Rates {
         mask: all(mask),
         grid: all(grid),
         context: all(context),
+        background: all(background),
     }
 }
 
@@ -161,6 +162,7 @@ pub(super) fn family() -> Family {
                     mask: largest,
                     grid: largest,
                     context: largest,
+                    background: largest,
                 };
                 run(&capture(gradient, cloud()), TrainConfig { iterations: 200, rates, ..config() })
             },

@@ -54,6 +54,17 @@ fn anchors_come_back_whatever_the_features() {
 }
 
 #[test]
+fn a_colour_behind_a_scene_without_a_background_is_refused() {
+    let mut bytes = bundle(variants().next().expect("some"));
+    bytes[17] &= !1;
+    let crc_at = usize::from(u16::from_le_bytes([bytes[10], bytes[11]])) - 4;
+    let crc = crc32(&bytes[..crc_at]).to_le_bytes();
+    bytes[crc_at..][..4].copy_from_slice(&crc);
+    let expected = DecodeError::OutOfRange { field: Field::Background, found: 10, limit: 0 };
+    assert_eq!(Bundle::parse(&bytes).err(), Some(expected));
+}
+
+#[test]
 fn values_are_symbols_times_steps() {
     for variant in variants() {
         let bytes = bundle(variant);

@@ -310,6 +310,7 @@ pub(super) fn bundle(variant: Variant) -> Vec<u8> {
         | u32::from(variant.context) << 4
         | u32::from(variant.coded_heads) << 5
         | u32::from(variant.detail) << 6
+        | 1 << 8
         | u32::from(variant.bank) << 9;
     let camera = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 6.0, 30.0, 30.0, 16.0, 12.0];
     let mut file = [

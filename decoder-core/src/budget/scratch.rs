@@ -4,7 +4,8 @@ use super::arena::{Arena, words_for};
 use super::work::Kept;
 use crate::bake::BakedGaussian;
 use crate::bundle::{
-    Bundle, Coder, MAX_FEATURE_DIM, MAX_LATTICE_BITS, MAX_OFFSETS, RecordLayout, Tier, model_words, n_log_scales,
+    Bundle, Coder, MAX_FEATURE_DIM, MAX_LATTICE_BITS, MAX_OFFSETS, RecordLayout, Tier, covariance_outputs, model_words,
+    n_log_scales,
 };
 use crate::context::{FEATURES_PER_LEVEL, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS};
 use crate::mlp::HeadShape;
@@ -209,7 +210,7 @@ impl ScratchShape {
         HeadShape {
             inputs: f.saturating_add(self.n_view_inputs as usize),
             feature: f,
-            covariance: if self.anisotropic { 7 } else { 1 },
+            covariance: covariance_outputs(self.anisotropic) as usize,
             colour: limited(self.colour_hidden, MAX_FEATURE_DIM),
             detail: limited(self.detail_hidden, MAX_FEATURE_DIM),
             bank: cfg!(feature = "feature-bank") && self.feature_bank,

@@ -222,6 +222,11 @@ pub(crate) const fn n_log_scales(anisotropic: bool) -> u16 {
     if anisotropic { 6 } else { 4 }
 }
 
+/// Outputs of the covariance head for an offset: three scale logits and a quaternion, or one scale logit.
+pub(crate) const fn covariance_outputs(anisotropic: bool) -> u16 {
+    if anisotropic { 7 } else { 1 }
+}
+
 /// Checks `least <= found <= most` and names the limit that does not hold.
 pub(crate) fn in_range(field: Field, found: u32, least: u32, most: u32) -> Result<(), DecodeError> {
     if found < least {

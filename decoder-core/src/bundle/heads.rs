@@ -5,7 +5,7 @@ mod weights;
 pub use weights::{CodedHeads, LayerWeights, WeightReader};
 
 use super::cursor::Cursor;
-use super::header::Header;
+use super::header::{Header, covariance_outputs};
 use crate::error::{DecodeError, Field, SectionKind};
 use crate::math::{from_half, is_finite_half};
 
@@ -107,13 +107,13 @@ impl<'a> HeadsView<'a> {
             b2: Halves::default(),
         };
         let (n_in, k) = (header.head_inputs(), usize::from(header.n_offsets));
+        let effects = header.features.effects;
         let mut all = [
             shape(n_in, header.feature_dim, k),
-            shape(n_in, header.feature_dim, k.saturating_mul(if header.features.effects.anisotropic { 7 } else { 1 })),
+            shape(n_in, header.feature_dim, k.saturating_mul(covariance_outputs(effects.anisotropic).into())),
             shape(n_in, header.colour_hidden, k.saturating_mul(3)),
             shape(usize::from(header.feature_dim).saturating_add(3), header.detail_hidden, 3),
         ];
-        let effects = header.features.effects;
         let has_bank = cfg!(feature = "feature-bank") && effects.feature_bank;
         let mut bank = has_bank.then(|| shape(BANK_INPUTS, header.feature_dim, BANK_WEIGHTS));
         let n_heads = if effects.detail { 4 } else { 3 };

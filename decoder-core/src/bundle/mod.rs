@@ -36,7 +36,7 @@ pub use header::{
     HEADER_FIXED_LEN, Header, MAGIC, MAX_ANCHORS, MAX_CHUNK_ANCHORS, MAX_FEATURE_DIM, MAX_OFFSETS, MAX_TIERS, VERSION,
     header_len,
 };
-pub(crate) use header::{in_range, n_log_scales};
+pub(crate) use header::{covariance_outputs, in_range, n_log_scales};
 pub(crate) use heads::{BANK_INPUTS, BANK_WEIGHTS};
 pub use heads::{CodedHeads, Halves, HeadView, HeadsView, LayerWeights, WeightReader};
 pub use lattice::{Lattice, MAX_LATTICE_BITS};

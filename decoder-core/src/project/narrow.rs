@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::packed::{SplatRecord, pack_precision, unpack_precision};
+use super::packed::{ElevenBits, SplatRecord};
 use super::splat::Splat;
 use crate::arithmetic::{Narrow, SplatChoice};
 use crate::math::{from_half, to_half};
@@ -23,10 +23,7 @@ pub(crate) struct NarrowSplat {
     mean: [i16; 2],
     depth: u16,
     shear: u16,
-    row_precision: u16,
-    column_precision: u16,
-    log_opacity: u16,
-    colour: [u16; 3],
+    rest: ElevenBits,
 }
 
 impl SplatRecord for NarrowSplat {
@@ -36,24 +33,14 @@ impl SplatRecord for NarrowSplat {
             mean: splat.mean.map(|px| libm::rintf(px * STEPS_PER_PX) as i16),
             depth: (splat.depth.to_bits() >> 16) as u16,
             shear: to_half(splat.shear),
-            row_precision: pack_precision(splat.row_precision),
-            column_precision: pack_precision(splat.column_precision),
-            log_opacity: to_half(splat.log_opacity),
-            colour: splat.colour.map(to_half),
+            rest: ElevenBits::new(splat),
         }
     }
 
     #[inline]
     fn unpack(&self) -> Splat {
-        Splat {
-            mean: self.mean.map(|steps| f32::from(steps) * (1.0 / STEPS_PER_PX)),
-            depth: self.depth(),
-            shear: from_half(self.shear),
-            row_precision: unpack_precision(self.row_precision),
-            column_precision: unpack_precision(self.column_precision),
-            log_opacity: from_half(self.log_opacity),
-            colour: self.colour.map(from_half),
-        }
+        let mean = self.mean.map(|steps| f32::from(steps) * (1.0 / STEPS_PER_PX));
+        self.rest.unpack(mean, self.depth(), from_half(self.shear))
     }
 
     #[inline]

@@ -60,36 +60,17 @@ pub(crate) struct PackedSplat {
     mean: [f32; 2],
     depth: f32,
     shear: f32,
-    row_precision: u16,
-    column_precision: u16,
-    log_opacity: u16,
-    colour: [u16; 3],
+    rest: ElevenBits,
 }
 
 impl SplatRecord for PackedSplat {
     fn new(splat: &Splat) -> Self {
-        Self {
-            mean: splat.mean,
-            depth: splat.depth,
-            shear: splat.shear,
-            row_precision: pack_precision(splat.row_precision),
-            column_precision: pack_precision(splat.column_precision),
-            log_opacity: to_half(splat.log_opacity),
-            colour: splat.colour.map(to_half),
-        }
+        Self { mean: splat.mean, depth: splat.depth, shear: splat.shear, rest: ElevenBits::new(splat) }
     }
 
     #[inline]
     fn unpack(&self) -> Splat {
-        Splat {
-            mean: self.mean,
-            depth: self.depth,
-            shear: self.shear,
-            row_precision: unpack_precision(self.row_precision),
-            column_precision: unpack_precision(self.column_precision),
-            log_opacity: from_half(self.log_opacity),
-            colour: self.colour.map(from_half),
-        }
+        self.rest.unpack(self.mean, self.depth, self.shear)
     }
 
     #[inline]
@@ -98,9 +79,45 @@ impl SplatRecord for PackedSplat {
     }
 }
 
+/// What of a [`Splat`] has no more than eleven bits in any record but the widest.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct ElevenBits {
+    row_precision: u16,
+    column_precision: u16,
+    log_opacity: u16,
+    colour: [u16; 3],
+}
+
+impl ElevenBits {
+    #[inline]
+    pub(super) fn new(splat: &Splat) -> Self {
+        Self {
+            row_precision: pack_precision(splat.row_precision),
+            column_precision: pack_precision(splat.column_precision),
+            log_opacity: to_half(splat.log_opacity),
+            colour: splat.colour.map(to_half),
+        }
+    }
+
+    /// The splat, with what is kept in other ways.
+    #[inline]
+    pub(super) fn unpack(&self, mean: [f32; 2], depth: f32, shear: f32) -> Splat {
+        Splat {
+            mean,
+            depth,
+            shear,
+            row_precision: unpack_precision(self.row_precision),
+            column_precision: unpack_precision(self.column_precision),
+            log_opacity: from_half(self.log_opacity),
+            colour: self.colour.map(from_half),
+        }
+    }
+}
+
 /// Rounds a precision to eleven bits, as a half has them; but six bits of exponent and no sign, because precisions lie
 /// between 1/0.3 px⁻², the dilation's, and those of splats far larger than a frame whose rim alone may cross it.
-pub(super) fn pack_precision(precision: f32) -> u16 {
+fn pack_precision(precision: f32) -> u16 {
     let above = precision.to_bits().saturating_sub(LEAST_PRECISION);
     let rounded = above.saturating_add(1 << (DIGITS_DROPPED - 1)) >> DIGITS_DROPPED;
     // Not reached: the largest stands for 4.
@@ -108,7 +125,7 @@ pub(super) fn pack_precision(precision: f32) -> u16 {
 }
 
 #[inline]
-pub(super) fn unpack_precision(packed: u16) -> f32 {
+fn unpack_precision(packed: u16) -> f32 {
     f32::from_bits((u32::from(packed) << DIGITS_DROPPED).wrapping_add(LEAST_PRECISION))
 }
 

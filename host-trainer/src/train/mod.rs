@@ -21,7 +21,6 @@ pub mod watchdog;
 use std::time::Instant;
 
 use cpu_time::ProcessTime;
-
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;

@@ -18,7 +18,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 const N_ANCHORS: usize = 40_000;
-const SHAPE: ModelShape = ModelShape { view_direction: true, view_distance: true, ..ModelShape::plain(50, 10) };
+const SHAPE: ModelShape =
+    ModelShape { view_colour: true, view_geometry: true, view_distance: true, ..ModelShape::plain(50, 10) };
 const BASE_STEPS: [f32; 3] = [1.0, 0.1, 0.2];
 
 /// Anchors on a sphere's surface, their values spread over a few steps, with a context model as training starts it.

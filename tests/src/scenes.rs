@@ -21,8 +21,15 @@ pub struct Case {
 }
 
 const fn shape(feature_dim: usize, n_offsets: usize, effects: [bool; 3]) -> ModelShape {
-    let [view_direction, view_distance, dilation_compensation] = effects;
-    ModelShape { view_direction, view_distance, dilation_compensation, ..ModelShape::plain(feature_dim, n_offsets) }
+    let [sees_direction, view_distance, dilation_compensation] = effects;
+    let (view_colour, view_geometry) = (sees_direction, sees_direction);
+    ModelShape {
+        view_colour,
+        view_geometry,
+        view_distance,
+        dilation_compensation,
+        ..ModelShape::plain(feature_dim, n_offsets)
+    }
 }
 
 /// A residual on the colours, and a colour head of a width of its own.
@@ -37,8 +44,12 @@ const ISOTROPIC: ModelShape = ModelShape { anisotropic: false, ..shape(12, 4, [t
 /// Balls that look the same from everywhere, so that they may be baked.
 const PLAIN_ISOTROPIC: ModelShape = ModelShape { anisotropic: false, ..shape(8, 3, [false, false, true]) };
 
+/// The direction of view for the colours alone, and for all but them.
+const COLOURED: ModelShape = ModelShape { view_geometry: false, ..shape(9, 3, [true, true, false]) };
+const SHAPED: ModelShape = ModelShape { view_colour: false, ..shape(12, 3, [true, true, false]) };
+
 /// Every effect on and off, narrow and wide, fewer anchors than a chunk holds and several chunks.
-pub const CASES: [Case; 11] = [
+pub const CASES: [Case; 13] = [
     Case { name: "device", shape: shape(16, 4, [true, true, false]), n_anchors: 700, seed: 1 },
     Case { name: "plain", shape: shape(8, 2, [false, false, false]), n_anchors: 300, seed: 2 },
     Case { name: "direction", shape: shape(12, 3, [true, false, false]), n_anchors: 129, seed: 3 },
@@ -50,6 +61,8 @@ pub const CASES: [Case; 11] = [
     Case { name: "banked, detailed", shape: BANKED_DETAILED, n_anchors: 400, seed: 11 },
     Case { name: "isotropic", shape: ISOTROPIC, n_anchors: 400, seed: 12 },
     Case { name: "plain isotropic", shape: PLAIN_ISOTROPIC, n_anchors: 300, seed: 13 },
+    Case { name: "view colour", shape: COLOURED, n_anchors: 300, seed: 14 },
+    Case { name: "view geometry", shape: SHAPED, n_anchors: 300, seed: 15 },
 ];
 
 /// Few bytes, so that every one of them can be damaged in turn.

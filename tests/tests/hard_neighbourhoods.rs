@@ -85,11 +85,8 @@ fn crossing(away: f64) -> impl Strategy<Value = Blob> {
 
 /// * `length`: of quaternions, `away`: of the centres of needles, as powers of ten.
 fn picture(length: Range<f64>, away: f64) -> impl Strategy<Value = Picture> {
-    let effects = any::<[bool; 3]>().prop_map(|[view_direction, view_distance, dilation_compensation]| ModelShape {
-        view_direction,
-        view_distance,
-        dilation_compensation,
-        ..ModelShape::plain(1, 1)
+    let effects = any::<[bool; 4]>().prop_map(|[view_colour, view_geometry, view_distance, dilation_compensation]| {
+        ModelShape { view_colour, view_geometry, view_distance, dilation_compensation, ..ModelShape::plain(1, 1) }
     });
     (prop::collection::vec(prop_oneof![3 => blob(length), 1 => crossing(away)], 1..=MAX_SPLATS), effects, view())
         .prop_map(|(mut blobs, effects, camera)| {

@@ -41,8 +41,10 @@ pub struct ScratchShape {
     pub n_offsets: u16,
     /// Whether Gaussians have three deviations and a rotation.
     pub anisotropic: bool,
-    /// Inputs of the heads besides the feature, at most 4.
-    pub n_view_inputs: u16,
+    /// Inputs of the opacity and covariance heads besides the feature, at most 4.
+    pub n_geometry_inputs: u16,
+    /// Inputs of the colour head besides the feature, at most 4.
+    pub n_colour_inputs: u16,
     /// Hidden width of the colour head.
     pub colour_hidden: u16,
     /// Hidden width of the detail head, 0 without one.
@@ -83,7 +85,8 @@ impl ScratchShape {
             feature_dim,
             n_offsets,
             anisotropic: true,
-            n_view_inputs: 4,
+            n_geometry_inputs: 4,
+            n_colour_inputs: 4,
             colour_hidden: MAX_FEATURE_DIM,
             detail_hidden: MAX_FEATURE_DIM,
             feature_bank: cfg!(feature = "feature-bank"),
@@ -124,7 +127,8 @@ impl ScratchShape {
             feature_dim: header.feature_dim,
             n_offsets: header.n_offsets,
             anisotropic: header.features.effects.anisotropic,
-            n_view_inputs: few(header.head_inputs()).saturating_sub(header.feature_dim),
+            n_geometry_inputs: few(header.geometry_inputs()).saturating_sub(header.feature_dim),
+            n_colour_inputs: few(header.colour_inputs()).saturating_sub(header.feature_dim),
             colour_hidden: header.colour_hidden,
             detail_hidden: header.detail_hidden,
             feature_bank: header.features.effects.feature_bank,
@@ -208,7 +212,8 @@ impl ScratchShape {
     pub(crate) const fn heads(&self) -> HeadShape {
         let [f, k] = [limited(self.feature_dim, MAX_FEATURE_DIM), limited(self.n_offsets, MAX_OFFSETS)];
         HeadShape {
-            inputs: f.saturating_add(self.n_view_inputs as usize),
+            geometry_inputs: f.saturating_add(self.n_geometry_inputs as usize),
+            colour_inputs: f.saturating_add(self.n_colour_inputs as usize),
             feature: f,
             covariance: covariance_outputs(self.anisotropic) as usize,
             colour: limited(self.colour_hidden, MAX_FEATURE_DIM),
@@ -249,7 +254,7 @@ impl ScratchShape {
             None => usize::MAX,
         };
         self.n_channels()
-            .saturating_add(heads.inputs)
+            .saturating_add(heads.inputs())
             .saturating_add(heads.hidden_len())
             .saturating_add(heads.sums_len())
             .saturating_add(outputs)
@@ -317,7 +322,8 @@ mod tests {
                     feature_dim: 1 + up_to(256),
                     n_offsets: 1 + up_to(32),
                     anisotropic: up_to(2) == 1,
-                    n_view_inputs: up_to(5),
+                    n_geometry_inputs: up_to(5),
+                    n_colour_inputs: up_to(5),
                     colour_hidden: 1 + up_to(256),
                     detail_hidden: up_to(257),
                     feature_bank: up_to(2) == 1,
@@ -341,7 +347,8 @@ mod tests {
                 feature_dim: a.feature_dim.max(b.feature_dim),
                 n_offsets: a.n_offsets.max(b.n_offsets),
                 anisotropic: a.anisotropic | b.anisotropic,
-                n_view_inputs: a.n_view_inputs.max(b.n_view_inputs),
+                n_geometry_inputs: a.n_geometry_inputs.max(b.n_geometry_inputs),
+                n_colour_inputs: a.n_colour_inputs.max(b.n_colour_inputs),
                 colour_hidden: a.colour_hidden.max(b.colour_hidden),
                 detail_hidden: a.detail_hidden.max(b.detail_hidden),
                 feature_bank: a.feature_bank | b.feature_bank,

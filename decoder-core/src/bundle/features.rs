@@ -6,9 +6,11 @@ use crate::error::DecodeError;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Effects {
-    /// The heads see the unit vector from the camera to the anchor.
-    pub view_direction: bool,
-    /// The heads see the distance from the camera to the anchor, normalised units.
+    /// The colour head sees the unit vector from the camera to the anchor.
+    pub view_colour: bool,
+    /// The opacity and the covariance head see it.
+    pub view_geometry: bool,
+    /// These heads see the distance from the camera to the anchor, normalised units.
     pub view_distance: bool,
     /// Opacity is multiplied by √(det Σ / det(Σ + 0.3 I)) (Yu et al. 2024, Mip-Splatting, eq. 8).
     pub dilation_compensation: bool,
@@ -38,7 +40,7 @@ pub struct Features {
 
 impl Features {
     /// Bits that have a meaning in this version.
-    const KNOWN: u32 = 0b11_1111_1111;
+    const KNOWN: u32 = 0b111_1111_1111;
 
     /// The bit that says what a scene lacks, where the others say what it has: bundles without it are older than the choice.
     const ISOTROPIC: u32 = 1 << 7;
@@ -47,7 +49,8 @@ impl Features {
     const BUILT: u32 = {
         let view = cfg!(feature = "view");
         let effects = Effects {
-            view_direction: view,
+            view_colour: view,
+            view_geometry: view,
             view_distance: view,
             dilation_compensation: cfg!(feature = "dilation-compensation"),
             detail: cfg!(feature = "detail"),
@@ -63,9 +66,9 @@ impl Features {
     #[must_use]
     pub const fn to_bits(self) -> u32 {
         let effects = self.effects;
-        let Effects { view_direction, view_distance, dilation_compensation, detail, .. } = effects;
-        let Effects { feature_bank, anisotropic, background, .. } = effects;
-        (view_direction as u32)
+        let Effects { view_colour, view_geometry, view_distance, dilation_compensation, .. } = effects;
+        let Effects { detail, feature_bank, anisotropic, background, .. } = effects;
+        (view_colour as u32)
             | (view_distance as u32) << 1
             | (dilation_compensation as u32) << 2
             | (self.masks as u32) << 3
@@ -75,6 +78,7 @@ impl Features {
             | if anisotropic { 0 } else { Self::ISOTROPIC }
             | (background as u32) << 8
             | (feature_bank as u32) << 9
+            | (view_geometry as u32) << 10
     }
 
     /// The features that `bits` stand for.
@@ -94,7 +98,8 @@ impl Features {
         let has = |bit: u32| bits & bit != 0;
         Ok(Self {
             effects: Effects {
-                view_direction: has(1),
+                view_colour: has(1),
+                view_geometry: has(1024),
                 view_distance: has(2),
                 dilation_compensation: has(4),
                 detail: has(64),
@@ -118,7 +123,7 @@ mod tests {
 
     #[test]
     fn known_bits_come_back_and_unknown_ones_are_named() {
-        for bits in 0..1024 {
+        for bits in 0..2048 {
             let unknown_bits = bits & !Features::KNOWN;
             let missing_bits = (bits ^ Features::ISOTROPIC) & !Features::BUILT;
             let expected = match (unknown_bits, missing_bits) {
@@ -128,8 +133,8 @@ mod tests {
             };
             assert_eq!(Features::from_bits(bits).map(Features::to_bits), expected, "bits {bits:#b}");
         }
-        let error = DecodeError::UnsupportedFeatures { unknown_bits: 0x8000_0400 };
-        assert_eq!(Features::from_bits(0x8000_0401), Err(error), "the first after the known ones and the last");
+        let error = DecodeError::UnsupportedFeatures { unknown_bits: 0x8000_0800 };
+        assert_eq!(Features::from_bits(0x8000_0801), Err(error), "the first after the known ones and the last");
     }
 
     #[test]
@@ -138,6 +143,7 @@ mod tests {
         let all = [
             (1, "view"),
             (2, "view"),
+            (1024, "view"),
             (4, "dilation-compensation"),
             (16, "context"),
             (64, "detail"),

@@ -11,7 +11,7 @@ use crate::error::{DecodeError, Field, SectionKind};
 /// The first bytes of every bundle. As in PNG: not ASCII, then a name, then line ends that text transfers would change.
 pub const MAGIC: [u8; 8] = *b"\x89PSB\r\n\x1a\n";
 /// The format version this crate reads.
-pub const VERSION: u16 = 1;
+pub const VERSION: u16 = 2;
 /// Length of the header's fields before the section table, bytes.
 pub const HEADER_FIXED_LEN: usize = 160;
 /// Widest feature and hidden layer; bounds the work of an anchor.
@@ -80,12 +80,23 @@ pub struct Header {
 }
 
 impl Header {
-    /// Inputs of every head but those of detail and the feature bank: feature, then direction (3), then distance (1), the last two if present.
+    /// Inputs of the opacity and of the covariance head: feature, then distance (1), then direction (3), the last two if these
+    /// heads see them.
     #[must_use]
-    pub fn head_inputs(&self) -> usize {
-        let effects = self.features.effects;
-        let direction = if effects.view_direction { 3 } else { 0 };
-        usize::from(self.feature_dim).saturating_add(direction).saturating_add(usize::from(effects.view_distance))
+    pub fn geometry_inputs(&self) -> usize {
+        self.head_inputs(self.features.effects.view_geometry)
+    }
+
+    /// Inputs of the colour head, as [`Self::geometry_inputs`].
+    #[must_use]
+    pub fn colour_inputs(&self) -> usize {
+        self.head_inputs(self.features.effects.view_colour)
+    }
+
+    fn head_inputs(&self, sees_direction: bool) -> usize {
+        let distance = usize::from(self.features.effects.view_distance);
+        let direction = if sees_direction { 3 } else { 0 };
+        usize::from(self.feature_dim).saturating_add(distance).saturating_add(direction)
     }
 
     /// Channels of an anchor: F features, log-scales, 3K offsets.

@@ -106,12 +106,12 @@ impl<'a> HeadsView<'a> {
             b1: Halves::default(),
             b2: Halves::default(),
         };
-        let (n_in, k) = (header.head_inputs(), usize::from(header.n_offsets));
+        let (of_geometry, k) = (header.geometry_inputs(), usize::from(header.n_offsets));
         let effects = header.features.effects;
         let mut all = [
-            shape(n_in, header.feature_dim, k),
-            shape(n_in, header.feature_dim, k.saturating_mul(covariance_outputs(effects.anisotropic).into())),
-            shape(n_in, header.colour_hidden, k.saturating_mul(3)),
+            shape(of_geometry, header.feature_dim, k),
+            shape(of_geometry, header.feature_dim, k.saturating_mul(covariance_outputs(effects.anisotropic).into())),
+            shape(header.colour_inputs(), header.colour_hidden, k.saturating_mul(3)),
             shape(usize::from(header.feature_dim).saturating_add(3), header.detail_hidden, 3),
         ];
         let has_bank = cfg!(feature = "feature-bank") && effects.feature_bank;

@@ -204,8 +204,9 @@ impl<'a> Bundle<'a> {
     /// decoder is built with the feature `baked`.
     #[must_use]
     pub fn n_gaussians(&self, n_tiers: u8) -> Option<u32> {
-        let Effects { view_direction, view_distance, feature_bank, .. } = self.header.features.effects;
-        let sees_view = view_direction || view_distance || (cfg!(feature = "feature-bank") && feature_bank);
+        let Effects { view_colour, view_geometry, view_distance, feature_bank, .. } = self.header.features.effects;
+        let sees_direction = view_colour || view_geometry;
+        let sees_view = sees_direction || view_distance || (cfg!(feature = "feature-bank") && feature_bank);
         let counts = self.gaussians.filter(|_| cfg!(feature = "baked") && !sees_view)?;
         Some(counts.up_to(n_tiers.min(self.n_tiers)))
     }

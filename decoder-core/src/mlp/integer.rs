@@ -5,6 +5,7 @@
 //! nothing is a float between the inputs and the outputs.
 
 use core::cell::Cell;
+use core::iter;
 
 use bytemuck::{Pod, Zeroable};
 
@@ -84,7 +85,8 @@ pub(crate) struct Quantised<'v> {
 }
 
 impl<'v> Quantised<'v> {
-    /// The heads' inputs and a 1 behind them, which multiplies the bias, in the inputs' own memory.
+    /// A 1, which multiplies the bias, and the heads' inputs behind it, in the inputs' own memory: a head that sees less than another
+    /// reads the first of them.
     ///
     /// # Budget
     /// About 10 instructions an input.
@@ -97,27 +99,26 @@ impl<'v> Quantised<'v> {
         let steps_per_unit = MOST / largest;
         let steps = |x: &Cell<f32>| (x.get() * steps_per_unit + ROUNDER).to_bits();
         let one = (steps_per_unit + ROUNDER).to_bits();
-        // A word is written when both of the pair, which lie at or behind it, have been read.
+        let n_words = inputs.len() / 2 + 1;
         let cells = Cell::from_mut(&mut *inputs).as_slice_of_cells();
-        let (pairs, last) = cells.as_chunks::<2>();
-        for (slot, [low, high]) in cells.iter().zip(pairs) {
-            slot.set(f32::from_bits(packed(steps(low), steps(high))));
+        if let Some((first, rest)) = cells.split_first() {
+            first.set(f32::from_bits(packed(one, steps(first))));
+            // A word is written when both of its pair, which lie at or behind it, have been read.
+            let (pairs, last) = rest.as_chunks::<2>();
+            for (slot, [low, high]) in rest.iter().zip(pairs) {
+                slot.set(f32::from_bits(packed(steps(low), steps(high))));
+            }
+            if let (Some(slot), [x]) = (rest.get(pairs.len()), last) {
+                slot.set(f32::from_bits(packed(steps(x), 0)));
+            }
         }
-        let end = match last {
-            [x] => packed(steps(x), one),
-            _ => one & 0xFFFF,
-        };
-        let n_pairs = pairs.len();
-        if let Some(slot) = cells.get(n_pairs) {
-            slot.set(f32::from_bits(end));
-        }
-        Self { pairs: words(inputs).get(..=n_pairs).unwrap_or_default(), scale: largest / MOST }
+        Self { pairs: words(inputs).get(..n_words).unwrap_or_default(), scale: largest / MOST }
     }
 }
 
 /// One head; its output layer has blocks of `B` outputs.
 pub(crate) struct IntegerHead<'s, P, const B: usize> {
-    /// `[n_blocks, ⌈(1 + n_in)/2⌉, LANES]`, the bias behind the weights.
+    /// `[n_blocks, ⌈(1 + n_in)/2⌉, LANES]`, the bias before the weights.
     hidden: &'s [[P; LANES]],
     pairs_per_unit: usize,
     /// `[n_blocks, ⌈n_hidden/2⌉, B]`.
@@ -152,7 +153,7 @@ where
         let mut w1 = weights.next_layer();
         for (unit, (bias, step)) in head.b1.iter().zip(&mut *steps).enumerate() {
             let row = row.get_mut(..=n_in).unwrap_or_default();
-            for (slot, weight) in row.iter_mut().zip(w1.by_ref().take(n_in).chain([bias])) {
+            for (slot, weight) in row.iter_mut().zip(iter::once(bias).chain(w1.by_ref().take(n_in))) {
                 *slot = weight;
             }
             *step = put_row(row, hidden, unit, pairs_per_unit);
@@ -289,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn inputs_are_right_to_half_a_step_and_followed_by_one() {
+    fn inputs_are_right_to_half_a_step_behind_a_one() {
         let mut random = numbers(1);
         for n in 1..70 {
             for size in [1e-6, 0.5, 1.0, 30.0, 1e9] {
@@ -297,7 +298,7 @@ mod tests {
                 let mut memory = inputs.clone();
                 let values = Quantised::of(&mut memory);
                 let found = integers(&values);
-                let expected = inputs.iter().chain([&1.0]);
+                let expected = [1.0].iter().chain(&inputs);
                 for (found, expected) in found.iter().zip(expected) {
                     let error = *found as f64 * f64::from(values.scale) - f64::from(*expected);
                     assert!(error.abs() <= 0.51 * f64::from(values.scale), "{found} for {expected} of {size}");

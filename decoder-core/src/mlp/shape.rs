@@ -7,8 +7,10 @@ use crate::bundle::{BANK_INPUTS, BANK_WEIGHTS};
 /// Widths of the heads of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct HeadShape {
-    /// Inputs of all heads but those of detail and the feature bank.
-    pub(crate) inputs: usize,
+    /// Inputs of the opacity and of the covariance head.
+    pub(crate) geometry_inputs: usize,
+    /// Inputs of the colour head.
+    pub(crate) colour_inputs: usize,
     /// F, which is also the hidden width of the opacity and covariance heads.
     pub(crate) feature: usize,
     /// Outputs of the covariance head an offset: 7, or 1 where Gaussians are isotropic.
@@ -24,10 +26,16 @@ pub(crate) struct HeadShape {
 }
 
 impl HeadShape {
+    /// Inputs of these three, of which the one that sees less reads the first.
+    pub(crate) const fn inputs(&self) -> usize {
+        if self.geometry_inputs > self.colour_inputs { self.geometry_inputs } else { self.colour_inputs }
+    }
+
     /// Floats of all heads in scratch memory.
     pub(crate) const fn n_weights(&self) -> usize {
-        let Self { inputs, feature: f, covariance: v, colour: c, detail: d, bank, offsets: k } = *self;
-        let first_layers = LANES * (2 * n_rows::<LANES>(inputs, f) + n_rows::<LANES>(inputs, c));
+        let Self { geometry_inputs, colour_inputs, feature: f, covariance: v, colour: c, detail: d, bank, offsets: k } =
+            *self;
+        let first_layers = LANES * (2 * n_rows::<LANES>(geometry_inputs, f) + n_rows::<LANES>(colour_inputs, c));
         let outputs = n_rows::<1>(f, k) + v * n_rows::<1>(f, k) + 3 * n_rows::<3>(c, 3 * k);
         // Integers take a step and a bias for each output, which one pair less a unit pays for when there are two units.
         let steps = if f == 1 { (1 + v) * k } else { 0 } + if c == 1 { 3 * k } else { 0 };
@@ -53,15 +61,15 @@ impl HeadShape {
     pub(crate) const fn opacity_macs(&self, n_drawn: usize) -> usize {
         // The feature bank's layers, and mixing.
         let bank = if self.bank { BANK_INPUTS + 2 * BANK_WEIGHTS } else { 0 };
-        self.feature * (self.inputs + n_drawn + bank)
+        self.feature * (self.geometry_inputs + n_drawn + bank)
     }
 
     /// Multiply-adds of the other heads for an anchor with `n_open` offsets of positive opacity.
     pub(crate) const fn open_macs(&self, n_open: usize) -> usize {
-        let Self { inputs, feature: f, covariance: v, colour: c, detail: d, bank, .. } = *self;
+        let Self { geometry_inputs, colour_inputs, feature: f, covariance: v, colour: c, detail: d, bank, .. } = *self;
         // The detail head's share of an anchor mixes again.
         let again = if bank && d > 0 { BANK_WEIGHTS * f } else { 0 };
-        let per_anchor = (f + c) * inputs + d * f + again;
+        let per_anchor = f * geometry_inputs + c * colour_inputs + d * f + again;
         let per_gaussian = v * f + 3 * c + 6 * d;
         per_anchor + n_open * per_gaussian
     }

@@ -44,7 +44,7 @@ pub(crate) struct HeadOutputs {
 
 /// Scratch memory of the heads.
 pub(crate) struct Workspace<'s> {
-    /// `[head_inputs]`.
+    /// What the head sees that sees most, see [`HeadShape::inputs`].
     pub(crate) inputs: &'s mut [f32],
     /// `[hidden_len]`.
     pub(crate) hidden: &'s mut [f32],
@@ -58,7 +58,7 @@ impl<'s> Workspace<'s> {
     /// As much of `arena` as heads of `shape` work in.
     pub(crate) fn take(arena: &mut Arena<'s>, shape: HeadShape) -> Result<Self, DecodeError> {
         Ok(Self {
-            inputs: arena.take(shape.inputs)?,
+            inputs: arena.take(shape.inputs())?,
             hidden: arena.take(shape.hidden_len())?,
             detail_sums: arena.take(shape.sums_len())?,
             outputs: arena.take(shape.offsets)?,
@@ -135,8 +135,8 @@ fn visible_only(outputs: &mut [HeadOutputs], visible: u32) -> impl Iterator<Item
     outputs.iter_mut().enumerate().filter(move |(k, _)| visible & (1 << (k & 31)) != 0)
 }
 
-/// Concatenates feature, direction and distance, the last two if the scene has them; a feature bank mixes the feature by the
-/// weights that are returned.
+/// Concatenates feature, distance and direction, the last two if the scene has them, as many as there is room for: each head
+/// reads the first of them. A feature bank mixes the feature by the weights that are returned.
 fn fill_inputs<A: Choices>(
     anchor: &Anchor<'_>,
     effects: Effects,
@@ -152,9 +152,9 @@ fn fill_inputs<A: Choices>(
     let direction = if distance > 0.0 { A::Roots::quotients([dx, dy, dz], distance) } else { [0.0; 3] };
     let [x, y, z] = direction;
     let seen_from = [x, y, z, distance];
-    let direction = direction.iter().take(if cfg!(feature = "view") && effects.view_direction { 3 } else { 0 });
+    let direction = direction.iter().take(if cfg!(feature = "view") { 3 } else { 0 });
     let distance = core::iter::once(&distance).take((cfg!(feature = "view") && effects.view_distance).into());
-    for (input, &value) in inputs.iter_mut().zip(anchor.feature.iter().chain(direction).chain(distance)) {
+    for (input, &value) in inputs.iter_mut().zip(anchor.feature.iter().chain(distance).chain(direction)) {
         *input = value;
     }
     let bank = heads.bank.as_ref().filter(|_| cfg!(feature = "feature-bank"))?;

@@ -146,7 +146,7 @@ mod tests {
     use crate::ops::head;
     use crate::scene::ModelShape;
 
-    const SHAPE: ModelShape = ModelShape { view_direction: true, ..ModelShape::plain(5, 2) };
+    const SHAPE: ModelShape = ModelShape { view_colour: true, ..ModelShape::plain(5, 2) };
 
     fn model(seed: u64, width: f64) -> ContextModel<f32> {
         let levels = vec![

@@ -12,7 +12,8 @@ pub fn shape_of(bundle: &Bundle<'_>) -> ModelShape {
     ModelShape {
         feature_dim: header.feature_dim.into(),
         n_offsets: header.n_offsets.into(),
-        view_direction: effects.view_direction,
+        view_colour: effects.view_colour,
+        view_geometry: effects.view_geometry,
         view_distance: effects.view_distance,
         dilation_compensation: effects.dilation_compensation,
         anisotropic: effects.anisotropic,

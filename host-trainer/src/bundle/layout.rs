@@ -43,7 +43,8 @@ pub(super) struct Counts {
 /// What the scene takes into account.
 pub(super) fn effects(scene: &Scene<f32>, info: &BundleInfo) -> Effects {
     Effects {
-        view_direction: scene.shape.view_direction,
+        view_colour: scene.shape.view_colour,
+        view_geometry: scene.shape.view_geometry,
         view_distance: scene.shape.view_distance,
         dilation_compensation: scene.shape.dilation_compensation,
         detail: scene.heads.detail.is_some(),

@@ -92,8 +92,13 @@ fn with_context(scene: Scene<f32>, seed: u64) -> Scene<f32> {
 }
 
 /// A small shape with every effect.
-const SMALL: ModelShape =
-    ModelShape { view_direction: true, view_distance: true, dilation_compensation: true, ..ModelShape::plain(6, 3) };
+const SMALL: ModelShape = ModelShape {
+    view_colour: true,
+    view_geometry: true,
+    view_distance: true,
+    dilation_compensation: true,
+    ..ModelShape::plain(6, 3)
+};
 
 fn camera(width_px: u32, height_px: u32) -> Camera {
     Camera {

@@ -38,7 +38,7 @@ pub(super) fn base(config: RunConfig, dataset: Option<&Path>, folder: &Path) -> 
 pub(super) fn check_effects(config: &RunConfig) -> Result<()> {
     if config.effects.auto {
         bail!(
-            "runs that are compared need the same effects; force them, as --effects +view-direction, and leave auto to train"
+            "runs that are compared need the same effects; force them, as --effects +view-colour, and leave auto to train"
         );
     }
     Ok(())

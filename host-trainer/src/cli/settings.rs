@@ -40,12 +40,12 @@ pub(crate) struct Settings {
     feature_dim: Option<usize>,
     #[arg(long, value_name = "K", help = with_default("Gaussians of an anchor", TrainConfig::default().shape.n_offsets))]
     offsets: Option<usize>,
-    /// What the scene takes into account, of view-direction, view-distance, dilation-compensation, detail, feature-bank and
-    /// anisotropy: auto trains short pilots and keeps what pays; none, all, +NAME and -NAME in a list force.
-    /// [default: view-direction,anisotropy]
+    /// What the scene takes into account, of view-colour, view-geometry, view-distance, dilation-compensation, detail, feature-bank
+    /// and anisotropy: auto trains short pilots and keeps what pays; none, all, +NAME and -NAME in a list force.
+    /// [default: view-colour,view-geometry,anisotropy]
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     effects: Option<Request>,
-    /// Do not show the heads the direction of view.
+    /// Show no head the direction of view: neither view-colour nor view-geometry.
     #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true",
         action = ArgAction::Set)]
     no_view_direction: Option<bool>,
@@ -143,7 +143,9 @@ impl Settings {
         train.densification.kept_anchors = self.keep_anchors.or(train.densification.kept_anchors);
         set(&mut train.shape.feature_dim, &self.feature_dim);
         set(&mut train.shape.n_offsets, &self.offsets);
-        set(&mut train.shape.view_direction, &self.no_view_direction.map(|no| !no));
+        let sees_direction = self.no_view_direction.map(|no| !no);
+        set(&mut train.shape.view_colour, &sees_direction);
+        set(&mut train.shape.view_geometry, &sees_direction);
         set(&mut train.shape.view_distance, &self.view_distance);
         set(&mut train.shape.dilation_compensation, &self.dilation_compensation);
         train.learns_background |= config.capture.background == Some(Background::Learned);
@@ -185,7 +187,7 @@ impl Settings {
     /// Whether an option other than `--effects` decides about an effect.
     fn decides(&self, effect: Effect) -> bool {
         let by_option = match effect {
-            Effect::ViewDirection => self.no_view_direction.is_some(),
+            Effect::ViewColour | Effect::ViewGeometry => self.no_view_direction.is_some(),
             Effect::ViewDistance => self.view_distance.is_some(),
             Effect::DilationCompensation => self.dilation_compensation.is_some(),
             // There is no option beside `--effects`.

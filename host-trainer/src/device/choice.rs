@@ -146,7 +146,8 @@ impl Model {
     fn scratch_len(&self, n: usize) -> u64 {
         let splats = n as f64 * self.splats_per_anchor * SHARE_OF_TWO_STRIPS;
         let shape = ScratchShape {
-            n_view_inputs: 3,
+            n_geometry_inputs: 3,
+            n_colour_inputs: 3,
             colour_hidden: self.feature_dim,
             detail_hidden: 0,
             feature_bank: false,

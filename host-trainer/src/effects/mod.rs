@@ -20,9 +20,11 @@ use crate::train::module::Detail;
 /// Something that a scene may take into account; a scene without it has no part for it, and its decoder does no work for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effect {
-    /// The heads see the unit vector from the camera to the anchor.
-    ViewDirection,
-    /// The heads see the distance from the camera to the anchor.
+    /// The colour head sees the unit vector from the camera to the anchor.
+    ViewColour,
+    /// The opacity and the covariance head see it.
+    ViewGeometry,
+    /// These heads see the distance from the camera to the anchor.
     ViewDistance,
     /// Opacities are compensated for the 0.3 px² dilation.
     DilationCompensation,
@@ -36,8 +38,9 @@ pub enum Effect {
 
 impl Effect {
     /// All there are, in the order in which they are measured and named.
-    pub const ALL: [Self; 6] = [
-        Self::ViewDirection,
+    pub const ALL: [Self; 7] = [
+        Self::ViewColour,
+        Self::ViewGeometry,
         Self::ViewDistance,
         Self::DilationCompensation,
         Self::Detail,
@@ -47,12 +50,14 @@ impl Effect {
 
     /// Those that are measured: at one size of the image dilation compensation shows nothing of what it is for, and a feature bank
     /// calls for a feature width divisible by 4, which HAC's is not.
-    pub const MEASURED: [Self; 4] = [Self::ViewDirection, Self::ViewDistance, Self::Detail, Self::Anisotropy];
+    pub const MEASURED: [Self; 5] =
+        [Self::ViewColour, Self::ViewGeometry, Self::ViewDistance, Self::Detail, Self::Anisotropy];
 
     /// Its name on the command line.
     pub const fn name(self) -> &'static str {
         match self {
-            Self::ViewDirection => "view-direction",
+            Self::ViewColour => "view-colour",
+            Self::ViewGeometry => "view-geometry",
             Self::ViewDistance => "view-distance",
             Self::DilationCompensation => "dilation-compensation",
             Self::Detail => "detail",
@@ -64,7 +69,8 @@ impl Effect {
     /// The key of a configuration that decides about it, or the start of such keys.
     pub const fn key(self) -> &'static str {
         match self {
-            Self::ViewDirection => "train.shape.view_direction",
+            Self::ViewColour => "train.shape.view_colour",
+            Self::ViewGeometry => "train.shape.view_geometry",
             Self::ViewDistance => "train.shape.view_distance",
             Self::DilationCompensation => "train.shape.dilation_compensation",
             Self::Detail => "train.modules.detail",
@@ -76,7 +82,8 @@ impl Effect {
     /// Whether a run has it.
     pub fn is_in(self, config: &TrainConfig) -> bool {
         match self {
-            Self::ViewDirection => config.shape.view_direction,
+            Self::ViewColour => config.shape.view_colour,
+            Self::ViewGeometry => config.shape.view_geometry,
             Self::ViewDistance => config.shape.view_distance,
             Self::DilationCompensation => config.shape.dilation_compensation,
             Self::Detail => config.modules.detail.is_some(),
@@ -88,7 +95,8 @@ impl Effect {
     /// Gives it to a run, or takes it; settings that a module has are kept.
     pub fn set(self, config: &mut TrainConfig, on: bool) {
         match self {
-            Self::ViewDirection => config.shape.view_direction = on,
+            Self::ViewColour => config.shape.view_colour = on,
+            Self::ViewGeometry => config.shape.view_geometry = on,
             Self::ViewDistance => config.shape.view_distance = on,
             Self::DilationCompensation => config.shape.dilation_compensation = on,
             Self::Anisotropy => config.shape.anisotropic = on,
@@ -143,8 +151,8 @@ mod tests {
     #[test]
     fn a_run_has_the_effects_it_is_given_and_a_shape_to_match() {
         let given = TrainConfig::default();
-        for bits in 0..16 {
-            let wanted: Vec<Effect> = (0..4).filter(|i| bits >> i & 1 == 1).map(|i| Effect::MEASURED[i]).collect();
+        for bits in 0..32 {
+            let wanted: Vec<Effect> = (0..5).filter(|i| bits >> i & 1 == 1).map(|i| Effect::MEASURED[i]).collect();
             let config = Effect::measured_only(&wanted, &given);
             assert_eq!((Effect::measured_in(&config), Effect::all_in(&config)), (wanted.clone(), wanted));
             assert_eq!(config.modules.shape(config.shape), config.shape);

@@ -22,8 +22,8 @@ use crate::train::{Observer, TrainConfig, TrainError, Trainer};
 pub const LEAST_ITERATIONS: u32 = 16_000;
 /// Share of the run's iterations that each pilot takes.
 ///
-/// At half the resolution and for the image alone an iteration takes about a quarter of one of the run's with `hac`, so the six or
-/// seven pilots take less than a quarter of its time.
+/// At half the resolution and for the image alone an iteration takes about a quarter of one of the run's with `hac`, so the seven
+/// or eight pilots take a quarter of its time.
 const PILOT_SHARE: f64 = 0.125;
 /// So many times the difference of two seeds is taken for chance.
 ///
@@ -110,7 +110,7 @@ pub struct Trial {
 /// Trains two pilots without effects, one with each of [`Effect::MEASURED`], and one with all that gained what an effect has to gain
 /// where these are several; says what each was worth, and which one is chosen.
 ///
-/// Quality is measured on held-out views at the pilots' size, instructions at the capture's own. Cost: six or seven eighths of the
+/// Quality is measured on held-out views at the pilots' size, instructions at the capture's own. Cost: seven or eight eighths of the
 /// run's iterations, each about a quarter of one of the run's.
 ///
 /// * `config`: of the run, for whose length, seed and widths the pilots stand; other effects than the measured are kept. * `encode`: a
@@ -251,7 +251,7 @@ mod tests {
         let mut begun = Vec::new();
         let begins = |effects: &[Effect]| begun.push(Effect::names(effects));
         let trials = measure(&pilots, &tiny_config(160), &dear, drawing, encode, begins).expect("pilots");
-        assert_eq!(begun, ["none", "none", "view-direction", "view-distance", "detail", "anisotropy"]);
+        assert_eq!(begun, ["none", "none", "view-colour", "view-geometry", "view-distance", "detail", "anisotropy"]);
         assert!(trials.chance_db > 0.0, "two seeds, two scenes");
         assert!(trials.each.iter().all(|trial| trial.worth.instructions > 0.0 && trial.worth.psnr_db.is_finite()));
         let chosen: Vec<_> = trials.each.iter().filter(|trial| trial.chosen).map(|trial| &trial.effects).collect();

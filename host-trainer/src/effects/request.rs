@@ -75,7 +75,7 @@ impl FromStr for Request {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use Effect::{Detail, DilationCompensation, ViewDirection, ViewDistance};
+    use Effect::{Detail, DilationCompensation, ViewColour, ViewDistance};
 
     #[test]
     fn a_list_forces_what_it_names_and_nothing_else() {
@@ -88,7 +88,7 @@ mod tests {
         assert_eq!(forced("none").len(), Effect::ALL.len());
         assert!(forced("none").iter().all(|(_, on)| !on) && forced("all").iter().all(|(_, on)| *on));
         let all_but = forced("all, -dilation-compensation");
-        assert!(all_but.contains(&(DilationCompensation, false)) && all_but.contains(&(ViewDirection, true)));
+        assert!(all_but.contains(&(DilationCompensation, false)) && all_but.contains(&(ViewColour, true)));
         assert_eq!("auto".parse(), Ok(Request::Auto));
     }
 
@@ -97,7 +97,7 @@ mod tests {
         for (text, part) in [
             (
                 "+fog",
-                "no effect `+fog`; needs auto, or a list of none, all, and +NAME or -NAME with NAME of view-direction",
+                "no effect `+fog`; needs auto, or a list of none, all, and +NAME or -NAME with NAME of view-colour",
             ),
             ("", "no effect ``"),
             ("detail,-detail", "`detail` is named twice"),

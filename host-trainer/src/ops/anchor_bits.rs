@@ -163,7 +163,7 @@ mod tests {
     use super::*;
     use crate::ops::finite_difference::{assert_piecewise_gradient, random};
 
-    const SHAPE: ModelShape = ModelShape { view_direction: true, ..ModelShape::plain(4, 3) };
+    const SHAPE: ModelShape = ModelShape { view_colour: true, ..ModelShape::plain(4, 3) };
     const N: usize = 5;
     /// Channels: 4 features, 6 log-scales, 9 offsets.
     const C: usize = 19;

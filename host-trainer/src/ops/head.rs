@@ -6,14 +6,16 @@ use crate::scene::Head;
 
 /// Evaluates a head for `n` anchors.
 ///
-/// * `input`: `[n, n_in]`. * `hidden`: `[n, n_hidden]`, overwritten with relu(W1·x + b1), which backward needs.
+/// * `input`: `[n, ≥ n_in]`, of which the first n_in of a row count. * `hidden`: `[n, n_hidden]`, overwritten with relu(W1·x + b1), which
+///   backward needs.
 /// * `output`: `[n, n_out]`, overwritten. Cost: n·(n_in + n_out)·n_hidden multiply-adds.
 pub fn forward<R: Real>(head: &Head<R>, input: &[R], hidden: &mut [R], output: &mut [R]) {
-    let n = input.len() / head.n_in;
+    let n = hidden.len() / head.n_hidden;
     for row in hidden.chunks_exact_mut(head.n_hidden) {
         row.copy_from_slice(&head.b1);
     }
-    multiply(Matrix::new(input, n, head.n_in), Matrix::new(&head.w1, head.n_hidden, head.n_in).t(), true, hidden);
+    let w1 = Matrix::new(&head.w1, head.n_hidden, head.n_in);
+    multiply(Matrix::first_columns(input, n, head.n_in), w1.t(), true, hidden);
     for h in hidden.iter_mut() {
         *h = h.larger(R::ZERO);
     }
@@ -28,7 +30,7 @@ pub fn forward<R: Real>(head: &Head<R>, input: &[R], hidden: &mut [R], output: &
 /// With δ = d_output: dW2 += δᵀ·h, db2 += Σδ, dh = δ·W2 where h > 0, dW1 += dhᵀ·x, db1 += Σdh, dx += dh·W1.
 ///
 /// * `input`, `hidden`: as forward left them. * `d_hidden`: scratch `[n, n_hidden]`.
-/// * `d_input`: `[n, n_in]`, added to. * `d_head`: added to.
+/// * `d_input`: as `input`, added to. * `d_head`: added to.
 pub fn backward<R: Real>(
     head: &Head<R>,
     input: &[R],
@@ -38,7 +40,7 @@ pub fn backward<R: Real>(
     d_input: &mut [R],
     d_head: &mut Head<R>,
 ) {
-    let n = input.len() / head.n_in;
+    let n = hidden.len() / head.n_hidden;
     let d_out = Matrix::new(d_output, n, head.n_out);
     multiply(d_out.t(), Matrix::new(hidden, n, head.n_hidden), true, &mut d_head.w2);
     add_rows(d_output, &mut d_head.b2);
@@ -47,7 +49,7 @@ pub fn backward<R: Real>(
         *d = if *h > R::ZERO { *d } else { R::ZERO };
     }
     let d_hid = Matrix::new(d_hidden, n, head.n_hidden);
-    multiply(d_hid.t(), Matrix::new(input, n, head.n_in), true, &mut d_head.w1);
+    multiply(d_hid.t(), Matrix::first_columns(input, n, head.n_in), true, &mut d_head.w1);
     add_rows(d_hidden, &mut d_head.b1);
     multiply(d_hid, Matrix::new(&head.w1, head.n_hidden, head.n_in), true, d_input);
 }
@@ -68,7 +70,7 @@ mod tests {
 
     /// Σ weights · outputs, a scalar whose gradient exercises every output.
     fn objective(head: &Head<f64>, input: &[f64], weights: &[f64]) -> f64 {
-        let n = input.len() / head.n_in;
+        let n = weights.len() / head.n_out;
         let (mut hidden, mut output) = (vec![0.0; n * head.n_hidden], vec![0.0; n * head.n_out]);
         forward(head, input, &mut hidden, &mut output);
         output.iter().zip(weights).map(|(o, w)| o * w).sum()
@@ -76,13 +78,14 @@ mod tests {
 
     #[test]
     fn backward_agrees_with_finite_differences() {
-        for (seed, n, n_in, n_hidden, n_out) in [(1, 5, 7, 4, 3), (2, 1, 3, 8, 10), (3, 17, 35, 32, 7)] {
+        // The last sees the first of 36 columns, and what lies behind them has no gradient.
+        for (seed, n, row, n_in, n_hidden, n_out) in [(1, 5, 7, 7, 4, 3), (2, 1, 3, 3, 8, 10), (3, 17, 36, 33, 32, 7)] {
             let mut head = Head::filled(n_in, n_hidden, n_out, 0.0f64);
             for (i, group) in head.groups_mut().into_iter().enumerate() {
                 let len = group.len();
                 group.copy_from_slice(&random(seed * 10 + i as u64, len));
             }
-            let input = random(seed + 100, n * n_in);
+            let input = random(seed + 100, n * row);
             let weights = random(seed + 200, n * n_out);
             let (mut hidden, mut output) = (vec![0.0; n * n_hidden], vec![0.0; n * n_out]);
             forward(&head, &input, &mut hidden, &mut output);

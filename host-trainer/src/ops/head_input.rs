@@ -16,7 +16,8 @@ pub fn seen_from<R: Real>(camera: &Pinhole<R>, position: [R; 3]) -> ([R; 3], R) 
     (ray.map(|r| r * inverse), distance)
 }
 
-/// Writes the input rows `[feature F, direction 3, distance 1]` of some anchors, the last two if the shape has them.
+/// Writes the input rows `[feature F, distance 1, direction 3]` of some anchors, the last two if a head sees them; one that sees less
+/// reads the first of a row.
 ///
 /// Both are those of [`seen_from`] (Lu et al. 2024, Scaffold-GS, section 3.2.1).
 ///
@@ -30,15 +31,9 @@ pub fn forward<R: Real>(shape: &ModelShape, camera: &Pinhole<R>, features: &[R],
         let (head, tail) = row.split_at_mut(shape.feature_dim);
         head.copy_from_slice(feature);
         let (direction, distance) = seen_from(camera, *position);
-        let mut rest = tail;
-        if shape.view_direction {
-            let (slots, after) = rest.split_at_mut(3);
-            slots.copy_from_slice(&direction);
-            rest = after;
-        }
-        if let Some(last) = rest.first_mut() {
-            *last = distance;
-        }
+        let (of_distance, of_direction) = tail.split_at_mut(shape.view_distance.into());
+        of_distance.fill(distance);
+        of_direction.copy_from_slice(&direction[..of_direction.len()]);
     }
 }
 
@@ -69,18 +64,18 @@ mod tests {
         })
     }
 
-    fn shape(view_direction: bool, view_distance: bool) -> ModelShape {
-        ModelShape { view_direction, view_distance, ..ModelShape::plain(3, 1) }
+    fn shape(view_colour: bool, view_distance: bool) -> ModelShape {
+        ModelShape { view_colour, view_distance, ..ModelShape::plain(3, 1) }
     }
 
     #[test]
-    fn a_row_is_feature_then_direction_then_distance() {
+    fn a_row_is_feature_then_distance_then_direction() {
         let camera = camera();
         let mut position = camera.centre_world;
         position[1] -= 2.0;
         let mut row = [9.0; 7];
         forward(&shape(true, true), &camera, &[1.0, 2.0, 3.0], &[position], &mut row);
-        for (found, expected) in row.iter().zip([1.0, 2.0, 3.0, 0.0, -1.0, 0.0, 2.0]) {
+        for (found, expected) in row.iter().zip([1.0, 2.0, 3.0, 2.0, 0.0, -1.0, 0.0]) {
             assert!((found - expected).abs() < 1e-12, "{row:?}");
         }
         forward(&shape(true, true), &camera, &[1.0, 2.0, 3.0], &[camera.centre_world], &mut row);
@@ -90,8 +85,8 @@ mod tests {
     #[test]
     fn backward_agrees_with_finite_differences() {
         let positions = [[0.3, -0.2, 0.9], [1.0, 0.0, 0.1]];
-        for (view_direction, view_distance) in [(false, false), (true, false), (false, true), (true, true)] {
-            let shape = shape(view_direction, view_distance);
+        for (sees_direction, view_distance) in [(false, false), (true, false), (false, true), (true, true)] {
+            let shape = shape(sees_direction, view_distance);
             let features = random(1, 6);
             let weights = random(2, 2 * shape.head_inputs());
             let mut d_features = vec![9.0; 6];

@@ -2,12 +2,14 @@
 
 use super::Real;
 
-/// A row-major matrix, or the transpose of one, borrowed from a slice.
+/// A row-major matrix, or the transpose of one, borrowed from a slice; the first columns of one.
 #[derive(Clone, Copy, Debug)]
 pub struct Matrix<'a, R> {
     values: &'a [R],
     rows: usize,
     cols: usize,
+    /// Values from one row to the next.
+    stride: usize,
     transposed: bool,
 }
 
@@ -18,7 +20,15 @@ impl<'a, R> Matrix<'a, R> {
     /// When `values` has another length.
     pub fn new(values: &'a [R], rows: usize, cols: usize) -> Self {
         assert_eq!(values.len(), rows * cols, "a {rows}×{cols} matrix needs that many values");
-        Self { values, rows, cols, transposed: false }
+        Self { values, rows, cols, stride: cols, transposed: false }
+    }
+
+    /// The first `cols` columns of `values`, `rows` rows of at least as many.
+    ///
+    /// # Panics
+    /// When `values` does not consist of such rows.
+    pub fn first_columns(values: &'a [R], rows: usize, cols: usize) -> Self {
+        Self { values, rows, cols, stride: stride(values.len(), rows, cols), transposed: false }
     }
 
     /// The transpose, without moving anything.
@@ -32,12 +42,20 @@ impl<'a, R> Matrix<'a, R> {
     }
 
     fn strides(&self) -> [isize; 2] {
-        let across = isize::try_from(self.cols).expect("a slice holds at most isize::MAX bytes");
+        let across = isize::try_from(self.stride).expect("a slice holds at most isize::MAX bytes");
         if self.transposed { [1, across] } else { [across, 1] }
     }
 }
 
-/// `out = a·b` (or `out += a·b` with `accumulate`), `out` row-major `[rows of a, columns of b]`.
+/// The length of each of the `rows` that `len` values consist of, at least `cols`.
+fn stride(len: usize, rows: usize, cols: usize) -> usize {
+    let stride = len.checked_div(rows).unwrap_or(cols);
+    assert!(stride >= cols && stride * rows == len, "{rows} rows of at least {cols} of {len} values");
+    stride
+}
+
+/// `out = a·b` (or `out += a·b` with `accumulate`), `out` row-major with the rows of a; its first columns are those of b, and what
+/// lies behind them stays.
 ///
 /// Sums run in the order `matrixmultiply` chooses for the CPU at hand: the same on one machine for any thread count,
 /// not on two CPU models.
@@ -48,11 +66,10 @@ pub fn multiply<R: Real>(a: Matrix<'_, R>, b: Matrix<'_, R>, accumulate: bool, o
     let [m, k] = a.extent();
     let [k_b, n] = b.extent();
     assert_eq!(k, k_b, "columns of a and rows of b");
-    assert_eq!(out.len(), m * n, "the product is {m}×{n}");
     let beta = if accumulate { R::ONE } else { R::ZERO };
-    let out_strides = [isize::try_from(n).expect("a slice holds at most isize::MAX bytes"), 1];
+    let out_strides = [isize::try_from(stride(out.len(), m, n)).expect("a slice holds at most isize::MAX bytes"), 1];
     #[expect(unsafe_code, reason = "matrixmultiply takes pointers and strides")]
-    // SAFETY: `Matrix::new` ties each extent and its strides to the length of its slice, and `out` holds m·n values.
+    // SAFETY: each matrix's extent and stride are tied to the length of its slice where it is made, and those of `out` by `stride`.
     unsafe {
         R::gemm(
             [m, k, n],
@@ -77,5 +94,24 @@ mod tests {
         let mut out = [0.0; 9];
         multiply(Matrix::new(&a, 2, 3).t(), Matrix::new(&a, 2, 3), false, &mut out);
         assert_eq!(out, [17.0, 22.0, 27.0, 22.0, 29.0, 36.0, 27.0, 36.0, 45.0]);
+    }
+
+    #[test]
+    fn the_first_columns_are_read_and_written_alone() {
+        let a = [1.0f64, 2.0, -9.0, 3.0, 4.0, -9.0];
+        let b = [1.0, 0.0, 1.0, 1.0];
+        let mut out = [7.0; 8];
+        multiply(Matrix::first_columns(&a, 2, 2), Matrix::new(&b, 2, 2), false, &mut out);
+        assert_eq!(out, [3.0, 2.0, 7.0, 7.0, 7.0, 4.0, 7.0, 7.0]);
+        let mut out = [0.0; 4];
+        multiply(Matrix::first_columns(&a, 2, 2).t(), Matrix::first_columns(&a, 2, 2), false, &mut out);
+        assert_eq!(out, [10.0, 14.0, 14.0, 20.0]);
+        multiply(Matrix::first_columns(&a[..0], 0, 2), Matrix::new(&b, 2, 2), false, &mut []);
+    }
+
+    #[test]
+    #[should_panic(expected = "2 rows of at least 3 of 4 values")]
+    fn rows_that_are_too_short_are_refused() {
+        Matrix::first_columns(&[0.0; 4], 2, 3);
     }
 }

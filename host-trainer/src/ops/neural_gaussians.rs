@@ -198,7 +198,7 @@ mod tests {
     use crate::ops::finite_difference::{assert_gradient, random};
     use crate::scene::MASK_THRESHOLD;
 
-    const SHAPE: ModelShape = ModelShape { view_direction: true, ..ModelShape::plain(4, 3) };
+    const SHAPE: ModelShape = ModelShape::plain(4, 3);
     const BALLS: ModelShape = ModelShape { anisotropic: false, ..SHAPE };
     const N: usize = 4;
 

@@ -131,16 +131,15 @@ impl ReferenceScene {
         if let Some(bank) = &self.heads.bank {
             feature = mixed(bank, &feature, from_camera);
         }
-        let mut input = feature.clone();
-        if self.shape.view_direction {
-            input.extend(from_camera.normalize_or_zero().to_array());
-        }
+        let mut without_direction = feature.clone();
         if self.shape.view_distance {
-            input.push(from_camera.length());
+            without_direction.push(from_camera.length());
         }
-        let opacities = evaluate(&self.heads.opacity, &input);
-        let covariances = evaluate(&self.heads.covariance, &input);
-        let colours = evaluate(&self.heads.colour, &input);
+        let with_direction = [&without_direction[..], &from_camera.normalize_or_zero().to_array()].concat();
+        let seen = |sees_direction: bool| if sees_direction { &with_direction } else { &without_direction };
+        let opacities = evaluate(&self.heads.opacity, seen(self.shape.view_geometry));
+        let covariances = evaluate(&self.heads.covariance, seen(self.shape.view_geometry));
+        let colours = evaluate(&self.heads.colour, seen(self.shape.view_colour));
 
         let mut splats = Vec::new();
         for k in 0..n_offsets {

@@ -20,6 +20,14 @@ pub enum OutputLayout {
 }
 
 impl OutputLayout {
+    /// Inputs of the head.
+    fn inputs(self, shape: &ModelShape) -> usize {
+        match self {
+            Self::Opacity | Self::Covariance => shape.geometry_inputs(),
+            Self::Colour => shape.colour_inputs(),
+        }
+    }
+
     /// Outputs per offset.
     pub const fn per_offset(self, shape: &ModelShape) -> usize {
         match self {
@@ -107,7 +115,7 @@ impl<R: Copy> Heads<R> {
     /// Heads for `shape` with every parameter `value`.
     pub fn filled(shape: &ModelShape, value: R) -> Self {
         let head = |layout: OutputLayout, n_hidden| {
-            Head::filled(shape.head_inputs(), n_hidden, layout.per_offset(shape) * shape.n_offsets, value)
+            Head::filled(layout.inputs(shape), n_hidden, layout.per_offset(shape) * shape.n_offsets, value)
         };
         let detail = |n_hidden| Head::filled(shape.feature_dim + 3, n_hidden, 3, value);
         Self {

@@ -63,7 +63,7 @@ pub fn initial_scene(shape: ModelShape, voxel_size: f64, points: &[DVec3], rng: 
         detail.b2.fill(0.0);
     }
     // A feature bank shows nothing while all features are 0.
-    if shape.head_inputs() == shape.feature_dim {
+    if shape.geometry_inputs() == shape.feature_dim {
         draw_all_at_first(&mut heads.opacity);
     }
     Scene { shape, voxel_size, anchors, heads, context: None }

@@ -16,9 +16,11 @@ pub struct ModelShape {
     pub feature_dim: usize,
     /// Offsets, that is Gaussians, K of an anchor.
     pub n_offsets: usize,
-    /// The heads see the unit vector from the camera to the anchor.
-    pub view_direction: bool,
-    /// The heads see the distance from the camera to the anchor, in normalised units.
+    /// The colour head sees the unit vector from the camera to the anchor.
+    pub view_colour: bool,
+    /// The opacity and the covariance head see it.
+    pub view_geometry: bool,
+    /// These heads see the distance from the camera to the anchor, in normalised units.
     pub view_distance: bool,
     /// Opacity is multiplied by √(det Σ / det(Σ + 0.3 I)) (Yu et al. 2024, Mip-Splatting, eq. 8).
     pub dilation_compensation: bool,
@@ -53,7 +55,8 @@ impl ModelShape {
         Self {
             feature_dim,
             n_offsets,
-            view_direction: false,
+            view_colour: false,
+            view_geometry: false,
             view_distance: false,
             dilation_compensation: false,
             anisotropic: true,
@@ -63,14 +66,34 @@ impl ModelShape {
         }
     }
 
-    /// Inputs of the first three heads: feature, then direction (3), then distance (1), the last two if present.
+    /// Inputs of the opacity and of the covariance head: feature, then distance (1), then direction (3), the last two if these
+    /// heads see them.
+    pub fn geometry_inputs(&self) -> usize {
+        self.inputs(self.view_geometry)
+    }
+
+    /// Inputs of the colour head, as [`Self::geometry_inputs`].
+    pub fn colour_inputs(&self) -> usize {
+        self.inputs(self.view_colour)
+    }
+
+    /// Inputs of the head among these three that sees most; one that sees less sees the first of them.
     pub fn head_inputs(&self) -> usize {
-        self.feature_dim + 3 * usize::from(self.view_direction) + usize::from(self.view_distance)
+        self.inputs(self.sees_direction())
+    }
+
+    fn inputs(&self, sees_direction: bool) -> usize {
+        self.feature_dim + usize::from(self.view_distance) + 3 * usize::from(sees_direction)
+    }
+
+    /// Whether any head sees the direction of view.
+    pub fn sees_direction(&self) -> bool {
+        self.view_colour || self.view_geometry
     }
 
     /// Whether the heads see anything of the view, if only through the feature bank: if not, a Gaussian is the same in every frame.
     pub fn sees_view(&self) -> bool {
-        self.view_direction || self.view_distance || self.feature_bank
+        self.sees_direction() || self.view_distance || self.feature_bank
     }
 
     /// Hidden width of the colour head.

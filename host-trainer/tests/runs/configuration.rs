@@ -30,9 +30,14 @@ fn a_written_configuration_gives_the_same_bundle_again() {
     command.arg("train").arg("--config").arg(&config).arg("-o").arg(&other);
     succeeds(command.args(["--iterations", "5", "--view-distance", "--no-view-direction=true", "--keep-checkpoints"]));
     let written = fs::read_to_string(home.join("c.run/config.toml")).unwrap();
-    for line in
-        ["iterations = 5", "view_distance = true", "view_direction = false", "n_offsets = 3", "voxel_size = 0.001"]
-    {
+    for line in [
+        "iterations = 5",
+        "view_distance = true",
+        "view_colour = false",
+        "view_geometry = false",
+        "n_offsets = 3",
+        "voxel_size = 0.001",
+    ] {
         assert!(written.lines().any(|l| l == line), "{line}: {written}");
     }
     assert!(home.join("c.run/iteration-00000005.checkpoint").exists());

@@ -18,14 +18,18 @@ fn effects_of(bundle: &PathBuf) -> Effects {
 fn forced_effects_are_those_of_the_bundle() {
     let home = folder("forced-effects");
     let output = home.join("a.psb");
-    succeeds(train(&output).args(["--effects", "+detail,-view-direction,+view-distance"]));
+    succeeds(train(&output).args(["--effects", "+detail,-view-colour,-view-geometry,+view-distance"]));
     let expected = Effects { detail: true, view_distance: true, anisotropic: true, ..Effects::default() };
     assert_eq!(effects_of(&output), expected);
-    succeeds(train(&output).args(["--effects", "-view-direction"]));
+    succeeds(train(&output).args(["--effects", "-view-geometry"]));
+    assert_eq!(effects_of(&output), Effects { view_colour: true, anisotropic: true, ..Effects::default() });
+    succeeds(train(&output).args(["--effects", "-view-colour", "--backbone", "hac"]));
+    assert_eq!(effects_of(&output), Effects { view_geometry: true, anisotropic: true, ..Effects::default() });
+    succeeds(train(&output).arg("--no-view-direction"));
     assert_eq!(effects_of(&output), Effects { anisotropic: true, ..Effects::default() });
     succeeds(train(&output).args(["--effects", "none"]));
     assert_eq!(effects_of(&output), Effects::default());
-    let banked = ["--effects", "-view-direction,+feature-bank", "--set"];
+    let banked = ["--effects", "-view-colour,-view-geometry,+feature-bank", "--set"];
     succeeds(train(&output).args(banked).arg("train.shape.feature_dim=4"));
     assert_eq!(effects_of(&output), Effects { feature_bank: true, anisotropic: true, ..Effects::default() });
     let said = fails(train(&output).args(banked).arg("train.shape.feature_dim=10"));
@@ -49,10 +53,7 @@ fn options_that_contradict_each_other_are_refused() {
     let output = folder("contradictions").join("a.psb");
     let with = |options: &[&str]| fails(train(&output).args(options));
     for (options, part) in [
-        (
-            &["--effects", "+view-direction", "--no-view-direction"][..],
-            "a scene with view-direction, and another option",
-        ),
+        (&["--effects", "+view-colour", "--no-view-direction"][..], "a scene with view-colour, and another option"),
         (&["--effects", "-detail", "--modules", "detail"], "a scene without detail, and another option"),
         (&["--effects", "none", "--set", "train.shape.view_distance=true"], "without view-distance, and another"),
         (&["--effects", "auto", "--view-distance"], "another option decides about view-distance"),
@@ -61,7 +62,7 @@ fn options_that_contradict_each_other_are_refused() {
         assert!(said.contains(part), "{options:?}: {said}");
     }
     assert!(!output.exists() && !output.with_extension("run").exists(), "before anything was done");
-    let agreeing = ["--effects", "+detail,-view-direction", "--modules", "detail", "--no-view-direction"];
+    let agreeing = ["--effects", "+detail,-view-geometry", "--modules", "detail", "--no-view-direction"];
     succeeds(train(&output).args(agreeing));
     let mut sweep = pocketsplat();
     sweep.arg("sweep").arg(capture()).arg("-o").arg(output.with_extension("sweep"));
@@ -73,9 +74,12 @@ fn options_that_contradict_each_other_are_refused() {
 fn a_run_too_short_to_measure_keeps_its_effects_and_says_so() {
     let output = folder("short-effects").join("a.psb");
     let said = succeeds(train(&output).args(["--effects", "auto"]));
-    assert!(said.contains("effects: view-direction + anisotropy; a run needs 16000 iterations"), "{said}");
+    assert!(said.contains("effects: view-colour + view-geometry + anisotropy; a run needs 16000 iterations"), "{said}");
     let said = succeeds(train(&output).args(["--effects", "auto", "--set", "effects.least_iterations=1"]));
-    assert!(said.contains("effects: view-direction + anisotropy; the capture has too few training views"), "{said}");
+    assert!(
+        said.contains("effects: view-colour + view-geometry + anisotropy; the capture has too few training views"),
+        "{said}"
+    );
     let said = succeeds(&mut train(&output));
     assert!(!said.contains("effects:"), "nothing is measured unasked: {said}");
 }
@@ -109,7 +113,7 @@ fn effects_are_measured_once_and_stay_with_the_run() {
     let table = fs::read_to_string(kept.join("effects.csv")).unwrap();
     assert!(table.lines().count() >= 5 && table.lines().filter(|line| line.ends_with("true")).count() == 1, "{table}");
     let config = fs::read_to_string(kept.join("config.toml")).unwrap();
-    assert!(config.contains("auto = false") && config.contains("view_direction = false"), "{config}");
+    assert!(config.contains("auto = false") && config.contains("view_colour = false"), "{config}");
     let (again, mut command) = run("b.psb");
     let said = succeeds(command.arg("--config").arg(kept.join("config.toml")));
     assert!(!said.contains("effects:"), "nothing is measured again: {said}");

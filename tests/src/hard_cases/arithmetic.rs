@@ -123,7 +123,7 @@ fn even_images() -> f64 {
 
 /// Numbers of head inputs and of a camera's own that are not finite, at the camera and one ulp from it.
 fn at_the_camera() -> f64 {
-    let shape = ModelShape { view_direction: true, view_distance: true, ..ModelShape::plain(2, 1) };
+    let shape = ModelShape { view_colour: true, view_geometry: true, view_distance: true, ..ModelShape::plain(2, 1) };
     let eye = DVec3::new(0.3, -0.2, 0.7);
     let camera = Pinhole::<f32>::new(&Camera {
         rotation: DMat3::from_rotation_y(0.4),

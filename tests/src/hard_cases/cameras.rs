@@ -18,7 +18,8 @@ clamp is a kink, not a jump, so the usual bounds hold. View direction and distan
 camera, at least 0.2 away, so the division by a distance of 0 is guarded in the trainer's operation alone
 (`distance 0`, under arithmetic).";
 
-const EFFECTS: ModelShape = ModelShape { view_direction: true, view_distance: true, ..ModelShape::plain(1, 1) };
+const EFFECTS: ModelShape =
+    ModelShape { view_colour: true, view_geometry: true, view_distance: true, ..ModelShape::plain(1, 1) };
 
 fn at(z: f64, scale: f64) -> Blob {
     Blob { position: [0.01, -0.02, z], scale: [scale; 3], ..Blob::default() }

@@ -63,7 +63,7 @@ fn gradient(i: u32, x: u32, y: u32) -> [u8; 3] {
 
 fn config() -> TrainConfig {
     TrainConfig {
-        shape: ModelShape { view_direction: true, ..ModelShape::plain(8, 4) },
+        shape: ModelShape { view_colour: true, view_geometry: true, ..ModelShape::plain(8, 4) },
         iterations: ITERATIONS,
         voxel_size: Some(0.02),
         densification: Densification {

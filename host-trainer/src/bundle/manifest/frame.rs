@@ -147,8 +147,8 @@ impl Added {
     }
 
     fn counts(&self, shape: &ModelShape) -> TierCounts {
-        let [hidden, f, k] =
-            [shape.feature_dim * shape.head_inputs(), shape.feature_dim, shape.n_offsets].map(|n| n as u64);
+        let [f, k] = [shape.feature_dim, shape.n_offsets].map(|n| n as u64);
+        let [geometry_inputs, colour_inputs] = [shape.geometry_inputs(), shape.colour_inputs()].map(|n| n as u64);
         // The opacity head runs for every visible anchor; hidden layers of the others for those it opens, their outputs
         // for the Gaussians it opens.
         let [c, d] = [shape.colour_width(), shape.detail_hidden].map(|n| n as u64);
@@ -157,7 +157,8 @@ impl Added {
             // Four inputs, three weights, three products; the last once more for the detail head.
             (true, detail) => [10 * f, if detail { 3 * f } else { 0 }],
         };
-        let per_open_anchor = hidden + c * shape.head_inputs() as u64 + d * f + again;
+        let hidden = f * geometry_inputs;
+        let per_open_anchor = hidden + c * colour_inputs + d * f + again;
         let per_gaussian = shape.covariance_outputs() as u64 * f + 3 * c + 6 * d;
         let head_macs = self.visible_anchors * (hidden + f * k + bank)
             + self.open_anchors * per_open_anchor

@@ -227,7 +227,7 @@ fn the_decoder_draws_what_the_oracle_draws() {
         [(11, Coder::Static, false), (12, Coder::Static, true), (13, Coder::Context, true)]
     {
         let shape = ModelShape { dilation_compensation: compensation, ..SMALL };
-        let (_, bytes) = write_random(coder, shape, 1500, seed, 128);
+        let (_, bytes) = write_random(coder, shape, 2500, seed, 128);
         let bundle = Bundle::parse(&bytes).expect("a sound bundle");
         let camera = camera(100, 70);
         let frame = core_image(&bundle, &camera).expect("a frame");

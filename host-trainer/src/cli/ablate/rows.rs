@@ -32,7 +32,7 @@ impl Row {
             // As many more parameters as the detail head has, in units of the colour head.
             let shape = config.train.shape;
             let detail = hidden * (shape.feature_dim + 3 + 1) + 3 * (hidden + 1);
-            let unit = shape.head_inputs() + 1 + 3 * shape.n_offsets;
+            let unit = shape.colour_inputs() + 1 + 3 * shape.n_offsets;
             config.train.shape.colour_hidden = shape.colour_width() + detail.div_ceil(unit);
         }
         if self.keys.is_empty() { Ok(config) } else { config.with_keys(&self.keys) }

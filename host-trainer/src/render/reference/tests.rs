@@ -210,16 +210,18 @@ fn moving_world_and_camera_together_changes_nothing() {
 }
 
 #[test]
-fn heads_see_direction_and_distance_after_the_feature() {
+fn heads_see_distance_and_direction_after_the_feature() {
     let mut scene = scene_of(&[Ball { position: [0.3, 0.0, 2.0], ..Ball::default() }]);
-    scene.shape.view_direction = true;
+    scene.shape.view_colour = true;
     scene.shape.view_distance = true;
-    for head in scene.heads.each_mut() {
-        head.n_in = 5;
-        head.w1 = vec![1.0, 0.0, 0.0, 0.0, 0.0];
+    // The direction is the colour head's alone.
+    for (head, n_in) in scene.heads.each_mut().zip([2, 2, 5]) {
+        head.n_in = n_in;
+        head.w1 = vec![0.0; n_in];
+        head.w1[0] = 1.0;
     }
     // The hidden unit of the colour head is relu(0.5·feature + 2·dx − dist + 4).
-    scene.heads.colour.w1 = vec![0.5, 2.0, 0.0, 0.0, -1.0];
+    scene.heads.colour.w1 = vec![0.5, -1.0, 2.0, 0.0, 0.0];
     scene.heads.colour.b1 = vec![4.0];
     scene.heads.colour.w2 = vec![1.0, -1.0, 0.0];
     scene.heads.colour.b2 = vec![0.0, 0.25, 0.5];

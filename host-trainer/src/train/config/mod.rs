@@ -193,7 +193,7 @@ impl Default for TrainConfig {
     fn default() -> Self {
         Self {
             backbone: Backbone::Scaffold,
-            shape: ModelShape { view_direction: true, ..ModelShape::plain(32, 10) },
+            shape: ModelShape { view_colour: true, view_geometry: true, ..ModelShape::plain(32, 10) },
             iterations: 30_000,
             seed: 42,
             voxel_size: None,

@@ -52,12 +52,14 @@ fn scene(seed: u64, shape: ModelShape) -> Scene<f64> {
     scene
 }
 
-fn shapes() -> [ModelShape; 7] {
-    let base = ModelShape { view_direction: true, ..ModelShape::plain(6, 3) };
+fn shapes() -> [ModelShape; 9] {
+    let base = ModelShape { view_colour: true, view_geometry: true, ..ModelShape::plain(6, 3) };
     [
         base,
         ModelShape { view_distance: true, dilation_compensation: true, ..base },
-        ModelShape { view_direction: false, n_offsets: 1, ..base },
+        ModelShape { view_colour: false, view_geometry: false, n_offsets: 1, ..base },
+        ModelShape { view_geometry: false, view_distance: true, ..base },
+        ModelShape { view_colour: false, ..base },
         ModelShape { detail_hidden: 5, colour_hidden: 8, ..base },
         ModelShape { feature_bank: true, ..ModelShape::plain(4, 2) },
         ModelShape { feature_bank: true, detail_hidden: 3, feature_dim: 8, ..base },
@@ -377,7 +379,7 @@ fn a_step_with_modules_agrees_with_finite_differences() {
     let at =
         Moment { iteration: 80, iterations: 100, phase: Phase::Raw, scaled: true, base_steps: [1.0, 0.1, 0.2], stream };
     for (seed, modules) in (71..).zip(modules()) {
-        let shape = ModelShape { view_direction: false, ..modules.shape(shapes()[0]) };
+        let shape = ModelShape { view_colour: false, view_geometry: false, ..modules.shape(shapes()[0]) };
         let mut scene = scene(seed, shape);
         let terms = modules.terms();
         let loss = Loss { modules: Some((&terms, &at)), ..Loss::plain(LossWeights::default()) };

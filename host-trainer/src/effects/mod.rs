@@ -7,12 +7,14 @@
 mod pilot;
 mod price;
 mod request;
+mod search;
 
 use std::fmt;
 
-pub use pilot::{Drawing, LEAST_ITERATIONS, PilotCapture, Trial, Trials, measure};
+pub use pilot::{Drawing, LEAST_ITERATIONS, PilotCapture, measure};
 pub use price::{Price, Worth, choose};
 pub use request::{NoRequest, Request};
+pub use search::{Trial, Trials};
 
 use crate::train::TrainConfig;
 use crate::train::module::Detail;

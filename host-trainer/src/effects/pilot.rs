@@ -2,7 +2,8 @@
 
 use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, MaxSplats};
 
-use super::{Effect, Price, Worth, choose};
+use super::search::{Trials, search};
+use super::{Effect, Price, Worth};
 use crate::dataset::{Capture, Image, View};
 use crate::device::Target;
 use crate::instructions::predict;
@@ -23,13 +24,8 @@ pub const LEAST_ITERATIONS: u32 = 16_000;
 /// Share of the run's iterations that each pilot takes.
 ///
 /// At half the resolution and for the image alone an iteration takes about a quarter of one of the run's with `hac`, so the seven
-/// or eight pilots take a quarter of its time.
+/// to ten pilots take about a quarter of its time.
 const PILOT_SHARE: f64 = 0.125;
-/// So many times the difference of two seeds is taken for chance.
-///
-/// Of three numbers of one normal distribution the third is above the mean of the first two by more than twice their difference about
-/// once in eight times: (c − (a + b)/2) / |a − b| is √(3/4) times a Cauchy variable.
-const CHANCE: f64 = 2.0;
 /// Of so many training views one is held out to measure with.
 const HOLD_OUT_EVERY: usize = 8;
 
@@ -83,34 +79,9 @@ pub struct Drawing {
     pub target: Target,
 }
 
-/// What pilots came to.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Trials {
-    /// What may be chance: twice the difference of the two pilots without effects, which differ in their seeds, dB.
-    pub chance_db: f64,
-    /// Each pilot; the first is the mean of those two.
-    pub each: Vec<Trial>,
-}
-
-/// A pilot and what came of it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Trial {
-    /// The effects that it had.
-    pub effects: Vec<Effect>,
-    /// What it was worth.
-    pub worth: Worth,
-    /// What it gained over the pilot without effects, dB.
-    pub gain_db: f64,
-    /// What it had to gain, dB.
-    pub price_db: f64,
-    /// Whether it is the one to keep.
-    pub chosen: bool,
-}
-
-/// Trains two pilots without effects, one with each of [`Effect::MEASURED`], and one with all that gained what an effect has to gain
-/// where these are several; says what each was worth, and which one is chosen.
+/// Trains pilots with the sets of effects that [`search`] asks for; says what each was worth, and which one is chosen.
 ///
-/// Quality is measured on held-out views at the pilots' size, instructions at the capture's own. Cost: seven or eight eighths of the
+/// Quality is measured on held-out views at the pilots' size, instructions at the capture's own. Cost: seven to ten eighths of the
 /// run's iterations, each about a quarter of one of the run's.
 ///
 /// * `config`: of the run, for whose length, seed and widths the pilots stand; other effects than the measured are kept. * `encode`: a
@@ -133,29 +104,7 @@ pub fn measure<E: From<TrainError> + From<DecodeError>>(
         let bytes = encode(trainer.finish()?, &capture.reduced)?;
         Ok(worth(&bytes, capture, drawing)?)
     };
-    let (one, other) = (worth_of(&[], config)?, worth_of(&[], &TrainConfig { seed: config.seed ^ 1, ..*config })?);
-    let (without, chance_db) = (one.mean_with(&other), CHANCE * (one.psnr_db - other.psnr_db).abs());
-    let mut all = vec![(Vec::new(), without)];
-    for effect in Effect::MEASURED {
-        all.push((vec![effect], worth_of(&[effect], config)?));
-    }
-    // Effects may share what they cost, as the two of the view do: what gains enough to be seen deserves a look in company.
-    let gainers = all.iter().filter(|(_, worth)| worth.psnr_db - without.psnr_db > price.effect_db.max(chance_db));
-    let together: Vec<Effect> = gainers.flat_map(|(effects, _)| effects.clone()).collect();
-    if together.len() > 1 {
-        let worth = worth_of(&together, config)?;
-        all.push((together, worth));
-    }
-    let numbers: Vec<(usize, Worth)> = all.iter().map(|(effects, worth)| (effects.len(), *worth)).collect();
-    let chosen = choose(price, &numbers, chance_db);
-    let each = all.into_iter().enumerate().map(|(i, (effects, worth))| Trial {
-        gain_db: worth.psnr_db - without.psnr_db,
-        price_db: if i == 0 { 0.0 } else { price.of(effects.len(), &worth, &without, chance_db) },
-        chosen: i == chosen,
-        effects,
-        worth,
-    });
-    Ok(Trials { chance_db, each: each.collect() })
+    search(price, |effects, seed| worth_of(effects, &TrainConfig { seed: config.seed ^ seed, ..*config }))
 }
 
 /// The run in short, for the image alone: so few steps leave a rate no time, and its noise would be more than what is measured.

@@ -78,14 +78,11 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     }
     let [width, height] = [|s: &Sight<'_>| s.camera.width_px, |s: &Sight<'_>| s.camera.height_px]
         .map(|side| sights.iter().map(side).max().unwrap_or(1));
-    let budget = Budget::for_frame(width, height).with_max_splats(MaxSplats::Worst);
+    // What a device would plan: with places for more splats a frame of strips goes over fewer anchors.
+    let budget = Budget::for_frame(width, height);
     let budget = match args.ram {
         None => budget,
-        // What a device would plan.
-        Some(ram) => {
-            let ram_bytes = usize::try_from(ram.as_u64()).unwrap_or(usize::MAX);
-            budget.with_max_splats(MaxSplats::Measured).in_bytes(ram_bytes)
-        }
+        Some(ram) => budget.in_bytes(usize::try_from(ram.as_u64()).unwrap_or(usize::MAX)),
     };
     let counted: Vec<Camera> = sights.iter().filter(|sight| sight.counts).map(|sight| sight.camera).collect();
     let (knobs, grid) = (knobs(&bundle), quality_grid(&bundle));
@@ -95,6 +92,10 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     for (i, setting) in settings.iter().enumerate() {
         eprintln!("{} of {}  {}: {}", i + 1, settings.len(), setting.knob, setting.name);
         let mut point = match measure(&bundle, &sights, setting, budget, &targets) {
+            // Splats that are larger than plans reckon with, and memory without limit.
+            Ok(point) if point.splats_dropped > 0 && args.ram.is_none() => {
+                measure(&bundle, &sights, setting, budget.with_max_splats(MaxSplats::Worst), &targets)?
+            }
             Ok(point) => point,
             // A residency or number of strips that does not fit is no setting of this budget.
             Err(error) if i > 0 && args.ram.is_some() => {

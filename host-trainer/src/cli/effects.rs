@@ -20,7 +20,7 @@ const TABLE: &str = "effects.csv";
 /// How a run comes to its effects; once they are chosen they stand in its shape and modules, and nothing is measured again.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct EffectsConfig {
-    /// Whether they are still to be measured.
+    /// Whether they are still to be measured; a configuration in a file has been decided about unless it says so.
     pub(crate) auto: bool,
     /// Shorter runs are not measured: pilots of an eighth of them say nothing.
     pub(crate) least_iterations: u32,
@@ -33,7 +33,7 @@ pub(crate) struct EffectsConfig {
 
 impl Default for EffectsConfig {
     fn default() -> Self {
-        Self { auto: false, least_iterations: LEAST_ITERATIONS, target: None, price: Price::default() }
+        Self { auto: true, least_iterations: LEAST_ITERATIONS, target: None, price: Price::default() }
     }
 }
 

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use super::bundle::BundleFile;
 use super::capture::{CaptureArgs, Split};
+use super::effects::EffectsConfig;
 use super::eval::{Evaluation, Measurements, Renderer, evaluate};
 use super::run_config::RunConfig;
 use super::{output, train};
@@ -27,14 +28,16 @@ struct Kept {
     evaluation: Evaluation,
 }
 
-/// What all points share: `config` with capture and folder, absolute, so that a point can be gone on with from anywhere.
+/// What all points share: `config` with capture and folder, absolute, so that a point can be gone on with from anywhere. Its effects
+/// are not measured, for points compare only if they have the same.
 pub(super) fn base(config: RunConfig, dataset: Option<&Path>, folder: &Path) -> Result<RunConfig> {
     let absolute = |path: &Path| std::path::absolute(path).with_context(|| format!("`{}` is no path", path.display()));
     let dataset = absolute(dataset.unwrap_or(&config.dataset))?;
-    Ok(RunConfig { dataset, output: absolute(folder)?, ..config })
+    let effects = EffectsConfig { auto: false, ..config.effects };
+    Ok(RunConfig { dataset, output: absolute(folder)?, effects, ..config })
 }
 
-/// Refuses effects that are still to be measured: points compare only if they have the same.
+/// Refuses effects that are to be measured after all.
 pub(super) fn check_effects(config: &RunConfig) -> Result<()> {
     if config.effects.auto {
         bail!(

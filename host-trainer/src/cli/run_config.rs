@@ -57,7 +57,8 @@ impl RunConfig {
     pub(crate) fn parse(text: &str) -> Result<Self> {
         let given: Table = text.parse()?;
         let train = TrainConfig::of(given_backbone(&given)?);
-        let mut all = Table::try_from(Self { train, ..Self::default() })?;
+        let effects = EffectsConfig { auto: false, ..EffectsConfig::default() };
+        let mut all = Table::try_from(Self { train, effects, ..Self::default() })?;
         merge(&mut all, &given);
         let config: Self = all.try_into()?;
         // What is not written again was not understood.

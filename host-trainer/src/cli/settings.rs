@@ -41,8 +41,8 @@ pub(crate) struct Settings {
     #[arg(long, value_name = "K", help = with_default("Gaussians of an anchor", TrainConfig::default().shape.n_offsets))]
     offsets: Option<usize>,
     /// What the scene takes into account, of view-colour, view-geometry, view-distance, dilation-compensation, detail, feature-bank
-    /// and anisotropy: auto trains short pilots and keeps what pays; none, all, +NAME and -NAME in a list force.
-    /// [default: view-colour,view-geometry,anisotropy]
+    /// and anisotropy: auto trains short pilots and keeps what pays; none, all, +NAME and -NAME in a list force. [default: auto for train,
+    /// view-colour,view-geometry,anisotropy for runs that are compared or too short]
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     effects: Option<Request>,
     /// Show no head the direction of view: neither view-colour nor view-geometry.

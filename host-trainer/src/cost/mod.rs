@@ -71,6 +71,8 @@ pub struct Measured {
     pub instructions: Vec<Option<Instructions>>,
     /// Scratch memory of the plan, bytes.
     pub scratch_bytes: usize,
+    /// Splats of all views that had no place in it.
+    pub splats_dropped: u32,
 }
 
 /// Draws all views as `setting` says within `budget`, and measures.
@@ -125,12 +127,14 @@ fn measure_in<A: Arithmetic>(of: &Measurement<'_, '_>) -> Result<Measured, Decod
         host_s: 0.0,
         instructions: vec![None; targets.len()],
         scratch_bytes: plan.scratch_len(),
+        splats_dropped: 0,
     };
     for sight in sights {
         image_of(&mut decoder, &sight.camera)?;
         let started = Instant::now();
         let (image, report): (Image, FrameReport) = image_of(&mut decoder, &sight.camera)?;
         measured.host_s += started.elapsed().as_secs_f64() / n;
+        measured.splats_dropped += report.splats_dropped;
         let (photograph, mask) = sight.photograph;
         measured.psnr_db += psnr_db_masked(&image, photograph, mask) / n;
         measured.psnr_to_reference_db = measured.psnr_to_reference_db.min(psnr_db(&image, &sight.reference));

@@ -81,7 +81,9 @@ fn a_run_too_short_to_measure_keeps_its_effects_and_says_so() {
         "{said}"
     );
     let said = succeeds(&mut train(&output));
-    assert!(!said.contains("effects:"), "nothing is measured unasked: {said}");
+    assert!(said.contains("a run needs 16000 iterations"), "measuring is the default: {said}");
+    let said = succeeds(train(&output).args(["--effects", "+view-colour"]));
+    assert!(!said.contains("effects:"), "nothing is measured that was decided about: {said}");
 }
 
 #[test]

@@ -59,7 +59,7 @@ impl Report<'_> {
     fn table(&self, columns: &[Column]) -> Result<Vec<u8>> {
         let mut table = csv::Writer::from_writer(Vec::new());
         let settings = ["knob", "setting", "pruning_rate", "alpha_cut_255ths", "transmittance_stop", "detail"];
-        let figures = ["PSNR", "psnr_to_reference_db", "worst_channel", "host_s", "scratch_bytes"];
+        let figures = ["PSNR", "psnr_to_reference_db", "worst_channel", "host_s", "scratch_bytes", "splats_dropped"];
         let mut header: Vec<String> = settings.into_iter().chain(figures).map(str::to_owned).collect();
         for Column { machine, .. } in columns {
             if machine.device().is_some() {
@@ -83,6 +83,7 @@ impl Report<'_> {
                 m.worst_channel.to_string(),
                 m.host_s.to_string(),
                 m.scratch_bytes.to_string(),
+                m.splats_dropped.to_string(),
             ];
             for Column { machine, place, front } in columns {
                 if machine.device().is_some() {
@@ -154,6 +155,14 @@ impl Report<'_> {
             }
             text.push('\n');
         }
-        text + "\nBold: nothing measured takes less at no less PSNR. Of the combinations only those are listed; cost.csv has all.\n"
+        text += "\nBold: nothing measured takes less at no less PSNR. Of the combinations only those are listed; cost.csv has all.\n";
+        let dropped = self.measured.iter().map(|m| m.splats_dropped).max().unwrap_or(0);
+        if dropped > 0 {
+            text += &format!(
+                "\nThe plan had no place for some splats, in all views of a setting for at most {dropped}: no view that was measured when \
+                 the bundle was written has so many.\n"
+            );
+        }
+        text
     }
 }

@@ -95,17 +95,9 @@ impl Encoding {
             }
         }
         let context = write(Coder::Context, 1.0)?;
-        let least_psnr_db = judged_psnr_db(&context.bytes, capture)? - LARGEST_LOSS_DB;
-        for share in MEAN_STEP_SHARES.into_iter().rev() {
-            let tables = write(Coder::Static, share)?;
-            if tables.bytes.len() >= context.bytes.len() {
-                break;
-            }
-            if judged_psnr_db(&tables.bytes, capture)? >= least_psnr_db {
-                return Ok(tables);
-            }
-        }
-        Ok(context)
+        let tables = MEAN_STEP_SHARES.into_iter().rev().map(|share| Ok(write(Coder::Static, share)?));
+        let psnr_db = |written: &Written| Ok(judged_psnr_db(&written.bytes, capture)?);
+        shorter_and_as_good(context, tables, |written| written.bytes.len(), psnr_db)
     }
 
     fn write(
@@ -134,6 +126,27 @@ impl Encoding {
     }
 }
 
+/// The first of `others` that is shorter than `one` and loses no more than [`LARGEST_LOSS_DB`]; `one` where there is none before the
+/// first that is not shorter.
+fn shorter_and_as_good<T, E>(
+    one: T,
+    others: impl Iterator<Item = Result<T, E>>,
+    len: impl Fn(&T) -> usize,
+    psnr_db: impl Fn(&T) -> Result<f64, E>,
+) -> Result<T, E> {
+    let least_psnr_db = psnr_db(&one)? - LARGEST_LOSS_DB;
+    for other in others {
+        let other = other?;
+        if len(&other) >= len(&one) {
+            break;
+        }
+        if psnr_db(&other)? >= least_psnr_db {
+            return Ok(other);
+        }
+    }
+    Ok(one)
+}
+
 /// PSNR of a bundle's frames, mean over [`JUDGED_VIEWS`] training views, dB.
 fn judged_psnr_db(bytes: &[u8], capture: &Capture) -> Result<f64, DecodeError> {
     let bundle = Bundle::parse(bytes)?;
@@ -151,4 +164,25 @@ fn judged_psnr_db(bytes: &[u8], capture: &Capture) -> Result<f64, DecodeError> {
 pub(crate) fn largest_px(capture: &Capture) -> [u32; 2] {
     let sizes = capture.train.iter().map(|view| [view.camera.width_px, view.camera.height_px]);
     sizes.max_by_key(|size| size[0].max(size[1])).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::shorter_and_as_good;
+
+    /// Bytes and PSNR of what is taken.
+    fn taken(context: (usize, f64), tables: &[(usize, f64)]) -> (usize, f64) {
+        let tables = tables.iter().map(|written| Ok::<_, ()>(*written));
+        shorter_and_as_good(context, tables, |written| written.0, |written| Ok(written.1)).expect("no error")
+    }
+
+    #[test]
+    fn tables_are_taken_where_they_are_shorter_and_cost_nothing() {
+        assert_eq!(taken((1000, 30.0), &[(900, 30.1)]), (900, 30.1));
+        assert_eq!(taken((1000, 30.0), &[(900, 29.99)]), (900, 29.99), "nothing to speak of");
+        assert_eq!(taken((1000, 30.0), &[(990, 27.3)]), (1000, 30.0), "decibels for a hundredth of the bytes");
+        assert_eq!(taken((1000, 30.0), &[(900, 29.0), (950, 30.0)]), (950, 30.0), "finer steps, still shorter");
+        assert_eq!(taken((1000, 30.0), &[(1000, 31.0), (900, 31.0)]), (1000, 30.0), "no longer looked for");
+        assert_eq!(taken((1000, 30.0), &[]), (1000, 30.0));
+    }
 }

@@ -85,8 +85,11 @@ fn crossing(away: f64) -> impl Strategy<Value = Blob> {
 
 /// * `length`: of quaternions, `away`: of the centres of needles, as powers of ten.
 fn picture(length: Range<f64>, away: f64) -> impl Strategy<Value = Picture> {
-    let effects = any::<[bool; 4]>().prop_map(|[view_colour, view_geometry, view_distance, dilation_compensation]| {
-        ModelShape { view_colour, view_geometry, view_distance, dilation_compensation, ..ModelShape::plain(1, 1) }
+    // Balls now and then; the first deviation of a needle is its length.
+    let effects = (any::<[bool; 4]>(), prop::bool::weighted(0.8)).prop_map(|(effects, anisotropic)| {
+        let [view_colour, view_geometry, view_distance, dilation_compensation] = effects;
+        let plain = ModelShape::plain(1, 1);
+        ModelShape { view_colour, view_geometry, view_distance, dilation_compensation, anisotropic, ..plain }
     });
     (prop::collection::vec(prop_oneof![3 => blob(length), 1 => crossing(away)], 1..=MAX_SPLATS), effects, view())
         .prop_map(|(mut blobs, effects, camera)| {

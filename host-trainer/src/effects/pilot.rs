@@ -79,7 +79,8 @@ pub struct Drawing {
     pub target: Target,
 }
 
-/// Trains pilots with the sets of effects that [`search`] asks for; says what each was worth, and which one is chosen.
+/// Trains pilots without effects, with each and with those that gained something, less what does not pay among them; says what each was
+/// worth, and which one is chosen.
 ///
 /// Quality is measured on held-out views at the pilots' size, instructions at the capture's own. Cost: seven to ten eighths of the
 /// run's iterations, each about a quarter of one of the run's.

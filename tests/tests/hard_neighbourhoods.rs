@@ -126,6 +126,6 @@ proptest! {
     fn gradients_near_hard_cases_are_finite_and_right(picture in picture(-1.0..1.0, 0.0)) {
         let (figures, _) = picture.measure();
         prop_assert!(figures.differences <= DIFFERENCES, "{:e}", figures.differences);
-        prop_assert!(figures.rounding <= ROUNDING, "{:e}", figures.rounding);
+        prop_assert!(figures.rounding <= ROUNDING, "{figures:?}");
     }
 }

@@ -15,6 +15,8 @@ const STEPS: [f64; 7] = [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10];
 const ENOUGH: f64 = 1e-7;
 /// Directions below are judged as if their terms summed to it: the loss itself is only known to 1e-16.
 const LEAST_SLOPE: f64 = 1e-4;
+/// Least difference of a channel to its truth.
+const LEAST_RESIDUAL: f64 = 1e-3;
 /// Gradients below are judged as if they were this large.
 const LEAST_GRADIENT: f64 = 1e-6;
 
@@ -65,11 +67,20 @@ fn step<R: Real>(scene: &Scene<R>, camera: &Camera, truth: &[f64], background: [
     (report.loss.into(), gradients)
 }
 
+/// `truth`, or what is [`LEAST_RESIDUAL`] from `drawn` where it is nearer: which side of an absolute value's kink a pixel is on is not
+/// for rounding to decide.
+fn beside(truth: f64, drawn: f64) -> f64 {
+    let residual = truth - drawn;
+    if residual.abs() < LEAST_RESIDUAL { drawn + LEAST_RESIDUAL.copysign(residual) } else { truth }
+}
+
 /// Error of the gradients in f32 against f64, and in f64 against differences; infinite where one is not finite.
 pub fn errors(scene: &Scene<f32>, camera: &Camera, background: [f64; 3]) -> [f64; 2] {
     let n_pixels = (camera.width_px * camera.height_px) as usize;
-    let truth: Vec<f64> = random(77, 3 * n_pixels).iter().map(|v| 0.5 + 0.5 * v).collect();
     let mut exact_scene = scene.cast::<f64>();
+    let image = Workspace::new(&scene.shape).image(&exact_scene, &Pinhole::new(camera), background);
+    let noise = random(77, 3 * n_pixels);
+    let truth: Vec<f64> = noise.iter().zip(&image).map(|(v, drawn)| beside(0.5 + 0.5 * v, *drawn)).collect();
     let (rounded_loss, rounded) = step(scene, camera, &truth, background);
     let (loss, exact) = step(&exact_scene, camera, &truth, background);
     if !exact.iter().chain(&rounded).flatten().chain([&loss, &rounded_loss]).all(|v| v.is_finite()) {

@@ -20,7 +20,7 @@ impl fmt::Display for DecodeError {
                     "the bundle needs what this decoder was built without; build pocketsplat-core with the features"
                 )?;
                 let names = [
-                    (0b11, "view"),
+                    (0b100_0000_0011, "view"),
                     (0b100, "dilation-compensation"),
                     (0b1_0000, "context"),
                     (0b100_0000, "detail"),

@@ -79,7 +79,7 @@ fn f32s(values: &[f32]) -> Vec<u8> {
     values.iter().flat_map(|x| x.to_le_bytes()).collect()
 }
 
-/// (inputs, outputs) of the layers, W1 and W2 of each head; view direction is on.
+/// (inputs, outputs) of the layers, W1 and W2 of each head; all of them see the direction of view.
 fn layers(variant: Variant) -> Vec<(usize, usize)> {
     let (n_in, detail) = (F + 3, DETAIL_HIDDEN.into());
     let mut layers = vec![(n_in, F), (F, K), (n_in, F), (F, 7 * K), (n_in, F), (F, 3 * K)];
@@ -311,11 +311,12 @@ pub(super) fn bundle(variant: Variant) -> Vec<u8> {
         | u32::from(variant.coded_heads) << 5
         | u32::from(variant.detail) << 6
         | 1 << 8
-        | u32::from(variant.bank) << 9;
+        | u32::from(variant.bank) << 9
+        | 1 << 10;
     let camera = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 6.0, 30.0, 30.0, 16.0, 12.0];
     let mut file = [
         MAGIC.to_vec(),
-        u16s(&[1, header_len as u16]),
+        u16s(&[2, header_len as u16]),
         u32s(&[file_len as u32, features, 0xFFFF_FFFF]),
         u16s(&[F as u16, K as u16]),
         u32s(&[n_anchors, n_chunks]),

@@ -25,7 +25,10 @@ fn a_written_configuration_reads_back_to_the_last_bit() {
         config.train.seed = u64::from(i).pow(7) % i64::MAX as u64;
         assert_eq!(RunConfig::parse(&config.to_toml().unwrap()).unwrap(), config, "{i}");
     }
-    assert_eq!(RunConfig::parse("").unwrap(), RunConfig::default());
+    // A file has been decided about.
+    let mut decided = RunConfig::default();
+    assert!(std::mem::take(&mut decided.effects.auto));
+    assert_eq!(RunConfig::parse("").unwrap(), decided);
 }
 
 #[test]

@@ -42,7 +42,7 @@ impl Features {
     /// Bits that have a meaning in this version.
     const KNOWN: u32 = 0b111_1111_1111;
 
-    /// The bit that says what a scene lacks, where the others say what it has: bundles without it are older than the choice.
+    /// The bit that says what a scene lacks, where the others say what it has: so a decoder of balls alone misses it and refuses.
     const ISOTROPIC: u32 = 1 << 7;
 
     /// What this decoder is built with, a bit for each; that of [`Self::ISOTROPIC`] for its opposite.

@@ -3,6 +3,7 @@
 use pocketsplat_core::bundle::{AnchorSite, HeadView};
 use pocketsplat_core::{Bundle, DecodeError};
 
+use crate::dataset::Normalisation;
 use crate::scene::{Anchors, Head, Heads, INITIAL_MASK_LOGIT, ModelShape, Scene};
 
 /// Widths and effects of a bundle's scene.
@@ -21,6 +22,12 @@ pub fn shape_of(bundle: &Bundle<'_>) -> ModelShape {
         detail_hidden: header.detail_hidden.into(),
         feature_bank: effects.feature_bank,
     }
+}
+
+/// The frame of a bundle's scene.
+pub fn normalisation_of(bundle: &Bundle<'_>) -> Normalisation {
+    let header = bundle.header();
+    Normalisation { centre: header.normalisation_centre.into(), scale: header.normalisation_scale }
 }
 
 /// The scene that a bundle draws, its values as the decoder has them; anchors are in file order.

@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
+use pocketsplat::bundle::normalisation_of;
 use pocketsplat::camera::Camera;
-use pocketsplat::dataset::{Background, Capture, Normalisation, View};
+use pocketsplat::dataset::{Background, Capture, View};
 use pocketsplat_core::Bundle;
 use pocketsplat_core::bundle::AnchorSite;
 
@@ -57,8 +58,7 @@ impl BundleFile {
 
     /// The camera of a view in the frame of this bundle, which need not be the frame of the capture as loaded now.
     pub(crate) fn camera(&self, bundle: &Bundle<'_>, capture: &Capture, view: &View) -> Camera {
-        let header = bundle.header();
-        let own = Normalisation { centre: header.normalisation_centre.into(), scale: header.normalisation_scale };
+        let own = normalisation_of(bundle);
         if own == capture.normalisation {
             return view.camera.clone();
         }

@@ -25,7 +25,6 @@ pub struct ModelShape {
     /// Opacity is multiplied by √(det Σ / det(Σ + 0.3 I)) (Yu et al. 2024, Mip-Splatting, eq. 8).
     pub dilation_compensation: bool,
     /// Gaussians have three deviations and a rotation; without it one deviation, the same in every direction.
-    #[serde(default = "anisotropic")]
     pub anisotropic: bool,
     /// Hidden width of the colour head; 0: F, as that of the others.
     #[serde(default, skip_serializing_if = "is_zero")]
@@ -35,13 +34,7 @@ pub struct ModelShape {
     pub detail_hidden: usize,
     /// The heads see the feature at three resolutions, mixed by where it is seen from ([`crate::ops::feature_bank`]); F is then
     /// divisible by 4.
-    #[serde(default)]
     pub feature_bank: bool,
-}
-
-/// What a configuration means that is older than the choice.
-const fn anisotropic() -> bool {
-    true
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference")]

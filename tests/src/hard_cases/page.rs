@@ -21,7 +21,7 @@ approximations (`host-trainer/src/render/reference.rs`). Errors of pixels are in
 - *trainer, worst*: a channel of the trainer's picture in f32 against the oracle's.
 - *codec*: a value quantised, encoded and decoded against itself, in quantisation steps: half is rounding.
 - *gradient, f32*: the gradient of a training step towards noise, in f32 against f64, worst parameter, in units of the largest of
-  its kind (features, log-scales, offsets, weights).
+  its kind (features, log-scales, offsets, weights) towards this noise or three others.
 - *gradient, f64*: the derivative along a random direction of each kind against central differences, in units of the sum of its
   terms.
 

@@ -7,7 +7,7 @@ use anyhow::ensure;
 use clap::Parser;
 use glam::DVec3;
 use pocketsplat::bundle;
-use pocketsplat::dataset::{self, FrameSize, LoadOptions, Normalisation, View};
+use pocketsplat::dataset::{self, FrameSize, LoadOptions, View};
 use pocketsplat::metrics::psnr_db_masked;
 use pocketsplat::ops::{head, neural_gaussians};
 use pocketsplat::render::reference::{ReferenceScene, to_image};
@@ -37,9 +37,8 @@ fn main() -> anyhow::Result<()> {
     let scene = Scene::new(ReferenceScene::from_bundle(&bundle)?)?;
     let options = LoadOptions { frame: args.resolution, ..LoadOptions::default() };
     let (capture, _) = dataset::load(&args.capture, &options)?;
-    let own = Normalisation { centre: header.normalisation_centre.into(), scale: header.normalisation_scale };
     ensure!(
-        own == capture.normalisation,
+        bundle::normalisation_of(&bundle) == capture.normalisation,
         "the capture is normalised otherwise than the bundle: load it as training did"
     );
 

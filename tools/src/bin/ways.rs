@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use anyhow::ensure;
 use clap::Parser;
 use pocketsplat::bundle;
-use pocketsplat::dataset::{self, LoadOptions, Normalisation};
+use pocketsplat::dataset::{self, LoadOptions};
 use pocketsplat::render::decoder::core_camera;
 use pocketsplat_core::{Budget, Bundle, Camera, Decoder, FrameReport, Residency, Strips, TileSink};
 
@@ -118,12 +118,10 @@ fn main() -> anyhow::Result<()> {
 
 /// The held-out views of a capture, in the frame that the bundle was trained in.
 fn held_out(bundle: &Bundle<'_>, capture: &Path, most: usize) -> anyhow::Result<Vec<Camera>> {
-    let header = bundle.header();
-    let longest_px = header.training_px.into_iter().max().map(u32::from);
+    let longest_px = bundle.header().training_px.into_iter().max().map(u32::from);
     let (capture, _) = dataset::load(capture, &LoadOptions { max_resolution: longest_px, ..LoadOptions::default() })?;
-    let own = Normalisation { centre: header.normalisation_centre.into(), scale: header.normalisation_scale };
     ensure!(
-        own == capture.normalisation,
+        bundle::normalisation_of(bundle) == capture.normalisation,
         "the capture is normalised otherwise than the bundle: load it as training did"
     );
     let n = capture.test.len().min(most);

@@ -1,8 +1,8 @@
 //! Bundles with everything that the format offers, of both coders.
 
-use pocketsplat::bundle::{self, Coder, WriteOptions, manifest};
-use pocketsplat::camera::Camera;
+use pocketsplat_capture::camera::Camera;
 use pocketsplat_core::Bundle;
+use pocketsplat_trainer::bundle::{self, Coder, WriteOptions, manifest};
 
 use crate::frame::info_for;
 use crate::scenes::{Case, cameras, masked, random_scene, with_context};

@@ -1,15 +1,15 @@
 //! Drawing with the decoder, and a sink that keeps the books.
 
 use glam::DVec3;
-use pocketsplat::bundle::{self, BundleInfo, WriteOptions};
-use pocketsplat::cost::{Choice, WithArithmetic};
-use pocketsplat::dataset::Normalisation;
-use pocketsplat::render::decoder::core_camera;
-use pocketsplat::scene::Scene;
+use pocketsplat_capture::dataset::Normalisation;
 use pocketsplat_core::arithmetic::Arithmetic;
 use pocketsplat_core::{
     Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, MaxSplats, Quality, Residency, Strips, TileSink,
 };
+use pocketsplat_trainer::bundle::{self, BundleInfo, WriteOptions};
+use pocketsplat_trainer::cost::{Choice, WithArithmetic};
+use pocketsplat_trainer::render::decoder::core_camera;
+use pocketsplat_trainer::scene::Scene;
 
 /// What lies behind the test scenes.
 pub const BACKGROUND: [u8; 3] = [13, 77, 200];
@@ -52,12 +52,12 @@ impl TileSink for Frame {
 }
 
 /// The decoder's camera of a host camera: the same numbers rounded to f32.
-pub fn to_core(camera: &pocketsplat::camera::Camera) -> Camera {
+pub fn to_core(camera: &pocketsplat_capture::camera::Camera) -> Camera {
     core_camera(camera).expect("a test camera is a sound one")
 }
 
 /// What a bundle says besides its scene, with `preview` as its preview.
-pub fn info_for(preview: &pocketsplat::camera::Camera) -> BundleInfo {
+pub fn info_for(preview: &pocketsplat_capture::camera::Camera) -> BundleInfo {
     BundleInfo {
         normalisation: Normalisation { centre: DVec3::ZERO, scale: 1.0 },
         background: BACKGROUND,
@@ -67,7 +67,7 @@ pub fn info_for(preview: &pocketsplat::camera::Camera) -> BundleInfo {
 }
 
 /// The bundle of a scene, with the first of the test cameras as its preview.
-pub fn bundle_of(scene: &Scene<f32>, preview: &pocketsplat::camera::Camera) -> Vec<u8> {
+pub fn bundle_of(scene: &Scene<f32>, preview: &pocketsplat_capture::camera::Camera) -> Vec<u8> {
     let written = bundle::write(scene, &info_for(preview), &WriteOptions::default());
     written.expect("a test scene can be written").bytes
 }

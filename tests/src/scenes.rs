@@ -1,9 +1,9 @@
 //! Scenes and cameras, the same on every machine: arithmetic and one documented random stream, no `libm` of the host.
 
 use glam::{DMat3, DVec3};
-use pocketsplat::camera::Camera;
-use pocketsplat::scene::{Anchors, ContextModel, Heads, MASK_THRESHOLD, ModelShape, Scene};
+use pocketsplat_capture::camera::Camera;
 use pocketsplat_core::context::{GridFrame, GridLevel, LevelKind};
+use pocketsplat_trainer::scene::{Anchors, ContextModel, Heads, MASK_THRESHOLD, ModelShape, Scene};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

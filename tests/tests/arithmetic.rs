@@ -3,9 +3,9 @@
 use conformance::bundles::{CODERS, tiered};
 use conformance::frame::{draw, draw_in, info_for, to_core};
 use conformance::scenes::{CASES, cameras, random_scene};
-use pocketsplat::bundle::{self, WriteOptions};
-use pocketsplat::cost::Choice;
 use pocketsplat_core::Bundle;
+use pocketsplat_trainer::bundle::{self, WriteOptions};
+use pocketsplat_trainer::cost::Choice;
 
 /// Root of the mean square difference that each may have to the exact frame, 255ths.
 ///

@@ -8,9 +8,9 @@ use std::path::Path;
 
 use conformance::captures;
 use glam::DVec3;
-use pocketsplat::camera::Camera;
-use pocketsplat::dataset::{self, Background, EXTENT, LoadOptions, View};
-use pocketsplat::synth::{self, SynthOptions};
+use pocketsplat_capture::camera::Camera;
+use pocketsplat_capture::dataset::{self, Background, EXTENT, LoadOptions, View};
+use pocketsplat_capture::synth::{self, SynthOptions};
 
 /// Points of the grid along an axis.
 const N_CELLS: usize = 72;

@@ -1,13 +1,13 @@
 //! Same seed, same machine, any number of threads: the same bundle, byte for byte.
 
-use pocketsplat::bundle::{self, BundleInfo, WriteOptions};
-use pocketsplat::dataset::{Capture, LoadOptions, load};
-use pocketsplat::scene::{ModelShape, Scene};
-use pocketsplat::synth::{SynthOptions, write_capture};
-use pocketsplat::train::config::Backbone;
-use pocketsplat::train::finish::Finished;
-use pocketsplat::train::step::StepReport;
-use pocketsplat::train::{Observer, TrainConfig, Trainer};
+use pocketsplat_capture::dataset::{Capture, LoadOptions, load};
+use pocketsplat_capture::synth::{SynthOptions, write_capture};
+use pocketsplat_trainer::bundle::{self, BundleInfo, WriteOptions};
+use pocketsplat_trainer::scene::{ModelShape, Scene};
+use pocketsplat_trainer::train::config::Backbone;
+use pocketsplat_trainer::train::finish::Finished;
+use pocketsplat_trainer::train::step::StepReport;
+use pocketsplat_trainer::train::{Observer, TrainConfig, Trainer};
 
 /// Keeps the number of anchors after each step.
 #[derive(Default)]

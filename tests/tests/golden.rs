@@ -4,9 +4,9 @@ use std::f32::consts::TAU;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use pocketsplat::verify::{Trial, ways};
 use pocketsplat_core::bundle::crc32;
 use pocketsplat_core::{Budget, Bundle, Camera, MaxSplats, Overflow, Plan};
+use pocketsplat_trainer::verify::{Trial, ways};
 
 const BUNDLES: [(&str, &[u8]); 5] = [
     ("static", include_bytes!("../golden/static.psb")),

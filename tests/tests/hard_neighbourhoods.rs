@@ -8,8 +8,8 @@ use conformance::hard_cases::blobs::{Blob, Blobs};
 use conformance::hard_cases::picture::camera;
 use conformance::hard_cases::{Figures, Picture};
 use glam::{DMat3, DQuat, DVec3};
-use pocketsplat::camera::Camera;
-use pocketsplat::scene::ModelShape;
+use pocketsplat_capture::camera::Camera;
+use pocketsplat_trainer::scene::ModelShape;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 

@@ -4,8 +4,8 @@
 use conformance::bundles::{CODERS, measured, tiered};
 use conformance::frame::{budget_for, to_core};
 use conformance::scenes::{CASES, cameras, orbit};
-use pocketsplat::verify::{Touched, Trial, Violation, exact_bytes, memory_does_not_show, ways, ways_agree};
 use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, ErrorClass, MaxSplats, Plan, ScratchShape};
+use pocketsplat_trainer::verify::{Touched, Trial, Violation, exact_bytes, memory_does_not_show, ways, ways_agree};
 
 /// A bundle for each case, of either coder in turn, with masks and three tiers.
 fn files() -> impl Iterator<Item = (&'static str, Vec<u8>)> {

@@ -4,9 +4,9 @@ use conformance::bundles::{CODERS, tiered};
 use conformance::difference::Difference;
 use conformance::frame::{bundle_of, draw, to_core};
 use conformance::scenes::{CASES, cameras, random_scene};
-use pocketsplat::render::host_camera;
-use pocketsplat::render::reference::ReferenceScene;
 use pocketsplat_core::Bundle;
+use pocketsplat_trainer::render::host_camera;
+use pocketsplat_trainer::render::reference::ReferenceScene;
 
 /// Rounding to 8 bits alone leaves 58.9 dB.
 const MIN_PSNR_DB: f64 = 58.0;

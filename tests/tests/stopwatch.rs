@@ -3,8 +3,8 @@
 use conformance::bundles::{CODERS, measured};
 use conformance::frame::{Frame, to_core};
 use conformance::scenes::{CASES, cameras};
-use pocketsplat::bundle::Coder;
 use pocketsplat_core::{Budget, Bundle, Decoder, Residency, Stage, Stopwatch, Strips};
+use pocketsplat_trainer::bundle::Coder;
 
 /// Remembers the stages.
 #[derive(Default)]

@@ -3,9 +3,9 @@
 use conformance::bundles::{CODERS, tier_ends, tiered};
 use conformance::frame::{Frame, budget_for, draw, to_core};
 use conformance::scenes::{CASES, cameras};
-use pocketsplat::bundle::Coder;
 use pocketsplat_core::bundle::AnchorSite;
 use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport};
+use pocketsplat_trainer::bundle::Coder;
 
 fn camera() -> Camera {
     to_core(&cameras()[0].1)

@@ -1,12 +1,12 @@
 //! Single operations at the ends of their arguments.
 
 use glam::{DMat3, DVec3};
-use pocketsplat::camera::Camera;
-use pocketsplat::ops::normality::{Histograms, Moments, Spread, Weights};
-use pocketsplat::ops::simd::Level;
-use pocketsplat::ops::{Pinhole, adam, head_input, rate, ssim};
-use pocketsplat::scene::ModelShape;
+use pocketsplat_capture::camera::Camera;
 use pocketsplat_core::math::{exp, sigmoid, tanh};
+use pocketsplat_trainer::ops::normality::{Histograms, Moments, Spread, Weights};
+use pocketsplat_trainer::ops::simd::Level;
+use pocketsplat_trainer::ops::{Pinhole, adam, head_input, rate, ssim};
+use pocketsplat_trainer::scene::ModelShape;
 
 use super::blobs::{Blob, Blobs};
 use super::gradient::{difference_error, random};

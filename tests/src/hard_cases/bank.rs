@@ -1,9 +1,9 @@
 //! Features that the view mixes: weights at their ends, logits beyond halves, a camera at the anchor.
 
 use glam::{DMat3, DVec3};
-use pocketsplat::camera::Camera;
-use pocketsplat::ops::{Pinhole, feature_bank};
-use pocketsplat::scene::{Head, ModelShape, Scene};
+use pocketsplat_capture::camera::Camera;
+use pocketsplat_trainer::ops::{Pinhole, feature_bank};
+use pocketsplat_trainer::scene::{Head, ModelShape, Scene};
 
 use super::blobs::{Blob, Blobs};
 use super::picture::{Picture, camera};
@@ -71,7 +71,7 @@ fn writing(n: usize) -> String {
         |i: usize| Blob { position: [0.1 * i as f64, 0.0, 2.0], colour: [0.1 + 0.1 * i as f64; 3], ..Blob::default() };
     let effects = ModelShape { feature_bank: true, ..ModelShape::plain(1, 1) };
     let scene = Blobs { effects, ..Blobs::of((0..n).map(blob)) }.scene();
-    let written = pocketsplat::bundle::write(&scene, &info_for(&camera()), &Default::default());
+    let written = pocketsplat_trainer::bundle::write(&scene, &info_for(&camera()), &Default::default());
     written.map_or_else(|error| error.to_string(), |_| "accepted".to_owned())
 }
 

@@ -1,8 +1,8 @@
 //! Where the camera stands: inside splats, on the near plane, very near, very far.
 
 use glam::{DMat3, DVec3};
-use pocketsplat::camera::Camera;
-use pocketsplat::scene::ModelShape;
+use pocketsplat_capture::camera::Camera;
+use pocketsplat_trainer::scene::ModelShape;
 
 use super::blobs::{Blob, Blobs};
 use super::picture::{Figures, Picture, camera};

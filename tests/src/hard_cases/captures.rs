@@ -5,10 +5,10 @@ use std::fs;
 use std::path::Path;
 
 use glam::DVec3;
-use pocketsplat::dataset::{self, Capture, LoadOptions};
-use pocketsplat::scene::init::initial_scene;
-use pocketsplat::synth::{self, SynthOptions};
-use pocketsplat::train::TrainConfig;
+use pocketsplat_capture::dataset::{self, Capture, LoadOptions};
+use pocketsplat_capture::synth::{self, SynthOptions};
+use pocketsplat_trainer::scene::init::initial_scene;
+use pocketsplat_trainer::train::TrainConfig;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 

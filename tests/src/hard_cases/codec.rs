@@ -1,8 +1,8 @@
 //! Symbols at and beyond the ends of their tables, under both coders.
 
-use pocketsplat::bundle::{self, Coder, WriteOptions};
-use pocketsplat::scene::Scene;
 use pocketsplat_core::Bundle;
+use pocketsplat_trainer::bundle::{self, Coder, WriteOptions};
+use pocketsplat_trainer::scene::Scene;
 
 use super::picture::{camera, codec_error};
 use super::{Case, Family, error};

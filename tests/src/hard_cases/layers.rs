@@ -1,7 +1,7 @@
 //! Order and transmittance: equal depths, hundreds of opaque layers, thousands of faint ones.
 
 use glam::{DMat3, DVec3};
-use pocketsplat::camera::Camera;
+use pocketsplat_capture::camera::Camera;
 
 use super::blobs::{Blob, Blobs, logit_of_opacity};
 use super::picture::{Figures, Picture, camera};

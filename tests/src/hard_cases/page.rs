@@ -12,7 +12,7 @@ case runs in the tests; this page is written by them (`POCKETSPLAT_BLESS=1 cargo
 and they fail where it does not say what they do, or where an error exceeds its bound.
 
 A picture goes through the whole product, against the oracle: the rules of a frame in f64, without tiles, tables or
-approximations (`host-trainer/src/render/reference.rs`). Errors of pixels are in steps of 8 bits. The columns are
+approximations (`host-trainer/trainer/src/render/reference.rs`). Errors of pixels are in steps of 8 bits. The columns are
 
 - *decoder, worst*: a channel of `decoder-core`'s frame against the oracle's, which is not rounded to 8 bits: half a step is
   rounding. The larger of two bundles, with heads as halves and with coded ones.

@@ -1,14 +1,14 @@
 //! A scene and a camera, drawn by decoder and trainer, coded and decoded, and compared with the f64 oracle.
 
 use glam::{DMat3, DVec3};
-use pocketsplat::bundle::{self, QuantisationSteps, WriteOptions, decoded_scene};
-use pocketsplat::camera::Camera;
-use pocketsplat::ops::Pinhole;
-use pocketsplat::render::host_camera;
-use pocketsplat::render::reference::ReferenceScene;
-use pocketsplat::scene::Scene;
-use pocketsplat::train::step::Workspace;
+use pocketsplat_capture::camera::Camera;
 use pocketsplat_core::Bundle;
+use pocketsplat_trainer::bundle::{self, QuantisationSteps, WriteOptions, decoded_scene};
+use pocketsplat_trainer::ops::Pinhole;
+use pocketsplat_trainer::render::host_camera;
+use pocketsplat_trainer::render::reference::ReferenceScene;
+use pocketsplat_trainer::scene::Scene;
+use pocketsplat_trainer::train::step::Workspace;
 
 use super::gradient;
 use crate::difference::Difference;

@@ -1,9 +1,9 @@
 //! Every picture again, of the qualities that are meant for use.
 
-use pocketsplat::bundle::{self, WriteOptions};
-use pocketsplat::render::host_camera;
-use pocketsplat::render::reference::ReferenceScene;
 use pocketsplat_core::{Bundle, Quality};
+use pocketsplat_trainer::bundle::{self, WriteOptions};
+use pocketsplat_trainer::render::host_camera;
+use pocketsplat_trainer::render::reference::ReferenceScene;
 
 use super::picture::{background, worst_tile};
 use super::{Case, Family, Probe, error, pictures};

@@ -3,10 +3,10 @@
 use std::f32::consts::PI;
 
 use glam::DVec3;
-use pocketsplat::bundle::{self, WriteOptions};
-use pocketsplat::dataset::{self, LoadOptions};
-use pocketsplat::scene::Scene;
+use pocketsplat_capture::dataset::{self, LoadOptions};
 use pocketsplat_core::Bundle;
+use pocketsplat_trainer::bundle::{self, WriteOptions};
+use pocketsplat_trainer::scene::Scene;
 
 use super::blobs::{Blob, Blobs};
 use super::picture::camera;

@@ -1,8 +1,8 @@
 //! Every picture again, in the arithmetics that are meant for use.
 
-use pocketsplat::bundle::{self, WriteOptions};
-use pocketsplat::cost::Choice;
 use pocketsplat_core::Bundle;
+use pocketsplat_trainer::bundle::{self, WriteOptions};
+use pocketsplat_trainer::cost::Choice;
 
 use super::picture::worst_tile;
 use super::{Case, Family, Probe, error, pictures};

@@ -1,11 +1,11 @@
 //! Runs that something goes wrong in: no parameter ever becomes infinite or NaN.
 
 use glam::{DMat3, DVec3};
-use pocketsplat::camera::Camera;
-use pocketsplat::dataset::{Capture, EXTENT, Image, Normalisation, PointsOrigin, View};
-use pocketsplat::scene::ModelShape;
-use pocketsplat::train::config::{Densification, Rate, Rates};
-use pocketsplat::train::{TrainConfig, TrainError, Trainer};
+use pocketsplat_capture::camera::Camera;
+use pocketsplat_capture::dataset::{Capture, EXTENT, Image, Normalisation, PointsOrigin, View};
+use pocketsplat_trainer::scene::ModelShape;
+use pocketsplat_trainer::train::config::{Densification, Rate, Rates};
+use pocketsplat_trainer::train::{TrainConfig, TrainError, Trainer};
 
 use super::{Case, Family, error, n_not_finite, parameters};
 

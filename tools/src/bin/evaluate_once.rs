@@ -6,13 +6,13 @@ use std::path::PathBuf;
 use anyhow::ensure;
 use clap::Parser;
 use glam::DVec3;
-use pocketsplat::bundle;
-use pocketsplat::dataset::{self, FrameSize, LoadOptions, View};
-use pocketsplat::metrics::psnr_db_masked;
-use pocketsplat::ops::{head, neural_gaussians};
-use pocketsplat::render::reference::{ReferenceScene, to_image};
-use pocketsplat::scene::{MASK_THRESHOLD, ModelShape};
+use pocketsplat_capture::dataset::{self, FrameSize, LoadOptions, View};
 use pocketsplat_core::Bundle;
+use pocketsplat_trainer::bundle;
+use pocketsplat_trainer::metrics::psnr_db_masked;
+use pocketsplat_trainer::ops::{head, neural_gaussians};
+use pocketsplat_trainer::render::reference::{ReferenceScene, to_image};
+use pocketsplat_trainer::scene::{MASK_THRESHOLD, ModelShape};
 
 /// Prints PSNR over held-out views while more and more chunks, the least sensitive to the view first, are evaluated once.
 #[derive(Parser)]

@@ -8,11 +8,11 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, ensure};
 use clap::Parser;
 use glam::{DMat3, DVec3};
-use pocketsplat::bundle::{self, BundleInfo, Coder, QuantisationSteps, WriteOptions, annotate::annotate};
-use pocketsplat::camera::Camera;
-use pocketsplat::dataset::Normalisation;
-use pocketsplat::scene::{Anchors, ContextModel, Heads, ModelShape, Scene};
+use pocketsplat_capture::camera::Camera;
+use pocketsplat_capture::dataset::Normalisation;
 use pocketsplat_core::context::{GridFrame, GridLevel, LevelKind};
+use pocketsplat_trainer::bundle::{self, BundleInfo, Coder, QuantisationSteps, WriteOptions, annotate::annotate};
+use pocketsplat_trainer::scene::{Anchors, ContextModel, Heads, ModelShape, Scene};
 
 /// The document when none is named.
 const FORMAT_DOC: &str = "decoder-core/src/bundle/FORMAT.md";

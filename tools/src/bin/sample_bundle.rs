@@ -8,11 +8,11 @@ use std::path::PathBuf;
 use anyhow::Context as _;
 use clap::Parser;
 use glam::{DMat3, DQuat, DVec3};
-use pocketsplat::bundle::{self, BundleInfo, Coder, WriteOptions};
-use pocketsplat::camera::Camera;
-use pocketsplat::dataset::Normalisation;
-use pocketsplat::scene::{Anchors, ContextModel, Head, Heads, ModelShape, Scene};
+use pocketsplat_capture::camera::Camera;
+use pocketsplat_capture::dataset::Normalisation;
 use pocketsplat_core::context::{GridFrame, GridLevel, LevelKind};
+use pocketsplat_trainer::bundle::{self, BundleInfo, Coder, WriteOptions};
+use pocketsplat_trainer::scene::{Anchors, ContextModel, Head, Heads, ModelShape, Scene};
 
 /// Writes a small bundle made by hand.
 #[derive(Parser)]
@@ -20,8 +20,8 @@ struct Args {
     /// The file to write.
     out: PathBuf,
     /// What gives the symbols their frequencies; a context model is made of the channels' means and deviations.
-    #[arg(long, value_enum, default_value_t = Coder::Static)]
-    coder: Coder,
+    #[arg(long, value_parser = ["static", "context"], default_value = "static")]
+    coder: String,
     /// Without glint and haze: as the same from everywhere.
     #[arg(long)]
     matte: bool,
@@ -241,7 +241,8 @@ fn main() -> anyhow::Result<()> {
     let (sees_view, anisotropic, feature_bank) = (!args.matte, !args.isotropic, args.feature_bank);
     let (view_colour, view_geometry, view_distance) = (sees_view, sees_view, sees_view);
     let mut scene = scene(ModelShape { view_colour, view_geometry, view_distance, anisotropic, feature_bank, ..SHAPE });
-    if args.coder != Coder::Static {
+    let with_context = args.coder == "context";
+    if with_context {
         scene.context = Some(context(&scene));
     }
     let info = BundleInfo {
@@ -252,7 +253,7 @@ fn main() -> anyhow::Result<()> {
     };
     let n_planet = planet().len();
     let options = WriteOptions {
-        coder: args.coder,
+        coder: if with_context { Coder::Context } else { Coder::Static },
         importance: Some((0..scene.anchors.len()).map(|anchor| if anchor < n_planet { 1.0 } else { 0.0 }).collect()),
         pruning_rates: vec![(scene.anchors.len() - n_planet) as f32 / scene.anchors.len() as f32, 0.0],
         chunk_anchors: 64,

@@ -1,0 +1,8 @@
+//! Captures: photographs with poses, read from disk or drawn, in one normalised frame.
+//!
+//! [`dataset`] reads the layouts of Blender, COLMAP and nerfstudio; [`synth`] writes a procedural capture; both give views with
+//! a [`camera`].
+
+pub mod camera;
+pub mod dataset;
+pub mod synth;

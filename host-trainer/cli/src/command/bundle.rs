@@ -1,0 +1,87 @@
+//! A bundle on disk and what it says about the capture it was trained on.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use pocketsplat_capture::camera::Camera;
+use pocketsplat_capture::dataset::{Background, Capture, View};
+use pocketsplat_core::Bundle;
+use pocketsplat_core::bundle::AnchorSite;
+use pocketsplat_trainer::bundle::normalisation_of;
+
+use super::capture::{CaptureArgs, CaptureOptions};
+
+/// The bytes of a bundle and where they came from.
+pub(crate) struct BundleFile {
+    pub(crate) path: PathBuf,
+    pub(crate) bytes: Vec<u8>,
+}
+
+impl BundleFile {
+    pub(crate) fn read(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).with_context(|| format!("could not read the bundle {}", path.display()))?;
+        Ok(Self { path: path.to_owned(), bytes })
+    }
+
+    /// Checks the file; says so when it is cut at the end of a tier.
+    pub(crate) fn parse(&self) -> Result<Bundle<'_>> {
+        let bundle = Bundle::parse(&self.bytes).with_context(|| format!("{} can not be used", self.path.display()))?;
+        let (n_tiers, n_written) = (bundle.n_tiers(), bundle.header().n_tiers);
+        if n_tiers < n_written {
+            eprintln!(
+                "{} is cut after tier {n_tiers} of {n_written}: a smaller scene of {} of {} anchors",
+                self.path.display(),
+                bundle.n_anchors(),
+                bundle.header().n_anchors
+            );
+        }
+        Ok(bundle)
+    }
+
+    /// Fills what the command line left open with what the bundle was trained with, and refuses what contradicts it.
+    pub(crate) fn capture_options(&self, bundle: &Bundle<'_>, args: &CaptureArgs) -> Result<CaptureArgs> {
+        let header = bundle.header();
+        let known = [Background::Black, Background::White].into_iter().find(|b| b.rgb8() == header.background);
+        if let (Some(asked), Some(trained)) = (args.options.background, known)
+            && asked != trained
+        {
+            bail!("{} was trained on {trained}, not on {asked}; leave --background out", self.path.display());
+        }
+        let [width, height] = header.training_px;
+        let trained_with = CaptureOptions {
+            max_resolution: Some(u32::from(width.max(height))),
+            background: known,
+            ..CaptureOptions::default()
+        };
+        Ok(CaptureArgs { dataset: args.dataset.clone(), options: args.options.or(&trained_with) })
+    }
+
+    /// The camera of a view in the frame of this bundle, which need not be the frame of the capture as loaded now.
+    pub(crate) fn camera(&self, bundle: &Bundle<'_>, capture: &Capture, view: &View) -> Camera {
+        let own = normalisation_of(bundle);
+        if own == capture.normalisation {
+            return view.camera.clone();
+        }
+        let centre_world = view.camera.centre_world() / capture.normalisation.scale + capture.normalisation.centre;
+        let translation = -(view.camera.rotation * own.point(centre_world));
+        Camera { translation, ..view.camera.clone() }
+    }
+
+    /// Entropy-decodes every chunk once, as a decoder that keeps its anchors in memory would; returns the number of Gaussians
+    /// that there are to draw: the offsets that no mask takes away.
+    pub(crate) fn decode_all(&self, bundle: &Bundle<'_>) -> Result<u64> {
+        let header = bundle.header();
+        let n_chunk = usize::from(header.max_chunk_anchors);
+        let mut words = vec![0; bundle.anchor_scratch_words()];
+        let mut models = bundle.anchor_models(&mut words)?;
+        let mut sites = vec![AnchorSite::default(); n_chunk];
+        let mut symbols = vec![0i16; n_chunk * header.n_channels()];
+        let mut n_drawn = 0;
+        for chunk in bundle.chunks() {
+            let n = usize::from(chunk.n_anchors());
+            chunk.decode_symbols(&mut models, &mut sites[..n], &mut symbols[..n * header.n_channels()])?;
+            n_drawn += sites[..n].iter().map(|site| u64::from(site.mask.count_ones())).sum::<u64>();
+        }
+        Ok(n_drawn)
+    }
+}

@@ -1,0 +1,150 @@
+//! `pocketsplat compare`: what finished runs came to, and what they took.
+
+use std::path::{Path, PathBuf};
+
+use crate::plot::{CostPanel, CostPoint, cost_svg};
+use anyhow::{Context, Result};
+use pocketsplat_trainer::cost::on_front;
+use serde::{Deserialize, Serialize};
+
+use super::run_config::{Difference, RunConfig};
+use super::{output, point};
+
+/// Compare finished runs: quality, bytes and the minutes that they took, by the settings in which they differ from the first.
+///
+/// Writes runs.csv and runs.svg. Bundles are measured on the views that are held out of training, once: the figures are kept beside
+/// them. Minutes are of one processor core, so that they do not depend on what else the machine did.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Run folders; the others are named by what they have otherwise than the first.
+    #[arg(value_name = "RUN", required = true)]
+    runs: Vec<PathBuf>,
+    /// Folder for the results.
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+}
+
+/// One line of runs.csv.
+#[derive(Debug, Serialize)]
+struct Line {
+    /// The key that is turned, for colours; empty for the first run.
+    #[serde(skip)]
+    knob: String,
+    run: String,
+    setting: String,
+    processor_minutes: f64,
+    #[serde(rename = "PSNR")]
+    psnr_db: f64,
+    #[serde(rename = "SSIM")]
+    ssim: f64,
+    #[serde(rename = "Size [Bytes]")]
+    size_bytes: usize,
+    n_anchors: u32,
+    #[serde(rename = "#Gaussians")]
+    n_gaussians: u64,
+}
+
+/// What is read of a run's result.json.
+#[derive(Deserialize)]
+struct RunResult {
+    train_processor_s: f64,
+}
+
+pub(crate) fn run(args: &Args) -> Result<()> {
+    let configs = args.runs.iter().map(|run| RunConfig::read(&run.join("config.toml"))).collect::<Result<Vec<_>>>()?;
+    let lines = args.runs.iter().zip(&configs).map(|(run, config)| line(run, config, &configs[0]));
+    let lines = lines.collect::<Result<Vec<_>>>()?;
+    std::fs::create_dir_all(&args.output).with_context(|| format!("could not make {}", args.output.display()))?;
+    let mut table = csv::Writer::from_writer(Vec::new());
+    lines.iter().try_for_each(|line| table.serialize(line))?;
+    let table = table.into_inner()?;
+    output::write_whole(&args.output.join("runs.csv"), &table)?;
+    let panels = [
+        panel("Quality over time", "minutes of a processor core", &lines, |line| line.processor_minutes),
+        panel("Quality over bytes", "bundle, kB", &lines, |line| line.size_bytes as f64 / 1e3),
+    ];
+    output::write_whole(&args.output.join("runs.svg"), cost_svg(&panels)?.as_bytes())?;
+    output::print_text(&String::from_utf8(table)?)
+}
+
+fn line(run: &Path, config: &RunConfig, first: &RunConfig) -> Result<Line> {
+    let path = run.join("result.json");
+    let result =
+        std::fs::read(&path).with_context(|| format!("could not read {}: is the run finished?", path.display()))?;
+    let result: RunResult = serde_json::from_slice(&result)
+        .with_context(|| format!("{} does not say what the run took; train it anew", path.display()))?;
+    let evaluation = point::measured(config, None)?;
+    let (knob, setting) = named(&first.differences(config)?);
+    Ok(Line {
+        knob,
+        run: run.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+        setting,
+        processor_minutes: result.train_processor_s / 60.0,
+        psnr_db: evaluation.psnr_db,
+        ssim: evaluation.ssim,
+        size_bytes: evaluation.bundle_bytes,
+        n_anchors: evaluation.n_anchors,
+        n_gaussians: evaluation.n_gaussians,
+    })
+}
+
+/// A short name of the first key that differs, and all of them with their values; tables by their names alone.
+fn named(differences: &[Difference]) -> (String, String) {
+    let short = |key: &str| key.rsplit('.').next().unwrap_or(key).to_owned();
+    // Voxels follow the resolution, and the widths of heads the modules.
+    let chosen: Vec<&Difference> = differences.iter().filter(|difference| !is_derived(&difference.key)).collect();
+    let said = chosen.iter().map(|Difference { key, other, .. }| match other.as_str() {
+        table if table.starts_with('{') => short(key),
+        "nothing" => format!("without {}", short(key)),
+        value => format!("{} {value}", short(key)),
+    });
+    let said: Vec<String> = said.collect();
+    let knob = chosen.first().map_or_else(|| "as the first".to_owned(), |difference| knob_of(&difference.key));
+    (knob, if said.is_empty() { "as the first".to_owned() } else { said.join(", ") })
+}
+
+fn is_derived(key: &str) -> bool {
+    ["train.voxel_size", "train.shape.detail_hidden", "train.densification.coarsest_cells"].contains(&key)
+}
+
+/// The key, or the table of all modules.
+fn knob_of(key: &str) -> String {
+    if key.starts_with("train.modules") {
+        "modules".to_owned()
+    } else {
+        key.rsplit('.').next().unwrap_or(key).to_owned()
+    }
+}
+
+fn panel(title: &str, unit: &str, lines: &[Line], cost: fn(&Line) -> f64) -> CostPanel {
+    let front = on_front(&lines.iter().map(|line| (cost(line), line.psnr_db)).collect::<Vec<_>>());
+    let points = lines.iter().zip(front).map(|(line, on_front)| CostPoint {
+        knob: line.knob.clone(),
+        cost: cost(line),
+        psnr_db: line.psnr_db,
+        on_front,
+    });
+    CostPanel { title: title.to_owned(), unit: unit.to_owned(), points: points.collect() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_is_named_by_what_it_has_otherwise() {
+        let first = RunConfig::default();
+        let name = |keys: &[&str]| {
+            let keys: Vec<String> = keys.iter().map(|key| (*key).to_owned()).collect();
+            named(&first.differences(&first.with_keys(&keys).unwrap()).unwrap())
+        };
+        let pair = |knob: &str, setting: &str| (knob.to_owned(), setting.to_owned());
+        assert_eq!(name(&[]), pair("as the first", "as the first"));
+        assert_eq!(name(&["train.iterations=500"]), pair("iterations", "iterations 500"));
+        assert_eq!(name(&["train.shape.n_offsets=3", "train.voxel_size=0.5"]), pair("n_offsets", "n_offsets 3"));
+        let mut with_detail = first.clone();
+        with_detail.train.modules.detail = Some(Default::default());
+        assert_eq!(named(&first.differences(&with_detail).unwrap()), pair("modules", "detail"));
+        assert_eq!(named(&with_detail.differences(&first).unwrap()), pair("modules", "without detail"));
+    }
+}

@@ -1,0 +1,175 @@
+//! `pocketsplat cost`: what accuracy costs in time, for one bundle.
+
+mod machine;
+mod report;
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+use bytesize::ByteSize;
+use pocketsplat_capture::dataset::{Capture, View};
+use pocketsplat_core::{Budget, Bundle, Camera, MaxSplats};
+use pocketsplat_trainer::cost::{
+    CountError, Counter, Instructions, MOST_VIEWS, Measured, Setting, Sight, knobs, measure, quality_grid,
+};
+use pocketsplat_trainer::device::Target;
+use pocketsplat_trainer::render::decoder::core_camera;
+use pocketsplat_trainer::render::reference::ReferenceScene;
+use rayon::prelude::*;
+
+use self::machine::Machine;
+use self::report::Report;
+use super::bundle::BundleFile;
+use super::capture::{CaptureArgs, Split};
+use super::eval::reference_image;
+
+/// Turn each of the decoder's knobs, and those of quality in all combinations, and measure what that costs in accuracy and
+/// saves in time.
+///
+/// Writes cost.csv, cost.svg and cost.md: for each setting PSNR to the f64 reference and to the photographs, the time of a
+/// frame here, and the instructions of each stage on each target. Where the firmware's folder and QEMU are at hand, the firmware
+/// counts them for each knob by itself; else, and for the combinations, they are predicted from what the frames consist of, if the
+/// arithmetic is the one whose costs were counted.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// The bundle.
+    bundle: PathBuf,
+    #[command(flatten)]
+    capture: CaptureArgs,
+    /// Folder for the results.
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Which views.
+    #[arg(long, value_enum, default_value_t = Split::Test)]
+    split: Split,
+    /// So many views at most, evenly picked; 0: all.
+    #[arg(long, default_value_t = 8)]
+    views: usize,
+    /// Scratch memory of the decoder, as 192KiB or 65536. [default: without limit]
+    #[arg(long, value_name = "BYTES")]
+    ram: Option<ByteSize>,
+    /// Machines whose time is compared.
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "NAME,…", default_values_t = [Machine::CortexM4])]
+    target: Vec<Machine>,
+    /// Instructions are those of so many of the views, evenly picked, at most 10, and the firmware counts them. [default: 2 where it
+    /// can; else all views, and nothing is counted]
+    #[arg(long, value_name = "VIEWS")]
+    count: Option<usize>,
+    /// Folder of the firmware that counts.
+    #[arg(long, value_name = "DIR", default_value = "firmware-example")]
+    firmware: PathBuf,
+}
+
+/// Views whose instructions are counted when nobody says how many: a count draws each of them for every knob.
+const COUNTED_VIEWS: usize = 2;
+
+pub(crate) fn run(args: &Args) -> Result<()> {
+    let file = BundleFile::read(&args.bundle)?;
+    let bundle = file.parse()?;
+    let targets: Vec<Target> = args.target.iter().filter_map(|machine| machine.device()).collect();
+    let counter = args.counter(&targets)?;
+    let capture = file.capture_options(&bundle, &args.capture)?.load(0)?;
+    let views = picked(args.split.views(&capture)?, args.views);
+    let mut sights = sights(&file, &bundle, &capture, &views)?;
+    if counter.is_some() {
+        let n = args.count.unwrap_or(COUNTED_VIEWS).clamp(1, MOST_VIEWS);
+        let counted: Vec<usize> = picked_of(sights.len(), n).collect();
+        sights.iter_mut().enumerate().for_each(|(i, sight)| sight.counts = counted.contains(&i));
+    }
+    let [width, height] = [|s: &Sight<'_>| s.camera.width_px, |s: &Sight<'_>| s.camera.height_px]
+        .map(|side| sights.iter().map(side).max().unwrap_or(1));
+    // What a device would plan: with places for more splats a frame of strips goes over fewer anchors.
+    let budget = Budget::for_frame(width, height);
+    let budget = match args.ram {
+        None => budget,
+        Some(ram) => budget.in_bytes(usize::try_from(ram.as_u64()).unwrap_or(usize::MAX)),
+    };
+    let counted: Vec<Camera> = sights.iter().filter(|sight| sight.counts).map(|sight| sight.camera).collect();
+    let (knobs, grid) = (knobs(&bundle), quality_grid(&bundle));
+    let n_knobs = knobs.len();
+    let settings: Vec<Setting> = knobs.into_iter().chain(grid).collect();
+    let mut measured = Vec::new();
+    for (i, setting) in settings.iter().enumerate() {
+        eprintln!("{} of {}  {}: {}", i + 1, settings.len(), setting.knob, setting.name);
+        let mut point = match measure(&bundle, &sights, setting, budget, &targets) {
+            // Splats that are larger than plans reckon with, and memory without limit.
+            Ok(point) if point.splats_dropped > 0 && args.ram.is_none() => {
+                measure(&bundle, &sights, setting, budget.with_max_splats(MaxSplats::Worst), &targets)?
+            }
+            Ok(point) => point,
+            // A residency or number of strips that does not fit is no setting of this budget.
+            Err(error) if i > 0 && args.ram.is_some() => {
+                eprintln!("  left out: {error}");
+                continue;
+            }
+            Err(error) => return Err(error).context("the scene as it is"),
+        };
+        if let Some(counter) = counter.as_ref().filter(|_| i < n_knobs) {
+            count(counter, &targets, &counted, &mut point);
+        }
+        measured.push(point);
+    }
+    let bundle_name = args.bundle.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let report = Report {
+        bundle_name,
+        machines: &args.target,
+        measured: &measured,
+        n_views: sights.len(),
+        n_counted: counted.len(),
+    };
+    report.write(&args.output)
+}
+
+impl Args {
+    /// Who counts instructions; nobody, with a word about it, where nobody was asked for and something is missing.
+    fn counter(&self, targets: &[Target]) -> Result<Option<Counter>> {
+        if targets.is_empty() || self.count == Some(0) {
+            return Ok(None);
+        }
+        match Counter::new(&self.firmware, &self.bundle, &self.output.join("counted"), targets) {
+            Ok(counter) => Ok(Some(counter)),
+            Err(missing @ (CountError::NoFirmware(_) | CountError::NoProgram(_))) if self.count.is_none() => {
+                eprintln!("instructions are predicted: {missing}");
+                Ok(None)
+            }
+            Err(error) => Err(error).context("counting instructions; --count 0 predicts them"),
+        }
+    }
+}
+
+/// Replaces what was predicted by what the firmware counts, where it can.
+fn count(counter: &Counter, targets: &[Target], cameras: &[Camera], point: &mut Measured) {
+    for (instructions, target) in point.instructions.iter_mut().zip(targets) {
+        match counter.count(*target, &point.setting, cameras, point.scratch_bytes) {
+            Ok(stages) => *instructions = Some(Instructions { stages, counted: true }),
+            Err(error) => eprintln!("  not counted: {error}"),
+        }
+    }
+}
+
+/// At most `n` of the views, evenly picked; all for 0.
+fn picked(views: &[View], n: usize) -> Vec<&View> {
+    picked_of(views.len(), if n == 0 { views.len() } else { n }).map(|i| &views[i]).collect()
+}
+
+/// At most `n` of `0..of`, evenly picked.
+fn picked_of(of: usize, n: usize) -> impl Iterator<Item = usize> {
+    let n = n.min(of);
+    (0..n).map(move |i| i * of / n)
+}
+
+fn sights<'a>(file: &BundleFile, bundle: &Bundle<'_>, capture: &Capture, views: &[&'a View]) -> Result<Vec<Sight<'a>>> {
+    let oracle = ReferenceScene::from_bundle(bundle)?;
+    views
+        .par_iter()
+        .map(|view| {
+            let camera = file.camera(bundle, capture, view);
+            Ok(Sight {
+                camera: core_camera(&camera)?,
+                reference: reference_image(bundle, &oracle, &camera),
+                photograph: (&view.image, view.mask.as_ref()),
+                counts: true,
+            })
+        })
+        .collect()
+}

@@ -1,0 +1,123 @@
+//! `pocketsplat demo`: the whole path once, on a capture it makes itself.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use pocketsplat_capture::dataset::Image;
+use pocketsplat_capture::synth::{SynthOptions, write_capture};
+use pocketsplat_trainer::render::decoder::core_image;
+use pocketsplat_trainer::render::reference::ReferenceScene;
+use pocketsplat_trainer::train::TrainConfig;
+use pocketsplat_trainer::train::config::Backbone;
+use pocketsplat_trainer::train::module::{Detail, Distribution, Modules, Pruning};
+
+use super::bundle::BundleFile;
+use super::capture::{CaptureArgs, CaptureOptions, Split};
+use super::encode::Encoding;
+use super::eval::{Measurements, Renderer, evaluate, reference_image};
+use super::{output, train};
+
+/// Make a capture, train it, compress it, draw it with the decoder and compare: about three minutes on two cores.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Folder for everything; what an earlier demo left there is replaced.
+    #[arg(short, long, default_value = "demo")]
+    output: PathBuf,
+    /// Training steps.
+    #[arg(long, default_value_t = 4000)]
+    iterations: u32,
+    /// Width and height of the images, pixels.
+    #[arg(long, default_value_t = SynthOptions::default().size_px)]
+    size: u32,
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Where the demo's capture lies.
+const CAPTURE: &str = "capture";
+/// Lies in a capture that a demo made, and only there: without it nothing is removed.
+const MARKER: &str = ".made-by-pocketsplat-demo";
+
+pub(crate) fn run(args: &Args) -> Result<()> {
+    let folder = &args.output;
+    let capture_folder = folder.join(CAPTURE);
+    clear_capture(&capture_folder)?;
+    eprintln!("1 of 4  ray-tracing a capture into {}", capture_folder.display());
+    write_capture(&capture_folder, &SynthOptions { size_px: args.size, ..SynthOptions::default() })?;
+    output::write_whole(&capture_folder.join(MARKER), b"")?;
+
+    eprintln!("2 of 4  training {} steps", args.iterations);
+    let capture_args = CaptureArgs { dataset: capture_folder, options: CaptureOptions::default() };
+    // Tiers that are trained for: the demo's bundle serves devices of several sizes.
+    let modules = Modules {
+        distribution: Some(Distribution::default()),
+        pruning: Some(Pruning::tiered()),
+        detail: Some(Detail::default()),
+    };
+    let config = TrainConfig { iterations: args.iterations, modules, ..TrainConfig::of(Backbone::Hac) };
+    let bundle_path = folder.join("scene.psb");
+    let capture = capture_args.load(config.seed)?;
+    let trained = train::train(&capture, config, &Encoding::default(), &bundle_path)?;
+
+    eprintln!("3 of 4  drawing the held-out views with the decoder");
+    let file = BundleFile::read(&bundle_path)?;
+    let what = Measurements { against_reference: true, per_tier: true, ..Measurements::default() };
+    let evaluation = evaluate(&file, &capture_args, Split::Test, Renderer::Core, &what)?;
+
+    let picture = folder.join("truth_reference_decoder.png");
+    eprintln!("4 of 4  {}: truth | f64 reference | decoder", picture.display());
+    let bundle = file.parse()?;
+    let view = &capture.test[0];
+    let reference = reference_image(&bundle, &ReferenceScene::from_bundle(&bundle)?, &view.camera);
+    let decoder = core_image(&bundle, &view.camera)?.image;
+    side_by_side(&[&view.image, &reference, &decoder])
+        .write_png(&picture)
+        .with_context(|| format!("could not write {}", picture.display()))?;
+
+    let report = serde_json::json!({
+        "bundle": bundle_path,
+        "picture": picture,
+        "psnr_db": evaluation.psnr_db,
+        "half_size_copy_psnr_db": evaluation.half_size_copy_psnr_db,
+        "ssim": evaluation.ssim,
+        "psnr_db_without_40_percent": evaluation.tiers.first().map(|tier| tier.psnr_db),
+        "decoder_to_reference_psnr_db": evaluation.psnr_to_reference_db,
+        "bundle_bytes": evaluation.bundle_bytes,
+        "n_anchors": evaluation.n_anchors,
+        "train_s": trained.train_s,
+        "render_s_per_view": evaluation.render_s_per_view,
+        "scratch_bytes": evaluation.scratch_bytes,
+    });
+    output::print(&report, args.json)
+}
+
+/// Removes the capture of an earlier demo, and nothing that is not one.
+fn clear_capture(folder: &Path) -> Result<()> {
+    if !folder.exists() {
+        return Ok(());
+    }
+    if !folder.join(MARKER).is_file() {
+        bail!("{} exists and is not the capture of an earlier demo; choose another --output", folder.display());
+    }
+    std::fs::remove_dir_all(folder).with_context(|| format!("could not remove {}", folder.display()))
+}
+
+/// Width that a small picture is enlarged to, about, so that a person sees its pixels.
+const PICTURE_PX: u32 = 1000;
+
+/// Images of one size next to each other, each pixel as a square of pixels where they are small.
+fn side_by_side(images: &[&Image]) -> Image {
+    let (width, height) = (images[0].width_px, images[0].height_px);
+    let n = u32::try_from(images.len()).unwrap_or(u32::MAX);
+    let zoom = (PICTURE_PX / (n * width)).max(1);
+    let pixel = |x: u32, y: u32| {
+        let (image, x) = (images[(x / width) as usize], x % width);
+        let at = 3 * (y * width + x) as usize;
+        [image.rgb[at], image.rgb[at + 1], image.rgb[at + 2]]
+    };
+    let (width_px, height_px) = (n * width * zoom, height * zoom);
+    let pixel = &pixel;
+    let rgb = (0..height_px).flat_map(|y| (0..width_px).flat_map(move |x| pixel(x / zoom, y / zoom))).collect();
+    Image { width_px, height_px, rgb }
+}

@@ -1,0 +1,38 @@
+//! `pocketsplat doctor`: what is wrong with a capture, and what to do about it.
+
+use std::path::PathBuf;
+
+use anyhow::{Result, bail};
+use pocketsplat_capture::dataset::{LoadOptions, Severity, diagnose};
+
+use super::output;
+
+/// Check a capture: images, poses, lenses, scale, splits; every finding comes with a remedy.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Folder of the capture.
+    dataset: PathBuf,
+    /// The folder of images to look at, for captures that hold several.
+    #[arg(long, value_name = "NAME")]
+    images: Option<String>,
+    /// Every how many-th view is held out.
+    #[arg(long, value_name = "N", default_value_t = LoadOptions::default().test_every)]
+    test_every: u32,
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(crate) fn run(args: &Args) -> Result<()> {
+    let options = LoadOptions { images: args.images.clone(), test_every: args.test_every, ..LoadOptions::default() };
+    let diagnosis = diagnose(&args.dataset, &options);
+    if args.json {
+        output::print(&diagnosis, true)?;
+    } else {
+        println!("{diagnosis}");
+    }
+    if diagnosis.has_errors() {
+        bail!("{} can not be trained on: {} errors", args.dataset.display(), diagnosis.count(Severity::Error));
+    }
+    Ok(())
+}

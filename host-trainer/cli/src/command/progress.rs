@@ -1,0 +1,89 @@
+//! What a run says while it works: a bar on a terminal, a line now and then elsewhere, always on stderr.
+
+use std::io::IsTerminal;
+use std::time::Instant;
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use pocketsplat_trainer::scene::Scene;
+use pocketsplat_trainer::train::step::StepReport;
+use pocketsplat_trainer::train::{DroppedStep, Observer};
+
+/// Weight of the newest step in the running means.
+const NEWEST: f64 = 0.02;
+/// Lines a run prints where there is no terminal.
+const LINES: u32 = 20;
+/// Dropped steps that are reported one by one.
+const DROPPED_SPELT_OUT: u32 = 10;
+
+/// Shows a training run.
+pub(crate) struct Progress {
+    bar: ProgressBar,
+    on_terminal: bool,
+    /// Iterations done before, and in all.
+    from: u32,
+    iterations: u32,
+    started: Instant,
+    loss: f64,
+    psnr_db: f64,
+    n_dropped: u32,
+}
+
+impl Progress {
+    /// * `from`: iterations that an earlier process did.
+    pub(crate) fn new(from: u32, iterations: u32) -> Self {
+        let on_terminal = std::io::stderr().is_terminal();
+        let target = if on_terminal { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let bar = ProgressBar::with_draw_target(Some(u64::from(iterations)), target);
+        let style = "{bar:30} {pos}/{len}  {msg}  {per_sec:>10}  {eta} left";
+        bar.set_style(ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar()));
+        bar.set_position(u64::from(from));
+        bar.reset_eta();
+        Self { bar, on_terminal, from, iterations, started: Instant::now(), loss: 0.0, psnr_db: 0.0, n_dropped: 0 }
+    }
+
+    /// A line that the bar does not overwrite.
+    fn say(&self, line: &str) {
+        self.bar.suspend(|| eprintln!("{line}"));
+    }
+}
+
+impl Observer for Progress {
+    fn step(&mut self, iteration: u32, report: &StepReport<f32>, scene: &Scene<f32>) {
+        let (loss, psnr_db) = (f64::from(report.loss), -10.0 * report.squared_error.log10());
+        let newest = NEWEST.max(1.0 / f64::from(iteration - self.from));
+        // A step that was dropped may have no number to show.
+        if loss.is_finite() && psnr_db.is_finite() {
+            self.loss += newest * (loss - self.loss);
+            self.psnr_db += newest * (psnr_db - self.psnr_db);
+        }
+        let bits = report.rate.map(|rate| format!("  {:.0} bits each", rate.bits.iter().sum::<f64>()));
+        let state = format!(
+            "loss {:.4}  PSNR {:.2} dB  {} anchors{}",
+            self.loss,
+            self.psnr_db,
+            scene.anchors.len(),
+            bits.unwrap_or_default()
+        );
+        if self.on_terminal {
+            self.bar.set_position(u64::from(iteration));
+            self.bar.set_message(state);
+            if iteration == self.iterations {
+                self.bar.finish();
+            }
+        } else if iteration.is_multiple_of((self.iterations / LINES).max(1)) || iteration == self.iterations {
+            let per_second = f64::from(iteration - self.from) / self.started.elapsed().as_secs_f64();
+            let left = f64::from(self.iterations - iteration) / per_second;
+            eprintln!("{iteration}/{}  {state}  {per_second:.1} it/s  {left:.0} s left", self.iterations);
+        }
+    }
+
+    fn dropped(&mut self, step: &DroppedStep) {
+        self.n_dropped += 1;
+        if self.n_dropped <= DROPPED_SPELT_OUT {
+            self.say(&format!("warning: {step}"));
+        }
+        if self.n_dropped == DROPPED_SPELT_OUT {
+            self.say("warning: further dropped steps are only counted, see the result and progress.csv");
+        }
+    }
+}

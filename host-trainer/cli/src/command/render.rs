@@ -1,0 +1,52 @@
+//! `pocketsplat render`: one view as a PNG.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result, bail};
+use pocketsplat_trainer::render::decoder::core_image;
+use pocketsplat_trainer::render::reference::ReferenceScene;
+
+use super::bundle::BundleFile;
+use super::capture::{CaptureArgs, Split};
+use super::eval::{Renderer, reference_image};
+use super::output;
+
+/// Draw one view of a capture from a bundle.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// The bundle.
+    bundle: PathBuf,
+    #[command(flatten)]
+    capture: CaptureArgs,
+    /// Which view of the split, from 0.
+    #[arg(long, value_name = "I")]
+    view: usize,
+    /// Which views.
+    #[arg(long, value_enum, default_value_t = Split::Test)]
+    split: Split,
+    /// The picture to write.
+    #[arg(short, long, value_name = "OUT.png")]
+    output: PathBuf,
+    /// What draws it.
+    #[arg(long, value_enum, default_value_t = Renderer::Core)]
+    renderer: Renderer,
+}
+
+pub(crate) fn run(args: &Args) -> Result<()> {
+    let file = BundleFile::read(&args.bundle)?;
+    let bundle = file.parse()?;
+    output::check_writable(&args.output)?;
+    let capture = file.capture_options(&bundle, &args.capture)?.load(0)?;
+    let views = args.split.views(&capture)?;
+    let Some(view) = views.get(args.view) else {
+        bail!("--view {} of {} views; choose 0 to {}", args.view, views.len(), views.len() - 1);
+    };
+    let camera = file.camera(&bundle, &capture, view);
+    let image = match args.renderer {
+        Renderer::Core => core_image(&bundle, &camera)?.image,
+        Renderer::Reference => reference_image(&bundle, &ReferenceScene::from_bundle(&bundle)?, &camera),
+    };
+    image.write_png(&args.output).with_context(|| format!("could not write {}", args.output.display()))?;
+    println!("{}: {}×{} px, view {}", args.output.display(), image.width_px, image.height_px, view.name);
+    Ok(())
+}

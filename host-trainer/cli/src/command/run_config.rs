@@ -1,0 +1,181 @@
+//! The configuration of a run as TOML: written into its folder, read by `--config`.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use pocketsplat_capture::dataset::Background;
+use pocketsplat_trainer::train::TrainConfig;
+use pocketsplat_trainer::train::config::Backbone;
+use serde::{Deserialize, Serialize};
+use toml::{Table, Value};
+
+use super::capture::CaptureOptions;
+use super::effects::EffectsConfig;
+use super::encode::Encoding;
+
+/// Everything a run was asked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct RunConfig {
+    /// Folder of the capture.
+    pub(crate) dataset: PathBuf,
+    /// The bundle to write.
+    pub(crate) output: PathBuf,
+    /// Iterations from one checkpoint to the next; by time without.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) checkpoint_every: Option<u32>,
+    pub(crate) keep_checkpoints: bool,
+    pub(crate) capture: CaptureOptions,
+    pub(crate) train: TrainConfig,
+    pub(crate) encoding: Encoding,
+    pub(crate) effects: EffectsConfig,
+}
+
+impl Default for RunConfig {
+    fn default() -> Self {
+        Self {
+            dataset: PathBuf::new(),
+            output: PathBuf::new(),
+            checkpoint_every: None,
+            keep_checkpoints: false,
+            capture: CaptureOptions { background: Some(Background::Black), ..CaptureOptions::default() },
+            train: TrainConfig::default(),
+            encoding: Encoding::default(),
+            effects: EffectsConfig::default(),
+        }
+    }
+}
+
+impl RunConfig {
+    /// Reads a configuration; keys that are missing have their defaults.
+    pub(crate) fn read(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path);
+        let text = text.with_context(|| format!("could not read the configuration {}", path.display()))?;
+        Self::parse(&text).with_context(|| format!("the configuration {} can not be used", path.display()))
+    }
+
+    /// As [`Self::read`], from its text.
+    pub(crate) fn parse(text: &str) -> Result<Self> {
+        let given: Table = text.parse()?;
+        let train = TrainConfig::of(given_backbone(&given)?);
+        let effects = EffectsConfig { auto: false, ..EffectsConfig::default() };
+        let mut all = Table::try_from(Self { train, effects, ..Self::default() })?;
+        merge(&mut all, &given);
+        let config: Self = all.try_into()?;
+        // What is not written again was not understood.
+        refuse_unknown(&given, &Table::try_from(&config)?, "")?;
+        Ok(config)
+    }
+
+    /// The same with some keys set, each given as `table.key=value`; what is no TOML value is taken as text.
+    pub(crate) fn with_keys(&self, keys: &[String]) -> Result<Self> {
+        let mut all = Table::try_from(self)?;
+        let mut given = Table::new();
+        for key in keys {
+            let Some((path, value)) = key.split_once('=') else {
+                bail!("`{key}` sets nothing; needs KEY=VALUE, as train.hac.sample=0.1");
+            };
+            let value = format!("x = {value}").parse::<Table>().ok().and_then(|mut table| table.remove("x"));
+            let value = value.unwrap_or_else(|| Value::String(key[path.len() + 1..].to_owned()));
+            let nested = path
+                .trim()
+                .rsplit('.')
+                .fold(value, |inner, name| Value::Table(Table::from_iter([(name.to_owned(), inner)])));
+            if let Value::Table(nested) = nested {
+                merge(&mut given, &nested);
+            }
+        }
+        merge(&mut all, &given);
+        let config: Self = all.try_into()?;
+        refuse_unknown(&given, &Table::try_from(&config)?, "")?;
+        Ok(config)
+    }
+
+    /// As TOML that [`Self::parse`] reads back.
+    pub(crate) fn to_toml(&self) -> Result<String> {
+        Ok(toml::to_string(self)?)
+    }
+
+    /// Refuses what no run can use, before any work starts.
+    pub(crate) fn check(&self) -> Result<()> {
+        self.train.validate().map_err(anyhow::Error::msg)?;
+        self.encoding.validate()
+    }
+
+    /// The first key at which two configurations differ in what decides the result, with both values.
+    ///
+    /// Where the capture lies, where the bundle goes, how it is quantised and when checkpoints are written do not: the
+    /// bundle is written anew from what was trained.
+    pub(crate) fn difference(&self, other: &Self) -> Result<Option<String>> {
+        let first = self.differences(other)?.into_iter().next();
+        Ok(first.map(|Difference { key, one, other }| format!("`{key}` is {one} and {other}")))
+    }
+
+    /// All keys at which they differ in that.
+    pub(crate) fn differences(&self, other: &Self) -> Result<Vec<Difference>> {
+        let deciding = |config: &Self| {
+            let Self { capture, train, .. } = config.clone();
+            Table::try_from(Self { capture, train, ..Self::default() })
+        };
+        let mut all = Vec::new();
+        collect_differences(&deciding(self)?, &deciding(other)?, "", &mut all);
+        Ok(all)
+    }
+}
+
+/// A key at which two configurations differ, and both values as TOML; `nothing` for none.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Difference {
+    pub(crate) key: String,
+    pub(crate) one: String,
+    pub(crate) other: String,
+}
+
+/// The backbone that a configuration names; its defaults stand for what else is missing.
+fn given_backbone(given: &Table) -> Result<Backbone> {
+    let named = given.get("train").and_then(|train| train.get("backbone"));
+    named.map_or(Ok(Backbone::default()), |name| Ok(name.clone().try_into()?))
+}
+
+/// Replaces values of `into` by those of `from`, table by table.
+fn merge(into: &mut Table, from: &Table) {
+    for (key, value) in from {
+        match (into.get_mut(key), value) {
+            (Some(Value::Table(into)), Value::Table(from)) => merge(into, from),
+            // A rate of `1` means 1.0.
+            (Some(Value::Float(into)), Value::Integer(from)) => *into = *from as f64,
+            _ => {
+                into.insert(key.clone(), value.clone());
+            }
+        }
+    }
+}
+
+fn refuse_unknown(given: &Table, known: &Table, at: &str) -> Result<()> {
+    for (key, value) in given {
+        match (known.get(key), value) {
+            (Some(Value::Table(known)), Value::Table(given)) => refuse_unknown(given, known, &format!("{at}{key}."))?,
+            (Some(_), _) => {}
+            (None, _) => {
+                let keys: Vec<&str> = known.keys().map(String::as_str).collect();
+                bail!("unknown key `{at}{key}`; known here: {}", keys.join(", "));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn collect_differences(a: &Table, b: &Table, at: &str, all: &mut Vec<Difference>) {
+    let keys = a.keys().chain(b.keys().filter(|key| !a.contains_key(*key)));
+    for key in keys.filter(|key| a.get(*key) != b.get(*key)) {
+        match (a.get(key), b.get(key)) {
+            (Some(Value::Table(a)), Some(Value::Table(b))) => collect_differences(a, b, &format!("{at}{key}."), all),
+            (a, b) => {
+                let text = |value: Option<&Value>| value.map_or("nothing".to_owned(), ToString::to_string);
+                all.push(Difference { key: format!("{at}{key}"), one: text(a), other: text(b) });
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,102 @@
+use super::*;
+use pocketsplat_trainer::train::module::pruning;
+
+#[test]
+fn a_written_configuration_reads_back_to_the_last_bit() {
+    let mut config = RunConfig {
+        dataset: "/captures/desk lamp".into(),
+        output: "out/lamp.psb".into(),
+        checkpoint_every: Some(700),
+        keep_checkpoints: true,
+        capture: CaptureOptions {
+            max_resolution: Some(400),
+            resolution: None,
+            background: Some(Background::White),
+            images: Some("images_2".to_owned()),
+            test_every: Some(5),
+        },
+        ..RunConfig::default()
+    };
+    for i in 1..200u32 {
+        let x = 1.0 / f64::from(i).powf(1.7);
+        config.train.voxel_size = Some(x);
+        config.train.rates.offset.end = x * 1e-9;
+        config.encoding.quantisation.feature = (x * 0.1) as f32;
+        config.train.seed = u64::from(i).pow(7) % i64::MAX as u64;
+        assert_eq!(RunConfig::parse(&config.to_toml().unwrap()).unwrap(), config, "{i}");
+    }
+    // A file has been decided about.
+    let mut decided = RunConfig::default();
+    assert!(std::mem::take(&mut decided.effects.auto));
+    assert_eq!(RunConfig::parse("").unwrap(), decided);
+}
+
+#[test]
+fn a_few_keys_are_enough() {
+    let config = RunConfig::parse("[train]\niterations = 7\n[train.rates.offset]\nstart = 1\n").unwrap();
+    assert_eq!(config.train.iterations, 7);
+    assert_eq!(config.train.rates.offset.start, 1.0);
+    assert_eq!(config.train.rates.offset.end, TrainConfig::default().rates.offset.end);
+    assert_eq!(
+        RunConfig::parse("[capture]\nbackground = \"white\"").unwrap().capture.background,
+        Some(Background::White)
+    );
+}
+
+#[test]
+fn what_is_missing_follows_the_backbone() {
+    let config = RunConfig::parse("[train]\nbackbone = \"hac\"\niterations = 7").unwrap();
+    assert_eq!(config.train, TrainConfig { iterations: 7, ..TrainConfig::of(Backbone::Hac) });
+    let config = RunConfig::parse("[train]\nbackbone = \"hac\"\n[train.shape]\nfeature_dim = 32").unwrap();
+    assert_eq!(config.train.shape.feature_dim, 32);
+    assert_eq!(RunConfig::parse(&config.to_toml().unwrap()).unwrap(), config);
+}
+
+#[test]
+fn what_is_not_understood_is_refused_by_its_name() {
+    for (text, part) in [
+        ("[train]\nbackbone = \"haç\"", "`scaffold` or `hac`"),
+        ("[train.rates]\nfeatures = 1", "unknown key `train.rates.features`; known here: "),
+        ("iterations = 3", "unknown key `iterations`; known here: "),
+        ("[train]\niterations = \"many\"", "iterations"),
+        ("[train]\niterations = -1", "iterations"),
+        ("[capture]\nbackground = \"grey\"", "`black`, `white` or `learned`"),
+        ("train = 3", "train"),
+        ("[train\n", "line 1"),
+    ] {
+        let message = format!("{:#}", RunConfig::parse(text).unwrap_err());
+        assert!(message.contains(part), "{text}: {message}");
+    }
+}
+
+#[test]
+fn any_key_can_be_set_by_its_path() {
+    let config = RunConfig::default();
+    let keys =
+        ["train.iterations=9", "train.modules.pruning.form=tiered", "train.hac.sample = 1", "encoding.tiers=[0.5, 0]"];
+    let set = config.with_keys(&keys.map(str::to_owned)).unwrap();
+    let pruning = set.train.modules.pruning.unwrap();
+    assert_eq!((set.train.iterations, set.train.hac.sample, set.encoding.tiers.as_slice()), (9, 1.0, &[0.5, 0.0][..]));
+    assert_eq!((pruning.form, pruning.beta), (pruning::Form::Tiered, 1e-3), "the rest has its defaults");
+    assert_eq!(RunConfig::parse(&set.to_toml().unwrap()).unwrap(), set);
+    for (key, part) in [
+        ("train.iterations", "needs KEY=VALUE"),
+        ("train.steps=3", "unknown key `train.steps`; known here: "),
+        ("train.modules.pruning.depth=3", "unknown key `train.modules.pruning.depth`"),
+        ("train.modules.pruning.form=soft", "soft"),
+    ] {
+        let message = format!("{:#}", config.with_keys(&[key.to_owned()]).unwrap_err());
+        assert!(message.contains(part), "{key}: {message}");
+    }
+}
+
+#[test]
+fn only_what_decides_the_result_counts_as_a_difference() {
+    let a = RunConfig::default();
+    let mut b = RunConfig { output: "elsewhere".into(), checkpoint_every: Some(3), ..a.clone() };
+    assert_eq!(a.difference(&b).unwrap(), None);
+    b.train.shape.n_offsets = 5;
+    assert_eq!(a.difference(&b).unwrap().unwrap(), "`train.shape.n_offsets` is 10 and 5");
+    b = RunConfig { capture: CaptureOptions { max_resolution: Some(200), ..a.capture.clone() }, ..a.clone() };
+    assert_eq!(a.difference(&b).unwrap().unwrap(), "`capture.max_resolution` is nothing and 200");
+}

@@ -1,0 +1,205 @@
+//! `pocketsplat train`: a capture in, a bundle out.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::atomic::AtomicBool;
+
+use anyhow::{Context, Result, bail};
+use pocketsplat_capture::dataset::{Background, Capture, View};
+use pocketsplat_core::Bundle;
+use pocketsplat_core::budget::MAX_FRAME_PX;
+use pocketsplat_trainer::bundle::Written;
+use pocketsplat_trainer::device::Fitted;
+use pocketsplat_trainer::effects::Effect;
+use pocketsplat_trainer::train::finish::Finished;
+use pocketsplat_trainer::train::run::{Ending, Interval, RunError, RunFolder};
+use pocketsplat_trainer::train::{TrainConfig, Trainer};
+use serde::Serialize;
+
+use super::capture::CaptureArgs;
+use super::encode::{Encoding, largest_px};
+use super::progress::Progress;
+use super::run_config::RunConfig;
+use super::train_args::Args;
+use super::{effects, output, stop};
+
+/// Seconds between checkpoints unless the user says otherwise: what an accident may cost.
+const CHECKPOINT_SECONDS: f64 = 60.0;
+
+/// What a finished run reports.
+#[derive(Debug, Serialize)]
+pub(crate) struct TrainResult {
+    pub(crate) bundle: PathBuf,
+    pub(crate) bundle_bytes: usize,
+    pub(crate) n_anchors: usize,
+    /// Of these, with a drawn offset; the others are not coded.
+    pub(crate) n_valid_anchors: usize,
+    pub(crate) drawn_offsets: usize,
+    pub(crate) undrawn_offsets: usize,
+    /// What coded the symbols: the shorter of the two unless the configuration forces one.
+    pub(crate) coder: &'static str,
+    /// Bytes of features, log-scales and offsets under the float context model.
+    pub(crate) estimated_bytes: Option<[f64; 3]>,
+    pub(crate) bytes_per_anchor: f64,
+    pub(crate) iterations: u32,
+    pub(crate) dropped_steps: u32,
+    pub(crate) train_s: f64,
+    /// Processor time of all threads.
+    pub(crate) train_processor_s: f64,
+    pub(crate) iterations_per_s: f64,
+    pub(crate) background: String,
+    pub(crate) effects: String,
+}
+
+pub(crate) fn run(args: &Args) -> Result<ExitCode> {
+    let (mut config, capture, folder) = match args.resume() {
+        Some(path) => {
+            let folder = RunFolder::reopen(path)?;
+            let begun = RunConfig::parse(&folder.config()?);
+            let begun = begun.with_context(|| format!("the config.toml in {} can not be used", path.display()))?;
+            let mut config = args.applied_to(begun.clone())?;
+            if let Some(difference) = begun.difference(&config)? {
+                bail!("the run began with another setting than the command line asks for: {difference}; leave it out");
+            }
+            // What was chosen stays; what an accident kept from being chosen is measured now.
+            config.effects = begun.effects;
+            output::check_writable(&config.output)?;
+            let capture = load(&mut config)?;
+            (config, capture, folder)
+        }
+        None => {
+            let mut config = args.resolved()?;
+            output::check_writable(&config.output)?;
+            // Before the folder is touched: a capture that does not load must not cost an earlier run its results.
+            let capture = load(&mut config)?;
+            let folder = RunFolder::start(&args.run_folder(&config)?, &config.to_toml()?, args.overwrite())?;
+            (config, capture, folder)
+        }
+    };
+    effects::resolve(&mut config, &capture, folder.path())?;
+    // Not before: until here there is nothing to keep, and Ctrl-C may end the process at once.
+    let stop = stop::flag()?;
+    match train_in(folder, &config, &capture, args.resume().is_some(), &stop)? {
+        Some(result) => output::print(&result, args.json()).map(|()| ExitCode::SUCCESS),
+        None => Ok(ExitCode::from(stop::INTERRUPTED)),
+    }
+}
+
+/// Loads the capture that a run is configured for, and decides what the configuration left to it.
+pub(crate) fn load(config: &mut RunConfig) -> Result<Capture> {
+    let source = CaptureArgs { dataset: config.dataset.clone(), options: config.capture.clone() };
+    let capture = source.load(config.train.seed)?;
+    let (largest, most) = (largest_px(&capture).into_iter().max().unwrap_or(0), u32::from(MAX_FRAME_PX));
+    if largest > most {
+        bail!(
+            "the photographs are {largest} px wide or high and the decoder draws {most}; use --max-resolution {most}"
+        );
+    }
+    config.train = config.train.resolved_for(&capture);
+    eprintln!("voxel size {:.5}, normalised units", config.train.voxel_size_for(&capture));
+    Ok(capture)
+}
+
+/// Trains in a run folder, from its checkpoint where the run `resumes`, and writes the bundle; `None` when `stop` was set
+/// before the end.
+pub(crate) fn train_in(
+    mut folder: RunFolder,
+    config: &RunConfig,
+    capture: &Capture,
+    resumes: bool,
+    stop: &AtomicBool,
+) -> Result<Option<TrainResult>> {
+    let path = folder.path().to_owned();
+    let mut trainer = if resumes { resumed(&folder, config, capture)? } else { Trainer::new(capture, config.train)? };
+    folder.write_config(&config.to_toml()?)?;
+    let interval = config.checkpoint_every.map_or(Interval::Seconds(CHECKPOINT_SECONDS), Interval::Iterations);
+    let how_to_go_on = || format!("go on with `pocketsplat train --resume {}`", path.display());
+    let mut progress = Progress::new(trainer.iteration, config.train.iterations);
+    let ending = folder.train(&mut trainer, &mut progress, interval, stop);
+    let ending = ending.map_err(|error| {
+        let stopped = format!("training stopped at iteration {}", trainer.iteration);
+        match error {
+            // It would come to the same end again.
+            RunError::Train(_) => anyhow::Error::new(error).context(stopped),
+            _ => anyhow::Error::new(error).context(format!("{stopped}; to retry, {}", how_to_go_on())),
+        }
+    })?;
+    if ending == Ending::Interrupted {
+        eprintln!(
+            "interrupted after iteration {} of {}; {}",
+            trainer.iteration,
+            config.train.iterations,
+            how_to_go_on()
+        );
+        return Ok(None);
+    }
+    let result = write_bundle(&trainer, capture, &config.encoding, &config.output)
+        .with_context(|| format!("the training is done and kept; {}", how_to_go_on()))?;
+    folder.finish(&serde_json::to_string_pretty(&result)?, config.keep_checkpoints)?;
+    Ok(Some(result))
+}
+
+/// The run as its newest sound checkpoint has it, or at its start where it was stopped before the first one.
+fn resumed<'a>(folder: &RunFolder, config: &RunConfig, capture: &'a Capture) -> Result<Trainer<'a>> {
+    let Some(resumed) = folder.resume(capture)? else {
+        eprintln!("the run in {} has no checkpoint yet; it begins anew", folder.path().display());
+        return Ok(Trainer::new(capture, config.train)?);
+    };
+    for fault in &resumed.passed_over {
+        eprintln!("warning: a checkpoint is damaged, so the run goes on from an older one: {fault}");
+    }
+    let trainer = resumed.restored.trainer;
+    let at_checkpoint = RunConfig { train: *trainer.config(), ..config.clone() };
+    if let Some(difference) = config.difference(&at_checkpoint)? {
+        bail!("config.toml and the checkpoint disagree: {difference}; write back what the run began with");
+    }
+    let (then, now) = (&resumed.restored.written_by, trainer.kernels());
+    if *then != now {
+        eprintln!(
+            "warning: the checkpoint was computed with {then}; this is {now}. The run goes on, but will not end in the \
+             same bits as there"
+        );
+    }
+    eprintln!("going on after iteration {} of {}", trainer.iteration, config.train.iterations);
+    Ok(trainer)
+}
+
+/// Trains without a run folder and writes the bundle.
+pub(crate) fn train(capture: &Capture, config: TrainConfig, encoding: &Encoding, output: &Path) -> Result<TrainResult> {
+    let mut trainer = Trainer::new(capture, config)?;
+    trainer.run(&mut Progress::new(0, config.iterations))?;
+    write_bundle(&trainer, capture, encoding, output)
+}
+
+fn write_bundle(trainer: &Trainer<'_>, capture: &Capture, encoding: &Encoding, output: &Path) -> Result<TrainResult> {
+    let finished = trainer.finish()?;
+    let held_out: Vec<View> = trainer.validation_views().cloned().collect();
+    let Fitted { written: Written { bytes, .. }, finished, n_cut } = encoding.encode(finished, capture, &held_out)?;
+    output::write_whole(output, &bytes)?;
+    if n_cut > 0 {
+        eprintln!("left out the {n_cut} least important anchors, so that the bundle fits");
+    }
+    let Finished { scene, background, n_undrawn, estimated_bits, .. } = finished;
+    let n_anchors = scene.anchors.len();
+    Ok(TrainResult {
+        bundle: output.to_owned(),
+        bundle_bytes: bytes.len(),
+        n_anchors,
+        n_valid_anchors: (0..n_anchors).filter(|a| scene.anchors.has_drawn(*a)).count(),
+        drawn_offsets: (0..scene.anchors.mask_logits.len()).filter(|offset| scene.anchors.is_drawn(*offset)).count(),
+        undrawn_offsets: n_undrawn,
+        coder: if Bundle::parse(&bytes)?.context().is_some() { "context" } else { "static" },
+        estimated_bytes: estimated_bits.map(|bits| bits.map(|bits| bits / 8.0)),
+        bytes_per_anchor: bytes.len() as f64 / n_anchors as f64,
+        iterations: trainer.iteration,
+        dropped_steps: trainer.n_dropped(),
+        train_s: trainer.seconds,
+        train_processor_s: trainer.processor_seconds,
+        iterations_per_s: f64::from(trainer.iteration) / trainer.seconds,
+        background: match [Background::Black, Background::White].into_iter().find(|known| known.rgb8() == background) {
+            Some(known) => known.to_string(),
+            None => format!("{background:?}"),
+        },
+        effects: Effect::names(&Effect::all_in(trainer.config())),
+    })
+}

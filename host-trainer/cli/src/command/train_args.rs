@@ -1,0 +1,150 @@
+//! The options of `pocketsplat train`, each of which may also stand in a configuration.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use bytesize::ByteSize;
+use pocketsplat_trainer::device::{Choice, Limits, Target, choose};
+use pocketsplat_trainer::train::config::Hac;
+
+use super::named::{TARGETS, one_of};
+use super::run_config::RunConfig;
+use super::settings::{Settings, with_default};
+
+/// Train a scene from a capture and write it as a bundle.
+///
+/// Works in a run folder beside the bundle, from which an interrupted run goes on with --resume and ends in the same
+/// bytes.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Folder of the capture.
+    #[arg(required_unless_present_any = ["config", "resume"])]
+    dataset: Option<PathBuf>,
+    /// The bundle to write.
+    #[arg(short, long, value_name = "OUT.psb", required_unless_present_any = ["config", "resume"])]
+    output: Option<PathBuf>,
+    /// Folder for configuration, progress and checkpoints. [default: OUT.run]
+    #[arg(long, value_name = "DIR", conflicts_with = "resume")]
+    run: Option<PathBuf>,
+    /// Read the configuration, as a run folder has it; options given beside it count more.
+    #[arg(long, value_name = "FILE.toml", conflicts_with = "resume")]
+    config: Option<PathBuf>,
+    /// Go on with the run in this folder. A capture that has moved since is given as DATASET.
+    #[arg(long, value_name = "OUT.run")]
+    resume: Option<PathBuf>,
+    /// Start anew where an unfinished run lies.
+    #[arg(short = 'w', long, conflicts_with = "resume")]
+    overwrite: bool,
+    #[arg(long, help = with_default("Weight of a value's bits in the loss, for `--backbone hac`", Hac::default().lambda))]
+    lambda: Option<f64>,
+    #[command(flatten)]
+    device: DeviceArgs,
+    #[command(flatten)]
+    settings: Settings,
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What the device has that the bundle is for; what else the command line leaves open is chosen by it.
+#[derive(clap::Args)]
+#[command(next_help_heading = "Device")]
+struct DeviceArgs {
+    /// Scratch memory of the decoder, as 192KiB: the whole scene is to be drawn in it, the lowest tier surely is. Besides it a
+    /// firmware needs its stack and what it shows the frame with.
+    #[arg(long, value_name = "BYTES")]
+    ram: Option<ByteSize>,
+    /// The bundle's size at most, as 1MiB.
+    #[arg(long, value_name = "BYTES")]
+    flash: Option<ByteSize>,
+    /// The processor, which says how many instructions a frame may take.
+    #[arg(long, value_parser = one_of::<Target>(TARGETS))]
+    target: Option<Target>,
+}
+
+impl DeviceArgs {
+    fn limits(&self) -> Limits {
+        Limits {
+            ram_bytes: self.ram.map(|bytes| bytes.as_u64()),
+            flash_bytes: self.flash.map(|bytes| bytes.as_u64()),
+            frame_instructions: self.target.map(Target::frame_instructions),
+        }
+    }
+}
+
+impl Args {
+    /// The run folder to go on in, if any.
+    pub(crate) fn resume(&self) -> Option<&Path> {
+        self.resume.as_deref()
+    }
+
+    /// Whether an unfinished run may be replaced.
+    pub(crate) fn overwrite(&self) -> bool {
+        self.overwrite
+    }
+
+    /// Whether the result is printed as JSON.
+    pub(crate) fn json(&self) -> bool {
+        self.json
+    }
+
+    /// The configuration of a new run: defaults, then `--config`, then what else the command line says.
+    pub(crate) fn resolved(&self) -> Result<RunConfig> {
+        let base = match &self.config {
+            Some(path) => RunConfig::read(path)?,
+            None => RunConfig::default(),
+        };
+        let mut config = self.applied_to(base)?;
+        let limits = self.device.limits();
+        // A configuration that is given has been decided about.
+        if !limits.is_none() && self.config.is_none() {
+            let choice = choose(&limits)?;
+            config = self.settings.chosen(config, &choice);
+            config.train.hac.lambda = self.lambda.unwrap_or(choice.lambda);
+            let Choice { feature_dim, n_offsets, max_anchors, lambda, deciding } = choice;
+            eprintln!(
+                "for this device: features of width {feature_dim}, {n_offsets} offsets, at most {max_anchors} anchors ({deciding} \
+                 decides), lambda {lambda}, where the command line says nothing else"
+            );
+        }
+        for (path, name, option) in [(&config.dataset, "dataset", "DATASET"), (&config.output, "output", "--output")] {
+            if path.as_os_str().is_empty() {
+                bail!("the configuration names no `{name}`; give it there or as {option}");
+            }
+        }
+        config.check()?;
+        // Absolute, so that the run can go on from any folder.
+        for path in [&mut config.dataset, &mut config.output] {
+            *path = std::path::absolute(&path).with_context(|| format!("{} is no path", path.display()))?;
+        }
+        Ok(config)
+    }
+
+    /// `config` with everything replaced that the command line says.
+    pub(crate) fn applied_to(&self, mut config: RunConfig) -> Result<RunConfig> {
+        // Absolute, so that the run can go on from any folder.
+        for (into, given) in [(&mut config.dataset, &self.dataset), (&mut config.output, &self.output)] {
+            if let Some(path) = given {
+                *into = std::path::absolute(path).with_context(|| format!("{} is no path", path.display()))?;
+            }
+        }
+        let limits = self.device.limits();
+        if !limits.is_none() {
+            config.encoding.limits = limits;
+        }
+        config.effects.target = self.device.target.or(config.effects.target);
+        if let Some(lambda) = self.lambda {
+            config.train.hac.lambda = lambda;
+        }
+        self.settings.applied_to(config)
+    }
+
+    /// Where a new run works.
+    pub(crate) fn run_folder(&self, config: &RunConfig) -> Result<PathBuf> {
+        let folder = self.run.clone().unwrap_or_else(|| config.output.with_extension("run"));
+        if std::path::absolute(&folder).ok() == std::path::absolute(&config.output).ok() {
+            bail!("{} can not be both bundle and run folder; choose another folder with --run", folder.display());
+        }
+        Ok(folder)
+    }
+}

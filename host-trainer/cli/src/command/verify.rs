@@ -1,0 +1,227 @@
+//! `pocketsplat verify`: a bundle held to the memory contract.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, Result};
+use bytesize::ByteSize;
+use pocketsplat_capture::dataset::FrameSize;
+use pocketsplat_core::bundle::crc32;
+use pocketsplat_core::{Budget, Bundle, Camera, Plan};
+use pocketsplat_trainer::bundle::manifest::cameras_to_measure;
+use pocketsplat_trainer::metrics::psnr_db;
+use pocketsplat_trainer::render::decoder::{core_camera, core_image_of_tiers};
+use pocketsplat_trainer::render::host_camera;
+use pocketsplat_trainer::render::reference::ReferenceScene;
+use pocketsplat_trainer::verify::{Violation, exact_bytes, memory_does_not_show, ways_agree, work_is_bounded};
+use serde::Serialize;
+
+use super::bundle::BundleFile;
+use super::capture::{CaptureArgs, CaptureOptions};
+use super::eval::reference_image;
+use super::fit::{frame_budget, plan_within};
+use super::output;
+
+/// Views that are compared with the slow reference.
+const REFERENCE_VIEWS: usize = 3;
+/// Both frames are rounded to 8 bits, which alone costs 58.9 dB.
+const MIN_REFERENCE_DB: f64 = 50.0;
+/// Share of the planned memory that the fullest of the views measured needs.
+const MIN_USED: f64 = 0.9;
+
+/// Hold a bundle to the memory contract: the planned bytes suffice and one fewer is refused, nothing beside them is touched,
+/// nothing but the camera changes a pixel, work is bounded, frames are the reference's.
+///
+/// Ends with exit code 1 where a law does not hold.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// The bundle.
+    bundle: PathBuf,
+    /// The capture it was trained on, whose views the manifest was measured over; without it the bundle's preview is drawn.
+    dataset: Option<PathBuf>,
+    /// Scratch memory of the decoder, as 192KiB. [default: without limit]
+    #[arg(long, value_name = "BYTES")]
+    ram: Option<ByteSize>,
+    #[command(flatten)]
+    capture: CaptureOptions,
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// One law over all that it was tried on.
+#[derive(Serialize)]
+struct Row {
+    law: &'static str,
+    trials: usize,
+    /// What was found, or the first violation.
+    finding: String,
+    holds: bool,
+}
+
+#[derive(Serialize)]
+struct Verification {
+    bundle: PathBuf,
+    ram_bytes: Option<u64>,
+    scratch_bytes: usize,
+    n_tiers: u8,
+    pruning_rate: f32,
+    n_views: usize,
+    laws: Vec<Row>,
+    /// CRC-32 of each view's pixels, what a device's frame can be compared with.
+    frames: Vec<String>,
+}
+
+pub(crate) fn run(args: &Args) -> Result<ExitCode> {
+    let file = BundleFile::read(&args.bundle)?;
+    let bundle = file.parse()?;
+    let measured = args.dataset.is_some();
+    let cameras = cameras(args, &file, &bundle)?;
+    let size = args.capture.resolution.unwrap_or_else(|| largest(&cameras));
+    let budget = frame_budget(&bundle, Some(size))?;
+    let ram_bytes = args.ram.map(|ram| ram.as_u64());
+    let plan = plan_within(&bundle, &budget, ram_bytes.unwrap_or(u64::MAX))?;
+    let plans: Vec<Plan> = (1..=plan.n_tiers())
+        .map(|tiers| plan_within(&bundle, &budget.with_tiers(tiers), ram_bytes.unwrap_or(u64::MAX)))
+        .collect::<Result<_>>()?;
+    let mut laws = vec![
+        law(
+            "the planned bytes suffice, one fewer is refused by number",
+            plans.iter().map(|plan| exact_bytes(&bundle, *plan)),
+        ),
+        law(
+            "residency and strips change no pixel",
+            plans.iter().flat_map(|plan| {
+                let budget = budget.with_tiers(plan.n_tiers());
+                let bundle = &bundle;
+                cameras.iter().take(REFERENCE_VIEWS).map(move |camera| ways_agree(bundle, budget, camera))
+            }),
+        ),
+    ];
+    let marks = cameras.iter().map(|camera| memory_does_not_show(&bundle, plan, camera).map(|touched| touched.mark));
+    let (row, most_used) =
+        with_most("content and place of the memory do not show, nothing beside it is touched", marks);
+    laws.push(row);
+    laws.push(used(most_used, &plan, measured));
+    let drawn = cameras.iter().map(|camera| core_image_of_tiers(&bundle, &host_camera(camera), plan.n_tiers()));
+    let drawn = drawn.collect::<Result<Vec<_>, _>>()?;
+    if measured {
+        // The manifest's maxima are over these views, for the whole frame at once.
+        let whole = bundle.plan(&budget.with_tiers(plan.n_tiers()))?;
+        laws.push(law(
+            "work is within what was predicted",
+            drawn.iter().map(|frame| {
+                let mut work = frame.report.work();
+                if whole.is_resident() || whole.is_baked() {
+                    work.decoded_anchors = 0;
+                }
+                if whole.is_baked() {
+                    work.head_macs = 0;
+                }
+                work_is_bounded(whole, &work)
+            }),
+        ));
+    }
+    laws.push(reference_law(&file, &bundle, plan.n_tiers(), &cameras)?);
+    let holds = laws.iter().all(|law| law.holds);
+    let verification = Verification {
+        bundle: args.bundle.clone(),
+        ram_bytes,
+        scratch_bytes: plan.scratch_len(),
+        n_tiers: plan.n_tiers(),
+        pruning_rate: plan.pruning_rate(),
+        n_views: cameras.len(),
+        laws,
+        frames: drawn.iter().map(|frame| format!("{:08x}", crc32(&frame.image.rgb))).collect(),
+    };
+    if args.json {
+        output::print(&verification, true)?;
+    } else {
+        output::print_text(&table(&verification))?;
+    }
+    Ok(if holds { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// The views that the manifest was measured over, or the preview.
+fn cameras(args: &Args, file: &BundleFile, bundle: &Bundle<'_>) -> Result<Vec<Camera>> {
+    let Some(dataset) = &args.dataset else {
+        let preview = bundle.header().preview;
+        let size = args.capture.resolution.map(|size| frame_budget(bundle, Some(size))).transpose()?;
+        return Ok(vec![size.map_or(preview, |size: Budget| preview.resized(size.width_px, size.height_px))]);
+    };
+    let source = CaptureArgs { dataset: dataset.clone(), options: args.capture.clone() };
+    let capture = file.capture_options(bundle, &source)?.load(0)?;
+    let cameras: Vec<_> = capture.train.iter().map(|view| file.camera(bundle, &capture, view)).collect();
+    let cameras = cameras_to_measure(&cameras);
+    cameras.iter().map(|camera| core_camera(camera).context("a view of the capture can not be drawn")).collect()
+}
+
+/// A frame that holds each of the views.
+fn largest(cameras: &[Camera]) -> FrameSize {
+    let most = |side: fn(&Camera) -> u16| cameras.iter().map(side).max().unwrap_or(1).into();
+    FrameSize { width_px: most(|camera| camera.width_px), height_px: most(|camera| camera.height_px) }
+}
+
+fn law(law: &'static str, trials: impl Iterator<Item = Result<(), Violation>>) -> Row {
+    with_most(law, trials.map(|trial| trial.map(|()| 0))).0
+}
+
+/// A law whose trials return numbers, with the largest of these.
+fn with_most(law: &'static str, trials: impl Iterator<Item = Result<usize, Violation>>) -> (Row, usize) {
+    let (mut n, mut most, mut first) = (0, 0, None);
+    for trial in trials {
+        n += 1;
+        match trial {
+            Ok(number) => most = most.max(number),
+            Err(violation) => first = first.or(Some(violation)),
+        }
+    }
+    let holds = first.is_none();
+    (Row { law, trials: n, finding: first.unwrap_or_default(), holds }, most)
+}
+
+/// How much of the plan the fullest view needs; only views that the manifest was measured over can be asked for it.
+fn used(most: usize, plan: &Plan, measured: bool) -> Row {
+    let share = most as f64 / plan.scratch_len() as f64;
+    Row {
+        law: "the planned bytes are needed",
+        trials: 1,
+        finding: format!("{most} of {} bytes, {:.1} %", plan.scratch_len(), 100.0 * share),
+        holds: !measured || share >= MIN_USED,
+    }
+}
+
+/// Each tier's frames against the f64 reference's.
+fn reference_law(file: &BundleFile, bundle: &Bundle<'_>, n_tiers: u8, cameras: &[Camera]) -> Result<Row> {
+    let chunks_at = bundle.sections().last().map_or(0, |section| section.offset as usize);
+    let (mut lowest, mut trials) = (f64::INFINITY, 0);
+    for tier in (0..n_tiers).filter_map(|tier| bundle.tier(tier)) {
+        let cut = Bundle::parse(&file.bytes[..chunks_at + tier.end as usize])?;
+        let reference = ReferenceScene::from_bundle(&cut)?;
+        for camera in cameras.iter().take(REFERENCE_VIEWS).map(host_camera) {
+            let frame = core_image_of_tiers(&cut, &camera, u8::MAX)?;
+            lowest = lowest.min(psnr_db(&frame.image, &reference_image(&cut, &reference, &camera)));
+            trials += 1;
+        }
+    }
+    let finding = format!("{lowest:.1} dB at least, needed {MIN_REFERENCE_DB}");
+    Ok(Row { law: "frames are the f64 reference's", trials, finding, holds: lowest >= MIN_REFERENCE_DB })
+}
+
+fn table(verification: &Verification) -> String {
+    let mut text = format!(
+        "{}: {} tiers, {:.1} % pruned, {} bytes of scratch memory, {} views\n\n",
+        verification.bundle.display(),
+        verification.n_tiers,
+        100.0 * verification.pruning_rate,
+        verification.scratch_bytes,
+        verification.n_views
+    );
+    for Row { law, trials, finding, holds } in &verification.laws {
+        text += &format!("{:<6}{trials:>5}  {law}", if *holds { "holds" } else { "BROKEN" });
+        text += &if finding.is_empty() { "\n".to_owned() } else { format!(": {finding}\n") };
+    }
+    let shown = 8;
+    text += &format!("\nframes {}", verification.frames.iter().take(shown).cloned().collect::<Vec<_>>().join(" "));
+    text + if verification.frames.len() > shown { " …\n" } else { "\n" }
+}

@@ -1,0 +1,17 @@
+//! The `pocketsplat` command: results to stdout, progress to stderr, exit code 0, 1 (failed), 2 (wrong
+//! usage) or 130 (training interrupted, with a checkpoint to go on from).
+
+mod command;
+mod plot;
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    match command::run() {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

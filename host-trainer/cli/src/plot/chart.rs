@@ -1,0 +1,197 @@
+//! What all charts share: colours, sizes, axes, legend.
+
+use plotters::chart::ChartContext;
+use plotters::coord::ranged1d::{AsRangedCoord, Ranged, ValueFormatter};
+use plotters::coord::types::RangedCoordf64;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+/// Width of a figure and height of a panel, pixels of the SVG, which scales.
+pub(super) const WIDTH_PX: u32 = 900;
+pub(super) const PANEL_PX: u32 = 420;
+
+const FONT: &str = "sans-serif";
+const TEXT_PX: u32 = 15;
+const NOTE_PX: u32 = 12;
+const TITLE_PX: u32 = 18;
+const INK: RGBColor = RGBColor(51, 51, 51);
+const GRID: RGBColor = RGBColor(225, 225, 225);
+
+/// Colours that people who see colours differently can tell apart (Okabe and Ito 2008), the darker ones first.
+const COLOURS: [RGBColor; 7] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+    RGBColor(0, 0, 0),
+];
+
+/// The colour of the `i`-th curve; they come round after seven.
+pub(super) fn colour(i: usize) -> RGBColor {
+    COLOURS[i % COLOURS.len()]
+}
+
+/// Drawing to a string hardly fails; what the drawing library says when it does.
+#[derive(Debug, thiserror::Error)]
+#[error("could not draw: {0}")]
+pub(crate) struct DrawError(String);
+
+impl<E: std::error::Error + Send + Sync> From<DrawingAreaErrorKind<E>> for DrawError {
+    fn from(error: DrawingAreaErrorKind<E>) -> Self {
+        Self(error.to_string())
+    }
+}
+
+/// The part of a figure that one chart fills.
+pub(super) type Panel<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
+
+/// A chart under construction.
+pub(super) type Chart<'a, 'b, X> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<X, RangedCoordf64>>;
+
+/// What a chart says about itself.
+pub(super) struct Labels<'a> {
+    pub(super) title: &'a str,
+    pub(super) x: &'a str,
+    pub(super) y: &'a str,
+    pub(super) x_tick: &'a dyn Fn(&f64) -> String,
+    pub(super) y_tick: &'a dyn Fn(&f64) -> String,
+}
+
+/// Draws `n_panels` panels, one below the other, into an SVG.
+pub(super) fn figure(
+    n_panels: usize,
+    draw: impl FnOnce(&[Panel<'_>]) -> Result<(), DrawError>,
+) -> Result<String, DrawError> {
+    let mut svg = String::new();
+    let height_px = PANEL_PX * u32::try_from(n_panels).unwrap_or(1);
+    let root = SVGBackend::with_string(&mut svg, (WIDTH_PX, height_px)).into_drawing_area();
+    root.fill(&WHITE)?;
+    draw(&root.split_evenly((n_panels, 1)))?;
+    root.present()?;
+    drop(root);
+    Ok(svg)
+}
+
+/// A chart with axes, ready for its curves.
+pub(super) fn axes<'a, 'b, X>(
+    area: &'a Panel<'b>,
+    x: X,
+    y: std::ops::Range<f64>,
+    labels: &Labels<'_>,
+) -> Result<Chart<'a, 'b, X::CoordDescType>, DrawError>
+where
+    X: AsRangedCoord<Value = f64>,
+    X::CoordDescType: Ranged<ValueType = f64> + ValueFormatter<f64>,
+{
+    let mut chart = ChartBuilder::on(area)
+        .caption(labels.title, (FONT, TITLE_PX).into_font().color(&INK))
+        .margin(12)
+        // The last mark of the x axis is written around its end.
+        .margin_right(36)
+        .x_label_area_size(50)
+        .y_label_area_size(64)
+        .build_cartesian_2d(x, y)?;
+    chart
+        .configure_mesh()
+        .x_desc(labels.x)
+        .y_desc(labels.y)
+        .x_labels(8)
+        .y_labels(8)
+        .x_label_formatter(&labels.x_tick)
+        .y_label_formatter(&labels.y_tick)
+        .axis_style(INK)
+        .bold_line_style(GRID)
+        .light_line_style(TRANSPARENT)
+        .label_style((FONT, TEXT_PX).into_font().color(&INK))
+        .axis_desc_style((FONT, TEXT_PX).into_font().color(&INK))
+        .draw()?;
+    Ok(chart)
+}
+
+/// Draws the legend where rising curves leave room.
+pub(super) fn legend<'a, 'b: 'a, X: Ranged<ValueType = f64>>(chart: &mut Chart<'a, 'b, X>) -> Result<(), DrawError> {
+    Ok(chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::LowerRight)
+        .margin(12)
+        .legend_area_size(26)
+        .background_style(WHITE.mix(0.85))
+        .border_style(GRID)
+        .label_font((FONT, TEXT_PX).into_font().color(&INK))
+        .draw()?)
+}
+
+/// A line's sign in the legend.
+pub(super) fn line_sign(colour: RGBColor) -> impl Fn((i32, i32)) -> PathElement<(i32, i32)> {
+    move |(x, y)| PathElement::new(vec![(x, y), (x + 20, y)], colour.stroke_width(2))
+}
+
+/// A note beside a point of the `i`-th curve: below to the right, and above to the left for every other curve, where rising
+/// curves leave room for both.
+pub(super) fn note(i: usize, text: String) -> Text<'static, (i32, i32), String> {
+    let colour = colour(i);
+    let style: TextStyle<'static> = (FONT, NOTE_PX).into_font().color(&colour);
+    match i % 2 {
+        0 => Text::new(text, (7, 4), style),
+        _ => Text::new(text, (-7, -4), style.pos(Pos::new(HPos::Right, VPos::Bottom))),
+    }
+}
+
+/// The smallest range with all `values`, widened by a twentieth at both ends; around a single value by 1.
+pub(super) fn padded(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
+    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+    let pad = if high > low { 0.05 * (high - low) } else { 1.0 };
+    if low.is_finite() && high.is_finite() { low - pad..high + pad } else { 0.0..1.0 }
+}
+
+/// The range from 0 to a twentieth above the largest of `values`.
+pub(super) fn from_zero(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
+    let high = values.fold(0.0, f64::max);
+    0.0..if high > 0.0 { 1.05 * high } else { 1.0 }
+}
+
+/// The digits after the point that tell the marks of an axis over `range` apart.
+pub(super) fn decimals(range: &std::ops::Range<f64>) -> usize {
+    // Eight marks, about.
+    let step = (range.end - range.start) / 8.0;
+    (0..9).find(|&digits| step * 10f64.powi(digits) >= 1.0).map_or(9, |digits| digits as usize)
+}
+
+/// A whole number with its thousands apart.
+pub(super) fn thousands(value: f64) -> String {
+    let digits = format!("{:.0}", value.abs());
+    let mut text = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i) % 3 == 0 {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    if value <= -0.5 { format!("-{text}") } else { text }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thousands_stand_apart() {
+        let texts = [0.0, 999.0, 1000.0, 1_234_567.0, -12_000.0].map(thousands);
+        assert_eq!(texts, ["0", "999", "1,000", "1,234,567", "-12,000"]);
+    }
+
+    #[test]
+    fn marks_have_the_digits_that_tell_them_apart() {
+        assert_eq!([0.0..80.0, 30.0..35.0, 12.6..12.601].map(|range| decimals(&range)), [0, 1, 4]);
+    }
+
+    #[test]
+    fn a_range_is_never_empty() {
+        assert_eq!(padded([1.0, 3.0].into_iter()), 0.9..3.1);
+        assert_eq!(padded([2.0].into_iter()), 1.0..3.0);
+        assert_eq!(padded(std::iter::empty()), 0.0..1.0);
+        assert_eq!((from_zero([2.0].into_iter()), from_zero(std::iter::empty())), (0.0..2.1, 0.0..1.0));
+    }
+}

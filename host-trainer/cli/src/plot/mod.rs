@@ -1,0 +1,26 @@
+//! Plots of what runs and sweeps recorded, as SVG that any browser shows.
+//!
+//! [`Recording`] reads a CSV file and tells by its header what it holds; `learning` and `rate_distortion` draw several of
+//! a kind into one figure; `chart` is what both share. No fonts are needed to draw: text stays text.
+
+mod chart;
+mod cost;
+mod learning;
+mod names;
+mod rate_distortion;
+mod recording;
+
+pub(crate) use cost::{CostPanel, CostPoint, cost_svg};
+pub(crate) use learning::learning_curves_svg;
+pub(crate) use names::names_of;
+pub(crate) use rate_distortion::{SizeAxis, rate_distortion_svg};
+pub(crate) use recording::{LearningRow, Recording, ResultRow, results_csv};
+
+/// Something with the name that a legend gives it.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Named<T> {
+    /// The name.
+    pub name: String,
+    /// The thing.
+    pub what: T,
+}

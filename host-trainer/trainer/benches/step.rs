@@ -1,0 +1,125 @@
+//! One training step of a fixed size, per instruction set, with a table of where its time goes.
+//!
+//! Scaffold-GS: 20,000 visible anchors, F 32, K 10. HAC in its context phase: 50,000, F 50, K 10, with three of four offsets
+//! masked. Both make about 100,000 splats at 400×400 pixels. `cargo bench -p pocketsplat-trainer --bench step`; the rayon pool has
+//! the machine's cores unless `RAYON_NUM_THREADS` says otherwise.
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use glam::{DMat3, DVec3};
+use pocketsplat_capture::camera::Camera;
+use pocketsplat_trainer::ops::Pinhole;
+use pocketsplat_trainer::ops::noise::Stream;
+use pocketsplat_trainer::ops::simd::Level;
+use pocketsplat_trainer::scene::Scene;
+use pocketsplat_trainer::scene::init::initial_scene;
+use pocketsplat_trainer::train::TrainConfig;
+use pocketsplat_trainer::train::config::{Backbone, Hac, LossWeights, Rates};
+use pocketsplat_trainer::train::context_start::initial_context;
+use pocketsplat_trainer::train::optimiser::Optimiser;
+use pocketsplat_trainer::train::step::coding::{Coding, RateTerms};
+use pocketsplat_trainer::train::step::{Loss, StageSeconds, StepReport, Target, Workspace};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+const SIZE_PX: u32 = 400;
+/// Makes about half of the Gaussians opaque.
+const OPACITY_BIAS: f32 = 0.0;
+
+fn camera() -> Camera {
+    Camera {
+        rotation: DMat3::IDENTITY,
+        translation: DVec3::new(0.0, 0.0, 4.0),
+        focal_px: [555.0; 2],
+        principal_px: [f64::from(SIZE_PX) / 2.0; 2],
+        width_px: SIZE_PX,
+        height_px: SIZE_PX,
+    }
+}
+
+/// Anchors on a sphere's surface, about half of their Gaussians opaque, as in a trained scene.
+fn scene(backbone: Backbone, n_anchors: usize) -> Scene<f32> {
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let points: Vec<DVec3> = (0..n_anchors)
+        .map(|_| DVec3::from(std::array::from_fn(|_| rng.random_range(-1.0..1.0))).normalize_or(DVec3::X) * 1.1)
+        .collect();
+    let mut scene = initial_scene(TrainConfig::of(backbone).shape, 0.001, &points, &mut rng);
+    for value in scene.anchors.features.iter_mut().chain(&mut scene.anchors.offsets) {
+        *value = rng.random_range(-1.0..1.0);
+    }
+    scene.heads.opacity.b2.fill(OPACITY_BIAS);
+    for log_scale in &mut scene.anchors.log_scales {
+        *log_scale += rng.random_range(-0.2..0.6);
+    }
+    scene
+}
+
+/// The same with masks and a context model.
+fn coded_scene() -> Scene<f32> {
+    let mut scene = scene(Backbone::Hac, 50_000);
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    for logit in &mut scene.anchors.mask_logits {
+        *logit = if rng.random::<f32>() < 0.75 { -6.0 } else { 1.0 };
+    }
+    scene.context = Some(initial_context(&scene, Hac::default().base_steps(), &mut rng));
+    scene
+}
+
+fn benchmark(criterion: &mut Criterion) {
+    let Hac { lambda, sample, mask_weight, grid_weight, .. } = Hac::default();
+    let rate = RateTerms { lambda, sample, mask: mask_weight, grid: grid_weight };
+    let coding = Coding::Context { stream: Stream::of_run(1), rate, exact: None };
+    steps(criterion, "scaffold", &scene(Backbone::Scaffold, 20_000), &Coding::Raw);
+    steps(criterion, "hac", &coded_scene(), &coding);
+}
+
+fn steps(criterion: &mut Criterion, name: &str, scene: &Scene<f32>, coding: &Coding<'_, f32>) {
+    let pinhole = Pinhole::new(&camera());
+    let mut rng = ChaCha8Rng::seed_from_u64(2);
+    let truth: Vec<f32> = (0..3 * SIZE_PX * SIZE_PX).map(|_| rng.random_range(0.0..1.0)).collect();
+    let target = Target { camera: &pinhole, truth: &truth, mask: None, background: [0.0; 3] };
+    let mut group = criterion.benchmark_group(name);
+    group.sample_size(20);
+    for level in Level::available() {
+        let mut workspace = Workspace::with_level(&scene.shape, level);
+        let mut reports = Vec::new();
+        group.bench_function(level.to_string(), |bencher| {
+            bencher.iter(|| reports.push(workspace.step(scene, &target, &Loss::plain(LossWeights::default()), coding)));
+        });
+        print_stages(level, &reports);
+    }
+    let mut workspace = Workspace::new(&scene.shape);
+    let mut moving = scene.clone();
+    let mut optimiser = Optimiser::new(&moving);
+    workspace.step(&moving, &target, &Loss::plain(LossWeights::default()), coding);
+    group.bench_function("optimiser", |bencher| {
+        bencher.iter(|| optimiser.apply(&mut moving, &workspace, &Rates::default(), 0.5, 5.0));
+    });
+    group.finish();
+}
+
+fn print_stages(level: Level, reports: &[StepReport<f32>]) {
+    let Some(last) = reports.last() else { return };
+    let median = |stage: fn(&StageSeconds) -> f64| {
+        let mut ms: Vec<f64> = reports.iter().map(|r| 1e3 * stage(&r.stages)).collect();
+        ms.sort_by(f64::total_cmp);
+        ms[ms.len() / 2]
+    };
+    println!(
+        "{level}: {} Gaussians, {} splats, {} pairs; medians in ms: context {:.1}, anchors {:.1}, tiles {:.1}, rasterise {:.1}, loss {:.1}, \
+         rasterise backward {:.1}, anchors backward {:.1}, context backward {:.1}",
+        last.n_gaussians,
+        last.n_splats,
+        last.n_pairs,
+        median(|s| s.context),
+        median(|s| s.anchors),
+        median(|s| s.tiles),
+        median(|s| s.rasterise),
+        median(|s| s.loss),
+        median(|s| s.rasterise_backward),
+        median(|s| s.anchors_backward),
+        median(|s| s.context_backward),
+    );
+}
+
+criterion_group!(benches, benchmark);
+criterion_main!(benches);

@@ -1,0 +1,56 @@
+//! The writer of bundles: place, quantise, count, code, lay out.
+//!
+//! Stages in the order data flows through them: `order` → `quantise` → `table` or [`context`] → `chunk` → `layout`;
+//! beside them `size` says where the bytes of a bundle went, [`manifest`] what drawing it takes and [`annotate`] what each
+//! byte means. The format is described in `decoder-core/src/bundle/FORMAT.md`; what reads it is [`pocketsplat_core`], and
+//! nothing here decides a decoded symbol or value by itself.
+
+pub mod annotate;
+mod channels;
+mod chunk;
+pub mod context;
+mod decoded;
+mod directory;
+mod error;
+mod frequencies;
+mod heads;
+mod ink;
+mod lattice;
+mod layout;
+mod load;
+pub mod manifest;
+mod mask;
+mod order;
+mod quantise;
+mod size;
+mod stream;
+mod table;
+mod write;
+
+#[cfg(test)]
+mod tests;
+
+pub use channels::ChannelName;
+pub use decoded::{decoded_heads, decoded_scene, normalisation_of, shape_of};
+pub use error::WriteError;
+pub use load::{LoadError, load};
+pub use quantise::QuantisationSteps;
+pub use size::{SizePart, SizeReport};
+pub use stream::PartBits;
+pub use write::{Coder, WriteOptions, Written, write};
+
+use pocketsplat_capture::camera::Camera;
+use pocketsplat_capture::dataset::Normalisation;
+
+/// What a bundle says about its capture besides the scene itself.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BundleInfo {
+    /// From the capture's world to the scene's frame.
+    pub normalisation: Normalisation,
+    /// What lies behind everything.
+    pub background: [u8; 3],
+    /// Width and height of the training images, pixels.
+    pub training_px: [u32; 2],
+    /// One of the training views, normalised frame, so that a device can draw something by itself.
+    pub preview: Camera,
+}

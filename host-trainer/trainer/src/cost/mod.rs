@@ -1,0 +1,156 @@
+//! What accuracy costs in time: one bundle drawn in many ways, each measured against the f64 reference, the photographs and
+//! the instructions that it takes.
+
+mod arithmetic;
+mod counter;
+mod front;
+mod setting;
+
+use std::time::Instant;
+
+use pocketsplat_core::arithmetic::Arithmetic;
+use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, Stage};
+
+pub use arithmetic::{Choice, WithArithmetic};
+pub use counter::{CountError, Counter, MOST_VIEWS};
+pub use front::on_front;
+pub use setting::{Setting, knobs, quality_grid};
+
+use crate::device::Target;
+use crate::instructions::predict;
+use crate::metrics::{psnr_db, psnr_db_masked};
+use crate::render::decoder::image_of;
+use pocketsplat_capture::dataset::{Image, Mask};
+
+/// A view to draw, and what it is compared with.
+pub struct Sight<'a> {
+    /// The camera, in the bundle's frame.
+    pub camera: Camera,
+    /// What the f64 reference draws of the whole scene.
+    pub reference: Image,
+    /// The photograph, and where it shows the scene.
+    pub photograph: (&'a Image, Option<&'a Mask>),
+    /// Whether its instructions are among those of a setting.
+    pub counts: bool,
+}
+
+/// Instructions of a frame, in the order of [`Stage::ALL`].
+pub type Stages = [f64; Stage::ALL.len()];
+
+/// Instructions of a frame on a target, and how they are known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Instructions {
+    /// Of each stage.
+    pub stages: Stages,
+    /// Whether an emulated board counted them; predicted from what the frame consists of, if not.
+    pub counted: bool,
+}
+
+impl Instructions {
+    /// Of all stages.
+    pub fn total(&self) -> f64 {
+        self.stages.iter().sum()
+    }
+}
+
+/// What a setting does; means over the views where nothing else is said.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Measured {
+    /// What was set.
+    pub setting: Setting,
+    /// PSNR to the f64 reference of the worst view, dB; infinite when all bytes agree.
+    pub psnr_to_reference_db: f64,
+    /// Largest difference of a channel to the reference, of all views, 255ths.
+    pub worst_channel: u8,
+    /// PSNR to the photographs, dB.
+    pub psnr_db: f64,
+    /// Time of a frame on this machine, s.
+    pub host_s: f64,
+    /// Instructions of a frame on each target, of the views that [count](Sight::counts); predicted ones are of the exact arithmetic
+    /// alone, to which the costs were fitted.
+    pub instructions: Vec<Option<Instructions>>,
+    /// Scratch memory of the plan, bytes.
+    pub scratch_bytes: usize,
+    /// Splats of all views that had no place in it.
+    pub splats_dropped: u32,
+}
+
+/// Draws all views as `setting` says within `budget`, and measures.
+///
+/// Cost: two frames a view, one by one: the first warms the caches for the second, which is timed.
+///
+/// # Errors
+/// [`DecodeError`] when the budget is too small or the bundle damaged.
+///
+/// # Panics
+/// Without views.
+pub fn measure(
+    bundle: &Bundle<'_>,
+    sights: &[Sight<'_>],
+    setting: &Setting,
+    budget: Budget,
+    targets: &[Target],
+) -> Result<Measured, DecodeError> {
+    setting.arithmetic.call(Measurement { bundle, sights, setting, budget, targets })
+}
+
+/// The arguments of [`measure`].
+struct Measurement<'a, 'b> {
+    bundle: &'a Bundle<'b>,
+    sights: &'a [Sight<'a>],
+    setting: &'a Setting,
+    budget: Budget,
+    targets: &'a [Target],
+}
+
+impl WithArithmetic for Measurement<'_, '_> {
+    type Output = Result<Measured, DecodeError>;
+
+    fn call<A: Arithmetic>(self) -> Self::Output {
+        measure_in::<A>(&self)
+    }
+}
+
+fn measure_in<A: Arithmetic>(of: &Measurement<'_, '_>) -> Result<Measured, DecodeError> {
+    let Measurement { bundle, sights, setting, budget, targets } = *of;
+    assert!(!sights.is_empty(), "views to measure with");
+    let plan = bundle.plan(&setting.of(budget))?;
+    let mut scratch = vec![0; plan.scratch_len()];
+    let mut decoder = Decoder::bind_in::<A>(bundle, plan, &mut scratch)?;
+    let (n, n_counted) = (sights.len() as f64, sights.iter().filter(|sight| sight.counts).count() as f64);
+    let mut predicted = vec![[0.0; Stage::ALL.len()]; targets.len()];
+    let mut measured = Measured {
+        setting: setting.clone(),
+        psnr_to_reference_db: f64::INFINITY,
+        worst_channel: 0,
+        psnr_db: 0.0,
+        host_s: 0.0,
+        instructions: vec![None; targets.len()],
+        scratch_bytes: plan.scratch_len(),
+        splats_dropped: 0,
+    };
+    for sight in sights {
+        image_of(&mut decoder, &sight.camera)?;
+        let started = Instant::now();
+        let (image, report): (Image, FrameReport) = image_of(&mut decoder, &sight.camera)?;
+        measured.host_s += started.elapsed().as_secs_f64() / n;
+        measured.splats_dropped += report.splats_dropped;
+        let (photograph, mask) = sight.photograph;
+        measured.psnr_db += psnr_db_masked(&image, photograph, mask) / n;
+        measured.psnr_to_reference_db = measured.psnr_to_reference_db.min(psnr_db(&image, &sight.reference));
+        let differences = image.rgb.iter().zip(&sight.reference.rgb).map(|(a, b)| a.abs_diff(*b));
+        measured.worst_channel = measured.worst_channel.max(differences.max().unwrap_or(0));
+        if sight.counts {
+            let size_px = [sight.camera.width_px, sight.camera.height_px];
+            for (sums, target) in predicted.iter_mut().zip(targets) {
+                let stages = predict(target.costs(), bundle, &plan, &report, size_px);
+                sums.iter_mut().zip(stages).for_each(|(sum, stage)| *sum += stage / n_counted);
+            }
+        }
+    }
+    if setting.arithmetic == Choice::Exact {
+        measured.instructions =
+            predicted.into_iter().map(|stages| Some(Instructions { stages, counted: false })).collect();
+    }
+    Ok(measured)
+}

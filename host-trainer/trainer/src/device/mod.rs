@@ -1,0 +1,66 @@
+//! Budget in, bundle out: the model that a device affords, and the scene cut until it fits.
+//!
+//! [`choose`] picks a model before anything is trained, from what scenes take on average; [`fitted`] writes what was trained
+//! and leaves out the least important anchors until the bundle keeps the limits, so that these hold whatever was trained.
+
+mod choice;
+mod fitting;
+
+pub use choice::{Choice, Deciding, Infeasible, choose};
+pub use fitting::{Fitted, NoFit, fitted};
+
+use serde::{Deserialize, Serialize};
+
+use crate::instructions;
+
+/// What a device has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Limits {
+    /// Scratch memory of the decoder, bytes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ram_bytes: Option<u64>,
+    /// Flash for the bundle, bytes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub flash_bytes: Option<u64>,
+    /// Instructions of a frame that the model is chosen for; what was trained is not cut to them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frame_instructions: Option<u64>,
+}
+
+impl Limits {
+    /// Whether there is any.
+    pub fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+/// A kind of processor, with the frame that it is meant for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Target {
+    /// A Cortex-M4 with FPU: frames of 80 million instructions.
+    CortexM4,
+    /// A Cortex-M7: frames of 250 million instructions.
+    CortexM7,
+    /// RISC-V without an FPU (RV32IMAC): frames of 1,000 million instructions.
+    Riscv32imac,
+}
+
+impl Target {
+    /// Instructions of a frame at most.
+    pub fn frame_instructions(self) -> u64 {
+        match self {
+            Self::CortexM4 => 80_000_000,
+            Self::CortexM7 => 250_000_000,
+            Self::Riscv32imac => 1_000_000_000,
+        }
+    }
+
+    /// Whose costs it has.
+    pub fn costs(self) -> instructions::Target {
+        match self {
+            Self::CortexM4 | Self::CortexM7 => instructions::Target::CortexM,
+            Self::Riscv32imac => instructions::Target::RiscV32,
+        }
+    }
+}

@@ -1,0 +1,212 @@
+//! Pilots: short runs that differ in their effects.
+
+use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, MaxSplats};
+
+use super::search::{Trials, search};
+use super::{Effect, Price, Worth};
+use crate::device::Target;
+use crate::instructions::predict;
+use crate::metrics::psnr_db_masked;
+use crate::render::decoder::{core_camera, image_of};
+use crate::scene::Scene;
+use crate::train::config::{Backbone, MIN_VIEWS_TO_HOLD_OUT};
+use crate::train::finish::Finished;
+use crate::train::module::Modules;
+use crate::train::step::StepReport;
+use crate::train::{Observer, TrainConfig, TrainError, Trainer};
+use pocketsplat_capture::dataset::{Capture, Image, View};
+
+/// Runs below this many iterations are too short for pilots of them to say anything.
+///
+/// Lego with view direction is 0.6 dB worse than without after pilots of 500 iterations and 1.7 dB better after 2,000: with more inputs
+/// there is more to learn (`docs/effects.md`).
+pub const LEAST_ITERATIONS: u32 = 16_000;
+/// Share of the run's iterations that each pilot takes.
+///
+/// At half the resolution and for the image alone an iteration takes about a quarter of one of the run's with `hac`, so the seven
+/// to ten pilots take about a quarter of its time.
+const PILOT_SHARE: f64 = 0.125;
+/// Of so many training views one is held out to measure with.
+const HOLD_OUT_EVERY: usize = 8;
+
+/// A capture for pilots.
+#[derive(Debug)]
+pub struct PilotCapture {
+    /// At half the resolution; its test views are training views that are held out here.
+    reduced: Capture,
+    /// Held-out views as they were.
+    held_out: Vec<View>,
+}
+
+impl PilotCapture {
+    /// Halves the views of `capture` and holds some of those it trains on out; never looks at its test views. `None` where it has
+    /// too few to spare any.
+    pub fn of(capture: &Capture) -> Option<Self> {
+        if capture.train.len() < MIN_VIEWS_TO_HOLD_OUT {
+            return None;
+        }
+        let views = |held_out: bool| {
+            let is_held_out = |i: usize| i % HOLD_OUT_EVERY == HOLD_OUT_EVERY / 2;
+            capture.train.iter().enumerate().filter(move |(i, _)| is_held_out(*i) == held_out).map(|(_, view)| view)
+        };
+        let reduced = Capture {
+            train: views(false).map(halved).collect(),
+            test: views(true).map(halved).collect(),
+            points: capture.points.clone(),
+            ..*capture
+        };
+        Some(Self { reduced, held_out: views(true).cloned().collect() })
+    }
+}
+
+/// A view with each side half as long, averaged by area.
+fn halved(view: &View) -> View {
+    let [width_px, height_px] = [view.image.width_px, view.image.height_px].map(|px| (px / 2).max(1));
+    View {
+        name: view.name.clone(),
+        camera: view.camera.resized(width_px, height_px),
+        image: view.image.area_resized(width_px, height_px),
+        mask: view.mask.as_ref().map(|mask| mask.area_resized(width_px, height_px)),
+    }
+}
+
+/// For which device pilots are drawn.
+#[derive(Clone, Copy, Debug)]
+pub struct Drawing {
+    /// Scratch memory of the decoder, bytes; without limit where there is none.
+    pub ram_bytes: Option<u64>,
+    /// Whose instructions count.
+    pub target: Target,
+}
+
+/// Trains pilots without effects, with each and with those that gained something, less what does not pay among them; says what each was
+/// worth, and which one is chosen.
+///
+/// Quality is measured on held-out views at the pilots' size, instructions at the capture's own. Cost: seven to ten eighths of the
+/// run's iterations, each about a quarter of one of the run's.
+///
+/// * `config`: of the run, for whose length, seed and widths the pilots stand; other effects than the measured are kept. * `encode`: a
+///   scene as a bundle. * `begins`: hears of each pilot before it is trained, by its effects.
+///
+/// # Errors
+/// Those of training, of `encode` and of decoding.
+pub fn measure<E: From<TrainError> + From<DecodeError>>(
+    capture: &PilotCapture,
+    config: &TrainConfig,
+    price: &Price,
+    drawing: Drawing,
+    mut encode: impl FnMut(Finished, &Capture) -> Result<Vec<u8>, E>,
+    mut begins: impl FnMut(&[Effect]),
+) -> Result<Trials, E> {
+    let mut worth_of = |effects: &[Effect], config: &TrainConfig| -> Result<Worth, E> {
+        begins(effects);
+        let mut trainer = Trainer::new(&capture.reduced, pilot_config(config, effects))?;
+        trainer.run(&mut Silent)?;
+        let bytes = encode(trainer.finish()?, &capture.reduced)?;
+        Ok(worth(&bytes, capture, drawing)?)
+    };
+    search(price, |effects, seed| worth_of(effects, &TrainConfig { seed: config.seed ^ seed, ..*config }))
+}
+
+/// The run in short, for the image alone: so few steps leave a rate no time, and its noise would be more than what is measured.
+fn pilot_config(config: &TrainConfig, effects: &[Effect]) -> TrainConfig {
+    let (backbone, modules) = (Backbone::Scaffold, Modules { pruning: None, ..config.modules });
+    let iterations = config.iteration_at(PILOT_SHARE).max(1);
+    let config = TrainConfig { backbone, iterations, validation_every: 0, modules, ..*config };
+    Effect::measured_only(effects, &config)
+}
+
+/// What a pilot's bundle is worth on the views that were held out of it.
+fn worth(bytes: &[u8], capture: &PilotCapture, drawing: Drawing) -> Result<Worth, DecodeError> {
+    let bundle = Bundle::parse(bytes)?;
+    let (mut psnr_db, mut instructions) = (0.0, 0.0);
+    let n = capture.reduced.test.len() as f64;
+    draw(&bundle, &capture.reduced.test, drawing, |view, image, _| {
+        psnr_db += psnr_db_masked(&image, &view.image, view.mask.as_ref()) / n;
+    })?;
+    draw(&bundle, &capture.held_out, drawing, |_, _, frame_instructions| instructions += frame_instructions / n)?;
+    Ok(Worth { psnr_db, instructions, bytes: bytes.len() })
+}
+
+/// Draws views by the plan that a device would make, and hands on each image and its predicted instructions.
+fn draw(
+    bundle: &Bundle<'_>,
+    views: &[View],
+    drawing: Drawing,
+    mut drawn: impl FnMut(&View, Image, f64),
+) -> Result<(), DecodeError> {
+    let cameras = views.iter().map(|view| core_camera(&view.camera)).collect::<Result<Vec<_>, _>>()?;
+    let largest = |side: fn(&Camera) -> u16| cameras.iter().map(side).max().unwrap_or(1);
+    let frame = Budget::for_frame(largest(|camera| camera.width_px), largest(|camera| camera.height_px));
+    let limited = drawing.ram_bytes.map(|ram| frame.in_bytes(usize::try_from(ram).unwrap_or(usize::MAX)));
+    // A pilot for which the memory does not suffice is measured as if it did; the run's scene will be cut until it does.
+    let plan = match limited.map(|budget| bundle.plan(&budget)) {
+        Some(Ok(plan)) => plan,
+        _ => bundle.plan(&frame.with_max_splats(MaxSplats::Worst))?,
+    };
+    let mut scratch = vec![0; plan.scratch_len()];
+    let mut decoder = Decoder::bind(bundle, plan, &mut scratch)?;
+    for (view, camera) in views.iter().zip(&cameras) {
+        let (image, report) = image_of(&mut decoder, camera)?;
+        let size_px = [camera.width_px, camera.height_px];
+        drawn(view, image, predict(drawing.target.costs(), bundle, &plan, &report, size_px).iter().sum());
+    }
+    Ok(())
+}
+
+/// Hears of steps and says nothing.
+struct Silent;
+
+impl Observer for Silent {
+    fn step(&mut self, _iteration: u32, _report: &StepReport<f32>, _scene: &Scene<f32>) {}
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bundle::{BundleInfo, WriteOptions, write};
+    use crate::train::test_capture::{many_views, tiny_config};
+
+    #[test]
+    fn pilots_see_no_test_view_and_are_measured_on_none_that_they_train_on() {
+        let mut capture = many_views(24);
+        capture.test = capture.train.split_off(20);
+        let pilots = PilotCapture::of(&capture).expect("views to spare");
+        let names = |views: &[View]| views.iter().map(|view| view.name.clone()).collect::<Vec<_>>();
+        let (trained, held_out) = (names(&pilots.reduced.train), names(&pilots.reduced.test));
+        assert_eq!((trained.len(), held_out.len()), (18, 2));
+        assert!(held_out.iter().all(|name| !trained.contains(name)));
+        assert!(names(&capture.test).iter().all(|name| !trained.contains(name) && !held_out.contains(name)));
+        assert_eq!(names(&pilots.held_out), held_out);
+        assert_eq!(pilots.reduced.train[0].image.width_px, capture.train[0].image.width_px / 2);
+        capture.train.truncate(MIN_VIEWS_TO_HOLD_OUT - 1);
+        assert!(PilotCapture::of(&capture).is_none(), "too few to spare");
+    }
+
+    #[test]
+    fn every_measured_effect_has_a_pilot_and_what_costs_too_much_is_not_chosen() {
+        let capture = many_views(12);
+        let pilots = PilotCapture::of(&capture).expect("views to spare");
+        let encode = |finished: Finished, capture: &Capture| {
+            let info = BundleInfo {
+                normalisation: capture.normalisation,
+                background: [0; 3],
+                training_px: [12, 12],
+                preview: capture.train[0].camera.clone(),
+            };
+            Ok::<_, Box<dyn std::error::Error + Send + Sync>>(
+                write(&finished.scene, &info, &WriteOptions::default())?.bytes,
+            )
+        };
+        let drawing = Drawing { ram_bytes: None, target: Target::CortexM4 };
+        let dear = Price { effect_db: 1e3, ..Price::default() };
+        let mut begun = Vec::new();
+        let begins = |effects: &[Effect]| begun.push(Effect::names(effects));
+        let trials = measure(&pilots, &tiny_config(160), &dear, drawing, encode, begins).expect("pilots");
+        assert_eq!(begun, ["none", "none", "view-colour", "view-geometry", "view-distance", "detail", "anisotropy"]);
+        assert!(trials.chance_db > 0.0, "two seeds, two scenes");
+        assert!(trials.each.iter().all(|trial| trial.worth.instructions > 0.0 && trial.worth.psnr_db.is_finite()));
+        let chosen: Vec<_> = trials.each.iter().filter(|trial| trial.chosen).map(|trial| &trial.effects).collect();
+        assert_eq!(chosen, [&Vec::new()]);
+    }
+}

@@ -1,0 +1,72 @@
+//! The camera as the operations see it.
+
+use super::Real;
+use pocketsplat_capture::camera::Camera;
+
+/// Centres at this depth or nearer are not drawn, normalised units (method constant of 3DGS): the f32 nearest to 0.2, so
+/// that every precision draws the same.
+pub const NEAR: f64 = 0.2_f32 as f64;
+
+/// A pinhole camera in the number type of the operations; conventions of [`Camera`].
+#[derive(Clone, Copy, Debug)]
+pub struct Pinhole<R> {
+    /// World to camera, rows.
+    pub rotation: [[R; 3]; 3],
+    /// World to camera.
+    pub translation: [R; 3],
+    /// Camera centre, world frame.
+    pub centre_world: [R; 3],
+    /// `[fx, fy]`, pixels.
+    pub focal_px: [R; 2],
+    /// `[cx, cy]`, pixels.
+    pub principal_px: [R; 2],
+    /// `[width, height]`, pixels.
+    pub size_px: [usize; 2],
+}
+
+impl<R: Real> Pinhole<R> {
+    /// Rounds `camera` to the number type.
+    pub fn new(camera: &Camera) -> Self {
+        let rotation = camera.rotation.transpose().to_cols_array_2d();
+        Self {
+            rotation: rotation.map(|row| row.map(R::real)),
+            translation: camera.translation.to_array().map(R::real),
+            centre_world: camera.centre_world().to_array().map(R::real),
+            focal_px: camera.focal_px.map(R::real),
+            principal_px: camera.principal_px.map(R::real),
+            size_px: [camera.width_px as usize, camera.height_px as usize],
+        }
+    }
+
+    /// `R·p + t`.
+    #[inline(always)]
+    pub fn to_cam(&self, point_world: [R; 3]) -> [R; 3] {
+        let mut point_cam = self.translation;
+        for (out, row) in point_cam.iter_mut().zip(&self.rotation) {
+            *out += row[0] * point_world[0] + row[1] * point_world[1] + row[2] * point_world[2];
+        }
+        point_cam
+    }
+
+    /// `Rᵀ·g`: takes the gradient of a camera-frame vector to the world frame.
+    #[inline(always)]
+    pub fn gradient_to_world(&self, gradient_cam: [R; 3]) -> [R; 3] {
+        let mut world = [R::ZERO; 3];
+        for (row, g) in self.rotation.iter().zip(gradient_cam) {
+            for (out, r) in world.iter_mut().zip(row) {
+                *out += *r * g;
+            }
+        }
+        world
+    }
+
+    /// Bounds of x/z (axis 0) or y/z (axis 1) inside which the EWA Jacobian is evaluated: the image's own bounds plus
+    /// 15 % of its size on either side, which for a central principal point is 3DGS's 1.3·tan(fov/2).
+    #[inline(always)]
+    pub fn slope_bounds(&self, axis: usize) -> [R; 2] {
+        let size = R::real(self.size_px[axis] as f64);
+        let (focal, principal) = (self.focal_px[axis], self.principal_px[axis]);
+        let margin = R::real(0.15) * size;
+        [-(principal + margin) / focal, (size - principal + margin) / focal]
+    }
+}

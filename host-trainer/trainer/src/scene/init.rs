@@ -1,0 +1,145 @@
+//! Where a scene starts: one anchor per occupied lattice cell, heads drawn at random.
+
+use std::collections::BTreeSet;
+
+use glam::DVec3;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use super::{Anchors, Head, Heads, INITIAL_MASK_LOGIT, ModelShape, Scene};
+use crate::ops::Real;
+use pocketsplat_capture::dataset::nearest_squared;
+
+/// Squared distances below this are lifted to it before the logarithm.
+const MIN_SQUARED_SPACING: f64 = 1e-7;
+
+/// Builds the starting scene from points (Lu et al. 2024, Scaffold-GS, section 3.1).
+///
+/// Anchors sit at unique(round(p/ε))·ε in lexicographic order; offsets and features are 0; all log-scales are
+/// ln √(mean squared distance to the three nearest anchors); heads are drawn from U(−1/√n_in, 1/√n_in), but that of detail
+/// ends in zeros, so that it adds nothing at first.
+pub fn initial_scene(shape: ModelShape, voxel_size: f64, points: &[DVec3], rng: &mut ChaCha8Rng) -> Scene<f32> {
+    let cells: BTreeSet<[i32; 3]> = points.iter().map(|p| lattice_cell(*p, voxel_size)).collect();
+    let lattice: Vec<[i32; 3]> = cells.into_iter().collect();
+    let positions: Vec<DVec3> = lattice.iter().map(|c| DVec3::from(c.map(f64::from)) * voxel_size).collect();
+    let log_scales = mean_squared_spacing(&positions)
+        .flat_map(|squared| {
+            std::iter::repeat_n(f32::real(0.5 * squared.max(MIN_SQUARED_SPACING).ln()), shape.n_log_scales())
+        })
+        .collect();
+    let n = lattice.len();
+    let anchors = Anchors {
+        lattice,
+        features: vec![0.0; n * shape.feature_dim],
+        log_scales,
+        offsets: vec![0.0; n * shape.n_offsets * 3],
+        mask_logits: vec![f32::real(INITIAL_MASK_LOGIT); n * shape.n_offsets],
+        places: Vec::new(),
+    };
+    let mut heads = Heads::filled(&shape, 0.0f32);
+    // Streams of their own: with a detail head or a feature bank or without, everything else begins and grows alike.
+    let [mut of_detail, mut of_bank] = [2, 3].map(|stream| {
+        let mut rng = rng.clone();
+        rng.set_stream(stream);
+        rng
+    });
+    let names: Vec<_> = heads.names().collect();
+    for (name, head) in names.into_iter().zip(heads.each_mut()) {
+        let rng = match name {
+            "detail" => &mut of_detail,
+            "feature bank" => &mut of_bank,
+            _ => &mut *rng,
+        };
+        let fans = [head.n_in, head.n_in, head.n_hidden, head.n_hidden];
+        for (group, fan_in) in head.groups_mut().into_iter().zip(fans) {
+            let bound = f32::real(1.0 / (fan_in as f64).sqrt());
+            for weight in group {
+                *weight = rng.random_range(-bound..bound);
+            }
+        }
+    }
+    if let Some(detail) = &mut heads.detail {
+        detail.w2.fill(0.0);
+        detail.b2.fill(0.0);
+    }
+    // A feature bank shows nothing while all features are 0.
+    if shape.geometry_inputs() == shape.feature_dim {
+        draw_all_at_first(&mut heads.opacity);
+    }
+    Scene { shape, voxel_size, anchors, heads, context: None }
+}
+
+/// Turns the biases of an opacity head that sees features alone, all of them 0 at first, so that no opacity begins below 0.
+///
+/// An offset whose opacity is below 0 is not drawn and learns nothing; where the view counts, another view may draw it.
+fn draw_all_at_first(opacity: &mut Head<f32>) {
+    let rows = opacity.w2.chunks_exact(opacity.n_hidden).zip(&mut opacity.b2);
+    for (row, bias) in rows {
+        let hidden: f32 = row.iter().zip(&opacity.b1).map(|(w, b)| w * b.max(0.0)).sum();
+        *bias = (hidden + *bias).abs() - hidden;
+    }
+}
+
+/// The lattice cell nearest to a point, ties to even.
+pub fn lattice_cell(point: DVec3, cell_size: f64) -> [i32; 3] {
+    #[expect(clippy::cast_possible_truncation, reason = "scenes are a few thousand cells wide; the cast saturates")]
+    let cell = (point / cell_size).to_array().map(|c| c.round_ties_even() as i32);
+    cell
+}
+
+/// Mean squared distance of every point to its three nearest others; fewer where there are fewer.
+fn mean_squared_spacing(points: &[DVec3]) -> impl Iterator<Item = f64> {
+    nearest_squared::<3>(points).into_iter().map(|nearest| {
+        let (sum, n) =
+            nearest.iter().filter(|d| d.is_finite()).fold((0.0, 0), |(sum, n), squared| (sum + squared, n + 1));
+        sum / f64::from(n.max(1))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ops::finite_difference::random;
+    use rand::SeedableRng;
+
+    #[test]
+    fn spacing_agrees_with_the_search_over_all_pairs() {
+        let points: Vec<DVec3> = random(1, 900).chunks_exact(3).map(DVec3::from_slice).collect();
+        for (i, found) in mean_squared_spacing(&points).enumerate() {
+            let mut all: Vec<f64> = points
+                .iter()
+                .enumerate()
+                .filter(|(j, _)| *j != i)
+                .map(|(_, q)| points[i].distance_squared(*q))
+                .collect();
+            all.sort_by(f64::total_cmp);
+            let expected = all[..3].iter().sum::<f64>() / 3.0;
+            assert!((found - expected).abs() < 1e-12, "point {i}: {found} against {expected}");
+        }
+        assert_eq!(mean_squared_spacing(&[DVec3::ONE]).collect::<Vec<_>>(), [0.0]);
+    }
+
+    #[test]
+    fn without_view_inputs_every_offset_begins_drawn() {
+        let plain = ModelShape::plain(8, 10);
+        for seed in 0..20 {
+            let Head { n_hidden, w2, b1, b2, .. } =
+                initial_scene(plain, 0.1, &[DVec3::ZERO], &mut ChaCha8Rng::seed_from_u64(seed)).heads.opacity;
+            for (row, bias) in w2.chunks_exact(n_hidden).zip(&b2) {
+                let logit: f32 = row.iter().zip(&b1).map(|(w, b)| w * b.max(0.0)).sum::<f32>() + bias;
+                assert!(logit > 0.0, "seed {seed}: {logit}");
+            }
+        }
+    }
+
+    #[test]
+    fn one_anchor_per_cell_in_lexicographic_order() {
+        let shape = crate::train::TrainConfig::default().shape;
+        let points = [DVec3::new(0.5, 0.0, 0.0), DVec3::new(0.0, 0.31, 0.0), DVec3::new(0.01, 0.29, 0.0)];
+        let scene = initial_scene(shape, 0.1, &points, &mut ChaCha8Rng::seed_from_u64(1));
+        assert_eq!(scene.anchors.lattice, [[0, 3, 0], [5, 0, 0]]);
+        let expected = 0.5 * (0.25f64 + 0.09).ln();
+        assert!((f64::from(scene.anchors.log_scales[0]) - expected).abs() < 1e-6);
+        assert!(scene.heads.opacity.w1.iter().all(|w| w.abs() <= 1.0 / 35f32.sqrt()));
+    }
+}

@@ -1,0 +1,178 @@
+//! What a capture looked like when a run began, so that it goes on with the same one.
+
+use std::io::{self, Write};
+
+use rayon::prelude::*;
+
+use super::CheckpointFault;
+use super::codec::{Decoder, Encoder};
+use pocketsplat_capture::dataset::{Capture, View};
+
+/// Numbers of a camera: rotation, translation, focal lengths, principal point.
+const CAMERA_NUMBERS: usize = 9 + 3 + 2 + 2;
+
+/// Largest difference of two cameras that count as the same, relative to numbers above 1: far below what training sees,
+/// far above what the elementary functions of two machines differ by.
+const CAMERA_TOLERANCE: f64 = 1e-9;
+
+/// The training views and the background of a capture, with checksums in place of pixels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CaptureSignature {
+    background: [f32; 3],
+    views: Vec<ViewSignature>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+struct ViewSignature {
+    name: String,
+    size_px: [u32; 2],
+    camera: [f64; CAMERA_NUMBERS],
+    /// CRC-32 of the pixels and the mask.
+    pixels: u32,
+}
+
+/// Where a capture differs from the one a run began with.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CaptureDifference {
+    /// More views, or fewer.
+    #[error("it has {found} training views, the run began with {needed}")]
+    Count {
+        /// Views now.
+        found: usize,
+        /// Views then.
+        needed: usize,
+    },
+    /// Other names, or another order.
+    #[error("its training view {index} is `{found}`, the run began with `{needed}`")]
+    Name {
+        /// From 0.
+        index: usize,
+        /// Its name now.
+        found: String,
+        /// Its name then.
+        needed: String,
+    },
+    /// Another resolution.
+    #[error("its view `{view}` has {}×{} px, the run began with {}×{}", found[0], found[1], needed[0], needed[1])]
+    Size {
+        /// The view.
+        view: String,
+        /// Width and height now, pixels.
+        found: [u32; 2],
+        /// Width and height then, pixels.
+        needed: [u32; 2],
+    },
+    /// Another pose or lens.
+    #[error("the camera of its view `{view}` is another one than when the run began")]
+    Camera {
+        /// The view.
+        view: String,
+    },
+    /// Another photograph or mask.
+    #[error("the pixels or the mask of its view `{view}` are others than when the run began")]
+    Pixels {
+        /// The view.
+        view: String,
+    },
+    /// Another background.
+    #[error("its background is {found:?}, the run began with {needed:?}")]
+    Background {
+        /// RGB now.
+        found: [f32; 3],
+        /// RGB then.
+        needed: [f32; 3],
+    },
+}
+
+impl CaptureSignature {
+    /// Reads every pixel once, on all threads: about a second for 10 GB.
+    pub fn of(capture: &Capture) -> Self {
+        Self { background: capture.background, views: capture.train.par_iter().map(ViewSignature::of).collect() }
+    }
+
+    /// Compares with the signature a run began with.
+    ///
+    /// # Errors
+    /// The first [`CaptureDifference`].
+    pub fn matches(&self, begun_with: &Self) -> Result<(), CaptureDifference> {
+        let (found, needed) = (self.views.len(), begun_with.views.len());
+        if found != needed {
+            return Err(CaptureDifference::Count { found, needed });
+        }
+        for (index, (now, then)) in self.views.iter().zip(&begun_with.views).enumerate() {
+            let view = || now.name.clone();
+            if now.name != then.name {
+                return Err(CaptureDifference::Name { index, found: view(), needed: then.name.clone() });
+            }
+            if now.size_px != then.size_px {
+                return Err(CaptureDifference::Size { view: view(), found: now.size_px, needed: then.size_px });
+            }
+            let close = |(a, b): (&f64, &f64)| (a - b).abs() <= CAMERA_TOLERANCE * b.abs().max(1.0);
+            if !now.camera.iter().zip(&then.camera).all(close) {
+                return Err(CaptureDifference::Camera { view: view() });
+            }
+        }
+        // Of a different background every view shows something; say that first.
+        if self.background != begun_with.background {
+            return Err(CaptureDifference::Background { found: self.background, needed: begun_with.background });
+        }
+        match self.views.iter().zip(&begun_with.views).find(|(now, then)| now.pixels != then.pixels) {
+            Some((now, _)) => Err(CaptureDifference::Pixels { view: now.name.clone() }),
+            None => Ok(()),
+        }
+    }
+
+    /// How many training views there are.
+    pub(super) fn n_views(&self) -> usize {
+        self.views.len()
+    }
+
+    pub(super) fn encode<W: Write>(&self, out: &mut Encoder<W>) -> io::Result<()> {
+        out.value(self.background)?;
+        out.value(self.views.len() as u64)?;
+        for view in &self.views {
+            out.text(&view.name)?;
+            out.value(view.size_px)?;
+            out.value(view.camera)?;
+            out.value(view.pixels)?;
+        }
+        Ok(())
+    }
+
+    pub(super) fn decode(from: &mut Decoder<'_>) -> Result<Self, CheckpointFault> {
+        let background = from.value("background")?;
+        let n: u64 = from.value("number of views")?;
+        let view = |from: &mut Decoder<'_>| {
+            Ok(ViewSignature {
+                name: from.text("name of a view")?,
+                size_px: from.value("size of a view")?,
+                camera: from.value("camera of a view")?,
+                pixels: from.value("checksum of a view")?,
+            })
+        };
+        Ok(Self { background, views: (0..n).map(|_| view(from)).collect::<Result<_, _>>()? })
+    }
+}
+
+impl ViewSignature {
+    fn of(view: &View) -> Self {
+        let camera = &view.camera;
+        let mut numbers = [0.0; CAMERA_NUMBERS];
+        let all = camera.rotation.to_cols_array().into_iter().chain(camera.translation.to_array());
+        for (to, from) in numbers.iter_mut().zip(all.chain(camera.focal_px).chain(camera.principal_px)) {
+            *to = from;
+        }
+        let mut hasher = crc32fast::Hasher::new();
+        hasher.update(&view.image.rgb);
+        for valid in view.mask.iter().flat_map(|mask| mask.valid.chunks(4096)) {
+            hasher.update(&valid.iter().map(|valid| u8::from(*valid)).collect::<Vec<_>>());
+        }
+        Self {
+            name: view.name.clone(),
+            size_px: [view.image.width_px, view.image.height_px],
+            camera: numbers,
+            pixels: hasher.finalize(),
+        }
+    }
+}

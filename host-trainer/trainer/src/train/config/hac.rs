@@ -1,0 +1,95 @@
+//! How a run trains towards few bits.
+
+use serde::{Deserialize, Serialize};
+
+use crate::bundle::QuantisationSteps;
+
+/// The kinds of scene that can be trained.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Backbone {
+    /// Anchors and three heads, trained for the image alone (Lu et al. 2024, Scaffold-GS).
+    #[default]
+    Scaffold,
+    /// The same, trained for image and bits, with a context model and masks (Chen et al. 2024, HAC).
+    Hac,
+}
+
+/// What a step does to the values of anchors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// Nothing.
+    Raw,
+    /// Noise of fixed steps.
+    Noise,
+    /// Noise of the context model's steps, and the rate.
+    Context,
+    /// Rounding as the decoder sees it, and the rate.
+    Exact,
+}
+
+/// The rate's part of a run with [`Backbone::Hac`]; constants of the published trainer unless said otherwise.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Hac {
+    /// λ: weight of the mean bits of a value in the loss.
+    pub lambda: f64,
+    /// Share of the run from which on values are noised: 3,000 of 30,000 iterations.
+    pub noise_from: f64,
+    /// Share from which on anchors come and go again, after a pause that begins with the noise.
+    pub pause_until: f64,
+    /// Share from which on there is a context model and a rate: a third.
+    pub context_from: f64,
+    /// Share from which on values are rounded and the integer model decides. (HAC has no such phase.)
+    pub exact_from: f64,
+    /// Share of the visible anchors that the rate is taken over.
+    pub sample: f64,
+    /// Weight of the mean opening of the masks in the loss, while there is a rate.
+    pub mask_weight: f64,
+    /// Weight of the bits of the grid's signs against those of the values. 0, for a bundle stores the signs as they are.
+    /// (HAC codes them; 1.)
+    pub grid_weight: f64,
+    /// Steps of the noise at first, and what the context's steps are relative to. (HAC rounds sizes, not their logarithms,
+    /// at 0.001, and has 0.2 for offsets; learned steps of offsets and log-scales then went to the upper end of their range.)
+    pub base_steps: QuantisationSteps,
+}
+
+impl Default for Hac {
+    fn default() -> Self {
+        Self {
+            lambda: 0.004,
+            noise_from: 3_000.0 / 30_000.0,
+            pause_until: 4_000.0 / 30_000.0,
+            context_from: 1.0 / 3.0,
+            exact_from: 0.95,
+            sample: 0.05,
+            mask_weight: 5e-4,
+            grid_weight: 0.0,
+            base_steps: QuantisationSteps { feature: 1.0, log_scale: 0.2, offset: 0.35 },
+        }
+    }
+}
+
+impl Hac {
+    /// [`Self::base_steps`] in the order of the channels.
+    pub fn base_steps(&self) -> [f32; 3] {
+        [self.base_steps.feature, self.base_steps.log_scale, self.base_steps.offset]
+    }
+
+    /// Each setting with its name and limits.
+    pub(super) fn ranges(&self) -> [(&'static str, f64, f64, f64); 11] {
+        let QuantisationSteps { feature, log_scale, offset } = self.base_steps;
+        [
+            ("--lambda", self.lambda, 0.0, 1e3),
+            ("train.hac.noise_from", self.noise_from, 0.0, 1.0),
+            ("train.hac.pause_until", self.pause_until, 0.0, 1.0),
+            ("train.hac.context_from", self.context_from, self.noise_from, 1.0),
+            ("train.hac.exact_from", self.exact_from, self.context_from, 1.0),
+            ("train.hac.sample", self.sample, 1e-6, 1.0),
+            ("train.hac.mask_weight", self.mask_weight, 0.0, 1e3),
+            ("train.hac.grid_weight", self.grid_weight, 0.0, 1e3),
+            ("train.hac.base_steps.feature", feature.into(), 1e-9, 1e9),
+            ("train.hac.base_steps.log_scale", log_scale.into(), 1e-9, 1e9),
+            ("train.hac.base_steps.offset", offset.into(), 1e-9, 1e9),
+        ]
+    }
+}

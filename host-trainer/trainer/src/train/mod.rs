@@ -1,0 +1,342 @@
+//! Training: one step, the optimiser, growth and pruning, the loop around them, and the folder that lets it go on after
+//! an interruption.
+
+pub mod checkpoint;
+mod coding;
+pub mod config;
+pub mod context_start;
+pub mod densify;
+pub mod finish;
+pub mod module;
+pub mod optimiser;
+mod outcome;
+pub mod run;
+pub mod statistics;
+pub mod step;
+pub mod survey;
+#[cfg(test)]
+pub(crate) mod test_capture;
+pub mod watchdog;
+
+use std::time::Instant;
+
+use cpu_time::ProcessTime;
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+
+pub use config::TrainConfig;
+pub use outcome::{Observer, Outcome, TrainError};
+pub use watchdog::DroppedStep;
+
+use crate::ops::Pinhole;
+use crate::ops::noise::Stream;
+use crate::scene::init::initial_scene;
+use crate::scene::{Anchors, Heads, Scene};
+use checkpoint::{CaptureSignature, Kernels};
+use coding::Integers;
+use config::{Backbone, Densification, Phase, Rate, Rates};
+use module::Moment;
+use optimiser::Optimiser;
+use pocketsplat_capture::dataset::{Capture, Image, View};
+use statistics::Statistics;
+use step::{Loss, Target, Workspace, clear_masked};
+use survey::Survey;
+use watchdog::Watchdog;
+
+/// Length of the published runs, iterations.
+const PUBLISHED_ITERATIONS: f64 = 30_000.0;
+
+/// The state of a run: everything the next iteration depends on.
+#[derive(Clone, Debug)]
+pub struct Trainer<'a> {
+    config: TrainConfig,
+    capture: &'a Capture,
+    signature: CaptureSignature,
+    cameras: Vec<Pinhole<f32>>,
+    /// Training views that are not held out.
+    trained: Vec<u32>,
+    background: [f32; 3],
+    /// Iterations done.
+    pub iteration: u32,
+    /// The scene as it stands.
+    pub scene: Scene<f32>,
+    /// Wall-clock seconds spent in iterations.
+    pub seconds: f64,
+    /// Seconds of processor time spent in iterations, of all threads: what does not depend on what else the machine does.
+    pub processor_seconds: f64,
+    watchdog: Watchdog,
+    optimiser: Optimiser<f32>,
+    statistics: Statistics,
+    rng: ChaCha8Rng,
+    /// Views left of the current pass over the capture, taken from the end.
+    queue: Vec<u32>,
+    workspace: Workspace<f32>,
+}
+
+/// Planes `[3, height, width]` of an image, 0 to 1.
+pub fn planes(image: &Image) -> Vec<f32> {
+    let n = (image.width_px * image.height_px) as usize;
+    let mut planes = vec![0.0; 3 * n];
+    for (channel, plane) in planes.chunks_exact_mut(n).enumerate() {
+        for (out, rgb) in plane.iter_mut().zip(image.rgb.chunks_exact(3)) {
+            *out = f32::from(rgb[channel]) / 255.0;
+        }
+    }
+    planes
+}
+
+impl<'a> Trainer<'a> {
+    /// Sets up a run.
+    ///
+    /// # Errors
+    /// [`TrainError`] when a setting is out of range or the capture has no view or point.
+    pub fn new(capture: &'a Capture, config: TrainConfig) -> Result<Self, TrainError> {
+        if capture.points.is_empty() {
+            return Err(TrainError::NoPoints);
+        }
+        let mut trainer = Self::without_scene(capture, config)?;
+        let shape = trainer.config.shape;
+        trainer.scene = initial_scene(shape, trainer.scene.voxel_size, &capture.points, &mut trainer.rng);
+        trainer.optimiser = Optimiser::new(&trainer.scene);
+        trainer.statistics = Statistics::new(trainer.scene.anchors.len(), shape.n_offsets);
+        Ok(trainer)
+    }
+
+    /// Everything but anchors and what belongs to them.
+    fn without_scene(capture: &'a Capture, config: TrainConfig) -> Result<Self, TrainError> {
+        config.validate().map_err(TrainError::Config)?;
+        if capture.train.is_empty() {
+            return Err(TrainError::NoViews);
+        }
+        let config = config.resolved_for(capture);
+        let heads = Heads::filled(&config.shape, 0.0);
+        let voxel_size = config.voxel_size_for(capture);
+        let scene = Scene { shape: config.shape, voxel_size, anchors: Anchors::default(), heads, context: None };
+        Ok(Self {
+            signature: CaptureSignature::of(capture),
+            cameras: capture.train.iter().map(|v| Pinhole::new(&v.camera)).collect(),
+            trained: (0u32..)
+                .zip(&capture.train)
+                .filter(|(i, _)| !config.holds_out(*i as usize, capture.train.len()))
+                .map(|(i, _)| i)
+                .collect(),
+            background: capture.background,
+            iteration: 0,
+            seconds: 0.0,
+            processor_seconds: 0.0,
+            watchdog: Watchdog::default(),
+            optimiser: Optimiser::new(&scene),
+            statistics: Statistics::default(),
+            workspace: Workspace::new(&config.shape),
+            queue: Vec::new(),
+            rng: ChaCha8Rng::seed_from_u64(config.seed),
+            config,
+            capture,
+            scene,
+        })
+    }
+
+    /// The configuration, resolved for the capture.
+    pub fn config(&self) -> &TrainConfig {
+        &self.config
+    }
+
+    /// The cameras of the training views, held out or not.
+    pub fn cameras(&self) -> &[Pinhole<f32>] {
+        &self.cameras
+    }
+
+    /// The training views that are held out: nothing of the scene follows from them, so it can be measured with them.
+    pub fn validation_views(&self) -> impl Iterator<Item = &'a View> + use<'a> {
+        let (config, views) = (self.config, &self.capture.train);
+        views.iter().enumerate().filter(move |(i, _)| config.holds_out(*i, views.len())).map(|(_, view)| view)
+    }
+
+    /// Whether all iterations are done.
+    pub fn is_done(&self) -> bool {
+        self.iteration >= self.config.iterations
+    }
+
+    /// Steps that were not applied so far.
+    pub fn n_dropped(&self) -> u32 {
+        self.watchdog.n_dropped
+    }
+
+    /// What this run is computed with.
+    pub fn kernels(&self) -> Kernels {
+        Kernels::of_this_machine(self.workspace.level())
+    }
+
+    /// Runs to the last iteration.
+    ///
+    /// # Errors
+    /// [`TrainError::Diverged`], see [`Self::advance`].
+    pub fn run(&mut self, observer: &mut impl Observer) -> Result<(), TrainError> {
+        while !self.is_done() {
+            self.observed_advance(observer)?;
+        }
+        Ok(())
+    }
+
+    /// [`Self::advance`], and tells `observer`.
+    fn observed_advance(&mut self, observer: &mut impl Observer) -> Result<Outcome, TrainError> {
+        let outcome = self.advance()?;
+        if let Some(dropped) = &outcome.dropped {
+            observer.dropped(dropped);
+        }
+        observer.step(self.iteration, &outcome.report, &self.scene);
+        Ok(outcome)
+    }
+
+    /// One iteration: a view drawn without replacement, a step, the optimiser, statistics, growth and pruning.
+    ///
+    /// A step with a loss or gradient that is not finite does nothing of the latter four.
+    ///
+    /// # Errors
+    /// [`TrainError::Diverged`] when more than [`watchdog::MAX_DROPPED_IN_A_ROW`] steps in a row did nothing; the
+    /// scene is as it was before them.
+    pub fn advance(&mut self) -> Result<Outcome, TrainError> {
+        let started = (Instant::now(), ProcessTime::now());
+        let outcome = self.iterate();
+        self.seconds += started.0.elapsed().as_secs_f64();
+        self.processor_seconds += started.1.elapsed().as_secs_f64();
+        outcome
+    }
+
+    fn iterate(&mut self) -> Result<Outcome, TrainError> {
+        self.iteration += 1;
+        self.begin_context();
+        if self.queue.is_empty() {
+            self.queue.clone_from(&self.trained);
+            self.queue.shuffle(&mut self.rng);
+        }
+        let index = self.queue.pop().expect("refilled above") as usize;
+        let View { name, image, mask, .. } = &self.capture.train[index];
+        let mask = mask.as_ref().map(|mask| mask.valid.as_slice());
+        let mut truth = planes(image);
+        clear_masked(&mut truth, mask);
+        let target = Target { camera: &self.cameras[index], truth: &truth, mask, background: self.background };
+        let integers = match self.config.phase(self.iteration) {
+            Phase::Exact => Some(Integers::of(&self.scene)?),
+            _ => None,
+        };
+        let context = integers.as_ref().map(|integers| integers.context(&self.scene)).transpose()?;
+        let coding = coding::coding(&self.config, self.iteration, context.as_ref().zip(integers.as_ref()));
+        let (modules, at) = (self.config.modules, self.moment());
+        let pruned_share = modules.each().iter().map(|module| module.pruned_share(&at)).fold(0.0, f32::max);
+        let terms = modules.terms();
+        let loss = Loss { weights: self.config.loss, modules: Some((&terms, &at)), pruned_share };
+        let report = self.workspace.step(&self.scene, &target, &loss, &coding);
+        if let Some(cause) = watchdog::inspect(&self.scene, &truth, self.background, &self.workspace, &report) {
+            let dropped = DroppedStep { iteration: self.iteration, view: name.clone(), cause };
+            return if self.watchdog.dropped() {
+                Err(TrainError::Diverged { n: self.watchdog.n_in_a_row, last: dropped })
+            } else {
+                Ok(Outcome { report, dropped: Some(dropped) })
+            };
+        }
+        self.watchdog.passed();
+        // The published loop leaves the parameters of its last iteration as they are.
+        if self.iteration < self.config.iterations {
+            let progress = f64::from(self.iteration) / f64::from(self.config.iterations);
+            let rates = self.rates();
+            self.optimiser.apply(&mut self.scene, &self.workspace, &rates, progress, self.capture.extent);
+            if self.config.learns_background {
+                let rate = rates.background.at(progress);
+                self.optimiser.apply_to_background(&mut self.background, &self.workspace, rate);
+            }
+        }
+        self.densify();
+        self.keep_the_best();
+        modules.each().into_iter().for_each(|module| module.event(&at, self));
+        Ok(Outcome { report, dropped: None })
+    }
+
+    /// What modules are told of this iteration.
+    fn moment(&self) -> Moment {
+        let phase = self.config.phase(self.iteration);
+        Moment {
+            iteration: self.iteration,
+            iterations: self.config.iterations,
+            phase,
+            scaled: self.config.backbone == Backbone::Scaffold || phase != Phase::Raw,
+            base_steps: self.config.hac.base_steps(),
+            stream: Stream::of_run(self.config.seed).branch(self.iteration),
+        }
+    }
+
+    fn trained_cameras(&self) -> Vec<&Pinhole<f32>> {
+        self.trained.iter().map(|view| &self.cameras[*view as usize]).collect()
+    }
+
+    /// What the views that training sees show of the scene as it stands; see [`Survey::new`].
+    pub fn survey(&self, contributions: bool) -> Survey {
+        Survey::new(&self.scene, &mut Workspace::new(&self.scene.shape), &self.trained_cameras(), contributions)
+    }
+
+    /// Drops the anchors that `keep` does not mark.
+    pub fn keep_anchors(&mut self, keep: &[bool]) {
+        densify::retain(&mut self.scene, &mut self.optimiser, &mut self.statistics, keep);
+    }
+
+    /// The learning rates of this iteration.
+    ///
+    /// Masks move only where bits count. A mask has a fixed way to go, from its start to the threshold; so that it comes as
+    /// far in a shorter run, its rate is that of [`PUBLISHED_ITERATIONS`] times their ratio, once there is a rate term.
+    fn rates(&self) -> Rates {
+        let Rates { mask, .. } = self.config.rates;
+        let factor = match self.config.phase(self.iteration) {
+            _ if self.config.backbone == Backbone::Scaffold => 0.0,
+            Phase::Raw | Phase::Noise => 1.0,
+            Phase::Context | Phase::Exact => PUBLISHED_ITERATIONS / f64::from(self.config.iterations),
+        };
+        Rates { mask: Rate { start: mask.start * factor, end: mask.end * factor }, ..self.config.rates }
+    }
+
+    /// Statistics of the step in the workspace, and growth and pruning when they are due.
+    fn densify(&mut self) {
+        let settings = self.config.densification;
+        let until = self.config.iteration_at(settings.until);
+        let from = self.config.iteration_at(settings.statistics_from);
+        if self.iteration >= until || self.iteration <= from || self.config.pauses_at(self.iteration) {
+            return;
+        }
+        self.statistics.add(&self.workspace, self.config.shape.n_offsets);
+        let due = self.iteration.is_multiple_of(settings.interval);
+        if due && self.iteration > self.config.iteration_at(settings.from) {
+            let Self { scene, optimiser, statistics, rng, .. } = self;
+            let coarsest_cells = self.config.coarsest_cells_for(self.capture);
+            densify::grow(scene, optimiser, statistics, &settings, coarsest_cells, rng);
+            densify::prune(scene, optimiser, statistics, &settings);
+        }
+    }
+
+    /// When growth ends: drops all but the anchors that contribute most to the training views, where a number is set.
+    fn keep_the_best(&mut self) {
+        let Densification { until, kept_anchors, .. } = self.config.densification;
+        let Some(most) = kept_anchors.filter(|most| *most < self.scene.anchors.len()) else { return };
+        if self.iteration == self.config.iteration_at(until) {
+            let Survey { contribution, .. } = self.survey(true);
+            let mut order: Vec<usize> = (0..contribution.len()).collect();
+            order.sort_by(|a, b| contribution[*b].total_cmp(&contribution[*a]));
+            let mut keep = vec![false; contribution.len()];
+            order[..most].iter().for_each(|anchor| keep[*anchor] = true);
+            self.keep_anchors(&keep);
+        }
+    }
+
+    /// The current scene's image of a view, 8 bit.
+    pub fn draw(&mut self, view: &View) -> Image {
+        let camera = Pinhole::new(&view.camera);
+        let planes = self.workspace.image(&self.scene, &camera, self.background);
+        let n = planes.len() / 3;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0..=1")]
+        let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
+        let rgb = (0..n).flat_map(|i| [byte(planes[i]), byte(planes[n + i]), byte(planes[2 * n + i])]).collect();
+        Image { width_px: view.camera.width_px, height_px: view.camera.height_px, rgb }
+    }
+}
+
+#[cfg(test)]
+mod tests;

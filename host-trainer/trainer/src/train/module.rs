@@ -1,0 +1,234 @@
+//! Modules: improvements that plug into the training of any backbone.
+//!
+//! A module is a struct of settings in a file of this folder and a line in [`modules!`](Modules). Attached by name
+//! (`--modules distribution,pruning`), it may
+//!
+//! * widen the model: [`Module::shape`] switches on heads of [`ModelShape`], which the optimiser moves, checkpoints keep, bundles
+//!   store and decoders evaluate as they do the others;
+//! * add to the loss of every step, on the image, on the Gaussians or on the anchors: [`Terms`];
+//! * do something to the run between two iterations: [`Module::event`];
+//! * leave anchors out of a step: [`Module::pruned_share`].
+//!
+//! It sees blocks of visible anchors and a [`Moment`], never a backbone.
+//!
+//! # A fourth module
+//!
+//! One that keeps offsets short, as `module/short.rs`:
+//!
+//! ```
+//! use pocketsplat_trainer::ops::Real;
+//! use pocketsplat_trainer::scene::Scene;
+//! use pocketsplat_trainer::train::module::{Module, Moment, Terms};
+//! use pocketsplat_trainer::train::step::Block;
+//! use serde::{Deserialize, Serialize};
+//!
+//! #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+//! #[serde(default)]
+//! pub struct Short {
+//!     /// Weight of the mean squared offset.
+//!     pub weight: f64,
+//! }
+//!
+//! impl Default for Short {
+//!     fn default() -> Self {
+//!         Self { weight: 1e-4 }
+//!     }
+//! }
+//!
+//! impl<R: Real> Terms<R> for Short {
+//!     fn on_anchors(&self, _at: &Moment, scene: &Scene<R>, blocks: &mut [Block<R>]) -> R {
+//!         let n = blocks.iter().map(|b| b.d_offsets.len()).sum::<usize>().max(1);
+//!         let share = R::real(self.weight / n as f64);
+//!         let width = 3 * scene.shape.n_offsets;
+//!         let mut sum = R::ZERO;
+//!         for block in blocks {
+//!             for (anchor, d) in block.anchors.iter().zip(block.d_offsets.chunks_exact_mut(width)) {
+//!                 let offsets = &scene.anchors.offsets[*anchor as usize * width..][..width];
+//!                 for (d, x) in d.iter_mut().zip(offsets) {
+//!                     sum += *x * *x;
+//!                     *d += R::real(2.0) * share * *x;
+//!                 }
+//!             }
+//!         }
+//!         share * sum
+//!     }
+//! }
+//!
+//! impl Module for Short {}
+//! ```
+//!
+//! and `short: Short,` among the modules below. It then has a name, a place in configurations (`[train.modules.short]`), and its
+//! gradient is checked as the others' are, by a line in the tests of [`crate::train::step`].
+
+pub mod detail;
+pub mod distribution;
+pub mod pruning;
+
+use std::fmt::Debug;
+
+use serde::{Deserialize, Serialize};
+
+use super::Trainer;
+use super::config::Phase;
+use super::step::Block;
+use crate::ops::Real;
+use crate::ops::noise::Stream;
+use crate::ops::simd::Level;
+use crate::scene::{ModelShape, Scene};
+
+pub use detail::Detail;
+pub use distribution::Distribution;
+pub use pruning::Pruning;
+
+/// Where a run stands when a module is asked.
+#[derive(Clone, Copy, Debug)]
+pub struct Moment {
+    /// Iteration in work, from 1.
+    pub iteration: u32,
+    /// Iterations of the run.
+    pub iterations: u32,
+    /// What the step does to the values of anchors.
+    pub phase: Phase,
+    /// Whether the values of anchors have a scale that means something: from the first noise on where the run comes to
+    /// that, else always. Before, a network can undo any change of scale.
+    pub scaled: bool,
+    /// Steps of features, log-scales and offsets that values are measured in.
+    pub base_steps: [f32; 3],
+    /// Random numbers of this iteration.
+    pub stream: Stream,
+}
+
+impl Moment {
+    /// Whether more than `share` of the run is done.
+    pub fn is_after(&self, share: f64) -> bool {
+        f64::from(self.iteration) > self.iteration_at(share)
+    }
+
+    /// Whether just `share` of the run is done.
+    pub fn is_at(&self, share: f64) -> bool {
+        f64::from(self.iteration) == self.iteration_at(share)
+    }
+
+    fn iteration_at(&self, share: f64) -> f64 {
+        (share * f64::from(self.iterations)).round()
+    }
+}
+
+/// Two images that are compared.
+#[derive(Clone, Copy, Debug)]
+pub struct Pictures<'a, R> {
+    /// What was drawn, planes `[3, height, width]`.
+    pub image: &'a [R],
+    /// The photograph.
+    pub truth: &'a [R],
+    /// Width and height.
+    pub size_px: [usize; 2],
+    /// Instruction set of the loops.
+    pub level: Level,
+}
+
+/// What a module adds to the loss of a step: each function returns its terms and adds their gradients.
+pub trait Terms<R: Real>: Sync {
+    /// Terms on the image.
+    ///
+    /// * `d_image`: planes as the image; added to.
+    fn on_image(&self, _at: &Moment, _pictures: &Pictures<'_, R>, _d_image: &mut [R]) -> R {
+        R::ZERO
+    }
+
+    /// Terms on the Gaussians of the view, after the forward pass.
+    ///
+    /// * `blocks`: [`Block::d_gaussians`] and the detail's residuals are added to.
+    fn on_gaussians(&self, _at: &Moment, _scene: &Scene<R>, _blocks: &mut [Block<R>]) -> R {
+        R::ZERO
+    }
+
+    /// Terms on the parameters of the visible anchors, after the backward pass.
+    ///
+    /// * `blocks`: gradients of anchors are added to.
+    fn on_anchors(&self, _at: &Moment, _scene: &Scene<R>, _blocks: &mut [Block<R>]) -> R {
+        R::ZERO
+    }
+}
+
+/// A plug-in of the training; everything has a default that does nothing.
+pub trait Module: Terms<f32> + Terms<f64> + Debug {
+    /// Refuses settings that no run can use.
+    ///
+    /// # Errors
+    /// Setting, value and accepted range.
+    fn check(&self) -> Result<(), String> {
+        Ok(())
+    }
+
+    /// The shape of the model that it works on.
+    fn shape(&self, shape: ModelShape) -> ModelShape {
+        shape
+    }
+
+    /// Changes the run after an iteration, when its time has come.
+    fn event(&self, _at: &Moment, _trainer: &mut Trainer<'_>) {}
+
+    /// Share of the anchors that the step leaves out, those of the lowest [places](crate::scene::Anchors::places) first.
+    fn pruned_share(&self, _at: &Moment) -> f32 {
+        0.0
+    }
+}
+
+macro_rules! modules {
+    ($($(#[$doc:meta])* $name:ident: $module:ident,)*) => {
+        /// The modules of a run; each is attached where it has settings.
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+        pub struct Modules {
+            $($(#[$doc])* #[serde(default, skip_serializing_if = "Option::is_none")] pub $name: Option<$module>,)*
+        }
+
+        impl Modules {
+            /// Names of all there are.
+            pub const NAMES: &'static [&'static str] = &[$(stringify!($name)),*];
+
+            /// Attaches a module with its default settings, unless it is attached already; `false` when none has that name.
+            pub fn attach(&mut self, name: &str) -> bool {
+                $(if name == stringify!($name) {
+                    self.$name.get_or_insert_default();
+                    return true;
+                })*
+                false
+            }
+
+            /// Names of the attached.
+            pub fn attached(&self) -> Vec<&'static str> {
+                let all = [$(self.$name.is_some().then_some(stringify!($name))),*];
+                all.into_iter().flatten().collect()
+            }
+
+            /// The attached.
+            pub fn each(&self) -> Vec<&dyn Module> {
+                let all: [Option<&dyn Module>; Self::NAMES.len()] = [$(self.$name.as_ref().map(|m| m as _)),*];
+                all.into_iter().flatten().collect()
+            }
+
+            /// The terms of the attached.
+            pub fn terms<R: Real>(&self) -> Vec<&dyn Terms<R>> {
+                let all: [Option<&dyn Terms<R>>; Self::NAMES.len()] = [$(self.$name.as_ref().map(|m| m as _)),*];
+                all.into_iter().flatten().collect()
+            }
+        }
+    };
+}
+
+modules! {
+    /// Features near a normal distribution.
+    distribution: Distribution,
+    /// Fewer anchors, or an order in which to leave them out.
+    pruning: Pruning,
+    /// A residual on the colours.
+    detail: Detail,
+}
+
+impl Modules {
+    /// The shape that the attached modules work on.
+    pub fn shape(&self, shape: ModelShape) -> ModelShape {
+        self.each().into_iter().fold(shape, |shape, module| module.shape(shape))
+    }
+}

@@ -1,0 +1,322 @@
+//! Opacity-based probabilistic pruning: fewer anchors for good, or an order in which a device may leave them out.
+
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+
+use super::{Module, Moment, Terms};
+use crate::ops::Real;
+use crate::ops::opacity_target::{Normalisation, forward_backward};
+use crate::scene::Scene;
+use crate::train::Trainer;
+use crate::train::config::within;
+use crate::train::step::Block;
+
+/// What the event does with the anchors it picks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Form {
+    /// Deletes them (the paper).
+    #[default]
+    Hard,
+    /// Deletes nothing: every anchor gets a place, and each later step draws the scene without those up to a random place,
+    /// so that one scene is good at every pruning rate.
+    Tiered,
+}
+
+/// Which anchors of the pool go.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Choice {
+    /// Any, at random from the run's seed (the paper).
+    #[default]
+    Random,
+    /// Those of the lowest rank.
+    Lowest,
+}
+
+/// What "a random subset of 30 % of their Gaussians" means.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Unit {
+    /// The rate is of all anchors, and whole anchors of the pool go: what the paper's counts of anchors show.
+    #[default]
+    Anchors,
+    /// The rate is of the offsets of the pool's anchors, which are masked: the paper's words.
+    Offsets,
+}
+
+/// What anchors are ranked by.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Rank {
+    /// Aggregated opacity: Σ of the opacities of its drawn Gaussians, mean over the views that see it (the paper).
+    #[default]
+    Opacity,
+    /// Σ of α·T over the pixels of all training views: what it contributes to the images.
+    Contribution,
+}
+
+/// Over which Gaussians the target of the opacities is taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Count {
+    /// All K of the visible anchors, drawn or not.
+    #[default]
+    Candidates,
+    /// Those drawn.
+    Drawn,
+}
+
+/// A loss that keeps opacities low, and one event that prunes by what is left of them (the plug-and-play paper, eq. 4 and
+/// section 3.2).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Pruning {
+    /// Weight of the opacity target. (The paper's is 1e-5. Divided by N it then leaves a third of lego's anchors and costs 4 dB.)
+    pub weight: f64,
+    /// β: the target is β·N.
+    pub beta: f64,
+    /// N of the target.
+    pub count: Count,
+    /// What the square is divided by.
+    pub normalisation: Normalisation,
+    /// Share of the run from which on the target counts.
+    pub from: f64,
+    /// Share of the run after which the event comes.
+    pub at: f64,
+    /// What the event does.
+    pub form: Form,
+    /// Share that goes; with [`Form::Tiered`] the deepest tier's.
+    pub rate: f64,
+    /// Share of the anchors, lowest ranks first, from which the choice is made. Beyond it the rank decides.
+    pub pool: f64,
+    /// Which of the pool.
+    pub choice: Choice,
+    /// What the rate counts.
+    pub unit: Unit,
+    /// What anchors are ranked by.
+    pub rank: Rank,
+}
+
+impl Default for Pruning {
+    fn default() -> Self {
+        Self {
+            weight: 1e-7,
+            beta: 1e-3,
+            count: Count::Candidates,
+            normalisation: Normalisation::Count,
+            from: 1_500.0 / 30_000.0,
+            at: 15_000.0 / 30_000.0,
+            form: Form::Hard,
+            rate: 0.3,
+            pool: 0.4,
+            choice: Choice::Random,
+            unit: Unit::Anchors,
+            rank: Rank::Opacity,
+        }
+    }
+}
+
+/// Shares of [`Pruning::rate`] that steps leave out under [`Form::Tiered`]; of 40 % they are 40, 30, 20, 10 and 5 %.
+pub const TIER_SHARES: [f64; 5] = [1.0, 0.75, 0.5, 0.25, 0.125];
+/// Draws of an iteration's stream: whether it takes all anchors, and if not, which tier.
+const WHOLE_DRAW: u32 = 0x5449_4552;
+const TIER_DRAW: u32 = WHOLE_DRAW + 1;
+
+impl Pruning {
+    /// [`Form::Tiered`] as it measures best: in the order of contribution. (A random choice within the pool, as the paper
+    /// deletes it, takes anchors that matter from the scene that is left.)
+    pub fn tiered() -> Self {
+        let hard = Self::default();
+        Self { form: Form::Tiered, rate: hard.pool, rank: Rank::Contribution, choice: Choice::Lowest, ..hard }
+    }
+
+    /// The place of every anchor, 0 to 1: the share of the anchors that goes before it.
+    ///
+    /// The pool's places are given out at random, all others by rank; equal ranks keep their order.
+    ///
+    /// * `rank`: `[n]`, low goes first.
+    pub fn places(&self, rank: &[f32], rng: &mut ChaCha8Rng) -> Vec<f32> {
+        let n = rank.len();
+        let mut order: Vec<usize> = (0..n).collect();
+        order.sort_by(|a, b| rank[*a].total_cmp(&rank[*b]));
+        if self.choice == Choice::Random {
+            order[..of_length(self.pool, n)].shuffle(rng);
+        }
+        let mut places = vec![0.0; n];
+        for (place, anchor) in order.into_iter().enumerate() {
+            places[anchor] = as_place(place as f64 / n as f64);
+        }
+        places
+    }
+}
+
+/// A share as anchors' [places](crate::scene::Anchors::places) are kept, so that it compares equal with them.
+#[expect(clippy::cast_possible_truncation, reason = "places are f32")]
+fn as_place(share: f64) -> f32 {
+    share as f32
+}
+
+/// A share of `n` items, to the nearest; at most all of them.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a length")]
+fn of_length(share: f64, n: usize) -> usize {
+    ((share * n as f64).round() as usize).min(n)
+}
+
+impl Module for Pruning {
+    fn check(&self) -> Result<(), String> {
+        within("train.modules.pruning.weight", self.weight, 0.0, 1e6)?;
+        within("train.modules.pruning.beta", self.beta, 0.0, 1.0)?;
+        within("train.modules.pruning.from", self.from, 0.0, 1.0)?;
+        within("train.modules.pruning.at", self.at, 0.0, 1.0)?;
+        within("train.modules.pruning.pool", self.pool, 0.0, 1.0)?;
+        let most = if self.form == Form::Hard && self.unit == Unit::Anchors { self.pool } else { 0.95 };
+        within("train.modules.pruning.rate", self.rate, 0.0, most)
+    }
+
+    fn event(&self, at: &Moment, trainer: &mut Trainer<'_>) {
+        if !at.is_at(self.at) || trainer.scene.anchors.is_empty() {
+            return;
+        }
+        let survey = trainer.survey(self.rank == Rank::Contribution);
+        let rank = match self.rank {
+            Rank::Opacity => survey.opacity_per_view(),
+            Rank::Contribution => survey.contribution,
+        };
+        // A stream of its own: the run's other random numbers do not depend on modules.
+        let mut rng = ChaCha8Rng::seed_from_u64(trainer.config().seed);
+        rng.set_stream(1);
+        let places = self.places(&rank, &mut rng);
+        match (self.form, self.unit) {
+            (Form::Tiered, _) => trainer.scene.anchors.places = places,
+            (Form::Hard, Unit::Anchors) => {
+                let keep: Vec<bool> = places.iter().map(|place| *place >= as_place(self.rate)).collect();
+                trainer.keep_anchors(&keep);
+            }
+            (Form::Hard, Unit::Offsets) => {
+                let k = trainer.config().shape.n_offsets;
+                let of_pool = (0..places.len()).filter(|a| places[*a] < as_place(self.pool));
+                let mut offsets: Vec<usize> = of_pool.flat_map(|a| a * k..(a + 1) * k).collect();
+                offsets.shuffle(&mut rng);
+                trainer.scene.anchors.mask(&offsets[..of_length(self.rate, offsets.len())]);
+            }
+        }
+    }
+
+    fn pruned_share(&self, at: &Moment) -> f32 {
+        if self.form != Form::Tiered || !at.is_after(self.at) || at.stream.uniform(WHOLE_DRAW) < 0.5 {
+            return 0.0;
+        }
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the number of shares")]
+        let tier = (at.stream.uniform(TIER_DRAW) * TIER_SHARES.len() as f32) as usize;
+        as_place(self.rate * TIER_SHARES[tier])
+    }
+}
+
+impl<R: Real> Terms<R> for Pruning {
+    fn on_gaussians(&self, at: &Moment, scene: &Scene<R>, blocks: &mut [Block<R>]) -> R {
+        if self.weight == 0.0 || !at.is_after(self.from) {
+            return R::ZERO;
+        }
+        let n: usize = match self.count {
+            Count::Candidates => blocks.iter().map(|b| b.anchors.len() * scene.shape.n_offsets).sum(),
+            Count::Drawn => blocks.iter().map(|b| b.gaussians.len()).sum(),
+        };
+        let sum: R = blocks.iter().map(|b| b.gaussians.iter().map(|g| g.opacity).sum::<R>()).sum();
+        let target = R::real(self.beta * n as f64);
+        let (term, slope) = forward_backward(sum, n, target, R::real(self.weight), self.normalisation);
+        for d in blocks.iter_mut().flat_map(|b| &mut b.d_gaussians) {
+            d.opacity += slope;
+        }
+        term
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::train::TrainConfig;
+    use crate::train::module::Modules;
+    use crate::train::test_capture::{tiny_capture, tiny_config};
+
+    fn places(pruning: &Pruning, rank: &[f32], seed: u64) -> Vec<f32> {
+        pruning.places(rank, &mut ChaCha8Rng::seed_from_u64(seed))
+    }
+
+    #[test]
+    fn the_pool_goes_at_random_and_the_rest_by_rank() {
+        let rank: Vec<f32> = (0..100).map(|i| ((i * 37) % 100) as f32).collect();
+        let random = places(&Pruning::default(), &rank, 1);
+        let mut sorted = random.clone();
+        sorted.sort_by(f32::total_cmp);
+        assert!(sorted.iter().enumerate().all(|(i, place)| *place == i as f32 / 100.0), "every place once");
+        for (place, rank) in random.iter().zip(&rank) {
+            assert_eq!(*place < 0.4, *rank < 40.0, "the pool is the lowest ranks");
+            assert!(*rank < 40.0 || (place - rank / 100.0).abs() < 1e-6, "beyond it the rank decides");
+        }
+        assert_ne!(random, places(&Pruning::default(), &rank, 2));
+        let lowest = places(&Pruning { choice: Choice::Lowest, ..Pruning::default() }, &rank, 1);
+        assert!(lowest.iter().zip(&rank).all(|(place, rank)| (place - rank / 100.0).abs() < 1e-6));
+        assert!(places(&Pruning::default(), &[], 1).is_empty());
+    }
+
+    /// Trains the tiny capture to its end with a pruning module; returns anchors and drawn offsets before and after the
+    /// event, and the places.
+    fn run(pruning: Pruning) -> ([usize; 2], [usize; 2], Vec<f32>) {
+        let capture = tiny_capture();
+        let modules = Modules { pruning: Some(pruning), ..Modules::default() };
+        let mut config = TrainConfig { modules, ..tiny_config(40) };
+        config.densification.until = 0.45;
+        let mut trainer = Trainer::new(&capture, config).unwrap();
+        let count = |trainer: &Trainer<'_>| {
+            let anchors = &trainer.scene.anchors;
+            (anchors.len(), (0..anchors.mask_logits.len()).filter(|o| anchors.is_drawn(*o)).count())
+        };
+        let mut before = (0, 0);
+        while !trainer.is_done() {
+            if trainer.iteration == 19 {
+                before = count(&trainer);
+            }
+            trainer.advance().unwrap();
+        }
+        let after = count(&trainer);
+        ([before.0, after.0], [before.1, after.1], trainer.scene.anchors.places.clone())
+    }
+
+    #[test]
+    fn hard_pruning_takes_its_share_once() {
+        for rank in [Rank::Opacity, Rank::Contribution] {
+            let ([before, after], ..) = run(Pruning { rank, rate: 0.3, ..Pruning::default() });
+            assert!(before > 10 && (after as f64 - 0.7 * before as f64).abs() <= 1.0, "{before} anchors, then {after}");
+        }
+        let (anchors, [before, after], _) = run(Pruning { unit: Unit::Offsets, ..Pruning::default() });
+        assert_eq!(anchors[0], anchors[1]);
+        let gone = (before - after) as f64 / before as f64;
+        assert!((gone - 0.12).abs() < 0.02, "30 % of 40 %: {gone}");
+    }
+
+    #[test]
+    fn tiered_pruning_deletes_nothing_and_steps_leave_out_what_their_place_says() {
+        let pruning = Pruning { form: Form::Tiered, rate: 0.4, ..Pruning::default() };
+        let ([before, after], _, places) = run(pruning);
+        assert_eq!((before, places.len()), (after, after));
+        let moment = |iteration| Moment {
+            iteration,
+            iterations: 40,
+            phase: crate::train::config::Phase::Raw,
+            scaled: true,
+            base_steps: [1.0; 3],
+            stream: crate::ops::noise::Stream::of_run(3).branch(iteration),
+        };
+        assert!((1..=20).all(|iteration| pruning.pruned_share(&moment(iteration)) == 0.0));
+        let shares: Vec<f32> = (21..4021).map(|iteration| pruning.pruned_share(&moment(iteration))).collect();
+        let n_whole = shares.iter().filter(|share| **share == 0.0).count();
+        assert!((1900..2100).contains(&n_whole), "half of the steps see all anchors: {n_whole}");
+        for share in TIER_SHARES {
+            let n = shares.iter().filter(|s| **s == (0.4 * share) as f32).count();
+            assert!((340..460).contains(&n), "each tier as often as the others: {n}");
+        }
+    }
+}

@@ -1,0 +1,436 @@
+//! The whole step against finite differences, and f32 against f64.
+
+use glam::{DMat3, DVec3};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use pocketsplat_core::context::{GridFrame, GridLevel, Group, LevelKind};
+
+use super::coding::{Exact, RateTerms};
+use super::*;
+use crate::bundle::context::{parse, rounded, section};
+use crate::ops::finite_difference::{assert_piecewise_gradient, random};
+use crate::ops::noise::Stream;
+use crate::ops::normality::{self, Spread};
+use crate::ops::opacity_target::Normalisation;
+use crate::scene::ContextModel;
+use crate::scene::init::initial_scene;
+use crate::train::config::Phase;
+use crate::train::module::detail::Teaching;
+use crate::train::module::distribution::{Reduction, Vectors};
+use crate::train::module::pruning::Count;
+use crate::train::module::{Detail, Distribution, Modules, Pruning};
+use pocketsplat_capture::camera::Camera;
+
+const SIZE: [u32; 2] = [26, 19];
+
+fn camera() -> Camera {
+    Camera {
+        rotation: DMat3::from_rotation_y(0.2),
+        translation: DVec3::new(0.05, -0.1, 2.0),
+        focal_px: [30.0, 31.0],
+        principal_px: [13.5, 9.0],
+        width_px: SIZE[0],
+        height_px: SIZE[1],
+    }
+}
+
+/// A scene in which every parameter matters: nothing at its initial zero.
+fn scene(seed: u64, shape: ModelShape) -> Scene<f64> {
+    let points: Vec<DVec3> = random(seed, 60).chunks_exact(3).map(|p| DVec3::from_slice(p) * 0.6).collect();
+    let mut scene = initial_scene(shape, 0.01, &points, &mut ChaCha8Rng::seed_from_u64(seed)).cast::<f64>();
+    scene.anchors.features = random(seed + 1, scene.anchors.features.len());
+    scene.anchors.offsets = random(seed + 2, scene.anchors.offsets.len());
+    for (s, r) in scene.anchors.log_scales.iter_mut().zip(random(seed + 3, 20 * 6)) {
+        *s += 0.3 * r - 0.5;
+    }
+    // Most Gaussians drawn, some not.
+    scene.heads.opacity.b2.fill(0.3);
+    if let Some(detail) = &mut scene.heads.detail {
+        detail.w2 = random(seed + 4, detail.w2.len());
+    }
+    scene
+}
+
+fn shapes() -> [ModelShape; 9] {
+    let base = ModelShape { view_colour: true, view_geometry: true, ..ModelShape::plain(6, 3) };
+    [
+        base,
+        ModelShape { view_distance: true, dilation_compensation: true, ..base },
+        ModelShape { view_colour: false, view_geometry: false, n_offsets: 1, ..base },
+        ModelShape { view_geometry: false, view_distance: true, ..base },
+        ModelShape { view_colour: false, ..base },
+        ModelShape { detail_hidden: 5, colour_hidden: 8, ..base },
+        ModelShape { feature_bank: true, ..ModelShape::plain(4, 2) },
+        ModelShape { feature_bank: true, detail_hidden: 3, feature_dim: 8, ..base },
+        ModelShape { anisotropic: false, ..base },
+    ]
+}
+
+fn truth() -> Vec<f64> {
+    random(77, 3 * (SIZE[0] * SIZE[1]) as usize).iter().map(|v| 0.5 + 0.5 * v).collect()
+}
+
+/// Every parameter of a scene in one vector that is no sign or mask: features, log-scales, offsets, the heads in file
+/// order, the context network.
+fn flatten<R: Real>(scene: &mut Scene<R>) -> Vec<&mut R> {
+    let Scene { anchors, heads, context, .. } = scene;
+    let mut all: Vec<&mut R> =
+        anchors.features.iter_mut().chain(&mut anchors.log_scales).chain(&mut anchors.offsets).collect();
+    for head in heads.each_mut().chain(context.as_mut().map(|context| &mut context.mlp)) {
+        for group in head.groups_mut() {
+            all.extend(group.iter_mut());
+        }
+    }
+    all
+}
+
+/// The gradients in the order of [`flatten`].
+fn gradients<R: Real>(scene: &Scene<R>, workspace: &Workspace<R>) -> Vec<f64> {
+    let mut d = scene.clone();
+    for g in flatten(&mut d) {
+        *g = R::ZERO;
+    }
+    workspace.blocks().iter().for_each(|block| block.copy_gradients(&scene.shape, &mut d.anchors));
+    d.heads = workspace.d_heads.clone();
+    if let (Some(context), Some(found)) = (&mut d.context, &workspace.d_context) {
+        context.mlp = found.mlp.clone();
+    }
+    flatten(&mut d).into_iter().map(|g| (*g).into()).collect()
+}
+
+/// Every fifth pixel does not count, for one of the shapes.
+fn mask(shape: &ModelShape) -> Option<Vec<bool>> {
+    shape.view_distance.then(|| (0..SIZE[0] * SIZE[1]).map(|i| i % 5 != 0).collect())
+}
+
+fn step<R: Real>(scene: &Scene<R>) -> (f64, Vec<f64>) {
+    let (report, workspace) = coded_step(scene, &Coding::Raw);
+    (report.loss.into(), gradients(scene, &workspace))
+}
+
+fn coded_step<R: Real>(scene: &Scene<R>, coding: &Coding<'_, R>) -> (StepReport<R>, Workspace<R>) {
+    step_with(scene, coding, &Loss::plain(LossWeights::default()))
+}
+
+fn step_with<R: Real>(scene: &Scene<R>, coding: &Coding<'_, R>, loss: &Loss<'_, R>) -> (StepReport<R>, Workspace<R>) {
+    let mut workspace = Workspace::new(&scene.shape);
+    let mask = mask(&scene.shape);
+    let mut truth: Vec<R> = truth().into_iter().map(R::real).collect();
+    clear_masked(&mut truth, mask.as_deref());
+    let target = Target {
+        camera: &Pinhole::new(&camera()),
+        truth: &truth,
+        mask: mask.as_deref(),
+        background: [0.1, 0.2, 0.3].map(R::real),
+    };
+    let report = workspace.step(scene, &target, loss, coding);
+    assert!(report.n_splats > 5, "the scene must be seen: {report:?}");
+    (report, workspace)
+}
+
+/// A context whose grid and network say something.
+fn context(seed: u64, scene: &Scene<f64>) -> ContextModel<f64> {
+    let levels = [(LevelKind::Volume, 5, 125), (LevelKind::Volume, 40, 64), (LevelKind::Xz, 9, 81)];
+    let levels = levels.map(|(kind, resolution, n_rows)| GridLevel { kind, resolution, n_rows }).to_vec();
+    let frame = GridFrame::spanning([-60; 3], [60; 3]);
+    let mut model = ContextModel::filled(&scene.shape, frame, levels, 6, [1.0, 0.1, 0.2], 0.0);
+    model.rows = random(seed, model.rows.len());
+    // Outputs of less than 0.8, so that no step or scale is at the end of its range.
+    for (i, (group, size)) in (1..).zip(model.mlp.groups_mut().into_iter().zip([0.4, 0.4, 0.05, 0.3])) {
+        *group = random(seed + i, group.len()).iter().map(|v| size * v).collect();
+    }
+    model
+}
+
+fn rate(grid: f64) -> RateTerms {
+    // Bits that weigh as much as the image, so that a wrong gradient shows.
+    RateTerms { lambda: 0.3, sample: 0.6, mask: 0.1, grid }
+}
+
+#[test]
+fn the_whole_step_agrees_with_finite_differences() {
+    for (seed, shape) in (1..).zip(shapes()) {
+        let mut scene = scene(seed, shape);
+        let (_, analytic) = step(&scene);
+        let x: Vec<f64> = flatten(&mut scene).into_iter().map(|p| *p).collect();
+        assert_piecewise_gradient("step", &x, &analytic, |x| {
+            let mut moved = scene.clone();
+            for (p, v) in flatten(&mut moved).into_iter().zip(x) {
+                *p = *v;
+            }
+            step(&moved).0
+        });
+    }
+}
+
+#[test]
+fn f32_agrees_with_f64() {
+    for (seed, shape) in (11..).zip(shapes()) {
+        let scene = scene(seed, shape);
+        let (loss, exact) = step(&scene);
+        let (rounded_loss, rounded) = step(&scene.cast::<f32>());
+        assert!((loss - rounded_loss).abs() <= 1e-5 * loss);
+        let scale = exact.iter().fold(0.0f64, |s, g| s.max(g.abs()));
+        for (i, (a, b)) in exact.iter().zip(&rounded).enumerate() {
+            assert!((a - b).abs() <= 1e-3 * a.abs().max(1e-2 * scale), "parameter {i}: f64 {a}, f32 {b}");
+        }
+    }
+}
+
+#[test]
+fn a_view_that_sees_nothing_has_zero_gradients() {
+    let mut scene = scene(3, shapes()[0]);
+    for cell in &mut scene.anchors.lattice {
+        cell[2] -= 5000;
+    }
+    let mut workspace = Workspace::new(&scene.shape);
+    let truth = truth();
+    let target = Target { camera: &Pinhole::new(&camera()), truth: &truth, mask: None, background: [0.0; 3] };
+    let report = workspace.step(&scene, &target, &Loss::plain(LossWeights::default()), &Coding::Raw);
+    assert!(report.loss.is_finite() && report.n_splats == 0);
+    assert!(gradients(&scene, &workspace).iter().all(|g| *g == 0.0));
+}
+
+#[test]
+fn blocks_of_anchors_add_up() {
+    // The heads' gradients are sums over blocks; along random directions, because there are hundreds of weights.
+    let shape = shapes()[0];
+    let points: Vec<DVec3> = random(5, 3 * 700).chunks_exact(3).map(|p| DVec3::from_slice(p) * 0.6).collect();
+    let mut scene = initial_scene(shape, 0.001, &points, &mut ChaCha8Rng::seed_from_u64(5)).cast::<f64>();
+    assert!(scene.anchors.len() > 2 * BLOCK, "several blocks");
+    scene.anchors.features = random(6, scene.anchors.features.len());
+    scene.anchors.log_scales.iter_mut().for_each(|s| *s -= 0.5);
+    let (_, analytic) = step(&scene);
+    let x: Vec<f64> = flatten(&mut scene).into_iter().map(|p| *p).collect();
+    let first_weight = x.len() - scene.heads.each().map(|h| h.n_params()).sum::<usize>();
+    for seed in 0..4 {
+        let direction = random(90 + seed, x.len() - first_weight);
+        let along: f64 = direction.iter().zip(&analytic[first_weight..]).map(|(d, g)| d * g).sum();
+        assert_piecewise_gradient("heads", &[0.0], &[along], |t| {
+            let mut moved = scene.clone();
+            for (p, d) in flatten(&mut moved).into_iter().skip(first_weight).zip(&direction) {
+                *p += t[0] * d;
+            }
+            step(&moved).0
+        });
+    }
+}
+
+#[test]
+fn a_step_with_noise_and_rate_agrees_with_finite_differences() {
+    let stream = Stream::of_run(31);
+    let codings = [
+        (shapes()[2], Coding::Noise { stream, steps: [0.3, 0.1, 0.2] }),
+        (shapes()[1], Coding::Context { stream, rate: rate(0.0), exact: None }),
+        (shapes()[6], Coding::Context { stream, rate: rate(0.0), exact: None }),
+    ];
+    for (shape, coding) in codings {
+        let mut scene = scene(31, shape);
+        if matches!(coding, Coding::Context { .. }) {
+            scene.context = Some(context(31, &scene));
+        }
+        let (report, workspace) = coded_step(&scene, &coding);
+        let sampled = report.rate.map_or(0, |rate| rate.n_sampled);
+        assert!((5..20).contains(&sampled) || scene.context.is_none(), "{sampled} of 20 anchors are in the sample");
+        let analytic = gradients(&scene, &workspace);
+        let x: Vec<f64> = flatten(&mut scene).into_iter().map(|p| *p).collect();
+        assert_piecewise_gradient("step", &x, &analytic, |x| {
+            let mut moved = scene.clone();
+            for (p, v) in flatten(&mut moved).into_iter().zip(x) {
+                *p = *v;
+            }
+            coded_step(&moved, &coding).0.loss
+        });
+    }
+}
+
+/// Shifting a feature of all anchors is shifting the biases behind it, and all rows of its level together.
+#[test]
+fn the_gradients_of_the_grid_are_those_of_its_features() {
+    let mut scene = scene(41, shapes()[0]);
+    scene.context = Some(context(41, &scene));
+    let coding = Coding::Context { stream: Stream::of_run(1), rate: rate(0.0), exact: None };
+    let (_, workspace) = coded_step(&scene, &coding);
+    let (model, gradients) = (scene.context.unwrap(), workspace.d_context.unwrap());
+    let mut rows = gradients.rows.as_slice();
+    for (l, level) in model.levels.iter().enumerate() {
+        let (own, after) = rows.split_at(level.n_rows as usize * 4);
+        rows = after;
+        for f in 0..4 {
+            let by_rows: f64 = own.iter().skip(f).step_by(4).sum();
+            let weights = model.mlp.w1.iter().skip(4 * l + f).step_by(model.mlp.n_in);
+            let by_biases: f64 = weights.zip(&gradients.mlp.b1).map(|(w, d)| w * d).sum();
+            assert!((by_rows - by_biases).abs() < 1e-12 && by_rows != 0.0, "{by_rows} and {by_biases}");
+        }
+    }
+}
+
+#[test]
+fn masks_hide_save_bits_and_are_pushed_shut() {
+    let mut scene = scene(51, shapes()[0]);
+    let open = coded_step(&scene, &Coding::Raw).0;
+    let k = scene.shape.n_offsets;
+    for logit in scene.anchors.mask_logits.iter_mut().step_by(k) {
+        *logit = -5.0;
+    }
+    scene.anchors.mask_logits[k..2 * k].fill(-5.0);
+    scene.context = Some(context(51, &scene));
+    let coding = Coding::Context { stream: Stream::of_run(1), rate: rate(1.0), exact: None };
+    let (report, workspace) = coded_step(&scene, &coding);
+    assert!(report.n_gaussians < open.n_gaussians);
+    for block in workspace.blocks() {
+        assert!(!block.anchors.contains(&1), "an anchor without a drawn offset is invisible");
+        assert!(block.sources.iter().all(|source| source.offset != 0));
+        for (row, anchor) in block.anchors.iter().enumerate() {
+            let logits = &scene.anchors.mask_logits[*anchor as usize * k..];
+            assert!(block.d_mask_logits[row * k] > 0.0, "only the mask term: {}", logits[0]);
+        }
+    }
+    let without = coded_step(&scene, &Coding::Context { stream: Stream::of_run(1), rate: rate(0.0), exact: None }).0;
+    assert!(report.loss > without.loss, "the grid's bits count");
+}
+
+/// In the last phase the step draws the very values that a decoder reads.
+#[test]
+fn rounded_values_are_symbols_of_the_integer_model() {
+    rounding_twice_is_rounding_once(shapes()[1]);
+    rounding_twice_is_rounding_once(shapes()[6]);
+}
+
+fn rounding_twice_is_rounding_once(shape: ModelShape) {
+    let mut exact = scene(61, shape);
+    exact.context = Some(context(61, &exact));
+    let scene = exact.cast::<f32>();
+    let (model, n_channels) = (scene.context.as_ref().unwrap(), scene.shape.values_per_anchor());
+    let section = section(model, n_channels).unwrap();
+    let context = parse(&section, &scene.shape).unwrap();
+    let network = rounded(model, n_channels).unwrap();
+    let step = |scene: &Scene<f32>| {
+        let exact = Some(Exact { context: &context, network: &network });
+        coded_step(scene, &Coding::Context { stream: Stream::of_run(3), rate: rate(0.0), exact })
+    };
+    let (report, workspace) = step(&scene);
+    let mut snapped = scene.clone();
+    for (a, cell) in scene.anchors.lattice.iter().enumerate() {
+        let (mut features, mut hidden) = (vec![0; context.n_inputs()], vec![0; context.n_hidden()]);
+        context.features(*cell, &mut features);
+        context.hidden(&features, &mut hidden);
+        let steps = context.steps(&hidden);
+        let arrays = [
+            (Group::Feature, &mut snapped.anchors.features, scene.shape.feature_dim),
+            (Group::LogScale, &mut snapped.anchors.log_scales, shape.n_log_scales()),
+            (Group::Offset, &mut snapped.anchors.offsets, 3 * scene.shape.n_offsets),
+        ];
+        for (group, values, width) in arrays {
+            for value in &mut values[a * width..(a + 1) * width] {
+                *value = (*value / steps.value(group)).round_ties_even() * steps.value(group);
+            }
+        }
+    }
+    let (again, repeated) = step(&snapped);
+    assert_eq!(
+        (again.squared_error, again.loss),
+        (report.squared_error, report.loss),
+        "rounding twice is rounding once"
+    );
+    assert_eq!(coded_step(&snapped, &Coding::Raw).0.squared_error, report.squared_error);
+    let n = flatten(&mut snapped).len() - network.n_params();
+    assert!(gradients(&scene, &workspace)[..n] == gradients(&snapped, &repeated)[..n], "straight through");
+}
+
+/// Every module and every option that has a gradient of its own, weighed so that a wrong one shows.
+fn modules() -> Vec<Modules> {
+    let distribution = Distribution {
+        divergence: 0.05,
+        spread: 0.07,
+        target: 0.4,
+        reduction: Reduction::Sum,
+        ..Distribution::default()
+    };
+    let pruning = Pruning { weight: 0.3, ..Pruning::default() };
+    let detail = |teaching| Detail { hidden: 5, teaching, weight: 0.5 };
+    let with = |distribution, pruning, detail| Modules { distribution, pruning, detail };
+    vec![
+        with(Some(distribution), None, None),
+        with(
+            Some(Distribution {
+                vectors: Vectors::All,
+                reading: Spread::Variance,
+                unit: 0.7,
+                reduction: Reduction::Mean,
+                ..distribution
+            }),
+            None,
+            None,
+        ),
+        with(Some(Distribution { form: normality::Form::Histogram, ..distribution }), None, None),
+        with(None, Some(pruning), None),
+        with(None, Some(Pruning { normalisation: Normalisation::Literal, count: Count::Drawn, ..pruning }), None),
+        with(None, None, Some(detail(Teaching::Small))),
+        with(None, None, Some(detail(Teaching::HighPass))),
+        with(Some(distribution), Some(pruning), Some(detail(Teaching::HighPass))),
+    ]
+}
+
+#[test]
+fn a_step_with_modules_agrees_with_finite_differences() {
+    let stream = Stream::of_run(5);
+    let at =
+        Moment { iteration: 80, iterations: 100, phase: Phase::Raw, scaled: true, base_steps: [1.0, 0.1, 0.2], stream };
+    for (seed, modules) in (71..).zip(modules()) {
+        let shape = ModelShape { view_colour: false, view_geometry: false, ..modules.shape(shapes()[0]) };
+        let mut scene = scene(seed, shape);
+        let terms = modules.terms();
+        let loss = Loss { modules: Some((&terms, &at)), ..Loss::plain(LossWeights::default()) };
+        let (report, workspace) = step_with(&scene, &Coding::Raw, &loss);
+        assert!(report.loss != coded_step(&scene, &Coding::Raw).0.loss, "{modules:?} adds nothing");
+        let analytic = gradients(&scene, &workspace);
+        let x: Vec<f64> = flatten(&mut scene).into_iter().map(|p| *p).collect();
+        assert_piecewise_gradient("step", &x, &analytic, |x| {
+            let mut moved = scene.clone();
+            for (p, v) in flatten(&mut moved).into_iter().zip(x) {
+                *p = *v;
+            }
+            step_with(&moved, &Coding::Raw, &loss).0.loss
+        });
+    }
+}
+
+/// The colours that teach a residual are those of the features before any noise; no gradient passes through them.
+#[test]
+fn uncoded_colours_are_those_of_the_scene_itself() {
+    let scene = scene(81, ModelShape { detail_hidden: 5, ..shapes()[0] });
+    let mut plain = scene.clone();
+    plain.heads.detail = None;
+    plain.shape.detail_hidden = 0;
+    let drawn = coded_step(&plain, &Coding::Raw).1;
+    let noise = Coding::Noise { stream: Stream::of_run(5), steps: [0.01; 3] };
+    let at = Moment {
+        iteration: 1,
+        iterations: 1,
+        phase: Phase::Noise,
+        scaled: true,
+        base_steps: [1.0; 3],
+        stream: Stream::of_run(5),
+    };
+    let modules =
+        Modules { detail: Some(Detail { hidden: 5, teaching: Teaching::Uncoded, weight: 3.0 }), ..Modules::default() };
+    let terms = modules.terms();
+    let loss = Loss { modules: Some((&terms, &at)), ..Loss::plain(LossWeights::default()) };
+    let (taught, workspace) = step_with(&scene, &noise, &loss);
+    let mut squares = 0.0;
+    let mut n = 0;
+    for (block, drawn) in workspace.blocks().iter().zip(drawn.blocks()) {
+        assert_eq!(block.sources, drawn.sources, "the noise is too small to make one appear or vanish");
+        for ((target, gaussian), plain) in
+            block.uncoded_colours(&scene).iter().zip(&block.gaussians).zip(&drawn.gaussians)
+        {
+            assert_eq!(*target, plain.colour);
+            squares += (0..3).map(|i| (gaussian.colour[i] - target[i]).powi(2)).sum::<f64>();
+            n += 1;
+        }
+    }
+    let difference = taught.loss - coded_step(&scene, &noise).0.loss;
+    assert!((difference - 3.0 * squares / f64::from(n)).abs() < 1e-12 && squares > 0.0);
+}

@@ -3,12 +3,9 @@
 use super::limits::{Budget, MaxSplats, Overflow, Residency, Strips};
 use super::scratch::ScratchShape;
 use super::work::{Kept, Work, decoding_macs};
-use crate::bundle::{Bundle, TierMeasures, saturate};
+use crate::bundle::{Bundle, STRIPS, TierMeasures, saturate};
 use crate::error::DecodeError;
 use crate::raster::TILE_PX;
-
-/// Numbers of strips that the manifest has maxima for, and that plans try.
-const STRIPS: [u8; 4] = [1, 2, 4, 8];
 
 /// What reading a baked Gaussian is worth in multiply-adds.
 const READING_MACS: u64 = 150;

@@ -1,7 +1,7 @@
 //! A chunk: up to a few hundred neighbouring anchors that decode by themselves.
 
 use super::cursor::saturate;
-use super::directory::{InkFrame, Record};
+use super::directory::{ChunkRecord, InkFrame};
 use super::{AnchorModels, AnchorReader, AnchorSite, crc32};
 use crate::error::{DecodeError, Field};
 
@@ -10,14 +10,20 @@ use crate::error::{DecodeError, Field};
 pub struct Chunk<'a> {
     index: u32,
     offset: u32,
-    record: Record,
+    record: ChunkRecord,
     ink_frame: InkFrame,
     words: &'a [[u8; 2]],
 }
 
 impl<'a> Chunk<'a> {
     /// The chunk of `record`, whose bytes begin at `offset` of the section `chunks`.
-    pub(super) fn new(index: u32, offset: u32, record: Record, ink_frame: InkFrame, chunks: &'a [u8]) -> Option<Self> {
+    pub(super) fn new(
+        index: u32,
+        offset: u32,
+        record: ChunkRecord,
+        ink_frame: InkFrame,
+        chunks: &'a [u8],
+    ) -> Option<Self> {
         let bytes = chunks.get(offset as usize..)?.get(..record.len as usize)?;
         let (words, _) = bytes.as_chunks();
         Some(Self { index, offset, record, ink_frame, words })
@@ -96,7 +102,7 @@ impl<'a> Chunk<'a> {
     /// Decodes all anchors of the chunk as values, its checksum compared first.
     ///
     /// * `sites`: `[n_anchors]`, filled.
-    /// * `values`: `[n_anchors, n_channels]` row-major, filled: F features, 6 log-scales, 3K offsets.
+    /// * `values`: `[n_anchors, n_channels]` row-major, filled: F features, the log-scales, 3K offsets.
     ///
     /// # Errors
     /// [`DecodeError::BufferTooShort`]; [`DecodeError::ChunkChecksum`] or [`DecodeError::ChunkStream`] for damage.
@@ -129,7 +135,7 @@ impl<'a> Chunk<'a> {
         let rows = rows.get_mut(..n_values).ok_or(too_short(Field::ChannelBuffer, n_values, n_rows))?;
         self.check()?;
         let mut reader = self.anchors(models);
-        // `max(1)`: a chunk size of zero would panic; there are always at least 6 channels.
+        // `max(1)`: a chunk size of zero would panic; there are always at least 8 channels.
         for (site, row) in sites.iter_mut().zip(rows.chunks_exact_mut(row_len.max(1))) {
             *site = reader.site();
             read_row(&mut reader, row);

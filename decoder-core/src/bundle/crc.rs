@@ -33,7 +33,13 @@ const fn remainders() -> [u32; 256] {
 /// ```
 #[must_use]
 pub fn crc32(bytes: &[u8]) -> u32 {
-    !bytes.iter().fold(!0, |crc, &byte| {
+    crc32_of(bytes.iter().copied())
+}
+
+/// The same of bytes that lie nowhere.
+#[inline]
+pub(super) fn crc32_of(bytes: impl Iterator<Item = u8>) -> u32 {
+    !bytes.fold(!0, |crc, byte| {
         let [low, ..] = crc.to_le_bytes();
         let remainder = REMAINDERS.get(usize::from(low ^ byte)).copied().unwrap_or(0);
         (crc >> 8) ^ remainder

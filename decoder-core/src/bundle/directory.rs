@@ -1,6 +1,7 @@
 //! The directory: the tiers, and one record a chunk.
 
 use super::cursor::Cursor;
+use super::emitter::Emitter;
 use super::header::{Header, in_range};
 use crate::error::{DecodeError, Field, SectionKind};
 
@@ -43,13 +44,34 @@ pub struct Directory<'a> {
 }
 
 /// One chunk's record.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Record {
-    pub(super) len: u32,
-    pub(super) crc: u32,
-    pub(super) n_anchors: u16,
-    pub(super) low: [u16; 3],
-    pub(super) high: [u16; 3],
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct ChunkRecord {
+    /// Bytes of the chunk.
+    pub len: u32,
+    /// Its checksum.
+    pub crc: u32,
+    /// Anchors it holds.
+    pub n_anchors: u16,
+    /// Lowest corner of its ink box, in steps of the [`InkFrame`].
+    pub low: [u16; 3],
+    /// Highest corner.
+    pub high: [u16; 3],
+}
+
+impl Tier {
+    pub(super) fn parse(record: &[u8; TIER_RECORD_LEN]) -> Result<Self, DecodeError> {
+        let [n_chunks, n_anchors, end] = Cursor::new(record, SectionKind::Directory).u32s()?;
+        Ok(Self { n_chunks, n_anchors, end })
+    }
+
+    /// The record's bytes: the reverse of `parse`.
+    #[must_use]
+    pub fn emit(&self) -> [u8; TIER_RECORD_LEN] {
+        let mut out = Emitter::new();
+        out.u32s([self.n_chunks, self.n_anchors, self.end]);
+        out.finish()
+    }
 }
 
 impl InkFrame {
@@ -60,6 +82,19 @@ impl InkFrame {
         let ([x, y, z], [step_x, step_y, step_z]) = (self.min, self.step);
         let [q_x, q_y, q_z] = q.map(f32::from);
         [x + q_x * step_x, y + q_y * step_y, z + q_z * step_z]
+    }
+
+    pub(super) fn parse(cursor: &mut Cursor<'_>) -> Result<Self, DecodeError> {
+        Ok(Self { min: cursor.f32s()?, step: cursor.f32s()? })
+    }
+
+    /// The frame's bytes: the reverse of `parse`.
+    #[must_use]
+    pub fn emit(&self) -> [u8; INK_FRAME_LEN] {
+        let mut out = Emitter::new();
+        out.f32s(self.min);
+        out.f32s(self.step);
+        out.finish()
     }
 
     fn check(&self) -> Result<(), DecodeError> {
@@ -73,13 +108,24 @@ impl InkFrame {
     }
 }
 
-impl Record {
-    fn parse(record: &[u8; CHUNK_RECORD_LEN]) -> Result<Self, DecodeError> {
+impl ChunkRecord {
+    pub(super) fn parse(record: &[u8; CHUNK_RECORD_LEN]) -> Result<Self, DecodeError> {
         let mut cursor = Cursor::new(record, SectionKind::Directory);
         let [len, crc] = cursor.u32s()?;
         let [n_anchors, reserved, low_x, low_y, low_z, high_x, high_y, high_z] = cursor.u16s()?;
         in_range(Field::Reserved, reserved.into(), 0, 0)?;
         Ok(Self { len, crc, n_anchors, low: [low_x, low_y, low_z], high: [high_x, high_y, high_z] })
+    }
+
+    /// The record's bytes: the reverse of `parse`.
+    #[must_use]
+    pub fn emit(&self) -> [u8; CHUNK_RECORD_LEN] {
+        let mut out = Emitter::new();
+        out.u32s([self.len, self.crc]);
+        out.u16s([self.n_anchors, 0]);
+        out.u16s(self.low);
+        out.u16s(self.high);
+        out.finish()
     }
 
     fn check(&self, header: &Header) -> Result<(), DecodeError> {
@@ -97,7 +143,7 @@ impl<'a> Directory<'a> {
     pub(super) fn parse(section: &'a [u8], header: &Header, chunks_len: u32) -> Result<Self, DecodeError> {
         let mut cursor = Cursor::new(section, SectionKind::Directory);
         let (tiers, _) = cursor.bytes(usize::from(header.n_tiers).saturating_mul(TIER_RECORD_LEN))?.as_chunks();
-        let ink_frame = InkFrame { min: cursor.f32s()?, step: cursor.f32s()? };
+        let ink_frame = InkFrame::parse(&mut cursor)?;
         ink_frame.check()?;
         let records_len = usize::try_from(header.n_chunks).unwrap_or(usize::MAX).saturating_mul(CHUNK_RECORD_LEN);
         let (records, _) = cursor.bytes(records_len)?.as_chunks();
@@ -110,14 +156,12 @@ impl<'a> Directory<'a> {
     /// Tier number `tier`.
     #[must_use]
     pub fn tier(&self, tier: u8) -> Option<Tier> {
-        let [n_chunks, n_anchors, end] =
-            Cursor::new(self.tiers.get(usize::from(tier))?, SectionKind::Directory).u32s().ok()?;
-        Some(Tier { n_chunks, n_anchors, end })
+        Tier::parse(self.tiers.get(usize::from(tier))?).ok()
     }
 
     /// The record of chunk number `index`.
-    pub(super) fn record(&self, index: u32) -> Option<Record> {
-        Record::parse(self.records.get(index as usize)?).ok()
+    pub(super) fn record(&self, index: u32) -> Option<ChunkRecord> {
+        ChunkRecord::parse(self.records.get(index as usize)?).ok()
     }
 
     /// Tiers and chunks add up, chunk by chunk and tier by tier.
@@ -129,7 +173,7 @@ impl<'a> Directory<'a> {
             in_range(Field::TierChunks, stored.n_chunks, sums.n_chunks, header.n_chunks)?;
             let n_new = stored.n_chunks.saturating_sub(sums.n_chunks);
             for record in records.by_ref().take(n_new as usize) {
-                let record = Record::parse(record)?;
+                let record = ChunkRecord::parse(record)?;
                 record.check(header)?;
                 sums.n_anchors = sums.n_anchors.saturating_add(record.n_anchors.into());
                 sums.end = sums.end.saturating_add(record.len);

@@ -1,9 +1,11 @@
 //! The header: fixed fields, then the section table, then its own checksum.
 
+use super::crc::crc32_of;
 use super::crc32;
 use super::cursor::Cursor;
+use super::emitter::Emitter;
 use super::features::Features;
-use super::section::SECTION_LEN;
+use super::section::{SECTION_LEN, Section};
 use crate::camera::Camera;
 use crate::context::N_GROUPS;
 use crate::error::{DecodeError, Field, SectionKind};
@@ -143,6 +145,46 @@ impl Header {
         in_range(Field::HeaderLen, len.into(), expected, expected)?;
         let (table, _) = cursor.bytes(usize::from(n_sections).saturating_mul(SECTION_LEN))?.as_chunks();
         Ok((header, table))
+    }
+
+    /// The header's bytes, its section table and checksum included: the reverse of `parse`.
+    ///
+    /// * `sections`: the rows of the table; [`header_len`](Self::header_len) and [`file_len`](Self::file_len) are the caller's to
+    ///   keep true to them.
+    pub fn emit(&self, sections: &[Section]) -> impl Iterator<Item = u8> {
+        let rows = sections.iter().flat_map(Section::emit);
+        // A table of 255 rows is the longest.
+        let checked = self.emit_fields(sections.len() as u8).into_iter().chain(rows);
+        let crc = crc32_of(checked.clone());
+        checked.chain(crc.to_le_bytes())
+    }
+
+    fn emit_fields(&self, n_sections: u8) -> [u8; HEADER_FIXED_LEN] {
+        let mut out = Emitter::new();
+        out.bytes(MAGIC);
+        out.u16s([VERSION, self.header_len]);
+        // No optional features yet.
+        out.u32s([self.file_len, self.features.to_bits(), 0]);
+        out.u16s([self.feature_dim, self.n_offsets]);
+        out.u32s([self.n_anchors, self.n_chunks]);
+        out.u16s([self.max_chunk_anchors]);
+        out.bytes([CONVENTION_OPENCV, n_sections]);
+        out.u16s(self.training_px);
+        out.bytes(self.background);
+        out.bytes([self.n_tiers]);
+        out.f32s([self.voxel_size]);
+        out.u16s([self.colour_hidden, self.detail_hidden]);
+        out.f64s(self.normalisation_centre);
+        out.f64s([self.normalisation_scale]);
+        let Camera { rotation, translation, focal_px, principal_px, width_px, height_px } = self.preview;
+        out.f32s(rotation);
+        out.f32s(translation);
+        out.f32s(focal_px);
+        out.f32s(principal_px);
+        out.u16s([width_px, height_px]);
+        out.bytes(self.symbol_bits);
+        out.bytes([0]);
+        out.finish()
     }
 
     fn parse_fields(cursor: &mut Cursor<'_>, header_len: u16) -> Result<(Self, u8), DecodeError> {

@@ -7,8 +7,8 @@ use crate::error::{DecodeError, Field, SectionKind};
 
 /// Most bits of a cell's code along an axis: three of them fit a u64.
 pub const MAX_LATTICE_BITS: u8 = 21;
-/// Lattice coordinates stay within ±2²⁴, where f32 still holds every integer.
-const MAX_LATTICE_MIN: u32 = 1 << 23;
+/// Largest magnitude of a coordinate of the lowest cell: coordinates stay within ±2²⁴, where f32 still holds every integer.
+pub const MAX_LATTICE_MIN: u32 = 1 << 23;
 
 /// The cube of cells that a scene's anchors lie in, and the frequencies of the trie that lists them.
 #[derive(Clone, Copy, Debug)]
@@ -42,6 +42,13 @@ impl<'a> Lattice<'a> {
             in_range(Field::TrieFrequency, node.end_both.into(), 0, node.end_zero.into())?;
         }
         Ok(Self { min, bits, trie })
+    }
+
+    /// The section's bytes: the reverse of `parse`.
+    pub fn emit(&self) -> impl Iterator<Item = u8> + use<'a> {
+        let min = self.min.into_iter().flat_map(i32::to_le_bytes);
+        min.chain([self.bits, 0, 0, 0])
+            .chain(self.trie.levels().as_flattened().as_flattened().as_flattened().iter().copied())
     }
 
     /// The cell of a code: its bits from the top are z, y, x of the highest bit, then of the next.

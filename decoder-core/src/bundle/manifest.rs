@@ -1,18 +1,23 @@
 //! The manifest: what each tier was measured to look like and to cost.
 
 use super::cursor::Cursor;
+use super::emitter::Emitter;
 use crate::error::{DecodeError, Field, SectionKind};
 
 /// Length of a tier's record, bytes.
 pub const MANIFEST_RECORD_LEN: usize = 60;
+
+/// Numbers of horizontal strips that a frame is cut into to measure it, and that plans try.
+pub const STRIPS: [u8; 4] = [1, 2, 4, 8];
 
 /// The bits that stand for "not measured".
 const NOT_MEASURED: u32 = 0x7FC0_0000;
 
 /// Quality and work of the scene that consists of a tier and those before it.
 ///
-/// The maxima are over [`n_cameras`](Self::n_cameras) views, each at the training size; another view may need more.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// The maxima are over [`n_cameras`](Self::n_cameras) views, each at the training size; another view may need more. By
+/// default nothing is measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TierMeasures {
     /// Mean PSNR over held-out training views, dB; `None` when not measured.
@@ -25,7 +30,7 @@ pub struct TierMeasures {
     pub max_visible_anchors: u32,
     /// Splats of a frame.
     pub max_splats: u32,
-    /// Splats of a strip when the frame is cut into 1, 2, 4, 8 horizontal strips.
+    /// Splats of a strip when the frame is cut into [`STRIPS`] horizontal strips.
     pub max_strip_splats: [u32; 4],
     /// Pairs of a 16×16 tile and a splat in such a strip.
     pub max_strip_pairs: [u32; 4],
@@ -58,6 +63,19 @@ impl TierMeasures {
             max_kilo_pixels: cursor.u32()?,
             max_decoded_anchors: cursor.u32()?,
         })
+    }
+
+    /// The record's bytes: the reverse of `parse`.
+    #[must_use]
+    pub fn emit(&self) -> [u8; MANIFEST_RECORD_LEN] {
+        let mut out = Emitter::new();
+        out.u32s([self.psnr_db.map_or(NOT_MEASURED, f32::to_bits)]);
+        out.u16s([self.n_views, self.n_cameras]);
+        out.u32s([self.max_visible_anchors, self.max_splats]);
+        out.u32s(self.max_strip_splats);
+        out.u32s(self.max_strip_pairs);
+        out.u32s([self.max_head_kilo_macs, self.max_kilo_pixels, self.max_decoded_anchors]);
+        out.finish()
     }
 }
 

@@ -1,8 +1,9 @@
 //! The view of a bundle's bytes: parsed and checked once, read in place ever after.
 //!
 //! [`Bundle::parse`] checks every offset, length, count, float and checksum but those of the chunks, so that nothing
-//! after it can read outside the bytes. [`format`] (`FORMAT.md` beside this file) is the normative description. The module knows
-//! nothing of rendering.
+//! after it can read outside the bytes. [`format`] (`FORMAT.md` beside this file) is the normative description. Beside each
+//! `parse` stands the `emit` that a writer calls: the bytes that `parse` reads, as an array where their number is fixed, else as an
+//! iterator, so that neither needs an allocator. The module knows nothing of rendering.
 // Tests may index and add as they like; this is about bytes that nobody vouches for.
 #![cfg_attr(not(test), deny(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::panic))]
@@ -15,6 +16,7 @@ mod chunk;
 mod crc;
 mod cursor;
 mod directory;
+mod emitter;
 mod features;
 mod gaussians;
 mod header;
@@ -30,7 +32,8 @@ pub(crate) use anchor::{AnchorRecords, RecordLayout, RecordMemory, model_words};
 pub use chunk::Chunk;
 pub use crc::crc32;
 pub(crate) use cursor::{Cursor, saturate};
-pub use directory::{CHUNK_RECORD_LEN, Directory, INK_FRAME_LEN, InkFrame, TIER_RECORD_LEN, Tier};
+pub use directory::{CHUNK_RECORD_LEN, ChunkRecord, Directory, INK_FRAME_LEN, InkFrame, TIER_RECORD_LEN, Tier};
+pub(crate) use emitter::Emitter;
 pub use features::{Effects, Features};
 pub use header::{
     HEADER_FIXED_LEN, Header, MAGIC, MAX_ANCHORS, MAX_CHUNK_ANCHORS, MAX_FEATURE_DIM, MAX_OFFSETS, MAX_TIERS, VERSION,
@@ -39,8 +42,8 @@ pub use header::{
 pub(crate) use header::{covariance_outputs, in_range, n_log_scales};
 pub(crate) use heads::{BANK_INPUTS, BANK_WEIGHTS};
 pub use heads::{CodedHeads, Halves, HeadView, HeadsView, LayerWeights, WeightReader};
-pub use lattice::{Lattice, MAX_LATTICE_BITS};
-pub use manifest::{MANIFEST_RECORD_LEN, TierMeasures};
+pub use lattice::{Lattice, MAX_LATTICE_BITS, MAX_LATTICE_MIN};
+pub use manifest::{MANIFEST_RECORD_LEN, STRIPS, TierMeasures};
 pub use section::{SECTION_LEN, Section};
 pub use tables::{Table, Tables};
 
@@ -95,7 +98,7 @@ impl<'a> Bundle<'a> {
         let heads = HeadsView::parse(sections.heads.bytes(bytes)?, &header)?;
         let lattice = Lattice::parse(sections.lattice.bytes(bytes)?)?;
         let masks = match sections.masks {
-            Some(section) => Some(masks::parse(section.bytes(bytes)?, header.n_offsets)?),
+            Some(section) => Some(MaskModel::parse(section.bytes(bytes)?, header.n_offsets)?),
             None => None,
         };
         let coder = sections.coder.bytes(bytes)?;

@@ -1,6 +1,7 @@
 //! The section table: where each part lies, and its checksum.
 
 use super::cursor::{Cursor, saturate};
+use super::emitter::Emitter;
 use super::features::Features;
 use super::header::in_range;
 use crate::error::{DecodeError, Field, SectionKind};
@@ -16,8 +17,6 @@ const FIRST_OPTIONAL_CODE: u8 = 128;
 pub struct Section {
     /// Which section.
     pub kind: SectionKind,
-    /// The number that the file has for its kind.
-    pub code: u8,
     /// Where it begins, bytes from the start of the file.
     pub offset: u32,
     /// Its length, bytes.
@@ -45,7 +44,35 @@ impl Section {
         let [code, reserved @ ..] = cursor.array::<4>()?;
         in_range(Field::Reserved, u8::from(reserved != [0; 3]).into(), 0, 0)?;
         let [offset, len, crc] = [cursor.u32()?, cursor.u32()?, cursor.u32()?];
-        Ok(Self { kind: kind_of(code)?, code, offset, len, crc })
+        Ok(Self { kind: kind_of(code)?, offset, len, crc })
+    }
+
+    /// The row's bytes: the reverse of `parse`.
+    #[must_use]
+    pub fn emit(&self) -> [u8; SECTION_LEN] {
+        let mut out = Emitter::new();
+        out.bytes([self.code(), 0, 0, 0]);
+        out.u32s([self.offset, self.len, self.crc]);
+        out.finish()
+    }
+
+    /// The number that the file has for its kind.
+    #[must_use]
+    pub const fn code(&self) -> u8 {
+        match self.kind {
+            // No section has it: the header is no row of its own table.
+            SectionKind::Header => 0,
+            SectionKind::Heads => 1,
+            SectionKind::Lattice => 2,
+            SectionKind::Masks => 3,
+            SectionKind::Tables => 4,
+            SectionKind::Context => 5,
+            SectionKind::Manifest => 6,
+            SectionKind::Directory => 7,
+            SectionKind::Chunks => 8,
+            SectionKind::Gaussians => 128,
+            SectionKind::Other(code) => code,
+        }
     }
 
     /// The bytes of the section, their checksum compared.
@@ -126,6 +153,7 @@ impl Sections {
     }
 }
 
+/// The kind of a number: the reverse of [`Section::code`].
 fn kind_of(code: u8) -> Result<SectionKind, DecodeError> {
     Ok(match code {
         1 => SectionKind::Heads,

@@ -12,6 +12,9 @@ use crate::error::{DecodeError, Field, SectionKind};
 /// Largest magnitude of a dequantised value: e^±88 and more is clamped anyway, and no product of two overflows.
 const MAX_VALUE: f32 = 1e18;
 
+/// Length of a table before its bounds, bytes.
+const TABLE_HEAD_LEN: usize = 12;
+
 /// Largest number of tables: one for each channel there can be.
 const MAX_TABLES: u32 = 360;
 
@@ -66,6 +69,22 @@ impl<'a> Tables<'a> {
         Ok(Self { channel_tables, offsets, section })
     }
 
+    /// The bytes of a section: the reverse of `parse`.
+    ///
+    /// * `channel_tables`: `[n_channels]` the number in `tables` of each channel's table.
+    pub fn emit<'t>(tables: &'t [Table<'t>], channel_tables: &'t [u16]) -> impl Iterator<Item = u8> + use<'t> {
+        let index_len = tables.len().saturating_mul(4).saturating_add(channel_tables.len().saturating_mul(2));
+        let offsets = tables.iter().scan(index_len.saturating_add(4), |end, table| {
+            let offset = saturate(*end);
+            *end = end.saturating_add(table.buffer_len());
+            Some(offset)
+        });
+        // Both are at most 360.
+        let counts = [tables.len() as u16, channel_tables.len() as u16];
+        let numbers = counts.into_iter().chain(channel_tables.iter().copied()).flat_map(u16::to_le_bytes);
+        numbers.chain(offsets.flat_map(u32::to_le_bytes)).chain(tables.iter().flat_map(Table::emit))
+    }
+
     /// Number of tables.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -112,12 +131,34 @@ impl<'a> Tables<'a> {
 }
 
 impl<'a> Table<'a> {
+    /// A table about to be written.
+    ///
+    /// * `bounds`: `[n_symbols + 2]` little-endian, from 0 to [`FREQUENCY_TOTAL`] without falling; the last entry is the escape.
+    #[must_use]
+    pub const fn new(origin: f32, step: f32, min_symbol: i16, bounds: &'a [[u8; 2]]) -> Self {
+        Self { origin, step, min_symbol, bounds }
+    }
+
     /// Reads a table; the section of `cursor` goes into errors.
     pub(super) fn parse(cursor: &mut Cursor<'a>) -> Result<Self, DecodeError> {
         let [origin, step] = cursor.f32s()?;
         let min_symbol = cursor.i16()?;
         let n_symbols = cursor.u16()?;
         Ok(Self { origin, step, min_symbol, bounds: cursor.pairs(usize::from(n_symbols).saturating_add(2))? })
+    }
+
+    /// The table's bytes: the reverse of `parse`.
+    pub fn emit(&self) -> impl Iterator<Item = u8> + use<'a> {
+        let scale = [self.origin, self.step].into_iter().flat_map(f32::to_le_bytes);
+        // A table has at most 2¹⁶ − 2 entries of its own.
+        let counts = self.min_symbol.to_le_bytes().into_iter().chain((self.n_symbols() as u16).to_le_bytes());
+        scale.chain(counts).chain(self.bounds.as_flattened().iter().copied())
+    }
+
+    /// How many bytes [`emit`](Self::emit) makes.
+    #[must_use]
+    pub fn buffer_len(&self) -> usize {
+        self.bounds.len().saturating_mul(2).saturating_add(TABLE_HEAD_LEN)
     }
 
     /// Number of symbols that have an entry of their own.

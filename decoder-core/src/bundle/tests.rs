@@ -1,6 +1,7 @@
 //! Bundles made by hand come back as what went into them.
 
 mod builder;
+mod emit;
 
 use std::vec;
 use std::vec::Vec;

@@ -14,7 +14,7 @@ pub use grid::{Corners, FEATURES_PER_LEVEL, GridFrame, GridLevel, LevelKind, WEI
 pub use mlp::{MAX_BIAS, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS};
 pub use steps::{Group, GroupStep, MAX_STEP_EXPONENT, MEAN_PARTS, MIN_STEP_EXPONENT, N_GROUPS, Steps};
 
-use crate::bundle::{Cursor, in_range, saturate};
+use crate::bundle::{Cursor, Emitter, in_range, saturate};
 use crate::entropy::{EIGHTHS, NormalModel};
 use crate::error::{DecodeError, Field, SectionKind};
 use mlp::Layer;
@@ -22,11 +22,26 @@ use steps::check_base_steps;
 
 /// Length of a level's record, bytes.
 const LEVEL_LEN: usize = 8;
+/// Length of what comes before the levels, bytes.
+const HEAD_LEN: usize = 40;
 /// Bits by which a weighted sum of rows is shortened to a feature: a feature of one is 2¹⁴.
 const FEATURE_SHIFT: u32 = 10;
 
 /// A feature of one.
 pub const FEATURE_ONE: i16 = 1 << 14;
+
+/// What a context section begins with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContextHead {
+    /// Where the grid lies.
+    pub frame: GridFrame,
+    /// Steps of the three groups where the network says nothing.
+    pub base_steps: [f32; N_GROUPS],
+    /// Levels of the grid, 1..=[`MAX_CONTEXT_LEVELS`].
+    pub n_levels: u8,
+    /// Hidden units of the network, 1..=[`MAX_CONTEXT_HIDDEN`].
+    pub n_hidden: u16,
+}
 
 /// The context section of a bundle, checked.
 #[derive(Clone, Copy, Debug)]
@@ -43,6 +58,35 @@ pub struct Context<'a> {
     n_channels: usize,
 }
 
+impl ContextHead {
+    fn parse(cursor: &mut Cursor<'_>) -> Result<Self, DecodeError> {
+        let mut min = [0; 3];
+        for coordinate in &mut min {
+            *coordinate = cursor.i32()?;
+        }
+        let scale = cursor.u32s()?;
+        let base_steps = check_base_steps(cursor.f32s()?)?;
+        let [n_levels, reserved] = cursor.array()?;
+        in_range(Field::Reserved, reserved.into(), 0, 0)?;
+        in_range(Field::ContextLevels, n_levels.into(), 1, MAX_CONTEXT_LEVELS.into())?;
+        let n_hidden = cursor.u16()?;
+        in_range(Field::ContextHidden, n_hidden.into(), 1, MAX_CONTEXT_HIDDEN.into())?;
+        Ok(Self { frame: GridFrame { min, scale }, base_steps, n_levels, n_hidden })
+    }
+
+    /// Its bytes: the reverse of `parse`.
+    #[must_use]
+    pub fn emit(&self) -> [u8; HEAD_LEN] {
+        let mut out = Emitter::new();
+        out.i32s(self.frame.min);
+        out.u32s(self.frame.scale);
+        out.f32s(self.base_steps);
+        out.bytes([self.n_levels, 0]);
+        out.u16s([self.n_hidden]);
+        out.finish()
+    }
+}
+
 impl<'a> Context<'a> {
     /// Checks a section for anchors of `n_channels` channels, the first `feature_dim` of them features, then `n_log_scales`.
     ///
@@ -55,20 +99,7 @@ impl<'a> Context<'a> {
         n_channels: usize,
     ) -> Result<Self, DecodeError> {
         let mut cursor = Cursor::new(section, SectionKind::Context);
-        let mut min = [0; 3];
-        for coordinate in &mut min {
-            *coordinate = cursor.i32()?;
-        }
-        let mut scale = [0; 3];
-        for factor in &mut scale {
-            *factor = cursor.u32()?;
-        }
-        let base_steps = check_base_steps(cursor.f32s()?)?;
-        let [n_levels, reserved] = cursor.array()?;
-        in_range(Field::Reserved, reserved.into(), 0, 0)?;
-        in_range(Field::ContextLevels, n_levels.into(), 1, MAX_CONTEXT_LEVELS.into())?;
-        let n_hidden = cursor.u16()?;
-        in_range(Field::ContextHidden, n_hidden.into(), 1, MAX_CONTEXT_HIDDEN.into())?;
+        let ContextHead { frame, base_steps, n_levels, n_hidden } = ContextHead::parse(&mut cursor)?;
         let n_levels = usize::from(n_levels);
         let n_hidden = usize::from(n_hidden);
         let (levels, _) = cursor.bytes(n_levels.saturating_mul(LEVEL_LEN))?.as_chunks();
@@ -95,17 +126,7 @@ impl<'a> Context<'a> {
                 found: saturate(section.len()),
             });
         }
-        Ok(Self {
-            frame: GridFrame { min, scale },
-            base_steps,
-            levels,
-            hidden,
-            output,
-            grid,
-            feature_dim,
-            n_log_scales,
-            n_channels,
-        })
+        Ok(Self { frame, base_steps, levels, hidden, output, grid, feature_dim, n_log_scales, n_channels })
     }
 
     /// Inputs of the network: [`FEATURES_PER_LEVEL`] a level.
@@ -236,6 +257,18 @@ fn level(record: &[u8; LEVEL_LEN]) -> Option<GridLevel> {
     Some(GridLevel { kind, resolution: u16::from_le_bytes([r0, r1]), n_rows: u32::from_le_bytes(n_rows) })
 }
 
+impl GridLevel {
+    /// The bytes of its record: what the reader of a bundle parses.
+    #[must_use]
+    pub fn emit(&self) -> [u8; LEVEL_LEN] {
+        let mut out = Emitter::new();
+        out.bytes([self.kind.code(), 0]);
+        out.u16s([self.resolution]);
+        out.u32s([self.n_rows]);
+        out.finish()
+    }
+}
+
 fn checked_level(record: &[u8; LEVEL_LEN]) -> Result<GridLevel, DecodeError> {
     let [kind, reserved, ..] = *record;
     in_range(Field::Reserved, reserved.into(), 0, 0)?;
@@ -250,3 +283,32 @@ fn checked_level(record: &[u8; LEVEL_LEN]) -> Result<GridLevel, DecodeError> {
 }
 
 const _: () = assert!(EIGHTHS == 8, "scale outputs and the tables count octaves alike");
+
+#[cfg(test)]
+mod tests {
+    use super::{ContextHead, level};
+    use crate::bundle::Cursor;
+    use crate::context::{GridFrame, GridLevel, LevelKind, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS};
+    use crate::error::SectionKind;
+
+    #[test]
+    fn heads_come_back() {
+        let frames = [[i32::MIN, -1, i32::MAX], [0, 77, -4000]].map(|min| GridFrame { min, scale: [0, 9, u32::MAX] });
+        for frame in frames {
+            for (n_levels, n_hidden) in [(1, 1), (MAX_CONTEXT_LEVELS, MAX_CONTEXT_HIDDEN), (7, 99)] {
+                let head = ContextHead { frame, base_steps: [1.0, 0.125, 0.3], n_levels, n_hidden };
+                assert_eq!(ContextHead::parse(&mut Cursor::new(&head.emit(), SectionKind::Context)), Ok(head));
+            }
+        }
+    }
+
+    #[test]
+    fn levels_come_back() {
+        for kind in [LevelKind::Volume, LevelKind::Xy, LevelKind::Xz, LevelKind::Yz] {
+            for (resolution, n_rows) in [(2, 8), (u16::MAX, u32::MAX), (513, 1 << 19)] {
+                let grid_level = GridLevel { kind, resolution, n_rows };
+                assert_eq!(level(&grid_level.emit()), Some(grid_level));
+            }
+        }
+    }
+}

@@ -36,6 +36,12 @@ impl<'a> MaskModel<'a> {
         Self { offsets }
     }
 
+    /// `[K][N_MASK_CONTEXTS]` frequencies of "drawn", as bytes.
+    #[must_use]
+    pub fn offsets(&self) -> &'a [[[u8; 2]; N_MASK_CONTEXTS]] {
+        self.offsets
+    }
+
     /// Offsets K.
     #[must_use]
     pub fn n_offsets(&self) -> usize {

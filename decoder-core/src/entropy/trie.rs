@@ -65,6 +65,12 @@ impl<'a> TrieModel<'a> {
         Self { levels }
     }
 
+    /// `[n_levels][N_TRIE_CONTEXTS]` of `end_both`, `end_zero`, as bytes.
+    #[must_use]
+    pub fn levels(&self) -> &'a [[[[u8; 2]; 2]; N_TRIE_CONTEXTS]] {
+        self.levels
+    }
+
     /// Levels, that is bits of a code.
     #[must_use]
     pub fn n_levels(&self) -> usize {

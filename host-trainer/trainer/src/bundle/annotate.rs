@@ -105,7 +105,7 @@ impl<'f> Annotator<'f> {
                 self.dump.array("Gaussians up to each tier", section.len as usize / 4, u32::from_le_bytes);
             }
             _ => {
-                self.dump.heading(&format!("section of kind {}", section.code));
+                self.dump.heading(&format!("section of kind {}", section.code()));
                 self.dump.array::<1, _>("bytes", section.len as usize, |[byte]| byte);
             }
         }

@@ -16,7 +16,7 @@ use super::output;
 /// Of rate-distortion curves it also prints how far each lies from the first: Bjøntegaard's deltas.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Files of one kind: progress.csv of runs, or results of sweeps (columns PSNR and Size [Bytes]).
+    /// Files of one kind: progress.csv of runs, or results of sweeps (columns `PSNR` and `Size [Bytes]`).
     #[arg(value_name = "CSV", required = true)]
     files: Vec<PathBuf>,
     /// The figure to write.

@@ -49,8 +49,6 @@ pub struct ScratchShape {
     pub colour_hidden: u16,
     /// Hidden width of the detail head, 0 without one.
     pub detail_hidden: u16,
-    /// Whether there is a feature bank.
-    pub feature_bank: bool,
     /// Frequency tables; 0 for bundles with a context.
     pub n_tables: u16,
     /// Inputs of the context, four a grid level; 0 for bundles with tables.
@@ -89,7 +87,6 @@ impl ScratchShape {
             n_colour_inputs: 4,
             colour_hidden: MAX_FEATURE_DIM,
             detail_hidden: MAX_FEATURE_DIM,
-            feature_bank: cfg!(feature = "feature-bank"),
             n_tables: feature_dim.saturating_add(n_log_scales(true)).saturating_add(n_offsets.saturating_mul(3)),
             context_inputs: (MAX_CONTEXT_LEVELS as u16).saturating_mul(FEATURES_PER_LEVEL as u16),
             context_hidden: MAX_CONTEXT_HIDDEN,
@@ -131,7 +128,6 @@ impl ScratchShape {
             n_colour_inputs: few(header.colour_inputs()).saturating_sub(header.feature_dim),
             colour_hidden: header.colour_hidden,
             detail_hidden: header.detail_hidden,
-            feature_bank: header.features.effects.feature_bank,
             n_tables,
             context_inputs,
             context_hidden,
@@ -218,7 +214,6 @@ impl ScratchShape {
             covariance: covariance_outputs(self.anisotropic) as usize,
             colour: limited(self.colour_hidden, MAX_FEATURE_DIM),
             detail: limited(self.detail_hidden, MAX_FEATURE_DIM),
-            bank: cfg!(feature = "feature-bank") && self.feature_bank,
             offsets: k,
         }
     }
@@ -326,7 +321,6 @@ mod tests {
                     n_colour_inputs: up_to(5),
                     colour_hidden: 1 + up_to(256),
                     detail_hidden: up_to(257),
-                    feature_bank: up_to(2) == 1,
                     n_tables: (1 - context) * up_to(360),
                     context_inputs: context * 4 * (1 + up_to(32)),
                     context_hidden: context * (1 + up_to(256)),
@@ -351,7 +345,6 @@ mod tests {
                 n_colour_inputs: a.n_colour_inputs.max(b.n_colour_inputs),
                 colour_hidden: a.colour_hidden.max(b.colour_hidden),
                 detail_hidden: a.detail_hidden.max(b.detail_hidden),
-                feature_bank: a.feature_bank | b.feature_bank,
                 n_tables: a.n_tables.max(b.n_tables),
                 context_inputs: a.context_inputs.max(b.context_inputs),
                 context_hidden: a.context_hidden.max(b.context_hidden),

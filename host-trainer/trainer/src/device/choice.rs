@@ -150,7 +150,6 @@ impl Model {
             n_colour_inputs: 3,
             colour_hidden: self.feature_dim,
             detail_hidden: 0,
-            feature_bank: false,
             // A sixteenth more than measured, as plans have it.
             max_splats: (splats * 17.0 / 16.0) as u32,
             ..ScratchShape::most(self.feature_dim, self.n_offsets)

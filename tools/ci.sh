@@ -7,7 +7,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-jobs=(fmt clippy doc test core-embedded format-doc link-gate digests firmware demo)
+jobs=(fmt clippy doc test core-embedded format-doc package link-gate digests firmware demo)
 
 embedded_target=thumbv7em-none-eabihf
 defmt_print_version=1.2.0
@@ -118,6 +118,16 @@ job_core-embedded() {
 job_format-doc() {
   cargo run -q -p tools --bin normal_tables --locked -- --check
   cargo run -q -p tools --bin hexdump --locked -- --check
+}
+
+# decoder-core builds from nothing but what its package holds, and the package holds what a user reads.
+job_package() {
+  local file files
+  files=$(cargo package -p pocketsplat-core --allow-dirty --locked --list)
+  for file in README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE src/bundle/FORMAT.md src/bundle/example.psb examples/draw_png.rs; do
+    grep -qx "$file" <<<"$files" || fail "the package of pocketsplat-core lacks $file"
+  done
+  cargo package -p pocketsplat-core --allow-dirty --locked
 }
 
 # decoder-core links without an allocator, is no larger than sizes.csv says, and reaches no panic but those of a list that

@@ -5,6 +5,7 @@
 #[cfg(test)]
 extern crate std;
 
+mod arena;
 mod camera;
 mod error;
 
@@ -24,9 +25,10 @@ mod raster;
 mod scene;
 mod stopwatch;
 
-pub use budget::{Budget, MaxSplats, Overflow, Plan, Quality, Residency, ScratchShape, Strips, Work};
+pub use budget::{Budget, MaxSplats, Overflow, Plan, Quality, Residency, Resident, ScratchShape, Strips, Work};
 pub use bundle::Bundle;
 pub use camera::Camera;
-pub use decoder::{Decoder, FrameReport, TileSink};
+pub use decoder::{Decoder, FrameReport, TileSink, count_gaussians, count_scratch_len};
 pub use error::{DecodeError, ErrorClass, Field, SectionKind};
+pub use project::chunks_in_view;
 pub use stopwatch::{Stage, Stopwatch};

@@ -198,22 +198,13 @@ fn a_constant_bounds_every_plan() {
             for way in ways(&bundle, budget_for(&views()[0]).with_max_splats(max_splats)) {
                 let plan = bundle.plan(&way).expect("planned");
                 let shape = *plan.shape();
-                let ScratchShape { feature_dim, n_offsets, max_splats, resident_anchors, resident_chunks, .. } = shape;
-                let most = ScratchShape {
-                    max_splats,
-                    resident_anchors,
-                    resident_chunks,
-                    baked_gaussians: shape.baked_gaussians,
-                    baked_chunks: shape.baked_chunks,
-                    ..ScratchShape::most(feature_dim, n_offsets)
-                };
+                let ScratchShape { model, coder, resident, frame, .. } = shape;
+                let most = ScratchShape { resident, frame, ..ScratchShape::most(model.feature_dim, model.n_offsets) };
                 assert!(most.scratch_len() >= plan.scratch_len(), "{name}: {plan:?}");
-                let widths = ScratchShape {
-                    colour_hidden: plan.shape().colour_hidden,
-                    detail_hidden: plan.shape().detail_hidden,
-                    n_tables: plan.shape().n_tables,
-                    ..most
-                };
+                let mut widths = most;
+                widths.model.colour_hidden = model.colour_hidden;
+                widths.model.detail_hidden = model.detail_hidden;
+                widths.coder.n_tables = coder.n_tables;
                 assert!(widths.scratch_len() >= plan.scratch_len(), "{name}: with the widths known: {plan:?}");
                 assert!(widths.scratch_len() <= most.scratch_len(), "{name}: knowing more takes no more");
                 assert_eq!(plan.shape().scratch_len(), plan.scratch_len(), "{name}: knowing all takes just that");

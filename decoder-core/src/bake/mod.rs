@@ -11,4 +11,4 @@ mod store;
 
 pub(crate) use pass::bake;
 pub(crate) use record::BakedGaussian;
-pub(crate) use store::{BakedGaussians, BakedMemory};
+pub(crate) use store::{BakedGaussians, BakedMemory, Baker};

@@ -58,7 +58,7 @@ impl<'s> Baker<'s> {
     }
 
     /// Gaussians of the first `n_chunks` chunks, those without a place included.
-    pub(super) fn n_of_first(&self, n_chunks: u32) -> u32 {
+    pub(crate) fn n_of_first(&self, n_chunks: u32) -> u32 {
         self.memory.starts.get(n_chunks as usize).map_or(0, |start| start & !DAMAGED)
     }
 

@@ -25,11 +25,11 @@ pub enum MaxSplats {
     AtMost(u32),
 }
 
-/// Where anchors wait between frames.
+/// Where decoded anchors are kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Residency {
-    /// Whichever is less work and fits.
+    /// Least predicted work that fits.
     Auto,
     /// Nowhere: their Gaussians are evaluated once when bound, and are in memory, 32 bytes each. For scenes that
     /// [look the same](crate::Bundle::n_gaussians) from everywhere.
@@ -87,11 +87,11 @@ pub struct Budget {
     pub tiers: u8,
     /// Splats in memory.
     pub max_splats: MaxSplats,
-    /// Where anchors wait.
+    /// Where decoded anchors are kept.
     pub residency: Residency,
-    /// Parts of a frame.
+    /// Horizontal strips of a frame.
     pub strips: Strips,
-    /// Splats that have no place.
+    /// What becomes of splats that there is no memory for.
     pub overflow: Overflow,
     /// Accuracy.
     pub quality: Quality,
@@ -114,43 +114,43 @@ impl Budget {
         }
     }
 
-    /// The same in at most `ram_bytes` of scratch memory.
+    /// Sets the bytes of scratch memory.
     #[must_use]
     pub const fn in_bytes(self, ram_bytes: usize) -> Self {
         Self { ram_bytes, ..self }
     }
 
-    /// The same with at most `tiers` tiers.
+    /// Sets the most tiers to draw.
     #[must_use]
     pub const fn with_tiers(self, tiers: u8) -> Self {
         Self { tiers, ..self }
     }
 
-    /// The same with memory for other numbers of splats.
+    /// Sets how many splats there is memory for.
     #[must_use]
     pub const fn with_max_splats(self, max_splats: MaxSplats) -> Self {
         Self { max_splats, ..self }
     }
 
-    /// The same with anchors elsewhere.
+    /// Sets anchor residency.
     #[must_use]
     pub const fn with_residency(self, residency: Residency) -> Self {
         Self { residency, ..self }
     }
 
-    /// The same in so many strips.
+    /// Sets the number of strips.
     #[must_use]
     pub const fn with_strips(self, strips: Strips) -> Self {
         Self { strips, ..self }
     }
 
-    /// The same with splats that have no place left out or drawn later.
+    /// Sets the overflow policy.
     #[must_use]
     pub const fn with_overflow(self, overflow: Overflow) -> Self {
         Self { overflow, ..self }
     }
 
-    /// The same less or more exactly.
+    /// Sets the quality.
     #[must_use]
     pub const fn with_quality(self, quality: Quality) -> Self {
         Self { quality, ..self }

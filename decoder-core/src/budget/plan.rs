@@ -1,9 +1,9 @@
 //! From limits to a number of bytes.
 
 use super::limits::{Budget, MaxSplats, Overflow, Residency, Strips};
-use super::scratch::ScratchShape;
-use super::work::{Kept, Work, decoding_macs};
-use crate::bundle::{Bundle, STRIPS, TierMeasures, saturate};
+use super::shape::{FrameShape, Resident, ScratchShape};
+use super::work::{Work, decoding_macs};
+use crate::bundle::{Bundle, STRIPS, Tier, TierMeasures, saturate};
 use crate::error::DecodeError;
 use crate::raster::TILE_PX;
 
@@ -49,13 +49,13 @@ impl Plan {
     /// Whether anchors are decoded once when bound; if not, every frame decodes those in view.
     #[must_use]
     pub fn is_resident(&self) -> bool {
-        self.shape.resident_chunks > 0
+        self.shape.resident.is_anchors()
     }
 
     /// Whether Gaussians are evaluated once when bound; if not, every frame runs the heads of the anchors in view.
     #[must_use]
     pub fn is_baked(&self) -> bool {
-        cfg!(feature = "baked") && self.shape.baked_chunks > 0
+        self.shape.resident.is_gaussians()
     }
 
     /// Horizontal strips of a frame.
@@ -74,7 +74,7 @@ impl Plan {
     /// Splats that there is memory for at once.
     #[must_use]
     pub fn max_splats(&self) -> u32 {
-        self.shape.max_splats
+        self.shape.frame.max_splats
     }
 
     /// What the size of the scratch memory follows from.
@@ -101,13 +101,12 @@ impl Plan {
 
 impl Bundle<'_> {
     /// Finds the best scene that fits a budget: the lowest pruning rate, that is the most tiers, in `ram_bytes`, and
-    /// among the ways to draw these tiers the one of least predicted work.
+    /// among the plan variants of these tiers the one of least predicted work.
     ///
     /// Work is predicted in multiply-adds. One strip goes over the scene once, several together about twice; going over it
     /// costs the heads' (from the manifest, else of all anchors), and decoding when anchors are streamed; or 150 a Gaussian when
-    /// they are baked. Of equals the
-    /// fewest strips are taken. The frame's size decides about memory only through the splats of a strip, because tiles
-    /// leave one by one; a splat takes 40 bytes.
+    /// they are baked. Of equals the fewest strips are taken. The frame's size decides about memory only through the splats of a
+    /// strip, because tiles leave one by one; a splat takes 40 bytes.
     ///
     /// When [slabs](Overflow::Slabs) are allowed, fewer places than splats will do, down to 256: then nearly every scene fits
     /// whole, and going over it counts once more for each slab.
@@ -127,11 +126,25 @@ impl Bundle<'_> {
         if budget.residency == Residency::Baked && self.n_gaussians(0).is_none() {
             return Err(DecodeError::NotBakeable);
         }
-        let most_tiers = budget.tiers.min(self.n_tiers());
+        Planner { bundle: self, budget }.best()
+    }
+}
+
+/// Compares the plans of one bundle within one budget.
+struct Planner<'p, 'b> {
+    bundle: &'p Bundle<'b>,
+    budget: &'p Budget,
+}
+
+impl Planner<'_, '_> {
+    /// The plan of the most tiers that fits, and of least predicted work.
+    fn best(&self) -> Result<Plan, DecodeError> {
+        let budget = self.budget;
+        let most_tiers = budget.tiers.min(self.bundle.n_tiers());
         let mut smallest: Option<Plan> = None;
         for n_tiers in (most_tiers.min(1)..=most_tiers).rev() {
             let mut best: Option<(u64, Plan)> = None;
-            for (cost, plan) in self.plans(budget, n_tiers) {
+            for (cost, plan) in self.variants(n_tiers) {
                 if smallest.is_none_or(|smallest| plan.scratch_len < smallest.scratch_len) {
                     smallest = Some(plan);
                 }
@@ -148,52 +161,52 @@ impl Bundle<'_> {
             return Err(DecodeError::Internal);
         };
         if scratch_len == usize::MAX {
-            return Err(DecodeError::PlanTooLarge { max_splats: shape.max_splats });
+            return Err(DecodeError::PlanTooLarge { max_splats: shape.frame.max_splats });
         }
         let [needed, available] = [scratch_len, budget.ram_bytes].map(saturate);
         Err(DecodeError::BudgetTooSmall { needed, available, n_tiers, n_strips })
     }
 
-    /// The ways to draw `n_tiers` tiers that the budget leaves open, fewest strips first, each with its predicted cost.
-    fn plans(&self, budget: &Budget, n_tiers: u8) -> impl Iterator<Item = (u64, Plan)> {
-        let (given, tried) = match budget.strips {
+    /// The plan variants of `n_tiers` tiers that the budget leaves open, fewest strips first, each with its predicted cost.
+    fn variants(&self, n_tiers: u8) -> impl Iterator<Item = (u64, Plan)> {
+        let (given, tried) = match self.budget.strips {
             Strips::Exactly(n) => (Some(n), &[][..]),
             Strips::Auto => (None, &STRIPS[..]),
         };
-        let residencies = match budget.residency {
-            Residency::Auto if self.n_gaussians(0).is_none() => &[Kept::Anchors, Kept::Nothing][..],
-            Residency::Auto => &[Kept::Gaussians, Kept::Anchors, Kept::Nothing],
-            Residency::Baked => &[Kept::Gaussians],
-            Residency::Resident => &[Kept::Anchors],
-            Residency::Streamed => &[Kept::Nothing],
+        let residencies = match self.budget.residency {
+            Residency::Auto if self.bundle.n_gaussians(0).is_none() => &[Residency::Resident, Residency::Streamed][..],
+            Residency::Auto => &[Residency::Baked, Residency::Resident, Residency::Streamed],
+            Residency::Baked => &[Residency::Baked],
+            Residency::Resident => &[Residency::Resident],
+            Residency::Streamed => &[Residency::Streamed],
         };
         let n_strips = given.into_iter().chain(tried.iter().copied());
-        let ways = n_strips.flat_map(move |n_strips| residencies.iter().map(move |&kept| (n_strips, kept)));
-        ways.map(move |(n_strips, kept)| self.one_plan(budget, n_tiers, n_strips, kept))
+        let variants = n_strips.flat_map(move |n_strips| residencies.iter().map(move |&kept| (n_strips, kept)));
+        variants.map(move |(n_strips, residency)| self.variant(n_tiers, n_strips, residency))
     }
 
-    fn one_plan(&self, budget: &Budget, n_tiers: u8, n_strips: u8, kept: Kept) -> (u64, Plan) {
-        let header = self.header();
-        let tier = self.up_to_tier(n_tiers);
-        let measures = self.tier_measures(n_tiers);
+    fn variant(&self, n_tiers: u8, n_strips: u8, residency: Residency) -> (u64, Plan) {
+        let Self { bundle, budget } = *self;
+        let header = bundle.header();
+        let tier = bundle.up_to_tier(n_tiers);
+        let measures = self.measures(n_tiers);
         let in_slabs = budget.overflow == Overflow::Slabs;
         let canvas_tiles = if in_slabs { tiles_of_strip([budget.width_px, budget.height_px], n_strips) } else { 1 };
-        let wanted = self.splats_to_hold(budget, n_tiers, n_strips);
-        let mut shape = ScratchShape::of(self, canvas_tiles, wanted, n_tiers, kept);
+        let wanted = self.splats_to_hold(budget.max_splats, n_tiers, n_strips);
+        let resident = self.resident(residency, n_tiers, tier);
+        let mut shape = ScratchShape::of(bundle, resident, FrameShape { canvas_tiles, max_splats: wanted });
         if !budget.quality.detail {
-            shape.detail_hidden = 0;
+            shape.model.detail_hidden = 0;
         }
         if in_slabs {
-            shape.max_splats = shape.splats_within(budget.ram_bytes).max(wanted.min(MIN_SLAB_SPLATS));
+            shape.frame.max_splats = shape.splats_within(budget.ram_bytes).max(wanted.min(MIN_SLAB_SPLATS));
         }
         // Each slab but the last keeps at least half of the places.
         let fullest = match budget.max_splats {
-            MaxSplats::AtMost(_) => {
-                self.splats_to_hold(&budget.with_max_splats(MaxSplats::Measured), n_tiers, n_strips)
-            }
+            MaxSplats::AtMost(_) => self.splats_to_hold(MaxSplats::Measured, n_tiers, n_strips),
             MaxSplats::Measured | MaxSplats::Worst => wanted,
         };
-        let places = shape.max_splats.max(1);
+        let places = shape.frame.max_splats.max(1);
         let n_slabs = if !in_slabs || fullest <= places { 1 } else { fullest.saturating_mul(2).div_ceil(places) };
         let passes = u64::from(n_strips).saturating_mul(n_slabs.into());
         let plan = Plan {
@@ -204,7 +217,7 @@ impl Bundle<'_> {
             shape,
             scratch_len: shape.scratch_len(),
             pruning_rate: 1.0 - tier.n_anchors as f32 / header.n_anchors.max(1) as f32,
-            work: measures.map(|m| Work::most(&m, header.training_px, budget, passes, kept)),
+            work: measures.map(|m| Work::most(&m, header.training_px, budget, passes, resident)),
         };
         let (head_macs, n_decoded) = match measures {
             Some(measures) => {
@@ -216,34 +229,50 @@ impl Bundle<'_> {
                 (per_anchor.saturating_mul(tier.n_anchors.into()), tier.n_anchors)
             }
         };
-        let decoding = decoding_macs(self).saturating_mul(n_decoded.into());
-        let once = match kept {
-            Kept::Gaussians if cfg!(feature = "baked") => READING_MACS.saturating_mul(shape.baked_gaussians.into()),
-            Kept::Gaussians | Kept::Anchors => head_macs,
-            Kept::Nothing => head_macs.saturating_add(decoding),
+        let decoding = decoding_macs(bundle).saturating_mul(n_decoded.into());
+        let once = match resident {
+            Resident::Gaussians { n_gaussians, .. } if cfg!(feature = "baked") => {
+                READING_MACS.saturating_mul(n_gaussians.into())
+            }
+            Resident::Gaussians { .. } | Resident::Anchors { .. } => head_macs,
+            Resident::Nothing => head_macs.saturating_add(decoding),
         };
         let times = u64::from(n_slabs).saturating_mul(if n_strips > 1 { 2 } else { 1 });
         (once.saturating_mul(times), plan)
     }
 
-    /// What the manifest says about the first `n_tiers` tiers, if they were measured.
-    fn tier_measures(&self, n_tiers: u8) -> Option<TierMeasures> {
-        self.measures(n_tiers.checked_sub(1)?).filter(|measures| measures.n_cameras > 0)
+    /// What a residency keeps in memory of the first `n_tiers` tiers, which `tier` sums up.
+    fn resident(&self, residency: Residency, n_tiers: u8, Tier { n_anchors, n_chunks, .. }: Tier) -> Resident {
+        match residency {
+            _ if n_chunks == 0 => Resident::Nothing,
+            Residency::Baked if cfg!(feature = "baked") => {
+                let n_gaussians = self.bundle.n_gaussians(n_tiers).unwrap_or_default();
+                Resident::Gaussians { n_gaussians, n_chunks }
+            }
+            Residency::Resident => Resident::Anchors { n_anchors, n_chunks },
+            _ => Resident::Nothing,
+        }
     }
 
-    /// Splats of a strip that a budget asks memory for.
-    fn splats_to_hold(&self, budget: &Budget, n_tiers: u8, n_strips: u8) -> u32 {
+    /// What the manifest says about the first `n_tiers` tiers, if they were measured.
+    fn measures(&self, n_tiers: u8) -> Option<TierMeasures> {
+        self.bundle.measures(n_tiers.checked_sub(1)?).filter(|measures| measures.n_cameras > 0)
+    }
+
+    /// Splats of a strip to have memory for.
+    fn splats_to_hold(&self, max_splats: MaxSplats, n_tiers: u8, n_strips: u8) -> u32 {
+        let header = self.bundle.header();
         // At most 2²⁴ anchors of 32 offsets.
-        let offsets = self.up_to_tier(n_tiers).n_anchors.saturating_mul(self.header().n_offsets.into());
-        let worst = self.n_gaussians(n_tiers).unwrap_or(offsets);
-        match budget.max_splats {
+        let offsets = self.bundle.up_to_tier(n_tiers).n_anchors.saturating_mul(header.n_offsets.into());
+        let worst = self.bundle.n_gaussians(n_tiers).unwrap_or(offsets);
+        match max_splats {
             MaxSplats::Worst => worst,
             MaxSplats::AtMost(most) => most.min(worst),
-            MaxSplats::Measured => match self.tier_measures(n_tiers) {
+            MaxSplats::Measured => match self.measures(n_tiers) {
                 None => worst,
                 Some(measures) => {
-                    let [_, training_height_px] = self.header().training_px;
-                    let most = fullest_strip(&measures, training_height_px, budget.height_px, n_strips);
+                    let [_, training_height_px] = header.training_px;
+                    let most = fullest_strip(&measures, training_height_px, self.budget.height_px, n_strips);
                     most.saturating_add(most.div_ceil(16)).min(worst)
                 }
             },

@@ -1,6 +1,7 @@
 //! What a frame costs in time, as counts that no clock is needed for.
 
 use super::limits::Budget;
+use super::shape::Resident;
 use crate::bundle::{Bundle, Coder, TierMeasures};
 
 /// What a symbol takes in multiply-adds of f32, of which each takes 2.5 instructions on a Cortex-M4; a symbol takes 64.
@@ -9,17 +10,6 @@ const SYMBOL_MACS: usize = 26;
 const NETWORK_MACS: usize = 2;
 /// The same of one of its inputs: 82 instructions for its share of a grid level's corners.
 const INPUT_MACS: usize = 33;
-
-/// What is in memory between frames.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kept {
-    /// Gaussians.
-    Gaussians,
-    /// Anchors.
-    Anchors,
-    /// Neither.
-    Nothing,
-}
 
 /// Work of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -37,13 +27,12 @@ impl Work {
     /// A bound on the work of the views that `measures` were taken over, at the budget's size.
     ///
     /// Each strip, or slab of one, may go over the whole scene. A frame smaller than those measured counts as one of their size.
-    ///
     pub(super) fn most(
         measures: &TierMeasures,
         training_px: [u16; 2],
         budget: &Budget,
         passes: u64,
-        kept: Kept,
+        resident: Resident,
     ) -> Self {
         let sides = [budget.width_px, budget.height_px].into_iter().zip(training_px);
         let area = |[width, height]: [u16; 2]| u32::from(width).saturating_mul(height.into());
@@ -53,9 +42,8 @@ impl Work {
             pixels.saturating_mul((u32::from(planned) << 10).div_ceil(u32::from(measured).max(1)).into())
         });
         let pixels = u64::from(measures.max_kilo_pixels).saturating_mul(1024);
-        let anchors = if kept == Kept::Nothing { measures.max_decoded_anchors } else { 0 };
-        let kilo_macs =
-            if cfg!(feature = "baked") && kept == Kept::Gaussians { 0 } else { measures.max_head_kilo_macs };
+        let anchors = if resident == Resident::Nothing { measures.max_decoded_anchors } else { 0 };
+        let kilo_macs = if resident.is_gaussians() { 0 } else { measures.max_head_kilo_macs };
         Self {
             head_macs: u64::from(kilo_macs).saturating_mul(1024).saturating_mul(passes),
             decoded_anchors: u64::from(anchors).saturating_mul(passes),

@@ -8,15 +8,17 @@ use std::vec::Vec;
 
 use builder::{Anchor, C, F, ORIGIN, STEP, Variant, bundle, cell, tiers, weight};
 
-use crate::budget::Arena;
+use crate::arena::Arena;
 use crate::bundle::{AnchorRecords, AnchorSite, Bundle, Coder, RecordMemory, Tables, crc32};
 use crate::error::{DecodeError, Field, SectionKind};
 use crate::{Budget, Decoder, FrameReport, MaxSplats, Overflow, Residency, ScratchShape, Strips, TileSink};
 
 fn variants() -> impl Iterator<Item = Variant> {
-    (0..1 << 5).map(|bits| {
-        let [masks, context, coded_heads, unknown_section, detail] = [1, 2, 4, 8, 16].map(|bit| bits & bit != 0);
-        Variant { masks, context, coded_heads, unknown_section, detail }
+    let n_bits = if cfg!(feature = "feature-bank") { 6 } else { 5 };
+    (0..1 << n_bits).map(|bits| {
+        let [masks, context, coded_heads, unknown_section, detail, bank] =
+            [1, 2, 4, 8, 16, 32].map(|bit| bits & bit != 0);
+        Variant { masks, context, coded_heads, unknown_section, detail, bank }
     })
 }
 
@@ -99,7 +101,7 @@ fn heads_come_back_raw_and_coded() {
         let bytes = bundle(variant);
         let bundle = Bundle::parse(&bytes).expect("sound");
         let mut weights = bundle.heads().weights();
-        for layer in 0..6 + 2 * usize::from(variant.detail) {
+        for layer in 0..6 + 2 * usize::from(variant.detail) + 2 * usize::from(variant.bank) {
             let found: Vec<f32> = weights.next_layer().collect();
             let expected: Vec<f32> = (0..found.len()).map(|index| weight(layer, index)).collect();
             assert_eq!(found, expected, "{variant:?}, layer {layer}");
@@ -217,7 +219,8 @@ fn anchors_in_memory_have_the_values_of_the_file() {
     for variant in variants() {
         let bytes = bundle(variant);
         let bundle = Bundle::parse(&bytes).expect("sound");
-        let (n_anchors, layout) = (bundle.n_anchors() as usize, bundle.record_layout());
+        let plan = bundle.plan(&BUDGET.with_residency(Residency::Resident)).expect("a plan");
+        let (n_anchors, layout) = (bundle.n_anchors() as usize, plan.shape().record_layout());
         let mut scratch = vec![u32::MAX; bundle.anchor_scratch_words()];
         let mut models = bundle.anchor_models(&mut scratch).expect("enough memory");
         let mut memory = vec![0xA5; Arena::bytes_for(4000).expect("few")];
@@ -227,7 +230,8 @@ fn anchors_in_memory_have_the_values_of_the_file() {
             damaged: arena.take(1).expect("enough"),
             scales: arena.take(bundle.tables().map_or(0, Tables::len)).expect("enough"),
         };
-        let records = AnchorRecords::decode(&bundle, bundle.n_chunks(), memory, &mut [0; C], &mut models, false);
+        let n_chunks = bundle.n_chunks() as usize;
+        let records = AnchorRecords::decode(&bundle, n_chunks, layout, memory, &mut [0; C], &mut models, false);
         let records = records.expect("sound");
         let mut index = 0;
         for chunk in bundle.chunks() {
@@ -318,11 +322,25 @@ fn the_largest_shape_suffices_for_every_plan() {
         for residency in [Residency::Resident, Residency::Streamed] {
             let plan = bundle.plan(&BUDGET.with_residency(residency)).expect("a plan");
             assert_eq!(plan.scratch_len(), plan.shape().scratch_len(), "{variant:?}: its own shape");
-            let ScratchShape { feature_dim, n_offsets, max_splats, resident_anchors, resident_chunks, .. } =
-                *plan.shape();
-            let most = ScratchShape::most(feature_dim, n_offsets);
-            let most = ScratchShape { max_splats, resident_anchors, resident_chunks, ..most };
+            let ScratchShape { model, resident, frame, .. } = *plan.shape();
+            let most = ScratchShape { resident, frame, ..ScratchShape::most(model.feature_dim, model.n_offsets) };
             assert!(most.scratch_len() >= plan.scratch_len(), "{variant:?}, {residency:?}: {most:?}");
         }
+    }
+}
+
+#[test]
+fn a_feature_bank_needs_a_feature_that_has_a_fourth() {
+    let plain = variants().next().expect("the first has nothing");
+    let mut bytes = bundle(Variant { bank: true, ..plain });
+    let header_len = bytes[10..12].iter().rev().fold(0, |len, byte| 256 * len + usize::from(*byte));
+    bytes[24] = 6;
+    let crc = crc32(&bytes[..header_len - 4]);
+    bytes[header_len - 4..header_len].copy_from_slice(&crc.to_le_bytes());
+    let error = Bundle::parse(&bytes).expect_err("six features");
+    if cfg!(feature = "feature-bank") {
+        assert_eq!(error, DecodeError::OutOfRange { field: Field::BankFeatureDim, found: 6, limit: 4 });
+    } else {
+        assert_eq!(error, DecodeError::NotBuilt { missing_bits: 1 << 9 });
     }
 }

@@ -4,13 +4,13 @@ use super::source::{AnchorSource, Anchors, GaussianSource};
 use super::splats::{Slab, SplatStore};
 use super::strip::{Strip, StripLayout};
 use super::tally::{Tally, place};
-use super::{Decoder, FrameReport, places_for};
+use super::{Decoder, FrameReport};
 use crate::arithmetic::Arithmetic;
 use crate::bake::BakedGaussian;
 use crate::bundle::{Chunk, Effects};
 use crate::error::DecodeError;
 use crate::project::{Band, View};
-use crate::scene::{Anchor, Gaussian, for_each_gaussian};
+use crate::scene::{Anchor, Evaluator, Gaussian, for_each_gaussian};
 use crate::stopwatch::{Stage, Stopwatch};
 
 /// One frame in work.
@@ -72,7 +72,7 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
                 _ => u64::from(chunk.n_anchors()).saturating_mul(n_offsets),
             };
             let most: u64 = seen.map(most_of).sum();
-            most <= places_for::<A>(&self.plan).into()
+            most <= self.splats.places().into()
         })
     }
 
@@ -170,9 +170,9 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
         let header = bundle.header();
         let effects = header.features.effects;
         let mut keeper = Keeper { view, strips, tallies: *tallies, in_slabs: *in_slabs, tally, pass, splats };
-        let Anchors { source, heads, row, work } = match source {
+        let Anchors { source, evaluator: Evaluator { heads, row, work } } = match source {
             GaussianSource::Anchors(anchors) => anchors,
-            // Never made then, which the compiler does not know.
+            // Unreachable without the feature; this arm drops the code.
             GaussianSource::Baked(_) if !cfg!(feature = "baked") => return Err(DecodeError::Internal),
             GaussianSource::Baked(baked) => {
                 watch.enter(Stage::Project);

@@ -3,8 +3,8 @@
 use crate::bake::BakedGaussians;
 use crate::bundle::{AnchorModels, AnchorRecords, AnchorSite, Chunk};
 use crate::error::DecodeError;
-use crate::mlp::{HeadNumbers, Heads};
-use crate::scene::Workspace;
+use crate::mlp::HeadNumbers;
+use crate::scene::Evaluator;
 use crate::stopwatch::{Stage, Stopwatch};
 
 /// The scene of the planned tiers.
@@ -19,10 +19,7 @@ pub(super) enum GaussianSource<'b, 's, N: HeadNumbers> {
 /// Anchors, and what evaluates them.
 pub(super) struct Anchors<'b, 's, N: HeadNumbers> {
     pub(super) source: AnchorSource<'b, 's>,
-    pub(super) heads: Heads<'s, N>,
-    /// `[n_channels]` of the anchor in work.
-    pub(super) row: &'s mut [f32],
-    pub(super) work: Workspace<'s>,
+    pub(super) evaluator: Evaluator<'s, N>,
 }
 
 /// The anchors of the planned tiers.

@@ -1,10 +1,11 @@
 //! The splats in memory, and their order.
 
 use crate::arithmetic::Choices;
+use crate::bundle::saturate;
 use crate::project::{Splat, SplatRecord};
 use crate::raster::{TileRect, sort_by_depth};
 
-/// The splats of the strip in work, or of a slab of its depth, in the order of the file.
+/// The splats of the current strip, or of a slab of its depth, in the order of the file.
 pub(super) struct SplatStore<'s, A: Choices> {
     pub(super) splats: &'s mut [A::Splat],
     pub(super) rects: &'s mut [TileRect],
@@ -37,6 +38,11 @@ impl Slab {
 }
 
 impl<A: Choices> SplatStore<'_, A> {
+    /// Splats that there is memory for.
+    pub(super) fn places(&self) -> u32 {
+        saturate(self.splats.len())
+    }
+
     /// Keeps a splat; the caller has counted that there is a place.
     pub(super) fn push(&mut self, splat: &Splat, rect: TileRect) {
         let slot = self.n as usize;

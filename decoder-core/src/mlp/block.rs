@@ -1,6 +1,6 @@
 //! A dense layer cut into blocks of outputs.
 
-use crate::budget::Arena;
+use crate::arena::Arena;
 use crate::bundle::{Halves, LayerWeights};
 use crate::error::DecodeError;
 use crate::mlp::weight::Weight;

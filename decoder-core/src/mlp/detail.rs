@@ -3,7 +3,7 @@
 use super::block::{continued, outputs};
 use super::head::{Head, LANES};
 use super::weight::Weight;
-use crate::budget::Arena;
+use crate::arena::Arena;
 use crate::bundle::{HeadView, WeightReader};
 use crate::error::DecodeError;
 

@@ -1,11 +1,12 @@
 //! A head: hidden layer with ReLU, output layer of one block per offset.
 
+use super::bank::Bank;
 use super::block::{Blocks, outputs};
 use super::detail::Detail;
 use super::numbers::{HeadNumbers, TwoLayers};
 use super::shape::HeadShape;
 use super::weight::Weight;
-use crate::budget::Arena;
+use crate::arena::Arena;
 use crate::bundle::{HeadView, HeadsView, WeightReader};
 use crate::error::DecodeError;
 
@@ -31,6 +32,7 @@ pub(crate) struct Heads<'s, N: HeadNumbers> {
     pub(crate) covariance: Covariance<'s, N>,
     pub(crate) colour: N::Head<'s, 3>,
     pub(crate) detail: Option<Detail<'s, N::Detail>>,
+    pub(crate) bank: Option<Bank<'s>>,
 }
 
 /// The covariance head.
@@ -46,7 +48,7 @@ impl<'s, N: HeadNumbers> Covariance<'s, N> {
     pub(crate) fn activate<'h>(&self, inputs: N::Values<'_>, hidden: &'h mut [f32]) -> N::Values<'h> {
         match self {
             Self::Isotropic(head) => head.activate(inputs, hidden),
-            // Never made then, which the compiler does not know, here and below.
+            // Unreachable without the feature; this arm drops the code, here and below.
             Self::Anisotropic(_) if !cfg!(feature = "anisotropy") => N::values(hidden),
             Self::Anisotropic(head) => head.activate(inputs, hidden),
         }
@@ -80,6 +82,16 @@ impl<'s, N: HeadNumbers> Heads<'s, N> {
                 Some(head) if cfg!(feature = "detail") && shape.detail > 0 => {
                     Some(Detail::convert(arena, head, &mut weights)?)
                 }
+                // Left out of the plan, and before the next in the file.
+                Some(_) if cfg!(feature = "feature-bank") => {
+                    weights.next_layer().for_each(drop);
+                    weights.next_layer().for_each(drop);
+                    None
+                }
+                _ => None,
+            },
+            bank: match &heads.bank {
+                Some(head) if cfg!(feature = "feature-bank") => Some(Bank::convert(arena, head, &mut weights)?),
                 _ => None,
             },
         })

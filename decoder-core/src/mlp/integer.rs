@@ -10,7 +10,7 @@ use core::iter;
 use bytemuck::{Pod, Zeroable};
 
 use super::numbers::{HeadNumbers, TwoLayers};
-use crate::budget::Arena;
+use crate::arena::Arena;
 use crate::bundle::{HeadView, WeightReader};
 use crate::error::DecodeError;
 

@@ -3,8 +3,8 @@
 use super::head::Head;
 use super::integer::{IntegerHead, Pair8, Pair16, Quantised};
 use super::weight::{Half, StrictHalf, Weight};
+use crate::arena::Arena;
 use crate::arithmetic::{F16, F32, I8, I16, StrictF16};
-use crate::budget::Arena;
 use crate::bundle::{HeadView, WeightReader};
 use crate::error::DecodeError;
 

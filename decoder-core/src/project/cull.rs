@@ -3,9 +3,29 @@
 use super::covariance::Covariance;
 use super::view::{NEAR, View};
 use crate::arithmetic::Roots;
+use crate::bundle::{Bundle, Chunk};
+use crate::camera::Camera;
+use crate::error::DecodeError;
 
 /// How far beyond its 3D extent a splat reaches on the image: √(2 ln 255 · 0.3) from the dilation, and rounding, pixels.
 pub(super) const DILATION_REACH_PX: f32 = 1.9;
+
+/// The chunks of the first `tiers` tiers that a frame of `camera` needs: those whose ink box it can see, in file order.
+///
+/// # Errors
+/// [`DecodeError::BadFloat`] or [`DecodeError::OutOfRange`] for an unusable camera.
+///
+/// # Budget
+/// About 100 multiplications a chunk; reads the directory and no chunk.
+pub fn chunks_in_view<'b>(
+    bundle: &Bundle<'b>,
+    camera: &Camera,
+    tiers: u8,
+) -> Result<impl Iterator<Item = Chunk<'b>> + use<'b>, DecodeError> {
+    let view = View::new(camera)?;
+    let n_chunks = bundle.up_to_tier(tiers).n_chunks;
+    Ok(bundle.chunks().take(n_chunks as usize).filter(move |chunk| view.sees_box(chunk.ink_box())))
+}
 
 impl View {
     /// Whether anything inside a box can reach the image; true more often than needed, never false wrongly.

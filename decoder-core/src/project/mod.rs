@@ -11,6 +11,7 @@ mod splat;
 mod view;
 
 pub(crate) use band::Band;
+pub use cull::chunks_in_view;
 pub(crate) use packed::{PackedSplat, SplatRecord};
 pub(crate) use splat::{Splat, log_cut};
 pub(crate) use view::View;

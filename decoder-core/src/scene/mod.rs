@@ -6,4 +6,4 @@ mod anchor;
 mod gaussian;
 
 pub(crate) use anchor::{Anchor, ink_radius};
-pub(crate) use gaussian::{Gaussian, HeadOutputs, NO_ROTATION, Workspace, for_each_gaussian};
+pub(crate) use gaussian::{Evaluator, Gaussian, HeadOutputs, NO_ROTATION, Workspace, for_each_gaussian};

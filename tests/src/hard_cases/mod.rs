@@ -10,6 +10,7 @@ pub mod page;
 pub mod picture;
 
 mod arithmetic;
+mod bank;
 mod cameras;
 mod captures;
 mod codec;
@@ -136,6 +137,7 @@ pub fn families() -> Vec<Family> {
         scenes::family(),
         codec::family(),
         arithmetic::family(),
+        bank::family(),
         roundings::family(),
         qualities::family(),
         captures::family(),

@@ -4,7 +4,7 @@ use super::AnchorSite;
 use super::bits::{BitReader, BitWriter, fits};
 use super::channels::Channel;
 use crate::bundle::lattice::Lattice;
-use crate::bundle::{AnchorModels, Bundle, Chunk, Coder, Header};
+use crate::bundle::{AnchorModels, Bundle, Chunk, Coder};
 use crate::context::{Group, N_GROUPS, Steps};
 use crate::error::{DecodeError, Field};
 
@@ -105,47 +105,30 @@ impl RecordLayout {
     }
 }
 
-impl Bundle<'_> {
-    /// The records of this bundle's anchors.
-    pub(crate) fn record_layout(&self) -> RecordLayout {
-        let header = self.header();
-        let masked_offsets = if self.masks().is_some() { header.n_offsets } else { 0 };
-        let Header { feature_dim, n_offsets, symbol_bits, .. } = *header;
-        RecordLayout::new(
-            feature_dim,
-            header.n_log_scales(),
-            n_offsets,
-            symbol_bits,
-            self.lattice().bits,
-            masked_offsets,
-            self.context().is_some(),
-        )
-    }
-}
-
 impl<'b, 's> AnchorRecords<'b, 's> {
     /// Decodes the first `n_chunks` chunks into `memory`.
     ///
-    /// * `row`: `[n_channels]` at least, for the symbols of the anchor in work. * `skip_damage`: leaves damaged chunks out and remembers which.
+    /// * `row`: `[n_channels]` at least, for the symbols of the current anchor. * `skip_damage`: leaves damaged chunks out and
+    ///   remembers which.
     ///
     /// # Errors
     /// [`DecodeError::ChunkChecksum`] or [`DecodeError::ChunkStream`] for damage that is not left out; a symbol beyond the
     /// header's bits is such damage.
     pub(crate) fn decode(
         bundle: &Bundle<'b>,
-        n_chunks: u32,
+        n_chunks: usize,
+        layout: RecordLayout,
         memory: RecordMemory<'s>,
         row: &mut [i16],
         models: &mut AnchorModels<'b, '_>,
         skip_damage: bool,
     ) -> Result<Self, DecodeError> {
         let RecordMemory { records, damaged, scales } = memory;
-        let layout = bundle.record_layout();
         damaged.fill(0);
         let row = row.get_mut(..bundle.header().n_channels()).unwrap_or_default();
         // `max(1)`: a chunk size of zero would panic; there are always at least 5 channels.
         let mut slots = records.chunks_exact_mut(layout.len().max(1));
-        for chunk in bundle.chunks().take(n_chunks as usize) {
+        for chunk in bundle.chunks().take(n_chunks) {
             match decode_chunk(&chunk, &layout, &mut slots, row, models) {
                 Err(DecodeError::ChunkChecksum { .. } | DecodeError::ChunkStream { .. }) if skip_damage => {
                     let (word, bit) = place(chunk.index());

@@ -7,7 +7,7 @@ mod frame;
 mod orbit;
 
 use pocketsplat_core::bundle::{MANIFEST_RECORD_LEN, TierMeasures, crc32};
-use pocketsplat_core::{Bundle, DecodeError, SectionKind};
+use pocketsplat_core::{Bundle, DecodeError, SectionKind, chunks_in_view};
 use rayon::prelude::*;
 
 use super::decoded::decoded_scene;
@@ -67,7 +67,7 @@ pub fn measure(bundle: &Bundle<'_>, cameras: &[Camera], held_out: &[View]) -> Re
         }
         let core = crate::render::decoder::core_camera(camera)?;
         for (tier, most) in maxima.iter_mut().enumerate() {
-            let in_view = bundle.chunks_in_view(&core, tier as u8 + 1)?;
+            let in_view = chunks_in_view(bundle, &core, tier as u8 + 1)?;
             most.decoded_anchors = most.decoded_anchors.max(in_view.map(|chunk| u64::from(chunk.n_anchors())).sum());
         }
     }

@@ -2,7 +2,7 @@
 
 use pocketsplat_core::bundle::Features;
 use pocketsplat_core::context::Context;
-use pocketsplat_core::{Bundle, DecodeError};
+use pocketsplat_core::{Bundle, DecodeError, count_gaussians, count_scratch_len};
 use rayon::prelude::*;
 
 use super::channels::{ChannelCoder, ContextWork, GROUPS};
@@ -111,7 +111,7 @@ pub fn write(scene: &Scene<f32>, info: &BundleInfo, options: &WriteOptions) -> R
 /// The section of Gaussian counts of a bundle that has none yet.
 fn gaussian_counts(bytes: &[u8]) -> Result<Vec<u8>, DecodeError> {
     let bundle = Bundle::parse(bytes)?;
-    let counts = bundle.count_gaussians(&mut vec![0; bundle.count_scratch_len()])?;
+    let counts = count_gaussians(&bundle, &mut vec![0; count_scratch_len(&bundle)])?;
     Ok(counts.iter().take(bundle.n_tiers().into()).flat_map(|count| count.to_le_bytes()).collect())
 }
 

@@ -145,15 +145,14 @@ impl Model {
     /// Scratch memory of a decoder that draws `n` anchors in two strips.
     fn scratch_len(&self, n: usize) -> u64 {
         let splats = n as f64 * self.splats_per_anchor * SHARE_OF_TWO_STRIPS;
-        let shape = ScratchShape {
-            n_geometry_inputs: 3,
-            n_colour_inputs: 3,
-            colour_hidden: self.feature_dim,
-            detail_hidden: 0,
-            // A sixteenth more than measured, as plans have it.
-            max_splats: (splats * 17.0 / 16.0) as u32,
-            ..ScratchShape::most(self.feature_dim, self.n_offsets)
-        };
+        let mut shape = ScratchShape::most(self.feature_dim, self.n_offsets);
+        shape.model.n_geometry_inputs = 3;
+        shape.model.n_colour_inputs = 3;
+        shape.model.colour_hidden = self.feature_dim;
+        shape.model.detail_hidden = 0;
+        shape.model.feature_bank = false;
+        // A sixteenth more than measured, as plans have it.
+        shape.frame.max_splats = (splats * 17.0 / 16.0) as u32;
         shape.scratch_len() as u64
     }
 

@@ -32,22 +32,26 @@ pub enum Effect {
     DilationCompensation,
     /// The detail module's head adds to colours.
     Detail,
+    /// The heads see features at several resolutions, mixed by where they are seen from.
+    FeatureBank,
     /// Gaussians have three deviations and a rotation, not one deviation.
     Anisotropy,
 }
 
 impl Effect {
     /// All there are, in the order in which they are measured and named.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::ViewColour,
         Self::ViewGeometry,
         Self::ViewDistance,
         Self::DilationCompensation,
         Self::Detail,
+        Self::FeatureBank,
         Self::Anisotropy,
     ];
 
-    /// Those that are measured: at one size of the image dilation compensation shows nothing of what it is for.
+    /// Those that are measured: at one size of the image dilation compensation shows nothing of what it is for, and a feature bank
+    /// calls for a feature width divisible by 4, which HAC's is not.
     pub const MEASURED: [Self; 5] =
         [Self::ViewColour, Self::ViewGeometry, Self::ViewDistance, Self::Detail, Self::Anisotropy];
 
@@ -59,6 +63,7 @@ impl Effect {
             Self::ViewDistance => "view-distance",
             Self::DilationCompensation => "dilation-compensation",
             Self::Detail => "detail",
+            Self::FeatureBank => "feature-bank",
             Self::Anisotropy => "anisotropy",
         }
     }
@@ -71,6 +76,7 @@ impl Effect {
             Self::ViewDistance => "train.shape.view_distance",
             Self::DilationCompensation => "train.shape.dilation_compensation",
             Self::Detail => "train.modules.detail",
+            Self::FeatureBank => "train.shape.feature_bank",
             Self::Anisotropy => "train.shape.anisotropic",
         }
     }
@@ -83,6 +89,7 @@ impl Effect {
             Self::ViewDistance => config.shape.view_distance,
             Self::DilationCompensation => config.shape.dilation_compensation,
             Self::Detail => config.modules.detail.is_some(),
+            Self::FeatureBank => config.shape.feature_bank,
             Self::Anisotropy => config.shape.anisotropic,
         }
     }
@@ -103,6 +110,7 @@ impl Effect {
                 config.modules.detail = None;
                 config.shape.detail_hidden = 0;
             }
+            Self::FeatureBank => config.shape.feature_bank = on,
         }
     }
 

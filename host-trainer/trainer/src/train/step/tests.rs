@@ -52,7 +52,7 @@ fn scene(seed: u64, shape: ModelShape) -> Scene<f64> {
     scene
 }
 
-fn shapes() -> [ModelShape; 7] {
+fn shapes() -> [ModelShape; 9] {
     let base = ModelShape { view_colour: true, view_geometry: true, ..ModelShape::plain(6, 3) };
     [
         base,
@@ -61,6 +61,8 @@ fn shapes() -> [ModelShape; 7] {
         ModelShape { view_geometry: false, view_distance: true, ..base },
         ModelShape { view_colour: false, ..base },
         ModelShape { detail_hidden: 5, colour_hidden: 8, ..base },
+        ModelShape { feature_bank: true, ..ModelShape::plain(4, 2) },
+        ModelShape { feature_bank: true, detail_hidden: 3, feature_dim: 8, ..base },
         ModelShape { anisotropic: false, ..base },
     ]
 }

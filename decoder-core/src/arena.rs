@@ -26,6 +26,17 @@ impl<'s> Arena<'s> {
         Self { rest: bytemuck::try_cast_slice_mut(words).unwrap_or_default() }
     }
 
+    /// All of `words`.
+    pub(crate) fn of_words(words: &'s mut [u32]) -> Self {
+        Self { rest: words }
+    }
+
+    /// Words not yet handed out.
+    #[cfg(test)]
+    pub(crate) fn n_words(&self) -> usize {
+        self.rest.len()
+    }
+
     /// The same memory for a while.
     pub(crate) fn borrow(&mut self) -> Arena<'_> {
         Arena { rest: self.rest }

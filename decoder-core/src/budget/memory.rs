@@ -1,0 +1,381 @@
+//! What scratch memory holds: one list of slices, which both the sum and the carving are made of.
+//!
+//! First lies what stays between frames, then the memory of a frame. What binding alone needs lies where the frame's memory lies
+//! later.
+
+use super::shape::ScratchShape;
+use crate::arena::{Arena, words_for};
+use crate::bake::{BakedGaussian, BakedMemory};
+use crate::bundle::{RecordMemory, model_words};
+use crate::error::DecodeError;
+use crate::project::PackedSplat;
+use crate::raster::{N_RADIX, Pixel, TILE_PIXELS, TileRect};
+use crate::scene::HeadOutputs;
+
+/// Makes of one list of slices the words that they take and the function that takes them, in this order.
+macro_rules! slices {
+    ($($(#[$doc:meta])* $memory:ident: $words:ident, $take:ident($shape:ident) {
+        $($field:ident: [$item:ty; $len:expr],)*
+    })*) => {$(
+        const fn $words($shape: &ScratchShape) -> usize {
+            0_usize$(.saturating_add(match words_for::<$item>($len) {
+                Some(words) => words,
+                None => usize::MAX,
+            }))*
+        }
+
+        $(#[$doc])*
+        fn $take<'s>($shape: &ScratchShape, arena: &mut Arena<'s>) -> Result<$memory<'s>, DecodeError> {
+            Ok($memory { $($field: arena.take::<$item>($len)?,)* })
+        }
+    )*};
+}
+
+slices! {
+    /// The heads' weights, and the anchor that they are evaluated for.
+    AnchorMemory: anchor_words, take_anchor(shape) {
+        heads: [u32; shape.heads().n_weights()],
+        row: [f32; shape.n_channels()],
+        inputs: [f32; shape.heads().inputs()],
+        hidden: [f32; shape.heads().hidden_len()],
+        detail_sums: [f32; shape.heads().sums_len()],
+        outputs: [HeadOutputs; shape.heads().offsets],
+    }
+
+    /// What the models of the symbols work in.
+    ModelMemory: models_words, take_models(shape) {
+        words: [u32; model_words(shape.coder.n_tables, shape.coder.context_inputs, shape.coder.context_hidden)],
+    }
+
+    /// Anchors between frames: their records, a bit a chunk, and the scale of each table.
+    RecordMemory: record_words, take_records(shape) {
+        records: [u16; shape.record_layout().len().saturating_mul(shape.resident.len())],
+        damaged: [u32; shape.resident.n_chunks().div_ceil(u32::BITS as usize)],
+        scales: [[f32; 2]; shape.coder.n_tables as usize],
+    }
+
+    /// Gaussians between frames, and where those of each chunk begin and end.
+    BakedMemory: baked_words, take_baked(shape) {
+        records: [BakedGaussian; shape.resident.len()],
+        starts: [u32; shape.resident.n_chunks().saturating_add(1)],
+    }
+
+    /// What a frame is drawn in.
+    FrameMemory: frame_words, take_frame_of(shape) {
+        pixels: [Pixel; TILE_PIXELS.saturating_mul(shape.frame.canvas_tiles as usize)],
+        rgb: [[u8; 3]; TILE_PIXELS],
+        counts: [u32; N_RADIX],
+        splats: [PackedSplat; shape.frame.max_splats as usize],
+        rects: [TileRect; shape.frame.max_splats as usize],
+        order: [u32; shape.frame.max_splats as usize],
+        spare: [u32; shape.frame.max_splats as usize],
+    }
+}
+
+/// Memory that anchors are evaluated in.
+pub(crate) struct AnchorMemory<'s> {
+    /// The weights, in whatever format the arithmetic keeps them.
+    pub(crate) heads: &'s mut [u32],
+    /// `[n_channels]` of the current anchor.
+    pub(crate) row: &'s mut [f32],
+    /// The inputs of the head that sees most.
+    pub(crate) inputs: &'s mut [f32],
+    /// A hidden layer.
+    pub(crate) hidden: &'s mut [f32],
+    /// The detail head's share of an anchor.
+    pub(crate) detail_sums: &'s mut [f32],
+    /// `[K]`.
+    pub(crate) outputs: &'s mut [HeadOutputs],
+}
+
+/// Memory of the models of the symbols.
+pub(crate) struct ModelMemory<'s> {
+    /// As many as [`Bundle::anchor_scratch_words`](crate::Bundle::anchor_scratch_words) says.
+    pub(crate) words: &'s mut [u32],
+}
+
+/// Memory that a frame is drawn in.
+pub(crate) struct FrameMemory<'s> {
+    /// `[TILE_PIXELS]` of the current tile, or of each tile of a strip that is drawn in slabs.
+    pub(crate) pixels: &'s mut [Pixel],
+    /// `[TILE_PIXELS]` of a finished tile.
+    pub(crate) rgb: &'s mut [[u8; 3]],
+    /// Counts of the sort.
+    pub(crate) counts: &'s mut [u32],
+    /// Splats, or room for fewer larger ones.
+    pub(crate) splats: &'s mut [PackedSplat],
+    /// The tiles of each.
+    pub(crate) rects: &'s mut [TileRect],
+    /// Their order.
+    pub(crate) order: &'s mut [u32],
+    /// The order before.
+    pub(crate) spare: &'s mut [u32],
+}
+
+/// Memory of the scene: what stays between frames (`'s`), and what binding works in (`'f`).
+pub(crate) enum SceneMemory<'s, 'f> {
+    /// Each frame decodes.
+    Streamed { anchor: AnchorMemory<'s>, models: ModelMemory<'s> },
+    /// Binding decodes.
+    Resident { anchor: AnchorMemory<'s>, records: RecordMemory<'s>, models: ModelMemory<'f> },
+    /// Binding decodes and evaluates.
+    Baked { baked: BakedMemory<'s>, anchor: AnchorMemory<'f>, models: ModelMemory<'f> },
+}
+
+impl<'s, 'f> SceneMemory<'s, 'f> {
+    /// Takes the memory of the scene from the front of `arena`.
+    ///
+    /// # Errors
+    /// [`DecodeError::ScratchTooSmall`] when the arena has fewer words than [`ScratchShape::scratch_len`] counts.
+    pub(crate) fn take(shape: &ScratchShape, arena: &'f mut Arena<'s>) -> Result<Self, DecodeError> {
+        if shape.resident.is_gaussians() {
+            let baked = take_baked(shape, arena)?;
+            let mut free = arena.borrow();
+            let anchor = take_anchor(shape, &mut free)?;
+            return Ok(Self::Baked { baked, anchor, models: take_models(shape, &mut free)? });
+        }
+        let anchor = take_anchor(shape, arena)?;
+        if shape.resident.is_anchors() {
+            let records = take_records(shape, arena)?;
+            return Ok(Self::Resident { anchor, records, models: take_models(shape, &mut arena.borrow())? });
+        }
+        Ok(Self::Streamed { anchor, models: take_models(shape, arena)? })
+    }
+}
+
+impl<'s> FrameMemory<'s> {
+    /// Takes the memory of a frame from what [`SceneMemory::take`] left.
+    ///
+    /// # Errors
+    /// As for [`SceneMemory::take`].
+    pub(crate) fn take(shape: &ScratchShape, arena: &mut Arena<'s>) -> Result<Self, DecodeError> {
+        take_frame_of(shape, arena)
+    }
+}
+
+impl ScratchShape {
+    /// Bytes of scratch memory, whatever their alignment; [`usize::MAX`] beyond the address space.
+    #[must_use]
+    pub const fn scratch_len(&self) -> usize {
+        let (when_bound, frame) = (self.words_when_bound(), frame_words(self));
+        let words = self.scene_words().saturating_add(if when_bound > frame { when_bound } else { frame });
+        bytes_for(words)
+    }
+
+    /// Bytes that binding takes without a frame after it.
+    pub(crate) const fn bind_len(&self) -> usize {
+        bytes_for(self.scene_words().saturating_add(self.words_when_bound()))
+    }
+
+    /// The most splats, up to those of the shape, that `len` bytes have places for; 0 if not even the rest fits.
+    pub(super) const fn splats_within(&self, len: usize) -> u32 {
+        let room = (len.saturating_sub(3) / 4).saturating_sub(self.scene_words());
+        if self.words_when_bound() > room {
+            return 0;
+        }
+        let (none, one) = (frame_words(&self.with_splats(0)), frame_words(&self.with_splats(1)));
+        let places = match room.saturating_sub(none).checked_div(one.saturating_sub(none)) {
+            Some(places) => places,
+            None => 0,
+        };
+        if places < self.frame.max_splats as usize { places as u32 } else { self.frame.max_splats }
+    }
+
+    /// The same with memory for so many splats.
+    pub(crate) const fn with_splats(mut self, max_splats: u32) -> Self {
+        self.frame.max_splats = max_splats;
+        self
+    }
+
+    /// What [`SceneMemory::take`] takes for good.
+    const fn scene_words(&self) -> usize {
+        if self.resident.is_gaussians() {
+            return baked_words(self);
+        }
+        anchor_words(self).saturating_add(if self.resident.is_anchors() {
+            record_words(self)
+        } else {
+            models_words(self)
+        })
+    }
+
+    /// What it takes where the frame's memory lies later.
+    const fn words_when_bound(&self) -> usize {
+        if self.resident.is_gaussians() {
+            anchor_words(self).saturating_add(models_words(self))
+        } else if self.resident.is_anchors() {
+            models_words(self)
+        } else {
+            0
+        }
+    }
+}
+
+const fn bytes_for(words: usize) -> usize {
+    match Arena::bytes_for(words) {
+        Some(len) if len < isize::MAX as usize => len,
+        _ => usize::MAX,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::vec;
+
+    use super::{Arena, FrameMemory, SceneMemory};
+    use crate::budget::{CoderShape, FrameShape, ModelShape, RecordShape, Resident, ScratchShape};
+
+    /// A stream of numbers, the same every time.
+    struct Numbers(u32);
+
+    impl Numbers {
+        fn below(&mut self, n: u32) -> u32 {
+            self.0 = self.0.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (self.0 >> 8) % n
+        }
+
+        /// A shape that keeps nothing, anchors or Gaussians.
+        fn shape(&mut self, kept: u32, most: u32) -> ScratchShape {
+            let mut up_to = |n: u32| self.below(n) as u16;
+            let context = up_to(2);
+            ScratchShape {
+                model: ModelShape {
+                    feature_dim: 1 + up_to(256),
+                    n_offsets: 1 + up_to(32),
+                    anisotropic: up_to(2) == 1,
+                    n_geometry_inputs: up_to(5),
+                    n_colour_inputs: up_to(5),
+                    colour_hidden: 1 + up_to(256),
+                    detail_hidden: up_to(257),
+                    feature_bank: up_to(2) == 1,
+                },
+                coder: CoderShape {
+                    n_tables: (1 - context) * up_to(360),
+                    context_inputs: context * 4 * (1 + up_to(32)),
+                    context_hidden: context * (1 + up_to(256)),
+                },
+                record: RecordShape {
+                    symbol_bits: [1 + up_to(16) as u8, 1 + up_to(16) as u8, 1 + up_to(16) as u8],
+                    lattice_bits: up_to(22) as u8,
+                    masks: up_to(2) == 1,
+                },
+                resident: match kept {
+                    0 => Resident::Nothing,
+                    1 => Resident::Anchors { n_anchors: 1 + self.below(most / 3), n_chunks: 1 + self.below(200) },
+                    _ => Resident::Gaussians { n_gaussians: self.below(2 * most), n_chunks: 1 + self.below(200) },
+                },
+                frame: FrameShape { canvas_tiles: 1 + self.below(100), max_splats: self.below(most) },
+            }
+        }
+    }
+
+    fn most_of(a: ScratchShape, b: ScratchShape) -> ScratchShape {
+        let ([a0, a1, a2], [b0, b1, b2]) = (a.record.symbol_bits, b.record.symbol_bits);
+        ScratchShape {
+            model: ModelShape {
+                feature_dim: a.model.feature_dim.max(b.model.feature_dim),
+                n_offsets: a.model.n_offsets.max(b.model.n_offsets),
+                anisotropic: a.model.anisotropic | b.model.anisotropic,
+                n_geometry_inputs: a.model.n_geometry_inputs.max(b.model.n_geometry_inputs),
+                n_colour_inputs: a.model.n_colour_inputs.max(b.model.n_colour_inputs),
+                colour_hidden: a.model.colour_hidden.max(b.model.colour_hidden),
+                detail_hidden: a.model.detail_hidden.max(b.model.detail_hidden),
+                feature_bank: a.model.feature_bank | b.model.feature_bank,
+            },
+            coder: CoderShape {
+                n_tables: a.coder.n_tables.max(b.coder.n_tables),
+                context_inputs: a.coder.context_inputs.max(b.coder.context_inputs),
+                context_hidden: a.coder.context_hidden.max(b.coder.context_hidden),
+            },
+            record: RecordShape {
+                symbol_bits: [a0.max(b0), a1.max(b1), a2.max(b2)],
+                lattice_bits: a.record.lattice_bits.max(b.record.lattice_bits),
+                masks: a.record.masks | b.record.masks,
+            },
+            resident: match (a.resident, b.resident) {
+                (
+                    Resident::Anchors { n_anchors, n_chunks },
+                    Resident::Anchors { n_anchors: more_anchors, n_chunks: more_chunks },
+                ) => Resident::Anchors { n_anchors: n_anchors.max(more_anchors), n_chunks: n_chunks.max(more_chunks) },
+                (
+                    Resident::Gaussians { n_gaussians, n_chunks },
+                    Resident::Gaussians { n_gaussians: more_gaussians, n_chunks: more_chunks },
+                ) => Resident::Gaussians {
+                    n_gaussians: n_gaussians.max(more_gaussians),
+                    n_chunks: n_chunks.max(more_chunks),
+                },
+                (same, _) => same,
+            },
+            frame: FrameShape {
+                canvas_tiles: a.frame.canvas_tiles.max(b.frame.canvas_tiles),
+                max_splats: a.frame.max_splats.max(b.frame.max_splats),
+            },
+        }
+    }
+
+    #[test]
+    fn more_never_takes_less() {
+        let random = &mut Numbers(1);
+        for _ in 0..20_000 {
+            let kept = random.below(3);
+            let (a, b) = (random.shape(kept, 100_000), random.shape(kept, 100_000));
+            let both = most_of(a, b);
+            let [len_a, len_b, len] = [a, b, both].map(|shape| shape.scratch_len());
+            assert!(len >= len_a.max(len_b), "{a:?} takes {len_a}, {b:?} {len_b}, both {len}");
+        }
+    }
+
+    #[test]
+    fn the_sum_is_what_carving_takes() {
+        let random = &mut Numbers(7);
+        for round in 0..600 {
+            let shape = random.shape(round % 3, 300);
+            let mut scratch = vec![0; shape.scratch_len() + 4];
+            let mut take_all = |len: usize| {
+                let mut arena = Arena::new(scratch.get_mut(..len).expect("not beyond"));
+                SceneMemory::take(&shape, &mut arena)?;
+                FrameMemory::take(&shape, &mut arena).map(|_| arena.n_words())
+            };
+            let [all, fewer] = [take_all(shape.scratch_len()), take_all(shape.scratch_len() - 7)];
+            assert!(fewer.is_err(), "a word less: {shape:?}");
+            let left = all.unwrap_or_else(|error| panic!("{error}: {shape:?}"));
+            let without_frame = shape.with_splats(0).bind_len();
+            assert!(left <= 1 || shape.scratch_len() == without_frame, "{left} words over: {shape:?}");
+        }
+    }
+
+    #[test]
+    fn a_resident_anchor_takes_what_its_symbols_take_and_little_more() {
+        let mut shape = ScratchShape::most(16, 4);
+        shape.record.lattice_bits = 10;
+        shape.coder.context_hidden = 32;
+        // 34 symbols of 16 bits, cell, mask, steps.
+        assert_eq!(shape.resident_anchor_len(), 2 * (34 * 16 + 30 + 4 + 16_usize).div_ceil(16), "of any symbols");
+        shape.coder.context_hidden = 0;
+        shape.record = RecordShape { masks: false, symbol_bits: [6, 8, 7], ..shape.record };
+        assert_eq!(shape.resident_anchor_len(), 2 * (16 * 6 + 6 * 8 + 12 * 7 + 30_usize).div_ceil(16), "of small ones");
+    }
+
+    #[test]
+    fn splats_within_a_length_fill_it() {
+        for resident in [
+            Resident::Nothing,
+            Resident::Anchors { n_anchors: 40, n_chunks: 40 },
+            Resident::Gaussians { n_gaussians: 40, n_chunks: 40 },
+        ] {
+            let shape = ScratchShape { resident, ..ScratchShape::most(16, 4) }.with_splats(5000);
+            for len in [100_000, 150_001, 999_999] {
+                let within = shape.with_splats(shape.splats_within(len));
+                let is_full = within.frame.max_splats == 5000 || within.scratch_len() + 40 > len;
+                assert!(within.scratch_len() <= len && is_full, "{within:?} in {len}");
+            }
+            assert_eq!(shape.splats_within(1000), 0, "not even the heads");
+        }
+    }
+
+    #[test]
+    fn beyond_the_address_space_is_said_so() {
+        let shape = ScratchShape::most(256, 32).with_splats(u32::MAX);
+        assert!(size_of::<usize>() > 4 || shape.scratch_len() == usize::MAX, "no wrapped sum");
+    }
+}

@@ -1,0 +1,121 @@
+//! Binding: the caller's memory taken apart, and the scene put into it.
+
+use super::Decoder;
+use super::source::{AnchorSource, Anchors, GaussianSource};
+use super::splats::SplatStore;
+use crate::arena::Arena;
+use crate::arithmetic::{Arithmetic, F32};
+use crate::bake::{BakedMemory, Baker, bake};
+use crate::budget::{AnchorMemory, FrameMemory, ModelMemory, Plan, SceneMemory, ScratchShape};
+use crate::bundle::{AnchorRecords, Bundle, RecordMemory, saturate};
+use crate::error::DecodeError;
+use crate::mlp::{HeadNumbers, Heads};
+use crate::project::PackedSplat;
+use crate::scene::{Evaluator, Workspace};
+
+impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
+    /// Takes as much of `scratch` as the plan says, and prepares the scene in it.
+    // Not inlined, here and below: a caller's stack frame would keep what only one of the steps needs.
+    #[inline(never)]
+    pub(super) fn bind_with(
+        bundle: &Bundle<'b>,
+        plan: Plan,
+        scratch: &'s mut [u8],
+        skip_damage: bool,
+    ) -> Result<Self, DecodeError> {
+        let needed = bundle.plan(plan.budget())?;
+        if needed != plan {
+            return Err(DecodeError::PlanMismatch {
+                needed: saturate(needed.scratch_len()),
+                planned: saturate(plan.scratch_len()),
+            });
+        }
+        let available = saturate(scratch.len());
+        let Some((scratch, _)) = scratch.split_at_mut_checked(plan.scratch_len()) else {
+            return Err(DecodeError::ScratchTooSmall { needed: saturate(plan.scratch_len()), available });
+        };
+        let mut arena = Arena::new(scratch);
+        let source = bind_scene(bundle, plan.shape(), &mut arena, skip_damage)?;
+        let FrameMemory { pixels, rgb, counts, splats, rects, order, spare } =
+            FrameMemory::take(plan.shape(), &mut arena)?;
+        let splats = SplatStore { splats: records_in(splats)?, rects, n: 0, order, spare, counts };
+        Ok(Self { bundle: *bundle, plan, skip_damage, source, pixels, rgb, splats })
+    }
+}
+
+/// Puts the scene into memory of `arena`, as far as `shape` keeps it there.
+#[inline(never)]
+fn bind_scene<'b, 's, N: HeadNumbers>(
+    bundle: &Bundle<'b>,
+    shape: &ScratchShape,
+    arena: &mut Arena<'s>,
+    skip_damage: bool,
+) -> Result<GaussianSource<'b, 's, N>, DecodeError> {
+    let (source, anchor) = match SceneMemory::take(shape, arena)? {
+        SceneMemory::Streamed { anchor, models: ModelMemory { words } } => {
+            (AnchorSource::Streamed(bundle.anchor_models(words)?), anchor)
+        }
+        SceneMemory::Resident { anchor, records, models } => {
+            (AnchorSource::Resident(decode_anchors(bundle, shape, records, anchor.row, models, skip_damage)?), anchor)
+        }
+        // Unreachable without the feature; this arm drops the code.
+        SceneMemory::Baked { .. } if !cfg!(feature = "baked") => return Err(DecodeError::Internal),
+        SceneMemory::Baked { baked, anchor, models } => {
+            let baker = evaluate_scene(bundle, shape, baked, anchor, models, skip_damage)?;
+            return baker.finish().map(GaussianSource::Baked);
+        }
+    };
+    Ok(GaussianSource::Anchors(Anchors { source, evaluator: evaluator(bundle, shape, anchor)? }))
+}
+
+/// Converts the heads into memory of the anchor.
+#[inline(never)]
+fn evaluator<'s, N: HeadNumbers>(
+    bundle: &Bundle<'_>,
+    shape: &ScratchShape,
+    memory: AnchorMemory<'s>,
+) -> Result<Evaluator<'s, N>, DecodeError> {
+    let AnchorMemory { heads, row, inputs, hidden, detail_sums, outputs } = memory;
+    let heads = Heads::convert(&mut Arena::of_words(heads), bundle.heads(), shape.heads())?;
+    Ok(Evaluator { heads, row, work: Workspace { inputs, hidden, detail_sums, outputs } })
+}
+
+/// Decodes the planned tiers into `records`.
+///
+/// * `row`: `[n_channels]`, for the symbols of the current anchor.
+fn decode_anchors<'b, 's>(
+    bundle: &Bundle<'b>,
+    shape: &ScratchShape,
+    records: RecordMemory<'s>,
+    row: &mut [f32],
+    models: ModelMemory<'_>,
+    skip_damage: bool,
+) -> Result<AnchorRecords<'b, 's>, DecodeError> {
+    let mut models = bundle.anchor_models(models.words)?;
+    let row = bytemuck::try_cast_slice_mut(row).unwrap_or_default();
+    let n_chunks = shape.resident.n_chunks();
+    AnchorRecords::decode(bundle, n_chunks, shape.record_layout(), records, row, &mut models, skip_damage)
+}
+
+/// Evaluates the Gaussians of the planned tiers into `baked`.
+#[inline(never)]
+pub(super) fn evaluate_scene<'s>(
+    bundle: &Bundle<'_>,
+    shape: &ScratchShape,
+    baked: BakedMemory<'s>,
+    anchor: AnchorMemory<'_>,
+    models: ModelMemory<'_>,
+    skip_damage: bool,
+) -> Result<Baker<'s>, DecodeError> {
+    let mut evaluator = evaluator::<F32>(bundle, shape, anchor)?;
+    let mut models = bundle.anchor_models(models.words)?;
+    bake(bundle, shape.resident.n_chunks(), baked, &mut models, &mut evaluator, skip_damage)
+}
+
+/// The memory of splats as records of another size: as many as fit.
+fn records_in<S: bytemuck::Pod>(splats: &mut [PackedSplat]) -> Result<&mut [S], DecodeError> {
+    let words: &mut [u32] = bytemuck::try_cast_slice_mut(splats).map_err(|_| DecodeError::Internal)?;
+    let words_each = size_of::<S>().div_ceil(4).max(1);
+    let n_words = words.len() / words_each * words_each;
+    bytemuck::try_cast_slice_mut(words.get_mut(..n_words).unwrap_or_default()).map_err(|_| DecodeError::Internal)
+}

@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_core::math::{exp, sigmoid, tanh};
-use pocketsplat_trainer::ops::normality::{Histograms, Moments, Spread, Weights};
+use pocketsplat_trainer::ops::normality::{Moments, Weights};
 use pocketsplat_trainer::ops::simd::Level;
 use pocketsplat_trainer::ops::{Pinhole, adam, head_input, rate, ssim};
 use pocketsplat_trainer::scene::ModelShape;
@@ -43,9 +43,9 @@ fn columns(n_rows: usize) -> Vec<f64> {
     x.iter().map(|x| f64::from(*x as f32)).collect()
 }
 
-const WEIGHTS: Weights<f64> = Weights { divergence: 0.3, spread: 0.7, target: 0.4 };
+const WEIGHTS: Weights<f64> = Weights { divergence: 0.3, spread: 0.7 };
 
-/// The gradient of both forms of the divergence in f64 against differences, over a few numbers of rows.
+/// The gradient of the divergence in f64 against differences, over a few numbers of rows.
 fn divergence_gradient() -> f64 {
     let mut worst = 0.0_f64;
     for n_rows in [1, 2, 40] {
@@ -55,29 +55,22 @@ fn divergence_gradient() -> f64 {
         let slope = |d: &[f64]| {
             d.iter().zip(&direction).map(|(g, d)| g * d).fold((0.0, 0.0), |(s, t): (f64, f64), x| (s + x, t + x.abs()))
         };
-        for spread in [Spread::Deviation, Spread::Variance] {
-            let mut d = vec![0.0; x.len()];
-            Moments::of(&[&x], 4).backward(&WEIGHTS, spread, true, &x, &mut d);
-            let (slope, scale) = slope(&d);
-            worst = worst
-                .max(difference_error(slope, scale, |t| Moments::of(&[&moved(t)], 4).term(&WEIGHTS, spread, true)));
-        }
         let mut d = vec![0.0; x.len()];
-        Histograms::of(&[&x], 4).backward(0.3, &x, &mut d);
+        Moments::of(&[&x], 4).backward(&WEIGHTS, &x, &mut d);
         let (slope, scale) = slope(&d);
-        worst = worst.max(difference_error(slope, scale, |t| Histograms::of(&[&moved(t)], 4).term(0.3)));
+        worst = worst.max(difference_error(slope, scale, |t| Moments::of(&[&moved(t)], 4).term(&WEIGHTS)));
     }
     worst
 }
 
 /// The divergence in f32 against f64, of the term.
 fn divergence_rounding() -> f64 {
-    let weights = Weights { divergence: 0.3_f32, spread: 0.7, target: 0.4 };
+    let weights = Weights { divergence: 0.3_f32, spread: 0.7 };
     let of = |n_rows: usize| {
         let x = columns(n_rows);
         let rounded: Vec<f32> = x.iter().map(|x| *x as f32).collect();
-        let exact = Moments::of(&[&x], 4).term(&WEIGHTS, Spread::Deviation, true);
-        (f64::from(Moments::of(&[&rounded], 4).term(&weights, Spread::Deviation, true)) / exact - 1.0).abs()
+        let exact = Moments::of(&[&x], 4).term(&WEIGHTS);
+        (f64::from(Moments::of(&[&rounded], 4).term(&weights)) / exact - 1.0).abs()
     };
     [1, 2, 40].map(of).into_iter().fold(0.0, f64::max)
 }

@@ -39,9 +39,8 @@ fn forced_effects_are_those_of_the_bundle() {
 #[test]
 fn isotropic_runs_go_through_every_phase_and_module() {
     let output = folder("isotropic").join("a.psb");
-    let mut command = train(&output);
-    command.args(["--effects", "-anisotropy", "--backbone", "hac", "--modules", "distribution,pruning,detail"]);
-    succeeds(command.args(["--set", "train.modules.distribution.vectors=all"]));
+    let modules = ["--backbone", "hac", "--modules", "distribution,pruning,detail"];
+    succeeds(train(&output).args(["--effects", "-anisotropy"]).args(modules));
     let bytes = fs::read(&output).unwrap();
     let bundle = Bundle::parse(&bytes).unwrap();
     assert!(!bundle.header().features.effects.anisotropic && bundle.n_anchors() > 0);

@@ -50,10 +50,10 @@ impl Effect {
         Self::Anisotropy,
     ];
 
-    /// Those that are measured: at one size of the image dilation compensation shows nothing of what it is for, and a feature bank
-    /// calls for a feature width divisible by 4, which HAC's is not.
-    pub const MEASURED: [Self; 5] =
-        [Self::ViewColour, Self::ViewGeometry, Self::ViewDistance, Self::Detail, Self::Anisotropy];
+    /// Those that are measured: at one size of the image dilation compensation shows nothing of what it is for, a feature bank
+    /// calls for a feature width divisible by 4, which HAC's is not, and the distance of view paid in none of five captures
+    /// (`docs/effects.md`).
+    pub const MEASURED: [Self; 4] = [Self::ViewColour, Self::ViewGeometry, Self::Detail, Self::Anisotropy];
 
     /// Its name on the command line.
     pub const fn name(self) -> &'static str {
@@ -153,8 +153,8 @@ mod tests {
     #[test]
     fn a_run_has_the_effects_it_is_given_and_a_shape_to_match() {
         let given = TrainConfig::default();
-        for bits in 0..32 {
-            let wanted: Vec<Effect> = (0..5).filter(|i| bits >> i & 1 == 1).map(|i| Effect::MEASURED[i]).collect();
+        for bits in 0..16 {
+            let wanted: Vec<Effect> = (0..4).filter(|i| bits >> i & 1 == 1).map(|i| Effect::MEASURED[i]).collect();
             let config = Effect::measured_only(&wanted, &given);
             assert_eq!((Effect::measured_in(&config), Effect::all_in(&config)), (wanted.clone(), wanted));
             assert_eq!(config.modules.shape(config.shape), config.shape);

@@ -8,10 +8,6 @@ use crate::scene::Head;
 /// What [`forward`] leaves for [`backward`]; buffers are kept from step to step.
 #[derive(Clone, Debug, Default)]
 pub struct Kept<R> {
-    /// `[m, 3]` residuals ΔH of the Gaussians.
-    pub residuals: Vec<R>,
-    /// `[m, 3]` dL/dΔH of terms on the residuals alone; zero after [`forward`], for others to add to.
-    pub d_residuals: Vec<R>,
     /// `[m, 3]` colours without residual.
     plain: Vec<R>,
     /// `[m, H]` hidden units.
@@ -54,12 +50,9 @@ pub fn forward<R: Real>(
     for unit in &mut kept.hidden {
         *unit = unit.larger(R::ZERO);
     }
-    kept.residuals.clear();
-    kept.residuals.extend(std::iter::repeat_n(&head.b2, m).flatten());
-    multiply(Matrix::new(&kept.hidden, m, h), Matrix::new(&head.w2, 3, h).t(), true, &mut kept.residuals);
-    kept.d_residuals.clear();
-    kept.d_residuals.resize(3 * m, R::ZERO);
-    for (gaussian, residual) in gaussians.iter_mut().zip(kept.residuals.as_chunks::<3>().0) {
+    let mut residuals: Vec<R> = std::iter::repeat_n(&head.b2, m).flatten().copied().collect();
+    multiply(Matrix::new(&kept.hidden, m, h), Matrix::new(&head.w2, 3, h).t(), true, &mut residuals);
+    for (gaussian, residual) in gaussians.iter_mut().zip(residuals.as_chunks::<3>().0) {
         for (colour, residual) in gaussian.colour.iter_mut().zip(residual) {
             *colour += *residual;
         }
@@ -81,14 +74,10 @@ pub fn backward<R: Real>(
     let (f, h, m) = (head.n_in - 3, head.n_hidden, d_gaussians.len());
     let n = features.len() / f;
     let [by_feature, by_colour] = first_layer(head);
-    for (d, gaussian) in kept.d_residuals.as_chunks_mut::<3>().0.iter_mut().zip(&*d_gaussians) {
-        for (d, colour) in d.iter_mut().zip(gaussian.colour) {
-            *d += colour;
-        }
-    }
-    let d_out = Matrix::new(&kept.d_residuals, m, 3);
+    let d_residuals: Vec<R> = d_gaussians.iter().flat_map(|gaussian| gaussian.colour).collect();
+    let d_out = Matrix::new(&d_residuals, m, 3);
     multiply(d_out.t(), Matrix::new(&kept.hidden, m, h), true, &mut d_head.w2);
-    for d in kept.d_residuals.as_chunks::<3>().0 {
+    for d in d_residuals.as_chunks::<3>().0 {
         for (sum, d) in d_head.b2.iter_mut().zip(d) {
             *sum += *d;
         }
@@ -158,13 +147,11 @@ mod tests {
         (head, features, colours.as_chunks().0.iter().map(of).collect())
     }
 
-    /// Σ weights·colours + Σ weights·residuals.
+    /// Σ weights·colours.
     fn objective(x: &[f64], weights: &[f64]) -> f64 {
         let (head, features, mut gaussians) = split(x);
-        let mut kept = Kept::default();
-        forward(&head, features, &sources(), &mut gaussians, &mut kept);
-        let colours = gaussians.iter().flat_map(|g| g.colour).chain(kept.residuals);
-        colours.zip(weights).map(|(c, w)| c * w).sum()
+        forward(&head, features, &sources(), &mut gaussians, &mut Kept::default());
+        gaussians.iter().flat_map(|g| g.colour).zip(weights).map(|(c, w)| c * w).sum()
     }
 
     #[test]
@@ -189,14 +176,12 @@ mod tests {
         let n_weights = Head::filled(F + 3, H, 3, 0.0).n_params();
         for seed in 0..3 {
             let x = random(seed, n_weights + 3 * F + 3 * ROWS.len());
-            let weights = random(seed + 10, 6 * ROWS.len());
+            let weights = random(seed + 10, 3 * ROWS.len());
             let (network, features, mut gaussians) = split(&x);
             let mut kept = Kept::default();
             forward(&network, features, &sources(), &mut gaussians, &mut kept);
-            let (by_colour, by_residual) = weights.split_at(3 * ROWS.len());
-            kept.d_residuals.copy_from_slice(by_residual);
             let of = |c: &[f64; 3]| Gaussian { colour: *c, ..Gaussian::default() };
-            let mut d_gaussians: Vec<Gaussian<f64>> = by_colour.as_chunks().0.iter().map(of).collect();
+            let mut d_gaussians: Vec<Gaussian<f64>> = weights.as_chunks().0.iter().map(of).collect();
             let (mut d_features, mut d_head) = (vec![0.0; 3 * F], Head::filled(F + 3, H, 3, 0.0));
             backward(&network, features, &sources(), &mut kept, &mut d_gaussians, &mut d_features, &mut d_head);
             let mut analytic = d_head.groups().concat();

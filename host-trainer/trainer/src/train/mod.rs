@@ -261,7 +261,6 @@ impl<'a> Trainer<'a> {
             iterations: self.config.iterations,
             phase,
             scaled: self.config.backbone == Backbone::Scaffold || phase != Phase::Raw,
-            base_steps: self.config.hac.base_steps(),
             stream: Stream::of_run(self.config.seed).branch(self.iteration),
         }
     }

@@ -83,7 +83,7 @@ pub use pruning::Pruning;
 /// Where a run stands when a module is asked.
 #[derive(Clone, Copy, Debug)]
 pub struct Moment {
-    /// Iteration in work, from 1.
+    /// Current iteration, from 1.
     pub iteration: u32,
     /// Iterations of the run.
     pub iterations: u32,
@@ -92,8 +92,6 @@ pub struct Moment {
     /// Whether the values of anchors have a scale that means something: from the first noise on where the run comes to
     /// that, else always. Before, a network can undo any change of scale.
     pub scaled: bool,
-    /// Steps of features, log-scales and offsets that values are measured in.
-    pub base_steps: [f32; 3],
     /// Random numbers of this iteration.
     pub stream: Stream,
 }
@@ -138,7 +136,7 @@ pub trait Terms<R: Real>: Sync {
 
     /// Terms on the Gaussians of the view, after the forward pass.
     ///
-    /// * `blocks`: [`Block::d_gaussians`] and the detail's residuals are added to.
+    /// * `blocks`: [`Block::d_gaussians`] is added to.
     fn on_gaussians(&self, _at: &Moment, _scene: &Scene<R>, _blocks: &mut [Block<R>]) -> R {
         R::ZERO
     }

@@ -53,25 +53,12 @@ pub(super) fn rows() -> Vec<Row> {
         curve("pruning", "hard pruning of 30 % alone", &["pruning"], false),
         curve("detail", "detail compensation alone", &["detail"], false),
     ];
-    let distribution: &[_] = &[
-        ("distribution-histogram", "histograms of 128 bins instead of moments", "form=histogram"),
-        ("distribution-variance", "the spread is the variance", "reading=variance"),
-        ("distribution-all", "all coded values instead of features", "vectors=all"),
-        ("distribution-half", "σ₀ = 0.5", "target=0.5"),
-        ("distribution-zero", "σ₀ = 0", "target=0"),
-        ("distribution-start", "from the first iteration on", "from=0"),
-        ("distribution-sum", "summed over the channels, as printed", "reduction=sum"),
-        ("distribution-sum-half", "the same, features measured in halves", "reduction=sum unit=0.5"),
-        ("distribution-first", "summed, from the first iteration to the context", "reduction=sum from=0 until=0.333"),
-        ("distribution-strong", "both weights 0.01", "divergence=0.01 spread=0.01"),
-    ];
+    let distribution: &[_] = &[("distribution-strong", "both weights 0.01", "divergence=0.01 spread=0.01")];
     let pruning: &[_] = &[
         ("pruning-lowest", "the lowest 30 % instead of a random choice", "choice=lowest"),
         ("pruning-contribution", "ranked by contribution to the images", "rank=contribution"),
-        ("pruning-offsets", "30 % of the offsets of 40 % of the anchors", "unit=offsets"),
         ("pruning-no-target", "without the opacity target", "weight=0"),
         ("pruning-target", "the opacity target at the paper's weight", "weight=1e-5"),
-        ("pruning-literal", "the opacity target as printed", "weight=1e-5 normalisation=literal"),
         ("pruning-10", "10 %", "rate=0.1"),
         ("pruning-20", "20 %", "rate=0.2"),
         ("pruning-40", "40 %", "rate=0.4"),
@@ -84,11 +71,7 @@ pub(super) fn rows() -> Vec<Row> {
         ("tiered-opacity", "the same, ranked by opacity", "form=tiered rate=0.4"),
         ("tiered-80", "tiers to 80 %", "form=tiered rate=0.8 rank=contribution choice=lowest"),
     ];
-    let detail: &[_] = &[
-        ("detail-free", "taught by the image's loss alone", "teaching=off"),
-        ("detail-small", "taught to be small, as eq. 6 is printed", "teaching=small weight=5e-4"),
-        ("detail-uncoded", "taught by the colours of uncoded features", "teaching=uncoded weight=0.05"),
-    ];
+    let detail: &[_] = &[("detail-free", "taught by the image's loss alone", "weight=0")];
     for (module, options) in [("distribution", distribution), ("pruning", pruning), ("detail", detail)] {
         for (name, what, settings) in options {
             let modules: &'static [&'static str] = match module {

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Module, Moment, Terms};
 use crate::ops::Real;
-use crate::ops::opacity_target::{Normalisation, forward_backward};
+use crate::ops::opacity_target::forward_backward;
 use crate::scene::Scene;
 use crate::train::Trainer;
 use crate::train::config::within;
@@ -36,17 +36,6 @@ pub enum Choice {
     Lowest,
 }
 
-/// What "a random subset of 30 % of their Gaussians" means.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Unit {
-    /// The rate is of all anchors, and whole anchors of the pool go: what the paper's counts of anchors show.
-    #[default]
-    Anchors,
-    /// The rate is of the offsets of the pool's anchors, which are masked: the paper's words.
-    Offsets,
-}
-
 /// What anchors are ranked by.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -58,17 +47,6 @@ pub enum Rank {
     Contribution,
 }
 
-/// Over which Gaussians the target of the opacities is taken.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Count {
-    /// All K of the visible anchors, drawn or not.
-    #[default]
-    Candidates,
-    /// Those drawn.
-    Drawn,
-}
-
 /// A loss that keeps opacities low, and one event that prunes by what is left of them (the plug-and-play paper, eq. 4 and
 /// section 3.2).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -76,12 +54,8 @@ pub enum Count {
 pub struct Pruning {
     /// Weight of the opacity target. (The paper's is 1e-5. Divided by N it then leaves a third of lego's anchors and costs 4 dB.)
     pub weight: f64,
-    /// β: the target is β·N.
+    /// β: the target is β·N, N being all K Gaussians of the visible anchors.
     pub beta: f64,
-    /// N of the target.
-    pub count: Count,
-    /// What the square is divided by.
-    pub normalisation: Normalisation,
     /// Share of the run from which on the target counts.
     pub from: f64,
     /// Share of the run after which the event comes.
@@ -94,8 +68,6 @@ pub struct Pruning {
     pub pool: f64,
     /// Which of the pool.
     pub choice: Choice,
-    /// What the rate counts.
-    pub unit: Unit,
     /// What anchors are ranked by.
     pub rank: Rank,
 }
@@ -105,15 +77,12 @@ impl Default for Pruning {
         Self {
             weight: 1e-7,
             beta: 1e-3,
-            count: Count::Candidates,
-            normalisation: Normalisation::Count,
             from: 1_500.0 / 30_000.0,
             at: 15_000.0 / 30_000.0,
             form: Form::Hard,
             rate: 0.3,
             pool: 0.4,
             choice: Choice::Random,
-            unit: Unit::Anchors,
             rank: Rank::Opacity,
         }
     }
@@ -172,7 +141,7 @@ impl Module for Pruning {
         within("train.modules.pruning.from", self.from, 0.0, 1.0)?;
         within("train.modules.pruning.at", self.at, 0.0, 1.0)?;
         within("train.modules.pruning.pool", self.pool, 0.0, 1.0)?;
-        let most = if self.form == Form::Hard && self.unit == Unit::Anchors { self.pool } else { 0.95 };
+        let most = if self.form == Form::Hard { self.pool } else { 0.95 };
         within("train.modules.pruning.rate", self.rate, 0.0, most)
     }
 
@@ -189,18 +158,11 @@ impl Module for Pruning {
         let mut rng = ChaCha8Rng::seed_from_u64(trainer.config().seed);
         rng.set_stream(1);
         let places = self.places(&rank, &mut rng);
-        match (self.form, self.unit) {
-            (Form::Tiered, _) => trainer.scene.anchors.places = places,
-            (Form::Hard, Unit::Anchors) => {
+        match self.form {
+            Form::Tiered => trainer.scene.anchors.places = places,
+            Form::Hard => {
                 let keep: Vec<bool> = places.iter().map(|place| *place >= as_place(self.rate)).collect();
                 trainer.keep_anchors(&keep);
-            }
-            (Form::Hard, Unit::Offsets) => {
-                let k = trainer.config().shape.n_offsets;
-                let of_pool = (0..places.len()).filter(|a| places[*a] < as_place(self.pool));
-                let mut offsets: Vec<usize> = of_pool.flat_map(|a| a * k..(a + 1) * k).collect();
-                offsets.shuffle(&mut rng);
-                trainer.scene.anchors.mask(&offsets[..of_length(self.rate, offsets.len())]);
             }
         }
     }
@@ -220,13 +182,10 @@ impl<R: Real> Terms<R> for Pruning {
         if self.weight == 0.0 || !at.is_after(self.from) {
             return R::ZERO;
         }
-        let n: usize = match self.count {
-            Count::Candidates => blocks.iter().map(|b| b.anchors.len() * scene.shape.n_offsets).sum(),
-            Count::Drawn => blocks.iter().map(|b| b.gaussians.len()).sum(),
-        };
+        let n = blocks.iter().map(|b| b.anchors.len() * scene.shape.n_offsets).sum::<usize>();
         let sum: R = blocks.iter().map(|b| b.gaussians.iter().map(|g| g.opacity).sum::<R>()).sum();
         let target = R::real(self.beta * n as f64);
-        let (term, slope) = forward_backward(sum, n, target, R::real(self.weight), self.normalisation);
+        let (term, slope) = forward_backward(sum, n, target, R::real(self.weight));
         for d in blocks.iter_mut().flat_map(|b| &mut b.d_gaussians) {
             d.opacity += slope;
         }
@@ -262,52 +221,42 @@ mod tests {
         assert!(places(&Pruning::default(), &[], 1).is_empty());
     }
 
-    /// Trains the tiny capture to its end with a pruning module; returns anchors and drawn offsets before and after the
-    /// event, and the places.
-    fn run(pruning: Pruning) -> ([usize; 2], [usize; 2], Vec<f32>) {
+    /// Trains the tiny capture to its end with a pruning module; returns anchors before and after the event, and the
+    /// places.
+    fn run(pruning: Pruning) -> ([usize; 2], Vec<f32>) {
         let capture = tiny_capture();
         let modules = Modules { pruning: Some(pruning), ..Modules::default() };
         let mut config = TrainConfig { modules, ..tiny_config(40) };
         config.densification.until = 0.45;
         let mut trainer = Trainer::new(&capture, config).unwrap();
-        let count = |trainer: &Trainer<'_>| {
-            let anchors = &trainer.scene.anchors;
-            (anchors.len(), (0..anchors.mask_logits.len()).filter(|o| anchors.is_drawn(*o)).count())
-        };
-        let mut before = (0, 0);
+        let mut before = 0;
         while !trainer.is_done() {
             if trainer.iteration == 19 {
-                before = count(&trainer);
+                before = trainer.scene.anchors.len();
             }
             trainer.advance().unwrap();
         }
-        let after = count(&trainer);
-        ([before.0, after.0], [before.1, after.1], trainer.scene.anchors.places.clone())
+        ([before, trainer.scene.anchors.len()], trainer.scene.anchors.places.clone())
     }
 
     #[test]
     fn hard_pruning_takes_its_share_once() {
         for rank in [Rank::Opacity, Rank::Contribution] {
-            let ([before, after], ..) = run(Pruning { rank, rate: 0.3, ..Pruning::default() });
+            let ([before, after], _) = run(Pruning { rank, rate: 0.3, ..Pruning::default() });
             assert!(before > 10 && (after as f64 - 0.7 * before as f64).abs() <= 1.0, "{before} anchors, then {after}");
         }
-        let (anchors, [before, after], _) = run(Pruning { unit: Unit::Offsets, ..Pruning::default() });
-        assert_eq!(anchors[0], anchors[1]);
-        let gone = (before - after) as f64 / before as f64;
-        assert!((gone - 0.12).abs() < 0.02, "30 % of 40 %: {gone}");
     }
 
     #[test]
     fn tiered_pruning_deletes_nothing_and_steps_leave_out_what_their_place_says() {
         let pruning = Pruning { form: Form::Tiered, rate: 0.4, ..Pruning::default() };
-        let ([before, after], _, places) = run(pruning);
+        let ([before, after], places) = run(pruning);
         assert_eq!((before, places.len()), (after, after));
         let moment = |iteration| Moment {
             iteration,
             iterations: 40,
             phase: crate::train::config::Phase::Raw,
             scaled: true,
-            base_steps: [1.0; 3],
             stream: crate::ops::noise::Stream::of_run(3).branch(iteration),
         };
         assert!((1..=20).all(|iteration| pruning.pruned_share(&moment(iteration)) == 0.0));

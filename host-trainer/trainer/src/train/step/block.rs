@@ -47,8 +47,8 @@ pub struct Block<R> {
     pub footprints: Vec<Footprint<R>>,
     /// dL/d(Gaussians): zero after the forward pass, for terms on Gaussians to add to.
     pub d_gaussians: Vec<Gaussian<R>>,
-    /// Residuals of the detail head, if the scene has one.
-    pub detail: detail::Kept<R>,
+    /// What the detail head leaves, if the scene has one.
+    detail: detail::Kept<R>,
     d_outputs: HeadOutputs<R>,
     d_hidden: Vec<R>,
     d_input: Vec<R>,
@@ -203,29 +203,6 @@ impl<R: Real> Block<R> {
                 }
             },
         );
-    }
-
-    /// `[gaussians, 3]` what the colour head says of features that coding has not touched.
-    pub fn uncoded_colours(&self, scene: &Scene<R>) -> Vec<[R; 3]> {
-        let (shape, n) = (&scene.shape, self.anchors.len());
-        let f = shape.feature_dim;
-        let uncoded = self.anchors.iter().flat_map(|a| &scene.anchors.features[*a as usize * f..][..f]);
-        let mut features: Vec<R> = uncoded.copied().collect();
-        if scene.heads.bank.is_some() {
-            feature_bank::mix(&self.bank, &features.clone(), &mut features);
-        }
-        let mut input = self.input.clone();
-        for (row, feature) in input.chunks_exact_mut(shape.head_inputs()).zip(features.chunks_exact(f)) {
-            row[..f].copy_from_slice(feature);
-        }
-        let weights = &scene.heads.colour;
-        let (mut hidden, mut output) = (vec![R::ZERO; n * weights.n_hidden], vec![R::ZERO; n * weights.n_out]);
-        head::forward(weights, &input, &mut hidden, &mut output);
-        let colours = self.sources.iter().map(|source| {
-            let at = 3 * (source.row as usize * shape.n_offsets + source.offset as usize);
-            std::array::from_fn(|i| output[at + i].sigmoid())
-        });
-        colours.collect()
     }
 
     /// From the gradients of its splats to those of its anchors and of the heads.

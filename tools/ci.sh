@@ -106,7 +106,7 @@ job_test() {
 job_core-embedded() {
   need_embedded_target
   local features
-  for features in "" defmt embedded-graphics defmt,embedded-graphics context detail anisotropy baked feature-bank \
+  for features in "" defmt embedded-graphics defmt,embedded-graphics context detail anisotropy baked \
     view,dilation-compensation anisotropy,baked default; do
     echo "-- features: ${features:-none}"
     cargo clippy -p pocketsplat-core --target "$embedded_target" --no-default-features --features "$features" --locked \

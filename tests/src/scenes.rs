@@ -35,13 +35,10 @@ const fn shape(feature_dim: usize, n_offsets: usize, effects: [bool; 3]) -> Mode
 /// A residual on the colours, and a colour head of a width of its own.
 const DETAILED: ModelShape = ModelShape { colour_hidden: 20, detail_hidden: 9, ..shape(12, 4, [true, false, false]) };
 
-/// Features mixed by the view, which the heads do not see otherwise.
-const BANKED: ModelShape = ModelShape { feature_bank: true, ..shape(8, 3, [false, false, false]) };
-const BANKED_DETAILED: ModelShape = ModelShape { feature_bank: true, view_distance: true, ..DETAILED };
-/// Balls.
+/// Isotropic Gaussians.
 const ISOTROPIC: ModelShape = ModelShape { anisotropic: false, ..shape(12, 4, [true, false, false]) };
 
-/// Balls that look the same from everywhere, so that they may be baked.
+/// Isotropic Gaussians that look the same from everywhere, so that they may be baked.
 const PLAIN_ISOTROPIC: ModelShape = ModelShape { anisotropic: false, ..shape(8, 3, [false, false, true]) };
 
 /// The direction of view for the colours alone, and for all but them.
@@ -49,7 +46,7 @@ const COLOURED: ModelShape = ModelShape { view_geometry: false, ..shape(9, 3, [t
 const SHAPED: ModelShape = ModelShape { view_colour: false, ..shape(12, 3, [true, true, false]) };
 
 /// Every effect on and off, narrow and wide, fewer anchors than a chunk holds and several chunks.
-pub const CASES: [Case; 13] = [
+pub const CASES: [Case; 11] = [
     Case { name: "device", shape: shape(16, 4, [true, true, false]), n_anchors: 700, seed: 1 },
     Case { name: "plain", shape: shape(8, 2, [false, false, false]), n_anchors: 300, seed: 2 },
     Case { name: "direction", shape: shape(12, 3, [true, false, false]), n_anchors: 129, seed: 3 },
@@ -57,8 +54,6 @@ pub const CASES: [Case; 13] = [
     Case { name: "compensated", shape: shape(16, 4, [true, true, true]), n_anchors: 500, seed: 5 },
     Case { name: "wide", shape: shape(32, 10, [true, true, true]), n_anchors: 150, seed: 6 },
     Case { name: "detailed", shape: DETAILED, n_anchors: 400, seed: 8 },
-    Case { name: "banked", shape: BANKED, n_anchors: 300, seed: 9 },
-    Case { name: "banked, detailed", shape: BANKED_DETAILED, n_anchors: 400, seed: 11 },
     Case { name: "isotropic", shape: ISOTROPIC, n_anchors: 400, seed: 12 },
     Case { name: "plain isotropic", shape: PLAIN_ISOTROPIC, n_anchors: 300, seed: 13 },
     Case { name: "view colour", shape: COLOURED, n_anchors: 300, seed: 14 },
@@ -68,8 +63,8 @@ pub const CASES: [Case; 13] = [
 /// Few bytes, so that every one of them can be damaged in turn.
 pub const TINY: Case = Case { name: "tiny", shape: shape(4, 2, [true, false, true]), n_anchors: 5, seed: 7 };
 
-/// The same with a feature bank.
-pub const TINY_BANKED: Case = Case { shape: ModelShape { feature_bank: true, ..TINY.shape }, ..TINY };
+/// The same with a detail head.
+pub const TINY_DETAILED: Case = Case { shape: ModelShape { detail_hidden: 3, ..TINY.shape }, ..TINY };
 
 /// A random ball of anchors around the origin, of radius 1.5, with heads of random weights.
 ///

@@ -3,7 +3,7 @@
 use conformance::bundles::{CODERS, tiered};
 use conformance::frame::bundle_of;
 use conformance::fuzz;
-use conformance::scenes::{TINY, TINY_BANKED, cameras, random_scene};
+use conformance::scenes::{TINY, TINY_DETAILED, cameras, random_scene};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -12,7 +12,7 @@ const N_STEPS: usize = 20_000;
 
 fn seeds() -> Vec<Vec<u8>> {
     let plain = bundle_of(&random_scene(&TINY), &cameras()[0].1);
-    CODERS.map(|coder| tiered(&TINY_BANKED, coder, 2)).into_iter().chain([plain]).collect()
+    CODERS.map(|coder| tiered(&TINY_DETAILED, coder, 2)).into_iter().chain([plain]).collect()
 }
 
 /// One of the ways in which a fuzzer changes bytes, a few times over.

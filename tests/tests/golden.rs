@@ -8,12 +8,11 @@ use pocketsplat_core::bundle::crc32;
 use pocketsplat_core::{Budget, Bundle, Camera, MaxSplats, Overflow, Plan};
 use pocketsplat_trainer::verify::{Trial, ways};
 
-const BUNDLES: [(&str, &[u8]); 5] = [
+const BUNDLES: [(&str, &[u8]); 4] = [
     ("static", include_bytes!("../golden/static.psb")),
     ("context", include_bytes!("../golden/context.psb")),
     ("matte", include_bytes!("../golden/matte.psb")),
     ("isotropic", include_bytes!("../golden/isotropic.psb")),
-    ("banked", include_bytes!("../golden/banked.psb")),
 ];
 const FRAMES: &str = include_str!("../golden/frames.csv");
 const N_VIEWS: u8 = 4;

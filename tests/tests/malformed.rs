@@ -3,7 +3,7 @@
 
 use conformance::bundles::{CODERS, chunks_offset, tier_ends, tiered};
 use conformance::frame::{Frame, budget_for, bundle_of, draw, to_core};
-use conformance::scenes::{CASES, Case, TINY, TINY_BANKED, cameras, random_scene};
+use conformance::scenes::{CASES, Case, TINY, TINY_DETAILED, cameras, random_scene};
 use conformance::seal::reseal;
 use pocketsplat_core::{Bundle, Camera, DecodeError, Decoder, ErrorClass, Field, FrameReport, SectionKind};
 use rand::{RngExt, SeedableRng};
@@ -18,7 +18,7 @@ fn small_camera() -> Camera {
 
 /// A bundle of few bytes with all features, one for each coder, and one with as few features as possible.
 fn small_bundles() -> Vec<Vec<u8>> {
-    let case = Case { n_anchors: 12, ..TINY_BANKED };
+    let case = Case { n_anchors: 12, ..TINY_DETAILED };
     let plain = bundle_of(&random_scene(&Case { n_anchors: 12, ..TINY }), &cameras()[0].1);
     CODERS.map(|coder| tiered(&case, coder, SMALL_CHUNK)).into_iter().chain([plain]).collect()
 }

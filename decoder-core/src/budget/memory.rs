@@ -247,7 +247,6 @@ mod tests {
                     n_colour_inputs: up_to(5),
                     colour_hidden: 1 + up_to(256),
                     detail_hidden: up_to(257),
-                    feature_bank: up_to(2) == 1,
                 },
                 coder: CoderShape {
                     n_tables: (1 - context) * up_to(360),
@@ -280,7 +279,6 @@ mod tests {
                 n_colour_inputs: a.model.n_colour_inputs.max(b.model.n_colour_inputs),
                 colour_hidden: a.model.colour_hidden.max(b.model.colour_hidden),
                 detail_hidden: a.model.detail_hidden.max(b.model.detail_hidden),
-                feature_bank: a.model.feature_bank | b.model.feature_bank,
             },
             coder: CoderShape {
                 n_tables: a.coder.n_tables.max(b.coder.n_tables),

@@ -58,8 +58,6 @@ pub struct ModelShape {
     pub colour_hidden: u16,
     /// Hidden width of the detail head, 0 without one.
     pub detail_hidden: u16,
-    /// Whether there is a feature bank.
-    pub feature_bank: bool,
 }
 
 /// What the models of the symbols take: tables or a context.
@@ -160,7 +158,6 @@ impl ScratchShape {
                 n_colour_inputs: 4,
                 colour_hidden: MAX_FEATURE_DIM,
                 detail_hidden: MAX_FEATURE_DIM,
-                feature_bank: cfg!(feature = "feature-bank"),
             },
             coder: CoderShape {
                 n_tables: feature_dim.saturating_add(n_log_scales(true)).saturating_add(n_offsets.saturating_mul(3)),
@@ -186,7 +183,6 @@ impl ScratchShape {
                 n_colour_inputs: few(header.colour_inputs()).saturating_sub(header.feature_dim),
                 colour_hidden: header.colour_hidden,
                 detail_hidden: header.detail_hidden,
-                feature_bank: header.features.effects.feature_bank,
             },
             coder: match bundle.coder() {
                 Coder::Static(tables) => {
@@ -225,7 +221,6 @@ impl ScratchShape {
             covariance: covariance_outputs(model.anisotropic) as usize,
             colour: limited(model.colour_hidden, MAX_FEATURE_DIM),
             detail: limited(model.detail_hidden, MAX_FEATURE_DIM),
-            bank: cfg!(feature = "feature-bank") && model.feature_bank,
             offsets: limited(model.n_offsets, MAX_OFFSETS),
         }
     }

@@ -16,8 +16,6 @@ pub struct Effects {
     pub dilation_compensation: bool,
     /// A detail head adds a residual to each Gaussian's colour.
     pub detail: bool,
-    /// The heads see a mixture of the feature at three resolutions, weighted by where it is seen from.
-    pub feature_bank: bool,
     /// Gaussians have three deviations and a rotation; without it one deviation, the same in every direction.
     pub anisotropic: bool,
     /// Something lies behind the scene: a colour.
@@ -39,8 +37,8 @@ pub struct Features {
 }
 
 impl Features {
-    /// Bits that have a meaning in this version.
-    const KNOWN: u32 = 0b111_1111_1111;
+    /// Bits that have a meaning in this version; bit 9 is reserved.
+    const KNOWN: u32 = 0b101_1111_1111;
 
     /// The bit that says what a scene lacks, where the others say what it has: so a decoder of balls alone misses it and refuses.
     const ISOTROPIC: u32 = 1 << 7;
@@ -54,7 +52,6 @@ impl Features {
             view_distance: view,
             dilation_compensation: cfg!(feature = "dilation-compensation"),
             detail: cfg!(feature = "detail"),
-            feature_bank: cfg!(feature = "feature-bank"),
             anisotropic: cfg!(feature = "anisotropy"),
             background: cfg!(feature = "background"),
         };
@@ -67,7 +64,7 @@ impl Features {
     pub const fn to_bits(self) -> u32 {
         let effects = self.effects;
         let Effects { view_colour, view_geometry, view_distance, dilation_compensation, .. } = effects;
-        let Effects { detail, feature_bank, anisotropic, background, .. } = effects;
+        let Effects { detail, anisotropic, background, .. } = effects;
         (view_colour as u32)
             | (view_distance as u32) << 1
             | (dilation_compensation as u32) << 2
@@ -77,7 +74,6 @@ impl Features {
             | (detail as u32) << 6
             | if anisotropic { 0 } else { Self::ISOTROPIC }
             | (background as u32) << 8
-            | (feature_bank as u32) << 9
             | (view_geometry as u32) << 10
     }
 
@@ -103,7 +99,6 @@ impl Features {
                 view_distance: has(2),
                 dilation_compensation: has(4),
                 detail: has(64),
-                feature_bank: has(512),
                 anisotropic: !has(Self::ISOTROPIC),
                 background: has(256),
             },
@@ -135,6 +130,8 @@ mod tests {
         }
         let error = DecodeError::UnsupportedFeatures { unknown_bits: 0x8000_0800 };
         assert_eq!(Features::from_bits(0x8000_0801), Err(error), "the first after the known ones and the last");
+        let reserved = DecodeError::UnsupportedFeatures { unknown_bits: 512 };
+        assert_eq!(Features::from_bits(513), Err(reserved), "the reserved bit between known ones");
     }
 
     #[test]
@@ -147,7 +144,6 @@ mod tests {
             (4, "dilation-compensation"),
             (16, "context"),
             (64, "detail"),
-            (512, "feature-bank"),
             (128, "anisotropy"),
             (256, "background"),
         ];

@@ -213,9 +213,6 @@ impl Header {
         let [feature_bits, log_scale_bits, offset_bits, reserved] = cursor.array()?;
         let symbol_bits = [feature_bits, log_scale_bits, offset_bits];
         in_range(Field::FeatureDim, feature_dim.into(), 1, MAX_FEATURE_DIM.into())?;
-        if cfg!(feature = "feature-bank") && features.effects.feature_bank {
-            in_range(Field::BankFeatureDim, feature_dim.into(), 4, u32::from(feature_dim & !3))?;
-        }
         in_range(Field::NOffsets, n_offsets.into(), 1, MAX_OFFSETS.into())?;
         in_range(Field::NAnchors, n_anchors, 0, MAX_ANCHORS)?;
         in_range(Field::NChunks, n_chunks, 0, n_anchors)?;

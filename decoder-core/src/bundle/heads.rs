@@ -9,12 +9,8 @@ use super::header::{Header, covariance_outputs};
 use crate::error::{DecodeError, Field, SectionKind};
 use crate::math::{from_half, is_finite_half};
 
-/// Matrices of all heads at most: W1 and W2 of opacity, covariance, colour, detail, feature bank.
-const N_MATRICES: usize = if cfg!(feature = "feature-bank") { 10 } else { 8 };
-/// Inputs of the feature bank: direction and distance.
-pub(crate) const BANK_INPUTS: usize = 4;
-/// Its outputs: a weight for each resolution of the feature.
-pub(crate) const BANK_WEIGHTS: usize = 3;
+/// Matrices of all heads at most: W1 and W2 of opacity, covariance, colour, detail.
+const N_MATRICES: usize = 8;
 
 /// IEEE half-precision numbers in flash, each read when asked for.
 #[derive(Clone, Copy, Debug, Default)]
@@ -84,9 +80,6 @@ pub struct HeadsView<'a> {
     pub colour: HeadView<'a>,
     /// From feature and colour of a Gaussian to what is added to the colour, if the scene has it.
     pub detail: Option<HeadView<'a>>,
-    /// From direction and distance of view to the weights of the feature's three resolutions, before softmax, if the scene has
-    /// it.
-    pub bank: Option<HeadView<'a>>,
     matrices: Matrices<'a>,
 }
 
@@ -114,20 +107,18 @@ impl<'a> HeadsView<'a> {
             shape(header.colour_inputs(), header.colour_hidden, k.saturating_mul(3)),
             shape(usize::from(header.feature_dim).saturating_add(3), header.detail_hidden, 3),
         ];
-        let has_bank = cfg!(feature = "feature-bank") && effects.feature_bank;
-        let mut bank = has_bank.then(|| shape(BANK_INPUTS, header.feature_dim, BANK_WEIGHTS));
         let n_heads = if effects.detail { 4 } else { 3 };
         let heads = all.get_mut(..n_heads).unwrap_or_default();
         let matrices = if header.features.coded_heads {
             let tables = CodedHeads::parse_tables(&mut cursor)?;
-            for head in heads.iter_mut().chain(&mut bank) {
+            for head in heads.iter_mut() {
                 head.b1 = Halves::parse(&mut cursor, head.n_hidden)?;
                 head.b2 = Halves::parse(&mut cursor, head.n_out)?;
             }
             Matrices::Coded(CodedHeads::new(tables, cursor.rest())?)
         } else {
             let mut matrices = [Halves::default(); N_MATRICES];
-            for (head, [w1, w2]) in heads.iter_mut().chain(&mut bank).zip(matrices.as_chunks_mut().0) {
+            for (head, [w1, w2]) in heads.iter_mut().zip(matrices.as_chunks_mut().0) {
                 *w1 = Halves::parse(&mut cursor, head.n_hidden.saturating_mul(head.n_in))?;
                 head.b1 = Halves::parse(&mut cursor, head.n_hidden)?;
                 *w2 = Halves::parse(&mut cursor, head.n_out.saturating_mul(head.n_hidden))?;
@@ -138,14 +129,14 @@ impl<'a> HeadsView<'a> {
         };
         let [opacity, covariance, colour, detail] = all;
         let detail = effects.detail.then_some(detail);
-        let heads = Self { opacity, covariance, colour, detail, bank, matrices };
+        let heads = Self { opacity, covariance, colour, detail, matrices };
         heads.check()?;
         Ok(heads)
     }
 
-    /// Opacity, covariance, colour, then detail and the feature bank's if there are such.
+    /// Opacity, covariance, colour, then detail if there is one.
     pub fn each(&self) -> impl Iterator<Item = HeadView<'a>> + use<'a> {
-        [self.opacity, self.covariance, self.colour].into_iter().chain(self.detail).chain(self.bank)
+        [self.opacity, self.covariance, self.colour].into_iter().chain(self.detail)
     }
 
     /// How the matrices are coded, if they are.

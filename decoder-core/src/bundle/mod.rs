@@ -40,7 +40,6 @@ pub use header::{
     header_len,
 };
 pub(crate) use header::{covariance_outputs, in_range, n_log_scales};
-pub(crate) use heads::{BANK_INPUTS, BANK_WEIGHTS};
 pub use heads::{CodedHeads, Halves, HeadView, HeadsView, LayerWeights, WeightReader};
 pub use lattice::{Lattice, MAX_LATTICE_BITS, MAX_LATTICE_MIN};
 pub use manifest::{MANIFEST_RECORD_LEN, STRIPS, TierMeasures};
@@ -203,13 +202,12 @@ impl<'a> Bundle<'a> {
     }
 
     /// Gaussians that the first `n_tiers` tiers consist of, those beyond the file's left out, if they are the same in every
-    /// frame: the heads see neither direction nor distance of view and no feature bank, the bundle says how many they make, and the
-    /// decoder is built with the feature `baked`.
+    /// frame: the heads see neither direction nor distance of view, the bundle says how many they make, and the decoder is built
+    /// with the feature `baked`.
     #[must_use]
     pub fn n_gaussians(&self, n_tiers: u8) -> Option<u32> {
-        let Effects { view_colour, view_geometry, view_distance, feature_bank, .. } = self.header.features.effects;
-        let sees_direction = view_colour || view_geometry;
-        let sees_view = sees_direction || view_distance || (cfg!(feature = "feature-bank") && feature_bank);
+        let Effects { view_colour, view_geometry, view_distance, .. } = self.header.features.effects;
+        let sees_view = view_colour || view_geometry || view_distance;
         let counts = self.gaussians.filter(|_| cfg!(feature = "baked") && !sees_view)?;
         Some(counts.up_to(n_tiers.min(self.n_tiers)))
     }

@@ -14,11 +14,9 @@ use crate::error::{DecodeError, Field, SectionKind};
 use crate::{Budget, Decoder, FrameReport, MaxSplats, Overflow, Residency, ScratchShape, Strips, TileSink};
 
 fn variants() -> impl Iterator<Item = Variant> {
-    let n_bits = if cfg!(feature = "feature-bank") { 6 } else { 5 };
-    (0..1 << n_bits).map(|bits| {
-        let [masks, context, coded_heads, unknown_section, detail, bank] =
-            [1, 2, 4, 8, 16, 32].map(|bit| bits & bit != 0);
-        Variant { masks, context, coded_heads, unknown_section, detail, bank }
+    (0..1 << 5).map(|bits| {
+        let [masks, context, coded_heads, unknown_section, detail] = [1, 2, 4, 8, 16].map(|bit| bits & bit != 0);
+        Variant { masks, context, coded_heads, unknown_section, detail }
     })
 }
 
@@ -101,7 +99,7 @@ fn heads_come_back_raw_and_coded() {
         let bytes = bundle(variant);
         let bundle = Bundle::parse(&bytes).expect("sound");
         let mut weights = bundle.heads().weights();
-        for layer in 0..6 + 2 * usize::from(variant.detail) + 2 * usize::from(variant.bank) {
+        for layer in 0..6 + 2 * usize::from(variant.detail) {
             let found: Vec<f32> = weights.next_layer().collect();
             let expected: Vec<f32> = (0..found.len()).map(|index| weight(layer, index)).collect();
             assert_eq!(found, expected, "{variant:?}, layer {layer}");
@@ -326,21 +324,5 @@ fn the_largest_shape_suffices_for_every_plan() {
             let most = ScratchShape { resident, frame, ..ScratchShape::most(model.feature_dim, model.n_offsets) };
             assert!(most.scratch_len() >= plan.scratch_len(), "{variant:?}, {residency:?}: {most:?}");
         }
-    }
-}
-
-#[test]
-fn a_feature_bank_needs_a_feature_that_has_a_fourth() {
-    let plain = variants().next().expect("the first has nothing");
-    let mut bytes = bundle(Variant { bank: true, ..plain });
-    let header_len = bytes[10..12].iter().rev().fold(0, |len, byte| 256 * len + usize::from(*byte));
-    bytes[24] = 6;
-    let crc = crc32(&bytes[..header_len - 4]);
-    bytes[header_len - 4..header_len].copy_from_slice(&crc.to_le_bytes());
-    let error = Bundle::parse(&bytes).expect_err("six features");
-    if cfg!(feature = "feature-bank") {
-        assert_eq!(error, DecodeError::OutOfRange { field: Field::BankFeatureDim, found: 6, limit: 4 });
-    } else {
-        assert_eq!(error, DecodeError::NotBuilt { missing_bits: 1 << 9 });
     }
 }

@@ -26,7 +26,6 @@ impl fmt::Display for DecodeError {
                     (0b100_0000, "detail"),
                     (0b1000_0000, "anisotropy"),
                     (0b1_0000_0000, "background"),
-                    (0b10_0000_0000, "feature-bank"),
                 ];
                 for (_, name) in names.into_iter().filter(|(bits, _)| missing_bits & bits != 0) {
                     write!(f, " {name}")?;

@@ -40,8 +40,6 @@ pub enum Field {
     HeaderLen,
     CameraConvention,
     FeatureDim,
-    /// The same of a scene with a feature bank.
-    BankFeatureDim,
     NOffsets,
     NAnchors,
     NChunks,
@@ -147,7 +145,6 @@ impl fmt::Display for Field {
             Self::HeaderLen => "header length",
             Self::CameraConvention => "camera convention",
             Self::FeatureDim => "feature width",
-            Self::BankFeatureDim => "feature width (a feature bank needs a multiple of 4)",
             Self::NOffsets => "offsets of an anchor",
             Self::NAnchors => "number of anchors",
             Self::NChunks => "number of chunks",

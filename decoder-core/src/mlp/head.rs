@@ -1,6 +1,5 @@
 //! A head: hidden layer with ReLU, output layer of one block per offset.
 
-use super::bank::Bank;
 use super::block::{Blocks, outputs};
 use super::detail::Detail;
 use super::numbers::{HeadNumbers, TwoLayers};
@@ -32,7 +31,6 @@ pub(crate) struct Heads<'s, N: HeadNumbers> {
     pub(crate) covariance: Covariance<'s, N>,
     pub(crate) colour: N::Head<'s, 3>,
     pub(crate) detail: Option<Detail<'s, N::Detail>>,
-    pub(crate) bank: Option<Bank<'s>>,
 }
 
 /// The covariance head.
@@ -82,16 +80,6 @@ impl<'s, N: HeadNumbers> Heads<'s, N> {
                 Some(head) if cfg!(feature = "detail") && shape.detail > 0 => {
                     Some(Detail::convert(arena, head, &mut weights)?)
                 }
-                // Left out of the plan, and before the next in the file.
-                Some(_) if cfg!(feature = "feature-bank") => {
-                    weights.next_layer().for_each(drop);
-                    weights.next_layer().for_each(drop);
-                    None
-                }
-                _ => None,
-            },
-            bank: match &heads.bank {
-                Some(head) if cfg!(feature = "feature-bank") => Some(Bank::convert(arena, head, &mut weights)?),
                 _ => None,
             },
         })

@@ -4,7 +4,6 @@
 //! of `B`, so that a block's accumulators stay in registers and one input serves them all; that changes no sum. The module
 //! knows nothing of what inputs and outputs mean.
 
-mod bank;
 mod block;
 mod detail;
 mod head;
@@ -13,7 +12,6 @@ mod numbers;
 mod shape;
 mod weight;
 
-pub(crate) use bank::mix;
 pub(crate) use head::Heads;
 pub(crate) use numbers::{HeadNumbers, TwoLayers};
 pub(crate) use shape::HeadShape;

@@ -2,7 +2,6 @@
 
 use super::block::n_rows;
 use super::head::LANES;
-use crate::bundle::{BANK_INPUTS, BANK_WEIGHTS};
 
 /// Widths of the heads of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,8 +18,6 @@ pub(crate) struct HeadShape {
     pub(crate) colour: usize,
     /// Hidden width of the detail head; 0 without one.
     pub(crate) detail: usize,
-    /// Whether there is a feature bank, of hidden width F.
-    pub(crate) bank: bool,
     /// K.
     pub(crate) offsets: usize,
 }
@@ -33,16 +30,14 @@ impl HeadShape {
 
     /// Floats of all heads in scratch memory.
     pub(crate) const fn n_weights(&self) -> usize {
-        let Self { geometry_inputs, colour_inputs, feature: f, covariance: v, colour: c, detail: d, bank, offsets: k } =
+        let Self { geometry_inputs, colour_inputs, feature: f, covariance: v, colour: c, detail: d, offsets: k } =
             *self;
         let first_layers = LANES * (2 * n_rows::<LANES>(geometry_inputs, f) + n_rows::<LANES>(colour_inputs, c));
         let outputs = n_rows::<1>(f, k) + v * n_rows::<1>(f, k) + 3 * n_rows::<3>(c, 3 * k);
         // Integers take a step and a bias for each output, which one pair less a unit pays for when there are two units.
         let steps = if f == 1 { (1 + v) * k } else { 0 } + if c == 1 { 3 * k } else { 0 };
         let detail = if d == 0 { 0 } else { LANES * n_rows::<LANES>(f + 3, d) + 3 * n_rows::<3>(d, 3) };
-        const W: usize = BANK_WEIGHTS;
-        let bank = if bank { LANES * n_rows::<LANES>(BANK_INPUTS, f) + W * n_rows::<W>(f, W) } else { 0 };
-        first_layers + outputs + steps + detail + bank
+        first_layers + outputs + steps + detail
     }
 
     /// Floats of the widest hidden layer's activations.
@@ -59,17 +54,13 @@ impl HeadShape {
 
     /// Multiply-adds of the opacity head, which every visible anchor takes, with `n_drawn` offsets.
     pub(crate) const fn opacity_macs(&self, n_drawn: usize) -> usize {
-        // The feature bank's layers, and mixing.
-        let bank = if self.bank { BANK_INPUTS + 2 * BANK_WEIGHTS } else { 0 };
-        self.feature * (self.geometry_inputs + n_drawn + bank)
+        self.feature * (self.geometry_inputs + n_drawn)
     }
 
     /// Multiply-adds of the other heads for an anchor with `n_open` offsets of positive opacity.
     pub(crate) const fn open_macs(&self, n_open: usize) -> usize {
-        let Self { geometry_inputs, colour_inputs, feature: f, covariance: v, colour: c, detail: d, bank, .. } = *self;
-        // The detail head's share of an anchor mixes again.
-        let again = if bank && d > 0 { BANK_WEIGHTS * f } else { 0 };
-        let per_anchor = f * geometry_inputs + c * colour_inputs + d * f + again;
+        let Self { geometry_inputs, colour_inputs, feature: f, covariance: v, colour: c, detail: d, .. } = *self;
+        let per_anchor = f * geometry_inputs + c * colour_inputs + d * f;
         let per_gaussian = v * f + 3 * c + 6 * d;
         per_anchor + n_open * per_gaussian
     }

@@ -5,7 +5,7 @@ use bytemuck::{Pod, Zeroable};
 use super::Anchor;
 use crate::arithmetic::{Choices, Functions, Roots};
 use crate::bundle::Effects;
-use crate::mlp::{HeadNumbers, Heads, TwoLayers, mix};
+use crate::mlp::{HeadNumbers, Heads, TwoLayers};
 use crate::stopwatch::{Stage, Stopwatch};
 
 /// Opacities below one step of an 8-bit channel draw nothing.
@@ -68,7 +68,7 @@ pub(crate) struct Workspace<'s> {
 ///
 /// # Budget
 /// The opacity head, and at most the others: `3F(F + 4) + 11KF` multiply-adds (`5KF` of isotropic Gaussians), with a detail head
-/// of H units `H(F + 6K)` more; a feature bank 10F and three exponentials, twice 3F of it with a detail head.
+/// of H units `H(F + 6K)` more.
 pub(crate) fn for_each_gaussian<A: Choices>(
     anchor: &Anchor<'_>,
     effects: Effects,
@@ -80,7 +80,7 @@ pub(crate) fn for_each_gaussian<A: Choices>(
 ) -> u64 {
     watch.enter(Stage::Heads);
     let Workspace { inputs, hidden, detail_sums, outputs } = work;
-    let bank_weights = fill_inputs::<A>(anchor, effects, eye, heads, hidden, inputs);
+    fill_inputs::<A>(anchor, effects, eye, inputs);
     let inputs = A::Heads::values(inputs);
     let opacity_macs = heads.shape.opacity_macs(anchor.mask.count_ones() as usize);
     let visible = fill_opacities::<A>(anchor, heads, inputs, hidden, outputs);
@@ -100,15 +100,7 @@ pub(crate) fn for_each_gaussian<A: Choices>(
     if cfg!(feature = "detail")
         && let Some(detail) = &heads.detail
     {
-        let mut feature = anchor.feature;
-        if cfg!(feature = "feature-bank")
-            && let Some(weights) = bank_weights
-        {
-            // Again, because the inputs may be integers by now.
-            mix(weights, anchor.feature, hidden);
-            feature = hidden.get(..feature.len()).unwrap_or_default();
-        }
-        detail.begin(feature, detail_sums);
+        detail.begin(anchor.feature, detail_sums);
         for (_, output) in visible_only(outputs, visible) {
             let [r, g, b] = detail.residual(output.colour, detail_sums, hidden);
             let [plain_r, plain_g, plain_b] = output.colour;
@@ -130,31 +122,18 @@ fn visible_only(outputs: &mut [HeadOutputs], visible: u32) -> impl Iterator<Item
 }
 
 /// Concatenates feature, distance and direction, the last two if the scene has them, as many as there is room for: each head
-/// reads the first of them. A feature bank mixes the feature by the weights that are returned.
-fn fill_inputs<A: Choices>(
-    anchor: &Anchor<'_>,
-    effects: Effects,
-    eye: [f32; 3],
-    heads: &Heads<'_, A::Heads>,
-    hidden: &mut [f32],
-    inputs: &mut [f32],
-) -> Option<[f32; 3]> {
+/// reads the first of them.
+fn fill_inputs<A: Choices>(anchor: &Anchor<'_>, effects: Effects, eye: [f32; 3], inputs: &mut [f32]) {
     let [ax, ay, az] = anchor.position;
     let [ex, ey, ez] = eye;
     let [dx, dy, dz] = [ax - ex, ay - ey, az - ez];
     let distance = A::Roots::sqrt(dx * dx + dy * dy + dz * dz);
     let direction = if distance > 0.0 { A::Roots::quotients([dx, dy, dz], distance) } else { [0.0; 3] };
-    let [x, y, z] = direction;
-    let seen_from = [x, y, z, distance];
     let direction = direction.iter().take(if cfg!(feature = "view") { 3 } else { 0 });
     let distance = core::iter::once(&distance).take((cfg!(feature = "view") && effects.view_distance).into());
     for (input, &value) in inputs.iter_mut().zip(anchor.feature.iter().chain(distance).chain(direction)) {
         *input = value;
     }
-    let bank = heads.bank.as_ref().filter(|_| cfg!(feature = "feature-bank"))?;
-    let weights = bank.weights::<A::Functions>(seen_from, hidden);
-    mix(weights, anchor.feature, inputs);
-    Some(weights)
 }
 
 /// Fills in opacities; returns a bit for each offset that is opaque enough to draw.

@@ -10,7 +10,6 @@ pub mod page;
 pub mod picture;
 
 mod arithmetic;
-mod bank;
 mod cameras;
 mod captures;
 mod codec;
@@ -137,7 +136,6 @@ pub fn families() -> Vec<Family> {
         scenes::family(),
         codec::family(),
         arithmetic::family(),
-        bank::family(),
         roundings::family(),
         qualities::family(),
         captures::family(),

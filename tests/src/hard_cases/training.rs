@@ -113,7 +113,7 @@ pub(super) fn diverging(edit: impl Fn(&mut Capture, &mut TrainConfig)) -> String
 fn spiked(factor: f64) -> Rates {
     let all = |rate: Rate| Rate { start: rate.start * factor, end: rate.end * factor };
     let Rates { offset, feature, log_scale, opacity_head, covariance_head, colour_head, .. } = Rates::default();
-    let Rates { feature_bank, mask, grid, context, background, .. } = Rates::default();
+    let Rates { mask, grid, context, background, .. } = Rates::default();
     Rates {
         offset: all(offset),
         feature: all(feature),
@@ -121,7 +121,6 @@ fn spiked(factor: f64) -> Rates {
         opacity_head: all(opacity_head),
         covariance_head: all(covariance_head),
         colour_head: all(colour_head),
-        feature_bank: all(feature_bank),
         mask: all(mask),
         grid: all(grid),
         context: all(context),
@@ -158,7 +157,6 @@ pub(super) fn family() -> Family {
                     opacity_head: largest,
                     covariance_head: largest,
                     colour_head: largest,
-                    feature_bank: largest,
                     mask: largest,
                     grid: largest,
                     context: largest,

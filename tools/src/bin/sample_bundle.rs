@@ -28,9 +28,6 @@ struct Args {
     /// Of balls, not of discs.
     #[arg(long)]
     isotropic: bool,
-    /// With features mixed by where they are seen from.
-    #[arg(long)]
-    feature_bank: bool,
 }
 
 const SHAPE: ModelShape = ModelShape {
@@ -126,7 +123,7 @@ fn scene(shape: ModelShape) -> Scene<f32> {
 }
 
 /// Heads that read the features as [`scene`] wrote them, add a glint towards the sun and a haze with distance, if they see the view,
-/// and a glow by night; a feature bank blurs features the farther they are away.
+/// and a glow by night.
 fn heads(shape: &ModelShape) -> Heads<f32> {
     let mut heads = Heads::filled(shape, 0.0);
     for head in [&mut heads.opacity, &mut heads.covariance, &mut heads.colour] {
@@ -158,14 +155,6 @@ fn heads(shape: &ModelShape) -> Heads<f32> {
             pass(&mut heads.colour, row, COLOUR + axis);
             heads.colour.w2[row * SHAPE.feature_dim + GLINT] = 0.5;
             heads.colour.w2[row * SHAPE.feature_dim + HAZE] = -0.25;
-        }
-    }
-    if let Some(bank) = &mut heads.bank {
-        // Its inputs end with the distance; a quarter, a half, the whole.
-        bank.w1[bank.n_in - 1] = 1.0;
-        bank.b2.copy_from_slice(&[-6.0, -5.0, 0.0]);
-        for (weight, growth) in [0.8, 0.5].into_iter().enumerate() {
-            bank.w2[weight * bank.n_hidden] = growth;
         }
     }
     if let Some(detail) = &mut heads.detail {
@@ -238,9 +227,9 @@ fn context(scene: &Scene<f32>) -> ContextModel<f32> {
 fn main() -> anyhow::Result<()> {
     let args = Args::parse();
     let camera = camera();
-    let (sees_view, anisotropic, feature_bank) = (!args.matte, !args.isotropic, args.feature_bank);
+    let (sees_view, anisotropic) = (!args.matte, !args.isotropic);
     let (view_colour, view_geometry, view_distance) = (sees_view, sees_view, sees_view);
-    let mut scene = scene(ModelShape { view_colour, view_geometry, view_distance, anisotropic, feature_bank, ..SHAPE });
+    let mut scene = scene(ModelShape { view_colour, view_geometry, view_distance, anisotropic, ..SHAPE });
     let with_context = args.coder == "context";
     if with_context {
         scene.context = Some(context(&scene));

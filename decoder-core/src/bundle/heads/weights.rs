@@ -17,7 +17,7 @@ pub struct CodedHeads<'a> {
     pub words: &'a [[u8; 2]],
 }
 
-/// Reads the matrices in their order: W1 and W2 of opacity, covariance, colour, and of detail and the feature bank if there are such.
+/// Reads the matrices in their order: W1 and W2 of opacity, covariance, colour, and of detail if there is one.
 #[derive(Clone, Copy, Debug)]
 pub struct WeightReader<'a> {
     sizes: [[usize; 2]; N_MATRICES / 2],

@@ -28,8 +28,6 @@ pub(super) struct Variant {
     pub(super) context: bool,
     pub(super) coded_heads: bool,
     pub(super) detail: bool,
-    /// A feature bank, if decoders are built with it.
-    pub(super) bank: bool,
     /// A section of an unknown kind before the manifest.
     pub(super) unknown_section: bool,
 }
@@ -85,9 +83,6 @@ fn layers(variant: Variant) -> Vec<(usize, usize)> {
     let mut layers = vec![(n_in, F), (F, K), (n_in, F), (F, 7 * K), (n_in, F), (F, 3 * K)];
     if variant.detail {
         layers.extend([(F + 3, detail), (detail, 3)]);
-    }
-    if variant.bank {
-        layers.extend([(4, F), (F, 3)]);
     }
     layers
 }
@@ -311,7 +306,6 @@ pub(super) fn bundle(variant: Variant) -> Vec<u8> {
         | u32::from(variant.coded_heads) << 5
         | u32::from(variant.detail) << 6
         | 1 << 8
-        | u32::from(variant.bank) << 9
         | 1 << 10;
     let camera = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 6.0, 30.0, 30.0, 16.0, 12.0];
     let mut file = [

@@ -42,8 +42,8 @@ pub(crate) struct Settings {
     feature_dim: Option<usize>,
     #[arg(long, value_name = "K", help = with_default("Gaussians of an anchor", TrainConfig::default().shape.n_offsets))]
     offsets: Option<usize>,
-    /// What the scene takes into account, of view-colour, view-geometry, view-distance, dilation-compensation, detail, feature-bank
-    /// and anisotropy: auto trains short pilots and keeps what pays; none, all, +NAME and -NAME in a list force. [default: auto for train,
+    /// What the scene takes into account, of view-colour, view-geometry, view-distance, dilation-compensation, detail and
+    /// anisotropy: auto trains short pilots and keeps what pays; none, all, +NAME and -NAME in a list force. [default: auto for train,
     /// view-colour,view-geometry,anisotropy for runs that are compared or too short]
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     effects: Option<Request>,
@@ -177,7 +177,6 @@ impl Settings {
             // There is no option beside `--effects`.
             Effect::Anisotropy => false,
             Effect::Detail => self.modules.iter().flatten().any(|name| name == effect.name() || name == "none"),
-            Effect::FeatureBank => false,
         };
         by_option || self.set.iter().any(|key| key.trim_start().starts_with(effect.key()))
     }

@@ -29,11 +29,6 @@ fn forced_effects_are_those_of_the_bundle() {
     assert_eq!(effects_of(&output), Effects { anisotropic: true, ..Effects::default() });
     succeeds(train(&output).args(["--effects", "none"]));
     assert_eq!(effects_of(&output), Effects::default());
-    let banked = ["--effects", "-view-colour,-view-geometry,+feature-bank", "--set"];
-    succeeds(train(&output).args(banked).arg("train.shape.feature_dim=4"));
-    assert_eq!(effects_of(&output), Effects { feature_bank: true, anisotropic: true, ..Effects::default() });
-    let said = fails(train(&output).args(banked).arg("train.shape.feature_dim=10"));
-    assert!(said.contains("--feature-dim is 10") && said.contains("8 or 12"), "{said}");
 }
 
 #[test]

@@ -114,8 +114,7 @@ impl<'f> Annotator<'f> {
 
     fn heads(&mut self, section: &Section) {
         let heads = *self.bundle.heads();
-        let detail = heads.detail.map(|_| "detail");
-        let names = ["opacity", "covariance", "colour"].into_iter().chain(detail).chain(["feature bank"]);
+        let names = ["opacity", "covariance", "colour", "detail"].into_iter();
         let dump = &mut self.dump;
         let Some(coded) = heads.coded() else {
             for (name, head) in names.zip(heads.each()) {

@@ -20,7 +20,6 @@ pub fn shape_of(bundle: &Bundle<'_>) -> ModelShape {
         anisotropic: effects.anisotropic,
         colour_hidden: header.colour_hidden.into(),
         detail_hidden: header.detail_hidden.into(),
-        feature_bank: effects.feature_bank,
     }
 }
 
@@ -78,7 +77,6 @@ pub fn decoded_heads(bundle: &Bundle<'_>) -> Heads<f32> {
         opacity: head(&views.opacity),
         covariance: head(&views.covariance),
         colour: head(&views.colour),
-        detail: views.detail.as_ref().map(&mut head),
-        bank: views.bank.as_ref().map(head),
+        detail: views.detail.as_ref().map(head),
     }
 }

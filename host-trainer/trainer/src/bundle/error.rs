@@ -95,12 +95,6 @@ pub enum WriteError {
         /// Values there.
         found: usize,
     },
-    /// The scene has a feature bank and a feature that has no fourth.
-    #[error("feature width is {found}; a feature bank needs a multiple of 4, train with one or without the bank")]
-    BankFeatureDim {
-        /// The width.
-        found: usize,
-    },
     /// A count or a size lies outside the format's limits.
     #[error("{what} is {found}; the format holds {least} to {most}")]
     Count {

@@ -48,7 +48,6 @@ pub(super) fn effects(scene: &Scene<f32>, info: &BundleInfo) -> Effects {
         view_distance: scene.shape.view_distance,
         dilation_compensation: scene.shape.dilation_compensation,
         detail: scene.heads.detail.is_some(),
-        feature_bank: scene.heads.bank.is_some(),
         anisotropic: scene.shape.anisotropic,
         background: info.background != [0; 3],
     }
@@ -91,9 +90,6 @@ fn push_fields(
     n_sections: usize,
 ) -> Result<(), WriteError> {
     let feature_dim = count("feature width", scene.shape.feature_dim, 1, MAX_FEATURE_DIM.into())?;
-    if scene.heads.bank.is_some() && !feature_dim.is_multiple_of(4) {
-        return Err(WriteError::BankFeatureDim { found: feature_dim });
-    }
     let n_offsets = count("number of offsets", scene.shape.n_offsets, 1, MAX_OFFSETS.into())?;
     let most_hidden = MAX_FEATURE_DIM.into();
     let colour_hidden = count("hidden width of the colour head", scene.heads.colour.n_hidden, 1, most_hidden)?;

@@ -150,7 +150,6 @@ impl Model {
         shape.model.n_colour_inputs = 3;
         shape.model.colour_hidden = self.feature_dim;
         shape.model.detail_hidden = 0;
-        shape.model.feature_bank = false;
         // A sixteenth more than measured, as plans have it.
         shape.frame.max_splats = (splats * 17.0 / 16.0) as u32;
         shape.scratch_len() as u64

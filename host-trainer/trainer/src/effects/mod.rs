@@ -32,27 +32,23 @@ pub enum Effect {
     DilationCompensation,
     /// The detail module's head adds to colours.
     Detail,
-    /// The heads see features at several resolutions, mixed by where they are seen from.
-    FeatureBank,
     /// Gaussians have three deviations and a rotation, not one deviation.
     Anisotropy,
 }
 
 impl Effect {
     /// All there are, in the order in which they are measured and named.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 6] = [
         Self::ViewColour,
         Self::ViewGeometry,
         Self::ViewDistance,
         Self::DilationCompensation,
         Self::Detail,
-        Self::FeatureBank,
         Self::Anisotropy,
     ];
 
-    /// Those that are measured: at one size of the image dilation compensation shows nothing of what it is for, a feature bank
-    /// calls for a feature width divisible by 4, which HAC's is not, and the distance of view paid in none of five captures
-    /// (`docs/effects.md`).
+    /// Those that are measured: at one size of the image dilation compensation shows nothing of what it is for, and the distance of
+    /// view paid in none of five captures (`docs/effects.md`).
     pub const MEASURED: [Self; 4] = [Self::ViewColour, Self::ViewGeometry, Self::Detail, Self::Anisotropy];
 
     /// Its name on the command line.
@@ -63,7 +59,6 @@ impl Effect {
             Self::ViewDistance => "view-distance",
             Self::DilationCompensation => "dilation-compensation",
             Self::Detail => "detail",
-            Self::FeatureBank => "feature-bank",
             Self::Anisotropy => "anisotropy",
         }
     }
@@ -76,7 +71,6 @@ impl Effect {
             Self::ViewDistance => "train.shape.view_distance",
             Self::DilationCompensation => "train.shape.dilation_compensation",
             Self::Detail => "train.modules.detail",
-            Self::FeatureBank => "train.shape.feature_bank",
             Self::Anisotropy => "train.shape.anisotropic",
         }
     }
@@ -89,7 +83,6 @@ impl Effect {
             Self::ViewDistance => config.shape.view_distance,
             Self::DilationCompensation => config.shape.dilation_compensation,
             Self::Detail => config.modules.detail.is_some(),
-            Self::FeatureBank => config.shape.feature_bank,
             Self::Anisotropy => config.shape.anisotropic,
         }
     }
@@ -110,7 +103,6 @@ impl Effect {
                 config.modules.detail = None;
                 config.shape.detail_hidden = 0;
             }
-            Self::FeatureBank => config.shape.feature_bank = on,
         }
     }
 

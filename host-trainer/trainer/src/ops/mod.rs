@@ -1,6 +1,6 @@
 //! The differentiable operations of a training step, one file each: `forward`, `backward`, plain slices, no state.
 //!
-//! Order of a step: [`prefilter`] → ([`feature_bank`] →) [`head_input`] → [`head`] → [`neural_gaussians`] → [`project`] → [`tiles`] →
+//! Order of a step: [`prefilter`] → [`head_input`] → [`head`] → [`neural_gaussians`] → [`project`] → [`tiles`] →
 //! [`rasterise`] → [`l1`], [`ssim`], [`volume`] → the same backwards → [`adam`].
 //!
 //! Every operation is generic over [`Real`]: the trainer runs it in f32, the tests compare its backward pass in f64
@@ -11,7 +11,6 @@ pub mod adaptive_step;
 pub mod anchor_bits;
 mod blur;
 pub mod detail;
-pub mod feature_bank;
 pub mod grid_bits;
 pub mod hash_grid;
 pub mod head;

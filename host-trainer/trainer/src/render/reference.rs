@@ -127,11 +127,8 @@ impl ReferenceScene {
         }
 
         let from_camera = position - camera.centre_world();
-        let mut feature = self.features[anchor * n_features..][..n_features].to_vec();
-        if let Some(bank) = &self.heads.bank {
-            feature = mixed(bank, &feature, from_camera);
-        }
-        let mut without_direction = feature.clone();
+        let feature = &self.features[anchor * n_features..][..n_features];
+        let mut without_direction = feature.to_vec();
         if self.shape.view_distance {
             without_direction.push(from_camera.length());
         }
@@ -162,7 +159,7 @@ impl ReferenceScene {
             };
             let mut colour = DVec3::from_slice(&colours[k * 3..]).map(sigmoid);
             if let Some(detail) = self.heads.detail.as_ref().filter(|_| quality.detail) {
-                colour += DVec3::from_slice(&evaluate(detail, &[&feature[..], &colour.to_array()].concat()));
+                colour += DVec3::from_slice(&evaluate(detail, &[feature, &colour.to_array()].concat()));
             }
             splats.extend(splat(
                 position + offset * anchor_size,
@@ -186,19 +183,6 @@ fn evaluate(head: &Head<f64>, input: &[f64]) -> Vec<f64> {
     };
     let hidden: Vec<f64> = affine(&head.w1, &head.b1, input).iter().map(|v| v.max(0.0)).collect();
     affine(&head.w2, &head.b2, &hidden)
-}
-
-/// w₀·(every fourth number, four times over) + w₁·(every second, twice) + w₂·feature, w = softmax of the bank of where it is seen from.
-fn mixed(bank: &Head<f64>, feature: &[f64], from_camera: DVec3) -> Vec<f64> {
-    let [x, y, z] = from_camera.normalize_or_zero().to_array();
-    let logits = evaluate(bank, &[x, y, z, from_camera.length()]);
-    let largest = logits.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let powers: Vec<f64> = logits.iter().map(|logit| (logit - largest).exp()).collect();
-    let sum: f64 = powers.iter().sum();
-    let tiled = |step: usize| feature.iter().step_by(step).copied().collect::<Vec<f64>>().repeat(step);
-    let parts = [tiled(4), tiled(2), feature.to_vec()];
-    let number = |i: usize| parts.iter().zip(&powers).map(|(part, power)| power / sum * part[i]).sum();
-    (0..feature.len()).map(number).collect()
 }
 
 fn sigmoid(x: f64) -> f64 {

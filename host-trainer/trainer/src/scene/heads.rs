@@ -1,11 +1,6 @@
-//! The anchor MLPs: opacity, covariance, colour, the residual of detail, and the weights of the feature bank.
+//! The anchor MLPs: opacity, covariance, colour, and the residual of detail.
 
 use super::ModelShape;
-
-/// Inputs of the feature bank: direction and distance of view.
-const BANK_INPUTS: usize = 4;
-/// Its outputs: a weight for each resolution of the feature.
-pub const BANK_WEIGHTS: usize = 3;
 
 /// What an output row of each head means for offset k.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -106,9 +101,6 @@ pub struct Heads<R> {
     /// From `[feature F, colour 3]` of a Gaussian to what is added to its colour, where the shape has it: see
     /// [`crate::ops::detail`].
     pub detail: Option<Head<R>>,
-    /// From direction and distance of view to the weights of the feature bank, before softmax, where the shape has it: see
-    /// [`crate::ops::feature_bank`].
-    pub bank: Option<Head<R>>,
 }
 
 impl<R: Copy> Heads<R> {
@@ -123,28 +115,25 @@ impl<R: Copy> Heads<R> {
             covariance: head(OutputLayout::Covariance, shape.feature_dim),
             colour: head(OutputLayout::Colour, shape.colour_width()),
             detail: (shape.detail_hidden > 0).then(|| detail(shape.detail_hidden)),
-            bank: shape.feature_bank.then(|| Head::filled(BANK_INPUTS, shape.feature_dim, BANK_WEIGHTS, value)),
         }
     }
 }
 
 impl<R> Heads<R> {
-    /// The heads in file order: opacity, covariance, colour, then detail and the feature bank's if there are such.
+    /// The heads in file order: opacity, covariance, colour, then detail if there is one.
     pub fn each(&self) -> impl Iterator<Item = &Head<R>> {
-        [&self.opacity, &self.covariance, &self.colour].into_iter().chain(&self.detail).chain(&self.bank)
+        [&self.opacity, &self.covariance, &self.colour].into_iter().chain(&self.detail)
     }
 
     /// Their names, in the same order.
     pub fn names(&self) -> impl Iterator<Item = &'static str> + use<R> {
-        let [detail, bank] = [("detail", self.detail.is_some()), ("feature bank", self.bank.is_some())];
-        let all = [("opacity", true), ("covariance", true), ("colour", true), detail, bank];
-        all.into_iter().filter_map(|(name, is_there)| is_there.then_some(name))
+        ["opacity", "covariance", "colour"].into_iter().chain(self.detail.is_some().then_some("detail"))
     }
 
     /// The heads in file order, mutable.
     pub fn each_mut(&mut self) -> impl Iterator<Item = &mut Head<R>> {
         let first = [&mut self.opacity, &mut self.covariance, &mut self.colour];
-        first.into_iter().chain(&mut self.detail).chain(&mut self.bank)
+        first.into_iter().chain(&mut self.detail)
     }
 
     /// The same heads with each replaced by what `f` makes of it.
@@ -154,7 +143,6 @@ impl<R> Heads<R> {
             covariance: f(&self.covariance),
             colour: f(&self.colour),
             detail: self.detail.as_ref().map(&f),
-            bank: self.bank.as_ref().map(&f),
         }
     }
 }

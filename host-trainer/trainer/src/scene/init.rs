@@ -37,19 +37,12 @@ pub fn initial_scene(shape: ModelShape, voxel_size: f64, points: &[DVec3], rng: 
         places: Vec::new(),
     };
     let mut heads = Heads::filled(&shape, 0.0f32);
-    // Streams of their own: with a detail head or a feature bank or without, everything else begins and grows alike.
-    let [mut of_detail, mut of_bank] = [2, 3].map(|stream| {
-        let mut rng = rng.clone();
-        rng.set_stream(stream);
-        rng
-    });
+    // A stream of its own: with a detail head or without, everything else begins and grows alike.
+    let mut of_detail = rng.clone();
+    of_detail.set_stream(2);
     let names: Vec<_> = heads.names().collect();
     for (name, head) in names.into_iter().zip(heads.each_mut()) {
-        let rng = match name {
-            "detail" => &mut of_detail,
-            "feature bank" => &mut of_bank,
-            _ => &mut *rng,
-        };
+        let rng = if name == "detail" { &mut of_detail } else { &mut *rng };
         let fans = [head.n_in, head.n_in, head.n_hidden, head.n_hidden];
         for (group, fan_in) in head.groups_mut().into_iter().zip(fans) {
             let bound = f32::real(1.0 / (fan_in as f64).sqrt());
@@ -62,7 +55,6 @@ pub fn initial_scene(shape: ModelShape, voxel_size: f64, points: &[DVec3], rng: 
         detail.w2.fill(0.0);
         detail.b2.fill(0.0);
     }
-    // A feature bank shows nothing while all features are 0.
     if shape.geometry_inputs() == shape.feature_dim {
         draw_all_at_first(&mut heads.opacity);
     }

@@ -7,7 +7,7 @@ mod heads;
 pub mod init;
 
 pub use context::ContextModel;
-pub use heads::{BANK_WEIGHTS, Head, Heads, OutputLayout};
+pub use heads::{Head, Heads, OutputLayout};
 
 /// What a model consists of: its widths and the effects it pays for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -32,9 +32,6 @@ pub struct ModelShape {
     /// Hidden width of the detail head; 0: there is none.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub detail_hidden: usize,
-    /// The heads see the feature at three resolutions, mixed by where it is seen from ([`crate::ops::feature_bank`]); F is then
-    /// divisible by 4.
-    pub feature_bank: bool,
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls it with a reference")]
@@ -55,7 +52,6 @@ impl ModelShape {
             anisotropic: true,
             colour_hidden: 0,
             detail_hidden: 0,
-            feature_bank: false,
         }
     }
 
@@ -84,9 +80,9 @@ impl ModelShape {
         self.view_colour || self.view_geometry
     }
 
-    /// Whether the heads see anything of the view, if only through the feature bank: if not, a Gaussian is the same in every frame.
+    /// Whether the heads see anything of the view: if not, a Gaussian is the same in every frame.
     pub fn sees_view(&self) -> bool {
-        self.sees_direction() || self.view_distance || self.feature_bank
+        self.sees_direction() || self.view_distance
     }
 
     /// Hidden width of the colour head.

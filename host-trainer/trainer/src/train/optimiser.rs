@@ -147,7 +147,7 @@ impl<R: Real> Optimiser<R> {
         // The detail head goes on with colours, at their rate.
         let first = [rates.opacity_head, rates.covariance_head, rates.colour_head];
         let of_detail = heads.detail.as_ref().map(|_| rates.colour_head);
-        let head_rates = first.into_iter().chain(of_detail).chain([rates.feature_bank]);
+        let head_rates = first.into_iter().chain(of_detail);
         let [first, second] = &mut self.heads;
         let moments = first.each_mut().zip(second.each_mut());
         let all = heads.each_mut().zip(workspace.d_heads.each()).zip(moments).zip(head_rates);

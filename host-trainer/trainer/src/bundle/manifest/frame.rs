@@ -152,15 +152,10 @@ impl Added {
         // The opacity head runs for every visible anchor; hidden layers of the others for those it opens, their outputs
         // for the Gaussians it opens.
         let [c, d] = [shape.colour_width(), shape.detail_hidden].map(|n| n as u64);
-        let [bank, again] = match (shape.feature_bank, shape.detail_hidden > 0) {
-            (false, _) => [0, 0],
-            // Four inputs, three weights, three products; the last once more for the detail head.
-            (true, detail) => [10 * f, if detail { 3 * f } else { 0 }],
-        };
         let hidden = f * geometry_inputs;
-        let per_open_anchor = hidden + c * colour_inputs + d * f + again;
+        let per_open_anchor = hidden + c * colour_inputs + d * f;
         let per_gaussian = shape.covariance_outputs() as u64 * f + 3 * c + 6 * d;
-        let head_macs = self.visible_anchors * (hidden + f * k + bank)
+        let head_macs = self.visible_anchors * (hidden + f * k)
             + self.open_anchors * per_open_anchor
             + self.gaussians * per_gaussian;
         let largest = |strips: [u64; 8]| strips.into_iter().max().unwrap_or_default();

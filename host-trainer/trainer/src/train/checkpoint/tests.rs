@@ -29,9 +29,7 @@ fn timeless(trainer: &Trainer<'_>) -> Vec<u8> {
 fn a_run_taken_up_again_ends_in_the_same_bits() {
     taken_up_again(tiny_config(90));
     taken_up_again(TrainConfig { learns_background: true, ..tiny_config(90) });
-    let mut banked = tiny_hac_config(90);
-    banked.shape.feature_bank = true;
-    taken_up_again(banked);
+    taken_up_again(tiny_hac_config(90));
 }
 
 fn taken_up_again(config: TrainConfig) {

@@ -44,9 +44,6 @@ pub struct Rates {
     pub covariance_head: Rate,
     /// Colour head.
     pub colour_head: Rate,
-    /// Feature bank.
-    #[serde(default = "Rates::of_feature_bank")]
-    pub feature_bank: Rate,
     /// Mask logits; multiplied by the capture's extent. For [`Backbone::Hac`], as those below.
     pub mask: Rate,
     /// Grid of the context model.
@@ -73,18 +70,11 @@ impl Default for Rates {
             opacity_head: Rate { start: 0.002, end: 2e-5 },
             covariance_head: constant(0.004),
             colour_head: Rate { start: 0.008, end: 5e-5 },
-            feature_bank: Self::of_feature_bank(),
             mask: Rate { start: 0.01, end: 1e-4 },
             grid: Rate { start: 0.005, end: 1e-5 },
             context: Rate { start: 0.005, end: 1e-5 },
             background: background_rate(),
         }
-    }
-}
-
-impl Rates {
-    fn of_feature_bank() -> Rate {
-        Rate { start: 0.01, end: 1e-5 }
     }
 }
 
@@ -245,14 +235,6 @@ impl TrainConfig {
         within("--offsets", self.shape.n_offsets as f64, 1.0, 32.0)?;
         within("train.shape.colour_hidden", self.shape.colour_hidden as f64, 0.0, 256.0)?;
         within("train.shape.detail_hidden", self.shape.detail_hidden as f64, 0.0, 256.0)?;
-        let f = self.shape.feature_dim;
-        if self.shape.feature_bank && !f.is_multiple_of(4) {
-            let (below, above) = (f - f % 4, f.next_multiple_of(4));
-            let nearest = if below > 0 { format!("{below} or {above}") } else { above.to_string() };
-            return Err(format!(
-                "--feature-dim is {f}, the feature bank needs a multiple of 4: {nearest}, or leave it out with --effects -feature-bank"
-            ));
-        }
         within("--voxel-size", self.voxel_size.unwrap_or(1e-3), 1e-6, 1.0)?;
         within(
             "train.densification.coarsest_cells",
@@ -271,7 +253,7 @@ impl TrainConfig {
             within(name, value, low, high)?;
         }
         let Rates { offset, feature, log_scale, opacity_head, covariance_head, colour_head, .. } = self.rates;
-        let Rates { mask, grid, context, feature_bank, background, .. } = self.rates;
+        let Rates { mask, grid, context, background, .. } = self.rates;
         for (name, rate) in [
             ("offset", offset),
             ("feature", feature),
@@ -279,7 +261,6 @@ impl TrainConfig {
             ("opacity_head", opacity_head),
             ("covariance_head", covariance_head),
             ("colour_head", colour_head),
-            ("feature_bank", feature_bank),
             ("mask", mask),
             ("grid", grid),
             ("context", context),

@@ -5,7 +5,7 @@ use super::coding::Coding;
 use crate::ops::neural_gaussians::{Gaussian, HeadOutputs, Source};
 use crate::ops::project::{Footprint, Splat};
 use crate::ops::simd::Level;
-use crate::ops::{Pinhole, Real, detail, feature_bank, head, head_input, neural_gaussians, project, volume};
+use crate::ops::{Pinhole, Real, detail, head, head_input, neural_gaussians, project, volume};
 use crate::scene::{Anchors, Head, Heads, ModelShape, Scene};
 
 /// A block of visible anchors on its way through the chain; buffers are kept from step to step.
@@ -35,9 +35,6 @@ pub struct Block<R> {
     offsets: Vec<R>,
     mask_logits: Vec<R>,
     pub(super) coded: Coded<R>,
-    /// Features as the heads see them, if the scene has a feature bank.
-    mixed: Vec<R>,
-    bank: feature_bank::Kept<R>,
     input: Vec<R>,
     hidden: [Vec<R>; 3],
     outputs: HeadOutputs<R>,
@@ -90,8 +87,6 @@ impl<R: Real> Block<R> {
             offsets: Vec::new(),
             mask_logits: Vec::new(),
             coded: Coded::default(),
-            mixed: Vec::new(),
-            bank: feature_bank::Kept::default(),
             input: Vec::new(),
             hidden: Default::default(),
             outputs: HeadOutputs::default(),
@@ -153,13 +148,8 @@ impl<R: Real> Block<R> {
     /// From anchors to splats.
     pub(super) fn forward(&mut self, level: Level, scene: &Scene<R>, camera: &Pinhole<R>) {
         let (shape, n) = (&scene.shape, self.anchors.len());
-        if let Some(bank) = &scene.heads.bank {
-            let Self { positions, features, bank: kept, mixed, .. } = self;
-            feature_bank::forward(bank, camera, positions, features, kept, mixed);
-        }
-        let features = if scene.heads.bank.is_some() { &self.mixed } else { &self.features };
         refill(&mut self.input, n * shape.head_inputs());
-        head_input::forward(shape, camera, features, &self.positions, &mut self.input);
+        head_input::forward(shape, camera, &self.features, &self.positions, &mut self.input);
         self.outputs.reset(shape, n);
         let outputs = [&mut self.outputs.opacity, &mut self.outputs.covariance, &mut self.outputs.colour];
         for ((weights, hidden), output) in scene.heads.each().zip(&mut self.hidden).zip(outputs) {
@@ -187,7 +177,7 @@ impl<R: Real> Block<R> {
             },
         );
         if let Some(head) = &scene.heads.detail {
-            detail::forward(head, features, &self.sources, &mut self.gaussians, &mut self.detail);
+            detail::forward(head, &self.features, &self.sources, &mut self.gaussians, &mut self.detail);
         }
         self.d_gaussians.clear();
         self.d_gaussians.resize(self.gaussians.len(), Gaussian::default());
@@ -230,8 +220,7 @@ impl<R: Real> Block<R> {
         }
         let mut by_detail = vec![R::ZERO; if scene.heads.detail.is_some() { n * shape.feature_dim } else { 0 }];
         if let (Some(head), Some(d_head)) = (&scene.heads.detail, &mut self.d_heads.detail) {
-            let Self { features, mixed, sources, detail, d_gaussians, .. } = self;
-            let features = if scene.heads.bank.is_some() { mixed } else { features };
+            let Self { features, sources, detail, d_gaussians, .. } = self;
             detail::backward(head, features, sources, detail, d_gaussians, &mut by_detail, d_head);
         }
         self.d_outputs.reset(shape, n);
@@ -263,11 +252,6 @@ impl<R: Real> Block<R> {
         head_input::backward(shape, &self.d_input, &mut self.d_features);
         for (d, by_detail) in self.d_features.iter_mut().zip(by_detail) {
             *d += by_detail;
-        }
-        if let (Some(bank), Some(d_bank)) = (&scene.heads.bank, &mut self.d_heads.bank) {
-            let d_mixed = std::mem::take(&mut self.d_features);
-            refill(&mut self.d_features, n * shape.feature_dim);
-            feature_bank::backward(bank, &self.features, &self.bank, &d_mixed, &mut self.d_features, d_bank);
         }
     }
 }

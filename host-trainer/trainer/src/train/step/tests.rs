@@ -47,7 +47,7 @@ fn scene(seed: u64, shape: ModelShape) -> Scene<f64> {
     scene
 }
 
-fn shapes() -> [ModelShape; 9] {
+fn shapes() -> [ModelShape; 7] {
     let base = ModelShape { view_colour: true, view_geometry: true, ..ModelShape::plain(6, 3) };
     [
         base,
@@ -56,8 +56,6 @@ fn shapes() -> [ModelShape; 9] {
         ModelShape { view_geometry: false, view_distance: true, ..base },
         ModelShape { view_colour: false, ..base },
         ModelShape { detail_hidden: 5, colour_hidden: 8, ..base },
-        ModelShape { feature_bank: true, ..ModelShape::plain(4, 2) },
-        ModelShape { feature_bank: true, detail_hidden: 3, feature_dim: 8, ..base },
         ModelShape { anisotropic: false, ..base },
     ]
 }

@@ -1,5 +1,7 @@
 //! The optimiser.
 
+use serde::{Deserialize, Serialize};
+
 use super::Real;
 
 /// Constants of Adam as Scaffold-GS sets them.
@@ -8,7 +10,7 @@ const BETA2: f64 = 0.999;
 const EPSILON: f64 = 1e-15;
 
 /// First and second moments of one parameter array.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Moments<R> {
     /// Running mean of the gradient.
     pub first: Vec<R>,

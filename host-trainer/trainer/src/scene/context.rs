@@ -2,15 +2,20 @@
 
 use pocketsplat_core::context::{FEATURES_PER_LEVEL, GridFrame, GridLevel, N_GROUPS};
 
+use serde::{Deserialize, Serialize};
+
+use super::grid_record::{Frame, levels};
 use super::{Head, ModelShape};
 
 /// A feature grid and a network that predicts, for every channel, mean and scale of its values, and for every group the
 /// quantisation step (Chen et al. 2024, HAC, section 4). [`pocketsplat_core::context`] is its integer form.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ContextModel<R> {
     /// Where the grid lies on the lattice.
+    #[serde(with = "Frame")]
     pub frame: GridFrame,
     /// Its levels.
+    #[serde(with = "levels")]
     pub levels: Vec<GridLevel>,
     /// `[Σ n_rows, 4]` rows of all levels, one after the other; only their signs count: +1 from 0 on, else −1.
     pub rows: Vec<R>,

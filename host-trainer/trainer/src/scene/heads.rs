@@ -1,5 +1,7 @@
 //! The anchor MLPs: opacity, covariance, colour, and the residual of detail.
 
+use serde::{Deserialize, Serialize};
+
 use super::ModelShape;
 
 /// What an output row of each head means for offset k.
@@ -34,7 +36,7 @@ impl OutputLayout {
 }
 
 /// One head: `y = W2·relu(W1·x + b1) + b2`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Head<R> {
     /// Inputs.
     pub n_in: usize,
@@ -90,7 +92,7 @@ impl<R: Copy> Head<R> {
 }
 
 /// The heads of a model.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Heads<R> {
     /// [`OutputLayout::Opacity`].
     pub opacity: Head<R>,

@@ -3,6 +3,7 @@
 //! Everything is in the normalised frame of [`pocketsplat_capture::dataset::Normalisation`].
 
 mod context;
+mod grid_record;
 mod heads;
 pub mod init;
 
@@ -116,7 +117,7 @@ const _: () = assert!(MASKED < MASK_THRESHOLD);
 pub const INITIAL_MASK_LOGIT: f64 = 1.0;
 
 /// Anchors as structure of arrays, one row an anchor.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Anchors<R> {
     /// `[n_anchors]` lattice coordinates; the position is `lattice · voxel_size`.
     pub lattice: Vec<[i32; 3]>,

@@ -1,6 +1,7 @@
 //! Adam over a whole scene, with a rate per group.
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::config::Rates;
 use super::step::{Block, Workspace};
@@ -12,7 +13,7 @@ use crate::scene::{Anchors, ContextModel, Head, Heads, ModelShape, Scene};
 const ROWS: usize = 2048;
 
 /// Moments of every trained parameter.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Optimiser<R> {
     /// Optimiser steps taken.
     pub n_steps: u32,
@@ -33,7 +34,7 @@ pub struct Optimiser<R> {
 }
 
 /// Moments of a context model.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ContextMoments<R> {
     /// Steps taken with it.
     pub n_steps: u32,

@@ -1,10 +1,12 @@
 //! What growth and pruning know of the anchors: how opaque they were, and how hard the image pulled at their offsets.
 
+use serde::{Deserialize, Serialize};
+
 use super::optimiser::retain_rows;
 use super::step::Workspace;
 
 /// Running sums since an anchor, or an offset, was last judged (Lu et al. 2024, Scaffold-GS, section 3.3).
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Statistics {
     /// `[n]` Σ over views of Σ_k max(α, 0).
     pub opacity_sum: Vec<f32>,

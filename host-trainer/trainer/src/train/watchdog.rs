@@ -15,7 +15,7 @@ const LARGEST_GRADIENT: f32 = 1e18;
 pub const MAX_DROPPED_IN_A_ROW: u32 = 100;
 
 /// How many steps were dropped.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Watchdog {
     /// In the whole run.
     pub n_dropped: u32,

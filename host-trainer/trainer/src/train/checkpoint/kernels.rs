@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use serde::{Deserialize, Serialize};
+
 use crate::ops::Real;
 use crate::ops::matmul::{Matrix, multiply};
 use crate::ops::simd::Level;
@@ -10,7 +12,7 @@ use crate::ops::simd::Level;
 ///
 /// Sums of matrix products and the system's exponentials may differ in the last bit from one CPU or C library to
 /// another; two machines with equal kernels train the same bits.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Kernels {
     /// In words: program version, system, instruction sets.
     pub description: String,

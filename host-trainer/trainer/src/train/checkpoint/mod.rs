@@ -1,22 +1,16 @@
 //! The state of a run as bytes, whole: a run that goes on from a checkpoint ends in the same bits as one that never
 //! stopped.
 //!
-//! Format, numbers in the byte order of the machine (another order shows as an unknown version):
-//!
 //! | what | how |
 //! |---|---|
 //! | magic | 8 bytes |
-//! | version | u32 |
-//! | configuration | text, TOML: [`crate::train::TrainConfig`] |
-//! | kernels | text and u32: [`Kernels`] |
-//! | capture | [`CaptureSignature`] |
-//! | state | counters, random state, view queue, scene, moments, context model, statistics |
+//! | version | u32, little-endian, as the checksum |
+//! | configuration | TOML: [`crate::train::TrainConfig`] |
+//! | kernels, capture, state | [`Kernels`], [`CaptureSignature`], then everything that the next iteration depends on |
 //! | checksum | CRC-32 of all before it |
 //!
-//! Texts and arrays are a u64 count and their elements.
+//! Configuration and state are in the wire format of `postcard`.
 
-mod codec;
-mod context;
 mod kernels;
 mod signature;
 mod state;
@@ -29,7 +23,7 @@ pub use signature::{CaptureDifference, CaptureSignature};
 pub use state::{RestoreError, Restored};
 
 /// The version that is written and read.
-pub const VERSION: u32 = 3;
+pub const VERSION: u32 = 4;
 
 /// Like PNG's: a byte that is no text, and line ends that a transfer as text would change.
 const MAGIC: [u8; 8] = *b"\x8bPSRUN\r\n";
@@ -67,10 +61,10 @@ pub enum CheckpointFault {
         /// What the rest of the checkpoint asks for.
         needed: u64,
     },
-    /// A text is not UTF-8, or the configuration is none.
-    #[error("its {what} can not be read: {why}")]
-    Text {
-        /// Which text.
+    /// The configuration is none, or the state does not have the form of one.
+    #[error("its {what} cannot be read: {why}")]
+    Form {
+        /// Configuration or state.
         what: &'static str,
         /// What the parser says.
         why: String,

@@ -1,11 +1,9 @@
 //! What a capture looked like when a run began, so that it goes on with the same one.
 
-use std::io::{self, Write};
-
 use rayon::prelude::*;
 
-use super::CheckpointFault;
-use super::codec::{Decoder, Encoder};
+use serde::{Deserialize, Serialize};
+
 use pocketsplat_capture::dataset::{Capture, View};
 
 /// Numbers of a camera: rotation, translation, focal lengths, principal point.
@@ -16,13 +14,13 @@ const CAMERA_NUMBERS: usize = 9 + 3 + 2 + 2;
 const CAMERA_TOLERANCE: f64 = 1e-9;
 
 /// The training views and the background of a capture, with checksums in place of pixels.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CaptureSignature {
     background: [f32; 3],
     views: Vec<ViewSignature>,
 }
 
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct ViewSignature {
     name: String,
     size_px: [u32; 2],
@@ -126,32 +124,6 @@ impl CaptureSignature {
     /// How many training views there are.
     pub(super) fn n_views(&self) -> usize {
         self.views.len()
-    }
-
-    pub(super) fn encode<W: Write>(&self, out: &mut Encoder<W>) -> io::Result<()> {
-        out.value(self.background)?;
-        out.value(self.views.len() as u64)?;
-        for view in &self.views {
-            out.text(&view.name)?;
-            out.value(view.size_px)?;
-            out.value(view.camera)?;
-            out.value(view.pixels)?;
-        }
-        Ok(())
-    }
-
-    pub(super) fn decode(from: &mut Decoder<'_>) -> Result<Self, CheckpointFault> {
-        let background = from.value("background")?;
-        let n: u64 = from.value("number of views")?;
-        let view = |from: &mut Decoder<'_>| {
-            Ok(ViewSignature {
-                name: from.text("name of a view")?,
-                size_px: from.value("size of a view")?,
-                camera: from.value("camera of a view")?,
-                pixels: from.value("checksum of a view")?,
-            })
-        };
-        Ok(Self { background, views: (0..n).map(|_| view(from)).collect::<Result<_, _>>()? })
     }
 }
 

@@ -1,15 +1,13 @@
 //! A trainer to a checkpoint and back.
 
-use std::io::{self, Write};
+use std::io::{self, BufWriter, Write};
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use serde::de::DeserializeOwned;
 
-use super::codec::{Decoder, Encoder};
-use super::context;
-use super::{CaptureDifference, CaptureSignature, CheckpointFault, Kernels};
-use crate::ops::adam::Moments;
-use crate::scene::{Anchors, Heads, ModelShape, Scene};
+use super::{CaptureDifference, CaptureSignature, CheckpointFault, Kernels, MAGIC, VERSION};
+use crate::scene::{Anchors, ContextModel, Heads, Scene};
 use crate::train::optimiser::Optimiser;
 use crate::train::statistics::Statistics;
 use crate::train::watchdog::Watchdog;
@@ -40,53 +38,35 @@ pub struct Restored<'a> {
     pub written_by: Kernels,
 }
 
+/// Bytes of the version and of the checksum.
+const NUMBER_LEN: usize = 4;
+
+/// Iteration, watchdog, wall-clock and processor seconds, the views left of this pass.
+type Progress = (u32, Watchdog, [f64; 2], Vec<u32>);
+/// Seed, stream and position.
+type RandomState = ([u8; 32], u64, u128);
+/// The scene and what belongs to it, and the background's colour.
+type Learned = (Anchors<f32>, Heads<f32>, Option<ContextModel<f32>>, Optimiser<f32>, Statistics, [f32; 3]);
+
 impl<'a> Trainer<'a> {
     /// Writes everything that the next iteration depends on; see [`crate::train::checkpoint`] for the format.
     ///
     /// # Errors
     /// What `out` reports.
     pub fn save(&self, out: impl Write) -> io::Result<()> {
-        let mut out = Encoder::begin(out)?;
-        out.text(&toml::to_string(&self.config).map_err(io::Error::other)?)?;
-        let kernels = self.kernels();
-        out.text(&kernels.description)?;
-        out.value(kernels.probe)?;
-        self.signature.encode(&mut out)?;
-
-        out.value([self.iteration, self.optimiser.n_steps])?;
-        out.value([self.watchdog.n_dropped, self.watchdog.n_in_a_row])?;
-        out.value([self.seconds, self.processor_seconds])?;
-        out.value(self.rng.get_seed())?;
-        out.value(self.rng.get_stream())?;
-        out.value(self.rng.get_word_pos())?;
-        out.values(&self.queue)?;
-
-        let Anchors { lattice, features, log_scales, offsets, mask_logits, places } = &self.scene.anchors;
-        out.values(lattice)?;
-        out.values(places)?;
-        let Optimiser { features: f, log_scales: s, offsets: o, mask_logits: m, .. } = &self.optimiser;
-        for (values, moments) in [(features, f), (log_scales, s), (offsets, o), (mask_logits, m)] {
-            out.values(values)?;
-            out.values(&moments.first)?;
-            out.values(&moments.second)?;
-        }
-        for heads in [&self.scene.heads, &self.optimiser.heads[0], &self.optimiser.heads[1]] {
-            for group in heads.each().flat_map(|head| head.groups()) {
-                out.values(group)?;
-            }
-        }
-        if self.config.learns_background {
-            out.value(self.background)?;
-            out.values(&self.optimiser.background.first)?;
-            out.values(&self.optimiser.background.second)?;
-        }
-        context::encode(&mut out, self.scene.context.as_ref(), self.optimiser.context.as_ref())?;
-        let Statistics { opacity_sum, n_views, gradient_sum, n_drawn } = &self.statistics;
-        out.values(opacity_sum)?;
-        out.values(n_views)?;
-        out.values(gradient_sum)?;
-        out.values(n_drawn)?;
-        out.end()
+        let mut out = BufWriter::new(Checksummed { out, checksum: crc32fast::Hasher::new() });
+        out.write_all(&MAGIC)?;
+        out.write_all(&VERSION.to_le_bytes())?;
+        let config = toml::to_string(&self.config).map_err(io::Error::other)?;
+        let progress = (self.iteration, self.watchdog, [self.seconds, self.processor_seconds], &self.queue);
+        let random = (self.rng.get_seed(), self.rng.get_stream(), self.rng.get_word_pos());
+        let Scene { anchors, heads, context, .. } = &self.scene;
+        let learned = (anchors, heads, context, &self.optimiser, &self.statistics, self.background);
+        let all = (config, self.kernels(), &self.signature, progress, random, learned);
+        postcard::to_io(&all, &mut out).map_err(io::Error::other)?;
+        let mut out = out.into_inner().map_err(io::IntoInnerError::into_error)?;
+        let checksum = out.checksum.clone().finalize();
+        out.write_all(&checksum.to_le_bytes())
     }
 
     /// Reads what [`Self::save`] wrote.
@@ -94,92 +74,116 @@ impl<'a> Trainer<'a> {
     /// # Errors
     /// [`RestoreError`] when the bytes are damaged or `capture` is not the one that the run began with.
     pub fn restore(capture: &'a Capture, bytes: &[u8]) -> Result<Restored<'a>, RestoreError> {
-        let mut from = Decoder::begin(bytes)?;
-        let text = from.text("configuration")?;
-        let config: TrainConfig = toml::from_str(&text)
-            .map_err(|e| CheckpointFault::Text { what: "configuration", why: e.message().to_owned() })?;
-        let written_by = Kernels { description: from.text("kernels")?, probe: from.value("probe")? };
-        let begun_with = CaptureSignature::decode(&mut from)?;
+        let (config, rest): (String, _) = part(content(bytes)?)?;
+        let config: TrainConfig = toml::from_str(&config)
+            .map_err(|e| CheckpointFault::Form { what: "configuration", why: e.message().to_owned() })?;
+        let ((written_by, begun_with), rest): ((Kernels, CaptureSignature), _) = part(rest)?;
         let mut trainer = Self::without_scene(capture, config)?;
         trainer.signature.matches(&begun_with)?;
-        trainer.decode_state(&mut from)?;
-        from.end()?;
+        let ((progress, (seed, stream, position), learned), rest): ((Progress, RandomState, Learned), _) = part(rest)?;
+        needs("bytes after the state", rest.len(), 0)?;
+        (trainer.iteration, trainer.watchdog, [trainer.seconds, trainer.processor_seconds], trainer.queue) = progress;
+        trainer.rng = ChaCha8Rng::from_seed(seed);
+        trainer.rng.set_stream(stream);
+        trainer.rng.set_word_pos(position);
+        let scene = &mut trainer.scene;
+        (scene.anchors, scene.heads, scene.context, trainer.optimiser, trainer.statistics, trainer.background) =
+            learned;
+        trainer.check()?;
         Ok(Restored { trainer, written_by })
     }
 
-    fn decode_state(&mut self, from: &mut Decoder<'_>) -> Result<(), CheckpointFault> {
-        let shape = self.config.shape;
-        let ModelShape { feature_dim, n_offsets, .. } = shape;
-        let [iteration, n_steps] = from.value("iteration")?;
-        if iteration > self.config.iterations {
-            let [found, needed] = [iteration, self.config.iterations].map(u64::from);
-            return Err(CheckpointFault::Content { what: "iterations done", found, needed });
+    /// That counters and lengths agree with configuration and capture.
+    fn check(&self) -> Result<(), CheckpointFault> {
+        let (shape, scene) = (self.config.shape, &self.scene);
+        if self.iteration > self.config.iterations {
+            needs("iterations done", self.iteration as usize, self.config.iterations as usize)?;
         }
-        self.iteration = iteration;
-        let [n_dropped, n_in_a_row] = from.value("dropped steps")?;
-        self.watchdog = Watchdog { n_dropped, n_in_a_row };
-        [self.seconds, self.processor_seconds] = from.value("seconds")?;
-        self.rng = ChaCha8Rng::from_seed(from.value("random seed")?);
-        self.rng.set_stream(from.value("random stream")?);
-        self.rng.set_word_pos(from.value("random position")?);
-        self.queue = from.values("view queue")?;
         let n_views = self.signature.n_views();
         if let Some(view) = self.queue.iter().find(|view| **view as usize >= n_views) {
-            let [found, needed] = [u64::from(*view), n_views as u64 - 1];
-            return Err(CheckpointFault::Content { what: "view in the queue", found, needed });
+            needs("view in the queue", *view as usize, n_views - 1)?;
         }
-
-        let lattice: Vec<[i32; 3]> = from.values("lattice")?;
-        let n = lattice.len();
-        let places: Vec<f32> = from.values("places")?;
-        if !(places.is_empty() || places.len() == n) {
-            let [found, needed] = [places.len(), n].map(|n| n as u64);
-            return Err(CheckpointFault::Content { what: "number of places", found, needed });
+        let Anchors { features, log_scales, offsets, mask_logits, places, .. } = &scene.anchors;
+        let n = scene.anchors.len();
+        if !places.is_empty() {
+            needs("number of places", places.len(), n)?;
         }
-        let mut array = |what, width: usize| -> Result<_, CheckpointFault> {
-            let len = n * width;
-            let values: Vec<f32> = from.exactly(what, len)?;
-            let moments = Moments { first: from.exactly(what, len)?, second: from.exactly(what, len)? };
-            Ok((values, moments))
-        };
-        let (features, f) = array("features", feature_dim)?;
-        let (log_scales, s) = array("log-scales", shape.n_log_scales())?;
-        let (offsets, o) = array("offsets", 3 * n_offsets)?;
-        let (mask_logits, m) = array("mask logits", n_offsets)?;
-        let voxel_size = self.config.voxel_size_for(self.capture);
-        let mut heads = || {
-            let mut heads = Heads::filled(&shape, 0.0f32);
-            for group in heads.each_mut().flat_map(|head| head.groups_mut()) {
-                *group = from.exactly("heads", group.len())?;
+        let Optimiser { features: f, log_scales: s, offsets: o, mask_logits: m, background, .. } = &self.optimiser;
+        for (what, values, moments, width) in [
+            ("features", features, f, shape.feature_dim),
+            ("log-scales", log_scales, s, shape.n_log_scales()),
+            ("offsets", offsets, o, 3 * shape.n_offsets),
+            ("mask logits", mask_logits, m, shape.n_offsets),
+        ] {
+            for values in [values, &moments.first, &moments.second] {
+                needs(what, values.len(), n * width)?;
             }
-            Ok::<_, CheckpointFault>(heads)
-        };
-        let anchors = Anchors { lattice, features, log_scales, offsets, mask_logits, places };
-        self.scene = Scene { shape, voxel_size, anchors, heads: heads()?, context: None };
-        let heads = [heads()?, heads()?];
-        let mut background = Moments::zeros(3);
-        if self.config.learns_background {
-            self.background = from.value("background")?;
-            background = Moments { first: from.exactly("background", 3)?, second: from.exactly("background", 3)? };
         }
-        let (model, moments) = context::decode(from, &shape)?.unzip();
-        self.scene.context = model;
-        self.optimiser = Optimiser {
-            n_steps,
-            features: f,
-            log_scales: s,
-            offsets: o,
-            mask_logits: m,
-            heads,
-            background,
-            context: moments,
-        };
-        self.statistics = Statistics {
-            opacity_sum: from.exactly("opacity sums", n)?,
-            n_views: from.exactly("view counts", n)?,
-            gradient_sum: from.exactly("gradient sums", n * n_offsets)?,
-            n_drawn: from.exactly("drawn counts", n * n_offsets)?,
-        };
-        Ok(())
+        needs("background", background.first.len(), 3)?;
+        let lens =
+            |heads: &Heads<f32>| heads.each().flat_map(|head| head.groups().map(<[f32]>::len)).collect::<Vec<_>>();
+        let needed = lens(&Heads::filled(&shape, 0.0));
+        for heads in [&scene.heads, &self.optimiser.heads[0], &self.optimiser.heads[1]] {
+            for (found, needed) in
+                lens(heads).into_iter().chain([usize::MAX]).zip(needed.iter().copied().chain([usize::MAX]))
+            {
+                needs("heads", found, needed)?;
+            }
+        }
+        if let (Some(model), moments) = (&scene.context, &self.optimiser.context) {
+            let moments = moments.as_ref().map_or(0, |moments| moments.rows.first.len());
+            needs("moments of the grid", moments, model.rows.len())?;
+        }
+        let Statistics { opacity_sum, n_views, gradient_sum, n_drawn } = &self.statistics;
+        needs("opacity sums", opacity_sum.len(), n)?;
+        needs("view counts", n_views.len(), n)?;
+        needs("gradient sums", gradient_sum.len(), n * shape.n_offsets)?;
+        needs("drawn counts", n_drawn.len(), n * shape.n_offsets)
     }
+}
+
+/// Passes on what is written and sums it up.
+struct Checksummed<W> {
+    out: W,
+    checksum: crc32fast::Hasher,
+}
+
+impl<W: Write> Write for Checksummed<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let n = self.out.write(bytes)?;
+        self.checksum.update(&bytes[..n]);
+        Ok(n)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+}
+
+/// What stands between version and checksum, once these are right.
+fn content(bytes: &[u8]) -> Result<&[u8], CheckpointFault> {
+    let rest = bytes.strip_prefix(&MAGIC).ok_or(CheckpointFault::Magic)?;
+    let Some((version, rest)) = rest.split_first_chunk().map(|(number, rest)| (u32::from_le_bytes(*number), rest))
+    else {
+        return Err(CheckpointFault::Magic);
+    };
+    if version != VERSION {
+        return Err(CheckpointFault::Version { found: version });
+    }
+    let (content, found) = rest.split_last_chunk::<NUMBER_LEN>().unwrap_or((rest, &[0; NUMBER_LEN]));
+    let found = u32::from_le_bytes(*found);
+    let computed = crc32fast::hash(&bytes[..bytes.len() - NUMBER_LEN]);
+    if found == computed { Ok(content) } else { Err(CheckpointFault::Checksum { found, computed }) }
+}
+
+/// The next part and the bytes behind it.
+fn part<T: DeserializeOwned>(bytes: &[u8]) -> Result<(T, &[u8]), CheckpointFault> {
+    postcard::take_from_bytes(bytes).map_err(|e| CheckpointFault::Form { what: "state", why: e.to_string() })
+}
+
+fn needs(what: &'static str, found: usize, needed: usize) -> Result<(), CheckpointFault> {
+    if found == needed {
+        return Ok(());
+    }
+    Err(CheckpointFault::Content { what, found: found as u64, needed: needed as u64 })
 }

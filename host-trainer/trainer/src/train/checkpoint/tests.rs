@@ -82,7 +82,7 @@ fn no_damage_passes() {
     let mut longer = bytes[..bytes.len() - 4].to_vec();
     longer.extend([0; 8]);
     let checksum = crc32fast::hash(&longer);
-    longer.extend(checksum.to_ne_bytes());
+    longer.extend(checksum.to_le_bytes());
     assert!(matches!(fault(&longer), CheckpointFault::Content { found: 8, .. }), "{:?}", fault(&longer));
 }
 

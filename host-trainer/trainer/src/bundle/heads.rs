@@ -6,6 +6,7 @@ use pocketsplat_core::entropy::FREQUENCY_TOTAL;
 use super::WriteError;
 use super::stream::SlotList;
 use super::table::TableDraft;
+use crate::ops::perturb;
 use crate::scene::{Head, Heads};
 
 /// Coded matrices are worth their decoding if the section is at most so many times as long as raw halves.
@@ -53,7 +54,7 @@ fn coded(heads: &Heads<f32>, fraction_bits: [u8; 2]) -> Option<Vec<u8>> {
     let [steps_1, steps_2] = fraction_bits.map(|bits| (-f32::from(bits)).exp2());
     let symbols = |weights: &[f32], step: f32| {
         let symbol = |weight: &f32| {
-            let symbol = (weight / step).round_ties_even();
+            let symbol = perturb::symbol(*weight, step);
             (symbol.abs() <= f32::from(i16::MAX)).then_some(symbol as i16)
         };
         weights.iter().map(symbol).collect::<Option<Vec<i16>>>()

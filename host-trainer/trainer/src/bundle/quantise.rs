@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::WriteError;
 use super::channels::{ChannelName, ContextWork, GROUPS};
 use super::order::Placement;
+use crate::ops::perturb;
 use crate::scene::{ModelShape, Scene};
 
 /// Distance between neighbouring values of each kind of channel; the value of a symbol is `symbol · step`.
@@ -88,7 +89,7 @@ pub(super) fn check_lengths(scene: &Scene<f32>) -> Result<(), WriteError> {
     Ok(())
 }
 
-/// Rounds every value that is coded to its nearest symbol, ties to even.
+/// The [symbol](perturb::symbol) of every value that is coded.
 ///
 /// # Errors
 /// [`WriteError::NotFinite`], [`WriteError::BeyondSymbols`], [`WriteError::NotPositive`].
@@ -158,8 +159,8 @@ fn symbol(value: f32, step: f32, anchor: usize, channel: ChannelName) -> Result<
     if !value.is_finite() {
         return Err(WriteError::NotFinite { anchor, channel, value });
     }
-    let symbol = (f64::from(value) / f64::from(step)).round_ties_even();
-    if symbol.abs() > f64::from(i16::MAX) {
+    let symbol = perturb::symbol(value, step);
+    if symbol.abs() > f32::from(i16::MAX) {
         return Err(WriteError::BeyondSymbols { anchor, channel, value, step });
     }
     Ok(symbol as i16)

@@ -6,6 +6,7 @@ mod entropy;
 mod heads;
 mod measures;
 mod round_trip;
+mod rounding;
 mod tiers;
 
 use std::collections::BTreeSet;

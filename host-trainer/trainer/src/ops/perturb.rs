@@ -16,16 +16,24 @@ pub fn with_noise<R: Real>(stream: Stream, first: u32, step: R, values: &mut [R]
     }
 }
 
-/// v ← s·step with s = round(v/step), ties to even, within the symbols of the coder: what a decoder will see.
+/// The symbol s of a value v, not yet an integer type: v/step to the nearest integer, ties to even.
+///
+/// The one rule of rounding, in the precision of training: the last phase of training and the writer of bundles both use it,
+/// so a bundle holds the symbols that training saw, ties of the rounded quotient included.
+#[inline(always)]
+pub fn symbol<R: Real>(value: R, step: R) -> R {
+    (value / step).round_ties_even()
+}
+
+/// v ← s·step with s the [`symbol`] of v, within the range of the coder: what a decoder will see.
 ///
 /// * `residuals`: overwritten with s − v/step.
 #[inline(always)]
 pub fn rounded<R: Real>(step: R, values: &mut [R], residuals: &mut [R]) {
     let limit = R::real(f64::from(i16::MAX));
     for (value, residual) in values.iter_mut().zip(residuals) {
-        let exact = *value / step;
-        let symbol = exact.round_ties_even().smaller(limit).larger(-limit);
-        *residual = symbol - exact;
+        let symbol = symbol(*value, step).smaller(limit).larger(-limit);
+        *residual = symbol - *value / step;
         *value = symbol * step;
     }
 }

@@ -17,7 +17,7 @@ const ROWS: usize = 512;
 /// A trained scene and what is known of it.
 #[derive(Clone, Debug)]
 pub struct Finished {
-    /// The scene; offsets that no view draws are masked, and with a context model every value is one that a decoder reads.
+    /// The scene, its values not rounded: the writer does that, once. Offsets that no view draws are masked.
     pub scene: Scene<f32>,
     /// `[n]` which anchors matter: their [places](crate::scene::Anchors::places) if they have any, else their aggregated
     /// opacity, see [`Survey::importance`]. The order of the tiers.
@@ -31,7 +31,9 @@ pub struct Finished {
 }
 
 impl Trainer<'_> {
-    /// Rounds, masks and surveys the scene as it stands, with the views that training sees.
+    /// Masks and surveys the scene as it stands, with the views that training sees.
+    ///
+    /// Both look at the values that the last phase of training drew: with a context model, rounded by its steps.
     ///
     /// Cost: one forward pass over the views.
     ///
@@ -41,12 +43,14 @@ impl Trainer<'_> {
         let mut scene = self.scene.clone();
         let integers = scene.context.is_some().then(|| Integers::of(&scene)).transpose()?;
         let context = integers.as_ref().map(|integers| integers.context(&self.scene)).transpose()?;
+        let mut drawn = scene.clone();
         if let Some(context) = &context {
-            round_values(&mut scene, context);
+            round_values(&mut drawn, context);
         }
-        let survey = Survey::new(&scene, &mut Workspace::new(&scene.shape), &self.trained_cameras(), false);
-        let n_undrawn = survey.mask_undrawn(&mut scene);
-        let estimated_bits = context.as_ref().map(|context| estimated_bits(&scene, context));
+        let survey = Survey::new(&drawn, &mut Workspace::new(&drawn.shape), &self.trained_cameras(), false);
+        let n_undrawn = survey.mask_undrawn(&mut drawn);
+        let estimated_bits = context.as_ref().map(|context| estimated_bits(&drawn, context));
+        scene.anchors.mask_logits = drawn.anchors.mask_logits;
         // Places that training has given out decide; it has prepared the scene for them.
         let importance = if scene.anchors.places.is_empty() { survey.importance } else { scene.anchors.places.clone() };
         // It is between 0 and 1.

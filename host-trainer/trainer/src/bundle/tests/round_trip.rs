@@ -19,10 +19,9 @@ fn rows_of_scene(scene: &Scene<f32>, steps: impl Fn([i32; 3]) -> [f32; 3]) -> Ro
     let (f, k, anchors) = (scene.shape.feature_dim, scene.shape.n_offsets, &scene.anchors);
     let mut rows = Rows::new();
     for (a, &cell) in anchors.lattice.iter().enumerate() {
-        let steps = steps(cell).map(f64::from);
-        let symbols = |values: &[f32], step: f64| {
-            values.iter().map(|&x| (f64::from(x) / step).round_ties_even() as i16).collect::<Vec<_>>()
-        };
+        let steps = steps(cell);
+        let symbols =
+            |values: &[f32], step: f32| values.iter().map(|&x| (x / step).round_ties_even() as i16).collect::<Vec<_>>();
         let features = symbols(&anchors.features[a * f..][..f], steps[0]);
         let log_scales = symbols(&anchors.log_scales[a * 6..][..6], steps[1]);
         let mut offsets = symbols(&anchors.offsets[a * 3 * k..][..3 * k], steps[2]);

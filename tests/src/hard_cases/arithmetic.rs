@@ -13,16 +13,22 @@ use super::gradient::{difference_error, random};
 use super::picture::{Picture, camera};
 use super::{Case, Family, error, n_not_finite, picture};
 
+const ANSWER: &str = "\
+No sum overflows, and every operation is finite and right at the ends of its arguments.";
+
 const ANALYSIS: &str = "\
-The heads sum in f32, whose largest number is 3·10³⁸: weights are halves and features 16-bit symbols, so the largest sum a bundle
-can hold is 10²⁰, far beyond a half's 65,504 and far below f32's end; saturated activations are exact. The exponential is
-right to 2e-7 inside its range and clamped outside, so sigmoid and tanh are right to 4e-7 of 1 for every argument. Variances
-are summed about the mean, whose own error of a column of mean μ adds (1e-7·μ)² to them: a column of mean 100 and deviation
-0.01 keeps four digits. ln v is replaced by its tangent below 10⁻⁶, so columns without variance and columns of one row have
-finite terms and right gradients. The rate's probability p is a difference of two tails, 6e-8/p of it is lost, and p is held at
-10⁻⁶ or more: bits are right to 0.09 at the floor and to 0.01 above 10⁻⁵. SSIM's variances are differences of blurred squares,
-1e-7 against the constant 9e-4 that is added to them: a thousandth at most. Differences of smooth operations agree with their
-gradients in f64 to 10⁻⁵.";
+Operation by operation:
+
+- Heads sum in f32, whose largest number is 3·10³⁸. Weights are halves and features 16-bit symbols, so the largest sum a bundle can
+  hold is 10²⁰: far beyond a half's 65,504 and far below f32's end. Saturated activations are exact.
+- The exponential is right to 2e-7 inside its range and clamped outside. So sigmoid and tanh are right to 4e-7 of 1 for every argument.
+- Variances are summed about the mean. The mean's own error of a column of mean μ adds (1e-7·μ)² to them: a column of mean 100 and
+  deviation 0.01 keeps four digits. ln v is replaced by its tangent below 10⁻⁶, so columns without variance and columns of one row
+  have finite terms and right gradients.
+- The rate's probability p is a difference of two tails. 6e-8/p of it is lost, and p is held at 10⁻⁶ or more. So bits are right to 0.09
+  at the floor and to 0.01 above 10⁻⁵.
+- SSIM's variances are differences of blurred squares, 1e-7 against the constant 9e-4 that is added to them: a thousandth at most.
+- Differences of smooth operations agree with their gradients in f64 to 10⁻⁵.";
 
 /// Largest error of `ours` against `exact` over hard arguments.
 fn worst_of(ours: impl Fn(f32) -> f32, exact: impl Fn(f64) -> f64) -> f64 {
@@ -207,5 +213,5 @@ pub(super) fn family() -> Family {
             extreme_gradients,
         ),
     ];
-    Family { title: "Arithmetic", analysis: ANALYSIS, cases }
+    Family { title: "Arithmetic", answer: ANSWER, analysis: ANALYSIS, cases }
 }

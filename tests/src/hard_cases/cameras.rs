@@ -8,15 +8,19 @@ use super::blobs::{Blob, Blobs};
 use super::picture::{Figures, Picture, camera};
 use super::{Case, Family, bounded, picture, unseen};
 
+const ANSWER: &str = "\
+Any camera is drawn right, inside a splat, beside it or far away through a long lens. Whether a centre on the near plane is drawn is
+decided exactly, to one ulp.";
+
 const ANALYSIS: &str = "\
-The camera's transform is a sum of three products and a translation, so a point comes out with an error of 2·6e-8·(|p| + |t|),
-which the projection multiplies by f/z. Near the near plane, z = 0.2, that is 300 px per unit for a camera of 60 px and nothing
-to speak of; a long lens far away is where it shows: 3·10⁴ px at distance 10³ move by 0.004 px. Whether a centre on the near
-plane is drawn is decided by one comparison with the f32 nearest to 0.2, in the oracle too, so there is no tolerance to grant:
-one ulp decides. Slopes beyond 1.15 image sizes are clamped, which keeps the Jacobian of centres beside the camera finite; the
-clamp is a kink, not a jump, so the usual bounds hold. View direction and distance are only asked of anchors in front of the
-camera, at least 0.2 away, so the division by a distance of 0 is guarded in the trainer's operation alone
-(`distance 0`, under arithmetic).";
+The camera's transform is a sum of three products and a translation. A point comes out with an error of 2·6e-8·(|p| + |t|), which the
+projection multiplies by f/z. Near the near plane, z = 0.2, that factor is 300 px per unit for a camera of 60 px, and the error is
+negligible. A long lens far away is where it shows: 3·10⁴ px at distance 10³ move by 0.004 px.
+
+The near plane is one comparison with the f32 nearest to 0.2, in the oracle too, so no tolerance is granted. Slopes beyond 1.15 image
+sizes are clamped, which keeps the Jacobian of centres beside the camera finite. The clamp is a kink, not a jump, so the usual bounds
+hold. View direction and distance are computed only for anchors in front of the camera, at least 0.2 away. A distance of 0 is
+therefore guarded in the trainer's operation alone (`distance 0`, under arithmetic).";
 
 const EFFECTS: ModelShape =
     ModelShape { view_colour: true, view_geometry: true, view_distance: true, ..ModelShape::plain(1, 1) };
@@ -102,5 +106,5 @@ pub(super) fn family() -> Family {
             Picture::of(Blobs::default().scene()).through(camera)
         }),
     ];
-    Family { title: "Cameras", analysis: ANALYSIS, cases }
+    Family { title: "Cameras", answer: ANSWER, analysis: ANALYSIS, cases }
 }

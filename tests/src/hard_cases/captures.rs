@@ -14,12 +14,15 @@ use rand_chacha::ChaCha8Rng;
 
 use super::{Case, Family, error, n_not_finite, parameters};
 
+const ANSWER: &str = "\
+A capture may lie 10⁶ units from its origin or be 10⁻⁴ wide: cameras come out right to 10⁻⁸ of the normalised frame. Any set of points
+gives a finite scene to start from.";
+
 const ANALYSIS: &str = "\
-Poses are read as f64 and normalised before anything is rounded to f32: the mean of the cameras goes to the origin and their
-spread to 5. A coordinate of 10⁶ is known to 1.2e-10, which normalising multiplies by about 1, and a sum over the views by a few;
-of a capture 10⁻⁴ wide every number is as good as of one that is 1 wide. So 1e-8 and 1e-12 normalised units. Where all points
-are one point, or lie in a line, spacings are lifted to 3·10⁻⁴ before their logarithm is taken, and a voxel size is found
-whatever the points are.";
+Poses are read as f64 and normalised before anything is rounded to f32: the mean of the cameras goes to the origin and their spread to 5.
+A coordinate of 10⁶ is known to 1.2e-10. Normalising multiplies that by about 1, and a sum over the views by a few. In a capture 10⁻⁴
+wide every number is as good as in one that is 1 wide. So the bounds are 1e-8 and 1e-12 normalised units. Where all points are one
+point, or lie in a line, spacings are lifted to 3·10⁻⁴ before their logarithm is taken. A voxel size is found whatever the points are.";
 
 const N_VIEWS: u32 = 8;
 
@@ -128,5 +131,5 @@ pub(super) fn family() -> Family {
             start_of(&(-12..12).map(|i| DVec3::splat(10.0_f64.powi(i))).collect::<Vec<_>>())
         }),
     ];
-    Family { title: "Captures", analysis: ANALYSIS, cases }
+    Family { title: "Captures", answer: ANSWER, analysis: ANALYSIS, cases }
 }

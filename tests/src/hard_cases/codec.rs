@@ -9,11 +9,13 @@ use super::{Case, Family, error};
 use crate::frame::info_for;
 use crate::scenes::{CASES, masked, random_scene, with_context};
 
+const ANSWER: &str = "\
+A coded value is off by the rounding to its symbol, half a step, and by nothing else.";
+
 const ANALYSIS: &str = "\
-Entropy coding is exact, so the error of a value is that of its rounding to a symbol: half a step, and 32,767·1.2e-7 of a step
-for the two f32 operations that make the value again, which is 0.004. Under a context the step of an anchor is up to
-2^(7/8) = 1.834 base steps, and the errors are given in base steps. A symbol outside its table, however far, is escaped; a table
-of one symbol takes no bits at all.";
+Entropy coding is exact. The two f32 operations that make the value again add 32,767·1.2e-7 of a step, which is 0.004. Under a context
+the step of an anchor is up to 2^(7/8) = 1.834 base steps, and the errors are given in base steps. A symbol outside its table, however
+far, is escaped. A table of one symbol takes no bits at all.";
 
 /// Half a step, and what the two operations of a value leave; under a context of 1.834 base steps.
 const STATIC: f64 = 0.505;
@@ -96,5 +98,5 @@ pub(super) fn family() -> Family {
             error_of(&opinionated(2000.0, 0.0), Coder::Context)
         }),
     ];
-    Family { title: "Codec", analysis: ANALYSIS, cases }
+    Family { title: "Codec", answer: ANSWER, analysis: ANALYSIS, cases }
 }

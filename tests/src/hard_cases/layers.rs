@@ -7,19 +7,25 @@ use super::blobs::{Blob, Blobs, logit_of_opacity};
 use super::picture::{Figures, Picture, camera};
 use super::{Case, Family, bounded, picture, unseen};
 
+const ANSWER: &str = "\
+Thousands of layers are drawn right. The exceptions are pixels where the stop rule decides: there the last of many opaque layers may be
+drawn in one arithmetic and not in the other, which is 2.5 steps at most, over a whole tile if the layers cover it.";
+
 const ANALYSIS: &str = "\
-Front to back, C = Σ cᵢαᵢTᵢ. An error δ of every alpha changes C by at most max δ/α times the contrast of neighbouring layers,
-because the weights αᵢTᵢ sum to 1 at most: the 2⁻¹² that the logarithm of an opacity keeps in the decoder's memory is 0.13 %
-of an alpha of 1/200, so thousands of faint layers err by a third of a step, and f32's sums by 3,000·6e-8 on top. The stop rule
-keeps transmittance at 10⁻⁴ or more, so it never comes near the subnormals however many layers there are. But the rule is a
-jump: a splat that is the first to be dropped in one arithmetic and drawn in the other has a weight of at most
-0.99·T with T(1 − 0.99) = 10⁻⁴, that is 0.0099, or 2.5 steps. Two layers at the limit of 0.99 meet that point exactly
-(0.01² against 10⁻⁴, which f32 and f64 round to different sides), so opaque stacks have a bound of 2.5 steps more, and a tile
-of them as much on average. Where depths are equal the order is that of the file in all three; where they are equal but for
-rounding no f32 renderer can know it, and the decoder's picture has to be that of a camera turned by 10⁻⁶ one way or the
-other. Gradients follow the stop rule too: in such stacks one layer in one arithmetic has a gradient and the other has none,
-which is why they are judged against the larger bound of 1. Layers of opacity 0.9 meet the same point with the fourth, whose
-weight is 0.0009: a quarter step. An opacity within 0.13 % of 1/255 may draw its splat or not, which is a step in all of a tile.";
+Front to back, C = Σ cᵢαᵢTᵢ. The weights αᵢTᵢ sum to 1 at most, so an error δ of every alpha changes C by at most max δ/α times the
+contrast of neighbouring layers. The logarithm of an opacity keeps 2⁻¹² in the decoder's memory, 0.13 % of an alpha of 1/200. So
+thousands of faint layers err by a third of a step, and f32's sums by 3,000·6e-8 besides. The stop rule keeps transmittance at 10⁻⁴ or
+more, so it never comes near the subnormals, however many layers there are.
+
+The stop rule is a jump. A splat that is the first to be dropped in one arithmetic and drawn in the other has a weight of at most 0.99·T
+with T(1 − 0.99) = 10⁻⁴, that is 0.0099, or 2.5 steps. Two layers at the limit of 0.99 meet that point exactly: f32 and f64 round 0.01²
+to different sides of 10⁻⁴. So opaque stacks have a bound of 2.5 steps more, and a tile of them as much on average. Layers of opacity 0.9
+meet the same point with the fourth, whose weight is 0.0009: a quarter step. Gradients follow the stop rule too. In such stacks one layer
+has a gradient in one arithmetic and none in the other, so they are judged against the larger bound of 1.
+
+Where depths are equal, all three renderers keep the order of the file. Where they are equal but for rounding, no f32 renderer can know
+the order; the decoder's picture then has to be that of a camera turned by 10⁻⁶ one way or the other. An opacity within 0.13 % of
+1/255 may draw its splat or not, which is a step in all of a tile.";
 
 const COLOURS: [[f64; 3]; 3] = [[0.95, 0.1, 0.1], [0.1, 0.9, 0.2], [0.05, 0.1, 0.95]];
 
@@ -118,5 +124,5 @@ pub(super) fn family() -> Family {
         unseen("opacity 0", "a logit of 0", || layers(3, 0.0, 0.01)),
         unseen("opacity below 0", "a logit of −40,000", || layers(3, -40_000.0, 0.01)),
     ];
-    Family { title: "Order and transmittance", analysis: ANALYSIS, cases }
+    Family { title: "Order and transmittance", answer: ANSWER, analysis: ANALYSIS, cases }
 }

@@ -120,6 +120,8 @@ impl Case {
 pub struct Family {
     /// Heading of the page.
     pub title: &'static str,
+    /// What a reader can rely on.
+    pub answer: &'static str,
     /// Why the bounds are what they are.
     pub analysis: &'static str,
     /// The cases.

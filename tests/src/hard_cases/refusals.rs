@@ -13,9 +13,12 @@ use super::picture::camera;
 use super::{Case, Family, captures, refusal, training};
 use crate::frame::{bundle_of, draw, info_for, to_core};
 
+const ANSWER: &str = "\
+A number that is not one, or that the format has no place for, is refused with its place and what was found.";
+
 const ANALYSIS: &str = "\
-A number that is none, or that the format has no place for, can only come from damage or divergence, and there is no picture to
-bound. Each of these says where it is and what was found. Photographs are bytes, so no pixel of one can be such a number.";
+Such a number can only come from damage or divergence, and there is no picture to bound. Photographs are bytes, so no pixel of one can
+be such a number.";
 
 fn scene() -> Scene<f32> {
     let blob = |i: i32| Blob { position: [f64::from(i) / 8.0, 0.0, 2.0], ..Blob::default() };
@@ -101,5 +104,5 @@ pub(super) fn family() -> Family {
             })
         }),
     ];
-    Family { title: "Refusals", analysis: ANALYSIS, cases }
+    Family { title: "Refusals", answer: ANSWER, analysis: ANALYSIS, cases }
 }

@@ -8,14 +8,20 @@ use super::picture::worst_tile;
 use super::{Case, Family, Probe, error, pictures};
 use crate::frame::{draw, draw_in, info_for, to_core};
 
+const ANSWER: &str = "\
+Functions of a table change a channel by a step where the exact decoder draws everything, and no tile visibly. Integer heads turn the
+longest needles by a tenth of a pixel, which is seen along their edges alone.";
+
 const ANALYSIS: &str = "\
-All pictures of the families above, drawn by the decoder in another arithmetic and compared with its own exact frames, in
-steps of 8 bits. Functions right to 10⁻⁴ move every alpha by a part in 5,000, which is nothing in a sum; but a contribution at
-1/255 may be drawn in one and not in the other (a step, and half a step of rounding on either side), and so may the last layer
-of an opaque stack (2.5 steps, over whole tiles): 4.5 steps, 3.2 in a tile's mean. Roots right to 10⁻⁶ turn a Gaussian by as
-much: 0.003 px at the end of a needle of 3,000 px. With heads in 16-bit integers a step of an output is 2⁻¹⁵ of the largest
-weight of its row or 2⁻¹⁶ of their sum, so a needle may turn by 6·10⁻⁵, a tenth of a pixel at the end of the longest, where a
-flank rises by 1.1 a pixel: 28 steps along an edge one pixel wide, 32 with the others, and 4 in a tile's mean.";
+All pictures of the families above are drawn by the decoder in another arithmetic and compared with its own exact frames, in steps of
+8 bits. Functions right to 10⁻⁴ move every alpha by a part in 5,000, which is nothing in a sum. But a contribution at 1/255 may be
+drawn in one and not in the other: a step, and half a step of rounding on either side. So may the last layer of an opaque stack: 2.5
+steps, over whole tiles. That makes 4.5 steps, and 3.2 in a tile's mean. Roots right to 10⁻⁶ turn a Gaussian by as much: 0.003 px at the
+end of a needle of 3,000 px.
+
+With heads in 16-bit integers a step of an output is 2⁻¹⁵ of the largest weight of its row or 2⁻¹⁶ of their sum. So a needle may turn by
+6·10⁻⁵, a tenth of a pixel at the end of the longest, where a flank rises by 1.1 a pixel: 28 steps along an edge one pixel wide. With the
+others that makes 32, and 4 in a tile's mean.";
 
 /// The worst channel of all pictures, and the worst mean of a tile, against the exact decoder; steps of 8 bits.
 fn worst(choice: Choice) -> [f64; 2] {
@@ -51,5 +57,5 @@ pub(super) fn family() -> Family {
         error("integer heads", WHAT, "worst channel, steps", 32.0, || worst(Choice::I16)[0]),
         error("integer heads, tiles", WHAT, "worst tile, steps", 4.0, || worst(Choice::I16)[1]),
     ];
-    Family { title: "Other arithmetics", analysis: ANALYSIS, cases }
+    Family { title: "Other arithmetics", answer: ANSWER, analysis: ANALYSIS, cases }
 }

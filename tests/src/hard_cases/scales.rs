@@ -4,17 +4,21 @@ use super::blobs::{Blob, Blobs};
 use super::picture::{Figures, Picture};
 use super::{Case, Family, bounded, picture, unseen};
 
+const ANSWER: &str = "\
+Sizes from 10⁻⁴⁵ to 10⁸ px and quaternions of any length are drawn right. A Gaussian beyond 4·10⁹ px is not drawn: a rule of the format,
+because nothing that a capture shows comes within six orders of it.";
+
 const ANALYSIS: &str = "\
-Sizes are exponentials of coded logarithms, so their relative error is that of the exponential, 2e-7, at any size; arguments
-beyond −87 and 88 are clamped in decoder and oracle, where e^x leaves the normal numbers. On the image a size only appears
-squared beside 0.3 px²: what is below 10⁻⁴ px is the dilation alone. At the other end Σ' grows with the square and det Σ' with
-the fourth power of a deviation, which leaves f32 at 4·10⁹ px: a Gaussian beyond that is not drawn, which is a rule of the
-format, because nothing that a capture shows comes within six orders of it. The decoder keeps inverse variances with eleven
-bits and six of exponent, down to deviations of 2·10⁹ px; halves end at 60,000 px, and of a splat as large whose rim crosses the
-frame they made another one. A quaternion is divided by its norm or by 10⁻¹², whichever is larger; products
-of components above 10⁻¹² are normal f32, so no norm underflows on the way, and below the floor the rotation comes out as the
-identity but for terms of the size of the quotient. At the floor a gradient is that of a quotient by 10⁻¹²: large, and no
-difference can check it, because a step that f64 can tell from none, 10⁻¹⁰, turns the Gaussian.";
+Sizes are exponentials of coded logarithms, so their relative error is that of the exponential, 2e-7, at any size. Arguments beyond −87
+and 88 are clamped in decoder and oracle, where eˣ leaves the normal numbers. On the image a size appears only squared beside
+0.3 px²: below 10⁻⁴ px there is the dilation alone. At the other end Σ' grows with the square of a deviation and det Σ' with its fourth
+power, which leaves f32 at 4·10⁹ px. The decoder keeps inverse variances with eleven bits and six of exponent, down to
+deviations of 2·10⁹ px. Halves would end at 60,000 px, and a splat as large whose rim crosses the frame would come out as another one.
+
+A quaternion is divided by its norm or by 10⁻¹², whichever is larger. Products of components above 10⁻¹² are normal f32, so no norm
+underflows on the way. Below the floor the rotation comes out as the identity, except for terms of the size of the quotient. At the
+floor a gradient is that of a quotient by 10⁻¹². It is large, and no difference can check it: a step that f64 can tell from none, 10⁻¹⁰,
+turns the Gaussian.";
 
 fn one(blob: Blob) -> Picture {
     let behind = Blob { position: [0.1, -0.05, 3.0], scale: [0.4; 3], colour: [0.1, 0.2, 0.9], ..Blob::default() };
@@ -72,5 +76,5 @@ pub(super) fn family() -> Family {
         picture("negative quaternion", "−q instead of q", || rotated([-0.7, 0.3, -0.2, 0.5], 1.0)),
         picture("half a turn", "w = 0, where the sign of the axis is free", || rotated([0.0, 0.6, 0.8, 0.0], 1.0)),
     ];
-    Family { title: "Sizes and rotations", analysis: ANALYSIS, cases }
+    Family { title: "Sizes and rotations", answer: ANSWER, analysis: ANALYSIS, cases }
 }

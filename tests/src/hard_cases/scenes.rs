@@ -9,10 +9,13 @@ use super::picture::{Picture, camera};
 use super::{Case, Family, error, picture, unseen};
 use crate::frame::{BACKGROUND, draw, info_for, to_core};
 
+const ANSWER: &str = "\
+Flat, collinear, lonely and empty scenes are drawn right. Where nothing is in the scene, the picture is the background to the bit.";
+
 const ANALYSIS: &str = "\
-Nothing here is inexact: what is flat, collinear or alone has boxes, tries and tables of zero width, and the question is whether
-something divides by one. So the bounds are the usual ones, and where nothing is in the scene the picture has to be the
-background to the bit. A tier or a chunk of a tier without anchors takes no place in the file and changes no pixel.";
+Nothing here is inexact. What is flat, collinear or alone has boxes, tries and tables of zero width, and the question is whether
+something divides by one. So the bounds are the usual ones. A tier or a chunk without anchors takes no place in the file
+and changes no pixel.";
 
 fn grid(cell: impl Fn(i32, i32) -> [f64; 3], n: i32) -> Blobs {
     let blob = |i: i32, j: i32| Blob {
@@ -120,5 +123,5 @@ pub(super) fn family() -> Family {
             empty_tiers,
         ),
     ];
-    Family { title: "Scenes", analysis: ANALYSIS, cases }
+    Family { title: "Scenes", answer: ANSWER, analysis: ANALYSIS, cases }
 }

@@ -10,19 +10,23 @@ use super::blobs::{Blob, Blobs};
 use super::picture::{Figures, Picture, camera};
 use super::{Case, Family, bounded, picture, unseen};
 
+const ANSWER: &str = "\
+Needles and pancakes of any ratio are drawn right: half a step of rounding, one step where a contribution of 1/255 is drawn in one
+arithmetic and not in the other. A whole tile is off by half a step and a tenth on average at most.";
+
 const ANALYSIS: &str = "\
-A Gaussian of deviations σ₁ ≥ σ₂ px on the image has det Σ' ≈ (σ₁² + 0.3)(σ₂² + 0.3). Computed as Σ'xx·Σ'yy − Σ'xy² for a
-needle at 45° it is the difference of two numbers of σ₁⁴/4, so f32 leaves an error of 6e-8·σ₁⁴/4 in 0.3·σ₁²: nothing is left
-of it beyond σ₁ = 4,000 px, and a hundredth is wrong from 400 px on. Both renderers therefore take |p × q|² for the
-determinant (Cauchy–Binet), whose terms are not squared differences. The same cancellation waits in dᵀΣ'⁻¹d at a distance d
-along the needle: its terms are d²/0.6, so the conic's rounding alone moves the exponent by 1e-7·d², which is a fifth of a step
-of a channel at 100 px and the whole splat at 3,000 px. Both therefore draw rows with the square completed,
-(dx − s·dy)²·Σ'yy/det Σ' + dy²/Σ'yy: nothing cancels, and what is left is the rounding of s·dy, 6e-8·dy px. That is below a
-hundredth of a deviation up to dy = 10⁵ px, so needles have the usual bounds: half a step of rounding to 8 bits, one step
-where a contribution of 1/255 is drawn in one arithmetic and not in the other; and a tile, over which such pixels are few, has
-a mean error of at most half a step and a tenth. Gradients in f32 have lost 1e-7·κ, κ being how many of its own widths a
-needle is turned away by a change of its parameters as large as themselves: up to 10⁴ for those within the frame, hence 0.001,
-and 10⁵ for those that reach far beyond it.";
+A Gaussian of deviations σ₁ ≥ σ₂ px on the image has det Σ' ≈ (σ₁² + 0.3)(σ₂² + 0.3). For a needle at 45°, Σ'xx·Σ'yy − Σ'xy² is the
+difference of two numbers of about σ₁⁴/4. In f32 that leaves an error of 6e-8·σ₁⁴/4 in 0.3·σ₁²: nothing is left beyond σ₁ = 4,000 px,
+and a hundredth is wrong from 400 px on. So both renderers take |p × q|² for the determinant (Cauchy–Binet), whose terms are not
+squared differences.
+
+The same cancellation waits in dᵀΣ'⁻¹d at a distance d along the needle. Its terms are d²/0.6, so the conic's rounding alone moves the
+exponent by 1e-7·d²: a fifth of a step of a channel at 100 px, the whole splat at 3,000 px. So both renderers draw rows with the square
+completed, (dx − s·dy)²·Σ'yy/det Σ' + dy²/Σ'yy. Nothing cancels there. What is left is the rounding of s·dy, 6e-8·dy px, below a
+hundredth of a deviation up to dy = 10⁵ px. That is why needles have the usual bounds.
+
+Gradients in f32 have lost 1e-7·κ. Here κ is the number of its own widths by which a needle turns when its parameters change by
+as much as themselves: up to 10⁴ for needles within the frame, hence 0.001, and 10⁵ for those that reach far beyond it.";
 
 /// Along the image's diagonal: the x axis turned by 45° about the line of sight.
 fn diagonal() -> [f32; 4] {
@@ -73,7 +77,7 @@ fn compensated(blob: Blob) -> Picture {
 }
 
 /// The same Gaussians in a scene that knows one deviation of each, the first.
-fn balls(blobs: impl IntoIterator<Item = Blob>) -> Scene<f32> {
+fn isotropic(blobs: impl IntoIterator<Item = Blob>) -> Scene<f32> {
     Blobs { effects: ModelShape { anisotropic: false, ..ModelShape::plain(1, 1) }, ..Blobs::of(blobs) }.scene()
 }
 
@@ -159,19 +163,19 @@ pub(super) fn family() -> Family {
             let camera = Camera { focal_px: [300.0; 2], ..camera() };
             Picture::of(Blobs::of([Blob { position: [200.0, 0.2, 0.6], ..wide(280.0) }]).scene()).through(camera)
         }),
-        picture("isotropic specks", "five of 3·10⁻⁴ px, in a scene that knows no shapes", || {
+        picture("isotropic specks", "five of 3·10⁻⁴ px, in an isotropic scene", || {
             let position = |i: i32| [f64::from(i) / 8.0, f64::from(i) / 16.0, 2.0];
-            Picture::of(balls((-2..=2).map(|i| Blob { position: position(i), ..speck() })))
+            Picture::of(isotropic((-2..=2).map(|i| Blob { position: position(i), ..speck() })))
         }),
         picture("isotropic and wide", "600 px in a frame of 48, half of it from a centre 3,000 px outside", || {
             let beside = Blob { position: [100.0, -40.0, 2.0], ..wide(200.0) };
-            Picture::of(balls([wide(20.0), beside]))
+            Picture::of(isotropic([wide(20.0), beside]))
         }),
         picture(
             "no isotropic needle",
-            "a needle and a pancake of ratio 10⁶ whose scene knows no shapes: balls, of anchors like needles",
+            "a needle and a pancake of ratio 10⁶ whose scene is isotropic: round Gaussians, of anchors like needles",
             || {
-                let mut scene = balls([needle(0.1, 1e6), Blob { position: [0.2, 0.1, 2.5], ..pancake(FRAC_PI_4) }]);
+                let mut scene = isotropic([needle(0.1, 1e6), Blob { position: [0.2, 0.1, 2.5], ..pancake(FRAC_PI_4) }]);
                 for log_scales in scene.anchors.log_scales.chunks_exact_mut(scene.shape.n_log_scales()) {
                     log_scales[..3].copy_from_slice(&[400_f32.ln(), 1e-3_f32.ln(), 1e-3_f32.ln()]);
                 }
@@ -179,5 +183,5 @@ pub(super) fn family() -> Family {
             },
         ),
     ];
-    Family { title: "Shapes of splats", analysis: ANALYSIS, cases }
+    Family { title: "Shapes of splats", answer: ANSWER, analysis: ANALYSIS, cases }
 }

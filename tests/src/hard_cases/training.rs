@@ -9,11 +9,14 @@ use pocketsplat_trainer::train::{TrainConfig, TrainError, Trainer};
 
 use super::{Case, Family, error, n_not_finite, parameters};
 
+const ANSWER: &str = "\
+Whatever the learning rates and photographs, every parameter stays finite. A run that cannot go on says why and keeps the scene it
+had.";
+
 const ANALYSIS: &str = "\
-Here nothing is measured but that every parameter is finite after every iteration. The watchdog looks at loss and gradients
-before they are applied and drops the step otherwise; Adam moves a parameter by at most a few rates whatever the gradient, so
-from finite parameters and gradients below 10¹⁸ come finite parameters. A run whose steps are all dropped ends with an error
-that names the cause, and with the scene it had.";
+Nothing is measured here except that every parameter is finite after every iteration. The watchdog looks at loss and gradients before
+they are applied and drops the step otherwise. Adam moves a parameter by at most a few rates whatever the gradient. So from finite
+parameters and gradients below 10¹⁸ come finite parameters. A run whose steps are all dropped ends with an error that names the cause.";
 
 const SIZE_PX: u32 = 24;
 const ITERATIONS: u32 = 60;
@@ -191,5 +194,5 @@ pub(super) fn family() -> Family {
             run(&capture(gradient, cloud().into_iter().map(|p| eye + 0.1 * p).chain([eye]).collect()), config())
         }),
     ];
-    Family { title: "Training", analysis: ANALYSIS, cases }
+    Family { title: "Training", answer: ANSWER, analysis: ANALYSIS, cases }
 }

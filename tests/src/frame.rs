@@ -7,8 +7,8 @@ use pocketsplat_core::{
     Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, MaxSplats, Quality, Residency, Strips, TileSink,
 };
 use pocketsplat_trainer::bundle::{self, BundleInfo, WriteOptions};
+use pocketsplat_trainer::camera::core_camera;
 use pocketsplat_trainer::cost::{Choice, WithArithmetic};
-use pocketsplat_trainer::render::decoder::core_camera;
 use pocketsplat_trainer::scene::Scene;
 
 /// What lies behind the test scenes.

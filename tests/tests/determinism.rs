@@ -4,9 +4,9 @@ use pocketsplat_capture::dataset::{Capture, LoadOptions, load};
 use pocketsplat_capture::synth::{SynthOptions, write_capture};
 use pocketsplat_trainer::bundle::{self, BundleInfo, WriteOptions};
 use pocketsplat_trainer::scene::{ModelShape, Scene};
+use pocketsplat_trainer::step::StepReport;
 use pocketsplat_trainer::train::config::Backbone;
 use pocketsplat_trainer::train::finish::Finished;
-use pocketsplat_trainer::train::step::StepReport;
 use pocketsplat_trainer::train::{Observer, TrainConfig, Trainer};
 
 /// Keeps the number of anchors after each step.

@@ -5,7 +5,7 @@ use conformance::difference::Difference;
 use conformance::frame::{bundle_of, draw, to_core};
 use conformance::scenes::{CASES, cameras, random_scene};
 use pocketsplat_core::Bundle;
-use pocketsplat_trainer::render::host_camera;
+use pocketsplat_trainer::camera::host_camera;
 use pocketsplat_trainer::render::reference::ReferenceScene;
 
 /// Rounding to 8 bits alone leaves 58.9 dB.

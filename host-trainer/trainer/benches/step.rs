@@ -12,12 +12,12 @@ use pocketsplat_trainer::ops::noise::Stream;
 use pocketsplat_trainer::ops::simd::Level;
 use pocketsplat_trainer::scene::Scene;
 use pocketsplat_trainer::scene::init::initial_scene;
+use pocketsplat_trainer::step::coding::{Coding, RateTerms};
+use pocketsplat_trainer::step::{Loss, LossWeights, StageSeconds, StepReport, Target, Workspace};
 use pocketsplat_trainer::train::TrainConfig;
-use pocketsplat_trainer::train::config::{Backbone, Hac, LossWeights, Rates};
+use pocketsplat_trainer::train::config::{Backbone, Hac, Rates};
 use pocketsplat_trainer::train::context_start::initial_context;
 use pocketsplat_trainer::train::optimiser::Optimiser;
-use pocketsplat_trainer::train::step::coding::{Coding, RateTerms};
-use pocketsplat_trainer::train::step::{Loss, StageSeconds, StepReport, Target, Workspace};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

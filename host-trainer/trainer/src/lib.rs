@@ -1,17 +1,24 @@
 //! Trains a structured neural Gaussian-splat scene from photographs and writes it as a compact bundle.
 //!
-//! Modules in the order data flows through them:
-//! [`scene`] → [`ops`] → [`train`] → [`bundle`] → [`render`] → [`metrics`]; [`device`], [`effects`], [`cost`] and [`verify`] ask
-//! them what fits a device.
+//! Modules in the order data flows through them, each importing only from those before it:
+//! [`real`] and [`camera`] → [`scene`] → [`ops`] → [`step`] → [`train`] → [`bundle`] → [`render`] → [`metrics`]. [`integer_model`] is
+//! what `train`'s last iterations and `bundle` share; [`device`], [`effects`], [`cost`] and [`verify`] ask all of them what fits a
+//! device.
 
 pub mod bundle;
+pub mod camera;
 pub mod cost;
 pub mod device;
 pub mod effects;
+#[cfg(test)]
+pub(crate) mod finite_difference;
 pub mod instructions;
+pub mod integer_model;
 pub mod metrics;
 pub mod ops;
+pub mod real;
 pub mod render;
 pub mod scene;
+pub mod step;
 pub mod train;
 pub mod verify;

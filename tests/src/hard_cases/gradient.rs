@@ -1,11 +1,12 @@
 //! The trainer's gradients of a whole step: finite, right in f64, and about the same in f32.
 
 use pocketsplat_capture::camera::Camera;
-use pocketsplat_trainer::ops::{Pinhole, Real};
+use pocketsplat_trainer::ops::Pinhole;
+use pocketsplat_trainer::real::Real;
 use pocketsplat_trainer::scene::Scene;
-use pocketsplat_trainer::train::config::LossWeights;
-use pocketsplat_trainer::train::step::coding::Coding;
-use pocketsplat_trainer::train::step::{Loss, Target, Workspace};
+use pocketsplat_trainer::step::LossWeights;
+use pocketsplat_trainer::step::coding::Coding;
+use pocketsplat_trainer::step::{Loss, Target, Workspace};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -3,12 +3,13 @@
 use glam::{DMat3, DVec3};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_core::Bundle;
-use pocketsplat_trainer::bundle::{self, QuantisationSteps, WriteOptions, decoded_scene};
+use pocketsplat_trainer::bundle::{self, WriteOptions, decoded_scene};
+use pocketsplat_trainer::camera::host_camera;
 use pocketsplat_trainer::ops::Pinhole;
-use pocketsplat_trainer::render::host_camera;
 use pocketsplat_trainer::render::reference::ReferenceScene;
+use pocketsplat_trainer::scene::QuantisationSteps;
 use pocketsplat_trainer::scene::Scene;
-use pocketsplat_trainer::train::step::Workspace;
+use pocketsplat_trainer::step::Workspace;
 
 use super::gradient;
 use crate::difference::Difference;

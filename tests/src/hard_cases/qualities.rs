@@ -2,7 +2,7 @@
 
 use pocketsplat_core::{Bundle, Quality};
 use pocketsplat_trainer::bundle::{self, WriteOptions};
-use pocketsplat_trainer::render::host_camera;
+use pocketsplat_trainer::camera::host_camera;
 use pocketsplat_trainer::render::reference::ReferenceScene;
 
 use super::picture::{background, worst_tile};

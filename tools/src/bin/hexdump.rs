@@ -11,7 +11,8 @@ use glam::{DMat3, DVec3};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::Normalisation;
 use pocketsplat_core::context::{GridFrame, GridLevel, LevelKind};
-use pocketsplat_trainer::bundle::{self, BundleInfo, Coder, QuantisationSteps, WriteOptions, annotate::annotate};
+use pocketsplat_trainer::bundle::{self, BundleInfo, Coder, WriteOptions, annotate::annotate};
+use pocketsplat_trainer::scene::QuantisationSteps;
 use pocketsplat_trainer::scene::{Anchors, ContextModel, Heads, ModelShape, Scene};
 
 /// The document when none is named.

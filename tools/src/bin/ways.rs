@@ -8,7 +8,7 @@ use clap::Parser;
 use pocketsplat_capture::dataset::{self, LoadOptions};
 use pocketsplat_core::{Budget, Bundle, Camera, Decoder, FrameReport, Residency, Strips, TileSink};
 use pocketsplat_trainer::bundle;
-use pocketsplat_trainer::render::decoder::core_camera;
+use pocketsplat_trainer::camera::core_camera;
 
 /// Draws views of a bundle in every way there is and prints what each takes.
 #[derive(Parser)]

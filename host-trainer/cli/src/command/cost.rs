@@ -9,11 +9,11 @@ use anyhow::{Context, Result};
 use bytesize::ByteSize;
 use pocketsplat_capture::dataset::{Capture, View};
 use pocketsplat_core::{Budget, Bundle, Camera, MaxSplats};
+use pocketsplat_trainer::camera::core_camera;
 use pocketsplat_trainer::cost::{
     CountError, Counter, Instructions, MOST_VIEWS, Measured, Setting, Sight, knobs, measure, quality_grid,
 };
 use pocketsplat_trainer::device::Target;
-use pocketsplat_trainer::render::decoder::core_camera;
 use pocketsplat_trainer::render::reference::ReferenceScene;
 use rayon::prelude::*;
 

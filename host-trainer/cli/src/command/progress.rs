@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use pocketsplat_trainer::scene::Scene;
-use pocketsplat_trainer::train::step::StepReport;
+use pocketsplat_trainer::step::StepReport;
 use pocketsplat_trainer::train::{DroppedStep, Observer};
 
 /// Weight of the newest step in the running means.

@@ -3,9 +3,10 @@
 use anyhow::{Result, bail};
 use clap::ArgAction;
 use pocketsplat_capture::dataset::Background;
-use pocketsplat_trainer::bundle::{Coder, QuantisationSteps};
+use pocketsplat_trainer::bundle::Coder;
 use pocketsplat_trainer::device::Choice;
 use pocketsplat_trainer::effects::{Effect, Request};
+use pocketsplat_trainer::scene::QuantisationSteps;
 use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::config::Backbone;
 use pocketsplat_trainer::train::module::{Modules, Pruning, pruning};

@@ -1,6 +1,7 @@
 //! Why a scene can not be written.
 
 use super::ChannelName;
+use crate::integer_model::IntegerModelError;
 
 /// Why a scene can not be written as a bundle.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -77,14 +78,9 @@ pub enum WriteError {
         /// The value.
         value: f32,
     },
-    /// A weight or bias of the context model is not finite, or too large for eight bits at any scale.
-    #[error("context model, row {row}: {value} does not fit eight bits (weights up to 2032, biases up to 16384)")]
-    ContextWeight {
-        /// Row of its layer.
-        row: usize,
-        /// The value.
-        value: f32,
-    },
+    /// The context model has no integer form.
+    #[error(transparent)]
+    IntegerModel(#[from] IntegerModelError),
     /// An array of the scene has another length than its shape says.
     #[error("{array} has {found} values, the scene's shape calls for {needed}")]
     Length {

@@ -7,7 +7,7 @@ use pocketsplat_core::bundle::{
 use pocketsplat_core::context::N_GROUPS;
 
 use super::{BundleInfo, WriteError};
-use crate::render::decoder::core_camera;
+use crate::camera::core_camera;
 use crate::scene::Scene;
 
 /// A section of the file; the numbers are the format's.

@@ -14,7 +14,7 @@ use super::decoded::decoded_scene;
 use crate::metrics::psnr_db_masked;
 use crate::ops::Pinhole;
 use crate::render::decoder::core_image_of_tiers;
-use crate::train::step::Workspace;
+use crate::step::Workspace;
 use frame::TierCounts;
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::View;
@@ -65,7 +65,7 @@ pub fn measure(bundle: &Bundle<'_>, cameras: &[Camera], held_out: &[View]) -> Re
         for (most, counts) in maxima.iter_mut().zip(counts) {
             most.raise_to(&counts);
         }
-        let core = crate::render::decoder::core_camera(camera)?;
+        let core = crate::camera::core_camera(camera)?;
         for (tier, most) in maxima.iter_mut().enumerate() {
             let in_view = chunks_in_view(bundle, &core, tier as u8 + 1)?;
             most.decoded_anchors = most.decoded_anchors.max(in_view.map(|chunk| u64::from(chunk.n_anchors())).sum());

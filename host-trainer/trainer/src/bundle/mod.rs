@@ -1,6 +1,6 @@
 //! The writer of bundles: place, quantise, count, code, lay out.
 //!
-//! Stages in the order data flows through them: `order` → `quantise` → `table` or [`context`] → `chunk` → `layout`;
+//! Stages in the order data flows through them: `order` → `quantise` → `table` or [the context](crate::integer_model) → `chunk` → `layout`;
 //! beside them `size` says where the bytes of a bundle went, [`manifest`] what drawing it takes and [`annotate`] what each
 //! byte means. The format is described in `decoder-core/src/bundle/FORMAT.md`; what reads it is [`pocketsplat_core`], and
 //! nothing here decides a decoded symbol or value by itself.
@@ -8,7 +8,6 @@
 pub mod annotate;
 mod channels;
 mod chunk;
-pub mod context;
 mod decoded;
 mod directory;
 mod error;
@@ -34,7 +33,6 @@ pub use channels::ChannelName;
 pub use decoded::{decoded_heads, decoded_scene, normalisation_of, shape_of};
 pub use error::WriteError;
 pub use load::{LoadError, load};
-pub use quantise::QuantisationSteps;
 pub use size::{SizePart, SizeReport};
 pub use stream::PartBits;
 pub use write::{Coder, WriteOptions, Written, write};

@@ -18,7 +18,8 @@ use pocketsplat_core::context::{GridFrame, GridLevel, LevelKind};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{BundleInfo, Coder, QuantisationSteps, WriteOptions};
+use super::{BundleInfo, Coder, WriteOptions};
+use crate::scene::QuantisationSteps;
 use crate::scene::{Anchors, ContextModel, Heads, ModelShape, Scene};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::Normalisation;

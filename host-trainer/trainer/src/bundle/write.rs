@@ -14,7 +14,9 @@ use super::mask::MaskModel;
 use super::order::Placement;
 use super::quantise::{Rows, StepSource, check_lengths, quantise};
 use super::table::TableSet;
-use super::{BundleInfo, QuantisationSteps, SizeReport, WriteError, context, directory, heads, manifest};
+use super::{BundleInfo, SizeReport, WriteError, directory, heads, manifest};
+use crate::integer_model;
+use crate::scene::QuantisationSteps;
 use crate::scene::Scene;
 
 /// What gives the symbols of the channels their frequencies.
@@ -93,8 +95,8 @@ pub fn write(scene: &Scene<f32>, info: &BundleInfo, options: &WriteOptions) -> R
             writer.with_tables([feature, log_scale, offset])?
         }
         (Some(model), coder) => {
-            let section = context::section(model, scene.shape.values_per_anchor())?;
-            let context = context::parse(&section, &scene.shape).map_err(WriteError::ReadBack)?;
+            let section = integer_model::section(model, scene.shape.values_per_anchor())?;
+            let context = integer_model::parse(&section, &scene.shape).map_err(WriteError::ReadBack)?;
             let candidates = [
                 (coder != Coder::Static).then(|| writer.with_context(&context, &section)),
                 (coder != Coder::Context).then(|| writer.with_tables(writer.mean_steps(&context, model.base_steps))),

@@ -4,15 +4,16 @@ use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, MaxSplats};
 
 use super::search::{Trials, search};
 use super::{Effect, Price, Worth};
+use crate::camera::core_camera;
 use crate::device::Target;
 use crate::instructions::predict;
 use crate::metrics::psnr_db_masked;
-use crate::render::decoder::{core_camera, image_of};
+use crate::render::decoder::image_of;
 use crate::scene::Scene;
+use crate::step::StepReport;
 use crate::train::config::{Backbone, MIN_VIEWS_TO_HOLD_OUT};
 use crate::train::finish::Finished;
 use crate::train::module::Modules;
-use crate::train::step::StepReport;
 use crate::train::{Observer, TrainConfig, TrainError, Trainer};
 use pocketsplat_capture::dataset::{Capture, Image, View};
 

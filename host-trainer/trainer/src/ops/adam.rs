@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Real;
+use crate::real::Real;
 
 /// Constants of Adam as Scaffold-GS sets them.
 const BETA1: f64 = 0.9;

@@ -1,6 +1,6 @@
 //! Quantisation steps that the context model chooses for each anchor.
 
-use super::Real;
+use crate::real::Real;
 
 /// Least and largest log₂(step/base): what the coder's integer exponents reach, −24 and 7 eighths of an octave.
 pub const EXPONENTS: [f64; 2] = [-3.0, 0.875];
@@ -44,7 +44,7 @@ pub fn backward<R: Real>(exponents: &[R], steps: &[R], d_steps: &[R], d_exponent
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ops::finite_difference::{assert_gradient, random};
+    use crate::finite_difference::{assert_gradient, random};
 
     #[test]
     fn backward_agrees_with_finite_differences() {

@@ -1,9 +1,9 @@
 //! Bits of whole anchors under what the context model says of them.
 
-use super::Real;
 use super::adaptive_step::{EXPONENTS, clamp, clamp_backward};
 use super::rate;
 use super::simd::Level;
+use crate::real::Real;
 use crate::scene::ModelShape;
 
 /// Least and largest log₂(scale/step): what the coder's tables reach, −32 and 31 eighths of an octave.
@@ -161,7 +161,7 @@ pub fn forward<R: Real>(level: Level, rows: &Rows<'_, R>) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ops::finite_difference::{assert_piecewise_gradient, random};
+    use crate::finite_difference::{assert_piecewise_gradient, random};
 
     const SHAPE: ModelShape = ModelShape { view_colour: true, ..ModelShape::plain(4, 3) };
     const N: usize = 5;

@@ -1,6 +1,6 @@
 //! A Gaussian blur of planes: 11 taps, σ 1.5 px, zero beyond the border.
 
-use super::Real;
+use crate::real::Real;
 
 /// Taps of the window.
 const TAPS: usize = 11;

@@ -1,8 +1,8 @@
 //! The detail residual: one small network shared by all Gaussians that adds to a colour what the anchor's feature says about it.
 
-use super::Real;
 use super::matmul::{Matrix, multiply};
 use super::neural_gaussians::{Gaussian, Source};
+use crate::real::Real;
 use crate::scene::Head;
 
 /// What [`forward`] leaves for [`backward`]; buffers are kept from step to step.
@@ -122,7 +122,7 @@ pub fn backward<R: Real>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ops::finite_difference::{assert_piecewise_gradient, random};
+    use crate::finite_difference::{assert_piecewise_gradient, random};
     use crate::ops::head;
 
     const F: usize = 4;

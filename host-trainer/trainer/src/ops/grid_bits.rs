@@ -1,6 +1,6 @@
 //! What the signs of a hash grid would cost, coded with the share of each sign.
 
-use super::Real;
+use crate::real::Real;
 
 /// Shares are kept this far from 0 and 1.
 const MARGIN: f64 = 1e-6;

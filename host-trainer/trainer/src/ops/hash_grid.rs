@@ -3,7 +3,7 @@
 use pocketsplat_core::context::{FEATURES_PER_LEVEL, GridLevel, WEIGHT_ONE};
 use rayon::prelude::*;
 
-use super::Real;
+use crate::real::Real;
 
 /// Writes Σ weight·sign(row) over the corners of every level (Chen et al. 2024, HAC), the weights those of the
 /// decoder: multiples of 2⁻²⁴ whose sums are exact in any order.
@@ -79,7 +79,7 @@ pub fn backward<R: Real>(levels: &[GridLevel], rows: &[R], parts: &[Part<'_, R>]
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ops::finite_difference::random;
+    use crate::finite_difference::random;
     use pocketsplat_core::context::LevelKind;
 
     fn levels() -> Vec<GridLevel> {

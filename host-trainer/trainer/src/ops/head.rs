@@ -1,7 +1,7 @@
 //! One anchor MLP over a block of anchors: `y = W2·relu(W1·x + b1) + b2`.
 
-use super::Real;
 use super::matmul::{Matrix, multiply};
+use crate::real::Real;
 use crate::scene::Head;
 
 /// Evaluates a head for `n` anchors.
@@ -66,7 +66,7 @@ fn add_rows<R: Real>(rows: &[R], sum: &mut [R]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ops::finite_difference::{assert_piecewise_gradient, random};
+    use crate::finite_difference::{assert_piecewise_gradient, random};
 
     /// Σ weights · outputs, a scalar whose gradient exercises every output.
     fn objective(head: &Head<f64>, input: &[f64], weights: &[f64]) -> f64 {

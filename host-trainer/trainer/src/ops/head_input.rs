@@ -1,6 +1,7 @@
 //! What a head sees of an anchor: its feature, the direction and the distance to it.
 
-use super::{Pinhole, Real};
+use super::Pinhole;
+use crate::real::Real;
 use crate::scene::ModelShape;
 
 /// The direction (x_a − c)/‖x_a − c‖ to an anchor, zero at the camera itself, and the distance ‖x_a − c‖ in normalised units.
@@ -49,7 +50,7 @@ pub fn backward<R: Real>(shape: &ModelShape, d_input: &[R], d_features: &mut [R]
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ops::finite_difference::{assert_gradient, random};
+    use crate::finite_difference::{assert_gradient, random};
     use glam::{DMat3, DVec3};
     use pocketsplat_capture::camera::Camera;
 

@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
-use super::Real;
 use super::blur::{blur, window};
 use super::simd::Level;
+use crate::real::Real;
 
 /// Rows that one task blurs.
 const ROWS: usize = 32;
@@ -61,7 +61,7 @@ pub fn forward_backward<R: Real>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ops::finite_difference::{assert_gradient, random};
+    use crate::finite_difference::{assert_gradient, random};
 
     #[test]
     fn backward_agrees_with_finite_differences() {

@@ -1,6 +1,6 @@
 //! Mean absolute difference of two images.
 
-use super::Real;
+use crate::real::Real;
 
 /// `mean |image − truth|` over pixels and channels.
 pub fn forward<R: Real>(image: &[R], truth: &[R]) -> R {
@@ -26,7 +26,7 @@ pub fn backward<R: Real>(image: &[R], truth: &[R], weight: R, d_image: &mut [R])
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ops::finite_difference::{assert_gradient, random};
+    use crate::finite_difference::{assert_gradient, random};
 
     #[test]
     fn backward_agrees_with_finite_differences() {

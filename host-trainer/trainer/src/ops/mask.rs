@@ -1,6 +1,6 @@
 //! Which offsets are drawn: a hard mask over trained logits, with the gradient of a soft one.
 
-use super::Real;
+use crate::real::Real;
 use crate::scene::MASK_THRESHOLD;
 
 /// Whether an offset with this mask logit is drawn: the logit is above [`MASK_THRESHOLD`].
@@ -33,7 +33,7 @@ pub fn term<R: Real>(logits: &[R], weight: R, d_logits: &mut [R]) -> R {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ops::finite_difference::{assert_gradient, random};
+    use crate::finite_difference::{assert_gradient, random};
 
     #[test]
     fn backward_agrees_with_finite_differences() {

@@ -1,6 +1,6 @@
 //! Matrix products on slices: a checked door to `matrixmultiply`.
 
-use super::Real;
+use crate::real::Real;
 
 /// A row-major matrix, or the transpose of one, borrowed from a slice; the first columns of one.
 #[derive(Clone, Copy, Debug)]

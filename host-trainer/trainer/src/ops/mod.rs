@@ -3,7 +3,7 @@
 //! Order of a step: [`prefilter`] → [`head_input`] → [`head`] → [`neural_gaussians`] → [`project`] → [`tiles`] →
 //! [`rasterise`] → [`l1`], [`ssim`], [`volume`] → the same backwards → [`adam`].
 //!
-//! Every operation is generic over [`Real`]: the trainer runs it in f32, the tests compare its backward pass in f64
+//! Every operation is generic over [`Real`](crate::real::Real): the trainer runs it in f32, the tests compare its backward pass in f64
 //! with central differences of its forward pass, and f32 with f64.
 
 pub mod adam;
@@ -30,14 +30,9 @@ pub mod prefilter;
 pub mod project;
 pub mod rasterise;
 pub mod rate;
-mod real;
 pub mod simd;
 pub mod ssim;
 pub mod tiles;
 pub mod volume;
 
-#[cfg(test)]
-pub(crate) mod finite_difference;
-
 pub use pinhole::Pinhole;
-pub use real::Real;

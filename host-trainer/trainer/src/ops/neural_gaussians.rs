@@ -1,7 +1,8 @@
 //! From head outputs to the Gaussians of a view.
 
-use super::real::per_axis;
-use super::{Real, mask};
+use super::mask;
+use crate::real::Real;
+use crate::real::per_axis;
 use crate::scene::ModelShape;
 
 /// A 3-D Gaussian with one colour, in the world frame.
@@ -195,7 +196,7 @@ fn index(i: usize) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ops::finite_difference::{assert_gradient, random};
+    use crate::finite_difference::{assert_gradient, random};
     use crate::scene::MASK_THRESHOLD;
 
     const SHAPE: ModelShape = ModelShape::plain(4, 3);

@@ -1,6 +1,6 @@
 //! The normal distribution, in a form whose loops vectorise.
 
-use super::Real;
+use crate::real::Real;
 
 /// Arguments are lowered to it: φ(8)/φ(0) is 1e-14.
 const MAX: f64 = 8.0;

@@ -1,6 +1,6 @@
 //! How far the columns of a matrix are from the standard normal distribution.
 
-use super::Real;
+use crate::real::Real;
 
 /// Variances below are treated as by the tangent there: no logarithm of 0, no division by 0, and no jump.
 const VARIANCE_FLOOR: f64 = 1e-6;
@@ -109,7 +109,7 @@ fn deviation_of<R: Real>(v: R) -> [R; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ops::finite_difference::{assert_gradient, random};
+    use crate::finite_difference::{assert_gradient, random};
     use crate::ops::normal::density_and_tail;
 
     const WIDTH: usize = 3;

@@ -1,6 +1,6 @@
 //! A target for the sum of a view's opacities.
 
-use super::Real;
+use crate::real::Real;
 
 /// The term `weight·(Σα − T)²/N` and its derivative by each α (the plug-and-play paper, eq. 4).
 ///
@@ -16,7 +16,7 @@ pub fn forward_backward<R: Real>(sum: R, n: usize, target: R, weight: R) -> (R, 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ops::finite_difference::{assert_gradient, random};
+    use crate::finite_difference::{assert_gradient, random};
 
     #[test]
     fn backward_agrees_with_finite_differences() {

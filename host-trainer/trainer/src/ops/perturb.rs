@@ -1,7 +1,7 @@
 //! Values as coding leaves them: with noise in place of rounding while training, rounded in its last phase.
 
-use super::Real;
 use super::noise::Stream;
+use crate::real::Real;
 
 /// v ← v + u·step with u uniform in [−½, ½) (Ballé et al. 2017, "End-to-end optimized image compression", section 3).
 ///
@@ -48,7 +48,7 @@ pub fn backward<R: Real>(d_values: &[R], residuals: &[R]) -> R {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ops::finite_difference::{assert_gradient, random};
+    use crate::finite_difference::{assert_gradient, random};
 
     #[test]
     fn backward_agrees_with_finite_differences() {

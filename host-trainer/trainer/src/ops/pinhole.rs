@@ -1,6 +1,6 @@
 //! The camera as the operations see it.
 
-use super::Real;
+use crate::real::Real;
 use pocketsplat_capture::camera::Camera;
 
 /// Centres at this depth or nearer are not drawn, normalised units (method constant of 3DGS): the f32 nearest to 0.2, so

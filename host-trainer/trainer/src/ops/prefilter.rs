@@ -1,6 +1,9 @@
 //! Which anchors a view may show.
 
-use super::{Pinhole, Real, pinhole::NEAR, project::DILATION_PX2};
+use super::Pinhole;
+use super::pinhole::NEAR;
+use super::project::DILATION_PX2;
+use crate::real::Real;
 use crate::scene::Scene;
 
 /// A splat of opacity 1 falls to 1/255 at √(2 ln 255) = 3.3290 deviations; the rest covers rounding.

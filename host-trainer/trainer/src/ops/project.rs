@@ -1,9 +1,10 @@
 //! From a 3-D Gaussian to its splat on the image plane.
 
+use super::Pinhole;
 use super::neural_gaussians::Gaussian;
 use super::pinhole::NEAR;
-use super::real::per_axis;
-use super::{Pinhole, Real};
+use crate::real::Real;
+use crate::real::per_axis;
 
 /// Low-pass term added to both diagonal entries of a projected covariance, px² (3DGS).
 pub const DILATION_PX2: f64 = 0.3;
@@ -291,7 +292,7 @@ fn quaternion_gradient<R: Real>([w, x, y, z]: [R; 4], columns: &[[R; 3]; 3]) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ops::finite_difference::{assert_gradient, random};
+    use crate::finite_difference::{assert_gradient, random};
     use glam::{DMat3, DVec3};
     use pocketsplat_capture::camera::Camera;
 

@@ -1,7 +1,7 @@
 //! Bits of rounded values under a normal distribution: the rate loss, forward and backward in one pass.
 
-use super::Real;
 use super::normal::density_and_tail;
+use crate::real::Real;
 
 /// Probabilities are lifted to it, so no value costs more than 19.93 bits; below it there is no gradient.
 const FLOOR: f64 = 1e-6;
@@ -75,7 +75,7 @@ pub fn forward_backward<R: Real>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ops::finite_difference::{assert_piecewise_gradient, random};
+    use crate::finite_difference::{assert_piecewise_gradient, random};
 
     /// Values, means and log-scales from `[x, μ, log₂ σ]` in turn.
     fn run<R: Real>(x: &[f64]) -> [Vec<f64>; 3] {

@@ -6,9 +6,9 @@
 
 use rayon::prelude::*;
 
-use super::Real;
 use super::blur::{blur, window};
 use super::simd::Level;
+use crate::real::Real;
 
 const C1: f64 = 0.01 * 0.01;
 const C2: f64 = 0.03 * 0.03;
@@ -135,7 +135,7 @@ pub fn backward<R: Real>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ops::finite_difference::{assert_gradient, random};
+    use crate::finite_difference::{assert_gradient, random};
 
     fn image(seed: u64, size: [usize; 2]) -> Vec<f64> {
         random(seed, 3 * size[0] * size[1]).iter().map(|v| 0.5 + 0.5 * v).collect()

@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::Real;
 use super::project::{Footprint, Splat};
+use crate::real::Real;
 
 /// Edge of a tile, pixels; one row of a tile is one vector of the rasteriser.
 pub const TILE_PX: usize = 16;
@@ -122,7 +122,7 @@ impl TileLists {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ops::finite_difference::random;
+    use crate::finite_difference::random;
 
     #[test]
     fn every_tile_lists_what_reaches_it_nearest_first() {

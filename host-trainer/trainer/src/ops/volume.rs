@@ -1,7 +1,7 @@
 //! Keeps Gaussians small: the mean volume of those a view draws.
 
-use super::Real;
 use super::neural_gaussians::Gaussian;
+use crate::real::Real;
 
 /// `weight · mean(s_x·s_y·s_z)` (Lu et al. 2024, Scaffold-GS, eq. 10), over `n_all` Gaussians of the view.
 ///
@@ -25,7 +25,7 @@ pub fn backward<R: Real>(gaussians: &[Gaussian<R>], weight: R, n_all: usize, d_g
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ops::finite_difference::{assert_gradient, random};
+    use crate::finite_difference::{assert_gradient, random};
 
     #[test]
     fn backward_agrees_with_finite_differences() {

@@ -3,6 +3,7 @@
 use pocketsplat_core::arithmetic::Arithmetic;
 use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, FrameReport, MaxSplats, Residency, Strips, TileSink};
 
+use crate::camera::core_camera;
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::Image;
 
@@ -54,30 +55,6 @@ pub fn image_of<A: Arithmetic>(
     let mut sink = ImageSink::new(camera.width_px, camera.height_px);
     let report = decoder.render(camera, &mut sink)?;
     Ok((sink.image, report))
-}
-
-/// Rounds a camera to the decoder's single precision.
-///
-/// # Errors
-/// [`DecodeError::OutOfRange`] when the image is larger than the decoder draws, and what
-/// [`pocketsplat_core::Camera::check`] finds.
-pub fn core_camera(camera: &Camera) -> Result<pocketsplat_core::Camera, DecodeError> {
-    use pocketsplat_core::Field;
-
-    let size = |field, px: u32| {
-        u16::try_from(px).map_err(|_| DecodeError::OutOfRange { field, found: px, limit: u16::MAX.into() })
-    };
-    let core = pocketsplat_core::Camera {
-        // glam stores columns.
-        rotation: camera.rotation.transpose().to_cols_array().map(|x| x as f32),
-        translation: camera.translation.to_array().map(|x| x as f32),
-        focal_px: camera.focal_px.map(|x| x as f32),
-        principal_px: camera.principal_px.map(|x| x as f32),
-        width_px: size(Field::FrameWidth, camera.width_px)?,
-        height_px: size(Field::FrameHeight, camera.height_px)?,
-    };
-    core.check()?;
-    Ok(core)
 }
 
 /// Copies tiles into an image.

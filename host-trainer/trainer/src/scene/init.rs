@@ -7,7 +7,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::{Anchors, Head, Heads, INITIAL_MASK_LOGIT, ModelShape, Scene};
-use crate::ops::Real;
+use crate::real::Real;
 use pocketsplat_capture::dataset::nearest_squared;
 
 /// Squared distances below this are lifted to it before the logarithm.
@@ -91,7 +91,7 @@ fn mean_squared_spacing(points: &[DVec3]) -> impl Iterator<Item = f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ops::finite_difference::random;
+    use crate::finite_difference::random;
     use rand::SeedableRng;
 
     #[test]
@@ -126,7 +126,7 @@ mod tests {
 
     #[test]
     fn one_anchor_per_cell_in_lexicographic_order() {
-        let shape = crate::train::TrainConfig::default().shape;
+        let shape = ModelShape { view_colour: true, view_geometry: true, ..ModelShape::plain(32, 10) };
         let points = [DVec3::new(0.5, 0.0, 0.0), DVec3::new(0.0, 0.31, 0.0), DVec3::new(0.01, 0.29, 0.0)];
         let scene = initial_scene(shape, 0.1, &points, &mut ChaCha8Rng::seed_from_u64(1));
         assert_eq!(scene.anchors.lattice, [[0, 3, 0], [5, 0, 0]]);

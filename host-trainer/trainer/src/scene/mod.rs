@@ -6,9 +6,13 @@ mod context;
 mod grid_record;
 mod heads;
 pub mod init;
+mod steps;
 
 pub use context::ContextModel;
 pub use heads::{Head, Heads, OutputLayout};
+pub use steps::QuantisationSteps;
+
+use crate::real::Real;
 
 /// What a model consists of: its widths and the effects it pays for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -146,7 +150,7 @@ impl<R> Anchors<R> {
     #[inline]
     pub fn is_drawn(&self, offset: usize) -> bool
     where
-        R: crate::ops::Real,
+        R: Real,
     {
         self.mask_logits[offset] > R::real(MASK_THRESHOLD)
     }
@@ -155,7 +159,7 @@ impl<R> Anchors<R> {
     #[inline]
     pub fn has_drawn(&self, anchor: usize) -> bool
     where
-        R: crate::ops::Real,
+        R: Real,
     {
         let k = self.mask_logits.len() / self.len();
         (anchor * k..(anchor + 1) * k).any(|offset| self.is_drawn(offset))
@@ -164,7 +168,7 @@ impl<R> Anchors<R> {
     /// Switches offsets off, counted through all anchors': sigmoid of their logits is 1e-5 then.
     pub fn mask(&mut self, offsets: &[usize])
     where
-        R: crate::ops::Real,
+        R: Real,
     {
         for offset in offsets {
             self.mask_logits[*offset] = R::real(MASKED);
@@ -192,7 +196,7 @@ pub struct Scene<R> {
     pub context: Option<ContextModel<R>>,
 }
 
-impl<R: crate::ops::Real> Scene<R> {
+impl<R: Real> Scene<R> {
     /// Position of an anchor: its lattice coordinates times ε, the product rounded as the decoder rounds it.
     #[inline]
     pub fn position(&self, anchor: usize) -> [R; 3] {
@@ -201,7 +205,7 @@ impl<R: crate::ops::Real> Scene<R> {
     }
 
     /// The same scene in another number type.
-    pub fn cast<T: crate::ops::Real>(&self) -> Scene<T> {
+    pub fn cast<T: Real>(&self) -> Scene<T> {
         let all = |values: &[R]| values.iter().map(|v| T::real((*v).into())).collect::<Vec<T>>();
         let head = |h: &Head<R>| h.map(|w| T::real(w.into()));
         Scene {

@@ -2,12 +2,13 @@
 
 use pocketsplat_core::context::Context;
 
-use super::config::{Phase, TrainConfig};
-use super::step::coding::{Coding, Exact, RateTerms};
+use super::config::TrainConfig;
 use super::{TrainError, Trainer, context_start};
-use crate::bundle::context as integers;
+use crate::integer_model::{self, IntegerModelError};
 use crate::ops::noise::Stream;
 use crate::scene::{Head, Scene};
+use crate::step::Phase;
+use crate::step::coding::{Coding, Exact, RateTerms};
 
 /// The integer form of a scene's context model, as bytes and as the network that they stand for.
 #[derive(Clone, Debug)]
@@ -24,10 +25,10 @@ impl Integers {
     pub(super) fn of(scene: &Scene<f32>) -> Result<Self, TrainError> {
         let n_channels = scene.shape.values_per_anchor();
         let model = scene.context.as_ref().ok_or_else(|| TrainError::Context("the scene has none".to_owned()))?;
-        let refused = |error: crate::bundle::WriteError| TrainError::Context(error.to_string());
+        let refused = |error: IntegerModelError| TrainError::Context(error.to_string());
         Ok(Self {
-            section: integers::section(model, n_channels).map_err(refused)?,
-            network: integers::rounded(model, n_channels).map_err(refused)?,
+            section: integer_model::section(model, n_channels).map_err(refused)?,
+            network: integer_model::rounded(model, n_channels).map_err(refused)?,
         })
     }
 
@@ -36,7 +37,7 @@ impl Integers {
     /// # Errors
     /// As [`Self::of`].
     pub(super) fn context(&self, scene: &Scene<f32>) -> Result<Context<'_>, TrainError> {
-        integers::parse(&self.section, &scene.shape).map_err(|error| TrainError::Context(error.to_string()))
+        integer_model::parse(&self.section, &scene.shape).map_err(|error| TrainError::Context(error.to_string()))
     }
 }
 

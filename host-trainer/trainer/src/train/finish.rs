@@ -4,12 +4,12 @@ use pocketsplat_core::context::{Context, Group, N_GROUPS};
 use rayon::prelude::*;
 
 use super::coding::Integers;
-use super::step::Workspace;
 use super::survey::Survey;
 use super::{TrainError, Trainer};
 use crate::ops::simd::Level;
 use crate::ops::{anchor_bits, hash_grid, head, mask, perturb};
 use crate::scene::Scene;
+use crate::step::Workspace;
 
 /// Anchors that one task looks at.
 const ROWS: usize = 512;

@@ -12,7 +12,6 @@ pub mod optimiser;
 mod outcome;
 pub mod run;
 pub mod statistics;
-pub mod step;
 pub mod survey;
 #[cfg(test)]
 pub(crate) mod test_capture;
@@ -33,14 +32,13 @@ use crate::ops::Pinhole;
 use crate::ops::noise::Stream;
 use crate::scene::init::initial_scene;
 use crate::scene::{Anchors, Heads, Scene};
+use crate::step::{Loss, Moment, Phase, Target, Workspace, clear_masked};
 use checkpoint::{CaptureSignature, Kernels};
 use coding::Integers;
-use config::{Backbone, Densification, Phase, Rate, Rates};
-use module::Moment;
+use config::{Backbone, Densification, Rate, Rates};
 use optimiser::Optimiser;
 use pocketsplat_capture::dataset::{Capture, Image, View};
 use statistics::Statistics;
-use step::{Loss, Target, Workspace, clear_masked};
 use survey::Survey;
 use watchdog::Watchdog;
 

@@ -16,10 +16,10 @@
 //! One that keeps offsets short, as `module/short.rs`:
 //!
 //! ```
-//! use pocketsplat_trainer::ops::Real;
+//! use pocketsplat_trainer::real::Real;
 //! use pocketsplat_trainer::scene::Scene;
-//! use pocketsplat_trainer::train::module::{Module, Moment, Terms};
-//! use pocketsplat_trainer::train::step::Block;
+//! use pocketsplat_trainer::train::module::Module;
+//! use pocketsplat_trainer::step::{Block, Moment, Terms};
 //! use serde::{Deserialize, Serialize};
 //!
 //! #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -58,7 +58,7 @@
 //! ```
 //!
 //! and `short: Short,` among the modules below. It then has a name, a place in configurations (`[train.modules.short]`), and its
-//! gradient is checked as the others' are, by a line in the tests of [`crate::train::step`].
+//! gradient is checked as the others' are, by a line in the tests of [`crate::step`].
 
 pub mod detail;
 pub mod distribution;
@@ -69,85 +69,13 @@ use std::fmt::Debug;
 use serde::{Deserialize, Serialize};
 
 use super::Trainer;
-use super::config::Phase;
-use super::step::Block;
-use crate::ops::Real;
-use crate::ops::noise::Stream;
-use crate::ops::simd::Level;
-use crate::scene::{ModelShape, Scene};
+use crate::real::Real;
+use crate::scene::ModelShape;
+use crate::step::{Moment, Terms};
 
 pub use detail::Detail;
 pub use distribution::Distribution;
 pub use pruning::Pruning;
-
-/// Where a run stands when a module is asked.
-#[derive(Clone, Copy, Debug)]
-pub struct Moment {
-    /// Current iteration, from 1.
-    pub iteration: u32,
-    /// Iterations of the run.
-    pub iterations: u32,
-    /// What the step does to the values of anchors.
-    pub phase: Phase,
-    /// Whether the values of anchors have a scale that means something: from the first noise on where the run comes to
-    /// that, else always. Before, a network can undo any change of scale.
-    pub scaled: bool,
-    /// Random numbers of this iteration.
-    pub stream: Stream,
-}
-
-impl Moment {
-    /// Whether more than `share` of the run is done.
-    pub fn is_after(&self, share: f64) -> bool {
-        f64::from(self.iteration) > self.iteration_at(share)
-    }
-
-    /// Whether just `share` of the run is done.
-    pub fn is_at(&self, share: f64) -> bool {
-        f64::from(self.iteration) == self.iteration_at(share)
-    }
-
-    fn iteration_at(&self, share: f64) -> f64 {
-        (share * f64::from(self.iterations)).round()
-    }
-}
-
-/// Two images that are compared.
-#[derive(Clone, Copy, Debug)]
-pub struct Pictures<'a, R> {
-    /// What was drawn, planes `[3, height, width]`.
-    pub image: &'a [R],
-    /// The photograph.
-    pub truth: &'a [R],
-    /// Width and height.
-    pub size_px: [usize; 2],
-    /// Instruction set of the loops.
-    pub level: Level,
-}
-
-/// What a module adds to the loss of a step: each function returns its terms and adds their gradients.
-pub trait Terms<R: Real>: Sync {
-    /// Terms on the image.
-    ///
-    /// * `d_image`: planes as the image; added to.
-    fn on_image(&self, _at: &Moment, _pictures: &Pictures<'_, R>, _d_image: &mut [R]) -> R {
-        R::ZERO
-    }
-
-    /// Terms on the Gaussians of the view, after the forward pass.
-    ///
-    /// * `blocks`: [`Block::d_gaussians`] is added to.
-    fn on_gaussians(&self, _at: &Moment, _scene: &Scene<R>, _blocks: &mut [Block<R>]) -> R {
-        R::ZERO
-    }
-
-    /// Terms on the parameters of the visible anchors, after the backward pass.
-    ///
-    /// * `blocks`: gradients of anchors are added to.
-    fn on_anchors(&self, _at: &Moment, _scene: &Scene<R>, _blocks: &mut [Block<R>]) -> R {
-        R::ZERO
-    }
-}
 
 /// A plug-in of the training; everything has a default that does nothing.
 pub trait Module: Terms<f32> + Terms<f64> + Debug {

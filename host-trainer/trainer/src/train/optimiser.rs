@@ -4,10 +4,10 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::config::Rates;
-use super::step::{Block, Workspace};
-use crate::ops::Real;
 use crate::ops::adam::{self, Moments, Step};
+use crate::real::Real;
 use crate::scene::{Anchors, ContextModel, Head, Heads, ModelShape, Scene};
+use crate::step::{Block, Workspace};
 
 /// Anchors one task updates.
 const ROWS: usize = 2048;

@@ -1,8 +1,8 @@
 //! What a run gives back: to whom it reports, what an iteration did, why it stopped.
 
-use super::step::StepReport;
 use super::watchdog::DroppedStep;
 use crate::scene::Scene;
+use crate::step::StepReport;
 
 /// Hears of every step of a run.
 pub trait Observer {

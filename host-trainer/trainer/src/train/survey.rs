@@ -1,9 +1,9 @@
 //! What the training views show of every anchor once training is over: which offsets are drawn, and how much an anchor
 //! counts.
 
-use super::step::Workspace;
 use crate::ops::Pinhole;
 use crate::scene::Scene;
+use crate::step::Workspace;
 
 /// One pass over some views.
 #[derive(Clone, Debug, PartialEq)]

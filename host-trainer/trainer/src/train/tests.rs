@@ -1,10 +1,10 @@
 //! A run with the rate of HAC, from its first iteration to what it hands to the writer.
 
-use super::config::Phase;
 use super::finish::Finished;
-use super::step::coding::RateReport;
 use super::test_capture::{tiny_capture, tiny_config, tiny_hac_config};
 use super::*;
+use crate::step::Phase;
+use crate::step::coding::RateReport;
 
 /// All steps of a run: phase and rate of each.
 fn trained(trainer: &mut Trainer<'_>) -> Vec<(Phase, Option<RateReport>)> {

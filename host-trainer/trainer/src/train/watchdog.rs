@@ -4,9 +4,9 @@ use std::fmt;
 
 use rayon::prelude::*;
 
-use super::step::{Block, StepReport, Workspace};
 use crate::ops::neural_gaussians::Gaussian;
 use crate::scene::{Heads, Scene};
+use crate::step::{Block, StepReport, Workspace};
 
 /// Gradients above are refused like infinite ones: their squares would overflow in Adam's second moment.
 const LARGEST_GRADIENT: f32 = 1e18;

@@ -5,7 +5,7 @@ use pocketsplat_core::bundle::TierMeasures;
 use crate::ops::project::{ALPHA_CUTOFF, Footprint, Splat};
 use crate::ops::tiles::TILE_PX;
 use crate::scene::ModelShape;
-use crate::train::step::Block;
+use crate::step::Block;
 use pocketsplat_capture::camera::Camera;
 
 /// Numbers of horizontal strips that a frame is cut into.

@@ -4,13 +4,14 @@ use pocketsplat_core::Bundle;
 
 use super::{SMALL, options, random_scene, with_context, write_bytes};
 use crate::bundle::channels::{ContextWork, GROUPS};
-use crate::bundle::{Coder, context, decoded_scene};
+use crate::bundle::{Coder, decoded_scene};
+use crate::integer_model;
 use crate::ops::noise::Stream;
 use crate::ops::perturb;
 use crate::scene::{ModelShape, Scene};
+use crate::step::coding::{Coding, Exact, RateTerms};
+use crate::step::{Loss, Target, Workspace};
 use crate::train::Trainer;
-use crate::train::step::coding::{Coding, Exact, RateTerms};
-use crate::train::step::{Loss, Target, Workspace};
 use crate::train::test_capture::{tiny_capture, tiny_hac_config};
 
 /// The bundle of a scene under its context model.
@@ -34,9 +35,9 @@ fn the_decoder_draws_what_the_last_step_drew() {
     decoded.heads = finished.scene.heads.clone();
 
     let (shape, model) = (trainer.scene.shape, trainer.scene.context.as_ref().expect("trained with one"));
-    let section = context::section(model, shape.values_per_anchor()).expect("an integer form");
-    let network = context::rounded(model, shape.values_per_anchor()).expect("an integer form");
-    let integers = context::parse(&section, &shape).expect("a sound section");
+    let section = integer_model::section(model, shape.values_per_anchor()).expect("an integer form");
+    let network = integer_model::rounded(model, shape.values_per_anchor()).expect("an integer form");
+    let integers = integer_model::parse(&section, &shape).expect("a sound section");
     let exact = Some(Exact { context: &integers, network: &network });
     let rate = RateTerms { lambda: 0.0, sample: 0.0, mask: 0.0, grid: 0.0 };
     let last_step = Coding::Context { stream: Stream::of_run(config.seed), rate, exact };
@@ -73,9 +74,9 @@ fn in_order_of(scene: &Scene<f32>, decoded: &Scene<f32>) -> Scene<f32> {
 fn quotients_that_round_to_a_tie_round_as_in_training() {
     let mut scene = with_context(random_scene(SMALL, 400, 4), 5);
     scene.anchors.mask_logits.fill(1.0);
-    let section = context::section(scene.context.as_ref().expect("given one"), SMALL.values_per_anchor());
+    let section = integer_model::section(scene.context.as_ref().expect("given one"), SMALL.values_per_anchor());
     let section = section.expect("a sound model");
-    let integers = context::parse(&section, &SMALL).expect("a sound section");
+    let integers = integer_model::parse(&section, &SMALL).expect("a sound section");
     let f = SMALL.feature_dim;
     let (mut expected, mut n_apart) = (Vec::new(), 0);
     for (a, cell) in scene.anchors.lattice.iter().enumerate() {

@@ -4,10 +4,10 @@ use rayon::prelude::*;
 
 use super::row::{ALPHA_MAX, LOOK_EVERY, Row, alpha_row, draws_nothing, mark_dead, reduce, step_row};
 use super::{TILE_VALUES, Tile, TileSplat, TiledImage};
-use crate::ops::Real;
 use crate::ops::project::{Footprint, Splat};
 use crate::ops::simd::Level;
 use crate::ops::tiles::{TILE_PX, TileLists};
+use crate::real::Real;
 
 /// Gradient of [`forward`](super::forward()) with respect to every splat.
 ///

@@ -3,8 +3,8 @@
 use rayon::prelude::*;
 
 use super::TILE_VALUES;
-use crate::ops::Real;
 use crate::ops::tiles::TILE_PX;
+use crate::real::Real;
 
 /// An image in tile order, as [`forward`](super::forward()) writes and [`backward`](super::backward()) reads it.
 #[derive(Clone, Debug, Default)]

@@ -19,9 +19,9 @@ pub use backward::{background_gradient, backward};
 pub use forward::forward;
 pub use image::TiledImage;
 
-use super::Real;
 use super::project::{Footprint, Splat};
 use super::tiles::{TILE_PX, TileLists};
+use crate::real::Real;
 use row::rows;
 
 /// Values of one channel of a tile.

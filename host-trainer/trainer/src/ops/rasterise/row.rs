@@ -1,8 +1,8 @@
 //! The arithmetic of one row of a tile: alpha, transmittance, the stop rule.
 
-use crate::ops::Real;
 use crate::ops::project::{ALPHA_CUTOFF, Splat};
 use crate::ops::tiles::TILE_PX;
+use crate::real::Real;
 
 /// Largest opacity of one contribution.
 pub(super) const ALPHA_MAX: f64 = 0.99;

@@ -1,7 +1,7 @@
 //! The rasteriser against plain loops, against finite differences, and against itself on other instruction sets.
 
 use super::*;
-use crate::ops::finite_difference::{assert_gradient, assert_piecewise_gradient, random};
+use crate::finite_difference::{assert_gradient, assert_piecewise_gradient, random};
 use crate::ops::simd::Level;
 use crate::ops::tiles;
 

@@ -7,7 +7,7 @@ use pocketsplat_core::{Bundle, DecodeError};
 
 use super::ReferenceScene;
 use crate::bundle::{decoded_heads, shape_of};
-use crate::ops::Real;
+use crate::real::Real;
 use crate::scene::Scene;
 
 impl ReferenceScene {

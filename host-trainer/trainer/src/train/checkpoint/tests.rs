@@ -10,7 +10,7 @@ use pocketsplat_capture::dataset::Mask;
 struct Silent;
 
 impl Observer for Silent {
-    fn step(&mut self, _: u32, _: &crate::train::step::StepReport<f32>, _: &crate::scene::Scene<f32>) {}
+    fn step(&mut self, _: u32, _: &crate::step::StepReport<f32>, _: &crate::scene::Scene<f32>) {}
 }
 
 fn saved(trainer: &Trainer<'_>) -> Vec<u8> {

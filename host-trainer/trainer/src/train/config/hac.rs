@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::bundle::QuantisationSteps;
+use crate::scene::QuantisationSteps;
 
 /// The kinds of scene that can be trained.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -13,19 +13,6 @@ pub enum Backbone {
     Scaffold,
     /// The same, trained for image and bits, with a context model and masks (Chen et al. 2024, HAC).
     Hac,
-}
-
-/// What a step does to the values of anchors.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Phase {
-    /// Nothing.
-    Raw,
-    /// Noise of fixed steps.
-    Noise,
-    /// Noise of the context model's steps, and the rate.
-    Context,
-    /// Rounding as the decoder sees it, and the rate.
-    Exact,
 }
 
 /// The rate's part of a run with [`Backbone::Hac`]; constants of the published trainer unless said otherwise.

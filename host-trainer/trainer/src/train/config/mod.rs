@@ -4,10 +4,11 @@ mod hac;
 
 use serde::{Deserialize, Serialize};
 
-pub use hac::{Backbone, Hac, Phase};
+pub use hac::{Backbone, Hac};
 
 use super::module::Modules;
 use crate::scene::ModelShape;
+use crate::step::{LossWeights, Phase};
 use pocketsplat_capture::dataset::{Capture, PointsOrigin};
 
 /// A geometric path of a learning rate over the run: from `start` to `end`; equal values make it constant.
@@ -75,21 +76,6 @@ impl Default for Rates {
             context: Rate { start: 0.005, end: 1e-5 },
             background: background_rate(),
         }
-    }
-}
-
-/// Weights of the loss (Scaffold-GS, eq. 10).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct LossWeights {
-    /// Share λ of 1 − SSIM; L1 has 1 − λ.
-    pub dssim: f64,
-    /// Mean volume of the Gaussians.
-    pub volume: f64,
-}
-
-impl Default for LossWeights {
-    fn default() -> Self {
-        Self { dssim: 0.2, volume: 0.01 }
     }
 }
 

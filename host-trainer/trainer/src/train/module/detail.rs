@@ -2,9 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Module, Moment, Pictures, Terms};
-use crate::ops::{Real, high_pass};
+use super::Module;
+use crate::ops::high_pass;
+use crate::real::Real;
 use crate::scene::ModelShape;
+use crate::step::{Moment, Pictures, Terms};
 use crate::train::config::within;
 
 /// Adds a residual to each Gaussian's colour, H = x + F(x ⊕ f) (the plug-and-play paper, eq. 5; see [`crate::ops::detail`]).

@@ -3,12 +3,12 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::{Module, Moment, Terms};
-use crate::ops::Real;
+use super::Module;
 use crate::ops::normality::{Moments, Weights};
+use crate::real::Real;
 use crate::scene::Scene;
+use crate::step::{Block, Moment, Terms};
 use crate::train::config::within;
-use crate::train::step::Block;
 
 /// Pulls the features of each channel, over the anchors of a view, towards the standard normal distribution, and their
 /// deviation towards 1 (the plug-and-play paper, eqs. 2 and 3, with P the normal distribution of the channel's moments).

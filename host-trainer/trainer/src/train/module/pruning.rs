@@ -5,13 +5,13 @@ use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use super::{Module, Moment, Terms};
-use crate::ops::Real;
+use super::Module;
 use crate::ops::opacity_target::forward_backward;
+use crate::real::Real;
 use crate::scene::Scene;
+use crate::step::{Block, Moment, Terms};
 use crate::train::Trainer;
 use crate::train::config::within;
-use crate::train::step::Block;
 
 /// What the event does with the anchors it picks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -255,7 +255,7 @@ mod tests {
         let moment = |iteration| Moment {
             iteration,
             iterations: 40,
-            phase: crate::train::config::Phase::Raw,
+            phase: crate::step::Phase::Raw,
             scaled: true,
             stream: crate::ops::noise::Stream::of_run(3).branch(iteration),
         };

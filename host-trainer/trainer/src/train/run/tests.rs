@@ -2,7 +2,7 @@ use std::fs;
 use std::sync::atomic::AtomicBool;
 
 use super::*;
-use crate::train::step::StepReport;
+use crate::step::StepReport;
 use crate::train::test_capture::{tiny_capture, tiny_config};
 
 const ITERATIONS: u32 = 40;

@@ -4,21 +4,23 @@ mod block;
 mod coded;
 pub mod coding;
 mod context;
+mod loss;
 mod stages;
 
 use rayon::prelude::*;
 
-use super::config::LossWeights;
-use super::module::{Moment, Pictures, Terms};
 use crate::ops::project::{Footprint, Splat};
 use crate::ops::rasterise::TiledImage;
 use crate::ops::simd::Level;
-use crate::ops::{Pinhole, Real, l1, prefilter, rasterise, ssim, tiles, volume};
+use crate::ops::{Pinhole, l1, prefilter, rasterise, ssim, tiles, volume};
+use crate::real::Real;
 use crate::scene::{Head, Heads, ModelShape, Scene};
 pub use block::Block;
 use coded::{Network, Weights};
+pub use coding::Phase;
 use coding::{Coding, RateReport};
 pub use context::ContextGradients;
+pub use loss::{Loss, LossWeights, Moment, Pictures, Terms};
 pub use stages::StageSeconds;
 use stages::Stopwatch;
 
@@ -37,24 +39,6 @@ pub struct Target<'a, R> {
     pub mask: Option<&'a [bool]>,
     /// What lies behind everything.
     pub background: [R; 3],
-}
-
-/// What a step's loss consists of besides the rate.
-#[derive(Clone, Copy)]
-pub struct Loss<'a, R> {
-    /// Weights of the image's terms.
-    pub weights: LossWeights,
-    /// The terms of modules, and what they are told of the run.
-    pub modules: Option<(&'a [&'a dyn Terms<R>], &'a Moment)>,
-    /// Anchors whose [place](crate::scene::Anchors::places) is below are not there.
-    pub pruned_share: f32,
-}
-
-impl<R> Loss<'_, R> {
-    /// The image's terms alone.
-    pub fn plain(weights: LossWeights) -> Self {
-        Self { weights, modules: None, pruned_share: 0.0 }
-    }
 }
 
 /// What a step gives back, besides the gradients it leaves in the [`Workspace`].
@@ -107,7 +91,7 @@ impl<R> Target<'_, R> {
 }
 
 /// Makes the pixels that do not count zero in every plane: as in the photograph, so that no loss sees them.
-pub(super) fn clear_masked<R: Real>(planes: &mut [R], mask: Option<&[bool]>) {
+pub(crate) fn clear_masked<R: Real>(planes: &mut [R], mask: Option<&[bool]>) {
     let Some(mask) = mask else { return };
     for plane in planes.chunks_exact_mut(mask.len()) {
         for (value, valid) in plane.iter_mut().zip(mask) {

@@ -5,7 +5,8 @@ use super::coding::Coding;
 use crate::ops::neural_gaussians::{Gaussian, HeadOutputs, Source};
 use crate::ops::project::{Footprint, Splat};
 use crate::ops::simd::Level;
-use crate::ops::{Pinhole, Real, detail, head, head_input, neural_gaussians, project, volume};
+use crate::ops::{Pinhole, detail, head, head_input, neural_gaussians, project, volume};
+use crate::real::Real;
 use crate::scene::{Anchors, Head, Heads, ModelShape, Scene};
 
 /// A block of visible anchors on its way through the chain; buffers are kept from step to step.

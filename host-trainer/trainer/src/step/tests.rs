@@ -8,12 +8,12 @@ use pocketsplat_core::context::{GridFrame, GridLevel, Group, LevelKind};
 
 use super::coding::{Exact, RateTerms};
 use super::*;
-use crate::bundle::context::{parse, rounded, section};
-use crate::ops::finite_difference::{assert_piecewise_gradient, random};
+use crate::finite_difference::{assert_piecewise_gradient, random};
+use crate::integer_model::{parse, rounded, section};
 use crate::ops::noise::Stream;
 use crate::scene::ContextModel;
 use crate::scene::init::initial_scene;
-use crate::train::config::Phase;
+use crate::step::Phase;
 use crate::train::module::{Detail, Distribution, Modules, Pruning};
 use pocketsplat_capture::camera::Camera;
 

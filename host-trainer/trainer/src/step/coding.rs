@@ -5,6 +5,19 @@ use pocketsplat_core::context::Context;
 use crate::ops::noise::Stream;
 use crate::scene::Head;
 
+/// What a step does to the values of anchors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// Nothing.
+    Raw,
+    /// Noise of fixed steps.
+    Noise,
+    /// Noise of the context model's steps, and the rate.
+    Context,
+    /// Rounding as the decoder sees it, and the rate.
+    Exact,
+}
+
 /// What happens to the values of the visible anchors before they are drawn.
 #[derive(Clone, Copy, Debug)]
 pub enum Coding<'a, R> {

@@ -7,7 +7,8 @@ use super::coded::steps_of;
 use super::coding::{RateReport, RateTerms};
 use super::{Coding, Network, Weights, Workspace};
 use crate::ops::hash_grid::Part;
-use crate::ops::{Real, grid_bits, hash_grid};
+use crate::ops::{grid_bits, hash_grid};
+use crate::real::Real;
 use crate::scene::{ContextModel, Head, Scene};
 
 /// Gradients of a [`ContextModel`].

@@ -7,7 +7,6 @@ use pocketsplat_core::DecodeError;
 use pocketsplat_core::context::{Context, MAX_BIAS, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS, MEAN_PARTS};
 use pocketsplat_core::entropy::EIGHTHS;
 
-use super::WriteError;
 use crate::scene::{ContextModel, Head, ModelShape};
 
 /// Bits of the fraction of an input: [`pocketsplat_core::context::FEATURE_ONE`].
@@ -18,6 +17,30 @@ pub const HIDDEN_BITS: i32 = 10;
 const MAX_WEIGHT_BITS: i32 = 13;
 /// Coarsest: the shift by [`HIDDEN_BITS`] less the output's fraction bits, 6 at most, must not become negative.
 const MIN_WEIGHT_BITS: i32 = -4;
+
+/// Why a context model has no integer form.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum IntegerModelError {
+    /// More levels or hidden units than the format has.
+    #[error("{what} are {found}; the format holds 1 to {most}")]
+    Count {
+        /// Which.
+        what: &'static str,
+        /// How many there are.
+        found: usize,
+        /// Most of the format.
+        most: usize,
+    },
+    /// A weight or bias is not finite, or too large for eight bits at any scale.
+    #[error("context model, row {row}: {value} does not fit eight bits (weights up to 2032, biases up to 16384)")]
+    Weight {
+        /// Row of its layer.
+        row: usize,
+        /// The value.
+        value: f32,
+    },
+}
 
 /// One row of a layer in integers.
 struct Row {
@@ -39,12 +62,12 @@ pub fn parse<'s>(section: &'s [u8], shape: &ModelShape) -> Result<Context<'s>, D
 /// The context section of a bundle.
 ///
 /// # Errors
-/// [`WriteError::Count`] when the model has more levels or hidden units than the format, [`WriteError::ContextWeight`] for a
+/// [`IntegerModelError::Count`] when the model has more levels or hidden units than the format, [`IntegerModelError::Weight`] for a
 /// weight that is not finite or too large.
-pub fn section(model: &ContextModel<f32>, n_channels: usize) -> Result<Vec<u8>, WriteError> {
+pub fn section(model: &ContextModel<f32>, n_channels: usize) -> Result<Vec<u8>, IntegerModelError> {
     let within = |what, found: usize, most: usize| match found {
         1.. if found <= most => Ok(()),
-        _ => Err(WriteError::Count { what, found, least: 1, most }),
+        _ => Err(IntegerModelError::Count { what, found, most }),
     };
     within("grid levels of the context", model.levels.len(), MAX_CONTEXT_LEVELS.into())?;
     within("hidden units of the context", model.mlp.n_hidden, MAX_CONTEXT_HIDDEN.into())?;
@@ -78,7 +101,7 @@ pub fn section(model: &ContextModel<f32>, n_channels: usize) -> Result<Vec<u8>, 
 ///
 /// # Errors
 /// As [`section`].
-pub fn rounded(model: &ContextModel<f32>, n_channels: usize) -> Result<Head<f32>, WriteError> {
+pub fn rounded(model: &ContextModel<f32>, n_channels: usize) -> Result<Head<f32>, IntegerModelError> {
     let [hidden, output] = rows(model, n_channels)?;
     let weights = |layer: &[Row]| -> Vec<f32> {
         let row = |row: &Row| {
@@ -92,7 +115,7 @@ pub fn rounded(model: &ContextModel<f32>, n_channels: usize) -> Result<Head<f32>
 }
 
 /// Both layers in integers.
-fn rows(model: &ContextModel<f32>, n_channels: usize) -> Result<[Vec<Row>; 2], WriteError> {
+fn rows(model: &ContextModel<f32>, n_channels: usize) -> Result<[Vec<Row>; 2], IntegerModelError> {
     let mlp = &model.mlp;
     // Fraction bits of what goes in and of what comes out.
     let layer = |weights: &[f32], n_in: usize, biases: &[f32], bits_in: i32, bits_out: &dyn Fn(usize) -> i32| {
@@ -107,10 +130,16 @@ fn rows(model: &ContextModel<f32>, n_channels: usize) -> Result<[Vec<Row>; 2], W
     ])
 }
 
-fn integer_row(index: usize, weights: &[f32], bias: f32, bits_in: i32, bits_out: i32) -> Result<Row, WriteError> {
+fn integer_row(
+    index: usize,
+    weights: &[f32],
+    bias: f32,
+    bits_in: i32,
+    bits_out: i32,
+) -> Result<Row, IntegerModelError> {
     let largest = weights.iter().fold(0.0_f32, |largest, weight| largest.max(weight.abs()));
     if let Some(&value) = weights.iter().chain([&bias]).find(|w| !w.is_finite()) {
-        return Err(WriteError::ContextWeight { row: index, value });
+        return Err(IntegerModelError::Weight { row: index, value });
     }
     // Room for the half that rounds the shift.
     let bias_room = f64::from(MAX_BIAS / 2);
@@ -118,7 +147,7 @@ fn integer_row(index: usize, weights: &[f32], bias: f32, bits_in: i32, bits_out:
         f64::from(largest) * power_of_two(bits) <= f64::from(i8::MAX)
             && f64::from(bias.abs()) * power_of_two(bits + bits_in) <= bias_room
     });
-    let too_large = WriteError::ContextWeight { row: index, value: largest.max(bias.abs()) };
+    let too_large = IntegerModelError::Weight { row: index, value: largest.max(bias.abs()) };
     let weight_bits = weight_bits.ok_or(too_large)?;
     let shift = weight_bits + bits_in - bits_out;
     let half = if shift > 0 { 1 << (shift - 1) } else { 0 };
@@ -142,7 +171,7 @@ mod tests {
     use pocketsplat_core::context::{FEATURE_ONE, GridFrame, GridLevel, Group, LevelKind};
 
     use super::*;
-    use crate::ops::finite_difference::random;
+    use crate::finite_difference::random;
     use crate::ops::head;
     use crate::scene::ModelShape;
 
@@ -235,7 +264,7 @@ mod tests {
         let mut model = model(1, 0.5);
         model.mlp.w2[3 * 16] = f32::NAN;
         let error = section(&model, SHAPE.values_per_anchor()).expect_err("not a number");
-        assert!(matches!(error, WriteError::ContextWeight { row: 3, .. }), "{error}");
+        assert!(matches!(error, IntegerModelError::Weight { row: 3, .. }), "{error}");
         model.mlp.w2[3 * 16] = 1e6;
         assert!(section(&model, SHAPE.values_per_anchor()).is_err(), "no shift is left for it");
     }

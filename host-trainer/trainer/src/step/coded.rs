@@ -7,7 +7,8 @@ use super::block::refill;
 use super::coding::{Coding, Exact};
 use crate::ops::noise::Stream;
 use crate::ops::simd::Level;
-use crate::ops::{Real, adaptive_step, anchor_bits, hash_grid, head, mask, perturb};
+use crate::ops::{adaptive_step, anchor_bits, hash_grid, head, mask, perturb};
+use crate::real::Real;
 use crate::scene::{ContextModel, Head, ModelShape, Scene};
 
 /// Number of the draw that decides whether an anchor is in the sample; channels are fewer.

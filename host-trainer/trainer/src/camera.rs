@@ -1,0 +1,59 @@
+//! Cameras between the host's double precision and the decoder's single precision.
+
+use glam::{DMat3, DVec3};
+use pocketsplat_core::{DecodeError, Field};
+
+use pocketsplat_capture::camera::Camera;
+
+/// The host's camera of a decoder's, number for number: [`core_camera`] takes it back unchanged.
+pub fn host_camera(camera: &pocketsplat_core::Camera) -> Camera {
+    Camera {
+        // glam stores columns.
+        rotation: DMat3::from_cols_array(&camera.rotation.map(f64::from)).transpose(),
+        translation: DVec3::from(camera.translation.map(f64::from)),
+        focal_px: camera.focal_px.map(f64::from),
+        principal_px: camera.principal_px.map(f64::from),
+        width_px: camera.width_px.into(),
+        height_px: camera.height_px.into(),
+    }
+}
+
+/// Rounds a camera to the decoder's single precision.
+///
+/// # Errors
+/// [`DecodeError::OutOfRange`] when the image is larger than the decoder draws, and what
+/// [`pocketsplat_core::Camera::check`] finds.
+pub fn core_camera(camera: &Camera) -> Result<pocketsplat_core::Camera, DecodeError> {
+    let size = |field, px: u32| {
+        u16::try_from(px).map_err(|_| DecodeError::OutOfRange { field, found: px, limit: u16::MAX.into() })
+    };
+    let core = pocketsplat_core::Camera {
+        // glam stores columns.
+        rotation: camera.rotation.transpose().to_cols_array().map(|x| x as f32),
+        translation: camera.translation.to_array().map(|x| x as f32),
+        focal_px: camera.focal_px.map(|x| x as f32),
+        principal_px: camera.principal_px.map(|x| x as f32),
+        width_px: size(Field::FrameWidth, camera.width_px)?,
+        height_px: size(Field::FrameHeight, camera.height_px)?,
+    };
+    core.check()?;
+    Ok(core)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{core_camera, host_camera};
+
+    #[test]
+    fn a_decoders_camera_survives_the_way_to_the_host_and_back() {
+        let camera = pocketsplat_core::Camera {
+            rotation: [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9],
+            translation: [1.1, -2.2, 3.3],
+            focal_px: [100.1, 99.9],
+            principal_px: [40.3, 29.7],
+            width_px: 80,
+            height_px: 60,
+        };
+        assert_eq!(core_camera(&host_camera(&camera)), Ok(camera), "f32 → f64 → f32 loses nothing");
+    }
+}

@@ -3,13 +3,18 @@
 //! The suites see public interfaces alone. Each of them asks one question:
 //!
 //! * `parity`: does the decoder draw what the f64 oracle draws?
+//! * `golden`: does it draw what it drew before?
+//! * `arithmetic`, `quality`: do other number formats and lower qualities stay near the exact frames?
+//! * `memory`: do the planned bytes suffice, does one byte less fail and say how many are needed, and do all plan variants draw
+//!   the same pixels?
 //! * `delivery`: does a sink get every pixel once, whatever the scratch memory held and wherever it lay?
-//! * `budget`: do the planned bytes suffice, and does one byte less fail and say how many are needed?
-//! * `memory`: do all ways to use memory draw the same pixels, touch nothing else, and say how much they needed?
+//! * `misuse`: is a frame, a bundle or a camera that a decoder was not planned for refused?
 //! * `malformed`: does a damaged bundle fail and name the place, or report the damaged chunk, and never draw another
 //!   picture in silence?
 //! * `tiers`: is each tier's scene part of the next one's, and is a file cut at its end that scene?
 //! * `digests`: do symbols not depend on the number of threads?
+//! * `orbit`: is the decoder's orbit the one that the manifest was measured over?
+//! * `stopwatch`: is a stopwatch told of every stage, in order, without a change of the frame?
 //! * `fuzzing`: do the bodies of the fuzz targets hold on a seeded walk?
 //! * `captures`: do captures load with the conventions that the renderers use?
 //! * `hard_cases`, `hard_neighbourhoods`: do named hard cases, and what lies near them, keep the bounds that

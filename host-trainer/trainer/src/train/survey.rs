@@ -1,4 +1,4 @@
-//! What the training views show of every anchor once training is over: which offsets are drawn, and how much an anchor
+//! What the training views show of every anchor: which offsets are drawn, and how much an anchor
 //! counts.
 
 use crate::ops::Pinhole;

@@ -2,8 +2,7 @@
 
 use bytemuck::Pod;
 
-use crate::bundle::saturate;
-use crate::error::DecodeError;
+use crate::error::{DecodeError, saturate};
 
 /// The part of the caller's memory not yet handed out, in words of four bytes.
 pub(crate) struct Arena<'s> {

@@ -1,6 +1,6 @@
 //! The pinhole camera of a frame.
 
-use crate::{DecodeError, error::Field};
+use crate::error::{DecodeError, Field};
 
 /// A pinhole camera in the normalised frame of a bundle: x right, y down, z forward (OpenCV).
 ///

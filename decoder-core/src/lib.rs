@@ -6,6 +6,7 @@
 extern crate std;
 
 mod arena;
+mod bytes;
 mod camera;
 mod error;
 

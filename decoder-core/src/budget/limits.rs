@@ -1,8 +1,7 @@
 //! What a caller wants of a plan, and within what.
 
 use super::quality::Quality;
-use crate::bundle::in_range;
-use crate::error::{DecodeError, Field};
+use crate::error::{DecodeError, Field, in_range};
 
 /// Largest width and height of a frame, pixels: a tile's column and row fit a byte.
 pub const MAX_FRAME_PX: u16 = 255 * 16;

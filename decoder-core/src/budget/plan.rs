@@ -3,8 +3,8 @@
 use super::limits::{Budget, MaxSplats, Overflow, Residency, Strips};
 use super::shape::{FrameShape, Resident, ScratchShape};
 use super::work::{Work, decoding_macs};
-use crate::bundle::{Bundle, STRIPS, Tier, TierMeasures, saturate};
-use crate::error::DecodeError;
+use crate::bundle::{Bundle, STRIPS, Tier, TierMeasures};
+use crate::error::{DecodeError, saturate};
 use crate::raster::TILE_PX;
 
 /// What reading a baked Gaussian is worth in multiply-adds.

@@ -1,7 +1,6 @@
 //! What accuracy a frame may give up to be drawn sooner.
 
-use crate::bundle::in_range;
-use crate::error::{DecodeError, Field};
+use crate::error::{DecodeError, Field, in_range};
 
 /// Largest [`Quality::alpha_cut`].
 pub const MAX_ALPHA_CUT: u8 = 64;

@@ -7,13 +7,12 @@ mod record;
 use channels::{ChannelModels, ContextModels};
 pub(crate) use record::{AnchorRecords, RecordLayout, RecordMemory};
 
-use super::cursor::saturate;
 use super::lattice::Lattice;
 use super::tables::{IndexedTable, IndexedTables};
 use super::{Bundle, Coder};
 use crate::context::Context;
 use crate::entropy::{AnsReader, MaskModel, TrieReader};
-use crate::error::{DecodeError, Field};
+use crate::error::{DecodeError, Field, saturate};
 use crate::stopwatch::Stopwatch;
 
 /// Where an anchor stands and which of its offsets are drawn.

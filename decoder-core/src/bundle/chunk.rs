@@ -1,9 +1,9 @@
 //! A chunk: up to a few hundred neighbouring anchors that decode by themselves.
 
-use super::cursor::saturate;
 use super::directory::{ChunkRecord, InkFrame};
-use super::{AnchorModels, AnchorReader, AnchorSite, crc32};
-use crate::error::{DecodeError, Field};
+use super::{AnchorModels, AnchorReader, AnchorSite};
+use crate::bytes::crc32;
+use crate::error::{DecodeError, Field, saturate};
 
 /// One record of the directory and the bytes it stands for.
 #[derive(Clone, Copy, Debug)]

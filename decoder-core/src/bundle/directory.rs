@@ -1,9 +1,8 @@
 //! The directory: the tiers, and one record a chunk.
 
-use super::cursor::Cursor;
-use super::emitter::Emitter;
-use super::header::{Header, in_range};
-use crate::error::{DecodeError, Field, SectionKind};
+use super::header::Header;
+use crate::bytes::{Cursor, Emitter};
+use crate::error::{DecodeError, Field, SectionKind, in_range};
 
 /// Length of a tier's record, bytes.
 pub const TIER_RECORD_LEN: usize = 12;

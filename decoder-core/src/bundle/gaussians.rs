@@ -1,9 +1,9 @@
 //! The section of Gaussian counts: how many Gaussians a scene consists of that looks the same from everywhere.
 
-use super::cursor::Cursor;
 use super::directory::Directory;
-use super::header::{Header, in_range};
-use crate::error::{DecodeError, Field, SectionKind};
+use super::header::Header;
+use crate::bytes::Cursor;
+use crate::error::{DecodeError, Field, SectionKind, in_range};
 
 /// Length of a tier's count, bytes.
 const COUNT_LEN: usize = 4;

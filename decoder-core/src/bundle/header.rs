@@ -1,14 +1,11 @@
 //! The header: fixed fields, then the section table, then its own checksum.
 
-use super::crc::crc32_of;
-use super::crc32;
-use super::cursor::Cursor;
-use super::emitter::Emitter;
 use super::features::Features;
 use super::section::{SECTION_LEN, Section};
+use crate::bytes::{Cursor, Emitter, crc32, crc32_of};
 use crate::camera::Camera;
 use crate::context::N_GROUPS;
-use crate::error::{DecodeError, Field, SectionKind};
+use crate::error::{DecodeError, Field, SectionKind, in_range};
 
 /// The first bytes of every bundle. As in PNG: not ASCII, then a name, then line ends that text transfers would change.
 pub const MAGIC: [u8; 8] = *b"\x89PSB\r\n\x1a\n";
@@ -275,15 +272,4 @@ pub(crate) const fn n_log_scales(anisotropic: bool) -> u16 {
 /// Outputs of the covariance head for an offset: three scale logits and a quaternion, or one scale logit.
 pub(crate) const fn covariance_outputs(anisotropic: bool) -> u16 {
     if anisotropic { 7 } else { 1 }
-}
-
-/// Checks `least <= found <= most` and names the limit that does not hold.
-pub(crate) fn in_range(field: Field, found: u32, least: u32, most: u32) -> Result<(), DecodeError> {
-    if found < least {
-        return Err(DecodeError::OutOfRange { field, found, limit: least });
-    }
-    if found > most {
-        return Err(DecodeError::OutOfRange { field, found, limit: most });
-    }
-    Ok(())
 }

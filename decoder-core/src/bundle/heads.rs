@@ -4,9 +4,9 @@ mod weights;
 
 pub use weights::{CodedHeads, LayerWeights, WeightReader};
 
-use super::cursor::Cursor;
 use super::header::{Header, covariance_outputs};
-use crate::error::{DecodeError, Field, SectionKind};
+use crate::bytes::Cursor;
+use crate::error::{DecodeError, Field, SectionKind, saturate};
 use crate::math::{from_half, is_finite_half};
 
 /// Matrices of all heads at most: W1 and W2 of opacity, covariance, colour, detail.
@@ -46,7 +46,7 @@ impl<'a> Halves<'a> {
         let halves = cursor.pairs(n)?;
         for (index, pair) in (first..).zip(halves) {
             if !is_finite_half(u16::from_le_bytes(*pair)) {
-                return Err(DecodeError::BadFloat { field: Field::HeadWeight, index: super::saturate(index) });
+                return Err(DecodeError::BadFloat { field: Field::HeadWeight, index: saturate(index) });
             }
         }
         Ok(Self(halves))
@@ -166,6 +166,6 @@ impl<'a> HeadsView<'a> {
                 weights.next_layer().for_each(drop);
             }
         }
-        weights.finish().map_err(|left| DecodeError::HeadStream { left_bytes: super::saturate(left) })
+        weights.finish().map_err(|left| DecodeError::HeadStream { left_bytes: saturate(left) })
     }
 }

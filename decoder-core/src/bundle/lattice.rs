@@ -1,9 +1,8 @@
 //! The lattice section: where the cells of anchors may lie, and the model of which do.
 
-use super::cursor::Cursor;
-use super::header::in_range;
+use crate::bytes::Cursor;
 use crate::entropy::{FREQUENCY_TOTAL, N_TRIE_CONTEXTS, TrieModel};
-use crate::error::{DecodeError, Field, SectionKind};
+use crate::error::{DecodeError, Field, SectionKind, in_range};
 
 /// Most bits of a cell's code along an axis: three of them fit a u64.
 pub const MAX_LATTICE_BITS: u8 = 21;

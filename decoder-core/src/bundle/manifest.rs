@@ -1,7 +1,6 @@
 //! The manifest: what each tier was measured to look like and to cost.
 
-use super::cursor::Cursor;
-use super::emitter::Emitter;
+use crate::bytes::{Cursor, Emitter};
 use crate::error::{DecodeError, Field, SectionKind};
 
 /// Length of a tier's record, bytes.

@@ -1,9 +1,8 @@
 //! The masks section: how often each offset is drawn.
 
-use super::cursor::Cursor;
-use super::header::in_range;
+use crate::bytes::Cursor;
 use crate::entropy::{FREQUENCY_TOTAL, MaskModel, N_MASK_CONTEXTS};
-use crate::error::{DecodeError, Field, SectionKind};
+use crate::error::{DecodeError, Field, SectionKind, in_range};
 
 impl<'a> MaskModel<'a> {
     /// Reads and checks the frequencies of `n_offsets` offsets.

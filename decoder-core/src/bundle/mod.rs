@@ -13,10 +13,7 @@ pub mod format {}
 
 mod anchor;
 mod chunk;
-mod crc;
-mod cursor;
 mod directory;
-mod emitter;
 mod features;
 mod gaussians;
 mod header;
@@ -27,19 +24,17 @@ mod masks;
 mod section;
 mod tables;
 
+pub use crate::bytes::crc32;
 pub use anchor::{AnchorModels, AnchorReader, AnchorSite};
 pub(crate) use anchor::{AnchorRecords, RecordLayout, RecordMemory, model_words};
 pub use chunk::Chunk;
-pub use crc::crc32;
-pub(crate) use cursor::{Cursor, saturate};
 pub use directory::{CHUNK_RECORD_LEN, ChunkRecord, Directory, INK_FRAME_LEN, InkFrame, TIER_RECORD_LEN, Tier};
-pub(crate) use emitter::Emitter;
 pub use features::{Effects, Features};
 pub use header::{
     HEADER_FIXED_LEN, Header, MAGIC, MAX_ANCHORS, MAX_CHUNK_ANCHORS, MAX_FEATURE_DIM, MAX_OFFSETS, MAX_TIERS, VERSION,
     header_len,
 };
-pub(crate) use header::{covariance_outputs, in_range, n_log_scales};
+pub(crate) use header::{covariance_outputs, n_log_scales};
 pub use heads::{CodedHeads, Halves, HeadView, HeadsView, LayerWeights, WeightReader};
 pub use lattice::{Lattice, MAX_LATTICE_BITS, MAX_LATTICE_MIN};
 pub use manifest::{MANIFEST_RECORD_LEN, STRIPS, TierMeasures};
@@ -48,7 +43,7 @@ pub use tables::{Table, Tables};
 
 use crate::context::Context;
 use crate::entropy::MaskModel;
-use crate::error::{DecodeError, SectionKind};
+use crate::error::{DecodeError, SectionKind, saturate};
 use gaussians::GaussianCounts;
 use section::Sections;
 

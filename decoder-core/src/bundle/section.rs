@@ -1,10 +1,8 @@
 //! The section table: where each part lies, and its checksum.
 
-use super::cursor::{Cursor, saturate};
-use super::emitter::Emitter;
 use super::features::Features;
-use super::header::in_range;
-use crate::error::{DecodeError, Field, SectionKind};
+use crate::bytes::{Cursor, Emitter, crc32};
+use crate::error::{DecodeError, Field, SectionKind, in_range, saturate};
 
 /// Length of a row of the section table, bytes.
 pub const SECTION_LEN: usize = 16;
@@ -81,7 +79,7 @@ impl Section {
         let available = saturate(file.len()).saturating_sub(self.offset);
         let truncated = DecodeError::Truncated { section: self.kind, needed: self.len, available };
         let bytes = file.get(self.offset as usize..end as usize).ok_or(truncated)?;
-        let computed = super::crc32(bytes);
+        let computed = crc32(bytes);
         if computed != self.crc {
             return Err(DecodeError::SectionChecksum { section: self.kind, stored: self.crc, computed });
         }

@@ -4,10 +4,9 @@ mod index;
 
 pub(super) use index::{IndexedTable, IndexedTables};
 
-use super::cursor::{Cursor, saturate};
-use super::header::in_range;
+use crate::bytes::Cursor;
 use crate::entropy::{AnsReader, FREQUENCY_TOTAL, Slot, SymbolModel};
-use crate::error::{DecodeError, Field, SectionKind};
+use crate::error::{DecodeError, Field, SectionKind, in_range, saturate};
 
 /// Largest magnitude of a dequantised value: e^±88 and more is clamped anyway, and no product of two overflows.
 const MAX_VALUE: f32 = 1e18;

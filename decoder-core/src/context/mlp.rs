@@ -1,8 +1,7 @@
 //! The integer network from grid features to means, scales and steps.
 
 use super::grid::FEATURES_PER_LEVEL;
-use crate::bundle::saturate;
-use crate::error::{DecodeError, Field};
+use crate::error::{DecodeError, Field, saturate};
 
 /// Most hidden units: with it, and biases of at most [`MAX_BIAS`], no sum passes 2³¹ whatever the weights are.
 pub const MAX_CONTEXT_HIDDEN: u16 = 256;

@@ -14,9 +14,9 @@ pub use grid::{Corners, FEATURES_PER_LEVEL, GridFrame, GridLevel, LevelKind, WEI
 pub use mlp::{MAX_BIAS, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS};
 pub use steps::{Group, GroupStep, MAX_STEP_EXPONENT, MEAN_PARTS, MIN_STEP_EXPONENT, N_GROUPS, Steps};
 
-use crate::bundle::{Cursor, Emitter, in_range, saturate};
+use crate::bytes::{Cursor, Emitter};
 use crate::entropy::{EIGHTHS, NormalModel};
-use crate::error::{DecodeError, Field, SectionKind};
+use crate::error::{DecodeError, Field, SectionKind, in_range, saturate};
 use mlp::Layer;
 use steps::check_base_steps;
 
@@ -287,7 +287,7 @@ const _: () = assert!(EIGHTHS == 8, "scale outputs and the tables count octaves 
 #[cfg(test)]
 mod tests {
     use super::{ContextHead, level};
-    use crate::bundle::Cursor;
+    use crate::bytes::Cursor;
     use crate::context::{GridFrame, GridLevel, LevelKind, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS};
     use crate::error::SectionKind;
 

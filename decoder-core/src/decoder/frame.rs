@@ -7,9 +7,8 @@ use super::tally::Tally;
 use super::{Decoder, FrameReport, TileSink};
 use crate::arithmetic::Arithmetic;
 use crate::budget::Overflow;
-use crate::bundle::{in_range, saturate};
 use crate::camera::Camera;
-use crate::error::{DecodeError, Field};
+use crate::error::{DecodeError, Field, in_range, saturate};
 use crate::project::View;
 use crate::raster::{
     BlendRule, EMPTY, TILE_PIXELS, TILE_PX, TilePlace, TileRect, blend_tile, finish_tile, sort_by_depth,

@@ -1,7 +1,7 @@
 //! The splats in memory, and their order.
 
 use crate::arithmetic::Choices;
-use crate::bundle::saturate;
+use crate::error::saturate;
 use crate::project::{Splat, SplatRecord};
 use crate::raster::{TileRect, sort_by_depth};
 

@@ -10,7 +10,6 @@ mod ans;
 mod mask;
 mod model;
 mod normal;
-mod normal_tables;
 #[cfg(test)]
 pub(crate) mod testing;
 mod trie;

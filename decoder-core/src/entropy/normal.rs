@@ -5,8 +5,10 @@
 //! means are in eighths, of which five tables do, because a mean of −p/8 is the mirror image of +p/8. Means and scales
 //! between those of the tables cost 0.1 % of the bits. `tools/src/bin/normal_tables.rs` writes the tables.
 
-use super::normal_tables::{BOUNDS, SCALES};
+mod tables;
+
 use super::{AnsReader, FREQUENCY_TOTAL, PRECISION_BITS, Slot, SymbolModel, UniformByte};
+use tables::{BOUNDS, SCALES};
 
 /// Number of scales.
 pub const N_SCALES: usize = 64;
@@ -29,13 +31,13 @@ const ESCAPE_NEAR: u8 = 253;
 
 /// The tables of one scale.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) struct Scale {
+struct Scale {
     /// Where the table of each δ begins in [`BOUNDS`], δ from −4 to 3; those of −δ and δ are the same.
-    pub(super) first: [u16; EIGHTHS as usize],
+    first: [u16; EIGHTHS as usize],
     /// D, the farthest symbol that has an entry.
-    pub(super) reach: u16,
+    reach: u16,
     /// For each piece of the range an entry that begins at or before the piece's start, whatever the phase.
-    pub(super) short_cuts: [u8; N_NORMAL_SHORT_CUTS],
+    short_cuts: [u8; N_NORMAL_SHORT_CUTS],
 }
 
 /// The distribution N(mean, σ) of an integer symbol.

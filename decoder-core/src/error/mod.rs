@@ -1,8 +1,10 @@
 //! The one error of the decoder: what is wrong, where, and what would be right.
 
+mod check;
 mod message;
 mod place;
 
+pub(crate) use check::{in_range, saturate};
 pub use place::{Field, SectionKind};
 
 /// Whose fault an error is, which decides what can be done about it.

@@ -1,4 +1,4 @@
-//! Writes the frequency tables of integer Gaussians (`decoder-core/src/entropy/normal_tables.rs`), or checks them.
+//! Writes the frequency tables of integer Gaussians (`decoder-core/src/entropy/normal/tables.rs`), or checks them.
 //!
 //!     cargo run -p tools --bin normal_tables -- --write
 //!     cargo run -p tools --bin normal_tables -- --check
@@ -11,7 +11,7 @@ use pocketsplat_core::entropy::{
     EIGHTHS, FREQUENCY_TOTAL, N_NORMAL_SHORT_CUTS, N_PHASES, N_SCALES, NORMAL_WINDOW, SCALE_ONE,
 };
 
-const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../decoder-core/src/entropy/normal_tables.rs");
+const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../decoder-core/src/entropy/normal/tables.rs");
 
 fn main() -> Result<()> {
     let path = Path::new(FILE);
@@ -40,9 +40,9 @@ fn source() -> String {
     // A decoder looks at as many from the start of any table.
     all_bounds.extend([usize::from(FREQUENCY_TOTAL); NORMAL_WINDOW]);
     let mut text = String::from(
-        "//! Tables of [`normal`](super::normal), written by `cargo run -p tools --bin normal_tables -- --write`.
+        "//! The tables, written by `cargo run -p tools --bin normal_tables -- --write`.
 
-use super::normal::{N_SCALES, Scale};
+use super::{N_SCALES, Scale};
 
 /// Of each scale where its tables begin in [`BOUNDS`], how far they reach, and short cuts into them.
 #[rustfmt::skip]

@@ -1,7 +1,8 @@
 //! The matrices of the heads, weight by weight, however they are stored.
 
-use super::{Cursor, DecodeError, Field, Halves, Matrices, N_MATRICES, SectionKind};
+use super::{DecodeError, Field, Halves, Matrices, N_MATRICES, SectionKind};
 use crate::bundle::tables::Table;
+use crate::bytes::Cursor;
 use crate::entropy::AnsReader;
 use crate::math::from_half;
 

@@ -6,9 +6,10 @@ use std::vec::Vec;
 use super::builder::{LATTICE_MIN, Variant, bundle};
 use super::variants;
 use crate::bundle::{
-    Bundle, ChunkRecord, Coder, Cursor, Effects, Features, Header, InkFrame, Lattice, SECTION_LEN, STRIPS, Section,
-    Table, Tables, Tier, TierMeasures, header_len, manifest,
+    Bundle, ChunkRecord, Coder, Effects, Features, Header, InkFrame, Lattice, SECTION_LEN, STRIPS, Section, Table,
+    Tables, Tier, TierMeasures, header_len, manifest,
 };
+use crate::bytes::Cursor;
 use crate::camera::Camera;
 use crate::context::{Context, ContextHead};
 use crate::entropy::TrieModel;

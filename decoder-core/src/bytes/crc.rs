@@ -38,7 +38,7 @@ pub fn crc32(bytes: &[u8]) -> u32 {
 
 /// The same of bytes that lie nowhere.
 #[inline]
-pub(super) fn crc32_of(bytes: impl Iterator<Item = u8>) -> u32 {
+pub(crate) fn crc32_of(bytes: impl Iterator<Item = u8>) -> u32 {
     !bytes.fold(!0, |crc, byte| {
         let [low, ..] = crc.to_le_bytes();
         let remainder = REMAINDERS.get(usize::from(low ^ byte)).copied().unwrap_or(0);

@@ -1,6 +1,6 @@
-//! Tables of [`normal`](super::normal), written by `cargo run -p tools --bin normal_tables -- --write`.
+//! The tables, written by `cargo run -p tools --bin normal_tables -- --write`.
 
-use super::normal::{N_SCALES, Scale};
+use super::{N_SCALES, Scale};
 
 /// Of each scale where its tables begin in [`BOUNDS`], how far they reach, and short cuts into them.
 #[rustfmt::skip]

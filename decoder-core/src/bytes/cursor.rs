@@ -1,6 +1,6 @@
 //! The only code that turns bytes into numbers.
 
-use crate::{DecodeError, error::SectionKind};
+use crate::error::{DecodeError, SectionKind, saturate};
 
 /// Reads little-endian numbers one after the other and knows in which section it stands.
 #[derive(Clone, Copy, Debug)]
@@ -109,9 +109,4 @@ impl<'a> Cursor<'a> {
         let needed = self.position().saturating_add(n);
         DecodeError::Truncated { section: self.section, needed: saturate(needed), available: saturate(self.len) }
     }
-}
-
-/// A length for an error message; bundles are below 4 GiB, so nothing is lost in practice.
-pub(crate) fn saturate(n: usize) -> u32 {
-    u32::try_from(n).unwrap_or(u32::MAX)
 }

@@ -40,10 +40,7 @@ impl Features {
     /// Bits that have a meaning in this version; bit 9 is reserved.
     const KNOWN: u32 = 0b101_1111_1111;
 
-    /// The bit that says what a scene lacks, where the others say what it has: so a decoder of balls alone misses it and refuses.
-    const ISOTROPIC: u32 = 1 << 7;
-
-    /// What this decoder is built with, a bit for each; that of [`Self::ISOTROPIC`] for its opposite.
+    /// What this decoder is built with, a bit for each.
     const BUILT: u32 = {
         let view = cfg!(feature = "view");
         let effects = Effects {
@@ -56,7 +53,7 @@ impl Features {
             background: cfg!(feature = "background"),
         };
         let built = Self { effects, masks: true, context: cfg!(feature = "context"), coded_heads: true };
-        built.to_bits() ^ Self::ISOTROPIC
+        built.to_bits()
     };
 
     /// The bits as the header stores them.
@@ -72,7 +69,7 @@ impl Features {
             | (self.context as u32) << 4
             | (self.coded_heads as u32) << 5
             | (detail as u32) << 6
-            | if anisotropic { 0 } else { Self::ISOTROPIC }
+            | (anisotropic as u32) << 7
             | (background as u32) << 8
             | (view_geometry as u32) << 10
     }
@@ -87,7 +84,7 @@ impl Features {
         if unknown_bits != 0 {
             return Err(DecodeError::UnsupportedFeatures { unknown_bits });
         }
-        let missing_bits = (bits ^ Self::ISOTROPIC) & !Self::BUILT;
+        let missing_bits = bits & !Self::BUILT;
         if missing_bits != 0 {
             return Err(DecodeError::NotBuilt { missing_bits });
         }
@@ -99,7 +96,7 @@ impl Features {
                 view_distance: has(2),
                 dilation_compensation: has(4),
                 detail: has(64),
-                anisotropic: !has(Self::ISOTROPIC),
+                anisotropic: has(128),
                 background: has(256),
             },
             masks: has(8),
@@ -120,7 +117,7 @@ mod tests {
     fn known_bits_come_back_and_unknown_ones_are_named() {
         for bits in 0..2048 {
             let unknown_bits = bits & !Features::KNOWN;
-            let missing_bits = (bits ^ Features::ISOTROPIC) & !Features::BUILT;
+            let missing_bits = bits & !Features::BUILT;
             let expected = match (unknown_bits, missing_bits) {
                 (0, 0) => Ok(bits),
                 (0, _) => Err(DecodeError::NotBuilt { missing_bits }),

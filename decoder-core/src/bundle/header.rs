@@ -10,7 +10,7 @@ use crate::error::{DecodeError, Field, SectionKind, in_range};
 /// The first bytes of every bundle. As in PNG: not ASCII, then a name, then line ends that text transfers would change.
 pub const MAGIC: [u8; 8] = *b"\x89PSB\r\n\x1a\n";
 /// The format version this crate reads.
-pub const VERSION: u16 = 2;
+pub const VERSION: u16 = 3;
 /// Length of the header's fields before the section table, bytes.
 pub const HEADER_FIXED_LEN: usize = 160;
 /// Widest feature and hidden layer; bounds the work of an anchor.

@@ -53,6 +53,13 @@ fn anchors_come_back_whatever_the_features() {
 }
 
 #[test]
+fn another_version_is_refused_before_anything_else() {
+    let mut bytes = bundle(variants().next().expect("some"));
+    bytes[8] = 2;
+    assert_eq!(Bundle::parse(&bytes).err(), Some(DecodeError::UnsupportedVersion { found: 2, supported: 3 }));
+}
+
+#[test]
 fn a_colour_behind_a_scene_without_a_background_is_refused() {
     let mut bytes = bundle(variants().next().expect("some"));
     bytes[17] &= !1;

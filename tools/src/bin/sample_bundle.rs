@@ -25,7 +25,7 @@ struct Args {
     /// Without glint and haze: as the same from everywhere.
     #[arg(long)]
     matte: bool,
-    /// Of balls, not of discs.
+    /// With isotropic Gaussians instead of discs.
     #[arg(long)]
     isotropic: bool,
 }

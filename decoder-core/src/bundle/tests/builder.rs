@@ -305,12 +305,13 @@ pub(super) fn bundle(variant: Variant) -> Vec<u8> {
         | u32::from(variant.context) << 4
         | u32::from(variant.coded_heads) << 5
         | u32::from(variant.detail) << 6
+        | 1 << 7
         | 1 << 8
         | 1 << 10;
     let camera = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 6.0, 30.0, 30.0, 16.0, 12.0];
     let mut file = [
         MAGIC.to_vec(),
-        u16s(&[2, header_len as u16]),
+        u16s(&[3, header_len as u16]),
         u32s(&[file_len as u32, features, 0xFFFF_FFFF]),
         u16s(&[F as u16, K as u16]),
         u32s(&[n_anchors, n_chunks]),

@@ -9,8 +9,8 @@ const INTRODUCTION: &str = "\
 
 ## What to rely on
 
-- A frame of the decoder is within 1.5 steps of 8 bits of the exact picture, whatever the scene and the camera. The exceptions are
-  stacks of opaque layers, where a rule of the format is a jump: 4 steps.
+- A frame of the decoder is within 1.5 steps of 8 bits of the exact picture. Exceptions are stacks of hundreds of layers, where a rule
+  of the format is a jump (up to 4 steps), and very long lenses (2 steps).
 - The same holds for any memory, any number of strips, any machine.
 - Training cannot produce a number that is not finite, and neither can a bundle contain one.
 - If you change the arithmetic of the decoder or the trainer, run this catalogue: it holds what breaks splat renderers, case by case,

@@ -10,7 +10,7 @@
 //! | `VIEWS` | absolute path of cameras to draw instead, at most 10: a line each of the numbers of a `Camera`, in its order | an orbit |
 //! | `QUALITY` | `EXACT`, `BALANCED` or `DRAFT` | `EXACT` |
 //! | `BUDGET` | what else is asked of the `Budget`, in Rust: `.with_tiers(2)` | nothing |
-//! | `ARITHMETIC` | types of `pocketsplat_core::arithmetic` in the order of `With`: `I16,Polynomial,Fast` | those of `Exact` |
+//! | `ARITHMETIC` | types of `pocketsplat_core::arithmetic` in the order of `With`: `I16,Table` | those of `ReferenceArithmetic` |
 
 use std::error::Error;
 use std::path::{Path, PathBuf};

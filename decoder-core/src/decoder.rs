@@ -13,7 +13,7 @@ mod tally;
 pub use count::{count_gaussians, count_scratch_len};
 pub use report::FrameReport;
 
-use crate::arithmetic::{Arithmetic, Exact};
+use crate::arithmetic::{Arithmetic, ReferenceArithmetic};
 use crate::budget::Plan;
 use crate::bundle::{Bundle, Chunk};
 use crate::camera::Camera;
@@ -32,7 +32,7 @@ pub trait TileSink {
 }
 
 /// Draws frames of one bundle with the memory it was bound to, computed as `A` says.
-pub struct Decoder<'b, 's, A: Arithmetic = Exact> {
+pub struct Decoder<'b, 's, A: Arithmetic = ReferenceArithmetic> {
     bundle: Bundle<'b>,
     plan: Plan,
     skip_damage: bool,
@@ -41,7 +41,7 @@ pub struct Decoder<'b, 's, A: Arithmetic = Exact> {
     pixels: &'s mut [Pixel],
     /// `[TILE_PIXELS]` a finished tile.
     rgb: &'s mut [[u8; 3]],
-    splats: SplatStore<'s, A>,
+    splats: SplatStore<'s, A::Splat>,
 }
 
 impl<'b, 's> Decoder<'b, 's> {
@@ -66,7 +66,7 @@ impl<'b, 's> Decoder<'b, 's> {
     /// As for [`bind`](Self::bind).
     ///
     /// # Budget
-    /// As for [`bind`](Self::bind); no arithmetic takes more memory than the exact one.
+    /// As for [`bind`](Self::bind); no arithmetic takes more memory than the reference.
     pub fn bind_in<A: Arithmetic>(
         bundle: &Bundle<'b>,
         plan: Plan,

@@ -2,7 +2,7 @@
 
 use embedded_graphics_core::draw_target::DrawTarget;
 use embedded_graphics_core::geometry::{Point, Size};
-use embedded_graphics_core::pixelcolor::Rgb888;
+use embedded_graphics_core::pixelcolor::{Rgb888, RgbColor};
 use embedded_graphics_core::primitives::Rectangle;
 
 use crate::decoder::TileSink;
@@ -14,13 +14,27 @@ use crate::decoder::TileSink;
 pub struct DisplaySink<'d, D: DrawTarget> {
     display: &'d mut D,
     origin: Point,
+    /// The display's largest red, green and blue, when it is dithered.
+    dithered_to: Option<[u8; 3]>,
     result: Result<(), D::Error>,
 }
 
 impl<'d, D: DrawTarget> DisplaySink<'d, D> {
-    /// Draws on `display` from `origin` on.
+    /// Draws on `display` from `origin` on; bytes are rounded to the display's colours as `embedded-graphics` does.
     pub fn new(display: &'d mut D, origin: Point) -> Self {
-        Self { display, origin, result: Ok(()) }
+        Self { display, origin, dithered_to: None, result: Ok(()) }
+    }
+
+    /// Dithers instead, with a 4×4 ordered pattern (Bayer 1973): bands of a 16-bit display turn into a fine pattern.
+    ///
+    /// # Budget
+    /// About 20 instructions a channel.
+    #[must_use]
+    pub fn dithered(self) -> Self
+    where
+        D::Color: RgbColor,
+    {
+        Self { dithered_to: Some([D::Color::MAX_R, D::Color::MAX_G, D::Color::MAX_B]), ..self }
     }
 
     /// Ends the frame.
@@ -43,7 +57,63 @@ where
         }
         let corner = self.origin + Point::new(x_px.into(), y_px.into());
         let area = Rectangle::new(corner, Size::new(width.into(), height.into()));
-        let colours = rgb.iter().map(|&[r, g, b]| D::Color::from(Rgb888::new(r, g, b)));
+        let places = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+        let dithered_to = self.dithered_to;
+        // Tiles begin at multiples of four pixels, so the pattern runs on across them.
+        let colours = rgb.iter().zip(places).map(|(&rgb, place)| {
+            let [r, g, b] = dithered_to.map_or(rgb, |most| dithered(rgb, most, place));
+            D::Color::from(Rgb888::new(r, g, b))
+        });
         self.result = self.display.fill_contiguous(&area, colours);
+    }
+}
+
+/// Bayer's matrix in sixteenths of a step.
+const BAYER: [[u8; 4]; 4] = [[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]];
+
+/// The bytes next to those of the steps `0..=most` that each channel is dithered to.
+fn dithered([r, g, b]: [u8; 3], [most_r, most_g, most_b]: [u8; 3], (x, y): (u16, u16)) -> [u8; 3] {
+    let row = BAYER.get(usize::from(y & 3)).copied().unwrap_or_default();
+    let sixteenths = row.get(usize::from(x & 3)).copied().unwrap_or_default();
+    // In 32nds, so that the mean of the thresholds is a half.
+    let up = 255 * (2 * u32::from(sixteenths) + 1);
+    [(r, most_r), (g, most_g), (b, most_b)].map(|(byte, most)| {
+        let most = u32::from(most).max(1);
+        let step = (u32::from(byte) * most * 32 + up) / (255 * 32);
+        // At most 255.
+        ((step * 255 + most / 2) / most) as u8
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use embedded_graphics_core::pixelcolor::{Rgb565, Rgb888, RgbColor};
+
+    use super::dithered;
+
+    const MOST: [u8; 3] = [Rgb565::MAX_R, Rgb565::MAX_G, Rgb565::MAX_B];
+
+    #[test]
+    fn dither_keeps_the_mean_and_the_ends() {
+        for byte in 0..=255_u8 {
+            let mut sums = [0.0; 3];
+            for (x, y) in (0..4).flat_map(|y| (0..4).map(move |x| (x, y))) {
+                let [r, g, b] = dithered([byte; 3], MOST, (x, y));
+                let shown = Rgb565::from(Rgb888::new(r, g, b));
+                let steps = [shown.r(), shown.g(), shown.b()];
+                for ((sum, step), most) in sums.iter_mut().zip(steps).zip(MOST) {
+                    *sum += 255.0 * f32::from(step) / f32::from(most) / 16.0;
+                }
+            }
+            assert!(sums.into_iter().all(|mean| (mean - f32::from(byte)).abs() < 0.3), "{byte}: {sums:?}");
+            assert!((1..255).contains(&byte) || sums == [f32::from(byte); 3], "{byte}: {sums:?}");
+        }
+    }
+
+    #[test]
+    fn a_display_of_all_bits_shows_every_byte() {
+        for byte in 0..=255_u8 {
+            assert_eq!(dithered([byte; 3], [255; 3], (3, 0)), [byte; 3]);
+        }
     }
 }

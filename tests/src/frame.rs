@@ -8,7 +8,7 @@ use pocketsplat_core::{
 };
 use pocketsplat_trainer::bundle::{self, BundleInfo, WriteOptions};
 use pocketsplat_trainer::camera::core_camera;
-use pocketsplat_trainer::cost::{Choice, WithArithmetic};
+use pocketsplat_trainer::cost::{ArithmeticChoice, WithArithmetic};
 use pocketsplat_trainer::scene::Scene;
 
 /// What lies behind the test scenes.
@@ -85,14 +85,18 @@ pub fn budget_for(camera: &Camera) -> Budget {
 /// # Errors
 /// The decoder's.
 pub fn draw(bundle: &Bundle<'_>, camera: &Camera) -> Result<(Frame, FrameReport), DecodeError> {
-    draw_in(Choice::Exact, bundle, camera)
+    draw_in(ArithmeticChoice::Reference, bundle, camera)
 }
 
 /// As [`draw`], with another arithmetic.
 ///
 /// # Errors
 /// The decoder's.
-pub fn draw_in(choice: Choice, bundle: &Bundle<'_>, camera: &Camera) -> Result<(Frame, FrameReport), DecodeError> {
+pub fn draw_in(
+    choice: ArithmeticChoice,
+    bundle: &Bundle<'_>,
+    camera: &Camera,
+) -> Result<(Frame, FrameReport), DecodeError> {
     choice.call(Drawing { bundle, camera, budget: budget_for(camera) })
 }
 
@@ -101,7 +105,7 @@ pub fn draw_in(choice: Choice, bundle: &Bundle<'_>, camera: &Camera) -> Result<(
 /// # Errors
 /// The decoder's.
 pub fn draw_at(quality: Quality, bundle: &Bundle<'_>, camera: &Camera) -> Result<(Frame, FrameReport), DecodeError> {
-    Choice::Exact.call(Drawing { bundle, camera, budget: budget_for(camera).with_quality(quality) })
+    ArithmeticChoice::Reference.call(Drawing { bundle, camera, budget: budget_for(camera).with_quality(quality) })
 }
 
 /// A frame to draw.

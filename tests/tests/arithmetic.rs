@@ -1,25 +1,17 @@
-//! Frames of every arithmetic: near the exact ones, in no more memory, and the same where nothing is rounded.
+//! Frames of every arithmetic: near those of the reference arithmetic, in no more memory, and the same where nothing is rounded.
 
 use conformance::bundles::{CODERS, tiered};
 use conformance::frame::{draw, draw_in, info_for, to_core};
 use conformance::scenes::{CASES, cameras, random_scene};
 use pocketsplat_core::Bundle;
 use pocketsplat_trainer::bundle::{self, WriteOptions};
-use pocketsplat_trainer::cost::Choice;
+use pocketsplat_trainer::cost::ArithmeticChoice;
 
-/// Root of the mean square difference that each may have to the exact frame, 255ths.
-///
-/// Strict halves lose a part in 1,000 with each of some twenty sums, bytes of weights a part in 250 of a row's largest;
-/// functions a part in 10,000; of 5, 6 and 5 bits a step is 8, 4 and 8, dithered as far as a whole one. Keys of 16 bits put
-/// splats of nearly one depth into another order, which shows where random scenes are deep.
-fn bound(choice: Choice) -> f64 {
+/// Root of the mean square difference that each may have to the reference arithmetic's frame, 255ths.
+fn bound(choice: ArithmeticChoice) -> f64 {
     match choice {
-        Choice::Exact | Choice::F16Weights | Choice::Libm | Choice::Fast | Choice::Wide => 0.5,
-        Choice::I16 | Choice::Table | Choice::Polynomial | Choice::FastPolynomial | Choice::Integer => 1.0,
-        Choice::StrictF16 => 3.0,
-        Choice::Rgb565 => 3.0,
-        Choice::Rgb565Dithered => 4.0,
-        Choice::I8 | Choice::Depth16 | Choice::FastPolynomialDepth16 | Choice::Narrow => 8.0,
+        ArithmeticChoice::Reference | ArithmeticChoice::F16 | ArithmeticChoice::Wide => 0.5,
+        ArithmeticChoice::I16 | ArithmeticChoice::Table | ArithmeticChoice::WithoutFpu => 1.0,
     }
 }
 
@@ -30,14 +22,14 @@ fn every_arithmetic_stays_near_and_draws_every_pixel_once() {
         let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
         let camera = to_core(&cameras()[0].1);
         let (exact, _) = draw(&bundle, &camera).expect("the worst case is planned for");
-        for &choice in Choice::TURNED {
+        for &choice in ArithmeticChoice::TURNED {
             // Wider splats have fewer places than the worst case takes, and other numbers may open an offset more than the
             // exact ones that a scene's Gaussians are counted with.
             let (frame, report) = draw_in(choice, &bundle, &camera).expect("no more memory than planned");
             assert!(frame.deliveries.iter().all(|&n| n == 1), "{}, {choice:?}: every pixel once", case.name);
             if report.splats_dropped > 0 {
                 let counted = bundle.n_gaussians(0).is_some() && report.splats_dropped <= 3;
-                assert!(choice == Choice::Wide || counted, "{}, {choice:?}: {report:?}", case.name);
+                assert!(choice == ArithmeticChoice::Wide || counted, "{}, {choice:?}: {report:?}", case.name);
                 continue;
             }
             let squares = frame.rgb.iter().zip(&exact.rgb).map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2));
@@ -56,7 +48,7 @@ fn halves_kept_as_halves_change_nothing() {
         let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
         assert!(bundle.heads().coded().is_none(), "{}: a bundle whose heads are halves", case.name);
         let camera = to_core(&cameras()[0].1);
-        let [exact, halves] = [Choice::Exact, Choice::F16Weights]
+        let [exact, halves] = [ArithmeticChoice::Reference, ArithmeticChoice::F16]
             .map(|choice| draw_in(choice, &bundle, &camera).expect("the worst case is planned for"));
         assert!(exact == halves, "{}: other bytes", case.name);
     }

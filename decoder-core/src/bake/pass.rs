@@ -1,14 +1,15 @@
 //! Going over a scene once, when it is bound.
 
 use super::store::{BakedMemory, Baker};
-use crate::arithmetic::{Exact, F32, Precise};
 use crate::bundle::{AnchorModels, Bundle, Chunk};
 use crate::error::DecodeError;
+use crate::math::functions::Reference;
+use crate::mlp::F32;
 use crate::scene::{Anchor, Evaluator, for_each_gaussian};
 
 /// Evaluates the Gaussians of the first `n_chunks` chunks into `memory`.
 ///
-/// * `models`, `evaluator`: not needed afterwards. Exact, whatever frames are computed with: it runs once, and the bundle's counts
+/// * `models`, `evaluator`: not needed afterwards. Of the reference arithmetic, whatever frames are computed with: it runs once, and the bundle's counts
 ///   are of it. * `skip_damage`: leaves damaged chunks out and remembers which.
 ///
 /// # Errors
@@ -50,12 +51,20 @@ fn evaluate<'b>(
         let site = anchors.site();
         anchors.values(row);
         let position = bundle.position(site.lattice);
-        let anchor = Anchor::from_row::<Precise>(header, position, site.mask, row).ok_or(DecodeError::Internal)?;
+        let anchor = Anchor::from_row::<Reference>(header, position, site.mask, row).ok_or(DecodeError::Internal)?;
         // Seen from anywhere.
         let eye = [0.0; 3];
-        for_each_gaussian::<Exact>(&anchor, header.features.effects, eye, heads, work, &mut (), |_, gaussian| {
-            baker.push(gaussian);
-        });
+        for_each_gaussian::<F32, Reference>(
+            &anchor,
+            header.features.effects,
+            eye,
+            heads,
+            work,
+            &mut (),
+            |_, gaussian| {
+                baker.push(gaussian);
+            },
+        );
     }
     anchors.finish()
 }

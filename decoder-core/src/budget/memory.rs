@@ -8,7 +8,7 @@ use crate::arena::{Arena, words_for};
 use crate::bake::{BakedGaussian, BakedMemory};
 use crate::bundle::{RecordMemory, model_words};
 use crate::error::DecodeError;
-use crate::project::PackedSplat;
+use crate::project::Packed28;
 use crate::raster::{N_RADIX, Pixel, TILE_PIXELS, TileRect};
 use crate::scene::HeadOutputs;
 
@@ -65,7 +65,7 @@ slices! {
         pixels: [Pixel; TILE_PIXELS.saturating_mul(shape.frame.canvas_tiles as usize)],
         rgb: [[u8; 3]; TILE_PIXELS],
         counts: [u32; N_RADIX],
-        splats: [PackedSplat; shape.frame.max_splats as usize],
+        splats: [Packed28; shape.frame.max_splats as usize],
         rects: [TileRect; shape.frame.max_splats as usize],
         order: [u32; shape.frame.max_splats as usize],
         spare: [u32; shape.frame.max_splats as usize],
@@ -103,7 +103,7 @@ pub(crate) struct FrameMemory<'s> {
     /// Counts of the sort.
     pub(crate) counts: &'s mut [u32],
     /// Splats, or room for fewer larger ones.
-    pub(crate) splats: &'s mut [PackedSplat],
+    pub(crate) splats: &'s mut [Packed28],
     /// The tiles of each.
     pub(crate) rects: &'s mut [TileRect],
     /// Their order.

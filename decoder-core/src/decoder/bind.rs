@@ -4,13 +4,13 @@ use super::Decoder;
 use super::source::{AnchorSource, Anchors, GaussianSource};
 use super::splats::SplatStore;
 use crate::arena::Arena;
-use crate::arithmetic::{Arithmetic, F32};
+use crate::arithmetic::Arithmetic;
 use crate::bake::{BakedMemory, Baker, bake};
 use crate::budget::{AnchorMemory, FrameMemory, ModelMemory, Plan, SceneMemory, ScratchShape};
 use crate::bundle::{AnchorRecords, Bundle, RecordMemory};
 use crate::error::{DecodeError, saturate};
-use crate::mlp::{HeadNumbers, Heads};
-use crate::project::PackedSplat;
+use crate::mlp::{F32, HeadFormat, Heads};
+use crate::project::Packed28;
 use crate::scene::{Evaluator, Workspace};
 
 impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
@@ -45,7 +45,7 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
 
 /// Puts the scene into memory of `arena`, as far as `shape` keeps it there.
 #[inline(never)]
-fn bind_scene<'b, 's, N: HeadNumbers>(
+fn bind_scene<'b, 's, N: HeadFormat>(
     bundle: &Bundle<'b>,
     shape: &ScratchShape,
     arena: &mut Arena<'s>,
@@ -70,7 +70,7 @@ fn bind_scene<'b, 's, N: HeadNumbers>(
 
 /// Converts the heads into memory of the anchor.
 #[inline(never)]
-fn evaluator<'s, N: HeadNumbers>(
+fn evaluator<'s, N: HeadFormat>(
     bundle: &Bundle<'_>,
     shape: &ScratchShape,
     memory: AnchorMemory<'s>,
@@ -113,7 +113,7 @@ pub(super) fn evaluate_scene<'s>(
 }
 
 /// The memory of splats as records of another size: as many as fit.
-fn records_in<S: bytemuck::Pod>(splats: &mut [PackedSplat]) -> Result<&mut [S], DecodeError> {
+fn records_in<S: bytemuck::Pod>(splats: &mut [Packed28]) -> Result<&mut [S], DecodeError> {
     let words: &mut [u32] = bytemuck::try_cast_slice_mut(splats).map_err(|_| DecodeError::Internal)?;
     let words_each = size_of::<S>().div_ceil(4).max(1);
     let n_words = words.len() / words_each * words_each;

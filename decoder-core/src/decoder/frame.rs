@@ -89,7 +89,7 @@ impl<A: Arithmetic> Decoder<'_, '_, A> {
         let n = *n as usize;
         let (Some(splats), Some(rects)) = (splats.get(..n), rects.get(..n)) else { return false };
         let (Some(order), Some(spare)) = (order.get_mut(..n), spare.get_mut(..n)) else { return false };
-        let (order, row_list) = sort_by_depth::<A>(splats, order, spare, counts);
+        let (order, row_list) = sort_by_depth(splats, order, spare, counts);
         // One after the other, or all at once.
         let keeps_tiles = self.plan.shape().frame.canvas_tiles > 1;
         let (mut n_tiles, mut alive) = (0, 0);
@@ -112,13 +112,13 @@ impl<A: Arithmetic> Decoder<'_, '_, A> {
                 if slab.from == 0.0 {
                     pixels.fill(EMPTY);
                 }
-                let work = blend_tile::<A>(place, splats, rects, list, &rule, pixels);
+                let work = blend_tile::<A::Functions, _>(place, splats, rects, list, &rule, pixels);
                 alive += work.alive;
                 report.tile_splats = report.tile_splats.saturating_add(work.splats);
                 report.row_splats = report.row_splats.saturating_add(work.rows);
                 report.pixel_splats = report.pixel_splats.saturating_add(work.pixels);
                 if !slab.ends() {
-                    finish_tile::<A::Colours>(place, pixels, background, self.rgb);
+                    finish_tile(place, pixels, background, self.rgb);
                     let n_pixels = usize::from(width) * usize::from(height);
                     watch.enter(Stage::Output);
                     sink.tile(x_px, y_px, width, height, self.rgb.get(..n_pixels).unwrap_or_default());

@@ -169,7 +169,7 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
         let Frame { view, strips, tallies, in_slabs, tally, report } = frame;
         let header = bundle.header();
         let effects = header.features.effects;
-        let mut keeper = Keeper { view, strips, tallies: *tallies, in_slabs: *in_slabs, tally, pass, splats };
+        let mut keeper = Keeper::<A> { view, strips, tallies: *tallies, in_slabs: *in_slabs, tally, pass, splats };
         let Anchors { source, evaluator: Evaluator { heads, row, work } } = match source {
             GaussianSource::Anchors(anchors) => anchors,
             // Unreachable without the feature; this arm drops the code.
@@ -199,24 +199,29 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
             let position = bundle.position(site.lattice);
             let anchor =
                 Anchor::from_row::<A::Functions>(header, position, site.mask, row).ok_or(DecodeError::Internal)?;
-            let is_seen = if as_baked {
-                view.sees_box(anchor.ink_box())
-            } else {
-                view.sees_anchor::<A::Roots>(position, anchor.extent)
-            };
+            let is_seen =
+                if as_baked { view.sees_box(anchor.ink_box()) } else { view.sees_anchor(position, anchor.extent) };
             if !is_seen || keeper.pass.band.as_ref().is_some_and(|band| !band.sees_anchor(&anchor)) {
                 return Ok(());
             }
             report.anchors_visible += 1;
-            let macs = for_each_gaussian::<A>(&anchor, effects, view.eye, heads, work, watch, |offset, gaussian| {
-                report.gaussians += 1;
-                let place = place(number, offset);
-                if as_baked {
-                    keeper.project(place, &BakedGaussian::rounded(gaussian, effects), effects);
-                } else {
-                    keeper.project(place, gaussian, effects);
-                }
-            });
+            let macs = for_each_gaussian::<A::Heads, A::Functions>(
+                &anchor,
+                effects,
+                view.eye,
+                heads,
+                work,
+                watch,
+                |offset, gaussian| {
+                    report.gaussians += 1;
+                    let place = place(number, offset);
+                    if as_baked {
+                        keeper.project(place, &BakedGaussian::rounded(gaussian, effects), effects);
+                    } else {
+                        keeper.project(place, gaussian, effects);
+                    }
+                },
+            );
             report.head_macs = report.head_macs.saturating_add(macs);
             Ok(())
         })
@@ -231,13 +236,13 @@ struct Keeper<'f, 's, A: Arithmetic> {
     in_slabs: bool,
     tally: &'f mut Tally,
     pass: &'f mut Pass,
-    splats: &'f mut SplatStore<'s, A>,
+    splats: &'f mut SplatStore<'s, A::Splat>,
 }
 
 impl<A: Arithmetic> Keeper<'_, '_, A> {
     /// * `place`: ascends in the order of the file.
     fn project(&mut self, place: u32, gaussian: &Gaussian, effects: Effects) {
-        let Some((splat, rect)) = self.view.project::<A>(gaussian, effects) else { return };
+        let Some((splat, rect)) = self.view.project::<A::Functions>(gaussian, effects) else { return };
         let touched = self.strips.touched(rect);
         let index = usize::from(self.pass.strip.index);
         let lies_here = touched.contains(&index);

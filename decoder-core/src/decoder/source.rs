@@ -3,13 +3,13 @@
 use crate::bake::BakedGaussians;
 use crate::bundle::{AnchorModels, AnchorRecords, AnchorSite, Chunk};
 use crate::error::DecodeError;
-use crate::mlp::HeadNumbers;
+use crate::mlp::HeadFormat;
 use crate::scene::Evaluator;
 use crate::stopwatch::{Stage, Stopwatch};
 
 /// The scene of the planned tiers.
 #[expect(clippy::large_enum_variant, reason = "a decoder has one, and there is no allocator to box with")]
-pub(super) enum GaussianSource<'b, 's, N: HeadNumbers> {
+pub(super) enum GaussianSource<'b, 's, N: HeadFormat> {
     /// Evaluated in each frame.
     Anchors(Anchors<'b, 's, N>),
     /// Evaluated when bound.
@@ -17,7 +17,7 @@ pub(super) enum GaussianSource<'b, 's, N: HeadNumbers> {
 }
 
 /// Anchors, and what evaluates them.
-pub(super) struct Anchors<'b, 's, N: HeadNumbers> {
+pub(super) struct Anchors<'b, 's, N: HeadFormat> {
     pub(super) source: AnchorSource<'b, 's>,
     pub(super) evaluator: Evaluator<'s, N>,
 }
@@ -30,7 +30,7 @@ pub(super) enum AnchorSource<'b, 's> {
     Resident(AnchorRecords<'b, 's>),
 }
 
-impl<N: HeadNumbers> GaussianSource<'_, '_, N> {
+impl<N: HeadFormat> GaussianSource<'_, '_, N> {
     /// Whether each frame decodes.
     pub(super) fn is_streamed(&self) -> bool {
         matches!(self, Self::Anchors(anchors) if !anchors.source.is_resident())

@@ -1,13 +1,12 @@
 //! The splats in memory, and their order.
 
-use crate::arithmetic::Choices;
 use crate::error::saturate;
 use crate::project::{Splat, SplatRecord};
 use crate::raster::{TileRect, sort_by_depth};
 
 /// The splats of the current strip, or of a slab of its depth, in the order of the file.
-pub(super) struct SplatStore<'s, A: Choices> {
-    pub(super) splats: &'s mut [A::Splat],
+pub(super) struct SplatStore<'s, S> {
+    pub(super) splats: &'s mut [S],
     pub(super) rects: &'s mut [TileRect],
     pub(super) n: u32,
     pub(super) order: &'s mut [u32],
@@ -37,7 +36,7 @@ impl Slab {
     }
 }
 
-impl<A: Choices> SplatStore<'_, A> {
+impl<S: SplatRecord> SplatStore<'_, S> {
     /// Splats that there is memory for.
     pub(super) fn places(&self) -> u32 {
         saturate(self.splats.len())
@@ -47,7 +46,7 @@ impl<A: Choices> SplatStore<'_, A> {
     pub(super) fn push(&mut self, splat: &Splat, rect: TileRect) {
         let slot = self.n as usize;
         if let (Some(splat_slot), Some(rect_slot)) = (self.splats.get_mut(slot), self.rects.get_mut(slot)) {
-            *splat_slot = A::Splat::new(splat);
+            *splat_slot = S::new(splat);
             *rect_slot = rect;
             self.n = self.n.saturating_add(1);
         }
@@ -86,7 +85,7 @@ impl<A: Choices> SplatStore<'_, A> {
         let n = self.n as usize;
         let splats = self.splats.get(..n)?;
         let (order, spare) = (self.order.get_mut(..n)?, self.spare.get_mut(..n)?);
-        let (order, _) = sort_by_depth::<A>(splats, order, spare, self.counts);
+        let (order, _) = sort_by_depth(splats, order, spare, self.counts);
         let depth_of = |index: &u32| splats.get(*index as usize).map_or(0.0, SplatRecord::depth);
         let nearest = order.first().map_or(depth, depth_of);
         let nearest = if depth < nearest { depth } else { nearest };
@@ -128,8 +127,7 @@ mod tests {
     use bytemuck::Zeroable;
 
     use super::{Slab, SplatStore};
-    use crate::arithmetic::Exact;
-    use crate::project::{PackedSplat, Splat, SplatRecord};
+    use crate::project::{Packed28, Splat, SplatRecord};
     use crate::raster::{N_RADIX, TileRect};
 
     const RECT: TileRect = TileRect { first_column: 0, last_column: 0, first_row: 0, last_row: 0 };
@@ -150,8 +148,8 @@ mod tests {
     fn slabs(depths: &[f32], n_places: usize) -> (Vec<Vec<f32>>, u32) {
         let (mut slabs, mut n_dropped, mut from) = (Vec::new(), 0, 0.0);
         loop {
-            let mut store = SplatStore::<Exact> {
-                splats: &mut std::vec![PackedSplat::zeroed(); n_places],
+            let mut store = SplatStore {
+                splats: &mut std::vec![Packed28::zeroed(); n_places],
                 rects: &mut std::vec![RECT; n_places],
                 n: 0,
                 order: &mut std::vec![0; n_places],

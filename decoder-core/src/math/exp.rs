@@ -42,7 +42,7 @@ pub fn exp(x: f32) -> f32 {
 /// # Budget
 /// About 15 instructions, no division, no branch.
 #[inline(always)]
-pub(crate) fn exp_near(x: f32) -> f32 {
+pub(super) fn exp_near(x: f32) -> f32 {
     let shifted = x * core::f32::consts::LOG2_E + ROUNDER;
     let n = shifted - ROUNDER;
     let r = (x - n * LN_2_HIGH) - n * LN_2_LOW;

@@ -6,9 +6,9 @@
 
 mod activation;
 mod exp;
+pub(crate) mod functions;
 mod half;
 
 pub use activation::{sigmoid, tanh};
-pub(crate) use exp::exp_near;
 pub use exp::{EXP_MAX, EXP_MIN, exp};
 pub use half::{from_half, is_finite_half, to_half};

@@ -1,7 +1,8 @@
 //! The detail head: what is added to a Gaussian's colour, its first layer split into a part per anchor and one per Gaussian.
 
 use super::block::{continued, outputs};
-use super::head::{Head, LANES};
+use super::head::Head;
+use super::shape::LANES;
 use super::weight::Weight;
 use crate::arena::Arena;
 use crate::bundle::{HeadView, WeightReader};

@@ -2,15 +2,12 @@
 
 use super::block::{Blocks, outputs};
 use super::detail::Detail;
-use super::numbers::{HeadNumbers, TwoLayers};
-use super::shape::HeadShape;
+use super::format::{HeadFormat, MlpHead};
+use super::shape::{HeadShape, LANES};
 use super::weight::Weight;
 use crate::arena::Arena;
 use crate::bundle::{HeadView, HeadsView, WeightReader};
 use crate::error::DecodeError;
-
-/// Outputs computed together in layers whose outputs are all needed.
-pub(super) const LANES: usize = 8;
 
 /// One head in floats; its output layer has blocks of `B` outputs.
 pub(crate) struct Head<'s, W, const B: usize> {
@@ -25,7 +22,7 @@ pub(super) struct Hidden<'s, W> {
 }
 
 /// The heads, one block of outputs an offset: none is computed for an offset that is not drawn.
-pub(crate) struct Heads<'s, N: HeadNumbers> {
+pub(crate) struct Heads<'s, N: HeadFormat> {
     pub(crate) shape: HeadShape,
     pub(crate) opacity: N::Head<'s, 1>,
     pub(crate) covariance: Covariance<'s, N>,
@@ -34,15 +31,15 @@ pub(crate) struct Heads<'s, N: HeadNumbers> {
 }
 
 /// The covariance head.
-pub(crate) enum Covariance<'s, N: HeadNumbers> {
+pub(crate) enum Covariance<'s, N: HeadFormat> {
     /// A scale logit an offset.
     Isotropic(N::Head<'s, 1>),
     /// Three, and a quaternion.
     Anisotropic(N::Head<'s, 7>),
 }
 
-impl<'s, N: HeadNumbers> Covariance<'s, N> {
-    /// As [`TwoLayers::activate`].
+impl<'s, N: HeadFormat> Covariance<'s, N> {
+    /// As [`MlpHead::activate`].
     pub(crate) fn activate<'h>(&self, inputs: N::Values<'_>, hidden: &'h mut [f32]) -> N::Values<'h> {
         match self {
             Self::Isotropic(head) => head.activate(inputs, hidden),
@@ -52,7 +49,7 @@ impl<'s, N: HeadNumbers> Covariance<'s, N> {
         }
     }
 
-    /// As [`TwoLayers::block`]; of an isotropic Gaussian the first output alone means something.
+    /// As [`MlpHead::block`]; of an isotropic Gaussian the first output alone means something.
     pub(crate) fn block(&self, index: usize, hidden: N::Values<'_>) -> Option<[f32; 7]> {
         match self {
             Self::Isotropic(head) => head.block(index, hidden).map(|[logit]| [logit, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
@@ -62,7 +59,7 @@ impl<'s, N: HeadNumbers> Covariance<'s, N> {
     }
 }
 
-impl<'s, N: HeadNumbers> Heads<'s, N> {
+impl<'s, N: HeadFormat> Heads<'s, N> {
     /// Converts the file's weights; takes [`n_weights`](super::HeadShape::n_weights) floats.
     pub(crate) fn convert(arena: &mut Arena<'s>, heads: &HeadsView<'_>, shape: HeadShape) -> Result<Self, DecodeError> {
         let mut weights = heads.weights();
@@ -86,9 +83,9 @@ impl<'s, N: HeadNumbers> Heads<'s, N> {
     }
 }
 
-impl<'s, N, W, const B: usize> TwoLayers<'s, N, B> for Head<'s, W, B>
+impl<'s, N, W, const B: usize> MlpHead<'s, N, B> for Head<'s, W, B>
 where
-    N: for<'v> HeadNumbers<Values<'v> = &'v [f32]>,
+    N: for<'v> HeadFormat<Values<'v> = &'v [f32]>,
     W: Weight,
 {
     fn convert(

@@ -1,4 +1,4 @@
-//! Heads in integers: weights of 16 or 8 bits, inputs and hidden units of 16, sums of 32, which never overflow.
+//! Heads in integers: weights, inputs and hidden units of 16 bits, sums of 32, which never overflow.
 //!
 //! An output is `t·Σ v·h + b`: v integers, t one step an output, h the hidden units as integers. What a step of hidden unit j
 //! is worth goes into the weights that read it, because relu(c·x) = c·relu(x) for c > 0: so all units have one scale, and
@@ -9,14 +9,14 @@ use core::iter;
 
 use bytemuck::{Pod, Zeroable};
 
-use super::numbers::{HeadNumbers, TwoLayers};
+use super::format::{HeadFormat, MlpHead};
 use crate::arena::Arena;
 use crate::bundle::{HeadView, WeightReader};
 use crate::error::DecodeError;
 
 /// Units computed together: their sums, a pair of inputs and the addresses fill the registers of a Cortex-M.
 const LANES: usize = 4;
-/// Largest magnitude of an input or a hidden unit.
+/// Largest magnitude of a weight, an input or a hidden unit.
 const MOST: f32 = 32_767.0;
 /// Largest sum of the magnitudes of a row's weights, in steps: times [`MOST`] it is below 2³¹, with 128 steps of rounding of 257
 /// weights.
@@ -24,55 +24,23 @@ const MOST_OF_A_ROW: f32 = 65_400.0;
 /// Added, it leaves a float of less than 2²² rounded to an integer in the low bits: 1.5 · 2²³.
 const ROUNDER: f32 = 12_582_912.0;
 
-/// Two neighbouring weights of an output.
-pub(crate) trait Pair: Pod {
-    /// Largest magnitude of a weight.
-    const LIMIT: f32;
-
-    /// From the low 16 bits of each.
-    fn of(low: u32, high: u32) -> Self;
-
-    /// `sum` with both products added; `x` holds two values, the first in its low half.
-    fn added(self, sum: i32, x: u32) -> i32;
-}
-
-/// 16 bits each.
+/// Two neighbouring weights of an output, 16 bits each.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(transparent)]
-pub(crate) struct Pair16(u32);
+pub(crate) struct Pair(u32);
 
-impl Pair for Pair16 {
-    const LIMIT: f32 = 32_767.0;
-
+impl Pair {
+    /// From the low 16 bits of each.
     fn of(low: u32, high: u32) -> Self {
         Self(packed(low, high))
     }
 
+    /// `sum` with both products added; `x` holds two values, the first in its low half.
     // On a Cortex-M4 two instructions, SMLABB and SMLATT.
     #[inline(always)]
     fn added(self, sum: i32, x: u32) -> i32 {
         let low = i32::from(self.0 as i16).wrapping_mul(i32::from(x as i16));
         let high = (self.0 as i32 >> 16).wrapping_mul(x as i32 >> 16);
-        sum.wrapping_add(low).wrapping_add(high)
-    }
-}
-
-/// 8 bits each.
-#[derive(Clone, Copy, Pod, Zeroable)]
-#[repr(transparent)]
-pub(crate) struct Pair8(u16);
-
-impl Pair for Pair8 {
-    const LIMIT: f32 = 127.0;
-
-    fn of(low: u32, high: u32) -> Self {
-        Self((low & 0xFF | high << 8) as u16)
-    }
-
-    #[inline(always)]
-    fn added(self, sum: i32, x: u32) -> i32 {
-        let low = i32::from(self.0 as i8).wrapping_mul(i32::from(x as i16));
-        let high = i32::from(self.0 as i16 >> 8).wrapping_mul(x as i32 >> 16);
         sum.wrapping_add(low).wrapping_add(high)
     }
 }
@@ -117,22 +85,21 @@ impl<'v> Quantised<'v> {
 }
 
 /// One head; its output layer has blocks of `B` outputs.
-pub(crate) struct IntegerHead<'s, P, const B: usize> {
+pub(crate) struct IntegerHead<'s, const B: usize> {
     /// `[n_blocks, ⌈(1 + n_in)/2⌉, LANES]`, the bias before the weights.
-    hidden: &'s [[P; LANES]],
+    hidden: &'s [[Pair; LANES]],
     pairs_per_unit: usize,
     /// `[n_blocks, ⌈n_hidden/2⌉, B]`.
-    output: &'s [[P; B]],
+    output: &'s [[Pair; B]],
     pairs_per_output: usize,
     /// `[n_blocks, B]`: what a step is worth for hidden units of scale 1, and the bias.
     ends: &'s [[[f32; 2]; B]],
     n_hidden: usize,
 }
 
-impl<'s, N, P, const B: usize> TwoLayers<'s, N, B> for IntegerHead<'s, P, B>
+impl<'s, N, const B: usize> MlpHead<'s, N, B> for IntegerHead<'s, B>
 where
-    N: for<'v> HeadNumbers<Values<'v> = Quantised<'v>>,
-    P: Pair,
+    N: for<'v> HeadFormat<Values<'v> = Quantised<'v>>,
 {
     fn convert(
         arena: &mut Arena<'s>,
@@ -142,8 +109,8 @@ where
         let HeadView { n_in, n_hidden, .. } = *head;
         let (pairs_per_unit, pairs_per_output) = (n_in / 2 + 1, n_hidden.div_ceil(2));
         let n_blocks = head.b2.len().div_ceil(B);
-        let hidden = take_rows::<P, LANES>(arena, n_hidden.div_ceil(LANES) * pairs_per_unit)?;
-        let output = take_rows::<P, B>(arena, n_blocks * pairs_per_output)?;
+        let hidden = take_rows::<LANES>(arena, n_hidden.div_ceil(LANES) * pairs_per_unit)?;
+        let output = take_rows::<B>(arena, n_blocks * pairs_per_output)?;
         let ends = arena.take::<[[f32; 2]; B]>(n_blocks)?;
         // Needed until the weights are integers: what a step of each hidden unit is worth, and a row.
         let mut free = arena.borrow();
@@ -212,7 +179,7 @@ where
 
 /// The sums of one block.
 #[inline]
-fn sums<P: Pair, const B: usize>(block: &[[P; B]], values: &[u32]) -> [i32; B] {
+fn sums<const B: usize>(block: &[[Pair; B]], values: &[u32]) -> [i32; B] {
     let mut sums = [0; B];
     for (row, &x) in block.iter().zip(values) {
         for (sum, pair) in sums.iter_mut().zip(row) {
@@ -222,34 +189,29 @@ fn sums<P: Pair, const B: usize>(block: &[[P; B]], values: &[u32]) -> [i32; B] {
     sums
 }
 
-/// `n` rows of `B` pairs, all zero; not taken as rows, because those of an odd number of halves do not divide into words.
-fn take_rows<'s, P: Pair, const B: usize>(arena: &mut Arena<'s>, n: usize) -> Result<&'s mut [[P; B]], DecodeError> {
-    let (rows, _) = arena.take::<P>(B * n)?.as_chunks_mut::<B>();
-    rows.fill([P::zeroed(); B]);
+/// `n` rows of `B` pairs, all zero.
+fn take_rows<'s, const B: usize>(arena: &mut Arena<'s>, n: usize) -> Result<&'s mut [[Pair; B]], DecodeError> {
+    let rows = arena.take::<[Pair; B]>(n)?;
+    rows.fill([Pair::zeroed(); B]);
     Ok(rows)
 }
 
 /// Rounds the weights of output `index` and puts them into its lane; returns what a step is worth.
-fn put_row<P: Pair, const B: usize>(
-    weights: &[f32],
-    rows: &mut [[P; B]],
-    index: usize,
-    pairs_per_output: usize,
-) -> f32 {
+fn put_row<const B: usize>(weights: &[f32], rows: &mut [[Pair; B]], index: usize, pairs_per_output: usize) -> f32 {
     let (mut largest, mut sum) = (0.0, 0.0);
     for weight in weights {
         let magnitude = weight.abs();
         largest = if magnitude > largest { magnitude } else { largest };
         sum += magnitude;
     }
-    let [by_largest, by_sum] = [largest / P::LIMIT, sum / MOST_OF_A_ROW];
+    let [by_largest, by_sum] = [largest / MOST, sum / MOST_OF_A_ROW];
     let step = if by_largest > by_sum { by_largest } else { by_sum };
     let step = if step > f32::MIN_POSITIVE { step } else { f32::MIN_POSITIVE };
     let block = rows.chunks_exact_mut(pairs_per_output.max(1)).nth(index / B).unwrap_or_default();
     let steps = |weight: &f32| (weight / step + ROUNDER).to_bits();
     for (row, pair) in block.iter_mut().zip(weights.chunks(2)) {
         if let (Some(slot), Some(low)) = (row.get_mut(index % B), pair.first()) {
-            *slot = P::of(steps(low), pair.get(1).map_or(0, steps));
+            *slot = Pair::of(steps(low), pair.get(1).map_or(0, steps));
         }
     }
     step
@@ -273,7 +235,9 @@ fn words_mut(floats: &mut [f32]) -> &mut [u32] {
 mod tests {
     use std::vec::Vec;
 
-    use super::{Pair, Pair8, Pair16, Quantised, put_row, sums};
+    use bytemuck::Zeroable;
+
+    use super::{Pair, Quantised, put_row, sums};
 
     /// A stream of numbers between −1 and 1, the same every time.
     fn numbers(seed: u32) -> impl FnMut() -> f32 {
@@ -309,7 +273,8 @@ mod tests {
     }
 
     /// Sums of random rows against f64, and those of the largest values against i64.
-    fn rows_sum_as_they_should<P: Pair>() {
+    #[test]
+    fn rows_are_right_to_half_a_step_and_never_overflow() {
         let mut random = numbers(2);
         for n in [1_usize, 2, 3, 16, 33, 257] {
             // One weight far above the others, all alike, and random ones.
@@ -322,7 +287,7 @@ mod tests {
                     })
                     .collect();
                 let n_pairs = n.div_ceil(2);
-                let mut rows = std::vec![[P::zeroed(); 3]; n_pairs];
+                let mut rows = std::vec![[Pair::zeroed(); 3]; n_pairs];
                 let step = f64::from(put_row(&weights, &mut rows, 1, n_pairs));
                 let steps: Vec<i64> =
                     (0..2 * n_pairs).map(|i| sums(&rows[i / 2..], &[1_u32 << (16 * (i % 2))])[1].into()).collect();
@@ -338,11 +303,5 @@ mod tests {
                 assert_eq!(sums(&rows, &std::vec![0x7FFF_7FFF; n_pairs])[0], 0, "the other lanes");
             }
         }
-    }
-
-    #[test]
-    fn rows_are_right_to_half_a_step_and_never_overflow() {
-        rows_sum_as_they_should::<Pair16>();
-        rows_sum_as_they_should::<Pair8>();
     }
 }

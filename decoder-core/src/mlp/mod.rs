@@ -6,12 +6,13 @@
 
 mod block;
 mod detail;
+mod format;
 mod head;
 mod integer;
-mod numbers;
 mod shape;
 mod weight;
 
+pub use format::{F16, F32, I16};
+pub(crate) use format::{HeadFormat, MlpHead};
 pub(crate) use head::Heads;
-pub(crate) use numbers::{HeadNumbers, TwoLayers};
 pub(crate) use shape::HeadShape;

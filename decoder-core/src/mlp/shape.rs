@@ -1,7 +1,9 @@
 //! Widths of the heads, and what follows from them: floats in memory and multiply-adds.
 
 use super::block::n_rows;
-use super::head::LANES;
+
+/// Outputs computed together in layers whose outputs are all needed.
+pub(super) const LANES: usize = 8;
 
 /// Widths of the heads of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -151,9 +151,9 @@ impl Side {
 #[cfg(test)]
 mod tests {
     use super::{Band, View};
-    use crate::arithmetic::Exact;
     use crate::bundle::Effects;
     use crate::camera::Camera;
+    use crate::math::functions::Reference;
     use crate::scene::{Anchor, Gaussian};
 
     const HEIGHT_PX: u16 = 90;
@@ -223,7 +223,7 @@ mod tests {
                     opacity: if k == 0 { 1.0 } else { random.between(0.01, 1.0) },
                     colour: [0.0; 3],
                 };
-                let Some((splat, rect)) = view.project::<Exact>(&gaussian, effects) else { continue };
+                let Some((splat, rect)) = view.project::<Reference>(&gaussian, effects) else { continue };
                 if rect.first_row <= first_row && first_row <= rect.last_row {
                     drawn = true;
                     drawn_in_slab |= from <= splat.depth && splat.depth < end;

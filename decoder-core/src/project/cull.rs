@@ -2,7 +2,6 @@
 
 use super::covariance::Covariance;
 use super::view::{NEAR, View};
-use crate::arithmetic::Roots;
 use crate::bundle::{Bundle, Chunk};
 use crate::camera::Camera;
 use crate::error::DecodeError;
@@ -82,7 +81,7 @@ impl View {
 
     /// The prefilter of anchors: an anchor counts as a Gaussian with deviations `extent` along the world's axes, and is
     /// kept when the square of ⌈3·√λ_max⌉ pixels around its centre overlaps the image.
-    pub(crate) fn sees_anchor<R: Roots>(&self, position: [f32; 3], extent: [f32; 3]) -> bool {
+    pub(crate) fn sees_anchor(&self, position: [f32; 3], extent: [f32; 3]) -> bool {
         let point = self.to_camera(position);
         let [_, _, z] = point;
         let in_front = z > NEAR;
@@ -96,8 +95,8 @@ impl View {
         // mid² − det, written without the difference of two large numbers.
         let spread = half_difference * half_difference + covariance.xy * covariance.xy;
         let spread = if spread > 0.1 { spread } else { 0.1 };
-        let lambda_max = 0.5 * (covariance.xx + covariance.yy) + R::sqrt(spread);
-        let radius = libm::ceilf(3.0 * R::sqrt(lambda_max));
+        let lambda_max = 0.5 * (covariance.xx + covariance.yy) + libm::sqrtf(spread);
+        let radius = libm::ceilf(3.0 * libm::sqrtf(lambda_max));
         let [u, v] = self.to_image(point);
         let [width, height] = self.size_px;
         u + radius > 0.0 && u - radius < width && v + radius > 0.0 && v - radius < height

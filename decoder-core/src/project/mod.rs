@@ -5,13 +5,13 @@
 mod band;
 mod covariance;
 mod cull;
-mod narrow;
 mod packed;
 mod splat;
 mod view;
 
 pub(crate) use band::Band;
 pub use cull::chunks_in_view;
-pub(crate) use packed::{PackedSplat, SplatRecord};
+pub(crate) use packed::SplatRecord;
+pub use packed::{Packed28, Wide};
 pub(crate) use splat::{Splat, log_cut};
 pub(crate) use view::View;

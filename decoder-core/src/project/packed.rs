@@ -1,9 +1,8 @@
-//! Splats as they wait in memory: 28 bytes, most numbers rounded to halves.
+//! Splats as they are kept in memory.
 
 use bytemuck::{Pod, Zeroable};
 
 use super::splat::Splat;
-use crate::arithmetic::{Mixed, SplatChoice, Wide};
 use crate::math::{from_half, to_half};
 
 /// Bits of 2⁻⁶², which stands for every smaller precision: a deviation of 2·10⁹ px.
@@ -11,7 +10,7 @@ const LEAST_PRECISION: u32 = (127 - 62) << 23;
 /// What a float has more digits than are kept.
 const DIGITS_DROPPED: u32 = 13;
 
-/// A splat as it waits in memory.
+/// A splat as it is kept in memory.
 pub(crate) trait SplatRecord: Pod {
     /// Rounds a splat.
     fn new(splat: &Splat) -> Self;
@@ -23,31 +22,28 @@ pub(crate) trait SplatRecord: Pod {
     fn depth(&self) -> f32;
 }
 
-impl SplatChoice for Mixed {
-    type Record = PackedSplat;
-}
+/// Splats in 40 bytes, all f32; memory planned for [`Packed28`] has places for fewer.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(transparent)]
+pub struct Wide(Splat);
 
-impl SplatChoice for Wide {
-    type Record = Splat;
-}
-
-impl SplatRecord for Splat {
+impl SplatRecord for Wide {
     fn new(splat: &Splat) -> Self {
-        *splat
+        Self(*splat)
     }
 
     #[inline]
     fn unpack(&self) -> Splat {
-        *self
+        self.0
     }
 
     #[inline]
     fn depth(&self) -> f32 {
-        self.depth
+        self.0.depth
     }
 }
 
-/// A [`Splat`], its place, depth and shear as they are, everything else rounded to eleven bits.
+/// Splats in 28 bytes: place, depth and shear as f32, everything else rounded to the eleven bits of halves.
 ///
 /// Shear is multiplied by the distance from the centre: eleven bits of it would move the far end of a needle that crosses a
 /// frame of 500 pixels by an eighth of a pixel, and one whose centre lies as far outside by as much more.
@@ -56,16 +52,16 @@ impl SplatRecord for Splat {
 /// 0.3 % of what is left there, and a colour by a sixteenth of a step of 8 bits.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
-pub(crate) struct PackedSplat {
+pub struct Packed28 {
     mean: [f32; 2],
     depth: f32,
     shear: f32,
-    rest: ElevenBits,
+    rest: HalfFields,
 }
 
-impl SplatRecord for PackedSplat {
+impl SplatRecord for Packed28 {
     fn new(splat: &Splat) -> Self {
-        Self { mean: splat.mean, depth: splat.depth, shear: splat.shear, rest: ElevenBits::new(splat) }
+        Self { mean: splat.mean, depth: splat.depth, shear: splat.shear, rest: HalfFields::new(splat) }
     }
 
     #[inline]
@@ -79,19 +75,19 @@ impl SplatRecord for PackedSplat {
     }
 }
 
-/// What of a [`Splat`] has no more than eleven bits in any record but the widest.
+/// What of a [`Splat`] is kept in 16 bits.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
-pub(super) struct ElevenBits {
+struct HalfFields {
     row_precision: u16,
     column_precision: u16,
     log_opacity: u16,
     colour: [u16; 3],
 }
 
-impl ElevenBits {
+impl HalfFields {
     #[inline]
-    pub(super) fn new(splat: &Splat) -> Self {
+    fn new(splat: &Splat) -> Self {
         Self {
             row_precision: pack_precision(splat.row_precision),
             column_precision: pack_precision(splat.column_precision),
@@ -100,9 +96,9 @@ impl ElevenBits {
         }
     }
 
-    /// The splat, with what is kept in other ways.
+    /// The splat, with what is kept as f32.
     #[inline]
-    pub(super) fn unpack(&self, mean: [f32; 2], depth: f32, shear: f32) -> Splat {
+    fn unpack(&self, mean: [f32; 2], depth: f32, shear: f32) -> Splat {
         Splat {
             mean,
             depth,
@@ -131,7 +127,7 @@ fn unpack_precision(packed: u16) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use super::{PackedSplat, SplatRecord};
+    use super::{Packed28, SplatRecord};
     use crate::project::Splat;
 
     #[test]
@@ -147,7 +143,7 @@ mod tests {
                 colour: [0.123, 0.987, -0.0456],
                 depth: 3.21,
             };
-            let kept = PackedSplat::new(&splat).unpack();
+            let kept = Packed28::new(&splat).unpack();
             let exact = |s: &Splat| (s.mean, s.depth, s.shear);
             assert_eq!(exact(&kept), exact(&splat), "as they are");
             let numbers = |s: &Splat| {

@@ -4,8 +4,8 @@ use bytemuck::{Pod, Zeroable};
 
 use super::covariance::Covariance;
 use super::view::{NEAR, View};
-use crate::arithmetic::{Choices, Functions, Roots};
 use crate::bundle::Effects;
+use crate::math::functions::Functions;
 use crate::raster::TileRect;
 use crate::scene::Gaussian;
 
@@ -45,7 +45,7 @@ impl View {
     ///
     /// # Budget
     /// About 150 multiplications, 80 where Gaussians are isotropic, one logarithm, two square roots, constant.
-    pub(crate) fn project<A: Choices>(&self, gaussian: &Gaussian, effects: Effects) -> Option<(Splat, TileRect)> {
+    pub(crate) fn project<F: Functions>(&self, gaussian: &Gaussian, effects: Effects) -> Option<(Splat, TileRect)> {
         let point = self.to_camera(gaussian.centre);
         let [_, _, depth] = point;
         // Not `depth <= NEAR`: NaN leaves as well, here and below.
@@ -61,23 +61,22 @@ impl View {
         };
         let mut opacity = gaussian.opacity;
         if cfg!(feature = "dilation-compensation") && effects.dilation_compensation {
-            opacity *= A::Roots::sqrt(covariance.det_bare / covariance.det);
+            opacity *= libm::sqrtf(covariance.det_bare / covariance.det);
         }
-        let log_opacity = A::Functions::ln(opacity + self.lost_opacity);
+        let log_opacity = F::ln(opacity + self.lost_opacity);
         // Squared Mahalanobis radius at which alpha is the least that draws.
         let reach = 2.0 * (log_opacity + self.log_cut);
         if !(reach >= 0.0 && covariance.det.is_finite()) {
             return None;
         }
         let mean = self.to_image(point);
-        let half_extent = [A::Roots::sqrt(reach * covariance.xx), A::Roots::sqrt(reach * covariance.yy)];
+        let half_extent = [libm::sqrtf(reach * covariance.xx), libm::sqrtf(reach * covariance.yy)];
         let rect = TileRect::covering(mean, half_extent, self.size_px)?;
-        let [shear, column_precision] = A::Roots::quotients([covariance.xy, 1.0], covariance.yy);
         let splat = Splat {
             mean,
-            shear,
+            shear: covariance.xy / covariance.yy,
             row_precision: covariance.yy / covariance.det,
-            column_precision,
+            column_precision: 1.0 / covariance.yy,
             log_opacity,
             colour: gaussian.colour,
             depth,
@@ -105,9 +104,9 @@ impl View {
 #[cfg(test)]
 mod tests {
     use super::log_cut;
-    use crate::arithmetic::Exact;
     use crate::bundle::Effects;
     use crate::camera::Camera;
+    use crate::math::functions::Reference;
     use crate::project::View;
     use crate::scene::Gaussian;
 
@@ -131,7 +130,7 @@ mod tests {
         let effects = Effects { anisotropic: cfg!(feature = "anisotropy"), ..Effects::default() };
         let sum_at = |steps: u8| {
             let view = View::new(&camera).expect("sound").cutting_at(steps);
-            let (splat, _) = view.project::<Exact>(&gaussian, effects).expect("in view");
+            let (splat, _) = view.project::<Reference>(&gaussian, effects).expect("in view");
             let least = (-f64::from(log_cut(steps))).exp();
             let mut sum = 0.0;
             for y in 0..100 {

@@ -1,9 +1,9 @@
 //! Front-to-back compositing of one tile.
 
 use super::tile::{TILE_PX, TileRect};
-use crate::arithmetic::{Choices, Colours, Functions};
 use crate::budget::Quality;
 use crate::math::exp;
+use crate::math::functions::Functions;
 use crate::project::{Splat, SplatRecord, log_cut};
 
 /// No splat is opaque; it keeps the light behind it computable.
@@ -32,7 +32,7 @@ impl BlendRule {
     }
 }
 
-/// Red, green, blue and transmittance of a pixel in work; the transmittance of a finished one is negated, so that it fails
+/// Red, green, blue and transmittance of a pixel while it is drawn; the transmittance of a finished one is negated, so that it fails
 /// every later test without a flag of its own.
 pub(crate) type Pixel = [f32; 4];
 
@@ -68,9 +68,9 @@ pub(crate) struct TileWork {
 ///
 /// # Budget
 /// Per splat and row of pixels two exponentials, per pixel two multiplications and the blend.
-pub(crate) fn blend_tile<A: Choices>(
+pub(crate) fn blend_tile<F: Functions, S: SplatRecord>(
     place: TilePlace,
-    splats: &[A::Splat],
+    splats: &[S],
     rects: &[TileRect],
     list: &[u32],
     rule: &BlendRule,
@@ -88,7 +88,7 @@ pub(crate) fn blend_tile<A: Choices>(
         if place.column < rect.first_column || place.column > rect.last_column {
             continue;
         }
-        let [rows, evaluated] = blend_splat::<A::Functions>(place, &splat.unpack(), rule, pixels, &mut alive);
+        let [rows, evaluated] = blend_splat::<F>(place, &splat.unpack(), rule, pixels, &mut alive);
         work.splats += 1;
         work.rows += rows;
         work.pixels = work.pixels.saturating_add(evaluated);
@@ -97,25 +97,23 @@ pub(crate) fn blend_tile<A: Choices>(
 }
 
 /// Puts the background behind a tile, if there is one, and rounds to bytes, `[height, width]` row by row.
-pub(crate) fn finish_tile<C: Colours>(
-    place: TilePlace,
-    pixels: &[Pixel],
-    background: Option<[f32; 3]>,
-    rgb: &mut [[u8; 3]],
-) {
+// Not inlined: that saves text, and a frame calls it once a tile.
+#[inline(never)]
+pub(crate) fn finish_tile(place: TilePlace, pixels: &[Pixel], background: Option<[f32; 3]>, rgb: &mut [[u8; 3]]) {
     match background {
-        Some(background) => finish::<C>(place, pixels, rgb, |pixel| behind(pixel, background)),
-        None => finish::<C>(place, pixels, rgb, |[red, green, blue, _]| [red, green, blue]),
+        Some(background) => finish(place, pixels, rgb, |pixel| behind(pixel, background)),
+        None => finish(place, pixels, rgb, |[red, green, blue, _]| [red, green, blue]),
     }
 }
 
 /// Rounds what `colour` makes of each pixel to bytes.
-fn finish<C: Colours>(place: TilePlace, pixels: &[Pixel], rgb: &mut [[u8; 3]], colour: impl Fn(Pixel) -> [f32; 3]) {
+fn finish(place: TilePlace, pixels: &[Pixel], rgb: &mut [[u8; 3]], colour: impl Fn(Pixel) -> [f32; 3]) {
     let rows = pixels.chunks_exact(TILE_PX.into());
     let out_rows = rgb.chunks_exact_mut(usize::from(place.width).max(1));
-    for (y, (out_row, row)) in out_rows.zip(rows).take(place.height.into()).enumerate() {
-        for (x, (out, pixel)) in out_row.iter_mut().zip(row).enumerate() {
-            *out = C::bytes(colour(*pixel).map(|channel| channel * 255.0), x, y);
+    for (out_row, row) in out_rows.zip(rows).take(place.height.into()) {
+        for (out, pixel) in out_row.iter_mut().zip(row) {
+            // A float cast saturates: negative becomes 0, and so does NaN; 255.5 and more become 255.
+            *out = colour(*pixel).map(|channel| (channel * 255.0 + 0.5) as u8);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! An anchor's values by name.
 
-use crate::arithmetic::Functions;
 use crate::bundle::Header;
+use crate::math::functions::Functions;
 
 /// One decoded anchor.
 #[derive(Clone, Copy, Debug)]

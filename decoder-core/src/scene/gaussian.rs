@@ -3,9 +3,9 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::Anchor;
-use crate::arithmetic::{Choices, Functions, Roots};
 use crate::bundle::Effects;
-use crate::mlp::{HeadNumbers, Heads, TwoLayers};
+use crate::math::functions::Functions;
+use crate::mlp::{HeadFormat, Heads, MlpHead};
 use crate::stopwatch::{Stage, Stopwatch};
 
 /// Opacities below one step of an 8-bit channel draw nothing.
@@ -41,7 +41,7 @@ pub(crate) struct HeadOutputs {
 }
 
 /// What evaluates anchors, one at a time.
-pub(crate) struct Evaluator<'s, N: HeadNumbers> {
+pub(crate) struct Evaluator<'s, N: HeadFormat> {
     pub(crate) heads: Heads<'s, N>,
     /// `[n_channels]` of the current anchor.
     pub(crate) row: &'s mut [f32],
@@ -69,21 +69,21 @@ pub(crate) struct Workspace<'s> {
 /// # Budget
 /// The opacity head, and at most the others: `3F(F + 4) + 11KF` multiply-adds (`5KF` of isotropic Gaussians), with a detail head
 /// of H units `H(F + 6K)` more.
-pub(crate) fn for_each_gaussian<A: Choices>(
+pub(crate) fn for_each_gaussian<H: HeadFormat, F: Functions>(
     anchor: &Anchor<'_>,
     effects: Effects,
     eye: [f32; 3],
-    heads: &Heads<'_, A::Heads>,
+    heads: &Heads<'_, H>,
     work: &mut Workspace<'_>,
     watch: &mut impl Stopwatch,
     mut draw: impl FnMut(usize, &Gaussian),
 ) -> u64 {
     watch.enter(Stage::Heads);
     let Workspace { inputs, hidden, detail_sums, outputs } = work;
-    fill_inputs::<A>(anchor, effects, eye, inputs);
-    let inputs = A::Heads::values(inputs);
+    fill_inputs(anchor, effects, eye, inputs);
+    let inputs = H::values(inputs);
     let opacity_macs = heads.shape.opacity_macs(anchor.mask.count_ones() as usize);
-    let visible = fill_opacities::<A>(anchor, heads, inputs, hidden, outputs);
+    let visible = fill_opacities::<H, F>(anchor, heads, inputs, hidden, outputs);
     if visible == 0 {
         return opacity_macs as u64;
     }
@@ -94,7 +94,7 @@ pub(crate) fn for_each_gaussian<A: Choices>(
     }
     let units = heads.colour.activate(inputs, hidden);
     for (k, output) in visible_only(outputs, visible) {
-        output.colour = heads.colour.block(k, units).unwrap_or_default().map(A::Functions::sigmoid);
+        output.colour = heads.colour.block(k, units).unwrap_or_default().map(F::sigmoid);
     }
     // Only then the buffer is free for the detail head.
     if cfg!(feature = "detail")
@@ -110,7 +110,7 @@ pub(crate) fn for_each_gaussian<A: Choices>(
     watch.enter(Stage::Project);
     for (k, output) in visible_only(outputs, visible) {
         if let Some(offset) = anchor.offsets.get(k) {
-            draw(k, &gaussian::<A>(anchor, effects, *offset, output));
+            draw(k, &gaussian::<F>(anchor, effects, *offset, output));
         }
     }
     (opacity_macs + heads.shape.open_macs(visible.count_ones() as usize)) as u64
@@ -123,12 +123,12 @@ fn visible_only(outputs: &mut [HeadOutputs], visible: u32) -> impl Iterator<Item
 
 /// Concatenates feature, distance and direction, the last two if the scene has them, as many as there is room for: each head
 /// reads the first of them.
-fn fill_inputs<A: Choices>(anchor: &Anchor<'_>, effects: Effects, eye: [f32; 3], inputs: &mut [f32]) {
+fn fill_inputs(anchor: &Anchor<'_>, effects: Effects, eye: [f32; 3], inputs: &mut [f32]) {
     let [ax, ay, az] = anchor.position;
     let [ex, ey, ez] = eye;
     let [dx, dy, dz] = [ax - ex, ay - ey, az - ez];
-    let distance = A::Roots::sqrt(dx * dx + dy * dy + dz * dz);
-    let direction = if distance > 0.0 { A::Roots::quotients([dx, dy, dz], distance) } else { [0.0; 3] };
+    let distance = libm::sqrtf(dx * dx + dy * dy + dz * dz);
+    let direction = if distance > 0.0 { [dx, dy, dz].map(|d| d / distance) } else { [0.0; 3] };
     let direction = direction.iter().take(if cfg!(feature = "view") { 3 } else { 0 });
     let distance = core::iter::once(&distance).take((cfg!(feature = "view") && effects.view_distance).into());
     for (input, &value) in inputs.iter_mut().zip(anchor.feature.iter().chain(distance).chain(direction)) {
@@ -137,10 +137,10 @@ fn fill_inputs<A: Choices>(anchor: &Anchor<'_>, effects: Effects, eye: [f32; 3],
 }
 
 /// Fills in opacities; returns a bit for each offset that is opaque enough to draw.
-fn fill_opacities<A: Choices>(
+fn fill_opacities<H: HeadFormat, F: Functions>(
     anchor: &Anchor<'_>,
-    heads: &Heads<'_, A::Heads>,
-    inputs: <A::Heads as HeadNumbers>::Values<'_>,
+    heads: &Heads<'_, H>,
+    inputs: <H as HeadFormat>::Values<'_>,
     hidden: &mut [f32],
     outputs: &mut [HeadOutputs],
 ) -> u32 {
@@ -150,25 +150,25 @@ fn fill_opacities<A: Choices>(
         let [logit] = heads.opacity.block(k, units).unwrap_or_default();
         // tanh keeps the sign and the order, so most offsets leave before it.
         if logit > 0.0 {
-            output.opacity = A::Functions::tanh(logit);
+            output.opacity = F::tanh(logit);
             visible |= if output.opacity >= OPACITY_MIN { 1 << (k & 31) } else { 0 };
         }
     }
     visible
 }
 
-fn gaussian<A: Choices>(anchor: &Anchor<'_>, effects: Effects, offset: [f32; 3], output: &HeadOutputs) -> Gaussian {
+fn gaussian<F: Functions>(anchor: &Anchor<'_>, effects: Effects, offset: [f32; 3], output: &HeadOutputs) -> Gaussian {
     let [x, y, z] = anchor.position;
     let [lx, ly, lz] = anchor.extent;
     let [gx, gy, gz] = anchor.base_scale;
     let [ox, oy, oz] = offset;
     let [s0, s1, s2, w, i, j, k] = output.covariance;
-    let s0 = gx * A::Functions::sigmoid(s0);
+    let s0 = gx * F::sigmoid(s0);
     let (scale, rotation) = if cfg!(feature = "anisotropy") && effects.anisotropic {
-        let norm = A::Roots::sqrt(w * w + i * i + j * j + k * k);
+        let norm = libm::sqrtf(w * w + i * i + j * j + k * k);
         let norm = if norm > QUATERNION_NORM_MIN { norm } else { QUATERNION_NORM_MIN };
-        let scale = [s0, gy * A::Functions::sigmoid(s1), gz * A::Functions::sigmoid(s2)];
-        (scale, A::Roots::quotients([w, i, j, k], norm))
+        let scale = [s0, gy * F::sigmoid(s1), gz * F::sigmoid(s2)];
+        (scale, [w, i, j, k].map(|q| q / norm))
     } else {
         ([s0; 3], NO_ROTATION)
     };

@@ -2,29 +2,28 @@
 
 use pocketsplat_core::Bundle;
 use pocketsplat_trainer::bundle::{self, WriteOptions};
-use pocketsplat_trainer::cost::Choice;
+use pocketsplat_trainer::cost::ArithmeticChoice;
 
 use super::picture::worst_tile;
 use super::{Case, Family, Probe, error, pictures};
 use crate::frame::{draw, draw_in, info_for, to_core};
 
 const ANSWER: &str = "\
-Functions of a table change a channel by a step where the exact decoder draws everything, and no tile visibly. Integer heads turn the
+Functions of a table change a channel by a step where the reference arithmetic draws everything, and no tile visibly. Integer heads turn the
 longest needles by a tenth of a pixel, which is seen along their edges alone.";
 
 const ANALYSIS: &str = "\
-All pictures of the families above are drawn by the decoder in another arithmetic and compared with its own exact frames, in steps of
+All pictures of the families above are drawn by the decoder in another arithmetic and compared with those of the reference arithmetic, in steps of
 8 bits. Functions right to 10⁻⁴ move every alpha by a part in 5,000, which is nothing in a sum. But a contribution at 1/255 may be
 drawn in one and not in the other: a step, and half a step of rounding on either side. So may the last layer of an opaque stack: 2.5
-steps, over whole tiles. That makes 4.5 steps, and 3.2 in a tile's mean. Roots right to 10⁻⁶ turn a Gaussian by as much: 0.003 px at the
-end of a needle of 3,000 px.
+steps, over whole tiles. That makes 4.5 steps, and 3.2 in a tile's mean.
 
 With heads in 16-bit integers a step of an output is 2⁻¹⁵ of the largest weight of its row or 2⁻¹⁶ of their sum. So a needle may turn by
 6·10⁻⁵, a tenth of a pixel at the end of the longest, where a flank rises by 1.1 a pixel: 28 steps along an edge one pixel wide. With the
 others that makes 32, and 4 in a tile's mean.";
 
-/// The worst channel of all pictures, and the worst mean of a tile, against the exact decoder; steps of 8 bits.
-fn worst(choice: Choice) -> [f64; 2] {
+/// The worst channel of all pictures, and the worst mean of a tile, against the reference arithmetic; steps of 8 bits.
+fn worst(choice: ArithmeticChoice) -> [f64; 2] {
     let mut worst = [0.0_f64; 2];
     for case in pictures() {
         let Probe::Picture { picture, .. } = case.probe else { continue };
@@ -33,12 +32,12 @@ fn worst(choice: Choice) -> [f64; 2] {
         let written = bundle::write(&picture.scene, &info, &WriteOptions::default()).expect("a scene to be written");
         let bundle = Bundle::parse(&written.bytes).expect("the writer's bundle is sound");
         let camera = to_core(&picture.camera);
-        let (exact, _) = draw(&bundle, &camera).expect("the worst case is planned for");
+        let (reference, _) = draw(&bundle, &camera).expect("the worst case is planned for");
         let (frame, _) = draw_in(choice, &bundle, &camera).expect("no more memory than planned");
-        let channels = exact.rgb.iter().zip(&frame.rgb).map(|(a, b)| f64::from(a.abs_diff(*b)));
+        let channels = reference.rgb.iter().zip(&frame.rgb).map(|(a, b)| f64::from(a.abs_diff(*b)));
         let colours: Vec<[f64; 3]> =
-            exact.rgb.as_chunks::<3>().0.iter().map(|rgb| rgb.map(|byte| f64::from(byte) / 255.0)).collect();
-        let found = [channels.fold(0.0, f64::max), worst_tile(&frame.rgb, &colours, exact.width_px)];
+            reference.rgb.as_chunks::<3>().0.iter().map(|rgb| rgb.map(|byte| f64::from(byte) / 255.0)).collect();
+        let found = [channels.fold(0.0, f64::max), worst_tile(&frame.rgb, &colours, reference.width_px)];
         if std::env::var_os("POCKETSPLAT_CASE").is_some() {
             println!("{choice:?}, {}: {found:?}", case.name);
         }
@@ -48,14 +47,12 @@ fn worst(choice: Choice) -> [f64; 2] {
 }
 
 pub(super) fn family() -> Family {
-    const WHAT: &str = "all pictures, against the exact decoder";
+    const WHAT: &str = "all pictures, against the reference arithmetic";
     let cases: Vec<Case> = vec![
-        error("polynomial, fast roots", WHAT, "worst channel, steps", 4.5, || worst(Choice::FastPolynomial)[0]),
-        error("polynomial, fast roots, tiles", WHAT, "worst tile, steps", 3.2, || worst(Choice::FastPolynomial)[1]),
-        error("functions of a table", WHAT, "worst channel, steps", 4.5, || worst(Choice::Table)[0]),
-        error("functions of a table, tiles", WHAT, "worst tile, steps", 3.2, || worst(Choice::Table)[1]),
-        error("integer heads", WHAT, "worst channel, steps", 32.0, || worst(Choice::I16)[0]),
-        error("integer heads, tiles", WHAT, "worst tile, steps", 4.0, || worst(Choice::I16)[1]),
+        error("functions of a table", WHAT, "worst channel, steps", 4.5, || worst(ArithmeticChoice::Table)[0]),
+        error("functions of a table, tiles", WHAT, "worst tile, steps", 3.2, || worst(ArithmeticChoice::Table)[1]),
+        error("integer heads", WHAT, "worst channel, steps", 32.0, || worst(ArithmeticChoice::I16)[0]),
+        error("integer heads, tiles", WHAT, "worst tile, steps", 4.0, || worst(ArithmeticChoice::I16)[1]),
     ];
     Family { title: "Other arithmetics", answer: ANSWER, analysis: ANALYSIS, cases }
 }

@@ -188,7 +188,7 @@ mod tests {
     use pocketsplat_core::{Quality, Residency, Strips};
 
     use super::*;
-    use crate::cost::Choice;
+    use crate::cost::ArithmeticChoice;
 
     #[test]
     fn a_setting_is_said_in_the_firmwares_words() {
@@ -204,11 +204,8 @@ mod tests {
             ".with_quality(pocketsplat_core::Quality { alpha_cut: 4, transmittance_stop: 10, detail: true }).with_tiers(2)\
              .with_residency(pocketsplat_core::Residency::Streamed).with_strips(pocketsplat_core::Strips::Exactly(4))"
         );
-        // Types that are the defaults of `With` may be left out at the end.
-        let begins = |whole: &str, said: String| whole.starts_with(&said);
-        assert!(begins("I16,Polynomial,Fast,Mixed,Depth32,Rgb888", Choice::Integer.call(Types)));
-        assert!(Choice::Integer.call(Types).starts_with("I16,Polynomial,Fast"));
-        assert!(begins("F32,Precise,Ieee,Mixed,Depth32,Rgb888", Choice::Exact.call(Types)));
+        assert_eq!(ArithmeticChoice::WithoutFpu.call(Types), "I16,Table,Packed28");
+        assert_eq!(ArithmeticChoice::Reference.call(Types), "F32,Reference,Packed28");
     }
 
     #[test]

@@ -11,7 +11,7 @@ use std::time::Instant;
 use pocketsplat_core::arithmetic::Arithmetic;
 use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, Stage};
 
-pub use arithmetic::{Choice, WithArithmetic};
+pub use arithmetic::{ArithmeticChoice, WithArithmetic};
 pub use counter::{CountError, Counter, MOST_VIEWS};
 pub use front::on_front;
 pub use setting::{Setting, knobs, quality_grid};
@@ -66,7 +66,7 @@ pub struct Measured {
     pub psnr_db: f64,
     /// Time of a frame on this machine, s.
     pub host_s: f64,
-    /// Instructions of a frame on each target, of the views that [count](Sight::counts); predicted ones are of the exact arithmetic
+    /// Instructions of a frame on each target, of the views that [count](Sight::counts); predicted ones are of the reference arithmetic
     /// alone, to which the costs were fitted.
     pub instructions: Vec<Option<Instructions>>,
     /// Scratch memory of the plan, bytes.
@@ -148,7 +148,7 @@ fn measure_in<A: Arithmetic>(of: &Measurement<'_, '_>) -> Result<Measured, Decod
             }
         }
     }
-    if setting.arithmetic == Choice::Exact {
+    if setting.arithmetic == ArithmeticChoice::Reference {
         measured.instructions =
             predicted.into_iter().map(|stages| Some(Instructions { stages, counted: false })).collect();
     }

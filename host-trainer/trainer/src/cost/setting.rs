@@ -1,6 +1,6 @@
 //! The knobs of decoder-core, each by itself, and those of quality together.
 
-use super::Choice;
+use super::ArithmeticChoice;
 use pocketsplat_core::{Budget, Bundle, Quality, Residency, Strips};
 
 /// One way to draw a bundle.
@@ -21,7 +21,7 @@ pub struct Setting {
     /// Parts of a frame.
     pub strips: Strips,
     /// What it is computed with.
-    pub arithmetic: Choice,
+    pub arithmetic: ArithmeticChoice,
 }
 
 impl Setting {
@@ -35,7 +35,7 @@ impl Setting {
             pruning_rate: 0.0,
             residency: Residency::Auto,
             strips: Strips::Auto,
-            arithmetic: Choice::Exact,
+            arithmetic: ArithmeticChoice::Reference,
         }
     }
 
@@ -92,7 +92,7 @@ pub fn knobs(bundle: &Bundle<'_>) -> Vec<Setting> {
         let strips = Strips::Exactly(n_strips);
         all.push(Setting { knob: "strips", name: n_strips.to_string(), strips, ..exact.clone() });
     }
-    for &arithmetic in Choice::TURNED {
+    for &arithmetic in ArithmeticChoice::TURNED {
         let (knob, name) = arithmetic.name();
         all.push(Setting { knob, name: name.to_owned(), arithmetic, ..exact.clone() });
     }

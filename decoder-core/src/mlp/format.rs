@@ -1,28 +1,37 @@
-//! What the heads are kept and multiplied in.
+//! The number formats that the heads are kept and multiplied in.
 
 use super::head::Head;
-use super::integer::{IntegerHead, Pair8, Pair16, Quantised};
-use super::weight::{Half, StrictHalf, Weight};
+use super::integer::{IntegerHead, Quantised};
+use super::weight::{Half, Weight};
 use crate::arena::Arena;
-use crate::arithmetic::{F16, F32, I8, I16, StrictF16};
 use crate::bundle::{HeadView, WeightReader};
 use crate::error::DecodeError;
 
+/// Weights as f32.
+#[derive(Clone, Copy, Debug)]
+pub struct F32;
+/// Weights as halves, which is what the file holds or nearly so; sums in f32.
+#[derive(Clone, Copy, Debug)]
+pub struct F16;
+/// Weights, inputs and hidden units as 16-bit integers, sums of 32 bits; the detail head in f32.
+#[derive(Clone, Copy, Debug)]
+pub struct I16;
+
 /// A format of the heads.
-pub(crate) trait HeadNumbers {
+pub(crate) trait HeadFormat {
     /// What the detail head is kept in, whose second inputs, the colours, follow from the other heads.
     type Detail: Weight;
     /// What a layer reads.
     type Values<'v>: Copy;
     /// A head of B outputs an offset.
-    type Head<'s, const B: usize>: TwoLayers<'s, Self, B>;
+    type Head<'s, const B: usize>: MlpHead<'s, Self, B>;
 
     /// Puts the heads' inputs into this format, in their own memory.
     fn values(inputs: &mut [f32]) -> Self::Values<'_>;
 }
 
 /// A head: a hidden layer with ReLU, and an output layer of one block of B outputs an offset.
-pub(crate) trait TwoLayers<'s, N: HeadNumbers + ?Sized, const B: usize>: Sized {
+pub(crate) trait MlpHead<'s, N: HeadFormat + ?Sized, const B: usize>: Sized {
     /// Converts the file's weights; takes no more memory than [`HeadShape`](super::HeadShape) says of floats.
     fn convert(arena: &mut Arena<'s>, head: &HeadView<'_>, weights: &mut WeightReader<'_>)
     -> Result<Self, DecodeError>;
@@ -39,7 +48,7 @@ pub(crate) trait TwoLayers<'s, N: HeadNumbers + ?Sized, const B: usize>: Sized {
 /// Floats read floats.
 macro_rules! floats {
     ($($name:ty => $weight:ty),*) => {$(
-        impl HeadNumbers for $name {
+        impl HeadFormat for $name {
             type Detail = $weight;
             type Values<'v> = &'v [f32];
             type Head<'s, const B: usize> = Head<'s, $weight, B>;
@@ -52,20 +61,15 @@ macro_rules! floats {
     )*};
 }
 
+floats!(F32 => f32, F16 => Half);
+
 /// Integers read integers; the detail head stays in floats.
-macro_rules! integers {
-    ($($name:ty => $pair:ty),*) => {$(
-        impl HeadNumbers for $name {
-            type Detail = f32;
-            type Values<'v> = Quantised<'v>;
-            type Head<'s, const B: usize> = IntegerHead<'s, $pair, B>;
+impl HeadFormat for I16 {
+    type Detail = f32;
+    type Values<'v> = Quantised<'v>;
+    type Head<'s, const B: usize> = IntegerHead<'s, B>;
 
-            fn values(inputs: &mut [f32]) -> Quantised<'_> {
-                Quantised::of(inputs)
-            }
-        }
-    )*};
+    fn values(inputs: &mut [f32]) -> Quantised<'_> {
+        Quantised::of(inputs)
+    }
 }
-
-floats!(F32 => f32, F16 => Half, StrictF16 => StrictHalf);
-integers!(I16 => Pair16, I8 => Pair8);

@@ -148,10 +148,11 @@ impl Header {
     ///
     /// * `sections`: the rows of the table; [`header_len`](Self::header_len) and [`file_len`](Self::file_len) are the caller's to
     ///   keep true to them.
-    pub fn emit(&self, sections: &[Section]) -> impl Iterator<Item = u8> {
-        let rows = sections.iter().flat_map(Section::emit);
+    pub fn emit<S: Iterator<Item = Section> + Clone>(&self, sections: S) -> impl Iterator<Item = u8> + use<S> {
         // A table of 255 rows is the longest.
-        let checked = self.emit_fields(sections.len() as u8).into_iter().chain(rows);
+        let n_sections = sections.clone().count() as u8;
+        let rows = sections.flat_map(|section| section.emit());
+        let checked = self.emit_fields(n_sections).into_iter().chain(rows);
         let crc = crc32_of(checked.clone());
         checked.chain(crc.to_le_bytes())
     }
@@ -208,14 +209,43 @@ impl Header {
             height_px: cursor.u16()?,
         };
         let [feature_bits, log_scale_bits, offset_bits, reserved] = cursor.array()?;
-        let symbol_bits = [feature_bits, log_scale_bits, offset_bits];
+        in_range(Field::CameraConvention, convention.into(), 0, CONVENTION_OPENCV.into())?;
+        in_range(Field::NSections, n_sections.into(), MIN_SECTIONS.into(), u8::MAX.into())?;
+        in_range(Field::Reserved, reserved.into(), 0, 0)?;
+        let header = Self {
+            header_len,
+            file_len,
+            features,
+            feature_dim,
+            n_offsets,
+            n_anchors,
+            n_chunks,
+            max_chunk_anchors,
+            n_tiers,
+            training_px,
+            background,
+            voxel_size,
+            colour_hidden,
+            detail_hidden,
+            symbol_bits: [feature_bits, log_scale_bits, offset_bits],
+            normalisation_centre,
+            normalisation_scale,
+            preview,
+        };
+        header.check()?;
+        Ok((header, n_sections))
+    }
+
+    /// The limits of the fields, each for itself.
+    pub(super) fn check(&self) -> Result<(), DecodeError> {
+        let Self { feature_dim, n_offsets, n_anchors, n_chunks, max_chunk_anchors, n_tiers, .. } = *self;
+        let Self { training_px, background, voxel_size, colour_hidden, detail_hidden, symbol_bits, .. } = *self;
+        let Self { features, normalisation_centre, normalisation_scale, ref preview, .. } = *self;
         in_range(Field::FeatureDim, feature_dim.into(), 1, MAX_FEATURE_DIM.into())?;
         in_range(Field::NOffsets, n_offsets.into(), 1, MAX_OFFSETS.into())?;
         in_range(Field::NAnchors, n_anchors, 0, MAX_ANCHORS)?;
         in_range(Field::NChunks, n_chunks, 0, n_anchors)?;
         in_range(Field::MaxChunkAnchors, max_chunk_anchors.into(), 1, MAX_CHUNK_ANCHORS.into())?;
-        in_range(Field::CameraConvention, convention.into(), 0, CONVENTION_OPENCV.into())?;
-        in_range(Field::NSections, n_sections.into(), MIN_SECTIONS.into(), u8::MAX.into())?;
         in_range(Field::NTiers, n_tiers.into(), 1, MAX_TIERS.into())?;
         in_range(Field::ColourHidden, colour_hidden.into(), 1, MAX_FEATURE_DIM.into())?;
         let [least, most] = if features.effects.detail { [1, MAX_FEATURE_DIM.into()] } else { [0, 0] };
@@ -223,7 +253,6 @@ impl Header {
         for bits in symbol_bits {
             in_range(Field::SymbolBits, bits.into(), 1, 16)?;
         }
-        in_range(Field::Reserved, reserved.into(), 0, 0)?;
         for channel in background {
             in_range(Field::Background, channel.into(), 0, if features.effects.background { 255 } else { 0 })?;
         }
@@ -240,27 +269,7 @@ impl Header {
         if preview.check().is_err() {
             return Err(DecodeError::BadFloat { field: Field::PreviewCamera, index: 0 });
         }
-        let header = Self {
-            header_len,
-            file_len,
-            features,
-            feature_dim,
-            n_offsets,
-            n_anchors,
-            n_chunks,
-            max_chunk_anchors,
-            n_tiers,
-            training_px,
-            background,
-            voxel_size,
-            colour_hidden,
-            detail_hidden,
-            symbol_bits,
-            normalisation_centre,
-            normalisation_scale,
-            preview,
-        };
-        Ok((header, n_sections))
+        Ok(())
     }
 }
 

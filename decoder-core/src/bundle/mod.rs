@@ -38,7 +38,7 @@ pub(crate) use header::{covariance_outputs, n_log_scales};
 pub use heads::{CodedHeads, Halves, HeadView, HeadsView, LayerWeights, WeightReader};
 pub use lattice::{Lattice, MAX_LATTICE_BITS, MAX_LATTICE_MIN};
 pub use manifest::{MANIFEST_RECORD_LEN, STRIPS, TierMeasures};
-pub use section::{SECTION_LEN, Section};
+pub use section::{SECTION_LEN, Section, SectionBytes};
 pub use tables::{Table, Tables};
 
 use crate::context::Context;
@@ -89,33 +89,54 @@ impl<'a> Bundle<'a> {
     pub fn parse(bytes: &'a [u8]) -> Result<Self, DecodeError> {
         let (header, section_table) = Header::parse(bytes)?;
         let sections = Sections::parse(section_table, header.features, header.header_len, header.file_len, bytes)?;
-        let heads = HeadsView::parse(sections.heads.bytes(bytes)?, &header)?;
-        let lattice = Lattice::parse(sections.lattice.bytes(bytes)?)?;
+        Self::of_parts(header, section_table, &sections.bytes(bytes)?, sections.chunks.len)
+    }
+
+    /// Checks sections that are in no file yet and returns the view of them, for a writer that measures a scene before it writes
+    /// it; [`sections`](Self::sections) lists none.
+    ///
+    /// # Errors
+    /// As [`parse`](Self::parse).
+    ///
+    /// # Budget
+    /// No scratch. Reads everything before the chunks once, coded heads twice.
+    pub fn of_sections(header: Header, sections: &SectionBytes<'a>) -> Result<Self, DecodeError> {
+        Features::from_bits(header.features.to_bits())?;
+        header.check()?;
+        Self::of_parts(header, &[], sections, saturate(sections.chunks.len()))
+    }
+
+    /// * `chunks_len`: length of the chunks section, of which the file may have less or go on behind it.
+    fn of_parts(
+        header: Header,
+        section_table: &'a [[u8; SECTION_LEN]],
+        sections: &SectionBytes<'a>,
+        chunks_len: u32,
+    ) -> Result<Self, DecodeError> {
+        let heads = HeadsView::parse(sections.heads, &header)?;
+        let lattice = Lattice::parse(sections.lattice)?;
         let masks = match sections.masks {
-            Some(section) => Some(MaskModel::parse(section.bytes(bytes)?, header.n_offsets)?),
+            Some(section) => Some(MaskModel::parse(section, header.n_offsets)?),
             None => None,
         };
-        let coder = sections.coder.bytes(bytes)?;
         let coder = if cfg!(feature = "context") && header.features.context {
             Coder::Context(Context::parse(
-                coder,
+                sections.coder,
                 header.feature_dim.into(),
                 header.n_log_scales().into(),
                 header.n_channels(),
             )?)
         } else {
-            Coder::Static(Tables::parse(coder, header.n_channels())?)
+            Coder::Static(Tables::parse(sections.coder, header.n_channels())?)
         };
-        let manifest = manifest::parse(sections.manifest.bytes(bytes)?, header.n_tiers)?;
-        let directory = Directory::parse(sections.directory.bytes(bytes)?, &header, sections.chunks.len)?;
+        let manifest = manifest::parse(sections.manifest, header.n_tiers)?;
+        let directory = Directory::parse(sections.directory, &header, chunks_len)?;
         let gaussians = match sections.gaussians {
             // Without the feature it is a section like any other that a decoder does not know.
-            Some(section) if cfg!(feature = "baked") => {
-                Some(GaussianCounts::parse(section.bytes(bytes)?, &header, &directory)?)
-            }
+            Some(section) if cfg!(feature = "baked") => Some(GaussianCounts::parse(section, &header, &directory)?),
             _ => None,
         };
-        let (n_tiers, chunks) = tiers_in(bytes, &sections.chunks, &directory, header.n_tiers)?;
+        let (n_tiers, chunks) = tiers_in(sections.chunks, chunks_len, &directory, header.n_tiers)?;
         Ok(Self {
             header,
             section_table,
@@ -138,7 +159,7 @@ impl<'a> Bundle<'a> {
     }
 
     /// The section table, those that this decoder skips included.
-    pub fn sections(&self) -> impl Iterator<Item = Section> + use<'a> {
+    pub fn sections(&self) -> impl Iterator<Item = Section> + Clone + use<'a> {
         self.section_table.iter().filter_map(|row| Section::parse(row).ok())
     }
 
@@ -269,15 +290,16 @@ impl<'a> Bundle<'a> {
     }
 }
 
-/// How many tiers `file` holds, and their chunks: all of them, or those up to a tier at whose end the file ends.
+/// How many tiers a file holds, and their chunks: all of them, or those up to a tier at whose end the file ends.
+///
+/// * `available`: the file from where its chunks begin.
 fn tiers_in<'a>(
-    file: &'a [u8],
-    section: &Section,
+    available: &'a [u8],
+    chunks_len: u32,
     directory: &Directory<'_>,
     n_tiers: u8,
 ) -> Result<(u8, &'a [u8]), DecodeError> {
-    let available = file.get(section.offset as usize..).unwrap_or_default();
-    if let Some(chunks) = available.get(..section.len as usize) {
+    if let Some(chunks) = available.get(..chunks_len as usize) {
         return Ok((n_tiers, chunks));
     }
     for tier in (0..n_tiers).rev() {
@@ -287,7 +309,7 @@ fn tiers_in<'a>(
         }
     }
     let available = saturate(available.len());
-    Err(DecodeError::Truncated { section: SectionKind::Chunks, needed: section.len, available })
+    Err(DecodeError::Truncated { section: SectionKind::Chunks, needed: chunks_len, available })
 }
 
 #[cfg(test)]

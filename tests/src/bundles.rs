@@ -2,7 +2,7 @@
 
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_core::Bundle;
-use pocketsplat_trainer::bundle::{self, Coder, WriteOptions, manifest};
+use pocketsplat_trainer::bundle::{self, CodedScene, Coder, WriteOptions, manifest};
 
 use crate::frame::info_for;
 use crate::scenes::{Case, cameras, masked, random_scene, with_context};
@@ -17,6 +17,10 @@ const PRUNING_RATES: [f32; 3] = [0.5, 0.25, 0.0];
 ///
 /// * `chunk_anchors`: anchors of a chunk at most.
 pub fn tiered(case: &Case, coder: Coder, chunk_anchors: u16) -> Vec<u8> {
+    coded(case, coder, chunk_anchors).into_file(&[]).expect("the writer's bundle is sound").bytes
+}
+
+fn coded(case: &Case, coder: Coder, chunk_anchors: u16) -> CodedScene {
     let scene = with_context(masked(random_scene(case), case.seed), case.seed);
     let options = WriteOptions {
         coder,
@@ -25,15 +29,14 @@ pub fn tiered(case: &Case, coder: Coder, chunk_anchors: u16) -> Vec<u8> {
         chunk_anchors,
         ..WriteOptions::default()
     };
-    bundle::write(&scene, &info_for(&cameras()[0].1), &options).expect("a test scene can be written").bytes
+    bundle::code(&scene, &info_for(&cameras()[0].1), &options).expect("a test scene can be written")
 }
 
 /// The same with chunks of 32 anchors and a manifest measured over `views`, which are of the size of the first test camera.
 pub fn measured(case: &Case, coder: Coder, views: &[Camera]) -> Vec<u8> {
-    let mut bytes = tiered(case, coder, 32);
-    let measures = manifest::measure(&Bundle::parse(&bytes).expect("the writer's bundle is sound"), views, &[]);
-    manifest::install(&mut bytes, &measures.expect("sound chunks")).expect("a sound bundle");
-    bytes
+    let coded = coded(case, coder, 32);
+    let measures = manifest::measure(&coded.bundle().expect("the writer's sections are sound"), views, &[]);
+    coded.into_file(&measures.expect("sound chunks")).expect("the writer's bundle is sound").bytes
 }
 
 /// Where the chunks of a bundle begin, bytes from the start of its file.

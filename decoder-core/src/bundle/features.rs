@@ -22,6 +22,14 @@ pub struct Effects {
     pub background: bool,
 }
 
+impl Effects {
+    /// Whether the heads see the view, so that a frame from elsewhere has other Gaussians.
+    #[must_use]
+    pub const fn see_view(self) -> bool {
+        self.view_colour || self.view_geometry || self.view_distance
+    }
+}
+
 /// What a bundle requires of its decoder: the scene's effects, and how its numbers are stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

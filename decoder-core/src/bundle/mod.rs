@@ -222,8 +222,7 @@ impl<'a> Bundle<'a> {
     /// with the feature `baked`.
     #[must_use]
     pub fn n_gaussians(&self, n_tiers: u8) -> Option<u32> {
-        let Effects { view_colour, view_geometry, view_distance, .. } = self.header.features.effects;
-        let sees_view = view_colour || view_geometry || view_distance;
+        let sees_view = self.header.features.effects.see_view();
         let counts = self.gaussians.filter(|_| cfg!(feature = "baked") && !sees_view)?;
         Some(counts.up_to(n_tiers.min(self.n_tiers)))
     }

@@ -4,7 +4,9 @@
 //! bias in range. Inputs are in 2⁻¹⁴, hidden units in 2⁻¹⁰, outputs in the units of [`pocketsplat_core::context`].
 
 use pocketsplat_core::DecodeError;
-use pocketsplat_core::context::{Context, MAX_BIAS, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS, MEAN_PARTS};
+use pocketsplat_core::context::{
+    Context, ContextHead, GridLevel, MAX_BIAS, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS, MEAN_PARTS,
+};
 use pocketsplat_core::entropy::EIGHTHS;
 
 use crate::scene::{ContextModel, Head, ModelShape};
@@ -73,17 +75,14 @@ pub fn section(model: &ContextModel<f32>, n_channels: usize) -> Result<Vec<u8>, 
     within("hidden units of the context", model.mlp.n_hidden, MAX_CONTEXT_HIDDEN.into())?;
     let [hidden, output] = rows(model, n_channels)?;
 
-    let mut bytes = Vec::new();
-    bytes.extend(model.frame.min.iter().flat_map(|c| c.to_le_bytes()));
-    bytes.extend(model.frame.scale.iter().flat_map(|s| s.to_le_bytes()));
-    bytes.extend(model.base_steps.iter().flat_map(|s| s.to_le_bytes()));
-    bytes.extend([model.levels.len() as u8, 0]);
-    bytes.extend((model.mlp.n_hidden as u16).to_le_bytes());
-    for level in &model.levels {
-        bytes.extend([level.kind.code(), 0]);
-        bytes.extend(level.resolution.to_le_bytes());
-        bytes.extend(level.n_rows.to_le_bytes());
-    }
+    let head = ContextHead {
+        frame: model.frame,
+        base_steps: model.base_steps,
+        n_levels: model.levels.len() as u8,
+        n_hidden: model.mlp.n_hidden as u16,
+    };
+    let mut bytes = head.emit().to_vec();
+    bytes.extend(model.levels.iter().flat_map(GridLevel::emit));
     for layer in [&hidden, &output] {
         bytes.extend(layer.iter().map(|row| row.shift));
     }
@@ -168,7 +167,7 @@ fn grid_bytes(rows: &[f32]) -> impl Iterator<Item = u8> + '_ {
 
 #[cfg(test)]
 mod tests {
-    use pocketsplat_core::context::{FEATURE_ONE, GridFrame, GridLevel, Group, LevelKind};
+    use pocketsplat_core::context::{FEATURE_ONE, GridFrame, Group, LevelKind};
 
     use super::*;
     use crate::finite_difference::random;

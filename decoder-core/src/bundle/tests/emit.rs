@@ -6,8 +6,8 @@ use std::vec::Vec;
 use super::builder::{LATTICE_MIN, Variant, bundle};
 use super::{symbols, variants};
 use crate::bundle::{
-    Bundle, ChunkRecord, Coder, Effects, Features, Header, InkFrame, Lattice, SECTION_LEN, STRIPS, Section, SectionBytes,
-    Table, Tables, Tier, TierMeasures, header_len, manifest,
+    Bundle, ChunkRecord, Coder, Effects, Features, Header, InkFrame, Lattice, SECTION_LEN, STRIPS, Section,
+    SectionBytes, Table, Tables, Tier, TierMeasures, header_len, manifest,
 };
 use crate::bytes::Cursor;
 use crate::camera::Camera;

@@ -3,8 +3,8 @@
 use anyhow::{Result, bail};
 use pocketsplat_capture::dataset::{Capture, View};
 use pocketsplat_core::{Budget, Bundle, DecodeError};
-use pocketsplat_trainer::bundle::manifest::{cameras_to_measure, install, measure};
-use pocketsplat_trainer::bundle::{self, BundleInfo, Coder, WriteError, WriteOptions, Written};
+use pocketsplat_trainer::bundle::manifest::{cameras_to_measure, measure};
+use pocketsplat_trainer::bundle::{self, BundleInfo, CodedScene, Coder, WriteError, WriteOptions};
 use pocketsplat_trainer::device::{Fitted, Limits, NoFit, fitted};
 use pocketsplat_trainer::metrics::psnr_db_masked;
 use pocketsplat_trainer::render::decoder::core_image;
@@ -68,11 +68,10 @@ impl Encoding {
         let [width_px, height_px] = largest_px(capture).map(|px| px as u16);
         let frame = Budget::for_frame(width_px, height_px);
         let write = |finished: &Finished| {
-            let mut written = self.coded(finished, capture)?;
+            let coded = self.coded(finished, capture)?;
             let cameras: Vec<_> = capture.train.iter().map(|view| view.camera.clone()).collect();
-            let measures = measure(&Bundle::parse(&written.bytes)?, &cameras_to_measure(&cameras), held_out)?;
-            install(&mut written.bytes, &measures)?;
-            Ok(written)
+            let measures = measure(&coded.bundle()?, &cameras_to_measure(&cameras), held_out)?;
+            Ok(coded.into_file(&measures)?)
         };
         Ok(fitted(finished, &self.limits, &frame, write)?)
     }
@@ -82,23 +81,23 @@ impl Encoding {
     /// A device that decodes in every frame pays six times as much for the context as for tables, and gets the finest that its flash
     /// has room for. Elsewhere tables have to be shorter and cost no more than [`LARGEST_LOSS_DB`]: their steps do not follow the
     /// place, and where a run's do, tables of the mean steps cost decibels.
-    fn coded(&self, finished: &Finished, capture: &Capture) -> Result<Written, NoFit> {
+    fn coded(&self, finished: &Finished, capture: &Capture) -> Result<CodedScene, NoFit> {
         let write = |coder, share| self.write(finished, coder, share, capture);
         if self.coder != Coder::Auto || finished.scene.context.is_none() {
             return Ok(write(self.coder, 1.0)?);
         }
         if self.limits.frame_instructions.is_some() {
             for share in MEAN_STEP_SHARES {
-                let written = write(Coder::Static, share)?;
-                if self.limits.flash_bytes.is_none_or(|most| written.bytes.len() as u64 <= most) {
-                    return Ok(written);
+                let coded = write(Coder::Static, share)?;
+                if self.limits.flash_bytes.is_none_or(|most| coded.file_len() as u64 <= most) {
+                    return Ok(coded);
                 }
             }
         }
         let context = write(Coder::Context, 1.0)?;
         let tables = MEAN_STEP_SHARES.into_iter().rev().map(|share| Ok(write(Coder::Static, share)?));
-        let psnr_db = |written: &Written| Ok(judged_psnr_db(&written.bytes, capture)?);
-        shorter_and_as_good(context, tables, |written| written.bytes.len(), psnr_db)
+        let psnr_db = |coded: &CodedScene| Ok(judged_psnr_db(&coded.bundle()?, capture)?);
+        shorter_and_as_good(context, tables, CodedScene::file_len, psnr_db)
     }
 
     fn write(
@@ -107,7 +106,7 @@ impl Encoding {
         coder: Coder,
         mean_step_share: f32,
         capture: &Capture,
-    ) -> Result<Written, WriteError> {
+    ) -> Result<CodedScene, WriteError> {
         let info = BundleInfo {
             normalisation: capture.normalisation,
             background: finished.background,
@@ -123,7 +122,7 @@ impl Encoding {
             pruning_rates: self.tiers.clone(),
             ..WriteOptions::default()
         };
-        bundle::write(&finished.scene, &info, &options)
+        bundle::code(&finished.scene, &info, &options)
     }
 }
 
@@ -149,12 +148,11 @@ fn shorter_and_as_good<T, E>(
 }
 
 /// PSNR of a bundle's frames, mean over [`JUDGED_VIEWS`] training views, dB.
-fn judged_psnr_db(bytes: &[u8], capture: &Capture) -> Result<f64, DecodeError> {
-    let bundle = Bundle::parse(bytes)?;
+fn judged_psnr_db(bundle: &Bundle<'_>, capture: &Capture) -> Result<f64, DecodeError> {
     let n = JUDGED_VIEWS.min(capture.train.len());
     let psnr_db = (0..n).into_par_iter().map(|i| {
         let view = &capture.train[i * capture.train.len() / n];
-        let frame = core_image(&bundle, &view.camera)?;
+        let frame = core_image(bundle, &view.camera)?;
         Ok(psnr_db_masked(&frame.image, &view.image, view.mask.as_ref()) / n as f64)
     });
     // One after the other, so that the sum does not depend on the number of threads.

@@ -1,25 +1,22 @@
 //! The table of contents: where each tier ends, and each chunk's length, checksum and ink box.
 
-use pocketsplat_core::bundle::crc32;
+use pocketsplat_core::bundle::{ChunkRecord, Tier, crc32};
 
-use super::ink::{InkBox, InkFrame};
+use super::ink::{InkBox, frame_around, quantised};
 use super::order::Placement;
 
 /// The section's bytes; chunks and boxes are those of the placement, in its order.
 pub(super) fn section(placement: &Placement, chunks: &[Vec<u8>], boxes: &[InkBox]) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    for &n_chunks in &placement.tier_chunks {
+    let tiers = placement.tier_chunks.iter().flat_map(|&n_chunks| {
         let n_anchors: usize = placement.chunks[..n_chunks].iter().map(ExactSizeIterator::len).sum();
         let end: usize = chunks[..n_chunks].iter().map(Vec::len).sum();
-        bytes.extend([n_chunks, n_anchors, end].iter().flat_map(|&x| (x as u32).to_le_bytes()));
-    }
-    let frame = InkFrame::around(boxes);
-    bytes.extend(frame.min.iter().chain(&frame.step).flat_map(|x| x.to_le_bytes()));
-    for ((anchors, chunk), ink) in placement.chunks.iter().zip(chunks).zip(boxes) {
-        bytes.extend([chunk.len() as u32, crc32(chunk)].iter().flat_map(|x| x.to_le_bytes()));
-        let corners = frame.quantise(ink);
-        let counts = [anchors.len() as u16, 0];
-        bytes.extend(counts.iter().chain(corners.as_flattened()).flat_map(|x| x.to_le_bytes()));
-    }
-    bytes
+        Tier { n_chunks: n_chunks as u32, n_anchors: n_anchors as u32, end: end as u32 }.emit()
+    });
+    let frame = frame_around(boxes);
+    let records = placement.chunks.iter().zip(chunks).zip(boxes).flat_map(|((anchors, chunk), ink)| {
+        let [low, high] = quantised(ink, &frame);
+        let (len, n_anchors) = (chunk.len() as u32, anchors.len() as u16);
+        ChunkRecord { len, crc: crc32(chunk), n_anchors, low, high }.emit()
+    });
+    tiers.chain(frame.emit()).chain(records).collect()
 }

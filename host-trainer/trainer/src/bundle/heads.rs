@@ -1,7 +1,6 @@
 //! The weights of the heads: halves, or steps of a fixed size under two tables.
 
 use half::f16;
-use pocketsplat_core::entropy::FREQUENCY_TOTAL;
 
 use super::WriteError;
 use super::stream::SlotList;
@@ -65,7 +64,7 @@ fn coded(heads: &Heads<f32>, fraction_bits: [u8; 2]) -> Option<Vec<u8>> {
         .collect::<Option<_>>()?;
     let table = |layer: usize, step: f32| TableDraft::of(step, matrices.iter().flat_map(|head| &head[layer]).copied());
     let tables = [table(0, steps_1), table(1, steps_2)];
-    let mut bytes: Vec<u8> = tables.iter().flat_map(TableDraft::record).collect();
+    let mut bytes: Vec<u8> = tables.iter().flat_map(|table| table.view().emit()).collect();
     let biases = heads.each().flat_map(|head| head.b1.iter().chain(&head.b2));
     bytes.extend(biases.flat_map(|&bias| f16::from_f32(bias).to_le_bytes()));
     let mut list = SlotList::default();
@@ -74,7 +73,6 @@ fn coded(heads: &Heads<f32>, fraction_bits: [u8; 2]) -> Option<Vec<u8>> {
             layer.iter().flat_map(|&symbol| table.slots(symbol)).for_each(|slot| list.append(&slot));
         }
     }
-    debug_assert!(tables.iter().all(|table| table.bounds.last() == Some(&FREQUENCY_TOTAL)), "all slots are owned");
     bytes.extend(list.into_bytes());
     Some(bytes)
 }

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use pocketsplat_core::bundle::InkFrame;
+
 use super::quantise::Rows;
 use crate::ops::prefilter::INK_DEVIATIONS;
 use crate::scene::ModelShape;
@@ -16,13 +18,6 @@ const MAX_COORDINATE: f64 = f32::MAX as f64 / 4.0;
 pub(super) struct InkBox {
     low: [f64; 3],
     high: [f64; 3],
-}
-
-/// What the integer corners of all boxes mean: `min + f32(q)·step`, in f32, product first.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct InkFrame {
-    pub(super) min: [f32; 3],
-    pub(super) step: [f32; 3],
 }
 
 impl InkBox {
@@ -53,53 +48,51 @@ impl InkBox {
     }
 }
 
-impl InkFrame {
-    /// The finest frame that reaches around all of `boxes`.
-    pub(super) fn around(boxes: &[InkBox]) -> Self {
-        if boxes.is_empty() {
-            return Self { min: [0.0; 3], step: [0.0; 3] };
+/// The finest frame that reaches around all of `boxes`.
+pub(super) fn frame_around(boxes: &[InkBox]) -> InkFrame {
+    let mut frame = InkFrame { min: [0.0; 3], step: [0.0; 3] };
+    if boxes.is_empty() {
+        return frame;
+    }
+    for axis in 0..3 {
+        let low = boxes.iter().map(|b| b.low[axis]).fold(f64::INFINITY, f64::min);
+        let high = boxes.iter().map(|b| b.high[axis]).fold(f64::NEG_INFINITY, f64::max);
+        frame.min[axis] = not_above(low);
+        frame.step[axis] = ((high - f64::from(frame.min[axis])) / f64::from(u16::MAX)) as f32;
+        while coordinate(&frame, axis, u16::MAX) < high {
+            frame.step[axis] = frame.step[axis].next_up();
         }
-        let mut frame = Self { min: [0.0; 3], step: [0.0; 3] };
-        for axis in 0..3 {
-            let low = boxes.iter().map(|b| b.low[axis]).fold(f64::INFINITY, f64::min);
-            let high = boxes.iter().map(|b| b.high[axis]).fold(f64::NEG_INFINITY, f64::max);
-            frame.min[axis] = not_above(low);
-            frame.step[axis] = ((high - f64::from(frame.min[axis])) / f64::from(u16::MAX)) as f32;
-            while f64::from(frame.coordinate(axis, u16::MAX)) < high {
-                frame.step[axis] = frame.step[axis].next_up();
-            }
+    }
+    frame
+}
+
+/// The corners of the smallest box of `frame` around `ink`.
+pub(super) fn quantised(ink: &InkBox, frame: &InkFrame) -> [[u16; 3]; 2] {
+    let steps = |axis: usize, x: f64| {
+        let steps = (x - f64::from(frame.min[axis])) / f64::from(frame.step[axis]);
+        // NaN, of a frame without extent, becomes 0.
+        steps.clamp(0.0, f64::from(u16::MAX))
+    };
+    let low = std::array::from_fn(|axis| {
+        let mut q = steps(axis, ink.low[axis]).floor() as u16;
+        while q > 0 && coordinate(frame, axis, q) > ink.low[axis] {
+            q -= 1;
         }
-        frame
-    }
+        q
+    });
+    let high = std::array::from_fn(|axis| {
+        let mut q = steps(axis, ink.high[axis]).ceil() as u16;
+        while q < u16::MAX && coordinate(frame, axis, q) < ink.high[axis] {
+            q += 1;
+        }
+        q
+    });
+    [low, high]
+}
 
-    /// The coordinate that `q` stands for.
-    fn coordinate(&self, axis: usize, q: u16) -> f32 {
-        self.min[axis] + f32::from(q) * self.step[axis]
-    }
-
-    /// The corners of the smallest box of this frame around `ink`.
-    pub(super) fn quantise(&self, ink: &InkBox) -> [[u16; 3]; 2] {
-        let steps = |axis: usize, x: f64| {
-            let steps = (x - f64::from(self.min[axis])) / f64::from(self.step[axis]);
-            // NaN, of a frame without extent, becomes 0.
-            steps.clamp(0.0, f64::from(u16::MAX))
-        };
-        let low = std::array::from_fn(|axis| {
-            let mut q = steps(axis, ink.low[axis]).floor() as u16;
-            while q > 0 && f64::from(self.coordinate(axis, q)) > ink.low[axis] {
-                q -= 1;
-            }
-            q
-        });
-        let high = std::array::from_fn(|axis| {
-            let mut q = steps(axis, ink.high[axis]).ceil() as u16;
-            while q < u16::MAX && f64::from(self.coordinate(axis, q)) < ink.high[axis] {
-                q += 1;
-            }
-            q
-        });
-        [low, high]
-    }
+/// The coordinate that `q` stands for along an axis, as the decoder rounds it.
+fn coordinate(frame: &InkFrame, axis: usize, q: u16) -> f64 {
+    frame.corner([q; 3])[axis].into()
 }
 
 /// The largest float32 not above `x`.
@@ -113,7 +106,7 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    use super::{InkBox, InkFrame};
+    use super::{InkBox, InkFrame, coordinate, frame_around, quantised};
 
     #[test]
     fn integer_boxes_enclose_the_boxes_they_stand_for() {
@@ -126,11 +119,11 @@ mod tests {
                 })
                 .collect();
             boxes.push(InkBox { low: [0.25; 3], high: [0.25; 3] });
-            let frame = InkFrame::around(&boxes);
+            let frame = frame_around(&boxes);
             for ink in &boxes {
-                let [low, high] = frame.quantise(ink);
+                let [low, high] = quantised(ink, &frame);
                 for axis in 0..3 {
-                    let [near, far] = [low, high].map(|corner| f64::from(frame.coordinate(axis, corner[axis])));
+                    let [near, far] = [low, high].map(|corner| coordinate(&frame, axis, corner[axis]));
                     assert!(near <= ink.low[axis] && far >= ink.high[axis], "{ink:?} in {frame:?}: {near} to {far}");
                     let spare = 2.0 * f64::from(frame.step[axis]) + 1e-6 * near.abs().max(far.abs());
                     assert!(ink.low[axis] - near <= spare && far - ink.high[axis] <= spare, "{ink:?}: {near} to {far}");
@@ -142,8 +135,8 @@ mod tests {
     #[test]
     fn one_point_has_a_frame_without_extent() {
         let point = InkBox { low: [0.5; 3], high: [0.5; 3] };
-        let frame = InkFrame::around(&[point]);
+        let frame = frame_around(&[point]);
         assert_eq!(frame, InkFrame { min: [0.5; 3], step: [0.0; 3] }, "the point itself");
-        assert_eq!(frame.quantise(&point), [[0; 3]; 2], "its only corner");
+        assert_eq!(quantised(&point, &frame), [[0; 3]; 2], "its only corner");
     }
 }

@@ -4,15 +4,13 @@
 //! anchor on trained scenes, where packed coordinates take 20 and more. The idea of coding occupancy by depth is that of
 //! octrees (Meagher 1982); one bit at a time needs three symbols instead of 255, and learns as much from its ancestors.
 
-use pocketsplat_core::bundle::{Lattice, MAX_LATTICE_BITS};
-use pocketsplat_core::entropy::{FREQUENCY_TOTAL, N_TRIE_CONTEXTS, Slot};
+use pocketsplat_core::bundle::{Lattice, MAX_LATTICE_BITS, MAX_LATTICE_MIN};
+use pocketsplat_core::entropy::{Children, FREQUENCY_TOTAL, N_TRIE_CONTEXTS, Slot, TrieModel};
 
 use super::WriteError;
 use super::frequencies::frequencies;
 use super::stream::{Part, SlotList};
 
-/// Largest magnitude of a lattice coordinate: f32 holds every integer up to twice that.
-const MAX_LATTICE: i32 = 1 << 23;
 /// The bit of the root in a set of levels.
 const TOP_LEVEL: u64 = 1 << 63;
 /// Ancestors of a node that its context looks at.
@@ -23,14 +21,6 @@ const N_ANCESTORS: u32 = 3;
 pub(super) struct LatticeFrame {
     pub(super) min: [i32; 3],
     pub(super) bits_per_axis: u32,
-}
-
-/// Which children a node of the trie has; the order is that of the slots.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Children {
-    Both,
-    Zero,
-    One,
 }
 
 /// A node as its children are coded.
@@ -46,8 +36,8 @@ struct Node {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct LatticeModel {
     pub(super) frame: LatticeFrame,
-    /// `[3·bits_per_axis, N_TRIE_CONTEXTS]` ends of the slots of "both" and of "only 0"; "only 1" has the rest.
-    pub(super) ends: Vec<[[u16; 2]; N_TRIE_CONTEXTS]>,
+    /// `[3·bits_per_axis, N_TRIE_CONTEXTS]` ends of the slots of "both" and of "only 0", as bytes; "only 1" has the rest.
+    levels: Vec<[[[u8; 2]; 2]; N_TRIE_CONTEXTS]>,
 }
 
 impl LatticeFrame {
@@ -57,8 +47,8 @@ impl LatticeFrame {
     /// [`WriteError::BeyondLattice`] and [`WriteError::LatticeTooWide`].
     pub(super) fn of(cells: &[[i32; 3]]) -> Result<Self, WriteError> {
         for (anchor, cell) in cells.iter().enumerate() {
-            if let Some(&found) = cell.iter().find(|c| c.unsigned_abs() > MAX_LATTICE.unsigned_abs()) {
-                return Err(WriteError::BeyondLattice { anchor, found, limit: MAX_LATTICE });
+            if let Some(&found) = cell.iter().find(|c| c.unsigned_abs() > MAX_LATTICE_MIN) {
+                return Err(WriteError::BeyondLattice { anchor, found, limit: MAX_LATTICE_MIN as i32 });
             }
         }
         let along = |axis: usize| cells.iter().map(move |cell| cell[axis]);
@@ -140,29 +130,33 @@ impl LatticeModel {
             }
         }
         let ends = |counts: [u64; 3]| {
-            let frequencies = frequencies(&counts, None);
-            [frequencies[0] as u16, (frequencies[0] + frequencies[1]) as u16]
+            let [zero, one, both] = [Children::Zero, Children::One, Children::Both].map(|child| counts[child as usize]);
+            // In the order of the slots.
+            let frequencies = frequencies(&[both, zero, one], None);
+            [frequencies[0], frequencies[0] + frequencies[1]].map(|end| u16::to_le_bytes(end as u16))
         };
-        Self { frame, ends: counts.iter().map(|level| level.map(ends)).collect() }
+        Self { frame, levels: counts.iter().map(|level| level.map(ends)).collect() }
     }
 
     /// The model of a bundle.
     pub(super) fn of(lattice: &Lattice<'_>) -> Self {
-        let ends = |level: usize, context: usize| {
-            lattice.trie.node(level, context).map_or([0; 2], |node| [node.end_both, node.end_zero])
-        };
         Self {
             frame: LatticeFrame { min: lattice.min, bits_per_axis: lattice.bits.into() },
-            ends: (0..lattice.trie.n_levels())
-                .map(|level| std::array::from_fn(|context| ends(level, context)))
-                .collect(),
+            levels: lattice.trie.levels().to_vec(),
         }
+    }
+
+    /// The model as the decoder has it.
+    pub(super) fn view(&self) -> Lattice<'_> {
+        let LatticeFrame { min, bits_per_axis } = self.frame;
+        // At most 21.
+        Lattice { min, bits: bits_per_axis as u8, trie: TrieModel::new(&self.levels) }
     }
 
     /// Appends the slots of the next anchor of a walk.
     pub(super) fn push(&self, walk: &mut Walk<'_>, anchor: usize, list: &mut SlotList) {
         walk.visit(anchor, |node| {
-            let [end_both, end_zero] = self.ends[node.level][node.context];
+            let [end_both, end_zero] = self.levels[node.level][node.context].map(u16::from_le_bytes);
             let (start, end) = match node.children {
                 Children::Both => (0, end_both),
                 Children::Zero => (end_both, end_zero),
@@ -170,13 +164,5 @@ impl LatticeModel {
             };
             list.push(Part::Position, &Slot { symbol: (), start, frequency: end - start });
         });
-    }
-
-    /// The section's bytes.
-    pub(super) fn section(&self) -> Vec<u8> {
-        let mut bytes: Vec<u8> = self.frame.min.iter().flat_map(|c| c.to_le_bytes()).collect();
-        bytes.extend([self.frame.bits_per_axis as u8, 0, 0, 0]);
-        bytes.extend(self.ends.as_flattened().as_flattened().iter().flat_map(|end| end.to_le_bytes()));
-        bytes
     }
 }

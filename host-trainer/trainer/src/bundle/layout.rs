@@ -1,33 +1,14 @@
-//! Header, sections and their checksums, in file order.
+//! The header and the sections of a coded scene, and the file that they make.
 
 use pocketsplat_core::bundle::{
-    Effects, Features, HEADER_FIXED_LEN, MAGIC, MAX_ANCHORS, MAX_CHUNK_ANCHORS, MAX_FEATURE_DIM, MAX_OFFSETS,
-    SECTION_LEN, VERSION, crc32, header_len,
+    Effects, Features, Header, MAX_ANCHORS, MAX_CHUNK_ANCHORS, MAX_FEATURE_DIM, MAX_OFFSETS, SectionBytes, TierMeasures,
 };
 use pocketsplat_core::context::N_GROUPS;
+use pocketsplat_core::{Bundle, DecodeError, count_gaussians, count_scratch_len};
 
-use super::{BundleInfo, WriteError};
+use super::{BundleInfo, SizeReport, WriteError, Written};
 use crate::camera::core_camera;
 use crate::scene::Scene;
-
-/// A section of the file; the numbers are the format's.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum SectionCode {
-    Heads = 1,
-    Lattice = 2,
-    Masks = 3,
-    Tables = 4,
-    Context = 5,
-    Manifest = 6,
-    Directory = 7,
-    Chunks = 8,
-    Gaussians = 128,
-}
-
-/// Where the checksum of the section in row `row` of the section table lies.
-pub(super) fn section_crc_offset(row: usize) -> usize {
-    HEADER_FIXED_LEN + SECTION_LEN * row + 12
-}
 
 /// What the header says besides what follows from the scene.
 pub(super) struct Counts {
@@ -53,42 +34,11 @@ pub(super) fn effects(scene: &Scene<f32>, info: &BundleInfo) -> Effects {
     }
 }
 
-/// Puts the parts together; the chunks come last.
-pub(super) fn assemble(
-    scene: &Scene<f32>,
-    info: &BundleInfo,
-    counts: &Counts,
-    sections: &[(SectionCode, Vec<u8>)],
-) -> Result<Vec<u8>, WriteError> {
-    let header_len = header_len(sections.len() as u8);
-    let file_len = header_len + sections.iter().map(|(_, bytes)| bytes.len()).sum::<usize>();
-    let file_len = count("file length", file_len, 0, u32::MAX as usize)?;
-    let mut bytes = MAGIC.to_vec();
-    bytes.extend([VERSION, header_len as u16].iter().flat_map(|x| x.to_le_bytes()));
-    bytes.extend((file_len as u32).to_le_bytes());
-    push_fields(&mut bytes, scene, info, counts, sections.len())?;
-    let mut offset = header_len;
-    for (code, section) in sections {
-        // Chunks have their checksums in the directory.
-        let crc = if *code == SectionCode::Chunks { 0 } else { crc32(section) };
-        for word in [*code as u32, offset as u32, section.len() as u32, crc] {
-            bytes.extend(word.to_le_bytes());
-        }
-        offset += section.len();
-    }
-    bytes.extend(crc32(&bytes).to_le_bytes());
-    bytes.extend(sections.iter().flat_map(|(_, section)| section));
-    Ok(bytes)
-}
-
-/// The header's fields from the required features to the section table.
-fn push_fields(
-    bytes: &mut Vec<u8>,
-    scene: &Scene<f32>,
-    info: &BundleInfo,
-    counts: &Counts,
-    n_sections: usize,
-) -> Result<(), WriteError> {
+/// The header of a coded scene, all but its lengths, which the file fills in.
+///
+/// # Errors
+/// [`WriteError::Count`], [`WriteError::NotPositive`], [`WriteError::Preview`].
+pub(super) fn header(scene: &Scene<f32>, info: &BundleInfo, counts: &Counts) -> Result<Header, WriteError> {
     let feature_dim = count("feature width", scene.shape.feature_dim, 1, MAX_FEATURE_DIM.into())?;
     let n_offsets = count("number of offsets", scene.shape.n_offsets, 1, MAX_OFFSETS.into())?;
     let most_hidden = MAX_FEATURE_DIM.into();
@@ -107,27 +57,117 @@ fn push_fields(
     positive("normalisation scale", normalisation.scale)?;
     let preview = core_camera(&info.preview).map_err(WriteError::Preview)?;
 
-    // No optional features yet.
-    bytes.extend([counts.features.to_bits(), 0].iter().flat_map(|x| x.to_le_bytes()));
-    bytes.extend([feature_dim as u16, n_offsets as u16].iter().flat_map(|x| x.to_le_bytes()));
-    bytes.extend([n_anchors as u32, counts.n_chunks as u32].iter().flat_map(|x| x.to_le_bytes()));
-    bytes.extend((chunk_anchors as u16).to_le_bytes());
-    // Camera convention OpenCV.
-    bytes.extend([0, n_sections as u8]);
-    bytes.extend(training_px.iter().flat_map(|&x| (x as u16).to_le_bytes()));
-    bytes.extend(info.background);
-    bytes.push(counts.n_tiers as u8);
-    bytes.extend((scene.voxel_size as f32).to_le_bytes());
-    bytes.extend([colour_hidden as u16, detail_hidden as u16].iter().flat_map(|x| x.to_le_bytes()));
-    let [x, y, z] = normalisation.centre.to_array();
-    bytes.extend([x, y, z, normalisation.scale].iter().flat_map(|x| x.to_le_bytes()));
-    let pose = preview.rotation.iter().chain(&preview.translation);
-    let floats = pose.chain(&preview.focal_px).chain(&preview.principal_px);
-    bytes.extend(floats.flat_map(|x| x.to_le_bytes()));
-    bytes.extend([preview.width_px, preview.height_px].iter().flat_map(|x| x.to_le_bytes()));
-    bytes.extend(counts.symbol_bits);
-    bytes.push(0);
-    Ok(())
+    Ok(Header {
+        header_len: 0,
+        file_len: 0,
+        features: counts.features,
+        feature_dim: feature_dim as u16,
+        n_offsets: n_offsets as u16,
+        n_anchors: n_anchors as u32,
+        n_chunks: counts.n_chunks as u32,
+        max_chunk_anchors: chunk_anchors as u16,
+        n_tiers: counts.n_tiers as u8,
+        training_px: training_px.map(|px| px as u16),
+        background: info.background,
+        voxel_size: scene.voxel_size as f32,
+        colour_hidden: colour_hidden as u16,
+        detail_hidden: detail_hidden as u16,
+        symbol_bits: counts.symbol_bits,
+        normalisation_centre: normalisation.centre.to_array(),
+        normalisation_scale: normalisation.scale,
+        preview,
+    })
+}
+
+/// A coded scene that is no file yet: the sections of its bundle, nothing measured but how many Gaussians it has.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CodedScene {
+    header: Header,
+    parts: Parts,
+    manifest: Vec<u8>,
+    gaussians: Option<Vec<u8>>,
+}
+
+/// Sections that say what a scene is.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Parts {
+    pub(super) heads: Vec<u8>,
+    pub(super) lattice: Vec<u8>,
+    pub(super) masks: Option<Vec<u8>>,
+    /// Tables or context.
+    pub(super) coder: Vec<u8>,
+    pub(super) directory: Vec<u8>,
+    pub(super) chunks: Vec<u8>,
+}
+
+impl CodedScene {
+    /// Joins the sections and counts the Gaussians of a scene that looks the same from everywhere.
+    ///
+    /// # Errors
+    /// [`WriteError::Count`] for a file of 4 GiB, [`WriteError::ReadBack`].
+    pub(super) fn new(header: Header, parts: Parts) -> Result<Self, WriteError> {
+        let manifest =
+            vec![TierMeasures::default(); header.n_tiers.into()].iter().flat_map(TierMeasures::emit).collect();
+        let mut coded = Self { header, parts, manifest, gaussians: None };
+        if !header.features.effects.see_view() {
+            // What the decoder itself makes of it: it plans by these counts.
+            coded.gaussians = Some(coded.gaussian_counts().map_err(WriteError::ReadBack)?);
+        }
+        count("file length", coded.file_len(), 0, u32::MAX as usize)?;
+        Ok(coded)
+    }
+
+    fn gaussian_counts(&self) -> Result<Vec<u8>, DecodeError> {
+        let bundle = self.bundle()?;
+        let counts = count_gaussians(&bundle, &mut vec![0; count_scratch_len(&bundle)])?;
+        Ok(counts.iter().take(bundle.n_tiers().into()).flat_map(|count| count.to_le_bytes()).collect())
+    }
+
+    /// What a decoder draws of it.
+    ///
+    /// # Errors
+    /// [`DecodeError`] where the decoder refuses it: a mistake in the writer.
+    pub fn bundle(&self) -> Result<Bundle<'_>, DecodeError> {
+        Bundle::of_sections(self.header, &self.sections())
+    }
+
+    /// Length of its file, bytes.
+    pub fn file_len(&self) -> usize {
+        self.sections().file_len()
+    }
+
+    /// Assembles the file and reads it back.
+    ///
+    /// * `measures`: `[n_tiers]`, or none at all for a scene that is not measured.
+    ///
+    /// # Errors
+    /// [`WriteError::Length`] for another number of measures, [`WriteError::ReadBack`].
+    pub fn into_file(mut self, measures: &[TierMeasures]) -> Result<Written, WriteError> {
+        let (needed, found) = (self.header.n_tiers.into(), measures.len());
+        if found == needed {
+            self.manifest = measures.iter().flat_map(TierMeasures::emit).collect();
+        } else if found > 0 {
+            return Err(WriteError::Length { array: "measures", needed, found });
+        }
+        let bytes: Vec<u8> = self.sections().emit(&self.header).collect();
+        let bundle = Bundle::parse(&bytes).map_err(WriteError::ReadBack)?;
+        let report = SizeReport::of(&bundle).map_err(WriteError::ReadBack)?;
+        Ok(Written { bytes, report })
+    }
+
+    fn sections(&self) -> SectionBytes<'_> {
+        let Parts { heads, lattice, masks, coder, directory, chunks } = &self.parts;
+        SectionBytes {
+            heads,
+            lattice,
+            masks: masks.as_deref(),
+            coder,
+            manifest: &self.manifest,
+            directory,
+            gaussians: self.gaussians.as_deref(),
+            chunks,
+        }
+    }
 }
 
 fn count(what: &'static str, found: usize, least: usize, most: usize) -> Result<usize, WriteError> {

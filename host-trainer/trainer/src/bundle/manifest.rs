@@ -6,8 +6,8 @@
 mod frame;
 mod orbit;
 
-use pocketsplat_core::bundle::{MANIFEST_RECORD_LEN, TierMeasures, crc32};
-use pocketsplat_core::{Bundle, DecodeError, SectionKind, chunks_in_view};
+use pocketsplat_core::bundle::TierMeasures;
+use pocketsplat_core::{Bundle, DecodeError, chunks_in_view};
 use rayon::prelude::*;
 
 use super::decoded::decoded_scene;
@@ -21,16 +21,6 @@ use pocketsplat_capture::dataset::View;
 
 /// Most training cameras that are measured.
 const MAX_TRAINING_CAMERAS: usize = 48;
-/// The bits of "not measured".
-const NOT_MEASURED: u32 = 0x7FC0_0000;
-
-/// The section of a bundle that nobody has measured.
-pub(super) fn unmeasured(n_tiers: usize) -> Vec<u8> {
-    let mut record = [0; MANIFEST_RECORD_LEN];
-    record[..4].copy_from_slice(&NOT_MEASURED.to_le_bytes());
-    record.repeat(n_tiers)
-}
-
 /// Cameras worth measuring: at most 48 of those given, evenly picked, and 24 on an orbit around what they look at.
 ///
 /// * `cameras`: in the normalised frame.
@@ -88,41 +78,4 @@ fn mean_psnr_db(bundle: &Bundle<'_>, n_tiers: u8, views: &[View]) -> Result<Opti
     });
     let psnr = psnr.collect::<Result<Vec<f64>, DecodeError>>()?;
     Ok((!psnr.is_empty()).then(|| (psnr.iter().sum::<f64>() / psnr.len() as f64) as f32).filter(|x| x.is_finite()))
-}
-
-/// Puts measures into a bundle in place of those it has.
-///
-/// # Errors
-/// [`DecodeError`] when `bytes` is not a sound bundle.
-///
-/// # Panics
-/// If there are not as many measures as tiers.
-pub fn install(bytes: &mut [u8], measures: &[TierMeasures]) -> Result<(), DecodeError> {
-    let bundle = Bundle::parse(bytes)?;
-    assert_eq!(measures.len(), usize::from(bundle.header().n_tiers), "measures for each tier");
-    let header_len = usize::from(bundle.header().header_len);
-    let row = bundle.sections().position(|section| section.kind == SectionKind::Manifest);
-    let section = bundle.sections().find(|section| section.kind == SectionKind::Manifest);
-    let (Some(row), Some(section)) = (row, section) else { return Err(DecodeError::Internal) };
-    let records: Vec<u8> = measures.iter().flat_map(record).collect();
-    let (start, len) = (section.offset as usize, section.len as usize);
-    bytes[start..start + len].copy_from_slice(&records);
-    let crc_at = super::layout::section_crc_offset(row);
-    bytes[crc_at..crc_at + 4].copy_from_slice(&crc32(&records).to_le_bytes());
-    let crc = crc32(&bytes[..header_len - 4]);
-    bytes[header_len - 4..header_len].copy_from_slice(&crc.to_le_bytes());
-    Ok(())
-}
-
-/// A tier's record.
-fn record(measures: &TierMeasures) -> Vec<u8> {
-    let mut bytes = measures.psnr_db.map_or(NOT_MEASURED, f32::to_bits).to_le_bytes().to_vec();
-    bytes.extend([measures.n_views, measures.n_cameras].iter().flat_map(|x| x.to_le_bytes()));
-    let counts = [measures.max_visible_anchors, measures.max_splats]
-        .into_iter()
-        .chain(measures.max_strip_splats)
-        .chain(measures.max_strip_pairs)
-        .chain([measures.max_head_kilo_macs, measures.max_kilo_pixels, measures.max_decoded_anchors]);
-    bytes.extend(counts.flat_map(u32::to_le_bytes));
-    bytes
 }

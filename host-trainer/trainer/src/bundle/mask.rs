@@ -7,8 +7,8 @@ use super::stream::{Part, SlotList};
 /// How often each offset is drawn, given how many before it are.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct MaskModel {
-    /// `[K, N_MASK_CONTEXTS]` frequency of "drawn", which owns the lowest slots.
-    pub(super) frequencies: Vec<[u16; N_MASK_CONTEXTS]>,
+    /// `[K, N_MASK_CONTEXTS]` frequency of "drawn", which owns the lowest slots, as bytes.
+    offsets: Vec<[[u8; 2]; N_MASK_CONTEXTS]>,
 }
 
 /// The masks of an anchor in order, each with its context.
@@ -34,28 +34,27 @@ impl MaskModel {
             // Both outcomes stay possible, so that any set of masks can be coded.
             (share * f64::from(FREQUENCY_TOTAL)).round().clamp(1.0, f64::from(FREQUENCY_TOTAL - 1)) as u16
         };
-        Self { frequencies: counts.iter().map(|contexts| contexts.map(frequency)).collect() }
+        let bytes = |counts| u16::to_le_bytes(frequency(counts));
+        Self { offsets: counts.iter().map(|contexts| contexts.map(bytes)).collect() }
     }
 
     /// The model of a bundle.
     pub(super) fn of(masks: &entropy::MaskModel<'_>) -> Self {
-        let frequency = |k: usize, n_drawn: usize| masks.frequency(k, n_drawn).unwrap_or_default();
-        Self {
-            frequencies: (0..masks.n_offsets()).map(|k| std::array::from_fn(|n_drawn| frequency(k, n_drawn))).collect(),
-        }
+        Self { offsets: masks.offsets().to_vec() }
+    }
+
+    /// The model as the decoder has it.
+    pub(super) fn view(&self) -> entropy::MaskModel<'_> {
+        entropy::MaskModel::new(&self.offsets)
     }
 
     /// Appends the slots of an anchor's masks.
     pub(super) fn push(&self, drawn: u32, list: &mut SlotList) {
-        for (k, context, is_drawn) in with_contexts(drawn, self.frequencies.len()) {
-            let end = self.frequencies[k][context];
+        let model = self.view();
+        for (k, context, is_drawn) in with_contexts(drawn, model.n_offsets()) {
+            let end = model.frequency(k, context).unwrap_or_default();
             let (start, end) = if is_drawn { (0, end) } else { (end, FREQUENCY_TOTAL) };
             list.push(Part::Mask, &Slot { symbol: (), start, frequency: end - start });
         }
-    }
-
-    /// The section's bytes.
-    pub(super) fn section(&self) -> Vec<u8> {
-        self.frequencies.as_flattened().iter().flat_map(|frequency| frequency.to_le_bytes()).collect()
     }
 }

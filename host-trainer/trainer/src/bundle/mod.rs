@@ -32,10 +32,11 @@ mod tests;
 pub use channels::ChannelName;
 pub use decoded::{decoded_heads, decoded_scene, normalisation_of, shape_of};
 pub use error::WriteError;
+pub use layout::CodedScene;
 pub use load::{LoadError, load};
 pub use size::{SizePart, SizeReport};
 pub use stream::PartBits;
-pub use write::{Coder, WriteOptions, Written, write};
+pub use write::{Coder, WriteOptions, Written, code, write};
 
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::Normalisation;

@@ -2,12 +2,11 @@
 
 use std::ops::Range;
 
+use pocketsplat_core::bundle::MAX_TIERS;
+
 use super::WriteError;
 use super::lattice::LatticeFrame;
 use crate::scene::Scene;
-
-/// Most tiers of a bundle.
-const MAX_TIERS: usize = 8;
 
 /// The anchors of a scene as a bundle holds them.
 pub(super) struct Placement {
@@ -82,8 +81,8 @@ impl Placement {
 fn tier_ends(n_anchors: usize, pruning_rates: &[f32]) -> Result<Vec<usize>, WriteError> {
     let falling = pruning_rates.iter().is_sorted_by(|a, b| a >= b);
     let inside = pruning_rates.iter().all(|rate| (0.0..1.0).contains(rate));
-    if pruning_rates.last() != Some(&0.0) || pruning_rates.len() > MAX_TIERS || !falling || !inside {
-        return Err(WriteError::Tiers { found: pruning_rates.to_vec(), most: MAX_TIERS });
+    if pruning_rates.last() != Some(&0.0) || pruning_rates.len() > usize::from(MAX_TIERS) || !falling || !inside {
+        return Err(WriteError::Tiers { found: pruning_rates.to_vec(), most: MAX_TIERS.into() });
     }
     Ok(pruning_rates.iter().map(|&rate| ((1.0 - f64::from(rate)) * n_anchors as f64).round() as usize).collect())
 }

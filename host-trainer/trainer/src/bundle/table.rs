@@ -5,7 +5,7 @@ mod histogram;
 
 pub(super) use draft::TableDraft;
 use histogram::Histogram;
-use pocketsplat_core::bundle::Tables;
+use pocketsplat_core::bundle::{Table, Tables};
 
 use super::channels::ChannelName;
 use super::quantise::Rows;
@@ -57,11 +57,7 @@ impl TableSet {
 
     /// The tables of a bundle.
     pub(super) fn of(tables: &Tables<'_>) -> Self {
-        let drafts = (0..tables.len()).filter_map(|table| tables.get(table)).map(|table| TableDraft {
-            step: table.step,
-            min_symbol: table.min_symbol,
-            bounds: table.bounds().collect(),
-        });
+        let drafts = (0..tables.len()).filter_map(|table| tables.get(table)).map(|table| TableDraft::of_table(&table));
         let of_channel = (0..tables.n_channels()).filter_map(|channel| tables.table_of(channel));
         Self { tables: drafts.collect(), channel_tables: of_channel.collect() }
     }
@@ -70,23 +66,12 @@ impl TableSet {
     pub(super) fn of_channel(&self, channel: usize) -> &TableDraft {
         &self.tables[self.channel_tables[channel]]
     }
-}
 
-impl TableSet {
     /// The section's bytes.
     pub(super) fn section(&self) -> Vec<u8> {
-        let mut bytes = Vec::new();
-        let u16_bytes = |x: usize| (x as u16).to_le_bytes();
-        bytes.extend(u16_bytes(self.tables.len()));
-        bytes.extend(u16_bytes(self.channel_tables.len()));
-        bytes.extend(self.channel_tables.iter().flat_map(|&table| u16_bytes(table)));
-        let mut offset = bytes.len() + 4 * self.tables.len();
-        for table in &self.tables {
-            bytes.extend((offset as u32).to_le_bytes());
-            offset += 12 + 2 * table.bounds.len();
-        }
-        bytes.extend(self.tables.iter().flat_map(TableDraft::record));
-        bytes
+        let tables: Vec<Table<'_>> = self.tables.iter().map(TableDraft::view).collect();
+        let channel_tables: Vec<u16> = self.channel_tables.iter().map(|&table| table as u16).collect();
+        Tables::emit(&tables, &channel_tables).collect()
     }
 }
 

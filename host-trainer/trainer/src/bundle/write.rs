@@ -1,20 +1,19 @@
-//! From a scene to the bytes of a bundle.
+//! From a scene to its coded sections.
 
 use pocketsplat_core::bundle::Features;
 use pocketsplat_core::context::Context;
-use pocketsplat_core::{Bundle, DecodeError, count_gaussians, count_scratch_len};
 use rayon::prelude::*;
 
 use super::channels::{ChannelCoder, ContextWork, GROUPS};
 use super::chunk::{ChunkRows, Models};
 use super::ink::InkBox;
 use super::lattice::LatticeModel;
-use super::layout::{self, Counts, SectionCode};
+use super::layout::{self, CodedScene, Counts, Parts};
 use super::mask::MaskModel;
 use super::order::Placement;
 use super::quantise::{Rows, StepSource, check_lengths, quantise};
 use super::table::TableSet;
-use super::{BundleInfo, SizeReport, WriteError, directory, heads, manifest};
+use super::{BundleInfo, SizeReport, WriteError, directory, heads};
 use crate::integer_model;
 use crate::scene::QuantisationSteps;
 use crate::scene::Scene;
@@ -23,7 +22,7 @@ use crate::scene::Scene;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Coder {
-    /// Whichever makes the shorter file. What that costs is not looked at: tables' steps do not follow the place.
+    /// The smaller file. Quality is not compared: tables' steps do not follow the place.
     #[default]
     Auto,
     /// Tables, the same for all anchors: cheap to decode.
@@ -75,7 +74,7 @@ pub struct Written {
     pub report: SizeReport,
 }
 
-/// Writes a scene as a bundle and reads it back once.
+/// Codes a scene: all of its bundle but what is measured.
 ///
 /// Anchors without a drawn offset are left out. With a scene that has a context model the static coder takes each group's
 /// mean step over the anchors (geometric, to the eighth of an octave): about the same quality where steps differ little from place to
@@ -83,38 +82,40 @@ pub struct Written {
 ///
 /// # Errors
 /// [`WriteError`] naming the anchor and channel, weight, or count that has no place in the format.
-pub fn write(scene: &Scene<f32>, info: &BundleInfo, options: &WriteOptions) -> Result<Written, WriteError> {
+pub fn code(scene: &Scene<f32>, info: &BundleInfo, options: &WriteOptions) -> Result<CodedScene, WriteError> {
     check_lengths(scene)?;
     let n_chunk = usize::from(options.chunk_anchors).max(1);
     let placement = Placement::of(scene, options.importance.as_deref(), &options.pruning_rates, n_chunk)?;
     let writer = Writer { scene, info, placement, options };
-    let bytes = match (&scene.context, options.coder) {
-        (None, Coder::Context) => return Err(WriteError::NoContext),
+    match (&scene.context, options.coder) {
+        (None, Coder::Context) => Err(WriteError::NoContext),
         (None, Coder::Auto | Coder::Static) => {
             let QuantisationSteps { feature, log_scale, offset } = options.steps;
-            writer.with_tables([feature, log_scale, offset])?
+            writer.with_tables([feature, log_scale, offset])
         }
         (Some(model), coder) => {
             let section = integer_model::section(model, scene.shape.values_per_anchor())?;
             let context = integer_model::parse(&section, &scene.shape).map_err(WriteError::ReadBack)?;
-            let candidates = [
-                (coder != Coder::Static).then(|| writer.with_context(&context, &section)),
-                (coder != Coder::Context).then(|| writer.with_tables(writer.mean_steps(&context, model.base_steps))),
-            ];
-            let written = candidates.into_iter().flatten().collect::<Result<Vec<_>, _>>()?;
-            written.into_iter().min_by_key(Vec::len).unwrap_or_default()
+            let with_context = || writer.with_context(&context, &section);
+            let with_tables = || writer.with_tables(writer.mean_steps(&context, model.base_steps));
+            match coder {
+                Coder::Context => with_context(),
+                Coder::Static => with_tables(),
+                Coder::Auto => {
+                    let [by_context, by_tables] = [with_context()?, with_tables()?];
+                    Ok(if by_tables.file_len() < by_context.file_len() { by_tables } else { by_context })
+                }
+            }
         }
-    };
-    let bundle = Bundle::parse(&bytes).map_err(WriteError::ReadBack)?;
-    let report = SizeReport::of(&bundle).map_err(WriteError::ReadBack)?;
-    Ok(Written { bytes, report })
+    }
 }
 
-/// The section of Gaussian counts of a bundle that has none yet.
-fn gaussian_counts(bytes: &[u8]) -> Result<Vec<u8>, DecodeError> {
-    let bundle = Bundle::parse(bytes)?;
-    let counts = count_gaussians(&bundle, &mut vec![0; count_scratch_len(&bundle)])?;
-    Ok(counts.iter().take(bundle.n_tiers().into()).flat_map(|count| count.to_le_bytes()).collect())
+/// Writes a scene as a bundle without measures; reads it back once.
+///
+/// # Errors
+/// As [`code`].
+pub fn write(scene: &Scene<f32>, info: &BundleInfo, options: &WriteOptions) -> Result<Written, WriteError> {
+    code(scene, info, options)?.into_file(&[])
 }
 
 /// A scene whose anchors have their places.
@@ -126,16 +127,16 @@ struct Writer<'s> {
 }
 
 impl Writer<'_> {
-    fn with_tables(&self, steps: [f32; 3]) -> Result<Vec<u8>, WriteError> {
+    fn with_tables(&self, steps: [f32; 3]) -> Result<CodedScene, WriteError> {
         let rows = quantise(self.scene, &self.placement, StepSource::Fixed(steps))?;
         let tables = TableSet::build(&rows, &self.scene.shape, steps);
-        let section = (SectionCode::Tables, tables.section());
-        self.assemble(&rows, ChannelCoder::Tables(tables), section)
+        let section = tables.section();
+        self.code(&rows, ChannelCoder::Tables(tables), section)
     }
 
-    fn with_context(&self, context: &Context<'_>, section: &[u8]) -> Result<Vec<u8>, WriteError> {
+    fn with_context(&self, context: &Context<'_>, section: &[u8]) -> Result<CodedScene, WriteError> {
         let rows = quantise(self.scene, &self.placement, StepSource::Context(context))?;
-        self.assemble(&rows, ChannelCoder::Context(*context), (SectionCode::Context, section.to_vec()))
+        self.code(&rows, ChannelCoder::Context(*context), section.to_vec())
     }
 
     /// `share·base·2^(q̄/8)` for each group, q̄ being the mean exponent over the anchors.
@@ -153,12 +154,8 @@ impl Writer<'_> {
         std::array::from_fn(|group| share * base_steps[group] * (sums[group] as f64 / n / 8.0).exp2() as f32)
     }
 
-    fn assemble(
-        &self,
-        rows: &Rows,
-        channels: ChannelCoder<'_>,
-        coder_section: (SectionCode, Vec<u8>),
-    ) -> Result<Vec<u8>, WriteError> {
+    /// * `coder`: the section of `channels`.
+    fn code(&self, rows: &Rows, channels: ChannelCoder<'_>, coder: Vec<u8>) -> Result<CodedScene, WriteError> {
         let (shape, placement) = (self.scene.shape, &self.placement);
         let code_runs = placement.chunks.iter().map(|chunk| &placement.codes[chunk.clone()]);
         let all_drawn = u32::MAX.unbounded_shr(u32::BITS - shape.n_offsets as u32);
@@ -179,37 +176,29 @@ impl Writer<'_> {
             (slots.into_bytes(), InkBox::of(rows, chunk.clone(), &shape, self.scene.voxel_size as f32))
         });
         let (chunks, boxes): (Vec<Vec<u8>>, Vec<InkBox>) = coded.unzip();
-        let n_tiers = placement.tier_chunks.len();
         let heads = heads::section(&self.scene.heads, self.options.head_fraction_bits)?;
-        let mut sections = vec![(SectionCode::Heads, heads.bytes), (SectionCode::Lattice, models.lattice.section())];
-        sections.extend(models.masks.as_ref().map(|masks| (SectionCode::Masks, masks.section())));
         let features = Features {
             effects: layout::effects(self.scene, self.info),
-            masks: models.masks.is_some(),
-            context: coder_section.0 == SectionCode::Context,
+            masks: has_masks,
+            context: matches!(models.channels, ChannelCoder::Context(_)),
             coded_heads: heads.is_coded,
         };
-        sections.extend([
-            coder_section,
-            (SectionCode::Manifest, manifest::unmeasured(n_tiers)),
-            (SectionCode::Directory, directory::section(placement, &chunks, &boxes)),
-            (SectionCode::Chunks, chunks.concat()),
-        ]);
         let counts = Counts {
             features,
             n_anchors: placement.order.len(),
             n_chunks: placement.chunks.len(),
             max_chunk_anchors: self.options.chunk_anchors,
-            n_tiers,
+            n_tiers: placement.tier_chunks.len(),
             symbol_bits: rows.symbol_bits(&shape),
         };
-        let bytes = layout::assemble(self.scene, self.info, &counts, &sections)?;
-        if shape.sees_view() {
-            return Ok(bytes);
-        }
-        // What the decoder itself makes of it: it plans by these counts.
-        let section = gaussian_counts(&bytes).map_err(WriteError::ReadBack)?;
-        sections.insert(sections.len() - 1, (SectionCode::Gaussians, section));
-        layout::assemble(self.scene, self.info, &counts, &sections)
+        let parts = Parts {
+            heads: heads.bytes,
+            lattice: models.lattice.view().emit().collect(),
+            masks: models.masks.as_ref().map(|masks| masks.view().emit().collect()),
+            coder,
+            directory: directory::section(placement, &chunks, &boxes),
+            chunks: chunks.concat(),
+        };
+        CodedScene::new(layout::header(self.scene, self.info, &counts)?, parts)
     }
 }

@@ -1,6 +1,6 @@
 //! What one frame takes, tier by tier.
 
-use pocketsplat_core::bundle::TierMeasures;
+use pocketsplat_core::bundle::{STRIPS, TierMeasures};
 
 use crate::ops::project::{ALPHA_CUTOFF, Footprint, Splat};
 use crate::ops::tiles::TILE_PX;
@@ -8,8 +8,6 @@ use crate::scene::ModelShape;
 use crate::step::Block;
 use pocketsplat_capture::camera::Camera;
 
-/// Numbers of horizontal strips that a frame is cut into.
-pub(super) const STRIPS: [usize; 4] = [1, 2, 4, 8];
 /// As the decoder rounds the box of a splat to tiles, pixels.
 const BOX_SLACK_PX: f64 = 0.01;
 
@@ -119,7 +117,7 @@ impl Added {
         let n_rows = (size_px[1] as usize).div_ceil(TILE_PX);
         let n_columns = (last_column - first_column + 1) as u64;
         for (i, n_strips) in STRIPS.into_iter().enumerate() {
-            let strip_rows = n_rows.div_ceil(n_strips);
+            let strip_rows = n_rows.div_ceil(n_strips.into());
             for strip in first_row / strip_rows..=last_row / strip_rows {
                 let rows = (last_row + 1).min((strip + 1) * strip_rows) - first_row.max(strip * strip_rows);
                 self.strip_splats[i][strip] += 1;

@@ -1,5 +1,6 @@
 //! A table about to be written.
 
+use pocketsplat_core::bundle::Table;
 use pocketsplat_core::entropy::{FREQUENCY_TOTAL, Slot};
 
 use super::histogram::Histogram;
@@ -13,8 +14,8 @@ const RAW_BYTE_FREQUENCY: u16 = FREQUENCY_TOTAL >> 8;
 pub(in crate::bundle) struct TableDraft {
     pub(in crate::bundle) step: f32,
     pub(in crate::bundle) min_symbol: i16,
-    /// Where each entry begins, where the escape begins and where it ends; the escape has at least one slot.
-    pub(in crate::bundle) bounds: Vec<u16>,
+    /// Where each entry begins, where the escape begins and where it ends, as bytes; the escape has at least one slot.
+    pub(super) bounds: Vec<[u8; 2]>,
 }
 
 impl TableDraft {
@@ -26,7 +27,7 @@ impl TableDraft {
             *sum += frequency;
             Some(*sum as u16)
         });
-        let bounds = std::iter::once(0).chain(ends).collect();
+        let bounds = std::iter::once(0).chain(ends).map(u16::to_le_bytes).collect();
         let min_symbol = i16::try_from(trimmed.first).unwrap_or(0);
         Self { step, min_symbol, bounds }
     }
@@ -36,30 +37,29 @@ impl TableDraft {
         Self::new(step, &Histogram::count(symbols))
     }
 
-    /// Its bytes in the file.
-    pub(in crate::bundle) fn record(&self) -> Vec<u8> {
-        // The origin is 0: symbol 0 is the value 0, and channels of equal step can share a table.
-        let mut bytes: Vec<u8> = [0.0, self.step].iter().flat_map(|x| x.to_le_bytes()).collect();
-        bytes.extend(self.min_symbol.to_le_bytes());
-        bytes.extend((self.n_symbols() as u16).to_le_bytes());
-        bytes.extend(self.bounds.iter().flat_map(|bound| bound.to_le_bytes()));
-        bytes
+    /// The table of a bundle.
+    pub(super) fn of_table(table: &Table<'_>) -> Self {
+        let bounds = table.bounds().map(u16::to_le_bytes).collect();
+        Self { step: table.step, min_symbol: table.min_symbol, bounds }
     }
 
-    /// Symbols with an entry of their own.
-    pub(super) fn n_symbols(&self) -> usize {
-        self.bounds.len() - 2
+    /// The table as the decoder has it.
+    pub(in crate::bundle) fn view(&self) -> Table<'_> {
+        // The origin is 0: symbol 0 is the value 0, and channels of equal step can share a table.
+        Table::new(0.0, self.step, self.min_symbol, &self.bounds)
     }
 
     /// The slots that code `symbol`, in reading order: its entry's, or the escape's and those of two raw bytes.
     pub(in crate::bundle) fn slots(&self, symbol: i16) -> impl Iterator<Item = Slot<()>> {
         let slot = |start: u16, frequency: u16| Slot { symbol: (), start, frequency };
-        let slot_of = |entry: usize| slot(self.bounds[entry], self.bounds[entry + 1] - self.bounds[entry]);
+        let bound = |index: usize| u16::from_le_bytes(self.bounds[index]);
+        let slot_of = |entry: usize| slot(bound(entry), bound(entry + 1) - bound(entry));
+        let n_symbols = self.view().n_symbols();
         let entry = usize::try_from(i32::from(symbol) - i32::from(self.min_symbol)).ok();
-        let own = entry.filter(|&entry| entry < self.n_symbols()).map(slot_of).filter(|slot| slot.frequency > 0);
+        let own = entry.filter(|&entry| entry < n_symbols).map(slot_of).filter(|slot| slot.frequency > 0);
         let (first, raw) = match own {
             Some(own) => (own, None),
-            None => (slot_of(self.n_symbols()), Some(symbol.to_be_bytes())),
+            None => (slot_of(n_symbols), Some(symbol.to_be_bytes())),
         };
         let raw = raw.into_iter().flatten();
         std::iter::once(first)

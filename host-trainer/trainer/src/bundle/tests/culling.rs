@@ -1,12 +1,11 @@
 use glam::{DMat3, DVec3};
-use pocketsplat_core::bundle::{CHUNK_RECORD_LEN, INK_FRAME_LEN, TIER_RECORD_LEN, crc32};
+use pocketsplat_core::bundle::{CHUNK_RECORD_LEN, INK_FRAME_LEN, InkFrame, SectionBytes, TIER_RECORD_LEN};
 use pocketsplat_core::{Bundle, SectionKind};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::{SMALL, options, random_scene, write_bytes};
 use crate::bundle::Coder;
-use crate::bundle::layout::section_crc_offset;
 use crate::render::decoder::core_image;
 use crate::scene::{ModelShape, Scene};
 use pocketsplat_capture::camera::Camera;
@@ -19,24 +18,30 @@ const INK_BOX: usize = 12;
 /// The same bundle with ink boxes that no camera misses.
 fn without_boxes(bytes: &[u8]) -> Vec<u8> {
     let bundle = Bundle::parse(bytes).expect("a sound bundle");
-    let header_len = usize::from(bundle.header().header_len);
-    let (row, section) =
-        bundle.sections().enumerate().find(|(_, section)| section.kind == SectionKind::Directory).expect("a directory");
-    let (start, len) = (section.offset as usize, section.len as usize);
-    let frame = start + TIER_RECORD_LEN * usize::from(bundle.header().n_tiers);
-    let mut bytes = bytes.to_vec();
-    bytes[frame..frame + 12].copy_from_slice([(-1e6_f32).to_le_bytes(); 3].as_flattened());
-    bytes[frame + 12..frame + 24].copy_from_slice([(2e6_f32 / 65535.0).to_le_bytes(); 3].as_flattened());
-    for record in bytes[frame + INK_FRAME_LEN..start + len].chunks_exact_mut(CHUNK_RECORD_LEN) {
+    let find = |wanted| bundle.sections().find(|section| section.kind == wanted);
+    let section = |wanted| {
+        let section = find(wanted).expect("the bundle has one");
+        &bytes[section.offset as usize..][..section.len as usize]
+    };
+    let mut directory = section(SectionKind::Directory).to_vec();
+    let frame = TIER_RECORD_LEN * usize::from(bundle.header().n_tiers);
+    let (frame, records) = directory[frame..].split_at_mut(INK_FRAME_LEN);
+    frame.copy_from_slice(&InkFrame { min: [-1e6; 3], step: [2e6 / 65535.0; 3] }.emit());
+    for record in records.chunks_exact_mut(CHUNK_RECORD_LEN) {
         record[INK_BOX..INK_BOX + 6].fill(0);
         record[INK_BOX + 6..INK_BOX + 12].fill(0xFF);
     }
-    let crc_at = section_crc_offset(row);
-    let crc = crc32(&bytes[start..start + len]);
-    bytes[crc_at..crc_at + 4].copy_from_slice(&crc.to_le_bytes());
-    let crc = crc32(&bytes[..header_len - 4]);
-    bytes[header_len - 4..header_len].copy_from_slice(&crc.to_le_bytes());
-    bytes
+    let sections = SectionBytes {
+        heads: section(SectionKind::Heads),
+        lattice: section(SectionKind::Lattice),
+        masks: bundle.masks().map(|_| section(SectionKind::Masks)),
+        coder: section(SectionKind::Tables),
+        manifest: section(SectionKind::Manifest),
+        directory: &directory,
+        gaussians: find(SectionKind::Gaussians).map(|_| section(SectionKind::Gaussians)),
+        chunks: section(SectionKind::Chunks),
+    };
+    sections.emit(bundle.header()).collect()
 }
 
 /// Cameras in and around the scene, looking anywhere, some with a principal point off the image.

@@ -2,17 +2,21 @@ use glam::DVec3;
 use pocketsplat_core::Bundle;
 
 use super::{SMALL, camera, info, options, random_scene};
-use crate::bundle::manifest::{cameras_to_measure, install, measure};
-use crate::bundle::{Coder, WriteOptions, write};
+use crate::bundle::manifest::{cameras_to_measure, measure};
+use crate::bundle::{CodedScene, Coder, WriteError, WriteOptions, code};
 use crate::render::decoder::core_image_of_tiers;
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::View;
 
-fn tiered_bundle() -> Vec<u8> {
+fn tiered_scene() -> CodedScene {
     let scene = random_scene(SMALL, 900, 61);
     let importance = Some((0..900).map(|i| ((i * 7919) % 900) as f32).collect());
     let options = WriteOptions { importance, pruning_rates: vec![0.6, 0.3, 0.0], ..options(Coder::Static, 32) };
-    write(&scene, &info(), &options).expect("a sound scene").bytes
+    code(&scene, &info(), &options).expect("a sound scene")
+}
+
+fn tiered_bundle() -> Vec<u8> {
+    tiered_scene().into_file(&[]).expect("a sound bundle").bytes
 }
 
 /// Views from all sides, some near enough to miss half of the scene.
@@ -75,16 +79,19 @@ fn psnr_rises_with_the_tiers_and_is_perfect_at_the_last() {
 }
 
 #[test]
-fn installed_measures_come_back() {
-    let mut bytes = tiered_bundle();
-    let before = bytes.clone();
-    let measures = measure(&Bundle::parse(&bytes).expect("sound"), &cameras()[..2], &[]).expect("sound chunks");
-    install(&mut bytes, &measures).expect("a sound bundle");
-    let bundle = Bundle::parse(&bytes).expect("sealed again");
+fn measures_come_back_from_the_file_and_change_nothing_else() {
+    let unmeasured = tiered_bundle();
+    let coded = tiered_scene();
+    let measures = measure(&coded.bundle().expect("sound"), &cameras()[..2], &[]).expect("sound chunks");
+    assert_eq!(coded.file_len(), unmeasured.len(), "known before there is a file");
+    let error = coded.clone().into_file(&measures[1..]).expect_err("three tiers");
+    assert!(matches!(error, WriteError::Length { needed: 3, found: 2, .. }), "{error}");
+    let bytes = coded.into_file(&measures).expect("a sound bundle").bytes;
+    let bundle = Bundle::parse(&bytes).expect("sound");
     for (tier, measures) in (0..).zip(&measures) {
         assert_eq!(bundle.measures(tier).as_ref(), Some(measures), "tier {tier}");
     }
-    let n_changed = bytes.iter().zip(&before).filter(|(a, b)| a != b).count();
+    let n_changed = bytes.iter().zip(&unmeasured).filter(|(a, b)| a != b).count();
     assert!(n_changed <= 3 * 60 + 8, "the manifest and two checksums: {n_changed} bytes");
 }
 

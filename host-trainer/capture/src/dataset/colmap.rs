@@ -60,7 +60,8 @@ pub(super) fn is_layout_of(folder: &Path) -> bool {
 /// As [`super::load`], as far as files but no pixels tell.
 pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, DatasetError> {
     let Some((model, encoding)) = model_of(folder) else {
-        return Err(DatasetError::unknown_layout(folder));
+        let looked_for = Layout::LOOKED_FOR.to_vec();
+        return Err(DatasetError::UnknownLayout { path: folder.to_owned(), looked_for, inside: None });
     };
     let path = |stem: &str| model.join(stem).with_extension(encoding.extension());
     let cameras = read(&path("cameras"), encoding, binary::cameras, text::cameras)?;

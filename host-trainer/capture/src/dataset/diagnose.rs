@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 use serde::Serialize;
 
+use super::detect::layout_of;
 use super::listing::Listing;
 use super::{Layout, LoadOptions, Split};
 
@@ -53,7 +54,7 @@ pub fn diagnose_cheaply(path: &Path, options: &LoadOptions) -> Diagnosis {
 fn check(path: &Path, options: &LoadOptions, decode: bool) -> Diagnosis {
     let mut diagnosis = Diagnosis {
         path: path.to_owned(),
-        layout: Layout::of(path),
+        layout: layout_of(path),
         n_train: 0,
         n_test: 0,
         n_points: 0,

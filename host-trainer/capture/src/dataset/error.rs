@@ -1,8 +1,6 @@
 //! What can be wrong with a capture as a whole.
 
-use std::path::{Path, PathBuf};
-
-use super::Layout;
+use std::path::PathBuf;
 
 /// Why a capture cannot be loaded; each message names the place, what was found, what is needed and the remedy.
 #[derive(Debug, thiserror::Error)]
@@ -181,13 +179,6 @@ impl DatasetError {
             Self::NoBaseline { .. } => "no-baseline",
             Self::MaxResolution { .. } | Self::TestEvery { .. } => "bad-option",
         }
-    }
-
-    /// The error of a folder that is no capture; looks whether a folder in it is one.
-    pub(super) fn unknown_layout(path: &Path) -> Self {
-        let entries = std::fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path());
-        let inside = entries.filter(|path| path.is_dir() && Layout::of(path).is_some()).min();
-        Self::UnknownLayout { path: path.to_owned(), looked_for: Layout::LOOKED_FOR.to_vec(), inside }
     }
 }
 

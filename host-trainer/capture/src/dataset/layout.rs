@@ -1,11 +1,8 @@
 //! How captures are laid out on disk.
 
 use std::fmt;
-use std::path::Path;
 
 use serde::Serialize;
-
-use super::{blender, colmap, nerfstudio};
 
 /// A layout that can be read, told by the files present; the first that fits is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -20,19 +17,6 @@ pub enum Layout {
 }
 
 impl Layout {
-    /// The layout of the folder `path`.
-    pub(super) fn of(path: &Path) -> Option<Self> {
-        if path.join(blender::TRAIN_FILE).is_file() {
-            Some(Self::Blender)
-        } else if colmap::is_layout_of(path) {
-            Some(Self::Colmap)
-        } else if path.join(nerfstudio::FILE).is_file() {
-            Some(Self::Nerfstudio)
-        } else {
-            None
-        }
-    }
-
     /// What tells each layout, for messages.
     pub(super) const LOOKED_FOR: [&str; 3] = [
         "`transforms_train.json` (Blender)",

@@ -15,8 +15,10 @@ use crate::camera::Camera;
 mod assemble;
 mod blender;
 mod colmap;
+mod detect;
 mod diagnose;
 mod error;
+mod frame_size;
 mod framing;
 mod frusta;
 mod image;
@@ -39,7 +41,7 @@ mod view_fault;
 
 pub use diagnose::{Diagnosis, Finding, Severity, diagnose, diagnose_cheaply};
 pub use error::DatasetError;
-pub use framing::{FrameSize, NoFrameSize};
+pub use frame_size::{FrameSize, NoFrameSize};
 pub use layout::Layout;
 pub use mask::Mask;
 pub use options::{Background, LoadOptions, UnknownBackground};
@@ -143,10 +145,10 @@ fn list(path: &Path, options: &LoadOptions) -> Result<listing::Listing, DatasetE
     if !path.is_dir() {
         return Err(DatasetError::NotAFolder { path: path.to_owned() });
     }
-    match Layout::of(path) {
+    match detect::layout_of(path) {
         Some(Layout::Blender) => blender::list(path),
         Some(Layout::Colmap) => colmap::list(path, options),
         Some(Layout::Nerfstudio) => nerfstudio::list(path, options),
-        None => Err(DatasetError::unknown_layout(path)),
+        None => Err(detect::unknown_layout(path)),
     }
 }

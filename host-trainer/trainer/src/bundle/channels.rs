@@ -1,12 +1,10 @@
-//! The channels of an anchor: their names, and the slots of their symbols under either coder.
+//! The channels of an anchor: their names, their groups, and what the context model says of them.
 
 use std::fmt;
 
 use pocketsplat_core::context::{Context, Group, N_GROUPS, Steps};
-use pocketsplat_core::entropy::Slot;
 
-use super::stream::{Part, SlotList};
-use super::table::TableSet;
+use super::stream::Part;
 use crate::scene::ModelShape;
 
 /// A channel of an anchor by name.
@@ -46,7 +44,8 @@ impl ChannelName {
         }
     }
 
-    fn part(self) -> Part {
+    /// What its slots say.
+    pub(super) fn part(self) -> Part {
         match self {
             Self::Feature(_) => Part::Feature,
             Self::LogScale(_) => Part::LogScale,
@@ -65,14 +64,6 @@ impl fmt::Display for ChannelName {
     }
 }
 
-/// What gives the channels' symbols their frequencies.
-pub(super) enum ChannelCoder<'c> {
-    /// Static tables, the same for all anchors.
-    Tables(TableSet),
-    /// The context model, anchor by anchor.
-    Context(Context<'c>),
-}
-
 /// The groups of channels in the order of their steps.
 pub(super) const GROUPS: [Group; N_GROUPS] = [Group::Feature, Group::LogScale, Group::Offset];
 
@@ -80,7 +71,8 @@ pub(super) const GROUPS: [Group; N_GROUPS] = [Group::Feature, Group::LogScale, G
 #[derive(Default)]
 pub(super) struct ContextWork {
     features: Vec<i16>,
-    hidden: Vec<i16>,
+    /// As [`Self::enter`] left it.
+    pub(super) hidden: Vec<i16>,
 }
 
 impl ContextWork {
@@ -91,38 +83,5 @@ impl ContextWork {
         context.features(lattice, &mut self.features);
         context.hidden(&self.features, &mut self.hidden);
         context.steps(&self.hidden)
-    }
-}
-
-impl ChannelCoder<'_> {
-    /// Appends the slots of an anchor's symbols `[n_channels]`, those of its drawn offsets alone.
-    pub(super) fn push(
-        &self,
-        work: &mut ContextWork,
-        shape: &ModelShape,
-        lattice: [i32; 3],
-        drawn: u32,
-        symbols: &[i16],
-        list: &mut SlotList,
-    ) {
-        let named =
-            symbols.iter().enumerate().map(|(channel, &symbol)| (channel, symbol, ChannelName::of(shape, channel)));
-        let coded = named.filter(|(_, _, name)| name.is_coded(drawn));
-        match self {
-            Self::Tables(tables) => {
-                for (channel, symbol, name) in coded {
-                    tables.of_channel(channel).slots(symbol).for_each(|slot| list.push(name.part(), &slot));
-                }
-            }
-            Self::Context(context) => {
-                let steps = work.enter(context, lattice);
-                for (channel, symbol, name) in coded {
-                    let slots = context.model(channel, &steps, &work.hidden).slots(symbol);
-                    for &(start, frequency) in slots.as_slice() {
-                        list.push(name.part(), &Slot { symbol: (), start, frequency });
-                    }
-                }
-            }
-        }
     }
 }

@@ -3,7 +3,8 @@
 use pocketsplat_core::Bundle;
 use pocketsplat_core::bundle::Coder;
 
-use super::channels::{ChannelCoder, ContextWork};
+use super::channel_coder::ChannelCoder;
+use super::channels::ContextWork;
 use super::decoded::shape_of;
 use super::lattice::{LatticeModel, Walk};
 use super::mask::MaskModel;

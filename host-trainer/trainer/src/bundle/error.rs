@@ -1,6 +1,6 @@
 //! Why a scene can not be written.
 
-use super::ChannelName;
+use super::channels::ChannelName;
 use crate::integer_model::IntegerModelError;
 
 /// Why a scene can not be written as a bundle.

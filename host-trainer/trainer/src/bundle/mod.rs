@@ -6,6 +6,7 @@
 //! nothing here decides a decoded symbol or value by itself.
 
 pub mod annotate;
+mod channel_coder;
 mod channels;
 mod chunk;
 mod decoded;

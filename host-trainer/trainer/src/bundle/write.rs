@@ -4,7 +4,8 @@ use pocketsplat_core::bundle::Features;
 use pocketsplat_core::context::Context;
 use rayon::prelude::*;
 
-use super::channels::{ChannelCoder, ContextWork, GROUPS};
+use super::channel_coder::ChannelCoder;
+use super::channels::{ContextWork, GROUPS};
 use super::chunk::{ChunkRows, Models};
 use super::ink::InkBox;
 use super::lattice::LatticeModel;

@@ -1,5 +1,6 @@
 //! A block of anchors: from parameters to splats, and back.
 
+use super::buffer::refill;
 use super::coded::{Coded, Network, Weights};
 use super::coding::Coding;
 use crate::ops::neural_gaussians::{Gaussian, HeadOutputs, Source};
@@ -51,11 +52,6 @@ pub struct Block<R> {
     d_hidden: Vec<R>,
     d_input: Vec<R>,
     pub(super) d_heads: Heads<R>,
-}
-
-pub(super) fn refill<R: Real>(buffer: &mut Vec<R>, len: usize) {
-    buffer.clear();
-    buffer.resize(len, R::ZERO);
 }
 
 impl<R: Real> Block<R> {

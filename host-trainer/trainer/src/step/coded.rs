@@ -3,7 +3,7 @@
 use pocketsplat_core::context::{FEATURES_PER_LEVEL, Group, MEAN_PARTS, N_GROUPS};
 use pocketsplat_core::entropy::EIGHTHS;
 
-use super::block::refill;
+use super::buffer::refill;
 use super::coding::{Coding, Exact};
 use crate::ops::noise::Stream;
 use crate::ops::simd::Level;

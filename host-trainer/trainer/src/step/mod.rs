@@ -1,6 +1,7 @@
 //! One view through the whole chain, forward and backward.
 
 mod block;
+mod buffer;
 mod coded;
 pub mod coding;
 mod context;

@@ -36,6 +36,7 @@ use crate::step::{Loss, Moment, Phase, Target, Workspace, clear_masked};
 use checkpoint::{CaptureSignature, Kernels};
 use coding::Integers;
 use config::{Backbone, Densification, Rate, Rates};
+use module::{AnchorChange, RunView};
 use optimiser::Optimiser;
 use pocketsplat_capture::dataset::{Capture, Image, View};
 use statistics::Statistics;
@@ -247,7 +248,14 @@ impl<'a> Trainer<'a> {
         }
         self.densify();
         self.keep_the_best();
-        modules.each().into_iter().for_each(|module| module.event(&at, self));
+        for module in modules.each() {
+            let run = RunView { scene: &self.scene, seed: self.config.seed, cameras: &self.trained_cameras() };
+            match module.event(&at, &run) {
+                Some(AnchorChange::Keep(keep)) => self.keep_anchors(&keep),
+                Some(AnchorChange::Rank(ranks)) => self.scene.anchors.places = ranks,
+                None => {}
+            }
+        }
         Ok(Outcome { report, dropped: None })
     }
 

@@ -6,7 +6,7 @@
 //! * widen the model: [`Module::shape`] switches on heads of [`ModelShape`], which the optimiser moves, checkpoints keep, bundles
 //!   store and decoders evaluate as they do the others;
 //! * add to the loss of every step, on the image, on the Gaussians or on the anchors: [`Terms`];
-//! * do something to the run between two iterations: [`Module::event`];
+//! * drop or rank anchors between two iterations: [`Module::event`];
 //! * leave anchors out of a step: [`Module::pruned_share`].
 //!
 //! It sees blocks of visible anchors and a [`Moment`], never a backbone.
@@ -68,14 +68,41 @@ use std::fmt::Debug;
 
 use serde::{Deserialize, Serialize};
 
-use super::Trainer;
+use super::survey::Survey;
+use crate::ops::Pinhole;
 use crate::real::Real;
-use crate::scene::ModelShape;
-use crate::step::{Moment, Terms};
+use crate::scene::{ModelShape, Scene};
+use crate::step::{Moment, Terms, Workspace};
 
 pub use detail::Detail;
 pub use distribution::Distribution;
 pub use pruning::Pruning;
+
+/// What a module may look at between two iterations.
+#[derive(Clone, Copy, Debug)]
+pub struct RunView<'a> {
+    /// The scene as it stands.
+    pub scene: &'a Scene<f32>,
+    /// The run's seed.
+    pub seed: u64,
+    pub(super) cameras: &'a [&'a Pinhole<f32>],
+}
+
+impl RunView<'_> {
+    /// What the views that training sees show of the scene; see [`Survey::new`].
+    pub fn survey(&self, contributions: bool) -> Survey {
+        Survey::new(self.scene, &mut Workspace::new(&self.scene.shape), self.cameras, contributions)
+    }
+}
+
+/// What a module does to the anchors of a run.
+#[derive(Clone, Debug, PartialEq)]
+pub enum AnchorChange {
+    /// `[n]` drops the anchors that are not marked.
+    Keep(Vec<bool>),
+    /// `[n]` gives every anchor its [rank](crate::scene::Anchors::places).
+    Rank(Vec<f32>),
+}
 
 /// A plug-in of the training; everything has a default that does nothing.
 pub trait Module: Terms<f32> + Terms<f64> + Debug {
@@ -92,8 +119,10 @@ pub trait Module: Terms<f32> + Terms<f64> + Debug {
         shape
     }
 
-    /// Changes the run after an iteration, when its time has come.
-    fn event(&self, _at: &Moment, _trainer: &mut Trainer<'_>) {}
+    /// What becomes of the anchors after an iteration, when its time has come.
+    fn event(&self, _at: &Moment, _run: &RunView<'_>) -> Option<AnchorChange> {
+        None
+    }
 
     /// Share of the anchors that the step leaves out, those of the lowest [places](crate::scene::Anchors::places) first.
     fn pruned_share(&self, _at: &Moment) -> f32 {

@@ -5,12 +5,11 @@ use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use super::Module;
+use super::{AnchorChange, Module, RunView};
 use crate::ops::opacity_target::forward_backward;
 use crate::real::Real;
 use crate::scene::Scene;
 use crate::step::{Block, Moment, Terms};
-use crate::train::Trainer;
 use crate::train::config::within;
 
 /// What the event does with the anchors it picks.
@@ -145,26 +144,23 @@ impl Module for Pruning {
         within("train.modules.pruning.rate", self.rate, 0.0, most)
     }
 
-    fn event(&self, at: &Moment, trainer: &mut Trainer<'_>) {
-        if !at.is_at(self.at) || trainer.scene.anchors.is_empty() {
-            return;
+    fn event(&self, at: &Moment, run: &RunView<'_>) -> Option<AnchorChange> {
+        if !at.is_at(self.at) || run.scene.anchors.is_empty() {
+            return None;
         }
-        let survey = trainer.survey(self.rank == Rank::Contribution);
+        let survey = run.survey(self.rank == Rank::Contribution);
         let rank = match self.rank {
             Rank::Opacity => survey.opacity_per_view(),
             Rank::Contribution => survey.contribution,
         };
         // A stream of its own: the run's other random numbers do not depend on modules.
-        let mut rng = ChaCha8Rng::seed_from_u64(trainer.config().seed);
+        let mut rng = ChaCha8Rng::seed_from_u64(run.seed);
         rng.set_stream(1);
         let places = self.places(&rank, &mut rng);
-        match self.form {
-            Form::Tiered => trainer.scene.anchors.places = places,
-            Form::Hard => {
-                let keep: Vec<bool> = places.iter().map(|place| *place >= as_place(self.rate)).collect();
-                trainer.keep_anchors(&keep);
-            }
-        }
+        Some(match self.form {
+            Form::Tiered => AnchorChange::Rank(places),
+            Form::Hard => AnchorChange::Keep(places.iter().map(|place| *place >= as_place(self.rate)).collect()),
+        })
     }
 
     fn pruned_share(&self, at: &Moment) -> f32 {
@@ -196,9 +192,9 @@ impl<R: Real> Terms<R> for Pruning {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::train::TrainConfig;
     use crate::train::module::Modules;
     use crate::train::test_capture::{tiny_capture, tiny_config};
+    use crate::train::{TrainConfig, Trainer};
 
     fn places(pruning: &Pruning, rank: &[f32], seed: u64) -> Vec<f32> {
         pruning.places(rank, &mut ChaCha8Rng::seed_from_u64(seed))

@@ -27,7 +27,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let bytes = arguments.next().map_or(Ok(EXAMPLE.to_vec()), std::fs::read)?;
     let output = arguments.next().unwrap_or_else(|| "display.png".to_owned());
 
-    // A display of five, six and five bits: the sink converts each pixel to the display's colours.
+    // A display of five, six and five bits: the sink converts each pixel to the display's colours, and dithers.
     let [width_px, height_px] = DISPLAY_PX;
     let mut display = SimulatorDisplay::<Rgb565>::new(Size::new(width_px.into(), height_px.into()));
 
@@ -38,7 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     // The preview's camera, for a frame of this size.
     let camera = bundle.header().preview.resized(width_px, height_px);
-    let mut sink = DisplaySink::new(&mut display, Point::zero());
+    let mut sink = DisplaySink::new(&mut display, Point::zero()).dithered();
     let report = decoder.render(&camera, &mut sink)?;
     // The simulator never fails; a display on a bus may.
     let Ok(()) = sink.finish();

@@ -5,20 +5,21 @@
 #[cfg(test)]
 extern crate std;
 
+// Each module imports only modules before it in this list: error · math · stopwatch · camera · bytes · arena · entropy · context ·
+// bundle · mlp · scene · project · raster · arithmetic · bake · budget · decoder · display. `tests/tests/rooms.rs` holds the crate to it.
 mod arena;
-mod bytes;
-mod camera;
-mod error;
-
 pub mod arithmetic;
 mod bake;
 pub mod budget;
 pub mod bundle;
+mod bytes;
+mod camera;
 pub mod context;
 mod decoder;
 #[cfg(feature = "embedded-graphics")]
 pub mod display;
 pub mod entropy;
+mod error;
 pub mod math;
 mod mlp;
 mod project;

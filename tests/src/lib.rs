@@ -19,6 +19,7 @@
 //! * `captures`: do captures load with the conventions that the renderers use?
 //! * `hard_cases`, `hard_neighbourhoods`: do named hard cases, and what lies near them, keep the bounds that
 //!   `docs/numerical-stability.md` states?
+//! * `rooms`: do imports go down only, and never in circles?
 //! * `determinism`: does the same seed give the same bundle for any number of threads?
 
 pub mod bundles;

@@ -8,8 +8,8 @@ use crate::arena::{Arena, words_for};
 use crate::bake::{BakedGaussian, BakedMemory};
 use crate::bundle::{RecordMemory, model_words};
 use crate::error::DecodeError;
-use crate::project::Packed28;
-use crate::raster::{N_RADIX, Pixel, TILE_PIXELS, TileRect};
+use crate::project::{Packed28, TILE_PIXELS, TileRect};
+use crate::raster::{N_RADIX, Pixel};
 use crate::scene::HeadOutputs;
 
 /// Makes of one list of slices the words that they take and the function that takes them, in this order.

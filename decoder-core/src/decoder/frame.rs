@@ -1,6 +1,6 @@
 //! Drawing a frame: strip after strip, slab after slab, tile after tile.
 
-use super::gather::Frame;
+use super::gather::{Admission, Frame};
 use super::splats::{Slab, SplatStore};
 use super::strip::{Strip, StripLayout};
 use super::tally::Tally;
@@ -9,10 +9,8 @@ use crate::arithmetic::Arithmetic;
 use crate::budget::Overflow;
 use crate::camera::Camera;
 use crate::error::{DecodeError, Field, in_range, saturate};
-use crate::project::View;
-use crate::raster::{
-    BlendRule, EMPTY, TILE_PIXELS, TILE_PX, TilePlace, TileRect, blend_tile, finish_tile, sort_by_depth,
-};
+use crate::project::{TILE_PIXELS, TILE_PX, TileRect, View};
+use crate::raster::{BlendRule, EMPTY, TilePlace, blend_tile, finish_tile, sort_by_depth};
 use crate::stopwatch::{Stage, Stopwatch};
 
 impl<A: Arithmetic> Decoder<'_, '_, A> {
@@ -31,11 +29,15 @@ impl<A: Arithmetic> Decoder<'_, '_, A> {
         in_range(Field::FrameWidth, camera.width_px.into(), 1, budget.width_px.into())?;
         in_range(Field::FrameHeight, camera.height_px.into(), 1, budget.height_px.into())?;
         let strips = StripLayout::new(camera.height_px, self.plan.n_strips());
-        let in_slabs = budget.overflow == Overflow::Slabs;
-        let tallies = !in_slabs && (strips.len() == 1 || !self.surely_fits(&view, strips));
-        let tally = Tally::new(self.splats.places());
-        let mut frame = Frame { view, strips, tallies, in_slabs, tally, report: FrameReport::default() };
-        if in_slabs && self.skip_damage {
+        let admission = if budget.overflow == Overflow::Slabs {
+            Admission::Slab
+        } else if strips.len() > 1 && self.surely_fits(&view, strips) {
+            Admission::All
+        } else {
+            Admission::Tally(Tally::new(self.splats.places()))
+        };
+        let mut frame = Frame { view, strips, admission, report: FrameReport::default() };
+        if self.skip_damage && matches!(admission, Admission::Slab) {
             self.note_damage(&mut frame);
         }
         let mut most_in_memory = 0;
@@ -66,9 +68,11 @@ impl<A: Arithmetic> Decoder<'_, '_, A> {
             frame.report.strip_splats = frame.report.strip_splats.saturating_add(in_strip);
             frame.report.max_splats = frame.report.max_splats.max(in_strip);
         }
-        let Frame { tally, mut report, .. } = frame;
-        report.splats_dropped = report.splats_dropped.saturating_add(tally.n_dropped());
-        report.max_splats = report.max_splats.max(tally.max_demand());
+        let Frame { admission, mut report, .. } = frame;
+        if let Admission::Tally(tally) = admission {
+            report.splats_dropped = report.splats_dropped.saturating_add(tally.n_dropped());
+            report.max_splats = report.max_splats.max(tally.max_demand());
+        }
         report.scratch_used = saturate(self.plan.shape().with_splats(most_in_memory).scratch_len());
         Ok(report)
     }
@@ -93,7 +97,8 @@ impl<A: Arithmetic> Decoder<'_, '_, A> {
         // One after the other, or all at once.
         let keeps_tiles = self.plan.shape().frame.canvas_tiles > 1;
         let (mut n_tiles, mut alive) = (0, 0);
-        let rule = BlendRule::of(self.plan.budget().quality);
+        let quality = self.plan.budget().quality;
+        let rule = BlendRule::new(quality.alpha_cut, quality.transmittance_stop);
         let header = self.bundle.header();
         let has_background = cfg!(feature = "background") && header.features.effects.background;
         let background = has_background.then(|| header.background.map(|byte| f32::from(byte) / 255.0));

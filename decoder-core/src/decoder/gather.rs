@@ -13,17 +13,23 @@ use crate::project::{Band, View};
 use crate::scene::{Anchor, Evaluator, Gaussian, for_each_gaussian};
 use crate::stopwatch::{Stage, Stopwatch};
 
-/// One frame in work.
+/// The current frame.
 pub(super) struct Frame {
     pub(super) view: View,
     pub(super) strips: StripLayout,
-    /// Whether the first strip goes over the whole scene and decides which splats all strips draw. It need not when the
-    /// chunks in each strip's view have no more offsets than there are places.
-    pub(super) tallies: bool,
-    /// Whether strips are drawn in slabs of depth when they have more splats than there are places.
-    pub(super) in_slabs: bool,
-    pub(super) tally: Tally,
+    pub(super) admission: Admission,
     pub(super) report: FrameReport,
+}
+
+/// Which splats are drawn where there may not be places for all.
+#[derive(Clone, Copy)]
+pub(super) enum Admission {
+    /// All: each strip surely has places enough.
+    All,
+    /// Those that have a place in every strip; the first strip goes over the whole scene to find out which.
+    Tally(Tally),
+    /// All, in slabs of depth, as many as it takes.
+    Slab,
 }
 
 /// Going over the scene once, for a strip.
@@ -45,7 +51,7 @@ impl Pass {
 impl Frame {
     /// What the pass of a strip has to look at.
     fn band(&self, strip: Strip) -> Option<Band> {
-        let whole = self.strips.len() == 1 || (self.tallies && strip.index == 0);
+        let whole = self.strips.len() == 1 || (strip.index == 0 && matches!(self.admission, Admission::Tally(_)));
         (!whole).then(|| self.view.band(self.strips.pixels(strip)))
     }
 
@@ -134,18 +140,19 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
         watch: &mut impl Stopwatch,
     ) -> Result<(), DecodeError> {
         watch.enter(Stage::Decode);
-        let (n_splats, tally, before) = (self.splats.n, frame.tally, frame.report);
+        let in_slabs = matches!(frame.admission, Admission::Slab);
+        let (n_splats, admission, before) = (self.splats.n, frame.admission, frame.report);
         if self.is_sound(chunk) {
             match self.gather_chunk(chunk, first_anchor, pass, frame, watch) {
                 // What its splats displaced is gone when strips are drawn in slabs.
-                Err(DecodeError::ChunkStream { .. }) if self.skip_damage && !frame.in_slabs => {}
+                Err(DecodeError::ChunkStream { .. }) if self.skip_damage && !in_slabs => {}
                 result => return result,
             }
         }
-        if frame.in_slabs {
+        if in_slabs {
             return Ok(());
         }
-        (self.splats.n, frame.tally, frame.report) = (n_splats, tally, before);
+        (self.splats.n, frame.admission, frame.report) = (n_splats, admission, before);
         // Once a frame.
         let mut earlier = frame.strips.iter().take(pass.strip.index.into());
         if !earlier.any(|strip| frame.needs(strip, chunk)) {
@@ -166,10 +173,10 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
         watch: &mut impl Stopwatch,
     ) -> Result<(), DecodeError> {
         let Self { bundle, source, splats, .. } = self;
-        let Frame { view, strips, tallies, in_slabs, tally, report } = frame;
+        let Frame { view, strips, admission, report } = frame;
         let header = bundle.header();
         let effects = header.features.effects;
-        let mut keeper = Keeper::<A> { view, strips, tallies: *tallies, in_slabs: *in_slabs, tally, pass, splats };
+        let mut keeper = Keeper::<A> { view, strips, admission, pass, splats };
         let Anchors { source, evaluator: Evaluator { heads, row, work } } = match source {
             GaussianSource::Anchors(anchors) => anchors,
             // Unreachable without the feature; this arm drops the code.
@@ -232,9 +239,7 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
 struct Keeper<'f, 's, A: Arithmetic> {
     view: &'f View,
     strips: &'f StripLayout,
-    tallies: bool,
-    in_slabs: bool,
-    tally: &'f mut Tally,
+    admission: &'f mut Admission,
     pass: &'f mut Pass,
     splats: &'f mut SplatStore<'s, A::Splat>,
 }
@@ -246,18 +251,21 @@ impl<A: Arithmetic> Keeper<'_, '_, A> {
         let touched = self.strips.touched(rect);
         let index = usize::from(self.pass.strip.index);
         let lies_here = touched.contains(&index);
-        if self.in_slabs {
-            if lies_here {
-                let end = self.pass.slab.end;
-                self.splats.push_into(&mut self.pass.slab, &splat, rect);
-                if self.pass.slab.end < end {
-                    self.pass.end_earlier(self.view);
+        let drawn = match self.admission {
+            Admission::All => true,
+            Admission::Tally(tally) if index == 0 => tally.admit(place, touched),
+            Admission::Tally(tally) => tally.admits(place),
+            Admission::Slab => {
+                if lies_here {
+                    let end = self.pass.slab.end;
+                    self.splats.push_into(&mut self.pass.slab, &splat, rect);
+                    if self.pass.slab.end < end {
+                        self.pass.end_earlier(self.view);
+                    }
                 }
+                return;
             }
-            return;
-        }
-        let drawn =
-            if self.tallies && index == 0 { self.tally.admit(place, touched) } else { self.tally.admits(place) };
+        };
         if drawn && lies_here {
             self.splats.push(&splat, rect);
         }

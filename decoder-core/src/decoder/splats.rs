@@ -1,8 +1,8 @@
 //! The splats in memory, and their order.
 
 use crate::error::saturate;
-use crate::project::{Splat, SplatRecord};
-use crate::raster::{TileRect, sort_by_depth};
+use crate::project::{Splat, SplatRecord, TileRect};
+use crate::raster::sort_by_depth;
 
 /// The splats of the current strip, or of a slab of its depth, in the order of the file.
 pub(super) struct SplatStore<'s, S> {
@@ -127,8 +127,8 @@ mod tests {
     use bytemuck::Zeroable;
 
     use super::{Slab, SplatStore};
-    use crate::project::{Packed28, Splat, SplatRecord};
-    use crate::raster::{N_RADIX, TileRect};
+    use crate::project::{Packed28, Splat, SplatRecord, TileRect};
+    use crate::raster::N_RADIX;
 
     const RECT: TileRect = TileRect { first_column: 0, last_column: 0, first_row: 0, last_row: 0 };
 

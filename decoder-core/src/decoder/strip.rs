@@ -2,7 +2,7 @@
 
 use core::ops::RangeInclusive;
 
-use crate::raster::{TILE_PX, TileRect};
+use crate::project::{TILE_PX, TileRect};
 
 /// How a frame is cut into strips of whole rows of tiles.
 #[derive(Clone, Copy, Debug)]
@@ -61,7 +61,7 @@ mod tests {
     use std::vec::Vec;
 
     use super::StripLayout;
-    use crate::raster::TileRect;
+    use crate::project::TileRect;
 
     #[test]
     fn strips_fill_the_frame_from_the_top() {

@@ -1,8 +1,6 @@
 //! The number formats that the heads are kept and multiplied in.
 
-use super::head::Head;
-use super::integer::{IntegerHead, Quantised};
-use super::weight::{Half, Weight};
+use super::weight::Weight;
 use crate::arena::Arena;
 use crate::bundle::{HeadView, WeightReader};
 use crate::error::DecodeError;
@@ -43,33 +41,4 @@ pub(crate) trait MlpHead<'s, N: HeadFormat + ?Sized, const B: usize>: Sized {
 
     /// Outputs of block `index`, before any activation; with one block per offset, those of an offset.
     fn block(&self, index: usize, hidden: N::Values<'_>) -> Option<[f32; B]>;
-}
-
-/// Floats read floats.
-macro_rules! floats {
-    ($($name:ty => $weight:ty),*) => {$(
-        impl HeadFormat for $name {
-            type Detail = $weight;
-            type Values<'v> = &'v [f32];
-            type Head<'s, const B: usize> = Head<'s, $weight, B>;
-
-            #[inline(always)]
-            fn values(inputs: &mut [f32]) -> &[f32] {
-                inputs
-            }
-        }
-    )*};
-}
-
-floats!(F32 => f32, F16 => Half);
-
-/// Integers read integers; the detail head stays in floats.
-impl HeadFormat for I16 {
-    type Detail = f32;
-    type Values<'v> = Quantised<'v>;
-    type Head<'s, const B: usize> = IntegerHead<'s, B>;
-
-    fn values(inputs: &mut [f32]) -> Quantised<'_> {
-        Quantised::of(inputs)
-    }
 }

@@ -1,12 +1,11 @@
-//! A head: hidden layer with ReLU, output layer of one block per offset.
+//! A head in floats: hidden layer with ReLU, output layer of one block per offset.
 
 use super::block::{Blocks, outputs};
-use super::detail::Detail;
-use super::format::{HeadFormat, MlpHead};
-use super::shape::{HeadShape, LANES};
-use super::weight::Weight;
+use super::format::{F16, F32, HeadFormat, MlpHead};
+use super::shape::LANES;
+use super::weight::{Half, Weight};
 use crate::arena::Arena;
-use crate::bundle::{HeadView, HeadsView, WeightReader};
+use crate::bundle::{HeadView, WeightReader};
 use crate::error::DecodeError;
 
 /// One head in floats; its output layer has blocks of `B` outputs.
@@ -21,67 +20,23 @@ pub(super) struct Hidden<'s, W> {
     pub(super) n_units: usize,
 }
 
-/// The heads, one block of outputs an offset: none is computed for an offset that is not drawn.
-pub(crate) struct Heads<'s, N: HeadFormat> {
-    pub(crate) shape: HeadShape,
-    pub(crate) opacity: N::Head<'s, 1>,
-    pub(crate) covariance: Covariance<'s, N>,
-    pub(crate) colour: N::Head<'s, 3>,
-    pub(crate) detail: Option<Detail<'s, N::Detail>>,
-}
+/// Floats read floats.
+macro_rules! floats {
+    ($($name:ty => $weight:ty),*) => {$(
+        impl HeadFormat for $name {
+            type Detail = $weight;
+            type Values<'v> = &'v [f32];
+            type Head<'s, const B: usize> = Head<'s, $weight, B>;
 
-/// The covariance head.
-pub(crate) enum Covariance<'s, N: HeadFormat> {
-    /// A scale logit an offset.
-    Isotropic(N::Head<'s, 1>),
-    /// Three, and a quaternion.
-    Anisotropic(N::Head<'s, 7>),
-}
-
-impl<'s, N: HeadFormat> Covariance<'s, N> {
-    /// As [`MlpHead::activate`].
-    pub(crate) fn activate<'h>(&self, inputs: N::Values<'_>, hidden: &'h mut [f32]) -> N::Values<'h> {
-        match self {
-            Self::Isotropic(head) => head.activate(inputs, hidden),
-            // Unreachable without the feature; this arm drops the code, here and below.
-            Self::Anisotropic(_) if !cfg!(feature = "anisotropy") => N::values(hidden),
-            Self::Anisotropic(head) => head.activate(inputs, hidden),
+            #[inline(always)]
+            fn values(inputs: &mut [f32]) -> &[f32] {
+                inputs
+            }
         }
-    }
-
-    /// As [`MlpHead::block`]; of an isotropic Gaussian the first output alone means something.
-    pub(crate) fn block(&self, index: usize, hidden: N::Values<'_>) -> Option<[f32; 7]> {
-        match self {
-            Self::Isotropic(head) => head.block(index, hidden).map(|[logit]| [logit, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
-            Self::Anisotropic(_) if !cfg!(feature = "anisotropy") => None,
-            Self::Anisotropic(head) => head.block(index, hidden),
-        }
-    }
+    )*};
 }
 
-impl<'s, N: HeadFormat> Heads<'s, N> {
-    /// Converts the file's weights; takes [`n_weights`](super::HeadShape::n_weights) floats.
-    pub(crate) fn convert(arena: &mut Arena<'s>, heads: &HeadsView<'_>, shape: HeadShape) -> Result<Self, DecodeError> {
-        let mut weights = heads.weights();
-        // In the order of the file.
-        Ok(Self {
-            shape,
-            opacity: N::Head::convert(arena, &heads.opacity, &mut weights)?,
-            covariance: if cfg!(feature = "anisotropy") && shape.covariance > 1 {
-                Covariance::Anisotropic(N::Head::convert(arena, &heads.covariance, &mut weights)?)
-            } else {
-                Covariance::Isotropic(N::Head::convert(arena, &heads.covariance, &mut weights)?)
-            },
-            colour: N::Head::convert(arena, &heads.colour, &mut weights)?,
-            detail: match &heads.detail {
-                Some(head) if cfg!(feature = "detail") && shape.detail > 0 => {
-                    Some(Detail::convert(arena, head, &mut weights)?)
-                }
-                _ => None,
-            },
-        })
-    }
-}
+floats!(F32 => f32, F16 => Half);
 
 impl<'s, N, W, const B: usize> MlpHead<'s, N, B> for Head<'s, W, B>
 where

@@ -9,7 +9,7 @@ use core::iter;
 
 use bytemuck::{Pod, Zeroable};
 
-use super::format::{HeadFormat, MlpHead};
+use super::format::{HeadFormat, I16, MlpHead};
 use crate::arena::Arena;
 use crate::bundle::{HeadView, WeightReader};
 use crate::error::DecodeError;
@@ -95,6 +95,17 @@ pub(crate) struct IntegerHead<'s, const B: usize> {
     /// `[n_blocks, B]`: what a step is worth for hidden units of scale 1, and the bias.
     ends: &'s [[[f32; 2]; B]],
     n_hidden: usize,
+}
+
+/// Integers read integers; the detail head stays in floats.
+impl HeadFormat for I16 {
+    type Detail = f32;
+    type Values<'v> = Quantised<'v>;
+    type Head<'s, const B: usize> = IntegerHead<'s, B>;
+
+    fn values(inputs: &mut [f32]) -> Quantised<'_> {
+        Quantised::of(inputs)
+    }
 }
 
 impl<'s, N, const B: usize> MlpHead<'s, N, B> for IntegerHead<'s, B>

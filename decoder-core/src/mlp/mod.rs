@@ -8,11 +8,12 @@ mod block;
 mod detail;
 mod format;
 mod head;
+mod heads;
 mod integer;
 mod shape;
 mod weight;
 
 pub use format::{F16, F32, I16};
 pub(crate) use format::{HeadFormat, MlpHead};
-pub(crate) use head::Heads;
+pub(crate) use heads::Heads;
 pub(crate) use shape::HeadShape;

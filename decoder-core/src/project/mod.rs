@@ -7,11 +7,13 @@ mod covariance;
 mod cull;
 mod packed;
 mod splat;
+mod tile;
 mod view;
 
 pub(crate) use band::Band;
 pub use cull::chunks_in_view;
 pub(crate) use packed::SplatRecord;
 pub use packed::{Packed28, Wide};
-pub(crate) use splat::{Splat, log_cut};
-pub(crate) use view::View;
+pub(crate) use splat::Splat;
+pub(crate) use tile::{TILE_PIXELS, TILE_PX, TileRect};
+pub(crate) use view::{View, log_cut};

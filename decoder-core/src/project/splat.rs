@@ -3,19 +3,11 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::covariance::Covariance;
+use super::tile::TileRect;
 use super::view::{NEAR, View};
 use crate::bundle::Effects;
 use crate::math::functions::Functions;
-use crate::raster::TileRect;
 use crate::scene::Gaussian;
-
-/// ln 255.
-pub(super) const LN_255: f32 = 5.541_263_5;
-
-/// −ln(`steps`/255): a splat reaches as far as its opacity times this as a power of e is 1.
-pub(crate) fn log_cut(steps: u8) -> f32 {
-    LN_255 - libm::logf(steps.max(1).into())
-}
 
 /// A projected Gaussian.
 ///
@@ -103,11 +95,10 @@ impl View {
 
 #[cfg(test)]
 mod tests {
-    use super::log_cut;
     use crate::bundle::Effects;
     use crate::camera::Camera;
     use crate::math::functions::Reference;
-    use crate::project::View;
+    use crate::project::{View, log_cut};
     use crate::scene::Gaussian;
 
     #[test]

@@ -1,6 +1,5 @@
 //! A camera, with what depends on it alone computed once a frame.
 
-use super::splat::{LN_255, log_cut};
 use crate::camera::Camera;
 use crate::error::DecodeError;
 
@@ -9,6 +8,14 @@ pub(super) const NEAR: f32 = 0.2;
 
 /// Beyond the image by this part of its size the Jacobian stops growing.
 const CLAMP_MARGIN: f32 = 0.15;
+
+/// ln 255.
+const LN_255: f32 = 5.541_263_5;
+
+/// −ln(`steps`/255): a splat reaches as far as its opacity times this as a power of e is 1.
+pub(crate) fn log_cut(steps: u8) -> f32 {
+    LN_255 - libm::logf(steps.max(1).into())
+}
 
 /// A camera ready to project.
 #[derive(Debug)]

@@ -1,10 +1,8 @@
 //! Front-to-back compositing of one tile.
 
-use super::tile::{TILE_PX, TileRect};
-use crate::budget::Quality;
 use crate::math::exp;
 use crate::math::functions::Functions;
-use crate::project::{Splat, SplatRecord, log_cut};
+use crate::project::{Splat, SplatRecord, TILE_PX, TileRect, log_cut};
 
 /// No splat is opaque; it keeps the light behind it computable.
 const ALPHA_MAX: f32 = 0.99;
@@ -23,11 +21,12 @@ pub(crate) struct BlendRule {
 }
 
 impl BlendRule {
-    pub(crate) fn of(quality: Quality) -> Self {
+    /// * `alpha_cut`: the least alpha, in 255ths. * `transmittance_stop`: in 10 000ths.
+    pub(crate) fn new(alpha_cut: u8, transmittance_stop: u16) -> Self {
         Self {
-            alpha_min: f32::from(quality.alpha_cut) / 255.0,
-            log_cut: log_cut(quality.alpha_cut),
-            transmittance_stop: f32::from(quality.transmittance_stop) * TRANSMITTANCE_MIN,
+            alpha_min: f32::from(alpha_cut) / 255.0,
+            log_cut: log_cut(alpha_cut),
+            transmittance_stop: f32::from(transmittance_stop) * TRANSMITTANCE_MIN,
         }
     }
 }

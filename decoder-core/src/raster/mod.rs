@@ -4,8 +4,6 @@
 
 mod blend;
 mod depth;
-mod tile;
 
 pub(crate) use blend::{BlendRule, EMPTY, Pixel, TilePlace, blend_tile, finish_tile};
 pub(crate) use depth::{N_RADIX, sort_by_depth};
-pub(crate) use tile::{TILE_PIXELS, TILE_PX, TileRect};

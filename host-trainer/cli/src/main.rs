@@ -2,6 +2,7 @@
 //! usage) or 130 (training interrupted, with a checkpoint to go on from).
 
 mod command;
+mod config;
 mod plot;
 
 use std::process::ExitCode;

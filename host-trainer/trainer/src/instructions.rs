@@ -11,14 +11,14 @@ use Stage::{Blend, Context, Decode, Heads, Output, Project, Sort};
 
 /// A family of processors that run the same code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Target {
+pub enum InstructionSet {
     /// Cortex-M4 and M7 with an FPU of single precision: `thumbv7em-none-eabihf`.
     CortexM,
     /// RISC-V without an FPU: `riscv32imac-unknown-none-elf`.
     RiscV32,
 }
 
-impl Target {
+impl InstructionSet {
     /// The target of a board of `firmware-example`.
     pub fn of_board(board: &str) -> Option<Self> {
         match board {
@@ -136,12 +136,12 @@ impl Costs {
     }
 
     /// The costs on a target, in the order of the terms.
-    pub fn of(&mut self, target: Target) -> &mut [f64; N_TERMS] {
+    pub fn of(&mut self, target: InstructionSet) -> &mut [f64; N_TERMS] {
         &mut self.0[target as usize]
     }
 
     /// Predicted instructions of each stage, as [`Stage::ALL`] orders them.
-    pub fn predict(&self, target: Target, terms: &[Term; N_TERMS]) -> [f64; Stage::ALL.len()] {
+    pub fn predict(&self, target: InstructionSet, terms: &[Term; N_TERMS]) -> [f64; Stage::ALL.len()] {
         let mut stages = [0.0; Stage::ALL.len()];
         for (term, cost) in terms.iter().zip(&self.0[target as usize]) {
             stages[term.stage as usize] += term.count * cost;
@@ -155,7 +155,7 @@ impl Costs {
 ///
 /// * `report`: of the frame, drawn by any machine by `plan`. * `size_px`: its width and height.
 pub fn predict(
-    target: Target,
+    target: InstructionSet,
     bundle: &Bundle<'_>,
     plan: &Plan,
     report: &FrameReport,
@@ -166,13 +166,13 @@ pub fn predict(
 
 #[cfg(test)]
 mod tests {
-    use super::{Costs, Target};
+    use super::{Costs, InstructionSet};
 
     #[test]
     fn the_table_is_sound_and_comes_back() {
         let mut costs = Costs::measured();
-        assert!(costs.of(Target::CortexM).iter().all(|cost| *cost >= 0.0), "no part saves instructions");
-        assert!(costs.of(Target::RiscV32)[8] > 10.0 * costs.of(Target::CortexM)[8], "without an FPU");
+        assert!(costs.of(InstructionSet::CortexM).iter().all(|cost| *cost >= 0.0), "no part saves instructions");
+        assert!(costs.of(InstructionSet::RiscV32)[8] > 10.0 * costs.of(InstructionSet::CortexM)[8], "without an FPU");
         assert_eq!(Costs::parse("stage,term,cortex-m,riscv32\n"), None, "rows are missing");
     }
 }

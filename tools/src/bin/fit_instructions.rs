@@ -9,7 +9,7 @@ use anyhow::{Context as _, bail, ensure};
 use clap::Parser;
 use pocketsplat_core::{Budget, Bundle, Decoder, Overflow, Stage};
 use pocketsplat_trainer::bundle;
-use pocketsplat_trainer::instructions::{Costs, N_TERMS, Target, Term, terms};
+use pocketsplat_trainer::instructions::{Costs, InstructionSet, N_TERMS, Term, terms};
 use pocketsplat_trainer::render::decoder::image_of;
 
 /// Most that a frame may differ from its prediction.
@@ -32,7 +32,7 @@ struct Args {
 /// One frame of a board.
 struct Frame {
     name: String,
-    target: Target,
+    target: InstructionSet,
     terms: [Term; N_TERMS],
     /// Instructions, as [`Stage::ALL`] orders them.
     measured: [f64; Stage::ALL.len()],
@@ -46,7 +46,7 @@ fn main() -> anyhow::Result<()> {
     }
     let mut costs = Costs::measured();
     if let Some(path) = &args.write {
-        for target in [Target::CortexM, Target::RiscV32] {
+        for target in [InstructionSet::CortexM, InstructionSet::RiscV32] {
             let of_target: Vec<&Frame> = frames.iter().filter(|frame| frame.target == target).collect();
             for stage in Stage::ALL {
                 fit(&of_target, stage, costs.of(target));
@@ -88,7 +88,7 @@ fn read(path: &Path, folders: &[PathBuf]) -> anyhow::Result<Vec<Frame>> {
     let mut all = Vec::new();
     for (run, frames) in runs {
         let [board, _, scratch, width, height, name, n_frames] = run.as_slice() else { bail!("a short row: {run:?}") };
-        let target = Target::of_board(board).with_context(|| format!("unknown board {board}"))?;
+        let target = InstructionSet::of_board(board).with_context(|| format!("unknown board {board}"))?;
         let path = folders.iter().map(|folder| folder.join(format!("{name}.psb"))).find(|path| path.exists());
         let bytes = bundle::load(&path.with_context(|| format!("no {name}.psb in the folders of bundles"))?)?;
         let bundle = Bundle::parse(&bytes)?;

@@ -9,12 +9,14 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail};
 use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::config::Backbone;
+use pocketsplat_trainer::train::module::Modules;
 
 use super::capture::Split;
 use super::lpips::LpipsArgs;
-use super::run_config::RunConfig;
-use super::settings::Settings;
+use super::settings::{QualityOptions, RunOptions, applied};
 use super::{output, point, stop, train};
+use crate::config::heading::{OUTPUT, QUALITY, RUN};
+use crate::config::{CaptureOptions, RunConfig};
 use results::Results;
 use rows::{Row, rows};
 
@@ -28,26 +30,31 @@ pub(crate) struct Args {
     /// Folder of the capture.
     #[arg(required_unless_present = "config")]
     dataset: Option<PathBuf>,
+    #[command(flatten)]
+    capture: CaptureOptions,
     /// Folder for the runs and the results.
-    #[arg(short, long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR", help_heading = OUTPUT)]
     output: PathBuf,
+    #[command(flatten)]
+    quality: QualityOptions,
     /// Weights of a value's bits in the loss; options and seeds are compared at the second, or the only one.
-    #[arg(long = "lambda", value_name = "X,…", value_delimiter = ',', default_values_t = [0.004, 0.002, 0.001, 0.0005])]
+    #[arg(long = "lambda", value_name = "X,…", value_delimiter = ',', default_values_t = [0.004, 0.002, 0.001, 0.0005],
+        help_heading = QUALITY)]
     lambdas: Vec<f64>,
-    /// Seeds that `none` and `all` are trained with at that rate, so that it is known what a seed alone changes.
-    #[arg(long, default_value_t = 3)]
-    seeds: u64,
-    /// Only these rows, by name; a trailing * stands for anything.
-    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    /// Rows to train, by name, where a trailing * stands for anything [default: all]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', help_heading = RUN)]
     rows: Vec<String>,
     /// List the rows and stop.
-    #[arg(long)]
+    #[arg(long, help_heading = RUN)]
     list: bool,
-    /// Read the configuration, as a run folder has it; options given beside it count more.
-    #[arg(long, value_name = "FILE.toml")]
+    /// Seeds that `none` and `all` are trained with, to show what a seed alone changes.
+    #[arg(long, default_value_t = 3, help_heading = RUN)]
+    seeds: u64,
+    /// Configuration to read, as a run folder has it; options beside it count more.
+    #[arg(long, value_name = "FILE.toml", help_heading = RUN)]
     config: Option<PathBuf>,
     #[command(flatten)]
-    settings: Settings,
+    run: RunOptions,
     #[command(flatten)]
     lpips: LpipsArgs,
 }
@@ -97,9 +104,10 @@ impl Args {
             Some(path) => RunConfig::read(path)?,
             None => RunConfig { train: TrainConfig::of(Backbone::Hac), ..RunConfig::default() },
         };
-        let base = self.settings.applied_to(point::base(base, self.dataset.as_deref(), &self.output)?)?;
-        if !base.train.modules.attached().is_empty() {
-            bail!("the rows of an ablation attach the modules; leave --modules and --prune out");
+        let base = point::base(base, self.dataset.as_deref(), &self.output)?;
+        let base = applied(&self.capture, &self.quality, &self.run, base)?;
+        if base.train.modules != Modules::default() {
+            bail!("the rows of an ablation attach the modules; leave --modules and --effects +detail out");
         }
         point::check_effects(&base)?;
         point::check_distinct(&self.lambdas)?;
@@ -143,9 +151,8 @@ impl Args {
             plan.push(run_of(base, row, at, base.train.seed)?);
         }
         // All of them before the first is trained for an hour.
-        plan.iter().try_for_each(|run| {
-            run.config.check().with_context(|| format!("the row {} can not be trained", run.row))
-        })?;
+        plan.iter()
+            .try_for_each(|run| run.config.check().with_context(|| format!("the row {} cannot be trained", run.row)))?;
         Ok(plan)
     }
 }

@@ -9,7 +9,8 @@ use pocketsplat_core::Bundle;
 use pocketsplat_core::bundle::AnchorSite;
 use pocketsplat_trainer::bundle::normalisation_of;
 
-use super::capture::{CaptureArgs, CaptureOptions};
+use super::capture::CaptureArgs;
+use crate::config::CaptureOptions;
 
 /// The bytes of a bundle and where they came from.
 pub(crate) struct BundleFile {
@@ -25,7 +26,7 @@ impl BundleFile {
 
     /// Checks the file; says so when it is cut at the end of a tier.
     pub(crate) fn parse(&self) -> Result<Bundle<'_>> {
-        let bundle = Bundle::parse(&self.bytes).with_context(|| format!("{} can not be used", self.path.display()))?;
+        let bundle = Bundle::parse(&self.bytes).with_context(|| format!("{} cannot be used", self.path.display()))?;
         let (n_tiers, n_written) = (bundle.n_tiers(), bundle.header().n_tiers);
         if n_tiers < n_written {
             eprintln!(

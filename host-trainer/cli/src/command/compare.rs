@@ -7,8 +7,8 @@ use anyhow::{Context, Result};
 use pocketsplat_trainer::cost::on_front;
 use serde::{Deserialize, Serialize};
 
-use super::run_config::{Difference, RunConfig};
 use super::{output, point};
+use crate::config::{Difference, RunConfig};
 
 /// Compare finished runs: quality, bytes and the minutes that they took, by the settings in which they differ from the first.
 ///
@@ -16,7 +16,7 @@ use super::{output, point};
 /// them. Minutes are of one processor core, so that they do not depend on what else the machine did.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Run folders; the others are named by what they have otherwise than the first.
+    /// Run folders, of which all but the first are named by their differences from the first.
     #[arg(value_name = "RUN", required = true)]
     runs: Vec<PathBuf>,
     /// Folder for the results.

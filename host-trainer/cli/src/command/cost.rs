@@ -13,7 +13,7 @@ use pocketsplat_trainer::camera::core_camera;
 use pocketsplat_trainer::cost::{
     CountError, Counter, Instructions, MOST_VIEWS, Measured, Setting, Sight, knobs, measure, quality_grid,
 };
-use pocketsplat_trainer::device::Target;
+use pocketsplat_trainer::device::Processor;
 use pocketsplat_trainer::render::reference::ReferenceScene;
 use rayon::prelude::*;
 
@@ -42,17 +42,16 @@ pub(crate) struct Args {
     /// Which views.
     #[arg(long, value_enum, default_value_t = Split::Test)]
     split: Split,
-    /// So many views at most, evenly picked; 0: all.
+    /// Largest number of views, evenly picked; 0 takes all.
     #[arg(long, default_value_t = 8)]
     views: usize,
-    /// Scratch memory of the decoder, as 192KiB or 65536. [default: without limit]
+    /// Scratch memory of the decoder, as 192KiB or 65536 [default: no limit]
     #[arg(long, value_name = "BYTES")]
     ram: Option<ByteSize>,
     /// Machines whose time is compared.
     #[arg(long, value_enum, value_delimiter = ',', value_name = "NAME,…", default_values_t = [Machine::CortexM4])]
     target: Vec<Machine>,
-    /// Instructions are those of so many of the views, evenly picked, at most 10, and the firmware counts them. [default: 2 where it
-    /// can; else all views, and nothing is counted]
+    /// Views, at most 10, whose instructions the firmware counts [default: 2 where it can, else none]
     #[arg(long, value_name = "VIEWS")]
     count: Option<usize>,
     /// Folder of the firmware that counts.
@@ -66,7 +65,7 @@ const COUNTED_VIEWS: usize = 2;
 pub(crate) fn run(args: &Args) -> Result<()> {
     let file = BundleFile::read(&args.bundle)?;
     let bundle = file.parse()?;
-    let targets: Vec<Target> = args.target.iter().filter_map(|machine| machine.device()).collect();
+    let targets: Vec<Processor> = args.target.iter().filter_map(|machine| machine.device()).collect();
     let counter = args.counter(&targets)?;
     let capture = file.capture_options(&bundle, &args.capture)?.load(0)?;
     let views = picked(args.split.views(&capture)?, args.views);
@@ -122,7 +121,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 
 impl Args {
     /// Who counts instructions; nobody, with a word about it, where nobody was asked for and something is missing.
-    fn counter(&self, targets: &[Target]) -> Result<Option<Counter>> {
+    fn counter(&self, targets: &[Processor]) -> Result<Option<Counter>> {
         if targets.is_empty() || self.count == Some(0) {
             return Ok(None);
         }
@@ -138,7 +137,7 @@ impl Args {
 }
 
 /// Replaces what was predicted by what the firmware counts, where it can.
-fn count(counter: &Counter, targets: &[Target], cameras: &[Camera], point: &mut Measured) {
+fn count(counter: &Counter, targets: &[Processor], cameras: &[Camera], point: &mut Measured) {
     for (instructions, target) in point.instructions.iter_mut().zip(targets) {
         match counter.count(*target, &point.setting, cameras, point.scratch_bytes) {
             Ok(stages) => *instructions = Some(Instructions { stages, counted: true }),

@@ -12,10 +12,11 @@ use pocketsplat_trainer::train::config::Backbone;
 use pocketsplat_trainer::train::module::{Detail, Distribution, Modules, Pruning};
 
 use super::bundle::BundleFile;
-use super::capture::{CaptureArgs, CaptureOptions, Split};
+use super::capture::{CaptureArgs, Split};
 use super::encode::Encoding;
 use super::eval::{Measurements, Renderer, evaluate, reference_image};
 use super::{output, train};
+use crate::config::CaptureOptions;
 
 /// Make a capture, train it, compress it, draw it with the decoder and compare: about three minutes on two cores.
 #[derive(clap::Args)]

@@ -12,10 +12,10 @@ use super::output;
 pub(crate) struct Args {
     /// Folder of the capture.
     dataset: PathBuf,
-    /// The folder of images to look at, for captures that hold several.
+    /// Folder of images to read, for captures that hold several sizes [default: the only one, or images]
     #[arg(long, value_name = "NAME")]
     images: Option<String>,
-    /// Every how many-th view is held out.
+    /// Hold out every N-th view; 0 holds out none.
     #[arg(long, value_name = "N", default_value_t = LoadOptions::default().test_every)]
     test_every: u32,
     /// Print the result as JSON.
@@ -32,7 +32,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         println!("{diagnosis}");
     }
     if diagnosis.has_errors() {
-        bail!("{} can not be trained on: {} errors", args.dataset.display(), diagnosis.count(Severity::Error));
+        bail!("{} cannot be trained on: {} errors", args.dataset.display(), diagnosis.count(Severity::Error));
     }
     Ok(())
 }

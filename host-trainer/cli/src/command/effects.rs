@@ -5,37 +5,18 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use pocketsplat_capture::dataset::Capture;
-use pocketsplat_trainer::device::{Limits, Target};
-use pocketsplat_trainer::effects::{Drawing, Effect, LEAST_ITERATIONS, PilotCapture, Price, Trials, measure};
+use pocketsplat_trainer::device::{Limits, Processor};
+use pocketsplat_trainer::effects::{Effect, PilotCapture, PilotDevice, Trials, measure};
 use pocketsplat_trainer::train::finish::Finished;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
+
+use crate::config::RunConfig;
 
 use super::encode::Encoding;
 use super::output;
-use super::run_config::RunConfig;
 
 /// The table of pilots in a run's folder.
 const TABLE: &str = "effects.csv";
-
-/// How a run comes to its effects; once they are chosen they stand in its shape and modules, and nothing is measured again.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct EffectsConfig {
-    /// Whether they are still to be measured; a configuration in a file has been decided about unless it says so.
-    pub(crate) auto: bool,
-    /// Shorter runs are not measured: pilots of an eighth of them say nothing.
-    pub(crate) least_iterations: u32,
-    /// The processor whose instructions count; a Cortex-M4 where none is named.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) target: Option<Target>,
-    /// What they have to gain.
-    pub(crate) price: Price,
-}
-
-impl Default for EffectsConfig {
-    fn default() -> Self {
-        Self { auto: true, least_iterations: LEAST_ITERATIONS, target: None, price: Price::default() }
-    }
-}
 
 /// One line of the table.
 #[derive(Serialize)]
@@ -69,15 +50,15 @@ pub(crate) fn resolve(config: &mut RunConfig, capture: &Capture, folder: &Path) 
         return Ok(());
     };
     let started = Instant::now();
-    let target = config.effects.target.unwrap_or(Target::CortexM4);
-    let drawing = Drawing { ram_bytes: config.encoding.limits.ram_bytes, target };
+    let target = config.effects.target.unwrap_or(Processor::CortexM4);
+    let device = PilotDevice { ram_bytes: config.encoding.limits.ram_bytes, target };
     let encoding = for_pilots(&config.encoding);
     let encode = |finished: Finished, capture: &Capture| {
         let fitted = encoding.encode(finished, capture, &[])?;
         Ok::<_, anyhow::Error>(fitted.written.bytes)
     };
     let begins = |effects: &[Effect]| eprintln!("effects: pilot with {}", Effect::names(effects));
-    let trials = measure(&pilots, &config.train, &config.effects.price, drawing, encode, begins)
+    let trials = measure(&pilots, &config.train, &config.effects.price, device, encode, begins)
         .context("measuring the effects; force them with --effects to do without")?;
     let chosen = trials.each.iter().find(|trial| trial.chosen).map_or(&[][..], |trial| &trial.effects);
     eprint!("{}", table(&trials, target));
@@ -110,7 +91,7 @@ fn csv(trials: &Trials) -> Result<Vec<u8>> {
     Ok(table.into_inner()?)
 }
 
-fn table(trials: &Trials, target: Target) -> String {
+fn table(trials: &Trials, target: Processor) -> String {
     let width = trials.each.iter().map(|trial| Effect::names(&trial.effects).len()).max().unwrap_or(0);
     let mut text = format!(
         "  {:width$}  PSNR, dB  gain, dB  price, dB  instructions, M    bytes  (of pilots, on a {target:?})\n",

@@ -41,10 +41,10 @@ pub(crate) struct Args {
     /// What draws the frames.
     #[arg(long, value_enum, default_value_t = Renderer::Core)]
     renderer: Renderer,
-    /// Also compare every frame with the f64 reference (`psnr_to_reference_db`, the lowest over the views).
+    /// Also compare every frame with the f64 reference (psnr_to_reference_db, the lowest over the views).
     #[arg(long)]
     against_reference: bool,
-    /// Also measure the scene of each tier and those before it: what a smaller device draws.
+    /// Also measure what smaller devices draw, tier by tier.
     #[arg(long)]
     per_tier: bool,
     #[command(flatten)]

@@ -7,7 +7,7 @@ use bytesize::ByteSize;
 use pocketsplat_capture::dataset::FrameSize;
 use pocketsplat_core::budget::MAX_FRAME_PX;
 use pocketsplat_core::{Budget, Bundle, DecodeError, Overflow, Plan};
-use pocketsplat_trainer::device::Target;
+use pocketsplat_trainer::device::Processor;
 use pocketsplat_trainer::instructions::predict;
 use pocketsplat_trainer::verify::Trial;
 use serde::Serialize;
@@ -24,18 +24,18 @@ use super::output;
 pub(crate) struct Args {
     /// The bundle.
     bundle: PathBuf,
-    /// Scratch memory of the decoder, as 192KiB or 65536; several compare. [default: a ladder from the least that does]
+    /// Scratch memory of the decoder, as 192KiB or 65536, or several to compare [default: steps from the least that suffices]
     #[arg(long, value_name = "BYTES", value_delimiter = ',')]
     ram: Vec<ByteSize>,
-    /// The largest frame. [default: the size that the bundle was trained at]
+    /// Largest frame [default: the training size of the bundle]
     #[arg(long, value_name = "WxH")]
     resolution: Option<FrameSize>,
-    /// Draw strips that have too many splats for the memory in slabs of depth, one after the other, instead of fewer anchors.
+    /// Draw strips with too many splats in slabs of depth, instead of leaving anchors out.
     #[arg(long, requires = "ram")]
     slabs: bool,
-    /// Also predict the instructions of a frame of the bundle's preview on such a processor.
-    #[arg(long, value_parser = one_of::<Target>(TARGETS))]
-    target: Option<Target>,
+    /// Processor for which to predict the instructions of the preview frame [default: none]
+    #[arg(long, value_parser = one_of::<Processor>(TARGETS))]
+    target: Option<Processor>,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
@@ -141,11 +141,11 @@ pub(crate) fn plan_within(bundle: &Bundle<'_>, frame: &Budget, ram_bytes: u64) -
 }
 
 /// Draws the preview in the plan's size, and predicts from what it consists of.
-fn preview_instructions(bundle: &Bundle<'_>, plan: &Plan, target: Target) -> Result<u64> {
+fn preview_instructions(bundle: &Bundle<'_>, plan: &Plan, target: Processor) -> Result<u64> {
     let Budget { width_px, height_px, .. } = *plan.budget();
     let camera = bundle.header().preview.resized(width_px, height_px);
     let Trial { report, .. } = Trial::run(bundle, *plan, &camera, 0, 0)?;
-    let stages = predict(target.costs(), bundle, plan, &report, [width_px, height_px]);
+    let stages = predict(target.instruction_set(), bundle, plan, &report, [width_px, height_px]);
     Ok(stages.iter().sum::<f64>() as u64)
 }
 

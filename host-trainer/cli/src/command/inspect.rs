@@ -22,7 +22,7 @@ pub(crate) struct Args {
     /// Print the file byte by byte with the meaning of each, long arrays abbreviated.
     #[arg(long, conflicts_with = "json")]
     hexdump: bool,
-    /// Lines of an array in the dump at most.
+    /// Largest number of lines of an array in the dump.
     #[arg(long, value_name = "N", default_value_t = 4, requires = "hexdump")]
     lines: usize,
 }

@@ -16,7 +16,7 @@ pub(crate) struct LpipsArgs {
     /// Also measure LPIPS on VGG16 with the weights of this safetensors file.
     #[arg(long, value_name = "FILE")]
     lpips_weights: Option<PathBuf>,
-    /// What black and white are to LPIPS. This field publishes figures of the first, LPIPS was trained on the second.
+    /// Range of black to white given to LPIPS: papers of this field use zero-to-one, LPIPS was trained on minus-one-to-one.
     #[arg(long, value_enum, default_value_t = Range::ZeroToOne)]
     lpips_range: Range,
 }

@@ -8,7 +8,7 @@ mod cost;
 mod demo;
 mod doctor;
 mod effects;
-mod encode;
+pub(crate) mod encode;
 mod eval;
 mod fit;
 mod inspect;
@@ -19,7 +19,6 @@ mod plot;
 mod point;
 mod progress;
 mod render;
-mod run_config;
 mod settings;
 mod stop;
 mod sweep;
@@ -37,8 +36,8 @@ use clap::{Parser, Subcommand};
 #[derive(Parser)]
 #[command(name = "pocketsplat", version, propagate_version = true)]
 struct Cli {
-    /// Threads; 0 takes one per core. No result depends on it.
-    #[arg(long, global = true, default_value_t = 0)]
+    /// Threads, on which no result depends; 0 takes one per core.
+    #[arg(long, value_name = "N", global = true, default_value_t = 0, help_heading = crate::config::heading::RUN)]
     threads: usize,
     #[command(subcommand)]
     command: Command,
@@ -86,4 +85,51 @@ pub(crate) fn run() -> Result<ExitCode> {
         Command::Demo(args) => demo::run(&args),
     }
     .map(|()| ExitCode::SUCCESS)
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::{Arg, CommandFactory as _};
+
+    use super::Cli;
+    use crate::config::heading::DEVICE;
+
+    fn commands() -> Vec<clap::Command> {
+        let mut cli = Cli::command();
+        cli.build();
+        cli.get_subcommands().filter(|command| command.get_name() != "help").cloned().collect()
+    }
+
+    #[test]
+    fn short_help_of_train_has_at_most_20_options() {
+        let mut train = commands().into_iter().find(|command| command.get_name() == "train").expect("train");
+        let help = train.render_help().to_string();
+        let options: Vec<&str> = help.lines().filter(|line| line.trim_start().starts_with('-')).collect();
+        assert!(options.len() <= 20, "{}: {help}", options.len());
+        let headings: Vec<&str> = help.lines().filter(|line| line.ends_with(':') && !line.starts_with(' ')).collect();
+        let expected = ["Arguments:", "Options:", "Input:", "Output:", "Quality:", "Device:", "Run:"];
+        assert_eq!(headings, expected, "{help}");
+    }
+
+    #[test]
+    fn only_limits_stand_under_device() {
+        for command in commands() {
+            let under_device = command.get_arguments().filter(|arg| arg.get_help_heading() == Some(DEVICE));
+            let others: Vec<&str> = under_device.map(|arg| arg.get_id().as_str()).collect();
+            assert!(others.iter().all(|name| ["ram", "flash", "target"].contains(name)), "{others:?}");
+        }
+    }
+
+    #[test]
+    fn the_help_of_an_option_is_one_sentence() {
+        let text = |arg: &Arg| arg.get_long_help().or(arg.get_help()).map(ToString::to_string).unwrap_or_default();
+        for command in commands() {
+            for arg in command.get_arguments() {
+                let help = text(arg);
+                let sentence = help.split("[default").next().unwrap_or_default().trim().trim_end_matches('.');
+                let at = format!("{} --{}: {help}", command.get_name(), arg.get_id());
+                assert!(!sentence.is_empty() && !sentence.contains(". "), "{at}");
+            }
+        }
+    }
 }

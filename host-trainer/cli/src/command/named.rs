@@ -10,7 +10,6 @@ pub(super) const SURFACES: &[&str] = &["matte", "mixed", "glossy"];
 pub(super) const CODERS: &[&str] = &["auto", "static", "context"];
 pub(super) const TARGETS: &[&str] = &["cortex-m4", "cortex-m7", "riscv32imac"];
 pub(super) const BACKBONES: &[&str] = &["scaffold", "hac"];
-pub(super) const PRUNING_FORMS: &[&str] = &["hard", "tiered"];
 
 /// Parses one of `names`, which are serde's for the variants of `T`.
 pub(super) fn one_of<T>(names: &'static [&'static str]) -> impl TypedValueParser<Value = T>
@@ -28,12 +27,11 @@ mod tests {
     use clap::builder::TypedValueParser as _;
     use pocketsplat_capture::synth::SurfaceFinish;
     use pocketsplat_trainer::bundle::Coder;
-    use pocketsplat_trainer::device::Target;
+    use pocketsplat_trainer::device::Processor;
     use pocketsplat_trainer::train::config::Backbone;
-    use pocketsplat_trainer::train::module::pruning::Form;
     use serde::de::DeserializeOwned;
 
-    use super::{BACKBONES, CODERS, PRUNING_FORMS, SURFACES, TARGETS};
+    use super::{BACKBONES, CODERS, SURFACES, TARGETS};
 
     /// Every name that help shows is one that serde knows.
     fn all_parse<T: DeserializeOwned + Clone + Send + Sync + 'static>(names: &'static [&'static str]) {
@@ -47,8 +45,7 @@ mod tests {
     fn every_name_shown_is_parsed() {
         all_parse::<SurfaceFinish>(SURFACES);
         all_parse::<Coder>(CODERS);
-        all_parse::<Target>(TARGETS);
+        all_parse::<Processor>(TARGETS);
         all_parse::<Backbone>(BACKBONES);
-        all_parse::<Form>(PRUNING_FORMS);
     }
 }

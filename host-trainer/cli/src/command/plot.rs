@@ -22,7 +22,7 @@ pub(crate) struct Args {
     /// The figure to write.
     #[arg(short, long, value_name = "FILE.svg")]
     output: PathBuf,
-    /// Lay sizes out by their ratios.
+    /// Draw sizes on a logarithmic axis.
     #[arg(long)]
     log_x: bool,
     /// Print the deltas as JSON.

@@ -13,10 +13,9 @@ use serde::{Deserialize, Serialize};
 
 use super::bundle::BundleFile;
 use super::capture::{CaptureArgs, Split};
-use super::effects::EffectsConfig;
 use super::eval::{Evaluation, Measurements, Renderer, evaluate};
-use super::run_config::RunConfig;
 use super::{output, train};
+use crate::config::{EffectsConfig, RunConfig};
 
 /// The configuration in a run folder.
 const CONFIG: &str = "config.toml";

@@ -10,9 +10,10 @@ use pocketsplat_trainer::train::config::Backbone;
 
 use super::capture::Split;
 use super::lpips::LpipsArgs;
-use super::run_config::RunConfig;
-use super::settings::Settings;
+use super::settings::{QualityOptions, RunOptions, applied};
 use super::{output, point, stop, train};
+use crate::config::heading::{OUTPUT, QUALITY, RUN};
+use crate::config::{CaptureOptions, RunConfig};
 
 /// Train a capture once for each weight of the bits, and measure every bundle on the held-out views.
 ///
@@ -23,17 +24,21 @@ pub(crate) struct Args {
     /// Folder of the capture.
     #[arg(required_unless_present = "config")]
     dataset: Option<PathBuf>,
+    #[command(flatten)]
+    capture: CaptureOptions,
     /// Folder for the bundles, their run folders and the results.
-    #[arg(short, long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR", help_heading = OUTPUT)]
     output: PathBuf,
-    /// Weights of a value's bits in the loss, one point each; the larger, the smaller the bundle.
-    #[arg(long = "lambda", value_name = "X,…", value_delimiter = ',', required = true)]
+    #[command(flatten)]
+    quality: QualityOptions,
+    /// Weights of a value's bits in the loss, one point each: the larger, the smaller the bundle.
+    #[arg(long = "lambda", value_name = "X,…", value_delimiter = ',', required = true, help_heading = QUALITY)]
     lambdas: Vec<f64>,
-    /// Read the configuration, as a run folder has it; options given beside it count more.
-    #[arg(long, value_name = "FILE.toml")]
+    /// Configuration to read, as a run folder has it; options beside it count more.
+    #[arg(long, value_name = "FILE.toml", help_heading = RUN)]
     config: Option<PathBuf>,
     #[command(flatten)]
-    settings: Settings,
+    run: RunOptions,
     #[command(flatten)]
     lpips: LpipsArgs,
 }
@@ -76,7 +81,7 @@ impl Args {
             None => RunConfig { train: TrainConfig::of(Backbone::Hac), ..RunConfig::default() },
         };
         let base = point::base(base, self.dataset.as_deref(), &self.output)?;
-        let base = self.settings.applied_to(base)?;
+        let base = applied(&self.capture, &self.quality, &self.run, base)?;
         point::check_effects(&base)?;
         if base.train.backbone != Backbone::Hac {
             bail!(

@@ -23,7 +23,7 @@ pub(crate) struct Args {
     /// Decides the textures and the cameras.
     #[arg(long, default_value_t = SynthOptions::default().seed)]
     seed: u64,
-    /// How the surfaces throw back the light.
+    /// How surfaces reflect light.
     #[arg(long, value_parser = one_of::<SurfaceFinish>(SURFACES), default_value = "mixed")]
     surface: SurfaceFinish,
 }

@@ -19,9 +19,9 @@ use serde::Serialize;
 use super::capture::CaptureArgs;
 use super::encode::{Encoding, largest_px};
 use super::progress::Progress;
-use super::run_config::RunConfig;
 use super::train_args::Args;
 use super::{effects, output, stop};
+use crate::config::RunConfig;
 
 /// Seconds between checkpoints unless the user says otherwise: what an accident may cost.
 const CHECKPOINT_SECONDS: f64 = 60.0;
@@ -36,7 +36,7 @@ pub(crate) struct TrainResult {
     pub(crate) n_valid_anchors: usize,
     pub(crate) drawn_offsets: usize,
     pub(crate) undrawn_offsets: usize,
-    /// What coded the symbols: the shorter of the two unless the configuration forces one.
+    /// What coded the symbols: `context` or `static`.
     pub(crate) coder: &'static str,
     /// Bytes of features, log-scales and offsets under the float context model.
     pub(crate) estimated_bytes: Option<[f64; 3]>,
@@ -56,7 +56,7 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
         Some(path) => {
             let folder = RunFolder::reopen(path)?;
             let begun = RunConfig::parse(&folder.config()?);
-            let begun = begun.with_context(|| format!("the config.toml in {} can not be used", path.display()))?;
+            let begun = begun.with_context(|| format!("the config.toml in {} cannot be used", path.display()))?;
             let mut config = args.applied_to(begun.clone())?;
             if let Some(difference) = begun.difference(&config)? {
                 bail!("the run began with another setting than the command line asks for: {difference}; leave it out");

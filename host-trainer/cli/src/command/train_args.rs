@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use bytesize::ByteSize;
-use pocketsplat_trainer::device::{Choice, Limits, Target, choose};
+use pocketsplat_trainer::device::{Limits, ModelChoice, Processor, choose};
 use pocketsplat_trainer::train::config::Hac;
 
 use super::named::{TARGETS, one_of};
-use super::run_config::RunConfig;
-use super::settings::{Settings, with_default};
+use super::settings::{QualityOptions, RunOptions, applied, with_default};
+use crate::config::heading::{DEVICE, OUTPUT, QUALITY, RUN};
+use crate::config::{CaptureOptions, RunConfig};
 
 /// Train a scene from a capture and write it as a bundle.
 ///
@@ -20,46 +21,50 @@ pub(crate) struct Args {
     /// Folder of the capture.
     #[arg(required_unless_present_any = ["config", "resume"])]
     dataset: Option<PathBuf>,
-    /// The bundle to write.
-    #[arg(short, long, value_name = "OUT.psb", required_unless_present_any = ["config", "resume"])]
+    #[command(flatten)]
+    capture: CaptureOptions,
+    /// Bundle to write.
+    #[arg(short, long, value_name = "OUT.psb", required_unless_present_any = ["config", "resume"], help_heading = OUTPUT)]
     output: Option<PathBuf>,
-    /// Folder for configuration, progress and checkpoints. [default: OUT.run]
-    #[arg(long, value_name = "DIR", conflicts_with = "resume")]
+    /// Folder for configuration, progress and checkpoints [default: OUT.run]
+    #[arg(long, value_name = "DIR", conflicts_with = "resume", help_heading = OUTPUT, hide_short_help = true)]
     run: Option<PathBuf>,
-    /// Read the configuration, as a run folder has it; options given beside it count more.
-    #[arg(long, value_name = "FILE.toml", conflicts_with = "resume")]
-    config: Option<PathBuf>,
-    /// Go on with the run in this folder. A capture that has moved since is given as DATASET.
-    #[arg(long, value_name = "OUT.run")]
-    resume: Option<PathBuf>,
-    /// Start anew where an unfinished run lies.
-    #[arg(short = 'w', long, conflicts_with = "resume")]
-    overwrite: bool,
-    #[arg(long, help = with_default("Weight of a value's bits in the loss, for `--backbone hac`", Hac::default().lambda))]
+    /// Print the result as JSON [default: as text]
+    #[arg(long, help_heading = OUTPUT, hide_short_help = true)]
+    json: bool,
+    #[command(flatten)]
+    quality: QualityOptions,
+    #[arg(long, value_name = "X", help_heading = QUALITY,
+        help = with_default("Weight of a value's bits in the loss of hac: the larger, the smaller the bundle", Hac::default().lambda))]
     lambda: Option<f64>,
     #[command(flatten)]
     device: DeviceArgs,
+    /// Configuration to read, as a run folder has it; options beside it count more.
+    #[arg(long, value_name = "FILE.toml", conflicts_with = "resume", help_heading = RUN)]
+    config: Option<PathBuf>,
+    /// Run folder to go on in; a capture that has moved is given as DATASET.
+    #[arg(long, value_name = "OUT.run", help_heading = RUN)]
+    resume: Option<PathBuf>,
+    /// Start anew where an unfinished run lies [default: refuse]
+    #[arg(short = 'w', long, conflicts_with = "resume", help_heading = RUN)]
+    overwrite: bool,
     #[command(flatten)]
-    settings: Settings,
-    /// Print the result as JSON.
-    #[arg(long)]
-    json: bool,
+    options: RunOptions,
 }
 
 /// What the device has that the bundle is for; what else the command line leaves open is chosen by it.
 #[derive(clap::Args)]
-#[command(next_help_heading = "Device")]
 struct DeviceArgs {
-    /// Scratch memory of the decoder, as 192KiB: the whole scene is to be drawn in it, the lowest tier surely is. Besides it a
-    /// firmware needs its stack and what it shows the frame with.
-    #[arg(long, value_name = "BYTES")]
+    /// Scratch bytes of the decoder, as 192KiB, excluding stack and frame buffer; the lowest tier is guaranteed to fit
+    /// [default: no limit]
+    #[arg(long, value_name = "BYTES", help_heading = DEVICE)]
     ram: Option<ByteSize>,
-    /// The bundle's size at most, as 1MiB.
-    #[arg(long, value_name = "BYTES")]
+    /// Largest size of the bundle, as 1MiB [default: no limit]
+    #[arg(long, value_name = "BYTES", help_heading = DEVICE)]
     flash: Option<ByteSize>,
-    /// The processor, which says how many instructions a frame may take.
-    #[arg(long, value_parser = one_of::<Target>(TARGETS))]
-    target: Option<Target>,
+    /// Processor, which limits the instructions of a frame [default: no limit]
+    #[arg(long, value_parser = one_of::<Processor>(TARGETS), help_heading = DEVICE)]
+    target: Option<Processor>,
 }
 
 impl DeviceArgs {
@@ -67,7 +72,7 @@ impl DeviceArgs {
         Limits {
             ram_bytes: self.ram.map(|bytes| bytes.as_u64()),
             flash_bytes: self.flash.map(|bytes| bytes.as_u64()),
-            frame_instructions: self.target.map(Target::frame_instructions),
+            frame_instructions: self.target.map(Processor::frame_instructions),
         }
     }
 }
@@ -99,12 +104,12 @@ impl Args {
         // A configuration that is given has been decided about.
         if !limits.is_none() && self.config.is_none() {
             let choice = choose(&limits)?;
-            config = self.settings.chosen(config, &choice);
+            config = self.quality.chosen(config, &choice);
             config.train.hac.lambda = self.lambda.unwrap_or(choice.lambda);
-            let Choice { feature_dim, n_offsets, max_anchors, lambda, deciding } = choice;
+            let ModelChoice { feature_dim, n_offsets, max_anchors, lambda, binding } = choice;
             eprintln!(
-                "for this device: features of width {feature_dim}, {n_offsets} offsets, at most {max_anchors} anchors ({deciding} \
-                 decides), lambda {lambda}, where the command line says nothing else"
+                "for this device: features of width {feature_dim}, {n_offsets} offsets, at most {max_anchors} anchors (limited by \
+                 {binding}), lambda {lambda}; options override these"
             );
         }
         for (path, name, option) in [(&config.dataset, "dataset", "DATASET"), (&config.output, "output", "--output")] {
@@ -115,7 +120,7 @@ impl Args {
         config.check()?;
         // Absolute, so that the run can go on from any folder.
         for path in [&mut config.dataset, &mut config.output] {
-            *path = std::path::absolute(&path).with_context(|| format!("{} is no path", path.display()))?;
+            *path = std::path::absolute(&path).with_context(|| format!("{} is not a path", path.display()))?;
         }
         Ok(config)
     }
@@ -125,7 +130,7 @@ impl Args {
         // Absolute, so that the run can go on from any folder.
         for (into, given) in [(&mut config.dataset, &self.dataset), (&mut config.output, &self.output)] {
             if let Some(path) = given {
-                *into = std::path::absolute(path).with_context(|| format!("{} is no path", path.display()))?;
+                *into = std::path::absolute(path).with_context(|| format!("{} is not a path", path.display()))?;
             }
         }
         let limits = self.device.limits();
@@ -136,14 +141,14 @@ impl Args {
         if let Some(lambda) = self.lambda {
             config.train.hac.lambda = lambda;
         }
-        self.settings.applied_to(config)
+        applied(&self.capture, &self.quality, &self.options, config)
     }
 
     /// Where a new run works.
     pub(crate) fn run_folder(&self, config: &RunConfig) -> Result<PathBuf> {
         let folder = self.run.clone().unwrap_or_else(|| config.output.with_extension("run"));
         if std::path::absolute(&folder).ok() == std::path::absolute(&config.output).ok() {
-            bail!("{} can not be both bundle and run folder; choose another folder with --run", folder.display());
+            bail!("{} cannot be both bundle and run folder; choose another folder with --run", folder.display());
         }
         Ok(folder)
     }

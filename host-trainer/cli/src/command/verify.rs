@@ -18,10 +18,11 @@ use pocketsplat_trainer::verify::{Violation, exact_bytes, memory_does_not_show, 
 use serde::Serialize;
 
 use super::bundle::BundleFile;
-use super::capture::{CaptureArgs, CaptureOptions};
+use super::capture::CaptureArgs;
 use super::eval::reference_image;
 use super::fit::{frame_budget, plan_within};
 use super::output;
+use crate::config::CaptureOptions;
 
 /// Views that are compared with the slow reference.
 const REFERENCE_VIEWS: usize = 3;
@@ -40,7 +41,7 @@ pub(crate) struct Args {
     bundle: PathBuf,
     /// The capture it was trained on, whose views the manifest was measured over; without it the bundle's preview is drawn.
     dataset: Option<PathBuf>,
-    /// Scratch memory of the decoder, as 192KiB. [default: without limit]
+    /// Scratch memory of the decoder, as 192KiB [default: no limit]
     #[arg(long, value_name = "BYTES")]
     ram: Option<ByteSize>,
     #[command(flatten)]
@@ -154,7 +155,7 @@ fn cameras(args: &Args, file: &BundleFile, bundle: &Bundle<'_>) -> Result<Vec<Ca
     let capture = file.capture_options(bundle, &source)?.load(0)?;
     let cameras: Vec<_> = capture.train.iter().map(|view| file.camera(bundle, &capture, view)).collect();
     let cameras = cameras_to_measure(&cameras);
-    cameras.iter().map(|camera| core_camera(camera).context("a view of the capture can not be drawn")).collect()
+    cameras.iter().map(|camera| core_camera(camera).context("a view of the capture cannot be drawn")).collect()
 }
 
 /// A frame that holds each of the views.

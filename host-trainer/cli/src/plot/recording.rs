@@ -7,7 +7,7 @@ use serde::de::DeserializeOwned;
 
 use pocketsplat_trainer::metrics::RatePoint;
 
-/// Why a file can not be plotted.
+/// Why a file cannot be plotted.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub(crate) enum RecordingError {
@@ -32,7 +32,7 @@ pub(crate) enum RecordingError {
         found: String,
     },
     /// A row that does not fit the header.
-    #[error("{}: a row can not be used", path.display())]
+    #[error("{}: a row cannot be used", path.display())]
     Row {
         /// The file.
         path: PathBuf,

@@ -1,4 +1,4 @@
-//! Full disks, folders that can not be written, two processes in one folder, captures that change.
+//! Full disks, folders that cannot be written, two processes in one folder, captures that change.
 
 use std::fs;
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
@@ -78,7 +78,7 @@ fn a_folder_that_can_not_be_written_is_an_error_before_any_work() {
             // Root may write anywhere; nobody may not.
             command.uid(65534).gid(65534);
             if !command.output().is_ok_and(|output| output.status.code() == Some(1)) {
-                eprintln!("skipped: this is root, and nobody can not run {:?}", pocketsplat().get_program());
+                eprintln!("skipped: this is root, and nobody cannot run {:?}", pocketsplat().get_program());
                 return;
             }
         }

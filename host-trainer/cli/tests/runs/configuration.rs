@@ -28,7 +28,8 @@ fn a_written_configuration_gives_the_same_bundle_again() {
     let other = home.join("c.psb");
     let mut command = pocketsplat();
     command.arg("train").arg("--config").arg(&config).arg("-o").arg(&other);
-    succeeds(command.args(["--iterations", "5", "--view-distance", "--no-view-direction=true", "--keep-checkpoints"]));
+    let effects = ["--effects", "+view-distance,-view-colour,-view-geometry"];
+    succeeds(command.args(["--iterations", "5", "--keep-checkpoints"]).args(effects));
     let written = fs::read_to_string(home.join("c.run/config.toml")).unwrap();
     for line in [
         "iterations = 5",

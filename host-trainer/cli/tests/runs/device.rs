@@ -1,4 +1,4 @@
-//! Memory in, bundle out: what a device has is kept, and what can not be kept is said before hours are spent.
+//! Memory in, bundle out: what a device has is kept, and what cannot be kept is said before hours are spent.
 
 use std::fs;
 
@@ -10,7 +10,7 @@ use crate::fixture::{capture, fails, folder, pocketsplat, succeeds, train};
 fn a_bundle_for_a_device_fits_it_and_passes_its_verification() {
     let home = folder("device");
     let free = home.join("free.psb");
-    succeeds(train(&free).args(["--prune", "tiered"]));
+    succeeds(train(&free).args(["--modules", "tiered-pruning"]));
     let bytes = fs::read(&free).unwrap();
     let bundle = Bundle::parse(&bytes).unwrap();
     let frame = Budget::for_frame(32, 32);

@@ -1,4 +1,4 @@
-//! Effects: forced, contradicted, measured, and kept with the run.
+//! Effects: forced, refused, measured, and kept with the run.
 
 use std::fs;
 use std::path::PathBuf;
@@ -25,7 +25,7 @@ fn forced_effects_are_those_of_the_bundle() {
     assert_eq!(effects_of(&output), Effects { view_colour: true, anisotropic: true, ..Effects::default() });
     succeeds(train(&output).args(["--effects", "-view-colour", "--backbone", "hac"]));
     assert_eq!(effects_of(&output), Effects { view_geometry: true, anisotropic: true, ..Effects::default() });
-    succeeds(train(&output).arg("--no-view-direction"));
+    succeeds(train(&output).args(["--effects", "-view-colour,-view-geometry"]));
     assert_eq!(effects_of(&output), Effects { anisotropic: true, ..Effects::default() });
     succeeds(train(&output).args(["--effects", "none"]));
     assert_eq!(effects_of(&output), Effects::default());
@@ -34,8 +34,8 @@ fn forced_effects_are_those_of_the_bundle() {
 #[test]
 fn isotropic_runs_go_through_every_phase_and_module() {
     let output = folder("isotropic").join("a.psb");
-    let modules = ["--backbone", "hac", "--modules", "distribution,pruning,detail"];
-    succeeds(train(&output).args(["--effects", "-anisotropy"]).args(modules));
+    let modules = ["--backbone", "hac", "--modules", "distribution,hard-pruning"];
+    succeeds(train(&output).args(["--effects", "-anisotropy,+detail"]).args(modules));
     let bytes = fs::read(&output).unwrap();
     let bundle = Bundle::parse(&bytes).unwrap();
     assert!(!bundle.header().features.effects.anisotropic && bundle.n_anchors() > 0);
@@ -43,21 +43,16 @@ fn isotropic_runs_go_through_every_phase_and_module() {
 }
 
 #[test]
-fn options_that_contradict_each_other_are_refused() {
-    let output = folder("contradictions").join("a.psb");
-    let with = |options: &[&str]| fails(train(&output).args(options));
-    for (options, part) in [
-        (&["--effects", "+view-colour", "--no-view-direction"][..], "a scene with view-colour, and another option"),
-        (&["--effects", "-detail", "--modules", "detail"], "a scene without detail, and another option"),
-        (&["--effects", "none", "--set", "train.shape.view_distance=true"], "without view-distance, and another"),
-        (&["--effects", "auto", "--view-distance"], "another option decides about view-distance"),
-    ] {
-        let said = with(options);
-        assert!(said.contains(part), "{options:?}: {said}");
+fn an_effect_is_set_in_one_way() {
+    let output = folder("one-way").join("a.psb");
+    for key in ["train.shape.view_distance=true", "train.shape.view_colour=true", "train.modules.detail.weight=0.5"] {
+        let said = fails(train(&output).args(["--set", key]));
+        assert!(said.contains(&format!("--set {key} belongs to the effect")) && said.contains("--effects +"), "{said}");
     }
     assert!(!output.exists() && !output.with_extension("run").exists(), "before anything was done");
-    let agreeing = ["--effects", "+detail,-view-geometry", "--modules", "detail", "--no-view-direction"];
-    succeeds(train(&output).args(agreeing));
+    let settings = ["--effects", "+detail", "--set", "train.modules.detail.hidden=5"];
+    succeeds(train(&output).args(settings));
+    assert!(effects_of(&output).detail && effects_of(&output).view_colour);
     let mut sweep = pocketsplat();
     sweep.arg("sweep").arg(capture()).arg("-o").arg(output.with_extension("sweep"));
     let said = fails(sweep.args(["--lambda", "0.004", "--effects", "auto"]));

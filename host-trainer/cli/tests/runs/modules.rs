@@ -4,13 +4,13 @@ use std::fs;
 
 use pocketsplat_core::Bundle;
 
-use crate::fixture::{capture, fails, folder, pocketsplat, resume, starts, succeeds, train, wait_for};
+use crate::fixture::{capture, fails, folder, pocketsplat, resume, starts, succeeds, text, train, wait_for};
 
 #[test]
 fn a_run_with_every_module_goes_on_in_the_same_bytes_on_either_backbone() {
     for backbone in ["scaffold", "hac"] {
         let home = folder(&format!("modules-{backbone}"));
-        let modules = ["--backbone", backbone, "--modules", "distribution,pruning,detail", "--prune", "tiered"];
+        let modules = ["--backbone", backbone, "--modules", "distribution,tiered-pruning", "--effects", "+detail"];
         let whole = home.join("whole.psb");
         succeeds(train(&whole).args(modules));
         let written = fs::read_to_string(home.join("whole.run/config.toml")).unwrap();
@@ -30,19 +30,24 @@ fn a_run_with_every_module_goes_on_in_the_same_bytes_on_either_backbone() {
 }
 
 #[test]
-fn the_modules_of_the_command_line_replace_those_of_a_configuration_and_their_heads() {
+fn modules_and_effects_of_the_command_line_replace_those_of_a_configuration_and_their_heads() {
     let home = folder("modules-replaced");
     let detailed = home.join("detailed.psb");
-    succeeds(train(&detailed).args(["--modules", "detail", "--set", "train.iterations=5"]));
+    let given = ["--modules", "distribution", "--effects", "+detail"];
+    succeeds(train(&detailed).args(given).args(["--set", "train.iterations=5"]));
     let config = home.join("detailed.run/config.toml");
     assert!(fs::read_to_string(&config).unwrap().contains("detail_hidden = 32"));
-    for (modules, detail) in [("none", false), ("pruning", false), ("pruning,detail", true)] {
+    for (modules, effects, detail) in
+        [("none", "-detail", false), ("hard-pruning", "-detail", false), ("tiered-pruning", "+view-colour", true)]
+    {
         let output = home.join(format!("{modules}.psb"));
         let mut command = pocketsplat();
-        command.arg("train").arg("--config").arg(&config).arg("-o").arg(&output).args(["--modules", modules]);
-        succeeds(&mut command);
+        command.arg("train").arg("--config").arg(&config).arg("-o").arg(&output);
+        succeeds(command.args(["--modules", modules, "--effects", effects]));
         let written = fs::read_to_string(output.with_extension("run").join("config.toml")).unwrap();
         assert_eq!(written.contains("detail_hidden = 32"), detail, "{modules}: {written}");
+        assert!(!written.contains("[train.modules.distribution]"), "{modules}: {written}");
+        assert_eq!(written.contains("[train.modules.pruning]"), modules != "none", "{written}");
         let bytes = fs::read(output).unwrap();
         assert_eq!(Bundle::parse(&bytes).unwrap().header().detail_hidden, if detail { 32 } else { 0 }, "{modules}");
     }
@@ -51,18 +56,24 @@ fn the_modules_of_the_command_line_replace_those_of_a_configuration_and_their_he
     fs::remove_file(run.join("result.json")).unwrap();
     let error = fails(resume(&run).args(["--modules", "none"]));
     assert!(error.contains("the run began with another setting"), "{error}");
-    succeeds(resume(&run).args(["--modules", "detail"]));
+    succeeds(resume(&run).args(given));
 }
 
 #[test]
 fn a_module_that_there_is_not_is_refused_by_its_name() {
     let output = folder("no-module").join("a.psb");
-    let error = fails(train(&output).args(["--modules", "distribution,sharpening"]));
-    assert!(error.contains("`sharpening`") && error.contains("distribution, pruning, detail, or none"), "{error}");
-    let error = fails(train(&output).args(["--prune-rate", "0.7"]));
+    let refused = train(&output).args(["--modules", "distribution,sharpening"]).output().unwrap();
+    let error = text(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(2), "wrong usage: {error}");
+    assert!(error.contains("'sharpening'") && error.contains("distribution, hard-pruning, tiered-pruning"), "{error}");
+    let error = fails(train(&output).args(["--modules", "hard-pruning,tiered-pruning"]));
+    assert!(error.contains("needs one of the two"), "{error}");
+    let error = fails(train(&output).args(["--modules", "hard-pruning", "--set", "train.modules.pruning.rate=0.7"]));
     assert!(error.contains("train.modules.pruning.rate is 0.7, needs 0 to 0.4"), "{error}");
-    let error = fails(train(&output).args(["--set", "train.modules.detail.depth=3"]));
+    let error = fails(train(&output).args(["--effects", "+detail", "--set", "train.modules.detail.depth=3"]));
     assert!(error.contains("unknown key `train.modules.detail.depth`"), "{error}");
+    let error = fails(train(&output).args(["--set", "train.modules.distribution.form=histogram"]));
+    assert!(error.contains("unknown key `train.modules.distribution.form`; known here: divergence, spread"), "{error}");
 }
 
 #[test]

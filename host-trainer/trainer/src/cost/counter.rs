@@ -8,7 +8,7 @@ use pocketsplat_core::arithmetic::Arithmetic;
 use pocketsplat_core::{Camera, Stage};
 
 use super::{Setting, Stages, WithArithmetic};
-use crate::device::Target;
+use crate::device::Processor;
 
 /// What `firmware-example` keeps of its RAM for itself: stack and other statics, bytes.
 const FIRMWARE_BYTES: usize = 10 * 1024 + 512;
@@ -58,7 +58,7 @@ impl Counter {
     ///
     /// # Errors
     /// [`CountError`] when the firmware or a program that `targets` need is not there.
-    pub fn new(firmware: &Path, bundle: &Path, folder: &Path, targets: &[Target]) -> Result<Self, CountError> {
+    pub fn new(firmware: &Path, bundle: &Path, folder: &Path, targets: &[Processor]) -> Result<Self, CountError> {
         let script = firmware.join("measure.sh");
         if !script.is_file() {
             return Err(CountError::NoFirmware(script));
@@ -82,7 +82,7 @@ impl Counter {
     /// [`CountError`] when the firmware does not build, or the board has too little memory.
     pub fn count(
         &self,
-        target: Target,
+        target: Processor,
         setting: &Setting,
         cameras: &[Camera],
         scratch_len: usize,
@@ -117,18 +117,18 @@ impl Counter {
 }
 
 /// The emulated board that stands for a target.
-fn board(target: Target) -> &'static str {
+fn board(target: Processor) -> &'static str {
     match target {
-        Target::CortexM4 => "mps2-an386",
-        Target::CortexM7 => "mps2-an500",
-        Target::Riscv32imac => "virt",
+        Processor::CortexM4 => "mps2-an386",
+        Processor::CortexM7 => "mps2-an500",
+        Processor::Riscv32imac => "virt",
     }
 }
 
-fn programs(target: Target) -> [&'static str; 4] {
+fn programs(target: Processor) -> [&'static str; 4] {
     match target {
-        Target::CortexM4 | Target::CortexM7 => ["bash", "flip-link", "defmt-print", "qemu-system-arm"],
-        Target::Riscv32imac => ["bash", "flip-link", "defmt-print", "qemu-system-riscv32"],
+        Processor::CortexM4 | Processor::CortexM7 => ["bash", "flip-link", "defmt-print", "qemu-system-arm"],
+        Processor::Riscv32imac => ["bash", "flip-link", "defmt-print", "qemu-system-riscv32"],
     }
 }
 

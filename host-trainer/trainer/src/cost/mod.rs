@@ -16,7 +16,7 @@ pub use counter::{CountError, Counter, MOST_VIEWS};
 pub use front::on_front;
 pub use setting::{Setting, knobs, quality_grid};
 
-use crate::device::Target;
+use crate::device::Processor;
 use crate::instructions::predict;
 use crate::metrics::{psnr_db, psnr_db_masked};
 use crate::render::decoder::image_of;
@@ -89,7 +89,7 @@ pub fn measure(
     sights: &[Sight<'_>],
     setting: &Setting,
     budget: Budget,
-    targets: &[Target],
+    targets: &[Processor],
 ) -> Result<Measured, DecodeError> {
     setting.arithmetic.call(Measurement { bundle, sights, setting, budget, targets })
 }
@@ -100,7 +100,7 @@ struct Measurement<'a, 'b> {
     sights: &'a [Sight<'a>],
     setting: &'a Setting,
     budget: Budget,
-    targets: &'a [Target],
+    targets: &'a [Processor],
 }
 
 impl WithArithmetic for Measurement<'_, '_> {
@@ -143,7 +143,7 @@ fn measure_in<A: Arithmetic>(of: &Measurement<'_, '_>) -> Result<Measured, Decod
         if sight.counts {
             let size_px = [sight.camera.width_px, sight.camera.height_px];
             for (sums, target) in predicted.iter_mut().zip(targets) {
-                let stages = predict(target.costs(), bundle, &plan, &report, size_px);
+                let stages = predict(target.instruction_set(), bundle, &plan, &report, size_px);
                 sums.iter_mut().zip(stages).for_each(|(sum, stage)| *sum += stage / n_counted);
             }
         }

@@ -40,9 +40,9 @@ struct Rate {
     bits: f64,
 }
 
-/// What decides how many anchors there may be.
+/// The limit that caps the number of anchors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Deciding {
+pub enum BindingLimit {
     /// Scratch memory.
     Ram,
     /// Bytes of the bundle.
@@ -53,7 +53,7 @@ pub enum Deciding {
     Nothing,
 }
 
-impl fmt::Display for Deciding {
+impl fmt::Display for BindingLimit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Ram => "RAM",
@@ -72,9 +72,9 @@ struct Model {
     splats_per_anchor: f64,
 }
 
-/// A model and why it was chosen.
+/// The widths and the number of anchors that a device affords.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Choice {
+pub struct ModelChoice {
     /// Feature width F.
     pub feature_dim: usize,
     /// Offsets K of an anchor.
@@ -83,19 +83,19 @@ pub struct Choice {
     pub max_anchors: usize,
     /// Weight of a value's bits in the loss.
     pub lambda: f64,
-    /// What decided about the anchors.
-    pub deciding: Deciding,
+    /// The limit that caps the anchors.
+    pub binding: BindingLimit,
 }
 
 /// No model fits.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "no scene worth drawing keeps the limit of {available} for {deciding}; the smallest, of {FEWEST_ANCHORS} anchors, takes \
+    "no scene worth drawing keeps the limit of {available} for {binding}; the smallest, of {FEWEST_ANCHORS} anchors, takes \
      about {needed}"
 )]
 pub struct Infeasible {
     /// Which limit.
-    pub deciding: Deciding,
+    pub binding: BindingLimit,
     /// What it is.
     pub available: u64,
     /// The nearest that would do.
@@ -109,37 +109,37 @@ pub struct Infeasible {
 ///
 /// # Errors
 /// [`Infeasible`] with the nearest limit that would do.
-pub fn choose(limits: &Limits) -> Result<Choice, Infeasible> {
+pub fn choose(limits: &Limits) -> Result<ModelChoice, Infeasible> {
     let [good, small] = RATES;
     let choice = choose_at(limits, good)?;
-    if choice.deciding == Deciding::Flash { choose_at(limits, small) } else { Ok(choice) }
+    if choice.binding == BindingLimit::Flash { choose_at(limits, small) } else { Ok(choice) }
 }
 
-fn choose_at(limits: &Limits, rate: Rate) -> Result<Choice, Infeasible> {
+fn choose_at(limits: &Limits, rate: Rate) -> Result<ModelChoice, Infeasible> {
     let of_models = MODELS.map(|model| (model, model.most_anchors(limits, rate)));
     let enough = of_models.iter().find(|(_, (n, _))| *n >= ENOUGH_ANCHORS);
     let [.., narrowest] = &of_models;
-    let (model, (max_anchors, deciding)) = *enough.unwrap_or(narrowest);
+    let (model, (max_anchors, binding)) = *enough.unwrap_or(narrowest);
     if max_anchors < FEWEST_ANCHORS {
-        return Err(model.infeasible(limits, rate, deciding));
+        return Err(model.infeasible(limits, rate, binding));
     }
     let Model { feature_dim, n_offsets, .. } = model;
     let Rate { lambda, .. } = rate;
-    Ok(Choice { feature_dim: feature_dim.into(), n_offsets: n_offsets.into(), max_anchors, lambda, deciding })
+    Ok(ModelChoice { feature_dim: feature_dim.into(), n_offsets: n_offsets.into(), max_anchors, lambda, binding })
 }
 
 impl Model {
-    /// Anchors that keep all limits, and which one decides.
-    fn most_anchors(&self, limits: &Limits, rate: Rate) -> (usize, Deciding) {
+    /// Anchors that keep all limits, and the binding one.
+    fn most_anchors(&self, limits: &Limits, rate: Rate) -> (usize, BindingLimit) {
         let of_ram = limits.ram_bytes.map(|ram| self.anchors_in(ram));
         let of_flash =
             limits.flash_bytes.map(|flash| ((flash as f64 - FIXED_FLASH) / self.flash_per_anchor(rate)) as usize);
         let of_work = limits
             .frame_instructions
             .map(|most| (most as f64 * SHARE_OF_ANCHORS / self.instructions_per_anchor()) as usize);
-        let all = [(of_ram, Deciding::Ram), (of_flash, Deciding::Flash), (of_work, Deciding::Instructions)];
-        let given = all.into_iter().filter_map(|(n, deciding)| Some((n?, deciding)));
-        given.min_by_key(|(n, _)| *n).unwrap_or((usize::MAX, Deciding::Nothing))
+        let all = [(of_ram, BindingLimit::Ram), (of_flash, BindingLimit::Flash), (of_work, BindingLimit::Instructions)];
+        let given = all.into_iter().filter_map(|(n, binding)| Some((n?, binding)));
+        given.min_by_key(|(n, _)| *n).unwrap_or((usize::MAX, BindingLimit::Nothing))
     }
 
     /// Scratch memory of a decoder that draws `n` anchors in two strips.
@@ -185,17 +185,17 @@ impl Model {
     }
 
     /// The limit that leaves too few anchors, and what it would have to be.
-    fn infeasible(&self, limits: &Limits, rate: Rate, deciding: Deciding) -> Infeasible {
+    fn infeasible(&self, limits: &Limits, rate: Rate, binding: BindingLimit) -> Infeasible {
         let n = FEWEST_ANCHORS as f64;
-        let (available, needed) = match deciding {
-            Deciding::Ram => (limits.ram_bytes, self.scratch_len(FEWEST_ANCHORS)),
-            Deciding::Flash => (limits.flash_bytes, (FIXED_FLASH + self.flash_per_anchor(rate) * n).ceil() as u64),
+        let (available, needed) = match binding {
+            BindingLimit::Ram => (limits.ram_bytes, self.scratch_len(FEWEST_ANCHORS)),
+            BindingLimit::Flash => (limits.flash_bytes, (FIXED_FLASH + self.flash_per_anchor(rate) * n).ceil() as u64),
             _ => {
                 let needed = self.instructions_per_anchor() * n / SHARE_OF_ANCHORS;
                 (limits.frame_instructions, needed.ceil() as u64)
             }
         };
-        Infeasible { deciding, available: available.unwrap_or_default(), needed }
+        Infeasible { binding, available: available.unwrap_or_default(), needed }
     }
 }
 
@@ -218,17 +218,17 @@ mod tests {
                     prop_assert!(choice.max_anchors >= FEWEST_ANCHORS);
                     prop_assert!(model.scratch_len(choice.max_anchors) <= ram);
                 }
-                Err(Infeasible { deciding, available, needed }) => {
+                Err(Infeasible { binding, available, needed }) => {
                     prop_assert!(needed > available);
                     let mut enough = limits;
-                    let limit = match deciding {
-                        Deciding::Ram => &mut enough.ram_bytes,
-                        Deciding::Flash => &mut enough.flash_bytes,
+                    let limit = match binding {
+                        BindingLimit::Ram => &mut enough.ram_bytes,
+                        BindingLimit::Flash => &mut enough.flash_bytes,
                         _ => &mut enough.frame_instructions,
                     };
                     *limit = Some(needed + 1);
                     let again = choose(&enough);
-                    prop_assert!(again.as_ref().err().is_none_or(|error| error.deciding != deciding), "{again:?}");
+                    prop_assert!(again.as_ref().err().is_none_or(|error| error.binding != binding), "{again:?}");
                 }
             }
         }
@@ -245,6 +245,6 @@ mod tests {
     #[test]
     fn without_limits_the_widest_model_has_no_cap() {
         let choice = choose(&Limits::default()).unwrap();
-        assert_eq!((choice.feature_dim, choice.max_anchors, choice.deciding), (32, usize::MAX, Deciding::Nothing));
+        assert_eq!((choice.feature_dim, choice.max_anchors, choice.binding), (32, usize::MAX, BindingLimit::Nothing));
     }
 }

@@ -6,12 +6,12 @@
 mod choice;
 mod fitting;
 
-pub use choice::{Choice, Deciding, Infeasible, choose};
+pub use choice::{BindingLimit, Infeasible, ModelChoice, choose};
 pub use fitting::{Fitted, NoFit, fitted};
 
 use serde::{Deserialize, Serialize};
 
-use crate::instructions;
+use crate::instructions::InstructionSet;
 
 /// What a device has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -37,7 +37,7 @@ impl Limits {
 /// A kind of processor, with the frame that it is meant for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Target {
+pub enum Processor {
     /// A Cortex-M4 with FPU: frames of 80 million instructions.
     CortexM4,
     /// A Cortex-M7: frames of 250 million instructions.
@@ -46,7 +46,7 @@ pub enum Target {
     Riscv32imac,
 }
 
-impl Target {
+impl Processor {
     /// Instructions of a frame at most.
     pub fn frame_instructions(self) -> u64 {
         match self {
@@ -56,11 +56,11 @@ impl Target {
         }
     }
 
-    /// Whose costs it has.
-    pub fn costs(self) -> instructions::Target {
+    /// Instructions whose costs it has.
+    pub fn instruction_set(self) -> InstructionSet {
         match self {
-            Self::CortexM4 | Self::CortexM7 => instructions::Target::CortexM,
-            Self::Riscv32imac => instructions::Target::RiscV32,
+            Self::CortexM4 | Self::CortexM7 => InstructionSet::CortexM,
+            Self::Riscv32imac => InstructionSet::RiscV32,
         }
     }
 }

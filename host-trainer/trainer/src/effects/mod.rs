@@ -11,9 +11,9 @@ mod search;
 
 use std::fmt;
 
-pub use pilot::{Drawing, LEAST_ITERATIONS, PilotCapture, measure};
+pub use pilot::{LEAST_ITERATIONS, PilotCapture, PilotDevice, measure};
 pub use price::{Price, Worth, choose};
-pub use request::{NoRequest, Request};
+pub use request::{ParseEffectsError, Request};
 pub use search::{Trial, Trials};
 
 use crate::train::TrainConfig;

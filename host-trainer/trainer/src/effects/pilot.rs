@@ -5,7 +5,7 @@ use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, MaxSplats};
 use super::search::{Trials, search};
 use super::{Effect, Price, Worth};
 use crate::camera::core_camera;
-use crate::device::Target;
+use crate::device::Processor;
 use crate::instructions::predict;
 use crate::metrics::psnr_db_masked;
 use crate::render::decoder::image_of;
@@ -73,11 +73,11 @@ fn halved(view: &View) -> View {
 
 /// For which device pilots are drawn.
 #[derive(Clone, Copy, Debug)]
-pub struct Drawing {
+pub struct PilotDevice {
     /// Scratch memory of the decoder, bytes; without limit where there is none.
     pub ram_bytes: Option<u64>,
     /// Whose instructions count.
-    pub target: Target,
+    pub target: Processor,
 }
 
 /// Trains pilots without effects, with each and with those that gained something, less what does not pay among them; says what each was
@@ -95,7 +95,7 @@ pub fn measure<E: From<TrainError> + From<DecodeError>>(
     capture: &PilotCapture,
     config: &TrainConfig,
     price: &Price,
-    drawing: Drawing,
+    device: PilotDevice,
     mut encode: impl FnMut(Finished, &Capture) -> Result<Vec<u8>, E>,
     mut begins: impl FnMut(&[Effect]),
 ) -> Result<Trials, E> {
@@ -104,7 +104,7 @@ pub fn measure<E: From<TrainError> + From<DecodeError>>(
         let mut trainer = Trainer::new(&capture.reduced, pilot_config(config, effects))?;
         trainer.run(&mut Silent)?;
         let bytes = encode(trainer.finish()?, &capture.reduced)?;
-        Ok(worth(&bytes, capture, drawing)?)
+        Ok(worth(&bytes, capture, device)?)
     };
     search(price, |effects, seed| worth_of(effects, &TrainConfig { seed: config.seed ^ seed, ..*config }))
 }
@@ -118,14 +118,14 @@ fn pilot_config(config: &TrainConfig, effects: &[Effect]) -> TrainConfig {
 }
 
 /// What a pilot's bundle is worth on the views that were held out of it.
-fn worth(bytes: &[u8], capture: &PilotCapture, drawing: Drawing) -> Result<Worth, DecodeError> {
+fn worth(bytes: &[u8], capture: &PilotCapture, device: PilotDevice) -> Result<Worth, DecodeError> {
     let bundle = Bundle::parse(bytes)?;
     let (mut psnr_db, mut instructions) = (0.0, 0.0);
     let n = capture.reduced.test.len() as f64;
-    draw(&bundle, &capture.reduced.test, drawing, |view, image, _| {
+    draw(&bundle, &capture.reduced.test, device, |view, image, _| {
         psnr_db += psnr_db_masked(&image, &view.image, view.mask.as_ref()) / n;
     })?;
-    draw(&bundle, &capture.held_out, drawing, |_, _, frame_instructions| instructions += frame_instructions / n)?;
+    draw(&bundle, &capture.held_out, device, |_, _, frame_instructions| instructions += frame_instructions / n)?;
     Ok(Worth { psnr_db, instructions, bytes: bytes.len() })
 }
 
@@ -133,13 +133,13 @@ fn worth(bytes: &[u8], capture: &PilotCapture, drawing: Drawing) -> Result<Worth
 fn draw(
     bundle: &Bundle<'_>,
     views: &[View],
-    drawing: Drawing,
+    device: PilotDevice,
     mut drawn: impl FnMut(&View, Image, f64),
 ) -> Result<(), DecodeError> {
     let cameras = views.iter().map(|view| core_camera(&view.camera)).collect::<Result<Vec<_>, _>>()?;
     let largest = |side: fn(&Camera) -> u16| cameras.iter().map(side).max().unwrap_or(1);
     let frame = Budget::for_frame(largest(|camera| camera.width_px), largest(|camera| camera.height_px));
-    let limited = drawing.ram_bytes.map(|ram| frame.in_bytes(usize::try_from(ram).unwrap_or(usize::MAX)));
+    let limited = device.ram_bytes.map(|ram| frame.in_bytes(usize::try_from(ram).unwrap_or(usize::MAX)));
     // A pilot for which the memory does not suffice is measured as if it did; the run's scene will be cut until it does.
     let plan = match limited.map(|budget| bundle.plan(&budget)) {
         Some(Ok(plan)) => plan,
@@ -150,7 +150,7 @@ fn draw(
     for (view, camera) in views.iter().zip(&cameras) {
         let (image, report) = image_of(&mut decoder, camera)?;
         let size_px = [camera.width_px, camera.height_px];
-        drawn(view, image, predict(drawing.target.costs(), bundle, &plan, &report, size_px).iter().sum());
+        drawn(view, image, predict(device.target.instruction_set(), bundle, &plan, &report, size_px).iter().sum());
     }
     Ok(())
 }
@@ -199,11 +199,11 @@ mod tests {
                 write(&finished.scene, &info, &WriteOptions::default())?.bytes,
             )
         };
-        let drawing = Drawing { ram_bytes: None, target: Target::CortexM4 };
+        let device = PilotDevice { ram_bytes: None, target: Processor::CortexM4 };
         let dear = Price { effect_db: 1e3, ..Price::default() };
         let mut begun = Vec::new();
         let begins = |effects: &[Effect]| begun.push(Effect::names(effects));
-        let trials = measure(&pilots, &tiny_config(160), &dear, drawing, encode, begins).expect("pilots");
+        let trials = measure(&pilots, &tiny_config(160), &dear, device, encode, begins).expect("pilots");
         assert_eq!(begun, ["none", "none", "view-colour", "view-geometry", "detail", "anisotropy"]);
         assert!(trials.chance_db > 0.0, "two seeds, two scenes");
         assert!(trials.each.iter().all(|trial| trial.worth.instructions > 0.0 && trial.worth.psnr_db.is_finite()));

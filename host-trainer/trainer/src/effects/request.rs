@@ -13,9 +13,9 @@ pub enum Request {
     Forced(Vec<(Effect, bool)>),
 }
 
-/// Text that asks for nothing that there is.
+/// Malformed `--effects` list.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum NoRequest {
+pub enum ParseEffectsError {
     /// No effect has that name.
     #[error("there is no effect `{name}`; needs auto, or a list of none, all, and +NAME or -NAME with NAME of {known}")]
     Unknown {
@@ -33,9 +33,9 @@ pub enum NoRequest {
 }
 
 impl FromStr for Request {
-    type Err = NoRequest;
+    type Err = ParseEffectsError;
 
-    fn from_str(text: &str) -> Result<Self, NoRequest> {
+    fn from_str(text: &str) -> Result<Self, ParseEffectsError> {
         let items: Vec<&str> = text.split(',').map(str::trim).collect();
         if items == ["auto"] {
             return Ok(Self::Auto);
@@ -48,7 +48,7 @@ impl FromStr for Request {
         let mut said: Vec<(Effect, bool)> = Vec::new();
         for item in named {
             if let Some(word) = ["auto", "none", "all"].into_iter().find(|word| word == item) {
-                return Err(NoRequest::Misplaced(word));
+                return Err(ParseEffectsError::Misplaced(word));
             }
             let (name, on) = match item.strip_prefix('-') {
                 Some(name) => (name, false),
@@ -56,10 +56,10 @@ impl FromStr for Request {
             };
             let effect = Effect::ALL.into_iter().find(|effect| effect.name() == name).ok_or_else(|| {
                 let known = Effect::ALL.map(Effect::name).join(", ");
-                NoRequest::Unknown { name: (*item).to_owned(), known }
+                ParseEffectsError::Unknown { name: (*item).to_owned(), known }
             })?;
             if said.iter().any(|(other, _)| *other == effect) {
-                return Err(NoRequest::Twice(effect.name()));
+                return Err(ParseEffectsError::Twice(effect.name()));
             }
             said.push((effect, on));
         }

@@ -4,7 +4,7 @@ use pocketsplat_core::context::Context;
 
 use super::config::TrainConfig;
 use super::{TrainError, Trainer, context_start};
-use crate::integer_model::{self, IntegerModelError};
+use crate::integer_model;
 use crate::ops::noise::Stream;
 use crate::scene::{Head, Scene};
 use crate::step::Phase;
@@ -21,23 +21,22 @@ impl Integers {
     /// Of the scene's context model.
     ///
     /// # Errors
-    /// [`TrainError::Context`] when there is none, or a weight has no integer form.
+    /// [`TrainError::NoContext`] when there is none, [`TrainError::IntegerModel`] when a weight has no integer form.
     pub(super) fn of(scene: &Scene<f32>) -> Result<Self, TrainError> {
         let n_channels = scene.shape.values_per_anchor();
-        let model = scene.context.as_ref().ok_or_else(|| TrainError::Context("the scene has none".to_owned()))?;
-        let refused = |error: IntegerModelError| TrainError::Context(error.to_string());
+        let model = scene.context.as_ref().ok_or(TrainError::NoContext)?;
         Ok(Self {
-            section: integer_model::section(model, n_channels).map_err(refused)?,
-            network: integer_model::rounded(model, n_channels).map_err(refused)?,
+            section: integer_model::section(model, n_channels)?,
+            network: integer_model::rounded(model, n_channels)?,
         })
     }
 
     /// What a decoder makes of the bytes.
     ///
     /// # Errors
-    /// As [`Self::of`].
+    /// [`TrainError::IntegersUnread`].
     pub(super) fn context(&self, scene: &Scene<f32>) -> Result<Context<'_>, TrainError> {
-        integer_model::parse(&self.section, &scene.shape).map_err(|error| TrainError::Context(error.to_string()))
+        Ok(integer_model::parse(&self.section, &scene.shape)?)
     }
 }
 

@@ -38,7 +38,7 @@ impl Trainer<'_> {
     /// Cost: one forward pass over the views.
     ///
     /// # Errors
-    /// [`TrainError::Context`] when the context model has no integer form.
+    /// [`TrainError::NoContext`] or [`TrainError::IntegerModel`] when the context model has no integer form.
     pub fn finish(&self) -> Result<Finished, TrainError> {
         let mut scene = self.scene.clone();
         let integers = scene.context.is_some().then(|| Integers::of(&scene)).transpose()?;

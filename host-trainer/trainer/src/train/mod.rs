@@ -104,7 +104,7 @@ impl<'a> Trainer<'a> {
 
     /// Everything but anchors and what belongs to them.
     fn without_scene(capture: &'a Capture, config: TrainConfig) -> Result<Self, TrainError> {
-        config.validate().map_err(TrainError::Config)?;
+        config.validate()?;
         if capture.train.is_empty() {
             return Err(TrainError::NoViews);
         }

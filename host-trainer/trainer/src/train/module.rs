@@ -1,7 +1,7 @@
 //! Modules: improvements that plug into the training of any backbone.
 //!
-//! A module is a struct of settings in a file of this folder and a line in [`modules!`](Modules). Attached by name
-//! (`--modules distribution,pruning`), it may
+//! A module is a struct of settings in a file of this folder and a line in [`modules!`](Modules). Attached by `--modules`,
+//! or as an effect by `--effects`, it may
 //!
 //! * widen the model: [`Module::shape`] switches on heads of [`ModelShape`], which the optimiser moves, checkpoints keep, bundles
 //!   store and decoders evaluate as they do the others;
@@ -57,8 +57,8 @@
 //! impl Module for Short {}
 //! ```
 //!
-//! and `short: Short,` among the modules below. It then has a name, a place in configurations (`[train.modules.short]`), and its
-//! gradient is checked as the others' are, by a line in the tests of [`crate::step`].
+//! and `short: Short,` among the modules below. It then has a place in configurations, `[train.modules.short]`, and its gradient is
+//! checked as the others' are, by a line in the tests of [`crate::step`].
 
 pub mod detail;
 pub mod distribution;
@@ -68,6 +68,7 @@ use std::fmt::Debug;
 
 use serde::{Deserialize, Serialize};
 
+use super::config::ConfigError;
 use super::survey::Survey;
 use crate::ops::Pinhole;
 use crate::real::Real;
@@ -110,7 +111,7 @@ pub trait Module: Terms<f32> + Terms<f64> + Debug {
     ///
     /// # Errors
     /// Setting, value and accepted range.
-    fn check(&self) -> Result<(), String> {
+    fn check(&self) -> Result<(), ConfigError> {
         Ok(())
     }
 
@@ -139,34 +140,18 @@ macro_rules! modules {
         }
 
         impl Modules {
-            /// Names of all there are.
-            pub const NAMES: &'static [&'static str] = &[$(stringify!($name)),*];
-
-            /// Attaches a module with its default settings, unless it is attached already; `false` when none has that name.
-            pub fn attach(&mut self, name: &str) -> bool {
-                $(if name == stringify!($name) {
-                    self.$name.get_or_insert_default();
-                    return true;
-                })*
-                false
-            }
-
-            /// Names of the attached.
-            pub fn attached(&self) -> Vec<&'static str> {
-                let all = [$(self.$name.is_some().then_some(stringify!($name))),*];
-                all.into_iter().flatten().collect()
-            }
-
             /// The attached.
             pub fn each(&self) -> Vec<&dyn Module> {
-                let all: [Option<&dyn Module>; Self::NAMES.len()] = [$(self.$name.as_ref().map(|m| m as _)),*];
-                all.into_iter().flatten().collect()
+                let mut all: Vec<&dyn Module> = Vec::new();
+                $(all.extend(self.$name.as_ref().map(|module| module as &dyn Module));)*
+                all
             }
 
             /// The terms of the attached.
             pub fn terms<R: Real>(&self) -> Vec<&dyn Terms<R>> {
-                let all: [Option<&dyn Terms<R>>; Self::NAMES.len()] = [$(self.$name.as_ref().map(|m| m as _)),*];
-                all.into_iter().flatten().collect()
+                let mut all: Vec<&dyn Terms<R>> = Vec::new();
+                $(all.extend(self.$name.as_ref().map(|module| module as &dyn Terms<R>));)*
+                all
             }
         }
     };

@@ -1,6 +1,10 @@
 //! What a run gives back: to whom it reports, what an iteration did, why it stopped.
 
+use pocketsplat_core::DecodeError;
+
+use super::config::ConfigError;
 use super::watchdog::DroppedStep;
+use crate::integer_model::IntegerModelError;
 use crate::scene::Scene;
 use crate::step::StepReport;
 
@@ -22,22 +26,28 @@ pub struct Outcome {
     pub dropped: Option<DroppedStep>,
 }
 
-/// Why a run can not start, or go on.
+/// Why a run cannot start, or go on.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TrainError {
     /// A setting is out of range.
-    #[error("{0}")]
-    Config(String),
+    #[error(transparent)]
+    Config(#[from] ConfigError),
     /// No view to train on.
     #[error("the capture has no training view; check that its training split names images that exist")]
     NoViews,
     /// No point to start from.
     #[error("the capture has no point to start from; check its bounds")]
     NoPoints,
+    /// The scene has no context model.
+    #[error("the scene has no context model; train it with `train.backbone` hac")]
+    NoContext,
     /// The context model has no integer form.
-    #[error("the context model can not be written in integers: {0}; start anew with lower `train.rates` in a --config")]
-    Context(String),
+    #[error("the context model cannot be written in integers; start anew with lower `train.rates` in a --config")]
+    IntegerModel(#[from] IntegerModelError),
+    /// The integer form of the context model is not one that a decoder reads.
+    #[error("the integers of the context model cannot be read back; start anew with lower `train.rates` in a --config")]
+    IntegersUnread(#[from] DecodeError),
     /// The cause of dropped steps does not pass.
     #[error(
         "{n} steps in a row would have made parameters infinite or NaN and were dropped, the last one so: {last}; \

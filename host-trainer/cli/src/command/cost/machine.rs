@@ -4,7 +4,7 @@ use std::fmt;
 
 use clap::ValueEnum;
 use pocketsplat_trainer::cost::Measured;
-use pocketsplat_trainer::device::Target;
+use pocketsplat_trainer::device::Processor;
 
 /// Where frames are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -32,12 +32,12 @@ impl fmt::Display for Machine {
 
 impl Machine {
     /// The device that it is.
-    pub(crate) fn device(self) -> Option<Target> {
+    pub(crate) fn device(self) -> Option<Processor> {
         match self {
             Self::Host => None,
-            Self::CortexM4 => Some(Target::CortexM4),
-            Self::CortexM7 => Some(Target::CortexM7),
-            Self::Riscv32imac => Some(Target::Riscv32imac),
+            Self::CortexM4 => Some(Processor::CortexM4),
+            Self::CortexM7 => Some(Processor::CortexM7),
+            Self::Riscv32imac => Some(Processor::Riscv32imac),
         }
     }
 

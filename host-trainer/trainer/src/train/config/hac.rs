@@ -66,7 +66,7 @@ impl Hac {
     pub(super) fn ranges(&self) -> [(&'static str, f64, f64, f64); 11] {
         let QuantisationSteps { feature, log_scale, offset } = self.base_steps;
         [
-            ("--lambda", self.lambda, 0.0, 1e3),
+            ("train.hac.lambda", self.lambda, 0.0, 1e3),
             ("train.hac.noise_from", self.noise_from, 0.0, 1.0),
             ("train.hac.pause_until", self.pause_until, 0.0, 1.0),
             ("train.hac.context_from", self.context_from, self.noise_from, 1.0),

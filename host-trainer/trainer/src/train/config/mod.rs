@@ -1,9 +1,12 @@
 //! What a run is made of: numbers a user may set, with the method's defaults.
 
+mod error;
 mod hac;
 
 use serde::{Deserialize, Serialize};
 
+pub use error::ConfigError;
+pub(in crate::train) use error::within;
 pub use hac::{Backbone, Hac};
 
 use super::module::Modules;
@@ -213,15 +216,15 @@ impl TrainConfig {
     /// Refuses what no run can use, before any work starts.
     ///
     /// # Errors
-    /// A sentence that names the setting, its value and the accepted range.
-    pub fn validate(&self) -> Result<(), String> {
+    /// [`ConfigError`] with the key of the setting, its value and what is accepted.
+    pub fn validate(&self) -> Result<(), ConfigError> {
         self.modules.each().into_iter().try_for_each(|module| module.check())?;
-        within("--iterations", f64::from(self.iterations), 1.0, 10_000_000.0)?;
-        within("--feature-dim", self.shape.feature_dim as f64, 1.0, 256.0)?;
-        within("--offsets", self.shape.n_offsets as f64, 1.0, 32.0)?;
+        within("train.iterations", f64::from(self.iterations), 1.0, 10_000_000.0)?;
+        within("train.shape.feature_dim", self.shape.feature_dim as f64, 1.0, 256.0)?;
+        within("train.shape.n_offsets", self.shape.n_offsets as f64, 1.0, 32.0)?;
         within("train.shape.colour_hidden", self.shape.colour_hidden as f64, 0.0, 256.0)?;
         within("train.shape.detail_hidden", self.shape.detail_hidden as f64, 0.0, 256.0)?;
-        within("--voxel-size", self.voxel_size.unwrap_or(1e-3), 1e-6, 1.0)?;
+        within("train.voxel_size", self.voxel_size.unwrap_or(1e-3), 1e-6, 1.0)?;
         within(
             "train.densification.coarsest_cells",
             f64::from(self.densification.coarsest_cells.unwrap_or(1)),
@@ -229,11 +232,9 @@ impl TrainConfig {
             1e6,
         )?;
         // The largest integer of TOML, in which configurations are kept.
-        within("--seed", self.seed as f64, 0.0, i64::MAX as f64)?;
+        within("train.seed", self.seed as f64, 0.0, i64::MAX as f64)?;
         if self.validation_every == 1 {
-            return Err(
-                "--validation-every is 1, needs 0 (none) or at least 2: some views have to be trained on".into()
-            );
+            return Err(ConfigError::NoViewLeft);
         }
         for (name, value, low, high) in self.hac.ranges() {
             within(name, value, low, high)?;
@@ -252,10 +253,10 @@ impl TrainConfig {
             ("context", context),
             ("background", background),
         ] {
-            within(&format!("train.rates.{name}.start"), rate.start, 0.0, 10.0)?;
+            within(format!("train.rates.{name}.start"), rate.start, 0.0, 10.0)?;
             // A path to 0 has no logarithm; a rate that starts at 0 stays there.
             let least_end = if rate.start > 0.0 { f64::MIN_POSITIVE } else { 0.0 };
-            within(&format!("train.rates.{name}.end"), rate.end, least_end, 10.0)?;
+            within(format!("train.rates.{name}.end"), rate.end, least_end, 10.0)?;
         }
         within("train.loss.dssim", self.loss.dssim, 0.0, 1.0)?;
         within("train.loss.volume", self.loss.volume, 0.0, 1e6)?;
@@ -321,11 +322,6 @@ impl TrainConfig {
         let at = (share * f64::from(self.iterations)).round() as u32;
         at
     }
-}
-
-/// Refuses a setting outside its range; NaN is outside of all.
-pub(in crate::train) fn within(name: &str, value: f64, low: f64, high: f64) -> Result<(), String> {
-    if value >= low && value <= high { Ok(()) } else { Err(format!("{name} is {value}, needs {low} to {high}")) }
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use crate::ops::high_pass;
 use crate::real::Real;
 use crate::scene::ModelShape;
 use crate::step::{Moment, Pictures, Terms};
-use crate::train::config::within;
+use crate::train::config::{ConfigError, within};
 
 /// Adds a residual to each Gaussian's colour, H = x + F(x ⊕ f) (the plug-and-play paper, eq. 5; see [`crate::ops::detail`]).
 ///
@@ -29,7 +29,7 @@ impl Default for Detail {
 }
 
 impl Module for Detail {
-    fn check(&self) -> Result<(), String> {
+    fn check(&self) -> Result<(), ConfigError> {
         within("train.modules.detail.hidden", self.hidden as f64, 1.0, 256.0)?;
         within("train.modules.detail.weight", self.weight, 0.0, 1e3)
     }

@@ -8,7 +8,7 @@ use crate::ops::normality::{Moments, Weights};
 use crate::real::Real;
 use crate::scene::Scene;
 use crate::step::{Block, Moment, Terms};
-use crate::train::config::within;
+use crate::train::config::{ConfigError, within};
 
 /// Pulls the features of each channel, over the anchors of a view, towards the standard normal distribution, and their
 /// deviation towards 1 (the plug-and-play paper, eqs. 2 and 3, with P the normal distribution of the channel's moments).
@@ -31,7 +31,7 @@ impl Default for Distribution {
 }
 
 impl Module for Distribution {
-    fn check(&self) -> Result<(), String> {
+    fn check(&self) -> Result<(), ConfigError> {
         within("train.modules.distribution.divergence", self.divergence, 0.0, 1e3)?;
         within("train.modules.distribution.spread", self.spread, 0.0, 1e3)
     }

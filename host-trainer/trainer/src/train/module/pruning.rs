@@ -10,7 +10,7 @@ use crate::ops::opacity_target::forward_backward;
 use crate::real::Real;
 use crate::scene::Scene;
 use crate::step::{Block, Moment, Terms};
-use crate::train::config::within;
+use crate::train::config::{ConfigError, within};
 
 /// What the event does with the anchors it picks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -27,7 +27,7 @@ pub enum Form {
 /// Which anchors of the pool go.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Choice {
+pub enum PoolChoice {
     /// Any, at random from the run's seed (the paper).
     #[default]
     Random,
@@ -66,7 +66,7 @@ pub struct Pruning {
     /// Share of the anchors, lowest ranks first, from which the choice is made. Beyond it the rank decides.
     pub pool: f64,
     /// Which of the pool.
-    pub choice: Choice,
+    pub choice: PoolChoice,
     /// What anchors are ranked by.
     pub rank: Rank,
 }
@@ -81,7 +81,7 @@ impl Default for Pruning {
             form: Form::Hard,
             rate: 0.3,
             pool: 0.4,
-            choice: Choice::Random,
+            choice: PoolChoice::Random,
             rank: Rank::Opacity,
         }
     }
@@ -98,7 +98,7 @@ impl Pruning {
     /// deletes it, takes anchors that matter from the scene that is left.)
     pub fn tiered() -> Self {
         let hard = Self::default();
-        Self { form: Form::Tiered, rate: hard.pool, rank: Rank::Contribution, choice: Choice::Lowest, ..hard }
+        Self { form: Form::Tiered, rate: hard.pool, rank: Rank::Contribution, choice: PoolChoice::Lowest, ..hard }
     }
 
     /// The place of every anchor, 0 to 1: the share of the anchors that goes before it.
@@ -110,7 +110,7 @@ impl Pruning {
         let n = rank.len();
         let mut order: Vec<usize> = (0..n).collect();
         order.sort_by(|a, b| rank[*a].total_cmp(&rank[*b]));
-        if self.choice == Choice::Random {
+        if self.choice == PoolChoice::Random {
             order[..of_length(self.pool, n)].shuffle(rng);
         }
         let mut places = vec![0.0; n];
@@ -134,7 +134,7 @@ fn of_length(share: f64, n: usize) -> usize {
 }
 
 impl Module for Pruning {
-    fn check(&self) -> Result<(), String> {
+    fn check(&self) -> Result<(), ConfigError> {
         within("train.modules.pruning.weight", self.weight, 0.0, 1e6)?;
         within("train.modules.pruning.beta", self.beta, 0.0, 1.0)?;
         within("train.modules.pruning.from", self.from, 0.0, 1.0)?;
@@ -212,7 +212,7 @@ mod tests {
             assert!(*rank < 40.0 || (place - rank / 100.0).abs() < 1e-6, "beyond it the rank decides");
         }
         assert_ne!(random, places(&Pruning::default(), &rank, 2));
-        let lowest = places(&Pruning { choice: Choice::Lowest, ..Pruning::default() }, &rank, 1);
+        let lowest = places(&Pruning { choice: PoolChoice::Lowest, ..Pruning::default() }, &rank, 1);
         assert!(lowest.iter().zip(&rank).all(|(place, rank)| (place - rank / 100.0).abs() < 1e-6));
         assert!(places(&Pruning::default(), &[], 1).is_empty());
     }

@@ -1,4 +1,4 @@
-//! Why a run folder can not be used, each reason with its remedy.
+//! Why a run folder cannot be used, each reason with its remedy.
 
 use std::path::{Path, PathBuf};
 
@@ -62,7 +62,7 @@ pub enum RunError {
         path: PathBuf,
     },
     /// A sound checkpoint that does not fit.
-    #[error("can not go on from {}", path.display())]
+    #[error("cannot go on from {}", path.display())]
     Restore {
         /// The checkpoint.
         path: PathBuf,

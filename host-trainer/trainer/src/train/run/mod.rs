@@ -131,7 +131,7 @@ impl RunFolder {
     /// The configuration the run began with.
     ///
     /// # Errors
-    /// [`RunError::Io`] when it can not be read.
+    /// [`RunError::Io`] when it cannot be read.
     pub fn config(&self) -> Result<String, RunError> {
         let path = self.path.join(CONFIG);
         fs::read_to_string(&path).map_err(|source| RunError::io("read", &path, source))
@@ -149,7 +149,7 @@ impl RunFolder {
     /// log on the way.
     ///
     /// # Errors
-    /// [`RunError`] when something can not be written or the run diverges. The checkpoints so far stay.
+    /// [`RunError`] when something cannot be written or the run diverges. The checkpoints so far stay.
     pub fn train(
         &mut self,
         trainer: &mut Trainer<'_>,

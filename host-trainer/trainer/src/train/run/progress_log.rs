@@ -33,7 +33,7 @@ impl ProgressLog {
     /// after the checkpoint from which the run goes on, and will be written again.
     ///
     /// # Errors
-    /// [`RunError`] when it can not be read or written.
+    /// [`RunError`] when it cannot be read or written.
     pub fn open(path: &Path, done: u32, iterations: u32) -> Result<Self, RunError> {
         let older = match fs::read(path) {
             // A power cut may leave anything.

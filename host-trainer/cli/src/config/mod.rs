@@ -1,5 +1,9 @@
 //! The configuration of a run as TOML: written into its folder, read by `--config`.
 
+mod capture;
+mod effects;
+pub(crate) mod heading;
+
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
@@ -9,9 +13,10 @@ use pocketsplat_trainer::train::config::Backbone;
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
-use super::capture::CaptureOptions;
-use super::effects::EffectsConfig;
-use super::encode::Encoding;
+pub(crate) use capture::CaptureOptions;
+pub(crate) use effects::EffectsConfig;
+
+use crate::command::encode::Encoding;
 
 /// Everything a run was asked for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -50,7 +55,7 @@ impl RunConfig {
     pub(crate) fn read(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path);
         let text = text.with_context(|| format!("could not read the configuration {}", path.display()))?;
-        Self::parse(&text).with_context(|| format!("the configuration {} can not be used", path.display()))
+        Self::parse(&text).with_context(|| format!("the configuration {} cannot be used", path.display()))
     }
 
     /// As [`Self::read`], from its text.
@@ -97,7 +102,7 @@ impl RunConfig {
 
     /// Refuses what no run can use, before any work starts.
     pub(crate) fn check(&self) -> Result<()> {
-        self.train.validate().map_err(anyhow::Error::msg)?;
+        self.train.validate()?;
         self.encoding.validate()
     }
 

@@ -1,0 +1,76 @@
+//! How photographs are prepared: options of every command that reads a capture, and a section of a run's configuration.
+
+use pocketsplat_capture::dataset::{Background, FrameSize};
+use serde::{Deserialize, Serialize};
+
+use super::heading::INPUT;
+
+/// How photographs are prepared.
+#[derive(clap::Args, Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct CaptureOptions {
+    /// Longest side of the images in pixels, to which larger ones are reduced [default: their own size for train, the
+    /// training size of the bundle elsewhere]
+    #[arg(long, value_name = "PX", help_heading = INPUT)]
+    pub(crate) max_resolution: Option<u32>,
+    /// Size of a display, to which images are reduced and cut [default: as --max-resolution]
+    #[arg(long, value_name = "WxH", conflicts_with = "max_resolution", help_heading = INPUT)]
+    #[serde(default, with = "frame_size", skip_serializing_if = "Option::is_none")]
+    pub(crate) resolution: Option<FrameSize>,
+    /// Colour behind transparent images: black, white, or learned with the scene [default: black for train, the bundle's
+    /// elsewhere]
+    #[arg(long, value_name = "COLOUR", help_heading = INPUT)]
+    #[serde(default, with = "background_name", skip_serializing_if = "Option::is_none")]
+    pub(crate) background: Option<Background>,
+    /// Folder of images to read, for captures that hold several sizes [default: the only one, or images]
+    #[arg(long, value_name = "NAME", help_heading = INPUT, hide_short_help = true)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) images: Option<String>,
+    /// Hold out every N-th view for testing where the capture has no split of its own; 0 holds out none [default: 8]
+    #[arg(long, value_name = "N", help_heading = INPUT, hide_short_help = true)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) test_every: Option<u32>,
+}
+
+impl CaptureOptions {
+    /// What is chosen here, and what `other` chooses where nothing is.
+    pub(crate) fn or(&self, other: &Self) -> Self {
+        // One way to say the size replaces the other.
+        let size_said = self.max_resolution.is_some() || self.resolution.is_some();
+        let size = if size_said { self } else { other };
+        Self {
+            max_resolution: size.max_resolution,
+            resolution: size.resolution,
+            background: self.background.or(other.background),
+            images: self.images.clone().or_else(|| other.images.clone()),
+            test_every: self.test_every.or(other.test_every),
+        }
+    }
+}
+
+/// Sizes of frames as text.
+mod frame_size {
+    use pocketsplat_capture::dataset::FrameSize;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+
+    pub(super) fn serialize<S: Serializer>(size: &Option<FrameSize>, to: S) -> Result<S::Ok, S::Error> {
+        size.map(|size| size.to_string()).serialize(to)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Option<FrameSize>, D::Error> {
+        String::deserialize(from)?.parse().map(Some).map_err(de::Error::custom)
+    }
+}
+
+/// Backgrounds by name.
+mod background_name {
+    use pocketsplat_capture::dataset::Background;
+    use serde::{Deserialize, Deserializer, Serializer, de};
+
+    pub(super) fn serialize<S: Serializer>(background: &Option<Background>, to: S) -> Result<S::Ok, S::Error> {
+        to.collect_str(&background.unwrap_or_default())
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Background>, D::Error> {
+        String::deserialize(from)?.parse().map(Some).map_err(de::Error::custom)
+    }
+}

@@ -1,0 +1,38 @@
+//! Which setting no run can use.
+
+use std::borrow::Cow;
+
+/// A setting that no run can use, by its key in a configuration.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ConfigError {
+    /// A number is too small, too large or NaN.
+    #[error("{key} is {found}, needs {low} to {high}")]
+    OutOfRange {
+        /// The key.
+        key: Cow<'static, str>,
+        /// Its value.
+        found: f64,
+        /// The least that is accepted.
+        low: f64,
+        /// The most that is accepted.
+        high: f64,
+    },
+    /// Every training view would be held out.
+    #[error("train.validation_every is 1, needs 0 (none) or at least 2: some views have to be trained on")]
+    NoViewLeft,
+}
+
+/// Refuses a value outside its range; NaN is outside of all.
+pub(in crate::train) fn within(
+    key: impl Into<Cow<'static, str>>,
+    found: f64,
+    low: f64,
+    high: f64,
+) -> Result<(), ConfigError> {
+    if found >= low && found <= high {
+        Ok(())
+    } else {
+        Err(ConfigError::OutOfRange { key: key.into(), found, low, high })
+    }
+}

@@ -24,6 +24,7 @@ pub mod math;
 mod mlp;
 mod project;
 mod raster;
+pub mod rules;
 mod scene;
 mod stopwatch;
 

@@ -5,7 +5,7 @@ use super::shape::{FrameShape, Resident, ScratchShape};
 use super::work::{Work, decoding_macs};
 use crate::bundle::{Bundle, STRIPS, Tier, TierMeasures};
 use crate::error::{DecodeError, saturate};
-use crate::project::TILE_PX;
+use crate::rules::TILE_PX;
 
 /// What reading a baked Gaussian is worth in multiply-adds.
 const READING_MACS: u64 = 150;

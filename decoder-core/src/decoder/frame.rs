@@ -9,8 +9,9 @@ use crate::arithmetic::Arithmetic;
 use crate::budget::Overflow;
 use crate::camera::Camera;
 use crate::error::{DecodeError, Field, in_range, saturate};
-use crate::project::{TILE_PIXELS, TILE_PX, TileRect, View};
+use crate::project::{TILE_PIXELS, TileRect, View};
 use crate::raster::{BlendRule, EMPTY, TilePlace, blend_tile, finish_tile, sort_by_depth};
+use crate::rules::TILE_PX;
 use crate::stopwatch::{Stage, Stopwatch};
 
 impl<A: Arithmetic> Decoder<'_, '_, A> {

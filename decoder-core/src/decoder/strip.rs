@@ -2,7 +2,8 @@
 
 use core::ops::RangeInclusive;
 
-use crate::project::{TILE_PX, TileRect};
+use crate::project::TileRect;
+use crate::rules::TILE_PX;
 
 /// How a frame is cut into strips of whole rows of tiles.
 #[derive(Clone, Copy, Debug)]

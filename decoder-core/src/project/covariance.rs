@@ -1,9 +1,10 @@
 //! The covariance of a splat on the image plane.
 
 use super::view::dot;
+use crate::rules::DILATION_PX2;
 
-/// Added to both variances, so that no splat is thinner than about a pixel, px².
-pub(super) const DILATION: f32 = 0.3;
+/// Added to both variances, px².
+pub(super) const DILATION: f32 = DILATION_PX2 as f32;
 
 /// Σ' = P·Pᵀ + 0.3·I with P = J·R·S, the 2×3 map from the Gaussian's unit sphere to pixels.
 pub(super) struct Covariance {

@@ -1,13 +1,14 @@
 //! What a view can see: boxes of chunks, then anchors.
 
 use super::covariance::Covariance;
-use super::view::{NEAR, View};
+use super::view::View;
 use crate::bundle::{Bundle, Chunk};
 use crate::camera::Camera;
 use crate::error::DecodeError;
+use crate::rules::{self, NEAR};
 
-/// How far beyond its 3D extent a splat reaches on the image: √(2 ln 255 · 0.3) from the dilation, and rounding, pixels.
-pub(super) const DILATION_REACH_PX: f32 = 1.9;
+/// How far beyond its 3D extent a splat reaches on the image, pixels.
+pub(super) const DILATION_REACH_PX: f32 = rules::DILATION_REACH_PX as f32;
 
 /// The chunks of the first `tiers` tiers that a frame of `camera` needs: those whose ink box it can see, in file order.
 ///

@@ -15,5 +15,5 @@ pub use cull::chunks_in_view;
 pub(crate) use packed::SplatRecord;
 pub use packed::{Packed28, Wide};
 pub(crate) use splat::Splat;
-pub(crate) use tile::{TILE_PIXELS, TILE_PX, TileRect};
+pub(crate) use tile::{TILE_PIXELS, TileRect};
 pub(crate) use view::{View, log_cut};

@@ -4,9 +4,10 @@ use bytemuck::{Pod, Zeroable};
 
 use super::covariance::Covariance;
 use super::tile::TileRect;
-use super::view::{NEAR, View};
+use super::view::View;
 use crate::bundle::Effects;
 use crate::math::functions::Functions;
+use crate::rules::NEAR;
 use crate::scene::Gaussian;
 
 /// A projected Gaussian.

@@ -2,8 +2,8 @@
 
 use bytemuck::{Pod, Zeroable};
 
-/// Edge of a tile, pixels.
-pub(crate) const TILE_PX: u16 = 16;
+use crate::rules::TILE_PX;
+
 /// Pixels of a tile.
 pub(crate) const TILE_PIXELS: usize = TILE_PX as usize * TILE_PX as usize;
 

@@ -3,9 +3,6 @@
 use crate::camera::Camera;
 use crate::error::DecodeError;
 
-/// Nothing nearer than this is drawn, normalised units.
-pub(super) const NEAR: f32 = 0.2;
-
 /// Beyond the image by this part of its size the Jacobian stops growing.
 const CLAMP_MARGIN: f32 = 0.15;
 

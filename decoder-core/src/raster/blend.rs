@@ -2,13 +2,11 @@
 
 use crate::math::exp;
 use crate::math::functions::Functions;
-use crate::project::{Splat, SplatRecord, TILE_PX, TileRect, log_cut};
+use crate::project::{Splat, SplatRecord, TileRect, log_cut};
+use crate::rules::{self, TILE_PX};
 
-/// No splat is opaque; it keeps the light behind it computable.
-const ALPHA_MAX: f32 = 0.99;
-/// A splat that would leave less light than this is left out, and the pixel is finished, as in training: all later splats
-/// together move a channel by less than half a step of 8 bits.
-const TRANSMITTANCE_MIN: f32 = 1e-4;
+const ALPHA_MAX: f32 = rules::ALPHA_MAX as f32;
+const TRANSMITTANCE_MIN: f32 = rules::TRANSMITTANCE_MIN as f32;
 
 /// Which contributions are left out.
 pub(crate) struct BlendRule {

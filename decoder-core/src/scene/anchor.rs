@@ -2,6 +2,7 @@
 
 use crate::bundle::Header;
 use crate::math::functions::Functions;
+use crate::rules;
 
 /// One decoded anchor.
 #[derive(Clone, Copy, Debug)]
@@ -20,8 +21,7 @@ pub(crate) struct Anchor<'r> {
     pub(crate) mask: u32,
 }
 
-/// Even an opaque Gaussian is fainter than 1/255 beyond √(2 ln 255) = 3.329 deviations.
-const INK_DEVIATIONS: f32 = 3.33;
+const INK_DEVIATIONS: f32 = rules::INK_DEVIATIONS as f32;
 
 impl<'r> Anchor<'r> {
     /// Names the parts of a row of channels; `None` when the row is too short.

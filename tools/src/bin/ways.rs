@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use anyhow::ensure;
 use clap::Parser;
 use pocketsplat_capture::dataset::{self, LoadOptions};
+use pocketsplat_core::bundle::STRIPS;
 use pocketsplat_core::{Budget, Bundle, Camera, Decoder, FrameReport, Residency, Strips, TileSink};
 use pocketsplat_trainer::bundle;
 use pocketsplat_trainer::camera::core_camera;
@@ -59,7 +60,7 @@ fn main() -> anyhow::Result<()> {
     let mut ways = Vec::new();
     let baked = bundle.n_gaussians(0).map(|_| Residency::Baked);
     for residency in baked.into_iter().chain([Residency::Resident, Residency::Streamed]) {
-        for n_strips in [1, 2, 4, 8] {
+        for n_strips in STRIPS {
             let budget = Budget::for_frame(width_px, height_px)
                 .with_tiers(args.tiers)
                 .with_residency(residency)

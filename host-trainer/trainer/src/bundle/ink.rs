@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use pocketsplat_core::bundle::InkFrame;
+use pocketsplat_core::rules::INK_DEVIATIONS;
 
 use super::quantise::Rows;
-use crate::ops::prefilter::INK_DEVIATIONS;
 use crate::scene::ModelShape;
 
 /// Rounding of a float32 and then some, relative to the largest coordinate.

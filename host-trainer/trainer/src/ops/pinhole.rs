@@ -2,10 +2,10 @@
 
 use crate::real::Real;
 use pocketsplat_capture::camera::Camera;
+use pocketsplat_core::rules;
 
-/// Centres at this depth or nearer are not drawn, normalised units (method constant of 3DGS): the f32 nearest to 0.2, so
-/// that every precision draws the same.
-pub const NEAR: f64 = 0.2_f32 as f64;
+/// Centres at this depth or nearer are not drawn, normalised units: the same number in every precision.
+pub const NEAR: f64 = rules::NEAR as f64;
 
 /// A pinhole camera in the number type of the operations; conventions of [`Camera`].
 #[derive(Clone, Copy, Debug)]

@@ -1,15 +1,11 @@
 //! Which anchors a view may show.
 
+use pocketsplat_core::rules::{DILATION_PX2, DILATION_REACH_PX, INK_DEVIATIONS};
+
 use super::Pinhole;
 use super::pinhole::NEAR;
-use super::project::DILATION_PX2;
 use crate::real::Real;
 use crate::scene::Scene;
-
-/// A splat of opacity 1 falls to 1/255 at √(2 ln 255) = 3.3290 deviations; the rest covers rounding.
-pub const INK_DEVIATIONS: f64 = 3.33;
-/// √(2 ln 255 · 0.3) from the dilation, and rounding, pixels.
-const DILATION_REACH_PX: f64 = 1.9;
 
 /// Whether the view draws anything of an anchor: by [`anchor_is_visible`] where the heads see the view; where they don't, by
 /// `offset_reaches`, which leaves nothing out, because a decoder that evaluates such Gaussians once knows no anchors any more.

@@ -1,13 +1,12 @@
 //! From a 3-D Gaussian to its splat on the image plane.
 
+use pocketsplat_core::rules::DILATION_PX2;
+
 use super::Pinhole;
 use super::neural_gaussians::Gaussian;
 use super::pinhole::NEAR;
 use crate::real::Real;
 use crate::real::per_axis;
-
-/// Low-pass term added to both diagonal entries of a projected covariance, px² (3DGS).
-pub const DILATION_PX2: f64 = 0.3;
 
 /// A contribution below one 8-bit step is not drawn, in training as in the decoder (Kerbl et al. 2023).
 pub const ALPHA_CUTOFF: f64 = 1.0 / 255.0;

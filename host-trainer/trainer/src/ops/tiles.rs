@@ -1,12 +1,13 @@
 //! Which splats each tile draws, in which order.
 
+use pocketsplat_core::rules;
 use rayon::prelude::*;
 
 use super::project::{Footprint, Splat};
 use crate::real::Real;
 
 /// Edge of a tile, pixels; one row of a tile is one vector of the rasteriser.
-pub const TILE_PX: usize = 16;
+pub const TILE_PX: usize = rules::TILE_PX as usize;
 
 /// A splat in the list of one tile.
 ///

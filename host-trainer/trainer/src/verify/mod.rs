@@ -4,6 +4,7 @@
 
 mod trial;
 
+use pocketsplat_core::bundle::STRIPS;
 use pocketsplat_core::{
     Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, MaxSplats, Overflow, Plan, Residency, Strips, Work,
 };
@@ -15,7 +16,7 @@ const FILLS: [(u8, usize); 5] = [(0x00, 0), (0xFF, 0), (0x5A, 1), (0x11, 2), (0x
 
 /// Every way to draw what `budget` says that `bundle` has: residency and strips, whatever its limit of memory.
 pub fn ways(bundle: &Bundle<'_>, budget: Budget) -> impl Iterator<Item = Budget> + use<> {
-    let strips = [1, 2, 4, 8].map(Strips::Exactly);
+    let strips = STRIPS.map(Strips::Exactly);
     let baked = bundle.n_gaussians(0).map(|_| Residency::Baked);
     baked
         .into_iter()

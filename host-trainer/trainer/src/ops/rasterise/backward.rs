@@ -1,8 +1,9 @@
 //! From the pixels' gradient to the splats'.
 
+use pocketsplat_core::rules::ALPHA_MAX;
 use rayon::prelude::*;
 
-use super::row::{ALPHA_MAX, LOOK_EVERY, Row, alpha_row, draws_nothing, mark_dead, reduce, step_row};
+use super::row::{LOOK_EVERY, Row, alpha_row, draws_nothing, mark_dead, reduce, step_row};
 use super::{TILE_VALUES, Tile, TileSplat, TiledImage};
 use crate::ops::project::{Footprint, Splat};
 use crate::ops::simd::Level;

@@ -1,13 +1,10 @@
 //! The arithmetic of one row of a tile: alpha, transmittance, the stop rule.
 
+use pocketsplat_core::rules::{ALPHA_MAX, TRANSMITTANCE_MIN};
+
 use crate::ops::project::{ALPHA_CUTOFF, Splat};
 use crate::ops::tiles::TILE_PX;
 use crate::real::Real;
-
-/// Largest opacity of one contribution.
-pub(super) const ALPHA_MAX: f64 = 0.99;
-/// A pixel stops before its transmittance falls below this: what lies behind moves no 8-bit channel by half a step.
-const TRANSMITTANCE_STOP: f64 = 1e-4;
 
 /// One row of a tile: one vector.
 pub(super) type Row<R> = [R; TILE_PX];
@@ -67,7 +64,7 @@ pub(super) fn step_row<R: Real>(alpha: &mut Row<R>, transmittance: &mut Row<R>) 
         let t = transmittance[i];
         let after = t * (R::ONE - alpha[i]);
         let live = t > R::ZERO;
-        let draws = live & (after >= R::real(TRANSMITTANCE_STOP));
+        let draws = live & (after >= R::real(TRANSMITTANCE_MIN));
         alpha[i] = if draws { alpha[i] } else { R::ZERO };
         weight[i] = alpha[i] * t;
         transmittance[i] = if draws {

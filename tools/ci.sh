@@ -103,15 +103,23 @@ job_test() {
   cargo test -p pocketsplat-core --no-default-features --lib --locked bundle::features
 }
 
+# Without any cargo feature, with each, with every pair and with all.
 job_core-embedded() {
   need_embedded_target
-  local features
-  for features in "" defmt embedded-graphics defmt,embedded-graphics context detail anisotropy baked \
-    view,dilation-compensation anisotropy,baked default; do
+  local all sets=("") i j features
+  mapfile -t all < <(sed -n '/^\[features\]/,/^\[d/s/^\([a-z-]*\) = .*/\1/p' decoder-core/Cargo.toml | grep -vx default)
+  [ ${#all[@]} -le 6 ] || fail "pocketsplat-core has ${#all[@]} cargo features, six at most: ${all[*]}"
+  for ((i = 0; i < ${#all[@]}; i++)); do
+    sets+=("${all[i]}")
+    for ((j = 0; j < i; j++)); do sets+=("${all[j]},${all[i]}"); done
+  done
+  sets+=("$(IFS=, && echo "${all[*]}")")
+  for features in "${sets[@]}"; do
     echo "-- features: ${features:-none}"
-    cargo clippy -p pocketsplat-core --target "$embedded_target" --no-default-features --features "$features" --locked \
+    cargo clippy -q -p pocketsplat-core --target "$embedded_target" --no-default-features --features "$features" --locked \
       -- -D warnings
   done
+  echo "${#sets[@]} sets of features: none, each, every pair, all"
 }
 
 # The annotated bundle in the format's description is what the writer writes today, and so are the decoder's tables.

@@ -50,15 +50,14 @@ impl Features {
 
     /// What this decoder is built with, a bit for each.
     const BUILT: u32 = {
-        let view = cfg!(feature = "view");
         let effects = Effects {
-            view_colour: view,
-            view_geometry: view,
-            view_distance: view,
-            dilation_compensation: cfg!(feature = "dilation-compensation"),
+            view_colour: true,
+            view_geometry: true,
+            view_distance: true,
+            dilation_compensation: true,
             detail: cfg!(feature = "detail"),
             anisotropic: cfg!(feature = "anisotropy"),
-            background: cfg!(feature = "background"),
+            background: true,
         };
         let built = Self { effects, masks: true, context: cfg!(feature = "context"), coded_heads: true };
         built.to_bits()
@@ -142,16 +141,7 @@ mod tests {
     #[test]
     fn what_a_decoder_is_built_without_is_named() {
         let text = |missing_bits| DecodeError::NotBuilt { missing_bits }.to_string();
-        let all = [
-            (1, "view"),
-            (2, "view"),
-            (1024, "view"),
-            (4, "dilation-compensation"),
-            (16, "context"),
-            (64, "detail"),
-            (128, "anisotropy"),
-            (256, "background"),
-        ];
+        let all = [(16, "context"), (64, "detail"), (128, "anisotropy")];
         for (bits, name) in all {
             assert!(text(bits).contains(name), "{bits:#b}: {}", text(bits));
         }

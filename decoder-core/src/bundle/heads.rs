@@ -10,7 +10,7 @@ use crate::error::{DecodeError, Field, SectionKind, saturate};
 use crate::math::{from_half, is_finite_half};
 
 /// Matrices of all heads at most: W1 and W2 of opacity, covariance, colour, detail.
-const N_MATRICES: usize = 8;
+const N_MATRICES: usize = if cfg!(feature = "detail") { 8 } else { 6 };
 
 /// IEEE half-precision numbers in flash, each read when asked for.
 #[derive(Clone, Copy, Debug, Default)]
@@ -107,7 +107,8 @@ impl<'a> HeadsView<'a> {
             shape(header.colour_inputs(), header.colour_hidden, k.saturating_mul(3)),
             shape(usize::from(header.feature_dim).saturating_add(3), header.detail_hidden, 3),
         ];
-        let n_heads = if effects.detail { 4 } else { 3 };
+        let has_detail = cfg!(feature = "detail") && effects.detail;
+        let n_heads = if has_detail { 4 } else { 3 };
         let heads = all.get_mut(..n_heads).unwrap_or_default();
         let matrices = if header.features.coded_heads {
             let tables = CodedHeads::parse_tables(&mut cursor)?;
@@ -128,7 +129,7 @@ impl<'a> HeadsView<'a> {
             Matrices::Raw(matrices)
         };
         let [opacity, covariance, colour, detail] = all;
-        let detail = effects.detail.then_some(detail);
+        let detail = has_detail.then_some(detail);
         let heads = Self { opacity, covariance, colour, detail, matrices };
         heads.check()?;
         Ok(heads)

@@ -101,7 +101,7 @@ impl<A: Arithmetic> Decoder<'_, '_, A> {
         let quality = self.plan.budget().quality;
         let rule = BlendRule::new(quality.alpha_cut, quality.transmittance_stop);
         let header = self.bundle.header();
-        let has_background = cfg!(feature = "background") && header.features.effects.background;
+        let has_background = header.features.effects.background;
         let background = has_background.then(|| header.background.map(|byte| f32::from(byte) / 255.0));
         let rows = (0..).zip(tiles_along(camera.height_px));
         for (row, (y_px, height)) in rows.take(strip.end_row.into()).skip(strip.first_row.into()) {

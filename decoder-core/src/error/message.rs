@@ -19,14 +19,7 @@ impl fmt::Display for DecodeError {
                     f,
                     "the bundle needs what this decoder was built without; build pocketsplat-core with the features"
                 )?;
-                let names = [
-                    (0b100_0000_0011, "view"),
-                    (0b100, "dilation-compensation"),
-                    (0b1_0000, "context"),
-                    (0b100_0000, "detail"),
-                    (0b1000_0000, "anisotropy"),
-                    (0b1_0000_0000, "background"),
-                ];
+                let names = [(0b1_0000, "context"), (0b100_0000, "detail"), (0b1000_0000, "anisotropy")];
                 for (_, name) in names.into_iter().filter(|(bits, _)| missing_bits & bits != 0) {
                     write!(f, " {name}")?;
                 }

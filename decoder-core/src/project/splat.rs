@@ -53,7 +53,7 @@ impl View {
             Covariance::of_ball(self.slopes(point), self.focal_px.map(|f| f / depth * deviation))
         };
         let mut opacity = gaussian.opacity;
-        if cfg!(feature = "dilation-compensation") && effects.dilation_compensation {
+        if effects.dilation_compensation {
             opacity *= libm::sqrtf(covariance.det_bare / covariance.det);
         }
         let log_opacity = F::ln(opacity + self.lost_opacity);

@@ -129,9 +129,8 @@ fn fill_inputs(anchor: &Anchor<'_>, effects: Effects, eye: [f32; 3], inputs: &mu
     let [dx, dy, dz] = [ax - ex, ay - ey, az - ez];
     let distance = libm::sqrtf(dx * dx + dy * dy + dz * dz);
     let direction = if distance > 0.0 { [dx, dy, dz].map(|d| d / distance) } else { [0.0; 3] };
-    let direction = direction.iter().take(if cfg!(feature = "view") { 3 } else { 0 });
-    let distance = core::iter::once(&distance).take((cfg!(feature = "view") && effects.view_distance).into());
-    for (input, &value) in inputs.iter_mut().zip(anchor.feature.iter().chain(distance).chain(direction)) {
+    let distance = effects.view_distance.then_some(&distance);
+    for (input, &value) in inputs.iter_mut().zip(anchor.feature.iter().chain(distance).chain(&direction)) {
         *input = value;
     }
 }

@@ -105,7 +105,7 @@ pub(crate) fn finish_tile(place: TilePlace, pixels: &[Pixel], background: Option
 
 /// Rounds what `colour` makes of each pixel to bytes.
 fn finish(place: TilePlace, pixels: &[Pixel], rgb: &mut [[u8; 3]], colour: impl Fn(Pixel) -> [f32; 3]) {
-    let rows = pixels.chunks_exact(TILE_PX.into());
+    let (rows, _) = pixels.as_chunks::<{ TILE_PX as usize }>();
     let out_rows = rgb.chunks_exact_mut(usize::from(place.width).max(1));
     for (out_row, row) in out_rows.zip(rows).take(place.height.into()) {
         for (out, pixel) in out_row.iter_mut().zip(row) {

@@ -2,7 +2,8 @@
 
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_core::Bundle;
-use pocketsplat_trainer::bundle::{self, CodedScene, Coder, WriteOptions, manifest};
+use pocketsplat_trainer::bundle::{self, CodedScene, Coder, WriteOptions};
+use pocketsplat_trainer::manifest;
 
 use crate::frame::info_for;
 use crate::scenes::{Case, cameras, masked, random_scene, with_context};

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use pocketsplat_core::bundle::crc32;
 use pocketsplat_core::{Budget, Bundle, Camera, MaxSplats, Overflow, Plan};
-use pocketsplat_trainer::verify::{Trial, ways};
+use pocketsplat_trainer::verify::{Trial, plan_variants};
 
 const BUNDLES: [(&str, &[u8]); 4] = [
     ("static", include_bytes!("../golden/static.psb")),
@@ -25,8 +25,8 @@ fn checksum(bundle: &Bundle<'_>, plan: Plan, camera: &Camera) -> u32 {
 
 /// Every residency and number of strips, with memory for all splats and with memory for few, in slabs of depth.
 fn plans(bundle: &Bundle<'_>, budget: Budget) -> Vec<Plan> {
-    let with_few = ways(bundle, budget.with_max_splats(MaxSplats::AtMost(150)).with_overflow(Overflow::Slabs));
-    ways(bundle, budget).chain(with_few).map(|way| bundle.plan(&way).expect("planned")).collect()
+    let with_few = plan_variants(bundle, budget.with_max_splats(MaxSplats::AtMost(150)).with_overflow(Overflow::Slabs));
+    plan_variants(bundle, budget).chain(with_few).map(|way| bundle.plan(&way).expect("planned")).collect()
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::{env, fs, panic};
 
 use conformance::hard_cases::{Case, Outcome, families, gathered, page};
 use pocketsplat_core::{Budget, Bundle, MaxSplats};
-use pocketsplat_trainer::verify::ways_agree;
+use pocketsplat_trainer::verify::variants_match;
 use rayon::prelude::*;
 
 /// Set, the page is written anew.
@@ -57,7 +57,7 @@ fn hard_splats_are_the_same_in_every_way_to_draw_them() {
     let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
     let camera = bundle.header().preview;
     let budget = Budget::for_frame(camera.width_px, camera.height_px).with_max_splats(MaxSplats::Worst);
-    ways_agree(&bundle, budget, &camera).unwrap_or_else(|violation| panic!("{violation}"));
+    variants_match(&bundle, budget, &camera).unwrap_or_else(|violation| panic!("{violation}"));
 }
 
 #[test]

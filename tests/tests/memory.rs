@@ -5,7 +5,9 @@ use conformance::bundles::{CODERS, measured, tiered};
 use conformance::frame::{budget_for, to_core};
 use conformance::scenes::{CASES, cameras, orbit};
 use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, ErrorClass, MaxSplats, Plan, ScratchShape};
-use pocketsplat_trainer::verify::{Touched, Trial, Violation, exact_bytes, memory_does_not_show, ways, ways_agree};
+use pocketsplat_trainer::verify::{
+    Touched, Trial, Violation, exact_bytes, memory_does_not_show, plan_variants, variants_match,
+};
 
 /// A bundle for each case, of either coder in turn, with masks and three tiers.
 fn files() -> impl Iterator<Item = (&'static str, Vec<u8>)> {
@@ -33,7 +35,7 @@ fn residency_and_strips_change_no_pixel() {
         let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
         for camera in views() {
             for tiers in 1..=3 {
-                holds(name, ways_agree(&bundle, budget_for(&camera).with_tiers(tiers), &camera));
+                holds(name, variants_match(&bundle, budget_for(&camera).with_tiers(tiers), &camera));
             }
         }
     }
@@ -45,7 +47,7 @@ fn the_planned_bytes_suffice_and_fewer_are_refused_by_number() {
         let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
         let budget = budget_for(&views()[0]);
         for max_splats in [MaxSplats::Worst, MaxSplats::AtMost(100), MaxSplats::AtMost(0)] {
-            for way in ways(&bundle, budget.with_max_splats(max_splats)) {
+            for way in plan_variants(&bundle, budget.with_max_splats(max_splats)) {
                 holds(name, exact_bytes(&bundle, bundle.plan(&way).expect("planned")));
             }
         }
@@ -57,7 +59,7 @@ fn memory_content_and_alignment_do_not_show_and_the_mark_covers_what_was_touched
     for (name, bytes) in files() {
         let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
         let camera = views()[0];
-        for way in ways(&bundle, budget_for(&camera)) {
+        for way in plan_variants(&bundle, budget_for(&camera)) {
             let plan = bundle.plan(&way).expect("planned");
             let Touched { bytes, mark } = holds(name, memory_does_not_show(&bundle, plan, &camera));
             assert!(bytes * 10 >= mark * 9, "{name}: {bytes} of {mark} bytes: {plan:?}");
@@ -74,7 +76,7 @@ fn measured_plans_hold_the_views_measured_and_waste_little() {
         let views: Vec<Camera> = views.iter().map(to_core).collect();
         for tiers in [1, 3] {
             let budget = budget_for(&views[0]).with_max_splats(MaxSplats::Measured).with_tiers(tiers);
-            for way in ways(&bundle, budget) {
+            for way in plan_variants(&bundle, budget) {
                 let plan = bundle.plan(&way).expect("planned");
                 let reports: Vec<_> = views.iter().map(|camera| draw(&bundle, plan, camera).report).collect();
                 let most = reports.iter().map(|report| report.scratch_used as usize).max().unwrap_or(0);
@@ -93,7 +95,7 @@ fn predicted_work_bounds_the_work_of_the_views_measured_closely() {
         let views = orbit(12);
         let bytes = measured(case, coder, &views);
         let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
-        for way in ways(&bundle, budget_for(&to_core(&views[0]))) {
+        for way in plan_variants(&bundle, budget_for(&to_core(&views[0]))) {
             let plan = bundle.plan(&way).expect("planned");
             let bound = plan.work().expect("measured");
             let work: Vec<_> = views.iter().map(|view| draw(&bundle, plan, &to_core(view)).report.work()).collect();
@@ -121,7 +123,7 @@ fn too_many_splats_leave_out_the_last_of_the_file_in_all_strips_alike() {
             let whole_plan = bundle.plan(&budget_for(&camera)).expect("planned");
             let Trial { rgb: whole_frame, report: whole, .. } = draw(&bundle, whole_plan, &camera);
             for most in [0, 1, whole.splats / 7, whole.splats / 2, whole.splats.saturating_sub(1)] {
-                for way in ways(&bundle, budget_for(&camera).with_max_splats(MaxSplats::AtMost(most))) {
+                for way in plan_variants(&bundle, budget_for(&camera).with_max_splats(MaxSplats::AtMost(most))) {
                     let plan = bundle.plan(&way).expect("planned");
                     let Trial { rgb: frame, report, .. } = draw(&bundle, plan, &camera);
                     assert_eq!(report.splats + report.splats_dropped, whole.splats, "{name}, {most}: {report:?}");
@@ -161,7 +163,8 @@ fn the_most_tiers_that_fit_are_planned() {
         for ram_bytes in (0..largest.scratch_len() + 500).step_by(500) {
             // By hand: all there is, one at a time.
             let by_hand = |tiers: u8| {
-                let plans = ways(&bundle, free.with_tiers(tiers)).map(|way| bundle.plan(&way).expect("planned"));
+                let plans =
+                    plan_variants(&bundle, free.with_tiers(tiers)).map(|way| bundle.plan(&way).expect("planned"));
                 plans.filter(|plan| plan.scratch_len() <= ram_bytes).map(|plan| plan.n_tiers()).max()
             };
             let expected = (1..=3).rev().find_map(by_hand);
@@ -195,7 +198,7 @@ fn a_constant_bounds_every_plan() {
     for (name, bytes) in files() {
         let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
         for max_splats in [MaxSplats::Worst, MaxSplats::AtMost(321)] {
-            for way in ways(&bundle, budget_for(&views()[0]).with_max_splats(max_splats)) {
+            for way in plan_variants(&bundle, budget_for(&views()[0]).with_max_splats(max_splats)) {
                 let plan = bundle.plan(&way).expect("planned");
                 let shape = *plan.shape();
                 let ScratchShape { model, coder, resident, frame, .. } = shape;

@@ -36,7 +36,7 @@ fn scene() -> Scene<f32> {
         log_scales: spread(N_ANCHORS * 6, 0.3).iter().map(|x| x - 3.0).collect(),
         offsets: spread(N_ANCHORS * 3 * SHAPE.n_offsets, 1.0),
         mask_logits: spread(N_ANCHORS * SHAPE.n_offsets, 1.0).iter().map(|x| x - 4.8).collect(),
-        places: Vec::new(),
+        prune_rank: Vec::new(),
         lattice: lattice.into_iter().collect(),
     };
     let mut scene =

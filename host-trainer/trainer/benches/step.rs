@@ -13,7 +13,7 @@ use pocketsplat_trainer::ops::simd::Level;
 use pocketsplat_trainer::scene::Scene;
 use pocketsplat_trainer::scene::init::initial_scene;
 use pocketsplat_trainer::step::coding::{Coding, RateTerms};
-use pocketsplat_trainer::step::{Loss, LossWeights, StageSeconds, StepReport, Target, Workspace};
+use pocketsplat_trainer::step::{Loss, LossWeights, StageSeconds, StepReport, TargetView, Workspace};
 use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::config::{Backbone, Hac, Rates};
 use pocketsplat_trainer::train::context_start::initial_context;
@@ -76,7 +76,7 @@ fn steps(criterion: &mut Criterion, name: &str, scene: &Scene<f32>, coding: &Cod
     let pinhole = Pinhole::new(&camera());
     let mut rng = ChaCha8Rng::seed_from_u64(2);
     let truth: Vec<f32> = (0..3 * SIZE_PX * SIZE_PX).map(|_| rng.random_range(0.0..1.0)).collect();
-    let target = Target { camera: &pinhole, truth: &truth, mask: None, background: [0.0; 3] };
+    let target = TargetView::new(&pinhole, truth, None, [0.0; 3]);
     let mut group = criterion.benchmark_group(name);
     group.sample_size(20);
     for level in Level::available() {

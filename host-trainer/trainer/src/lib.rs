@@ -14,6 +14,7 @@ pub mod effects;
 pub(crate) mod finite_difference;
 pub mod instructions;
 pub mod integer_model;
+pub mod manifest;
 pub mod metrics;
 pub mod ops;
 pub mod real;

@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_core::math::{exp, sigmoid, tanh};
-use pocketsplat_trainer::ops::normality::{Moments, Weights};
+use pocketsplat_trainer::ops::normality::{ChannelMoments, Weights};
 use pocketsplat_trainer::ops::simd::Level;
 use pocketsplat_trainer::ops::{Pinhole, adam, head_input, rate, ssim};
 use pocketsplat_trainer::scene::ModelShape;
@@ -62,9 +62,9 @@ fn divergence_gradient() -> f64 {
             d.iter().zip(&direction).map(|(g, d)| g * d).fold((0.0, 0.0), |(s, t): (f64, f64), x| (s + x, t + x.abs()))
         };
         let mut d = vec![0.0; x.len()];
-        Moments::of(&[&x], 4).backward(&WEIGHTS, &x, &mut d);
+        ChannelMoments::of(&[&x], 4).backward(&WEIGHTS, &x, &mut d);
         let (slope, scale) = slope(&d);
-        worst = worst.max(difference_error(slope, scale, |t| Moments::of(&[&moved(t)], 4).term(&WEIGHTS)));
+        worst = worst.max(difference_error(slope, scale, |t| ChannelMoments::of(&[&moved(t)], 4).term(&WEIGHTS)));
     }
     worst
 }
@@ -75,8 +75,8 @@ fn divergence_rounding() -> f64 {
     let of = |n_rows: usize| {
         let x = columns(n_rows);
         let rounded: Vec<f32> = x.iter().map(|x| *x as f32).collect();
-        let exact = Moments::of(&[&x], 4).term(&WEIGHTS);
-        (f64::from(Moments::of(&[&rounded], 4).term(&weights)) / exact - 1.0).abs()
+        let exact = ChannelMoments::of(&[&x], 4).term(&WEIGHTS);
+        (f64::from(ChannelMoments::of(&[&rounded], 4).term(&weights)) / exact - 1.0).abs()
     };
     [1, 2, 40].map(of).into_iter().fold(0.0, f64::max)
 }

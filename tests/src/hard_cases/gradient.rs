@@ -6,7 +6,7 @@ use pocketsplat_trainer::real::Real;
 use pocketsplat_trainer::scene::Scene;
 use pocketsplat_trainer::step::LossWeights;
 use pocketsplat_trainer::step::coding::Coding;
-use pocketsplat_trainer::step::{Loss, Target, Workspace};
+use pocketsplat_trainer::step::{Loss, TargetView, Workspace};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -56,7 +56,7 @@ fn kinds<R: Real>(scene: &mut Scene<R>) -> [Vec<&mut R>; 4] {
 fn step<R: Real>(scene: &Scene<R>, camera: &Camera, truth: &[f64], background: [f64; 3]) -> (f64, [Vec<f64>; 4]) {
     let truth: Vec<R> = truth.iter().map(|v| R::real(*v)).collect();
     let camera = Pinhole::new(camera);
-    let target = Target { camera: &camera, truth: &truth, mask: None, background: background.map(R::real) };
+    let target = TargetView::new(&camera, truth, None, background.map(R::real));
     let weights = LossWeights { volume: 0.0, ..LossWeights::default() };
     let mut workspace = Workspace::new(&scene.shape);
     let report = workspace.step(scene, &target, &Loss::plain(weights), &Coding::Raw);

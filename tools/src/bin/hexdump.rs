@@ -108,7 +108,7 @@ fn example(coder: Coder) -> Result<Vec<u8>> {
                 0.25, 0.0, -0.5, 0.5, 0.5, 0.0, 0.0, 0.5, 0.25, 0.0, 0.0, 0.0, 0.25, 0.25, 0.0, -0.25, 0.0, 0.0,
             ],
             mask_logits: vec![1.0, 1.0, 1.0, -10.0, 1.0, 1.0],
-            places: vec![],
+            prune_rank: vec![],
         },
         heads,
         context: (coder == Coder::Context).then(|| context(&shape)),

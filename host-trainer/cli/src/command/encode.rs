@@ -3,9 +3,9 @@
 use anyhow::{Result, bail};
 use pocketsplat_capture::dataset::{Capture, View};
 use pocketsplat_core::{Budget, Bundle, DecodeError};
-use pocketsplat_trainer::bundle::manifest::{cameras_to_measure, measure};
 use pocketsplat_trainer::bundle::{self, BundleInfo, CodedScene, Coder, WriteError, WriteOptions};
 use pocketsplat_trainer::device::{Fitted, Limits, NoFit, fitted};
+use pocketsplat_trainer::manifest::{cameras_to_measure, measure};
 use pocketsplat_trainer::metrics::psnr_db_masked;
 use pocketsplat_trainer::render::decoder::core_image;
 use pocketsplat_trainer::scene::QuantisationSteps;

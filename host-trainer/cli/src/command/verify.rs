@@ -8,13 +8,13 @@ use bytesize::ByteSize;
 use pocketsplat_capture::dataset::FrameSize;
 use pocketsplat_core::bundle::crc32;
 use pocketsplat_core::{Budget, Bundle, Camera, Plan};
-use pocketsplat_trainer::bundle::manifest::cameras_to_measure;
 use pocketsplat_trainer::camera::core_camera;
 use pocketsplat_trainer::camera::host_camera;
+use pocketsplat_trainer::manifest::cameras_to_measure;
 use pocketsplat_trainer::metrics::psnr_db;
 use pocketsplat_trainer::render::decoder::core_image_of_tiers;
 use pocketsplat_trainer::render::reference::ReferenceScene;
-use pocketsplat_trainer::verify::{Violation, exact_bytes, memory_does_not_show, ways_agree, work_is_bounded};
+use pocketsplat_trainer::verify::{Violation, exact_bytes, memory_does_not_show, variants_match, work_is_bounded};
 use serde::Serialize;
 
 use super::bundle::BundleFile;
@@ -96,7 +96,7 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
             plans.iter().flat_map(|plan| {
                 let budget = budget.with_tiers(plan.n_tiers());
                 let bundle = &bundle;
-                cameras.iter().take(REFERENCE_VIEWS).map(move |camera| ways_agree(bundle, budget, camera))
+                cameras.iter().take(REFERENCE_VIEWS).map(move |camera| variants_match(bundle, budget, camera))
             }),
         ),
     ];

@@ -1,7 +1,7 @@
 //! The writer of bundles: place, quantise, count, code, lay out.
 //!
 //! Stages in the order data flows through them: `order` → `quantise` → `table` or [the context](crate::integer_model) → `chunk` → `layout`;
-//! beside them `size` says where the bytes of a bundle went, [`manifest`] what drawing it takes and [`annotate`] what each
+//! beside them `size` says where the bytes of a bundle went, [`manifest`](crate::manifest) what drawing it takes and [`annotate`] what each
 //! byte means. The format is described in `decoder-core/src/bundle/FORMAT.md`; what reads it is [`pocketsplat_core`], and
 //! nothing here decides a decoded symbol or value by itself.
 
@@ -18,7 +18,6 @@ mod ink;
 mod lattice;
 mod layout;
 mod load;
-pub mod manifest;
 mod mask;
 mod order;
 mod quantise;

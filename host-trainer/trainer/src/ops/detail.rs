@@ -7,7 +7,7 @@ use crate::scene::Head;
 
 /// What [`forward`] leaves for [`backward`]; buffers are kept from step to step.
 #[derive(Clone, Debug, Default)]
-pub struct Kept<R> {
+pub struct ForwardCache<R> {
     /// `[m, 3]` colours without residual.
     plain: Vec<R>,
     /// `[m, H]` hidden units.
@@ -34,7 +34,7 @@ pub fn forward<R: Real>(
     features: &[R],
     sources: &[Source],
     gaussians: &mut [Gaussian<R>],
-    kept: &mut Kept<R>,
+    kept: &mut ForwardCache<R>,
 ) {
     let (f, h, m) = (head.n_in - 3, head.n_hidden, gaussians.len());
     let n = features.len() / f;
@@ -66,7 +66,7 @@ pub fn backward<R: Real>(
     head: &Head<R>,
     features: &[R],
     sources: &[Source],
-    kept: &mut Kept<R>,
+    kept: &mut ForwardCache<R>,
     d_gaussians: &mut [Gaussian<R>],
     d_features: &mut [R],
     d_head: &mut Head<R>,
@@ -150,7 +150,7 @@ mod tests {
     /// Σ weights·colours.
     fn objective(x: &[f64], weights: &[f64]) -> f64 {
         let (head, features, mut gaussians) = split(x);
-        forward(&head, features, &sources(), &mut gaussians, &mut Kept::default());
+        forward(&head, features, &sources(), &mut gaussians, &mut ForwardCache::default());
         gaussians.iter().flat_map(|g| g.colour).zip(weights).map(|(c, w)| c * w).sum()
     }
 
@@ -160,7 +160,7 @@ mod tests {
         let x = random(3, n);
         let (network, features, mut gaussians) = split(&x);
         let plain: Vec<[f64; 3]> = gaussians.iter().map(|g| g.colour).collect();
-        forward(&network, features, &sources(), &mut gaussians, &mut Kept::default());
+        forward(&network, features, &sources(), &mut gaussians, &mut ForwardCache::default());
         for ((gaussian, plain), row) in gaussians.iter().zip(plain).zip(ROWS) {
             let input = [&features[row as usize * F..][..F], &plain].concat();
             let mut output = [0.0; 3];
@@ -178,7 +178,7 @@ mod tests {
             let x = random(seed, n_weights + 3 * F + 3 * ROWS.len());
             let weights = random(seed + 10, 3 * ROWS.len());
             let (network, features, mut gaussians) = split(&x);
-            let mut kept = Kept::default();
+            let mut kept = ForwardCache::default();
             forward(&network, features, &sources(), &mut gaussians, &mut kept);
             let of = |c: &[f64; 3]| Gaussian { colour: *c, ..Gaussian::default() };
             let mut d_gaussians: Vec<Gaussian<f64>> = weights.as_chunks().0.iter().map(of).collect();

@@ -16,7 +16,7 @@ pub struct Weights<R> {
 
 /// Mean and variance of every column.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Moments<R> {
+pub struct ChannelMoments<R> {
     /// Rows.
     pub n: usize,
     /// `[width]`.
@@ -25,7 +25,7 @@ pub struct Moments<R> {
     pub variance: Vec<R>,
 }
 
-impl<R: Real> Moments<R> {
+impl<R: Real> ChannelMoments<R> {
     /// Of matrices `[_, width]` that lie one below the other; sums run matrix by matrix.
     pub fn of(parts: &[&[R]], width: usize) -> Self {
         let n = parts.iter().map(|part| part.len() / width.max(1)).sum::<usize>();
@@ -127,7 +127,7 @@ mod tests {
             // A column without variance, and one with less than the floor.
             x.iter_mut().step_by(WIDTH).for_each(|x| *x = 0.25);
             x.iter_mut().skip(1).step_by(WIDTH).for_each(|x| *x *= 3e-4);
-            let moments = |x: &[f64]| Moments::of(&parts(x), WIDTH);
+            let moments = |x: &[f64]| ChannelMoments::of(&parts(x), WIDTH);
             let mut d = vec![0.0; x.len()];
             moments(&x).backward(&weights, &x, &mut d);
             assert!(d.iter().all(|d| d.is_finite()));
@@ -151,7 +151,7 @@ mod tests {
         };
         // Quantiles instead of a sample.
         let normal: Vec<f64> = (0..n).map(quantile).collect();
-        let term = |x: &[f64]| Moments::of(&[x], 1).term(&Weights { divergence: 1.0, spread: 0.0 });
+        let term = |x: &[f64]| ChannelMoments::of(&[x], 1).term(&Weights { divergence: 1.0, spread: 0.0 });
         assert!(term(&normal).abs() < 2e-3, "{}", term(&normal));
         let other: Vec<f64> = normal.iter().map(|x| 0.5 * x + 0.7).collect();
         let exact = 0.5 * (0.25 + 0.49 - 1.0 - 0.25f64.ln());

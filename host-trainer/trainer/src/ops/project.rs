@@ -178,7 +178,7 @@ pub fn backward<R: Real>(
     if compensated {
         d.opacity = add_compensation_gradient(&p, gaussian, d_splat, &mut by_lever);
     }
-    let LeverGradient { d_t, stretch } = by_lever;
+    let JacobianGradient { d_t, stretch } = by_lever;
 
     // T[i][j] = f_i/z·(axes[i][j] − slope_i·axes[2][j])·scale_j.
     let z = p.point_cam[2];
@@ -216,7 +216,7 @@ pub fn backward<R: Real>(
 }
 
 /// dL/dT, and by axis of the Gaussian `Σᵢ Tᵢⱼ·∂L/∂Tᵢⱼ`: what stretching it along that axis does.
-struct LeverGradient<R> {
+struct JacobianGradient<R> {
     d_t: [[R; 3]; 2],
     stretch: [R; 3],
 }
@@ -227,7 +227,7 @@ struct LeverGradient<R> {
 /// for a needle is the small difference of long vectors, and is taken as k·(0.3·t₀ + t₁ × (t₀ × t₁)) instead. Stretching a
 /// needle hardly turns it, so the large terms of dL/dT cancel in `stretch`: it is written with r as well.
 #[inline(always)]
-fn ellipse_gradient<R: Real>(p: &Projection<R>, d_splat: &Splat<R>) -> LeverGradient<R> {
+fn ellipse_gradient<R: Real>(p: &Projection<R>, d_splat: &Splat<R>) -> JacobianGradient<R> {
     let (two, dilation, k) = (R::real(2.0), R::real(DILATION_PX2), R::ONE / p.cov[2]);
     let (shear, precision) = (p.cov[1] * k, p.cov[2] / p.det);
     let turned = cross(&p.t[1], &p.cross);
@@ -236,7 +236,7 @@ fn ellipse_gradient<R: Real>(p: &Projection<R>, d_splat: &Splat<R>) -> LeverGrad
     let sideways = k * d_splat.shear;
     let across = two * k * k * d_splat.column_precision;
     let t1 = &p.t[1];
-    LeverGradient {
+    JacobianGradient {
         d_t: [
             per_axis(|j| sideways * t1[j] - along * rest[j]),
             per_axis(|j| (along * shear + sideways) * rest[j] - (sideways * shear + across) * t1[j]),
@@ -253,7 +253,7 @@ fn add_compensation_gradient<R: Real>(
     p: &Projection<R>,
     gaussian: &Gaussian<R>,
     d_splat: &Splat<R>,
-    by_lever: &mut LeverGradient<R>,
+    by_lever: &mut JacobianGradient<R>,
 ) -> R {
     let share = compensation(p);
     if share > R::ZERO {

@@ -135,9 +135,9 @@ pub struct Anchors<R> {
     /// `[n_anchors, K]` mask logits: an offset is drawn, and coded, only where its logit is above [`MASK_THRESHOLD`]
     /// (Chen et al. 2024, HAC, section 4.3).
     pub mask_logits: Vec<R>,
-    /// `[n_anchors]`, or empty where nothing has given out places: the share of the anchors that goes before this one when
+    /// `[n_anchors]`, or empty where nothing has ranked them: the share of the anchors that goes before this one when
     /// anchors are left out.
-    pub places: Vec<f32>,
+    pub prune_rank: Vec<f32>,
 }
 
 impl<R> Anchors<R> {
@@ -217,7 +217,7 @@ impl<R: Real> Scene<R> {
                 log_scales: all(&self.anchors.log_scales),
                 offsets: all(&self.anchors.offsets),
                 mask_logits: all(&self.anchors.mask_logits),
-                places: self.anchors.places.clone(),
+                prune_rank: self.anchors.prune_rank.clone(),
             },
             heads: self.heads.map(head),
             context: self.context.as_ref().map(|context| ContextModel {

@@ -47,7 +47,7 @@ pub struct Block<R> {
     /// dL/d(Gaussians): zero after the forward pass, for terms on Gaussians to add to.
     pub d_gaussians: Vec<Gaussian<R>>,
     /// What the detail head leaves, if the scene has one.
-    detail: detail::Kept<R>,
+    detail: detail::ForwardCache<R>,
     d_outputs: HeadOutputs<R>,
     d_hidden: Vec<R>,
     d_input: Vec<R>,
@@ -90,7 +90,7 @@ impl<R: Real> Block<R> {
             splats: Vec::new(),
             footprints: Vec::new(),
             d_gaussians: Vec::new(),
-            detail: detail::Kept::default(),
+            detail: detail::ForwardCache::default(),
             d_outputs: HeadOutputs::default(),
             d_hidden: Vec::new(),
             d_input: Vec::new(),

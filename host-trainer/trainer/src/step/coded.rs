@@ -4,7 +4,7 @@ use pocketsplat_core::context::{FEATURES_PER_LEVEL, Group, MEAN_PARTS, N_GROUPS}
 use pocketsplat_core::entropy::EIGHTHS;
 
 use super::buffer::refill;
-use super::coding::{Coding, Exact};
+use super::coding::{Coding, IntegerModel};
 use crate::ops::noise::Stream;
 use crate::ops::simd::Level;
 use crate::ops::{adaptive_step, anchor_bits, hash_grid, head, mask, perturb};
@@ -132,9 +132,9 @@ impl<R: Real> Coded<R> {
                     let draw = stream.branch(*anchor).uniform(SAMPLE_DRAW);
                     (f64::from(draw) < rate.sample).then_some(row)
                 }));
-                self.ask(scene, network, anchors);
+                self.predict(scene, network, anchors);
                 if let Some(exact) = exact {
-                    self.ask_exactly(scene, exact, anchors);
+                    self.predict_quantised(scene, exact, anchors);
                 }
                 self.perturb(level, &scene.shape, exact.is_none().then_some(*stream), anchors, values);
             }
@@ -142,8 +142,8 @@ impl<R: Real> Coded<R> {
         }
     }
 
-    /// Asks the network for the steps of all anchors and the distributions of the sample.
-    fn ask(&mut self, scene: &Scene<R>, network: Network<'_, R>, anchors: &[u32]) {
+    /// Predicts the steps of all anchors and the distributions of the sample.
+    fn predict(&mut self, scene: &Scene<R>, network: Network<'_, R>, anchors: &[u32]) {
         let (model, n) = (network.model, anchors.len());
         let lattice = anchors.iter().map(|a| scene.anchors.lattice[*a as usize]);
         self.units.clear();
@@ -169,7 +169,7 @@ impl<R: Real> Coded<R> {
     }
 
     /// Puts what the integers say in the place of what the floats say.
-    fn ask_exactly(&mut self, scene: &Scene<R>, exact: &Exact<'_, R>, anchors: &[u32]) {
+    fn predict_quantised(&mut self, scene: &Scene<R>, exact: &IntegerModel<'_, R>, anchors: &[u32]) {
         let context = exact.context;
         let n_channels = scene.shape.values_per_anchor();
         let part = |output: i16, parts: i32| R::real(f64::from(output) / f64::from(parts));

@@ -15,7 +15,7 @@ pub enum Phase {
     /// Noise of the context model's steps, and the rate.
     Context,
     /// Rounding as the decoder sees it, and the rate.
-    Exact,
+    IntegerModel,
 }
 
 /// What happens to the values of the visible anchors before they are drawn.
@@ -37,13 +37,13 @@ pub enum Coding<'a, R> {
         /// The terms of the loss.
         rate: RateTerms,
         /// With it values are rounded, and steps and distributions are those of its integers: what a decoder sees.
-        exact: Option<Exact<'a, R>>,
+        exact: Option<IntegerModel<'a, R>>,
     },
 }
 
 /// The integer form of the scene's context model.
 #[derive(Clone, Copy, Debug)]
-pub struct Exact<'a, R> {
+pub struct IntegerModel<'a, R> {
     /// What decides.
     pub context: &'a Context<'a>,
     /// The network that its integers stand for, through which gradients pass.

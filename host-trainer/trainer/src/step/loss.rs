@@ -30,8 +30,8 @@ pub struct Loss<'a, R> {
     /// Weights of the image's terms.
     pub weights: LossWeights,
     /// The terms of modules, and what they are told of the run.
-    pub modules: Option<(&'a [&'a dyn Terms<R>], &'a Moment)>,
-    /// Anchors whose [place](crate::scene::Anchors::places) is below are not there.
+    pub modules: Option<(&'a [&'a dyn Terms<R>], &'a StepInfo)>,
+    /// Anchors whose [place](crate::scene::Anchors::prune_rank) is below are not there.
     pub pruned_share: f32,
 }
 
@@ -44,7 +44,7 @@ impl<R> Loss<'_, R> {
 
 /// Where a run stands when a module is asked.
 #[derive(Clone, Copy, Debug)]
-pub struct Moment {
+pub struct StepInfo {
     /// Current iteration, from 1.
     pub iteration: u32,
     /// Iterations of the run.
@@ -58,7 +58,7 @@ pub struct Moment {
     pub stream: Stream,
 }
 
-impl Moment {
+impl StepInfo {
     /// Whether more than `share` of the run is done.
     pub fn is_after(&self, share: f64) -> bool {
         f64::from(self.iteration) > self.iteration_at(share)
@@ -76,7 +76,7 @@ impl Moment {
 
 /// Two images that are compared.
 #[derive(Clone, Copy, Debug)]
-pub struct Pictures<'a, R> {
+pub struct ImagePair<'a, R> {
     /// What was drawn, planes `[3, height, width]`.
     pub image: &'a [R],
     /// The photograph.
@@ -92,21 +92,21 @@ pub trait Terms<R: Real>: Sync {
     /// Terms on the image.
     ///
     /// * `d_image`: planes as the image; added to.
-    fn on_image(&self, _at: &Moment, _pictures: &Pictures<'_, R>, _d_image: &mut [R]) -> R {
+    fn on_image(&self, _at: &StepInfo, _pictures: &ImagePair<'_, R>, _d_image: &mut [R]) -> R {
         R::ZERO
     }
 
     /// Terms on the Gaussians of the view, after the forward pass.
     ///
     /// * `blocks`: [`Block::d_gaussians`] is added to.
-    fn on_gaussians(&self, _at: &Moment, _scene: &Scene<R>, _blocks: &mut [Block<R>]) -> R {
+    fn on_gaussians(&self, _at: &StepInfo, _scene: &Scene<R>, _blocks: &mut [Block<R>]) -> R {
         R::ZERO
     }
 
     /// Terms on the parameters of the visible anchors, after the backward pass.
     ///
     /// * `blocks`: gradients of anchors are added to.
-    fn on_anchors(&self, _at: &Moment, _scene: &Scene<R>, _blocks: &mut [Block<R>]) -> R {
+    fn on_anchors(&self, _at: &StepInfo, _scene: &Scene<R>, _blocks: &mut [Block<R>]) -> R {
         R::ZERO
     }
 }

@@ -7,6 +7,7 @@ pub mod coding;
 mod context;
 mod loss;
 mod stages;
+mod target;
 
 use rayon::prelude::*;
 
@@ -21,26 +22,15 @@ use coded::{Network, Weights};
 pub use coding::Phase;
 use coding::{Coding, RateReport};
 pub use context::ContextGradients;
-pub use loss::{Loss, LossWeights, Moment, Pictures, Terms};
+pub use loss::{ImagePair, Loss, LossWeights, StepInfo, Terms};
 pub use stages::StageSeconds;
-use stages::Stopwatch;
+use stages::StageTimer;
+use target::clear_masked;
+pub use target::{TargetView, planes};
 
 /// Anchors one task evaluates together; also the unit in which the gradients of the heads are summed, so that the sums
 /// do not depend on the number of threads.
 const BLOCK: usize = 256;
-
-/// The photograph a step compares with.
-#[derive(Clone, Copy, Debug)]
-pub struct Target<'a, R> {
-    /// The camera that took it.
-    pub camera: &'a Pinhole<R>,
-    /// Planes `[3, height, width]`, 0 to 1.
-    pub truth: &'a [R],
-    /// `[height, width]` pixels that count, all of them without a mask; at the others `truth` is 0.
-    pub mask: Option<&'a [bool]>,
-    /// What lies behind everything.
-    pub background: [R; 3],
-}
 
 /// What a step gives back, besides the gradients it leaves in the [`Workspace`].
 #[derive(Clone, Copy, Debug)]
@@ -62,7 +52,7 @@ pub struct StepReport<R> {
 }
 
 /// A drawn view and what its backward pass needs.
-struct Drawing<R> {
+struct DrawnView<R> {
     stages: StageSeconds,
     image: TiledImage<R>,
     lists: tiles::TileLists,
@@ -82,23 +72,6 @@ pub struct Workspace<R> {
     pub d_background: [R; 3],
     /// dL/d(context model), where the last step asked it.
     pub d_context: Option<ContextGradients<R>>,
-}
-
-impl<R> Target<'_, R> {
-    /// Pixels that count, at least 1.
-    fn n_counted(&self) -> usize {
-        self.mask.map_or(self.truth.len() / 3, |mask| mask.iter().filter(|valid| **valid).count()).max(1)
-    }
-}
-
-/// Makes the pixels that do not count zero in every plane: as in the photograph, so that no loss sees them.
-pub(crate) fn clear_masked<R: Real>(planes: &mut [R], mask: Option<&[bool]>) {
-    let Some(mask) = mask else { return };
-    for plane in planes.chunks_exact_mut(mask.len()) {
-        for (value, valid) in plane.iter_mut().zip(mask) {
-            *value = if *valid { *value } else { R::ZERO };
-        }
-    }
 }
 
 impl<R: Real> Workspace<R> {
@@ -132,9 +105,9 @@ impl<R: Real> Workspace<R> {
         coding: &Coding<'_, R>,
         network: Option<Network<'_, R>>,
         pruned_share: f32,
-    ) -> Drawing<R> {
-        let mut stopwatch = Stopwatch::start();
-        let is_kept = |a: usize| scene.anchors.places.get(a).is_none_or(|place| *place >= pruned_share);
+    ) -> DrawnView<R> {
+        let mut timer = StageTimer::start();
+        let is_kept = |a: usize| scene.anchors.prune_rank.get(a).is_none_or(|place| *place >= pruned_share);
         let visible: Vec<u32> = (0..scene.anchors.len())
             .into_par_iter()
             .with_min_len(1024)
@@ -150,17 +123,17 @@ impl<R: Real> Workspace<R> {
             block.gather(scene, anchors);
             block.code(level, scene, coding, network);
         });
-        let context = stopwatch.lap();
+        let context = timer.lap();
         self.blocks[..self.n_blocks].par_iter_mut().for_each(|block| block.forward(level, scene, camera));
         let splats: Vec<Splat<R>> = self.blocks().iter().flat_map(|b| b.splats.iter().copied()).collect();
         let footprints: Vec<Footprint<R>> = self.blocks().iter().flat_map(|b| b.footprints.iter().copied()).collect();
-        let anchors = stopwatch.lap();
+        let anchors = timer.lap();
         let lists = tiles::build(&splats, &footprints, camera.size_px);
-        let tiles = stopwatch.lap();
+        let tiles = timer.lap();
         let image = rasterise::forward(level, &splats, &footprints, &lists, background);
-        let rasterise = stopwatch.lap();
+        let rasterise = timer.lap();
         let stages = StageSeconds { context, anchors, tiles, rasterise, ..StageSeconds::default() };
-        Drawing { stages, image, lists, splats, footprints }
+        DrawnView { stages, image, lists, splats, footprints }
     }
 
     /// The image of a view, planes `[3, height, width]`, not clamped.
@@ -177,12 +150,15 @@ impl<R: Real> Workspace<R> {
         let n_pixels = d_image.len() / 3;
         d_image[..n_pixels].fill(R::ONE);
         let d_tiled = TiledImage::from_planes(&d_image, camera.size_px);
-        let Drawing { image, lists, splats, footprints, .. } = &drawing;
+        let DrawnView { image, lists, splats, footprints, .. } = &drawing;
         let d_splats = rasterise::backward(self.level, splats, footprints, lists, image, &d_tiled);
         d_splats.iter().map(|d| d.colour[0]).collect()
     }
 
     /// Loss and gradients of one view.
+    ///
+    /// The means of L1 and SSIM are over all pixels, those that do not count being equal in both images, so that a view weighs as much
+    /// as it shows of the scene; [`StepReport::squared_error`], which makes the PSNR, is over those that count.
     ///
     /// L = (1 − λ)·L1 + λ·(1 − SSIM) + w·mean(s_x·s_y·s_z) (Lu et al. 2024, Scaffold-GS, eq. 10), the terms of modules, and
     /// those of [`RateTerms`](coding::RateTerms) where `coding` has them. Gradients of anchors are left in [`Self::blocks`], those
@@ -190,30 +166,30 @@ impl<R: Real> Workspace<R> {
     pub fn step(
         &mut self,
         scene: &Scene<R>,
-        target: &Target<'_, R>,
-        terms: &Loss<'_, R>,
+        target: &TargetView<'_, R>,
+        loss: &Loss<'_, R>,
         coding: &Coding<'_, R>,
     ) -> StepReport<R> {
-        let weights = &terms.weights;
+        let weights = &loss.weights;
         let size_px = target.camera.size_px;
         let steps_head = context::steps_head(scene, coding);
         let network = context::network(scene, coding, steps_head.as_ref());
-        let Drawing { mut stages, image: tiled, lists, splats, footprints } =
-            self.draw(scene, target.camera, target.background, coding, network, terms.pruned_share);
-        let mut stopwatch = Stopwatch::start();
+        let DrawnView { mut stages, image: tiled, lists, splats, footprints } =
+            self.draw(scene, target.camera, target.background, coding, network, loss.pruned_share);
+        let mut timer = StageTimer::start();
         let mut image = tiled.to_planes(size_px);
         clear_masked(&mut image, target.mask);
 
         let lambda = R::real(weights.dssim);
-        let (similarity, partials) = ssim::forward(self.level, &image, target.truth, size_px);
+        let (similarity, partials) = ssim::forward(self.level, &image, target.truth(), size_px);
         let mut d_image = vec![R::ZERO; image.len()];
-        l1::backward(&image, target.truth, R::ONE - lambda, &mut d_image);
-        ssim::backward(self.level, &image, target.truth, size_px, &partials, -lambda, &mut d_image);
+        l1::backward(&image, target.truth(), R::ONE - lambda, &mut d_image);
+        ssim::backward(self.level, &image, target.truth(), size_px, &partials, -lambda, &mut d_image);
         let mut by_modules = R::ZERO;
-        if let Some((modules, at)) = terms.modules {
-            let pictures = Pictures { image: &image, truth: target.truth, size_px, level: self.level };
+        if let Some((modules, at)) = loss.modules {
+            let images = ImagePair { image: &image, truth: target.truth(), size_px, level: self.level };
             for module in modules {
-                by_modules += module.on_image(at, &pictures, &mut d_image);
+                by_modules += module.on_image(at, &images, &mut d_image);
                 by_modules += module.on_gaussians(at, scene, &mut self.blocks[..self.n_blocks]);
             }
         }
@@ -221,21 +197,21 @@ impl<R: Real> Workspace<R> {
         let n_gaussians = self.blocks().iter().map(|b| b.gaussians.len()).sum();
         let volume_weight = R::real(weights.volume);
         let volumes: R = self.blocks().iter().map(|b| volume::forward(&b.gaussians, volume_weight, n_gaussians)).sum();
-        let mut loss = (R::ONE - lambda) * l1::forward(&image, target.truth)
+        let mut total = (R::ONE - lambda) * l1::forward(&image, target.truth())
             + lambda * (R::ONE - similarity)
             + volumes
             + by_modules;
 
         let squared: f64 = image
             .chunks(4096)
-            .zip(target.truth.chunks(4096))
+            .zip(target.truth().chunks(4096))
             .map(|(a, b)| a.iter().zip(b).map(|(x, y)| Into::<f64>::into((*x - *y) * (*x - *y))).sum::<f64>())
             .sum();
         let d_tiled = TiledImage::from_planes(&d_image, size_px);
-        stages.loss = stopwatch.lap();
+        stages.loss = timer.lap();
         let d_splats = rasterise::backward(self.level, &splats, &footprints, &lists, &tiled, &d_tiled);
         self.d_background = rasterise::background_gradient(&tiled, &d_tiled);
-        stages.rasterise_backward = stopwatch.lap();
+        stages.rasterise_backward = timer.lap();
         let mut rest = d_splats.as_slice();
         let mut shares = Vec::with_capacity(self.n_blocks);
         for block in self.blocks() {
@@ -247,11 +223,11 @@ impl<R: Real> Workspace<R> {
             block.backward(scene, target.camera, d_splats, volume_weight, n_gaussians);
         });
         self.sum_head_gradients();
-        stages.anchors_backward = stopwatch.lap();
+        stages.anchors_backward = timer.lap();
         let rate = match (coding, network) {
             (Coding::Context { rate, .. }, Some(network)) => {
                 let (term, report) = self.rate(scene, network, rate);
-                loss += term;
+                total += term;
                 Some(report)
             }
             _ => {
@@ -259,14 +235,14 @@ impl<R: Real> Workspace<R> {
                 None
             }
         };
-        stages.context_backward = stopwatch.lap();
-        if let Some((modules, at)) = terms.modules {
+        stages.context_backward = timer.lap();
+        if let Some((modules, at)) = loss.modules {
             for module in modules {
-                loss += module.on_anchors(at, scene, &mut self.blocks[..self.n_blocks]);
+                total += module.on_anchors(at, scene, &mut self.blocks[..self.n_blocks]);
             }
         }
         StepReport {
-            loss,
+            loss: total,
             squared_error: squared / (3 * target.n_counted()) as f64,
             n_gaussians,
             n_splats: splats.len(),

@@ -24,9 +24,9 @@ pub struct StageSeconds {
 }
 
 /// Reads the time since the last reading.
-pub(super) struct Stopwatch(Instant);
+pub(super) struct StageTimer(Instant);
 
-impl Stopwatch {
+impl StageTimer {
     pub(super) fn start() -> Self {
         Self(Instant::now())
     }

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 
 use pocketsplat_core::context::{GridFrame, GridLevel, Group, LevelKind};
 
-use super::coding::{Exact, RateTerms};
+use super::coding::{IntegerModel, RateTerms};
 use super::*;
 use crate::finite_difference::{assert_piecewise_gradient, random};
 use crate::integer_model::{parse, rounded, section};
@@ -109,14 +109,9 @@ fn coded_step<R: Real>(scene: &Scene<R>, coding: &Coding<'_, R>) -> (StepReport<
 fn step_with<R: Real>(scene: &Scene<R>, coding: &Coding<'_, R>, loss: &Loss<'_, R>) -> (StepReport<R>, Workspace<R>) {
     let mut workspace = Workspace::new(&scene.shape);
     let mask = mask(&scene.shape);
-    let mut truth: Vec<R> = truth().into_iter().map(R::real).collect();
-    clear_masked(&mut truth, mask.as_deref());
-    let target = Target {
-        camera: &Pinhole::new(&camera()),
-        truth: &truth,
-        mask: mask.as_deref(),
-        background: [0.1, 0.2, 0.3].map(R::real),
-    };
+    let truth: Vec<R> = truth().into_iter().map(R::real).collect();
+    let pinhole = Pinhole::new(&camera());
+    let target = TargetView::new(&pinhole, truth, mask.as_deref(), [0.1, 0.2, 0.3].map(R::real));
     let report = workspace.step(scene, &target, loss, coding);
     assert!(report.n_splats > 5, "the scene must be seen: {report:?}");
     (report, workspace)
@@ -178,8 +173,8 @@ fn a_view_that_sees_nothing_has_zero_gradients() {
         cell[2] -= 5000;
     }
     let mut workspace = Workspace::new(&scene.shape);
-    let truth = truth();
-    let target = Target { camera: &Pinhole::new(&camera()), truth: &truth, mask: None, background: [0.0; 3] };
+    let pinhole = Pinhole::new(&camera());
+    let target = TargetView::new(&pinhole, truth(), None, [0.0; 3]);
     let report = workspace.step(&scene, &target, &Loss::plain(LossWeights::default()), &Coding::Raw);
     assert!(report.loss.is_finite() && report.n_splats == 0);
     assert!(gradients(&scene, &workspace).iter().all(|g| *g == 0.0));
@@ -300,7 +295,7 @@ fn rounding_twice_is_rounding_once(shape: ModelShape) {
     let context = parse(&section, &scene.shape).unwrap();
     let network = rounded(model, n_channels).unwrap();
     let step = |scene: &Scene<f32>| {
-        let exact = Some(Exact { context: &context, network: &network });
+        let exact = Some(IntegerModel { context: &context, network: &network });
         coded_step(scene, &Coding::Context { stream: Stream::of_run(3), rate: rate(0.0), exact })
     };
     let (report, workspace) = step(&scene);
@@ -348,7 +343,7 @@ fn modules() -> Vec<Modules> {
 #[test]
 fn a_step_with_modules_agrees_with_finite_differences() {
     let stream = Stream::of_run(5);
-    let at = Moment { iteration: 80, iterations: 100, phase: Phase::Raw, scaled: true, stream };
+    let at = StepInfo { iteration: 80, iterations: 100, phase: Phase::Raw, scaled: true, stream };
     for (seed, modules) in (71..).zip(modules()) {
         let shape = ModelShape { view_colour: false, view_geometry: false, ..modules.shape(shapes()[0]) };
         let mut scene = scene(seed, shape);

@@ -8,7 +8,7 @@ use crate::integer_model;
 use crate::ops::noise::Stream;
 use crate::scene::{Head, Scene};
 use crate::step::Phase;
-use crate::step::coding::{Coding, Exact, RateTerms};
+use crate::step::coding::{Coding, IntegerModel, RateTerms};
 
 /// The integer form of a scene's context model, as bytes and as the network that they stand for.
 #[derive(Clone, Debug)]
@@ -44,7 +44,7 @@ impl Trainer<'_> {
     /// Makes the context model where this iteration is the first to need it.
     pub(super) fn begin_context(&mut self) {
         let phase = self.config.phase(self.iteration);
-        if self.scene.context.is_none() && matches!(phase, Phase::Context | Phase::Exact) {
+        if self.scene.context.is_none() && matches!(phase, Phase::Context | Phase::IntegerModel) {
             let base_steps = self.config.hac.base_steps();
             self.scene.context = Some(context_start::initial_context(&self.scene, base_steps, &mut self.rng));
             self.optimiser.begin_context(&self.scene);
@@ -66,8 +66,8 @@ pub(super) fn coding<'a>(
     match config.phase(iteration) {
         Phase::Raw => Coding::Raw,
         Phase::Noise => Coding::Noise { stream, steps: hac.base_steps() },
-        Phase::Context | Phase::Exact => {
-            let exact = exact.map(|(context, integers)| Exact { context, network: &integers.network });
+        Phase::Context | Phase::IntegerModel => {
+            let exact = exact.map(|(context, integers)| IntegerModel { context, network: &integers.network });
             Coding::Context { stream, rate, exact }
         }
     }

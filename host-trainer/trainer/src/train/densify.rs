@@ -82,8 +82,8 @@ pub fn grow(
             scene.anchors.log_scales.extend(std::iter::repeat_n(log_edge, scene.shape.n_log_scales()));
             scene.anchors.offsets.extend(std::iter::repeat_n(0.0, 3 * k));
             scene.anchors.mask_logits.extend(std::iter::repeat_n(INITIAL_MASK_LOGIT as f32, k));
-            if !scene.anchors.places.is_empty() {
-                scene.anchors.places.push(1.0);
+            if !scene.anchors.prune_rank.is_empty() {
+                scene.anchors.prune_rank.push(1.0);
             }
         }
     }
@@ -158,13 +158,13 @@ pub fn prune(
 /// Drops the anchors that `keep` does not mark, with all that belongs to them.
 pub fn retain(scene: &mut Scene<f32>, optimiser: &mut Optimiser<f32>, statistics: &mut Statistics, keep: &[bool]) {
     let (f, s, k) = (scene.shape.feature_dim, scene.shape.n_log_scales(), scene.shape.n_offsets);
-    let Anchors { lattice, features, log_scales, offsets, mask_logits, places } = &mut scene.anchors;
+    let Anchors { lattice, features, log_scales, offsets, mask_logits, prune_rank } = &mut scene.anchors;
     retain_rows(lattice, 1, keep);
     for (values, width) in [(features, f), (log_scales, s), (offsets, 3 * k), (mask_logits, k)] {
         retain_rows(values, width, keep);
     }
-    if !places.is_empty() {
-        retain_rows(places, 1, keep);
+    if !prune_rank.is_empty() {
+        retain_rows(prune_rank, 1, keep);
     }
     optimiser.retain(keep, &scene.shape);
     statistics.retain(keep, k);

@@ -19,7 +19,7 @@ const ROWS: usize = 512;
 pub struct Finished {
     /// The scene, its values not rounded: the writer does that, once. Offsets that no view draws are masked.
     pub scene: Scene<f32>,
-    /// `[n]` which anchors matter: their [places](crate::scene::Anchors::places) if they have any, else their aggregated
+    /// `[n]` which anchors matter: their [places](crate::scene::Anchors::prune_rank) if they have any, else their aggregated
     /// opacity, see [`Survey::importance`]. The order of the tiers.
     pub importance: Vec<f32>,
     /// What lies behind it, rounded.
@@ -52,7 +52,8 @@ impl Trainer<'_> {
         let estimated_bits = context.as_ref().map(|context| estimated_bits(&drawn, context));
         scene.anchors.mask_logits = drawn.anchors.mask_logits;
         // Places that training has given out decide; it has prepared the scene for them.
-        let importance = if scene.anchors.places.is_empty() { survey.importance } else { scene.anchors.places.clone() };
+        let importance =
+            if scene.anchors.prune_rank.is_empty() { survey.importance } else { scene.anchors.prune_rank.clone() };
         // It is between 0 and 1.
         let background = self.background.map(|channel| (channel * 255.0).round() as u8);
         Ok(Finished { scene, importance, background, n_undrawn, estimated_bits })

@@ -32,7 +32,7 @@ use crate::ops::Pinhole;
 use crate::ops::noise::Stream;
 use crate::scene::init::initial_scene;
 use crate::scene::{Anchors, Heads, Scene};
-use crate::step::{Loss, Moment, Phase, Target, Workspace, clear_masked};
+use crate::step::{Loss, Phase, StepInfo, TargetView, Workspace, planes};
 use checkpoint::{CaptureSignature, Kernels};
 use coding::Integers;
 use config::{Backbone, Densification, Rate, Rates};
@@ -71,18 +71,6 @@ pub struct Trainer<'a> {
     /// Views left of the current pass over the capture, taken from the end.
     queue: Vec<u32>,
     workspace: Workspace<f32>,
-}
-
-/// Planes `[3, height, width]` of an image, 0 to 1.
-pub fn planes(image: &Image) -> Vec<f32> {
-    let n = (image.width_px * image.height_px) as usize;
-    let mut planes = vec![0.0; 3 * n];
-    for (channel, plane) in planes.chunks_exact_mut(n).enumerate() {
-        for (out, rgb) in plane.iter_mut().zip(image.rgb.chunks_exact(3)) {
-            *out = f32::from(rgb[channel]) / 255.0;
-        }
-    }
-    planes
 }
 
 impl<'a> Trainer<'a> {
@@ -213,21 +201,19 @@ impl<'a> Trainer<'a> {
         let index = self.queue.pop().expect("refilled above") as usize;
         let View { name, image, mask, .. } = &self.capture.train[index];
         let mask = mask.as_ref().map(|mask| mask.valid.as_slice());
-        let mut truth = planes(image);
-        clear_masked(&mut truth, mask);
-        let target = Target { camera: &self.cameras[index], truth: &truth, mask, background: self.background };
+        let target = TargetView::new(&self.cameras[index], planes(image), mask, self.background);
         let integers = match self.config.phase(self.iteration) {
-            Phase::Exact => Some(Integers::of(&self.scene)?),
+            Phase::IntegerModel => Some(Integers::of(&self.scene)?),
             _ => None,
         };
         let context = integers.as_ref().map(|integers| integers.context(&self.scene)).transpose()?;
         let coding = coding::coding(&self.config, self.iteration, context.as_ref().zip(integers.as_ref()));
-        let (modules, at) = (self.config.modules, self.moment());
+        let (modules, at) = (self.config.modules, self.step_info());
         let pruned_share = modules.each().iter().map(|module| module.pruned_share(&at)).fold(0.0, f32::max);
         let terms = modules.terms();
         let loss = Loss { weights: self.config.loss, modules: Some((&terms, &at)), pruned_share };
         let report = self.workspace.step(&self.scene, &target, &loss, &coding);
-        if let Some(cause) = watchdog::inspect(&self.scene, &truth, self.background, &self.workspace, &report) {
+        if let Some(cause) = watchdog::inspect(&self.scene, target.truth(), self.background, &self.workspace, &report) {
             let dropped = DroppedStep { iteration: self.iteration, view: name.clone(), cause };
             return if self.watchdog.dropped() {
                 Err(TrainError::Diverged { n: self.watchdog.n_in_a_row, last: dropped })
@@ -252,7 +238,7 @@ impl<'a> Trainer<'a> {
             let run = RunView { scene: &self.scene, seed: self.config.seed, cameras: &self.trained_cameras() };
             match module.event(&at, &run) {
                 Some(AnchorChange::Keep(keep)) => self.keep_anchors(&keep),
-                Some(AnchorChange::Rank(ranks)) => self.scene.anchors.places = ranks,
+                Some(AnchorChange::Rank(ranks)) => self.scene.anchors.prune_rank = ranks,
                 None => {}
             }
         }
@@ -260,9 +246,9 @@ impl<'a> Trainer<'a> {
     }
 
     /// What modules are told of this iteration.
-    fn moment(&self) -> Moment {
+    fn step_info(&self) -> StepInfo {
         let phase = self.config.phase(self.iteration);
-        Moment {
+        StepInfo {
             iteration: self.iteration,
             iterations: self.config.iterations,
             phase,
@@ -294,7 +280,7 @@ impl<'a> Trainer<'a> {
         let factor = match self.config.phase(self.iteration) {
             _ if self.config.backbone == Backbone::Scaffold => 0.0,
             Phase::Raw | Phase::Noise => 1.0,
-            Phase::Context | Phase::Exact => PUBLISHED_ITERATIONS / f64::from(self.config.iterations),
+            Phase::Context | Phase::IntegerModel => PUBLISHED_ITERATIONS / f64::from(self.config.iterations),
         };
         Rates { mask: Rate { start: mask.start * factor, end: mask.end * factor }, ..self.config.rates }
     }

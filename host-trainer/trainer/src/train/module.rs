@@ -9,7 +9,7 @@
 //! * drop or rank anchors between two iterations: [`Module::event`];
 //! * leave anchors out of a step: [`Module::pruned_share`].
 //!
-//! It sees blocks of visible anchors and a [`Moment`], never a backbone.
+//! It sees blocks of visible anchors and a [`StepInfo`], never a backbone.
 //!
 //! # A fourth module
 //!
@@ -19,7 +19,7 @@
 //! use pocketsplat_trainer::real::Real;
 //! use pocketsplat_trainer::scene::Scene;
 //! use pocketsplat_trainer::train::module::Module;
-//! use pocketsplat_trainer::step::{Block, Moment, Terms};
+//! use pocketsplat_trainer::step::{Block, StepInfo, Terms};
 //! use serde::{Deserialize, Serialize};
 //!
 //! #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -36,7 +36,7 @@
 //! }
 //!
 //! impl<R: Real> Terms<R> for Short {
-//!     fn on_anchors(&self, _at: &Moment, scene: &Scene<R>, blocks: &mut [Block<R>]) -> R {
+//!     fn on_anchors(&self, _at: &StepInfo, scene: &Scene<R>, blocks: &mut [Block<R>]) -> R {
 //!         let n = blocks.iter().map(|b| b.d_offsets.len()).sum::<usize>().max(1);
 //!         let share = R::real(self.weight / n as f64);
 //!         let width = 3 * scene.shape.n_offsets;
@@ -73,7 +73,7 @@ use super::survey::Survey;
 use crate::ops::Pinhole;
 use crate::real::Real;
 use crate::scene::{ModelShape, Scene};
-use crate::step::{Moment, Terms, Workspace};
+use crate::step::{StepInfo, Terms, Workspace};
 
 pub use detail::Detail;
 pub use distribution::Distribution;
@@ -101,7 +101,7 @@ impl RunView<'_> {
 pub enum AnchorChange {
     /// `[n]` drops the anchors that are not marked.
     Keep(Vec<bool>),
-    /// `[n]` gives every anchor its [rank](crate::scene::Anchors::places).
+    /// `[n]` gives every anchor its [rank](crate::scene::Anchors::prune_rank).
     Rank(Vec<f32>),
 }
 
@@ -121,12 +121,12 @@ pub trait Module: Terms<f32> + Terms<f64> + Debug {
     }
 
     /// What becomes of the anchors after an iteration, when its time has come.
-    fn event(&self, _at: &Moment, _run: &RunView<'_>) -> Option<AnchorChange> {
+    fn event(&self, _at: &StepInfo, _run: &RunView<'_>) -> Option<AnchorChange> {
         None
     }
 
-    /// Share of the anchors that the step leaves out, those of the lowest [places](crate::scene::Anchors::places) first.
-    fn pruned_share(&self, _at: &Moment) -> f32 {
+    /// Share of the anchors that the step leaves out, those of the lowest [places](crate::scene::Anchors::prune_rank) first.
+    fn pruned_share(&self, _at: &StepInfo) -> f32 {
         0.0
     }
 }

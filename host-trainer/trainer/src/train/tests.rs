@@ -27,7 +27,7 @@ fn the_rate_falls_and_masks_close_where_bits_weigh() {
         let mut trainer = Trainer::new(&capture, config).unwrap();
         let steps = trained(&mut trainer);
         for (phase, rate) in &steps {
-            assert_eq!(rate.is_some(), matches!(phase, Phase::Context | Phase::Exact));
+            assert_eq!(rate.is_some(), matches!(phase, Phase::Context | Phase::IntegerModel));
         }
         let rates: Vec<f64> = steps.iter().filter_map(|(_, rate)| Some(rate.as_ref()?.bits.iter().sum())).collect();
         let finished = trainer.finish().unwrap();

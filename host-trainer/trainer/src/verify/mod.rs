@@ -15,7 +15,7 @@ pub use trial::{Breach, Trial};
 const FILLS: [(u8, usize); 5] = [(0x00, 0), (0xFF, 0), (0x5A, 1), (0x11, 2), (0xC3, 3)];
 
 /// Every way to draw what `budget` says that `bundle` has: residency and strips, whatever its limit of memory.
-pub fn ways(bundle: &Bundle<'_>, budget: Budget) -> impl Iterator<Item = Budget> + use<> {
+pub fn plan_variants(bundle: &Bundle<'_>, budget: Budget) -> impl Iterator<Item = Budget> + use<> {
     let strips = STRIPS.map(Strips::Exactly);
     let baked = bundle.n_gaussians(0).map(|_| Residency::Baked);
     baked
@@ -93,11 +93,11 @@ pub fn memory_does_not_show(bundle: &Bundle<'_>, plan: Plan, camera: &Camera) ->
 ///
 /// # Errors
 /// A sentence that says what happened instead.
-pub fn ways_agree(bundle: &Bundle<'_>, budget: Budget, camera: &Camera) -> Result<(), Violation> {
+pub fn variants_match(bundle: &Bundle<'_>, budget: Budget, camera: &Camera) -> Result<(), Violation> {
     let draw = |budget: &Budget| -> Result<Trial, Breach> { Trial::run(bundle, bundle.plan(budget)?, camera, 0, 0) };
     let scene = |r: &FrameReport| (r.splats, r.tile_splats, r.pixel_splats);
     let expected = draw(&budget).map_err(|breach| breach.to_string())?;
-    for way in ways(bundle, budget) {
+    for way in plan_variants(bundle, budget) {
         let Budget { residency, strips, .. } = way;
         let drawn = draw(&way).map_err(|breach| format!("{residency:?}, {strips:?}: {breach}"))?;
         // With less memory for splats than the view has, what a strip has no place for differs from way to way.

@@ -2,8 +2,8 @@ use glam::DVec3;
 use pocketsplat_core::Bundle;
 
 use super::{SMALL, camera, info, options, random_scene};
-use crate::bundle::manifest::{cameras_to_measure, measure};
 use crate::bundle::{CodedScene, Coder, WriteError, WriteOptions, code};
+use crate::manifest::{cameras_to_measure, measure};
 use crate::render::decoder::core_image_of_tiers;
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::View;

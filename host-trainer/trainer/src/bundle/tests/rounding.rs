@@ -9,8 +9,8 @@ use crate::integer_model;
 use crate::ops::noise::Stream;
 use crate::ops::perturb;
 use crate::scene::{ModelShape, Scene};
-use crate::step::coding::{Coding, Exact, RateTerms};
-use crate::step::{Loss, Target, Workspace};
+use crate::step::coding::{Coding, IntegerModel, RateTerms};
+use crate::step::{Loss, TargetView, Workspace};
 use crate::train::Trainer;
 use crate::train::test_capture::{tiny_capture, tiny_hac_config};
 
@@ -38,13 +38,13 @@ fn the_decoder_draws_what_the_last_step_drew() {
     let section = integer_model::section(model, shape.values_per_anchor()).expect("an integer form");
     let network = integer_model::rounded(model, shape.values_per_anchor()).expect("an integer form");
     let integers = integer_model::parse(&section, &shape).expect("a sound section");
-    let exact = Some(Exact { context: &integers, network: &network });
+    let exact = Some(IntegerModel { context: &integers, network: &network });
     let rate = RateTerms { lambda: 0.0, sample: 0.0, mask: 0.0, grid: 0.0 };
     let last_step = Coding::Context { stream: Stream::of_run(config.seed), rate, exact };
     let mut workspace = Workspace::new(&shape);
     for camera in trainer.cameras() {
         let truth = vec![0.0; 3 * camera.size_px.iter().product::<usize>()];
-        let target = Target { camera, truth: &truth, mask: None, background: [0.0; 3] };
+        let target = TargetView::new(camera, truth, None, [0.0; 3]);
         let mut squared_error = |scene: &Scene<f32>, coding: &Coding<'_, f32>| {
             workspace.step(scene, &target, &Loss::plain(config.loss), coding).squared_error
         };

@@ -247,7 +247,7 @@ fn a_scene_is_widened_value_by_value() {
             log_scales: vec![0.1; 6],
             offsets: vec![1.0, 2.0, 3.0],
             mask_logits: vec![1.0],
-            places: Vec::new(),
+            prune_rank: Vec::new(),
         },
         heads: Heads::filled(&shape, 0.125),
         context: None,

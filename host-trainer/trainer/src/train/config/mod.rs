@@ -297,7 +297,7 @@ impl TrainConfig {
     pub fn phase(&self, iteration: u32) -> Phase {
         let after = |share: f64| iteration > self.iteration_at(share);
         match self.backbone {
-            Backbone::Hac if after(self.hac.exact_from) => Phase::Exact,
+            Backbone::Hac if after(self.hac.exact_from) => Phase::IntegerModel,
             Backbone::Hac if after(self.hac.context_from) => Phase::Context,
             Backbone::Hac if after(self.hac.noise_from) => Phase::Noise,
             _ => Phase::Raw,

@@ -29,8 +29,8 @@ fn phases_follow_each_other_at_their_shares_of_the_run() {
         (10_000, Phase::Noise),
         (10_001, Phase::Context),
         (28_500, Phase::Context),
-        (28_501, Phase::Exact),
-        (30_000, Phase::Exact),
+        (28_501, Phase::IntegerModel),
+        (30_000, Phase::IntegerModel),
     ] {
         assert_eq!(config.phase(iteration), phase, "{iteration}");
         assert_eq!(TrainConfig::default().phase(iteration), Phase::Raw);

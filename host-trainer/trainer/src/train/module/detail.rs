@@ -6,7 +6,7 @@ use super::Module;
 use crate::ops::high_pass;
 use crate::real::Real;
 use crate::scene::ModelShape;
-use crate::step::{Moment, Pictures, Terms};
+use crate::step::{ImagePair, StepInfo, Terms};
 use crate::train::config::{ConfigError, within};
 
 /// Adds a residual to each Gaussian's colour, H = x + F(x ⊕ f) (the plug-and-play paper, eq. 5; see [`crate::ops::detail`]).
@@ -40,11 +40,11 @@ impl Module for Detail {
 }
 
 impl<R: Real> Terms<R> for Detail {
-    fn on_image(&self, _at: &Moment, pictures: &Pictures<'_, R>, d_image: &mut [R]) -> R {
+    fn on_image(&self, _at: &StepInfo, images: &ImagePair<'_, R>, d_image: &mut [R]) -> R {
         if self.weight == 0.0 {
             return R::ZERO;
         }
-        let Pictures { image, truth, size_px, level } = *pictures;
+        let ImagePair { image, truth, size_px, level } = *images;
         high_pass::forward_backward(level, image, truth, size_px, R::real(self.weight), d_image)
     }
 }

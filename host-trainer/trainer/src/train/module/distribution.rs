@@ -4,10 +4,10 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::Module;
-use crate::ops::normality::{Moments, Weights};
+use crate::ops::normality::{ChannelMoments, Weights};
 use crate::real::Real;
 use crate::scene::Scene;
-use crate::step::{Block, Moment, Terms};
+use crate::step::{Block, StepInfo, Terms};
 use crate::train::config::{ConfigError, within};
 
 /// Pulls the features of each channel, over the anchors of a view, towards the standard normal distribution, and their
@@ -38,7 +38,7 @@ impl Module for Distribution {
 }
 
 impl<R: Real> Terms<R> for Distribution {
-    fn on_anchors(&self, at: &Moment, scene: &Scene<R>, blocks: &mut [Block<R>]) -> R {
+    fn on_anchors(&self, at: &StepInfo, scene: &Scene<R>, blocks: &mut [Block<R>]) -> R {
         if !at.scaled {
             return R::ZERO;
         }
@@ -51,7 +51,7 @@ impl<R: Real> Terms<R> for Distribution {
         let parts: Vec<&[R]> = features.iter().map(Vec::as_slice).collect();
         let share = 1.0 / width.max(1) as f64;
         let weights = Weights { divergence: R::real(self.divergence * share), spread: R::real(self.spread * share) };
-        let moments = Moments::of(&parts, width);
+        let moments = ChannelMoments::of(&parts, width);
         blocks.par_iter_mut().zip(&features).for_each(|(block, features)| {
             moments.backward(&weights, features, &mut block.d_features);
         });

@@ -9,7 +9,7 @@ use super::{AnchorChange, Module, RunView};
 use crate::ops::opacity_target::forward_backward;
 use crate::real::Real;
 use crate::scene::Scene;
-use crate::step::{Block, Moment, Terms};
+use crate::step::{Block, StepInfo, Terms};
 use crate::train::config::{ConfigError, within};
 
 /// What the event does with the anchors it picks.
@@ -19,8 +19,7 @@ pub enum Form {
     /// Deletes them (the paper).
     #[default]
     Hard,
-    /// Deletes nothing: every anchor gets a place, and each later step draws the scene without those up to a random place,
-    /// so that one scene is good at every pruning rate.
+    /// Deletes nothing: every anchor gets a prune rank, and each later step draws the scene without those below a random one, so that one scene is good at every pruning rate.
     Tiered,
 }
 
@@ -101,29 +100,29 @@ impl Pruning {
         Self { form: Form::Tiered, rate: hard.pool, rank: Rank::Contribution, choice: PoolChoice::Lowest, ..hard }
     }
 
-    /// The place of every anchor, 0 to 1: the share of the anchors that goes before it.
+    /// The prune rank of every anchor, 0 to 1: the share of the anchors that goes before it.
     ///
-    /// The pool's places are given out at random, all others by rank; equal ranks keep their order.
+    /// Those of the pool are shuffled, all others follow their scores; equal scores keep their order.
     ///
-    /// * `rank`: `[n]`, low goes first.
-    pub fn places(&self, rank: &[f32], rng: &mut ChaCha8Rng) -> Vec<f32> {
-        let n = rank.len();
+    /// * `scores`: `[n]`, low goes first.
+    pub fn prune_ranks(&self, scores: &[f32], rng: &mut ChaCha8Rng) -> Vec<f32> {
+        let n = scores.len();
         let mut order: Vec<usize> = (0..n).collect();
-        order.sort_by(|a, b| rank[*a].total_cmp(&rank[*b]));
+        order.sort_by(|a, b| scores[*a].total_cmp(&scores[*b]));
         if self.choice == PoolChoice::Random {
             order[..of_length(self.pool, n)].shuffle(rng);
         }
-        let mut places = vec![0.0; n];
-        for (place, anchor) in order.into_iter().enumerate() {
-            places[anchor] = as_place(place as f64 / n as f64);
+        let mut ranks = vec![0.0; n];
+        for (prune_rank, anchor) in order.into_iter().enumerate() {
+            ranks[anchor] = as_prune_rank(prune_rank as f64 / n as f64);
         }
-        places
+        ranks
     }
 }
 
-/// A share as anchors' [places](crate::scene::Anchors::places) are kept, so that it compares equal with them.
-#[expect(clippy::cast_possible_truncation, reason = "places are f32")]
-fn as_place(share: f64) -> f32 {
+/// A share as anchors' [prune ranks](crate::scene::Anchors::prune_rank) are kept, so that it compares equal with them.
+#[expect(clippy::cast_possible_truncation, reason = "ranks are f32")]
+fn as_prune_rank(share: f64) -> f32 {
     share as f32
 }
 
@@ -144,37 +143,39 @@ impl Module for Pruning {
         within("train.modules.pruning.rate", self.rate, 0.0, most)
     }
 
-    fn event(&self, at: &Moment, run: &RunView<'_>) -> Option<AnchorChange> {
+    fn event(&self, at: &StepInfo, run: &RunView<'_>) -> Option<AnchorChange> {
         if !at.is_at(self.at) || run.scene.anchors.is_empty() {
             return None;
         }
         let survey = run.survey(self.rank == Rank::Contribution);
-        let rank = match self.rank {
+        let scores = match self.rank {
             Rank::Opacity => survey.opacity_per_view(),
             Rank::Contribution => survey.contribution,
         };
         // A stream of its own: the run's other random numbers do not depend on modules.
         let mut rng = ChaCha8Rng::seed_from_u64(run.seed);
         rng.set_stream(1);
-        let places = self.places(&rank, &mut rng);
+        let ranks = self.prune_ranks(&scores, &mut rng);
         Some(match self.form {
-            Form::Tiered => AnchorChange::Rank(places),
-            Form::Hard => AnchorChange::Keep(places.iter().map(|place| *place >= as_place(self.rate)).collect()),
+            Form::Tiered => AnchorChange::Rank(ranks),
+            Form::Hard => {
+                AnchorChange::Keep(ranks.iter().map(|prune_rank| *prune_rank >= as_prune_rank(self.rate)).collect())
+            }
         })
     }
 
-    fn pruned_share(&self, at: &Moment) -> f32 {
+    fn pruned_share(&self, at: &StepInfo) -> f32 {
         if self.form != Form::Tiered || !at.is_after(self.at) || at.stream.uniform(WHOLE_DRAW) < 0.5 {
             return 0.0;
         }
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the number of shares")]
         let tier = (at.stream.uniform(TIER_DRAW) * TIER_SHARES.len() as f32) as usize;
-        as_place(self.rate * TIER_SHARES[tier])
+        as_prune_rank(self.rate * TIER_SHARES[tier])
     }
 }
 
 impl<R: Real> Terms<R> for Pruning {
-    fn on_gaussians(&self, at: &Moment, scene: &Scene<R>, blocks: &mut [Block<R>]) -> R {
+    fn on_gaussians(&self, at: &StepInfo, scene: &Scene<R>, blocks: &mut [Block<R>]) -> R {
         if self.weight == 0.0 || !at.is_after(self.from) {
             return R::ZERO;
         }
@@ -196,29 +197,29 @@ mod tests {
     use crate::train::test_capture::{tiny_capture, tiny_config};
     use crate::train::{TrainConfig, Trainer};
 
-    fn places(pruning: &Pruning, rank: &[f32], seed: u64) -> Vec<f32> {
-        pruning.places(rank, &mut ChaCha8Rng::seed_from_u64(seed))
+    fn prune_ranks(pruning: &Pruning, rank: &[f32], seed: u64) -> Vec<f32> {
+        pruning.prune_ranks(rank, &mut ChaCha8Rng::seed_from_u64(seed))
     }
 
     #[test]
     fn the_pool_goes_at_random_and_the_rest_by_rank() {
         let rank: Vec<f32> = (0..100).map(|i| ((i * 37) % 100) as f32).collect();
-        let random = places(&Pruning::default(), &rank, 1);
+        let random = prune_ranks(&Pruning::default(), &rank, 1);
         let mut sorted = random.clone();
         sorted.sort_by(f32::total_cmp);
-        assert!(sorted.iter().enumerate().all(|(i, place)| *place == i as f32 / 100.0), "every place once");
-        for (place, rank) in random.iter().zip(&rank) {
-            assert_eq!(*place < 0.4, *rank < 40.0, "the pool is the lowest ranks");
-            assert!(*rank < 40.0 || (place - rank / 100.0).abs() < 1e-6, "beyond it the rank decides");
+        assert!(sorted.iter().enumerate().all(|(i, prune_rank)| *prune_rank == i as f32 / 100.0), "every rank once");
+        for (prune_rank, rank) in random.iter().zip(&rank) {
+            assert_eq!(*prune_rank < 0.4, *rank < 40.0, "the pool is the lowest ranks");
+            assert!(*rank < 40.0 || (prune_rank - rank / 100.0).abs() < 1e-6, "beyond it the rank decides");
         }
-        assert_ne!(random, places(&Pruning::default(), &rank, 2));
-        let lowest = places(&Pruning { choice: PoolChoice::Lowest, ..Pruning::default() }, &rank, 1);
-        assert!(lowest.iter().zip(&rank).all(|(place, rank)| (place - rank / 100.0).abs() < 1e-6));
-        assert!(places(&Pruning::default(), &[], 1).is_empty());
+        assert_ne!(random, prune_ranks(&Pruning::default(), &rank, 2));
+        let lowest = prune_ranks(&Pruning { choice: PoolChoice::Lowest, ..Pruning::default() }, &rank, 1);
+        assert!(lowest.iter().zip(&rank).all(|(prune_rank, rank)| (prune_rank - rank / 100.0).abs() < 1e-6));
+        assert!(prune_ranks(&Pruning::default(), &[], 1).is_empty());
     }
 
     /// Trains the tiny capture to its end with a pruning module; returns anchors before and after the event, and the
-    /// places.
+    /// ranks.
     fn run(pruning: Pruning) -> ([usize; 2], Vec<f32>) {
         let capture = tiny_capture();
         let modules = Modules { pruning: Some(pruning), ..Modules::default() };
@@ -232,7 +233,7 @@ mod tests {
             }
             trainer.advance().unwrap();
         }
-        ([before, trainer.scene.anchors.len()], trainer.scene.anchors.places.clone())
+        ([before, trainer.scene.anchors.len()], trainer.scene.anchors.prune_rank.clone())
     }
 
     #[test]
@@ -246,17 +247,17 @@ mod tests {
     #[test]
     fn tiered_pruning_deletes_nothing_and_steps_leave_out_what_their_place_says() {
         let pruning = Pruning { form: Form::Tiered, rate: 0.4, ..Pruning::default() };
-        let ([before, after], places) = run(pruning);
-        assert_eq!((before, places.len()), (after, after));
-        let moment = |iteration| Moment {
+        let ([before, after], ranks) = run(pruning);
+        assert_eq!((before, ranks.len()), (after, after));
+        let info = |iteration| StepInfo {
             iteration,
             iterations: 40,
             phase: crate::step::Phase::Raw,
             scaled: true,
             stream: crate::ops::noise::Stream::of_run(3).branch(iteration),
         };
-        assert!((1..=20).all(|iteration| pruning.pruned_share(&moment(iteration)) == 0.0));
-        let shares: Vec<f32> = (21..4021).map(|iteration| pruning.pruned_share(&moment(iteration))).collect();
+        assert!((1..=20).all(|iteration| pruning.pruned_share(&info(iteration)) == 0.0));
+        let shares: Vec<f32> = (21..4021).map(|iteration| pruning.pruned_share(&info(iteration))).collect();
         let n_whole = shares.iter().filter(|share| **share == 0.0).count();
         assert!((1900..2100).contains(&n_whole), "half of the steps see all anchors: {n_whole}");
         for share in TIER_SHARES {

@@ -10,7 +10,7 @@ use pocketsplat_core::bundle::TierMeasures;
 use pocketsplat_core::{Bundle, DecodeError, chunks_in_view};
 use rayon::prelude::*;
 
-use super::decoded::decoded_scene;
+use crate::bundle::decoded_scene;
 use crate::metrics::psnr_db_masked;
 use crate::ops::Pinhole;
 use crate::render::decoder::core_image_of_tiers;
@@ -21,6 +21,7 @@ use pocketsplat_capture::dataset::View;
 
 /// Most training cameras that are measured.
 const MAX_TRAINING_CAMERAS: usize = 48;
+
 /// Cameras worth measuring: at most 48 of those given, evenly picked, and 24 on an orbit around what they look at.
 ///
 /// * `cameras`: in the normalised frame.

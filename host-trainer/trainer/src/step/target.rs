@@ -1,0 +1,58 @@
+//! The photograph that a step compares with.
+
+use pocketsplat_capture::dataset::Image;
+
+use crate::ops::Pinhole;
+use crate::real::Real;
+
+/// A photograph, the camera that took it, and where it shows the scene.
+#[derive(Clone, Debug)]
+pub struct TargetView<'a, R> {
+    /// The camera that took it.
+    pub camera: &'a Pinhole<R>,
+    /// `[height, width]` pixels that count; all of them without a mask.
+    pub mask: Option<&'a [bool]>,
+    /// What lies behind everything.
+    pub background: [R; 3],
+    truth: Vec<R>,
+}
+
+impl<'a, R: Real> TargetView<'a, R> {
+    /// * `truth`: planes `[3, height, width]`, 0 to 1; pixels that do not count become 0, as they do in what is drawn.
+    pub fn new(camera: &'a Pinhole<R>, mut truth: Vec<R>, mask: Option<&'a [bool]>, background: [R; 3]) -> Self {
+        clear_masked(&mut truth, mask);
+        Self { camera, mask, background, truth }
+    }
+
+    /// Planes `[3, height, width]`, 0 to 1; 0 where pixels do not count.
+    pub fn truth(&self) -> &[R] {
+        &self.truth
+    }
+
+    /// Pixels that count, at least 1.
+    pub(super) fn n_counted(&self) -> usize {
+        self.mask.map_or(self.truth.len() / 3, |mask| mask.iter().filter(|valid| **valid).count()).max(1)
+    }
+}
+
+/// Makes the pixels that do not count zero in every plane: as in the photograph, so that no loss sees them.
+pub(super) fn clear_masked<R: Real>(planes: &mut [R], mask: Option<&[bool]>) {
+    let Some(mask) = mask else { return };
+    for plane in planes.chunks_exact_mut(mask.len()) {
+        for (value, valid) in plane.iter_mut().zip(mask) {
+            *value = if *valid { *value } else { R::ZERO };
+        }
+    }
+}
+
+/// Planes `[3, height, width]` of an image, 0 to 1.
+pub fn planes(image: &Image) -> Vec<f32> {
+    let n = (image.width_px * image.height_px) as usize;
+    let mut planes = vec![0.0; 3 * n];
+    for (channel, plane) in planes.chunks_exact_mut(n).enumerate() {
+        for (out, rgb) in plane.iter_mut().zip(image.rgb.chunks_exact(3)) {
+            *out = f32::from(rgb[channel]) / 255.0;
+        }
+    }
+    planes
+}

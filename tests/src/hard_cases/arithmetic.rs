@@ -189,7 +189,7 @@ pub(super) fn family() -> Family {
             1e-3,
             divergence_rounding,
         ),
-        error("divergence, gradient", "the same, in both forms", "of the direction's terms", 1e-5, divergence_gradient),
+        error("divergence, gradient", "the same", "of the direction's terms", 1e-5, divergence_gradient),
         error("bits", "values 10³⁰ steps away, scales of 2⁻⁵⁰ to 2⁵⁰", "worst error, bits", 0.1, bits_rounding),
         error(
             "SSIM of even images",

@@ -2,13 +2,22 @@
 
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_core::Bundle;
-use pocketsplat_trainer::bundle::{self, CodedScene, Coder, WriteOptions};
+use pocketsplat_trainer::bundle::{self, ChannelCoding, CodedScene, WriteOptions, mean_steps};
 use pocketsplat_trainer::manifest;
 
 use crate::frame::info_for;
 use crate::scenes::{Case, cameras, masked, random_scene, with_context};
 
-/// The coders, each by force.
+/// What codes the symbols of a test bundle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Coder {
+    /// Tables of the context's mean steps.
+    Static,
+    /// The context.
+    Context,
+}
+
+/// Both.
 pub const CODERS: [Coder; 2] = [Coder::Static, Coder::Context];
 
 /// The pruning rates of the tiers: half of the anchors, three quarters, all.
@@ -23,8 +32,12 @@ pub fn tiered(case: &Case, coder: Coder, chunk_anchors: u16) -> Vec<u8> {
 
 fn coded(case: &Case, coder: Coder, chunk_anchors: u16) -> CodedScene {
     let scene = with_context(masked(random_scene(case), case.seed), case.seed);
+    let channels = match coder {
+        Coder::Static => ChannelCoding::Tables(mean_steps(&scene).expect("a scene with a context")),
+        Coder::Context => ChannelCoding::Context,
+    };
     let options = WriteOptions {
-        coder,
+        channels,
         importance: Some((0..scene.anchors.len()).map(|anchor| anchor as f32).collect()),
         pruning_rates: PRUNING_RATES.to_vec(),
         chunk_anchors,

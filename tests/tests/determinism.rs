@@ -2,11 +2,10 @@
 
 use pocketsplat_capture::dataset::{Capture, LoadOptions, load};
 use pocketsplat_capture::synth::{SynthOptions, write_capture};
-use pocketsplat_trainer::bundle::{self, BundleInfo, WriteOptions};
+use pocketsplat_trainer::encode::Encoding;
 use pocketsplat_trainer::scene::{ModelShape, Scene};
 use pocketsplat_trainer::step::StepReport;
 use pocketsplat_trainer::train::config::Backbone;
-use pocketsplat_trainer::train::finish::Finished;
 use pocketsplat_trainer::train::{Observer, TrainConfig, Trainer};
 
 /// Keeps the number of anchors after each step.
@@ -40,16 +39,9 @@ fn train(capture: &Capture, backbone: Backbone, seed: u64, n_threads: usize) -> 
         let mut counts = AnchorCounts::default();
         let mut trainer = Trainer::new(capture, config).expect("the capture trains");
         trainer.run(&mut counts).expect("no step is dropped");
-        let info = BundleInfo {
-            normalisation: capture.normalisation,
-            background: [0; 3],
-            training_px: [40; 2],
-            preview: capture.train[0].camera.clone(),
-        };
-        let Finished { scene, importance, .. } = trainer.finish().expect("the context has an integer form");
-        let options = WriteOptions { importance: Some(importance), ..WriteOptions::default() };
-        let bytes = bundle::write(&scene, &info, &options).expect("the scene is finite").bytes;
-        (bytes, counts.0)
+        let finished = trainer.finish().expect("the context has an integer form");
+        let fitted = Encoding::default().encode(finished, capture, &[]).expect("the scene is finite");
+        (fitted.written.bytes, counts.0)
     })
 }
 

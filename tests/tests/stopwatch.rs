@@ -1,10 +1,9 @@
 //! What a stopwatch is told: every stage that a frame goes through, in order, and no change of the frame by it.
 
-use conformance::bundles::{CODERS, measured};
+use conformance::bundles::{CODERS, Coder, measured};
 use conformance::frame::{Frame, to_core};
 use conformance::scenes::{CASES, cameras};
 use pocketsplat_core::{Budget, Bundle, Decoder, Residency, Stage, Stopwatch, Strips};
-use pocketsplat_trainer::bundle::Coder;
 
 /// Remembers the stages.
 #[derive(Default)]

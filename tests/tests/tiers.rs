@@ -1,11 +1,10 @@
 //! Each tier's scene is part of the next one's, a file cut at a tier's end is that scene, and plans follow the tiers.
 
-use conformance::bundles::{CODERS, tier_ends, tiered};
+use conformance::bundles::{CODERS, Coder, tier_ends, tiered};
 use conformance::frame::{Frame, budget_for, draw, to_core};
 use conformance::scenes::{CASES, cameras};
 use pocketsplat_core::bundle::AnchorSite;
 use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport};
-use pocketsplat_trainer::bundle::Coder;
 
 fn camera() -> Camera {
     to_core(&cameras()[0].1)

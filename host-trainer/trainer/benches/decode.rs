@@ -11,7 +11,7 @@ use pocketsplat_capture::dataset::Normalisation;
 use pocketsplat_core::Bundle;
 use pocketsplat_core::bundle::AnchorSite;
 use pocketsplat_core::context::Context;
-use pocketsplat_trainer::bundle::{self, BundleInfo, Coder, SizeReport, WriteOptions};
+use pocketsplat_trainer::bundle::{self, BundleInfo, ChannelCoding, SizeReport, WriteOptions, mean_steps};
 use pocketsplat_trainer::scene::{Anchors, Heads, ModelShape, Scene};
 use pocketsplat_trainer::train::context_start::initial_context;
 use rand::{RngExt, SeedableRng};
@@ -45,7 +45,7 @@ fn scene() -> Scene<f32> {
     scene
 }
 
-fn written(coder: Coder) -> Vec<u8> {
+fn written(scene: &Scene<f32>, channels: ChannelCoding) -> Vec<u8> {
     let info = BundleInfo {
         normalisation: Normalisation { centre: DVec3::ZERO, scale: 1.0 },
         background: [0; 3],
@@ -59,8 +59,8 @@ fn written(coder: Coder) -> Vec<u8> {
             height_px: 400,
         },
     };
-    let options = WriteOptions { coder, ..WriteOptions::default() };
-    bundle::write(&scene(), &info, &options).expect("the scene is sound").bytes
+    let options = WriteOptions { channels, ..WriteOptions::default() };
+    bundle::write(scene, &info, &options).expect("the scene is sound").bytes
 }
 
 /// Decodes every anchor to values; returns their sites.
@@ -95,8 +95,10 @@ fn predict(context: &Context<'_>, sites: &[AnchorSite], with_models: bool) {
 }
 
 fn benchmark(criterion: &mut Criterion) {
-    for (name, coder) in [("context", Coder::Context), ("tables", Coder::Static)] {
-        let bytes = written(coder);
+    let scene = scene();
+    let tables = ChannelCoding::Tables(mean_steps(&scene).expect("a scene with a context"));
+    for (name, channels) in [("context", ChannelCoding::Context), ("tables", tables)] {
+        let bytes = written(&scene, channels);
         let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
         let mut values = vec![0.0; usize::from(bundle.header().max_chunk_anchors) * bundle.header().n_channels()];
         let sites = decode(&bundle, &mut values);

@@ -2,14 +2,15 @@
 //!
 //! Modules in the order data flows through them, each importing only from those before it:
 //! [`real`] and [`camera`] → [`scene`] → [`ops`] → [`step`] → [`train`] → [`bundle`] → [`render`] → [`metrics`]. [`integer_model`] is
-//! what `train`'s last iterations and `bundle` share; [`device`], [`effects`], [`cost`] and [`verify`] ask all of them what fits a
-//! device.
+//! what `train`'s last iterations and `bundle` share; [`device`] says what a device holds and [`encode`] makes the bundle of a run that
+//! fits it; [`effects`], [`cost`] and [`verify`] ask all of them.
 
 pub mod bundle;
 pub mod camera;
 pub mod cost;
 pub mod device;
 pub mod effects;
+pub mod encode;
 #[cfg(test)]
 pub(crate) mod finite_difference;
 pub mod instructions;

@@ -1,7 +1,7 @@
 //! Symbols at and beyond the ends of their tables, under both coders.
 
 use pocketsplat_core::Bundle;
-use pocketsplat_trainer::bundle::{self, Coder, WriteOptions};
+use pocketsplat_trainer::bundle::{self, ChannelCoding, WriteOptions};
 use pocketsplat_trainer::scene::Scene;
 
 use super::picture::{camera, codec_error};
@@ -21,8 +21,8 @@ far, is escaped. A table of one symbol takes no bits at all.";
 const STATIC: f64 = 0.505;
 const CONTEXT: f64 = 0.922;
 
-fn error_of(scene: &Scene<f32>, coder: Coder) -> f64 {
-    let options = WriteOptions { coder, chunk_anchors: 64, ..WriteOptions::default() };
+fn error_of(scene: &Scene<f32>, channels: ChannelCoding) -> f64 {
+    let options = WriteOptions { channels, chunk_anchors: 64, ..WriteOptions::default() };
     let written = bundle::write(scene, &info_for(&camera()), &options).expect("a scene to be written");
     codec_error(scene, &Bundle::parse(&written.bytes).expect("the writer's bundle is sound"))
 }
@@ -58,20 +58,20 @@ pub(super) fn family() -> Family {
             farthest(&mut scene.anchors.features, 0.1);
             farthest(&mut scene.anchors.log_scales, 0.05);
             farthest(&mut scene.anchors.offsets, 0.1);
-            error_of(&scene, Coder::Static)
+            error_of(&scene, ChannelCoding::default())
         }),
         error("one outlier", "a feature at 32,767 steps among zeros", steps, STATIC, || {
             let mut scene = scene();
             scene.anchors.features.fill(0.0);
             scene.anchors.features[11] = 3276.7;
-            error_of(&scene, Coder::Static)
+            error_of(&scene, ChannelCoding::default())
         }),
         error("one value", "every value the same: tables of one symbol", steps, STATIC, || {
             let mut scene = scene();
             for values in [&mut scene.anchors.features, &mut scene.anchors.log_scales, &mut scene.anchors.offsets] {
                 values.fill(-1.25);
             }
-            error_of(&scene, Coder::Static)
+            error_of(&scene, ChannelCoding::default())
         }),
         error("every symbol once", "features spread over all of ±32,767 steps", steps, STATIC, || {
             let mut scene = scene();
@@ -79,23 +79,23 @@ pub(super) fn family() -> Family {
             for (i, value) in scene.anchors.features.iter_mut().enumerate() {
                 *value = (2.0 * i as f32 / n - 1.0) * 3276.7;
             }
-            error_of(&scene, Coder::Static)
+            error_of(&scene, ChannelCoding::default())
         }),
         error("beyond a context's tables", "values hundreds of steps from the mean", base_steps, CONTEXT, || {
             let mut scene = with_context(scene(), 5);
             for (i, value) in scene.anchors.features.iter_mut().enumerate().step_by(7) {
                 *value = if i % 2 == 0 { 655.0 } else { -655.0 };
             }
-            error_of(&scene, Coder::Context)
+            error_of(&scene, ChannelCoding::Context)
         }),
         error("a context too sure", "scales of 2⁻¹⁰⁰: every symbol escapes", base_steps, CONTEXT, || {
-            error_of(&opinionated(0.0, -100.0), Coder::Context)
+            error_of(&opinionated(0.0, -100.0), ChannelCoding::Context)
         }),
         error("a context too vague", "scales of 2¹⁰⁰, held at the widest", base_steps, CONTEXT, || {
-            error_of(&opinionated(0.0, 100.0), Coder::Context)
+            error_of(&opinionated(0.0, 100.0), ChannelCoding::Context)
         }),
         error("a context far off", "means 2,000 base steps away", base_steps, CONTEXT, || {
-            error_of(&opinionated(2000.0, 0.0), Coder::Context)
+            error_of(&opinionated(2000.0, 0.0), ChannelCoding::Context)
         }),
     ];
     Family { title: "Codec", answer: ANSWER, analysis: ANALYSIS, cases }

@@ -11,15 +11,19 @@ use glam::{DMat3, DVec3};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::Normalisation;
 use pocketsplat_core::context::{GridFrame, GridLevel, LevelKind};
-use pocketsplat_trainer::bundle::{self, BundleInfo, Coder, WriteOptions, annotate::annotate};
+use pocketsplat_trainer::bundle::{self, BundleInfo, ChannelCoding, WriteOptions, annotate::annotate};
 use pocketsplat_trainer::scene::QuantisationSteps;
 use pocketsplat_trainer::scene::{Anchors, ContextModel, Heads, ModelShape, Scene};
 
 /// The document when none is named.
 const FORMAT_DOC: &str = "decoder-core/src/bundle/FORMAT.md";
-/// The examples: name in the document's markers, coder, bundle beside the document.
-const EXAMPLES: [(&str, Coder, &str); 2] =
-    [("static", Coder::Static, "example.psb"), ("context", Coder::Context, "example-context.psb")];
+/// Steps of the example with tables.
+const STEPS: QuantisationSteps = QuantisationSteps { feature: 0.25, log_scale: 0.25, offset: 0.25 };
+/// The examples: name in the document's markers, coding, bundle beside the document.
+const EXAMPLES: [(&str, ChannelCoding, &str); 2] = [
+    ("static", ChannelCoding::Tables(STEPS), "example.psb"),
+    ("context", ChannelCoding::Context, "example-context.psb"),
+];
 
 /// Annotates a bundle, or the format document's examples.
 #[derive(Parser)]
@@ -43,15 +47,15 @@ fn main() -> Result<()> {
         return Ok(());
     }
     let Some(document) = args.check.as_ref().or(args.write.as_ref()) else {
-        for (name, coder, _) in EXAMPLES {
-            println!("{name}\n{}", dump(&example(coder)?)?);
+        for (name, channels, _) in EXAMPLES {
+            println!("{name}\n{}", dump(&example(channels)?)?);
         }
         return Ok(());
     };
     let text = std::fs::read_to_string(document).with_context(|| format!("{}: can not be read", document.display()))?;
     let mut fresh = text.clone();
-    for (name, coder, file) in EXAMPLES {
-        let bytes = example(coder)?;
+    for (name, channels, file) in EXAMPLES {
+        let bytes = example(channels)?;
         fresh = with_example(&fresh, name, &dump(&bytes)?)
             .with_context(|| format!("{}: no place for the dump", document.display()))?;
         let bundle = document.with_file_name(file);
@@ -91,8 +95,9 @@ fn with_example(text: &str, name: &str, dump: &str) -> Result<String> {
 
 /// Three anchors in two tiers, one of them with a hidden offset, one with a value so far out that it takes the escape; the
 /// other example has a context model of one level and two hidden units, coded heads, and a detail head of one unit.
-fn example(coder: Coder) -> Result<Vec<u8>> {
-    let detail_hidden = usize::from(coder == Coder::Context);
+fn example(channels: ChannelCoding) -> Result<Vec<u8>> {
+    let has_context = channels == ChannelCoding::Context;
+    let detail_hidden = usize::from(has_context);
     let shape = ModelShape { dilation_compensation: true, detail_hidden, ..ModelShape::plain(2, 2) };
     let mut heads = Heads::filled(&shape, 0.25);
     (heads.opacity.w1[0], heads.covariance.w2[3]) = (0.5, -0.25);
@@ -111,7 +116,7 @@ fn example(coder: Coder) -> Result<Vec<u8>> {
             prune_rank: vec![],
         },
         heads,
-        context: (coder == Coder::Context).then(|| context(&shape)),
+        context: has_context.then(|| context(&shape)),
     };
     let info = BundleInfo {
         normalisation: Normalisation { centre: DVec3::new(1.0, 2.0, -0.5), scale: 2.0 },
@@ -127,11 +132,10 @@ fn example(coder: Coder) -> Result<Vec<u8>> {
         },
     };
     let options = WriteOptions {
-        steps: QuantisationSteps { feature: 0.25, log_scale: 0.25, offset: 0.25 },
-        coder,
+        channels,
         importance: Some(vec![3.0, 1.0, 2.0]),
         pruning_rates: vec![0.4, 0.0],
-        head_fraction_bits: (coder == Coder::Context).then_some([2, 2]),
+        head_fraction_bits: has_context.then_some([2, 2]),
         ..WriteOptions::default()
     };
     Ok(bundle::write(&scene, &info, &options).context("the example can not be written")?.bytes)

@@ -11,7 +11,7 @@ use glam::{DMat3, DQuat, DVec3};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::Normalisation;
 use pocketsplat_core::context::{GridFrame, GridLevel, LevelKind};
-use pocketsplat_trainer::bundle::{self, BundleInfo, Coder, WriteOptions};
+use pocketsplat_trainer::bundle::{self, BundleInfo, ChannelCoding, WriteOptions};
 use pocketsplat_trainer::scene::{Anchors, ContextModel, Head, Heads, ModelShape, Scene};
 
 /// Writes a small bundle made by hand.
@@ -242,7 +242,7 @@ fn main() -> anyhow::Result<()> {
     };
     let n_planet = planet().len();
     let options = WriteOptions {
-        coder: if with_context { Coder::Context } else { Coder::Static },
+        channels: if with_context { ChannelCoding::Context } else { ChannelCoding::default() },
         importance: Some((0..scene.anchors.len()).map(|anchor| if anchor < n_planet { 1.0 } else { 0.0 }).collect()),
         pruning_rates: vec![(scene.anchors.len() - n_planet) as f32 / scene.anchors.len() as f32, 0.0],
         chunk_anchors: 64,

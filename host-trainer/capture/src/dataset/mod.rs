@@ -115,6 +115,12 @@ pub struct Capture {
 pub const EXTENT: f64 = 5.0;
 
 impl Capture {
+    /// Size of the training view with the longest side, pixels.
+    pub fn largest_px(&self) -> [u32; 2] {
+        let sizes = self.train.iter().map(|view| [view.camera.width_px, view.camera.height_px]);
+        sizes.max_by_key(|size| size[0].max(size[1])).unwrap_or_default()
+    }
+
     /// The voxel size for anchors, normalised units: [`suggested_voxel_size`] of the capture's points, and
     /// [`PUBLISHED_VOXEL_SIZE`] where they are random and their spacing says nothing about the scene.
     pub fn suggested_voxel_size(&self) -> f64 {

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::Image;
 use pocketsplat_capture::synth::{SynthOptions, write_capture};
+use pocketsplat_trainer::encode::Encoding;
 use pocketsplat_trainer::render::decoder::core_image;
 use pocketsplat_trainer::render::reference::ReferenceScene;
 use pocketsplat_trainer::train::TrainConfig;
@@ -13,7 +14,6 @@ use pocketsplat_trainer::train::module::{Detail, Distribution, Modules, Pruning}
 
 use super::bundle::BundleFile;
 use super::capture::{CaptureArgs, Split};
-use super::encode::Encoding;
 use super::eval::{Measurements, Renderer, evaluate, reference_image};
 use super::{output, train};
 use crate::config::CaptureOptions;

@@ -5,14 +5,12 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use pocketsplat_capture::dataset::Capture;
-use pocketsplat_trainer::device::{Limits, Processor};
-use pocketsplat_trainer::effects::{Effect, PilotCapture, PilotDevice, Trials, measure};
-use pocketsplat_trainer::train::finish::Finished;
+use pocketsplat_trainer::device::Processor;
+use pocketsplat_trainer::effects::{Effect, PilotCapture, Trials, measure};
 use serde::Serialize;
 
 use crate::config::RunConfig;
 
-use super::encode::Encoding;
 use super::output;
 
 /// The table of pilots in a run's folder.
@@ -51,14 +49,8 @@ pub(crate) fn resolve(config: &mut RunConfig, capture: &Capture, folder: &Path) 
     };
     let started = Instant::now();
     let target = config.effects.target.unwrap_or(Processor::CortexM4);
-    let device = PilotDevice { ram_bytes: config.encoding.limits.ram_bytes, target };
-    let encoding = for_pilots(&config.encoding);
-    let encode = |finished: Finished, capture: &Capture| {
-        let fitted = encoding.encode(finished, capture, &[])?;
-        Ok::<_, anyhow::Error>(fitted.written.bytes)
-    };
     let begins = |effects: &[Effect]| eprintln!("effects: pilot with {}", Effect::names(effects));
-    let trials = measure(&pilots, &config.train, &config.effects.price, device, encode, begins)
+    let trials = measure(&pilots, &config.train, &config.effects.price, target, &config.encoding, begins)
         .context("measuring the effects; force them with --effects to do without")?;
     let chosen = trials.each.iter().find(|trial| trial.chosen).map_or(&[][..], |trial| &trial.effects);
     eprint!("{}", table(&trials, target));
@@ -66,12 +58,6 @@ pub(crate) fn resolve(config: &mut RunConfig, capture: &Capture, folder: &Path) 
     output::write_whole(&folder.join(TABLE), &csv(&trials)?)?;
     config.train = Effect::measured_only(chosen, &config.train);
     Ok(())
-}
-
-/// Bundles of one tier, cut to nothing: pilots are smaller than the scene that has to fit.
-fn for_pilots(encoding: &Encoding) -> Encoding {
-    let limits = Limits { ram_bytes: None, flash_bytes: None, ..encoding.limits };
-    Encoding { tiers: vec![0.0], limits, ..encoding.clone() }
 }
 
 fn csv(trials: &Trials) -> Result<Vec<u8>> {

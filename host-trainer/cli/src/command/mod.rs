@@ -8,7 +8,6 @@ mod cost;
 mod demo;
 mod doctor;
 mod effects;
-pub(crate) mod encode;
 mod eval;
 mod fit;
 mod inspect;

@@ -26,8 +26,8 @@ where
 mod tests {
     use clap::builder::TypedValueParser as _;
     use pocketsplat_capture::synth::SurfaceFinish;
-    use pocketsplat_trainer::bundle::Coder;
     use pocketsplat_trainer::device::Processor;
+    use pocketsplat_trainer::encode::CoderChoice;
     use pocketsplat_trainer::train::config::Backbone;
     use serde::de::DeserializeOwned;
 
@@ -44,7 +44,7 @@ mod tests {
     #[test]
     fn every_name_shown_is_parsed() {
         all_parse::<SurfaceFinish>(SURFACES);
-        all_parse::<Coder>(CODERS);
+        all_parse::<CoderChoice>(CODERS);
         all_parse::<Processor>(TARGETS);
         all_parse::<Backbone>(BACKBONES);
     }

@@ -2,9 +2,9 @@
 
 use anyhow::{Result, bail};
 use pocketsplat_capture::dataset::Background;
-use pocketsplat_trainer::bundle::Coder;
 use pocketsplat_trainer::device::ModelChoice;
 use pocketsplat_trainer::effects::{Effect, Request};
+use pocketsplat_trainer::encode::CoderChoice;
 use pocketsplat_trainer::scene::QuantisationSteps;
 use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::config::Backbone;
@@ -50,9 +50,10 @@ pub(crate) struct QualityOptions {
     #[arg(long, value_name = "STEP", help_heading = QUALITY, hide_short_help = true,
         help = with_default("Quantisation step of the features of a scaffold scene", QuantisationSteps::default().feature))]
     feature_step: Option<f32>,
-    /// Source of the symbols' frequencies: static tables, the context model, or the better of the two [default: auto]
-    #[arg(long, value_parser = one_of::<Coder>(CODERS), help_heading = OUTPUT, hide_short_help = true)]
-    coder: Option<Coder>,
+    /// Source of the symbols' frequencies: static tables, the context model, or auto: tables for a device that decodes in every
+    /// frame, else the smaller file where it is as good [default: auto]
+    #[arg(long, value_parser = one_of::<CoderChoice>(CODERS), help_heading = OUTPUT, hide_short_help = true)]
+    coder: Option<CoderChoice>,
     /// Shares of the anchors that smaller devices leave out, falling to 0 [default: 0.4,0.3,0.2,0.1,0.05,0]
     #[arg(long, value_name = "RATES", value_delimiter = ',', help_heading = OUTPUT, hide_short_help = true)]
     tiers: Option<Vec<f32>>,

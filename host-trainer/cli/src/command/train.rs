@@ -9,15 +9,14 @@ use pocketsplat_capture::dataset::{Background, Capture, View};
 use pocketsplat_core::Bundle;
 use pocketsplat_core::budget::MAX_FRAME_PX;
 use pocketsplat_trainer::bundle::Written;
-use pocketsplat_trainer::device::Fitted;
 use pocketsplat_trainer::effects::Effect;
+use pocketsplat_trainer::encode::{Encoding, Fitted};
 use pocketsplat_trainer::train::finish::Finished;
 use pocketsplat_trainer::train::run::{Ending, Interval, RunError, RunFolder};
 use pocketsplat_trainer::train::{TrainConfig, Trainer};
 use serde::Serialize;
 
 use super::capture::CaptureArgs;
-use super::encode::{Encoding, largest_px};
 use super::progress::Progress;
 use super::train_args::Args;
 use super::{effects, output, stop};
@@ -89,7 +88,7 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
 pub(crate) fn load(config: &mut RunConfig) -> Result<Capture> {
     let source = CaptureArgs { dataset: config.dataset.clone(), options: config.capture.clone() };
     let capture = source.load(config.train.seed)?;
-    let (largest, most) = (largest_px(&capture).into_iter().max().unwrap_or(0), u32::from(MAX_FRAME_PX));
+    let (largest, most) = (capture.largest_px().into_iter().max().unwrap_or(0), u32::from(MAX_FRAME_PX));
     if largest > most {
         bail!(
             "the photographs are {largest} px wide or high and the decoder draws {most}; use --max-resolution {most}"

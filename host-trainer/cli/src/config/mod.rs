@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::Background;
+use pocketsplat_trainer::encode::Encoding;
 use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::config::Backbone;
 use serde::{Deserialize, Serialize};
@@ -15,8 +16,6 @@ use toml::{Table, Value};
 
 pub(crate) use capture::CaptureOptions;
 pub(crate) use effects::EffectsConfig;
-
-use crate::command::encode::Encoding;
 
 /// Everything a run was asked for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -103,7 +102,7 @@ impl RunConfig {
     /// Refuses what no run can use, before any work starts.
     pub(crate) fn check(&self) -> Result<()> {
         self.train.validate()?;
-        self.encoding.validate()
+        Ok(self.encoding.check(self.train.backbone)?)
     }
 
     /// The first key at which two configurations differ in what decides the result, with both values.

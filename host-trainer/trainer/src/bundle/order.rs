@@ -77,13 +77,22 @@ impl Placement {
     }
 }
 
-/// Anchors up to and with each tier.
-fn tier_ends(n_anchors: usize, pruning_rates: &[f32]) -> Result<Vec<usize>, WriteError> {
-    let falling = pruning_rates.iter().is_sorted_by(|a, b| a >= b);
+/// Checks that pruning rates fall from below 1 to 0, one a tier.
+///
+/// # Errors
+/// [`WriteError::Tiers`].
+pub fn check_pruning_rates(pruning_rates: &[f32]) -> Result<(), WriteError> {
+    let falling = pruning_rates.iter().is_sorted_by(|a, b| a > b);
     let inside = pruning_rates.iter().all(|rate| (0.0..1.0).contains(rate));
     if pruning_rates.last() != Some(&0.0) || pruning_rates.len() > usize::from(MAX_TIERS) || !falling || !inside {
         return Err(WriteError::Tiers { found: pruning_rates.to_vec(), most: MAX_TIERS.into() });
     }
+    Ok(())
+}
+
+/// Anchors up to and with each tier.
+fn tier_ends(n_anchors: usize, pruning_rates: &[f32]) -> Result<Vec<usize>, WriteError> {
+    check_pruning_rates(pruning_rates)?;
     Ok(pruning_rates.iter().map(|&rate| ((1.0 - f64::from(rate)) * n_anchors as f64).round() as usize).collect())
 }
 

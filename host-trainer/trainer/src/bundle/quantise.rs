@@ -7,7 +7,7 @@ use super::WriteError;
 use super::channels::{ChannelName, ContextWork, GROUPS};
 use super::order::Placement;
 use crate::ops::perturb;
-use crate::scene::{ModelShape, Scene};
+use crate::scene::{ModelShape, QuantisationSteps, Scene};
 
 /// Where an anchor's steps come from.
 #[derive(Clone, Copy)]
@@ -70,18 +70,25 @@ pub(super) fn check_lengths(scene: &Scene<f32>) -> Result<(), WriteError> {
     Ok(())
 }
 
+/// Checks that steps are finite and positive.
+///
+/// # Errors
+/// [`WriteError::NotPositive`].
+pub fn check_steps(steps: QuantisationSteps) -> Result<(), WriteError> {
+    let QuantisationSteps { feature, log_scale, offset } = steps;
+    for (what, step) in [("feature step", feature), ("log-scale step", log_scale), ("offset step", offset)] {
+        if !(step.is_finite() && step > 0.0) {
+            return Err(WriteError::NotPositive { what, value: step.into() });
+        }
+    }
+    Ok(())
+}
+
 /// The [symbol](perturb::symbol) of every value that is coded.
 ///
 /// # Errors
-/// [`WriteError::NotFinite`], [`WriteError::BeyondSymbols`], [`WriteError::NotPositive`].
+/// [`WriteError::NotFinite`], [`WriteError::BeyondSymbols`].
 pub(super) fn quantise(scene: &Scene<f32>, placement: &Placement, steps: StepSource<'_>) -> Result<Rows, WriteError> {
-    if let StepSource::Fixed(steps) = steps {
-        for (what, step) in ["feature step", "log-scale step", "offset step"].into_iter().zip(steps) {
-            if !(step.is_finite() && step > 0.0) {
-                return Err(WriteError::NotPositive { what, value: step.into() });
-            }
-        }
-    }
     let n_channels = scene.shape.values_per_anchor();
     let lattice: Vec<[i32; 3]> = placement.order.iter().map(|&anchor| scene.anchors.lattice[anchor]).collect();
     let parts = placement.chunks.par_iter().map(|chunk| {

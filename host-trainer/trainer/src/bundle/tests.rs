@@ -18,7 +18,7 @@ use pocketsplat_core::context::{GridFrame, GridLevel, LevelKind};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{BundleInfo, Coder, WriteOptions};
+use super::{BundleInfo, ChannelCoding, WriteOptions};
 use crate::scene::QuantisationSteps;
 use crate::scene::{Anchors, ContextModel, Heads, ModelShape, Scene};
 use pocketsplat_capture::camera::Camera;
@@ -26,6 +26,8 @@ use pocketsplat_capture::dataset::Normalisation;
 
 /// One step for every channel, so that a test can compute symbols by itself.
 const STEPS: QuantisationSteps = QuantisationSteps { feature: 0.02, log_scale: 0.02, offset: 0.02 };
+/// Tables of them.
+const TABLES: ChannelCoding = ChannelCoding::Tables(STEPS);
 
 /// A scene of random anchors in a cube before the camera, the same for the same arguments.
 ///
@@ -122,8 +124,8 @@ fn info() -> BundleInfo {
     }
 }
 
-fn options(coder: Coder, chunk_anchors: u16) -> WriteOptions {
-    WriteOptions { steps: STEPS, coder, chunk_anchors, ..WriteOptions::default() }
+fn options(channels: ChannelCoding, chunk_anchors: u16) -> WriteOptions {
+    WriteOptions { channels, chunk_anchors, ..WriteOptions::default() }
 }
 
 fn write_bytes(scene: &Scene<f32>, options: &WriteOptions) -> Vec<u8> {
@@ -131,10 +133,16 @@ fn write_bytes(scene: &Scene<f32>, options: &WriteOptions) -> Vec<u8> {
 }
 
 /// A random scene and its bundle, under static tables or a context.
-fn write_random(coder: Coder, shape: ModelShape, n_anchors: usize, seed: u64, chunk: u16) -> (Scene<f32>, Vec<u8>) {
+fn write_random(
+    channels: ChannelCoding,
+    shape: ModelShape,
+    n_anchors: usize,
+    seed: u64,
+    chunk: u16,
+) -> (Scene<f32>, Vec<u8>) {
     let scene = random_scene(shape, n_anchors, seed);
-    let scene = if coder == Coder::Context { with_context(scene, seed) } else { scene };
-    let bytes = write_bytes(&scene, &options(coder, chunk));
+    let scene = if channels == ChannelCoding::Context { with_context(scene, seed) } else { scene };
+    let bytes = write_bytes(&scene, &options(channels, chunk));
     (scene, bytes)
 }
 

@@ -1,46 +1,44 @@
 //! From a scene to its coded sections.
 
 use pocketsplat_core::bundle::Features;
-use pocketsplat_core::context::Context;
 use rayon::prelude::*;
 
 use super::channel_coder::ChannelCoder;
-use super::channels::{ContextWork, GROUPS};
 use super::chunk::{ChunkRows, Models};
 use super::ink::InkBox;
 use super::lattice::LatticeModel;
 use super::layout::{self, CodedScene, Counts, Parts};
 use super::mask::MaskModel;
 use super::order::Placement;
-use super::quantise::{Rows, StepSource, check_lengths, quantise};
+use super::quantise::{Rows, StepSource, check_lengths, check_steps, quantise};
 use super::table::TableSet;
 use super::{BundleInfo, SizeReport, WriteError, directory, heads};
 use crate::integer_model;
-use crate::scene::QuantisationSteps;
-use crate::scene::Scene;
+use crate::scene::{QuantisationSteps, Scene};
 
-/// What gives the symbols of the channels their frequencies.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Coder {
-    /// The smaller file. Quality is not compared: tables' steps do not follow the place.
-    #[default]
-    Auto,
-    /// Tables, the same for all anchors: cheap to decode.
-    Static,
-    /// The scene's context model.
+/// What gives the channels their steps, and their symbols their frequencies.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ChannelCoding {
+    /// These steps and static tables, the same for all anchors: cheap to decode.
+    Tables(QuantisationSteps),
+    /// The scene's context model, anchor by anchor.
     Context,
 }
+
+impl Default for ChannelCoding {
+    fn default() -> Self {
+        Self::Tables(QuantisationSteps::default())
+    }
+}
+
+/// Pruning rates of the tiers where nobody asks for others.
+pub const PRUNING_RATES: [f32; 6] = [0.40, 0.30, 0.20, 0.10, 0.05, 0.0];
 
 /// How a scene is written.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WriteOptions {
-    /// Steps of a scene without a context model.
-    pub steps: QuantisationSteps,
-    /// What gives the symbols their frequencies.
-    pub coder: Coder,
-    /// Steps of static tables for a scene that has a context model, in units of the mean steps of that.
-    pub mean_step_share: f32,
+    /// Steps and frequencies of the channels.
+    pub channels: ChannelCoding,
     /// `[n_anchors]` larger for anchors that matter more; they come into earlier tiers. Without it there is one tier.
     pub importance: Option<Vec<f32>>,
     /// Pruning rates of the tiers, falling to 0: the share of anchors that the scene of tiers up to each one lacks.
@@ -55,11 +53,9 @@ pub struct WriteOptions {
 impl Default for WriteOptions {
     fn default() -> Self {
         Self {
-            steps: QuantisationSteps::default(),
-            coder: Coder::Auto,
-            mean_step_share: 1.0,
+            channels: ChannelCoding::default(),
             importance: None,
-            pruning_rates: vec![0.40, 0.30, 0.20, 0.10, 0.05, 0.0],
+            pruning_rates: PRUNING_RATES.to_vec(),
             head_fraction_bits: Some([9, 9]),
             chunk_anchors: 256,
         }
@@ -77,9 +73,7 @@ pub struct Written {
 
 /// Codes a scene: all of its bundle but what is measured.
 ///
-/// Anchors without a drawn offset are left out. With a scene that has a context model the static coder takes each group's
-/// mean step over the anchors (geometric, to the eighth of an octave): about the same quality where steps differ little from place to
-/// place, decibels less where they differ much.
+/// Anchors without a drawn offset are left out. Every value is rounded here, once.
 ///
 /// # Errors
 /// [`WriteError`] naming the anchor and channel, weight, or count that has no place in the format.
@@ -88,26 +82,9 @@ pub fn code(scene: &Scene<f32>, info: &BundleInfo, options: &WriteOptions) -> Re
     let n_chunk = usize::from(options.chunk_anchors).max(1);
     let placement = Placement::of(scene, options.importance.as_deref(), &options.pruning_rates, n_chunk)?;
     let writer = Writer { scene, info, placement, options };
-    match (&scene.context, options.coder) {
-        (None, Coder::Context) => Err(WriteError::NoContext),
-        (None, Coder::Auto | Coder::Static) => {
-            let QuantisationSteps { feature, log_scale, offset } = options.steps;
-            writer.with_tables([feature, log_scale, offset])
-        }
-        (Some(model), coder) => {
-            let section = integer_model::section(model, scene.shape.values_per_anchor())?;
-            let context = integer_model::parse(&section, &scene.shape).map_err(WriteError::ReadBack)?;
-            let with_context = || writer.with_context(&context, &section);
-            let with_tables = || writer.with_tables(writer.mean_steps(&context, model.base_steps));
-            match coder {
-                Coder::Context => with_context(),
-                Coder::Static => with_tables(),
-                Coder::Auto => {
-                    let [by_context, by_tables] = [with_context()?, with_tables()?];
-                    Ok(if by_tables.file_len() < by_context.file_len() { by_tables } else { by_context })
-                }
-            }
-        }
+    match options.channels {
+        ChannelCoding::Tables(steps) => writer.with_tables(steps),
+        ChannelCoding::Context => writer.with_context(),
     }
 }
 
@@ -128,31 +105,21 @@ struct Writer<'s> {
 }
 
 impl Writer<'_> {
-    fn with_tables(&self, steps: [f32; 3]) -> Result<CodedScene, WriteError> {
+    fn with_tables(&self, steps: QuantisationSteps) -> Result<CodedScene, WriteError> {
+        check_steps(steps)?;
+        let steps = steps.into();
         let rows = quantise(self.scene, &self.placement, StepSource::Fixed(steps))?;
         let tables = TableSet::build(&rows, &self.scene.shape, steps);
         let section = tables.section();
         self.code(&rows, ChannelCoder::Tables(tables), section)
     }
 
-    fn with_context(&self, context: &Context<'_>, section: &[u8]) -> Result<CodedScene, WriteError> {
-        let rows = quantise(self.scene, &self.placement, StepSource::Context(context))?;
-        self.code(&rows, ChannelCoder::Context(*context), section.to_vec())
-    }
-
-    /// `share·base·2^(q̄/8)` for each group, q̄ being the mean exponent over the anchors.
-    fn mean_steps(&self, context: &Context<'_>, base_steps: [f32; 3]) -> [f32; 3] {
-        let mut work = ContextWork::default();
-        let mut sums = [0_i64; 3];
-        for &anchor in &self.placement.order {
-            let steps = work.enter(context, self.scene.anchors.lattice[anchor]);
-            for (sum, group) in sums.iter_mut().zip(GROUPS) {
-                *sum += i64::from(steps.exponent(group));
-            }
-        }
-        let n = self.placement.order.len().max(1) as f64;
-        let share = self.options.mean_step_share;
-        std::array::from_fn(|group| share * base_steps[group] * (sums[group] as f64 / n / 8.0).exp2() as f32)
+    fn with_context(&self) -> Result<CodedScene, WriteError> {
+        let model = self.scene.context.as_ref().ok_or(WriteError::NoContext)?;
+        let section = integer_model::section(model, self.scene.shape.values_per_anchor())?;
+        let context = integer_model::parse(&section, &self.scene.shape).map_err(WriteError::ReadBack)?;
+        let rows = quantise(self.scene, &self.placement, StepSource::Context(&context))?;
+        self.code(&rows, ChannelCoder::Context(context), section.clone())
     }
 
     /// * `coder`: the section of `channels`.

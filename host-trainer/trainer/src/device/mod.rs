@@ -1,13 +1,11 @@
-//! Budget in, bundle out: the model that a device affords, and the scene cut until it fits.
+//! Budget in, model out: the scene that a device affords, chosen before anything is trained.
 //!
-//! [`choose`] picks a model before anything is trained, from what scenes take on average; [`fitted`] writes what was trained
-//! and leaves out the least important anchors until the bundle keeps the limits, so that these hold whatever was trained.
+//! [`choose`] goes by what scenes take on average; [`Encoding::encode`](crate::encode::Encoding::encode) then leaves out the least
+//! important anchors until the bundle keeps the limits, so that these hold whatever was trained.
 
 mod choice;
-mod fitting;
 
 pub use choice::{BindingLimit, Infeasible, ModelChoice, choose};
-pub use fitting::{Fitted, NoFit, fitted};
 
 use serde::{Deserialize, Serialize};
 

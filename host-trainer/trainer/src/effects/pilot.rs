@@ -5,14 +5,14 @@ use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, MaxSplats};
 use super::search::{Trials, search};
 use super::{Effect, Price, Worth};
 use crate::camera::core_camera;
-use crate::device::Processor;
+use crate::device::{Limits, Processor};
+use crate::encode::{CoderChoice, EncodeError, Encoding};
 use crate::instructions::predict;
 use crate::metrics::psnr_db_masked;
 use crate::render::decoder::image_of;
 use crate::scene::Scene;
 use crate::step::StepReport;
 use crate::train::config::{Backbone, MIN_VIEWS_TO_HOLD_OUT};
-use crate::train::finish::Finished;
 use crate::train::module::Modules;
 use crate::train::{Observer, TrainConfig, TrainError, Trainer};
 use pocketsplat_capture::dataset::{Capture, Image, View};
@@ -71,13 +71,27 @@ fn halved(view: &View) -> View {
     }
 }
 
+/// Why pilots could not be measured.
+#[derive(Debug, thiserror::Error)]
+pub enum PilotError {
+    /// A pilot could not be trained.
+    #[error(transparent)]
+    Train(#[from] TrainError),
+    /// Its scene has no bundle.
+    #[error(transparent)]
+    Encode(#[from] EncodeError),
+    /// Its bundle cannot be drawn.
+    #[error("a pilot's bundle cannot be drawn; please report it")]
+    Draw(#[from] DecodeError),
+}
+
 /// For which device pilots are drawn.
-#[derive(Clone, Copy, Debug)]
-pub struct PilotDevice {
+#[derive(Clone, Copy)]
+struct PilotDevice {
     /// Scratch memory of the decoder, bytes; without limit where there is none.
-    pub ram_bytes: Option<u64>,
+    ram_bytes: Option<u64>,
     /// Whose instructions count.
-    pub target: Processor,
+    target: Processor,
 }
 
 /// Trains pilots without effects, with each and with those that gained something, less what does not pay among them; says what each was
@@ -86,25 +100,30 @@ pub struct PilotDevice {
 /// Quality is measured on held-out views at the pilots' size, instructions at the capture's own. Cost: six to nine eighths of the
 /// run's iterations, each about a quarter of one of the run's.
 ///
-/// * `config`: of the run, for whose length, seed and widths the pilots stand; other effects than the measured are kept. * `encode`: a
-///   scene as a bundle. * `begins`: hears of each pilot before it is trained, by its effects.
+/// * `config`: of the run, for whose length, seed and widths the pilots stand; other effects than the measured are kept.
+/// * `target`: whose instructions count. * `encoding`: of the run; bundles of pilots have one tier and are cut to nothing, and are
+///   drawn within its RAM. * `begins`: hears of each pilot before it is trained, by its effects.
 ///
 /// # Errors
-/// Those of training, of `encode` and of decoding.
-pub fn measure<E: From<TrainError> + From<DecodeError>>(
+/// [`PilotError`].
+pub fn measure(
     capture: &PilotCapture,
     config: &TrainConfig,
     price: &Price,
-    device: PilotDevice,
-    mut encode: impl FnMut(Finished, &Capture) -> Result<Vec<u8>, E>,
+    target: Processor,
+    encoding: &Encoding,
     mut begins: impl FnMut(&[Effect]),
-) -> Result<Trials, E> {
-    let mut worth_of = |effects: &[Effect], config: &TrainConfig| -> Result<Worth, E> {
+) -> Result<Trials, PilotError> {
+    let device = PilotDevice { ram_bytes: encoding.limits.ram_bytes, target };
+    // Pilots are smaller than the scene that has to fit.
+    let limits = Limits { ram_bytes: None, flash_bytes: None, ..encoding.limits };
+    let encoding = Encoding { coder: CoderChoice::Auto, tiers: vec![0.0], limits, ..encoding.clone() };
+    let mut worth_of = |effects: &[Effect], config: &TrainConfig| -> Result<Worth, PilotError> {
         begins(effects);
         let mut trainer = Trainer::new(&capture.reduced, pilot_config(config, effects))?;
         trainer.run(&mut Silent)?;
-        let bytes = encode(trainer.finish()?, &capture.reduced)?;
-        Ok(worth(&bytes, capture, device)?)
+        let fitted = encoding.encode(trainer.finish()?, &capture.reduced, &[])?;
+        Ok(worth(&fitted.written.bytes, capture, device)?)
     };
     search(price, |effects, seed| worth_of(effects, &TrainConfig { seed: config.seed ^ seed, ..*config }))
 }
@@ -165,7 +184,6 @@ impl Observer for Silent {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bundle::{BundleInfo, WriteOptions, write};
     use crate::train::test_capture::{many_views, tiny_config};
 
     #[test]
@@ -188,22 +206,11 @@ mod tests {
     fn every_measured_effect_has_a_pilot_and_what_costs_too_much_is_not_chosen() {
         let capture = many_views(12);
         let pilots = PilotCapture::of(&capture).expect("views to spare");
-        let encode = |finished: Finished, capture: &Capture| {
-            let info = BundleInfo {
-                normalisation: capture.normalisation,
-                background: [0; 3],
-                training_px: [12, 12],
-                preview: capture.train[0].camera.clone(),
-            };
-            Ok::<_, Box<dyn std::error::Error + Send + Sync>>(
-                write(&finished.scene, &info, &WriteOptions::default())?.bytes,
-            )
-        };
-        let device = PilotDevice { ram_bytes: None, target: Processor::CortexM4 };
         let dear = Price { effect_db: 1e3, ..Price::default() };
         let mut begun = Vec::new();
         let begins = |effects: &[Effect]| begun.push(Effect::names(effects));
-        let trials = measure(&pilots, &tiny_config(160), &dear, device, encode, begins).expect("pilots");
+        let trials = measure(&pilots, &tiny_config(160), &dear, Processor::CortexM4, &Encoding::default(), begins);
+        let trials = trials.expect("pilots");
         assert_eq!(begun, ["none", "none", "view-colour", "view-geometry", "detail", "anisotropy"]);
         assert!(trials.chance_db > 0.0, "two seeds, two scenes");
         assert!(trials.each.iter().all(|trial| trial.worth.instructions > 0.0 && trial.worth.psnr_db.is_finite()));

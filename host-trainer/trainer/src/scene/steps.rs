@@ -13,6 +13,27 @@ pub struct QuantisationSteps {
     pub offset: f32,
 }
 
+impl QuantisationSteps {
+    /// All of them times `share`.
+    pub fn scaled(self, share: f32) -> Self {
+        Self::from(<[f32; 3]>::from(self).map(|step| share * step))
+    }
+}
+
+impl From<QuantisationSteps> for [f32; 3] {
+    /// In the order of the channels.
+    fn from(steps: QuantisationSteps) -> Self {
+        [steps.feature, steps.log_scale, steps.offset]
+    }
+}
+
+impl From<[f32; 3]> for QuantisationSteps {
+    /// Of steps in the order of the channels.
+    fn from([feature, log_scale, offset]: [f32; 3]) -> Self {
+        Self { feature, log_scale, offset }
+    }
+}
+
 impl Default for QuantisationSteps {
     fn default() -> Self {
         Self { feature: 0.1, log_scale: 0.05, offset: 0.1 }

@@ -4,8 +4,7 @@ use pocketsplat_core::{Bundle, SectionKind};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{SMALL, options, random_scene, write_bytes};
-use crate::bundle::Coder;
+use super::{SMALL, TABLES, options, random_scene, write_bytes};
 use crate::render::decoder::core_image;
 use crate::scene::{ModelShape, Scene};
 use pocketsplat_capture::camera::Camera;
@@ -72,7 +71,7 @@ fn tightly_boxed_scene() -> Scene<f32> {
 
 #[test]
 fn culling_chunks_changes_no_pixel() {
-    let boxed = write_bytes(&tightly_boxed_scene(), &options(Coder::Static, 1));
+    let boxed = write_bytes(&tightly_boxed_scene(), &options(TABLES, 1));
     let unboxed = without_boxes(&boxed);
     let (boxed, unboxed) = (Bundle::parse(&boxed).expect("sound"), Bundle::parse(&unboxed).expect("sealed again"));
     let mut rng = ChaCha8Rng::seed_from_u64(32);

@@ -1,7 +1,7 @@
 use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, ErrorClass, MaxSplats, TileSink};
 
-use super::{SMALL, info, options, random_scene, write_random};
-use crate::bundle::{Coder, WriteOptions, write};
+use super::{SMALL, TABLES, info, options, random_scene, write_random};
+use crate::bundle::{ChannelCoding, WriteOptions, write};
 use crate::scene::ModelShape;
 
 /// The smallest model, so that every bit of its bundle can be tried.
@@ -24,7 +24,7 @@ fn parse_and_draw(bytes: &[u8]) -> Result<(), DecodeError> {
 }
 
 /// A tiny bundle of two tiers.
-fn tiny(coder: Coder) -> Vec<u8> {
+fn tiny(coder: ChannelCoding) -> Vec<u8> {
     let scene = super::with_context(random_scene(TINY, 7, 21), 22);
     let importance = Some(vec![1.0, 7.0, 3.0, 2.0, 5.0, 6.0, 4.0]);
     let options = WriteOptions { importance, pruning_rates: vec![0.5, 0.0], ..options(coder, 3) };
@@ -35,7 +35,7 @@ fn tiny(coder: Coder) -> Vec<u8> {
 
 #[test]
 fn every_truncation_is_an_error_or_a_smaller_scene() {
-    let bytes = tiny(Coder::Static);
+    let bytes = tiny(TABLES);
     parse_and_draw(&bytes).expect("the whole bundle");
     let bundle = Bundle::parse(&bytes).expect("a sound bundle");
     let end = |tier: u8| bundle.tier(tier).expect("a tier").end as usize;
@@ -51,7 +51,7 @@ fn every_truncation_is_an_error_or_a_smaller_scene() {
 
 #[test]
 fn every_flipped_bit_is_an_error_and_damaged_chunks_are_named() {
-    for coder in [Coder::Static, Coder::Context] {
+    for coder in [TABLES, ChannelCoding::Context] {
         let mut bytes = tiny(coder);
         let bundle = Bundle::parse(&bytes).expect("a sound bundle");
         let lens: Vec<usize> = bundle.chunks().map(|chunk| chunk.n_bytes()).collect();
@@ -76,14 +76,14 @@ fn every_flipped_bit_is_an_error_and_damaged_chunks_are_named() {
 
 #[test]
 fn bytes_after_the_end_are_ignored() {
-    let mut bytes = tiny(Coder::Context);
+    let mut bytes = tiny(ChannelCoding::Context);
     bytes.extend([0xFF; 100]);
     parse_and_draw(&bytes).expect("a flash partition longer than its bundle");
 }
 
 #[test]
 fn scratch_one_byte_short_names_the_need() {
-    let (_, bytes) = write_random(Coder::Static, SMALL, 50, 22, 16);
+    let (_, bytes) = write_random(TABLES, SMALL, 50, 22, 16);
     let bundle = Bundle::parse(&bytes).expect("a sound bundle");
     let plan = bundle.plan(&Budget::for_frame(64, 48)).expect("a plan");
     let mut scratch = vec![0; plan.scratch_len() - 1];
@@ -94,7 +94,7 @@ fn scratch_one_byte_short_names_the_need() {
 
 #[test]
 fn too_many_splats_are_counted_and_that_many_then_suffice() {
-    let (_, bytes) = write_random(Coder::Static, SMALL, 50, 22, 16);
+    let (_, bytes) = write_random(TABLES, SMALL, 50, 22, 16);
     let bundle = Bundle::parse(&bytes).expect("a sound bundle");
     let draw = |most| {
         let plan = bundle.plan(&Budget::for_frame(64, 48).with_max_splats(MaxSplats::AtMost(most))).expect("a plan");

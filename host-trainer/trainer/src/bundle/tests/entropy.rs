@@ -7,8 +7,8 @@ use pocketsplat_core::Bundle;
 use pocketsplat_core::entropy::{AnsReader, FREQUENCY_TOTAL, Slot, SymbolModel};
 use proptest::prelude::*;
 
-use super::{SMALL, decoded_rows, write_random};
-use crate::bundle::Coder;
+use super::{SMALL, TABLES, decoded_rows, write_random};
+use crate::bundle::ChannelCoding;
 use crate::bundle::chunk::{ChunkRows, Models};
 
 /// A table over 0..n, for both readers.
@@ -91,7 +91,7 @@ impl DecoderModel<12> for Expected {
 /// What our reader makes of a bundle is what constriction's own decoder finds in its streams, slot by slot.
 #[test]
 fn constriction_reads_real_streams_as_our_reader_does() {
-    for coder in [Coder::Static, Coder::Context] {
+    for coder in [TABLES, ChannelCoding::Context] {
         let (_, bytes) = write_random(coder, SMALL, 500, 71, 64);
         let bundle = Bundle::parse(&bytes).expect("a sound bundle");
         let models = Models::of(&bundle);

@@ -1,8 +1,8 @@
 use glam::DVec3;
 use pocketsplat_core::Bundle;
 
-use super::{SMALL, camera, info, options, random_scene};
-use crate::bundle::{CodedScene, Coder, WriteError, WriteOptions, code};
+use super::{SMALL, TABLES, camera, info, options, random_scene};
+use crate::bundle::{CodedScene, WriteError, WriteOptions, code};
 use crate::manifest::{cameras_to_measure, measure};
 use crate::render::decoder::core_image_of_tiers;
 use pocketsplat_capture::camera::Camera;
@@ -11,7 +11,7 @@ use pocketsplat_capture::dataset::View;
 fn tiered_scene() -> CodedScene {
     let scene = random_scene(SMALL, 900, 61);
     let importance = Some((0..900).map(|i| ((i * 7919) % 900) as f32).collect());
-    let options = WriteOptions { importance, pruning_rates: vec![0.6, 0.3, 0.0], ..options(Coder::Static, 32) };
+    let options = WriteOptions { importance, pruning_rates: vec![0.6, 0.3, 0.0], ..options(TABLES, 32) };
     code(&scene, &info(), &options).expect("a sound scene")
 }
 

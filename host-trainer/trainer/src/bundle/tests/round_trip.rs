@@ -3,10 +3,12 @@ use std::collections::BTreeMap;
 use pocketsplat_core::Bundle;
 use pocketsplat_core::context::Group;
 
-use super::{SMALL, camera, decoded_rows, info, options, random_scene, with_context, write_bytes, write_random};
+use super::{
+    SMALL, TABLES, camera, decoded_rows, info, options, random_scene, with_context, write_bytes, write_random,
+};
 use crate::bundle::annotate::annotate;
 use crate::bundle::channels::ContextWork;
-use crate::bundle::{ChannelName, Coder, SizeReport, WriteError, WriteOptions, write};
+use crate::bundle::{ChannelCoding, ChannelName, SizeReport, WriteError, WriteOptions, mean_steps, write};
 use crate::render::decoder::core_image;
 use crate::render::reference::ReferenceScene;
 use crate::scene::{ModelShape, Scene};
@@ -52,7 +54,7 @@ fn every_symbol_comes_back_under_static_tables() {
         scene.anchors.offsets[0] = 600.0;
         scene.anchors.features[0] = -655.0;
         scene.anchors.mask_logits[0] = 1.0;
-        let bytes = write_bytes(&scene, &options(Coder::Auto, chunk_anchors));
+        let bytes = write_bytes(&scene, &options(TABLES, chunk_anchors));
         let bundle = Bundle::parse(&bytes).expect("a sound bundle");
         assert!(bundle.tables().is_some(), "a scene without context");
         let expected = rows_of_scene(&scene, |_| [0.02; 3]);
@@ -69,7 +71,7 @@ fn every_symbol_comes_back_under_a_context() {
         scene.anchors.offsets[..3].copy_from_slice(&[18.0, -18.0, 1000.0]);
         scene.anchors.features[..2].copy_from_slice(&[655.0, -655.0]);
         scene.anchors.mask_logits[0] = 1.0;
-        let bytes = write_bytes(&scene, &options(Coder::Context, chunk_anchors));
+        let bytes = write_bytes(&scene, &options(ChannelCoding::Context, chunk_anchors));
         let bundle = Bundle::parse(&bytes).expect("a sound bundle");
         let context = bundle.context().expect("the coder asked for");
         let expected = rows_of_scene(&scene, |cell| {
@@ -81,9 +83,10 @@ fn every_symbol_comes_back_under_a_context() {
 }
 
 #[test]
-fn the_static_coder_keeps_a_contexts_mean_steps() {
+fn tables_can_have_a_contexts_mean_steps() {
     let scene = with_context(random_scene(SMALL, 200, 4), 5);
-    let bytes = write_bytes(&scene, &options(Coder::Static, 64));
+    let mean = mean_steps(&scene).expect("a scene with a context");
+    let bytes = write_bytes(&scene, &options(ChannelCoding::Tables(mean), 64));
     let bundle = Bundle::parse(&bytes).expect("a sound bundle");
     let steps: Vec<f32> = bundle.tables().expect("the coder asked for").of_channels().map(|table| table.step).collect();
     let n_channels = SMALL.values_per_anchor();
@@ -96,16 +99,6 @@ fn the_static_coder_keeps_a_contexts_mean_steps() {
         rows_of_bundle(&bundle),
         rows_of_scene(&scene, |_| [steps[0], steps[SMALL.feature_dim], steps[n_channels - 1]])
     );
-}
-
-#[test]
-fn auto_takes_the_shorter_file() {
-    for n_anchors in [20, 3000] {
-        let scene = with_context(random_scene(SMALL, n_anchors, 4), 5);
-        let [auto, fixed, context] =
-            [Coder::Auto, Coder::Static, Coder::Context].map(|coder| write_bytes(&scene, &options(coder, 128)));
-        assert_eq!(auto.len(), fixed.len().min(context.len()), "{n_anchors} anchors");
-    }
 }
 
 #[test]
@@ -129,7 +122,7 @@ fn without_hidden_offsets_masks_cost_nothing() {
 
 #[test]
 fn values_that_do_not_fit_are_named() {
-    let fails = |scene: &Scene<f32>, why: &str| write(scene, &info(), &options(Coder::Auto, 64)).expect_err(why);
+    let fails = |scene: &Scene<f32>, why: &str| write(scene, &info(), &options(TABLES, 64)).expect_err(why);
     let shown = || {
         let mut scene = random_scene(SMALL, 10, 7);
         scene.anchors.mask_logits.fill(1.0);
@@ -152,7 +145,7 @@ fn values_that_do_not_fit_are_named() {
         "{error}"
     );
     scene.anchors.mask_logits[3 * 2 + 1] = -10.0;
-    write(&scene, &info(), &options(Coder::Auto, 64)).expect("what is not drawn is not coded");
+    write(&scene, &info(), &options(TABLES, 64)).expect("what is not drawn is not coded");
     let mut scene = shown();
     scene.heads.opacity.b1[2] = 1e6;
     let error = fails(&scene, "too large for half");
@@ -168,13 +161,13 @@ fn values_that_do_not_fit_are_named() {
     scene.anchors.lattice[8] = scene.anchors.lattice[5];
     let error = fails(&scene, "two of a cell");
     assert!(matches!(error, WriteError::SharedCell { anchors: [5, 8], .. }), "{error}");
-    let error = write(&shown(), &info(), &options(Coder::Context, 64)).expect_err("no context to code with");
+    let error = write(&shown(), &info(), &options(ChannelCoding::Context, 64)).expect_err("no context to code with");
     assert_eq!(error, WriteError::NoContext, "{error}");
 }
 
 #[test]
 fn the_annotated_dump_shows_every_byte_once() {
-    for coder in [Coder::Static, Coder::Context] {
+    for coder in [TABLES, ChannelCoding::Context] {
         let (_, bytes) = write_random(coder, SMALL, 40, 9, 16);
         let dump = annotate(&bytes, usize::MAX).expect("a sound bundle");
         let shown = dump.lines().filter_map(|line| {
@@ -189,7 +182,7 @@ fn the_annotated_dump_shows_every_byte_once() {
 
 #[test]
 fn the_size_report_accounts_for_every_byte() {
-    for coder in [Coder::Static, Coder::Context] {
+    for coder in [TABLES, ChannelCoding::Context] {
         let scene = with_context(random_scene(SMALL, 700, 9), 10);
         let importance = Some((0..700).map(|i| (i % 13) as f32).collect());
         let written = write(&scene, &info(), &WriteOptions { importance, ..options(coder, 128) }).expect("sound");
@@ -207,10 +200,11 @@ fn the_size_report_accounts_for_every_byte() {
 #[test]
 fn large_scenes_pay_little_for_states_and_container() {
     let shape = ModelShape { feature_dim: 16, n_offsets: 6, ..SMALL };
-    for coder in [Coder::Static, Coder::Context] {
-        let scene = with_context(random_scene(shape, 6000, 9), 10);
+    let scene = with_context(random_scene(shape, 6000, 9), 10);
+    let mean_tables = ChannelCoding::Tables(mean_steps(&scene).expect("a scene with a context"));
+    for coder in [mean_tables, ChannelCoding::Context] {
         let importance = Some((0..6000).map(|i| (i % 101) as f32).collect());
-        let options = WriteOptions { importance, ..WriteOptions { coder, ..WriteOptions::default() } };
+        let options = WriteOptions { channels: coder, importance, ..WriteOptions::default() };
         let written = write(&scene, &info(), &options).expect("a sound scene");
         let report = written.report;
         let over = report.states() / (report.ideal.total() / 8.0);
@@ -222,9 +216,7 @@ fn large_scenes_pay_little_for_states_and_container() {
 
 #[test]
 fn the_decoder_draws_what_the_oracle_draws() {
-    for (seed, coder, compensation) in
-        [(11, Coder::Static, false), (12, Coder::Static, true), (13, Coder::Context, true)]
-    {
+    for (seed, coder, compensation) in [(11, TABLES, false), (12, TABLES, true), (13, ChannelCoding::Context, true)] {
         let shape = ModelShape { dilation_compensation: compensation, ..SMALL };
         let (_, bytes) = write_random(coder, shape, 2500, seed, 128);
         let bundle = Bundle::parse(&bytes).expect("a sound bundle");

@@ -4,7 +4,7 @@ use pocketsplat_core::Bundle;
 
 use super::{SMALL, options, random_scene, with_context, write_bytes};
 use crate::bundle::channels::{ContextWork, GROUPS};
-use crate::bundle::{Coder, decoded_scene};
+use crate::bundle::{ChannelCoding, decoded_scene};
 use crate::integer_model;
 use crate::ops::noise::Stream;
 use crate::ops::perturb;
@@ -16,7 +16,7 @@ use crate::train::test_capture::{tiny_capture, tiny_hac_config};
 
 /// The bundle of a scene under its context model.
 fn coded_by_context(scene: &Scene<f32>) -> Vec<u8> {
-    write_bytes(scene, &options(Coder::Context, 64))
+    write_bytes(scene, &options(ChannelCoding::Context, 64))
 }
 
 #[test]

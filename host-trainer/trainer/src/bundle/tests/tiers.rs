@@ -2,8 +2,8 @@ use std::collections::BTreeSet;
 
 use pocketsplat_core::Bundle;
 
-use super::{SMALL, camera, decoded_rows, info, options, random_scene, with_context};
-use crate::bundle::{Coder, WriteError, WriteOptions, write};
+use super::{SMALL, TABLES, camera, decoded_rows, info, options, random_scene, with_context};
+use crate::bundle::{ChannelCoding, WriteError, WriteOptions, write};
 use crate::render::decoder::{core_image, core_image_of_tiers};
 
 const RATES: [f32; 3] = [0.5, 0.2, 0.0];
@@ -13,7 +13,7 @@ fn importance(n: usize) -> Vec<f32> {
     (0..n).map(|i| ((i * 7919) % n) as f32).collect()
 }
 
-fn tiered(coder: Coder, chunk_anchors: u16) -> (crate::scene::Scene<f32>, Vec<u8>) {
+fn tiered(coder: ChannelCoding, chunk_anchors: u16) -> (crate::scene::Scene<f32>, Vec<u8>) {
     let mut scene = with_context(random_scene(SMALL, 400, 51), 52);
     scene.anchors.mask_logits.fill(1.0);
     let options = WriteOptions {
@@ -27,7 +27,7 @@ fn tiered(coder: Coder, chunk_anchors: u16) -> (crate::scene::Scene<f32>, Vec<u8
 
 #[test]
 fn tiers_hold_the_most_important_anchors() {
-    let (scene, bytes) = tiered(Coder::Static, 64);
+    let (scene, bytes) = tiered(TABLES, 64);
     let bundle = Bundle::parse(&bytes).expect("a sound bundle");
     let cells: Vec<[i32; 3]> = decoded_rows(&bundle).iter().map(|(site, _)| site.lattice).collect();
     let mut by_importance: Vec<usize> = (0..400).collect();
@@ -43,7 +43,7 @@ fn tiers_hold_the_most_important_anchors() {
 
 #[test]
 fn a_file_cut_at_a_tiers_end_is_the_smaller_scene() {
-    for coder in [Coder::Static, Coder::Context] {
+    for coder in [TABLES, ChannelCoding::Context] {
         let (_, bytes) = tiered(coder, 32);
         let whole = Bundle::parse(&bytes).expect("a sound bundle");
         let rows = decoded_rows(&whole);

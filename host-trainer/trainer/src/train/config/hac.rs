@@ -59,7 +59,7 @@ impl Default for Hac {
 impl Hac {
     /// [`Self::base_steps`] in the order of the channels.
     pub fn base_steps(&self) -> [f32; 3] {
-        [self.base_steps.feature, self.base_steps.log_scale, self.base_steps.offset]
+        self.base_steps.into()
     }
 
     /// Each setting with its name and limits.

@@ -1,0 +1,87 @@
+use pocketsplat_capture::dataset::Capture;
+use pocketsplat_core::Bundle;
+
+use super::{CoderChoice, EncodeError, Encoding, Fitted};
+use crate::bundle::WriteError;
+use crate::device::Limits;
+use crate::scene::QuantisationSteps;
+use crate::train::Trainer;
+use crate::train::config::Backbone;
+use crate::train::finish::Finished;
+use crate::train::test_capture::{tiny_capture, tiny_hac_config};
+
+fn finished(capture: &Capture) -> Finished {
+    let mut trainer = Trainer::new(capture, tiny_hac_config(80)).expect("a sound capture");
+    while !trainer.is_done() {
+        trainer.advance().expect("a sound step");
+    }
+    trainer.finish().expect("the context has an integer form")
+}
+
+/// The step of the first feature, where tables code it.
+fn feature_step(fitted: &Fitted) -> Option<f32> {
+    let bundle = Bundle::parse(&fitted.written.bytes).expect("a sound bundle");
+    bundle.tables().and_then(|tables| tables.of_channels().next().map(|table| table.step))
+}
+
+#[test]
+fn a_device_gets_the_finest_tables_that_its_flash_holds() {
+    let capture = tiny_capture();
+    let finished = finished(&capture);
+    let encode = |coder, limits| {
+        let encoding = Encoding { coder, limits, ..Encoding::default() };
+        encoding.encode(finished.clone(), &capture, &[]).expect("a bundle")
+    };
+    assert_eq!(feature_step(&encode(CoderChoice::Context, Limits::default())), None);
+    let coarse = encode(CoderChoice::Static, Limits::default());
+    let device = Limits { frame_instructions: Some(80_000_000), ..Limits::default() };
+    let fine = encode(CoderChoice::Auto, device);
+    let steps = [&fine, &coarse].map(|fitted| feature_step(fitted).expect("tables"));
+    assert!((steps[0] - 0.5 * steps[1]).abs() < 1e-6 * steps[1], "half of the mean steps: {steps:?}");
+    let flash_bytes = Some(fine.written.bytes.len() as u64 - 1);
+    let tight = encode(CoderChoice::Auto, Limits { flash_bytes, ..device });
+    assert!(feature_step(&tight) > Some(steps[0]), "the next coarser steps");
+    assert_eq!(tight.n_cut, 0, "before anchors are left out");
+}
+
+#[test]
+fn anchors_are_left_out_until_the_bundle_fits() {
+    let capture = tiny_capture();
+    let finished = finished(&capture);
+    let encode = |flash_bytes| {
+        let encoding = Encoding { limits: Limits { flash_bytes, ..Limits::default() }, ..Encoding::default() };
+        encoding.encode(finished.clone(), &capture, &[])
+    };
+    let whole = encode(None).expect("a bundle");
+    assert_eq!(whole.n_cut, 0);
+    let flash_bytes = whole.written.bytes.len() as u64 * 9 / 10;
+    let cut = encode(Some(flash_bytes)).expect("a smaller bundle");
+    assert!(cut.n_cut > 0 && cut.written.bytes.len() as u64 <= flash_bytes, "{} anchors left out", cut.n_cut);
+    let error = encode(Some(100)).expect_err("less than a header");
+    assert!(matches!(error, EncodeError::TooLarge { memory: "flash", available: 100, .. }), "{error}");
+}
+
+#[test]
+fn every_tier_of_the_file_is_measured() {
+    let capture = tiny_capture();
+    let fitted = Encoding::default().encode(finished(&capture), &capture, &capture.train[..1]).expect("a bundle");
+    let bundle = Bundle::parse(&fitted.written.bytes).expect("a sound bundle");
+    for tier in 0..bundle.n_tiers() {
+        let measures = bundle.measures(tier).expect("measured");
+        assert!(measures.psnr_db.is_some_and(|psnr_db| psnr_db > 10.0), "tier {tier}: {measures:?}");
+        assert!(measures.max_splats > 0, "tier {tier}: {measures:?}");
+    }
+}
+
+#[test]
+fn what_the_writer_would_refuse_is_refused_before_training() {
+    let sound = Encoding::default();
+    assert_eq!(sound.check(Backbone::Scaffold), Ok(()));
+    let steps = Encoding { quantisation: QuantisationSteps { offset: 0.0, ..Default::default() }, ..sound.clone() };
+    assert!(matches!(steps.check(Backbone::Hac), Err(WriteError::NotPositive { what: "offset step", .. })));
+    let tiers = Encoding { tiers: vec![0.4, 0.4, 0.0], ..sound.clone() };
+    assert!(matches!(tiers.check(Backbone::Hac), Err(WriteError::Tiers { .. })));
+    let context = Encoding { coder: CoderChoice::Context, ..sound };
+    assert_eq!(context.check(Backbone::Scaffold), Err(WriteError::NoContext));
+    assert_eq!(context.check(Backbone::Hac), Ok(()));
+}

@@ -5,8 +5,8 @@
 #[cfg(test)]
 extern crate std;
 
-// Each module imports only modules before it in this list: error · math · stopwatch · camera · bytes · arena · entropy · context ·
-// bundle · mlp · scene · project · raster · arithmetic · bake · budget · decoder · display. `tests/tests/rooms.rs` holds the crate to it.
+// Each module imports only modules before it in this list: error · rules · math · stopwatch · camera · bytes · arena · entropy ·
+// context · bundle · mlp · scene · project · raster · arithmetic · bake · budget · decoder · display. `tests/tests/rooms.rs` holds the crate to it.
 mod arena;
 pub mod arithmetic;
 mod bake;

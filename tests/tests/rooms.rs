@@ -12,6 +12,7 @@ const CRATES: [(&str, &[&str]); 1] = [(
     "decoder-core/src",
     &[
         "error",
+        "rules",
         "math",
         "stopwatch",
         "camera",

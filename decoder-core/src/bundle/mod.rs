@@ -22,6 +22,7 @@ mod lattice;
 mod manifest;
 mod masks;
 mod section;
+mod sections;
 mod tables;
 
 pub use crate::bytes::crc32;
@@ -38,14 +39,15 @@ pub(crate) use header::{covariance_outputs, n_log_scales};
 pub use heads::{CodedHeads, Halves, HeadView, HeadsView, LayerWeights, WeightReader};
 pub use lattice::{Lattice, MAX_LATTICE_BITS, MAX_LATTICE_MIN};
 pub use manifest::{MANIFEST_RECORD_LEN, STRIPS, TierMeasures};
-pub use section::{SECTION_LEN, Section, SectionBytes};
+pub use section::{SECTION_LEN, Section};
+pub use sections::SectionBytes;
 pub use tables::{Table, Tables};
 
 use crate::context::Context;
 use crate::entropy::MaskModel;
 use crate::error::{DecodeError, SectionKind, saturate};
 use gaussians::GaussianCounts;
-use section::Sections;
+use sections::Sections;
 
 /// Where the models of the channels come from.
 #[derive(Clone, Copy, Debug)]

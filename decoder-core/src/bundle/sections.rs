@@ -1,0 +1,164 @@
+//! The sections of a bundle: their bytes, and the table that says where they lie.
+
+use super::features::Features;
+use super::header::{Header, header_len};
+use super::section::{SECTION_LEN, Section};
+use crate::bytes::crc32;
+use crate::error::{DecodeError, SectionKind, saturate};
+
+/// The bytes of the sections that a decoder reads.
+#[derive(Clone, Copy, Debug)]
+pub struct SectionBytes<'a> {
+    /// The heads' weights.
+    pub heads: &'a [u8],
+    /// The lattice and the model of its cells.
+    pub lattice: &'a [u8],
+    /// The model of the masks, where some offset is not drawn.
+    pub masks: Option<&'a [u8]>,
+    /// Tables or context, as the header's features say.
+    pub coder: &'a [u8],
+    /// The measures of the tiers.
+    pub manifest: &'a [u8],
+    /// Tiers and chunk records.
+    pub directory: &'a [u8],
+    /// Counts of Gaussians, where they are the same from everywhere.
+    pub gaussians: Option<&'a [u8]>,
+    /// The chunks.
+    pub chunks: &'a [u8],
+}
+
+impl<'a> SectionBytes<'a> {
+    /// The bytes of a bundle of these sections: the reverse of [`Bundle::parse`](super::Bundle::parse).
+    ///
+    /// * `header`: its lengths are filled in.
+    pub fn emit(&self, header: &Header) -> impl Iterator<Item = u8> + use<'a> {
+        let sections = self.in_order(header.features);
+        // At most nine.
+        let header_len = header_len(sections.clone().count() as u8);
+        let rows = sections.clone().scan(saturate(header_len), |next, (kind, bytes)| {
+            let (offset, len) = (*next, saturate(bytes.len()));
+            *next = offset.saturating_add(len);
+            // Each chunk has its own checksum, so that a device need not read all of them to draw some.
+            let crc = if kind == SectionKind::Chunks { 0 } else { crc32(bytes) };
+            Some(Section { kind, offset, len, crc })
+        });
+        let header = Header { header_len: header_len as u16, file_len: saturate(self.file_len()), ..*header };
+        header.emit(rows).chain(sections.flat_map(|(_, bytes)| bytes.iter().copied()))
+    }
+
+    /// How many bytes [`emit`](Self::emit) makes; a bundle has less than 4 GiB.
+    #[must_use]
+    pub fn file_len(&self) -> usize {
+        let sections = self.in_order(Features::default());
+        let header_len = header_len(sections.clone().count() as u8);
+        sections.fold(header_len, |sum, (_, bytes)| sum.saturating_add(bytes.len()))
+    }
+
+    /// The sections as the file has them.
+    fn in_order(&self, features: Features) -> impl Iterator<Item = (SectionKind, &'a [u8])> + Clone + use<'a> {
+        let coder = if features.context { SectionKind::Context } else { SectionKind::Tables };
+        [
+            Some((SectionKind::Heads, self.heads)),
+            Some((SectionKind::Lattice, self.lattice)),
+            self.masks.map(|bytes| (SectionKind::Masks, bytes)),
+            Some((coder, self.coder)),
+            Some((SectionKind::Manifest, self.manifest)),
+            Some((SectionKind::Directory, self.directory)),
+            self.gaussians.map(|bytes| (SectionKind::Gaussians, bytes)),
+            Some((SectionKind::Chunks, self.chunks)),
+        ]
+        .into_iter()
+        .flatten()
+    }
+}
+
+/// Where the sections that a decoder reads lie.
+pub(super) struct Sections {
+    pub(super) heads: Section,
+    pub(super) lattice: Section,
+    pub(super) masks: Option<Section>,
+    /// Tables or context.
+    pub(super) coder: Section,
+    pub(super) manifest: Section,
+    pub(super) directory: Section,
+    pub(super) gaussians: Option<Section>,
+    pub(super) chunks: Section,
+}
+
+impl Sections {
+    /// Reads the table: sections follow the header in order, without gaps, and end at `file_len`. Compares the checksums
+    /// of those that are to be skipped.
+    pub(super) fn parse(
+        table: &[[u8; SECTION_LEN]],
+        features: Features,
+        header_len: u16,
+        file_len: u32,
+        file: &[u8],
+    ) -> Result<Self, DecodeError> {
+        let mut rows = table.iter();
+        let mut start = u32::from(header_len);
+        let mut gaussians = None;
+        let mut next = |wanted: SectionKind| {
+            for row in rows.by_ref() {
+                let section = Section::parse(row)?;
+                if section.offset != start {
+                    let Section { kind: section, offset: found, .. } = section;
+                    return Err(DecodeError::Misplaced { section, expected: start, found });
+                }
+                let Some(end) = start.checked_add(section.len).filter(|&end| end <= file_len) else {
+                    let available = file_len.saturating_sub(start);
+                    return Err(DecodeError::Truncated { section: section.kind, needed: section.len, available });
+                };
+                start = end;
+                if section.kind == wanted {
+                    return Ok(section);
+                }
+                match section.kind {
+                    SectionKind::Gaussians if gaussians.is_none() => gaussians = Some(section),
+                    SectionKind::Other(_) => {}
+                    found => return Err(DecodeError::UnexpectedSection { found, expected: wanted }),
+                }
+                section.bytes(file)?;
+            }
+            Err(DecodeError::MissingSection { section: wanted })
+        };
+        let mut sections = Self {
+            gaussians: None,
+            heads: next(SectionKind::Heads)?,
+            lattice: next(SectionKind::Lattice)?,
+            masks: if features.masks { Some(next(SectionKind::Masks)?) } else { None },
+            coder: next(if features.context { SectionKind::Context } else { SectionKind::Tables })?,
+            manifest: next(SectionKind::Manifest)?,
+            directory: next(SectionKind::Directory)?,
+            chunks: next(SectionKind::Chunks)?,
+        };
+        sections.gaussians = gaussians;
+        if let Some(row) = rows.next() {
+            let Section { kind: found, .. } = Section::parse(row)?;
+            return Err(DecodeError::UnexpectedSection { found, expected: SectionKind::Chunks });
+        }
+        if start != file_len {
+            return Err(DecodeError::WrongLength { section: SectionKind::Chunks, expected: file_len, found: start });
+        }
+        if sections.chunks.crc != 0 {
+            let stored = sections.chunks.crc;
+            return Err(DecodeError::SectionChecksum { section: SectionKind::Chunks, stored, computed: 0 });
+        }
+        Ok(sections)
+    }
+
+    /// The bytes of the sections, their checksums compared; those of the chunks go on to the end of the file, wherever that is.
+    pub(super) fn bytes<'a>(&self, file: &'a [u8]) -> Result<SectionBytes<'a>, DecodeError> {
+        let some = |section: &Option<Section>| section.as_ref().map(|section| section.bytes(file)).transpose();
+        Ok(SectionBytes {
+            heads: self.heads.bytes(file)?,
+            lattice: self.lattice.bytes(file)?,
+            masks: some(&self.masks)?,
+            coder: self.coder.bytes(file)?,
+            manifest: self.manifest.bytes(file)?,
+            directory: self.directory.bytes(file)?,
+            gaussians: some(&self.gaussians)?,
+            chunks: file.get(self.chunks.offset as usize..).unwrap_or_default(),
+        })
+    }
+}

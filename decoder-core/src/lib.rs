@@ -28,7 +28,9 @@ pub mod rules;
 mod scene;
 mod stopwatch;
 
-pub use budget::{Budget, MaxSplats, Overflow, Plan, Quality, Residency, Resident, ScratchShape, Strips, Work};
+pub use budget::{
+    Budget, HeadWeights, MaxSplats, Overflow, Plan, Quality, Residency, Resident, ScratchShape, Strips, Work,
+};
 pub use bundle::Bundle;
 pub use camera::Camera;
 pub use decoder::{Decoder, FrameReport, TileSink, count_gaussians, count_scratch_len};

@@ -1,11 +1,13 @@
 //! Frames of every arithmetic: near those of the reference arithmetic, in no more memory, and the same where nothing is rounded.
 
 use conformance::bundles::{CODERS, tiered};
-use conformance::frame::{draw, draw_in, info_for, to_core};
+use conformance::frame::{Frame, budget_for, draw, draw_in, info_for, to_core};
 use conformance::scenes::{CASES, cameras, random_scene};
-use pocketsplat_core::Bundle;
+use pocketsplat_core::arithmetic::WithoutFpu;
+use pocketsplat_core::{Bundle, Decoder, HeadWeights};
 use pocketsplat_trainer::bundle::{self, WriteOptions};
 use pocketsplat_trainer::cost::ArithmeticChoice;
+use pocketsplat_trainer::verify::halves;
 
 /// Root of the mean square difference that each may have to the reference arithmetic's frame, 255ths.
 fn bound(choice: ArithmeticChoice) -> f64 {
@@ -51,5 +53,31 @@ fn halves_kept_as_halves_change_nothing() {
         let [exact, halves] = [ArithmeticChoice::Reference, ArithmeticChoice::F16]
             .map(|choice| draw_in(choice, &bundle, &camera).expect("the worst case is planned for"));
         assert!(exact == halves, "{}: other bytes", case.name);
+    }
+}
+
+#[test]
+fn a_budget_without_room_for_f32_takes_halves_before_it_prunes() {
+    for (i, case) in CASES.iter().enumerate() {
+        let bytes = tiered(case, CODERS[i % 2], 64);
+        let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
+        let camera = to_core(&cameras()[0].1);
+        let budget = budget_for(&camera);
+        let whole = bundle.plan(&budget).expect("memory without limit");
+        assert_eq!((whole.head_weights(), whole.pruning_rate()), (HeadWeights::F32, 0.0), "{}", case.name);
+        let Some(plan) = halves(&bundle, &budget) else { continue };
+        assert!(plan.pruning_rate() == 0.0 && plan.scratch_len() < whole.scratch_len(), "{}: {plan:?}", case.name);
+        // The frames of halves whatever the memory, and of every other arithmetic in the memory of halves.
+        let mut scratch = vec![0; plan.scratch_len()];
+        let mut planned = Frame::new(camera.width_px, camera.height_px);
+        let mut decoder = Decoder::bind(&bundle, plan, &mut scratch).expect("the planned bytes");
+        let report = decoder.render(&camera, &mut planned).expect("a sound bundle");
+        let (forced, forced_report) = draw_in(ArithmeticChoice::F16, &bundle, &camera).expect("a sound bundle");
+        if report.splats_dropped == 0 && forced_report.splats_dropped == 0 {
+            assert!(planned == forced, "{}: another frame", case.name);
+        }
+        let mut frame = Frame::new(camera.width_px, camera.height_px);
+        let mut decoder = Decoder::bind_in::<WithoutFpu>(&bundle, plan, &mut scratch).expect("integers take no more");
+        decoder.render(&camera, &mut frame).expect("a sound bundle");
     }
 }

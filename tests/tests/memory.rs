@@ -6,7 +6,7 @@ use conformance::frame::{budget_for, to_core};
 use conformance::scenes::{CASES, cameras, orbit};
 use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, ErrorClass, MaxSplats, Plan, ScratchShape};
 use pocketsplat_trainer::verify::{
-    Touched, Trial, Violation, exact_bytes, memory_does_not_show, plan_variants, variants_match,
+    Touched, Trial, Violation, exact_bytes, halves, memory_does_not_show, plan_variants, variants_match,
 };
 
 /// A bundle for each case, of either coder in turn, with masks and three tiers.
@@ -49,6 +49,9 @@ fn the_planned_bytes_suffice_and_fewer_are_refused_by_number() {
         for max_splats in [MaxSplats::Worst, MaxSplats::AtMost(100), MaxSplats::AtMost(0)] {
             for way in plan_variants(&bundle, budget.with_max_splats(max_splats)) {
                 holds(name, exact_bytes(&bundle, bundle.plan(&way).expect("planned")));
+                if let Some(plan) = halves(&bundle, &way) {
+                    holds(name, exact_bytes(&bundle, plan));
+                }
             }
         }
     }
@@ -163,8 +166,9 @@ fn the_most_tiers_that_fit_are_planned() {
         for ram_bytes in (0..largest.scratch_len() + 500).step_by(500) {
             // By hand: all there is, one at a time.
             let by_hand = |tiers: u8| {
-                let plans =
-                    plan_variants(&bundle, free.with_tiers(tiers)).map(|way| bundle.plan(&way).expect("planned"));
+                let plans = plan_variants(&bundle, free.with_tiers(tiers)).flat_map(|way| {
+                    [Some(bundle.plan(&way).expect("planned")), halves(&bundle, &way)].into_iter().flatten()
+                });
                 plans.filter(|plan| plan.scratch_len() <= ram_bytes).map(|plan| plan.n_tiers()).max()
             };
             let expected = (1..=3).rev().find_map(by_hand);

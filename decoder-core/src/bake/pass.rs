@@ -5,12 +5,12 @@ use crate::bundle::{AnchorModels, Bundle, Chunk};
 use crate::error::DecodeError;
 use crate::math::functions::Reference;
 use crate::mlp::F32;
-use crate::scene::{Anchor, Evaluator, for_each_gaussian};
+use crate::scene::{Anchor, Evaluator, Gaussian, GaussianSink};
 
 /// Evaluates the Gaussians of the first `n_chunks` chunks into `memory`.
 ///
-/// * `models`, `evaluator`: not needed afterwards. Of the reference arithmetic, whatever frames are computed with: it runs once, and the bundle's counts
-///   are of it. * `skip_damage`: leaves damaged chunks out and remembers which.
+/// * `models`, `evaluator`, `row`: not needed afterwards. Of the reference arithmetic, whatever frames are computed with: it runs
+///   once, and the bundle's counts are of it. * `skip_damage`: leaves damaged chunks out and remembers which.
 ///
 /// # Errors
 /// [`DecodeError::ChunkChecksum`] or [`DecodeError::ChunkStream`] for damage that is not left out.
@@ -21,13 +21,13 @@ pub(crate) fn bake<'b, 's>(
     n_chunks: usize,
     memory: BakedMemory<'s>,
     models: &mut AnchorModels<'b, '_>,
-    evaluator: &mut Evaluator<'_, F32>,
+    (evaluator, row): (&mut Evaluator<'_, F32>, &mut [f32]),
     skip_damage: bool,
 ) -> Result<Baker<'s>, DecodeError> {
     let mut baker = Baker::new(memory);
     for chunk in bundle.chunks().take(n_chunks) {
         let first = baker.n;
-        let is_damaged = match evaluate(bundle, &chunk, models, evaluator, &mut baker) {
+        let is_damaged = match evaluate(bundle, &chunk, models, (evaluator, row), &mut baker) {
             Err(DecodeError::ChunkChecksum { .. } | DecodeError::ChunkStream { .. }) if skip_damage => true,
             result => result.map(|()| false)?,
         };
@@ -40,11 +40,10 @@ fn evaluate<'b>(
     bundle: &Bundle<'b>,
     chunk: &Chunk<'b>,
     models: &mut AnchorModels<'b, '_>,
-    evaluator: &mut Evaluator<'_, F32>,
+    (evaluator, row): (&mut Evaluator<'_, F32>, &mut [f32]),
     baker: &mut Baker<'_>,
 ) -> Result<(), DecodeError> {
     chunk.check()?;
-    let Evaluator { heads, row, work } = evaluator;
     let header = bundle.header();
     let mut anchors = chunk.anchors(models);
     for _ in 0..chunk.n_anchors() {
@@ -54,17 +53,13 @@ fn evaluate<'b>(
         let anchor = Anchor::from_row::<Reference>(header, position, site.mask, row).ok_or(DecodeError::Internal)?;
         // Seen from anywhere.
         let eye = [0.0; 3];
-        for_each_gaussian::<F32, Reference>(
-            &anchor,
-            header.features.effects,
-            eye,
-            heads,
-            work,
-            &mut (),
-            |_, gaussian| {
-                baker.push(gaussian);
-            },
-        );
+        evaluator.visit::<Reference>(0, &anchor, (header.features.effects, eye), &mut (), baker);
     }
     anchors.finish()
+}
+
+impl GaussianSink for Baker<'_> {
+    fn gaussian(&mut self, _: u32, _: usize, gaussian: &Gaussian) {
+        self.push(gaussian);
+    }
 }

@@ -34,7 +34,7 @@ macro_rules! slices {
 slices! {
     /// The heads' weights, and the anchor that they are evaluated for.
     AnchorMemory: anchor_words, take_anchor(shape) {
-        heads: [u32; shape.heads().n_weights()],
+        heads: [u32; shape.heads().words(shape.model.head_weights)],
         row: [f32; shape.n_channels()],
         inputs: [f32; shape.heads().inputs()],
         hidden: [f32; shape.heads().hidden_len()],
@@ -223,7 +223,7 @@ mod tests {
     use std::vec;
 
     use super::{Arena, FrameMemory, SceneMemory};
-    use crate::budget::{CoderShape, FrameShape, ModelShape, RecordShape, Resident, ScratchShape};
+    use crate::budget::{CoderShape, FrameShape, HeadWeights, ModelShape, RecordShape, Resident, ScratchShape};
 
     /// A stream of numbers, the same every time.
     struct Numbers(u32);
@@ -247,6 +247,7 @@ mod tests {
                     n_colour_inputs: up_to(5),
                     colour_hidden: 1 + up_to(256),
                     detail_hidden: up_to(257),
+                    head_weights: if up_to(2) == 1 { HeadWeights::F16 } else { HeadWeights::F32 },
                 },
                 coder: CoderShape {
                     n_tables: (1 - context) * up_to(360),
@@ -279,6 +280,10 @@ mod tests {
                 n_colour_inputs: a.model.n_colour_inputs.max(b.model.n_colour_inputs),
                 colour_hidden: a.model.colour_hidden.max(b.model.colour_hidden),
                 detail_hidden: a.model.detail_hidden.max(b.model.detail_hidden),
+                head_weights: match (a.model.head_weights, b.model.head_weights) {
+                    (HeadWeights::F16, HeadWeights::F16) => HeadWeights::F16,
+                    _ => HeadWeights::F32,
+                },
             },
             coder: CoderShape {
                 n_tables: a.coder.n_tables.max(b.coder.n_tables),

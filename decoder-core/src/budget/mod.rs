@@ -14,6 +14,7 @@ mod quality;
 mod shape;
 mod work;
 
+pub use crate::mlp::HeadWeights;
 pub use limits::{Budget, MAX_FRAME_PX, MAX_STRIPS, MaxSplats, Overflow, Residency, Strips};
 pub(crate) use memory::{AnchorMemory, FrameMemory, ModelMemory, SceneMemory};
 pub use plan::Plan;

@@ -5,6 +5,7 @@ use super::shape::{FrameShape, Resident, ScratchShape};
 use super::work::{Work, decoding_macs};
 use crate::bundle::{Bundle, STRIPS, Tier, TierMeasures};
 use crate::error::{DecodeError, saturate};
+use crate::mlp::HeadWeights;
 use crate::rules::TILE_PX;
 
 /// What reading a baked Gaussian is worth in multiply-adds.
@@ -58,6 +59,13 @@ impl Plan {
         self.shape.resident.is_gaussians()
     }
 
+    /// How the weights of the heads are kept in memory: as halves where there is no room for f32. Frames of one differ from frames
+    /// of the other by less than a step of 8 bits in most pixels, by a step where alpha is at its cut.
+    #[must_use]
+    pub fn head_weights(&self) -> HeadWeights {
+        self.shape.model.head_weights
+    }
+
     /// Horizontal strips of a frame.
     #[must_use]
     pub fn n_strips(&self) -> u8 {
@@ -100,8 +108,8 @@ impl Plan {
 }
 
 impl Bundle<'_> {
-    /// Finds the best scene that fits a budget: the lowest pruning rate, that is the most tiers, in `ram_bytes`, and
-    /// among the plan variants of these tiers the one of least predicted work.
+    /// Finds the best scene that fits a budget: the lowest pruning rate, that is the most tiers, in `ram_bytes`; of these tiers
+    /// [weights of the heads](Plan::head_weights) in f32 before halves, and among these plan variants the one of least predicted work.
     ///
     /// Work is predicted in multiply-adds. One strip goes over the scene once, several together about twice; going over it
     /// costs the heads' (from the manifest, else of all anchors), and decoding when anchors are streamed; or 150 a Gaussian when
@@ -118,7 +126,7 @@ impl Bundle<'_> {
     /// the address space.
     ///
     /// # Budget
-    /// At most 64 sums; reads the manifest and the directory's tiers, no chunk.
+    /// At most 128 sums; reads the manifest and the directory's tiers, no chunk.
     // Not inlined: a caller's stack frame would keep what only planning needs.
     #[inline(never)]
     pub fn plan(&self, budget: &Budget) -> Result<Plan, DecodeError> {
@@ -142,9 +150,11 @@ impl Planner<'_, '_> {
         let budget = self.budget;
         let most_tiers = budget.tiers.min(self.bundle.n_tiers());
         let mut smallest: Option<Plan> = None;
-        for n_tiers in (most_tiers.min(1)..=most_tiers).rev() {
+        let tiers = (most_tiers.min(1)..=most_tiers).rev();
+        // Halves before fewer tiers.
+        for (n_tiers, weights) in tiers.flat_map(|n| [(n, HeadWeights::F32), (n, HeadWeights::F16)]) {
             let mut best: Option<(u64, Plan)> = None;
-            for (cost, plan) in self.variants(n_tiers) {
+            for (cost, plan) in self.variants(n_tiers, weights) {
                 if smallest.is_none_or(|smallest| plan.scratch_len < smallest.scratch_len) {
                     smallest = Some(plan);
                 }
@@ -168,7 +178,7 @@ impl Planner<'_, '_> {
     }
 
     /// The plan variants of `n_tiers` tiers that the budget leaves open, fewest strips first, each with its predicted cost.
-    fn variants(&self, n_tiers: u8) -> impl Iterator<Item = (u64, Plan)> {
+    fn variants(&self, n_tiers: u8, weights: HeadWeights) -> impl Iterator<Item = (u64, Plan)> {
         let (given, tried) = match self.budget.strips {
             Strips::Exactly(n) => (Some(n), &[][..]),
             Strips::Auto => (None, &STRIPS[..]),
@@ -182,19 +192,22 @@ impl Planner<'_, '_> {
         };
         let n_strips = given.into_iter().chain(tried.iter().copied());
         let variants = n_strips.flat_map(move |n_strips| residencies.iter().map(move |&kept| (n_strips, kept)));
-        variants.map(move |(n_strips, residency)| self.variant(n_tiers, n_strips, residency))
+        variants.map(move |(n_strips, residency)| self.variant(n_tiers, n_strips, residency, weights))
     }
 
-    fn variant(&self, n_tiers: u8, n_strips: u8, residency: Residency) -> (u64, Plan) {
+    fn variant(&self, n_tiers: u8, n_strips: u8, residency: Residency, weights: HeadWeights) -> (u64, Plan) {
         let Self { bundle, budget } = *self;
         let header = bundle.header();
         let tier = bundle.up_to_tier(n_tiers);
         let measures = self.measures(n_tiers);
         let in_slabs = budget.overflow == Overflow::Slabs;
         let canvas_tiles = if in_slabs { tiles_of_strip([budget.width_px, budget.height_px], n_strips) } else { 1 };
-        let wanted = self.splats_to_hold(budget.max_splats, n_tiers, n_strips);
         let resident = self.resident(residency, n_tiers, tier);
+        // Gaussians are evaluated once, with weights in f32.
+        let weights = if resident.is_gaussians() { HeadWeights::F32 } else { weights };
+        let wanted = self.splats_to_hold(budget.max_splats, n_tiers, n_strips, weights);
         let mut shape = ScratchShape::of(bundle, resident, FrameShape { canvas_tiles, max_splats: wanted });
+        shape.model.head_weights = weights;
         if !budget.quality.detail {
             shape.model.detail_hidden = 0;
         }
@@ -203,7 +216,7 @@ impl Planner<'_, '_> {
         }
         // Each slab but the last keeps at least half of the places.
         let fullest = match budget.max_splats {
-            MaxSplats::AtMost(_) => self.splats_to_hold(MaxSplats::Measured, n_tiers, n_strips),
+            MaxSplats::AtMost(_) => self.splats_to_hold(MaxSplats::Measured, n_tiers, n_strips, weights),
             MaxSplats::Measured | MaxSplats::Worst => wanted,
         };
         let places = shape.frame.max_splats.max(1);
@@ -260,11 +273,13 @@ impl Planner<'_, '_> {
     }
 
     /// Splats of a strip to have memory for.
-    fn splats_to_hold(&self, max_splats: MaxSplats, n_tiers: u8, n_strips: u8) -> u32 {
+    fn splats_to_hold(&self, max_splats: MaxSplats, n_tiers: u8, n_strips: u8, weights: HeadWeights) -> u32 {
         let header = self.bundle.header();
         // At most 2²⁴ anchors of 32 offsets.
         let offsets = self.bundle.up_to_tier(n_tiers).n_anchors.saturating_mul(header.n_offsets.into());
-        let worst = self.bundle.n_gaussians(n_tiers).unwrap_or(offsets);
+        // Counted with weights in f32; halves may open another offset.
+        let counted = self.bundle.n_gaussians(n_tiers).filter(|_| weights == HeadWeights::F32);
+        let worst = counted.unwrap_or(offsets);
         match max_splats {
             MaxSplats::Worst => worst,
             MaxSplats::AtMost(most) => most.min(worst),

@@ -4,7 +4,7 @@ use crate::bundle::{
     Bundle, Coder, MAX_FEATURE_DIM, MAX_LATTICE_BITS, MAX_OFFSETS, RecordLayout, covariance_outputs, n_log_scales,
 };
 use crate::context::{FEATURES_PER_LEVEL, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS};
-use crate::mlp::HeadShape;
+use crate::mlp::{HeadShape, HeadWeights};
 
 /// What the size of the scratch memory follows from.
 ///
@@ -58,6 +58,8 @@ pub struct ModelShape {
     pub colour_hidden: u16,
     /// Hidden width of the detail head, 0 without one.
     pub detail_hidden: u16,
+    /// How the weights of the other heads are kept.
+    pub head_weights: HeadWeights,
 }
 
 /// What the models of the symbols take: tables or a context.
@@ -158,6 +160,7 @@ impl ScratchShape {
                 n_colour_inputs: 4,
                 colour_hidden: MAX_FEATURE_DIM,
                 detail_hidden: MAX_FEATURE_DIM,
+                head_weights: HeadWeights::F32,
             },
             coder: CoderShape {
                 n_tables: feature_dim.saturating_add(n_log_scales(true)).saturating_add(n_offsets.saturating_mul(3)),
@@ -183,6 +186,7 @@ impl ScratchShape {
                 n_colour_inputs: few(header.colour_inputs()).saturating_sub(header.feature_dim),
                 colour_hidden: header.colour_hidden,
                 detail_hidden: header.detail_hidden,
+                head_weights: HeadWeights::F32,
             },
             coder: match bundle.coder() {
                 Coder::Static(tables) => {

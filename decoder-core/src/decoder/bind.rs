@@ -11,7 +11,7 @@ use crate::bundle::{AnchorRecords, Bundle, RecordMemory};
 use crate::error::{DecodeError, saturate};
 use crate::mlp::{F32, HeadFormat, Heads};
 use crate::project::Packed28;
-use crate::scene::{Evaluator, Workspace};
+use crate::scene::{Evaluator, Pair, Workspace};
 
 impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
     /// Takes as much of `scratch` as the plan says, and prepares the scene in it.
@@ -65,19 +65,27 @@ fn bind_scene<'b, 's, N: HeadFormat>(
             return baker.finish().map(GaussianSource::Baked);
         }
     };
-    Ok(GaussianSource::Anchors(Anchors { source, evaluator: evaluator(bundle, shape, anchor)? }))
+    let (evaluator, row) = evaluator(bundle, shape, anchor, arena.borrow())?;
+    Ok(GaussianSource::Anchors(Anchors { source, row, evaluator }))
 }
 
-/// Converts the heads into memory of the anchor.
+/// Converts the heads into memory of the anchor, and returns what evaluates anchors and `[n_channels]` of one.
+///
+/// * `free`: memory that is needed later, to work in.
 #[inline(never)]
 fn evaluator<'s, N: HeadFormat>(
     bundle: &Bundle<'_>,
     shape: &ScratchShape,
     memory: AnchorMemory<'s>,
-) -> Result<Evaluator<'s, N>, DecodeError> {
+    mut free: Arena<'_>,
+) -> Result<(Evaluator<'s, N>, &'s mut [f32]), DecodeError> {
     let AnchorMemory { heads, row, inputs, hidden, detail_sums, outputs } = memory;
-    let heads = Heads::convert(&mut Arena::of_words(heads), bundle.heads(), shape.heads())?;
-    Ok(Evaluator { heads, row, work: Workspace { inputs, hidden, detail_sums, outputs } })
+    let mut arena = Arena::of_words(heads);
+    let kept_as = N::KEPT_AS.unwrap_or(shape.model.head_weights);
+    let heads = Heads::convert(&mut arena, &mut free, kept_as, bundle.heads(), shape.heads())?;
+    let pair = if heads.takes_two() { Pair::take(&mut arena, shape.heads()) } else { None };
+    let work = Workspace { hidden, detail_sums, outputs };
+    Ok((Evaluator { heads, inputs, work, pair }, row))
 }
 
 /// Decodes the planned tiers into `records`.
@@ -107,9 +115,9 @@ pub(super) fn evaluate_scene<'s>(
     models: ModelMemory<'_>,
     skip_damage: bool,
 ) -> Result<Baker<'s>, DecodeError> {
-    let mut evaluator = evaluator::<F32>(bundle, shape, anchor)?;
+    let (mut evaluator, row) = evaluator::<F32>(bundle, shape, anchor, Arena::of_words(&mut []))?;
     let mut models = bundle.anchor_models(models.words)?;
-    bake(bundle, shape.resident.n_chunks(), baked, &mut models, &mut evaluator, skip_damage)
+    bake(bundle, shape.resident.n_chunks(), baked, &mut models, (&mut evaluator, row), skip_damage)
 }
 
 /// The memory of splats as records of another size: as many as fit.

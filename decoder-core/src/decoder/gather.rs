@@ -10,7 +10,7 @@ use crate::bake::BakedGaussian;
 use crate::bundle::{Chunk, Effects};
 use crate::error::DecodeError;
 use crate::project::{Band, View};
-use crate::scene::{Anchor, Evaluator, Gaussian, for_each_gaussian};
+use crate::scene::{Anchor, Gaussian, GaussianSink};
 use crate::stopwatch::{Stage, Stopwatch};
 
 /// The current frame.
@@ -176,13 +176,17 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
         let Frame { view, strips, admission, report } = frame;
         let header = bundle.header();
         let effects = header.features.effects;
-        let mut keeper = Keeper::<A> { view, strips, admission, pass, splats };
-        let Anchors { source, evaluator: Evaluator { heads, row, work } } = match source {
+        let keeper = Keeper::<A> { view, strips, admission, pass, splats };
+        // As if its Gaussians were baked, which know nothing of the anchor's extent.
+        let as_baked = bundle.n_gaussians(0).is_some();
+        let mut gathering = Gathering { keeper, report, effects, as_baked };
+        let Anchors { source, row, evaluator } = match source {
             GaussianSource::Anchors(anchors) => anchors,
             // Unreachable without the feature; this arm drops the code.
             GaussianSource::Baked(_) if !cfg!(feature = "baked") => return Err(DecodeError::Internal),
             GaussianSource::Baked(baked) => {
                 watch.enter(Stage::Project);
+                let Gathering { keeper, report, .. } = &mut gathering;
                 report.gaussians = report.gaussians.saturating_add(baked.n_of_chunk(chunk.index()));
                 for (number, gaussian) in baked.of_chunk(chunk.index(), effects) {
                     if keeper.pass.band.is_none_or(|band| band.sees_gaussian(&gaussian)) {
@@ -192,13 +196,13 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
                 return Ok(());
             }
         };
-        // As if its Gaussians were baked, which know nothing of the anchor's extent.
-        let as_baked = bundle.n_gaussians(0).is_some();
         let n_scalars = u32::from(header.feature_dim) + u32::from(header.n_log_scales());
         let decoded = u32::from(!source.is_resident());
-        report.chunks_decoded += decoded;
+        gathering.report.chunks_decoded += decoded;
+        evaluator.forget();
         source.for_each(chunk, first_anchor, row, watch, |number, site, row, watch| {
             watch.enter(Stage::Project);
+            let Gathering { keeper, report, .. } = &mut gathering;
             report.anchors_read += 1;
             report.anchors_decoded += decoded;
             let n_channels = 3 * site.mask.count_ones() + n_scalars;
@@ -212,26 +216,36 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
                 return Ok(());
             }
             report.anchors_visible += 1;
-            let macs = for_each_gaussian::<A::Heads, A::Functions>(
-                &anchor,
-                effects,
-                view.eye,
-                heads,
-                work,
-                watch,
-                |offset, gaussian| {
-                    report.gaussians += 1;
-                    let place = place(number, offset);
-                    if as_baked {
-                        keeper.project(place, &BakedGaussian::rounded(gaussian, effects), effects);
-                    } else {
-                        keeper.project(place, gaussian, effects);
-                    }
-                },
-            );
-            report.head_macs = report.head_macs.saturating_add(macs);
+            evaluator.visit::<A::Functions>(number, &anchor, (effects, view.eye), watch, &mut gathering);
             Ok(())
-        })
+        })?;
+        evaluator.finish::<A::Functions>(effects, watch, &mut gathering);
+        Ok(())
+    }
+}
+
+/// Keeps the splats of anchors.
+struct Gathering<'f, 's, A: Arithmetic> {
+    keeper: Keeper<'f, 's, A>,
+    report: &'f mut FrameReport,
+    effects: Effects,
+    /// Whether Gaussians are rounded as baked ones are.
+    as_baked: bool,
+}
+
+impl<A: Arithmetic> GaussianSink for Gathering<'_, '_, A> {
+    fn gaussian(&mut self, anchor: u32, offset: usize, gaussian: &Gaussian) {
+        self.report.gaussians += 1;
+        let place = place(anchor, offset);
+        if self.as_baked {
+            self.keeper.project(place, &BakedGaussian::rounded(gaussian, self.effects), self.effects);
+        } else {
+            self.keeper.project(place, gaussian, self.effects);
+        }
+    }
+
+    fn head_macs(&mut self, n: u64) {
+        self.report.head_macs = self.report.head_macs.saturating_add(n);
     }
 }
 

@@ -19,6 +19,8 @@ pub(super) enum GaussianSource<'b, 's, N: HeadFormat> {
 /// Anchors, and what evaluates them.
 pub(super) struct Anchors<'b, 's, N: HeadFormat> {
     pub(super) source: AnchorSource<'b, 's>,
+    /// `[n_channels]` of the current anchor.
+    pub(super) row: &'s mut [f32],
     pub(super) evaluator: Evaluator<'s, N>,
 }
 

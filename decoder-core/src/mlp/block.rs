@@ -1,14 +1,30 @@
 //! A dense layer cut into blocks of outputs.
 
+use super::weight::{self, Half};
 use crate::arena::Arena;
 use crate::bundle::{Halves, LayerWeights};
 use crate::error::DecodeError;
-use crate::mlp::weight::Weight;
+
+/// How the weights of the heads are kept in scratch memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum HeadWeights {
+    /// 32 bits each.
+    F32,
+    /// 16 bits each.
+    F16,
+}
 
 /// A dense layer: `[n_blocks, 1 + n_in, B]`, each block beginning with its biases.
-pub(crate) struct Blocks<'s, W, const B: usize> {
+pub(crate) struct Blocks<'s, const B: usize> {
     rows_per_block: usize,
-    rows: &'s [[W; B]],
+    rows: Rows<'s, B>,
+}
+
+/// Rows of weights.
+enum Rows<'s, const B: usize> {
+    F32(&'s [[f32; B]]),
+    F16(&'s [[Half; B]]),
 }
 
 /// Rows of `B` weights that a layer of `n_in` inputs and `n_out` outputs fills.
@@ -16,68 +32,118 @@ pub(crate) const fn n_rows<const B: usize>(n_in: usize, n_out: usize) -> usize {
     n_out.div_ceil(B) * (n_in + 1)
 }
 
-impl<'s, W: Weight, const B: usize> Blocks<'s, W, B> {
+impl<'s, const B: usize> Blocks<'s, B> {
     /// Converts a layer's weights `[n_out, n_in]` and biases `[n_out]`; outputs beyond `n_out` become 0.
     pub(crate) fn convert(
         arena: &mut Arena<'s>,
+        kept_as: HeadWeights,
         weights: LayerWeights<'_, '_>,
         biases: &Halves<'_>,
         n_in: usize,
     ) -> Result<Self, DecodeError> {
-        // Not as rows: those of an odd number of halves do not divide into words.
-        let values = arena.take::<W>(B * n_rows::<B>(n_in, biases.len()))?;
-        fill(values, weights, biases, n_in + 1, B);
-        let (rows, _) = values.as_chunks::<B>();
+        // Not taken as rows: those of an odd number of halves do not divide into words.
+        let rows = match filled(arena, kept_as, weights, biases, n_in, B)? {
+            Values::F32(values) => Rows::F32(values.as_chunks::<B>().0),
+            Values::F16(values) => Rows::F16(values.as_chunks::<B>().0),
+        };
         Ok(Self { rows_per_block: n_in + 1, rows })
     }
 
-    /// All blocks in order.
-    pub(crate) fn iter(&self) -> impl Iterator<Item = &'s [[W; B]]> + use<'s, W, B> {
-        self.rows.chunks_exact(self.rows_per_block.max(1))
+    /// Whether two anchors at a time cost less than one after the other.
+    pub(crate) fn takes_two(&self) -> bool {
+        matches!(self.rows, Rows::F16(_))
     }
 
-    /// Block number `index`.
-    pub(crate) fn block(&self, index: usize) -> Option<&'s [[W; B]]> {
-        let (_, from) = self.rows.split_at_checked(index * self.rows_per_block)?;
-        from.get(..self.rows_per_block)
+    /// Blocks of floats in order; none of halves.
+    pub(crate) fn floats(&self) -> impl Iterator<Item = &'s [[f32; B]]> + use<'s, B> {
+        let rows = match self.rows {
+            Rows::F32(rows) => rows,
+            Rows::F16(_) => &[],
+        };
+        rows.chunks_exact(self.rows_per_block.max(1))
     }
-}
 
-/// Fills the blocks of a layer, each `[rows_per_block, lanes]`.
-// Not inlined: one of it serves blocks of all widths.
-#[inline(never)]
-fn fill<W: Weight>(
-    values: &mut [W],
-    mut weights: LayerWeights<'_, '_>,
-    biases: &Halves<'_>,
-    rows_per_block: usize,
-    lanes: usize,
-) {
-    values.fill(W::zeroed());
-    // `max(1)` shows the compiler what is true anyway, and a panic path less is linked.
-    let lanes = lanes.max(1);
-    for (output, bias) in biases.iter().enumerate() {
-        let Some(block) = values.chunks_exact_mut((rows_per_block * lanes).max(1)).nth(output / lanes) else { break };
-        let lane = block.get_mut(output % lanes..).unwrap_or_default();
-        for (slot, weight) in lane.iter_mut().step_by(lanes).zip(core::iter::once(bias).chain(weights.by_ref())) {
-            *slot = W::keep(weight);
+    /// Blocks of halves in order; none of floats.
+    pub(crate) fn halves(&self) -> impl Iterator<Item = &'s [[Half; B]]> + use<'s, B> {
+        let rows = match self.rows {
+            Rows::F32(_) => &[],
+            Rows::F16(rows) => rows,
+        };
+        rows.chunks_exact(self.rows_per_block.max(1))
+    }
+
+    /// The outputs of block number `index`.
+    // Not inlined: it has several callers.
+    #[inline(never)]
+    pub(crate) fn outputs(&self, index: usize, inputs: &[f32]) -> Option<[f32; B]> {
+        match self.rows {
+            Rows::F32(rows) => block(rows, index, self.rows_per_block).map(|block| outputs(block, inputs)),
+            Rows::F16(rows) => block(rows, index, self.rows_per_block).map(|block| weight::outputs(block, inputs)),
         }
     }
 }
 
+/// Block number `index`.
+fn block<W>(rows: &[W], index: usize, rows_per_block: usize) -> Option<&[W]> {
+    let (_, from) = rows.split_at_checked(index * rows_per_block)?;
+    from.get(..rows_per_block)
+}
+
+/// Memory of weights.
+enum Values<'v> {
+    F32(&'v mut [f32]),
+    F16(&'v mut [Half]),
+}
+
+/// The blocks of a layer, each `[1 + n_in, lanes]`, in memory of `arena`.
+// Not inlined: one of it serves blocks of all widths.
+#[inline(never)]
+fn filled<'s>(
+    arena: &mut Arena<'s>,
+    kept_as: HeadWeights,
+    mut weights: LayerWeights<'_, '_>,
+    biases: &Halves<'_>,
+    n_in: usize,
+    lanes: usize,
+) -> Result<Values<'s>, DecodeError> {
+    let rows_per_block = n_in + 1;
+    let n = biases.len().next_multiple_of(lanes.max(1)) * rows_per_block;
+    let mut values = match kept_as {
+        HeadWeights::F32 => Values::F32(arena.take(n)?),
+        HeadWeights::F16 => Values::F16(arena.take(n)?),
+    };
+    match &mut values {
+        Values::F32(values) => values.fill(0.0),
+        Values::F16(values) => values.fill(bytemuck::Zeroable::zeroed()),
+    }
+    // `max(1)` shows the compiler what is true anyway, and a panic path less is linked.
+    let lanes = lanes.max(1);
+    for (output, bias) in biases.iter().enumerate() {
+        let first = output / lanes * rows_per_block * lanes + output % lanes;
+        let row = core::iter::once(bias).chain(weights.by_ref().take(rows_per_block.saturating_sub(1)));
+        for (place, weight) in (first..).step_by(lanes).zip(row) {
+            match &mut values {
+                Values::F32(values) => values.get_mut(place).into_iter().for_each(|slot| *slot = weight),
+                Values::F16(values) => values.get_mut(place).into_iter().for_each(|slot| *slot = Half::of(weight)),
+            }
+        }
+    }
+    Ok(values)
+}
+
 /// The outputs of one block: bias, then `input·weight` added in order.
 #[inline]
-pub(crate) fn outputs<W: Weight, const B: usize>(block: &[[W; B]], inputs: &[f32]) -> [f32; B] {
+pub(crate) fn outputs<const B: usize>(block: &[[f32; B]], inputs: &[f32]) -> [f32; B] {
     let Some((biases, weights)) = block.split_first() else { return [0.0; B] };
-    continued(biases.map(W::value), weights, inputs)
+    continued(*biases, weights, inputs)
 }
 
 /// `sums` with `input·weight` added in order.
 #[inline]
-pub(crate) fn continued<W: Weight, const B: usize>(mut sums: [f32; B], weights: &[[W; B]], inputs: &[f32]) -> [f32; B] {
+pub(crate) fn continued<const B: usize>(mut sums: [f32; B], weights: &[[f32; B]], inputs: &[f32]) -> [f32; B] {
     for (row, &x) in weights.iter().zip(inputs) {
-        for (sum, &weight) in sums.iter_mut().zip(row) {
-            *sum = weight.added(*sum, x);
+        for (sum, weight) in sums.iter_mut().zip(row) {
+            *sum += weight * x;
         }
     }
     sums

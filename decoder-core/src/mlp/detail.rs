@@ -1,9 +1,8 @@
 //! The detail head: what is added to a Gaussian's colour, its first layer split into a part per anchor and one per Gaussian.
 
-use super::block::{continued, outputs};
+use super::block::{HeadWeights, continued, outputs};
 use super::head::Head;
 use super::shape::LANES;
-use super::weight::Weight;
 use crate::arena::Arena;
 use crate::bundle::{HeadView, WeightReader};
 use crate::error::DecodeError;
@@ -11,25 +10,27 @@ use crate::error::DecodeError;
 /// `W2·relu(W1·[feature, colour] + b1) + b2`.
 ///
 /// Inputs are taken in ascending order, so the sums over the feature are the same for all Gaussians of an anchor.
-pub(crate) struct Detail<'s, W> {
-    head: Head<'s, W, 3>,
+pub(crate) struct Detail<'s> {
+    // In f32 whatever the other heads are kept in: what it reads of them comes from their outputs.
+    head: Head<'s, 3>,
     feature_dim: usize,
 }
 
-impl<'s, W: Weight> Detail<'s, W> {
+impl<'s> Detail<'s> {
     pub(super) fn convert(
         arena: &mut Arena<'s>,
         head: &HeadView<'_>,
         weights: &mut WeightReader<'_>,
     ) -> Result<Self, DecodeError> {
-        Ok(Self { feature_dim: head.n_in.saturating_sub(3), head: Head::converted(arena, head, weights)? })
+        let feature_dim = head.n_in.saturating_sub(3);
+        Ok(Self { feature_dim, head: Head::convert(arena, HeadWeights::F32, head, weights)? })
     }
 
     /// The part per anchor: fills `sums` with `b1 + W1·feature`.
     ///
     /// * `sums`: [`sums_len`](super::HeadShape::sums_len) floats.
     pub(crate) fn begin(&self, feature: &[f32], sums: &mut [f32]) {
-        for (sums, block) in sums.as_chunks_mut::<LANES>().0.iter_mut().zip(self.head.hidden.blocks.iter()) {
+        for (sums, block) in sums.as_chunks_mut::<LANES>().0.iter_mut().zip(self.head.hidden.blocks.floats()) {
             *sums = outputs(block, feature);
         }
     }
@@ -39,7 +40,7 @@ impl<'s, W: Weight> Detail<'s, W> {
     /// * `sums`: as [`Self::begin`] left them. * `hidden`: at least as many floats.
     pub(crate) fn residual(&self, colour: [f32; 3], sums: &[f32], hidden: &mut [f32]) -> [f32; 3] {
         let units = hidden.as_chunks_mut::<LANES>().0.iter_mut();
-        for ((units, sums), block) in units.zip(sums.as_chunks::<LANES>().0).zip(self.head.hidden.blocks.iter()) {
+        for ((units, sums), block) in units.zip(sums.as_chunks::<LANES>().0).zip(self.head.hidden.blocks.floats()) {
             // The row of biases, then one an input.
             let rows = block.get(1..).and_then(|rows| rows.get(self.feature_dim..)).unwrap_or_default();
             for (unit, sum) in units.iter_mut().zip(continued(*sums, rows, &colour)) {
@@ -47,6 +48,6 @@ impl<'s, W: Weight> Detail<'s, W> {
             }
         }
         let hidden = hidden.get(..self.head.hidden.n_units).unwrap_or_default();
-        self.head.outputs(0, hidden).unwrap_or_default()
+        self.head.output.outputs(0, hidden).unwrap_or_default()
     }
 }

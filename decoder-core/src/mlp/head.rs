@@ -1,99 +1,143 @@
 //! A head in floats: hidden layer with ReLU, output layer of one block per offset.
 
-use super::block::{Blocks, outputs};
+use super::block::{self, Blocks, HeadWeights};
 use super::format::{F16, F32, HeadFormat, MlpHead};
+use super::pair::Role;
 use super::shape::LANES;
-use super::weight::{Half, Weight};
+use super::weight;
 use crate::arena::Arena;
 use crate::bundle::{HeadView, WeightReader};
 use crate::error::DecodeError;
 
 /// One head in floats; its output layer has blocks of `B` outputs.
-pub(crate) struct Head<'s, W, const B: usize> {
-    pub(super) hidden: Hidden<'s, W>,
-    output: Blocks<'s, W, B>,
+pub(crate) struct Head<'s, const B: usize> {
+    pub(super) hidden: Hidden<'s>,
+    pub(super) output: Blocks<'s, B>,
 }
 
 /// The hidden layer of a head.
-pub(super) struct Hidden<'s, W> {
-    pub(super) blocks: Blocks<'s, W, LANES>,
+pub(super) struct Hidden<'s> {
+    pub(super) blocks: Blocks<'s, LANES>,
     pub(super) n_units: usize,
 }
 
 /// Floats read floats.
 macro_rules! floats {
-    ($($name:ty => $weight:ty),*) => {$(
+    ($($name:ty => $kept_as:expr),*) => {$(
         impl HeadFormat for $name {
-            type Detail = $weight;
+            const KEPT_AS: Option<HeadWeights> = $kept_as;
             type Values<'v> = &'v [f32];
-            type Head<'s, const B: usize> = Head<'s, $weight, B>;
+            type Head<'s, const B: usize> = Head<'s, B>;
 
             #[inline(always)]
             fn values(inputs: &mut [f32]) -> &[f32] {
                 inputs
             }
+
+            #[inline(always)]
+            fn floats(inputs: &[f32]) -> Option<&[f32]> {
+                Some(inputs)
+            }
         }
     )*};
 }
 
-floats!(F32 => f32, F16 => Half);
+floats!(F32 => None, F16 => Some(HeadWeights::F16));
 
-impl<'s, N, W, const B: usize> MlpHead<'s, N, B> for Head<'s, W, B>
+impl<'s, N, const B: usize> MlpHead<'s, N, B> for Head<'s, B>
 where
     N: for<'v> HeadFormat<Values<'v> = &'v [f32]>,
-    W: Weight,
 {
     fn convert(
         arena: &mut Arena<'s>,
+        _: Arena<'_>,
+        kept_as: HeadWeights,
         head: &HeadView<'_>,
         weights: &mut WeightReader<'_>,
     ) -> Result<Self, DecodeError> {
-        Self::converted(arena, head, weights)
+        Self::convert(arena, kept_as, head, weights)
     }
 
-    fn activate<'h>(&self, inputs: &[f32], hidden: &'h mut [f32]) -> &'h [f32] {
-        self.hidden.activate(inputs, hidden)
+    fn activate<'h>(&self, number: usize, inputs: &[f32], hidden: &'h mut [f32], role: &'h mut Role<'_>) -> &'h [f32] {
+        self.hidden.activate(number, inputs, hidden, role)
     }
 
     fn block(&self, index: usize, hidden: &[f32]) -> Option<[f32; B]> {
-        self.outputs(index, hidden)
+        self.output.outputs(index, hidden)
+    }
+
+    fn takes_two(&self) -> bool {
+        self.hidden.blocks.takes_two()
     }
 }
 
-impl<W: Weight> Hidden<'_, W> {
+impl Hidden<'_> {
     // Not inlined: one of it serves all heads.
     #[inline(never)]
-    fn activate<'h>(&self, inputs: &[f32], units: &'h mut [f32]) -> &'h [f32] {
-        // Not zipped: blocks are of a length that the compiler does not know, and their number would be a division, which
-        // it may take for one by zero.
-        let mut blocks = self.blocks.iter();
-        for units in units.as_chunks_mut::<LANES>().0 {
-            let Some(block) = blocks.next() else { break };
-            for (unit, sum) in units.iter_mut().zip(outputs(block, inputs)) {
-                *unit = if sum > 0.0 { sum } else { 0.0 };
+    fn activate<'h>(&self, number: usize, inputs: &[f32], hidden: &'h mut [f32], role: &'h mut Role<'_>) -> &'h [f32] {
+        if !self.blocks.takes_two() {
+            // Not zipped, here and below: blocks are of a length that the compiler does not know, and their number would be a
+            // division, which it may take for one by zero.
+            let mut blocks = self.blocks.floats();
+            for units in hidden.as_chunks_mut::<LANES>().0 {
+                let Some(block) = blocks.next() else { break };
+                *units = block::outputs(block, inputs).map(relu);
+            }
+        } else if let Some((second_inputs, second)) = role.second(number, hidden.len()) {
+            let mut blocks = self.blocks.halves();
+            for (first, second) in hidden.as_chunks_mut::<LANES>().0.iter_mut().zip(second.as_chunks_mut::<LANES>().0) {
+                let Some(block) = blocks.next() else { break };
+                [*first, *second] = weight::scaled_sums_of_two(block, [inputs, second_inputs]);
+            }
+            self.finish(inputs, hidden);
+            self.finish(second_inputs, second);
+        } else if let Some(known) = role.known(number, hidden.len()) {
+            return known.get(..self.n_units).unwrap_or_default();
+        } else {
+            // Rare: the last anchor of a chunk.
+            hidden.fill(f32::NAN);
+            self.finish(inputs, hidden);
+        }
+        hidden.get(..self.n_units).unwrap_or_default()
+    }
+
+    /// Makes units of the sums of halves, which are not finite if an input was too large to be scaled.
+    #[inline(never)]
+    fn finish(&self, inputs: &[f32], units: &mut [f32]) {
+        let units = units.get_mut(..self.n_units).unwrap_or_default();
+        // 0 times a finite number is 0; times any other it is NaN, and so is every sum with NaN.
+        let mut zero = 0.0;
+        for unit in &mut *units {
+            zero += 0.0 * *unit;
+            *unit = relu(*unit);
+        }
+        if zero != 0.0 {
+            let blocks = self.blocks.halves().flat_map(|block| (0..LANES).map(move |lane| (block, lane)));
+            for (unit, (block, lane)) in units.iter_mut().zip(blocks) {
+                *unit = relu(weight::unscaled(block.as_flattened(), lane, LANES, inputs));
             }
         }
-        units.get(..self.n_units).unwrap_or_default()
     }
 }
 
-impl<'s, W: Weight, const B: usize> Head<'s, W, B> {
-    pub(super) fn converted(
+#[inline]
+fn relu(sum: f32) -> f32 {
+    if sum > 0.0 { sum } else { 0.0 }
+}
+
+impl<'s, const B: usize> Head<'s, B> {
+    pub(super) fn convert(
         arena: &mut Arena<'s>,
+        kept_as: HeadWeights,
         head: &HeadView<'_>,
         weights: &mut WeightReader<'_>,
     ) -> Result<Self, DecodeError> {
         Ok(Self {
             hidden: Hidden {
-                blocks: Blocks::convert(arena, weights.next_layer(), &head.b1, head.n_in)?,
+                blocks: Blocks::convert(arena, kept_as, weights.next_layer(), &head.b1, head.n_in)?,
                 n_units: head.n_hidden,
             },
-            output: Blocks::convert(arena, weights.next_layer(), &head.b2, head.n_hidden)?,
+            output: Blocks::convert(arena, kept_as, weights.next_layer(), &head.b2, head.n_hidden)?,
         })
-    }
-
-    /// Outputs of block `index`, before any activation.
-    pub(super) fn outputs(&self, index: usize, hidden: &[f32]) -> Option<[f32; B]> {
-        self.output.block(index).map(|block| outputs(block, hidden))
     }
 }

@@ -1,7 +1,9 @@
 //! All heads of a scene.
 
+use super::block::HeadWeights;
 use super::detail::Detail;
 use super::format::{HeadFormat, MlpHead};
+use super::pair::Role;
 use super::shape::HeadShape;
 use crate::arena::Arena;
 use crate::bundle::HeadsView;
@@ -13,7 +15,7 @@ pub(crate) struct Heads<'s, N: HeadFormat> {
     pub(crate) opacity: N::Head<'s, 1>,
     pub(crate) covariance: Covariance<'s, N>,
     pub(crate) colour: N::Head<'s, 3>,
-    pub(crate) detail: Option<Detail<'s, N::Detail>>,
+    pub(crate) detail: Option<Detail<'s>>,
 }
 
 /// The covariance head.
@@ -26,12 +28,18 @@ pub(crate) enum Covariance<'s, N: HeadFormat> {
 
 impl<'s, N: HeadFormat> Covariance<'s, N> {
     /// As [`MlpHead::activate`].
-    pub(crate) fn activate<'h>(&self, inputs: N::Values<'_>, hidden: &'h mut [f32]) -> N::Values<'h> {
+    pub(crate) fn activate<'h>(
+        &self,
+        number: usize,
+        inputs: N::Values<'_>,
+        hidden: &'h mut [f32],
+        role: &'h mut Role<'_>,
+    ) -> N::Values<'h> {
         match self {
-            Self::Isotropic(head) => head.activate(inputs, hidden),
+            Self::Isotropic(head) => head.activate(number, inputs, hidden, role),
             // Unreachable without the feature; this arm drops the code, here and below.
             Self::Anisotropic(_) if !cfg!(feature = "anisotropy") => N::values(hidden),
-            Self::Anisotropic(head) => head.activate(inputs, hidden),
+            Self::Anisotropic(head) => head.activate(number, inputs, hidden, role),
         }
     }
 
@@ -46,22 +54,35 @@ impl<'s, N: HeadFormat> Covariance<'s, N> {
 }
 
 impl<'s, N: HeadFormat> Heads<'s, N> {
-    /// Converts the file's weights; takes [`n_weights`](super::HeadShape::n_weights) floats.
-    pub(crate) fn convert(arena: &mut Arena<'s>, heads: &HeadsView<'_>, shape: HeadShape) -> Result<Self, DecodeError> {
-        let mut weights = heads.weights();
+    /// Whether two anchors at a time cost less than one after the other.
+    pub(crate) fn takes_two(&self) -> bool {
+        self.opacity.takes_two()
+    }
+
+    /// Converts the file's weights; takes as many words as [`HeadShape`] says.
+    ///
+    /// * `kept_as`: of floats. * `free`: memory to work in.
+    pub(crate) fn convert(
+        arena: &mut Arena<'s>,
+        free: &mut Arena<'_>,
+        kept_as: HeadWeights,
+        heads: &HeadsView<'_>,
+        shape: HeadShape,
+    ) -> Result<Self, DecodeError> {
+        let weights = &mut heads.weights();
         // In the order of the file.
         Ok(Self {
             shape,
-            opacity: N::Head::convert(arena, &heads.opacity, &mut weights)?,
+            opacity: N::Head::convert(arena, free.borrow(), kept_as, &heads.opacity, weights)?,
             covariance: if cfg!(feature = "anisotropy") && shape.covariance > 1 {
-                Covariance::Anisotropic(N::Head::convert(arena, &heads.covariance, &mut weights)?)
+                Covariance::Anisotropic(N::Head::convert(arena, free.borrow(), kept_as, &heads.covariance, weights)?)
             } else {
-                Covariance::Isotropic(N::Head::convert(arena, &heads.covariance, &mut weights)?)
+                Covariance::Isotropic(N::Head::convert(arena, free.borrow(), kept_as, &heads.covariance, weights)?)
             },
-            colour: N::Head::convert(arena, &heads.colour, &mut weights)?,
+            colour: N::Head::convert(arena, free.borrow(), kept_as, &heads.colour, weights)?,
             detail: match &heads.detail {
                 Some(head) if cfg!(feature = "detail") && shape.detail > 0 => {
-                    Some(Detail::convert(arena, head, &mut weights)?)
+                    Some(Detail::convert(arena, head, weights)?)
                 }
                 _ => None,
             },

@@ -9,7 +9,9 @@ use core::iter;
 
 use bytemuck::{Pod, Zeroable};
 
+use super::block::HeadWeights;
 use super::format::{HeadFormat, I16, MlpHead};
+use super::pair::Role;
 use crate::arena::Arena;
 use crate::bundle::{HeadView, WeightReader};
 use crate::error::DecodeError;
@@ -99,12 +101,16 @@ pub(crate) struct IntegerHead<'s, const B: usize> {
 
 /// Integers read integers; the detail head stays in floats.
 impl HeadFormat for I16 {
-    type Detail = f32;
+    const KEPT_AS: Option<HeadWeights> = None;
     type Values<'v> = Quantised<'v>;
     type Head<'s, const B: usize> = IntegerHead<'s, B>;
 
     fn values(inputs: &mut [f32]) -> Quantised<'_> {
         Quantised::of(inputs)
+    }
+
+    fn floats(_: &[f32]) -> Option<Quantised<'_>> {
+        None
     }
 }
 
@@ -114,6 +120,8 @@ where
 {
     fn convert(
         arena: &mut Arena<'s>,
+        mut free: Arena<'_>,
+        _: HeadWeights,
         head: &HeadView<'_>,
         weights: &mut WeightReader<'_>,
     ) -> Result<Self, DecodeError> {
@@ -124,7 +132,6 @@ where
         let output = take_rows::<B>(arena, n_blocks * pairs_per_output)?;
         let ends = arena.take::<[[f32; 2]; B]>(n_blocks)?;
         // Needed until the weights are integers: what a step of each hidden unit is worth, and a row.
-        let mut free = arena.borrow();
         let steps = free.take::<f32>(n_hidden)?;
         let row = free.take::<f32>(n_hidden.max(n_in + 1))?;
 
@@ -150,7 +157,13 @@ where
         Ok(Self { hidden, pairs_per_unit, output, pairs_per_output, ends, n_hidden })
     }
 
-    fn activate<'h>(&self, inputs: Quantised<'_>, hidden: &'h mut [f32]) -> Quantised<'h> {
+    fn activate<'h>(
+        &self,
+        _: usize,
+        inputs: Quantised<'_>,
+        hidden: &'h mut [f32],
+        _: &'h mut Role<'_>,
+    ) -> Quantised<'h> {
         let mut blocks = self.hidden.chunks_exact(self.pairs_per_unit.max(1));
         let mut all_bits = 0;
         for units in words_mut(hidden).as_chunks_mut::<LANES>().0 {

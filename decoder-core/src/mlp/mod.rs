@@ -10,10 +10,13 @@ mod format;
 mod head;
 mod heads;
 mod integer;
+mod pair;
 mod shape;
 mod weight;
 
+pub use block::HeadWeights;
 pub use format::{F16, F32, I16};
 pub(crate) use format::{HeadFormat, MlpHead};
 pub(crate) use heads::Heads;
+pub(crate) use pair::Role;
 pub(crate) use shape::HeadShape;

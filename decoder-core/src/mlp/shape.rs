@@ -1,6 +1,7 @@
 //! Widths of the heads, and what follows from them: floats in memory and multiply-adds.
 
-use super::block::n_rows;
+use super::block::{HeadWeights, n_rows};
+use super::pair::Role;
 
 /// Outputs computed together in layers whose outputs are all needed.
 pub(super) const LANES: usize = 8;
@@ -30,16 +31,47 @@ impl HeadShape {
         if self.geometry_inputs > self.colour_inputs { self.geometry_inputs } else { self.colour_inputs }
     }
 
-    /// Floats of all heads in scratch memory.
-    pub(crate) const fn n_weights(&self) -> usize {
+    /// Words of all heads in scratch memory, whatever they are multiplied in: integers take no more than floats of either width.
+    pub(crate) const fn words(&self, weights: HeadWeights) -> usize {
         let Self { geometry_inputs, colour_inputs, feature: f, covariance: v, colour: c, detail: d, offsets: k } =
             *self;
-        let first_layers = LANES * (2 * n_rows::<LANES>(geometry_inputs, f) + n_rows::<LANES>(colour_inputs, c));
-        let outputs = n_rows::<1>(f, k) + v * n_rows::<1>(f, k) + 3 * n_rows::<3>(c, 3 * k);
+        let n = [
+            LANES * n_rows::<LANES>(geometry_inputs, f),
+            LANES * n_rows::<LANES>(colour_inputs, c),
+            n_rows::<1>(f, k),
+            v * n_rows::<1>(f, k),
+            3 * n_rows::<3>(c, 3 * k),
+        ];
         // Integers take a step and a bias for each output, which one pair less a unit pays for when there are two units.
         let steps = if f == 1 { (1 + v) * k } else { 0 } + if c == 1 { 3 * k } else { 0 };
+        let floats = 2 * n[0] + n[1] + n[2] + n[3] + n[4] + steps;
         let detail = if d == 0 { 0 } else { LANES * n_rows::<LANES>(f + 3, d) + 3 * n_rows::<3>(d, 3) };
-        first_layers + outputs + steps + detail
+        let of_one = match weights {
+            HeadWeights::F32 => floats,
+            HeadWeights::F16 => {
+                let [w0, w1, w2, w3, w4] =
+                    [n[0].div_ceil(2), n[1].div_ceil(2), n[2].div_ceil(2), n[3].div_ceil(2), n[4].div_ceil(2)];
+                let halves = 2 * w0 + w1 + w2 + w3 + w4 + self.pair_words();
+                let integers = self.integer_words();
+                let most = if halves > integers { halves } else { integers };
+                if most < floats { most } else { floats }
+            }
+        };
+        of_one + detail
+    }
+
+    /// Words of the anchor that waits for a second one, and of what is computed for the second one beside the first.
+    const fn pair_words(&self) -> usize {
+        3 * self.offsets + self.inputs() + Role::units_len(self.hidden_len())
+    }
+
+    /// Words of the heads in integers.
+    const fn integer_words(&self) -> usize {
+        let Self { geometry_inputs, colour_inputs, feature: f, covariance: v, colour: c, offsets: k, .. } = *self;
+        2 * (f.next_multiple_of(4) * (geometry_inputs / 2 + 1))
+            + c.next_multiple_of(4) * (colour_inputs / 2 + 1)
+            + (1 + v) * k * (f.div_ceil(2) + 2)
+            + 3 * k * (c.div_ceil(2) + 2)
     }
 
     /// Floats of the widest hidden layer's activations.

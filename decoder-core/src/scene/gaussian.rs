@@ -5,7 +5,7 @@ use bytemuck::{Pod, Zeroable};
 use super::Anchor;
 use crate::bundle::Effects;
 use crate::math::functions::Functions;
-use crate::mlp::{HeadFormat, Heads, MlpHead};
+use crate::mlp::{HeadFormat, Heads, MlpHead, Role};
 use crate::stopwatch::{Stage, Stopwatch};
 
 /// Opacities below one step of an 8-bit channel draw nothing.
@@ -40,18 +40,17 @@ pub(crate) struct HeadOutputs {
     colour: [f32; 3],
 }
 
-/// What evaluates anchors, one at a time.
-pub(crate) struct Evaluator<'s, N: HeadFormat> {
-    pub(crate) heads: Heads<'s, N>,
-    /// `[n_channels]` of the current anchor.
-    pub(crate) row: &'s mut [f32],
-    pub(crate) work: Workspace<'s>,
+/// Takes the Gaussians of anchors.
+pub(crate) trait GaussianSink {
+    /// The Gaussian of an anchor's offset; anchors ascend, and offsets within one.
+    fn gaussian(&mut self, anchor: u32, offset: usize, gaussian: &Gaussian);
+
+    /// The multiply-adds that an anchor took.
+    fn head_macs(&mut self, _: u64) {}
 }
 
 /// Scratch memory of the heads.
 pub(crate) struct Workspace<'s> {
-    /// What the head sees that sees most, see [`crate::mlp::HeadShape::inputs`].
-    pub(crate) inputs: &'s mut [f32],
     /// `[hidden_len]`.
     pub(crate) hidden: &'s mut [f32],
     /// `[sums_len]`, see [`crate::mlp::HeadShape`].
@@ -60,60 +59,70 @@ pub(crate) struct Workspace<'s> {
     pub(crate) outputs: &'s mut [HeadOutputs],
 }
 
-/// Calls `draw` with the offset and each Gaussian of `anchor` that a camera at `eye` can see, offsets ascending; returns the
-/// multiply-adds that it took.
-///
-/// Masked offsets take no part. The covariance and colour heads run only when an opacity is positive, and only for those
-/// offsets.
-///
-/// # Budget
-/// The opacity head, and at most the others: `3F(F + 4) + 11KF` multiply-adds (`5KF` of isotropic Gaussians), with a detail head
-/// of H units `H(F + 6K)` more.
-pub(crate) fn for_each_gaussian<H: HeadFormat, F: Functions>(
-    anchor: &Anchor<'_>,
-    effects: Effects,
-    eye: [f32; 3],
-    heads: &Heads<'_, H>,
-    work: &mut Workspace<'_>,
-    watch: &mut impl Stopwatch,
-    mut draw: impl FnMut(usize, &Gaussian),
-) -> u64 {
-    watch.enter(Stage::Heads);
-    let Workspace { inputs, hidden, detail_sums, outputs } = work;
-    fill_inputs(anchor, effects, eye, inputs);
-    let inputs = H::values(inputs);
-    let opacity_macs = heads.shape.opacity_macs(anchor.mask.count_ones() as usize);
-    let visible = fill_opacities::<H, F>(anchor, heads, inputs, hidden, outputs);
-    if visible == 0 {
-        return opacity_macs as u64;
-    }
-    // The hidden layers share one buffer, so the colours of all visible offsets follow the covariances of all.
-    let units = heads.covariance.activate(inputs, hidden);
-    for (k, output) in visible_only(outputs, visible) {
-        output.covariance = heads.covariance.block(k, units).unwrap_or_default();
-    }
-    let units = heads.colour.activate(inputs, hidden);
-    for (k, output) in visible_only(outputs, visible) {
-        output.colour = heads.colour.block(k, units).unwrap_or_default().map(F::sigmoid);
-    }
-    // Only then the buffer is free for the detail head.
-    if cfg!(feature = "detail")
-        && let Some(detail) = &heads.detail
-    {
-        detail.begin(anchor.feature, detail_sums);
-        for (_, output) in visible_only(outputs, visible) {
-            let [r, g, b] = detail.residual(output.colour, detail_sums, hidden);
-            let [plain_r, plain_g, plain_b] = output.colour;
-            output.colour = [plain_r + r, plain_g + g, plain_b + b];
+/// What the heads of a scene are evaluated with.
+pub(super) struct Evaluation<'e, 's, H: HeadFormat> {
+    pub(super) heads: &'e Heads<'s, H>,
+    pub(super) work: &'e mut Workspace<'s>,
+    pub(super) effects: Effects,
+}
+
+impl<H: HeadFormat> Evaluation<'_, '_, H> {
+    /// Hands the Gaussians of `anchor` to `sink` that are seen from where `inputs` are.
+    ///
+    /// Masked offsets take no part. The covariance and colour heads run only when an opacity is positive, and only for those
+    /// offsets.
+    ///
+    /// # Budget
+    /// The opacity head, and at most the others: `3F(F + 4) + 11KF` multiply-adds (`5KF` of isotropic Gaussians), with a detail head
+    /// of H units `H(F + 6K)` more.
+    // Not inlined: it has several callers.
+    #[inline(never)]
+    pub(super) fn run<F: Functions>(
+        &mut self,
+        number: u32,
+        anchor: &Anchor<'_>,
+        inputs: H::Values<'_>,
+        role: &mut Role<'_>,
+        watch: &mut impl Stopwatch,
+        sink: &mut impl GaussianSink,
+    ) {
+        watch.enter(Stage::Heads);
+        let Self { heads, work, effects } = self;
+        let Workspace { hidden, detail_sums, outputs } = work;
+        let mut macs = heads.shape.opacity_macs(anchor.mask.count_ones() as usize);
+        let units = heads.opacity.activate(0, inputs, hidden, role);
+        let visible = fill_opacities::<H, F>(anchor, heads, units, outputs);
+        if visible != 0 {
+            // The hidden layers share one buffer, so the colours of all visible offsets follow the covariances of all.
+            let units = heads.covariance.activate(1, inputs, hidden, role);
+            for (k, output) in visible_only(outputs, visible) {
+                output.covariance = heads.covariance.block(k, units).unwrap_or_default();
+            }
+            let units = heads.colour.activate(2, inputs, hidden, role);
+            for (k, output) in visible_only(outputs, visible) {
+                output.colour = heads.colour.block(k, units).unwrap_or_default().map(F::sigmoid);
+            }
+            // Only then the buffer is free for the detail head.
+            if cfg!(feature = "detail")
+                && let Some(detail) = &heads.detail
+            {
+                detail.begin(anchor.feature, detail_sums);
+                for (_, output) in visible_only(outputs, visible) {
+                    let [r, g, b] = detail.residual(output.colour, detail_sums, hidden);
+                    let [plain_r, plain_g, plain_b] = output.colour;
+                    output.colour = [plain_r + r, plain_g + g, plain_b + b];
+                }
+            }
+            watch.enter(Stage::Project);
+            for (k, output) in visible_only(outputs, visible) {
+                if let Some(offset) = anchor.offsets.get(k) {
+                    sink.gaussian(number, k, &gaussian::<F>(anchor, *effects, *offset, output));
+                }
+            }
+            macs += heads.shape.open_macs(visible.count_ones() as usize);
         }
+        sink.head_macs(macs as u64);
     }
-    watch.enter(Stage::Project);
-    for (k, output) in visible_only(outputs, visible) {
-        if let Some(offset) = anchor.offsets.get(k) {
-            draw(k, &gaussian::<F>(anchor, effects, *offset, output));
-        }
-    }
-    (opacity_macs + heads.shape.open_macs(visible.count_ones() as usize)) as u64
 }
 
 /// The outputs of the offsets that are drawn, each with the offset's number.
@@ -123,7 +132,7 @@ fn visible_only(outputs: &mut [HeadOutputs], visible: u32) -> impl Iterator<Item
 
 /// Concatenates feature, distance and direction, the last two if the scene has them, as many as there is room for: each head
 /// reads the first of them.
-fn fill_inputs(anchor: &Anchor<'_>, effects: Effects, eye: [f32; 3], inputs: &mut [f32]) {
+pub(super) fn fill_inputs(anchor: &Anchor<'_>, effects: Effects, eye: [f32; 3], inputs: &mut [f32]) {
     let [ax, ay, az] = anchor.position;
     let [ex, ey, ez] = eye;
     let [dx, dy, dz] = [ax - ex, ay - ey, az - ez];
@@ -139,12 +148,10 @@ fn fill_inputs(anchor: &Anchor<'_>, effects: Effects, eye: [f32; 3], inputs: &mu
 fn fill_opacities<H: HeadFormat, F: Functions>(
     anchor: &Anchor<'_>,
     heads: &Heads<'_, H>,
-    inputs: <H as HeadFormat>::Values<'_>,
-    hidden: &mut [f32],
+    units: H::Values<'_>,
     outputs: &mut [HeadOutputs],
 ) -> u32 {
     let mut visible = 0_u32;
-    let units = heads.opacity.activate(inputs, hidden);
     for (k, output) in visible_only(outputs, anchor.mask) {
         let [logit] = heads.opacity.block(k, units).unwrap_or_default();
         // tanh keeps the sign and the order, so most offsets leave before it.

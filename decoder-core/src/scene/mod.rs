@@ -4,6 +4,8 @@
 
 mod anchor;
 mod gaussian;
+mod visit;
 
 pub(crate) use anchor::{Anchor, ink_radius};
-pub(crate) use gaussian::{Evaluator, Gaussian, HeadOutputs, NO_ROTATION, Workspace, for_each_gaussian};
+pub(crate) use gaussian::{Gaussian, GaussianSink, HeadOutputs, NO_ROTATION, Workspace};
+pub(crate) use visit::{Evaluator, Pair};

@@ -1,0 +1,114 @@
+//! Anchors evaluated one after the other, or two at a time where that costs less.
+
+use super::Anchor;
+use super::gaussian::{Evaluation, GaussianSink, Workspace, fill_inputs};
+use crate::arena::Arena;
+use crate::bundle::Effects;
+use crate::math::functions::Functions;
+use crate::mlp::{HeadFormat, HeadShape, Heads, Role};
+use crate::stopwatch::Stopwatch;
+
+/// What evaluates anchors.
+pub(crate) struct Evaluator<'s, N: HeadFormat> {
+    pub(crate) heads: Heads<'s, N>,
+    /// What the head sees that sees most, see [`HeadShape::inputs`].
+    pub(crate) inputs: &'s mut [f32],
+    pub(crate) work: Workspace<'s>,
+    /// Where anchors are evaluated two at a time.
+    pub(crate) pair: Option<Pair<'s>>,
+}
+
+/// Two anchors at a time: the first waits for the second.
+pub(crate) struct Pair<'s> {
+    /// Of the first; its feature is among the evaluator's inputs.
+    offsets: &'s mut [[f32; 3]],
+    /// What the second anchor's heads read.
+    inputs: &'s mut [f32],
+    /// The second anchor's hidden units.
+    units: &'s mut [f32],
+    waiting: Option<Waiting>,
+}
+
+/// An anchor without its feature and its offsets.
+struct Waiting {
+    number: u32,
+    position: [f32; 3],
+    extent: [f32; 3],
+    base_scale: [f32; 3],
+    mask: u32,
+}
+
+impl<'s> Pair<'s> {
+    /// Takes its memory from `arena`; `None` if there is too little.
+    pub(crate) fn take(arena: &mut Arena<'s>, shape: HeadShape) -> Option<Self> {
+        Some(Self {
+            offsets: arena.take(shape.offsets).ok()?,
+            inputs: arena.take(shape.inputs()).ok()?,
+            units: arena.take(Role::units_len(shape.hidden_len())).ok()?,
+            waiting: None,
+        })
+    }
+}
+
+impl Waiting {
+    fn anchor<'r>(&self, feature: &'r [f32], offsets: &'r [[f32; 3]]) -> Anchor<'r> {
+        let Self { position, extent, base_scale, mask, .. } = *self;
+        Anchor { position, feature, extent, base_scale, offsets, mask }
+    }
+}
+
+impl<N: HeadFormat> Evaluator<'_, N> {
+    /// Hands the Gaussians of `anchor` that a camera at `eye` can see to `sink`, now or when the next anchor comes; in the order of
+    /// the anchors.
+    pub(crate) fn visit<F: Functions>(
+        &mut self,
+        number: u32,
+        anchor: &Anchor<'_>,
+        (effects, eye): (Effects, [f32; 3]),
+        watch: &mut impl Stopwatch,
+        sink: &mut impl GaussianSink,
+    ) {
+        let Self { heads, inputs, work, pair } = self;
+        let mut evaluation = Evaluation { heads, work, effects };
+        let Some(Pair { offsets, inputs: second_inputs, units, waiting }) = pair else {
+            fill_inputs(anchor, effects, eye, inputs);
+            evaluation.run::<F>(number, anchor, N::values(inputs), &mut Role::Alone, watch, sink);
+            return;
+        };
+        let Some(first) = waiting.take() else {
+            fill_inputs(anchor, effects, eye, inputs);
+            offsets.iter_mut().zip(anchor.offsets).for_each(|(kept, offset)| *kept = *offset);
+            let Anchor { position, extent, base_scale, mask, .. } = *anchor;
+            *waiting = Some(Waiting { number, position, extent, base_scale, mask });
+            return;
+        };
+        fill_inputs(anchor, effects, eye, second_inputs);
+        let (Some(first_values), Some(second_values)) = (N::floats(inputs), N::floats(second_inputs)) else { return };
+        let mut role = Role::First { inputs: second_inputs, units, n_known: 0 };
+        evaluation.run::<F>(first.number, &first.anchor(inputs, offsets), first_values, &mut role, watch, sink);
+        let mut role = role.of_second();
+        evaluation.run::<F>(number, anchor, second_values, &mut role, watch, sink);
+    }
+
+    /// The same for an anchor that waits for another.
+    pub(crate) fn finish<F: Functions>(
+        &mut self,
+        effects: Effects,
+        watch: &mut impl Stopwatch,
+        sink: &mut impl GaussianSink,
+    ) {
+        let Self { heads, inputs, work, pair } = self;
+        let Some(Pair { offsets, waiting, .. }) = pair else { return };
+        if let (Some(first), Some(values)) = (waiting.take(), N::floats(inputs)) {
+            let anchor = first.anchor(inputs, offsets);
+            Evaluation { heads, work, effects }.run::<F>(first.number, &anchor, values, &mut Role::Alone, watch, sink);
+        }
+    }
+
+    /// Forgets an anchor that waits, after an error.
+    pub(crate) fn forget(&mut self) {
+        if let Some(pair) = &mut self.pair {
+            pair.waiting = None;
+        }
+    }
+}

@@ -159,6 +159,8 @@ impl<'a> Directory<'a> {
     }
 
     /// The record of chunk number `index`.
+    // Not inlined: every loop over chunks calls it.
+    #[inline(never)]
     pub(super) fn record(&self, index: u32) -> Option<ChunkRecord> {
         ChunkRecord::parse(self.records.get(index as usize)?).ok()
     }

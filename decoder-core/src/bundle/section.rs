@@ -60,6 +60,8 @@ impl Section {
     }
 
     /// The bytes of the section, their checksum compared.
+    // Not inlined: it has seven callers.
+    #[inline(never)]
     pub(super) fn bytes<'a>(&self, file: &'a [u8]) -> Result<&'a [u8], DecodeError> {
         let end = self.offset.saturating_add(self.len);
         let available = saturate(file.len()).saturating_sub(self.offset);

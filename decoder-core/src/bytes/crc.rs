@@ -31,6 +31,8 @@ const fn remainders() -> [u32; 256] {
 /// ```
 /// assert_eq!(pocketsplat_core::bundle::crc32(b"123456789"), 0xCBF4_3926);
 /// ```
+// Not inlined: it has many callers.
+#[inline(never)]
 #[must_use]
 pub fn crc32(bytes: &[u8]) -> u32 {
     crc32_of(bytes.iter().copied())

@@ -6,9 +6,18 @@ use pocketsplat_core::bundle::{
 use pocketsplat_core::context::N_GROUPS;
 use pocketsplat_core::{Bundle, DecodeError, count_gaussians, count_scratch_len};
 
-use super::{BundleInfo, SizeReport, WriteError, Written};
+use super::{BundleInfo, SizeReport, WriteError};
 use crate::camera::core_camera;
 use crate::scene::Scene;
+
+/// A bundle just written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Written {
+    /// The file.
+    pub bytes: Vec<u8>,
+    /// Where its bytes went.
+    pub report: SizeReport,
+}
 
 /// What the header says besides what follows from the scene.
 pub(super) struct Counts {

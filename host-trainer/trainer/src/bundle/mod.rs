@@ -33,14 +33,14 @@ mod tests;
 pub use channels::ChannelName;
 pub use decoded::{decoded_heads, decoded_scene, normalisation_of, shape_of};
 pub use error::WriteError;
-pub use layout::CodedScene;
+pub use layout::{CodedScene, Written};
 pub use load::{LoadError, load};
 pub use mean_steps::mean_steps;
 pub use order::check_pruning_rates;
 pub use quantise::check_steps;
 pub use size::{SizePart, SizeReport};
 pub use stream::PartBits;
-pub use write::{ChannelCoding, PRUNING_RATES, WriteOptions, Written, code, write};
+pub use write::{ChannelCoding, PRUNING_RATES, WriteOptions, code, write};
 
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::Normalisation;

@@ -7,12 +7,12 @@ use super::channel_coder::ChannelCoder;
 use super::chunk::{ChunkRows, Models};
 use super::ink::InkBox;
 use super::lattice::LatticeModel;
-use super::layout::{self, CodedScene, Counts, Parts};
+use super::layout::{self, CodedScene, Counts, Parts, Written};
 use super::mask::MaskModel;
 use super::order::Placement;
 use super::quantise::{Rows, StepSource, check_lengths, check_steps, quantise};
 use super::table::TableSet;
-use super::{BundleInfo, SizeReport, WriteError, directory, heads};
+use super::{BundleInfo, WriteError, directory, heads};
 use crate::integer_model;
 use crate::scene::{QuantisationSteps, Scene};
 
@@ -60,15 +60,6 @@ impl Default for WriteOptions {
             chunk_anchors: 256,
         }
     }
-}
-
-/// A bundle just written.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Written {
-    /// The file.
-    pub bytes: Vec<u8>,
-    /// Where its bytes went.
-    pub report: SizeReport,
 }
 
 /// Codes a scene: all of its bundle but what is measured.

@@ -51,8 +51,10 @@ impl<'s> Pair<'s> {
 }
 
 impl Waiting {
-    fn anchor<'r>(&self, feature: &'r [f32], offsets: &'r [[f32; 3]]) -> Anchor<'r> {
+    /// * `inputs`: its feature, of `feature_dim` floats, and what else its heads read.
+    fn anchor<'r>(&self, inputs: &'r [f32], feature_dim: usize, offsets: &'r [[f32; 3]]) -> Anchor<'r> {
         let Self { position, extent, base_scale, mask, .. } = *self;
+        let feature = inputs.get(..feature_dim).unwrap_or_default();
         Anchor { position, feature, extent, base_scale, offsets, mask }
     }
 }
@@ -85,7 +87,14 @@ impl<N: HeadFormat> Evaluator<'_, N> {
         fill_inputs(anchor, effects, eye, second_inputs);
         let (Some(first_values), Some(second_values)) = (N::floats(inputs), N::floats(second_inputs)) else { return };
         let mut role = Role::First { inputs: second_inputs, units, n_known: 0 };
-        evaluation.run::<F>(first.number, &first.anchor(inputs, offsets), first_values, &mut role, watch, sink);
+        evaluation.run::<F>(
+            first.number,
+            &first.anchor(inputs, heads.shape.feature, offsets),
+            first_values,
+            &mut role,
+            watch,
+            sink,
+        );
         let mut role = role.of_second();
         evaluation.run::<F>(number, anchor, second_values, &mut role, watch, sink);
     }
@@ -100,7 +109,7 @@ impl<N: HeadFormat> Evaluator<'_, N> {
         let Self { heads, inputs, work, pair } = self;
         let Some(Pair { offsets, waiting, .. }) = pair else { return };
         if let (Some(first), Some(values)) = (waiting.take(), N::floats(inputs)) {
-            let anchor = first.anchor(inputs, offsets);
+            let anchor = first.anchor(inputs, heads.shape.feature, offsets);
             Evaluation { heads, work, effects }.run::<F>(first.number, &anchor, values, &mut Role::Alone, watch, sink);
         }
     }

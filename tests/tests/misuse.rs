@@ -1,4 +1,4 @@
-//! A frame, a bundle or a camera that a decoder was not planned for, or can not draw with, is refused as misuse.
+//! A frame, a bundle or a camera that a decoder was not planned for, or cannot draw with, is refused as misuse.
 
 use conformance::frame::{Frame, budget_for, bundle_of, draw, to_core};
 use conformance::scenes::{CASES, cameras, random_scene};

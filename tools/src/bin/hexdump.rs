@@ -42,7 +42,7 @@ struct Args {
 fn main() -> Result<()> {
     let args = Args::parse();
     if let Some(path) = &args.bundle {
-        let bytes = std::fs::read(path).with_context(|| format!("{}: can not be read", path.display()))?;
+        let bytes = std::fs::read(path).with_context(|| format!("{}: cannot be read", path.display()))?;
         print!("{}", dump(&bytes)?);
         return Ok(());
     }
@@ -52,7 +52,7 @@ fn main() -> Result<()> {
         }
         return Ok(());
     };
-    let text = std::fs::read_to_string(document).with_context(|| format!("{}: can not be read", document.display()))?;
+    let text = std::fs::read_to_string(document).with_context(|| format!("{}: cannot be read", document.display()))?;
     let mut fresh = text.clone();
     for (name, channels, file) in EXAMPLES {
         let bytes = example(channels)?;
@@ -62,14 +62,14 @@ fn main() -> Result<()> {
         if args.check.is_some() {
             ensure!(std::fs::read(&bundle).is_ok_and(|stored| stored == bytes), differs(document, &bundle));
         } else {
-            std::fs::write(&bundle, bytes).with_context(|| format!("{}: can not be written", bundle.display()))?;
+            std::fs::write(&bundle, bytes).with_context(|| format!("{}: cannot be written", bundle.display()))?;
         }
     }
     if args.check.is_some() {
         ensure!(text == fresh, differs(document, document));
         return Ok(());
     }
-    std::fs::write(document, fresh).with_context(|| format!("{}: can not be written", document.display()))
+    std::fs::write(document, fresh).with_context(|| format!("{}: cannot be written", document.display()))
 }
 
 fn dump(bytes: &[u8]) -> Result<String> {
@@ -138,7 +138,7 @@ fn example(channels: ChannelCoding) -> Result<Vec<u8>> {
         head_fraction_bits: has_context.then_some([2, 2]),
         ..WriteOptions::default()
     };
-    Ok(bundle::write(&scene, &info, &options).context("the example can not be written")?.bytes)
+    Ok(bundle::write(&scene, &info, &options).context("the example cannot be written")?.bytes)
 }
 
 /// Means at 0, deviations of one to four base steps, steps of a base step at one end of the x axis and half of one at the

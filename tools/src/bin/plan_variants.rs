@@ -1,4 +1,4 @@
-//! What the ways to draw a bundle take, in bytes and in this machine's time: residency and strips, frame by frame in turn.
+//! What the plan variants of a bundle take, in bytes and in this machine's time: residency and strips, frame by frame in turn.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -11,7 +11,7 @@ use pocketsplat_core::{Budget, Bundle, Camera, Decoder, FrameReport, Residency, 
 use pocketsplat_trainer::bundle;
 use pocketsplat_trainer::camera::core_camera;
 
-/// Draws views of a bundle in every way there is and prints what each takes.
+/// Draws views of a bundle by every plan variant there is and prints what each takes.
 #[derive(Parser)]
 struct Args {
     /// The bundle.
@@ -21,7 +21,7 @@ struct Args {
     /// Held-out views at most, evenly picked.
     #[arg(long, default_value_t = 8)]
     views: usize,
-    /// Frames of each way and view; medians count.
+    /// Frames of each variant and view; medians count.
     #[arg(long, default_value_t = 5)]
     frames: usize,
     /// Tiers to draw at most.
@@ -29,8 +29,8 @@ struct Args {
     tiers: u8,
 }
 
-/// A decoder with the name of its way and what its frames took.
-struct Way<'b> {
+/// A decoder with the name of its variant and what its frames took.
+struct Variant<'b> {
     residency: Residency,
     n_strips: u8,
     scratch_len: usize,
@@ -57,7 +57,7 @@ fn main() -> anyhow::Result<()> {
         Some(capture) => held_out(&bundle, capture, args.views)?,
     };
     let [width_px, height_px] = bundle.header().training_px;
-    let mut ways = Vec::new();
+    let mut variants = Vec::new();
     let baked = bundle.n_gaussians(0).map(|_| Residency::Baked);
     for residency in baked.into_iter().chain([Residency::Resident, Residency::Streamed]) {
         for n_strips in STRIPS {
@@ -68,7 +68,7 @@ fn main() -> anyhow::Result<()> {
             let plan = bundle.plan(&budget)?;
             let decoder = Decoder::bind(&bundle, plan, vec![0; plan.scratch_len()].leak())?;
             let (scratch_len, reports) = (plan.scratch_len(), Vec::new());
-            ways.push(Way { residency, n_strips, scratch_len, decoder, time_ms: 0.0, reports });
+            variants.push(Variant { residency, n_strips, scratch_len, decoder, time_ms: 0.0, reports });
         }
     }
     println!(
@@ -79,25 +79,25 @@ fn main() -> anyhow::Result<()> {
         cameras.len(),
     );
     for camera in &cameras {
-        let mut times = vec![Vec::new(); ways.len()];
+        let mut times = vec![Vec::new(); variants.len()];
         // In turn, so that all suffer alike from what else the machine does.
         for frame in 0..args.frames {
-            for (way, times) in ways.iter_mut().zip(&mut times) {
+            for (variant, times) in variants.iter_mut().zip(&mut times) {
                 let start = Instant::now();
-                let report = way.decoder.render(camera, &mut Nowhere)?;
+                let report = variant.decoder.render(camera, &mut Nowhere)?;
                 times.push(start.elapsed());
                 if frame == 0 {
-                    way.reports.push(report);
+                    variant.reports.push(report);
                 }
             }
         }
-        for (way, times) in ways.iter_mut().zip(&mut times) {
-            way.time_ms += median_ms(times);
+        for (variant, times) in variants.iter_mut().zip(&mut times) {
+            variant.time_ms += median_ms(times);
         }
     }
-    let first_ms = ways.first().map_or(1.0, |way| way.time_ms);
-    println!("way              bytes  most used  decoded  visible  head Mmac   splats  dropped  Mpixels     ms  ratio");
-    for Way { residency, n_strips, scratch_len, time_ms, reports, .. } in &ways {
+    let first_ms = variants.first().map_or(1.0, |variant| variant.time_ms);
+    println!("variant          bytes  most used  decoded  visible  head Mmac   splats  dropped  Mpixels     ms  ratio");
+    for Variant { residency, n_strips, scratch_len, time_ms, reports, .. } in &variants {
         let n = cameras.len() as f64;
         let mean = |count: fn(&FrameReport) -> f64| reports.iter().map(count).sum::<f64>() / n;
         println!(

@@ -1,9 +1,9 @@
-//! Why a scene can not be written.
+//! Why a scene cannot be written.
 
 use super::channels::ChannelName;
 use crate::integer_model::IntegerModelError;
 
-/// Why a scene can not be written as a bundle.
+/// Why a scene cannot be written as a bundle.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum WriteError {
@@ -47,7 +47,7 @@ pub enum WriteError {
         /// The most the format holds.
         limit: u32,
     },
-    /// Two anchors share a lattice cell, which a trie of cells can not tell apart.
+    /// Two anchors share a lattice cell, which a trie of cells cannot tell apart.
     #[error("anchors {} and {} share the lattice cell {cell:?}; keep one of them", anchors[0], anchors[1])]
     SharedCell {
         /// Their indices in the scene.
@@ -111,7 +111,7 @@ pub enum WriteError {
         /// Its value.
         value: f64,
     },
-    /// The preview camera can not be drawn with.
+    /// The preview camera cannot be drawn with.
     #[error("preview camera: {0}")]
     Preview(#[source] pocketsplat_core::DecodeError),
     /// The decoder refuses the bundle just written: a mistake in the writer.

@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use pocketsplat_core::{Bundle, DecodeError};
 
-/// Why a bundle file can not be used.
+/// Why a bundle file cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LoadError {
-    /// The file can not be read.
-    #[error("{}: can not be read", path.display())]
+    /// The file cannot be read.
+    #[error("{}: cannot be read", path.display())]
     Io {
         /// The file.
         path: PathBuf,

@@ -78,7 +78,7 @@ impl SlotList {
 
     /// Appends a slot without counting its bits.
     pub(super) fn append<S>(&mut self, slot: &Slot<S>) {
-        debug_assert!(slot.frequency > 0, "a slot that can not be coded");
+        debug_assert!(slot.frequency > 0, "a slot that cannot be coded");
         // What is certain changes no state and takes no bits.
         if slot.frequency < FREQUENCY_TOTAL {
             self.slots.push(FixedSlot { start: slot.start, frequency: slot.frequency });

@@ -11,7 +11,7 @@ pub struct RatePoint {
     pub psnr_db: f64,
 }
 
-/// Why two curves can not be compared.
+/// Why two curves cannot be compared.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BjontegaardError {

@@ -318,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn isotropic_gaussians_are_balls() {
+    fn isotropic_gaussians_reach_equally_far_in_every_direction() {
         let x = random(9, n_inputs(&BALLS));
         let (gaussians, sources) = run(&BALLS, &x);
         let (outputs, log_scales, _) = split(&BALLS, &x);

@@ -15,7 +15,7 @@ pub use trial::{Breach, Trial};
 /// Content of the memory and bytes that it begins behind a word.
 const FILLS: [(u8, usize); 5] = [(0x00, 0), (0xFF, 0), (0x5A, 1), (0x11, 2), (0xC3, 3)];
 
-/// Every way to draw what `budget` says that `bundle` has: residency and strips, whatever its limit of memory.
+/// Every plan variant that draws what `budget` says that `bundle` has: residency and strips, whatever its limit of memory.
 pub fn plan_variants(bundle: &Bundle<'_>, budget: Budget) -> impl Iterator<Item = Budget> + use<> {
     let strips = STRIPS.map(Strips::Exactly);
     let baked = bundle.n_gaussians(0).map(|_| Residency::Baked);
@@ -26,10 +26,10 @@ pub fn plan_variants(bundle: &Bundle<'_>, budget: Budget) -> impl Iterator<Item 
         .map(|budget| budget.in_bytes(usize::MAX))
 }
 
-/// The plan of `way` whose heads are halves, if that saves memory: with a byte too little for f32.
-pub fn halves(bundle: &Bundle<'_>, way: &Budget) -> Option<Plan> {
-    let whole = bundle.plan(way).ok()?;
-    let halves = bundle.plan(&way.in_bytes(whole.scratch_len().saturating_sub(1))).ok()?;
+/// The plan of `variant` whose heads are halves, if that saves memory: with a byte too little for f32.
+pub fn halves(bundle: &Bundle<'_>, variant: &Budget) -> Option<Plan> {
+    let whole = bundle.plan(variant).ok()?;
+    let halves = bundle.plan(&variant.in_bytes(whole.scratch_len().saturating_sub(1))).ok()?;
     (halves.head_weights() == HeadWeights::F16 && halves.n_tiers() == whole.n_tiers()).then_some(halves)
 }
 
@@ -106,10 +106,10 @@ pub fn variants_match(bundle: &Bundle<'_>, budget: Budget, camera: &Camera) -> R
     let scene = |r: &FrameReport| (r.splats, r.tile_splats, r.pixel_splats);
     let expected = draw(&budget.in_bytes(usize::MAX)).map_err(|breach| breach.to_string())?;
     let mut expected_of_halves: Option<Trial> = None;
-    for way in plan_variants(bundle, budget) {
-        let Budget { residency, strips, .. } = way;
-        let drawn = draw(&way).map_err(|breach| format!("{residency:?}, {strips:?}: {breach}"))?;
-        // With less memory for splats than the view has, what a strip has no place for differs from way to way.
+    for variant in plan_variants(bundle, budget) {
+        let Budget { residency, strips, .. } = variant;
+        let drawn = draw(&variant).map_err(|breach| format!("{residency:?}, {strips:?}: {breach}"))?;
+        // With less memory for splats than the view has, what a strip has no place for differs between variants.
         let whole = expected.report.splats_dropped == 0 && drawn.report.splats_dropped == 0;
         if whole && (&drawn.rgb, scene(&drawn.report)) != (&expected.rgb, scene(&expected.report)) {
             return Err(format!("{residency:?}, {strips:?}: another frame"));
@@ -119,12 +119,12 @@ pub fn variants_match(bundle: &Bundle<'_>, budget: Budget, camera: &Camera) -> R
         }
         // A third of the places that the fullest strip asks for.
         let few = MaxSplats::AtMost((drawn.report.max_splats / 3).max(1));
-        let in_slabs = draw(&way.with_max_splats(few).with_overflow(Overflow::Slabs));
+        let in_slabs = draw(&variant.with_max_splats(few).with_overflow(Overflow::Slabs));
         let in_slabs = in_slabs.map_err(|breach| format!("{residency:?}, {strips:?}, slabs: {breach}"))?;
         if whole && in_slabs.report.splats_dropped == 0 && in_slabs.rgb != expected.rgb {
             return Err(format!("{residency:?}, {strips:?}, {} slabs: another frame", in_slabs.report.slabs));
         }
-        let Some(plan) = halves(bundle, &way) else { continue };
+        let Some(plan) = halves(bundle, &variant) else { continue };
         let drawn = Trial::run(bundle, plan, camera, 0, 0)
             .map_err(|breach| format!("{residency:?}, {strips:?}, heads in halves: {breach}"))?;
         let expected = expected_of_halves.get_or_insert_with(|| drawn.clone());

@@ -77,7 +77,7 @@ impl Lpips {
     /// Memory: 59 MB.
     ///
     /// # Errors
-    /// [`LpipsError`] when the file can not be read or is not that of LPIPS-VGG.
+    /// [`LpipsError`] when the file cannot be read or is not that of LPIPS-VGG.
     pub fn read(path: &Path, range: InputRange) -> Result<Self, LpipsError> {
         let bytes = std::fs::read(path).map_err(|source| LpipsError::Read { path: path.to_owned(), source })?;
         Ok(Self { stages: weights::stages(&bytes, path)?, range })

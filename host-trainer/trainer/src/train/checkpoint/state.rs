@@ -14,7 +14,7 @@ use crate::train::watchdog::Watchdog;
 use crate::train::{TrainConfig, TrainError, Trainer};
 use pocketsplat_capture::dataset::Capture;
 
-/// Why a run can not go on from a checkpoint.
+/// Why a run cannot go on from a checkpoint.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RestoreError {

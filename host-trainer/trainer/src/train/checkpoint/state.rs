@@ -1,6 +1,6 @@
 //! A trainer to a checkpoint and back.
 
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -54,7 +54,7 @@ impl<'a> Trainer<'a> {
     /// # Errors
     /// What `out` reports.
     pub fn save(&self, out: impl Write) -> io::Result<()> {
-        let mut out = BufWriter::new(Checksummed { out, checksum: crc32fast::Hasher::new() });
+        let mut out = Checksummed { out, checksum: crc32fast::Hasher::new() };
         out.write_all(&MAGIC)?;
         out.write_all(&VERSION.to_le_bytes())?;
         let config = toml::to_string(&self.config).map_err(io::Error::other)?;
@@ -63,8 +63,8 @@ impl<'a> Trainer<'a> {
         let Scene { anchors, heads, context, .. } = &self.scene;
         let learned = (anchors, heads, context, &self.optimiser, &self.statistics, self.background);
         let all = (config, self.kernels(), &self.signature, progress, random, learned);
-        postcard::to_io(&all, &mut out).map_err(io::Error::other)?;
-        let mut out = out.into_inner().map_err(io::IntoInnerError::into_error)?;
+        // Not `to_io`, which hides what the disk reports.
+        out.write_all(&postcard::to_stdvec(&all).map_err(io::Error::other)?)?;
         let checksum = out.checksum.clone().finalize();
         out.write_all(&checksum.to_le_bytes())
     }

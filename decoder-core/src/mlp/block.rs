@@ -73,14 +73,24 @@ impl<'s, const B: usize> Blocks<'s, B> {
     }
 
     /// The outputs of block number `index`.
-    // Not inlined: it has several callers.
-    #[inline(never)]
+    #[inline(always)]
     pub(crate) fn outputs(&self, index: usize, inputs: &[f32]) -> Option<[f32; B]> {
         match self.rows {
             Rows::F32(rows) => block(rows, index, self.rows_per_block).map(|block| outputs(block, inputs)),
-            Rows::F16(rows) => block(rows, index, self.rows_per_block).map(|block| weight::outputs(block, inputs)),
+            Rows::F16(rows) => outputs_of_halves(rows, index, self.rows_per_block, inputs),
         }
     }
+}
+
+// Not inlined: only floats are worth the text that a block takes at each of its callers.
+#[inline(never)]
+fn outputs_of_halves<const B: usize>(
+    rows: &[[Half; B]],
+    index: usize,
+    rows_per_block: usize,
+    inputs: &[f32],
+) -> Option<[f32; B]> {
+    block(rows, index, rows_per_block).map(|block| weight::outputs(block, inputs))
 }
 
 /// Block number `index`.

@@ -62,6 +62,7 @@ where
         self.hidden.activate(number, inputs, hidden, role)
     }
 
+    #[inline(always)]
     fn block(&self, index: usize, hidden: &[f32]) -> Option<[f32; B]> {
         self.output.outputs(index, hidden)
     }
@@ -81,7 +82,9 @@ impl Hidden<'_> {
             let mut blocks = self.blocks.floats();
             for units in hidden.as_chunks_mut::<LANES>().0 {
                 let Some(block) = blocks.next() else { break };
-                *units = block::outputs(block, inputs).map(relu);
+                for (unit, sum) in units.iter_mut().zip(block::outputs(block, inputs)) {
+                    *unit = relu(sum);
+                }
             }
         } else if let Some((second_inputs, second)) = role.second(number, hidden.len()) {
             let mut blocks = self.blocks.halves();

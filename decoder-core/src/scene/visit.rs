@@ -6,7 +6,7 @@ use crate::arena::Arena;
 use crate::bundle::Effects;
 use crate::math::functions::Functions;
 use crate::mlp::{HeadFormat, HeadShape, Heads, Role};
-use crate::stopwatch::Stopwatch;
+use crate::stopwatch::{Stage, Stopwatch};
 
 /// What evaluates anchors.
 pub(crate) struct Evaluator<'s, N: HeadFormat> {
@@ -70,6 +70,7 @@ impl<N: HeadFormat> Evaluator<'_, N> {
         watch: &mut impl Stopwatch,
         sink: &mut impl GaussianSink,
     ) {
+        watch.enter(Stage::Heads);
         let Self { heads, inputs, work, pair } = self;
         let mut evaluation = Evaluation { heads, work, effects };
         let Some(Pair { offsets, inputs: second_inputs, units, waiting }) = pair else {

@@ -71,6 +71,7 @@ impl<N: HeadFormat> Evaluator<'_, N> {
         sink: &mut impl GaussianSink,
     ) {
         watch.enter(Stage::Heads);
+        watch.enter(Stage::Heads);
         let Self { heads, inputs, work, pair } = self;
         let mut evaluation = Evaluation { heads, work, effects };
         let Some(Pair { offsets, inputs: second_inputs, units, waiting }) = pair else {

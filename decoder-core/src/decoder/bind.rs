@@ -51,21 +51,33 @@ fn bind_scene<'b, 's, N: HeadFormat>(
     arena: &mut Arena<'s>,
     skip_damage: bool,
 ) -> Result<GaussianSource<'b, 's, N>, DecodeError> {
-    let (source, anchor) = match SceneMemory::take(shape, arena)? {
-        SceneMemory::Streamed { anchor, models: ModelMemory { words } } => {
-            (AnchorSource::Streamed(bundle.anchor_models(words)?), anchor)
+    match SceneMemory::take(shape, arena)? {
+        // Unreachable without the feature; this arm drops the code.
+        SceneMemory::Baked { .. } if !cfg!(feature = "baked") => Err(DecodeError::Internal),
+        SceneMemory::Baked { baked, anchor, models } => {
+            evaluate_scene(bundle, shape, baked, anchor, models, skip_damage)?.finish().map(GaussianSource::Baked)
+        }
+        SceneMemory::Streamed { anchor, models } => {
+            let source = AnchorSource::Streamed(bundle.anchor_models(models.words)?);
+            with_heads(bundle, shape, source, anchor, arena.borrow())
         }
         SceneMemory::Resident { anchor, records, models } => {
-            (AnchorSource::Resident(decode_anchors(bundle, shape, records, anchor.row, models, skip_damage)?), anchor)
+            let records = decode_anchors(bundle, shape, records, anchor.row, models, skip_damage)?;
+            with_heads(bundle, shape, AnchorSource::Resident(records), anchor, arena.borrow())
         }
-        // Unreachable without the feature; this arm drops the code.
-        SceneMemory::Baked { .. } if !cfg!(feature = "baked") => return Err(DecodeError::Internal),
-        SceneMemory::Baked { baked, anchor, models } => {
-            let baker = evaluate_scene(bundle, shape, baked, anchor, models, skip_damage)?;
-            return baker.finish().map(GaussianSource::Baked);
-        }
-    };
-    let (evaluator, row) = evaluator(bundle, shape, anchor, arena.borrow())?;
+    }
+}
+
+/// Anchors with the heads that make Gaussians of them.
+#[inline(never)]
+fn with_heads<'b, 's, N: HeadFormat>(
+    bundle: &Bundle<'b>,
+    shape: &ScratchShape,
+    source: AnchorSource<'b, 's>,
+    anchor: AnchorMemory<'s>,
+    free: Arena<'_>,
+) -> Result<GaussianSource<'b, 's, N>, DecodeError> {
+    let (evaluator, row) = evaluator(bundle, shape, anchor, free)?;
     Ok(GaussianSource::Anchors(Anchors { source, row, evaluator }))
 }
 
@@ -91,6 +103,7 @@ fn evaluator<'s, N: HeadFormat>(
 /// Decodes the planned tiers into `records`.
 ///
 /// * `row`: `[n_channels]`, for the symbols of the current anchor.
+#[inline(never)]
 fn decode_anchors<'b, 's>(
     bundle: &Bundle<'b>,
     shape: &ScratchShape,

@@ -67,7 +67,7 @@ pub(super) struct Evaluation<'e, 's, H: HeadFormat> {
 }
 
 impl<H: HeadFormat> Evaluation<'_, '_, H> {
-    /// Hands the Gaussians of `anchor` to `sink` that are seen from where `inputs` are.
+    /// Hands the Gaussians of `anchor` to `sink` that are seen from where `inputs` are; the caller has entered [`Stage::Heads`].
     ///
     /// Masked offsets take no part. The covariance and colour heads run only when an opacity is positive, and only for those
     /// offsets.
@@ -86,7 +86,6 @@ impl<H: HeadFormat> Evaluation<'_, '_, H> {
         watch: &mut impl Stopwatch,
         sink: &mut impl GaussianSink,
     ) {
-        watch.enter(Stage::Heads);
         let Self { heads, work, effects } = self;
         let Workspace { hidden, detail_sums, outputs } = work;
         let mut macs = heads.shape.opacity_macs(anchor.mask.count_ones() as usize);

@@ -71,7 +71,6 @@ impl<N: HeadFormat> Evaluator<'_, N> {
         sink: &mut impl GaussianSink,
     ) {
         watch.enter(Stage::Heads);
-        watch.enter(Stage::Heads);
         let Self { heads, inputs, work, pair } = self;
         let mut evaluation = Evaluation { heads, work, effects };
         let Some(Pair { offsets, inputs: second_inputs, units, waiting }) = pair else {
@@ -97,6 +96,7 @@ impl<N: HeadFormat> Evaluator<'_, N> {
             watch,
             sink,
         );
+        watch.enter(Stage::Heads);
         let mut role = role.of_second();
         evaluation.run::<F>(number, anchor, second_values, &mut role, watch, sink);
     }
@@ -111,6 +111,7 @@ impl<N: HeadFormat> Evaluator<'_, N> {
         let Self { heads, inputs, work, pair } = self;
         let Some(Pair { offsets, waiting, .. }) = pair else { return };
         if let (Some(first), Some(values)) = (waiting.take(), N::floats(inputs)) {
+            watch.enter(Stage::Heads);
             let anchor = first.anchor(inputs, heads.shape.feature, offsets);
             Evaluation { heads, work, effects }.run::<F>(first.number, &anchor, values, &mut Role::Alone, watch, sink);
         }

@@ -41,7 +41,7 @@ pub use lattice::{Lattice, MAX_LATTICE_BITS, MAX_LATTICE_MIN};
 pub use manifest::{MANIFEST_RECORD_LEN, STRIPS, TierMeasures};
 pub use section::{SECTION_LEN, Section};
 pub use sections::SectionBytes;
-pub use tables::{Table, Tables};
+pub use tables::{FrequencyTable, Tables};
 
 use crate::context::Context;
 use crate::entropy::MaskModel;

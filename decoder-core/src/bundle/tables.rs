@@ -32,7 +32,7 @@ pub struct Tables<'a> {
 /// Entry i owns the slots from `bounds[i]` to `bounds[i + 1]`, and the last piece, up to [`FREQUENCY_TOTAL`], is the
 /// escape's.
 #[derive(Clone, Copy, Debug)]
-pub struct Table<'a> {
+pub struct FrequencyTable<'a> {
     /// Value of symbol 0.
     pub origin: f32,
     /// Distance between neighbouring symbols' values.
@@ -62,7 +62,7 @@ impl<'a> Tables<'a> {
             let offset = u32::from_le_bytes(offset);
             let expected = saturate(cursor.position());
             in_range(Field::TableOffset, offset, expected, expected)?;
-            Table::parse(&mut cursor)?.check(SectionKind::Tables, table)?;
+            FrequencyTable::parse(&mut cursor)?.check(SectionKind::Tables, table)?;
         }
         cursor.end()?;
         Ok(Self { channel_tables, offsets, section })
@@ -71,7 +71,7 @@ impl<'a> Tables<'a> {
     /// The bytes of a section: the reverse of `parse`.
     ///
     /// * `channel_tables`: `[n_channels]` the number in `tables` of each channel's table.
-    pub fn emit<'t>(tables: &'t [Table<'t>], channel_tables: &'t [u16]) -> impl Iterator<Item = u8> + use<'t> {
+    pub fn emit<'t>(tables: &'t [FrequencyTable<'t>], channel_tables: &'t [u16]) -> impl Iterator<Item = u8> + use<'t> {
         let index_len = tables.len().saturating_mul(4).saturating_add(channel_tables.len().saturating_mul(2));
         let offsets = tables.iter().scan(index_len.saturating_add(4), |end, table| {
             let offset = saturate(*end);
@@ -81,7 +81,7 @@ impl<'a> Tables<'a> {
         // Both are at most 360.
         let counts = [tables.len() as u16, channel_tables.len() as u16];
         let numbers = counts.into_iter().chain(channel_tables.iter().copied()).flat_map(u16::to_le_bytes);
-        numbers.chain(offsets.flat_map(u32::to_le_bytes)).chain(tables.iter().flat_map(Table::emit))
+        numbers.chain(offsets.flat_map(u32::to_le_bytes)).chain(tables.iter().flat_map(FrequencyTable::emit))
     }
 
     /// Number of tables.
@@ -111,10 +111,10 @@ impl<'a> Tables<'a> {
 
     /// Table number `table`.
     #[must_use]
-    pub fn get(&self, table: usize) -> Option<Table<'a>> {
+    pub fn get(&self, table: usize) -> Option<FrequencyTable<'a>> {
         let offset = u32::from_le_bytes(*self.offsets.get(table)?);
         let bytes = self.section.get(offset as usize..)?;
-        Table::parse(&mut Cursor::new(bytes, SectionKind::Tables)).ok()
+        FrequencyTable::parse(&mut Cursor::new(bytes, SectionKind::Tables)).ok()
     }
 
     /// `[n_channels]` the table of each channel, as bytes of its number.
@@ -123,13 +123,13 @@ impl<'a> Tables<'a> {
     }
 
     /// The tables of all channels in order.
-    pub fn of_channels(&self) -> impl Iterator<Item = Table<'a>> + use<'a> {
+    pub fn of_channels(&self) -> impl Iterator<Item = FrequencyTable<'a>> + use<'a> {
         let tables = *self;
         (0..tables.n_channels()).filter_map(move |channel| tables.get(tables.table_of(channel)?))
     }
 }
 
-impl<'a> Table<'a> {
+impl<'a> FrequencyTable<'a> {
     /// A table about to be written.
     ///
     /// * `bounds`: `[n_symbols + 2]` little-endian, from 0 to [`FREQUENCY_TOTAL`] without falling; the last entry is the escape.
@@ -211,7 +211,7 @@ impl<'a> Table<'a> {
     }
 }
 
-impl SymbolModel for Table<'_> {
+impl SymbolModel for FrequencyTable<'_> {
     /// `None` is the escape: the symbol follows as two raw bytes, high then low.
     type Symbol = Option<i16>;
 

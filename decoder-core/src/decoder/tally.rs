@@ -7,7 +7,7 @@ use crate::budget::MAX_STRIPS;
 /// Counts the splats of all strips in the order of the file, until one strip is full.
 ///
 /// The first splat that some strip has no place for, and all after it, are left out of all strips: so what is drawn does
-/// not depend on which strip is in work, and the tiers that come first in the file are the last to suffer.
+/// not depend on which strip is drawn, and the tiers that come first in the file are the last to suffer.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tally {
     /// Splats that a strip has places for.

@@ -13,20 +13,20 @@ use crate::error::DecodeError;
 pub(crate) struct Heads<'s, N: HeadFormat> {
     pub(crate) shape: HeadShape,
     pub(crate) opacity: N::Head<'s, 1>,
-    pub(crate) covariance: Covariance<'s, N>,
+    pub(crate) covariance: CovarianceHead<'s, N>,
     pub(crate) colour: N::Head<'s, 3>,
     pub(crate) detail: Option<Detail<'s>>,
 }
 
 /// The covariance head.
-pub(crate) enum Covariance<'s, N: HeadFormat> {
+pub(crate) enum CovarianceHead<'s, N: HeadFormat> {
     /// A scale logit an offset.
     Isotropic(N::Head<'s, 1>),
     /// Three, and a quaternion.
     Anisotropic(N::Head<'s, 7>),
 }
 
-impl<'s, N: HeadFormat> Covariance<'s, N> {
+impl<'s, N: HeadFormat> CovarianceHead<'s, N> {
     /// As [`MlpHead::activate`].
     pub(crate) fn activate<'h>(
         &self,
@@ -69,15 +69,15 @@ impl<'s, N: HeadFormat> Heads<'s, N> {
         heads: &HeadsView<'_>,
         shape: HeadShape,
     ) -> Result<Self, DecodeError> {
-        let weights = &mut heads.weights();
+        let (covariance, weights) = (&heads.covariance, &mut heads.weights());
         // In the order of the file.
         Ok(Self {
             shape,
             opacity: N::Head::convert(arena, free.borrow(), kept_as, &heads.opacity, weights)?,
             covariance: if cfg!(feature = "anisotropy") && shape.covariance > 1 {
-                Covariance::Anisotropic(N::Head::convert(arena, free.borrow(), kept_as, &heads.covariance, weights)?)
+                CovarianceHead::Anisotropic(N::Head::convert(arena, free.borrow(), kept_as, covariance, weights)?)
             } else {
-                Covariance::Isotropic(N::Head::convert(arena, free.borrow(), kept_as, &heads.covariance, weights)?)
+                CovarianceHead::Isotropic(N::Head::convert(arena, free.borrow(), kept_as, covariance, weights)?)
             },
             colour: N::Head::convert(arena, free.borrow(), kept_as, &heads.colour, weights)?,
             detail: match &heads.detail {

@@ -96,12 +96,12 @@ impl Band {
     /// 7 multiplications a border.
     pub(crate) fn sees_gaussian(&self, gaussian: &Gaussian) -> bool {
         let radius = ink_radius(gaussian.scale);
-        !self.sides().any(|side| side.is_beyond_ball(gaussian.centre, radius))
+        !self.sides().any(|side| side.is_beyond_sphere(gaussian.centre, radius))
     }
 }
 
 impl Side {
-    /// Whether all splats of a box lie beyond: the box holds their balls of radius r, whose farthest points have
+    /// Whether all splats of a box lie beyond: the box holds a sphere of radius r around each, whose farthest point has
     /// `y + m·z + r·|normal|`; where s is more than that, half of the box's shortest edge bounds r.
     fn is_beyond_box(&self, (min, max): ([f32; 3], [f32; 3])) -> bool {
         let ([n0, n1, n2], [low0, low1, low2], [high0, high1, high2]) = (self.normal, min, max);
@@ -117,22 +117,22 @@ impl Side {
         farthest + self.shift + excess + ROUNDING * (size + excess) < 0.0
     }
 
-    /// Whether a ball lies beyond.
-    fn is_beyond_ball(&self, centre: [f32; 3], radius: f32) -> bool {
+    /// Whether a sphere lies beyond.
+    fn is_beyond_sphere(&self, centre: [f32; 3], radius: f32) -> bool {
         let ([n0, n1, n2], [x, y, z]) = (self.normal, centre);
         let [a, b, c] = [n0 * x, n1 * y, n2 * z];
-        let ball = radius * self.stretch;
-        let size = a.abs() + b.abs() + c.abs() + self.shift.abs() + ball;
-        (a + b + c) + self.shift + ball + ROUNDING * size < 0.0
+        let reach = radius * self.stretch;
+        let size = a.abs() + b.abs() + c.abs() + self.shift.abs() + reach;
+        (a + b + c) + self.shift + reach + ROUNDING * size < 0.0
     }
 
-    /// Whether all offsets that an anchor draws lie beyond, each the centre of a ball of `radius`.
+    /// Whether all offsets that an anchor draws lie beyond, each the centre of a sphere of `radius`.
     fn is_beyond_anchor(&self, anchor: &Anchor<'_>, radius: f32) -> bool {
         let ([n0, n1, n2], [l0, l1, l2], [p0, p1, p2]) = (self.normal, anchor.extent, anchor.position);
         let along = [n0 * l0, n1 * l1, n2 * l2];
-        let ball = radius * self.stretch;
-        let centre = dot(self.normal, anchor.position) + self.shift + ball;
-        let size = n0.abs() * p0.abs() + n1.abs() * p1.abs() + n2.abs() * p2.abs() + self.shift.abs() + ball;
+        let reach = radius * self.stretch;
+        let centre = dot(self.normal, anchor.position) + self.shift + reach;
+        let size = n0.abs() * p0.abs() + n1.abs() * p1.abs() + n2.abs() * p2.abs() + self.shift.abs() + reach;
         let mut mask = anchor.mask;
         for offset in anchor.offsets {
             let drawn = mask & 1 == 1;

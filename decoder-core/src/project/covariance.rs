@@ -46,7 +46,7 @@ impl Covariance {
     ///
     /// * `[tx, ty]`: slopes within the clamp. * `[a, b]`: the deviation along either axis in front of the camera, pixels.
     #[inline]
-    pub(super) fn of_ball([tx, ty]: [f32; 2], [a, b]: [f32; 2]) -> Self {
+    pub(super) fn of_isotropic([tx, ty]: [f32; 2], [a, b]: [f32; 2]) -> Self {
         let [tx_2, ty_2] = [tx * tx, ty * ty];
         let [pp, qq] = [a * a * (1.0 + tx_2), b * b * (1.0 + ty_2)];
         let ab = a * b;
@@ -66,14 +66,14 @@ mod tests {
     use super::Covariance;
 
     #[test]
-    fn of_a_ball_it_is_that_of_the_rows_of_its_jacobian() {
+    fn of_an_isotropic_gaussian_it_is_that_of_the_rows_of_its_jacobian() {
         for (tx, ty) in [(0.0, 0.0), (0.3, -0.7), (-1.9, 0.02), (5.0, 6.0)] {
             for (a, b) in [(1e-4_f32, 2e-4_f32), (0.7, 0.5), (300.0, 310.0), (6e3, 1e4)] {
                 let rows = Covariance::from_rows([[a, 0.0, -a * tx], [0.0, b, -b * ty]]);
-                let ball = Covariance::of_ball([tx, ty], [a, b]);
+                let short = Covariance::of_isotropic([tx, ty], [a, b]);
                 let near = |found: f32, expected: f32| (found - expected).abs() <= 1e-6 * expected.abs();
-                assert!(near(ball.xx, rows.xx) && near(ball.xy, rows.xy) && near(ball.yy, rows.yy), "{tx} {ty} {a}");
-                assert!(near(ball.det, rows.det) && near(ball.det_bare, rows.det_bare), "{tx} {ty} {a}");
+                assert!(near(short.xx, rows.xx) && near(short.xy, rows.xy) && near(short.yy, rows.yy), "{tx} {ty} {a}");
+                assert!(near(short.det, rows.det) && near(short.det_bare, rows.det_bare), "{tx} {ty} {a}");
             }
         }
     }

@@ -30,10 +30,10 @@ pub fn chunks_in_view<'b>(
 impl View {
     /// Whether anything inside a box can reach the image; true more often than needed, never false wrongly.
     ///
-    /// The box holds, for each of its splats, the ball of radius r = √(2 ln 255)·σ_max around the centre (x, y, z). On
+    /// The box holds, for each of its splats, a sphere of radius r = √(2 ln 255)·σ_max around the centre (x, y, z). On
     /// the image the splat reaches at most r·fx/z·√(1 + t²) from its centre, t being the clamped slope, plus the reach
     /// of the dilation. So it ends left of the image when x + m·z + r·√(1 + t²) < 0 for m = (cx + reach)/fx, and if m
-    /// is taken no smaller than |t| can be, that follows from the whole ball lying beyond the plane x + m·z = 0.
+    /// is taken no smaller than |t| can be, that follows from the whole sphere lying beyond the plane x + m·z = 0.
     pub(crate) fn sees_box(&self, (min, max): ([f32; 3], [f32; 3])) -> bool {
         let [row_x, row_y, row_z] = self.rotation;
         let [tx, ty, tz] = self.translation;

@@ -50,7 +50,7 @@ impl View {
             Covariance::from_rows(self.sphere_to_image(point, gaussian))
         } else {
             let [deviation, ..] = gaussian.scale;
-            Covariance::of_ball(self.slopes(point), self.focal_px.map(|f| f / depth * deviation))
+            Covariance::of_isotropic(self.slopes(point), self.focal_px.map(|f| f / depth * deviation))
         };
         let mut opacity = gaussian.opacity;
         if effects.dilation_compensation {

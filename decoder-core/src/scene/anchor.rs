@@ -44,7 +44,7 @@ impl<'r> Anchor<'r> {
         Some(Self { position, feature, extent: [a0, a1, a2].map(F::exp), base_scale, offsets, mask })
     }
 
-    /// A box that holds the balls of ink of all offsets that it draws, as that of a chunk does; empty without any.
+    /// A box that holds the visible part of all splats it draws, as that of a chunk does; empty without any.
     pub(crate) fn ink_box(&self) -> ([f32; 3], [f32; 3]) {
         let ([px, py, pz], [lx, ly, lz]) = (self.position, self.extent);
         let radius = ink_radius(self.base_scale);

@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Capture, EXTENT, Image, Normalisation, PointsOrigin, View};
 use pocketsplat_trainer::scene::ModelShape;
-use pocketsplat_trainer::train::config::{Densification, Rate, Rates};
+use pocketsplat_trainer::train::config::{Densification, LearningRate, Rates};
 use pocketsplat_trainer::train::{TrainConfig, TrainError, Trainer};
 
 use super::{Case, Family, error, n_not_finite, parameters};
@@ -114,7 +114,7 @@ pub(super) fn diverging(edit: impl Fn(&mut Capture, &mut TrainConfig)) -> String
 
 /// All rates multiplied.
 fn spiked(factor: f64) -> Rates {
-    let all = |rate: Rate| Rate { start: rate.start * factor, end: rate.end * factor };
+    let all = |rate: LearningRate| LearningRate { start: rate.start * factor, end: rate.end * factor };
     let Rates { offset, feature, log_scale, opacity_head, covariance_head, colour_head, .. } = Rates::default();
     let Rates { mask, grid, context, background, .. } = Rates::default();
     Rates {
@@ -152,7 +152,7 @@ pub(super) fn family() -> Family {
             numbers,
             0.0,
             || {
-                let largest = Rate { start: 10.0, end: 10.0 };
+                let largest = LearningRate { start: 10.0, end: 10.0 };
                 let rates = Rates {
                     offset: largest,
                     feature: largest,

@@ -1,7 +1,7 @@
 //! The matrices of the heads, weight by weight, however they are stored.
 
 use super::{DecodeError, Field, Halves, Matrices, N_MATRICES, SectionKind};
-use crate::bundle::tables::Table;
+use crate::bundle::tables::FrequencyTable;
 use crate::bytes::Cursor;
 use crate::entropy::AnsReader;
 use crate::math::from_half;
@@ -13,7 +13,7 @@ const STEPS: core::ops::RangeInclusive<f32> = 1.0 / 16_777_216.0..=1.0;
 #[derive(Clone, Copy, Debug)]
 pub struct CodedHeads<'a> {
     /// Of all first layers, of all second layers.
-    pub tables: [Table<'a>; 2],
+    pub tables: [FrequencyTable<'a>; 2],
     /// Words of the one stream that holds W1 and W2 of each head, row-major.
     pub words: &'a [[u8; 2]],
 }
@@ -29,7 +29,7 @@ pub struct WeightReader<'a> {
 #[derive(Clone, Copy, Debug)]
 enum Source<'a> {
     Raw([Halves<'a>; N_MATRICES]),
-    Coded([Table<'a>; 2], AnsReader<'a>),
+    Coded([FrequencyTable<'a>; 2], AnsReader<'a>),
 }
 
 /// The weights of one matrix, row-major; read it to its end before the next.
@@ -42,12 +42,12 @@ pub struct LayerWeights<'r, 'a> {
 #[derive(Debug)]
 enum LayerSource<'r, 'a> {
     Raw(Halves<'a>),
-    Coded(Table<'a>, &'r mut AnsReader<'a>),
+    Coded(FrequencyTable<'a>, &'r mut AnsReader<'a>),
 }
 
 impl<'a> CodedHeads<'a> {
-    pub(super) fn parse_tables(cursor: &mut Cursor<'a>) -> Result<[Table<'a>; 2], DecodeError> {
-        let tables = [Table::parse(cursor)?, Table::parse(cursor)?];
+    pub(super) fn parse_tables(cursor: &mut Cursor<'a>) -> Result<[FrequencyTable<'a>; 2], DecodeError> {
+        let tables = [FrequencyTable::parse(cursor)?, FrequencyTable::parse(cursor)?];
         for (index, table) in (0..).zip(&tables) {
             table.check(SectionKind::Heads, index)?;
             let power_of_two = table.step.to_bits() & 0x7F_FFFF == 0;
@@ -58,7 +58,7 @@ impl<'a> CodedHeads<'a> {
         Ok(tables)
     }
 
-    pub(super) fn new(tables: [Table<'a>; 2], words: &'a [u8]) -> Result<Self, DecodeError> {
+    pub(super) fn new(tables: [FrequencyTable<'a>; 2], words: &'a [u8]) -> Result<Self, DecodeError> {
         let (words, odd_byte) = words.as_chunks();
         if !odd_byte.is_empty() {
             return Err(DecodeError::HeadStream { left_bytes: 1 });

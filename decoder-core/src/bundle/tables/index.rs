@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::{Table, Tables};
+use super::{FrequencyTable, Tables};
 use crate::entropy::{AnsReader, FREQUENCY_TOTAL, PRECISION_BITS};
 use crate::error::DecodeError;
 
@@ -38,7 +38,7 @@ pub(in crate::bundle) struct IndexedTables<'a, 's> {
 }
 
 impl IndexedTable {
-    fn new(table: &Table<'_>) -> Self {
+    fn new(table: &FrequencyTable<'_>) -> Self {
         let n_entries = table.n_symbols().min(MAX_ENTRIES);
         // The entries with the most slots.
         let slots = |bounds: &[[u8; 2]]| {
@@ -58,8 +58,8 @@ impl IndexedTable {
             let next = bounds.partition_point(|&bound| bound <= start);
             *short_cut = next.saturating_sub(1) as u8;
         }
-        let Table { origin, step, min_symbol, .. } = *table;
-        // `Table::check` made sure that the symbol of every entry is an i16.
+        let FrequencyTable { origin, step, min_symbol, .. } = *table;
+        // `FrequencyTable::check` made sure that the symbol of every entry is an i16.
         let first_symbol = i32::from(min_symbol).wrapping_add(first);
         Self { origin, step, first_symbol, n_entries: n_entries as u32, short_cuts, bounds }
     }
@@ -138,7 +138,7 @@ mod tests {
     use std::{vec, vec::Vec};
 
     use super::IndexedTable;
-    use crate::bundle::Table;
+    use crate::bundle::FrequencyTable;
     use crate::entropy::{FREQUENCY_TOTAL, Slot, SymbolModel};
 
     /// Tables of all kinds: wide, narrow, long with empty entries, empty.
@@ -161,7 +161,7 @@ mod tests {
     #[test]
     fn short_cuts_lead_where_bisection_leads_or_nowhere() {
         for bounds in tables() {
-            let table = Table { origin: 0.0, step: 1.0, min_symbol: -7, bounds: &bounds };
+            let table = FrequencyTable { origin: 0.0, step: 1.0, min_symbol: -7, bounds: &bounds };
             let indexed = IndexedTable::new(&table);
             let mut n_found = 0;
             for quantile in 0..FREQUENCY_TOTAL {

@@ -6,8 +6,8 @@ use std::vec::Vec;
 use super::builder::{LATTICE_MIN, Variant, bundle};
 use super::{symbols, variants};
 use crate::bundle::{
-    Bundle, ChunkRecord, Coder, Effects, Features, Header, InkFrame, Lattice, SECTION_LEN, STRIPS, Section,
-    SectionBytes, Table, Tables, Tier, TierMeasures, header_len, manifest,
+    Bundle, ChunkRecord, Coder, Effects, Features, FrequencyTable, Header, InkFrame, Lattice, SECTION_LEN, STRIPS,
+    Section, SectionBytes, Tables, Tier, TierMeasures, header_len, manifest,
 };
 use crate::bytes::Cursor;
 use crate::camera::Camera;
@@ -207,9 +207,9 @@ fn tables_come_back() {
     let halves: [Vec<[u8; 2]>; 3] = [vec![0, 4096], vec![0, 4095, 4096], (0..4096).chain([4096]).collect()]
         .map(|bounds: Vec<u16>| bounds.into_iter().map(u16::to_le_bytes).collect());
     let tables = [
-        Table::new(0.0, f32::MIN_POSITIVE, i16::MAX, &halves[0]),
-        Table::new(-1e17, 1.0, i16::MIN, &halves[1]),
-        Table::new(1e17, 1e12, -2048, &halves[2]),
+        FrequencyTable::new(0.0, f32::MIN_POSITIVE, i16::MAX, &halves[0]),
+        FrequencyTable::new(-1e17, 1.0, i16::MIN, &halves[1]),
+        FrequencyTable::new(1e17, 1e12, -2048, &halves[2]),
     ];
     let channel_tables: Vec<u16> = (0..360).map(|channel| channel % 3).collect();
     for n_tables in 1..=3 {
@@ -265,7 +265,7 @@ fn a_bundle_is_emitted_as_it_was_parsed() {
         }
         match bundle.coder() {
             Coder::Static(tables) => {
-                let all: Vec<Table<'_>> = (0..tables.len()).filter_map(|table| tables.get(table)).collect();
+                let all: Vec<FrequencyTable<'_>> = (0..tables.len()).filter_map(|table| tables.get(table)).collect();
                 let of_channel = (0..tables.n_channels()).filter_map(|channel| tables.table_of(channel));
                 let of_channel: Vec<u16> = of_channel.map(|table| table as u16).collect();
                 let emitted: Vec<u8> = Tables::emit(&all, &of_channel).collect();
@@ -278,7 +278,7 @@ fn a_bundle_is_emitted_as_it_was_parsed() {
             }
         }
         if let Some(coded) = bundle.heads().coded() {
-            let tables: Vec<u8> = coded.tables.iter().flat_map(Table::emit).collect();
+            let tables: Vec<u8> = coded.tables.iter().flat_map(FrequencyTable::emit).collect();
             assert!(section(&bytes, SectionKind::Heads).starts_with(&tables), "{variant:?}");
         }
         let measures = (0..header.n_tiers).filter_map(|tier| bundle.measures(tier));

@@ -6,8 +6,8 @@ use pocketsplat_core::bundle::Coder;
 use super::channel_coder::ChannelCoder;
 use super::channels::ContextWork;
 use super::decoded::shape_of;
-use super::lattice::{LatticeModel, Walk};
-use super::mask::MaskModel;
+use super::lattice::{LatticeModelDraft, Walk};
+use super::mask::MaskModelDraft;
 use super::stream::SlotList;
 use super::table::TableSet;
 use crate::scene::ModelShape;
@@ -15,9 +15,9 @@ use crate::scene::ModelShape;
 /// Everything that gives symbols their frequencies.
 pub(super) struct Models<'c> {
     pub(super) shape: ModelShape,
-    pub(super) lattice: LatticeModel,
+    pub(super) lattice: LatticeModelDraft,
     /// Absent when every offset of every anchor is drawn.
-    pub(super) masks: Option<MaskModel>,
+    pub(super) masks: Option<MaskModelDraft>,
     pub(super) channels: ChannelCoder<'c>,
 }
 
@@ -37,8 +37,8 @@ impl<'b> Models<'b> {
     pub(super) fn of(bundle: &Bundle<'b>) -> Self {
         Self {
             shape: shape_of(bundle),
-            lattice: LatticeModel::of(bundle.lattice()),
-            masks: bundle.masks().map(MaskModel::of),
+            lattice: LatticeModelDraft::of(bundle.lattice()),
+            masks: bundle.masks().map(MaskModelDraft::of),
             channels: match bundle.coder() {
                 Coder::Static(tables) => ChannelCoder::Tables(TableSet::of(tables)),
                 Coder::Context(context) => ChannelCoder::Context(*context),

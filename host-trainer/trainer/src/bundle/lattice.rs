@@ -34,7 +34,7 @@ struct Node {
 
 /// How often nodes of each level and context have which children.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct LatticeModel {
+pub(super) struct LatticeModelDraft {
     pub(super) frame: LatticeFrame,
     /// `[3·bits_per_axis, N_TRIE_CONTEXTS]` ends of the slots of "both" and of "only 0", as bytes; "only 1" has the rest.
     levels: Vec<[[[u8; 2]; 2]; N_TRIE_CONTEXTS]>,
@@ -119,7 +119,7 @@ impl<'c> Walk<'c> {
     }
 }
 
-impl LatticeModel {
+impl LatticeModelDraft {
     /// Counts the nodes of all chunks; the codes of each ascend.
     pub(super) fn count<'c>(frame: LatticeFrame, chunks: impl Iterator<Item = &'c [u64]>) -> Self {
         let mut counts = vec![[[0_u64; 3]; N_TRIE_CONTEXTS]; frame.n_levels() as usize];

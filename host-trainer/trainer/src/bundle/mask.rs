@@ -6,7 +6,7 @@ use super::stream::{Part, SlotList};
 
 /// How often each offset is drawn, given how many before it are.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct MaskModel {
+pub(super) struct MaskModelDraft {
     /// `[K, N_MASK_CONTEXTS]` frequency of "drawn", which owns the lowest slots, as bytes.
     offsets: Vec<[[u8; 2]; N_MASK_CONTEXTS]>,
 }
@@ -19,7 +19,7 @@ fn with_contexts(drawn: u32, n_offsets: usize) -> impl Iterator<Item = (usize, u
     })
 }
 
-impl MaskModel {
+impl MaskModelDraft {
     /// Counts the masks of all anchors; bit k of `drawn` is set iff offset k is drawn.
     pub(super) fn count(drawn: &[u32], n_offsets: usize) -> Self {
         let mut counts = vec![[[0_u64; 2]; N_MASK_CONTEXTS]; n_offsets];

@@ -5,7 +5,7 @@ mod histogram;
 
 pub(super) use draft::TableDraft;
 use histogram::Histogram;
-use pocketsplat_core::bundle::{Table, Tables};
+use pocketsplat_core::bundle::{FrequencyTable, Tables};
 
 use super::channels::ChannelName;
 use super::quantise::Rows;
@@ -69,7 +69,7 @@ impl TableSet {
 
     /// The section's bytes.
     pub(super) fn section(&self) -> Vec<u8> {
-        let tables: Vec<Table<'_>> = self.tables.iter().map(TableDraft::view).collect();
+        let tables: Vec<FrequencyTable<'_>> = self.tables.iter().map(TableDraft::view).collect();
         let channel_tables: Vec<u16> = self.channel_tables.iter().map(|&table| table as u16).collect();
         Tables::emit(&tables, &channel_tables).collect()
     }

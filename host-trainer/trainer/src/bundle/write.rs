@@ -6,9 +6,9 @@ use rayon::prelude::*;
 use super::channel_coder::ChannelCoder;
 use super::chunk::{ChunkRows, Models};
 use super::ink::InkBox;
-use super::lattice::LatticeModel;
+use super::lattice::LatticeModelDraft;
 use super::layout::{self, CodedScene, Counts, Parts, Written};
-use super::mask::MaskModel;
+use super::mask::MaskModelDraft;
 use super::order::Placement;
 use super::quantise::{Rows, StepSource, check_lengths, check_steps, quantise};
 use super::table::TableSet;
@@ -121,8 +121,8 @@ impl Writer<'_> {
         let has_masks = placement.drawn.iter().any(|&drawn| drawn != all_drawn);
         let models = Models {
             shape,
-            lattice: LatticeModel::count(placement.frame, code_runs),
-            masks: has_masks.then(|| MaskModel::count(&placement.drawn, shape.n_offsets)),
+            lattice: LatticeModelDraft::count(placement.frame, code_runs),
+            masks: has_masks.then(|| MaskModelDraft::count(&placement.drawn, shape.n_offsets)),
             channels,
         };
         let n_channels = rows.n_channels;

@@ -31,11 +31,11 @@ const SHARE_OF_ANCHORS: f64 = 0.5;
 /// Bytes of a bundle besides its anchors, for features of width 16.
 const FIXED_FLASH: f64 = 10_000.0;
 /// Weights λ of the rate, and the bits that a channel then takes; the second where flash would decide with the first.
-const RATES: [Rate; 2] = [Rate { lambda: 0.001, bits: 4.0 }, Rate { lambda: 0.004, bits: 2.8 }];
+const RATES: [RateWeight; 2] = [RateWeight { lambda: 0.001, bits: 4.0 }, RateWeight { lambda: 0.004, bits: 2.8 }];
 
 /// What a weight of the bits comes to.
 #[derive(Clone, Copy)]
-struct Rate {
+struct RateWeight {
     lambda: f64,
     bits: f64,
 }
@@ -115,7 +115,7 @@ pub fn choose(limits: &Limits) -> Result<ModelChoice, Infeasible> {
     if choice.binding == BindingLimit::Flash { choose_at(limits, small) } else { Ok(choice) }
 }
 
-fn choose_at(limits: &Limits, rate: Rate) -> Result<ModelChoice, Infeasible> {
+fn choose_at(limits: &Limits, rate: RateWeight) -> Result<ModelChoice, Infeasible> {
     let of_models = MODELS.map(|model| (model, model.most_anchors(limits, rate)));
     let enough = of_models.iter().find(|(_, (n, _))| *n >= ENOUGH_ANCHORS);
     let [.., narrowest] = &of_models;
@@ -124,13 +124,13 @@ fn choose_at(limits: &Limits, rate: Rate) -> Result<ModelChoice, Infeasible> {
         return Err(model.infeasible(limits, rate, binding));
     }
     let Model { feature_dim, n_offsets, .. } = model;
-    let Rate { lambda, .. } = rate;
+    let RateWeight { lambda, .. } = rate;
     Ok(ModelChoice { feature_dim: feature_dim.into(), n_offsets: n_offsets.into(), max_anchors, lambda, binding })
 }
 
 impl Model {
     /// Anchors that keep all limits, and the binding one.
-    fn most_anchors(&self, limits: &Limits, rate: Rate) -> (usize, BindingLimit) {
+    fn most_anchors(&self, limits: &Limits, rate: RateWeight) -> (usize, BindingLimit) {
         let of_ram = limits.ram_bytes.map(|ram| self.anchors_in(ram));
         let of_flash =
             limits.flash_bytes.map(|flash| ((flash as f64 - FIXED_FLASH) / self.flash_per_anchor(rate)) as usize);
@@ -173,7 +173,7 @@ impl Model {
         f64::from(self.feature_dim) + 6.0 + 3.0 * self.splats_per_anchor
     }
 
-    fn flash_per_anchor(&self, rate: Rate) -> f64 {
+    fn flash_per_anchor(&self, rate: RateWeight) -> f64 {
         // A position takes as much as five channels.
         rate.bits * (self.channels() + 5.0) / 8.0
     }
@@ -185,7 +185,7 @@ impl Model {
     }
 
     /// The limit that leaves too few anchors, and what it would have to be.
-    fn infeasible(&self, limits: &Limits, rate: Rate, binding: BindingLimit) -> Infeasible {
+    fn infeasible(&self, limits: &Limits, rate: RateWeight, binding: BindingLimit) -> Infeasible {
         let n = FEWEST_ANCHORS as f64;
         let (available, needed) = match binding {
             BindingLimit::Ram => (limits.ram_bytes, self.scratch_len(FEWEST_ANCHORS)),

@@ -156,7 +156,7 @@ pub fn backward<R: Real>(
             // Not that of the Gaussian, to which others may have added.
             let colour = outputs.colour[at * 3 + i].sigmoid();
             d_outputs.colour[at * 3 + i] += d.colour[i] * colour * (R::ONE - colour);
-            // scale = e^s · σ, so ∂/∂s = scale, and ∂/∂logit = scale · (1 − σ); of a ball all three are one.
+            // scale = e^s · σ, so ∂/∂s = scale, and ∂/∂logit = scale · (1 − σ); isotropic: all three are one.
             let axis = if shape.anisotropic { i } else { 0 };
             let (log_scale, logit) = (row * n_log_scales + 3 + axis, at * n_outputs + axis);
             let sigma = outputs.covariance[logit].sigmoid();

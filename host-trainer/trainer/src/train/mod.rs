@@ -35,7 +35,7 @@ use crate::scene::{Anchors, Heads, Scene};
 use crate::step::{Loss, Phase, StepInfo, TargetView, Workspace, planes};
 use checkpoint::{CaptureSignature, Kernels};
 use coding::Integers;
-use config::{Backbone, Densification, Rate, Rates};
+use config::{Backbone, Densification, LearningRate, Rates};
 use module::{AnchorChange, RunView};
 use optimiser::Optimiser;
 use pocketsplat_capture::dataset::{Capture, Image, View};
@@ -282,7 +282,7 @@ impl<'a> Trainer<'a> {
             Phase::Raw | Phase::Noise => 1.0,
             Phase::Context | Phase::IntegerModel => PUBLISHED_ITERATIONS / f64::from(self.config.iterations),
         };
-        Rates { mask: Rate { start: mask.start * factor, end: mask.end * factor }, ..self.config.rates }
+        Rates { mask: LearningRate { start: mask.start * factor, end: mask.end * factor }, ..self.config.rates }
     }
 
     /// Statistics of the step in the workspace, and growth and pruning when they are due.

@@ -1,6 +1,6 @@
 //! A table about to be written.
 
-use pocketsplat_core::bundle::Table;
+use pocketsplat_core::bundle::FrequencyTable;
 use pocketsplat_core::entropy::{FREQUENCY_TOTAL, Slot};
 
 use super::histogram::Histogram;
@@ -38,15 +38,15 @@ impl TableDraft {
     }
 
     /// The table of a bundle.
-    pub(super) fn of_table(table: &Table<'_>) -> Self {
+    pub(super) fn of_table(table: &FrequencyTable<'_>) -> Self {
         let bounds = table.bounds().map(u16::to_le_bytes).collect();
         Self { step: table.step, min_symbol: table.min_symbol, bounds }
     }
 
     /// The table as the decoder has it.
-    pub(in crate::bundle) fn view(&self) -> Table<'_> {
+    pub(in crate::bundle) fn view(&self) -> FrequencyTable<'_> {
         // The origin is 0: symbol 0 is the value 0, and channels of equal step can share a table.
-        Table::new(0.0, self.step, self.min_symbol, &self.bounds)
+        FrequencyTable::new(0.0, self.step, self.min_symbol, &self.bounds)
     }
 
     /// The slots that code `symbol`, in reading order: its entry's, or the escape's and those of two raw bytes.

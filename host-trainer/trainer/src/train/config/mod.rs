@@ -16,14 +16,14 @@ use pocketsplat_capture::dataset::{Capture, PointsOrigin};
 
 /// A geometric path of a learning rate over the run: from `start` to `end`; equal values make it constant.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Rate {
+pub struct LearningRate {
     /// At iteration 0.
     pub start: f64,
     /// At the last iteration.
     pub end: f64,
 }
 
-impl Rate {
+impl LearningRate {
     /// lr(t) = start^(1 − t/T) · end^(t/T) with `progress` = t/T.
     pub fn at(&self, progress: f64) -> f64 {
         if self.start <= 0.0 {
@@ -37,46 +37,46 @@ impl Rate {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Rates {
     /// Offsets; multiplied by the capture's extent.
-    pub offset: Rate,
+    pub offset: LearningRate,
     /// Anchor features.
-    pub feature: Rate,
+    pub feature: LearningRate,
     /// Log-scales.
-    pub log_scale: Rate,
+    pub log_scale: LearningRate,
     /// Opacity head.
-    pub opacity_head: Rate,
+    pub opacity_head: LearningRate,
     /// Covariance head.
-    pub covariance_head: Rate,
+    pub covariance_head: LearningRate,
     /// Colour head.
-    pub colour_head: Rate,
+    pub colour_head: LearningRate,
     /// Mask logits; multiplied by the capture's extent. For [`Backbone::Hac`], as those below.
-    pub mask: Rate,
+    pub mask: LearningRate,
     /// Grid of the context model.
-    pub grid: Rate,
+    pub grid: LearningRate,
     /// Network of the context model.
-    pub context: Rate,
+    pub context: LearningRate,
     /// Background, where it is learned.
     #[serde(default = "background_rate")]
-    pub background: Rate,
+    pub background: LearningRate,
 }
 
 /// The rate of the background.
-const fn background_rate() -> Rate {
-    Rate { start: 0.01, end: 1e-4 }
+const fn background_rate() -> LearningRate {
+    LearningRate { start: 0.01, end: 1e-4 }
 }
 
 impl Default for Rates {
     fn default() -> Self {
-        let constant = |rate| Rate { start: rate, end: rate };
+        let constant = |rate| LearningRate { start: rate, end: rate };
         Self {
-            offset: Rate { start: 0.01, end: 1e-4 },
+            offset: LearningRate { start: 0.01, end: 1e-4 },
             feature: constant(0.0075),
             log_scale: constant(0.007),
-            opacity_head: Rate { start: 0.002, end: 2e-5 },
+            opacity_head: LearningRate { start: 0.002, end: 2e-5 },
             covariance_head: constant(0.004),
-            colour_head: Rate { start: 0.008, end: 5e-5 },
-            mask: Rate { start: 0.01, end: 1e-4 },
-            grid: Rate { start: 0.005, end: 1e-5 },
-            context: Rate { start: 0.005, end: 1e-5 },
+            colour_head: LearningRate { start: 0.008, end: 5e-5 },
+            mask: LearningRate { start: 0.01, end: 1e-4 },
+            grid: LearningRate { start: 0.005, end: 1e-5 },
+            context: LearningRate { start: 0.005, end: 1e-5 },
             background: background_rate(),
         }
     }

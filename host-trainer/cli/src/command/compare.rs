@@ -55,9 +55,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let lines = args.runs.iter().zip(&configs).map(|(run, config)| line(run, config, &configs[0]));
     let lines = lines.collect::<Result<Vec<_>>>()?;
     std::fs::create_dir_all(&args.output).with_context(|| format!("could not make {}", args.output.display()))?;
-    let mut table = csv::Writer::from_writer(Vec::new());
-    lines.iter().try_for_each(|line| table.serialize(line))?;
-    let table = table.into_inner()?;
+    let table = output::csv(&lines)?;
     output::write_whole(&args.output.join("runs.csv"), &table)?;
     let panels = [
         panel("Quality over time", "minutes of a processor core", &lines, |line| line.processor_minutes),

@@ -55,26 +55,22 @@ pub(crate) fn resolve(config: &mut RunConfig, capture: &Capture, folder: &Path) 
     let chosen = trials.each.iter().find(|trial| trial.chosen).map_or(&[][..], |trial| &trial.effects);
     eprint!("{}", table(&trials, target));
     eprintln!("effects: {}, measured in {:.0} s", Effect::names(chosen), started.elapsed().as_secs_f64());
-    output::write_whole(&folder.join(TABLE), &csv(&trials)?)?;
+    output::write_whole(&folder.join(TABLE), &output::csv(lines(&trials))?)?;
     config.train = Effect::measured_only(chosen, &config.train);
     Ok(())
 }
 
-fn csv(trials: &Trials) -> Result<Vec<u8>> {
-    let mut table = csv::Writer::from_writer(Vec::new());
-    for trial in &trials.each {
-        table.serialize(Line {
-            effects: Effect::names(&trial.effects),
-            psnr_db: trial.worth.psnr_db,
-            gain_db: trial.gain_db,
-            price_db: trial.price_db,
-            instructions: trial.worth.instructions.round() as u64,
-            bytes: trial.worth.bytes,
-            chance_db: trials.chance_db,
-            chosen: trial.chosen,
-        })?;
-    }
-    Ok(table.into_inner()?)
+fn lines(trials: &Trials) -> impl Iterator<Item = Line> {
+    trials.each.iter().map(|trial| Line {
+        effects: Effect::names(&trial.effects),
+        psnr_db: trial.worth.psnr_db,
+        gain_db: trial.gain_db,
+        price_db: trial.price_db,
+        instructions: trial.worth.instructions.round() as u64,
+        bytes: trial.worth.bytes,
+        chance_db: trials.chance_db,
+        chosen: trial.chosen,
+    })
 }
 
 fn table(trials: &Trials, target: Processor) -> String {

@@ -18,6 +18,7 @@ mod plot;
 mod point;
 mod progress;
 mod render;
+mod runs;
 mod settings;
 mod stop;
 mod sweep;

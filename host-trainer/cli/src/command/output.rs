@@ -44,6 +44,13 @@ fn beside(path: &Path) -> (PathBuf, PathBuf) {
     (folder, partial)
 }
 
+/// A table as CSV, one line each, with the names of the fields above.
+pub(crate) fn csv(lines: impl IntoIterator<Item = impl serde::Serialize>) -> Result<Vec<u8>> {
+    let mut table = csv::Writer::from_writer(Vec::new());
+    lines.into_iter().try_for_each(|line| table.serialize(line))?;
+    Ok(table.into_inner()?)
+}
+
 /// Prints `report` to stdout: as JSON, or as aligned `name value` lines.
 pub(crate) fn print<T: serde::Serialize>(report: &T, json: bool) -> Result<()> {
     let text = if json {

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use pocketsplat_capture::dataset::Capture;
 use pocketsplat_core::bundle::crc32;
 use pocketsplat_trainer::metrics::Lpips;
@@ -15,7 +15,7 @@ use super::bundle::BundleFile;
 use super::capture::{CaptureArgs, Split};
 use super::eval::{Evaluation, Measurements, Renderer, evaluate};
 use super::{output, train};
-use crate::config::{EffectsConfig, RunConfig};
+use crate::config::RunConfig;
 
 /// The configuration in a run folder.
 const CONFIG: &str = "config.toml";
@@ -25,35 +25,6 @@ const CONFIG: &str = "config.toml";
 struct Kept {
     bundle_crc: u32,
     evaluation: Evaluation,
-}
-
-/// What all points share: `config` with capture and folder, absolute, so that a point can be gone on with from anywhere. Its effects
-/// are not measured, for points compare only if they have the same.
-pub(super) fn base(config: RunConfig, dataset: Option<&Path>, folder: &Path) -> Result<RunConfig> {
-    let absolute = |path: &Path| std::path::absolute(path).with_context(|| format!("`{}` is no path", path.display()));
-    let dataset = absolute(dataset.unwrap_or(&config.dataset))?;
-    let effects = EffectsConfig { auto: false, ..config.effects };
-    Ok(RunConfig { dataset, output: absolute(folder)?, effects, ..config })
-}
-
-/// Refuses effects that are to be measured after all.
-pub(super) fn check_effects(config: &RunConfig) -> Result<()> {
-    if config.effects.auto {
-        bail!(
-            "runs that are compared need the same effects; force them, as --effects +view-colour, and leave auto to train"
-        );
-    }
-    Ok(())
-}
-
-/// Refuses a weight that is named twice: each point has a file of its own.
-pub(super) fn check_distinct(lambdas: &[f64]) -> Result<()> {
-    for (i, lambda) in lambdas.iter().enumerate() {
-        if lambdas[..i].contains(lambda) {
-            bail!("--lambda names {lambda} twice; each point needs a weight of its own");
-        }
-    }
-    Ok(())
 }
 
 /// Brings a point to its end, from wherever it stands; false when it was interrupted before.

@@ -1,9 +1,10 @@
 //! The rows of an ablation.
 
-use anyhow::Result;
-use pocketsplat_trainer::train::module::{Detail, Distribution, Modules, Pruning};
+use pocketsplat_trainer::scene::ModelShape;
+use pocketsplat_trainer::train::module::Detail;
 
-use crate::config::RunConfig;
+/// The row that all others are compared with.
+pub(super) const BASELINE: &str = "none";
 
 /// A way to train.
 pub(super) struct Row {
@@ -11,81 +12,99 @@ pub(super) struct Row {
     pub(super) name: &'static str,
     /// What it is, in a few words.
     pub(super) what: &'static str,
-    /// A curve, not a point.
-    pub(super) at_all_rates: bool,
-    /// Trained with several seeds at one rate.
-    pub(super) with_seeds: bool,
-    modules: Modules,
-    /// Keys of the configuration by which it differs.
-    keys: Vec<String>,
+    pub(super) extent: Extent,
+    /// Keys of the configuration by which it differs, each as `table.key=value`.
+    pub(super) overrides: Vec<String>,
 }
 
-impl Row {
-    /// `base` as the row has it.
-    pub(super) fn applied_to(&self, base: &RunConfig) -> Result<RunConfig> {
-        let mut config = base.clone();
-        config.train.modules = self.modules;
-        let hidden = Detail::default().hidden;
-        if self.name == WIDE {
-            // As many more parameters as the detail head has, in units of the colour head.
-            let shape = config.train.shape;
-            let detail = hidden * (shape.feature_dim + 3 + 1) + 3 * (hidden + 1);
-            let unit = shape.colour_inputs() + 1 + 3 * shape.n_offsets;
-            config.train.shape.colour_hidden = shape.colour_width() + detail.div_ceil(unit);
-        }
-        if self.keys.is_empty() { Ok(config) } else { config.with_keys(&self.keys) }
-    }
+/// At which rates and seeds a row is trained.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Extent {
+    /// At every rate, and with several seeds at one.
+    SeededCurve,
+    /// At every rate.
+    Curve,
+    /// At one rate.
+    Option,
 }
 
-/// The control of the detail head.
-const WIDE: &str = "wide-colour";
-/// Tiers that the bundle has too.
-const TIERED_80: &str = "tiered-80";
+const DISTRIBUTION: &str = "train.modules.distribution={}";
+const PRUNING: &str = "train.modules.pruning={}";
+/// As `--modules tiered-pruning`.
+const TIERED: &str = r#"train.modules.pruning={form="tiered", rate=0.4, rank="contribution", choice="lowest"}"#;
+const DETAIL: &str = "train.modules.detail={}";
 
 /// All rows: the curves, then the options of each module.
-pub(super) fn rows() -> Vec<Row> {
-    let none = Modules::default();
-    let distribution = Modules { distribution: Some(Distribution::default()), ..none };
-    let pruning = Modules { pruning: Some(Pruning::default()), ..none };
-    let tiered = Modules { pruning: Some(Pruning::tiered()), ..none };
-    let detail = Modules { detail: Some(Detail::default()), ..none };
-    let all = Modules { pruning: pruning.pruning, detail: detail.detail, ..distribution };
-    let curve =
-        |name, what, modules, with_seeds| Row { name, what, at_all_rates: true, with_seeds, modules, keys: vec![] };
-    let mut rows = vec![
-        curve("none", "the backbone alone", none, true),
-        curve("all", "all three modules", all, true),
-        curve("distribution", "distribution regularisation alone", distribution, false),
-        curve("pruning", "hard pruning of 30 % alone", pruning, false),
-        curve("detail", "detail compensation alone", detail, false),
-    ];
-    let options: &[(&str, &str, Modules, &[&str])] = &[
-        (
+pub(super) fn rows(shape: &ModelShape) -> Vec<Row> {
+    use Extent::{Curve, Option, SeededCurve};
+    // As many more parameters as the detail head has, in units of the colour head.
+    let hidden = Detail::default().hidden;
+    let detail = hidden * (shape.feature_dim + 3 + 1) + 3 * (hidden + 1);
+    let unit = shape.colour_inputs() + 1 + 3 * shape.n_offsets;
+    let wide = format!("train.shape.colour_hidden={}", shape.colour_width() + detail.div_ceil(unit));
+
+    let pruning = |key: &str| vec![PRUNING.to_owned(), format!("train.modules.pruning.{key}")];
+    let tiered = |key: &str| vec![TIERED.to_owned(), format!("train.modules.pruning.{key}")];
+    let keys = |keys: &[&str]| keys.iter().map(|key| (*key).to_owned()).collect();
+    let row = |name, what, extent, overrides| Row { name, what, extent, overrides };
+    vec![
+        row(BASELINE, "the backbone alone", SeededCurve, vec![]),
+        row("all", "all three modules", SeededCurve, keys(&[DISTRIBUTION, PRUNING, DETAIL])),
+        row("distribution", "distribution regularisation alone", Curve, keys(&[DISTRIBUTION])),
+        row("pruning", "hard pruning of 30 % alone", Curve, keys(&[PRUNING])),
+        row("detail", "detail compensation alone", Curve, keys(&[DETAIL])),
+        row(
             "distribution-strong",
             "both weights 0.01",
-            distribution,
-            &["distribution.divergence=0.01", "distribution.spread=0.01"],
+            Option,
+            keys(&["train.modules.distribution={divergence=0.01, spread=0.01}"]),
         ),
-        ("pruning-lowest", "the lowest 30 % instead of a random choice", pruning, &["pruning.choice=lowest"]),
-        ("pruning-contribution", "ranked by contribution to the images", pruning, &["pruning.rank=contribution"]),
-        ("pruning-no-target", "without the opacity target", pruning, &["pruning.weight=0"]),
-        ("pruning-target", "the opacity target at the paper's weight", pruning, &["pruning.weight=1e-5"]),
-        ("pruning-10", "10 %", pruning, &["pruning.rate=0.1"]),
-        ("pruning-20", "20 %", pruning, &["pruning.rate=0.2"]),
-        ("pruning-40", "40 %", pruning, &["pruning.rate=0.4"]),
-        ("tiered", "tiers to 40 %, nothing deleted, by contribution", tiered, &[]),
-        ("tiered-random", "the same with the random choice", tiered, &["pruning.choice=random"]),
-        ("tiered-opacity", "the same, ranked by opacity", tiered, &["pruning.choice=random", "pruning.rank=opacity"]),
-        (TIERED_80, "tiers to 80 %", tiered, &["pruning.rate=0.8"]),
-        ("detail-free", "taught by the image's loss alone", detail, &["detail.weight=0"]),
-        (WIDE, "no detail head, a colour head with as many more parameters", none, &[]),
-    ];
-    for (name, what, modules, settings) in options {
-        let mut keys: Vec<String> = settings.iter().map(|setting| format!("train.modules.{setting}")).collect();
-        if *name == TIERED_80 {
-            keys.push("encoding.tiers=[0.8, 0.6, 0.4, 0.2, 0.1, 0.0]".to_owned());
+        row("pruning-lowest", "the lowest 30 % instead of a random choice", Option, pruning("choice=lowest")),
+        row("pruning-contribution", "ranked by contribution to the images", Option, pruning("rank=contribution")),
+        row("pruning-no-target", "without the opacity target", Option, pruning("weight=0")),
+        row("pruning-target", "the opacity target at the paper's weight", Option, pruning("weight=1e-5")),
+        row("pruning-10", "10 %", Option, pruning("rate=0.1")),
+        row("pruning-20", "20 %", Option, pruning("rate=0.2")),
+        row("pruning-40", "40 %", Option, pruning("rate=0.4")),
+        row("tiered", "tiers to 40 %, nothing deleted, by contribution", Option, keys(&[TIERED])),
+        row("tiered-random", "the same with the random choice", Option, tiered("choice=random")),
+        row(
+            "tiered-opacity",
+            "the same, ranked by opacity",
+            Option,
+            keys(&[r#"train.modules.pruning={form="tiered", rate=0.4}"#]),
+        ),
+        row(
+            "tiered-80",
+            "tiers to 80 %",
+            Option,
+            [tiered("rate=0.8"), keys(&["encoding.tiers=[0.8, 0.6, 0.4, 0.2, 0.1, 0.0]"])].concat(),
+        ),
+        row("detail-free", "taught by the image's loss alone", Option, keys(&["train.modules.detail={weight=0}"])),
+        row("wide-colour", "no detail head, a colour head with as many more parameters", Option, vec![wide]),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use pocketsplat_trainer::train::TrainConfig;
+    use pocketsplat_trainer::train::config::Backbone;
+    use pocketsplat_trainer::train::module::{Modules, Pruning};
+
+    use super::rows;
+    use crate::config::RunConfig;
+
+    #[test]
+    fn every_row_can_be_trained_and_tiered_is_the_preset() {
+        let base = RunConfig { train: TrainConfig::of(Backbone::Hac), ..RunConfig::default() };
+        for row in rows(&base.train.shape) {
+            let config = base.with_keys(&row.overrides).unwrap();
+            config.check().unwrap();
+            assert_eq!(row.name == "none", config.train == base.train, "{}", row.name);
+            if row.name == "tiered" {
+                let preset = Modules { pruning: Some(Pruning::tiered()), ..Modules::default() };
+                assert_eq!(config.train.modules, preset);
+            }
         }
-        rows.push(Row { name, what, at_all_rates: false, with_seeds: false, modules: *modules, keys });
     }
-    rows
 }

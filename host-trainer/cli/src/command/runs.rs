@@ -1,0 +1,166 @@
+//! Several runs over one capture: each trained and measured once, with a table of results and a figure.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Context, Result, bail};
+use pocketsplat_trainer::train::TrainConfig;
+use pocketsplat_trainer::train::config::Backbone;
+
+use super::capture::Split;
+use super::eval::Evaluation;
+use super::lpips::LpipsArgs;
+use super::settings::{QualityOptions, RunOptions, applied};
+use super::{output, point, stop, train};
+use crate::config::heading::{OUTPUT, RUN};
+use crate::config::{CaptureOptions, EffectsConfig, RunConfig};
+use crate::plot::{Named, ResultRow, SizeAxis, names_of, rate_distortion_svg, results_csv};
+
+/// The curves of all rows, in the folder of the runs.
+const FIGURE: &str = "rate_distortion.svg";
+
+/// What all runs share.
+#[derive(clap::Args)]
+pub(super) struct RunsArgs {
+    /// Folder of the capture.
+    #[arg(required_unless_present = "config")]
+    dataset: Option<PathBuf>,
+    #[command(flatten)]
+    capture: CaptureOptions,
+    /// Folder for the bundles, their run folders and the results.
+    #[arg(short, long, value_name = "DIR", help_heading = OUTPUT)]
+    pub(super) output: PathBuf,
+    #[command(flatten)]
+    quality: QualityOptions,
+    /// Configuration to read, as a run folder has it; options beside it count more.
+    #[arg(long, value_name = "FILE.toml", help_heading = RUN)]
+    config: Option<PathBuf>,
+    #[command(flatten)]
+    run: RunOptions,
+    #[command(flatten)]
+    lpips: LpipsArgs,
+}
+
+/// One run, by what distinguishes it from the configuration that all share.
+pub(super) struct RunSpec {
+    /// The row of the results that it belongs to.
+    pub(super) row: &'static str,
+    pub(super) lambda: f64,
+    pub(super) seed: u64,
+    /// Whether it is a point of its row's curve.
+    pub(super) on_curve: bool,
+    /// Its bundle, within the folder of the runs.
+    pub(super) bundle: String,
+    /// Other keys of the configuration, each as `table.key=value`.
+    pub(super) overrides: Vec<String>,
+}
+
+/// A run and what it came to.
+pub(super) struct MeasuredRun<'a> {
+    pub(super) spec: &'a RunSpec,
+    pub(super) evaluation: Evaluation,
+}
+
+impl fmt::Display for RunSpec {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}, lambda {}, seed {}", self.row, self.lambda, self.seed)
+    }
+}
+
+impl RunSpec {
+    fn config(&self, base: &RunConfig) -> Result<RunConfig> {
+        let mut keys = self.overrides.clone();
+        keys.extend([format!("train.hac.lambda={}", self.lambda), format!("train.seed={}", self.seed)]);
+        let mut config = base.with_keys(&keys)?;
+        config.output = base.output.join(&self.bundle);
+        // As a run keeps it.
+        config.train.shape = config.train.modules.shape(config.train.shape);
+        Ok(config)
+    }
+}
+
+impl RunsArgs {
+    /// The configuration that all runs share, HAC unless said otherwise; its output is the folder of the runs.
+    ///
+    /// Paths are absolute, so that a run can be resumed from anywhere. Effects are not measured: runs compare only if they have
+    /// the same.
+    pub(super) fn base(&self) -> Result<RunConfig> {
+        let absolute =
+            |path: &Path| std::path::absolute(path).with_context(|| format!("`{}` is no path", path.display()));
+        let config = match &self.config {
+            Some(path) => RunConfig::read(path)?,
+            None => RunConfig { train: TrainConfig::of(Backbone::Hac), ..RunConfig::default() },
+        };
+        let dataset = absolute(self.dataset.as_deref().unwrap_or(&config.dataset))?;
+        let effects = EffectsConfig { auto: false, ..config.effects };
+        let config = RunConfig { dataset, output: absolute(&self.output)?, effects, ..config };
+        let config = applied(&self.capture, &self.quality, &self.run, config)?;
+        if config.effects.auto {
+            bail!(
+                "runs that are compared need the same effects; force them, as --effects +view-colour, and leave auto to train"
+            );
+        }
+        Ok(config)
+    }
+
+    /// Trains and measures the runs one after another, from wherever each stands, and then prints what `tables` returns.
+    ///
+    /// After each run `tables` writes the results so far.
+    pub(super) fn train(
+        &self,
+        mut base: RunConfig,
+        specs: &[RunSpec],
+        tables: impl Fn(&[MeasuredRun<'_>]) -> Result<Vec<u8>>,
+    ) -> Result<ExitCode> {
+        // All of them before the first is trained for an hour.
+        for (i, spec) in specs.iter().enumerate() {
+            if specs[..i].iter().any(|other| other.bundle == spec.bundle) {
+                bail!("--lambda names {} twice; each run needs a weight of its own", spec.lambda);
+            }
+            spec.config(&base)?.check().with_context(|| format!("cannot train {spec}"))?;
+        }
+        let lpips = self.lpips.load()?;
+        output::check_writable(&base.output.join(FIGURE))?;
+        let capture = train::load(&mut base)?;
+        Split::Test.views(&capture).context("runs are compared on held-out views; see --test-every")?;
+        let stop = stop::flag()?;
+        let mut measured = Vec::new();
+        let mut text = Vec::new();
+        for (i, spec) in specs.iter().enumerate() {
+            eprintln!("{} of {}  {spec}", i + 1, specs.len());
+            let config = spec.config(&base)?;
+            output::check_writable(&config.output)?;
+            if !point::trained(&config, &capture, &stop)? {
+                eprintln!("the same command again resumes here");
+                return Ok(ExitCode::from(stop::INTERRUPTED));
+            }
+            measured.push(MeasuredRun { spec, evaluation: point::measured(&config, lpips.as_ref())? });
+            text = tables(&measured)?;
+        }
+        output::print_text(&String::from_utf8(text)?)?;
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// Writes a table for each row's curve, `ROW.csv`, and the figure of all; returns the tables.
+pub(super) fn write_curves(folder: &Path, runs: &[MeasuredRun<'_>]) -> Result<Vec<u8>> {
+    let mut curves: Vec<(PathBuf, Vec<ResultRow>)> = Vec::new();
+    for MeasuredRun { spec, evaluation } in runs.iter().filter(|run| run.spec.on_curve) {
+        let path = folder.join(format!("{}.csv", spec.row));
+        let point = evaluation.result_row(format!("lambda={}", spec.lambda));
+        match curves.iter_mut().find(|(other, _)| *other == path) {
+            Some((_, points)) => points.push(point),
+            None => curves.push((path, vec![point])),
+        }
+    }
+    let (mut named, mut tables) = (Vec::new(), Vec::new());
+    for (path, what) in curves {
+        let table = results_csv(&what)?;
+        output::write_whole(&path, &table)?;
+        tables.extend(table);
+        named.push(Named { name: names_of(&[path]).swap_remove(0), what });
+    }
+    output::write_whole(&folder.join(FIGURE), rate_distortion_svg(&named, SizeAxis::Linear)?.as_bytes())?;
+    Ok(tables)
+}

@@ -44,7 +44,7 @@ pub use error::DatasetError;
 pub use frame_size::{FrameSize, NoFrameSize};
 pub use layout::Layout;
 pub use mask::Mask;
-pub use options::{Background, LoadOptions, UnknownBackground};
+pub use options::{Background, LoadOptions};
 pub use pose::PoseFault;
 pub use report::{LoadReport, SkippedView, Split};
 pub use spacing::{PUBLISHED_VOXEL_SIZE, nearest_squared, suggested_voxel_size};

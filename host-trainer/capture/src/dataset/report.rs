@@ -2,11 +2,14 @@
 
 use std::fmt;
 
+use serde::Deserialize;
+
 use super::error::FAULTS_SPELT_OUT;
 use super::{Background, Layout, PointsOrigin, ViewFault};
 
 /// The part of a capture a view belongs to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Split {
     /// Views to train on.
     Train,

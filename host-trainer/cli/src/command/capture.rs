@@ -3,8 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
-use clap::ValueEnum;
-use pocketsplat_capture::dataset::{self, Background, Capture, LoadOptions, Severity, View};
+use pocketsplat_capture::dataset::{self, Background, Capture, LoadOptions, Severity, Split, View};
 
 use crate::config::CaptureOptions;
 
@@ -46,25 +45,14 @@ impl CaptureArgs {
     }
 }
 
-/// Which views of a capture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Split {
-    /// Held out of training.
-    Test,
-    /// Trained on.
-    Train,
-}
-
-impl Split {
-    /// The views of this split, at least one.
-    pub(crate) fn views(self, capture: &Capture) -> Result<&[View]> {
-        let views = match self {
-            Self::Test => &capture.test,
-            Self::Train => &capture.train,
-        };
-        if views.is_empty() {
-            bail!("the capture has no {self:?} view; choose the other --split");
-        }
-        Ok(views)
+/// The views of a split, at least one.
+pub(crate) fn views_of(capture: &Capture, split: Split) -> Result<&[View]> {
+    let views = match split {
+        Split::Test => &capture.test,
+        Split::Train => &capture.train,
+    };
+    if views.is_empty() {
+        bail!("the capture has no {split} view; choose the other --split");
     }
+    Ok(views)
 }

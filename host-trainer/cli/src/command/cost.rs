@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use bytesize::ByteSize;
-use pocketsplat_capture::dataset::{Capture, View};
+use pocketsplat_capture::dataset::{Capture, Split, View};
 use pocketsplat_core::{Budget, Bundle, Camera, MaxSplats};
 use pocketsplat_trainer::camera::core_camera;
 use pocketsplat_trainer::cost::{
@@ -20,8 +20,9 @@ use rayon::prelude::*;
 use self::machine::Machine;
 use self::report::Report;
 use super::bundle::BundleFile;
-use super::capture::{CaptureArgs, Split};
+use super::capture::{CaptureArgs, views_of};
 use super::eval::reference_image;
+use crate::config::named::{SPLITS, one_of};
 
 /// Turn each of the decoder's knobs, and those of quality in all combinations, and measure what that costs in accuracy and
 /// saves in time.
@@ -40,7 +41,7 @@ pub(crate) struct Args {
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     /// Which views.
-    #[arg(long, value_enum, default_value_t = Split::Test)]
+    #[arg(long, value_parser = one_of::<Split>(SPLITS), default_value = SPLITS[0])]
     split: Split,
     /// Largest number of views, evenly picked; 0 takes all.
     #[arg(long, default_value_t = 8)]
@@ -68,7 +69,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let targets: Vec<Processor> = args.target.iter().filter_map(|machine| machine.device()).collect();
     let counter = args.counter(&targets)?;
     let capture = file.capture_options(&bundle, &args.capture)?.load(0)?;
-    let views = picked(args.split.views(&capture)?, args.views);
+    let views = picked(views_of(&capture, args.split)?, args.views);
     let mut sights = sights(&file, &bundle, &capture, &views)?;
     if counter.is_some() {
         let n = args.count.unwrap_or(COUNTED_VIEWS).clamp(1, MOST_VIEWS);

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-use pocketsplat_capture::dataset::Image;
+use pocketsplat_capture::dataset::{Image, Split};
 use pocketsplat_capture::synth::{SynthOptions, write_capture};
 use pocketsplat_trainer::encode::Encoding;
 use pocketsplat_trainer::render::decoder::core_image;
@@ -13,7 +13,7 @@ use pocketsplat_trainer::train::config::Backbone;
 use pocketsplat_trainer::train::module::{Detail, Distribution, Modules, Pruning};
 
 use super::bundle::BundleFile;
-use super::capture::{CaptureArgs, Split};
+use super::capture::CaptureArgs;
 use super::eval::{Measurements, Renderer, evaluate, reference_image};
 use super::{output, train};
 use crate::config::CaptureOptions;

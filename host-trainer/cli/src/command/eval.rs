@@ -6,7 +6,7 @@ use std::time::Instant;
 use crate::plot::ResultRow;
 use anyhow::Result;
 use pocketsplat_capture::camera::Camera;
-use pocketsplat_capture::dataset::{Capture, Image, View};
+use pocketsplat_capture::dataset::{Capture, Image, Split, View};
 use pocketsplat_core::Bundle;
 use pocketsplat_trainer::metrics::{Lpips, half_size_enlarged, psnr_db, psnr_db_masked, ssim_masked};
 use pocketsplat_trainer::render::decoder::{core_image, core_image_of_tiers};
@@ -15,9 +15,10 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::bundle::BundleFile;
-use super::capture::{CaptureArgs, Split};
+use super::capture::{CaptureArgs, views_of};
 use super::lpips::LpipsArgs;
 use super::output;
+use crate::config::named::{SPLITS, one_of};
 
 /// What draws the frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -36,7 +37,7 @@ pub(crate) struct Args {
     #[command(flatten)]
     capture: CaptureArgs,
     /// Which views.
-    #[arg(long, value_enum, default_value_t = Split::Test)]
+    #[arg(long, value_parser = one_of::<Split>(SPLITS), default_value = SPLITS[0])]
     split: Split,
     /// What draws the frames.
     #[arg(long, value_enum, default_value_t = Renderer::Core)]
@@ -191,7 +192,7 @@ pub(crate) fn evaluate(
     let bundle = file.parse()?;
     let options = file.capture_options(&bundle, capture)?;
     let loaded = options.load(0)?;
-    let views = split.views(&loaded)?;
+    let views = views_of(&loaded, split)?;
     // The fastest of a few: what other processes take is not the bundle's.
     let mut decode_s = f64::INFINITY;
     let mut n_gaussians = 0;
@@ -246,7 +247,7 @@ pub(crate) fn evaluate(
         n_anchors: bundle.n_anchors(),
         n_gaussians,
         n_views: rows.len(),
-        split: format!("{split:?}").to_lowercase(),
+        split: split.to_string(),
         renderer: format!("{renderer:?}").to_lowercase(),
         width_px: views[0].image.width_px,
         height_px: views[0].image.height_px,

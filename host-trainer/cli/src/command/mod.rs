@@ -12,7 +12,6 @@ mod eval;
 mod fit;
 mod inspect;
 mod lpips;
-mod named;
 mod output;
 mod plot;
 mod point;

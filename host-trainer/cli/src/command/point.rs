@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::{Result, bail};
-use pocketsplat_capture::dataset::Capture;
+use pocketsplat_capture::dataset::{Capture, Split};
 use pocketsplat_core::bundle::crc32;
 use pocketsplat_trainer::metrics::Lpips;
 use pocketsplat_trainer::train::module::pruning::Form;
@@ -12,7 +12,7 @@ use pocketsplat_trainer::train::run::{RunError, RunFolder};
 use serde::{Deserialize, Serialize};
 
 use super::bundle::BundleFile;
-use super::capture::{CaptureArgs, Split};
+use super::capture::CaptureArgs;
 use super::eval::{Evaluation, Measurements, Renderer, evaluate};
 use super::{output, train};
 use crate::config::RunConfig;

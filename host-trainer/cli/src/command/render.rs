@@ -3,13 +3,15 @@
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
+use pocketsplat_capture::dataset::Split;
 use pocketsplat_trainer::render::decoder::core_image;
 use pocketsplat_trainer::render::reference::ReferenceScene;
 
 use super::bundle::BundleFile;
-use super::capture::{CaptureArgs, Split};
+use super::capture::{CaptureArgs, views_of};
 use super::eval::{Renderer, reference_image};
 use super::output;
+use crate::config::named::{SPLITS, one_of};
 
 /// Draw one view of a capture from a bundle.
 #[derive(clap::Args)]
@@ -22,7 +24,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "I")]
     view: usize,
     /// Which views.
-    #[arg(long, value_enum, default_value_t = Split::Test)]
+    #[arg(long, value_parser = one_of::<Split>(SPLITS), default_value = SPLITS[0])]
     split: Split,
     /// The picture to write.
     #[arg(short, long, value_name = "OUT.png")]
@@ -37,7 +39,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let bundle = file.parse()?;
     output::check_writable(&args.output)?;
     let capture = file.capture_options(&bundle, &args.capture)?.load(0)?;
-    let views = args.split.views(&capture)?;
+    let views = views_of(&capture, args.split)?;
     let Some(view) = views.get(args.view) else {
         bail!("--view {} of {} views; choose 0 to {}", args.view, views.len(), views.len() - 1);
     };

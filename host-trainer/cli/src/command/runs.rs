@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
+use pocketsplat_capture::dataset::Split;
 use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::config::Backbone;
 
-use super::capture::Split;
+use super::capture::views_of;
 use super::eval::Evaluation;
 use super::lpips::LpipsArgs;
 use super::settings::{QualityOptions, RunOptions, applied};
@@ -123,7 +124,7 @@ impl RunsArgs {
         let lpips = self.lpips.load()?;
         output::check_writable(&base.output.join(FIGURE))?;
         let capture = train::load(&mut base)?;
-        Split::Test.views(&capture).context("runs are compared on held-out views; see --test-every")?;
+        views_of(&capture, Split::Test).context("runs are compared on held-out views; see --test-every")?;
         let stop = stop::flag()?;
         let mut measured = Vec::new();
         let mut text = Vec::new();

@@ -10,8 +10,8 @@ use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::config::Backbone;
 use pocketsplat_trainer::train::module::{Distribution, Modules, Pruning};
 
-use super::named::{BACKBONES, CODERS, one_of};
 use crate::config::heading::{OUTPUT, QUALITY, RUN};
+use crate::config::named::{BACKBONES, CODERS, one_of};
 use crate::config::{CaptureOptions, RunConfig};
 
 /// How good a scene becomes, and how large.
@@ -151,29 +151,18 @@ impl QualityOptions {
         Ok(())
     }
 
-    /// `config` with what a device affords, where the command line leaves it open: HAC, the widths, the cap, trained tiers.
-    pub(crate) fn chosen(&self, config: RunConfig, choice: &ModelChoice) -> RunConfig {
-        let mut config = config;
-        let train = &mut config.train;
+    /// Sets what a device affords, where the command line leaves it open: HAC, the widths, the cap, trained tiers.
+    pub(crate) fn choose(&self, train: &mut TrainConfig, choice: &ModelChoice) {
         if self.backbone.is_none() {
             *train = train.with_backbone(Backbone::Hac);
         }
-        if self.feature_dim.is_none() {
-            train.shape.feature_dim = choice.feature_dim;
-        }
-        if self.offsets.is_none() {
-            train.shape.n_offsets = choice.n_offsets;
-        }
-        if self.max_anchors.is_none() {
-            train.densification.max_anchors = Some(choice.max_anchors);
-        }
-        if self.keep_anchors.is_none() {
-            train.densification.kept_anchors = Some(choice.max_anchors);
-        }
+        train.shape.feature_dim = self.feature_dim.unwrap_or(choice.feature_dim);
+        train.shape.n_offsets = self.offsets.unwrap_or(choice.n_offsets);
+        train.densification.max_anchors = self.max_anchors.or(Some(choice.max_anchors));
+        train.densification.kept_anchors = self.keep_anchors.or(Some(choice.max_anchors));
         if self.modules.is_none() {
             train.modules.pruning.get_or_insert_with(Pruning::tiered);
         }
-        config
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::named::{SURFACES, one_of};
+use crate::config::named::{SURFACES, one_of};
 use anyhow::Result;
 use pocketsplat_capture::synth::{SurfaceFinish, SynthOptions, write_capture};
 

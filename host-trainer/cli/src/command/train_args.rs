@@ -1,15 +1,15 @@
 //! The options of `pocketsplat train`, each of which may also stand in a configuration.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 use bytesize::ByteSize;
 use pocketsplat_trainer::device::{Limits, ModelChoice, Processor, choose};
 use pocketsplat_trainer::train::config::Hac;
 
-use super::named::{TARGETS, one_of};
 use super::settings::{QualityOptions, RunOptions, applied, with_default};
 use crate::config::heading::{DEVICE, OUTPUT, QUALITY, RUN};
+use crate::config::named::{TARGETS, one_of};
 use crate::config::{CaptureOptions, RunConfig};
 
 /// Train a scene from a capture and write it as a bundle.
@@ -31,7 +31,7 @@ pub(crate) struct Args {
     run: Option<PathBuf>,
     /// Print the result as JSON [default: as text]
     #[arg(long, help_heading = OUTPUT, hide_short_help = true)]
-    json: bool,
+    pub(super) json: bool,
     #[command(flatten)]
     quality: QualityOptions,
     #[arg(long, value_name = "X", help_heading = QUALITY,
@@ -44,10 +44,10 @@ pub(crate) struct Args {
     config: Option<PathBuf>,
     /// Run folder to go on in; a capture that has moved is given as DATASET.
     #[arg(long, value_name = "OUT.run", help_heading = RUN)]
-    resume: Option<PathBuf>,
+    pub(super) resume: Option<PathBuf>,
     /// Start anew where an unfinished run lies [default: refuse]
     #[arg(short = 'w', long, conflicts_with = "resume", help_heading = RUN)]
-    overwrite: bool,
+    pub(super) overwrite: bool,
     #[command(flatten)]
     options: RunOptions,
 }
@@ -78,21 +78,6 @@ impl DeviceArgs {
 }
 
 impl Args {
-    /// The run folder to go on in, if any.
-    pub(crate) fn resume(&self) -> Option<&Path> {
-        self.resume.as_deref()
-    }
-
-    /// Whether an unfinished run may be replaced.
-    pub(crate) fn overwrite(&self) -> bool {
-        self.overwrite
-    }
-
-    /// Whether the result is printed as JSON.
-    pub(crate) fn json(&self) -> bool {
-        self.json
-    }
-
     /// The configuration of a new run: defaults, then `--config`, then what else the command line says.
     pub(crate) fn resolved(&self) -> Result<RunConfig> {
         let base = match &self.config {
@@ -104,7 +89,7 @@ impl Args {
         // A configuration that is given has been decided about.
         if !limits.is_none() && self.config.is_none() {
             let choice = choose(&limits)?;
-            config = self.quality.chosen(config, &choice);
+            self.quality.choose(&mut config.train, &choice);
             config.train.hac.lambda = self.lambda.unwrap_or(choice.lambda);
             let ModelChoice { feature_dim, n_offsets, max_anchors, lambda, binding } = choice;
             eprintln!(

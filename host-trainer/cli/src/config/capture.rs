@@ -4,6 +4,7 @@ use pocketsplat_capture::dataset::{Background, FrameSize};
 use serde::{Deserialize, Serialize};
 
 use super::heading::INPUT;
+use super::named::{BACKGROUNDS, one_of};
 
 /// How photographs are prepared.
 #[derive(clap::Args, Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -14,12 +15,12 @@ pub(crate) struct CaptureOptions {
     pub(crate) max_resolution: Option<u32>,
     /// Size of a display, to which images are reduced and cut [default: as --max-resolution]
     #[arg(long, value_name = "WxH", conflicts_with = "max_resolution", help_heading = INPUT)]
-    #[serde(default, with = "frame_size", skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) resolution: Option<FrameSize>,
     /// Colour behind transparent images: black, white, or learned with the scene [default: black for train, the bundle's
     /// elsewhere]
-    #[arg(long, value_name = "COLOUR", help_heading = INPUT)]
-    #[serde(default, with = "background_name", skip_serializing_if = "Option::is_none")]
+    #[arg(long, value_name = "COLOUR", value_parser = one_of::<Background>(BACKGROUNDS), help_heading = INPUT)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) background: Option<Background>,
     /// Folder of images to read, for captures that hold several sizes [default: the only one, or images]
     #[arg(long, value_name = "NAME", help_heading = INPUT, hide_short_help = true)]
@@ -44,33 +45,5 @@ impl CaptureOptions {
             images: self.images.clone().or_else(|| other.images.clone()),
             test_every: self.test_every.or(other.test_every),
         }
-    }
-}
-
-/// Sizes of frames as text.
-mod frame_size {
-    use pocketsplat_capture::dataset::FrameSize;
-    use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
-
-    pub(super) fn serialize<S: Serializer>(size: &Option<FrameSize>, to: S) -> Result<S::Ok, S::Error> {
-        size.map(|size| size.to_string()).serialize(to)
-    }
-
-    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Option<FrameSize>, D::Error> {
-        String::deserialize(from)?.parse().map(Some).map_err(de::Error::custom)
-    }
-}
-
-/// Backgrounds by name.
-mod background_name {
-    use pocketsplat_capture::dataset::Background;
-    use serde::{Deserialize, Deserializer, Serializer, de};
-
-    pub(super) fn serialize<S: Serializer>(background: &Option<Background>, to: S) -> Result<S::Ok, S::Error> {
-        to.collect_str(&background.unwrap_or_default())
-    }
-
-    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Background>, D::Error> {
-        String::deserialize(from)?.parse().map(Some).map_err(de::Error::custom)
     }
 }

@@ -3,6 +3,7 @@
 mod capture;
 mod effects;
 pub(crate) mod heading;
+pub(crate) mod named;
 
 use std::path::{Path, PathBuf};
 

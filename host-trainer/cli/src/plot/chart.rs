@@ -1,5 +1,6 @@
 //! What all charts share: colours, sizes, axes, legend.
 
+use anyhow::Result;
 use plotters::chart::ChartContext;
 use plotters::coord::ranged1d::{AsRangedCoord, Ranged, ValueFormatter};
 use plotters::coord::types::RangedCoordf64;
@@ -33,17 +34,6 @@ pub(super) fn colour(i: usize) -> RGBColor {
     COLOURS[i % COLOURS.len()]
 }
 
-/// Drawing to a string hardly fails; what the drawing library says when it does.
-#[derive(Debug, thiserror::Error)]
-#[error("could not draw: {0}")]
-pub(crate) struct DrawError(String);
-
-impl<E: std::error::Error + Send + Sync> From<DrawingAreaErrorKind<E>> for DrawError {
-    fn from(error: DrawingAreaErrorKind<E>) -> Self {
-        Self(error.to_string())
-    }
-}
-
 /// The part of a figure that one chart fills.
 pub(super) type Panel<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
 
@@ -60,10 +50,7 @@ pub(super) struct Labels<'a> {
 }
 
 /// Draws `n_panels` panels, one below the other, into an SVG.
-pub(super) fn figure(
-    n_panels: usize,
-    draw: impl FnOnce(&[Panel<'_>]) -> Result<(), DrawError>,
-) -> Result<String, DrawError> {
+pub(super) fn figure(n_panels: usize, draw: impl FnOnce(&[Panel<'_>]) -> Result<()>) -> Result<String> {
     let mut svg = String::new();
     let height_px = PANEL_PX * u32::try_from(n_panels).unwrap_or(1);
     let root = SVGBackend::with_string(&mut svg, (WIDTH_PX, height_px)).into_drawing_area();
@@ -80,7 +67,7 @@ pub(super) fn axes<'a, 'b, X>(
     x: X,
     y: std::ops::Range<f64>,
     labels: &Labels<'_>,
-) -> Result<Chart<'a, 'b, X::CoordDescType>, DrawError>
+) -> Result<Chart<'a, 'b, X::CoordDescType>>
 where
     X: AsRangedCoord<Value = f64>,
     X::CoordDescType: Ranged<ValueType = f64> + ValueFormatter<f64>,
@@ -111,7 +98,7 @@ where
 }
 
 /// Draws the legend where rising curves leave room.
-pub(super) fn legend<'a, 'b: 'a, X: Ranged<ValueType = f64>>(chart: &mut Chart<'a, 'b, X>) -> Result<(), DrawError> {
+pub(super) fn legend<'a, 'b: 'a, X: Ranged<ValueType = f64>>(chart: &mut Chart<'a, 'b, X>) -> Result<()> {
     Ok(chart
         .configure_series_labels()
         .position(SeriesLabelPosition::LowerRight)

@@ -1,8 +1,9 @@
 //! What accuracy costs, in time or bytes, as a figure.
 
+use anyhow::Result;
 use plotters::prelude::*;
 
-use super::chart::{self, DrawError, Labels, Panel};
+use super::chart::{self, Labels, Panel};
 
 /// One way to train or draw a scene.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,10 +30,7 @@ pub(crate) struct CostPanel {
 }
 
 /// PSNR over cost, a panel for each kind of it, a colour for each knob and a line along the Pareto front, as an SVG.
-///
-/// # Errors
-/// [`DrawError`] when the drawing library fails.
-pub(crate) fn cost_svg(panels: &[CostPanel]) -> Result<String, DrawError> {
+pub(crate) fn cost_svg(panels: &[CostPanel]) -> Result<String> {
     let mut knobs: Vec<&str> = Vec::new();
     for point in panels.iter().flat_map(|panel| &panel.points) {
         if !knobs.contains(&point.knob.as_str()) {
@@ -44,7 +42,7 @@ pub(crate) fn cost_svg(panels: &[CostPanel]) -> Result<String, DrawError> {
     })
 }
 
-fn draw(area: &Panel<'_>, panel: &CostPanel, knobs: &[&str]) -> Result<(), DrawError> {
+fn draw(area: &Panel<'_>, panel: &CostPanel, knobs: &[&str]) -> Result<()> {
     let points = &panel.points;
     let psnr_db = chart::padded(points.iter().map(|point| point.psnr_db));
     let digits = chart::decimals(&psnr_db);

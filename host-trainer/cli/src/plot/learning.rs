@@ -1,8 +1,9 @@
 //! Learning curves: how runs went.
 
+use anyhow::Result;
 use plotters::prelude::*;
 
-use super::chart::{self, DrawError, Labels};
+use super::chart::{self, Labels};
 use super::{LearningRow, Named};
 
 /// Rows on either side of one that its mean takes in: the views of a row are few and differ.
@@ -30,10 +31,7 @@ const RATE: Quantity =
 
 /// PSNR of the training views over the iterations, below it the anchors, and below these the rate if any run has one, as
 /// an SVG.
-///
-/// # Errors
-/// [`DrawError`] when the drawing library fails.
-pub(crate) fn learning_curves_svg(runs: &[Named<Vec<LearningRow>>]) -> Result<String, DrawError> {
+pub(crate) fn learning_curves_svg(runs: &[Named<Vec<LearningRow>>]) -> Result<String> {
     let has_rate = runs.iter().flat_map(|run| &run.what).any(|row| row.bits().is_some());
     let quantities = if has_rate { vec![PSNR, ANCHORS, RATE] } else { vec![PSNR, ANCHORS] };
     let last = runs.iter().flat_map(|run| &run.what).map(|row| row.iteration).max().unwrap_or(1);
@@ -47,7 +45,7 @@ fn draw(
     quantity: &Quantity,
     runs: &[Named<Vec<LearningRow>>],
     last_iteration: u32,
-) -> Result<(), DrawError> {
+) -> Result<()> {
     let labels = Labels {
         title: quantity.title,
         x: "iteration",

@@ -1,9 +1,10 @@
 //! Rate-distortion curves: what quality costs.
 
+use anyhow::Result;
 use plotters::coord::ranged1d::{AsRangedCoord, Ranged, ValueFormatter};
 use plotters::prelude::*;
 
-use super::chart::{self, DrawError, Labels};
+use super::chart::{self, Labels};
 use super::{Named, ResultRow};
 
 /// How sizes lie along the axis.
@@ -17,10 +18,7 @@ pub(crate) enum SizeAxis {
 }
 
 /// PSNR over size, a curve for each file and a point for each rate, as an SVG; the better the further up and left.
-///
-/// # Errors
-/// [`DrawError`] when the drawing library fails.
-pub(crate) fn rate_distortion_svg(curves: &[Named<Vec<ResultRow>>], axis: SizeAxis) -> Result<String, DrawError> {
+pub(crate) fn rate_distortion_svg(curves: &[Named<Vec<ResultRow>>], axis: SizeAxis) -> Result<String> {
     let sizes = || curves.iter().flat_map(|curve| &curve.what).map(megabytes);
     let (least, most) = (sizes().fold(f64::INFINITY, f64::min), sizes().fold(0.0, f64::max));
     match axis {
@@ -33,7 +31,7 @@ pub(crate) fn rate_distortion_svg(curves: &[Named<Vec<ResultRow>>], axis: SizeAx
     }
 }
 
-fn draw<X>(curves: &[Named<Vec<ResultRow>>], sizes: X) -> Result<String, DrawError>
+fn draw<X>(curves: &[Named<Vec<ResultRow>>], sizes: X) -> Result<String>
 where
     X: AsRangedCoord<Value = f64>,
     X::CoordDescType: Ranged<ValueType = f64> + ValueFormatter<f64>,

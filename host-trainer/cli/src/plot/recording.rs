@@ -1,51 +1,11 @@
 //! What runs and sweeps recorded, as read from CSV files.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use anyhow::{Context, Result, bail};
+use pocketsplat_trainer::metrics::RatePoint;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
-
-use pocketsplat_trainer::metrics::RatePoint;
-
-/// Why a file cannot be plotted.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub(crate) enum RecordingError {
-    /// The system refuses.
-    #[error("could not read {}", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Why not.
-        source: std::io::Error,
-    },
-    /// Something else.
-    #[error(
-        "{} begins with `{found}`; needs the columns iteration, psnr_db and anchors (progress.csv of a run), or PSNR and \
-         Size [Bytes] (results of a sweep)",
-        path.display()
-    )]
-    Header {
-        /// The file.
-        path: PathBuf,
-        /// Its first line.
-        found: String,
-    },
-    /// A row that does not fit the header.
-    #[error("{}: a row cannot be used", path.display())]
-    Row {
-        /// The file.
-        path: PathBuf,
-        /// Which, and why not.
-        source: csv::Error,
-    },
-    /// Nothing to draw.
-    #[error("{} has no row to draw; let the run go further", path.display())]
-    Empty {
-        /// The file.
-        path: PathBuf,
-    },
-}
 
 /// One row of a run's `progress.csv`; other columns are passed over.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
@@ -108,10 +68,7 @@ impl ResultRow {
 }
 
 /// Results as the CSV that [`Recording::read`] takes back.
-///
-/// # Errors
-/// What the writer says; a `Vec` takes everything.
-pub(crate) fn results_csv(rows: &[ResultRow]) -> Result<Vec<u8>, csv::Error> {
+pub(crate) fn results_csv(rows: &[ResultRow]) -> Result<Vec<u8>> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(["Submethod", "PSNR", "SSIM", "LPIPS", "Size [Bytes]", "#Gaussians"])?;
     let decimals = |value: f64| format!("{value:.6}");
@@ -125,7 +82,7 @@ pub(crate) fn results_csv(rows: &[ResultRow]) -> Result<Vec<u8>, csv::Error> {
             row.n_gaussians.map(|n| n.to_string()).unwrap_or_default(),
         ])?;
     }
-    writer.into_inner().map_err(|error| error.into_error().into())
+    Ok(writer.into_inner()?)
 }
 
 /// A CSV file by what it holds.
@@ -138,38 +95,43 @@ pub(crate) enum Recording {
 }
 
 impl Recording {
-    /// Reads a CSV file, told by its header.
-    ///
-    /// # Errors
-    /// [`RecordingError`] with the path, and the line where it is a line's.
-    pub(crate) fn read(path: &Path) -> Result<Self, RecordingError> {
-        let bytes = std::fs::read(path).map_err(|source| RecordingError::Read { path: path.to_owned(), source })?;
-        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes.as_slice());
-        let wrong_row = |source| RecordingError::Row { path: path.to_owned(), source };
-        let header = reader.headers().map_err(wrong_row)?.clone();
+    /// Reads a CSV file, told by its header; errors name the path, and the line where it is a line's.
+    pub(crate) fn read(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).with_context(|| format!("could not read {}", path.display()))?;
+        Self::parse(&bytes).with_context(|| format!("{} cannot be plotted", path.display()))
+    }
+
+    fn parse(bytes: &[u8]) -> Result<Self> {
+        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
+        let header = reader.headers()?.clone();
         let has = |names: &[&str]| names.iter().all(|name| header.iter().any(|column| column == *name));
         if has(&["iteration", "psnr_db", "anchors"]) {
-            Ok(Self::Learning(rows(reader, path)?))
+            Ok(Self::Learning(rows(reader)?))
         } else if has(&["PSNR", "Size [Bytes]"]) {
-            Ok(Self::Results(rows(reader, path)?))
+            Ok(Self::Results(rows(reader)?))
         } else {
             let found: String = header.iter().collect::<Vec<_>>().join(",").chars().take(80).collect();
-            Err(RecordingError::Header { path: path.to_owned(), found })
+            bail!(
+                "it begins with `{found}`; needs the columns iteration, psnr_db and anchors (progress.csv of a run), or PSNR and \
+                 Size [Bytes] (results of a sweep)"
+            )
         }
     }
 }
 
-fn rows<T: DeserializeOwned>(mut reader: csv::Reader<&[u8]>, path: &Path) -> Result<Vec<T>, RecordingError> {
-    let rows = reader.deserialize().collect::<Result<Vec<T>, _>>();
-    let rows = rows.map_err(|source| RecordingError::Row { path: path.to_owned(), source })?;
-    if rows.is_empty() { Err(RecordingError::Empty { path: path.to_owned() }) } else { Ok(rows) }
+fn rows<T: DeserializeOwned>(mut reader: csv::Reader<&[u8]>) -> Result<Vec<T>> {
+    let rows = reader.deserialize().collect::<Result<Vec<T>, _>>()?;
+    if rows.is_empty() {
+        bail!("it has no row to draw; let the run go further");
+    }
+    Ok(rows)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn read(text: impl AsRef<[u8]>) -> Result<Recording, RecordingError> {
+    fn read(text: impl AsRef<[u8]>) -> Result<Recording> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("some.csv");
         std::fs::write(&path, text).unwrap();
@@ -209,7 +171,7 @@ mod tests {
     #[test]
     fn a_file_that_can_not_be_plotted_says_why() {
         let message = |text| {
-            let error = anyhow_chain(&read(text).unwrap_err());
+            let error = format!("{:#}", read(text).unwrap_err());
             assert!(error.contains("some.csv"), "{error}");
             error
         };
@@ -218,11 +180,5 @@ mod tests {
         assert!(message("iteration,psnr_db,anchors\n").contains("no row"));
         let wrong = message("iteration,psnr_db,anchors\n3,1.0,5\n6,good,5\n");
         assert!(wrong.contains("line: 3"), "{wrong}");
-    }
-
-    /// An error with its causes, as the command prints it.
-    fn anyhow_chain(error: &dyn std::error::Error) -> String {
-        let causes = std::iter::successors(Some(error), |error| error.source());
-        causes.map(ToString::to_string).collect::<Vec<_>>().join(": ")
     }
 }

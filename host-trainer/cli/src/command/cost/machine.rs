@@ -21,12 +21,7 @@ pub(crate) enum Machine {
 
 impl fmt::Display for Machine {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Host => "host",
-            Self::CortexM4 => "cortex-m4",
-            Self::CortexM7 => "cortex-m7",
-            Self::Riscv32imac => "riscv32imac",
-        })
+        f.write_str(self.to_possible_value().as_ref().map_or("", |value| value.get_name()))
     }
 }
 

@@ -117,7 +117,7 @@ impl Report<'_> {
                 })
                 .collect(),
         };
-        Ok(cost_svg(&columns.iter().map(panel).collect::<Vec<_>>())?)
+        cost_svg(&columns.iter().map(panel).collect::<Vec<_>>())
     }
 
     /// The table as a page; of the combinations those that are on a front.

@@ -33,7 +33,8 @@ const NORM_FLOOR: f32 = 1e-10;
 ///
 /// LPIPS was trained on [−1, 1]; published figures of Gaussian splatting, from 3DGS on, are of images handed over in
 /// [0, 1]. The two differ by several hundredths, so a figure means nothing without its range.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum InputRange {
     /// Black 0, white 1: as this field publishes.
     #[default]

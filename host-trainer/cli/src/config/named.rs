@@ -6,13 +6,16 @@ use serde::de::IntoDeserializer as _;
 use serde::de::value::{Error, StrDeserializer};
 
 // Names of the choices, in the order in which help shows them.
-pub(super) const SURFACES: &[&str] = &["matte", "mixed", "glossy"];
-pub(super) const CODERS: &[&str] = &["auto", "static", "context"];
-pub(super) const TARGETS: &[&str] = &["cortex-m4", "cortex-m7", "riscv32imac"];
-pub(super) const BACKBONES: &[&str] = &["scaffold", "hac"];
+pub(crate) const SURFACES: &[&str] = &["matte", "mixed", "glossy"];
+pub(crate) const CODERS: &[&str] = &["auto", "static", "context"];
+pub(crate) const TARGETS: &[&str] = &["cortex-m4", "cortex-m7", "riscv32imac"];
+pub(crate) const BACKBONES: &[&str] = &["scaffold", "hac"];
+pub(crate) const SPLITS: &[&str] = &["test", "train"];
+pub(crate) const BACKGROUNDS: &[&str] = &["black", "white", "learned"];
+pub(crate) const LPIPS_RANGES: &[&str] = &["zero-to-one", "minus-one-to-one"];
 
 /// Parses one of `names`, which are serde's for the variants of `T`.
-pub(super) fn one_of<T>(names: &'static [&'static str]) -> impl TypedValueParser<Value = T>
+pub(crate) fn one_of<T>(names: &'static [&'static str]) -> impl TypedValueParser<Value = T>
 where
     T: DeserializeOwned + Clone + Send + Sync + 'static,
 {
@@ -24,18 +27,18 @@ where
 
 #[cfg(test)]
 mod tests {
-    use clap::builder::TypedValueParser as _;
+    use pocketsplat_capture::dataset::{Background, Split};
     use pocketsplat_capture::synth::SurfaceFinish;
     use pocketsplat_trainer::device::Processor;
     use pocketsplat_trainer::encode::CoderChoice;
+    use pocketsplat_trainer::metrics::InputRange;
     use pocketsplat_trainer::train::config::Backbone;
-    use serde::de::DeserializeOwned;
 
-    use super::{BACKBONES, CODERS, SURFACES, TARGETS};
+    use super::*;
 
     /// Every name that help shows is one that serde knows.
     fn all_parse<T: DeserializeOwned + Clone + Send + Sync + 'static>(names: &'static [&'static str]) {
-        let parser = super::one_of::<T>(names);
+        let parser = one_of::<T>(names);
         for name in names {
             parser.parse_ref(&clap::Command::new("test"), None, name.as_ref()).expect(name);
         }
@@ -47,5 +50,8 @@ mod tests {
         all_parse::<CoderChoice>(CODERS);
         all_parse::<Processor>(TARGETS);
         all_parse::<Backbone>(BACKBONES);
+        all_parse::<Split>(SPLITS);
+        all_parse::<Background>(BACKGROUNDS);
+        all_parse::<InputRange>(LPIPS_RANGES);
     }
 }

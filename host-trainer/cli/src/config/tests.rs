@@ -60,7 +60,7 @@ fn what_is_not_understood_is_refused_by_its_name() {
         ("iterations = 3", "unknown key `iterations`; known here: "),
         ("[train]\niterations = \"many\"", "iterations"),
         ("[train]\niterations = -1", "iterations"),
-        ("[capture]\nbackground = \"grey\"", "`black`, `white` or `learned`"),
+        ("[capture]\nbackground = \"grey\"", "`black`, `white`, `learned`"),
         ("train = 3", "train"),
         ("[train\n", "line 1"),
     ] {

@@ -16,8 +16,8 @@ pub use price::{Price, Worth, choose};
 pub use request::{ParseEffectsError, Request};
 pub use search::{Trial, Trials};
 
+use crate::scene::ModelShape;
 use crate::train::TrainConfig;
-use crate::train::module::Detail;
 
 /// Something that a scene may take into account; a scene without it has no part for it, and its decoder does no work for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,56 +53,49 @@ impl Effect {
 
     /// Its name on the command line.
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::ViewColour => "view-colour",
-            Self::ViewGeometry => "view-geometry",
-            Self::ViewDistance => "view-distance",
-            Self::DilationCompensation => "dilation-compensation",
-            Self::Detail => "detail",
-            Self::Anisotropy => "anisotropy",
-        }
+        self.name_and_key().0
     }
 
     /// The key of a configuration that decides about it, or the start of such keys.
     pub const fn key(self) -> &'static str {
+        self.name_and_key().1
+    }
+
+    const fn name_and_key(self) -> (&'static str, &'static str) {
         match self {
-            Self::ViewColour => "train.shape.view_colour",
-            Self::ViewGeometry => "train.shape.view_geometry",
-            Self::ViewDistance => "train.shape.view_distance",
-            Self::DilationCompensation => "train.shape.dilation_compensation",
-            Self::Detail => "train.modules.detail",
-            Self::Anisotropy => "train.shape.anisotropic",
+            Self::ViewColour => ("view-colour", "train.shape.view_colour"),
+            Self::ViewGeometry => ("view-geometry", "train.shape.view_geometry"),
+            Self::ViewDistance => ("view-distance", "train.shape.view_distance"),
+            Self::DilationCompensation => ("dilation-compensation", "train.shape.dilation_compensation"),
+            Self::Detail => ("detail", "train.modules.detail"),
+            Self::Anisotropy => ("anisotropy", "train.shape.anisotropic"),
         }
+    }
+
+    /// The switch of a shape that it is; `None` for the effect that is a module.
+    fn switch(self, shape: &mut ModelShape) -> Option<&mut bool> {
+        Some(match self {
+            Self::ViewColour => &mut shape.view_colour,
+            Self::ViewGeometry => &mut shape.view_geometry,
+            Self::ViewDistance => &mut shape.view_distance,
+            Self::DilationCompensation => &mut shape.dilation_compensation,
+            Self::Anisotropy => &mut shape.anisotropic,
+            Self::Detail => return None,
+        })
     }
 
     /// Whether a run has it.
     pub fn is_in(self, config: &TrainConfig) -> bool {
-        match self {
-            Self::ViewColour => config.shape.view_colour,
-            Self::ViewGeometry => config.shape.view_geometry,
-            Self::ViewDistance => config.shape.view_distance,
-            Self::DilationCompensation => config.shape.dilation_compensation,
-            Self::Detail => config.modules.detail.is_some(),
-            Self::Anisotropy => config.shape.anisotropic,
-        }
+        self.switch(&mut config.shape.clone()).map_or(config.modules.detail.is_some(), |on| *on)
     }
 
     /// Gives it to a run, or takes it; settings that a module has are kept.
     pub fn set(self, config: &mut TrainConfig, on: bool) {
-        match self {
-            Self::ViewColour => config.shape.view_colour = on,
-            Self::ViewGeometry => config.shape.view_geometry = on,
-            Self::ViewDistance => config.shape.view_distance = on,
-            Self::DilationCompensation => config.shape.dilation_compensation = on,
-            Self::Anisotropy => config.shape.anisotropic = on,
-            Self::Detail if on => {
-                let Detail { hidden, .. } = *config.modules.detail.get_or_insert_default();
-                config.shape.detail_hidden = hidden;
-            }
-            Self::Detail => {
-                config.modules.detail = None;
-                config.shape.detail_hidden = 0;
-            }
+        if let Some(switch) = self.switch(&mut config.shape) {
+            *switch = on;
+        } else {
+            config.modules.detail = on.then(|| config.modules.detail.unwrap_or_default());
+            config.shape.detail_hidden = config.modules.detail.map_or(0, |detail| detail.hidden);
         }
     }
 

@@ -77,6 +77,11 @@ impl Shot {
 }
 
 impl Listing {
+    /// The sound views, with their names.
+    pub(super) fn sound(&self) -> impl Iterator<Item = (&str, &Shot)> {
+        self.views.iter().filter_map(|view| Some((view.name.as_str(), view.shot.as_ref().ok()?)))
+    }
+
     /// The sound views of a split.
     pub(super) fn shots(&self, split: Split) -> impl Iterator<Item = &Shot> {
         self.views.iter().filter(move |view| view.split == split).filter_map(|view| view.shot.as_ref().ok())

@@ -6,6 +6,9 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
+use crate::dataset::listing::Shot;
+use crate::dataset::report::first_few;
+
 /// How much a finding matters; the worst compares smallest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -49,6 +52,21 @@ impl Finding {
     pub(super) fn new(severity: Severity, code: &'static str, message: String, remedy: &str) -> Self {
         let remedy = remedy.to_owned();
         Self { severity, code, message, remedy, files: Vec::new(), numbers: BTreeMap::new() }
+    }
+
+    /// A finding about views; `None` without any.
+    pub(super) fn about(
+        views: &[(&str, &Shot)],
+        severity: Severity,
+        code: &'static str,
+        what: &str,
+        remedy: &str,
+    ) -> Option<Self> {
+        let names: Vec<String> = views.iter().map(|(name, _)| (*name).to_owned()).collect();
+        let message = format!("{what}: {} ({})", names.len(), first_few(&names));
+        let files = views.iter().map(|(_, shot)| shot.path.clone());
+        let finding = Self::new(severity, code, message, remedy).files(files).number("views", names.len() as f64);
+        (!views.is_empty()).then_some(finding)
     }
 
     /// A finding of a message that ends with its remedy behind the last semicolon, as all messages of this module do.

@@ -1,12 +1,9 @@
 //! Findings about where the cameras stand.
 
-use std::path::PathBuf;
-
 use glam::DVec3;
 
 use super::{Finding, Severity};
 use crate::dataset::listing::{Listing, Shot};
-use crate::dataset::report::first_few;
 use crate::dataset::{DatasetError, Normalisation};
 
 /// A camera this many median distances from the middle of all is no part of the capture.
@@ -43,53 +40,33 @@ pub(super) fn median(mut values: Vec<f64>) -> f64 {
 }
 
 fn outliers(listing: &Listing, findings: &mut Vec<Finding>) {
-    let sound: Vec<(&str, &Shot)> =
-        listing.views.iter().filter_map(|view| Some((view.name.as_str(), view.shot.as_ref().ok()?))).collect();
-    let centres: Vec<DVec3> = sound.iter().map(|(_, shot)| shot.centre_world()).collect();
+    let centres: Vec<DVec3> = listing.sound().map(|(_, shot)| shot.centre_world()).collect();
     let middle = middle(&centres);
     let median_distance = median(centres.iter().map(|centre| centre.distance(middle)).collect());
-    let ratio = |centre: &DVec3| centre.distance(middle) / median_distance;
-    let far: Vec<usize> = (0..sound.len()).filter(|&i| ratio(&centres[i]) > OUTLIER_RATIO).collect();
-    if far.is_empty() || median_distance == 0.0 {
-        return;
-    }
-    let names: Vec<String> = far.iter().map(|&i| sound[i].0.to_owned()).collect();
-    let farthest = far.iter().map(|&i| ratio(&centres[i])).fold(0.0, f64::max);
-    let message = format!(
-        "cameras far from the others: {} ({}); the farthest stands {farthest:.0} times the median distance from the \
-         middle of all",
-        names.len(),
-        first_few(&names)
-    );
+    let ratio = |shot: &Shot| shot.centre_world().distance(middle) / median_distance;
+    let far: Vec<(&str, &Shot)> = listing.sound().filter(|(_, shot)| ratio(shot) > OUTLIER_RATIO).collect();
     let remedy = "take these views out: their poses are probably wrong, and all others shrink to make room for them";
-    let finding = Finding::new(Severity::Warning, "pose-outlier", message, remedy)
-        .files(far.iter().map(|&i| sound[i].1.path.clone()))
-        .number("views", names.len() as f64)
-        .number("farthest_ratio", farthest)
-        .number("median_distance", median_distance);
-    findings.push(finding);
+    let finding = Finding::about(&far, Severity::Warning, "pose-outlier", "cameras far from the others", remedy);
+    if let Some(mut finding) = finding.filter(|_| median_distance > 0.0) {
+        let farthest = far.iter().map(|(_, shot)| ratio(shot)).fold(0.0, f64::max);
+        finding.message +=
+            &format!("; the farthest stands {farthest:.0} times the median distance from the middle of all");
+        findings.push(finding.number("farthest_ratio", farthest).number("median_distance", median_distance));
+    }
 }
 
 fn repeated(listing: &Listing, findings: &mut Vec<Finding>) {
-    let mut poses: Vec<([u64; 12], &str, PathBuf)> = Vec::new();
-    for view in &listing.views {
-        if let Ok(shot) = &view.shot {
-            let mut bits = [0; 12];
-            let numbers = shot.rotation.to_cols_array().into_iter().chain(shot.translation.to_array());
-            bits.iter_mut().zip(numbers).for_each(|(bits, number)| *bits = number.to_bits());
-            poses.push((bits, &view.name, shot.path.clone()));
-        }
-    }
-    poses.sort_unstable();
-    let same: Vec<_> = poses.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() > 1).flatten().collect();
-    if same.is_empty() {
-        return;
-    }
-    let names: Vec<String> = same.iter().map(|(_, name, _)| (*name).to_owned()).collect();
-    let message = format!("views that share their pose with another: {} ({})", names.len(), first_few(&names));
+    let pose = |shot: &Shot| -> Vec<u64> {
+        let numbers = shot.rotation.to_cols_array().into_iter().chain(shot.translation.to_array());
+        numbers.map(f64::to_bits).collect()
+    };
+    let mut views: Vec<(&str, &Shot)> = listing.sound().collect();
+    views.sort_by_cached_key(|(name, shot)| (pose(shot), *name));
+    let same = views.chunk_by(|a, b| pose(a.1) == pose(b.1)).filter(|same| same.len() > 1);
+    let same: Vec<(&str, &Shot)> = same.flatten().copied().collect();
     let remedy = "check that they were taken from one place; if not, their poses were not estimated but copied";
-    let finding = Finding::new(Severity::Warning, "repeated-pose", message, remedy);
-    findings.push(finding.number("views", names.len() as f64).files(same.iter().map(|(_, _, path)| path.clone())));
+    let what = "views that share their pose with another";
+    findings.extend(Finding::about(&same, Severity::Warning, "repeated-pose", what, remedy));
 }
 
 fn far_from_origin(normalisation: &Normalisation, findings: &mut Vec<Finding>) {

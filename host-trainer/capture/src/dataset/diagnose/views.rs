@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use super::{Finding, Severity};
 use crate::dataset::assemble::MIN_TRAIN_VIEWS;
-use crate::dataset::listing::{ListedView, Listing, Shot, commonest};
+use crate::dataset::listing::{ListedView, Listing, commonest};
 use crate::dataset::report::first_few;
 use crate::dataset::{Layout, Split};
 
@@ -21,20 +21,6 @@ pub(super) fn check(listing: &Listing, findings: &mut Vec<Finding>) {
     alpha(listing, findings);
     orientation(listing, findings);
     sizes(listing, findings);
-}
-
-/// The views that can be used, with their names.
-fn sound(listing: &Listing) -> impl Iterator<Item = (&str, &Shot)> {
-    listing.views.iter().filter_map(|view| Some((view.name.as_str(), view.shot.as_ref().ok()?)))
-}
-
-/// A finding about some of the sound views; none where there are none.
-fn about(views: &[(&str, &Shot)], severity: Severity, code: &'static str, what: &str, remedy: &str) -> Option<Finding> {
-    let names: Vec<String> = views.iter().map(|(name, _)| (*name).to_owned()).collect();
-    let message = format!("{what}: {} ({})", names.len(), first_few(&names));
-    let files = views.iter().map(|(_, shot)| shot.path.clone());
-    let finding = Finding::new(severity, code, message, remedy).files(files).number("views", names.len() as f64);
-    (!views.is_empty()).then_some(finding)
 }
 
 /// One finding for each kind of fault, told by the first view that has it.
@@ -59,19 +45,11 @@ fn left_out(listing: &Listing, findings: &mut Vec<Finding>) {
 fn counts(listing: &Listing, findings: &mut Vec<Finding>) {
     let (usable, listed) = (listing.shots(Split::Train).count(), listing.n_listed(Split::Train));
     let (severity, code, needed, remedy) = if usable < MIN_TRAIN_VIEWS {
-        (
-            Severity::Error,
-            "too-few-views",
-            MIN_TRAIN_VIEWS,
-            "repair the views that were left out, or take more photographs",
-        )
+        let remedy = "repair the views that were left out, or take more photographs";
+        (Severity::Error, "too-few-views", MIN_TRAIN_VIEWS, remedy)
     } else if usable < FEW_TRAIN_VIEWS {
-        (
-            Severity::Warning,
-            "few-views",
-            FEW_TRAIN_VIEWS,
-            "take more photographs from other places, overlapping by half",
-        )
+        let remedy = "take more photographs from other places, overlapping by half";
+        (Severity::Warning, "few-views", FEW_TRAIN_VIEWS, remedy)
     } else {
         return;
     };
@@ -112,22 +90,23 @@ fn repeated_names(listing: &Listing, findings: &mut Vec<Finding>) {
 }
 
 fn lenses(listing: &Listing, findings: &mut Vec<Finding>) {
-    let n_distorted = sound(listing).filter(|(_, shot)| !shot.lens.is_pinhole()).count();
+    let n_distorted = listing.sound().filter(|(_, shot)| !shot.lens.is_pinhole()).count();
     if n_distorted > 0 {
-        let shift_px = sound(listing).map(|(_, shot)| shot.lens.largest_shift_px()).fold(0.0, f64::max);
+        let shift_px = listing.sound().map(|(_, shot)| shot.lens.largest_shift_px()).fold(0.0, f64::max);
         let message = format!(
             "images with lens distortion: {n_distorted}; it moves pixels by up to {shift_px:.1} px and is undone on loading"
         );
         let finding = Finding::new(Severity::Note, "distortion", message, "");
         findings.push(finding.number("views", n_distorted as f64).number("largest_shift_px", shift_px));
     }
-    let outside: Vec<_> = sound(listing)
+    let outside: Vec<_> = listing
+        .sound()
         .filter(|(_, shot)| {
             let ([x, y], (width_px, height_px)) = (shot.lens.principal_px, shot.lens.size_px);
             !(0.0..=f64::from(width_px)).contains(&x) || !(0.0..=f64::from(height_px)).contains(&y)
         })
         .collect();
-    findings.extend(about(
+    findings.extend(Finding::about(
         &outside,
         Severity::Warning,
         "principal-point",
@@ -137,9 +116,9 @@ fn lenses(listing: &Listing, findings: &mut Vec<Finding>) {
 }
 
 fn alpha(listing: &Listing, findings: &mut Vec<Finding>) {
-    let (with, without): (Vec<_>, Vec<_>) = sound(listing).partition(|(_, shot)| shot.header.has_alpha);
+    let (with, without): (Vec<_>, Vec<_>) = listing.sound().partition(|(_, shot)| shot.header.has_alpha);
     let finding = if listing.layout == Layout::Blender {
-        about(
+        Finding::about(
             &without,
             Severity::Note,
             "no-alpha",
@@ -147,7 +126,7 @@ fn alpha(listing: &Listing, findings: &mut Vec<Finding>) {
             "export RGBA to have the chosen background there",
         )
     } else {
-        about(
+        Finding::about(
             &with,
             Severity::Warning,
             "alpha",
@@ -159,8 +138,8 @@ fn alpha(listing: &Listing, findings: &mut Vec<Finding>) {
 }
 
 fn orientation(listing: &Listing, findings: &mut Vec<Finding>) {
-    let turned: Vec<_> = sound(listing).filter(|(_, shot)| shot.header.exif_orientation != 1).collect();
-    findings.extend(about(
+    let turned: Vec<_> = listing.sound().filter(|(_, shot)| shot.header.exif_orientation != 1).collect();
+    findings.extend(Finding::about(
         &turned,
         Severity::Warning,
         "exif-orientation",
@@ -170,8 +149,8 @@ fn orientation(listing: &Listing, findings: &mut Vec<Finding>) {
 }
 
 fn sizes(listing: &Listing, findings: &mut Vec<Finding>) {
-    let Some(common_px) = commonest(sound(listing).map(|(_, shot)| shot.header.size_px)) else { return };
-    let other: Vec<_> = sound(listing).filter(|(_, shot)| shot.header.size_px != common_px).collect();
+    let Some(common_px) = commonest(listing.sound().map(|(_, shot)| shot.header.size_px)) else { return };
+    let other: Vec<_> = listing.sound().filter(|(_, shot)| shot.header.size_px != common_px).collect();
     let what = format!("images of another size than the {}×{} px of most", common_px.0, common_px.1);
-    findings.extend(about(&other, Severity::Note, "mixed-sizes", &what, ""));
+    findings.extend(Finding::about(&other, Severity::Note, "mixed-sizes", &what, ""));
 }

@@ -23,25 +23,14 @@ const MIN_WEIGHT_BITS: i32 = -4;
 /// Why a context model has no integer form.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "each message names its fields")]
 pub enum IntegerModelError {
     /// More levels or hidden units than the format has.
     #[error("{what} are {found}; the format holds 1 to {most}")]
-    Count {
-        /// Which.
-        what: &'static str,
-        /// How many there are.
-        found: usize,
-        /// Most of the format.
-        most: usize,
-    },
+    Count { what: &'static str, found: usize, most: usize },
     /// A weight or bias is not finite, or too large for eight bits at any scale.
     #[error("context model, row {row}: {value} does not fit eight bits (weights up to 2032, biases up to 16384)")]
-    Weight {
-        /// Row of its layer.
-        row: usize,
-        /// The value.
-        value: f32,
-    },
+    Weight { row: usize, value: f32 },
 }
 
 /// One row of a layer in integers.

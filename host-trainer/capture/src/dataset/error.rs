@@ -5,13 +5,11 @@ use std::path::PathBuf;
 /// Why a capture cannot be loaded; each message names the place, what was found, what is needed and the remedy.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "each message names its fields")]
 pub enum DatasetError {
     /// The path is no folder.
     #[error("`{}` is not a folder; give the folder that holds the capture", path.display())]
-    NotAFolder {
-        /// The path given.
-        path: PathBuf,
-    },
+    NotAFolder { path: PathBuf },
     /// No known layout fits the folder.
     #[error(
         "`{}` is no capture that can be read: looked for {} and found none of them; {}",
@@ -22,144 +20,69 @@ pub enum DatasetError {
             None => "give the folder that holds one of them".to_owned(),
         }
     )]
-    UnknownLayout {
-        /// The folder given.
-        path: PathBuf,
-        /// The files whose presence would have told a layout.
-        looked_for: Vec<&'static str>,
-        /// A folder in it that is a capture.
-        inside: Option<PathBuf>,
-    },
+    UnknownLayout { path: PathBuf, looked_for: Vec<&'static str>, inside: Option<PathBuf> },
     /// A file of the capture cannot be read.
     #[error("cannot read `{}`: {source}; check that the file is there and may be read", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
+    Read { path: PathBuf, source: std::io::Error },
     /// A transforms file is no such JSON; the source gives line and column.
     #[error(
         "`{}` is not a transforms file: {source}; it needs `fl_x` or `camera_angle_x` and `frames`, each frame \
          with `file_path` and a `transform_matrix` of 4 rows of 4 numbers",
         path.display()
     )]
-    Transforms {
-        /// The file.
-        path: PathBuf,
-        /// Where and what.
-        source: serde_json::Error,
-    },
+    Transforms { path: PathBuf, source: serde_json::Error },
     /// The field of view is not an angle a pinhole camera can have.
     #[error(
         "`{}`: `camera_angle_x` is {found}, needed: the horizontal field of view in radians, between 0 and π; \
          convert it if it is in degrees",
         path.display()
     )]
-    FieldOfView {
-        /// The file.
-        path: PathBuf,
-        /// The value in it.
-        found: f64,
-    },
+    FieldOfView { path: PathBuf, found: f64 },
     /// A transforms file gives no focal length.
     #[error(
         "`{}`: neither `fl_x` nor `camera_angle_x` is a number, for all frames or in the frame `{frame}`; give the \
          focal length in pixels or the horizontal field of view in radians",
         path.display()
     )]
-    NoFocal {
-        /// The file.
-        path: PathBuf,
-        /// The first frame without.
-        frame: String,
-    },
+    NoFocal { path: PathBuf, frame: String },
     /// A file of a COLMAP model is damaged.
     #[error("`{}`: {place}: {found}; export the model again, or copy it again if the file was cut", path.display())]
-    Model {
-        /// The file.
-        path: PathBuf,
-        /// Line, or record and byte.
-        place: String,
-        /// What is wrong there, with what is needed.
-        found: String,
-    },
+    Model { path: PathBuf, place: String, found: String },
     /// A camera model that cannot be undistorted.
     #[error(
         "`{}`: {camera} has the camera model `{model}`, needed: PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL, RADIAL or \
          OPENCV; undistort the capture first (COLMAP: image_undistorter) or reconstruct it with one of these",
         path.display()
     )]
-    CameraModel {
-        /// The file that says so.
-        path: PathBuf,
-        /// Which camera.
-        camera: String,
-        /// The model's name.
-        model: String,
-    },
+    CameraModel { path: PathBuf, camera: String, model: String },
     /// There is no folder of images, or more than one to choose from.
     #[error("`{}` {}", path.display(), image_folder(wanted.as_deref(), present))]
-    ImageFolder {
-        /// The capture.
-        path: PathBuf,
-        /// The folder asked for.
-        wanted: Option<String>,
-        /// Folders of images in the capture.
-        present: Vec<String>,
-    },
+    ImageFolder { path: PathBuf, wanted: Option<String>, present: Vec<String> },
     /// A point cloud is damaged or of an unknown kind.
     #[error("`{}` {found}; write it again, or take `ply_file_path` out to start from random points", path.display())]
-    Ply {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        found: String,
-    },
+    Ply { path: PathBuf, found: String },
     /// Too few training views are left after the unusable ones are set aside.
     #[error(
         "`{}`: {usable} of {listed} training views can be used, needed: at least {needed}{}",
         path.display(),
         list_faults(faults)
     )]
-    TooFewViews {
-        /// The file that lists the views.
-        path: PathBuf,
-        /// Views without a fault.
-        usable: usize,
-        /// Views in the file.
-        listed: usize,
-        /// Views a scene cannot be trained without.
-        needed: usize,
-        /// Why each of the others cannot be used: name and fault.
-        faults: Vec<String>,
-    },
+    TooFewViews { path: PathBuf, usable: usize, listed: usize, needed: usize, faults: Vec<String> },
     /// The training cameras span no space, so the scene has no scale.
     #[error(
         "`{}`: all training cameras stand within {spread:.1e} of one point, so the scene has no scale; give views from \
          different places, or check the translations of the poses",
         path.display()
     )]
-    NoBaseline {
-        /// The file that lists the views.
-        path: PathBuf,
-        /// Largest distance of a camera from their mean, capture units.
-        spread: f64,
-    },
+    NoBaseline { path: PathBuf, spread: f64 },
     /// The limit on the resolution is no size.
     #[error("the largest resolution is {found} px, needed: at least 1; leave it out to load images at their own size")]
-    MaxResolution {
-        /// The value given.
-        found: u32,
-    },
+    MaxResolution { found: u32 },
     /// Every view would be held out.
     #[error(
         "one view in {found} is to be held out, needed: at least 2, so that some are left to train on; 0 holds out none"
     )]
-    TestEvery {
-        /// The value given.
-        found: u32,
-    },
+    TestEvery { found: u32 },
 }
 
 impl DatasetError {

@@ -10,58 +10,32 @@ const MAX_DEVIATION: f64 = 2e-3;
 /// Why a matrix is no camera pose.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "each message names its fields")]
 pub enum PoseFault {
     /// Not 4 × 4 (or 3 × 4).
     #[error("has {rows} rows, the shortest of {columns} numbers, needed: 4 rows of 4; export the pose again")]
-    Shape {
-        /// Rows found.
-        rows: usize,
-        /// Numbers in the shortest row.
-        columns: usize,
-    },
+    Shape { rows: usize, columns: usize },
     /// A number is NaN or infinite.
     #[error("has {found} in row {row}, column {column}, needed: finite numbers; take the frame out or export it again")]
-    NotFinite {
-        /// Row, from 0.
-        row: usize,
-        /// Column, from 0.
-        column: usize,
-        /// The number.
-        found: f64,
-    },
+    NotFinite { row: usize, column: usize, found: f64 },
     /// The last row is not 0 0 0 1.
     #[error("has the last row {found:?}, needed: [0, 0, 0, 1]; the matrix may be transposed")]
-    LastRow {
-        /// The row.
-        found: [f64; 4],
-    },
+    LastRow { found: [f64; 4] },
     /// The upper left 3 × 3 has no inverse.
     #[error("is singular: its 3×3 part has determinant {determinant:e}, needed: 1; export the pose again")]
-    Singular {
-        /// The determinant.
-        determinant: f64,
-    },
+    Singular { determinant: f64 },
     /// The columns are orthogonal but not of length 1.
     #[error("scales by {scale:.6}, needed: a rotation without scale; apply the camera's scale before exporting")]
-    Scaled {
-        /// Length of the columns.
-        scale: f64,
-    },
+    Scaled { scale: f64 },
     /// The columns are not orthogonal, or of different lengths.
     #[error(
         "is no rotation: its columns deviate from orthonormal by {deviation:.6}, needed: at most {MAX_DEVIATION}; \
          remove shear and scale from the camera before exporting"
     )]
-    NotOrthonormal {
-        /// max |RᵀR − I|.
-        deviation: f64,
-    },
+    NotOrthonormal { deviation: f64 },
     /// The determinant is −1: left and right are exchanged.
     #[error("is a reflection: its determinant is {determinant:.6}, needed: +1; negate one axis of the camera")]
-    Reflection {
-        /// The determinant.
-        determinant: f64,
-    },
+    Reflection { determinant: f64 },
 }
 
 /// World-to-camera rotation and translation in OpenCV axes of an OpenGL camera-to-world matrix.

@@ -7,6 +7,7 @@ use super::PoseFault;
 /// Why one view cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "each message names its fields")]
 pub enum ViewFault {
     /// The image is not there.
     #[error(
@@ -17,35 +18,16 @@ pub enum ViewFault {
             format!("`{}` does not exist", path.display())
         }
     )]
-    Missing {
-        /// The path as the capture gives it.
-        path: PathBuf,
-        /// Whether it was also looked for with `.png` behind it.
-        or_png: bool,
-        /// What lists it.
-        listed_in: &'static str,
-    },
+    Missing { path: PathBuf, or_png: bool, listed_in: &'static str },
     /// The image cannot be decoded.
     #[error("image unreadable: `{}`: {message}; replace it with a whole PNG or JPEG", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// What the decoder said.
-        message: String,
-    },
+    Unreadable { path: PathBuf, message: String },
     /// The image's size is not the capture's.
     #[error(
         "`{}` is {}×{} px, the training images are {}×{} px; export it again at that size",
         path.display(), found_px.0, found_px.1, needed_px.0, needed_px.1
     )]
-    Size {
-        /// The file.
-        path: PathBuf,
-        /// Its width and height.
-        found_px: (u32, u32),
-        /// Width and height of most training images.
-        needed_px: (u32, u32),
-    },
+    Size { path: PathBuf, found_px: (u32, u32), needed_px: (u32, u32) },
     /// The image has another shape than its camera.
     #[error(
         "`{}` is {}×{} px, its camera is for {}×{} px, which is another shape{}",
@@ -56,68 +38,34 @@ pub enum ViewFault {
             "; use the images that the poses were made from, or scale both sides alike"
         }
     )]
-    Shape {
-        /// The file.
-        path: PathBuf,
-        /// Its width and height.
-        found_px: (u32, u32),
-        /// Width and height the intrinsics are for.
-        needed_px: (u32, u32),
-    },
+    Shape { path: PathBuf, found_px: (u32, u32), needed_px: (u32, u32) },
     /// The image does not cover the frame asked for.
     #[error(
         "`{}` is {}×{} px and does not cover the frame of {}×{} px; ask for a smaller frame",
         path.display(), found_px.0, found_px.1, needed_px.0, needed_px.1
     )]
-    Small {
-        /// The file.
-        path: PathBuf,
-        /// Its width and height.
-        found_px: (u32, u32),
-        /// Width and height of the frame.
-        needed_px: (u32, u32),
-    },
+    Small { path: PathBuf, found_px: (u32, u32), needed_px: (u32, u32) },
     /// The intrinsics are no lens.
     #[error("{found}; correct the camera's numbers or take the view out")]
-    Lens {
-        /// What is wrong, with what is needed.
-        found: String,
-    },
+    Lens { found: String },
     /// A camera model that cannot be undistorted.
     #[error(
         "its camera model is `{model}`, needed: PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL, RADIAL or OPENCV; undistort the \
          image first"
     )]
-    CameraModel {
-        /// The model's name.
-        model: String,
-    },
+    CameraModel { model: String },
     /// The view's camera is not in the model.
     #[error("its camera {camera_id} is not among the model's cameras; export the model again")]
-    NoCamera {
-        /// The camera's number.
-        camera_id: u32,
-    },
+    NoCamera { camera_id: u32 },
     /// The rotation is none.
     #[error("its rotation is a quaternion of length {length:.6}, needed: 1; export the model again")]
-    Quaternion {
-        /// The quaternion's length.
-        length: f64,
-    },
+    Quaternion { length: f64 },
     /// The translation is none.
     #[error("its translation is {found:?}, needed: finite numbers; take the view out or export the model again")]
-    Translation {
-        /// The numbers.
-        found: [f64; 3],
-    },
+    Translation { found: [f64; 3] },
     /// The mask cannot be used.
     #[error("its mask `{}` {message}; restore the mask or take `mask_path` out", path.display())]
-    Mask {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        message: String,
-    },
+    Mask { path: PathBuf, message: String },
     /// The pose is no rigid motion.
     #[error("`transform_matrix` {0}")]
     Pose(#[from] PoseFault),

@@ -69,41 +69,20 @@ pub struct SynthReport {
 /// Why no capture was written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "each message names its fields")]
 pub enum SynthError {
     /// An option has a value nothing can be traced with.
     #[error("`{name}` is {found}, needed: {min} to {max}")]
-    Option {
-        /// The option.
-        name: &'static str,
-        /// Its value.
-        found: u32,
-        /// Smallest value that works.
-        min: u32,
-        /// Largest value that works.
-        max: u32,
-    },
+    Option { name: &'static str, found: u32, min: u32, max: u32 },
     /// The folder holds something already.
     #[error("`{}` is not empty: give a new folder, so that no capture is overwritten", path.display())]
-    Occupied {
-        /// The folder.
-        path: PathBuf,
-    },
+    Occupied { path: PathBuf },
     /// The system does not let a file or folder be written.
     #[error("cannot write `{}`: {source}", path.display())]
-    Write {
-        /// The file or folder.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
+    Write { path: PathBuf, source: std::io::Error },
     /// An image cannot be encoded or written.
     #[error("cannot write the image `{}`: {source}", path.display())]
-    Image {
-        /// The file.
-        path: PathBuf,
-        /// What the encoder said.
-        source: image::ImageError,
-    },
+    Image { path: PathBuf, source: image::ImageError },
 }
 
 #[derive(Serialize)]

@@ -7,23 +7,14 @@ use pocketsplat_core::{Bundle, DecodeError};
 /// Why a bundle file cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "each message names its fields")]
 pub enum LoadError {
     /// The file cannot be read.
     #[error("{}: cannot be read", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
+    Io { path: PathBuf, source: std::io::Error },
     /// The file is not a sound bundle.
     #[error("{}: not a sound bundle", path.display())]
-    Malformed {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        source: DecodeError,
-    },
+    Malformed { path: PathBuf, source: DecodeError },
 }
 
 /// Reads a bundle file and checks all of it, every chunk's checksum included; `Bundle::parse` of the bytes succeeds.

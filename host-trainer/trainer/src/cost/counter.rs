@@ -18,6 +18,7 @@ pub const MOST_VIEWS: usize = 10;
 /// Why nothing can be counted, or a count came to nothing.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "each message names its fields")]
 pub enum CountError {
     /// The folder is not that of the firmware.
     #[error("{} is not there; needs the repository's folder firmware-example", .0.display())]
@@ -27,20 +28,10 @@ pub enum CountError {
     NoProgram(&'static str),
     /// A file of a count could not be written or a program not be started.
     #[error("{}: {source}", path.display())]
-    Io {
-        /// Which.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
+    Io { path: PathBuf, source: std::io::Error },
     /// The firmware did not build or did not draw.
     #[error("the firmware on {board}: {said}")]
-    Failed {
-        /// Where.
-        board: &'static str,
-        /// The last line of what was printed.
-        said: String,
-    },
+    Failed { board: &'static str, said: String },
 }
 
 /// Builds `firmware-example` with a bundle and a setting, and lets emulated boards draw.

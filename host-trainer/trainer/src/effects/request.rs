@@ -15,15 +15,11 @@ pub enum Request {
 
 /// Malformed `--effects` list.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "each message names its fields")]
 pub enum ParseEffectsError {
     /// No effect has that name.
     #[error("there is no effect `{name}`; needs auto, or a list of none, all, and +NAME or -NAME with NAME of {known}")]
-    Unknown {
-        /// What was found.
-        name: String,
-        /// Names of all.
-        known: String,
-    },
+    Unknown { name: String, known: String },
     /// An effect is named twice.
     #[error("`{0}` is named twice; name each effect once")]
     Twice(&'static str),

@@ -7,33 +7,20 @@ use crate::bundle::WriteError;
 /// Why a finished run has no bundle.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "each message names its fields")]
 pub enum EncodeError {
     /// Even a small part of the scene is too much for the device.
     #[error(
         "the scene does not fit: with {n_anchors} anchors it takes {needed} bytes of {memory}, {available} are allowed; allow \
          more or train a narrower model (--feature-dim, --offsets)"
     )]
-    TooLarge {
-        /// RAM or flash.
-        memory: &'static str,
-        /// Bytes that are allowed.
-        available: u64,
-        /// Bytes that it takes.
-        needed: u64,
-        /// Anchors of the smallest scene tried.
-        n_anchors: usize,
-    },
+    TooLarge { memory: &'static str, available: u64, needed: u64, n_anchors: usize },
     /// A value or a count has no place in the format.
     #[error(transparent)]
     Write(#[from] WriteError),
     /// The decoder does not draw a training view of the coded scene.
     #[error("training view {view}: the coded scene cannot be drawn; please report it")]
-    Draw {
-        /// Name of the view.
-        view: String,
-        /// Why.
-        source: DecodeError,
-    },
+    Draw { view: String, source: DecodeError },
     /// The tiers of the coded scene cannot be measured or planned for.
     #[error("the tiers of the coded scene cannot be measured; please report it")]
     Measure(#[source] DecodeError),

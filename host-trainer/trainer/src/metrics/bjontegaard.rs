@@ -14,50 +14,25 @@ pub struct RatePoint {
 /// Why two curves cannot be compared.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "each message names its fields")]
 pub enum BjontegaardError {
     /// No curve.
     #[error("the {curve} curve has {found} points, needs 2 or more")]
-    TooFew {
-        /// Which curve, `reference` or `compared`.
-        curve: &'static str,
-        /// Its points.
-        found: usize,
-    },
+    TooFew { curve: &'static str, found: usize },
     /// A point without a place in the plane.
     #[error(
         "the {curve} curve has a point of {size_bytes} bytes and {psnr_db} dB, needs finite numbers, bytes above 0"
     )]
-    NotAPoint {
-        /// Which curve.
-        curve: &'static str,
-        /// Its size, bytes.
-        size_bytes: f64,
-        /// Its quality, dB.
-        psnr_db: f64,
-    },
+    NotAPoint { curve: &'static str, size_bytes: f64, psnr_db: f64 },
     /// More bytes for less quality: no function of quality goes through such points.
     #[error(
         "the {curve} curve does not rise: {} bytes give {} dB and {} bytes give {} dB; leave the worse point out",
         less.size_bytes, less.psnr_db, more.size_bytes, more.psnr_db
     )]
-    NotRising {
-        /// Which curve.
-        curve: &'static str,
-        /// The point of fewer bytes.
-        less: RatePoint,
-        /// The point of more bytes, which is no better.
-        more: RatePoint,
-    },
+    NotRising { curve: &'static str, less: RatePoint, more: RatePoint },
     /// Nothing to compare at.
     #[error("the curves have no {axis} in common: {reference:?} and {compared:?}; train points nearer to each other")]
-    NoOverlap {
-        /// Along which axis.
-        axis: &'static str,
-        /// First and last value of the reference.
-        reference: [f64; 2],
-        /// First and last value of the other.
-        compared: [f64; 2],
-    },
+    NoOverlap { axis: &'static str, reference: [f64; 2], compared: [f64; 2] },
 }
 
 /// BD-rate: how many more bytes `compared` takes for the same PSNR, percent; negative is better (Bjøntegaard 2001,

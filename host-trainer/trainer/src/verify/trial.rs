@@ -18,28 +18,17 @@ pub struct Trial {
 
 /// What must not happen.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "each message names its fields")]
 pub enum Breach {
     /// The decoder refused what was planned.
     #[error("the decoder refuses: {0}")]
     Refused(#[from] DecodeError),
     /// It wrote where it was given nothing.
     #[error("{n_bytes} bytes beside the {scratch_len} of the plan were written to")]
-    Outside {
-        /// Bytes that changed.
-        n_bytes: usize,
-        /// Bytes that were given.
-        scratch_len: usize,
-    },
+    Outside { n_bytes: usize, scratch_len: usize },
     /// A pixel came never, or more than once.
     #[error("pixel ({x}, {y}) was delivered {times} times, needed: once")]
-    Delivery {
-        /// Column.
-        x: usize,
-        /// Row.
-        y: usize,
-        /// How often.
-        times: u8,
-    },
+    Delivery { x: usize, y: usize, times: u8 },
 }
 
 impl Trial {

@@ -51,7 +51,7 @@ pub(crate) struct TrainResult {
 }
 
 pub(crate) fn run(args: &Args) -> Result<ExitCode> {
-    let (mut config, capture, folder) = match &args.resume {
+    let (mut config, capture, folder) = match args.resume() {
         Some(path) => {
             let folder = RunFolder::reopen(path)?;
             let begun = RunConfig::parse(&folder.config()?);
@@ -71,15 +71,15 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
             output::check_writable(&config.output)?;
             // Before the folder is touched: a capture that does not load must not cost an earlier run its results.
             let capture = load(&mut config)?;
-            let folder = RunFolder::start(&args.run_folder(&config)?, &config.to_toml()?, args.overwrite)?;
+            let folder = RunFolder::start(&args.run_folder(&config)?, &config.to_toml()?, args.overwrite())?;
             (config, capture, folder)
         }
     };
     effects::resolve(&mut config, &capture, folder.path())?;
     // Not before: until here there is nothing to keep, and Ctrl-C may end the process at once.
     let stop = stop::flag()?;
-    match train_in(folder, &config, &capture, args.resume.is_some(), &stop)? {
-        Some(result) => output::print(&result, args.json).map(|()| ExitCode::SUCCESS),
+    match train_in(folder, &config, &capture, args.resume().is_some(), &stop)? {
+        Some(result) => output::print(&result, args.json()).map(|()| ExitCode::SUCCESS),
         None => Ok(ExitCode::from(stop::INTERRUPTED)),
     }
 }

@@ -1,6 +1,6 @@
 //! The options of `pocketsplat train`, each of which may also stand in a configuration.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use bytesize::ByteSize;
@@ -31,7 +31,7 @@ pub(crate) struct Args {
     run: Option<PathBuf>,
     /// Print the result as JSON [default: as text]
     #[arg(long, help_heading = OUTPUT, hide_short_help = true)]
-    pub(super) json: bool,
+    json: bool,
     #[command(flatten)]
     quality: QualityOptions,
     #[arg(long, value_name = "X", help_heading = QUALITY,
@@ -44,10 +44,10 @@ pub(crate) struct Args {
     config: Option<PathBuf>,
     /// Run folder to go on in; a capture that has moved is given as DATASET.
     #[arg(long, value_name = "OUT.run", help_heading = RUN)]
-    pub(super) resume: Option<PathBuf>,
+    resume: Option<PathBuf>,
     /// Start anew where an unfinished run lies [default: refuse]
     #[arg(short = 'w', long, conflicts_with = "resume", help_heading = RUN)]
-    pub(super) overwrite: bool,
+    overwrite: bool,
     #[command(flatten)]
     options: RunOptions,
 }
@@ -78,6 +78,21 @@ impl DeviceArgs {
 }
 
 impl Args {
+    /// The run folder to go on in, if any.
+    pub(crate) fn resume(&self) -> Option<&Path> {
+        self.resume.as_deref()
+    }
+
+    /// Whether an unfinished run may be replaced.
+    pub(crate) fn overwrite(&self) -> bool {
+        self.overwrite
+    }
+
+    /// Whether the result is printed as JSON.
+    pub(crate) fn json(&self) -> bool {
+        self.json
+    }
+
     /// The configuration of a new run: defaults, then `--config`, then what else the command line says.
     pub(crate) fn resolved(&self) -> Result<RunConfig> {
         let base = match &self.config {

@@ -1,7 +1,7 @@
 //! The directory: the tiers, and one record a chunk.
 
 use super::header::Header;
-use crate::bytes::{Cursor, Emitter};
+use crate::bytes::{Cursor, Emitter, Fields};
 use crate::error::{DecodeError, Field, SectionKind, in_range};
 
 /// Length of a tier's record, bytes.
@@ -59,9 +59,9 @@ pub struct ChunkRecord {
 }
 
 impl Tier {
-    pub(super) fn parse(record: &[u8; TIER_RECORD_LEN]) -> Result<Self, DecodeError> {
-        let [n_chunks, n_anchors, end] = Cursor::new(record, SectionKind::Directory).u32s()?;
-        Ok(Self { n_chunks, n_anchors, end })
+    pub(super) fn parse(record: &[u8; TIER_RECORD_LEN]) -> Self {
+        let [n_chunks, n_anchors, end] = Fields::new(record).u32s();
+        Self { n_chunks, n_anchors, end }
     }
 
     /// The record's bytes: the reverse of `parse`.
@@ -83,8 +83,9 @@ impl InkFrame {
         [x + q_x * step_x, y + q_y * step_y, z + q_z * step_z]
     }
 
-    pub(super) fn parse(cursor: &mut Cursor<'_>) -> Result<Self, DecodeError> {
-        Ok(Self { min: cursor.f32s()?, step: cursor.f32s()? })
+    pub(super) fn parse(record: &[u8; INK_FRAME_LEN]) -> Self {
+        let mut fields = Fields::new(record);
+        Self { min: fields.f32s(), step: fields.f32s() }
     }
 
     /// The frame's bytes: the reverse of `parse`.
@@ -108,12 +109,12 @@ impl InkFrame {
 }
 
 impl ChunkRecord {
-    pub(super) fn parse(record: &[u8; CHUNK_RECORD_LEN]) -> Result<Self, DecodeError> {
-        let mut cursor = Cursor::new(record, SectionKind::Directory);
-        let [len, crc] = cursor.u32s()?;
-        let [n_anchors, reserved, low_x, low_y, low_z, high_x, high_y, high_z] = cursor.u16s()?;
-        in_range(Field::Reserved, reserved.into(), 0, 0)?;
-        Ok(Self { len, crc, n_anchors, low: [low_x, low_y, low_z], high: [high_x, high_y, high_z] })
+    /// The record, and what it has in reserve, which must be 0.
+    pub(super) fn parse(record: &[u8; CHUNK_RECORD_LEN]) -> (Self, u16) {
+        let mut fields = Fields::new(record);
+        let [len, crc] = fields.u32s();
+        let [n_anchors, reserved] = fields.u16s();
+        (Self { len, crc, n_anchors, low: fields.u16s(), high: fields.u16s() }, reserved)
     }
 
     /// The record's bytes: the reverse of `parse`.
@@ -142,7 +143,7 @@ impl<'a> Directory<'a> {
     pub(super) fn parse(section: &'a [u8], header: &Header, chunks_len: u32) -> Result<Self, DecodeError> {
         let mut cursor = Cursor::new(section, SectionKind::Directory);
         let (tiers, _) = cursor.bytes(usize::from(header.n_tiers).saturating_mul(TIER_RECORD_LEN))?.as_chunks();
-        let ink_frame = InkFrame::parse(&mut cursor)?;
+        let ink_frame = InkFrame::parse(cursor.record()?);
         ink_frame.check()?;
         let records_len = usize::try_from(header.n_chunks).unwrap_or(usize::MAX).saturating_mul(CHUNK_RECORD_LEN);
         let (records, _) = cursor.bytes(records_len)?.as_chunks();
@@ -155,14 +156,14 @@ impl<'a> Directory<'a> {
     /// Tier number `tier`.
     #[must_use]
     pub fn tier(&self, tier: u8) -> Option<Tier> {
-        Tier::parse(self.tiers.get(usize::from(tier))?).ok()
+        self.tiers.get(usize::from(tier)).map(Tier::parse)
     }
 
     /// The record of chunk number `index`.
     // Not inlined: every loop over chunks calls it.
     #[inline(never)]
     pub(super) fn record(&self, index: u32) -> Option<ChunkRecord> {
-        ChunkRecord::parse(self.records.get(index as usize)?).ok()
+        self.records.get(index as usize).map(|record| ChunkRecord::parse(record).0)
     }
 
     /// Tiers and chunks add up, chunk by chunk and tier by tier.
@@ -174,7 +175,8 @@ impl<'a> Directory<'a> {
             in_range(Field::TierChunks, stored.n_chunks, sums.n_chunks, header.n_chunks)?;
             let n_new = stored.n_chunks.saturating_sub(sums.n_chunks);
             for record in records.by_ref().take(n_new as usize) {
-                let record = ChunkRecord::parse(record)?;
+                let (record, reserved) = ChunkRecord::parse(record);
+                in_range(Field::Reserved, reserved.into(), 0, 0)?;
                 record.check(header)?;
                 sums.n_anchors = sums.n_anchors.saturating_add(record.n_anchors.into());
                 sums.end = sums.end.saturating_add(record.len);

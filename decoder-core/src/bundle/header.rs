@@ -2,7 +2,7 @@
 
 use super::features::Features;
 use super::section::{SECTION_LEN, Section};
-use crate::bytes::{Cursor, Emitter, crc32, crc32_of};
+use crate::bytes::{Cursor, Emitter, Fields, crc32, crc32_of};
 use crate::camera::Camera;
 use crate::context::N_GROUPS;
 use crate::error::{DecodeError, Field, SectionKind, in_range};
@@ -13,6 +13,8 @@ pub const MAGIC: [u8; 8] = *b"\x89PSB\r\n\x1a\n";
 pub const VERSION: u16 = 3;
 /// Length of the header's fields before the section table, bytes.
 pub const HEADER_FIXED_LEN: usize = 160;
+/// Length of those behind magic, version and length.
+const HEADER_FIELDS_LEN: usize = HEADER_FIXED_LEN - 12;
 /// Widest feature and hidden layer; bounds the work of an anchor.
 pub const MAX_FEATURE_DIM: u16 = 256;
 /// Most offsets, that is splats, of an anchor.
@@ -120,24 +122,23 @@ impl Header {
     /// Reads and checks the header; returns it with the section table.
     pub(super) fn parse(bytes: &[u8]) -> Result<(Self, &[[u8; SECTION_LEN]]), DecodeError> {
         let mut cursor = Cursor::new(bytes, SectionKind::Header);
-        if cursor.array() != Ok(MAGIC) {
+        if cursor.record() != Ok(&MAGIC) {
             return Err(DecodeError::NotABundle);
         }
-        let found = cursor.u16()?;
+        let [found, len] = Fields::new(cursor.record::<4>()?).u16s();
         if found != VERSION {
             return Err(DecodeError::UnsupportedVersion { found, supported: VERSION });
         }
-        let len = cursor.u16()?;
         let [least, most] = [MIN_SECTIONS, u8::MAX].map(|n| header_len(n) as u32);
         in_range(Field::HeaderLen, len.into(), least, most)?;
         let checked_len = usize::from(len).saturating_sub(4);
         let mut whole = Cursor::new(bytes, SectionKind::Header);
         let computed = crc32(whole.bytes(checked_len)?);
-        let stored = whole.u32()?;
+        let stored = Fields::new(whole.record::<4>()?).u32();
         if stored != computed {
             return Err(DecodeError::SectionChecksum { section: SectionKind::Header, stored, computed });
         }
-        let (header, n_sections) = Self::parse_fields(&mut cursor, len)?;
+        let (header, n_sections) = Self::parse_fields(cursor.record()?, len)?;
         let expected = header_len(n_sections) as u32;
         in_range(Field::HeaderLen, len.into(), expected, expected)?;
         let (table, _) = cursor.bytes(usize::from(n_sections).saturating_mul(SECTION_LEN))?.as_chunks();
@@ -185,30 +186,26 @@ impl Header {
         out.finish()
     }
 
-    fn parse_fields(cursor: &mut Cursor<'_>, header_len: u16) -> Result<(Self, u8), DecodeError> {
-        let file_len = cursor.u32()?;
-        let features = Features::from_bits(cursor.u32()?)?;
-        let _optional_features = cursor.u32()?;
-        let [feature_dim, n_offsets] = [cursor.u16()?, cursor.u16()?];
-        let [n_anchors, n_chunks] = [cursor.u32()?, cursor.u32()?];
-        let max_chunk_anchors = cursor.u16()?;
-        let [convention, n_sections] = cursor.array()?;
-        let training_px = [cursor.u16()?, cursor.u16()?];
-        let background = cursor.array()?;
-        let n_tiers = cursor.u8()?;
-        let voxel_size = cursor.f32()?;
-        let [colour_hidden, detail_hidden] = [cursor.u16()?, cursor.u16()?];
-        let normalisation_centre = [cursor.f64()?, cursor.f64()?, cursor.f64()?];
-        let normalisation_scale = cursor.f64()?;
-        let preview = Camera {
-            rotation: cursor.f32s()?,
-            translation: cursor.f32s()?,
-            focal_px: cursor.f32s()?,
-            principal_px: cursor.f32s()?,
-            width_px: cursor.u16()?,
-            height_px: cursor.u16()?,
-        };
-        let [feature_bits, log_scale_bits, offset_bits, reserved] = cursor.array()?;
+    fn parse_fields(record: &[u8; HEADER_FIELDS_LEN], header_len: u16) -> Result<(Self, u8), DecodeError> {
+        let mut fields = Fields::new(record);
+        let [file_len, features, _optional_features] = fields.u32s();
+        let features = Features::from_bits(features)?;
+        let [feature_dim, n_offsets] = fields.u16s();
+        let [n_anchors, n_chunks] = fields.u32s();
+        let max_chunk_anchors = fields.u16();
+        let [convention, n_sections] = fields.bytes();
+        let training_px = fields.u16s();
+        let background = fields.bytes();
+        let [n_tiers] = fields.bytes();
+        let voxel_size = fields.f32();
+        let [colour_hidden, detail_hidden] = fields.u16s();
+        let normalisation_centre = fields.f64s();
+        let [normalisation_scale] = fields.f64s();
+        let (rotation, translation) = (fields.f32s(), fields.f32s());
+        let (focal_px, principal_px) = (fields.f32s(), fields.f32s());
+        let [width_px, height_px] = fields.u16s();
+        let preview = Camera { rotation, translation, focal_px, principal_px, width_px, height_px };
+        let [feature_bits, log_scale_bits, offset_bits, reserved] = fields.bytes();
         in_range(Field::CameraConvention, convention.into(), 0, CONVENTION_OPENCV.into())?;
         in_range(Field::NSections, n_sections.into(), MIN_SECTIONS.into(), u8::MAX.into())?;
         in_range(Field::Reserved, reserved.into(), 0, 0)?;

@@ -68,6 +68,13 @@ pub struct HeadView<'a> {
     pub b2: Halves<'a>,
 }
 
+impl HeadView<'_> {
+    /// Weights of W1 and of W2.
+    fn matrix_sizes(&self) -> [usize; 2] {
+        [self.n_hidden.saturating_mul(self.n_in), self.n_out.saturating_mul(self.n_hidden)]
+    }
+}
+
 /// The heads of the file.
 #[derive(Clone, Copy, Debug)]
 pub struct HeadsView<'a> {
@@ -110,23 +117,22 @@ impl<'a> HeadsView<'a> {
         let has_detail = cfg!(feature = "detail") && effects.detail;
         let n_heads = if has_detail { 4 } else { 3 };
         let heads = all.get_mut(..n_heads).unwrap_or_default();
-        let matrices = if header.features.coded_heads {
-            let tables = CodedHeads::parse_tables(&mut cursor)?;
-            for head in heads.iter_mut() {
-                head.b1 = Halves::parse(&mut cursor, head.n_hidden)?;
-                head.b2 = Halves::parse(&mut cursor, head.n_out)?;
+        // Coded matrices follow the biases of all heads.
+        let coded = header.features.coded_heads;
+        let tables = if coded { Some(CodedHeads::parse_tables(&mut cursor)?) } else { None };
+        let mut matrices = [Halves::default(); N_MATRICES];
+        for (head, [w1, w2]) in heads.iter_mut().zip(matrices.as_chunks_mut().0) {
+            let [n1, n2] = if coded { [0; 2] } else { head.matrix_sizes() };
+            for (halves, n) in [(w1, n1), (&mut head.b1, head.n_hidden), (w2, n2), (&mut head.b2, head.n_out)] {
+                *halves = Halves::parse(&mut cursor, n)?;
             }
-            Matrices::Coded(CodedHeads::new(tables, cursor.rest())?)
-        } else {
-            let mut matrices = [Halves::default(); N_MATRICES];
-            for (head, [w1, w2]) in heads.iter_mut().zip(matrices.as_chunks_mut().0) {
-                *w1 = Halves::parse(&mut cursor, head.n_hidden.saturating_mul(head.n_in))?;
-                head.b1 = Halves::parse(&mut cursor, head.n_hidden)?;
-                *w2 = Halves::parse(&mut cursor, head.n_out.saturating_mul(head.n_hidden))?;
-                head.b2 = Halves::parse(&mut cursor, head.n_out)?;
+        }
+        let matrices = match tables {
+            Some(tables) => Matrices::Coded(CodedHeads::new(tables, cursor.rest())?),
+            None => {
+                cursor.end()?;
+                Matrices::Raw(matrices)
             }
-            cursor.end()?;
-            Matrices::Raw(matrices)
         };
         let [opacity, covariance, colour, detail] = all;
         let detail = has_detail.then_some(detail);
@@ -154,7 +160,7 @@ impl<'a> HeadsView<'a> {
     pub fn weights(&self) -> WeightReader<'a> {
         let mut sizes = [[0; 2]; N_MATRICES / 2];
         for (size, head) in sizes.iter_mut().zip(self.each()) {
-            *size = [head.n_hidden.saturating_mul(head.n_in), head.n_out.saturating_mul(head.n_hidden)];
+            *size = head.matrix_sizes();
         }
         WeightReader::new(&self.matrices, sizes)
     }

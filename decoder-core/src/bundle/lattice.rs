@@ -1,6 +1,6 @@
 //! The lattice section: where the cells of anchors may lie, and the model of which do.
 
-use crate::bytes::Cursor;
+use crate::bytes::{Cursor, Fields};
 use crate::entropy::{FREQUENCY_TOTAL, N_TRIE_CONTEXTS, TrieModel};
 use crate::error::{DecodeError, Field, SectionKind, in_range};
 
@@ -23,8 +23,9 @@ pub struct Lattice<'a> {
 impl<'a> Lattice<'a> {
     pub(super) fn parse(section: &'a [u8]) -> Result<Self, DecodeError> {
         let mut cursor = Cursor::new(section, SectionKind::Lattice);
-        let min = [cursor.i32()?, cursor.i32()?, cursor.i32()?];
-        let [bits, reserved @ ..] = cursor.array::<4>()?;
+        let mut fields = Fields::new(cursor.record::<16>()?);
+        let min = fields.i32s();
+        let [bits, reserved @ ..] = fields.bytes::<4>();
         for cell in min {
             in_range(Field::LatticeMin, cell.unsigned_abs(), 0, MAX_LATTICE_MIN)?;
         }

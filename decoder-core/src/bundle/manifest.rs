@@ -1,6 +1,6 @@
 //! The manifest: what each tier was measured to look like and to cost.
 
-use crate::bytes::{Cursor, Emitter};
+use crate::bytes::{Cursor, Emitter, Fields};
 use crate::error::{DecodeError, Field, SectionKind};
 
 /// Length of a tier's record, bytes.
@@ -44,23 +44,23 @@ pub struct TierMeasures {
 impl TierMeasures {
     /// Reads the record of tier number `tier`.
     pub(super) fn parse(record: &[u8; MANIFEST_RECORD_LEN], tier: u32) -> Result<Self, DecodeError> {
-        let mut cursor = Cursor::new(record, SectionKind::Manifest);
-        let psnr_bits = cursor.u32()?;
+        let mut fields = Fields::new(record);
+        let psnr_bits = fields.u32();
         let psnr_db = (psnr_bits != NOT_MEASURED).then_some(f32::from_bits(psnr_bits));
         if psnr_db.is_some_and(|psnr_db| !psnr_db.is_finite()) {
             return Err(DecodeError::BadFloat { field: Field::ManifestPsnr, index: tier });
         }
         Ok(Self {
             psnr_db,
-            n_views: cursor.u16()?,
-            n_cameras: cursor.u16()?,
-            max_visible_anchors: cursor.u32()?,
-            max_splats: cursor.u32()?,
-            max_strip_splats: cursor.u32s()?,
-            max_strip_pairs: cursor.u32s()?,
-            max_head_kilo_macs: cursor.u32()?,
-            max_kilo_pixels: cursor.u32()?,
-            max_decoded_anchors: cursor.u32()?,
+            n_views: fields.u16(),
+            n_cameras: fields.u16(),
+            max_visible_anchors: fields.u32(),
+            max_splats: fields.u32(),
+            max_strip_splats: fields.u32s(),
+            max_strip_pairs: fields.u32s(),
+            max_head_kilo_macs: fields.u32(),
+            max_kilo_pixels: fields.u32(),
+            max_decoded_anchors: fields.u32(),
         })
     }
 

@@ -1,6 +1,6 @@
 //! A row of the section table: where a section lies, and its checksum.
 
-use crate::bytes::{Cursor, Emitter, crc32};
+use crate::bytes::{Emitter, Fields, crc32};
 use crate::error::{DecodeError, Field, SectionKind, in_range, saturate};
 
 /// Length of a row of the section table, bytes.
@@ -24,10 +24,10 @@ pub struct Section {
 
 impl Section {
     pub(super) fn parse(row: &[u8; SECTION_LEN]) -> Result<Self, DecodeError> {
-        let mut cursor = Cursor::new(row, SectionKind::Header);
-        let [code, reserved @ ..] = cursor.array::<4>()?;
+        let mut fields = Fields::new(row);
+        let [code, reserved @ ..] = fields.bytes::<4>();
         in_range(Field::Reserved, u8::from(reserved != [0; 3]).into(), 0, 0)?;
-        let [offset, len, crc] = [cursor.u32()?, cursor.u32()?, cursor.u32()?];
+        let [offset, len, crc] = fields.u32s();
         Ok(Self { kind: kind_of(code)?, offset, len, crc })
     }
 

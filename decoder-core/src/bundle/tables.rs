@@ -4,7 +4,7 @@ mod index;
 
 pub(super) use index::{IndexedTable, IndexedTables};
 
-use crate::bytes::Cursor;
+use crate::bytes::{Cursor, Fields};
 use crate::entropy::{AnsReader, FREQUENCY_TOTAL, Slot, SymbolModel};
 use crate::error::{DecodeError, Field, SectionKind, in_range, saturate};
 
@@ -46,8 +46,7 @@ pub struct FrequencyTable<'a> {
 impl<'a> Tables<'a> {
     pub(super) fn parse(section: &'a [u8], n_channels: usize) -> Result<Self, DecodeError> {
         let mut cursor = Cursor::new(section, SectionKind::Tables);
-        let n_tables = cursor.u16()?;
-        let found_channels = cursor.u16()?;
+        let [n_tables, found_channels] = Fields::new(cursor.record::<4>()?).u16s();
         in_range(Field::NTables, n_tables.into(), 1, MAX_TABLES)?;
         in_range(Field::NChannels, found_channels.into(), saturate(n_channels), saturate(n_channels))?;
         let channel_tables = cursor.pairs(n_channels)?;
@@ -140,10 +139,11 @@ impl<'a> FrequencyTable<'a> {
 
     /// Reads a table; the section of `cursor` goes into errors.
     pub(super) fn parse(cursor: &mut Cursor<'a>) -> Result<Self, DecodeError> {
-        let [origin, step] = cursor.f32s()?;
-        let min_symbol = cursor.i16()?;
-        let n_symbols = cursor.u16()?;
-        Ok(Self { origin, step, min_symbol, bounds: cursor.pairs(usize::from(n_symbols).saturating_add(2))? })
+        let mut fields = Fields::new(cursor.record::<TABLE_HEAD_LEN>()?);
+        let [origin, step] = fields.f32s();
+        let [min_symbol, n_symbols] = fields.u16s();
+        let bounds = cursor.pairs(usize::from(n_symbols).saturating_add(2))?;
+        Ok(Self { origin, step, min_symbol: min_symbol.cast_signed(), bounds })
     }
 
     /// The table's bytes: the reverse of `parse`.

@@ -1,8 +1,8 @@
-//! The only code that turns bytes into numbers.
+//! Bytes taken off the front of a section.
 
 use crate::error::{DecodeError, SectionKind, saturate};
 
-/// Reads little-endian numbers one after the other and knows in which section it stands.
+/// Takes one part of a section after the other, and knows which section it is.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cursor<'a> {
     rest: &'a [u8],
@@ -34,12 +34,7 @@ impl<'a> Cursor<'a> {
         Err(DecodeError::WrongLength { section: self.section, expected, found })
     }
 
-    pub(crate) fn array<const N: usize>(&mut self) -> Result<[u8; N], DecodeError> {
-        let Some((head, rest)) = self.rest.split_first_chunk::<N>() else { return Err(self.truncated(N)) };
-        self.rest = rest;
-        Ok(*head)
-    }
-
+    /// The next `n` bytes.
     pub(crate) fn bytes(&mut self, n: usize) -> Result<&'a [u8], DecodeError> {
         let Some((head, rest)) = self.rest.split_at_checked(n) else { return Err(self.truncated(n)) };
         self.rest = rest;
@@ -52,57 +47,9 @@ impl<'a> Cursor<'a> {
         Ok(pairs)
     }
 
-    pub(crate) fn u8(&mut self) -> Result<u8, DecodeError> {
-        let [byte] = self.array()?;
-        Ok(byte)
-    }
-
-    pub(crate) fn u16(&mut self) -> Result<u16, DecodeError> {
-        Ok(u16::from_le_bytes(self.array()?))
-    }
-
-    pub(crate) fn i16(&mut self) -> Result<i16, DecodeError> {
-        Ok(i16::from_le_bytes(self.array()?))
-    }
-
-    pub(crate) fn u32(&mut self) -> Result<u32, DecodeError> {
-        Ok(u32::from_le_bytes(self.array()?))
-    }
-
-    pub(crate) fn i32(&mut self) -> Result<i32, DecodeError> {
-        Ok(i32::from_le_bytes(self.array()?))
-    }
-
-    pub(crate) fn f32(&mut self) -> Result<f32, DecodeError> {
-        Ok(f32::from_le_bytes(self.array()?))
-    }
-
-    pub(crate) fn f64(&mut self) -> Result<f64, DecodeError> {
-        Ok(f64::from_le_bytes(self.array()?))
-    }
-
-    pub(crate) fn u16s<const N: usize>(&mut self) -> Result<[u16; N], DecodeError> {
-        let mut numbers = [0; N];
-        for number in &mut numbers {
-            *number = self.u16()?;
-        }
-        Ok(numbers)
-    }
-
-    pub(crate) fn u32s<const N: usize>(&mut self) -> Result<[u32; N], DecodeError> {
-        let mut numbers = [0; N];
-        for number in &mut numbers {
-            *number = self.u32()?;
-        }
-        Ok(numbers)
-    }
-
-    pub(crate) fn f32s<const N: usize>(&mut self) -> Result<[f32; N], DecodeError> {
-        let mut floats = [0.0; N];
-        for x in &mut floats {
-            *x = self.f32()?;
-        }
-        Ok(floats)
+    /// A record of `N` bytes.
+    pub(crate) fn record<const N: usize>(&mut self) -> Result<&'a [u8; N], DecodeError> {
+        self.bytes(N)?.as_array().ok_or(DecodeError::Internal)
     }
 
     fn truncated(&self, n: usize) -> DecodeError {

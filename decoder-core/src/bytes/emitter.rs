@@ -1,4 +1,4 @@
-//! The only code that turns numbers into bytes: the reverse of [`Cursor`](super::Cursor).
+//! The only code that turns numbers into bytes: the reverse of [`Fields`](super::Fields).
 
 /// Writes little-endian numbers one after the other into a record of `N` bytes.
 pub(crate) struct Emitter<const N: usize> {

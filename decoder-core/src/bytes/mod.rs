@@ -8,8 +8,10 @@
 mod crc;
 mod cursor;
 mod emitter;
+mod fields;
 
 pub use crc::crc32;
 pub(crate) use crc::crc32_of;
 pub(crate) use cursor::Cursor;
 pub(crate) use emitter::Emitter;
+pub(crate) use fields::Fields;

@@ -14,7 +14,7 @@ pub use grid::{Corners, FEATURES_PER_LEVEL, GridFrame, GridLevel, LevelKind, WEI
 pub use mlp::{MAX_BIAS, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS};
 pub use steps::{Group, GroupStep, MAX_STEP_EXPONENT, MEAN_PARTS, MIN_STEP_EXPONENT, N_GROUPS, Steps};
 
-use crate::bytes::{Cursor, Emitter};
+use crate::bytes::{Cursor, Emitter, Fields};
 use crate::entropy::{EIGHTHS, NormalModel};
 use crate::error::{DecodeError, Field, SectionKind, in_range, saturate};
 use mlp::Layer;
@@ -59,19 +59,16 @@ pub struct Context<'a> {
 }
 
 impl ContextHead {
-    fn parse(cursor: &mut Cursor<'_>) -> Result<Self, DecodeError> {
-        let mut min = [0; 3];
-        for coordinate in &mut min {
-            *coordinate = cursor.i32()?;
-        }
-        let scale = cursor.u32s()?;
-        let base_steps = check_base_steps(cursor.f32s()?)?;
-        let [n_levels, reserved] = cursor.array()?;
+    fn parse(record: &[u8; HEAD_LEN]) -> Result<Self, DecodeError> {
+        let mut fields = Fields::new(record);
+        let frame = GridFrame { min: fields.i32s(), scale: fields.u32s() };
+        let base_steps = check_base_steps(fields.f32s())?;
+        let [n_levels, reserved] = fields.bytes();
         in_range(Field::Reserved, reserved.into(), 0, 0)?;
         in_range(Field::ContextLevels, n_levels.into(), 1, MAX_CONTEXT_LEVELS.into())?;
-        let n_hidden = cursor.u16()?;
+        let n_hidden = fields.u16();
         in_range(Field::ContextHidden, n_hidden.into(), 1, MAX_CONTEXT_HIDDEN.into())?;
-        Ok(Self { frame: GridFrame { min, scale }, base_steps, n_levels, n_hidden })
+        Ok(Self { frame, base_steps, n_levels, n_hidden })
     }
 
     /// Its bytes: the reverse of `parse`.
@@ -99,7 +96,7 @@ impl<'a> Context<'a> {
         n_channels: usize,
     ) -> Result<Self, DecodeError> {
         let mut cursor = Cursor::new(section, SectionKind::Context);
-        let ContextHead { frame, base_steps, n_levels, n_hidden } = ContextHead::parse(&mut cursor)?;
+        let ContextHead { frame, base_steps, n_levels, n_hidden } = ContextHead::parse(cursor.record()?)?;
         let n_levels = usize::from(n_levels);
         let n_hidden = usize::from(n_hidden);
         let (levels, _) = cursor.bytes(n_levels.saturating_mul(LEVEL_LEN))?.as_chunks();
@@ -287,9 +284,7 @@ const _: () = assert!(EIGHTHS == 8, "scale outputs and the tables count octaves 
 #[cfg(test)]
 mod tests {
     use super::{ContextHead, level};
-    use crate::bytes::Cursor;
     use crate::context::{GridFrame, GridLevel, LevelKind, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS};
-    use crate::error::SectionKind;
 
     #[test]
     fn heads_come_back() {
@@ -297,7 +292,7 @@ mod tests {
         for frame in frames {
             for (n_levels, n_hidden) in [(1, 1), (MAX_CONTEXT_LEVELS, MAX_CONTEXT_HIDDEN), (7, 99)] {
                 let head = ContextHead { frame, base_steps: [1.0, 0.125, 0.3], n_levels, n_hidden };
-                assert_eq!(ContextHead::parse(&mut Cursor::new(&head.emit(), SectionKind::Context)), Ok(head));
+                assert_eq!(ContextHead::parse(&head.emit()), Ok(head));
             }
         }
     }

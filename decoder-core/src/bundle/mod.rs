@@ -47,7 +47,6 @@ use crate::context::Context;
 use crate::entropy::MaskModel;
 use crate::error::{DecodeError, SectionKind, saturate};
 use gaussians::GaussianCounts;
-use sections::Sections;
 
 /// Where the models of the channels come from.
 #[derive(Clone, Copy, Debug)]
@@ -90,8 +89,8 @@ impl<'a> Bundle<'a> {
     #[inline(never)]
     pub fn parse(bytes: &'a [u8]) -> Result<Self, DecodeError> {
         let (header, section_table) = Header::parse(bytes)?;
-        let sections = Sections::parse(section_table, header.features, header.header_len, header.file_len, bytes)?;
-        Self::of_parts(header, section_table, &sections.bytes(bytes)?, sections.chunks.len)
+        let (sections, chunks_len) = SectionBytes::parse(section_table, &header, bytes)?;
+        Self::of_parts(header, section_table, &sections, chunks_len)
     }
 
     /// Checks sections that are in no file yet and returns the view of them, for a writer that measures a scene before it writes

@@ -54,47 +54,16 @@ impl<'a> SectionBytes<'a> {
         sections.fold(header_len, |sum, (_, bytes)| sum.saturating_add(bytes.len()))
     }
 
-    /// The sections as the file has them.
-    fn in_order(&self, features: Features) -> impl Iterator<Item = (SectionKind, &'a [u8])> + Clone + use<'a> {
-        let coder = if features.context { SectionKind::Context } else { SectionKind::Tables };
-        [
-            Some((SectionKind::Heads, self.heads)),
-            Some((SectionKind::Lattice, self.lattice)),
-            self.masks.map(|bytes| (SectionKind::Masks, bytes)),
-            Some((coder, self.coder)),
-            Some((SectionKind::Manifest, self.manifest)),
-            Some((SectionKind::Directory, self.directory)),
-            self.gaussians.map(|bytes| (SectionKind::Gaussians, bytes)),
-            Some((SectionKind::Chunks, self.chunks)),
-        ]
-        .into_iter()
-        .flatten()
-    }
-}
-
-/// Where the sections that a decoder reads lie.
-pub(super) struct Sections {
-    pub(super) heads: Section,
-    pub(super) lattice: Section,
-    pub(super) masks: Option<Section>,
-    /// Tables or context.
-    pub(super) coder: Section,
-    pub(super) manifest: Section,
-    pub(super) directory: Section,
-    pub(super) gaussians: Option<Section>,
-    pub(super) chunks: Section,
-}
-
-impl Sections {
-    /// Reads the table: sections follow the header in order, without gaps, and end at `file_len`. Compares the checksums
-    /// of those that are to be skipped.
+    /// Finds the sections in a file, and compares their checksums but for the chunks', which have their own; also returns the length
+    /// of the chunks, which go on to the end of the file, wherever that is.
+    ///
+    /// * `table`: its rows follow the header in order, without gaps, and end at `file_len`.
     pub(super) fn parse(
         table: &[[u8; SECTION_LEN]],
-        features: Features,
-        header_len: u16,
-        file_len: u32,
-        file: &[u8],
-    ) -> Result<Self, DecodeError> {
+        header: &Header,
+        file: &'a [u8],
+    ) -> Result<(Self, u32), DecodeError> {
+        let Header { features, file_len, header_len, .. } = *header;
         let mut rows = table.iter();
         let mut start = u32::from(header_len);
         let mut gaussians = None;
@@ -110,29 +79,29 @@ impl Sections {
                     return Err(DecodeError::Truncated { section: section.kind, needed: section.len, available });
                 };
                 start = end;
-                if section.kind == wanted {
-                    return Ok(section);
-                }
                 match section.kind {
-                    SectionKind::Gaussians if gaussians.is_none() => gaussians = Some(section),
-                    SectionKind::Other(_) => {}
+                    found if found == wanted => return Ok(section),
+                    SectionKind::Gaussians if gaussians.is_none() => gaussians = Some(section.bytes(file)?),
+                    SectionKind::Other(_) => _ = section.bytes(file)?,
                     found => return Err(DecodeError::UnexpectedSection { found, expected: wanted }),
                 }
-                section.bytes(file)?;
             }
             Err(DecodeError::MissingSection { section: wanted })
         };
+        let mut bytes_of = |wanted| next(wanted)?.bytes(file);
         let mut sections = Self {
+            heads: bytes_of(SectionKind::Heads)?,
+            lattice: bytes_of(SectionKind::Lattice)?,
+            masks: if features.masks { Some(bytes_of(SectionKind::Masks)?) } else { None },
+            coder: bytes_of(if features.context { SectionKind::Context } else { SectionKind::Tables })?,
+            manifest: bytes_of(SectionKind::Manifest)?,
+            directory: bytes_of(SectionKind::Directory)?,
             gaussians: None,
-            heads: next(SectionKind::Heads)?,
-            lattice: next(SectionKind::Lattice)?,
-            masks: if features.masks { Some(next(SectionKind::Masks)?) } else { None },
-            coder: next(if features.context { SectionKind::Context } else { SectionKind::Tables })?,
-            manifest: next(SectionKind::Manifest)?,
-            directory: next(SectionKind::Directory)?,
-            chunks: next(SectionKind::Chunks)?,
+            chunks: &[],
         };
+        let Section { offset, len, crc: stored, .. } = next(SectionKind::Chunks)?;
         sections.gaussians = gaussians;
+        sections.chunks = file.get(offset as usize..).unwrap_or_default();
         if let Some(row) = rows.next() {
             let Section { kind: found, .. } = Section::parse(row)?;
             return Err(DecodeError::UnexpectedSection { found, expected: SectionKind::Chunks });
@@ -140,25 +109,26 @@ impl Sections {
         if start != file_len {
             return Err(DecodeError::WrongLength { section: SectionKind::Chunks, expected: file_len, found: start });
         }
-        if sections.chunks.crc != 0 {
-            let stored = sections.chunks.crc;
+        if stored != 0 {
             return Err(DecodeError::SectionChecksum { section: SectionKind::Chunks, stored, computed: 0 });
         }
-        Ok(sections)
+        Ok((sections, len))
     }
 
-    /// The bytes of the sections, their checksums compared; those of the chunks go on to the end of the file, wherever that is.
-    pub(super) fn bytes<'a>(&self, file: &'a [u8]) -> Result<SectionBytes<'a>, DecodeError> {
-        let some = |section: &Option<Section>| section.as_ref().map(|section| section.bytes(file)).transpose();
-        Ok(SectionBytes {
-            heads: self.heads.bytes(file)?,
-            lattice: self.lattice.bytes(file)?,
-            masks: some(&self.masks)?,
-            coder: self.coder.bytes(file)?,
-            manifest: self.manifest.bytes(file)?,
-            directory: self.directory.bytes(file)?,
-            gaussians: some(&self.gaussians)?,
-            chunks: file.get(self.chunks.offset as usize..).unwrap_or_default(),
-        })
+    /// The sections as the file has them.
+    fn in_order(&self, features: Features) -> impl Iterator<Item = (SectionKind, &'a [u8])> + Clone + use<'a> {
+        let coder = if features.context { SectionKind::Context } else { SectionKind::Tables };
+        [
+            Some((SectionKind::Heads, self.heads)),
+            Some((SectionKind::Lattice, self.lattice)),
+            self.masks.map(|bytes| (SectionKind::Masks, bytes)),
+            Some((coder, self.coder)),
+            Some((SectionKind::Manifest, self.manifest)),
+            Some((SectionKind::Directory, self.directory)),
+            self.gaussians.map(|bytes| (SectionKind::Gaussians, bytes)),
+            Some((SectionKind::Chunks, self.chunks)),
+        ]
+        .into_iter()
+        .flatten()
     }
 }

@@ -59,7 +59,8 @@ impl<'a> Lattice<'a> {
     /// let lattice = Lattice { min: [-5, 0, 7], bits: 2, trie: TrieModel::new(&[]) };
     /// assert_eq!(lattice.cell(0b011_100), [-3, 2, 8]);
     /// ```
-    #[inline]
+    // Not inlined: it is long, and a symbol takes as long as a call.
+    #[inline(never)]
     #[must_use]
     pub fn cell(&self, code: u64) -> [i32; 3] {
         let [x, y, z] = self.min;

@@ -69,6 +69,13 @@ impl<'b> Bundle<'b> {
     /// # Budget
     /// With tables about 32 bisections each; with a context nothing.
     pub fn anchor_models<'s>(&self, scratch: &'s mut [u32]) -> Result<AnchorModels<'b, 's>, DecodeError> {
+        self.models(scratch, true)
+    }
+
+    /// The same.
+    ///
+    /// * `scaled`: if not, the value of a symbol is the symbol, so that a decoder needs no other reader for those.
+    fn models<'s>(&self, scratch: &'s mut [u32], scaled: bool) -> Result<AnchorModels<'b, 's>, DecodeError> {
         let [needed, available] = [self.anchor_scratch_words(), scratch.len()];
         let too_short = DecodeError::BufferTooShort {
             field: Field::ModelBuffer,
@@ -79,7 +86,7 @@ impl<'b> Bundle<'b> {
         let channels = match self.coder() {
             Coder::Static(tables) => {
                 let slots = bytemuck::try_cast_slice_mut(scratch).map_err(|_| DecodeError::Internal)?;
-                ChannelModels::Static(IndexedTables::new(tables, slots)?)
+                ChannelModels::Static(IndexedTables::new(tables, slots, scaled)?)
             }
             // What bundles were refused for is not linked, here and below.
             Coder::Context(_) if !cfg!(feature = "context") => return Err(DecodeError::Internal),
@@ -94,6 +101,7 @@ impl<'b> Bundle<'b> {
                     context: *context,
                     features: halves(features, context.n_inputs())?,
                     hidden: halves(hidden, context.n_hidden())?,
+                    scaled,
                     step_bits: 0,
                 })
             }
@@ -135,7 +143,8 @@ impl<'b, 's, 'm> AnchorReader<'b, 's, 'm> {
     }
 
     /// Where the next anchor stands; one call an anchor, before its channels.
-    #[inline]
+    // Not inlined: it has several callers, and an anchor's channels take a hundred times as long as a call.
+    #[inline(never)]
     pub fn site(&mut self) -> AnchorSite {
         self.code = self.codes.next(&mut self.symbols);
         let lattice = self.models.lattice.cell(self.code);

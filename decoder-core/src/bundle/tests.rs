@@ -236,7 +236,8 @@ fn anchors_in_memory_have_the_values_of_the_file() {
             scales: arena.take(bundle.tables().map_or(0, Tables::len)).expect("enough"),
         };
         let n_chunks = bundle.n_chunks() as usize;
-        let records = AnchorRecords::decode(&bundle, n_chunks, layout, memory, &mut [0; C], &mut models, false);
+        let mut words = vec![u32::MAX; bundle.anchor_scratch_words()];
+        let records = AnchorRecords::decode(&bundle, n_chunks, layout, memory, &mut [0.0; C], &mut words, false);
         let records = records.expect("sound");
         let mut index = 0;
         for chunk in bundle.chunks() {

@@ -88,6 +88,11 @@ impl Steps {
         self.exponents.iter().rev().fold(0, |bits, &exponent| (bits << 5) | u16::from(exponent as u8 & 31))
     }
 
+    /// The same for symbols that stand for themselves.
+    pub(crate) fn unscaled(self) -> Self {
+        Self { values: [1.0; N_GROUPS], ..self }
+    }
+
     /// The steps whose exponents [`to_bits`](Self::to_bits) gave.
     pub(crate) fn from_bits(base_steps: [f32; N_GROUPS], bits: u16) -> Self {
         // −24..=7 are 32 numbers, so five bits tell them apart: 0..=7 stand for themselves.

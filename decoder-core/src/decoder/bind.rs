@@ -112,10 +112,8 @@ fn decode_anchors<'b, 's>(
     models: ModelMemory<'_>,
     skip_damage: bool,
 ) -> Result<AnchorRecords<'b, 's>, DecodeError> {
-    let mut models = bundle.anchor_models(models.words)?;
-    let row = bytemuck::try_cast_slice_mut(row).unwrap_or_default();
     let n_chunks = shape.resident.n_chunks();
-    AnchorRecords::decode(bundle, n_chunks, shape.record_layout(), records, row, &mut models, skip_damage)
+    AnchorRecords::decode(bundle, n_chunks, shape.record_layout(), records, row, models.words, skip_damage)
 }
 
 /// Evaluates the Gaussians of the planned tiers into `baked`.

@@ -94,8 +94,8 @@ impl<'r> BitWriter<'r> {
 }
 
 /// Whether two's complement of `n` bits, 1 to 16, has the number.
-pub(super) const fn fits(number: i16, n: u32) -> bool {
-    let unused = 16_u32.wrapping_sub(n);
+pub(super) const fn fits(number: i32, n: u32) -> bool {
+    let unused = u32::BITS.wrapping_sub(n);
     number.wrapping_shl(unused).wrapping_shr(unused) == number
 }
 
@@ -141,7 +141,7 @@ mod tests {
                 writer.push(number.cast_unsigned().into(), n);
                 writer.finish();
                 let same = BitReader::new(&words).signed(n) == i32::from(number);
-                assert_eq!(same, fits(number, n), "{number} in {n} bits");
+                assert_eq!(same, fits(number.into(), n), "{number} in {n} bits");
             }
         }
     }

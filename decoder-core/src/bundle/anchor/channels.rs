@@ -21,6 +21,8 @@ pub(super) struct ContextModels<'b, 's> {
     pub(super) features: &'s mut [i16],
     /// `[n_hidden]`.
     pub(super) hidden: &'s mut [i16],
+    /// If not, the value of a symbol is the symbol.
+    pub(super) scaled: bool,
     /// The exponents of the steps of the anchor read last.
     pub(super) step_bits: u16,
 }
@@ -150,11 +152,12 @@ impl<'b> ContextModels<'b, '_> {
         watch: &mut impl Stopwatch,
     ) -> AnsReader<'b> {
         watch.enter(Stage::Context);
-        let Self { context, features, hidden, step_bits } = self;
+        let Self { context, features, hidden, scaled, step_bits } = self;
         context.features(site.lattice, features);
         context.hidden(features, hidden);
         let steps = context.steps(hidden);
         *step_bits = steps.to_bits();
+        let steps = if *scaled { steps } else { steps.unscaled() };
         let mut block = Block { moments: [[0; 2]; BLOCK], len: 0 };
         let n_scalars = scalars.len();
         let (feature, log_scales) = scalars.split_at_mut_checked(context.feature_dim()).unwrap_or_default();

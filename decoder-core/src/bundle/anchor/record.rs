@@ -86,7 +86,7 @@ impl RecordLayout {
     }
 
     /// Writes a record; says whether every symbol has a place in its bits.
-    fn write(&self, record: &mut [u16], symbols: &[i16], code: u64, mask: u32, steps: u16) -> bool {
+    fn write(&self, record: &mut [u16], symbols: &[f32], code: u64, mask: u32, steps: u16) -> bool {
         let mut writer = BitWriter::new(record);
         writer.push_wide(code, self.code_bits.into());
         writer.push_wide(mask.into(), self.mask_bits.into());
@@ -95,8 +95,9 @@ impl RecordLayout {
         for (n, bits) in self.groups {
             let (group, after) = rest.split_at_checked(n.into()).unwrap_or_default();
             for &symbol in group {
+                let symbol = symbol as i32;
                 sound &= fits(symbol, bits.into());
-                writer.push(symbol.cast_unsigned().into(), bits.into());
+                writer.push(symbol.cast_unsigned(), bits.into());
             }
             rest = after;
         }
@@ -108,8 +109,8 @@ impl RecordLayout {
 impl<'b, 's> AnchorRecords<'b, 's> {
     /// Decodes the first `n_chunks` chunks into `memory`.
     ///
-    /// * `row`: `[n_channels]` at least, for the symbols of the current anchor. * `skip_damage`: leaves damaged chunks out and
-    ///   remembers which.
+    /// * `row`: `[n_channels]` at least, for the symbols of the current anchor. * `scratch`: what the models of the symbols take.
+    ///   * `skip_damage`: leaves damaged chunks out and remembers which.
     ///
     /// # Errors
     /// [`DecodeError::ChunkChecksum`] or [`DecodeError::ChunkStream`] for damage that is not left out; a symbol beyond the
@@ -119,17 +120,18 @@ impl<'b, 's> AnchorRecords<'b, 's> {
         n_chunks: usize,
         layout: RecordLayout,
         memory: RecordMemory<'s>,
-        row: &mut [i16],
-        models: &mut AnchorModels<'b, '_>,
+        row: &mut [f32],
+        scratch: &mut [u32],
         skip_damage: bool,
     ) -> Result<Self, DecodeError> {
         let RecordMemory { records, damaged, scales } = memory;
+        let mut models = bundle.models(scratch, false)?;
         damaged.fill(0);
         let row = row.get_mut(..bundle.header().n_channels()).unwrap_or_default();
         // `max(1)`: a chunk size of zero would panic; there are always at least 5 channels.
         let mut slots = records.chunks_exact_mut(layout.len().max(1));
         for chunk in bundle.chunks().take(n_chunks) {
-            match decode_chunk(&chunk, &layout, &mut slots, row, models) {
+            match decode_chunk(&chunk, &layout, &mut slots, row, &mut models) {
                 Err(DecodeError::ChunkChecksum { .. } | DecodeError::ChunkStream { .. }) if skip_damage => {
                     let (word, bit) = place(chunk.index());
                     if let Some(word) = damaged.get_mut(word) {
@@ -170,6 +172,8 @@ impl<'b, 's> AnchorRecords<'b, 's> {
     ///
     /// # Budget
     /// A few shifts, a conversion and a multiplication a channel.
+    // On its own it gets the registers that it needs.
+    #[inline(never)]
     pub(crate) fn read(&self, index: u32, row: &mut [f32]) -> Option<AnchorSite> {
         let start = (index as usize).checked_mul(self.layout.len())?;
         let record = self.records.get(start..)?.get(..self.layout.len())?;
@@ -216,7 +220,7 @@ fn decode_chunk<'b, 'r>(
     chunk: &Chunk<'b>,
     layout: &RecordLayout,
     records: &mut impl Iterator<Item = &'r mut [u16]>,
-    row: &mut [i16],
+    row: &mut [f32],
     models: &mut AnchorModels<'b, '_>,
 ) -> Result<(), DecodeError> {
     let mut sound = chunk.check();
@@ -228,7 +232,7 @@ fn decode_chunk<'b, 'r>(
             available: n_done.into(),
         })?;
         let site = anchors.site();
-        anchors.symbols(row);
+        anchors.values(row);
         if !layout.write(record, row, anchors.code(), site.mask, anchors.step_bits()) && sound.is_ok() {
             sound = Err(DecodeError::ChunkStream { chunk: chunk.index(), left_bytes: 0 });
         }

@@ -67,9 +67,18 @@ impl IndexedTable {
 
 impl<'a, 's> IndexedTables<'a, 's> {
     /// Unpacks `tables` into `slots`, one each.
-    pub(in crate::bundle) fn new(tables: &Tables<'a>, slots: &'s mut [IndexedTable]) -> Result<Self, DecodeError> {
+    ///
+    /// * `scaled`: if not, the value of a symbol is the symbol.
+    pub(in crate::bundle) fn new(
+        tables: &Tables<'a>,
+        slots: &'s mut [IndexedTable],
+        scaled: bool,
+    ) -> Result<Self, DecodeError> {
         for (index, slot) in slots.iter_mut().enumerate() {
             *slot = IndexedTable::new(&tables.get(index).ok_or(DecodeError::Internal)?);
+            if !scaled {
+                (slot.origin, slot.step) = (0.0, 1.0);
+            }
         }
         Ok(Self { tables: *tables, indexed: slots })
     }

@@ -1,5 +1,6 @@
 //! What can be wrong with a capture as a whole.
 
+use std::fmt;
 use std::path::PathBuf;
 
 /// Why a capture cannot be loaded; each message names the place, what was found, what is needed and the remedy.
@@ -117,17 +118,18 @@ fn image_folder(wanted: Option<&str>, present: &[String]) -> String {
     }
 }
 
-/// How many faults a message spells out before it counts the rest.
-pub(super) const FAULTS_SPELT_OUT: usize = 3;
+/// How many items a message spells out before it counts the rest.
+const SPELT_OUT: usize = 3;
+
+/// The first items, and how many more there are.
+pub(super) fn first_few<T: fmt::Display>(items: &[T], separator: &str) -> String {
+    let mut texts: Vec<String> = items.iter().take(SPELT_OUT).map(T::to_string).collect();
+    if items.len() > SPELT_OUT {
+        texts.push(format!("… and {} more", items.len() - SPELT_OUT));
+    }
+    texts.join(separator)
+}
 
 fn list_faults(faults: &[String]) -> String {
-    let mut text = String::new();
-    for fault in faults.iter().take(FAULTS_SPELT_OUT) {
-        text.push_str("\n  ");
-        text.push_str(fault);
-    }
-    if faults.len() > FAULTS_SPELT_OUT {
-        text.push_str(&format!("\n  … and {} more", faults.len() - FAULTS_SPELT_OUT));
-    }
-    text
+    if faults.is_empty() { String::new() } else { format!("\n  {}", first_few(faults, "\n  ")) }
 }

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Deserialize;
 
-use super::error::FAULTS_SPELT_OUT;
+use super::error::first_few;
 use super::{Background, Layout, PointsOrigin, ViewFault};
 
 /// The part of a capture a view belongs to.
@@ -89,35 +89,24 @@ impl fmt::Display for LoadReport {
         let random = if self.points_origin == PointsOrigin::Random { "random " } else { "" };
         write!(f, ", on {}, {} {random}initial points", self.background, self.n_points)?;
         for split in [Split::Train, Split::Test] {
-            let of_split = || self.skipped.iter().filter(move |view| view.split == split);
-            let n_skipped = of_split().count();
-            if n_skipped > 0 {
-                write!(f, "\n{split} views left out: {n_skipped}")?;
-                for view in of_split().take(FAULTS_SPELT_OUT) {
-                    write!(f, "\n  {view}")?;
-                }
-                if n_skipped > FAULTS_SPELT_OUT {
-                    write!(f, "\n  … and {} more", n_skipped - FAULTS_SPELT_OUT)?;
-                }
+            let of_split: Vec<&SkippedView> = self.skipped.iter().filter(|view| view.split == split).collect();
+            if !of_split.is_empty() {
+                write!(f, "\n{split} views left out: {}\n  {}", of_split.len(), first_few(&of_split, "\n  "))?;
             }
         }
         if !self.unposed.is_empty() {
-            write!(f, "\nimages without a pose, not used: {} ({})", self.unposed.len(), first_few(&self.unposed))?;
+            write!(
+                f,
+                "\nimages without a pose, not used: {} ({})",
+                self.unposed.len(),
+                first_few(&self.unposed, ", ")
+            )?;
         }
         for note in &self.notes {
             write!(f, "\nnote: {note}")?;
         }
         Ok(())
     }
-}
-
-/// The first names, and how many more there are.
-pub(super) fn first_few(names: &[String]) -> String {
-    let mut text = names.iter().take(FAULTS_SPELT_OUT).map(String::as_str).collect::<Vec<_>>().join(", ");
-    if names.len() > FAULTS_SPELT_OUT {
-        text.push_str(&format!(", … and {} more", names.len() - FAULTS_SPELT_OUT));
-    }
-    text
 }
 
 #[cfg(test)]

@@ -6,8 +6,8 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
+use crate::dataset::error::first_few;
 use crate::dataset::listing::Shot;
-use crate::dataset::report::first_few;
 
 /// How much a finding matters; the worst compares smallest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -63,7 +63,7 @@ impl Finding {
         remedy: &str,
     ) -> Option<Self> {
         let names: Vec<String> = views.iter().map(|(name, _)| (*name).to_owned()).collect();
-        let message = format!("{what}: {} ({})", names.len(), first_few(&names));
+        let message = format!("{what}: {} ({})", names.len(), first_few(&names, ", "));
         let files = views.iter().map(|(_, shot)| shot.path.clone());
         let finding = Self::new(severity, code, message, remedy).files(files).number("views", names.len() as f64);
         (!views.is_empty()).then_some(finding)

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use super::{Finding, Severity};
 use crate::dataset::assemble::MIN_TRAIN_VIEWS;
+use crate::dataset::error::first_few;
 use crate::dataset::listing::{ListedView, Listing, commonest};
-use crate::dataset::report::first_few;
 use crate::dataset::{Layout, Split};
 
 /// With fewer views than this, most places are seen from too few sides to be more than guessed.
@@ -35,7 +35,8 @@ fn left_out(listing: &Listing, findings: &mut Vec<Finding>) {
     for (code, views) in by_code {
         let Some(Err(first)) = views.first().map(|view| &view.shot) else { continue };
         let names: Vec<String> = views.iter().map(|view| view.name.clone()).collect();
-        let text = format!("views left out: {} of {n_listed} ({}); the first: {first}", names.len(), first_few(&names));
+        let text =
+            format!("views left out: {} of {n_listed} ({}); the first: {first}", names.len(), first_few(&names, ", "));
         let paths = views.iter().filter_map(|view| view.shot.as_ref().err()?.path().map(PathBuf::from));
         let finding = Finding::told(Severity::Warning, code, &text).files(paths);
         findings.push(finding.number("views", names.len() as f64).number("listed", n_listed as f64));
@@ -65,7 +66,7 @@ fn counts(listing: &Listing, findings: &mut Vec<Finding>) {
 fn unposed(listing: &Listing, findings: &mut Vec<Finding>) {
     let n = listing.unposed.len();
     if n > 0 {
-        let message = format!("images without a pose: {n} ({})", first_few(&listing.unposed));
+        let message = format!("images without a pose: {n} ({})", first_few(&listing.unposed, ", "));
         let remedy = "they are not used; reconstruct again with more matches if they are needed";
         let files = listing.unposed.iter().map(PathBuf::from);
         let finding = Finding::new(Severity::Warning, "unposed-image", message, remedy).files(files);
@@ -82,7 +83,7 @@ fn repeated_names(listing: &Listing, findings: &mut Vec<Finding>) {
         .filter_map(|names| names.first().map(|name| (*name).to_owned()))
         .collect();
     if !repeated.is_empty() {
-        let message = format!("images listed more than once: {} ({})", repeated.len(), first_few(&repeated));
+        let message = format!("images listed more than once: {} ({})", repeated.len(), first_few(&repeated, ", "));
         let remedy = "list each image once; the copies weigh more in training and may be in both splits";
         let finding = Finding::new(Severity::Warning, "repeated-image", message, remedy);
         findings.push(finding.number("images", repeated.len() as f64).files(repeated.iter().map(PathBuf::from)));

@@ -51,3 +51,20 @@ impl Camera {
         }
     }
 }
+
+/// The point nearest to all optical axes, in the least-squares sense: it solves `Σ(I − d·dᵀ)·p = Σ(I − d·dᵀ)·c` over axes
+/// `c + s·d`.
+///
+/// `None` where the mean of `I − d·dᵀ` has a determinant of no more than `least_determinant`, as for parallel axes.
+pub fn nearest_to_axes<'a>(cameras: impl Iterator<Item = &'a Camera>, least_determinant: f64) -> Option<DVec3> {
+    let (mut n, mut across_sum, mut across_centres) = (0, DMat3::ZERO, DVec3::ZERO);
+    for camera in cameras {
+        let axis = camera.rotation.row(2);
+        let across = DMat3::IDENTITY - DMat3::from_cols(axis * axis.x, axis * axis.y, axis * axis.z);
+        n += 1;
+        across_sum += across;
+        across_centres += across * camera.centre_world();
+    }
+    let mean = across_sum * (1.0 / f64::from(n));
+    (mean.determinant() > least_determinant).then(|| across_sum.inverse() * across_centres)
+}

@@ -1,11 +1,11 @@
 //! Random initial points where the cameras look, for captures that bring no points.
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
 use super::EXTENT;
-use crate::camera::Camera;
+use crate::camera::{Camera, nearest_to_axes};
 
 /// Half the side of the cube of points, in half-widths of the cameras' view at the focus.
 ///
@@ -64,19 +64,10 @@ fn depth(camera: &Camera, point: DVec3) -> f64 {
     (camera.rotation * point + camera.translation).z
 }
 
-/// The point nearest to all optical axes: it solves `Σ(I − d·dᵀ)·p = Σ(I − d·dᵀ)·c` over axes `c + s·d`.
-///
-/// `None` where the axes do not fix it or it is not in front of at least three quarters of the cameras.
+/// The point nearest to all optical axes; `None` where the axes do not fix it or it is not in front of at least three quarters
+/// of the cameras.
 fn focus(cameras: &[&Camera]) -> Option<DVec3> {
-    let (mut across_sum, mut across_centres) = (DMat3::ZERO, DVec3::ZERO);
-    for camera in cameras {
-        let axis = camera.rotation.transpose() * DVec3::Z;
-        let across = DMat3::IDENTITY - DMat3::from_cols(axis * axis.x, axis * axis.y, axis * axis.z);
-        across_sum += across;
-        across_centres += across * camera.centre_world();
-    }
-    let mean = across_sum * (1.0 / cameras.len() as f64);
-    let point = (mean.determinant() > MIN_DETERMINANT).then(|| across_sum.inverse() * across_centres)?;
+    let point = nearest_to_axes(cameras.iter().copied(), MIN_DETERMINANT)?;
     let n_in_front = cameras.iter().filter(|camera| depth(camera, point) > 0.0).count();
     (4 * n_in_front >= 3 * cameras.len()).then_some(point)
 }
@@ -95,6 +86,8 @@ fn cube_half(cameras: &[&Camera], focus: DVec3) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use glam::DMat3;
+
     use super::*;
 
     fn camera(rotation: DMat3, centre: DVec3) -> Camera {

@@ -2,30 +2,21 @@
 
 use std::f64::consts::TAU;
 
-use glam::{DMat3, DVec3};
-
-use pocketsplat_capture::camera::Camera;
+use glam::DVec3;
+use pocketsplat_capture::camera::{Camera, nearest_to_axes};
 
 /// Cameras of the orbit.
 const N_CAMERAS: u32 = 24;
+/// As [`nearest_to_axes`] takes it.
+const MIN_DETERMINANT: f64 = 1e-6;
 
 /// Cameras with the first one's lens, as far from the scene and as high above it as the given ones are on average.
 ///
-/// The centre is the point nearest to all optical axes, in the least-squares sense: Σ (I − dᵢdᵢᵀ)·p = Σ (I − dᵢdᵢᵀ)·cᵢ.
-/// Parallel axes have no such point; then there is no orbit.
+/// The centre is the point nearest to all optical axes. Parallel axes have no such point; then there is no orbit.
 pub(super) fn around(cameras: &[Camera]) -> Vec<Camera> {
     let Some(first) = cameras.first() else { return Vec::new() };
     let n = cameras.len() as f64;
-    let across = |camera: &Camera| {
-        let forward = camera.rotation.row(2);
-        DMat3::IDENTITY - DMat3::from_cols(forward * forward.x, forward * forward.y, forward * forward.z)
-    };
-    let normal: DMat3 = cameras.iter().map(across).fold(DMat3::ZERO, |sum, m| sum + m);
-    let right: DVec3 = cameras.iter().map(|camera| across(camera) * camera.centre_world()).sum();
-    if normal.determinant().abs() < 1e-6 * n.powi(3) {
-        return Vec::new();
-    }
-    let centre = normal.inverse() * right;
+    let Some(centre) = nearest_to_axes(cameras.iter(), MIN_DETERMINANT) else { return Vec::new() };
     let up = cameras.iter().map(|camera| -camera.rotation.row(1)).sum::<DVec3>().normalize_or(DVec3::Z);
     let height = cameras.iter().map(|camera| (camera.centre_world() - centre).dot(up)).sum::<f64>() / n;
     let distance = cameras.iter().map(|camera| camera.centre_world().distance(centre)).sum::<f64>() / n;

@@ -93,6 +93,16 @@ pub trait Real:
     );
 }
 
+/// Methods of [`Real`] that floats have by the same names.
+macro_rules! as_of_floats {
+    ($($name:ident -> $output:ty),*) => {
+        $(#[inline(always)]
+        fn $name(self) -> $output {
+            self.$name()
+        })*
+    };
+}
+
 macro_rules! real {
     ($t:ty, $gemm:path, $exp:expr, $log2:expr) => {
         impl Real for $t {
@@ -108,29 +118,10 @@ macro_rules! real {
                 $exp(self)
             }
             #[inline(always)]
-            fn ln(self) -> Self {
-                self.ln()
-            }
-            #[inline(always)]
             fn log2(self) -> Self {
                 $log2(self)
             }
-            #[inline(always)]
-            fn round_ties_even(self) -> Self {
-                self.round_ties_even()
-            }
-            #[inline(always)]
-            fn sqrt(self) -> Self {
-                self.sqrt()
-            }
-            #[inline(always)]
-            fn abs(self) -> Self {
-                self.abs()
-            }
-            #[inline(always)]
-            fn is_finite(self) -> bool {
-                self.is_finite()
-            }
+            as_of_floats!(ln -> Self, round_ties_even -> Self, sqrt -> Self, abs -> Self, is_finite -> bool);
             #[expect(unsafe_code, reason = "see the trait")]
             unsafe fn gemm(
                 [m, k, n]: [usize; 3],

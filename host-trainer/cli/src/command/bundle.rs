@@ -6,8 +6,7 @@ use anyhow::{Context, Result, bail};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Background, Capture, View};
 use pocketsplat_core::Bundle;
-use pocketsplat_core::bundle::AnchorSite;
-use pocketsplat_trainer::bundle::normalisation_of;
+use pocketsplat_trainer::bundle::{for_each_chunk, normalisation_of};
 
 use super::capture::CaptureArgs;
 use crate::config::CaptureOptions;
@@ -71,18 +70,10 @@ impl BundleFile {
     /// Entropy-decodes every chunk once, as a decoder that keeps its anchors in memory would; returns the number of Gaussians
     /// that there are to draw: the offsets that no mask takes away.
     pub(crate) fn decode_all(&self, bundle: &Bundle<'_>) -> Result<u64> {
-        let header = bundle.header();
-        let n_chunk = usize::from(header.max_chunk_anchors);
-        let mut words = vec![0; bundle.anchor_scratch_words()];
-        let mut models = bundle.anchor_models(&mut words)?;
-        let mut sites = vec![AnchorSite::default(); n_chunk];
-        let mut symbols = vec![0i16; n_chunk * header.n_channels()];
         let mut n_drawn = 0;
-        for chunk in bundle.chunks() {
-            let n = usize::from(chunk.n_anchors());
-            chunk.decode_symbols(&mut models, &mut sites[..n], &mut symbols[..n * header.n_channels()])?;
-            n_drawn += sites[..n].iter().map(|site| u64::from(site.mask.count_ones())).sum::<u64>();
-        }
+        for_each_chunk(bundle, |_, sites, _| {
+            n_drawn += sites.iter().map(|site| u64::from(site.mask.count_ones())).sum::<u64>();
+        })?;
         Ok(n_drawn)
     }
 }

@@ -129,32 +129,15 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 /// Times that a bundle is decoded to measure how long it takes.
 const DECODES: usize = 3;
 
-/// One drawn view.
-struct Frame {
+/// One drawn view and how it compares.
+struct DrawnView {
     image: Image,
     seconds: f64,
     scratch_bytes: usize,
-}
-
-/// One drawn view and how it compares.
-struct Row {
-    frame: Frame,
     psnr_db: f64,
     ssim: f64,
     psnr_to_reference_db: f64,
     half_size_copy_psnr_db: f64,
-}
-
-fn draw(bundle: &Bundle<'_>, reference: Option<&ReferenceScene>, camera: &Camera) -> Result<Frame> {
-    let started = Instant::now();
-    let (image, scratch_bytes) = match reference {
-        None => {
-            let frame = core_image(bundle, camera)?;
-            (frame.image, frame.scratch_bytes)
-        }
-        Some(scene) => (reference_image(bundle, scene, camera), 0),
-    };
-    Ok(Frame { image, seconds: started.elapsed().as_secs_f64(), scratch_bytes })
 }
 
 /// The f64 reference's frame on the bundle's background, 8 bit.
@@ -207,36 +190,39 @@ pub(crate) fn evaluate(
     } else {
         None
     };
-    let rows: Vec<Row> = views
+    let rows: Vec<DrawnView> = views
         .par_iter()
         .map(|view| {
             let camera = file.camera(&bundle, &loaded, view);
-            let drawn_by = oracle.as_ref().filter(|_| renderer == Renderer::Reference);
-            let frame = draw(&bundle, drawn_by, &camera)?;
+            let started = Instant::now();
+            let (image, scratch_bytes) = match oracle.as_ref().filter(|_| renderer == Renderer::Reference) {
+                Some(scene) => (reference_image(&bundle, scene, &camera), 0),
+                None => core_image(&bundle, &camera).map(|frame| (frame.image, frame.scratch_bytes))?,
+            };
+            let seconds = started.elapsed().as_secs_f64();
             let to_reference = match oracle.as_ref().filter(|_| against_reference) {
-                Some(scene) => psnr_db(&frame.image, &reference_image(&bundle, scene, &camera)),
+                Some(scene) => psnr_db(&image, &reference_image(&bundle, scene, &camera)),
                 None => f64::INFINITY,
             };
-            Ok(Row {
-                psnr_db: psnr_db_masked(&frame.image, &view.image, view.mask.as_ref()),
-                ssim: ssim_masked(&frame.image, &view.image, view.mask.as_ref()),
+            let psnr_db = |image: &Image| psnr_db_masked(image, &view.image, view.mask.as_ref());
+            Ok(DrawnView {
+                seconds,
+                scratch_bytes,
+                psnr_db: psnr_db(&image),
+                ssim: ssim_masked(&image, &view.image, view.mask.as_ref()),
                 psnr_to_reference_db: to_reference,
-                half_size_copy_psnr_db: psnr_db_masked(
-                    &half_size_enlarged(&view.image),
-                    &view.image,
-                    view.mask.as_ref(),
-                ),
-                frame,
+                half_size_copy_psnr_db: psnr_db(&half_size_enlarged(&view.image)),
+                image,
             })
         })
         .collect::<Result<_>>()?;
     // One view after another: the features of a view fill hundreds of bytes a pixel, and fill every thread by themselves.
     let mean_lpips = |lpips: &Lpips| -> Result<f64> {
-        let distance = |(row, view): (&Row, &View)| lpips.distance(&row.frame.image, &view.image, view.mask.as_ref());
+        let distance = |(row, view): (&DrawnView, &View)| lpips.distance(&row.image, &view.image, view.mask.as_ref());
         let of_views = rows.iter().zip(views).map(distance).collect::<Result<Vec<_>, _>>()?;
         Ok(of_views.iter().sum::<f64>() / of_views.len() as f64)
     };
-    let mean = |value: fn(&Row) -> f64| rows.iter().map(value).sum::<f64>() / rows.len() as f64;
+    let mean = |value: fn(&DrawnView) -> f64| rows.iter().map(value).sum::<f64>() / rows.len() as f64;
     Ok(Evaluation {
         psnr_db: mean(|row| row.psnr_db),
         ssim: mean(|row| row.ssim),
@@ -253,8 +239,8 @@ pub(crate) fn evaluate(
         height_px: views[0].image.height_px,
         background: options.options.background.map_or_else(String::new, |b| b.to_string()),
         decode_s,
-        render_s_per_view: mean(|row| row.frame.seconds),
-        scratch_bytes: rows.iter().map(|row| row.frame.scratch_bytes).max().unwrap_or(0),
+        render_s_per_view: mean(|row| row.seconds),
+        scratch_bytes: rows.iter().map(|row| row.scratch_bytes).max().unwrap_or(0),
         tiers: if per_tier { tiers(file, &bundle, &loaded, views)? } else { Vec::new() },
         psnr_to_reference_db: against_reference
             .then(|| rows.iter().map(|row| row.psnr_to_reference_db).fold(f64::INFINITY, f64::min)),

@@ -1,6 +1,6 @@
 //! A bundle as a scene again.
 
-use pocketsplat_core::bundle::{AnchorSite, HeadView};
+use pocketsplat_core::bundle::{AnchorSite, Chunk, HeadView};
 use pocketsplat_core::{Bundle, DecodeError};
 
 use crate::scene::{Anchors, Head, Heads, INITIAL_MASK_LOGIT, ModelShape, Scene};
@@ -27,6 +27,27 @@ pub fn shape_of(bundle: &Bundle<'_>) -> ModelShape {
 pub fn normalisation_of(bundle: &Bundle<'_>) -> Normalisation {
     let header = bundle.header();
     Normalisation { centre: header.normalisation_centre.into(), scale: header.normalisation_scale }
+}
+
+/// Entropy-decodes a bundle chunk by chunk, and hands on each chunk's sites and symbols, `[n]` and `[n, n_channels]`.
+///
+/// # Errors
+/// [`DecodeError`] of the first chunk that does not decode.
+pub fn for_each_chunk(
+    bundle: &Bundle<'_>,
+    mut decoded: impl FnMut(&Chunk<'_>, &[AnchorSite], &[i16]),
+) -> Result<(), DecodeError> {
+    let (n_most, n_channels) = (usize::from(bundle.header().max_chunk_anchors), bundle.header().n_channels());
+    let mut words = vec![0; bundle.anchor_scratch_words()];
+    let mut models = bundle.anchor_models(&mut words)?;
+    let (mut sites, mut symbols) = (vec![AnchorSite::default(); n_most], vec![0; n_most * n_channels]);
+    for chunk in bundle.chunks() {
+        let n = usize::from(chunk.n_anchors());
+        let (sites, symbols) = (&mut sites[..n], &mut symbols[..n * n_channels]);
+        chunk.decode_symbols(&mut models, sites, symbols)?;
+        decoded(&chunk, sites, symbols);
+    }
+    Ok(())
 }
 
 /// The scene that a bundle draws, its values as the decoder has them; anchors are in file order.

@@ -31,7 +31,7 @@ mod write;
 mod tests;
 
 pub use channels::ChannelName;
-pub use decoded::{decoded_heads, decoded_scene, normalisation_of, shape_of};
+pub use decoded::{decoded_heads, decoded_scene, for_each_chunk, normalisation_of, shape_of};
 pub use error::WriteError;
 pub use layout::{CodedScene, Written};
 pub use load::{LoadError, load};

@@ -1,10 +1,10 @@
 //! Where the bytes of a bundle went.
 
-use pocketsplat_core::bundle::AnchorSite;
 use pocketsplat_core::{Bundle, DecodeError, SectionKind};
 
 use super::PartBits;
 use super::chunk::{ChunkRows, Models};
+use super::decoded::for_each_chunk;
 
 /// Bytes of a bundle by what they hold; all of them together are the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
@@ -93,20 +93,13 @@ impl SizeReport {
 
     fn add_chunks(&mut self, bundle: &Bundle<'_>) -> Result<(), DecodeError> {
         let coders = Models::of(bundle);
-        let mut words = vec![0; bundle.anchor_scratch_words()];
-        let mut decoders = bundle.anchor_models(&mut words)?;
-        for chunk in bundle.chunks() {
-            let n = usize::from(chunk.n_anchors());
-            let mut sites = vec![AnchorSite::default(); n];
-            let mut symbols = vec![0; n * bundle.header().n_channels()];
-            chunk.decode_symbols(&mut decoders, &mut sites, &mut symbols)?;
+        for_each_chunk(bundle, |chunk, sites, symbols| {
             let lattice: Vec<[i32; 3]> = sites.iter().map(|site| site.lattice).collect();
             let drawn: Vec<u32> = sites.iter().map(|site| site.mask).collect();
             self.n_drawn_offsets += drawn.iter().map(|drawn| drawn.count_ones() as usize).sum::<usize>();
             self.streams += chunk.n_bytes();
-            self.ideal += coders.slots(ChunkRows { lattice: &lattice, drawn: &drawn, symbols: &symbols }).bits;
-        }
-        Ok(())
+            self.ideal += coders.slots(ChunkRows { lattice: &lattice, drawn: &drawn, symbols }).bits;
+        })
     }
 
     fn fixed_bytes(&self) -> usize {

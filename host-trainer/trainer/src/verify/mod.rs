@@ -104,14 +104,15 @@ pub fn memory_does_not_show(bundle: &Bundle<'_>, plan: Plan, camera: &Camera) ->
 pub fn variants_match(bundle: &Bundle<'_>, budget: Budget, camera: &Camera) -> Result<(), Violation> {
     let draw = |budget: &Budget| -> Result<Trial, Breach> { Trial::run(bundle, bundle.plan(budget)?, camera, 0, 0) };
     let scene = |r: &FrameReport| (r.splats, r.tile_splats, r.pixel_splats);
+    // With less memory for splats than the view has, what a strip has no place for differs between variants.
+    let both_whole = |a: &Trial, b: &Trial| a.report.splats_dropped == 0 && b.report.splats_dropped == 0;
+    let differ = |a: &Trial, b: &Trial| both_whole(a, b) && (&a.rgb, scene(&a.report)) != (&b.rgb, scene(&b.report));
     let expected = draw(&budget.in_bytes(usize::MAX)).map_err(|breach| breach.to_string())?;
     let mut expected_of_halves: Option<Trial> = None;
     for variant in plan_variants(bundle, budget) {
         let Budget { residency, strips, .. } = variant;
         let drawn = draw(&variant).map_err(|breach| format!("{residency:?}, {strips:?}: {breach}"))?;
-        // With less memory for splats than the view has, what a strip has no place for differs between variants.
-        let whole = expected.report.splats_dropped == 0 && drawn.report.splats_dropped == 0;
-        if whole && (&drawn.rgb, scene(&drawn.report)) != (&expected.rgb, scene(&expected.report)) {
+        if differ(&drawn, &expected) {
             return Err(format!("{residency:?}, {strips:?}: another frame"));
         }
         if drawn.report.anchors_decoded > 0 && residency != Residency::Streamed {
@@ -121,15 +122,14 @@ pub fn variants_match(bundle: &Bundle<'_>, budget: Budget, camera: &Camera) -> R
         let few = MaxSplats::AtMost((drawn.report.max_splats / 3).max(1));
         let in_slabs = draw(&variant.with_max_splats(few).with_overflow(Overflow::Slabs));
         let in_slabs = in_slabs.map_err(|breach| format!("{residency:?}, {strips:?}, slabs: {breach}"))?;
-        if whole && in_slabs.report.splats_dropped == 0 && in_slabs.rgb != expected.rgb {
+        if both_whole(&drawn, &expected) && both_whole(&drawn, &in_slabs) && in_slabs.rgb != expected.rgb {
             return Err(format!("{residency:?}, {strips:?}, {} slabs: another frame", in_slabs.report.slabs));
         }
         let Some(plan) = halves(bundle, &variant) else { continue };
         let drawn = Trial::run(bundle, plan, camera, 0, 0)
             .map_err(|breach| format!("{residency:?}, {strips:?}, heads in halves: {breach}"))?;
         let expected = expected_of_halves.get_or_insert_with(|| drawn.clone());
-        let whole = expected.report.splats_dropped == 0 && drawn.report.splats_dropped == 0;
-        if whole && (&drawn.rgb, scene(&drawn.report)) != (&expected.rgb, scene(&expected.report)) {
+        if differ(&drawn, expected) {
             return Err(format!("{residency:?}, {strips:?}, heads in halves: another frame"));
         }
     }

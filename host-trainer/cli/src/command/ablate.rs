@@ -34,7 +34,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "NAMES", value_delimiter = ',', help_heading = RUN)]
     rows: Vec<String>,
     /// List the rows and stop.
-    #[arg(long, help_heading = RUN)]
+    #[arg(long, exclusive = true, help_heading = RUN)]
     list: bool,
     /// Seeds that `none` and `all` are trained with, to show what a seed alone changes.
     #[arg(long, default_value_t = 3, help_heading = RUN)]

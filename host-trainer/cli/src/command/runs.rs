@@ -30,8 +30,8 @@ pub(super) struct RunsArgs {
     #[command(flatten)]
     capture: CaptureOptions,
     /// Folder for the bundles, their run folders and the results.
-    #[arg(short, long, value_name = "DIR", help_heading = OUTPUT)]
-    pub(super) output: PathBuf,
+    #[arg(short, long, value_name = "DIR", required = true, help_heading = OUTPUT)]
+    output: Option<PathBuf>,
     #[command(flatten)]
     quality: QualityOptions,
     /// Configuration to read, as a run folder has it; options beside it count more.
@@ -89,13 +89,15 @@ impl RunsArgs {
     pub(super) fn base(&self) -> Result<RunConfig> {
         let absolute =
             |path: &Path| std::path::absolute(path).with_context(|| format!("`{}` is no path", path.display()));
+        // An option that stands alone, as `ablate --list`, comes without it.
+        let output = self.output.as_deref().context("no folder for the runs; give --output")?;
         let config = match &self.config {
             Some(path) => RunConfig::read(path)?,
             None => RunConfig { train: TrainConfig::of(Backbone::Hac), ..RunConfig::default() },
         };
         let dataset = absolute(self.dataset.as_deref().unwrap_or(&config.dataset))?;
         let effects = EffectsConfig { auto: false, ..config.effects };
-        let config = RunConfig { dataset, output: absolute(&self.output)?, effects, ..config };
+        let config = RunConfig { dataset, output: absolute(output)?, effects, ..config };
         let config = applied(&self.capture, &self.quality, &self.run, config)?;
         if config.effects.auto {
             bail!(

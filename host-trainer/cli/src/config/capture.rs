@@ -17,8 +17,7 @@ pub(crate) struct CaptureOptions {
     #[arg(long, value_name = "WxH", conflicts_with = "max_resolution", help_heading = INPUT)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) resolution: Option<FrameSize>,
-    /// Colour behind transparent images: black, white, or learned with the scene [default: black for train, the bundle's
-    /// elsewhere]
+    /// Colour behind transparent images; learned is trained with the scene [default: black for train, the bundle's elsewhere]
     #[arg(long, value_name = "COLOUR", value_parser = one_of::<Background>(BACKGROUNDS), help_heading = INPUT)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) background: Option<Background>,

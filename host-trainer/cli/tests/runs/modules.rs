@@ -101,3 +101,10 @@ fn an_ablation_keeps_what_is_done_and_compares_it_with_the_backbone_alone() {
     let error = fails(&mut ablate("sharpening"));
     assert!(error.contains("sharpening"), "{error}");
 }
+
+#[test]
+fn the_rows_of_an_ablation_are_listed_without_a_capture() {
+    let listed = pocketsplat().args(["ablate", "--list"]).output().unwrap();
+    let rows = text(&listed.stdout);
+    assert!(listed.status.success() && rows.starts_with("none ") && rows.contains("\ntiered-80 "), "{rows}");
+}

@@ -34,7 +34,7 @@ pub enum IntegerModelError {
 }
 
 /// One row of a layer in integers.
-struct Row {
+struct IntegerRow {
     /// Bits of the fraction of its weights.
     weight_bits: i32,
     weights: Vec<i8>,
@@ -91,8 +91,8 @@ pub fn section(model: &ContextModel<f32>, n_channels: usize) -> Result<Vec<u8>, 
 /// As [`section`].
 pub fn rounded(model: &ContextModel<f32>, n_channels: usize) -> Result<Head<f32>, IntegerModelError> {
     let [hidden, output] = rows(model, n_channels)?;
-    let weights = |layer: &[Row]| -> Vec<f32> {
-        let row = |row: &Row| {
+    let weights = |layer: &[IntegerRow]| -> Vec<f32> {
+        let row = |row: &IntegerRow| {
             let unit = power_of_two(-row.weight_bits) as f32;
             row.weights.iter().map(move |weight| f32::from(*weight) * unit).collect::<Vec<_>>()
         };
@@ -103,7 +103,7 @@ pub fn rounded(model: &ContextModel<f32>, n_channels: usize) -> Result<Head<f32>
 }
 
 /// Both layers in integers.
-fn rows(model: &ContextModel<f32>, n_channels: usize) -> Result<[Vec<Row>; 2], IntegerModelError> {
+fn rows(model: &ContextModel<f32>, n_channels: usize) -> Result<[Vec<IntegerRow>; 2], IntegerModelError> {
     let mlp = &model.mlp;
     // Fraction bits of what goes in and of what comes out.
     let layer = |weights: &[f32], n_in: usize, biases: &[f32], bits_in: i32, bits_out: &dyn Fn(usize) -> i32| {
@@ -124,7 +124,7 @@ fn integer_row(
     bias: f32,
     bits_in: i32,
     bits_out: i32,
-) -> Result<Row, IntegerModelError> {
+) -> Result<IntegerRow, IntegerModelError> {
     let largest = weights.iter().fold(0.0_f32, |largest, weight| largest.max(weight.abs()));
     if let Some(&value) = weights.iter().chain([&bias]).find(|w| !w.is_finite()) {
         return Err(IntegerModelError::Weight { row: index, value });
@@ -141,7 +141,7 @@ fn integer_row(
     let half = if shift > 0 { 1 << (shift - 1) } else { 0 };
     let weights = weights.iter().map(|w| (f64::from(*w) * power_of_two(weight_bits)).round() as i8).collect();
     let bias = (f64::from(bias) * power_of_two(weight_bits + bits_in)).round() as i32 + half;
-    Ok(Row { weight_bits, weights, bias, shift: shift as u8 })
+    Ok(IntegerRow { weight_bits, weights, bias, shift: shift as u8 })
 }
 
 fn power_of_two(exponent: i32) -> f64 {

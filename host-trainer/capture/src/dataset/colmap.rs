@@ -24,12 +24,12 @@ const MAX_QUATERNION_DEVIATION: f64 = 1e-2;
 
 /// How a model's files are written.
 #[derive(Clone, Copy)]
-enum Encoding {
+enum ModelEncoding {
     Binary,
     Text,
 }
 
-impl Encoding {
+impl ModelEncoding {
     fn extension(self) -> &'static str {
         match self {
             Self::Binary => "bin",
@@ -39,11 +39,12 @@ impl Encoding {
 }
 
 /// The folder of the model and how it is written, told by its list of cameras or of images.
-fn model_of(folder: &Path) -> Option<(PathBuf, Encoding)> {
+fn model_of(folder: &Path) -> Option<(PathBuf, ModelEncoding)> {
     let folders = MODEL_FOLDERS.iter().map(|name| folder.join(name));
     folders.into_iter().find_map(|model| {
-        let encodings = [Encoding::Binary, Encoding::Text];
-        let is_there = |stem: &str, encoding: Encoding| model.join(stem).with_extension(encoding.extension()).is_file();
+        let encodings = [ModelEncoding::Binary, ModelEncoding::Text];
+        let is_there =
+            |stem: &str, encoding: ModelEncoding| model.join(stem).with_extension(encoding.extension()).is_file();
         let found = encodings.into_iter().find(|&e| is_there("cameras", e) || is_there("images", e))?;
         Some((model, found))
     })
@@ -120,14 +121,14 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
 /// Reads one file of the model in either encoding.
 fn read<T>(
     path: &Path,
-    encoding: Encoding,
+    encoding: ModelEncoding,
     binary: fn(&[u8]) -> Result<T, ModelFault>,
     text: fn(&str) -> Result<T, ModelFault>,
 ) -> Result<T, DatasetError> {
     let cannot_read = |source| DatasetError::Read { path: path.to_owned(), source };
     let parsed = match encoding {
-        Encoding::Binary => binary(&std::fs::read(path).map_err(cannot_read)?),
-        Encoding::Text => text(&std::fs::read_to_string(path).map_err(cannot_read)?),
+        ModelEncoding::Binary => binary(&std::fs::read(path).map_err(cannot_read)?),
+        ModelEncoding::Text => text(&std::fs::read_to_string(path).map_err(cannot_read)?),
     };
     parsed.map_err(|fault| DatasetError::Model { path: path.to_owned(), place: fault.place, found: fault.found })
 }

@@ -8,7 +8,7 @@ use super::{Background, Image, Mask};
 
 /// What an image file says about itself before its pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Header {
+pub(super) struct ImageHeader {
     /// Width and height as stored, pixels.
     pub(super) size_px: (u32, u32),
     /// Whether there is an alpha channel.
@@ -21,12 +21,12 @@ pub(super) struct Header {
 ///
 /// # Errors
 /// What the decoder or the system said, for people.
-pub(super) fn read_header(path: &Path) -> Result<Header, String> {
+pub(super) fn read_header(path: &Path) -> Result<ImageHeader, String> {
     let reader = ::image::ImageReader::open(path).and_then(|reader| reader.with_guessed_format());
     let decoder = reader.map_err(|error| error.to_string())?.into_decoder();
     let mut decoder = decoder.map_err(|error| error.to_string())?;
     let exif_orientation = decoder.orientation().map_or(1, |orientation| orientation.to_exif());
-    Ok(Header { size_px: decoder.dimensions(), has_alpha: decoder.color_type().has_alpha(), exif_orientation })
+    Ok(ImageHeader { size_px: decoder.dimensions(), has_alpha: decoder.color_type().has_alpha(), exif_orientation })
 }
 
 /// Decodes a mask: black pixels do not count.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DVec3};
 
-use super::image::Header;
+use super::image::ImageHeader;
 use super::lens::Lens;
 use super::{Layout, Split, ViewFault};
 
@@ -59,7 +59,7 @@ pub(super) struct ListedView {
 #[derive(Clone)]
 pub(super) struct Shot {
     pub(super) path: PathBuf,
-    pub(super) header: Header,
+    pub(super) header: ImageHeader,
     /// World to camera, OpenCV axes.
     pub(super) rotation: DMat3,
     pub(super) translation: DVec3,

@@ -11,7 +11,7 @@ const MAX_HEADER_BYTES: usize = 1 << 16;
 
 /// How the numbers are written.
 #[derive(Clone, Copy, PartialEq)]
-enum Encoding {
+enum PlyEncoding {
     Ascii,
     Little,
     Big,
@@ -26,8 +26,8 @@ struct Scalar {
 }
 
 /// The vertices as the header describes them.
-struct Layout {
-    encoding: Encoding,
+struct PlyLayout {
+    encoding: PlyEncoding,
     n_vertices: usize,
     properties: Vec<Scalar>,
     /// Which properties are x, y and z.
@@ -47,7 +47,7 @@ fn parse(bytes: &[u8]) -> Result<Vec<DVec3>, String> {
     let (header, body) = split_header(bytes)?;
     let layout = read_layout(header)?;
     match layout.encoding {
-        Encoding::Ascii => ascii_points(&layout, body),
+        PlyEncoding::Ascii => ascii_points(&layout, body),
         _ => binary_points(&layout, body),
     }
 }
@@ -66,16 +66,16 @@ fn split_header(bytes: &[u8]) -> Result<(&str, &[u8]), String> {
     Ok((header, &bytes[end + line_end + 1..]))
 }
 
-fn read_layout(header: &str) -> Result<Layout, String> {
+fn read_layout(header: &str) -> Result<PlyLayout, String> {
     let mut encoding = None;
     let mut n_vertices = None;
     let (mut names, mut properties) = (Vec::new(), Vec::new());
     for line in header.lines() {
         let words: Vec<&str> = line.split_whitespace().collect();
         match words.as_slice() {
-            ["format", "ascii", _] => encoding = Some(Encoding::Ascii),
-            ["format", "binary_little_endian", _] => encoding = Some(Encoding::Little),
-            ["format", "binary_big_endian", _] => encoding = Some(Encoding::Big),
+            ["format", "ascii", _] => encoding = Some(PlyEncoding::Ascii),
+            ["format", "binary_little_endian", _] => encoding = Some(PlyEncoding::Little),
+            ["format", "binary_big_endian", _] => encoding = Some(PlyEncoding::Big),
             ["format", other, ..] => return Err(format!("has the unknown format `{other}`")),
             ["element", "vertex", count] => {
                 n_vertices = Some(count.parse::<usize>().map_err(|_| format!("has `{count}` vertices"))?);
@@ -106,10 +106,10 @@ fn read_layout(header: &str) -> Result<Layout, String> {
         at.ok_or_else(|| format!("has no floating-point property `{axis}`"))
     };
     let xyz = [index("x")?, index("y")?, index("z")?];
-    Ok(Layout { encoding, n_vertices, properties, xyz })
+    Ok(PlyLayout { encoding, n_vertices, properties, xyz })
 }
 
-fn ascii_points(layout: &Layout, body: &[u8]) -> Result<Vec<DVec3>, String> {
+fn ascii_points(layout: &PlyLayout, body: &[u8]) -> Result<Vec<DVec3>, String> {
     let text = std::str::from_utf8(body).map_err(|_| "is not text although its format is `ascii`")?;
     let mut points = Vec::new();
     for line in text.lines().take(layout.n_vertices) {
@@ -126,7 +126,7 @@ fn ascii_points(layout: &Layout, body: &[u8]) -> Result<Vec<DVec3>, String> {
     Ok(points)
 }
 
-fn binary_points(layout: &Layout, body: &[u8]) -> Result<Vec<DVec3>, String> {
+fn binary_points(layout: &PlyLayout, body: &[u8]) -> Result<Vec<DVec3>, String> {
     let n_bytes: usize = layout.properties.iter().map(|scalar| scalar.n_bytes).sum();
     let held = body.len() / n_bytes;
     // Before anything is reserved, so that a hostile count costs nothing.
@@ -138,7 +138,7 @@ fn binary_points(layout: &Layout, body: &[u8]) -> Result<Vec<DVec3>, String> {
         let bytes = &vertex[start(property)..][..layout.properties[property].n_bytes];
         let mut little = [0; 8];
         little[..bytes.len()].copy_from_slice(bytes);
-        if layout.encoding == Encoding::Big {
+        if layout.encoding == PlyEncoding::Big {
             little[..bytes.len()].reverse();
         }
         let [a, b, c, d, ..] = little;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::image::{Header, read_header};
+use super::image::{ImageHeader, read_header};
 use super::lens::Lens;
 use super::listing::{Shot, is_image_name};
 use super::pose::world_to_camera;
@@ -78,7 +78,7 @@ impl Frame {
 
     /// The lens for the image as it is stored: the frame's own numbers before the shared ones, the focal length before
     /// the field of view, the middle of the image where no principal point is given.
-    fn lens(&self, path: &Path, header: &Header, shared: &Intrinsics) -> Result<Lens, ViewFault> {
+    fn lens(&self, path: &Path, header: &ImageHeader, shared: &Intrinsics) -> Result<Lens, ViewFault> {
         let either = |number: fn(&Intrinsics) -> Option<f64>| number(&self.own).or_else(|| number(shared));
         let size_px = match (either(|i| i.w), either(|i| i.h)) {
             (Some(w), Some(h)) => {

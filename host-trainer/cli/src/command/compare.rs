@@ -26,7 +26,7 @@ pub(crate) struct Args {
 
 /// One line of runs.csv.
 #[derive(Debug, Serialize)]
-struct Line {
+struct RunLine {
     /// The key that is turned, for colours; empty for the first run.
     #[serde(skip)]
     knob: String,
@@ -65,7 +65,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     output::print_text(&String::from_utf8(table)?)
 }
 
-fn line(run: &Path, config: &RunConfig, first: &RunConfig) -> Result<Line> {
+fn line(run: &Path, config: &RunConfig, first: &RunConfig) -> Result<RunLine> {
     let path = run.join("result.json");
     let result =
         std::fs::read(&path).with_context(|| format!("could not read {}: is the run finished?", path.display()))?;
@@ -73,7 +73,7 @@ fn line(run: &Path, config: &RunConfig, first: &RunConfig) -> Result<Line> {
         .with_context(|| format!("{} does not say what the run took; train it anew", path.display()))?;
     let evaluation = point::measured(config, None)?;
     let (knob, setting) = named(&first.differences(config)?);
-    Ok(Line {
+    Ok(RunLine {
         knob,
         run: run.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
         setting,
@@ -114,7 +114,7 @@ fn knob_of(key: &str) -> String {
     }
 }
 
-fn panel(title: &str, unit: &str, lines: &[Line], cost: fn(&Line) -> f64) -> CostPanel {
+fn panel(title: &str, unit: &str, lines: &[RunLine], cost: fn(&RunLine) -> f64) -> CostPanel {
     let front = on_front(&lines.iter().map(|line| (cost(line), line.psnr_db)).collect::<Vec<_>>());
     let points = lines.iter().zip(front).map(|(line, on_front)| CostPoint {
         knob: line.knob.clone(),

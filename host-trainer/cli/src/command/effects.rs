@@ -6,7 +6,7 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use pocketsplat_capture::dataset::Capture;
 use pocketsplat_trainer::device::Processor;
-use pocketsplat_trainer::effects::{Effect, PilotCapture, Trials, measure};
+use pocketsplat_trainer::effects::{Effect, PilotCapture, Pilots, measure};
 use serde::Serialize;
 
 use crate::config::RunConfig;
@@ -18,7 +18,7 @@ const TABLE: &str = "effects.csv";
 
 /// One line of the table.
 #[derive(Serialize)]
-struct Line {
+struct PilotLine {
     effects: String,
     #[serde(rename = "PSNR")]
     psnr_db: f64,
@@ -60,8 +60,8 @@ pub(crate) fn resolve(config: &mut RunConfig, capture: &Capture, folder: &Path) 
     Ok(())
 }
 
-fn lines(trials: &Trials) -> impl Iterator<Item = Line> {
-    trials.each.iter().map(|trial| Line {
+fn lines(trials: &Pilots) -> impl Iterator<Item = PilotLine> {
+    trials.each.iter().map(|trial| PilotLine {
         effects: Effect::names(&trial.effects),
         psnr_db: trial.worth.psnr_db,
         gain_db: trial.gain_db,
@@ -73,7 +73,7 @@ fn lines(trials: &Trials) -> impl Iterator<Item = Line> {
     })
 }
 
-fn table(trials: &Trials, target: Processor) -> String {
+fn table(trials: &Pilots, target: Processor) -> String {
     let width = trials.each.iter().map(|trial| Effect::names(&trial.effects).len()).max().unwrap_or(0);
     let mut text = format!(
         "  {:width$}  PSNR, dB  gain, dB  price, dB  instructions, M    bytes  (of pilots, on a {target:?})\n",

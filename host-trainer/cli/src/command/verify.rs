@@ -53,7 +53,7 @@ pub(crate) struct Args {
 
 /// One law over all that it was tried on.
 #[derive(Serialize)]
-struct Row {
+struct Law {
     law: &'static str,
     trials: usize,
     /// What was found, or the first violation.
@@ -69,7 +69,7 @@ struct Verification {
     n_tiers: u8,
     pruning_rate: f32,
     n_views: usize,
-    laws: Vec<Row>,
+    laws: Vec<Law>,
     /// CRC-32 of each view's pixels, what a device's frame can be compared with.
     frames: Vec<String>,
 }
@@ -164,12 +164,12 @@ fn largest(cameras: &[Camera]) -> FrameSize {
     FrameSize { width_px: most(|camera| camera.width_px), height_px: most(|camera| camera.height_px) }
 }
 
-fn law(law: &'static str, trials: impl Iterator<Item = Result<(), Violation>>) -> Row {
+fn law(law: &'static str, trials: impl Iterator<Item = Result<(), Violation>>) -> Law {
     with_most(law, trials.map(|trial| trial.map(|()| 0))).0
 }
 
 /// A law whose trials return numbers, with the largest of these.
-fn with_most(law: &'static str, trials: impl Iterator<Item = Result<usize, Violation>>) -> (Row, usize) {
+fn with_most(law: &'static str, trials: impl Iterator<Item = Result<usize, Violation>>) -> (Law, usize) {
     let (mut n, mut most, mut first) = (0, 0, None);
     for trial in trials {
         n += 1;
@@ -179,13 +179,13 @@ fn with_most(law: &'static str, trials: impl Iterator<Item = Result<usize, Viola
         }
     }
     let holds = first.is_none();
-    (Row { law, trials: n, finding: first.unwrap_or_default(), holds }, most)
+    (Law { law, trials: n, finding: first.unwrap_or_default(), holds }, most)
 }
 
 /// How much of the plan the fullest view needs; only views that the manifest was measured over can be asked for it.
-fn used(most: usize, plan: &Plan, measured: bool) -> Row {
+fn used(most: usize, plan: &Plan, measured: bool) -> Law {
     let share = most as f64 / plan.scratch_len() as f64;
-    Row {
+    Law {
         law: "the planned bytes are needed",
         trials: 1,
         finding: format!("{most} of {} bytes, {:.1} %", plan.scratch_len(), 100.0 * share),
@@ -194,7 +194,7 @@ fn used(most: usize, plan: &Plan, measured: bool) -> Row {
 }
 
 /// Each tier's frames against the f64 reference's.
-fn reference_law(file: &BundleFile, bundle: &Bundle<'_>, n_tiers: u8, cameras: &[Camera]) -> Result<Row> {
+fn reference_law(file: &BundleFile, bundle: &Bundle<'_>, n_tiers: u8, cameras: &[Camera]) -> Result<Law> {
     let chunks_at = bundle.sections().last().map_or(0, |section| section.offset as usize);
     let (mut lowest, mut trials) = (f64::INFINITY, 0);
     for tier in (0..n_tiers).filter_map(|tier| bundle.tier(tier)) {
@@ -207,7 +207,7 @@ fn reference_law(file: &BundleFile, bundle: &Bundle<'_>, n_tiers: u8, cameras: &
         }
     }
     let finding = format!("{lowest:.1} dB at least, needed {MIN_REFERENCE_DB}");
-    Ok(Row { law: "frames are the f64 reference's", trials, finding, holds: lowest >= MIN_REFERENCE_DB })
+    Ok(Law { law: "frames are the f64 reference's", trials, finding, holds: lowest >= MIN_REFERENCE_DB })
 }
 
 fn table(verification: &Verification) -> String {
@@ -219,7 +219,7 @@ fn table(verification: &Verification) -> String {
         verification.scratch_bytes,
         verification.n_views
     );
-    for Row { law, trials, finding, holds } in &verification.laws {
+    for Law { law, trials, finding, holds } in &verification.laws {
         text += &format!("{:<6}{trials:>5}  {law}", if *holds { "holds" } else { "BROKEN" });
         text += &if finding.is_empty() { "\n".to_owned() } else { format!(": {finding}\n") };
     }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use pocketsplat_core::bundle::InkFrame;
 use pocketsplat_core::rules::INK_DEVIATIONS;
 
-use super::quantise::Rows;
+use super::quantise::SymbolRows;
 use crate::scene::ModelShape;
 
 /// Rounding of a float32 and then some, relative to the largest coordinate.
@@ -25,7 +25,7 @@ impl InkBox {
     ///
     /// Every drawn offset counts, with the ball of 3.33 times its anchor's largest base scale: the heads may open any of
     /// them in some view, and sigmoid(·) < 1 only makes them smaller.
-    pub(super) fn of(rows: &Rows, anchors: Range<usize>, shape: &ModelShape, voxel_size: f32) -> Self {
+    pub(super) fn of(rows: &SymbolRows, anchors: Range<usize>, shape: &ModelShape, voxel_size: f32) -> Self {
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         for anchor in anchors {
             let (row, [_, log_scale_step, offset_step]) = (rows.symbols_of(anchor), rows.steps[anchor]);

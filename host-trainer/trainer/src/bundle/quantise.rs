@@ -19,7 +19,7 @@ pub(super) enum StepSource<'c> {
 }
 
 /// The anchors of a bundle as integers, in file order.
-pub(super) struct Rows {
+pub(super) struct SymbolRows {
     pub(super) n_channels: usize,
     /// `[n]`.
     pub(super) lattice: Vec<[i32; 3]>,
@@ -31,7 +31,7 @@ pub(super) struct Rows {
     pub(super) steps: Vec<[f32; 3]>,
 }
 
-impl Rows {
+impl SymbolRows {
     /// The symbols of anchor `anchor`.
     pub(super) fn symbols_of(&self, anchor: usize) -> &[i16] {
         &self.symbols[anchor * self.n_channels..][..self.n_channels]
@@ -88,7 +88,11 @@ pub fn check_steps(steps: QuantisationSteps) -> Result<(), WriteError> {
 ///
 /// # Errors
 /// [`WriteError::NotFinite`], [`WriteError::BeyondSymbols`].
-pub(super) fn quantise(scene: &Scene<f32>, placement: &Placement, steps: StepSource<'_>) -> Result<Rows, WriteError> {
+pub(super) fn quantise(
+    scene: &Scene<f32>,
+    placement: &Placement,
+    steps: StepSource<'_>,
+) -> Result<SymbolRows, WriteError> {
     let n_channels = scene.shape.values_per_anchor();
     let lattice: Vec<[i32; 3]> = placement.order.iter().map(|&anchor| scene.anchors.lattice[anchor]).collect();
     let parts = placement.chunks.par_iter().map(|chunk| {
@@ -107,7 +111,7 @@ pub(super) fn quantise(scene: &Scene<f32>, placement: &Placement, steps: StepSou
         }
         Ok(rows)
     });
-    let mut rows = Rows {
+    let mut rows = SymbolRows {
         n_channels,
         lattice: Vec::new(),
         drawn: placement.drawn.clone(),
@@ -118,7 +122,7 @@ pub(super) fn quantise(scene: &Scene<f32>, placement: &Placement, steps: StepSou
         rows.symbols.extend(symbols);
         rows.steps.extend(steps);
     }
-    Ok(Rows { lattice, ..rows })
+    Ok(SymbolRows { lattice, ..rows })
 }
 
 /// Appends the symbols of one anchor of the scene.

@@ -8,7 +8,7 @@ use histogram::Histogram;
 use pocketsplat_core::bundle::{FrequencyTable, Tables};
 
 use super::channels::ChannelName;
-use super::quantise::Rows;
+use super::quantise::SymbolRows;
 use crate::scene::ModelShape;
 
 /// The tables of a bundle and which channel uses which.
@@ -19,7 +19,7 @@ pub(super) struct TableSet {
 }
 
 /// Channels that share a table.
-struct Group {
+struct ChannelGroup {
     step: f32,
     channels: Vec<usize>,
     histogram: Histogram,
@@ -33,14 +33,14 @@ impl TableSet {
     /// Greedy: each round merges the pair that saves most. `O(n_channels²)` trial merges.
     ///
     /// * `steps`: of features, log-scales, offsets.
-    pub(super) fn build(rows: &Rows, shape: &ModelShape, steps: [f32; 3]) -> Self {
-        let mut groups: Vec<Group> = (0..rows.n_channels)
+    pub(super) fn build(rows: &SymbolRows, shape: &ModelShape, steps: [f32; 3]) -> Self {
+        let mut groups: Vec<ChannelGroup> = (0..rows.n_channels)
             .map(|channel| {
                 let name = ChannelName::of(shape, channel);
                 let coded = (0..rows.drawn.len()).filter(|&anchor| name.is_coded(rows.drawn[anchor]));
                 let histogram = Histogram::count(coded.map(|anchor| rows.symbols_of(anchor)[channel]));
                 let step = steps[name.group()];
-                Group { step, channels: vec![channel], bits: histogram.trimmed().bits, histogram }
+                ChannelGroup { step, channels: vec![channel], bits: histogram.trimmed().bits, histogram }
             })
             .collect();
         merge_while_it_saves(&mut groups);
@@ -75,8 +75,8 @@ impl TableSet {
     }
 }
 
-fn merge_while_it_saves(groups: &mut Vec<Group>) {
-    let saving = |a: &Group, b: &Group| {
+fn merge_while_it_saves(groups: &mut Vec<ChannelGroup>) {
+    let saving = |a: &ChannelGroup, b: &ChannelGroup| {
         if a.step != b.step {
             return f64::NEG_INFINITY;
         }
@@ -91,7 +91,7 @@ fn merge_while_it_saves(groups: &mut Vec<Group>) {
         if saved <= 0.0 {
             break;
         }
-        // Group i, the later one, joins group j.
+        // ChannelGroup i, the later one, joins group j.
         let joined = groups.remove(i);
         savings.remove(i);
         for row in savings.iter_mut().skip(i) {

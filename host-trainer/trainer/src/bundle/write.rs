@@ -10,7 +10,7 @@ use super::lattice::LatticeModelDraft;
 use super::layout::{self, CodedScene, Counts, Parts, Written};
 use super::mask::MaskModelDraft;
 use super::order::Placement;
-use super::quantise::{Rows, StepSource, check_lengths, check_steps, quantise};
+use super::quantise::{StepSource, SymbolRows, check_lengths, check_steps, quantise};
 use super::table::TableSet;
 use super::{BundleInfo, WriteError, directory, heads};
 use crate::integer_model;
@@ -114,7 +114,7 @@ impl Writer<'_> {
     }
 
     /// * `coder`: the section of `channels`.
-    fn code(&self, rows: &Rows, channels: ChannelCoder<'_>, coder: Vec<u8>) -> Result<CodedScene, WriteError> {
+    fn code(&self, rows: &SymbolRows, channels: ChannelCoder<'_>, coder: Vec<u8>) -> Result<CodedScene, WriteError> {
         let (shape, placement) = (self.scene.shape, &self.placement);
         let code_runs = placement.chunks.iter().map(|chunk| &placement.codes[chunk.clone()]);
         let all_drawn = u32::MAX.unbounded_shr(u32::BITS - shape.n_offsets as u32);

@@ -14,7 +14,7 @@ use std::fmt;
 pub use pilot::{LEAST_ITERATIONS, PilotCapture, PilotError, measure};
 pub use price::{Price, Worth, choose};
 pub use request::{ParseEffectsError, Request};
-pub use search::{Trial, Trials};
+pub use search::{Pilot, Pilots};
 
 use crate::scene::ModelShape;
 use crate::train::TrainConfig;

@@ -2,7 +2,7 @@
 
 use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, MaxSplats};
 
-use super::search::{Trials, search};
+use super::search::{Pilots, search};
 use super::{Effect, Price, Worth};
 use crate::camera::core_camera;
 use crate::device::{Limits, Processor};
@@ -113,7 +113,7 @@ pub fn measure(
     target: Processor,
     encoding: &Encoding,
     mut begins: impl FnMut(&[Effect]),
-) -> Result<Trials, PilotError> {
+) -> Result<Pilots, PilotError> {
     let device = PilotDevice { ram_bytes: encoding.limits.ram_bytes, target };
     // Pilots are smaller than the scene that has to fit.
     let limits = Limits { ram_bytes: None, flash_bytes: None, ..encoding.limits };

@@ -10,16 +10,16 @@ const CHANCE: f64 = 2.0;
 
 /// What pilots came to.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Trials {
+pub struct Pilots {
     /// What may be chance: twice the difference of the two pilots without effects, which differ in their seeds, dB.
     pub chance_db: f64,
     /// Each pilot; the first is the mean of those two.
-    pub each: Vec<Trial>,
+    pub each: Vec<Pilot>,
 }
 
 /// A pilot and what came of it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Trial {
+pub struct Pilot {
     /// The effects that it had.
     pub effects: Vec<Effect>,
     /// What it was worth.
@@ -32,7 +32,7 @@ pub struct Trial {
     pub chosen: bool,
 }
 
-impl Trial {
+impl Pilot {
     /// What is left of its gain, dB.
     fn left_db(&self) -> f64 {
         self.gain_db - self.price_db
@@ -50,16 +50,16 @@ impl Trial {
 pub(super) fn search<E>(
     price: &Price,
     mut worth_of: impl FnMut(&[Effect], u64) -> Result<Worth, E>,
-) -> Result<Trials, E> {
+) -> Result<Pilots, E> {
     let (one, other) = (worth_of(&[], 0)?, worth_of(&[], 1)?);
     let (without, chance_db) = (one.mean_with(&other), CHANCE * (one.psnr_db - other.psnr_db).abs());
-    let mut trial_of = |effects: &[Effect]| -> Result<Trial, E> {
+    let mut trial_of = |effects: &[Effect]| -> Result<Pilot, E> {
         let worth = worth_of(effects, 0)?;
         let gain_db = worth.psnr_db - without.psnr_db;
         let price_db = price.of(effects.len(), &worth, &without, chance_db);
-        Ok(Trial { effects: effects.to_vec(), worth, gain_db, price_db, chosen: false })
+        Ok(Pilot { effects: effects.to_vec(), worth, gain_db, price_db, chosen: false })
     };
-    let nothing = Trial { effects: Vec::new(), worth: without, gain_db: 0.0, price_db: 0.0, chosen: false };
+    let nothing = Pilot { effects: Vec::new(), worth: without, gain_db: 0.0, price_db: 0.0, chosen: false };
     let mut each = vec![nothing];
     for effect in Effect::MEASURED {
         each.push(trial_of(&[effect])?);
@@ -85,7 +85,7 @@ pub(super) fn search<E>(
     let numbers: Vec<(usize, Worth)> = each.iter().map(|trial| (trial.effects.len(), trial.worth)).collect();
     let chosen = choose(price, &numbers, chance_db);
     each[chosen].chosen = true;
-    Ok(Trials { chance_db, each })
+    Ok(Pilots { chance_db, each })
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use crate::command::runs::MeasuredRun;
 
 /// One line of ablation.csv.
 #[derive(Serialize)]
-pub(super) struct RunLine {
+pub(super) struct AblationLine {
     row: &'static str,
     lambda: f64,
     seed: u64,
@@ -55,9 +55,9 @@ pub(super) struct Comparison {
 }
 
 /// Every run, as ablation.csv lists it.
-pub(super) fn run_lines(runs: &[MeasuredRun<'_>]) -> impl Iterator<Item = RunLine> {
+pub(super) fn run_lines(runs: &[MeasuredRun<'_>]) -> impl Iterator<Item = AblationLine> {
     let tier = |tier: &TierEvaluation| format!("{:.2}:{:.3}", tier.pruning_rate, tier.psnr_db);
-    runs.iter().map(move |MeasuredRun { spec, evaluation }| RunLine {
+    runs.iter().map(move |MeasuredRun { spec, evaluation }| AblationLine {
         row: spec.row,
         lambda: spec.lambda,
         seed: spec.seed,

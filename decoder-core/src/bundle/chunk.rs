@@ -1,6 +1,8 @@
 //! A chunk: up to a few hundred neighbouring anchors that decode by themselves.
 
-use super::directory::{ChunkRecord, InkFrame};
+use core::ops::Range;
+
+use super::directory::{ChunkRecord, Directory, InkFrame};
 use super::{AnchorModels, AnchorReader, AnchorSite};
 use crate::bytes::crc32;
 use crate::error::{DecodeError, Field, saturate};
@@ -13,6 +15,31 @@ pub struct Chunk<'a> {
     record: ChunkRecord,
     ink_frame: InkFrame,
     words: &'a [[u8; 2]],
+}
+
+/// The chunks of a file, one after the other.
+pub(super) struct Chunks<'a> {
+    pub(super) directory: Directory<'a>,
+    /// The chunks section.
+    pub(super) chunks: &'a [u8],
+    /// Those to come.
+    pub(super) numbers: Range<u32>,
+    /// Where the first of them begins.
+    pub(super) offset: u32,
+}
+
+impl<'a> Iterator for Chunks<'a> {
+    type Item = Chunk<'a>;
+
+    // Not inlined: there are many loops over chunks.
+    #[inline(never)]
+    fn next(&mut self) -> Option<Chunk<'a>> {
+        let index = self.numbers.next()?;
+        let record = self.directory.record(index)?;
+        let offset = self.offset;
+        self.offset = offset.saturating_add(record.len);
+        Chunk::new(index, offset, record, self.directory.ink_frame, self.chunks)
+    }
 }
 
 impl<'a> Chunk<'a> {

@@ -46,6 +46,7 @@ pub use tables::{FrequencyTable, Tables};
 use crate::context::Context;
 use crate::entropy::MaskModel;
 use crate::error::{DecodeError, SectionKind, saturate};
+use chunk::Chunks;
 use gaussians::GaussianCounts;
 
 /// Where the models of the channels come from.
@@ -272,14 +273,7 @@ impl<'a> Bundle<'a> {
 
     /// All chunks in the file, in order.
     pub fn chunks(&self) -> impl Iterator<Item = Chunk<'a>> + use<'a> {
-        let Self { directory, chunks, .. } = *self;
-        let mut offset = 0_u32;
-        (0..self.n_chunks()).map_while(move |index| {
-            let record = directory.record(index)?;
-            let chunk = Chunk::new(index, offset, record, directory.ink_frame, chunks);
-            offset = offset.saturating_add(record.len);
-            chunk
-        })
+        Chunks { directory: self.directory, chunks: self.chunks, numbers: 0..self.n_chunks(), offset: 0 }
     }
 
     /// Position of a lattice cell, normalised frame.

@@ -114,7 +114,7 @@ pub(super) fn diverging(edit: impl Fn(&mut Capture, &mut TrainConfig)) -> String
 
 /// All rates multiplied.
 fn spiked(factor: f64) -> Rates {
-    let all = |rate: LearningRate| LearningRate { start: rate.start * factor, end: rate.end * factor };
+    let all = |rate: LearningRate| rate.times(factor);
     let Rates { offset, feature, log_scale, opacity_head, covariance_head, colour_head, .. } = Rates::default();
     let Rates { mask, grid, context, background, .. } = Rates::default();
     Rates {
@@ -152,7 +152,7 @@ pub(super) fn family() -> Family {
             numbers,
             0.0,
             || {
-                let largest = LearningRate { start: 10.0, end: 10.0 };
+                let largest = LearningRate::falling(10.0, 10.0);
                 let rates = Rates {
                     offset: largest,
                     feature: largest,

@@ -55,6 +55,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         distribution: Some(Distribution::default()),
         pruning: Some(Pruning::tiered()),
         detail: Some(Detail::default()),
+        ..Modules::default()
     };
     let config = TrainConfig { iterations: args.iterations, modules, ..TrainConfig::of(Backbone::Hac) };
     let bundle_path = folder.join("scene.psb");

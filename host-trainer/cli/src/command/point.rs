@@ -46,7 +46,8 @@ pub(super) fn trained(config: &RunConfig, capture: &Capture, stop: &AtomicBool) 
         }
         Err(error) => return Err(error.into()),
     };
-    Ok(train::train_in(folder, config, capture, resumes, stop)?.is_some())
+    let start = if resumes { train::Start::Resumed } else { train::Start::New };
+    Ok(train::train_in(folder, config, capture, start, stop)?.is_some())
 }
 
 /// Stops where the run in a point's folder is not the one that is asked for, in its bundle's bytes or its capture.

@@ -8,7 +8,7 @@ use pocketsplat_trainer::encode::CoderChoice;
 use pocketsplat_trainer::scene::QuantisationSteps;
 use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::config::Backbone;
-use pocketsplat_trainer::train::module::{Distribution, Modules, Pruning};
+use pocketsplat_trainer::train::module::{Distribution, Modules, Pruning, Rdo};
 
 use crate::config::heading::{OUTPUT, QUALITY, RUN};
 use crate::config::named::{BACKBONES, CODERS, one_of};
@@ -79,6 +79,9 @@ pub(crate) struct RunOptions {
     /// Keep the last two checkpoints of the finished run [default: they are removed]
     #[arg(long, help_heading = RUN, hide_short_help = true)]
     keep_checkpoints: bool,
+    /// Keep the checkpoints after these iterations, for other runs to begin from with --from [default: none]
+    #[arg(long, value_name = "STEPS", value_delimiter = ',', help_heading = RUN, hide_short_help = true)]
+    fork_at: Option<Vec<u32>>,
 }
 
 /// A training module as `--modules` names it.
@@ -92,6 +95,8 @@ enum TrainingModule {
     HardPruning,
     /// Pruning that deletes nothing and trains one scene for every pruning rate up to 40 %.
     TieredPruning,
+    /// Pruning of the offsets and anchors that are not worth their bits, in place of learned masks; needs hac.
+    RdoPruning,
 }
 
 /// A help text with the value that stands where the option is not given.
@@ -170,6 +175,7 @@ impl QualityOptions {
 fn attach(modules: &mut Modules, names: &[TrainingModule]) -> Result<()> {
     let named = |module| names.contains(&module);
     modules.distribution = named(TrainingModule::Distribution).then(Distribution::default);
+    modules.rdo = named(TrainingModule::RdoPruning).then(Rdo::default);
     modules.pruning = match (named(TrainingModule::HardPruning), named(TrainingModule::TieredPruning)) {
         (true, true) => bail!("--modules names hard-pruning and tiered-pruning, needs one of the two at most"),
         (true, false) => Some(Pruning::default()),
@@ -183,6 +189,7 @@ impl RunOptions {
     fn applied_to(&self, mut config: RunConfig) -> Result<RunConfig> {
         config.checkpoint_every = self.checkpoint_every.or(config.checkpoint_every);
         config.keep_checkpoints |= self.keep_checkpoints;
+        config.fork_at = self.fork_at.clone().unwrap_or(config.fork_at);
         config.train.seed = self.seed.unwrap_or(config.train.seed);
         for key in self.set.iter().map(|key| key.trim_start()) {
             // The detail module has settings of its own where the run has the effect.

@@ -12,7 +12,7 @@ use pocketsplat_trainer::bundle::Written;
 use pocketsplat_trainer::effects::Effect;
 use pocketsplat_trainer::encode::{Encoding, Fitted};
 use pocketsplat_trainer::train::finish::Finished;
-use pocketsplat_trainer::train::run::{Ending, Interval, RunError, RunFolder};
+use pocketsplat_trainer::train::run::{Ending, Interval, RunError, RunFolder, fork};
 use pocketsplat_trainer::train::{TrainConfig, Trainer};
 use serde::Serialize;
 
@@ -51,34 +51,59 @@ pub(crate) struct TrainResult {
 }
 
 pub(crate) fn run(args: &Args) -> Result<ExitCode> {
-    let (mut config, capture, folder) = match args.resume() {
-        Some(path) => {
-            let folder = RunFolder::reopen(path)?;
-            let begun = RunConfig::parse(&folder.config()?);
-            let begun = begun.with_context(|| format!("the config.toml in {} cannot be used", path.display()))?;
-            let mut config = args.applied_to(begun.clone())?;
-            if let Some(difference) = begun.difference(&config)? {
-                bail!("the run began with another setting than the command line asks for: {difference}; leave it out");
-            }
-            // What was chosen stays; what an accident kept from being chosen is measured now.
-            config.effects = begun.effects;
-            output::check_writable(&config.output)?;
-            let capture = load(&mut config)?;
-            (config, capture, folder)
+    match args.resume() {
+        Some(path) => resume(args, path),
+        None => begin(args),
+    }
+}
+
+fn resume(args: &Args, path: &Path) -> Result<ExitCode> {
+    let folder = RunFolder::reopen(path)?;
+    let begun = RunConfig::parse(&folder.config()?);
+    let begun = begun.with_context(|| format!("the config.toml in {} cannot be used", path.display()))?;
+    let mut config = args.applied_to(begun.clone())?;
+    if let Some(difference) = begun.difference(&config)? {
+        bail!("the run began with another setting than the command line asks for: {difference}; leave it out");
+    }
+    // What was chosen stays; what an accident kept from being chosen is measured now.
+    config.effects = begun.effects;
+    output::check_writable(&config.output)?;
+    let capture = load(&mut config)?;
+    go_on(args, folder, config, &capture, Start::Resumed)
+}
+
+fn begin(args: &Args) -> Result<ExitCode> {
+    let mut config = args.resolved()?;
+    output::check_writable(&config.output)?;
+    // Before the folder is touched: a capture or checkpoint that does not load must not cost an earlier run its results.
+    let capture = load(&mut config)?;
+    let path = args.run_folder(&config)?;
+    let start = match args.fork() {
+        Some((run, _)) if run.canonicalize().ok() == path.canonicalize().ok() => {
+            bail!("{} cannot be both the run to begin from and the new one; choose another --output", path.display())
         }
-        None => {
-            let mut config = args.resolved()?;
-            output::check_writable(&config.output)?;
-            // Before the folder is touched: a capture that does not load must not cost an earlier run its results.
-            let capture = load(&mut config)?;
-            let folder = RunFolder::start(&args.run_folder(&config)?, &config.to_toml()?, args.overwrite())?;
-            (config, capture, folder)
+        Some((run, iteration)) => {
+            let trainer = fork(run, iteration, &capture, config.train)?;
+            eprintln!("going on after iteration {iteration} of {}", run.display());
+            Start::Forked(Box::new(trainer))
         }
+        None => Start::New,
     };
-    effects::resolve(&mut config, &capture, folder.path())?;
+    let folder = RunFolder::start(&path, &config.to_toml()?, args.overwrite())?;
+    go_on(args, folder, config, &capture, start)
+}
+
+fn go_on<'a>(
+    args: &Args,
+    folder: RunFolder,
+    mut config: RunConfig,
+    capture: &'a Capture,
+    start: Start<'a>,
+) -> Result<ExitCode> {
+    effects::resolve(&mut config, capture, folder.path())?;
     // Not before: until here there is nothing to keep, and Ctrl-C may end the process at once.
     let stop = stop::flag()?;
-    match train_in(folder, &config, &capture, args.resume().is_some(), &stop)? {
+    match train_in(folder, &config, capture, start, &stop)? {
         Some(result) => output::print(&result, args.json()).map(|()| ExitCode::SUCCESS),
         None => Ok(ExitCode::from(stop::INTERRUPTED)),
     }
@@ -99,17 +124,36 @@ pub(crate) fn load(config: &mut RunConfig) -> Result<Capture> {
     Ok(capture)
 }
 
-/// Trains in a run folder, from its checkpoint where the run `resumes`, and writes the bundle; `None` when `stop` was set
-/// before the end.
-pub(crate) fn train_in(
-    mut folder: RunFolder,
+/// Where a run begins.
+#[derive(Debug)]
+pub(crate) enum Start<'a> {
+    /// With the capture's points.
+    New,
+    /// With the newest checkpoint of its folder.
+    Resumed,
+    /// With the state of another run.
+    Forked(Box<Trainer<'a>>),
+}
+
+/// Trains in a run folder and writes the bundle; `None` when `stop` was set before the end.
+pub(crate) fn train_in<'a>(
+    folder: RunFolder,
     config: &RunConfig,
-    capture: &Capture,
-    resumes: bool,
+    capture: &'a Capture,
+    start: Start<'a>,
     stop: &AtomicBool,
 ) -> Result<Option<TrainResult>> {
+    let mut folder = folder.forking_at(&config.fork_at);
     let path = folder.path().to_owned();
-    let mut trainer = if resumes { resumed(&folder, config, capture)? } else { Trainer::new(capture, config.train)? };
+    let mut trainer = match start {
+        Start::New => Trainer::new(capture, config.train)?,
+        Start::Resumed => resumed(&folder, config, capture)?,
+        Start::Forked(trainer) => {
+            // Without it a resumed run would begin with the capture's points.
+            folder.save(&trainer)?;
+            *trainer
+        }
+    };
     folder.write_config(&config.to_toml()?)?;
     let interval = config.checkpoint_every.map_or(Interval::Seconds(CHECKPOINT_SECONDS), Interval::Iterations);
     let how_to_go_on = || format!("go on with `pocketsplat train --resume {}`", path.display());

@@ -19,7 +19,7 @@ use crate::config::{CaptureOptions, RunConfig};
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Folder of the capture.
-    #[arg(required_unless_present_any = ["config", "resume"])]
+    #[arg(required_unless_present_any = ["config", "resume", "from"])]
     dataset: Option<PathBuf>,
     #[command(flatten)]
     capture: CaptureOptions,
@@ -45,6 +45,13 @@ pub(crate) struct Args {
     /// Run folder to go on in; a capture that has moved is given as DATASET.
     #[arg(long, value_name = "OUT.run", help_heading = RUN)]
     resume: Option<PathBuf>,
+    /// Run folder whose run this one shares up to --at; what the command line says else holds from there on.
+    #[arg(long, value_name = "OUT.run", requires = "at", conflicts_with_all = ["config", "resume"], help_heading = RUN,
+        hide_short_help = true)]
+    from: Option<PathBuf>,
+    /// Iteration after which it goes its own way; one that the run was given as --fork-at.
+    #[arg(long, value_name = "STEP", requires = "from", help_heading = RUN, hide_short_help = true)]
+    at: Option<u32>,
     /// Start anew where an unfinished run lies [default: refuse]
     #[arg(short = 'w', long, conflicts_with = "resume", help_heading = RUN)]
     overwrite: bool,
@@ -83,6 +90,11 @@ impl Args {
         self.resume.as_deref()
     }
 
+    /// The run folder to begin from and the iteration, if any.
+    pub(crate) fn fork(&self) -> Option<(&Path, u32)> {
+        self.from.as_deref().zip(self.at)
+    }
+
     /// Whether an unfinished run may be replaced.
     pub(crate) fn overwrite(&self) -> bool {
         self.overwrite
@@ -95,14 +107,15 @@ impl Args {
 
     /// The configuration of a new run: defaults, then `--config`, then what else the command line says.
     pub(crate) fn resolved(&self) -> Result<RunConfig> {
-        let base = match &self.config {
-            Some(path) => RunConfig::read(path)?,
-            None => RunConfig::default(),
+        let base = match (&self.config, &self.from) {
+            (Some(path), _) => RunConfig::read(path)?,
+            (None, Some(run)) => RunConfig { fork_at: Vec::new(), ..RunConfig::of_run(run)? },
+            (None, None) => RunConfig::default(),
         };
         let mut config = self.applied_to(base)?;
         let limits = self.device.limits();
         // A configuration that is given has been decided about.
-        if !limits.is_none() && self.config.is_none() {
+        if !limits.is_none() && self.config.is_none() && self.from.is_none() {
             let choice = choose(&limits)?;
             self.quality.choose(&mut config.train, &choice);
             config.train.hac.lambda = self.lambda.unwrap_or(choice.lambda);

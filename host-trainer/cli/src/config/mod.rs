@@ -29,6 +29,9 @@ pub(crate) struct RunConfig {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) checkpoint_every: Option<u32>,
     pub(crate) keep_checkpoints: bool,
+    /// Iterations whose checkpoints stay, for other runs to begin from.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) fork_at: Vec<u32>,
     pub(crate) capture: CaptureOptions,
     pub(crate) train: TrainConfig,
     pub(crate) encoding: Encoding,
@@ -42,6 +45,7 @@ impl Default for RunConfig {
             output: PathBuf::new(),
             checkpoint_every: None,
             keep_checkpoints: false,
+            fork_at: Vec::new(),
             capture: CaptureOptions { background: Some(Background::Black), ..CaptureOptions::default() },
             train: TrainConfig::default(),
             encoding: Encoding::default(),
@@ -56,6 +60,13 @@ impl RunConfig {
         let text = std::fs::read_to_string(path);
         let text = text.with_context(|| format!("could not read the configuration {}", path.display()))?;
         Self::parse(&text).with_context(|| format!("the configuration {} cannot be used", path.display()))
+    }
+
+    /// That of the run in a folder, with what was decided on the way: effects are not chosen again.
+    pub(crate) fn of_run(folder: &Path) -> Result<Self> {
+        let mut config = Self::read(&folder.join("config.toml"))?;
+        config.effects.auto = false;
+        Ok(config)
     }
 
     /// As [`Self::read`], from its text.

@@ -82,3 +82,35 @@ fn a_run_goes_on_only_with_what_it_began_with() {
     succeeds(resume(&run).arg("-o").arg(&elsewhere).args(["--checkpoint-every", "1000"]));
     assert!(fs::read(&elsewhere).unwrap() == undisturbed());
 }
+
+#[test]
+fn a_fork_shares_a_run_up_to_an_iteration() {
+    let home = folder("fork");
+    let whole = home.join("a.psb");
+    succeeds(train(&whole).args(["--fork-at", "90"]));
+    assert!(fs::read(&whole).unwrap() == undisturbed());
+    let fork = |name: &str, at: &str| {
+        let mut command = pocketsplat();
+        command.arg("train").arg("--from").arg(home.join("a.run")).args(["--at", at]).arg("-o").arg(home.join(name));
+        command
+    };
+    let said = succeeds(&mut fork("same.psb", "90"));
+    assert!(said.contains("going on after iteration 90"), "{said}");
+    assert!(fs::read(home.join("same.psb")).unwrap() == undisturbed(), "the same settings end in the same bytes");
+    // Killed, it goes on from where it was, not from the capture's points.
+    let lower = ["--set", "train.rates.feature.end=1e-6"];
+    succeeds(fork("other.psb", "90").args(lower));
+    let mut child = starts(fork("killed.psb", "90").args(lower));
+    wait_for(&home.join("killed.run"), 92, &mut child);
+    child.kill().unwrap();
+    child.wait().unwrap();
+    succeeds(&mut resume(&home.join("killed.run")));
+    let other = fs::read(home.join("other.psb")).unwrap();
+    assert!(other != undisturbed() && other == fs::read(home.join("killed.psb")).unwrap());
+
+    let error = fails(&mut fork("b.psb", "91"));
+    assert!(error.contains("no checkpoint of iteration 91, it has those of [90]"), "{error}");
+    let error = fails(&mut fork("a.psb", "90"));
+    assert!(error.contains("cannot be both the run to begin from and the new one"), "{error}");
+    assert!(home.join("a.run/iteration-00000090.checkpoint").exists(), "nothing is lost");
+}

@@ -10,7 +10,9 @@ use crate::fixture::{capture, fails, folder, pocketsplat, resume, starts, succee
 fn a_run_with_every_module_goes_on_in_the_same_bytes_on_either_backbone() {
     for backbone in ["scaffold", "hac"] {
         let home = folder(&format!("modules-{backbone}"));
-        let modules = ["--backbone", backbone, "--modules", "distribution,tiered-pruning", "--effects", "+detail"];
+        let names =
+            if backbone == "hac" { "distribution,tiered-pruning,rdo-pruning" } else { "distribution,tiered-pruning" };
+        let modules = ["--backbone", backbone, "--modules", names, "--effects", "+detail"];
         let whole = home.join("whole.psb");
         succeeds(train(&whole).args(modules));
         let written = fs::read_to_string(home.join("whole.run/config.toml")).unwrap();

@@ -143,19 +143,21 @@ pub fn forward_backward<R: Real>(
     sums
 }
 
-/// Bits of the drawn values of features, log-scales and offsets, without gradients.
-pub fn forward<R: Real>(level: Level, rows: &Rows<'_, R>) -> [f64; 3] {
+/// Bits of the drawn values of features, log-scales and offsets, and of each drawn offset `[n, K]`; no gradients.
+pub fn forward<R: Real>(level: Level, rows: &Rows<'_, R>) -> ([f64; 3], Vec<R>) {
     let mut d_values = rows.values.map(|values| vec![R::ZERO; values.len()]);
-    let (mut d_outputs, mut d_drawn) = (vec![R::ZERO; rows.outputs.len()], vec![R::ZERO; rows.drawn.len()]);
+    let (mut d_outputs, mut of_offsets) = (vec![R::ZERO; rows.outputs.len()], vec![R::ZERO; rows.drawn.len()]);
     let mut scratch = Scratch::default();
-    level.run(
+    let sums = level.run(
         #[inline(always)]
         || {
             let values = d_values.each_mut().map(Vec::as_mut_slice);
-            let mut unused = Gradients { values, outputs: &mut d_outputs, drawn: &mut d_drawn };
-            forward_backward(rows, R::ZERO, &mut scratch, &mut unused)
+            // The gradient of a mask at weight 1 is what it saves.
+            let mut unused = Gradients { values, outputs: &mut d_outputs, drawn: &mut of_offsets };
+            forward_backward(rows, R::ONE, &mut scratch, &mut unused)
         },
-    )
+    );
+    (sums, of_offsets)
 }
 
 #[cfg(test)]

@@ -192,16 +192,8 @@ impl<R: Real> Block<R> {
         );
     }
 
-    /// From the gradients of its splats to those of its anchors and of the heads.
-    pub(super) fn backward(
-        &mut self,
-        scene: &Scene<R>,
-        camera: &Pinhole<R>,
-        d_splats: &[Splat<R>],
-        volume_weight: R,
-        n_gaussians: usize,
-    ) {
-        let (shape, n) = (&scene.shape, self.anchors.len());
+    /// From the gradients of its splats to those of its Gaussians, which are added to.
+    pub(super) fn splats_backward(&mut self, shape: &ModelShape, camera: &Pinhole<R>, d_splats: &[Splat<R>]) {
         self.screen_gradients.clear();
         let half = camera.size_px.map(|s| R::real(0.5 * s as f64));
         for (drawn, d_splat) in self.drawn.iter().zip(d_splats) {
@@ -211,6 +203,11 @@ impl<R: Real> Block<R> {
             let [x, y] = [d_splat.mean_px[0] * half[0], d_splat.mean_px[1] * half[1]];
             self.screen_gradients.push((x * x + y * y).sqrt());
         }
+    }
+
+    /// From the gradients of its Gaussians to those of its anchors and of the heads.
+    pub(super) fn backward(&mut self, scene: &Scene<R>, volume_weight: R, n_gaussians: usize) {
+        let (shape, n) = (&scene.shape, self.anchors.len());
         volume::backward(&self.gaussians, volume_weight, n_gaussians, &mut self.d_gaussians);
         for group in self.d_heads.each_mut().flat_map(Head::groups_mut) {
             group.fill(R::ZERO);

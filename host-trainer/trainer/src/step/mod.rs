@@ -6,6 +6,7 @@ mod coded;
 pub mod coding;
 mod context;
 mod loss;
+mod probe;
 mod stages;
 mod target;
 
@@ -23,6 +24,7 @@ pub use coding::Phase;
 use coding::{Coding, RateReport};
 pub use context::ContextGradients;
 pub use loss::{ImagePair, Loss, LossWeights, StepInfo, Terms};
+pub use probe::ImageError;
 pub use stages::StageSeconds;
 use stages::StageTimer;
 use target::clear_masked;
@@ -202,26 +204,14 @@ impl<R: Real> Workspace<R> {
             + volumes
             + by_modules;
 
-        let squared: f64 = image
-            .chunks(4096)
-            .zip(target.truth().chunks(4096))
-            .map(|(a, b)| a.iter().zip(b).map(|(x, y)| Into::<f64>::into((*x - *y) * (*x - *y))).sum::<f64>())
-            .sum();
         let d_tiled = TiledImage::from_planes(&d_image, size_px);
         stages.loss = timer.lap();
         let d_splats = rasterise::backward(self.level, &splats, &footprints, &lists, &tiled, &d_tiled);
         self.d_background = rasterise::background_gradient(&tiled, &d_tiled);
         stages.rasterise_backward = timer.lap();
-        let mut rest = d_splats.as_slice();
-        let mut shares = Vec::with_capacity(self.n_blocks);
-        for block in self.blocks() {
-            let (share, after) = rest.split_at(block.drawn.len());
-            shares.push(share);
-            rest = after;
-        }
-        self.blocks[..self.n_blocks].par_iter_mut().zip(shares).for_each(|(block, d_splats)| {
-            block.backward(scene, target.camera, d_splats, volume_weight, n_gaussians);
-        });
+        self.splats_backward(&scene.shape, target.camera, &d_splats);
+        let blocks = self.blocks[..self.n_blocks].par_iter_mut();
+        blocks.for_each(|block| block.backward(scene, volume_weight, n_gaussians));
         self.sum_head_gradients();
         stages.anchors_backward = timer.lap();
         let rate = match (coding, network) {
@@ -243,13 +233,26 @@ impl<R: Real> Workspace<R> {
         }
         StepReport {
             loss: total,
-            squared_error: squared / (3 * target.n_counted()) as f64,
+            squared_error: target.squared_sum(&image) / (3 * target.n_counted()) as f64,
             n_gaussians,
             n_splats: splats.len(),
             n_pairs: lists.entries.len(),
             rate,
             stages,
         }
+    }
+
+    /// Takes the gradients of all splats back to the Gaussians of their blocks.
+    fn splats_backward(&mut self, shape: &ModelShape, camera: &Pinhole<R>, d_splats: &[Splat<R>]) {
+        let mut rest = d_splats;
+        let mut shares = Vec::with_capacity(self.n_blocks);
+        for block in self.blocks() {
+            let (share, after) = rest.split_at(block.drawn.len());
+            shares.push(share);
+            rest = after;
+        }
+        let blocks = self.blocks[..self.n_blocks].par_iter_mut().zip(shares);
+        blocks.for_each(|(block, d_splats)| block.splats_backward(shape, camera, d_splats));
     }
 
     /// Adds the blocks' gradients of the heads in block order.

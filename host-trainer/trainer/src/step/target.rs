@@ -29,6 +29,13 @@ impl<'a, R: Real> TargetView<'a, R> {
         &self.truth
     }
 
+    /// Σ over pixels and channels of the squared difference to `image`, planes that are 0 where pixels do not count.
+    pub(super) fn squared_sum(&self, image: &[R]) -> f64 {
+        // Blocks of fixed size, so that the sum's rounding is the same however it is scheduled.
+        let blocks = image.chunks(4096).zip(self.truth.chunks(4096));
+        blocks.map(|(a, b)| a.iter().zip(b).map(|(x, y)| Into::<f64>::into((*x - *y) * (*x - *y))).sum::<f64>()).sum()
+    }
+
     /// Pixels that count, at least 1.
     pub(super) fn n_counted(&self) -> usize {
         self.mask.map_or(self.truth.len() / 3, |mask| mask.iter().filter(|valid| **valid).count()).max(1)

@@ -19,7 +19,7 @@ use pocketsplat_capture::camera::Camera;
 
 const SIZE: [u32; 2] = [26, 19];
 
-fn camera() -> Camera {
+pub(super) fn camera() -> Camera {
     Camera {
         rotation: DMat3::from_rotation_y(0.2),
         translation: DVec3::new(0.05, -0.1, 2.0),
@@ -31,7 +31,7 @@ fn camera() -> Camera {
 }
 
 /// A scene in which every parameter matters: nothing at its initial zero.
-fn scene(seed: u64, shape: ModelShape) -> Scene<f64> {
+pub(super) fn scene(seed: u64, shape: ModelShape) -> Scene<f64> {
     let points: Vec<DVec3> = random(seed, 60).chunks_exact(3).map(|p| DVec3::from_slice(p) * 0.6).collect();
     let mut scene = initial_scene(shape, 0.01, &points, &mut ChaCha8Rng::seed_from_u64(seed)).cast::<f64>();
     scene.anchors.features = random(seed + 1, scene.anchors.features.len());
@@ -336,7 +336,7 @@ fn modules() -> Vec<Modules> {
         Modules { distribution, ..Modules::default() },
         Modules { pruning, ..Modules::default() },
         Modules { detail, ..Modules::default() },
-        Modules { distribution, pruning, detail },
+        Modules { distribution, pruning, rdo: None, detail },
     ]
 }
 

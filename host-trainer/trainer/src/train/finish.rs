@@ -1,13 +1,13 @@
 //! What a finished run hands to the writer of bundles.
 
-use pocketsplat_core::context::{Context, Group, N_GROUPS};
+use pocketsplat_core::context::{Context, N_GROUPS};
 use rayon::prelude::*;
 
+use super::bits::{self, anchor_steps};
 use super::coding::Integers;
 use super::survey::Survey;
 use super::{TrainError, Trainer};
-use crate::ops::simd::Level;
-use crate::ops::{anchor_bits, hash_grid, head, mask, perturb};
+use crate::ops::perturb;
 use crate::scene::Scene;
 use crate::step::Workspace;
 
@@ -49,7 +49,7 @@ impl Trainer<'_> {
         }
         let survey = Survey::new(&drawn, &mut Workspace::new(&drawn.shape), &self.trained_cameras(), false);
         let n_undrawn = survey.mask_undrawn(&mut drawn);
-        let estimated_bits = context.as_ref().map(|context| estimated_bits(&drawn, context));
+        let estimated_bits = context.as_ref().map(|context| bits::of_scene(&drawn, context));
         scene.anchors.mask_logits = drawn.anchors.mask_logits;
         // Places that training has given out decide; it has prepared the scene for them.
         let importance =
@@ -58,14 +58,6 @@ impl Trainer<'_> {
         let background = self.background.map(|channel| (channel * 255.0).round() as u8);
         Ok(Finished { scene, importance, background, n_undrawn, estimated_bits })
     }
-}
-
-/// The steps of an anchor, in the order of the channels.
-fn steps(context: &Context<'_>, lattice: [i32; 3], features: &mut [i16], hidden: &mut [i16]) -> [f32; N_GROUPS] {
-    context.features(lattice, features);
-    context.hidden(features, hidden);
-    let steps = context.steps(hidden);
-    [Group::Feature, Group::LogScale, Group::Offset].map(|group| steps.value(group))
 }
 
 /// Makes every value a symbol times its step, as the integer model has it.
@@ -79,55 +71,10 @@ fn round_values(scene: &mut Scene<f32>, context: &Context<'_>) {
         let mut residuals = vec![0.0; f.max(s).max(o)];
         let rows = features.chunks_exact_mut(f).zip(log_scales.chunks_exact_mut(s)).zip(offsets.chunks_exact_mut(o));
         for (cell, ((features, log_scales), offsets)) in lattice.iter().zip(rows) {
-            let steps = steps(context, *cell, &mut inputs, &mut hidden);
+            let steps = anchor_steps(context, *cell, &mut inputs, &mut hidden);
             for (values, step) in [features, log_scales, offsets].into_iter().zip(steps) {
                 perturb::rounded(step, values, &mut residuals);
             }
         }
     });
-}
-
-/// Bits of all drawn values, rounded by the integer model's steps, under the float model's means and scales.
-fn estimated_bits(scene: &Scene<f32>, context: &Context<'_>) -> [f64; N_GROUPS] {
-    let Some(model) = &scene.context else { return [0.0; N_GROUPS] };
-    let (shape, anchors) = (&scene.shape, &scene.anchors);
-    let (f, k, n_out) = (shape.feature_dim, shape.n_offsets, model.mlp.n_out);
-    let valid: Vec<usize> = (0..anchors.len()).filter(|a| anchors.has_drawn(*a)).collect();
-    let parts: Vec<[f64; N_GROUPS]> = valid
-        .par_chunks(ROWS)
-        .map(|rows| {
-            let n = rows.len();
-            let units: Vec<[u16; 3]> = rows.iter().map(|a| model.frame.unit(anchors.lattice[*a])).collect();
-            let mut inputs = vec![0.0; n * model.mlp.n_in];
-            hash_grid::forward(&model.levels, &model.rows, &units, &mut inputs);
-            let (mut hidden, mut outputs) = (vec![0.0; n * model.mlp.n_hidden], vec![0.0; n * n_out]);
-            head::forward(&model.mlp, &inputs, &mut hidden, &mut outputs);
-            let (mut features, mut units) = (vec![0; context.n_inputs()], vec![0; context.n_hidden()]);
-            let gather = |values: &[f32], width: usize| -> Vec<f32> {
-                rows.iter().flat_map(|a| values[a * width..(a + 1) * width].iter().copied()).collect()
-            };
-            for (a, output) in rows.iter().zip(outputs.chunks_exact_mut(n_out)) {
-                let exact = steps(context, anchors.lattice[*a], &mut features, &mut units);
-                let exponents = &mut output[n_out - N_GROUPS..];
-                for (exponent, (step, base)) in exponents.iter_mut().zip(exact.iter().zip(model.base_steps)) {
-                    *exponent = (step / base).log2();
-                }
-            }
-            let values = [
-                gather(&anchors.features, f),
-                gather(&anchors.log_scales, shape.n_log_scales()),
-                gather(&anchors.offsets, 3 * k),
-            ];
-            let drawn: Vec<bool> = gather(&anchors.mask_logits, k).into_iter().map(mask::is_open).collect();
-            let rows = anchor_bits::Rows {
-                shape,
-                base_steps: model.base_steps,
-                values: values.each_ref().map(Vec::as_slice),
-                drawn: &drawn,
-                outputs: &outputs,
-            };
-            anchor_bits::forward(Level::detect(), &rows)
-        })
-        .collect();
-    parts.iter().fold([0.0; N_GROUPS], |sum, part| std::array::from_fn(|i| sum[i] + part[i]))
 }

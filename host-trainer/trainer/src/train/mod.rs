@@ -1,6 +1,7 @@
 //! Training: one step, the optimiser, growth and pruning, the loop around them, and the folder that lets it go on after
 //! an interruption.
 
+pub mod bits;
 pub mod checkpoint;
 mod coding;
 pub mod config;
@@ -16,6 +17,7 @@ pub mod survey;
 #[cfg(test)]
 pub(crate) mod test_capture;
 pub mod watchdog;
+pub mod worth;
 
 use std::time::Instant;
 
@@ -35,7 +37,7 @@ use crate::scene::{Anchors, Heads, Scene};
 use crate::step::{Loss, Phase, StepInfo, TargetView, Workspace, planes};
 use checkpoint::{CaptureSignature, Kernels};
 use coding::Integers;
-use config::{Backbone, Densification, LearningRate, Rates};
+use config::{Backbone, Densification, Rates};
 use module::{AnchorChange, RunView};
 use optimiser::Optimiser;
 use pocketsplat_capture::dataset::{Capture, Image, View};
@@ -199,9 +201,7 @@ impl<'a> Trainer<'a> {
             self.queue.shuffle(&mut self.rng);
         }
         let index = self.queue.pop().expect("refilled above") as usize;
-        let View { name, image, mask, .. } = &self.capture.train[index];
-        let mask = mask.as_ref().map(|mask| mask.valid.as_slice());
-        let target = TargetView::new(&self.cameras[index], planes(image), mask, self.background);
+        let target = target(&self.capture.train[index], &self.cameras[index], self.background);
         let integers = match self.config.phase(self.iteration) {
             Phase::IntegerModel => Some(Integers::of(&self.scene)?),
             _ => None,
@@ -214,7 +214,8 @@ impl<'a> Trainer<'a> {
         let loss = Loss { weights: self.config.loss, modules: Some((&terms, &at)), pruned_share };
         let report = self.workspace.step(&self.scene, &target, &loss, &coding);
         if let Some(cause) = watchdog::inspect(&self.scene, target.truth(), self.background, &self.workspace, &report) {
-            let dropped = DroppedStep { iteration: self.iteration, view: name.clone(), cause };
+            let dropped =
+                DroppedStep { iteration: self.iteration, view: self.capture.train[index].name.clone(), cause };
             return if self.watchdog.dropped() {
                 Err(TrainError::Diverged { n: self.watchdog.n_in_a_row, last: dropped })
             } else {
@@ -235,9 +236,9 @@ impl<'a> Trainer<'a> {
         self.densify();
         self.keep_the_best();
         for module in modules.each() {
-            let run = RunView { scene: &self.scene, seed: self.config.seed, cameras: &self.trained_cameras() };
-            match module.event(&at, &run) {
+            match module.event(&at, &RunView { trainer: self })? {
                 Some(AnchorChange::Keep(keep)) => self.keep_anchors(&keep),
+                Some(AnchorChange::Mask(offsets)) => self.mask_offsets(&offsets),
                 Some(AnchorChange::Rank(ranks)) => self.scene.anchors.prune_rank = ranks,
                 None => {}
             }
@@ -266,6 +267,21 @@ impl<'a> Trainer<'a> {
         Survey::new(&self.scene, &mut Workspace::new(&self.scene.shape), &self.trained_cameras(), contributions)
     }
 
+    /// What every photograph that training sees asks of the scene.
+    fn targets(&self) -> impl Iterator<Item = TargetView<'_, f32>> {
+        self.trained
+            .iter()
+            .map(|view| *view as usize)
+            .map(|view| target(&self.capture.train[view], &self.cameras[view], self.background))
+    }
+
+    /// Switches offsets off, counted through all anchors', and drops the anchors that have none left.
+    fn mask_offsets(&mut self, offsets: &[usize]) {
+        self.scene.anchors.mask(offsets);
+        let keep: Vec<bool> = (0..self.scene.anchors.len()).map(|a| self.scene.anchors.has_drawn(a)).collect();
+        self.keep_anchors(&keep);
+    }
+
     /// Drops the anchors that `keep` does not mark.
     pub fn keep_anchors(&mut self, keep: &[bool]) {
         densify::retain(&mut self.scene, &mut self.optimiser, &mut self.statistics, keep);
@@ -273,16 +289,17 @@ impl<'a> Trainer<'a> {
 
     /// The learning rates of this iteration.
     ///
-    /// Masks move only where bits count. A mask has a fixed way to go, from its start to the threshold; so that it comes as
+    /// Masks move only where bits count, and no longer once the integer model decides: what is left then learns to do
+    /// without the rest. A mask has a fixed way to go, from its start to the threshold; so that it comes as
     /// far in a shorter run, its rate is that of [`PUBLISHED_ITERATIONS`] times their ratio, once there is a rate term.
     fn rates(&self) -> Rates {
-        let Rates { mask, .. } = self.config.rates;
         let factor = match self.config.phase(self.iteration) {
-            _ if self.config.backbone == Backbone::Scaffold => 0.0,
+            _ if self.config.backbone == Backbone::Scaffold || !self.config.modules.learns_masks() => 0.0,
             Phase::Raw | Phase::Noise => 1.0,
-            Phase::Context | Phase::IntegerModel => PUBLISHED_ITERATIONS / f64::from(self.config.iterations),
+            Phase::Context => PUBLISHED_ITERATIONS / f64::from(self.config.iterations),
+            Phase::IntegerModel => 0.0,
         };
-        Rates { mask: LearningRate { start: mask.start * factor, end: mask.end * factor }, ..self.config.rates }
+        Rates { mask: self.config.rates.mask.times(factor), ..self.config.rates }
     }
 
     /// Statistics of the step in the workspace, and growth and pruning when they are due.
@@ -327,6 +344,12 @@ impl<'a> Trainer<'a> {
         let rgb = (0..n).flat_map(|i| [byte(planes[i]), byte(planes[n + i]), byte(planes[2 * n + i])]).collect();
         Image { width_px: view.camera.width_px, height_px: view.camera.height_px, rgb }
     }
+}
+
+/// What a photograph asks of the scene.
+fn target<'v>(view: &'v View, camera: &'v Pinhole<f32>, background: [f32; 3]) -> TargetView<'v, f32> {
+    let mask = view.mask.as_ref().map(|mask| mask.valid.as_slice());
+    TargetView::new(camera, planes(&view.image), mask, background)
 }
 
 #[cfg(test)]

@@ -63,6 +63,7 @@
 pub mod detail;
 pub mod distribution;
 pub mod pruning;
+pub mod rdo;
 
 use std::fmt::Debug;
 
@@ -70,29 +71,45 @@ use serde::{Deserialize, Serialize};
 
 use super::config::ConfigError;
 use super::survey::Survey;
-use crate::ops::Pinhole;
+use super::worth::Worth;
+use super::{TrainConfig, TrainError, Trainer};
 use crate::real::Real;
 use crate::scene::{ModelShape, Scene};
-use crate::step::{StepInfo, Terms, Workspace};
+use crate::step::{StepInfo, Terms};
 
 pub use detail::Detail;
 pub use distribution::Distribution;
 pub use pruning::Pruning;
+pub use rdo::Rdo;
 
 /// What a module may look at between two iterations.
 #[derive(Clone, Copy, Debug)]
 pub struct RunView<'a> {
-    /// The scene as it stands.
-    pub scene: &'a Scene<f32>,
-    /// The run's seed.
-    pub seed: u64,
-    pub(super) cameras: &'a [&'a Pinhole<f32>],
+    pub(super) trainer: &'a Trainer<'a>,
 }
 
 impl RunView<'_> {
+    /// The scene as it stands.
+    pub fn scene(&self) -> &Scene<f32> {
+        &self.trainer.scene
+    }
+
+    /// How it is trained.
+    pub fn config(&self) -> &TrainConfig {
+        self.trainer.config()
+    }
+
     /// What the views that training sees show of the scene; see [`Survey::new`].
     pub fn survey(&self, contributions: bool) -> Survey {
-        Survey::new(self.scene, &mut Workspace::new(&self.scene.shape), self.cameras, contributions)
+        self.trainer.survey(contributions)
+    }
+
+    /// What the images would lose with each offset and anchor, and what these cost; see [`Worth`].
+    ///
+    /// # Errors
+    /// [`TrainError::NoContext`] before there is a context model that says what values cost.
+    pub fn worth(&self) -> Result<Worth, TrainError> {
+        self.trainer.worth()
     }
 }
 
@@ -101,6 +118,8 @@ impl RunView<'_> {
 pub enum AnchorChange {
     /// `[n]` drops the anchors that are not marked.
     Keep(Vec<bool>),
+    /// Switches these offsets off, counted through all anchors', and drops the anchors that have none left.
+    Mask(Vec<usize>),
     /// `[n]` gives every anchor its [rank](crate::scene::Anchors::prune_rank).
     Rank(Vec<f32>),
 }
@@ -121,8 +140,16 @@ pub trait Module: Terms<f32> + Terms<f64> + Debug {
     }
 
     /// What becomes of the anchors after an iteration, when its time has come.
-    fn event(&self, _at: &StepInfo, _run: &RunView<'_>) -> Option<AnchorChange> {
-        None
+    ///
+    /// # Errors
+    /// What keeps it from finding out.
+    fn event(&self, _at: &StepInfo, _run: &RunView<'_>) -> Result<Option<AnchorChange>, TrainError> {
+        Ok(None)
+    }
+
+    /// Whether the masks of offsets are learned beside it.
+    fn learns_masks(&self) -> bool {
+        true
     }
 
     /// Share of the anchors that the step leaves out, those of the lowest [places](crate::scene::Anchors::prune_rank) first.
@@ -160,13 +187,20 @@ macro_rules! modules {
 modules! {
     /// Features near a normal distribution.
     distribution: Distribution,
-    /// Fewer anchors, or an order in which to leave them out.
+    /// Fewer anchors, or an order in which to leave them out, by opacity.
     pruning: Pruning,
+    /// Fewer anchors and offsets, by what they are worth a bit.
+    rdo: Rdo,
     /// A residual on the colours.
     detail: Detail,
 }
 
 impl Modules {
+    /// Whether masks of offsets are learned with the attached modules.
+    pub fn learns_masks(&self) -> bool {
+        self.each().into_iter().all(|module| module.learns_masks())
+    }
+
     /// The shape that the attached modules work on.
     pub fn shape(&self, shape: ModelShape) -> ModelShape {
         self.each().into_iter().fold(shape, |shape, module| module.shape(shape))

@@ -41,6 +41,21 @@ fn the_rate_falls_and_masks_close_where_bits_weigh() {
 }
 
 #[test]
+fn masks_stay_once_the_integer_model_decides() {
+    let capture = tiny_capture();
+    let mut config = tiny_hac_config(100);
+    config.hac = config::Hac { lambda: 0.5, ..config.hac };
+    let mut trainer = Trainer::new(&capture, config).unwrap();
+    let mut masks = Vec::new();
+    while !trainer.is_done() {
+        let same = masks == trainer.scene.anchors.mask_logits;
+        assert_eq!(same, trainer.config.phase(trainer.iteration) == Phase::IntegerModel, "{}", trainer.iteration);
+        masks.clone_from(&trainer.scene.anchors.mask_logits);
+        trainer.advance().unwrap();
+    }
+}
+
+#[test]
 fn a_finished_scene_keeps_its_values_and_counts_the_bits_of_its_symbols() {
     let capture = tiny_capture();
     let mut trainer = Trainer::new(&capture, tiny_hac_config(80)).unwrap();

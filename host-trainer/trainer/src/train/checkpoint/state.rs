@@ -24,6 +24,12 @@ pub enum RestoreError {
     /// The capture is another one.
     #[error("this is not the capture that the run began with: {0}")]
     Capture(#[from] CaptureDifference),
+    /// A fork asks for another scene than the checkpoint holds.
+    #[error("a fork keeps `train.{key}` of its run; leave out what sets it")]
+    Fork {
+        /// The key of the setting that differs.
+        key: &'static str,
+    },
     /// No trainer can be made of capture and configuration.
     #[error(transparent)]
     Train(#[from] TrainError),
@@ -91,6 +97,28 @@ impl<'a> Trainer<'a> {
             learned;
         trainer.check()?;
         Ok(Restored { trainer, written_by })
+    }
+
+    /// As [`Self::restore`], and goes on as `config` says: the scene, the moments and the random numbers are the checkpoint's.
+    ///
+    /// # Errors
+    /// As [`Self::restore`]; [`RestoreError::Fork`] when `config` asks for another model, lattice or split of the views.
+    pub fn fork(capture: &'a Capture, bytes: &[u8], config: TrainConfig) -> Result<Restored<'a>, RestoreError> {
+        let mut restored = Self::restore(capture, bytes)?;
+        config.validate().map_err(TrainError::from)?;
+        let (begun, config) = (restored.trainer.config, config.resolved_for(capture));
+        for (key, same) in [
+            ("shape", begun.shape == config.shape),
+            ("voxel_size", begun.voxel_size == config.voxel_size),
+            ("validation_every", begun.validation_every == config.validation_every),
+        ] {
+            if !same {
+                return Err(RestoreError::Fork { key });
+            }
+        }
+        restored.trainer.config = config;
+        restored.trainer.check()?;
+        Ok(restored)
     }
 
     /// That counters and lengths agree with configuration and capture.

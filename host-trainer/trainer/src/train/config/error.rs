@@ -21,6 +21,12 @@ pub enum ConfigError {
     /// Every training view would be held out.
     #[error("train.validation_every is 1, needs 0 (none) or at least 2: some views have to be trained on")]
     NoViewLeft,
+    /// A module that weighs bits, in a run that has none.
+    #[error("{key} weighs error against bits, needs train.backbone hac, which has a rate")]
+    NoRate {
+        /// The key that asks for it.
+        key: &'static str,
+    },
 }
 
 /// Refuses a value outside its range; NaN is outside of all.

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::SETTLE_FROM;
 use crate::scene::QuantisationSteps;
 
 /// The kinds of scene that can be trained.
@@ -47,7 +48,7 @@ impl Default for Hac {
             noise_from: 3_000.0 / 30_000.0,
             pause_until: 4_000.0 / 30_000.0,
             context_from: 1.0 / 3.0,
-            exact_from: 0.95,
+            exact_from: SETTLE_FROM,
             sample: 0.05,
             mask_weight: 5e-4,
             grid_weight: 0.0,

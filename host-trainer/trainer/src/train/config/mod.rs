@@ -10,26 +10,41 @@ pub(in crate::train) use error::within;
 pub use hac::{Backbone, Hac};
 
 use super::module::Modules;
+use super::module::pruning::Rank;
 use crate::scene::ModelShape;
 use crate::step::{LossWeights, Phase};
 use pocketsplat_capture::dataset::{Capture, PointsOrigin};
 
-/// A geometric path of a learning rate over the run: from `start` to `end`; equal values make it constant.
+/// A learning rate over the run: `start` until share `from` is done, then on a geometric path to `end`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LearningRate {
     /// At iteration 0.
     pub start: f64,
     /// At the last iteration.
     pub end: f64,
+    /// Share of the run up to which it stays at `start`.
+    #[serde(default)]
+    pub from: f64,
 }
 
 impl LearningRate {
-    /// lr(t) = start^(1 − t/T) · end^(t/T) with `progress` = t/T.
+    /// A geometric path over the whole run.
+    pub const fn falling(start: f64, end: f64) -> Self {
+        Self { start, end, from: 0.0 }
+    }
+
+    /// lr(t) = start^(1 − u) · end^u with `progress` = t/T and u = max(0, (t/T − from)/(1 − from)).
     pub fn at(&self, progress: f64) -> f64 {
-        if self.start <= 0.0 {
-            return 0.0;
+        if self.start <= 0.0 || progress <= self.from {
+            return self.start.max(0.0);
         }
-        (self.start.ln() * (1.0 - progress) + self.end.ln() * progress).exp()
+        let fallen = (progress - self.from) / (1.0 - self.from);
+        (self.start.ln() * (1.0 - fallen) + self.end.ln() * fallen).exp()
+    }
+
+    /// The same path, `factor` times as high.
+    pub fn times(&self, factor: f64) -> Self {
+        Self { start: self.start * factor, end: self.end * factor, ..*self }
     }
 }
 
@@ -61,22 +76,27 @@ pub struct Rates {
 
 /// The rate of the background.
 const fn background_rate() -> LearningRate {
-    LearningRate { start: 0.01, end: 1e-4 }
+    LearningRate::falling(0.01, 1e-4)
 }
+
+/// Share of the run after which the rates that the published trainers keep constant fall too: a value that still moves at the
+/// end flips across the borders between symbols until the last step.
+pub(super) const SETTLE_FROM: f64 = 0.85;
 
 impl Default for Rates {
     fn default() -> Self {
-        let constant = |rate| LearningRate { start: rate, end: rate };
+        let falling = LearningRate::falling;
+        let settling = |start, end| LearningRate { start, end, from: SETTLE_FROM };
         Self {
-            offset: LearningRate { start: 0.01, end: 1e-4 },
-            feature: constant(0.0075),
-            log_scale: constant(0.007),
-            opacity_head: LearningRate { start: 0.002, end: 2e-5 },
-            covariance_head: constant(0.004),
-            colour_head: LearningRate { start: 0.008, end: 5e-5 },
-            mask: LearningRate { start: 0.01, end: 1e-4 },
-            grid: LearningRate { start: 0.005, end: 1e-5 },
-            context: LearningRate { start: 0.005, end: 1e-5 },
+            offset: falling(0.01, 1e-4),
+            feature: settling(0.0075, 5e-4),
+            log_scale: settling(0.007, 5e-4),
+            opacity_head: falling(0.002, 2e-5),
+            covariance_head: settling(0.004, 4e-4),
+            colour_head: falling(0.008, 5e-5),
+            mask: falling(0.01, 1e-4),
+            grid: falling(0.005, 1e-5),
+            context: falling(0.005, 1e-5),
             background: background_rate(),
         }
     }
@@ -220,6 +240,16 @@ impl TrainConfig {
     pub fn validate(&self) -> Result<(), ConfigError> {
         self.modules.each().into_iter().try_for_each(|module| module.check())?;
         within("train.iterations", f64::from(self.iterations), 1.0, 10_000_000.0)?;
+        let by_worth = self.modules.pruning.filter(|pruning| pruning.rank == Rank::Worth).map(|pruning| pruning.at);
+        let weighs =
+            [("train.modules.rdo.from", self.modules.rdo.map(|rdo| rdo.from)), ("train.modules.pruning.at", by_worth)];
+        for (key, at) in weighs.into_iter().filter_map(|(key, at)| Some((key, at?))) {
+            if self.backbone == Backbone::Scaffold {
+                return Err(ConfigError::NoRate { key });
+            }
+            // The context model begins with the iteration after its share.
+            within(key, at, self.hac.context_from + 1.0 / f64::from(self.iterations), 1.0)?;
+        }
         within("train.shape.feature_dim", self.shape.feature_dim as f64, 1.0, 256.0)?;
         within("train.shape.n_offsets", self.shape.n_offsets as f64, 1.0, 32.0)?;
         within("train.shape.colour_hidden", self.shape.colour_hidden as f64, 0.0, 256.0)?;
@@ -257,6 +287,7 @@ impl TrainConfig {
             // A path to 0 has no logarithm; a rate that starts at 0 stays there.
             let least_end = if rate.start > 0.0 { f64::MIN_POSITIVE } else { 0.0 };
             within(format!("train.rates.{name}.end"), rate.end, least_end, 10.0)?;
+            within(format!("train.rates.{name}.from"), rate.from, 0.0, 1.0 - 1e-6)?;
         }
         within("train.loss.dssim", self.loss.dssim, 0.0, 1.0)?;
         within("train.loss.volume", self.loss.volume, 0.0, 1e6)?;

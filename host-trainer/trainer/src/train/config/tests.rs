@@ -1,6 +1,16 @@
 use super::*;
 
 #[test]
+fn a_rate_stays_and_then_falls_on_a_geometric_path() {
+    let rate = LearningRate { start: 1e-2, end: 1e-4, from: 0.8 };
+    for (progress, expected) in [(0.0, 1e-2), (0.8, 1e-2), (0.9, 1e-3), (1.0, 1e-4)] {
+        assert!((rate.at(progress) / expected - 1.0).abs() < 1e-9, "{progress}: {}", rate.at(progress));
+    }
+    assert!((LearningRate::falling(1e-2, 1e-4).at(0.5) / 1e-3 - 1.0).abs() < 1e-9);
+    assert_eq!(rate.times(0.0).at(0.9), 0.0);
+}
+
+#[test]
 fn the_defaults_of_each_backbone_are_accepted() {
     for backbone in [Backbone::Scaffold, Backbone::Hac] {
         assert_eq!(TrainConfig::of(backbone).validate(), Ok(()));
@@ -28,8 +38,8 @@ fn phases_follow_each_other_at_their_shares_of_the_run() {
         (3_001, Phase::Noise),
         (10_000, Phase::Noise),
         (10_001, Phase::Context),
-        (28_500, Phase::Context),
-        (28_501, Phase::IntegerModel),
+        (25_500, Phase::Context),
+        (25_501, Phase::IntegerModel),
         (30_000, Phase::IntegerModel),
     ] {
         assert_eq!(config.phase(iteration), phase, "{iteration}");

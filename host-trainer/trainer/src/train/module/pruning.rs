@@ -10,6 +10,7 @@ use crate::ops::opacity_target::forward_backward;
 use crate::real::Real;
 use crate::scene::Scene;
 use crate::step::{Block, StepInfo, Terms};
+use crate::train::TrainError;
 use crate::train::config::{ConfigError, within};
 
 /// What the event does with the anchors it picks.
@@ -43,6 +44,8 @@ pub enum Rank {
     Opacity,
     /// Σ of α·T over the pixels of all training views: what it contributes to the images.
     Contribution,
+    /// Squared error that its removal adds to the training views, for each of its bits; needs a rate.
+    Worth,
 }
 
 /// A loss that keeps opacities low, and one event that prunes by what is left of them (the plug-and-play paper, eq. 4 and
@@ -143,25 +146,25 @@ impl Module for Pruning {
         within("train.modules.pruning.rate", self.rate, 0.0, most)
     }
 
-    fn event(&self, at: &StepInfo, run: &RunView<'_>) -> Option<AnchorChange> {
-        if !at.is_at(self.at) || run.scene.anchors.is_empty() {
-            return None;
+    fn event(&self, at: &StepInfo, run: &RunView<'_>) -> Result<Option<AnchorChange>, TrainError> {
+        if !at.is_at(self.at) || run.scene().anchors.is_empty() {
+            return Ok(None);
         }
-        let survey = run.survey(self.rank == Rank::Contribution);
         let scores = match self.rank {
-            Rank::Opacity => survey.opacity_per_view(),
-            Rank::Contribution => survey.contribution,
+            Rank::Opacity => run.survey(false).opacity_per_view(),
+            Rank::Contribution => run.survey(true).contribution,
+            Rank::Worth => run.worth()?.per_bit(),
         };
         // A stream of its own: the run's other random numbers do not depend on modules.
-        let mut rng = ChaCha8Rng::seed_from_u64(run.seed);
+        let mut rng = ChaCha8Rng::seed_from_u64(run.config().seed);
         rng.set_stream(1);
         let ranks = self.prune_ranks(&scores, &mut rng);
-        Some(match self.form {
+        Ok(Some(match self.form {
             Form::Tiered => AnchorChange::Rank(ranks),
             Form::Hard => {
                 AnchorChange::Keep(ranks.iter().map(|prune_rank| *prune_rank >= as_prune_rank(self.rate)).collect())
             }
-        })
+        }))
     }
 
     fn pruned_share(&self, at: &StepInfo) -> f32 {

@@ -69,6 +69,19 @@ pub enum RunError {
         /// Why not.
         source: RestoreError,
     },
+    /// Nothing to begin another run from.
+    #[error(
+        "{} has no checkpoint of iteration {iteration}, it has {}; train it again with --fork-at {iteration}",
+        path.display(), if kept.is_empty() { "none".to_owned() } else { format!("those of {kept:?}") }
+    )]
+    NoCheckpoint {
+        /// The run folder.
+        path: PathBuf,
+        /// What was asked for.
+        iteration: u32,
+        /// What there is.
+        kept: Vec<u32>,
+    },
     /// No checkpoint is sound.
     #[error("no checkpoint of the run is sound ({}); start anew with --overwrite", faults.join("; "))]
     AllDamaged {

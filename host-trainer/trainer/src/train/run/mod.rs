@@ -5,7 +5,7 @@
 //! | `config.toml` | the resolved configuration |
 //! | `effects.csv` | what each effect was worth in pilots, where they were measured |
 //! | `progress.csv` | loss and PSNR over the run, see [`ProgressLog`] |
-//! | `iteration-00001500.checkpoint` | the state of the run, see [`super::checkpoint`]; the last two are kept |
+//! | `iteration-00001500.checkpoint` | the state of the run, see [`super::checkpoint`]; the last two are kept, and those to fork from |
 //! | `result.json` | what the finished run reports; with it, the run is over |
 //! | `lock` | locked by the process that works in the folder; the system frees it when that process ends, however |
 
@@ -24,7 +24,7 @@ use std::time::Instant;
 
 pub use error::RunError;
 pub use progress_log::ProgressLog;
-pub use store::Resumed;
+pub use store::{Resumed, fork};
 
 use super::{Observer, Trainer};
 
@@ -59,6 +59,8 @@ pub enum Ending {
 #[derive(Debug)]
 pub struct RunFolder {
     path: PathBuf,
+    /// Iterations whose checkpoints are written and kept, so that other runs can begin there.
+    forks_at: Vec<u32>,
     _lock: File,
 }
 
@@ -81,7 +83,7 @@ impl RunFolder {
         if !overwrite && !folder.is_finished() && !folder.checkpoints()?.is_empty() {
             return Err(RunError::Unfinished { path: path.to_owned() });
         }
-        folder.clear_checkpoints()?;
+        folder.clear_checkpoints(|_| true)?;
         for name in [RESULT, LOG, EFFECTS] {
             files::remove(&path.join(name))?;
         }
@@ -110,13 +112,19 @@ impl RunFolder {
         let lock = open.map_err(|source| RunError::io("open", &name, source))?;
         match lock.try_lock() {
             Ok(()) => {
-                let folder = Self { path: path.to_owned(), _lock: lock };
+                let folder = Self { path: path.to_owned(), forks_at: Vec::new(), _lock: lock };
                 folder.clear_partial_files()?;
                 Ok(folder)
             }
             Err(fs::TryLockError::WouldBlock) => Err(RunError::InUse { path: path.to_owned() }),
             Err(fs::TryLockError::Error(source)) => Err(RunError::io("lock", &name, source)),
         }
+    }
+
+    /// The same; checkpoints after these iterations are written and stay, whatever happens.
+    #[must_use]
+    pub fn forking_at(self, iterations: &[u32]) -> Self {
+        Self { forks_at: iterations.to_vec(), ..self }
     }
 
     /// Where it is.
@@ -167,6 +175,7 @@ impl RunFolder {
                 Interval::Iterations(n) => n > 0 && trainer.iteration > 0 && trainer.iteration.is_multiple_of(n),
                 Interval::Seconds(s) => saved_at.elapsed().as_secs_f64() >= f64::max(s, write_s / LARGEST_SHARE),
             };
+            let due = due || self.forks_at.contains(&trainer.iteration);
             if (ends || due) && saved_iteration != Some(trainer.iteration) {
                 let started = Instant::now();
                 self.save(trainer)?;
@@ -181,12 +190,12 @@ impl RunFolder {
         }
     }
 
-    /// Ends the run: keeps `result`, and removes the checkpoints unless they are to be kept.
+    /// Ends the run: keeps `result`, and removes the checkpoints unless they are to be kept or to be forked from.
     ///
     /// # Errors
     /// [`RunError::Io`].
     pub fn finish(self, result: &str, keep_checkpoints: bool) -> Result<(), RunError> {
         files::write_whole(&self.path.join(RESULT), |out| out.write_all(result.as_bytes()))?;
-        if keep_checkpoints { Ok(()) } else { self.clear_checkpoints() }
+        self.clear_checkpoints(|iteration| !keep_checkpoints && !self.forks_at.contains(&iteration))
     }
 }

@@ -1,11 +1,12 @@
-//! The checkpoints in a run folder: the last two, so that one is left when the newest turns out damaged.
+//! The checkpoints in a run folder: the last two, so that one is left when the newest turns out damaged, and those that other
+//! runs are to begin from.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::{RunError, RunFolder, files};
-use crate::train::Trainer;
 use crate::train::checkpoint::{CheckpointFault, RestoreError, Restored};
+use crate::train::{TrainConfig, Trainer};
 use pocketsplat_capture::dataset::Capture;
 
 /// Checkpoints that are kept.
@@ -13,6 +14,42 @@ const KEPT: usize = 2;
 
 const PREFIX: &str = "iteration-";
 const EXTENSION: &str = "checkpoint";
+
+fn file_name(iteration: u32) -> String {
+    format!("{PREFIX}{iteration:08}.{EXTENSION}")
+}
+
+fn checkpoints_in(folder: &Path) -> Result<Vec<(u32, PathBuf)>, RunError> {
+    let iteration = |name: &str| name.strip_prefix(PREFIX)?.strip_suffix(EXTENSION)?.strip_suffix('.')?.parse().ok();
+    let mut found: Vec<(u32, PathBuf)> = files::names(folder)?
+        .into_iter()
+        .filter_map(|name| Some((iteration(name.to_str()?)?, folder.join(name))))
+        .collect();
+    found.sort_unstable();
+    found.reverse();
+    Ok(found)
+}
+
+/// The state of the run in `folder` after `iteration`, to go on as `config` says in another folder.
+///
+/// # Errors
+/// [`RunError::NoCheckpoint`] when none was kept of that iteration, [`RunError::Restore`] when it is damaged or does not
+/// fit.
+pub fn fork<'a>(
+    folder: &Path,
+    iteration: u32,
+    capture: &'a Capture,
+    config: TrainConfig,
+) -> Result<Trainer<'a>, RunError> {
+    let path = folder.join(file_name(iteration));
+    if !path.is_file() {
+        let kept = checkpoints_in(folder)?.into_iter().rev().map(|(iteration, _)| iteration).collect();
+        return Err(RunError::NoCheckpoint { path: folder.to_owned(), iteration, kept });
+    }
+    let bytes = fs::read(&path).map_err(|source| RunError::io("read", &path, source))?;
+    let restored = Trainer::fork(capture, &bytes, config);
+    restored.map(|restored| restored.trainer).map_err(|source| RunError::Restore { path, source })
+}
 
 /// A run taken up again.
 #[derive(Debug)]
@@ -24,16 +61,9 @@ pub struct Resumed<'a> {
 }
 
 impl RunFolder {
-    /// The checkpoints, newest first.
-    pub(super) fn checkpoints(&self) -> Result<Vec<PathBuf>, RunError> {
-        let iteration =
-            |name: &str| name.strip_prefix(PREFIX)?.strip_suffix(EXTENSION)?.strip_suffix('.')?.parse().ok();
-        let mut found: Vec<(u32, PathBuf)> = files::names(&self.path)?
-            .into_iter()
-            .filter_map(|name| Some((iteration(name.to_str()?)?, self.path.join(name))))
-            .collect();
-        found.sort_unstable();
-        Ok(found.into_iter().rev().map(|(_, path)| path).collect())
+    /// Iterations and files of the checkpoints, newest first.
+    pub(super) fn checkpoints(&self) -> Result<Vec<(u32, PathBuf)>, RunError> {
+        checkpoints_in(&self.path)
     }
 
     /// Writes a checkpoint, and removes those that are no longer needed.
@@ -41,12 +71,9 @@ impl RunFolder {
     /// # Errors
     /// [`RunError::Write`] when there is no room or right to write; the older checkpoints stay.
     pub fn save(&self, trainer: &Trainer<'_>) -> Result<(), RunError> {
-        let name = format!("{PREFIX}{:08}.{EXTENSION}", trainer.iteration);
-        files::write_whole(&self.path.join(name), |out| trainer.save(out))?;
-        for old in self.checkpoints()?.into_iter().skip(KEPT) {
-            files::remove(&old)?;
-        }
-        Ok(())
+        files::write_whole(&self.path.join(file_name(trainer.iteration)), |out| trainer.save(out))?;
+        let passing = self.checkpoints()?.into_iter().filter(|(iteration, _)| !self.forks_at.contains(iteration));
+        passing.skip(KEPT).try_for_each(|(_, path)| files::remove(&path))
     }
 
     /// The state in the newest sound checkpoint; none when the run was stopped before it wrote one.
@@ -56,7 +83,7 @@ impl RunFolder {
     /// sound.
     pub fn resume<'a>(&self, capture: &'a Capture) -> Result<Option<Resumed<'a>>, RunError> {
         let mut passed_over = Vec::new();
-        for path in self.checkpoints()? {
+        for (_, path) in self.checkpoints()? {
             let bytes = fs::read(&path).map_err(|source| RunError::io("read", &path, source))?;
             match Trainer::restore(capture, &bytes) {
                 Ok(restored) => return Ok(Some(Resumed { restored, passed_over })),
@@ -69,9 +96,10 @@ impl RunFolder {
         if passed_over.is_empty() { Ok(None) } else { Err(RunError::AllDamaged { faults: passed_over }) }
     }
 
-    /// Removes all checkpoints.
-    pub(super) fn clear_checkpoints(&self) -> Result<(), RunError> {
-        self.checkpoints()?.iter().try_for_each(|path| files::remove(path))
+    /// Removes the checkpoints for which `goes`.
+    pub(super) fn clear_checkpoints(&self, goes: impl Fn(u32) -> bool) -> Result<(), RunError> {
+        let mut gone = self.checkpoints()?.into_iter().filter(|(iteration, _)| goes(*iteration));
+        gone.try_for_each(|(_, path)| files::remove(&path))
     }
 
     /// Removes what a process left that died while it wrote.

@@ -82,6 +82,36 @@ fn a_folder_takes_a_run_through_interruption_and_damage_to_the_same_end() {
 }
 
 #[test]
+fn a_fork_begins_where_its_run_stood() {
+    let (home, capture) = (tempfile::tempdir().unwrap(), tiny_capture());
+    let path = home.path().join("a.run");
+    let mut folder = RunFolder::start(&path, "", false).unwrap().forking_at(&[12, 20]);
+    let (_, scene, _) = train(&mut folder, Interval::Iterations(7), u32::MAX);
+    folder.finish("{}", false).unwrap();
+    let config = tiny_config(ITERATIONS);
+    let mut same = fork(&path, 12, &capture, config).unwrap();
+    assert_eq!(same.iteration, 12);
+    let mut other = config;
+    other.rates.feature.end = 1e-6;
+    let mut other = fork(&path, 20, &capture, other).unwrap();
+    for trainer in [&mut same, &mut other] {
+        while !trainer.is_done() {
+            trainer.advance().unwrap();
+        }
+    }
+    assert!(same.scene == scene, "the same settings, the same bits");
+    assert!(other.scene != scene && other.scene.anchors.len() == scene.anchors.len());
+
+    let message = fork(&path, 35, &capture, config).unwrap_err().to_string();
+    assert!(message.contains("no checkpoint of iteration 35, it has those of [12, 20]"), "{message}");
+    let mut wider = config;
+    wider.shape.feature_dim += 1;
+    let error = fork(&path, 12, &capture, wider).unwrap_err();
+    let source = std::error::Error::source(&error).unwrap().to_string();
+    assert!(source.contains("a fork keeps `train.shape`"), "{error}: {source}");
+}
+
+#[test]
 fn checkpoints_by_time_wait_for_their_time() {
     let home = tempfile::tempdir().unwrap();
     for (seconds, at_least) in [(0.0, 2), (1e9, 1)] {

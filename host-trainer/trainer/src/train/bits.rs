@@ -1,0 +1,91 @@
+//! What the context model says that values cost.
+
+use pocketsplat_core::context::{Context, Group, N_GROUPS};
+use rayon::prelude::*;
+
+use crate::ops::simd::Level;
+use crate::ops::{anchor_bits, hash_grid, head, mask};
+use crate::scene::{ContextModel, Scene};
+
+/// Anchors that one task looks at.
+const ROWS: usize = 512;
+
+/// Bits of every anchor's values under the float model's means and scales and the integer model's steps.
+///
+/// Values need not be rounded: the cost is that of an interval as wide as a step around each.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Bits {
+    /// `[n]` of features, log-scales and drawn offsets; 0 where no offset is drawn.
+    pub of_anchors: Vec<[f64; N_GROUPS]>,
+    /// `[n, K]` of the three values of each drawn offset; 0 where it is not.
+    pub of_offsets: Vec<f32>,
+}
+
+impl Bits {
+    /// Of a scene with a context model; empty without.
+    ///
+    /// * `context`: the integers of the scene's model.
+    pub fn of(scene: &Scene<f32>, context: &Context<'_>) -> Self {
+        let Some(model) = &scene.context else { return Self::default() };
+        let anchors: Vec<usize> = (0..scene.anchors.len()).collect();
+        let parts: Vec<Self> =
+            anchors.par_chunks(ROWS).map(|rows| Self::of_rows(scene, model, context, rows)).collect();
+        let of_anchors = parts.iter().flat_map(|part| part.of_anchors.iter().copied()).collect();
+        let of_offsets = parts.iter().flat_map(|part| part.of_offsets.iter().copied()).collect();
+        Self { of_anchors, of_offsets }
+    }
+
+    fn of_rows(scene: &Scene<f32>, model: &ContextModel<f32>, context: &Context<'_>, rows: &[usize]) -> Self {
+        let (shape, anchors) = (&scene.shape, &scene.anchors);
+        let (widths, k) = ([shape.feature_dim, shape.n_log_scales(), 3 * shape.n_offsets], shape.n_offsets);
+        let units: Vec<[u16; 3]> = rows.iter().map(|a| model.frame.unit(anchors.lattice[*a])).collect();
+        let (n, n_out) = (rows.len(), model.mlp.n_out);
+        let mut inputs = vec![0.0; n * model.mlp.n_in];
+        hash_grid::forward(&model.levels, &model.rows, &units, &mut inputs);
+        let (mut hidden, mut outputs) = (vec![0.0; n * model.mlp.n_hidden], vec![0.0; n * n_out]);
+        head::forward(&model.mlp, &inputs, &mut hidden, &mut outputs);
+        let (mut features, mut units) = (vec![0; context.n_inputs()], vec![0; context.n_hidden()]);
+        let mut bits = Self::default();
+        for (a, output) in rows.iter().zip(outputs.chunks_exact_mut(n_out)) {
+            let steps = anchor_steps(context, anchors.lattice[*a], &mut features, &mut units);
+            let exponents = &mut output[n_out - N_GROUPS..];
+            for (exponent, (step, base)) in exponents.iter_mut().zip(steps.iter().zip(model.base_steps)) {
+                *exponent = (step / base).log2();
+            }
+            let of = |values: &[f32], width: usize| values[a * width..(a + 1) * width].to_vec();
+            let values =
+                [of(&anchors.features, widths[0]), of(&anchors.log_scales, widths[1]), of(&anchors.offsets, widths[2])];
+            let drawn: Vec<bool> = of(&anchors.mask_logits, k).into_iter().map(mask::is_open).collect();
+            if !drawn.contains(&true) {
+                bits.of_anchors.push([0.0; N_GROUPS]);
+                bits.of_offsets.extend(std::iter::repeat_n(0.0, k));
+                continue;
+            }
+            let values = values.each_ref().map(Vec::as_slice);
+            let row = anchor_bits::Rows { shape, base_steps: model.base_steps, values, drawn: &drawn, outputs: output };
+            let (of_anchor, of_offsets) = anchor_bits::forward(Level::detect(), &row);
+            bits.of_anchors.push(of_anchor);
+            bits.of_offsets.extend(of_offsets);
+        }
+        bits
+    }
+}
+
+/// Bits of all features, log-scales and drawn offsets.
+pub fn of_scene(scene: &Scene<f32>, context: &Context<'_>) -> [f64; N_GROUPS] {
+    let bits = Bits::of(scene, context);
+    bits.of_anchors.iter().fold([0.0; N_GROUPS], |sum, bits| std::array::from_fn(|i| sum[i] + bits[i]))
+}
+
+/// The steps of an anchor, in the order of the channels, as the integer model has them.
+pub(super) fn anchor_steps(
+    context: &Context<'_>,
+    lattice: [i32; 3],
+    features: &mut [i16],
+    hidden: &mut [i16],
+) -> [f32; N_GROUPS] {
+    context.features(lattice, features);
+    context.hidden(features, hidden);
+    let steps = context.steps(hidden);
+    [Group::Feature, Group::LogScale, Group::Offset].map(|group| steps.value(group))
+}

@@ -1,0 +1,153 @@
+//! Rate–distortion optimised pruning: what is not worth its bits goes.
+
+use serde::{Deserialize, Serialize};
+
+use super::{AnchorChange, Module, RunView};
+use crate::real::Real;
+use crate::step::{StepInfo, Terms};
+use crate::train::TrainError;
+use crate::train::config::{ConfigError, within};
+use crate::train::worth::Worth;
+
+/// Offsets and anchors leave whose removal adds less squared error than their bits are worth, at a few events after which
+/// the rest learns to do without them. It takes the place of learned masks.
+///
+/// An offset goes when D < strength·μ·R, D the error of [`Worth::of_offsets`], R its bits and μ the price of a bit at the
+/// run's λ; an anchor likewise with the bits of all its values. So the scene keeps what lowers D + strength·μ·R, the
+/// Lagrangian of coding theory (Sullivan and Wiegand 1998, "Rate-distortion optimization for video compression", eq. 3),
+/// as far as removals do not interact.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Rdo {
+    /// Multiple of the price of a bit that follows from λ.
+    pub strength: f64,
+    /// Shares of the run after which the first and the last event come; the first needs a context model.
+    pub from: f64,
+    /// See `from`.
+    pub until: f64,
+    /// Number of events, evenly spaced; with one it comes at `from`.
+    pub events: u32,
+}
+
+impl Default for Rdo {
+    fn default() -> Self {
+        Self { strength: 1.0, from: 0.5, until: 0.7, events: 2 }
+    }
+}
+
+impl Rdo {
+    /// Shares of the run after which events come.
+    fn shares(&self) -> impl Iterator<Item = f64> {
+        let spacing = (self.until - self.from) / f64::from(self.events.max(2) - 1);
+        let Self { from, .. } = *self;
+        (0..self.events).map(move |event| from + spacing * f64::from(event))
+    }
+
+    /// The offsets to switch off, counted through all anchors'; never all of them.
+    pub fn worthless(&self, worth: &Worth) -> Vec<usize> {
+        let k = worth.of_offsets.len() / worth.of_anchors.len().max(1);
+        let price = self.strength * worth.bit_price;
+        let goes = |offset: usize| {
+            let anchor = offset / k;
+            worth.of_offsets[offset] < price * f64::from(worth.bits.of_offsets[offset])
+                || worth.of_anchors[anchor] < price * worth.anchor_bits(anchor)
+        };
+        // A scene without anchors has nothing left to learn with.
+        let best = (0..worth.of_offsets.len()).max_by(|a, b| worth.of_offsets[*a].total_cmp(&worth.of_offsets[*b]));
+        (0..worth.of_offsets.len()).filter(|offset| Some(*offset) != best && goes(*offset)).collect()
+    }
+}
+
+impl Module for Rdo {
+    fn check(&self) -> Result<(), ConfigError> {
+        within("train.modules.rdo.strength", self.strength, 0.0, 1e6)?;
+        within("train.modules.rdo.from", self.from, 0.0, 1.0)?;
+        within("train.modules.rdo.until", self.until, self.from, 1.0)?;
+        within("train.modules.rdo.events", f64::from(self.events), 1.0, 100.0)
+    }
+
+    fn event(&self, at: &StepInfo, run: &RunView<'_>) -> Result<Option<AnchorChange>, TrainError> {
+        if !self.shares().any(|share| at.is_at(share)) {
+            return Ok(None);
+        }
+        Ok(Some(AnchorChange::Mask(self.worthless(&run.worth()?))))
+    }
+
+    fn learns_masks(&self) -> bool {
+        false
+    }
+}
+
+impl<R: Real> Terms<R> for Rdo {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::train::bits::Bits;
+    use crate::train::module::Modules;
+    use crate::train::test_capture::{tiny_capture, tiny_hac_config};
+    use crate::train::{TrainConfig, Trainer};
+
+    #[test]
+    fn what_is_not_worth_its_bits_goes() {
+        // Two anchors of three offsets: the first offset of each pays for itself, the second anchor does not.
+        let worth = Worth {
+            of_offsets: vec![9.0, 0.1, 0.0, 5.0, 0.1, 0.0],
+            of_anchors: vec![100.0, 5.2],
+            bits: Bits {
+                of_anchors: vec![[16.0, 2.0, 2.0], [16.0, 2.0, 2.0]],
+                of_offsets: vec![1.0, 1.0, 0.0, 1.0, 1.0, 0.0],
+            },
+            bit_price: 0.2,
+        };
+        let gone = |strength: f64| Rdo { strength, ..Rdo::default() }.worthless(&worth);
+        assert_eq!(gone(0.0), [0; 0], "what costs nothing stays");
+        assert_eq!(gone(0.6), [1, 4], "42 bits are worth 5.04");
+        assert_eq!(gone(1.0), [1, 3, 4, 5], "they are worth 8.4");
+        assert_eq!(gone(1e6), [1, 2, 3, 4, 5], "the best stays, so that there is a scene");
+    }
+
+    #[test]
+    fn events_are_spaced_evenly() {
+        let shares = |events: u32| Rdo { events, ..Rdo::default() }.shares().collect::<Vec<_>>();
+        assert_eq!(shares(1), [0.5]);
+        assert_eq!(shares(2), [0.5, 0.7]);
+        assert!(shares(3).into_iter().zip([0.5, 0.6, 0.7]).all(|(found, known)| (found - known).abs() < 1e-12));
+    }
+
+    #[test]
+    fn a_run_prunes_at_its_events_alone_and_the_more_the_stronger() {
+        let capture = tiny_capture();
+        let mut left = Vec::new();
+        for strength in [0.0, 1.0, 20.0] {
+            let modules = Modules { rdo: Some(Rdo { strength, ..Rdo::default() }), ..Modules::default() };
+            let mut config = TrainConfig { modules, ..tiny_hac_config(100) };
+            config.densification.until = 0.4;
+            let mut trainer = Trainer::new(&capture, config).unwrap();
+            let drawn = |trainer: &Trainer<'_>| {
+                let anchors = &trainer.scene.anchors;
+                (0..anchors.mask_logits.len()).filter(|offset| anchors.is_drawn(*offset)).count()
+            };
+            for _ in 0..100 {
+                let before = drawn(&trainer);
+                trainer.advance().unwrap();
+                if trainer.iteration > 40 && ![50, 70].contains(&trainer.iteration) {
+                    assert_eq!(drawn(&trainer), before, "after iteration {}: masks are not learned", trainer.iteration);
+                }
+            }
+            assert!((0..trainer.scene.anchors.len()).all(|anchor| trainer.scene.anchors.has_drawn(anchor)));
+            left.push(drawn(&trainer));
+        }
+        assert!(left[0] > left[1] && left[1] > left[2] && left[2] > 0, "{left:?}");
+    }
+
+    #[test]
+    fn a_run_without_a_rate_is_refused() {
+        let modules = Modules { rdo: Some(Rdo::default()), ..Modules::default() };
+        let refused = TrainConfig { modules, ..TrainConfig::default() }.validate();
+        assert_eq!(refused, Err(ConfigError::NoRate { key: "train.modules.rdo.from" }));
+        let early = Modules { rdo: Some(Rdo { from: 0.2, ..Rdo::default() }), ..Modules::default() };
+        let refused = TrainConfig { modules: early, ..tiny_hac_config(100) }.validate().unwrap_err().to_string();
+        assert!(refused.contains("train.modules.rdo.from is 0.2"), "{refused}");
+    }
+}

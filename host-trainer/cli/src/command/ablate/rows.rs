@@ -33,6 +33,14 @@ const PRUNING: &str = "train.modules.pruning={}";
 /// As `--modules tiered-pruning`.
 const TIERED: &str = r#"train.modules.pruning={form="tiered", rate=0.4, rank="contribution", choice="lowest"}"#;
 const DETAIL: &str = "train.modules.detail={}";
+const RDO: &str = "train.modules.rdo={}";
+/// Rates as the published trainers have them: features, log-scales and the covariance head at one rate to the end.
+const CONSTANT_RATES: [&str; 4] = [
+    "train.rates.feature.end=0.0075",
+    "train.rates.log_scale.end=0.007",
+    "train.rates.covariance_head.end=0.004",
+    "train.hac.exact_from=0.95",
+];
 
 /// All rows: the curves, then the options of each module.
 pub(super) fn rows(shape: &ModelShape) -> Vec<Row> {
@@ -54,6 +62,14 @@ pub(super) fn rows(shape: &ModelShape) -> Vec<Row> {
         row("pruning", "hard pruning of 30 % alone", Curve, keys(&[PRUNING])),
         row("detail", "detail compensation alone", Curve, keys(&[DETAIL])),
         row(
+            "rdo",
+            "offsets and anchors that are not worth their bits go, in place of masks",
+            SeededCurve,
+            keys(&[RDO]),
+        ),
+        row("rdo-detail", "the same with detail compensation", Curve, keys(&[RDO, DETAIL])),
+        row("constant-rates", "the backbone with rates that do not settle at the end", Curve, keys(&CONSTANT_RATES)),
+        row(
             "distribution-strong",
             "both weights 0.01",
             Option,
@@ -67,6 +83,7 @@ pub(super) fn rows(shape: &ModelShape) -> Vec<Row> {
         row("pruning-20", "20 %", Option, pruning("rate=0.2")),
         row("pruning-40", "40 %", Option, pruning("rate=0.4")),
         row("tiered", "tiers to 40 %, nothing deleted, by contribution", Option, keys(&[TIERED])),
+        row("tiered-worth", "the same, ranked by error for each bit", Option, tiered("rank=worth")),
         row("tiered-random", "the same with the random choice", Option, tiered("choice=random")),
         row(
             "tiered-opacity",

@@ -40,11 +40,13 @@ struct Candidates<'a> {
 
 impl Candidates<'_> {
     fn coded(&self, channels: ChannelCoding) -> Result<CodedScene, WriteError> {
+        let default = WriteOptions::default();
         let options = WriteOptions {
             channels,
             importance: Some(self.finished.importance.clone()),
             pruning_rates: self.tiers.to_vec(),
-            ..WriteOptions::default()
+            head_fraction_bits: self.finished.head_fraction_bits.map(|bits| [bits; 2]).or(default.head_fraction_bits),
+            ..default
         };
         code(&self.finished.scene, &self.info, &options)
     }

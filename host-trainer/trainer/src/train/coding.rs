@@ -6,15 +6,22 @@ use super::config::TrainConfig;
 use super::{TrainError, Trainer, context_start};
 use crate::integer_model;
 use crate::ops::noise::Stream;
-use crate::scene::{Head, Scene};
+use crate::ops::perturb;
+use crate::scene::{Head, Heads, Scene};
 use crate::step::Phase;
 use crate::step::coding::{Coding, IntegerModel, RateTerms};
 
-/// The integer form of a scene's context model, as bytes and as the network that they stand for.
+/// Bits of the fraction of the heads' weights that a run with a context model ends with: they are drawn so in its last phase, so
+/// that rounding them costs nothing.
+pub(super) const HEAD_FRACTION_BITS: u8 = 7;
+
+/// The integer form of a scene's context model, as bytes and as the network that they stand for, and the heads as they are
+/// written.
 #[derive(Clone, Debug)]
 pub(super) struct Integers {
     pub(super) section: Vec<u8>,
     pub(super) network: Head<f32>,
+    pub(super) heads: Heads<f32>,
 }
 
 impl Integers {
@@ -28,6 +35,7 @@ impl Integers {
         Ok(Self {
             section: integer_model::section(model, n_channels)?,
             network: integer_model::rounded(model, n_channels)?,
+            heads: scene.heads.map(written),
         })
     }
 
@@ -38,6 +46,13 @@ impl Integers {
     pub(super) fn context(&self, scene: &Scene<f32>) -> Result<Context<'_>, TrainError> {
         Ok(integer_model::parse(&self.section, &scene.shape)?)
     }
+}
+
+/// A head whose matrices are multiples of the last bit of the fraction.
+fn written(head: &Head<f32>) -> Head<f32> {
+    let step = (-f32::from(HEAD_FRACTION_BITS)).exp2();
+    let matrix = |weights: &[f32]| weights.iter().map(|weight| perturb::symbol(*weight, step) * step).collect();
+    Head { w1: matrix(&head.w1), w2: matrix(&head.w2), ..head.clone() }
 }
 
 impl Trainer<'_> {

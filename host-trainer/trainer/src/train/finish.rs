@@ -4,7 +4,7 @@ use pocketsplat_core::context::{Context, N_GROUPS};
 use rayon::prelude::*;
 
 use super::bits::{self, anchor_steps};
-use super::coding::Integers;
+use super::coding::{HEAD_FRACTION_BITS, Integers};
 use super::survey::Survey;
 use super::{TrainError, Trainer};
 use crate::ops::perturb;
@@ -26,6 +26,8 @@ pub struct Finished {
     pub background: [u8; 3],
     /// Offsets that were masked because no view draws them.
     pub n_undrawn: usize,
+    /// Bits of the fraction of the heads' weights, where training has ended with weights of so many.
+    pub head_fraction_bits: Option<u8>,
     /// Bits of features, log-scales and drawn offsets under the float context model, in all; none without such a model.
     pub estimated_bits: Option<[f64; N_GROUPS]>,
 }
@@ -44,8 +46,9 @@ impl Trainer<'_> {
         let integers = scene.context.is_some().then(|| Integers::of(&scene)).transpose()?;
         let context = integers.as_ref().map(|integers| integers.context(&self.scene)).transpose()?;
         let mut drawn = scene.clone();
-        if let Some(context) = &context {
+        if let (Some(context), Some(integers)) = (&context, &integers) {
             round_values(&mut drawn, context);
+            drawn.heads = integers.heads.clone();
         }
         let survey = Survey::new(&drawn, &mut Workspace::new(&drawn.shape), &self.trained_cameras(), false);
         let n_undrawn = survey.mask_undrawn(&mut drawn);
@@ -56,7 +59,8 @@ impl Trainer<'_> {
             if scene.anchors.prune_rank.is_empty() { survey.importance } else { scene.anchors.prune_rank.clone() };
         // It is between 0 and 1.
         let background = self.background.map(|channel| (channel * 255.0).round() as u8);
-        Ok(Finished { scene, importance, background, n_undrawn, estimated_bits })
+        let head_fraction_bits = context.is_some().then_some(HEAD_FRACTION_BITS);
+        Ok(Finished { scene, importance, background, n_undrawn, head_fraction_bits, estimated_bits })
     }
 }
 

@@ -11,6 +11,7 @@ pub mod finish;
 pub mod module;
 pub mod optimiser;
 mod outcome;
+mod probing;
 pub mod run;
 pub mod statistics;
 pub mod survey;
@@ -19,6 +20,7 @@ pub(crate) mod test_capture;
 pub mod watchdog;
 pub mod worth;
 
+use std::mem;
 use std::time::Instant;
 
 use cpu_time::ProcessTime;
@@ -212,7 +214,12 @@ impl<'a> Trainer<'a> {
         let pruned_share = modules.each().iter().map(|module| module.pruned_share(&at)).fold(0.0, f32::max);
         let terms = modules.terms();
         let loss = Loss { weights: self.config.loss, modules: Some((&terms, &at)), pruned_share };
+        // Drawn with the heads as they are written; the gradients move the weights behind them (straight through).
+        let behind = integers.as_ref().map(|integers| mem::replace(&mut self.scene.heads, integers.heads.clone()));
         let report = self.workspace.step(&self.scene, &target, &loss, &coding);
+        if let Some(heads) = behind {
+            self.scene.heads = heads;
+        }
         if let Some(cause) = watchdog::inspect(&self.scene, target.truth(), self.background, &self.workspace, &report) {
             let dropped =
                 DroppedStep { iteration: self.iteration, view: self.capture.train[index].name.clone(), cause };

@@ -72,7 +72,7 @@ use serde::{Deserialize, Serialize};
 use super::config::ConfigError;
 use super::survey::Survey;
 use super::worth::Worth;
-use super::{TrainConfig, TrainError, Trainer};
+use super::{TrainError, Trainer};
 use crate::real::Real;
 use crate::scene::{ModelShape, Scene};
 use crate::step::{StepInfo, Terms};
@@ -94,9 +94,9 @@ impl RunView<'_> {
         &self.trainer.scene
     }
 
-    /// How it is trained.
-    pub fn config(&self) -> &TrainConfig {
-        self.trainer.config()
+    /// The run's seed.
+    pub fn seed(&self) -> u64 {
+        self.trainer.config().seed
     }
 
     /// What the views that training sees show of the scene; see [`Survey::new`].
@@ -145,6 +145,11 @@ pub trait Module: Terms<f32> + Terms<f64> + Debug {
     /// What keeps it from finding out.
     fn event(&self, _at: &StepInfo, _run: &RunView<'_>) -> Result<Option<AnchorChange>, TrainError> {
         Ok(None)
+    }
+
+    /// Key and value of the share of the run at which it first weighs error against bits, if it ever does.
+    fn weighs_bits_at(&self) -> Option<(&'static str, f64)> {
+        None
     }
 
     /// Whether the masks of offsets are learned beside it.

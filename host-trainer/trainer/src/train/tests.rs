@@ -56,6 +56,23 @@ fn masks_stay_once_the_integer_model_decides() {
 }
 
 #[test]
+fn the_last_phase_draws_the_heads_as_they_are_written() {
+    let capture = tiny_capture();
+    let mut trainer = Trainer::new(&capture, tiny_hac_config(100)).unwrap();
+    while trainer.config.phase(trainer.iteration + 1) != Phase::IntegerModel {
+        trainer.advance().unwrap();
+    }
+    let mut rounded = trainer.clone();
+    rounded.scene.heads = coding::Integers::of(&trainer.scene).unwrap().heads;
+    assert!(rounded.scene.heads != trainer.scene.heads);
+    let losses = [&mut trainer, &mut rounded].map(|trainer| trainer.advance().unwrap().report.loss);
+    assert_eq!(losses[0], losses[1], "neither draws what lies between two steps");
+    let weights = trainer.scene.heads.colour.w1.iter();
+    assert!(weights.filter(|weight| (**weight * 128.0).fract() != 0.0).count() > 0, "but it moves");
+    assert_eq!(trainer.finish().unwrap().head_fraction_bits, Some(7));
+}
+
+#[test]
 fn a_finished_scene_keeps_its_values_and_counts_the_bits_of_its_symbols() {
     let capture = tiny_capture();
     let mut trainer = Trainer::new(&capture, tiny_hac_config(80)).unwrap();

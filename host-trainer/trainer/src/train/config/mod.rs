@@ -10,7 +10,6 @@ pub(in crate::train) use error::within;
 pub use hac::{Backbone, Hac};
 
 use super::module::Modules;
-use super::module::pruning::Rank;
 use crate::scene::ModelShape;
 use crate::step::{LossWeights, Phase};
 use pocketsplat_capture::dataset::{Capture, PointsOrigin};
@@ -240,10 +239,7 @@ impl TrainConfig {
     pub fn validate(&self) -> Result<(), ConfigError> {
         self.modules.each().into_iter().try_for_each(|module| module.check())?;
         within("train.iterations", f64::from(self.iterations), 1.0, 10_000_000.0)?;
-        let by_worth = self.modules.pruning.filter(|pruning| pruning.rank == Rank::Worth).map(|pruning| pruning.at);
-        let weighs =
-            [("train.modules.rdo.from", self.modules.rdo.map(|rdo| rdo.from)), ("train.modules.pruning.at", by_worth)];
-        for (key, at) in weighs.into_iter().filter_map(|(key, at)| Some((key, at?))) {
+        for (key, at) in self.modules.each().into_iter().filter_map(|module| module.weighs_bits_at()) {
             if self.backbone == Backbone::Scaffold {
                 return Err(ConfigError::NoRate { key });
             }

@@ -156,7 +156,7 @@ impl Module for Pruning {
             Rank::Worth => run.worth()?.per_bit(),
         };
         // A stream of its own: the run's other random numbers do not depend on modules.
-        let mut rng = ChaCha8Rng::seed_from_u64(run.config().seed);
+        let mut rng = ChaCha8Rng::seed_from_u64(run.seed());
         rng.set_stream(1);
         let ranks = self.prune_ranks(&scores, &mut rng);
         Ok(Some(match self.form {
@@ -165,6 +165,10 @@ impl Module for Pruning {
                 AnchorChange::Keep(ranks.iter().map(|prune_rank| *prune_rank >= as_prune_rank(self.rate)).collect())
             }
         }))
+    }
+
+    fn weighs_bits_at(&self) -> Option<(&'static str, f64)> {
+        (self.rank == Rank::Worth).then_some(("train.modules.pruning.at", self.at))
     }
 
     fn pruned_share(&self, at: &StepInfo) -> f32 {

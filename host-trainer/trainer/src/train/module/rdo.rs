@@ -73,6 +73,10 @@ impl Module for Rdo {
         Ok(Some(AnchorChange::Mask(self.worthless(&run.worth()?))))
     }
 
+    fn weighs_bits_at(&self) -> Option<(&'static str, f64)> {
+        Some(("train.modules.rdo.from", self.from))
+    }
+
     fn learns_masks(&self) -> bool {
         false
     }

@@ -69,7 +69,7 @@ fn resume(args: &Args, path: &Path) -> Result<ExitCode> {
     config.effects = begun.effects;
     output::check_writable(&config.output)?;
     let capture = load(&mut config)?;
-    go_on(args, folder, config, &capture, Start::Resumed)
+    train_and_print(args, folder, config, &capture, Start::Resumed)
 }
 
 fn begin(args: &Args) -> Result<ExitCode> {
@@ -90,10 +90,10 @@ fn begin(args: &Args) -> Result<ExitCode> {
         None => Start::New,
     };
     let folder = RunFolder::start(&path, &config.to_toml()?, args.overwrite())?;
-    go_on(args, folder, config, &capture, start)
+    train_and_print(args, folder, config, &capture, start)
 }
 
-fn go_on<'a>(
+fn train_and_print<'a>(
     args: &Args,
     folder: RunFolder,
     mut config: RunConfig,

@@ -24,8 +24,8 @@ impl<R: Real> Workspace<R> {
     /// of the image C by its opacity o along one random direction r of ±1.
     ///
     /// An image is linear in each opacity, but for the clamp of alpha. So taking the Gaussian away changes it by −o·∂C/∂o,
-    /// occlusion included, and the expectation of (o·d)² over r is the squared error that this adds to an image that
-    /// cannot be bettered by o alone.
+    /// occlusion included, and the expectation of (o·d)² over r is the squared error that this adds where o is at its
+    /// optimum.
     ///
     /// Cost: a forward and a backward pass through the rasteriser.
     ///

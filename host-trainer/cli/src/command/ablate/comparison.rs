@@ -39,7 +39,7 @@ pub(super) struct Comparison {
     /// Over the rates that both have.
     bd_rate_percent: Option<f64>,
     bd_psnr_db: Option<f64>,
-    /// As `bd_rate_percent` at equal SSIM: where photographs differ in exposure or the scene is learnt by heart, PSNR of
+    /// As `bd_rate_percent` at equal SSIM: where photographs differ in exposure or training overfits, PSNR of
     /// held-out views may fall while bytes and likeness rise.
     bd_rate_ssim_percent: Option<f64>,
     /// At the rate of the options, at equal quality; with its 95 % interval where there are seeds.

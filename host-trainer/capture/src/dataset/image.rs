@@ -6,6 +6,8 @@ use ::image::ImageDecoder;
 
 use super::{Background, Image, Mask};
 
+mod jpeg_end;
+
 /// What an image file says about itself before its pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct ImageHeader {
@@ -23,8 +25,7 @@ pub(super) struct ImageHeader {
 /// What the decoder or the system said, for people.
 pub(super) fn read_header(path: &Path) -> Result<ImageHeader, String> {
     let reader = ::image::ImageReader::open(path).and_then(|reader| reader.with_guessed_format());
-    let decoder = reader.map_err(|error| error.to_string())?.into_decoder();
-    let mut decoder = decoder.map_err(|error| error.to_string())?;
+    let mut decoder = reader.map_err(in_words)?.into_decoder().map_err(in_words)?;
     let exif_orientation = decoder.orientation().map_or(1, |orientation| orientation.to_exif());
     Ok(ImageHeader { size_px: decoder.dimensions(), has_alpha: decoder.color_type().has_alpha(), exif_orientation })
 }
@@ -42,8 +43,20 @@ pub(super) fn read_mask(path: &Path) -> Result<Mask, String> {
 /// Decodes an image as it is stored: an EXIF orientation is not applied, because poses and intrinsics are for the
 /// pixels as stored.
 fn decode(path: &Path) -> Result<::image::DynamicImage, String> {
-    let reader = ::image::ImageReader::open(path).and_then(|reader| reader.with_guessed_format());
-    reader.map_err(|error| error.to_string())?.decode().map_err(|error| error.to_string())
+    let bytes = std::fs::read(path).map_err(in_words)?;
+    if bytes.starts_with(&jpeg_end::START) && !jpeg_end::is_whole(&bytes) {
+        return Err(format!(
+            "the JPEG ends after {} bytes without its end marker (FF D9), so the file was cut",
+            bytes.len()
+        ));
+    }
+    let reader = ::image::ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format();
+    reader.map_err(in_words)?.decode().map_err(in_words)
+}
+
+/// What a decoder or the system said, on one line.
+fn in_words(error: impl std::fmt::Display) -> String {
+    error.to_string().split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// Decodes the image file `path` and composites it on `background`.

@@ -21,6 +21,21 @@ const MAX_DEPTH_RATIO: f64 = 50.0;
 /// * `centres`: of the training cameras that can be used, capture units.
 pub(super) fn check(listing: &Listing, centres: &[DVec3], findings: &mut Vec<Finding>) {
     let Some((path, points)) = listing.points.as_ref().filter(|(_, points)| !points.is_empty()) else { return };
+    let finite: Vec<DVec3> = points.iter().copied().filter(|point| point.is_finite()).collect();
+    if let Some(first) = points.iter().position(|point| !point.is_finite()) {
+        let n_lost = points.len() - finite.len();
+        let message = format!(
+            "`{}`: {n_lost} of {} points have a coordinate that is no finite number, the first is point {first} (counted \
+             from 0): {}, needed: finite numbers",
+            path.display(),
+            points.len(),
+            points[first]
+        );
+        let remedy = "these points are left out; export the points again if many are";
+        let finding = Finding::new(Severity::Warning, "non-finite-points", message, remedy).files([path.clone()]);
+        findings.push(finding.number("points", points.len() as f64).number("not_finite", n_lost as f64));
+    }
+    let points = finite;
     if points.len() < FEW_POINTS {
         let message = format!(
             "`{}` holds {} points, needed: at least {FEW_POINTS} to outline a scene",
@@ -31,7 +46,7 @@ pub(super) fn check(listing: &Listing, centres: &[DVec3], findings: &mut Vec<Fin
         let finding = Finding::new(Severity::Warning, "few-points", message, remedy).files([path.clone()]);
         findings.push(finding.number("points", points.len() as f64).number("needed", FEW_POINTS as f64));
     }
-    if centres.is_empty() {
+    if centres.is_empty() || points.is_empty() {
         return;
     }
     let projected: Vec<DVec3> = points.iter().copied().step_by(points.len().div_ceil(N_PROJECTED)).collect();

@@ -221,6 +221,39 @@ pub(super) fn cases() -> Vec<Case> {
             },
         ),
         case(
+            "points that are not numbers",
+            ColmapBinary,
+            Doubt,
+            "non-finite-points",
+            &[
+                "points3D.bin`: 2 of 120 points have a coordinate that is no finite number",
+                "the first is point 5 (counted from 0): [NaN, 0.2, 0.25]",
+            ],
+            |f| {
+                (f.points[5].x, f.points[9].z) = (f64::NAN, f64::INFINITY);
+                f.write_files();
+            },
+        ),
+        case(
+            "a point cloud of nothing but NaN",
+            Nerfstudio,
+            Doubt,
+            "non-finite-points",
+            &[
+                "cloud.ply`: 3 of 3 points have a coordinate",
+                "the first is point 0",
+                "holds 0 points, needed: at least 100",
+            ],
+            |f| {
+                f.shared.push_str(", \"ply_file_path\": \"cloud.ply\"");
+                f.write_files().write(
+                    "cloud.ply",
+                    "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+                     end_header\nnan 0 0\n0 nan 0\n0 0 inf\n",
+                );
+            },
+        ),
+        case(
             "points of another reconstruction",
             ColmapBinary,
             Doubt,

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::Harm::{Fatal, Views};
-use super::{Case, N_VIEWS, case, cut};
+use super::{Case, N_VIEWS, case, cut, turned_image};
 use crate::fixture::Camera;
 use crate::fixture::Kind::{Blender, ColmapBinary, ColmapText, Nerfstudio};
 
@@ -53,6 +53,35 @@ pub(super) fn cases() -> Vec<Case> {
             &["p_05.png: image unreadable"],
             |f| {
                 cut(f.write_files(), "images/p_05.png", 60);
+            },
+        ),
+        case(
+            "a JPEG cut in its picture",
+            ColmapBinary,
+            Views,
+            "unreadable-image",
+            &[
+                "p_05.png: image unreadable: `",
+                "the JPEG ends after 800 bytes without its end marker (FF D9), so the file was cut",
+                "replace it with a whole PNG or JPEG",
+            ],
+            |f| {
+                turned_image(f.write_files(), "images/p_05.png");
+                cut(f, "images/p_05.png", 800);
+            },
+        ),
+        case(
+            "a JPEG whose copy was never finished",
+            Nerfstudio,
+            Views,
+            "unreadable-image",
+            &["images/p_05.png: image unreadable", "without its end marker (FF D9)"],
+            |f| {
+                turned_image(f.write_files(), "images/p_05.png");
+                let mut bytes = std::fs::read(f.at("images/p_05.png")).expect("it was written");
+                let half = bytes.len() / 2 + 300;
+                bytes[half..].fill(0);
+                f.write("images/p_05.png", bytes);
             },
         ),
         case(

@@ -46,7 +46,7 @@ pub(super) fn list(folder: &Path) -> Result<Listing, DatasetError> {
              `{TRAIN_FILE}` into it",
             folder.join(TEST_FILE).display()
         );
-        notes.push(Note::new("no-test-views", text));
+        notes.push(Note::warning("no-test-views", text));
     }
     Ok(Listing { layout: Layout::Blender, source, views, points: None, unposed: Vec::new(), notes })
 }

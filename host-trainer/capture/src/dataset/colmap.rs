@@ -1,14 +1,15 @@
 //! COLMAP captures: a sparse model, `sparse/0/{cameras,images,points3D}.{bin,txt}`, beside folders of photographs.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DQuat, DVec3};
 use rayon::prelude::*;
 
 use super::image::read_header;
-use super::listing::{ListedView, Listing, Note, Shot, every_nth, image_names_below};
-use super::{DatasetError, Layout, LoadOptions, ViewFault, image_folder};
+use super::listing::{ListedView, Listing, Note, Shot, every_nth, unused_images};
+use super::named_path::NamedPath;
+use super::{DatasetError, Layout, LoadOptions, ViewFault, image_folder, text_file};
 
 mod binary;
 mod model;
@@ -109,8 +110,9 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
             shot: shot(&image_folder, image, &cameras),
         })
         .collect();
-    let posed: HashSet<&str> = images.iter().map(|image| image.name.as_str()).collect();
-    let unposed = image_names_below(&image_folder).into_iter().filter(|name| !posed.contains(name.as_str())).collect();
+    let posed: Vec<PathBuf> =
+        images.iter().filter_map(|image| NamedPath::new(&image.name).image(&image_folder, None)).collect();
+    let unposed = unused_images(&image_folder, posed.iter().map(PathBuf::as_path));
     let mut listing = Listing { layout: Layout::Colmap, source: path("images"), views, points, unposed, notes };
     if !listing.has_test_views() {
         listing.notes.push(Note::no_test_views());
@@ -128,7 +130,7 @@ fn read<T>(
     let cannot_read = |source| DatasetError::Read { path: path.to_owned(), source };
     let parsed = match encoding {
         ModelEncoding::Binary => binary(&std::fs::read(path).map_err(cannot_read)?),
-        ModelEncoding::Text => text(&std::fs::read_to_string(path).map_err(cannot_read)?),
+        ModelEncoding::Text => text(&text_file::read(path).map_err(cannot_read)?),
     };
     parsed.map_err(|fault| DatasetError::Model { path: path.to_owned(), place: fault.place, found: fault.found })
 }
@@ -137,10 +139,9 @@ fn shot(folder: &Path, image: &ModelImage, cameras: &BTreeMap<u32, ModelCamera>)
     let (rotation, translation) = pose(image)?;
     let camera_id = image.camera_id;
     let camera = cameras.get(&camera_id).ok_or(ViewFault::NoCamera { camera_id })?;
-    let path = folder.join(&image.name);
-    if !path.is_file() {
-        return Err(ViewFault::Missing { path, or_png: false, listed_in: "the model" });
-    }
+    let path = NamedPath::new(&image.name)
+        .image(folder, None)
+        .ok_or_else(|| ViewFault::Missing { path: folder.join(&image.name), listed_in: "the model" })?;
     let header = match read_header(&path) {
         Ok(header) => header,
         Err(message) => return Err(ViewFault::Unreadable { path, message }),

@@ -76,10 +76,7 @@ fn check(path: &Path, options: &LoadOptions, decode: bool) -> Diagnosis {
     let centres: Vec<DVec3> = listing.shots(Split::Train).map(|shot| shot.centre_world()).collect();
     poses::check(&listing, &centres, findings);
     points::check(&listing, &centres, findings);
-    findings.extend(listing.notes.iter().map(|note| {
-        let severity = if note.code == "no-test-views" { Severity::Warning } else { Severity::Note };
-        Finding::told(severity, note.code, &note.text)
-    }));
+    findings.extend(listing.notes.iter().map(|note| Finding::told(note.severity, note.code, &note.text)));
     // Stable, so that findings of one severity keep the order of the checks.
     findings.sort_by_key(|finding| finding.severity);
     let n_points = |listing: &Listing| listing.points.as_ref().map_or(0, |(_, points)| points.len());

@@ -8,6 +8,15 @@ use super::{Background, Image, Mask};
 
 mod jpeg_end;
 
+/// Extensions of the image files that are read, in the order in which they are tried.
+pub(super) const EXTENSIONS: [&str; 3] = ["png", "jpg", "jpeg"];
+
+/// Whether a file of this name can be a photograph.
+pub(super) fn is_image_name(name: &str) -> bool {
+    let extension = name.rsplit_once('.').map(|(_, extension)| extension.to_ascii_lowercase());
+    extension.is_some_and(|extension| EXTENSIONS.contains(&extension.as_str()))
+}
+
 /// What an image file says about itself before its pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct ImageHeader {

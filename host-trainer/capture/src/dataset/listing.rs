@@ -1,13 +1,13 @@
 //! What a reader of one layout finds, before any pixel is decoded: the common ground of loading and diagnosing.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DVec3};
 
-use super::image::ImageHeader;
+use super::image::{ImageHeader, is_image_name};
 use super::lens::Lens;
-use super::{Layout, Split, ViewFault};
+use super::{Layout, Severity, Split, ViewFault};
 
 /// A capture as its files list it.
 pub(super) struct Listing {
@@ -26,6 +26,7 @@ pub(super) struct Listing {
 
 /// Something about how a capture was read, with its remedy behind the last semicolon where there is one.
 pub(super) struct Note {
+    pub(super) severity: Severity,
     /// One of the codes of [`Finding`](super::Finding).
     pub(super) code: &'static str,
     pub(super) text: String,
@@ -33,12 +34,16 @@ pub(super) struct Note {
 
 impl Note {
     pub(super) fn new(code: &'static str, text: impl Into<String>) -> Self {
-        Self { code, text: text.into() }
+        Self { severity: Severity::Note, code, text: text.into() }
+    }
+
+    pub(super) fn warning(code: &'static str, text: impl Into<String>) -> Self {
+        Self { severity: Severity::Warning, ..Self::new(code, text) }
     }
 
     /// No view is held out of a capture that names no split of its own.
     pub(super) fn no_test_views() -> Self {
-        Self::new(
+        Self::warning(
             "no-test-views",
             "no views are held out, so quality on unseen views cannot be measured; hold every eighth out with \
              `--test-every 8`",
@@ -113,10 +118,19 @@ pub(super) fn every_nth(test_every: u32, i: usize) -> Split {
     if test_every > 0 && i.is_multiple_of(test_every as usize) { Split::Test } else { Split::Train }
 }
 
+/// The names of the image files below `folder` that are not among `used`, in the form of [`image_names_below`].
+///
+/// Files are compared, not names, because captures name files in many ways.
+pub(super) fn unused_images<'a>(folder: &Path, used: impl Iterator<Item = &'a Path>) -> Vec<String> {
+    let used: HashSet<PathBuf> = used.filter_map(|path| path.canonicalize().ok()).collect();
+    let is_used = |name: &String| folder.join(name).canonicalize().is_ok_and(|path| used.contains(&path));
+    image_names_below(folder).into_iter().filter(|name| !is_used(name)).collect()
+}
+
 /// The names of image files below `folder`, relative to it with `/` between their parts, sorted.
 ///
 /// Links to folders are not followed, so that the walk ends.
-pub(super) fn image_names_below(folder: &Path) -> Vec<String> {
+fn image_names_below(folder: &Path) -> Vec<String> {
     let mut names = Vec::new();
     let mut waiting = vec![(folder.to_owned(), String::new())];
     while let Some((folder, prefix)) = waiting.pop() {
@@ -131,12 +145,6 @@ pub(super) fn image_names_below(folder: &Path) -> Vec<String> {
     }
     names.sort_unstable();
     names
-}
-
-/// Whether a file of this name can be a photograph.
-pub(super) fn is_image_name(name: &str) -> bool {
-    let extension = name.rsplit_once('.').map(|(_, extension)| extension.to_ascii_lowercase());
-    extension.is_some_and(|extension| ["jpg", "jpeg", "png"].contains(&extension.as_str()))
 }
 
 #[cfg(test)]

@@ -1,11 +1,13 @@
 //! Captures of nerfstudio and instant-ngp: one `transforms.json` beside photographs.
 
 use std::collections::HashMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use glam::DVec3;
 use rayon::prelude::*;
 
-use super::listing::{ListedView, Listing, Note, every_nth, image_names_below};
+use super::listing::{ListedView, Listing, Note, every_nth, unused_images};
+use super::named_path::NamedPath;
 use super::transforms::{Transforms, read_transforms};
 use super::{DatasetError, Layout, LoadOptions, Split, image_folder, ply};
 
@@ -39,16 +41,9 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
             Some(ListedView { split: split?, name: frame.name().to_owned(), shot })
         })
         .collect();
-    let points = match &transforms.ply_file_path {
-        Some(path) => {
-            let path = folder.join(path);
-            let points = ply::read_points(&path)?;
-            Some((path, points))
-        }
-        None => None,
-    };
-    let unposed = unposed(folder, images.as_deref().or(named.as_deref()), &transforms);
-    if points.as_ref().is_none_or(|(_, points)| points.is_empty()) {
+    let points = points(folder, &transforms, &mut notes)?;
+    let unposed = unposed(folder, images.as_deref(), &transforms);
+    if transforms.ply_file_path.is_none() || points.as_ref().is_some_and(|(_, points)| points.is_empty()) {
         let text = "the capture brings no points, so training starts from random points where the cameras look; name a \
                     point cloud in `ply_file_path` for a better start";
         notes.push(Note::new("no-points", text));
@@ -75,7 +70,7 @@ fn splits(transforms: &Transforms, options: &LoadOptions, notes: &mut Vec<Note>)
     let mut by_name = HashMap::new();
     for (names, split) in [(train.as_ref(), Split::Train), (held_out, Split::Test)] {
         for name in names.into_iter().flatten() {
-            by_name.insert(name.trim_start_matches("./"), split);
+            by_name.insert(NamedPath::new(name).name(), split);
         }
     }
     let splits: Vec<_> = transforms.frames.iter().map(|frame| by_name.get(frame.name()).copied()).collect();
@@ -95,15 +90,38 @@ fn splits(transforms: &Transforms, options: &LoadOptions, notes: &mut Vec<Note>)
     splits
 }
 
-/// Images beside the listed ones that no frame names.
+/// The points that the file names, where they are there.
+fn points(
+    folder: &Path,
+    transforms: &Transforms,
+    notes: &mut Vec<Note>,
+) -> Result<Option<(PathBuf, Vec<DVec3>)>, DatasetError> {
+    let Some(named) = transforms.ply_file_path.as_deref().map(NamedPath::new) else { return Ok(None) };
+    let Some(path) = named.file(folder, None) else {
+        let text = format!(
+            "`ply_file_path` names `{}`, which does not exist, so training starts from random points where the cameras \
+             look; restore the point cloud for a better start, or take `ply_file_path` out",
+            named.expected(folder, None).display()
+        );
+        notes.push(Note::warning("missing-points", text));
+        return Ok(None);
+    };
+    let points = ply::read_points(&path)?;
+    Ok(Some((path, points)))
+}
+
+/// Images beside the listed ones that no frame names, if all of them lie in one folder of the capture.
 fn unposed(folder: &Path, images: Option<&str>, transforms: &Transforms) -> Vec<String> {
-    let Some(images) = images else { return Vec::new() };
-    let listed: std::collections::HashSet<&str> = transforms
-        .frames
-        .iter()
-        .map(|frame| frame.name().split_once('/').map_or(frame.name(), |(_, rest)| rest))
-        .collect();
-    let is_listed =
-        |name: &str| listed.contains(name) || name.strip_suffix(".png").is_some_and(|stem| listed.contains(stem));
-    image_names_below(&folder.join(images)).into_iter().filter(|name| !is_listed(name)).collect()
+    let found: Vec<PathBuf> = transforms.frames.iter().filter_map(|frame| frame.image(folder, images)).collect();
+    let mut folders = found.iter().map(|path| {
+        let mut parts = path.strip_prefix(folder).ok()?.components();
+        // A file that lies in the capture's own folder has no second part.
+        parts.next().filter(|_| parts.next().is_some())
+    });
+    let Some(Some(first)) = folders.next() else { return Vec::new() };
+    if !folders.all(|folder| folder == Some(first)) {
+        return Vec::new();
+    }
+    let masks: Vec<PathBuf> = transforms.frames.iter().filter_map(|frame| frame.mask(folder)).collect();
+    unused_images(&folder.join(first), found.iter().chain(&masks).map(PathBuf::as_path))
 }

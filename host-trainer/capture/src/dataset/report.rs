@@ -121,7 +121,6 @@ mod tests {
                 name: format!("train/r_{i}"),
                 fault: ViewFault::Missing {
                     path: format!("/capture/train/r_{i}").into(),
-                    or_png: true,
                     listed_in: "the transforms file",
                 },
             })

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use super::image::{ImageHeader, read_header};
 use super::lens::Lens;
-use super::listing::{Shot, is_image_name};
+use super::listing::Shot;
+use super::named_path::NamedPath;
 use super::pose::world_to_camera;
 use super::{DatasetError, ViewFault};
 
@@ -31,7 +32,7 @@ impl Transforms {
 
     /// The first part that all frames' paths share, such as `images`.
     pub(super) fn image_folder(&self) -> Option<&str> {
-        let mut folders = self.frames.iter().map(|frame| frame.name().split_once('/').map(|(folder, _)| folder));
+        let mut folders = self.frames.iter().map(|frame| frame.path().first_folder());
         let first = folders.next()??;
         folders.all(|folder| folder == Some(first)).then_some(first)
     }
@@ -49,31 +50,33 @@ impl Frame {
         if let Some(model) = unknown_model(&self.own) {
             return Err(ViewFault::CameraModel { model });
         }
-        let path = self.existing_path(folder, images)?;
+        let path = self.image(folder, images).ok_or_else(|| ViewFault::Missing {
+            path: self.path().expected(folder, images),
+            listed_in: "the transforms file",
+        })?;
         let header = match read_header(&path) {
             Ok(header) => header,
             Err(message) => return Err(ViewFault::Unreadable { path, message }),
         };
         let lens = self.lens(&path, &header, shared)?;
-        let mask = self.mask_path.as_ref().map(|mask| folder.join(json::plain(mask)));
-        if let Some(path) = mask.as_ref().filter(|path| !path.is_file()) {
-            return Err(ViewFault::Mask { path: path.clone(), message: "does not exist".to_owned() });
-        }
+        let mask = match self.mask_path.as_deref().map(NamedPath::new) {
+            Some(named) => Some(named.image(folder, None).ok_or_else(|| ViewFault::Mask {
+                path: named.expected(folder, None),
+                message: "does not exist".to_owned(),
+            })?),
+            None => None,
+        };
         Ok(Shot { path, header, rotation, translation, lens, mask })
     }
 
-    fn existing_path(&self, folder: &Path, images: Option<&str>) -> Result<PathBuf, ViewFault> {
-        let name = self.name();
-        let literal = match images {
-            Some(images) => folder.join(images).join(name.split_once('/').map_or(name, |(_, rest)| rest)),
-            None => folder.join(name),
-        };
-        let mut with_extension = literal.clone().into_os_string();
-        with_extension.push(".png");
-        let candidates = [literal.clone(), PathBuf::from(with_extension)];
-        let or_png = !is_image_name(name);
-        let found = candidates.into_iter().find(|path| path.is_file());
-        found.ok_or(ViewFault::Missing { path: literal, or_png, listed_in: "the transforms file" })
+    /// The frame's image file, where it is there; `images` as for [`Self::shot`].
+    pub(super) fn image(&self, folder: &Path, images: Option<&str>) -> Option<PathBuf> {
+        self.path().image(folder, images)
+    }
+
+    /// The frame's mask, where it names one that is there.
+    pub(super) fn mask(&self, folder: &Path) -> Option<PathBuf> {
+        NamedPath::new(self.mask_path.as_deref()?).image(folder, None)
     }
 
     /// The lens for the image as it is stored: the frame's own numbers before the shared ones, the focal length before

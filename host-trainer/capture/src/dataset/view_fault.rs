@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::PoseFault;
+use super::image::EXTENSIONS;
 
 /// Why one view cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -11,14 +12,10 @@ use super::PoseFault;
 pub enum ViewFault {
     /// The image is not there.
     #[error(
-        "image missing: {}; restore it or take the view out of {listed_in}",
-        if *or_png {
-            format!("neither `{}` nor the same with `.png` exists", path.display())
-        } else {
-            format!("`{}` does not exist", path.display())
-        }
+        "image missing: `{}` does not exist, nor does it as .{}; restore it or take the view out of {listed_in}",
+        path.display(), EXTENSIONS.join(" or .")
     )]
-    Missing { path: PathBuf, or_png: bool, listed_in: &'static str },
+    Missing { path: PathBuf, listed_in: &'static str },
     /// The image cannot be decoded.
     #[error("image unreadable: `{}`: {message}; replace it with a whole PNG or JPEG", path.display())]
     Unreadable { path: PathBuf, message: String },

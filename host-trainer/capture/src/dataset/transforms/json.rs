@@ -4,7 +4,8 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use crate::dataset::DatasetError;
+use crate::dataset::named_path::NamedPath;
+use crate::dataset::{DatasetError, text_file};
 
 /// What a transforms file holds, as far as it is used.
 pub(in crate::dataset) struct Transforms {
@@ -57,6 +58,9 @@ struct Contents {
 pub(in crate::dataset) struct Frame {
     /// Relative to the capture, in Blender captures usually without extension.
     file_path: String,
+    /// [`NamedPath::name`] of it.
+    #[serde(skip)]
+    name: String,
     /// Camera to world, OpenGL axes; `null` stands for a number that is none.
     transform_matrix: Vec<Vec<Option<f64>>>,
     /// An image whose black pixels do not count.
@@ -66,9 +70,14 @@ pub(in crate::dataset) struct Frame {
 }
 
 impl Frame {
+    /// The path of the image as the file gives it.
+    pub(super) fn path(&self) -> NamedPath<'_> {
+        NamedPath::new(&self.file_path)
+    }
+
     /// The path as people write it.
     pub(in crate::dataset) fn name(&self) -> &str {
-        plain(&self.file_path)
+        &self.name
     }
 
     /// The matrix by rows; numbers that are none are NaN.
@@ -77,18 +86,13 @@ impl Frame {
     }
 }
 
-/// A path without a leading `./`.
-pub(super) fn plain(path: &str) -> &str {
-    path.trim_start_matches("./")
-}
-
 /// Reads and checks a transforms file.
 ///
 /// # Errors
 /// [`DatasetError::Read`], [`DatasetError::Transforms`], [`DatasetError::FieldOfView`] or [`DatasetError::NoFocal`],
 /// naming the file.
 pub(in crate::dataset) fn read_transforms(path: &Path) -> Result<Transforms, DatasetError> {
-    let text = std::fs::read_to_string(path).map_err(|source| DatasetError::Read { path: path.to_owned(), source })?;
+    let text = text_file::read(path).map_err(|source| DatasetError::Read { path: path.to_owned(), source })?;
     let parsed = parse(&text).or_else(|error| {
         // Python writes the bare words NaN and Infinity, which JSON lacks; read as null they cost one view, not all.
         // The first error is the one to tell: its column is right.
@@ -111,7 +115,8 @@ pub(in crate::dataset) fn read_transforms(path: &Path) -> Result<Transforms, Dat
 fn parse(text: &str) -> serde_json::Result<Transforms> {
     let shared = serde_json::from_str(text)?;
     let contents: Contents = serde_json::from_str(text)?;
-    let Contents { frames, ply_file_path, train_filenames, val_filenames, test_filenames } = contents;
+    let Contents { mut frames, ply_file_path, train_filenames, val_filenames, test_filenames } = contents;
+    frames.iter_mut().for_each(|frame| frame.name = frame.path().name());
     Ok(Transforms { shared, frames, ply_file_path, splits: [train_filenames, val_filenames, test_filenames] })
 }
 

@@ -1,15 +1,9 @@
 //! COLMAP models whose files are missing, damaged, hostile, or of a camera that is not read.
 
 use super::Harm::Fatal;
-use super::{Case, case, cut};
+use super::{Case, case, cut, edit};
 use crate::fixture::Fixture;
 use crate::fixture::Kind::{ColmapBinary, ColmapText};
-
-/// Changes the text of a written file.
-fn edit(fixture: &Fixture, name: &str, change: impl Fn(String) -> String) {
-    let text = std::fs::read_to_string(fixture.at(name)).expect("it was written");
-    fixture.write(name, change(text));
-}
 
 /// Overwrites bytes of a written file.
 fn poke(fixture: &Fixture, name: &str, at: usize, with: &[u8]) {

@@ -1,6 +1,6 @@
 //! Transforms files that are damaged, or say what no view can be made of.
 
-use super::Harm::Fatal;
+use super::Harm::{Doubt, Fatal};
 use super::{Case, case, cut};
 use crate::fixture::Kind::{Blender, Nerfstudio};
 
@@ -67,9 +67,13 @@ pub(super) fn cases() -> Vec<Case> {
         case(
             "a point cloud missing",
             Nerfstudio,
-            Fatal,
-            "unreadable-file",
-            &["sparse.ply`: ", "check that the file is there"],
+            Doubt,
+            "missing-points",
+            &[
+                "warning[missing-points]: `ply_file_path` names `",
+                "sparse.ply`, which does not exist, so training starts from random points",
+                "remedy: restore the point cloud for a better start, or take `ply_file_path` out",
+            ],
             |f| {
                 f.shared.push_str(", \"ply_file_path\": \"sparse.ply\"");
                 f.write_files();

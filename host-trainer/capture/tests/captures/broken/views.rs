@@ -17,7 +17,7 @@ pub(super) fn cases() -> Vec<Case> {
             &[
                 "train views left out: 2",
                 "p_03.png: image missing: `",
-                "does not exist; restore it or take the view out of the model",
+                "does not exist, nor does it as .png or .jpg or .jpeg; restore it or take the view out of the model",
             ],
             |f| {
                 f.write_files().remove("images/p_03.png");

@@ -1,0 +1,157 @@
+//! Finding the files that a capture names: captures are moved, converted and renamed after their paths were written.
+
+use std::path::{Path, PathBuf};
+
+use super::image::EXTENSIONS;
+
+/// Where photographs lie in captures that name them by paths of another machine.
+const IMAGE_FOLDERS: [&str; 2] = ["images", "input"];
+
+/// A path as a capture's file writes it, taken apart.
+pub(super) struct NamedPath<'a> {
+    written: &'a str,
+    /// Whether it starts at a root, of this machine or of another: `/home/…` or `C:\…`.
+    is_absolute: bool,
+    /// Its parts without `.` and with `a/..` folded.
+    parts: Vec<&'a str>,
+}
+
+impl<'a> NamedPath<'a> {
+    pub(super) fn new(written: &'a str) -> Self {
+        let has_drive = written.as_bytes().get(1) == Some(&b':') && written.as_bytes()[0].is_ascii_alphabetic();
+        let mut parts = Vec::new();
+        for part in written.split(['/', '\\']) {
+            match part {
+                "" | "." => {}
+                ".." if parts.last().is_some_and(|last| *last != "..") => drop(parts.pop()),
+                part => parts.push(part),
+            }
+        }
+        Self { written, is_absolute: has_drive || written.starts_with(['/', '\\']), parts }
+    }
+
+    /// The path for people: its parts, of an absolute path the last one only.
+    pub(super) fn name(&self) -> String {
+        let skipped = if self.is_absolute { self.parts.len().saturating_sub(1) } else { 0 };
+        self.parts[skipped..].join("/")
+    }
+
+    /// The first part of a relative path of several, such as `images`.
+    pub(super) fn first_folder(&self) -> Option<&'a str> {
+        (!self.is_absolute && self.parts.len() > 1).then(|| self.parts[0])
+    }
+
+    /// Where the file is if nothing was moved.
+    ///
+    /// * `images`: a folder of `folder` that stands in for the first part of the path.
+    pub(super) fn expected(&self, folder: &Path, images: Option<&str>) -> PathBuf {
+        match images {
+            Some(images) => folder.join(images).join(self.name_below_first()),
+            None if self.is_absolute => PathBuf::from(self.written),
+            None => folder.join(self.parts.join("/")),
+        }
+    }
+
+    fn name_below_first(&self) -> String {
+        match self.first_folder() {
+            Some(_) => self.parts[1..].join("/"),
+            None => self.name(),
+        }
+    }
+
+    /// The file that is there: as written, by the last parts of the path, the most first, or by its name in a folder of
+    /// images.
+    pub(super) fn file(&self, folder: &Path, images: Option<&str>) -> Option<PathBuf> {
+        self.candidates(folder, images).into_iter().find(|path| path.is_file())
+    }
+
+    /// The image that is there: as [`Self::file`], and where the path has no extension of an image or the file another.
+    pub(super) fn image(&self, folder: &Path, images: Option<&str>) -> Option<PathBuf> {
+        self.candidates(folder, images).iter().find_map(|path| with_some_extension(path))
+    }
+
+    fn candidates(&self, folder: &Path, images: Option<&str>) -> Vec<PathBuf> {
+        let base = images.map_or_else(|| folder.to_owned(), |images| folder.join(images));
+        let mut candidates = vec![self.expected(folder, images)];
+        candidates.extend((0..self.parts.len()).map(|skipped| base.join(self.parts[skipped..].join("/"))));
+        if let (None, Some(name)) = (images, self.parts.last()) {
+            candidates.extend(IMAGE_FOLDERS.map(|images| folder.join(images).join(name)));
+        }
+        candidates
+    }
+}
+
+/// The image at `path`, or beside it under the same name with another extension.
+fn with_some_extension(path: &Path) -> Option<PathBuf> {
+    if path.is_file() {
+        return Some(path.to_owned());
+    }
+    let name = path.file_name()?.to_str()?;
+    let stem = if super::image::is_image_name(name) { name.rsplit_once('.')?.0 } else { name };
+    let upper = EXTENSIONS.map(str::to_uppercase);
+    let mut extensions = EXTENSIONS.into_iter().chain(upper.iter().map(String::as_str));
+    extensions.find_map(|extension| {
+        let path = path.with_file_name(format!("{stem}.{extension}"));
+        path.is_file().then_some(path)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn folder(files: &[&str]) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        for file in files {
+            let path = folder.path().join(file);
+            std::fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
+            std::fs::write(path, "").expect("a file");
+        }
+        folder
+    }
+
+    #[test]
+    fn names_are_plain_whatever_was_written() {
+        for (written, name) in [
+            ("./images/a.png", "images/a.png"),
+            ("images//a/../b.png", "images/b.png"),
+            ("../images/a.png", "../images/a.png"),
+            (".\\images\\a.png", "images/a.png"),
+            ("/home/ann/fox/images/a.png", "a.png"),
+            ("C:\\Users\\ann\\a.png", "a.png"),
+            ("", ""),
+        ] {
+            assert_eq!(NamedPath::new(written).name(), name, "{written}");
+        }
+    }
+
+    #[test]
+    fn images_are_found_where_they_can_be_meant() {
+        let capture = folder(&["images/a.jpg", "images/b.PNG", "images/frame.001.png", "images_2/a.jpg", "c.jpeg"]);
+        let found = |written: &str, images: Option<&str>| {
+            let path = NamedPath::new(written).image(capture.path(), images)?;
+            Some(path.strip_prefix(capture.path()).expect("inside").to_str().expect("text").to_owned())
+        };
+        for (written, images, expected) in [
+            ("images/a.jpg", None, Some("images/a.jpg")),
+            ("images/a.png", None, Some("images/a.jpg")),
+            ("images/a", None, Some("images/a.jpg")),
+            ("images/b.png", None, Some("images/b.PNG")),
+            ("images/frame.001", None, Some("images/frame.001.png")),
+            ("images\\x\\..\\a.jpg", None, Some("images/a.jpg")),
+            ("fox/images/a.jpg", None, Some("images/a.jpg")),
+            ("a.jpg", None, Some("images/a.jpg")),
+            ("/home/ann/fox/images_2/a.jpg", None, Some("images_2/a.jpg")),
+            ("/home/ann/photographs/a.jpg", None, Some("images/a.jpg")),
+            ("D:\\photographs\\c.png", None, Some("c.jpeg")),
+            ("images/a.jpg", Some("images_2"), Some("images_2/a.jpg")),
+            ("/home/ann/photographs/a.jpg", Some("images_2"), Some("images_2/a.jpg")),
+            ("images/b.png", Some("images_2"), None),
+            ("images/d.png", None, None),
+            ("", None, None),
+        ] {
+            assert_eq!(found(written, images).as_deref(), expected, "{written} in {images:?}");
+        }
+        assert_eq!(NamedPath::new("images/a.png").file(capture.path(), None), None, "a file has its own extension");
+    }
+}

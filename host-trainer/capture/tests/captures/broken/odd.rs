@@ -1,0 +1,122 @@
+//! Captures that are odd but lack nothing: all views load, and the code of each case is one that must not be told.
+
+use super::Harm::Nothing;
+use super::{Case, case, edit};
+use crate::fixture::Kind::{Blender, ColmapBinary, ColmapText, Nerfstudio};
+use crate::fixture::{Fixture, SIZE_PX};
+
+/// Replaces text of a transforms file.
+fn replace(fixture: &Fixture, from: &str, to: &str) {
+    edit(fixture.write_files(), "transforms.json", |text| text.replace(from, to));
+}
+
+pub(super) fn cases() -> Vec<Case> {
+    let mut cases = paths();
+    cases.extend(texts());
+    cases
+}
+
+fn paths() -> Vec<Case> {
+    vec![
+        case("names without extension", Nerfstudio, Nothing, "unposed-image", &["warnings: 1,"], |f| {
+            replace(f, ".png", "");
+        }),
+        case("names of JPEG for images of PNG", Nerfstudio, Nothing, "unposed-image", &["warnings: 1,"], |f| {
+            replace(f, ".png", ".jpg");
+        }),
+        case("images converted to JPEG", ColmapText, Nothing, "missing-image", &["warnings: 1,"], |f| {
+            f.write_files();
+            for photo in &f.photos {
+                let jpeg = photo.name.replace(".png", ".JPG");
+                image::open(f.at("images").join(&photo.name))
+                    .expect("written")
+                    .save(f.at("images").join(jpeg))
+                    .expect("JPEG");
+                f.remove(&format!("images/{}", photo.name));
+            }
+        }),
+        case("names of no folder", Nerfstudio, Nothing, "missing-image", &["warnings: 1,"], |f| {
+            replace(f, "./images/", "");
+        }),
+        case("names from the folder above", Nerfstudio, Nothing, "missing-image", &["warnings: 1,"], |f| {
+            replace(f, "./images/", "fox/images/");
+        }),
+        case("paths over a folder that is not there", Nerfstudio, Nothing, "unposed-image", &["warnings: 1,"], |f| {
+            replace(f, "./images/", "colmap/../images/");
+        }),
+        case("absolute paths", Nerfstudio, Nothing, "unposed-image", &["warnings: 1,"], |f| {
+            let images = format!("{}/", f.at("images").display());
+            replace(f, "./images/", &images);
+        }),
+        case("absolute paths of another machine", Nerfstudio, Nothing, "unposed-image", &["warnings: 1,"], |f| {
+            replace(f, "./images/", "/home/ann/photographs/");
+        }),
+        case("paths of Windows", Nerfstudio, Nothing, "unposed-image", &["warnings: 1,"], |f| {
+            replace(f, "./images/", "C:\\\\Users\\\\ann\\\\fox\\\\images\\\\");
+        }),
+        case("backslashes in a model", ColmapText, Nothing, "missing-image", &["warnings: 1,"], |f| {
+            f.photos.iter_mut().for_each(|photo| photo.name = format!("left\\{}", photo.name));
+            std::fs::create_dir(f.at("images/left")).expect("a folder");
+            for i in 0..super::N_VIEWS {
+                let name = format!("p_{i:02}.png");
+                std::fs::rename(f.at("images").join(&name), f.at("images/left").join(&name)).expect("written");
+            }
+            f.write_files();
+        }),
+        case(
+            "names in a model that start with the folder",
+            ColmapBinary,
+            Nothing,
+            "unposed-image",
+            &["warnings: 1,"],
+            |f| {
+                f.photos.iter_mut().for_each(|photo| photo.name = format!("images/{}", photo.name));
+                f.write_files();
+            },
+        ),
+        case(
+            "renderings stored as JPEG names",
+            Blender,
+            Nothing,
+            "missing-image",
+            &["10 views to train, 2 to test"],
+            |f| {
+                f.photos.iter_mut().for_each(|photo| photo.name = photo.name.replace(".png", ".jpg"));
+                f.write_files();
+            },
+        ),
+        case("masks beside the images", Nerfstudio, Nothing, "unposed-image", &["warnings: 1,"], |f| {
+            f.photos[2].extra = "\"mask_path\": \"images/mask_02.png\", ".to_owned();
+            f.write_image("images/mask_02.png", SIZE_PX);
+            f.write_files();
+        }),
+    ]
+}
+
+fn texts() -> Vec<Case> {
+    vec![
+        case("transforms behind a byte order mark", Nerfstudio, Nothing, "bad-transforms", &["warnings: 1,"], |f| {
+            edit(f.write_files(), "transforms.json", |text| format!("\u{feff}{text}"));
+        }),
+        case("renderings behind a byte order mark", Blender, Nothing, "bad-transforms", &["2 to test"], |f| {
+            f.write_files();
+            for name in ["transforms_train.json", "transforms_test.json"] {
+                edit(f, name, |text| format!("\u{feff}{text}"));
+            }
+        }),
+        case("a text model behind byte order marks", ColmapText, Nothing, "bad-model", &["warnings: 1,"], |f| {
+            f.write_files();
+            for name in ["cameras", "images", "points3D"] {
+                // Without the comment that would hide the mark.
+                edit(f, &format!("sparse/0/{name}.txt"), |text| {
+                    format!("\u{feff}{}", text.lines().skip(1).collect::<Vec<_>>().join("\n"))
+                });
+            }
+        }),
+        case("transforms in UTF-16", Nerfstudio, Nothing, "unreadable-file", &["warnings: 1,"], |f| {
+            let text = String::from_utf8(f.files().remove(0).1).expect("text");
+            let units = text.encode_utf16().flat_map(u16::to_le_bytes);
+            f.write("transforms.json", [0xFF, 0xFE].into_iter().chain(units).collect::<Vec<u8>>());
+        }),
+    ]
+}

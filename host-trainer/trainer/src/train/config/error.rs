@@ -21,6 +21,17 @@ pub enum ConfigError {
     /// Every training view would be held out.
     #[error("train.validation_every is 1, needs 0 (none) or at least 2: some views have to be trained on")]
     NoViewLeft,
+    /// A detail head that is not the detail module's.
+    #[error(
+        "train.shape.detail_hidden is {found}, needs {needed}, which train.modules.detail asks for: attach the module with \
+         --effects +detail, or set train.modules.detail.hidden"
+    )]
+    DetailHidden {
+        /// Units of the shape.
+        found: usize,
+        /// Those of the module, 0 without it.
+        needed: usize,
+    },
     /// A module that weighs bits, in a run that has none.
     #[error("{key} weighs error against bits, needs train.backbone hac, which has a rate")]
     NoRate {

@@ -249,7 +249,11 @@ impl TrainConfig {
         within("train.shape.feature_dim", self.shape.feature_dim as f64, 1.0, 256.0)?;
         within("train.shape.n_offsets", self.shape.n_offsets as f64, 1.0, 32.0)?;
         within("train.shape.colour_hidden", self.shape.colour_hidden as f64, 0.0, 256.0)?;
-        within("train.shape.detail_hidden", self.shape.detail_hidden as f64, 0.0, 256.0)?;
+        // The module widens the shape when the run begins.
+        let (found, needed) = (self.shape.detail_hidden, self.modules.detail.map_or(0, |detail| detail.hidden));
+        if found > 0 && found != needed {
+            return Err(ConfigError::DetailHidden { found, needed });
+        }
         within("train.voxel_size", self.voxel_size.unwrap_or(1e-3), 1e-6, 1.0)?;
         within(
             "train.densification.coarsest_cells",

@@ -1,4 +1,5 @@
 use super::*;
+use crate::train::module::Detail;
 
 #[test]
 fn a_rate_stays_and_then_falls_on_a_geometric_path() {
@@ -47,6 +48,17 @@ fn phases_follow_each_other_at_their_shares_of_the_run() {
     }
     assert!(!config.pauses_at(2_999) && config.pauses_at(3_000) && config.pauses_at(3_999) && !config.pauses_at(4_000));
     assert!(!TrainConfig::default().pauses_at(3_500));
+}
+
+#[test]
+fn a_detail_head_is_the_modules() {
+    let mut config = TrainConfig::default();
+    config.shape.detail_hidden = 5;
+    assert_eq!(config.validate(), Err(ConfigError::DetailHidden { found: 5, needed: 0 }));
+    config.modules.detail = Some(Detail { hidden: 7, ..Detail::default() });
+    assert_eq!(config.validate(), Err(ConfigError::DetailHidden { found: 5, needed: 7 }));
+    config.shape = config.modules.shape(config.shape);
+    assert_eq!(config.validate(), Ok(()));
 }
 
 #[test]

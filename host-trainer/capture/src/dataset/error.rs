@@ -3,6 +3,8 @@
 use std::fmt;
 use std::path::PathBuf;
 
+use super::lens::READABLE_MODELS;
+
 /// Why a capture cannot be loaded; each message names the place, what was found, what is needed and the remedy.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -51,8 +53,8 @@ pub enum DatasetError {
     Model { path: PathBuf, place: String, found: String },
     /// A camera model that cannot be undistorted.
     #[error(
-        "`{}`: {camera} has the camera model `{model}`, needed: PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL, RADIAL or \
-         OPENCV; undistort the capture first (COLMAP: image_undistorter) or reconstruct it with one of these",
+        "`{}`: {camera} has the camera model `{model}`, needed: {READABLE_MODELS}; undistort the capture first (COLMAP: \
+         image_undistorter) or reconstruct it with one of these",
         path.display()
     )]
     CameraModel { path: PathBuf, camera: String, model: String },

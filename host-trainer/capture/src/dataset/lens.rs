@@ -1,19 +1,34 @@
-//! The lens of a photograph: a pinhole and the radial and tangential distortion of Brown's model.
+//! The lens of a photograph: a pinhole behind the distortion of Brown's model, or a fisheye.
 
 use std::path::Path;
 
 use super::ViewFault;
 use crate::camera::Camera;
 
+/// Camera models whose distortion is undone, for messages.
+pub(super) const READABLE_MODELS: &str = "PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV, \
+                                          OPENCV_FISHEYE, SIMPLE_RADIAL_FISHEYE or RADIAL_FISHEYE";
+
+/// What the radius of a direction becomes in the image before its distortion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Projection {
+    /// The tangent of the angle to the axis: straight lines stay straight.
+    Perspective,
+    /// The angle to the axis itself.
+    Fisheye,
+}
+
 /// How many steps the search for the fold of a distortion takes from the axis to the corner.
 const FOLD_STEPS: u32 = 4096;
 
 /// Intrinsics of a photograph as it was taken, for an image of `size_px`.
 ///
-/// A direction `(x, y, 1)` of the camera frame meets the image at `(fx·xd + cx, fy·yd + cy)`, with `r² = x² + y²`,
-/// `d = 1 + k1·r² + k2·r⁴ + k3·r⁶ + k4·r⁸` and
+/// A direction `(x, y, 1)` of the camera frame meets the image at `(fx·xd + cx, fy·yd + cy)`, with `r² = x² + y²`. Through a
+/// perspective lens, with `d = (1 + k1·r² + k2·r⁴ + k3·r⁶ + k4·r⁸) / (1 + q1·r² + q2·r⁴ + q3·r⁶)`,
 /// `xd = x·d + 2·p1·x·y + p2·(r² + 2x²)`, `yd = y·d + p1·(r² + 2y²) + 2·p2·x·y`
-/// (Brown 1966; as COLMAP's OPENCV and, with k3 and k4, nerfstudio's).
+/// (Brown 1966; as COLMAP's OPENCV, with k3 and q its FULL_OPENCV, with k3 and k4 nerfstudio's OPENCV).
+/// Through a fisheye, with the angle `θ = atan r`, `(xd, yd) = (x, y)·θd/r`, `θd = θ·(1 + k1·θ² + k2·θ⁴ + k3·θ⁶ + k4·θ⁸)`
+/// (Kannala and Brandt 2006; as COLMAP's and nerfstudio's OPENCV_FISHEYE).
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Lens {
     /// Width and height of the image the numbers are for, pixels.
@@ -22,9 +37,12 @@ pub(super) struct Lens {
     pub(super) focal_px: [f64; 2],
     /// `[cx, cy]`, pixels from the outer corner of the first pixel.
     pub(super) principal_px: [f64; 2],
+    pub(super) projection: Projection,
     /// `[k1, k2, k3, k4]`.
     pub(super) radial: [f64; 4],
-    /// `[p1, p2]`.
+    /// `[q1, q2, q3]`; 0 for a fisheye.
+    pub(super) divisor: [f64; 3],
+    /// `[p1, p2]`; 0 for a fisheye.
     pub(super) tangential: [f64; 2],
 }
 
@@ -32,12 +50,24 @@ impl Lens {
     /// A lens without distortion, its principal point in the middle.
     pub(super) fn central(size_px: (u32, u32), focal_px: [f64; 2]) -> Self {
         let principal_px = [0.5 * f64::from(size_px.0), 0.5 * f64::from(size_px.1)];
-        Self { size_px, focal_px, principal_px, radial: [0.0; 4], tangential: [0.0; 2] }
+        Self {
+            size_px,
+            focal_px,
+            principal_px,
+            projection: Projection::Perspective,
+            radial: [0.0; 4],
+            divisor: [0.0; 3],
+            tangential: [0.0; 2],
+        }
     }
 
     /// Whether straight lines stay straight.
     pub(super) fn is_pinhole(&self) -> bool {
-        self.radial.iter().chain(&self.tangential).all(|&k| k == 0.0)
+        self.projection == Projection::Perspective && self.coefficients().all(|k| k == 0.0)
+    }
+
+    fn coefficients(&self) -> impl Iterator<Item = f64> {
+        self.radial.into_iter().chain(self.divisor).chain(self.tangential)
     }
 
     /// What no lens has, in words, or `None` where the numbers can be a lens.
@@ -49,8 +79,8 @@ impl Lens {
         if let Some(focal_px) = self.focal_px.into_iter().find(|f| !(f.is_finite() && *f > 0.0)) {
             return Some(format!("the focal length is {focal_px} px, needed: a positive number"));
         }
-        let others = self.principal_px.iter().chain(&self.radial).chain(&self.tangential);
-        if let Some(number) = others.into_iter().find(|number| !number.is_finite()) {
+        let mut others = self.principal_px.into_iter().chain(self.coefficients());
+        if let Some(number) = others.find(|number| !number.is_finite()) {
             return Some(format!(
                 "the principal point or a distortion coefficient is {number}, needed: finite numbers"
             ));
@@ -91,9 +121,18 @@ impl Lens {
     /// Where the direction `(x, y, 1)` goes on the plane at distance 1 once it has passed the lens.
     pub(super) fn distorted(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let [k1, k2, k3, k4] = self.radial;
-        let [p1, p2] = self.tangential;
         let r2 = x * x + y * y;
-        let d = 1.0 + r2 * (k1 + r2 * (k2 + r2 * (k3 + r2 * k4)));
+        if self.projection == Projection::Fisheye {
+            let r = r2.sqrt();
+            let angle = r.atan();
+            let t = angle * angle;
+            // θ/r goes to 1 on the axis.
+            let d = if r > 0.0 { angle / r } else { 1.0 } * (1.0 + t * (k1 + t * (k2 + t * (k3 + t * k4))));
+            return [x * d, y * d];
+        }
+        let [q1, q2, q3] = self.divisor;
+        let [p1, p2] = self.tangential;
+        let d = (1.0 + r2 * (k1 + r2 * (k2 + r2 * (k3 + r2 * k4)))) / (1.0 + r2 * (q1 + r2 * (q2 + r2 * q3)));
         [x * d + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x), y * d + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y]
     }
 
@@ -109,11 +148,21 @@ impl Lens {
 
     /// The squared radius from which the radial part turns back, infinite where it does not before `limit`.
     ///
-    /// `r·d(r²)` has the slope `1 + 3k1·r² + 5k2·r⁴ + 7k3·r⁶ + 9k4·r⁸`; beyond its first zero the model shows again
-    /// what it has shown already, which no lens does.
+    /// With `s = r²` and `d = n/q`, `r·d` has the slope `(n·q + 2s·(n'·q − n·q')) / q²`; beyond its first zero, or one of q, the
+    /// model shows again what it has shown already, which no lens does. A fisheye's is that of `θd`, with `s = θ²` and `q = 1`.
     pub(super) fn fold_squared(&self, limit: f64) -> f64 {
-        let [k1, k2, k3, k4] = self.radial;
-        let slope = |s: f64| 1.0 + s * (3.0 * k1 + s * (5.0 * k2 + s * (7.0 * k3 + s * 9.0 * k4)));
+        let ([k1, k2, k3, k4], [q1, q2, q3]) = (self.radial, self.divisor);
+        let slope = |r2: f64| {
+            let s = match self.projection {
+                Projection::Perspective => r2,
+                Projection::Fisheye => r2.sqrt().atan().powi(2),
+            };
+            let n = 1.0 + s * (k1 + s * (k2 + s * (k3 + s * k4)));
+            let q = 1.0 + s * (q1 + s * (q2 + s * q3));
+            let n_slope = k1 + s * (2.0 * k2 + s * (3.0 * k3 + s * 4.0 * k4));
+            let q_slope = q1 + s * (2.0 * q2 + s * 3.0 * q3);
+            if q > 0.0 { n * q + 2.0 * s * (n_slope * q - n * q_slope) } else { 0.0 }
+        };
         let steps = (1..=FOLD_STEPS).map(|i| limit * f64::from(i) / f64::from(FOLD_STEPS));
         steps.into_iter().find(|&s| slope(s) <= 0.0).unwrap_or(f64::INFINITY)
     }
@@ -156,8 +205,58 @@ mod tests {
             size_px: (540, 960),
             focal_px: [687.8, 687.2],
             principal_px: [277.3, 482.6],
+            projection: Projection::Perspective,
             radial: [0.0578, -0.0805, 0.01, -0.002],
+            divisor: [0.0; 3],
             tangential: [-9.8e-4, 1.6e-4],
+        }
+    }
+
+    fn full_opencv() -> Lens {
+        Lens { radial: [0.31, -0.12, 0.02, 0.0], divisor: [0.27, -0.05, 0.004], ..opencv() }
+    }
+
+    /// 118° from side to side.
+    fn fisheye() -> Lens {
+        Lens {
+            focal_px: [300.0, 290.0],
+            projection: Projection::Fisheye,
+            radial: [0.03, -0.02, 0.006, -0.001],
+            tangential: [0.0; 2],
+            ..opencv()
+        }
+    }
+
+    /// [`Lens::distorted`] as the models are written down, each power by itself and the fisheye on the sphere.
+    fn slowly_distorted(lens: &Lens, [x, y]: [f64; 2]) -> [f64; 2] {
+        let power = |k: &[f64], s: f64| {
+            k.iter().zip(1..).map(|(k, i)| k * (0..i).map(|_| s).product::<f64>()).fold(1.0, |sum, term| sum + term)
+        };
+        if lens.projection == Projection::Fisheye {
+            let length = (x * x + y * y + 1.0).sqrt();
+            let (angle, turn) = ((1.0 / length).acos(), y.atan2(x));
+            let bent = angle * power(&lens.radial, angle * angle);
+            return [bent * turn.cos(), bent * turn.sin()];
+        }
+        let r = x.hypot(y);
+        let d = power(&lens.radial, r * r) / power(&lens.divisor, r * r);
+        let [p1, p2] = lens.tangential;
+        let shift = [2.0 * p1 * x * y + p2 * (r * r + 2.0 * x * x), p1 * (r * r + 2.0 * y * y) + 2.0 * p2 * x * y];
+        [x * d + shift[0], y * d + shift[1]]
+    }
+
+    #[test]
+    fn every_model_follows_the_slow_reference() {
+        for lens in [opencv(), full_opencv(), fisheye()] {
+            for i in -10..=10 {
+                for j in -10..=10 {
+                    let direction = [0.09 * f64::from(i), 0.17 * f64::from(j)];
+                    let (found, expected) = (lens.distorted(direction), slowly_distorted(&lens, direction));
+                    let miss = (found[0] - expected[0]).hypot(found[1] - expected[1]);
+                    // The arc cosine loses half the digits near the axis.
+                    assert!(miss < 1e-8, "{:?} {direction:?}: {found:?}, {expected:?}", lens.projection);
+                }
+            }
         }
     }
 
@@ -179,13 +278,14 @@ mod tests {
 
     #[test]
     fn the_inverse_undoes_the_distortion_all_over_the_image() {
-        let lens = opencv();
-        for i in 0..=10 {
-            for j in 0..=10 {
-                let direction = lens.direction([54.0 * f64::from(i), 96.0 * f64::from(j)]);
-                let back = undistorted(&lens, lens.distorted(direction));
-                let miss = (back[0] - direction[0]).hypot(back[1] - direction[1]);
-                assert!(miss < 1e-12, "{direction:?} came back as {back:?}");
+        for (lens, most) in [(opencv(), 1e-12), (full_opencv(), 1e-12), (fisheye(), 1e-10)] {
+            for i in 0..=10 {
+                for j in 0..=10 {
+                    let direction = lens.direction([54.0 * f64::from(i), 96.0 * f64::from(j)]);
+                    let back = undistorted(&lens, lens.distorted(direction));
+                    let miss = (back[0] - direction[0]).hypot(back[1] - direction[1]);
+                    assert!(miss < most, "{:?}: {direction:?} came back as {back:?}", lens.projection);
+                }
             }
         }
     }
@@ -205,6 +305,15 @@ mod tests {
         assert!((lens.fold_squared(1.0) - 2.0 / 3.0).abs() < 1e-3, "1 − 1.5·r² = 0");
         assert_eq!(lens.fold_squared(0.5), f64::INFINITY);
         assert_eq!(opencv().fold_squared(0.7), f64::INFINITY);
+        assert_eq!(full_opencv().fold_squared(0.7), f64::INFINITY);
+        assert_eq!(fisheye().fold_squared(100.0), f64::INFINITY);
+        // θ·(1 − 0.5·θ²) turns where 1 = 1.5·θ²; r/(1 + 2r²) where 1 = 2r²; and 1 − 2r² has no lens beyond its zero.
+        let bent = Lens { radial: [-0.5, 0.0, 0.0, 0.0], ..fisheye() };
+        assert!((bent.fold_squared(4.0) - (2.0_f64 / 3.0).sqrt().tan().powi(2)).abs() < 2e-3);
+        for q1 in [2.0, -2.0] {
+            let lens = Lens { radial: [0.0; 4], divisor: [q1, 0.0, 0.0], ..opencv() };
+            assert!((lens.fold_squared(1.0) - 0.5).abs() < 1e-3, "{q1}");
+        }
     }
 
     #[test]

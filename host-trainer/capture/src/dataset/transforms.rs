@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::image::{ImageHeader, read_header};
-use super::lens::Lens;
+use super::lens::{Lens, Projection};
 use super::listing::Shot;
 use super::named_path::NamedPath;
 use super::pose::world_to_camera;
@@ -14,7 +14,9 @@ mod json;
 pub(super) use json::{Frame, Intrinsics, Transforms, read_transforms};
 
 /// Camera models whose parameters the fields of a transforms file spell out.
-const KNOWN_MODELS: [&str; 6] = ["OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "PERSPECTIVE"];
+const KNOWN_MODELS: [&str; 7] =
+    ["OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "PERSPECTIVE", FISHEYE_MODEL];
+const FISHEYE_MODEL: &str = "OPENCV_FISHEYE";
 
 impl Transforms {
     /// Refuses a camera model of all frames that cannot be undistorted.
@@ -110,15 +112,21 @@ impl Frame {
             tangential: [either(|i| i.p1), either(|i| i.p2)].map(Option::unwrap_or_default),
             ..central
         };
+        let is_fisheye = |i: &Intrinsics| {
+            let named = i.camera_model.as_deref().map(|model| model.eq_ignore_ascii_case(FISHEYE_MODEL));
+            named.or(i.is_fisheye)
+        };
+        let lens = if is_fisheye(&self.own).or_else(|| is_fisheye(shared)) == Some(true) {
+            Lens { projection: Projection::Fisheye, tangential: [0.0; 2], ..lens }
+        } else {
+            lens
+        };
         lens.for_image(path, header.size_px)
     }
 }
 
 /// The name of a camera model whose distortion the fields do not spell out.
 fn unknown_model(intrinsics: &Intrinsics) -> Option<String> {
-    if intrinsics.is_fisheye == Some(true) {
-        return Some("is_fisheye".to_owned());
-    }
     let model = intrinsics.camera_model.as_deref()?;
     (!KNOWN_MODELS.contains(&model.to_ascii_uppercase().as_str())).then(|| model.to_owned())
 }

@@ -75,6 +75,7 @@ fn between(position_px: f64, n: u32) -> (usize, usize, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dataset::lens::Projection;
 
     /// A smooth picture over directions, 0 to 255.
     fn picture([x, y]: [f64; 2]) -> [f64; 3] {
@@ -104,6 +105,7 @@ mod tests {
             principal_px: [57.0, 46.5],
             radial: [k1, 0.05, 0.0, 0.0],
             tangential: [0.003, -0.002],
+            ..Lens::central((120, 90), [100.0; 2])
         }
     }
 
@@ -136,6 +138,31 @@ mod tests {
                 .sum::<f64>()
                 / 32_400.0;
             assert!(mean < 0.5, "k1 = {k1}: mean error {mean}");
+        }
+    }
+
+    #[test]
+    fn a_fisheye_and_a_rational_lens_become_the_pinhole_picture() {
+        let fisheye = Lens {
+            focal_px: [50.0, 52.0],
+            projection: Projection::Fisheye,
+            radial: [0.02, -0.01, 0.002, 0.0],
+            tangential: [0.0; 2],
+            ..lens(0.0)
+        };
+        let rational = Lens { radial: [0.4, 0.1, 0.02, 0.0], divisor: [0.55, 0.06, 0.01], ..lens(0.0) };
+        for (lens, most_mean) in [(fisheye, 2.0), (rational, 0.5)] {
+            let taken = image(&lens, |at| seen_at(&lens, at));
+            let expected = image(&lens, |at| lens.direction(at));
+            let (found, mask) = undistorted(&taken, None, &lens);
+            assert_eq!(mask, None, "both show more than the pinhole needs");
+            let (sum, most) =
+                found.rgb.iter().zip(&expected.rgb).fold((0_u64, 0), |(sum, most), (a, b)| {
+                    (sum + u64::from(a.abs_diff(*b)), most.max(a.abs_diff(*b)))
+                });
+            // The corners of the fisheye's picture are enlarged four times: bilinear reading errs more there.
+            let mean = sum as f64 / found.rgb.len() as f64;
+            assert!(mean < most_mean && most < 40, "{:?}: mean {mean}, most {most}", lens.projection);
         }
     }
 

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::PoseFault;
 use super::image::EXTENSIONS;
+use super::lens::READABLE_MODELS;
 
 /// Why one view cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -46,10 +47,7 @@ pub enum ViewFault {
     #[error("{found}; correct the camera's numbers or take the view out")]
     Lens { found: String },
     /// A camera model that cannot be undistorted.
-    #[error(
-        "its camera model is `{model}`, needed: PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL, RADIAL or OPENCV; undistort the \
-         image first"
-    )]
+    #[error("its camera model is `{model}`, needed: {READABLE_MODELS}; undistort the image first")]
     CameraModel { model: String },
     /// The view's camera is not in the model.
     #[error("its camera {camera_id} is not among the model's cameras; export the model again")]

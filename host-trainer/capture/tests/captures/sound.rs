@@ -99,12 +99,16 @@ fn intrinsics_follow_the_pixels_of_the_folder_that_is_read() {
 
 #[test]
 fn every_camera_model_reads_its_parameters_in_order() {
-    let cases: [(_, &[f64], [f64; 2], bool); 5] = [
+    let cases: [(_, &[f64], [f64; 2], bool); 9] = [
         ((0, "SIMPLE_PINHOLE"), &[21.0, 11.0, 7.0], [21.0, 21.0], false),
         ((1, "PINHOLE"), &[21.0, 22.0, 11.0, 7.0], [21.0, 22.0], false),
         ((2, "SIMPLE_RADIAL"), &[21.0, 11.0, 7.0, 0.3], [21.0, 21.0], true),
         ((3, "RADIAL"), &[21.0, 11.0, 7.0, 0.3, 0.1], [21.0, 21.0], true),
         ((4, "OPENCV"), &[21.0, 22.0, 11.0, 7.0, 0.3, 0.1, 0.01, -0.02], [21.0, 22.0], true),
+        ((5, "OPENCV_FISHEYE"), &[21.0, 22.0, 11.0, 7.0, 0.9, 0.1, 0.1, 0.1], [21.0, 22.0], true),
+        ((6, "FULL_OPENCV"), &[21.0, 22.0, 11.0, 7.0, 0.3, 0.1, 0.01, -0.02, 0.1, -0.1, 0.0, 0.0], [21.0, 22.0], true),
+        ((8, "SIMPLE_RADIAL_FISHEYE"), &[21.0, 11.0, 7.0, 0.0], [21.0, 21.0], false),
+        ((9, "RADIAL_FISHEYE"), &[21.0, 11.0, 7.0, 0.9, 0.5], [21.0, 21.0], true),
     ];
     for kind in [Kind::ColmapBinary, Kind::ColmapText] {
         for (model, parameters, focal_px, is_distorted) in cases {
@@ -120,6 +124,25 @@ fn every_camera_model_reads_its_parameters_in_order() {
                 assert!(!mask.valid[0] && mask.valid[8 * 24 + 12], "{}", model.1);
                 assert!(report.to_string().contains("pixels that do not count"), "{report}");
             }
+        }
+    }
+}
+
+#[test]
+fn a_fisheye_is_one_however_it_is_said() {
+    let mut colmap = Fixture::new(Kind::ColmapBinary, 9);
+    colmap.cameras[0].model = (5, "OPENCV_FISHEYE");
+    colmap.cameras[0].parameters = vec![20.0, 20.0, 12.0, 8.0, 0.02, -0.01, 0.001, -0.001];
+    let expected = colmap.write_files().load().expect("a capture").0;
+    let pinhole = loaded(Kind::ColmapBinary);
+    assert_ne!(expected.train[0].image, pinhole.train[0].image, "undistorted");
+    for said in ["\"camera_model\": \"OPENCV_FISHEYE\"", "\"is_fisheye\": true, \"camera_model\": \"opencv_fisheye\""] {
+        let mut fixture = Fixture::new(Kind::Nerfstudio, 9);
+        fixture.shared.push_str(", \"k1\": 0.02, \"k2\": -0.01, \"k3\": 0.001, \"k4\": -0.001, ");
+        fixture.shared.push_str(said);
+        let capture = fixture.write_files().load().expect("a capture").0;
+        for (a, b) in capture.train.iter().zip(&expected.train) {
+            assert_eq!(a.image, b.image, "{said}: {}", a.name);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! What a sparse model holds, however it is written.
 
-use crate::dataset::lens::Lens;
+use crate::dataset::lens::{Lens, Projection};
 
 /// A camera of the model: one lens for any number of images.
 #[derive(Debug, PartialEq)]
@@ -57,15 +57,26 @@ impl ModelCamera {
         if known.is_some_and(|&(_, _, count)| count != parameters.len()) {
             return None;
         }
+        let pinhole = |focal_px, principal_px| Lens { principal_px, ..Lens::central(size_px, focal_px) };
         let lens = |focal_px, principal_px, radial, tangential| {
-            Some(Lens { size_px, focal_px, principal_px, radial, tangential })
+            Some(Lens { radial, tangential, ..pinhole(focal_px, principal_px) })
+        };
+        let fisheye = |focal_px, principal_px, radial| {
+            Some(Lens { projection: Projection::Fisheye, radial, ..pinhole(focal_px, principal_px) })
         };
         let lens = match (model, parameters) {
-            ("SIMPLE_PINHOLE", &[f, cx, cy]) => lens([f; 2], [cx, cy], [0.0; 4], [0.0; 2]),
-            ("PINHOLE", &[fx, fy, cx, cy]) => lens([fx, fy], [cx, cy], [0.0; 4], [0.0; 2]),
+            ("SIMPLE_PINHOLE", &[f, cx, cy]) => Some(pinhole([f; 2], [cx, cy])),
+            ("PINHOLE", &[fx, fy, cx, cy]) => Some(pinhole([fx, fy], [cx, cy])),
             ("SIMPLE_RADIAL", &[f, cx, cy, k]) => lens([f; 2], [cx, cy], [k, 0.0, 0.0, 0.0], [0.0; 2]),
             ("RADIAL", &[f, cx, cy, k1, k2]) => lens([f; 2], [cx, cy], [k1, k2, 0.0, 0.0], [0.0; 2]),
             ("OPENCV", &[fx, fy, cx, cy, k1, k2, p1, p2]) => lens([fx, fy], [cx, cy], [k1, k2, 0.0, 0.0], [p1, p2]),
+            ("FULL_OPENCV", &[fx, fy, cx, cy, k1, k2, p1, p2, k3, q1, q2, q3]) => {
+                let (radial, divisor) = ([k1, k2, k3, 0.0], [q1, q2, q3]);
+                Some(Lens { radial, divisor, tangential: [p1, p2], ..pinhole([fx, fy], [cx, cy]) })
+            }
+            ("OPENCV_FISHEYE", &[fx, fy, cx, cy, k1, k2, k3, k4]) => fisheye([fx, fy], [cx, cy], [k1, k2, k3, k4]),
+            ("SIMPLE_RADIAL_FISHEYE", &[f, cx, cy, k]) => fisheye([f; 2], [cx, cy], [k, 0.0, 0.0, 0.0]),
+            ("RADIAL_FISHEYE", &[f, cx, cy, k1, k2]) => fisheye([f; 2], [cx, cy], [k1, k2, 0.0, 0.0]),
             _ => None,
         };
         Some(Self { model: model.to_owned(), lens })

@@ -89,14 +89,14 @@ pub(super) fn cases() -> Vec<Case> {
             },
         ),
         case(
-            "a fisheye in a binary model",
+            "a fisheye with prisms in a binary model",
             ColmapBinary,
             Fatal,
             "camera-model",
-            &["camera 1 has the camera model `OPENCV_FISHEYE`, needed: PINHOLE", "image_undistorter"],
+            &["camera 1 has the camera model `THIN_PRISM_FISHEYE`, needed: PINHOLE", "image_undistorter"],
             |f| {
-                f.cameras[0].model.0 = 5;
-                f.cameras[0].parameters.resize(8, 0.0);
+                f.cameras[0].model.0 = 10;
+                f.cameras[0].parameters.resize(12, 0.0);
                 f.write_files();
             },
         ),
@@ -105,10 +105,10 @@ pub(super) fn cases() -> Vec<Case> {
             ColmapText,
             Fatal,
             "camera-model",
-            &["cameras.txt`: camera 1 has the camera model `FULL_OPENCV`, needed: PINHOLE"],
+            &["cameras.txt`: camera 1 has the camera model `EUCM`, needed: PINHOLE", "OPENCV_FISHEYE"],
             |f| {
-                f.cameras[0].model.1 = "FULL_OPENCV";
-                f.cameras[0].parameters.resize(12, 0.0);
+                f.cameras[0].model.1 = "EUCM";
+                f.cameras[0].parameters.resize(6, 0.0);
                 f.write_files();
             },
         ),

@@ -43,13 +43,13 @@ pub(super) fn cases() -> Vec<Case> {
             },
         ),
         case(
-            "a fisheye",
+            "a panorama",
             Nerfstudio,
             Fatal,
             "camera-model",
-            &["all frames has the camera model `OPENCV_FISHEYE`", "undistort the capture first"],
+            &["all frames has the camera model `EQUIRECTANGULAR`", "undistort the capture first"],
             |f| {
-                f.shared.push_str(", \"camera_model\": \"OPENCV_FISHEYE\"");
+                f.shared.push_str(", \"camera_model\": \"EQUIRECTANGULAR\"");
                 f.write_files();
             },
         ),

@@ -203,13 +203,13 @@ pub(super) fn cases() -> Vec<Case> {
             },
         ),
         case(
-            "one frame with a fisheye",
+            "one frame with a panorama",
             Nerfstudio,
             Views,
             "camera-model",
-            &["images/p_02.png: its camera model is `is_fisheye`"],
+            &["images/p_02.png: its camera model is `EQUIRECTANGULAR`"],
             |f| {
-                f.photos[2].extra = "\"is_fisheye\": true, ".to_owned();
+                f.photos[2].extra = "\"camera_model\": \"EQUIRECTANGULAR\", ".to_owned();
                 f.write_files();
             },
         ),

@@ -27,8 +27,9 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
     let sizes_px = |split| listing.shots(split).map(|shot| shot.header.size_px);
     let source_size_px = commonest(sizes_px(Split::Train)).unwrap_or_default();
     let n_sizes = sizes_px(Split::Train).chain(sizes_px(Split::Test)).collect::<BTreeSet<_>>().len();
-    let n_without_alpha =
-        listing.views.iter().flat_map(|view| &view.shot).filter(|shot| !shot.header.has_alpha).count();
+    let shots = || listing.views.iter().flat_map(|view| &view.shot);
+    let n_without_alpha = shots().filter(|shot| !shot.header.has_alpha).count();
+    let n_with_alpha = shots().count() - n_without_alpha;
     let listed = listing.n_listed(Split::Train);
     // Before decoding anything, if that many are already known not to do.
     if listing.shots(Split::Train).count() < MIN_TRAIN_VIEWS {
@@ -75,6 +76,13 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
         notes.push(format!(
             "images without an alpha channel: {n_without_alpha}; what they show behind the object is trained as part \
              of it; export RGBA to have the background {} there",
+            options.background
+        ));
+    }
+    if layout != Layout::Blender && n_with_alpha > 0 {
+        notes.push(format!(
+            "photographs with an alpha channel: {n_with_alpha}; what is transparent is trained as {} background; give masks \
+             to leave it out of training instead",
             options.background
         ));
     }

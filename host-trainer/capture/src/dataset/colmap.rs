@@ -1,4 +1,5 @@
-//! COLMAP captures: a sparse model, `sparse/0/{cameras,images,points3D}.{bin,txt}`, beside folders of photographs.
+//! COLMAP captures: a sparse model, `sparse/0/{cameras,images,points3D}.{bin,txt}`, beside folders of photographs and, where
+//! there are any, their masks.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -6,22 +7,28 @@ use std::path::{Path, PathBuf};
 use glam::{DMat3, DQuat, DVec3};
 use rayon::prelude::*;
 
+use super::error::first_few;
 use super::image::read_header;
 use super::listing::{ListedView, Listing, Note, Shot, every_nth, unused_images};
 use super::named_path::NamedPath;
 use super::{DatasetError, Layout, LoadOptions, ViewFault, image_folder, text_file};
 
 mod binary;
+mod choose;
 mod model;
 mod text;
 
+pub(super) use choose::has_model;
 use model::{ModelCamera, ModelFault, ModelImage};
 
-/// Where a model is looked for, in this order.
-const MODEL_FOLDERS: [&str; 2] = ["sparse/0", "sparse"];
+/// Deviation of a quaternion's length from 1 that rounding explains: text files carry at least three decimals.
+const ROUNDED_QUATERNION: f64 = 2e-3;
 
-/// Largest deviation of a quaternion's length from 1; text files carry at least three decimals.
-const MAX_QUATERNION_DEVIATION: f64 = 1e-2;
+/// Largest deviation of a quaternion's length from 1 that is taken for a missing normalisation.
+const MAX_QUATERNION_DEVIATION: f64 = 0.1;
+
+/// The folder of masks beside the folder of images.
+const MASKS: &str = "masks";
 
 /// How a model's files are written.
 #[derive(Clone, Copy)]
@@ -39,33 +46,14 @@ impl ModelEncoding {
     }
 }
 
-/// The folder of the model and how it is written, told by its list of cameras or of images.
-fn model_of(folder: &Path) -> Option<(PathBuf, ModelEncoding)> {
-    let folders = MODEL_FOLDERS.iter().map(|name| folder.join(name));
-    folders.into_iter().find_map(|model| {
-        let encodings = [ModelEncoding::Binary, ModelEncoding::Text];
-        let is_there =
-            |stem: &str, encoding: ModelEncoding| model.join(stem).with_extension(encoding.extension()).is_file();
-        let found = encodings.into_iter().find(|&e| is_there("cameras", e) || is_there("images", e))?;
-        Some((model, found))
-    })
-}
-
-/// Whether the folder is of this layout.
-pub(super) fn is_layout_of(folder: &Path) -> bool {
-    model_of(folder).is_some()
-}
-
 /// Lists the COLMAP capture in `folder`, views sorted by name.
 ///
 /// # Errors
 /// As [`super::load`], as far as files but no pixels tell.
 pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, DatasetError> {
-    let Some((model, encoding)) = model_of(folder) else {
-        let looked_for = Layout::LOOKED_FOR.to_vec();
-        return Err(DatasetError::UnknownLayout { path: folder.to_owned(), looked_for, inside: None });
-    };
-    let path = |stem: &str| model.join(stem).with_extension(encoding.extension());
+    let mut notes = Vec::new();
+    let model = choose::choose(folder, options.model, &mut notes)?;
+    let (path, encoding) = (|stem: &str| model.path(stem), model.encoding);
     let cameras = read(&path("cameras"), encoding, binary::cameras, text::cameras)?;
     let mut images = read(&path("images"), encoding, binary::images, text::images)?;
     images.sort_by(|a, b| a.name.cmp(&b.name));
@@ -77,7 +65,6 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
             return Err(DatasetError::CameraModel { path, camera, model });
         }
     }
-    let mut notes = Vec::new();
     let points_path = path("points3D");
     let points = if points_path.is_file() {
         Some((points_path.clone(), read(&points_path, encoding, binary::points, text::points)?))
@@ -93,26 +80,26 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
         );
         notes.push(Note::new("no-points", text));
     }
-    if model.ends_with("0") && folder.join("sparse/1").is_dir() {
-        let text = "the capture has several models, of which only `sparse/0` is read; merge them if images of the others are needed";
-        notes.push(Note::new("several-models", text));
-    }
     let image_folder = image_folder::choose(folder, options, &mut notes)?;
     let Some(image_folder) = image_folder.map(|name| folder.join(name)) else {
         return Err(DatasetError::ImageFolder { path: folder.to_owned(), wanted: None, present: Vec::new() });
     };
+    let masks = Some(folder.join(MASKS)).filter(|masks| masks.is_dir());
     let views: Vec<ListedView> = images
         .par_iter()
         .enumerate()
         .map(|(i, image)| ListedView {
             split: every_nth(options.test_every, i),
             name: image.name.clone(),
-            shot: shot(&image_folder, image, &cameras),
+            shot: shot(&image_folder, masks.as_deref(), image, &cameras),
         })
         .collect();
     let posed: Vec<PathBuf> =
         images.iter().filter_map(|image| NamedPath::new(&image.name).image(&image_folder, None)).collect();
-    let unposed = unused_images(&image_folder, posed.iter().map(PathBuf::as_path));
+    let used_masks: Vec<PathBuf> = views.iter().filter_map(|view| view.shot.as_ref().ok()?.mask.clone()).collect();
+    let unposed = unused_images(&image_folder, posed.iter().chain(&used_masks).map(PathBuf::as_path));
+    notes.extend(missing_masks(masks.as_deref(), &views));
+    notes.extend(long_quaternions(&path("images"), &images));
     let mut listing = Listing { layout: Layout::Colmap, source: path("images"), views, points, unposed, notes };
     if !listing.has_test_views() {
         listing.notes.push(Note::no_test_views());
@@ -135,7 +122,53 @@ fn read<T>(
     parsed.map_err(|fault| DatasetError::Model { path: path.to_owned(), place: fault.place, found: fault.found })
 }
 
-fn shot(folder: &Path, image: &ModelImage, cameras: &BTreeMap<u32, ModelCamera>) -> Result<Shot, ViewFault> {
+/// Says how many views lack a mask although others have one.
+fn missing_masks(masks: Option<&Path>, views: &[ListedView]) -> Option<Note> {
+    let masks = masks?;
+    let sound = || views.iter().filter_map(|view| Some((&view.name, view.shot.as_ref().ok()?)));
+    let without: Vec<&String> = sound().filter(|(_, shot)| shot.mask.is_none()).map(|(name, _)| name).collect();
+    (!without.is_empty()).then(|| {
+        let text = format!(
+            "images without a mask in `{}`: {} of {} ({}), so all their pixels count; name masks like their images, with \
+             `.png` behind the name or in place of its extension",
+            masks.display(),
+            without.len(),
+            sound().count(),
+            first_few(&without, ", ")
+        );
+        Note::warning("missing-masks", text)
+    })
+}
+
+/// Says which rotations had to be normalised by more than rounding explains.
+fn long_quaternions(path: &Path, images: &[ModelImage]) -> Option<Note> {
+    let deviation = |image: &ModelImage| (quaternion(image).length() - 1.0).abs();
+    let near = |image: &&ModelImage| (ROUNDED_QUATERNION..=MAX_QUATERNION_DEVIATION).contains(&deviation(image));
+    let near: Vec<&ModelImage> = images.iter().filter(near).collect();
+    let worst = near.iter().max_by(|a, b| deviation(a).total_cmp(&deviation(b)))?;
+    let names: Vec<&str> = near.iter().map(|image| image.name.as_str()).collect();
+    let text = format!(
+        "`{}`: rotations whose quaternion is not of length 1: {} ({}), the worst of length {:.6}; they were normalised: export \
+         the model again with more digits if its views do not agree",
+        path.display(),
+        names.len(),
+        first_few(&names, ", "),
+        quaternion(worst).length()
+    );
+    Some(Note::warning("quaternion-length", text))
+}
+
+/// The mask of the image `name`: COLMAP appends `.png` to the image's name, others replace its extension.
+fn mask_of(masks: &Path, name: &str) -> Option<PathBuf> {
+    NamedPath::new(&format!("{name}.png")).file(masks, None).or_else(|| NamedPath::new(name).image(masks, None))
+}
+
+fn shot(
+    folder: &Path,
+    masks: Option<&Path>,
+    image: &ModelImage,
+    cameras: &BTreeMap<u32, ModelCamera>,
+) -> Result<Shot, ViewFault> {
     let (rotation, translation) = pose(image)?;
     let camera_id = image.camera_id;
     let camera = cameras.get(&camera_id).ok_or(ViewFault::NoCamera { camera_id })?;
@@ -150,13 +183,19 @@ fn shot(folder: &Path, image: &ModelImage, cameras: &BTreeMap<u32, ModelCamera>)
         return Err(ViewFault::CameraModel { model: camera.model.clone() });
     };
     let lens = lens.clone().for_image(&path, header.size_px)?;
-    Ok(Shot { path, header, rotation, translation, lens, mask: None })
+    let mask = masks.and_then(|masks| mask_of(masks, &image.name));
+    Ok(Shot { path, header, rotation, translation, lens, mask })
+}
+
+/// The quaternion as it is written.
+fn quaternion(image: &ModelImage) -> DQuat {
+    let [w, x, y, z] = image.quaternion_wxyz;
+    DQuat::from_xyzw(x, y, z, w)
 }
 
 /// World to camera in OpenCV axes, as COLMAP stores it.
 fn pose(image: &ModelImage) -> Result<(DMat3, DVec3), ViewFault> {
-    let [w, x, y, z] = image.quaternion_wxyz;
-    let quaternion = DQuat::from_xyzw(x, y, z, w);
+    let quaternion = quaternion(image);
     let length = quaternion.length();
     if length.is_nan() || (length - 1.0).abs() > MAX_QUATERNION_DEVIATION {
         return Err(ViewFault::Quaternion { length });

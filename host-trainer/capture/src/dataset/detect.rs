@@ -8,10 +8,13 @@ use super::{DatasetError, Layout, blender, colmap, nerfstudio};
 pub(super) fn layout_of(path: &Path) -> Option<Layout> {
     if path.join(blender::TRAIN_FILE).is_file() {
         Some(Layout::Blender)
-    } else if colmap::is_layout_of(path) {
+    } else if colmap::has_model(path, true) {
         Some(Layout::Colmap)
     } else if path.join(nerfstudio::FILE).is_file() {
         Some(Layout::Nerfstudio)
+    } else if colmap::has_model(path, false) {
+        // After nerfstudio, which leaves the model in `colmap/sparse` that its transforms were made from.
+        Some(Layout::Colmap)
     } else {
         None
     }

@@ -48,6 +48,12 @@ pub enum DatasetError {
         path.display()
     )]
     NoFocal { path: PathBuf, frame: String },
+    /// The capture has no model of that number.
+    #[error("`{}` has no model {wanted}{}", path.display(), models_there(present))]
+    ModelNumber { path: PathBuf, wanted: u32, present: Vec<u32> },
+    /// The model went away while the capture was looked at.
+    #[error("`{}` has no model in `sparse` or `colmap/sparse`; reconstruct the capture again", path.display())]
+    NoModel { path: PathBuf },
     /// A file of a COLMAP model is damaged.
     #[error("`{}`: {place}: {found}; export the model again, or copy it again if the file was cut", path.display())]
     Model { path: PathBuf, place: String, found: String },
@@ -97,6 +103,8 @@ impl DatasetError {
             Self::Read { .. } => "unreadable-file",
             Self::Transforms { .. } => "bad-transforms",
             Self::FieldOfView { .. } | Self::NoFocal { .. } => "bad-intrinsics",
+            Self::ModelNumber { .. } => "bad-option",
+            Self::NoModel { .. } => "unknown-layout",
             Self::Model { .. } => "bad-model",
             Self::CameraModel { .. } => "camera-model",
             Self::ImageFolder { .. } => "image-folder",
@@ -108,9 +116,17 @@ impl DatasetError {
     }
 }
 
+fn models_there(present: &[u32]) -> String {
+    let numbers: Vec<String> = present.iter().map(u32::to_string).collect();
+    match numbers.as_slice() {
+        [] => ": there is one, without a number; leave `--model` out".to_owned(),
+        numbers => format!(": there are {}; give `--model` one of these, or leave it out", numbers.join(", ")),
+    }
+}
+
 fn image_folder(wanted: Option<&str>, present: &[String]) -> String {
     let there = match present {
-        [] => "there is neither `images` nor `images_…`".to_owned(),
+        [] => "there is neither `images` nor `images_…` nor `input`".to_owned(),
         present => format!("there are `{}`", present.join("`, `")),
     };
     match (wanted, present) {

@@ -2,14 +2,17 @@
 
 use std::path::Path;
 
+use super::image::is_image_name;
 use super::listing::Note;
 use super::{DatasetError, LoadOptions};
 
 /// The folder of full-size images.
 const DEFAULT: &str = "images";
+/// Where some tools look for photographs before a reconstruction.
+const UNPREPARED: &str = "input";
 
-/// The name of the folder to read images from: the one asked for, the only one there is, or `images`; says what else
-/// there is. `None` where there is none.
+/// The name of the folder to read images from: the one asked for, the only one there is, or `images`; without any of these
+/// `input`, or no name where images lie in the capture's own folder. Says what else there is; `None` where there is none.
 ///
 /// # Errors
 /// [`DatasetError::ImageFolder`] where the one asked for is missing, or several are there but not `images`.
@@ -26,6 +29,8 @@ pub(super) fn choose(
         return Err(DatasetError::ImageFolder { path: folder.to_owned(), wanted: Some(name.clone()), present });
     }
     match present.as_slice() {
+        [] if folder.join(UNPREPARED).is_dir() => Ok(Some(UNPREPARED.to_owned())),
+        [] if holds_images(folder) => Ok(Some(String::new())),
         [] => Ok(None),
         [only] => Ok(Some(only.clone())),
         several if several.iter().any(|name| name == DEFAULT) => {
@@ -39,6 +44,12 @@ pub(super) fn choose(
         }
         _ => Err(DatasetError::ImageFolder { path: folder.to_owned(), wanted: None, present }),
     }
+}
+
+/// Whether images lie in the folder itself.
+fn holds_images(folder: &Path) -> bool {
+    let mut entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    entries.any(|entry| entry.path().is_file() && is_image_name(&entry.file_name().to_string_lossy()))
 }
 
 /// The folders named `images` or `images_…`, sorted.

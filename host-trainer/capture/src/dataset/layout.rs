@@ -10,7 +10,7 @@ use serde::Serialize;
 pub enum Layout {
     /// Synthetic-NeRF: `transforms_train.json` and its like beside RGBA images.
     Blender,
-    /// A sparse model in `sparse/0`, binary or text, beside `images`.
+    /// A sparse model in `sparse/0` or `colmap/sparse/0`, binary or text, beside `images` or `input`.
     Colmap,
     /// nerfstudio and instant-ngp: one `transforms.json`.
     Nerfstudio,
@@ -20,7 +20,7 @@ impl Layout {
     /// What tells each layout, for messages.
     pub(super) const LOOKED_FOR: [&str; 3] = [
         "`transforms_train.json` (Blender)",
-        "`sparse/0/cameras.bin` or `sparse/0/cameras.txt` (COLMAP)",
+        "`sparse/0/cameras.bin` or `sparse/0/cameras.txt`, also in `colmap` (COLMAP)",
         "`transforms.json` (nerfstudio, instant-ngp)",
     ];
 }

@@ -91,16 +91,12 @@ impl Lens {
     /// The same lens for the image scaled to `size_px`, or `None` where that is no scaling of the image: the sides of
     /// both must be in one ratio, each to a rounding of 1 px.
     pub(super) fn scaled_to(&self, size_px: (u32, u32)) -> Option<Self> {
-        let ratio = |side_px: u32, own_px: u32| {
-            let (side, own) = (f64::from(side_px), f64::from(own_px));
-            ((side - 1.0) / own, side / own, (side + 1.0) / own)
-        };
-        let (x, y) = (ratio(size_px.0, self.size_px.0), ratio(size_px.1, self.size_px.1));
-        let alike = x.0 <= y.2 && y.0 <= x.2;
-        alike.then(|| Self {
+        let x = f64::from(size_px.0) / f64::from(self.size_px.0);
+        let y = f64::from(size_px.1) / f64::from(self.size_px.1);
+        is_scaling(self.size_px, size_px).then(|| Self {
             size_px,
-            focal_px: [self.focal_px[0] * x.1, self.focal_px[1] * y.1],
-            principal_px: [self.principal_px[0] * x.1, self.principal_px[1] * y.1],
+            focal_px: [self.focal_px[0] * x, self.focal_px[1] * y],
+            principal_px: [self.principal_px[0] * x, self.principal_px[1] * y],
             ..self.clone()
         })
     }
@@ -194,6 +190,16 @@ impl Lens {
         let (focal_px, principal_px) = (self.focal_px, self.principal_px);
         Camera { rotation, translation, focal_px, principal_px, width_px, height_px }
     }
+}
+
+/// Whether an image of one size can be one of the other scaled: each side may be rounded by 1 px.
+pub(super) fn is_scaling(from_px: (u32, u32), to_px: (u32, u32)) -> bool {
+    let ratio = |to_px: u32, from_px: u32| {
+        let (to, from) = (f64::from(to_px), f64::from(from_px));
+        ((to - 1.0) / from, (to + 1.0) / from)
+    };
+    let (x, y) = (ratio(to_px.0, from_px.0), ratio(to_px.1, from_px.1));
+    x.0 <= y.1 && y.0 <= x.1
 }
 
 #[cfg(test)]

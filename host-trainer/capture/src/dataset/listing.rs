@@ -70,7 +70,7 @@ pub(super) struct Shot {
     pub(super) translation: DVec3,
     /// For the image as it is stored.
     pub(super) lens: Lens,
-    /// A mask image of the same size; its black pixels do not count.
+    /// A mask image of the same size or a larger one of the same shape; its black pixels do not count.
     pub(super) mask: Option<PathBuf>,
 }
 

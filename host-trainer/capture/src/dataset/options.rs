@@ -65,6 +65,8 @@ pub struct LoadOptions {
     ///
     /// Without it the only one there is, or `images`. Blender captures name each image by its path and ignore it.
     pub images: Option<String>,
+    /// The sparse model to read, by its number, for COLMAP captures that hold several; without it the largest.
+    pub model: Option<u32>,
     /// Every this many-th view, sorted by name and counted from the first, is held out where the capture gives no
     /// split of its own; 0 holds out none. Views whose image is missing count, so that the split does not depend on
     /// which files are there.
@@ -81,6 +83,7 @@ impl Default for LoadOptions {
             seed: 42,
             n_random_points: 10_000,
             images: None,
+            model: None,
             // As every published figure on COLMAP captures.
             test_every: 8,
         }

@@ -2,6 +2,7 @@
 
 use super::framing::Framing;
 use super::image::{read_composited, read_mask};
+use super::lens::is_scaling;
 use super::listing::Shot;
 use super::undistort::undistorted;
 use super::{LoadOptions, Mask, View, ViewFault};
@@ -41,6 +42,14 @@ impl Shot {
         let needed_px = self.header.size_px;
         match read_mask(&path) {
             Ok(mask) if (mask.width_px, mask.height_px) == needed_px => Ok(Some(mask)),
+            // Masks are often kept at full size only.
+            Ok(mask)
+                if mask.width_px >= needed_px.0
+                    && mask.height_px >= needed_px.1
+                    && is_scaling((mask.width_px, mask.height_px), needed_px) =>
+            {
+                Ok(Some(mask.area_resized(needed_px.0, needed_px.1)))
+            }
             Ok(mask) => {
                 let (width_px, height_px) = (mask.width_px, mask.height_px);
                 let message = format!("is {width_px}×{height_px} px, its image {}×{} px", needed_px.0, needed_px.1);

@@ -59,7 +59,7 @@ pub enum ViewFault {
     #[error("its translation is {found:?}, needed: finite numbers; take the view out or export the model again")]
     Translation { found: [f64; 3] },
     /// The mask cannot be used.
-    #[error("its mask `{}` {message}; restore the mask or take `mask_path` out", path.display())]
+    #[error("its mask `{}` {message}; restore the mask or take it out of the capture", path.display())]
     Mask { path: PathBuf, message: String },
     /// The pose is no rigid motion.
     #[error("`transform_matrix` {0}")]

@@ -117,6 +117,14 @@ impl Fixture {
         image::save_buffer(path, &bytes, width_px, height_px, colour).expect("an image");
     }
 
+    /// Writes a mask whose left third does not count.
+    pub(crate) fn write_mask(&self, name: &str, (width_px, height_px): (u32, u32)) {
+        let path = self.at(name);
+        fs::create_dir_all(path.parent().expect("a file lies in a folder")).expect("a folder");
+        let value = |x: u32, _| image::Luma([if 3 * x < width_px { 0 } else { 255_u8 }]);
+        image::ImageBuffer::from_fn(width_px, height_px, value).save(path).expect("an image");
+    }
+
     /// The files of the layout that hold poses, as path and bytes.
     pub(crate) fn files(&self) -> Vec<(&'static str, Vec<u8>)> {
         match self.kind {

@@ -148,6 +148,20 @@ fn a_fisheye_is_one_however_it_is_said() {
 }
 
 #[test]
+fn the_largest_model_is_read_or_the_one_asked_for() {
+    let mut fixture = Fixture::new(Kind::ColmapText, 9);
+    fixture.write_files();
+    std::fs::rename(fixture.at("sparse/0"), fixture.at("sparse/10")).expect("a model");
+    fixture.photos.truncate(5);
+    fixture.write_files();
+    let n_views = |model| {
+        let capture = fixture.load_with(&LoadOptions { model, ..LoadOptions::default() }).expect("a capture").0;
+        capture.train.len() + capture.test.len()
+    };
+    assert_eq!((n_views(None), n_views(Some(0)), n_views(Some(10))), (9, 5, 9));
+}
+
+#[test]
 fn a_lens_per_image_is_kept_apart() {
     let mut fixture = Fixture::new(Kind::ColmapBinary, 9);
     for i in 1..9_u32 {

@@ -26,6 +26,7 @@ impl CaptureArgs {
             background: self.options.background.unwrap_or(Background::Black),
             seed,
             images: self.options.images.clone(),
+            model: self.options.model,
             test_every: self.options.test_every.unwrap_or(default.test_every),
             ..default
         }

@@ -15,6 +15,9 @@ pub(crate) struct Args {
     /// Folder of images to read, for captures that hold several sizes [default: the only one, or images]
     #[arg(long, value_name = "NAME")]
     images: Option<String>,
+    /// Number of the sparse model to read, for COLMAP captures that hold several [default: the one with the most images]
+    #[arg(long, value_name = "N")]
+    model: Option<u32>,
     /// Hold out every N-th view; 0 holds out none.
     #[arg(long, value_name = "N", default_value_t = LoadOptions::default().test_every)]
     test_every: u32,
@@ -24,7 +27,12 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
-    let options = LoadOptions { images: args.images.clone(), test_every: args.test_every, ..LoadOptions::default() };
+    let options = LoadOptions {
+        images: args.images.clone(),
+        model: args.model,
+        test_every: args.test_every,
+        ..LoadOptions::default()
+    };
     let diagnosis = diagnose(&args.dataset, &options);
     if args.json {
         output::print(&diagnosis, true)?;

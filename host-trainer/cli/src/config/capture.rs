@@ -25,6 +25,10 @@ pub(crate) struct CaptureOptions {
     #[arg(long, value_name = "NAME", help_heading = INPUT, hide_short_help = true)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) images: Option<String>,
+    /// Number of the sparse model to read, for COLMAP captures that hold several [default: the one with the most images]
+    #[arg(long, value_name = "N", help_heading = INPUT, hide_short_help = true)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) model: Option<u32>,
     /// Hold out every N-th view for testing where the capture has no split of its own; 0 holds out none [default: 8]
     #[arg(long, value_name = "N", help_heading = INPUT, hide_short_help = true)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -42,6 +46,7 @@ impl CaptureOptions {
             resolution: size.resolution,
             background: self.background.or(other.background),
             images: self.images.clone().or_else(|| other.images.clone()),
+            model: self.model.or(other.model),
             test_every: self.test_every.or(other.test_every),
         }
     }

@@ -13,6 +13,7 @@ fn a_written_configuration_reads_back_to_the_last_bit() {
             resolution: None,
             background: Some(Background::White),
             images: Some("images_2".to_owned()),
+            model: Some(1),
             test_every: Some(5),
         },
         ..RunConfig::default()

@@ -129,10 +129,11 @@ fn alpha(listing: &Listing, findings: &mut Vec<Finding>) {
     } else {
         Finding::about(
             &with,
-            Severity::Warning,
+            Severity::Note,
             "alpha",
-            "photographs with an alpha channel, which are composited on the chosen background",
-            "if the alpha marks pixels to leave out, give them as masks; else remove the channel",
+            "photographs with an alpha channel, which are composited on the chosen background: what is transparent is \
+             trained as empty",
+            "to leave transparent pixels out of training instead, give them as masks",
         )
     };
     findings.extend(finding);

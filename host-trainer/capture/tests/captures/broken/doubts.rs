@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::Harm::Doubt;
 use super::{Case, case, flat_image, look_away, turned_image};
 use crate::fixture::Kind::{Blender, ColmapBinary, ColmapText, Nerfstudio};
+use crate::fixture::SIZE_PX;
 
 pub(super) fn cases() -> Vec<Case> {
     vec![
@@ -124,7 +125,7 @@ pub(super) fn cases() -> Vec<Case> {
             Nerfstudio,
             Doubt,
             "alpha",
-            &["photographs with an alpha channel", ": 1 (images/p_03.png)", "give them as masks"],
+            &["note[alpha]: photographs with an alpha channel", ": 1 (images/p_03.png)", "give them as masks"],
             |f| {
                 let rgba = [90; 24 * 16 * 4];
                 image::save_buffer(
@@ -186,6 +187,35 @@ pub(super) fn cases() -> Vec<Case> {
             &["images of another size than the 24×16 px of most: 1 (p_03.png)"],
             |f| {
                 f.write_files().write_image("images/p_03.png", (48, 32));
+            },
+        ),
+        case(
+            "a mask for some images",
+            ColmapBinary,
+            Doubt,
+            "missing-masks",
+            &[
+                "masks`: 10 of 12 (p_00.png, p_01.png, p_02.png, … and 7 more), so all their pixels count",
+                "name masks like",
+            ],
+            |f| {
+                f.write_files().write_image("masks/p_03.png.png", SIZE_PX);
+                f.write_image("masks/p_04.jpg", SIZE_PX);
+            },
+        ),
+        case(
+            "quaternions that were never normalised",
+            ColmapText,
+            Doubt,
+            "quaternion-length",
+            &[
+                "images.txt`: rotations whose quaternion is not of length 1: 2 (p_02.png, p_07.png), the worst of length 0.930000",
+                "they were normalised",
+                "10 views to train, 2 to test",
+            ],
+            |f| {
+                (f.photos[2].quaternion_length, f.photos[7].quaternion_length) = (0.93, 1.05);
+                f.write_files();
             },
         ),
         case(
@@ -269,9 +299,17 @@ pub(super) fn cases() -> Vec<Case> {
             ColmapBinary,
             Doubt,
             "several-models",
-            &["the capture has several models, of which only `sparse/0` is read"],
+            &[
+                "note[several-models]: the capture has 3 models, which share no frame: 0 poses 5 images, 1 poses 12 images, 2 \
+                 poses 0 images",
+                "remedy: the largest, 1, is read: choose another with `--model N`",
+                "10 views to train, 2 to test",
+            ],
             |f| {
-                f.write_files().write("sparse/1/cameras.bin", "");
+                f.write_files();
+                std::fs::rename(f.at("sparse/0"), f.at("sparse/1")).expect("a model");
+                f.photos.truncate(5);
+                f.write_files().write("sparse/2/cameras.bin", "");
             },
         ),
     ]

@@ -27,7 +27,9 @@ pub(super) fn cases() -> Vec<Case> {
             ColmapText,
             Fatal,
             "image-folder",
-            &["has no folder of images: there is neither `images` nor `images_…`; put the photographs into `images`"],
+            &[
+                "has no folder of images: there is neither `images` nor `images_…` nor `input`; put the photographs into `images`",
+            ],
             |f| std::fs::rename(f.write_files().at("images"), f.at("photos")).expect("a folder"),
         ),
         case(

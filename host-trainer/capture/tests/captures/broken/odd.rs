@@ -13,6 +13,7 @@ fn replace(fixture: &Fixture, from: &str, to: &str) {
 pub(super) fn cases() -> Vec<Case> {
     let mut cases = paths();
     cases.extend(texts());
+    cases.extend(layouts());
     cases
 }
 
@@ -88,6 +89,106 @@ fn paths() -> Vec<Case> {
         case("masks beside the images", Nerfstudio, Nothing, "unposed-image", &["warnings: 1,"], |f| {
             f.photos[2].extra = "\"mask_path\": \"images/mask_02.png\", ".to_owned();
             f.write_image("images/mask_02.png", SIZE_PX);
+            f.write_files();
+        }),
+    ]
+}
+
+fn layouts() -> Vec<Case> {
+    vec![
+        case("a model in `sparse` itself", ColmapBinary, Nothing, "several-models", &["COLMAP capture"], |f| {
+            f.write_files();
+            for name in ["cameras.bin", "images.bin", "points3D.bin"] {
+                std::fs::rename(f.at("sparse/0").join(name), f.at("sparse").join(name)).expect("written");
+            }
+        }),
+        case("a model in `colmap/sparse/0`", ColmapText, Nothing, "several-models", &["COLMAP capture"], |f| {
+            std::fs::create_dir(f.write_files().at("colmap")).expect("a folder");
+            std::fs::rename(f.at("sparse"), f.at("colmap/sparse")).expect("written");
+        }),
+        case(
+            "transforms beside the model they were made from",
+            Nerfstudio,
+            Nothing,
+            "no-alpha",
+            &["nerfstudio"],
+            |f| {
+                f.write_files().write("colmap/sparse/0/cameras.bin", "");
+            },
+        ),
+        case("a second model that is not the first", ColmapBinary, Nothing, "several-models", &["COLMAP"], |f| {
+            std::fs::rename(f.write_files().at("sparse/0"), f.at("sparse/4")).expect("written");
+        }),
+        case("photographs in `input`", ColmapText, Nothing, "image-folder", &["warnings: 1,"], |f| {
+            std::fs::rename(f.write_files().at("images"), f.at("input")).expect("a folder");
+        }),
+        case("photographs beside `sparse`", ColmapBinary, Nothing, "unposed-image", &["warnings: 1,"], |f| {
+            f.write_files();
+            for photo in &f.photos {
+                std::fs::rename(f.at("images").join(&photo.name), f.at(&photo.name)).expect("written");
+            }
+            std::fs::remove_dir(f.at("images")).expect("empty");
+        }),
+        case(
+            "masks beside a model",
+            ColmapBinary,
+            Nothing,
+            "missing-masks",
+            &["pixels that do not count", ": 12"],
+            |f| {
+                f.write_files();
+                for (i, photo) in f.photos.iter().enumerate() {
+                    let name = if i.is_multiple_of(2) { format!("{}.png", photo.name) } else { photo.name.clone() };
+                    f.write_mask(&format!("masks/{name}"), SIZE_PX);
+                }
+            },
+        ),
+        case(
+            "masks at twice the size of the images",
+            ColmapText,
+            Nothing,
+            "bad-mask",
+            &["do not count", ": 12"],
+            |f| {
+                f.write_files();
+                for photo in &f.photos {
+                    f.write_mask(&format!("masks/{}", photo.name), (2 * SIZE_PX.0, 2 * SIZE_PX.1));
+                }
+            },
+        ),
+        case(
+            "photographs cut out of their background",
+            ColmapBinary,
+            Nothing,
+            "no-alpha",
+            &["note[alpha]", ": 12 ("],
+            |f| {
+                f.write_files();
+                for photo in &f.photos {
+                    let image = image::open(f.at("images").join(&photo.name)).expect("written").into_rgba8();
+                    image.save(f.at("images").join(&photo.name)).expect("an image");
+                }
+            },
+        ),
+        case("a fisheye", ColmapBinary, Nothing, "camera-model", &["images with lens distortion: 12"], |f| {
+            f.cameras[0].model = (5, "OPENCV_FISHEYE");
+            f.cameras[0].parameters = vec![20.0, 20.0, 12.0, 8.0, 0.01, 0.0, 0.0, 0.0];
+            f.write_files();
+        }),
+        case(
+            "a fisheye of instant-ngp",
+            Nerfstudio,
+            Nothing,
+            "camera-model",
+            &["images with lens distortion: 12"],
+            |f| {
+                f.shared.push_str(", \"is_fisheye\": true, \"k1\": 0.01");
+                f.write_files();
+            },
+        ),
+        case("a rational lens", ColmapText, Nothing, "camera-model", &["images with lens distortion: 12"], |f| {
+            f.cameras[0].model = (6, "FULL_OPENCV");
+            f.cameras[0].parameters = vec![20.0, 20.0, 12.0, 8.0, 0.1, 0.0, 0.0, 0.0, 0.0, 0.1, 0.0, 0.0];
             f.write_files();
         }),
     ]

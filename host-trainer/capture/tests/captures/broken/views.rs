@@ -147,6 +147,38 @@ pub(super) fn cases() -> Vec<Case> {
             },
         ),
         case(
+            "a quaternion far from length 1",
+            ColmapText,
+            Views,
+            "bad-pose",
+            &["p_02.png: its rotation is a quaternion of length 1.400000, needed: 1; export the model again"],
+            |f| {
+                f.photos[2].quaternion_length = 1.4;
+                f.write_files();
+            },
+        ),
+        case(
+            "a quaternion of NaN",
+            ColmapBinary,
+            Views,
+            "bad-pose",
+            &["p_02.png: its rotation is a quaternion of length NaN, needed: 1"],
+            |f| {
+                f.photos[2].quaternion_length = f64::NAN;
+                f.write_files();
+            },
+        ),
+        case(
+            "a mask of another size beside a model",
+            ColmapBinary,
+            Views,
+            "bad-mask",
+            &["p_02.png: its mask `", "masks/p_02.png.png` is 24×8 px, its image 24×16 px; restore the mask"],
+            |f| {
+                f.write_files().write_image("masks/p_02.png.png", (24, 8));
+            },
+        ),
+        case(
             "a translation of NaN",
             ColmapBinary,
             Views,

@@ -130,16 +130,18 @@ pub fn with_context(scene: Scene<f32>, seed: u64) -> Scene<f32> {
     let base_steps = [0.1, 0.05, 0.1];
     let mut model = ContextModel::filled(&scene.shape, frame, levels, 8, base_steps, 0.0);
     model.rows.fill_with(|| rng.random_range(-1.0..1.0));
-    for group in model.mlp.groups_mut() {
+    for group in model.network.mlp.groups_mut() {
         group.fill_with(|| rng.random_range(-0.3..0.3));
     }
     // The values of `random_scene` are uniform: deviations of 0.58, log-scales around −2.2.
     let (f, n_channels) = (scene.shape.feature_dim, scene.shape.values_per_anchor());
     for channel in 0..n_channels {
         let group = usize::from(channel >= f) + usize::from(channel >= f + 6);
-        model.mlp.b2[channel] += [0.0, -44.0, 0.0][group];
-        model.mlp.b2[n_channels + channel] += [2.5, 3.5, 2.5][group];
+        model.network.mlp.b2[channel] += [0.0, -44.0, 0.0][group];
+        model.network.mlp.b2[n_channels + channel] += [2.5, 3.5, 2.5][group];
     }
+    let mut model = model.with_taps(&scene.shape, 3, 0.0);
+    model.network.taps.fill_with(|| rng.random_range(-0.5..0.5));
     Scene { context: Some(model), ..scene }
 }
 

@@ -6,7 +6,7 @@
 use super::shape::ScratchShape;
 use crate::arena::{Arena, words_for};
 use crate::bake::{BakedGaussian, BakedMemory};
-use crate::bundle::{RecordMemory, model_words};
+use crate::bundle::RecordMemory;
 use crate::error::DecodeError;
 use crate::project::{Packed28, TILE_PIXELS, TileRect};
 use crate::raster::{N_RADIX, Pixel};
@@ -44,7 +44,7 @@ slices! {
 
     /// What the models of the symbols work in.
     ModelMemory: models_words, take_models(shape) {
-        words: [u32; model_words(shape.coder.n_tables, shape.coder.context_inputs, shape.coder.context_hidden)],
+        words: [u32; shape.coder.words()],
     }
 
     /// Anchors between frames: their records, a bit a chunk, and the scale of each table.
@@ -253,6 +253,7 @@ mod tests {
                     n_tables: (1 - context) * up_to(360),
                     context_inputs: context * 4 * (1 + up_to(32)),
                     context_hidden: context * (1 + up_to(256)),
+                    context_residuals: context * up_to(257),
                 },
                 record: RecordShape {
                     symbol_bits: [1 + up_to(16) as u8, 1 + up_to(16) as u8, 1 + up_to(16) as u8],
@@ -289,6 +290,7 @@ mod tests {
                 n_tables: a.coder.n_tables.max(b.coder.n_tables),
                 context_inputs: a.coder.context_inputs.max(b.coder.context_inputs),
                 context_hidden: a.coder.context_hidden.max(b.coder.context_hidden),
+                context_residuals: a.coder.context_residuals.max(b.coder.context_residuals),
             },
             record: RecordShape {
                 symbol_bits: [a0.max(b0), a1.max(b1), a2.max(b2)],

@@ -1,7 +1,8 @@
 //! What the number of bytes of scratch memory follows from.
 
 use crate::bundle::{
-    Bundle, Coder, MAX_FEATURE_DIM, MAX_LATTICE_BITS, MAX_OFFSETS, RecordLayout, covariance_outputs, n_log_scales,
+    Bundle, Coder, MAX_FEATURE_DIM, MAX_LATTICE_BITS, MAX_OFFSETS, RecordLayout, covariance_outputs, model_words,
+    n_log_scales,
 };
 use crate::context::{FEATURES_PER_LEVEL, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS};
 use crate::mlp::{HeadShape, HeadWeights};
@@ -72,6 +73,8 @@ pub struct CoderShape {
     pub context_inputs: u16,
     /// Hidden units of the context; 0 for bundles with tables.
     pub context_hidden: u16,
+    /// Residuals of features that a context with taps keeps; 0 without.
+    pub context_residuals: u16,
 }
 
 /// Bits of an anchor in memory.
@@ -116,6 +119,13 @@ pub struct FrameShape {
     pub canvas_tiles: u32,
     /// Splats in memory.
     pub max_splats: u32,
+}
+
+impl CoderShape {
+    /// Words that the models of the symbols work in.
+    pub(super) const fn words(&self) -> usize {
+        model_words(self.n_tables, self.context_inputs, self.context_hidden, self.context_residuals)
+    }
 }
 
 impl Resident {
@@ -166,6 +176,7 @@ impl ScratchShape {
                 n_tables: feature_dim.saturating_add(n_log_scales(true)).saturating_add(n_offsets.saturating_mul(3)),
                 context_inputs: (MAX_CONTEXT_LEVELS as u16).saturating_mul(FEATURES_PER_LEVEL as u16),
                 context_hidden: MAX_CONTEXT_HIDDEN,
+                context_residuals: feature_dim,
             },
             record: RecordShape { symbol_bits: [16; 3], lattice_bits: MAX_LATTICE_BITS, masks: true },
             resident: Resident::Nothing,
@@ -189,13 +200,17 @@ impl ScratchShape {
                 head_weights: HeadWeights::F32,
             },
             coder: match bundle.coder() {
-                Coder::Static(tables) => {
-                    CoderShape { n_tables: few(tables.len()), context_inputs: 0, context_hidden: 0 }
-                }
+                Coder::Static(tables) => CoderShape {
+                    n_tables: few(tables.len()),
+                    context_inputs: 0,
+                    context_hidden: 0,
+                    context_residuals: 0,
+                },
                 Coder::Context(context) => CoderShape {
                     n_tables: 0,
                     context_inputs: few(context.n_inputs()),
                     context_hidden: few(context.n_hidden()),
+                    context_residuals: few(context.n_residuals()),
                 },
             },
             record: RecordShape {

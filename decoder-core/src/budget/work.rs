@@ -3,6 +3,7 @@
 use super::limits::Budget;
 use super::shape::Resident;
 use crate::bundle::{Bundle, Coder, TierMeasures};
+use crate::context::first_tap;
 
 /// What a symbol takes in multiply-adds of f32, of which each takes 2.5 instructions on a Cortex-M4; a symbol takes 64.
 const SYMBOL_MACS: usize = 26;
@@ -61,8 +62,9 @@ pub(super) fn decoding_macs(bundle: &Bundle<'_>) -> u64 {
         Coder::Context(context) => {
             let [inputs, hidden] = [context.n_inputs(), context.n_hidden()];
             let layers = hidden.saturating_mul(inputs.saturating_add(context.n_outputs()));
+            let taps = first_tap(context.feature_dim(), context.n_taps());
             let grid = inputs.saturating_mul(INPUT_MACS);
-            symbols.saturating_add(layers.saturating_mul(NETWORK_MACS)).saturating_add(grid)
+            symbols.saturating_add(layers.saturating_add(taps).saturating_mul(NETWORK_MACS)).saturating_add(grid)
         }
     };
     macs as u64

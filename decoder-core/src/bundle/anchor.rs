@@ -52,10 +52,13 @@ impl<'b> Bundle<'b> {
     /// Words of memory that [`anchor_models`](Self::anchor_models) takes.
     #[must_use]
     pub fn anchor_scratch_words(&self) -> usize {
-        // At most 360 tables, 128 inputs, 256 hidden units.
+        // At most 360 tables, 128 inputs, 256 hidden units, 256 features.
         match self.coder() {
-            Coder::Static(tables) => model_words(tables.len() as u16, 0, 0),
-            Coder::Context(context) => model_words(0, context.n_inputs() as u16, context.n_hidden() as u16),
+            Coder::Static(tables) => model_words(tables.len() as u16, 0, 0, 0),
+            Coder::Context(context) => {
+                let [inputs, hidden, residuals] = context_lens(context);
+                model_words(0, inputs as u16, hidden as u16, residuals as u16)
+            }
         }
     }
 
@@ -91,16 +94,11 @@ impl<'b> Bundle<'b> {
             // What bundles were refused for is not linked, here and below.
             Coder::Context(_) if !cfg!(feature = "context") => return Err(DecodeError::Internal),
             Coder::Context(context) => {
-                let [n_feature_words, _] = context_lens(context);
-                let (features, hidden) = scratch.split_at_mut_checked(n_feature_words).ok_or(DecodeError::Internal)?;
-                let halves = |words, n| -> Result<&'s mut [i16], DecodeError> {
-                    let halves: &mut [i16] = bytemuck::try_cast_slice_mut(words).map_err(|_| DecodeError::Internal)?;
-                    halves.get_mut(..n).ok_or(DecodeError::Internal)
-                };
+                let halves: &'s mut [i16] = bytemuck::try_cast_slice_mut(scratch).map_err(|_| DecodeError::Internal)?;
+                let n_numbers = context_lens(context).into_iter().fold(0, usize::saturating_add);
                 ChannelModels::Context(ContextModels {
                     context: *context,
-                    features: halves(features, context.n_inputs())?,
-                    hidden: halves(hidden, context.n_hidden())?,
+                    numbers: halves.get_mut(..n_numbers).ok_or(DecodeError::Internal)?,
                     scaled,
                     step_bits: 0,
                 })
@@ -117,15 +115,15 @@ impl<'b> Bundle<'b> {
 }
 
 /// Words that so many tables take, or a context of such widths; whichever are more.
-pub(crate) const fn model_words(n_tables: u16, context_inputs: u16, context_hidden: u16) -> usize {
+pub(crate) const fn model_words(n_tables: u16, inputs: u16, hidden: u16, residuals: u16) -> usize {
     let tables = (n_tables as usize).saturating_mul(size_of::<IndexedTable>().div_ceil(4));
-    let context = (context_inputs.div_ceil(2) as usize).saturating_add(context_hidden.div_ceil(2) as usize);
+    let context = (inputs as usize).saturating_add(hidden as usize).saturating_add(residuals as usize).div_ceil(2);
     if tables > context { tables } else { context }
 }
 
-/// Words of the context's features and of its hidden units.
-fn context_lens(context: &Context<'_>) -> [usize; 2] {
-    [context.n_inputs().div_ceil(2), context.n_hidden().div_ceil(2)]
+/// Numbers of the context's inputs, its hidden units, and the residuals of features where it has taps.
+fn context_lens(context: &Context<'_>) -> [usize; 3] {
+    [context.n_inputs(), context.n_hidden(), context.n_residuals()]
 }
 
 impl AnchorModels<'_, '_> {

@@ -10,13 +10,15 @@ use builder::{Anchor, C, F, ORIGIN, STEP, Variant, bundle, cell, tiers, weight};
 
 use crate::arena::Arena;
 use crate::bundle::{AnchorRecords, AnchorSite, Bundle, Coder, RecordMemory, Tables, crc32};
+use crate::context::Group;
+use crate::entropy::NormalModel;
 use crate::error::{DecodeError, Field, SectionKind};
 use crate::{Budget, Decoder, FrameReport, MaxSplats, Overflow, Residency, ScratchShape, Strips, TileSink};
 
 fn variants() -> impl Iterator<Item = Variant> {
-    (0..1 << 5).map(|bits| {
+    (0..1 << 6).map(|bits| {
         let [masks, context, coded_heads, unknown_section, detail] = [1, 2, 4, 8, 16].map(|bit| bits & bit != 0);
-        Variant { masks, context, coded_heads, unknown_section, detail }
+        Variant { masks, context, n_taps: 2 * (bits >> 5), coded_heads, unknown_section, detail }
     })
 }
 
@@ -95,6 +97,39 @@ fn values_are_symbols_times_steps() {
                     };
                     assert_eq!(value, expected, "{variant:?}, channel {channel}");
                 }
+            }
+        }
+    }
+}
+
+/// Section 7 of FORMAT.md by hand, in numbers that cannot overflow.
+#[test]
+fn taps_move_the_means_of_features() {
+    for variant in variants().filter(|variant| variant.context && variant.n_taps > 0) {
+        let bytes = bundle(variant);
+        let bundle = Bundle::parse(&bytes).expect("sound");
+        let context = bundle.context().expect("one");
+        let weights: Vec<i64> = (0..5).map(|i| i64::from((i * 59 + 40) as u8 as i8)).collect();
+        let rows: [&[i64]; F] = [&[], &weights[..1], &weights[1..3], &weights[3..5]];
+        for anchor in tiers(variant).concat().concat() {
+            let (mut features, mut hidden) = (vec![0; context.n_inputs()], vec![0; context.n_hidden()]);
+            context.features(cell(anchor.code), &mut features);
+            context.hidden(&features, &mut hidden);
+            let steps = context.steps(&hidden);
+            let q = steps.exponent(Group::Feature);
+            let factor = (4096.0 * 2f64.powf(-f64::from(q & 7) / 8.0)).round() as i64 * (1 << -(q >> 3).min(0));
+            let mut residuals: Vec<i16> = vec![];
+            for (feature, (row, &symbol)) in rows.into_iter().zip(&anchor.symbols).enumerate() {
+                let own8 = (i64::from(context.output(feature, &hidden)) * factor + (1 << 14)) >> 15;
+                let before = &residuals[feature - row.len()..];
+                let sum: i64 = row.iter().zip(before).map(|(weight, &residual)| weight * i64::from(residual)).sum();
+                let mean8 = (own8 + 4 + ((64 + sum) >> 7)).clamp(-32768, 32767) - 4;
+                let scale = i32::from(context.output(C + feature, &hidden)) - q + 32;
+                let expected = NormalModel::new(mean8 as i32, scale);
+                assert_eq!(context.model(feature, &steps, &hidden, &residuals), expected, "feature {feature}");
+                residuals.push((8 * i64::from(symbol) - own8).clamp(-32768, 32767) as i16);
+                let found = context.residual(feature, &steps, &hidden, symbol);
+                assert_eq!(Some(&found), residuals.last(), "feature {feature}");
             }
         }
     }

@@ -9,16 +9,19 @@
 mod grid;
 mod mlp;
 mod steps;
+mod taps;
 
 pub use grid::{Corners, FEATURES_PER_LEVEL, GridFrame, GridLevel, LevelKind, WEIGHT_ONE};
 pub use mlp::{MAX_BIAS, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS};
 pub use steps::{Group, GroupStep, MAX_STEP_EXPONENT, MEAN_PARTS, MIN_STEP_EXPONENT, N_GROUPS, Steps};
+pub use taps::{MAX_TAPS, TAP_BITS, first_tap};
 
 use crate::bytes::{Cursor, Emitter, Fields};
 use crate::entropy::{EIGHTHS, NormalModel};
 use crate::error::{DecodeError, Field, SectionKind, in_range, saturate};
 use mlp::Layer;
 use steps::check_base_steps;
+use taps::Taps;
 
 /// Length of a level's record, bytes.
 const LEVEL_LEN: usize = 8;
@@ -39,6 +42,8 @@ pub struct ContextHead {
     pub base_steps: [f32; N_GROUPS],
     /// Levels of the grid, 1..=[`MAX_CONTEXT_LEVELS`].
     pub n_levels: u8,
+    /// Features that a feature's mean follows at most, 0..=[`MAX_TAPS`].
+    pub n_taps: u8,
     /// Hidden units of the network, 1..=[`MAX_CONTEXT_HIDDEN`].
     pub n_hidden: u16,
 }
@@ -51,6 +56,7 @@ pub struct Context<'a> {
     levels: &'a [[u8; LEVEL_LEN]],
     hidden: Layer<'a>,
     output: Layer<'a>,
+    taps: Taps<'a>,
     /// Four bits a row, set for +1; two rows a byte, the first in the low half.
     grid: &'a [u8],
     feature_dim: usize,
@@ -63,12 +69,11 @@ impl ContextHead {
         let mut fields = Fields::new(record);
         let frame = GridFrame { min: fields.i32s(), scale: fields.u32s() };
         let base_steps = check_base_steps(fields.f32s())?;
-        let [n_levels, reserved] = fields.bytes();
-        in_range(Field::Reserved, reserved.into(), 0, 0)?;
+        let [n_levels, n_taps] = fields.bytes();
         in_range(Field::ContextLevels, n_levels.into(), 1, MAX_CONTEXT_LEVELS.into())?;
         let n_hidden = fields.u16();
         in_range(Field::ContextHidden, n_hidden.into(), 1, MAX_CONTEXT_HIDDEN.into())?;
-        Ok(Self { frame, base_steps, n_levels, n_hidden })
+        Ok(Self { frame, base_steps, n_levels, n_taps, n_hidden })
     }
 
     /// Its bytes: the reverse of `parse`.
@@ -78,7 +83,7 @@ impl ContextHead {
         out.i32s(self.frame.min);
         out.u32s(self.frame.scale);
         out.f32s(self.base_steps);
-        out.bytes([self.n_levels, 0]);
+        out.bytes([self.n_levels, self.n_taps]);
         out.u16s([self.n_hidden]);
         out.finish()
     }
@@ -96,7 +101,7 @@ impl<'a> Context<'a> {
         n_channels: usize,
     ) -> Result<Self, DecodeError> {
         let mut cursor = Cursor::new(section, SectionKind::Context);
-        let ContextHead { frame, base_steps, n_levels, n_hidden } = ContextHead::parse(cursor.record()?)?;
+        let ContextHead { frame, base_steps, n_levels, n_taps, n_hidden } = ContextHead::parse(cursor.record()?)?;
         let n_levels = usize::from(n_levels);
         let n_hidden = usize::from(n_hidden);
         let (levels, _) = cursor.bytes(n_levels.saturating_mul(LEVEL_LEN))?.as_chunks();
@@ -115,6 +120,7 @@ impl<'a> Context<'a> {
         let output = Layer { weights: output_weights, biases: output_biases, shifts: output_shifts, n_in: n_hidden };
         hidden.check()?;
         output.check()?;
+        let taps = Taps::new(cursor.bytes(first_tap(feature_dim, n_taps.into()))?, n_taps)?;
         let grid = cursor.bytes((n_rows as usize).div_ceil(2))?;
         if !cursor.rest().is_empty() {
             return Err(DecodeError::WrongLength {
@@ -123,7 +129,7 @@ impl<'a> Context<'a> {
                 found: saturate(section.len()),
             });
         }
-        Ok(Self { frame, base_steps, levels, hidden, output, grid, feature_dim, n_log_scales, n_channels })
+        Ok(Self { frame, base_steps, levels, hidden, output, taps, grid, feature_dim, n_log_scales, n_channels })
     }
 
     /// Inputs of the network: [`FEATURES_PER_LEVEL`] a level.
@@ -142,6 +148,18 @@ impl<'a> Context<'a> {
     #[must_use]
     pub fn n_outputs(&self) -> usize {
         self.output.biases.len()
+    }
+
+    /// Features that a feature's mean follows at most; 0 where the anchor's place says all.
+    #[must_use]
+    pub fn n_taps(&self) -> usize {
+        self.taps.n_taps()
+    }
+
+    /// Residuals of an anchor's features to keep while it is decoded: none without taps.
+    #[must_use]
+    pub fn n_residuals(&self) -> usize {
+        if self.n_taps() > 0 { self.feature_dim } else { 0 }
     }
 
     /// Features of an anchor.
@@ -226,13 +244,36 @@ impl<'a> Context<'a> {
 
     /// The distribution of a channel's symbol.
     ///
+    /// * `residuals`: [`residual`](Self::residual) of every feature before, where there are taps.
+    ///
     /// # Budget
     /// Two rows of the network.
     #[must_use]
-    pub fn model(&self, channel: usize, steps: &Steps, hidden: &[i16]) -> NormalModel {
+    pub fn model(&self, channel: usize, steps: &Steps, hidden: &[i16], residuals: &[i16]) -> NormalModel {
         let mean = self.output(channel, hidden);
         let scale = self.output(channel.saturating_add(self.n_channels), hidden);
-        steps.of(self.group(channel)).model(mean, scale)
+        let (group, step) = (self.group(channel), steps.of(self.group(channel)));
+        let raised_mean = step.raised_mean(mean);
+        step.model(
+            if group == Group::Feature { self.moved(channel, raised_mean, residuals) } else { raised_mean },
+            scale,
+        )
+    }
+
+    /// What a feature's symbol leaves of the mean that its anchor's place gives it, in eighths of the step.
+    ///
+    /// # Budget
+    /// A row of the network.
+    #[must_use]
+    pub fn residual(&self, feature: usize, steps: &Steps, hidden: &[i16], symbol: i16) -> i16 {
+        residual(symbol.into(), steps.of(Group::Feature).raised_mean(self.output(feature, hidden)))
+    }
+
+    /// The raised mean of `feature` as the residuals of the features before move it.
+    #[inline(always)]
+    pub(crate) fn moved(&self, feature: usize, raised_mean: i32, residuals: &[i16]) -> i32 {
+        // Within 4096 steps every symbol near the mean is an i16.
+        raised_mean.wrapping_add(self.taps.shift(feature, residuals)).clamp(i16::MIN.into(), i16::MAX.into())
     }
 
     /// Mean and scale of each channel from `first` on, in 1/[`MEAN_PARTS`] of a base step and in eighths of an octave of one.
@@ -245,6 +286,13 @@ impl<'a> Context<'a> {
         let byte = self.grid.get((row >> 1) as usize).copied().unwrap_or_default();
         if row & 1 == 0 { byte & 0xF } else { byte >> 4 }
     }
+}
+
+/// What a symbol leaves of a [raised mean](GroupStep::raised_mean), in eighths of the step; limited to i16.
+#[inline(always)]
+pub(crate) fn residual(symbol: i32, raised_mean: i32) -> i16 {
+    let left = symbol.wrapping_mul(EIGHTHS).wrapping_add(EIGHTHS / 2).wrapping_sub(raised_mean);
+    left.clamp(i16::MIN.into(), i16::MAX.into()) as i16
 }
 
 /// A level as its record has it.
@@ -291,7 +339,8 @@ mod tests {
         let frames = [[i32::MIN, -1, i32::MAX], [0, 77, -4000]].map(|min| GridFrame { min, scale: [0, 9, u32::MAX] });
         for frame in frames {
             for (n_levels, n_hidden) in [(1, 1), (MAX_CONTEXT_LEVELS, MAX_CONTEXT_HIDDEN), (7, 99)] {
-                let head = ContextHead { frame, base_steps: [1.0, 0.125, 0.3], n_levels, n_hidden };
+                let n_taps = n_levels.wrapping_mul(2);
+                let head = ContextHead { frame, base_steps: [1.0, 0.125, 0.3], n_levels, n_taps, n_hidden };
                 assert_eq!(ContextHead::parse(&head.emit()), Ok(head));
             }
         }

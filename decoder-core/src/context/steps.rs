@@ -141,13 +141,18 @@ impl Steps {
 }
 
 impl GroupStep {
-    /// The distribution of a symbol, from a mean in 1/[`MEAN_PARTS`] of a base step and a scale in eighths of an octave of
-    /// it: the mean in eighths of the step is `(mean·T + 2¹⁴) >> 15`, T = 4096·2^(−q/8).
+    /// A mean in 1/[`MEAN_PARTS`] of a base step as eighths of the step, `(mean·T + 2¹⁴) >> 15`, T = 4096·2^(−q/8), and half
+    /// a step more, as the tables want it.
     #[inline(always)]
-    pub(crate) fn model(&self, mean: i16, scale: i16) -> NormalModel {
-        // An i16 times at most 2¹⁵; half a step is added before the shift, as the tables want it.
-        let shifted = i32::from(mean).wrapping_mul(self.mean_factor).wrapping_add(HALF_STEP) >> MEAN_SHIFT;
-        NormalModel::from_shifted(shifted, i32::from(scale).wrapping_add(self.scale_shift))
+    pub(crate) fn raised_mean(&self, mean: i16) -> i32 {
+        // An i16 times at most 2¹⁵.
+        i32::from(mean).wrapping_mul(self.mean_factor).wrapping_add(HALF_STEP) >> MEAN_SHIFT
+    }
+
+    /// The distribution of a symbol, from a [raised mean](Self::raised_mean) and a scale in eighths of an octave of a base step.
+    #[inline(always)]
+    pub(crate) fn model(&self, raised_mean: i32, scale: i16) -> NormalModel {
+        NormalModel::from_shifted(raised_mean, i32::from(scale).wrapping_add(self.scale_shift))
     }
 }
 
@@ -176,7 +181,8 @@ mod tests {
             assert!((found / expected - 1.0).abs() < 1e-6, "q {q}: {found} against {expected}");
             for mean in [-32768, -640, -1, 0, 5, 64, 32767_i16] {
                 let expected = f64::from(mean) / 64.0 / expected * 8.0;
-                let model = steps.of(Group::Offset).model(mean, 0);
+                let step = steps.of(Group::Offset);
+                let model = step.model(step.raised_mean(mean), 0);
                 let near = |found: i32| (f64::from(found) - expected).abs() <= 0.5 + expected.abs() * 2e-4;
                 let found = (expected.round() as i32 - 8..).take(16).find(|&found| {
                     near(found) && NormalModel::new(found, SCALE_ONE - i32::from(steps.exponents[2])) == model

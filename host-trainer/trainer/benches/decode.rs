@@ -89,7 +89,7 @@ fn predict(context: &Context<'_>, sites: &[AnchorSite], with_models: bool) {
         if with_models {
             let offsets = (0..SHAPE.n_offsets).filter(|k| (site.mask >> k) & 1 == 1);
             let channels = (0..n_scalars).chain(offsets.flat_map(|k| n_scalars + 3 * k..n_scalars + 3 * k + 3));
-            channels.for_each(|channel| _ = black_box(context.model(channel, &steps, &hidden)));
+            channels.for_each(|channel| _ = black_box(context.model(channel, &steps, &hidden, &[])));
         }
     }
 }

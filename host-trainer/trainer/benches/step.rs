@@ -66,7 +66,7 @@ fn coded_scene() -> Scene<f32> {
 
 fn benchmark(criterion: &mut Criterion) {
     let Hac { lambda, sample, mask_weight, grid_weight, .. } = Hac::default();
-    let rate = RateTerms { lambda, sample, mask: mask_weight, grid: grid_weight };
+    let rate = RateTerms { lambda, sample, mask: mask_weight, masks_weigh_anchors: false, grid: grid_weight };
     let coding = Coding::Context { stream: Stream::of_run(1), rate, exact: None };
     steps(criterion, "scaffold", &scene(Backbone::Scaffold, 20_000), &Coding::Raw);
     steps(criterion, "hac", &coded_scene(), &coding);

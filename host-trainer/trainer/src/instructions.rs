@@ -4,7 +4,7 @@
 //! cycles.
 
 use pocketsplat_core::bundle::Coder;
-use pocketsplat_core::context::LevelKind;
+use pocketsplat_core::context::{LevelKind, first_tap};
 use pocketsplat_core::{Bundle, FrameReport, Plan, Stage};
 
 use Stage::{Blend, Context, Decode, Heads, Output, Project, Sort};
@@ -58,7 +58,9 @@ pub fn terms(bundle: &Bundle<'_>, plan: &Plan, report: &FrameReport, size_px: [u
             let corners: u32 = context.levels().map(|level| if level.kind == LevelKind::Volume { 8 } else { 4 }).sum();
             // A mean and a scale for each symbol, and three steps.
             let rows = 2.0 * symbols + 3.0 * decoded;
-            (0.0, symbols, decoded * f64::from(corners), rows + decoded * hidden, hidden * (decoded * inputs + rows))
+            let taps = decoded * first_tap(context.feature_dim(), context.n_taps()) as f64;
+            let macs = hidden * (decoded * inputs + rows) + taps;
+            (0.0, symbols, decoded * f64::from(corners), rows + decoded * hidden, macs)
         }
     };
     let count = |n: u32| f64::from(n);

@@ -5,11 +5,11 @@
 
 use pocketsplat_core::DecodeError;
 use pocketsplat_core::context::{
-    Context, ContextHead, GridLevel, MAX_BIAS, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS, MEAN_PARTS,
+    Context, ContextHead, GridLevel, MAX_BIAS, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS, MAX_TAPS, MEAN_PARTS, TAP_BITS,
 };
 use pocketsplat_core::entropy::EIGHTHS;
 
-use crate::scene::{ContextModel, Head, ModelShape};
+use crate::scene::{ContextModel, ContextNetwork, Head, ModelShape};
 
 /// Bits of the fraction of an input: [`pocketsplat_core::context::FEATURE_ONE`].
 const INPUT_BITS: i32 = 14;
@@ -31,7 +31,13 @@ pub enum IntegerModelError {
     /// A weight or bias is not finite, or too large for eight bits at any scale.
     #[error("context model, row {row}: {value} does not fit eight bits (weights up to 2032, biases up to 16384)")]
     Weight { row: usize, value: f32 },
+    /// A tap is not finite.
+    #[error("context model: a tap's weight is {value}")]
+    Tap { value: f32 },
 }
+
+/// What a tap's weight of one stands for.
+const TAP_UNIT: f32 = 1.0 / (1 << TAP_BITS) as f32;
 
 /// One row of a layer in integers.
 struct IntegerRow {
@@ -61,14 +67,16 @@ pub fn section(model: &ContextModel<f32>, n_channels: usize) -> Result<Vec<u8>, 
         _ => Err(IntegerModelError::Count { what, found, most }),
     };
     within("grid levels of the context", model.levels.len(), MAX_CONTEXT_LEVELS.into())?;
-    within("hidden units of the context", model.mlp.n_hidden, MAX_CONTEXT_HIDDEN.into())?;
+    within("hidden units of the context", model.network.mlp.n_hidden, MAX_CONTEXT_HIDDEN.into())?;
+    within("taps of the context", model.network.n_taps.max(1), MAX_TAPS.into())?;
     let [hidden, output] = rows(model, n_channels)?;
 
     let head = ContextHead {
         frame: model.frame,
         base_steps: model.base_steps,
         n_levels: model.levels.len() as u8,
-        n_hidden: model.mlp.n_hidden as u16,
+        n_taps: model.network.n_taps as u8,
+        n_hidden: model.network.mlp.n_hidden as u16,
     };
     let mut bytes = head.emit().to_vec();
     bytes.extend(model.levels.iter().flat_map(GridLevel::emit));
@@ -81,6 +89,7 @@ pub fn section(model: &ContextModel<f32>, n_channels: usize) -> Result<Vec<u8>, 
     for layer in [&hidden, &output] {
         bytes.extend(layer.iter().flat_map(|row| &row.weights).map(|weight| weight.cast_unsigned()));
     }
+    bytes.extend(tap_integers(model)?.into_iter().map(i8::cast_unsigned));
     bytes.extend(grid_bytes(&model.rows));
     Ok(bytes)
 }
@@ -89,7 +98,7 @@ pub fn section(model: &ContextModel<f32>, n_channels: usize) -> Result<Vec<u8>, 
 ///
 /// # Errors
 /// As [`section`].
-pub fn rounded(model: &ContextModel<f32>, n_channels: usize) -> Result<Head<f32>, IntegerModelError> {
+pub fn rounded(model: &ContextModel<f32>, n_channels: usize) -> Result<ContextNetwork<f32>, IntegerModelError> {
     let [hidden, output] = rows(model, n_channels)?;
     let weights = |layer: &[IntegerRow]| -> Vec<f32> {
         let row = |row: &IntegerRow| {
@@ -99,12 +108,14 @@ pub fn rounded(model: &ContextModel<f32>, n_channels: usize) -> Result<Head<f32>
         layer.iter().flat_map(row).collect()
     };
     let (w1, w2) = (weights(&hidden), weights(&output));
-    Ok(Head { w1, w2, ..model.mlp.clone() })
+    let ContextNetwork { mlp, n_taps, .. } = &model.network;
+    let taps = tap_integers(model)?.into_iter().map(|tap| f32::from(tap) * TAP_UNIT).collect();
+    Ok(ContextNetwork { mlp: Head { w1, w2, ..mlp.clone() }, n_taps: *n_taps, taps })
 }
 
 /// Both layers in integers.
 fn rows(model: &ContextModel<f32>, n_channels: usize) -> Result<[Vec<IntegerRow>; 2], IntegerModelError> {
-    let mlp = &model.mlp;
+    let mlp = &model.network.mlp;
     // Fraction bits of what goes in and of what comes out.
     let layer = |weights: &[f32], n_in: usize, biases: &[f32], bits_in: i32, bits_out: &dyn Fn(usize) -> i32| {
         let rows = weights.chunks_exact(n_in).zip(biases).enumerate();
@@ -144,6 +155,15 @@ fn integer_row(
     Ok(IntegerRow { weight_bits, weights, bias, shift: shift as u8 })
 }
 
+/// The taps' weights in units of [`TAP_UNIT`]; those beyond −1 … 127/128 end there.
+fn tap_integers(model: &ContextModel<f32>) -> Result<Vec<i8>, IntegerModelError> {
+    let integer = |tap: &f32| {
+        // A cast of a float ends at the type's ends.
+        if tap.is_finite() { Ok((tap / TAP_UNIT).round() as i8) } else { Err(IntegerModelError::Tap { value: *tap }) }
+    };
+    model.network.taps.iter().map(integer).collect()
+}
+
 fn power_of_two(exponent: i32) -> f64 {
     f64::from(exponent).exp2()
 }
@@ -178,7 +198,7 @@ mod tests {
             values.iter_mut().zip(numbers).for_each(|(value, x)| *value = (x * width) as f32);
         };
         fill(&mut model.rows, seed, 1.0);
-        for (group, values) in (1..).zip(model.mlp.groups_mut()) {
+        for (group, values) in (1..).zip(model.network.mlp.groups_mut()) {
             fill(values, seed + group, width);
         }
         model
@@ -198,7 +218,7 @@ mod tests {
                 context.hidden(&features, &mut hidden);
                 let input: Vec<f32> = features.iter().map(|f| f32::from(*f) / f32::from(FEATURE_ONE)).collect();
                 let (mut float_hidden, mut expected) = (vec![0.0; 16], vec![0.0; context.n_outputs()]);
-                head::forward(&rounded, &input, &mut float_hidden, &mut expected);
+                head::forward(&rounded.mlp, &input, &mut float_hidden, &mut expected);
                 for (row, expected) in expected.iter().enumerate() {
                     let parts = if row < n_channels { 64.0 } else { 8.0 };
                     let found = f32::from(context.output(row, &hidden)) / parts;
@@ -250,10 +270,10 @@ mod tests {
     #[test]
     fn weights_out_of_range_are_named() {
         let mut model = model(1, 0.5);
-        model.mlp.w2[3 * 16] = f32::NAN;
+        model.network.mlp.w2[3 * 16] = f32::NAN;
         let error = section(&model, SHAPE.values_per_anchor()).expect_err("not a number");
         assert!(matches!(error, IntegerModelError::Weight { row: 3, .. }), "{error}");
-        model.mlp.w2[3 * 16] = 1e6;
+        model.network.mlp.w2[3 * 16] = 1e6;
         assert!(section(&model, SHAPE.values_per_anchor()).is_err(), "no shift is left for it");
     }
 }

@@ -151,11 +151,11 @@ fn context(shape: &ModelShape) -> ContextModel<f32> {
     for (row, signs) in model.rows.chunks_mut(4).enumerate() {
         signs.fill(if row % 2 == 1 { 1.0 } else { -1.0 });
     }
-    model.mlp.w1[0] = 1.0;
+    model.network.mlp.w1[0] = 1.0;
     let n_channels = shape.values_per_anchor();
-    model.mlp.b2[n_channels..2 * n_channels].fill(1.0);
-    for output in n_channels..model.mlp.n_out {
-        model.mlp.w2[2 * output] = if output < 2 * n_channels { 1.0 } else { -1.0 };
+    model.network.mlp.b2[n_channels..2 * n_channels].fill(1.0);
+    for output in n_channels..model.network.mlp.n_out {
+        model.network.mlp.w2[2 * output] = if output < 2 * n_channels { 1.0 } else { -1.0 };
     }
     model
 }

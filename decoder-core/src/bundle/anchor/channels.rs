@@ -2,7 +2,7 @@
 
 use super::AnchorSite;
 use crate::bundle::tables::IndexedTables;
-use crate::context::{Context, Group, GroupStep};
+use crate::context::{Context, Group, GroupStep, residual};
 use crate::entropy::AnsReader;
 use crate::stopwatch::{Stage, Stopwatch};
 
@@ -17,10 +17,9 @@ pub(super) enum ChannelModels<'b, 's> {
 #[derive(Debug)]
 pub(super) struct ContextModels<'b, 's> {
     pub(super) context: Context<'b>,
-    /// `[n_inputs]`.
-    pub(super) features: &'s mut [i16],
-    /// `[n_hidden]`.
-    pub(super) hidden: &'s mut [i16],
+    /// Grid features `[n_inputs]`, hidden units `[n_hidden]`, and with taps what each feature leaves of the mean that the
+    /// anchor's place gives it, `[n_residuals]`.
+    pub(super) numbers: &'s mut [i16],
     /// If not, the value of a symbol is the symbol.
     pub(super) scaled: bool,
     /// The exponents of the steps of the anchor read last.
@@ -152,7 +151,9 @@ impl<'b> ContextModels<'b, '_> {
         watch: &mut impl Stopwatch,
     ) -> AnsReader<'b> {
         watch.enter(Stage::Context);
-        let Self { context, features, hidden, scaled, step_bits } = self;
+        let Self { context, numbers, scaled, step_bits } = self;
+        let Some((features, rest)) = numbers.split_at_mut_checked(context.n_inputs()) else { return symbols };
+        let Some((hidden, residuals)) = rest.split_at_mut_checked(context.n_hidden()) else { return symbols };
         context.features(site.lattice, features);
         context.hidden(features, hidden);
         let steps = context.steps(hidden);
@@ -166,7 +167,11 @@ impl<'b> ContextModels<'b, '_> {
             for slots in slots.chunks_mut(BLOCK) {
                 block.push(context, hidden, first, slots.len());
                 watch.enter(Stage::Decode);
-                symbols = block.read(&steps.of(group), symbols, slots);
+                symbols = if group == Group::Feature && !residuals.is_empty() {
+                    block.read_features(context, residuals, first, &steps.of(group), symbols, slots)
+                } else {
+                    block.read(&steps.of(group), symbols, slots)
+                };
                 watch.enter(Stage::Context);
                 first = first.saturating_add(slots.len());
             }
@@ -210,7 +215,33 @@ impl Block {
         self.len = 0;
         let (step, mut symbols) = (*step, symbols);
         for (slot, &[mean, scale]) in slots.iter_mut().zip(&self.moments) {
-            let symbol = step.model(mean, scale).wide_symbol(&mut symbols);
+            let symbol = step.model(step.raised_mean(mean), scale).wide_symbol(&mut symbols);
+            *slot = T::from_scaled(symbol, step.value);
+        }
+        symbols
+    }
+
+    /// The same with features from `first` on, whose means follow the features before.
+    ///
+    /// * `residuals`: `[feature_dim]`, of the features before; those of the block are filled.
+    // On its own it gets the registers that it needs.
+    #[inline(never)]
+    fn read_features<'b, T: Channel>(
+        &mut self,
+        context: &Context<'_>,
+        residuals: &mut [i16],
+        first: usize,
+        step: &GroupStep,
+        symbols: AnsReader<'b>,
+        slots: &mut [T],
+    ) -> AnsReader<'b> {
+        self.len = 0;
+        let (step, mut symbols) = (*step, symbols);
+        for (feature, (slot, &[mean, scale])) in (first..).zip(slots.iter_mut().zip(&self.moments)) {
+            let Some((before, [own, ..])) = residuals.split_at_mut_checked(feature) else { break };
+            let raised_mean = step.raised_mean(mean);
+            let symbol = step.model(context.moved(feature, raised_mean, before), scale).wide_symbol(&mut symbols);
+            *own = residual(symbol, raised_mean);
             *slot = T::from_scaled(symbol, step.value);
         }
         symbols

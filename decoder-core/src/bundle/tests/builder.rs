@@ -4,7 +4,7 @@ use std::vec;
 use std::vec::Vec;
 
 use crate::bundle::{MAGIC, crc32};
-use crate::context::Context;
+use crate::context::{Context, first_tap};
 use crate::entropy::testing::{AnsWriter, slot_of};
 use crate::entropy::{Children, MaskModel, Slot, SymbolModel, TrieModel};
 
@@ -26,6 +26,8 @@ pub(super) const STEP: f32 = 0.25;
 pub(super) struct Variant {
     pub(super) masks: bool,
     pub(super) context: bool,
+    /// Taps of the context.
+    pub(super) n_taps: u8,
     pub(super) coded_heads: bool,
     pub(super) detail: bool,
     /// A section of an unknown kind before the manifest.
@@ -161,14 +163,14 @@ fn mask_frequencies() -> [[[u8; 2]; 4]; K] {
     std::array::from_fn(|k| std::array::from_fn(|n| (1000 + 500 * k as u16 + 300 * n as u16).to_le_bytes()))
 }
 
-pub(super) fn context_section() -> Vec<u8> {
+pub(super) fn context_section(n_taps: u8) -> Vec<u8> {
     let n_out = 2 * C + 3;
     let level = |kind: u8, resolution: u16, n_rows: u32| [vec![kind, 0], u16s(&[resolution]), u32s(&[n_rows])].concat();
     [
         LATTICE_MIN.iter().flat_map(|x| x.to_le_bytes()).collect(),
         u32s(&[0xFFFF_0000 / 7; 3]),
         f32s(&[1.0, 0.125, 0.25]),
-        vec![2, 0],
+        vec![2, n_taps],
         u16s(&[N_HIDDEN as u16]),
         level(0, 3, 27),
         level(2, 9, 16),
@@ -178,6 +180,7 @@ pub(super) fn context_section() -> Vec<u8> {
         (0..n_out).flat_map(|i| (100 * i as i32 - 2000).to_le_bytes()).collect(),
         (0..8 * N_HIDDEN).map(|i| (i * 37 + 11) as u8).collect(),
         (0..N_HIDDEN * n_out).map(|i| (i * 29 + 5) as u8 >> 3).collect(),
+        (0..first_tap(F, n_taps.into())).map(|i| (i * 59 + 40) as u8).collect(),
         (0..22).map(|i| (i * 101 + 3) as u8).collect(),
     ]
     .concat()
@@ -196,7 +199,7 @@ fn chunk_words(anchors: &[Anchor], variant: Variant) -> Vec<u8> {
     let trie = TrieModel::new(&nodes);
     let frequencies = mask_frequencies();
     let masks = MaskModel::new(&frequencies);
-    let section = context_section();
+    let section = context_section(variant.n_taps);
     let context = Context::parse(&section, F, 6, C).expect("a sound context");
     let mut slots = Vec::new();
     for (index, anchor) in anchors.iter().enumerate() {
@@ -237,14 +240,18 @@ fn chunk_words(anchors: &[Anchor], variant: Variant) -> Vec<u8> {
         context.features(cell(anchor.code), &mut features);
         context.hidden(&features, &mut hidden);
         let steps = context.steps(&hidden);
+        let mut residuals = Vec::new();
         for (channel, &symbol) in anchor.symbols.iter().enumerate() {
             if channel >= F + 6 && anchor.mask >> ((channel - F - 6) / 3) & 1 == 0 {
                 continue;
             }
             if variant.context {
-                let symbol = context.model(channel, &steps, &hidden).slots(symbol);
+                let slots_of_symbol = context.model(channel, &steps, &hidden, &residuals).slots(symbol);
+                if channel < F {
+                    residuals.push(context.residual(channel, &steps, &hidden, symbol));
+                }
                 let slot = |&(start, frequency)| Slot { symbol: (), start, frequency };
-                slots.extend(symbol.as_slice().iter().map(slot));
+                slots.extend(slots_of_symbol.as_slice().iter().map(slot));
             } else {
                 push_static(&mut slots, symbol);
             }
@@ -292,7 +299,7 @@ pub(super) fn bundle(variant: Variant) -> Vec<u8> {
     if variant.masks {
         sections.push((3, mask_frequencies().concat().into_flattened()));
     }
-    sections.push(if variant.context { (5, context_section()) } else { (4, tables) });
+    sections.push(if variant.context { (5, context_section(variant.n_taps)) } else { (4, tables) });
     if variant.unknown_section {
         sections.push((200, b"from the future".to_vec()));
     }

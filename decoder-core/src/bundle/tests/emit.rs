@@ -300,6 +300,7 @@ fn context_head(context: &Context<'_>) -> ContextHead {
         frame: context.frame(),
         base_steps: context.base_steps(),
         n_levels: context.levels().count() as u8,
+        n_taps: context.n_taps() as u8,
         n_hidden: context.n_hidden() as u16,
     }
 }

@@ -7,7 +7,6 @@ use std::process::ExitCode;
 
 use anyhow::{Result, bail};
 use pocketsplat_trainer::train::TrainConfig;
-use pocketsplat_trainer::train::config::Backbone;
 use pocketsplat_trainer::train::module::Modules;
 
 use super::output;
@@ -52,7 +51,7 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
         bail!("the rows of an ablation attach the modules; leave --modules and --effects +detail out");
     }
     // Without a rate there is nothing to vary.
-    let lambdas = if base.train.backbone == Backbone::Hac { args.lambdas.as_slice() } else { &args.lambdas[..1] };
+    let lambdas = if base.train.backbone.is_coded() { args.lambdas.as_slice() } else { &args.lambdas[..1] };
     let option_lambda = lambdas[usize::from(lambdas.len() > 1)];
     let specs = args.specs(&base, lambdas, option_lambda)?;
     let folder = base.output.clone();

@@ -17,8 +17,8 @@ use crate::config::{CaptureOptions, RunConfig};
 /// How good a scene becomes, and how large.
 #[derive(clap::Args)]
 pub(crate) struct QualityOptions {
-    /// Kind of scene: scaffold (Scaffold-GS) is trained for the image alone, hac (HAC) for image and size [default: scaffold
-    /// for train without a device, hac elsewhere]
+    /// Kind of scene: scaffold (Scaffold-GS) is trained for the image alone, hac (HAC) and hac-plus (HAC++) for image and size
+    /// [default: scaffold for train without a device, hac elsewhere]
     #[arg(long, value_parser = one_of::<Backbone>(BACKBONES), help_heading = QUALITY)]
     backbone: Option<Backbone>,
     #[arg(long, value_name = "N", help_heading = QUALITY,
@@ -32,7 +32,8 @@ pub(crate) struct QualityOptions {
     /// Training modules to attach in place of those of the configuration [default: none; tiered-pruning for a device]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum, help_heading = QUALITY)]
     modules: Option<Vec<TrainingModule>>,
-    /// Feature width of an anchor, and hidden width of the heads [default: 32; 50 with hac; by the limits for a device]
+    /// Feature width of an anchor, and hidden width of the heads [default: 32 with scaffold, else 50; by the limits for a
+    /// device]
     #[arg(long, value_name = "F", help_heading = QUALITY, hide_short_help = true)]
     feature_dim: Option<usize>,
     #[arg(long, value_name = "K", help_heading = QUALITY, hide_short_help = true,
@@ -95,7 +96,8 @@ enum TrainingModule {
     HardPruning,
     /// Pruning that deletes nothing and trains one scene for every pruning rate up to 40 %.
     TieredPruning,
-    /// Pruning of the offsets and anchors that are not worth their bits, in place of learned masks; needs hac.
+    /// Pruning of the offsets and anchors that are not worth their bits, in place of learned masks; needs a backbone that is trained
+    /// for size.
     RdoPruning,
 }
 

@@ -3,7 +3,6 @@
 use std::process::ExitCode;
 
 use anyhow::{Result, bail};
-use pocketsplat_trainer::train::config::Backbone;
 
 use super::runs::{RunSpec, RunsArgs, write_curves};
 use crate::config::heading::QUALITY;
@@ -23,7 +22,7 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     let base = args.runs.base()?;
-    if base.train.backbone != Backbone::Hac {
+    if !base.train.backbone.is_coded() {
         bail!("a sweep varies the weight of the bits, and they have none in this configuration; use --backbone hac");
     }
     let spec = |&lambda: &f64| RunSpec {

@@ -4,6 +4,7 @@ mod dump;
 
 use half::f16;
 use pocketsplat_core::bundle::{AnchorModels, AnchorSite, Chunk, Section};
+use pocketsplat_core::context::first_tap;
 
 use pocketsplat_core::{Bundle, DecodeError, SectionKind};
 
@@ -183,7 +184,7 @@ impl<'f> Annotator<'f> {
         dump.array("grid scale", 3, u32::from_le_bytes);
         dump.array("base steps", 3, f32::from_le_bytes);
         dump.field::<1, _>("n_levels", |[byte]| byte);
-        dump.field::<1, _>("reserved", |[byte]| byte);
+        dump.field::<1, _>("n_taps", |[byte]| byte);
         dump.field("n_hidden", u16::from_le_bytes);
         let mut n_rows = 0;
         for (index, level) in context.levels().enumerate() {
@@ -199,7 +200,7 @@ impl<'f> Annotator<'f> {
         dump.array("b2", n_out, i32::from_le_bytes);
         dump.array("W1", n_hidden * n_in, i8::from_le_bytes);
         dump.array("W2", n_out * n_hidden, i8::from_le_bytes);
-
+        dump.array("taps", first_tap(context.feature_dim(), context.n_taps()), i8::from_le_bytes);
         dump.array::<1, _>("grid rows", n_rows.div_ceil(2), |[byte]| format!("{byte:08b}"));
     }
 

@@ -39,7 +39,7 @@ impl ChannelCoder<'_> {
             Self::Context(context) => {
                 let steps = work.enter(context, lattice);
                 for (channel, symbol, name) in coded {
-                    let slots = context.model(channel, &steps, &work.hidden).slots(symbol);
+                    let slots = work.next(context, channel, &steps, symbol).slots(symbol);
                     for &(start, frequency) in slots.as_slice() {
                         list.push(name.part(), &Slot { symbol: (), start, frequency });
                     }

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use pocketsplat_core::context::{Context, Group, N_GROUPS, Steps};
+use pocketsplat_core::entropy::NormalModel;
 
 use super::stream::Part;
 use crate::scene::ModelShape;
@@ -71,8 +72,9 @@ pub(super) const GROUPS: [Group; N_GROUPS] = [Group::Feature, Group::LogScale, G
 #[derive(Default)]
 pub(super) struct ContextWork {
     features: Vec<i16>,
-    /// As [`Self::enter`] left it.
-    pub(super) hidden: Vec<i16>,
+    hidden: Vec<i16>,
+    /// Of the anchor's features so far, where there are taps.
+    residuals: Vec<i16>,
 }
 
 impl ContextWork {
@@ -82,6 +84,16 @@ impl ContextWork {
         self.hidden.resize(context.n_hidden(), 0);
         context.features(lattice, &mut self.features);
         context.hidden(&self.features, &mut self.hidden);
+        self.residuals.clear();
         context.steps(&self.hidden)
+    }
+
+    /// The distribution of the next channel that is coded of the anchor entered last; `symbol` is what it turns out to be.
+    pub(super) fn next(&mut self, context: &Context<'_>, channel: usize, steps: &Steps, symbol: i16) -> NormalModel {
+        let model = context.model(channel, steps, &self.hidden, &self.residuals);
+        if self.residuals.len() < context.n_residuals() {
+            self.residuals.push(context.residual(channel, steps, &self.hidden, symbol));
+        }
+        model
     }
 }

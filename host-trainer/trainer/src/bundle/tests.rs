@@ -81,7 +81,7 @@ fn with_context(scene: Scene<f32>, seed: u64) -> Scene<f32> {
     for row in &mut model.rows {
         *row = rng.random_range(-1.0..1.0);
     }
-    for group in model.mlp.groups_mut() {
+    for group in model.network.mlp.groups_mut() {
         group.iter_mut().for_each(|weight| *weight = rng.random_range(-0.3..0.3));
     }
     // Deviations of 0.35, 0.41, 0.58; log-scales around −2.5.
@@ -89,9 +89,12 @@ fn with_context(scene: Scene<f32>, seed: u64) -> Scene<f32> {
     for channel in 0..n_channels {
         let group =
             usize::from(channel >= scene.shape.feature_dim) + usize::from(channel >= scene.shape.feature_dim + 6);
-        model.mlp.b2[channel] += [0.0, -50.0, 0.0][group];
-        model.mlp.b2[n_channels + channel] += [1.8, 3.0, 1.5][group];
+        model.network.mlp.b2[channel] += [0.0, -50.0, 0.0][group];
+        model.network.mlp.b2[n_channels + channel] += [1.8, 3.0, 1.5][group];
     }
+    // Every other scene has taps.
+    let mut model = model.with_taps(&scene.shape, if seed % 2 == 0 { 0 } else { 4 }, 0.0);
+    model.network.taps.iter_mut().for_each(|tap| *tap = rng.random_range(-0.6..0.6));
     Scene { context: Some(model), ..scene }
 }
 

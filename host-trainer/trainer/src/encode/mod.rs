@@ -52,7 +52,7 @@ impl Encoding {
     /// [`WriteError::NotPositive`] for a step, [`WriteError::Tiers`] for pruning rates that do not fall to 0, [`WriteError::NoContext`]
     /// where the context is to code a scene that is trained without one.
     pub fn check(&self, backbone: Backbone) -> Result<(), WriteError> {
-        if self.coder == CoderChoice::Context && backbone == Backbone::Scaffold {
+        if self.coder == CoderChoice::Context && !backbone.is_coded() {
             return Err(WriteError::NoContext);
         }
         check_steps(self.quantisation)?;

@@ -3,6 +3,7 @@
 use super::adaptive_step::{EXPONENTS, clamp, clamp_backward};
 use super::rate;
 use super::simd::Level;
+use super::taps;
 use crate::real::Real;
 use crate::scene::ModelShape;
 
@@ -16,14 +17,16 @@ pub struct Scratch<R> {
     mean: Vec<R>,
     log2_scale: Vec<R>,
     bits: Vec<R>,
+    /// `[C]`, of the features used: what values leave of the means of their anchor's place.
+    residual: Vec<R>,
     d_value: Vec<R>,
     d_log2_scale: Vec<R>,
 }
 
 impl<R: Real> Scratch<R> {
     fn resize(&mut self, len: usize) {
-        let Self { value, mean, log2_scale, bits, d_value, d_log2_scale } = self;
-        for row in [value, mean, log2_scale, bits, d_value, d_log2_scale] {
+        let Self { value, mean, log2_scale, bits, residual, d_value, d_log2_scale } = self;
+        for row in [value, mean, log2_scale, bits, residual, d_value, d_log2_scale] {
             row.resize(len, R::ZERO);
         }
     }
@@ -42,6 +45,10 @@ pub struct Rows<'a, R> {
     pub drawn: &'a [bool],
     /// `[n, 2C + 3]`: means in base steps, log₂(scale/base step), log₂(step/base step) of the three groups.
     pub outputs: &'a [R],
+    /// Features that a feature's mean follows at most.
+    pub n_taps: usize,
+    /// Their weights, see [`taps`].
+    pub taps: &'a [R],
 }
 
 /// Where gradients go; every array is added to.
@@ -51,6 +58,8 @@ pub struct Gradients<'a, R> {
     pub values: [&'a mut [R]; 3],
     /// As [`Rows::outputs`].
     pub outputs: &'a mut [R],
+    /// As [`Rows::taps`].
+    pub taps: &'a mut [R],
     /// `[n, K]`: weight times the bits of each drawn offset, which the masks save.
     pub drawn: &'a mut [R],
 }
@@ -58,7 +67,7 @@ pub struct Gradients<'a, R> {
 /// Bits of the drawn values of features, log-scales and offsets, and weight times their gradients.
 ///
 /// In units of the step s = base·2^e a value is x = v/s, its mean m·2^−e, its scale 2^(l − e); see [`rate`] for the rest.
-/// ∂bits/∂e = −ln 2·(x − μ)·∂bits/∂x − ∂bits/∂l. To be called under [`Level::run`](super::simd::Level::run).
+/// With m the mean before the taps move it, ∂bits/∂e = −ln 2·(x − m)·∂bits/∂x − ∂bits/∂l. To be called under [`Level::run`](super::simd::Level::run).
 ///
 /// * `weight`: of one bit in the loss.
 #[inline(always)]
@@ -96,6 +105,11 @@ pub fn forward_backward<R: Real>(
                 *to = clamp(*log2_scale - exponent, LOG2_SCALES);
             }
         }
+        // Features come first.
+        taps::forward(rows.n_taps, rows.taps, &scratch.value[..f], &mut scratch.mean[..f], &mut scratch.residual[..f]);
+        for c in f..n_channels {
+            scratch.residual[c] = scratch.value[c] - scratch.mean[c];
+        }
         rate::forward_backward(
             &scratch.value,
             &scratch.mean,
@@ -116,6 +130,9 @@ pub fn forward_backward<R: Real>(
                 scratch.d_log2_scale[channels].fill(R::ZERO);
             }
         }
+        let Scratch { residual, d_value, .. } = scratch;
+        d_value.iter_mut().for_each(|d| *d = weight * *d);
+        taps::backward(rows.n_taps, rows.taps, &residual[..f], &mut d_value[..f], gradients.taps);
         let (d_means, rest) = d_output.split_at_mut(n_channels);
         let (d_log2_scales, d_exponents) = rest.split_at_mut(n_channels);
         for (group, (first, width)) in groups.into_iter().enumerate() {
@@ -126,7 +143,7 @@ pub fn forward_backward<R: Real>(
             let mut d_exponent = R::ZERO;
             for i in 0..width {
                 let c = first + i;
-                let d_value = weight * scratch.d_value[c];
+                let d_value = scratch.d_value[c];
                 let unclamped = log2_scales[c] - exponent;
                 let d_log2_scale = weight * scratch.d_log2_scale[c];
                 d_values[i] += d_value * per_unit;
@@ -134,7 +151,7 @@ pub fn forward_backward<R: Real>(
                 d_log2_scales[c] += clamp_backward(unclamped, LOG2_SCALES, d_log2_scale);
                 // A scale at the end of its range stays there whatever the step.
                 let through_scale = if unclamped == scratch.log2_scale[c] { d_log2_scale } else { R::ZERO };
-                d_exponent -= ln_2 * d_value * (scratch.value[c] - scratch.mean[c]) + through_scale;
+                d_exponent -= ln_2 * d_value * scratch.residual[c] + through_scale;
             }
             d_exponents[group] += clamp_backward(exponents[group], EXPONENTS, d_exponent);
             sums[group] += scratch.bits[first..first + width].iter().map(|b| (*b).into()).sum::<f64>();
@@ -147,13 +164,14 @@ pub fn forward_backward<R: Real>(
 pub fn forward<R: Real>(level: Level, rows: &Rows<'_, R>) -> ([f64; 3], Vec<R>) {
     let mut d_values = rows.values.map(|values| vec![R::ZERO; values.len()]);
     let (mut d_outputs, mut of_offsets) = (vec![R::ZERO; rows.outputs.len()], vec![R::ZERO; rows.drawn.len()]);
+    let mut d_taps = vec![R::ZERO; rows.taps.len()];
     let mut scratch = Scratch::default();
     let sums = level.run(
         #[inline(always)]
         || {
             let values = d_values.each_mut().map(Vec::as_mut_slice);
             // The gradient of a mask at weight 1 is what it saves.
-            let mut unused = Gradients { values, outputs: &mut d_outputs, drawn: &mut of_offsets };
+            let mut unused = Gradients { values, outputs: &mut d_outputs, taps: &mut d_taps, drawn: &mut of_offsets };
             forward_backward(rows, R::ONE, &mut scratch, &mut unused)
         },
     );
@@ -176,25 +194,33 @@ mod tests {
         drawn: Vec<f64>,
     }
 
-    /// `x`: features, log-scales, offsets, outputs.
+    const N_TAPS: usize = 2;
+    /// Two of feature 2 and of feature 3, one of feature 1.
+    const N_WEIGHTS: usize = 5;
+
+    /// `x`: features, log-scales, offsets, outputs, taps.
     fn run(x: &[f64], drawn: &[bool], weight: f64) -> Found {
         let (features, rest) = x.split_at(N * 4);
         let (log_scales, rest) = rest.split_at(N * 6);
-        let (offsets, outputs) = rest.split_at(N * 9);
+        let (offsets, rest) = rest.split_at(N * 9);
+        let (outputs, taps) = rest.split_at(N * (2 * C + 3));
         let rows = Rows {
             shape: &SHAPE,
             base_steps: [1.0, 0.1, 0.2],
             values: [features, log_scales, offsets],
             drawn,
             outputs,
+            n_taps: N_TAPS,
+            taps,
         };
         let mut gradient = vec![0.0; x.len()];
         let (d_features, rest) = gradient.split_at_mut(N * 4);
         let (d_log_scales, rest) = rest.split_at_mut(N * 6);
-        let (d_offsets, d_outputs) = rest.split_at_mut(N * 9);
+        let (d_offsets, rest) = rest.split_at_mut(N * 9);
+        let (d_outputs, d_taps) = rest.split_at_mut(N * (2 * C + 3));
         let mut d_drawn = vec![0.0; N * 3];
-        let mut into =
-            Gradients { values: [d_features, d_log_scales, d_offsets], outputs: d_outputs, drawn: &mut d_drawn };
+        let values = [d_features, d_log_scales, d_offsets];
+        let mut into = Gradients { values, outputs: d_outputs, taps: d_taps, drawn: &mut d_drawn };
         let bits = forward_backward(&rows, weight, &mut Scratch::default(), &mut into);
         Found { bits, gradient, drawn: d_drawn }
     }
@@ -204,6 +230,7 @@ mod tests {
         x[..N * 4].iter_mut().for_each(|v| *v *= 3.0);
         x[N * 4..N * 10].iter_mut().for_each(|v| *v *= 0.3);
         x.extend(random(seed + 1, N * (2 * C + 3)).iter().map(|v| 1.5 * v));
+        x.extend(random(seed + 3, N_WEIGHTS).iter().map(|v| 0.5 * v));
         (x, random(seed + 2, N * 3).iter().map(|v| *v > -0.4).collect())
     }
 
@@ -212,7 +239,7 @@ mod tests {
         for seed in [1, 11, 21] {
             let (mut x, drawn) = inputs(seed);
             // A step and a scale out of their ranges, where the true gradient is 0 and the way back is open.
-            let last = x.len() - 1;
+            let last = x.len() - N_WEIGHTS - 1;
             x[last] = -3.5;
             x[N * C + C + 1] = 9.0;
             let mut found = run(&x, &drawn, 0.7);

@@ -32,6 +32,7 @@ pub mod rasterise;
 pub mod rate;
 pub mod simd;
 pub mod ssim;
+pub mod taps;
 pub mod tiles;
 pub mod volume;
 

@@ -1,6 +1,6 @@
 //! The trainable context model: what an anchor's place says about its values.
 
-use pocketsplat_core::context::{FEATURES_PER_LEVEL, GridFrame, GridLevel, N_GROUPS};
+use pocketsplat_core::context::{FEATURES_PER_LEVEL, GridFrame, GridLevel, N_GROUPS, first_tap};
 
 use serde::{Deserialize, Serialize};
 
@@ -19,15 +19,46 @@ pub struct ContextModel<R> {
     pub levels: Vec<GridLevel>,
     /// `[Σ n_rows, 4]` rows of all levels, one after the other; only their signs count: +1 from 0 on, else −1.
     pub rows: Vec<R>,
-    /// From 4 features a level to 2C + 3 outputs: C means in base steps, C binary logarithms of scales in base steps,
-    /// three binary logarithms of steps in base steps.
-    pub mlp: Head<R>,
+    /// What makes distributions of the grid's features.
+    pub network: ContextNetwork<R>,
     /// Steps of features, log-scales and offsets where the network says nothing.
     pub base_steps: [f32; N_GROUPS],
 }
 
+/// The network of a context model, and its taps.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ContextNetwork<R> {
+    /// From 4 features a level to 2C + 3 outputs: C means in base steps, C binary logarithms of scales in base steps,
+    /// three binary logarithms of steps in base steps.
+    pub mlp: Head<R>,
+    /// Features that a feature's mean follows at most; 0 for none.
+    pub n_taps: usize,
+    /// Weights of the min(c, `n_taps`) features just before each feature c, from c = 0 on; see [`crate::ops::taps`].
+    pub taps: Vec<R>,
+}
+
+impl<R: Copy> ContextNetwork<R> {
+    /// The parameter groups: those of the network, then the taps.
+    pub fn groups(&self) -> [&[R]; 5] {
+        let [w1, b1, w2, b2] = self.mlp.groups();
+        [w1, b1, w2, b2, &self.taps]
+    }
+
+    /// The parameter groups in the same order, mutable.
+    pub fn groups_mut(&mut self) -> [&mut Vec<R>; 5] {
+        let [w1, b1, w2, b2] = self.mlp.groups_mut();
+        [w1, b1, w2, b2, &mut self.taps]
+    }
+
+    /// The same with each parameter replaced by what `f` makes of it.
+    pub fn map<T>(&self, f: impl Fn(R) -> T) -> ContextNetwork<T> {
+        let taps = self.taps.iter().map(|tap| f(*tap)).collect();
+        ContextNetwork { mlp: self.mlp.map(f), n_taps: self.n_taps, taps }
+    }
+}
+
 impl<R: Copy> ContextModel<R> {
-    /// Every parameter `value`.
+    /// Every parameter `value`, without taps.
     pub fn filled(
         shape: &ModelShape,
         frame: GridFrame,
@@ -39,6 +70,14 @@ impl<R: Copy> ContextModel<R> {
         let n_rows: usize = levels.iter().map(|level| level.n_rows as usize).sum();
         let n_out = 2 * shape.values_per_anchor() + N_GROUPS;
         let mlp = Head::filled(levels.len() * FEATURES_PER_LEVEL, n_hidden, n_out, value);
-        Self { frame, levels, rows: vec![value; n_rows * FEATURES_PER_LEVEL], mlp, base_steps }
+        let network = ContextNetwork { mlp, n_taps: 0, taps: Vec::new() };
+        Self { frame, levels, rows: vec![value; n_rows * FEATURES_PER_LEVEL], network, base_steps }
+    }
+
+    /// The same model with taps, all of them `value`.
+    pub fn with_taps(mut self, shape: &ModelShape, n_taps: usize, value: R) -> Self {
+        self.network.n_taps = n_taps;
+        self.network.taps = vec![value; first_tap(shape.feature_dim, n_taps)];
+        self
     }
 }

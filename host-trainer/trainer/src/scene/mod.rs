@@ -8,7 +8,7 @@ mod heads;
 pub mod init;
 mod steps;
 
-pub use context::ContextModel;
+pub use context::{ContextModel, ContextNetwork};
 pub use heads::{Head, Heads, OutputLayout};
 pub use steps::QuantisationSteps;
 
@@ -224,7 +224,7 @@ impl<R: Real> Scene<R> {
                 frame: context.frame,
                 levels: context.levels.clone(),
                 rows: all(&context.rows),
-                mlp: head(&context.mlp),
+                network: context.network.map(|w| T::real(w.into())),
                 base_steps: context.base_steps,
             }),
         }

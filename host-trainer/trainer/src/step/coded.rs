@@ -9,7 +9,7 @@ use crate::ops::noise::Stream;
 use crate::ops::simd::Level;
 use crate::ops::{adaptive_step, anchor_bits, hash_grid, head, mask, perturb};
 use crate::real::Real;
-use crate::scene::{ContextModel, Head, ModelShape, Scene};
+use crate::scene::{ContextModel, ContextNetwork, Head, ModelShape, Scene};
 
 /// Number of the draw that decides whether an anchor is in the sample; channels are fewer.
 const SAMPLE_DRAW: u32 = u32::MAX;
@@ -22,7 +22,7 @@ pub(super) type Values<'a, R> = [&'a mut Vec<R>; N_GROUPS];
 pub(super) struct Network<'a, R> {
     pub(super) model: &'a ContextModel<R>,
     /// All its outputs: for the sample of the rate.
-    pub(super) whole: &'a Head<R>,
+    pub(super) whole: &'a ContextNetwork<R>,
     /// [`steps_of`] it: for every visible anchor.
     pub(super) steps: &'a Head<R>,
 }
@@ -32,6 +32,8 @@ pub(super) struct Network<'a, R> {
 pub(super) struct Weights<R> {
     /// Of a bit of the sample.
     pub(super) bit: R,
+    /// The same where masks answer for the features and log-scales of their anchor, else 0.
+    pub(super) anchor: R,
     /// Of the opening of one mask.
     pub(super) mask: R,
 }
@@ -52,6 +54,8 @@ pub(super) struct Coded<R> {
     /// dL/d(network): through the steps of all anchors, and through the distributions of the sample.
     pub(super) d_steps_head: Option<Head<R>>,
     pub(super) d_whole: Option<Head<R>>,
+    /// dL/d(taps), empty without.
+    pub(super) d_taps: Vec<R>,
     inputs: Vec<R>,
     hidden: Vec<R>,
     d_hidden: Vec<R>,
@@ -163,9 +167,10 @@ impl<R: Real> Coded<R> {
         for row in self.sampled.iter().map(|row| *row as usize) {
             sample.inputs.extend_from_slice(&self.inputs[row * n_in..(row + 1) * n_in]);
         }
-        sample.hidden.resize(self.sampled.len() * network.whole.n_hidden, R::ZERO);
-        sample.outputs.resize(self.sampled.len() * network.whole.n_out, R::ZERO);
-        head::forward(network.whole, &sample.inputs, &mut sample.hidden, &mut sample.outputs);
+        let mlp = &network.whole.mlp;
+        sample.hidden.resize(self.sampled.len() * mlp.n_hidden, R::ZERO);
+        sample.outputs.resize(self.sampled.len() * mlp.n_out, R::ZERO);
+        head::forward(mlp, &sample.inputs, &mut sample.hidden, &mut sample.outputs);
     }
 
     /// Puts what the integers say in the place of what the floats say.
@@ -249,7 +254,7 @@ impl<R: Real> Coded<R> {
                 self.mask_term = mask::term(mask_logits, weights.mask, d_mask_logits);
                 let rows = [&**features, &**log_scales, &**offsets];
                 let d_rows = [&mut **d_features, &mut **d_log_scales, &mut **d_offsets];
-                self.rate(shape, network.model, weights.bit, rows, d_rows, mask_logits, d_mask_logits);
+                self.rate(shape, network, weights, rows, d_rows, mask_logits, d_mask_logits);
             },
         );
         self.d_steps.resize(n * N_GROUPS, R::ZERO);
@@ -278,9 +283,9 @@ impl<R: Real> Coded<R> {
         let sample = &mut self.sample;
         refill(&mut sample.d_inputs, sample.inputs.len());
         sample.d_hidden.resize(sample.hidden.len(), R::ZERO);
-        let d_whole = zeroed(&mut self.d_whole, network.whole);
+        let d_whole = zeroed(&mut self.d_whole, &network.whole.mlp);
         head::backward(
-            network.whole,
+            &network.whole.mlp,
             &sample.inputs,
             &sample.hidden,
             &sample.d_outputs,
@@ -288,7 +293,7 @@ impl<R: Real> Coded<R> {
             &mut sample.d_inputs,
             d_whole,
         );
-        let n_in = network.whole.n_in;
+        let n_in = network.whole.mlp.n_in;
         for (row, d_sample) in self.sampled.iter().zip(sample.d_inputs.chunks_exact(n_in)) {
             let d_inputs = &mut self.d_inputs[*row as usize * n_in..(*row as usize + 1) * n_in];
             for (d, d_sample) in d_inputs.iter_mut().zip(d_sample) {
@@ -303,16 +308,18 @@ impl<R: Real> Coded<R> {
     fn rate(
         &mut self,
         shape: &ModelShape,
-        model: &ContextModel<R>,
-        weight: R,
+        network: Network<'_, R>,
+        weights: Weights<R>,
         values: [&[R]; N_GROUPS],
         d_values: [&mut [R]; N_GROUPS],
         mask_logits: &[R],
         d_mask_logits: &mut [R],
     ) {
-        let (k, n_out) = (shape.n_offsets, model.mlp.n_out);
+        let ContextNetwork { mlp, n_taps, taps } = network.whole;
+        let (k, n_out) = (shape.n_offsets, mlp.n_out);
         let widths = widths(shape);
-        let base_steps = model.base_steps.map(|step| R::real(step.into()));
+        let base_steps = network.model.base_steps.map(|step| R::real(step.into()));
+        refill(&mut self.d_taps, taps.len());
         let Sample { outputs, d_outputs, d_drawn, drawn, scratch, .. } = &mut self.sample;
         refill(d_outputs, outputs.len());
         self.bits = [0.0; N_GROUPS];
@@ -330,6 +337,8 @@ impl<R: Real> Coded<R> {
                 values: [&values[0][of(widths[0])], &values[1][of(widths[1])], &values[2][of(widths[2])]],
                 drawn,
                 outputs,
+                n_taps: *n_taps,
+                taps,
             };
             let mut gradients = anchor_bits::Gradients {
                 values: [
@@ -338,15 +347,19 @@ impl<R: Real> Coded<R> {
                     &mut d_offsets[of(widths[2])],
                 ],
                 outputs: d_outputs,
+                taps: &mut self.d_taps,
                 drawn: d_drawn,
             };
-            let bits = anchor_bits::forward_backward(&rows, weight, scratch, &mut gradients);
+            let bits = anchor_bits::forward_backward(&rows, weights.bit, scratch, &mut gradients);
             for (sum, bits) in self.bits.iter_mut().zip(bits) {
                 *sum += bits;
             }
+            // What one mask more of the anchor adds to its own bits: a K-th part of features and log-scales.
+            let [features, log_scales, _] = bits;
+            let shared = weights.anchor * R::real((features + log_scales) / k as f64);
             let d_logits = d_mask_logits[of(k)].iter_mut().zip(&mask_logits[of(k)]);
             for ((d_logit, logit), d_drawn) in d_logits.zip(&*d_drawn) {
-                *d_logit += *d_drawn * mask::slope(*logit);
+                *d_logit += (*d_drawn + shared) * mask::slope(*logit);
             }
         }
     }

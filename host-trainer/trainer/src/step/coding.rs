@@ -3,7 +3,7 @@
 use pocketsplat_core::context::Context;
 
 use crate::ops::noise::Stream;
-use crate::scene::Head;
+use crate::scene::ContextNetwork;
 
 /// What a step does to the values of anchors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,7 +47,7 @@ pub struct IntegerModel<'a, R> {
     /// What decides.
     pub context: &'a Context<'a>,
     /// The network that its integers stand for, through which gradients pass.
-    pub network: &'a Head<R>,
+    pub network: &'a ContextNetwork<R>,
 }
 
 /// How much bits weigh in the loss.
@@ -59,6 +59,9 @@ pub struct RateTerms {
     pub sample: f64,
     /// Weight of the mean opening of the visible anchors' masks.
     pub mask: f64,
+    /// Whether the masks of an anchor answer for the bits of its features and log-scales too, a K-th part each (Chen et al.
+    /// 2025, HAC++, section 3.4); else for those of their offsets alone.
+    pub masks_weigh_anchors: bool,
     /// Weight of the bits of the grid's signs, relative to those of the values.
     pub grid: f64,
 }

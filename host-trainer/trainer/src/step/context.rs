@@ -9,29 +9,29 @@ use super::{Coding, Network, Weights, Workspace};
 use crate::ops::hash_grid::Part;
 use crate::ops::{grid_bits, hash_grid};
 use crate::real::Real;
-use crate::scene::{ContextModel, Head, Scene};
+use crate::scene::{ContextModel, ContextNetwork, Head, Scene};
 
 /// Gradients of a [`ContextModel`].
 #[derive(Clone, Debug)]
 pub struct ContextGradients<R> {
     /// As [`ContextModel::rows`].
     pub rows: Vec<R>,
-    /// As [`ContextModel::mlp`].
-    pub mlp: Head<R>,
+    /// As [`ContextModel::network`].
+    pub network: ContextNetwork<R>,
 }
 
 /// The network that `coding` asks: that of the scene, or what its integers stand for.
-fn whole<'a, R>(model: &'a ContextModel<R>, coding: &Coding<'a, R>) -> &'a Head<R> {
+fn whole<'a, R>(model: &'a ContextModel<R>, coding: &Coding<'a, R>) -> &'a ContextNetwork<R> {
     match coding {
         Coding::Context { exact: Some(exact), .. } => exact.network,
-        _ => &model.mlp,
+        _ => &model.network,
     }
 }
 
 /// The part of the network that every visible anchor needs.
 pub(super) fn steps_head<R: Real>(scene: &Scene<R>, coding: &Coding<'_, R>) -> Option<Head<R>> {
     let model = scene.context.as_ref().filter(|_| matches!(coding, Coding::Context { .. }))?;
-    Some(steps_of(whole(model, coding)))
+    Some(steps_of(&whole(model, coding).mlp))
 }
 
 pub(super) fn network<'a, R>(
@@ -59,7 +59,8 @@ impl<R: Real> Workspace<R> {
         let valid_share = n_valid as f64 / n_anchors.max(1) as f64;
         let bit = terms.lambda * valid_share / (n_sampled.max(1) as f64 * n_channels);
         let mask = terms.mask / (n_visible * shape.n_offsets).max(1) as f64;
-        let weights = Weights { bit: R::real(bit), mask: R::real(mask) };
+        let anchor = if terms.masks_weigh_anchors { bit } else { 0.0 };
+        let weights = Weights { bit: R::real(bit), anchor: R::real(anchor), mask: R::real(mask) };
         let level = self.level;
         self.blocks[..self.n_blocks]
             .par_iter_mut()
@@ -86,15 +87,15 @@ impl<R: Real> Workspace<R> {
 
     /// Adds up the blocks' gradients in block order, and takes those of the grid's features to its rows.
     fn context_gradients(&mut self, network: Network<'_, R>) -> ContextGradients<R> {
-        let Head { n_in, n_hidden, n_out, .. } = *network.whole;
+        let Head { n_hidden, n_out, .. } = network.whole.mlp;
         let kept = self.d_context.take().filter(|kept| kept.rows.len() == network.model.rows.len());
         let mut gradients = kept.unwrap_or_else(|| ContextGradients {
             rows: vec![R::ZERO; network.model.rows.len()],
-            mlp: Head::filled(n_in, n_hidden, n_out, R::ZERO),
+            network: network.whole.map(|_| R::ZERO),
         });
         let first = n_out - N_GROUPS;
         let firsts = [0, 0, first * n_hidden, first];
-        for (g, (sum, first)) in gradients.mlp.groups_mut().into_iter().zip(firsts).enumerate() {
+        for (g, (sum, first)) in gradients.network.mlp.groups_mut().into_iter().zip(firsts).enumerate() {
             sum.fill(R::ZERO);
             for block in self.blocks() {
                 let parts = [(0, &block.coded.d_whole), (first, &block.coded.d_steps_head)];
@@ -104,6 +105,11 @@ impl<R: Real> Workspace<R> {
                     }
                 }
             }
+        }
+        let d_taps = &mut gradients.network.taps;
+        d_taps.fill(R::ZERO);
+        for block in self.blocks() {
+            d_taps.iter_mut().zip(&block.coded.d_taps).for_each(|(sum, part)| *sum += *part);
         }
         let parts: Vec<Part<'_, R>> =
             self.blocks().iter().map(|b| Part { units: &b.coded.units, d_features: &b.coded.d_inputs }).collect();

@@ -11,8 +11,8 @@ use super::*;
 use crate::finite_difference::{assert_piecewise_gradient, random};
 use crate::integer_model::{parse, rounded, section};
 use crate::ops::noise::Stream;
-use crate::scene::ContextModel;
 use crate::scene::init::initial_scene;
+use crate::scene::{ContextModel, Head};
 use crate::step::Phase;
 use crate::train::module::{Detail, Distribution, Modules, Pruning};
 use pocketsplat_capture::camera::Camera;
@@ -70,10 +70,11 @@ fn flatten<R: Real>(scene: &mut Scene<R>) -> Vec<&mut R> {
     let Scene { anchors, heads, context, .. } = scene;
     let mut all: Vec<&mut R> =
         anchors.features.iter_mut().chain(&mut anchors.log_scales).chain(&mut anchors.offsets).collect();
-    for head in heads.each_mut().chain(context.as_mut().map(|context| &mut context.mlp)) {
-        for group in head.groups_mut() {
-            all.extend(group.iter_mut());
-        }
+    for group in heads.each_mut().flat_map(Head::groups_mut) {
+        all.extend(group.iter_mut());
+    }
+    for group in context.iter_mut().flat_map(|context| context.network.groups_mut()) {
+        all.extend(group.iter_mut());
     }
     all
 }
@@ -87,7 +88,7 @@ fn gradients<R: Real>(scene: &Scene<R>, workspace: &Workspace<R>) -> Vec<f64> {
     workspace.blocks().iter().for_each(|block| block.copy_gradients(&scene.shape, &mut d.anchors));
     d.heads = workspace.d_heads.clone();
     if let (Some(context), Some(found)) = (&mut d.context, &workspace.d_context) {
-        context.mlp = found.mlp.clone();
+        context.network = found.network.clone();
     }
     flatten(&mut d).into_iter().map(|g| (*g).into()).collect()
 }
@@ -123,9 +124,10 @@ fn context(seed: u64, scene: &Scene<f64>) -> ContextModel<f64> {
     let levels = levels.map(|(kind, resolution, n_rows)| GridLevel { kind, resolution, n_rows }).to_vec();
     let frame = GridFrame::spanning([-60; 3], [60; 3]);
     let mut model = ContextModel::filled(&scene.shape, frame, levels, 6, [1.0, 0.1, 0.2], 0.0);
+    model = model.with_taps(&scene.shape, 2, 0.0);
     model.rows = random(seed, model.rows.len());
     // Outputs of less than 0.8, so that no step or scale is at the end of its range.
-    for (i, (group, size)) in (1..).zip(model.mlp.groups_mut().into_iter().zip([0.4, 0.4, 0.05, 0.3])) {
+    for (i, (group, size)) in (1..).zip(model.network.groups_mut().into_iter().zip([0.4, 0.4, 0.05, 0.3, 0.4])) {
         *group = random(seed + i, group.len()).iter().map(|v| size * v).collect();
     }
     model
@@ -133,7 +135,7 @@ fn context(seed: u64, scene: &Scene<f64>) -> ContextModel<f64> {
 
 fn rate(grid: f64) -> RateTerms {
     // Bits that weigh as much as the image, so that a wrong gradient shows.
-    RateTerms { lambda: 0.3, sample: 0.6, mask: 0.1, grid }
+    RateTerms { lambda: 0.3, sample: 0.6, mask: 0.1, masks_weigh_anchors: false, grid }
 }
 
 #[test]
@@ -247,8 +249,9 @@ fn the_gradients_of_the_grid_are_those_of_its_features() {
         rows = after;
         for f in 0..4 {
             let by_rows: f64 = own.iter().skip(f).step_by(4).sum();
-            let weights = model.mlp.w1.iter().skip(4 * l + f).step_by(model.mlp.n_in);
-            let by_biases: f64 = weights.zip(&gradients.mlp.b1).map(|(w, d)| w * d).sum();
+            let mlp = &model.network.mlp;
+            let weights = mlp.w1.iter().skip(4 * l + f).step_by(mlp.n_in);
+            let by_biases: f64 = weights.zip(&gradients.network.mlp.b1).map(|(w, d)| w * d).sum();
             assert!((by_rows - by_biases).abs() < 1e-12 && by_rows != 0.0, "{by_rows} and {by_biases}");
         }
     }
@@ -323,7 +326,7 @@ fn rounding_twice_is_rounding_once(shape: ModelShape) {
         "rounding twice is rounding once"
     );
     assert_eq!(coded_step(&snapped, &Coding::Raw).0.squared_error, report.squared_error);
-    let n = flatten(&mut snapped).len() - network.n_params();
+    let n = flatten(&mut snapped).len() - network.groups().map(<[f32]>::len).iter().sum::<usize>();
     assert!(gradients(&scene, &workspace)[..n] == gradients(&snapped, &repeated)[..n], "straight through");
 }
 
@@ -336,7 +339,7 @@ fn modules() -> Vec<Modules> {
         Modules { distribution, ..Modules::default() },
         Modules { pruning, ..Modules::default() },
         Modules { detail, ..Modules::default() },
-        Modules { distribution, pruning, rdo: None, detail },
+        Modules { distribution, rdo: None, pruning, detail },
     ]
 }
 

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use crate::ops::simd::Level;
 use crate::ops::{anchor_bits, hash_grid, head, mask};
-use crate::scene::{ContextModel, Scene};
+use crate::scene::{ContextModel, ContextNetwork, Scene};
 
 /// Anchors that one task looks at.
 const ROWS: usize = 512;
@@ -39,11 +39,12 @@ impl Bits {
         let (shape, anchors) = (&scene.shape, &scene.anchors);
         let (widths, k) = ([shape.feature_dim, shape.n_log_scales(), 3 * shape.n_offsets], shape.n_offsets);
         let units: Vec<[u16; 3]> = rows.iter().map(|a| model.frame.unit(anchors.lattice[*a])).collect();
-        let (n, n_out) = (rows.len(), model.mlp.n_out);
-        let mut inputs = vec![0.0; n * model.mlp.n_in];
+        let ContextNetwork { mlp, n_taps, taps } = &model.network;
+        let (n, n_out) = (rows.len(), mlp.n_out);
+        let mut inputs = vec![0.0; n * mlp.n_in];
         hash_grid::forward(&model.levels, &model.rows, &units, &mut inputs);
-        let (mut hidden, mut outputs) = (vec![0.0; n * model.mlp.n_hidden], vec![0.0; n * n_out]);
-        head::forward(&model.mlp, &inputs, &mut hidden, &mut outputs);
+        let (mut hidden, mut outputs) = (vec![0.0; n * mlp.n_hidden], vec![0.0; n * n_out]);
+        head::forward(mlp, &inputs, &mut hidden, &mut outputs);
         let (mut features, mut units) = (vec![0; context.n_inputs()], vec![0; context.n_hidden()]);
         let mut bits = Self::default();
         for (a, output) in rows.iter().zip(outputs.chunks_exact_mut(n_out)) {
@@ -62,7 +63,15 @@ impl Bits {
                 continue;
             }
             let values = values.each_ref().map(Vec::as_slice);
-            let row = anchor_bits::Rows { shape, base_steps: model.base_steps, values, drawn: &drawn, outputs: output };
+            let row = anchor_bits::Rows {
+                shape,
+                base_steps: model.base_steps,
+                values,
+                drawn: &drawn,
+                outputs: output,
+                n_taps: *n_taps,
+                taps,
+            };
             let (of_anchor, of_offsets) = anchor_bits::forward(Level::detect(), &row);
             bits.of_anchors.push(of_anchor);
             bits.of_offsets.extend(of_offsets);

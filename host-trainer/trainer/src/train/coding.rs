@@ -2,12 +2,12 @@
 
 use pocketsplat_core::context::Context;
 
-use super::config::TrainConfig;
+use super::config::{Backbone, TrainConfig};
 use super::{TrainError, Trainer, context_start};
 use crate::integer_model;
 use crate::ops::noise::Stream;
 use crate::ops::perturb;
-use crate::scene::{Head, Heads, Scene};
+use crate::scene::{ContextNetwork, Head, Heads, Scene};
 use crate::step::Phase;
 use crate::step::coding::{Coding, IntegerModel, RateTerms};
 
@@ -20,7 +20,7 @@ pub(super) const HEAD_FRACTION_BITS: u8 = 7;
 #[derive(Clone, Debug)]
 pub(super) struct Integers {
     pub(super) section: Vec<u8>,
-    pub(super) network: Head<f32>,
+    pub(super) network: ContextNetwork<f32>,
     pub(super) heads: Heads<f32>,
 }
 
@@ -61,7 +61,9 @@ impl Trainer<'_> {
         let phase = self.config.phase(self.iteration);
         if self.scene.context.is_none() && matches!(phase, Phase::Context | Phase::IntegerModel) {
             let base_steps = self.config.hac.base_steps();
-            self.scene.context = Some(context_start::initial_context(&self.scene, base_steps, &mut self.rng));
+            let model = context_start::initial_context(&self.scene, base_steps, &mut self.rng);
+            let n_taps = self.config.backbone.n_taps(self.scene.shape.feature_dim);
+            self.scene.context = Some(model.with_taps(&self.scene.shape, n_taps, 0.0));
             self.optimiser.begin_context(&self.scene);
         }
     }
@@ -77,7 +79,14 @@ pub(super) fn coding<'a>(
 ) -> Coding<'a, f32> {
     let hac = &config.hac;
     let stream = Stream::of_run(config.seed).branch(iteration);
-    let rate = RateTerms { lambda: hac.lambda, sample: hac.sample, mask: hac.mask_weight, grid: hac.grid_weight };
+    let masks_weigh_anchors = config.backbone == Backbone::HacPlus;
+    let rate = RateTerms {
+        lambda: hac.lambda,
+        sample: hac.sample,
+        mask: if masks_weigh_anchors { 0.0 } else { hac.mask_weight },
+        masks_weigh_anchors,
+        grid: hac.grid_weight,
+    };
     match config.phase(iteration) {
         Phase::Raw => Coding::Raw,
         Phase::Noise => Coding::Noise { stream, steps: hac.base_steps() },

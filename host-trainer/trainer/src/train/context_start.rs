@@ -25,7 +25,7 @@ pub fn initial_context(scene: &Scene<f32>, base_steps: [f32; N_GROUPS], rng: &mu
     for row in &mut model.rows {
         *row = rng.random_range(-ROW_BOUND..ROW_BOUND);
     }
-    let mlp = &mut model.mlp;
+    let mlp = &mut model.network.mlp;
     let bounds = [1.0 / (mlp.n_in as f32).sqrt(), OUTPUT_DAMPING / (mlp.n_hidden as f32).sqrt()];
     for (group, bound) in [(&mut mlp.w1, bounds[0]), (&mut mlp.b1, bounds[0]), (&mut mlp.w2, bounds[1])] {
         for weight in group {
@@ -156,17 +156,18 @@ mod tests {
         let model = initial_context(scene, [1.0, 0.1, 0.2], &mut ChaCha8Rng::seed_from_u64(1));
         let units: Vec<[u16; 3]> = scene.anchors.lattice.iter().map(|cell| model.frame.unit(*cell)).collect();
         let n = units.len();
-        let mut inputs = vec![0.0; n * model.mlp.n_in];
+        let mut inputs = vec![0.0; n * model.network.mlp.n_in];
         hash_grid::forward(&model.levels, &model.rows, &units, &mut inputs);
-        let (mut hidden, mut outputs) = (vec![0.0; n * model.mlp.n_hidden], vec![0.0; n * model.mlp.n_out]);
-        head::forward(&model.mlp, &inputs, &mut hidden, &mut outputs);
-        for row in outputs.chunks_exact(model.mlp.n_out) {
-            for (output, bias) in row.iter().zip(&model.mlp.b2) {
+        let (mut hidden, mut outputs) =
+            (vec![0.0; n * model.network.mlp.n_hidden], vec![0.0; n * model.network.mlp.n_out]);
+        head::forward(&model.network.mlp, &inputs, &mut hidden, &mut outputs);
+        for row in outputs.chunks_exact(model.network.mlp.n_out) {
+            for (output, bias) in row.iter().zip(&model.network.mlp.b2) {
                 assert!((output - bias).abs() < 0.3, "{output} instead of {bias}");
             }
         }
         // The mean log-scale, from its output.
         let mean = scene.anchors.log_scales.iter().step_by(scene.shape.n_log_scales()).sum::<f32>() / n as f32;
-        assert!((model.mlp.b2[scene.shape.feature_dim] * 0.1 - mean).abs() < 1e-3);
+        assert!((model.network.mlp.b2[scene.shape.feature_dim] * 0.1 - mean).abs() < 1e-3);
     }
 }

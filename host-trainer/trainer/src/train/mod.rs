@@ -39,7 +39,7 @@ use crate::scene::{Anchors, Heads, Scene};
 use crate::step::{Loss, Phase, StepInfo, TargetView, Workspace, planes};
 use checkpoint::{CaptureSignature, Kernels};
 use coding::Integers;
-use config::{Backbone, Densification, Rates};
+use config::{Densification, Rates};
 use module::{AnchorChange, RunView};
 use optimiser::Optimiser;
 use pocketsplat_capture::dataset::{Capture, Image, View};
@@ -260,7 +260,7 @@ impl<'a> Trainer<'a> {
             iteration: self.iteration,
             iterations: self.config.iterations,
             phase,
-            scaled: self.config.backbone == Backbone::Scaffold || phase != Phase::Raw,
+            scaled: !self.config.backbone.is_coded() || phase != Phase::Raw,
             stream: Stream::of_run(self.config.seed).branch(self.iteration),
         }
     }
@@ -301,7 +301,7 @@ impl<'a> Trainer<'a> {
     /// far in a shorter run, its rate is that of [`PUBLISHED_ITERATIONS`] times their ratio, once there is a rate term.
     fn rates(&self) -> Rates {
         let factor = match self.config.phase(self.iteration) {
-            _ if self.config.backbone == Backbone::Scaffold || !self.config.modules.learns_masks() => 0.0,
+            _ if !self.config.backbone.is_coded() || !self.config.modules.learns_masks() => 0.0,
             Phase::Raw | Phase::Noise => 1.0,
             Phase::Context => PUBLISHED_ITERATIONS / f64::from(self.config.iterations),
             Phase::IntegerModel => 0.0,

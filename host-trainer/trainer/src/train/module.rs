@@ -192,10 +192,10 @@ macro_rules! modules {
 modules! {
     /// Features near a normal distribution.
     distribution: Distribution,
-    /// Fewer anchors, or an order in which to leave them out, by opacity.
-    pruning: Pruning,
     /// Fewer anchors and offsets, by what they are worth a bit.
     rdo: Rdo,
+    /// Fewer anchors, or an order in which to leave them out; after `rdo`, so that it ranks those that stay.
+    pruning: Pruning,
     /// A residual on the colours.
     detail: Detail,
 }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::config::Rates;
 use crate::ops::adam::{self, Moments, Step};
 use crate::real::Real;
-use crate::scene::{Anchors, ContextModel, Head, Heads, ModelShape, Scene};
+use crate::scene::{Anchors, ContextModel, ContextNetwork, Heads, ModelShape, Scene};
 use crate::step::{Block, Workspace};
 
 /// Anchors one task updates.
@@ -41,15 +41,14 @@ pub struct ContextMoments<R> {
     /// Of the grid's rows.
     pub rows: Moments<R>,
     /// First and second moments of the network.
-    pub mlp: [Head<R>; 2],
+    pub network: [ContextNetwork<R>; 2],
 }
 
 impl<R: Real> ContextMoments<R> {
     /// Zero moments.
     pub fn zeros(model: &ContextModel<R>) -> Self {
-        let Head { n_in, n_hidden, n_out, .. } = model.mlp;
-        let mlp = Head::filled(n_in, n_hidden, n_out, R::ZERO);
-        Self { n_steps: 0, rows: Moments::zeros(model.rows.len()), mlp: [mlp.clone(), mlp] }
+        let network = model.network.map(|_| R::ZERO);
+        Self { n_steps: 0, rows: Moments::zeros(model.rows.len()), network: [network.clone(), network] }
     }
 }
 
@@ -153,13 +152,25 @@ impl<R: Real> Optimiser<R> {
         let moments = first.each_mut().zip(second.each_mut());
         let all = heads.each_mut().zip(workspace.d_heads.each()).zip(moments).zip(head_rates);
         for (((head, gradient), (first, second)), rate) in all {
-            update_head(step(rate.at(progress)), head, gradient, [first, second]);
+            update_groups(
+                step(rate.at(progress)),
+                head.groups_mut(),
+                gradient.groups(),
+                first.groups_mut(),
+                second.groups_mut(),
+            );
         }
         if let (Some(model), Some(gradient), Some(moments)) = (context, &workspace.d_context, &mut self.context) {
             moments.n_steps += 1;
-            let [first, second] = &mut moments.mlp;
-            let of_mlp = Step::new(rates.context.at(progress), moments.n_steps);
-            update_head(of_mlp, &mut model.mlp, &gradient.mlp, [first, second]);
+            let [first, second] = &mut moments.network;
+            let of_network = Step::new(rates.context.at(progress), moments.n_steps);
+            update_groups(
+                of_network,
+                model.network.groups_mut(),
+                gradient.network.groups(),
+                first.groups_mut(),
+                second.groups_mut(),
+            );
             let of_rows = Step::new(rates.grid.at(progress), moments.n_steps);
             let Moments { first, second } = &mut moments.rows;
             let parts = model.rows.par_chunks_mut(ROWS).zip(gradient.rows.par_chunks(ROWS));
@@ -196,9 +207,15 @@ impl<R: Real> Optimiser<R> {
     }
 }
 
-fn update_head<R: Real>(step: Step<R>, head: &mut Head<R>, gradient: &Head<R>, [first, second]: [&mut Head<R>; 2]) {
-    let moments = first.groups_mut().into_iter().zip(second.groups_mut());
-    for ((p, g), (m, v)) in head.groups_mut().into_iter().zip(gradient.groups()).zip(moments) {
+/// Moves the groups of a head or a network.
+fn update_groups<R: Real, const N: usize>(
+    step: Step<R>,
+    parameters: [&mut Vec<R>; N],
+    gradients: [&[R]; N],
+    first: [&mut Vec<R>; N],
+    second: [&mut Vec<R>; N],
+) {
+    for ((p, g), (m, v)) in parameters.into_iter().zip(gradients).zip(first.into_iter().zip(second)) {
         adam::update(step, p, m, v, Some(g));
     }
 }

@@ -39,7 +39,7 @@ fn the_decoder_draws_what_the_last_step_drew() {
     let network = integer_model::rounded(model, shape.values_per_anchor()).expect("an integer form");
     let integers = integer_model::parse(&section, &shape).expect("a sound section");
     let exact = Some(IntegerModel { context: &integers, network: &network });
-    let rate = RateTerms { lambda: 0.0, sample: 0.0, mask: 0.0, grid: 0.0 };
+    let rate = RateTerms { lambda: 0.0, sample: 0.0, mask: 0.0, masks_weigh_anchors: false, grid: 0.0 };
     let last_step = Coding::Context { stream: Stream::of_run(config.seed), rate, exact };
     let mut workspace = Workspace::new(&shape);
     for camera in trainer.cameras() {

@@ -161,6 +161,7 @@ impl<'a> Trainer<'a> {
         if let (Some(model), moments) = (&scene.context, &self.optimiser.context) {
             let moments = moments.as_ref().map_or(0, |moments| moments.rows.first.len());
             needs("moments of the grid", moments, model.rows.len())?;
+            needs("taps of the context model", model.network.n_taps, self.config.backbone.n_taps(shape.feature_dim))?;
         }
         let Statistics { opacity_sum, n_views, gradient_sum, n_drawn } = &self.statistics;
         needs("opacity sums", opacity_sum.len(), n)?;

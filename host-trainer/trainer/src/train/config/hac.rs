@@ -1,5 +1,6 @@
 //! How a run trains towards few bits.
 
+use pocketsplat_core::context::MAX_TAPS;
 use serde::{Deserialize, Serialize};
 
 use super::SETTLE_FROM;
@@ -14,9 +15,26 @@ pub enum Backbone {
     Scaffold,
     /// The same, trained for image and bits, with a context model and masks (Chen et al. 2024, HAC).
     Hac,
+    /// HAC whose features follow the features before them, and whose masks answer for whole anchors (Chen et al. 2025, HAC++).
+    HacPlus,
 }
 
-/// The rate's part of a run with [`Backbone::Hac`]; constants of the published trainer unless said otherwise.
+impl Backbone {
+    /// Whether it trains for bits too.
+    pub fn is_coded(self) -> bool {
+        self != Self::Scaffold
+    }
+
+    /// Taps of its context model for anchors of so many features: all features before one say something about it.
+    pub(in crate::train) fn n_taps(self, feature_dim: usize) -> usize {
+        match self {
+            Self::Scaffold | Self::Hac => 0,
+            Self::HacPlus => (feature_dim - 1).min(MAX_TAPS.into()),
+        }
+    }
+}
+
+/// The rate's part of a run with [`Backbone::Hac`] or [`Backbone::HacPlus`]; constants of the published trainer unless said otherwise.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hac {
     /// λ: weight of the mean bits of a value in the loss.
@@ -31,7 +49,8 @@ pub struct Hac {
     pub exact_from: f64,
     /// Share of the visible anchors that the rate is taken over.
     pub sample: f64,
-    /// Weight of the mean opening of the masks in the loss, while there is a rate.
+    /// Weight of the mean opening of the masks in the loss, while there is a rate; not with [`Backbone::HacPlus`], whose masks
+    /// answer for their anchors' bits instead.
     pub mask_weight: f64,
     /// Weight of the bits of the grid's signs against those of the values. 0, for a bundle stores the signs as they are.
     /// (HAC codes them; 1.)

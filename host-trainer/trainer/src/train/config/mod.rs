@@ -62,7 +62,7 @@ pub struct Rates {
     pub covariance_head: LearningRate,
     /// Colour head.
     pub colour_head: LearningRate,
-    /// Mask logits; multiplied by the capture's extent. For [`Backbone::Hac`], as those below.
+    /// Mask logits; multiplied by the capture's extent. Where there is a rate, as those below.
     pub mask: LearningRate,
     /// Grid of the context model.
     pub grid: LearningRate,
@@ -177,7 +177,7 @@ pub struct TrainConfig {
     pub loss: LossWeights,
     /// Growth and pruning.
     pub densification: Densification,
-    /// The rate, for [`Backbone::Hac`].
+    /// The rate, where the backbone has one.
     pub hac: Hac,
     /// What is plugged in.
     #[serde(default)]
@@ -207,7 +207,7 @@ impl Default for TrainConfig {
 }
 
 impl TrainConfig {
-    /// The defaults of a backbone: HAC's anchors have 50 features.
+    /// The defaults of a backbone: anchors of HAC and HAC++ have 50 features.
     ///
     /// (Published HAC also shows the heads the distance of view. On lego that costs 0.3 dB in short runs, so it is an option
     /// here.)
@@ -215,7 +215,7 @@ impl TrainConfig {
         let scaffold = Self::default();
         match backbone {
             Backbone::Scaffold => scaffold,
-            Backbone::Hac => {
+            Backbone::Hac | Backbone::HacPlus => {
                 let shape = ModelShape { feature_dim: 50, ..scaffold.shape };
                 Self { backbone, shape, ..scaffold }
             }
@@ -240,7 +240,7 @@ impl TrainConfig {
         self.modules.each().into_iter().try_for_each(|module| module.check())?;
         within("train.iterations", f64::from(self.iterations), 1.0, 10_000_000.0)?;
         for (key, at) in self.modules.each().into_iter().filter_map(|module| module.weighs_bits_at()) {
-            if self.backbone == Backbone::Scaffold {
+            if !self.backbone.is_coded() {
                 return Err(ConfigError::NoRate { key });
             }
             // The context model begins with the iteration after its share.
@@ -327,10 +327,11 @@ impl TrainConfig {
     /// What iteration `iteration`, from 1, does to the values of anchors.
     pub fn phase(&self, iteration: u32) -> Phase {
         let after = |share: f64| iteration > self.iteration_at(share);
-        match self.backbone {
-            Backbone::Hac if after(self.hac.exact_from) => Phase::IntegerModel,
-            Backbone::Hac if after(self.hac.context_from) => Phase::Context,
-            Backbone::Hac if after(self.hac.noise_from) => Phase::Noise,
+        match self.hac {
+            _ if !self.backbone.is_coded() => Phase::Raw,
+            Hac { exact_from, .. } if after(exact_from) => Phase::IntegerModel,
+            Hac { context_from, .. } if after(context_from) => Phase::Context,
+            Hac { noise_from, .. } if after(noise_from) => Phase::Noise,
             _ => Phase::Raw,
         }
     }
@@ -338,7 +339,7 @@ impl TrainConfig {
     /// Whether growth and pruning pause at `iteration`, so that the heads get used to the noise first.
     pub fn pauses_at(&self, iteration: u32) -> bool {
         let pause = self.iteration_at(self.hac.noise_from)..self.iteration_at(self.hac.pause_until);
-        self.backbone == Backbone::Hac && pause.contains(&iteration)
+        self.backbone.is_coded() && pause.contains(&iteration)
     }
 
     /// Whether training view `index` of `n_views` is held out.

@@ -27,11 +27,15 @@ pub struct Rdo {
     pub until: f64,
     /// Number of events, evenly spaced; with one it comes at `from`.
     pub events: u32,
+    /// Anchors that the last event leaves where there are more, whatever λ says: the strength is then the one that does it.
+    /// Events before it take equal shares.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub anchors: Option<usize>,
 }
 
 impl Default for Rdo {
     fn default() -> Self {
-        Self { strength: 1.0, from: 0.5, until: 0.7, events: 2 }
+        Self { strength: 1.0, from: 0.5, until: 0.7, events: 2, anchors: None }
     }
 }
 
@@ -43,10 +47,40 @@ impl Rdo {
         (0..self.events).map(move |event| from + spacing * f64::from(event))
     }
 
-    /// The offsets to switch off, counted through all anchors'; never all of them.
-    pub fn worthless(&self, worth: &Worth) -> Vec<usize> {
+    /// The strength that leaves so many of the anchors, or the nearest fewer; 0 where there are no more.
+    ///
+    /// Cost: 60 times [`worthless`](Self::worthless).
+    fn strength_for(&self, worth: &Worth, n_left: usize) -> f64 {
         let k = worth.of_offsets.len() / worth.of_anchors.len().max(1);
-        let price = self.strength * worth.bit_price;
+        let leaves = |strength: f64| {
+            let mut drawn: Vec<usize> = (0..worth.of_anchors.len())
+                .map(|anchor| worth.bits.of_offsets[anchor * k..][..k].iter().filter(|bits| **bits > 0.0).count())
+                .collect();
+            self.worthless(worth, strength).into_iter().for_each(|offset| {
+                drawn[offset / k] -= usize::from(worth.bits.of_offsets[offset] > 0.0);
+            });
+            drawn.iter().filter(|drawn| **drawn > 0).count()
+        };
+        if leaves(0.0) <= n_left {
+            return 0.0;
+        }
+        // Powers of two: what an anchor is worth spans many orders.
+        let (mut too_weak, mut enough) = (-40.0_f64, 40.0_f64);
+        for _ in 0..60 {
+            let middle = f64::midpoint(too_weak, enough);
+            if leaves(middle.exp2()) > n_left {
+                too_weak = middle;
+            } else {
+                enough = middle;
+            }
+        }
+        enough.exp2()
+    }
+
+    /// The offsets to switch off, counted through all anchors'; never all of them.
+    fn worthless(&self, worth: &Worth, strength: f64) -> Vec<usize> {
+        let k = worth.of_offsets.len() / worth.of_anchors.len().max(1);
+        let price = strength * worth.bit_price;
         let goes = |offset: usize| {
             let anchor = offset / k;
             worth.of_offsets[offset] < price * f64::from(worth.bits.of_offsets[offset])
@@ -63,14 +97,21 @@ impl Module for Rdo {
         within("train.modules.rdo.strength", self.strength, 0.0, 1e6)?;
         within("train.modules.rdo.from", self.from, 0.0, 1.0)?;
         within("train.modules.rdo.until", self.until, self.from, 1.0)?;
+        within("train.modules.rdo.anchors", self.anchors.unwrap_or(1) as f64, 1.0, 1e9)?;
         within("train.modules.rdo.events", f64::from(self.events), 1.0, 100.0)
     }
 
     fn event(&self, at: &StepInfo, run: &RunView<'_>) -> Result<Option<AnchorChange>, TrainError> {
-        if !self.shares().any(|share| at.is_at(share)) {
-            return Ok(None);
-        }
-        Ok(Some(AnchorChange::Mask(self.worthless(&run.worth()?))))
+        let shares: Vec<f64> = self.shares().collect();
+        let Some(event) = shares.iter().position(|share| at.is_at(*share)) else { return Ok(None) };
+        let worth = run.worth()?;
+        let strength = self.anchors.map_or(self.strength, |n_last| {
+            let (n, n_last) = (worth.of_anchors.len() as f64, n_last as f64);
+            let n_left = n_last * (n / n_last).powf(1.0 - 1.0 / (shares.len() - event) as f64);
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of anchors")]
+            self.strength_for(&worth, n_left.round() as usize)
+        });
+        Ok(Some(AnchorChange::Mask(self.worthless(&worth, strength))))
     }
 
     fn weighs_bits_at(&self) -> Option<(&'static str, f64)> {
@@ -104,11 +145,14 @@ mod tests {
             },
             bit_price: 0.2,
         };
-        let gone = |strength: f64| Rdo { strength, ..Rdo::default() }.worthless(&worth);
+        let gone = |strength: f64| Rdo::default().worthless(&worth, strength);
         assert_eq!(gone(0.0), [0; 0], "what costs nothing stays");
         assert_eq!(gone(0.6), [1, 4], "42 bits are worth 5.04");
         assert_eq!(gone(1.0), [1, 3, 4, 5], "they are worth 8.4");
         assert_eq!(gone(1e6), [1, 2, 3, 4, 5], "the best stays, so that there is a scene");
+        let left = |n: usize| Rdo::default().strength_for(&worth, n);
+        assert_eq!(left(2), 0.0, "there are no more");
+        assert!((left(1) - 5.2 / 8.4).abs() < 1e-6, "the second anchor goes at {}", left(1));
     }
 
     #[test]

@@ -93,7 +93,7 @@ fn with_context(scene: Scene<f32>, seed: u64) -> Scene<f32> {
         model.network.mlp.b2[n_channels + channel] += [1.8, 3.0, 1.5][group];
     }
     // Every other scene has taps.
-    let mut model = model.with_taps(&scene.shape, if seed % 2 == 0 { 0 } else { 4 }, 0.0);
+    let mut model = model.with_taps(&scene.shape, if seed.is_multiple_of(2) { 0 } else { 4 }, 0.0);
     model.network.taps.iter_mut().for_each(|tap| *tap = rng.random_range(-0.6..0.6));
     Scene { context: Some(model), ..scene }
 }

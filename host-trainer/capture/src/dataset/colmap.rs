@@ -177,7 +177,7 @@ fn shot(
         .ok_or_else(|| ViewFault::Missing { path: folder.join(&image.name), listed_in: "the model" })?;
     let header = match read_header(&path) {
         Ok(header) => header,
-        Err(message) => return Err(ViewFault::Unreadable { path, message }),
+        Err(message) => return Err(ViewFault::of_header(path, message)),
     };
     let Some(lens) = &camera.lens else {
         return Err(ViewFault::CameraModel { model: camera.model.clone() });

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{DatasetError, Layout, blender, colmap, nerfstudio};
+use super::{DatasetError, Layout, blender, colmap, nerfstudio, no_poses, nsvf, polycam, record3d};
 
 /// The layout of the folder `path`.
 pub(super) fn layout_of(path: &Path) -> Option<Layout> {
@@ -15,14 +15,25 @@ pub(super) fn layout_of(path: &Path) -> Option<Layout> {
     } else if colmap::has_model(path, false) {
         // After nerfstudio, which leaves the model in `colmap/sparse` that its transforms were made from.
         Some(Layout::Colmap)
+    } else if polycam::is_layout_of(path) {
+        Some(Layout::Polycam)
+    } else if record3d::is_layout_of(path) {
+        Some(Layout::Record3d)
+    } else if nsvf::is_layout_of(path) {
+        Some(Layout::Nsvf)
     } else {
         None
     }
 }
 
-/// The error of a folder that is no capture; looks whether a folder in it is one.
+/// The error of a folder that is no capture; looks whether a folder in it is one, and what else it may be.
 pub(super) fn unknown_layout(path: &Path) -> DatasetError {
     let entries = std::fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path());
     let inside = entries.filter(|path| path.is_dir() && layout_of(path).is_some()).min();
+    if inside.is_none()
+        && let Some(found) = no_poses::found_instead(path)
+    {
+        return DatasetError::NoCapture { found };
+    }
     DatasetError::UnknownLayout { path: path.to_owned(), looked_for: Layout::LOOKED_FOR.to_vec(), inside }
 }

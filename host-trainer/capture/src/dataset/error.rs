@@ -24,6 +24,9 @@ pub enum DatasetError {
         }
     )]
     UnknownLayout { path: PathBuf, looked_for: Vec<&'static str>, inside: Option<PathBuf> },
+    /// What is given is something else, such as photographs without poses.
+    #[error("{found}")]
+    NoCapture { found: String },
     /// A file of the capture cannot be read.
     #[error("cannot read `{}`: {source}; check that the file is there and may be read", path.display())]
     Read { path: PathBuf, source: std::io::Error },
@@ -34,6 +37,9 @@ pub enum DatasetError {
         path.display()
     )]
     Transforms { path: PathBuf, source: serde_json::Error },
+    /// A file of a telephone's export is no such JSON; the source gives line and column.
+    #[error("`{}` is not {what}: {source}; it needs {needs}: export the capture again", path.display())]
+    Json { path: PathBuf, what: &'static str, needs: &'static str, source: serde_json::Error },
     /// The field of view is not an angle a pinhole camera can have.
     #[error(
         "`{}`: `camera_angle_x` is {found}, needed: the horizontal field of view in radians, between 0 and π; \
@@ -100,8 +106,10 @@ impl DatasetError {
         match self {
             Self::NotAFolder { .. } => "not-a-folder",
             Self::UnknownLayout { .. } => "unknown-layout",
+            Self::NoCapture { .. } => "no-capture",
             Self::Read { .. } => "unreadable-file",
             Self::Transforms { .. } => "bad-transforms",
+            Self::Json { .. } => "bad-export",
             Self::FieldOfView { .. } | Self::NoFocal { .. } => "bad-intrinsics",
             Self::ModelNumber { .. } => "bad-option",
             Self::NoModel { .. } => "unknown-layout",

@@ -6,10 +6,13 @@ use ::image::ImageDecoder;
 
 use super::{Background, Image, Mask};
 
+mod foreign;
 mod jpeg_end;
 
+pub(super) use foreign::{conversion, foreign_format, has_foreign_name};
+
 /// Extensions of the image files that are read, in the order in which they are tried.
-pub(super) const EXTENSIONS: [&str; 3] = ["png", "jpg", "jpeg"];
+pub(super) const EXTENSIONS: [&str; 4] = ["png", "jpg", "jpeg", "webp"];
 
 /// Whether a file of this name can be a photograph.
 pub(super) fn is_image_name(name: &str) -> bool {

@@ -14,14 +14,23 @@ pub enum Layout {
     Colmap,
     /// nerfstudio and instant-ngp: one `transforms.json`.
     Nerfstudio,
+    /// Polycam's raw export: `keyframes`.
+    Polycam,
+    /// Record3D's export: `metadata` beside `rgbd` or `rgb`.
+    Record3d,
+    /// NSVF: `intrinsics.txt`, `pose` and `rgb`.
+    Nsvf,
 }
 
 impl Layout {
     /// What tells each layout, for messages.
-    pub(super) const LOOKED_FOR: [&str; 3] = [
+    pub(super) const LOOKED_FOR: [&str; 6] = [
         "`transforms_train.json` (Blender)",
         "`sparse/0/cameras.bin` or `sparse/0/cameras.txt`, also in `colmap` (COLMAP)",
         "`transforms.json` (nerfstudio, instant-ngp)",
+        "`keyframes/cameras` (Polycam)",
+        "`metadata` beside `rgbd` (Record3D)",
+        "`intrinsics.txt` beside `pose` (NSVF)",
     ];
 }
 
@@ -31,6 +40,9 @@ impl fmt::Display for Layout {
             Self::Blender => "Blender",
             Self::Colmap => "COLMAP",
             Self::Nerfstudio => "nerfstudio",
+            Self::Polycam => "Polycam",
+            Self::Record3d => "Record3D",
+            Self::Nsvf => "NSVF",
         })
     }
 }

@@ -29,11 +29,15 @@ mod listing;
 mod mask;
 mod named_path;
 mod nerfstudio;
+mod no_poses;
 mod normalise;
+mod nsvf;
 mod options;
 mod photo;
 mod ply;
+mod polycam;
 mod pose;
+mod record3d;
 mod report;
 mod spacing;
 mod text_file;
@@ -151,12 +155,18 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<(Capture, LoadReport),
 fn list(path: &Path, options: &LoadOptions) -> Result<listing::Listing, DatasetError> {
     options.check()?;
     if !path.is_dir() {
+        if let Some(found) = no_poses::file_instead(path).filter(|_| path.is_file()) {
+            return Err(DatasetError::NoCapture { found });
+        }
         return Err(DatasetError::NotAFolder { path: path.to_owned() });
     }
     match detect::layout_of(path) {
         Some(Layout::Blender) => blender::list(path),
         Some(Layout::Colmap) => colmap::list(path, options),
         Some(Layout::Nerfstudio) => nerfstudio::list(path, options),
+        Some(Layout::Polycam) => polycam::list(path, options),
+        Some(Layout::Record3d) => record3d::list(path, options),
+        Some(Layout::Nsvf) => nsvf::list(path, options),
         None => Err(detect::unknown_layout(path)),
     }
 }

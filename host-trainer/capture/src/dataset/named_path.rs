@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::image::EXTENSIONS;
+use super::image::{EXTENSIONS, has_foreign_name, is_image_name};
 
 /// Where photographs lie in captures that name them by paths of another machine.
 const IMAGE_FOLDERS: [&str; 2] = ["images", "input"];
@@ -83,17 +83,20 @@ impl<'a> NamedPath<'a> {
 
 /// The image at `path`, or beside it under the same name with another extension.
 fn with_some_extension(path: &Path) -> Option<PathBuf> {
-    if path.is_file() {
+    let name = path.file_name()?.to_str()?;
+    let is_foreign = has_foreign_name(name);
+    if path.is_file() && !is_foreign {
         return Some(path.to_owned());
     }
-    let name = path.file_name()?.to_str()?;
-    let stem = if super::image::is_image_name(name) { name.rsplit_once('.')?.0 } else { name };
+    let stem = if is_foreign || is_image_name(name) { name.rsplit_once('.')?.0 } else { name };
     let upper = EXTENSIONS.map(str::to_uppercase);
     let mut extensions = EXTENSIONS.into_iter().chain(upper.iter().map(String::as_str));
-    extensions.find_map(|extension| {
+    let readable = extensions.find_map(|extension| {
         let path = path.with_file_name(format!("{stem}.{extension}"));
         path.is_file().then_some(path)
-    })
+    });
+    // The photograph before its conversion only where there is no other, for the message that it must be converted.
+    readable.or_else(|| path.is_file().then(|| path.to_owned()))
 }
 
 #[cfg(test)]
@@ -127,7 +130,15 @@ mod tests {
 
     #[test]
     fn images_are_found_where_they_can_be_meant() {
-        let capture = folder(&["images/a.jpg", "images/b.PNG", "images/frame.001.png", "images_2/a.jpg", "c.jpeg"]);
+        let capture = folder(&[
+            "images/a.jpg",
+            "images/a.heic",
+            "images/b.PNG",
+            "images/e.heic",
+            "images/frame.001.png",
+            "images_2/a.jpg",
+            "c.webp",
+        ]);
         let found = |written: &str, images: Option<&str>| {
             let path = NamedPath::new(written).image(capture.path(), images)?;
             Some(path.strip_prefix(capture.path()).expect("inside").to_str().expect("text").to_owned())
@@ -143,7 +154,9 @@ mod tests {
             ("a.jpg", None, Some("images/a.jpg")),
             ("/home/ann/fox/images_2/a.jpg", None, Some("images_2/a.jpg")),
             ("/home/ann/photographs/a.jpg", None, Some("images/a.jpg")),
-            ("D:\\photographs\\c.png", None, Some("c.jpeg")),
+            ("D:\\photographs\\c.png", None, Some("c.webp")),
+            ("images/a.heic", None, Some("images/a.jpg")),
+            ("images/e.heic", None, Some("images/e.heic")),
             ("images/a.jpg", Some("images_2"), Some("images_2/a.jpg")),
             ("/home/ann/photographs/a.jpg", Some("images_2"), Some("images_2/a.jpg")),
             ("images/b.png", Some("images_2"), None),

@@ -4,7 +4,8 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use super::{DatasetError, FrameSize};
+use super::listing::every_nth;
+use super::{DatasetError, FrameSize, Split};
 
 /// What stands behind everything: the colour that transparent pixels are composited on.
 ///
@@ -91,6 +92,12 @@ impl Default for LoadOptions {
 }
 
 impl LoadOptions {
+    /// The split of the view at place `i` where the capture names none.
+    #[expect(clippy::unnecessary_wraps, reason = "captures with a split of their own have views of none")]
+    pub(super) fn split_of(&self, i: usize) -> Option<Split> {
+        Some(every_nth(self.test_every, i))
+    }
+
     /// Refuses values that no capture can be loaded with.
     pub(super) fn check(&self) -> Result<(), DatasetError> {
         match (self.max_resolution, self.test_every) {

@@ -2,12 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
+use rayon::prelude::*;
+
 use super::image::{ImageHeader, read_header};
 use super::lens::{Lens, Projection};
-use super::listing::Shot;
+use super::listing::{ListedView, Listing, Note, Shot, unused_images};
 use super::named_path::NamedPath;
 use super::pose::world_to_camera;
-use super::{DatasetError, ViewFault};
+use super::{DatasetError, Layout, Split, ViewFault};
 
 mod json;
 
@@ -40,6 +42,33 @@ impl Transforms {
     }
 }
 
+/// Lists frames of a layout that brings neither points nor a list of splits, in their order.
+///
+/// * `source`: what lists the frames; `images`: the folder that their paths start from.
+/// * `split`: of the frame at a place; none leaves it out.
+pub(super) fn list_frames(
+    layout: Layout,
+    source: PathBuf,
+    images: &Path,
+    frames: &[Frame],
+    shared: &Intrinsics,
+    split: impl Fn(usize) -> Option<Split> + Sync,
+) -> Listing {
+    let view = |(i, frame): (usize, &Frame)| {
+        Some(ListedView { split: split(i)?, name: frame.name().to_owned(), shot: frame.shot(images, None, shared) })
+    };
+    let views: Vec<ListedView> = frames.par_iter().enumerate().filter_map(view).collect();
+    let found: Vec<PathBuf> = frames.iter().filter_map(|frame| frame.image(images, None)).collect();
+    let unposed = unused_images(images, found.iter().map(PathBuf::as_path));
+    let text = "the capture brings no points, so training starts from random points where the cameras look";
+    let mut listing =
+        Listing { layout, source, views, points: None, unposed, notes: vec![Note::new("no-points", text)] };
+    if !listing.has_test_views() {
+        listing.notes.push(Note::no_test_views());
+    }
+    listing
+}
+
 impl Frame {
     /// The frame's photograph.
     ///
@@ -58,7 +87,7 @@ impl Frame {
         })?;
         let header = match read_header(&path) {
             Ok(header) => header,
-            Err(message) => return Err(ViewFault::Unreadable { path, message }),
+            Err(message) => return Err(ViewFault::of_header(path, message)),
         };
         let lens = self.lens(&path, &header, shared)?;
         let mask = match self.mask_path.as_deref().map(NamedPath::new) {

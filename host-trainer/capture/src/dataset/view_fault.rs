@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::PoseFault;
-use super::image::EXTENSIONS;
+use super::image::{EXTENSIONS, conversion, foreign_format};
 use super::lens::READABLE_MODELS;
 
 /// Why one view cannot be used.
@@ -18,8 +18,14 @@ pub enum ViewFault {
     )]
     Missing { path: PathBuf, listed_in: &'static str },
     /// The image cannot be decoded.
-    #[error("image unreadable: `{}`: {message}; replace it with a whole PNG or JPEG", path.display())]
+    #[error("image unreadable: `{}`: {message}; replace it with a whole PNG, JPEG or WebP", path.display())]
     Unreadable { path: PathBuf, message: String },
+    /// The image is of a format that is not read.
+    #[error(
+        "`{}` is {found}, needed: PNG, JPEG or WebP; convert the images, names need not change in the capture:\n  {}",
+        path.display(), conversion(path.parent().unwrap_or(path), &path.to_string_lossy())
+    )]
+    Format { path: PathBuf, found: &'static str },
     /// The image's size is not the capture's.
     #[error(
         "`{}` is {}×{} px, the training images are {}×{} px; export it again at that size",
@@ -67,11 +73,20 @@ pub enum ViewFault {
 }
 
 impl ViewFault {
+    /// The fault of an image whose header cannot be read.
+    pub(super) fn of_header(path: PathBuf, message: String) -> Self {
+        match foreign_format(&path) {
+            Some(found) => Self::Format { path, found },
+            None => Self::Unreadable { path, message },
+        }
+    }
+
     /// The kind of fault, as a code of [`Finding`](super::Finding).
     pub(super) fn code(&self) -> &'static str {
         match self {
             Self::Missing { .. } => "missing-image",
             Self::Unreadable { .. } => "unreadable-image",
+            Self::Format { .. } => "image-format",
             Self::Size { .. } | Self::Small { .. } => "image-size",
             Self::Shape { .. } => "image-shape",
             Self::Lens { .. } => "bad-intrinsics",
@@ -87,6 +102,7 @@ impl ViewFault {
         match self {
             Self::Missing { path, .. }
             | Self::Unreadable { path, .. }
+            | Self::Format { path, .. }
             | Self::Size { path, .. }
             | Self::Shape { path, .. }
             | Self::Small { path, .. }

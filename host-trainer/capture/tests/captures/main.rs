@@ -2,6 +2,7 @@
 //! give, and real ones where they are at hand.
 
 mod broken;
+mod exports;
 mod fixture;
 mod real;
 mod sound;

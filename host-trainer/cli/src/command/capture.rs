@@ -10,8 +10,8 @@ use crate::config::CaptureOptions;
 /// Where photographs come from and how they are prepared.
 #[derive(clap::Args, Clone, Debug)]
 pub(crate) struct CaptureArgs {
-    /// Folder of the capture: transforms_train.json (Blender, Synthetic-NeRF), sparse/0 (COLMAP) or transforms.json
-    /// (nerfstudio, instant-ngp).
+    /// Folder of the capture: transforms_train.json (Blender, Synthetic-NeRF), sparse/0 (COLMAP), transforms.json
+    /// (nerfstudio, instant-ngp), or an export of Polycam, Record3D or NSVF.
     pub(crate) dataset: PathBuf,
     #[command(flatten)]
     pub(crate) options: CaptureOptions,

@@ -23,24 +23,24 @@ pub(in crate::dataset) struct Transforms {
 #[serde(default)]
 pub(in crate::dataset) struct Intrinsics {
     /// Fields of view, radians.
-    pub(super) camera_angle_x: Option<f64>,
-    pub(super) camera_angle_y: Option<f64>,
+    pub(in crate::dataset) camera_angle_x: Option<f64>,
+    pub(in crate::dataset) camera_angle_y: Option<f64>,
     /// Focal lengths and principal point, pixels.
-    pub(super) fl_x: Option<f64>,
-    pub(super) fl_y: Option<f64>,
-    pub(super) cx: Option<f64>,
-    pub(super) cy: Option<f64>,
+    pub(in crate::dataset) fl_x: Option<f64>,
+    pub(in crate::dataset) fl_y: Option<f64>,
+    pub(in crate::dataset) cx: Option<f64>,
+    pub(in crate::dataset) cy: Option<f64>,
     /// The image size they are for, pixels; written as floats by some.
-    pub(super) w: Option<f64>,
-    pub(super) h: Option<f64>,
-    pub(super) k1: Option<f64>,
-    pub(super) k2: Option<f64>,
-    pub(super) k3: Option<f64>,
-    pub(super) k4: Option<f64>,
-    pub(super) p1: Option<f64>,
-    pub(super) p2: Option<f64>,
-    pub(super) camera_model: Option<String>,
-    pub(super) is_fisheye: Option<bool>,
+    pub(in crate::dataset) w: Option<f64>,
+    pub(in crate::dataset) h: Option<f64>,
+    pub(in crate::dataset) k1: Option<f64>,
+    pub(in crate::dataset) k2: Option<f64>,
+    pub(in crate::dataset) k3: Option<f64>,
+    pub(in crate::dataset) k4: Option<f64>,
+    pub(in crate::dataset) p1: Option<f64>,
+    pub(in crate::dataset) p2: Option<f64>,
+    pub(in crate::dataset) camera_model: Option<String>,
+    pub(in crate::dataset) is_fisheye: Option<bool>,
 }
 
 /// The rest of the file, read apart from the shared intrinsics so that an error in these tells its own column.
@@ -70,6 +70,13 @@ pub(in crate::dataset) struct Frame {
 }
 
 impl Frame {
+    /// A frame of another file: the path of its image, its matrix by rows and its lens.
+    pub(in crate::dataset) fn new(file_path: String, rows: &[Vec<f64>], own: Intrinsics) -> Self {
+        let name = NamedPath::new(&file_path).name();
+        let transform_matrix = rows.iter().map(|row| row.iter().copied().map(Some).collect()).collect();
+        Self { file_path, name, transform_matrix, mask_path: None, own }
+    }
+
     /// The path of the image as the file gives it.
     pub(super) fn path(&self) -> NamedPath<'_> {
         NamedPath::new(&self.file_path)

@@ -1,7 +1,8 @@
 //! Captures of no layout, or of one that lacks a part.
 
 use super::Harm::Fatal;
-use super::{Case, case};
+use super::{Case, case, cut, edit};
+use crate::exports::{write_nsvf, write_polycam, write_record3d};
 use crate::fixture::Kind::{Blender, ColmapBinary, ColmapText, Nerfstudio};
 
 pub(super) fn cases() -> Vec<Case> {
@@ -12,7 +13,99 @@ pub(super) fn cases() -> Vec<Case> {
             Fatal,
             "unknown-layout",
             &["looked for `transforms_train.json` (Blender), `sparse/0/cameras.bin`", "none of them; give the folder"],
+            |f| std::fs::remove_dir_all(f.at("images")).expect("images"),
+        ),
+        case(
+            "photographs without poses",
+            ColmapBinary,
+            Fatal,
+            "no-capture",
+            &[
+                "/images` holds 12 photographs but no poses; make poses with COLMAP and give this folder again:\n  colmap \
+                 feature_extractor --database_path '",
+                "/images' --ImageReader.single_camera 1",
+                "\n  colmap exhaustive_matcher --database_path '",
+                "\n  mkdir -p '",
+                "\n  colmap mapper --database_path '",
+                "/sparse'",
+            ],
             |_| {},
+        ),
+        case(
+            "photographs of a telephone without poses",
+            ColmapBinary,
+            Fatal,
+            "no-capture",
+            &[
+                "holds 2 photographs but no poses; convert those of a format that is not read:\n  magick mogrify -format jpg \
+                 -quality 95 '",
+                "/*.HEIC'\nthen make poses with COLMAP",
+            ],
+            |f| {
+                std::fs::remove_dir_all(f.at("images")).expect("images");
+                f.write("IMG_0001.HEIC", "");
+                f.write("IMG_0002.HEIC", "");
+            },
+        ),
+        case(
+            "a film",
+            Nerfstudio,
+            Fatal,
+            "no-capture",
+            &["/walk.MOV` is a film, needed: photographs with poses; take 2 photographs a second", "ffmpeg -i '"],
+            |f| {
+                std::fs::remove_dir_all(f.at("images")).expect("images");
+                f.write("walk.MOV", "");
+            },
+        ),
+        case(
+            "a packed capture",
+            Nerfstudio,
+            Fatal,
+            "no-capture",
+            &["/shoe.r3d` is a packed capture, needed: its files; unpack it", "unzip '", "/shoe.r3d' -d '"],
+            |f| {
+                std::fs::remove_dir_all(f.at("images")).expect("images");
+                f.write("shoe.r3d", "");
+            },
+        ),
+        case(
+            "a camera of Polycam cut",
+            Nerfstudio,
+            Fatal,
+            "bad-export",
+            &["p_04.json` is not a camera of Polycam: EOF", "it needs `fx`, `fy`,", "export the capture again"],
+            |f| {
+                write_polycam(f, "cameras", "images");
+                cut(f, "keyframes/cameras/p_04.json", 40);
+            },
+        ),
+        case(
+            "metadata of Record3D without poses",
+            Nerfstudio,
+            Fatal,
+            "bad-export",
+            &["metadata` is not metadata of Record3D: missing field `poses`", "`poses` of 7 numbers each"],
+            |f| {
+                write_record3d(f, "metadata", "rgbd", 0);
+                edit(f, "metadata", |text| text.replace("poses", "places"));
+            },
+        ),
+        case(
+            "intrinsics of NSVF that are words",
+            Nerfstudio,
+            Fatal,
+            "bad-model",
+            &["intrinsics.txt`: line 1: `focal` is no number"],
+            |f| write_nsvf(f, "focal 20\n", |_| ""),
+        ),
+        case(
+            "intrinsics of NSVF without a principal point",
+            Nerfstudio,
+            Fatal,
+            "bad-model",
+            &["intrinsics.txt`: line 1: no intrinsics, needed: a matrix of 4 by 4 numbers"],
+            |f| write_nsvf(f, "20.0\n", |_| ""),
         ),
         case(
             "the capture is a folder further in",

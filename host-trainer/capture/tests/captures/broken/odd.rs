@@ -2,6 +2,7 @@
 
 use super::Harm::Nothing;
 use super::{Case, case, edit};
+use crate::exports::{NSVF_MATRIX, write_nsvf, write_polycam, write_record3d};
 use crate::fixture::Kind::{Blender, ColmapBinary, ColmapText, Nerfstudio};
 use crate::fixture::{Fixture, SIZE_PX};
 
@@ -35,6 +36,22 @@ fn paths() -> Vec<Case> {
                     .expect("JPEG");
                 f.remove(&format!("images/{}", photo.name));
             }
+        }),
+        case("images converted to WebP", Nerfstudio, Nothing, "image-format", &["warnings: 1,"], |f| {
+            f.write_files();
+            for photo in &f.photos {
+                let webp = photo.name.replace(".png", ".webp");
+                image::open(f.at("images").join(&photo.name))
+                    .expect("written")
+                    .save(f.at("images").join(webp))
+                    .expect("WebP");
+                f.remove(&format!("images/{}", photo.name));
+            }
+        }),
+        case("images converted beside the originals", ColmapText, Nothing, "image-format", &["warnings: 1,"], |f| {
+            f.photos.iter_mut().for_each(|photo| photo.name = photo.name.replace(".png", ".heic"));
+            f.write_files();
+            f.photos.iter().for_each(|photo| f.write(&format!("images/{}", photo.name), b"\0\0\0\x18ftypheic"));
         }),
         case("names of no folder", Nerfstudio, Nothing, "missing-image", &["warnings: 1,"], |f| {
             replace(f, "./images/", "");
@@ -186,6 +203,22 @@ fn layouts() -> Vec<Case> {
                 f.write_files();
             },
         ),
+        case("an export of Polycam", Nerfstudio, Nothing, "unposed-image", &["Polycam capture", "warnings: 1,"], |f| {
+            write_polycam(f, "corrected_cameras", "corrected_images");
+        }),
+        case(
+            "an export of Record3D",
+            Nerfstudio,
+            Nothing,
+            "unposed-image",
+            &["Record3D capture", "warnings: 1,"],
+            |f| {
+                write_record3d(f, "metadata", "rgbd", 0);
+            },
+        ),
+        case("a raw capture of NSVF", Nerfstudio, Nothing, "unposed-image", &["NSVF capture", "warnings: 1,"], |f| {
+            write_nsvf(f, NSVF_MATRIX, |_| "");
+        }),
         case("a rational lens", ColmapText, Nothing, "camera-model", &["images with lens distortion: 12"], |f| {
             f.cameras[0].model = (6, "FULL_OPENCV");
             f.cameras[0].parameters = vec![20.0, 20.0, 12.0, 8.0, 0.1, 0.0, 0.0, 0.0, 0.0, 0.1, 0.0, 0.0];

@@ -3,7 +3,8 @@
 use glam::DVec3;
 
 use super::Harm::{Fatal, Views};
-use super::{Case, N_VIEWS, case, cut, turned_image};
+use super::{Case, N_VIEWS, case, cut, edit, turned_image};
+use crate::exports::{NSVF_MATRIX, write_nsvf, write_polycam, write_record3d};
 use crate::fixture::Camera;
 use crate::fixture::Kind::{Blender, ColmapBinary, ColmapText, Nerfstudio};
 
@@ -17,7 +18,7 @@ pub(super) fn cases() -> Vec<Case> {
             &[
                 "train views left out: 2",
                 "p_03.png: image missing: `",
-                "does not exist, nor does it as .png or .jpg or .jpeg; restore it or take the view out of the model",
+                "does not exist, nor does it as .png or .jpg or .jpeg or .webp; restore it or take the view out of the model",
             ],
             |f| {
                 f.write_files().remove("images/p_03.png");
@@ -40,7 +41,7 @@ pub(super) fn cases() -> Vec<Case> {
             Nerfstudio,
             Views,
             "unreadable-image",
-            &["images/p_05.png: image unreadable: `", "replace it with a whole PNG or JPEG"],
+            &["images/p_05.png: image unreadable: `", "replace it with a whole PNG, JPEG or WebP"],
             |f| {
                 f.write_files().write("images/p_05.png", "");
             },
@@ -63,7 +64,7 @@ pub(super) fn cases() -> Vec<Case> {
             &[
                 "p_05.png: image unreadable: `",
                 "the JPEG ends after 800 bytes without its end marker (FF D9), so the file was cut",
-                "replace it with a whole PNG or JPEG",
+                "replace it with a whole PNG, JPEG or WebP",
             ],
             |f| {
                 turned_image(f.write_files(), "images/p_05.png");
@@ -89,9 +90,75 @@ pub(super) fn cases() -> Vec<Case> {
             Blender,
             Views,
             "unreadable-image",
-            &["images/p_05.png: image unreadable", "replace it with a whole PNG or JPEG"],
+            &["images/p_05.png: image unreadable", "replace it with a whole PNG, JPEG or WebP"],
             |f| {
                 f.write_files().write("images/p_05.png", b"RIFF\x24\0\0\0WEBPVP8 ");
+            },
+        ),
+        case(
+            "images of a format that has to be converted",
+            Nerfstudio,
+            Views,
+            "image-format",
+            &[
+                "p_05.png` is HEIC, needed: PNG, JPEG or WebP; convert the images, names need not change in the capture:\n",
+                "magick mogrify -format jpg -quality 95 '",
+            ],
+            |f| {
+                f.write_files().write("images/p_05.png", b"\0\0\0\x18ftypheic\0\0\0\0");
+                f.write("images/p_06.png", b"\0\0\0\x1Cftypavif\0\0\0\0");
+            },
+        ),
+        case(
+            "a raw photograph",
+            ColmapText,
+            Views,
+            "image-format",
+            &["p_05.png` is TIFF or raw, needed: PNG, JPEG or WebP"],
+            |f| {
+                f.write_files().write("images/p_05.png", b"II*\0\x08\0\0\0\x01\0\0\0");
+            },
+        ),
+        case("a WebP cut", ColmapText, Views, "unreadable-image", &["p_05.png: image unreadable"], |f| {
+            let image = image::open(f.write_files().at("images/p_05.png")).expect("written");
+            image.save_with_format(f.at("images/p_05.png"), image::ImageFormat::WebP).expect("WebP");
+            cut(f, "images/p_05.png", 60);
+        }),
+        case(
+            "a moment of Polycam without a lens",
+            Nerfstudio,
+            Views,
+            "bad-intrinsics",
+            &["p_04: the focal length is NaN px, needed: a positive number"],
+            |f| {
+                write_polycam(f, "cameras", "images");
+                edit(f, "keyframes/cameras/p_04.json", |text| text.replace("\"fx\"", "\"focal\""));
+            },
+        ),
+        case(
+            "a moment of Polycam without a pose",
+            Nerfstudio,
+            Views,
+            "bad-pose",
+            &["p_04: `transform_matrix` has NaN in row 1, column 2"],
+            |f| {
+                write_polycam(f, "cameras", "images");
+                edit(f, "keyframes/cameras/p_04.json", |text| text.replace("t_12", "t_99"));
+            },
+        ),
+        case("a picture of Record3D missing", Nerfstudio, Views, "missing-image", &["rgbd/4` does not exist"], |f| {
+            write_record3d(f, "metadata", "rgbd", 0);
+            f.remove("rgbd/4.png");
+        }),
+        case(
+            "a pose of NSVF cut",
+            Nerfstudio,
+            Views,
+            "bad-pose",
+            &["0004: `transform_matrix` has 2 rows, the shortest of 4 numbers, needed: 4 rows of 4"],
+            |f| {
+                write_nsvf(f, NSVF_MATRIX, |_| "");
+                edit(f, "pose/0004.txt", |text| text.lines().take(2).collect::<Vec<_>>().join("\n"));
             },
         ),
         case(

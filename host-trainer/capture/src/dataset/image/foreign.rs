@@ -1,0 +1,38 @@
+//! Image formats that are told by their first bytes but not read.
+
+use std::path::Path;
+
+/// Extensions of such images; a photograph converted from one keeps its name but for that.
+pub(in crate::dataset) const FOREIGN_EXTENSIONS: [&str; 9] =
+    ["heic", "heif", "avif", "tif", "tiff", "bmp", "gif", "jxl", "dng"];
+
+/// Whether a file of this name is an image that has to be converted.
+pub(in crate::dataset) fn has_foreign_name(name: &str) -> bool {
+    let extension = name.rsplit_once('.').map(|(_, extension)| extension.to_ascii_lowercase());
+    extension.is_some_and(|extension| FOREIGN_EXTENSIONS.contains(&extension.as_str()))
+}
+
+/// The format of the image file `path` where it is known but not read.
+pub(in crate::dataset) fn foreign_format(path: &Path) -> Option<&'static str> {
+    let mut head = [0; 12];
+    std::io::Read::read_exact(&mut std::fs::File::open(path).ok()?, &mut head).ok()?;
+    match &head {
+        // ISO 14496-12: the size of the first box, its type, then the brand of the file.
+        [_, _, _, _, b'f', b't', b'y', b'p', brand @ ..] => match brand {
+            b"avif" | b"avis" => Some("AVIF"),
+            b"heic" | b"heix" | b"hevc" | b"mif1" | b"msf1" => Some("HEIC"),
+            _ => None,
+        },
+        [b'I', b'I', 42, 0, ..] | [b'M', b'M', 0, 42, ..] => Some("TIFF or raw"),
+        [b'G', b'I', b'F', b'8', ..] => Some("GIF"),
+        [b'B', b'M', ..] => Some("BMP"),
+        [0xFF, 0x0A, ..] | [0, 0, 0, 12, b'J', b'X', b'L', b' ', ..] => Some("JPEG XL"),
+        _ => None,
+    }
+}
+
+/// The command that converts all images in `folder` that have the extension of `name`.
+pub(in crate::dataset) fn conversion(folder: &Path, name: &str) -> String {
+    let extension = name.rsplit_once('.').map_or("*", |(_, extension)| extension);
+    format!("magick mogrify -format jpg -quality 95 '{}/*.{extension}'", folder.display())
+}

@@ -1,0 +1,67 @@
+//! Raw exports of Polycam: `keyframes` with one photograph and one file of its camera for each moment.
+//!
+//! As polyform, the publisher's converter, documents them: `t_ij` are rows of a camera-to-world matrix in ARKit's axes, which
+//! are those of OpenGL.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use super::listing::Listing;
+use super::transforms::{Frame, Intrinsics, list_frames};
+use super::{DatasetError, Layout, LoadOptions, text_file};
+
+/// Cameras and their images: optimised over all moments and undistorted first, as tracked where there are none.
+const FOLDERS: [(&str, &str); 2] = [("corrected_cameras", "corrected_images"), ("cameras", "images")];
+
+/// The folders of cameras and of images.
+fn folders(folder: &Path) -> Option<(PathBuf, PathBuf)> {
+    let keyframes = folder.join("keyframes");
+    let folders = FOLDERS.iter().map(|(cameras, images)| (keyframes.join(cameras), keyframes.join(images)));
+    folders.into_iter().find(|(cameras, images)| cameras.is_dir() && images.is_dir())
+}
+
+/// Whether the folder is of this layout.
+pub(super) fn is_layout_of(folder: &Path) -> bool {
+    folders(folder).is_some()
+}
+
+/// Lists the capture in `folder`, views by their time.
+///
+/// # Errors
+/// As [`super::load`], as far as files but no pixels tell.
+pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, DatasetError> {
+    let Some((cameras, images)) = folders(folder) else {
+        return Err(DatasetError::NotAFolder { path: folder.join("keyframes") });
+    };
+    let entries = std::fs::read_dir(&cameras).into_iter().flatten().flatten().map(|entry| entry.path());
+    let mut files: Vec<PathBuf> = entries.filter(|path| path.extension().is_some_and(|e| e == "json")).collect();
+    files.sort();
+    let frames = files.iter().map(|path| frame(path)).collect::<Result<Vec<_>, _>>()?;
+    Ok(list_frames(Layout::Polycam, cameras, &images, &frames, &Intrinsics::default(), |i| options.split_of(i)))
+}
+
+/// The frame that a camera's file describes; numbers that are missing become NaN, which its view is left out for.
+fn frame(path: &Path) -> Result<Frame, DatasetError> {
+    let text = text_file::read(path).map_err(|source| DatasetError::Read { path: path.to_owned(), source })?;
+    let needs = "`fx`, `fy`, `cx`, `cy`, `width`, `height` and `t_00` to `t_23`";
+    let camera: Value = serde_json::from_str(&text).map_err(|source| DatasetError::Json {
+        path: path.to_owned(),
+        what: "a camera of Polycam",
+        needs,
+        source,
+    })?;
+    let number = |name: &str| camera[name].as_f64();
+    let row = |i: usize| (0..4).map(|j| number(&format!("t_{i}{j}")).unwrap_or(f64::NAN)).collect();
+    let own = Intrinsics {
+        fl_x: number("fx"),
+        fl_y: number("fy"),
+        cx: number("cx"),
+        cy: number("cy"),
+        w: number("width"),
+        h: number("height"),
+        ..Intrinsics::default()
+    };
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    Ok(Frame::new(stem, &[row(0), row(1), row(2)], own))
+}

@@ -1,0 +1,94 @@
+//! Exports of Record3D: `metadata` with lens and poses of a film beside the folder of its pictures.
+//!
+//! A pose is a quaternion, its real part last, and a position: camera to world in ARKit's axes, which are those of OpenGL.
+//! `K` is written by columns.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use glam::{DMat3, DQuat};
+use serde::Deserialize;
+
+use super::image::is_image_name;
+use super::listing::Listing;
+use super::transforms::{Frame, Intrinsics, list_frames};
+use super::{DatasetError, Layout, LoadOptions, text_file};
+
+/// The file of poses: of an unpacked `.r3d`, and of an export as EXR and JPEG.
+const METADATA: [&str; 2] = ["metadata", "metadata.json"];
+/// The folder of pictures, of either kind.
+const PICTURES: [&str; 2] = ["rgbd", "rgb"];
+
+#[derive(Deserialize)]
+struct Metadata {
+    w: f64,
+    h: f64,
+    #[serde(rename = "K")]
+    k: [f64; 9],
+    /// `[qx, qy, qz, qw, x, y, z]` of each picture.
+    poses: Vec<[f64; 7]>,
+    /// `[fx, fy, cx, cy, …]` of each picture.
+    #[serde(default, rename = "perFrameIntrinsicCoeffs")]
+    lenses: Vec<Vec<f64>>,
+}
+
+fn files(folder: &Path) -> Option<(PathBuf, PathBuf)> {
+    let metadata = METADATA.iter().map(|name| folder.join(name)).find(|path| path.is_file())?;
+    let pictures = PICTURES.iter().map(|name| folder.join(name)).find(|path| path.is_dir())?;
+    Some((metadata, pictures))
+}
+
+/// Whether the folder is of this layout.
+pub(super) fn is_layout_of(folder: &Path) -> bool {
+    files(folder).is_some()
+}
+
+/// Lists the capture in `folder`, views in the order of the film.
+///
+/// # Errors
+/// As [`super::load`], as far as files but no pixels tell.
+pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, DatasetError> {
+    let Some((path, pictures)) = files(folder) else {
+        return Err(DatasetError::NotAFolder { path: folder.join(PICTURES[0]) });
+    };
+    let text = text_file::read(&path).map_err(|source| DatasetError::Read { path: path.clone(), source })?;
+    let needs = "`w`, `h`, `K` of 9 numbers and `poses` of 7 numbers each";
+    let metadata: Metadata = serde_json::from_str(&text).map_err(|source| DatasetError::Json {
+        path: path.clone(),
+        what: "metadata of Record3D",
+        needs,
+        source,
+    })?;
+    let [fx, _, _, _, fy, _, cx, cy, _] = metadata.k;
+    let intrinsics = |fx, fy, cx, cy| {
+        let [fl_x, fl_y, cx, cy, w, h] = [fx, fy, cx, cy, metadata.w, metadata.h].map(Some);
+        Intrinsics { fl_x, fl_y, cx, cy, w, h, ..Intrinsics::default() }
+    };
+    let names = names_by_number(&pictures);
+    let first = names.keys().next().copied().unwrap_or(0);
+    let frame = |(i, &[qx, qy, qz, qw, x, y, z]): (usize, &[f64; 7])| {
+        let rotation = DMat3::from_quat(DQuat::from_xyzw(qx, qy, qz, qw).normalize()).transpose();
+        let rows = [(rotation.x_axis, x), (rotation.y_axis, y), (rotation.z_axis, z)]
+            .map(|(row, along)| vec![row.x, row.y, row.z, along]);
+        let own = match metadata.lenses.get(i).map(Vec::as_slice) {
+            Some(&[fx, fy, cx, cy, ..]) if fx > 0.0 => intrinsics(fx, fy, cx, cy),
+            _ => Intrinsics::default(),
+        };
+        let name = names.get(&(first + i)).cloned().unwrap_or_else(|| (first + i).to_string());
+        Frame::new(name, &rows, own)
+    };
+    let frames: Vec<Frame> = metadata.poses.iter().enumerate().map(frame).collect();
+    let shared = intrinsics(fx, fy, cx, cy);
+    Ok(list_frames(Layout::Record3d, path, &pictures, &frames, &shared, |i| options.split_of(i)))
+}
+
+/// The images in a folder whose names are numbers, by these.
+fn names_by_number(folder: &Path) -> BTreeMap<usize, String> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    let numbered = names.filter(|name| is_image_name(name)).filter_map(|name| {
+        let number = name.rsplit_once('.')?.0.parse().ok()?;
+        Some((number, name))
+    });
+    numbered.collect()
+}

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use ::image::ImageDecoder;
+use ::image::{ImageDecoder, ImageEncoder};
 
 use super::{Background, Image, Mask};
 
@@ -13,6 +13,9 @@ pub(super) use foreign::{conversion, foreign_format, has_foreign_name};
 
 /// Extensions of the image files that are read, in the order in which they are tried.
 pub(super) const EXTENSIONS: [&str; 4] = ["png", "jpg", "jpeg", "webp"];
+
+/// Of 100: compression that the eye does not see.
+const JPEG_QUALITY: u8 = 95;
 
 /// Whether a file of this name can be a photograph.
 pub(super) fn is_image_name(name: &str) -> bool {
@@ -144,6 +147,18 @@ impl Image {
         Self { width_px, height_px, rgb }
     }
 
+    /// Writes the image as a JPEG of quality 95 of 100.
+    ///
+    /// # Errors
+    /// What the encoder or the system said.
+    pub fn write_jpeg(&self, path: &Path) -> Result<(), ::image::ImageError> {
+        let mut bytes = Vec::new();
+        let encoder = ::image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY);
+        let (width_px, height_px) = (self.width_px, self.height_px);
+        encoder.write_image(&self.rgb, width_px, height_px, ::image::ExtendedColorType::Rgb8)?;
+        Ok(std::fs::write(path, bytes)?)
+    }
+
     /// Writes the image as an 8-bit RGB PNG.
     ///
     /// # Errors
@@ -221,6 +236,18 @@ mod tests {
         for (w, h) in [(1, 1), (5, 11), (12, 10), (26, 33)] {
             assert!(flat.area_resized(w, h).rgb.iter().all(|&v| v == 201), "{w}×{h}");
         }
+    }
+
+    #[test]
+    fn a_written_jpeg_reads_back_nearly_the_same() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("picture.jpg");
+        let smooth =
+            Image { width_px: 32, height_px: 24, rgb: (0..32 * 24).flat_map(|i| [(i / 4) as u8; 3]).collect() };
+        smooth.write_jpeg(&path).expect("a JPEG");
+        assert!(jpeg_end::is_whole(&std::fs::read(&path).expect("it was written")));
+        let read = read_composited(&path, Background::Black).expect("a JPEG");
+        assert!(read.rgb.iter().zip(&smooth.rgb).all(|(a, b)| a.abs_diff(*b) <= 8));
     }
 
     #[test]

@@ -1,9 +1,9 @@
-//! `pocketsplat render`: one view as a PNG.
+//! `pocketsplat render`: one view as a PNG or a JPEG.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-use pocketsplat_capture::dataset::Split;
+use pocketsplat_capture::dataset::{Image, Split};
 use pocketsplat_trainer::render::decoder::core_image;
 use pocketsplat_trainer::render::reference::ReferenceScene;
 
@@ -26,7 +26,7 @@ pub(crate) struct Args {
     /// Which views.
     #[arg(long, value_parser = one_of::<Split>(SPLITS), default_value = SPLITS[0])]
     split: Split,
-    /// The picture to write.
+    /// The picture to write: a PNG, or a JPEG where the name ends in .jpg or .jpeg.
     #[arg(short, long, value_name = "OUT.png")]
     output: PathBuf,
     /// What draws it.
@@ -34,9 +34,23 @@ pub(crate) struct Args {
     renderer: Renderer,
 }
 
+/// Writes an image to a file.
+type Writer = fn(&Image, &Path) -> Result<(), image::ImageError>;
+
+/// The format that the end of a picture's name asks for.
+fn writer(path: &Path) -> Result<Writer> {
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    match extension.as_str() {
+        "png" => Ok(Image::write_png),
+        "jpg" | "jpeg" => Ok(Image::write_jpeg),
+        _ => bail!("{}: pictures are written as .png, .jpg or .jpeg; end the name in one of these", path.display()),
+    }
+}
+
 pub(crate) fn run(args: &Args) -> Result<()> {
     let file = BundleFile::read(&args.bundle)?;
     let bundle = file.parse()?;
+    let write = writer(&args.output)?;
     output::check_writable(&args.output)?;
     let capture = file.capture_options(&bundle, &args.capture)?.load(0)?;
     let views = views_of(&capture, args.split)?;
@@ -48,7 +62,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         Renderer::Core => core_image(&bundle, &camera)?.image,
         Renderer::Reference => reference_image(&bundle, &ReferenceScene::from_bundle(&bundle)?, &camera),
     };
-    image.write_png(&args.output).with_context(|| format!("could not write {}", args.output.display()))?;
+    write(&image, &args.output).with_context(|| format!("could not write {}", args.output.display()))?;
     println!("{}: {}×{} px, view {}", args.output.display(), image.width_px, image.height_px, view.name);
     Ok(())
 }

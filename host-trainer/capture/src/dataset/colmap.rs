@@ -19,7 +19,7 @@ mod model;
 mod text;
 
 pub(super) use choose::has_model;
-use model::{ModelCamera, ModelFault, ModelImage};
+use model::{ModelCamera, ModelEncoding, ModelFault, ModelImage};
 
 /// Deviation of a quaternion's length from 1 that rounding explains: text files carry at least three decimals.
 const ROUNDED_QUATERNION: f64 = 2e-3;
@@ -29,22 +29,6 @@ const MAX_QUATERNION_DEVIATION: f64 = 0.1;
 
 /// The folder of masks beside the folder of images.
 const MASKS: &str = "masks";
-
-/// How a model's files are written.
-#[derive(Clone, Copy)]
-enum ModelEncoding {
-    Binary,
-    Text,
-}
-
-impl ModelEncoding {
-    fn extension(self) -> &'static str {
-        match self {
-            Self::Binary => "bin",
-            Self::Text => "txt",
-        }
-    }
-}
 
 /// Lists the COLMAP capture in `folder`, views sorted by name.
 ///

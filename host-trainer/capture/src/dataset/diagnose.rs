@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::detect::layout_of;
 use super::listing::Listing;
-use super::{Layout, LoadOptions, Split};
+use super::{Layout, LoadOptions, Severity, Split};
 
 mod finding;
 mod pixels;
@@ -16,7 +16,7 @@ mod points;
 mod poses;
 mod views;
 
-pub use finding::{Finding, Severity};
+pub use finding::Finding;
 
 /// What was found out about a capture; displays as lines to print, serialises for programs.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::PathBuf;
 
-use super::lens::READABLE_MODELS;
+use super::camera_models::READABLE_MODELS;
 
 /// Why a capture cannot be loaded; each message names the place, what was found, what is needed and the remedy.
 #[derive(Debug, thiserror::Error)]

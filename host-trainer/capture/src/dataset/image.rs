@@ -6,22 +6,10 @@ use ::image::{ImageDecoder, ImageEncoder};
 
 use super::{Background, Image, Mask};
 
-mod foreign;
 mod jpeg_end;
-
-pub(super) use foreign::{conversion, foreign_format, has_foreign_name};
-
-/// Extensions of the image files that are read, in the order in which they are tried.
-pub(super) const EXTENSIONS: [&str; 4] = ["png", "jpg", "jpeg", "webp"];
 
 /// Of 100: compression that the eye does not see.
 const JPEG_QUALITY: u8 = 95;
-
-/// Whether a file of this name can be a photograph.
-pub(super) fn is_image_name(name: &str) -> bool {
-    let extension = name.rsplit_once('.').map(|(_, extension)| extension.to_ascii_lowercase());
-    extension.is_some_and(|extension| EXTENSIONS.contains(&extension.as_str()))
-}
 
 /// What an image file says about itself before its pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

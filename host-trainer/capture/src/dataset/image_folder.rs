@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::image::is_image_name;
+use super::image_names::is_image_name;
 use super::listing::Note;
 use super::{DatasetError, LoadOptions};
 

@@ -5,10 +5,6 @@ use std::path::Path;
 use super::ViewFault;
 use crate::camera::Camera;
 
-/// Camera models whose distortion is undone, for messages.
-pub(super) const READABLE_MODELS: &str = "PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV, \
-                                          OPENCV_FISHEYE, SIMPLE_RADIAL_FISHEYE or RADIAL_FISHEYE";
-
 /// What the radius of a direction becomes in the image before its distortion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Projection {

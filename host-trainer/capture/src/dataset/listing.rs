@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DVec3};
 
-use super::image::{ImageHeader, is_image_name};
+use super::image::ImageHeader;
+use super::image_names::is_image_name;
 use super::lens::Lens;
 use super::{Layout, Severity, Split, ViewFault};
 

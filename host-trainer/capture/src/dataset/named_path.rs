@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::image::{EXTENSIONS, has_foreign_name, is_image_name};
+use super::image_names::{EXTENSIONS, has_foreign_name, is_image_name};
 
 /// Where photographs lie in captures that name them by paths of another machine.
 const IMAGE_FOLDERS: [&str; 2] = ["images", "input"];

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::image::{conversion, has_foreign_name, is_image_name};
+use super::image_names::{conversion, has_foreign_name, is_image_name};
 
 /// Folders that photographs are kept in, the capture's own last.
 const FOLDERS: [&str; 5] = ["images", "input", "rgb", "photos", "."];

@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::listing::{Listing, Note};
+use super::listing::{Listing, Note, every_nth};
 use super::transforms::{Frame, Intrinsics, list_frames};
 use super::{DatasetError, Layout, LoadOptions, Split, text_file};
 
@@ -31,7 +31,7 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
     let has = |prefix: &str| frames.iter().any(|frame| frame.name().starts_with(prefix));
     let (is_split, has_test) = (has("0_") && (has("1_") || has("2_")), has("2_"));
     let split = |i: usize| match frames.get(i).and_then(|frame| frame.name().split_once('_')) {
-        _ if !is_split => options.split_of(i),
+        _ if !is_split => Some(every_nth(options.test_every, i)),
         Some(("0", _)) => Some(Split::Train),
         Some(("1", _)) if has_test => None,
         Some(("1" | "2", _)) => Some(Split::Test),

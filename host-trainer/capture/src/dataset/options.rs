@@ -4,8 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use super::listing::every_nth;
-use super::{DatasetError, FrameSize, Split};
+use super::{DatasetError, FrameSize};
 
 /// What stands behind everything: the colour that transparent pixels are composited on.
 ///
@@ -92,12 +91,6 @@ impl Default for LoadOptions {
 }
 
 impl LoadOptions {
-    /// The split of the view at place `i` where the capture names none.
-    #[expect(clippy::unnecessary_wraps, reason = "captures with a split of their own have views of none")]
-    pub(super) fn split_of(&self, i: usize) -> Option<Split> {
-        Some(every_nth(self.test_every, i))
-    }
-
     /// Refuses values that no capture can be loaded with.
     pub(super) fn check(&self) -> Result<(), DatasetError> {
         match (self.max_resolution, self.test_every) {

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use super::listing::Listing;
+use super::listing::{Listing, every_nth};
 use super::transforms::{Frame, Intrinsics, list_frames};
 use super::{DatasetError, Layout, LoadOptions, text_file};
 
@@ -38,7 +38,9 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
     let mut files: Vec<PathBuf> = entries.filter(|path| path.extension().is_some_and(|e| e == "json")).collect();
     files.sort();
     let frames = files.iter().map(|path| frame(path)).collect::<Result<Vec<_>, _>>()?;
-    Ok(list_frames(Layout::Polycam, cameras, &images, &frames, &Intrinsics::default(), |i| options.split_of(i)))
+    Ok(list_frames(Layout::Polycam, cameras, &images, &frames, &Intrinsics::default(), |i| {
+        Some(every_nth(options.test_every, i))
+    }))
 }
 
 /// The frame that a camera's file describes; numbers that are missing become NaN, which its view is left out for.

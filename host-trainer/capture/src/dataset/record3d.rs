@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 use glam::{DMat3, DQuat};
 use serde::Deserialize;
 
-use super::image::is_image_name;
-use super::listing::Listing;
+use super::image_names::is_image_name;
+use super::listing::{Listing, every_nth};
 use super::transforms::{Frame, Intrinsics, list_frames};
 use super::{DatasetError, Layout, LoadOptions, text_file};
 
@@ -79,7 +79,7 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
     };
     let frames: Vec<Frame> = metadata.poses.iter().enumerate().map(frame).collect();
     let shared = intrinsics(fx, fy, cx, cy);
-    Ok(list_frames(Layout::Record3d, path, &pictures, &frames, &shared, |i| options.split_of(i)))
+    Ok(list_frames(Layout::Record3d, path, &pictures, &frames, &shared, |i| Some(every_nth(options.test_every, i))))
 }
 
 /// The images in a folder whose names are numbers, by these.

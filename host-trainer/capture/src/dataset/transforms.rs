@@ -16,9 +16,11 @@ mod json;
 pub(super) use json::{Frame, Intrinsics, Transforms, read_transforms};
 
 /// Camera models whose parameters the fields of a transforms file spell out.
-const KNOWN_MODELS: [&str; 7] =
-    ["OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "PERSPECTIVE", FISHEYE_MODEL];
-const FISHEYE_MODEL: &str = "OPENCV_FISHEYE";
+const PERSPECTIVE_MODELS: [&str; 7] =
+    ["OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "PERSPECTIVE", FULL_MODEL];
+const FISHEYE_MODELS: [&str; 3] = ["OPENCV_FISHEYE", "SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE"];
+/// The model of which k4, k5 and k6 stand below the fraction.
+const FULL_MODEL: &str = "FULL_OPENCV";
 
 impl Transforms {
     /// Refuses a camera model of all frames that cannot be undistorted.
@@ -141,12 +143,18 @@ impl Frame {
             tangential: [either(|i| i.p1), either(|i| i.p2)].map(Option::unwrap_or_default),
             ..central
         };
-        let is_fisheye = |i: &Intrinsics| {
-            let named = i.camera_model.as_deref().map(|model| model.eq_ignore_ascii_case(FISHEYE_MODEL));
-            named.or(i.is_fisheye)
+        let model = |i: &Intrinsics| i.camera_model.as_deref().map(str::to_ascii_uppercase);
+        let model = model(&self.own).or_else(|| model(shared));
+        let is_fisheye = match model.as_deref() {
+            Some(model) => FISHEYE_MODELS.contains(&model),
+            None => self.own.is_fisheye.or(shared.is_fisheye) == Some(true),
         };
-        let lens = if is_fisheye(&self.own).or_else(|| is_fisheye(shared)) == Some(true) {
+        let lens = if is_fisheye {
             Lens { projection: Projection::Fisheye, tangential: [0.0; 2], ..lens }
+        } else if model.as_deref() == Some(FULL_MODEL) {
+            let [k1, k2, k3, k4] = lens.radial;
+            let below = [either(|i| i.k5), either(|i| i.k6)].map(Option::unwrap_or_default);
+            Lens { radial: [k1, k2, k3, 0.0], divisor: [k4, below[0], below[1]], ..lens }
         } else {
             lens
         };
@@ -157,5 +165,7 @@ impl Frame {
 /// The name of a camera model whose distortion the fields do not spell out.
 fn unknown_model(intrinsics: &Intrinsics) -> Option<String> {
     let model = intrinsics.camera_model.as_deref()?;
-    (!KNOWN_MODELS.contains(&model.to_ascii_uppercase().as_str())).then(|| model.to_owned())
+    let known = model.to_ascii_uppercase();
+    let mut all = PERSPECTIVE_MODELS.iter().chain(&FISHEYE_MODELS);
+    (!all.any(|model| *model == known)).then(|| model.to_owned())
 }

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use super::PoseFault;
-use super::image::{EXTENSIONS, conversion, foreign_format};
-use super::lens::READABLE_MODELS;
+use super::camera_models::READABLE_MODELS;
+use super::image_names::{EXTENSIONS, conversion, foreign_format};
 
 /// Why one view cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -13,8 +13,9 @@ use super::lens::READABLE_MODELS;
 pub enum ViewFault {
     /// The image is not there.
     #[error(
-        "image missing: `{}` does not exist, nor does it as .{}; restore it or take the view out of {listed_in}",
-        path.display(), EXTENSIONS.join(" or .")
+        "image missing: `{}` does not exist, nor does the same with the extension {}; restore it or take the view out of \
+         {listed_in}",
+        path.display(), EXTENSIONS.join(" or ")
     )]
     Missing { path: PathBuf, listed_in: &'static str },
     /// The image cannot be decoded.

@@ -148,6 +148,24 @@ fn a_fisheye_is_one_however_it_is_said() {
 }
 
 #[test]
+fn a_rational_lens_is_one_however_it_is_said() {
+    let mut colmap = Fixture::new(Kind::ColmapText, 9);
+    colmap.cameras[0].model = (6, "FULL_OPENCV");
+    colmap.cameras[0].parameters = vec![20.0, 20.0, 12.0, 8.0, 0.3, 0.2, 0.01, -0.02, 0.1, 0.4, 0.3, 0.2];
+    let expected = colmap.write_files().load().expect("a capture").0;
+    let mut fixture = Fixture::new(Kind::Nerfstudio, 9);
+    fixture.shared.push_str(
+        ", \"camera_model\": \"FULL_OPENCV\", \"k1\": 0.3, \"k2\": 0.2, \"p1\": 0.01, \"p2\": -0.02, \"k3\": 0.1, \
+         \"k4\": 0.4, \"k5\": 0.3, \"k6\": 0.2",
+    );
+    let capture = fixture.write_files().load().expect("a capture").0;
+    for (a, b) in capture.train.iter().zip(&expected.train) {
+        assert_eq!(a.image, b.image, "{}", a.name);
+    }
+    assert_ne!(expected.train[0].image, loaded(Kind::ColmapText).train[0].image, "undistorted");
+}
+
+#[test]
 fn the_largest_model_is_read_or_the_one_asked_for() {
     let mut fixture = Fixture::new(Kind::ColmapText, 9);
     fixture.write_files();

@@ -129,7 +129,7 @@ fn views_with_faults_are_left_out_and_named() {
     assert_eq!(names, ["train/r_0", "train/r_2", "train/r_4"]);
     let skipped: Vec<String> = report.skipped.iter().map(ToString::to_string).collect();
     assert_eq!(skipped.len(), 5, "{skipped:?}");
-    assert_says(&skipped[0], &["train/r_1: image missing", " as .png or .jpg", "restore it"]);
+    assert_says(&skipped[0], &["train/r_1: image missing", "with the extension png or jpg", "restore it"]);
     assert_says(&skipped[1], &["train/r_3: image unreadable", "train/r_3.png", "replace it"]);
     assert_says(&skipped[2], &["train/r_5", "5×4", "6×4", "export it again"]);
     assert_says(&skipped[3], &["train/r_6: `transform_matrix` scales by 2.0", "apply the camera's scale"]);

@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{ModelEncoding, binary, text};
+use super::model::ModelEncoding;
+use super::{binary, text};
 use crate::dataset::listing::Note;
 use crate::dataset::{DatasetError, text_file};
 

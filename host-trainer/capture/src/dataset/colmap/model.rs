@@ -2,6 +2,22 @@
 
 use crate::dataset::lens::{Lens, Projection};
 
+/// How a model's files are written.
+#[derive(Clone, Copy)]
+pub(super) enum ModelEncoding {
+    Binary,
+    Text,
+}
+
+impl ModelEncoding {
+    pub(super) fn extension(self) -> &'static str {
+        match self {
+            Self::Binary => "bin",
+            Self::Text => "txt",
+        }
+    }
+}
+
 /// A camera of the model: one lens for any number of images.
 #[derive(Debug, PartialEq)]
 pub(super) struct ModelCamera {

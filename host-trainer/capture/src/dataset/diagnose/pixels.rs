@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
-use super::{Finding, Severity};
+use super::Finding;
 use crate::dataset::listing::{ListedView, Listing, Shot};
-use crate::dataset::{LoadOptions, View};
+use crate::dataset::{LoadOptions, Severity, View};
 
 /// A view of which less than this share counts hardly constrains anything.
 const MIN_COUNTED_SHARE: f64 = 0.1;

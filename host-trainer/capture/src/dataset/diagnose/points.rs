@@ -2,8 +2,9 @@
 
 use glam::DVec3;
 
+use super::Finding;
 use super::poses::median;
-use super::{Finding, Severity};
+use crate::dataset::Severity;
 use crate::dataset::listing::{Listing, Shot};
 
 /// Fewer points than this outline no scene.

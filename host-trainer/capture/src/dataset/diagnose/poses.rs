@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 
-use super::{Finding, Severity};
+use super::Finding;
 use crate::dataset::listing::{Listing, Shot};
-use crate::dataset::{DatasetError, Normalisation};
+use crate::dataset::{DatasetError, Normalisation, Severity};
 
 /// A camera this many median distances from the middle of all is no part of the capture.
 const OUTLIER_RATIO: f64 = 10.0;

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use super::{Finding, Severity};
+use super::Finding;
 use crate::dataset::assemble::MIN_TRAIN_VIEWS;
 use crate::dataset::error::first_few;
 use crate::dataset::listing::{ListedView, Listing, commonest};
-use crate::dataset::{Layout, Split};
+use crate::dataset::{Layout, Severity, Split};
 
 /// With fewer views than this, most places are seen from too few sides to be more than guessed.
 const FEW_TRAIN_VIEWS: usize = 20;

@@ -37,6 +37,8 @@ pub(in crate::dataset) struct Intrinsics {
     pub(in crate::dataset) k2: Option<f64>,
     pub(in crate::dataset) k3: Option<f64>,
     pub(in crate::dataset) k4: Option<f64>,
+    pub(in crate::dataset) k5: Option<f64>,
+    pub(in crate::dataset) k6: Option<f64>,
     pub(in crate::dataset) p1: Option<f64>,
     pub(in crate::dataset) p2: Option<f64>,
     pub(in crate::dataset) camera_model: Option<String>,

@@ -18,7 +18,7 @@ pub(super) fn cases() -> Vec<Case> {
             &[
                 "train views left out: 2",
                 "p_03.png: image missing: `",
-                "does not exist, nor does it as .png or .jpg or .jpeg or .webp; restore it or take the view out of the model",
+                "does not exist, nor does the same with the extension png or jpg or jpeg or webp; restore it or take the view out of the model",
             ],
             |f| {
                 f.write_files().remove("images/p_03.png");

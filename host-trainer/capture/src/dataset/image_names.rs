@@ -1,19 +1,30 @@
-//! Image formats that are told by their first bytes but not read.
+//! Which files are images: those that are read, by their names, and those that have to be converted first.
 
 use std::path::Path;
 
+/// Extensions of the image files that are read, in the order in which they are tried.
+pub(super) const EXTENSIONS: [&str; 4] = ["png", "jpg", "jpeg", "webp"];
+
+/// Whether a file of this name can be a photograph.
+pub(super) fn is_image_name(name: &str) -> bool {
+    has_extension(name, &EXTENSIONS)
+}
+
+fn has_extension(name: &str, extensions: &[&str]) -> bool {
+    let extension = name.rsplit_once('.').map(|(_, extension)| extension.to_ascii_lowercase());
+    extension.is_some_and(|extension| extensions.contains(&extension.as_str()))
+}
+
 /// Extensions of such images; a photograph converted from one keeps its name but for that.
-pub(in crate::dataset) const FOREIGN_EXTENSIONS: [&str; 9] =
-    ["heic", "heif", "avif", "tif", "tiff", "bmp", "gif", "jxl", "dng"];
+const FOREIGN_EXTENSIONS: [&str; 9] = ["heic", "heif", "avif", "tif", "tiff", "bmp", "gif", "jxl", "dng"];
 
 /// Whether a file of this name is an image that has to be converted.
-pub(in crate::dataset) fn has_foreign_name(name: &str) -> bool {
-    let extension = name.rsplit_once('.').map(|(_, extension)| extension.to_ascii_lowercase());
-    extension.is_some_and(|extension| FOREIGN_EXTENSIONS.contains(&extension.as_str()))
+pub(super) fn has_foreign_name(name: &str) -> bool {
+    has_extension(name, &FOREIGN_EXTENSIONS)
 }
 
 /// The format of the image file `path` where it is known but not read.
-pub(in crate::dataset) fn foreign_format(path: &Path) -> Option<&'static str> {
+pub(super) fn foreign_format(path: &Path) -> Option<&'static str> {
     let mut head = [0; 12];
     std::io::Read::read_exact(&mut std::fs::File::open(path).ok()?, &mut head).ok()?;
     match &head {
@@ -32,7 +43,7 @@ pub(in crate::dataset) fn foreign_format(path: &Path) -> Option<&'static str> {
 }
 
 /// The command that converts all images in `folder` that have the extension of `name`.
-pub(in crate::dataset) fn conversion(folder: &Path, name: &str) -> String {
+pub(super) fn conversion(folder: &Path, name: &str) -> String {
     let extension = name.rsplit_once('.').map_or("*", |(_, extension)| extension);
     format!("magick mogrify -format jpg -quality 95 '{}/*.{extension}'", folder.display())
 }

@@ -1,6 +1,6 @@
 //! Which layout a folder has, told by the files in it.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::{DatasetError, Layout, blender, colmap, nerfstudio, no_poses, nsvf, polycam, record3d};
 
@@ -26,10 +26,21 @@ pub(super) fn layout_of(path: &Path) -> Option<Layout> {
     }
 }
 
+/// The capture that a folder is a part of, such as of its `images` or `sparse/0`.
+fn whole_of(path: &Path) -> Option<PathBuf> {
+    path.ancestors().skip(1).take(3).find(|folder| layout_of(folder).is_some()).map(Path::to_owned)
+}
+
 /// The error of a folder that is no capture; looks whether a folder in it is one, and what else it may be.
 pub(super) fn unknown_layout(path: &Path) -> DatasetError {
     let entries = std::fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path());
     let inside = entries.filter(|path| path.is_dir() && layout_of(path).is_some()).min();
+    if inside.is_none()
+        && let Some(whole) = path.canonicalize().ok().and_then(|path| whole_of(&path))
+    {
+        let found = format!("`{}` is a part of the capture `{}`; give that folder", path.display(), whole.display());
+        return DatasetError::NoCapture { found };
+    }
     if inside.is_none()
         && let Some(found) = no_poses::found_instead(path)
     {

@@ -60,24 +60,31 @@ impl<'a> NamedPath<'a> {
     }
 
     /// The file that is there: as written, by the last parts of the path, the most first, or by its name in a folder of
-    /// images.
+    /// images. The first folder of the path that is there decides: what is missing in it is not looked for elsewhere.
     pub(super) fn file(&self, folder: &Path, images: Option<&str>) -> Option<PathBuf> {
-        self.candidates(folder, images).into_iter().find(|path| path.is_file())
+        self.find(folder, images, |path| path.is_file().then(|| path.to_owned()))
     }
 
     /// The image that is there: as [`Self::file`], and where the path has no extension of an image or the file another.
     pub(super) fn image(&self, folder: &Path, images: Option<&str>) -> Option<PathBuf> {
-        self.candidates(folder, images).iter().find_map(|path| with_some_extension(path))
+        self.find(folder, images, with_some_extension)
     }
 
-    fn candidates(&self, folder: &Path, images: Option<&str>) -> Vec<PathBuf> {
-        let base = images.map_or_else(|| folder.to_owned(), |images| folder.join(images));
-        let mut candidates = vec![self.expected(folder, images)];
-        candidates.extend((0..self.parts.len()).map(|skipped| base.join(self.parts[skipped..].join("/"))));
-        if let (None, Some(name)) = (images, self.parts.last()) {
-            candidates.extend(IMAGE_FOLDERS.map(|images| folder.join(images).join(name)));
+    fn find(&self, folder: &Path, images: Option<&str>, look: impl Fn(&Path) -> Option<PathBuf>) -> Option<PathBuf> {
+        if let Some(found) = look(&self.expected(folder, images)) {
+            return Some(found);
         }
-        candidates
+        let base = images.map_or_else(|| folder.to_owned(), |images| folder.join(images));
+        for skipped in 0..self.parts.len() {
+            let path = base.join(self.parts[skipped..].join("/"));
+            let found = look(&path);
+            let has_folder = skipped + 1 < self.parts.len();
+            if found.is_some() || (has_folder && path.parent().is_some_and(Path::is_dir)) {
+                return found;
+            }
+        }
+        let name = self.parts.last().filter(|_| images.is_none())?;
+        IMAGE_FOLDERS.iter().find_map(|images| look(&folder.join(images).join(name)))
     }
 }
 
@@ -137,6 +144,7 @@ mod tests {
             "images/e.heic",
             "images/frame.001.png",
             "images_2/a.jpg",
+            "left/b.jpg",
             "c.webp",
         ]);
         let found = |written: &str, images: Option<&str>| {
@@ -161,6 +169,8 @@ mod tests {
             ("/home/ann/photographs/a.jpg", Some("images_2"), Some("images_2/a.jpg")),
             ("images/b.png", Some("images_2"), None),
             ("images/d.png", None, None),
+            ("left/a.jpg", None, None),
+            ("/home/ann/left/a.jpg", None, None),
             ("", None, None),
         ] {
             assert_eq!(found(written, images).as_deref(), expected, "{written} in {images:?}");

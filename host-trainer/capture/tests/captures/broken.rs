@@ -233,6 +233,20 @@ fn a_file_in_place_of_a_folder_is_told_what_it_is() {
 }
 
 #[test]
+fn a_part_of_a_capture_names_the_whole() {
+    for (kind, part) in [(ColmapBinary, "images"), (ColmapText, "sparse/0"), (Blender, "images")] {
+        let fixture = Fixture::new(kind, 4);
+        let part = fixture.write_files().at(part);
+        let error = pocketsplat_capture::dataset::load(&part, &LoadOptions::default()).expect_err("a part").to_string();
+        let whole = fixture.path().canonicalize().expect("a folder");
+        assert!(
+            error.ends_with(&format!(" is a part of the capture `{}`; give that folder", whole.display())),
+            "{error}"
+        );
+    }
+}
+
+#[test]
 fn options_out_of_range_are_refused() {
     let fixture = Fixture::new(ColmapBinary, 4);
     let error = |options| fixture.write_files().load_with(&options).expect_err("out of range").to_string();

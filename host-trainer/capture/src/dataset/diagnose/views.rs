@@ -75,12 +75,15 @@ fn unposed(listing: &Listing, findings: &mut Vec<Finding>) {
 }
 
 fn repeated_names(listing: &Listing, findings: &mut Vec<Finding>) {
-    let mut names: Vec<&str> = listing.views.iter().map(|view| view.name.as_str()).collect();
-    names.sort_unstable();
-    let repeated: Vec<String> = names
-        .chunk_by(|a, b| a == b)
-        .filter(|names| names.len() > 1)
-        .filter_map(|names| names.first().map(|name| (*name).to_owned()))
+    // By the file that was found: two names can mean one.
+    let file =
+        |view: &ListedView| view.shot.as_ref().map_or_else(|_| PathBuf::from(&view.name), |shot| shot.path.clone());
+    let mut files: Vec<(PathBuf, &str)> = listing.views.iter().map(|view| (file(view), view.name.as_str())).collect();
+    files.sort_unstable();
+    let repeated: Vec<String> = files
+        .chunk_by(|a, b| a.0 == b.0)
+        .filter(|same| same.len() > 1)
+        .filter_map(|same| same.first().map(|(_, name)| (*name).to_owned()))
         .collect();
     if !repeated.is_empty() {
         let message = format!("images listed more than once: {} ({})", repeated.len(), first_few(&repeated, ", "));

@@ -98,6 +98,17 @@ pub(super) fn cases() -> Vec<Case> {
             },
         ),
         case(
+            "two names of one image",
+            Nerfstudio,
+            Doubt,
+            "repeated-image",
+            &["images listed more than once: 1 (images/p_05.jpg)"],
+            |f| {
+                f.photos[6].name = "p_05.jpg".to_owned();
+                f.write_files();
+            },
+        ),
+        case(
             "distortion",
             ColmapBinary,
             Doubt,

@@ -37,6 +37,18 @@ pub(super) fn cases() -> Vec<Case> {
             },
         ),
         case(
+            "an image missing that another folder has",
+            ColmapText,
+            Views,
+            "missing-image",
+            &["left/p_03.png: image missing: `", "images/left/p_03.png` does not exist"],
+            |f| {
+                f.photos[3].name = "left/p_03.png".to_owned();
+                f.write_image("images/left/p_99.png", (24, 16));
+                f.write_files();
+            },
+        ),
+        case(
             "an image without content",
             Nerfstudio,
             Views,

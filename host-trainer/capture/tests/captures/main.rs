@@ -2,6 +2,7 @@
 //! give, and real ones where they are at hand.
 
 mod broken;
+mod damaged;
 mod exports;
 mod fixture;
 mod real;

@@ -8,6 +8,7 @@ use pocketsplat_trainer::encode::CoderChoice;
 use pocketsplat_trainer::scene::QuantisationSteps;
 use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::config::Backbone;
+use pocketsplat_trainer::train::module::pruning::Rank;
 use pocketsplat_trainer::train::module::{Distribution, Modules, Pruning, Rdo};
 
 use crate::config::heading::{OUTPUT, QUALITY, RUN};
@@ -45,7 +46,8 @@ pub(crate) struct QualityOptions {
     /// Grow to at most N anchors, those with the largest gradients first [default: no limit]
     #[arg(long, value_name = "N", help_heading = QUALITY, hide_short_help = true)]
     max_anchors: Option<usize>,
-    /// Keep the N anchors that contribute most to the training views when growth ends, half-way [default: all]
+    /// Keep N anchors: those that contribute most to the training views when growth ends, half-way, or with rdo-pruning those
+    /// that are worth most at its last event [default: all]
     #[arg(long, value_name = "N", help_heading = QUALITY, hide_short_help = true)]
     keep_anchors: Option<usize>,
     #[arg(long, value_name = "STEP", help_heading = QUALITY, hide_short_help = true,
@@ -143,11 +145,13 @@ impl QualityOptions {
         set(&mut train.validation_every, &self.validation_every);
         train.voxel_size = self.voxel_size.or(train.voxel_size);
         train.densification.max_anchors = self.max_anchors.or(train.densification.max_anchors);
-        train.densification.kept_anchors = self.keep_anchors.or(train.densification.kept_anchors);
         set(&mut train.shape.feature_dim, &self.feature_dim);
         set(&mut train.shape.n_offsets, &self.offsets);
         if let Some(names) = &self.modules {
             attach(&mut train.modules, names)?;
+        }
+        if let Some(most) = self.keep_anchors {
+            keep(train, most);
         }
         if let Some(request) = &self.effects {
             config.effects.auto = *request == Request::Auto;
@@ -158,19 +162,45 @@ impl QualityOptions {
         Ok(())
     }
 
-    /// Sets what a device affords, where the command line leaves it open: HAC, the widths, the cap, trained tiers.
+    /// Sets what a device affords, where the command line leaves it open: HAC, the widths, the number of anchors, pruning by
+    /// worth down to it, trained tiers.
     pub(crate) fn choose(&self, train: &mut TrainConfig, choice: &ModelChoice) {
         if self.backbone.is_none() {
             *train = train.with_backbone(Backbone::Hac);
         }
         train.shape.feature_dim = self.feature_dim.unwrap_or(choice.feature_dim);
         train.shape.n_offsets = self.offsets.unwrap_or(choice.n_offsets);
-        train.densification.max_anchors = self.max_anchors.or(Some(choice.max_anchors));
-        train.densification.kept_anchors = self.keep_anchors.or(Some(choice.max_anchors));
         if self.modules.is_none() {
-            train.modules.pruning.get_or_insert_with(Pruning::tiered);
+            if train.backbone.is_coded() {
+                train.modules.rdo.get_or_insert_default();
+            }
+            let tiers = tiers_of(&train.modules);
+            train.modules.pruning.get_or_insert(tiers);
         }
+        let most = self.keep_anchors.unwrap_or(choice.max_anchors);
+        keep(train, most);
+        let grown = if train.modules.rdo.is_some() { most.saturating_mul(GROWN_ANCHORS) / KEPT_ANCHORS } else { most };
+        train.densification.max_anchors = self.max_anchors.or(Some(grown));
     }
+}
+
+/// Where pruning by worth leaves so many anchors, growth goes to this many: on lego at 120 px half as many more gained
+/// 0.6 dB over growth to the number itself (`docs/rate-distortion.md`).
+const GROWN_ANCHORS: usize = 3;
+const KEPT_ANCHORS: usize = 2;
+
+/// Lets `most` anchors stay.
+fn keep(train: &mut TrainConfig, most: usize) {
+    match &mut train.modules.rdo {
+        Some(rdo) => rdo.anchors = Some(most),
+        None => train.densification.kept_anchors = Some(most),
+    }
+}
+
+/// Tiers beside the other modules: after the last pruning by worth, and by worth.
+fn tiers_of(modules: &Modules) -> Pruning {
+    let tiered = Pruning::tiered();
+    modules.rdo.map_or(tiered, |rdo| Pruning { at: rdo.until, rank: Rank::Worth, ..tiered })
 }
 
 /// Attaches these training modules with their defaults in place of those that are attached; effects stay.
@@ -181,7 +211,7 @@ fn attach(modules: &mut Modules, names: &[TrainingModule]) -> Result<()> {
     modules.pruning = match (named(TrainingModule::HardPruning), named(TrainingModule::TieredPruning)) {
         (true, true) => bail!("--modules names hard-pruning and tiered-pruning, needs one of the two at most"),
         (true, false) => Some(Pruning::default()),
-        (false, true) => Some(Pruning::tiered()),
+        (false, true) => Some(tiers_of(modules)),
         (false, false) => None,
     };
     Ok(())

@@ -8,10 +8,13 @@ use crate::fixture::{capture, fails, folder, pocketsplat, resume, starts, succee
 
 #[test]
 fn a_run_with_every_module_goes_on_in_the_same_bytes_on_either_backbone() {
-    for backbone in ["scaffold", "hac"] {
+    for backbone in ["scaffold", "hac-plus"] {
         let home = folder(&format!("modules-{backbone}"));
-        let names =
-            if backbone == "hac" { "distribution,tiered-pruning,rdo-pruning" } else { "distribution,tiered-pruning" };
+        let names = if backbone == "hac-plus" {
+            "distribution,tiered-pruning,rdo-pruning"
+        } else {
+            "distribution,tiered-pruning"
+        };
         let modules = ["--backbone", backbone, "--modules", names, "--effects", "+detail"];
         let whole = home.join("whole.psb");
         succeeds(train(&whole).args(modules));

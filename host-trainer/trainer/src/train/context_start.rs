@@ -77,11 +77,12 @@ fn level(kind: LevelKind, resolution: u16, cap: u32) -> GridLevel {
     GridLevel { kind, resolution, n_rows: dense.map_or(cap, |nodes| nodes.min(cap)) }
 }
 
-/// Hidden units: the network's weights, a byte each, should stay a few per cent of the bundle.
+/// Hidden units: the network's weights, a byte each, should stay a few per cent of the bundle. (Lego at 100 px, 15,000 anchors,
+/// pruned by worth to 8,000: 16 units instead of 32 take 3 % fewer bytes at equal PSNR.)
 fn n_hidden(n_anchors: usize) -> usize {
     match n_anchors {
-        ..5_000 => 16,
-        5_000..50_000 => 32,
+        ..20_000 => 16,
+        20_000..50_000 => 32,
         50_000..LARGE => 64,
         LARGE.. => 100,
     }

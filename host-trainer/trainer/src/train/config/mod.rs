@@ -82,9 +82,14 @@ const fn background_rate() -> LearningRate {
 /// end flips across the borders between symbols until the last step.
 pub(super) const SETTLE_FROM: f64 = 0.85;
 
+/// Share of the run from which on there is a context model and a rate: 10,000 of 30,000 iterations.
+const CONTEXT_FROM: f64 = 1.0 / 3.0;
+
 impl Default for Rates {
     fn default() -> Self {
         let falling = LearningRate::falling;
+        // The published paths of both fall from the run's start, so that they are at an eighth when the model begins.
+        let of_context = LearningRate { start: 0.005, end: 1e-5, from: CONTEXT_FROM };
         let settling = |start, end| LearningRate { start, end, from: SETTLE_FROM };
         Self {
             offset: falling(0.01, 1e-4),
@@ -94,8 +99,8 @@ impl Default for Rates {
             covariance_head: settling(0.004, 4e-4),
             colour_head: falling(0.008, 5e-5),
             mask: falling(0.01, 1e-4),
-            grid: falling(0.005, 1e-5),
-            context: falling(0.005, 1e-5),
+            grid: of_context,
+            context: of_context,
             background: background_rate(),
         }
     }

@@ -56,7 +56,7 @@ fn what_is_missing_follows_the_backbone() {
 #[test]
 fn what_is_not_understood_is_refused_by_its_name() {
     for (text, part) in [
-        ("[train]\nbackbone = \"haç\"", "`scaffold` or `hac`"),
+        ("[train]\nbackbone = \"haç\"", "`scaffold`, `hac`, `hac-plus`"),
         ("[train.rates]\nfeatures = 1", "unknown key `train.rates.features`; known here: "),
         ("iterations = 3", "unknown key `iterations`; known here: "),
         ("[train]\niterations = \"many\"", "iterations"),

@@ -10,7 +10,7 @@ use builder::{Anchor, C, F, ORIGIN, STEP, Variant, bundle, cell, tiers, weight};
 
 use crate::arena::Arena;
 use crate::bundle::{AnchorRecords, AnchorSite, Bundle, Coder, RecordMemory, Tables, crc32};
-use crate::context::Group;
+use crate::context::{Context, Group};
 use crate::entropy::NormalModel;
 use crate::error::{DecodeError, Field, SectionKind};
 use crate::{Budget, Decoder, FrameReport, MaxSplats, Overflow, Residency, ScratchShape, Strips, TileSink};
@@ -132,6 +132,30 @@ fn taps_move_the_means_of_features() {
                 assert_eq!(Some(&found), residuals.last(), "feature {feature}");
             }
         }
+    }
+}
+
+/// Encoder and decoder limit a mean at the same place, which without taps is nowhere.
+#[test]
+fn means_at_the_end_of_their_range_are_the_same_at_both_ends() {
+    for n_taps in [0, 2] {
+        let mut section = builder::context_section(n_taps);
+        let n_out = 2 * C + 3;
+        // After the head, two levels and all shifts; the first mean's bias, then that of the features' step.
+        let b2 = 40 + 2 * 8 + 3 + n_out + 3 * 4;
+        for (output, bias) in [(0, 1_i32 << 29), (2 * C, -(1 << 29))] {
+            section[b2 + 4 * output..][..4].copy_from_slice(&bias.to_le_bytes());
+        }
+        let context = Context::parse(&section, F, 6, C).expect("a sound section");
+        let hidden = [0; 3];
+        let steps = context.steps(&hidden);
+        assert_eq!((context.output(0, &hidden), steps.exponent(Group::Feature)), (i16::MAX, -24));
+        let step = steps.of(Group::Feature);
+        let raised_mean = step.raised_mean(i16::MAX);
+        assert!(raised_mean > i16::MAX.into(), "beyond it: {raised_mean}");
+        let decoders = if n_taps == 0 { raised_mean } else { context.moved(0, raised_mean, &[]) };
+        let scale = context.output(C, &hidden);
+        assert_eq!(context.model(0, &steps, &hidden, &[]), step.model(decoders, scale), "{n_taps} taps");
     }
 }
 

@@ -254,10 +254,9 @@ impl<'a> Context<'a> {
         let scale = self.output(channel.saturating_add(self.n_channels), hidden);
         let (group, step) = (self.group(channel), steps.of(self.group(channel)));
         let raised_mean = step.raised_mean(mean);
-        step.model(
-            if group == Group::Feature { self.moved(channel, raised_mean, residuals) } else { raised_mean },
-            scale,
-        )
+        // Without taps as the decoder has it, which then limits nothing.
+        let follows = group == Group::Feature && self.n_taps() > 0;
+        step.model(if follows { self.moved(channel, raised_mean, residuals) } else { raised_mean }, scale)
     }
 
     /// What a feature's symbol leaves of the mean that its anchor's place gives it, in eighths of the step.

@@ -59,9 +59,9 @@ pub struct Context<'a> {
     taps: Taps<'a>,
     /// Four bits a row, set for +1; two rows a byte, the first in the low half.
     grid: &'a [u8],
-    feature_dim: usize,
-    n_log_scales: usize,
-    n_channels: usize,
+    feature_dim: u16,
+    n_log_scales: u16,
+    n_channels: u16,
 }
 
 impl ContextHead {
@@ -129,6 +129,8 @@ impl<'a> Context<'a> {
                 found: saturate(section.len()),
             });
         }
+        // At most 256, 6 and 358.
+        let [feature_dim, n_log_scales, n_channels] = [feature_dim, n_log_scales, n_channels].map(|n| n as u16);
         Ok(Self { frame, base_steps, levels, hidden, output, taps, grid, feature_dim, n_log_scales, n_channels })
     }
 
@@ -159,13 +161,13 @@ impl<'a> Context<'a> {
     /// Residuals of an anchor's features to keep while it is decoded: none without taps.
     #[must_use]
     pub fn n_residuals(&self) -> usize {
-        if self.n_taps() > 0 { self.feature_dim } else { 0 }
+        if self.n_taps() > 0 { usize::from(self.feature_dim) } else { 0 }
     }
 
     /// Features of an anchor.
     #[must_use]
     pub fn feature_dim(&self) -> usize {
-        self.feature_dim
+        usize::from(self.feature_dim)
     }
 
     /// Where the grid lies.
@@ -188,7 +190,7 @@ impl<'a> Context<'a> {
     /// Group of a channel.
     #[must_use]
     pub fn group(&self, channel: usize) -> Group {
-        Group::of_channel(channel, self.feature_dim, self.n_log_scales)
+        Group::of_channel(channel, usize::from(self.feature_dim), usize::from(self.n_log_scales))
     }
 
     /// The grid's features at an anchor.
@@ -237,7 +239,7 @@ impl<'a> Context<'a> {
     #[inline]
     #[must_use]
     pub fn steps(&self, hidden: &[i16]) -> Steps {
-        let first = self.n_channels.saturating_mul(2);
+        let first = usize::from(self.n_channels).saturating_mul(2);
         let raw = [0, 1, 2].map(|group: usize| self.output(first.saturating_add(group), hidden));
         Steps::new(self.base_steps, raw)
     }
@@ -251,7 +253,7 @@ impl<'a> Context<'a> {
     #[must_use]
     pub fn model(&self, channel: usize, steps: &Steps, hidden: &[i16], residuals: &[i16]) -> NormalModel {
         let mean = self.output(channel, hidden);
-        let scale = self.output(channel.saturating_add(self.n_channels), hidden);
+        let scale = self.output(channel.saturating_add(usize::from(self.n_channels)), hidden);
         let (group, step) = (self.group(channel), steps.of(self.group(channel)));
         let raised_mean = step.raised_mean(mean);
         // Without taps as the decoder has it, which then limits nothing.
@@ -278,7 +280,7 @@ impl<'a> Context<'a> {
     /// Mean and scale of each channel from `first` on, in 1/[`MEAN_PARTS`] of a base step and in eighths of an octave of one.
     #[inline]
     pub(crate) fn moments(&self, first: usize, hidden: &[i16], moments: &mut [[i16; 2]]) {
-        self.output.pairs(first, first.saturating_add(self.n_channels), hidden, moments);
+        self.output.pairs(first, first.saturating_add(usize::from(self.n_channels)), hidden, moments);
     }
 
     fn row_bits(&self, row: u32) -> u8 {

@@ -142,6 +142,8 @@ struct Block {
 
 impl<'b> ContextModels<'b, '_> {
     /// Fills scalars and offsets with symbols of models that follow from the anchor's place.
+    // Not inlined: its block would be on the stack of what calls it to the end.
+    #[inline(never)]
     fn read<T: Channel>(
         &mut self,
         site: AnchorSite,

@@ -8,7 +8,7 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
-    /// The capture cannot be trained on.
+    /// Training is impossible.
     Error,
     /// The result will suffer, or is not what was meant.
     Warning,

@@ -74,7 +74,7 @@ pub enum ViewFault {
 }
 
 impl ViewFault {
-    /// The fault of an image whose header cannot be read.
+    /// The fault of an image with an unreadable header.
     pub(super) fn of_header(path: PathBuf, message: String) -> Self {
         match foreign_format(&path) {
             Some(found) => Self::Format { path, found },

@@ -237,3 +237,22 @@ impl RunOptions {
         if self.set.is_empty() { Ok(config) } else { config.with_keys(&self.set) }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_stays_and_what_ranks_it_follows_pruning_by_worth() {
+        let mut train = TrainConfig::of(Backbone::Hac);
+        keep(&mut train, 700);
+        assert_eq!(train.densification.kept_anchors, Some(700));
+        assert_eq!(tiers_of(&train.modules), Pruning::tiered());
+        train.densification.kept_anchors = None;
+        train.modules.rdo = Some(Rdo::default());
+        keep(&mut train, 700);
+        assert_eq!((train.modules.rdo.unwrap().anchors, train.densification.kept_anchors), (Some(700), None));
+        let tiers = tiers_of(&train.modules);
+        assert_eq!((tiers.at, tiers.rank), (Rdo::default().until, Rank::Worth));
+    }
+}

@@ -67,7 +67,8 @@ pub struct Gradients<'a, R> {
 /// Bits of the drawn values of features, log-scales and offsets, and weight times their gradients.
 ///
 /// In units of the step s = base·2^e a value is x = v/s, its mean m·2^−e, its scale 2^(l − e); see [`rate`] for the rest.
-/// With m the mean before the taps move it, ∂bits/∂e = −ln 2·(x − m)·∂bits/∂x − ∂bits/∂l. To be called under [`Level::run`](super::simd::Level::run).
+/// With m the mean before the taps move it, ∂bits/∂e = −ln 2·(x − m)·∂bits/∂x − ∂bits/∂l. To be called under
+/// [`Level::run`](super::simd::Level::run).
 ///
 /// * `weight`: of one bit in the loss.
 #[inline(always)]

@@ -282,6 +282,38 @@ fn masks_hide_save_bits_and_are_pushed_shut() {
     assert!(report.loss > without.loss, "the grid's bits count");
 }
 
+/// HAC++: each mask of an anchor answers for a K-th part of its features' and log-scales' bits, whether it is open or shut.
+#[test]
+fn masks_answer_for_their_anchors() {
+    let mut scene = scene(53, shapes()[0]);
+    let k = scene.shape.n_offsets;
+    scene.anchors.mask_logits[1] = -5.0;
+    scene.context = Some(context(53, &scene));
+    let gradients = |masks_weigh_anchors: bool| {
+        let rate = RateTerms { mask: 0.0, sample: 1.0, masks_weigh_anchors, ..rate(0.0) };
+        let (report, workspace) = coded_step(&scene, &Coding::Context { stream: Stream::of_run(1), rate, exact: None });
+        let blocks = workspace.blocks().iter();
+        let logits = blocks.clone().flat_map(|block| {
+            block.anchors.iter().flat_map(|a| scene.anchors.mask_logits[*a as usize * k..][..k].to_vec())
+        });
+        let found: Vec<(f64, f64)> = logits.zip(blocks.flat_map(|block| block.d_mask_logits.clone())).collect();
+        (report.rate.expect("a rate"), found)
+    };
+    let ((rate_report, with), (_, without)) = (gradients(true), gradients(false));
+    // Per anchor, in the weight of a bit; every anchor is drawn.
+    let weight = 0.3 / (rate_report.n_sampled * scene.shape.values_per_anchor()) as f64;
+    let mut sum = 0.0;
+    for (with, without) in with.chunks(k).zip(without.chunks(k)) {
+        let shares: Vec<f64> =
+            with.iter().zip(without).map(|((logit, a), (_, b))| (a - b) / crate::ops::mask::slope(*logit)).collect();
+        assert!(shares.iter().all(|share| *share > 0.0 && (share / shares[0] - 1.0).abs() < 1e-9), "{shares:?}");
+        sum += shares.iter().sum::<f64>();
+    }
+    let [features, log_scales, _] = rate_report.bits;
+    let expected = weight * rate_report.n_sampled as f64 * (features + log_scales);
+    assert!((sum / expected - 1.0).abs() < 1e-9, "{sum} instead of {expected}");
+}
+
 /// In the last phase the step draws the very values that a decoder reads.
 #[test]
 fn rounded_values_are_symbols_of_the_integer_model() {

@@ -33,7 +33,7 @@ impl ModelFiles {
         self.folder.join(stem).with_extension(self.encoding.extension())
     }
 
-    /// How many images the model poses; 0 where its list cannot be read.
+    /// Number of images with a pose in the model; 0 where its list is unreadable.
     fn n_images(&self) -> usize {
         let path = self.path("images");
         match self.encoding {

@@ -19,6 +19,8 @@ embedded=$target/embedded
 export CARGO_TARGET_DIR=$target
 # Flags meant for this machine's CPU would reach the microcontroller's builds too.
 unset RUSTFLAGS CARGO_ENCODED_RUSTFLAGS
+# Everything is built once: what a second build would need takes a third of the disk.
+export CARGO_INCREMENTAL=0
 export CARGO_TERM_COLOR=${CARGO_TERM_COLOR:-never}
 export PATH="$target/tools/bin:${CARGO_HOME:-${HOME:-}/.cargo}/bin:$PATH"
 

@@ -63,6 +63,7 @@ pub fn info_for(preview: &pocketsplat_capture::camera::Camera) -> BundleInfo {
         background: BACKGROUND,
         training_px: [preview.width_px, preview.height_px],
         preview: preview.clone(),
+        protocol: None,
     }
 }
 

@@ -39,7 +39,7 @@ pub(crate) use header::{covariance_outputs, n_log_scales};
 pub use heads::{CodedHeads, Halves, HeadView, HeadsView, LayerWeights, WeightReader};
 pub use lattice::{Lattice, MAX_LATTICE_BITS, MAX_LATTICE_MIN};
 pub use manifest::{MANIFEST_RECORD_LEN, STRIPS, TierMeasures};
-pub use section::{SECTION_LEN, Section};
+pub use section::{PROTOCOL_CODE, SECTION_LEN, Section};
 pub use sections::SectionBytes;
 pub use tables::{FrequencyTable, Tables};
 

@@ -7,6 +7,8 @@ use crate::error::{DecodeError, Field, SectionKind, in_range, saturate};
 pub const SECTION_LEN: usize = 16;
 /// Sections of this kind and above may be skipped by a decoder that does not know them.
 const FIRST_OPTIONAL_CODE: u8 = 128;
+/// The number of the section protocol, which decoders skip.
+pub const PROTOCOL_CODE: u8 = 129;
 
 /// One row of the section table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 
 use super::features::Features;
 use super::header::{Header, header_len};
-use super::section::{SECTION_LEN, Section};
+use super::section::{PROTOCOL_CODE, SECTION_LEN, Section};
 use crate::bytes::crc32;
 use crate::error::{DecodeError, SectionKind, saturate};
 
@@ -23,6 +23,8 @@ pub struct SectionBytes<'a> {
     pub directory: &'a [u8],
     /// Counts of Gaussians, where they are the same from everywhere.
     pub gaussians: Option<&'a [u8]>,
+    /// How the photographs were prepared, in words that no decoder reads.
+    pub protocol: Option<&'a [u8]>,
     /// The chunks.
     pub chunks: &'a [u8],
 }
@@ -33,7 +35,7 @@ impl<'a> SectionBytes<'a> {
     /// * `header`: its lengths are filled in.
     pub fn emit(&self, header: &Header) -> impl Iterator<Item = u8> + use<'a> {
         let sections = self.in_order(header.features);
-        // At most nine.
+        // At most ten.
         let header_len = header_len(sections.clone().count() as u8);
         let rows = sections.clone().scan(saturate(header_len), |next, (kind, bytes)| {
             let (offset, len) = (*next, saturate(bytes.len()));
@@ -97,6 +99,7 @@ impl<'a> SectionBytes<'a> {
             manifest: bytes_of(SectionKind::Manifest)?,
             directory: bytes_of(SectionKind::Directory)?,
             gaussians: None,
+            protocol: None,
             chunks: &[],
         };
         let Section { offset, len, crc: stored, .. } = next(SectionKind::Chunks)?;
@@ -126,6 +129,7 @@ impl<'a> SectionBytes<'a> {
             Some((SectionKind::Manifest, self.manifest)),
             Some((SectionKind::Directory, self.directory)),
             self.gaussians.map(|bytes| (SectionKind::Gaussians, bytes)),
+            self.protocol.map(|bytes| (SectionKind::Other(PROTOCOL_CODE), bytes)),
             Some((SectionKind::Chunks, self.chunks)),
         ]
         .into_iter()

@@ -50,6 +50,7 @@ fn written(scene: &Scene<f32>, channels: ChannelCoding) -> Vec<u8> {
         normalisation: Normalisation { centre: DVec3::ZERO, scale: 1.0 },
         background: [0; 3],
         training_px: [400; 2],
+        protocol: None,
         preview: Camera {
             rotation: DMat3::IDENTITY,
             translation: DVec3::new(0.0, 0.0, 4.0),

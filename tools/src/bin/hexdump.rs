@@ -122,6 +122,7 @@ fn example(channels: ChannelCoding) -> Result<Vec<u8>> {
         normalisation: Normalisation { centre: DVec3::new(1.0, 2.0, -0.5), scale: 2.0 },
         background: [0, 0, 64],
         training_px: [32, 24],
+        protocol: None,
         preview: Camera {
             rotation: DMat3::IDENTITY,
             translation: DVec3::new(0.0, 0.0, 2.0),

@@ -239,6 +239,7 @@ fn main() -> anyhow::Result<()> {
         background: BACKGROUND,
         training_px: [camera.width_px, camera.height_px],
         preview: camera,
+        protocol: None,
     };
     let n_planet = planet().len();
     let options = WriteOptions {

@@ -82,6 +82,7 @@ fn sections_are_a_bundle_before_there_is_a_file_and_then_are_that_file() {
             manifest: section(&bytes, SectionKind::Manifest),
             directory: section(&bytes, SectionKind::Directory),
             gaussians: None,
+            protocol: None,
             chunks: section(&bytes, SectionKind::Chunks),
         };
         let header = Header { header_len: 0, file_len: 0, ..*file.header() };

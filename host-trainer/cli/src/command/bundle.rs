@@ -6,10 +6,10 @@ use anyhow::{Context, Result, bail};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Background, Capture, View};
 use pocketsplat_core::Bundle;
-use pocketsplat_trainer::bundle::{for_each_chunk, normalisation_of};
+use pocketsplat_trainer::bundle::{for_each_chunk, normalisation_of, protocol_of};
 
 use super::capture::CaptureArgs;
-use crate::config::CaptureOptions;
+use crate::config::{CaptureOptions, Protocol};
 
 /// The bytes of a bundle and where they came from.
 pub(crate) struct BundleFile {
@@ -38,8 +38,33 @@ impl BundleFile {
         Ok(bundle)
     }
 
+    /// Loads the capture as the bundle's was prepared, but for what the command line says; warns where it is another one.
+    pub(crate) fn load(&self, bundle: &Bundle<'_>, args: &CaptureArgs) -> Result<(CaptureOptions, Capture)> {
+        let protocol = self.protocol(bundle);
+        let source = self.capture_options(bundle, protocol.as_ref(), args)?;
+        if let Some(protocol) = &protocol {
+            eprintln!("as the bundle says: {protocol}");
+        }
+        let capture = source.load(0)?;
+        if let Some(why) = protocol.and_then(|protocol| protocol.contradiction(&capture)) {
+            eprintln!("warning: {why}");
+        }
+        Ok((source.options, capture))
+    }
+
+    /// What the bundle says of its photographs; nothing in bundles of other writers.
+    fn protocol(&self, bundle: &Bundle<'_>) -> Option<Protocol> {
+        let parsed = Protocol::parse(protocol_of(bundle, &self.bytes)?);
+        parsed.inspect_err(|error| eprintln!("warning: the section protocol cannot be read: {error}")).ok()
+    }
+
     /// Fills what the command line left open with what the bundle was trained with, and refuses what contradicts it.
-    pub(crate) fn capture_options(&self, bundle: &Bundle<'_>, args: &CaptureArgs) -> Result<CaptureArgs> {
+    fn capture_options(
+        &self,
+        bundle: &Bundle<'_>,
+        protocol: Option<&Protocol>,
+        args: &CaptureArgs,
+    ) -> Result<CaptureArgs> {
         let header = bundle.header();
         let known = [Background::Black, Background::White].into_iter().find(|b| b.rgb8() == header.background);
         if let (Some(asked), Some(trained)) = (args.options.background, known)
@@ -48,11 +73,12 @@ impl BundleFile {
             bail!("{} was trained on {trained}, not on {asked}; leave --background out", self.path.display());
         }
         let [width, height] = header.training_px;
-        let trained_with = CaptureOptions {
+        let header_says = CaptureOptions {
             max_resolution: Some(u32::from(width.max(height))),
             background: known,
             ..CaptureOptions::default()
         };
+        let trained_with = protocol.map_or(header_says, |protocol| protocol.options.clone());
         Ok(CaptureArgs { dataset: args.dataset.clone(), options: args.options.or(&trained_with) })
     }
 

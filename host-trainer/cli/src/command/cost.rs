@@ -68,7 +68,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let bundle = file.parse()?;
     let targets: Vec<Processor> = args.target.iter().filter_map(|machine| machine.device()).collect();
     let counter = args.counter(&targets)?;
-    let capture = file.capture_options(&bundle, &args.capture)?.load(0)?;
+    let (_, capture) = file.load(&bundle, &args.capture)?;
     let views = picked(views_of(&capture, args.split)?, args.views);
     let mut sights = sights(&file, &bundle, &capture, &views)?;
     if counter.is_some() {

@@ -6,7 +6,7 @@ use std::time::Instant;
 use crate::plot::ResultRow;
 use anyhow::Result;
 use pocketsplat_capture::camera::Camera;
-use pocketsplat_capture::dataset::{Capture, Image, Split, View};
+use pocketsplat_capture::dataset::{Background, Capture, Image, Split, View};
 use pocketsplat_core::Bundle;
 use pocketsplat_trainer::metrics::{Lpips, half_size_enlarged, psnr_db, psnr_db_masked, ssim_masked};
 use pocketsplat_trainer::render::decoder::{core_image, core_image_of_tiers};
@@ -163,7 +163,7 @@ fn tiers(file: &BundleFile, bundle: &Bundle<'_>, capture: &Capture, views: &[Vie
     evaluated.collect()
 }
 
-/// Draws and measures every view of a split.
+/// Loads the capture as the bundle's was prepared, and measures every view of a split.
 pub(crate) fn evaluate(
     file: &BundleFile,
     capture: &CaptureArgs,
@@ -171,11 +171,24 @@ pub(crate) fn evaluate(
     renderer: Renderer,
     what: &Measurements<'_>,
 ) -> Result<Evaluation> {
+    let (options, loaded) = file.load(&file.parse()?, capture)?;
+    measure(file, &loaded, options.background, split, renderer, what)
+}
+
+/// Draws and measures every view of a split of a loaded capture.
+///
+/// * `background`: what its transparent pixels were composited on.
+pub(crate) fn measure(
+    file: &BundleFile,
+    loaded: &Capture,
+    background: Option<Background>,
+    split: Split,
+    renderer: Renderer,
+    what: &Measurements<'_>,
+) -> Result<Evaluation> {
     let Measurements { against_reference, per_tier, lpips } = *what;
     let bundle = file.parse()?;
-    let options = file.capture_options(&bundle, capture)?;
-    let loaded = options.load(0)?;
-    let views = views_of(&loaded, split)?;
+    let views = views_of(loaded, split)?;
     // The fastest of a few: what other processes take is not the bundle's.
     let mut decode_s = f64::INFINITY;
     let mut n_gaussians = 0;
@@ -193,7 +206,7 @@ pub(crate) fn evaluate(
     let rows: Vec<DrawnView> = views
         .par_iter()
         .map(|view| {
-            let camera = file.camera(&bundle, &loaded, view);
+            let camera = file.camera(&bundle, loaded, view);
             let started = Instant::now();
             let (image, scratch_bytes) = match oracle.as_ref().filter(|_| renderer == Renderer::Reference) {
                 Some(scene) => (reference_image(&bundle, scene, &camera), 0),
@@ -237,11 +250,11 @@ pub(crate) fn evaluate(
         renderer: format!("{renderer:?}").to_lowercase(),
         width_px: views[0].image.width_px,
         height_px: views[0].image.height_px,
-        background: options.options.background.map_or_else(String::new, |b| b.to_string()),
+        background: background.map_or_else(String::new, |b| b.to_string()),
         decode_s,
         render_s_per_view: mean(|row| row.seconds),
         scratch_bytes: rows.iter().map(|row| row.scratch_bytes).max().unwrap_or(0),
-        tiers: if per_tier { tiers(file, &bundle, &loaded, views)? } else { Vec::new() },
+        tiers: if per_tier { tiers(file, &bundle, loaded, views)? } else { Vec::new() },
         psnr_to_reference_db: against_reference
             .then(|| rows.iter().map(|row| row.psnr_to_reference_db).fold(f64::INFINITY, f64::min)),
     })

@@ -1,9 +1,10 @@
 //! What a run says while it works: a bar on a terminal, a line now and then elsewhere, always on stderr.
 
+use std::fmt::Write;
 use std::io::IsTerminal;
 use std::time::Instant;
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use pocketsplat_trainer::scene::Scene;
 use pocketsplat_trainer::step::StepReport;
 use pocketsplat_trainer::train::{DroppedStep, Observer};
@@ -34,8 +35,11 @@ impl Progress {
         let on_terminal = std::io::stderr().is_terminal();
         let target = if on_terminal { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(Some(u64::from(iterations)), target);
-        let style = "{bar:30} {pos}/{len}  {msg}  {per_sec:>10}  {eta} left";
-        bar.set_style(ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar()));
+        let style = "{bar:20} {pos}/{len}  {msg}  {rate} it/s  {eta} left";
+        let style = ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar());
+        // A failure to format is one to draw the bar, which is no reason to end a run.
+        let rate = |state: &ProgressState, out: &mut dyn Write| _ = write!(out, "{:.1}", state.per_sec());
+        bar.set_style(style.with_key("rate", rate));
         bar.set_position(u64::from(from));
         bar.reset_eta();
         Self { bar, on_terminal, from, iterations, started: Instant::now(), loss: 0.0, psnr_db: 0.0, n_dropped: 0 }
@@ -58,7 +62,7 @@ impl Observer for Progress {
         }
         let bits = report.rate.map(|rate| format!("  {:.0} bits each", rate.bits.iter().sum::<f64>()));
         let state = format!(
-            "loss {:.4}  PSNR {:.2} dB  {} anchors{}",
+            "loss {:.4}  training PSNR {:.2} dB  {} anchors{}",
             self.loss,
             self.psnr_db,
             scene.anchors.len(),
@@ -70,7 +74,9 @@ impl Observer for Progress {
             if iteration == self.iterations {
                 self.bar.finish();
             }
-        } else if iteration.is_multiple_of((self.iterations / LINES).max(1)) || iteration == self.iterations {
+        } else if iteration.is_multiple_of((self.iterations / LINES).max(1))
+            || [self.from + 1, self.iterations].contains(&iteration)
+        {
             let per_second = f64::from(iteration - self.from) / self.started.elapsed().as_secs_f64();
             let left = f64::from(self.iterations - iteration) / per_second;
             eprintln!("{iteration}/{}  {state}  {per_second:.1} it/s  {left:.0} s left", self.iterations);

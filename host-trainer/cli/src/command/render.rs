@@ -52,7 +52,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let bundle = file.parse()?;
     let write = writer(&args.output)?;
     output::check_writable(&args.output)?;
-    let capture = file.capture_options(&bundle, &args.capture)?.load(0)?;
+    let (_, capture) = file.load(&bundle, &args.capture)?;
     let views = views_of(&capture, args.split)?;
     let Some(view) = views.get(args.view) else {
         bail!("--view {} of {} views; choose 0 to {}", args.view, views.len(), views.len() - 1);

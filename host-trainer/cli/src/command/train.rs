@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result, bail};
-use pocketsplat_capture::dataset::{Background, Capture, View};
+use pocketsplat_capture::dataset::{Background, Capture, Split, View};
 use pocketsplat_core::Bundle;
 use pocketsplat_core::budget::MAX_FRAME_PX;
 use pocketsplat_trainer::bundle::Written;
@@ -16,11 +16,13 @@ use pocketsplat_trainer::train::run::{Ending, Interval, RunError, RunFolder, for
 use pocketsplat_trainer::train::{TrainConfig, Trainer};
 use serde::Serialize;
 
+use super::bundle::BundleFile;
 use super::capture::CaptureArgs;
+use super::eval::{Evaluation, Measurements, Renderer, measure};
 use super::progress::Progress;
 use super::train_args::Args;
 use super::{effects, output, stop};
-use crate::config::RunConfig;
+use crate::config::{CaptureOptions, Protocol, RunConfig};
 
 /// Seconds between checkpoints unless the user says otherwise: what an accident may cost.
 const CHECKPOINT_SECONDS: f64 = 60.0;
@@ -48,6 +50,20 @@ pub(crate) struct TrainResult {
     pub(crate) iterations_per_s: f64,
     pub(crate) background: String,
     pub(crate) effects: String,
+    /// Largest amount of memory that the program has held, where the system tells.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) peak_memory_bytes: Option<u64>,
+    /// Of the bundle, over the views that are held out for testing, where there are any: as `eval` measures it.
+    #[serde(flatten)]
+    pub(crate) held_out: Option<HeldOut>,
+}
+
+/// How good a bundle is on views that training did not see.
+#[derive(Debug, Serialize)]
+pub(crate) struct HeldOut {
+    pub(crate) psnr_db: f64,
+    pub(crate) ssim: f64,
+    pub(crate) n_test_views: usize,
 }
 
 pub(crate) fn run(args: &Args) -> Result<ExitCode> {
@@ -103,10 +119,21 @@ fn train_and_print<'a>(
     effects::resolve(&mut config, capture, folder.path())?;
     // Not before: until here there is nothing to keep, and Ctrl-C may end the process at once.
     let stop = stop::flag()?;
-    match train_in(folder, &config, capture, start, &stop)? {
-        Some(result) => output::print(&result, args.json()).map(|()| ExitCode::SUCCESS),
-        None => Ok(ExitCode::from(stop::INTERRUPTED)),
-    }
+    let Some(result) = train_in(folder, &config, capture, start, &stop)? else {
+        return Ok(ExitCode::from(stop::INTERRUPTED));
+    };
+    output::print(&result, args.json())?;
+    let (bundle, dataset) = (config.output.display(), config.dataset.display());
+    eprintln!("see it:       pocketsplat render {bundle} {dataset} --view 0 -o view.png");
+    eprintln!("on a device:  pocketsplat fit {bundle}");
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The largest amount of memory that this process has held, as Linux tells it.
+fn peak_memory_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    Some(1024 * peak.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?)
 }
 
 /// Loads the capture that a run is configured for, and decides what the configuration left to it.
@@ -176,7 +203,7 @@ pub(crate) fn train_in<'a>(
         );
         return Ok(None);
     }
-    let result = write_bundle(&trainer, capture, &config.encoding, &config.output)
+    let result = write_bundle(&trainer, capture, &config.capture, &config.encoding, &config.output)
         .with_context(|| format!("the training is done and kept; {}", how_to_go_on()))?;
     folder.finish(&serde_json::to_string_pretty(&result)?, config.keep_checkpoints)?;
     Ok(Some(result))
@@ -207,33 +234,49 @@ fn resumed<'a>(folder: &RunFolder, config: &RunConfig, capture: &'a Capture) -> 
     Ok(trainer)
 }
 
-/// Trains without a run folder and writes the bundle.
+/// Trains on a capture that was loaded as it is, without a run folder, and writes the bundle.
 pub(crate) fn train(capture: &Capture, config: TrainConfig, encoding: &Encoding, output: &Path) -> Result<TrainResult> {
     let mut trainer = Trainer::new(capture, config)?;
     trainer.run(&mut Progress::new(0, config.iterations))?;
-    write_bundle(&trainer, capture, encoding, output)
+    write_bundle(&trainer, capture, &CaptureOptions::default(), encoding, output)
 }
 
-fn write_bundle(trainer: &Trainer<'_>, capture: &Capture, encoding: &Encoding, output: &Path) -> Result<TrainResult> {
-    let finished = trainer.finish()?;
+fn write_bundle(
+    trainer: &Trainer<'_>,
+    capture: &Capture,
+    options: &CaptureOptions,
+    encoding: &Encoding,
+    output: &Path,
+) -> Result<TrainResult> {
+    let protocol = Some(Protocol::of(capture, options).to_text()?);
+    let finished = Finished { protocol, ..trainer.finish()? };
     let held_out: Vec<View> = trainer.validation_views().cloned().collect();
     let Fitted { written: Written { bytes, .. }, finished, n_cut } = encoding.encode(finished, capture, &held_out)?;
     output::write_whole(output, &bytes)?;
     if n_cut > 0 {
         eprintln!("left out the {n_cut} least important anchors, so that the bundle fits");
     }
+    let file = BundleFile { path: output.to_owned(), bytes };
+    let held_out = if capture.test.is_empty() {
+        None
+    } else {
+        let what = Measurements::default();
+        let Evaluation { psnr_db, ssim, n_views, .. } =
+            measure(&file, capture, options.background, Split::Test, Renderer::Core, &what)?;
+        Some(HeldOut { psnr_db, ssim, n_test_views: n_views })
+    };
     let Finished { scene, background, n_undrawn, estimated_bits, .. } = finished;
     let n_anchors = scene.anchors.len();
     Ok(TrainResult {
         bundle: output.to_owned(),
-        bundle_bytes: bytes.len(),
+        bundle_bytes: file.bytes.len(),
         n_anchors,
         n_valid_anchors: (0..n_anchors).filter(|a| scene.anchors.has_drawn(*a)).count(),
         drawn_offsets: (0..scene.anchors.mask_logits.len()).filter(|offset| scene.anchors.is_drawn(*offset)).count(),
         undrawn_offsets: n_undrawn,
-        coder: if Bundle::parse(&bytes)?.context().is_some() { "context" } else { "static" },
+        coder: if Bundle::parse(&file.bytes)?.context().is_some() { "context" } else { "static" },
         estimated_bytes: estimated_bits.map(|bits| bits.map(|bits| bits / 8.0)),
-        bytes_per_anchor: bytes.len() as f64 / n_anchors as f64,
+        bytes_per_anchor: file.bytes.len() as f64 / n_anchors as f64,
         iterations: trainer.iteration,
         dropped_steps: trainer.n_dropped(),
         train_s: trainer.seconds,
@@ -244,5 +287,7 @@ fn write_bundle(trainer: &Trainer<'_>, capture: &Capture, encoding: &Encoding, o
             None => format!("{background:?}"),
         },
         effects: Effect::names(&Effect::all_in(trainer.config())),
+        peak_memory_bytes: peak_memory_bytes(),
+        held_out,
     })
 }

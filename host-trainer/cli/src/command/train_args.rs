@@ -35,7 +35,7 @@ pub(crate) struct Args {
     #[command(flatten)]
     quality: QualityOptions,
     #[arg(long, value_name = "X", help_heading = QUALITY,
-        help = with_default("Weight of a value's bits in the loss of hac: the larger, the smaller the bundle", Hac::default().lambda))]
+        help = with_default("Weight of a value's bits in the loss of hac and hac-plus: the larger, the smaller the bundle", Hac::default().lambda))]
     lambda: Option<f64>,
     #[command(flatten)]
     device: DeviceArgs,
@@ -129,6 +129,11 @@ impl Args {
             if path.as_os_str().is_empty() {
                 bail!("the configuration names no `{name}`; give it there or as {option}");
             }
+        }
+        if self.lambda.is_some() && !config.train.backbone.is_coded() {
+            bail!(
+                "--lambda weighs the bits of a value, and scaffold scenes are trained without them; use --backbone hac"
+            );
         }
         config.check()?;
         // Absolute, so that the run can go on from any folder.

@@ -152,7 +152,7 @@ fn cameras(args: &Args, file: &BundleFile, bundle: &Bundle<'_>) -> Result<Vec<Ca
         return Ok(vec![size.map_or(preview, |size: Budget| preview.resized(size.width_px, size.height_px))]);
     };
     let source = CaptureArgs { dataset: dataset.clone(), options: args.capture.clone() };
-    let capture = file.capture_options(bundle, &source)?.load(0)?;
+    let (_, capture) = file.load(bundle, &source)?;
     let cameras: Vec<_> = capture.train.iter().map(|view| file.camera(bundle, &capture, view)).collect();
     let cameras = cameras_to_measure(&cameras);
     cameras.iter().map(|camera| core_camera(camera).context("a view of the capture cannot be drawn")).collect()

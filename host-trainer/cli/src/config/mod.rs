@@ -4,6 +4,7 @@ mod capture;
 mod effects;
 pub(crate) mod heading;
 pub(crate) mod named;
+mod protocol;
 
 use std::path::{Path, PathBuf};
 
@@ -17,6 +18,7 @@ use toml::{Table, Value};
 
 pub(crate) use capture::CaptureOptions;
 pub(crate) use effects::EffectsConfig;
+pub(crate) use protocol::Protocol;
 
 /// Everything a run was asked for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

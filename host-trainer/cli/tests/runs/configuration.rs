@@ -1,8 +1,11 @@
 //! What a run was asked for: written, read back, overridden, contradicted.
 
 use std::fs;
+use std::path::Path;
 
-use crate::fixture::{ITERATIONS, fails, folder, pocketsplat, resume, starts, succeeds, train, undisturbed, wait_for};
+use crate::fixture::{
+    ITERATIONS, capture, fails, folder, pocketsplat, resume, starts, succeeds, text, train, undisturbed, wait_for,
+};
 
 #[test]
 fn a_written_configuration_gives_the_same_bundle_again() {
@@ -113,4 +116,27 @@ fn a_fork_shares_a_run_up_to_an_iteration() {
     let error = fails(&mut fork("a.psb", "90"));
     assert!(error.contains("cannot be both the run to begin from and the new one"), "{error}");
     assert!(home.join("a.run/iteration-00000090.checkpoint").exists(), "nothing is lost");
+}
+
+#[test]
+fn a_bundle_is_measured_as_it_was_trained_and_another_capture_is_noticed() {
+    let home = folder("protocol");
+    let output = home.join("a.psb");
+    succeeds(train(&output).args(["--resolution", "24x16", "--background", "white"]));
+    let eval = |capture: &Path| {
+        let found = pocketsplat().arg("eval").arg(&output).arg(capture).arg("--json").output().unwrap();
+        assert!(found.status.success(), "{}", text(&found.stderr));
+        (serde_json::from_slice::<serde_json::Value>(&found.stdout).unwrap(), text(&found.stderr))
+    };
+    let (found, said) = eval(capture());
+    let result: serde_json::Value = serde_json::from_slice(&fs::read(home.join("a.run/result.json")).unwrap()).unwrap();
+    assert_eq!((&result["psnr_db"], &result["ssim"]), (&found["psnr_db"], &found["ssim"]), "what training said");
+    assert_eq!((&found["width_px"], &found["height_px"]), (&24.into(), &16.into()), "{found}");
+    assert_eq!(found["background"], "white");
+    assert!(said.contains("as the bundle says: images cut to 24x16, background white"), "{said}");
+    assert!(!said.contains("another capture"), "{said}");
+    let other = home.join("other");
+    succeeds(pocketsplat().arg("synth").arg(&other).args(["--size", "32", "--train-views", "6", "--seed", "7"]));
+    let (_, said) = eval(&other);
+    assert!(said.contains("warning: this is another capture than the bundle was trained on"), "{said}");
 }

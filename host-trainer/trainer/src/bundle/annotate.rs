@@ -3,7 +3,7 @@
 mod dump;
 
 use half::f16;
-use pocketsplat_core::bundle::{AnchorModels, AnchorSite, Chunk, Section};
+use pocketsplat_core::bundle::{AnchorModels, AnchorSite, Chunk, PROTOCOL_CODE, Section};
 use pocketsplat_core::context::first_tap;
 
 use pocketsplat_core::{Bundle, DecodeError, SectionKind};
@@ -104,6 +104,10 @@ impl<'f> Annotator<'f> {
             SectionKind::Gaussians => {
                 self.dump.heading("gaussians");
                 self.dump.array("Gaussians up to each tier", section.len as usize / 4, u32::from_le_bytes);
+            }
+            SectionKind::Other(PROTOCOL_CODE) => {
+                self.dump.heading("protocol");
+                self.dump.array::<1, _>("text", section.len as usize, |[byte]| char::from(byte));
             }
             _ => {
                 self.dump.heading(&format!("section of kind {}", section.code()));

@@ -6,7 +6,7 @@ use pocketsplat_core::bundle::{
 use pocketsplat_core::context::N_GROUPS;
 use pocketsplat_core::{Bundle, DecodeError, count_gaussians, count_scratch_len};
 
-use super::{BundleInfo, SizeReport, WriteError};
+use super::{BundleInfo, MAX_PROTOCOL_LEN, SizeReport, WriteError};
 use crate::camera::core_camera;
 use crate::scene::Scene;
 
@@ -95,6 +95,7 @@ pub struct CodedScene {
     parts: Parts,
     manifest: Vec<u8>,
     gaussians: Option<Vec<u8>>,
+    protocol: Option<String>,
 }
 
 /// Sections that say what a scene is.
@@ -114,10 +115,11 @@ impl CodedScene {
     ///
     /// # Errors
     /// [`WriteError::Count`] for a file of 4 GiB, [`WriteError::ReadBack`].
-    pub(super) fn new(header: Header, parts: Parts) -> Result<Self, WriteError> {
+    pub(super) fn new(header: Header, parts: Parts, protocol: Option<String>) -> Result<Self, WriteError> {
+        count("length of the protocol, bytes", protocol.as_ref().map_or(0, String::len), 0, MAX_PROTOCOL_LEN)?;
         let manifest =
             vec![TierMeasures::default(); header.n_tiers.into()].iter().flat_map(TierMeasures::emit).collect();
-        let mut coded = Self { header, parts, manifest, gaussians: None };
+        let mut coded = Self { header, parts, manifest, gaussians: None, protocol };
         if !header.features.effects.see_view() {
             // What the decoder itself makes of it: it plans by these counts.
             coded.gaussians = Some(coded.gaussian_counts().map_err(WriteError::ReadBack)?);
@@ -174,6 +176,7 @@ impl CodedScene {
             manifest: &self.manifest,
             directory,
             gaussians: self.gaussians.as_deref(),
+            protocol: self.protocol.as_ref().map(String::as_bytes),
             chunks,
         }
     }

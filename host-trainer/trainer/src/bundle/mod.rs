@@ -44,6 +44,8 @@ pub use write::{ChannelCoding, PRUNING_RATES, WriteOptions, code, write};
 
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::Normalisation;
+use pocketsplat_core::Bundle;
+use pocketsplat_core::bundle::PROTOCOL_CODE;
 
 /// What a bundle says about its capture besides the scene itself.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,4 +58,15 @@ pub struct BundleInfo {
     pub training_px: [u32; 2],
     /// One of the training views, normalised frame, so that a device can draw something by itself.
     pub preview: Camera,
+    /// How the photographs were prepared: the section protocol, of at most [`MAX_PROTOCOL_LEN`] bytes.
+    pub protocol: Option<String>,
+}
+
+/// Most bytes of the section protocol.
+pub const MAX_PROTOCOL_LEN: usize = 200;
+
+/// What the section protocol of a bundle says; `bytes` are the whole file. None where there is none, or none that is text.
+pub fn protocol_of<'a>(bundle: &Bundle<'a>, bytes: &'a [u8]) -> Option<&'a str> {
+    let section = bundle.sections().find(|section| section.code() == PROTOCOL_CODE)?;
+    std::str::from_utf8(bytes.get(section.offset as usize..)?.get(..section.len as usize)?).ok()
 }

@@ -33,7 +33,7 @@ pub struct SizeReport {
     pub manifest: usize,
     /// Ends of the tiers, records of the chunks.
     pub directory: usize,
-    /// Sections that this version does not know.
+    /// Sections that say nothing about the scene: the protocol, and what this version does not know.
     pub other: usize,
     /// ANS streams: what the models leave of positions, masks and channels.
     pub streams: usize,

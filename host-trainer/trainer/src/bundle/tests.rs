@@ -124,6 +124,7 @@ fn info() -> BundleInfo {
         background: [10, 20, 30],
         training_px: [64, 48],
         preview: camera(64, 48),
+        protocol: None,
     }
 }
 

@@ -158,6 +158,6 @@ impl Writer<'_> {
             directory: directory::section(placement, &chunks, &boxes),
             chunks: chunks.concat(),
         };
-        CodedScene::new(layout::header(self.scene, self.info, &counts)?, parts)
+        CodedScene::new(layout::header(self.scene, self.info, &counts)?, parts, self.info.protocol.clone())
     }
 }

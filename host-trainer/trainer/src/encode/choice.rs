@@ -63,6 +63,7 @@ impl Encoding {
             training_px: capture.largest_px(),
             // Any training view will do for a device that has no camera of its own.
             preview: capture.train[0].camera.clone(),
+            protocol: finished.protocol.clone(),
         };
         let candidates = Candidates { finished, info, tiers: &self.tiers };
         if finished.scene.context.is_none() && self.coder != CoderChoice::Context {

@@ -30,6 +30,8 @@ pub struct Finished {
     pub head_fraction_bits: Option<u8>,
     /// Bits of features, log-scales and drawn offsets under the float context model, in all; none without such a model.
     pub estimated_bits: Option<[f64; N_GROUPS]>,
+    /// How the photographs were prepared, for the bundle to say; training does not know.
+    pub protocol: Option<String>,
 }
 
 impl Trainer<'_> {
@@ -60,7 +62,7 @@ impl Trainer<'_> {
         // It is between 0 and 1.
         let background = self.background.map(|channel| (channel * 255.0).round() as u8);
         let head_fraction_bits = context.is_some().then_some(HEAD_FRACTION_BITS);
-        Ok(Finished { scene, importance, background, n_undrawn, head_fraction_bits, estimated_bits })
+        Ok(Finished { scene, importance, background, n_undrawn, head_fraction_bits, estimated_bits, protocol: None })
     }
 }
 

@@ -38,6 +38,7 @@ fn without_boxes(bytes: &[u8]) -> Vec<u8> {
         manifest: section(SectionKind::Manifest),
         directory: &directory,
         gaussians: find(SectionKind::Gaussians).map(|_| section(SectionKind::Gaussians)),
+        protocol: None,
         chunks: section(SectionKind::Chunks),
     };
     sections.emit(bundle.header()).collect()

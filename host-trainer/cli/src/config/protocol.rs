@@ -1,0 +1,153 @@
+//! How the photographs of a bundle were prepared, as the bundle says it.
+
+use std::fmt;
+
+use anyhow::Result;
+use pocketsplat_capture::dataset::{Background, Capture, LoadOptions};
+use pocketsplat_core::bundle::crc32;
+use pocketsplat_trainer::bundle::MAX_PROTOCOL_LEN;
+use serde::{Deserialize, Serialize};
+
+use super::CaptureOptions;
+
+/// Parts of a normalised unit, and of a rotation's entries, to which poses are rounded in a fingerprint.
+const POSE_PARTS: f64 = 1e4;
+
+/// What a bundle says about its photographs, so that whoever measures it prepares them alike.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Protocol {
+    /// Version of the program that trained it.
+    program: String,
+    /// The capture, as [`fingerprint`] gives it.
+    capture: String,
+    /// How it was loaded; split and background said even where they are the defaults.
+    #[serde(flatten)]
+    pub(crate) options: CaptureOptions,
+}
+
+impl Protocol {
+    /// Of a run on a loaded capture.
+    pub(crate) fn of(capture: &Capture, options: &CaptureOptions) -> Self {
+        let defaults = CaptureOptions {
+            background: Some(Background::Black),
+            test_every: Some(LoadOptions::default().test_every),
+            ..CaptureOptions::default()
+        };
+        let program = env!("CARGO_PKG_VERSION").to_owned();
+        Self { program, capture: fingerprint(capture), options: options.or(&defaults) }
+    }
+
+    /// As the section of a bundle. A folder of images whose name does not fit is left out.
+    pub(crate) fn to_text(&self) -> Result<String> {
+        let text = toml::to_string(self)?;
+        if text.len() <= MAX_PROTOCOL_LEN {
+            return Ok(text);
+        }
+        let options = CaptureOptions { images: None, ..self.options.clone() };
+        Ok(toml::to_string(&Self { options, ..self.clone() })?)
+    }
+
+    /// Reads the section; what other versions may have added is passed over.
+    pub(crate) fn parse(text: &str) -> Result<Self> {
+        Ok(toml::from_str(text)?)
+    }
+
+    /// Why a capture is not the one that the bundle was trained on.
+    pub(crate) fn contradiction(&self, capture: &Capture) -> Option<String> {
+        let found = fingerprint(capture);
+        (found != self.capture).then(|| {
+            format!(
+                "this is another capture than the bundle was trained on, or other views of it (fingerprint {found}, the \
+                 bundle's is {})",
+                self.capture
+            )
+        })
+    }
+}
+
+/// A checksum of the names and poses of all views, whatever their size and split.
+fn fingerprint(capture: &Capture) -> String {
+    let mut views: Vec<_> = capture.train.iter().chain(&capture.test).collect();
+    views.sort_by(|a, b| a.name.cmp(&b.name));
+    let mut bytes = Vec::new();
+    for view in views {
+        bytes.extend(view.name.bytes().chain([0]));
+        let pose = view.camera.rotation.to_cols_array().into_iter().chain(view.camera.translation.to_array());
+        #[expect(clippy::cast_possible_truncation, reason = "normalised units, far below 2³¹ parts")]
+        bytes.extend(pose.flat_map(|x| ((x * POSE_PARTS).round() as i32).to_le_bytes()));
+    }
+    format!("{:08x}", crc32(&bytes))
+}
+
+impl fmt::Display for Protocol {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let CaptureOptions { max_resolution, resolution, background, images, model, test_every } = &self.options;
+        match (resolution, max_resolution) {
+            (Some(frame), _) => write!(f, "images cut to {frame}")?,
+            (None, Some(px)) => write!(f, "images of at most {px} px")?,
+            (None, None) => f.write_str("images of full size")?,
+        }
+        if let Some(images) = images {
+            write!(f, " of the folder {images}")?;
+        }
+        if let Some(model) = model {
+            write!(f, ", sparse model {model}")?;
+        }
+        if let Some(background) = background {
+            write!(f, ", background {background}")?;
+        }
+        match test_every {
+            Some(0) => f.write_str(", no view held out")?,
+            Some(every) => write!(f, ", one view in {every} held out where the capture has no split")?,
+            None => {}
+        }
+        write!(f, "; trained by pocketsplat {}", self.program)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use pocketsplat_capture::dataset::FrameSize;
+
+    use super::*;
+
+    fn protocol(images: Option<&str>) -> Protocol {
+        Protocol {
+            program: "0.1.0".to_owned(),
+            capture: "00ff12ab".to_owned(),
+            options: CaptureOptions {
+                resolution: Some("160x120".parse::<FrameSize>().unwrap()),
+                background: Some(Background::White),
+                images: images.map(str::to_owned),
+                model: Some(12),
+                test_every: Some(10),
+                ..CaptureOptions::default()
+            },
+        }
+    }
+
+    #[test]
+    fn the_longest_section_comes_back() {
+        let full = protocol(Some("images_of_the_second_day"));
+        let text = full.to_text().unwrap();
+        assert!(text.len() <= MAX_PROTOCOL_LEN, "{} bytes: {text}", text.len());
+        assert_eq!(Protocol::parse(&text).unwrap(), full);
+        let said = full.to_string();
+        assert!(said.contains("cut to 160x120") && said.contains("one view in 10"), "{said}");
+    }
+
+    #[test]
+    fn a_name_that_does_not_fit_is_left_out() {
+        let long = protocol(Some(&"a".repeat(150)));
+        let text = long.to_text().unwrap();
+        assert!(text.len() <= MAX_PROTOCOL_LEN, "{} bytes: {text}", text.len());
+        assert_eq!(Protocol::parse(&text).unwrap(), protocol(None));
+    }
+
+    #[test]
+    fn later_versions_may_say_more() {
+        let text = format!("{}exposure = true\n", protocol(None).to_text().unwrap());
+        assert_eq!(Protocol::parse(&text).unwrap(), protocol(None));
+        assert!(Protocol::parse("program = 3").is_err());
+    }
+}

@@ -1,4 +1,4 @@
-//! Bundles with everything that the format offers, of both coders.
+//! Bundles with everything that the format offers, of all coders.
 
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_core::Bundle;
@@ -6,19 +6,23 @@ use pocketsplat_trainer::bundle::{self, ChannelCoding, CodedScene, WriteOptions,
 use pocketsplat_trainer::manifest;
 
 use crate::frame::info_for;
-use crate::scenes::{Case, cameras, masked, random_scene, with_context};
+use crate::scenes::{Case, cameras, masked, random_scene, with_context, with_levels};
 
 /// What codes the symbols of a test bundle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coder {
     /// Tables of the context's mean steps.
     Static,
-    /// The context.
+    /// The context of a grid.
     Context,
+    /// The context of anchors that follow anchors.
+    Levels,
 }
 
-/// Both.
+/// Those whose frames and digests are kept.
 pub const CODERS: [Coder; 2] = [Coder::Static, Coder::Context];
+/// All.
+pub const ALL_CODERS: [Coder; 3] = [Coder::Static, Coder::Context, Coder::Levels];
 
 /// The pruning rates of the tiers: half of the anchors, three quarters, all.
 const PRUNING_RATES: [f32; 3] = [0.5, 0.25, 0.0];
@@ -31,10 +35,11 @@ pub fn tiered(case: &Case, coder: Coder, chunk_anchors: u16) -> Vec<u8> {
 }
 
 fn coded(case: &Case, coder: Coder, chunk_anchors: u16) -> CodedScene {
-    let scene = with_context(masked(random_scene(case), case.seed), case.seed);
+    let scene = masked(random_scene(case), case.seed);
+    let scene = if coder == Coder::Levels { with_levels(scene, case.seed) } else { with_context(scene, case.seed) };
     let channels = match coder {
         Coder::Static => ChannelCoding::Tables(mean_steps(&scene).expect("a scene with a context")),
-        Coder::Context => ChannelCoding::Context,
+        Coder::Context | Coder::Levels => ChannelCoding::Context,
     };
     let options = WriteOptions {
         channels,

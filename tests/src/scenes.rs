@@ -130,18 +130,37 @@ pub fn with_context(scene: Scene<f32>, seed: u64) -> Scene<f32> {
     let base_steps = [0.1, 0.05, 0.1];
     let mut model = ContextModel::filled(&scene.shape, frame, levels, 8, base_steps, 0.0);
     model.rows.fill_with(|| rng.random_range(-1.0..1.0));
-    for group in model.network.mlp.groups_mut() {
+    for group in model.networks[0].mlp.groups_mut() {
         group.fill_with(|| rng.random_range(-0.3..0.3));
     }
     // The values of `random_scene` are uniform: deviations of 0.58, log-scales around −2.2.
     let (f, n_channels) = (scene.shape.feature_dim, scene.shape.values_per_anchor());
     for channel in 0..n_channels {
         let group = usize::from(channel >= f) + usize::from(channel >= f + 6);
-        model.network.mlp.b2[channel] += [0.0, -44.0, 0.0][group];
-        model.network.mlp.b2[n_channels + channel] += [2.5, 3.5, 2.5][group];
+        model.networks[0].mlp.b2[channel] += [0.0, -44.0, 0.0][group];
+        model.networks[0].mlp.b2[n_channels + channel] += [2.5, 3.5, 2.5][group];
     }
     let mut model = model.with_taps(&scene.shape, 3, 0.0);
-    model.network.taps.fill_with(|| rng.random_range(-0.5..0.5));
+    model.networks[0].taps.fill_with(|| rng.random_range(-0.5..0.5));
+    Scene { context: Some(model), ..scene }
+}
+
+/// The scene with a context of random weights in which anchors follow anchors.
+pub fn with_levels(scene: Scene<f32>, seed: u64) -> Scene<f32> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let frame = GridFrame::spanning([-100; 3], [100; 3]);
+    let mut model = ContextModel::following(&scene.shape, frame, [4, 6, 8], 8, [0.1, 0.05, 0.1], 0.0);
+    let (f, n_channels) = (scene.shape.feature_dim, scene.shape.values_per_anchor());
+    for network in &mut model.networks {
+        for group in network.mlp.groups_mut() {
+            group.fill_with(|| rng.random_range(-0.3..0.3));
+        }
+        for channel in 0..n_channels {
+            let group = usize::from(channel >= f) + usize::from(channel >= f + 6);
+            network.mlp.b2[channel] += [0.0, -44.0, 0.0][group];
+            network.mlp.b2[n_channels + channel] += [2.5, 3.5, 2.5][group];
+        }
+    }
     Scene { context: Some(model), ..scene }
 }
 

@@ -1,6 +1,6 @@
 //! A seeded walk through what the fuzz targets look at: sound bundles, damaged here and there.
 
-use conformance::bundles::{CODERS, tiered};
+use conformance::bundles::{ALL_CODERS, tiered};
 use conformance::frame::bundle_of;
 use conformance::fuzz;
 use conformance::scenes::{TINY, TINY_DETAILED, cameras, random_scene};
@@ -12,7 +12,7 @@ const N_STEPS: usize = 20_000;
 
 fn seeds() -> Vec<Vec<u8>> {
     let plain = bundle_of(&random_scene(&TINY), &cameras()[0].1);
-    CODERS.map(|coder| tiered(&TINY_DETAILED, coder, 2)).into_iter().chain([plain]).collect()
+    ALL_CODERS.map(|coder| tiered(&TINY_DETAILED, coder, 2)).into_iter().chain([plain]).collect()
 }
 
 /// One of the ways in which a fuzzer changes bytes, a few times over.

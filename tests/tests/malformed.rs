@@ -1,7 +1,7 @@
 //! A damaged bundle fails with an error that names the place, or draws without the damaged chunk and says which: never
 //! another picture in silence, never a panic.
 
-use conformance::bundles::{CODERS, chunks_offset, tier_ends, tiered};
+use conformance::bundles::{ALL_CODERS, chunks_offset, tier_ends, tiered};
 use conformance::frame::{Frame, budget_for, bundle_of, draw, to_core};
 use conformance::scenes::{CASES, Case, TINY, TINY_DETAILED, cameras, random_scene};
 use conformance::seal::reseal;
@@ -20,7 +20,7 @@ fn small_camera() -> Camera {
 fn small_bundles() -> Vec<Vec<u8>> {
     let case = Case { n_anchors: 12, ..TINY_DETAILED };
     let plain = bundle_of(&random_scene(&Case { n_anchors: 12, ..TINY }), &cameras()[0].1);
-    CODERS.map(|coder| tiered(&case, coder, SMALL_CHUNK)).into_iter().chain([plain]).collect()
+    ALL_CODERS.map(|coder| tiered(&case, coder, SMALL_CHUNK)).into_iter().chain([plain]).collect()
 }
 
 fn picture(bytes: &[u8], camera: &Camera) -> Result<Frame, DecodeError> {
@@ -167,7 +167,7 @@ fn every_flipped_bit_names_the_section_or_the_chunk_that_is_left_out() {
 fn random_damage_of_a_large_bundle_names_the_place() {
     let camera = to_core(&cameras()[0].1).resized(40, 30);
     let mut rng = ChaCha8Rng::seed_from_u64(11);
-    for coder in CODERS {
+    for coder in ALL_CODERS {
         let mut bytes = tiered(&CASES[0], coder, 32);
         let layout = Layout::of(&bytes);
         for _ in 0..300 {

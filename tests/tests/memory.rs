@@ -1,7 +1,7 @@
 //! The memory contract: a plan's bytes suffice, one fewer is refused by number, nothing else is touched, and neither where
 //! anchors wait nor in how many strips a frame is drawn changes a pixel.
 
-use conformance::bundles::{CODERS, measured, tiered};
+use conformance::bundles::{ALL_CODERS, measured, tiered};
 use conformance::frame::{budget_for, to_core};
 use conformance::scenes::{CASES, cameras, orbit};
 use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, ErrorClass, MaxSplats, Plan, ScratchShape};
@@ -9,9 +9,9 @@ use pocketsplat_trainer::verify::{
     Touched, Trial, Violation, exact_bytes, halves, memory_does_not_show, plan_variants, variants_match,
 };
 
-/// A bundle for each case, of either coder in turn, with masks and three tiers.
+/// A bundle for each case, of each coder in turn, with masks and three tiers.
 fn files() -> impl Iterator<Item = (&'static str, Vec<u8>)> {
-    CASES.iter().enumerate().map(|(i, case)| (case.name, tiered(case, CODERS[i % 2], 64)))
+    CASES.iter().enumerate().map(|(i, case)| (case.name, tiered(case, ALL_CODERS[i % 3], 64)))
 }
 
 /// Views of the test scenes: from outside, with a skewed lens, from within.
@@ -72,7 +72,7 @@ fn memory_content_and_alignment_do_not_show_and_the_mark_covers_what_was_touched
 
 #[test]
 fn measured_plans_hold_the_views_measured_and_waste_little() {
-    for (case, coder) in CASES.iter().zip(CODERS.into_iter().cycle()) {
+    for (case, coder) in CASES.iter().zip(ALL_CODERS.into_iter().cycle()) {
         let views = orbit(12);
         let bytes = measured(case, coder, &views);
         let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
@@ -94,7 +94,7 @@ fn measured_plans_hold_the_views_measured_and_waste_little() {
 
 #[test]
 fn predicted_work_bounds_the_work_of_the_views_measured_closely() {
-    for (case, coder) in CASES.iter().zip(CODERS.into_iter().cycle()) {
+    for (case, coder) in CASES.iter().zip(ALL_CODERS.into_iter().cycle()) {
         let views = orbit(12);
         let bytes = measured(case, coder, &views);
         let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
@@ -151,7 +151,7 @@ fn too_many_splats_leave_out_the_last_of_the_file_in_all_strips_alike() {
 
 #[test]
 fn the_most_tiers_that_fit_are_planned() {
-    for coder in CODERS {
+    for coder in ALL_CODERS {
         let bytes = measured(&CASES[0], coder, &orbit(4));
         let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
         let free = Budget::for_frame(160, 120);

@@ -1,6 +1,6 @@
 //! Each tier's scene is part of the next one's, a file cut at a tier's end is that scene, and plans follow the tiers.
 
-use conformance::bundles::{CODERS, Coder, tier_ends, tiered};
+use conformance::bundles::{ALL_CODERS, Coder, tier_ends, tiered};
 use conformance::frame::{Frame, budget_for, draw, to_core};
 use conformance::scenes::{CASES, cameras};
 use pocketsplat_core::bundle::AnchorSite;
@@ -42,7 +42,7 @@ fn draw_tiers(bundle: &Bundle<'_>, tiers: u8) -> (Frame, FrameReport) {
 
 #[test]
 fn tiers_are_nested() {
-    for coder in CODERS {
+    for coder in ALL_CODERS {
         let bytes = file(coder);
         let whole = Bundle::parse(&bytes).expect("the writer's bundle is sound");
         let all = anchors(&whole);
@@ -59,7 +59,7 @@ fn tiers_are_nested() {
 
 #[test]
 fn a_cut_file_draws_what_fewer_tiers_of_the_whole_one_draw() {
-    for coder in CODERS {
+    for coder in ALL_CODERS {
         let bytes = file(coder);
         let whole = Bundle::parse(&bytes).expect("the writer's bundle is sound");
         let frames: Vec<_> = (1..=3).map(|tiers| draw_tiers(&whole, tiers)).collect();
@@ -76,7 +76,7 @@ fn a_cut_file_draws_what_fewer_tiers_of_the_whole_one_draw() {
 
 #[test]
 fn the_planned_bytes_suffice_for_every_tier_and_one_less_is_refused_by_number() {
-    for coder in CODERS {
+    for coder in ALL_CODERS {
         let bytes = file(coder);
         let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
         let lens: Vec<usize> = (0..4)
@@ -107,7 +107,7 @@ fn the_planned_bytes_suffice_for_every_tier_and_one_less_is_refused_by_number() 
 
 #[test]
 fn scratch_content_does_not_show() {
-    for coder in CODERS {
+    for coder in ALL_CODERS {
         let bytes = file(coder);
         let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
         let camera = camera();

@@ -253,7 +253,7 @@ mod tests {
                     n_tables: (1 - context) * up_to(360),
                     context_inputs: context * 4 * (1 + up_to(32)),
                     context_hidden: context * (1 + up_to(256)),
-                    context_residuals: context * up_to(257),
+                    context_kept: context * up_to(257),
                 },
                 record: RecordShape {
                     symbol_bits: [1 + up_to(16) as u8, 1 + up_to(16) as u8, 1 + up_to(16) as u8],
@@ -290,7 +290,7 @@ mod tests {
                 n_tables: a.coder.n_tables.max(b.coder.n_tables),
                 context_inputs: a.coder.context_inputs.max(b.coder.context_inputs),
                 context_hidden: a.coder.context_hidden.max(b.coder.context_hidden),
-                context_residuals: a.coder.context_residuals.max(b.coder.context_residuals),
+                context_kept: a.coder.context_kept.max(b.coder.context_kept),
             },
             record: RecordShape {
                 symbol_bits: [a0.max(b0), a1.max(b1), a2.max(b2)],

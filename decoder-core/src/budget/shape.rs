@@ -4,7 +4,7 @@ use crate::bundle::{
     Bundle, Coder, MAX_FEATURE_DIM, MAX_LATTICE_BITS, MAX_OFFSETS, RecordLayout, covariance_outputs, model_words,
     n_log_scales,
 };
-use crate::context::{FEATURES_PER_LEVEL, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS};
+use crate::context::{FEATURES_PER_LEVEL, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS, N_POSITION_INPUTS};
 use crate::mlp::{HeadShape, HeadWeights};
 
 /// What the size of the scratch memory follows from.
@@ -73,8 +73,8 @@ pub struct CoderShape {
     pub context_inputs: u16,
     /// Hidden units of the context; 0 for bundles with tables.
     pub context_hidden: u16,
-    /// Residuals of features that a context with taps keeps; 0 without.
-    pub context_residuals: u16,
+    /// Numbers that a context keeps from feature to feature or from anchor to anchor.
+    pub context_kept: u16,
 }
 
 /// Bits of an anchor in memory.
@@ -121,10 +121,17 @@ pub struct FrameShape {
     pub max_splats: u32,
 }
 
+/// Inputs of a context at most: of a grid, or of a parent that gives `n_parent`.
+const fn most_inputs(n_parent: u16) -> u16 {
+    let grid = (MAX_CONTEXT_LEVELS as u16).saturating_mul(FEATURES_PER_LEVEL as u16);
+    let levels = n_parent.saturating_add(N_POSITION_INPUTS as u16);
+    if grid > levels { grid } else { levels }
+}
+
 impl CoderShape {
     /// Words that the models of the symbols work in.
     pub(super) const fn words(&self) -> usize {
-        model_words(self.n_tables, self.context_inputs, self.context_hidden, self.context_residuals)
+        model_words(self.n_tables, self.context_inputs, self.context_hidden, self.context_kept)
     }
 }
 
@@ -174,9 +181,9 @@ impl ScratchShape {
             },
             coder: CoderShape {
                 n_tables: feature_dim.saturating_add(n_log_scales(true)).saturating_add(n_offsets.saturating_mul(3)),
-                context_inputs: (MAX_CONTEXT_LEVELS as u16).saturating_mul(FEATURES_PER_LEVEL as u16),
+                context_inputs: most_inputs(feature_dim.saturating_add(n_log_scales(true))),
                 context_hidden: MAX_CONTEXT_HIDDEN,
-                context_residuals: feature_dim,
+                context_kept: feature_dim.saturating_add(n_log_scales(true)).saturating_mul(2),
             },
             record: RecordShape { symbol_bits: [16; 3], lattice_bits: MAX_LATTICE_BITS, masks: true },
             resident: Resident::Nothing,
@@ -200,17 +207,14 @@ impl ScratchShape {
                 head_weights: HeadWeights::F32,
             },
             coder: match bundle.coder() {
-                Coder::Static(tables) => CoderShape {
-                    n_tables: few(tables.len()),
-                    context_inputs: 0,
-                    context_hidden: 0,
-                    context_residuals: 0,
-                },
+                Coder::Static(tables) => {
+                    CoderShape { n_tables: few(tables.len()), context_inputs: 0, context_hidden: 0, context_kept: 0 }
+                }
                 Coder::Context(context) => CoderShape {
                     n_tables: 0,
                     context_inputs: few(context.n_inputs()),
                     context_hidden: few(context.n_hidden()),
-                    context_residuals: few(context.n_residuals()),
+                    context_kept: few(context.n_kept()),
                 },
             },
             record: RecordShape {

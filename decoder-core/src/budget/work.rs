@@ -63,7 +63,9 @@ pub(super) fn decoding_macs(bundle: &Bundle<'_>) -> u64 {
             let [inputs, hidden] = [context.n_inputs(), context.n_hidden()];
             let layers = hidden.saturating_mul(inputs.saturating_add(context.n_outputs()));
             let taps = first_tap(context.feature_dim(), context.n_taps());
-            let grid = inputs.saturating_mul(INPUT_MACS);
+            // Inputs that are another anchor's values are there.
+            let looked_up = if context.level_shifts().is_some() { 0 } else { inputs };
+            let grid = looked_up.saturating_mul(INPUT_MACS);
             symbols.saturating_add(layers.saturating_add(taps).saturating_mul(NETWORK_MACS)).saturating_add(grid)
         }
     };

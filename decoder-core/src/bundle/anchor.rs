@@ -4,13 +4,13 @@ mod bits;
 mod channels;
 mod record;
 
-use channels::{ChannelModels, ContextModels};
+use channels::{Channel, ChannelModels, ContextModels};
 pub(crate) use record::{AnchorRecords, RecordLayout, RecordMemory};
 
 use super::lattice::Lattice;
 use super::tables::{IndexedTable, IndexedTables};
-use super::{Bundle, Coder};
-use crate::context::Context;
+use super::{Bundle, Coder, MAX_FEATURE_DIM, n_log_scales};
+use crate::context::{Context, MAX_CONTEXT_INPUTS, N_POSITION_INPUTS, Trail};
 use crate::entropy::{AnsReader, MaskModel, TrieReader};
 use crate::error::{DecodeError, Field, saturate};
 use crate::stopwatch::Stopwatch;
@@ -31,7 +31,7 @@ pub struct AnchorModels<'b, 's> {
     lattice: Lattice<'b>,
     masks: Option<MaskModel<'b>>,
     /// F features and the log-scales.
-    n_scalars: usize,
+    n_scalars: u16,
     n_offsets: u16,
     channels: ChannelModels<'b, 's>,
 }
@@ -45,6 +45,8 @@ pub struct AnchorReader<'b, 's, 'm> {
     symbols: AnsReader<'b>,
     models: &'m mut AnchorModels<'b, 's>,
     code: u64,
+    /// No channels were read yet.
+    is_first: bool,
     site: AnchorSite,
 }
 
@@ -52,12 +54,12 @@ impl<'b> Bundle<'b> {
     /// Words of memory that [`anchor_models`](Self::anchor_models) takes.
     #[must_use]
     pub fn anchor_scratch_words(&self) -> usize {
-        // At most 360 tables, 128 inputs, 256 hidden units, 256 features.
+        // At most 360 tables, 272 inputs, 256 hidden units, twice 262 numbers kept.
         match self.coder() {
             Coder::Static(tables) => model_words(tables.len() as u16, 0, 0, 0),
             Coder::Context(context) => {
-                let [inputs, hidden, residuals] = context_lens(context);
-                model_words(0, inputs as u16, hidden as u16, residuals as u16)
+                let [inputs, hidden, kept] = context_lens(context);
+                model_words(0, inputs as u16, hidden as u16, kept as u16)
             }
         }
     }
@@ -101,43 +103,57 @@ impl<'b> Bundle<'b> {
                     numbers: halves.get_mut(..n_numbers).ok_or(DecodeError::Internal)?,
                     scaled,
                     step_bits: 0,
+                    trail: Trail::default(),
                 })
             }
         };
         Ok(AnchorModels {
             lattice: *self.lattice(),
             masks: self.masks().copied(),
-            n_scalars: self.header().n_scalars(),
+            n_scalars: self.header().n_scalars() as u16,
             n_offsets: self.header().n_offsets,
             channels,
         })
     }
 }
 
+const _: () = assert!(
+    N_POSITION_INPUTS + MAX_FEATURE_DIM as usize + n_log_scales(true) as usize <= MAX_CONTEXT_INPUTS,
+    "what a parent gives overflows no sum"
+);
+
 /// Words that so many tables take, or a context of such widths; whichever are more.
-pub(crate) const fn model_words(n_tables: u16, inputs: u16, hidden: u16, residuals: u16) -> usize {
+pub(crate) const fn model_words(n_tables: u16, inputs: u16, hidden: u16, kept: u16) -> usize {
     let tables = (n_tables as usize).saturating_mul(size_of::<IndexedTable>().div_ceil(4));
-    let context = (inputs as usize).saturating_add(hidden as usize).saturating_add(residuals as usize).div_ceil(2);
+    let context = (inputs as usize).saturating_add(hidden as usize).saturating_add(kept as usize).div_ceil(2);
     if tables > context { tables } else { context }
 }
 
-/// Numbers of the context's inputs, its hidden units, and the residuals of features where it has taps.
+/// Numbers of the context's inputs, its hidden units, and those that it keeps.
 fn context_lens(context: &Context<'_>) -> [usize; 3] {
-    [context.n_inputs(), context.n_hidden(), context.n_residuals()]
+    [context.n_inputs(), context.n_hidden(), context.n_kept()]
 }
 
 impl AnchorModels<'_, '_> {
     /// Channels of an anchor.
     #[must_use]
     pub fn n_channels(&self) -> usize {
-        self.n_scalars.saturating_add(usize::from(self.n_offsets).saturating_mul(3))
+        usize::from(self.n_scalars).saturating_add(usize::from(self.n_offsets).saturating_mul(3))
     }
 }
 
 impl<'b, 's, 'm> AnchorReader<'b, 's, 'm> {
     pub(super) fn new(chunk: u32, words: &'b [[u8; 2]], models: &'m mut AnchorModels<'b, 's>) -> Self {
         let codes = models.lattice.trie.codes();
-        Self { chunk, codes, symbols: AnsReader::new(words), models, code: 0, site: AnchorSite::default() }
+        Self {
+            chunk,
+            codes,
+            symbols: AnsReader::new(words),
+            models,
+            code: 0,
+            is_first: true,
+            site: AnchorSite::default(),
+        }
     }
 
     /// Where the next anchor stands; one call an anchor, before its channels.
@@ -157,7 +173,7 @@ impl<'b, 's, 'm> AnchorReader<'b, 's, 'm> {
 
     /// The anchor's symbols, one a channel; one call of this or of [`values`](Self::values) an anchor.
     pub fn symbols(&mut self, row: &mut [i16]) {
-        self.symbols = self.models.channels.read(self.site, self.models.n_scalars, self.symbols, row, &mut ());
+        self.read(row, &mut ());
     }
 
     /// The anchor's values, one a channel; one call of this or of [`symbols`](Self::symbols) an anchor.
@@ -167,7 +183,13 @@ impl<'b, 's, 'm> AnchorReader<'b, 's, 'm> {
 
     /// As [`values`](Self::values); `watch` is in the stage of decoding before and after.
     pub(crate) fn values_watched(&mut self, row: &mut [f32], watch: &mut impl Stopwatch) {
-        self.symbols = self.models.channels.read(self.site, self.models.n_scalars, self.symbols, row, watch);
+        self.read(row, watch);
+    }
+
+    fn read(&mut self, row: &mut [impl Channel], watch: &mut impl Stopwatch) {
+        let is_first = core::mem::take(&mut self.is_first);
+        let n_scalars = self.models.n_scalars.into();
+        self.symbols = self.models.channels.read(self.site, n_scalars, is_first, self.symbols, row, watch);
     }
 
     /// The code of the cell that [`site`](Self::site) came to.

@@ -6,7 +6,7 @@ mod emit;
 use std::vec;
 use std::vec::Vec;
 
-use builder::{Anchor, C, F, ORIGIN, STEP, Variant, bundle, cell, tiers, weight};
+use builder::{Anchor, C, F, ORIGIN, STEP, Variant, bundle, cell, hidden, tiers, weight};
 
 use crate::arena::Arena;
 use crate::bundle::{AnchorRecords, AnchorSite, Bundle, Coder, RecordMemory, Tables, crc32};
@@ -16,9 +16,10 @@ use crate::error::{DecodeError, Field, SectionKind};
 use crate::{Budget, Decoder, FrameReport, MaxSplats, Overflow, Residency, ScratchShape, Strips, TileSink};
 
 fn variants() -> impl Iterator<Item = Variant> {
-    (0..1 << 6).map(|bits| {
+    (0..3 << 5).map(|bits| {
         let [masks, context, coded_heads, unknown_section, detail] = [1, 2, 4, 8, 16].map(|bit| bits & bit != 0);
-        Variant { masks, context, n_taps: 2 * (bits >> 5), coded_heads, unknown_section, detail }
+        let (n_taps, levels) = (2 * u8::from(bits >> 5 == 1), bits >> 5 == 2);
+        Variant { masks, context, n_taps, levels, coded_heads, unknown_section, detail }
     })
 }
 
@@ -82,17 +83,15 @@ fn values_are_symbols_times_steps() {
         for (chunk, anchors) in bundle.chunks().zip(tiers(variant).concat()) {
             let (mut sites, mut values) = (vec![AnchorSite::default(); anchors.len()], vec![9.0; anchors.len() * C]);
             chunk.decode_values(&mut models, &mut sites, &mut values).expect("a sound chunk");
-            for (anchor, row) in anchors.iter().zip(values.chunks(C)) {
+            for (index, (anchor, row)) in anchors.iter().zip(values.chunks(C)).enumerate() {
                 for (channel, (&symbol, &value)) in anchor.symbols.iter().zip(row).enumerate() {
                     let drawn = channel < F + 6 || anchor.mask >> ((channel - F - 6) / 3) & 1 == 1;
                     let expected = match bundle.coder() {
                         _ if !drawn => 0.0,
                         Coder::Static(_) => f32::from(symbol) * STEP + ORIGIN,
                         Coder::Context(context) => {
-                            let (mut features, mut hidden) = (vec![0; context.n_inputs()], vec![0; context.n_hidden()]);
-                            context.features(cell(anchor.code), &mut features);
-                            context.hidden(&features, &mut hidden);
-                            f32::from(symbol) * context.steps(&hidden).value(context.group(channel))
+                            let (network, hidden) = hidden(context, &anchors, index);
+                            f32::from(symbol) * network.steps(&hidden).value(context.group(channel))
                         }
                     };
                     assert_eq!(value, expected, "{variant:?}, channel {channel}");
@@ -114,21 +113,22 @@ fn taps_move_the_means_of_features() {
         for anchor in tiers(variant).concat().concat() {
             let (mut features, mut hidden) = (vec![0; context.n_inputs()], vec![0; context.n_hidden()]);
             context.features(cell(anchor.code), &mut features);
-            context.hidden(&features, &mut hidden);
-            let steps = context.steps(&hidden);
+            let network = context.network(0);
+            network.hidden(&features, &mut hidden);
+            let steps = network.steps(&hidden);
             let q = steps.exponent(Group::Feature);
             let factor = (4096.0 * 2f64.powf(-f64::from(q & 7) / 8.0)).round() as i64 * (1 << -(q >> 3).min(0));
             let mut residuals: Vec<i16> = vec![];
             for (feature, (row, &symbol)) in rows.into_iter().zip(&anchor.symbols).enumerate() {
-                let own8 = (i64::from(context.output(feature, &hidden)) * factor + (1 << 14)) >> 15;
+                let own8 = (i64::from(network.output(feature, &hidden)) * factor + (1 << 14)) >> 15;
                 let before = &residuals[feature - row.len()..];
                 let sum: i64 = row.iter().zip(before).map(|(weight, &residual)| weight * i64::from(residual)).sum();
                 let mean8 = (own8 + 4 + ((64 + sum) >> 7)).clamp(-32768, 32767) - 4;
-                let scale = i32::from(context.output(C + feature, &hidden)) - q + 32;
+                let scale = i32::from(network.output(C + feature, &hidden)) - q + 32;
                 let expected = NormalModel::new(mean8 as i32, scale);
-                assert_eq!(context.model(feature, &steps, &hidden, &residuals), expected, "feature {feature}");
+                assert_eq!(network.model(feature, &steps, &hidden, &residuals), expected, "feature {feature}");
                 residuals.push((8 * i64::from(symbol) - own8).clamp(-32768, 32767) as i16);
-                let found = context.residual(feature, &steps, &hidden, symbol);
+                let found = network.residual(feature, &steps, &hidden, symbol);
                 assert_eq!(Some(&found), residuals.last(), "feature {feature}");
             }
         }
@@ -138,8 +138,8 @@ fn taps_move_the_means_of_features() {
 /// Encoder and decoder limit a mean at the same place, which without taps is nowhere.
 #[test]
 fn means_at_the_end_of_their_range_are_the_same_at_both_ends() {
-    for n_taps in [0, 2] {
-        let mut section = builder::context_section(n_taps);
+    for variant in variants().filter(|variant| variant.context && !variant.levels) {
+        let mut section = builder::context_section(variant);
         let n_out = 2 * C + 3;
         // After the head, two levels and all shifts; the first mean's bias, then that of the features' step.
         let b2 = 40 + 2 * 8 + 3 + n_out + 3 * 4;
@@ -147,15 +147,15 @@ fn means_at_the_end_of_their_range_are_the_same_at_both_ends() {
             section[b2 + 4 * output..][..4].copy_from_slice(&bias.to_le_bytes());
         }
         let context = Context::parse(&section, F, 6, C).expect("a sound section");
-        let hidden = [0; 3];
-        let steps = context.steps(&hidden);
-        assert_eq!((context.output(0, &hidden), steps.exponent(Group::Feature)), (i16::MAX, -24));
+        let (network, hidden) = (context.network(0), [0; 3]);
+        let steps = network.steps(&hidden);
+        assert_eq!((network.output(0, &hidden), steps.exponent(Group::Feature)), (i16::MAX, -24));
         let step = steps.of(Group::Feature);
         let raised_mean = step.raised_mean(i16::MAX);
         assert!(raised_mean > i16::MAX.into(), "beyond it: {raised_mean}");
-        let decoders = if n_taps == 0 { raised_mean } else { context.moved(0, raised_mean, &[]) };
-        let scale = context.output(C, &hidden);
-        assert_eq!(context.model(0, &steps, &hidden, &[]), step.model(decoders, scale), "{n_taps} taps");
+        let decoders = if variant.n_taps == 0 { raised_mean } else { context.moved(0, raised_mean, &[]) };
+        let scale = network.output(C, &hidden);
+        assert_eq!(network.model(0, &steps, &hidden, &[]), step.model(decoders, scale), "{variant:?}");
     }
 }
 

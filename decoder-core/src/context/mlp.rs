@@ -1,30 +1,32 @@
-//! The integer network from grid features to means, scales and steps.
+//! Dense layers in integers.
 
 use super::grid::FEATURES_PER_LEVEL;
-use crate::error::{DecodeError, Field, saturate};
+use crate::error::{DecodeError, Field};
 
 /// Most hidden units: with it, and biases of at most [`MAX_BIAS`], no sum passes 2³¹ whatever the weights are.
 pub const MAX_CONTEXT_HIDDEN: u16 = 256;
-/// Most grid levels, hence 128 inputs.
+/// Most grid levels, hence 128 inputs of it.
 pub const MAX_CONTEXT_LEVELS: u8 = 32;
-/// Largest magnitude of a bias: inputs are at most 2¹⁴ and hidden units below 2¹⁵, so 128·2⁷·2¹⁴ and 256·2⁷·2¹⁵ are left.
+/// Most inputs.
+pub const MAX_CONTEXT_INPUTS: usize = 272;
+/// Largest magnitude of a bias: inputs and hidden units are at most 2¹⁵, so 272·2⁷·2¹⁵ and 256·2⁷·2¹⁵ are left.
 pub const MAX_BIAS: u32 = 1 << 29;
 /// Largest shift of a sum.
 const MAX_SHIFT: u8 = 31;
 
-const _: () = assert!((MAX_CONTEXT_LEVELS as u64 * FEATURES_PER_LEVEL as u64) << 21 <= 1 << 30);
-const _: () = assert!(((MAX_CONTEXT_HIDDEN as u64) << 22) + (MAX_BIAS as u64) < 1 << 31);
+const _: () = assert!(MAX_CONTEXT_LEVELS as usize * FEATURES_PER_LEVEL <= MAX_CONTEXT_INPUTS);
+const _: () = assert!(((MAX_CONTEXT_INPUTS as u64) << 22) + (MAX_BIAS as u64) < 1 << 31);
+const _: () = assert!(MAX_CONTEXT_HIDDEN as usize <= MAX_CONTEXT_INPUTS);
 
 /// One dense layer `(W·x + b) >> shift`, weights i8 and row-major.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Layer<'a> {
     /// `[n_out, n_in]`.
-    pub(super) weights: &'a [u8],
+    weights: &'a [u8],
     /// `[n_out]`.
-    pub(super) biases: &'a [[u8; 4]],
+    biases: &'a [[u8; 4]],
     /// `[n_out]`.
-    pub(super) shifts: &'a [u8],
-    pub(super) n_in: usize,
+    shifts: &'a [u8],
 }
 
 /// What one output of a layer is made with.
@@ -56,6 +58,32 @@ fn limited(sum: i32, shift: u8) -> i16 {
 }
 
 impl<'a> Layer<'a> {
+    /// Bytes of a network: shifts, biases and weights of both layers.
+    pub(super) const fn pair_len(n_inputs: usize, n_hidden: usize, n_outputs: usize) -> usize {
+        // A shift, four bytes of bias and the weights for each row.
+        // With at most 256 hidden units, 719 outputs and 272 inputs nothing overflows.
+        let [hidden, output] = [n_inputs.wrapping_add(5), n_hidden.wrapping_add(5)];
+        n_hidden.wrapping_mul(hidden).wrapping_add(n_outputs.wrapping_mul(output))
+    }
+
+    /// The hidden and the output layer of a network at the front of `bytes`, not yet checked, and what follows it.
+    pub(super) fn pair(bytes: &'a [u8], n_inputs: usize, n_hidden: usize, n_outputs: usize) -> ([Self; 2], &'a [u8]) {
+        let mut rest = bytes;
+        let mut next = |n: usize| {
+            let (part, after) = rest.split_at_checked(n).unwrap_or_default();
+            rest = after;
+            part
+        };
+        let [hidden_shifts, output_shifts] = [next(n_hidden), next(n_outputs)];
+        let (hidden_biases, _) = next(n_hidden.wrapping_mul(4)).as_chunks();
+        let (output_biases, _) = next(n_outputs.wrapping_mul(4)).as_chunks();
+        let hidden_weights = next(n_inputs.wrapping_mul(n_hidden));
+        let output_weights = next(n_hidden.wrapping_mul(n_outputs));
+        let hidden = Layer { weights: hidden_weights, biases: hidden_biases, shifts: hidden_shifts };
+        let output = Layer { weights: output_weights, biases: output_biases, shifts: output_shifts };
+        ([hidden, output], rest)
+    }
+
     pub(super) fn check(&self) -> Result<(), DecodeError> {
         for &shift in self.shifts {
             if shift > MAX_SHIFT {
@@ -69,40 +97,37 @@ impl<'a> Layer<'a> {
                 return Err(DecodeError::OutOfRange { field: Field::ContextBias, found, limit: MAX_BIAS });
             }
         }
-        if self.weights.len() != self.n_in.saturating_mul(self.biases.len()) {
-            return Err(DecodeError::OutOfRange {
-                field: Field::ContextHidden,
-                found: saturate(self.weights.len()),
-                limit: saturate(self.n_in),
-            });
-        }
         Ok(())
     }
 
-    /// The rows from `first` on.
+    /// The rows of `n_in` weights from `first` on.
     #[inline]
-    pub(super) fn rows(&self, first: usize) -> impl Iterator<Item = Row<'a>> + use<'a> {
-        let weights = self.weights.get(first.saturating_mul(self.n_in)..).unwrap_or_default();
+    fn rows(&self, first: usize, n_in: usize) -> impl Iterator<Item = Row<'a>> + use<'a> {
+        let weights = self.weights.get(first.saturating_mul(n_in)..).unwrap_or_default();
         let biases = self.biases.get(first..).unwrap_or_default();
         let shifts = self.shifts.get(first..).unwrap_or_default();
         // `max(1)`: a chunk size of zero would panic; there is always an input.
-        let rows = weights.chunks_exact(self.n_in.max(1)).zip(biases.iter().zip(shifts));
+        let rows = weights.chunks_exact(n_in.max(1)).zip(biases.iter().zip(shifts));
         rows.map(|(weights, (&bias, &shift))| Row { weights, bias, shift })
     }
 
     /// Output `index`, limited to i16.
+    ///
+    /// * `inputs`: `[n_in]`.
     pub(super) fn limited(&self, index: usize, inputs: &[i16]) -> i16 {
-        self.rows(index).next().map_or(0, |row| limited(row.output(inputs), row.shift))
+        self.rows(index, inputs.len()).next().map_or(0, |row| limited(row.output(inputs), row.shift))
     }
 
     /// The outputs from `first` on beside those from `second` on, limited to i16.
+    ///
+    /// * `inputs`: `[n_in]`.
     ///
     /// # Budget
     /// Per pair 2·n_in multiply-adds, about 3.3 instructions each on a Cortex-M4, and 30 instructions.
     // On its own it gets the registers that it needs.
     #[inline(never)]
     pub(super) fn pairs(&self, first: usize, second: usize, inputs: &[i16], pairs: &mut [[i16; 2]]) {
-        for ((a, b), pair) in self.rows(first).zip(self.rows(second)).zip(pairs) {
+        for ((a, b), pair) in self.rows(first, inputs.len()).zip(self.rows(second, inputs.len())).zip(pairs) {
             let biases = (i32::from_le_bytes(a.bias), i32::from_le_bytes(b.bias));
             // An input is fetched once for both.
             let weights = a.weights.iter().zip(b.weights);
@@ -115,9 +140,12 @@ impl<'a> Layer<'a> {
     }
 
     /// All outputs, limited to 0..=32767: a rectified hidden layer.
+    ///
+    /// * `inputs`: at least `[n_in]`; levels have fewer inputs than there is room for.
     #[inline(always)]
     pub(super) fn rectified(&self, inputs: &[i16], outputs: &mut [i16]) {
-        for (row, output) in self.rows(0).zip(outputs) {
+        let n_in = self.weights.len().checked_div(self.biases.len()).unwrap_or_default();
+        for (row, output) in self.rows(0, n_in).zip(outputs) {
             *output = limited(row.output(inputs), row.shift).max(0);
         }
     }

@@ -1,24 +1,30 @@
-//! The context model: what an anchor's place says about its symbols (Chen et al. 2024, HAC, section 4), in integers.
+//! The context model: what an anchor's place says about its symbols, in integers.
 //!
-//! grid features → hidden units → per channel a mean and a scale, per group a quantisation step. Training runs the same
-//! quantities in floats and ends on these integers; whatever decides a symbol is computed here and nowhere else.
+//! Its inputs are features of a grid (Chen et al. 2024, HAC, section 4), or the values of an anchor that was decoded before
+//! (Wang et al. 2024, ContextGS, section 4): inputs → hidden units → per channel a mean and a scale, per group a quantisation
+//! step. Training runs the same quantities in floats and ends on these integers; whatever decides a symbol is computed here and
+//! nowhere else.
 // Tests may index and add as they like; this is about bytes that nobody vouches for.
 #![cfg_attr(not(test), deny(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::panic))]
 
 mod grid;
+mod levels;
 mod mlp;
+mod network;
 mod steps;
 mod taps;
 
 pub use grid::{Corners, FEATURES_PER_LEVEL, GridFrame, GridLevel, LevelKind, WEIGHT_ONE};
-pub use mlp::{MAX_BIAS, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS};
-pub use steps::{Group, GroupStep, MAX_STEP_EXPONENT, MEAN_PARTS, MIN_STEP_EXPONENT, N_GROUPS, Steps};
+pub use levels::{MAX_LEVEL_SHIFT, MAX_SPAN_SHIFT, N_LEVELS, N_POSITION_INPUTS, Place, Trail};
+pub use mlp::{MAX_BIAS, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_INPUTS, MAX_CONTEXT_LEVELS};
+pub use network::Network;
+pub use steps::{Group, GroupStep, MAX_STEP_EXPONENT, MEAN_PARTS, MIN_STEP_EXPONENT, N_GROUPS, PARENT_UNITS, Steps};
 pub use taps::{MAX_TAPS, TAP_BITS, first_tap};
 
 use crate::bytes::{Cursor, Emitter, Fields};
-use crate::entropy::{EIGHTHS, NormalModel};
-use crate::error::{DecodeError, Field, SectionKind, in_range, saturate};
+use crate::entropy::EIGHTHS;
+use crate::error::{DecodeError, Field, SectionKind, in_range};
 use mlp::Layer;
 use steps::check_base_steps;
 use taps::Taps;
@@ -40,7 +46,7 @@ pub struct ContextHead {
     pub frame: GridFrame,
     /// Steps of the three groups where the network says nothing.
     pub base_steps: [f32; N_GROUPS],
-    /// Levels of the grid, 1..=[`MAX_CONTEXT_LEVELS`].
+    /// Levels of the grid, up to [`MAX_CONTEXT_LEVELS`]; 0 where anchors follow anchors instead.
     pub n_levels: u8,
     /// Features that a feature's mean follows at most, 0..=[`MAX_TAPS`].
     pub n_taps: u8,
@@ -53,15 +59,27 @@ pub struct ContextHead {
 pub struct Context<'a> {
     frame: GridFrame,
     base_steps: [f32; N_GROUPS],
-    levels: &'a [[u8; LEVEL_LEN]],
-    hidden: Layer<'a>,
-    output: Layer<'a>,
+    inputs: Inputs<'a>,
+    /// That of the coarsest level first.
+    networks: &'a [u8],
     taps: Taps<'a>,
-    /// Four bits a row, set for +1; two rows a byte, the first in the low half.
-    grid: &'a [u8],
+    n_hidden: u16,
     feature_dim: u16,
     n_log_scales: u16,
     n_channels: u16,
+}
+
+/// Where the inputs of the network come from.
+#[derive(Clone, Copy, Debug)]
+enum Inputs<'a> {
+    /// A grid around the scene.
+    Grid {
+        levels: &'a [[u8; LEVEL_LEN]],
+        /// Four bits a row, set for +1; two rows a byte, the first in the low half.
+        grid: &'a [u8],
+    },
+    /// An anchor that was decoded before: the edges of the cells of levels 1 and 2, and of what level 2 lies in, as powers of two.
+    Levels([u8; N_LEVELS]),
 }
 
 impl ContextHead {
@@ -70,7 +88,7 @@ impl ContextHead {
         let frame = GridFrame { min: fields.i32s(), scale: fields.u32s() };
         let base_steps = check_base_steps(fields.f32s())?;
         let [n_levels, n_taps] = fields.bytes();
-        in_range(Field::ContextLevels, n_levels.into(), 1, MAX_CONTEXT_LEVELS.into())?;
+        in_range(Field::ContextLevels, n_levels.into(), 0, MAX_CONTEXT_LEVELS.into())?;
         let n_hidden = fields.u16();
         in_range(Field::ContextHidden, n_hidden.into(), 1, MAX_CONTEXT_HIDDEN.into())?;
         Ok(Self { frame, base_steps, n_levels, n_taps, n_hidden })
@@ -102,54 +120,64 @@ impl<'a> Context<'a> {
     ) -> Result<Self, DecodeError> {
         let mut cursor = Cursor::new(section, SectionKind::Context);
         let ContextHead { frame, base_steps, n_levels, n_taps, n_hidden } = ContextHead::parse(cursor.record()?)?;
-        let n_levels = usize::from(n_levels);
-        let n_hidden = usize::from(n_hidden);
-        let (levels, _) = cursor.bytes(n_levels.saturating_mul(LEVEL_LEN))?.as_chunks();
         let mut n_rows = 0_u32;
-        for record in levels {
-            n_rows = n_rows.saturating_add(checked_level(record)?.n_rows);
+        let inputs = if n_levels == 0 {
+            let [shift_1, shift_2, shift_3, reserved] = *cursor.record()?;
+            in_range(Field::LevelShift, shift_2.into(), shift_1.into(), MAX_LEVEL_SHIFT.into())?;
+            in_range(Field::LevelShift, shift_3.into(), 0, MAX_SPAN_SHIFT.into())?;
+            in_range(Field::Reserved, reserved.into(), 0, 0)?;
+            in_range(Field::ContextTaps, n_taps.into(), 0, 0)?;
+            Inputs::Levels([shift_1, shift_2, shift_3])
+        } else {
+            let (levels, _) = cursor.bytes(usize::from(n_levels).saturating_mul(LEVEL_LEN))?.as_chunks();
+            for record in levels {
+                n_rows = n_rows.saturating_add(checked_level(record)?.n_rows);
+            }
+            Inputs::Grid { levels, grid: &[] }
+        };
+        let mut context = Self {
+            frame,
+            base_steps,
+            inputs,
+            networks: &[],
+            taps: Taps::default(),
+            n_hidden,
+            // A header's numbers, which are u16.
+            feature_dim: feature_dim as u16,
+            n_log_scales: n_log_scales as u16,
+            n_channels: n_channels as u16,
+        };
+        let lens = (0..context.n_networks())
+            .map(|level| Layer::pair_len(context.n_level_inputs(level), context.n_hidden(), context.n_outputs()));
+        context.networks = cursor.bytes(lens.fold(0, usize::saturating_add))?;
+        for level in 0..context.n_networks() {
+            context.network(level).check()?;
         }
-        let n_inputs = n_levels.saturating_mul(FEATURES_PER_LEVEL);
-        let n_outputs = n_channels.saturating_mul(2).saturating_add(N_GROUPS);
-        let [hidden_shifts, output_shifts] = [cursor.bytes(n_hidden)?, cursor.bytes(n_outputs)?];
-        let (hidden_biases, _) = cursor.bytes(n_hidden.saturating_mul(4))?.as_chunks();
-        let (output_biases, _) = cursor.bytes(n_outputs.saturating_mul(4))?.as_chunks();
-        let hidden_weights = cursor.bytes(n_inputs.saturating_mul(n_hidden))?;
-        let output_weights = cursor.bytes(n_hidden.saturating_mul(n_outputs))?;
-        let hidden = Layer { weights: hidden_weights, biases: hidden_biases, shifts: hidden_shifts, n_in: n_inputs };
-        let output = Layer { weights: output_weights, biases: output_biases, shifts: output_shifts, n_in: n_hidden };
-        hidden.check()?;
-        output.check()?;
-        let taps = Taps::new(cursor.bytes(first_tap(feature_dim, n_taps.into()))?, n_taps)?;
-        let grid = cursor.bytes((n_rows as usize).div_ceil(2))?;
-        if !cursor.rest().is_empty() {
-            return Err(DecodeError::WrongLength {
-                section: SectionKind::Context,
-                expected: saturate(cursor.position()),
-                found: saturate(section.len()),
-            });
+        context.taps = Taps::new(cursor.bytes(first_tap(feature_dim, n_taps.into()))?, n_taps)?;
+        if let Inputs::Grid { grid, .. } = &mut context.inputs {
+            *grid = cursor.bytes((n_rows as usize).div_ceil(2))?;
         }
-        // At most 256, 6 and 358.
-        let [feature_dim, n_log_scales, n_channels] = [feature_dim, n_log_scales, n_channels].map(|n| n as u16);
-        Ok(Self { frame, base_steps, levels, hidden, output, taps, grid, feature_dim, n_log_scales, n_channels })
+        cursor.end()?;
+        Ok(context)
     }
 
-    /// Inputs of the network: [`FEATURES_PER_LEVEL`] a level.
+    /// Inputs of the network: [`FEATURES_PER_LEVEL`] a level of the grid, or those of an anchor that follows another: its place,
+    /// then features and log-scales of its parent.
     #[must_use]
     pub fn n_inputs(&self) -> usize {
-        self.hidden.n_in
+        self.n_level_inputs(0)
     }
 
     /// Hidden units.
     #[must_use]
     pub fn n_hidden(&self) -> usize {
-        self.output.n_in
+        self.n_hidden.into()
     }
 
     /// Outputs: C means, C scales, three steps.
     #[must_use]
     pub fn n_outputs(&self) -> usize {
-        self.output.biases.len()
+        usize::from(self.n_channels).saturating_mul(2).saturating_add(N_GROUPS)
     }
 
     /// Features that a feature's mean follows at most; 0 where the anchor's place says all.
@@ -161,13 +189,101 @@ impl<'a> Context<'a> {
     /// Residuals of an anchor's features to keep while it is decoded: none without taps.
     #[must_use]
     pub fn n_residuals(&self) -> usize {
-        if self.n_taps() > 0 { usize::from(self.feature_dim) } else { 0 }
+        if self.n_taps() > 0 { self.feature_dim() } else { 0 }
+    }
+
+    /// Inputs that a parent gives: its features and log-scales.
+    #[must_use]
+    pub fn n_parent_inputs(&self) -> usize {
+        usize::from(self.feature_dim.wrapping_add(self.n_log_scales))
+    }
+
+    /// Numbers to keep while a chunk is decoded: the residuals, or what the two anchors give that others may follow.
+    #[must_use]
+    pub fn n_kept(&self) -> usize {
+        match self.inputs {
+            Inputs::Grid { .. } => self.n_notes(),
+            Inputs::Levels(_) => self.n_notes().wrapping_mul(2),
+        }
+    }
+
+    /// Numbers to note of an anchor: its residuals, or what it gives those that follow it.
+    pub(crate) fn n_notes(&self) -> usize {
+        match self.inputs {
+            Inputs::Grid { .. } => self.n_residuals(),
+            Inputs::Levels(_) => self.n_parent_inputs(),
+        }
+    }
+
+    /// What to note of a channel's symbol.
+    ///
+    /// * `raised_mean`: as the anchor's place gives it.
+    #[inline(always)]
+    pub(crate) fn note(&self, group: Group, step: &GroupStep, raised_mean: i32, symbol: i32) -> i16 {
+        if self.n_taps() > 0 { residual(symbol, raised_mean) } else { step.parent_input(group, symbol) }
+    }
+
+    /// The edges of the cells of levels 1 and 2, and of what level 2 lies in, as powers of two, where anchors follow anchors.
+    #[must_use]
+    pub fn level_shifts(&self) -> Option<[u8; N_LEVELS]> {
+        match self.inputs {
+            Inputs::Grid { .. } => None,
+            Inputs::Levels(shifts) => Some(shifts),
+        }
+    }
+
+    /// Level and place of the next anchor of a chunk, where anchors follow anchors.
+    #[inline]
+    pub fn place(&self, trail: &mut Trail, cell: [i32; 3]) -> Option<Place> {
+        self.level_shifts().map(|shifts| trail.next(shifts, &self.frame, cell))
+    }
+
+    fn n_networks(&self) -> usize {
+        match self.inputs {
+            Inputs::Grid { .. } => 1,
+            Inputs::Levels(_) => N_LEVELS,
+        }
+    }
+
+    /// The network of anchors of a level, where anchors follow anchors; with a grid there is level 0 alone.
+    ///
+    /// # Budget
+    /// Some 40 instructions a level from the coarsest on.
+    #[must_use]
+    pub fn network(&self, level: usize) -> Network<'_, 'a> {
+        let (mut network, mut rest) =
+            Network::first(self, self.networks, self.n_level_inputs(self.n_networks().saturating_sub(1)));
+        for level in (level..self.n_networks().saturating_sub(1)).rev() {
+            (network, rest) = Network::first(self, rest, self.n_level_inputs(level));
+        }
+        network
+    }
+
+    /// Inputs of the network of a level: places, and what a parent gives; with a grid its features.
+    fn n_level_inputs(&self, level: usize) -> usize {
+        match self.inputs {
+            Inputs::Grid { levels, .. } => levels.len().wrapping_mul(FEATURES_PER_LEVEL),
+            Inputs::Levels(_) if level == N_LEVELS.wrapping_sub(1) => N_POSITION_INPUTS,
+            Inputs::Levels(_) => N_POSITION_INPUTS.wrapping_add(self.n_parent_inputs()),
+        }
+    }
+
+    /// The inputs of an anchor that follows another.
+    ///
+    /// * `parent`: `[n_parent_inputs]` [`GroupStep::parent_input`] of each of its parent's symbols; at level 2 of no meaning.
+    ///   * `inputs`: `[n_inputs]`, filled.
+    pub fn follow(&self, place: &Place, parent: &[i16], inputs: &mut [i16]) {
+        let Some((at, given)) = inputs.split_first_chunk_mut() else { return };
+        *at = place.position;
+        for (input, value) in given.iter_mut().zip(parent) {
+            *input = *value;
+        }
     }
 
     /// Features of an anchor.
     #[must_use]
     pub fn feature_dim(&self) -> usize {
-        usize::from(self.feature_dim)
+        self.feature_dim.into()
     }
 
     /// Where the grid lies.
@@ -182,15 +298,19 @@ impl<'a> Context<'a> {
         self.base_steps
     }
 
-    /// The levels in the order of the inputs.
+    /// The levels of the grid in the order of the inputs; none where anchors follow anchors.
     pub fn levels(&self) -> impl Iterator<Item = GridLevel> + use<'a> {
-        self.levels.iter().filter_map(level)
+        let records = match self.inputs {
+            Inputs::Grid { levels, .. } => levels,
+            Inputs::Levels(_) => &[],
+        };
+        records.iter().filter_map(level)
     }
 
     /// Group of a channel.
     #[must_use]
     pub fn group(&self, channel: usize) -> Group {
-        Group::of_channel(channel, usize::from(self.feature_dim), usize::from(self.n_log_scales))
+        Group::of_channel(channel, self.feature_dim(), self.n_log_scales.into())
     }
 
     /// The grid's features at an anchor.
@@ -220,71 +340,19 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// The hidden units: `(W1·x + b1) >> shift`, limited to 0..=32767.
-    ///
-    /// * `features`: `[n_inputs]`. * `hidden`: `[n_hidden]`, filled.
-    #[inline(always)]
-    pub fn hidden(&self, features: &[i16], hidden: &mut [i16]) {
-        self.hidden.rectified(features, hidden);
-    }
-
-    /// One output: `(W2·h + b2) >> shift`, limited to i16.
-    #[inline(always)]
-    #[must_use]
-    pub fn output(&self, row: usize, hidden: &[i16]) -> i16 {
-        self.output.limited(row, hidden)
-    }
-
-    /// The anchor's quantisation steps.
-    #[inline]
-    #[must_use]
-    pub fn steps(&self, hidden: &[i16]) -> Steps {
-        let first = usize::from(self.n_channels).saturating_mul(2);
-        let raw = [0, 1, 2].map(|group: usize| self.output(first.saturating_add(group), hidden));
-        Steps::new(self.base_steps, raw)
-    }
-
-    /// The distribution of a channel's symbol.
-    ///
-    /// * `residuals`: [`residual`](Self::residual) of every feature before, where there are taps.
-    ///
-    /// # Budget
-    /// Two rows of the network.
-    #[must_use]
-    pub fn model(&self, channel: usize, steps: &Steps, hidden: &[i16], residuals: &[i16]) -> NormalModel {
-        let mean = self.output(channel, hidden);
-        let scale = self.output(channel.saturating_add(usize::from(self.n_channels)), hidden);
-        let (group, step) = (self.group(channel), steps.of(self.group(channel)));
-        let raised_mean = step.raised_mean(mean);
-        // Without taps as the decoder has it, which then limits nothing.
-        let follows = group == Group::Feature && self.n_taps() > 0;
-        step.model(if follows { self.moved(channel, raised_mean, residuals) } else { raised_mean }, scale)
-    }
-
-    /// What a feature's symbol leaves of the mean that its anchor's place gives it, in eighths of the step.
-    ///
-    /// # Budget
-    /// A row of the network.
-    #[must_use]
-    pub fn residual(&self, feature: usize, steps: &Steps, hidden: &[i16], symbol: i16) -> i16 {
-        residual(symbol.into(), steps.of(Group::Feature).raised_mean(self.output(feature, hidden)))
-    }
-
-    /// The raised mean of `feature` as the residuals of the features before move it.
+    /// The raised mean of `feature` as the residuals of the features before move it; without taps itself, unlimited.
     #[inline(always)]
     pub(crate) fn moved(&self, feature: usize, raised_mean: i32, residuals: &[i16]) -> i32 {
+        if self.n_taps() == 0 {
+            return raised_mean;
+        }
         // Within 4096 steps every symbol near the mean is an i16.
         raised_mean.wrapping_add(self.taps.shift(feature, residuals)).clamp(i16::MIN.into(), i16::MAX.into())
     }
 
-    /// Mean and scale of each channel from `first` on, in 1/[`MEAN_PARTS`] of a base step and in eighths of an octave of one.
-    #[inline]
-    pub(crate) fn moments(&self, first: usize, hidden: &[i16], moments: &mut [[i16; 2]]) {
-        self.output.pairs(first, first.saturating_add(usize::from(self.n_channels)), hidden, moments);
-    }
-
     fn row_bits(&self, row: u32) -> u8 {
-        let byte = self.grid.get((row >> 1) as usize).copied().unwrap_or_default();
+        let Inputs::Grid { grid, .. } = self.inputs else { return 0 };
+        let byte = grid.get((row >> 1) as usize).copied().unwrap_or_default();
         if row & 1 == 0 { byte & 0xF } else { byte >> 4 }
     }
 }

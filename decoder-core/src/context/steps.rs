@@ -12,6 +12,9 @@ pub const MAX_STEP_EXPONENT: i32 = 7;
 /// Means leave the network in parts of a base step.
 pub const MEAN_PARTS: i32 = 64;
 
+/// Base steps of a feature and of a log-scale that are an input of one to the anchors that follow; offsets are none.
+pub const PARENT_UNITS: [i32; N_GROUPS] = [16, 64, 1];
+
 /// 2^(i/8), the part of an octave.
 const PART_OF_OCTAVE: [f32; 8] =
     [1.0, 1.090_507_7, 1.189_207_1, 1.296_839_6, core::f32::consts::SQRT_2, 1.542_210_8, 1.681_792_9, 1.834_008_1];
@@ -149,6 +152,24 @@ impl GroupStep {
         i32::from(mean).wrapping_mul(self.mean_factor).wrapping_add(HALF_STEP) >> MEAN_SHIFT
     }
 
+    /// What a symbol gives the anchors that follow its own, in 2⁻¹⁴: its value in 1/[`PARENT_UNITS`] of the group's base steps,
+    /// limited to one; `(symbol·T' + half) >> shift` with T' = 4096·2^(q/8).
+    #[inline]
+    #[must_use]
+    pub fn parent_input(&self, group: Group, symbol: i32) -> i16 {
+        let [features, log_scales, _] = PARENT_UNITS;
+        let units = if group == Group::Feature { features } else { log_scales };
+        // −q: octaves −1 to 3.
+        let exponent = self.scale_shift.wrapping_sub(SCALE_ONE);
+        let part = INVERSE_PART_OF_OCTAVE.get((exponent & 7) as usize).copied().unwrap_or(4096);
+        // 2¹² of the part, 2⁻¹⁴ of the input: at least 2.
+        let shift = units.ilog2().cast_signed().wrapping_sub(2).wrapping_add(exponent >> 3).cast_unsigned();
+        // An i16 times at most 2¹².
+        let half = 1_i32.wrapping_shl(shift.wrapping_sub(1));
+        let value = symbol.wrapping_mul(part).wrapping_add(half).wrapping_shr(shift);
+        value.clamp(-(1 << 14), 1 << 14) as i16
+    }
+
     /// The distribution of a symbol, from a [raised mean](Self::raised_mean) and a scale in eighths of an octave of a base step.
     #[inline(always)]
     pub(crate) fn model(&self, raised_mean: i32, scale: i16) -> NormalModel {
@@ -188,6 +209,21 @@ mod tests {
                     near(found) && NormalModel::new(found, SCALE_ONE - i32::from(steps.exponents[2])) == model
                 });
                 assert!(found.is_some(), "q {q}, mean {mean}: {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_a_parent_gives_is_its_value_in_units() {
+        for q in MIN_STEP_EXPONENT..=MAX_STEP_EXPONENT {
+            let steps = Steps::new([1.0; N_GROUPS], [q as i16; N_GROUPS]);
+            for (group, units) in [(Group::Feature, 16.0), (Group::LogScale, 64.0)] {
+                for symbol in [i16::MIN, -300, -17, -1, 0, 1, 5, 40, 1000, i16::MAX] {
+                    let value = f64::from(symbol) * (f64::from(q) / 8.0).exp2() / units;
+                    let expected = value.clamp(-1.0, 1.0) * 16384.0;
+                    let found = f64::from(steps.of(group).parent_input(group, symbol.into()));
+                    assert!((found - expected).abs() <= 0.51 + expected.abs() * 2e-4, "q {q}: {found}, not {expected}");
+                }
             }
         }
     }

@@ -21,7 +21,7 @@ pub const fn first_tap(feature: usize, n_taps: usize) -> usize {
 }
 
 /// The weights of a context's taps, i8 in units of 2⁻⁷.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Taps<'a> {
     weights: &'a [u8],
     n_taps: usize,

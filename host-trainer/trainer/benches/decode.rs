@@ -81,16 +81,16 @@ fn decode(bundle: &Bundle<'_>, values: &mut [f32]) -> Vec<AnchorSite> {
 /// What the context says about every anchor, without reading a symbol: grid, network, and which table each channel takes.
 fn predict(context: &Context<'_>, sites: &[AnchorSite], with_models: bool) {
     let (mut features, mut hidden) = (vec![0; context.n_inputs()], vec![0; context.n_hidden()]);
-    let n_scalars = SHAPE.feature_dim + 6;
+    let (network, n_scalars) = (context.network(0), SHAPE.feature_dim + 6);
     for site in sites {
         context.features(site.lattice, &mut features);
-        context.hidden(&features, &mut hidden);
-        let steps = context.steps(&hidden);
+        network.hidden(&features, &mut hidden);
+        let steps = network.steps(&hidden);
         black_box(&steps);
         if with_models {
             let offsets = (0..SHAPE.n_offsets).filter(|k| (site.mask >> k) & 1 == 1);
             let channels = (0..n_scalars).chain(offsets.flat_map(|k| n_scalars + 3 * k..n_scalars + 3 * k + 3));
-            channels.for_each(|channel| _ = black_box(context.model(channel, &steps, &hidden, &[])));
+            channels.for_each(|channel| _ = black_box(network.model(channel, &steps, &hidden, &[])));
         }
     }
 }

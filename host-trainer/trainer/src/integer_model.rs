@@ -66,20 +66,42 @@ pub fn section(model: &ContextModel<f32>, n_channels: usize) -> Result<Vec<u8>, 
         1.. if found <= most => Ok(()),
         _ => Err(IntegerModelError::Count { what, found, most }),
     };
-    within("grid levels of the context", model.levels.len(), MAX_CONTEXT_LEVELS.into())?;
-    within("hidden units of the context", model.network.mlp.n_hidden, MAX_CONTEXT_HIDDEN.into())?;
-    within("taps of the context", model.network.n_taps.max(1), MAX_TAPS.into())?;
-    let [hidden, output] = rows(model, n_channels)?;
+    if model.shifts.is_none() {
+        within("grid levels of the context", model.levels.len(), MAX_CONTEXT_LEVELS.into())?;
+    }
+    let first = &model.networks[0];
+    within("hidden units of the context", first.mlp.n_hidden, MAX_CONTEXT_HIDDEN.into())?;
+    within("taps of the context", first.n_taps.max(1), MAX_TAPS.into())?;
 
     let head = ContextHead {
         frame: model.frame,
         base_steps: model.base_steps,
         n_levels: model.levels.len() as u8,
-        n_taps: model.network.n_taps as u8,
-        n_hidden: model.network.mlp.n_hidden as u16,
+        n_taps: first.n_taps as u8,
+        n_hidden: first.mlp.n_hidden as u16,
     };
     let mut bytes = head.emit().to_vec();
     bytes.extend(model.levels.iter().flat_map(GridLevel::emit));
+    if let Some(shifts) = model.shifts {
+        bytes.extend(shifts);
+        bytes.push(0);
+    }
+    // The coarsest level first.
+    for network in model.networks.iter().rev() {
+        push_network(network, n_channels, &mut bytes)?;
+        bytes.extend(tap_integers(network)?.into_iter().map(i8::cast_unsigned));
+    }
+    bytes.extend(grid_bytes(&model.rows));
+    Ok(bytes)
+}
+
+/// Appends shifts, biases and weights of a network.
+fn push_network(
+    network: &ContextNetwork<f32>,
+    n_channels: usize,
+    bytes: &mut Vec<u8>,
+) -> Result<(), IntegerModelError> {
+    let [hidden, output] = rows(&network.mlp, n_channels)?;
     for layer in [&hidden, &output] {
         bytes.extend(layer.iter().map(|row| row.shift));
     }
@@ -89,17 +111,19 @@ pub fn section(model: &ContextModel<f32>, n_channels: usize) -> Result<Vec<u8>, 
     for layer in [&hidden, &output] {
         bytes.extend(layer.iter().flat_map(|row| &row.weights).map(|weight| weight.cast_unsigned()));
     }
-    bytes.extend(tap_integers(model)?.into_iter().map(i8::cast_unsigned));
-    bytes.extend(grid_bytes(&model.rows));
-    Ok(bytes)
+    Ok(())
 }
 
-/// The network whose floats are exactly what the section's integers stand for: what gradients pass straight through.
+/// The networks whose floats are exactly what the section's integers stand for: what gradients pass straight through.
 ///
 /// # Errors
 /// As [`section`].
-pub fn rounded(model: &ContextModel<f32>, n_channels: usize) -> Result<ContextNetwork<f32>, IntegerModelError> {
-    let [hidden, output] = rows(model, n_channels)?;
+pub fn rounded(model: &ContextModel<f32>, n_channels: usize) -> Result<Vec<ContextNetwork<f32>>, IntegerModelError> {
+    model.networks.iter().map(|network| rounded_network(network, n_channels)).collect()
+}
+
+fn rounded_network(network: &ContextNetwork<f32>, n_channels: usize) -> Result<ContextNetwork<f32>, IntegerModelError> {
+    let [hidden, output] = rows(&network.mlp, n_channels)?;
     let weights = |layer: &[IntegerRow]| -> Vec<f32> {
         let row = |row: &IntegerRow| {
             let unit = power_of_two(-row.weight_bits) as f32;
@@ -108,14 +132,13 @@ pub fn rounded(model: &ContextModel<f32>, n_channels: usize) -> Result<ContextNe
         layer.iter().flat_map(row).collect()
     };
     let (w1, w2) = (weights(&hidden), weights(&output));
-    let ContextNetwork { mlp, n_taps, .. } = &model.network;
-    let taps = tap_integers(model)?.into_iter().map(|tap| f32::from(tap) * TAP_UNIT).collect();
+    let ContextNetwork { mlp, n_taps, .. } = network;
+    let taps = tap_integers(network)?.into_iter().map(|tap| f32::from(tap) * TAP_UNIT).collect();
     Ok(ContextNetwork { mlp: Head { w1, w2, ..mlp.clone() }, n_taps: *n_taps, taps })
 }
 
 /// Both layers in integers.
-fn rows(model: &ContextModel<f32>, n_channels: usize) -> Result<[Vec<IntegerRow>; 2], IntegerModelError> {
-    let mlp = &model.network.mlp;
+fn rows(mlp: &Head<f32>, n_channels: usize) -> Result<[Vec<IntegerRow>; 2], IntegerModelError> {
     // Fraction bits of what goes in and of what comes out.
     let layer = |weights: &[f32], n_in: usize, biases: &[f32], bits_in: i32, bits_out: &dyn Fn(usize) -> i32| {
         let rows = weights.chunks_exact(n_in).zip(biases).enumerate();
@@ -156,12 +179,12 @@ fn integer_row(
 }
 
 /// The taps' weights in units of [`TAP_UNIT`]; those beyond −1 … 127/128 end there.
-fn tap_integers(model: &ContextModel<f32>) -> Result<Vec<i8>, IntegerModelError> {
+fn tap_integers(network: &ContextNetwork<f32>) -> Result<Vec<i8>, IntegerModelError> {
     let integer = |tap: &f32| {
         // A cast of a float ends at the type's ends.
         if tap.is_finite() { Ok((tap / TAP_UNIT).round() as i8) } else { Err(IntegerModelError::Tap { value: *tap }) }
     };
-    model.network.taps.iter().map(integer).collect()
+    network.taps.iter().map(integer).collect()
 }
 
 fn power_of_two(exponent: i32) -> f64 {
@@ -198,7 +221,7 @@ mod tests {
             values.iter_mut().zip(numbers).for_each(|(value, x)| *value = (x * width) as f32);
         };
         fill(&mut model.rows, seed, 1.0);
-        for (group, values) in (1..).zip(model.network.mlp.groups_mut()) {
+        for (group, values) in (1..).zip(model.networks[0].mlp.groups_mut()) {
             fill(values, seed + group, width);
         }
         model
@@ -215,18 +238,19 @@ mod tests {
             for lattice in [[-40, -30, 7], [0, 0, 50], [199, 69, 89], [500, -500, 33]] {
                 let (mut features, mut hidden) = (vec![0; context.n_inputs()], vec![0; context.n_hidden()]);
                 context.features(lattice, &mut features);
-                context.hidden(&features, &mut hidden);
+                let network = context.network(0);
+                network.hidden(&features, &mut hidden);
                 let input: Vec<f32> = features.iter().map(|f| f32::from(*f) / f32::from(FEATURE_ONE)).collect();
                 let (mut float_hidden, mut expected) = (vec![0.0; 16], vec![0.0; context.n_outputs()]);
-                head::forward(&rounded.mlp, &input, &mut float_hidden, &mut expected);
+                head::forward(&rounded[0].mlp, &input, &mut float_hidden, &mut expected);
                 for (row, expected) in expected.iter().enumerate() {
                     let parts = if row < n_channels { 64.0 } else { 8.0 };
-                    let found = f32::from(context.output(row, &hidden)) / parts;
+                    let found = f32::from(network.output(row, &hidden)) / parts;
                     // Half a part, and sixteen hidden units that are half of 2⁻¹⁰ off.
                     let tolerance = 0.51 / parts + 16.0 * 0.5 / 2048.0;
                     assert!((found - expected).abs() < tolerance, "row {row}: {found} against {expected}");
                 }
-                let steps = context.steps(&hidden);
+                let steps = network.steps(&hidden);
                 for (group, base, output) in
                     [(Group::Feature, 1.0, 0), (Group::LogScale, 0.1, 1), (Group::Offset, 0.2, 2)]
                 {
@@ -270,10 +294,10 @@ mod tests {
     #[test]
     fn weights_out_of_range_are_named() {
         let mut model = model(1, 0.5);
-        model.network.mlp.w2[3 * 16] = f32::NAN;
+        model.networks[0].mlp.w2[3 * 16] = f32::NAN;
         let error = section(&model, SHAPE.values_per_anchor()).expect_err("not a number");
         assert!(matches!(error, IntegerModelError::Weight { row: 3, .. }), "{error}");
-        model.network.mlp.w2[3 * 16] = 1e6;
+        model.networks[0].mlp.w2[3 * 16] = 1e6;
         assert!(section(&model, SHAPE.values_per_anchor()).is_err(), "no shift is left for it");
     }
 }

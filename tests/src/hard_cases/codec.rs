@@ -43,8 +43,8 @@ fn opinionated(mean: f32, log2_scale: f32) -> Scene<f32> {
     let mut scene = with_context(scene(), 5);
     let n_channels = scene.shape.values_per_anchor();
     if let Some(model) = &mut scene.context {
-        model.network.mlp.b2[..n_channels].fill(mean);
-        model.network.mlp.b2[n_channels..2 * n_channels].fill(log2_scale);
+        model.networks[0].mlp.b2[..n_channels].fill(mean);
+        model.networks[0].mlp.b2[n_channels..2 * n_channels].fill(log2_scale);
     }
     scene
 }

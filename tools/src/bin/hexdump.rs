@@ -152,11 +152,11 @@ fn context(shape: &ModelShape) -> ContextModel<f32> {
     for (row, signs) in model.rows.chunks_mut(4).enumerate() {
         signs.fill(if row % 2 == 1 { 1.0 } else { -1.0 });
     }
-    model.network.mlp.w1[0] = 1.0;
+    model.networks[0].mlp.w1[0] = 1.0;
     let n_channels = shape.values_per_anchor();
-    model.network.mlp.b2[n_channels..2 * n_channels].fill(1.0);
-    for output in n_channels..model.network.mlp.n_out {
-        model.network.mlp.w2[2 * output] = if output < 2 * n_channels { 1.0 } else { -1.0 };
+    model.networks[0].mlp.b2[n_channels..2 * n_channels].fill(1.0);
+    for output in n_channels..model.networks[0].mlp.n_out {
+        model.networks[0].mlp.w2[2 * output] = if output < 2 * n_channels { 1.0 } else { -1.0 };
     }
     model
 }

@@ -199,7 +199,7 @@ fn context(scene: &Scene<f32>) -> ContextModel<f32> {
     for (row, signs) in model.rows.chunks_mut(4).enumerate() {
         signs.fill(if row % 4 < 2 { 1.0 } else { -1.0 });
     }
-    model.network.mlp.w1[0] = 1.0;
+    model.networks[0].mlp.w1[0] = 1.0;
     let n_channels = scene.shape.values_per_anchor();
     let groups = [
         (&scene.anchors.features, SHAPE.feature_dim),
@@ -213,13 +213,14 @@ fn context(scene: &Scene<f32>) -> ContextModel<f32> {
             let n = values.len() as f32;
             let mean = values.iter().sum::<f32>() / n;
             let deviation = (values.iter().map(|v| (v - mean) * (v - mean)).sum::<f32>() / n).sqrt();
-            model.network.mlp.b2[channel] = mean;
-            model.network.mlp.b2[n_channels + channel] = deviation.max(0.1).log2();
+            model.networks[0].mlp.b2[channel] = mean;
+            model.networks[0].mlp.b2[n_channels + channel] = deviation.max(0.1).log2();
             channel += 1;
         }
     }
-    for output in 2 * n_channels..model.network.mlp.n_out {
-        model.network.mlp.w2[output * model.network.mlp.n_hidden] = -0.25;
+    let mlp = &mut model.networks[0].mlp;
+    for output in 2 * n_channels..mlp.n_out {
+        mlp.w2[output * mlp.n_hidden] = -0.25;
     }
     model
 }

@@ -2,7 +2,7 @@
 
 use super::AnchorSite;
 use crate::bundle::tables::IndexedTables;
-use crate::context::{Context, Group, GroupStep, residual};
+use crate::context::{Context, Group, GroupStep, Network, Trail};
 use crate::entropy::AnsReader;
 use crate::stopwatch::{Stage, Stopwatch};
 
@@ -17,13 +17,15 @@ pub(super) enum ChannelModels<'b, 's> {
 #[derive(Debug)]
 pub(super) struct ContextModels<'b, 's> {
     pub(super) context: Context<'b>,
-    /// Grid features `[n_inputs]`, hidden units `[n_hidden]`, and with taps what each feature leaves of the mean that the
-    /// anchor's place gives it, `[n_residuals]`.
+    /// Inputs `[n_inputs]`, hidden units `[n_hidden]`, and `[n_kept]`: with taps what each feature leaves of the mean that the
+    /// anchor's place gives it; of anchors that follow anchors what those that began the current cells of levels 1 and 2 give.
     pub(super) numbers: &'s mut [i16],
     /// If not, the value of a symbol is the symbol.
     pub(super) scaled: bool,
     /// The exponents of the steps of the anchor read last.
     pub(super) step_bits: u16,
+    /// Where the current cells of levels began.
+    pub(super) trail: Trail,
 }
 
 /// What a row is made of: symbols, or the values they stand for.
@@ -77,11 +79,12 @@ impl<'b> ChannelModels<'b, '_> {
 
     /// Fills `row` with the next anchor's channels; returns the reader behind them.
     ///
-    /// * `n_scalars`: channels before the offsets'.
+    /// * `n_scalars`: channels before the offsets'. * `is_first`: it begins a chunk, which depends on no other.
     pub(super) fn read<T: Channel>(
         &mut self,
         site: AnchorSite,
         n_scalars: usize,
+        is_first: bool,
         symbols: AnsReader<'b>,
         row: &mut [T],
         watch: &mut impl Stopwatch,
@@ -91,7 +94,12 @@ impl<'b> ChannelModels<'b, '_> {
         match self {
             Self::Static(tables) => read_static(*tables, site.mask, symbols, scalars, offsets),
             Self::Context(_) if !cfg!(feature = "context") => symbols,
-            Self::Context(models) => models.read(site, symbols, scalars, offsets, watch),
+            Self::Context(models) => {
+                if is_first {
+                    models.trail.restart();
+                }
+                models.read(site, symbols, scalars, offsets, watch)
+            }
         }
     }
 }
@@ -153,12 +161,24 @@ impl<'b> ContextModels<'b, '_> {
         watch: &mut impl Stopwatch,
     ) -> AnsReader<'b> {
         watch.enter(Stage::Context);
-        let Self { context, numbers, scaled, step_bits } = self;
-        let Some((features, rest)) = numbers.split_at_mut_checked(context.n_inputs()) else { return symbols };
-        let Some((hidden, residuals)) = rest.split_at_mut_checked(context.n_hidden()) else { return symbols };
-        context.features(site.lattice, features);
-        context.hidden(features, hidden);
-        let steps = context.steps(hidden);
+        let Self { context, numbers, scaled, step_bits, trail } = self;
+        let Some((inputs, rest)) = numbers.split_at_mut_checked(context.n_inputs()) else { return symbols };
+        let Some((hidden, kept)) = rest.split_at_mut_checked(context.n_hidden()) else { return symbols };
+        let Some((notes, coarsest)) = kept.split_at_mut_checked(context.n_notes()) else { return symbols };
+        // What is noted of an anchor of level 0 no other will ask for.
+        let (level, noted) = match context.place(trail, site.lattice) {
+            None => {
+                context.features(site.lattice, inputs);
+                (0, true)
+            }
+            Some(place) => {
+                context.follow(&place, if place.level == 0 { notes } else { coarsest }, inputs);
+                (place.level, place.level > 0)
+            }
+        };
+        let network = context.network(level);
+        network.hidden(inputs, hidden);
+        let steps = network.steps(hidden);
         *step_bits = steps.to_bits();
         let steps = if *scaled { steps } else { steps.unscaled() };
         let mut block = Block { moments: [[0; 2]; BLOCK], len: 0 };
@@ -167,15 +187,22 @@ impl<'b> ContextModels<'b, '_> {
         let mut first = 0_usize;
         for (group, slots) in [(Group::Feature, feature), (Group::LogScale, log_scales)] {
             for slots in slots.chunks_mut(BLOCK) {
-                block.push(context, hidden, first, slots.len());
+                block.push(&network, hidden, first, slots.len());
                 watch.enter(Stage::Decode);
-                symbols = if group == Group::Feature && !residuals.is_empty() {
-                    block.read_features(context, residuals, first, &steps.of(group), symbols, slots)
+                let step = steps.of(group);
+                symbols = if noted && first < notes.len() {
+                    block.read_noted(context, notes, (group, first), &step, symbols, slots)
                 } else {
-                    block.read(&steps.of(group), symbols, slots)
+                    block.read(&step, symbols, slots)
                 };
                 watch.enter(Stage::Context);
                 first = first.saturating_add(slots.len());
+            }
+        }
+        if level > 1 {
+            // It begins a cell of level 1 too.
+            for (slot, note) in coarsest.iter_mut().zip(notes) {
+                *slot = *note;
             }
         }
         // Those drawn are read side by side, so that they fill blocks, and then go to their places.
@@ -185,7 +212,7 @@ impl<'b> ContextModels<'b, '_> {
         while mask != 0 {
             let offset = (mask.trailing_zeros() as usize).saturating_mul(3);
             mask &= mask.wrapping_sub(1);
-            block.push(context, hidden, n_scalars.saturating_add(offset), 3);
+            block.push(&network, hidden, n_scalars.saturating_add(offset), 3);
             if block.len == BLOCK || mask == 0 {
                 let Some((now, later)) = slots.split_at_mut_checked(block.len) else { break };
                 watch.enter(Stage::Decode);
@@ -202,10 +229,10 @@ impl<'b> ContextModels<'b, '_> {
 
 impl Block {
     /// Adds `len` channels from `first` on.
-    fn push(&mut self, context: &Context<'_>, hidden: &[i16], first: usize, len: usize) {
+    fn push(&mut self, network: &Network<'_, '_>, hidden: &[i16], first: usize, len: usize) {
         let end = self.len.saturating_add(len);
         if let Some(moments) = self.moments.get_mut(self.len..end) {
-            context.moments(first, hidden, moments);
+            network.moments(first, hidden, moments);
             self.len = end;
         }
     }
@@ -223,27 +250,28 @@ impl Block {
         symbols
     }
 
-    /// The same with features from `first` on, whose means follow the features before.
+    /// The same of channels from `first` of `group` on of an anchor that is noted; means follow the notes before where there are
+    /// taps.
     ///
-    /// * `residuals`: `[feature_dim]`, of the features before; those of the block are filled.
+    /// * `notes`: `[n_notes]`, of the channels before; those of the block are filled.
     // On its own it gets the registers that it needs.
     #[inline(never)]
-    fn read_features<'b, T: Channel>(
+    fn read_noted<'b, T: Channel>(
         &mut self,
         context: &Context<'_>,
-        residuals: &mut [i16],
-        first: usize,
+        notes: &mut [i16],
+        (group, first): (Group, usize),
         step: &GroupStep,
         symbols: AnsReader<'b>,
         slots: &mut [T],
     ) -> AnsReader<'b> {
         self.len = 0;
         let (step, mut symbols) = (*step, symbols);
-        for (feature, (slot, &[mean, scale])) in (first..).zip(slots.iter_mut().zip(&self.moments)) {
-            let Some((before, [own, ..])) = residuals.split_at_mut_checked(feature) else { break };
+        for (channel, (slot, &[mean, scale])) in (first..).zip(slots.iter_mut().zip(&self.moments)) {
+            let Some((before, [own, ..])) = notes.split_at_mut_checked(channel) else { break };
             let raised_mean = step.raised_mean(mean);
-            let symbol = step.model(context.moved(feature, raised_mean, before), scale).wide_symbol(&mut symbols);
-            *own = residual(symbol, raised_mean);
+            let symbol = step.model(context.moved(channel, raised_mean, before), scale).wide_symbol(&mut symbols);
+            *own = context.note(group, &step, raised_mean, symbol);
             *slot = T::from_scaled(symbol, step.value);
         }
         symbols

@@ -4,7 +4,7 @@ use std::vec;
 use std::vec::Vec;
 
 use crate::bundle::{MAGIC, crc32};
-use crate::context::{Context, first_tap};
+use crate::context::{Context, Group, Network, Trail, first_tap};
 use crate::entropy::testing::{AnsWriter, slot_of};
 use crate::entropy::{Children, MaskModel, Slot, SymbolModel, TrieModel};
 
@@ -28,6 +28,8 @@ pub(super) struct Variant {
     pub(super) context: bool,
     /// Taps of the context.
     pub(super) n_taps: u8,
+    /// The context is that of anchors that follow anchors.
+    pub(super) levels: bool,
     pub(super) coded_heads: bool,
     pub(super) detail: bool,
     /// A section of an unknown kind before the manifest.
@@ -163,27 +165,74 @@ fn mask_frequencies() -> [[[u8; 2]; 4]; K] {
     std::array::from_fn(|k| std::array::from_fn(|n| (1000 + 500 * k as u16 + 300 * n as u16).to_le_bytes()))
 }
 
-pub(super) fn context_section(n_taps: u8) -> Vec<u8> {
+pub(super) fn context_section(variant: Variant) -> Vec<u8> {
     let n_out = 2 * C + 3;
     let level = |kind: u8, resolution: u16, n_rows: u32| [vec![kind, 0], u16s(&[resolution]), u32s(&[n_rows])].concat();
+    let head = |n_levels: u8, n_taps: u8| {
+        [
+            LATTICE_MIN.iter().flat_map(|x| x.to_le_bytes()).collect(),
+            u32s(&[0xFFFF_0000 / 7; 3]),
+            f32s(&[1.0, 0.125, 0.25]),
+            vec![n_levels, n_taps],
+            u16s(&[N_HIDDEN as u16]),
+        ]
+        .concat()
+    };
+    let network = |n_in: usize| {
+        [
+            vec![9; N_HIDDEN],
+            (0..n_out).map(|i| if i < 2 * C { 9 } else { 12 }).collect(),
+            (0..N_HIDDEN).flat_map(|i| (1000 * i as i32).to_le_bytes()).collect(),
+            (0..n_out).flat_map(|i| (100 * i as i32 - 2000).to_le_bytes()).collect(),
+            (0..n_in * N_HIDDEN).map(|i| (i * 37 + 11) as u8).collect::<Vec<u8>>(),
+            (0..N_HIDDEN * n_out).map(|i| ((i + 13 * (n_in % 2)) * 29 + 5) as u8 >> 3).collect(),
+        ]
+        .concat()
+    };
+    if variant.levels {
+        return [head(0, 0), vec![1, 2, 3, 0], network(3), network(3 + F + 6), network(3 + F + 6)].concat();
+    }
     [
-        LATTICE_MIN.iter().flat_map(|x| x.to_le_bytes()).collect(),
-        u32s(&[0xFFFF_0000 / 7; 3]),
-        f32s(&[1.0, 0.125, 0.25]),
-        vec![2, n_taps],
-        u16s(&[N_HIDDEN as u16]),
+        head(2, variant.n_taps),
         level(0, 3, 27),
         level(2, 9, 16),
-        vec![9; N_HIDDEN],
-        (0..n_out).map(|i| if i < 2 * C { 9 } else { 12 }).collect(),
-        (0..N_HIDDEN).flat_map(|i| (1000 * i as i32).to_le_bytes()).collect(),
-        (0..n_out).flat_map(|i| (100 * i as i32 - 2000).to_le_bytes()).collect(),
-        (0..8 * N_HIDDEN).map(|i| (i * 37 + 11) as u8).collect(),
-        (0..N_HIDDEN * n_out).map(|i| (i * 29 + 5) as u8 >> 3).collect(),
-        (0..first_tap(F, n_taps.into())).map(|i| (i * 59 + 40) as u8).collect(),
+        network(8),
+        (0..first_tap(F, variant.n_taps.into())).map(|i| (i * 59 + 40) as u8).collect(),
         (0..22).map(|i| (i * 101 + 3) as u8).collect(),
     ]
     .concat()
+}
+
+/// The network and the hidden units of an anchor of a chunk, from the anchors before it.
+pub(super) fn hidden<'c, 'a>(
+    context: &'c Context<'a>,
+    anchors: &[Anchor],
+    index: usize,
+) -> (Network<'c, 'a>, Vec<i16>) {
+    let (mut inputs, mut hidden) = (vec![0; context.n_inputs()], vec![0; context.n_hidden()]);
+    let Some(shifts) = context.level_shifts() else {
+        context.features(cell(anchors[index].code), &mut inputs);
+        let network = context.network(0);
+        network.hidden(&inputs, &mut hidden);
+        return (network, hidden);
+    };
+    let (mut trail, mut network) = (Trail::default(), context.network(0));
+    // What the anchors that began the current cells of levels 1 and 2 give.
+    let mut given = [vec![], vec![]];
+    for anchor in &anchors[..=index] {
+        let place = trail.next(shifts, &context.frame(), cell(anchor.code));
+        network = context.network(place.level);
+        context.follow(&place, &given[place.level.min(1)], &mut inputs);
+        network.hidden(&inputs, &mut hidden);
+        let steps = network.steps(&hidden);
+        let row = anchor.symbols[..F + 6].iter().enumerate().map(|(channel, &symbol)| {
+            let group = if channel < F { Group::Feature } else { Group::LogScale };
+            steps.of(group).parent_input(group, symbol.into())
+        });
+        let row: Vec<i16> = row.collect();
+        given[..place.level].fill(row);
+    }
+    (network, hidden)
 }
 
 /// The lattice coordinates of a code.
@@ -199,7 +248,7 @@ fn chunk_words(anchors: &[Anchor], variant: Variant) -> Vec<u8> {
     let trie = TrieModel::new(&nodes);
     let frequencies = mask_frequencies();
     let masks = MaskModel::new(&frequencies);
-    let section = context_section(variant.n_taps);
+    let section = context_section(variant);
     let context = Context::parse(&section, F, 6, C).expect("a sound context");
     let mut slots = Vec::new();
     for (index, anchor) in anchors.iter().enumerate() {
@@ -236,19 +285,17 @@ fn chunk_words(anchors: &[Anchor], variant: Variant) -> Vec<u8> {
                 });
             }
         }
-        let (mut features, mut hidden) = (vec![0; context.n_inputs()], vec![0; context.n_hidden()]);
-        context.features(cell(anchor.code), &mut features);
-        context.hidden(&features, &mut hidden);
-        let steps = context.steps(&hidden);
+        let (network, hidden) = hidden(&context, anchors, index);
+        let steps = network.steps(&hidden);
         let mut residuals = Vec::new();
         for (channel, &symbol) in anchor.symbols.iter().enumerate() {
             if channel >= F + 6 && anchor.mask >> ((channel - F - 6) / 3) & 1 == 0 {
                 continue;
             }
             if variant.context {
-                let slots_of_symbol = context.model(channel, &steps, &hidden, &residuals).slots(symbol);
+                let slots_of_symbol = network.model(channel, &steps, &hidden, &residuals).slots(symbol);
                 if channel < F {
-                    residuals.push(context.residual(channel, &steps, &hidden, symbol));
+                    residuals.push(network.residual(channel, &steps, &hidden, symbol));
                 }
                 let slot = |&(start, frequency)| Slot { symbol: (), start, frequency };
                 slots.extend(slots_of_symbol.as_slice().iter().map(slot));
@@ -299,7 +346,7 @@ pub(super) fn bundle(variant: Variant) -> Vec<u8> {
     if variant.masks {
         sections.push((3, mask_frequencies().concat().into_flattened()));
     }
-    sections.push(if variant.context { (5, context_section(variant.n_taps)) } else { (4, tables) });
+    sections.push(if variant.context { (5, context_section(variant)) } else { (4, tables) });
     if variant.unknown_section {
         sections.push((200, b"from the future".to_vec()));
     }

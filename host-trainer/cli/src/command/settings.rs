@@ -18,7 +18,8 @@ use crate::config::{CaptureOptions, RunConfig};
 /// How good a scene becomes, and how large.
 #[derive(clap::Args)]
 pub(crate) struct QualityOptions {
-    /// Kind of scene: scaffold (Scaffold-GS) is trained for the image alone, hac (HAC) and hac-plus (HAC++) for image and size
+    /// Kind of scene: scaffold (Scaffold-GS) is trained for the image alone; hac (HAC), hac-plus (HAC++) and contextgs (ContextGS)
+    /// for image and size
     /// [default: scaffold for train without a device, hac elsewhere]
     #[arg(long, value_parser = one_of::<Backbone>(BACKBONES), help_heading = QUALITY)]
     backbone: Option<Backbone>,

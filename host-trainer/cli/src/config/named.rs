@@ -9,7 +9,7 @@ use serde::de::value::{Error, StrDeserializer};
 pub(crate) const SURFACES: &[&str] = &["matte", "mixed", "glossy"];
 pub(crate) const CODERS: &[&str] = &["auto", "static", "context"];
 pub(crate) const TARGETS: &[&str] = &["cortex-m4", "cortex-m7", "riscv32imac"];
-pub(crate) const BACKBONES: &[&str] = &["scaffold", "hac", "hac-plus"];
+pub(crate) const BACKBONES: &[&str] = &["scaffold", "hac", "hac-plus", "contextgs"];
 pub(crate) const SPLITS: &[&str] = &["test", "train"];
 pub(crate) const BACKGROUNDS: &[&str] = &["black", "white", "learned"];
 pub(crate) const LPIPS_RANGES: &[&str] = &["zero-to-one", "minus-one-to-one"];

@@ -4,7 +4,7 @@ mod dump;
 
 use half::f16;
 use pocketsplat_core::bundle::{AnchorModels, AnchorSite, Chunk, PROTOCOL_CODE, Section};
-use pocketsplat_core::context::first_tap;
+use pocketsplat_core::context::{N_LEVELS, N_POSITION_INPUTS, first_tap};
 
 use pocketsplat_core::{Bundle, DecodeError, SectionKind};
 
@@ -181,7 +181,7 @@ impl<'f> Annotator<'f> {
 
     fn context(&mut self) {
         let Some(context) = self.bundle.context() else { return };
-        let (n_in, n_hidden, n_out) = (context.n_inputs(), context.n_hidden(), context.n_outputs());
+        let (n_hidden, n_out) = (context.n_hidden(), context.n_outputs());
         let dump = &mut self.dump;
         dump.heading("context");
         dump.array("grid min", 3, i32::from_le_bytes);
@@ -198,12 +198,21 @@ impl<'f> Annotator<'f> {
             dump.field(&format!("level {index}, n_rows"), u32::from_le_bytes);
             n_rows += level.n_rows as usize;
         }
-        dump.array::<1, _>("shift1", n_hidden, |[byte]| byte);
-        dump.array::<1, _>("shift2", n_out, |[byte]| byte);
-        dump.array("b1", n_hidden, i32::from_le_bytes);
-        dump.array("b2", n_out, i32::from_le_bytes);
-        dump.array("W1", n_hidden * n_in, i8::from_le_bytes);
-        dump.array("W2", n_out * n_hidden, i8::from_le_bytes);
+        let levels = if context.level_shifts().is_some() { (0..N_LEVELS).rev() } else { (0..1).rev() };
+        if context.level_shifts().is_some() {
+            dump.array::<1, _>("shifts of levels", 3, |[byte]| byte);
+            dump.field::<1, _>("reserved", |[byte]| byte);
+        }
+        for level in levels {
+            let n_parent = if level + 1 < N_LEVELS { context.n_parent_inputs() } else { 0 };
+            let n_in = if context.level_shifts().is_some() { N_POSITION_INPUTS + n_parent } else { context.n_inputs() };
+            dump.array::<1, _>("shift1", n_hidden, |[byte]| byte);
+            dump.array::<1, _>("shift2", n_out, |[byte]| byte);
+            dump.array("b1", n_hidden, i32::from_le_bytes);
+            dump.array("b2", n_out, i32::from_le_bytes);
+            dump.array("W1", n_hidden * n_in, i8::from_le_bytes);
+            dump.array("W2", n_out * n_hidden, i8::from_le_bytes);
+        }
         dump.array("taps", first_tap(context.feature_dim(), context.n_taps()), i8::from_le_bytes);
         dump.array::<1, _>("grid rows", n_rows.div_ceil(2), |[byte]| format!("{byte:08b}"));
     }

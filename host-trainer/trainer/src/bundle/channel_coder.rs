@@ -16,11 +16,11 @@ pub(super) enum ChannelCoder<'c> {
     Context(Context<'c>),
 }
 
-impl ChannelCoder<'_> {
+impl<'c> ChannelCoder<'c> {
     /// Appends the slots of an anchor's symbols `[n_channels]`, those of its drawn offsets alone.
     pub(super) fn push(
         &self,
-        work: &mut ContextWork,
+        work: &mut ContextWork<'c>,
         shape: &ModelShape,
         lattice: [i32; 3],
         drawn: u32,
@@ -39,11 +39,12 @@ impl ChannelCoder<'_> {
             Self::Context(context) => {
                 let steps = work.enter(context, lattice);
                 for (channel, symbol, name) in coded {
-                    let slots = work.next(context, channel, &steps, symbol).slots(symbol);
+                    let slots = work.next(channel, &steps, symbol).slots(symbol);
                     for &(start, frequency) in slots.as_slice() {
                         list.push(name.part(), &Slot { symbol: (), start, frequency });
                     }
                 }
+                work.leave(&steps, symbols);
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use pocketsplat_core::context::{Context, Group, N_GROUPS, Steps};
+use pocketsplat_core::context::{Context, Group, N_GROUPS, Steps, Trail};
 use pocketsplat_core::entropy::NormalModel;
 
 use super::stream::Part;
@@ -66,34 +66,75 @@ impl fmt::Display for ChannelName {
 }
 
 /// The groups of channels in the order of their steps.
-pub(super) const GROUPS: [Group; N_GROUPS] = [Group::Feature, Group::LogScale, Group::Offset];
+pub(crate) const GROUPS: [Group; N_GROUPS] = [Group::Feature, Group::LogScale, Group::Offset];
 
-/// Buffers of the context model.
+/// The context model on its way through the anchors of a chunk.
 #[derive(Default)]
-pub(super) struct ContextWork {
-    features: Vec<i16>,
+pub(crate) struct ContextWork<'c> {
+    inputs: Vec<i16>,
     hidden: Vec<i16>,
     /// Of the anchor's features so far, where there are taps.
     residuals: Vec<i16>,
+    /// Where the current cells of levels began.
+    trail: Trail,
+    /// The level of the anchor entered last.
+    at: Option<(usize, Context<'c>)>,
+    /// What the anchors that began the current cells of levels 1 and 2 give.
+    given: [Vec<i16>; 2],
 }
 
-impl ContextWork {
-    /// Evaluates the hidden layer for an anchor and returns its steps.
-    pub(super) fn enter(&mut self, context: &Context<'_>, lattice: [i32; 3]) -> Steps {
-        self.features.resize(context.n_inputs(), 0);
+impl<'c> ContextWork<'c> {
+    /// Evaluates the hidden layer for the next anchor of a chunk and returns its steps.
+    pub(crate) fn enter(&mut self, context: &Context<'c>, lattice: [i32; 3]) -> Steps {
+        self.inputs.resize(context.n_inputs(), 0);
         self.hidden.resize(context.n_hidden(), 0);
-        context.features(lattice, &mut self.features);
-        context.hidden(&self.features, &mut self.hidden);
+        let level = match context.place(&mut self.trail, lattice) {
+            None => {
+                context.features(lattice, &mut self.inputs);
+                0
+            }
+            Some(place) => {
+                context.follow(&place, &self.given[place.level.min(1)], &mut self.inputs);
+                place.level
+            }
+        };
+        let network = context.network(level);
+        network.hidden(&self.inputs, &mut self.hidden);
         self.residuals.clear();
-        context.steps(&self.hidden)
+        self.at = Some((level, *context));
+        network.steps(&self.hidden)
     }
 
     /// The distribution of the next channel that is coded of the anchor entered last; `symbol` is what it turns out to be.
-    pub(super) fn next(&mut self, context: &Context<'_>, channel: usize, steps: &Steps, symbol: i16) -> NormalModel {
-        let model = context.model(channel, steps, &self.hidden, &self.residuals);
+    ///
+    /// # Panics
+    /// Before any anchor.
+    pub(super) fn next(&mut self, channel: usize, steps: &Steps, symbol: i16) -> NormalModel {
+        let (level, context) = self.at.expect("an anchor was entered");
+        let network = context.network(level);
+        let model = network.model(channel, steps, &self.hidden, &self.residuals);
         if self.residuals.len() < context.n_residuals() {
-            self.residuals.push(context.residual(channel, steps, &self.hidden, symbol));
+            self.residuals.push(network.residual(channel, steps, &self.hidden, symbol));
         }
         model
+    }
+
+    /// Goes on from the anchor entered last, whose symbols are known now: others may follow it.
+    ///
+    /// * `symbols`: `[n_channels]`, of which features and log-scales count.
+    pub(crate) fn leave(&mut self, steps: &Steps, symbols: &[i16]) {
+        let Some((level @ 1.., context)) = self.at else { return };
+        let given: Vec<i16> = symbols[..context.n_parent_inputs()]
+            .iter()
+            .enumerate()
+            .map(|(channel, symbol)| {
+                let group = context.group(channel);
+                steps.of(group).parent_input(group, (*symbol).into())
+            })
+            .collect();
+        if level > 1 {
+            self.given[1].clone_from(&given);
+        }
+        self.given[0] = given;
     }
 }

@@ -47,7 +47,7 @@ impl<'b> Models<'b> {
     }
 }
 
-impl Models<'_> {
+impl<'c> Models<'c> {
     /// The slots of a chunk in reading order: of each anchor position, masks, channels.
     pub(super) fn slots(&self, rows: ChunkRows<'_>) -> SlotList {
         let codes: Vec<u64> = rows.lattice.iter().map(|&cell| self.lattice.frame.code(cell)).collect();

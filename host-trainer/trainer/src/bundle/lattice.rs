@@ -10,6 +10,7 @@ use pocketsplat_core::entropy::{Children, FREQUENCY_TOTAL, N_TRIE_CONTEXTS, Slot
 use super::WriteError;
 use super::frequencies::frequencies;
 use super::stream::{Part, SlotList};
+use crate::ops::file_order;
 
 /// The bit of the root in a set of levels.
 const TOP_LEVEL: u64 = 1 << 63;
@@ -41,18 +42,19 @@ pub(super) struct LatticeModelDraft {
 }
 
 impl LatticeFrame {
-    /// The smallest frame of all `cells`.
+    /// The smallest frame of all `cells` whose lowest corner is a multiple of 2^shift.
     ///
     /// # Errors
     /// [`WriteError::BeyondLattice`] and [`WriteError::LatticeTooWide`].
-    pub(super) fn of(cells: &[[i32; 3]]) -> Result<Self, WriteError> {
+    pub(super) fn of(cells: &[[i32; 3]], shift: u8) -> Result<Self, WriteError> {
         for (anchor, cell) in cells.iter().enumerate() {
             if let Some(&found) = cell.iter().find(|c| c.unsigned_abs() > MAX_LATTICE_MIN) {
                 return Err(WriteError::BeyondLattice { anchor, found, limit: MAX_LATTICE_MIN as i32 });
             }
         }
         let along = |axis: usize| cells.iter().map(move |cell| cell[axis]);
-        let min: [i32; 3] = std::array::from_fn(|axis| along(axis).min().unwrap_or_default());
+        let min: [i32; 3] =
+            std::array::from_fn(|axis| file_order::aligned(along(axis).min().unwrap_or_default(), shift));
         let spans = (0..3).map(|axis| along(axis).max().unwrap_or_default().abs_diff(min[axis]));
         let span = spans.max().unwrap_or_default();
         let bits_per_axis = u32::BITS - span.leading_zeros();
@@ -65,9 +67,7 @@ impl LatticeFrame {
     /// Morton code of a cell: bits of z, y and x in turn from the highest on, x lowest.
     pub(super) fn code(&self, cell: [i32; 3]) -> u64 {
         let offset: [u32; 3] = std::array::from_fn(|axis| cell[axis].abs_diff(self.min[axis]));
-        (0..self.bits_per_axis).fold(0, |code, bit| {
-            (0..3).fold(code, |code, axis| code | (u64::from((offset[axis] >> bit) & 1) << (3 * bit + axis as u32)))
-        })
+        file_order::code(offset, self.bits_per_axis)
     }
 
     /// Levels of the trie, leaves apart.

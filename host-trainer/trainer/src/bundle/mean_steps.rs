@@ -1,7 +1,9 @@
 //! One step a group for a scene whose context model has steps that follow the place.
 
 use super::WriteError;
-use super::channels::{ContextWork, GROUPS};
+use super::order::Placement;
+use super::quantise::{StepSource, quantise};
+use super::write::WriteOptions;
 use crate::integer_model;
 use crate::scene::{QuantisationSteps, Scene};
 
@@ -16,16 +18,15 @@ pub fn mean_steps(scene: &Scene<f32>) -> Result<QuantisationSteps, WriteError> {
     let model = scene.context.as_ref().ok_or(WriteError::NoContext)?;
     let section = integer_model::section(model, scene.shape.values_per_anchor())?;
     let context = integer_model::parse(&section, &scene.shape).map_err(WriteError::ReadBack)?;
-    let mut work = ContextWork::default();
-    let (mut n, mut sums) = (0_usize, [0_i64; 3]);
-    let anchors = &scene.anchors;
-    for anchor in (0..anchors.len()).filter(|anchor| anchors.has_drawn(*anchor)) {
-        n += 1;
-        let steps = work.enter(&context, anchors.lattice[anchor]);
-        for (sum, group) in sums.iter_mut().zip(GROUPS) {
-            *sum += i64::from(steps.exponent(group));
+    let placement = Placement::of(scene, None, &[0.0], WriteOptions::default().chunk_anchors.into())?;
+    let rows = quantise(scene, &placement, StepSource::Context(&context))?;
+    let (n, mut sums) = (rows.steps.len(), [0.0; 3]);
+    for steps in &rows.steps {
+        for ((sum, step), base) in sums.iter_mut().zip(steps).zip(model.base_steps) {
+            // Whole eighths of an octave, so that the order does not matter.
+            *sum += (f64::from(step / base).log2() * 8.0).round();
         }
     }
-    let mean = |group: usize| model.base_steps[group] * (sums[group] as f64 / n.max(1) as f64 / 8.0).exp2() as f32;
+    let mean = |group: usize| model.base_steps[group] * (sums[group] / n.max(1) as f64 / 8.0).exp2() as f32;
     Ok(std::array::from_fn(mean).into())
 }

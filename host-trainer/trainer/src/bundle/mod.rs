@@ -30,7 +30,9 @@ mod write;
 #[cfg(test)]
 mod tests;
 
+pub use crate::ops::file_order::PRUNING_RATES;
 pub use channels::ChannelName;
+pub(crate) use channels::{ContextWork, GROUPS};
 pub use decoded::{decoded_heads, decoded_scene, for_each_chunk, normalisation_of, shape_of};
 pub use error::WriteError;
 pub use layout::{CodedScene, Written};
@@ -40,7 +42,7 @@ pub use order::check_pruning_rates;
 pub use quantise::check_steps;
 pub use size::{SizePart, SizeReport};
 pub use stream::PartBits;
-pub use write::{ChannelCoding, PRUNING_RATES, WriteOptions, code, write};
+pub use write::{ChannelCoding, WriteOptions, code, write};
 
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::Normalisation;

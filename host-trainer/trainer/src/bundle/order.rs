@@ -6,6 +6,7 @@ use pocketsplat_core::bundle::MAX_TIERS;
 
 use super::WriteError;
 use super::lattice::LatticeFrame;
+use crate::ops::file_order;
 use crate::scene::Scene;
 
 /// The anchors of a scene as a bundle holds them.
@@ -38,7 +39,9 @@ impl Placement {
         chunk_anchors: usize,
     ) -> Result<Self, WriteError> {
         let n_offsets = scene.shape.n_offsets;
-        let frame = LatticeFrame::of(&scene.anchors.lattice)?;
+        // Where anchors follow anchors, the curve must go through their cells one after the other.
+        let [_, shift, _] = scene.context.as_ref().and_then(|model| model.shifts).unwrap_or_default();
+        let frame = LatticeFrame::of(&scene.anchors.lattice, shift)?;
         let drawn_bits = |anchor: usize| {
             (0..n_offsets).fold(0, |bits, k| bits | (u32::from(scene.anchors.is_drawn(anchor * n_offsets + k)) << k))
         };
@@ -57,20 +60,11 @@ impl Placement {
                     let (needed, found) = (scene.anchors.len(), importance.len());
                     return Err(WriteError::Length { array: "importance", needed, found });
                 }
-                // Stable: of equally important anchors the earlier on the curve comes first.
-                order.sort_by(|&a, &b| importance[b].total_cmp(&importance[a]));
+                file_order::sort_by_importance(&mut order, importance);
                 tier_ends(order.len(), pruning_rates)?
             }
         };
-        let (mut chunks, mut tier_chunks, mut begin) = (Vec::new(), Vec::new(), 0);
-        for end in tier_ends {
-            order[begin..end].sort_by_cached_key(code);
-            // Chunks of a tier differ by one anchor at most.
-            let (n, n_chunks) = (end - begin, (end - begin).div_ceil(chunk_anchors));
-            chunks.extend((0..n_chunks).map(|i| begin + i * n / n_chunks..begin + (i + 1) * n / n_chunks));
-            tier_chunks.push(chunks.len());
-            begin = end;
-        }
+        let (chunks, tier_chunks) = file_order::cut(&mut order, &tier_ends, chunk_anchors, code);
         let codes = order.iter().map(code).collect();
         let drawn = order.iter().map(|&anchor| all_drawn[anchor]).collect();
         Ok(Self { frame, order, codes, drawn, chunks, tier_chunks })
@@ -93,7 +87,7 @@ pub fn check_pruning_rates(pruning_rates: &[f32]) -> Result<(), WriteError> {
 /// Anchors up to and with each tier.
 fn tier_ends(n_anchors: usize, pruning_rates: &[f32]) -> Result<Vec<usize>, WriteError> {
     check_pruning_rates(pruning_rates)?;
-    Ok(pruning_rates.iter().map(|&rate| ((1.0 - f64::from(rate)) * n_anchors as f64).round() as usize).collect())
+    Ok(file_order::tier_ends(n_anchors, pruning_rates))
 }
 
 #[cfg(test)]

@@ -99,15 +99,19 @@ pub(super) fn quantise(
         let mut work = ContextWork::default();
         let mut rows = (Vec::with_capacity(chunk.len() * n_channels), Vec::with_capacity(chunk.len()));
         for row in chunk.clone() {
-            let steps = match steps {
-                StepSource::Fixed(steps) => steps,
+            let (own, values) = match steps {
+                StepSource::Fixed(steps) => (None, steps),
                 StepSource::Context(context) => {
                     let steps = work.enter(context, lattice[row]);
-                    GROUPS.map(|group| steps.value(group))
+                    (Some(steps), GROUPS.map(|group| steps.value(group)))
                 }
             };
-            push_symbols(scene, placement.order[row], placement.drawn[row], steps, &mut rows.0)?;
-            rows.1.push(steps);
+            let first = rows.0.len();
+            push_symbols(scene, placement.order[row], placement.drawn[row], values, &mut rows.0)?;
+            if let Some(steps) = own {
+                work.leave(&steps, &rows.0[first..]);
+            }
+            rows.1.push(values);
         }
         Ok(rows)
     });

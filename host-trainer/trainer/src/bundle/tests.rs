@@ -81,7 +81,7 @@ fn with_context(scene: Scene<f32>, seed: u64) -> Scene<f32> {
     for row in &mut model.rows {
         *row = rng.random_range(-1.0..1.0);
     }
-    for group in model.network.mlp.groups_mut() {
+    for group in model.networks[0].mlp.groups_mut() {
         group.iter_mut().for_each(|weight| *weight = rng.random_range(-0.3..0.3));
     }
     // Deviations of 0.35, 0.41, 0.58; log-scales around −2.5.
@@ -89,12 +89,32 @@ fn with_context(scene: Scene<f32>, seed: u64) -> Scene<f32> {
     for channel in 0..n_channels {
         let group =
             usize::from(channel >= scene.shape.feature_dim) + usize::from(channel >= scene.shape.feature_dim + 6);
-        model.network.mlp.b2[channel] += [0.0, -50.0, 0.0][group];
-        model.network.mlp.b2[n_channels + channel] += [1.8, 3.0, 1.5][group];
+        model.networks[0].mlp.b2[channel] += [0.0, -50.0, 0.0][group];
+        model.networks[0].mlp.b2[n_channels + channel] += [1.8, 3.0, 1.5][group];
     }
     // Every other scene has taps.
     let mut model = model.with_taps(&scene.shape, if seed.is_multiple_of(2) { 0 } else { 4 }, 0.0);
-    model.network.taps.iter_mut().for_each(|tap| *tap = rng.random_range(-0.6..0.6));
+    model.networks[0].taps.iter_mut().for_each(|tap| *tap = rng.random_range(-0.6..0.6));
+    Scene { context: Some(model), ..scene }
+}
+
+/// The scene with a context of random weights in which anchors follow anchors.
+fn with_levels(scene: Scene<f32>, seed: u64) -> Scene<f32> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let frame = GridFrame::spanning([-100; 3], [100; 3]);
+    let mut model = ContextModel::following(&scene.shape, frame, [4, 6, 8], 12, [0.1, 0.05, 0.2], 0.0);
+    let n_channels = scene.shape.values_per_anchor();
+    for network in &mut model.networks {
+        for group in network.mlp.groups_mut() {
+            group.iter_mut().for_each(|weight| *weight = rng.random_range(-0.3..0.3));
+        }
+        for channel in 0..n_channels {
+            let group =
+                usize::from(channel >= scene.shape.feature_dim) + usize::from(channel >= scene.shape.feature_dim + 6);
+            network.mlp.b2[channel] += [0.0, -50.0, 0.0][group];
+            network.mlp.b2[n_channels + channel] += [1.8, 3.0, 1.5][group];
+        }
+    }
     Scene { context: Some(model), ..scene }
 }
 

@@ -14,6 +14,7 @@ use super::quantise::{StepSource, SymbolRows, check_lengths, check_steps, quanti
 use super::table::TableSet;
 use super::{BundleInfo, WriteError, directory, heads};
 use crate::integer_model;
+use crate::ops::file_order::{CHUNK_ANCHORS, PRUNING_RATES};
 use crate::scene::{QuantisationSteps, Scene};
 
 /// What gives the channels their steps, and their symbols their frequencies.
@@ -31,9 +32,6 @@ impl Default for ChannelCoding {
     }
 }
 
-/// Pruning rates of the tiers where nobody asks for others.
-pub const PRUNING_RATES: [f32; 6] = [0.40, 0.30, 0.20, 0.10, 0.05, 0.0];
-
 /// How a scene is written.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WriteOptions {
@@ -46,7 +44,7 @@ pub struct WriteOptions {
     /// Bits of the fraction of the heads' weights, those of W1 and of W2, where coding them saves a tenth of their bytes;
     /// without it they stay halves. Nine cost no more than 0.01 dB and save a fifth to a third (`docs/benchmarks.md`).
     pub head_fraction_bits: Option<[u8; 2]>,
-    /// Anchors of a chunk at most: neighbours enough to pay for its record, few enough to skip.
+    /// Anchors of a chunk at most.
     pub chunk_anchors: u16,
 }
 
@@ -57,7 +55,7 @@ impl Default for WriteOptions {
             importance: None,
             pruning_rates: PRUNING_RATES.to_vec(),
             head_fraction_bits: Some([9, 9]),
-            chunk_anchors: 256,
+            chunk_anchors: CHUNK_ANCHORS,
         }
     }
 }

@@ -11,6 +11,7 @@ pub mod adaptive_step;
 pub mod anchor_bits;
 mod blur;
 pub mod detail;
+pub mod file_order;
 pub mod grid_bits;
 pub mod hash_grid;
 pub mod head;

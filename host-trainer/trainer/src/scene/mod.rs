@@ -224,7 +224,8 @@ impl<R: Real> Scene<R> {
                 frame: context.frame,
                 levels: context.levels.clone(),
                 rows: all(&context.rows),
-                network: context.network.map(|w| T::real(w.into())),
+                networks: context.networks.iter().map(|network| network.map(|w| T::real(w.into()))).collect(),
+                shifts: context.shifts,
                 base_steps: context.base_steps,
             }),
         }

@@ -3,12 +3,13 @@
 use super::buffer::refill;
 use super::coded::{Coded, Network, Weights};
 use super::coding::Coding;
+use super::parents::Parents;
 use crate::ops::neural_gaussians::{Gaussian, HeadOutputs, Source};
 use crate::ops::project::{Footprint, Splat};
 use crate::ops::simd::Level;
 use crate::ops::{Pinhole, detail, head, head_input, neural_gaussians, project, volume};
 use crate::real::Real;
-use crate::scene::{Anchors, Head, Heads, ModelShape, Scene};
+use crate::scene::{Anchors, ContextModel, Head, Heads, ModelShape, Scene};
 
 /// A block of visible anchors on its way through the chain; buffers are kept from step to step.
 #[derive(Clone, Debug)]
@@ -123,9 +124,15 @@ impl<R: Real> Block<R> {
         scene: &Scene<R>,
         coding: &Coding<'_, R>,
         network: Option<Network<'_, R>>,
+        parents: &Parents<R>,
     ) {
         let values = [&mut self.features, &mut self.log_scales, &mut self.offsets];
-        self.coded.forward(level, scene, coding, network, &self.anchors, values);
+        self.coded.forward(level, scene, coding, network, parents, &self.anchors, values);
+    }
+
+    /// Writes what its anchors give those that follow them; after [`Self::code`].
+    pub(super) fn give(&self, model: &ContextModel<R>, rounded: bool, parents: &mut Parents<R>) {
+        self.coded.give(model, rounded, &self.anchors, [&self.features, &self.log_scales], parents);
     }
 
     /// [`Self::code`] backwards, where it asked the context; after [`Self::backward`].

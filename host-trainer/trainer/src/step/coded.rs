@@ -1,10 +1,11 @@
 //! The values of a block of anchors as coding leaves them, and their rate.
 
-use pocketsplat_core::context::{FEATURES_PER_LEVEL, Group, MEAN_PARTS, N_GROUPS};
+use pocketsplat_core::context::{Group, MEAN_PARTS, N_GROUPS, Steps};
 use pocketsplat_core::entropy::EIGHTHS;
 
 use super::buffer::refill;
 use super::coding::{Coding, IntegerModel};
+use super::parents::{Parents, give_symbols, give_values};
 use crate::ops::noise::Stream;
 use crate::ops::simd::Level;
 use crate::ops::{adaptive_step, anchor_bits, hash_grid, head, mask, perturb};
@@ -17,14 +18,14 @@ const SAMPLE_DRAW: u32 = u32::MAX;
 /// The values of a block, or their gradients: `[n, F]`, `[n, 6]` or `[n, 4]`, `[n, 3K]`.
 pub(super) type Values<'a, R> = [&'a mut Vec<R>; N_GROUPS];
 
-/// The context network of a step.
+/// The context networks of a step.
 #[derive(Clone, Copy)]
 pub(super) struct Network<'a, R> {
     pub(super) model: &'a ContextModel<R>,
-    /// All its outputs: for the sample of the rate.
-    pub(super) whole: &'a ContextNetwork<R>,
-    /// [`steps_of`] it: for every visible anchor.
-    pub(super) steps: &'a Head<R>,
+    /// All outputs, by the level of the anchors: for the sample of the rate.
+    pub(super) whole: &'a [ContextNetwork<R>],
+    /// [`steps_of`] them: for every visible anchor.
+    pub(super) steps: &'a [Head<R>],
 }
 
 /// Weights of a step's rate terms.
@@ -41,6 +42,8 @@ pub(super) struct Weights<R> {
 /// What coding did to a block, kept for the way back; buffers are kept from step to step.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Coded<R> {
+    /// The level that its anchors all have; 0 where the context is a grid.
+    pub(super) anchor_level: usize,
     /// `[n]` places in the grid's cube.
     pub(super) units: Vec<[u16; 3]>,
     /// dL/d(grid features), `[n, 4·levels]`.
@@ -102,6 +105,8 @@ fn widths(shape: &ModelShape) -> [usize; N_GROUPS] {
 
 /// A head of zeros as wide as `like`, in the place of whatever was there.
 fn zeroed<'a, R: Real>(slot: &'a mut Option<Head<R>>, like: &Head<R>) -> &'a mut Head<R> {
+    // Blocks are of another level now and then.
+    *slot = slot.take().filter(|head| head.n_in == like.n_in);
     let head = slot.get_or_insert_with(|| Head::filled(like.n_in, like.n_hidden, like.n_out, R::ZERO));
     for group in head.groups_mut() {
         group.fill(R::ZERO);
@@ -112,17 +117,20 @@ fn zeroed<'a, R: Real>(slot: &'a mut Option<Head<R>>, like: &Head<R>) -> &'a mut
 impl<R: Real> Coded<R> {
     /// Puts coding's traces into the values of a block.
     ///
-    /// * `network`: where `coding` asks the context.
+    /// * `network`: where `coding` asks the context. * `parents`: of all anchors. * `anchors`: of one level.
+    #[expect(clippy::too_many_arguments, reason = "what a step and what a block is told")]
     pub(super) fn forward(
         &mut self,
         level: Level,
         scene: &Scene<R>,
         coding: &Coding<'_, R>,
         network: Option<Network<'_, R>>,
+        parents: &Parents<R>,
         anchors: &[u32],
         values: Values<'_, R>,
     ) {
         self.sampled.clear();
+        self.anchor_level = anchors.first().map_or(0, |anchor| parents.level(*anchor));
         let n = anchors.len();
         match (coding, network) {
             (Coding::Noise { stream, steps }, _) => {
@@ -136,9 +144,9 @@ impl<R: Real> Coded<R> {
                     let draw = stream.branch(*anchor).uniform(SAMPLE_DRAW);
                     (f64::from(draw) < rate.sample).then_some(row)
                 }));
-                self.predict(scene, network, anchors);
+                self.predict(scene, network, parents, anchors);
                 if let Some(exact) = exact {
-                    self.predict_quantised(scene, exact, anchors);
+                    self.predict_quantised(scene, exact, parents, anchors);
                 }
                 self.perturb(level, &scene.shape, exact.is_none().then_some(*stream), anchors, values);
             }
@@ -147,17 +155,23 @@ impl<R: Real> Coded<R> {
     }
 
     /// Predicts the steps of all anchors and the distributions of the sample.
-    fn predict(&mut self, scene: &Scene<R>, network: Network<'_, R>, anchors: &[u32]) {
+    fn predict(&mut self, scene: &Scene<R>, network: Network<'_, R>, parents: &Parents<R>, anchors: &[u32]) {
         let (model, n) = (network.model, anchors.len());
+        let (steps_head, mlp) = (&network.steps[self.anchor_level], &network.whole[self.anchor_level].mlp);
         let lattice = anchors.iter().map(|a| scene.anchors.lattice[*a as usize]);
         self.units.clear();
         self.units.extend(lattice.map(|cell| model.frame.unit(cell)));
-        let n_in = model.levels.len() * FEATURES_PER_LEVEL;
-        self.inputs.resize(n * n_in, R::ZERO);
-        hash_grid::forward(&model.levels, &model.rows, &self.units, &mut self.inputs);
-        self.hidden.resize(n * network.steps.n_hidden, R::ZERO);
+        let n_in = mlp.n_in;
+        if model.shifts.is_some() {
+            self.inputs.clear();
+            anchors.iter().for_each(|anchor| parents.push_inputs(*anchor, &mut self.inputs));
+        } else {
+            self.inputs.resize(n * n_in, R::ZERO);
+            hash_grid::forward(&model.levels, &model.rows, &self.units, &mut self.inputs);
+        }
+        self.hidden.resize(n * steps_head.n_hidden, R::ZERO);
         self.exponents.resize(n * N_GROUPS, R::ZERO);
-        head::forward(network.steps, &self.inputs, &mut self.hidden, &mut self.exponents);
+        head::forward(steps_head, &self.inputs, &mut self.hidden, &mut self.exponents);
         self.steps.resize(n * N_GROUPS, R::ZERO);
         let base_steps = model.base_steps.map(|step| R::real(step.into()));
         adaptive_step::forward(base_steps, &self.exponents, &mut self.steps);
@@ -167,14 +181,19 @@ impl<R: Real> Coded<R> {
         for row in self.sampled.iter().map(|row| *row as usize) {
             sample.inputs.extend_from_slice(&self.inputs[row * n_in..(row + 1) * n_in]);
         }
-        let mlp = &network.whole.mlp;
         sample.hidden.resize(self.sampled.len() * mlp.n_hidden, R::ZERO);
         sample.outputs.resize(self.sampled.len() * mlp.n_out, R::ZERO);
         head::forward(mlp, &sample.inputs, &mut sample.hidden, &mut sample.outputs);
     }
 
     /// Puts what the integers say in the place of what the floats say.
-    fn predict_quantised(&mut self, scene: &Scene<R>, exact: &IntegerModel<'_, R>, anchors: &[u32]) {
+    fn predict_quantised(
+        &mut self,
+        scene: &Scene<R>,
+        exact: &IntegerModel<'_, R>,
+        parents: &Parents<R>,
+        anchors: &[u32],
+    ) {
         let context = exact.context;
         let n_channels = scene.shape.values_per_anchor();
         let part = |output: i16, parts: i32| R::real(f64::from(output) / f64::from(parts));
@@ -182,19 +201,51 @@ impl<R: Real> Coded<R> {
         let mut sampled = self.sampled.iter().zip(self.sample.outputs.chunks_exact_mut(context.n_outputs())).peekable();
         let rows = self.exponents.chunks_exact_mut(N_GROUPS).zip(self.steps.chunks_exact_mut(N_GROUPS));
         for ((row, anchor), (exponents, steps)) in (0u32..).zip(anchors).zip(rows) {
-            context.features(scene.anchors.lattice[*anchor as usize], &mut features);
-            context.hidden(&features, &mut hidden);
-            let exact_steps = context.steps(&hidden);
+            let network = parents.enter(context, *anchor, scene.anchors.lattice[*anchor as usize], &mut features);
+            network.hidden(&features, &mut hidden);
+            let exact_steps = network.steps(&hidden);
             for (i, group) in [Group::Feature, Group::LogScale, Group::Offset].into_iter().enumerate() {
-                exponents[i] = part(context.output(2 * n_channels + i, &hidden), EIGHTHS);
+                exponents[i] = part(network.output(2 * n_channels + i, &hidden), EIGHTHS);
                 steps[i] = R::real(exact_steps.value(group).into());
             }
             if let Some((_, outputs)) = sampled.next_if(|(sampled, _)| **sampled == row) {
                 for (i, output) in outputs.iter_mut().enumerate() {
                     let parts = if i < n_channels { MEAN_PARTS } else { EIGHTHS };
-                    *output = part(context.output(i, &hidden), parts);
+                    *output = part(network.output(i, &hidden), parts);
                 }
             }
+        }
+    }
+
+    /// Writes what the block's anchors give those that follow them.
+    ///
+    /// * `values`: features and log-scales as [`Self::forward`] left them.
+    pub(super) fn give(
+        &self,
+        model: &ContextModel<R>,
+        rounded: bool,
+        anchors: &[u32],
+        values: [&[R]; 2],
+        parents: &mut Parents<R>,
+    ) {
+        let n = anchors.len().max(1);
+        let mut given = Vec::new();
+        for (row, anchor) in anchors.iter().enumerate() {
+            given.clear();
+            // Eighths of an octave.
+            #[expect(clippy::cast_possible_truncation, reason = "limited by the steps")]
+            let exponent = |i: usize| (self.exponents[row * N_GROUPS + i].into() * f64::from(EIGHTHS)).round() as i16;
+            let steps = Steps::new(model.base_steps, std::array::from_fn(exponent));
+            for (i, (group, values)) in [Group::Feature, Group::LogScale].into_iter().zip(values).enumerate() {
+                let width = values.len() / n;
+                let values = &values[row * width..][..width];
+                if rounded {
+                    give_symbols(&steps, group, values, &mut given);
+                } else {
+                    give_values(model.base_steps[i], i, values, &mut given);
+                }
+            }
+            parents.given_mut(*anchor).copy_from_slice(&given);
         }
     }
 
@@ -270,9 +321,10 @@ impl<R: Real> Coded<R> {
 
         refill(&mut self.d_inputs, self.inputs.len());
         self.d_hidden.resize(self.hidden.len(), R::ZERO);
-        let d_steps_head = zeroed(&mut self.d_steps_head, network.steps);
+        let (steps_head, mlp) = (&network.steps[self.anchor_level], &network.whole[self.anchor_level].mlp);
+        let d_steps_head = zeroed(&mut self.d_steps_head, steps_head);
         head::backward(
-            network.steps,
+            steps_head,
             &self.inputs,
             &self.hidden,
             &self.d_exponents,
@@ -283,9 +335,9 @@ impl<R: Real> Coded<R> {
         let sample = &mut self.sample;
         refill(&mut sample.d_inputs, sample.inputs.len());
         sample.d_hidden.resize(sample.hidden.len(), R::ZERO);
-        let d_whole = zeroed(&mut self.d_whole, &network.whole.mlp);
+        let d_whole = zeroed(&mut self.d_whole, mlp);
         head::backward(
-            &network.whole.mlp,
+            mlp,
             &sample.inputs,
             &sample.hidden,
             &sample.d_outputs,
@@ -293,7 +345,7 @@ impl<R: Real> Coded<R> {
             &mut sample.d_inputs,
             d_whole,
         );
-        let n_in = network.whole.mlp.n_in;
+        let n_in = mlp.n_in;
         for (row, d_sample) in self.sampled.iter().zip(sample.d_inputs.chunks_exact(n_in)) {
             let d_inputs = &mut self.d_inputs[*row as usize * n_in..(*row as usize + 1) * n_in];
             for (d, d_sample) in d_inputs.iter_mut().zip(d_sample) {
@@ -315,7 +367,7 @@ impl<R: Real> Coded<R> {
         mask_logits: &[R],
         d_mask_logits: &mut [R],
     ) {
-        let ContextNetwork { mlp, n_taps, taps } = network.whole;
+        let ContextNetwork { mlp, n_taps, taps } = &network.whole[self.anchor_level];
         let (k, n_out) = (shape.n_offsets, mlp.n_out);
         let widths = widths(shape);
         let base_steps = network.model.base_steps.map(|step| R::real(step.into()));

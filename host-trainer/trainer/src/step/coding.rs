@@ -46,8 +46,8 @@ pub enum Coding<'a, R> {
 pub struct IntegerModel<'a, R> {
     /// What decides.
     pub context: &'a Context<'a>,
-    /// The network that its integers stand for, through which gradients pass.
-    pub network: &'a ContextNetwork<R>,
+    /// The networks that its integers stand for, through which gradients pass.
+    pub networks: &'a [ContextNetwork<R>],
 }
 
 /// How much bits weigh in the loss.

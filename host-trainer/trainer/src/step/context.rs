@@ -16,28 +16,28 @@ use crate::scene::{ContextModel, ContextNetwork, Head, Scene};
 pub struct ContextGradients<R> {
     /// As [`ContextModel::rows`].
     pub rows: Vec<R>,
-    /// As [`ContextModel::network`].
-    pub network: ContextNetwork<R>,
+    /// As [`ContextModel::networks`].
+    pub networks: Vec<ContextNetwork<R>>,
 }
 
-/// The network that `coding` asks: that of the scene, or what its integers stand for.
-fn whole<'a, R>(model: &'a ContextModel<R>, coding: &Coding<'a, R>) -> &'a ContextNetwork<R> {
+/// The networks that `coding` asks: those of the scene, or what its integers stand for.
+fn whole<'a, R>(model: &'a ContextModel<R>, coding: &Coding<'a, R>) -> &'a [ContextNetwork<R>] {
     match coding {
-        Coding::Context { exact: Some(exact), .. } => exact.network,
-        _ => &model.network,
+        Coding::Context { exact: Some(exact), .. } => exact.networks,
+        _ => &model.networks,
     }
 }
 
-/// The part of the network that every visible anchor needs.
-pub(super) fn steps_head<R: Real>(scene: &Scene<R>, coding: &Coding<'_, R>) -> Option<Head<R>> {
+/// The part of the networks that every visible anchor needs.
+pub(super) fn steps_heads<R: Real>(scene: &Scene<R>, coding: &Coding<'_, R>) -> Option<Vec<Head<R>>> {
     let model = scene.context.as_ref().filter(|_| matches!(coding, Coding::Context { .. }))?;
-    Some(steps_of(&whole(model, coding).mlp))
+    Some(whole(model, coding).iter().map(|network| steps_of(&network.mlp)).collect())
 }
 
 pub(super) fn network<'a, R>(
     scene: &'a Scene<R>,
     coding: &Coding<'a, R>,
-    steps: Option<&'a Head<R>>,
+    steps: Option<&'a [Head<R>]>,
 ) -> Option<Network<'a, R>> {
     let (model, steps) = (scene.context.as_ref()?, steps?);
     Some(Network { model, whole: whole(model, coding), steps })
@@ -87,17 +87,28 @@ impl<R: Real> Workspace<R> {
 
     /// Adds up the blocks' gradients in block order, and takes those of the grid's features to its rows.
     fn context_gradients(&mut self, network: Network<'_, R>) -> ContextGradients<R> {
-        let Head { n_hidden, n_out, .. } = network.whole.mlp;
         let kept = self.d_context.take().filter(|kept| kept.rows.len() == network.model.rows.len());
         let mut gradients = kept.unwrap_or_else(|| ContextGradients {
             rows: vec![R::ZERO; network.model.rows.len()],
-            network: network.whole.map(|_| R::ZERO),
+            networks: network.whole.iter().map(|network| network.map(|_| R::ZERO)).collect(),
         });
-        let first = n_out - N_GROUPS;
-        let firsts = [0, 0, first * n_hidden, first];
-        for (g, (sum, first)) in gradients.network.mlp.groups_mut().into_iter().zip(firsts).enumerate() {
+        for (level, sums) in gradients.networks.iter_mut().enumerate() {
+            self.add_up(level, sums);
+        }
+        let parts: Vec<Part<'_, R>> =
+            self.blocks().iter().map(|b| Part { units: &b.coded.units, d_features: &b.coded.d_inputs }).collect();
+        hash_grid::backward(&network.model.levels, &network.model.rows, &parts, &mut gradients.rows);
+        gradients
+    }
+
+    /// Adds up the blocks' gradients of the network of one level.
+    fn add_up(&self, level: usize, sums: &mut ContextNetwork<R>) {
+        let blocks = || self.blocks().iter().filter(|block| block.coded.anchor_level == level);
+        let first = sums.mlp.n_out - N_GROUPS;
+        let firsts = [0, 0, first * sums.mlp.n_hidden, first];
+        for (g, (sum, first)) in sums.mlp.groups_mut().into_iter().zip(firsts).enumerate() {
             sum.fill(R::ZERO);
-            for block in self.blocks() {
+            for block in blocks() {
                 let parts = [(0, &block.coded.d_whole), (first, &block.coded.d_steps_head)];
                 for (first, part) in parts.into_iter().filter_map(|(first, head)| Some((first, head.as_ref()?))) {
                     for (sum, part) in sum[first..].iter_mut().zip(part.groups()[g]) {
@@ -106,14 +117,9 @@ impl<R: Real> Workspace<R> {
                 }
             }
         }
-        let d_taps = &mut gradients.network.taps;
-        d_taps.fill(R::ZERO);
-        for block in self.blocks() {
-            d_taps.iter_mut().zip(&block.coded.d_taps).for_each(|(sum, part)| *sum += *part);
+        sums.taps.fill(R::ZERO);
+        for block in blocks() {
+            sums.taps.iter_mut().zip(&block.coded.d_taps).for_each(|(sum, part)| *sum += *part);
         }
-        let parts: Vec<Part<'_, R>> =
-            self.blocks().iter().map(|b| Part { units: &b.coded.units, d_features: &b.coded.d_inputs }).collect();
-        hash_grid::backward(&network.model.levels, &network.model.rows, &parts, &mut gradients.rows);
-        gradients
     }
 }

@@ -6,10 +6,14 @@ mod coded;
 pub mod coding;
 mod context;
 mod loss;
+pub mod parents;
 mod probe;
 mod stages;
 mod target;
 
+use std::mem;
+
+use pocketsplat_core::context::N_LEVELS;
 use rayon::prelude::*;
 
 use crate::ops::project::{Footprint, Splat};
@@ -24,6 +28,7 @@ pub use coding::Phase;
 use coding::{Coding, RateReport};
 pub use context::ContextGradients;
 pub use loss::{ImagePair, Loss, LossWeights, StepInfo, Terms};
+use parents::Parents;
 pub use probe::ImageError;
 pub use stages::StageSeconds;
 use stages::StageTimer;
@@ -72,6 +77,8 @@ pub struct Workspace<R> {
     pub d_heads: Heads<R>,
     /// dL/d(background).
     pub d_background: [R; 3],
+    /// Which anchors follow which in the last step that asked a context of levels.
+    parents: Parents<R>,
     /// dL/d(context model), where the last step asked it.
     pub d_context: Option<ContextGradients<R>>,
 }
@@ -85,7 +92,15 @@ impl<R: Real> Workspace<R> {
     /// As [`Self::new`] with the instruction set chosen.
     pub fn with_level(shape: &ModelShape, level: Level) -> Self {
         let d_heads = Heads::filled(shape, R::ZERO);
-        Self { level, blocks: Vec::new(), n_blocks: 0, d_heads, d_background: [R::ZERO; 3], d_context: None }
+        Self {
+            level,
+            blocks: Vec::new(),
+            n_blocks: 0,
+            d_heads,
+            d_background: [R::ZERO; 3],
+            parents: Parents::default(),
+            d_context: None,
+        }
     }
 
     /// The instruction set that the loops run under.
@@ -93,7 +108,7 @@ impl<R: Real> Workspace<R> {
         self.level
     }
 
-    /// The blocks of visible anchors of the last step, with their gradients; anchors ascend through them.
+    /// The blocks of visible anchors of the last step, with their gradients; anchors of a level ascend through them.
     pub fn blocks(&self) -> &[Block<R>] {
         &self.blocks[..self.n_blocks]
     }
@@ -116,15 +131,22 @@ impl<R: Real> Workspace<R> {
             .filter(|a| is_kept(*a) && scene.anchors.has_drawn(*a) && prefilter::shows(scene, *a, camera))
             .map(|a| u32::try_from(a).expect("fewer than 2³² anchors"))
             .collect();
-        self.n_blocks = visible.len().div_ceil(BLOCK);
-        while self.blocks.len() < self.n_blocks {
-            self.blocks.push(Block::new(&scene.shape));
-        }
         let level = self.level;
-        self.blocks.par_iter_mut().zip(visible.par_chunks(BLOCK)).for_each(|(block, anchors)| {
-            block.gather(scene, anchors);
-            block.code(level, scene, coding, network);
-        });
+        let mut parents = mem::take(&mut self.parents);
+        let by_level = match network.and_then(|network| Some((network, network.model.shifts?))) {
+            Some((network, shifts)) => {
+                parents.update(&scene.shape, &scene.anchors, shifts, &network.model.frame);
+                self.code_parents(scene, coding, network, &mut parents);
+                let of = |l: usize| visible.iter().copied().filter(|a| parents.level(*a) == l).collect();
+                (0..N_LEVELS).map(of).collect()
+            }
+            None => {
+                parents = Parents::default();
+                vec![visible]
+            }
+        };
+        self.code_blocks(scene, &by_level, coding, network, &parents);
+        self.parents = parents;
         let context = timer.lap();
         self.blocks[..self.n_blocks].par_iter_mut().for_each(|block| block.forward(level, scene, camera));
         let splats: Vec<Splat<R>> = self.blocks().iter().flat_map(|b| b.splats.iter().copied()).collect();
@@ -136,6 +158,45 @@ impl<R: Real> Workspace<R> {
         let rasterise = timer.lap();
         let stages = StageSeconds { context, anchors, tiles, rasterise, ..StageSeconds::default() };
         DrawnView { stages, image, lists, splats, footprints }
+    }
+
+    /// Copies anchors into blocks, each of one level, and codes them.
+    fn code_blocks(
+        &mut self,
+        scene: &Scene<R>,
+        by_level: &[Vec<u32>],
+        coding: &Coding<'_, R>,
+        network: Option<Network<'_, R>>,
+        parents: &Parents<R>,
+    ) {
+        let parts: Vec<&[u32]> = by_level.iter().flat_map(|anchors| anchors.chunks(BLOCK)).collect();
+        self.n_blocks = parts.len();
+        while self.blocks.len() < self.n_blocks {
+            self.blocks.push(Block::new(&scene.shape));
+        }
+        let level = self.level;
+        self.blocks.par_iter_mut().zip(parts).for_each(|(block, anchors)| {
+            block.gather(scene, anchors);
+            block.code(level, scene, coding, network, parents);
+        });
+    }
+
+    /// Codes all anchors that others follow, the coarsest level first, wherever they stand: what they give is then known.
+    fn code_parents(
+        &mut self,
+        scene: &Scene<R>,
+        coding: &Coding<'_, R>,
+        network: Network<'_, R>,
+        parents: &mut Parents<R>,
+    ) {
+        let rounded = matches!(coding, Coding::Context { exact: Some(_), .. });
+        for level in (1..N_LEVELS).rev() {
+            let anchors = parents.of_level(level);
+            self.code_blocks(scene, &[anchors], coding, Some(network), parents);
+            for block in self.blocks() {
+                block.give(network.model, rounded, parents);
+            }
+        }
     }
 
     /// The image of a view, planes `[3, height, width]`, not clamped.
@@ -174,8 +235,8 @@ impl<R: Real> Workspace<R> {
     ) -> StepReport<R> {
         let weights = &loss.weights;
         let size_px = target.camera.size_px;
-        let steps_head = context::steps_head(scene, coding);
-        let network = context::network(scene, coding, steps_head.as_ref());
+        let steps_heads = context::steps_heads(scene, coding);
+        let network = context::network(scene, coding, steps_heads.as_deref());
         let DrawnView { mut stages, image: tiled, lists, splats, footprints } =
             self.draw(scene, target.camera, target.background, coding, network, loss.pruned_share);
         let mut timer = StageTimer::start();

@@ -12,7 +12,7 @@ use crate::finite_difference::{assert_piecewise_gradient, random};
 use crate::integer_model::{parse, rounded, section};
 use crate::ops::noise::Stream;
 use crate::scene::init::initial_scene;
-use crate::scene::{ContextModel, Head};
+use crate::scene::{ContextModel, ContextNetwork, Head};
 use crate::step::Phase;
 use crate::train::module::{Detail, Distribution, Modules, Pruning};
 use pocketsplat_capture::camera::Camera;
@@ -73,7 +73,7 @@ fn flatten<R: Real>(scene: &mut Scene<R>) -> Vec<&mut R> {
     for group in heads.each_mut().flat_map(Head::groups_mut) {
         all.extend(group.iter_mut());
     }
-    for group in context.iter_mut().flat_map(|context| context.network.groups_mut()) {
+    for group in context.iter_mut().flat_map(|context| &mut context.networks).flat_map(ContextNetwork::groups_mut) {
         all.extend(group.iter_mut());
     }
     all
@@ -88,7 +88,7 @@ fn gradients<R: Real>(scene: &Scene<R>, workspace: &Workspace<R>) -> Vec<f64> {
     workspace.blocks().iter().for_each(|block| block.copy_gradients(&scene.shape, &mut d.anchors));
     d.heads = workspace.d_heads.clone();
     if let (Some(context), Some(found)) = (&mut d.context, &workspace.d_context) {
-        context.network = found.network.clone();
+        context.networks = found.networks.clone();
     }
     flatten(&mut d).into_iter().map(|g| (*g).into()).collect()
 }
@@ -127,8 +127,28 @@ fn context(seed: u64, scene: &Scene<f64>) -> ContextModel<f64> {
     model = model.with_taps(&scene.shape, 2, 0.0);
     model.rows = random(seed, model.rows.len());
     // Outputs of less than 0.8, so that no step or scale is at the end of its range.
-    for (i, (group, size)) in (1..).zip(model.network.groups_mut().into_iter().zip([0.4, 0.4, 0.05, 0.3, 0.4])) {
+    for (i, (group, size)) in (1..).zip(model.networks[0].groups_mut().into_iter().zip([0.4, 0.4, 0.05, 0.3, 0.4])) {
         *group = random(seed + i, group.len()).iter().map(|v| size * v).collect();
+    }
+    model
+}
+
+/// The scene with anchors that share cells.
+fn close_together(mut scene: Scene<f64>) -> Scene<f64> {
+    for [_, y, z] in &mut scene.anchors.lattice {
+        (*y, *z) = (*y / 8, *z / 8);
+    }
+    scene
+}
+
+/// Networks of anchors that follow anchors, which say something.
+fn levels(seed: u64, scene: &Scene<f64>) -> ContextModel<f64> {
+    let frame = GridFrame::spanning([-60; 3], [60; 3]);
+    let mut model = ContextModel::following(&scene.shape, frame, [5, 6, 7], 6, [1.0, 0.1, 0.2], 0.0);
+    for (seed, network) in (seed..).step_by(10).zip(&mut model.networks) {
+        for (i, (group, size)) in (1..).zip(network.mlp.groups_mut().into_iter().zip([0.4, 0.4, 0.05, 0.3])) {
+            *group = random(seed + i, group.len()).iter().map(|v| size * v).collect();
+        }
     }
     model
 }
@@ -235,6 +255,34 @@ fn a_step_with_noise_and_rate_agrees_with_finite_differences() {
     }
 }
 
+/// Gradients stop at what a parent gives, so the parameters that move here are those that no anchor gives: offsets, and the
+/// networks of level 0.
+#[test]
+fn a_step_with_levels_agrees_with_finite_differences() {
+    let mut scene = close_together(scene(35, shapes()[1]));
+    scene.context = Some(levels(35, &scene));
+    let coding = Coding::Context { stream: Stream::of_run(35), rate: rate(0.0), exact: None };
+    let (_, workspace) = coded_step(&scene, &coding);
+    let level = |anchor: u32| workspace.parents.level(anchor);
+    let of_level: Vec<usize> = (0..3).map(|l| (0u32..20).filter(|a| level(*a) == l).count()).collect();
+    assert!(of_level.iter().all(|n| *n > 1), "anchors of all levels: {of_level:?}");
+    let analytic = gradients(&scene, &workspace);
+    let mut model = scene.context.clone().expect("given one");
+    let n_of = |network: &ContextNetwork<f64>| network.groups().iter().map(|group| group.len()).sum::<usize>();
+    let n_rest: usize = model.networks[1..].iter().map(n_of).sum();
+    let n = analytic.len() - n_rest;
+    let first = n - n_of(&model.networks[0]);
+    assert!(analytic[n..].iter().any(|g| *g != 0.0), "levels 1 and 2 learn");
+    let x: Vec<f64> = model.networks[0].groups_mut().into_iter().flatten().map(|p| *p).collect();
+    assert_piecewise_gradient("network of level 0", &x, &analytic[first..n], |x| {
+        let mut moved = scene.clone();
+        for (p, v) in flatten(&mut moved)[first..n].iter_mut().zip(x) {
+            **p = *v;
+        }
+        coded_step(&moved, &coding).0.loss
+    });
+}
+
 /// Shifting a feature of all anchors is shifting the biases behind it, and all rows of its level together.
 #[test]
 fn the_gradients_of_the_grid_are_those_of_its_features() {
@@ -249,9 +297,9 @@ fn the_gradients_of_the_grid_are_those_of_its_features() {
         rows = after;
         for f in 0..4 {
             let by_rows: f64 = own.iter().skip(f).step_by(4).sum();
-            let mlp = &model.network.mlp;
+            let mlp = &model.networks[0].mlp;
             let weights = mlp.w1.iter().skip(4 * l + f).step_by(mlp.n_in);
-            let by_biases: f64 = weights.zip(&gradients.network.mlp.b1).map(|(w, d)| w * d).sum();
+            let by_biases: f64 = weights.zip(&gradients.networks[0].mlp.b1).map(|(w, d)| w * d).sum();
             assert!((by_rows - by_biases).abs() < 1e-12 && by_rows != 0.0, "{by_rows} and {by_biases}");
         }
     }
@@ -317,29 +365,27 @@ fn masks_answer_for_their_anchors() {
 /// In the last phase the step draws the very values that a decoder reads.
 #[test]
 fn rounded_values_are_symbols_of_the_integer_model() {
-    rounding_twice_is_rounding_once(shapes()[1]);
-    rounding_twice_is_rounding_once(shapes()[6]);
+    rounding_twice_is_rounding_once(scene(61, shapes()[1]), context);
+    rounding_twice_is_rounding_once(scene(61, shapes()[6]), context);
+    rounding_twice_is_rounding_once(close_together(scene(61, shapes()[1])), levels);
 }
 
-fn rounding_twice_is_rounding_once(shape: ModelShape) {
-    let mut exact = scene(61, shape);
-    exact.context = Some(context(61, &exact));
-    let scene = exact.cast::<f32>();
+fn rounding_twice_is_rounding_once(mut exact: Scene<f64>, model: fn(u64, &Scene<f64>) -> ContextModel<f64>) {
+    exact.context = Some(model(61, &exact));
+    let (scene, shape) = (exact.cast::<f32>(), exact.shape);
     let (model, n_channels) = (scene.context.as_ref().unwrap(), scene.shape.values_per_anchor());
     let section = section(model, n_channels).unwrap();
     let context = parse(&section, &scene.shape).unwrap();
-    let network = rounded(model, n_channels).unwrap();
+    let networks = rounded(model, n_channels).unwrap();
     let step = |scene: &Scene<f32>| {
-        let exact = Some(IntegerModel { context: &context, network: &network });
+        let exact = Some(IntegerModel { context: &context, networks: &networks });
         coded_step(scene, &Coding::Context { stream: Stream::of_run(3), rate: rate(0.0), exact })
     };
     let (report, workspace) = step(&scene);
     let mut snapped = scene.clone();
-    for (a, cell) in scene.anchors.lattice.iter().enumerate() {
-        let (mut features, mut hidden) = (vec![0; context.n_inputs()], vec![0; context.n_hidden()]);
-        context.features(*cell, &mut features);
-        context.hidden(&features, &mut hidden);
-        let steps = context.steps(&hidden);
+    let parents = Parents::of_integers(&scene, &context);
+    for (a, anchor) in (0..scene.anchors.len()).zip(0..) {
+        let steps = parents.steps(&context, &scene, anchor);
         let arrays = [
             (Group::Feature, &mut snapped.anchors.features, scene.shape.feature_dim),
             (Group::LogScale, &mut snapped.anchors.log_scales, shape.n_log_scales()),
@@ -358,7 +404,8 @@ fn rounding_twice_is_rounding_once(shape: ModelShape) {
         "rounding twice is rounding once"
     );
     assert_eq!(coded_step(&snapped, &Coding::Raw).0.squared_error, report.squared_error);
-    let n = flatten(&mut snapped).len() - network.groups().map(<[f32]>::len).iter().sum::<usize>();
+    let n =
+        flatten(&mut snapped).len() - networks.iter().flat_map(ContextNetwork::groups).map(<[f32]>::len).sum::<usize>();
     assert!(gradients(&scene, &workspace)[..n] == gradients(&snapped, &repeated)[..n], "straight through");
 }
 

@@ -1,11 +1,12 @@
 //! What the context model says that values cost.
 
-use pocketsplat_core::context::{Context, Group, N_GROUPS};
+use pocketsplat_core::context::{Context, Group, N_GROUPS, N_LEVELS, Steps};
 use rayon::prelude::*;
 
 use crate::ops::simd::Level;
 use crate::ops::{anchor_bits, hash_grid, head, mask};
 use crate::scene::{ContextModel, ContextNetwork, Scene};
+use crate::step::parents::Parents;
 
 /// Anchors that one task looks at.
 const ROWS: usize = 512;
@@ -27,28 +28,50 @@ impl Bits {
     /// * `context`: the integers of the scene's model.
     pub fn of(scene: &Scene<f32>, context: &Context<'_>) -> Self {
         let Some(model) = &scene.context else { return Self::default() };
-        let anchors: Vec<usize> = (0..scene.anchors.len()).collect();
-        let parts: Vec<Self> =
-            anchors.par_chunks(ROWS).map(|rows| Self::of_rows(scene, model, context, rows)).collect();
-        let of_anchors = parts.iter().flat_map(|part| part.of_anchors.iter().copied()).collect();
-        let of_offsets = parts.iter().flat_map(|part| part.of_offsets.iter().copied()).collect();
-        Self { of_anchors, of_offsets }
+        let parents = Parents::of_integers(scene, context);
+        let (n, k) = (scene.anchors.len(), scene.shape.n_offsets);
+        let mut bits = Self { of_anchors: vec![[0.0; N_GROUPS]; n], of_offsets: vec![0.0; n * k] };
+        for level in 0..N_LEVELS {
+            let anchors: Vec<u32> = (0u32..).take(n).filter(|anchor| parents.level(*anchor) == level).collect();
+            let parts = anchors.par_chunks(ROWS).map(|rows| Self::of_rows(scene, model, context, &parents, rows));
+            for (rows, part) in anchors.chunks(ROWS).zip(parts.collect::<Vec<Self>>()) {
+                let found = part.of_anchors.into_iter().zip(part.of_offsets.chunks_exact(k));
+                for (a, (of_anchor, of_offsets)) in rows.iter().map(|a| *a as usize).zip(found) {
+                    bits.of_anchors[a] = of_anchor;
+                    bits.of_offsets[a * k..][..k].copy_from_slice(of_offsets);
+                }
+            }
+        }
+        bits
     }
 
-    fn of_rows(scene: &Scene<f32>, model: &ContextModel<f32>, context: &Context<'_>, rows: &[usize]) -> Self {
+    /// * `rows`: anchors of one level.
+    fn of_rows(
+        scene: &Scene<f32>,
+        model: &ContextModel<f32>,
+        context: &Context<'_>,
+        parents: &Parents<f32>,
+        rows: &[u32],
+    ) -> Self {
         let (shape, anchors) = (&scene.shape, &scene.anchors);
         let (widths, k) = ([shape.feature_dim, shape.n_log_scales(), 3 * shape.n_offsets], shape.n_offsets);
-        let units: Vec<[u16; 3]> = rows.iter().map(|a| model.frame.unit(anchors.lattice[*a])).collect();
-        let ContextNetwork { mlp, n_taps, taps } = &model.network;
+        let level = rows.first().map_or(0, |anchor| parents.level(*anchor));
+        let ContextNetwork { mlp, n_taps, taps } = &model.networks[level];
         let (n, n_out) = (rows.len(), mlp.n_out);
-        let mut inputs = vec![0.0; n * mlp.n_in];
-        hash_grid::forward(&model.levels, &model.rows, &units, &mut inputs);
+        let mut inputs = Vec::with_capacity(n * mlp.n_in);
+        if model.shifts.is_some() {
+            rows.iter().for_each(|anchor| parents.push_inputs(*anchor, &mut inputs));
+        } else {
+            let units: Vec<[u16; 3]> = rows.iter().map(|a| model.frame.unit(anchors.lattice[*a as usize])).collect();
+            inputs.resize(n * mlp.n_in, 0.0);
+            hash_grid::forward(&model.levels, &model.rows, &units, &mut inputs);
+        }
         let (mut hidden, mut outputs) = (vec![0.0; n * mlp.n_hidden], vec![0.0; n * n_out]);
         head::forward(mlp, &inputs, &mut hidden, &mut outputs);
-        let (mut features, mut units) = (vec![0; context.n_inputs()], vec![0; context.n_hidden()]);
         let mut bits = Self::default();
         for (a, output) in rows.iter().zip(outputs.chunks_exact_mut(n_out)) {
-            let steps = anchor_steps(context, anchors.lattice[*a], &mut features, &mut units);
+            let steps = values_of(parents.steps(context, scene, *a));
+            let a = *a as usize;
             let exponents = &mut output[n_out - N_GROUPS..];
             for (exponent, (step, base)) in exponents.iter_mut().zip(steps.iter().zip(model.base_steps)) {
                 *exponent = (step / base).log2();
@@ -86,15 +109,13 @@ pub fn of_scene(scene: &Scene<f32>, context: &Context<'_>) -> [f64; N_GROUPS] {
     bits.of_anchors.iter().fold([0.0; N_GROUPS], |sum, bits| std::array::from_fn(|i| sum[i] + bits[i]))
 }
 
-/// The steps of an anchor, in the order of the channels, as the integer model has them.
-pub(super) fn anchor_steps(
-    context: &Context<'_>,
-    lattice: [i32; 3],
-    features: &mut [i16],
-    hidden: &mut [i16],
-) -> [f32; N_GROUPS] {
-    context.features(lattice, features);
-    context.hidden(features, hidden);
-    let steps = context.steps(hidden);
+/// The steps of all anchors, in the order of the channels, as the integer model has them.
+pub(super) fn all_steps(scene: &Scene<f32>, context: &Context<'_>) -> Vec<[f32; N_GROUPS]> {
+    let parents = Parents::of_integers(scene, context);
+    let anchors: Vec<u32> = (0u32..).take(scene.anchors.len()).collect();
+    anchors.par_iter().map(|anchor| values_of(parents.steps(context, scene, *anchor))).collect()
+}
+
+fn values_of(steps: Steps) -> [f32; N_GROUPS] {
     [Group::Feature, Group::LogScale, Group::Offset].map(|group| steps.value(group))
 }

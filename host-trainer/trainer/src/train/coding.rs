@@ -15,12 +15,12 @@ use crate::step::coding::{Coding, IntegerModel, RateTerms};
 /// that rounding them costs nothing.
 pub(super) const HEAD_FRACTION_BITS: u8 = 7;
 
-/// The integer form of a scene's context model, as bytes and as the network that they stand for, and the heads as they are
+/// The integer form of a scene's context model, as bytes and as the networks that they stand for, and the heads as they are
 /// written.
 #[derive(Clone, Debug)]
 pub(super) struct Integers {
     pub(super) section: Vec<u8>,
-    pub(super) network: ContextNetwork<f32>,
+    pub(super) networks: Vec<ContextNetwork<f32>>,
     pub(super) heads: Heads<f32>,
 }
 
@@ -34,7 +34,7 @@ impl Integers {
         let model = scene.context.as_ref().ok_or(TrainError::NoContext)?;
         Ok(Self {
             section: integer_model::section(model, n_channels)?,
-            network: integer_model::rounded(model, n_channels)?,
+            networks: integer_model::rounded(model, n_channels)?,
             heads: scene.heads.map(written),
         })
     }
@@ -61,7 +61,11 @@ impl Trainer<'_> {
         let phase = self.config.phase(self.iteration);
         if self.scene.context.is_none() && matches!(phase, Phase::Context | Phase::IntegerModel) {
             let base_steps = self.config.hac.base_steps();
-            let model = context_start::initial_context(&self.scene, base_steps, &mut self.rng);
+            let begin = match self.config.backbone {
+                Backbone::ContextGs => context_start::initial_levels,
+                Backbone::Scaffold | Backbone::Hac | Backbone::HacPlus => context_start::initial_context,
+            };
+            let model = begin(&self.scene, base_steps, &mut self.rng);
             let n_taps = self.config.backbone.n_taps(self.scene.shape.feature_dim);
             self.scene.context = Some(model.with_taps(&self.scene.shape, n_taps, 0.0));
             self.optimiser.begin_context(&self.scene);
@@ -91,7 +95,7 @@ pub(super) fn coding<'a>(
         Phase::Raw => Coding::Raw,
         Phase::Noise => Coding::Noise { stream, steps: hac.base_steps() },
         Phase::Context | Phase::IntegerModel => {
-            let exact = exact.map(|(context, integers)| IntegerModel { context, network: &integers.network });
+            let exact = exact.map(|(context, integers)| IntegerModel { context, networks: &integers.networks });
             Coding::Context { stream, rate, exact }
         }
     }

@@ -1,16 +1,22 @@
 //! The context model as it starts: a grid that fits the scene, a network that says no more than each channel's statistics.
 
-use pocketsplat_core::context::{FEATURES_PER_LEVEL, GridFrame, GridLevel, LevelKind, N_GROUPS};
+use std::collections::HashSet;
+
+use pocketsplat_core::context::{
+    FEATURES_PER_LEVEL, GridFrame, GridLevel, LevelKind, MAX_LEVEL_SHIFT, MAX_SPAN_SHIFT, N_GROUPS, N_LEVELS,
+};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use crate::scene::{ContextModel, Scene};
+use crate::scene::{ContextModel, Head, Scene};
 
 /// Scenes of this many anchors get the published grid and network.
 const LARGE: usize = 200_000;
 /// Share of the anchors that may lie outside the frame at either end of an axis: a capture's stray points must not take
 /// the grid's resolution from the rest. Outside counts as on the border.
 const STRAY: f64 = 0.005;
+/// Share of the anchors of a level that the next coarser one has (the published one).
+const LEVEL_SHARE: f64 = 0.2;
 /// Rows start within ±this, so that the first gradients decide their signs.
 const ROW_BOUND: f32 = 1e-4;
 /// Output weights start this much smaller than a layer's usual bound, so that the statistics hold at first.
@@ -25,15 +31,52 @@ pub fn initial_context(scene: &Scene<f32>, base_steps: [f32; N_GROUPS], rng: &mu
     for row in &mut model.rows {
         *row = rng.random_range(-ROW_BOUND..ROW_BOUND);
     }
-    let mlp = &mut model.network.mlp;
+    begin(&mut model.networks[0].mlp, rng);
+    model.networks[0].mlp.b2 = output_biases(scene, base_steps);
+    model
+}
+
+/// Weights as a network starts with them.
+fn begin(mlp: &mut Head<f32>, rng: &mut ChaCha8Rng) {
     let bounds = [1.0 / (mlp.n_in as f32).sqrt(), OUTPUT_DAMPING / (mlp.n_hidden as f32).sqrt()];
     for (group, bound) in [(&mut mlp.w1, bounds[0]), (&mut mlp.b1, bounds[0]), (&mut mlp.w2, bounds[1])] {
         for weight in group {
             *weight = rng.random_range(-bound..bound);
         }
     }
-    mlp.b2 = output_biases(scene, base_steps);
+}
+
+/// A model for anchors that follow anchors.
+pub fn initial_levels(scene: &Scene<f32>, base_steps: [f32; N_GROUPS], rng: &mut ChaCha8Rng) -> ContextModel<f32> {
+    let n_hidden = n_level_hidden(scene.anchors.len());
+    let frame = frame(scene);
+    let shifts = level_shifts(scene, &frame);
+    let mut model = ContextModel::following(&scene.shape, frame, shifts, n_hidden, base_steps, 0.0);
+    for network in &mut model.networks {
+        begin(&mut network.mlp, rng);
+        network.mlp.b2 = output_biases(scene, base_steps);
+    }
     model
+}
+
+/// Edges of the cells of levels 1 and 2, as powers of two: those for which the share of the anchors that begin a cell of level 1,
+/// and of these that begin one of level 2, comes nearest to [`LEVEL_SHARE`]; then the edge of a cube that all lie in.
+fn level_shifts(scene: &Scene<f32>, frame: &GridFrame) -> [u8; N_LEVELS] {
+    let cells = |shift: u8| {
+        let drawn = (0..scene.anchors.len()).filter(|a| scene.anchors.has_drawn(*a));
+        drawn.map(|a| scene.anchors.lattice[a].map(|c| c >> shift)).collect::<HashSet<_>>().len().max(1)
+    };
+    let n: Vec<f64> = (0..=MAX_LEVEL_SHIFT).map(|shift| cells(shift) as f64).collect();
+    let coarser = |from: u8| {
+        let miss = |to: u8| (n[usize::from(to)] / n[usize::from(from)] / LEVEL_SHARE).ln().abs();
+        (from..=MAX_LEVEL_SHIFT).min_by(|a, b| miss(*a).total_cmp(&miss(*b))).unwrap_or(from)
+    };
+    let first = coarser(0);
+    let span = |axis: usize| scene.anchors.lattice.iter().map(move |cell| cell[axis].abs_diff(frame.min[axis])).max();
+    let widest = (0..3).filter_map(span).max().unwrap_or(0);
+    #[expect(clippy::cast_possible_truncation, reason = "bits of a u32")]
+    let span_shift = ((u32::BITS - widest.leading_zeros()) as u8).min(MAX_SPAN_SHIFT);
+    [first, coarser(first), span_shift]
 }
 
 /// The box of all anchors but the strays, axis by axis.
@@ -83,6 +126,16 @@ fn n_hidden(n_anchors: usize) -> usize {
     match n_anchors {
         ..20_000 => 16,
         20_000..50_000 => 32,
+        50_000..LARGE => 64,
+        LARGE.. => 100,
+    }
+}
+
+/// The same where there are three networks and no grid: together about as many bytes.
+fn n_level_hidden(n_anchors: usize) -> usize {
+    match n_anchors {
+        ..5_000 => 12,
+        5_000..50_000 => 24,
         50_000..LARGE => 64,
         LARGE.. => 100,
     }
@@ -147,6 +200,26 @@ mod tests {
     }
 
     #[test]
+    fn each_level_has_about_a_fifth_of_the_one_below() {
+        let capture = tiny_capture();
+        let trainer = Trainer::new(&capture, tiny_config(60)).unwrap();
+        let mut scene = trainer.scene;
+        // A plane: a shift takes three quarters of the cells.
+        let plane: Vec<[i32; 3]> = (0..64 * 64).map(|i| [4 * (i % 64), 4 * (i / 64), 7]).collect();
+        let n = scene.anchors.len().min(plane.len());
+        scene.anchors.lattice[..n].copy_from_slice(&plane[..n]);
+        scene.anchors.lattice[n..].fill(plane[0]);
+        let model = initial_levels(&scene, [1.0, 0.1, 0.2], &mut ChaCha8Rng::seed_from_u64(1));
+        assert_eq!(
+            model.shifts.map(|[first, second, _]| [first, second]),
+            Some([3, 4]),
+            "cells of 2 by 2 anchors, and of 2 by 2 of these"
+        );
+        assert_eq!(model.networks.iter().map(|network| network.mlp.n_in).collect::<Vec<_>>(), [17, 17, 3]);
+        assert_eq!(model.networks[0].mlp.b2, model.networks[2].mlp.b2);
+    }
+
+    #[test]
     fn at_first_it_says_what_the_statistics_say() {
         let capture = tiny_capture();
         let mut trainer = Trainer::new(&capture, tiny_config(60)).unwrap();
@@ -157,18 +230,18 @@ mod tests {
         let model = initial_context(scene, [1.0, 0.1, 0.2], &mut ChaCha8Rng::seed_from_u64(1));
         let units: Vec<[u16; 3]> = scene.anchors.lattice.iter().map(|cell| model.frame.unit(*cell)).collect();
         let n = units.len();
-        let mut inputs = vec![0.0; n * model.network.mlp.n_in];
+        let mut inputs = vec![0.0; n * model.networks[0].mlp.n_in];
         hash_grid::forward(&model.levels, &model.rows, &units, &mut inputs);
         let (mut hidden, mut outputs) =
-            (vec![0.0; n * model.network.mlp.n_hidden], vec![0.0; n * model.network.mlp.n_out]);
-        head::forward(&model.network.mlp, &inputs, &mut hidden, &mut outputs);
-        for row in outputs.chunks_exact(model.network.mlp.n_out) {
-            for (output, bias) in row.iter().zip(&model.network.mlp.b2) {
+            (vec![0.0; n * model.networks[0].mlp.n_hidden], vec![0.0; n * model.networks[0].mlp.n_out]);
+        head::forward(&model.networks[0].mlp, &inputs, &mut hidden, &mut outputs);
+        for row in outputs.chunks_exact(model.networks[0].mlp.n_out) {
+            for (output, bias) in row.iter().zip(&model.networks[0].mlp.b2) {
                 assert!((output - bias).abs() < 0.3, "{output} instead of {bias}");
             }
         }
         // The mean log-scale, from its output.
         let mean = scene.anchors.log_scales.iter().step_by(scene.shape.n_log_scales()).sum::<f32>() / n as f32;
-        assert!((model.network.mlp.b2[scene.shape.feature_dim] * 0.1 - mean).abs() < 1e-3);
+        assert!((model.networks[0].mlp.b2[scene.shape.feature_dim] * 0.1 - mean).abs() < 1e-3);
     }
 }

@@ -3,7 +3,7 @@
 use pocketsplat_core::context::{Context, N_GROUPS};
 use rayon::prelude::*;
 
-use super::bits::{self, anchor_steps};
+use super::bits::{self, all_steps};
 use super::coding::{HEAD_FRACTION_BITS, Integers};
 use super::survey::Survey;
 use super::{TrainError, Trainer};
@@ -69,17 +69,16 @@ impl Trainer<'_> {
 /// Makes every value a symbol times its step, as the integer model has it.
 fn round_values(scene: &mut Scene<f32>, context: &Context<'_>) {
     let (f, s, o) = (scene.shape.feature_dim, scene.shape.n_log_scales(), 3 * scene.shape.n_offsets);
+    let steps = all_steps(scene, context);
     let anchors = &mut scene.anchors;
-    let rows = anchors.lattice.par_chunks(ROWS).zip(anchors.features.par_chunks_mut(ROWS * f));
+    let rows = steps.par_chunks(ROWS).zip(anchors.features.par_chunks_mut(ROWS * f));
     let rows = rows.zip(anchors.log_scales.par_chunks_mut(ROWS * s)).zip(anchors.offsets.par_chunks_mut(ROWS * o));
-    rows.for_each(|(((lattice, features), log_scales), offsets)| {
-        let (mut inputs, mut hidden) = (vec![0; context.n_inputs()], vec![0; context.n_hidden()]);
+    rows.for_each(|(((steps, features), log_scales), offsets)| {
         let mut residuals = vec![0.0; f.max(s).max(o)];
         let rows = features.chunks_exact_mut(f).zip(log_scales.chunks_exact_mut(s)).zip(offsets.chunks_exact_mut(o));
-        for (cell, ((features, log_scales), offsets)) in lattice.iter().zip(rows) {
-            let steps = anchor_steps(context, *cell, &mut inputs, &mut hidden);
+        for (steps, ((features, log_scales), offsets)) in steps.iter().zip(rows) {
             for (values, step) in [features, log_scales, offsets].into_iter().zip(steps) {
-                perturb::rounded(step, values, &mut residuals);
+                perturb::rounded(*step, values, &mut residuals);
             }
         }
     });

@@ -39,7 +39,7 @@ use crate::scene::{Anchors, Heads, Scene};
 use crate::step::{Loss, Phase, StepInfo, TargetView, Workspace, planes};
 use checkpoint::{CaptureSignature, Kernels};
 use coding::Integers;
-use config::{Densification, Rates};
+use config::{Backbone, Densification, Rates};
 use module::{AnchorChange, RunView};
 use optimiser::Optimiser;
 use pocketsplat_capture::dataset::{Capture, Image, View};
@@ -242,6 +242,7 @@ impl<'a> Trainer<'a> {
         }
         self.densify();
         self.keep_the_best();
+        self.rank_for_levels();
         for module in modules.each() {
             match module.event(&at, &RunView { trainer: self })? {
                 Some(AnchorChange::Keep(keep)) => self.keep_anchors(&keep),
@@ -338,6 +339,21 @@ impl<'a> Trainer<'a> {
             let mut keep = vec![false; contribution.len()];
             order[..most].iter().for_each(|anchor| keep[*anchor] = true);
             self.keep_anchors(&keep);
+        }
+    }
+
+    /// When growth ends: where anchors follow anchors, they do so inside the tiers that the bundle will have.
+    fn rank_for_levels(&mut self) {
+        let due = self.iteration == self.config.iteration_at(self.config.densification.until);
+        if due && self.config.backbone == Backbone::ContextGs && self.scene.anchors.prune_rank.is_empty() {
+            let Survey { importance, .. } = self.survey(false);
+            let mut order: Vec<usize> = (0..importance.len()).collect();
+            order.sort_by(|a, b| importance[*a].total_cmp(&importance[*b]));
+            let mut ranks = vec![0.0; order.len()];
+            for (place, anchor) in order.iter().enumerate() {
+                ranks[*anchor] = place as f32 / order.len() as f32;
+            }
+            self.scene.anchors.prune_rank = ranks;
         }
     }
 

@@ -40,15 +40,15 @@ pub struct ContextMoments<R> {
     pub n_steps: u32,
     /// Of the grid's rows.
     pub rows: Moments<R>,
-    /// First and second moments of the network.
-    pub network: [ContextNetwork<R>; 2],
+    /// First and second moments of the networks.
+    pub networks: [Vec<ContextNetwork<R>>; 2],
 }
 
 impl<R: Real> ContextMoments<R> {
     /// Zero moments.
     pub fn zeros(model: &ContextModel<R>) -> Self {
-        let network = model.network.map(|_| R::ZERO);
-        Self { n_steps: 0, rows: Moments::zeros(model.rows.len()), network: [network.clone(), network] }
+        let networks: Vec<_> = model.networks.iter().map(|network| network.map(|_| R::ZERO)).collect();
+        Self { n_steps: 0, rows: Moments::zeros(model.rows.len()), networks: [networks.clone(), networks] }
     }
 }
 
@@ -162,15 +162,18 @@ impl<R: Real> Optimiser<R> {
         }
         if let (Some(model), Some(gradient), Some(moments)) = (context, &workspace.d_context, &mut self.context) {
             moments.n_steps += 1;
-            let [first, second] = &mut moments.network;
+            let [first, second] = &mut moments.networks;
             let of_network = Step::new(rates.context.at(progress), moments.n_steps);
-            update_groups(
-                of_network,
-                model.network.groups_mut(),
-                gradient.network.groups(),
-                first.groups_mut(),
-                second.groups_mut(),
-            );
+            let networks = model.networks.iter_mut().zip(&gradient.networks).zip(first.iter_mut().zip(second));
+            for ((network, gradient), (first, second)) in networks {
+                update_groups(
+                    of_network,
+                    network.groups_mut(),
+                    gradient.groups(),
+                    first.groups_mut(),
+                    second.groups_mut(),
+                );
+            }
             let of_rows = Step::new(rates.grid.at(progress), moments.n_steps);
             let Moments { first, second } = &mut moments.rows;
             let parts = model.rows.par_chunks_mut(ROWS).zip(gradient.rows.par_chunks(ROWS));

@@ -1,5 +1,6 @@
 //! A run with the rate of HAC, from its first iteration to what it hands to the writer.
 
+use super::config::Backbone;
 use super::finish::Finished;
 use super::test_capture::{tiny_capture, tiny_config, tiny_hac_config};
 use super::*;
@@ -19,10 +20,16 @@ fn trained(trainer: &mut Trainer<'_>) -> Vec<(Phase, Option<RateReport>)> {
 
 #[test]
 fn the_rate_falls_and_masks_close_where_bits_weigh() {
+    rate_falls(Backbone::Hac, 0.7);
+    rate_falls(Backbone::ContextGs, 0.85);
+}
+
+/// * `share`: of the bits an anchor at first that is left at most.
+fn rate_falls(backbone: Backbone, share: f64) {
     let capture = tiny_capture();
     let mut ends = Vec::new();
     for lambda in [0.0, 0.5] {
-        let mut config = tiny_hac_config(300);
+        let mut config = TrainConfig { backbone, ..tiny_hac_config(300) };
         config.hac = config::Hac { lambda, sample: 1.0, ..config.hac };
         let mut trainer = Trainer::new(&capture, config).unwrap();
         let steps = trained(&mut trainer);
@@ -36,7 +43,7 @@ fn the_rate_falls_and_masks_close_where_bits_weigh() {
         ends.push((rates[0], rates[rates.len() - 1], n_drawn));
     }
     let [free, weighed] = [ends[0], ends[1]];
-    assert!(weighed.1 < 0.7 * weighed.0 && weighed.1 < 0.7 * free.1, "bits an anchor, first and last: {ends:?}");
+    assert!(weighed.1 < share * weighed.0 && weighed.1 < 0.7 * free.1, "bits an anchor, first and last: {ends:?}");
     assert!(weighed.2 <= free.2, "drawn offsets: {ends:?}");
 }
 

@@ -5,7 +5,7 @@ use std::fmt;
 use rayon::prelude::*;
 
 use crate::ops::neural_gaussians::Gaussian;
-use crate::scene::{Heads, Scene};
+use crate::scene::{ContextNetwork, Heads, Scene};
 use crate::step::{Block, StepReport, Workspace};
 
 /// Gradients above are refused like infinite ones: their squares would overflow in Adam's second moment.
@@ -121,7 +121,10 @@ fn cause(array: &'static str, anchor: Option<usize>, value: f32) -> Cause {
 }
 
 fn context_gradients(workspace: &Workspace<f32>) -> impl Iterator<Item = &[f32]> {
-    workspace.d_context.iter().flat_map(|found| found.network.groups().into_iter().chain([found.rows.as_slice()]))
+    workspace
+        .d_context
+        .iter()
+        .flat_map(|found| found.networks.iter().flat_map(ContextNetwork::groups).chain([found.rows.as_slice()]))
 }
 
 fn groups(heads: &Heads<f32>) -> impl Iterator<Item = &[f32]> {
@@ -154,7 +157,7 @@ fn input_fault(scene: &Scene<f32>, truth: &[f32], background: [f32; 3]) -> Optio
     })
     .or_else(|| {
         let model = scene.context.as_ref()?;
-        let mut arrays = model.network.groups().into_iter().chain([model.rows.as_slice()]);
+        let mut arrays = model.networks.iter().flat_map(ContextNetwork::groups).chain([model.rows.as_slice()]);
         let (_, value) = arrays.find_map(|array| refused(array, 1, f32::MAX))?;
         Some(cause("a weight of the context model", None, value))
     })

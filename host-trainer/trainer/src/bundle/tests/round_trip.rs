@@ -1,17 +1,21 @@
 use std::collections::BTreeMap;
 
 use pocketsplat_core::Bundle;
-use pocketsplat_core::context::Group;
+use pocketsplat_core::context::{Group, Trail};
 
 use super::{
-    SMALL, TABLES, camera, decoded_rows, info, options, random_scene, with_context, write_bytes, write_random,
+    SMALL, TABLES, camera, decoded_rows, info, options, random_scene, with_context, with_levels, write_bytes,
+    write_random,
 };
 use crate::bundle::annotate::annotate;
 use crate::bundle::channels::ContextWork;
-use crate::bundle::{ChannelCoding, ChannelName, SizeReport, WriteError, WriteOptions, mean_steps, write};
+use crate::bundle::{
+    ChannelCoding, ChannelName, SizeReport, WriteError, WriteOptions, for_each_chunk, mean_steps, write,
+};
 use crate::render::decoder::core_image;
 use crate::render::reference::ReferenceScene;
 use crate::scene::{ModelShape, Scene};
+use crate::step::parents::Parents;
 
 /// Drawn offsets and symbols of the anchors that a bundle keeps, by their cells.
 type Rows = BTreeMap<[i32; 3], (u32, Vec<i16>)>;
@@ -80,6 +84,66 @@ fn every_symbol_comes_back_under_a_context() {
         });
         assert_eq!(rows_of_bundle(&bundle), expected, "{n_anchors} anchors in chunks of {chunk_anchors}");
     }
+}
+
+/// Steps follow the anchors before; what matters is that one rule finds them twice.
+#[test]
+fn every_symbol_comes_back_where_anchors_follow_anchors() {
+    for (n_anchors, chunk_anchors) in [(1, 128), (300, 128), (129, 1), (500, 1024)] {
+        let mut scene = with_levels(random_scene(SMALL, n_anchors, 4), 5);
+        scene.anchors.offsets[..3].copy_from_slice(&[18.0, -18.0, 1000.0]);
+        scene.anchors.features[..2].copy_from_slice(&[655.0, -655.0]);
+        scene.anchors.mask_logits[0] = 1.0;
+        let bytes = write_bytes(&scene, &options(ChannelCoding::Context, chunk_anchors));
+        let bundle = Bundle::parse(&bytes).expect("a sound bundle");
+        let context = bundle.context().expect("the coder asked for");
+        let (mut steps_of, mut n_of_level) = (BTreeMap::new(), [0; 3]);
+        for_each_chunk(&bundle, |_, sites, symbols| {
+            let (mut work, mut trail) = (ContextWork::default(), Trail::default());
+            for (site, symbols) in sites.iter().zip(symbols.chunks(SMALL.values_per_anchor())) {
+                let steps = work.enter(context, site.lattice);
+                work.leave(&steps, symbols);
+                let values = [Group::Feature, Group::LogScale, Group::Offset].map(|group| steps.value(group));
+                steps_of.insert(site.lattice, values);
+                n_of_level[context.place(&mut trail, site.lattice).expect("levels").level] += 1;
+            }
+        })
+        .expect("sound chunks");
+        let expected = rows_of_scene(&scene, |cell| steps_of.get(&cell).copied().unwrap_or([1.0; 3]));
+        assert_eq!(rows_of_bundle(&bundle), expected, "{n_anchors} anchors in chunks of {chunk_anchors}");
+        if chunk_anchors == 1024 {
+            assert!(n_of_level.iter().all(|n| *n > 5), "anchors of all levels: {n_of_level:?}");
+        }
+        let report = SizeReport::of(&bundle).expect("sound");
+        assert!(report.states() >= 0.0 && report.states() < 8.0 * f64::from(bundle.n_chunks()), "{report:?}");
+    }
+}
+
+/// What training takes for a bundle's levels are those of the bundle: the same steps at every anchor.
+#[test]
+fn training_finds_the_levels_of_the_bundle() {
+    let mut scene = with_levels(random_scene(SMALL, 700, 4), 7);
+    levels_of_the_bundle(&scene, &options(ChannelCoding::Context, 256));
+    scene.anchors.prune_rank = (0..700).map(|i| (i * 37 % 700) as f32 / 700.0).collect();
+    let importance = Some(scene.anchors.prune_rank.clone());
+    levels_of_the_bundle(&scene, &WriteOptions { importance, ..options(ChannelCoding::Context, 256) });
+}
+
+fn levels_of_the_bundle(scene: &Scene<f32>, options: &WriteOptions) {
+    let bytes = write_bytes(scene, options);
+    let bundle = Bundle::parse(&bytes).expect("a sound bundle");
+    let context = bundle.context().expect("the coder asked for");
+    let parents = Parents::of_integers(scene, context);
+    let of_cell: BTreeMap<[i32; 3], u32> = scene.anchors.lattice.iter().copied().zip(0..).collect();
+    for_each_chunk(&bundle, |_, sites, symbols| {
+        let mut work = ContextWork::default();
+        for (site, symbols) in sites.iter().zip(symbols.chunks(SMALL.values_per_anchor())) {
+            let steps = work.enter(context, site.lattice);
+            work.leave(&steps, symbols);
+            assert_eq!(parents.steps(context, scene, of_cell[&site.lattice]), steps, "at {:?}", site.lattice);
+        }
+    })
+    .expect("sound chunks");
 }
 
 #[test]

@@ -2,11 +2,11 @@
 
 use glam::DVec3;
 use pocketsplat_core::bundle::{AnchorSite, Coder};
-use pocketsplat_core::context::{Context, Group};
+use pocketsplat_core::context::Context;
 use pocketsplat_core::{Bundle, DecodeError};
 
 use super::ReferenceScene;
-use crate::bundle::{decoded_heads, shape_of};
+use crate::bundle::{ContextWork, GROUPS, decoded_heads, shape_of};
 use crate::real::Real;
 use crate::scene::Scene;
 
@@ -50,6 +50,7 @@ impl ReferenceScene {
         let mut words = vec![0; bundle.anchor_scratch_words()];
         let mut models = bundle.anchor_models(&mut words)?;
         for chunk in bundle.chunks() {
+            let mut work = ContextWork::default();
             let mut sites = vec![AnchorSite::default(); chunk.n_anchors().into()];
             let mut symbols = vec![0i16; sites.len() * n_channels];
             chunk.decode_symbols(&mut models, &mut sites, &mut symbols)?;
@@ -66,7 +67,7 @@ impl ReferenceScene {
                         values.map(f64::from).collect()
                     }
                     Coder::Context(context) => {
-                        let steps = steps(context, site.lattice);
+                        let steps = steps(context, &mut work, site.lattice, symbols);
                         let step_of = |channel: usize| match channel.checked_sub(shape.feature_dim) {
                             None => steps[0],
                             Some(log_scale) if log_scale < shape.n_log_scales() => steps[1],
@@ -87,11 +88,9 @@ impl ReferenceScene {
 }
 
 /// base·2^(q/8) of the three groups, exact where the decoder multiplies tabulated factors.
-fn steps(context: &Context<'_>, lattice: [i32; 3]) -> [f64; 3] {
-    let (mut features, mut hidden) = (vec![0; context.n_inputs()], vec![0; context.n_hidden()]);
-    context.features(lattice, &mut features);
-    context.hidden(&features, &mut hidden);
-    let steps = context.steps(&hidden);
-    let exponents = [Group::Feature, Group::LogScale, Group::Offset].map(|group| steps.exponent(group));
+fn steps<'c>(context: &Context<'c>, work: &mut ContextWork<'c>, lattice: [i32; 3], symbols: &[i16]) -> [f64; 3] {
+    let steps = work.enter(context, lattice);
+    work.leave(&steps, symbols);
+    let exponents = GROUPS.map(|group| steps.exponent(group));
     std::array::from_fn(|i| f64::from(context.base_steps()[i]) * (f64::from(exponents[i]) / 8.0).exp2())
 }

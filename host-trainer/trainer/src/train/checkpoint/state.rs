@@ -2,12 +2,14 @@
 
 use std::io::{self, Write};
 
+use pocketsplat_core::context::N_LEVELS;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::de::DeserializeOwned;
 
 use super::{CaptureDifference, CaptureSignature, CheckpointFault, Kernels, MAGIC, VERSION};
 use crate::scene::{Anchors, ContextModel, Heads, Scene};
+use crate::train::config::Backbone;
 use crate::train::optimiser::Optimiser;
 use crate::train::statistics::Statistics;
 use crate::train::watchdog::Watchdog;
@@ -161,7 +163,11 @@ impl<'a> Trainer<'a> {
         if let (Some(model), moments) = (&scene.context, &self.optimiser.context) {
             let moments = moments.as_ref().map_or(0, |moments| moments.rows.first.len());
             needs("moments of the grid", moments, model.rows.len())?;
-            needs("taps of the context model", model.network.n_taps, self.config.backbone.n_taps(shape.feature_dim))?;
+            let (n_taps, n_networks) =
+                (model.networks.first().map_or(0, |network| network.n_taps), model.networks.len());
+            needs("taps of the context model", n_taps, self.config.backbone.n_taps(shape.feature_dim))?;
+            let n_levels = if self.config.backbone == Backbone::ContextGs { N_LEVELS } else { 1 };
+            needs("networks of the context model", n_networks, n_levels)?;
         }
         let Statistics { opacity_sum, n_views, gradient_sum, n_drawn } = &self.statistics;
         needs("opacity sums", opacity_sum.len(), n)?;

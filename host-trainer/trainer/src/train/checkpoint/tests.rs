@@ -3,6 +3,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
+use crate::train::config::Backbone;
 use crate::train::test_capture::{tiny_capture, tiny_config, tiny_hac_config};
 use crate::train::{Observer, TrainConfig, TrainError, Trainer};
 use pocketsplat_capture::dataset::Mask;
@@ -30,6 +31,7 @@ fn a_run_taken_up_again_ends_in_the_same_bits() {
     taken_up_again(tiny_config(90));
     taken_up_again(TrainConfig { learns_background: true, ..tiny_config(90) });
     taken_up_again(tiny_hac_config(90));
+    taken_up_again(TrainConfig { backbone: Backbone::ContextGs, ..tiny_hac_config(90) });
 }
 
 fn taken_up_again(config: TrainConfig) {

@@ -33,7 +33,7 @@ pub enum ConfigError {
         needed: usize,
     },
     /// A module that weighs bits, in a run that has none.
-    #[error("{key} weighs error against bits, needs a train.backbone with a rate: hac or hac-plus")]
+    #[error("{key} weighs error against bits, needs a train.backbone with a rate: hac, hac-plus or contextgs")]
     NoRate {
         /// The key that asks for it.
         key: &'static str,

@@ -17,6 +17,10 @@ pub enum Backbone {
     Hac,
     /// HAC whose features follow the features before them, and whose masks answer for whole anchors (Chen et al. 2025, HAC++).
     HacPlus,
+    /// The same as [`Self::Hac`] with another context: what an anchor coded before says of those around it (Wang et al. 2024,
+    /// ContextGS, without its hyper-latents).
+    #[serde(rename = "contextgs")]
+    ContextGs,
 }
 
 impl Backbone {
@@ -28,13 +32,13 @@ impl Backbone {
     /// Taps of its context model for anchors of so many features: all features before one say something about it.
     pub(in crate::train) fn n_taps(self, feature_dim: usize) -> usize {
         match self {
-            Self::Scaffold | Self::Hac => 0,
+            Self::Scaffold | Self::Hac | Self::ContextGs => 0,
             Self::HacPlus => (feature_dim - 1).min(MAX_TAPS.into()),
         }
     }
 }
 
-/// The rate's part of a run with [`Backbone::Hac`] or [`Backbone::HacPlus`]; constants of the published trainer unless said otherwise.
+/// The rate's part of a run that trains for bits too; constants of the published trainer unless said otherwise.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hac {
     /// λ: weight of the mean bits of a value in the loss.

@@ -212,7 +212,7 @@ impl Default for TrainConfig {
 }
 
 impl TrainConfig {
-    /// The defaults of a backbone: anchors of HAC and HAC++ have 50 features.
+    /// The defaults of a backbone: anchors of HAC, HAC++ and ContextGS have 50 features.
     ///
     /// (Published HAC also shows the heads the distance of view. On lego that costs 0.3 dB in short runs, so it is an option
     /// here.)
@@ -220,7 +220,7 @@ impl TrainConfig {
         let scaffold = Self::default();
         match backbone {
             Backbone::Scaffold => scaffold,
-            Backbone::Hac | Backbone::HacPlus => {
+            Backbone::Hac | Backbone::HacPlus | Backbone::ContextGs => {
                 let shape = ModelShape { feature_dim: 50, ..scaffold.shape };
                 Self { backbone, shape, ..scaffold }
             }

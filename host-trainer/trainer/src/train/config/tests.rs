@@ -13,7 +13,7 @@ fn a_rate_stays_and_then_falls_on_a_geometric_path() {
 
 #[test]
 fn the_defaults_of_each_backbone_are_accepted() {
-    for backbone in [Backbone::Scaffold, Backbone::Hac, Backbone::HacPlus] {
+    for backbone in [Backbone::Scaffold, Backbone::Hac, Backbone::HacPlus, Backbone::ContextGs] {
         assert_eq!(TrainConfig::of(backbone).validate(), Ok(()));
         assert_eq!(TrainConfig::of(backbone).backbone, backbone);
     }

@@ -49,7 +49,6 @@ const CRATES: [(&str, &[&str]); 4] = [
             "render",
             "metrics",
             "manifest",
-            "instructions",
             "device",
             "encode",
             "effects",

@@ -13,7 +13,6 @@ pub mod effects;
 pub mod encode;
 #[cfg(test)]
 pub(crate) mod finite_difference;
-pub mod instructions;
 pub mod integer_model;
 pub mod manifest;
 pub mod metrics;

@@ -7,8 +7,8 @@ use bytesize::ByteSize;
 use pocketsplat_capture::dataset::FrameSize;
 use pocketsplat_core::budget::MAX_FRAME_PX;
 use pocketsplat_core::{Budget, Bundle, DecodeError, Overflow, Plan};
+use pocketsplat_instructions::predict;
 use pocketsplat_trainer::device::Processor;
-use pocketsplat_trainer::instructions::predict;
 use pocketsplat_trainer::verify::Trial;
 use serde::Serialize;
 

@@ -17,10 +17,10 @@ pub use front::on_front;
 pub use setting::{Setting, knobs, quality_grid};
 
 use crate::device::Processor;
-use crate::instructions::predict;
 use crate::metrics::{psnr_db, psnr_db_masked};
 use crate::render::decoder::image_of;
 use pocketsplat_capture::dataset::{Image, Mask};
+use pocketsplat_instructions::predict;
 
 /// A view to draw, and what it is compared with.
 pub struct Sight<'a> {

@@ -9,7 +9,7 @@ pub use choice::{BindingLimit, Infeasible, ModelChoice, choose};
 
 use serde::{Deserialize, Serialize};
 
-use crate::instructions::InstructionSet;
+use pocketsplat_instructions::InstructionSet;
 
 /// What a device has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -7,7 +7,6 @@ use super::{Effect, Price, Worth};
 use crate::camera::core_camera;
 use crate::device::{Limits, Processor};
 use crate::encode::{CoderChoice, EncodeError, Encoding};
-use crate::instructions::predict;
 use crate::metrics::psnr_db_masked;
 use crate::render::decoder::image_of;
 use crate::scene::Scene;
@@ -16,6 +15,7 @@ use crate::train::config::{Backbone, MIN_VIEWS_TO_HOLD_OUT};
 use crate::train::module::Modules;
 use crate::train::{Observer, TrainConfig, TrainError, Trainer};
 use pocketsplat_capture::dataset::{Capture, Image, View};
+use pocketsplat_instructions::predict;
 
 /// Runs below this many iterations are too short for pilots of them to say anything.
 ///

@@ -106,7 +106,7 @@ impl Costs {
     /// # Panics
     /// Never: a test reads the table.
     pub fn measured() -> Self {
-        Self::parse(include_str!("instructions/costs.csv")).expect("the table in the source is sound")
+        Self::parse(include_str!("costs.csv")).expect("the table in the source is sound")
     }
 
     /// All zero.

@@ -7,7 +7,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-jobs=(fmt clippy doc test core-embedded format-doc package link-gate digests firmware demo)
+jobs=(fmt clippy doc test viewer core-embedded format-doc package link-gate digests firmware demo)
 
 embedded_target=thumbv7em-none-eabihf
 defmt_print_version=1.2.0
@@ -103,6 +103,24 @@ job_test() {
   cargo test -p pocketsplat-core --features embedded-graphics --locked
   # Refusals of what a decoder is built without.
   cargo test -p pocketsplat-core --no-default-features --lib --locked bundle::features
+}
+
+# The viewer's WebAssembly module is what its source builds, and in a browser its page draws the golden frames.
+job_viewer() {
+  local built=$target/pocketsplat.wasm
+  need_target wasm32-unknown-unknown
+  need_command chromium chromium
+  cargo clippy -q -p pocketsplat-viewer --target wasm32-unknown-unknown --locked -- -D warnings
+  viewer/build.sh "$built"
+  cmp "$built" viewer/pocketsplat.wasm ||
+    fail "viewer/pocketsplat.wasm is not what its source builds; run \`tools/ci.sh bless-viewer\` and commit it"
+  POCKETSPLAT_NEEDS_BROWSER=1 cargo test -q -p pocketsplat-viewer --locked
+}
+
+# Not one of `jobs`: writes the module that `viewer` compares with.
+job_bless-viewer() {
+  need_target wasm32-unknown-unknown
+  viewer/build.sh viewer/pocketsplat.wasm
 }
 
 # Without any cargo feature, with each, with every pair and with all.

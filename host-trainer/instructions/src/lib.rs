@@ -121,7 +121,7 @@ impl Costs {
         for term in 0..N_TERMS {
             let mut fields = rows.next()?.split(',').skip(2);
             for target in &mut costs.0 {
-                target[term] = fields.next()?.parse().ok()?;
+                target[term] = decimal(fields.next()?)?;
             }
         }
         rows.next().is_none().then_some(costs)
@@ -152,6 +152,14 @@ impl Costs {
     }
 }
 
+/// Reads a number of two decimals, the nearest f64: both its hundredths and 100 are exact. The standard library's reader of floats
+/// would be a tenth of the viewer's WebAssembly module.
+fn decimal(text: &str) -> Option<f64> {
+    let (whole, hundredths) = text.split_once('.').filter(|(_, hundredths)| hundredths.len() == 2)?;
+    let [whole, hundredths] = [whole, hundredths].map(|digits| digits.parse::<u32>().ok().map(f64::from));
+    Some((100.0 * whole? + hundredths?) / 100.0)
+}
+
 /// Predicted instructions of each stage of a frame, as [`Stage::ALL`] orders them; their sum is within 10 % of what the boards
 /// of `firmware-example` took for the bundles that were measured.
 ///
@@ -168,7 +176,17 @@ pub fn predict(
 
 #[cfg(test)]
 mod tests {
-    use super::{Costs, InstructionSet};
+    use super::{Costs, InstructionSet, decimal};
+
+    #[test]
+    fn decimals_are_those_of_the_standard_library() {
+        for text in ["0.00", "0.27", "3.26", "2669.25", "22223.72", "4294967295.99"] {
+            assert_eq!(decimal(text), text.parse().ok(), "{text}");
+        }
+        for text in ["", "1", "1.2", "1.234", ".25", "-1.00", "1e3.00"] {
+            assert_eq!(decimal(text), None, "{text}");
+        }
+    }
 
     #[test]
     fn the_table_is_sound_and_comes_back() {

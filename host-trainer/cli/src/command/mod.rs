@@ -25,6 +25,7 @@ mod synth;
 mod train;
 mod train_args;
 mod verify;
+mod view;
 
 use std::process::ExitCode;
 
@@ -47,6 +48,7 @@ enum Command {
     Train(train_args::Args),
     Eval(eval::Args),
     Render(render::Args),
+    View(view::Args),
     Inspect(inspect::Args),
     Fit(fit::Args),
     Cost(cost::Args),
@@ -74,6 +76,7 @@ pub(crate) fn run() -> Result<ExitCode> {
         Command::Verify(args) => return verify::run(&args),
         Command::Eval(args) => eval::run(&args),
         Command::Render(args) => render::run(&args),
+        Command::View(args) => view::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Fit(args) => fit::run(&args),
         Command::Cost(args) => cost::run(&args),

@@ -1,0 +1,120 @@
+//! `pocketsplat view`: a page that draws bundles in a browser.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use anyhow::{Context, Result, bail};
+use pocketsplat_viewer::{SceneFile, package, page};
+
+use super::bundle::BundleFile;
+use super::output;
+
+/// Write one page that draws bundles in a browser, with nothing to install and nothing fetched.
+///
+/// The page turns the scene by mouse, touch and keys. Sliders set what a device has: memory, pruning rate, quality. It shows the plan and
+/// the very pixels of the device. Several bundles stand side by side with one camera.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// The bundles.
+    #[arg(required = true, value_name = "SCENE.psb")]
+    bundles: Vec<PathBuf>,
+    /// The page to write.
+    #[arg(short, long, value_name = "OUT.html", required_unless_present = "package")]
+    output: Option<PathBuf>,
+    /// Open the page in the desktop's browser.
+    #[arg(long, requires = "output")]
+    open: bool,
+    /// Also write a folder for web developers: the decoder as WebAssembly, its JavaScript, types, an example that draws the first bundle.
+    #[arg(long, value_name = "DIR")]
+    package: Option<PathBuf>,
+}
+
+pub(crate) fn run(args: &Args) -> Result<()> {
+    let files = args.bundles.iter().map(|path| BundleFile::read(path)).collect::<Result<Vec<_>>>()?;
+    for file in &files {
+        file.parse()?;
+    }
+    if let Some(path) = &args.output {
+        write_page(path, &files)?;
+        if args.open {
+            open(path)?;
+        }
+    }
+    match (&args.package, files.first()) {
+        (Some(folder), Some(first)) => write_package(folder, &first.bytes),
+        _ => Ok(()),
+    }
+}
+
+fn write_page(path: &Path, files: &[BundleFile]) -> Result<()> {
+    let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+    if extension != "html" && extension != "htm" {
+        bail!("{}: a page is written as .html; end the name in it", path.display());
+    }
+    output::check_writable(path)?;
+    let names = names(&files.iter().map(|file| file.path.as_path()).collect::<Vec<_>>());
+    let scenes: Vec<SceneFile<'_>> =
+        names.iter().zip(files).map(|(name, file)| SceneFile { name, bytes: &file.bytes }).collect();
+    let text = page(&names.join(" | "), &scenes);
+    output::write_whole(path, text.as_bytes())?;
+    println!("{}: {:.2} MB; open it in a browser", path.display(), text.len() as f64 / 1e6);
+    Ok(())
+}
+
+/// What the page calls the files: their names without extension, with a number where another has the same.
+fn names(paths: &[&Path]) -> Vec<String> {
+    let stem = |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let name = |(i, path): (usize, &&Path)| {
+        let before = paths[..i].iter().filter(|other| stem(other) == stem(path)).count();
+        if before == 0 { stem(path) } else { format!("{} ({})", stem(path), before + 1) }
+    };
+    paths.iter().enumerate().map(name).collect()
+}
+
+fn write_package(folder: &Path, bundle: &[u8]) -> Result<()> {
+    fs::create_dir_all(folder).with_context(|| format!("could not make the folder {}", folder.display()))?;
+    for file in package() {
+        output::write_whole(&folder.join(file.name), file.bytes)?;
+    }
+    output::write_whole(&folder.join("scene.psb"), bundle)?;
+    println!("{}: {} files; README.md says how to use them", folder.display(), package().len() + 1);
+    Ok(())
+}
+
+/// Hands the page to the desktop.
+fn open(path: &Path) -> Result<()> {
+    let has_desktop = cfg!(not(target_os = "linux"))
+        || ["DISPLAY", "WAYLAND_DISPLAY"]
+            .iter()
+            .any(|name| std::env::var_os(name).is_some_and(|value| !value.is_empty()));
+    if !has_desktop {
+        bail!("there is no desktop here to open {}; open the file in a browser", path.display());
+    }
+    let path = fs::canonicalize(path).with_context(|| format!("could not find {}", path.display()))?;
+    let program = match std::env::consts::OS {
+        "macos" => "open",
+        "windows" => "explorer",
+        _ => "xdg-open",
+    };
+    Command::new(program)
+        .arg(&path)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .with_context(|| format!("could not start `{program}`; open {} in a browser", path.display()))?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::names;
+
+    #[test]
+    fn files_of_one_name_are_told_apart() {
+        let paths = ["a/scene.psb", "b/scene.psb", "c.psb"].map(Path::new);
+        assert_eq!(names(&paths), ["scene", "scene (2)", "c"]);
+    }
+}

@@ -1,0 +1,107 @@
+//! What the page shows as numbers: each list with its names, so that JavaScript need not know an order.
+
+use pocketsplat_core::bundle::Coder;
+use pocketsplat_core::{Bundle, Camera, FrameReport, HeadWeights, Plan, Stage};
+use pocketsplat_instructions::{Costs, InstructionSet, terms};
+
+/// Numbers, each with a name; not finite where there is none.
+pub type Figures = Vec<(&'static str, f64)>;
+
+/// What a bundle is.
+pub(crate) fn of_bundle(bundle: &Bundle<'_>) -> Figures {
+    let header = bundle.header();
+    let [width, height] = header.training_px;
+    let [x, y, z] = header.normalisation_centre;
+    let [red, green, blue] = header.background.map(f64::from);
+    vec![
+        ("nAnchors", bundle.n_anchors().into()),
+        ("nTiers", bundle.n_tiers().into()),
+        ("widthPx", width.into()),
+        ("heightPx", height.into()),
+        ("usesContext", flag(matches!(bundle.coder(), Coder::Context(_)))),
+        ("backgroundRed", red),
+        ("backgroundGreen", green),
+        ("backgroundBlue", blue),
+        ("centreX", x),
+        ("centreY", y),
+        ("centreZ", z),
+        ("scale", header.normalisation_scale),
+    ]
+}
+
+/// The scene of the first `tiers` tiers.
+pub(crate) fn of_tiers(bundle: &Bundle<'_>, tiers: u8) -> Figures {
+    let last = tiers.checked_sub(1);
+    let n_anchors = last.and_then(|last| bundle.tier(last)).map_or(0, |tier| tier.n_anchors);
+    let measures = last.and_then(|last| bundle.measures(last));
+    let psnr_db = measures.and_then(|measures| measures.psnr_db).map_or(f64::NAN, f64::from);
+    let all = f64::from(bundle.header().n_anchors.max(1));
+    vec![("nAnchors", n_anchors.into()), ("pruningRate", 1.0 - f64::from(n_anchors) / all), ("psnrDb", psnr_db)]
+}
+
+/// What a plan does and takes.
+pub(crate) fn of_plan(bundle: &Bundle<'_>, plan: &Plan) -> Figures {
+    let tier = of_tiers(bundle, plan.n_tiers());
+    let mut figures = vec![
+        ("scratchBytes", plan.scratch_len() as f64),
+        ("nTiers", plan.n_tiers().into()),
+        ("nStrips", plan.n_strips().into()),
+        ("nSlabs", plan.n_slabs().into()),
+        ("maxSplats", plan.max_splats().into()),
+        ("isResident", flag(plan.is_resident())),
+        ("isBaked", flag(plan.is_baked())),
+        ("halfWeights", flag(plan.head_weights() == HeadWeights::F16)),
+    ];
+    figures.extend(tier);
+    figures
+}
+
+/// What a frame consisted of, and the instructions that two families of processors would take for it, by stage.
+pub(crate) fn of_frame(
+    costs: &Costs,
+    bundle: &Bundle<'_>,
+    plan: &Plan,
+    camera: &Camera,
+    report: &FrameReport,
+) -> Figures {
+    let mut figures = vec![
+        ("splats", report.splats.into()),
+        ("splatsDropped", report.splats_dropped.into()),
+        ("maxSplats", report.max_splats.into()),
+        ("anchorsVisible", report.anchors_visible.into()),
+        ("anchorsDecoded", report.anchors_decoded.into()),
+        ("gaussians", report.gaussians.into()),
+        ("slabs", report.slabs.into()),
+        ("scratchUsed", report.scratch_used.into()),
+    ];
+    let terms = terms(bundle, plan, report, [camera.width_px, camera.height_px]);
+    let targets = [(InstructionSet::CortexM, CORTEX_M), (InstructionSet::RiscV32, RISCV32)];
+    for (target, names) in targets {
+        figures.extend(names.into_iter().zip(costs.predict(target, &terms)));
+    }
+    figures
+}
+
+/// The stages in the order of [`Stage::ALL`].
+const CORTEX_M: [&str; Stage::ALL.len()] = [
+    "cortexMDecode",
+    "cortexMContext",
+    "cortexMHeads",
+    "cortexMProject",
+    "cortexMSort",
+    "cortexMBlend",
+    "cortexMOutput",
+];
+const RISCV32: [&str; Stage::ALL.len()] = [
+    "riscv32Decode",
+    "riscv32Context",
+    "riscv32Heads",
+    "riscv32Project",
+    "riscv32Sort",
+    "riscv32Blend",
+    "riscv32Output",
+];
+
+fn flag(holds: bool) -> f64 {
+    f64::from(u8::from(holds))
+}

@@ -1,0 +1,39 @@
+//! The folder for web developers: the module, its JavaScript, types, a page and an example.
+
+/// The WebAssembly module: this crate for `wasm32-unknown-unknown`.
+pub const MODULE: &[u8] = include_bytes!("../pocketsplat.wasm");
+pub(crate) const POCKETSPLAT: &str = include_str!("../web/pocketsplat.js");
+pub(crate) const ORBIT: &str = include_str!("../web/orbit.js");
+
+/// A file of the package.
+#[derive(Clone, Copy, Debug)]
+pub struct PackageFile {
+    /// Its name in the folder.
+    pub name: &'static str,
+    /// Its content.
+    pub bytes: &'static [u8],
+}
+
+/// The files of the package. Its example draws the bundle `scene.psb` beside them.
+pub fn package() -> [PackageFile; 8] {
+    const MANIFEST: &str = concat!(
+        "{\n  \"name\": \"pocketsplat\",\n  \"version\": \"",
+        env!("CARGO_PKG_VERSION"),
+        "\",\n  \"description\": \"Draws pocketsplat bundles with the decoder that runs on microcontrollers\",\n  \"license\": \"",
+        env!("CARGO_PKG_LICENSE"),
+        "\",\n  \"type\": \"module\",\n  \"sideEffects\": false,\n  \"exports\": {\n    \".\": \"./pocketsplat.js\",\n",
+        "    \"./orbit\": \"./orbit.js\",\n    \"./pocketsplat.wasm\": \"./pocketsplat.wasm\"\n  },\n",
+        "  \"types\": \"./pocketsplat.d.ts\"\n}\n"
+    );
+    [
+        ("pocketsplat.wasm", MODULE),
+        ("pocketsplat.js", POCKETSPLAT.as_bytes()),
+        ("pocketsplat.d.ts", include_bytes!("../web/pocketsplat.d.ts")),
+        ("orbit.js", ORBIT.as_bytes()),
+        ("orbit.d.ts", include_bytes!("../web/orbit.d.ts")),
+        ("package.json", MANIFEST.as_bytes()),
+        ("README.md", include_bytes!("../web/README.md")),
+        ("example.html", include_bytes!("../web/example.html")),
+    ]
+    .map(|(name, bytes)| PackageFile { name, bytes })
+}

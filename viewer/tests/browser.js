@@ -1,0 +1,147 @@
+// Runs in the page of `browser.rs`: says on the console what the page draws and does.
+const say = (text) => console.log(`pocketsplat: ${text}`);
+const check = (holds, what) => say(`${holds ? 'passed' : 'FAILED'} ${what}`);
+const sleep = (milliseconds) => new Promise((resolve) => setTimeout(resolve, milliseconds));
+
+/** CRC-32 (IEEE 802.3) of red, green and blue of a canvas. */
+function checksum(canvas) {
+  const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext('2d', { willReadFrequently: true });
+  copy.drawImage(canvas, 0, 0);
+  const { data } = copy.getImageData(0, 0, canvas.width, canvas.height);
+  let crc = 0xffffffff;
+  for (let i = 0; i < data.length; i++) {
+    if (i % 4 === 3) continue;
+    crc ^= data[i];
+    for (let bit = 0; bit < 8; bit++) crc = (crc >>> 1) ^ (crc & 1 ? 0xedb88320 : 0);
+  }
+  return ((crc ^ 0xffffffff) >>> 0).toString(16).padStart(8, '0');
+}
+
+/** As `golden.rs` computes it: in f32. */
+const quarter = (n) => Math.fround(Math.fround(2 * Math.PI) * n) / 4;
+
+/** Until no view has drawn for a while. */
+async function settled() {
+  for (let last = -1; ; ) {
+    await sleep(700);
+    const shown = pocketsplat.views.map((view) => view.shownAt).join();
+    if (shown === last) return;
+    last = shown;
+  }
+}
+
+async function digests() {
+  for (const view of pocketsplat.views) {
+    for (let tiers = 1; tiers <= view.tiers.length; tiers++) {
+      for (let n = 0; n < 4; n++) {
+        const camera = await view.orbited(quarter(n));
+        const { widthPx, heightPx } = camera;
+        const settings = { widthPx, heightPx, tiers, slabs: true, quality: 'exact', ramBytes: Infinity };
+        await view.show(settings, camera);
+        const whole = checksum(view.canvas);
+        say(`frame ${view.name},${tiers},${n},${whole}`);
+        const { leastBytes, mostBytes } = view.limits;
+        for (const ramBytes of [leastBytes, 0.6 * mostBytes, 0.8 * mostBytes]) {
+          await view.show({ ...settings, ramBytes }, camera);
+          const { scratchBytes, nTiers, halfWeights } = view.plan;
+          check(scratchBytes <= ramBytes, `${view.name}: the plan keeps its memory`);
+          // Fewer tiers and weights of 16 bits change pixels, and are named by the plan.
+          if (nTiers === tiers && !halfWeights) check(checksum(view.canvas) === whole, `${view.name}: less memory, same pixels`);
+        }
+        await view.show({ ...settings, ramBytes: leastBytes - 1 }, camera);
+        check(/budget of \d+ bytes/.test(view.refused), `${view.name}: a byte less is refused`);
+      }
+    }
+  }
+}
+
+async function speed(view, widthPx, heightPx, count) {
+  const settings = { widthPx, heightPx, tiers: 255, slabs: false, quality: 'exact', ramBytes: Infinity };
+  const orbit = pocketsplat.orbit();
+  await view.show(settings, orbit.camera(widthPx, heightPx));
+  const start = performance.now();
+  let drawing = 0;
+  for (let i = 0; i < count; i++) {
+    orbit.turn((2 * Math.PI) / count, 0);
+    drawing += (await view.show(settings, orbit.camera(widthPx, heightPx))).milliseconds;
+  }
+  const perSecond = (1000 * count) / (performance.now() - start);
+  say(`speed ${view.name}: ${perSecond.toFixed(1)} frames/s at ${widthPx}x${heightPx}, ${(drawing / count).toFixed(1)} ms each`);
+}
+
+async function hands() {
+  const { state, views } = pocketsplat;
+  const [stage, orbit, view] = [document.getElementById('stage'), pocketsplat.orbit(), views[0]];
+  const press = (key, more = {}) => stage.dispatchEvent(new KeyboardEvent('keydown', { key, bubbles: true, cancelable: true, ...more }));
+  const { yaw, distance } = orbit;
+  press('ArrowLeft');
+  check(orbit.yaw < yaw, 'an arrow key turns');
+  press('+');
+  check(orbit.distance < distance, 'plus zooms in');
+  press('ArrowUp', { shiftKey: true });
+  check(String(orbit.target) !== String(orbit.home.target), 'Shift and an arrow key pan');
+  press('0');
+  check(orbit.yaw === orbit.home.yaw && orbit.distance === orbit.home.distance, '0 resets');
+  const at = (type, x, y, more = {}) => {
+    stage.dispatchEvent(new PointerEvent(type, { pointerId: 1, clientX: x, clientY: y, bubbles: true, button: 0, ...more }));
+  };
+  stage.setPointerCapture = () => {};
+  at('pointerdown', 100, 100);
+  at('pointermove', 160, 100);
+  at('pointerup', 160, 100);
+  check(orbit.yaw < orbit.home.yaw, 'dragging turns');
+  const [near, target] = [orbit.distance, String(orbit.target)];
+  at('pointerdown', 100, 100);
+  at('pointerdown', 200, 100, { pointerId: 2 });
+  at('pointermove', 260, 120, { pointerId: 2 });
+  at('pointerup', 100, 100);
+  at('pointerup', 260, 120, { pointerId: 2 });
+  check(orbit.distance < near && String(orbit.target) !== target, 'two fingers pan and zoom');
+  stage.dispatchEvent(new WheelEvent('wheel', { deltaY: 300, cancelable: true }));
+  check(orbit.distance > near / 1.6, 'the wheel zooms out');
+  press('d');
+  await settled();
+  check(state.device && view.canvas.width === view.bundle.widthPx, 'the device view has the device’s pixels');
+  check(getComputedStyle(view.canvas).imageRendering === 'pixelated', 'and shows each');
+  const slide = (id, value) => {
+    const input = document.getElementById(id);
+    input.value = value;
+    input.dispatchEvent(new Event('input', { bubbles: true }));
+  };
+  const before = { ...view.plan };
+  slide('ram', 120);
+  await settled();
+  check(view.plan.scratchBytes < before.scratchBytes && !view.refused, 'the slider of memory plans anew');
+  check(document.getElementById('plan').textContent.includes('Scratch memory'), 'the plan is shown');
+  slide('ram', 200);
+  slide('pruning', 1);
+  await settled();
+  check(view.plan.nAnchors < before.nAnchors, 'the slider of pruning plans anew');
+  document.querySelector('input[value="draft"]').click();
+  await settled();
+  check(state.quality === 'draft' && view.frame.splats > 0, 'quality plans anew');
+  press(' ');
+  await sleep(400);
+  check(orbit.yaw !== orbit.home.yaw, 'Space spins');
+  press(' ');
+  const unnamed = [...document.querySelectorAll('input, select, button')].filter(
+    (element) => !element.labels?.length && !element.textContent && !element.getAttribute('aria-label'),
+  );
+  check(unnamed.length === 0, `every control has a name ${unnamed.map((element) => element.id)}`);
+}
+
+addEventListener('unhandledrejection', (event) => say(`FAILED ${event.reason}`));
+pocketsplat.started.then(async () => {
+  const [mark] = performance.getEntriesByName('first-picture');
+  say(`first picture after ${mark.startTime.toFixed(0)} ms`);
+  pocketsplat.stopSpinning();
+  await settled();
+  if (pocketsplat.views.length > 1) {
+    await hands();
+    await settled();
+    await digests();
+  }
+  for (const view of pocketsplat.views) await speed(view, 320, 240, pocketsplat.views.length > 1 ? 4 : 48);
+  check(performance.getEntriesByType('resource').length === 0, 'nothing was fetched');
+  say('done');
+});

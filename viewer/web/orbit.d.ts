@@ -1,0 +1,43 @@
+import type { Camera } from './pocketsplat.js';
+
+/** A camera that turns around a point. */
+export class Orbit {
+  constructor(preview: Camera);
+  /** Angles, radians, and the distance, normalised units. */
+  yaw: number;
+  pitch: number;
+  distance: number;
+  /** The point it turns around, normalised units. */
+  target: number[];
+  reset(): void;
+  /** Turns by angles, radians. */
+  turn(yaw: number, pitch: number): void;
+  /** Moves the picture by parts of its shorter side. */
+  pan(x: number, y: number): void;
+  /** Goes nearer by a factor above 1. */
+  zoom(factor: number): void;
+  /** The camera of a frame of this size. */
+  camera(widthPx: number, heightPx: number): Camera;
+}
+
+/** Lets mouse, touch and keyboard move an orbit; `changed` is called after each move. Give the element `touch-action: none`. */
+export function handle(element: HTMLElement, orbit: Orbit, changed: () => void): void;
+
+/** The lens of a camera for frames of another size. */
+export function lensOf(
+  camera: Camera,
+  width: number,
+  height: number,
+): Pick<Camera, 'focalPx' | 'principalPx' | 'widthPx' | 'heightPx'>;
+
+/** Where a camera stands, normalised units. */
+export function centreOf(camera: Camera): number[];
+
+/** A bundle's normalisation. */
+export interface Normalisation {
+  centre: number[];
+  scale: number;
+}
+
+/** The same camera in the frame of another bundle of the same capture. */
+export function carried(camera: Camera, from: Normalisation, to: Normalisation): Camera;

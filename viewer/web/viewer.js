@@ -1,0 +1,284 @@
+// The page: one camera, one set of limits, as many bundles as there are.
+import { Orbit, carried, handle } from './orbit.js';
+import { Drawer, View } from './view.js';
+import { bytes, caption, count, percent, showFrames, showInstructions, showPlans } from './figures.js';
+
+const DISPLAYS = [[96, 64], [128, 128], [160, 120], [160, 128], [240, 240], [320, 240], [480, 320], [640, 480]];
+/** Above this a moving picture gets fewer pixels, below that more again. */
+const [SLOW_MS, FAST_MS] = [70, 30];
+const SHARPNESS = [1, 0.7, 0.5, 0.35, 0.25];
+const NO_LIMIT = 200;
+const TURN_MS = 24000;
+
+const $ = (id) => document.getElementById(id);
+const stage = $('stage');
+const state = { device: false, ramBytes: Infinity, ramStep: NO_LIMIT, pruning: 0, quality: 'exact', slabs: false, size: undefined };
+const motion = { spinning: false, sharpness: 0, moved: 0, still: 0 };
+const views = [];
+let orbit;
+
+function decoded(text) {
+  const binary = atob(text.trim());
+  const array = new Uint8Array(binary.length);
+  for (let i = 0; i < array.length; i++) array[i] = binary.charCodeAt(i);
+  return array;
+}
+
+// --- What is to be drawn ---------------------------------------------------------------------------------------------
+
+/** The frame's size: the display's, or what the window has, as far as the scene has detail for it. */
+function frameSize() {
+  if (state.device) return state.size;
+  const { clientWidth, clientHeight } = views[0].figure;
+  const { widthPx, heightPx } = views[0].bundle;
+  const longest = Math.max(clientWidth, clientHeight, 1);
+  const most = Math.min(1024, Math.max(480, 3 * Math.max(widthPx, heightPx)), longest * devicePixelRatio);
+  return [clientWidth, clientHeight].map((side) => Math.max(16, Math.round((side * most) / longest)));
+}
+
+function isMoving() {
+  return motion.spinning || performance.now() - motion.moved < 250;
+}
+
+function settingsOf(view, [widthPx, heightPx]) {
+  const nTiers = view.tiers.length;
+  const tiers = Math.max(1, nTiers - Math.min(state.pruning, nTiers - 1));
+  return { widthPx, heightPx, ramBytes: state.ramBytes, tiers, slabs: state.slabs, quality: state.quality };
+}
+
+/** One camera for all: in the world's frame where the bundles are of one capture, else around each scene by itself. */
+function cameraOf(view, widthPx, heightPx) {
+  if (view.orbit) {
+    const { yaw, pitch, distance } = orbit.home;
+    const own = view.orbit.home;
+    view.orbit.yaw = own.yaw + orbit.yaw - yaw;
+    view.orbit.pitch = own.pitch + orbit.pitch - pitch;
+    view.orbit.distance = (own.distance * orbit.distance) / distance;
+    return view.orbit.camera(widthPx, heightPx);
+  }
+  const camera = orbit.camera(widthPx, heightPx);
+  const [from, to] = [views[0].normalisation, view.normalisation];
+  return JSON.stringify(from) === JSON.stringify(to) ? camera : carried(camera, from, to);
+}
+
+/** Frames of about the same place and size are of one capture, however it was split. */
+function isSameCapture({ centre: a, scale }, { centre: b, scale: other }) {
+  const apart = Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) * scale;
+  return apart < 1 && scale / other < 1.2 && other / scale < 1.2;
+}
+
+function next(view) {
+  const size = frameSize();
+  const settings = settingsOf(view, size);
+  const sharpness = state.device || !isMoving() ? 1 : SHARPNESS[motion.sharpness];
+  const camera = cameraOf(view, ...size.map((side) => Math.max(16, Math.round(side * sharpness))));
+  return { settings, camera, key: JSON.stringify([settings, state.ramStep, camera]) };
+}
+
+// --- What was drawn --------------------------------------------------------------------------------------------------
+
+function shown(view) {
+  const now = performance.now();
+  const between = now - (view.shownAt ?? 0);
+  view.shownAt = now;
+  // Only frames that follow each other say something about speed.
+  view.between = isMoving() && between < 1000 ? 0.8 * (view.between ?? between) + 0.2 * between : undefined;
+  if (view.frame && !state.device) {
+    const { milliseconds } = view.frame;
+    if (milliseconds > SLOW_MS) motion.sharpness = Math.min(motion.sharpness + 1, SHARPNESS.length - 1);
+    else if (milliseconds < FAST_MS) motion.sharpness = Math.max(motion.sharpness - 1, 0);
+  }
+  layOut(view);
+  view.caption.textContent = caption(view, view.between && 1000 / view.between);
+  view.caption.classList.toggle('bad', Boolean(view.refused));
+  view.canvas.style.opacity = view.refused ? 0.15 : 1;
+  const ready = views.filter((each) => each.bundle);
+  showPlans($('plan'), ready);
+  showFrames($('frame'), ready);
+  showInstructions($('stages'), ready, $('target').value);
+  showRam();
+  if (!performance.getEntriesByName('first-picture').length) performance.mark('first-picture');
+}
+
+/** In the device view each of the display's pixels is a whole number of the screen's, as far as there is room. */
+function layOut({ canvas, figure }) {
+  if (!state.device) {
+    canvas.style.width = canvas.style.height = '';
+    return;
+  }
+  const [width, height] = state.size;
+  const room = Math.min((figure.clientWidth - 40) / width, (figure.clientHeight - 90) / height) * devicePixelRatio;
+  const scale = (room >= 1 ? Math.floor(room) : room) / devicePixelRatio;
+  canvas.style.width = `${width * scale}px`;
+  canvas.style.height = `${height * scale}px`;
+}
+
+function draw() {
+  for (const view of views) if (view.bundle) view.follow(next, shown);
+}
+
+function moved() {
+  stopSpinning();
+  touch();
+}
+
+/** Draws now, and sharply once nothing has moved for a moment. */
+function touch() {
+  motion.moved = performance.now();
+  clearTimeout(motion.still);
+  motion.still = setTimeout(draw, 300);
+  draw();
+}
+
+// --- Settings --------------------------------------------------------------------------------------------------------
+
+/** Limits of memory that are of use to any of the bundles. */
+function ramRange() {
+  const known = views.filter((view) => view.limits).map((view) => view.limits);
+  return [Math.min(...known.map((limits) => limits.leastBytes)), Math.max(...known.map((limits) => limits.mostBytes))];
+}
+
+function ramOf(step) {
+  if (step >= NO_LIMIT) return Infinity;
+  const [least, most] = ramRange();
+  const bytes = least * (most / least) ** (step / (NO_LIMIT - 1));
+  // Whole KiB, and always enough for something.
+  return Math.ceil(bytes / 1024) * 1024;
+}
+
+function showRam() {
+  const text = state.ramBytes === Infinity ? 'no limit' : bytes(state.ramBytes);
+  $('ram-text').textContent = text;
+  $('ram').setAttribute('aria-valuetext', text);
+}
+
+function showPruning() {
+  const tiers = views[0].tiers;
+  const text = percent(tiers[Math.max(0, tiers.length - 1 - state.pruning)].pruningRate);
+  $('pruning-text').textContent = text;
+  $('pruning').setAttribute('aria-valuetext', text);
+}
+
+function setDevice(device) {
+  state.device = device;
+  stage.className = device ? 'device' : 'scene';
+  document.querySelector(`input[name="view"][value="${device ? 'device' : 'scene'}"]`).checked = true;
+  $('size').disabled = !device;
+  touch();
+}
+
+function stopSpinning() {
+  motion.spinning = false;
+  $('spin').setAttribute('aria-pressed', 'false');
+}
+
+/** Turns the scene until told otherwise, or by `most` radians. */
+function spin(most = Infinity) {
+  if (motion.spinning) return stopSpinning();
+  motion.spinning = true;
+  $('spin').setAttribute('aria-pressed', 'true');
+  let [before, turned] = [performance.now(), 0];
+  const step = (now) => {
+    if (!motion.spinning) return;
+    const angle = (Math.min(now - before, 200) * 2 * Math.PI) / TURN_MS;
+    before = now;
+    turned += angle;
+    orbit.turn(-angle, 0);
+    if (turned > most) stopSpinning();
+    touch();
+    requestAnimationFrame(step);
+  };
+  requestAnimationFrame(step);
+}
+
+function offer() {
+  const { bundle } = views[0];
+  const trained = [bundle.widthPx, bundle.heightPx];
+  const sizes = [trained, ...DISPLAYS.filter((size) => String(size) !== String(trained))];
+  $('size').replaceChildren(
+    ...sizes.map(([width, height], i) => new Option(`${width}×${height}${i ? '' : ', as trained'}`, `${width},${height}`)),
+  );
+  state.size = trained;
+  $('pruning').max = Math.max(...views.map((view) => view.tiers.length)) - 1;
+  $('facts').textContent = views
+    .map((view) => `${count(view.bundle.nAnchors)} anchors, ${bytes(view.bundle.bytes)}, trained at ${view.bundle.widthPx}×${view.bundle.heightPx}`)
+    .join(' · ');
+  showPruning();
+}
+
+function listen() {
+  handle(stage, orbit, moved);
+  stage.addEventListener('pointerdown', stopSpinning);
+  document.addEventListener('keydown', (event) => {
+    if (event.ctrlKey || event.altKey || event.metaKey) return;
+    if (event.target.closest('select, button, summary, input') && event.key === ' ') return;
+    if (event.target.closest('select')) return;
+    if (event.key === ' ') spin();
+    else if (event.key === 'd' || event.key === 'D') setDevice(!state.device);
+    else return;
+    event.preventDefault();
+  });
+  $('spin').addEventListener('click', () => spin());
+  $('reset').addEventListener('click', () => (orbit.reset(), moved()));
+  $('save').addEventListener('click', save);
+  $('target').addEventListener('change', () => showInstructions($('stages'), views, $('target').value));
+  $('size').addEventListener('change', (event) => ((state.size = event.target.value.split(',').map(Number)), touch()));
+  $('slabs').addEventListener('change', (event) => ((state.slabs = event.target.checked), touch()));
+  $('ram').addEventListener('input', (event) => {
+    state.ramStep = Number(event.target.value);
+    state.ramBytes = ramOf(state.ramStep);
+    showRam();
+    touch();
+  });
+  $('pruning').addEventListener('input', (event) => ((state.pruning = Number(event.target.value)), showPruning(), touch()));
+  for (const input of document.querySelectorAll('input[name="view"]')) {
+    input.addEventListener('change', () => setDevice(input.value === 'device'));
+  }
+  for (const input of document.querySelectorAll('input[name="quality"]')) {
+    input.addEventListener('change', () => ((state.quality = input.value), touch()));
+  }
+  new ResizeObserver(touch).observe(stage);
+}
+
+function save() {
+  for (const view of views) {
+    view.canvas.toBlob((blob) => {
+      const link = Object.assign(document.createElement('a'), { href: URL.createObjectURL(blob), download: `${view.name}.png` });
+      link.click();
+      setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+    });
+  }
+}
+
+// --- Start -----------------------------------------------------------------------------------------------------------
+
+async function start() {
+  stage.className = 'scene';
+  const module = decoded($('module').textContent);
+  const source = $('worker').textContent;
+  const sources = [...document.querySelectorAll('script[data-bundle]')];
+  const opened = sources.map(async (element) => {
+    const view = new View(element.dataset.bundle, stage, new Drawer(source));
+    views.push(view);
+    await view.open(module, decoded(element.textContent));
+  });
+  await Promise.all(opened);
+  const [first, ...others] = views;
+  orbit = new Orbit(first.preview);
+  for (const view of others) {
+    if (!isSameCapture(first.normalisation, view.normalisation)) view.orbit = new Orbit(view.preview);
+  }
+  offer();
+  listen();
+  setDevice(false);
+  await Promise.all(views.map((view) => view.first));
+  if (!matchMedia('(prefers-reduced-motion: reduce)').matches) spin(2 * Math.PI);
+}
+
+/** For scripts: what is on the page, and when it is. */
+globalThis.pocketsplat = { views, state, orbit: () => orbit, stopSpinning };
+globalThis.pocketsplat.started = start().catch((error) => {
+  $('facts').textContent = `This page cannot draw: ${error.message}`;
+  $('facts').className = 'bad';
+  throw error;
+});

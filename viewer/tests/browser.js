@@ -82,6 +82,11 @@ async function hands() {
   check(String(orbit.target) !== String(orbit.home.target), 'Shift and an arrow key pan');
   press('0');
   check(orbit.yaw === orbit.home.yaw && orbit.distance === orbit.home.distance, '0 resets');
+  const upright = JSON.stringify(orbit.camera(64, 64).rotation.map((x) => x.toFixed(6)));
+  press('r');
+  const lying = JSON.stringify(orbit.camera(64, 64).rotation.map((x) => x.toFixed(6)));
+  for (let i = 0; i < 3; i++) press('r');
+  check(lying !== upright && upright === JSON.stringify(orbit.camera(64, 64).rotation.map((x) => x.toFixed(6))), 'four quarters are a whole');
   const at = (type, x, y, more = {}) => {
     stage.dispatchEvent(new PointerEvent(type, { pointerId: 1, clientX: x, clientY: y, bubbles: true, button: 0, ...more }));
   };

@@ -19,8 +19,12 @@ export const percent = (part) => `${(100 * part).toFixed(part > 0 && part < 0.1 
 const instructions = (n) => (n >= 1e9 ? `${(n / 1e9).toFixed(2)} billion` : `${(n / 1e6).toFixed(1)} million`);
 const duration = (milliseconds) => `${milliseconds.toFixed(milliseconds < 10 ? 1 : 0)} ms`;
 
-/** Rows of a table: a title, and a cell for each view. */
+/** Rows of a table: a title, and a cell for each view. What says the same as before stays, so that nothing is read aloud again. */
 function fill(table, views, rows) {
+  const texts = rows.map(([title, cell]) => [title, views.map((view) => cell(view) ?? '–')]);
+  const said = JSON.stringify([views.map((view) => view.name), texts]);
+  if (table.said === said) return;
+  table.said = said;
   const line = (title, cells, tag = 'td') => {
     const row = document.createElement('tr');
     const head = row.appendChild(document.createElement('th'));
@@ -33,7 +37,7 @@ function fill(table, views, rows) {
     }
     return row;
   };
-  const lines = rows.map(([title, cell]) => line(title, views.map((view) => cell(view) ?? '–')));
+  const lines = texts.map(([title, cells]) => line(title, cells));
   if (views.length > 1) lines.unshift(line('', views.map((view) => view.name), 'th'));
   table.replaceChildren(...lines);
 }
@@ -44,8 +48,8 @@ export function showPlans(table, views) {
     ['Scratch memory', of((plan) => `${bytes(plan.scratchBytes)}`)],
     ['Anchors drawn', of((plan) => count(plan.nAnchors))],
     ['Pruning rate', of((plan) => percent(plan.pruningRate))],
-    ['Quality measured', of((plan) => (Number.isFinite(plan.psnrDb) ? `${plan.psnrDb.toFixed(2)} dB` : undefined))],
-    ['Anchors are', of(({ isBaked, isResident }) => (isBaked ? 'baked' : isResident ? 'in memory' : 'decoded each frame'))],
+    ['PSNR, measured', of((plan) => (Number.isFinite(plan.psnrDb) ? `${plan.psnrDb.toFixed(2)} dB` : undefined))],
+    ['Anchors are', of(({ isBaked, isResident }) => (isBaked ? 'baked' : isResident ? 'in memory' : 'streamed'))],
     ['Strips', of((plan) => count(plan.nStrips))],
     ['Slabs, at most', of((plan) => count(plan.nSlabs))],
     ['Room for splats', of((plan) => count(plan.maxSplats))],
@@ -61,7 +65,7 @@ export function showFrames(table, views) {
     ['Drawn here in', of((frame) => duration(frame.milliseconds))],
     ['Splats', of((frame) => count(frame.splats))],
     ['Splats left out', of((frame) => count(frame.splatsDropped))],
-    ['Anchors in view', of((frame) => count(frame.anchorsVisible))],
+    ['Anchors evaluated', of((frame) => count(frame.anchorsVisible))],
     ['Memory used', of((frame) => bytes(frame.scratchUsed))],
   ];
   fill(table, views, rows);

@@ -9,6 +9,7 @@ const [SLOW_MS, FAST_MS] = [70, 30];
 const SHARPNESS = [1, 0.7, 0.5, 0.35, 0.25];
 const NO_LIMIT = 200;
 const TURN_MS = 24000;
+const SWAY_MS = 7000;
 
 const $ = (id) => document.getElementById(id);
 const stage = $('stage');
@@ -32,7 +33,7 @@ function frameSize() {
   const { clientWidth, clientHeight } = views[0].figure;
   const { widthPx, heightPx } = views[0].bundle;
   const longest = Math.max(clientWidth, clientHeight, 1);
-  const most = Math.min(1024, Math.max(480, 3 * Math.max(widthPx, heightPx)), longest * devicePixelRatio);
+  const most = Math.min(1024, Math.max(256, 2 * Math.max(widthPx, heightPx)), longest * devicePixelRatio);
   return [clientWidth, clientHeight].map((side) => Math.max(16, Math.round((side * most) / longest)));
 }
 
@@ -172,19 +173,30 @@ function stopSpinning() {
   $('spin').setAttribute('aria-pressed', 'false');
 }
 
-/** Turns the scene until told otherwise, or by `most` radians. */
-function spin(most = Infinity) {
+/** Turns the scene until told otherwise. */
+function spin() {
   if (motion.spinning) return stopSpinning();
-  motion.spinning = true;
   $('spin').setAttribute('aria-pressed', 'true');
-  let [before, turned] = [performance.now(), 0];
+  animate((milliseconds) => (milliseconds * 2 * Math.PI) / TURN_MS);
+}
+
+/** Sways once from side to side, so that a picture is seen to be a scene; no further, for not every scene has a back. */
+function sway() {
+  const at = (milliseconds) => 0.35 * Math.sin((2 * Math.PI * milliseconds) / SWAY_MS);
+  animate(at, SWAY_MS);
+}
+
+/** Turns the scene to the angle of each moment, for so long. */
+function animate(angleAt, duration = Infinity) {
+  motion.spinning = true;
+  let [before, passed] = [performance.now(), 0];
   const step = (now) => {
     if (!motion.spinning) return;
-    const angle = (Math.min(now - before, 200) * 2 * Math.PI) / TURN_MS;
-    before = now;
-    turned += angle;
-    orbit.turn(-angle, 0);
-    if (turned > most) stopSpinning();
+    // A frame that took long is a slow moment, not a leap.
+    const after = Math.min(passed + Math.min(now - before, 200), duration);
+    orbit.turn(angleAt(passed) - angleAt(after), 0);
+    [before, passed] = [now, after];
+    if (passed >= duration) stopSpinning();
     touch();
     requestAnimationFrame(step);
   };
@@ -219,6 +231,10 @@ function listen() {
     event.preventDefault();
   });
   $('spin').addEventListener('click', () => spin());
+  $('quarter').addEventListener('click', () => {
+    for (const each of [orbit, ...views.map((view) => view.orbit)]) each?.quarter();
+    moved();
+  });
   $('reset').addEventListener('click', () => (orbit.reset(), moved()));
   $('save').addEventListener('click', save);
   $('target').addEventListener('change', () => showInstructions($('stages'), views, $('target').value));
@@ -272,7 +288,7 @@ async function start() {
   listen();
   setDevice(false);
   await Promise.all(views.map((view) => view.first));
-  if (!matchMedia('(prefers-reduced-motion: reduce)').matches) spin(2 * Math.PI);
+  if (!matchMedia('(prefers-reduced-motion: reduce)').matches) sway();
 }
 
 /** For scripts: what is on the page, and when it is. */

@@ -5,8 +5,13 @@ use crate::package::{MODULE, ORBIT, POCKETSPLAT};
 const PAGE: &str = include_str!("../web/page.html");
 const STYLE: &str = include_str!("../web/style.css");
 const WORKER: &str = include_str!("../web/worker.js");
-const SCRIPTS: [&str; 4] =
-    [ORBIT, include_str!("../web/view.js"), include_str!("../web/figures.js"), include_str!("../web/viewer.js")];
+const SCRIPTS: [&str; 5] = [
+    ORBIT,
+    include_str!("../web/motion.js"),
+    include_str!("../web/view.js"),
+    include_str!("../web/figures.js"),
+    include_str!("../web/viewer.js"),
+];
 
 /// A bundle and what the page calls it.
 #[derive(Clone, Copy, Debug)]

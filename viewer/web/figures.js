@@ -45,6 +45,7 @@ function fill(table, views, rows) {
 export function showPlans(table, views) {
   const of = (cell) => (view) => (view.plan && !view.refused ? cell(view.plan, view) : undefined);
   const rows = [
+    ...(views.length > 1 ? [['Bundle', (view) => bytes(view.bundle.bytes)]] : []),
     ['Scratch memory', of((plan) => `${bytes(plan.scratchBytes)}`)],
     ['Anchors drawn', of((plan) => count(plan.nAnchors))],
     ['Pruning rate', of((plan) => percent(plan.pruningRate))],
@@ -104,7 +105,7 @@ export function showInstructions(place, views, target) {
 
 /** What stands below a picture. */
 export function caption(view, framesPerSecond) {
-  if (view.refused) return `${view.name} does not fit: ${view.refused}`;
+  if (view.refused) return `${view.name}: ${view.refused}`;
   const { splatsDropped, milliseconds, widthPx, heightPx } = view.frame;
   const speed = framesPerSecond ? `at ${framesPerSecond.toFixed(0)} frames/s` : `in ${duration(milliseconds)}`;
   const lost = splatsDropped ? `, ${count(splatsDropped)} splats left out` : '';

@@ -1,22 +1,18 @@
 // The page: one camera, one set of limits, as many bundles as there are.
 import { Orbit, carried, handle } from './orbit.js';
+import { Motion } from './motion.js';
 import { Drawer, View } from './view.js';
 import { bytes, caption, count, percent, showFrames, showInstructions, showPlans } from './figures.js';
 
 const DISPLAYS = [[96, 64], [128, 128], [160, 120], [160, 128], [240, 240], [320, 240], [480, 320], [640, 480]];
-/** Above this a moving picture gets fewer pixels, below that more again. */
-const [SLOW_MS, FAST_MS] = [70, 30];
-const SHARPNESS = [1, 0.7, 0.5, 0.35, 0.25];
 const NO_LIMIT = 200;
-const TURN_MS = 24000;
-const SWAY_MS = 7000;
 
 const $ = (id) => document.getElementById(id);
 const stage = $('stage');
 const state = { device: false, ramBytes: Infinity, ramStep: NO_LIMIT, pruning: 0, quality: 'exact', slabs: false, size: undefined };
-const motion = { spinning: false, sharpness: 0, moved: 0, still: 0 };
 const views = [];
 let orbit;
+let motion;
 
 function decoded(text) {
   const binary = atob(text.trim());
@@ -35,10 +31,6 @@ function frameSize() {
   const longest = Math.max(clientWidth, clientHeight, 1);
   const most = Math.min(1024, Math.max(256, 2 * Math.max(widthPx, heightPx)), longest * devicePixelRatio);
   return [clientWidth, clientHeight].map((side) => Math.max(16, Math.round((side * most) / longest)));
-}
-
-function isMoving() {
-  return motion.spinning || performance.now() - motion.moved < 250;
 }
 
 function settingsOf(view, [widthPx, heightPx]) {
@@ -71,7 +63,7 @@ function isSameCapture({ centre: a, scale }, { centre: b, scale: other }) {
 function next(view) {
   const size = frameSize();
   const settings = settingsOf(view, size);
-  const sharpness = state.device || !isMoving() ? 1 : SHARPNESS[motion.sharpness];
+  const sharpness = state.device ? 1 : motion.sharpness;
   const camera = cameraOf(view, ...size.map((side) => Math.max(16, Math.round(side * sharpness))));
   return { settings, camera, key: JSON.stringify([settings, state.ramStep, camera]) };
 }
@@ -83,15 +75,12 @@ function shown(view) {
   const between = now - (view.shownAt ?? 0);
   view.shownAt = now;
   // Only frames that follow each other say something about speed.
-  view.between = isMoving() && between < 1000 ? 0.8 * (view.between ?? between) + 0.2 * between : undefined;
-  if (view.frame && !state.device) {
-    const { milliseconds } = view.frame;
-    if (milliseconds > SLOW_MS) motion.sharpness = Math.min(motion.sharpness + 1, SHARPNESS.length - 1);
-    else if (milliseconds < FAST_MS) motion.sharpness = Math.max(motion.sharpness - 1, 0);
-  }
+  view.between = motion.isMoving && between < 1000 ? 0.8 * (view.between ?? between) + 0.2 * between : undefined;
+  if (view.frame && !state.device) motion.took(view.frame.milliseconds);
   layOut(view);
   view.caption.textContent = caption(view, view.between && 1000 / view.between);
   view.caption.classList.toggle('bad', Boolean(view.refused));
+  view.caption.setAttribute('aria-live', view.refused ? 'assertive' : 'off');
   view.canvas.style.opacity = view.refused ? 0.15 : 1;
   const ready = views.filter((each) => each.bundle);
   showPlans($('plan'), ready);
@@ -120,15 +109,7 @@ function draw() {
 
 function moved() {
   stopSpinning();
-  touch();
-}
-
-/** Draws now, and sharply once nothing has moved for a moment. */
-function touch() {
-  motion.moved = performance.now();
-  clearTimeout(motion.still);
-  motion.still = setTimeout(draw, 300);
-  draw();
+  motion.touch();
 }
 
 // --- Settings --------------------------------------------------------------------------------------------------------
@@ -165,42 +146,18 @@ function setDevice(device) {
   stage.className = device ? 'device' : 'scene';
   document.querySelector(`input[name="view"][value="${device ? 'device' : 'scene'}"]`).checked = true;
   $('size').disabled = !device;
-  touch();
+  motion.touch();
 }
 
 function stopSpinning() {
-  motion.spinning = false;
+  motion.stop();
   $('spin').setAttribute('aria-pressed', 'false');
 }
 
-/** Turns the scene until told otherwise. */
 function spin() {
-  if (motion.spinning) return stopSpinning();
+  if ($('spin').getAttribute('aria-pressed') === 'true') return stopSpinning();
   $('spin').setAttribute('aria-pressed', 'true');
-  animate((milliseconds) => (milliseconds * 2 * Math.PI) / TURN_MS);
-}
-
-/** Sways once from side to side, so that a picture is seen to be a scene; no further, for not every scene has a back. */
-function sway() {
-  const at = (milliseconds) => 0.35 * Math.sin((2 * Math.PI * milliseconds) / SWAY_MS);
-  animate(at, SWAY_MS);
-}
-
-/** Turns the scene to the angle of each moment, for so long. */
-function animate(angleAt, duration = Infinity) {
-  motion.spinning = true;
-  let [before, passed] = [performance.now(), 0];
-  const step = (now) => {
-    if (!motion.spinning) return;
-    // A frame that took long is a slow moment, not a leap.
-    const after = Math.min(passed + Math.min(now - before, 200), duration);
-    orbit.turn(angleAt(passed) - angleAt(after), 0);
-    [before, passed] = [now, after];
-    if (passed >= duration) stopSpinning();
-    touch();
-    requestAnimationFrame(step);
-  };
-  requestAnimationFrame(step);
+  return motion.spin();
 }
 
 function offer() {
@@ -212,9 +169,8 @@ function offer() {
   );
   state.size = trained;
   $('pruning').max = Math.max(...views.map((view) => view.tiers.length)) - 1;
-  $('facts').textContent = views
-    .map((view) => `${count(view.bundle.nAnchors)} anchors, ${bytes(view.bundle.bytes)}, trained at ${view.bundle.widthPx}×${view.bundle.heightPx}`)
-    .join(' · ');
+  const facts = `${count(bundle.nAnchors)} anchors, ${bytes(bundle.bytes)}, trained at ${trained.join('×')}`;
+  $('facts').textContent = views.length > 1 ? `${views.length} bundles, one camera` : facts;
   showPruning();
 }
 
@@ -230,7 +186,7 @@ function listen() {
     else return;
     event.preventDefault();
   });
-  $('spin').addEventListener('click', () => spin());
+  $('spin').addEventListener('click', spin);
   $('quarter').addEventListener('click', () => {
     for (const each of [orbit, ...views.map((view) => view.orbit)]) each?.quarter();
     moved();
@@ -238,22 +194,22 @@ function listen() {
   $('reset').addEventListener('click', () => (orbit.reset(), moved()));
   $('save').addEventListener('click', save);
   $('target').addEventListener('change', () => showInstructions($('stages'), views, $('target').value));
-  $('size').addEventListener('change', (event) => ((state.size = event.target.value.split(',').map(Number)), touch()));
-  $('slabs').addEventListener('change', (event) => ((state.slabs = event.target.checked), touch()));
+  $('size').addEventListener('change', (event) => ((state.size = event.target.value.split(',').map(Number)), motion.touch()));
+  $('slabs').addEventListener('change', (event) => ((state.slabs = event.target.checked), motion.touch()));
   $('ram').addEventListener('input', (event) => {
     state.ramStep = Number(event.target.value);
     state.ramBytes = ramOf(state.ramStep);
     showRam();
-    touch();
+    motion.touch();
   });
-  $('pruning').addEventListener('input', (event) => ((state.pruning = Number(event.target.value)), showPruning(), touch()));
+  $('pruning').addEventListener('input', (event) => ((state.pruning = Number(event.target.value)), showPruning(), motion.touch()));
   for (const input of document.querySelectorAll('input[name="view"]')) {
     input.addEventListener('change', () => setDevice(input.value === 'device'));
   }
   for (const input of document.querySelectorAll('input[name="quality"]')) {
-    input.addEventListener('change', () => ((state.quality = input.value), touch()));
+    input.addEventListener('change', () => ((state.quality = input.value), motion.touch()));
   }
-  new ResizeObserver(touch).observe(stage);
+  new ResizeObserver(() => motion.touch()).observe(stage);
 }
 
 function save() {
@@ -276,11 +232,13 @@ async function start() {
   const opened = sources.map(async (element) => {
     const view = new View(element.dataset.bundle, stage, new Drawer(source));
     views.push(view);
+    stage.style.setProperty('--columns', sources.length > 3 ? Math.ceil(Math.sqrt(sources.length)) : sources.length);
     await view.open(module, decoded(element.textContent));
   });
   await Promise.all(opened);
   const [first, ...others] = views;
   orbit = new Orbit(first.preview);
+  motion = new Motion(orbit, draw);
   for (const view of others) {
     if (!isSameCapture(first.normalisation, view.normalisation)) view.orbit = new Orbit(view.preview);
   }
@@ -288,7 +246,7 @@ async function start() {
   listen();
   setDevice(false);
   await Promise.all(views.map((view) => view.first));
-  if (!matchMedia('(prefers-reduced-motion: reduce)').matches) sway();
+  if (!matchMedia('(prefers-reduced-motion: reduce)').matches) motion.sway();
 }
 
 /** For scripts: what is on the page, and when it is. */

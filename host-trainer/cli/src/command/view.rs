@@ -35,16 +35,12 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     for file in &files {
         file.parse()?;
     }
-    if let Some(path) = &args.output {
-        write_page(path, &files)?;
-        if args.open {
-            open(path)?;
-        }
+    if let (Some(folder), Some(first)) = (&args.package, files.first()) {
+        write_package(folder, &first.bytes)?;
     }
-    match (&args.package, files.first()) {
-        (Some(folder), Some(first)) => write_package(folder, &first.bytes),
-        _ => Ok(()),
-    }
+    let Some(path) = &args.output else { return Ok(()) };
+    write_page(path, &files)?;
+    if args.open { open(path) } else { Ok(()) }
 }
 
 fn write_page(path: &Path, files: &[BundleFile]) -> Result<()> {

@@ -9,3 +9,4 @@ mod fixture;
 mod interruption;
 mod modules;
 mod sweep;
+mod view;

@@ -2,6 +2,7 @@
 //!
 //! Needs Chromium; without one it says aloud that it checked nothing. `POCKETSPLAT_VIEW=SCENE.psb` measures a page of that bundle too.
 
+use std::f32::consts::TAU;
 use std::fmt::Write as _;
 use std::io::{BufRead as _, BufReader};
 use std::path::Path;
@@ -9,7 +10,9 @@ use std::process::{Child, Command, Stdio};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
-use pocketsplat_viewer::{SceneFile, page};
+use pocketsplat_core::bundle::crc32;
+use pocketsplat_core::{Budget, Bundle, Overflow};
+use pocketsplat_viewer::{Scene, SceneFile, page};
 
 const GOLDEN: [SceneFile<'_>; 4] = [
     SceneFile { name: "static", bytes: include_bytes!("../../tests/golden/static.psb") },
@@ -19,6 +22,7 @@ const GOLDEN: [SceneFile<'_>; 4] = [
 ];
 const FRAMES: &str = include_str!("../../tests/golden/frames.csv");
 const SCRIPT: &str = include_str!("browser.js");
+const MANY_CORES: &str = "Object.defineProperty(navigator, 'hardwareConcurrency', { value: 64 })";
 /// What a page may take on a machine that does other things too.
 const PATIENCE: Duration = Duration::from_secs(240);
 
@@ -41,8 +45,31 @@ fn a_page_of_one_bundle_draws() {
     let bytes = given.as_deref().unwrap_or(GOLDEN[0].bytes);
     println!("a page of {} bytes", page(name, &[SceneFile { name, bytes }]).len());
     let Some(said) = run(name, &[SceneFile { name, bytes }]) else { return };
-    said.iter().for_each(|line| println!("{line}"));
-    assert!(said.iter().any(|line| line.starts_with("speed ")), "{said:#?}");
+    said.iter()
+        .filter(|line| line.starts_with("first ") || line.starts_with("speed "))
+        .for_each(|line| println!("{line}"));
+    let found: Vec<&str> = said.iter().filter_map(|line| line.strip_prefix("frame ")).collect();
+    assert_eq!(found, frames(name, bytes), "pixels of the canvas");
+}
+
+/// The frames of a bundle as this machine draws them: a row for each as in `frames.csv`.
+fn frames(name: &str, bytes: &[u8]) -> Vec<String> {
+    let bundle = Bundle::parse(bytes).expect("a sound bundle");
+    let mut scene = Scene::open(bytes.to_vec().leak()).expect("a sound bundle");
+    let preview = scene.preview();
+    let mut rows = Vec::new();
+    for tiers in 1..=bundle.n_tiers() {
+        let budget =
+            Budget::for_frame(preview.width_px, preview.height_px).with_tiers(tiers).with_overflow(Overflow::Slabs);
+        scene.bind(&budget).expect("planned");
+        for view in 0..4_u8 {
+            scene.render(&preview.orbited(TAU * f32::from(view) / 4.0)).expect("drawn");
+            let (pixels, _) = scene.rgba().as_chunks::<4>();
+            let rgb: Vec<u8> = pixels.iter().flat_map(|&[red, green, blue, _]| [red, green, blue]).collect();
+            rows.push(format!("{name},{tiers},{view},{:08x}", crc32(&rgb)));
+        }
+    }
+    rows
 }
 
 /// Opens a page with the script, and returns what it says; nothing where there is no browser. Fails for a check that failed, and for
@@ -56,6 +83,9 @@ fn run(title: &str, scenes: &[SceneFile<'_>]) -> Option<Vec<String>> {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("page.html");
     let text = page(title, scenes).replace("</body>", &format!("<script type=\"module\">{SCRIPT}</script></body>"));
+    // Several bundles get two workers each, one bundle what this machine has cores for.
+    let text =
+        if scenes.len() > 1 { text.replace("<head>", &format!("<head><script>{MANY_CORES}</script>")) } else { text };
     std::fs::write(&file, text).expect("written");
     let mut child = start(&browser, &file, &folder.path().join("profile"));
     let stderr = BufReader::new(child.0.stderr.take().expect("piped"));

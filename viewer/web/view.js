@@ -1,15 +1,20 @@
-// One bundle on the page: its worker, its canvas, and what it was last asked for.
+// One bundle on the page: its workers, its canvas, and what it was last asked for.
+
+/** Frames that take less wait for the screen, which shows no more of them. */
+const QUICK_MS = 14;
 
 /** A worker that draws one bundle, as promises. */
-export class Drawer {
+class Drawer {
+  /** The settings it is bound to, and what it answered. */
+  settings = '';
+  answer = {};
+  isBusy = false;
   #worker;
   #waiting = new Map();
   #count = 0;
 
-  constructor(source) {
-    const address = URL.createObjectURL(new Blob([source], { type: 'text/javascript' }));
+  constructor(address) {
     this.#worker = new Worker(address);
-    URL.revokeObjectURL(address);
     this.#worker.onmessage = ({ data: { id, answer, error } }) => {
       const { resolve, reject } = this.#waiting.get(id);
       this.#waiting.delete(id);
@@ -27,18 +32,33 @@ export class Drawer {
     this.#worker.postMessage({ id, question, ...argument });
     return new Promise((resolve, reject) => this.#waiting.set(id, { resolve, reject }));
   }
+
+  /** Plans within `settings` unless they are the last ones; then draws, unless the plan was refused. */
+  async draw(settings, camera) {
+    const wanted = JSON.stringify({ ...settings, ramBytes: String(settings.ramBytes) });
+    if (wanted !== this.settings) {
+      this.settings = wanted;
+      const { limits, plan, refused } = await this.ask('bind', { settings });
+      this.answer = { limits, plan, refused };
+    }
+    return this.answer.refused ? this.answer : { ...this.answer, frame: await this.ask('render', { camera }) };
+  }
 }
 
 /** A bundle in its place on the page. It draws the latest of what it is asked for and skips what came between. */
 export class View {
-  #drawer;
-  #settings = '';
-  #busy = false;
+  #drawers = [];
+  /** What was asked for last. */
+  #asked;
+  /** Frames asked for, and the number of the one on the canvas. */
+  #count = 0;
+  #shown = 0;
   #begun;
+  /** Frames that were on the canvas. */
+  nShown = 0;
 
-  constructor(name, place, drawer) {
+  constructor(name, place) {
     this.name = name;
-    this.#drawer = drawer;
     /** Resolves when it has shown a picture, or why it cannot. */
     this.first = new Promise((resolve) => (this.#begun = resolve));
     this.figure = place.appendChild(document.createElement('figure'));
@@ -50,54 +70,71 @@ export class View {
     this.context = this.canvas.getContext('2d', { alpha: false });
   }
 
-  async open(module, bundle) {
-    Object.assign(this, await this.#drawer.ask('open', { module, bundle }));
+  /** Adds a worker; with two of them, one draws the next frame while the other finishes this one. */
+  async open(address, module, bundle) {
+    const drawer = new Drawer(address);
+    Object.assign(this, await drawer.ask('open', { module, bundle }));
     const { centreX, centreY, centreZ, scale, backgroundRed, backgroundGreen, backgroundBlue } = this.bundle;
     this.normalisation = { centre: [centreX, centreY, centreZ], scale };
     this.figure.style.setProperty('--behind', `rgb(${backgroundRed} ${backgroundGreen} ${backgroundBlue})`);
+    this.#drawers.push(drawer);
   }
 
-  /** Plans within `settings` unless they are the last ones, then draws. Resolves when the canvas shows the frame. */
-  async show(settings, camera) {
-    const wanted = JSON.stringify({ ...settings, ramBytes: String(settings.ramBytes) });
-    if (wanted !== this.#settings) {
-      this.#settings = wanted;
-      const { limits, plan, refused } = await this.#drawer.ask('bind', { settings });
-      Object.assign(this, { limits, plan, refused });
-    }
-    if (this.refused) return undefined;
-    this.frame = await this.#drawer.ask('render', { camera });
-    const { pixels, widthPx, heightPx } = this.frame;
-    if (this.canvas.width !== widthPx) this.canvas.width = widthPx;
-    if (this.canvas.height !== heightPx) this.canvas.height = heightPx;
-    this.context.putImageData(new ImageData(pixels, widthPx, heightPx), 0, 0);
-    return this.frame;
+  /** Whether it is drawing. */
+  get isBusy() {
+    return this.#drawers.some((drawer) => drawer.isBusy);
   }
 
   /** The bundle's camera carried around the scene. */
   async orbited(angle) {
-    return (await this.#drawer.ask('orbited', { angle })).camera;
+    return (await this.#drawers[0].ask('orbited', { angle })).camera;
+  }
+
+  /** Draws what a script asks for. Resolves when the canvas shows it. */
+  async show(settings, camera) {
+    this.#asked = undefined;
+    await this.#draw(this.#drawers[0], settings, camera);
+    return this.frame;
   }
 
   /** Shows what `next` says until that does not change any more; `shown` is called after each frame. */
-  async follow(next, shown) {
-    if (this.#busy) return;
-    this.#busy = true;
-    let last;
+  follow(next, shown) {
+    for (const drawer of this.#drawers) if (!drawer.isBusy) this.#run(drawer, next, shown);
+  }
+
+  async #run(drawer, next, shown) {
+    drawer.isBusy = true;
     try {
-      for (let wanted = next(this); wanted.key !== last; wanted = next(this)) {
-        last = wanted.key;
-        await this.show(wanted.settings, wanted.camera);
-        shown(this);
+      for (let wanted = next(this); wanted.key !== this.#asked; wanted = next(this)) {
+        this.#asked = wanted.key;
+        const isNew = await this.#draw(drawer, wanted.settings, wanted.camera);
+        if (isNew) shown(this);
         this.#begun();
         // The page's turn: a frame of its own between two of ours.
-        await new Promise((resolve) => requestAnimationFrame(resolve));
+        if (this.frame?.milliseconds < QUICK_MS) await new Promise((resolve) => requestAnimationFrame(resolve));
       }
     } catch (error) {
       this.refused = error.message;
       shown(this);
       this.#begun();
     }
-    this.#busy = false;
+    drawer.isBusy = false;
+  }
+
+  /** Draws, and shows it unless a later frame was faster. */
+  async #draw(drawer, settings, camera) {
+    const number = ++this.#count;
+    const answer = await drawer.draw(settings, camera);
+    if (number < this.#shown) return false;
+    this.#shown = number;
+    const { limits, plan, refused, frame = this.frame } = answer;
+    Object.assign(this, { limits, plan, refused, frame });
+    if (refused) return true;
+    const { pixels, widthPx, heightPx } = frame;
+    if (this.canvas.width !== widthPx) this.canvas.width = widthPx;
+    if (this.canvas.height !== heightPx) this.canvas.height = heightPx;
+    this.context.putImageData(new ImageData(pixels, widthPx, heightPx), 0, 0);
+    this.nShown++;
+    return true;
   }
 }

@@ -1,16 +1,18 @@
 // The page: one camera, one set of limits, as many bundles as there are.
 import { Orbit, carried, handle } from './orbit.js';
 import { Motion } from './motion.js';
-import { Drawer, View } from './view.js';
+import { View } from './view.js';
 import { bytes, caption, count, percent, showFrames, showInstructions, showPlans } from './figures.js';
 
 const DISPLAYS = [[96, 64], [128, 128], [160, 120], [160, 128], [240, 240], [320, 240], [480, 320], [640, 480]];
 const NO_LIMIT = 200;
+const FIGURES_MS = 200;
 
 const $ = (id) => document.getElementById(id);
 const stage = $('stage');
 const state = { device: false, ramBytes: Infinity, ramStep: NO_LIMIT, pruning: 0, quality: 'exact', slabs: false, size: undefined };
 const views = [];
+const figures = { shownAt: 0, timer: undefined };
 let orbit;
 let motion;
 
@@ -78,16 +80,24 @@ function shown(view) {
   view.between = motion.isMoving && between < 1000 ? 0.8 * (view.between ?? between) + 0.2 * between : undefined;
   if (view.frame && !state.device) motion.took(view.frame.milliseconds);
   layOut(view);
-  view.caption.textContent = caption(view, view.between && 1000 / view.between);
-  view.caption.classList.toggle('bad', Boolean(view.refused));
-  view.caption.setAttribute('aria-live', view.refused ? 'assertive' : 'off');
   view.canvas.style.opacity = view.refused ? 0.15 : 1;
-  const ready = views.filter((each) => each.bundle);
-  showPlans($('plan'), ready);
-  showFrames($('frame'), ready);
-  showInstructions($('stages'), ready, $('target').value);
-  showRam();
+  // Numbers that change with every frame cannot be read, and cost as much as a small frame.
+  figures.timer ??= setTimeout(showFigures, Math.max(0, figures.shownAt + FIGURES_MS - now));
   if (!performance.getEntriesByName('first-picture').length) performance.mark('first-picture');
+}
+
+function showFigures() {
+  Object.assign(figures, { timer: undefined, shownAt: performance.now() });
+  for (const view of views) {
+    if (!view.frame && !view.refused) continue;
+    view.caption.textContent = caption(view, motion.isMoving && view.between && 1000 / view.between);
+    view.caption.classList.toggle('bad', Boolean(view.refused));
+    view.caption.setAttribute('aria-live', view.refused ? 'assertive' : 'off');
+  }
+  showPlans($('plan'), views);
+  showFrames($('frame'), views);
+  showInstructions($('stages'), views, $('target').value);
+  showRam();
 }
 
 /** In the device view each of the display's pixels is a whole number of the screen's, as far as there is room. */
@@ -227,15 +237,13 @@ function save() {
 async function start() {
   stage.className = 'scene';
   const module = decoded($('module').textContent);
-  const source = $('worker').textContent;
+  const address = URL.createObjectURL(new Blob([$('worker').textContent], { type: 'text/javascript' }));
   const sources = [...document.querySelectorAll('script[data-bundle]')];
-  const opened = sources.map(async (element) => {
-    const view = new View(element.dataset.bundle, stage, new Drawer(source));
-    views.push(view);
-    stage.style.setProperty('--columns', sources.length > 3 ? Math.ceil(Math.sqrt(sources.length)) : sources.length);
-    await view.open(module, decoded(element.textContent));
-  });
-  await Promise.all(opened);
+  stage.style.setProperty('--columns', sources.length > 3 ? Math.ceil(Math.sqrt(sources.length)) : sources.length);
+  for (const { dataset } of sources) views.push(new View(dataset.bundle, stage));
+  const bundles = sources.map((element) => decoded(element.textContent));
+  const open = () => Promise.all(views.map((view, i) => view.open(address, module, bundles[i])));
+  await open();
   const [first, ...others] = views;
   orbit = new Orbit(first.preview);
   motion = new Motion(orbit, draw);
@@ -246,6 +254,8 @@ async function start() {
   listen();
   setDevice(false);
   await Promise.all(views.map((view) => view.first));
+  // A second worker for each where cores are idle, once there is something to look at.
+  if (navigator.hardwareConcurrency >= 4 * views.length) await open();
   if (!matchMedia('(prefers-reduced-motion: reduce)').matches) motion.sway();
 }
 

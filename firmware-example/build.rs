@@ -129,8 +129,8 @@ fn cameras(path: &str) -> Result<Vec<String>, Box<dyn Error>> {
             return Err(format!("views {path}: a line of {} numbers; a camera has 18", numbers.len()).into());
         };
         Ok(format!(
-            "Camera {{ rotation: {rotation:?}, translation: {:?}, focal_px: {:?}, principal_px: {:?}, width_px: {width}, \
-             height_px: {height} }},",
+            "Camera {{ rotation: pocketsplat_core::Rotation::new_unchecked({rotation:?}), translation: {:?}, \
+             focal_px: {:?}, principal_px: {:?}, width_px: {width}, height_px: {height} }},",
             [t0, t1, t2],
             [fx, fy],
             [cx, cy]

@@ -101,6 +101,8 @@ job_test() {
   cargo test --workspace --locked --no-fail-fast
   # Not unified into the workspace's build: `defmt` wants a logger at link time, the firmware has one.
   cargo test -p pocketsplat-core --features embedded-graphics --locked
+  # The largest frames where overflow is not checked, as firmware is built; above it was.
+  cargo test --release -p pocketsplat-core --lib --locked decoder::tests
   # Refusals of what a decoder is built without.
   cargo test -p pocketsplat-core --no-default-features --lib --locked bundle::features
 }
@@ -140,6 +142,13 @@ job_core-embedded() {
       -- -D warnings
   done
   echo "${#sets[@]} sets of features: none, each, every pair, all"
+  local said
+  need_target i686-unknown-linux-gnu
+  need_target i586-unknown-linux-gnu
+  cargo check -q -p pocketsplat-core --target i686-unknown-linux-gnu --locked
+  said=$(cargo check -q -p pocketsplat-core --target i586-unknown-linux-gnu --locked 2>&1) && fail "x87 is not refused"
+  grep -q "on x87" <<<"$said" || fail "x87 is refused for another reason: $said"
+  echo "i686 builds, i586 is refused: x87"
 }
 
 # The annotated bundle in the format's description is what the writer writes today, and so are the decoder's tables.

@@ -4,6 +4,7 @@
 //! cargo run -p pocketsplat-core --example draw_png -- [BUNDLE.psb [OUT.png]]
 //! ```
 
+use std::convert::Infallible;
 use std::error::Error;
 
 use pocketsplat_core::{Budget, Bundle, Decoder, TileSink};
@@ -19,11 +20,14 @@ struct Frame {
 }
 
 impl TileSink for Frame {
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, _height: u16, rgb: &[[u8; 3]]) {
+    type Error = Infallible;
+
+    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, _height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
         for (row, pixels) in rgb.chunks_exact(width.into()).enumerate() {
             let first = ((usize::from(y_px) + row) * self.width_px + usize::from(x_px)) * 3;
             self.rgb[first..][..pixels.as_flattened().len()].copy_from_slice(pixels.as_flattened());
         }
+        Ok(())
     }
 }
 

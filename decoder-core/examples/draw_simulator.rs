@@ -38,10 +38,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     // The preview's camera, for a frame of this size.
     let camera = bundle.header().preview.resized(width_px, height_px);
-    let mut sink = DisplaySink::new(&mut display, Point::zero()).dithered();
-    let report = decoder.render(&camera, &mut sink)?;
-    // The simulator never fails; a display on a bus may.
-    let Ok(()) = sink.finish();
+    // The simulator never fails; the error of a display on a bus would come back from here.
+    let report = decoder.render(&camera, &mut DisplaySink::new(&mut display, Point::zero()).dithered())?;
 
     let shown = display.to_rgb_output_image(&OutputSettingsBuilder::new().scale(2).build());
     shown.save_png(&output)?;

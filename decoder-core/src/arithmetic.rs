@@ -8,7 +8,10 @@
 //! # let bytes = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/bundle/example.psb"));
 //! # let mut scratch = [0; 8 * 1024];
 //! # struct Sink;
-//! # impl pocketsplat_core::TileSink for Sink { fn tile(&mut self, _: u16, _: u16, _: u16, _: u16, _: &[[u8; 3]]) {} }
+//! # impl pocketsplat_core::TileSink for Sink {
+//! #     type Error = core::convert::Infallible;
+//! #     fn tile(&mut self, _: u16, _: u16, _: u16, _: u16, _: &[[u8; 3]]) -> Result<(), Self::Error> { Ok(()) }
+//! # }
 //! use pocketsplat_core::arithmetic::WithoutFpu;
 //! use pocketsplat_core::{Budget, Bundle, Decoder};
 //!

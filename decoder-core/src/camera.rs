@@ -1,6 +1,11 @@
 //! The pinhole camera of a frame.
 
-use crate::error::{DecodeError, Field};
+mod rotation;
+
+pub(crate) use rotation::MOST_OFF;
+pub use rotation::Rotation;
+
+use crate::error::{DecodeError, Field, in_range};
 
 /// A pinhole camera in the normalised frame of a bundle: x right, y down, z forward (OpenCV).
 ///
@@ -8,8 +13,8 @@ use crate::error::{DecodeError, Field};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Camera {
-    /// World to camera rotation, row-major.
-    pub rotation: [f32; 9],
+    /// World to camera rotation.
+    pub rotation: Rotation,
     /// World to camera translation, normalised units.
     pub translation: [f32; 3],
     /// Focal lengths `[fx, fy]`, pixels.
@@ -26,9 +31,9 @@ impl Camera {
     /// The same camera with its frame scaled to `width_px × height_px`.
     ///
     /// ```
-    /// # use pocketsplat_core::Camera;
+    /// # use pocketsplat_core::{Camera, Rotation};
     /// let camera = Camera {
-    ///     rotation: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+    ///     rotation: Rotation::IDENTITY,
     ///     translation: [0.0; 3],
     ///     focal_px: [100.0, 100.0],
     ///     principal_px: [40.0, 30.0],
@@ -55,7 +60,7 @@ impl Camera {
     /// Where the camera stands, normalised frame: −Rᵀ·t.
     #[must_use]
     pub fn centre(&self) -> [f32; 3] {
-        let [r00, r01, r02, r10, r11, r12, r20, r21, r22] = self.rotation;
+        let [[r00, r01, r02], [r10, r11, r12], [r20, r21, r22]] = self.rotation.rows();
         let [x, y, z] = self.translation;
         [-(r00 * x + r10 * y + r20 * z), -(r01 * x + r11 * y + r21 * z), -(r02 * x + r12 * y + r22 * z)]
     }
@@ -69,10 +74,10 @@ impl Camera {
     /// Sine and cosine are `libm`'s, so every machine gets the same bits.
     ///
     /// ```
-    /// # use pocketsplat_core::Camera;
+    /// # use pocketsplat_core::{Camera, Rotation};
     /// // At (0, -3, 0), looking along y, z up.
     /// let camera = Camera {
-    ///     rotation: [1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0],
+    ///     rotation: Rotation::new([1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0])?,
     ///     translation: [0.0, 0.0, 3.0],
     ///     focal_px: [100.0, 100.0],
     ///     principal_px: [40.0, 30.0],
@@ -81,11 +86,12 @@ impl Camera {
     /// };
     /// let [x, y, z] = camera.orbited(core::f32::consts::FRAC_PI_2).centre();
     /// assert!((x - 3.0).abs() < 1e-6 && y.abs() < 1e-6 && z == 0.0);
+    /// # Ok::<(), pocketsplat_core::DecodeError>(())
     /// ```
     #[must_use]
     pub fn orbited(&self, angle: f32) -> Self {
-        let [x0, x1, x2, y0, y1, y2, z0, z1, z2] = self.rotation;
-        let (right, down, forward) = ([x0, x1, x2], [y0, y1, y2], [z0, z1, z2]);
+        let [right, down, forward] = self.rotation.rows();
+        let ([y0, y1, y2], [z0, z1, z2]) = (down, forward);
         let (axis, sign) = nearest_axis([-y0, -y1, -y2]);
         let (sin, cos) = (sign * libm::sinf(angle), libm::cosf(angle));
         let eye = self.centre();
@@ -96,7 +102,7 @@ impl Camera {
         let ([a0, a1, a2], [b0, b1, b2], [c0, c1, c2]) = (right_after, down_after, forward_after);
         let [t0, t1, t2] = self.translation;
         Self {
-            rotation: [a0, a1, a2, b0, b1, b2, c0, c1, c2],
+            rotation: Rotation::new_unchecked([a0, a1, a2, b0, b1, b2, c0, c1, c2]),
             translation: [
                 shifted(t0, right, right_after),
                 shifted(t1, down, down_after),
@@ -106,21 +112,23 @@ impl Camera {
         }
     }
 
-    /// Checks that every float is finite, the focal lengths positive and the frame not empty.
+    /// Checks that every float is finite, the focal lengths positive and the frame not empty; that the rotation is one was
+    /// checked when it was [made](Rotation::new).
     ///
     /// # Errors
     /// [`DecodeError::BadFloat`] or [`DecodeError::OutOfRange`] naming the field.
     pub fn check(&self) -> Result<(), DecodeError> {
-        let pose = self.rotation.iter().chain(&self.translation);
-        check_floats(Field::CameraPose, pose, |x| x.is_finite())?;
-        check_floats(Field::CameraFocal, self.focal_px.iter(), |x| x.is_finite() && x > 0.0)?;
-        check_floats(Field::CameraPrincipal, self.principal_px.iter(), |x| x.is_finite())?;
-        for (field, size_px) in [(Field::FrameWidth, self.width_px), (Field::FrameHeight, self.height_px)] {
-            if size_px == 0 {
-                return Err(DecodeError::OutOfRange { field, found: 0, limit: 1 });
-            }
+        let floats: [(Field, u8, &[f32], f32); 4] = [
+            (Field::CameraPose, 0, self.rotation.numbers(), FINITE),
+            (Field::CameraPose, 9, &self.translation, FINITE),
+            (Field::CameraFocal, 0, &self.focal_px, POSITIVE),
+            (Field::CameraPrincipal, 0, &self.principal_px, FINITE),
+        ];
+        for (field, first, floats, least) in floats {
+            check_floats(field, first.into(), floats, least)?;
         }
-        Ok(())
+        in_range(Field::FrameWidth, self.width_px.into(), 1, u32::MAX)?;
+        in_range(Field::FrameHeight, self.height_px.into(), 1, u32::MAX)
     }
 }
 
@@ -150,14 +158,15 @@ fn dot([a0, a1, a2]: [f32; 3], [b0, b1, b2]: [f32; 3]) -> f32 {
     a0 * b0 + a1 * b1 + a2 * b2
 }
 
-/// Names the first float that is not `good`.
-fn check_floats<'f>(
-    field: Field,
-    floats: impl Iterator<Item = &'f f32>,
-    good: impl Fn(f32) -> bool,
-) -> Result<(), DecodeError> {
-    for (index, &x) in (0..).zip(floats) {
-        if !good(x) {
+/// The least finite number.
+const FINITE: f32 = f32::MIN;
+/// The least positive number.
+const POSITIVE: f32 = f32::from_bits(1);
+
+/// Names the first float that is not finite or below `least`; the first of `floats` has number `first` in its field.
+fn check_floats(field: Field, first: u32, floats: &[f32], least: f32) -> Result<(), DecodeError> {
+    for (&x, index) in floats.iter().zip(first..) {
+        if !(least <= x && x <= f32::MAX) {
             return Err(DecodeError::BadFloat { field, index });
         }
     }
@@ -168,7 +177,7 @@ fn check_floats<'f>(
 mod tests {
     use core::f32::consts::TAU;
 
-    use super::{Camera, dot};
+    use super::{Camera, Rotation, dot};
 
     #[test]
     fn an_orbit_keeps_distance_height_and_the_middle_of_the_image() {
@@ -185,7 +194,7 @@ mod tests {
             (2, up_along([0.6, 0.0, 0.8], [0.8, 0.0, -0.6])),
         ] {
             let camera = Camera {
-                rotation,
+                rotation: Rotation::new(rotation).expect("a rotation"),
                 translation: [0.1, -0.2, 2.5],
                 focal_px: [90.0, 80.0],
                 principal_px: [30.0, 20.0],
@@ -199,7 +208,8 @@ mod tests {
             let to_pivot = |eye: [f32; 3]| [0, 1, 2].map(|i| pivot[i] - eye[i]);
             for step in 0..9 {
                 let after = camera.orbited(TAU * step as f32 / 8.0);
-                let [x0, x1, x2, y0, y1, y2, z0, z1, z2] = after.rotation;
+                let [x0, x1, x2, y0, y1, y2, z0, z1, z2] = after.rotation.to_array();
+                Rotation::new(after.rotation.to_array()).expect("still a rotation");
                 let near = |found: f32, expected: f32| {
                     assert!((found - expected).abs() < 1e-5, "axis {axis}, step {step}: {found}, not {expected}");
                 };

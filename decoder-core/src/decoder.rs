@@ -9,6 +9,8 @@ mod source;
 mod splats;
 mod strip;
 mod tally;
+#[cfg(test)]
+mod tests;
 
 pub use count::{count_gaussians, count_scratch_len};
 pub use report::FrameReport;
@@ -17,7 +19,7 @@ use crate::arithmetic::{Arithmetic, ReferenceArithmetic};
 use crate::budget::Plan;
 use crate::bundle::{Bundle, Chunk};
 use crate::camera::Camera;
-use crate::error::DecodeError;
+use crate::error::{DecodeError, RenderError};
 use crate::raster::Pixel;
 use crate::stopwatch::Stopwatch;
 use source::GaussianSource;
@@ -25,10 +27,16 @@ use splats::SplatStore;
 
 /// Takes finished tiles, for instance to a display.
 pub trait TileSink {
+    /// What can go wrong with a tile; [`Infallible`](core::convert::Infallible) where nothing can.
+    type Error;
+
     /// One tile: its first pixel, its size, and `[height, width]` pixels row by row.
     ///
     /// Tiles come in rows from the top, each row from the left; together they fill the frame, none twice.
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]);
+    ///
+    /// # Errors
+    /// The sink's own: the frame ends with it, and no more tiles come.
+    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) -> Result<(), Self::Error>;
 }
 
 /// Draws frames of one bundle with the memory it was bound to, computed as `A` says.
@@ -109,9 +117,10 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
     /// many it left out; or it draws a strip in several slabs of depth if the [budget](crate::Overflow) says so.
     ///
     /// # Errors
+    /// [`RenderError::Sink`] with the first error of `sink`, which gets no tile after it. [`RenderError::Decode`] with
     /// [`DecodeError::OutOfRange`] for a frame larger than planned and [`DecodeError::BadFloat`] for an unusable camera,
-    /// before the first tile; [`DecodeError::ChunkStream`] for a chunk that no writer makes, which with strips and streamed
-    /// anchors may come after some.
+    /// before the first tile; with [`DecodeError::ChunkStream`] for a chunk that no writer makes, which with strips and
+    /// streamed anchors may come after some. After any of them the decoder draws the next frame as if nothing had been.
     ///
     /// # Budget
     /// No memory beyond the bound one, under 3 KiB of stack. Work of one strip: every anchor of a chunk in view is decoded
@@ -119,7 +128,7 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
     /// transmittance falls below 1e-4. Of several strips each does so for the chunks and anchors that can reach it; but the
     /// first one goes over the whole view to see that all strips have places enough, unless that follows from the
     /// directory.
-    pub fn render(&mut self, camera: &Camera, sink: &mut impl TileSink) -> Result<FrameReport, DecodeError> {
+    pub fn render<S: TileSink>(&mut self, camera: &Camera, sink: &mut S) -> Result<FrameReport, RenderError<S::Error>> {
         self.render_watched(camera, sink, &mut ())
     }
 
@@ -127,12 +136,12 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
     ///
     /// # Errors
     /// As for [`render`](Self::render).
-    pub fn render_watched(
+    pub fn render_watched<S: TileSink>(
         &mut self,
         camera: &Camera,
-        sink: &mut impl TileSink,
+        sink: &mut S,
         watch: &mut impl Stopwatch,
-    ) -> Result<FrameReport, DecodeError> {
+    ) -> Result<FrameReport, RenderError<S::Error>> {
         self.draw_frame(camera, sink, watch)
     }
 

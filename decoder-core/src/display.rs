@@ -1,4 +1,24 @@
 //! A tile sink for every display that `embedded-graphics` can draw on.
+//!
+//! ```
+//! # use embedded_graphics_core::geometry::{Point, Size};
+//! # use embedded_graphics_core::pixelcolor::Rgb565;
+//! # let bytes = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/bundle/example.psb"));
+//! # let mut scratch = [0; 8 * 1024];
+//! # let mut display = embedded_graphics_simulator::SimulatorDisplay::<Rgb565>::new(Size::new(32, 24));
+//! use pocketsplat_core::display::DisplaySink;
+//! use pocketsplat_core::{Budget, Bundle, Decoder, RenderError};
+//!
+//! let bundle = Bundle::parse(bytes)?;
+//! let plan = bundle.plan(&Budget::for_frame(32, 24).in_bytes(scratch.len()))?;
+//! let mut decoder = Decoder::bind(&bundle, plan, &mut scratch)?;
+//! match decoder.render(&bundle.header().preview, &mut DisplaySink::new(&mut display, Point::zero())) {
+//!     Ok(report) => assert_eq!((report.splats, display.get_pixel(Point::new(31, 23))), (5, Rgb565::new(0, 0, 8))),
+//!     Err(RenderError::Decode(error)) => return Err(error), // the camera or the bundle
+//!     Err(RenderError::Sink(error)) => panic!("the bus of the display: {error}"),
+//! }
+//! # Ok::<(), pocketsplat_core::DecodeError>(())
+//! ```
 
 use embedded_graphics_core::draw_target::DrawTarget;
 use embedded_graphics_core::geometry::{Point, Size};
@@ -9,40 +29,32 @@ use crate::decoder::TileSink;
 
 /// Draws tiles on a display with the frame's first pixel at `origin`.
 ///
-/// Each tile is one `fill_contiguous`, so a display driver sets its window once for 256 pixels.
+/// Each tile is one `fill_contiguous`, so a display driver sets its window once for 256 pixels. The first error of the display
+/// ends the frame as [`RenderError::Sink`](crate::RenderError::Sink).
+#[must_use = "a sink draws nothing by itself: hand it to `Decoder::render`"]
 #[derive(Debug)]
 pub struct DisplaySink<'d, D: DrawTarget> {
     display: &'d mut D,
     origin: Point,
     /// The display's largest red, green and blue, when it is dithered.
     dithered_to: Option<[u8; 3]>,
-    result: Result<(), D::Error>,
 }
 
 impl<'d, D: DrawTarget> DisplaySink<'d, D> {
     /// Draws on `display` from `origin` on; bytes are rounded to the display's colours as `embedded-graphics` does.
     pub fn new(display: &'d mut D, origin: Point) -> Self {
-        Self { display, origin, dithered_to: None, result: Ok(()) }
+        Self { display, origin, dithered_to: None }
     }
 
     /// Dithers instead, with a 4×4 ordered pattern (Bayer 1973): bands of a 16-bit display turn into a fine pattern.
     ///
     /// # Budget
     /// About 20 instructions a channel.
-    #[must_use]
     pub fn dithered(self) -> Self
     where
         D::Color: RgbColor,
     {
         Self { dithered_to: Some([D::Color::MAX_R, D::Color::MAX_G, D::Color::MAX_B]), ..self }
-    }
-
-    /// Ends the frame.
-    ///
-    /// # Errors
-    /// The first error of the display; nothing was drawn after it.
-    pub fn finish(self) -> Result<(), D::Error> {
-        self.result
     }
 }
 
@@ -51,10 +63,11 @@ where
     D: DrawTarget,
     D::Color: From<Rgb888>,
 {
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) {
-        if self.result.is_err() {
-            return;
-        }
+    type Error = D::Error;
+
+    // Not inlined: among what draws a tile its loop would not stay in registers.
+    #[inline(never)]
+    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) -> Result<(), D::Error> {
         let corner = self.origin + Point::new(x_px.into(), y_px.into());
         let area = Rectangle::new(corner, Size::new(width.into(), height.into()));
         let places = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
@@ -64,7 +77,7 @@ where
             let [r, g, b] = dithered_to.map_or(rgb, |most| dithered(rgb, most, place));
             D::Color::from(Rgb888::new(r, g, b))
         });
-        self.result = self.display.fill_contiguous(&area, colours);
+        self.display.fill_contiguous(&area, colours)
     }
 }
 

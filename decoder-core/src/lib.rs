@@ -5,6 +5,12 @@
 #[cfg(test)]
 extern crate std;
 
+#[cfg(all(target_arch = "x86", not(target_feature = "sse2")))]
+compile_error!(
+    "pocketsplat-core does not draw the same pixels on x87, whose registers round to 64 bits of fraction: build for a \
+     target with SSE2, such as i686"
+);
+
 // Each module imports only modules before it in this list: error · rules · math · stopwatch · camera · bytes · arena · entropy ·
 // context · bundle · mlp · scene · project · raster · arithmetic · bake · budget · decoder · display. `tests/tests/rooms.rs` holds the crate to it.
 mod arena;
@@ -32,8 +38,8 @@ pub use budget::{
     Budget, HeadWeights, MaxSplats, Overflow, Plan, Quality, Residency, Resident, ScratchShape, Strips, Work,
 };
 pub use bundle::Bundle;
-pub use camera::Camera;
+pub use camera::{Camera, Rotation};
 pub use decoder::{Decoder, FrameReport, TileSink, count_gaussians, count_scratch_len};
-pub use error::{DecodeError, ErrorClass, Field, SectionKind};
+pub use error::{DecodeError, ErrorClass, Field, RenderError, SectionKind};
 pub use project::chunks_in_view;
 pub use stopwatch::{Stage, Stopwatch};

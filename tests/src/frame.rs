@@ -1,5 +1,7 @@
 //! Drawing with the decoder, and a sink that keeps the books.
 
+use std::convert::Infallible;
+
 use glam::DVec3;
 use pocketsplat_capture::dataset::Normalisation;
 use pocketsplat_core::arithmetic::Arithmetic;
@@ -34,7 +36,9 @@ impl Frame {
 }
 
 impl TileSink for Frame {
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) {
+    type Error = Infallible;
+
+    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
         let [x, y, width, height] = [x_px, y_px, width, height].map(usize::from);
         assert_eq!(rgb.len(), width * height, "pixels of the tile at ({x}, {y})");
         assert!(
@@ -48,6 +52,7 @@ impl TileSink for Frame {
             self.rgb[3 * start..][..3 * width].copy_from_slice(pixels.as_flattened());
             self.deliveries[start..][..width].iter_mut().for_each(|n| *n += 1);
         }
+        Ok(())
     }
 }
 

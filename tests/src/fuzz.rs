@@ -183,7 +183,7 @@ fn draw_one(
     let mut scratch = vec![0; plan.scratch_len()];
     let bind = if skip_damage { Decoder::bind_skipping_damage } else { Decoder::bind };
     let mut frame = Frame::new(camera.width_px, camera.height_px);
-    let result = bind(bundle, plan, &mut scratch).and_then(|mut decoder| decoder.render(&camera, &mut frame));
+    let result = bind(bundle, plan, &mut scratch).and_then(|mut decoder| Ok(decoder.render(&camera, &mut frame)?));
     if let Err(error) = &result {
         check_blame(error);
     }

@@ -1,5 +1,7 @@
 //! A sink gets every pixel exactly once, and the same ones whatever the scratch memory held and wherever it lay.
 
+use std::convert::Infallible;
+
 use conformance::frame::{Frame, budget_for, bundle_of, draw, to_core};
 use conformance::scenes::{CASES, cameras, random_scene};
 use pocketsplat_core::{Bundle, Decoder, TileSink};
@@ -9,8 +11,11 @@ use pocketsplat_core::{Bundle, Decoder, TileSink};
 struct Corners(Vec<[u16; 2]>);
 
 impl TileSink for Corners {
-    fn tile(&mut self, x_px: u16, y_px: u16, _width: u16, _height: u16, _rgb: &[[u8; 3]]) {
+    type Error = Infallible;
+
+    fn tile(&mut self, x_px: u16, y_px: u16, _width: u16, _height: u16, _rgb: &[[u8; 3]]) -> Result<(), Infallible> {
         self.0.push([y_px, x_px]);
+        Ok(())
     }
 }
 

@@ -2,7 +2,7 @@
 
 use conformance::frame::{Frame, budget_for, bundle_of, draw, to_core};
 use conformance::scenes::{CASES, cameras, random_scene};
-use pocketsplat_core::{Bundle, Camera, Decoder, ErrorClass};
+use pocketsplat_core::{Bundle, Camera, DecodeError, Decoder, ErrorClass, Rotation};
 
 fn camera() -> Camera {
     to_core(&cameras()[0].1)
@@ -19,7 +19,10 @@ fn a_larger_frame_than_planned_is_refused() {
     for larger in
         [Camera { width_px: camera.width_px + 1, ..camera }, Camera { height_px: camera.height_px + 1, ..camera }]
     {
-        let error = decoder.render(&larger, &mut Frame::new(larger.width_px, larger.height_px)).err();
+        let error = decoder
+            .render(&larger, &mut Frame::new(larger.width_px, larger.height_px))
+            .map_err(DecodeError::from)
+            .err();
         assert_eq!(error.map(|e| e.class()), Some(ErrorClass::Misuse), "{} x {}", larger.width_px, larger.height_px);
     }
 }
@@ -43,7 +46,7 @@ fn an_unusable_camera_is_refused() {
         Camera { focal_px: [0.0, 100.0], ..good },
         Camera { focal_px: [100.0, f32::NAN], ..good },
         Camera { translation: [f32::INFINITY, 0.0, 0.0], ..good },
-        Camera { rotation: [f32::NAN; 9], ..good },
+        Camera { rotation: Rotation::new_unchecked([f32::NAN; 9]), ..good },
         Camera { principal_px: [f32::NEG_INFINITY, 0.0], ..good },
     ];
     for camera in bad {

@@ -20,9 +20,9 @@ fn carrying_a_camera_around_the_scene_takes_the_manifests_circle() {
     assert_eq!(orbit.len(), 24, "cameras of the manifest's orbit");
     for (i, expected) in orbit.iter().enumerate() {
         let found = orbit[0].orbited((TAU * i as f64 / 24.0) as f32);
-        let pairs =
-            found.rotation.iter().chain(&found.translation).zip(expected.rotation.iter().chain(&expected.translation));
-        for (found, expected) in pairs {
+        let [pose, expected_pose] = [found, *expected]
+            .map(|camera| camera.rotation.to_array().into_iter().chain(camera.translation).collect::<Vec<_>>());
+        for (found, expected) in pose.into_iter().zip(expected_pose) {
             assert!((found - expected).abs() < 1e-5, "camera {i}: {found}, not {expected}");
         }
         assert_eq!(found.focal_px, expected.focal_px, "camera {i} has the same lens");

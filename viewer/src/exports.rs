@@ -7,7 +7,7 @@
 
 use std::cell::RefCell;
 
-use pocketsplat_core::{Budget, Camera, DecodeError, Overflow, Quality};
+use pocketsplat_core::{Budget, Camera, DecodeError, Overflow, Quality, Rotation};
 
 use crate::{Figures, Scene};
 
@@ -130,7 +130,7 @@ extern "C" fn bind(ram: f64, width: u16, height: u16, tiers: u8, slabs: u32, cut
 /// Draws what the camera sees.
 #[unsafe(no_mangle)]
 extern "C" fn render() -> u32 {
-    on_scene(|scene, camera| scene.render(&camera_of(camera)))
+    on_scene(|scene, camera| scene.render(&camera_of(camera)?))
 }
 
 /// The pixels of the last frame: `[height, width, 4]`.
@@ -168,20 +168,20 @@ fn budget(ram: f64, [width, height]: [u16; 2], tiers: u8, slabs: u32, quality: (
         .with_quality(Quality { alpha_cut, transmittance_stop, detail: detail != 0 })
 }
 
-fn camera_of(numbers: &[f32; CAMERA_LEN]) -> Camera {
+fn camera_of(numbers: &[f32; CAMERA_LEN]) -> Result<Camera, DecodeError> {
     let [r0, r1, r2, r3, r4, r5, r6, r7, r8, x, y, z, fx, fy, cx, cy, width, height] = *numbers;
-    Camera {
-        rotation: [r0, r1, r2, r3, r4, r5, r6, r7, r8],
+    Ok(Camera {
+        rotation: Rotation::new([r0, r1, r2, r3, r4, r5, r6, r7, r8])?,
         translation: [x, y, z],
         focal_px: [fx, fy],
         principal_px: [cx, cy],
         width_px: width as u16,
         height_px: height as u16,
-    }
+    })
 }
 
 fn numbers_of(camera: &Camera) -> [f32; CAMERA_LEN] {
-    let [r0, r1, r2, r3, r4, r5, r6, r7, r8] = camera.rotation;
+    let [r0, r1, r2, r3, r4, r5, r6, r7, r8] = camera.rotation.to_array();
     let ([x, y, z], [fx, fy], [cx, cy]) = (camera.translation, camera.focal_px, camera.principal_px);
     let [width, height] = [camera.width_px, camera.height_px].map(f32::from);
     [r0, r1, r2, r3, r4, r5, r6, r7, r8, x, y, z, fx, fy, cx, cy, width, height]

@@ -1,5 +1,6 @@
 //! One bundle, its plan, the memory it draws in, and the picture.
 
+use std::convert::Infallible;
 use std::slice;
 
 use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, Plan, TileSink};
@@ -121,7 +122,7 @@ impl Bound {
     }
 
     fn render(&mut self, camera: &Camera, frame: &mut Frame) -> Result<FrameReport, DecodeError> {
-        self.decoder.render(camera, frame)
+        Ok(self.decoder.render(camera, frame)?)
     }
 }
 
@@ -149,7 +150,9 @@ impl Frame {
 }
 
 impl TileSink for Frame {
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, _height: u16, rgb: &[[u8; 3]]) {
+    type Error = Infallible;
+
+    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, _height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
         for (row, pixels) in rgb.chunks_exact(width.into()).enumerate() {
             let first = (usize::from(y_px) + row) * self.width_px + usize::from(x_px);
             let (targets, _) = self.rgba[4 * first..].as_chunks_mut::<4>();
@@ -157,6 +160,7 @@ impl TileSink for Frame {
                 *target = [red, green, blue, 0xff];
             }
         }
+        Ok(())
     }
 }
 

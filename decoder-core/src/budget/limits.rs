@@ -8,6 +8,9 @@ pub const MAX_FRAME_PX: u16 = 255 * 16;
 /// Most horizontal strips of a frame.
 pub const MAX_STRIPS: u8 = 8;
 
+/// Fewest places for splats with which a strip can be drawn in [slabs](Overflow::Slabs) of depth.
+pub const MIN_SLAB_PLACES: u32 = 2;
+
 /// How many splats there is memory for at once: those of a frame, or with strips those of a strip.
 ///
 /// A view that needs more draws those of the file's first anchors and
@@ -20,7 +23,7 @@ pub enum MaxSplats {
     Measured,
     /// Every offset of every anchor of the tiers drawn: always enough.
     Worst,
-    /// So many.
+    /// So many; with [slabs](Overflow::Slabs) at least [`MIN_SLAB_PLACES`].
     AtMost(u32),
 }
 
@@ -155,11 +158,14 @@ impl Budget {
         Self { quality, ..self }
     }
 
-    /// Frame, strips and quality lie within their limits.
+    /// Frame, strips, quality and the places of slabs lie within their limits.
     pub(super) fn check(&self) -> Result<(), DecodeError> {
         in_range(Field::FrameWidth, self.width_px.into(), 1, MAX_FRAME_PX.into())?;
         in_range(Field::FrameHeight, self.height_px.into(), 1, MAX_FRAME_PX.into())?;
         self.quality.check()?;
+        if let (Overflow::Slabs, MaxSplats::AtMost(n)) = (self.overflow, self.max_splats) {
+            in_range(Field::SlabSplats, n, MIN_SLAB_PLACES, u32::MAX)?;
+        }
         match self.strips {
             Strips::Auto => Ok(()),
             Strips::Exactly(n) => in_range(Field::Strips, n.into(), 1, MAX_STRIPS.into()),

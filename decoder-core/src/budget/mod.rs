@@ -15,7 +15,7 @@ mod shape;
 mod work;
 
 pub use crate::mlp::HeadWeights;
-pub use limits::{Budget, MAX_FRAME_PX, MAX_STRIPS, MaxSplats, Overflow, Residency, Strips};
+pub use limits::{Budget, MAX_FRAME_PX, MAX_STRIPS, MIN_SLAB_PLACES, MaxSplats, Overflow, Residency, Strips};
 pub(crate) use memory::{AnchorMemory, FrameMemory, ModelMemory, SceneMemory};
 pub use plan::Plan;
 pub use quality::{MAX_ALPHA_CUT, MAX_TRANSMITTANCE_STOP, Quality};

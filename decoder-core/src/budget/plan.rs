@@ -1,6 +1,6 @@
 //! From limits to a number of bytes.
 
-use super::limits::{Budget, MaxSplats, Overflow, Residency, Strips};
+use super::limits::{Budget, MIN_SLAB_PLACES, MaxSplats, Overflow, Residency, Strips};
 use super::shape::{FrameShape, Resident, ScratchShape};
 use super::work::{Work, decoding_macs};
 use crate::bundle::{Bundle, STRIPS, Tier, TierMeasures};
@@ -122,7 +122,8 @@ impl Bundle<'_> {
     /// # Errors
     /// [`DecodeError::BudgetTooSmall`] names the bytes that the smallest plan within the other limits needs;
     /// [`DecodeError::NotBakeable`] for a residency that the scene does not have;
-    /// [`DecodeError::OutOfRange`] for an empty or too large frame or number of strips; [`DecodeError::PlanTooLarge`] beyond
+    /// [`DecodeError::OutOfRange`] for an empty or too large frame or number of strips, and for fewer than
+    /// [`MIN_SLAB_PLACES`] splats a slab; [`DecodeError::PlanTooLarge`] beyond
     /// the address space.
     ///
     /// # Budget
@@ -288,11 +289,16 @@ impl Planner<'_, '_> {
                 Some(measures) => {
                     let [_, training_height_px] = header.training_px;
                     let most = fullest_strip(&measures, training_height_px, self.budget.height_px, n_strips);
-                    most.saturating_add(most.div_ceil(16)).min(worst)
+                    with_reserve(most).min(worst)
                 }
             },
         }
     }
+}
+
+/// Places for so many measured splats and a sixteenth more; a manifest may have measured views without any.
+fn with_reserve(n_splats: u32) -> u32 {
+    n_splats.saturating_add(n_splats.div_ceil(16)).max(MIN_SLAB_PLACES)
 }
 
 /// Tiles of a strip.
@@ -324,7 +330,7 @@ fn fullest_strip(measures: &TierMeasures, training_height_px: u16, height_px: u1
 
 #[cfg(test)]
 mod tests {
-    use super::{TierMeasures, fullest_strip};
+    use super::{TierMeasures, fullest_strip, with_reserve};
 
     #[test]
     fn strips_count_as_those_measured_that_are_as_high() {
@@ -346,5 +352,10 @@ mod tests {
         // 13 rows of tiles in eight strips are two a strip, 16 % of the frame; of 112 pixels one row is 14 %, of 96 17 %.
         assert_eq!([splats(112, 8), splats(96, 8)], [30, 70], "one row of few is a larger part");
         assert_eq!(splats(16, 8), 100, "a frame of one row is one strip");
+    }
+
+    #[test]
+    fn there_are_places_to_draw_in_slabs_whatever_was_measured() {
+        assert_eq!([0, 1, 16, 17, u32::MAX].map(with_reserve), [2, 2, 17, 19, u32::MAX]);
     }
 }

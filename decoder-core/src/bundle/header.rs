@@ -3,7 +3,7 @@
 use super::features::Features;
 use super::section::{SECTION_LEN, Section};
 use crate::bytes::{Cursor, Emitter, Fields, crc32, crc32_of};
-use crate::camera::Camera;
+use crate::camera::{Camera, MOST_OFF, Rotation};
 use crate::context::N_GROUPS;
 use crate::error::{DecodeError, Field, SectionKind, in_range};
 
@@ -176,7 +176,7 @@ impl Header {
         out.f64s(self.normalisation_centre);
         out.f64s([self.normalisation_scale]);
         let Camera { rotation, translation, focal_px, principal_px, width_px, height_px } = self.preview;
-        out.f32s(rotation);
+        out.f32s(rotation.to_array());
         out.f32s(translation);
         out.f32s(focal_px);
         out.f32s(principal_px);
@@ -201,7 +201,7 @@ impl Header {
         let [colour_hidden, detail_hidden] = fields.u16s();
         let normalisation_centre = fields.f64s();
         let [normalisation_scale] = fields.f64s();
-        let (rotation, translation) = (fields.f32s(), fields.f32s());
+        let (rotation, translation) = (Rotation::new_unchecked(fields.f32s()), fields.f32s());
         let (focal_px, principal_px) = (fields.f32s(), fields.f32s());
         let [width_px, height_px] = fields.u16s();
         let preview = Camera { rotation, translation, focal_px, principal_px, width_px, height_px };
@@ -266,7 +266,7 @@ impl Header {
         if preview.check().is_err() {
             return Err(DecodeError::BadFloat { field: Field::PreviewCamera, index: 0 });
         }
-        Ok(())
+        in_range(Field::PreviewRotation, preview.rotation.off(), 0, MOST_OFF)
     }
 }
 

@@ -3,6 +3,7 @@
 mod builder;
 mod emit;
 
+use core::convert::Infallible;
 use std::vec;
 use std::vec::Vec;
 
@@ -12,7 +13,7 @@ use crate::arena::Arena;
 use crate::bundle::{AnchorRecords, AnchorSite, Bundle, Coder, RecordMemory, Tables, crc32};
 use crate::context::{Context, Group};
 use crate::entropy::NormalModel;
-use crate::error::{DecodeError, Field, SectionKind};
+use crate::error::{DecodeError, ErrorClass, Field, SectionKind};
 use crate::{Budget, Decoder, FrameReport, MaxSplats, Overflow, Residency, ScratchShape, Strips, TileSink};
 
 fn variants() -> impl Iterator<Item = Variant> {
@@ -71,6 +72,30 @@ fn a_colour_behind_a_scene_without_a_background_is_refused() {
     bytes[crc_at..][..4].copy_from_slice(&crc);
     let expected = DecodeError::OutOfRange { field: Field::Background, found: 10, limit: 0 };
     assert_eq!(Bundle::parse(&bytes).err(), Some(expected));
+}
+
+#[test]
+fn a_preview_that_is_no_rotation_is_refused() {
+    let mut bytes = bundle(variants().next().expect("some"));
+    let crc_at = usize::from(u16::from_le_bytes([bytes[10], bytes[11]])) - 4;
+    // Each number of the matrix, moved by what is allowed and by more.
+    for index in 0..9 {
+        let place = 88 + 4 * index..92 + 4 * index;
+        let number = f32::from_le_bytes(bytes[place.clone()].try_into().expect("four bytes"));
+        for (moved, refused) in [(0.007, false), (0.04, true), (-0.04, true), (f32::INFINITY, true)] {
+            bytes[place.clone()].copy_from_slice(&(number + moved).to_le_bytes());
+            let crc = crc32(&bytes[..crc_at]).to_le_bytes();
+            bytes[crc_at..][..4].copy_from_slice(&crc);
+            let error = Bundle::parse(&bytes).err();
+            assert_eq!(error.is_some(), refused, "number {index}, moved by {moved}: {error:?}");
+            let Some(error) = error else { continue };
+            assert_eq!(error.class(), ErrorClass::Malformed, "number {index}, moved by {moved}: {error}");
+            let named =
+                matches!(error, DecodeError::OutOfRange { field: Field::PreviewRotation, found: 301.., limit: 300 });
+            assert!(named || moved == f32::INFINITY, "number {index}, moved by {moved}: {error}");
+        }
+        bytes[place].copy_from_slice(&number.to_le_bytes());
+    }
 }
 
 #[test]
@@ -217,8 +242,11 @@ fn a_file_cut_where_a_tier_ends_is_a_smaller_scene_and_any_other_is_refused() {
 struct Pixels(Vec<[u8; 3]>);
 
 impl TileSink for Pixels {
-    fn tile(&mut self, _x_px: u16, _y_px: u16, _width: u16, _height: u16, rgb: &[[u8; 3]]) {
+    type Error = Infallible;
+
+    fn tile(&mut self, _x_px: u16, _y_px: u16, _width: u16, _height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
         self.0.extend_from_slice(rgb);
+        Ok(())
     }
 }
 

@@ -8,7 +8,7 @@ use super::{Decoder, FrameReport, TileSink};
 use crate::arithmetic::Arithmetic;
 use crate::budget::Overflow;
 use crate::camera::Camera;
-use crate::error::{DecodeError, Field, in_range, saturate};
+use crate::error::{Field, RenderError, in_range, saturate};
 use crate::project::{TILE_PIXELS, TileRect, View};
 use crate::raster::{BlendRule, EMPTY, TilePlace, blend_tile, finish_tile, sort_by_depth};
 use crate::rules::TILE_PX;
@@ -18,12 +18,12 @@ impl<A: Arithmetic> Decoder<'_, '_, A> {
     /// As [`render_watched`](Self::render_watched).
     // Not inlined: a caller's stack frame would keep what only this needs.
     #[inline(never)]
-    pub(super) fn draw_frame(
+    pub(super) fn draw_frame<S: TileSink>(
         &mut self,
         camera: &Camera,
-        sink: &mut impl TileSink,
+        sink: &mut S,
         watch: &mut impl Stopwatch,
-    ) -> Result<FrameReport, DecodeError> {
+    ) -> Result<FrameReport, RenderError<S::Error>> {
         watch.enter(Stage::Project);
         let budget = *self.plan.budget();
         let view = View::new(camera)?.cutting_at(budget.quality.alpha_cut);
@@ -54,7 +54,8 @@ impl<A: Arithmetic> Decoder<'_, '_, A> {
                 let first_here =
                     rects.filter(|rect| *strips.touched(**rect).start() == usize::from(strip.index)).count();
                 frame.report.splats = frame.report.splats.saturating_add(first_here as u32);
-                let alive = self.draw(strip, slab, camera, sink, &mut frame.report, watch);
+                let alive =
+                    self.draw(strip, slab, camera, sink, &mut frame.report, watch).map_err(RenderError::Sink)?;
                 if !slab.ends() {
                     break;
                 }
@@ -62,7 +63,8 @@ impl<A: Arithmetic> Decoder<'_, '_, A> {
                 if !alive {
                     // Nothing behind can be seen: the strip goes out as it is.
                     self.splats.n = 0;
-                    self.draw(strip, Slab::behind(from), camera, sink, &mut frame.report, watch);
+                    self.draw(strip, Slab::behind(from), camera, sink, &mut frame.report, watch)
+                        .map_err(RenderError::Sink)?;
                     break;
                 }
             }
@@ -80,20 +82,23 @@ impl<A: Arithmetic> Decoder<'_, '_, A> {
 
     /// Orders the splats of a strip's slab and draws tile after tile; behind the last slab tiles go to `sink`. Returns whether
     /// more can be seen behind them.
-    fn draw(
+    ///
+    /// # Errors
+    /// The sink's.
+    fn draw<S: TileSink>(
         &mut self,
         strip: Strip,
         slab: Slab,
         camera: &Camera,
-        sink: &mut impl TileSink,
+        sink: &mut S,
         report: &mut FrameReport,
         watch: &mut impl Stopwatch,
-    ) -> bool {
+    ) -> Result<bool, S::Error> {
         watch.enter(Stage::Sort);
         let SplatStore { splats, rects, n, order, spare, counts } = &mut self.splats;
         let n = *n as usize;
-        let (Some(splats), Some(rects)) = (splats.get(..n), rects.get(..n)) else { return false };
-        let (Some(order), Some(spare)) = (order.get_mut(..n), spare.get_mut(..n)) else { return false };
+        let (Some(splats), Some(rects)) = (splats.get(..n), rects.get(..n)) else { return Ok(false) };
+        let (Some(order), Some(spare)) = (order.get_mut(..n), spare.get_mut(..n)) else { return Ok(false) };
         let (order, row_list) = sort_by_depth(splats, order, spare, counts);
         // One after the other, or all at once.
         let keeps_tiles = self.plan.shape().frame.canvas_tiles > 1;
@@ -103,16 +108,18 @@ impl<A: Arithmetic> Decoder<'_, '_, A> {
         let header = self.bundle.header();
         let has_background = header.features.effects.background;
         let background = has_background.then(|| header.background.map(|byte| f32::from(byte) / 255.0));
-        let rows = (0..).zip(tiles_along(camera.height_px));
-        for (row, (y_px, height)) in rows.take(strip.end_row.into()).skip(strip.first_row.into()) {
+        // A frame has 255 rows and columns at most.
+        for row in strip.first_row as u8..strip.end_row as u8 {
+            let (y_px, height) = tile_along(camera.height_px, row);
             watch.enter(Stage::Sort);
             let list = gather_row(order, rects, row, row_list);
-            for (column, (x_px, width)) in (0..).zip(tiles_along(camera.width_px)) {
+            for column in 0..camera.width_px.div_ceil(TILE_PX) as u8 {
+                let (x_px, width) = tile_along(camera.width_px, column);
                 watch.enter(Stage::Blend);
                 let place = TilePlace { column, row, width, height };
                 let Some(pixels) = self.pixels.chunks_exact_mut(TILE_PIXELS).nth(if keeps_tiles { n_tiles } else { 0 })
                 else {
-                    return false;
+                    return Ok(false);
                 };
                 n_tiles += 1;
                 if slab.from == 0.0 {
@@ -127,20 +134,23 @@ impl<A: Arithmetic> Decoder<'_, '_, A> {
                     finish_tile(place, pixels, background, self.rgb);
                     let n_pixels = usize::from(width) * usize::from(height);
                     watch.enter(Stage::Output);
-                    sink.tile(x_px, y_px, width, height, self.rgb.get(..n_pixels).unwrap_or_default());
+                    sink.tile(x_px, y_px, width, height, self.rgb.get(..n_pixels).unwrap_or_default())?;
                 }
             }
         }
-        alive > 0
+        Ok(alive > 0)
     }
 }
 
-/// First pixel and size of each tile along an axis.
-fn tiles_along(size_px: u16) -> impl Iterator<Item = (u16, u16)> {
-    (0..size_px).step_by(TILE_PX.into()).map(move |first| (first, TILE_PX.min(size_px - first)))
+/// First pixel and size of a tile along an axis that it lies in.
+fn tile_along(size_px: u16, index: u8) -> (u16, u16) {
+    let first_px = u16::from(index) * TILE_PX;
+    (first_px, TILE_PX.min(size_px.saturating_sub(first_px)))
 }
 
 /// Copies the splats that touch tile row `row` from `order` to the front of `list`, in order.
+// Not inlined: its loop would not stay in registers.
+#[inline(never)]
 fn gather_row<'l>(order: &[u32], rects: &[TileRect], row: u8, list: &'l mut [u32]) -> &'l [u32] {
     let mut n = 0;
     for &index in order {

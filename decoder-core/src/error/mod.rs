@@ -1,11 +1,13 @@
-//! The one error of the decoder: what is wrong, where, and what would be right.
+//! The error of the decoder: what is wrong, where, and what would be right; and that of a frame, which is it or the sink's.
 
 mod check;
 mod message;
 mod place;
+mod render;
 
 pub(crate) use check::{in_range, saturate};
 pub use place::{Field, SectionKind};
+pub use render::RenderError;
 
 /// Whose fault an error is, which decides what can be done about it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -58,6 +58,8 @@ pub enum Field {
     VoxelSize,
     Normalisation,
     PreviewCamera,
+    /// How far the preview's matrix is from a [rotation](crate::Rotation), in 10 000ths.
+    PreviewRotation,
     HeadWeight,
     HeadStep,
     NTables,
@@ -89,11 +91,15 @@ pub enum Field {
     GridResolution,
     GridRows,
     CameraPose,
+    /// How far a camera's matrix is from a [rotation](crate::Rotation), in 10 000ths.
+    CameraRotation,
     CameraFocal,
     CameraPrincipal,
     FrameWidth,
     FrameHeight,
     Strips,
+    /// Places for the splats of a slab.
+    SlabSplats,
     /// The alpha that a budget's quality cuts at.
     AlphaCut,
     /// The transmittance that it stops at.
@@ -108,11 +114,13 @@ impl Field {
     pub(super) const fn class(self) -> ErrorClass {
         match self {
             Self::CameraPose
+            | Self::CameraRotation
             | Self::CameraFocal
             | Self::CameraPrincipal
             | Self::FrameWidth
             | Self::FrameHeight
             | Self::Strips
+            | Self::SlabSplats
             | Self::AlphaCut
             | Self::TransmittanceStop
             | Self::ChannelBuffer
@@ -163,6 +171,7 @@ impl fmt::Display for Field {
             Self::VoxelSize => "voxel size",
             Self::Normalisation => "normalisation",
             Self::PreviewCamera => "preview camera",
+            Self::PreviewRotation => "distance of the preview camera's matrix from a rotation, in 10 000ths,",
             Self::HeadWeight => "weight of a head",
             Self::HeadStep => "origin or step of coded heads",
             Self::NTables => "number of tables",
@@ -194,11 +203,13 @@ impl fmt::Display for Field {
             Self::GridResolution => "resolution of a grid level",
             Self::GridRows => "rows of a grid level (all nodes, or a power of two)",
             Self::CameraPose => "camera pose",
+            Self::CameraRotation => "distance of the camera's matrix from a rotation, in 10 000ths,",
             Self::CameraFocal => "camera focal length",
             Self::CameraPrincipal => "camera principal point",
             Self::FrameWidth => "frame width",
             Self::FrameHeight => "frame height",
             Self::Strips => "number of strips",
+            Self::SlabSplats => "number of splats of a slab",
             Self::AlphaCut => "alpha to cut at, in 255ths",
             Self::TransmittanceStop => "transmittance to stop at, in 10 000ths",
             Self::ChannelBuffer => "buffer for channels",

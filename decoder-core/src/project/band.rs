@@ -152,7 +152,7 @@ impl Side {
 mod tests {
     use super::{Band, View};
     use crate::bundle::Effects;
-    use crate::camera::Camera;
+    use crate::camera::{Camera, Rotation};
     use crate::math::functions::Reference;
     use crate::scene::{Anchor, Gaussian};
 
@@ -172,7 +172,7 @@ mod tests {
         // A turn about x, then one about z, some distance away: orthonormal within rounding.
         let [(s, c), (sz, cz)] = [random.between(-0.7, 0.7), random.between(-3.0, 3.0)].map(f32::sin_cos);
         let camera = Camera {
-            rotation: [cz, -sz, 0.0, c * sz, c * cz, -s, s * sz, s * cz, c],
+            rotation: Rotation::new([cz, -sz, 0.0, c * sz, c * cz, -s, s * sz, s * cz, c]).expect("a rotation"),
             translation: [random.between(-1.0, 1.0), random.between(-1.0, 1.0), random.between(-0.5, 4.0)],
             focal_px: [80.0, random.between(30.0, 300.0)],
             principal_px: [40.0, random.between(-20.0, 120.0)],
@@ -250,7 +250,7 @@ mod tests {
     fn a_depth_that_rounding_moves_onto_a_border_is_not_left_out() {
         let random = &mut Numbers(2);
         let mut camera = Camera {
-            rotation: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+            rotation: Rotation::IDENTITY,
             translation: [0.0; 3],
             focal_px: [80.0; 2],
             principal_px: [40.0, 45.0],

@@ -97,7 +97,7 @@ impl View {
 #[cfg(test)]
 mod tests {
     use crate::bundle::Effects;
-    use crate::camera::Camera;
+    use crate::camera::{Camera, Rotation};
     use crate::math::functions::Reference;
     use crate::project::{View, log_cut};
     use crate::scene::Gaussian;
@@ -105,7 +105,7 @@ mod tests {
     #[test]
     fn a_splat_cut_earlier_keeps_its_sum() {
         let camera = Camera {
-            rotation: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+            rotation: Rotation::IDENTITY,
             translation: [0.0; 3],
             focal_px: [100.0; 2],
             principal_px: [50.0; 2],

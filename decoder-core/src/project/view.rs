@@ -37,13 +37,12 @@ impl View {
     /// Checks the camera and prepares it.
     pub(crate) fn new(camera: &Camera) -> Result<Self, DecodeError> {
         camera.check()?;
-        let [r0, r1, r2, r3, r4, r5, r6, r7, r8] = camera.rotation;
         let [fx, fy] = camera.focal_px;
         let [cx, cy] = camera.principal_px;
         let [width, height] = [f32::from(camera.width_px), f32::from(camera.height_px)];
         let [margin_x, margin_y] = [CLAMP_MARGIN * width / fx, CLAMP_MARGIN * height / fy];
         Ok(Self {
-            rotation: [[r0, r1, r2], [r3, r4, r5], [r6, r7, r8]],
+            rotation: camera.rotation.rows(),
             translation: camera.translation,
             eye: camera.centre(),
             focal_px: camera.focal_px,

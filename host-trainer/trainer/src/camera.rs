@@ -1,7 +1,7 @@
 //! Cameras between the host's double precision and the decoder's single precision.
 
 use glam::{DMat3, DVec3};
-use pocketsplat_core::{DecodeError, Field};
+use pocketsplat_core::{DecodeError, Field, Rotation};
 
 use pocketsplat_capture::camera::Camera;
 
@@ -9,7 +9,7 @@ use pocketsplat_capture::camera::Camera;
 pub fn host_camera(camera: &pocketsplat_core::Camera) -> Camera {
     Camera {
         // glam stores columns.
-        rotation: DMat3::from_cols_array(&camera.rotation.map(f64::from)).transpose(),
+        rotation: DMat3::from_cols_array(&camera.rotation.to_array().map(f64::from)).transpose(),
         translation: DVec3::from(camera.translation.map(f64::from)),
         focal_px: camera.focal_px.map(f64::from),
         principal_px: camera.principal_px.map(f64::from),
@@ -21,15 +21,15 @@ pub fn host_camera(camera: &pocketsplat_core::Camera) -> Camera {
 /// Rounds a camera to the decoder's single precision.
 ///
 /// # Errors
-/// [`DecodeError::OutOfRange`] when the image is larger than the decoder draws, and what
-/// [`pocketsplat_core::Camera::check`] finds.
+/// [`DecodeError::OutOfRange`] when the image is larger than the decoder draws, and what [`Rotation::new`] and
+/// [`pocketsplat_core::Camera::check`] find.
 pub fn core_camera(camera: &Camera) -> Result<pocketsplat_core::Camera, DecodeError> {
     let size = |field, px: u32| {
         u16::try_from(px).map_err(|_| DecodeError::OutOfRange { field, found: px, limit: u16::MAX.into() })
     };
     let core = pocketsplat_core::Camera {
         // glam stores columns.
-        rotation: camera.rotation.transpose().to_cols_array().map(|x| x as f32),
+        rotation: Rotation::new(camera.rotation.transpose().to_cols_array().map(|x| x as f32))?,
         translation: camera.translation.to_array().map(|x| x as f32),
         focal_px: camera.focal_px.map(|x| x as f32),
         principal_px: camera.principal_px.map(|x| x as f32),
@@ -42,12 +42,14 @@ pub fn core_camera(camera: &Camera) -> Result<pocketsplat_core::Camera, DecodeEr
 
 #[cfg(test)]
 mod tests {
+    use pocketsplat_core::Rotation;
+
     use super::{core_camera, host_camera};
 
     #[test]
     fn a_decoders_camera_survives_the_way_to_the_host_and_back() {
         let camera = pocketsplat_core::Camera {
-            rotation: [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9],
+            rotation: Rotation::new([0.6, 0.0, 0.8, 0.48, 0.8, -0.36, -0.64, 0.6, 0.48]).expect("a rotation"),
             translation: [1.1, -2.2, 3.3],
             focal_px: [100.1, 99.9],
             principal_px: [40.3, 29.7],

@@ -1,5 +1,7 @@
 //! One number for the pixels of a frame.
 
+use core::convert::Infallible;
+
 use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, MaxSplats, Residency, Strips, TileSink};
 
 use super::digest::Digest;
@@ -27,8 +29,11 @@ pub fn frame_digest(bundle: &Bundle<'_>, scratch: &mut [u8]) -> Result<Digest, D
 struct Tiles(Digest);
 
 impl TileSink for Tiles {
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) {
+    type Error = Infallible;
+
+    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
         self.0.add([x_px, y_px, width, height].into_iter().flat_map(u16::to_le_bytes));
         self.0.add(rgb.as_flattened().iter().copied());
+        Ok(())
     }
 }

@@ -5,12 +5,14 @@
 #![no_std]
 #![no_main]
 
+use core::convert::Infallible;
 use core::hint::black_box;
 use core::panic::PanicInfo;
 
 use pocketsplat_core::bundle::AnchorSite;
 use pocketsplat_core::{
-    Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, MaxSplats, Residency, ScratchShape, Strips,
+    Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, MaxSplats, RenderError, Residency, Rotation,
+    ScratchShape, Strips,
 };
 
 /// The linker's entry point; `black_box` hides every argument, so no branch of the decoder is known to be dead.
@@ -20,7 +22,7 @@ extern "C" fn _start() -> ! {
     let mut scratch = [0; 4096];
     let mut words = [0; 64];
     let camera = Camera {
-        rotation: [0.0; 9],
+        rotation: Rotation::new_unchecked([0.0; 9]),
         translation: [0.0; 3],
         focal_px: [0.0; 2],
         principal_px: [0.0; 2],
@@ -34,7 +36,7 @@ extern "C" fn _start() -> ! {
 }
 
 /// Parse, plan, bind, draw.
-fn draw(bytes: &[u8], camera: &Camera, scratch: &mut [u8]) -> Result<FrameReport, DecodeError> {
+fn draw(bytes: &[u8], camera: &Camera, scratch: &mut [u8]) -> Result<FrameReport, RenderError<Infallible>> {
     let bundle = Bundle::parse(bytes)?;
     let [max_splats, residency, strips] = black_box([0_u8; 3]);
     let budget = Budget::for_frame(camera.width_px, camera.height_px)
@@ -82,12 +84,15 @@ mod display {
     struct Display;
 
     impl TileSink for Display {
-        fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) {
+        type Error = Infallible;
+
+        fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
             black_box((x_px, y_px, width, height, rgb));
+            Ok(())
         }
     }
 
-    pub(super) fn draw(decoder: &mut Decoder<'_, '_>, camera: &Camera) -> Result<FrameReport, DecodeError> {
+    pub(super) fn draw(decoder: &mut Decoder<'_, '_>, camera: &Camera) -> Result<FrameReport, RenderError<Infallible>> {
         decoder.render(camera, &mut Display)
     }
 }
@@ -121,12 +126,9 @@ mod display {
         }
     }
 
-    pub(super) fn draw(decoder: &mut Decoder<'_, '_>, camera: &Camera) -> Result<FrameReport, DecodeError> {
+    pub(super) fn draw(decoder: &mut Decoder<'_, '_>, camera: &Camera) -> Result<FrameReport, RenderError<Infallible>> {
         let mut display = Display;
-        let mut sink = DisplaySink::new(&mut display, Point::zero());
-        let report = decoder.render(camera, &mut sink);
-        let Ok(()) = sink.finish();
-        report
+        decoder.render(camera, &mut DisplaySink::new(&mut display, Point::zero()))
     }
 }
 

@@ -4,7 +4,7 @@ use std::f32::consts::PI;
 
 use glam::DVec3;
 use pocketsplat_capture::dataset::{self, LoadOptions};
-use pocketsplat_core::Bundle;
+use pocketsplat_core::{Bundle, Rotation};
 use pocketsplat_trainer::bundle::{self, WriteOptions};
 use pocketsplat_trainer::scene::Scene;
 
@@ -72,7 +72,11 @@ pub(super) fn family() -> Family {
             writing(|scene| scene.anchors.lattice[1][0] += 1 << 22)
         }),
         refusal("NaN in a camera", "a pose that is none", "the decoder", "camera", || {
-            drawing(|camera| camera.rotation[4] = f32::NAN)
+            drawing(|camera| {
+                let mut rows = camera.rotation.to_array();
+                rows[4] = f32::NAN;
+                camera.rotation = Rotation::new_unchecked(rows);
+            })
         }),
         refusal("negative focal length", "a lens that is none", "the decoder", "focal", || {
             drawing(|camera| camera.focal_px[1] = -PI)

@@ -1,5 +1,6 @@
 //! What the plan variants of a bundle take, in bytes and in this machine's time: residency and strips, frame by frame in turn.
 
+use std::convert::Infallible;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -43,8 +44,11 @@ struct Variant<'b> {
 struct Nowhere;
 
 impl TileSink for Nowhere {
-    fn tile(&mut self, _x_px: u16, _y_px: u16, _width: u16, _height: u16, rgb: &[[u8; 3]]) {
+    type Error = Infallible;
+
+    fn tile(&mut self, _x_px: u16, _y_px: u16, _width: u16, _height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
         std::hint::black_box(rgb);
+        Ok(())
     }
 }
 

@@ -9,7 +9,7 @@ use crate::bundle::{
     Bundle, ChunkRecord, Coder, Effects, Features, FrequencyTable, Header, InkFrame, Lattice, SECTION_LEN, STRIPS,
     Section, SectionBytes, Tables, Tier, TierMeasures, header_len, manifest,
 };
-use crate::camera::Camera;
+use crate::camera::{Camera, Rotation};
 use crate::context::{Context, ContextHead};
 use crate::entropy::TrieModel;
 use crate::error::{DecodeError, SectionKind};
@@ -128,7 +128,7 @@ fn random_header(bits: &mut Bits) -> Header {
         normalisation_centre: std::array::from_fn(|_| finite(bits)),
         normalisation_scale: finite(bits).abs() + f64::from_bits(1),
         preview: Camera {
-            rotation: [1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0],
+            rotation: Rotation::new([1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0]).expect("a rotation"),
             translation: [0.5, -3.25, 7.0],
             focal_px: [bits.up_to(9999) as f32, 0.125],
             principal_px: [-4.5, bits.up_to(9999) as f32],

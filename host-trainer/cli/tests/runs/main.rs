@@ -8,5 +8,6 @@ mod effects;
 mod fixture;
 mod interruption;
 mod modules;
+mod preview;
 mod sweep;
 mod view;

@@ -126,8 +126,8 @@ fn programs(target: Processor) -> [&'static str; 4] {
 /// Cameras as the firmware's build script reads them.
 fn lines(cameras: &[Camera]) -> String {
     let line = |camera: &Camera| {
-        let floats =
-            camera.rotation.iter().chain(&camera.translation).chain(&camera.focal_px).chain(&camera.principal_px);
+        let rotation = camera.rotation.to_array();
+        let floats = rotation.iter().chain(&camera.translation).chain(&camera.focal_px).chain(&camera.principal_px);
         let mut numbers: Vec<String> = floats.map(f32::to_string).collect();
         numbers.extend([camera.width_px, camera.height_px].map(|px| px.to_string()));
         numbers.join(" ") + "\n"

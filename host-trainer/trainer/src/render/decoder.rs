@@ -1,5 +1,7 @@
 //! The decoder's own renderer, with memory from the heap: what a device would show.
 
+use std::convert::Infallible;
+
 use pocketsplat_core::arithmetic::Arithmetic;
 use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, FrameReport, MaxSplats, Residency, Strips, TileSink};
 
@@ -70,11 +72,14 @@ impl ImageSink {
 }
 
 impl TileSink for ImageSink {
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, _height: u16, rgb: &[[u8; 3]]) {
+    type Error = Infallible;
+
+    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, _height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
         let stride = self.image.width_px as usize;
         for (y, row) in rgb.chunks_exact(usize::from(width)).enumerate() {
             let start = 3 * ((usize::from(y_px) + y) * stride + usize::from(x_px));
             self.image.rgb[start..start + 3 * row.len()].copy_from_slice(row.as_flattened());
         }
+        Ok(())
     }
 }

@@ -4,6 +4,7 @@
 
 mod trial;
 
+use pocketsplat_core::budget::MIN_SLAB_PLACES;
 use pocketsplat_core::bundle::STRIPS;
 use pocketsplat_core::{
     Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, HeadWeights, MaxSplats, Overflow, Plan, Residency,
@@ -118,8 +119,8 @@ pub fn variants_match(bundle: &Bundle<'_>, budget: Budget, camera: &Camera) -> R
         if drawn.report.anchors_decoded > 0 && residency != Residency::Streamed {
             return Err(format!("{residency:?}, {strips:?}: decoded anchors that wait in memory"));
         }
-        // A third of the places that the fullest strip asks for.
-        let few = MaxSplats::AtMost((drawn.report.max_splats / 3).max(1));
+        // A third of the places that the fullest strip asks for, or the fewest that there may be.
+        let few = MaxSplats::AtMost((drawn.report.max_splats / 3).max(MIN_SLAB_PLACES));
         let in_slabs = draw(&variant.with_max_splats(few).with_overflow(Overflow::Slabs));
         let in_slabs = in_slabs.map_err(|breach| format!("{residency:?}, {strips:?}, slabs: {breach}"))?;
         if both_whole(&drawn, &expected) && both_whole(&drawn, &in_slabs) && in_slabs.rgb != expected.rgb {

@@ -1,5 +1,7 @@
 //! One frame in watched memory.
 
+use std::convert::Infallible;
+
 use pocketsplat_core::{Bundle, Camera, DecodeError, Decoder, FrameReport, Plan, TileSink};
 
 /// Bytes before and after the memory that a decoder gets.
@@ -42,7 +44,7 @@ impl Trial {
         let (before, rest) = memory.split_at_mut(GUARD_LEN + start);
         let (scratch, after) = rest.split_at_mut(scratch_len);
         let mut sink = Pixels::new(camera);
-        let report = Decoder::bind(bundle, plan, scratch)?.render(camera, &mut sink)?;
+        let report = Decoder::bind(bundle, plan, scratch)?.render(camera, &mut sink).map_err(DecodeError::from)?;
         let n_bytes = before.iter().chain(&*after).filter(|byte| **byte != fill).count();
         if n_bytes > 0 {
             return Err(Breach::Outside { n_bytes, scratch_len });
@@ -70,12 +72,15 @@ impl Pixels {
 }
 
 impl TileSink for Pixels {
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, _height: u16, rgb: &[[u8; 3]]) {
+    type Error = Infallible;
+
+    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, _height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
         let [x, y, width] = [x_px, y_px, width].map(usize::from);
         for (row, pixels) in rgb.chunks_exact(width).enumerate() {
             let start = (y + row) * self.width + x;
             self.rgb[3 * start..][..3 * width].copy_from_slice(pixels.as_flattened());
             self.times[start..][..width].iter_mut().for_each(|times| *times = times.saturating_add(1));
         }
+        Ok(())
     }
 }

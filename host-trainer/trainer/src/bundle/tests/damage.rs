@@ -1,3 +1,5 @@
+use std::convert::Infallible;
+
 use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, ErrorClass, MaxSplats, TileSink};
 
 use super::{SMALL, TABLES, info, options, random_scene, write_random};
@@ -10,7 +12,11 @@ const TINY: ModelShape = ModelShape { feature_dim: 1, n_offsets: 1, ..SMALL };
 struct NoSink;
 
 impl TileSink for NoSink {
-    fn tile(&mut self, _: u16, _: u16, _: u16, _: u16, _: &[[u8; 3]]) {}
+    type Error = Infallible;
+
+    fn tile(&mut self, _: u16, _: u16, _: u16, _: u16, _: &[[u8; 3]]) -> Result<(), Infallible> {
+        Ok(())
+    }
 }
 
 /// Everything a device does with a bundle.

@@ -1,0 +1,131 @@
+//! Frames of all sizes, and sinks that fail.
+
+use std::vec;
+use std::vec::Vec;
+
+use super::{Decoder, TileSink};
+use crate::budget::{Budget, MAX_FRAME_PX, MaxSplats, Overflow, Residency, Strips};
+use crate::bundle::Bundle;
+use crate::camera::{Camera, Rotation};
+use crate::error::{DecodeError, ErrorClass, Field, RenderError};
+
+const EXAMPLE: &[u8] = include_bytes!("../bundle/example.psb");
+
+/// Counts pixels, keeps where each tile begins, and refuses one tile.
+#[derive(Default)]
+struct Tally {
+    n_pixels: usize,
+    corners: Vec<[u16; 2]>,
+    /// Which tile is refused, from 0.
+    refused: Option<usize>,
+}
+
+impl TileSink for Tally {
+    type Error = &'static str;
+
+    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) -> Result<(), &'static str> {
+        assert_eq!(rgb.len(), usize::from(width) * usize::from(height), "the tile at ({x_px}, {y_px})");
+        let refused = self.refused == Some(self.corners.len());
+        self.corners.push([x_px, y_px]);
+        self.n_pixels += rgb.len();
+        if refused { Err("the bus hung") } else { Ok(()) }
+    }
+}
+
+fn example() -> Bundle<'static> {
+    Bundle::parse(EXAMPLE).expect("the example is sound")
+}
+
+fn draw(budget: &Budget, camera: &Camera, refused: Option<usize>) -> (Tally, Result<u32, RenderError<&'static str>>) {
+    let bundle = example();
+    let plan = bundle.plan(budget).expect("a plan");
+    let mut scratch = vec![0; plan.scratch_len()];
+    let mut tally = Tally { refused, ..Tally::default() };
+    let mut decoder = Decoder::bind(&bundle, plan, &mut scratch).expect("planned memory");
+    let drawn = decoder.render(camera, &mut tally).map(|report| report.splats);
+    if drawn.is_err() {
+        let mut again = Tally::default();
+        decoder.render(&example().header().preview, &mut again).expect("the next frame is drawn");
+        assert_eq!(again.n_pixels, 32 * 24, "the next frame is whole");
+    }
+    (tally, drawn)
+}
+
+/// Where overflow is checked, the number of a column beyond the last would panic.
+#[test]
+fn frames_of_the_largest_size_are_drawn_and_larger_ones_refused() {
+    let preview = example().header().preview;
+    let largest = MAX_FRAME_PX;
+    for [width_px, height_px] in
+        [[largest, 1], [largest - 15, 17], [largest - 16, 16], [1, largest], [largest, largest]]
+    {
+        for n_strips in [1, 8] {
+            for overflow in [Overflow::LeaveOut, Overflow::Slabs] {
+                // A canvas of 266 MB, which is the same in parts.
+                if overflow == Overflow::Slabs && width_px == height_px {
+                    continue;
+                }
+                let budget = Budget::for_frame(width_px, height_px)
+                    .with_strips(Strips::Exactly(n_strips))
+                    .with_overflow(overflow);
+                let (tally, drawn) = draw(&budget, &preview.resized(width_px, height_px), None);
+                assert!(drawn.is_ok_and(|n_splats| n_splats > 0), "{width_px}×{height_px}: {drawn:?}");
+                assert_eq!(tally.n_pixels, usize::from(width_px) * usize::from(height_px), "{budget:?}");
+                let last = [width_px, height_px].map(|size_px| (size_px - 1) / 16 * 16);
+                assert_eq!(tally.corners.last(), Some(&last), "{budget:?}");
+            }
+        }
+    }
+    for (field, budget) in [
+        (Field::FrameWidth, Budget::for_frame(largest + 1, 1)),
+        (Field::FrameHeight, Budget::for_frame(1, largest + 1)),
+    ] {
+        let expected = DecodeError::OutOfRange { field, found: 4081, limit: 4080 };
+        assert_eq!(example().plan(&budget), Err(expected));
+    }
+}
+
+#[test]
+fn the_first_error_of_a_sink_ends_the_frame_and_is_returned() {
+    let preview = example().header().preview;
+    let in_slabs = Budget::for_frame(32, 24).with_overflow(Overflow::Slabs).with_max_splats(MaxSplats::AtMost(2));
+    for budget in [Budget::for_frame(32, 24), Budget::for_frame(32, 24).with_strips(Strips::Exactly(2)), in_slabs] {
+        for refused in 0..4 {
+            let (tally, drawn) = draw(&budget, &preview, Some(refused));
+            assert_eq!(drawn, Err(RenderError::Sink("the bus hung")), "tile {refused}");
+            assert_eq!(tally.corners.len(), refused + 1, "no tile comes after the one refused");
+        }
+        assert!(draw(&budget, &preview, Some(4)).1.is_ok(), "there are four tiles");
+    }
+}
+
+#[test]
+fn an_unusable_camera_is_another_error_than_a_sinks() {
+    let preview = example().header().preview;
+    let wide = Camera { width_px: 33, ..preview };
+    let (tally, drawn) = draw(&Budget::for_frame(32, 24), &wide, Some(0));
+    let error = DecodeError::OutOfRange { field: Field::FrameWidth, found: 33, limit: 32 };
+    assert_eq!((drawn, tally.n_pixels), (Err(RenderError::Decode(error)), 0));
+    let nowhere = Camera { rotation: Rotation::new_unchecked([f32::NAN; 9]), ..preview };
+    let (_, drawn) = draw(&Budget::for_frame(32, 24), &nowhere, None);
+    assert_eq!(drawn, Err(RenderError::Decode(DecodeError::BadFloat { field: Field::CameraPose, index: 0 })));
+    let mirrored = Rotation::new_unchecked([-1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]);
+    let (_, drawn) = draw(&Budget::for_frame(32, 24), &Camera { rotation: mirrored, ..preview }, None);
+    assert!(drawn.is_ok_and(|n_splats| n_splats > 0), "drawn unchecked: {drawn:?}");
+}
+
+#[test]
+fn slabs_of_fewer_than_two_splats_are_refused() {
+    let budget = Budget::for_frame(32, 24).with_residency(Residency::Streamed).with_overflow(Overflow::Slabs);
+    for found in [0, 1] {
+        let error = example().plan(&budget.with_max_splats(MaxSplats::AtMost(found))).expect_err("too few");
+        assert_eq!(error, DecodeError::OutOfRange { field: Field::SlabSplats, found, limit: 2 });
+        assert_eq!(error.class(), ErrorClass::Misuse);
+        let left_out = budget.with_overflow(Overflow::LeaveOut).with_max_splats(MaxSplats::AtMost(found));
+        assert!(example().plan(&left_out).is_ok(), "{found} places are fine where splats are left out");
+    }
+    let preview = example().header().preview;
+    let (_, all) = draw(&budget, &preview, None);
+    let within = |places| draw(&budget.with_max_splats(MaxSplats::AtMost(places)), &preview, None).1;
+    assert_eq!((within(3), within(2)), (all, all.map(|n_splats| n_splats - 1)), "three of the five lie at one depth");
+}

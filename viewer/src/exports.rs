@@ -100,6 +100,12 @@ extern "C" fn preview() -> u32 {
     })
 }
 
+/// How far away what the preview shows is.
+#[unsafe(no_mangle)]
+extern "C" fn focus() -> u32 {
+    on_scene(|scene, _| Ok(scene.focus()))
+}
+
 /// Sets the camera to the bundle's, carried around the scene by `angle`, radians.
 #[unsafe(no_mangle)]
 extern "C" fn orbit(angle: f32) -> u32 {

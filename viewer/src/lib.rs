@@ -16,6 +16,7 @@
 #[cfg(target_arch = "wasm32")]
 mod exports;
 mod figures;
+mod focus;
 #[cfg(not(target_arch = "wasm32"))]
 mod package;
 #[cfg(not(target_arch = "wasm32"))]

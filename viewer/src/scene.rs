@@ -7,6 +7,7 @@ use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport
 use pocketsplat_instructions::Costs;
 
 use crate::figures::{self, Figures};
+use crate::focus;
 
 /// A bundle that is drawn within one plan after another.
 pub struct Scene {
@@ -35,6 +36,11 @@ impl Scene {
     /// The scene of the first `tiers` tiers.
     pub fn tier_figures(&self, tiers: u8) -> Figures {
         figures::of_tiers(&self.bundle, tiers)
+    }
+
+    /// How far away what the preview shows in its middle is.
+    pub fn focus(&self) -> Figures {
+        vec![("distance", focus::distance(&self.bundle))]
     }
 
     /// The camera that the bundle holds.

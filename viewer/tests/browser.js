@@ -91,6 +91,11 @@ async function hands() {
   check(String(orbit.target) !== String(orbit.home.target), 'Shift and an arrow key pan');
   press('0');
   check(orbit.yaw === orbit.home.yaw && orbit.distance === orbit.home.distance, '0 resets');
+  const eye = (camera) => camera.rotation.concat(camera.translation).map((x) => x.toFixed(6)).join();
+  const [seen, far] = [eye(orbit.camera(64, 64)), orbit.distance];
+  orbit.refocus(far + 1);
+  check(eye(orbit.camera(64, 64)) === seen && orbit.distance === far + 1, 'another focus, the same picture');
+  orbit.refocus(far);
   const upright = JSON.stringify(orbit.camera(64, 64).rotation.map((x) => x.toFixed(6)));
   press('r');
   const lying = JSON.stringify(orbit.camera(64, 64).rotation.map((x) => x.toFixed(6)));

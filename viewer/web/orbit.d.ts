@@ -2,7 +2,8 @@ import type { Camera } from './pocketsplat.js';
 
 /** A camera that turns around a point. */
 export class Orbit {
-  constructor(preview: Camera);
+  /** Around the point of the line of sight at `distance`, such as `scene.focus()`; else around the nearest to the origin. */
+  constructor(preview: Camera, distance?: number);
   /** Angles, radians, and the distance, normalised units. */
   yaw: number;
   pitch: number;
@@ -10,6 +11,8 @@ export class Orbit {
   /** The point it turns around, normalised units. */
   target: number[];
   reset(): void;
+  /** Turns around the point at another distance from now on; the picture stays as it is. */
+  refocus(distance: number): void;
   /** Turns the picture by a quarter, clockwise, and begins anew: for scenes whose photographs lie on their side. */
   quarter(): void;
   /** Turns by angles, radians. */

@@ -9,18 +9,18 @@ const clamp = (x, least, most) => Math.min(most, Math.max(least, x));
 /** Never straight above or below, where up has no direction. */
 const MOST_PITCH = (88 * Math.PI) / 180;
 
-/** A camera with the lens of `preview`, around the point of its line of sight that is nearest to the origin. */
+/** A camera with the lens of `preview`, around a point of its line of sight: at a distance, else the nearest to the origin. */
 export class Orbit {
-  constructor(preview) {
-    this.#begin(preview);
+  constructor(preview, distance) {
+    this.#begin(preview, distance);
   }
 
   /** Turns the picture by a quarter, clockwise, and begins anew: for scenes whose photographs lie on their side. */
   quarter() {
-    this.#begin(rolled(this.preview));
+    this.#begin(rolled(this.preview), this.home.distance);
   }
 
-  #begin(preview) {
+  #begin(preview, given) {
     this.preview = preview;
     const r = preview.rotation;
     const [right, down, forward] = [r.slice(0, 3), r.slice(3, 6), r.slice(6, 9)];
@@ -33,7 +33,7 @@ export class Orbit {
     this.ahead = unit((axis + 1) % 3);
     this.aside = cross(this.up, this.ahead);
     const along = -dot(eye, forward);
-    const distance = along > 0.2 ? along : 3;
+    const distance = given > 0 ? given : along > 0.2 ? along : 3;
     const yaw = Math.atan2(dot(forward, this.aside), dot(forward, this.ahead));
     const pitch = Math.asin(clamp(-dot(forward, this.up), -1, 1));
     this.home = { yaw, pitch, distance, target: sum(eye, scaled(forward, distance)) };
@@ -47,9 +47,19 @@ export class Orbit {
     Object.assign(this, this.home, { target: [...this.home.target] });
   }
 
+  /** Turns around the point at another distance from now on; the picture stays as it is. */
+  refocus(distance) {
+    if (!(distance > 0)) return;
+    const further = distance - this.home.distance;
+    for (const pose of [this.home, this]) {
+      pose.target = sum(pose.target, scaled(this.axes(pose).forward, further));
+      pose.distance += further;
+    }
+  }
+
   /** Directions of the camera: right, down and forward in the picture. */
-  axes() {
-    const { yaw, pitch, roll, ahead, aside, up } = this;
+  axes({ yaw, pitch } = this) {
+    const { roll, ahead, aside, up } = this;
     const level = sum(scaled(ahead, Math.cos(yaw)), scaled(aside, Math.sin(yaw)));
     const forward = sum(scaled(level, Math.cos(pitch)), scaled(up, -Math.sin(pitch)));
     const right0 = cross(level, up);

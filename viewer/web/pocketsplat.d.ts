@@ -130,6 +130,11 @@ export class Scene {
   readonly preview: Camera;
   /** The preview carried around the scene by `angle`, radians: the same numbers as a device computes. */
   orbited(angle: number): Camera;
+  /**
+   * How far from the preview what it shows in its middle is, normalised units: the median depth of the anchors there. NaN where
+   * there are none. Decodes up to 8,192 anchors.
+   */
+  focus(): number;
   /** The least memory that draws anything within the other limits, and the most that is of use. */
   limits(settings: Settings): { leastBytes: number; mostBytes: number };
   /** What a decoder would do. */

@@ -51,6 +51,11 @@ export class Scene {
     };
   }
 
+  /** How far from the preview what it shows in its middle is: the median depth of the anchors there. Decodes up to 8,192 anchors. */
+  focus() {
+    return this.#answer(this.#wasm.focus()).distance;
+  }
+
   /** The least memory that draws anything, and the most that is of use. */
   limits(settings) {
     const [, ...others] = this.#settings(settings);

@@ -90,6 +90,11 @@ export class View {
     return (await this.#drawers[0].ask('orbited', { angle })).camera;
   }
 
+  /** How far from the preview what it shows is. */
+  async focus() {
+    return (await this.#drawers[0].ask('focus')).distance;
+  }
+
   /** Draws what a script asks for. Resolves when the canvas shows it. */
   async show(settings, camera) {
     this.#asked = undefined;

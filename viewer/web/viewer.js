@@ -254,7 +254,10 @@ async function start() {
   listen();
   setDevice(false);
   await Promise.all(views.map((view) => view.first));
-  // A second worker for each where cores are idle, once there is something to look at.
+  // What takes a moment comes after the first picture.
+  orbit.refocus(await first.focus());
+  for (const view of others) view.orbit?.refocus(await view.focus());
+  // A second worker for each where cores are idle.
   if (navigator.hardwareConcurrency >= 4 * views.length) await open();
   if (!matchMedia('(prefers-reduced-motion: reduce)').matches) motion.sway();
 }

@@ -16,6 +16,9 @@ const answers = {
       return { limits, refused: error.message };
     }
   },
+  focus() {
+    return { distance: scene.focus() };
+  },
   orbited({ angle }) {
     return { camera: scene.orbited(angle) };
   },

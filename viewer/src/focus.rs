@@ -4,9 +4,9 @@ use pocketsplat_core::bundle::AnchorSite;
 use pocketsplat_core::{Bundle, DecodeError};
 
 /// Anchors that are looked at, about: those of some chunks, so that large scenes open as fast as small ones.
-const N_ANCHORS: u32 = 8192;
+const N_ANCHORS: u32 = 16_384;
 /// The part of the picture's width and height, around its middle, that counts.
-const MIDDLE: f32 = 0.3;
+const MIDDLE: f32 = 0.6;
 /// Halvings of the range of depths: below a thousandth of it.
 const N_HALVINGS: u32 = 12;
 

@@ -132,7 +132,7 @@ export class Scene {
   orbited(angle: number): Camera;
   /**
    * How far from the preview what it shows in its middle is, normalised units: the median depth of the anchors there. NaN where
-   * there are none. Decodes up to 8,192 anchors.
+   * there are none. Decodes up to 16,384 anchors.
    */
   focus(): number;
   /** The least memory that draws anything within the other limits, and the most that is of use. */

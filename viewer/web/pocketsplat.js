@@ -51,7 +51,7 @@ export class Scene {
     };
   }
 
-  /** How far from the preview what it shows in its middle is: the median depth of the anchors there. Decodes up to 8,192 anchors. */
+  /** How far from the preview what it shows in its middle is: the median depth of the anchors there. Decodes up to 16,384 anchors. */
   focus() {
     return this.#answer(this.#wasm.focus()).distance;
   }

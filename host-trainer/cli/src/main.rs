@@ -8,11 +8,5 @@ mod plot;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    match command::run() {
-        Ok(code) => code,
-        Err(error) => {
-            eprintln!("error: {error:#}");
-            ExitCode::FAILURE
-        }
-    }
+    command::run()
 }

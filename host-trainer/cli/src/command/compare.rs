@@ -7,6 +7,7 @@ use anyhow::{Context, Result};
 use pocketsplat_trainer::cost::on_front;
 use serde::{Deserialize, Serialize};
 
+use super::eval::Evaluation;
 use super::{output, point};
 use crate::config::{Difference, RunConfig};
 
@@ -52,7 +53,9 @@ struct RunResult {
 
 pub(crate) fn run(args: &Args) -> Result<()> {
     let configs = args.runs.iter().map(|run| RunConfig::read(&run.join("config.toml"))).collect::<Result<Vec<_>>>()?;
-    let lines = args.runs.iter().zip(&configs).map(|(run, config)| line(run, config, &configs[0]));
+    let evaluations = configs.iter().map(|config| point::measured(config, None)).collect::<Result<Vec<_>>>()?;
+    let runs = args.runs.iter().zip(configs.iter().zip(&evaluations));
+    let lines = runs.map(|(run, compared)| line(run, compared, (&configs[0], &evaluations[0])));
     let lines = lines.collect::<Result<Vec<_>>>()?;
     std::fs::create_dir_all(&args.output).with_context(|| format!("could not make {}", args.output.display()))?;
     let table = output::csv(&lines)?;
@@ -65,14 +68,21 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     output::print_text(&String::from_utf8(table)?)
 }
 
-fn line(run: &Path, config: &RunConfig, first: &RunConfig) -> Result<RunLine> {
+fn line(
+    run: &Path,
+    (config, evaluation): (&RunConfig, &Evaluation),
+    (first, first_evaluation): (&RunConfig, &Evaluation),
+) -> Result<RunLine> {
     let path = run.join("result.json");
     let result =
         std::fs::read(&path).with_context(|| format!("could not read {}: is the run finished?", path.display()))?;
     let result: RunResult = serde_json::from_slice(&result)
         .with_context(|| format!("{} does not say what the run took; train it anew", path.display()))?;
-    let evaluation = point::measured(config, None)?;
-    let (knob, setting) = named(&first.differences(config)?);
+    let mut differences = first.differences_of_bundles(config)?;
+    if let (Some(first), Some(protocol)) = (&first_evaluation.protocol, &evaluation.protocol) {
+        differences.extend(first.differences(protocol));
+    }
+    let (knob, setting) = named(&differences);
     Ok(RunLine {
         knob,
         run: run.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
@@ -134,15 +144,19 @@ mod tests {
         let first = RunConfig::default();
         let name = |keys: &[&str]| {
             let keys: Vec<String> = keys.iter().map(|key| (*key).to_owned()).collect();
-            named(&first.differences(&first.with_keys(&keys).unwrap()).unwrap())
+            named(&first.differences_of_bundles(&first.with_keys(&keys).unwrap()).unwrap())
         };
         let pair = |knob: &str, setting: &str| (knob.to_owned(), setting.to_owned());
         assert_eq!(name(&[]), pair("as the first", "as the first"));
         assert_eq!(name(&["train.iterations=500"]), pair("iterations", "iterations 500"));
         assert_eq!(name(&["train.shape.n_offsets=3", "train.voxel_size=0.5"]), pair("n_offsets", "n_offsets 3"));
+        assert_eq!(
+            name(&["encoding.coder=static", "capture.test_every=5"]),
+            pair("test_every", "test_every 5, coder \"static\"")
+        );
         let mut with_detail = first.clone();
         with_detail.train.modules.detail = Some(Default::default());
-        assert_eq!(named(&first.differences(&with_detail).unwrap()), pair("modules", "detail"));
-        assert_eq!(named(&with_detail.differences(&first).unwrap()), pair("modules", "without detail"));
+        assert_eq!(named(&first.differences_of_bundles(&with_detail).unwrap()), pair("modules", "detail"));
+        assert_eq!(named(&with_detail.differences_of_bundles(&first).unwrap()), pair("modules", "without detail"));
     }
 }

@@ -1,17 +1,21 @@
 //! `--effects auto`: pilots of a run, their table, and the effects that the run gets.
 
-use std::path::Path;
+mod pilots;
+
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
 use pocketsplat_capture::dataset::Capture;
 use pocketsplat_trainer::device::Processor;
-use pocketsplat_trainer::effects::{Effect, PilotCapture, Pilots, measure};
+use pocketsplat_trainer::effects::{Effect, PilotCapture, PilotError, Pilots, measure};
+use pocketsplat_trainer::train::run::RunFolder;
 use serde::Serialize;
 
 use crate::config::RunConfig;
 
 use super::output;
+use pilots::PilotsFile;
 
 /// The table of pilots in a run's folder.
 const TABLE: &str = "effects.csv";
@@ -30,34 +34,60 @@ struct PilotLine {
     chosen: bool,
 }
 
+/// Whether a run can begin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Resolved {
+    /// Its effects are known.
+    Ready,
+    /// `stop` was set before they were; the pilots that are done are kept.
+    Interrupted,
+}
+
 /// Measures the effects where the configuration leaves them open and gives the run those that pay; writes the table into `folder`.
 ///
 /// A run too short or a capture too small to measure with keeps what it has.
-pub(crate) fn resolve(config: &mut RunConfig, capture: &Capture, folder: &Path) -> Result<()> {
+pub(crate) fn resolve(
+    config: &mut RunConfig,
+    capture: &Capture,
+    folder: &RunFolder,
+    stop: &AtomicBool,
+) -> Result<Resolved> {
     if !std::mem::take(&mut config.effects.auto) {
-        return Ok(());
+        return Ok(Resolved::Ready);
     }
     let kept = Effect::names(&Effect::all_in(&config.train));
     let least = config.effects.least_iterations;
     if config.train.iterations < least {
         eprintln!("effects: {kept}; a run needs {least} iterations to measure which ones pay");
-        return Ok(());
+        return Ok(Resolved::Ready);
     }
-    let Some(pilots) = PilotCapture::of(capture) else {
+    let Some(views) = PilotCapture::of(capture) else {
         eprintln!("effects: {kept}; the capture has too few training views to measure which ones pay");
-        return Ok(());
+        return Ok(Resolved::Ready);
     };
     let started = Instant::now();
-    let target = config.effects.target.unwrap_or(Processor::CortexM4);
-    let begins = |effects: &[Effect]| eprintln!("effects: pilot with {}", Effect::names(effects));
-    let trials = measure(&pilots, &config.train, &config.effects.price, target, &config.encoding, begins)
-        .context("measuring the effects; force them with --effects to do without")?;
+    let (price, target) = (config.effects.price, config.effects.target.unwrap_or(Processor::CortexM4));
+    let mut log = PilotsFile::open(folder.pilots())?;
+    let measured = measure(&views, &config.train, &price, target, &config.encoding, &mut log, stop);
+    log.end();
+    let trials = match measured {
+        Err(PilotError::Interrupted) => {
+            eprintln!(
+                "interrupted while effects were measured, {} pilots are kept; go on with `pocketsplat train --resume {}`",
+                log.n_done(),
+                folder.path().display()
+            );
+            return Ok(Resolved::Interrupted);
+        }
+        other => other.context("measuring the effects; force them with --effects to do without")?,
+    };
     let chosen = trials.each.iter().find(|trial| trial.chosen).map_or(&[][..], |trial| &trial.effects);
-    eprint!("{}", table(&trials, target));
+    let for_device = (price.instructions_db > 0.0).then_some(target);
+    eprint!("{}", table(&trials, for_device));
     eprintln!("effects: {}, measured in {:.0} s", Effect::names(chosen), started.elapsed().as_secs_f64());
-    output::write_whole(&folder.join(TABLE), &output::csv(lines(&trials))?)?;
+    output::write_whole(&folder.path().join(TABLE), &output::csv(lines(&trials))?)?;
     config.train = Effect::measured_only(chosen, &config.train);
-    Ok(())
+    Ok(Resolved::Ready)
 }
 
 fn lines(trials: &Pilots) -> impl Iterator<Item = PilotLine> {
@@ -73,21 +103,25 @@ fn lines(trials: &Pilots) -> impl Iterator<Item = PilotLine> {
     })
 }
 
-fn table(trials: &Pilots, target: Processor) -> String {
+/// * `device`: whose instructions count, if any do.
+fn table(trials: &Pilots, device: Option<Processor>) -> String {
     let width = trials.each.iter().map(|trial| Effect::names(&trial.effects).len()).max().unwrap_or(0);
+    let counted = |text: String| if device.is_some() { text } else { String::new() };
     let mut text = format!(
-        "  {:width$}  PSNR, dB  gain, dB  price, dB  instructions, M    bytes  (of pilots, on a {target:?})\n",
-        "effects"
+        "  {:width$}  PSNR, dB  gain, dB  price, dB{}    bytes  (of pilots{})\n",
+        "effects",
+        counted("  instructions, M".to_owned()),
+        device.map_or_else(String::new, |target| format!(", on a {target:?}")),
     );
     for trial in &trials.each {
         text += &format!(
-            "{} {:width$}  {:8.2}  {:+8.3}  {:+9.3}  {:15.2}  {:7}\n",
+            "{} {:width$}  {:8.2}  {:+8.3}  {:+9.3}{}  {:7}\n",
             if trial.chosen { '*' } else { ' ' },
             Effect::names(&trial.effects),
             trial.worth.psnr_db,
             trial.gain_db,
             trial.price_db,
-            trial.worth.instructions / 1e6,
+            counted(format!("  {:15.2}", trial.worth.instructions / 1e6)),
             trial.worth.bytes,
         );
     }

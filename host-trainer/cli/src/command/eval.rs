@@ -6,7 +6,7 @@ use std::time::Instant;
 use crate::plot::ResultRow;
 use anyhow::Result;
 use pocketsplat_capture::camera::Camera;
-use pocketsplat_capture::dataset::{Background, Capture, Image, Split, View};
+use pocketsplat_capture::dataset::{Capture, Image, Split, View};
 use pocketsplat_core::Bundle;
 use pocketsplat_trainer::metrics::{Lpips, half_size_enlarged, psnr_db, psnr_db_masked, ssim_masked};
 use pocketsplat_trainer::render::decoder::{core_image, core_image_of_tiers};
@@ -19,6 +19,7 @@ use super::capture::{CaptureArgs, views_of};
 use super::lpips::LpipsArgs;
 use super::output;
 use crate::config::named::{SPLITS, one_of};
+use crate::config::{CaptureOptions, Protocol};
 
 /// What draws the frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -58,6 +59,9 @@ pub(crate) struct Args {
 /// Figures of a bundle over a split of a capture; PSNR, SSIM and LPIPS are means over views of 8-bit images.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Evaluation {
+    /// See [`output::SCHEMA_VERSION`].
+    #[serde(default)]
+    pub(crate) schema_version: u32,
     pub(crate) psnr_db: f64,
     pub(crate) ssim: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -85,6 +89,22 @@ pub(crate) struct Evaluation {
     /// The scene of each tier and those before it, where asked for.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) tiers: Vec<TierEvaluation>,
+    /// How the photographs were prepared, and the fingerprint of the capture.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) protocol: Option<Protocol>,
+    /// Each view by itself, in the order of the capture.
+    #[serde(default)]
+    pub(crate) views: Vec<ViewEvaluation>,
+}
+
+/// Figures of one view.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct ViewEvaluation {
+    pub(crate) name: String,
+    pub(crate) psnr_db: f64,
+    pub(crate) ssim: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) lpips: Option<f64>,
 }
 
 /// Figures of the scene that consists of a tier and those before it.
@@ -172,16 +192,16 @@ pub(crate) fn evaluate(
     what: &Measurements<'_>,
 ) -> Result<Evaluation> {
     let (options, loaded) = file.load(&file.parse()?, capture)?;
-    measure(file, &loaded, options.background, split, renderer, what)
+    measure(file, &loaded, &options, split, renderer, what)
 }
 
 /// Draws and measures every view of a split of a loaded capture.
 ///
-/// * `background`: what its transparent pixels were composited on.
+/// * `options`: how it was loaded.
 pub(crate) fn measure(
     file: &BundleFile,
     loaded: &Capture,
-    background: Option<Background>,
+    options: &CaptureOptions,
     split: Split,
     renderer: Renderer,
     what: &Measurements<'_>,
@@ -230,16 +250,23 @@ pub(crate) fn measure(
         })
         .collect::<Result<_>>()?;
     // One view after another: the features of a view fill hundreds of bytes a pixel, and fill every thread by themselves.
-    let mean_lpips = |lpips: &Lpips| -> Result<f64> {
+    let lpips_of_views = |lpips: &Lpips| -> Result<Vec<f64>> {
         let distance = |(row, view): (&DrawnView, &View)| lpips.distance(&row.image, &view.image, view.mask.as_ref());
-        let of_views = rows.iter().zip(views).map(distance).collect::<Result<Vec<_>, _>>()?;
-        Ok(of_views.iter().sum::<f64>() / of_views.len() as f64)
+        Ok(rows.iter().zip(views).map(distance).collect::<Result<Vec<_>, _>>()?)
+    };
+    let lpips_of_views = lpips.map(lpips_of_views).transpose()?;
+    let of_view = |(i, (row, view)): (usize, (&DrawnView, &View))| ViewEvaluation {
+        name: view.name.clone(),
+        psnr_db: row.psnr_db,
+        ssim: row.ssim,
+        lpips: lpips_of_views.as_ref().map(|values| values[i]),
     };
     let mean = |value: fn(&DrawnView) -> f64| rows.iter().map(value).sum::<f64>() / rows.len() as f64;
     Ok(Evaluation {
+        schema_version: output::SCHEMA_VERSION,
         psnr_db: mean(|row| row.psnr_db),
         ssim: mean(|row| row.ssim),
-        lpips: lpips.map(mean_lpips).transpose()?,
+        lpips: lpips_of_views.as_ref().map(|values| values.iter().sum::<f64>() / values.len() as f64),
         lpips_of: lpips.map(|lpips| format!("VGG16, input in {}", lpips.range())),
         half_size_copy_psnr_db: mean(|row| row.half_size_copy_psnr_db),
         bundle_bytes: file.bytes.len(),
@@ -250,12 +277,14 @@ pub(crate) fn measure(
         renderer: format!("{renderer:?}").to_lowercase(),
         width_px: views[0].image.width_px,
         height_px: views[0].image.height_px,
-        background: background.map_or_else(String::new, |b| b.to_string()),
+        background: options.background.map_or_else(String::new, |b| b.to_string()),
         decode_s,
         render_s_per_view: mean(|row| row.seconds),
         scratch_bytes: rows.iter().map(|row| row.scratch_bytes).max().unwrap_or(0),
         tiers: if per_tier { tiers(file, &bundle, loaded, views)? } else { Vec::new() },
         psnr_to_reference_db: against_reference
             .then(|| rows.iter().map(|row| row.psnr_to_reference_db).fold(f64::INFINITY, f64::min)),
+        protocol: Some(Protocol::of(loaded, options)),
+        views: rows.iter().zip(views).enumerate().map(of_view).collect(),
     })
 }

@@ -8,6 +8,7 @@ mod cost;
 mod demo;
 mod doctor;
 mod effects;
+mod estimate;
 mod eval;
 mod fit;
 mod inspect;
@@ -15,6 +16,7 @@ mod lpips;
 mod output;
 mod plot;
 mod point;
+mod process;
 mod progress;
 mod render;
 mod runs;
@@ -30,7 +32,7 @@ mod view;
 use std::process::ExitCode;
 
 use anyhow::{Context, Result};
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 /// Train a neural Gaussian-splat scene, compress it to a fraction of a megabyte, draw it on a microcontroller.
 #[derive(Parser)]
@@ -62,13 +64,57 @@ enum Command {
     Doctor(doctor::Args),
 }
 
-/// Parses the command line and runs the command.
-pub(crate) fn run() -> Result<ExitCode> {
-    let cli = Cli::parse();
+/// Parses the command line, runs the command, and says what failed: as JSON on stdout where results go there as JSON.
+pub(crate) fn run() -> ExitCode {
+    let as_json = std::env::args_os().any(|arg| arg == "--json");
+    let parsed = Cli::command().mut_subcommands(accepting_negative_numbers).try_get_matches();
+    let cli = match parsed.and_then(|matches| Cli::from_arg_matches(&matches)) {
+        Ok(cli) => cli,
+        Err(error) => {
+            if as_json && error.use_stderr() {
+                let said = error.render().to_string();
+                print_failure(said.trim_start_matches("error: "), &[]);
+            }
+            error.exit()
+        }
+    };
+    dispatch(cli).unwrap_or_else(|error| {
+        eprintln!("error: {error:#}");
+        if as_json {
+            let causes: Vec<String> = error.chain().skip(1).map(ToString::to_string).collect();
+            print_failure(&error.to_string(), &causes);
+        }
+        ExitCode::FAILURE
+    })
+}
+
+/// Lets `--lambda -1` reach the check that says which numbers there may be.
+fn accepting_negative_numbers(command: clap::Command) -> clap::Command {
+    command.allow_negative_numbers(true)
+}
+
+fn print_failure(error: &str, causes: &[String]) {
+    let schema_version = output::SCHEMA_VERSION;
+    let failure = serde_json::json!({ "schema_version": schema_version, "error": error.trim_end(), "causes": causes });
+    // It stands on stderr as well; if stdout is gone there is nobody to tell.
+    let _ = output::print_text(&format!("{failure:#}\n"));
+}
+
+/// As many threads as were asked for, but no more than there are cores: more only take turns.
+fn n_threads(asked: usize) -> usize {
+    let n_cores = std::thread::available_parallelism().map_or(usize::MAX, usize::from);
+    if asked > n_cores {
+        eprintln!("using {n_cores} threads, one for each core, instead of {asked}");
+    }
+    asked.min(n_cores)
+}
+
+fn dispatch(cli: Cli) -> Result<ExitCode> {
+    let n_threads = n_threads(cli.threads);
     rayon::ThreadPoolBuilder::new()
-        .num_threads(cli.threads)
+        .num_threads(n_threads)
         .build_global()
-        .with_context(|| format!("could not start {} threads", cli.threads))?;
+        .with_context(|| format!("could not start {n_threads} threads"))?;
     match cli.command {
         Command::Train(args) => return train::run(&args),
         Command::Sweep(args) => return sweep::run(&args),

@@ -6,6 +6,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 
+/// Version of what commands print as JSON and of `result.json`: rises when a field goes or changes its meaning.
+pub(crate) const SCHEMA_VERSION: u32 = 1;
+
+/// Fields that are for machines alone.
+const FOR_MACHINES: [&str; 3] = ["schema_version", "protocol", "views"];
+
 /// Fails now if `path` could not be written later, and makes its folder.
 pub(crate) fn check_writable(path: &Path) -> Result<()> {
     let (folder, probe) = beside(path);
@@ -59,8 +65,9 @@ pub(crate) fn print<T: serde::Serialize>(report: &T, json: bool) -> Result<()> {
         let serde_json::Value::Object(fields) = serde_json::to_value(report)? else {
             anyhow::bail!("a report is a set of named values");
         };
-        let width = fields.keys().map(String::len).max().unwrap_or(0);
-        fields.iter().map(|(name, value)| format!("{name:width$}  {}\n", plain(value))).collect()
+        let fields: Vec<_> = fields.iter().filter(|(name, _)| !FOR_MACHINES.contains(&name.as_str())).collect();
+        let width = fields.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
+        fields.into_iter().map(|(name, value)| format!("{name:width$}  {}\n", plain(value))).collect()
     };
     print_text(&text)
 }

@@ -9,6 +9,8 @@ use pocketsplat_trainer::scene::Scene;
 use pocketsplat_trainer::step::StepReport;
 use pocketsplat_trainer::train::{DroppedStep, Observer};
 
+use super::estimate::Estimate;
+
 /// Weight of the newest step in the running means.
 const NEWEST: f64 = 0.02;
 /// Lines a run prints where there is no terminal.
@@ -27,22 +29,29 @@ pub(crate) struct Progress {
     loss: f64,
     psnr_db: f64,
     n_dropped: u32,
+    estimate: Option<Estimate>,
 }
 
 impl Progress {
     /// * `from`: iterations that an earlier process did.
     pub(crate) fn new(from: u32, iterations: u32) -> Self {
-        let on_terminal = std::io::stderr().is_terminal();
-        let target = if on_terminal { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-        let bar = ProgressBar::with_draw_target(Some(u64::from(iterations)), target);
-        let style = "{bar:20} {pos}/{len}  {msg}  {rate} it/s  {eta} left";
-        let style = ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar());
-        // A failure to format is one to draw the bar, which is no reason to end a run.
-        let rate = |state: &ProgressState, out: &mut dyn Write| _ = write!(out, "{:.1}", state.per_sec());
-        bar.set_style(style.with_key("rate", rate));
-        bar.set_position(u64::from(from));
-        bar.reset_eta();
-        Self { bar, on_terminal, from, iterations, started: Instant::now(), loss: 0.0, psnr_db: 0.0, n_dropped: 0 }
+        let (bar, on_terminal) = (bar_of(from, iterations), std::io::stderr().is_terminal());
+        Self {
+            bar,
+            on_terminal,
+            from,
+            iterations,
+            started: Instant::now(),
+            loss: 0.0,
+            psnr_db: 0.0,
+            n_dropped: 0,
+            estimate: None,
+        }
+    }
+
+    /// The same, which also says now and then what the run will take.
+    pub(crate) fn estimating(self, estimate: Estimate) -> Self {
+        Self { estimate: Some(estimate), ..self }
     }
 
     /// A line that the bar does not overwrite.
@@ -51,8 +60,35 @@ impl Progress {
     }
 }
 
+/// A rate to two digits at least.
+fn two_digits(per_second: f64) -> String {
+    format!("{per_second:.*}", if per_second < 10.0 { 2 } else { 1 })
+}
+
+/// A bar on a terminal, nothing elsewhere.
+///
+/// * `from`: steps that an earlier process did.
+pub(super) fn bar_of(from: u32, steps: u32) -> ProgressBar {
+    let on_terminal = std::io::stderr().is_terminal();
+    let target = if on_terminal { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+    let bar = ProgressBar::with_draw_target(Some(u64::from(steps)), target);
+    // What matters first: a narrow terminal cuts the end.
+    let style = "{bar:12} {pos}/{len}  {eta} left  {rate} it/s  {wide_msg}";
+    let style = ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar());
+    // A failure to format is one to draw the bar, which is no reason to end a run.
+    let rate = |state: &ProgressState, out: &mut dyn Write| _ = write!(out, "{}", two_digits(state.per_sec()));
+    bar.set_style(style.with_key("rate", rate));
+    bar.set_position(u64::from(from));
+    bar.reset_eta();
+    bar
+}
+
 impl Observer for Progress {
     fn step(&mut self, iteration: u32, report: &StepReport<f32>, scene: &Scene<f32>) {
+        if let Some(mut estimate) = self.estimate.take() {
+            estimate.step(iteration, scene.anchors.len(), |line| self.say(line));
+            self.estimate = Some(estimate);
+        }
         let (loss, psnr_db) = (f64::from(report.loss), -10.0 * report.squared_error.log10());
         let newest = NEWEST.max(1.0 / f64::from(iteration - self.from));
         // A step that was dropped may have no number to show.
@@ -62,11 +98,11 @@ impl Observer for Progress {
         }
         let bits = report.rate.map(|rate| format!("  {:.0} bits each", rate.bits.iter().sum::<f64>()));
         let state = format!(
-            "loss {:.4}  training PSNR {:.2} dB  {} anchors{}",
-            self.loss,
+            "training PSNR {:.2} dB  {} anchors{}  loss {:.4}",
             self.psnr_db,
             scene.anchors.len(),
-            bits.unwrap_or_default()
+            bits.unwrap_or_default(),
+            self.loss,
         );
         if self.on_terminal {
             self.bar.set_position(u64::from(iteration));
@@ -79,7 +115,8 @@ impl Observer for Progress {
         {
             let per_second = f64::from(iteration - self.from) / self.started.elapsed().as_secs_f64();
             let left = f64::from(self.iterations - iteration) / per_second;
-            eprintln!("{iteration}/{}  {state}  {per_second:.1} it/s  {left:.0} s left", self.iterations);
+            let rate = two_digits(per_second);
+            eprintln!("{iteration}/{}  {left:.0} s left  {rate} it/s  {state}", self.iterations);
         }
     }
 

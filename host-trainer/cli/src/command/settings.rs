@@ -20,18 +20,19 @@ use crate::config::{CaptureOptions, RunConfig};
 pub(crate) struct QualityOptions {
     /// Kind of scene: scaffold (Scaffold-GS) is trained for the image alone; hac (HAC), hac-plus (HAC++) and contextgs (ContextGS)
     /// for image and size
-    /// [default: scaffold for train without a device, hac elsewhere]
+    /// [default: hac]
     #[arg(long, value_parser = one_of::<Backbone>(BACKBONES), help_heading = QUALITY)]
     backbone: Option<Backbone>,
-    #[arg(long, value_name = "N", help_heading = QUALITY,
-        help = with_default("Training steps, with which all schedules scale", TrainConfig::default().iterations))]
+    /// Training steps, with which all schedules scale [default: by the preset for train, else 30000]
+    #[arg(long, value_name = "N", help_heading = QUALITY)]
     iterations: Option<u32>,
     /// Effects of the scene: auto keeps what pays in short pilot runs, a list of none, all, +NAME and -NAME forces
     /// view-colour, view-geometry, view-distance, dilation-compensation, detail and anisotropy [default: auto for train, else
     /// view-colour,view-geometry,anisotropy]
     #[arg(long, value_name = "LIST", allow_hyphen_values = true, help_heading = QUALITY)]
     effects: Option<Request>,
-    /// Training modules to attach in place of those of the configuration [default: none; tiered-pruning for a device]
+    /// Training modules to attach in place of those of the configuration [default: rdo-pruning for
+    /// train, with tiered-pruning for a device; else none]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum, help_heading = QUALITY)]
     modules: Option<Vec<TrainingModule>>,
     /// Feature width of an anchor, and hidden width of the heads [default: 32 with scaffold, else 50; by the limits for a
@@ -62,7 +63,7 @@ pub(crate) struct QualityOptions {
     #[arg(long, value_name = "RATES", value_delimiter = ',', help_heading = OUTPUT, hide_short_help = true)]
     tiers: Option<Vec<f32>>,
     #[arg(long, value_name = "N", help_heading = QUALITY, hide_short_help = true,
-        help = with_default("Hold out every N-th training view to measure with; 0 holds out none",
+        help = with_default("Hold out every N-th training view, and measure the tiers with these instead of test views; 0 holds out none",
         TrainConfig::default().validation_every))]
     validation_every: Option<u32>,
 }
@@ -71,7 +72,7 @@ pub(crate) struct QualityOptions {
 #[derive(clap::Args)]
 pub(crate) struct RunOptions {
     /// Set a key of the configuration, as train.modules.pruning.rate=0.2; may be given several times.
-    #[arg(long, value_name = "KEY=VALUE", help_heading = RUN)]
+    #[arg(long, value_name = "KEY=VALUE", help_heading = RUN, hide_short_help = true)]
     set: Vec<String>,
     #[arg(long, value_name = "N", help_heading = RUN,
         help = with_default("Seed of all random numbers: the same seed on the same machine gives the same bundle",
@@ -138,6 +139,10 @@ impl QualityOptions {
         let (encoding, train) = (&mut config.encoding, &mut config.train);
         if let Some(backbone) = self.backbone {
             *train = train.with_backbone(backbone);
+            if !backbone.is_coded() {
+                // Nothing is worth its bits where there are none.
+                train.modules.rdo = None;
+            }
         }
         set(&mut encoding.quantisation.feature, &self.feature_step);
         set(&mut encoding.coder, &self.coder);
@@ -163,18 +168,12 @@ impl QualityOptions {
         Ok(())
     }
 
-    /// Sets what a device affords, where the command line leaves it open: HAC, the widths, the number of anchors, pruning by
-    /// worth down to it, trained tiers.
+    /// Sets what a device affords, where the command line leaves it open: the widths, the number of anchors, pruning by worth
+    /// down to it, trained tiers.
     pub(crate) fn choose(&self, train: &mut TrainConfig, choice: &ModelChoice) {
-        if self.backbone.is_none() {
-            *train = train.with_backbone(Backbone::Hac);
-        }
         train.shape.feature_dim = self.feature_dim.unwrap_or(choice.feature_dim);
         train.shape.n_offsets = self.offsets.unwrap_or(choice.n_offsets);
         if self.modules.is_none() {
-            if train.backbone.is_coded() {
-                train.modules.rdo.get_or_insert_default();
-            }
             let tiers = tiers_of(&train.modules);
             train.modules.pruning.get_or_insert(tiers);
         }

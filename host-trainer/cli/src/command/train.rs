@@ -18,7 +18,10 @@ use serde::Serialize;
 
 use super::bundle::BundleFile;
 use super::capture::CaptureArgs;
-use super::eval::{Evaluation, Measurements, Renderer, measure};
+use super::effects::Resolved;
+use super::estimate::Estimate;
+use super::eval::{Evaluation, Measurements, Renderer, ViewEvaluation, measure};
+use super::process::peak_memory_bytes;
 use super::progress::Progress;
 use super::train_args::Args;
 use super::{effects, output, stop};
@@ -27,9 +30,14 @@ use crate::config::{CaptureOptions, Protocol, RunConfig};
 /// Seconds between checkpoints unless the user says otherwise: what an accident may cost.
 const CHECKPOINT_SECONDS: f64 = 60.0;
 
+/// Test views that tiers are measured with at most, evenly picked: more would cost time and say little.
+const MOST_JUDGES: usize = 12;
+
 /// What a finished run reports.
 #[derive(Debug, Serialize)]
 pub(crate) struct TrainResult {
+    /// See [`output::SCHEMA_VERSION`].
+    pub(crate) schema_version: u32,
     pub(crate) bundle: PathBuf,
     pub(crate) bundle_bytes: usize,
     pub(crate) n_anchors: usize,
@@ -56,6 +64,8 @@ pub(crate) struct TrainResult {
     /// Of the bundle, over the views that are held out for testing, where there are any: as `eval` measures it.
     #[serde(flatten)]
     pub(crate) held_out: Option<HeldOut>,
+    /// How the photographs were prepared, and the fingerprint of the capture.
+    pub(crate) protocol: Protocol,
 }
 
 /// How good a bundle is on views that training did not see.
@@ -64,6 +74,7 @@ pub(crate) struct HeldOut {
     pub(crate) psnr_db: f64,
     pub(crate) ssim: f64,
     pub(crate) n_test_views: usize,
+    pub(crate) views: Vec<ViewEvaluation>,
 }
 
 pub(crate) fn run(args: &Args) -> Result<ExitCode> {
@@ -116,9 +127,11 @@ fn train_and_print<'a>(
     capture: &'a Capture,
     start: Start<'a>,
 ) -> Result<ExitCode> {
-    effects::resolve(&mut config, capture, folder.path())?;
     // Not before: until here there is nothing to keep, and Ctrl-C may end the process at once.
     let stop = stop::flag()?;
+    if effects::resolve(&mut config, capture, &folder, &stop)? == Resolved::Interrupted {
+        return Ok(ExitCode::from(stop::INTERRUPTED));
+    }
     let Some(result) = train_in(folder, &config, capture, start, &stop)? else {
         return Ok(ExitCode::from(stop::INTERRUPTED));
     };
@@ -129,16 +142,11 @@ fn train_and_print<'a>(
     Ok(ExitCode::SUCCESS)
 }
 
-/// The largest amount of memory that this process has held, as Linux tells it.
-fn peak_memory_bytes() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
-    Some(1024 * peak.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?)
-}
-
 /// Loads the capture that a run is configured for, and decides what the configuration left to it.
 pub(crate) fn load(config: &mut RunConfig) -> Result<Capture> {
     let source = CaptureArgs { dataset: config.dataset.clone(), options: config.capture.clone() };
+    // At once: large captures take their time.
+    eprintln!("reading {}", config.dataset.display());
     let capture = source.load(config.train.seed)?;
     let (largest, most) = (capture.largest_px().into_iter().max().unwrap_or(0), u32::from(MAX_FRAME_PX));
     if largest > most {
@@ -173,7 +181,10 @@ pub(crate) fn train_in<'a>(
     let mut folder = folder.forking_at(&config.fork_at);
     let path = folder.path().to_owned();
     let mut trainer = match start {
-        Start::New => Trainer::new(capture, config.train)?,
+        Start::New => {
+            Estimate::try_out(capture, &config.train)?;
+            Trainer::new(capture, config.train)?
+        }
         Start::Resumed => resumed(&folder, config, capture)?,
         Start::Forked(trainer) => {
             // Without it a resumed run would begin with the capture's points.
@@ -184,7 +195,8 @@ pub(crate) fn train_in<'a>(
     folder.write_config(&config.to_toml()?)?;
     let interval = config.checkpoint_every.map_or(Interval::Seconds(CHECKPOINT_SECONDS), Interval::Iterations);
     let how_to_go_on = || format!("go on with `pocketsplat train --resume {}`", path.display());
-    let mut progress = Progress::new(trainer.iteration, config.train.iterations);
+    let estimate = Estimate::new(capture, &config.train, trainer.iteration);
+    let mut progress = Progress::new(trainer.iteration, config.train.iterations).estimating(estimate);
     let ending = folder.train(&mut trainer, &mut progress, interval, stop);
     let ending = ending.map_err(|error| {
         let stopped = format!("training stopped at iteration {}", trainer.iteration);
@@ -241,6 +253,16 @@ pub(crate) fn train(capture: &Capture, config: TrainConfig, encoding: &Encoding,
     write_bundle(&trainer, capture, &CaptureOptions::default(), encoding, output)
 }
 
+/// The views that tiers are measured with: those held out of training for it, else some of the test views.
+fn judges(trainer: &Trainer<'_>, capture: &Capture) -> Vec<View> {
+    let held_out: Vec<View> = trainer.validation_views().cloned().collect();
+    if !held_out.is_empty() {
+        return held_out;
+    }
+    let n = capture.test.len().min(MOST_JUDGES);
+    (0..n).map(|i| capture.test[i * capture.test.len() / n].clone()).collect()
+}
+
 fn write_bundle(
     trainer: &Trainer<'_>,
     capture: &Capture,
@@ -248,9 +270,9 @@ fn write_bundle(
     encoding: &Encoding,
     output: &Path,
 ) -> Result<TrainResult> {
-    let protocol = Some(Protocol::of(capture, options).to_text()?);
-    let finished = Finished { protocol, ..trainer.finish()? };
-    let held_out: Vec<View> = trainer.validation_views().cloned().collect();
+    let protocol = Protocol::of(capture, options);
+    let finished = Finished { protocol: Some(protocol.to_text()?), ..trainer.finish()? };
+    let held_out = judges(trainer, capture);
     let Fitted { written: Written { bytes, .. }, finished, n_cut } = encoding.encode(finished, capture, &held_out)?;
     output::write_whole(output, &bytes)?;
     if n_cut > 0 {
@@ -261,13 +283,14 @@ fn write_bundle(
         None
     } else {
         let what = Measurements::default();
-        let Evaluation { psnr_db, ssim, n_views, .. } =
-            measure(&file, capture, options.background, Split::Test, Renderer::Core, &what)?;
-        Some(HeldOut { psnr_db, ssim, n_test_views: n_views })
+        let Evaluation { psnr_db, ssim, n_views, views, .. } =
+            measure(&file, capture, options, Split::Test, Renderer::Core, &what)?;
+        Some(HeldOut { psnr_db, ssim, n_test_views: n_views, views })
     };
     let Finished { scene, background, n_undrawn, estimated_bits, .. } = finished;
     let n_anchors = scene.anchors.len();
     Ok(TrainResult {
+        schema_version: output::SCHEMA_VERSION,
         bundle: output.to_owned(),
         bundle_bytes: file.bytes.len(),
         n_anchors,
@@ -289,5 +312,6 @@ fn write_bundle(
         effects: Effect::names(&Effect::all_in(trainer.config())),
         peak_memory_bytes: peak_memory_bytes(),
         held_out,
+        protocol,
     })
 }

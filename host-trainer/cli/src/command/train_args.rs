@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use bytesize::ByteSize;
 use pocketsplat_trainer::device::{Limits, ModelChoice, Processor, choose};
-use pocketsplat_trainer::train::config::Hac;
+use pocketsplat_trainer::effects::Price;
 
-use super::settings::{QualityOptions, RunOptions, applied, with_default};
+use super::settings::{QualityOptions, RunOptions, applied};
 use crate::config::heading::{DEVICE, OUTPUT, QUALITY, RUN};
 use crate::config::named::{TARGETS, one_of};
-use crate::config::{CaptureOptions, RunConfig};
+use crate::config::{CaptureOptions, Preset, RunConfig};
 
 /// Train a scene from a capture and write it as a bundle.
 ///
@@ -32,10 +32,15 @@ pub(crate) struct Args {
     /// Print the result as JSON [default: as text]
     #[arg(long, help_heading = OUTPUT, hide_short_help = true)]
     json: bool,
+    /// Length of the run and size of the images: quick (2,000 iterations, 200 px), standard (7,000, 400 px), or full (30,000,
+    /// images as they are) [default: standard]
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["config", "resume", "from"], hide_possible_values = true,
+        help_heading = QUALITY)]
+    preset: Option<Preset>,
     #[command(flatten)]
     quality: QualityOptions,
-    #[arg(long, value_name = "X", help_heading = QUALITY,
-        help = with_default("Weight of a value's bits in the loss of hac and hac-plus: the larger, the smaller the bundle", Hac::default().lambda))]
+    /// Weight of a value's bits in the loss: the larger, the smaller the bundle [default: 0.002; by --flash for a device]
+    #[arg(long, value_name = "X", help_heading = QUALITY)]
     lambda: Option<f64>,
     #[command(flatten)]
     device: DeviceArgs,
@@ -107,15 +112,19 @@ impl Args {
 
     /// The configuration of a new run: defaults, then `--config`, then what else the command line says.
     pub(crate) fn resolved(&self) -> Result<RunConfig> {
-        let base = match (&self.config, &self.from) {
+        let mut base = match (&self.config, &self.from) {
             (Some(path), _) => RunConfig::read(path)?,
             (None, Some(run)) => RunConfig { fork_at: Vec::new(), ..RunConfig::of_run(run)? },
-            (None, None) => RunConfig::default(),
+            (None, None) => self.preset.unwrap_or_default().config(),
         };
-        let mut config = self.applied_to(base)?;
         let limits = self.device.limits();
         // A configuration that is given has been decided about.
-        if !limits.is_none() && self.config.is_none() && self.from.is_none() {
+        let is_for_device = !limits.is_none() && self.config.is_none() && self.from.is_none();
+        if is_for_device {
+            base.effects.price = Price::for_device();
+        }
+        let mut config = self.applied_to(base)?;
+        if is_for_device {
             let choice = choose(&limits)?;
             self.quality.choose(&mut config.train, &choice);
             config.train.hac.lambda = self.lambda.unwrap_or(choice.lambda);

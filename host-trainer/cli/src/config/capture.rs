@@ -9,7 +9,7 @@ use super::named::{BACKGROUNDS, one_of};
 /// How photographs are prepared.
 #[derive(clap::Args, Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct CaptureOptions {
-    /// Longest side of the images in pixels, to which larger ones are reduced [default: their own size for train, the
+    /// Longest side of the images in pixels, to which larger ones are reduced [default: by the preset for train, the
     /// training size of the bundle elsewhere]
     #[arg(long, value_name = "PX", help_heading = INPUT)]
     pub(crate) max_resolution: Option<u32>,

@@ -4,6 +4,7 @@ mod capture;
 mod effects;
 pub(crate) mod heading;
 pub(crate) mod named;
+mod preset;
 mod protocol;
 
 use std::path::{Path, PathBuf};
@@ -18,6 +19,7 @@ use toml::{Table, Value};
 
 pub(crate) use capture::CaptureOptions;
 pub(crate) use effects::EffectsConfig;
+pub(crate) use preset::Preset;
 pub(crate) use protocol::Protocol;
 
 /// Everything a run was asked for.
@@ -129,14 +131,20 @@ impl RunConfig {
     }
 
     /// All keys at which they differ in that.
-    pub(crate) fn differences(&self, other: &Self) -> Result<Vec<Difference>> {
-        let deciding = |config: &Self| {
-            let Self { capture, train, .. } = config.clone();
-            Table::try_from(Self { capture, train, ..Self::default() })
-        };
-        let mut all = Vec::new();
-        collect_differences(&deciding(self)?, &deciding(other)?, "", &mut all);
-        Ok(all)
+    fn differences(&self, other: &Self) -> Result<Vec<Difference>> {
+        differences(self, other, |config| {
+            let Self { capture, train, .. } = config;
+            Self { capture, train, ..Self::default() }
+        })
+    }
+
+    /// All keys at which their bundles differ: those, and how bundles are coded. The effects that were chosen are among them, how
+    /// they were chosen is not.
+    pub(crate) fn differences_of_bundles(&self, other: &Self) -> Result<Vec<Difference>> {
+        differences(self, other, |config| {
+            let Self { capture, train, encoding, .. } = config;
+            Self { capture, train, encoding, ..Self::default() }
+        })
     }
 }
 
@@ -146,6 +154,18 @@ pub(crate) struct Difference {
     pub(crate) key: String,
     pub(crate) one: String,
     pub(crate) other: String,
+}
+
+/// All keys at which two configurations differ in what `deciding` leaves of them.
+fn differences(
+    one: &RunConfig,
+    other: &RunConfig,
+    deciding: impl Fn(RunConfig) -> RunConfig,
+) -> Result<Vec<Difference>> {
+    let table = |config: &RunConfig| Table::try_from(deciding(config.clone()));
+    let mut all = Vec::new();
+    collect_differences(&table(one)?, &table(other)?, "", &mut all);
+    Ok(all)
 }
 
 /// The backbone that a configuration names; its defaults stand for what else is missing.

@@ -8,7 +8,7 @@ use pocketsplat_core::bundle::crc32;
 use pocketsplat_trainer::bundle::MAX_PROTOCOL_LEN;
 use serde::{Deserialize, Serialize};
 
-use super::CaptureOptions;
+use super::{CaptureOptions, Difference};
 
 /// Parts of a normalised unit, and of a rotation's entries, to which poses are rounded in a fingerprint.
 const POSE_PARTS: f64 = 1e4;
@@ -50,6 +50,15 @@ impl Protocol {
     /// Reads the section; what other versions may have added is passed over.
     pub(crate) fn parse(text: &str) -> Result<Self> {
         Ok(toml::from_str(text)?)
+    }
+
+    /// Where two differ besides the options: the capture, and the version of the program.
+    pub(crate) fn differences(&self, other: &Self) -> Vec<Difference> {
+        let pairs = [("capture", &self.capture, &other.capture), ("program", &self.program, &other.program)];
+        let differing = pairs.into_iter().filter(|(_, one, other)| one != other);
+        differing
+            .map(|(key, one, other)| Difference { key: key.to_owned(), one: one.clone(), other: other.clone() })
+            .collect()
     }
 
     /// Why a capture is not the one that the bundle was trained on.

@@ -7,7 +7,8 @@ use std::process::Command;
 use pocketsplat_core::Bundle;
 use pocketsplat_core::bundle::Effects;
 
-use crate::fixture::{capture, fails, folder, pocketsplat, succeeds, train};
+use crate::fixture::{capture, fails, folder, pocketsplat, resume, starts, succeeds, text, train};
+use crate::interruption::signal;
 
 fn effects_of(bundle: &PathBuf) -> Effects {
     let bytes = fs::read(bundle).unwrap();
@@ -89,16 +90,11 @@ fn effects_are_measured_once_and_stay_with_the_run() {
     let (output, mut command) = run("a.psb");
     command.arg(&views).args(["--iterations", "80", "--feature-dim", "8", "--offsets", "3"]);
     // So dear that nothing pays, whatever it is worth.
-    command.args([
-        "--effects",
-        "auto",
-        "--set",
-        "effects.least_iterations=80",
-        "--set",
-        "effects.price.effect_db=1000",
-    ]);
+    let least = "effects.least_iterations=80";
+    let measured = ["--effects", "auto", "--set", least, "--set", "effects.price.effect_db=1000"];
+    command.args(measured);
     let said = succeeds(&mut command);
-    assert!(said.contains("effects: pilot with detail") && said.contains("effects: none, measured in"), "{said}");
+    assert!(said.contains("effects: pilot 5 with detail") && said.contains("effects: none, measured in"), "{said}");
     assert_eq!(effects_of(&output), Effects::default());
     let kept = home.join("a.run");
     let table = fs::read_to_string(kept.join("effects.csv")).unwrap();
@@ -108,5 +104,23 @@ fn effects_are_measured_once_and_stay_with_the_run() {
     let (again, mut command) = run("b.psb");
     let said = succeeds(command.arg("--config").arg(kept.join("config.toml")));
     assert!(!said.contains("effects:"), "nothing is measured again: {said}");
-    assert!(fs::read(output).unwrap() == fs::read(again).unwrap());
+    assert!(fs::read(&output).unwrap() == fs::read(again).unwrap());
+
+    // Ctrl-C while pilots are trained: those that are done stay.
+    let (interrupted, mut command) = run("c.psb");
+    command.arg(&views).args(["--iterations", "80", "--feature-dim", "8", "--offsets", "3"]).args(measured);
+    let mut child = starts(&mut command);
+    let folder = home.join("c.run");
+    while !folder.join("pilots.csv").exists() {
+        assert!(child.try_wait().unwrap().is_none(), "ended before its first pilot");
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    signal(&child, "INT");
+    let ended = child.wait_with_output().unwrap();
+    let said = text(&ended.stderr);
+    assert_eq!(ended.status.code(), Some(130), "{said}");
+    assert!(said.contains("pilots are kept; go on with `pocketsplat train --resume"), "{said}");
+    let said = succeeds(&mut resume(&folder));
+    assert!(!said.contains("effects: pilot 1 with none") && said.contains("effects: pilot 6"), "{said}");
+    assert!(fs::read(output).unwrap() == fs::read(interrupted).unwrap());
 }

@@ -64,7 +64,7 @@ fn kill_9_at_random_moments_costs_at_most_one_interval_and_no_bit() {
     eprintln!("killed {n_killed} times");
 }
 
-fn signal(child: &Child, name: &str) {
+pub(crate) fn signal(child: &Child, name: &str) {
     let sent = Command::new("kill").args([&format!("-{name}"), &child.id().to_string()]).status().unwrap();
     assert!(sent.success());
 }

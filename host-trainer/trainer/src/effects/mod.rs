@@ -11,7 +11,7 @@ mod search;
 
 use std::fmt;
 
-pub use pilot::{LEAST_ITERATIONS, PilotCapture, PilotError, measure};
+pub use pilot::{LEAST_ITERATIONS, PilotCapture, PilotError, PilotLog, measure};
 pub use price::{Price, Worth, choose};
 pub use request::{ParseEffectsError, Request};
 pub use search::{Pilot, Pilots};

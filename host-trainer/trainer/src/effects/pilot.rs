@@ -1,5 +1,8 @@
 //! Pilots: short runs that differ in their effects.
 
+use std::io;
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, MaxSplats};
 
 use super::search::{Pilots, search};
@@ -9,11 +12,9 @@ use crate::device::{Limits, Processor};
 use crate::encode::{CoderChoice, EncodeError, Encoding};
 use crate::metrics::psnr_db_masked;
 use crate::render::decoder::image_of;
-use crate::scene::Scene;
-use crate::step::StepReport;
 use crate::train::config::{Backbone, MIN_VIEWS_TO_HOLD_OUT};
 use crate::train::module::Modules;
-use crate::train::{Observer, TrainConfig, TrainError, Trainer};
+use crate::train::{TrainConfig, TrainError, Trainer};
 use pocketsplat_capture::dataset::{Capture, Image, View};
 use pocketsplat_instructions::predict;
 
@@ -83,6 +84,30 @@ pub enum PilotError {
     /// Its bundle cannot be drawn.
     #[error("a pilot's bundle cannot be drawn; please report it")]
     Draw(#[from] DecodeError),
+    /// What it was worth could not be written down.
+    #[error("the pilots' results cannot be kept")]
+    Keep(#[from] io::Error),
+    /// It was asked to stop.
+    #[error("the measurement of effects was interrupted")]
+    Interrupted,
+}
+
+/// Follows pilots, and remembers those that are done, so that no interruption makes them be trained again.
+pub trait PilotLog {
+    /// What a pilot with these effects and this change of the seed came to, if it is done.
+    fn known(&self, effects: &[Effect], seed: u64) -> Option<Worth>;
+
+    /// A pilot begins, of so many iterations.
+    fn begins(&mut self, effects: &[Effect], iterations: u32);
+
+    /// A pilot has done this iteration.
+    fn step(&mut self, iteration: u32);
+
+    /// A pilot is done.
+    ///
+    /// # Errors
+    /// What keeps it from being written down.
+    fn done(&mut self, effects: &[Effect], seed: u64, worth: &Worth) -> io::Result<()>;
 }
 
 /// For which device pilots are drawn.
@@ -102,7 +127,7 @@ struct PilotDevice {
 ///
 /// * `config`: of the run, for whose length, seed and widths the pilots stand; other effects than the measured are kept.
 /// * `target`: whose instructions count. * `encoding`: of the run; bundles of pilots have one tier and are cut to nothing, and are
-///   drawn within its RAM. * `begins`: hears of each pilot before it is trained, by its effects.
+///   drawn within its RAM. * `stop`: looked at after every iteration.
 ///
 /// # Errors
 /// [`PilotError`].
@@ -112,25 +137,37 @@ pub fn measure(
     price: &Price,
     target: Processor,
     encoding: &Encoding,
-    mut begins: impl FnMut(&[Effect]),
+    log: &mut impl PilotLog,
+    stop: &AtomicBool,
 ) -> Result<Pilots, PilotError> {
     let device = PilotDevice { ram_bytes: encoding.limits.ram_bytes, target };
     // Pilots are smaller than the scene that has to fit.
     let limits = Limits { ram_bytes: None, flash_bytes: None, ..encoding.limits };
     let encoding = Encoding { coder: CoderChoice::Auto, tiers: vec![0.0], limits, ..encoding.clone() };
-    let mut worth_of = |effects: &[Effect], config: &TrainConfig| -> Result<Worth, PilotError> {
-        begins(effects);
-        let mut trainer = Trainer::new(&capture.reduced, pilot_config(config, effects))?;
-        trainer.run(&mut Silent)?;
+    search(price, |effects, seed| {
+        if let Some(worth) = log.known(effects, seed) {
+            return Ok(worth);
+        }
+        let config = pilot_config(&TrainConfig { seed: config.seed ^ seed, ..*config }, effects);
+        log.begins(effects, config.iterations);
+        let mut trainer = Trainer::new(&capture.reduced, config)?;
+        while !trainer.is_done() {
+            if stop.load(Ordering::Relaxed) {
+                return Err(PilotError::Interrupted);
+            }
+            trainer.advance()?;
+            log.step(trainer.iteration);
+        }
         let fitted = encoding.encode(trainer.finish()?, &capture.reduced, &[])?;
-        Ok(worth(&fitted.written.bytes, capture, device)?)
-    };
-    search(price, |effects, seed| worth_of(effects, &TrainConfig { seed: config.seed ^ seed, ..*config }))
+        let worth = worth(&fitted.written.bytes, capture, device)?;
+        log.done(effects, seed, &worth)?;
+        Ok(worth)
+    })
 }
 
 /// The run in short, for the image alone: so few steps leave a rate no time, and its noise would be more than what is measured.
 fn pilot_config(config: &TrainConfig, effects: &[Effect]) -> TrainConfig {
-    let (backbone, modules) = (Backbone::Scaffold, Modules { pruning: None, ..config.modules });
+    let (backbone, modules) = (Backbone::Scaffold, Modules { pruning: None, rdo: None, ..config.modules });
     let iterations = config.iteration_at(PILOT_SHARE).max(1);
     let config = TrainConfig { backbone, iterations, validation_every: 0, modules, ..*config };
     Effect::measured_only(effects, &config)
@@ -174,17 +211,38 @@ fn draw(
     Ok(())
 }
 
-/// Hears of steps and says nothing.
-struct Silent;
-
-impl Observer for Silent {
-    fn step(&mut self, _iteration: u32, _report: &StepReport<f32>, _scene: &Scene<f32>) {}
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::train::test_capture::{many_views, tiny_config};
+
+    #[derive(Default)]
+    struct Noted {
+        begun: Vec<String>,
+        n_steps: u32,
+        known: Vec<(String, u64, Worth)>,
+    }
+
+    impl PilotLog for Noted {
+        fn known(&self, effects: &[Effect], seed: u64) -> Option<Worth> {
+            let name = Effect::names(effects);
+            self.known.iter().find(|known| known.0 == name && known.1 == seed).map(|known| known.2)
+        }
+
+        fn begins(&mut self, effects: &[Effect], iterations: u32) {
+            assert_eq!(iterations, 20, "an eighth");
+            self.begun.push(Effect::names(effects));
+        }
+
+        fn step(&mut self, _iteration: u32) {
+            self.n_steps += 1;
+        }
+
+        fn done(&mut self, effects: &[Effect], seed: u64, worth: &Worth) -> io::Result<()> {
+            self.known.push((Effect::names(effects), seed, *worth));
+            Ok(())
+        }
+    }
 
     #[test]
     fn pilots_see_no_test_view_and_are_measured_on_none_that_they_train_on() {
@@ -207,11 +265,21 @@ mod tests {
         let capture = many_views(12);
         let pilots = PilotCapture::of(&capture).expect("views to spare");
         let dear = Price { effect_db: 1e3, ..Price::default() };
-        let mut begun = Vec::new();
-        let begins = |effects: &[Effect]| begun.push(Effect::names(effects));
-        let trials = measure(&pilots, &tiny_config(160), &dear, Processor::CortexM4, &Encoding::default(), begins);
-        let trials = trials.expect("pilots");
-        assert_eq!(begun, ["none", "none", "view-colour", "view-geometry", "detail", "anisotropy"]);
+        let measured = |log: &mut Noted, stop: bool| {
+            let (config, stop) = (tiny_config(160), AtomicBool::new(stop));
+            measure(&pilots, &config, &dear, Processor::CortexM4, &Encoding::default(), log, &stop)
+        };
+        let mut log = Noted::default();
+        assert!(matches!(measured(&mut log, true), Err(PilotError::Interrupted)));
+        log = Noted::default();
+        let trials = measured(&mut log, false).expect("pilots");
+        assert_eq!(log.begun, ["none", "none", "view-colour", "view-geometry", "detail", "anisotropy"]);
+        assert_eq!(log.n_steps, 6 * 20);
+        // As after an interruption: what is known is not trained again, and what comes of it is the same.
+        log.known.remove(2);
+        log.begun.clear();
+        assert_eq!(measured(&mut log, false).expect("pilots"), trials);
+        assert_eq!(log.begun, ["view-colour"]);
         assert!(trials.chance_db > 0.0, "two seeds, two scenes");
         assert!(trials.each.iter().all(|trial| trial.worth.instructions > 0.0 && trial.worth.psnr_db.is_finite()));
         let chosen: Vec<_> = trials.each.iter().filter(|trial| trial.chosen).map(|trial| &trial.effects).collect();

@@ -40,11 +40,21 @@ pub struct Price {
 
 impl Default for Price {
     fn default() -> Self {
-        Self { effect_db: 0.05, instructions_db: 0.05, bytes_db: 0.05 }
+        Self::for_pc()
     }
 }
 
 impl Price {
+    /// Where nobody counts instructions or bytes: what gains is kept.
+    pub const fn for_pc() -> Self {
+        Self { effect_db: 0.05, instructions_db: 0.0, bytes_db: 0.0 }
+    }
+
+    /// For a device.
+    pub const fn for_device() -> Self {
+        Self { effect_db: 0.05, instructions_db: 0.05, bytes_db: 0.05 }
+    }
+
     /// What `with`, a scene with `n_effects`, has to gain over `without`, a scene without any, dB:
     /// `max(effect_db · n, chance_db) + instructions_db · 10·(I/I₀ − 1) + bytes_db · 10·(B/B₀ − 1)`.
     ///
@@ -94,7 +104,7 @@ mod tests {
 
     #[test]
     fn what_gains_no_more_than_its_price_is_left_out() {
-        let choose = |trials: &[(usize, Worth)], chance_db| choose(&Price::default(), trials, chance_db);
+        let choose = |trials: &[(usize, Worth)], chance_db| choose(&Price::for_device(), trials, chance_db);
         assert_eq!(choose(&[NONE], 0.0), 0);
         assert_eq!(choose(&[NONE, trial(1, 0.049, 50e6, 100_000)], 0.0), 0, "the effect itself");
         assert_eq!(choose(&[NONE, trial(1, 0.051, 50e6, 100_000)], 0.0), 1);
@@ -105,8 +115,16 @@ mod tests {
     }
 
     #[test]
+    fn on_a_pc_what_gains_is_kept_whatever_it_takes() {
+        let choose = |trials: &[(usize, Worth)], chance_db| choose(&Price::for_pc(), trials, chance_db);
+        assert_eq!(choose(&[NONE, trial(1, 0.051, 500e6, 900_000)], 0.0), 1);
+        assert_eq!(choose(&[NONE, trial(1, 0.051, 500e6, 900_000)], 0.1), 0, "no more than chance");
+        assert_eq!(choose(&[NONE, trial(1, 0.4, 55e6, 90_000), trial(3, 0.6, 90e6, 90_000)], 0.0), 2);
+    }
+
+    #[test]
     fn of_those_that_pay_the_one_that_leaves_most_is_kept() {
-        let choose = |trials: &[(usize, Worth)]| choose(&Price::default(), trials, 0.0);
+        let choose = |trials: &[(usize, Worth)]| choose(&Price::for_device(), trials, 0.0);
         let alone = [trial(1, 0.2, 55e6, 100_000), trial(1, 0.4, 55e6, 100_000)];
         assert_eq!(choose(&[NONE, alone[0], alone[1], trial(2, 0.44, 56e6, 100_000)]), 2);
         assert_eq!(choose(&[NONE, alone[0], alone[1], trial(2, 0.6, 56e6, 100_000)]), 3);

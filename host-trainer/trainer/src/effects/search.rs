@@ -97,7 +97,7 @@ mod tests {
     /// The sets that are tried, in order, and the one that is kept, where a set gains `gain_db` and makes a frame as dear as `frame`.
     fn tried(gain_db: impl Fn(&[Effect]) -> f64, frame: impl Fn(&[Effect]) -> f64) -> (Vec<Vec<Effect>>, Vec<Effect>) {
         let mut tried = Vec::new();
-        let trials = search(&Price::default(), |effects, seed| {
+        let trials = search(&Price::for_device(), |effects, seed| {
             tried.push(effects.to_vec());
             let psnr_db = 30.0 + gain_db(effects) + 0.001 * seed as f64;
             Ok::<_, ()>(Worth { psnr_db, instructions: 1e6 * frame(effects), bytes: 1000 })

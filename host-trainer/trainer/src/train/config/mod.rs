@@ -200,7 +200,7 @@ impl Default for TrainConfig {
             iterations: 30_000,
             seed: 42,
             voxel_size: None,
-            validation_every: 24,
+            validation_every: 0,
             rates: Rates::default(),
             learns_background: false,
             loss: LossWeights::default(),

@@ -31,6 +31,7 @@ use super::{Observer, Trainer};
 const CONFIG: &str = "config.toml";
 const LOG: &str = "progress.csv";
 const EFFECTS: &str = "effects.csv";
+const PILOTS: &str = "pilots.csv";
 const RESULT: &str = "result.json";
 const LOCK: &str = "lock";
 
@@ -84,7 +85,7 @@ impl RunFolder {
             return Err(RunError::Unfinished { path: path.to_owned() });
         }
         folder.clear_checkpoints(|_| true)?;
-        for name in [RESULT, LOG, EFFECTS] {
+        for name in [RESULT, LOG, EFFECTS, PILOTS] {
             files::remove(&path.join(name))?;
         }
         folder.write_config(config)?;
@@ -125,6 +126,11 @@ impl RunFolder {
     #[must_use]
     pub fn forking_at(self, iterations: &[u32]) -> Self {
         Self { forks_at: iterations.to_vec(), ..self }
+    }
+
+    /// The file of the pilots that are done, which the caller keeps while it measures effects.
+    pub fn pilots(&self) -> PathBuf {
+        self.path.join(PILOTS)
     }
 
     /// Where it is.

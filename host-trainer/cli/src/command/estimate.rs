@@ -1,0 +1,268 @@
+//! What a run will take: minutes, memory and bytes, from a few steps and from how runs go on.
+
+use std::fmt;
+use std::time::Instant;
+
+use anyhow::Result;
+use pocketsplat_capture::dataset::{Capture, PointsOrigin};
+use pocketsplat_trainer::train::{TrainConfig, Trainer};
+
+use super::process::{machine_memory_bytes, peak_memory_bytes};
+
+/// Steps of the trial, of which the first, that fill caches and take memory, are not timed.
+const TRIAL_STEPS: u32 = 12;
+const UNTIMED_STEPS: u32 = 4;
+/// Iterations after which the estimate is shown again; then at these shares of the run.
+const FIRST: u32 = 30;
+const AGAIN_AT: [f64; 3] = [0.1, 0.25, 0.5];
+
+/// Above this many minutes, and this share of the machine's memory, a run is warned of.
+const MANY_MINUTES: f64 = 120.0;
+const MUCH_MEMORY: f64 = 0.8;
+
+/// What pruning, coding and measuring take more than a step, against the peak so far.
+const EVENTS_MEMORY: f64 = 1.15;
+
+/// Bytes of a bundle besides its anchors: heads, context, container.
+const FIXED_BYTES: f64 = 40e3;
+
+/// How a run goes on, against its first steps. As runs of the captures of `docs/benchmarks.md` went, which says how far single ones
+/// are off.
+struct Course {
+    /// Time of a step at [`SHARES`] of the run.
+    cost: [f64; SHARES.len()],
+    /// Anchors at these.
+    anchors: [f64; SHARES.len()],
+}
+
+/// Shares of a run: growth goes on up to half of it, then pruning by worth takes its first part.
+const SHARES: [f64; 8] = [0.0, 0.1, 0.2, 0.35, 0.5, 0.51, 0.65, 1.0];
+/// The number of those before pruning.
+const BEFORE_PRUNING: usize = 5;
+
+/// From points drawn at random, as of Synthetic-NeRF.
+const FROM_RANDOM: Course =
+    Course { cost: [1.0, 1.0, 2.7, 5.3, 7.0, 3.6, 3.4, 3.4], anchors: [1.0, 0.6, 3.0, 3.5, 3.8, 1.7, 1.5, 1.5] };
+/// From a capture's own points.
+const FROM_CAPTURE: Course =
+    Course { cost: [1.0, 1.1, 1.3, 1.6, 1.9, 1.4, 1.35, 1.35], anchors: [1.0, 1.0, 1.1, 1.1, 1.15, 0.7, 0.6, 0.6] };
+
+impl Course {
+    /// The same where nothing is pruned by worth.
+    fn unpruned(&self) -> Self {
+        let goes_on = |values: &[f64; SHARES.len()]| {
+            std::array::from_fn(|i| values[if i < BEFORE_PRUNING { i } else { BEFORE_PRUNING - 1 }])
+        };
+        Self { cost: goes_on(&self.cost), anchors: goes_on(&self.anchors) }
+    }
+}
+
+/// The value at share `at` on straight lines between [`SHARES`].
+fn between(values: &[f64; SHARES.len()], at: f64) -> f64 {
+    let next = SHARES.partition_point(|share| *share < at).clamp(1, SHARES.len() - 1);
+    let (from, to) = (SHARES[next - 1], SHARES[next]);
+    values[next - 1] + (values[next] - values[next - 1]) * (at - from) / (to - from)
+}
+
+/// Follows a run, and says now and then what it will take.
+pub(super) struct Estimate {
+    what: String,
+    course: Course,
+    iterations: u32,
+    bytes_per_anchor: f64,
+    /// Memory of an anchor while it is trained: its values, their moments and gradients, and what a step notes of it; measured.
+    memory_per_anchor: f64,
+    /// A limit of growth.
+    most_anchors: f64,
+    /// When this process began, and a step some time ago, to tell the rate by.
+    started: Instant,
+    earlier: (u32, Instant),
+    next: Vec<u32>,
+}
+
+/// What a run takes in all.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Expected {
+    minutes: f64,
+    memory_bytes: f64,
+    bundle_bytes: f64,
+}
+
+impl Estimate {
+    /// * `from`: iterations that are done.
+    pub(super) fn new(capture: &Capture, config: &TrainConfig, from: u32) -> Self {
+        let [width, height] = capture.largest_px();
+        let iterations = config.iterations;
+        let said = AGAIN_AT.into_iter().map(|share| config.iteration_at(share));
+        let values = config.shape.values_per_anchor() as f64;
+        let course = match capture.points_origin {
+            PointsOrigin::Random => FROM_RANDOM,
+            PointsOrigin::Capture => FROM_CAPTURE,
+        };
+        Self {
+            what: format!("{width}×{height} px, {iterations} iterations"),
+            course: if config.modules.rdo.is_some() { course } else { course.unpruned() },
+            iterations,
+            bytes_per_anchor: bytes_per_anchor(config),
+            memory_per_anchor: 140.0 * values,
+            most_anchors: config.densification.max_anchors.map_or(f64::INFINITY, |most| most as f64),
+            started: Instant::now(),
+            earlier: (from, Instant::now()),
+            next: [from + FIRST].into_iter().chain(said).filter(|at| *at >= from + FIRST && *at < iterations).collect(),
+        }
+    }
+
+    /// Measures a few steps of a new run, which are not kept, and says what it will take.
+    ///
+    /// # Errors
+    /// Those of the steps.
+    pub(super) fn try_out(capture: &Capture, config: &TrainConfig) -> Result<()> {
+        let mut trainer = Trainer::new(capture, *config)?;
+        let mut timed = Instant::now();
+        for step in 0..TRIAL_STEPS.min(config.iterations) {
+            if step == UNTIMED_STEPS {
+                timed = Instant::now();
+            }
+            trainer.advance()?;
+        }
+        let step_s = timed.elapsed().as_secs_f64() / f64::from(TRIAL_STEPS - UNTIMED_STEPS);
+        let estimate = Self::new(capture, config, 0);
+        estimate.say(&estimate.expected(0, step_s, 0.0, trainer.scene.anchors.len()));
+        Ok(())
+    }
+
+    /// Hears of an iteration that is done, and says what the run will take when it is time to.
+    pub(super) fn step(&mut self, iteration: u32, n_anchors: usize, say: impl FnOnce(&str)) {
+        // The rate of the last hundred steps or so: growth changes it.
+        if iteration.is_multiple_of(100) && !self.next.contains(&iteration) {
+            self.earlier = (iteration, Instant::now());
+        }
+        if self.next.first().is_none_or(|next| iteration < *next) {
+            return;
+        }
+        self.next.retain(|next| *next > iteration);
+        let step_s = self.earlier.1.elapsed().as_secs_f64() / f64::from(iteration - self.earlier.0);
+        let expected = self.expected(iteration, step_s, self.started.elapsed().as_secs_f64(), n_anchors);
+        say(&self.line(&expected));
+    }
+
+    fn expected(&self, iteration: u32, step_s: f64, spent_s: f64, n_anchors: usize) -> Expected {
+        let done = f64::from(iteration) / f64::from(self.iterations);
+        let parts = 100;
+        let mean_cost = (0..parts)
+            .map(|i| between(&self.course.cost, done + (1.0 - done) * (f64::from(i) + 0.5) / f64::from(parts)))
+            .sum::<f64>()
+            / f64::from(parts);
+        let steps_left = f64::from(self.iterations - iteration);
+        let left_s = steps_left * step_s * mean_cost / between(&self.course.cost, done);
+        let against_now = n_anchors as f64 / between(&self.course.anchors, done);
+        let later = |share: &f64| *share >= done;
+        let most =
+            SHARES.iter().zip(self.course.anchors).filter(|(share, _)| later(share)).map(|(_, n)| n * against_now);
+        let most = most.fold(n_anchors as f64, f64::max).min(self.most_anchors.max(n_anchors as f64));
+        let end = (self.course.anchors[SHARES.len() - 1] * against_now).min(self.most_anchors);
+        Expected {
+            minutes: (spent_s + left_s) / 60.0,
+            memory_bytes: peak_memory_bytes().unwrap_or(0) as f64 * EVENTS_MEMORY
+                + (most - n_anchors as f64) * self.memory_per_anchor,
+            bundle_bytes: FIXED_BYTES + end * self.bytes_per_anchor,
+        }
+    }
+
+    fn line(&self, expected: &Expected) -> String {
+        format!("{}: {expected}", self.what)
+    }
+
+    /// The line, and what to do where it says too much.
+    fn say(&self, expected: &Expected) {
+        eprintln!("{}", self.line(expected));
+        if expected.minutes > MANY_MINUTES {
+            eprintln!("warning: that is long; --max-resolution 400 or --iterations 7000 makes it shorter");
+        }
+        if let Some(machine) = machine_memory_bytes()
+            && expected.memory_bytes > MUCH_MEMORY * machine as f64
+        {
+            eprintln!(
+                "warning: the machine has {:.1} GB of memory; --max-resolution 400 or --max-anchors N takes less",
+                machine as f64 / 1e9
+            );
+        }
+    }
+}
+
+impl fmt::Display for Expected {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { minutes, memory_bytes, bundle_bytes } = *self;
+        match minutes {
+            ..1.0 => write!(f, "about {:.0} seconds", 60.0 * minutes)?,
+            1.0..10.0 => write!(f, "about {minutes:.1} minutes")?,
+            10.0..180.0 => write!(f, "about {minutes:.0} minutes")?,
+            _ => write!(f, "about {:.0} hours", minutes / 60.0)?,
+        }
+        write!(f, ", {:.1} GB of memory, a bundle of about {:.2} MB", memory_bytes / 1e9, bundle_bytes / 1e6)
+    }
+}
+
+/// Bytes of an anchor in a bundle: of context-coded scenes a power of λ, fitted; of scaffold scenes with static tables.
+fn bytes_per_anchor(config: &TrainConfig) -> f64 {
+    if config.backbone.is_coded() { 24.0 * (config.hac.lambda.max(1e-5) / 0.002).powf(-0.35) } else { 40.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Steps cost four times as much from the middle on, and there are three times as many anchors.
+    const GROWING: Course =
+        Course { cost: [1.0, 1.0, 1.0, 1.0, 4.0, 4.0, 4.0, 4.0], anchors: [1.0, 1.0, 2.0, 3.0, 3.0, 2.0, 2.0, 2.0] };
+
+    fn estimate(most_anchors: f64) -> Estimate {
+        Estimate {
+            what: "8×8 px, 1000 iterations".to_owned(),
+            course: GROWING,
+            iterations: 1000,
+            bytes_per_anchor: 20.0,
+            memory_per_anchor: 1000.0,
+            most_anchors,
+            started: Instant::now(),
+            earlier: (0, Instant::now()),
+            next: vec![30, 100],
+        }
+    }
+
+    #[test]
+    fn lines_between_shares() {
+        let values = [1.0, 2.0, 4.0, 4.0, 4.0, 4.0, 4.0, 8.0];
+        let at = |share: f64| between(&values, share);
+        assert_eq!(
+            [0.0, 0.1, 0.15, 0.5, 0.825, 1.0].map(|share| (8.0 * at(share)).round() / 8.0),
+            [1.0, 2.0, 3.0, 4.0, 6.0, 8.0]
+        );
+    }
+
+    #[test]
+    fn what_is_left_costs_what_the_course_says() {
+        let close = |found: f64, expected: f64| assert!((found / expected - 1.0).abs() < 0.01, "{found}, {expected}");
+        let all = estimate(f64::INFINITY);
+        let start = all.expected(0, 0.06, 0.0, 5000);
+        // 0.35 at 1, a line to 4 over 0.15, and 0.5 at 4.
+        close(start.minutes, 1.0 * (0.35 + 0.15 * 2.5 + 0.5 * 4.0));
+        let middle = all.expected(500, 0.24, 600.0, 15_000);
+        close(middle.minutes, 10.0 + 2.0);
+        close(middle.bundle_bytes, FIXED_BYTES + 10_000.0 * 20.0);
+        // Memory still to come is that of 10,000 anchors, at the end none; what the process holds may grow meanwhile.
+        let to_come = start.memory_bytes - all.expected(1000, 0.1, 0.0, 10_000).memory_bytes;
+        assert!(to_come < 1.001e7, "{to_come}");
+        close(estimate(6000.0).expected(0, 0.06, 0.0, 5000).bundle_bytes, FIXED_BYTES + 6000.0 * 20.0);
+    }
+
+    #[test]
+    fn it_speaks_when_it_has_learnt_something() {
+        let (mut estimate, mut said) = (estimate(f64::INFINITY), Vec::new());
+        for iteration in 1..=1000 {
+            estimate.step(iteration, 5000, |line| said.push((iteration, line.to_owned())));
+        }
+        assert_eq!(said.iter().map(|(at, _)| *at).collect::<Vec<_>>(), [30, 100]);
+        assert!(said[0].1.starts_with("8×8 px, 1000 iterations: about 0 seconds, "), "{}", said[0].1);
+    }
+}

@@ -13,6 +13,7 @@ mod tally;
 mod tests;
 
 pub use count::{count_gaussians, count_scratch_len};
+pub use frame::{Drawing, Tile};
 pub use report::FrameReport;
 
 use crate::arithmetic::{Arithmetic, ReferenceArithmetic};
@@ -104,7 +105,7 @@ impl<'b, 's> Decoder<'b, 's> {
     }
 }
 
-impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
+impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
     /// The bundle it draws.
     #[must_use]
     pub fn bundle(&self) -> &Bundle<'b> {
@@ -145,8 +146,19 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
         self.draw_frame(camera, sink, watch)
     }
 
+    /// Begins a frame that comes tile by tile, each when it is asked for: the same pixels as [`render`](Self::render)'s.
+    ///
+    /// # Errors
+    /// [`DecodeError::OutOfRange`] for a frame larger than planned and [`DecodeError::BadFloat`] for an unusable camera.
+    ///
+    /// # Budget
+    /// No memory beyond the bound one, but for about 500 bytes of the drawing itself.
+    pub fn begin(&mut self, camera: &Camera) -> Result<Drawing<'_, 'b, 's, A>, DecodeError> {
+        self.begin_frame(camera)
+    }
+
     /// The chunks of the tiers that are drawn, each with the number of its first anchor.
-    fn planned_chunks(&self) -> impl Iterator<Item = (Chunk<'b>, u32)> + use<'b, A> {
+    fn planned_chunks(&self) -> impl Iterator<Item = (Chunk<'b>, u32)> + use<'b, 's, A> {
         let n_chunks = self.bundle.up_to_tier(self.plan.n_tiers()).n_chunks;
         let mut n_anchors = 0_u32;
         self.bundle.chunks().take(n_chunks as usize).map(move |chunk| {

@@ -5,27 +5,78 @@ use super::splats::{Slab, SplatStore};
 use super::strip::{Strip, StripLayout};
 use super::tally::Tally;
 use super::{Decoder, FrameReport, TileSink};
-use crate::arithmetic::Arithmetic;
+use crate::arithmetic::{Arithmetic, ReferenceArithmetic};
 use crate::budget::Overflow;
 use crate::camera::Camera;
-use crate::error::{Field, RenderError, in_range, saturate};
+use crate::error::{DecodeError, Field, RenderError, in_range, saturate};
 use crate::project::{TILE_PIXELS, TileRect, View};
-use crate::raster::{BlendRule, EMPTY, TilePlace, blend_tile, finish_tile, sort_by_depth};
+use crate::raster::{BlendRule, EMPTY, TilePlace, blend_tile, finish_tile};
 use crate::rules::TILE_PX;
 use crate::stopwatch::{Stage, Stopwatch};
 
-impl<A: Arithmetic> Decoder<'_, '_, A> {
-    /// As [`render_watched`](Self::render_watched).
-    // Not inlined: a caller's stack frame would keep what only this needs.
-    #[inline(never)]
-    pub(super) fn draw_frame<S: TileSink>(
-        &mut self,
-        camera: &Camera,
-        sink: &mut S,
-        watch: &mut impl Stopwatch,
-    ) -> Result<FrameReport, RenderError<S::Error>> {
-        watch.enter(Stage::Project);
-        let budget = *self.plan.budget();
+/// A frame that comes tile by tile, each when it is asked for; made by [`Decoder::begin`].
+///
+/// Between two tiles the processor is free: for the bus that sends the last one, for other tasks. Dropping it ends the frame.
+///
+/// ```
+/// # fn main() -> Result<(), pocketsplat_core::DecodeError> {
+/// # let bytes = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/bundle/example.psb"));
+/// # let mut scratch = [0; 8 * 1024];
+/// use pocketsplat_core::{Budget, Bundle, Decoder};
+///
+/// let bundle = Bundle::parse(bytes)?;
+/// let plan = bundle.plan(&Budget::for_frame(32, 24))?;
+/// let mut decoder = Decoder::bind(&bundle, plan, &mut scratch)?;
+/// let mut drawing = decoder.begin(&bundle.header().preview)?;
+/// let mut n_pixels = 0;
+/// while let Some(tile) = drawing.next_tile()? {
+///     n_pixels += tile.rgb.len(); // or: display.send(tile.x_px, tile.y_px, tile.rgb).await
+/// }
+/// assert_eq!((n_pixels, drawing.report().splats), (32 * 24, 5));
+/// # Ok(())
+/// # }
+/// ```
+#[must_use = "nothing is drawn before its tiles are asked for"]
+pub struct Drawing<'d, 'b, 's, A: Arithmetic = ReferenceArithmetic> {
+    decoder: &'d mut Decoder<'b, 's, A>,
+    size_px: [u16; 2],
+    frame: Frame,
+    rule: BlendRule,
+    strip: Strip,
+    slab: Slab,
+    /// The next tile: its place in the frame, and its number in the strip.
+    row: u8,
+    column: u8,
+    n_tiles: usize,
+    /// Splats of the current row, at the front of the spare list.
+    n_in_row: usize,
+    /// Pixels of the slab that are not finished.
+    alive: u32,
+    /// Splats of the strip, and the most in memory at once.
+    in_strip: u32,
+    most_in_memory: u32,
+}
+
+/// A finished tile.
+#[derive(Clone, Copy, Debug)]
+pub struct Tile<'t> {
+    /// Its first column, pixels.
+    pub x_px: u16,
+    /// Its first row, pixels.
+    pub y_px: u16,
+    /// Its width, pixels.
+    pub width: u16,
+    /// Its height, pixels.
+    pub height: u16,
+    /// `[height, width]`, row by row.
+    pub rgb: &'t [[u8; 3]],
+}
+
+impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
+    /// Checks the camera and prepares a frame, without drawing any of it.
+    #[inline(always)]
+    pub(super) fn begin_frame(&mut self, camera: &Camera) -> Result<Drawing<'_, 'b, 's, A>, DecodeError> {
+        let budget = self.plan.budget();
         let view = View::new(camera)?.cutting_at(budget.quality.alpha_cut);
         in_range(Field::FrameWidth, camera.width_px.into(), 1, budget.width_px.into())?;
         in_range(Field::FrameHeight, camera.height_px.into(), 1, budget.height_px.into())?;
@@ -37,121 +88,192 @@ impl<A: Arithmetic> Decoder<'_, '_, A> {
         } else {
             Admission::Tally(Tally::new(self.splats.places()))
         };
+        let rule = BlendRule::new(budget.quality.alpha_cut, budget.quality.transmittance_stop);
         let mut frame = Frame { view, strips, admission, report: FrameReport::default() };
         if self.skip_damage && matches!(admission, Admission::Slab) {
             self.note_damage(&mut frame);
         }
-        let mut most_in_memory = 0;
-        for strip in strips.iter() {
-            let (mut from, mut in_strip) = (0.0, 0_u32);
-            loop {
-                let slab = self.gather(strip, from, &mut frame, watch)?;
-                frame.report.slabs = frame.report.slabs.saturating_add(1);
-                let n = self.splats.n;
-                most_in_memory = n.max(most_in_memory);
-                in_strip = in_strip.saturating_add(n);
-                let rects = self.splats.rects.iter().take(n as usize);
-                let first_here =
-                    rects.filter(|rect| *strips.touched(**rect).start() == usize::from(strip.index)).count();
-                frame.report.splats = frame.report.splats.saturating_add(first_here as u32);
-                let alive =
-                    self.draw(strip, slab, camera, sink, &mut frame.report, watch).map_err(RenderError::Sink)?;
-                if !slab.ends() {
-                    break;
-                }
-                from = slab.end;
-                if !alive {
-                    // Nothing behind can be seen: the strip goes out as it is.
-                    self.splats.n = 0;
-                    self.draw(strip, Slab::behind(from), camera, sink, &mut frame.report, watch)
-                        .map_err(RenderError::Sink)?;
-                    break;
-                }
-            }
-            frame.report.strip_splats = frame.report.strip_splats.saturating_add(in_strip);
-            frame.report.max_splats = frame.report.max_splats.max(in_strip);
+        Ok(Drawing {
+            decoder: self,
+            size_px: [camera.width_px, camera.height_px],
+            frame,
+            rule,
+            strip: Strip::BEFORE,
+            slab: Slab::behind(0.0),
+            row: 0,
+            column: 0,
+            n_tiles: 0,
+            n_in_row: 0,
+            alive: 0,
+            in_strip: 0,
+            most_in_memory: 0,
+        })
+    }
+
+    /// As [`render_watched`](Self::render_watched).
+    // Not inlined: a caller's stack frame would keep what only this needs.
+    #[inline(never)]
+    pub(super) fn draw_frame<S: TileSink>(
+        &mut self,
+        camera: &Camera,
+        sink: &mut S,
+        watch: &mut impl Stopwatch,
+    ) -> Result<FrameReport, RenderError<S::Error>> {
+        watch.enter(Stage::Project);
+        let mut drawing = self.begin_frame(camera)?;
+        while let Some(Tile { x_px, y_px, width, height, rgb }) = drawing.next_tile_watched(watch)? {
+            sink.tile(x_px, y_px, width, height, rgb).map_err(RenderError::Sink)?;
         }
-        let Frame { admission, mut report, .. } = frame;
-        if let Admission::Tally(tally) = admission {
+        Ok(drawing.report())
+    }
+}
+
+impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
+    /// Draws the next tile, in the order in which [`Decoder::render`] hands them out, and with the same pixels; `None` after
+    /// the last.
+    ///
+    /// # Errors
+    /// [`DecodeError::ChunkStream`] for a chunk that no writer makes; no tile comes after it.
+    ///
+    /// # Budget
+    /// As [`Decoder::render`], divided among its tiles: the first of a strip, or of each of its slabs, takes the decoding and
+    /// the sort for all.
+    pub fn next_tile(&mut self) -> Result<Option<Tile<'_>>, DecodeError> {
+        self.next_tile_watched(&mut ())
+    }
+
+    /// As [`next_tile`](Self::next_tile), and tells `watch` where the work goes.
+    ///
+    /// # Errors
+    /// As for [`next_tile`](Self::next_tile).
+    pub fn next_tile_watched(&mut self, watch: &mut impl Stopwatch) -> Result<Option<Tile<'_>>, DecodeError> {
+        let place = loop {
+            if u16::from(self.row) >= self.strip.end_row {
+                if !self.next_slab(watch)? {
+                    return Ok(None);
+                }
+                continue;
+            }
+            let Some(place) = self.draw_tile(watch) else { return Err(DecodeError::Internal) };
+            if !self.slab.ends() {
+                break place;
+            }
+        };
+        watch.enter(Stage::Output);
+        let TilePlace { column, row, width, height } = place;
+        let [x_px, y_px] = [column, row].map(|index| u16::from(index) * TILE_PX);
+        let rgb = self.decoder.rgb.get(..usize::from(width) * usize::from(height)).unwrap_or_default();
+        Ok(Some(Tile { x_px, y_px, width, height, rgb }))
+    }
+
+    /// What the frame consisted of and took; of a frame that is not finished so far.
+    #[must_use]
+    pub fn report(&self) -> FrameReport {
+        let mut report = self.frame.report;
+        if let Admission::Tally(tally) = self.frame.admission {
             report.splats_dropped = report.splats_dropped.saturating_add(tally.n_dropped());
             report.max_splats = report.max_splats.max(tally.max_demand());
         }
-        report.scratch_used = saturate(self.plan.shape().with_splats(most_in_memory).scratch_len());
-        Ok(report)
+        report.scratch_used = saturate(self.decoder.plan.shape().with_splats(self.most_in_memory).scratch_len());
+        report
     }
 
-    /// Orders the splats of a strip's slab and draws tile after tile; behind the last slab tiles go to `sink`. Returns whether
-    /// more can be seen behind them.
-    ///
-    /// # Errors
-    /// The sink's.
-    fn draw<S: TileSink>(
-        &mut self,
-        strip: Strip,
-        slab: Slab,
-        camera: &Camera,
-        sink: &mut S,
-        report: &mut FrameReport,
-        watch: &mut impl Stopwatch,
-    ) -> Result<bool, S::Error> {
-        watch.enter(Stage::Sort);
-        let SplatStore { splats, rects, n, order, spare, counts } = &mut self.splats;
-        let n = *n as usize;
-        let (Some(splats), Some(rects)) = (splats.get(..n), rects.get(..n)) else { return Ok(false) };
-        let (Some(order), Some(spare)) = (order.get_mut(..n), spare.get_mut(..n)) else { return Ok(false) };
-        let (order, row_list) = sort_by_depth(splats, order, spare, counts);
-        // One after the other, or all at once.
-        let keeps_tiles = self.plan.shape().frame.canvas_tiles > 1;
-        let (mut n_tiles, mut alive) = (0, 0);
-        let quality = self.plan.budget().quality;
-        let rule = BlendRule::new(quality.alpha_cut, quality.transmittance_stop);
-        let header = self.bundle.header();
-        let has_background = header.features.effects.background;
-        let background = has_background.then(|| header.background.map(|byte| f32::from(byte) / 255.0));
-        // A frame has 255 rows and columns at most.
-        for row in strip.first_row as u8..strip.end_row as u8 {
-            let (y_px, height) = tile_along(camera.height_px, row);
-            watch.enter(Stage::Sort);
-            let list = gather_row(order, rects, row, row_list);
-            for column in 0..camera.width_px.div_ceil(TILE_PX) as u8 {
-                let (x_px, width) = tile_along(camera.width_px, column);
-                watch.enter(Stage::Blend);
-                let place = TilePlace { column, row, width, height };
-                let Some(pixels) = self.pixels.chunks_exact_mut(TILE_PIXELS).nth(if keeps_tiles { n_tiles } else { 0 })
-                else {
-                    return Ok(false);
-                };
-                n_tiles += 1;
-                if slab.from == 0.0 {
-                    pixels.fill(EMPTY);
+    /// Gathers and orders the splats of the next slab, of this strip or of the next one; false when there is none.
+    fn next_slab(&mut self, watch: &mut impl Stopwatch) -> Result<bool, DecodeError> {
+        let Self { decoder, frame, .. } = self;
+        let from = if self.slab.ends() {
+            self.slab.end
+        } else {
+            frame.report.strip_splats = frame.report.strip_splats.saturating_add(self.in_strip);
+            frame.report.max_splats = frame.report.max_splats.max(self.in_strip);
+            self.in_strip = 0;
+            let Some(strip) = frame.strips.after(self.strip) else { return Ok(false) };
+            self.strip = strip;
+            0.0
+        };
+        if from > 0.0 && self.alive == 0 {
+            // Nothing behind can be seen: the strip goes out as it is.
+            decoder.splats.n = 0;
+            self.slab = Slab::behind(from);
+        } else {
+            self.slab = match decoder.gather(self.strip, from, frame, watch) {
+                Ok(slab) => slab,
+                Err(error) => {
+                    // As after the last strip.
+                    (self.slab, self.strip.end_row, self.row) = (Slab::behind(0.0), frame.strips.n_rows(), u8::MAX);
+                    return Err(error);
                 }
-                let work = blend_tile::<A::Functions, _>(place, splats, rects, list, &rule, pixels);
-                alive += work.alive;
-                report.tile_splats = report.tile_splats.saturating_add(work.splats);
-                report.row_splats = report.row_splats.saturating_add(work.rows);
-                report.pixel_splats = report.pixel_splats.saturating_add(work.pixels);
-                if !slab.ends() {
-                    finish_tile(place, pixels, background, self.rgb);
-                    let n_pixels = usize::from(width) * usize::from(height);
-                    watch.enter(Stage::Output);
-                    sink.tile(x_px, y_px, width, height, self.rgb.get(..n_pixels).unwrap_or_default())?;
-                }
-            }
+            };
+            frame.report.slabs = frame.report.slabs.saturating_add(1);
+            let n = decoder.splats.n;
+            self.most_in_memory = n.max(self.most_in_memory);
+            self.in_strip = self.in_strip.saturating_add(n);
+            let rects = decoder.splats.rects.iter().take(n as usize);
+            let strips = frame.strips;
+            let first_here =
+                rects.filter(|rect| *strips.touched(**rect).start() == usize::from(self.strip.index)).count();
+            frame.report.splats = frame.report.splats.saturating_add(first_here as u32);
         }
-        Ok(alive > 0)
+        watch.enter(Stage::Sort);
+        decoder.splats.sort();
+        // A frame has 255 rows at most.
+        self.row = self.strip.first_row as u8;
+        (self.column, self.n_tiles, self.alive) = (0, 0, 0);
+        Ok(true)
+    }
+
+    /// Draws the slab's splats into the next tile, and finishes it if the slab is the strip's last.
+    fn draw_tile(&mut self, watch: &mut impl Stopwatch) -> Option<TilePlace> {
+        let [width_px, height_px] = self.size_px;
+        let decoder = &mut *self.decoder;
+        let SplatStore { splats, rects, n, order, spare, .. } = &mut decoder.splats;
+        let n = *n as usize;
+        let (splats, rects) = (splats.get(..n)?, rects.get(..n)?);
+        if self.column == 0 {
+            watch.enter(Stage::Sort);
+            self.n_in_row = gather_row(order.get(..n)?, rects, self.row, spare.get_mut(..n)?);
+        }
+        watch.enter(Stage::Blend);
+        let (row, column) = (self.row, self.column);
+        let place = TilePlace { column, row, width: size_along(width_px, column), height: size_along(height_px, row) };
+        // One after the other, or all at once.
+        let slot = if decoder.plan.shape().frame.canvas_tiles > 1 { self.n_tiles } else { 0 };
+        let pixels = decoder.pixels.chunks_exact_mut(TILE_PIXELS).nth(slot)?;
+        if self.slab.from == 0.0 {
+            pixels.fill(EMPTY);
+        }
+        let list = spare.get(..self.n_in_row)?;
+        let work = blend_tile::<A::Functions, _>(place, splats, rects, list, &self.rule, pixels);
+        self.alive += work.alive;
+        let report = &mut self.frame.report;
+        report.tile_splats = report.tile_splats.saturating_add(work.splats);
+        report.row_splats = report.row_splats.saturating_add(work.rows);
+        report.pixel_splats = report.pixel_splats.saturating_add(work.pixels);
+        if !self.slab.ends() {
+            let header = decoder.bundle.header();
+            let has_background = header.features.effects.background;
+            let background = has_background.then(|| header.background.map(|byte| f32::from(byte) / 255.0));
+            finish_tile(place, pixels, background, decoder.rgb);
+        }
+        self.n_tiles += 1;
+        self.column += 1;
+        if u16::from(self.column) >= width_px.div_ceil(TILE_PX) {
+            self.column = 0;
+            self.row += 1;
+        }
+        Some(place)
     }
 }
 
-/// First pixel and size of a tile along an axis that it lies in.
-fn tile_along(size_px: u16, index: u8) -> (u16, u16) {
-    let first_px = u16::from(index) * TILE_PX;
-    (first_px, TILE_PX.min(size_px.saturating_sub(first_px)))
+/// Size of a tile along an axis, pixels.
+fn size_along(size_px: u16, index: u8) -> u16 {
+    TILE_PX.min(size_px.saturating_sub(u16::from(index) * TILE_PX))
 }
 
-/// Copies the splats that touch tile row `row` from `order` to the front of `list`, in order.
+/// Copies the splats that touch tile row `row` from `order` to the front of `list`, in order; returns how many.
 // Not inlined: its loop would not stay in registers.
 #[inline(never)]
-fn gather_row<'l>(order: &[u32], rects: &[TileRect], row: u8, list: &'l mut [u32]) -> &'l [u32] {
+fn gather_row(order: &[u32], rects: &[TileRect], row: u8, list: &mut [u32]) -> usize {
     let mut n = 0;
     for &index in order {
         let Some(rect) = rects.get(index as usize) else { continue };
@@ -163,5 +285,5 @@ fn gather_row<'l>(order: &[u32], rects: &[TileRect], row: u8, list: &'l mut [u32
             n += 1;
         }
     }
-    list.get(..n).unwrap_or_default()
+    n
 }

@@ -78,6 +78,18 @@ impl<S: SplatRecord> SplatStore<'_, S> {
         self.push(splat, rect);
     }
 
+    /// Puts the indices of the splats into `order`, nearest first.
+    pub(super) fn sort(&mut self) {
+        let n = self.n as usize;
+        let (Some(splats), Some(order)) = (self.splats.get(..n), self.order.get_mut(..n)) else { return };
+        let Some(spare) = self.spare.get_mut(..n) else { return };
+        let before = order.as_ptr();
+        let (sorted, _) = sort_by_depth(splats, order, spare, self.counts);
+        if sorted.as_ptr() != before {
+            core::mem::swap(&mut self.order, &mut self.spare);
+        }
+    }
+
     /// A depth before which some of the splats in memory and one more at `depth` lie, and some not; `None` if all lie at one.
     // Not inlined, here and below: rare, in the middle of a loop that is not.
     #[inline(never)]

@@ -20,6 +20,11 @@ pub(super) struct Strip {
     pub(super) end_row: u16,
 }
 
+impl Strip {
+    /// The one that the first comes after.
+    pub(super) const BEFORE: Self = Self { index: 0, first_row: 0, end_row: 0 };
+}
+
 impl StripLayout {
     /// `n_strips` strips of ⌈tile rows / `n_strips`⌉ rows; fewer when the first ones hold all.
     pub(super) fn new(height_px: u16, n_strips: u8) -> Self {
@@ -31,6 +36,14 @@ impl StripLayout {
     pub(super) fn len(&self) -> u8 {
         // At most as many as asked for.
         self.n_rows().div_ceil(self.rows_per_strip.max(1)) as u8
+    }
+
+    /// The strip below another one.
+    pub(super) fn after(self, strip: Strip) -> Option<Strip> {
+        let index = u8::from(strip != Strip::BEFORE) + strip.index;
+        let (first_row, n_rows) = (strip.end_row, self.n_rows());
+        let end_row = (first_row + self.rows_per_strip).min(n_rows);
+        (first_row < n_rows).then_some(Strip { index, first_row, end_row })
     }
 
     /// From the top.
@@ -52,7 +65,8 @@ impl StripLayout {
         [strip.first_row * TILE_PX, (strip.end_row * TILE_PX).min(self.height_px)]
     }
 
-    fn n_rows(&self) -> u16 {
+    /// Rows of tiles.
+    pub(super) fn n_rows(&self) -> u16 {
         self.height_px.div_ceil(TILE_PX)
     }
 }

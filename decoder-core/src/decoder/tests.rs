@@ -1,5 +1,6 @@
 //! Frames of all sizes, and sinks that fail.
 
+use core::convert::Infallible;
 use std::vec;
 use std::vec::Vec;
 
@@ -82,6 +83,53 @@ fn frames_of_the_largest_size_are_drawn_and_larger_ones_refused() {
     ] {
         let expected = DecodeError::OutOfRange { field, found: 4081, limit: 4080 };
         assert_eq!(example().plan(&budget), Err(expected));
+    }
+}
+
+/// Keeps tiles.
+#[derive(Default)]
+struct Tiles(Vec<([u16; 4], Vec<[u8; 3]>)>);
+
+impl TileSink for Tiles {
+    type Error = Infallible;
+
+    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
+        self.0.push(([x_px, y_px, width, height], rgb.to_vec()));
+        Ok(())
+    }
+}
+
+#[test]
+fn tiles_that_are_asked_for_are_those_that_a_sink_gets() {
+    let bundle = example();
+    let camera = bundle.header().preview.resized(100, 75);
+    let frame = Budget::for_frame(100, 75);
+    let few = frame.with_max_splats(MaxSplats::AtMost(3));
+    for n_strips in [1, 2, 8] {
+        for budget in [frame, few, few.with_overflow(Overflow::Slabs)] {
+            let plan = bundle.plan(&budget.with_strips(Strips::Exactly(n_strips))).expect("a plan");
+            let mut scratch = vec![0; plan.scratch_len()];
+            let mut decoder = Decoder::bind(&bundle, plan, &mut scratch).expect("planned memory");
+            let mut expected = Tiles::default();
+            let report = decoder.render(&camera, &mut expected).expect("drawn");
+            // Dropped after so many tiles, and the last time not at all.
+            for n_tiles in [0, 1, 9, 35] {
+                let mut drawing = decoder.begin(&camera).expect("a sound camera");
+                let mut found = Tiles::default();
+                while found.0.len() < n_tiles
+                    && let Some(tile) = drawing.next_tile().expect("drawn")
+                {
+                    found.tile(tile.x_px, tile.y_px, tile.width, tile.height, tile.rgb).expect("kept");
+                }
+                assert!(found.0 == expected.0[..n_tiles], "{n_strips} strips, {budget:?}: the first {n_tiles} tiles");
+                if n_tiles == 35 {
+                    for _ in 0..2 {
+                        assert!(drawing.next_tile().expect("drawn").is_none(), "35 tiles are the frame");
+                    }
+                    assert_eq!(drawing.report(), report, "{n_strips} strips, {budget:?}");
+                }
+            }
+        }
     }
 }
 

@@ -5,7 +5,7 @@ use conformance::bundles::{ALL_CODERS, chunks_offset, tier_ends, tiered};
 use conformance::frame::{Frame, budget_for, bundle_of, draw, to_core};
 use conformance::scenes::{CASES, Case, TINY, TINY_DETAILED, cameras, random_scene};
 use conformance::seal::reseal;
-use pocketsplat_core::{Bundle, Camera, DecodeError, Decoder, ErrorClass, Field, FrameReport, SectionKind};
+use pocketsplat_core::{Bundle, Camera, DecodeError, Decoder, ErrorClass, Field, FrameReport, SectionKind, Strips};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -264,4 +264,34 @@ fn bytes_of_other_files_are_not_bundles() {
         let error = Bundle::parse(bytes).err();
         assert_eq!(error.map(|e| e.class()), Some(ErrorClass::Malformed), "{} bytes", bytes.len());
     }
+}
+
+#[test]
+fn no_tile_comes_after_a_chunk_that_no_writer_makes() {
+    let mut n_refused = 0;
+    for bytes in small_bundles() {
+        let mut bytes = bytes;
+        // The last byte is a chunk's.
+        *bytes.last_mut().expect("some") ^= 0x10;
+        reseal(&mut bytes);
+        let bundle = Bundle::parse(&bytes).expect("its checksums are right");
+        let camera = bundle.header().preview;
+        let plan = bundle.plan(&budget_for(&camera).with_strips(Strips::Exactly(8))).expect("a plan");
+        let mut scratch = vec![0; plan.scratch_len()];
+        let mut decoder = Decoder::bind(&bundle, plan, &mut scratch).expect("its checksums are right");
+        let mut drawing = decoder.begin(&camera).expect("a sound camera");
+        loop {
+            match drawing.next_tile() {
+                Ok(Some(_)) => {}
+                Ok(None) => break,
+                Err(error) => {
+                    assert!(matches!(error, DecodeError::ChunkStream { .. }), "{error}");
+                    assert!(drawing.next_tile().is_ok_and(|tile| tile.is_none()), "a tile after the error");
+                    n_refused += 1;
+                    break;
+                }
+            }
+        }
+    }
+    assert!(n_refused > 0, "some chunk's stream is damaged");
 }

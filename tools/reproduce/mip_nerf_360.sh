@@ -5,9 +5,6 @@
 #
 # DATA: the folder 360_v2, as its authors publish it
 # The images of all nine scenes are wider than high, so that the longest side is the width.
+# shellcheck source=tools/reproduce/scenes.sh
 source "$(dirname "$0")/scenes.sh"
-[ $# -ge 2 ] || { sed -n 's/^# \{0,1\}//p' "$0" | sed 1d >&2; exit 2; }
-data=$1 out=$2
-shift 2
-folder() { echo "$data/$1"; }
-run_scenes "$out" "${*:-bicycle bonsai counter flowers garden kitchen room stump treehill}" folder --images images --max-resolution 1600
+reproduce "bicycle bonsai counter flowers garden kitchen room stump treehill" --images images --max-resolution 1600 -- "$@"

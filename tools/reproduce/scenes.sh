@@ -1,14 +1,21 @@
 # Sourced by the scripts beside it: trains and measures scenes at several rates, and writes one line for each bundle.
 #
-# run_scenes OUT "SCENES" FOLDER_OF_SCENE OPTIONS…
+# reproduce "SCENES" OPTIONS… -- DATA OUT [SCENE…]
 #   OUT/SCENE-LAMBDA.psb, its run folder and its figures as JSON; OUT/results.csv. What is done is not done again, what was
 #   interrupted goes on. LAMBDAS ("0.004 0.002 0.001 0.0005"), BACKBONE (hac), MODULES (rdo-pruning), SEED (42), LPIPS (a file of
 #   weights) and POCKETSPLAT (the program) are read from the environment.
 set -euo pipefail
 
-run_scenes() {
-  local out=$1 scenes=$2 folder_of=$3 scene lambda bundle lpips=() rates=${LAMBDAS:-0.004 0.002 0.001 0.0005} rate
-  shift 3
+reproduce() {
+  local scenes=$1 options=() data out scene lambda run lpips=() rates=${LAMBDAS:-0.004 0.002 0.001 0.0005} rate
+  shift
+  while [ "$1" != -- ]; do options+=("$1") && shift; done
+  shift
+  # Without both, the head of the script says how it is called.
+  [ $# -ge 2 ] || { sed -n '1d;/^# shellcheck/d;s/^# \{0,1\}//p' "$0" >&2 && exit 2; }
+  data=$1 out=$2
+  shift 2
+  scenes=${*:-$scenes}
   mkdir -p "$out"
   [ "${BACKBONE:-hac}" != scaffold ] || rates=0
   [ -z "${LPIPS:-}" ] || lpips=(--lpips-weights "$LPIPS")
@@ -17,18 +24,18 @@ run_scenes() {
       rate=(--modules "${MODULES:-rdo-pruning}" --lambda "$lambda")
       # It has no bits to weigh.
       [ "${BACKBONE:-hac}" != scaffold ] || rate=(--modules "${MODULES:-none}")
-      bundle=$out/${scene//\//_}-$lambda.psb
-      if [ ! -f "$out/${scene//\//_}-$lambda.run/result.json" ]; then
-        if [ -f "$out/${scene//\//_}-$lambda.run/config.toml" ]; then
-          "${POCKETSPLAT:-pocketsplat}" train --resume "$out/${scene//\//_}-$lambda.run" >/dev/null
+      run=$out/${scene//\//_}-$lambda
+      if [ ! -f "$run.run/result.json" ]; then
+        if [ -f "$run.run/config.toml" ]; then
+          "${POCKETSPLAT:-pocketsplat}" train --resume "$run.run" >/dev/null
         else
-          "${POCKETSPLAT:-pocketsplat}" train "$("$folder_of" "$scene")" -o "$bundle" --preset full \
-            --backbone "${BACKBONE:-hac}" "${rate[@]}" --seed "${SEED:-42}" --effects +view-colour "$@" >/dev/null
+          "${POCKETSPLAT:-pocketsplat}" train "$data/$scene" -o "$run.psb" --preset full \
+            --backbone "${BACKBONE:-hac}" "${rate[@]}" --seed "${SEED:-42}" --effects +view-colour "${options[@]}" >/dev/null
         fi
       fi
-      [ -f "$out/${scene//\//_}-$lambda.json" ] ||
-        "${POCKETSPLAT:-pocketsplat}" eval "$bundle" "$("$folder_of" "$scene")" --json "${lpips[@]}" >"$out/${scene//\//_}-$lambda.json.part"
-      [ ! -f "$out/${scene//\//_}-$lambda.json.part" ] || mv "$out/${scene//\//_}-$lambda.json.part" "$out/${scene//\//_}-$lambda.json"
+      [ -f "$run.json" ] ||
+        "${POCKETSPLAT:-pocketsplat}" eval "$run.psb" "$data/$scene" --json "${lpips[@]}" >"$run.json.part"
+      [ ! -f "$run.json.part" ] || mv "$run.json.part" "$run.json"
     done
   done
   summarise "$out"

@@ -7,11 +7,11 @@ use super::DecodeError;
 
 /// Why a frame was not drawn to its end: the decoder's error, or the first one of the sink that takes its tiles.
 ///
-/// With a sink that cannot fail, whose error is [`Infallible`], `?` turns it into a [`DecodeError`].
+/// Where the sink takes every tile (its error is [`Infallible`]), `?` turns it into a [`DecodeError`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum RenderError<E> {
-    /// The camera or the bundle cannot be drawn.
+    /// The decoder refused the camera or the bundle.
     Decode(DecodeError),
     /// The sink refused a tile; it got none after it.
     Sink(E),

@@ -55,7 +55,7 @@ impl BundleFile {
     /// What the bundle says of its photographs; nothing in bundles of other writers.
     fn protocol(&self, bundle: &Bundle<'_>) -> Option<Protocol> {
         let parsed = Protocol::parse(protocol_of(bundle, &self.bytes)?);
-        parsed.inspect_err(|error| eprintln!("warning: the section protocol cannot be read: {error}")).ok()
+        parsed.inspect_err(|error| eprintln!("warning: could not read the section protocol: {error}")).ok()
     }
 
     /// Fills what the command line left open with what the bundle was trained with, and refuses what contradicts it.

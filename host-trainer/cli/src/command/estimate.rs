@@ -9,9 +9,9 @@ use pocketsplat_trainer::train::{TrainConfig, Trainer};
 
 use super::process::{machine_memory_bytes, peak_memory_bytes};
 
-/// Steps of the trial, of which the first, that fill caches and take memory, are not timed.
-const TRIAL_STEPS: u32 = 12;
+/// Steps of the trial; the first fill caches and take memory, and are not timed.
 const UNTIMED_STEPS: u32 = 4;
+const TIMED_STEPS: u32 = 8;
 /// Iterations after which the estimate is shown again; then at these shares of the run.
 const FIRST: u32 = 30;
 const AGAIN_AT: [f64; 3] = [0.1, 0.25, 0.5];
@@ -124,14 +124,14 @@ impl Estimate {
     /// Those of the steps.
     pub(super) fn try_out(capture: &Capture, config: &TrainConfig) -> Result<()> {
         let mut trainer = Trainer::new(capture, *config)?;
-        let mut timed = Instant::now();
-        for step in 0..TRIAL_STEPS.min(config.iterations) {
-            if step == UNTIMED_STEPS {
-                timed = Instant::now();
-            }
+        for _ in 0..UNTIMED_STEPS.min(config.iterations) {
             trainer.advance()?;
         }
-        let step_s = timed.elapsed().as_secs_f64() / f64::from(TRIAL_STEPS - UNTIMED_STEPS);
+        let (timed, n_timed) = (Instant::now(), TIMED_STEPS.min(config.iterations - trainer.iteration));
+        for _ in 0..n_timed {
+            trainer.advance()?;
+        }
+        let step_s = timed.elapsed().as_secs_f64() / f64::from(n_timed.max(1));
         let estimate = Self::new(capture, config, 0);
         estimate.say(&estimate.expected(0, step_s, 0.0, trainer.scene.anchors.len()));
         Ok(())

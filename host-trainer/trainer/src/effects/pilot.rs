@@ -85,7 +85,7 @@ pub enum PilotError {
     #[error("a pilot's bundle cannot be drawn; please report it")]
     Draw(#[from] DecodeError),
     /// What it was worth could not be written down.
-    #[error("the pilots' results cannot be kept")]
+    #[error("could not write down the results of pilots")]
     Keep(#[from] io::Error),
     /// It was asked to stop.
     #[error("the measurement of effects was interrupted")]

@@ -67,14 +67,18 @@ fn every_symbol_comes_back_under_static_tables() {
     }
 }
 
+/// Values of a context-coded scene that take escapes: a byte beyond the table, and three.
+fn with_escapes(scene: &mut Scene<f32>) {
+    scene.anchors.offsets[..3].copy_from_slice(&[18.0, -18.0, 1000.0]);
+    scene.anchors.features[..2].copy_from_slice(&[655.0, -655.0]);
+    scene.anchors.mask_logits[0] = 1.0;
+}
+
 #[test]
 fn every_symbol_comes_back_under_a_context() {
     for (n_anchors, chunk_anchors) in [(1, 128), (300, 128), (129, 1), (500, 1024)] {
         let mut scene = with_context(random_scene(SMALL, n_anchors, 4), 5);
-        // A byte beyond the table, and three.
-        scene.anchors.offsets[..3].copy_from_slice(&[18.0, -18.0, 1000.0]);
-        scene.anchors.features[..2].copy_from_slice(&[655.0, -655.0]);
-        scene.anchors.mask_logits[0] = 1.0;
+        with_escapes(&mut scene);
         let bytes = write_bytes(&scene, &options(ChannelCoding::Context, chunk_anchors));
         let bundle = Bundle::parse(&bytes).expect("a sound bundle");
         let context = bundle.context().expect("the coder asked for");
@@ -91,9 +95,7 @@ fn every_symbol_comes_back_under_a_context() {
 fn every_symbol_comes_back_where_anchors_follow_anchors() {
     for (n_anchors, chunk_anchors) in [(1, 128), (300, 128), (129, 1), (500, 1024)] {
         let mut scene = with_levels(random_scene(SMALL, n_anchors, 4), 5);
-        scene.anchors.offsets[..3].copy_from_slice(&[18.0, -18.0, 1000.0]);
-        scene.anchors.features[..2].copy_from_slice(&[655.0, -655.0]);
-        scene.anchors.mask_logits[0] = 1.0;
+        with_escapes(&mut scene);
         let bytes = write_bytes(&scene, &options(ChannelCoding::Context, chunk_anchors));
         let bundle = Bundle::parse(&bytes).expect("a sound bundle");
         let context = bundle.context().expect("the coder asked for");

@@ -8,7 +8,7 @@ use std::fs;
 use std::path::Path;
 
 /// The folder of each crate's sources, and its rooms; one may import those to its left.
-const CRATES: [(&str, &[&str]); 4] = [
+const CRATES: [(&str, &[&str]); 5] = [
     (
         "decoder-core/src",
         &[
@@ -34,6 +34,7 @@ const CRATES: [(&str, &[&str]); 4] = [
         ],
     ),
     ("host-trainer/capture/src", &["camera", "dataset", "synth"]),
+    ("host-trainer/gaussians/src", &["degree"]),
     (
         "host-trainer/trainer/src",
         &[

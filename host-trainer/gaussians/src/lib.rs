@@ -1,10 +1,19 @@
 //! Explicit Gaussians with spherical harmonics, as 3D Gaussian Splatting has them (Kerbl et al. 2023), and their files.
 //!
-//! [`Gaussians`] is what every file holds and what the trainer draws, trains and makes of a bundle.
+//! [`Gaussians`] is what every file holds and what the trainer draws, trains and makes of a bundle. Files keep their Gaussians in the
+//! frame that they come in; [`ply`] says it as it is.
 
+mod check;
 mod degree;
+mod error;
+mod file;
+mod notes;
+pub mod ply;
 
 pub use degree::Degree;
+pub use error::{FileError, Unreadable};
+pub use file::Format;
+pub use notes::Notes;
 
 /// N Gaussians; every slice has its rows in the same order.
 ///
@@ -44,5 +53,30 @@ impl Gaussians {
     pub fn harmonics_of(&self, index: usize) -> &[[f32; 3]] {
         let n = self.degree.n_coefficients();
         &self.harmonics[index * n..(index + 1) * n]
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::{Degree, Gaussians};
+
+    /// Three Gaussians of degree 3 whose numbers all differ.
+    pub(crate) fn example() -> Gaussians {
+        of_degree(Degree::Three, 3)
+    }
+
+    /// `n` Gaussians whose numbers all differ and lie where scenes have theirs.
+    pub(crate) fn of_degree(degree: Degree, n: usize) -> Gaussians {
+        let wave = |index: usize, phase: f32| (index as f32 * 0.7 + phase).sin();
+        Gaussians {
+            degree,
+            centres: (0..n).map(|i| [3.0 * wave(i, 0.1), 2.0 * wave(i, 1.3), 4.0 * wave(i, 2.9)]).collect(),
+            log_scales: (0..n).map(|i| [0.1, 0.5, 0.9].map(|phase| -4.0 + 2.0 * wave(i, phase))).collect(),
+            rotations: (0..n).map(|i| [0.2, 1.2, 2.2, 3.2].map(|phase| wave(i, phase))).collect(),
+            opacity_logits: (0..n).map(|i| 3.0 * wave(i, 0.4)).collect(),
+            harmonics: (0..n * degree.n_coefficients())
+                .map(|i| [0.3, 0.6, 1.9].map(|phase| 0.8 * wave(i, phase)))
+                .collect(),
+        }
     }
 }

@@ -1,0 +1,178 @@
+//! The header of a .ply file: elements and their properties.
+
+use crate::Unreadable;
+
+/// Longest header read; real ones are below 4 kB.
+const MAX_HEADER_BYTES: usize = 1 << 16;
+
+/// How the numbers are written.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Encoding {
+    Ascii,
+    Little,
+    Big,
+}
+
+/// The type of a number.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Scalar {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    F32,
+    F64,
+}
+
+impl Scalar {
+    fn named(name: &str) -> Option<Self> {
+        Some(match name {
+            "char" | "int8" => Self::I8,
+            "uchar" | "uint8" => Self::U8,
+            "short" | "int16" => Self::I16,
+            "ushort" | "uint16" => Self::U16,
+            "int" | "int32" => Self::I32,
+            "uint" | "uint32" => Self::U32,
+            "float" | "float32" => Self::F32,
+            "double" | "float64" => Self::F64,
+            _ => return None,
+        })
+    }
+
+    pub(super) const fn n_bytes(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::F64 => 8,
+        }
+    }
+}
+
+/// One property of an element.
+pub(super) struct Property<'a> {
+    pub(super) name: &'a str,
+    /// `None` for a list, whose length stands in the data.
+    pub(super) scalar: Option<Scalar>,
+}
+
+/// One element.
+pub(super) struct Element<'a> {
+    pub(super) name: &'a str,
+    pub(super) count: usize,
+    pub(super) properties: Vec<Property<'a>>,
+}
+
+impl Element<'_> {
+    /// Bytes of one row in a binary file; `None` where a list makes them differ.
+    pub(super) fn n_bytes(&self) -> Option<usize> {
+        self.properties.iter().map(|property| property.scalar.map(Scalar::n_bytes)).sum()
+    }
+}
+
+/// A header.
+pub(super) struct Header<'a> {
+    pub(super) encoding: Encoding,
+    pub(super) comments: Vec<&'a str>,
+    pub(super) elements: Vec<Element<'a>>,
+    /// Which element is `vertex`.
+    vertex: usize,
+}
+
+impl<'a> Header<'a> {
+    /// The header of a file, and the bytes after it.
+    pub(super) fn read(bytes: &'a [u8]) -> Result<(Self, &'a [u8]), Unreadable> {
+        let (text, body) = split(bytes)?;
+        let (mut encoding, mut comments, mut elements) = (None, Vec::new(), Vec::<Element<'a>>::new());
+        for line in text.lines() {
+            let words: Vec<&str> = line.split_whitespace().collect();
+            match words.as_slice() {
+                ["format", "ascii", ..] => encoding = Some(Encoding::Ascii),
+                ["format", "binary_little_endian", ..] => encoding = Some(Encoding::Little),
+                ["format", "binary_big_endian", ..] => encoding = Some(Encoding::Big),
+                ["comment", ..] => comments.push(line.trim_start().trim_start_matches("comment").trim()),
+                ["element", name, count] => {
+                    let count = count.parse().map_err(|_| {
+                        Unreadable::new(format!("has a header with `{line}`, whose count is no whole number"))
+                    })?;
+                    elements.push(Element { name, count, properties: Vec::new() });
+                }
+                ["property", kind, .., name] => {
+                    let scalar = Scalar::named(kind);
+                    if scalar.is_none() && *kind != "list" {
+                        return Err(Unreadable::new(format!("has a header with `{line}`, whose type is unknown")));
+                    }
+                    let element = elements.last_mut().ok_or_else(|| {
+                        Unreadable::new(format!("has a header with `{line}` before the first element"))
+                    })?;
+                    element.properties.push(Property { name, scalar });
+                }
+                ["ply" | "obj_info", ..] | [] => {}
+                _ => return Err(Unreadable::new(format!("has a header with the unknown line `{line}`"))),
+            }
+        }
+        let encoding = encoding.ok_or_else(|| Unreadable::new("has a header without a line `format`"))?;
+        let vertex = elements.iter().position(|element| element.name == "vertex");
+        let vertex = vertex
+            .ok_or_else(|| Unreadable::new("has a header without an element `vertex`, so it has no Gaussians"))?;
+        Ok((Self { encoding, comments, elements, vertex }, body))
+    }
+
+    /// The element that holds the Gaussians.
+    pub(super) fn vertex(&self) -> &Element<'a> {
+        &self.elements[self.vertex]
+    }
+
+    /// The elements that do not.
+    pub(super) fn others(&self) -> impl Iterator<Item = &Element<'a>> {
+        self.elements.iter().enumerate().filter(|(index, _)| *index != self.vertex).map(|(_, element)| element)
+    }
+
+    /// The bytes from the first vertex on.
+    pub(super) fn skip_to_vertices<'b>(&self, body: &'b [u8]) -> Result<&'b [u8], Unreadable> {
+        let mut body = body;
+        for element in &self.elements[..self.vertex] {
+            let cut = || {
+                Unreadable::new(format!(
+                    "is cut off within its {} rows of the element `{}`; copy it again from where it was made",
+                    element.count, element.name
+                ))
+            };
+            if self.encoding == Encoding::Ascii {
+                for _ in 0..element.count {
+                    let end = body.iter().position(|&byte| byte == b'\n').ok_or_else(cut)?;
+                    body = &body[end + 1..];
+                }
+            } else {
+                let row = element.n_bytes().ok_or_else(|| {
+                    Unreadable::new(format!("has lists in the element `{}`, which comes before `vertex`", element.name))
+                })?;
+                let skipped =
+                    row.checked_mul(element.count).filter(|&skipped| skipped <= body.len()).ok_or_else(cut)?;
+                body = &body[skipped..];
+            }
+        }
+        Ok(body)
+    }
+}
+
+/// The header's text, and the bytes after the line `end_header`.
+fn split(bytes: &[u8]) -> Result<(&str, &[u8]), Unreadable> {
+    const END: &[u8] = b"\nend_header";
+    if !bytes.starts_with(b"ply") {
+        return Err(Unreadable::new("is no .ply file: it does not start with `ply`"));
+    }
+    let head = &bytes[..bytes.len().min(MAX_HEADER_BYTES)];
+    let end = head.windows(END.len()).position(|window| window == END).ok_or_else(|| {
+        Unreadable::new(format!("has no line `end_header` in its first {MAX_HEADER_BYTES} bytes; it may be cut off"))
+    })?;
+    let after = end + END.len();
+    let line_end = head[after..]
+        .iter()
+        .position(|&byte| byte == b'\n')
+        .ok_or_else(|| Unreadable::new("is cut off in the line `end_header`"))?;
+    let text = std::str::from_utf8(&head[..end]).map_err(|_| Unreadable::new("has a header that is not text"))?;
+    Ok((text, &bytes[after + line_end + 1..]))
+}

@@ -7,10 +7,12 @@ use pocketsplat_core::Bundle;
 use pocketsplat_core::bundle::TierMeasures;
 use pocketsplat_trainer::bundle::annotate::annotate;
 use pocketsplat_trainer::bundle::{SizePart, SizeReport, decoded_scene};
+use pocketsplat_trainer::camera::host_camera;
 use serde_json::{Value, json};
 
 use super::bundle::BundleFile;
 use super::output;
+use super::render::CameraRecord;
 
 /// Show a bundle's header, its tiers, and its bytes part by part.
 #[derive(clap::Args)]
@@ -37,6 +39,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let size = SizeReport::of(&bundle)?;
     let (mut facts, parts, tiers) = (facts(&bundle, &size)?, size.parts(), tiers(&bundle));
     if args.json {
+        facts["preview"] = serde_json::to_value(CameraRecord::of(&host_camera(&bundle.header().preview)))?;
         facts["parts"] = serde_json::to_value(parts)?;
         facts["tiers"] = tiers.iter().map(Tier::facts).collect();
         return output::print(&facts, true);

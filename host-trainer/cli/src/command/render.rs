@@ -1,96 +1,120 @@
-//! `pocketsplat render`: one view as a PNG or a JPEG.
+//! `pocketsplat render`: views of a capture, or of a bundle alone, as pictures.
 
-use std::path::{Path, PathBuf};
+mod cameras;
+mod pictures;
 
-use anyhow::{Context, Result, bail};
-use pocketsplat_capture::camera::Camera;
-use pocketsplat_capture::dataset::{FrameSize, Image, Split};
+use std::path::PathBuf;
+
+use anyhow::{Result, bail};
+use pocketsplat_capture::dataset::{Image, Split, View};
 use pocketsplat_core::Bundle;
-use pocketsplat_trainer::camera::host_camera;
 use pocketsplat_trainer::render::decoder::core_image;
 use pocketsplat_trainer::render::reference::ReferenceScene;
+use rayon::prelude::*;
 
 use super::bundle::BundleFile;
 use super::capture::{CaptureArgs, views_of};
 use super::eval::{Renderer, reference_image};
-use super::fit::frame_budget;
 use super::output;
 use crate::config::CaptureOptions;
 use crate::config::named::{SPLITS, one_of};
+pub(super) use cameras::CameraRecord;
+use cameras::Shot;
+use pictures::Format;
 
-/// Draw one view of a capture from a bundle, or the bundle's own camera.
+/// Options that speak of a capture, which pictures of a bundle alone do without.
+const OF_A_CAPTURE: [&str; 7] = ["dataset", "split", "max_resolution", "background", "images", "model", "test_every"];
+
+/// Draw a bundle as pictures: views of a capture, the bundle's own camera, a turn around it, or cameras of a file.
 #[derive(clap::Args)]
+#[command(group = clap::ArgGroup::new("cameras").required(true).args(["view", "all", "preview", "orbit", "camera"]))]
 pub(crate) struct Args {
     /// The bundle.
     bundle: PathBuf,
     /// Folder of the capture, as for eval
-    #[arg(required_unless_present = "preview")]
+    #[arg(required_unless_present_any = ["preview", "orbit", "camera"])]
     dataset: Option<PathBuf>,
     #[command(flatten)]
     options: CaptureOptions,
     /// Which view of the split, from 0.
-    #[arg(long, value_name = "I", required_unless_present = "preview")]
+    #[arg(long, value_name = "I")]
     view: Option<usize>,
-    /// Draw the bundle's own camera instead, which a device draws first; with --resolution at the size of its display
-    #[arg(long, conflicts_with_all = [
-        "dataset", "view", "split", "max_resolution", "background", "images", "model", "test_every"
-    ])]
+    /// Draw every view of the split.
+    #[arg(long)]
+    all: bool,
+    /// Draw the bundle's own camera, which a device draws first; with --resolution at the size of its display
+    #[arg(long, conflicts_with_all = OF_A_CAPTURE)]
     preview: bool,
+    /// Draw N pictures of a turn around the scene, from the bundle's own camera on.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=3600), conflicts_with_all = OF_A_CAPTURE)]
+    orbit: Option<u16>,
+    /// Draw the cameras of a file: {"cameras": [...]}, each as `inspect --json` prints `preview`.
+    #[arg(long, value_name = "FILE.json", conflicts_with_all = OF_A_CAPTURE, conflicts_with = "resolution")]
+    camera: Option<PathBuf>,
     /// Which views.
     #[arg(long, value_parser = one_of::<Split>(SPLITS), default_value = SPLITS[0])]
     split: Split,
-    /// The picture to write: a PNG, or a JPEG where the name ends in .jpg or .jpeg.
-    #[arg(short, long, value_name = "OUT.png")]
+    /// What to write: .png or .jpg; of several pictures .gif, .apng, or a folder for numbered .png.
+    #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
+    /// Put all pictures on one sheet, a .png or .jpg.
+    #[arg(long)]
+    contact_sheet: bool,
     /// What draws it.
     #[arg(long, value_enum, default_value_t = Renderer::Core)]
     renderer: Renderer,
 }
 
-/// Writes an image to a file.
-type Writer = fn(&Image, &Path) -> Result<(), image::ImageError>;
-
-/// The format that the end of a picture's name asks for.
-fn writer(path: &Path) -> Result<Writer> {
-    let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    match extension.as_str() {
-        "png" => Ok(Image::write_png),
-        "jpg" | "jpeg" => Ok(Image::write_jpeg),
-        _ => bail!("{}: pictures are written as .png, .jpg or .jpeg; end the name in one of these", path.display()),
-    }
-}
-
 pub(crate) fn run(args: &Args) -> Result<()> {
     let file = BundleFile::read(&args.bundle)?;
     let bundle = file.parse()?;
-    let write = writer(&args.output)?;
+    let format = Format::of(&args.output)?;
     output::check_writable(&args.output)?;
-    let (camera, name) = match (&args.dataset, args.view) {
-        (Some(dataset), Some(index)) => {
-            let capture = CaptureArgs { dataset: dataset.clone(), options: args.options.clone() };
-            let (_, capture) = file.load(&bundle, &capture)?;
-            let views = views_of(&capture, args.split)?;
-            let Some(view) = views.get(index) else {
-                bail!("--view {index} of {} views; choose 0 to {}", views.len(), views.len() - 1);
-            };
-            (file.camera(&bundle, &capture, view), format!("view {}", view.name))
-        }
-        // The command line has both or neither.
-        _ => (preview(&bundle, args.options.resolution)?, "preview".to_owned()),
+    let shots = shots(args, &file, &bundle)?;
+    format.check(shots.len(), args.contact_sheet, &args.output)?;
+    let pictures = draw(&bundle, &shots, args.renderer)?;
+    let written = pictures::write(&pictures, format, args.contact_sheet, &args.output)?;
+    let (Some(first), Some(picture), Some(shot)) = (written.first(), pictures.first(), shots.first()) else {
+        bail!("there is no view to draw");
     };
-    let image = match args.renderer {
-        Renderer::Core => core_image(&bundle, &camera)?.image,
-        Renderer::Reference => reference_image(&bundle, &ReferenceScene::from_bundle(&bundle)?, &camera),
+    let what = if let [shot] = &shots[..] {
+        shot.name.clone()
+    } else {
+        format!("{} pictures from {}", shots.len(), shot.name)
     };
-    write(&image, &args.output).with_context(|| format!("could not write {}", args.output.display()))?;
-    println!("{}: {}×{} px, {name}", args.output.display(), image.width_px, image.height_px);
+    let place = if format == Format::Folder { args.output.display() } else { first.display() };
+    println!("{place}: {}×{} px, {what}", picture.width_px, picture.height_px);
     Ok(())
 }
 
-/// The camera in the bundle, at its own size or scaled to a display's, as a firmware scales it.
-fn preview(bundle: &Bundle<'_>, size: Option<FrameSize>) -> Result<Camera> {
-    let preview = bundle.header().preview;
-    let Some(_) = size else { return Ok(host_camera(&preview)) };
-    let frame = frame_budget(bundle, size)?;
-    Ok(host_camera(&preview.resized(frame.width_px, frame.height_px)))
+/// What to draw, in its order.
+fn shots(args: &Args, file: &BundleFile, bundle: &Bundle<'_>) -> Result<Vec<Shot>> {
+    if let Some(path) = &args.camera {
+        return cameras::of_file(path);
+    }
+    if let Some(n) = args.orbit {
+        return cameras::orbit(bundle, args.options.resolution, n);
+    }
+    let Some(dataset) = &args.dataset else { return Ok(vec![cameras::preview(bundle, args.options.resolution)?]) };
+    let capture = CaptureArgs { dataset: dataset.clone(), options: args.options.clone() };
+    let (_, capture) = file.load(bundle, &capture)?;
+    let views = views_of(&capture, args.split)?;
+    let shot = |view: &View| Shot { name: format!("view {}", view.name), camera: file.camera(bundle, &capture, view) };
+    let Some(index) = args.view else { return Ok(views.iter().map(shot).collect()) };
+    match views.get(index) {
+        Some(view) => Ok(vec![shot(view)]),
+        None => bail!("--view {index} of {} views; choose 0 to {}", views.len(), views.len() - 1),
+    }
+}
+
+fn draw(bundle: &Bundle<'_>, shots: &[Shot], renderer: Renderer) -> Result<Vec<Image>> {
+    let reference = match renderer {
+        Renderer::Core => None,
+        Renderer::Reference => Some(ReferenceScene::from_bundle(bundle)?),
+    };
+    let draw = |shot: &Shot| match &reference {
+        None => Ok(core_image(bundle, &shot.camera)?.image),
+        Some(scene) => Ok(reference_image(bundle, scene, &shot.camera)),
+    };
+    shots.par_iter().map(draw).collect()
 }

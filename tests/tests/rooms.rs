@@ -46,6 +46,7 @@ const CRATES: [(&str, &[&str]); 5] = [
             "integer_model",
             "step",
             "train",
+            "explicit",
             "bundle",
             "render",
             "metrics",

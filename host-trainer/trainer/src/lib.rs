@@ -1,7 +1,8 @@
 //! Trains a structured neural Gaussian-splat scene from photographs and writes it as a compact bundle.
 //!
 //! Modules in the order data flows through them, each importing only from those before it:
-//! [`real`] and [`camera`] → [`scene`] → [`ops`] → [`step`] → [`train`] → [`bundle`] → [`render`] → [`metrics`]. [`integer_model`] is
+//! [`real`] and [`camera`] → [`scene`] → [`ops`] → [`step`] → [`train`] → [`bundle`] → [`render`] → [`metrics`]. [`explicit`] draws and
+//! trains explicit Gaussians instead of anchors, beside `train`. [`integer_model`] is
 //! what `train`'s last iterations and `bundle` share; [`device`] says what a device holds and [`encode`] makes the bundle of a run that
 //! fits it; [`effects`], [`cost`] and [`verify`] ask all of them.
 
@@ -11,6 +12,7 @@ pub mod cost;
 pub mod device;
 pub mod effects;
 pub mod encode;
+pub mod explicit;
 #[cfg(test)]
 pub(crate) mod finite_difference;
 pub mod integer_model;

@@ -3,6 +3,8 @@
 //! Order of a step: [`prefilter`] → [`head_input`] → [`head`] → [`neural_gaussians`] → [`project`] → [`tiles`] →
 //! [`rasterise`] → [`l1`], [`ssim`], [`volume`] → the same backwards → [`adam`].
 //!
+//! With explicit Gaussians [`explicit_gaussians`] and [`spherical_harmonics`] stand in the place of the first four.
+//!
 //! Every operation is generic over [`Real`](crate::real::Real): the trainer runs it in f32, the tests compare its backward pass in f64
 //! with central differences of its forward pass, and f32 with f64.
 
@@ -11,6 +13,7 @@ pub mod adaptive_step;
 pub mod anchor_bits;
 mod blur;
 pub mod detail;
+pub mod explicit_gaussians;
 pub mod file_order;
 pub mod grid_bits;
 pub mod hash_grid;
@@ -32,6 +35,7 @@ pub mod project;
 pub mod rasterise;
 pub mod rate;
 pub mod simd;
+pub mod spherical_harmonics;
 pub mod ssim;
 pub mod taps;
 pub mod tiles;

@@ -32,8 +32,8 @@ use parents::Parents;
 pub use probe::ImageError;
 pub use stages::StageSeconds;
 use stages::StageTimer;
-use target::clear_masked;
-pub use target::{TargetView, planes};
+pub(crate) use target::clear_masked;
+pub use target::{TargetView, image_of_planes, planes};
 
 /// Anchors one task evaluates together; also the unit in which the gradients of the heads are summed, so that the sums
 /// do not depend on the number of threads.

@@ -30,20 +30,20 @@ impl<'a, R: Real> TargetView<'a, R> {
     }
 
     /// Σ over pixels and channels of the squared difference to `image`, planes that are 0 where pixels do not count.
-    pub(super) fn squared_sum(&self, image: &[R]) -> f64 {
+    pub(crate) fn squared_sum(&self, image: &[R]) -> f64 {
         // Blocks of fixed size, so that the sum's rounding is the same however it is scheduled.
         let blocks = image.chunks(4096).zip(self.truth.chunks(4096));
         blocks.map(|(a, b)| a.iter().zip(b).map(|(x, y)| Into::<f64>::into((*x - *y) * (*x - *y))).sum::<f64>()).sum()
     }
 
     /// Pixels that count, at least 1.
-    pub(super) fn n_counted(&self) -> usize {
+    pub(crate) fn n_counted(&self) -> usize {
         self.mask.map_or(self.truth.len() / 3, |mask| mask.iter().filter(|valid| **valid).count()).max(1)
     }
 }
 
 /// Makes the pixels that do not count zero in every plane: as in the photograph, so that no loss sees them.
-pub(super) fn clear_masked<R: Real>(planes: &mut [R], mask: Option<&[bool]>) {
+pub(crate) fn clear_masked<R: Real>(planes: &mut [R], mask: Option<&[bool]>) {
     let Some(mask) = mask else { return };
     for plane in planes.chunks_exact_mut(mask.len()) {
         for (value, valid) in plane.iter_mut().zip(mask) {
@@ -62,4 +62,14 @@ pub fn planes(image: &Image) -> Vec<f32> {
         }
     }
     planes
+}
+
+/// The 8-bit image of planes `[3, height, width]`, values beyond 0 to 1 cut off.
+pub fn image_of_planes(planes: &[f32], size_px: [usize; 2]) -> Image {
+    let [width_px, height_px] = size_px.map(|side| u32::try_from(side).expect("the size of an image"));
+    let n = planes.len() / 3;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0..=1")]
+    let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
+    let rgb = (0..n).flat_map(|i| [byte(planes[i]), byte(planes[n + i]), byte(planes[2 * n + i])]).collect();
+    Image { width_px, height_px, rgb }
 }

@@ -36,7 +36,7 @@ use crate::ops::Pinhole;
 use crate::ops::noise::Stream;
 use crate::scene::init::initial_scene;
 use crate::scene::{Anchors, Heads, Scene};
-use crate::step::{Loss, Phase, StepInfo, TargetView, Workspace, planes};
+use crate::step::{Loss, Phase, StepInfo, TargetView, Workspace, image_of_planes, planes};
 use checkpoint::{CaptureSignature, Kernels};
 use coding::Integers;
 use config::{Backbone, Densification, Rates};
@@ -361,11 +361,7 @@ impl<'a> Trainer<'a> {
     pub fn draw(&mut self, view: &View) -> Image {
         let camera = Pinhole::new(&view.camera);
         let planes = self.workspace.image(&self.scene, &camera, self.background);
-        let n = planes.len() / 3;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0..=1")]
-        let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
-        let rgb = (0..n).flat_map(|i| [byte(planes[i]), byte(planes[n + i]), byte(planes[2 * n + i])]).collect();
-        Image { width_px: view.camera.width_px, height_px: view.camera.height_px, rgb }
+        image_of_planes(&planes, camera.size_px)
     }
 }
 

@@ -2,23 +2,29 @@
 
 use std::path::Path;
 
-use crate::{FileError, Gaussians, Notes, Unreadable, ply};
+use crate::{FileError, Gaussians, Notes, Unreadable, ply, sog, spz};
 
 /// A file format for Gaussians.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// Every number in 32 bits.
     Ply,
+    /// 8 to 24 bits a number, gzip around them.
+    Spz,
+    /// Images, a palette for what follows the view.
+    Sog,
 }
 
 impl Format {
     /// All.
-    pub const ALL: [Self; 1] = [Self::Ply];
+    pub const ALL: [Self; 3] = [Self::Ply, Self::Spz, Self::Sog];
 
     /// What names end in, without the dot.
     pub const fn extension(self) -> &'static str {
         match self {
             Self::Ply => "ply",
+            Self::Spz => "spz",
+            Self::Sog => "sog",
         }
     }
 
@@ -29,9 +35,15 @@ impl Format {
     }
 
     /// The bytes of a file of this format.
-    pub fn to_bytes(self, gaussians: &Gaussians, notes: &Notes) -> Vec<u8> {
+    ///
+    /// # Errors
+    /// [`Unreadable`] for Gaussians that cannot be drawn, or that the format cannot hold.
+    pub fn to_bytes(self, gaussians: &Gaussians, notes: &Notes) -> Result<Vec<u8>, Unreadable> {
+        gaussians.check()?;
         match self {
-            Self::Ply => ply::write(gaussians, notes),
+            Self::Ply => Ok(ply::write(gaussians, notes)),
+            Self::Spz => spz::write(gaussians, notes),
+            Self::Sog => sog::write(gaussians, notes),
         }
     }
 
@@ -42,6 +54,8 @@ impl Format {
     pub fn from_bytes(self, bytes: &[u8]) -> Result<(Gaussians, Notes), Unreadable> {
         match self {
             Self::Ply => ply::read(bytes),
+            Self::Spz => spz::read(bytes),
+            Self::Sog => sog::read(bytes),
         }
     }
 

@@ -1,14 +1,18 @@
 //! Explicit Gaussians with spherical harmonics, as 3D Gaussian Splatting has them (Kerbl et al. 2023), and their files.
 //!
-//! [`Gaussians`] is what every file holds and what the trainer draws, trains and makes of a bundle. Files keep their Gaussians in the
-//! frame that they come in; [`ply`] says it as it is.
+//! [`Gaussians`] is what every file holds and what the trainer draws, trains and makes of a bundle. Readers and writers keep the
+//! scene's frame; axes differ only inside of a .spz.
 
+mod axes;
 mod check;
 mod degree;
 mod error;
 mod file;
 mod notes;
+mod opacity;
 pub mod ply;
+pub mod sog;
+pub mod spz;
 
 pub use degree::Degree;
 pub use error::{FileError, Unreadable};

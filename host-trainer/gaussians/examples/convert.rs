@@ -1,0 +1,13 @@
+//! Converts between the formats: `cargo run -p pocketsplat-gaussians --example convert IN OUT`.
+
+use std::path::Path;
+
+use pocketsplat_gaussians::Format;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let [from, to] = [1, 2].map(|index| std::env::args().nth(index).unwrap_or_default());
+    let (gaussians, notes) = Format::read(Path::new(&from))?;
+    let format = Format::of_path(Path::new(&to)).ok_or("the second name ends in .ply, .spz or .sog")?;
+    std::fs::write(to, format.to_bytes(&gaussians, &notes)?)?;
+    Ok(())
+}

@@ -27,5 +27,5 @@ pub use figures::Figures;
 #[cfg(not(target_arch = "wasm32"))]
 pub use package::{MODULE, PackageFile, package};
 #[cfg(not(target_arch = "wasm32"))]
-pub use page::{SceneFile, page};
+pub use page::{SceneFile, base64, escaped, page};
 pub use scene::Scene;

@@ -2,13 +2,10 @@
 //!
 //! Needs Chromium; without one it says aloud that it checked nothing. `POCKETSPLAT_VIEW=SCENE.psb` measures a page of that bundle too.
 
+mod chromium;
+
 use std::f32::consts::TAU;
 use std::fmt::Write as _;
-use std::io::{BufRead as _, BufReader};
-use std::path::Path;
-use std::process::{Child, Command, Stdio};
-use std::sync::mpsc;
-use std::time::{Duration, Instant};
 
 use pocketsplat_core::bundle::crc32;
 use pocketsplat_core::{Budget, Bundle, Overflow};
@@ -23,8 +20,6 @@ const GOLDEN: [SceneFile<'_>; 4] = [
 const FRAMES: &str = include_str!("../../tests/golden/frames.csv");
 const SCRIPT: &str = include_str!("browser.js");
 const MANY_CORES: &str = "Object.defineProperty(navigator, 'hardwareConcurrency', { value: 64 })";
-/// What a page may take on a machine that does other things too.
-const PATIENCE: Duration = Duration::from_secs(240);
 
 #[test]
 fn the_canvas_has_the_golden_frames_and_the_controls_work() {
@@ -72,84 +67,11 @@ fn frames(name: &str, bytes: &[u8]) -> Vec<String> {
     rows
 }
 
-/// Opens a page with the script, and returns what it says; nothing where there is no browser. Fails for a check that failed, and for
-/// whatever else the page has to say, such as an error.
+/// Opens a page of bundles with the script, and returns what it says; nothing where there is no browser.
 fn run(title: &str, scenes: &[SceneFile<'_>]) -> Option<Vec<String>> {
-    let Some(browser) = browser() else {
-        assert!(std::env::var_os("POCKETSPLAT_NEEDS_BROWSER").is_none(), "no Chromium: apt-get install chromium");
-        println!("SKIPPED: no Chromium (apt-get install chromium), so the page was not opened");
-        return None;
-    };
-    let folder = tempfile::tempdir().expect("a folder");
-    let file = folder.path().join("page.html");
-    let text = page(title, scenes).replace("</body>", &format!("<script type=\"module\">{SCRIPT}</script></body>"));
+    let text = page(title, scenes);
     // Several bundles get two workers each, one bundle what this machine has cores for.
     let text =
         if scenes.len() > 1 { text.replace("<head>", &format!("<head><script>{MANY_CORES}</script>")) } else { text };
-    std::fs::write(&file, text).expect("written");
-    let mut child = start(&browser, &file, &folder.path().join("profile"));
-    let stderr = BufReader::new(child.0.stderr.take().expect("piped"));
-    let (sender, lines) = mpsc::channel();
-    std::thread::spawn(move || stderr.lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
-    let (start, mut said, mut log) = (Instant::now(), Vec::new(), Vec::new());
-    loop {
-        let left = PATIENCE.saturating_sub(start.elapsed());
-        let line = lines.recv_timeout(left).unwrap_or_else(|error| panic!("{error} after {said:#?}; {log:#?}"));
-        // [process:thread:time:INFO:CONSOLE:line] "text", source: …
-        let Some((_, message)) = line.split_once("CONSOLE") else {
-            log.push(line);
-            continue;
-        };
-        let text = message.split_once("] \"").map_or(message, |(_, text)| text);
-        let text = text.rsplit_once("\", source:").map_or(text, |(text, _)| text);
-        match text.strip_prefix("pocketsplat: ") {
-            Some("done") => return Some(said),
-            Some(text) if !text.starts_with("FAILED") => said.push(text.to_owned()),
-            _ => panic!("the page says {text:?}, after {said:#?}"),
-        }
-    }
-}
-
-/// A browser that ends with the test.
-struct Browser(Child);
-
-impl Drop for Browser {
-    fn drop(&mut self) {
-        // It may have ended by itself.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-fn start(browser: &str, file: &Path, profile: &Path) -> Browser {
-    const FLAGS: [&str; 12] = [
-        "--headless",
-        "--no-sandbox",
-        "--disable-gpu",
-        "--disable-quic",
-        "--no-first-run",
-        "--disable-background-networking",
-        "--disable-component-update",
-        "--disable-sync",
-        "--disable-dev-shm-usage",
-        "--window-size=1280,800",
-        "--enable-logging=stderr",
-        "--v=0",
-    ];
-    let mut command = Command::new(browser);
-    command.args(FLAGS).arg(format!("--user-data-dir={}", profile.display())).arg(format!("file://{}", file.display()));
-    Browser(command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("started"))
-}
-
-fn browser() -> Option<String> {
-    let names = ["chromium", "chromium-browser", "google-chrome"];
-    let runs = |name: &&str| {
-        Command::new(name)
-            .arg("--version")
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .status()
-            .is_ok_and(|s| s.success())
-    };
-    names.into_iter().find(|name| runs(name)).map(str::to_owned)
+    chromium::said_by(&text, SCRIPT)
 }

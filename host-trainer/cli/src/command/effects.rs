@@ -2,6 +2,7 @@
 
 mod pilots;
 
+use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
@@ -10,7 +11,7 @@ use pocketsplat_capture::dataset::Capture;
 use pocketsplat_trainer::device::Processor;
 use pocketsplat_trainer::effects::{Effect, PilotCapture, PilotError, Pilots, measure};
 use pocketsplat_trainer::train::run::RunFolder;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::config::RunConfig;
 
@@ -21,17 +22,30 @@ use pilots::PilotsFile;
 const TABLE: &str = "effects.csv";
 
 /// One line of the table.
-#[derive(Serialize)]
-struct PilotLine {
-    effects: String,
+#[derive(Serialize, Deserialize)]
+pub(super) struct PilotLine {
+    pub(super) effects: String,
     #[serde(rename = "PSNR")]
-    psnr_db: f64,
-    gain_db: f64,
-    price_db: f64,
-    instructions: u64,
-    bytes: usize,
+    pub(super) psnr_db: f64,
+    pub(super) gain_db: f64,
+    pub(super) price_db: f64,
+    pub(super) instructions: u64,
+    pub(super) bytes: usize,
     chance_db: f64,
-    chosen: bool,
+    pub(super) chosen: bool,
+}
+
+impl PilotLine {
+    /// The table of a run; none where its effects were not measured.
+    pub(super) fn of_run(folder: &Path) -> Result<Option<Vec<Self>>> {
+        let path = folder.join(TABLE);
+        if !path.exists() {
+            return Ok(None);
+        }
+        let read = || csv::Reader::from_path(&path)?.deserialize().collect();
+        let lines: csv::Result<Vec<Self>> = read();
+        Ok(Some(lines.with_context(|| format!("{} is no table of effects", path.display()))?))
+    }
 }
 
 /// Whether a run can begin.

@@ -19,6 +19,7 @@ mod point;
 mod process;
 mod progress;
 mod render;
+mod report;
 mod runs;
 mod settings;
 mod stop;
@@ -51,6 +52,7 @@ enum Command {
     Eval(eval::Args),
     Render(render::Args),
     View(view::Args),
+    Report(report::Args),
     Inspect(inspect::Args),
     Fit(fit::Args),
     Cost(cost::Args),
@@ -123,6 +125,7 @@ fn dispatch(cli: Cli) -> Result<ExitCode> {
         Command::Eval(args) => eval::run(&args),
         Command::Render(args) => render::run(&args),
         Command::View(args) => view::run(&args),
+        Command::Report(args) => report::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Fit(args) => fit::run(&args),
         Command::Cost(args) => cost::run(&args),

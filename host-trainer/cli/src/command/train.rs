@@ -24,7 +24,7 @@ use super::eval::{Evaluation, Measurements, Renderer, ViewEvaluation, measure};
 use super::process::peak_memory_bytes;
 use super::progress::Progress;
 use super::train_args::Args;
-use super::{effects, output, stop};
+use super::{effects, output, report, stop};
 use crate::config::{CaptureOptions, Protocol, RunConfig};
 
 /// Seconds between checkpoints unless the user says otherwise: what an accident may cost.
@@ -132,10 +132,14 @@ fn train_and_print<'a>(
     if effects::resolve(&mut config, capture, &folder, &stop)? == Resolved::Interrupted {
         return Ok(ExitCode::from(stop::INTERRUPTED));
     }
+    let path = folder.path().to_owned();
     let Some(result) = train_in(folder, &config, capture, start, &stop)? else {
         return Ok(ExitCode::from(stop::INTERRUPTED));
     };
     output::print(&result, args.json())?;
+    if args.writes_report() {
+        report::write_into(&path, &config, capture);
+    }
     let (bundle, dataset) = (config.output.display(), config.dataset.display());
     eprintln!("see it:       pocketsplat render {bundle} {dataset} --view 0 -o view.png");
     eprintln!("on a device:  pocketsplat fit {bundle}");

@@ -32,6 +32,9 @@ pub(crate) struct Args {
     /// Print the result as JSON [default: as text]
     #[arg(long, help_heading = OUTPUT, hide_short_help = true)]
     json: bool,
+    /// Do without report.html in the run folder.
+    #[arg(long, help_heading = OUTPUT, hide_short_help = true)]
+    no_report: bool,
     /// Length of the run and size of the images: quick (2,000 iterations, 200 px), standard (7,000, 400 px), or full (30,000,
     /// images as they are) [default: standard]
     #[arg(long, value_name = "NAME", conflicts_with_all = ["config", "resume", "from"], hide_possible_values = true,
@@ -108,6 +111,11 @@ impl Args {
     /// Whether the result is printed as JSON.
     pub(crate) fn json(&self) -> bool {
         self.json
+    }
+
+    /// Whether the run ends with a page about it.
+    pub(crate) fn writes_report(&self) -> bool {
+        !self.no_report
     }
 
     /// The configuration of a new run: defaults, then `--config`, then what else the command line says.

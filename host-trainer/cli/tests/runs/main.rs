@@ -2,6 +2,8 @@
 #![cfg(unix)]
 
 mod accidents;
+#[path = "../../../../viewer/tests/chromium/mod.rs"]
+mod chromium;
 mod configuration;
 mod device;
 mod effects;
@@ -9,5 +11,6 @@ mod fixture;
 mod interruption;
 mod modules;
 mod preview;
+mod report;
 mod sweep;
 mod view;

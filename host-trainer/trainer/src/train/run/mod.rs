@@ -7,6 +7,7 @@
 //! | `progress.csv` | loss and PSNR over the run, see [`ProgressLog`] |
 //! | `iteration-00001500.checkpoint` | the state of the run, see [`super::checkpoint`]; the last two are kept, and those to fork from |
 //! | `result.json` | what the finished run reports; with it, the run is over |
+//! | `report.html` | a page about the finished run, which the command writes |
 //! | `lock` | locked by the process that works in the folder; the system frees it when that process ends, however |
 
 mod error;

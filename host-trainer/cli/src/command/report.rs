@@ -1,0 +1,155 @@
+//! `pocketsplat report`: a page about a finished run.
+
+mod pictures;
+mod sections;
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use pocketsplat_capture::dataset::{Capture, Split};
+use pocketsplat_viewer::{SceneFile, escaped, page};
+use serde::Deserialize;
+
+use super::bundle::BundleFile;
+use super::capture::CaptureArgs;
+use super::eval::{Evaluation, Measurements, Renderer, measure};
+use super::output;
+use crate::config::{CaptureOptions, RunConfig};
+use crate::plot::{Named, Recording, learning_curves_svg};
+
+const PAGE: &str = include_str!("report/report.html");
+const STYLE: &str = include_str!("report/report.css");
+const SCRIPT: &str = include_str!("report/report.js");
+
+/// The page in a run's folder.
+const FILE: &str = "report.html";
+
+/// Write a page about a finished run: quality view by view, photograph against picture, bytes, tiers, the viewer.
+///
+/// It is one file that fetches nothing. `train` writes one into the run folder at its end.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Run folder.
+    #[arg(value_name = "OUT.run")]
+    run: PathBuf,
+    /// Where the capture lies now [default: where the run found it]
+    #[arg(value_name = "CAPTURE")]
+    dataset: Option<PathBuf>,
+    /// The page to write [default: report.html in the run folder]
+    #[arg(short, long, value_name = "OUT.html")]
+    output: Option<PathBuf>,
+}
+
+/// What is read of a run's result.json.
+#[derive(Deserialize)]
+struct RunResult {
+    iterations: u32,
+    train_s: f64,
+    train_processor_s: f64,
+    peak_memory_bytes: Option<u64>,
+}
+
+/// A run and its bundle, and the photographs where they are at hand.
+struct Run<'a> {
+    folder: &'a Path,
+    config: &'a RunConfig,
+    result: RunResult,
+    file: BundleFile,
+    photographs: Option<Photographs<'a>>,
+}
+
+/// The views that were held out, and how the bundle compares with them.
+struct Photographs<'a> {
+    capture: &'a Capture,
+    evaluation: Evaluation,
+}
+
+pub(crate) fn run(args: &Args) -> Result<()> {
+    let config = RunConfig::read(&args.run.join("config.toml"))?;
+    let output = args.output.clone().unwrap_or_else(|| args.run.join(FILE));
+    output::check_writable(&output)?;
+    let source = CaptureArgs {
+        dataset: args.dataset.clone().unwrap_or(config.dataset.clone()),
+        options: config.capture.clone(),
+    };
+    let capture = source.load(config.train.seed);
+    let capture = capture
+        .inspect_err(|error| {
+            eprintln!("warning: the page will lack photographs: {error:#}; give the folder as CAPTURE if it has moved");
+        })
+        .ok();
+    write(&args.run, &config, capture.as_ref(), &output)
+}
+
+/// Writes the page of a run that has just ended into its folder; a run is not worse for lacking one.
+pub(super) fn write_into(folder: &Path, config: &RunConfig, capture: &Capture) {
+    let path = folder.join(FILE);
+    match write(folder, config, Some(capture), &path) {
+        Ok(()) => eprintln!("its report:   {}", path.display()),
+        Err(error) => eprintln!("warning: there is no report: {error:#}"),
+    }
+}
+
+fn write(folder: &Path, config: &RunConfig, capture: Option<&Capture>, path: &Path) -> Result<()> {
+    let result = folder.join("result.json");
+    let text = std::fs::read_to_string(&result).with_context(|| {
+        format!(
+            "{} is missing: the run is not finished; go on with `pocketsplat train --resume {}`",
+            result.display(),
+            folder.display()
+        )
+    })?;
+    let result = serde_json::from_str(&text).with_context(|| format!("{} is no result of a run", result.display()))?;
+    let file = BundleFile::read(&config.output)?;
+    let photographs = capture
+        .filter(|capture| !capture.test.is_empty())
+        .map(|capture| photographs(&file, capture, &config.capture))
+        .transpose()?;
+    let run = Run { folder, config, result, file, photographs };
+    output::write_whole(path, html(&run)?.as_bytes())
+}
+
+fn photographs<'a>(file: &BundleFile, capture: &'a Capture, options: &CaptureOptions) -> Result<Photographs<'a>> {
+    let evaluation = measure(file, capture, options, Split::Test, Renderer::Core, &Measurements::default())?;
+    Ok(Photographs { capture, evaluation })
+}
+
+fn html(run: &Run<'_>) -> Result<String> {
+    let bundle = run.file.parse()?;
+    let name = run.config.output.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let viewer = page(&name, &[SceneFile { name: &name, bytes: &run.file.bytes }]);
+    let mut parts = vec![
+        ("STYLE", STYLE.trim_end().to_owned()),
+        ("SCRIPT", SCRIPT.trim_end().to_owned()),
+        ("TITLE", escaped(&name)),
+        ("NAME", escaped(&name)),
+        ("FACTS", sections::facts(run, &bundle)),
+        ("VIEWER", escaped(&viewer)),
+        ("PICTURES", pictures::section(run, &bundle)?),
+        ("CURVES", curves(run.folder, &name)?),
+        ("BYTES", sections::bytes(&bundle)?),
+        ("TIERS", sections::tiers(&bundle)?),
+        ("EFFECTS", sections::effects(run.folder)?),
+        ("VIEWS", sections::views(run)),
+        ("PROTOCOL", sections::protocol(run)?),
+    ];
+    // Each mark stands once, and what takes its place is not searched for marks again.
+    let mut text = String::new();
+    let mut rest = PAGE;
+    while let Some((before, after)) = rest.split_once("{{") {
+        let Some((mark, after)) = after.split_once("}}") else { bail!("report.html has a mark without an end") };
+        let place = parts.iter().position(|(name, _)| *name == mark);
+        let part = parts.swap_remove(place.with_context(|| format!("report.html asks for {mark}"))?).1;
+        text.extend([before, &part]);
+        rest = after;
+    }
+    Ok(text + rest)
+}
+
+/// How the run went, as a figure.
+fn curves(folder: &Path, name: &str) -> Result<String> {
+    match Recording::read(&folder.join("progress.csv"))? {
+        Recording::Learning(what) => learning_curves_svg(&[Named { name: name.to_owned(), what }]),
+        Recording::Results(_) => bail!("{} has a progress.csv that is no learning curve", folder.display()),
+    }
+}

@@ -1,0 +1,90 @@
+//! A page in Chromium, and what it says.
+
+use std::io::{BufRead as _, BufReader};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc;
+use std::time::{Duration, Instant};
+
+/// What a page may take on a machine that does other things too.
+const PATIENCE: Duration = Duration::from_secs(240);
+
+/// Opens a page with a script at its end, and returns what it says: lines on the console that begin with `pocketsplat: `, up to `done`.
+///
+/// Nothing where there is no browser. Fails for a check that `FAILED`, and for whatever else the page has to say, such as an error.
+pub(crate) fn said_by(page: &str, script: &str) -> Option<Vec<String>> {
+    let Some(browser) = browser() else {
+        assert!(std::env::var_os("POCKETSPLAT_NEEDS_BROWSER").is_none(), "no Chromium: apt-get install chromium");
+        println!("SKIPPED: no Chromium (apt-get install chromium), so the page was not opened");
+        return None;
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("page.html");
+    let text = page.replace("</body>", &format!("<script type=\"module\">{script}</script></body>"));
+    std::fs::write(&file, text).expect("written");
+    let mut child = start(&browser, &file, &folder.path().join("profile"));
+    let stderr = BufReader::new(child.0.stderr.take().expect("piped"));
+    let (sender, lines) = mpsc::channel();
+    std::thread::spawn(move || stderr.lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
+    let (start, mut said, mut log) = (Instant::now(), Vec::new(), Vec::new());
+    loop {
+        let left = PATIENCE.saturating_sub(start.elapsed());
+        let line = lines.recv_timeout(left).unwrap_or_else(|error| panic!("{error} after {said:#?}; {log:#?}"));
+        // [process:thread:time:INFO:CONSOLE:line] "text", source: …
+        let Some((_, message)) = line.split_once("CONSOLE") else {
+            log.push(line);
+            continue;
+        };
+        let text = message.split_once("] \"").map_or(message, |(_, text)| text);
+        let text = text.rsplit_once("\", source:").map_or(text, |(text, _)| text);
+        match text.strip_prefix("pocketsplat: ") {
+            Some("done") => return Some(said),
+            Some(text) if !text.starts_with("FAILED") => said.push(text.to_owned()),
+            _ => panic!("the page says {text:?}, after {said:#?}"),
+        }
+    }
+}
+
+/// A browser that ends with the test.
+struct Browser(Child);
+
+impl Drop for Browser {
+    fn drop(&mut self) {
+        // It may have ended by itself.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+fn start(browser: &str, file: &Path, profile: &Path) -> Browser {
+    const FLAGS: [&str; 12] = [
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--disable-quic",
+        "--no-first-run",
+        "--disable-background-networking",
+        "--disable-component-update",
+        "--disable-sync",
+        "--disable-dev-shm-usage",
+        "--window-size=1280,800",
+        "--enable-logging=stderr",
+        "--v=0",
+    ];
+    let mut command = Command::new(browser);
+    command.args(FLAGS).arg(format!("--user-data-dir={}", profile.display())).arg(format!("file://{}", file.display()));
+    Browser(command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("started"))
+}
+
+fn browser() -> Option<String> {
+    let names = ["chromium", "chromium-browser", "google-chrome"];
+    let runs = |name: &&str| {
+        Command::new(name)
+            .arg("--version")
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .status()
+            .is_ok_and(|s| s.success())
+    };
+    names.into_iter().find(|name| runs(name)).map(str::to_owned)
+}

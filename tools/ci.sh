@@ -100,7 +100,10 @@ job_doc() {
 job_test() {
   # Pages are opened in a browser.
   need_command chromium chromium
-  POCKETSPLAT_NEEDS_BROWSER=1 cargo test --workspace --locked --no-fail-fast
+  # Files of Gaussians are read by programs that are not ours.
+  need_command python3 python3
+  need_command dwebp webp
+  POCKETSPLAT_NEEDS_BROWSER=1 POCKETSPLAT_NEEDS_READERS=1 cargo test --workspace --locked --no-fail-fast
   # Not unified into the workspace's build: `defmt` wants a logger at link time, the firmware has one.
   cargo test -p pocketsplat-core --features embedded-graphics --locked
   # The largest frames where overflow is not checked, as firmware is built; above it was.

@@ -34,7 +34,10 @@ const CRATES: [(&str, &[&str]); 5] = [
         ],
     ),
     ("host-trainer/capture/src", &["camera", "dataset", "synth"]),
-    ("host-trainer/gaussians/src", &["degree"]),
+    (
+        "host-trainer/gaussians/src",
+        &["degree", "notes", "error", "check", "opacity", "axes", "ply", "spz", "sog", "file"],
+    ),
     (
         "host-trainer/trainer/src",
         &[

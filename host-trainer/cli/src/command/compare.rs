@@ -128,6 +128,7 @@ fn panel(title: &str, unit: &str, lines: &[RunLine], cost: fn(&RunLine) -> f64) 
     let front = on_front(&lines.iter().map(|line| (cost(line), line.psnr_db)).collect::<Vec<_>>());
     let points = lines.iter().zip(front).map(|(line, on_front)| CostPoint {
         knob: line.knob.clone(),
+        setting: line.setting.clone(),
         cost: cost(line),
         psnr_db: line.psnr_db,
         on_front,

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::plot::{
-    LearningRow, Named, Recording, ResultRow, SizeAxis, learning_curves_svg, names_of, rate_distortion_svg,
+    Named, Recording, ResultRow, SizeAxis, cost_svg, learning_curves_svg, names_of, rate_distortion_svg,
 };
 use anyhow::{Result, bail};
 use pocketsplat_trainer::metrics::{RatePoint, bd_psnr_db, bd_rate_percent};
@@ -11,12 +11,12 @@ use serde_json::{Map, Value, json};
 
 use super::output;
 
-/// Draw learning curves of runs, or rate-distortion curves of sweeps, into an SVG.
+/// Draw learning curves of runs, rate-distortion curves of sweeps and ablations, or what settings cost, into an SVG.
 ///
 /// Of rate-distortion curves it also prints how far each lies from the first: Bjøntegaard's deltas.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Files of one kind: progress.csv of runs, or results of sweeps (columns `PSNR` and `Size [Bytes]`).
+    /// Files of one kind: progress.csv of runs, results of sweeps (`PSNR`, `Size [Bytes]`), ablation.csv, or cost.csv and runs.csv.
     #[arg(value_name = "CSV", required = true)]
     files: Vec<PathBuf>,
     /// The figure to write.
@@ -31,28 +31,30 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
-    let (mut runs, mut curves) = (Vec::new(), Vec::new());
+    let (mut runs, mut curves, mut panels) = (Vec::new(), Vec::new(), Vec::new());
     for (path, name) in args.files.iter().zip(names_of(&args.files)) {
         match Recording::read(path)? {
             Recording::Learning(what) => runs.push(Named { name, what }),
             Recording::Results(what) => curves.push(Named { name, what }),
+            Recording::Ablation(of_rows) => curves.extend(of_rows),
+            Recording::Cost(of_file) => panels.extend(of_file),
         }
     }
     output::check_writable(&args.output)?;
-    match (runs.first(), curves.first()) {
-        (Some(run), Some(curve)) => {
-            bail!("{} is a learning curve and {} is not; plot them one kind at a time", run.name, curve.name)
-        }
-        (Some(_), None) => draw_learning(args, &runs),
+    let n_kinds = [runs.is_empty(), curves.is_empty(), panels.is_empty()].iter().filter(|is_empty| !**is_empty).count();
+    if n_kinds > 1 {
+        bail!(
+            "these are learning curves, rate-distortion curves or costs, and not all of one kind; plot them one kind at a time"
+        );
+    }
+    if args.log_x && curves.is_empty() {
+        bail!("--log-x is for the sizes of rate-distortion curves");
+    }
+    match (runs.is_empty(), panels.is_empty()) {
+        (false, _) => output::write_whole(&args.output, learning_curves_svg(&runs)?.as_bytes()),
+        (_, false) => output::write_whole(&args.output, cost_svg(&panels)?.as_bytes()),
         _ => draw_rate_distortion(args, &curves),
     }
-}
-
-fn draw_learning(args: &Args, runs: &[Named<Vec<LearningRow>>]) -> Result<()> {
-    if args.log_x {
-        bail!("--log-x is for sizes; these are learning curves");
-    }
-    output::write_whole(&args.output, learning_curves_svg(runs)?.as_bytes())
 }
 
 fn draw_rate_distortion(args: &Args, curves: &[Named<Vec<ResultRow>>]) -> Result<()> {

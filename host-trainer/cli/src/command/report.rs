@@ -150,6 +150,6 @@ fn html(run: &Run<'_>) -> Result<String> {
 fn curves(folder: &Path, name: &str) -> Result<String> {
     match Recording::read(&folder.join("progress.csv"))? {
         Recording::Learning(what) => learning_curves_svg(&[Named { name: name.to_owned(), what }]),
-        Recording::Results(_) => bail!("{} has a progress.csv that is no learning curve", folder.display()),
+        _ => bail!("{} has a progress.csv that is no learning curve", folder.display()),
     }
 }

@@ -164,6 +164,13 @@ pub(super) fn write_curves(folder: &Path, runs: &[MeasuredRun<'_>]) -> Result<Ve
         tables.extend(table);
         named.push(Named { name: names_of(&[path]).swap_remove(0), what });
     }
+    // The figure shows what seeds change as well.
+    for MeasuredRun { spec, evaluation } in runs.iter().filter(|run| !run.spec.on_curve) {
+        let point = evaluation.result_row(format!("lambda={}", spec.lambda));
+        if let Some(curve) = named.iter_mut().find(|curve| curve.name == spec.row) {
+            curve.what.push(point);
+        }
+    }
     output::write_whole(&folder.join(FIGURE), rate_distortion_svg(&named, SizeAxis::Linear)?.as_bytes())?;
     Ok(tables)
 }

@@ -1,11 +1,12 @@
-//! What all charts share: colours, sizes, axes, legend.
+//! What all charts share: colours, sizes, axes, legend, names of points.
 
 use anyhow::Result;
 use plotters::chart::ChartContext;
 use plotters::coord::ranged1d::{AsRangedCoord, Ranged, ValueFormatter};
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+use super::{labels, marker};
 
 /// Width of a figure and height of a panel, pixels of the SVG, which scales.
 pub(super) const WIDTH_PX: u32 = 900;
@@ -13,9 +14,14 @@ pub(super) const PANEL_PX: u32 = 420;
 
 const FONT: &str = "sans-serif";
 const TEXT_PX: u32 = 15;
-const NOTE_PX: u32 = 12;
+const NOTE_PX: u32 = labels::LABEL_PX as u32;
+/// Width of the legend, and of one of its lines.
+const LEGEND_PX: u32 = 210;
+const LEGEND_LINE_PX: i32 = 20;
 const TITLE_PX: u32 = 18;
 const INK: RGBColor = RGBColor(51, 51, 51);
+/// Of lines that are no series.
+pub(super) const FRONT: RGBColor = RGBColor(120, 120, 120);
 const GRID: RGBColor = RGBColor(225, 225, 225);
 
 /// Colours that people who see colours differently can tell apart (Okabe and Ito 2008), the darker ones first.
@@ -34,8 +40,8 @@ pub(super) fn colour(i: usize) -> RGBColor {
     COLOURS[i % COLOURS.len()]
 }
 
-/// The part of a figure that one chart fills.
-pub(super) type Panel<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
+/// A part of a figure, or all of it; drawn on in pixels.
+pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
 
 /// A chart under construction.
 pub(super) type Chart<'a, 'b, X> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<X, RangedCoordf64>>;
@@ -49,21 +55,26 @@ pub(super) struct Labels<'a> {
     pub(super) y_tick: &'a dyn Fn(&f64) -> String,
 }
 
-/// Draws `n_panels` panels, one below the other, into an SVG.
-pub(super) fn figure(n_panels: usize, draw: impl FnOnce(&[Panel<'_>]) -> Result<()>) -> Result<String> {
+/// Draws `n_panels` panels, one below the other, into an SVG; `draw` gets them and the whole figure.
+pub(super) fn figure(n_panels: usize, draw: impl FnOnce(&[Area<'_>], &Area<'_>) -> Result<()>) -> Result<String> {
     let mut svg = String::new();
     let height_px = PANEL_PX * u32::try_from(n_panels).unwrap_or(1);
     let root = SVGBackend::with_string(&mut svg, (WIDTH_PX, height_px)).into_drawing_area();
     root.fill(&WHITE)?;
-    draw(&root.split_evenly((n_panels, 1)))?;
+    draw(&root.split_evenly((n_panels, 1)), &root)?;
     root.present()?;
     drop(root);
     Ok(svg)
 }
 
+/// The left part of a panel, for its chart, and the right part, for the legend.
+pub(super) fn with_legend<'a>(panel: &Area<'a>) -> (Area<'a>, Area<'a>) {
+    panel.split_horizontally(WIDTH_PX - LEGEND_PX)
+}
+
 /// A chart with axes, ready for its curves.
 pub(super) fn axes<'a, 'b, X>(
-    area: &'a Panel<'b>,
+    area: &'a Area<'b>,
     x: X,
     y: std::ops::Range<f64>,
     labels: &Labels<'_>,
@@ -97,33 +108,61 @@ where
     Ok(chart)
 }
 
-/// Draws the legend where rising curves leave room.
-pub(super) fn legend<'a, 'b: 'a, X: Ranged<ValueType = f64>>(chart: &mut Chart<'a, 'b, X>) -> Result<()> {
-    Ok(chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::LowerRight)
-        .margin(12)
-        .legend_area_size(26)
-        .background_style(WHITE.mix(0.85))
-        .border_style(GRID)
-        .label_font((FONT, TEXT_PX).into_font().color(&INK))
-        .draw()?)
+/// What a line of a legend shows before its name.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Sign {
+    /// The line of the `i`-th series.
+    Line(usize),
+    /// Its marker.
+    Marker(usize),
+    /// A thin line that is no series.
+    Front,
 }
 
-/// A line's sign in the legend.
-pub(super) fn line_sign(colour: RGBColor) -> impl Fn((i32, i32)) -> PathElement<(i32, i32)> {
-    move |(x, y)| PathElement::new(vec![(x, y), (x + 20, y)], colour.stroke_width(2))
-}
-
-/// A note beside a point of the `i`-th curve: below to the right, and above to the left for every other curve, where rising
-/// curves leave room for both.
-pub(super) fn note(i: usize, text: String) -> Text<'static, (i32, i32), String> {
-    let colour = colour(i);
-    let style: TextStyle<'static> = (FONT, NOTE_PX).into_font().color(&colour);
-    match i % 2 {
-        0 => Text::new(text, (7, 4), style),
-        _ => Text::new(text, (-7, -4), style.pos(Pos::new(HPos::Right, VPos::Bottom))),
+/// Draws a legend, one line each, as far as there is room.
+pub(super) fn legend<'n>(area: &Area<'_>, entries: impl IntoIterator<Item = (Sign, &'n str)>) -> Result<()> {
+    let most = (PANEL_PX as i32 - 60) / LEGEND_LINE_PX;
+    for (row, (sign, name)) in (0..most).zip(entries) {
+        let y = 44 + row * LEGEND_LINE_PX;
+        let line = |style: ShapeStyle| PathElement::new(vec![(0, y), (18, y)], style);
+        match sign {
+            Sign::Line(i) => area.draw(&line(colour(i).stroke_width(2)))?,
+            Sign::Marker(i) => marker::draw(area, i, (9, y))?,
+            Sign::Front => area.draw(&line(FRONT.stroke_width(1)))?,
+        }
+        area.draw(&Text::new(shortened(name, 28), (24, y - NOTE_PX as i32 / 2), note_style(&INK)))?;
     }
+    Ok(())
+}
+
+fn note_style(colour: &RGBColor) -> TextStyle<'static> {
+    (FONT, NOTE_PX).into_font().color(colour)
+}
+
+fn shortened(name: &str, most: usize) -> String {
+    let n = name.chars().count();
+    if n <= most { name.to_owned() } else { name.chars().take(most - 1).chain(['…']).collect() }
+}
+
+/// Writes names beside points, the first ones first, where they cover nothing; those without room are left out.
+///
+/// * `points`: all points of the chart, pixels of the figure. * `names`: index of the point, its series, the name.
+pub(super) fn name_points<'a, 'b: 'a, X: Ranged<ValueType = f64>>(
+    figure: &Area<'_>,
+    chart: &Chart<'a, 'b, X>,
+    points: &[(i32, i32)],
+    names: &[(usize, usize, String)],
+) -> Result<()> {
+    let (x, y) = chart.plotting_area().get_pixel_range();
+    let labels: Vec<(usize, &str)> = names.iter().map(|(index, _, name)| (*index, name.as_str())).collect();
+    let places = labels::placed(points, &labels, [x.start, y.start, x.end, y.end]);
+    for ((index, series, name), place) in names.iter().zip(places) {
+        if let Some((dx, dy)) = place {
+            let (x, y) = points[*index];
+            figure.draw(&Text::new(name.clone(), (x + dx, y + dy), note_style(&colour(*series))))?;
+        }
+    }
+    Ok(())
 }
 
 /// The smallest range with all `values`, widened by a twentieth at both ends; around a single value by 1.

@@ -35,13 +35,13 @@ pub(crate) fn learning_curves_svg(runs: &[Named<Vec<LearningRow>>]) -> Result<St
     let has_rate = runs.iter().flat_map(|run| &run.what).any(|row| row.bits().is_some());
     let quantities = if has_rate { vec![PSNR, ANCHORS, RATE] } else { vec![PSNR, ANCHORS] };
     let last = runs.iter().flat_map(|run| &run.what).map(|row| row.iteration).max().unwrap_or(1);
-    chart::figure(quantities.len(), |panels| {
+    chart::figure(quantities.len(), |panels, _| {
         panels.iter().zip(&quantities).try_for_each(|(panel, quantity)| draw(panel, quantity, runs, last.max(1)))
     })
 }
 
 fn draw(
-    panel: &chart::Panel<'_>,
+    panel: &chart::Area<'_>,
     quantity: &Quantity,
     runs: &[Named<Vec<LearningRow>>],
     last_iteration: u32,
@@ -56,20 +56,24 @@ fn draw(
     let all = runs.iter().flat_map(|run| points(quantity, &run.what)).map(|(_, value)| value);
     // PSNR has no zero worth showing; amounts are read by their height.
     let values = if quantity.axis == PSNR.axis { chart::padded(all) } else { chart::from_zero(all) };
-    let mut chart = chart::axes(panel, 0.0..f64::from(last_iteration), values, &labels)?;
+    // A single run has its name in the title of whatever shows the figure.
+    let (area, for_legend) = if runs.len() > 1 {
+        let (area, for_legend) = chart::with_legend(panel);
+        (area, Some(for_legend))
+    } else {
+        (panel.clone(), None)
+    };
+    let mut chart = chart::axes(&area, 0.0..f64::from(last_iteration), values, &labels)?;
     for (i, run) in runs.iter().enumerate() {
         let (mut line, colour) = (points(quantity, &run.what), chart::colour(i));
         if quantity.scatters {
             chart.draw_series(LineSeries::new(line.clone(), colour.mix(0.25)))?;
             line = means(&line);
         }
-        chart
-            .draw_series(LineSeries::new(line, colour.stroke_width(2)))?
-            .label(run.name.as_str())
-            .legend(chart::line_sign(colour));
+        chart.draw_series(LineSeries::new(line, colour.stroke_width(2)))?;
     }
-    // Once is enough, where there is room for it.
-    if quantity.axis == PSNR.axis { chart::legend(&mut chart) } else { Ok(()) }
+    let entries = runs.iter().enumerate().map(|(i, run)| (chart::Sign::Line(i), run.name.as_str()));
+    for_legend.map_or(Ok(()), |area| chart::legend(&area, entries))
 }
 
 /// (iteration, value) of the rows that have one.

@@ -1,11 +1,13 @@
 //! Plots of what runs and sweeps recorded, as SVG that any browser shows.
 //!
 //! [`Recording`] reads a CSV file and tells by its header what it holds; `learning` and `rate_distortion` draw several of
-//! a kind into one figure; `chart` is what both share. No fonts are needed to draw: text stays text.
+//! a kind into one figure, `cost` compares settings; `chart`, `marker` and `labels` are what all share. No fonts are needed to draw: text stays text.
 
 mod chart;
 mod cost;
+mod labels;
 mod learning;
+mod marker;
 mod names;
 mod rate_distortion;
 mod recording;

@@ -4,8 +4,8 @@ use anyhow::Result;
 use plotters::coord::ranged1d::{AsRangedCoord, Ranged, ValueFormatter};
 use plotters::prelude::*;
 
-use super::chart::{self, Labels};
-use super::{Named, ResultRow};
+use super::chart::{self, Labels, Sign};
+use super::{Named, ResultRow, marker};
 
 /// How sizes lie along the axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -18,6 +18,8 @@ pub(crate) enum SizeAxis {
 }
 
 /// PSNR over size, a curve for each file and a point for each rate, as an SVG; the better the further up and left.
+///
+/// Rows of one curve with the same name are seeds: they become one point at their mean, with lines from the least to the most.
 pub(crate) fn rate_distortion_svg(curves: &[Named<Vec<ResultRow>>], axis: SizeAxis) -> Result<String> {
     let sizes = || curves.iter().flat_map(|curve| &curve.what).map(megabytes);
     let (least, most) = (sizes().fold(f64::INFINITY, f64::min), sizes().fold(0.0, f64::max));
@@ -36,9 +38,11 @@ where
     X: AsRangedCoord<Value = f64>,
     X::CoordDescType: Ranged<ValueType = f64> + ValueFormatter<f64>,
 {
-    chart::figure(1, |panels| {
-        let all = curves.iter().flat_map(|curve| &curve.what).map(|row| row.psnr_db);
-        let psnr_db = chart::padded(all);
+    chart::figure(1, |panels, figure| {
+        let curves: Vec<(&str, Vec<Point>)> =
+            curves.iter().map(|curve| (curve.name.as_str(), points(&curve.what))).collect();
+        let all = || curves.iter().flat_map(|(_, points)| points);
+        let psnr_db = chart::padded(all().flat_map(|point| point.psnr_db));
         let digits = chart::decimals(&psnr_db);
         let labels = Labels {
             title: "Quality over size",
@@ -47,25 +51,64 @@ where
             x_tick: &|x| significant(*x),
             y_tick: &|y| format!("{y:.digits$}"),
         };
-        let mut chart = chart::axes(&panels[0], sizes, psnr_db, &labels)?;
-        for (i, curve) in curves.iter().enumerate() {
-            let colour = chart::colour(i);
-            let mut rows: Vec<&ResultRow> = curve.what.iter().collect();
-            rows.sort_by(|a, b| a.size_bytes.total_cmp(&b.size_bytes));
-            let points: Vec<(f64, f64)> = rows.iter().map(|row| (megabytes(row), row.psnr_db)).collect();
-            chart
-                .draw_series(LineSeries::new(points.clone(), colour.stroke_width(2)))?
-                .label(curve.name.as_str())
-                .legend(chart::line_sign(colour));
-            chart.draw_series(points.iter().map(|&point| Circle::new(point, 4, colour.filled())))?;
-            let named = rows
-                .iter()
-                .zip(&points)
-                .map(|(row, &point)| EmptyElement::at(point) + chart::note(i, row.submethod.clone()));
-            chart.draw_series(named)?;
+        let (area, for_legend) = chart::with_legend(&panels[0]);
+        let mut chart = chart::axes(&area, sizes, psnr_db, &labels)?;
+        for (i, (_, points)) in curves.iter().enumerate() {
+            let line = points.iter().map(|point| (point.megabytes[1], point.psnr_db[1]));
+            chart.draw_series(LineSeries::new(line, chart::colour(i).stroke_width(2)))?;
+            for Point { megabytes: [from, x, to], psnr_db: [low, y, high], .. } in points {
+                for (start, end) in [((*from, *y), (*to, *y)), ((*x, *low), (*x, *high))] {
+                    let ends = [chart.backend_coord(&start), chart.backend_coord(&end)];
+                    figure.draw(&PathElement::new(ends.to_vec(), chart::colour(i).stroke_width(1)))?;
+                }
+            }
         }
-        chart::legend(&mut chart)
+        let mut at = Vec::new();
+        let mut names = Vec::new();
+        for (i, (_, points)) in curves.iter().enumerate() {
+            for point in points {
+                let place = chart.backend_coord(&(point.megabytes[1], point.psnr_db[1]));
+                marker::draw(figure, i, place)?;
+                names.push((at.len(), i, point.name.replace("lambda=", "λ ")));
+                at.push(place);
+            }
+        }
+        chart::name_points(figure, &chart, &at, &names)?;
+        let entries = curves.iter().enumerate().map(|(i, (name, _))| (Sign::Marker(i), *name));
+        let has_seeds = all().any(|point| point.n_seeds > 1);
+        let note = has_seeds.then_some((Sign::Front, "lines: range over seeds"));
+        chart::legend(&for_legend, entries.chain(note))
     })
+}
+
+/// Rows of one name, which are one rate from several seeds: least, mean and most.
+struct Point<'a> {
+    name: &'a str,
+    n_seeds: usize,
+    megabytes: [f64; 3],
+    psnr_db: [f64; 3],
+}
+
+fn points(rows: &[ResultRow]) -> Vec<Point<'_>> {
+    let mut points: Vec<Point<'_>> = Vec::new();
+    for row in rows {
+        if points.iter().any(|point| point.name == row.submethod) {
+            continue;
+        }
+        let same: Vec<&ResultRow> = rows.iter().filter(|other| other.submethod == row.submethod).collect();
+        let spread = |value: fn(&ResultRow) -> f64| {
+            let values = || same.iter().map(|row| value(row));
+            [
+                values().fold(f64::INFINITY, f64::min),
+                values().sum::<f64>() / same.len() as f64,
+                values().fold(f64::NEG_INFINITY, f64::max),
+            ]
+        };
+        let (name, n_seeds) = (row.submethod.as_str(), same.len());
+        points.push(Point { name, n_seeds, megabytes: spread(megabytes), psnr_db: spread(|row| row.psnr_db) });
+    }
+    points.sort_by(|a, b| a.megabytes[1].total_cmp(&b.megabytes[1]));
+    points
 }
 
 fn megabytes(row: &ResultRow) -> f64 {
@@ -81,6 +124,23 @@ fn significant(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rows_of_one_name_are_one_point_with_its_spread() {
+        let row = |submethod: &str, size_bytes, psnr_db| ResultRow {
+            submethod: submethod.to_owned(),
+            psnr_db,
+            ssim: None,
+            lpips: None,
+            size_bytes,
+            n_gaussians: None,
+        };
+        let rows = [row("b", 4e6, 33.0), row("a", 1e6, 30.0), row("a", 3e6, 32.0)];
+        let points = points(&rows);
+        let found: Vec<_> =
+            points.iter().map(|point| (point.name, point.n_seeds, point.megabytes, point.psnr_db)).collect();
+        assert_eq!(found, [("a", 2, [1.0, 2.0, 3.0], [30.0, 31.0, 32.0]), ("b", 1, [4.0; 3], [33.0; 3])]);
+    }
 
     #[test]
     fn idle_zeros_are_left_out() {

@@ -3,9 +3,13 @@
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
+use pocketsplat_trainer::cost::on_front;
 use pocketsplat_trainer::metrics::RatePoint;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
+
+use super::Named;
+use super::cost::{CostPanel, CostPoint};
 
 /// One row of a run's `progress.csv`; other columns are passed over.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
@@ -85,9 +89,35 @@ pub(crate) fn results_csv(rows: &[ResultRow]) -> Result<Vec<u8>> {
     Ok(writer.into_inner()?)
 }
 
+/// One run of an ablation.
+#[derive(Deserialize)]
+struct AblationRow {
+    row: String,
+    lambda: f64,
+    #[serde(rename = "PSNR")]
+    psnr_db: f64,
+    #[serde(rename = "Size [Bytes]")]
+    size_bytes: f64,
+}
+
+/// One run of a comparison.
+#[derive(Deserialize)]
+struct RunRow {
+    setting: String,
+    processor_minutes: f64,
+    #[serde(rename = "PSNR")]
+    psnr_db: f64,
+    #[serde(rename = "Size [Bytes]")]
+    size_bytes: f64,
+}
+
 /// A CSV file by what it holds.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Recording {
+    /// What settings or runs cost.
+    Cost(Vec<CostPanel>),
+    /// Curves of an ablation, each with its seeds.
+    Ablation(Vec<Named<Vec<ResultRow>>>),
     /// How a run went.
     Learning(Vec<LearningRow>),
     /// What came out over rates.
@@ -107,16 +137,91 @@ impl Recording {
         let has = |names: &[&str]| names.iter().all(|name| header.iter().any(|column| column == *name));
         if has(&["iteration", "psnr_db", "anchors"]) {
             Ok(Self::Learning(rows(reader)?))
+        } else if has(&["knob", "setting", "PSNR", "host_s"]) {
+            Ok(Self::Cost(settings(reader)?))
+        } else if has(&["setting", "processor_minutes", "PSNR", "Size [Bytes]"]) {
+            Ok(Self::Cost(runs(&rows(reader)?)))
+        } else if has(&["row", "lambda", "seed", "PSNR", "Size [Bytes]"]) {
+            Ok(Self::Ablation(ablation(rows(reader)?)))
         } else if has(&["PSNR", "Size [Bytes]"]) {
             Ok(Self::Results(rows(reader)?))
         } else {
             let found: String = header.iter().collect::<Vec<_>>().join(",").chars().take(80).collect();
             bail!(
-                "it begins with `{found}`; needs the columns iteration, psnr_db and anchors (progress.csv of a run), or PSNR and \
-                 Size [Bytes] (results of a sweep)"
+                "it begins with `{found}`; needs the columns iteration, psnr_db and anchors (progress.csv of a run), PSNR and \
+                 Size [Bytes] (results of a sweep), or what ablate, cost and compare write (ablation.csv, cost.csv, runs.csv)"
             )
         }
     }
+}
+
+/// A panel for each machine of cost.csv.
+fn settings(mut reader: csv::Reader<&[u8]>) -> Result<Vec<CostPanel>> {
+    let header = reader.headers()?.clone();
+    let machines: Vec<&str> = header.iter().filter_map(|column| column.strip_suffix(" on_front")).collect();
+    let place =
+        |name: &str| header.iter().position(|column| column == name).with_context(|| format!("no column {name}"));
+    let records = reader.records().collect::<Result<Vec<_>, _>>()?;
+    let [knob, setting, psnr] = [place("knob")?, place("setting")?, place("PSNR")?];
+    let panel = |machine: &str| {
+        let is_host = place(&format!("{machine} instructions")).is_err();
+        let (column, scale) =
+            if is_host { (place("host_s")?, 1e3) } else { (place(&format!("{machine} instructions"))?, 1e-6) };
+        let front = place(&format!("{machine} on_front"))?;
+        let mut points = Vec::new();
+        for record in records.iter().filter(|record| !record[column].is_empty()) {
+            let number = |i: usize| record[i].parse::<f64>().with_context(|| format!("`{}` is no number", &record[i]));
+            let (cost, psnr_db) = (scale * number(column)?, number(psnr)?);
+            let (knob, setting) = (record[knob].to_owned(), record[setting].to_owned());
+            points.push(CostPoint { knob, setting, cost, psnr_db, on_front: &record[front] == "true" });
+        }
+        let unit = if is_host { "milliseconds" } else { "millions of instructions" };
+        Ok(CostPanel { title: format!("Quality over time: {machine}"), unit: unit.to_owned(), points })
+    };
+    machines.into_iter().map(panel).collect()
+}
+
+/// Minutes and bytes of runs.csv.
+fn runs(rows: &[RunRow]) -> Vec<CostPanel> {
+    let panel = |title: &str, unit: &str, cost: fn(&RunRow) -> f64| {
+        let front = on_front(&rows.iter().map(|row| (cost(row), row.psnr_db)).collect::<Vec<_>>());
+        let point = |(row, on_front): (&RunRow, bool)| CostPoint {
+            knob: knob_of(&row.setting),
+            setting: row.setting.clone(),
+            cost: cost(row),
+            psnr_db: row.psnr_db,
+            on_front,
+        };
+        let points = rows.iter().zip(front).map(point).collect();
+        CostPanel { title: title.to_owned(), unit: unit.to_owned(), points }
+    };
+    vec![
+        panel("Quality over time", "minutes of a processor core", |row| row.processor_minutes),
+        panel("Quality over bytes", "bundle, kB", |row| row.size_bytes / 1e3),
+    ]
+}
+
+/// The key that a run's setting begins with; the first run has none.
+fn knob_of(setting: &str) -> String {
+    match setting.split_once([' ', ',']) {
+        Some((key, _)) if key != "as" => key.to_owned(),
+        _ => setting.to_owned(),
+    }
+}
+
+/// The rows of an ablation as curves; rows of one rate are seeds. A row of one rate alone is no curve.
+fn ablation(rows: Vec<AblationRow>) -> Vec<Named<Vec<ResultRow>>> {
+    let mut curves: Vec<Named<Vec<ResultRow>>> = Vec::new();
+    for AblationRow { row, lambda, psnr_db, size_bytes } in rows {
+        let submethod = format!("lambda={lambda}");
+        let point = ResultRow { submethod, psnr_db, ssim: None, lpips: None, size_bytes, n_gaussians: None };
+        match curves.iter_mut().find(|curve| curve.name == row) {
+            Some(curve) => curve.what.push(point),
+            None => curves.push(Named { name: row, what: vec![point] }),
+        }
+    }
+    curves.retain(|curve| curve.what.iter().any(|point| point.submethod != curve.what[0].submethod));
+    curves
 }
 
 fn rows<T: DeserializeOwned>(mut reader: csv::Reader<&[u8]>) -> Result<Vec<T>> {
@@ -166,6 +271,25 @@ mod tests {
         let with_rate = row(3, Some(10.5), 7, [Some(60.0), Some(9.0), Some(3.5)]);
         assert_eq!(with_rate.bits(), Some(72.5));
         assert_eq!(read(text).unwrap(), Recording::Learning(vec![with_rate]));
+    }
+
+    #[test]
+    fn what_the_other_commands_write_is_read_too() {
+        let ablation = "row,lambda,seed,PSNR,Size [Bytes]\nnone,0.004,42,33.5,400\nnone,0.004,43,33.7,420\n\
+            none,0.002,42,34.0,500\nalone,0.004,42,1.0,2\n";
+        let Recording::Ablation(curves) = read(ablation).unwrap() else { panic!("an ablation") };
+        assert_eq!((curves.len(), curves[0].name.as_str(), curves[0].what.len()), (1, "none", 3));
+        let costs = "knob,setting,PSNR,host_s,m4 instructions,m4 on_front,host on_front\n\
+            level,exact,31.5,0.002,4e7,false,true\ncut,none,31.0,0.001,,false,true\n";
+        let Recording::Cost(panels) = read(costs).unwrap() else { panic!("costs") };
+        let found: Vec<_> =
+            panels.iter().map(|panel| (panel.unit.as_str(), panel.points.len(), panel.points[0].cost)).collect();
+        assert_eq!(found, [("millions of instructions", 1, 40.0), ("milliseconds", 2, 2.0)]);
+        let runs = "run,setting,processor_minutes,PSNR,Size [Bytes]\na,as the first,3,33,3000\nb,offsets 3,4,32,2000\n";
+        let Recording::Cost(panels) = read(runs).unwrap() else { panic!("costs") };
+        assert_eq!(panels.len(), 2);
+        assert_eq!([0, 1].map(|i| panels[0].points[i].on_front), [true, false]);
+        assert_eq!([0, 1].map(|i| panels[1].points[i].on_front), [true, true]);
     }
 
     #[test]

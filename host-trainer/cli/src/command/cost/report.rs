@@ -113,7 +113,8 @@ impl Report<'_> {
                 .zip(front)
                 .filter_map(|(m, &on_front)| {
                     let cost = machine.time(m, *place)?;
-                    Some(CostPoint { knob: m.setting.knob.to_owned(), cost, psnr_db: m.psnr_db, on_front })
+                    let (knob, setting) = (m.setting.knob.to_owned(), m.setting.name.clone());
+                    Some(CostPoint { knob, setting, cost, psnr_db: m.psnr_db, on_front })
                 })
                 .collect(),
         };

@@ -135,16 +135,24 @@ impl Image {
         Self { width_px, height_px, rgb }
     }
 
-    /// Writes the image as a JPEG of quality 95 of 100.
+    /// The image as a JPEG of quality 95 of 100.
     ///
     /// # Errors
-    /// What the encoder or the system said.
-    pub fn write_jpeg(&self, path: &Path) -> Result<(), ::image::ImageError> {
+    /// What the encoder said.
+    pub fn to_jpeg(&self) -> Result<Vec<u8>, ::image::ImageError> {
         let mut bytes = Vec::new();
         let encoder = ::image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY);
         let (width_px, height_px) = (self.width_px, self.height_px);
         encoder.write_image(&self.rgb, width_px, height_px, ::image::ExtendedColorType::Rgb8)?;
-        Ok(std::fs::write(path, bytes)?)
+        Ok(bytes)
+    }
+
+    /// Writes the image as [`Self::to_jpeg`] has it.
+    ///
+    /// # Errors
+    /// What the encoder or the system said.
+    pub fn write_jpeg(&self, path: &Path) -> Result<(), ::image::ImageError> {
+        Ok(std::fs::write(path, self.to_jpeg()?)?)
     }
 
     /// Writes the image as an 8-bit RGB PNG.

@@ -29,6 +29,7 @@ mod train;
 mod train_args;
 mod verify;
 mod view;
+mod watch;
 
 use std::process::ExitCode;
 

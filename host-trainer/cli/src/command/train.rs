@@ -24,7 +24,7 @@ use super::eval::{Evaluation, Measurements, Renderer, ViewEvaluation, measure};
 use super::process::peak_memory_bytes;
 use super::progress::Progress;
 use super::train_args::Args;
-use super::{effects, output, report, stop};
+use super::{effects, output, report, stop, watch};
 use crate::config::{CaptureOptions, Protocol, RunConfig};
 
 /// Seconds between checkpoints unless the user says otherwise: what an accident may cost.
@@ -127,6 +127,10 @@ fn train_and_print<'a>(
     capture: &'a Capture,
     start: Start<'a>,
 ) -> Result<ExitCode> {
+    if let Some(port) = args.watch() {
+        let photograph = capture.test.first().or(capture.train.first()).map(|view| &view.image);
+        watch::serve(folder.path(), port, config.train.iterations, photograph)?;
+    }
     // Not before: until here there is nothing to keep, and Ctrl-C may end the process at once.
     let stop = stop::flag()?;
     if effects::resolve(&mut config, capture, &folder, &stop)? == Resolved::Interrupted {

@@ -35,6 +35,9 @@ pub(crate) struct Args {
     /// Do without report.html in the run folder.
     #[arg(long, help_heading = OUTPUT, hide_short_help = true)]
     no_report: bool,
+    /// Serve a page about the run while it goes on, to this machine alone, at a free port or the one given.
+    #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "0", help_heading = OUTPUT, hide_short_help = true)]
+    watch: Option<u16>,
     /// Length of the run and size of the images: quick (2,000 iterations, 200 px), standard (7,000, 400 px), or full (30,000,
     /// images as they are) [default: standard]
     #[arg(long, value_name = "NAME", conflicts_with_all = ["config", "resume", "from"], hide_possible_values = true,
@@ -111,6 +114,11 @@ impl Args {
     /// Whether the result is printed as JSON.
     pub(crate) fn json(&self) -> bool {
         self.json
+    }
+
+    /// The port of the page about the run while it goes on, if there is to be one; 0 for any.
+    pub(crate) fn watch(&self) -> Option<u16> {
+        self.watch
     }
 
     /// Whether the run ends with a page about it.

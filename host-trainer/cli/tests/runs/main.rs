@@ -14,3 +14,4 @@ mod preview;
 mod report;
 mod sweep;
 mod view;
+mod watch;

@@ -357,6 +357,11 @@ impl<'a> Trainer<'a> {
         }
     }
 
+    /// What it trains on.
+    pub fn capture(&self) -> &'a Capture {
+        self.capture
+    }
+
     /// The current scene's image of a view, 8 bit.
     pub fn draw(&mut self, view: &View) -> Image {
         let camera = Pinhole::new(&view.camera);

@@ -44,6 +44,14 @@ pub(super) fn remove(path: &Path) -> Result<(), RunError> {
     }
 }
 
+/// Removes a folder with all that is in it; none is as good.
+pub(super) fn remove_folder(path: &Path) -> Result<(), RunError> {
+    match fs::remove_dir_all(path) {
+        Err(e) if e.kind() != io::ErrorKind::NotFound => Err(RunError::io("remove", path, e)),
+        _ => Ok(()),
+    }
+}
+
 /// The names in a folder.
 pub(super) fn names(folder: &Path) -> Result<Vec<OsString>, RunError> {
     let read = || fs::read_dir(folder)?.map(|entry| Ok(entry?.file_name())).collect::<io::Result<Vec<_>>>();

@@ -5,6 +5,7 @@
 //! | `config.toml` | the resolved configuration |
 //! | `effects.csv` | what each effect was worth in pilots, where they were measured |
 //! | `progress.csv` | loss and PSNR over the run, see [`ProgressLog`] |
+//! | `previews/00000140.jpg` | one held-out view after so many iterations, fifty pictures a run |
 //! | `iteration-00001500.checkpoint` | the state of the run, see [`super::checkpoint`]; the last two are kept, and those to fork from |
 //! | `result.json` | what the finished run reports; with it, the run is over |
 //! | `report.html` | a page about the finished run, which the command writes |
@@ -12,6 +13,7 @@
 
 mod error;
 mod files;
+mod previews;
 mod progress_log;
 mod store;
 
@@ -24,16 +26,19 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 pub use error::RunError;
+pub use previews::newest_preview;
 pub use progress_log::ProgressLog;
 pub use store::{Resumed, fork};
 
 use super::{Observer, Trainer};
+use previews::{PREVIEWS, Previews};
 
 const CONFIG: &str = "config.toml";
 const LOG: &str = "progress.csv";
 const EFFECTS: &str = "effects.csv";
 const PILOTS: &str = "pilots.csv";
 const RESULT: &str = "result.json";
+const REPORT: &str = "report.html";
 const LOCK: &str = "lock";
 
 /// Checkpoints every so many seconds are put off until they take at most this share of the time.
@@ -86,9 +91,10 @@ impl RunFolder {
             return Err(RunError::Unfinished { path: path.to_owned() });
         }
         folder.clear_checkpoints(|_| true)?;
-        for name in [RESULT, LOG, EFFECTS, PILOTS] {
+        for name in [RESULT, LOG, EFFECTS, PILOTS, REPORT] {
             files::remove(&path.join(name))?;
         }
+        files::remove_folder(&path.join(PREVIEWS))?;
         folder.write_config(config)?;
         Ok(folder)
     }
@@ -173,6 +179,7 @@ impl RunFolder {
         stop: &AtomicBool,
     ) -> Result<Ending, RunError> {
         let mut log = ProgressLog::open(&self.path.join(LOG), trainer.iteration, trainer.config().iterations)?;
+        let previews = Previews::open(&self.path.join(PREVIEWS), trainer.iteration, trainer.config().iterations)?;
         let (mut saved_at, mut write_s) = (Instant::now(), 0.0);
         let mut saved_iteration = None;
         loop {
@@ -194,6 +201,7 @@ impl RunFolder {
             }
             let outcome = trainer.observed_advance(observer)?;
             log.add(trainer, &outcome)?;
+            previews.add(trainer)?;
         }
     }
 

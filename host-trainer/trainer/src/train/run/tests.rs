@@ -46,8 +46,17 @@ fn a_folder_takes_a_run_through_interruption_and_damage_to_the_same_end() {
     assert_eq!(ending, Ending::Finished);
     assert_eq!(
         names(&whole),
-        ["config.toml", "iteration-00000035.checkpoint", "iteration-00000040.checkpoint", "lock", "progress.csv"]
+        [
+            "config.toml",
+            "iteration-00000035.checkpoint",
+            "iteration-00000040.checkpoint",
+            "lock",
+            "previews",
+            "progress.csv"
+        ]
     );
+    let previews = |path: &Path| files::names(&path.join(PREVIEWS)).unwrap().len();
+    assert_eq!((previews(whole.path()), newest_preview(whole.path()).unwrap().0), (ITERATIONS as usize, ITERATIONS));
     let log = fs::read_to_string(whole.path().join(LOG)).unwrap();
 
     let path = home.path().join("broken.run");

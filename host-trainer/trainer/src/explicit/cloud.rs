@@ -10,6 +10,8 @@ use crate::real::Real;
 pub struct Cloud<R> {
     /// Degree that is drawn; more coefficients may be stored.
     pub degree: Degree,
+    /// Whether opacities are scaled by what the dilation adds to a splat's area (Yu et al. 2024, Mip-Splatting).
+    pub compensation: bool,
     /// Coefficients that are stored of each colour channel.
     pub n_coefficients: usize,
     /// `[N]`, normalised frame.
@@ -73,7 +75,16 @@ impl From<&Gaussians> for Cloud<f32> {
     fn from(gaussians: &Gaussians) -> Self {
         let Gaussians { degree, centres, log_scales, rotations, opacity_logits, harmonics } = gaussians.clone();
         let n_coefficients = degree.n_coefficients();
-        Self { degree, n_coefficients, centres, log_scales, rotations, opacity_logits, harmonics }
+        Self {
+            degree,
+            compensation: false,
+            n_coefficients,
+            centres,
+            log_scales,
+            rotations,
+            opacity_logits,
+            harmonics,
+        }
     }
 }
 

@@ -23,6 +23,13 @@ impl Renderer {
         Self { cloud: gaussians.into(), level: Level::detect() }
     }
 
+    /// The same; with `compensation` opacities are scaled by what the dilation adds to a splat's area, as a file's notes may say.
+    #[must_use]
+    pub fn with_compensation(mut self, compensation: bool) -> Self {
+        self.cloud.compensation = compensation;
+        self
+    }
+
     /// Planes `[3, height, width]`, not clamped.
     ///
     /// Cost: one pass over the Gaussians, and over the pixels of those that reach the image; the same bits for any number of threads.

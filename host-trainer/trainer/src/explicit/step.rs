@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::Cloud;
 use crate::ops::explicit_gaussians::{self, Stored};
 use crate::ops::neural_gaussians::Gaussian;
-use crate::ops::project::{self, Footprint, Splat};
+use crate::ops::project::{self, ALPHA_CUTOFF, Footprint, Splat};
 use crate::ops::rasterise::{self, TiledImage};
 use crate::ops::simd::Level;
 use crate::ops::spherical_harmonics::MOST;
@@ -31,15 +31,15 @@ pub struct Drawing<R> {
 }
 
 /// What a step gives back.
-pub struct Gradients<R> {
+pub struct CloudGradients<R> {
     /// The loss.
     pub loss: R,
     /// Mean squared difference of image and photograph over the pixels that count, before any rounding.
     pub squared_error: f64,
     /// Gaussians that reached the image, ascending; the other arrays have their rows in this order.
     pub drawn: Vec<u32>,
-    /// How far they reach on the image.
-    pub footprints: Vec<Footprint<R>>,
+    /// Three deviations along a row or a column, whichever is more, px.
+    pub widest_px: Vec<R>,
     /// dL/d(what is stored).
     pub stored: Vec<Stored<R>>,
     /// dL/d(coefficients), 0 beyond the degree that is drawn.
@@ -83,7 +83,7 @@ pub fn draw<R: Real>(level: Level, cloud: &Cloud<R>, camera: &Pinhole<R>, backgr
 #[inline(always)]
 fn splat<R: Real>(cloud: &Cloud<R>, camera: &Pinhole<R>, index: usize) -> Option<DrawnSplat<R>> {
     let gaussian = explicit_gaussians::shape(&cloud.stored(index));
-    let (mut splat, footprint) = project::forward(camera, &gaussian, false)?;
+    let (mut splat, footprint) = project::forward(camera, &gaussian, cloud.compensation)?;
     splat.colour =
         explicit_gaussians::colour(camera.centre_world, cloud.degree, gaussian.centre, cloud.harmonics_of(index));
     Some((u32::try_from(index).expect("fewer than 2³² Gaussians"), splat, footprint))
@@ -92,7 +92,7 @@ fn splat<R: Real>(cloud: &Cloud<R>, camera: &Pinhole<R>, index: usize) -> Option
 /// Loss and gradients of one view: L = (1 − λ)·L1 + λ·(1 − SSIM) (Kerbl et al. 2023, eq. 7).
 ///
 /// * `dssim`: λ.
-pub fn step<R: Real>(level: Level, cloud: &Cloud<R>, target: &TargetView<'_, R>, dssim: f64) -> Gradients<R> {
+pub fn step<R: Real>(level: Level, cloud: &Cloud<R>, target: &TargetView<'_, R>, dssim: f64) -> CloudGradients<R> {
     let camera = target.camera;
     let size_px = camera.size_px;
     let drawing = draw(level, cloud, camera, target.background);
@@ -130,7 +130,15 @@ pub fn step<R: Real>(level: Level, cloud: &Cloud<R>, target: &TargetView<'_, R>,
         },
     );
     let squared_error = target.squared_sum(&image) / (3 * target.n_counted()) as f64;
-    Gradients { loss, squared_error, drawn, footprints, stored, harmonics, screen }
+    let widest_px = splats.iter().zip(&footprints).map(|(splat, footprint)| widest_px(splat, footprint)).collect();
+    CloudGradients { loss, squared_error, drawn, widest_px, stored, harmonics, screen }
+}
+
+/// The footprint reaches √(2·ln(255·o)) deviations.
+fn widest_px<R: Real>(splat: &Splat<R>, footprint: &Footprint<R>) -> R {
+    let reach = (R::real(2.0) * (splat.opacity * R::real(1.0 / ALPHA_CUTOFF)).ln()).sqrt();
+    let [x, y] = footprint.half_extent_px;
+    R::real(3.0) * x.larger(y) / reach
 }
 
 #[inline(always)]
@@ -143,7 +151,7 @@ fn splat_backward<R: Real>(
 ) -> Stored<R> {
     let stored = cloud.stored(index);
     let gaussian: Gaussian<R> = explicit_gaussians::shape(&stored);
-    let d = project::backward(camera, &gaussian, false, d_splat);
+    let d = project::backward(camera, &gaussian, cloud.compensation, d_splat);
     let harmonics = cloud.harmonics_of(index);
     explicit_gaussians::backward(camera.centre_world, cloud.degree, &stored, harmonics, &d, d_harmonics)
 }

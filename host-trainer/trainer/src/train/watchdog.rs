@@ -63,14 +63,14 @@ impl fmt::Display for Cause {
 
 impl Watchdog {
     /// Counts a step that was applied.
-    pub(super) fn passed(&mut self) {
+    pub(crate) fn passed(&mut self) {
         self.n_in_a_row = 0;
     }
 
     /// Counts a step that was dropped.
     ///
     /// * returns whether the run should stop.
-    pub(super) fn dropped(&mut self) -> bool {
+    pub(crate) fn dropped(&mut self) -> bool {
         self.n_dropped += 1;
         self.n_in_a_row += 1;
         self.n_in_a_row > MAX_DROPPED_IN_A_ROW
@@ -109,7 +109,7 @@ pub(super) fn inspect(
 
 /// Whether all gradients are below the limit. Without early exit inside a run of 1024, so that it vectorises.
 #[inline(always)]
-fn sound(gradients: &[f32]) -> bool {
+pub(crate) fn sound(gradients: &[f32]) -> bool {
     gradients.chunks(1024).all(
         #[inline(always)]
         |run| run.iter().fold(true, |sound, g| sound & (g.abs() <= LARGEST_GRADIENT)),

@@ -11,6 +11,7 @@
 //!
 //! Configuration and state are in the wire format of `postcard`.
 
+pub(crate) mod envelope;
 mod kernels;
 mod signature;
 mod state;

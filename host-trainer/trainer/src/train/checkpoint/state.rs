@@ -5,9 +5,9 @@ use std::io::{self, Write};
 use pocketsplat_core::context::N_LEVELS;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use serde::de::DeserializeOwned;
 
-use super::{CaptureDifference, CaptureSignature, CheckpointFault, Kernels, MAGIC, VERSION};
+use super::envelope::{self, content, needs, part};
+use super::{CaptureDifference, CaptureSignature, CheckpointFault, Kernels, MAGIC};
 use crate::scene::{Anchors, ContextModel, Heads, Scene};
 use crate::train::config::Backbone;
 use crate::train::optimiser::Optimiser;
@@ -46,9 +46,6 @@ pub struct Restored<'a> {
     pub written_by: Kernels,
 }
 
-/// Bytes of the version and of the checksum.
-const NUMBER_LEN: usize = 4;
-
 /// Iteration, watchdog, wall-clock and processor seconds, the views left of this pass.
 type Progress = (u32, Watchdog, [f64; 2], Vec<u32>);
 /// Seed, stream and position.
@@ -62,19 +59,12 @@ impl<'a> Trainer<'a> {
     /// # Errors
     /// What `out` reports.
     pub fn save(&self, out: impl Write) -> io::Result<()> {
-        let mut out = Checksummed { out, checksum: crc32fast::Hasher::new() };
-        out.write_all(&MAGIC)?;
-        out.write_all(&VERSION.to_le_bytes())?;
         let config = toml::to_string(&self.config).map_err(io::Error::other)?;
         let progress = (self.iteration, self.watchdog, [self.seconds, self.processor_seconds], &self.queue);
         let random = (self.rng.get_seed(), self.rng.get_stream(), self.rng.get_word_pos());
         let Scene { anchors, heads, context, .. } = &self.scene;
         let learned = (anchors, heads, context, &self.optimiser, &self.statistics, self.background);
-        let all = (config, self.kernels(), &self.signature, progress, random, learned);
-        // Not `to_io`, which hides what the disk reports.
-        out.write_all(&postcard::to_stdvec(&all).map_err(io::Error::other)?)?;
-        let checksum = out.checksum.clone().finalize();
-        out.write_all(&checksum.to_le_bytes())
+        envelope::write(out, MAGIC, &(config, self.kernels(), &self.signature, progress, random, learned))
     }
 
     /// Reads what [`Self::save`] wrote.
@@ -82,7 +72,7 @@ impl<'a> Trainer<'a> {
     /// # Errors
     /// [`RestoreError`] when the bytes are damaged or `capture` is not the one that the run began with.
     pub fn restore(capture: &'a Capture, bytes: &[u8]) -> Result<Restored<'a>, RestoreError> {
-        let (config, rest): (String, _) = part(content(bytes)?)?;
+        let (config, rest): (String, _) = part(content(bytes, MAGIC)?)?;
         let config: TrainConfig = toml::from_str(&config)
             .map_err(|e| CheckpointFault::Form { what: "configuration", why: e.message().to_owned() })?;
         let ((written_by, begun_with), rest): ((Kernels, CaptureSignature), _) = part(rest)?;
@@ -175,50 +165,4 @@ impl<'a> Trainer<'a> {
         needs("gradient sums", gradient_sum.len(), n * shape.n_offsets)?;
         needs("drawn counts", n_drawn.len(), n * shape.n_offsets)
     }
-}
-
-/// Passes on what is written and sums it up.
-struct Checksummed<W> {
-    out: W,
-    checksum: crc32fast::Hasher,
-}
-
-impl<W: Write> Write for Checksummed<W> {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let n = self.out.write(bytes)?;
-        self.checksum.update(&bytes[..n]);
-        Ok(n)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.out.flush()
-    }
-}
-
-/// What stands between version and checksum, once these are right.
-fn content(bytes: &[u8]) -> Result<&[u8], CheckpointFault> {
-    let rest = bytes.strip_prefix(&MAGIC).ok_or(CheckpointFault::Magic)?;
-    let Some((version, rest)) = rest.split_first_chunk().map(|(number, rest)| (u32::from_le_bytes(*number), rest))
-    else {
-        return Err(CheckpointFault::Magic);
-    };
-    if version != VERSION {
-        return Err(CheckpointFault::Version { found: version });
-    }
-    let (content, found) = rest.split_last_chunk::<NUMBER_LEN>().unwrap_or((rest, &[0; NUMBER_LEN]));
-    let found = u32::from_le_bytes(*found);
-    let computed = crc32fast::hash(&bytes[..bytes.len() - NUMBER_LEN]);
-    if found == computed { Ok(content) } else { Err(CheckpointFault::Checksum { found, computed }) }
-}
-
-/// The next part and the bytes behind it.
-fn part<T: DeserializeOwned>(bytes: &[u8]) -> Result<(T, &[u8]), CheckpointFault> {
-    postcard::take_from_bytes(bytes).map_err(|e| CheckpointFault::Form { what: "state", why: e.to_string() })
-}
-
-fn needs(what: &'static str, found: usize, needed: usize) -> Result<(), CheckpointFault> {
-    if found == needed {
-        return Ok(());
-    }
-    Err(CheckpointFault::Content { what, found: found as u64, needed: needed as u64 })
 }

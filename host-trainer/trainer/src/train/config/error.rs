@@ -41,12 +41,7 @@ pub enum ConfigError {
 }
 
 /// Refuses a value outside its range; NaN is outside of all.
-pub(in crate::train) fn within(
-    key: impl Into<Cow<'static, str>>,
-    found: f64,
-    low: f64,
-    high: f64,
-) -> Result<(), ConfigError> {
+pub(crate) fn within(key: impl Into<Cow<'static, str>>, found: f64, low: f64, high: f64) -> Result<(), ConfigError> {
     if found >= low && found <= high {
         Ok(())
     } else {

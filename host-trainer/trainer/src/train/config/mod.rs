@@ -6,7 +6,7 @@ mod hac;
 use serde::{Deserialize, Serialize};
 
 pub use error::ConfigError;
-pub(in crate::train) use error::within;
+pub(crate) use error::within;
 pub use hac::{Backbone, Hac};
 
 use super::module::Modules;

@@ -15,6 +15,7 @@ mod error;
 mod files;
 mod previews;
 mod progress_log;
+mod resumable;
 mod store;
 
 #[cfg(test)]
@@ -27,10 +28,12 @@ use std::time::Instant;
 
 pub use error::RunError;
 pub use previews::newest_preview;
-pub use progress_log::ProgressLog;
-pub use store::{Resumed, fork};
+pub use progress_log::{LoggedStep, ProgressLog};
+pub use resumable::Resumable;
+pub use store::{Newest, Resumed, fork};
 
 use super::{Observer, Trainer};
+use crate::step::StepReport;
 use previews::{PREVIEWS, Previews};
 
 const CONFIG: &str = "config.toml";
@@ -178,30 +181,48 @@ impl RunFolder {
         interval: Interval,
         stop: &AtomicBool,
     ) -> Result<Ending, RunError> {
-        let mut log = ProgressLog::open(&self.path.join(LOG), trainer.iteration, trainer.config().iterations)?;
         let previews = Previews::open(&self.path.join(PREVIEWS), trainer.iteration, trainer.config().iterations)?;
+        self.drive(trainer, interval, stop, |trainer| {
+            let outcome = trainer.observed_advance(observer)?;
+            previews.add(trainer)?;
+            let StepReport { loss, squared_error, rate, .. } = outcome.report;
+            Ok(LoggedStep { loss: f64::from(loss), squared_error, rate, is_dropped: outcome.dropped.is_some() })
+        })
+    }
+
+    /// As [`Self::train`], for any run; `advance` does one iteration.
+    ///
+    /// # Errors
+    /// As [`Self::train`].
+    pub fn drive<R: Resumable>(
+        &mut self,
+        run: &mut R,
+        interval: Interval,
+        stop: &AtomicBool,
+        mut advance: impl FnMut(&mut R) -> Result<LoggedStep, RunError>,
+    ) -> Result<Ending, RunError> {
+        let mut log = ProgressLog::open(&self.path.join(LOG), run.iteration(), run.iterations())?;
         let (mut saved_at, mut write_s) = (Instant::now(), 0.0);
         let mut saved_iteration = None;
         loop {
             let asked = stop.load(Ordering::Relaxed);
-            let ends = asked || trainer.is_done();
+            let ends = asked || is_done(run);
             let due = match interval {
-                Interval::Iterations(n) => n > 0 && trainer.iteration > 0 && trainer.iteration.is_multiple_of(n),
+                Interval::Iterations(n) => n > 0 && run.iteration() > 0 && run.iteration().is_multiple_of(n),
                 Interval::Seconds(s) => saved_at.elapsed().as_secs_f64() >= f64::max(s, write_s / LARGEST_SHARE),
             };
-            let due = due || self.forks_at.contains(&trainer.iteration);
-            if (ends || due) && saved_iteration != Some(trainer.iteration) {
+            let due = due || self.forks_at.contains(&run.iteration());
+            if (ends || due) && saved_iteration != Some(run.iteration()) {
                 let started = Instant::now();
-                self.save(trainer)?;
+                self.save(run)?;
                 write_s = started.elapsed().as_secs_f64();
-                (saved_at, saved_iteration) = (Instant::now(), Some(trainer.iteration));
+                (saved_at, saved_iteration) = (Instant::now(), Some(run.iteration()));
             }
             if ends {
-                return Ok(if trainer.is_done() { Ending::Finished } else { Ending::Interrupted });
+                return Ok(if is_done(run) { Ending::Finished } else { Ending::Interrupted });
             }
-            let outcome = trainer.observed_advance(observer)?;
-            log.add(trainer, &outcome)?;
-            previews.add(trainer)?;
+            let step = advance(run)?;
+            log.add(run, &step)?;
         }
     }
 
@@ -213,4 +234,8 @@ impl RunFolder {
         files::write_whole(&self.path.join(RESULT), |out| out.write_all(result.as_bytes()))?;
         self.clear_checkpoints(|iteration| !keep_checkpoints && !self.forks_at.contains(&iteration))
     }
+}
+
+fn is_done(run: &impl Resumable) -> bool {
+    run.iteration() >= run.iterations()
 }

@@ -4,8 +4,8 @@ use std::fs::{self, File};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use super::{RunError, files};
-use crate::train::{Outcome, Trainer};
+use super::{Resumable, RunError, files};
+use crate::step::coding::RateReport;
 
 const HEADER: &str =
     "iteration,loss,psnr_db,anchors,seconds,dropped,feature_bits,log_scale_bits,offset_bits,drawn_offsets";
@@ -13,9 +13,23 @@ const HEADER: &str =
 /// Rows of a whole run, about.
 const ROWS: u32 = 500;
 
+/// What the log keeps of an iteration.
+#[derive(Clone, Copy, Debug)]
+pub struct LoggedStep {
+    /// The loss.
+    pub loss: f64,
+    /// Mean squared difference of image and photograph.
+    pub squared_error: f64,
+    /// What coding cost, where there is a rate.
+    pub rate: Option<RateReport>,
+    /// Whether it changed nothing.
+    pub is_dropped: bool,
+}
+
 /// A CSV file with one row every five hundredth of a run: iterations done, means of loss and PSNR (dB) since the row
 /// before, anchors, seconds spent in iterations, steps dropped so far; mean bits of an anchor's features, log-scales and
-/// offsets since the row before, where there is a rate, and offsets that are drawn, of all anchors.
+/// offsets since the row before, where there is a rate, and offsets that are drawn, of all anchors. Explicit Gaussians count as anchors
+/// with one offset each.
 #[derive(Debug)]
 pub struct ProgressLog {
     path: PathBuf,
@@ -61,18 +75,19 @@ impl ProgressLog {
     ///
     /// # Errors
     /// [`RunError::Write`] when a row was due and could not be written.
-    pub fn add(&mut self, trainer: &Trainer<'_>, outcome: &Outcome) -> Result<(), RunError> {
-        if outcome.dropped.is_none() {
-            self.loss += f64::from(outcome.report.loss);
-            self.psnr_db -= 10.0 * outcome.report.squared_error.log10();
+    pub fn add(&mut self, run: &impl Resumable, step: &LoggedStep) -> Result<(), RunError> {
+        if !step.is_dropped {
+            self.loss += step.loss;
+            self.psnr_db -= 10.0 * step.squared_error.log10();
             self.n += 1;
-            if let Some(rate) = outcome.report.rate {
+            if let Some(rate) = step.rate {
                 let n = rate.n_sampled as f64;
                 self.bits = std::array::from_fn(|i| self.bits[i] + n * rate.bits[i]);
                 self.n_sampled += rate.n_sampled;
             }
         }
-        if !trainer.iteration.is_multiple_of(self.every) && !trainer.is_done() {
+        let iteration = run.iteration();
+        if !iteration.is_multiple_of(self.every) && iteration < run.iterations() {
             return Ok(());
         }
         let means = match self.n {
@@ -84,15 +99,9 @@ impl ProgressLog {
             0 => ",,".to_owned(),
             n => self.bits.map(|bits| format!("{:.2}", bits / n as f64)).join(","),
         };
-        let anchors = &trainer.scene.anchors;
-        let row = format!(
-            "{},{means},{},{:.3},{},{bits},{}\n",
-            trainer.iteration,
-            anchors.len(),
-            trainer.seconds,
-            trainer.n_dropped(),
-            (0..anchors.mask_logits.len()).filter(|offset| anchors.is_drawn(*offset)).count()
-        );
+        let [n_anchors, n_drawn] = run.size();
+        let (seconds, n_dropped) = (run.seconds(), run.n_dropped());
+        let row = format!("{iteration},{means},{n_anchors},{seconds:.3},{n_dropped},{bits},{n_drawn}\n");
         (self.loss, self.psnr_db, self.n) = (0.0, 0.0, 0);
         (self.bits, self.n_sampled) = ([0.0; 3], 0);
         // In one piece, so that rows are not cut by a crash of the process.

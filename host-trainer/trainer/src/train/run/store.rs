@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::{RunError, RunFolder, files};
+use super::{Resumable, RunError, RunFolder, files};
 use crate::train::checkpoint::{CheckpointFault, RestoreError, Restored};
 use crate::train::{TrainConfig, Trainer};
 use pocketsplat_capture::dataset::Capture;
@@ -52,10 +52,13 @@ pub fn fork<'a>(
 }
 
 /// A run taken up again.
+pub type Resumed<'a> = Newest<Restored<'a>>;
+
+/// What the newest sound checkpoint holds.
 #[derive(Debug)]
-pub struct Resumed<'a> {
-    /// Its state.
-    pub restored: Restored<'a>,
+pub struct Newest<T> {
+    /// The state.
+    pub restored: T,
     /// What is wrong with newer checkpoints, which were passed over.
     pub passed_over: Vec<String>,
 }
@@ -70,8 +73,8 @@ impl RunFolder {
     ///
     /// # Errors
     /// [`RunError::Write`] when there is no room or right to write; the older checkpoints stay.
-    pub fn save(&self, trainer: &Trainer<'_>) -> Result<(), RunError> {
-        files::write_whole(&self.path.join(file_name(trainer.iteration)), |out| trainer.save(out))?;
+    pub fn save(&self, run: &impl Resumable) -> Result<(), RunError> {
+        files::write_whole(&self.path.join(file_name(run.iteration())), |out| run.save(out))?;
         let passing = self.checkpoints()?.into_iter().filter(|(iteration, _)| !self.forks_at.contains(iteration));
         passing.skip(KEPT).try_for_each(|(_, path)| files::remove(&path))
     }
@@ -82,11 +85,19 @@ impl RunFolder {
     /// [`RunError::Restore`] when `capture` is not that of the run, [`RunError::AllDamaged`] when no checkpoint is
     /// sound.
     pub fn resume<'a>(&self, capture: &'a Capture) -> Result<Option<Resumed<'a>>, RunError> {
+        self.newest(|bytes| Trainer::restore(capture, bytes))
+    }
+
+    /// What `restore` makes of the newest sound checkpoint; none when the run was stopped before it wrote one.
+    ///
+    /// # Errors
+    /// As [`Self::resume`].
+    pub fn newest<T>(&self, restore: impl Fn(&[u8]) -> Result<T, RestoreError>) -> Result<Option<Newest<T>>, RunError> {
         let mut passed_over = Vec::new();
         for (_, path) in self.checkpoints()? {
             let bytes = fs::read(&path).map_err(|source| RunError::io("read", &path, source))?;
-            match Trainer::restore(capture, &bytes) {
-                Ok(restored) => return Ok(Some(Resumed { restored, passed_over })),
+            match restore(&bytes) {
+                Ok(restored) => return Ok(Some(Newest { restored, passed_over })),
                 Err(RestoreError::Fault(fault)) if !matches!(fault, CheckpointFault::Version { .. }) => {
                     passed_over.push(format!("{}: {fault}", path.display()));
                 }

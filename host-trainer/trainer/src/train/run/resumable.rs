@@ -1,0 +1,51 @@
+//! What a run folder asks of a run.
+
+use std::io::{self, Write};
+
+use crate::train::Trainer;
+
+/// A run that is kept in checkpoints and goes on from them to the same bits.
+pub trait Resumable {
+    /// Iterations done.
+    fn iteration(&self) -> u32;
+    /// Iterations in all.
+    fn iterations(&self) -> u32;
+    /// Wall-clock seconds spent in iterations.
+    fn seconds(&self) -> f64;
+    /// Steps that were not applied so far.
+    fn n_dropped(&self) -> u32;
+    /// Of the scene: its anchors, and the Gaussians that it may draw.
+    fn size(&self) -> [usize; 2];
+    /// Writes everything that the next iteration depends on.
+    ///
+    /// # Errors
+    /// What `out` reports.
+    fn save(&self, out: &mut dyn Write) -> io::Result<()>;
+}
+
+impl Resumable for Trainer<'_> {
+    fn iteration(&self) -> u32 {
+        self.iteration
+    }
+
+    fn iterations(&self) -> u32 {
+        self.config().iterations
+    }
+
+    fn seconds(&self) -> f64 {
+        self.seconds
+    }
+
+    fn n_dropped(&self) -> u32 {
+        self.n_dropped()
+    }
+
+    fn size(&self) -> [usize; 2] {
+        let anchors = &self.scene.anchors;
+        [anchors.len(), (0..anchors.mask_logits.len()).filter(|offset| anchors.is_drawn(*offset)).count()]
+    }
+
+    fn save(&self, out: &mut dyn Write) -> io::Result<()> {
+        self.save(out)
+    }
+}

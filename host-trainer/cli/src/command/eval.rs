@@ -1,4 +1,6 @@
-//! `pocketsplat eval`: how good a bundle is, how large, how fast.
+//! `pocketsplat eval`: how good a bundle or a file of Gaussians is, how large, how fast.
+
+pub(crate) mod explicit;
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -16,6 +18,7 @@ use serde::{Deserialize, Serialize};
 
 use super::bundle::BundleFile;
 use super::capture::{CaptureArgs, views_of};
+use super::gaussians::GaussiansFile;
 use super::lpips::LpipsArgs;
 use super::output;
 use crate::config::named::{SPLITS, one_of};
@@ -30,10 +33,10 @@ pub(crate) enum Renderer {
     Reference,
 }
 
-/// Compare a bundle's frames with the photographs of a capture.
+/// Compare the frames of a bundle or of a file of Gaussians with the photographs of a capture.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// The bundle.
+    /// The bundle, or the .ply or .spz.
     bundle: PathBuf,
     #[command(flatten)]
     capture: CaptureArgs,
@@ -71,7 +74,9 @@ pub(crate) struct Evaluation {
     pub(crate) lpips_of: Option<String>,
     /// Of a copy of each photograph at half the size, enlarged again: what no detail at all scores.
     pub(crate) half_size_copy_psnr_db: f64,
+    /// Of the file, bundle or not.
     pub(crate) bundle_bytes: usize,
+    /// 0 where there are explicit Gaussians.
     pub(crate) n_anchors: u32,
     /// What there is to draw: offsets that no mask takes away.
     pub(crate) n_gaussians: u64,
@@ -138,6 +143,9 @@ impl Evaluation {
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
+    if GaussiansFile::is_one(&args.bundle) {
+        return explicit::run(args);
+    }
     let file = BundleFile::read(&args.bundle)?;
     let lpips = args.lpips.load()?;
     let what =
@@ -223,52 +231,26 @@ pub(crate) fn measure(
     } else {
         None
     };
-    let rows: Vec<DrawnView> = views
-        .par_iter()
-        .map(|view| {
-            let camera = file.camera(&bundle, loaded, view);
-            let started = Instant::now();
-            let (image, scratch_bytes) = match oracle.as_ref().filter(|_| renderer == Renderer::Reference) {
-                Some(scene) => (reference_image(&bundle, scene, &camera), 0),
-                None => core_image(&bundle, &camera).map(|frame| (frame.image, frame.scratch_bytes))?,
-            };
-            let seconds = started.elapsed().as_secs_f64();
-            let to_reference = match oracle.as_ref().filter(|_| against_reference) {
-                Some(scene) => psnr_db(&image, &reference_image(&bundle, scene, &camera)),
-                None => f64::INFINITY,
-            };
-            let psnr_db = |image: &Image| psnr_db_masked(image, &view.image, view.mask.as_ref());
-            Ok(DrawnView {
-                seconds,
-                scratch_bytes,
-                psnr_db: psnr_db(&image),
-                ssim: ssim_masked(&image, &view.image, view.mask.as_ref()),
-                psnr_to_reference_db: to_reference,
-                half_size_copy_psnr_db: psnr_db(&half_size_enlarged(&view.image)),
-                image,
-            })
-        })
-        .collect::<Result<_>>()?;
-    // One view after another: the features of a view fill hundreds of bytes a pixel, and fill every thread by themselves.
-    let lpips_of_views = |lpips: &Lpips| -> Result<Vec<f64>> {
-        let distance = |(row, view): (&DrawnView, &View)| lpips.distance(&row.image, &view.image, view.mask.as_ref());
-        Ok(rows.iter().zip(views).map(distance).collect::<Result<Vec<_>, _>>()?)
+    let draw = |view: &View| {
+        let camera = file.camera(&bundle, loaded, view);
+        match oracle.as_ref().filter(|_| renderer == Renderer::Reference) {
+            Some(scene) => Ok((reference_image(&bundle, scene, &camera), 0)),
+            None => Ok(core_image(&bundle, &camera).map(|frame| (frame.image, frame.scratch_bytes))?),
+        }
     };
-    let lpips_of_views = lpips.map(lpips_of_views).transpose()?;
-    let of_view = |(i, (row, view)): (usize, (&DrawnView, &View))| ViewEvaluation {
-        name: view.name.clone(),
-        psnr_db: row.psnr_db,
-        ssim: row.ssim,
-        lpips: lpips_of_views.as_ref().map(|values| values[i]),
+    let to_reference = |image: &Image, view: &View| match oracle.as_ref().filter(|_| against_reference) {
+        Some(scene) => psnr_db(image, &reference_image(&bundle, scene, &file.camera(&bundle, loaded, view))),
+        None => f64::INFINITY,
     };
-    let mean = |value: fn(&DrawnView) -> f64| rows.iter().map(value).sum::<f64>() / rows.len() as f64;
+    let rows = drawn_views(views, draw, to_reference)?;
+    let (lpips_mean, of_views) = view_evaluations(&rows, views, lpips)?;
     Ok(Evaluation {
         schema_version: output::SCHEMA_VERSION,
-        psnr_db: mean(|row| row.psnr_db),
-        ssim: mean(|row| row.ssim),
-        lpips: lpips_of_views.as_ref().map(|values| values.iter().sum::<f64>() / values.len() as f64),
+        psnr_db: mean(&rows, |row| row.psnr_db),
+        ssim: mean(&rows, |row| row.ssim),
+        lpips: lpips_mean,
         lpips_of: lpips.map(|lpips| format!("VGG16, input in {}", lpips.range())),
-        half_size_copy_psnr_db: mean(|row| row.half_size_copy_psnr_db),
+        half_size_copy_psnr_db: mean(&rows, |row| row.half_size_copy_psnr_db),
         bundle_bytes: file.bytes.len(),
         n_anchors: bundle.n_anchors(),
         n_gaussians,
@@ -279,12 +261,64 @@ pub(crate) fn measure(
         height_px: views[0].image.height_px,
         background: options.background.map_or_else(String::new, |b| b.to_string()),
         decode_s,
-        render_s_per_view: mean(|row| row.seconds),
+        render_s_per_view: mean(&rows, |row| row.seconds),
         scratch_bytes: rows.iter().map(|row| row.scratch_bytes).max().unwrap_or(0),
         tiers: if per_tier { tiers(file, &bundle, loaded, views)? } else { Vec::new() },
         psnr_to_reference_db: against_reference
             .then(|| rows.iter().map(|row| row.psnr_to_reference_db).fold(f64::INFINITY, f64::min)),
         protocol: Some(Protocol::of(loaded, options)),
-        views: rows.iter().zip(views).enumerate().map(of_view).collect(),
+        views: of_views,
     })
+}
+
+/// Draws every view and compares it.
+///
+/// * `draw`: the picture of a view, and the bytes of scratch that it took. * `to_reference`: PSNR of a picture to another renderer's.
+fn drawn_views(
+    views: &[View],
+    draw: impl Fn(&View) -> Result<(Image, usize)> + Sync,
+    to_reference: impl Fn(&Image, &View) -> f64 + Sync,
+) -> Result<Vec<DrawnView>> {
+    let drawn = |view: &View| {
+        let started = Instant::now();
+        let (image, scratch_bytes) = draw(view)?;
+        let seconds = started.elapsed().as_secs_f64();
+        let psnr_db = |image: &Image| psnr_db_masked(image, &view.image, view.mask.as_ref());
+        Ok(DrawnView {
+            seconds,
+            scratch_bytes,
+            psnr_db: psnr_db(&image),
+            ssim: ssim_masked(&image, &view.image, view.mask.as_ref()),
+            psnr_to_reference_db: to_reference(&image, view),
+            half_size_copy_psnr_db: psnr_db(&half_size_enlarged(&view.image)),
+            image,
+        })
+    };
+    views.par_iter().map(drawn).collect()
+}
+
+fn mean(rows: &[DrawnView], value: fn(&DrawnView) -> f64) -> f64 {
+    rows.iter().map(value).sum::<f64>() / rows.len() as f64
+}
+
+/// Each view by itself, and the mean LPIPS where it is measured.
+fn view_evaluations(
+    rows: &[DrawnView],
+    views: &[View],
+    lpips: Option<&Lpips>,
+) -> Result<(Option<f64>, Vec<ViewEvaluation>)> {
+    // One view after another: the features of a view fill hundreds of bytes a pixel, and fill every thread by themselves.
+    let lpips_of_views = |lpips: &Lpips| -> Result<Vec<f64>> {
+        let distance = |(row, view): (&DrawnView, &View)| lpips.distance(&row.image, &view.image, view.mask.as_ref());
+        Ok(rows.iter().zip(views).map(distance).collect::<Result<Vec<_>, _>>()?)
+    };
+    let distances = lpips.map(lpips_of_views).transpose()?;
+    let of_view = |(i, (row, view)): (usize, (&DrawnView, &View))| ViewEvaluation {
+        name: view.name.clone(),
+        psnr_db: row.psnr_db,
+        ssim: row.ssim,
+        lpips: distances.as_ref().map(|values| values[i]),
+    };
+    let mean = distances.as_ref().map(|values| values.iter().sum::<f64>() / values.len() as f64);
+    Ok((mean, rows.iter().zip(views).enumerate().map(of_view).collect()))
 }

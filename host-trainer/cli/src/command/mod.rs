@@ -11,6 +11,8 @@ mod effects;
 mod estimate;
 mod eval;
 mod fit;
+mod gaussians;
+mod import;
 mod inspect;
 mod lpips;
 mod output;
@@ -50,6 +52,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Train(train_args::Args),
+    Import(import::Args),
     Eval(eval::Args),
     Render(render::Args),
     View(view::Args),
@@ -123,6 +126,7 @@ fn dispatch(cli: Cli) -> Result<ExitCode> {
         Command::Sweep(args) => return sweep::run(&args),
         Command::Ablate(args) => return ablate::run(&args),
         Command::Verify(args) => return verify::run(&args),
+        Command::Import(args) => import::run(&args),
         Command::Eval(args) => eval::run(&args),
         Command::Render(args) => render::run(&args),
         Command::View(args) => view::run(&args),

@@ -5,6 +5,7 @@ use std::io::IsTerminal;
 use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+use pocketsplat_trainer::explicit::train::CloudOutcome;
 use pocketsplat_trainer::scene::Scene;
 use pocketsplat_trainer::step::StepReport;
 use pocketsplat_trainer::train::{DroppedStep, Observer};
@@ -83,27 +84,25 @@ pub(super) fn bar_of(from: u32, steps: u32) -> ProgressBar {
     bar
 }
 
-impl Observer for Progress {
-    fn step(&mut self, iteration: u32, report: &StepReport<f32>, scene: &Scene<f32>) {
-        if let Some(mut estimate) = self.estimate.take() {
-            estimate.step(iteration, scene.anchors.len(), |line| self.say(line));
-            self.estimate = Some(estimate);
+impl Progress {
+    /// After an iteration on explicit Gaussians.
+    pub(crate) fn explicit_step(&mut self, iteration: u32, outcome: &CloudOutcome, n_gaussians: usize) {
+        if let Some(dropped) = &outcome.dropped {
+            self.dropped(dropped);
         }
-        let (loss, psnr_db) = (f64::from(report.loss), -10.0 * report.squared_error.log10());
+        self.show(iteration, outcome.loss, outcome.squared_error, &format!("{n_gaussians} Gaussians"));
+    }
+
+    /// * `size`: how much there is of the scene, in words.
+    fn show(&mut self, iteration: u32, loss: f64, squared_error: f64, size: &str) {
+        let psnr_db = -10.0 * squared_error.log10();
         let newest = NEWEST.max(1.0 / f64::from(iteration - self.from));
         // A step that was dropped may have no number to show.
         if loss.is_finite() && psnr_db.is_finite() {
             self.loss += newest * (loss - self.loss);
             self.psnr_db += newest * (psnr_db - self.psnr_db);
         }
-        let bits = report.rate.map(|rate| format!("  {:.0} bits each", rate.bits.iter().sum::<f64>()));
-        let state = format!(
-            "training PSNR {:.2} dB  {} anchors{}  loss {:.4}",
-            self.psnr_db,
-            scene.anchors.len(),
-            bits.unwrap_or_default(),
-            self.loss,
-        );
+        let state = format!("training PSNR {:.2} dB  {size}  loss {:.4}", self.psnr_db, self.loss);
         if self.on_terminal {
             self.bar.set_position(u64::from(iteration));
             self.bar.set_message(state);
@@ -118,6 +117,18 @@ impl Observer for Progress {
             let rate = two_digits(per_second);
             eprintln!("{iteration}/{}  {left:.0} s left  {rate} it/s  {state}", self.iterations);
         }
+    }
+}
+
+impl Observer for Progress {
+    fn step(&mut self, iteration: u32, report: &StepReport<f32>, scene: &Scene<f32>) {
+        if let Some(mut estimate) = self.estimate.take() {
+            estimate.step(iteration, scene.anchors.len(), |line| self.say(line));
+            self.estimate = Some(estimate);
+        }
+        let bits = report.rate.map(|rate| format!("  {:.0} bits each", rate.bits.iter().sum::<f64>()));
+        let size = format!("{} anchors{}", scene.anchors.len(), bits.unwrap_or_default());
+        self.show(iteration, f64::from(report.loss), report.squared_error, &size);
     }
 
     fn dropped(&mut self, step: &DroppedStep) {

@@ -1,11 +1,13 @@
 //! `pocketsplat render`: views of a capture, or of a bundle alone, as pictures.
 
 mod cameras;
+mod explicit;
 mod pictures;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
+use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Image, Split, View};
 use pocketsplat_core::Bundle;
 use pocketsplat_trainer::render::decoder::core_image;
@@ -15,6 +17,7 @@ use rayon::prelude::*;
 use super::bundle::BundleFile;
 use super::capture::{CaptureArgs, views_of};
 use super::eval::{Renderer, reference_image};
+use super::gaussians::GaussiansFile;
 use super::output;
 use crate::config::CaptureOptions;
 use crate::config::named::{SPLITS, one_of};
@@ -26,10 +29,12 @@ use pictures::Format;
 const OF_A_CAPTURE: [&str; 7] = ["dataset", "split", "max_resolution", "background", "images", "model", "test_every"];
 
 /// Draw a bundle as pictures: views of a capture, the bundle's own camera, a turn around it, or cameras of a file.
+///
+/// Of a .ply or .spz it draws views of a capture.
 #[derive(clap::Args)]
 #[command(group = clap::ArgGroup::new("cameras").required(true).args(["view", "all", "preview", "orbit", "camera"]))]
 pub(crate) struct Args {
-    /// The bundle.
+    /// The bundle, or the .ply or .spz.
     bundle: PathBuf,
     /// Folder of the capture, as for eval
     #[arg(required_unless_present_any = ["preview", "orbit", "camera"])]
@@ -66,13 +71,20 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
-    let file = BundleFile::read(&args.bundle)?;
-    let bundle = file.parse()?;
     let format = Format::of(&args.output)?;
     output::check_writable(&args.output)?;
-    let shots = shots(args, &file, &bundle)?;
-    format.check(shots.len(), args.contact_sheet, &args.output)?;
-    let pictures = draw(&bundle, &shots, args.renderer)?;
+    let (shots, pictures) = if GaussiansFile::is_one(&args.bundle) {
+        let (shots, pictures) = explicit::draw(args)?;
+        format.check(shots.len(), args.contact_sheet, &args.output)?;
+        (shots, pictures)
+    } else {
+        let file = BundleFile::read(&args.bundle)?;
+        let bundle = file.parse()?;
+        let shots = shots(args, &file, &bundle)?;
+        format.check(shots.len(), args.contact_sheet, &args.output)?;
+        let pictures = draw(&bundle, &shots, args.renderer)?;
+        (shots, pictures)
+    };
     let written = pictures::write(&pictures, format, args.contact_sheet, &args.output)?;
     let (Some(first), Some(picture), Some(shot)) = (written.first(), pictures.first(), shots.first()) else {
         bail!("there is no view to draw");
@@ -85,6 +97,11 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let place = if format == Format::Folder { args.output.display() } else { first.display() };
     println!("{place}: {}×{} px, {what}", picture.width_px, picture.height_px);
     Ok(())
+}
+
+/// The cameras of a file as `--camera` reads it.
+pub(super) fn cameras_of_file(path: &Path) -> Result<Vec<Camera>> {
+    Ok(cameras::of_file(path)?.into_iter().map(|shot| shot.camera).collect())
 }
 
 /// What to draw, in its order.

@@ -1,10 +1,12 @@
 //! What decides how a run trains, as options of every command that trains; each may also stand in a configuration.
 
 use anyhow::{Result, bail};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use pocketsplat_capture::dataset::Background;
 use pocketsplat_trainer::device::ModelChoice;
 use pocketsplat_trainer::effects::{Effect, Request};
 use pocketsplat_trainer::encode::CoderChoice;
+use pocketsplat_trainer::explicit::CloudConfig;
 use pocketsplat_trainer::scene::QuantisationSteps;
 use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::config::Backbone;
@@ -13,16 +15,19 @@ use pocketsplat_trainer::train::module::{Distribution, Modules, Pruning, Rdo};
 
 use crate::config::heading::{OUTPUT, QUALITY, RUN};
 use crate::config::named::{BACKBONES, CODERS, one_of};
-use crate::config::{CaptureOptions, RunConfig};
+use crate::config::{CaptureOptions, EXPLICIT, ExplicitRunConfig, RunConfig};
+use serde::Deserialize as _;
+use serde::de::IntoDeserializer as _;
+use serde::de::value::StrDeserializer;
 
 /// How good a scene becomes, and how large.
 #[derive(clap::Args)]
 pub(crate) struct QualityOptions {
     /// Kind of scene: scaffold (Scaffold-GS) is trained for the image alone; hac (HAC), hac-plus (HAC++) and contextgs (ContextGS)
-    /// for image and size
+    /// for image and size; 3dgs (3D Gaussian Splatting) makes an uncompressed .ply to compare with
     /// [default: hac]
-    #[arg(long, value_parser = one_of::<Backbone>(BACKBONES), help_heading = QUALITY)]
-    backbone: Option<Backbone>,
+    #[arg(long, value_parser = backbone_choice(), help_heading = QUALITY)]
+    backbone: Option<BackboneChoice>,
     /// Training steps, with which all schedules scale [default: by the preset for train, else 30000]
     #[arg(long, value_name = "N", help_heading = QUALITY)]
     iterations: Option<u32>,
@@ -66,6 +71,26 @@ pub(crate) struct QualityOptions {
         help = with_default("Hold out every N-th training view, and measure the tiers with these instead of test views; 0 holds out none",
         TrainConfig::default().validation_every))]
     validation_every: Option<u32>,
+}
+
+/// What `--backbone` names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum BackboneChoice {
+    /// Anchors, which make a bundle.
+    Anchors(Backbone),
+    /// Explicit Gaussians, which make a file of Gaussians.
+    Explicit,
+}
+
+fn backbone_choice() -> impl TypedValueParser<Value = BackboneChoice> {
+    let named = |name: String| -> Result<BackboneChoice, serde::de::value::Error> {
+        if name == EXPLICIT {
+            return Ok(BackboneChoice::Explicit);
+        }
+        let name: StrDeserializer<'_, serde::de::value::Error> = name.as_str().into_deserializer();
+        Backbone::deserialize(name).map(BackboneChoice::Anchors)
+    };
+    PossibleValuesParser::new(BACKBONES).try_map(named)
 }
 
 /// How a run proceeds.
@@ -130,14 +155,50 @@ pub(crate) fn applied(
 }
 
 impl QualityOptions {
-    fn apply_to(&self, config: &mut RunConfig) -> Result<()> {
+    /// Whether explicit Gaussians are asked for in place of anchors.
+    pub(crate) fn is_explicit(&self) -> bool {
+        self.backbone == Some(BackboneChoice::Explicit)
+    }
+
+    /// Sets what holds for explicit Gaussians too.
+    pub(crate) fn apply_to_explicit(&self, gaussians: &mut CloudConfig) {
+        gaussians.iterations = self.iterations.unwrap_or(gaussians.iterations);
+    }
+
+    /// The given options that say nothing about explicit Gaussians.
+    pub(crate) fn of_anchors(&self) -> Vec<&'static str> {
+        let Self { backbone: _, iterations: _, effects, modules, feature_dim, offsets, voxel_size, .. } = self;
+        let Self { max_anchors, keep_anchors, feature_step, coder, tiers, validation_every, .. } = self;
+        [
+            ("--effects", effects.is_some()),
+            ("--modules", modules.is_some()),
+            ("--feature-dim", feature_dim.is_some()),
+            ("--offsets", offsets.is_some()),
+            ("--voxel-size", voxel_size.is_some()),
+            ("--max-anchors", max_anchors.is_some()),
+            ("--keep-anchors", keep_anchors.is_some()),
+            ("--feature-step", feature_step.is_some()),
+            ("--coder", coder.is_some()),
+            ("--tiers", tiers.is_some()),
+            ("--validation-every", validation_every.is_some()),
+        ]
+        .into_iter()
+        .filter_map(|(name, given)| given.then_some(name))
+        .collect()
+    }
+
+    /// Sets what the options say.
+    pub(crate) fn apply_to(&self, config: &mut RunConfig) -> Result<()> {
         fn set<T: Clone>(into: &mut T, given: &Option<T>) {
             if let Some(value) = given {
                 *into = value.clone();
             }
         }
         let (encoding, train) = (&mut config.encoding, &mut config.train);
-        if let Some(backbone) = self.backbone {
+        if self.is_explicit() {
+            bail!("--backbone {EXPLICIT} makes a .ply; it works with `pocketsplat train CAPTURE -o SCENE.ply` alone");
+        }
+        if let Some(BackboneChoice::Anchors(backbone)) = self.backbone {
             *train = train.with_backbone(backbone);
             if !backbone.is_coded() {
                 // Nothing is worth its bits where there are none.
@@ -218,6 +279,17 @@ fn attach(modules: &mut Modules, names: &[TrainingModule]) -> Result<()> {
 }
 
 impl RunOptions {
+    /// The same for explicit Gaussians.
+    pub(crate) fn applied_to_explicit(&self, mut config: ExplicitRunConfig) -> Result<ExplicitRunConfig> {
+        if self.fork_at.is_some() {
+            bail!("--fork-at works with anchors alone; leave it out with --backbone {EXPLICIT}");
+        }
+        config.checkpoint_every = self.checkpoint_every.or(config.checkpoint_every);
+        config.keep_checkpoints |= self.keep_checkpoints;
+        config.gaussians.seed = self.seed.unwrap_or(config.gaussians.seed);
+        if self.set.is_empty() { Ok(config) } else { config.with_keys(&self.set) }
+    }
+
     fn applied_to(&self, mut config: RunConfig) -> Result<RunConfig> {
         config.checkpoint_every = self.checkpoint_every.or(config.checkpoint_every);
         config.keep_checkpoints |= self.keep_checkpoints;
@@ -241,6 +313,14 @@ impl RunOptions {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_backbone_that_help_shows_is_parsed() {
+        for name in BACKBONES {
+            let parsed = backbone_choice().parse_ref(&clap::Command::new("test"), None, name.as_ref());
+            assert_eq!(parsed.expect(name) == BackboneChoice::Explicit, *name == EXPLICIT);
+        }
+    }
 
     #[test]
     fn what_stays_and_what_ranks_it_follows_pruning_by_worth() {

@@ -1,5 +1,7 @@
 //! `pocketsplat train`: a capture in, a bundle out.
 
+mod explicit;
+
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
@@ -25,7 +27,7 @@ use super::process::peak_memory_bytes;
 use super::progress::Progress;
 use super::train_args::Args;
 use super::{effects, output, report, stop, watch};
-use crate::config::{CaptureOptions, Protocol, RunConfig};
+use crate::config::{CaptureOptions, ExplicitRunConfig, Protocol, RunConfig};
 
 /// Seconds between checkpoints unless the user says otherwise: what an accident may cost.
 const CHECKPOINT_SECONDS: f64 = 60.0;
@@ -80,12 +82,16 @@ pub(crate) struct HeldOut {
 pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     match args.resume() {
         Some(path) => resume(args, path),
+        None if args.is_explicit() => explicit::begin(args),
         None => begin(args),
     }
 }
 
 fn resume(args: &Args, path: &Path) -> Result<ExitCode> {
     let folder = RunFolder::reopen(path)?;
+    if ExplicitRunConfig::is_one(&folder.config()?) {
+        return explicit::resume(args, folder);
+    }
     let begun = RunConfig::parse(&folder.config()?);
     let begun = begun.with_context(|| format!("the config.toml in {} cannot be used", path.display()))?;
     let mut config = args.applied_to(begun.clone())?;
@@ -104,7 +110,7 @@ fn begin(args: &Args) -> Result<ExitCode> {
     output::check_writable(&config.output)?;
     // Before the folder is touched: a capture or checkpoint that does not load must not cost an earlier run its results.
     let capture = load(&mut config)?;
-    let path = args.run_folder(&config)?;
+    let path = args.run_folder(&config.output)?;
     let start = match args.fork() {
         Some((run, _)) if run.canonicalize().ok() == path.canonicalize().ok() => {
             bail!("{} cannot be both the run to begin from and the new one; choose another --output", path.display())
@@ -156,15 +162,21 @@ pub(crate) fn load(config: &mut RunConfig) -> Result<Capture> {
     // At once: large captures take their time.
     eprintln!("reading {}", config.dataset.display());
     let capture = source.load(config.train.seed)?;
+    check_size(&capture)?;
+    config.train = config.train.resolved_for(&capture);
+    eprintln!("voxel size {:.5}, normalised units", config.train.voxel_size_for(&capture));
+    Ok(capture)
+}
+
+/// Refuses photographs that the decoder cannot draw.
+fn check_size(capture: &Capture) -> Result<()> {
     let (largest, most) = (capture.largest_px().into_iter().max().unwrap_or(0), u32::from(MAX_FRAME_PX));
     if largest > most {
         bail!(
             "the photographs are {largest} px wide or high and the decoder draws {most}; use --max-resolution {most}"
         );
     }
-    config.train = config.train.resolved_for(&capture);
-    eprintln!("voxel size {:.5}, normalised units", config.train.voxel_size_for(&capture));
-    Ok(capture)
+    Ok(())
 }
 
 /// Where a run begins.
@@ -196,7 +208,7 @@ pub(crate) fn train_in<'a>(
         Start::Resumed => resumed(&folder, config, capture)?,
         Start::Forked(trainer) => {
             // Without it a resumed run would begin with the capture's points.
-            folder.save(&trainer)?;
+            folder.save(&*trainer)?;
             *trainer
         }
     };
@@ -256,9 +268,20 @@ fn resumed<'a>(folder: &RunFolder, config: &RunConfig, capture: &'a Capture) -> 
 
 /// Trains on a capture that was loaded as it is, without a run folder, and writes the bundle.
 pub(crate) fn train(capture: &Capture, config: TrainConfig, encoding: &Encoding, output: &Path) -> Result<TrainResult> {
+    train_as(capture, config, &CaptureOptions::default(), encoding, output)
+}
+
+/// As [`train`]; the bundle says that the capture was loaded with `options`.
+pub(crate) fn train_as(
+    capture: &Capture,
+    config: TrainConfig,
+    options: &CaptureOptions,
+    encoding: &Encoding,
+    output: &Path,
+) -> Result<TrainResult> {
     let mut trainer = Trainer::new(capture, config)?;
     trainer.run(&mut Progress::new(0, config.iterations))?;
-    write_bundle(&trainer, capture, &CaptureOptions::default(), encoding, output)
+    write_bundle(&trainer, capture, options, encoding, output)
 }
 
 /// The views that tiers are measured with: those held out of training for it, else some of the test views.

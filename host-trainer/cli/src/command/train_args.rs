@@ -4,13 +4,15 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use bytesize::ByteSize;
+use pocketsplat_capture::dataset::Background;
 use pocketsplat_trainer::device::{Limits, ModelChoice, Processor, choose};
 use pocketsplat_trainer::effects::Price;
+use pocketsplat_trainer::explicit::CloudConfig;
 
 use super::settings::{QualityOptions, RunOptions, applied};
 use crate::config::heading::{DEVICE, OUTPUT, QUALITY, RUN};
 use crate::config::named::{TARGETS, one_of};
-use crate::config::{CaptureOptions, Preset, RunConfig};
+use crate::config::{CaptureOptions, EXPLICIT, ExplicitRunConfig, Preset, RunConfig};
 
 /// Train a scene from a capture and write it as a bundle.
 ///
@@ -23,7 +25,7 @@ pub(crate) struct Args {
     dataset: Option<PathBuf>,
     #[command(flatten)]
     capture: CaptureOptions,
-    /// Bundle to write.
+    /// Bundle to write; with --backbone 3dgs a .ply
     #[arg(short, long, value_name = "OUT.psb", required_unless_present_any = ["config", "resume"], help_heading = OUTPUT)]
     output: Option<PathBuf>,
     /// Folder for configuration, progress and checkpoints [default: OUT.run]
@@ -72,7 +74,7 @@ pub(crate) struct Args {
 
 /// What the device has that the bundle is for; what else the command line leaves open is chosen by it.
 #[derive(clap::Args)]
-struct DeviceArgs {
+pub(crate) struct DeviceArgs {
     /// Scratch bytes of the decoder, as 192KiB, excluding stack and frame buffer; the lowest tier is guaranteed to fit
     /// [default: no limit]
     #[arg(long, value_name = "BYTES", help_heading = DEVICE)]
@@ -92,6 +94,24 @@ impl DeviceArgs {
             flash_bytes: self.flash.map(|bytes| bytes.as_u64()),
             frame_instructions: self.target.map(Processor::frame_instructions),
         }
+    }
+
+    /// Sets the limits, and what they afford where the options leave it open; nothing without limits.
+    pub(crate) fn choose(&self, quality: &QualityOptions, lambda: Option<f64>, config: &mut RunConfig) -> Result<()> {
+        let limits = self.limits();
+        if limits.is_none() {
+            return Ok(());
+        }
+        config.encoding.limits = limits;
+        let choice = choose(&limits)?;
+        quality.choose(&mut config.train, &choice);
+        config.train.hac.lambda = lambda.unwrap_or(choice.lambda);
+        let ModelChoice { feature_dim, n_offsets, max_anchors, lambda, binding } = choice;
+        eprintln!(
+            "for this device: features of width {feature_dim}, {n_offsets} offsets, at most {max_anchors} anchors (limited by \
+             {binding}), lambda {lambda}; options override these"
+        );
+        Ok(())
     }
 }
 
@@ -141,14 +161,7 @@ impl Args {
         }
         let mut config = self.applied_to(base)?;
         if is_for_device {
-            let choice = choose(&limits)?;
-            self.quality.choose(&mut config.train, &choice);
-            config.train.hac.lambda = self.lambda.unwrap_or(choice.lambda);
-            let ModelChoice { feature_dim, n_offsets, max_anchors, lambda, binding } = choice;
-            eprintln!(
-                "for this device: features of width {feature_dim}, {n_offsets} offsets, at most {max_anchors} anchors (limited by \
-                 {binding}), lambda {lambda}; options override these"
-            );
+            self.device.choose(&self.quality, self.lambda, &mut config)?;
         }
         for (path, name, option) in [(&config.dataset, "dataset", "DATASET"), (&config.output, "output", "--output")] {
             if path.as_os_str().is_empty() {
@@ -187,11 +200,63 @@ impl Args {
         applied(&self.capture, &self.quality, &self.options, config)
     }
 
+    /// Whether explicit Gaussians are asked for.
+    pub(crate) fn is_explicit(&self) -> bool {
+        self.quality.is_explicit()
+    }
+
+    /// The configuration of a new run on explicit Gaussians.
+    pub(crate) fn explicit(&self) -> Result<ExplicitRunConfig> {
+        for (name, given) in [("--config", self.config.is_some()), ("--from", self.from.is_some())] {
+            if given {
+                bail!("{name} works with anchors alone; leave it out with --backbone {EXPLICIT}");
+            }
+        }
+        let preset = self.preset.unwrap_or_default().config();
+        let gaussians = CloudConfig { iterations: preset.train.iterations, ..CloudConfig::default() };
+        let (Some(dataset), Some(output)) = (&self.dataset, &self.output) else {
+            bail!("the run needs DATASET and --output");
+        };
+        let config = ExplicitRunConfig::new(dataset.clone(), output.clone(), preset.capture, gaussians);
+        self.applied_to_explicit(config)
+    }
+
+    /// `config` with everything replaced that the command line says.
+    pub(crate) fn applied_to_explicit(&self, mut config: ExplicitRunConfig) -> Result<ExplicitRunConfig> {
+        let DeviceArgs { ram, flash, target } = &self.device;
+        let mut refused = self.quality.of_anchors();
+        let device = [("--ram", ram.is_some()), ("--flash", flash.is_some()), ("--target", target.is_some())];
+        let others = [("--lambda", self.lambda.is_some()), ("--watch", self.watch.is_some())];
+        let given = others.into_iter().chain(device).filter(|(_, given)| *given);
+        refused.extend(given.map(|(name, _)| name));
+        if !refused.is_empty() {
+            bail!(
+                "{} does not go with --backbone {EXPLICIT}, which trains Gaussians and compresses nothing; leave it out",
+                refused.join(", ")
+            );
+        }
+        if self.capture.background == Some(Background::Learned) {
+            bail!("--background learned works with anchors alone; choose black or white with --backbone {EXPLICIT}");
+        }
+        config.capture = self.capture.or(&config.capture);
+        self.quality.apply_to_explicit(&mut config.gaussians);
+        config = self.options.applied_to_explicit(config)?;
+        for (into, given) in [(&mut config.dataset, &self.dataset), (&mut config.output, &self.output)] {
+            let path = given.as_ref().unwrap_or(into);
+            // Absolute, so that the run can go on from any folder.
+            *into = std::path::absolute(path).with_context(|| format!("{} is not a path", path.display()))?;
+        }
+        config.gaussians.validate()?;
+        Ok(config)
+    }
+
     /// Where a new run works.
-    pub(crate) fn run_folder(&self, config: &RunConfig) -> Result<PathBuf> {
-        let folder = self.run.clone().unwrap_or_else(|| config.output.with_extension("run"));
-        if std::path::absolute(&folder).ok() == std::path::absolute(&config.output).ok() {
-            bail!("{} cannot be both bundle and run folder; choose another folder with --run", folder.display());
+    ///
+    /// * `output`: what it writes in the end.
+    pub(crate) fn run_folder(&self, output: &Path) -> Result<PathBuf> {
+        let folder = self.run.clone().unwrap_or_else(|| output.with_extension("run"));
+        if std::path::absolute(&folder).ok() == std::path::absolute(output).ok() {
+            bail!("{} cannot be both output and run folder; choose another folder with --run", folder.display());
         }
         Ok(folder)
     }

@@ -2,6 +2,7 @@
 
 mod capture;
 mod effects;
+mod explicit;
 pub(crate) mod heading;
 pub(crate) mod named;
 mod preset;
@@ -19,6 +20,7 @@ use toml::{Table, Value};
 
 pub(crate) use capture::CaptureOptions;
 pub(crate) use effects::EffectsConfig;
+pub(crate) use explicit::{EXPLICIT, ExplicitRunConfig};
 pub(crate) use preset::Preset;
 pub(crate) use protocol::Protocol;
 
@@ -89,21 +91,7 @@ impl RunConfig {
     /// The same with some keys set, each given as `table.key=value`; what is no TOML value is taken as text.
     pub(crate) fn with_keys(&self, keys: &[String]) -> Result<Self> {
         let mut all = Table::try_from(self)?;
-        let mut given = Table::new();
-        for key in keys {
-            let Some((path, value)) = key.split_once('=') else {
-                bail!("`{key}` sets nothing; needs KEY=VALUE, as train.hac.sample=0.1");
-            };
-            let value = format!("x = {value}").parse::<Table>().ok().and_then(|mut table| table.remove("x"));
-            let value = value.unwrap_or_else(|| Value::String(key[path.len() + 1..].to_owned()));
-            let nested = path
-                .trim()
-                .rsplit('.')
-                .fold(value, |inner, name| Value::Table(Table::from_iter([(name.to_owned(), inner)])));
-            if let Value::Table(nested) = nested {
-                merge(&mut given, &nested);
-            }
-        }
+        let given = keys_of(keys)?;
         merge(&mut all, &given);
         let config: Self = all.try_into()?;
         refuse_unknown(&given, &Table::try_from(&config)?, "")?;
@@ -156,6 +144,26 @@ pub(crate) struct Difference {
     pub(crate) other: String,
 }
 
+/// Keys given as `table.key=value`, as tables; what is no TOML value is taken as text.
+fn keys_of(keys: &[String]) -> Result<Table> {
+    let mut given = Table::new();
+    for key in keys {
+        let Some((path, value)) = key.split_once('=') else {
+            bail!("`{key}` sets nothing; needs KEY=VALUE, as train.hac.sample=0.1");
+        };
+        let value = format!("x = {value}").parse::<Table>().ok().and_then(|mut table| table.remove("x"));
+        let value = value.unwrap_or_else(|| Value::String(key[path.len() + 1..].to_owned()));
+        let nested = path
+            .trim()
+            .rsplit('.')
+            .fold(value, |inner, name| Value::Table(Table::from_iter([(name.to_owned(), inner)])));
+        if let Value::Table(nested) = nested {
+            merge(&mut given, &nested);
+        }
+    }
+    Ok(given)
+}
+
 /// All keys at which two configurations differ in what `deciding` leaves of them.
 fn differences(
     one: &RunConfig,
@@ -163,9 +171,14 @@ fn differences(
     deciding: impl Fn(RunConfig) -> RunConfig,
 ) -> Result<Vec<Difference>> {
     let table = |config: &RunConfig| Table::try_from(deciding(config.clone()));
+    Ok(table_differences(&table(one)?, &table(other)?))
+}
+
+/// All keys at which two tables differ.
+fn table_differences(one: &Table, other: &Table) -> Vec<Difference> {
     let mut all = Vec::new();
-    collect_differences(&table(one)?, &table(other)?, "", &mut all);
-    Ok(all)
+    collect_differences(one, other, "", &mut all);
+    all
 }
 
 /// The backbone that a configuration names; its defaults stand for what else is missing.

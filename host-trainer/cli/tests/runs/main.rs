@@ -7,6 +7,7 @@ mod chromium;
 mod configuration;
 mod device;
 mod effects;
+mod explicit;
 mod fixture;
 mod interruption;
 mod modules;

@@ -75,16 +75,7 @@ impl From<&Gaussians> for Cloud<f32> {
     fn from(gaussians: &Gaussians) -> Self {
         let Gaussians { degree, centres, log_scales, rotations, opacity_logits, harmonics } = gaussians.clone();
         let n_coefficients = degree.n_coefficients();
-        Self {
-            degree,
-            compensation: false,
-            n_coefficients,
-            centres,
-            log_scales,
-            rotations,
-            opacity_logits,
-            harmonics,
-        }
+        Self { degree, compensation: false, n_coefficients, centres, log_scales, rotations, opacity_logits, harmonics }
     }
 }
 

@@ -1,18 +1,22 @@
 //! Explicit Gaussians with spherical harmonics (Kerbl et al. 2023, 3D Gaussian Splatting): drawn, and trained.
 //!
 //! [`cloud`] holds them in any number type, [`step`] draws one view and takes its loss back to them, [`render`] makes pictures of a file's,
-//! [`train`] the rest of a run: [`start`], [`optimiser`], [`density`], [`checkpoint`].
+//! [`train`] the rest of a run: [`start`], [`optimiser`], [`density`], [`checkpoint`]. For those that come without
+//! photographs, [`bulk`] says where they are, [`views`] stands cameras around them, and [`pictures`] makes a capture of what these see.
 
+pub mod bulk;
 pub mod checkpoint;
 pub mod cloud;
 pub mod config;
 pub mod density;
 pub mod frame;
 pub mod optimiser;
+pub mod pictures;
 pub mod render;
 pub mod start;
 pub mod step;
 pub mod train;
+pub mod views;
 
 pub use cloud::Cloud;
 pub use config::CloudConfig;

@@ -1,0 +1,89 @@
+//! A file of explicit Gaussians on disk and what it says about the capture it was trained on.
+
+use std::path::Path;
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use pocketsplat_capture::dataset::{Background, Capture, Normalisation};
+use pocketsplat_gaussians::{Format, Gaussians, Notes};
+use pocketsplat_trainer::explicit::frame;
+use pocketsplat_trainer::explicit::render::Renderer;
+
+use super::capture::CaptureArgs;
+use crate::config::{CaptureOptions, Protocol};
+
+/// Begins each comment that is a line of the protocol.
+const PROTOCOL: &str = "pocketsplat ";
+
+/// A file of Gaussians, read.
+pub(crate) struct GaussiansFile {
+    pub(crate) n_bytes: usize,
+    /// In the frame of the file.
+    pub(crate) gaussians: Gaussians,
+    notes: Notes,
+    /// Seconds that reading took.
+    pub(crate) read_s: f64,
+}
+
+impl GaussiansFile {
+    /// Whether a file is one by its name.
+    pub(crate) fn is_one(path: &Path) -> bool {
+        Format::of_path(path).is_some()
+    }
+
+    pub(crate) fn read(path: &Path) -> Result<Self> {
+        let started = Instant::now();
+        let (gaussians, notes) = Format::read(path)?;
+        let read_s = started.elapsed().as_secs_f64();
+        if !notes.ignored.is_empty() {
+            eprintln!(
+                "warning: {} has more than Gaussians, which is left out: {}",
+                path.display(),
+                notes.ignored.join(", ")
+            );
+        }
+        let metadata = std::fs::metadata(path).with_context(|| format!("could not read {}", path.display()))?;
+        let n_bytes = usize::try_from(metadata.len())?;
+        Ok(Self { n_bytes, gaussians, notes, read_s })
+    }
+
+    /// What a run writes beside its Gaussians.
+    pub(crate) fn notes_of(protocol: &Protocol) -> Result<Notes> {
+        let comments = protocol.to_text()?.lines().map(|line| format!("{PROTOCOL}{line}")).collect();
+        Ok(Notes { comments, ..Notes::default() })
+    }
+
+    /// Loads the capture as that of the file was prepared, but for what the command line says; warns where it is another one.
+    pub(crate) fn load(&self, args: &CaptureArgs) -> Result<(CaptureOptions, Capture)> {
+        let protocol = self.protocol();
+        let black = CaptureOptions { background: Some(Background::Black), ..CaptureOptions::default() };
+        let trained_with = protocol.as_ref().map_or(black, |protocol| protocol.options.clone());
+        let options = args.options.or(&trained_with);
+        if let Some(protocol) = &protocol {
+            eprintln!("as the file says: {protocol}");
+        }
+        let capture = CaptureArgs { dataset: args.dataset.clone(), options: options.clone() }.load(0)?;
+        if let Some(why) = protocol.and_then(|protocol| protocol.contradiction(&capture)) {
+            eprintln!("warning: {why}");
+        }
+        Ok((options, capture))
+    }
+
+    /// Whether opacities are to be scaled by what the dilation adds to a splat's area.
+    pub(crate) fn compensation(&self) -> bool {
+        self.notes.compensation
+    }
+
+    /// What the file says of its photographs; nothing in files of other writers.
+    fn protocol(&self) -> Option<Protocol> {
+        let lines: Vec<&str> = self.notes.comments.iter().filter_map(|line| line.strip_prefix(PROTOCOL)).collect();
+        if lines.is_empty() { None } else { Protocol::parse(&lines.join("\n")).ok() }
+    }
+
+    /// Draws for the cameras of a capture.
+    pub(crate) fn renderer(&self, normalisation: &Normalisation) -> Renderer {
+        let mut gaussians = self.gaussians.clone();
+        frame::to_normalised(&mut gaussians, normalisation);
+        Renderer::new(&gaussians).with_compensation(self.notes.compensation)
+    }
+}

@@ -1,0 +1,205 @@
+//! `pocketsplat import`: explicit Gaussians in, a bundle out.
+
+mod cameras;
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result, bail};
+use pocketsplat_capture::camera::Camera;
+use pocketsplat_capture::dataset::{Background, Capture, FrameSize};
+use pocketsplat_core::budget::MAX_FRAME_PX;
+use pocketsplat_trainer::explicit::bulk::Bulk;
+use pocketsplat_trainer::explicit::pictures::{Pictures, capture};
+use pocketsplat_trainer::explicit::views::generated;
+use serde::Serialize;
+
+use super::gaussians::GaussiansFile;
+use super::settings::QualityOptions;
+use super::train::{HeldOut, TrainResult, train_as};
+use super::train_args::DeviceArgs;
+use super::{output, process};
+use crate::config::heading::{INPUT, OUTPUT, QUALITY, RUN};
+use crate::config::named::{BACKGROUNDS, one_of};
+use crate::config::{CaptureOptions, Preset, RunConfig};
+
+/// Longest side of the pictures unless the user says otherwise, px.
+const LONGEST_PX: u32 = 200;
+
+/// One camera in so many is held out.
+const HELD_OUT_EVERY: usize = 8;
+
+/// Centres that training starts from, at most.
+const N_POINTS: usize = 20_000;
+
+/// Weight of a value's bits in the loss.
+const LAMBDA: f64 = 0.0005;
+
+/// Compress splats that exist already: draw pictures of a .ply or .spz, train a bundle on them, and measure what it lost.
+///
+/// Cameras stand around the scene's bulk, or inside it where it lies all around its centre; --cameras gives others.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// The .ply or .spz.
+    points: PathBuf,
+    /// Cameras to draw with, in the frame of the splats: a transforms.json, or a file as `render --camera` reads it
+    /// [default: generated]
+    #[arg(long, value_name = "FILE.json", help_heading = INPUT)]
+    cameras: Option<PathBuf>,
+    /// Generated cameras to train with; one in eight as many is added to measure with.
+    #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(2..=10_000),
+        conflicts_with = "cameras", help_heading = INPUT)]
+    views: u32,
+    /// Size of the pictures [default: 200x200; with --cameras theirs, at most 200 px]
+    #[arg(long, value_name = "WxH", help_heading = INPUT)]
+    resolution: Option<FrameSize>,
+    /// Colour behind the splats
+    #[arg(long, value_name = "COLOUR", value_parser = one_of::<Background>(BACKGROUNDS), default_value = BACKGROUNDS[0],
+        help_heading = INPUT)]
+    background: Background,
+    /// Bundle to write.
+    #[arg(short, long, value_name = "OUT.psb", help_heading = OUTPUT)]
+    output: PathBuf,
+    /// Print the result as JSON [default: as text]
+    #[arg(long, help_heading = OUTPUT)]
+    json: bool,
+    #[command(flatten)]
+    quality: QualityOptions,
+    /// Weight of a value's bits in the loss: the larger, the smaller the bundle [default: 0.0005; by --flash for a device]
+    #[arg(long, value_name = "X", help_heading = QUALITY)]
+    lambda: Option<f64>,
+    #[command(flatten)]
+    device: DeviceArgs,
+    /// Seed of all random numbers: the same seed on the same machine gives the same bundle.
+    #[arg(long, value_name = "N", default_value_t = 42, help_heading = RUN)]
+    seed: u64,
+}
+
+/// What an import reports.
+#[derive(Debug, Serialize)]
+struct ImportResult {
+    /// See [`output::SCHEMA_VERSION`].
+    schema_version: u32,
+    bundle: PathBuf,
+    bundle_bytes: usize,
+    /// Of the file that was imported.
+    original_bytes: usize,
+    /// How many times smaller the bundle is.
+    times_smaller: f64,
+    original_gaussians: usize,
+    n_anchors: usize,
+    drawn_offsets: usize,
+    /// Of the bundle's frames to the original's, from cameras that training did not have.
+    psnr_to_original_db: f64,
+    ssim_to_original: f64,
+    n_held_out_views: usize,
+    n_training_views: usize,
+    iterations: u32,
+    train_s: f64,
+    train_processor_s: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    peak_memory_bytes: Option<u64>,
+}
+
+pub(crate) fn run(args: &Args) -> Result<()> {
+    if !GaussiansFile::is_one(&args.points) {
+        bail!("{} is no file of Gaussians by its name; needs a .ply, .spz or .sog", args.points.display());
+    }
+    if args.background == Background::Learned {
+        bail!("--background learned is for photographs; choose black or white, which the splats are drawn on");
+    }
+    let config = configured(args)?;
+    output::check_writable(&args.output)?;
+    let file = GaussiansFile::read(&args.points)?;
+    let (train, test) = cameras(args, &file)?;
+    let capture = captured(args, &file, &train, &test)?;
+    eprintln!(
+        "{} Gaussians in {:.1} MB, drawn from {} cameras, {} of them held out",
+        file.gaussians.len(),
+        file.n_bytes as f64 / 1e6,
+        train.len() + test.len(),
+        test.len()
+    );
+    let train = config.train.resolved_for(&capture);
+    let trained = train_as(&capture, train, &config.capture, &config.encoding, &args.output)?;
+    output::print(&result(&file, &capture, trained)?, args.json)?;
+    eprintln!("see it:  pocketsplat view {} -o scene.html", args.output.display());
+    Ok(())
+}
+
+/// What is trained: as `train` does it, with the effects that every scene can have.
+fn configured(args: &Args) -> Result<RunConfig> {
+    let mut config = Preset::Standard.config();
+    config.train.hac.lambda = args.lambda.unwrap_or(LAMBDA);
+    config.train.seed = args.seed;
+    args.quality.apply_to(&mut config)?;
+    args.device.choose(&args.quality, args.lambda, &mut config)?;
+    config.capture = CaptureOptions {
+        max_resolution: None,
+        resolution: args.resolution,
+        background: Some(args.background),
+        ..CaptureOptions::default()
+    };
+    config.train.shape = config.train.modules.shape(config.train.shape);
+    config.check()?;
+    Ok(config)
+}
+
+/// Cameras to train with, and those that are held out.
+fn cameras(args: &Args, file: &GaussiansFile) -> Result<(Vec<Camera>, Vec<Camera>)> {
+    let all = match &args.cameras {
+        Some(path) => cameras::of_file(path, args.resolution, LONGEST_PX)?,
+        None => {
+            let size_px = args.resolution.map_or([LONGEST_PX; 2], |frame| [frame.width_px, frame.height_px]);
+            let bulk = Bulk::of(&file.gaussians).with_context(|| {
+                format!("nothing in {} is opaque enough to stand cameras around; give --cameras", args.points.display())
+            })?;
+            let (n, place) = (args.views as usize, if bulk.surrounds { "inside" } else { "around" });
+            eprintln!("cameras stand {place} the bulk at {:.3}, radius {:.3}", bulk.centre, bulk.radius);
+            generated(&bulk, n + n.div_ceil(HELD_OUT_EVERY - 1), size_px)
+        }
+    };
+    let largest = all.iter().map(|camera| camera.width_px.max(camera.height_px)).max().unwrap_or(0);
+    if largest > u32::from(MAX_FRAME_PX) {
+        bail!(
+            "pictures of {largest} px are wider or higher than the {MAX_FRAME_PX} px that the decoder draws; use --resolution"
+        );
+    }
+    let (mut train, mut test) = (Vec::new(), Vec::new());
+    for (i, camera) in all.into_iter().enumerate() {
+        if i % HELD_OUT_EVERY == HELD_OUT_EVERY - 1 { test.push(camera) } else { train.push(camera) }
+    }
+    if train.len() < 2 || test.is_empty() {
+        bail!("there are {} cameras, needs {HELD_OUT_EVERY}: one in so many is held out", train.len() + test.len());
+    }
+    Ok((train, test))
+}
+
+fn captured(args: &Args, file: &GaussiansFile, train: &[Camera], test: &[Camera]) -> Result<Capture> {
+    let background = args.background.rgb8().map(|channel| f32::from(channel) / 255.0);
+    let how = Pictures { compensation: file.compensation(), background, n_points: N_POINTS, seed: args.seed };
+    let capture = capture(&file.gaussians, train, test, &how);
+    capture.with_context(|| "all cameras stand in one point; give --cameras that stand apart".to_owned())
+}
+
+fn result(file: &GaussiansFile, capture: &Capture, trained: TrainResult) -> Result<ImportResult> {
+    let TrainResult { bundle, bundle_bytes, n_anchors, drawn_offsets, iterations, train_s, .. } = trained;
+    let HeldOut { psnr_db, ssim, n_test_views, .. } = trained.held_out.context("cameras are held out")?;
+    Ok(ImportResult {
+        schema_version: output::SCHEMA_VERSION,
+        bundle,
+        bundle_bytes,
+        original_bytes: file.n_bytes,
+        times_smaller: file.n_bytes as f64 / bundle_bytes as f64,
+        original_gaussians: file.gaussians.len(),
+        n_anchors,
+        drawn_offsets,
+        psnr_to_original_db: psnr_db,
+        ssim_to_original: ssim,
+        n_held_out_views: n_test_views,
+        n_training_views: capture.train.len(),
+        iterations,
+        train_s,
+        train_processor_s: trained.train_processor_s,
+        peak_memory_bytes: process::peak_memory_bytes(),
+    })
+}

@@ -1,0 +1,195 @@
+//! `pocketsplat train --backbone 3dgs`: a capture in, explicit Gaussians out.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::atomic::AtomicBool;
+
+use anyhow::{Context, Result, bail};
+use pocketsplat_capture::dataset::{Background, Capture, Split};
+use pocketsplat_gaussians::Format;
+use pocketsplat_trainer::explicit::CloudTrainer;
+use pocketsplat_trainer::train::run::{Ending, Interval, LoggedStep, RunError, RunFolder};
+use serde::Serialize;
+
+use super::super::capture::CaptureArgs;
+use super::super::eval::explicit::measure;
+use super::super::eval::{Evaluation, Measurements};
+use super::super::gaussians::GaussiansFile;
+use super::super::process::peak_memory_bytes;
+use super::super::progress::Progress;
+use super::super::train_args::Args;
+use super::super::{output, stop};
+use super::{CHECKPOINT_SECONDS, HeldOut, check_size};
+use crate::config::{EXPLICIT, ExplicitRunConfig, Protocol};
+
+/// What a finished run reports.
+#[derive(Debug, Serialize)]
+struct ExplicitResult {
+    /// See [`output::SCHEMA_VERSION`].
+    schema_version: u32,
+    file: PathBuf,
+    file_bytes: usize,
+    n_gaussians: usize,
+    iterations: u32,
+    dropped_steps: u32,
+    train_s: f64,
+    /// Processor time of all threads.
+    train_processor_s: f64,
+    iterations_per_s: f64,
+    background: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    peak_memory_bytes: Option<u64>,
+    /// Over the views that are held out for testing, where there are any: as `eval` measures it.
+    #[serde(flatten)]
+    held_out: Option<HeldOut>,
+    protocol: Protocol,
+}
+
+pub(super) fn begin(args: &Args) -> Result<ExitCode> {
+    let config = args.explicit()?;
+    format_of(&config)?;
+    output::check_writable(&config.output)?;
+    // Before the folder is touched: a capture that does not load must not cost an earlier run its results.
+    let capture = load(&config)?;
+    let path = args.run_folder(&config.output)?;
+    let folder = RunFolder::start(&path, &config.to_toml()?, args.overwrite())?;
+    let trainer = CloudTrainer::new(&capture, config.gaussians)?;
+    train(args, folder, &config, &capture, trainer)
+}
+
+pub(super) fn resume(args: &Args, folder: RunFolder) -> Result<ExitCode> {
+    let begun = ExplicitRunConfig::parse(&folder.config()?);
+    let begun = begun.with_context(|| format!("the config.toml in {} cannot be used", folder.path().display()))?;
+    let config = args.applied_to_explicit(begun.clone())?;
+    if let Some(difference) = begun.difference(&config)? {
+        bail!("the run began with another setting than the command line asks for: {difference}; leave it out");
+    }
+    format_of(&config)?;
+    output::check_writable(&config.output)?;
+    let capture = load(&config)?;
+    let trainer = match folder.newest(|bytes| CloudTrainer::restore(&capture, bytes))? {
+        None => {
+            eprintln!("the run in {} has no checkpoint yet; it begins anew", folder.path().display());
+            CloudTrainer::new(&capture, config.gaussians)?
+        }
+        Some(newest) => {
+            for fault in &newest.passed_over {
+                eprintln!("warning: a checkpoint is damaged, so the run goes on from an older one: {fault}");
+            }
+            let (trainer, then) = (newest.restored.trainer, newest.restored.written_by);
+            if *trainer.config() != config.gaussians {
+                bail!("config.toml and the checkpoint disagree; write back what the run began with");
+            }
+            if then != trainer.kernels() {
+                eprintln!(
+                    "warning: the checkpoint was computed with {then}; this is {}. The run goes on, but will not end in \
+                     the same bits as there",
+                    trainer.kernels()
+                );
+            }
+            eprintln!("going on after iteration {} of {}", trainer.iteration, config.gaussians.iterations);
+            trainer
+        }
+    };
+    train(args, folder, &config, &capture, trainer)
+}
+
+/// The format that the output's name says.
+fn format_of(config: &ExplicitRunConfig) -> Result<Format> {
+    Format::of_path(&config.output).with_context(|| {
+        format!("--backbone {EXPLICIT} writes Gaussians and no bundle: {} has to end in .ply", config.output.display())
+    })
+}
+
+fn load(config: &ExplicitRunConfig) -> Result<Capture> {
+    let source = CaptureArgs { dataset: config.dataset.clone(), options: config.capture.clone() };
+    // At once: large captures take their time.
+    eprintln!("reading {}", config.dataset.display());
+    let capture = source.load(config.gaussians.seed)?;
+    check_size(&capture)?;
+    Ok(capture)
+}
+
+fn train(
+    args: &Args,
+    folder: RunFolder,
+    config: &ExplicitRunConfig,
+    capture: &Capture,
+    trainer: CloudTrainer<'_>,
+) -> Result<ExitCode> {
+    // Not before: until here there is nothing to keep, and Ctrl-C may end the process at once.
+    let stop = stop::flag()?;
+    let Some(result) = train_in(folder, config, capture, trainer, &stop)? else {
+        return Ok(ExitCode::from(stop::INTERRUPTED));
+    };
+    output::print(&result, args.json())?;
+    eprintln!("compress it:  pocketsplat import {} -o scene.psb", config.output.display());
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Trains in a run folder and writes the file; `None` when `stop` was set before the end.
+fn train_in(
+    mut folder: RunFolder,
+    config: &ExplicitRunConfig,
+    capture: &Capture,
+    mut trainer: CloudTrainer<'_>,
+    stop: &AtomicBool,
+) -> Result<Option<ExplicitResult>> {
+    folder.write_config(&config.to_toml()?)?;
+    let interval = config.checkpoint_every.map_or(Interval::Seconds(CHECKPOINT_SECONDS), Interval::Iterations);
+    let how_to_go_on = format!("go on with `pocketsplat train --resume {}`", folder.path().display());
+    let iterations = config.gaussians.iterations;
+    let mut progress = Progress::new(trainer.iteration, iterations);
+    let ending = folder.drive(&mut trainer, interval, stop, |trainer| {
+        let outcome = trainer.advance()?;
+        progress.explicit_step(trainer.iteration, &outcome, trainer.cloud.len());
+        let is_dropped = outcome.dropped.is_some();
+        Ok(LoggedStep { loss: outcome.loss, squared_error: outcome.squared_error, rate: None, is_dropped })
+    });
+    let ending = ending.map_err(|error| {
+        let stopped = format!("training stopped at iteration {}", trainer.iteration);
+        match error {
+            // It would come to the same end again.
+            RunError::Train(_) => anyhow::Error::new(error).context(stopped),
+            _ => anyhow::Error::new(error).context(format!("{stopped}; to retry, {how_to_go_on}")),
+        }
+    })?;
+    if ending == Ending::Interrupted {
+        eprintln!("interrupted after iteration {} of {iterations}; {how_to_go_on}", trainer.iteration);
+        return Ok(None);
+    }
+    let result =
+        write(&trainer, config, capture).with_context(|| format!("the training is done and kept; {how_to_go_on}"))?;
+    folder.finish(&serde_json::to_string_pretty(&result)?, config.keep_checkpoints)?;
+    Ok(Some(result))
+}
+
+fn write(trainer: &CloudTrainer<'_>, config: &ExplicitRunConfig, capture: &Capture) -> Result<ExplicitResult> {
+    let protocol = Protocol::of(capture, &config.capture);
+    let notes = GaussiansFile::notes_of(&protocol)?;
+    let bytes = format_of(config)?.to_bytes(&trainer.gaussians(), &notes)?;
+    output::write_whole(&config.output, &bytes)?;
+    let held_out = if capture.test.is_empty() {
+        None
+    } else {
+        let file = GaussiansFile::read(&config.output)?;
+        let Evaluation { psnr_db, ssim, n_views, views, .. } =
+            measure(&file, capture, &config.capture, Split::Test, &Measurements::default())?;
+        Some(HeldOut { psnr_db, ssim, n_test_views: n_views, views })
+    };
+    Ok(ExplicitResult {
+        schema_version: output::SCHEMA_VERSION,
+        file: config.output.clone(),
+        file_bytes: bytes.len(),
+        n_gaussians: trainer.cloud.len(),
+        iterations: trainer.iteration,
+        dropped_steps: trainer.n_dropped(),
+        train_s: trainer.seconds,
+        train_processor_s: trainer.processor_seconds,
+        iterations_per_s: f64::from(trainer.iteration) / trainer.seconds,
+        background: config.capture.background.unwrap_or(Background::Black).to_string(),
+        peak_memory_bytes: peak_memory_bytes(),
+        held_out,
+        protocol,
+    })
+}

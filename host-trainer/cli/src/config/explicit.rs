@@ -1,0 +1,108 @@
+//! The configuration of a run on explicit Gaussians, beside that of a run on anchors.
+
+use std::path::PathBuf;
+
+use anyhow::{Result, bail};
+use pocketsplat_trainer::explicit::CloudConfig;
+use serde::{Deserialize, Serialize};
+use toml::Table;
+
+use super::{CaptureOptions, Difference, keys_of, merge};
+
+/// The name of explicit Gaussians as a backbone.
+pub(crate) const EXPLICIT: &str = "3dgs";
+
+/// Everything such a run was asked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct ExplicitRunConfig {
+    /// [`EXPLICIT`]: what tells the two kinds of configuration apart.
+    backbone: String,
+    /// Folder of the capture.
+    pub(crate) dataset: PathBuf,
+    /// The file to write.
+    pub(crate) output: PathBuf,
+    /// Iterations from one checkpoint to the next; by time without.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) checkpoint_every: Option<u32>,
+    pub(crate) keep_checkpoints: bool,
+    pub(crate) capture: CaptureOptions,
+    pub(crate) gaussians: CloudConfig,
+}
+
+impl ExplicitRunConfig {
+    /// A run that nothing else is known of.
+    pub(crate) fn new(dataset: PathBuf, output: PathBuf, capture: CaptureOptions, gaussians: CloudConfig) -> Self {
+        let backbone = EXPLICIT.to_owned();
+        Self { backbone, dataset, output, checkpoint_every: None, keep_checkpoints: false, capture, gaussians }
+    }
+
+    /// Whether a configuration is one of these.
+    pub(crate) fn is_one(text: &str) -> bool {
+        text.parse::<Table>().is_ok_and(|table| table.get("backbone").is_some())
+    }
+
+    /// Reads what [`Self::to_toml`] wrote.
+    pub(crate) fn parse(text: &str) -> Result<Self> {
+        let config: Self = toml::from_str(text)?;
+        if config.backbone != EXPLICIT {
+            bail!("`backbone` is {}, needs {EXPLICIT}", config.backbone);
+        }
+        config.gaussians.validate()?;
+        Ok(config)
+    }
+
+    /// As TOML.
+    pub(crate) fn to_toml(&self) -> Result<String> {
+        Ok(toml::to_string(self)?)
+    }
+
+    /// The same with some keys set, each given as `table.key=value`.
+    pub(crate) fn with_keys(&self, keys: &[String]) -> Result<Self> {
+        let mut all = Table::try_from(self)?;
+        merge(&mut all, &keys_of(keys)?);
+        Ok(all.try_into()?)
+    }
+
+    /// The first key at which two differ in what decides the result, with both values.
+    pub(crate) fn difference(&self, other: &Self) -> Result<Option<String>> {
+        let deciding = |config: &Self| {
+            let Self { capture, gaussians, .. } = config.clone();
+            Table::try_from(Self::new(PathBuf::new(), PathBuf::new(), capture, gaussians))
+        };
+        let first = super::table_differences(&deciding(self)?, &deciding(other)?).into_iter().next();
+        Ok(first.map(|Difference { key, one, other }| format!("`{key}` is {one} and {other}")))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn config() -> ExplicitRunConfig {
+        let capture = CaptureOptions { max_resolution: Some(200), ..CaptureOptions::default() };
+        ExplicitRunConfig::new("lego".into(), "lego.ply".into(), capture, CloudConfig::default())
+    }
+
+    #[test]
+    fn a_configuration_comes_back_from_its_text() {
+        let text = config().to_toml().unwrap();
+        assert!(ExplicitRunConfig::is_one(&text), "{text}");
+        assert_eq!(ExplicitRunConfig::parse(&text).unwrap(), config());
+        assert!(!ExplicitRunConfig::is_one(&crate::config::RunConfig::default().to_toml().unwrap()));
+        let other = text.replace("3dgs", "hac");
+        assert!(ExplicitRunConfig::parse(&other).unwrap_err().to_string().contains("needs 3dgs"));
+    }
+
+    #[test]
+    fn keys_can_be_set_and_told_apart() {
+        let keys = ["gaussians.density.interval=50".to_owned(), "gaussians.rates.bands_divisor=10".to_owned()];
+        let changed = config().with_keys(&keys).unwrap();
+        assert_eq!((changed.gaussians.density.interval, changed.gaussians.rates.bands_divisor), (50, 10.0));
+        let said = config().difference(&changed).unwrap().unwrap();
+        assert!(said.contains("gaussians.density.interval") && said.contains("100 and 50"), "{said}");
+        let elsewhere = ExplicitRunConfig { dataset: "moved".into(), ..config() };
+        assert_eq!(config().difference(&elsewhere).unwrap(), None);
+        assert!(config().with_keys(&["gaussians.density.intervall=50".to_owned()]).is_err());
+    }
+}

@@ -7,7 +7,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-jobs=(fmt clippy doc test viewer core-embedded format-doc package link-gate digests firmware demo)
+jobs=(fmt clippy doc test viewer core-embedded format-doc package link-gate digests firmware c demo)
 
 embedded_target=thumbv7em-none-eabihf
 defmt_print_version=1.2.0
@@ -277,6 +277,15 @@ measure_firmware() { # CSV
       cargo clippy -q --release --locked --target "$out" --target-dir "$embedded" -- -D warnings
     done
   )
+}
+
+# The C interface, on this machine with sanitisers and on a board.
+job_c() {
+  need_embedded_target
+  need_target riscv32imac-unknown-none-elf
+  need_command arm-none-eabi-gcc gcc-arm-none-eabi
+  need_command qemu-system-arm qemu-system-arm
+  decoder-c/test.sh "$target/c"
 }
 
 # The main job in small: the same path as `cargo run --release -- demo`, a few hundred steps on small images.

@@ -1,0 +1,81 @@
+/* Draws a bundle from four sides into a frame buffer: the whole of what a firmware in C does. */
+#include "draw.h"
+
+#include "pocketsplat.h"
+
+enum { MAX_FRAME_BYTES = 3 * 200 * 200, MAX_SCRATCH_BYTES = 512 * 1024, SIDES = 4 };
+
+/* Everything there is, fixed when the program is linked. */
+static uint8_t scratch[MAX_SCRATCH_BYTES];
+static uint8_t frame[MAX_FRAME_BYTES];
+static _Alignas(PSB_DECODER_ALIGN) uint8_t place[PSB_DECODER_BYTES];
+static psb_message message;
+
+/* Copies a tile into the frame buffer; user is the frame's width. A display would get it by its bus. */
+static int32_t take_tile(void *user, uint16_t x_px, uint16_t y_px, uint16_t width, uint16_t height, const uint8_t *rgb) {
+  const size_t stride = *(const uint16_t *)user;
+  for (size_t y = 0; y < height; y++) {
+    uint8_t *row = frame + 3 * ((y_px + y) * stride + x_px);
+    for (size_t i = 0; i < 3 * (size_t)width; i++) row[i] = rgb[3 * width * y + i];
+  }
+  return 0;
+}
+
+/* CRC-32 (IEEE 802.3). */
+static uint32_t crc32(const uint8_t *bytes, size_t len) {
+  uint32_t crc = 0xffffffff;
+  while (len--) {
+    crc ^= *bytes++;
+    for (int bit = 0; bit < 8; bit++) crc = crc >> 1 ^ (crc & 1 ? 0xedb88320 : 0);
+  }
+  return ~crc;
+}
+
+static void say_row(const char *name, unsigned tiers, unsigned side, uint32_t crc) {
+  char digits[] = ",0,0,00000000\n";
+  digits[1] = (char)('0' + tiers);
+  digits[3] = (char)('0' + side);
+  for (int i = 0; i < 8; i++) digits[5 + i] = "0123456789abcdef"[crc >> (28 - 4 * i) & 15];
+  say(name);
+  say(digits);
+}
+
+static int failed(psb_status status) {
+  say(psb_status_name(status));
+  say(": ");
+  say(message.text);
+  say("\n");
+  return 1;
+}
+
+int draw_orbit(const char *name, const uint8_t *bundle, size_t bundle_len) {
+  psb_budget budget;
+  psb_plan whole, plan;
+  psb_decoder *decoder;
+  psb_camera preview, camera;
+  psb_report report;
+  psb_status status = psb_preview(bundle, bundle_len, 0, 0, &preview, &message);
+  if (status != PSB_STATUS_OK || 3 * (size_t)preview.width_px * preview.height_px > sizeof frame) return failed(status);
+  budget = psb_budget_for_frame(preview.width_px, preview.height_px, sizeof scratch);
+  status = psb_make_plan(bundle, bundle_len, &budget, &whole, &message);
+  if (status != PSB_STATUS_OK) return failed(status);
+  for (uint8_t tiers = 1; tiers <= whole.n_tiers; tiers++) {
+    budget.tiers = tiers;
+    budget.slabs = true;
+    status = psb_make_plan(bundle, bundle_len, &budget, &plan, &message);
+    if (status != PSB_STATUS_OK) return failed(status);
+    /* One byte fewer is refused, with the number that would do. */
+    status = psb_bind(place, sizeof place, bundle, bundle_len, &budget, scratch, plan.scratch_bytes - 1, &decoder, &message);
+    if (status != PSB_STATUS_OVER_BUDGET || decoder != NULL) return failed(status);
+    status = psb_bind(place, sizeof place, bundle, bundle_len, &budget, scratch, plan.scratch_bytes, &decoder, &message);
+    if (status != PSB_STATUS_OK) return failed(status);
+    for (unsigned side = 0; side < SIDES; side++) {
+      status = psb_orbit(&preview, 6.2831855f * (float)side / 4.0f, &camera, &message);
+      if (status != PSB_STATUS_OK) return failed(status);
+      status = psb_render(decoder, &camera, take_tile, &camera.width_px, &report, &message);
+      if (status != PSB_STATUS_OK || report.splats == 0) return failed(status);
+      say_row(name, tiers, side, crc32(frame, 3 * (size_t)camera.width_px * camera.height_px));
+    }
+  }
+  return 0;
+}

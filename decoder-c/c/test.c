@@ -1,0 +1,97 @@
+/* On a PC, with the sanitisers: the golden frames, and calls that must fail without harm. `test NAME=FILE.psb ...` */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "draw.h"
+#include "pocketsplat.h"
+
+#define CHECK(condition)                                                     \
+  do {                                                                       \
+    if (!(condition)) {                                                      \
+      fprintf(stderr, "%s:%d: %s does not hold\n", __FILE__, __LINE__, #condition); \
+      exit(1);                                                               \
+    }                                                                        \
+  } while (0)
+
+void say(const char *text) { fputs(text, stdout); }
+
+static int32_t refuse(void *user, uint16_t x, uint16_t y, uint16_t width, uint16_t height, const uint8_t *rgb) {
+  (void)x, (void)y, (void)width, (void)height, (void)rgb;
+  return ++*(int32_t *)user == 2 ? 77 : 0;
+}
+
+/* Every argument that may be wrong, and damaged bytes, each in memory of its own so that the sanitiser sees a byte too many. */
+static void misuse(const uint8_t *bundle, size_t len) {
+  psb_budget budget = psb_budget_for_frame(64, 48, 1 << 20);
+  psb_plan plan;
+  psb_message message;
+  psb_decoder *decoder = NULL;
+  psb_camera camera;
+  psb_report report;
+  void *place = aligned_alloc(PSB_DECODER_ALIGN, PSB_DECODER_BYTES);
+  CHECK(psb_make_plan(NULL, len, &budget, &plan, &message) == PSB_STATUS_MISUSE);
+  CHECK(strcmp(message.text, "bundle is NULL") == 0);
+  CHECK(psb_make_plan(bundle, len, NULL, &plan, NULL) == PSB_STATUS_MISUSE);
+  CHECK(psb_make_plan(bundle, len, &budget, NULL, &message) == PSB_STATUS_MISUSE);
+  budget.quality = 9;
+  CHECK(psb_make_plan(bundle, len, &budget, &plan, &message) == PSB_STATUS_MISUSE && strstr(message.text, "PSB_QUALITY"));
+  budget.quality = PSB_QUALITY_EXACT;
+  budget.ram_bytes = 100;
+  CHECK(psb_make_plan(bundle, len, &budget, &plan, &message) == PSB_STATUS_OVER_BUDGET && plan.scratch_bytes > 100);
+  budget.ram_bytes = plan.scratch_bytes;
+  CHECK(psb_make_plan(bundle, len, &budget, &plan, &message) == PSB_STATUS_OK && message.text[0] == 0);
+  uint8_t *scratch = malloc(plan.scratch_bytes);
+  CHECK(psb_bind(NULL, PSB_DECODER_BYTES, bundle, len, &budget, scratch, plan.scratch_bytes, &decoder, &message) == PSB_STATUS_MISUSE);
+  CHECK(psb_decoder_bytes() <= PSB_DECODER_BYTES);
+  CHECK(psb_bind(place, psb_decoder_bytes() - 1, bundle, len, &budget, scratch, plan.scratch_bytes, &decoder, &message) == PSB_STATUS_MISUSE);
+  CHECK(psb_bind((char *)place + 1, PSB_DECODER_BYTES - 1, bundle, len, &budget, scratch, plan.scratch_bytes, &decoder, &message) == PSB_STATUS_MISUSE);
+  CHECK(psb_bind(place, PSB_DECODER_BYTES, bundle, len, &budget, NULL, plan.scratch_bytes, &decoder, &message) == PSB_STATUS_MISUSE);
+  CHECK(psb_bind(place, PSB_DECODER_BYTES, bundle, len, &budget, scratch, plan.scratch_bytes, NULL, &message) == PSB_STATUS_MISUSE);
+  for (size_t cut = 0; cut < len; cut += 97) {
+    uint8_t *part = malloc(cut + 1);
+    memcpy(part, bundle, cut);
+    /* A file that is cut where a tier ends is a smaller scene; anywhere else it is refused. */
+    psb_status status = psb_make_plan(part, cut, &budget, &plan, &message);
+    CHECK(status == PSB_STATUS_OK || (status == PSB_STATUS_MALFORMED && message.text[0]));
+    part[cut / 2] ^= 16;
+    status = psb_make_plan(part, cut, &budget, &plan, NULL);
+    CHECK(status <= PSB_STATUS_OVER_BUDGET);
+    free(part);
+  }
+  CHECK(psb_make_plan(bundle, len, &budget, &plan, NULL) == PSB_STATUS_OK);
+  CHECK(psb_bind(place, PSB_DECODER_BYTES, bundle, len, &budget, scratch, plan.scratch_bytes, &decoder, NULL) == PSB_STATUS_OK);
+  CHECK(psb_preview(NULL, len, 64, 48, &camera, NULL) == PSB_STATUS_MISUSE);
+  CHECK(psb_preview(bundle, len, 64, 48, NULL, NULL) == PSB_STATUS_MISUSE);
+  CHECK(psb_preview(bundle, len, 64, 48, &camera, &message) == PSB_STATUS_OK && camera.width_px == 64);
+  CHECK(psb_render(decoder, &camera, NULL, NULL, &report, &message) == PSB_STATUS_MISUSE);
+  CHECK(psb_render(decoder, NULL, refuse, NULL, &report, &message) == PSB_STATUS_MISUSE);
+  int32_t n_tiles = 0;
+  CHECK(psb_render(decoder, &camera, refuse, &n_tiles, &report, &message) == PSB_STATUS_STOPPED);
+  CHECK(n_tiles == 2 && strstr(message.text, "returned 77"));
+  CHECK(psb_render(decoder, &camera, refuse, &n_tiles, NULL, NULL) == PSB_STATUS_OK);
+  camera.rotation[0] += 0.5f;
+  CHECK(psb_render(decoder, &camera, refuse, &n_tiles, &report, &message) == PSB_STATUS_MISUSE && message.text[0]);
+  CHECK(psb_orbit(NULL, 1.0f, &camera, NULL) == PSB_STATUS_MISUSE);
+  CHECK(strcmp(psb_status_name(99), "unknown") == 0);
+  free(scratch);
+  free(place);
+}
+
+int main(int argc, char **argv) {
+  for (int i = 1; i < argc; i++) {
+    char *path = strchr(argv[i], '=');
+    CHECK(path != NULL);
+    *path++ = 0;
+    FILE *file = fopen(path, "rb");
+    CHECK(file != NULL && fseek(file, 0, SEEK_END) == 0);
+    const size_t len = (size_t)ftell(file);
+    uint8_t *bundle = malloc(len);
+    rewind(file);
+    CHECK(fread(bundle, 1, len, file) == len && fclose(file) == 0);
+    if (draw_orbit(argv[i], bundle, len) != 0) return 1;
+    misuse(bundle, len);
+    free(bundle);
+  }
+  return 0;
+}

@@ -1,0 +1,220 @@
+/* pocketsplat: draws a compressed neural Gaussian-splat scene without an allocator, in memory that is known beforehand.
+ *
+ * Written by `cargo test` from src/: change that, and run `BLESS=1 cargo test`.
+ */
+
+#ifndef POCKETSPLAT_H
+#define POCKETSPLAT_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+// Bytes that suffice for a psb_decoder on every target.
+#define PSB_DECODER_BYTES 2048
+
+// Alignment that suffices for a psb_decoder on every target.
+#define PSB_DECODER_ALIGN 8
+
+// How a call ended, and whose fault it is if not well.
+typedef enum psb_status {
+  // Done.
+  PSB_STATUS_OK = 0,
+  // The bytes are not a sound bundle: fetch or flash them again.
+  PSB_STATUS_MALFORMED = 1,
+  // A sound bundle that needs a newer or a fuller decoder.
+  PSB_STATUS_UNSUPPORTED = 2,
+  // The memory given is not enough; the message names the bytes that would do.
+  PSB_STATUS_OVER_BUDGET = 3,
+  // An argument is NULL where it must not be, or outside its limits.
+  PSB_STATUS_MISUSE = 4,
+  // The caller's function stopped the frame.
+  PSB_STATUS_STOPPED = 5,
+  // A mistake in pocketsplat; please report it.
+  PSB_STATUS_INTERNAL = 6,
+} psb_status;
+
+// How exactly a frame is drawn.
+typedef enum psb_quality {
+  // Every splat, wherever it shows.
+  PSB_QUALITY_EXACT = 0,
+  // Fewer instructions, and differences that photographs hardly tell.
+  PSB_QUALITY_BALANCED = 1,
+  // Fewer still; fine detail is left out.
+  PSB_QUALITY_DRAFT = 2,
+} psb_quality;
+
+// A decoder that is bound to a bundle and to its scratch memory. It lies in memory of the caller, has nothing to free, and may be
+// forgotten at any time; its scratch memory is then the caller's again.
+typedef struct psb_decoder psb_decoder;
+
+// What there is to draw with. Begin with psb_budget_for_frame.
+typedef struct psb_budget {
+  // Bytes of scratch memory that there are.
+  size_t ram_bytes;
+  // Widest frame, pixels.
+  uint16_t width_px;
+  // Highest frame, pixels.
+  uint16_t height_px;
+  // Tiers to draw at most; 255 draws all that the file holds.
+  uint8_t tiers;
+  // A psb_quality.
+  uint8_t quality;
+  // Draw strips with too many splats in slabs of depth, which takes longer, instead of leaving splats out.
+  bool slabs;
+} psb_budget;
+
+// What fits into a budget.
+typedef struct psb_plan {
+  // Bytes of scratch memory that psb_bind takes; where nothing fits, those that would do.
+  size_t scratch_bytes;
+  // Share of the anchors that is not drawn.
+  float pruning_rate;
+  // Places for splats.
+  uint32_t max_splats;
+  // Tiers that are drawn.
+  uint8_t n_tiers;
+  // Horizontal strips of a frame.
+  uint8_t n_strips;
+  // Anchors are decoded once, not in every frame.
+  bool is_resident;
+  // Gaussians are evaluated once, not in every frame.
+  bool is_baked;
+} psb_plan;
+
+// What was wrong, for people: the place, the number found and the number needed. Longer texts are cut.
+typedef struct psb_message {
+  // Ends with NUL.
+  char text[192];
+} psb_message;
+
+// A pinhole camera in the frame of a bundle: x right, y down, z forward (OpenCV).
+//
+// A point p of the scene is at (x, y, z) = R·p + t for the camera and at u = fx·x/z + cx, v = fy·y/z + cy on its image; the centre of
+// pixel (i, j) is at (i + 0.5, j + 0.5).
+typedef struct psb_camera {
+  // R, row by row: scene to camera.
+  float rotation[9];
+  // t, units of the scene.
+  float translation[3];
+  // fx, fy, pixels.
+  float focal_px[2];
+  // cx, cy, pixels from the outer corner of the first pixel.
+  float principal_px[2];
+  // Frame width, pixels.
+  uint16_t width_px;
+  // Frame height, pixels.
+  uint16_t height_px;
+} psb_camera;
+
+// Takes one tile of a frame: 8-bit RGB, row by row, width × height pixels, at (x_px, y_px). What is not 0 ends the frame.
+typedef int32_t (*psb_tile)(void *user,
+                            uint16_t x_px,
+                            uint16_t y_px,
+                            uint16_t width,
+                            uint16_t height,
+                            const uint8_t *rgb);
+
+// What a frame consisted of.
+typedef struct psb_report {
+  // Anchors that were decoded for this frame.
+  uint32_t anchors_decoded;
+  // Anchors whose heads ran.
+  uint32_t anchors_visible;
+  // Splats drawn.
+  uint32_t splats;
+  // Splats left out because there was no memory for them.
+  uint32_t splats_dropped;
+  // Pairs of a pixel and a splat evaluated for it.
+  uint32_t pixel_splats;
+  // Bytes of the scratch memory that this frame needed.
+  uint32_t scratch_used;
+} psb_report;
+
+#ifdef __cplusplus
+extern "C" {
+#endif // __cplusplus
+
+// The name of a status, such as "over budget"; "unknown" for other numbers. Static, ends with NUL.
+const char *psb_status_name(uint32_t status);
+
+// A budget for frames of at most width_px by height_px within ram_bytes, everything else as good as memory allows.
+struct psb_budget psb_budget_for_frame(uint16_t width_px, uint16_t height_px, size_t ram_bytes);
+
+// Checks a bundle and says how many bytes the best plan within a budget takes.
+//
+// bundle: bundle_len bytes of a .psb. message: NULL, or where to say what was wrong.
+//
+// # Safety
+// Pointers are NULL or point to what the call says.
+enum psb_status psb_make_plan(const uint8_t *bundle,
+                              size_t bundle_len,
+                              const struct psb_budget *budget,
+                              struct psb_plan *plan,
+                              struct psb_message *message);
+
+// The bundle's own camera, with which a device may begin: for frames of width_px by height_px, or of its own size for 0 by 0.
+//
+// bundle: bundle_len bytes of a .psb, which are checked. message: NULL, or where to say what was wrong.
+//
+// # Safety
+// Pointers are NULL or point to what the call says.
+enum psb_status psb_preview(const uint8_t *bundle,
+                            size_t bundle_len,
+                            uint16_t width_px,
+                            uint16_t height_px,
+                            struct psb_camera *camera,
+                            struct psb_message *message);
+
+// Carries a camera by an angle, radians, around the upright axis through what it looks at.
+//
+// turned may be camera itself. message: NULL, or where to say what was wrong.
+//
+// # Safety
+// Pointers are NULL or point to what the call says.
+enum psb_status psb_orbit(const struct psb_camera *camera,
+                          float angle,
+                          struct psb_camera *turned,
+                          struct psb_message *message);
+
+// Bytes of a psb_decoder on this target, PSB_DECODER_BYTES at most; its alignment is PSB_DECODER_ALIGN at most.
+size_t psb_decoder_bytes(void);
+
+// Checks a bundle, plans for it, and binds a decoder to it.
+//
+// place: place_len bytes for the decoder, psb_decoder_bytes() or PSB_DECODER_BYTES, aligned to PSB_DECODER_ALIGN. scratch: scratch_len bytes of any
+// alignment, as many as psb_make_plan said or more. decoder: gets the decoder, NULL where the call fails. message: NULL, or where to say what was
+// wrong.
+//
+// # Safety
+// Pointers are NULL or point to what the call says. Bundle, place and scratch lie apart, stay where they are, and nobody else writes to
+// them as long as the decoder is used.
+enum psb_status psb_bind(void *place,
+                         size_t place_len,
+                         const uint8_t *bundle,
+                         size_t bundle_len,
+                         const struct psb_budget *budget,
+                         uint8_t *scratch,
+                         size_t scratch_len,
+                         struct psb_decoder **decoder,
+                         struct psb_message *message);
+
+// Draws the scene as a camera sees it and hands it to a function tile by tile.
+//
+// user: passed on to tile. report: NULL, or where to say what the frame consisted of. message: NULL, or where to say what was wrong. After an
+// error the next frame is drawn as if nothing had been.
+//
+// # Safety
+// Pointers are NULL or point to what the call says; the decoder is bound, and the function does not use it.
+enum psb_status psb_render(struct psb_decoder *decoder,
+                           const struct psb_camera *camera,
+                           psb_tile tile,
+                           void *user,
+                           struct psb_report *report,
+                           struct psb_message *message);
+
+#ifdef __cplusplus
+}  // extern "C"
+#endif  // __cplusplus
+
+#endif  /* POCKETSPLAT_H */

@@ -1,0 +1,161 @@
+//! A decoder in the caller's memory.
+
+use core::ffi::c_void;
+use core::mem::{align_of, size_of};
+use core::slice;
+
+use pocketsplat_core::{RenderError, TileSink};
+
+use crate::camera::Camera;
+use crate::plan::{Budget, bytes_of, planned};
+use crate::status::{Failure, Message, Status, status_of};
+
+/// Bytes that suffice for a psb_decoder on every target.
+pub const DECODER_BYTES: usize = 2048;
+
+/// Alignment that suffices for a psb_decoder on every target.
+pub const DECODER_ALIGN: usize = 8;
+
+/// A decoder that is bound to a bundle and to its scratch memory. It lies in memory of the caller, has nothing to free, and may be
+/// forgotten at any time; its scratch memory is then the caller's again.
+pub struct Decoder(pocketsplat_core::Decoder<'static, 'static>);
+
+const _: () = assert!(size_of::<Decoder>() <= DECODER_BYTES && align_of::<Decoder>() <= DECODER_ALIGN);
+
+/// Bytes of a psb_decoder on this target, PSB_DECODER_BYTES at most; its alignment is PSB_DECODER_ALIGN at most.
+#[unsafe(no_mangle)]
+pub extern "C" fn psb_decoder_bytes() -> usize {
+    size_of::<Decoder>()
+}
+
+/// What a frame consisted of.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Report {
+    /// Anchors that were decoded for this frame.
+    pub anchors_decoded: u32,
+    /// Anchors whose heads ran.
+    pub anchors_visible: u32,
+    /// Splats drawn.
+    pub splats: u32,
+    /// Splats left out because there was no memory for them.
+    pub splats_dropped: u32,
+    /// Pairs of a pixel and a splat evaluated for it.
+    pub pixel_splats: u32,
+    /// Bytes of the scratch memory that this frame needed.
+    pub scratch_used: u32,
+}
+
+/// Takes one tile of a frame: 8-bit RGB, row by row, width × height pixels, at (x_px, y_px). What is not 0 ends the frame.
+pub type TileFn = Option<
+    unsafe extern "C" fn(user: *mut c_void, x_px: u16, y_px: u16, width: u16, height: u16, rgb: *const u8) -> i32,
+>;
+
+/// Hands tiles to the caller's function.
+struct Tiles {
+    function: unsafe extern "C" fn(*mut c_void, u16, u16, u16, u16, *const u8) -> i32,
+    user: *mut c_void,
+}
+
+impl TileSink for Tiles {
+    type Error = i32;
+
+    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) -> Result<(), i32> {
+        // SAFETY: the caller's function, with the pixels that its description says.
+        match unsafe { (self.function)(self.user, x_px, y_px, width, height, rgb.as_ptr().cast()) } {
+            0 => Ok(()),
+            code => Err(code),
+        }
+    }
+}
+
+/// Checks a bundle, plans for it, and binds a decoder to it.
+///
+/// place: place_len bytes for the decoder, psb_decoder_bytes() or PSB_DECODER_BYTES, aligned to PSB_DECODER_ALIGN. scratch: scratch_len bytes of any
+/// alignment, as many as psb_make_plan said or more. decoder: gets the decoder, NULL where the call fails. message: NULL, or where to say what was
+/// wrong.
+///
+/// # Safety
+/// Pointers are NULL or point to what the call says. Bundle, place and scratch lie apart, stay where they are, and nobody else writes to
+/// them as long as the decoder is used.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn psb_bind(
+    place: *mut c_void,
+    place_len: usize,
+    bundle: *const u8,
+    bundle_len: usize,
+    budget: *const Budget,
+    scratch: *mut u8,
+    scratch_len: usize,
+    decoder: *mut *mut Decoder,
+    message: *mut Message,
+) -> Status {
+    // SAFETY: the caller's promise.
+    let (bundle, budget, decoder, message) =
+        unsafe { (bytes_of(bundle, bundle_len), budget.as_ref(), decoder.as_mut(), message.as_mut()) };
+    let outcome = (|| {
+        let decoder = decoder.ok_or(Failure::Misuse("decoder is NULL"))?;
+        *decoder = core::ptr::null_mut();
+        let place = place.cast::<Decoder>();
+        if place.is_null() || !place.is_aligned() {
+            return Err(Failure::Misuse("place is NULL or not aligned to PSB_DECODER_ALIGN"));
+        }
+        if place_len < size_of::<Decoder>() {
+            return Err(Failure::Misuse("place_len is less than psb_decoder_bytes()"));
+        }
+        if scratch.is_null() {
+            return Err(Failure::Misuse("scratch is NULL"));
+        }
+        let (bundle, plan) = planned(bundle, budget)?;
+        // SAFETY: not NULL; the rest is the caller's promise.
+        let scratch = unsafe { slice::from_raw_parts_mut(scratch, scratch_len) };
+        let bound = pocketsplat_core::Decoder::bind(&bundle, plan, scratch)?;
+        // SAFETY: long enough and aligned, as was checked.
+        unsafe { place.write(Decoder(bound)) };
+        *decoder = place;
+        Ok(())
+    })();
+    status_of(outcome, message)
+}
+
+/// Draws the scene as a camera sees it and hands it to a function tile by tile.
+///
+/// user: passed on to tile. report: NULL, or where to say what the frame consisted of. message: NULL, or where to say what was wrong. After an
+/// error the next frame is drawn as if nothing had been.
+///
+/// # Safety
+/// Pointers are NULL or point to what the call says; the decoder is bound, and the function does not use it.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn psb_render(
+    decoder: *mut Decoder,
+    camera: *const Camera,
+    tile: TileFn,
+    user: *mut c_void,
+    report: *mut Report,
+    message: *mut Message,
+) -> Status {
+    // SAFETY: the caller's promise.
+    let (decoder, camera, report, message) =
+        unsafe { (decoder.as_mut(), camera.as_ref(), report.as_mut(), message.as_mut()) };
+    let outcome = (|| {
+        let Decoder(decoder) = decoder.ok_or(Failure::Misuse("decoder is NULL"))?;
+        let camera = camera.ok_or(Failure::Misuse("camera is NULL"))?.to_core()?;
+        let function = tile.ok_or(Failure::Misuse("tile is NULL"))?;
+        let found = decoder.render(&camera, &mut Tiles { function, user }).map_err(|error| match error {
+            RenderError::Decode(error) => Failure::Decode(error),
+            RenderError::Sink(code) => Failure::Stopped(code),
+        })?;
+        if let Some(report) = report {
+            *report = Report {
+                anchors_decoded: found.anchors_decoded,
+                anchors_visible: found.anchors_visible,
+                splats: found.splats,
+                splats_dropped: found.splats_dropped,
+                pixel_splats: found.pixel_splats,
+                scratch_used: found.scratch_used,
+            };
+        }
+        Ok(())
+    })();
+    status_of(outcome, message)
+}

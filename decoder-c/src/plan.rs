@@ -1,0 +1,142 @@
+//! How many bytes a scene takes.
+
+use core::slice;
+
+use pocketsplat_core::{Bundle, Overflow, Quality as CoreQuality};
+
+use crate::status::{Failure, Message, Status, status_of};
+
+/// How exactly a frame is drawn.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quality {
+    /// Every splat, wherever it shows.
+    Exact = 0,
+    /// Fewer instructions, and differences that photographs hardly tell.
+    Balanced = 1,
+    /// Fewer still; fine detail is left out.
+    Draft = 2,
+}
+
+/// What there is to draw with. Begin with psb_budget_for_frame.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct Budget {
+    /// Bytes of scratch memory that there are.
+    pub ram_bytes: usize,
+    /// Widest frame, pixels.
+    pub width_px: u16,
+    /// Highest frame, pixels.
+    pub height_px: u16,
+    /// Tiers to draw at most; 255 draws all that the file holds.
+    pub tiers: u8,
+    /// A psb_quality.
+    pub quality: u8,
+    /// Draw strips with too many splats in slabs of depth, which takes longer, instead of leaving splats out.
+    pub slabs: bool,
+}
+
+/// What fits into a budget.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Plan {
+    /// Bytes of scratch memory that psb_bind takes; where nothing fits, those that would do.
+    pub scratch_bytes: usize,
+    /// Share of the anchors that is not drawn.
+    pub pruning_rate: f32,
+    /// Places for splats.
+    pub max_splats: u32,
+    /// Tiers that are drawn.
+    pub n_tiers: u8,
+    /// Horizontal strips of a frame.
+    pub n_strips: u8,
+    /// Anchors are decoded once, not in every frame.
+    pub is_resident: bool,
+    /// Gaussians are evaluated once, not in every frame.
+    pub is_baked: bool,
+}
+
+impl Budget {
+    fn to_core(self) -> Result<pocketsplat_core::Budget, Failure> {
+        let quality = match self.quality {
+            0 => CoreQuality::EXACT,
+            1 => CoreQuality::BALANCED,
+            2 => CoreQuality::DRAFT,
+            _ => return Err(Failure::Misuse("quality is none of PSB_QUALITY_EXACT, _BALANCED, _DRAFT")),
+        };
+        let overflow = if self.slabs { Overflow::Slabs } else { Overflow::LeaveOut };
+        let frame = pocketsplat_core::Budget::for_frame(self.width_px, self.height_px);
+        Ok(frame.in_bytes(self.ram_bytes).with_tiers(self.tiers).with_quality(quality).with_overflow(overflow))
+    }
+}
+
+impl From<&pocketsplat_core::Plan> for Plan {
+    fn from(plan: &pocketsplat_core::Plan) -> Self {
+        Self {
+            scratch_bytes: plan.scratch_len(),
+            pruning_rate: plan.pruning_rate(),
+            max_splats: plan.max_splats(),
+            n_tiers: plan.n_tiers(),
+            n_strips: plan.n_strips(),
+            is_resident: plan.is_resident(),
+            is_baked: plan.is_baked(),
+        }
+    }
+}
+
+/// Checks a bundle and plans for it.
+pub(crate) fn planned(
+    bundle: Option<&'static [u8]>,
+    budget: Option<&Budget>,
+) -> Result<(Bundle<'static>, pocketsplat_core::Plan), Failure> {
+    let bundle = Bundle::parse(bundle.ok_or(Failure::Misuse("bundle is NULL"))?)?;
+    let budget = budget.ok_or(Failure::Misuse("budget is NULL"))?.to_core()?;
+    let plan = bundle.plan(&budget)?;
+    Ok((bundle, plan))
+}
+
+/// The caller's bytes; nothing for NULL.
+///
+/// # Safety
+/// `bytes` is NULL, or points to `len` bytes that stay as they are while the result is used.
+pub(crate) unsafe fn bytes_of(bytes: *const u8, len: usize) -> Option<&'static [u8]> {
+    // SAFETY: not NULL; the rest is the caller's promise.
+    (!bytes.is_null()).then(|| unsafe { slice::from_raw_parts(bytes, len) })
+}
+
+/// A budget for frames of at most width_px by height_px within ram_bytes, everything else as good as memory allows.
+#[unsafe(no_mangle)]
+pub extern "C" fn psb_budget_for_frame(width_px: u16, height_px: u16, ram_bytes: usize) -> Budget {
+    Budget { ram_bytes, width_px, height_px, tiers: u8::MAX, quality: Quality::Exact as u8, slabs: false }
+}
+
+/// Checks a bundle and says how many bytes the best plan within a budget takes.
+///
+/// bundle: bundle_len bytes of a .psb. message: NULL, or where to say what was wrong.
+///
+/// # Safety
+/// Pointers are NULL or point to what the call says.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn psb_make_plan(
+    bundle: *const u8,
+    bundle_len: usize,
+    budget: *const Budget,
+    plan: *mut Plan,
+    message: *mut Message,
+) -> Status {
+    // SAFETY: the caller's promise.
+    let (bundle, budget, plan, message) =
+        unsafe { (bytes_of(bundle, bundle_len), budget.as_ref(), plan.as_mut(), message.as_mut()) };
+    let outcome = (|| {
+        let plan = plan.ok_or(Failure::Misuse("plan is NULL"))?;
+        *plan = Plan::default();
+        let (_, found) = planned(bundle, budget).inspect_err(|failure| {
+            if let Failure::Decode(pocketsplat_core::DecodeError::BudgetTooSmall { needed, .. }) = failure {
+                plan.scratch_bytes = *needed as usize;
+            }
+        })?;
+        *plan = Plan::from(&found);
+        Ok(())
+    })();
+    status_of(outcome, message)
+}

@@ -52,6 +52,7 @@ const CRATES: [(&str, &[&str]); 5] = [
             "explicit",
             "bundle",
             "render",
+            "export",
             "metrics",
             "manifest",
             "device",

@@ -13,6 +13,7 @@ pub mod device;
 pub mod effects;
 pub mod encode;
 pub mod explicit;
+pub mod export;
 #[cfg(test)]
 pub(crate) mod finite_difference;
 pub mod integer_model;

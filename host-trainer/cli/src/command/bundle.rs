@@ -6,10 +6,9 @@ use anyhow::{Context, Result, bail};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Background, Capture, View};
 use pocketsplat_core::Bundle;
-use pocketsplat_gaussians::Format;
 use pocketsplat_trainer::bundle::{for_each_chunk, normalisation_of, protocol_of};
 
-use super::capture::CaptureArgs;
+use super::capture::{CaptureArgs, refuse_gaussians};
 use crate::config::{CaptureOptions, Protocol};
 
 /// The bytes of a bundle and where they came from.
@@ -20,10 +19,7 @@ pub(crate) struct BundleFile {
 
 impl BundleFile {
     pub(crate) fn read(path: &Path) -> Result<Self> {
-        if Format::of_path(path).is_some() {
-            let path = path.display();
-            bail!("{path} holds Gaussians and no bundle; make one of it with `pocketsplat import {path} -o scene.psb`");
-        }
+        refuse_gaussians(path)?;
         let bytes = std::fs::read(path).with_context(|| format!("could not read the bundle {}", path.display()))?;
         Ok(Self { path: path.to_owned(), bytes })
     }

@@ -1,11 +1,23 @@
 //! The capture that a command works on, and the views it chooses.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::{self, Background, Capture, LoadOptions, Severity, Split, View};
+use pocketsplat_gaussians::Format;
 
 use crate::config::CaptureOptions;
+
+/// Refuses a file of explicit Gaussians, and names the command that reads it.
+pub(crate) fn refuse_gaussians(path: &Path) -> Result<()> {
+    if Format::of_path(path).is_some() {
+        let path = path.display();
+        bail!(
+            "{path} is a file of Gaussians, no bundle and no capture; make a bundle of it with `pocketsplat import {path} -o scene.psb`"
+        );
+    }
+    Ok(())
+}
 
 /// Where photographs come from and how they are prepared.
 #[derive(clap::Args, Clone, Debug)]
@@ -34,6 +46,7 @@ impl CaptureArgs {
 
     /// Loads the capture and says on stderr what was found.
     pub(crate) fn load(&self, seed: u64) -> Result<Capture> {
+        refuse_gaussians(&self.dataset)?;
         let options = self.load_options(seed);
         let findings = dataset::diagnose_cheaply(&self.dataset, &options);
         if findings.count(Severity::Warning) > 0 {

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use pocketsplat_capture::dataset::{LoadOptions, Severity, diagnose};
 
+use super::capture::refuse_gaussians;
 use super::output;
 
 /// Check a capture: images, poses, lenses, scale, splits; every finding comes with a remedy.
@@ -27,6 +28,7 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
+    refuse_gaussians(&args.dataset)?;
     let options = LoadOptions {
         images: args.images.clone(),
         model: args.model,

@@ -10,6 +10,7 @@ mod doctor;
 mod effects;
 mod estimate;
 mod eval;
+mod export;
 mod fit;
 mod gaussians;
 mod import;
@@ -56,6 +57,7 @@ enum Command {
     Eval(eval::Args),
     Render(render::Args),
     View(view::Args),
+    Export(export::Args),
     Report(report::Args),
     Inspect(inspect::Args),
     Fit(fit::Args),
@@ -130,6 +132,7 @@ fn dispatch(cli: Cli) -> Result<ExitCode> {
         Command::Eval(args) => eval::run(&args),
         Command::Render(args) => render::run(&args),
         Command::View(args) => view::run(&args),
+        Command::Export(args) => export::run(&args),
         Command::Report(args) => report::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Fit(args) => fit::run(&args),

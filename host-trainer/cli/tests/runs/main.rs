@@ -8,6 +8,7 @@ mod configuration;
 mod device;
 mod effects;
 mod explicit;
+mod export;
 mod fixture;
 mod interruption;
 mod modules;

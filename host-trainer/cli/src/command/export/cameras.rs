@@ -1,0 +1,204 @@
+//! The cameras that see what is exported: a capture's, or generated ones.
+
+use std::f64::consts::TAU;
+
+use anyhow::{Result, bail};
+use glam::{DMat3, DQuat, DVec3};
+use pocketsplat_capture::camera::Camera;
+use pocketsplat_capture::dataset::{Capture, Image, Split, View};
+use pocketsplat_core::Bundle;
+use pocketsplat_trainer::camera::host_camera;
+use pocketsplat_trainer::metrics::psnr_db_masked;
+
+use super::super::bundle::BundleFile;
+use super::super::capture::views_of;
+
+/// Generated cameras of each height.
+const N_AROUND: u32 = 32;
+/// Heights of generated cameras, turned up from that of the bundle's own one, parts of a turn.
+const HEIGHTS: [f64; 4] = [-0.04, 0.0, 0.04, 0.1];
+/// No camera looks down or up more steeply, parts of a turn.
+const STEEPEST: f64 = 0.22;
+/// Cameras that look in directions further apart than this, as the cosine between them, see different things.
+const ALIKE: f64 = 0.7;
+/// Every eighth camera is held out, as with captures.
+const HELD_OUT_EVERY: usize = 8;
+
+/// Cameras to fit to, and cameras to judge by; all in the bundle's frame.
+pub(super) struct Cameras<'a> {
+    pub(super) fitted: Vec<Camera>,
+    pub(super) judged: Vec<Camera>,
+    /// Which cameras `judged` are.
+    pub(super) split: String,
+    /// The photographs of `judged`, where there are any.
+    photographs: Option<&'a [View]>,
+    /// How far the cameras are apart, as [`Capture::extent`] has it.
+    pub(super) extent: f64,
+}
+
+impl<'a> Cameras<'a> {
+    /// Those of a capture; without held-out views the training views judge.
+    pub(super) fn of_capture(file: &BundleFile, bundle: &Bundle<'_>, capture: &'a Capture) -> Result<Self> {
+        let split = if capture.test.is_empty() { Split::Train } else { Split::Test };
+        let judged = views_of(capture, split)?;
+        let of =
+            |views: &[View]| -> Vec<Camera> { views.iter().map(|view| file.camera(bundle, capture, view)).collect() };
+        Ok(Self {
+            fitted: with_between(of(views_of(capture, Split::Train)?)),
+            judged: of(judged),
+            split: split.to_string(),
+            photographs: Some(judged),
+            extent: capture.extent,
+        })
+    }
+
+    /// Circles of several heights around what the bundle's own camera looks at.
+    pub(super) fn generated(bundle: &Bundle<'_>) -> Result<Self> {
+        let (all, distance) = around(&host_camera(&bundle.header().preview))?;
+        let of = |held_out: bool| {
+            let chosen = all.iter().enumerate().filter(|(i, _)| (i % HELD_OUT_EVERY == 0) == held_out);
+            chosen.map(|(_, camera)| camera.clone()).collect()
+        };
+        Ok(Self {
+            fitted: of(false),
+            judged: of(true),
+            split: "generated".to_owned(),
+            photographs: None,
+            extent: distance,
+        })
+    }
+
+    /// Mean PSNR of the pictures of `judged` to their photographs; `None` where there are none.
+    pub(super) fn psnr_db(&self, pictures: &[Image]) -> Option<f64> {
+        let views = self.photographs?;
+        let of_view = |(picture, view): (&Image, &View)| psnr_db_masked(picture, &view.image, view.mask.as_ref());
+        Some(pictures.iter().zip(views).map(of_view).sum::<f64>() / views.len() as f64)
+    }
+}
+
+/// Cameras, and those halfway from each to the nearest other one that looks in nearly the same direction.
+///
+/// A bundle can be drawn from anywhere, and what lies between the training views is what held-out views ask for.
+fn with_between(mut cameras: Vec<Camera>) -> Vec<Camera> {
+    let between: Vec<Camera> = cameras
+        .iter()
+        .enumerate()
+        .filter_map(|(i, camera)| {
+            let alike = |other: &Camera| camera.rotation.row(2).dot(other.rotation.row(2)) > ALIKE;
+            let distance = |other: &Camera| camera.centre_world().distance(other.centre_world());
+            let others =
+                cameras.iter().enumerate().filter(|(j, other)| *j != i && alike(other)).map(|(_, other)| other);
+            let nearest = others.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+            let turn = |camera: &Camera| DQuat::from_mat3(&camera.rotation);
+            let rotation = DMat3::from_quat(turn(camera).slerp(turn(nearest), 0.5).normalize());
+            let eye = camera.centre_world().midpoint(nearest.centre_world());
+            Some(Camera { rotation, translation: -(rotation * eye), ..camera.clone() })
+        })
+        .collect();
+    cameras.extend(between);
+    cameras
+}
+
+/// Cameras with the lens of `own` on circles around the point of its axis that is nearest to the scene's origin, and their distance to it.
+fn around(own: &Camera) -> Result<(Vec<Camera>, f64)> {
+    let (eye, forward) = (own.centre_world(), own.rotation.row(2));
+    let target = eye - eye.dot(forward) * forward;
+    let distance = eye.distance(target);
+    if !(distance > 1e-3) {
+        bail!(
+            "the bundle's own camera stands where it looks, so there is nothing to turn around; give the folder of the capture"
+        );
+    }
+    let up = nearest_axis(-own.rotation.row(1));
+    let side = up.any_orthonormal_vector();
+    let front = up.cross(side);
+    let own_height = ((eye - target).dot(up) / distance).clamp(-1.0, 1.0).asin() / TAU;
+    let cameras = HEIGHTS
+        .into_iter()
+        .flat_map(|height| {
+            let (rise, reach) = (TAU * (own_height + height).clamp(-STEEPEST, STEEPEST)).sin_cos();
+            (0..N_AROUND).map(move |i| {
+                let (sin, cos) = (TAU * f64::from(i) / f64::from(N_AROUND)).sin_cos();
+                let eye = target + distance * (reach * (cos * side + sin * front) + rise * up);
+                own.looking_at(eye, target, up)
+            })
+        })
+        .collect();
+    Ok((cameras, distance))
+}
+
+/// The coordinate axis nearest to `direction`, as a firmware that turns the camera takes it for up.
+fn nearest_axis(direction: DVec3) -> DVec3 {
+    let axis = direction
+        .abs()
+        .to_array()
+        .iter()
+        .enumerate()
+        .fold((0, 0.0), |best, (axis, part)| if *part > best.1 { (axis, *part) } else { best });
+    let mut nearest = DVec3::ZERO;
+    nearest[axis.0] = direction[axis.0].signum();
+    nearest
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DMat3, DVec3};
+    use pocketsplat_capture::camera::Camera;
+
+    use super::{around, with_between};
+
+    #[test]
+    fn generated_cameras_look_at_one_point_from_one_distance() {
+        let lens = Camera {
+            rotation: DMat3::IDENTITY,
+            translation: DVec3::ZERO,
+            focal_px: [50.0, 50.0],
+            principal_px: [20.0, 15.0],
+            width_px: 40,
+            height_px: 30,
+        };
+        let target = DVec3::new(0.1, 0.0, 0.2);
+        let own = lens.looking_at(DVec3::new(3.0, 1.0, 2.0), target, DVec3::Z);
+        let (cameras, distance) = around(&own).expect("a view to turn");
+        assert_eq!(cameras.len(), 128);
+        let pivot = own.centre_world() + distance * own.rotation.row(2);
+        for camera in &cameras {
+            let seen = camera.rotation * pivot + camera.translation;
+            assert!(seen.truncate().length() < 1e-9 && (seen.z - distance).abs() < 1e-9, "{seen}");
+            assert!(camera.rotation.row(1).z < 0.0, "upright");
+        }
+    }
+
+    #[test]
+    fn cameras_between_look_where_their_neighbours_do() {
+        let lens = Camera {
+            rotation: DMat3::IDENTITY,
+            translation: DVec3::ZERO,
+            focal_px: [50.0, 50.0],
+            principal_px: [20.0, 15.0],
+            width_px: 40,
+            height_px: 30,
+        };
+        let at = |angle: f64| lens.looking_at(3.0 * DVec3::new(angle.cos(), angle.sin(), 0.2), DVec3::ZERO, DVec3::Z);
+        let cameras = with_between(vec![at(0.0), at(0.4), at(3.0)]);
+        assert_eq!(cameras.len(), 5, "the third has no neighbour");
+        for camera in &cameras[3..] {
+            let seen = camera.rotation * DVec3::ZERO + camera.translation;
+            assert!(seen.truncate().length() < 0.05 && seen.z > 2.5, "{seen}");
+            assert!((camera.rotation.determinant() - 1.0).abs() < 1e-9, "a rotation");
+        }
+    }
+
+    #[test]
+    fn a_camera_in_the_middle_is_refused() {
+        let own = Camera {
+            rotation: DMat3::IDENTITY,
+            translation: DVec3::ZERO,
+            focal_px: [50.0, 50.0],
+            principal_px: [20.0, 15.0],
+            width_px: 40,
+            height_px: 30,
+        };
+        assert!(around(&own).expect_err("nothing to turn").to_string().contains("give the folder of the capture"));
+    }
+}

@@ -45,8 +45,8 @@ pub(crate) struct Args {
     /// [default: generated]
     #[arg(long, value_name = "FILE.json", help_heading = INPUT)]
     cameras: Option<PathBuf>,
-    /// Generated cameras to train with; one in eight as many is added to measure with.
-    #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(2..=10_000),
+    /// Generated cameras to train with; one for every seven of them is added to measure with.
+    #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(7..=10_000),
         conflicts_with = "cameras", help_heading = INPUT)]
     views: u32,
     /// Size of the pictures [default: 200x200; with --cameras theirs, at most 200 px]
@@ -155,7 +155,7 @@ fn cameras(args: &Args, file: &GaussiansFile) -> Result<(Vec<Camera>, Vec<Camera
             })?;
             let (n, place) = (args.views as usize, if bulk.surrounds { "inside" } else { "around" });
             eprintln!("cameras stand {place} the bulk at {:.3}, radius {:.3}", bulk.centre, bulk.radius);
-            generated(&bulk, n + n.div_ceil(HELD_OUT_EVERY - 1), size_px)
+            generated(&bulk, n * HELD_OUT_EVERY / (HELD_OUT_EVERY - 1), size_px)
         }
     };
     let largest = all.iter().map(|camera| camera.width_px.max(camera.height_px)).max().unwrap_or(0);

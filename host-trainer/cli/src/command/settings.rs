@@ -28,7 +28,7 @@ pub(crate) struct QualityOptions {
     /// [default: hac]
     #[arg(long, value_parser = backbone_choice(), help_heading = QUALITY)]
     backbone: Option<BackboneChoice>,
-    /// Training steps, with which all schedules scale [default: by the preset for train, else 30000]
+    /// Training steps, with which all schedules scale [default: by the preset for train, 5000 for import, else 30000]
     #[arg(long, value_name = "N", help_heading = QUALITY)]
     iterations: Option<u32>,
     /// Effects of the scene: auto keeps what pays in short pilot runs, a list of none, all, +NAME and -NAME forces
@@ -37,7 +37,7 @@ pub(crate) struct QualityOptions {
     #[arg(long, value_name = "LIST", allow_hyphen_values = true, help_heading = QUALITY)]
     effects: Option<Request>,
     /// Training modules to attach in place of those of the configuration [default: rdo-pruning for
-    /// train, with tiered-pruning for a device; else none]
+    /// train and import, with tiered-pruning for a device; else none]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum, help_heading = QUALITY)]
     modules: Option<Vec<TrainingModule>>,
     /// Feature width of an anchor, and hidden width of the heads [default: 32 with scaffold, else 50; by the limits for a

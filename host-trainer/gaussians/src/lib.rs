@@ -50,6 +50,14 @@ impl Gaussians {
         self.centres.is_empty()
     }
 
+    /// The same with harmonics of `degree` at most; colours then follow the view less.
+    #[must_use]
+    pub fn reduced_to(&self, degree: Degree) -> Self {
+        let degree = degree.min(self.degree);
+        let harmonics = (0..self.len()).flat_map(|index| &self.harmonics_of(index)[..degree.n_coefficients()]);
+        Self { degree, harmonics: harmonics.copied().collect(), ..self.clone() }
+    }
+
     /// The coefficients of Gaussian `index`.
     ///
     /// # Panics

@@ -5,7 +5,7 @@ mod cameras;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result, anyhow, bail};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::Image;
 use pocketsplat_core::Bundle;
@@ -32,10 +32,11 @@ use cameras::Cameras;
 ///
 /// Opacity, shape and colour of a bundle's Gaussians follow the view. A file keeps one opacity and one shape, and a colour in spherical
 /// harmonics. They are fitted to what the training cameras see of the bundle, and the loss on the held-out views is measured with the
-/// file as written. Without a capture, cameras are generated around what the bundle's own camera looks at.
+/// file as written. Without a capture, cameras are generated around what the bundle's own camera looks at. A file of Gaussians is
+/// written in another format, as it is.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// The bundle.
+    /// The bundle; or a .ply, .spz or .sog, to be written in another format.
     bundle: PathBuf,
     /// Folder of the capture, as for eval
     dataset: Option<PathBuf>,
@@ -140,6 +141,9 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         anyhow!("{}: export writes {known}; end the name in one of them", args.output.display())
     })?;
     output::check_writable(&args.output)?;
+    if GaussiansFile::is_one(&args.bundle) {
+        return convert(args, format);
+    }
     let file = BundleFile::read(&args.bundle)?;
     let bundle = file.parse()?;
     let source = Source::new(&bundle);
@@ -192,6 +196,39 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         seconds: started.elapsed().as_secs_f64(),
     };
     output::print(&export, args.json)
+}
+
+/// A file of Gaussians in another format.
+#[derive(Debug, Serialize)]
+struct Conversion {
+    /// See [`output::SCHEMA_VERSION`].
+    schema_version: u32,
+    format: &'static str,
+    bytes: usize,
+    source_bytes: usize,
+    n_gaussians: usize,
+    sh_degree: usize,
+}
+
+/// Writes the Gaussians of a file in another format; nothing is fitted.
+fn convert(args: &Args, format: Format) -> Result<()> {
+    if args.dataset.is_some() {
+        bail!("{} holds Gaussians, which are written as they are; leave CAPTURE out", args.bundle.display());
+    }
+    let file = GaussiansFile::read(&args.bundle)?;
+    let gaussians = file.gaussians.reduced_to(Degree::ALL[usize::from(args.sh_degree)]);
+    let bytes =
+        format.to_bytes(&gaussians, &file.notes).map_err(|fault| anyhow!("{} {fault}", args.output.display()))?;
+    output::write_whole(&args.output, &bytes)?;
+    let conversion = Conversion {
+        schema_version: output::SCHEMA_VERSION,
+        format: format.extension(),
+        bytes: bytes.len(),
+        source_bytes: file.n_bytes,
+        n_gaussians: gaussians.len(),
+        sh_degree: gaussians.degree.number(),
+    };
+    output::print(&conversion, args.json)
 }
 
 /// What the file says of its making; a .ply alone has room for it.

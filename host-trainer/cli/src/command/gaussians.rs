@@ -20,7 +20,7 @@ pub(crate) struct GaussiansFile {
     pub(crate) n_bytes: usize,
     /// In the frame of the file.
     pub(crate) gaussians: Gaussians,
-    notes: Notes,
+    pub(crate) notes: Notes,
     /// Seconds that reading took.
     pub(crate) read_s: f64,
 }

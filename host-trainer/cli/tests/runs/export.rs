@@ -55,6 +55,21 @@ fn without_a_capture_cameras_are_generated() {
 }
 
 #[test]
+fn a_file_of_gaussians_is_written_in_another_format() {
+    let home = folder("export_convert");
+    let (bundle, first, second) = (home.join("a.psb"), home.join("a.ply"), home.join("b.sog"));
+    fs::write(&bundle, undisturbed()).unwrap();
+    let made = measured(&mut export(&bundle, &first));
+    let said =
+        measured(pocketsplat().arg("export").arg(&first).arg("-o").arg(&second).args(["--json", "--sh-degree", "1"]));
+    assert_eq!((&said["n_gaussians"], &said["source_bytes"]), (&made["n_gaussians"], &made["bytes"]));
+    let (gaussians, _) = Format::read(&second).unwrap();
+    assert_eq!((gaussians.degree, gaussians.len() as u64), (Degree::One, made["n_gaussians"].as_u64().unwrap()));
+    let said = fails(pocketsplat().arg("export").arg(&first).arg(capture()).arg("-o").arg(&second));
+    assert!(said.contains("leave CAPTURE out"), "{said}");
+}
+
+#[test]
 fn what_cannot_be_written_is_refused_before_any_work() {
     let home = folder("export_refused");
     let bundle = home.join("a.psb");
@@ -75,7 +90,6 @@ fn every_other_command_names_import() {
             &["inspect"][..],
             &["view", "-o", "a.html"],
             &["fit", "--ram", "100KiB"],
-            &["export", "-o", "a.ply"],
             &["verify"],
             &["train", "-o", "a.psb"],
             &["doctor"],

@@ -1,0 +1,62 @@
+#!/usr/bin/env bash
+# One capture, every way to keep it: explicit Gaussians as .ply, .spz and .sog, and the bundles of three backbones.
+#
+#   tools/reproduce/formats.sh CAPTURE OUT [OPTION of train…]
+#
+# Writes OUT/formats.csv and prints it. What is done is not done again, what was interrupted goes on. ITERATIONS (7000), SIZE (200, the
+# longest side in pixels), SEED (42), LPIPS (a file of weights) and POCKETSPLAT (the program) are read from the environment.
+set -euo pipefail
+[ $# -ge 2 ] || { sed -n '1d;/^#/!q;s/^# \{0,1\}//p' "$0" >&2 && exit 2; }
+capture=$1 out=$2
+shift 2
+program=${POCKETSPLAT:-pocketsplat}
+mkdir -p "$out"
+lpips=()
+[ -z "${LPIPS:-}" ] || lpips=(--lpips-weights "$LPIPS")
+
+trained() { # FILE OPTIONS…
+  local file=$1 run=${1%.*}.run
+  shift
+  [ ! -f "$run/result.json" ] || return 0
+  if [ -f "$run/config.toml" ]; then
+    "$program" train --resume "$run" >/dev/null
+  else
+    "$program" train "$capture" -o "$file" --iterations "${ITERATIONS:-7000}" --max-resolution "${SIZE:-200}" --seed "${SEED:-42}" \
+      --no-report "$@" >/dev/null
+  fi
+}
+
+trained "$out/3dgs.ply" --backbone 3dgs "$@"
+for kind in spz sog; do
+  [ -f "$out/3dgs.$kind" ] || "$program" export "$out/3dgs.ply" -o "$out/3dgs.$kind" >/dev/null
+done
+effects=(--effects +view-colour)
+trained "$out/scaffold.psb" --backbone scaffold --modules none "${effects[@]}" "$@"
+trained "$out/hac.psb" --backbone hac --modules none --lambda 0.002 "${effects[@]}" "$@"
+trained "$out/hac-modules.psb" --backbone hac --modules rdo-pruning --lambda 0.002 "${effects[@]}" "$@"
+for kind in ply spz sog; do
+  [ -f "$out/hac-modules.$kind" ] || "$program" export "$out/hac-modules.psb" "$capture" -o "$out/hac-modules.$kind" >/dev/null
+done
+for file in 3dgs.ply 3dgs.spz 3dgs.sog scaffold.psb hac.psb hac-modules.psb hac-modules.ply hac-modules.spz hac-modules.sog; do
+  [ -f "$out/$file.json" ] || {
+    "$program" eval "$out/$file" "$capture" --max-resolution "${SIZE:-200}" --json "${lpips[@]}" >"$out/$file.part"
+    mv "$out/$file.part" "$out/$file.json"
+  }
+done
+
+python3 - "$out" <<'PYTHON'
+import csv, json, pathlib, sys
+
+out = pathlib.Path(sys.argv[1])
+names = ["psnr_db", "ssim", "lpips", "bundle_bytes", "n_gaussians", "decode_s", "render_s_per_view", "scratch_bytes"]
+rows = [{"file": path.stem, **{name: (found := json.loads(path.read_text())).get(name, "") for name in names}} for path in out.glob("*.json")]
+whole = max(row["bundle_bytes"] for row in rows)
+for row in rows:
+    row["times_smaller"] = round(whole / row["bundle_bytes"], 1)
+rows.sort(key=lambda row: -row["bundle_bytes"])
+with open(out / "formats.csv", "w", newline="") as file:
+    table = csv.DictWriter(file, ["file", *names, "times_smaller"])
+    table.writeheader()
+    table.writerows(rows)
+print((out / "formats.csv").read_text(), end="")
+PYTHON

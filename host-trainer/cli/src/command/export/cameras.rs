@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use anyhow::{Result, bail};
-use glam::{DMat3, DQuat, DVec3};
+use glam::DVec3;
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Capture, Image, Split, View};
 use pocketsplat_core::Bundle;
@@ -19,8 +19,6 @@ const N_AROUND: u32 = 32;
 const HEIGHTS: [f64; 4] = [-0.04, 0.0, 0.04, 0.1];
 /// No camera looks down or up more steeply, parts of a turn.
 const STEEPEST: f64 = 0.22;
-/// Cameras that look in directions further apart than this, as the cosine between them, see different things.
-const ALIKE: f64 = 0.7;
 /// Every eighth camera is held out, as with captures.
 const HELD_OUT_EVERY: usize = 8;
 
@@ -44,7 +42,7 @@ impl<'a> Cameras<'a> {
         let of =
             |views: &[View]| -> Vec<Camera> { views.iter().map(|view| file.camera(bundle, capture, view)).collect() };
         Ok(Self {
-            fitted: with_between(of(views_of(capture, Split::Train)?)),
+            fitted: of(views_of(capture, Split::Train)?),
             judged: of(judged),
             split: split.to_string(),
             photographs: Some(judged),
@@ -74,29 +72,6 @@ impl<'a> Cameras<'a> {
         let of_view = |(picture, view): (&Image, &View)| psnr_db_masked(picture, &view.image, view.mask.as_ref());
         Some(pictures.iter().zip(views).map(of_view).sum::<f64>() / views.len() as f64)
     }
-}
-
-/// Cameras, and those halfway from each to the nearest other one that looks in nearly the same direction.
-///
-/// A bundle can be drawn from anywhere, and what lies between the training views is what held-out views ask for.
-fn with_between(mut cameras: Vec<Camera>) -> Vec<Camera> {
-    let between: Vec<Camera> = cameras
-        .iter()
-        .enumerate()
-        .filter_map(|(i, camera)| {
-            let alike = |other: &Camera| camera.rotation.row(2).dot(other.rotation.row(2)) > ALIKE;
-            let distance = |other: &Camera| camera.centre_world().distance(other.centre_world());
-            let others =
-                cameras.iter().enumerate().filter(|(j, other)| *j != i && alike(other)).map(|(_, other)| other);
-            let nearest = others.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
-            let turn = |camera: &Camera| DQuat::from_mat3(&camera.rotation);
-            let rotation = DMat3::from_quat(turn(camera).slerp(turn(nearest), 0.5).normalize());
-            let eye = camera.centre_world().midpoint(nearest.centre_world());
-            Some(Camera { rotation, translation: -(rotation * eye), ..camera.clone() })
-        })
-        .collect();
-    cameras.extend(between);
-    cameras
 }
 
 /// Cameras with the lens of `own` on circles around the point of its axis that is nearest to the scene's origin, and their distance to it.
@@ -145,7 +120,7 @@ mod tests {
     use glam::{DMat3, DVec3};
     use pocketsplat_capture::camera::Camera;
 
-    use super::{around, with_between};
+    use super::around;
 
     #[test]
     fn generated_cameras_look_at_one_point_from_one_distance() {
@@ -166,26 +141,6 @@ mod tests {
             let seen = camera.rotation * pivot + camera.translation;
             assert!(seen.truncate().length() < 1e-9 && (seen.z - distance).abs() < 1e-9, "{seen}");
             assert!(camera.rotation.row(1).z < 0.0, "upright");
-        }
-    }
-
-    #[test]
-    fn cameras_between_look_where_their_neighbours_do() {
-        let lens = Camera {
-            rotation: DMat3::IDENTITY,
-            translation: DVec3::ZERO,
-            focal_px: [50.0, 50.0],
-            principal_px: [20.0, 15.0],
-            width_px: 40,
-            height_px: 30,
-        };
-        let at = |angle: f64| lens.looking_at(3.0 * DVec3::new(angle.cos(), angle.sin(), 0.2), DVec3::ZERO, DVec3::Z);
-        let cameras = with_between(vec![at(0.0), at(0.4), at(3.0)]);
-        assert_eq!(cameras.len(), 5, "the third has no neighbour");
-        for camera in &cameras[3..] {
-            let seen = camera.rotation * DVec3::ZERO + camera.translation;
-            assert!(seen.truncate().length() < 0.05 && seen.z > 2.5, "{seen}");
-            assert!((camera.rotation.determinant() - 1.0).abs() < 1e-9, "a rotation");
         }
     }
 

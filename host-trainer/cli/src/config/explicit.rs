@@ -7,10 +7,8 @@ use pocketsplat_trainer::explicit::CloudConfig;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
+use super::named::EXPLICIT;
 use super::{CaptureOptions, Difference, keys_of, merge};
-
-/// The name of explicit Gaussians as a backbone.
-pub(crate) const EXPLICIT: &str = "3dgs";
 
 /// Everything such a run was asked for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -20,7 +20,8 @@ use toml::{Table, Value};
 
 pub(crate) use capture::CaptureOptions;
 pub(crate) use effects::EffectsConfig;
-pub(crate) use explicit::{EXPLICIT, ExplicitRunConfig};
+pub(crate) use explicit::ExplicitRunConfig;
+pub(crate) use named::EXPLICIT;
 pub(crate) use preset::Preset;
 pub(crate) use protocol::Protocol;
 

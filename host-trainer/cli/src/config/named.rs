@@ -5,11 +5,14 @@ use serde::de::DeserializeOwned;
 use serde::de::IntoDeserializer as _;
 use serde::de::value::{Error, StrDeserializer};
 
+/// The name of explicit Gaussians as a backbone.
+pub(crate) const EXPLICIT: &str = "3dgs";
+
 // Names of the choices, in the order in which help shows them.
 pub(crate) const SURFACES: &[&str] = &["matte", "mixed", "glossy"];
 pub(crate) const CODERS: &[&str] = &["auto", "static", "context"];
 pub(crate) const TARGETS: &[&str] = &["cortex-m4", "cortex-m7", "riscv32imac"];
-pub(crate) const BACKBONES: &[&str] = &["scaffold", "hac", "hac-plus", "contextgs", super::EXPLICIT];
+pub(crate) const BACKBONES: &[&str] = &["scaffold", "hac", "hac-plus", "contextgs", EXPLICIT];
 pub(crate) const SPLITS: &[&str] = &["test", "train"];
 pub(crate) const BACKGROUNDS: &[&str] = &["black", "white", "learned"];
 pub(crate) const LPIPS_RANGES: &[&str] = &["zero-to-one", "minus-one-to-one"];

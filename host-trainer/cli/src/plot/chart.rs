@@ -1,4 +1,4 @@
-//! What all charts share: colours, sizes, axes, legend, names of points.
+//! What all charts share: sizes, axes, legend, names of points.
 
 use anyhow::Result;
 use plotters::chart::ChartContext;
@@ -6,6 +6,7 @@ use plotters::coord::ranged1d::{AsRangedCoord, Ranged, ValueFormatter};
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
+pub(super) use super::marker::{Area, colour};
 use super::{labels, marker};
 
 /// Width of a figure and height of a panel, pixels of the SVG, which scales.
@@ -23,25 +24,6 @@ const INK: RGBColor = RGBColor(51, 51, 51);
 /// Of lines that are no series.
 pub(super) const FRONT: RGBColor = RGBColor(120, 120, 120);
 const GRID: RGBColor = RGBColor(225, 225, 225);
-
-/// Colours that people who see colours differently can tell apart (Okabe and Ito 2008), the darker ones first.
-const COLOURS: [RGBColor; 7] = [
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(230, 159, 0),
-    RGBColor(86, 180, 233),
-    RGBColor(0, 0, 0),
-];
-
-/// The colour of the `i`-th curve; they come round after seven.
-pub(super) fn colour(i: usize) -> RGBColor {
-    COLOURS[i % COLOURS.len()]
-}
-
-/// A part of a figure, or all of it; drawn on in pixels.
-pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
 
 /// A chart under construction.
 pub(super) type Chart<'a, 'b, X> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<X, RangedCoordf64>>;

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use toml::Table;
 
 use super::named::EXPLICIT;
-use super::{CaptureOptions, Difference, keys_of, merge};
+use super::{CaptureOptions, Difference, keys_of, merge, refuse_unknown};
 
 /// Everything such a run was asked for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -57,9 +57,11 @@ impl ExplicitRunConfig {
 
     /// The same with some keys set, each given as `table.key=value`.
     pub(crate) fn with_keys(&self, keys: &[String]) -> Result<Self> {
-        let mut all = Table::try_from(self)?;
-        merge(&mut all, &keys_of(keys)?);
-        Ok(all.try_into()?)
+        let (mut all, given) = (Table::try_from(self)?, keys_of(keys)?);
+        merge(&mut all, &given);
+        let config: Self = all.try_into()?;
+        refuse_unknown(&given, &Table::try_from(&config)?, "")?;
+        Ok(config)
     }
 
     /// The first key at which two differ in what decides the result, with both values.

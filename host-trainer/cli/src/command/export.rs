@@ -113,7 +113,7 @@ impl<'a> Source<'a> {
 
     /// The bundle's Gaussians as a file has them, in the capture's frame, and the number that was left out.
     fn gaussians(&self, cameras: &Cameras<'_>, degree: Degree, n_steps: u32) -> Result<(Gaussians, usize)> {
-        let scene = decoded_scene(self.bundle).context("the bundle cannot be decoded")?;
+        let scene = decoded_scene(self.bundle).context("could not decode the bundle")?;
         let pinholes: Vec<Pinhole<f32>> = cameras.fitted.iter().map(Pinhole::new).collect();
         eprintln!("what {} cameras see of {} anchors", pinholes.len(), scene.anchors.len());
         let baked = bake(&scene, &pinholes, degree);

@@ -78,19 +78,22 @@ pub(crate) fn run(args: &Args) -> Result<()> {
             eprintln!("warning: the page will lack photographs: {error:#}; give the folder as CAPTURE if it has moved");
         })
         .ok();
-    write(&args.run, &config, capture.as_ref(), &output)
+    let n_bytes = write(&args.run, &config, capture.as_ref(), &output)?;
+    println!("{}: {:.2} MB; open it in a browser", output.display(), n_bytes as f64 / 1e6);
+    Ok(())
 }
 
 /// Writes the page of a run that has just ended into its folder; a run is not worse for lacking one.
 pub(super) fn write_into(folder: &Path, config: &RunConfig, capture: &Capture) {
     let path = folder.join(FILE);
     match write(folder, config, Some(capture), &path) {
-        Ok(()) => eprintln!("its report:   {}", path.display()),
+        Ok(_) => eprintln!("its report:   {}", path.display()),
         Err(error) => eprintln!("warning: there is no report: {error:#}"),
     }
 }
 
-fn write(folder: &Path, config: &RunConfig, capture: Option<&Capture>, path: &Path) -> Result<()> {
+/// Returns the length of the page.
+fn write(folder: &Path, config: &RunConfig, capture: Option<&Capture>, path: &Path) -> Result<usize> {
     let result = folder.join("result.json");
     let text = std::fs::read_to_string(&result).with_context(|| {
         format!(
@@ -106,7 +109,9 @@ fn write(folder: &Path, config: &RunConfig, capture: Option<&Capture>, path: &Pa
         .map(|capture| photographs(&file, capture, &config.capture))
         .transpose()?;
     let run = Run { folder, config, result, file, photographs };
-    output::write_whole(path, html(&run)?.as_bytes())
+    let text = html(&run)?;
+    output::write_whole(path, text.as_bytes())?;
+    Ok(text.len())
 }
 
 fn photographs<'a>(file: &BundleFile, capture: &'a Capture, options: &CaptureOptions) -> Result<Photographs<'a>> {

@@ -93,7 +93,7 @@ fn resume(args: &Args, path: &Path) -> Result<ExitCode> {
         return explicit::resume(args, folder);
     }
     let begun = RunConfig::parse(&folder.config()?);
-    let begun = begun.with_context(|| format!("the config.toml in {} cannot be used", path.display()))?;
+    let begun = begun.with_context(|| format!("could not use the config.toml in {}", path.display()))?;
     let mut config = args.applied_to(begun.clone())?;
     if let Some(difference) = begun.difference(&config)? {
         bail!("the run began with another setting than the command line asks for: {difference}; leave it out");

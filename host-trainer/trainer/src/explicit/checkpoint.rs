@@ -11,10 +11,9 @@ use super::density::DensityStatistics;
 use super::optimiser::CloudOptimiser;
 use super::train::CloudTrainer;
 use crate::ops::spherical_harmonics::MOST;
-use crate::train::checkpoint::envelope::{self, needs, part};
+use crate::train::checkpoint::envelope::{self, Progress, RandomState, needs, part};
 use crate::train::checkpoint::{CaptureSignature, CheckpointFault, Kernels, RestoreError};
 use crate::train::run::Resumable;
-use crate::train::watchdog::Watchdog;
 
 /// As the checkpoints of anchors have it, with a letter of its own.
 const MAGIC: [u8; 8] = *b"\x8bPSGRN\r\n";
@@ -28,10 +27,6 @@ pub struct RestoredCloud<'a> {
     pub written_by: Kernels,
 }
 
-/// Iteration, watchdog, wall-clock and processor seconds, the views left of this pass.
-type Progress = (u32, Watchdog, [f64; 2], Vec<u32>);
-/// Seed, stream and position.
-type RandomState = ([u8; 32], u64, u128);
 /// Centres, log-scales, rotations, opacity logits, coefficients.
 type Arrays = (Vec<[f32; 3]>, Vec<[f32; 3]>, Vec<[f32; 4]>, Vec<f32>, Vec<[f32; 3]>);
 /// The Gaussians and what belongs to them.

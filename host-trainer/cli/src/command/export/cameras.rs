@@ -122,18 +122,19 @@ mod tests {
 
     use super::around;
 
+    const LENS: Camera = Camera {
+        rotation: DMat3::IDENTITY,
+        translation: DVec3::ZERO,
+        focal_px: [50.0, 50.0],
+        principal_px: [20.0, 15.0],
+        width_px: 40,
+        height_px: 30,
+    };
+
     #[test]
     fn generated_cameras_look_at_one_point_from_one_distance() {
-        let lens = Camera {
-            rotation: DMat3::IDENTITY,
-            translation: DVec3::ZERO,
-            focal_px: [50.0, 50.0],
-            principal_px: [20.0, 15.0],
-            width_px: 40,
-            height_px: 30,
-        };
         let target = DVec3::new(0.1, 0.0, 0.2);
-        let own = lens.looking_at(DVec3::new(3.0, 1.0, 2.0), target, DVec3::Z);
+        let own = LENS.looking_at(DVec3::new(3.0, 1.0, 2.0), target, DVec3::Z);
         let (cameras, distance) = around(&own).expect("a view to turn");
         assert_eq!(cameras.len(), 128);
         let pivot = own.centre_world() + distance * own.rotation.row(2);
@@ -146,14 +147,6 @@ mod tests {
 
     #[test]
     fn a_camera_in_the_middle_is_refused() {
-        let own = Camera {
-            rotation: DMat3::IDENTITY,
-            translation: DVec3::ZERO,
-            focal_px: [50.0, 50.0],
-            principal_px: [20.0, 15.0],
-            width_px: 40,
-            height_px: 30,
-        };
-        assert!(around(&own).expect_err("nothing to turn").to_string().contains("give the folder of the capture"));
+        assert!(around(&LENS).expect_err("nothing to turn").to_string().contains("give the folder of the capture"));
     }
 }

@@ -88,7 +88,7 @@ pub(super) fn of_file(path: &Path) -> Result<Vec<Shot>> {
     }
     let shot = |(i, record): (usize, CameraRecord)| {
         let camera = record.camera();
-        core_camera(&camera).with_context(|| format!("camera {i} of {} cannot be used", path.display()))?;
+        core_camera(&camera).with_context(|| format!("could not use camera {i} of {}", path.display()))?;
         Ok(Shot { name: record.name.unwrap_or_else(|| format!("camera {i}")), camera })
     };
     file.cameras.into_iter().enumerate().map(shot).collect()

@@ -59,7 +59,7 @@ pub(super) fn begin(args: &Args) -> Result<ExitCode> {
 
 pub(super) fn resume(args: &Args, folder: RunFolder) -> Result<ExitCode> {
     let begun = ExplicitRunConfig::parse(&folder.config()?);
-    let begun = begun.with_context(|| format!("the config.toml in {} cannot be used", folder.path().display()))?;
+    let begun = begun.with_context(|| format!("could not use the config.toml in {}", folder.path().display()))?;
     let config = args.applied_to_explicit(begun.clone())?;
     if let Some(difference) = begun.difference(&config)? {
         bail!("the run began with another setting than the command line asks for: {difference}; leave it out");

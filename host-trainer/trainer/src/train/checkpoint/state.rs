@@ -6,13 +6,12 @@ use pocketsplat_core::context::N_LEVELS;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::envelope::{self, content, needs, part};
+use super::envelope::{self, Progress, RandomState, content, needs, part};
 use super::{CaptureDifference, CaptureSignature, CheckpointFault, Kernels, MAGIC};
 use crate::scene::{Anchors, ContextModel, Heads, Scene};
 use crate::train::config::Backbone;
 use crate::train::optimiser::Optimiser;
 use crate::train::statistics::Statistics;
-use crate::train::watchdog::Watchdog;
 use crate::train::{TrainConfig, TrainError, Trainer};
 use pocketsplat_capture::dataset::Capture;
 
@@ -46,10 +45,6 @@ pub struct Restored<'a> {
     pub written_by: Kernels,
 }
 
-/// Iteration, watchdog, wall-clock and processor seconds, the views left of this pass.
-type Progress = (u32, Watchdog, [f64; 2], Vec<u32>);
-/// Seed, stream and position.
-type RandomState = ([u8; 32], u64, u128);
 /// The scene and what belongs to it, and the background's colour.
 type Learned = (Anchors<f32>, Heads<f32>, Option<ContextModel<f32>>, Optimiser<f32>, Statistics, [f32; 3]);
 

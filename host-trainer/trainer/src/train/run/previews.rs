@@ -30,7 +30,7 @@ fn iteration_of(name: &OsStr) -> Option<u32> {
 /// A folder with a JPEG every fiftieth of a run, `00000140.jpg` after iteration 140: always the first held-out view, or the first
 /// training view where none is held out.
 ///
-/// Each takes about a third of an iteration, so less than a hundredth of a run of 2,000 iterations.
+/// Each costs the forward half of an iteration.
 #[derive(Debug)]
 pub(super) struct Previews {
     folder: PathBuf,

@@ -8,6 +8,8 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use pocketsplat_trainer::explicit::train::CloudOutcome;
 use pocketsplat_trainer::scene::Scene;
 use pocketsplat_trainer::step::StepReport;
+use pocketsplat_trainer::train::gauge::Load;
+use pocketsplat_trainer::train::steering::Fit;
 use pocketsplat_trainer::train::{DroppedStep, Observer};
 
 use super::estimate::Estimate;
@@ -129,6 +131,19 @@ impl Observer for Progress {
         let bits = report.rate.map(|rate| format!("  {:.0} bits each", rate.bits.iter().sum::<f64>()));
         let size = format!("{} anchors{}", scene.anchors.len(), bits.unwrap_or_default());
         self.show(iteration, f64::from(report.loss), report.squared_error, &size);
+    }
+
+    fn fitted(&mut self, fit: &Fit) {
+        let Load { ram, instructions, bytes } = fit.load;
+        let shares = [("RAM", ram), ("instructions", instructions), ("bytes", bytes)];
+        let shares = shares.iter().filter(|(_, share)| *share > 0.0);
+        let shares: Vec<_> = shares.map(|(of, share)| format!("{:.0} % of the {of}", 100.0 * share)).collect();
+        let lambda = if fit.lambda == fit.former_lambda {
+            String::new()
+        } else {
+            format!(", before lambda goes from {:.5} to {:.5}", fit.former_lambda, fit.lambda)
+        };
+        self.say(&format!("pruning to {} anchors, which take {}{lambda}", fit.n_anchors, shares.join(", ")));
     }
 
     fn dropped(&mut self, step: &DroppedStep) {

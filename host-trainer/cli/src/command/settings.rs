@@ -238,17 +238,20 @@ impl QualityOptions {
             let tiers = tiers_of(&train.modules);
             train.modules.pruning.get_or_insert(tiers);
         }
-        let most = self.keep_anchors.unwrap_or(choice.max_anchors);
-        keep(train, most);
-        let grown = if train.modules.rdo.is_some() { most.saturating_mul(GROWN_ANCHORS) / KEPT_ANCHORS } else { most };
+        let grown = match train.modules.rdo {
+            // Its events leave what is measured to fit.
+            Some(_) => choice.max_anchors.saturating_mul(GROWTH),
+            None => {
+                keep(train, self.keep_anchors.unwrap_or(choice.max_anchors));
+                choice.max_anchors
+            }
+        };
         train.densification.max_anchors = self.max_anchors.or(Some(grown));
     }
 }
 
-/// Where pruning by worth leaves so many anchors, growth goes to this many: on lego at 120 px half as many more gained
-/// 0.6 dB over growth to the number itself (`docs/rate-distortion.md`).
-const GROWN_ANCHORS: usize = 3;
-const KEPT_ANCHORS: usize = 2;
+/// Where pruning by worth leaves what fits, growth goes to so many times what fits on average.
+const GROWTH: usize = 3;
 
 /// Lets `most` anchors stay.
 fn keep(train: &mut TrainConfig, most: usize) {

@@ -8,12 +8,14 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::{Background, Capture, Split, View};
-use pocketsplat_core::Bundle;
 use pocketsplat_core::budget::MAX_FRAME_PX;
+use pocketsplat_core::{Bundle, Plan};
 use pocketsplat_trainer::bundle::Written;
+use pocketsplat_trainer::device::Limits;
 use pocketsplat_trainer::effects::Effect;
-use pocketsplat_trainer::encode::{Encoding, Fitted};
+use pocketsplat_trainer::encode::{Cut, Encoding, Fitted, Scale};
 use pocketsplat_trainer::train::finish::Finished;
+use pocketsplat_trainer::train::gauge::Gauge;
 use pocketsplat_trainer::train::run::{Ending, Interval, RunError, RunFolder, fork};
 use pocketsplat_trainer::train::{TrainConfig, Trainer};
 use serde::Serialize;
@@ -42,6 +44,9 @@ pub(crate) struct TrainResult {
     pub(crate) schema_version: u32,
     pub(crate) bundle: PathBuf,
     pub(crate) bundle_bytes: usize,
+    /// Scratch memory in which a device with limited memory draws the whole scene.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) scratch_bytes: Option<usize>,
     pub(crate) n_anchors: usize,
     /// Of these, with a drawn offset; the others are not coded.
     pub(crate) n_valid_anchors: usize,
@@ -200,7 +205,8 @@ pub(crate) fn train_in<'a>(
 ) -> Result<Option<TrainResult>> {
     let mut folder = folder.forking_at(&config.fork_at);
     let path = folder.path().to_owned();
-    let mut trainer = match start {
+    let scale = config.encoding.scale(capture);
+    let trainer = match start {
         Start::New => {
             Estimate::try_out(capture, &config.train)?;
             Trainer::new(capture, config.train)?
@@ -212,6 +218,7 @@ pub(crate) fn train_in<'a>(
             *trainer
         }
     };
+    let mut trainer = trainer.fitting(gauge(scale.as_ref()));
     folder.write_config(&config.to_toml()?)?;
     let interval = config.checkpoint_every.map_or(Interval::Seconds(CHECKPOINT_SECONDS), Interval::Iterations);
     let how_to_go_on = || format!("go on with `pocketsplat train --resume {}`", path.display());
@@ -239,6 +246,11 @@ pub(crate) fn train_in<'a>(
         .with_context(|| format!("the training is done and kept; {}", how_to_go_on()))?;
     folder.finish(&serde_json::to_string_pretty(&result)?, config.keep_checkpoints)?;
     Ok(Some(result))
+}
+
+/// What tells a run that its bundle has limits.
+fn gauge<'a>(scale: Option<&'a Scale<'a>>) -> Option<&'a dyn Gauge> {
+    scale.map(|scale| scale as &dyn Gauge)
 }
 
 /// The run as its newest sound checkpoint has it, or at its start where it was stopped before the first one.
@@ -279,7 +291,8 @@ pub(crate) fn train_as(
     encoding: &Encoding,
     output: &Path,
 ) -> Result<TrainResult> {
-    let mut trainer = Trainer::new(capture, config)?;
+    let scale = encoding.scale(capture);
+    let mut trainer = Trainer::new(capture, config)?.fitting(gauge(scale.as_ref()));
     trainer.run(&mut Progress::new(0, config.iterations))?;
     write_bundle(&trainer, capture, options, encoding, output)
 }
@@ -294,6 +307,31 @@ fn judges(trainer: &Trainer<'_>, capture: &Capture) -> Vec<View> {
     (0..n).map(|i| capture.test[i * capture.test.len() / n].clone()).collect()
 }
 
+/// What a bundle takes of its limits, and what it lost to them.
+fn say_what_fits(file: &BundleFile, limits: &Limits, cut: Option<&Cut>, plan: Option<&Plan>) -> Result<()> {
+    let share =
+        |bytes: u64, most: u64| format!("{bytes} of {most} bytes ({:.1} %)", 100.0 * bytes as f64 / most as f64);
+    if let Some(most) = limits.flash_bytes {
+        eprintln!("the bundle takes {}", share(file.bytes.len() as u64, most));
+    }
+    if let (Some(most), Some(plan)) = (limits.ram_bytes, plan) {
+        let memory = share(plan.scratch_len() as u64, most);
+        let strips = plan.n_strips();
+        let plural = if strips == 1 { "" } else { "s" };
+        eprintln!("the whole scene is drawn in {memory} of scratch memory, in {strips} strip{plural}");
+    }
+    let Some(Cut { n_anchors, flash_bytes, ram_bytes, psnr_db }) = cut else { return Ok(()) };
+    let bundle = file.parse()?;
+    let now = bundle.n_tiers().checked_sub(1).and_then(|tier| bundle.measures(tier)?.psnr_db);
+    let lost =
+        psnr_db.zip(now).map(|(before, now)| format!(" at a cost of {:.2} dB", before - now)).unwrap_or_default();
+    let ram = ram_bytes.map(|bytes| format!(" and {bytes} bytes of scratch memory")).unwrap_or_default();
+    eprintln!(
+        "the {n_anchors} least important anchors were left out to fit{lost}; with them the bundle takes {flash_bytes} bytes{ram}"
+    );
+    Ok(())
+}
+
 fn write_bundle(
     trainer: &Trainer<'_>,
     capture: &Capture,
@@ -304,12 +342,11 @@ fn write_bundle(
     let protocol = Protocol::of(capture, options);
     let finished = Finished { protocol: Some(protocol.to_text()?), ..trainer.finish()? };
     let held_out = judges(trainer, capture);
-    let Fitted { written: Written { bytes, .. }, finished, n_cut } = encoding.encode(finished, capture, &held_out)?;
+    let Fitted { written: Written { bytes, .. }, finished, cut, plan } =
+        encoding.encode(finished, capture, &held_out)?;
     output::write_whole(output, &bytes)?;
-    if n_cut > 0 {
-        eprintln!("left out the {n_cut} least important anchors, so that the bundle fits");
-    }
     let file = BundleFile { path: output.to_owned(), bytes };
+    say_what_fits(&file, &encoding.limits, cut.as_ref(), plan.as_ref())?;
     let held_out = if capture.test.is_empty() {
         None
     } else {
@@ -324,6 +361,7 @@ fn write_bundle(
         schema_version: output::SCHEMA_VERSION,
         bundle: output.to_owned(),
         bundle_bytes: file.bytes.len(),
+        scratch_bytes: plan.map(|plan| plan.scratch_len()),
         n_anchors,
         n_valid_anchors: (0..n_anchors).filter(|a| scene.anchors.has_drawn(*a)).count(),
         drawn_offsets: (0..scene.anchors.mask_logits.len()).filter(|offset| scene.anchors.is_drawn(*offset)).count(),

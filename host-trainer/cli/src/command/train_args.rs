@@ -75,12 +75,12 @@ pub(crate) struct Args {
 /// What the device has that the bundle is for; what else the command line leaves open is chosen by it.
 #[derive(clap::Args)]
 pub(crate) struct DeviceArgs {
-    /// Scratch bytes of the decoder, as 192KiB, excluding stack and frame buffer; the lowest tier is guaranteed to fit
+    /// Scratch bytes of the decoder, as 192KiB, excluding stack and frame buffer; the whole scene is guaranteed to fit
     /// [default: no limit]
     #[arg(long, value_name = "BYTES", help_heading = DEVICE)]
     ram: Option<ByteSize>,
-    /// Largest size of the bundle, as 1MiB [default: no limit]
-    #[arg(long, value_name = "BYTES", help_heading = DEVICE)]
+    /// Size of the bundle, as 300kB or 1MiB; the scene is trained to fill it [default: no limit]
+    #[arg(long, visible_alias = "bytes", value_name = "BYTES", help_heading = DEVICE)]
     flash: Option<ByteSize>,
     /// Processor, which limits the instructions of a frame [default: no limit]
     #[arg(long, value_parser = one_of::<Processor>(TARGETS), help_heading = DEVICE)]
@@ -92,7 +92,7 @@ impl DeviceArgs {
         Limits {
             ram_bytes: self.ram.map(|bytes| bytes.as_u64()),
             flash_bytes: self.flash.map(|bytes| bytes.as_u64()),
-            frame_instructions: self.target.map(Processor::frame_instructions),
+            processor: self.target,
         }
     }
 
@@ -103,13 +103,17 @@ impl DeviceArgs {
             return Ok(());
         }
         config.encoding.limits = limits;
+        if self.ram.is_none() && self.target.is_none() {
+            eprintln!("for this size: the number of anchors and lambda follow while it trains");
+            return Ok(());
+        }
         let choice = choose(&limits)?;
         quality.choose(&mut config.train, &choice);
         config.train.hac.lambda = lambda.unwrap_or(choice.lambda);
         let ModelChoice { feature_dim, n_offsets, max_anchors, lambda, binding } = choice;
         eprintln!(
-            "for this device: features of width {feature_dim}, {n_offsets} offsets, at most {max_anchors} anchors (limited by \
-             {binding}), lambda {lambda}; options override these"
+            "for this device: features of width {feature_dim}, {n_offsets} offsets, about {max_anchors} anchors (limited by \
+             {binding}), lambda {lambda} at first; options override these"
         );
         Ok(())
     }

@@ -4,7 +4,7 @@ use std::fmt;
 
 use pocketsplat_core::ScratchShape;
 
-use super::Limits;
+use super::{Limits, Processor};
 
 /// Feature widths F and offsets K, widest first, and the splats that an anchor of them draws in the fullest view.
 ///
@@ -134,9 +134,9 @@ impl Model {
         let of_ram = limits.ram_bytes.map(|ram| self.anchors_in(ram));
         let of_flash =
             limits.flash_bytes.map(|flash| ((flash as f64 - FIXED_FLASH) / self.flash_per_anchor(rate)) as usize);
-        let of_work = limits
-            .frame_instructions
-            .map(|most| (most as f64 * SHARE_OF_ANCHORS / self.instructions_per_anchor()) as usize);
+        let of_work = limits.processor.map(|processor| {
+            (processor.frame_instructions() as f64 * SHARE_OF_ANCHORS / self.instructions_per_anchor()) as usize
+        });
         let all = [(of_ram, BindingLimit::Ram), (of_flash, BindingLimit::Flash), (of_work, BindingLimit::Instructions)];
         let given = all.into_iter().filter_map(|(n, binding)| Some((n?, binding)));
         given.min_by_key(|(n, _)| *n).unwrap_or((usize::MAX, BindingLimit::Nothing))
@@ -192,7 +192,7 @@ impl Model {
             BindingLimit::Flash => (limits.flash_bytes, (FIXED_FLASH + self.flash_per_anchor(rate) * n).ceil() as u64),
             _ => {
                 let needed = self.instructions_per_anchor() * n / SHARE_OF_ANCHORS;
-                (limits.frame_instructions, needed.ceil() as u64)
+                (limits.processor.map(Processor::frame_instructions), needed.ceil() as u64)
             }
         };
         Infeasible { binding, available: available.unwrap_or_default(), needed }
@@ -208,10 +208,10 @@ mod tests {
     proptest! {
         #[test]
         fn a_chosen_model_keeps_its_limits_and_what_does_not_do_is_named(
-            ram in 0_u64..4_000_000, flash in 0_u64..2_000_000, instructions in 0_u64..500_000_000
+            ram in 0_u64..4_000_000, flash in 0_u64..2_000_000,
+            processor in prop::sample::select(vec![Processor::CortexM4, Processor::CortexM7, Processor::Riscv32imac])
         ) {
-            let limits =
-                Limits { ram_bytes: Some(ram), flash_bytes: Some(flash), frame_instructions: Some(instructions) };
+            let limits = Limits { ram_bytes: Some(ram), flash_bytes: Some(flash), processor: Some(processor) };
             match choose(&limits) {
                 Ok(choice) => {
                     let model = MODELS.into_iter().find(|m| usize::from(m.feature_dim) == choice.feature_dim).unwrap();
@@ -221,12 +221,11 @@ mod tests {
                 Err(Infeasible { binding, available, needed }) => {
                     prop_assert!(needed > available);
                     let mut enough = limits;
-                    let limit = match binding {
-                        BindingLimit::Ram => &mut enough.ram_bytes,
-                        BindingLimit::Flash => &mut enough.flash_bytes,
-                        _ => &mut enough.frame_instructions,
-                    };
-                    *limit = Some(needed + 1);
+                    match binding {
+                        BindingLimit::Ram => enough.ram_bytes = Some(needed + 1),
+                        BindingLimit::Flash => enough.flash_bytes = Some(needed + 1),
+                        _ => prop_assert!(false, "every processor has time for the smallest scene: {needed}"),
+                    }
                     let again = choose(&enough);
                     prop_assert!(again.as_ref().err().is_none_or(|error| error.binding != binding), "{again:?}");
                 }

@@ -1,7 +1,8 @@
 //! Budget in, model out: the scene that a device affords, chosen before anything is trained.
 //!
-//! [`choose`] goes by what scenes take on average; [`Encoding::encode`](crate::encode::Encoding::encode) then leaves out the least
-//! important anchors until the bundle keeps the limits, so that these hold whatever was trained.
+//! [`choose`] goes by what scenes take on average; training measures what the
+//! scene [takes](crate::train::gauge::Gauge) and steers by it; [`Encoding::encode`](crate::encode::Encoding::encode) then leaves out
+//! the least important anchors until the bundle keeps the limits, so that these hold whatever was trained.
 
 mod choice;
 
@@ -20,9 +21,9 @@ pub struct Limits {
     /// Flash for the bundle, bytes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub flash_bytes: Option<u64>,
-    /// Instructions of a frame that the model is chosen for; what was trained is not cut to them.
+    /// Processor, whose frames of limited length the model is chosen and trained for; what was trained is not cut to them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub frame_instructions: Option<u64>,
+    pub processor: Option<Processor>,
 }
 
 impl Limits {

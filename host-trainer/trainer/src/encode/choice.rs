@@ -53,10 +53,26 @@ impl Candidates<'_> {
 }
 
 impl Encoding {
-    /// Codes a finished scene as [`CoderChoice`] says.
-    ///
-    /// Cost: up to five codings; with [`CoderChoice::Auto`] and no device, up to 40 decoded frames.
-    pub(super) fn coded(&self, finished: &Finished, capture: &Capture) -> Result<CodedScene, EncodeError> {
+    /// Codes a finished scene in the fewest bytes that [`CoderChoice`] leaves open: how a scene that is still trained is weighed.
+    pub(super) fn smallest(&self, finished: &Finished, capture: &Capture) -> Result<CodedScene, EncodeError> {
+        let candidates = self.candidates(finished, capture);
+        if finished.scene.context.is_none() {
+            return Ok(candidates.coded(ChannelCoding::Tables(self.quantisation))?);
+        }
+        let context = || candidates.coded(ChannelCoding::Context);
+        let tables = || candidates.coded(ChannelCoding::Tables(mean_steps(&finished.scene)?));
+        Ok(match self.coder {
+            CoderChoice::Context => context()?,
+            CoderChoice::Static => tables()?,
+            CoderChoice::Auto if self.limits.processor.is_some() => tables()?,
+            CoderChoice::Auto => {
+                let (context, tables) = (context()?, tables()?);
+                if tables.file_len() < context.file_len() { tables } else { context }
+            }
+        })
+    }
+
+    fn candidates<'a>(&'a self, finished: &'a Finished, capture: &Capture) -> Candidates<'a> {
         let info = BundleInfo {
             normalisation: capture.normalisation,
             background: finished.background,
@@ -65,27 +81,40 @@ impl Encoding {
             preview: capture.train[0].camera.clone(),
             protocol: finished.protocol.clone(),
         };
-        let candidates = Candidates { finished, info, tiers: &self.tiers };
-        if finished.scene.context.is_none() && self.coder != CoderChoice::Context {
-            return Ok(candidates.coded(ChannelCoding::Tables(self.quantisation))?);
-        }
+        Candidates { finished, info, tiers: &self.tiers }
+    }
+
+    /// Codes a finished scene as [`CoderChoice`] says.
+    ///
+    /// Cost: up to five codings; with [`CoderChoice::Auto`] and no device, up to 40 decoded frames.
+    pub(super) fn coded(&self, finished: &Finished, capture: &Capture) -> Result<CodedScene, EncodeError> {
+        let candidates = self.candidates(finished, capture);
         if self.coder == CoderChoice::Context {
             return Ok(candidates.coded(ChannelCoding::Context)?);
+        }
+        if finished.scene.context.is_none() {
+            return Ok(candidates.coded(ChannelCoding::Tables(self.quantisation))?);
         }
         let mean = mean_steps(&finished.scene)?;
         let tables = |share| candidates.coded(ChannelCoding::Tables(mean.scaled(share)));
         if self.coder == CoderChoice::Static {
             return Ok(tables(1.0)?);
         }
-        if self.limits.frame_instructions.is_some() {
+        let fits = |coded: &CodedScene| self.limits.flash_bytes.is_none_or(|most| coded.file_len() as u64 <= most);
+        if self.limits.processor.is_some() {
             for share in MEAN_STEP_SHARES {
                 let coded = tables(share)?;
-                if self.limits.flash_bytes.is_none_or(|most| coded.file_len() as u64 <= most) {
+                if fits(&coded) {
                     return Ok(coded);
                 }
             }
         }
         let context = candidates.coded(ChannelCoding::Context)?;
+        if !fits(&context) {
+            // Tables that fit, before anchors are left out.
+            let tables = tables(1.0)?;
+            return Ok(if tables.file_len() < context.file_len() { tables } else { context });
+        }
         let tables = MEAN_STEP_SHARES.into_iter().rev().map(|share| Ok(tables(share)?));
         smaller_and_as_good(context, tables, CodedScene::file_len, |coded| judged_psnr_db(coded, &capture.train))
     }

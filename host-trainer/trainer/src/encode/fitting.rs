@@ -2,17 +2,20 @@
 
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Capture, View};
-use pocketsplat_core::{Budget, Bundle, DecodeError};
+use pocketsplat_core::{Bundle, DecodeError, Plan};
 
+use super::scale::{DevicePlans, frame_of};
 use super::{EncodeError, Encoding};
-use crate::bundle::{CodedScene, WriteError, Written};
+use crate::bundle::{WriteError, Written};
 use crate::manifest::{cameras_to_measure, measure};
 use crate::train::finish::Finished;
+use crate::train::steering::Search;
 
-/// Scenes that are coded at most before giving up.
-const MOST_ATTEMPTS: usize = 12;
-/// A cut goes a little further than proportion says, because heads and models stay.
-const MARGIN: f64 = 0.98;
+/// A cut goes on until this share of the limit is used, or for so many codings.
+const CUTTING: Search = Search { tolerance: 0.015, most_trials: 14 };
+/// A scene that takes at most so much more than the memory in two strips is cut until it does not. Any other may be drawn in more
+/// strips, which take less memory and more time.
+const WORTH_CUTTING: f64 = 1.1;
 
 /// A bundle within its limits.
 #[derive(Clone, Debug)]
@@ -21,80 +24,144 @@ pub struct Fitted {
     pub written: Written,
     /// What it holds.
     pub finished: Finished,
-    /// Anchors that were left out for it.
-    pub n_cut: usize,
+    /// What was left out for it, if anything.
+    pub cut: Option<Cut>,
+    /// How the device draws all of it, where its memory is limited.
+    pub plan: Option<Plan>,
 }
 
-/// What a bundle takes too much of.
-struct Excess {
+/// What a scene lost to its limits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cut {
+    /// Anchors that were left out.
+    pub n_anchors: usize,
+    /// Bytes of the bundle that would have held them.
+    pub flash_bytes: u64,
+    /// Scratch memory that would have done, where it is limited.
+    pub ram_bytes: Option<u64>,
+    /// PSNR over the held-out views with them, dB.
+    pub psnr_db: Option<f32>,
+}
+
+/// What a bundle takes of the limit that leaves least room.
+#[derive(Clone, Copy)]
+struct Need {
     memory: &'static str,
     available: u64,
     needed: u64,
 }
 
+impl Need {
+    fn share(&self) -> f64 {
+        self.needed as f64 / self.available.max(1) as f64
+    }
+}
+
+/// A coded scene and what it takes.
+struct Attempt {
+    finished: Finished,
+    written: Written,
+    plan: Option<Plan>,
+    need: Option<Need>,
+}
+
+impl Attempt {
+    fn share(&self) -> f64 {
+        self.need.map_or(0.0, |need| need.share())
+    }
+
+    fn fitted(self, cut: Option<Cut>) -> Fitted {
+        let Self { written, finished, plan, .. } = self;
+        Fitted { written, finished, cut, plan }
+    }
+}
+
 impl Encoding {
     /// Codes a finished scene in tiers, again and again without its least important anchors, until the bundle is within the flash
-    /// and its lowest tier is drawn within the RAM; measures each tier over training views and an orbit, and assembles the file.
+    /// and the whole of it is drawn within the RAM; measures each tier over training views and an orbit, and assembles the file.
     ///
     /// * `held_out`: views that were not trained on, whose photographs the tiers are compared with.
     ///
     /// # Errors
     /// [`EncodeError`].
     pub fn encode(&self, finished: Finished, capture: &Capture, held_out: &[View]) -> Result<Fitted, EncodeError> {
-        // Photographs are not larger than frames may be: loading has seen to it.
-        let [width_px, height_px] = capture.largest_px().map(|px| px as u16);
-        let frame = Budget::for_frame(width_px, height_px);
         let cameras: Vec<_> = capture.train.iter().map(|view| view.camera.clone()).collect();
         let cameras = cameras_to_measure(&cameras);
-        let mut finished = finished;
-        let n_before = n_kept(&finished);
-        let mut attempts = 0;
-        loop {
-            let n_now = n_kept(&finished);
-            let coded = self.coded(&finished, capture)?;
-            let Excess { memory, available, needed } = match self.within_limits(coded, &frame, &cameras, held_out)? {
-                Ok(written) => return Ok(Fitted { written, finished, n_cut: n_before - n_now }),
-                Err(excess) => excess,
-            };
-            attempts += 1;
-            let n_next = (n_now as f64 * MARGIN * available as f64 / needed as f64) as usize;
-            if attempts == MOST_ATTEMPTS || n_next == 0 {
-                return Err(EncodeError::TooLarge { memory, available, needed, n_anchors: n_now });
+        let attempt = |finished| self.attempt(finished, capture, &cameras, held_out);
+        let (n, whole) = (n_kept(&finished), attempt(finished.clone())?);
+        let Some(need) = whole.need.filter(|need| need.needed > need.available) else {
+            return Ok(whole.fitted(None));
+        };
+        let lost = lost_by(&whole)?;
+        let (mut best, mut least) = (None, (n, need));
+        let first = whole.share();
+        CUTTING.largest(n, |n_next| {
+            if n_next == n {
+                return Ok(first);
             }
-            keep(&mut finished, n_next);
-        }
+            let mut fewer = finished.clone();
+            keep(&mut fewer, n_next);
+            let found = attempt(fewer)?;
+            let share = found.share();
+            match found.need.filter(|_| share > 1.0) {
+                Some(need) => least = (n_next, need),
+                None => best = Some((n_next, found)),
+            }
+            Ok::<_, EncodeError>(share)
+        })?;
+        let Some((n_left, best)) = best else {
+            let (n_anchors, Need { memory, available, needed }) = least;
+            return Err(EncodeError::TooLarge { memory, available, needed, n_anchors });
+        };
+        Ok(best.fitted(Some(Cut { n_anchors: n - n_left, ..lost })))
     }
 
-    /// Measures a coded scene and assembles its file, or says what it takes too much of.
-    fn within_limits(
+    /// Codes and measures a scene, and says what it takes of the limits.
+    fn attempt(
         &self,
-        coded: CodedScene,
-        frame: &Budget,
+        finished: Finished,
+        capture: &Capture,
         cameras: &[Camera],
         held_out: &[View],
-    ) -> Result<Result<Written, Excess>, EncodeError> {
-        let needed = coded.file_len() as u64;
-        if let Some(available) = self.limits.flash_bytes.filter(|most| needed > *most) {
-            return Ok(Err(Excess { memory: "flash", available, needed }));
-        }
+    ) -> Result<Attempt, EncodeError> {
+        let coded = self.coded(&finished, capture)?;
         let bundle = coded.bundle().map_err(WriteError::ReadBack)?;
         let measures = measure(&bundle, cameras, held_out).map_err(EncodeError::Measure)?;
         let written = coded.into_file(&measures)?;
-        let excess = self.beyond_ram(&written, frame).map_err(EncodeError::Measure)?;
-        Ok(excess.map_or(Ok(written), Err))
+        let flash = self.limits.flash_bytes.map(|available| {
+            let needed = written.bytes.len() as u64;
+            Need { memory: "flash", available, needed }
+        });
+        let ram = self.limits.ram_bytes.map(|available| ram_of(&written, capture, available));
+        let (ram, plan) =
+            ram.transpose().map_err(EncodeError::Measure)?.map_or((None, None), |(ram, plan)| (Some(ram), plan));
+        let need = flash.into_iter().chain(ram).max_by(|a, b| a.share().total_cmp(&b.share()));
+        Ok(Attempt { finished, written, plan, need })
     }
+}
 
-    fn beyond_ram(&self, written: &Written, frame: &Budget) -> Result<Option<Excess>, DecodeError> {
-        let Some(available) = self.limits.ram_bytes else { return Ok(None) };
-        let budget = frame.in_bytes(usize::try_from(available).unwrap_or(usize::MAX));
-        match Bundle::parse(&written.bytes)?.plan(&budget) {
-            Ok(_) => Ok(None),
-            Err(DecodeError::BudgetTooSmall { needed, .. }) => {
-                Ok(Some(Excess { memory: "RAM", available, needed: needed.into() }))
-            }
-            Err(error) => Err(error),
-        }
-    }
+/// Scratch memory of the whole scene, and the plan where it suffices.
+fn ram_of(written: &Written, capture: &Capture, available: u64) -> Result<(Need, Option<Plan>), DecodeError> {
+    let bundle = Bundle::parse(&written.bytes)?;
+    let DevicePlans { in_two_strips, smallest, within } = DevicePlans::of(&bundle, frame_of(capture), Some(available))?;
+    let two_strips = in_two_strips.scratch_len() as u64;
+    let nearly = two_strips > available && two_strips as f64 <= WORTH_CUTTING * available as f64;
+    let needed = match within {
+        Some(_) if nearly => two_strips,
+        Some(plan) => plan.scratch_len() as u64,
+        None if nearly => two_strips,
+        // Halves were tried too, and were not enough.
+        None => (smallest.scratch_len() as u64).max(available + 1),
+    };
+    Ok((Need { memory: "RAM", available, needed }, within))
+}
+
+/// What is lost when all that is too much of a scene goes.
+fn lost_by(whole: &Attempt) -> Result<Cut, EncodeError> {
+    let bundle = Bundle::parse(&whole.written.bytes).map_err(WriteError::ReadBack)?;
+    let psnr_db = bundle.n_tiers().checked_sub(1).and_then(|tier| bundle.measures(tier)?.psnr_db);
+    let ram_bytes = whole.need.filter(|need| need.memory == "RAM").map(|need| need.needed);
+    Ok(Cut { n_anchors: 0, flash_bytes: whole.written.bytes.len() as u64, ram_bytes, psnr_db })
 }
 
 /// Anchors with a drawn offset: those that are written.

@@ -1,17 +1,20 @@
 //! From a finished run to its bundle: coded, cut until it fits, measured, assembled.
 //!
-//! `choice` settles what codes the symbols, `fitting` leaves out anchors until the bundle keeps the limits of the device. Both work on
+//! `choice` settles what codes the symbols, `scale` says what a scene takes while it is trained, `fitting` leaves out anchors until the
+//! bundle keeps the limits of the device. Both work on
 //! [coded scenes](crate::bundle::CodedScene); the file is assembled once, when its measures are known.
 
 mod choice;
 mod error;
 mod fitting;
+mod scale;
 #[cfg(test)]
 mod tests;
 
 pub use choice::CoderChoice;
 pub use error::EncodeError;
-pub use fitting::Fitted;
+pub use fitting::{Cut, Fitted};
+pub use scale::Scale;
 
 use serde::{Deserialize, Serialize};
 

@@ -1,14 +1,17 @@
 use pocketsplat_capture::dataset::Capture;
 use pocketsplat_core::Bundle;
 
+use super::scale::{DevicePlans, frame_of};
 use super::{CoderChoice, EncodeError, Encoding, Fitted};
 use crate::bundle::WriteError;
-use crate::device::Limits;
+use crate::device::{Limits, Processor};
 use crate::scene::QuantisationSteps;
-use crate::train::Trainer;
 use crate::train::config::Backbone;
 use crate::train::finish::Finished;
+use crate::train::gauge::Gauge;
+use crate::train::module::{Modules, Rdo};
 use crate::train::test_capture::{tiny_capture, tiny_hac_config};
+use crate::train::{TrainConfig, Trainer};
 
 fn finished(capture: &Capture) -> Finished {
     let mut trainer = Trainer::new(capture, tiny_hac_config(80)).expect("a sound capture");
@@ -34,14 +37,14 @@ fn a_device_gets_the_finest_tables_that_its_flash_holds() {
     };
     assert_eq!(feature_step(&encode(CoderChoice::Context, Limits::default())), None);
     let coarse = encode(CoderChoice::Static, Limits::default());
-    let device = Limits { frame_instructions: Some(80_000_000), ..Limits::default() };
+    let device = Limits { processor: Some(Processor::CortexM4), ..Limits::default() };
     let fine = encode(CoderChoice::Auto, device);
     let steps = [&fine, &coarse].map(|fitted| feature_step(fitted).expect("tables"));
     assert!((steps[0] - 0.5 * steps[1]).abs() < 1e-6 * steps[1], "half of the mean steps: {steps:?}");
     let flash_bytes = Some(fine.written.bytes.len() as u64 - 1);
     let tight = encode(CoderChoice::Auto, Limits { flash_bytes, ..device });
     assert!(feature_step(&tight) > Some(steps[0]), "the next coarser steps");
-    assert_eq!(tight.n_cut, 0, "before anchors are left out");
+    assert_eq!(tight.cut, None, "before anchors are left out");
 }
 
 #[test]
@@ -53,12 +56,59 @@ fn anchors_are_left_out_until_the_bundle_fits() {
         encoding.encode(finished.clone(), &capture, &[])
     };
     let whole = encode(None).expect("a bundle");
-    assert_eq!(whole.n_cut, 0);
+    assert_eq!(whole.cut, None);
     let flash_bytes = whole.written.bytes.len() as u64 * 9 / 10;
     let cut = encode(Some(flash_bytes)).expect("a smaller bundle");
-    assert!(cut.n_cut > 0 && cut.written.bytes.len() as u64 <= flash_bytes, "{} anchors left out", cut.n_cut);
+    let len = cut.written.bytes.len() as u64;
+    assert!(len <= flash_bytes && len * 100 >= flash_bytes * 95, "{len} of {flash_bytes} bytes");
+    let lost = cut.cut.expect("something was left out");
+    assert_eq!(lost.flash_bytes, whole.written.bytes.len() as u64);
+    assert!(lost.n_anchors > 0, "{lost:?}");
     let error = encode(Some(100)).expect_err("less than a header");
     assert!(matches!(error, EncodeError::TooLarge { memory: "flash", available: 100, .. }), "{error}");
+}
+
+/// A run on the capture that is trained for the limits of its bundle.
+fn trained_for(limits: Limits, capture: &Capture) -> Fitted {
+    let encoding = Encoding { limits, tiers: vec![0.3, 0.0], ..Encoding::default() };
+    let modules = Modules { rdo: Some(Rdo::default()), ..Modules::default() };
+    let mut config = TrainConfig { modules, ..tiny_hac_config(150) };
+    config.densification.until = 0.45;
+    let scale = encoding.scale(capture);
+    let gauge = scale.as_ref().map(|scale| scale as &dyn Gauge);
+    let mut trainer = Trainer::new(capture, config).expect("a sound capture").fitting(gauge);
+    while !trainer.is_done() {
+        trainer.advance().expect("a sound step");
+    }
+    encoding.encode(trainer.finish().expect("a scene"), capture, &[]).expect("a bundle")
+}
+
+#[test]
+fn a_run_ends_within_its_limits_and_fills_them() {
+    let capture = tiny_capture();
+    let free = trained_for(Limits { ram_bytes: Some(1 << 30), ..Limits::default() }, &capture);
+    assert_eq!(free.cut, None, "a gigabyte is enough");
+    let len = free.written.bytes.len() as u64;
+    let bundle = Bundle::parse(&free.written.bytes).expect("a sound bundle");
+    let plans = DevicePlans::of(&bundle, frame_of(&capture), None).expect("a plan");
+    let scratch_len = plans.in_two_strips.scratch_len() as u64;
+    for share in [0.75, 0.9] {
+        let part = |whole: u64| Some((whole as f64 * share) as u64);
+        let limits = Limits { flash_bytes: part(len), ..Limits::default() };
+        let used = trained_for(limits, &capture).written.bytes.len() as u64;
+        // So few iterations are too few for values to follow a new weight of their bits.
+        assert!(Some(used) <= limits.flash_bytes && Some(used) > part(len * 6 / 10), "{used} bytes of {limits:?}");
+        let limits = Limits { ram_bytes: part(scratch_len), ..Limits::default() };
+        let fitted = trained_for(limits, &capture);
+        let bundle = Bundle::parse(&fitted.written.bytes).expect("a sound bundle");
+        let plan = fitted.plan.expect("the whole scene is drawn");
+        assert_eq!(plan.n_tiers(), bundle.n_tiers());
+        let used = plan.scratch_len() as u64;
+        assert!(
+            Some(used) <= limits.ram_bytes && Some(used) > part(scratch_len * 17 / 20),
+            "{used} bytes of {limits:?}"
+        );
+    }
 }
 
 #[test]

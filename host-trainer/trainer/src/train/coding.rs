@@ -75,9 +75,10 @@ impl Trainer<'_> {
 
 /// What iteration `iteration` does.
 ///
-/// * `exact`: the integers, in the phase that needs them.
+/// * `lambda`: weight of a value's bits. * `exact`: the integers, in the phase that needs them.
 pub(super) fn coding<'a>(
     config: &TrainConfig,
+    lambda: f64,
     iteration: u32,
     exact: Option<(&'a Context<'a>, &'a Integers)>,
 ) -> Coding<'a, f32> {
@@ -85,7 +86,7 @@ pub(super) fn coding<'a>(
     let stream = Stream::of_run(config.seed).branch(iteration);
     let masks_weigh_anchors = config.backbone == Backbone::HacPlus;
     let rate = RateTerms {
-        lambda: hac.lambda,
+        lambda,
         sample: hac.sample,
         mask: if masks_weigh_anchors { 0.0 } else { hac.mask_weight },
         masks_weigh_anchors,

@@ -44,7 +44,11 @@ impl Trainer<'_> {
     /// # Errors
     /// [`TrainError::NoContext`] or [`TrainError::IntegerModel`] when the context model has no integer form.
     pub fn finish(&self) -> Result<Finished, TrainError> {
-        let mut scene = self.scene.clone();
+        self.finished(self.scene.clone())
+    }
+
+    /// The same for a scene that differs from the trainer's in its masks.
+    pub(super) fn finished(&self, mut scene: Scene<f32>) -> Result<Finished, TrainError> {
         let integers = scene.context.is_some().then(|| Integers::of(&scene)).transpose()?;
         let context = integers.as_ref().map(|integers| integers.context(&self.scene)).transpose()?;
         let mut drawn = scene.clone();

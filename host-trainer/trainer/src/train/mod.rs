@@ -8,12 +8,14 @@ pub mod config;
 pub mod context_start;
 pub mod densify;
 pub mod finish;
+pub mod gauge;
 pub mod module;
 pub mod optimiser;
 mod outcome;
 mod probing;
 pub mod run;
 pub mod statistics;
+pub mod steering;
 pub mod survey;
 #[cfg(test)]
 pub(crate) mod test_capture;
@@ -40,6 +42,7 @@ use crate::step::{Loss, Phase, StepInfo, TargetView, Workspace, image_of_planes,
 use checkpoint::{CaptureSignature, Kernels};
 use coding::Integers;
 use config::{Backbone, Densification, Rates};
+use gauge::Gauge;
 use module::{AnchorChange, RunView};
 use optimiser::Optimiser;
 use pocketsplat_capture::dataset::{Capture, Image, View};
@@ -68,6 +71,9 @@ pub struct Trainer<'a> {
     pub seconds: f64,
     /// Seconds of processor time spent in iterations, of all threads: what does not depend on what else the machine does.
     pub processor_seconds: f64,
+    /// λ: weight of a value's bits in the loss, as configured until [a scene that has to fit](steering) asks for another.
+    lambda: f64,
+    gauge: Option<&'a dyn Gauge>,
     watchdog: Watchdog,
     optimiser: Optimiser<f32>,
     statistics: Statistics,
@@ -116,6 +122,8 @@ impl<'a> Trainer<'a> {
             iteration: 0,
             seconds: 0.0,
             processor_seconds: 0.0,
+            lambda: config.hac.lambda,
+            gauge: None,
             watchdog: Watchdog::default(),
             optimiser: Optimiser::new(&scene),
             statistics: Statistics::default(),
@@ -176,6 +184,9 @@ impl<'a> Trainer<'a> {
         if let Some(dropped) = &outcome.dropped {
             observer.dropped(dropped);
         }
+        if let Some(fit) = &outcome.fit {
+            observer.fitted(fit);
+        }
         observer.step(self.iteration, &outcome.report, &self.scene);
         Ok(outcome)
     }
@@ -209,7 +220,7 @@ impl<'a> Trainer<'a> {
             _ => None,
         };
         let context = integers.as_ref().map(|integers| integers.context(&self.scene)).transpose()?;
-        let coding = coding::coding(&self.config, self.iteration, context.as_ref().zip(integers.as_ref()));
+        let coding = coding::coding(&self.config, self.lambda, self.iteration, context.as_ref().zip(integers.as_ref()));
         let (modules, at) = (self.config.modules, self.step_info());
         let pruned_share = modules.each().iter().map(|module| module.pruned_share(&at)).fold(0.0, f32::max);
         let terms = modules.terms();
@@ -226,7 +237,7 @@ impl<'a> Trainer<'a> {
             return if self.watchdog.dropped() {
                 Err(TrainError::Diverged { n: self.watchdog.n_in_a_row, last: dropped })
             } else {
-                Ok(Outcome { report, dropped: Some(dropped) })
+                Ok(Outcome { report, dropped: Some(dropped), fit: None })
             };
         }
         self.watchdog.passed();
@@ -243,15 +254,21 @@ impl<'a> Trainer<'a> {
         self.densify();
         self.keep_the_best();
         self.rank_for_levels();
+        let mut fit = None;
         for module in modules.each() {
             match module.event(&at, &RunView { trainer: self })? {
                 Some(AnchorChange::Keep(keep)) => self.keep_anchors(&keep),
                 Some(AnchorChange::Mask(offsets)) => self.mask_offsets(&offsets),
                 Some(AnchorChange::Rank(ranks)) => self.scene.anchors.prune_rank = ranks,
+                Some(AnchorChange::Fit { masked, found }) => {
+                    self.mask_offsets(&masked);
+                    self.lambda = found.lambda;
+                    fit = Some(found);
+                }
                 None => {}
             }
         }
-        Ok(Outcome { report, dropped: None })
+        Ok(Outcome { report, dropped: None, fit })
     }
 
     /// What modules are told of this iteration.

@@ -70,6 +70,8 @@ use std::fmt::Debug;
 use serde::{Deserialize, Serialize};
 
 use super::config::ConfigError;
+use super::gauge::Load;
+use super::steering::Fit;
 use super::survey::Survey;
 use super::worth::Worth;
 use super::{TrainError, Trainer};
@@ -111,6 +113,24 @@ impl RunView<'_> {
     pub fn worth(&self) -> Result<Worth, TrainError> {
         self.trainer.worth()
     }
+
+    /// Weight of a value's bits in the loss.
+    pub fn lambda(&self) -> f64 {
+        self.trainer.lambda
+    }
+
+    /// Whether the bundle has limits to keep.
+    pub fn is_limited(&self) -> bool {
+        self.trainer.gauge.is_some()
+    }
+
+    /// What the bundle takes of its limits without these offsets; nothing where it has none.
+    ///
+    /// # Errors
+    /// [`TrainError::Gauge`] for a scene that has no bundle.
+    pub fn load_without(&self, offsets: &[usize]) -> Result<Load, TrainError> {
+        Ok(self.trainer.load_without(offsets)?.unwrap_or_default())
+    }
 }
 
 /// What a module does to the anchors of a run.
@@ -122,6 +142,13 @@ pub enum AnchorChange {
     Mask(Vec<usize>),
     /// `[n]` gives every anchor its [rank](crate::scene::Anchors::prune_rank).
     Rank(Vec<f32>),
+    /// Switches offsets off as [`Self::Mask`] does, and weighs bits anew, so that the bundle fits.
+    Fit {
+        /// The offsets.
+        masked: Vec<usize>,
+        /// What is left.
+        found: Fit,
+    },
 }
 
 /// A plug-in of the training; everything has a default that does nothing.

@@ -1,8 +1,11 @@
 //! What a run gives back: to whom it reports, what an iteration did, why it stopped.
 
+use std::error::Error;
+
 use pocketsplat_core::DecodeError;
 
 use super::config::ConfigError;
+use super::steering::Fit;
 use super::watchdog::DroppedStep;
 use crate::integer_model::IntegerModelError;
 use crate::scene::Scene;
@@ -15,6 +18,9 @@ pub trait Observer {
 
     /// When an iteration changed nothing, because of what `step` says; [`Self::step`] follows.
     fn dropped(&mut self, _step: &DroppedStep) {}
+
+    /// When anchors were left out so that the bundle fits.
+    fn fitted(&mut self, _fit: &Fit) {}
 }
 
 /// What an iteration gives back.
@@ -24,6 +30,8 @@ pub struct Outcome {
     pub report: StepReport<f32>,
     /// Why it was not applied, if so: parameters, moments and statistics are as before.
     pub dropped: Option<DroppedStep>,
+    /// What was left so that the bundle fits, where this iteration ended with that.
+    pub fit: Option<Fit>,
 }
 
 /// Why a run cannot start, or go on.
@@ -48,6 +56,9 @@ pub enum TrainError {
     /// The integer form of the context model is not one that a decoder reads.
     #[error("the integers of the context model cannot be read back; start anew with lower `train.rates` in a --config")]
     IntegersUnread(#[from] DecodeError),
+    /// What the bundle would take cannot be measured.
+    #[error("the scene as it stands has no bundle to measure; please report it")]
+    Gauge(#[source] Box<dyn Error + Send + Sync>),
     /// The cause of dropped steps does not pass.
     #[error(
         "{n} steps in a row would have made parameters infinite or NaN and were dropped, the last one so: {last}; \

@@ -54,7 +54,7 @@ impl Trainer<'_> {
             *sum /= n_values.max(1) as f64;
         }
         let mean_squared_error = squared_sum / n_values.max(1) as f64;
-        let price_in_loss = self.config.hac.lambda / (n * self.scene.shape.values_per_anchor()).max(1) as f64;
+        let price_in_loss = self.lambda / (n * self.scene.shape.values_per_anchor()).max(1) as f64;
         let bit_price = price_in_loss * 2.0 * mean_squared_error / loss.max(f64::MIN_POSITIVE);
         Ok(Worth { of_offsets, of_anchors, bits, bit_price })
     }

@@ -45,8 +45,8 @@ pub struct Restored<'a> {
     pub written_by: Kernels,
 }
 
-/// The scene and what belongs to it, and the background's colour.
-type Learned = (Anchors<f32>, Heads<f32>, Option<ContextModel<f32>>, Optimiser<f32>, Statistics, [f32; 3]);
+/// The scene and what belongs to it, the background's colour, the weight of the bits.
+type Learned = (Anchors<f32>, Heads<f32>, Option<ContextModel<f32>>, Optimiser<f32>, Statistics, [f32; 3], f64);
 
 impl<'a> Trainer<'a> {
     /// Writes everything that the next iteration depends on; see [`crate::train::checkpoint`] for the format.
@@ -58,7 +58,7 @@ impl<'a> Trainer<'a> {
         let progress = (self.iteration, self.watchdog, [self.seconds, self.processor_seconds], &self.queue);
         let random = (self.rng.get_seed(), self.rng.get_stream(), self.rng.get_word_pos());
         let Scene { anchors, heads, context, .. } = &self.scene;
-        let learned = (anchors, heads, context, &self.optimiser, &self.statistics, self.background);
+        let learned = (anchors, heads, context, &self.optimiser, &self.statistics, self.background, self.lambda);
         envelope::write(out, MAGIC, &(config, self.kernels(), &self.signature, progress, random, learned))
     }
 
@@ -80,8 +80,8 @@ impl<'a> Trainer<'a> {
         trainer.rng.set_stream(stream);
         trainer.rng.set_word_pos(position);
         let scene = &mut trainer.scene;
-        (scene.anchors, scene.heads, scene.context, trainer.optimiser, trainer.statistics, trainer.background) =
-            learned;
+        (scene.anchors, scene.heads, scene.context, trainer.optimiser, trainer.statistics, ..) = learned;
+        (.., trainer.background, trainer.lambda) = learned;
         trainer.check()?;
         Ok(Restored { trainer, written_by })
     }
@@ -102,6 +102,9 @@ impl<'a> Trainer<'a> {
             if !same {
                 return Err(RestoreError::Fork { key });
             }
+        }
+        if config.hac.lambda != begun.hac.lambda {
+            restored.trainer.lambda = config.hac.lambda;
         }
         restored.trainer.config = config;
         restored.trainer.check()?;

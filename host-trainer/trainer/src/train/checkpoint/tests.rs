@@ -1,9 +1,14 @@
+use std::error::Error;
+
 use rand::RngExt;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
 use crate::train::config::Backbone;
+use crate::train::finish::Finished;
+use crate::train::gauge::{Gauge, Load};
+use crate::train::module::{Modules, Rdo};
 use crate::train::test_capture::{tiny_capture, tiny_config, tiny_hac_config};
 use crate::train::{Observer, TrainConfig, TrainError, Trainer};
 use pocketsplat_capture::dataset::Mask;
@@ -28,15 +33,29 @@ fn timeless(trainer: &Trainer<'_>) -> Vec<u8> {
 /// Twenty runs of each backbone, each stopped after a random iteration and taken up again by a new trainer.
 #[test]
 fn a_run_taken_up_again_ends_in_the_same_bits() {
-    taken_up_again(tiny_config(90));
-    taken_up_again(TrainConfig { learns_background: true, ..tiny_config(90) });
-    taken_up_again(tiny_hac_config(90));
-    taken_up_again(TrainConfig { backbone: Backbone::ContextGs, ..tiny_hac_config(90) });
+    taken_up_again(tiny_config(90), None);
+    taken_up_again(TrainConfig { learns_background: true, ..tiny_config(90) }, None);
+    taken_up_again(tiny_hac_config(90), None);
+    taken_up_again(TrainConfig { backbone: Backbone::ContextGs, ..tiny_hac_config(90) }, None);
+    let modules = Modules { rdo: Some(Rdo::default()), ..Modules::default() };
+    taken_up_again(TrainConfig { modules, ..tiny_hac_config(90) }, Some(&Draws(150.0)));
 }
 
-fn taken_up_again(config: TrainConfig) {
+/// A device that draws so many anchors, and holds the bytes of half as many more.
+#[derive(Debug)]
+struct Draws(f64);
+
+impl Gauge for Draws {
+    fn load(&self, finished: &Finished) -> Result<Load, Box<dyn Error + Send + Sync>> {
+        let anchors = &finished.scene.anchors;
+        let n = (0..anchors.len()).filter(|anchor| anchors.has_drawn(*anchor)).count() as f64;
+        Ok(Load { ram: n / self.0, bytes: n / (1.5 * self.0), ..Load::default() })
+    }
+}
+
+fn taken_up_again(config: TrainConfig, gauge: Option<&dyn Gauge>) {
     let (capture, iterations) = (tiny_capture(), config.iterations);
-    let mut whole = Trainer::new(&capture, config).unwrap();
+    let mut whole = Trainer::new(&capture, config).unwrap().fitting(gauge);
     let mut along_the_way = vec![saved(&whole)];
     let mut n_anchors = vec![whole.scene.anchors.len()];
     while !whole.is_done() {
@@ -54,6 +73,7 @@ fn taken_up_again(config: TrainConfig) {
         assert_eq!(written_by, trainer.kernels());
         assert_eq!(trainer.iteration as usize, stopped_after);
         assert_eq!(saved(&trainer), along_the_way[stopped_after], "restoring and saving is the identity");
+        trainer = trainer.fitting(gauge);
         trainer.run(&mut Silent).unwrap();
         assert!(timeless(&trainer) == last, "{:?} stopped after {stopped_after}", config.backbone);
     }

@@ -7,6 +7,7 @@ use crate::real::Real;
 use crate::step::{StepInfo, Terms};
 use crate::train::TrainError;
 use crate::train::config::{ConfigError, within};
+use crate::train::steering::fit;
 use crate::train::worth::Worth;
 
 /// Offsets and anchors leave whose removal adds less squared error than their bits are worth, at a few events after which
@@ -105,12 +106,21 @@ impl Module for Rdo {
         let shares: Vec<f64> = self.shares().collect();
         let Some(event) = shares.iter().position(|share| at.is_at(*share)) else { return Ok(None) };
         let worth = run.worth()?;
-        let strength = self.anchors.map_or(self.strength, |n_last| {
-            let (n, n_last) = (worth.of_anchors.len() as f64, n_last as f64);
-            let n_left = n_last * (n / n_last).powf(1.0 - 1.0 / (shares.len() - event) as f64);
+        let n = worth.of_anchors.len();
+        let part_of_the_way = |n_last: usize| {
+            let n_left = n_last as f64 * (n as f64 / n_last as f64).powf(1.0 - 1.0 / (shares.len() - event) as f64);
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of anchors")]
             self.strength_for(&worth, n_left.round() as usize)
-        });
+        };
+        if run.is_limited() {
+            let left = |n_left: usize| self.worthless(&worth, self.strength_for(&worth, n_left));
+            let strength_for = |n_left: usize| self.strength_for(&worth, n_left);
+            let fits = fit(n, run.lambda(), strength_for, |n_left| run.load_without(&left(n_left)))?;
+            let n_last = fits.n_anchors.min(self.anchors.unwrap_or(usize::MAX));
+            let masked = self.worthless(&worth, part_of_the_way(n_last));
+            return Ok(Some(AnchorChange::Fit { masked, found: fits }));
+        }
+        let strength = self.anchors.map_or(self.strength, part_of_the_way);
         Ok(Some(AnchorChange::Mask(self.worthless(&worth, strength))))
     }
 

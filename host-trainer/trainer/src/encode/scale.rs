@@ -1,0 +1,130 @@
+//! What the bundle of a scene takes of the limits of its device.
+
+use std::error::Error;
+
+use pocketsplat_capture::camera::Camera;
+use pocketsplat_capture::dataset::Capture;
+use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, Plan, Residency, Strips};
+use pocketsplat_instructions::predict;
+
+use super::{EncodeError, Encoding};
+use crate::bundle::WriteError;
+use crate::camera::core_camera;
+use crate::device::Processor;
+use crate::manifest::{cameras_to_measure, measure};
+use crate::render::decoder::image_of;
+use crate::train::finish::Finished;
+use crate::train::gauge::{Gauge, Load};
+
+/// Strips that the model of a device is chosen for.
+const STRIPS: u8 = 2;
+/// Every so many of the measured cameras one is drawn to predict its instructions.
+const DRAWN_EVERY: usize = 9;
+
+/// Codes scenes to find out what their bundles take.
+#[derive(Debug)]
+pub struct Scale<'a> {
+    encoding: &'a Encoding,
+    capture: &'a Capture,
+    cameras: Vec<Camera>,
+}
+
+impl Encoding {
+    /// The scale for scenes of a capture; `None` where nothing limits them.
+    pub fn scale<'a>(&'a self, capture: &'a Capture) -> Option<Scale<'a>> {
+        let cameras: Vec<_> = capture.train.iter().map(|view| view.camera.clone()).collect();
+        let cameras = cameras_to_measure(&cameras);
+        (!self.limits.is_none()).then_some(Scale { encoding: self, capture, cameras })
+    }
+}
+
+impl Scale<'_> {
+    fn load(&self, finished: &Finished) -> Result<Load, EncodeError> {
+        let limits = &self.encoding.limits;
+        let coded = self.encoding.smallest(finished, self.capture)?;
+        let bytes = limits.flash_bytes.map_or(0.0, |most| coded.file_len() as f64 / most as f64);
+        if limits.ram_bytes.is_none() && limits.processor.is_none() {
+            return Ok(Load { bytes, ..Load::default() });
+        }
+        let bundle = coded.bundle().map_err(WriteError::ReadBack)?;
+        let measures = measure(&bundle, &self.cameras, &[]).map_err(EncodeError::Measure)?;
+        let written = coded.into_file(&measures)?;
+        let drawing = || -> Result<[f64; 2], DecodeError> {
+            let bundle = Bundle::parse(&written.bytes)?;
+            let plans = DevicePlans::of(&bundle, frame_of(self.capture), limits.ram_bytes)?;
+            let ram = limits.ram_bytes.map_or(0.0, |most| plans.in_two_strips.scratch_len() as f64 / most as f64);
+            let instructions = match limits.processor {
+                Some(processor) => {
+                    self.instructions(&bundle, plans.drawn(), processor)? / processor.frame_instructions() as f64
+                }
+                None => 0.0,
+            };
+            Ok([ram, instructions])
+        };
+        let [ram, instructions] = drawing().map_err(EncodeError::Measure)?;
+        Ok(Load { ram, instructions, bytes })
+    }
+
+    /// Of the dearest frame of some of the cameras.
+    fn instructions(&self, bundle: &Bundle<'_>, plan: Plan, processor: Processor) -> Result<f64, DecodeError> {
+        let mut scratch = vec![0; plan.scratch_len()];
+        let mut decoder = Decoder::bind(bundle, plan, &mut scratch)?;
+        let mut most = 0.0_f64;
+        for camera in self.cameras.iter().step_by(DRAWN_EVERY) {
+            let camera = core_camera(camera)?;
+            let (_, report) = image_of(&mut decoder, &camera)?;
+            let size_px = [camera.width_px, camera.height_px];
+            most = most.max(predict(processor.instruction_set(), bundle, &plan, &report, size_px).iter().sum());
+        }
+        Ok(most)
+    }
+}
+
+impl Gauge for Scale<'_> {
+    fn load(&self, finished: &Finished) -> Result<Load, Box<dyn Error + Send + Sync>> {
+        Ok(self.load(finished)?)
+    }
+}
+
+/// A frame as large as the training images, of all tiers.
+pub(super) fn frame_of(capture: &Capture) -> Budget {
+    // Photographs are not larger than frames may be: loading has seen to it.
+    let [width_px, height_px] = capture.largest_px().map(|px| px as u16);
+    Budget::for_frame(width_px, height_px)
+}
+
+/// How a device may draw the whole of a bundle.
+pub(super) struct DevicePlans {
+    /// As its model was chosen: in two strips of anchors that are decoded in every frame.
+    pub(super) in_two_strips: Plan,
+    /// The plan of the whole scene that takes fewest bytes.
+    pub(super) smallest: Plan,
+    /// The plan that draws the whole scene within the device's memory with the least work.
+    pub(super) within: Option<Plan>,
+}
+
+impl DevicePlans {
+    pub(super) fn of(bundle: &Bundle<'_>, frame: Budget, ram_bytes: Option<u64>) -> Result<Self, DecodeError> {
+        let streamed = |n| bundle.plan(&frame.with_residency(Residency::Streamed).with_strips(Strips::Exactly(n)));
+        let in_two_strips = streamed(STRIPS)?;
+        let mut smallest = in_two_strips;
+        for n_strips in pocketsplat_core::bundle::STRIPS {
+            let plan = streamed(n_strips)?;
+            if plan.scratch_len() < smallest.scratch_len() {
+                smallest = plan;
+            }
+        }
+        let ram_bytes = ram_bytes.map_or(usize::MAX, |most| usize::try_from(most).unwrap_or(usize::MAX));
+        let within = match bundle.plan(&frame.in_bytes(ram_bytes)) {
+            Ok(plan) => Some(plan).filter(|plan| plan.n_tiers() == bundle.n_tiers()),
+            Err(DecodeError::BudgetTooSmall { .. }) => None,
+            Err(error) => return Err(error),
+        };
+        Ok(Self { in_two_strips, smallest, within })
+    }
+
+    /// The plan that a device would draw by, or would if it had the memory.
+    fn drawn(&self) -> Plan {
+        self.within.unwrap_or(self.in_two_strips)
+    }
+}

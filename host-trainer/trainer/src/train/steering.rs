@@ -1,0 +1,158 @@
+//! How much of a scene stays, and at which weight of the bits, so that its bundle fits.
+
+use super::gauge::Load;
+
+/// Share of the limits to aim at. A little of the scene is cut off in the end; what is not there cannot be filled in.
+const AIM: f64 = 1.02;
+/// How an event looks for it.
+const STEERING: Search = Search { tolerance: 0.01, most_trials: 5 };
+/// The bytes of an anchor go with λ to the power of −0.35 (`docs/rate-distortion.md`).
+const POWER_OF_LAMBDA: f64 = 0.35;
+/// Farthest that one step changes λ, as a factor.
+const LARGEST_FACTOR: f64 = 16.0;
+
+/// What fits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fit {
+    /// Anchors that stay.
+    pub n_anchors: usize,
+    /// λ from here on, and until now.
+    pub lambda: f64,
+    /// See `lambda`.
+    pub former_lambda: f64,
+    /// What they take as they are.
+    pub load: Load,
+}
+
+/// The most of `n` anchors that fit, and the weight λ at which their bytes do.
+///
+/// Fewer anchors and a larger λ both save bytes. They go together, at the strength of pruning that the new λ asks for; the bytes of
+/// an anchor are expected to follow λ^−0.35. What a decoder needs follows from the anchors alone.
+///
+/// * `lambda`: the present weight. * `strength_for`: multiple of λ at which pruning leaves so many anchors, or fewer. * `load`: what
+///   that scene takes.
+///
+/// # Errors
+/// Those of `load`.
+pub(super) fn fit<E>(
+    n: usize,
+    lambda: f64,
+    strength_for: impl Fn(usize) -> f64,
+    mut load: impl FnMut(usize) -> Result<Load, E>,
+) -> Result<Fit, E> {
+    let mut tried: Vec<(usize, Load)> = Vec::new();
+    let mut load_of = |n: usize| match tried.iter().find(|(known, _)| *known == n) {
+        Some((_, known)) => Ok(*known),
+        None => load(n).inspect(|found| tried.push((n, *found))),
+    };
+    let later = |strength: f64| strength.clamp(1.0 / LARGEST_FACTOR, LARGEST_FACTOR).powf(-POWER_OF_LAMBDA);
+    let n_of_bytes = STEERING.largest(n, |n| Ok(load_of(n)?.bytes / AIM * later(strength_for(n))))?;
+    let n_anchors = STEERING.largest(n_of_bytes, |n| Ok(load_of(n)?.drawing() / AIM))?;
+    let load = load_of(n_anchors)?;
+    let factor = match load.bytes {
+        0.0 => 1.0,
+        bytes => (bytes / AIM).powf(1.0 / POWER_OF_LAMBDA).clamp(1.0 / LARGEST_FACTOR, LARGEST_FACTOR),
+    };
+    Ok(Fit { n_anchors, lambda: lambda * factor, former_lambda: lambda, load })
+}
+
+/// A search among numbers of anchors.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Search {
+    /// What may be left of the limit.
+    pub(crate) tolerance: f64,
+    /// Scenes that are tried.
+    pub(crate) most_trials: usize,
+}
+
+impl Search {
+    /// About the largest number up to `n` whose share is at most 1, on straight lines between logarithms; `n` itself where it is.
+    ///
+    /// Where no number that was tried is good enough it is the smallest of them.
+    ///
+    /// # Errors
+    /// Those of `share`.
+    pub(crate) fn largest<E>(&self, n: usize, mut share: impl FnMut(usize) -> Result<f64, E>) -> Result<usize, E> {
+        let (mut too_many, mut fits): ((usize, f64), Option<(usize, f64)>) = ((n, share(n)?), None);
+        if too_many.1 <= 1.0 {
+            return Ok(n);
+        }
+        // Proportional at first, and more careful with every trial that was still too much.
+        let mut slope = 1.0;
+        for _ in 1..self.most_trials {
+            let (n_above, above) = (too_many.0 as f64, too_many.1.ln());
+            if let Some((n_below, below)) = fits {
+                slope = ((above - below.ln()) / (n_above / n_below as f64).ln()).max(0.1);
+            }
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of anchors")]
+            let next = (n_above * (-(above + 0.5 * self.tolerance) / slope).exp()) as usize;
+            let next = next.clamp(fits.map_or(1, |(n, _)| n), too_many.0.max(2) - 1);
+            if next >= too_many.0 || fits.is_some_and(|(n, _)| next == n) {
+                break;
+            }
+            let found = share(next)?;
+            if found > 1.0 {
+                too_many = (next, found);
+                slope *= 0.7;
+            } else {
+                fits = Some((next, found));
+                if found >= 1.0 - self.tolerance {
+                    break;
+                }
+            }
+        }
+        Ok(fits.map_or(too_many.0, |(n, _)| n))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::convert::Infallible;
+
+    use super::*;
+
+    /// A scene whose decoder takes 1 for 1,000 anchors and a tenth more, and whose bundle 1 for `per_byte`.
+    fn fitted(n: usize, per_byte: f64, strength_for: impl Fn(usize) -> f64) -> Fit {
+        let mut n_trials = 0;
+        let load = |n: usize| -> Result<Load, Infallible> {
+            n_trials += 1;
+            Ok(Load { ram: 0.1 + 0.9e-3 * n as f64, instructions: 0.5e-3 * n as f64, bytes: n as f64 / per_byte })
+        };
+        let found = fit(n, 0.002, strength_for, load).unwrap();
+        assert!(n_trials <= 2 * STEERING.most_trials, "{n_trials} trials");
+        found
+    }
+
+    #[test]
+    fn memory_alone_decides_about_anchors() {
+        let fit = fitted(3000, f64::INFINITY, |_| 1.0);
+        assert!((fit.load.ram / AIM - 1.0).abs() <= STEERING.tolerance, "{fit:?}");
+        assert_eq!(fit.lambda, 0.002);
+        assert_eq!(fitted(700, f64::INFINITY, |_| 1.0).n_anchors, 700, "what fits stays");
+    }
+
+    #[test]
+    fn bytes_are_saved_by_anchors_and_rate_together() {
+        // Half as many anchors are left at four times the strength.
+        let strength = |n: usize| (1000.0 / n as f64).powi(2);
+        let fit = fitted(900, 500.0, strength);
+        assert!(fit.n_anchors > 500 * 102 / 100, "rate saves a part: {fit:?}");
+        let factor = fit.lambda / 0.002;
+        assert!((factor / strength(fit.n_anchors) - 1.0).abs() < 0.1, "one weight for both: {fit:?}");
+        let bytes = fit.load.bytes * factor.powf(-POWER_OF_LAMBDA);
+        assert!((bytes / AIM - 1.0).abs() < 1e-9, "{bytes}");
+    }
+
+    #[test]
+    fn bytes_that_memory_leaves_over_go_into_the_rate() {
+        let fit = fitted(3000, 2000.0, |_| 1.0);
+        assert!((fit.load.ram / AIM - 1.0).abs() <= STEERING.tolerance, "{fit:?}");
+        assert!(fit.lambda < 0.002 && fit.lambda > 0.002 / LARGEST_FACTOR, "{fit:?}");
+    }
+
+    #[test]
+    fn a_limit_that_nothing_keeps_leaves_little_and_ends() {
+        let never = fit(1000, 0.002, |_| 1.0, |_| Ok::<_, Infallible>(Load { ram: 3.0, ..Load::default() })).unwrap();
+        assert!(never.n_anchors >= 1 && never.n_anchors < 100, "{never:?}");
+    }
+}

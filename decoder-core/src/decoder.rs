@@ -11,10 +11,14 @@ mod strip;
 mod tally;
 #[cfg(test)]
 mod tests;
+mod tile;
 
 pub use count::{count_gaussians, count_scratch_len};
-pub use frame::{Drawing, Tile};
+pub use frame::Drawing;
 pub use report::FrameReport;
+#[cfg(feature = "embedded-graphics")]
+pub(crate) use tile::dithered_steps;
+pub use tile::{ByteOrder, Rounding, Tile};
 
 use crate::arithmetic::{Arithmetic, ReferenceArithmetic};
 use crate::budget::Plan;

@@ -25,7 +25,7 @@ use embedded_graphics_core::geometry::{Point, Size};
 use embedded_graphics_core::pixelcolor::{Rgb888, RgbColor};
 use embedded_graphics_core::primitives::Rectangle;
 
-use crate::decoder::TileSink;
+use crate::decoder::{TileSink, dithered_steps};
 
 /// Draws tiles on a display with the frame's first pixel at `origin`.
 ///
@@ -81,28 +81,23 @@ where
     }
 }
 
-/// Bayer's matrix in sixteenths of a step.
-const BAYER: [[u8; 4]; 4] = [[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]];
-
 /// The bytes next to those of the steps `0..=most` that each channel is dithered to.
-fn dithered([r, g, b]: [u8; 3], [most_r, most_g, most_b]: [u8; 3], (x, y): (u16, u16)) -> [u8; 3] {
-    let row = BAYER.get(usize::from(y & 3)).copied().unwrap_or_default();
-    let sixteenths = row.get(usize::from(x & 3)).copied().unwrap_or_default();
-    // In 32nds, so that the mean of the thresholds is a half.
-    let up = 255 * (2 * u32::from(sixteenths) + 1);
-    [(r, most_r), (g, most_g), (b, most_b)].map(|(byte, most)| {
+fn dithered(rgb: [u8; 3], most: [u8; 3], place: (u16, u16)) -> [u8; 3] {
+    let [r, g, b] = dithered_steps(rgb, most, place);
+    let [most_r, most_g, most_b] = most;
+    [(r, most_r), (g, most_g), (b, most_b)].map(|(step, most)| {
         let most = u32::from(most).max(1);
-        let step = (u32::from(byte) * most * 32 + up) / (255 * 32);
         // At most 255.
-        ((step * 255 + most / 2) / most) as u8
+        ((u32::from(step) * 255 + most / 2) / most) as u8
     })
 }
 
 #[cfg(test)]
 mod tests {
-    use embedded_graphics_core::pixelcolor::{Rgb565, Rgb888, RgbColor};
+    use embedded_graphics_core::pixelcolor::{IntoStorage, Rgb565, Rgb888, RgbColor};
 
     use super::dithered;
+    use crate::decoder::{ByteOrder, Rounding, Tile};
 
     const MOST: [u8; 3] = [Rgb565::MAX_R, Rgb565::MAX_G, Rgb565::MAX_B];
 
@@ -120,6 +115,24 @@ mod tests {
             }
             assert!(sums.into_iter().all(|mean| (mean - f32::from(byte)).abs() < 0.3), "{byte}: {sums:?}");
             assert!((1..255).contains(&byte) || sums == [f32::from(byte); 3], "{byte}: {sums:?}");
+        }
+    }
+
+    #[test]
+    fn a_packed_tile_is_what_a_display_of_16_bits_shows() {
+        for byte in 0..=255_u8 {
+            let rgb = [byte, byte.wrapping_add(85), byte.wrapping_add(170)];
+            for (x, y) in (0..4).flat_map(|y| (0..4).map(move |x| (x, y))) {
+                for rounding in [Rounding::Nearest, Rounding::Dithered] {
+                    let mut tile = [rgb; 16];
+                    let tile = Tile { x_px: 0, y_px: 0, width: 4, height: 4, rgb: &mut tile };
+                    let packed = tile.into_rgb565(ByteOrder::LittleEndian, rounding);
+                    let pixel = packed.as_chunks::<2>().0[usize::from(4 * y + x)];
+                    let [r, g, b] = if rounding == Rounding::Dithered { dithered(rgb, MOST, (x, y)) } else { rgb };
+                    let shown = Rgb565::from(Rgb888::new(r, g, b)).into_storage();
+                    assert_eq!(u16::from_le_bytes(pixel), shown, "{rgb:?} at ({x}, {y}), {rounding:?}");
+                }
+            }
         }
     }
 

@@ -39,7 +39,9 @@ pub use budget::{
 };
 pub use bundle::Bundle;
 pub use camera::{Camera, Rotation};
-pub use decoder::{Decoder, Drawing, FrameReport, Tile, TileSink, count_gaussians, count_scratch_len};
+pub use decoder::{
+    ByteOrder, Decoder, Drawing, FrameReport, Rounding, Tile, TileSink, count_gaussians, count_scratch_len,
+};
 pub use error::{DecodeError, ErrorClass, Field, RenderError, SectionKind};
 pub use project::chunks_in_view;
 pub use stopwatch::{Stage, Stopwatch};

@@ -4,6 +4,7 @@ use super::gather::{Admission, Frame};
 use super::splats::{Slab, SplatStore};
 use super::strip::{Strip, StripLayout};
 use super::tally::Tally;
+use super::tile::Tile;
 use super::{Decoder, FrameReport, TileSink};
 use crate::arithmetic::{Arithmetic, ReferenceArithmetic};
 use crate::budget::Overflow;
@@ -55,21 +56,6 @@ pub struct Drawing<'d, 'b, 's, A: Arithmetic = ReferenceArithmetic> {
     /// Splats of the strip, and the most in memory at once.
     in_strip: u32,
     most_in_memory: u32,
-}
-
-/// A finished tile.
-#[derive(Clone, Copy, Debug)]
-pub struct Tile<'t> {
-    /// Its first column, pixels.
-    pub x_px: u16,
-    /// Its first row, pixels.
-    pub y_px: u16,
-    /// Its width, pixels.
-    pub width: u16,
-    /// Its height, pixels.
-    pub height: u16,
-    /// `[height, width]`, row by row.
-    pub rgb: &'t [[u8; 3]],
 }
 
 impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
@@ -162,7 +148,7 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
         watch.enter(Stage::Output);
         let TilePlace { column, row, width, height } = place;
         let [x_px, y_px] = [column, row].map(|index| u16::from(index) * TILE_PX);
-        let rgb = self.decoder.rgb.get(..usize::from(width) * usize::from(height)).unwrap_or_default();
+        let rgb = self.decoder.rgb.get_mut(..usize::from(width) * usize::from(height)).unwrap_or_default();
         Ok(Some(Tile { x_px, y_px, width, height, rgb }))
     }
 

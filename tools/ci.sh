@@ -177,18 +177,33 @@ job_link-gate() {
   tests/link-gate/build.sh "$(llvm_tools)" "$embedded/link-gate"
 }
 
-# Two bundles, one of each coder, decode to the same symbols and values on every target.
+# Programs for Linux, with the emulator that runs each and the compiler that links it.
+digest_programs=(
+  "aarch64-unknown-linux-gnu qemu-aarch64 aarch64-linux-gnu-gcc gcc-aarch64-linux-gnu libc6-dev-arm64-cross"
+  "armv7-unknown-linux-gnueabihf qemu-arm arm-linux-gnueabihf-gcc gcc-arm-linux-gnueabihf libc6-dev-armhf-cross"
+  "i686-unknown-linux-gnu qemu-i386 i686-linux-gnu-gcc gcc-i686-linux-gnu libc6-dev-i386-cross"
+  "s390x-unknown-linux-gnu qemu-s390x s390x-linux-gnu-gcc gcc-s390x-linux-gnu libc6-dev-s390x-cross"
+)
+# Programs without a system, with the emulated board: Cortex-M0+ code on an M3, M4, M33 without and with FPU, M55, RISC-V without and
+# with atomics and FPU.
+digest_boards=(
+  "thumbv6m-none-eabi mps2-an385"
+  "thumbv7em-none-eabihf mps2-an386"
+  "thumbv8m.main-none-eabi mps2-an505"
+  "thumbv8m.main-none-eabihf mps2-an505"
+  "thumbv8m.main-none-eabihf mps3-an547"
+  "riscv32imc-unknown-none-elf virt"
+  "riscv32imac-unknown-none-elf virt"
+  "riscv32imafc-unknown-none-elf virt"
+)
+
+# Three bundles, one of each coder and one of hard cases, decode to the same symbols and values and draw the same frames on every target.
 job_digests() {
-  local out=$target/digests host found name
-  need_target aarch64-unknown-linux-gnu
-  need_target armv7-unknown-linux-gnueabihf
-  need_target riscv32imac-unknown-none-elf
-  need_embedded_target
-  need_command aarch64-linux-gnu-gcc gcc-aarch64-linux-gnu libc6-dev-arm64-cross libgcc-12-dev-arm64-cross
-  need_command arm-linux-gnueabihf-gcc gcc-arm-linux-gnueabihf libc6-dev-armhf-cross libgcc-12-dev-armhf-cross
+  local out=$target/digests host found name emulator board compiler packages program
   need_command qemu-aarch64 qemu-user
   need_command qemu-system-arm qemu-system-arm
   need_command qemu-system-riscv32 qemu-system-misc
+  need_command node nodejs
   cargo run -q -p conformance --bin digest_bundles --locked -- "$out"
   digest_of() { # NAME CARGO_ARGUMENTS… -- RUNNER…
     local name=$1 arguments=()
@@ -208,15 +223,24 @@ job_digests() {
   local build=$out/build semihosting=(-display none -monitor none -serial none -semihosting-config enable=on,target=native)
   digest_of "this machine, release" --release -- "$build/release/digest"
   digest_of "this machine, debug" -- "$build/debug/digest"
-  for name in aarch64-unknown-linux-gnu:qemu-aarch64 armv7-unknown-linux-gnueabihf:qemu-arm; do
-    digest_of "${name%:*}" --release --target "${name%:*}" -- "${name#*:}" "$build/${name%:*}/release/digest"
+  for program in "${digest_programs[@]}"; do
+    read -r name emulator compiler packages <<<"$program"
+    need_target "$name"
+    # shellcheck disable=SC2086 # several packages
+    need_command "$compiler" $packages
+    digest_of "$name" --release --target "$name" -- "$emulator" "$build/$name/release/digest"
   done
-  name=thumbv7em-none-eabihf
-  digest_of $name --release --target $name -- \
-    qemu-system-arm -M mps2-an386 "${semihosting[@]}" -kernel "$build/$name/release/digest"
-  name=riscv32imac-unknown-none-elf
-  digest_of $name --release --target $name -- \
-    qemu-system-riscv32 -M virt -bios none "${semihosting[@]}" -kernel "$build/$name/release/digest"
+  for program in "${digest_boards[@]}"; do
+    read -r name board <<<"$program"
+    need_target "$name"
+    emulator=(qemu-system-arm -M "$board")
+    [ "$board" != virt ] || emulator=(qemu-system-riscv32 -M virt -bios none)
+    PSB_BOARD=$board digest_of "$name on $board" --release --target "$name" -- \
+      "${emulator[@]}" "${semihosting[@]}" -kernel "$build/$name/release/digest"
+  done
+  name=wasm32-wasip1
+  need_target $name
+  digest_of $name --release --target $name -- node --no-warnings tests/digest/run.mjs "$build/$name/release/digest.wasm"
 }
 
 # Boards with the RAM that they get, KiB: as much as such a device has, and so little that anchors are decoded in each frame.

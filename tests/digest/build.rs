@@ -1,14 +1,30 @@
-//! Memory of the emulated boards: QEMU's mps2-an386 for Cortex-M4, its virt for RISC-V.
+//! Memory of the emulated boards, which `PSB_BOARD` names as QEMU does.
 
 use std::path::PathBuf;
 use std::{env, fs};
 
+/// mps2-an385 and mps2-an386.
 const CORTEX_M: &str = "MEMORY
 {
   FLASH : ORIGIN = 0x00000000, LENGTH = 4M
   RAM   : ORIGIN = 0x20000000, LENGTH = 4M
 }
 ";
+/// mps2-an505, which starts in the secure state.
+const CORTEX_M33: &str = "MEMORY
+{
+  FLASH : ORIGIN = 0x10000000, LENGTH = 4M
+  RAM   : ORIGIN = 0x38000000, LENGTH = 4M
+}
+";
+/// mps3-an547, as well; code is in the ITCM.
+const CORTEX_M55: &str = "MEMORY
+{
+  FLASH : ORIGIN = 0x10000000, LENGTH = 512K
+  RAM   : ORIGIN = 0x31000000, LENGTH = 2M
+}
+";
+/// virt.
 const RISC_V: &str = "MEMORY
 {
   RAM : ORIGIN = 0x80000000, LENGTH = 16M
@@ -28,7 +44,14 @@ fn main() {
         return;
     }
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
-    let memory = if cfg("CARGO_CFG_TARGET_ARCH") == "arm" { CORTEX_M } else { RISC_V };
+    println!("cargo::rerun-if-env-changed=PSB_BOARD");
+    let memory = match cfg("PSB_BOARD").as_str() {
+        "mps2-an385" | "mps2-an386" => CORTEX_M,
+        "mps2-an505" => CORTEX_M33,
+        "mps3-an547" => CORTEX_M55,
+        "virt" => RISC_V,
+        other => panic!("PSB_BOARD is {other:?}; it must be mps2-an385, mps2-an386, mps2-an505, mps3-an547 or virt"),
+    };
     fs::write(out.join("memory.x"), memory).expect("OUT_DIR can be written");
     println!("cargo::rustc-link-search={}", out.display());
     if memory == RISC_V {

@@ -168,6 +168,15 @@ job_package() {
     grep -qx "$file" <<<"$files" || fail "the package of pocketsplat-core lacks $file"
   done
   cargo package -p pocketsplat-core --allow-dirty --locked
+  # The oldest Rust that its manifest names.
+  local oldest features
+  oldest=$(sed -n 's/^rust-version = "\(.*\)"$/\1/p' decoder-core/Cargo.toml)
+  rustup toolchain install "$oldest" --profile minimal --no-self-update >/dev/null 2>&1 || fail "Rust $oldest is missing: run \`rustup toolchain install $oldest\`"
+  for features in --all-features --no-default-features; do
+    cargo "+$oldest" check -q -p pocketsplat-core --locked --target-dir "$target/oldest" "$features" || fail "pocketsplat-core does not build with Rust $oldest $features"
+  done
+  rm -rf "$target/oldest"
+  echo "builds with Rust $oldest"
 }
 
 # decoder-core links without an allocator, is no larger than sizes.csv says, and reaches no panic but those of a list that

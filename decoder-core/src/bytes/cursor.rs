@@ -49,7 +49,7 @@ impl<'a> Cursor<'a> {
 
     /// A record of `N` bytes.
     pub(crate) fn record<const N: usize>(&mut self) -> Result<&'a [u8; N], DecodeError> {
-        self.bytes(N)?.as_array().ok_or(DecodeError::Internal)
+        self.bytes(N)?.first_chunk().ok_or(DecodeError::Internal)
     }
 
     fn truncated(&self, n: usize) -> DecodeError {

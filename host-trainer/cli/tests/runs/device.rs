@@ -18,6 +18,14 @@ fn a_bundle_for_a_device_fits_it_and_passes_its_verification() {
         bundle.plan(&frame.in_bytes(ram)).is_ok_and(|plan| plan.n_tiers() == bundle.n_tiers())
     };
     let lowest = (1..).find(|&ram| all_of(&bundle, 64 * ram)).unwrap() * 64;
+    // `verify` holds what it can draw to the laws, and does not hide that it is a part.
+    let verified = |ram: usize| {
+        let run = pocketsplat().arg("verify").arg(&free).args(["--ram", &ram.to_string()]).output().unwrap();
+        String::from_utf8(run.stdout).unwrap()
+    };
+    let part = (1..lowest / 64).rfind(|&ram| bundle.plan(&frame.in_bytes(64 * ram)).is_ok()).unwrap() * 64;
+    assert!(verified(part).contains("the whole scene takes "), "{}", verified(part));
+    assert!(!verified(lowest).contains("the whole scene takes "), "{}", verified(lowest));
     // Less than the free scene takes as a whole, and less flash.
     let (ram, flash) = (lowest * 9 / 10, bytes.len() * 2 / 3);
     let output = home.join("fitted.psb");

@@ -8,7 +8,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use pocketsplat_trainer::explicit::train::CloudOutcome;
 use pocketsplat_trainer::scene::Scene;
 use pocketsplat_trainer::step::StepReport;
-use pocketsplat_trainer::train::gauge::Load;
+use pocketsplat_trainer::train::load::Load;
 use pocketsplat_trainer::train::steering::Fit;
 use pocketsplat_trainer::train::{DroppedStep, Observer};
 

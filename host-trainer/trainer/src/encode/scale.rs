@@ -14,7 +14,8 @@ use crate::device::Processor;
 use crate::manifest::{cameras_to_measure, measure};
 use crate::render::decoder::image_of;
 use crate::train::finish::Finished;
-use crate::train::gauge::{Gauge, Load};
+use crate::train::gauge::Gauge;
+use crate::train::load::Load;
 
 /// Strips that the model of a device is chosen for.
 const STRIPS: u8 = 2;

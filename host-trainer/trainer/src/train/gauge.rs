@@ -4,6 +4,7 @@ use std::error::Error;
 use std::fmt::Debug;
 
 use super::finish::Finished;
+use super::load::Load;
 use super::{TrainError, Trainer};
 
 /// Measures what bundles take; [`crate::encode::Scale`] codes them for it, which training itself knows nothing of.
@@ -13,24 +14,6 @@ pub trait Gauge: Debug + Sync {
     /// # Errors
     /// What keeps the scene from being coded or drawn.
     fn load(&self, finished: &Finished) -> Result<Load, Box<dyn Error + Send + Sync>>;
-}
-
-/// Shares of the limits that a bundle takes: above 1 it does not fit; 0 where there is no limit.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Load {
-    /// Scratch memory of a decoder that draws the whole scene.
-    pub ram: f64,
-    /// Instructions of the dearest frame that was tried.
-    pub instructions: f64,
-    /// Bytes of the bundle.
-    pub bytes: f64,
-}
-
-impl Load {
-    /// The larger share of what a decoder needs, whatever the bundle's length.
-    pub fn drawing(&self) -> f64 {
-        self.ram.max(self.instructions)
-    }
 }
 
 impl<'a> Trainer<'a> {

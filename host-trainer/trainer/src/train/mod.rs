@@ -9,6 +9,7 @@ pub mod context_start;
 pub mod densify;
 pub mod finish;
 pub mod gauge;
+pub mod load;
 pub mod module;
 pub mod optimiser;
 mod outcome;

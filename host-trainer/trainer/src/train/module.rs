@@ -70,7 +70,7 @@ use std::fmt::Debug;
 use serde::{Deserialize, Serialize};
 
 use super::config::ConfigError;
-use super::gauge::Load;
+use super::load::Load;
 use super::steering::Fit;
 use super::survey::Survey;
 use super::worth::Worth;

@@ -1,6 +1,6 @@
 //! How much of a scene stays, and at which weight of the bits, so that its bundle fits.
 
-use super::gauge::Load;
+use super::load::Load;
 
 /// Share of the limits to aim at. A little of the scene is cut off in the end; what is not there cannot be filled in.
 const AIM: f64 = 1.02;

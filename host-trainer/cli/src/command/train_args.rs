@@ -104,7 +104,7 @@ impl DeviceArgs {
         }
         config.encoding.limits = limits;
         if self.ram.is_none() && self.target.is_none() {
-            eprintln!("for this size: the number of anchors and lambda follow while it trains");
+            eprintln!("to fill this size, the number of anchors and lambda are found while it trains");
             return Ok(());
         }
         let choice = choose(&limits)?;

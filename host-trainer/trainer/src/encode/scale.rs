@@ -50,20 +50,19 @@ impl Scale<'_> {
         let bundle = coded.bundle().map_err(WriteError::ReadBack)?;
         let measures = measure(&bundle, &self.cameras, &[]).map_err(EncodeError::Measure)?;
         let written = coded.into_file(&measures)?;
-        let drawing = || -> Result<[f64; 2], DecodeError> {
-            let bundle = Bundle::parse(&written.bytes)?;
-            let plans = DevicePlans::of(&bundle, frame_of(self.capture), limits.ram_bytes)?;
-            let ram = limits.ram_bytes.map_or(0.0, |most| plans.in_two_strips.scratch_len() as f64 / most as f64);
-            let instructions = match limits.processor {
-                Some(processor) => {
-                    self.instructions(&bundle, plans.drawn(), processor)? / processor.frame_instructions() as f64
-                }
-                None => 0.0,
-            };
-            Ok([ram, instructions])
-        };
-        let [ram, instructions] = drawing().map_err(EncodeError::Measure)?;
+        let [ram, instructions] = self.drawing(&written.bytes).map_err(EncodeError::Measure)?;
         Ok(Load { ram, instructions, bytes })
+    }
+
+    /// Shares of the RAM and of a frame's instructions.
+    fn drawing(&self, bundle: &[u8]) -> Result<[f64; 2], DecodeError> {
+        let limits = &self.encoding.limits;
+        let bundle = Bundle::parse(bundle)?;
+        let plans = DevicePlans::of(&bundle, frame_of(self.capture), limits.ram_bytes)?;
+        let ram = limits.ram_bytes.map_or(0.0, |most| plans.in_two_strips.scratch_len() as f64 / most as f64);
+        let Some(processor) = limits.processor else { return Ok([ram, 0.0]) };
+        let most = processor.frame_instructions() as f64;
+        Ok([ram, self.instructions(&bundle, plans.drawn(), processor)? / most])
     }
 
     /// Of the dearest frame of some of the cameras.

@@ -3,7 +3,7 @@
 use anyhow::{Result, bail};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use pocketsplat_capture::dataset::Background;
-use pocketsplat_trainer::device::ModelChoice;
+use pocketsplat_trainer::device::{ModelChoice, widest_within};
 use pocketsplat_trainer::effects::{Effect, Request};
 use pocketsplat_trainer::encode::CoderChoice;
 use pocketsplat_trainer::explicit::CloudConfig;
@@ -227,6 +227,11 @@ impl QualityOptions {
             }
         }
         Ok(())
+    }
+
+    /// Sets the width of features for a bundle of so many bytes, where the command line leaves it open.
+    pub(crate) fn choose_width(&self, train: &mut TrainConfig, bytes: u64) {
+        train.shape.feature_dim = self.feature_dim.unwrap_or_else(|| widest_within(bytes, &train.shape));
     }
 
     /// Sets what a device affords, where the command line leaves it open: the widths, the number of anchors, pruning by worth

@@ -103,8 +103,12 @@ impl DeviceArgs {
             return Ok(());
         }
         config.encoding.limits = limits;
-        if self.ram.is_none() && self.target.is_none() {
-            eprintln!("to fill this size, the number of anchors and lambda are found while it trains");
+        if let (None, None, Some(bytes)) = (self.ram, self.target, self.flash) {
+            quality.choose_width(&mut config.train, bytes.as_u64());
+            eprintln!(
+                "to fill this size: features of width {}; the number of anchors and lambda are found while it trains",
+                config.train.shape.feature_dim
+            );
             return Ok(());
         }
         let choice = choose(&limits)?;

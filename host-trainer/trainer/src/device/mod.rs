@@ -5,8 +5,10 @@
 //! the least important anchors until the bundle keeps the limits, so that these hold whatever was trained.
 
 mod choice;
+mod width;
 
 pub use choice::{BindingLimit, Infeasible, ModelChoice, choose};
+pub use width::widest_within;
 
 use serde::{Deserialize, Serialize};
 

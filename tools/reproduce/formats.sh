@@ -26,16 +26,18 @@ trained() { # FILE OPTIONS…
   fi
 }
 
+exported() { # FROM TO [CAPTURE]
+  [ -f "$2" ] || "$program" export "$1" ${3:+"$3"} -o "$2" >/dev/null
+}
+
 trained "$out/3dgs.ply" --backbone 3dgs "$@"
-for kind in spz sog; do
-  [ -f "$out/3dgs.$kind" ] || "$program" export "$out/3dgs.ply" -o "$out/3dgs.$kind" >/dev/null
-done
 effects=(--effects +view-colour)
 trained "$out/scaffold.psb" --backbone scaffold --modules none "${effects[@]}" "$@"
 trained "$out/hac.psb" --backbone hac --modules none --lambda 0.002 "${effects[@]}" "$@"
 trained "$out/hac-modules.psb" --backbone hac --modules rdo-pruning --lambda 0.002 "${effects[@]}" "$@"
-for kind in ply spz sog; do
-  [ -f "$out/hac-modules.$kind" ] || "$program" export "$out/hac-modules.psb" "$capture" -o "$out/hac-modules.$kind" >/dev/null
+exported "$out/hac-modules.psb" "$out/hac-modules.ply" "$capture"
+for name in 3dgs hac-modules; do
+  for kind in spz sog; do exported "$out/$name.ply" "$out/$name.$kind"; done
 done
 for file in 3dgs.ply 3dgs.spz 3dgs.sog scaffold.psb hac.psb hac-modules.psb hac-modules.ply hac-modules.spz hac-modules.sog; do
   [ -f "$out/$file.json" ] || {

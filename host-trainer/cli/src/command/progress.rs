@@ -143,7 +143,7 @@ impl Observer for Progress {
         } else {
             format!(", before lambda goes from {:.5} to {:.5}", fit.former_lambda, fit.lambda)
         };
-        self.say(&format!("pruning to {} anchors, which take {}{lambda}", fit.n_anchors, shares.join(", ")));
+        self.say(&format!("to fit: {} anchors, which take {}{lambda}", fit.n_anchors, shares.join(", ")));
     }
 
     fn dropped(&mut self, step: &DroppedStep) {

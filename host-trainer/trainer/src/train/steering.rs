@@ -24,6 +24,21 @@ pub struct Fit {
     pub load: Load,
 }
 
+/// Shares of the run after which the weight alone is looked at again, once nothing is pruned any more: bytes follow it slowly.
+pub(super) const REWEIGHED_AT: [f64; 3] = [0.75, 0.8, 0.85];
+
+/// The weight at which a scene of `n` anchors is expected to fill its bytes; `None` where these have no limit.
+///
+/// * `lambda`: the present weight. * `load`: what the scene takes at it.
+pub(super) fn reweighed(n: usize, lambda: f64, load: Load) -> Option<Fit> {
+    (load.bytes > 0.0).then(|| Fit { n_anchors: n, lambda: lambda * factor(load), former_lambda: lambda, load })
+}
+
+/// What λ is to be multiplied by, so that the bytes become those that are aimed at.
+fn factor(load: Load) -> f64 {
+    (load.bytes / AIM).powf(1.0 / POWER_OF_LAMBDA).clamp(1.0 / LARGEST_FACTOR, LARGEST_FACTOR)
+}
+
 /// The most of `n` anchors that fit, and the weight λ at which their bytes do.
 ///
 /// Fewer anchors and a larger λ both save bytes. They go together, at the strength of pruning that the new λ asks for; the bytes of
@@ -49,11 +64,8 @@ pub(super) fn fit<E>(
     let n_of_bytes = STEERING.largest(n, |n| Ok(load_of(n)?.bytes / AIM * later(strength_for(n))))?;
     let n_anchors = STEERING.largest(n_of_bytes, |n| Ok(load_of(n)?.drawing() / AIM))?;
     let load = load_of(n_anchors)?;
-    let factor = match load.bytes {
-        0.0 => 1.0,
-        bytes => (bytes / AIM).powf(1.0 / POWER_OF_LAMBDA).clamp(1.0 / LARGEST_FACTOR, LARGEST_FACTOR),
-    };
-    Ok(Fit { n_anchors, lambda: lambda * factor, former_lambda: lambda, load })
+    let unlimited = Fit { n_anchors, lambda, former_lambda: lambda, load };
+    Ok(reweighed(n_anchors, lambda, load).unwrap_or(unlimited))
 }
 
 /// A search among numbers of anchors.

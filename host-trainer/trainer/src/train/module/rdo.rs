@@ -7,7 +7,7 @@ use crate::real::Real;
 use crate::step::{StepInfo, Terms};
 use crate::train::TrainError;
 use crate::train::config::{ConfigError, within};
-use crate::train::steering::fit;
+use crate::train::steering::{REWEIGHED_AT, fit, reweighed};
 use crate::train::worth::Worth;
 
 /// Offsets and anchors leave whose removal adds less squared error than their bits are worth, at a few events after which
@@ -104,7 +104,13 @@ impl Module for Rdo {
 
     fn event(&self, at: &StepInfo, run: &RunView<'_>) -> Result<Option<AnchorChange>, TrainError> {
         let shares: Vec<f64> = self.shares().collect();
-        let Some(event) = shares.iter().position(|share| at.is_at(*share)) else { return Ok(None) };
+        let Some(event) = shares.iter().position(|share| at.is_at(*share)) else {
+            if !(run.is_limited() && REWEIGHED_AT.iter().any(|share| at.is_at(*share) && *share > self.until)) {
+                return Ok(None);
+            }
+            let found = reweighed(run.scene().anchors.len(), run.lambda(), run.load_without(&[])?);
+            return Ok(found.map(|found| AnchorChange::Fit { masked: Vec::new(), found }));
+        };
         let worth = run.worth()?;
         let n = worth.of_anchors.len();
         let part_of_the_way = |n_last: usize| {

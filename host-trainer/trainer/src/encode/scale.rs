@@ -84,6 +84,10 @@ impl Gauge for Scale<'_> {
     fn load(&self, finished: &Finished) -> Result<Load, Box<dyn Error + Send + Sync>> {
         Ok(self.load(finished)?)
     }
+
+    fn limits_bytes(&self) -> bool {
+        self.encoding.limits.flash_bytes.is_some()
+    }
 }
 
 /// A frame as large as the training images, of all tiers.

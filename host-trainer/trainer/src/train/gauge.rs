@@ -14,6 +14,9 @@ pub trait Gauge: Debug + Sync {
     /// # Errors
     /// What keeps the scene from being coded or drawn.
     fn load(&self, finished: &Finished) -> Result<Load, Box<dyn Error + Send + Sync>>;
+
+    /// Whether the length of the bundle is limited.
+    fn limits_bytes(&self) -> bool;
 }
 
 impl<'a> Trainer<'a> {
@@ -21,6 +24,11 @@ impl<'a> Trainer<'a> {
     #[must_use]
     pub fn fitting(self, gauge: Option<&'a dyn Gauge>) -> Self {
         Self { gauge, ..self }
+    }
+
+    /// Whether the bundle's length is limited.
+    pub(super) fn limits_bytes(&self) -> bool {
+        self.gauge.is_some_and(Gauge::limits_bytes)
     }
 
     /// What the scene takes without these offsets, counted through all anchors'; `None` where nobody asks.

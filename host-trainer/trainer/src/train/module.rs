@@ -124,6 +124,11 @@ impl RunView<'_> {
         self.trainer.gauge.is_some()
     }
 
+    /// Whether one of them is its length.
+    pub fn limits_bytes(&self) -> bool {
+        self.trainer.limits_bytes()
+    }
+
     /// What the bundle takes of its limits without these offsets; nothing where it has none.
     ///
     /// # Errors

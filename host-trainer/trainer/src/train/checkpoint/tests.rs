@@ -52,6 +52,10 @@ impl Gauge for Draws {
         let n = (0..anchors.len()).filter(|anchor| anchors.has_drawn(*anchor)).count() as f64;
         Ok(Load { ram: n / self.0, bytes: n / (1.5 * self.0), ..Load::default() })
     }
+
+    fn limits_bytes(&self) -> bool {
+        true
+    }
 }
 
 fn taken_up_again(config: TrainConfig, gauge: Option<&dyn Gauge>) {

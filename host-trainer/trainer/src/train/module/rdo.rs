@@ -105,7 +105,7 @@ impl Module for Rdo {
     fn event(&self, at: &StepInfo, run: &RunView<'_>) -> Result<Option<AnchorChange>, TrainError> {
         let shares: Vec<f64> = self.shares().collect();
         let Some(event) = shares.iter().position(|share| at.is_at(*share)) else {
-            if !(run.is_limited() && REWEIGHED_AT.iter().any(|share| at.is_at(*share) && *share > self.until)) {
+            if !(run.limits_bytes() && REWEIGHED_AT.iter().any(|share| at.is_at(*share) && *share > self.until)) {
                 return Ok(None);
             }
             let found = reweighed(run.scene().anchors.len(), run.lambda(), run.load_without(&[])?);

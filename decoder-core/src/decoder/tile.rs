@@ -53,7 +53,7 @@ impl<'t> Tile<'t> {
     /// ```
     ///
     /// # Budget
-    /// No memory; about 20 instructions a pixel, 60 more when dithered.
+    /// One pass over the pixels, and no memory.
     // Not inlined: among what draws a tile its loop would not stay in registers.
     #[inline(never)]
     #[must_use]

@@ -4,10 +4,10 @@ use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Capture, View};
 use pocketsplat_core::{Bundle, DecodeError, Plan};
 
-use super::scale::{DevicePlans, frame_of};
+use super::scale::{DevicePlans, frame_of, measured_cameras};
 use super::{EncodeError, Encoding};
 use crate::bundle::{WriteError, Written};
-use crate::manifest::{cameras_to_measure, measure};
+use crate::manifest::measure;
 use crate::train::finish::Finished;
 use crate::train::steering::Search;
 
@@ -85,8 +85,7 @@ impl Encoding {
     /// # Errors
     /// [`EncodeError`].
     pub fn encode(&self, finished: Finished, capture: &Capture, held_out: &[View]) -> Result<Fitted, EncodeError> {
-        let cameras: Vec<_> = capture.train.iter().map(|view| view.camera.clone()).collect();
-        let cameras = cameras_to_measure(&cameras);
+        let cameras = measured_cameras(capture);
         let attempt = |finished| self.attempt(finished, capture, &cameras, held_out);
         let (n, whole) = (n_kept(&finished), attempt(finished.clone())?);
         let Some(need) = whole.need.filter(|need| need.needed > need.available) else {

@@ -33,9 +33,7 @@ pub struct Scale<'a> {
 impl Encoding {
     /// The scale for scenes of a capture; `None` where nothing limits them.
     pub fn scale<'a>(&'a self, capture: &'a Capture) -> Option<Scale<'a>> {
-        let cameras: Vec<_> = capture.train.iter().map(|view| view.camera.clone()).collect();
-        let cameras = cameras_to_measure(&cameras);
-        (!self.limits.is_none()).then_some(Scale { encoding: self, capture, cameras })
+        (!self.limits.is_none()).then(|| Scale { encoding: self, capture, cameras: measured_cameras(capture) })
     }
 }
 
@@ -88,6 +86,12 @@ impl Gauge for Scale<'_> {
     fn limits_bytes(&self) -> bool {
         self.encoding.limits.flash_bytes.is_some()
     }
+}
+
+/// The cameras that the scenes of a capture are measured with.
+pub(super) fn measured_cameras(capture: &Capture) -> Vec<Camera> {
+    let cameras: Vec<_> = capture.train.iter().map(|view| view.camera.clone()).collect();
+    cameras_to_measure(&cameras)
 }
 
 /// A frame as large as the training images, of all tiers.

@@ -31,13 +31,13 @@ impl<'a> Trainer<'a> {
         self.gauge.is_some_and(Gauge::limits_bytes)
     }
 
-    /// What the scene takes without these offsets, counted through all anchors'; `None` where nobody asks.
+    /// What the scene takes without these offsets, counted through all anchors'; nothing where it has no limits.
     ///
     /// Cost: a forward pass over the views, and a coding.
-    pub(super) fn load_without(&self, offsets: &[usize]) -> Result<Option<Load>, TrainError> {
-        let Some(gauge) = self.gauge else { return Ok(None) };
+    pub(super) fn load_without(&self, offsets: &[usize]) -> Result<Load, TrainError> {
+        let Some(gauge) = self.gauge else { return Ok(Load::default()) };
         let mut scene = self.scene.clone();
         scene.anchors.mask(offsets);
-        gauge.load(&self.finished(scene)?).map(Some).map_err(TrainError::Gauge)
+        gauge.load(&self.finished(scene)?).map_err(TrainError::Gauge)
     }
 }

@@ -134,7 +134,7 @@ impl RunView<'_> {
     /// # Errors
     /// [`TrainError::Gauge`] for a scene that has no bundle.
     pub fn load_without(&self, offsets: &[usize]) -> Result<Load, TrainError> {
-        Ok(self.trainer.load_without(offsets)?.unwrap_or_default())
+        self.trainer.load_without(offsets)
     }
 }
 

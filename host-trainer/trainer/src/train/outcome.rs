@@ -56,7 +56,7 @@ pub enum TrainError {
     /// The integer form of the context model is not one that a decoder reads.
     #[error("the integers of the context model cannot be read back; start anew with lower `train.rates` in a --config")]
     IntegersUnread(#[from] DecodeError),
-    /// What the bundle would take cannot be measured.
+    /// There is no bundle whose length and memory could be measured.
     #[error("the scene as it stands has no bundle to measure; please report it")]
     Gauge(#[source] Box<dyn Error + Send + Sync>),
     /// The cause of dropped steps does not pass.

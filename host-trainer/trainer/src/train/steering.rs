@@ -2,7 +2,7 @@
 
 use super::load::Load;
 
-/// Share of the limits to aim at. A little of the scene is cut off in the end; what is not there cannot be filled in.
+/// Share of the limits to aim at: a little too much is cut in the end, but nothing grows any more where there is too little.
 const AIM: f64 = 1.02;
 /// How an event looks for it.
 const STEERING: Search = Search { tolerance: 0.01, most_trials: 5 };
@@ -27,16 +27,15 @@ pub struct Fit {
 /// Shares of the run after which the weight alone is looked at again, once nothing is pruned any more: bytes follow it slowly.
 pub(super) const REWEIGHED_AT: [f64; 3] = [0.75, 0.8, 0.85];
 
-/// The weight at which a scene of `n` anchors is expected to fill its bytes; `None` where these have no limit.
+/// A scene of `n_anchors`, and the weight at which it is expected to fill its bytes; the present one where these have no limit.
 ///
 /// * `lambda`: the present weight. * `load`: what the scene takes at it.
-pub(super) fn reweighed(n: usize, lambda: f64, load: Load) -> Option<Fit> {
-    (load.bytes > 0.0).then(|| Fit { n_anchors: n, lambda: lambda * factor(load), former_lambda: lambda, load })
-}
-
-/// What λ is to be multiplied by, so that the bytes become those that are aimed at.
-fn factor(load: Load) -> f64 {
-    (load.bytes / AIM).powf(1.0 / POWER_OF_LAMBDA).clamp(1.0 / LARGEST_FACTOR, LARGEST_FACTOR)
+pub(super) fn reweighed(n_anchors: usize, lambda: f64, load: Load) -> Fit {
+    let factor = match load.bytes {
+        0.0 => 1.0,
+        bytes => (bytes / AIM).powf(1.0 / POWER_OF_LAMBDA).clamp(1.0 / LARGEST_FACTOR, LARGEST_FACTOR),
+    };
+    Fit { n_anchors, lambda: lambda * factor, former_lambda: lambda, load }
 }
 
 /// The most of `n` anchors that fit, and the weight λ at which their bytes do.
@@ -63,9 +62,7 @@ pub(super) fn fit<E>(
     let later = |strength: f64| strength.clamp(1.0 / LARGEST_FACTOR, LARGEST_FACTOR).powf(-POWER_OF_LAMBDA);
     let n_of_bytes = STEERING.largest(n, |n| Ok(load_of(n)?.bytes / AIM * later(strength_for(n))))?;
     let n_anchors = STEERING.largest(n_of_bytes, |n| Ok(load_of(n)?.drawing() / AIM))?;
-    let load = load_of(n_anchors)?;
-    let unlimited = Fit { n_anchors, lambda, former_lambda: lambda, load };
-    Ok(reweighed(n_anchors, lambda, load).unwrap_or(unlimited))
+    Ok(reweighed(n_anchors, lambda, load_of(n_anchors)?))
 }
 
 /// A search among numbers of anchors.

@@ -109,7 +109,7 @@ impl Module for Rdo {
                 return Ok(None);
             }
             let found = reweighed(run.scene().anchors.len(), run.lambda(), run.load_without(&[])?);
-            return Ok(found.map(|found| AnchorChange::Fit { masked: Vec::new(), found }));
+            return Ok(Some(AnchorChange::Fit { masked: Vec::new(), found }));
         };
         let worth = run.worth()?;
         let n = worth.of_anchors.len();

@@ -5,6 +5,7 @@ mod count;
 mod frame;
 mod gather;
 mod report;
+mod row;
 mod source;
 mod splats;
 mod strip;
@@ -16,6 +17,7 @@ mod tile;
 pub use count::{count_gaussians, count_scratch_len};
 pub use frame::Drawing;
 pub use report::FrameReport;
+pub use row::{PixelFormat, TileRow};
 #[cfg(feature = "embedded-graphics")]
 pub(crate) use tile::dithered_steps;
 pub use tile::{ByteOrder, Rounding, Tile};
@@ -60,6 +62,34 @@ pub struct Decoder<'b, 's, A: Arithmetic = ReferenceArithmetic> {
 impl<'b, 's> Decoder<'b, 's> {
     /// Takes `scratch`, converts the heads' weights into it, compares the checksum of every chunk of the planned tiers, and
     /// decodes them, or evaluates their Gaussians, if the plan says so.
+    ///
+    /// Dropping the decoder gives the memory back: pass `&mut scratch`, and bind another bundle in the same bytes afterwards.
+    ///
+    /// ```
+    /// # fn main() -> Result<(), pocketsplat_core::DecodeError> {
+    /// # let first = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/bundle/example.psb"));
+    /// # let second = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/bundle/example-context.psb"));
+    /// use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder};
+    ///
+    /// /// Draws a bundle in memory that it has only as long as the call lasts; returns the pixels.
+    /// fn show(bundle: &Bundle<'_>, scratch: &mut [u8]) -> Result<usize, DecodeError> {
+    ///     let plan = bundle.plan(&Budget::for_frame(32, 24).in_bytes(scratch.len()))?;
+    ///     let mut decoder = Decoder::bind(bundle, plan, scratch)?;
+    ///     let mut drawing = decoder.begin(&bundle.header().preview.resized(32, 24))?;
+    ///     let mut n_pixels = 0;
+    ///     while let Some(tile) = drawing.next_tile()? {
+    ///         n_pixels += tile.rgb.len();
+    ///     }
+    ///     Ok(n_pixels)
+    /// }
+    ///
+    /// let mut scratch = [0; 8 * 1024]; // or a `&'static mut [u8]`: pass `&mut *scratch`, which lends it
+    /// assert_eq!(show(&Bundle::parse(first)?, &mut scratch)?, 32 * 24);
+    /// scratch.fill(0); // the caller's again, for anything
+    /// assert_eq!(show(&Bundle::parse(second)?, &mut scratch)?, 32 * 24);
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
     /// [`DecodeError::ScratchTooSmall`] names the bytes needed; [`DecodeError::PlanMismatch`] when `plan` is another

@@ -40,7 +40,8 @@ pub use budget::{
 pub use bundle::Bundle;
 pub use camera::{Camera, Rotation};
 pub use decoder::{
-    ByteOrder, Decoder, Drawing, FrameReport, Rounding, Tile, TileSink, count_gaussians, count_scratch_len,
+    ByteOrder, Decoder, Drawing, FrameReport, PixelFormat, Rounding, Tile, TileRow, TileSink, count_gaussians,
+    count_scratch_len,
 };
 pub use error::{DecodeError, ErrorClass, Field, RenderError, SectionKind};
 pub use project::chunks_in_view;

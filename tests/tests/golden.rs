@@ -5,7 +5,9 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use pocketsplat_core::bundle::crc32;
-use pocketsplat_core::{Budget, Bundle, Camera, MaxSplats, Overflow, Plan};
+use pocketsplat_core::{
+    Budget, Bundle, ByteOrder, Camera, Decoder, MaxSplats, Overflow, PixelFormat, Plan, Rounding, Tile,
+};
 use pocketsplat_trainer::verify::{Trial, plan_variants};
 
 const BUNDLES: [(&str, &[u8]); 4] = [
@@ -21,6 +23,20 @@ fn checksum(bundle: &Bundle<'_>, plan: Plan, camera: &Camera) -> u32 {
     let drawn = Trial::run(bundle, plan, camera, 0, 0).unwrap_or_else(|breach| panic!("{breach}: {plan:?}"));
     assert_eq!(drawn.report.splats_dropped, 0, "{plan:?}");
     crc32(&drawn.rgb)
+}
+
+/// A frame drawn row of tiles by row of tiles into one of two buffers by turns.
+fn in_rows(bundle: &Bundle<'_>, plan: Plan, camera: &Camera, format: PixelFormat) -> Vec<u8> {
+    let mut scratch = vec![0; plan.scratch_len()];
+    let mut decoder = Decoder::bind(bundle, plan, &mut scratch).expect("planned memory");
+    let mut drawing = decoder.begin(camera).expect("a sound camera");
+    let mut buffers = [0xa5, 0x5a].map(|byte| vec![byte; 16 * usize::from(camera.width_px) * format.bytes_per_pixel()]);
+    let mut frame = Vec::new();
+    while let Some(row) = drawing.next_tile_row(format, &mut buffers[0]).expect("drawn") {
+        frame.extend_from_slice(row.bytes);
+        buffers.swap(0, 1);
+    }
+    frame
 }
 
 /// Every residency and number of strips, with memory for all splats and with memory for few, in slabs of depth.
@@ -58,4 +74,42 @@ fn frames_have_the_committed_checksums() {
         found == FRAMES,
         "frames are not those of tests/golden/frames.csv, which has\n{FRAMES}but they are\n{found}"
     );
+}
+
+#[test]
+fn rows_of_tiles_are_the_frames_in_every_format() {
+    let packed = [ByteOrder::BigEndian, ByteOrder::LittleEndian]
+        .into_iter()
+        .flat_map(|order| [Rounding::Nearest, Rounding::Dithered].map(|rounding| PixelFormat::Rgb565(order, rounding)));
+    let formats: Vec<PixelFormat> = [PixelFormat::Rgb888].into_iter().chain(packed).collect();
+    for (name, bytes) in BUNDLES {
+        let bundle = Bundle::parse(bytes).expect("a committed bundle is sound");
+        let preview = bundle.header().preview;
+        let (width, height) = (preview.width_px, preview.height_px);
+        let plans = plans(&bundle, Budget::for_frame(width, height).with_max_splats(MaxSplats::Worst));
+        for view in 0..N_VIEWS {
+            let camera = preview.orbited(TAU * f32::from(view) / f32::from(N_VIEWS));
+            // Every plan draws one view, the first one all of them in every format.
+            let of_view = plans.iter().skip(view.into()).step_by(N_VIEWS.into());
+            for plan in of_view.chain(&plans[..1]) {
+                let drawn = crc32(&in_rows(&bundle, *plan, &camera, PixelFormat::Rgb888));
+                let line = format!("{name},{},{view},{drawn:08x}", bundle.n_tiers());
+                assert!(
+                    FRAMES.lines().any(|golden| golden == line),
+                    "not in tests/golden/frames.csv: {line}, {plan:?}"
+                );
+            }
+            let rgb = Trial::run(&bundle, plans[0], &camera, 0, 0).expect("drawn").rgb;
+            for format in &formats {
+                let mut rgb = rgb.as_chunks::<3>().0.to_vec();
+                let frame = Tile { x_px: 0, y_px: 0, width, height, rgb: &mut rgb };
+                let expected = match *format {
+                    PixelFormat::Rgb888 => frame.rgb.as_flattened_mut(),
+                    PixelFormat::Rgb565(order, rounding) => frame.into_rgb565(order, rounding),
+                };
+                let found = in_rows(&bundle, plans[0], &camera, *format);
+                assert!(found == expected, "{name}, view {view}, {format:?}");
+            }
+        }
+    }
 }

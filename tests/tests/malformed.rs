@@ -5,7 +5,9 @@ use conformance::bundles::{ALL_CODERS, chunks_offset, tier_ends, tiered};
 use conformance::frame::{Frame, budget_for, bundle_of, draw, to_core};
 use conformance::scenes::{CASES, Case, TINY, TINY_DETAILED, cameras, random_scene};
 use conformance::seal::reseal;
-use pocketsplat_core::{Bundle, Camera, DecodeError, Decoder, ErrorClass, Field, FrameReport, SectionKind, Strips};
+use pocketsplat_core::{
+    Bundle, Camera, DecodeError, Decoder, ErrorClass, Field, FrameReport, PixelFormat, SectionKind, Strips,
+};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -287,6 +289,8 @@ fn no_tile_comes_after_a_chunk_that_no_writer_makes() {
                 Err(error) => {
                     assert!(matches!(error, DecodeError::ChunkStream { .. }), "{error}");
                     assert!(drawing.next_tile().is_ok_and(|tile| tile.is_none()), "a tile after the error");
+                    let row = drawing.next_tile_row(PixelFormat::Rgb888, &mut []);
+                    assert_eq!(row, Ok(None), "a row of tiles after the error");
                     n_refused += 1;
                     break;
                 }

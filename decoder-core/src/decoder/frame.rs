@@ -164,6 +164,14 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
         report
     }
 
+    /// What is left of the current row of tiles: its first column and row, its width and height, pixels; `None` after the last row.
+    pub(super) fn rest_of_row(&self) -> Option<[u16; 4]> {
+        let [width_px, height_px] = self.size_px;
+        let [x_px, y_px] = [self.column, self.row].map(|index| u16::from(index) * TILE_PX);
+        let is_over = u16::from(self.row) >= self.frame.strips.n_rows();
+        (!is_over).then(|| [x_px, y_px, width_px.saturating_sub(x_px), size_along(height_px, self.row)])
+    }
+
     /// Gathers and orders the splats of the next slab, of this strip or of the next one; false when there is none.
     fn next_slab(&mut self, watch: &mut impl Stopwatch) -> Result<bool, DecodeError> {
         let Self { decoder, frame, .. } = self;

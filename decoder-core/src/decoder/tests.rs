@@ -4,7 +4,7 @@ use core::convert::Infallible;
 use std::vec;
 use std::vec::Vec;
 
-use super::{Decoder, TileSink};
+use super::{ByteOrder, Decoder, PixelFormat, Rounding, Tile, TileRow, TileSink};
 use crate::budget::{Budget, MAX_FRAME_PX, MaxSplats, Overflow, Residency, Strips};
 use crate::bundle::Bundle;
 use crate::camera::{Camera, Rotation};
@@ -130,6 +130,103 @@ fn tiles_that_are_asked_for_are_those_that_a_sink_gets() {
                 }
             }
         }
+    }
+}
+
+/// The lines of `[height, width, bytes]` from row `y_px` on, each from column `x_px` on.
+fn lines_of(frame: &[u8], width: usize, row: &TileRow<'_>) -> Vec<u8> {
+    let bytes = row.bytes.len() / (usize::from(row.width) * usize::from(row.height));
+    let [x, y] = [row.x_px, row.y_px].map(usize::from);
+    let lines = frame.chunks_exact(width * bytes).skip(y).take(row.height.into());
+    lines.flat_map(|line| line[x * bytes..].to_vec()).collect()
+}
+
+#[test]
+fn rows_of_tiles_are_the_lines_of_the_frame() {
+    let bundle = example();
+    let (width, height) = (100, 75);
+    let camera = bundle.header().preview.resized(width, height);
+    let frame = Budget::for_frame(width, height);
+    let in_slabs = frame.with_max_splats(MaxSplats::AtMost(3)).with_overflow(Overflow::Slabs);
+    for budget in [frame, frame.with_strips(Strips::Exactly(8)), in_slabs, in_slabs.with_strips(Strips::Exactly(2))] {
+        let plan = bundle.plan(&budget).expect("a plan");
+        let mut scratch = vec![0; plan.scratch_len()];
+        let mut decoder = Decoder::bind(&bundle, plan, &mut scratch).expect("planned memory");
+        let mut tiles = Tiles::default();
+        let report = decoder.render(&camera, &mut tiles).expect("drawn");
+        let mut rgb = vec![[0; 3]; usize::from(width) * usize::from(height)];
+        for ([x_px, y_px, tile_width, _], pixels) in &tiles.0 {
+            let lines = rgb.chunks_exact_mut(width.into()).skip((*y_px).into());
+            for (line, from) in lines.zip(pixels.chunks_exact((*tile_width).into())) {
+                line[usize::from(*x_px)..][..from.len()].copy_from_slice(from);
+            }
+        }
+        for format in FORMATS {
+            let expected = match format {
+                PixelFormat::Rgb888 => rgb.as_flattened().to_vec(),
+                // The pattern of one large tile is that of all small ones.
+                PixelFormat::Rgb565(order, rounding) => {
+                    let whole = Tile { x_px: 0, y_px: 0, width, height, rgb: &mut rgb.clone() };
+                    whole.into_rgb565(order, rounding).to_vec()
+                }
+            };
+            // So many single tiles before each row.
+            for n_single in [0, 1, 6, 8] {
+                let mut drawing = decoder.begin(&camera).expect("a sound camera");
+                let mut buffer = vec![0; 16 * usize::from(width) * format.bytes_per_pixel()];
+                let mut places = Vec::new();
+                loop {
+                    for _ in 0..n_single {
+                        drawing.next_tile().expect("drawn");
+                    }
+                    let Some(row) = drawing.next_tile_row(format, &mut buffer).expect("drawn") else { break };
+                    assert!(*row.bytes == lines_of(&expected, width.into(), &row), "{budget:?}, {format:?}: {row:?}");
+                    places.push([row.x_px, row.y_px, row.width, row.height]);
+                }
+                let row = |x_px, y_px| [x_px, y_px, width - x_px, 16.min(height - y_px)];
+                let few = match n_single {
+                    0 => [0, 16, 32, 48, 64].map(|y_px| row(0, y_px)).to_vec(),
+                    1 => [0, 16, 32, 48, 64].map(|y_px| row(16, y_px)).to_vec(),
+                    6 => [0, 16, 32, 48, 64].map(|y_px| row(96, y_px)).to_vec(),
+                    _ => vec![row(16, 16), row(16, 48)],
+                };
+                assert_eq!(places, few, "{budget:?}, {format:?}, {n_single} single tiles before each row");
+                assert!(drawing.next_tile().expect("drawn").is_none(), "the rows are the frame");
+                assert_eq!(drawing.report(), report, "{budget:?}, {format:?}");
+            }
+        }
+    }
+}
+
+const FORMATS: [PixelFormat; 5] = [
+    PixelFormat::Rgb888,
+    PixelFormat::Rgb565(ByteOrder::BigEndian, Rounding::Nearest),
+    PixelFormat::Rgb565(ByteOrder::BigEndian, Rounding::Dithered),
+    PixelFormat::Rgb565(ByteOrder::LittleEndian, Rounding::Nearest),
+    PixelFormat::Rgb565(ByteOrder::LittleEndian, Rounding::Dithered),
+];
+
+#[test]
+fn a_buffer_too_short_for_a_row_of_tiles_is_refused_and_the_row_comes_later() {
+    let bundle = example();
+    let plan = bundle.plan(&Budget::for_frame(32, 24)).expect("a plan");
+    let mut scratch = vec![0; plan.scratch_len()];
+    let mut decoder = Decoder::bind(&bundle, plan, &mut scratch).expect("planned memory");
+    for format in FORMATS {
+        let mut drawing = decoder.begin(&bundle.header().preview).expect("a sound camera");
+        for height in [16, 8] {
+            let needed = 32 * height * format.bytes_per_pixel();
+            let mut buffer = vec![0; needed];
+            for available in [0, 1, needed - 1] {
+                let error = drawing.next_tile_row(format, &mut buffer[..available]).expect_err("too short");
+                let [needed, available] = [needed, available].map(|len| u32::try_from(len).expect("small"));
+                assert_eq!(error, DecodeError::BufferTooShort { field: Field::RowBuffer, needed, available });
+                assert_eq!(error.class(), ErrorClass::Misuse);
+            }
+            let row = drawing.next_tile_row(format, &mut buffer).expect("long enough").expect("a row");
+            assert_eq!((usize::from(row.height), row.bytes.len()), (height, needed), "{format:?}");
+        }
+        assert_eq!(drawing.next_tile_row(format, &mut []), Ok(None), "after the last row no buffer is needed");
     }
 }
 

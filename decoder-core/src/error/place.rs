@@ -107,6 +107,8 @@ pub enum Field {
     ChannelBuffer,
     SiteBuffer,
     ModelBuffer,
+    /// Bytes for a row of tiles.
+    RowBuffer,
 }
 
 impl Field {
@@ -125,7 +127,8 @@ impl Field {
             | Self::TransmittanceStop
             | Self::ChannelBuffer
             | Self::SiteBuffer
-            | Self::ModelBuffer => ErrorClass::Misuse,
+            | Self::ModelBuffer
+            | Self::RowBuffer => ErrorClass::Misuse,
             _ => ErrorClass::Malformed,
         }
     }
@@ -215,6 +218,7 @@ impl fmt::Display for Field {
             Self::ChannelBuffer => "buffer for channels",
             Self::SiteBuffer => "buffer for anchors' sites",
             Self::ModelBuffer => "memory for the models of anchors",
+            Self::RowBuffer => "buffer of bytes for a row of tiles",
         })
     }
 }

@@ -65,6 +65,10 @@ fn draw(bytes: &[u8], camera: &Camera, scratch: &mut [u8]) -> Result<FrameReport
     // Sine and cosine are a tenth of all text, and nothing else needs them.
     #[cfg(feature = "orbit")]
     let camera = camera.orbited(black_box(1.0));
+    #[cfg(feature = "drawing")]
+    if black_box(true) {
+        return drawing::draw(&mut decoder, &camera);
+    }
     display::draw(&mut decoder, &camera)
 }
 
@@ -73,6 +77,32 @@ fn decode(bytes: &[u8], words: &mut [u32], values: &mut [f32]) -> Result<(), Dec
     let bundle = Bundle::parse(bytes)?;
     let mut models = bundle.anchor_models(words)?;
     bundle.chunk(black_box(0))?.decode_values(&mut models, &mut [AnchorSite::default()], values)
+}
+
+#[cfg(feature = "drawing")]
+mod drawing {
+    use super::*;
+    use pocketsplat_core::{ByteOrder, PixelFormat, Rounding};
+
+    /// Tile by tile, or row of tiles by row of tiles.
+    pub(super) fn draw(decoder: &mut Decoder<'_, '_>, camera: &Camera) -> Result<FrameReport, RenderError<Infallible>> {
+        let mut drawing = decoder.begin(camera)?;
+        if black_box(true) {
+            while let Some(tile) = drawing.next_tile()? {
+                black_box(tile.into_rgb565(ByteOrder::BigEndian, Rounding::Nearest));
+            }
+        }
+        let mut buffer = [0; 64];
+        let format = if black_box(true) {
+            PixelFormat::Rgb888
+        } else {
+            PixelFormat::Rgb565(ByteOrder::LittleEndian, Rounding::Dithered)
+        };
+        while let Some(row) = drawing.next_tile_row(black_box(format), black_box(&mut buffer))? {
+            black_box(row);
+        }
+        Ok(drawing.report())
+    }
 }
 
 #[cfg(not(feature = "embedded-graphics"))]

@@ -27,7 +27,7 @@ cargo test -q --locked
 bundles=(static context matte isotropic)
 flags=(-std=c11 -Wall -Wextra -Wpedantic -Werror -O1 -g -Iinclude)
 cargo build -q --release --locked
-cc "${flags[@]}" -fsanitize=address,undefined -fno-sanitize-recover=all c/test.c c/draw.c "$out/release/libpocketsplat.a" -lm -o "$out/test"
+cc "${flags[@]}" -fsanitize=address,undefined -fno-sanitize-recover=all c/test.c c/draw.c c/pieces.c "$out/release/libpocketsplat.a" -lm -o "$out/test"
 arguments=()
 for bundle in "${bundles[@]}"; do arguments+=("$bundle=$golden/$bundle.psb"); done
 "$out/test" "${arguments[@]}" >"$out/host.csv"
@@ -38,7 +38,7 @@ cargo build -q --release --locked --target $target
 : >"$out/board.csv"
 for bundle in "${bundles[@]}"; do
   arm-none-eabi-gcc "${flags[@]}" -mcpu=cortex-m4 -mfloat-abi=hard -mfpu=fpv4-sp-d16 -ffreestanding -nostdlib -ffunction-sections \
-    -Wl,--gc-sections -Wl,-z,noexecstack "-DNAME=\"$bundle\"" "-DFILE=\"$golden/$bundle.psb\"" -Tc/mps2.ld c/mps2.c c/draw.c \
+    -Wl,--gc-sections -Wl,-z,noexecstack "-DNAME=\"$bundle\"" "-DFILE=\"$golden/$bundle.psb\"" -Tc/mps2.ld c/mps2.c c/draw.c c/pieces.c \
     "$out/$target/release/libpocketsplat.a" -lgcc -o "$out/$bundle.elf"
   timeout 120 qemu-system-arm -M mps2-an386 -display none -monitor none -serial none -semihosting-config enable=on,target=native \
     -kernel "$out/$bundle.elf" </dev/null >>"$out/board.csv" 2>&1 || { cat "$out/board.csv" >&2 && exit 1; }

@@ -1,6 +1,7 @@
 /* Draws a bundle from four sides into a frame buffer: the whole of what a firmware in C does. */
 #include "draw.h"
 
+#include "pieces.h"
 #include "pocketsplat.h"
 
 enum { MAX_FRAME_BYTES = 3 * 200 * 200, MAX_SCRATCH_BYTES = 512 * 1024, SIDES = 4 };
@@ -54,6 +55,7 @@ int draw_orbit(const char *name, const uint8_t *bundle, size_t bundle_len) {
   psb_decoder *decoder;
   psb_camera preview, camera;
   psb_report report;
+  int is_same;
   psb_status status = psb_preview(bundle, bundle_len, 0, 0, &preview, &message);
   if (status != PSB_STATUS_OK || 3 * (size_t)preview.width_px * preview.height_px > sizeof frame) return failed(status);
   budget = psb_budget_for_frame(preview.width_px, preview.height_px, sizeof scratch);
@@ -74,6 +76,13 @@ int draw_orbit(const char *name, const uint8_t *bundle, size_t bundle_len) {
       if (status != PSB_STATUS_OK) return failed(status);
       status = psb_render(decoder, &camera, take_tile, &camera.width_px, &report, &message);
       if (status != PSB_STATUS_OK || report.splats == 0) return failed(status);
+      /* Piece by piece the same pixels come. */
+      status = draw_in_pieces(decoder, &camera, frame, &report, &is_same, &message);
+      if (status != PSB_STATUS_OK) return failed(status);
+      if (!is_same) {
+        say("the pieces of a frame are not the frame\n");
+        return 1;
+      }
       say_row(name, tiers, side, crc32(frame, 3 * (size_t)camera.width_px * camera.height_px));
     }
   }

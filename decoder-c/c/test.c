@@ -21,6 +21,56 @@ static int32_t refuse(void *user, uint16_t x, uint16_t y, uint16_t width, uint16
   return ++*(int32_t *)user == 2 ? 77 : 0;
 }
 
+static int32_t take(void *user, uint16_t x, uint16_t y, uint16_t width, uint16_t height, const uint8_t *rgb) {
+  (void)user, (void)x, (void)y, (void)width, (void)height, (void)rgb;
+  return 0;
+}
+
+/* Frames that are not begun, that are begun twice or given up, rows that do not fit, and arguments that are wrong. */
+static void misordered(psb_decoder *decoder, const psb_camera *camera) {
+  const size_t row_len = (size_t)16 * camera->width_px * 2;
+  psb_message message;
+  psb_report report = {0};
+  psb_pixels piece;
+  uint8_t *row = malloc(row_len);
+  CHECK(psb_next_tile(decoder, &piece, &report, &message) == PSB_STATUS_MISUSE && strstr(message.text, "psb_begin"));
+  CHECK(piece.bytes == NULL && piece.len == 0);
+  CHECK(psb_next_tile_row(decoder, row, row_len, &piece, NULL, &message) == PSB_STATUS_MISUSE && strstr(message.text, "psb_begin"));
+  CHECK(psb_begin(NULL, camera, PSB_FORMAT_RGB888, &message) == PSB_STATUS_MISUSE);
+  CHECK(psb_begin(decoder, NULL, PSB_FORMAT_RGB888, &message) == PSB_STATUS_MISUSE);
+  CHECK(psb_begin(decoder, camera, 5, &message) == PSB_STATUS_MISUSE && strstr(message.text, "PSB_FORMAT"));
+  CHECK(psb_next_tile(NULL, &piece, NULL, NULL) == PSB_STATUS_MISUSE && psb_next_tile_row(NULL, row, row_len, &piece, NULL, NULL) == PSB_STATUS_MISUSE);
+  CHECK(psb_begin(decoder, camera, PSB_FORMAT_RGB565_BIG_ENDIAN, &message) == PSB_STATUS_OK);
+  CHECK(psb_next_tile(decoder, NULL, NULL, NULL) == PSB_STATUS_MISUSE);
+  CHECK(psb_next_tile_row(decoder, row, row_len, NULL, NULL, NULL) == PSB_STATUS_MISUSE);
+  CHECK(psb_next_tile_row(decoder, NULL, row_len, &piece, NULL, &message) == PSB_STATUS_MISUSE);
+  CHECK(psb_next_tile_row(decoder, row, row_len - 1, &piece, NULL, &message) == PSB_STATUS_MISUSE && piece.bytes == NULL);
+  CHECK(strstr(message.text, "2047") && strstr(message.text, "2048"));
+  /* None of these draws anything: the first row is still to come. */
+  CHECK(psb_next_tile_row(decoder, row, row_len, &piece, &report, NULL) == PSB_STATUS_OK && piece.bytes == row);
+  CHECK(piece.y_px == 0 && piece.width == 64 && piece.height == 16 && piece.len == row_len && report.splats == 0);
+  /* A frame that is begun again starts from its first tile. */
+  CHECK(psb_begin(decoder, camera, PSB_FORMAT_RGB888, NULL) == PSB_STATUS_OK);
+  CHECK(psb_next_tile(decoder, &piece, NULL, NULL) == PSB_STATUS_OK && piece.x_px == 0 && piece.y_px == 0 && piece.len == 768);
+  /* psb_render ends it, and so does a psb_begin that fails. */
+  CHECK(psb_render(decoder, camera, take, NULL, NULL, NULL) == PSB_STATUS_OK);
+  CHECK(psb_next_tile(decoder, &piece, NULL, NULL) == PSB_STATUS_MISUSE && piece.bytes == NULL);
+  CHECK(psb_begin(decoder, camera, PSB_FORMAT_RGB888, NULL) == PSB_STATUS_OK);
+  CHECK(psb_begin(decoder, camera, 99, NULL) == PSB_STATUS_MISUSE);
+  CHECK(psb_next_tile(decoder, &piece, NULL, NULL) == PSB_STATUS_MISUSE);
+  /* After the last tile nothing comes, as often as one asks. */
+  CHECK(psb_begin(decoder, camera, PSB_FORMAT_RGB565_LITTLE_ENDIAN_DITHERED, NULL) == PSB_STATUS_OK);
+  unsigned n_tiles = 0;
+  while (psb_next_tile(decoder, &piece, &report, &message) == PSB_STATUS_OK && piece.bytes != NULL) n_tiles++;
+  CHECK(n_tiles == 12 && report.splats > 0 && message.text[0] == 0);
+  CHECK(psb_next_tile(decoder, &piece, NULL, NULL) == PSB_STATUS_OK && piece.bytes == NULL);
+  CHECK(psb_next_tile_row(decoder, row, 0, &piece, NULL, NULL) == PSB_STATUS_OK && piece.bytes == NULL);
+  /* Given up in the middle, and the memory with it. */
+  CHECK(psb_begin(decoder, camera, PSB_FORMAT_RGB888, NULL) == PSB_STATUS_OK);
+  CHECK(psb_next_tile(decoder, &piece, NULL, NULL) == PSB_STATUS_OK);
+  free(row);
+}
+
 /* Every argument that may be wrong, and damaged bytes, each in memory of its own so that the sanitiser sees a byte too many. */
 static void misuse(const uint8_t *bundle, size_t len) {
   psb_budget budget = psb_budget_for_frame(64, 48, 1 << 20);
@@ -70,7 +120,9 @@ static void misuse(const uint8_t *bundle, size_t len) {
   CHECK(psb_render(decoder, &camera, refuse, &n_tiles, &report, &message) == PSB_STATUS_STOPPED);
   CHECK(n_tiles == 2 && strstr(message.text, "returned 77"));
   CHECK(psb_render(decoder, &camera, refuse, &n_tiles, NULL, NULL) == PSB_STATUS_OK);
+  misordered(decoder, &camera);
   camera.rotation[0] += 0.5f;
+  CHECK(psb_begin(decoder, &camera, PSB_FORMAT_RGB888, &message) == PSB_STATUS_MISUSE && message.text[0]);
   CHECK(psb_render(decoder, &camera, refuse, &n_tiles, &report, &message) == PSB_STATUS_MISUSE && message.text[0]);
   CHECK(psb_orbit(NULL, 1.0f, &camera, NULL) == PSB_STATUS_MISUSE);
   CHECK(strcmp(psb_status_name(99), "unknown") == 0);

@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 // Bytes that suffice for a psb_decoder on every target.
-#define PSB_DECODER_BYTES 2048
+#define PSB_DECODER_BYTES 2560
 
 // Alignment that suffices for a psb_decoder on every target.
 #define PSB_DECODER_ALIGN 8
@@ -43,6 +43,20 @@ typedef enum psb_quality {
   // Fewer still; fine detail is left out.
   PSB_QUALITY_DRAFT = 2,
 } psb_quality;
+
+// What the bytes of a pixel are.
+typedef enum psb_format {
+  // Three bytes: red, green, blue.
+  PSB_FORMAT_RGB888 = 0,
+  // Two bytes, the one with red first: five bits of red, six of green, five of blue, each the nearest. What displays on SPI take.
+  PSB_FORMAT_RGB565_BIG_ENDIAN = 1,
+  // The same, the byte with blue first. What LCD controllers read from memory.
+  PSB_FORMAT_RGB565_LITTLE_ENDIAN = 2,
+  // As PSB_FORMAT_RGB565_BIG_ENDIAN, by a 4×4 ordered pattern (Bayer 1973), which turns bands into a fine pattern.
+  PSB_FORMAT_RGB565_BIG_ENDIAN_DITHERED = 3,
+  // As PSB_FORMAT_RGB565_LITTLE_ENDIAN, by the same pattern.
+  PSB_FORMAT_RGB565_LITTLE_ENDIAN_DITHERED = 4,
+} psb_format;
 
 // A decoder that is bound to a bundle and to its scratch memory. It lies in memory of the caller, has nothing to free, and may be
 // forgotten at any time; its scratch memory is then the caller's again.
@@ -131,6 +145,22 @@ typedef struct psb_report {
   uint32_t scratch_used;
 } psb_report;
 
+// A finished part of a frame: a tile, or a row of tiles.
+typedef struct psb_pixels {
+  // Row by row, width × height pixels; NULL when the frame is complete.
+  const uint8_t *bytes;
+  // Bytes of them.
+  size_t len;
+  // First column, pixels.
+  uint16_t x_px;
+  // First row, pixels.
+  uint16_t y_px;
+  // Width, pixels.
+  uint16_t width;
+  // Height, pixels.
+  uint16_t height;
+} psb_pixels;
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -202,7 +232,7 @@ enum psb_status psb_bind(void *place,
 // Draws the scene as a camera sees it and hands it to a function tile by tile.
 //
 // user: passed on to tile. report: NULL, or where to say what the frame consisted of. message: NULL, or where to say what was wrong. After an
-// error the next frame is drawn as if nothing had been.
+// error the next frame is drawn as if nothing had been. psb_begin draws the same frame piece by piece.
 //
 // # Safety
 // Pointers are NULL or point to what the call says; the decoder is bound, and the function does not use it.
@@ -212,6 +242,49 @@ enum psb_status psb_render(struct psb_decoder *decoder,
                            void *user,
                            struct psb_report *report,
                            struct psb_message *message);
+
+// Begins a frame whose pixels come when they are asked for, by psb_next_tile or psb_next_tile_row: the same as psb_render's.
+//
+// format: a psb_format. message: NULL, or where to say what was wrong. A frame that was begun before, and is not complete, ends here without
+// harm; psb_render ends it too.
+//
+// # Safety
+// Pointers are NULL or point to what the call says; the decoder is bound.
+enum psb_status psb_begin(struct psb_decoder *decoder,
+                          const struct psb_camera *camera,
+                          uint32_t format,
+                          struct psb_message *message);
+
+// Draws the next tile of the frame that was begun: 16 by 16 pixels, less at the right and at the bottom; in rows from the top, each from the left.
+//
+// tile: gets the tile; its bytes are NULL when the frame is complete. They lie in scratch memory and stay until the next call with this decoder.
+// report: NULL, or where to say, when the frame is complete, what it consisted of. message: NULL, or where to say what was wrong;
+// PSB_STATUS_MISUSE when no frame is begun.
+//
+// # Safety
+// Pointers are NULL or point to what the call says; the decoder is bound.
+enum psb_status psb_next_tile(struct psb_decoder *decoder,
+                              struct psb_pixels *tile,
+                              struct psb_report *report,
+                              struct psb_message *message);
+
+// Draws the next row of tiles into memory of the caller, so that one transfer sends 16 whole lines of the frame, fewer at the bottom. After
+// single tiles of a row it draws the rest of the row.
+//
+// bytes: len bytes; 16 × width of the frame × bytes of a pixel serve every row. Too few are PSB_STATUS_MISUSE and the message names those needed;
+// the row can be asked for again. row: gets the row, in bytes; NULL there when the frame is complete. report: NULL, or where to say, when the
+// frame is complete, what it consisted of. message: NULL, or where to say what was wrong; PSB_STATUS_MISUSE when no frame is begun.
+//
+// With two such pieces of memory the bus sends one while the next call fills the other.
+//
+// # Safety
+// Pointers are NULL or point to what the call says; the decoder is bound, and bytes lie apart from its memory.
+enum psb_status psb_next_tile_row(struct psb_decoder *decoder,
+                                  uint8_t *bytes,
+                                  size_t len,
+                                  struct psb_pixels *row,
+                                  struct psb_report *report,
+                                  struct psb_message *message);
 
 #ifdef __cplusplus
 }  // extern "C"

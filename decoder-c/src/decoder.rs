@@ -4,21 +4,67 @@ use core::ffi::c_void;
 use core::mem::{align_of, size_of};
 use core::slice;
 
-use pocketsplat_core::{RenderError, TileSink};
+use pocketsplat_core::{FrameReport, RenderError, TileSink};
 
 use crate::camera::Camera;
+use crate::drawing::Begun;
 use crate::plan::{Budget, bytes_of, planned};
 use crate::status::{Failure, Message, Status, status_of};
 
 /// Bytes that suffice for a psb_decoder on every target.
-pub const DECODER_BYTES: usize = 2048;
+pub const DECODER_BYTES: usize = 2560;
 
 /// Alignment that suffices for a psb_decoder on every target.
 pub const DECODER_ALIGN: usize = 8;
 
 /// A decoder that is bound to a bundle and to its scratch memory. It lies in memory of the caller, has nothing to free, and may be
 /// forgotten at any time; its scratch memory is then the caller's again.
-pub struct Decoder(pocketsplat_core::Decoder<'static, 'static>);
+pub struct Decoder {
+    /// Borrows `bound` as long as it is there. So nobody may borrow a whole `Decoder`, and nobody `bound` before this is gone.
+    begun: Option<Begun>,
+    bound: pocketsplat_core::Decoder<'static, 'static>,
+}
+
+impl Decoder {
+    /// What is bound, without a frame that was begun.
+    ///
+    /// # Safety
+    /// `decoder` is NULL or bound, and nobody uses it as long as the result is used, but by what [`keep`](Self::keep) takes.
+    pub(crate) unsafe fn bound(
+        decoder: *mut Self,
+    ) -> Result<&'static mut pocketsplat_core::Decoder<'static, 'static>, Failure> {
+        if decoder.is_null() {
+            return Err(Failure::Misuse("decoder is NULL"));
+        }
+        // SAFETY: not NULL, and bound. One field after the other: what borrowed the second one is gone.
+        unsafe {
+            (*decoder).begun = None;
+            Ok(&mut (*decoder).bound)
+        }
+    }
+
+    /// Keeps a frame that was begun with what [`bound`](Self::bound) gave.
+    ///
+    /// # Safety
+    /// `decoder` is bound.
+    pub(crate) unsafe fn keep(decoder: *mut Self, begun: Begun) {
+        // SAFETY: not NULL, and bound; the other field is not touched.
+        unsafe { (*decoder).begun = Some(begun) };
+    }
+
+    /// The frame that was begun.
+    ///
+    /// # Safety
+    /// `decoder` is NULL or bound, and nobody uses it as long as the result is used.
+    pub(crate) unsafe fn begun(decoder: *mut Self) -> Result<&'static mut Begun, Failure> {
+        if decoder.is_null() {
+            return Err(Failure::Misuse("decoder is NULL"));
+        }
+        // SAFETY: not NULL, and bound; the other field, which this one borrows, is not touched.
+        let begun = unsafe { &mut (*decoder).begun };
+        begun.as_mut().ok_or(Failure::Misuse("no frame is begun: call psb_begin first; psb_render ends what it began"))
+    }
+}
 
 const _: () = assert!(size_of::<Decoder>() <= DECODER_BYTES && align_of::<Decoder>() <= DECODER_ALIGN);
 
@@ -44,6 +90,19 @@ pub struct Report {
     pub pixel_splats: u32,
     /// Bytes of the scratch memory that this frame needed.
     pub scratch_used: u32,
+}
+
+impl From<FrameReport> for Report {
+    fn from(found: FrameReport) -> Self {
+        Self {
+            anchors_decoded: found.anchors_decoded,
+            anchors_visible: found.anchors_visible,
+            splats: found.splats,
+            splats_dropped: found.splats_dropped,
+            pixel_splats: found.pixel_splats,
+            scratch_used: found.scratch_used,
+        }
+    }
 }
 
 /// Takes one tile of a frame: 8-bit RGB, row by row, width × height pixels, at (x_px, y_px). What is not 0 ends the frame.
@@ -111,7 +170,7 @@ pub unsafe extern "C" fn psb_bind(
         let scratch = unsafe { slice::from_raw_parts_mut(scratch, scratch_len) };
         let bound = pocketsplat_core::Decoder::bind(&bundle, plan, scratch)?;
         // SAFETY: long enough and aligned, as was checked.
-        unsafe { place.write(Decoder(bound)) };
+        unsafe { place.write(Decoder { begun: None, bound }) };
         *decoder = place;
         Ok(())
     })();
@@ -121,7 +180,7 @@ pub unsafe extern "C" fn psb_bind(
 /// Draws the scene as a camera sees it and hands it to a function tile by tile.
 ///
 /// user: passed on to tile. report: NULL, or where to say what the frame consisted of. message: NULL, or where to say what was wrong. After an
-/// error the next frame is drawn as if nothing had been.
+/// error the next frame is drawn as if nothing had been. psb_begin draws the same frame piece by piece.
 ///
 /// # Safety
 /// Pointers are NULL or point to what the call says; the decoder is bound, and the function does not use it.
@@ -135,25 +194,18 @@ pub unsafe extern "C" fn psb_render(
     message: *mut Message,
 ) -> Status {
     // SAFETY: the caller's promise.
-    let (decoder, camera, report, message) =
-        unsafe { (decoder.as_mut(), camera.as_ref(), report.as_mut(), message.as_mut()) };
+    let (camera, report, message) = unsafe { (camera.as_ref(), report.as_mut(), message.as_mut()) };
     let outcome = (|| {
-        let Decoder(decoder) = decoder.ok_or(Failure::Misuse("decoder is NULL"))?;
+        // SAFETY: NULL or a bound decoder, the caller's promise.
+        let bound = unsafe { Decoder::bound(decoder) }?;
         let camera = camera.ok_or(Failure::Misuse("camera is NULL"))?.to_core()?;
         let function = tile.ok_or(Failure::Misuse("tile is NULL"))?;
-        let found = decoder.render(&camera, &mut Tiles { function, user }).map_err(|error| match error {
+        let found = bound.render(&camera, &mut Tiles { function, user }).map_err(|error| match error {
             RenderError::Decode(error) => Failure::Decode(error),
             RenderError::Sink(code) => Failure::Stopped(code),
         })?;
         if let Some(report) = report {
-            *report = Report {
-                anchors_decoded: found.anchors_decoded,
-                anchors_visible: found.anchors_visible,
-                splats: found.splats,
-                splats_dropped: found.splats_dropped,
-                pixel_splats: found.pixel_splats,
-                scratch_used: found.scratch_used,
-            };
+            *report = found.into();
         }
         Ok(())
     })();

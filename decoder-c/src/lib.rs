@@ -1,7 +1,8 @@
 //! The C interface of `pocketsplat-core`: `include/pocketsplat.h` and a static library.
 //!
 //! The order of calls is that of the Rust crate: [`psb_make_plan`] says how many bytes a scene takes, [`psb_bind`] takes them, [`psb_render`]
-//! draws frames. Nothing is allocated, no panic crosses, and a pointer that is NULL where it must not be is an error.
+//! draws frames, or [`psb_begin`] and [`psb_next_tile`] piece by piece. Nothing is allocated, no panic crosses, and a pointer that is NULL
+//! where it must not be is an error.
 //!
 //! What the caller promises, since no code can check it: pointers that are not NULL point to as many bytes as the call says; bundle and
 //! scratch memory stay where they are, unchanged and apart from each other, as long as the decoder is used; one thread at a time uses it.
@@ -10,11 +11,13 @@
 
 mod camera;
 mod decoder;
+mod drawing;
 mod plan;
 mod status;
 
 pub use camera::{Camera, psb_orbit, psb_preview};
 pub use decoder::{DECODER_ALIGN, DECODER_BYTES, Decoder, Report, TileFn, psb_bind, psb_decoder_bytes, psb_render};
+pub use drawing::{Format, Pixels, psb_begin, psb_next_tile, psb_next_tile_row};
 pub use plan::{Budget, Plan, Quality, psb_budget_for_frame, psb_make_plan};
 pub use status::{Message, Status, psb_status_name};
 
@@ -35,7 +38,7 @@ mod tests {
         let root = Path::new(env!("CARGO_MANIFEST_DIR"));
         let config = cbindgen::Config::from_file(root.join("cbindgen.toml")).expect("a configuration");
         let mut builder = cbindgen::Builder::new().with_config(config);
-        for file in ["status", "plan", "camera", "decoder"] {
+        for file in ["status", "plan", "camera", "decoder", "drawing"] {
             builder = builder.with_src(root.join(format!("src/{file}.rs")));
         }
         let mut text = Vec::new();

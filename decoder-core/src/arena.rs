@@ -2,7 +2,7 @@
 
 use bytemuck::Pod;
 
-use crate::error::{DecodeError, saturate};
+use crate::error::{DecodeError, Region, saturate};
 
 /// The part of the caller's memory not yet handed out, in words of four bytes.
 pub(crate) struct Arena<'s> {
@@ -47,7 +47,7 @@ impl<'s> Arena<'s> {
         let rest = core::mem::take(&mut self.rest);
         let available = saturate(rest.len());
         let Some((head, rest)) = rest.split_at_mut_checked(n_words) else {
-            return Err(DecodeError::ScratchTooSmall { needed: saturate(n_words), available });
+            return Err(DecodeError::ScratchTooSmall { region: Region::Fast, needed: saturate(n_words), available });
         };
         self.rest = rest;
         bytemuck::try_cast_slice_mut(head).map_err(|_| DecodeError::Internal)

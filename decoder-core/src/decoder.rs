@@ -115,7 +115,38 @@ impl<'b, 's> Decoder<'b, 's> {
         plan: Plan,
         scratch: &'s mut [u8],
     ) -> Result<Decoder<'b, 's, A>, DecodeError> {
-        let decoder = Decoder::bind_with(bundle, plan, scratch, false)?;
+        Self::bind_in_regions(bundle, plan, [scratch, &mut []])
+    }
+
+    /// As [`bind_in`](Self::bind_in), in two regions of memory: the frames are the same as with one.
+    ///
+    /// * `[fast, slow]`: at least [`Plan::scratch_len`] and [`Plan::slow_scratch_len`] bytes.
+    ///
+    /// ```no_run
+    /// # use pocketsplat_core::{arithmetic::ReferenceArithmetic, Budget, Bundle, DecodeError, Decoder};
+    /// # fn bound(bundle: &Bundle<'_>, sram: &mut [u8], psram: &mut [u8]) -> Result<(), DecodeError> {
+    /// let plan = bundle.plan(&Budget::for_frame(320, 240).in_bytes(sram.len()).with_slow_bytes(psram.len()))?;
+    /// for part in plan.memory() {
+    ///     // For instance `Scene` and `Splats` in `Slow`, with the bytes of each.
+    ///     # let _ = part;
+    /// }
+    /// let decoder = Decoder::bind_in_regions::<ReferenceArithmetic>(bundle, plan, [sram, psram])?;
+    /// # let _ = decoder;
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// As for [`bind`](Self::bind); [`DecodeError::ScratchTooSmall`] names the region.
+    ///
+    /// # Budget
+    /// As for [`bind`](Self::bind), in both regions.
+    pub fn bind_in_regions<A: Arithmetic>(
+        bundle: &Bundle<'b>,
+        plan: Plan,
+        regions: [&'s mut [u8]; 2],
+    ) -> Result<Decoder<'b, 's, A>, DecodeError> {
+        let decoder = Decoder::bind_with(bundle, plan, regions, false)?;
         // What is in memory was compared before it was decoded.
         if decoder.source.is_streamed() {
             for (chunk, _) in decoder.planned_chunks() {
@@ -135,7 +166,7 @@ impl<'b, 's> Decoder<'b, 's> {
     /// As for [`bind`](Self::bind) when anchors are resident. Streamed, checksums are compared in the frames that need the
     /// chunks: about 8 instructions a byte of those in view.
     pub fn bind_skipping_damage(bundle: &Bundle<'b>, plan: Plan, scratch: &'s mut [u8]) -> Result<Self, DecodeError> {
-        Self::bind_with(bundle, plan, scratch, true)
+        Self::bind_with(bundle, plan, [scratch, &mut []], true)
     }
 }
 

@@ -35,7 +35,8 @@ mod scene;
 mod stopwatch;
 
 pub use budget::{
-    Budget, HeadWeights, MaxSplats, Overflow, Plan, Quality, Residency, Resident, ScratchShape, Strips, Work,
+    Budget, HeadWeights, MaxSplats, Overflow, Part, PartMemory, Plan, Quality, Residency, Resident, ScratchShape,
+    Strips, Work,
 };
 pub use bundle::Bundle;
 pub use camera::{Camera, Rotation};
@@ -43,6 +44,6 @@ pub use decoder::{
     ByteOrder, Decoder, Drawing, FrameReport, PixelFormat, Rounding, Tile, TileRow, TileSink, count_gaussians,
     count_scratch_len,
 };
-pub use error::{DecodeError, ErrorClass, Field, RenderError, SectionKind};
+pub use error::{DecodeError, ErrorClass, Field, Region, RenderError, SectionKind};
 pub use project::chunks_in_view;
 pub use stopwatch::{Stage, Stopwatch};

@@ -4,7 +4,7 @@ use conformance::bundles::{ALL_CODERS, Coder, tier_ends, tiered};
 use conformance::frame::{Frame, budget_for, draw, to_core};
 use conformance::scenes::{CASES, cameras};
 use pocketsplat_core::bundle::AnchorSite;
-use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport};
+use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, Region};
 
 fn camera() -> Camera {
     to_core(&cameras()[0].1)
@@ -93,7 +93,9 @@ fn the_planned_bytes_suffice_for_every_tier_and_one_less_is_refused_by_number() 
                 };
                 for skip_damage in [false, true] {
                     assert_eq!(bind(skip_damage, needed), None, "{coder:?}, {tiers} tiers: {needed} bytes suffice");
-                    let expected = DecodeError::ScratchTooSmall { needed: needed as u32, available: needed as u32 - 1 };
+                    let [needed_bytes, available] = [needed, needed - 1].map(|n| n as u32);
+                    let expected =
+                        DecodeError::ScratchTooSmall { region: Region::Fast, needed: needed_bytes, available };
                     assert_eq!(bind(skip_damage, needed - 1), Some(expected), "{coder:?}, {tiers} tiers");
                 }
                 needed

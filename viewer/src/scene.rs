@@ -3,7 +3,7 @@
 use std::convert::Infallible;
 use std::slice;
 
-use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, Plan, TileSink};
+use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, Plan, Region, TileSink};
 use pocketsplat_instructions::Costs;
 
 use crate::figures::{self, Figures};
@@ -89,7 +89,7 @@ impl Scene {
     /// As [`Decoder::render`]; [`DecodeError::ScratchTooSmall`] where nothing is bound.
     pub fn render(&mut self, camera: &Camera) -> Result<Figures, DecodeError> {
         let Some(bound) = &mut self.bound else {
-            return Err(DecodeError::ScratchTooSmall { needed: 1, available: 0 });
+            return Err(DecodeError::ScratchTooSmall { region: Region::Fast, needed: 1, available: 0 });
         };
         camera.check()?;
         self.frame.clear(camera);

@@ -79,8 +79,10 @@ pub enum Overflow {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Budget {
-    /// Bytes of scratch memory there are.
+    /// Bytes of scratch memory there are; the fast ones, if some are slow.
     pub ram_bytes: usize,
+    /// Bytes of slow scratch memory besides; 0 for none.
+    pub slow_bytes: usize,
     /// Widest frame, pixels, 1..=[`MAX_FRAME_PX`].
     pub width_px: u16,
     /// Highest frame, pixels, 1..=[`MAX_FRAME_PX`].
@@ -105,6 +107,7 @@ impl Budget {
     pub const fn for_frame(width_px: u16, height_px: u16) -> Self {
         Self {
             ram_bytes: usize::MAX,
+            slow_bytes: 0,
             width_px,
             height_px,
             tiers: u8::MAX,
@@ -120,6 +123,12 @@ impl Budget {
     #[must_use]
     pub const fn in_bytes(self, ram_bytes: usize) -> Self {
         Self { ram_bytes, ..self }
+    }
+
+    /// Sets the bytes of slow scratch memory, beside the fast ones of [`in_bytes`](Self::in_bytes).
+    #[must_use]
+    pub const fn with_slow_bytes(self, slow_bytes: usize) -> Self {
+        Self { slow_bytes, ..self }
     }
 
     /// Sets the most tiers to draw.

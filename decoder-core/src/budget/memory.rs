@@ -1,13 +1,14 @@
 //! What scratch memory holds: one list of slices, which both the sum and the carving are made of.
 //!
 //! First lies what stays between frames, then the memory of a frame. What binding alone needs lies where the frame's memory lies
-//! later.
+//! later. Each list is a [`Part`], which lies in one region.
 
+use super::placement::{Part, Placement, Regions};
 use super::shape::ScratchShape;
 use crate::arena::{Arena, words_for};
 use crate::bake::{BakedGaussian, BakedMemory};
 use crate::bundle::RecordMemory;
-use crate::error::DecodeError;
+use crate::error::{DecodeError, Region};
 use crate::project::{Packed28, TILE_PIXELS, TileRect};
 use crate::raster::{N_RADIX, Pixel};
 use crate::scene::HeadOutputs;
@@ -60,12 +61,20 @@ slices! {
         starts: [u32; shape.resident.n_chunks().saturating_add(1)],
     }
 
-    /// What a frame is drawn in.
-    FrameMemory: frame_words, take_frame_of(shape) {
+    /// What tiles are drawn in.
+    TileMemory: tile_words, take_tiles(shape) {
         pixels: [Pixel; TILE_PIXELS.saturating_mul(shape.frame.canvas_tiles as usize)],
         rgb: [[u8; 3]; TILE_PIXELS],
         counts: [u32; N_RADIX],
+    }
+
+    /// The splats of a strip or slab.
+    SplatMemory: splat_words, take_splats(shape) {
         splats: [Packed28; shape.frame.max_splats as usize],
+    }
+
+    /// What lists and sorts them.
+    ListMemory: list_words, take_lists(shape) {
         rects: [TileRect; shape.frame.max_splats as usize],
         order: [u32; shape.frame.max_splats as usize],
         spare: [u32; shape.frame.max_splats as usize],
@@ -94,22 +103,40 @@ pub(crate) struct ModelMemory<'s> {
     pub(crate) words: &'s mut [u32],
 }
 
-/// Memory that a frame is drawn in.
-pub(crate) struct FrameMemory<'s> {
+/// Memory that tiles are drawn in.
+pub(crate) struct TileMemory<'s> {
     /// `[TILE_PIXELS]` of the current tile, or of each tile of a strip that is drawn in slabs.
     pub(crate) pixels: &'s mut [Pixel],
     /// `[TILE_PIXELS]` of a finished tile.
     pub(crate) rgb: &'s mut [[u8; 3]],
     /// Counts of the sort.
     pub(crate) counts: &'s mut [u32],
+}
+
+/// Memory of splats.
+pub(crate) struct SplatMemory<'s> {
     /// Splats, or room for fewer larger ones.
     pub(crate) splats: &'s mut [Packed28],
+}
+
+/// Memory that splats are listed and sorted in.
+pub(crate) struct ListMemory<'s> {
     /// The tiles of each.
     pub(crate) rects: &'s mut [TileRect],
     /// Their order.
     pub(crate) order: &'s mut [u32],
     /// The order before.
     pub(crate) spare: &'s mut [u32],
+}
+
+/// Memory that a frame is drawn in.
+pub(crate) struct FrameMemory<'s> {
+    /// For tiles.
+    pub(crate) tiles: TileMemory<'s>,
+    /// For splats.
+    pub(crate) splats: SplatMemory<'s>,
+    /// For their lists.
+    pub(crate) lists: ListMemory<'s>,
 }
 
 /// Memory of the scene: what stays between frames (`'s`), and what binding works in (`'f`).
@@ -123,23 +150,24 @@ pub(crate) enum SceneMemory<'s, 'f> {
 }
 
 impl<'s, 'f> SceneMemory<'s, 'f> {
-    /// Takes the memory of the scene from the front of `arena`.
+    /// Takes the memory of the scene from the front of `regions`.
     ///
     /// # Errors
-    /// [`DecodeError::ScratchTooSmall`] when the arena has fewer words than [`ScratchShape::scratch_len`] counts.
-    pub(crate) fn take(shape: &ScratchShape, arena: &'f mut Arena<'s>) -> Result<Self, DecodeError> {
+    /// [`DecodeError::ScratchTooSmall`] when a region has fewer words than [`ScratchShape::lens`] counts.
+    pub(crate) fn take(shape: &ScratchShape, regions: &'f mut Regions<'s>) -> Result<Self, DecodeError> {
         if shape.resident.is_gaussians() {
-            let baked = take_baked(shape, arena)?;
-            let mut free = arena.borrow();
-            let anchor = take_anchor(shape, &mut free)?;
-            return Ok(Self::Baked { baked, anchor, models: take_models(shape, &mut free)? });
+            let baked = take_baked(shape, regions.of(Part::Scene))?;
+            let mut free = regions.borrow();
+            let anchor = take_anchor(shape, free.of(Part::Heads))?;
+            return Ok(Self::Baked { baked, anchor, models: take_models(shape, free.of(Part::Models))? });
         }
-        let anchor = take_anchor(shape, arena)?;
+        let anchor = take_anchor(shape, regions.of(Part::Heads))?;
         if shape.resident.is_anchors() {
-            let records = take_records(shape, arena)?;
-            return Ok(Self::Resident { anchor, records, models: take_models(shape, &mut arena.borrow())? });
+            let records = take_records(shape, regions.of(Part::Scene))?;
+            let models = take_models(shape, regions.borrow().of(Part::Models))?;
+            return Ok(Self::Resident { anchor, records, models });
         }
-        Ok(Self::Streamed { anchor, models: take_models(shape, arena)? })
+        Ok(Self::Streamed { anchor, models: take_models(shape, regions.of(Part::Models))? })
     }
 }
 
@@ -148,8 +176,38 @@ impl<'s> FrameMemory<'s> {
     ///
     /// # Errors
     /// As for [`SceneMemory::take`].
-    pub(crate) fn take(shape: &ScratchShape, arena: &mut Arena<'s>) -> Result<Self, DecodeError> {
-        take_frame_of(shape, arena)
+    pub(crate) fn take(shape: &ScratchShape, regions: &mut Regions<'s>) -> Result<Self, DecodeError> {
+        let tiles = take_tiles(shape, regions.of(Part::Tiles))?;
+        let splats = take_splats(shape, regions.of(Part::Splats))?;
+        Ok(Self { tiles, splats, lists: take_lists(shape, regions.of(Part::Lists))? })
+    }
+}
+
+/// When a part is needed.
+#[derive(Clone, Copy)]
+enum When {
+    /// From binding to the last frame.
+    Kept,
+    /// While binding.
+    Bound,
+    /// In a frame; lies where what was [bound](Self::Bound) lay before.
+    Frame,
+}
+
+/// Words of several parts, by when they are needed.
+#[derive(Clone, Copy)]
+struct Words {
+    kept: usize,
+    bound: usize,
+    frame: usize,
+}
+
+impl Words {
+    const NONE: Self = Self { kept: 0, bound: 0, frame: 0 };
+
+    /// Words of memory.
+    const fn most(self) -> usize {
+        self.kept.saturating_add(if self.bound > self.frame { self.bound } else { self.frame })
     }
 }
 
@@ -157,28 +215,44 @@ impl ScratchShape {
     /// Bytes of scratch memory, whatever their alignment; [`usize::MAX`] beyond the address space.
     #[must_use]
     pub const fn scratch_len(&self) -> usize {
-        let (when_bound, frame) = (self.words_when_bound(), frame_words(self));
-        let words = self.scene_words().saturating_add(if when_bound > frame { when_bound } else { frame });
-        bytes_for(words)
+        let [len, _] = self.lens(Placement::FAST);
+        len
+    }
+
+    /// Bytes of fast and of slow memory, whatever their alignment, when the parts are placed so.
+    pub(super) const fn lens(&self, placement: Placement) -> [usize; 2] {
+        let [fast, slow] = self.words(placement);
+        [bytes_for(fast.most()), bytes_for(slow.most())]
     }
 
     /// Bytes that binding takes without a frame after it.
     pub(crate) const fn bind_len(&self) -> usize {
-        bytes_for(self.scene_words().saturating_add(self.words_when_bound()))
+        let [fast, _] = self.words(Placement::FAST);
+        bytes_for(fast.kept.saturating_add(fast.bound))
     }
 
-    /// The most splats, up to those of the shape, that `len` bytes have places for; 0 if not even the rest fits.
-    pub(super) const fn splats_within(&self, len: usize) -> u32 {
-        let room = (len.saturating_sub(3) / 4).saturating_sub(self.scene_words());
-        if self.words_when_bound() > room {
-            return 0;
+    /// Bytes of a part while frames are drawn.
+    pub(super) const fn part_len(&self, part: Part) -> usize {
+        match self.words_of(part) {
+            (When::Kept | When::Frame, words) => words.saturating_mul(4),
+            (When::Bound, _) => 0,
         }
-        let (none, one) = (frame_words(&self.with_splats(0)), frame_words(&self.with_splats(1)));
-        let places = match room.saturating_sub(none).checked_div(one.saturating_sub(none)) {
-            Some(places) => places,
-            None => 0,
-        };
-        if places < self.frame.max_splats as usize { places as u32 } else { self.frame.max_splats }
+    }
+
+    /// The most splats, up to those of the shape, that `lens` bytes of fast and slow memory have places for when the parts are
+    /// placed so; 0 if not even the rest fits.
+    pub(super) fn splats_within(&self, placement: Placement, lens: [usize; 2]) -> u32 {
+        let [none, one] = [0, 1].map(|splats| self.with_splats(splats).words(placement));
+        let mut most = self.frame.max_splats;
+        for ((Words { kept, bound, frame }, one), len) in none.into_iter().zip(one).zip(lens) {
+            let room = (len.saturating_sub(3) / 4).saturating_sub(kept);
+            if bound > room || frame > room {
+                return 0;
+            }
+            let places = room.saturating_sub(frame).checked_div(one.frame.saturating_sub(frame));
+            most = places.and_then(|places| u32::try_from(places).ok()).map_or(most, |places| places.min(most));
+        }
+        most
     }
 
     /// The same with memory for so many splats.
@@ -187,31 +261,48 @@ impl ScratchShape {
         self
     }
 
-    /// What [`SceneMemory::take`] takes for good.
-    const fn scene_words(&self) -> usize {
-        if self.resident.is_gaussians() {
-            return baked_words(self);
+    /// Words of fast and of slow memory when the parts are placed so.
+    // Not inlined: each caller would have a copy.
+    #[inline(never)]
+    const fn words(&self, placement: Placement) -> [Words; 2] {
+        let ([mut fast, mut slow], mut parts) = ([Words::NONE; 2], Part::ALL.as_slice());
+        while let [part, rest @ ..] = parts {
+            let region = match placement.region(*part) {
+                Region::Fast => &mut fast,
+                Region::Slow => &mut slow,
+            };
+            let (when, words) = self.words_of(*part);
+            let sum = match when {
+                When::Kept => &mut region.kept,
+                When::Bound => &mut region.bound,
+                When::Frame => &mut region.frame,
+            };
+            *sum = sum.saturating_add(words);
+            parts = rest;
         }
-        anchor_words(self).saturating_add(if self.resident.is_anchors() {
-            record_words(self)
-        } else {
-            models_words(self)
-        })
+        [fast, slow]
     }
 
-    /// What it takes where the frame's memory lies later.
-    const fn words_when_bound(&self) -> usize {
-        if self.resident.is_gaussians() {
-            anchor_words(self).saturating_add(models_words(self))
-        } else if self.resident.is_anchors() {
-            models_words(self)
-        } else {
-            0
+    /// Words of a part, in the order that [`SceneMemory::take`] and [`FrameMemory::take`] take them.
+    const fn words_of(&self, part: Part) -> (When, usize) {
+        let (is_baked, is_resident) = (self.resident.is_gaussians(), self.resident.is_anchors());
+        match part {
+            Part::Heads => (if is_baked { When::Bound } else { When::Kept }, anchor_words(self)),
+            Part::Models => (if is_baked || is_resident { When::Bound } else { When::Kept }, models_words(self)),
+            Part::Scene if is_baked => (When::Kept, baked_words(self)),
+            Part::Scene if is_resident => (When::Kept, record_words(self)),
+            Part::Scene => (When::Kept, 0),
+            Part::Tiles => (When::Frame, tile_words(self)),
+            Part::Splats => (When::Frame, splat_words(self)),
+            Part::Lists => (When::Frame, list_words(self)),
         }
     }
 }
 
 const fn bytes_for(words: usize) -> usize {
+    if words == 0 {
+        return 0;
+    }
     match Arena::bytes_for(words) {
         Some(len) if len < isize::MAX as usize => len,
         _ => usize::MAX,
@@ -222,7 +313,7 @@ const fn bytes_for(words: usize) -> usize {
 mod tests {
     use std::vec;
 
-    use super::{Arena, FrameMemory, SceneMemory};
+    use super::{FrameMemory, Placement, Regions, SceneMemory};
     use crate::budget::{CoderShape, FrameShape, HeadWeights, ModelShape, RecordShape, Resident, ScratchShape};
 
     /// A stream of numbers, the same every time.
@@ -335,17 +426,26 @@ mod tests {
         let random = &mut Numbers(7);
         for round in 0..600 {
             let shape = random.shape(round % 3, 300);
-            let mut scratch = vec![0; shape.scratch_len() + 4];
-            let mut take_all = |len: usize| {
-                let mut arena = Arena::new(scratch.get_mut(..len).expect("not beyond"));
-                SceneMemory::take(&shape, &mut arena)?;
-                FrameMemory::take(&shape, &mut arena).map(|_| arena.n_words())
-            };
-            let [all, fewer] = [take_all(shape.scratch_len()), take_all(shape.scratch_len() - 7)];
-            assert!(fewer.is_err(), "a word less: {shape:?}");
-            let left = all.unwrap_or_else(|error| panic!("{error}: {shape:?}"));
-            let without_frame = shape.with_splats(0).bind_len();
-            assert!(left <= 1 || shape.scratch_len() == without_frame, "{left} words over: {shape:?}");
+            let n_placement = random.below(64) as usize;
+            for placement in [Placement::FAST].into_iter().chain(Placement::to_try(true).nth(n_placement)) {
+                let lens = shape.lens(placement);
+                let mut memory = lens.map(|len| vec![0; len]);
+                let mut take_all = |less: [usize; 2]| {
+                    let [fast, slow] = &mut memory;
+                    let [end_fast, end_slow] = [0, 1].map(|region| lens[region].saturating_sub(less[region]));
+                    let mut regions = Regions::new(&mut fast[..end_fast], &mut slow[..end_slow], placement);
+                    SceneMemory::take(&shape, &mut regions)?;
+                    FrameMemory::take(&shape, &mut regions).map(|_| regions.n_words())
+                };
+                for (region, less) in [[7, 0], [0, 7]].into_iter().enumerate().filter(|(region, _)| lens[*region] > 7) {
+                    assert!(take_all(less).is_err(), "a word less of region {region}: {placement:?} of {shape:?}");
+                }
+                let left = take_all([0, 0]).unwrap_or_else(|error| panic!("{error}: {placement:?} of {shape:?}"));
+                for (super::Words { bound, frame, .. }, left) in shape.words(placement).into_iter().zip(left) {
+                    let unused = bound.saturating_sub(frame);
+                    assert!(left <= unused + 1, "{left} words over: {placement:?} of {shape:?}");
+                }
+            }
         }
     }
 
@@ -370,11 +470,11 @@ mod tests {
         ] {
             let shape = ScratchShape { resident, ..ScratchShape::most(16, 4) }.with_splats(5000);
             for len in [100_000, 150_001, 999_999] {
-                let within = shape.with_splats(shape.splats_within(len));
+                let within = shape.with_splats(shape.splats_within(Placement::FAST, [len, 0]));
                 let is_full = within.frame.max_splats == 5000 || within.scratch_len() + 40 > len;
                 assert!(within.scratch_len() <= len && is_full, "{within:?} in {len}");
             }
-            assert_eq!(shape.splats_within(1000), 0, "not even the heads");
+            assert_eq!(shape.splats_within(Placement::FAST, [1000, 0]), 0, "not even the heads");
         }
     }
 

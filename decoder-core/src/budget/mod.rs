@@ -9,6 +9,7 @@
 
 mod limits;
 mod memory;
+mod placement;
 mod plan;
 mod quality;
 mod shape;
@@ -16,7 +17,9 @@ mod work;
 
 pub use crate::mlp::HeadWeights;
 pub use limits::{Budget, MAX_FRAME_PX, MAX_STRIPS, MIN_SLAB_PLACES, MaxSplats, Overflow, Residency, Strips};
-pub(crate) use memory::{AnchorMemory, FrameMemory, ModelMemory, SceneMemory};
+pub(crate) use memory::{AnchorMemory, FrameMemory, ListMemory, ModelMemory, SceneMemory, TileMemory};
+pub use placement::{Part, PartMemory};
+pub(crate) use placement::{Placement, Regions};
 pub use plan::Plan;
 pub use quality::{MAX_ALPHA_CUT, MAX_TRANSMITTANCE_STOP, Quality};
 pub use shape::{CoderShape, FrameShape, ModelShape, RecordShape, Resident, ScratchShape};

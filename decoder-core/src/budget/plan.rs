@@ -1,10 +1,11 @@
 //! From limits to a number of bytes.
 
 use super::limits::{Budget, MIN_SLAB_PLACES, MaxSplats, Overflow, Residency, Strips};
+use super::placement::{Part, PartMemory, Placement};
 use super::shape::{FrameShape, Resident, ScratchShape};
 use super::work::{Work, decoding_macs};
 use crate::bundle::{Bundle, STRIPS, Tier, TierMeasures};
-use crate::error::{DecodeError, saturate};
+use crate::error::{DecodeError, Region, saturate};
 use crate::mlp::HeadWeights;
 use crate::rules::TILE_PX;
 
@@ -23,16 +24,40 @@ pub struct Plan {
     n_strips: u8,
     n_slabs: u32,
     shape: ScratchShape,
+    placement: Placement,
     scratch_len: usize,
+    slow_len: usize,
     pruning_rate: f32,
     work: Option<Work>,
 }
 
 impl Plan {
-    /// Bytes of scratch memory, exactly so many, whatever their alignment.
+    /// Bytes of scratch memory, exactly so many, whatever their alignment; the fast ones, if some are slow.
     #[must_use]
     pub fn scratch_len(&self) -> usize {
         self.scratch_len
+    }
+
+    /// Bytes of slow scratch memory, exactly so many, whatever their alignment; 0 unless the budget has some.
+    #[must_use]
+    pub fn slow_scratch_len(&self) -> usize {
+        self.slow_len
+    }
+
+    /// Where each part of the scratch memory lies and how many bytes it takes. The bytes of a region's parts, and 3 for alignment,
+    /// are its length; where binding takes more than a frame, the length is greater.
+    pub fn memory(&self) -> impl Iterator<Item = PartMemory> + use<> {
+        let Self { shape, placement, .. } = *self;
+        Part::ALL.into_iter().map(move |part| PartMemory {
+            part,
+            region: placement.region(part),
+            n_bytes: shape.part_len(part),
+        })
+    }
+
+    /// Which parts lie where.
+    pub(crate) fn placement(&self) -> Placement {
+        self.placement
     }
 
     /// Tiers that are drawn.
@@ -119,15 +144,19 @@ impl Bundle<'_> {
     /// When [slabs](Overflow::Slabs) are allowed, fewer places than splats will do, down to 256: then nearly every scene fits
     /// whole, and going over it counts once more for each slab.
     ///
+    /// With [slow bytes](Budget::slow_bytes) each [part](Part) of the memory lies in one of two regions: of the equal plan variants
+    /// the one is taken that has the first part in fast memory, of these the one with the second, and so on. No pixel depends on it.
+    ///
     /// # Errors
-    /// [`DecodeError::BudgetTooSmall`] names the bytes that the smallest plan within the other limits needs;
+    /// [`DecodeError::BudgetTooSmall`] names the bytes that the smallest plan within the other limits needs, of slow memory if there
+    /// is some;
     /// [`DecodeError::NotBakeable`] for a residency that the scene does not have;
     /// [`DecodeError::OutOfRange`] for an empty or too large frame or number of strips, and for fewer than
     /// [`MIN_SLAB_PLACES`] splats a slab; [`DecodeError::PlanTooLarge`] beyond
     /// the address space.
     ///
     /// # Budget
-    /// At most 128 sums; reads the manifest and the directory's tiers, no chunk.
+    /// At most 128 sums, 64 times as many with slow memory; reads the manifest and the directory's tiers, no chunk.
     // Not inlined: a caller's stack frame would keep what only planning needs.
     #[inline(never)]
     pub fn plan(&self, budget: &Budget) -> Result<Plan, DecodeError> {
@@ -150,36 +179,45 @@ impl Planner<'_, '_> {
     fn best(&self) -> Result<Plan, DecodeError> {
         let budget = self.budget;
         let most_tiers = budget.tiers.min(self.bundle.n_tiers());
-        let mut smallest: Option<Plan> = None;
+        let has_slow = budget.slow_bytes > 0;
+        // The memory that decides: whatever is too much for the fast one can lie in the slow one, if there is any.
+        let (region, available) =
+            if has_slow { (Region::Slow, budget.slow_bytes) } else { (Region::Fast, budget.ram_bytes) };
+        let (mut least_needed, mut n_strips_then, mut tiers_then, mut splats_then) = (usize::MAX, 0, most_tiers, 0);
         let tiers = (most_tiers.min(1)..=most_tiers).rev();
         // Halves before fewer tiers.
         for (n_tiers, weights) in tiers.flat_map(|n| [(n, HeadWeights::F32), (n, HeadWeights::F16)]) {
             let mut best: Option<(u64, Plan)> = None;
-            for (cost, plan) in self.variants(n_tiers, weights) {
-                if smallest.is_none_or(|smallest| plan.scratch_len < smallest.scratch_len) {
-                    smallest = Some(plan);
-                }
-                let fits = plan.scratch_len <= budget.ram_bytes && plan.scratch_len < usize::MAX;
-                if fits && best.is_none_or(|(least, _)| cost < least) {
-                    best = Some((cost, plan));
+            for placement in Placement::to_try(has_slow) {
+                for (cost, plan) in self.variants(n_tiers, weights, placement) {
+                    let needed = match region {
+                        Region::Fast => plan.scratch_len,
+                        Region::Slow if plan.scratch_len <= budget.ram_bytes => plan.slow_len,
+                        Region::Slow => usize::MAX,
+                    };
+                    if needed < least_needed || n_strips_then == 0 {
+                        (least_needed, n_strips_then) = (needed, plan.n_strips);
+                        (tiers_then, splats_then) = (n_tiers, plan.shape.frame.max_splats);
+                    }
+                    let fits = needed <= available && needed < usize::MAX;
+                    if fits && best.is_none_or(|(least, _)| cost < least) {
+                        best = Some((cost, plan));
+                    }
                 }
             }
             if let Some((_, plan)) = best {
                 return Ok(plan);
             }
         }
-        let Some(Plan { scratch_len, n_tiers, n_strips, shape, .. }) = smallest else {
-            return Err(DecodeError::Internal);
-        };
-        if scratch_len == usize::MAX {
-            return Err(DecodeError::PlanTooLarge { max_splats: shape.frame.max_splats });
+        if least_needed == usize::MAX {
+            return Err(DecodeError::PlanTooLarge { max_splats: splats_then });
         }
-        let [needed, available] = [scratch_len, budget.ram_bytes].map(saturate);
-        Err(DecodeError::BudgetTooSmall { needed, available, n_tiers, n_strips })
+        let [needed, available] = [least_needed, available].map(saturate);
+        Err(DecodeError::BudgetTooSmall { region, needed, available, n_tiers: tiers_then, n_strips: n_strips_then })
     }
 
     /// The plan variants of `n_tiers` tiers that the budget leaves open, fewest strips first, each with its predicted cost.
-    fn variants(&self, n_tiers: u8, weights: HeadWeights) -> impl Iterator<Item = (u64, Plan)> {
+    fn variants(&self, n_tiers: u8, weights: HeadWeights, placement: Placement) -> impl Iterator<Item = (u64, Plan)> {
         let (given, tried) = match self.budget.strips {
             Strips::Exactly(n) => (Some(n), &[][..]),
             Strips::Auto => (None, &STRIPS[..]),
@@ -193,10 +231,17 @@ impl Planner<'_, '_> {
         };
         let n_strips = given.into_iter().chain(tried.iter().copied());
         let variants = n_strips.flat_map(move |n_strips| residencies.iter().map(move |&kept| (n_strips, kept)));
-        variants.map(move |(n_strips, residency)| self.variant(n_tiers, n_strips, residency, weights))
+        variants.map(move |(n_strips, residency)| self.variant(n_tiers, n_strips, residency, weights, placement))
     }
 
-    fn variant(&self, n_tiers: u8, n_strips: u8, residency: Residency, weights: HeadWeights) -> (u64, Plan) {
+    fn variant(
+        &self,
+        n_tiers: u8,
+        n_strips: u8,
+        residency: Residency,
+        weights: HeadWeights,
+        placement: Placement,
+    ) -> (u64, Plan) {
         let Self { bundle, budget } = *self;
         let header = bundle.header();
         let tier = bundle.up_to_tier(n_tiers);
@@ -213,7 +258,8 @@ impl Planner<'_, '_> {
             shape.model.detail_hidden = 0;
         }
         if in_slabs {
-            shape.frame.max_splats = shape.splats_within(budget.ram_bytes).max(wanted.min(MIN_SLAB_SPLATS));
+            shape.frame.max_splats =
+                shape.splats_within(placement, [budget.ram_bytes, budget.slow_bytes]).max(wanted.min(MIN_SLAB_SPLATS));
         }
         // Each slab but the last keeps at least half of the places.
         let fullest = match budget.max_splats {
@@ -223,13 +269,16 @@ impl Planner<'_, '_> {
         let places = shape.frame.max_splats.max(1);
         let n_slabs = if !in_slabs || fullest <= places { 1 } else { fullest.saturating_mul(2).div_ceil(places) };
         let passes = u64::from(n_strips).saturating_mul(n_slabs.into());
+        let [scratch_len, slow_len] = shape.lens(placement);
         let plan = Plan {
             budget: *budget,
             n_tiers,
             n_strips,
             n_slabs,
             shape,
-            scratch_len: shape.scratch_len(),
+            placement,
+            scratch_len,
+            slow_len,
             pruning_rate: 1.0 - tier.n_anchors as f32 / header.n_anchors.max(1) as f32,
             work: measures.map(|m| Work::most(&m, header.training_px, budget, passes, resident)),
         };

@@ -6,21 +6,23 @@ use super::splats::SplatStore;
 use crate::arena::Arena;
 use crate::arithmetic::Arithmetic;
 use crate::bake::{BakedMemory, Baker, bake};
-use crate::budget::{AnchorMemory, FrameMemory, ModelMemory, Plan, SceneMemory, ScratchShape};
+use crate::budget::{
+    AnchorMemory, FrameMemory, ListMemory, ModelMemory, Part, Plan, Regions, SceneMemory, ScratchShape, TileMemory,
+};
 use crate::bundle::{AnchorRecords, Bundle, RecordMemory};
-use crate::error::{DecodeError, saturate};
+use crate::error::{DecodeError, Region, saturate};
 use crate::mlp::{F32, HeadFormat, Heads};
 use crate::project::Packed28;
 use crate::scene::{Evaluator, Pair, Workspace};
 
 impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
-    /// Takes as much of `scratch` as the plan says, and prepares the scene in it.
+    /// Takes as much of the fast and the slow memory as the plan says, and prepares the scene in it.
     // Not inlined, here and below: a caller's stack frame would keep what only one of the steps needs.
     #[inline(never)]
     pub(super) fn bind_with(
         bundle: &Bundle<'b>,
         plan: Plan,
-        scratch: &'s mut [u8],
+        [fast, slow]: [&'s mut [u8]; 2],
         skip_damage: bool,
     ) -> Result<Self, DecodeError> {
         let needed = bundle.plan(plan.budget())?;
@@ -30,28 +32,32 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
                 planned: saturate(plan.scratch_len()),
             });
         }
-        let available = saturate(scratch.len());
-        let Some((scratch, _)) = scratch.split_at_mut_checked(plan.scratch_len()) else {
-            return Err(DecodeError::ScratchTooSmall { needed: saturate(plan.scratch_len()), available });
-        };
-        let mut arena = Arena::new(scratch);
-        let source = bind_scene(bundle, plan.shape(), &mut arena, skip_damage)?;
-        let FrameMemory { pixels, rgb, counts, splats, rects, order, spare } =
-            FrameMemory::take(plan.shape(), &mut arena)?;
-        let splats = SplatStore { splats: records_in(splats)?, rects, n: 0, order, spare, counts };
+        let fast = front(fast, plan.scratch_len(), Region::Fast)?;
+        let slow = front(slow, plan.slow_scratch_len(), Region::Slow)?;
+        let mut regions = Regions::new(fast, slow, plan.placement());
+        let source = bind_scene(bundle, plan.shape(), &mut regions, skip_damage)?;
+        let FrameMemory { tiles, splats, lists } = FrameMemory::take(plan.shape(), &mut regions)?;
+        let (TileMemory { pixels, rgb, counts }, ListMemory { rects, order, spare }) = (tiles, lists);
+        let splats = SplatStore { splats: records_in(splats.splats)?, rects, n: 0, order, spare, counts };
         Ok(Self { bundle: *bundle, plan, skip_damage, source, pixels, rgb, splats })
     }
 }
 
-/// Puts the scene into memory of `arena`, as far as `shape` keeps it there.
+/// The first `len` bytes of a region.
+fn front(memory: &mut [u8], len: usize, region: Region) -> Result<&mut [u8], DecodeError> {
+    let available = saturate(memory.len());
+    memory.get_mut(..len).ok_or(DecodeError::ScratchTooSmall { region, needed: saturate(len), available })
+}
+
+/// Puts the scene into memory of `regions`, as far as `shape` keeps it there.
 #[inline(never)]
 fn bind_scene<'b, 's, N: HeadFormat>(
     bundle: &Bundle<'b>,
     shape: &ScratchShape,
-    arena: &mut Arena<'s>,
+    regions: &mut Regions<'s>,
     skip_damage: bool,
 ) -> Result<GaussianSource<'b, 's, N>, DecodeError> {
-    match SceneMemory::take(shape, arena)? {
+    match SceneMemory::take(shape, regions)? {
         // Unreachable without the feature; this arm drops the code.
         SceneMemory::Baked { .. } if !cfg!(feature = "baked") => Err(DecodeError::Internal),
         SceneMemory::Baked { baked, anchor, models } => {
@@ -59,11 +65,11 @@ fn bind_scene<'b, 's, N: HeadFormat>(
         }
         SceneMemory::Streamed { anchor, models } => {
             let source = AnchorSource::Streamed(bundle.anchor_models(models.words)?);
-            with_heads(bundle, shape, source, anchor, arena.borrow())
+            with_heads(bundle, shape, source, anchor, regions.of(Part::Tiles).borrow())
         }
         SceneMemory::Resident { anchor, records, models } => {
             let records = decode_anchors(bundle, shape, records, anchor.row, models, skip_damage)?;
-            with_heads(bundle, shape, AnchorSource::Resident(records), anchor, arena.borrow())
+            with_heads(bundle, shape, AnchorSource::Resident(records), anchor, regions.of(Part::Tiles).borrow())
         }
     }
 }

@@ -1,8 +1,7 @@
 //! Counting the Gaussians of a scene, for the writer of its bundle.
 
 use super::bind;
-use crate::arena::Arena;
-use crate::budget::{FrameShape, Resident, SceneMemory, ScratchShape};
+use crate::budget::{FrameShape, Placement, Regions, Resident, SceneMemory, ScratchShape};
 use crate::bundle::{Bundle, MAX_TIERS};
 use crate::error::DecodeError;
 
@@ -23,8 +22,8 @@ pub fn count_scratch_len(bundle: &Bundle<'_>) -> usize {
 /// [`count_scratch_len`] bytes of `scratch`. Decodes and evaluates every anchor.
 pub fn count_gaussians(bundle: &Bundle<'_>, scratch: &mut [u8]) -> Result<[u32; MAX_TIERS as usize], DecodeError> {
     let shape = shape(bundle);
-    let mut arena = Arena::new(scratch);
-    let SceneMemory::Baked { baked, anchor, models } = SceneMemory::take(&shape, &mut arena)? else {
+    let mut regions = Regions::new(scratch, &mut [], Placement::FAST);
+    let SceneMemory::Baked { baked, anchor, models } = SceneMemory::take(&shape, &mut regions)? else {
         return Err(DecodeError::NotBakeable);
     };
     let baker = bind::evaluate_scene(bundle, &shape, baked, anchor, models, false)?;

@@ -73,12 +73,12 @@ impl fmt::Display for DecodeError {
             Self::PlanTooLarge { max_splats } => {
                 write!(f, "{max_splats} splats need more memory than this machine addresses; plan for fewer")
             }
-            Self::ScratchTooSmall { needed, available } => {
-                write!(f, "scratch memory of {available} bytes, the plan needs {needed}")
+            Self::ScratchTooSmall { region, needed, available } => {
+                write!(f, "{region} of {available} bytes, the plan needs {needed}")
             }
-            Self::BudgetTooSmall { needed, available, n_tiers, n_strips } => write!(
+            Self::BudgetTooSmall { region, needed, available, n_tiers, n_strips } => write!(
                 f,
-                "a budget of {available} bytes, the smallest plan ({n_tiers} tiers, {n_strips} strips) needs {needed}: \
+                "a budget of {available} bytes of {region}, the smallest plan ({n_tiers} tiers, {n_strips} strips) needs {needed}: \
                  allow that many, or fewer splats, more strips, or streamed anchors where the budget rules them out"
             ),
             Self::NotBakeable => {

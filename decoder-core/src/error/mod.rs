@@ -6,7 +6,7 @@ mod place;
 mod render;
 
 pub(crate) use check::{in_range, saturate};
-pub use place::{Field, SectionKind};
+pub use place::{Field, Region, SectionKind};
 pub use render::RenderError;
 
 /// Whose fault an error is, which decides what can be done about it.
@@ -166,6 +166,8 @@ pub enum DecodeError {
     },
     /// The caller's scratch memory is shorter than the plan says.
     ScratchTooSmall {
+        /// Which memory.
+        region: Region,
         /// Bytes needed.
         needed: u32,
         /// Bytes given.
@@ -173,6 +175,8 @@ pub enum DecodeError {
     },
     /// No plan fits the budget's bytes; with those of the smallest one it would.
     BudgetTooSmall {
+        /// Which memory: the slow one, if the budget has some.
+        region: Region,
         /// Bytes of the smallest plan within the budget's other limits.
         needed: u32,
         /// Bytes in the budget.

@@ -222,3 +222,22 @@ impl fmt::Display for Field {
         })
     }
 }
+
+/// A kind of memory: a microcontroller may have little that is fast (SRAM, TCM) and much that is slow (PSRAM, SDRAM).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Region {
+    /// What [`Budget::ram_bytes`](crate::Budget) counts; all there is unless a budget says otherwise.
+    Fast,
+    /// What [`Budget::slow_bytes`](crate::Budget) counts.
+    Slow,
+}
+
+impl fmt::Display for Region {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Fast => "scratch memory",
+            Self::Slow => "slow scratch memory",
+        })
+    }
+}

@@ -7,8 +7,8 @@ mod trial;
 use pocketsplat_core::budget::MIN_SLAB_PLACES;
 use pocketsplat_core::bundle::STRIPS;
 use pocketsplat_core::{
-    Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, HeadWeights, MaxSplats, Overflow, Plan, Residency,
-    Strips, Work,
+    Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, HeadWeights, MaxSplats, Overflow, Plan, Region,
+    Residency, Strips, Work,
 };
 
 pub use trial::{Breach, Trial};
@@ -63,7 +63,8 @@ pub fn exact_bytes(bundle: &Bundle<'_>, plan: Plan) -> Result<(), Violation> {
         }
         for available in [needed.saturating_sub(1), needed / 2, 0] {
             let [needed, len] = [needed, available].map(|n| n as u32);
-            let (found, expected) = (bind(available), DecodeError::ScratchTooSmall { needed, available: len });
+            let (found, expected) =
+                (bind(available), DecodeError::ScratchTooSmall { region: Region::Fast, needed, available: len });
             if found.as_ref() != Some(&expected) {
                 return Err(format!("{available} bytes: expected {expected:?}, found {found:?}"));
             }

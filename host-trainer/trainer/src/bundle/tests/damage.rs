@@ -1,6 +1,6 @@
 use std::convert::Infallible;
 
-use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, ErrorClass, MaxSplats, TileSink};
+use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, ErrorClass, MaxSplats, Region, TileSink};
 
 use super::{SMALL, TABLES, info, options, random_scene, write_random};
 use crate::bundle::{ChannelCoding, WriteOptions, write};
@@ -95,7 +95,7 @@ fn scratch_one_byte_short_names_the_need() {
     let mut scratch = vec![0; plan.scratch_len() - 1];
     let error = Decoder::bind(&bundle, plan, &mut scratch).err().expect("one byte short");
     let needed = plan.scratch_len() as u32;
-    assert_eq!(error, DecodeError::ScratchTooSmall { needed, available: needed - 1 }, "{error}");
+    assert_eq!(error, DecodeError::ScratchTooSmall { region: Region::Fast, needed, available: needed - 1 }, "{error}");
 }
 
 #[test]

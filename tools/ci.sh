@@ -145,6 +145,8 @@ job_core-embedded() {
       -- -D warnings
   done
   echo "${#sets[@]} sets of features: none, each, every pair, all"
+  # Its assembly.
+  cargo clippy -q -p pocketsplat-half --target "$embedded_target" --locked -- -D warnings
   local said
   need_target i686-unknown-linux-gnu
   need_target i586-unknown-linux-gnu
@@ -167,7 +169,8 @@ job_package() {
   for file in README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE src/bundle/FORMAT.md src/bundle/example.psb examples/draw_png.rs; do
     grep -qx "$file" <<<"$files" || fail "the package of pocketsplat-core lacks $file"
   done
-  cargo package -p pocketsplat-core --allow-dirty --locked
+  # With the crate that it needs, which it would otherwise get from the registry.
+  cargo package -p pocketsplat-half -p pocketsplat-core --allow-dirty --locked
   # The oldest Rust that its manifest names.
   local oldest features
   oldest=$(sed -n 's/^rust-version = "\(.*\)"$/\1/p' decoder-core/Cargo.toml)
@@ -206,7 +209,8 @@ digest_boards=(
   "riscv32imafc-unknown-none-elf virt"
 )
 
-# Three bundles, one of each coder and one of hard cases, decode to the same symbols and values and draw the same frames on every target.
+# Halves are converted alike on every target, by whatever instructions it has. Three bundles, one of each coder and one of hard cases,
+# decode to the same symbols and values and draw the same frames.
 job_digests() {
   local out=$target/digests host found name emulator board compiler packages program
   need_command qemu-aarch64 qemu-user

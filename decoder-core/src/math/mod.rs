@@ -7,8 +7,7 @@
 mod activation;
 mod exp;
 pub(crate) mod functions;
-mod half;
 
 pub use activation::{sigmoid, tanh};
 pub use exp::{EXP_MAX, EXP_MIN, exp};
-pub use half::{from_half, is_finite_half, to_half};
+pub use pocketsplat_half::{from_half, is_finite_half, to_half};

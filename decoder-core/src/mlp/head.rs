@@ -90,7 +90,7 @@ impl Hidden<'_> {
             let mut blocks = self.blocks.halves();
             for (first, second) in hidden.as_chunks_mut::<LANES>().0.iter_mut().zip(second.as_chunks_mut::<LANES>().0) {
                 let Some(block) = blocks.next() else { break };
-                [*first, *second] = weight::scaled_sums_of_two(block, [inputs, second_inputs]);
+                [*first, *second] = weight::sums_of_two(block, [inputs, second_inputs]);
             }
             self.finish(inputs, hidden);
             self.finish(second_inputs, second);

@@ -2,6 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use super::shape::LANES;
 use crate::math::to_half;
 
 /// 2¹¹²: what a half's bits, moved into a float's fields, are short of.
@@ -57,19 +58,24 @@ pub(super) fn outputs<const B: usize>(block: &[[Half; B]], inputs: &[f32]) -> [f
 
 /// The sums of two anchors, whose weights are widened once; not finite where an input is too large to be scaled.
 #[inline]
-pub(super) fn scaled_sums_of_two<const B: usize>(block: &[[Half; B]], inputs: [&[f32]; 2]) -> [[f32; B]; 2] {
-    let Some((biases, rows)) = block.split_first() else { return [[0.0; B]; 2] };
-    let [mut first, mut second] = [biases.map(Half::value); 2];
+pub(super) fn sums_of_two(block: &[[Half; LANES]], inputs: [&[f32]; 2]) -> [[f32; LANES]; 2] {
+    let Some((biases, rows)) = block.split_first() else { return [[0.0; LANES]; 2] };
+    let mut sums = [biases.map(Half::value); 2];
+    if pocketsplat_half::IN_HARDWARE {
+        pocketsplat_half::add_products(&mut sums, bytemuck::cast_slice(rows), inputs);
+        return sums;
+    }
+    let [first, second] = &mut sums;
     let [first_inputs, second_inputs] = inputs;
     for ((row, &x), &y) in rows.iter().zip(first_inputs).zip(second_inputs) {
         let [x, y] = [x * SCALE, y * SCALE];
-        for ((first, second), weight) in first.iter_mut().zip(&mut second).zip(row) {
+        for ((first, second), weight) in first.iter_mut().zip(&mut *second).zip(row) {
             let weight = weight.scaled();
             *first += weight * x;
             *second += weight * y;
         }
     }
-    [first, second]
+    sums
 }
 
 /// `sums`, or the same without scaling if an input was too large for it, which leaves no sum finite.
@@ -100,7 +106,7 @@ pub(super) fn unscaled(block: &[Half], lane: usize, lanes: usize, inputs: &[f32]
 mod tests {
     use half::f16;
 
-    use super::{Half, SCALE, outputs, scaled_sums_of_two};
+    use super::{Half, LANES, SCALE, outputs, sums_of_two};
 
     /// Every finite half.
     fn halves() -> impl Iterator<Item = f16> {
@@ -135,7 +141,8 @@ mod tests {
             (state >> 8) as f32 / 8_388_608.0 - 1.0
         };
         for round in 0..2000 {
-            let block: [[Half; 3]; 9] = core::array::from_fn(|_| core::array::from_fn(|_| Half::of(3.0 * random())));
+            let block: [[Half; LANES]; 9] =
+                core::array::from_fn(|_| core::array::from_fn(|_| Half::of(3.0 * random())));
             // Small ones, zeros, and in some rounds one that is too large to be scaled.
             let mut inputs: [[f32; 8]; 2] = core::array::from_fn(|_| core::array::from_fn(|_| 5.0 * random().max(0.0)));
             if round % 3 == 0 {
@@ -152,7 +159,7 @@ mod tests {
             });
             assert_eq!(inputs.map(|inputs| outputs(&block, &inputs)), expected, "one by one, {inputs:?}");
             if round % 3 != 0 {
-                let of_two = scaled_sums_of_two(&block, inputs.each_ref().map(|inputs| &inputs[..]));
+                let of_two = sums_of_two(&block, inputs.each_ref().map(|inputs| &inputs[..]));
                 assert_eq!(of_two, expected, "two at a time");
             }
         }

@@ -1,9 +1,10 @@
 //! Splats as they are kept in memory.
 
 use bytemuck::{Pod, Zeroable};
+use pocketsplat_half::from_halves;
 
 use super::splat::Splat;
-use crate::math::{from_half, to_half};
+use crate::math::to_half;
 
 /// Bits of 2⁻⁶², which stands for every smaller precision: a deviation of 2·10⁹ px.
 const LEAST_PRECISION: u32 = (127 - 62) << 23;
@@ -99,14 +100,16 @@ impl HalfFields {
     /// The splat, with what is kept as f32.
     #[inline]
     fn unpack(&self, mean: [f32; 2], depth: f32, shear: f32) -> Splat {
+        let [red, green, blue] = self.colour;
+        let [log_opacity, colour @ ..] = from_halves([self.log_opacity, red, green, blue]);
         Splat {
             mean,
             depth,
             shear,
             row_precision: unpack_precision(self.row_precision),
             column_precision: unpack_precision(self.column_precision),
-            log_opacity: from_half(self.log_opacity),
-            colour: self.colour.map(from_half),
+            log_opacity,
+            colour,
         }
     }
 }

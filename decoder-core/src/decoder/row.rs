@@ -100,8 +100,11 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
                 PixelFormat::Rgb565(order, rounding) => tile.into_rgb565(order, rounding),
             };
             for (line, from) in bytes.chunks_exact_mut(line_len.max(1)).zip(packed.chunks_exact(len.max(1))) {
-                let line = line.get_mut(start..).unwrap_or_default();
-                line.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
+                let line = line.get_mut(start..start + len).unwrap_or_default();
+                // Byte by byte this would take three instructions each.
+                let ((to, to_rest), (from, from_rest)) = (line.as_chunks_mut::<16>(), from.as_chunks::<16>());
+                to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
+                to_rest.iter_mut().zip(from_rest).for_each(|(to, from)| *to = *from);
             }
             if is_last {
                 return Ok(Some(TileRow { x_px, y_px, width, height, bytes }));

@@ -162,15 +162,22 @@ job_format-doc() {
   cargo run -q -p tools --bin hexdump --locked -- --check
 }
 
-# decoder-core builds from nothing but what its package holds, and the package holds what a user reads.
+# Every crate builds from nothing but what the packages hold, and they hold what a user reads. Not optimised: nothing is run.
 job_package() {
-  local file files
+  local crate file files
   files=$(cargo package -p pocketsplat-core --allow-dirty --locked --list)
   for file in README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE src/bundle/FORMAT.md src/bundle/example.psb examples/draw_png.rs; do
     grep -qx "$file" <<<"$files" || fail "the package of pocketsplat-core lacks $file"
   done
-  # With the crate that it needs, which it would otherwise get from the registry.
-  cargo package -p pocketsplat-half -p pocketsplat-core --allow-dirty --locked
+  for crate in pocketsplat pocketsplat-{half,capture,gaussians,instructions,trainer,viewer}; do
+    files=$(cargo package -p "$crate" --allow-dirty --locked --list)
+    for file in LICENSE-MIT LICENSE-APACHE; do
+      grep -qx "$file" <<<"$files" || fail "the package of $crate lacks $file"
+    done
+  done
+  CARGO_PROFILE_DEV_OPT_LEVEL=0 CARGO_PROFILE_DEV_DEBUG=0 \
+    cargo package --workspace --exclude conformance --exclude tools --allow-dirty --locked
+  rm -rf "$target/package"
   # The oldest Rust that its manifest names.
   local oldest features
   oldest=$(sed -n 's/^rust-version = "\(.*\)"$/\1/p' decoder-core/Cargo.toml)

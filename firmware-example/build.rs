@@ -93,8 +93,8 @@ fn prepare() -> Result<(), Box<dyn Error>> {
     let views = views.concat();
     let settings = format!(
         "const BOARD: &str = {name:?};\nconst RAM_KIB: usize = {ram_kib};\nconst STACK_LEN: usize = {STACK_LEN};\n\
-         const SCRATCH_LEN: usize = {scratch_len};\nconst WIDTH_PX: usize = {width_px};\n\
-         const HEIGHT_PX: usize = {height_px};\nconst N_FRAMES: u8 = {n_frames};\n\
+         pub(crate) const SCRATCH_LEN: usize = {scratch_len};\npub(crate) const WIDTH_PX: usize = {width_px};\n\
+         pub(crate) const HEIGHT_PX: usize = {height_px};\nconst N_FRAMES: u8 = {n_frames};\n\
          const VIEWS: &[Camera] = &[{views}];\nconst QUALITY: Quality = Quality::{quality};\n\
          fn asked(budget: Budget) -> Budget {{ budget.with_quality(QUALITY){budget} }}\n\
          type Chosen = pocketsplat_core::arithmetic::With<{arithmetic}>;\n"

@@ -16,7 +16,7 @@ out=$(realpath "${5:-${CARGO_TARGET_DIR:-target}/measured}")
 
 cd "$(dirname "$0")"
 target=$(realpath -m "${CARGO_TARGET_DIR:-target}")
-cargo build -q --release --locked --target "$processor" --target-dir "$target" >&2
+cargo build -q --release --locked --bin firmware-example --target "$processor" --target-dir "$target" >&2
 runner=$PWD/qemu.sh
 rm -f "$out"/frame*.ppm "$out/instructions.csv"
 cd "$out"

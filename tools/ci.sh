@@ -7,7 +7,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-jobs=(fmt clippy doc test viewer core-embedded format-doc package link-gate digests firmware c demo)
+jobs=(fmt clippy doc test viewer core-embedded format-doc package link-gate digests firmware boards c demo)
 
 embedded_target=thumbv7em-none-eabihf
 defmt_print_version=1.2.0
@@ -83,6 +83,7 @@ need_tool() { # CRATE VERSION
 job_fmt() {
   cargo fmt --all --check
   (cd firmware-example && cargo fmt --check)
+  (cd boards && cargo fmt --all --check)
   (cd tests/link-gate && cargo fmt --check)
   (cd tests/digest && cargo fmt --check)
   (cd fuzz && cargo fmt --check)
@@ -317,11 +318,30 @@ measure_firmware() { # CSV
   done
   (
     cd firmware-example
+    export PSB_BUNDLE=$target/firmware/sample-static.psb
+    out=(--release --locked --bin two_buffers --features two-buffers --target-dir "$embedded")
+    cargo clippy -q "${out[@]}" -- -D warnings
+    cargo build -q "${out[@]}"
+    ./qemu.sh "$embedded/$embedded_target/release/two_buffers" || fail "two tile buffers do not draw what render draws"
     export PSB_BUNDLE=$bundle
     for out in "$embedded_target" riscv32imac-unknown-none-elf; do
       cargo clippy -q --release --locked --target "$out" --target-dir "$embedded" -- -D warnings
     done
   )
+}
+
+# Firmware for real boards builds, and a display of memory gets the pixels of `render`.
+job_boards() {
+  local bundle=$target/firmware/sample-static.psb board
+  need_embedded_target
+  need_target thumbv8m.main-none-eabihf
+  mkdir -p "$target/firmware"
+  [ -s "$bundle" ] || cargo run -q -p tools --bin sample_bundle --locked -- --coder static "$bundle"
+  (cd boards && cargo test -q -p pocketsplat-panel --locked --target-dir "$target/boards")
+  for board in pico2 stm32f429i-disco; do
+    (cd "boards/$board" && PSB_BUNDLE=$bundle cargo build -q --release --locked --target-dir "$embedded")
+    echo "$board builds"
+  done
 }
 
 # The C interface, on this machine with sanitisers and on a board.

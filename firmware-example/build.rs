@@ -5,6 +5,7 @@
 //! | `PSB_BUNDLE` | absolute path of the bundle | an error |
 //! | `BOARD` | `mps2-an386`, `mps2-an500`, or `virt` for RISC-V | `mps2-an386`; for RISC-V `virt` |
 //! | `RAM_KIB` | RAM in all: statics, scratch memory, stack | 256, 1024, 512 |
+//! | `STACK_KIB` | of which the stack's | 10 |
 //! | `SIZE` | frames, `WIDTHxHEIGHT` | the preview's |
 //! | `FRAMES` | frames of the orbit, at most 10 | 4 |
 //! | `VIEWS` | absolute path of cameras to draw instead, at most 10: a line each of the numbers of a `Camera`, in its order | an orbit |
@@ -18,8 +19,8 @@ use std::{env, fs};
 
 use pocketsplat_core::Bundle;
 
-/// Bytes reserved for the stack; the firmware fails when it comes near.
-const STACK_LEN: usize = 10 * 1024;
+/// KiB reserved for the stack; the firmware fails when it comes near.
+const STACK_KIB: usize = 10;
 /// Bytes of all statics beside the scratch memory, which gets the rest: the logger's and the flags of the cells.
 const OTHER_STATICS: usize = 512;
 
@@ -57,7 +58,8 @@ fn prepare() -> Result<(), Box<dyn Error>> {
         .find(|board| board.0 == name && board.1 == arch)
         .ok_or_else(|| format!("BOARD={name} is no board of architecture {arch}: see build.rs"))?;
     let ram_kib = variable("RAM_KIB").map_or(Ok(usual_ram_kib), |text| text.parse())?;
-    lay_out(memory, ram_kib, &out)?;
+    let stack_len = variable("STACK_KIB").map_or(Ok(STACK_KIB), |text| text.parse())? * 1024;
+    lay_out(memory, ram_kib, stack_len, &out)?;
 
     let path = variable("PSB_BUNDLE")
         .ok_or("PSB_BUNDLE is not set: set it to the absolute path of a bundle, as README.md shows")?;
@@ -85,14 +87,14 @@ fn prepare() -> Result<(), Box<dyn Error>> {
     let budget = variable("BUDGET").unwrap_or_default();
     let arithmetic = variable("ARITHMETIC").unwrap_or_default();
     let scratch_len = (ram_kib * 1024)
-        .checked_sub(STACK_LEN + OTHER_STATICS)
-        .ok_or_else(|| format!("RAM_KIB={ram_kib} leaves no scratch memory beside {STACK_LEN} bytes of stack"))?;
+        .checked_sub(stack_len + OTHER_STATICS)
+        .ok_or_else(|| format!("RAM_KIB={ram_kib} leaves no scratch memory beside {stack_len} bytes of stack"))?;
     let arithmetic: Vec<String> =
         arithmetic.split_terminator(',').map(|name| format!("pocketsplat_core::arithmetic::{}", name.trim())).collect();
     let arithmetic = arithmetic.join(", ");
     let views = views.concat();
     let settings = format!(
-        "const BOARD: &str = {name:?};\nconst RAM_KIB: usize = {ram_kib};\nconst STACK_LEN: usize = {STACK_LEN};\n\
+        "const BOARD: &str = {name:?};\nconst RAM_KIB: usize = {ram_kib};\nconst STACK_LEN: usize = {stack_len};\n\
          pub(crate) const SCRATCH_LEN: usize = {scratch_len};\npub(crate) const WIDTH_PX: usize = {width_px};\n\
          pub(crate) const HEIGHT_PX: usize = {height_px};\nconst N_FRAMES: u8 = {n_frames};\n\
          const VIEWS: &[Camera] = &[{views}];\nconst QUALITY: Quality = Quality::{quality};\n\
@@ -103,10 +105,10 @@ fn prepare() -> Result<(), Box<dyn Error>> {
 }
 
 /// Writes the linker's `memory.x` and asks for it and the scripts of start-up code and logger.
-fn lay_out(memory: &str, ram_kib: usize, out: &Path) -> Result<(), Box<dyn Error>> {
+fn lay_out(memory: &str, ram_kib: usize, stack_len: usize, out: &Path) -> Result<(), Box<dyn Error>> {
     // Numbers, because flip-link reads them too.
     let numbers = |text: &str| {
-        text.replace("RAM_KIB * 1024", &(ram_kib * 1024).to_string()).replace("STACK_LEN", &STACK_LEN.to_string())
+        text.replace("RAM_KIB * 1024", &(ram_kib * 1024).to_string()).replace("STACK_LEN", &stack_len.to_string())
     };
     fs::write(out.join("memory.x"), numbers(memory) + &numbers(SECTIONS))?;
     println!("cargo::rustc-link-search={}", out.display());

@@ -57,7 +57,7 @@ impl From<io::Error> for Failure {
 /// Draws, looks at the stack, and ends.
 #[board::entry]
 fn main() -> ! {
-    stack::paint();
+    let _ = stack::paint();
     board::start();
     let drawn = draw_orbit(PANEL.take(), SCRATCH.take()).and_then(|()| check_stack());
     match drawn {

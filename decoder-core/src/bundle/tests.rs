@@ -317,15 +317,15 @@ fn anchors_in_memory_have_the_values_of_the_file() {
         let mut models = bundle.anchor_models(&mut scratch).expect("enough memory");
         let mut memory = vec![0xA5; Arena::bytes_for(4000).expect("few")];
         let mut arena = Arena::new(&mut memory);
-        let memory = RecordMemory {
+        let mut memory = RecordMemory {
             records: arena.take(n_anchors * layout.len()).expect("enough"),
             damaged: arena.take(1).expect("enough"),
             scales: arena.take(bundle.tables().map_or(0, Tables::len)).expect("enough"),
         };
         let n_chunks = bundle.n_chunks() as usize;
         let mut words = vec![u32::MAX; bundle.anchor_scratch_words()];
-        let records = AnchorRecords::decode(&bundle, n_chunks, layout, memory, &mut [0.0; C], &mut words, false);
-        let records = records.expect("sound");
+        memory.decode(&bundle, n_chunks, &layout, &mut [0.0; C], &mut words, false).expect("sound");
+        let records = AnchorRecords::new(&bundle, layout, memory).expect("sound");
         let mut index = 0;
         for chunk in bundle.chunks() {
             let mut anchors = chunk.anchors(&mut models);

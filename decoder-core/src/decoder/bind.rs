@@ -5,7 +5,7 @@ use super::source::{AnchorSource, Anchors, GaussianSource};
 use super::splats::SplatStore;
 use crate::arena::Arena;
 use crate::arithmetic::Arithmetic;
-use crate::bake::{BakedMemory, Baker, bake};
+use crate::bake::{BakedGaussians, BakedMemory, Baker, bake};
 use crate::budget::{
     AnchorMemory, FrameMemory, ListMemory, ModelMemory, Part, Plan, Regions, SceneMemory, ScratchShape, TileMemory,
 };
@@ -17,30 +17,71 @@ use crate::scene::{Evaluator, Pair, Workspace};
 
 impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
     /// Takes as much of the fast and the slow memory as the plan says, and prepares the scene in it.
-    // Not inlined, here and below: a caller's stack frame would keep what only one of the steps needs.
-    #[inline(never)]
     pub(super) fn bind_with(
         bundle: &Bundle<'b>,
         plan: Plan,
         [fast, slow]: [&'s mut [u8]; 2],
         skip_damage: bool,
     ) -> Result<Self, DecodeError> {
-        let needed = bundle.plan(plan.budget())?;
-        if needed != plan {
-            return Err(DecodeError::PlanMismatch {
-                needed: saturate(needed.scratch_len()),
-                planned: saturate(plan.scratch_len()),
-            });
-        }
+        check_plan(bundle, &plan)?;
         let fast = front(fast, plan.scratch_len(), Region::Fast)?;
         let slow = front(slow, plan.slow_scratch_len(), Region::Slow)?;
+        // Before anything else, in memory that is taken again after it: the deepest calls come while no result waits on the stack.
+        read_chunks(bundle, &plan, [&mut *fast, &mut *slow], skip_damage)?;
+        Self::prepare(bundle, plan, [fast, slow], skip_damage)
+    }
+
+    /// The same, when resident anchors are decoded.
+    // Not inlined, here and below: a caller's stack frame would keep what only one of the steps needs.
+    #[inline(never)]
+    fn prepare(
+        bundle: &Bundle<'b>,
+        plan: Plan,
+        [fast, slow]: [&'s mut [u8]; 2],
+        skip_damage: bool,
+    ) -> Result<Self, DecodeError> {
         let mut regions = Regions::new(fast, slow, plan.placement());
-        let source = bind_scene(bundle, plan.shape(), &mut regions, skip_damage)?;
+        let source = bind_scene(bundle, plan.shape(), &mut regions, skip_damage);
+        Self::of_parts(bundle, plan, source, regions, skip_damage)
+    }
+
+    /// The decoder of a scene; what is left of `regions` is for frames.
+    ///
+    /// * `source`: not unpacked by the caller, whose stack frame would hold it twice.
+    #[inline(never)]
+    fn of_parts(
+        bundle: &Bundle<'b>,
+        plan: Plan,
+        source: Result<GaussianSource<'b, 's, A::Heads>, DecodeError>,
+        mut regions: Regions<'s>,
+        skip_damage: bool,
+    ) -> Result<Self, DecodeError> {
+        let source = source?;
         let FrameMemory { tiles, splats, lists } = FrameMemory::take(plan.shape(), &mut regions)?;
         let (TileMemory { pixels, rgb, counts }, ListMemory { rects, order, spare }) = (tiles, lists);
         let splats = SplatStore { splats: records_in(splats.splats)?, rects, n: 0, order, spare, counts };
         Ok(Self { bundle: *bundle, plan, skip_damage, source, pixels, rgb, splats })
     }
+}
+
+/// Whether `plan` is one of this bundle.
+#[inline(never)]
+fn check_plan(bundle: &Bundle<'_>, plan: &Plan) -> Result<(), DecodeError> {
+    let needed = bundle.plan(plan.budget())?;
+    if needed != *plan {
+        return Err(DecodeError::PlanMismatch {
+            needed: saturate(needed.scratch_len()),
+            planned: saturate(plan.scratch_len()),
+        });
+    }
+    Ok(())
+}
+
+/// Compares the checksum of every chunk of the first `n_tiers`.
+#[inline(never)]
+fn check_chunks(bundle: &Bundle<'_>, n_tiers: u8) -> Result<(), DecodeError> {
+    let n_chunks = bundle.up_to_tier(n_tiers).n_chunks;
+    bundle.chunks().take(n_chunks as usize).try_for_each(|chunk| chunk.check())
 }
 
 /// The first `len` bytes of a region.
@@ -49,7 +90,7 @@ fn front(memory: &mut [u8], len: usize, region: Region) -> Result<&mut [u8], Dec
     memory.get_mut(..len).ok_or(DecodeError::ScratchTooSmall { region, needed: saturate(len), available })
 }
 
-/// Puts the scene into memory of `regions`, as far as `shape` keeps it there.
+/// Puts the scene into memory of `regions`, as far as `shape` keeps it there; resident anchors are there already.
 #[inline(never)]
 fn bind_scene<'b, 's, N: HeadFormat>(
     bundle: &Bundle<'b>,
@@ -57,34 +98,59 @@ fn bind_scene<'b, 's, N: HeadFormat>(
     regions: &mut Regions<'s>,
     skip_damage: bool,
 ) -> Result<GaussianSource<'b, 's, N>, DecodeError> {
-    match SceneMemory::take(shape, regions)? {
+    let (anchor, kept) = match SceneMemory::take(shape, regions)? {
         // Unreachable without the feature; this arm drops the code.
-        SceneMemory::Baked { .. } if !cfg!(feature = "baked") => Err(DecodeError::Internal),
+        SceneMemory::Baked { .. } if !cfg!(feature = "baked") => return Err(DecodeError::Internal),
         SceneMemory::Baked { baked, anchor, models } => {
-            evaluate_scene(bundle, shape, baked, anchor, models, skip_damage)?.finish().map(GaussianSource::Baked)
+            return bind_baked(bundle, shape, baked, anchor, models, skip_damage).map(GaussianSource::Baked);
         }
-        SceneMemory::Streamed { anchor, models } => {
-            let source = AnchorSource::Streamed(bundle.anchor_models(models.words)?);
-            with_heads(bundle, shape, source, anchor, regions.of(Part::Tiles).borrow())
-        }
-        SceneMemory::Resident { anchor, records, models } => {
-            let records = decode_anchors(bundle, shape, records, anchor.row, models, skip_damage)?;
-            with_heads(bundle, shape, AnchorSource::Resident(records), anchor, regions.of(Part::Tiles).borrow())
-        }
-    }
+        SceneMemory::Streamed { anchor, models } => (anchor, Kept::Models(models)),
+        SceneMemory::Resident { anchor, records, .. } => (anchor, Kept::Anchors(records)),
+    };
+    let evaluator = evaluator(bundle, shape, anchor, regions.of(Part::Tiles).borrow());
+    anchors(bundle, shape, kept, evaluator)
 }
 
+/// What of anchors is in memory.
+enum Kept<'s> {
+    /// Nothing but what decodes them.
+    Models(ModelMemory<'s>),
+    /// They.
+    Anchors(RecordMemory<'s>),
+}
+
+/// What evaluates anchors, and `[n_channels]` of one.
+type EvaluatorAndRow<'s, N> = (Evaluator<'s, N>, &'s mut [f32]);
+
 /// Anchors with the heads that make Gaussians of them.
+///
+/// * `evaluator`: not unpacked by the caller, whose stack frame would hold it twice.
 #[inline(never)]
-fn with_heads<'b, 's, N: HeadFormat>(
+fn anchors<'b, 's, N: HeadFormat>(
     bundle: &Bundle<'b>,
     shape: &ScratchShape,
-    source: AnchorSource<'b, 's>,
-    anchor: AnchorMemory<'s>,
-    free: Arena<'_>,
+    kept: Kept<'s>,
+    evaluator: Result<EvaluatorAndRow<'s, N>, DecodeError>,
 ) -> Result<GaussianSource<'b, 's, N>, DecodeError> {
-    let (evaluator, row) = evaluator(bundle, shape, anchor, free)?;
+    let (evaluator, row) = evaluator?;
+    let source = match kept {
+        Kept::Models(models) => AnchorSource::Streamed(bundle.anchor_models(models.words)?),
+        Kept::Anchors(records) => AnchorSource::Resident(AnchorRecords::new(bundle, shape.record_layout(), records)?),
+    };
     Ok(GaussianSource::Anchors(Anchors { source, row, evaluator }))
+}
+
+/// Gaussians that are evaluated once.
+#[inline(never)]
+fn bind_baked<'s>(
+    bundle: &Bundle<'_>,
+    shape: &ScratchShape,
+    baked: BakedMemory<'s>,
+    anchor: AnchorMemory<'_>,
+    models: ModelMemory<'_>,
+    skip_damage: bool,
+) -> Result<BakedGaussians<'s>, DecodeError> {
+    evaluate_scene(bundle, shape, baked, anchor, models, skip_damage)?.finish()
 }
 
 /// Converts the heads into memory of the anchor, and returns what evaluates anchors and `[n_channels]` of one.
@@ -96,30 +162,47 @@ fn evaluator<'s, N: HeadFormat>(
     shape: &ScratchShape,
     memory: AnchorMemory<'s>,
     mut free: Arena<'_>,
-) -> Result<(Evaluator<'s, N>, &'s mut [f32]), DecodeError> {
+) -> Result<EvaluatorAndRow<'s, N>, DecodeError> {
     let AnchorMemory { heads, row, inputs, hidden, detail_sums, outputs } = memory;
     let mut arena = Arena::of_words(heads);
     let kept_as = N::KEPT_AS.unwrap_or(shape.model.head_weights);
-    let heads = Heads::convert(&mut arena, &mut free, kept_as, bundle.heads(), shape.heads())?;
-    let pair = if heads.takes_two() { Pair::take(&mut arena, shape.heads()) } else { None };
+    let heads = Heads::convert(&mut arena, &mut free, kept_as, bundle.heads(), shape.heads());
     let work = Workspace { hidden, detail_sums, outputs };
+    evaluator_of(heads, arena, shape, (inputs, row), work)
+}
+
+/// * `heads`: not unpacked by the caller, whose stack frame would hold it twice. * `arena`: what they left.
+#[inline(never)]
+fn evaluator_of<'s, N: HeadFormat>(
+    heads: Result<Heads<'s, N>, DecodeError>,
+    mut arena: Arena<'s>,
+    shape: &ScratchShape,
+    (inputs, row): (&'s mut [f32], &'s mut [f32]),
+    work: Workspace<'s>,
+) -> Result<EvaluatorAndRow<'s, N>, DecodeError> {
+    let heads = heads?;
+    let pair = if heads.takes_two() { Pair::take(&mut arena, shape.heads()) } else { None };
     Ok((Evaluator { heads, inputs, work, pair }, row))
 }
 
-/// Decodes the planned tiers into `records`.
-///
-/// * `row`: `[n_channels]`, for the symbols of the current anchor.
+/// Decodes the planned tiers if they are resident, and if they are streamed compares their checksums; Gaussians are baked later.
 #[inline(never)]
-fn decode_anchors<'b, 's>(
-    bundle: &Bundle<'b>,
-    shape: &ScratchShape,
-    records: RecordMemory<'s>,
-    row: &mut [f32],
-    models: ModelMemory<'_>,
+fn read_chunks(
+    bundle: &Bundle<'_>,
+    plan: &Plan,
+    [fast, slow]: [&mut [u8]; 2],
     skip_damage: bool,
-) -> Result<AnchorRecords<'b, 's>, DecodeError> {
-    let n_chunks = shape.resident.n_chunks();
-    AnchorRecords::decode(bundle, n_chunks, shape.record_layout(), records, row, models.words, skip_damage)
+) -> Result<(), DecodeError> {
+    let shape = plan.shape();
+    let mut regions = Regions::new(fast, slow, plan.placement());
+    match SceneMemory::take(shape, &mut regions)? {
+        SceneMemory::Resident { anchor, mut records, models } => {
+            let n_chunks = shape.resident.n_chunks();
+            records.decode(bundle, n_chunks, &shape.record_layout(), anchor.row, models.words, skip_damage)
+        }
+        SceneMemory::Streamed { .. } if !skip_damage => check_chunks(bundle, plan.n_tiers()),
+        _ => Ok(()),
+    }
 }
 
 /// Evaluates the Gaussians of the planned tiers into `baked`.

@@ -106,8 +106,8 @@ impl RecordLayout {
     }
 }
 
-impl<'b, 's> AnchorRecords<'b, 's> {
-    /// Decodes the first `n_chunks` chunks into `memory`.
+impl RecordMemory<'_> {
+    /// Decodes the first `n_chunks` chunks.
     ///
     /// * `row`: `[n_channels]` at least, for the symbols of the current anchor. * `scratch`: what the models of the symbols take.
     ///   * `skip_damage`: leaves damaged chunks out and remembers which.
@@ -116,22 +116,22 @@ impl<'b, 's> AnchorRecords<'b, 's> {
     /// [`DecodeError::ChunkChecksum`] or [`DecodeError::ChunkStream`] for damage that is not left out; a symbol beyond the
     /// header's bits is such damage.
     pub(crate) fn decode(
-        bundle: &Bundle<'b>,
+        &mut self,
+        bundle: &Bundle<'_>,
         n_chunks: usize,
-        layout: RecordLayout,
-        memory: RecordMemory<'s>,
+        layout: &RecordLayout,
         row: &mut [f32],
         scratch: &mut [u32],
         skip_damage: bool,
-    ) -> Result<Self, DecodeError> {
-        let RecordMemory { records, damaged, scales } = memory;
+    ) -> Result<(), DecodeError> {
+        let Self { records, damaged, .. } = self;
         let mut models = bundle.models(scratch, false)?;
         damaged.fill(0);
         let row = row.get_mut(..bundle.header().n_channels()).unwrap_or_default();
         // `max(1)`: a chunk size of zero would panic; there are always at least 5 channels.
         let mut slots = records.chunks_exact_mut(layout.len().max(1));
         for chunk in bundle.chunks().take(n_chunks) {
-            match decode_chunk(&chunk, &layout, &mut slots, row, &mut models) {
+            match decode_chunk(&chunk, layout, &mut slots, row, &mut models) {
                 Err(DecodeError::ChunkChecksum { .. } | DecodeError::ChunkStream { .. }) if skip_damage => {
                     let (word, bit) = place(chunk.index());
                     if let Some(word) = damaged.get_mut(word) {
@@ -141,6 +141,18 @@ impl<'b, 's> AnchorRecords<'b, 's> {
                 result => result?,
             }
         }
+        Ok(())
+    }
+}
+
+impl<'b, 's> AnchorRecords<'b, 's> {
+    /// The anchors in `memory`, which were [decoded](RecordMemory::decode) into it.
+    pub(crate) fn new(
+        bundle: &Bundle<'b>,
+        layout: RecordLayout,
+        memory: RecordMemory<'s>,
+    ) -> Result<Self, DecodeError> {
+        let RecordMemory { records, damaged, scales } = memory;
         let values = match bundle.coder() {
             Coder::Context(context) => Values::Context { base_steps: context.base_steps() },
             Coder::Static(tables) => {

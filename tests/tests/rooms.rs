@@ -8,7 +8,7 @@ use std::fs;
 use std::path::Path;
 
 /// The folder of each crate's sources, and its rooms; one may import those to its left.
-const CRATES: [(&str, &[&str]); 5] = [
+const CRATES: [(&str, &[&str]); 7] = [
     (
         "decoder-core/src",
         &[
@@ -62,6 +62,8 @@ const CRATES: [(&str, &[&str]); 5] = [
             "verify",
         ],
     ),
+    ("host-trainer/instructions/src", &[]),
+    ("viewer/src", &["figures", "focus", "scene", "exports", "package", "page"]),
     ("host-trainer/cli/src", &["plot", "config", "command"]),
 ];
 

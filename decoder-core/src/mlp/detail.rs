@@ -2,7 +2,7 @@
 
 use super::block::{HeadWeights, continued, outputs};
 use super::head::Head;
-use super::shape::LANES;
+use super::weight::LANES;
 use crate::arena::Arena;
 use crate::bundle::{HeadView, WeightReader};
 use crate::error::DecodeError;

@@ -3,8 +3,8 @@
 use super::block::{self, Blocks, HeadWeights};
 use super::format::{F16, F32, HeadFormat, MlpHead};
 use super::pair::Role;
-use super::shape::LANES;
 use super::weight;
+use super::weight::LANES;
 use crate::arena::Arena;
 use crate::bundle::{HeadView, WeightReader};
 use crate::error::DecodeError;

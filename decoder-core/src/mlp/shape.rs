@@ -2,9 +2,7 @@
 
 use super::block::{HeadWeights, n_rows};
 use super::pair::Role;
-
-/// Outputs computed together in layers whose outputs are all needed.
-pub(super) const LANES: usize = 8;
+use super::weight::LANES;
 
 /// Widths of the heads of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,6 +6,7 @@ pub(crate) use rotation::MOST_OFF;
 pub use rotation::Rotation;
 
 use crate::error::{DecodeError, Field, in_range};
+use crate::math::sin_cos;
 
 /// A pinhole camera in the normalised frame of a bundle: x right, y down, z forward (OpenCV).
 ///
@@ -71,7 +72,7 @@ impl Camera {
     /// coordinate axis of the normalised frame to which the camera's up is nearest, either way round; p is the point of the
     /// camera's line of sight nearest to the origin, which the training cameras surround. Distance, height and what is in
     /// the middle of the image stay: of cameras that look at one point it is the circle that the manifest's orbit takes.
-    /// Sine and cosine are `libm`'s, so every machine gets the same bits.
+    /// Sine and cosine are [`sin_cos`](crate::math::sin_cos)'s, so every machine gets the same bits.
     ///
     /// ```
     /// # use pocketsplat_core::{Camera, Rotation};
@@ -93,7 +94,8 @@ impl Camera {
         let [right, down, forward] = self.rotation.rows();
         let ([y0, y1, y2], [z0, z1, z2]) = (down, forward);
         let (axis, sign) = nearest_axis([-y0, -y1, -y2]);
-        let (sin, cos) = (sign * libm::sinf(angle), libm::cosf(angle));
+        let [sin, cos] = sin_cos(angle);
+        let sin = sign * sin;
         let eye = self.centre();
         let ([e0, e1, e2], along) = (eye, dot(eye, forward));
         let pivot = [e0 - along * z0, e1 - along * z1, e2 - along * z2];

@@ -62,7 +62,6 @@ fn draw(bytes: &[u8], camera: &Camera, scratch: &mut [u8]) -> Result<FrameReport
         Decoder::bind_skipping_damage(&bundle, plan, scratch)?
     };
     let camera = camera.resized(black_box(1), black_box(1));
-    // Sine and cosine are a tenth of all text, and nothing else needs them.
     #[cfg(feature = "orbit")]
     let camera = camera.orbited(black_box(1.0));
     #[cfg(feature = "drawing")]

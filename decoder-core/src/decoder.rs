@@ -182,7 +182,7 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
     /// streamed anchors may come after some. After any of them the decoder draws the next frame as if nothing had been.
     ///
     /// # Budget
-    /// No memory beyond the bound one, under 3 KiB of stack. Work of one strip: every anchor of a chunk in view is decoded
+    /// No memory beyond the bound one, under 4 KiB of stack. Work of one strip: every anchor of a chunk in view is decoded
     /// unless it is resident, the heads run for anchors that pass the prefilter, unless Gaussians are baked, and a pixel is finished when its
     /// transmittance falls below 1e-4. Of several strips each does so for the chunks and anchors that can reach it; but the
     /// first one goes over the whole view to see that all strips have places enough, unless that follows from the

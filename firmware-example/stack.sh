@@ -29,6 +29,6 @@ for level in 3 s z; do
 done
 export CARGO_PROFILE_DEV_OPT_LEVEL=0
 rows "dev" debug
-rows "dev, dependencies at s" debug --config 'profile.dev.package."*".opt-level="s"'
+rows "dev with dependencies at s" debug --config 'profile.dev.package."*".opt-level="s"'
 CARGO_PROFILE_DEV_OPT_LEVEL=1 rows "dev at 1" debug
 CARGO_PROFILE_DEV_OPT_LEVEL=s rows "dev at s" debug

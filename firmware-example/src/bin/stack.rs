@@ -6,7 +6,7 @@
 #![no_main]
 
 #[path = "../board/mod.rs"]
-#[expect(unused_imports, reason = "the other program counts instructions")]
+#[allow(dead_code, unused_imports, reason = "the other program counts instructions")]
 mod board;
 #[path = "../stack.rs"]
 mod stack;

@@ -1,6 +1,7 @@
 //! `pocketsplat train`: a capture in, a bundle out.
 
 mod explicit;
+mod limits;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -8,12 +9,10 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::{Background, Capture, Split, View};
+use pocketsplat_core::Bundle;
 use pocketsplat_core::budget::MAX_FRAME_PX;
-use pocketsplat_core::{Bundle, Plan};
-use pocketsplat_trainer::bundle::Written;
-use pocketsplat_trainer::device::Limits;
 use pocketsplat_trainer::effects::Effect;
-use pocketsplat_trainer::encode::{Cut, Encoding, Fitted, Scale};
+use pocketsplat_trainer::encode::{Encoding, Fitted, Scale};
 use pocketsplat_trainer::train::finish::Finished;
 use pocketsplat_trainer::train::gauge::Gauge;
 use pocketsplat_trainer::train::run::{Ending, Interval, RunError, RunFolder, fork};
@@ -47,6 +46,9 @@ pub(crate) struct TrainResult {
     /// Scratch memory in which a device with limited memory draws the whole scene.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) scratch_bytes: Option<usize>,
+    /// Predicted for the dearest frame of some training views, where there is a processor.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) instructions: Option<u64>,
     pub(crate) n_anchors: usize,
     /// Of these, with a drawn offset; the others are not coded.
     pub(crate) n_valid_anchors: usize,
@@ -307,31 +309,6 @@ fn judges(trainer: &Trainer<'_>, capture: &Capture) -> Vec<View> {
     (0..n).map(|i| capture.test[i * capture.test.len() / n].clone()).collect()
 }
 
-/// What a bundle takes of its limits, and what it lost to them.
-fn say_what_fits(file: &BundleFile, limits: &Limits, cut: Option<&Cut>, plan: Option<&Plan>) -> Result<()> {
-    let share =
-        |bytes: u64, most: u64| format!("{bytes} of {most} bytes ({:.1} %)", 100.0 * bytes as f64 / most as f64);
-    if let Some(most) = limits.flash_bytes {
-        eprintln!("the bundle takes {}", share(file.bytes.len() as u64, most));
-    }
-    if let (Some(most), Some(plan)) = (limits.ram_bytes, plan) {
-        let memory = share(plan.scratch_len() as u64, most);
-        let strips = plan.n_strips();
-        let plural = if strips == 1 { "" } else { "s" };
-        eprintln!("the whole scene is drawn in {memory} of scratch memory, in {strips} strip{plural}");
-    }
-    let Some(Cut { n_anchors, flash_bytes, ram_bytes, psnr_db }) = cut else { return Ok(()) };
-    let bundle = file.parse()?;
-    let now = bundle.n_tiers().checked_sub(1).and_then(|tier| bundle.measures(tier)?.psnr_db);
-    let lost =
-        psnr_db.zip(now).map(|(before, now)| format!(" at a cost of {:.2} dB", before - now)).unwrap_or_default();
-    let ram = ram_bytes.map(|bytes| format!(" and {bytes} bytes of scratch memory")).unwrap_or_default();
-    eprintln!(
-        "the {n_anchors} least important anchors were left out to fit{lost}; with them the bundle takes {flash_bytes} bytes{ram}"
-    );
-    Ok(())
-}
-
 fn write_bundle(
     trainer: &Trainer<'_>,
     capture: &Capture,
@@ -342,11 +319,11 @@ fn write_bundle(
     let protocol = Protocol::of(capture, options);
     let finished = Finished { protocol: Some(protocol.to_text()?), ..trainer.finish()? };
     let held_out = judges(trainer, capture);
-    let Fitted { written: Written { bytes, .. }, finished, cut, plan } =
-        encoding.encode(finished, capture, &held_out)?;
-    output::write_whole(output, &bytes)?;
-    let file = BundleFile { path: output.to_owned(), bytes };
-    say_what_fits(&file, &encoding.limits, cut.as_ref(), plan.as_ref())?;
+    let fitted = encoding.encode(finished, capture, &held_out)?;
+    output::write_whole(output, &fitted.written.bytes)?;
+    let file = BundleFile { path: output.to_owned(), bytes: fitted.written.bytes.clone() };
+    limits::say(&file, &encoding.limits, &fitted)?;
+    let Fitted { finished, plan, instructions, .. } = fitted;
     let held_out = if capture.test.is_empty() {
         None
     } else {
@@ -362,6 +339,7 @@ fn write_bundle(
         bundle: output.to_owned(),
         bundle_bytes: file.bytes.len(),
         scratch_bytes: plan.map(|plan| plan.scratch_len()),
+        instructions,
         n_anchors,
         n_valid_anchors: (0..n_anchors).filter(|a| scene.anchors.has_drawn(*a)).count(),
         drawn_offsets: (0..scene.anchors.mask_logits.len()).filter(|offset| scene.anchors.is_drawn(*offset)).count(),

@@ -4,7 +4,7 @@ use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Capture, View};
 use pocketsplat_core::{Bundle, DecodeError, Plan};
 
-use super::scale::{DevicePlans, frame_of, measured_cameras};
+use super::scale::{DevicePlans, frame_of, measured_cameras, most_instructions};
 use super::{EncodeError, Encoding};
 use crate::bundle::{WriteError, Written};
 use crate::manifest::measure;
@@ -16,6 +16,8 @@ const CUTTING: Search = Search { tolerance: 0.015, most_trials: 14 };
 /// A scene that takes at most so much more than the memory in two strips is cut until it does not. Any other may be drawn in more
 /// strips, which take less memory and more time.
 const WORTH_CUTTING: f64 = 1.1;
+/// The part of the anchors that may go for the instructions of a frame; a frame that would take more still takes longer instead.
+const MOST_CUT_FOR_TIME: f64 = 0.5;
 
 /// A bundle within its limits.
 #[derive(Clone, Debug)]
@@ -28,6 +30,8 @@ pub struct Fitted {
     pub cut: Option<Cut>,
     /// How the device draws all of it, where its memory is limited.
     pub plan: Option<Plan>,
+    /// Instructions predicted for its dearest frame, where there is a processor.
+    pub instructions: Option<u64>,
 }
 
 /// What a scene lost to its limits.
@@ -39,14 +43,16 @@ pub struct Cut {
     pub flash_bytes: u64,
     /// Scratch memory that would have done, where it is limited.
     pub ram_bytes: Option<u64>,
+    /// Instructions that a frame would have taken, where there is a processor.
+    pub instructions: Option<u64>,
     /// PSNR over the held-out views with them, dB.
     pub psnr_db: Option<f32>,
 }
 
-/// What a bundle takes of the limit that leaves least room.
+/// What a bundle takes of a limit.
 #[derive(Clone, Copy)]
 struct Need {
-    memory: &'static str,
+    limit: &'static str,
     available: u64,
     needed: u64,
 }
@@ -62,23 +68,30 @@ struct Attempt {
     finished: Finished,
     written: Written,
     plan: Option<Plan>,
-    need: Option<Need>,
+    /// Of the memory that leaves least room.
+    memory: Option<Need>,
+    /// Of a frame's instructions.
+    time: Option<Need>,
+}
+
+/// A scene of which no part keeps a limit.
+struct Unfit {
+    whole: Attempt,
+    /// The fewest anchors that were tried, and what they take.
+    least: (usize, Need),
 }
 
 impl Attempt {
-    fn share(&self) -> f64 {
-        self.need.map_or(0.0, |need| need.share())
-    }
-
     fn fitted(self, cut: Option<Cut>) -> Fitted {
-        let Self { written, finished, plan, .. } = self;
-        Fitted { written, finished, cut, plan }
+        let Self { written, finished, plan, time, .. } = self;
+        Fitted { written, finished, cut, plan, instructions: time.map(|time| time.needed) }
     }
 }
 
 impl Encoding {
     /// Codes a finished scene in tiers, again and again without its least important anchors, until the bundle is within the flash
-    /// and the whole of it is drawn within the RAM; measures each tier over training views and an orbit, and assembles the file.
+    /// and the whole of it is drawn within the RAM and, as far as half of the anchors suffice for that, within the processor's
+    /// instructions; measures each tier over training views and an orbit, and assembles the file.
     ///
     /// * `held_out`: views that were not trained on, whose photographs the tiers are compared with.
     ///
@@ -86,33 +99,28 @@ impl Encoding {
     /// [`EncodeError`].
     pub fn encode(&self, finished: Finished, capture: &Capture, held_out: &[View]) -> Result<Fitted, EncodeError> {
         let cameras = measured_cameras(capture);
-        let attempt = |finished| self.attempt(finished, capture, &cameras, held_out);
-        let (n, whole) = (n_kept(&finished), attempt(finished.clone())?);
-        let Some(need) = whole.need.filter(|need| need.needed > need.available) else {
-            return Ok(whole.fitted(None));
-        };
-        let lost = lost_by(&whole)?;
-        let (mut best, mut least) = (None, (n, need));
-        let first = whole.share();
-        CUTTING.largest(n, |n_next| {
-            if n_next == n {
-                return Ok(first);
-            }
+        let attempt = |n: usize| {
             let mut fewer = finished.clone();
-            keep(&mut fewer, n_next);
-            let found = attempt(fewer)?;
-            let share = found.share();
-            match found.need.filter(|_| share > 1.0) {
-                Some(need) => least = (n_next, need),
-                None => best = Some((n_next, found)),
-            }
-            Ok::<_, EncodeError>(share)
-        })?;
-        let Some((n_left, best)) = best else {
-            let (n_anchors, Need { memory, available, needed }) = least;
-            return Err(EncodeError::TooLarge { memory, available, needed, n_anchors });
+            keep(&mut fewer, n);
+            self.attempt(fewer, capture, &cameras, held_out)
         };
-        Ok(best.fitted(Some(Cut { n_anchors: n - n_left, ..lost })))
+        let n = n_kept(&finished);
+        let whole = attempt(n)?;
+        let lost = lost_by(&whole)?;
+        let (n_held, held) = match most_within(n, whole, |found| found.memory, attempt)? {
+            Ok(found) => found,
+            Err(Unfit { least: (n_anchors, Need { limit, available, needed }), .. }) => {
+                return Err(EncodeError::TooLarge { memory: limit, available, needed, n_anchors });
+            }
+        };
+        let at_least = (n as f64 * (1.0 - MOST_CUT_FOR_TIME)) as usize;
+        let (n_left, best) = match most_within(n_held, held, |found| found.time, attempt)? {
+            Ok(found) if found.0 >= at_least => found,
+            Ok(_) => (n_held, attempt(n_held)?),
+            Err(Unfit { whole, .. }) => (n_held, whole),
+        };
+        let cut = (n_left < n).then(|| Cut { n_anchors: n - n_left, ..lost });
+        Ok(best.fitted(cut))
     }
 
     /// Codes and measures a scene, and says what it takes of the limits.
@@ -129,14 +137,52 @@ impl Encoding {
         let written = coded.into_file(&measures)?;
         let flash = self.limits.flash_bytes.map(|available| {
             let needed = written.bytes.len() as u64;
-            Need { memory: "flash", available, needed }
+            Need { limit: "flash", available, needed }
         });
         let ram = self.limits.ram_bytes.map(|available| ram_of(&written, capture, available));
         let (ram, plan) =
             ram.transpose().map_err(EncodeError::Measure)?.map_or((None, None), |(ram, plan)| (Some(ram), plan));
-        let need = flash.into_iter().chain(ram).max_by(|a, b| a.share().total_cmp(&b.share()));
-        Ok(Attempt { finished, written, plan, need })
+        let memory = flash.into_iter().chain(ram).max_by(|a, b| a.share().total_cmp(&b.share()));
+        let time = self.time_of(&written, capture, cameras).map_err(EncodeError::Measure)?;
+        Ok(Attempt { finished, written, plan, memory, time })
     }
+
+    /// Instructions of the dearest frame, where the processor is known and the memory suffices.
+    fn time_of(&self, written: &Written, capture: &Capture, cameras: &[Camera]) -> Result<Option<Need>, DecodeError> {
+        let Some(processor) = self.limits.processor else { return Ok(None) };
+        let bundle = Bundle::parse(&written.bytes)?;
+        let plans = DevicePlans::of(&bundle, frame_of(capture), self.limits.ram_bytes)?;
+        let needed = most_instructions(&bundle, plans.drawn(), processor, cameras)?.round() as u64;
+        Ok(Some(Need { limit: "instructions", available: processor.frame_instructions(), needed }))
+    }
+}
+
+/// Cuts `whole`, a scene of `n` anchors, until the need that `of` names is no more than there is: the most anchors that keep it,
+/// and the attempt with them.
+fn most_within(
+    n: usize,
+    whole: Attempt,
+    of: impl Fn(&Attempt) -> Option<Need>,
+    attempt: impl Fn(usize) -> Result<Attempt, EncodeError>,
+) -> Result<Result<(usize, Attempt), Unfit>, EncodeError> {
+    let Some(need) = of(&whole).filter(|need| need.needed > need.available) else {
+        return Ok(Ok((n, whole)));
+    };
+    let (mut best, mut least) = (None, (n, need));
+    CUTTING.largest(n, |n_next| {
+        if n_next == n {
+            return Ok(need.share());
+        }
+        let found = attempt(n_next)?;
+        let found_need = of(&found);
+        let share = found_need.map_or(0.0, |need| need.share());
+        match found_need.filter(|_| share > 1.0) {
+            Some(need) => least = (n_next, need),
+            None => best = Some((n_next, found)),
+        }
+        Ok::<_, EncodeError>(share)
+    })?;
+    Ok(best.ok_or(Unfit { whole, least }))
 }
 
 /// Scratch memory of the whole scene, and the plan where it suffices.
@@ -152,15 +198,16 @@ fn ram_of(written: &Written, capture: &Capture, available: u64) -> Result<(Need,
         // Halves were tried too, and were not enough.
         None => (smallest.scratch_len() as u64).max(available + 1),
     };
-    Ok((Need { memory: "RAM", available, needed }, within))
+    Ok((Need { limit: "RAM", available, needed }, within))
 }
 
 /// What is lost when all that is too much of a scene goes.
 fn lost_by(whole: &Attempt) -> Result<Cut, EncodeError> {
     let bundle = Bundle::parse(&whole.written.bytes).map_err(WriteError::ReadBack)?;
     let psnr_db = bundle.n_tiers().checked_sub(1).and_then(|tier| bundle.measures(tier)?.psnr_db);
-    let ram_bytes = whole.need.filter(|need| need.memory == "RAM").map(|need| need.needed);
-    Ok(Cut { n_anchors: 0, flash_bytes: whole.written.bytes.len() as u64, ram_bytes, psnr_db })
+    let ram_bytes = whole.memory.filter(|need| need.limit == "RAM").map(|need| need.needed);
+    let instructions = whole.time.map(|time| time.needed);
+    Ok(Cut { n_anchors: 0, flash_bytes: whole.written.bytes.len() as u64, ram_bytes, instructions, psnr_db })
 }
 
 /// Anchors with a drawn offset: those that are written.

@@ -60,22 +60,27 @@ impl Scale<'_> {
         let ram = limits.ram_bytes.map_or(0.0, |most| plans.in_two_strips.scratch_len() as f64 / most as f64);
         let Some(processor) = limits.processor else { return Ok([ram, 0.0]) };
         let most = processor.frame_instructions() as f64;
-        Ok([ram, self.instructions(&bundle, plans.drawn(), processor)? / most])
+        Ok([ram, most_instructions(&bundle, plans.drawn(), processor, &self.cameras)? / most])
     }
+}
 
-    /// Of the dearest frame of some of the cameras.
-    fn instructions(&self, bundle: &Bundle<'_>, plan: Plan, processor: Processor) -> Result<f64, DecodeError> {
-        let mut scratch = vec![0; plan.scratch_len()];
-        let mut decoder = Decoder::bind(bundle, plan, &mut scratch)?;
-        let mut most = 0.0_f64;
-        for camera in self.cameras.iter().step_by(DRAWN_EVERY) {
-            let camera = core_camera(camera)?;
-            let (_, report) = image_of(&mut decoder, &camera)?;
-            let size_px = [camera.width_px, camera.height_px];
-            most = most.max(predict(processor.instruction_set(), bundle, &plan, &report, size_px).iter().sum());
-        }
-        Ok(most)
+/// Instructions predicted for the dearest frame of every [`DRAWN_EVERY`]th camera.
+pub(super) fn most_instructions(
+    bundle: &Bundle<'_>,
+    plan: Plan,
+    processor: Processor,
+    cameras: &[Camera],
+) -> Result<f64, DecodeError> {
+    let mut scratch = vec![0; plan.scratch_len()];
+    let mut decoder = Decoder::bind(bundle, plan, &mut scratch)?;
+    let mut most = 0.0_f64;
+    for camera in cameras.iter().step_by(DRAWN_EVERY) {
+        let camera = core_camera(camera)?;
+        let (_, report) = image_of(&mut decoder, &camera)?;
+        let size_px = [camera.width_px, camera.height_px];
+        most = most.max(predict(processor.instruction_set(), bundle, &plan, &report, size_px).iter().sum());
     }
+    Ok(most)
 }
 
 impl Gauge for Scale<'_> {
@@ -132,7 +137,7 @@ impl DevicePlans {
     }
 
     /// The plan that a device would draw by, or would if it had the memory.
-    fn drawn(&self) -> Plan {
+    pub(super) fn drawn(&self) -> Plan {
         self.within.unwrap_or(self.in_two_strips)
     }
 }

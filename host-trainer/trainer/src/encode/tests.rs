@@ -68,6 +68,31 @@ fn anchors_are_left_out_until_the_bundle_fits() {
     assert!(matches!(error, EncodeError::TooLarge { memory: "flash", available: 100, .. }), "{error}");
 }
 
+#[test]
+fn anchors_are_left_out_until_a_frame_takes_no_more_than_the_processor_has() {
+    let capture = tiny_capture();
+    let finished = finished(&capture);
+    let encode = |size_px, processor| {
+        let mut capture = capture.clone();
+        capture.train.iter_mut().for_each(|view| view.camera = view.camera.resized(size_px, size_px));
+        let encoding = Encoding { limits: Limits { processor, ..Limits::default() }, ..Encoding::default() };
+        encoding.encode(finished.clone(), &capture, &[]).expect("a bundle")
+    };
+    let (m4, m7) = (Processor::CortexM4, Processor::CortexM7);
+    let most = m4.frame_instructions();
+    // A Cortex-M7 has the same instructions and more of them, so it says what the whole scene takes.
+    let whole_at = |size_px| encode(size_px, Some(m7)).instructions.expect("a processor");
+    let sizes_px = (100..800).step_by(20).map(|size_px| (size_px, whole_at(size_px)));
+    let (size_px, whole) = sizes_px.into_iter().find(|(_, whole)| *whole > most).expect("large frames take long");
+    let cut = encode(size_px, Some(m4));
+    let lost = cut.cut.expect("something was left out");
+    assert_eq!(lost.instructions, Some(whole));
+    assert!(lost.n_anchors > 0 && cut.instructions <= Some(most), "{:?} of {most} instructions", cut.instructions);
+    let hopeless = encode(4 * size_px, Some(m4));
+    assert_eq!(hopeless.cut, None, "no half of the scene would do");
+    assert!(hopeless.instructions > Some(most), "{:?}", hopeless.instructions);
+}
+
 /// A run on the capture that is trained for the limits of its bundle.
 fn trained_for(limits: Limits, capture: &Capture) -> Fitted {
     let encoding = Encoding { limits, tiers: vec![0.3, 0.0], ..Encoding::default() };

@@ -24,8 +24,8 @@ use super::capture::{CaptureArgs, views_of};
 use super::eval::reference_image;
 use crate::config::named::{SPLITS, one_of};
 
-/// Turn each of the decoder's knobs, and those of quality in all combinations, and measure what that costs in accuracy and
-/// saves in time.
+/// Change each setting of the decoder by itself, and those of quality in all combinations, and measure what that costs in
+/// accuracy and saves in time.
 ///
 /// Writes cost.csv, cost.svg and cost.md: for each setting PSNR to the f64 reference and to the photographs, the time of a
 /// frame here, and the instructions of each stage on each target. Where the firmware's folder and QEMU are at hand, the firmware

@@ -57,6 +57,12 @@ pub(crate) enum Resolved {
     Interrupted,
 }
 
+/// Whether [`resolve`] will train pilots.
+pub(crate) fn are_measured(config: &RunConfig, capture: &Capture) -> bool {
+    let is_long = config.train.iterations >= config.effects.least_iterations;
+    config.effects.auto && is_long && PilotCapture::can_be_of(capture)
+}
+
 /// Measures the effects where the configuration leaves them open and gives the run those that pay; writes the table into `folder`.
 ///
 /// A run too short or a capture too small to measure with keeps what it has.

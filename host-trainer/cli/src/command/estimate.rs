@@ -1,10 +1,12 @@
 //! What a run will take: minutes, memory and bytes, from a few steps and from how runs go on.
 
 use std::fmt;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use anyhow::Result;
 use pocketsplat_capture::dataset::{Capture, PointsOrigin};
+use pocketsplat_trainer::effects::PILOTS_TIME_SHARE;
 use pocketsplat_trainer::train::{TrainConfig, Trainer};
 
 use super::process::{machine_memory_bytes, peak_memory_bytes};
@@ -83,19 +85,31 @@ pub(super) struct Estimate {
     started: Instant,
     earlier: (u32, Instant),
     next: Vec<u32>,
+    machine_bytes: Option<u64>,
+    warned: Warned,
+}
+
+/// What a run has been warned of, so that it is warned of nothing twice.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Warned {
+    of_minutes: bool,
+    of_memory: bool,
 }
 
 /// What a run takes in all.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Expected {
+    /// Those of the pilots among them.
     minutes: f64,
+    /// What the pilots of its effects take, if they are still to come.
+    pilot_minutes: f64,
     memory_bytes: f64,
     bundle_bytes: f64,
 }
 
 impl Estimate {
-    /// * `from`: iterations that are done.
-    pub(super) fn new(capture: &Capture, config: &TrainConfig, from: u32) -> Self {
+    /// * `from`: iterations that are done. * `warned`: what the user has read already.
+    pub(super) fn new(capture: &Capture, config: &TrainConfig, from: u32, warned: Warned) -> Self {
         let [width, height] = capture.largest_px();
         let iterations = config.iterations;
         let said = AGAIN_AT.into_iter().map(|share| config.iteration_at(share));
@@ -115,26 +129,44 @@ impl Estimate {
             started: Instant::now(),
             earlier: (from, Instant::now()),
             next: [from + FIRST].into_iter().chain(said).filter(|at| *at >= from + FIRST && *at < iterations).collect(),
+            machine_bytes: machine_memory_bytes(),
+            warned,
         }
     }
 
-    /// Measures a few steps of a new run, which are not kept, and says what it will take.
+    /// Measures a few steps of a new run, which are not kept, and says what it will take; returns what it has warned of.
+    ///
+    /// * `with_pilots`: whether pilots will measure its effects first. * `stop`: looked at after every step; once it is set, nothing
+    ///   is said.
     ///
     /// # Errors
     /// Those of the steps.
-    pub(super) fn try_out(capture: &Capture, config: &TrainConfig) -> Result<()> {
+    pub(super) fn try_out(
+        capture: &Capture,
+        config: &TrainConfig,
+        with_pilots: bool,
+        stop: &AtomicBool,
+    ) -> Result<Warned> {
         let mut trainer = Trainer::new(capture, *config)?;
-        for _ in 0..UNTIMED_STEPS.min(config.iterations) {
-            trainer.advance()?;
+        let mut advance = |n_steps: u32| -> Result<f64> {
+            let started = Instant::now();
+            for _ in 0..n_steps {
+                if !stop.load(Ordering::Relaxed) {
+                    trainer.advance()?;
+                }
+            }
+            Ok(started.elapsed().as_secs_f64() / f64::from(n_steps.max(1)))
+        };
+        let n_untimed = UNTIMED_STEPS.min(config.iterations);
+        advance(n_untimed)?;
+        let step_s = advance(TIMED_STEPS.min(config.iterations - n_untimed))?;
+        let mut estimate = Self::new(capture, config, 0, Warned::default());
+        if !stop.load(Ordering::Relaxed) {
+            let expected = estimate.expected(0, step_s, 0.0, trainer.scene.anchors.len());
+            let expected = if with_pilots { expected.with_pilots() } else { expected };
+            eprintln!("{}", estimate.said(&expected));
         }
-        let (timed, n_timed) = (Instant::now(), TIMED_STEPS.min(config.iterations - trainer.iteration));
-        for _ in 0..n_timed {
-            trainer.advance()?;
-        }
-        let step_s = timed.elapsed().as_secs_f64() / f64::from(n_timed.max(1));
-        let estimate = Self::new(capture, config, 0);
-        estimate.say(&estimate.expected(0, step_s, 0.0, trainer.scene.anchors.len()));
-        Ok(())
+        Ok(estimate.warned)
     }
 
     /// Hears of an iteration that is done, and says what the run will take when it is time to.
@@ -149,7 +181,7 @@ impl Estimate {
         self.next.retain(|next| *next > iteration);
         let step_s = self.earlier.1.elapsed().as_secs_f64() / f64::from(iteration - self.earlier.0);
         let expected = self.expected(iteration, step_s, self.started.elapsed().as_secs_f64(), n_anchors);
-        say(&self.line(&expected));
+        say(&self.said(&expected));
     }
 
     fn expected(&self, iteration: u32, step_s: f64, spent_s: f64, n_anchors: usize) -> Expected {
@@ -170,41 +202,56 @@ impl Estimate {
         let end = (self.course.anchors[SHARES.len() - 1] * against_now).min(self.most_anchors);
         Expected {
             minutes: (spent_s + left_s) / 60.0,
+            pilot_minutes: 0.0,
             memory_bytes: peak_memory_bytes().unwrap_or(0) as f64 * EVENTS_MEMORY
                 + (most - n_anchors as f64) * self.memory_per_anchor,
             bundle_bytes: FIXED_BYTES + end * self.bytes_per_anchor,
         }
     }
 
-    fn line(&self, expected: &Expected) -> String {
-        format!("{}: {expected}", self.what)
-    }
-
-    /// The line, and what to do where it says too much.
-    fn say(&self, expected: &Expected) {
-        eprintln!("{}", self.line(expected));
-        if expected.minutes > MANY_MINUTES {
-            eprintln!("warning: that is long; --max-resolution 400 or --iterations 7000 makes it shorter");
+    /// The line, and a warning for each limit that the estimate passes and none before it did.
+    fn said(&mut self, expected: &Expected) -> String {
+        let mut said = format!("{}: {expected}", self.what);
+        if expected.minutes > MANY_MINUTES && !std::mem::replace(&mut self.warned.of_minutes, true) {
+            said += "\nwarning: that is long; --max-resolution 400 or --iterations 7000 makes it shorter";
         }
-        if let Some(machine) = machine_memory_bytes()
+        if let Some(machine) = self.machine_bytes
             && expected.memory_bytes > MUCH_MEMORY * machine as f64
+            && !std::mem::replace(&mut self.warned.of_memory, true)
         {
-            eprintln!(
-                "warning: the machine has {:.1} GB of memory; --max-resolution 400 or --max-anchors N takes less",
+            said += &format!(
+                "\nwarning: the machine has {:.1} GB of memory; --max-resolution 400 or --max-anchors N takes less",
                 machine as f64 / 1e9
             );
         }
+        said
+    }
+}
+
+impl Expected {
+    /// The same with pilots before the run.
+    fn with_pilots(self) -> Self {
+        let pilot_minutes = PILOTS_TIME_SHARE * self.minutes;
+        Self { minutes: self.minutes + pilot_minutes, pilot_minutes, ..self }
+    }
+}
+
+/// As people say it.
+fn duration(minutes: f64) -> String {
+    match minutes {
+        ..1.0 => format!("{:.0} seconds", 60.0 * minutes),
+        1.0..10.0 => format!("{minutes:.1} minutes"),
+        10.0..180.0 => format!("{minutes:.0} minutes"),
+        _ => format!("{:.0} hours", minutes / 60.0),
     }
 }
 
 impl fmt::Display for Expected {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { minutes, memory_bytes, bundle_bytes } = *self;
-        match minutes {
-            ..1.0 => write!(f, "about {:.0} seconds", 60.0 * minutes)?,
-            1.0..10.0 => write!(f, "about {minutes:.1} minutes")?,
-            10.0..180.0 => write!(f, "about {minutes:.0} minutes")?,
-            _ => write!(f, "about {:.0} hours", minutes / 60.0)?,
+        let Self { minutes, pilot_minutes, memory_bytes, bundle_bytes } = *self;
+        write!(f, "about {}", duration(minutes))?;
+        if pilot_minutes > 0.0 {
+            write!(f, " ({} of them to measure effects)", duration(pilot_minutes))?;
         }
         write!(f, ", {:.1} GB of memory, a bundle of about {:.2} MB", memory_bytes / 1e9, bundle_bytes / 1e6)
     }
@@ -236,6 +283,8 @@ mod tests {
             started: Instant::now(),
             earlier: (0, Instant::now()),
             next: vec![30, 100],
+            machine_bytes: Some(1_000_000_000_000),
+            warned: Warned::default(),
         }
     }
 
@@ -275,5 +324,28 @@ mod tests {
         }
         assert_eq!(said.iter().map(|(at, _)| *at).collect::<Vec<_>>(), [30, 100]);
         assert!(said[0].1.starts_with("8×8 px, 1000 iterations: about 0 seconds, "), "{}", said[0].1);
+    }
+
+    #[test]
+    fn each_limit_is_warned_of_once_whenever_an_estimate_first_passes_it() {
+        let mut estimate = estimate(f64::INFINITY);
+        let small = Expected { minutes: 119.0, pilot_minutes: 0.0, memory_bytes: 0.7e12, bundle_bytes: 1e6 };
+        let said = estimate.said(&small);
+        assert!(said.contains("about 119 minutes, 700.0 GB of memory") && !said.contains("warning"), "{said}");
+        let long = Expected { minutes: 121.0, ..small };
+        let said = estimate.said(&long);
+        assert!(said.contains("\nwarning: that is long") && !said.contains("the machine has"), "{said}");
+        let large = Expected { memory_bytes: 0.9e12, ..long };
+        let said = estimate.said(&large);
+        assert!(!said.contains("that is long") && said.contains("\nwarning: the machine has 1000.0 GB"), "{said}");
+        assert!(!estimate.said(&large).contains("warning"));
+    }
+
+    #[test]
+    fn pilots_count_and_are_named() {
+        let run = Expected { minutes: 100.0, pilot_minutes: 0.0, memory_bytes: 1e9, bundle_bytes: 1e6 };
+        let said = estimate(f64::INFINITY).said(&run.with_pilots());
+        assert!(said.contains("about 125 minutes (25 minutes of them to measure effects), 1.0 GB"), "{said}");
+        assert!(said.contains("warning: that is long"), "the limit holds for both together: {said}");
     }
 }

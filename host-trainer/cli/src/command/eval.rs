@@ -36,7 +36,7 @@ pub(crate) enum Renderer {
 /// Compare the frames of a bundle or of a file of Gaussians with the photographs of a capture.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// The bundle, or the .ply or .spz.
+    /// The bundle, or a .ply, .spz or .sog file of Gaussians.
     bundle: PathBuf,
     #[command(flatten)]
     capture: CaptureArgs,

@@ -18,7 +18,8 @@ use crate::config::named::{TARGETS, one_of};
 
 /// Show what a decoder draws of a bundle within so much memory: the share of the scene, its quality, the work of a frame.
 ///
-/// Quality is the manifest's, measured over held-out training views when the bundle was made. Work is a bound over the views
+/// Quality is the manifest's, measured over test views when the bundle was made (over training views that were held out, where
+/// --validation-every said so). Work is a bound over the views
 /// in the manifest.
 #[derive(clap::Args)]
 pub(crate) struct Args {

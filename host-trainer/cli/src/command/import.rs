@@ -37,12 +37,12 @@ const ITERATIONS: u32 = 5_000;
 /// Weight of a value's bits in the loss.
 const LAMBDA: f64 = 0.0005;
 
-/// Compress splats that exist already: draw pictures of a .ply or .spz, train a bundle on them, and measure what it lost.
+/// Compress splats that exist already: draw pictures of a .ply, .spz or .sog, train a bundle on them, and measure what it lost.
 ///
 /// Cameras stand around the scene's bulk, or inside it where it lies all around its centre; --cameras gives others.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// The .ply or .spz.
+    /// The .ply, .spz or .sog.
     points: PathBuf,
     /// Cameras to draw with, in the frame of the splats: a transforms.json, or a file as `render --camera` reads it
     /// [default: generated]

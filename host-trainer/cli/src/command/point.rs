@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use super::bundle::BundleFile;
 use super::capture::CaptureArgs;
+use super::estimate::Estimate;
 use super::eval::{Evaluation, Measurements, Renderer, evaluate};
 use super::{output, train};
 use crate::config::RunConfig;
@@ -46,13 +47,17 @@ pub(super) fn trained(config: &RunConfig, capture: &Capture, stop: &AtomicBool) 
         }
         Err(error) => return Err(error.into()),
     };
-    let start = if resumes { train::Start::Resumed } else { train::Start::New };
+    let start = if resumes {
+        train::Start::Resumed
+    } else {
+        train::Start::New(Estimate::try_out(capture, &config.train, false, stop)?)
+    };
     Ok(train::train_in(folder, config, capture, start, stop)?.is_some())
 }
 
 /// Stops where the run in a point's folder is not the one that is asked for, in its bundle's bytes or its capture.
 fn refuse_other(begun: &RunConfig, config: &RunConfig, folder: &Path) -> Result<()> {
-    let difference = match begun.difference(config)? {
+    let difference = match begun.difference(config, train::IN_RUN_AND_ON_COMMAND_LINE)? {
         Some(difference) => difference,
         None if begun.encoding != config.encoding => "its bundle is coded in another way".to_owned(),
         None if begun.dataset != config.dataset => {

@@ -30,11 +30,11 @@ const OF_A_CAPTURE: [&str; 7] = ["dataset", "split", "max_resolution", "backgrou
 
 /// Draw a bundle as pictures: views of a capture, the bundle's own camera, a turn around it, or cameras of a file.
 ///
-/// Of a .ply or .spz it draws views of a capture.
+/// Of a .ply, .spz or .sog it draws views of a capture.
 #[derive(clap::Args)]
 #[command(group = clap::ArgGroup::new("cameras").required(true).args(["view", "all", "preview", "orbit", "camera"]))]
 pub(crate) struct Args {
-    /// The bundle, or the .ply or .spz.
+    /// The bundle, or a .ply, .spz or .sog file of Gaussians.
     bundle: PathBuf,
     /// Folder of the capture, as for eval
     #[arg(required_unless_present_any = ["preview", "orbit", "camera"])]

@@ -34,7 +34,7 @@ pub(super) struct RunsArgs {
     output: Option<PathBuf>,
     #[command(flatten)]
     quality: QualityOptions,
-    /// Configuration to read, as a run folder has it; options beside it count more.
+    /// Configuration to read, as a run folder has it; options override it.
     #[arg(long, value_name = "FILE.toml", help_heading = RUN)]
     config: Option<PathBuf>,
     #[command(flatten)]

@@ -31,9 +31,9 @@ pub(crate) struct QualityOptions {
     /// Training steps, with which all schedules scale [default: by the preset for train, 5000 for import, else 30000]
     #[arg(long, value_name = "N", help_heading = QUALITY)]
     iterations: Option<u32>,
-    /// Effects of the scene: auto keeps what pays in short pilot runs, a list of none, all, +NAME and -NAME forces
-    /// view-colour, view-geometry, view-distance, dilation-compensation, detail and anisotropy [default: auto for train, else
-    /// view-colour,view-geometry,anisotropy]
+    /// Effects of the scene: auto keeps what pays in short pilot runs, and measures that only in runs of 16,000 iterations and more;
+    /// a list of none, all, +NAME and -NAME forces view-colour, view-geometry, view-distance, dilation-compensation, detail and
+    /// anisotropy [default: auto for train, else view-colour,view-geometry,anisotropy]
     #[arg(long, value_name = "LIST", allow_hyphen_values = true, help_heading = QUALITY)]
     effects: Option<Request>,
     /// Training modules to attach in place of those of the configuration [default: rdo-pruning for
@@ -303,19 +303,34 @@ impl RunOptions {
         config.keep_checkpoints |= self.keep_checkpoints;
         config.fork_at = self.fork_at.clone().unwrap_or(config.fork_at);
         config.train.seed = self.seed.unwrap_or(config.train.seed);
-        for key in self.set.iter().map(|key| key.trim_start()) {
-            // The detail module has settings of its own where the run has the effect.
-            let settles = |effect: &Effect| {
-                key.starts_with(effect.key()) && !(*effect == Effect::Detail && effect.is_in(&config.train))
-            };
-            if let Some(effect) = Effect::ALL.into_iter().find(settles) {
-                bail!(
-                    "--set {key} belongs to the effect {effect}; force it with --effects +{effect} or --effects -{effect}"
-                );
-            }
+        for key in &self.set {
+            config = with_key(&config, key.trim_start())?;
         }
-        if self.set.is_empty() { Ok(config) } else { config.with_keys(&self.set) }
+        Ok(config)
     }
+}
+
+/// `config` with one key set, which must not decide about an effect.
+fn with_key(config: &RunConfig, key: &str) -> Result<RunConfig> {
+    // The detail module has settings of its own where the run has the effect.
+    let names =
+        |effect: &Effect| key.starts_with(effect.key()) && !(*effect == Effect::Detail && effect.is_in(&config.train));
+    let named = Effect::ALL.into_iter().find(names);
+    let set = match named {
+        Some(_) => config.clone(),
+        None => config.with_keys(&[key.to_owned()])?,
+    };
+    // A table may hold the key of an effect as well.
+    let changes = |effect: &Effect| effect.is_in(&config.train) != effect.is_in(&set.train);
+    if let Some(effect) = named.or_else(|| Effect::ALL.into_iter().find(changes)) {
+        bail!("--set {key} belongs to the effect {effect}; force it with --effects +{effect} or --effects -{effect}");
+    }
+    if set.train.shape.detail_hidden != config.train.shape.detail_hidden {
+        bail!(
+            "--set {key} belongs to the effect detail; set its width with --effects +detail --set train.modules.detail.hidden=N"
+        );
+    }
+    Ok(set)
 }
 
 #[cfg(test)]

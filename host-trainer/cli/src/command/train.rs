@@ -22,7 +22,7 @@ use serde::Serialize;
 use super::bundle::BundleFile;
 use super::capture::CaptureArgs;
 use super::effects::Resolved;
-use super::estimate::Estimate;
+use super::estimate::{Estimate, Warned};
 use super::eval::{Evaluation, Measurements, Renderer, ViewEvaluation, measure};
 use super::process::peak_memory_bytes;
 use super::progress::Progress;
@@ -32,6 +32,9 @@ use crate::config::{CaptureOptions, ExplicitRunConfig, Protocol, RunConfig};
 
 /// Seconds between checkpoints unless the user says otherwise: what an accident may cost.
 const CHECKPOINT_SECONDS: f64 = 60.0;
+
+/// Where the two configurations stand that have to agree.
+pub(crate) const IN_RUN_AND_ON_COMMAND_LINE: [&str; 2] = ["in the run", "on the command line"];
 
 /// Test views that tiers are measured with at most, evenly picked: more would cost time and say little.
 const MOST_JUDGES: usize = 12;
@@ -102,7 +105,7 @@ fn resume(args: &Args, path: &Path) -> Result<ExitCode> {
     let begun = RunConfig::parse(&folder.config()?);
     let begun = begun.with_context(|| format!("could not use the config.toml in {}", path.display()))?;
     let mut config = args.applied_to(begun.clone())?;
-    if let Some(difference) = begun.difference(&config)? {
+    if let Some(difference) = begun.difference(&config, IN_RUN_AND_ON_COMMAND_LINE)? {
         bail!("the run began with another setting than the command line asks for: {difference}; leave it out");
     }
     // What was chosen stays; what an accident kept from being chosen is measured now.
@@ -127,7 +130,7 @@ fn begin(args: &Args) -> Result<ExitCode> {
             eprintln!("going on after iteration {iteration} of {}", run.display());
             Start::Forked(Box::new(trainer))
         }
-        None => Start::New,
+        None => Start::New(Warned::default()),
     };
     let folder = RunFolder::start(&path, &config.to_toml()?, args.overwrite())?;
     train_and_print(args, folder, config, &capture, start)
@@ -146,6 +149,14 @@ fn train_and_print<'a>(
     }
     // Not before: until here there is nothing to keep, and Ctrl-C may end the process at once.
     let stop = stop::flag()?;
+    // Before the pilots: they may take hours too.
+    let start = match start {
+        Start::New(_) => {
+            let with_pilots = effects::are_measured(&config, capture);
+            Start::New(Estimate::try_out(capture, &config.train, with_pilots, &stop)?)
+        }
+        other => other,
+    };
     if effects::resolve(&mut config, capture, &folder, &stop)? == Resolved::Interrupted {
         return Ok(ExitCode::from(stop::INTERRUPTED));
     }
@@ -189,8 +200,8 @@ fn check_size(capture: &Capture) -> Result<()> {
 /// Where a run begins.
 #[derive(Debug)]
 pub(crate) enum Start<'a> {
-    /// With the capture's points.
-    New,
+    /// With the capture's points; what the user was warned of when the run was tried out.
+    New(Warned),
     /// With the newest checkpoint of its folder.
     Resumed,
     /// With the state of another run.
@@ -208,11 +219,9 @@ pub(crate) fn train_in<'a>(
     let mut folder = folder.forking_at(&config.fork_at);
     let path = folder.path().to_owned();
     let scale = config.encoding.scale(capture);
+    let warned = if let Start::New(warned) = start { warned } else { Warned::default() };
     let trainer = match start {
-        Start::New => {
-            Estimate::try_out(capture, &config.train)?;
-            Trainer::new(capture, config.train)?
-        }
+        Start::New(_) => Trainer::new(capture, config.train)?,
         Start::Resumed => resumed(&folder, config, capture)?,
         Start::Forked(trainer) => {
             // Without it a resumed run would begin with the capture's points.
@@ -224,7 +233,7 @@ pub(crate) fn train_in<'a>(
     folder.write_config(&config.to_toml()?)?;
     let interval = config.checkpoint_every.map_or(Interval::Seconds(CHECKPOINT_SECONDS), Interval::Iterations);
     let how_to_go_on = || format!("go on with `pocketsplat train --resume {}`", path.display());
-    let estimate = Estimate::new(capture, &config.train, trainer.iteration);
+    let estimate = Estimate::new(capture, &config.train, trainer.iteration, warned);
     let mut progress = Progress::new(trainer.iteration, config.train.iterations).estimating(estimate);
     let ending = folder.train(&mut trainer, &mut progress, interval, stop);
     let ending = ending.map_err(|error| {
@@ -266,7 +275,7 @@ fn resumed<'a>(folder: &RunFolder, config: &RunConfig, capture: &'a Capture) -> 
     }
     let trainer = resumed.restored.trainer;
     let at_checkpoint = RunConfig { train: *trainer.config(), ..config.clone() };
-    if let Some(difference) = config.difference(&at_checkpoint)? {
+    if let Some(difference) = config.difference(&at_checkpoint, ["in config.toml", "in the checkpoint"])? {
         bail!("config.toml and the checkpoint disagree: {difference}; write back what the run began with");
     }
     let (then, now) = (&resumed.restored.written_by, trainer.kernels());

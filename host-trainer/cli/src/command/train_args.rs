@@ -52,17 +52,17 @@ pub(crate) struct Args {
     lambda: Option<f64>,
     #[command(flatten)]
     device: DeviceArgs,
-    /// Configuration to read, as a run folder has it; options beside it count more.
+    /// Configuration to read, as a run folder has it; options override it.
     #[arg(long, value_name = "FILE.toml", conflicts_with = "resume", help_heading = RUN)]
     config: Option<PathBuf>,
-    /// Run folder to go on in; a capture that has moved is given as DATASET.
+    /// Run folder of an interrupted run to go on with; give DATASET as well if the capture has moved.
     #[arg(long, value_name = "OUT.run", help_heading = RUN)]
     resume: Option<PathBuf>,
-    /// Run folder whose run this one shares up to --at; what the command line says else holds from there on.
+    /// Run folder of a run to branch off after iteration --at; the other options hold from there on.
     #[arg(long, value_name = "OUT.run", requires = "at", conflicts_with_all = ["config", "resume"], help_heading = RUN,
         hide_short_help = true)]
     from: Option<PathBuf>,
-    /// Iteration after which it goes its own way; one that the run was given as --fork-at.
+    /// Iteration to branch off after, one that the other run was given as --fork-at.
     #[arg(long, value_name = "STEP", requires = "from", help_heading = RUN, hide_short_help = true)]
     at: Option<u32>,
     /// Start anew where an unfinished run lies [default: refuse]
@@ -197,10 +197,12 @@ impl Args {
                 *into = std::path::absolute(path).with_context(|| format!("{} is not a path", path.display()))?;
             }
         }
-        let limits = self.device.limits();
-        if !limits.is_none() {
-            config.encoding.limits = limits;
-        }
+        let (given, before) = (self.device.limits(), config.encoding.limits);
+        config.encoding.limits = Limits {
+            ram_bytes: given.ram_bytes.or(before.ram_bytes),
+            flash_bytes: given.flash_bytes.or(before.flash_bytes),
+            processor: given.processor.or(before.processor),
+        };
         config.effects.target = self.device.target.or(config.effects.target);
         if let Some(lambda) = self.lambda {
             config.train.hac.lambda = lambda;

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use toml::Table;
 
 use super::named::EXPLICIT;
-use super::{CaptureOptions, Difference, keys_of, merge, refuse_unknown};
+use super::{CaptureOptions, keys_of, merge, refuse_unknown};
 
 /// Everything such a run was asked for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -65,13 +65,15 @@ impl ExplicitRunConfig {
     }
 
     /// The first key at which two differ in what decides the result, with both values.
-    pub(crate) fn difference(&self, other: &Self) -> Result<Option<String>> {
+    ///
+    /// * `places`: as those of [`RunConfig::difference`](super::RunConfig::difference).
+    pub(crate) fn difference(&self, other: &Self, places: [&str; 2]) -> Result<Option<String>> {
         let deciding = |config: &Self| {
             let Self { capture, gaussians, .. } = config.clone();
             Table::try_from(Self::new(PathBuf::new(), PathBuf::new(), capture, gaussians))
         };
-        let first = super::table_differences(&deciding(self)?, &deciding(other)?).into_iter().next();
-        Ok(first.map(|Difference { key, one, other }| format!("`{key}` is {one} and {other}")))
+        let differences = super::table_differences(&deciding(self)?, &deciding(other)?);
+        Ok(differences.first().map(|difference| difference.at(places)))
     }
 }
 
@@ -99,10 +101,11 @@ mod tests {
         let keys = ["gaussians.density.interval=50".to_owned(), "gaussians.rates.bands_divisor=10".to_owned()];
         let changed = config().with_keys(&keys).unwrap();
         assert_eq!((changed.gaussians.density.interval, changed.gaussians.rates.bands_divisor), (50, 10.0));
-        let said = config().difference(&changed).unwrap().unwrap();
-        assert!(said.contains("gaussians.density.interval") && said.contains("100 and 50"), "{said}");
+        let places = ["in the run", "on the command line"];
+        let said = config().difference(&changed, places).unwrap().unwrap();
+        assert_eq!(said, "`gaussians.density.interval` is 100 in the run, 50 on the command line");
         let elsewhere = ExplicitRunConfig { dataset: "moved".into(), ..config() };
-        assert_eq!(config().difference(&elsewhere).unwrap(), None);
+        assert_eq!(config().difference(&elsewhere, places).unwrap(), None);
         assert!(config().with_keys(&["gaussians.density.intervall=50".to_owned()]).is_err());
     }
 }

@@ -110,21 +110,21 @@ impl RunConfig {
         Ok(self.encoding.check(self.train.backbone)?)
     }
 
-    /// The first key at which two configurations differ in what decides the result, with both values.
+    /// The first key at which two configurations differ in what decides the training, with both values.
     ///
-    /// Where the capture lies, where the bundle goes, how it is quantised and when checkpoints are written do not: the
-    /// bundle is written anew from what was trained.
-    pub(crate) fn difference(&self, other: &Self) -> Result<Option<String>> {
-        let first = self.differences(other)?.into_iter().next();
-        Ok(first.map(|Difference { key, one, other }| format!("`{key}` is {one} and {other}")))
-    }
-
-    /// All keys at which they differ in that.
-    fn differences(&self, other: &Self) -> Result<Vec<Difference>> {
-        differences(self, other, |config| {
+    /// Where the capture lies, where the bundle goes and when checkpoints are written do not. How the bundle is coded does where it
+    /// has limits, for the run is steered by what its bundle takes of them; without, the bundle is written anew from what was
+    /// trained.
+    ///
+    /// * `places`: where this one and the other stand, as "in the run" and "on the command line".
+    pub(crate) fn difference(&self, other: &Self, places: [&str; 2]) -> Result<Option<String>> {
+        let is_steered = !(self.encoding.limits.is_none() && other.encoding.limits.is_none());
+        let differences = differences(self, other, |config| {
             let Self { capture, train, .. } = config;
-            Self { capture, train, ..Self::default() }
-        })
+            let encoding = if is_steered { config.encoding } else { Encoding::default() };
+            Self { capture, train, encoding, ..Self::default() }
+        });
+        Ok(differences?.first().map(|difference| difference.at(places)))
     }
 
     /// All keys at which their bundles differ: those, and how bundles are coded. The effects that were chosen are among them, how
@@ -143,6 +143,14 @@ pub(crate) struct Difference {
     pub(crate) key: String,
     pub(crate) one: String,
     pub(crate) other: String,
+}
+
+impl Difference {
+    /// With both values, and where they stand.
+    fn at(&self, [here, there]: [&str; 2]) -> String {
+        let Self { key, one, other } = self;
+        format!("`{key}` is {one} {here}, {other} {there}")
+    }
 }
 
 /// Keys given as `table.key=value`, as tables; what is no TOML value is taken as text.

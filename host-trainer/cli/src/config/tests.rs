@@ -94,10 +94,33 @@ fn any_key_can_be_set_by_its_path() {
 #[test]
 fn only_what_decides_the_result_counts_as_a_difference() {
     let a = RunConfig::default();
+    let difference = |other: &RunConfig| a.difference(other, ["here", "there"]).unwrap();
     let mut b = RunConfig { output: "elsewhere".into(), checkpoint_every: Some(3), ..a.clone() };
-    assert_eq!(a.difference(&b).unwrap(), None);
+    assert_eq!(difference(&b), None);
     b.train.shape.n_offsets = 5;
-    assert_eq!(a.difference(&b).unwrap().unwrap(), "`train.shape.n_offsets` is 10 and 5");
+    assert_eq!(difference(&b).unwrap(), "`train.shape.n_offsets` is 10 here, 5 there");
     b = RunConfig { capture: CaptureOptions { max_resolution: Some(200), ..a.capture.clone() }, ..a.clone() };
-    assert_eq!(a.difference(&b).unwrap().unwrap(), "`capture.max_resolution` is nothing and 200");
+    assert_eq!(difference(&b).unwrap(), "`capture.max_resolution` is nothing here, 200 there");
+}
+
+#[test]
+fn coding_decides_where_limits_steer_the_run() {
+    let steered = |keys: &[&str]| {
+        RunConfig::default().with_keys(&keys.iter().map(|key| (*key).to_owned()).collect::<Vec<_>>()).unwrap()
+    };
+    let difference = |one: &RunConfig, other: &RunConfig| one.difference(other, ["here", "there"]).unwrap();
+    let (free, tables) = (RunConfig::default(), steered(&["encoding.coder=static", "encoding.tiers=[0.5, 0]"]));
+    assert_eq!(difference(&free, &tables), None, "without limits bundles are coded when all is trained");
+    let flash = steered(&["encoding.limits.flash_bytes=300000"]);
+    for (key, is) in [
+        ("encoding.limits.flash_bytes=200000", "`encoding.limits.flash_bytes` is 300000 here, 200000 there"),
+        ("encoding.limits.ram_bytes=4096", "`encoding.limits.ram_bytes` is nothing here, 4096 there"),
+        ("encoding.coder=static", "`encoding.coder` is \"auto\" here, \"static\" there"),
+        ("encoding.tiers=[0.0]", "`encoding.tiers` is "),
+    ] {
+        let said = difference(&flash, &flash.with_keys(&[key.to_owned()]).unwrap()).expect(key);
+        assert!(said.starts_with(is), "{key}: {said}");
+    }
+    assert!(difference(&free, &flash).expect("limits").contains("encoding.limits"));
+    assert_eq!(difference(&flash, &flash), None);
 }

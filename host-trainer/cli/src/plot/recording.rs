@@ -293,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_can_not_be_plotted_says_why() {
+    fn a_file_that_cannot_be_plotted_says_why() {
         let message = |text| {
             let error = format!("{:#}", read(text).unwrap_err());
             assert!(error.contains("some.csv"), "{error}");

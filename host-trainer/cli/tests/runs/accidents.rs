@@ -63,7 +63,7 @@ fn a_full_disk_is_named() {
 }
 
 #[test]
-fn a_folder_that_can_not_be_written_is_an_error_before_any_work() {
+fn a_folder_that_cannot_be_written_is_an_error_before_any_work() {
     let home = folder("read-only");
     fs::set_permissions(&home, fs::Permissions::from_mode(0o555)).unwrap();
     let mut commands = [train(&home.join("a.psb")), train(&home.join("../writable.psb"))];

@@ -48,7 +48,7 @@ fn a_written_configuration_gives_the_same_bundle_again() {
 }
 
 #[test]
-fn what_a_configuration_can_not_say_is_refused_by_name() {
+fn what_a_configuration_cannot_say_is_refused_by_name() {
     let home = folder("bad-config");
     let config = home.join("my.toml");
     let mut command = pocketsplat();
@@ -73,12 +73,22 @@ fn a_run_goes_on_only_with_what_it_began_with() {
     child.kill().unwrap();
     child.wait().unwrap();
     let error = fails(resume(&run).args(["--iterations", "400"]));
-    assert!(error.contains("`train.iterations` is 160 and 400"), "{error}");
+    assert!(error.contains("`train.iterations` is 160 in the run, 400 on the command line"), "{error}");
+    let error = fails(resume(&run).args(["--flash", "300kB"]));
+    assert!(
+        error.contains("`encoding.limits` is nothing in the run, { flash_bytes = 300000 } on the command line"),
+        "{error}"
+    );
     let config = run.join("config.toml");
     let begun = fs::read_to_string(&config).unwrap();
     fs::write(&config, begun.replace("seed = 42", "seed = 43")).unwrap();
     let error = fails(&mut resume(&run));
-    assert!(error.contains("config.toml and the checkpoint disagree: `train.seed` is 43 and 42"), "{error}");
+    assert!(
+        error.contains(
+            "config.toml and the checkpoint disagree: `train.seed` is 43 in config.toml, 42 in the checkpoint"
+        ),
+        "{error}"
+    );
     fs::write(&config, begun).unwrap();
     // Where the bundle goes does not decide what it is.
     let elsewhere = home.join("b.psb");

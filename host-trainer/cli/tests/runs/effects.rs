@@ -53,6 +53,12 @@ fn an_effect_is_set_in_one_way() {
     assert!(!output.exists() && !output.with_extension("run").exists(), "before anything was done");
     let settings = ["--effects", "+detail", "--set", "train.modules.detail.hidden=5"];
     succeeds(train(&output).args(settings));
+    for key in ["train.shape={view_colour=false}", "train={shape={anisotropic=false}}", "train.modules={detail={}}"] {
+        let said = fails(train(&output).args(["--set", key]).arg("--overwrite"));
+        assert!(said.contains(&format!("--set {key} belongs to the effect")) && said.contains("--effects +"), "{said}");
+    }
+    let said = fails(train(&output).args(["--effects", "+detail", "--set", "train.shape.detail_hidden=99"]));
+    assert!(said.contains("belongs to the effect detail") && said.contains("train.modules.detail.hidden"), "{said}");
     assert!(effects_of(&output).detail && effects_of(&output).view_colour);
     let mut sweep = pocketsplat();
     sweep.arg("sweep").arg(capture()).arg("-o").arg(output.with_extension("sweep"));
@@ -94,6 +100,8 @@ fn effects_are_measured_once_and_stay_with_the_run() {
     let measured = ["--effects", "auto", "--set", least, "--set", "effects.price.effect_db=1000"];
     command.args(measured);
     let said = succeeds(&mut command);
+    let (estimate, pilot) = (said.find(" of them to measure effects), "), said.find("effects: pilot 1 with none"));
+    assert!(estimate.zip(pilot).is_some_and(|(estimate, pilot)| estimate < pilot), "{said}");
     assert!(said.contains("effects: pilot 5 with detail") && said.contains("effects: none, measured in"), "{said}");
     assert_eq!(effects_of(&output), Effects::default());
     let kept = home.join("a.run");

@@ -11,8 +11,8 @@ mod search;
 
 use std::fmt;
 
-pub use pilot::{LEAST_ITERATIONS, PilotCapture, PilotError, PilotLog, measure};
-pub use price::{Price, Worth, choose};
+pub use pilot::{LEAST_ITERATIONS, PILOTS_TIME_SHARE, PilotCapture, PilotError, PilotLog, measure};
+pub use price::{PilotFigures, Price, choose};
 pub use request::{ParseEffectsError, Request};
 pub use search::{Pilot, Pilots};
 

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, MaxSplats};
 
 use super::search::{Pilots, search};
-use super::{Effect, Price, Worth};
+use super::{Effect, PilotFigures, Price};
 use crate::camera::core_camera;
 use crate::device::{Limits, Processor};
 use crate::encode::{CoderChoice, EncodeError, Encoding};
@@ -25,9 +25,10 @@ use pocketsplat_instructions::predict;
 pub const LEAST_ITERATIONS: u32 = 16_000;
 /// Share of the run's iterations that each pilot takes.
 ///
-/// At half the resolution and for the image alone an iteration takes about a quarter of one of the run's with `hac`, so the six
-/// to nine pilots take about a quarter of its time.
+/// At half the resolution and for the image alone an iteration takes about a quarter of one of the run's with `hac`.
 const PILOT_SHARE: f64 = 0.125;
+/// Time of the six to nine pilots, against that of the run.
+pub const PILOTS_TIME_SHARE: f64 = 0.25;
 /// Of so many training views one is held out to measure with.
 const HOLD_OUT_EVERY: usize = 8;
 
@@ -41,10 +42,15 @@ pub struct PilotCapture {
 }
 
 impl PilotCapture {
+    /// Whether `capture` has enough training views to spare some.
+    pub fn can_be_of(capture: &Capture) -> bool {
+        capture.train.len() >= MIN_VIEWS_TO_HOLD_OUT
+    }
+
     /// Halves the views of `capture` and holds some of those it trains on out; never looks at its test views. `None` where it has
     /// too few to spare any.
     pub fn of(capture: &Capture) -> Option<Self> {
-        if capture.train.len() < MIN_VIEWS_TO_HOLD_OUT {
+        if !Self::can_be_of(capture) {
             return None;
         }
         let views = |held_out: bool| {
@@ -95,7 +101,7 @@ pub enum PilotError {
 /// Follows pilots, and remembers those that are done, so that no interruption makes them be trained again.
 pub trait PilotLog {
     /// What a pilot with these effects and this change of the seed came to, if it is done.
-    fn known(&self, effects: &[Effect], seed: u64) -> Option<Worth>;
+    fn known(&self, effects: &[Effect], seed: u64) -> Option<PilotFigures>;
 
     /// A pilot begins, of so many iterations.
     fn begins(&mut self, effects: &[Effect], iterations: u32);
@@ -107,7 +113,7 @@ pub trait PilotLog {
     ///
     /// # Errors
     /// What keeps it from being written down.
-    fn done(&mut self, effects: &[Effect], seed: u64, worth: &Worth) -> io::Result<()>;
+    fn done(&mut self, effects: &[Effect], seed: u64, worth: &PilotFigures) -> io::Result<()>;
 }
 
 /// For which device pilots are drawn.
@@ -174,7 +180,7 @@ fn pilot_config(config: &TrainConfig, effects: &[Effect]) -> TrainConfig {
 }
 
 /// What a pilot's bundle is worth on the views that were held out of it.
-fn worth(bytes: &[u8], capture: &PilotCapture, device: PilotDevice) -> Result<Worth, DecodeError> {
+fn worth(bytes: &[u8], capture: &PilotCapture, device: PilotDevice) -> Result<PilotFigures, DecodeError> {
     let bundle = Bundle::parse(bytes)?;
     let (mut psnr_db, mut instructions) = (0.0, 0.0);
     let n = capture.reduced.test.len() as f64;
@@ -182,7 +188,7 @@ fn worth(bytes: &[u8], capture: &PilotCapture, device: PilotDevice) -> Result<Wo
         psnr_db += psnr_db_masked(&image, &view.image, view.mask.as_ref()) / n;
     })?;
     draw(&bundle, &capture.held_out, device, |_, _, frame_instructions| instructions += frame_instructions / n)?;
-    Ok(Worth { psnr_db, instructions, bytes: bytes.len() })
+    Ok(PilotFigures { psnr_db, instructions, bytes: bytes.len() })
 }
 
 /// Draws views by the plan that a device would make, and hands on each image and its predicted instructions.
@@ -220,11 +226,11 @@ mod tests {
     struct Noted {
         begun: Vec<String>,
         n_steps: u32,
-        known: Vec<(String, u64, Worth)>,
+        known: Vec<(String, u64, PilotFigures)>,
     }
 
     impl PilotLog for Noted {
-        fn known(&self, effects: &[Effect], seed: u64) -> Option<Worth> {
+        fn known(&self, effects: &[Effect], seed: u64) -> Option<PilotFigures> {
             let name = Effect::names(effects);
             self.known.iter().find(|known| known.0 == name && known.1 == seed).map(|known| known.2)
         }
@@ -238,7 +244,7 @@ mod tests {
             self.n_steps += 1;
         }
 
-        fn done(&mut self, effects: &[Effect], seed: u64, worth: &Worth) -> io::Result<()> {
+        fn done(&mut self, effects: &[Effect], seed: u64, worth: &PilotFigures) -> io::Result<()> {
             self.known.push((Effect::names(effects), seed, *worth));
             Ok(())
         }

@@ -2,9 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-/// What a scene is worth and takes.
+/// What the scene of a pilot is worth and takes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Worth {
+pub struct PilotFigures {
     /// PSNR over views that were not trained on, dB.
     pub psnr_db: f64,
     /// Instructions of a frame on the target, predicted, mean over those views.
@@ -13,7 +13,7 @@ pub struct Worth {
     pub bytes: usize,
 }
 
-impl Worth {
+impl PilotFigures {
     pub(super) fn mean_with(&self, other: &Self) -> Self {
         Self {
             psnr_db: self.psnr_db.midpoint(other.psnr_db),
@@ -60,7 +60,7 @@ impl Price {
     ///
     /// Less than nothing where it saves more than its effects cost. * `chance_db`: what scenes gain that differ in nothing but their
     /// seeds.
-    pub fn of(&self, n_effects: usize, with: &Worth, without: &Worth, chance_db: f64) -> f64 {
+    pub fn of(&self, n_effects: usize, with: &PilotFigures, without: &PilotFigures, chance_db: f64) -> f64 {
         let tenths_more = |with: f64, without: f64| 10.0 * (with / without - 1.0);
         (self.effect_db * n_effects as f64).max(chance_db)
             + self.instructions_db * tenths_more(with.instructions, without.instructions)
@@ -71,9 +71,9 @@ impl Price {
 /// The index of the trial whose gain is furthest above its price; 0, the one without effects, where none gains more than its price.
 ///
 /// * `trials`: number of effects and worth of each; the first is without. * `chance_db`: as in [`Price::of`].
-pub fn choose(price: &Price, trials: &[(usize, Worth)], chance_db: f64) -> usize {
+pub fn choose(price: &Price, trials: &[(usize, PilotFigures)], chance_db: f64) -> usize {
     let Some((_, without)) = trials.first() else { return 0 };
-    let left = |(n, with): &(usize, Worth)| {
+    let left = |(n, with): &(usize, PilotFigures)| {
         let gain_db = with.psnr_db - without.psnr_db;
         if gain_db > 0.0 { gain_db - price.of(*n, with, without, chance_db) } else { f64::NEG_INFINITY }
     };
@@ -88,10 +88,10 @@ pub fn choose(price: &Price, trials: &[(usize, Worth)], chance_db: f64) -> usize
 mod tests {
     use super::*;
 
-    const NONE: (usize, Worth) = (0, Worth { psnr_db: 30.0, instructions: 50e6, bytes: 100_000 });
+    const NONE: (usize, PilotFigures) = (0, PilotFigures { psnr_db: 30.0, instructions: 50e6, bytes: 100_000 });
 
-    fn trial(n: usize, gain_db: f64, instructions: f64, bytes: usize) -> (usize, Worth) {
-        (n, Worth { psnr_db: 30.0 + gain_db, instructions, bytes })
+    fn trial(n: usize, gain_db: f64, instructions: f64, bytes: usize) -> (usize, PilotFigures) {
+        (n, PilotFigures { psnr_db: 30.0 + gain_db, instructions, bytes })
     }
 
     #[test]
@@ -104,7 +104,7 @@ mod tests {
 
     #[test]
     fn what_gains_no_more_than_its_price_is_left_out() {
-        let choose = |trials: &[(usize, Worth)], chance_db| choose(&Price::for_device(), trials, chance_db);
+        let choose = |trials: &[(usize, PilotFigures)], chance_db| choose(&Price::for_device(), trials, chance_db);
         assert_eq!(choose(&[NONE], 0.0), 0);
         assert_eq!(choose(&[NONE, trial(1, 0.049, 50e6, 100_000)], 0.0), 0, "the effect itself");
         assert_eq!(choose(&[NONE, trial(1, 0.051, 50e6, 100_000)], 0.0), 1);
@@ -116,7 +116,7 @@ mod tests {
 
     #[test]
     fn on_a_pc_what_gains_is_kept_whatever_it_takes() {
-        let choose = |trials: &[(usize, Worth)], chance_db| choose(&Price::for_pc(), trials, chance_db);
+        let choose = |trials: &[(usize, PilotFigures)], chance_db| choose(&Price::for_pc(), trials, chance_db);
         assert_eq!(choose(&[NONE, trial(1, 0.051, 500e6, 900_000)], 0.0), 1);
         assert_eq!(choose(&[NONE, trial(1, 0.051, 500e6, 900_000)], 0.1), 0, "no more than chance");
         assert_eq!(choose(&[NONE, trial(1, 0.4, 55e6, 90_000), trial(3, 0.6, 90e6, 90_000)], 0.0), 2);
@@ -124,7 +124,7 @@ mod tests {
 
     #[test]
     fn of_those_that_pay_the_one_that_leaves_most_is_kept() {
-        let choose = |trials: &[(usize, Worth)]| choose(&Price::for_device(), trials, 0.0);
+        let choose = |trials: &[(usize, PilotFigures)]| choose(&Price::for_device(), trials, 0.0);
         let alone = [trial(1, 0.2, 55e6, 100_000), trial(1, 0.4, 55e6, 100_000)];
         assert_eq!(choose(&[NONE, alone[0], alone[1], trial(2, 0.44, 56e6, 100_000)]), 2);
         assert_eq!(choose(&[NONE, alone[0], alone[1], trial(2, 0.6, 56e6, 100_000)]), 3);

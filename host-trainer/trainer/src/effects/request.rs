@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn what_can_not_be_meant_is_refused_by_name() {
+    fn what_cannot_be_meant_is_refused_by_name() {
         for (text, part) in [
             (
                 "+fog",

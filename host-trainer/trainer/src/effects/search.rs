@@ -1,6 +1,6 @@
 //! Which sets of effects are tried, and which one is kept.
 
-use super::{Effect, Price, Worth, choose};
+use super::{Effect, PilotFigures, Price, choose};
 
 /// So many times the difference of two seeds is taken for chance.
 ///
@@ -23,7 +23,7 @@ pub struct Pilot {
     /// The effects that it had.
     pub effects: Vec<Effect>,
     /// What it was worth.
-    pub worth: Worth,
+    pub worth: PilotFigures,
     /// What it gained over the pilot without effects, dB.
     pub gain_db: f64,
     /// What it had to gain, dB.
@@ -49,7 +49,7 @@ impl Pilot {
 /// Those of `worth_of`.
 pub(super) fn search<E>(
     price: &Price,
-    mut worth_of: impl FnMut(&[Effect], u64) -> Result<Worth, E>,
+    mut worth_of: impl FnMut(&[Effect], u64) -> Result<PilotFigures, E>,
 ) -> Result<Pilots, E> {
     let (one, other) = (worth_of(&[], 0)?, worth_of(&[], 1)?);
     let (without, chance_db) = (one.mean_with(&other), CHANCE * (one.psnr_db - other.psnr_db).abs());
@@ -82,7 +82,7 @@ pub(super) fn search<E>(
         let least = (0..gainers.len()).min_by(|a, b| gainers[*a].0.total_cmp(&gainers[*b].0));
         least.map(|least| gainers.remove(least));
     }
-    let numbers: Vec<(usize, Worth)> = each.iter().map(|trial| (trial.effects.len(), trial.worth)).collect();
+    let numbers: Vec<(usize, PilotFigures)> = each.iter().map(|trial| (trial.effects.len(), trial.worth)).collect();
     let chosen = choose(price, &numbers, chance_db);
     each[chosen].chosen = true;
     Ok(Pilots { chance_db, each })
@@ -100,7 +100,7 @@ mod tests {
         let trials = search(&Price::for_device(), |effects, seed| {
             tried.push(effects.to_vec());
             let psnr_db = 30.0 + gain_db(effects) + 0.001 * seed as f64;
-            Ok::<_, ()>(Worth { psnr_db, instructions: 1e6 * frame(effects), bytes: 1000 })
+            Ok::<_, ()>(PilotFigures { psnr_db, instructions: 1e6 * frame(effects), bytes: 1000 })
         });
         let chosen = trials.expect("no error").each.into_iter().filter(|trial| trial.chosen).map(|trial| trial.effects);
         (tried.split_off(2 + Effect::MEASURED.len()), chosen.flatten().collect())

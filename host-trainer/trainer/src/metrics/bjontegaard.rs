@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn curves_that_can_not_be_compared_say_why() {
+    fn curves_that_cannot_be_compared_say_why() {
         let message = |b: &[(f64, f64)]| bd_rate_percent(&a(), &curve(b)).unwrap_err().to_string();
         assert!(message(&[(1e6, 33.0)]).contains("compared curve has 1 points"), "{}", message(&[(1e6, 33.0)]));
         let apart = message(&[(1e6, 20.0), (2e6, 25.0)]);

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use indicatif::ProgressBar;
-use pocketsplat_trainer::effects::{Effect, PilotLog, Worth};
+use pocketsplat_trainer::effects::{Effect, PilotFigures, PilotLog};
 use serde::{Deserialize, Serialize};
 
 use super::super::output;
@@ -68,10 +68,10 @@ impl PilotsFile {
 }
 
 impl PilotLog for PilotsFile {
-    fn known(&self, effects: &[Effect], seed: u64) -> Option<Worth> {
+    fn known(&self, effects: &[Effect], seed: u64) -> Option<PilotFigures> {
         let names = Effect::names(effects);
         let found = self.done.iter().find(|done| done.effects == names && done.seed == seed)?;
-        Some(Worth { psnr_db: found.psnr_db, instructions: found.instructions, bytes: found.bytes })
+        Some(PilotFigures { psnr_db: found.psnr_db, instructions: found.instructions, bytes: found.bytes })
     }
 
     fn begins(&mut self, effects: &[Effect], iterations: u32) {
@@ -98,8 +98,8 @@ impl PilotLog for PilotsFile {
         self.bar.set_position(self.done.len() as u64 * u64::from(self.iterations) + u64::from(iteration));
     }
 
-    fn done(&mut self, effects: &[Effect], seed: u64, worth: &Worth) -> io::Result<()> {
-        let Worth { psnr_db, instructions, bytes } = *worth;
+    fn done(&mut self, effects: &[Effect], seed: u64, worth: &PilotFigures) -> io::Result<()> {
+        let PilotFigures { psnr_db, instructions, bytes } = *worth;
         self.done.push(Done { effects: Effect::names(effects), seed, psnr_db, instructions, bytes });
         let table = output::csv(self.done.iter().cloned()).map_err(io::Error::other)?;
         output::write_whole(&self.path, &table).map_err(io::Error::other)
@@ -114,7 +114,7 @@ mod tests {
     fn what_is_done_is_known_to_the_next_process_to_the_last_bit() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("pilots.csv");
-        let worth = Worth { psnr_db: 30.0 + 1.0 / 3.0, instructions: 1e8 / 7.0, bytes: 12_345 };
+        let worth = PilotFigures { psnr_db: 30.0 + 1.0 / 3.0, instructions: 1e8 / 7.0, bytes: 12_345 };
         let effects = [Effect::ViewColour, Effect::Anisotropy];
         let mut file = PilotsFile::open(path.clone()).expect("none yet");
         file.begins(&effects, 100);

@@ -19,7 +19,7 @@ use super::super::process::peak_memory_bytes;
 use super::super::progress::Progress;
 use super::super::train_args::Args;
 use super::super::{output, stop};
-use super::{CHECKPOINT_SECONDS, HeldOut, check_size};
+use super::{CHECKPOINT_SECONDS, HeldOut, IN_RUN_AND_ON_COMMAND_LINE, check_size};
 use crate::config::{EXPLICIT, ExplicitRunConfig, Protocol};
 
 /// What a finished run reports.
@@ -61,7 +61,7 @@ pub(super) fn resume(args: &Args, folder: RunFolder) -> Result<ExitCode> {
     let begun = ExplicitRunConfig::parse(&folder.config()?);
     let begun = begun.with_context(|| format!("could not use the config.toml in {}", folder.path().display()))?;
     let config = args.applied_to_explicit(begun.clone())?;
-    if let Some(difference) = begun.difference(&config)? {
+    if let Some(difference) = begun.difference(&config, IN_RUN_AND_ON_COMMAND_LINE)? {
         bail!("the run began with another setting than the command line asks for: {difference}; leave it out");
     }
     format_of(&config)?;

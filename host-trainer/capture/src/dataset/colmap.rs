@@ -11,6 +11,7 @@ use super::error::first_few;
 use super::image::read_header;
 use super::listing::{ListedView, Listing, Note, Shot, every_nth, unused_images};
 use super::named_path::NamedPath;
+use super::quaternion::{long_quaternions, rotation_of};
 use super::{DatasetError, Layout, LoadOptions, ViewFault, image_folder, text_file};
 
 mod binary;
@@ -20,12 +21,6 @@ mod text;
 
 pub(super) use choose::has_model;
 use model::{ModelCamera, ModelEncoding, ModelFault, ModelImage};
-
-/// Deviation of a quaternion's length from 1 that rounding explains: text files carry at least three decimals.
-const ROUNDED_QUATERNION: f64 = 2e-3;
-
-/// Largest deviation of a quaternion's length from 1 that is taken for a missing normalisation.
-const MAX_QUATERNION_DEVIATION: f64 = 0.1;
 
 /// The folder of masks beside the folder of images.
 const MASKS: &str = "masks";
@@ -83,7 +78,8 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
     let used_masks: Vec<PathBuf> = views.iter().filter_map(|view| view.shot.as_ref().ok()?.mask.clone()).collect();
     let unposed = unused_images(&image_folder, posed.iter().chain(&used_masks).map(PathBuf::as_path));
     notes.extend(missing_masks(masks.as_deref(), &views));
-    notes.extend(long_quaternions(&path("images"), &images));
+    notes
+        .extend(long_quaternions(&path("images"), images.iter().map(|image| (image.name.as_str(), quaternion(image)))));
     let mut listing = Listing { layout: Layout::Colmap, source: path("images"), views, points, unposed, notes };
     if !listing.has_test_views() {
         listing.notes.push(Note::no_test_views());
@@ -124,24 +120,6 @@ fn missing_masks(masks: Option<&Path>, views: &[ListedView]) -> Option<Note> {
     })
 }
 
-/// Says which rotations had to be normalised by more than rounding explains.
-fn long_quaternions(path: &Path, images: &[ModelImage]) -> Option<Note> {
-    let deviation = |image: &ModelImage| (quaternion(image).length() - 1.0).abs();
-    let near = |image: &&ModelImage| (ROUNDED_QUATERNION..=MAX_QUATERNION_DEVIATION).contains(&deviation(image));
-    let near: Vec<&ModelImage> = images.iter().filter(near).collect();
-    let worst = near.iter().max_by(|a, b| deviation(a).total_cmp(&deviation(b)))?;
-    let names: Vec<&str> = near.iter().map(|image| image.name.as_str()).collect();
-    let text = format!(
-        "`{}`: rotations whose quaternion is not of length 1: {} ({}), the worst of length {:.6}; they were normalised: export \
-         the model again with more digits if its views do not agree",
-        path.display(),
-        names.len(),
-        first_few(&names, ", "),
-        quaternion(worst).length()
-    );
-    Some(Note::warning("quaternion-length", text))
-}
-
 /// The mask of the image `name`: COLMAP appends `.png` to the image's name, others replace its extension.
 fn mask_of(masks: &Path, name: &str) -> Option<PathBuf> {
     NamedPath::new(&format!("{name}.png")).file(masks, None).or_else(|| NamedPath::new(name).image(masks, None))
@@ -179,14 +157,10 @@ fn quaternion(image: &ModelImage) -> DQuat {
 
 /// World to camera in OpenCV axes, as COLMAP stores it.
 fn pose(image: &ModelImage) -> Result<(DMat3, DVec3), ViewFault> {
-    let quaternion = quaternion(image);
-    let length = quaternion.length();
-    if length.is_nan() || (length - 1.0).abs() > MAX_QUATERNION_DEVIATION {
-        return Err(ViewFault::Quaternion { length });
-    }
+    let rotation = rotation_of(quaternion(image))?;
     let translation = DVec3::from_array(image.translation);
     if !translation.is_finite() {
         return Err(ViewFault::Translation { found: image.translation });
     }
-    Ok((DMat3::from_quat(quaternion.normalize()), translation))
+    Ok((rotation, translation))
 }

@@ -15,8 +15,11 @@ fn has_extension(name: &str, extensions: &[&str]) -> bool {
     extension.is_some_and(|extension| extensions.contains(&extension.as_str()))
 }
 
-/// Extensions of such images; a photograph converted from one keeps its name but for that.
-const FOREIGN_EXTENSIONS: [&str; 9] = ["heic", "heif", "avif", "tif", "tiff", "bmp", "gif", "jxl", "dng"];
+/// Extensions of such images, the second line those of cameras' raw files; a photograph converted from one keeps its name but for that.
+const FOREIGN_EXTENSIONS: [&str; 16] = [
+    "heic", "heif", "avif", "tif", "tiff", "bmp", "gif", "jxl", //
+    "dng", "cr2", "cr3", "nef", "arw", "raf", "orf", "rw2",
+];
 
 /// Whether a file of this name is an image that has to be converted.
 pub(super) fn has_foreign_name(name: &str) -> bool {
@@ -32,8 +35,14 @@ pub(super) fn foreign_format(path: &Path) -> Option<&'static str> {
         [_, _, _, _, b'f', b't', b'y', b'p', brand @ ..] => match brand {
             b"avif" | b"avis" => Some("AVIF"),
             b"heic" | b"heix" | b"hevc" | b"mif1" | b"msf1" => Some("HEIC"),
+            b"crx " => Some("raw"),
             _ => None,
         },
+        // Fujifilm, Olympus, Panasonic; raw files of others begin as TIFF.
+        b"FUJIFILMCCD-"
+        | [b'I', b'I', b'R', b'O' | b'S', ..]
+        | [b'M', b'M', b'O', b'R', ..]
+        | [b'I', b'I', b'U', 0, ..] => Some("raw"),
         [b'I', b'I', 42, 0, ..] | [b'M', b'M', 0, 42, ..] => Some("TIFF or raw"),
         [b'G', b'I', b'F', b'8', ..] => Some("GIF"),
         [b'B', b'M', ..] => Some("BMP"),

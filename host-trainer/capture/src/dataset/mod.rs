@@ -39,6 +39,7 @@ mod photo;
 mod ply;
 mod polycam;
 mod pose;
+mod quaternion;
 mod record3d;
 mod report;
 mod severity;

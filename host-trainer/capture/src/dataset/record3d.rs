@@ -11,6 +11,7 @@ use serde::Deserialize;
 
 use super::image_names::is_image_name;
 use super::listing::{Listing, every_nth};
+use super::quaternion::{long_quaternions, rotation_of};
 use super::transforms::{Frame, Intrinsics, list_frames};
 use super::{DatasetError, Layout, LoadOptions, text_file};
 
@@ -66,8 +67,11 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
     };
     let names = names_by_number(&pictures);
     let first = names.keys().next().copied().unwrap_or(0);
-    let frame = |(i, &[qx, qy, qz, qw, x, y, z]): (usize, &[f64; 7])| {
-        let rotation = DMat3::from_quat(DQuat::from_xyzw(qx, qy, qz, qw).normalize()).transpose();
+    let quaternion = |&[x, y, z, w, ..]: &[f64; 7]| DQuat::from_xyzw(x, y, z, w);
+    let rotations: Vec<_> = metadata.poses.iter().map(|pose| rotation_of(quaternion(pose))).collect();
+    let frame = |(i, &[.., x, y, z]): (usize, &[f64; 7])| {
+        // A fault takes the place of the view below.
+        let rotation = rotations[i].as_ref().map_or(DMat3::IDENTITY, DMat3::transpose);
         let rows = [(rotation.x_axis, x), (rotation.y_axis, y), (rotation.z_axis, z)]
             .map(|(row, along)| vec![row.x, row.y, row.z, along]);
         let own = match metadata.lenses.get(i).map(Vec::as_slice) {
@@ -79,7 +83,17 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
     };
     let frames: Vec<Frame> = metadata.poses.iter().enumerate().map(frame).collect();
     let shared = intrinsics(fx, fy, cx, cy);
-    Ok(list_frames(Layout::Record3d, path, &pictures, &frames, &shared, |i| Some(every_nth(options.test_every, i))))
+    let split = |i| Some(every_nth(options.test_every, i));
+    let mut listing = list_frames(Layout::Record3d, path.clone(), &pictures, &frames, &shared, split);
+    let named = listing.views.iter().map(|view| view.name.as_str()).zip(metadata.poses.iter().map(quaternion));
+    let long = long_quaternions(&path, named);
+    listing.notes.extend(long);
+    for (view, rotation) in listing.views.iter_mut().zip(rotations) {
+        if let Err(fault) = rotation {
+            view.shot = Err(fault);
+        }
+    }
+    Ok(listing)
 }
 
 /// The images in a folder whose names are numbers, by these.

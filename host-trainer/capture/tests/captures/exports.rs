@@ -51,7 +51,7 @@ pub(crate) fn write_record3d(fixture: &Fixture, metadata: &str, pictures: &str, 
         .iter()
         .map(|photo| {
             let [x, y, z] = opengl(photo).map(|row| DVec3::new(row[0], row[1], row[2]));
-            let q = DQuat::from_mat3(&DMat3::from_cols(x, y, z).transpose());
+            let q = DQuat::from_mat3(&DMat3::from_cols(x, y, z).transpose()) * photo.quaternion_length;
             let c = photo.centre;
             format!("[{:?}, {:?}, {:?}, {:?}, {:?}, {:?}, {:?}]", q.x, q.y, q.z, q.w, c.x, c.y, c.z)
         })

@@ -5,15 +5,17 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::{self, Background, Capture, LoadOptions, Severity, Split, View};
 use pocketsplat_gaussians::Format;
+use pocketsplat_trainer::train::run::shell_word;
 
 use crate::config::CaptureOptions;
 
 /// Refuses a file of explicit Gaussians, and names the command that reads it.
 pub(crate) fn refuse_gaussians(path: &Path) -> Result<()> {
     if Format::of_path(path).is_some() {
-        let path = path.display();
+        let word = shell_word(path);
         bail!(
-            "{path} is a file of Gaussians, no bundle and no capture; make a bundle of it with `pocketsplat import {path} -o scene.psb`"
+            "{} is a file of Gaussians, no bundle and no capture; make a bundle of it with `pocketsplat import {word} -o scene.psb`",
+            path.display()
         );
     }
     Ok(())
@@ -50,7 +52,7 @@ impl CaptureArgs {
         let options = self.load_options(seed);
         let findings = dataset::diagnose_cheaply(&self.dataset, &options);
         if findings.count(Severity::Warning) > 0 {
-            eprintln!("warnings found: run `pocketsplat doctor {}`", self.dataset.display());
+            eprintln!("warnings found: run `pocketsplat doctor {}`", shell_word(&self.dataset));
         }
         let (capture, report) = dataset::load(&self.dataset, &options)
             .with_context(|| format!("could not load the capture {}", self.dataset.display()))?;

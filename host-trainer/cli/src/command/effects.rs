@@ -10,7 +10,7 @@ use anyhow::{Context, Result};
 use pocketsplat_capture::dataset::Capture;
 use pocketsplat_trainer::device::Processor;
 use pocketsplat_trainer::effects::{Effect, PilotCapture, PilotError, Pilots, measure};
-use pocketsplat_trainer::train::run::RunFolder;
+use pocketsplat_trainer::train::run::{RunFolder, shell_word};
 use serde::{Deserialize, Serialize};
 
 use crate::config::RunConfig;
@@ -95,7 +95,7 @@ pub(crate) fn resolve(
             eprintln!(
                 "interrupted while effects were measured, {} pilots are kept; go on with `pocketsplat train --resume {}`",
                 log.n_done(),
-                folder.path().display()
+                shell_word(folder.path())
             );
             return Ok(Resolved::Interrupted);
         }

@@ -237,7 +237,7 @@ impl Expected {
 }
 
 /// As people say it.
-fn duration(minutes: f64) -> String {
+pub(super) fn duration(minutes: f64) -> String {
     match minutes {
         ..1.0 => format!("{:.0} seconds", 60.0 * minutes),
         1.0..10.0 => format!("{minutes:.1} minutes"),

@@ -1,6 +1,7 @@
 //! `pocketsplat eval`: how good a bundle or a file of Gaussians is, how large, how fast.
 
 pub(crate) mod explicit;
+mod summary;
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -62,9 +63,6 @@ pub(crate) struct Args {
 /// Figures of a bundle over a split of a capture; PSNR, SSIM and LPIPS are means over views of 8-bit images.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Evaluation {
-    /// See [`output::SCHEMA_VERSION`].
-    #[serde(default)]
-    pub(crate) schema_version: u32,
     pub(crate) psnr_db: f64,
     pub(crate) ssim: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -151,7 +149,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let what =
         Measurements { against_reference: args.against_reference, per_tier: args.per_tier, lpips: lpips.as_ref() };
     let evaluation = evaluate(&file, &args.capture, args.split, args.renderer, &what)?;
-    output::print(&evaluation, args.json)
+    output::print_or(&evaluation, args.json, &evaluation)
 }
 
 /// Times that a bundle is decoded to measure how long it takes.
@@ -245,7 +243,6 @@ pub(crate) fn measure(
     let rows = drawn_views(views, draw, to_reference)?;
     let (lpips_mean, of_views) = view_evaluations(&rows, views, lpips)?;
     Ok(Evaluation {
-        schema_version: output::SCHEMA_VERSION,
         psnr_db: mean(&rows, |row| row.psnr_db),
         ssim: mean(&rows, |row| row.ssim),
         lpips: lpips_mean,

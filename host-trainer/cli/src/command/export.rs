@@ -59,8 +59,6 @@ pub(crate) struct Args {
 /// What was written, and what it lost.
 #[derive(Debug, Serialize)]
 struct Export {
-    /// See [`output::SCHEMA_VERSION`].
-    schema_version: u32,
     format: &'static str,
     bytes: usize,
     bundle_bytes: usize,
@@ -180,7 +178,6 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let pictures = source.pictures_of(&written, &cameras.judged);
     let file_psnr_db = cameras.psnr_db(&pictures);
     let export = Export {
-        schema_version: output::SCHEMA_VERSION,
         format: format.extension(),
         bytes: bytes.len(),
         bundle_bytes: file.bytes.len(),
@@ -201,8 +198,6 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 /// A file of Gaussians in another format.
 #[derive(Debug, Serialize)]
 struct Conversion {
-    /// See [`output::SCHEMA_VERSION`].
-    schema_version: u32,
     format: &'static str,
     bytes: usize,
     source_bytes: usize,
@@ -221,7 +216,6 @@ fn convert(args: &Args, format: Format) -> Result<()> {
         format.to_bytes(&gaussians, &file.notes).map_err(|fault| anyhow!("{} {fault}", args.output.display()))?;
     output::write_whole(&args.output, &bytes)?;
     let conversion = Conversion {
-        schema_version: output::SCHEMA_VERSION,
         format: format.extension(),
         bytes: bytes.len(),
         source_bytes: file.n_bytes,

@@ -11,12 +11,13 @@ use pocketsplat_core::budget::MAX_FRAME_PX;
 use pocketsplat_trainer::explicit::bulk::Bulk;
 use pocketsplat_trainer::explicit::pictures::{Pictures, capture};
 use pocketsplat_trainer::explicit::views::generated;
+use pocketsplat_trainer::train::run::shell_word;
 use serde::Serialize;
 
 use super::gaussians::GaussiansFile;
 use super::settings::QualityOptions;
 use super::train::{HeldOut, TrainResult, train_as};
-use super::train_args::DeviceArgs;
+use super::train_args::{DeviceArgs, check_lambda};
 use super::{output, process};
 use crate::config::heading::{INPUT, OUTPUT, QUALITY, RUN};
 use crate::config::named::{BACKGROUNDS, one_of};
@@ -80,8 +81,6 @@ pub(crate) struct Args {
 /// What an import reports.
 #[derive(Debug, Serialize)]
 struct ImportResult {
-    /// See [`output::SCHEMA_VERSION`].
-    schema_version: u32,
     bundle: PathBuf,
     bundle_bytes: usize,
     /// Of the file that was imported.
@@ -125,7 +124,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let train = config.train.resolved_for(&capture);
     let trained = train_as(&capture, train, &config.capture, &config.encoding, &args.output)?;
     output::print(&result(&file, &capture, trained)?, args.json)?;
-    eprintln!("see it:  pocketsplat view {} -o scene.html", args.output.display());
+    eprintln!("see it:  pocketsplat view {} -o scene.html", shell_word(&args.output));
     Ok(())
 }
 
@@ -135,7 +134,12 @@ fn configured(args: &Args) -> Result<RunConfig> {
     config.train.hac.lambda = args.lambda.unwrap_or(LAMBDA);
     config.train.iterations = ITERATIONS;
     config.train.seed = args.seed;
+    config.effects.auto = false;
     args.quality.apply_to(&mut config)?;
+    if config.effects.auto {
+        bail!("import measures no effects; name them, as --effects +view-colour, and leave auto to train");
+    }
+    check_lambda(args.lambda, config.train.backbone)?;
     args.device.choose(&args.quality, args.lambda, &mut config)?;
     config.capture = CaptureOptions {
         max_resolution: None,
@@ -189,7 +193,6 @@ fn result(file: &GaussiansFile, capture: &Capture, trained: TrainResult) -> Resu
     let TrainResult { bundle, bundle_bytes, n_anchors, drawn_offsets, iterations, train_s, .. } = trained;
     let HeldOut { psnr_db, ssim, n_test_views, .. } = trained.held_out.context("cameras are held out")?;
     Ok(ImportResult {
-        schema_version: output::SCHEMA_VERSION,
         bundle,
         bundle_bytes,
         original_bytes: file.n_bytes,

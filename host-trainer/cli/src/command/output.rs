@@ -9,9 +9,6 @@ use anyhow::{Context, Result};
 /// Version of what commands print as JSON and of `result.json`: rises when a field goes or changes its meaning.
 pub(crate) const SCHEMA_VERSION: u32 = 1;
 
-/// Fields that are for machines alone.
-const FOR_MACHINES: [&str; 3] = ["schema_version", "protocol", "views"];
-
 /// Fails now if `path` could not be written later, and makes its folder.
 pub(crate) fn check_writable(path: &Path) -> Result<()> {
     let (folder, probe) = beside(path);
@@ -57,19 +54,36 @@ pub(crate) fn csv(lines: impl IntoIterator<Item = impl serde::Serialize>) -> Res
     Ok(table.into_inner()?)
 }
 
+/// A report with the version of what its fields mean.
+#[derive(serde::Serialize)]
+struct Versioned<'a, T> {
+    schema_version: u32,
+    #[serde(flatten)]
+    report: &'a T,
+}
+
+/// `report`, a set of named values, as JSON with a `schema_version`.
+pub(crate) fn json<T: serde::Serialize>(report: &T) -> Result<String> {
+    Ok(serde_json::to_string_pretty(&Versioned { schema_version: SCHEMA_VERSION, report })? + "\n")
+}
+
 /// Prints `report` to stdout: as JSON, or as aligned `name value` lines.
-pub(crate) fn print<T: serde::Serialize>(report: &T, json: bool) -> Result<()> {
-    let text = if json {
-        serde_json::to_string_pretty(report)? + "\n"
+pub(crate) fn print<T: serde::Serialize>(report: &T, as_json: bool) -> Result<()> {
+    let text = if as_json {
+        json(report)?
     } else {
         let serde_json::Value::Object(fields) = serde_json::to_value(report)? else {
             anyhow::bail!("a report is a set of named values");
         };
-        let fields: Vec<_> = fields.iter().filter(|(name, _)| !FOR_MACHINES.contains(&name.as_str())).collect();
-        let width = fields.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
-        fields.into_iter().map(|(name, value)| format!("{name:width$}  {}\n", plain(value))).collect()
+        let width = fields.keys().map(String::len).max().unwrap_or(0);
+        fields.iter().map(|(name, value)| format!("{name:width$}  {}\n", plain(value))).collect()
     };
     print_text(&text)
+}
+
+/// Prints `report` to stdout: as JSON, or in the words that it has for people.
+pub(crate) fn print_or<T: serde::Serialize>(report: &T, as_json: bool, words: impl std::fmt::Display) -> Result<()> {
+    print_text(&if as_json { json(report)? } else { words.to_string() })
 }
 
 /// Prints `text` to stdout.
@@ -91,5 +105,22 @@ fn plain(value: &serde_json::Value) -> String {
         }
         serde_json::Value::Array(items) => items.iter().map(plain).collect::<Vec<_>>().join(" "),
         other => other.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_report_as_json_says_its_version() {
+        #[derive(serde::Serialize)]
+        struct Report {
+            share: f32,
+        }
+        let text = json(&Report { share: 0.1 }).unwrap();
+        assert_eq!(text, "{\n  \"schema_version\": 1,\n  \"share\": 0.1\n}\n");
+        let of_values = json(&serde_json::json!({ "bytes": 3 })).unwrap();
+        assert!(of_values.contains("\"schema_version\": 1") && of_values.contains("\"bytes\": 3"), "{of_values}");
     }
 }

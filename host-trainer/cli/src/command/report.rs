@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::{Capture, Split};
+use pocketsplat_trainer::train::run::shell_word;
 use pocketsplat_viewer::{SceneFile, escaped, page};
 use serde::Deserialize;
 
@@ -99,7 +100,7 @@ fn write(folder: &Path, config: &RunConfig, capture: Option<&Capture>, path: &Pa
         format!(
             "{} is missing: the run is not finished; go on with `pocketsplat train --resume {}`",
             result.display(),
-            folder.display()
+            shell_word(folder)
         )
     })?;
     let result = serde_json::from_str(&text).with_context(|| format!("{} is no result of a run", result.display()))?;

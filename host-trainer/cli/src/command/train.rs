@@ -2,6 +2,7 @@
 
 mod explicit;
 mod limits;
+mod summary;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -15,7 +16,7 @@ use pocketsplat_trainer::effects::Effect;
 use pocketsplat_trainer::encode::{Encoding, Fitted, Scale};
 use pocketsplat_trainer::train::finish::Finished;
 use pocketsplat_trainer::train::gauge::Gauge;
-use pocketsplat_trainer::train::run::{Ending, Interval, RunError, RunFolder, fork};
+use pocketsplat_trainer::train::run::{Ending, Interval, RunError, RunFolder, fork, shell_word};
 use pocketsplat_trainer::train::{TrainConfig, Trainer};
 use serde::Serialize;
 
@@ -29,6 +30,7 @@ use super::progress::Progress;
 use super::train_args::Args;
 use super::{effects, output, report, stop, watch};
 use crate::config::{CaptureOptions, ExplicitRunConfig, Protocol, RunConfig};
+use summary::Summary;
 
 /// Seconds between checkpoints unless the user says otherwise: what an accident may cost.
 const CHECKPOINT_SECONDS: f64 = 60.0;
@@ -42,8 +44,6 @@ const MOST_JUDGES: usize = 12;
 /// What a finished run reports.
 #[derive(Debug, Serialize)]
 pub(crate) struct TrainResult {
-    /// See [`output::SCHEMA_VERSION`].
-    pub(crate) schema_version: u32,
     pub(crate) bundle: PathBuf,
     pub(crate) bundle_bytes: usize,
     /// Scratch memory in which a device with limited memory draws the whole scene.
@@ -78,6 +78,22 @@ pub(crate) struct TrainResult {
     pub(crate) held_out: Option<HeldOut>,
     /// How the photographs were prepared, and the fingerprint of the capture.
     pub(crate) protocol: Protocol,
+}
+
+impl TrainResult {
+    /// * `bundle`: its path as people know it.
+    fn summary<'a>(&'a self, bundle: &'a Path) -> Summary<'a> {
+        Summary {
+            held_out: self.held_out.as_ref(),
+            path: bundle,
+            n_bytes: self.bundle_bytes,
+            peak_memory_bytes: self.peak_memory_bytes,
+            train_s: self.train_s,
+            train_processor_s: self.train_processor_s,
+            iterations: self.iterations,
+            dropped_steps: self.dropped_steps,
+        }
+    }
 }
 
 /// How good a bundle is on views that training did not see.
@@ -120,7 +136,7 @@ fn begin(args: &Args) -> Result<ExitCode> {
     output::check_writable(&config.output)?;
     // Before the folder is touched: a capture or checkpoint that does not load must not cost an earlier run its results.
     let capture = load(&mut config)?;
-    let path = args.run_folder(&config.output)?;
+    let path = args.run_folder(args.named_paths(&config.dataset, &config.output).1)?;
     let start = match args.fork() {
         Some((run, _)) if run.canonicalize().ok() == path.canonicalize().ok() => {
             bail!("{} cannot be both the run to begin from and the new one; choose another --output", path.display())
@@ -164,11 +180,12 @@ fn train_and_print<'a>(
     let Some(result) = train_in(folder, &config, capture, start, &stop)? else {
         return Ok(ExitCode::from(stop::INTERRUPTED));
     };
-    output::print(&result, args.json())?;
+    let (dataset, bundle) = args.named_paths(&config.dataset, &config.output);
+    output::print_or(&result, args.json(), result.summary(bundle))?;
     if args.writes_report() {
         report::write_into(&path, &config, capture);
     }
-    let (bundle, dataset) = (config.output.display(), config.dataset.display());
+    let (bundle, dataset) = (shell_word(bundle), shell_word(dataset));
     eprintln!("see it:       pocketsplat render {bundle} {dataset} --view 0 -o view.png");
     eprintln!("on a device:  pocketsplat fit {bundle}");
     Ok(ExitCode::SUCCESS)
@@ -232,7 +249,7 @@ pub(crate) fn train_in<'a>(
     let mut trainer = trainer.fitting(gauge(scale.as_ref()));
     folder.write_config(&config.to_toml()?)?;
     let interval = config.checkpoint_every.map_or(Interval::Seconds(CHECKPOINT_SECONDS), Interval::Iterations);
-    let how_to_go_on = || format!("go on with `pocketsplat train --resume {}`", path.display());
+    let how_to_go_on = || format!("go on with `pocketsplat train --resume {}`", shell_word(&path));
     let estimate = Estimate::new(capture, &config.train, trainer.iteration, warned);
     let mut progress = Progress::new(trainer.iteration, config.train.iterations).estimating(estimate);
     let ending = folder.train(&mut trainer, &mut progress, interval, stop);
@@ -255,7 +272,7 @@ pub(crate) fn train_in<'a>(
     }
     let result = write_bundle(&trainer, capture, &config.capture, &config.encoding, &config.output)
         .with_context(|| format!("the training is done and kept; {}", how_to_go_on()))?;
-    folder.finish(&serde_json::to_string_pretty(&result)?, config.keep_checkpoints)?;
+    folder.finish(&output::json(&result)?, config.keep_checkpoints)?;
     Ok(Some(result))
 }
 
@@ -326,6 +343,12 @@ fn write_bundle(
     output: &Path,
 ) -> Result<TrainResult> {
     let protocol = Protocol::of(capture, options);
+    if let Some(images) = protocol.omitted_images()? {
+        eprintln!(
+            "warning: the name of the folder of images is too long for the bundle; give --images {} to eval and render",
+            shell_word(Path::new(images))
+        );
+    }
     let finished = Finished { protocol: Some(protocol.to_text()?), ..trainer.finish()? };
     let held_out = judges(trainer, capture);
     let fitted = encoding.encode(finished, capture, &held_out)?;
@@ -344,7 +367,6 @@ fn write_bundle(
     let Finished { scene, background, n_undrawn, estimated_bits, .. } = finished;
     let n_anchors = scene.anchors.len();
     Ok(TrainResult {
-        schema_version: output::SCHEMA_VERSION,
         bundle: output.to_owned(),
         bundle_bytes: file.bytes.len(),
         scratch_bytes: plan.map(|plan| plan.scratch_len()),

@@ -8,6 +8,7 @@ use pocketsplat_capture::dataset::Background;
 use pocketsplat_trainer::device::{Limits, ModelChoice, Processor, choose};
 use pocketsplat_trainer::effects::Price;
 use pocketsplat_trainer::explicit::CloudConfig;
+use pocketsplat_trainer::train::config::Backbone;
 
 use super::settings::{QualityOptions, RunOptions, applied};
 use crate::config::heading::{DEVICE, OUTPUT, QUALITY, RUN};
@@ -123,6 +124,14 @@ impl DeviceArgs {
     }
 }
 
+/// Refuses a weight of bits where none are weighed.
+pub(super) fn check_lambda(given: Option<f64>, backbone: Backbone) -> Result<()> {
+    if given.is_some() && !backbone.is_coded() {
+        bail!("--lambda weighs the bits of a value, and scaffold scenes are trained without them; use --backbone hac");
+    }
+    Ok(())
+}
+
 impl Args {
     /// The run folder to go on in, if any.
     pub(crate) fn resume(&self) -> Option<&Path> {
@@ -132,6 +141,11 @@ impl Args {
     /// The run folder to begin from and the iteration, if any.
     pub(crate) fn fork(&self) -> Option<(&Path, u32)> {
         self.from.as_deref().zip(self.at)
+    }
+
+    /// Capture and output of a run as the command line names them, else as its configuration does.
+    pub(crate) fn named_paths<'a>(&'a self, dataset: &'a Path, output: &'a Path) -> (&'a Path, &'a Path) {
+        (self.dataset.as_deref().unwrap_or(dataset), self.output.as_deref().unwrap_or(output))
     }
 
     /// Whether an unfinished run may be replaced.
@@ -176,11 +190,7 @@ impl Args {
                 bail!("the configuration names no `{name}`; give it there or as {option}");
             }
         }
-        if self.lambda.is_some() && !config.train.backbone.is_coded() {
-            bail!(
-                "--lambda weighs the bits of a value, and scaffold scenes are trained without them; use --backbone hac"
-            );
-        }
+        check_lambda(self.lambda, config.train.backbone)?;
         config.check()?;
         // Absolute, so that the run can go on from any folder.
         for path in [&mut config.dataset, &mut config.output] {

@@ -37,11 +37,16 @@ impl Protocol {
         Self { program, capture: fingerprint(capture), options: options.or(&defaults) }
     }
 
-    /// As the section of a bundle. A folder of images whose name does not fit is left out.
+    /// The folder of images whose name does not fit into the section of a bundle, if so.
+    pub(crate) fn omitted_images(&self) -> Result<Option<&str>> {
+        let fits = toml::to_string(self)?.len() <= MAX_PROTOCOL_LEN;
+        Ok(self.options.images.as_deref().filter(|_| !fits))
+    }
+
+    /// As the section of a bundle, without [`Self::omitted_images`].
     pub(crate) fn to_text(&self) -> Result<String> {
-        let text = toml::to_string(self)?;
-        if text.len() <= MAX_PROTOCOL_LEN {
-            return Ok(text);
+        if self.omitted_images()?.is_none() {
+            return Ok(toml::to_string(self)?);
         }
         let options = CaptureOptions { images: None, ..self.options.clone() };
         Ok(toml::to_string(&Self { options, ..self.clone() })?)
@@ -151,6 +156,8 @@ mod tests {
         let text = long.to_text().unwrap();
         assert!(text.len() <= MAX_PROTOCOL_LEN, "{} bytes: {text}", text.len());
         assert_eq!(Protocol::parse(&text).unwrap(), protocol(None));
+        assert_eq!(long.omitted_images().unwrap(), Some("a".repeat(150).as_str()), "so that training can say it");
+        assert_eq!(protocol(Some("images_2")).omitted_images().unwrap(), None);
     }
 
     #[test]

@@ -45,7 +45,7 @@ fn a_bundle_for_a_device_fits_it_and_passes_its_verification() {
     succeeds(pocketsplat().arg("verify").arg(&output).args(["--ram", &ram, "--resolution", "24x16"]));
     let fit = pocketsplat().arg("fit").arg(&output).args(["--json", "--ram", &ram]).output().unwrap();
     let fit: serde_json::Value = serde_json::from_slice(&fit.stdout).unwrap();
-    assert_eq!(fit["points"][0]["scratch_bytes"], plan.scratch_len());
+    assert_eq!((&fit["points"][0]["scratch_bytes"], &fit["schema_version"]), (&plan.scratch_len().into(), &1.into()));
     // Without an amount, each step has its own plan, and more memory never draws less.
     let ladder = pocketsplat().arg("fit").arg(&output).arg("--json").output().unwrap();
     let ladder: serde_json::Value = serde_json::from_slice(&ladder.stdout).unwrap();

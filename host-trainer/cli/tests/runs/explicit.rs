@@ -94,6 +94,10 @@ fn splats_become_a_bundle_that_is_measured_against_them() {
     let cameras = capture().join("transforms_train.json");
     let said = fails(import(&bundle).arg("--cameras").arg(&cameras));
     assert!(said.contains("6 cameras, needs 8"), "{said}");
+    let said = fails(import(&bundle).args(["--backbone", "scaffold", "--lambda", "0.01"]));
+    assert!(said.contains("--lambda weighs the bits of a value, and scaffold scenes are trained without"), "{said}");
+    let said = fails(import(&bundle).args(["--effects", "auto"]));
+    assert!(said.contains("import measures no effects; name them"), "{said}");
     fs::write(home.join("mesh.ply"), "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n")
         .unwrap();
     let mut mesh = pocketsplat();

@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::Harm::Doubt;
 use super::{Case, case, flat_image, look_away, turned_image};
+use crate::exports::write_record3d;
 use crate::fixture::Kind::{Blender, ColmapBinary, ColmapText, Nerfstudio};
 use crate::fixture::SIZE_PX;
 
@@ -227,6 +228,19 @@ pub(super) fn cases() -> Vec<Case> {
             |f| {
                 (f.photos[2].quaternion_length, f.photos[7].quaternion_length) = (0.93, 1.05);
                 f.write_files();
+            },
+        ),
+        case(
+            "quaternions of Record3D that were never normalised",
+            Nerfstudio,
+            Doubt,
+            "quaternion-length",
+            &[
+                "metadata`: rotations whose quaternion is not of length 1: 2 (2.png, 7.png), the worst of length 0.930000",
+            ],
+            |f| {
+                (f.photos[2].quaternion_length, f.photos[7].quaternion_length) = (0.93, 1.05);
+                write_record3d(f, "metadata", "rgbd", 0);
             },
         ),
         case(

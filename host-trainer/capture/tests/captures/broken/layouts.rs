@@ -48,6 +48,23 @@ pub(super) fn cases() -> Vec<Case> {
             },
         ),
         case(
+            "raw photographs without poses",
+            ColmapBinary,
+            Fatal,
+            "no-capture",
+            &[
+                "holds 7 photographs but no poses; convert those of a format that is not read:\n  magick mogrify -format jpg \
+                 -quality 95 '",
+                "/*.ARW'\nthen make poses with COLMAP",
+            ],
+            |f| {
+                std::fs::remove_dir_all(f.at("images")).expect("images");
+                for name in ["1.ARW", "1.CR2", "1.CR3", "1.NEF", "1.ORF", "1.RAF", "1.RW2"] {
+                    f.write(name, "");
+                }
+            },
+        ),
+        case(
             "a film",
             Nerfstudio,
             Fatal,

@@ -248,6 +248,28 @@ pub(super) fn cases() -> Vec<Case> {
             },
         ),
         case(
+            "a quaternion of Record3D far from length 1",
+            Nerfstudio,
+            Views,
+            "bad-pose",
+            &["2.png: its rotation is a quaternion of length 1.400000, needed: 1; export the model again"],
+            |f| {
+                f.photos[2].quaternion_length = 1.4;
+                write_record3d(f, "metadata", "rgbd", 0);
+            },
+        ),
+        case(
+            "a quaternion of Record3D of length 0",
+            Nerfstudio,
+            Views,
+            "bad-pose",
+            &["2.png: its rotation is a quaternion of length 0.000000, needed: 1"],
+            |f| {
+                f.photos[2].quaternion_length = 0.0;
+                write_record3d(f, "metadata", "rgbd", 0);
+            },
+        ),
+        case(
             "a mask of another size beside a model",
             ColmapBinary,
             Views,

@@ -24,7 +24,8 @@ pub(super) fn run(args: &Args) -> Result<()> {
     let lpips = args.lpips.load()?;
     let (options, capture) = file.load(&args.capture)?;
     let what = Measurements { lpips: lpips.as_ref(), ..Measurements::default() };
-    output::print(&measure(&file, &capture, &options, args.split, &what)?, args.json)
+    let evaluation = measure(&file, &capture, &options, args.split, &what)?;
+    output::print_or(&evaluation, args.json, &evaluation)
 }
 
 /// Draws and measures every view of a split of a loaded capture.
@@ -43,7 +44,6 @@ pub(crate) fn measure(
     let rows = drawn_views(views, draw, |_, _| f64::INFINITY)?;
     let (lpips, views) = view_evaluations(&rows, views, what.lpips)?;
     Ok(Evaluation {
-        schema_version: output::SCHEMA_VERSION,
         psnr_db: mean(&rows, |row| row.psnr_db),
         ssim: mean(&rows, |row| row.ssim),
         lpips,

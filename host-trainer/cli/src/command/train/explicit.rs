@@ -1,6 +1,6 @@
 //! `pocketsplat train --backbone 3dgs`: a capture in, explicit Gaussians out.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
 
@@ -8,7 +8,7 @@ use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::{Background, Capture, Split};
 use pocketsplat_gaussians::Format;
 use pocketsplat_trainer::explicit::CloudTrainer;
-use pocketsplat_trainer::train::run::{Ending, Interval, LoggedStep, RunError, RunFolder};
+use pocketsplat_trainer::train::run::{Ending, Interval, LoggedStep, RunError, RunFolder, shell_word};
 use serde::Serialize;
 
 use super::super::capture::CaptureArgs;
@@ -19,14 +19,13 @@ use super::super::process::peak_memory_bytes;
 use super::super::progress::Progress;
 use super::super::train_args::Args;
 use super::super::{output, stop};
+use super::summary::Summary;
 use super::{CHECKPOINT_SECONDS, HeldOut, IN_RUN_AND_ON_COMMAND_LINE, check_size};
 use crate::config::{EXPLICIT, ExplicitRunConfig, Protocol};
 
 /// What a finished run reports.
 #[derive(Debug, Serialize)]
 struct ExplicitResult {
-    /// See [`output::SCHEMA_VERSION`].
-    schema_version: u32,
     file: PathBuf,
     file_bytes: usize,
     n_gaussians: usize,
@@ -45,13 +44,29 @@ struct ExplicitResult {
     protocol: Protocol,
 }
 
+impl ExplicitResult {
+    /// * `file`: its path as people know it.
+    fn summary<'a>(&'a self, file: &'a Path) -> Summary<'a> {
+        Summary {
+            held_out: self.held_out.as_ref(),
+            path: file,
+            n_bytes: self.file_bytes,
+            peak_memory_bytes: self.peak_memory_bytes,
+            train_s: self.train_s,
+            train_processor_s: self.train_processor_s,
+            iterations: self.iterations,
+            dropped_steps: self.dropped_steps,
+        }
+    }
+}
+
 pub(super) fn begin(args: &Args) -> Result<ExitCode> {
     let config = args.explicit()?;
     format_of(&config)?;
     output::check_writable(&config.output)?;
     // Before the folder is touched: a capture that does not load must not cost an earlier run its results.
     let capture = load(&config)?;
-    let path = args.run_folder(&config.output)?;
+    let path = args.run_folder(args.named_paths(&config.dataset, &config.output).1)?;
     let folder = RunFolder::start(&path, &config.to_toml()?, args.overwrite())?;
     let trainer = CloudTrainer::new(&capture, config.gaussians)?;
     train(args, folder, &config, &capture, trainer)
@@ -122,8 +137,9 @@ fn train(
     let Some(result) = train_in(folder, config, capture, trainer, &stop)? else {
         return Ok(ExitCode::from(stop::INTERRUPTED));
     };
-    output::print(&result, args.json())?;
-    eprintln!("compress it:  pocketsplat import {} -o scene.psb", config.output.display());
+    let (_, path) = args.named_paths(&config.dataset, &config.output);
+    output::print_or(&result, args.json(), result.summary(path))?;
+    eprintln!("compress it:  pocketsplat import {} -o scene.psb", shell_word(path));
     Ok(ExitCode::SUCCESS)
 }
 
@@ -137,7 +153,7 @@ fn train_in(
 ) -> Result<Option<ExplicitResult>> {
     folder.write_config(&config.to_toml()?)?;
     let interval = config.checkpoint_every.map_or(Interval::Seconds(CHECKPOINT_SECONDS), Interval::Iterations);
-    let how_to_go_on = format!("go on with `pocketsplat train --resume {}`", folder.path().display());
+    let how_to_go_on = format!("go on with `pocketsplat train --resume {}`", shell_word(folder.path()));
     let iterations = config.gaussians.iterations;
     let mut progress = Progress::new(trainer.iteration, iterations);
     let ending = folder.drive(&mut trainer, interval, stop, |trainer| {
@@ -160,7 +176,7 @@ fn train_in(
     }
     let result =
         write(&trainer, config, capture).with_context(|| format!("the training is done and kept; {how_to_go_on}"))?;
-    folder.finish(&serde_json::to_string_pretty(&result)?, config.keep_checkpoints)?;
+    folder.finish(&output::json(&result)?, config.keep_checkpoints)?;
     Ok(Some(result))
 }
 
@@ -178,7 +194,6 @@ fn write(trainer: &CloudTrainer<'_>, config: &ExplicitRunConfig, capture: &Captu
         Some(HeldOut { psnr_db, ssim, n_test_views: n_views, views })
     };
     Ok(ExplicitResult {
-        schema_version: output::SCHEMA_VERSION,
         file: config.output.clone(),
         file_bytes: bytes.len(),
         n_gaussians: trainer.cloud.len(),

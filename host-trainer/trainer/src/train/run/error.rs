@@ -36,7 +36,7 @@ pub enum RunError {
     /// A run would be lost.
     #[error(
         "{} holds an unfinished run; go on with it by `pocketsplat train --resume {}`, or start anew with --overwrite",
-        path.display(), path.display()
+        path.display(), super::shell_word(path)
     )]
     Unfinished {
         /// The folder.

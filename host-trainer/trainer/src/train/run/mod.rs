@@ -16,6 +16,7 @@ mod files;
 mod previews;
 mod progress_log;
 mod resumable;
+mod shell;
 mod store;
 
 #[cfg(test)]
@@ -30,6 +31,7 @@ pub use error::RunError;
 pub use previews::newest_preview;
 pub use progress_log::{LoggedStep, ProgressLog};
 pub use resumable::Resumable;
+pub use shell::shell_word;
 pub use store::{Newest, Resumed, fork};
 
 use super::{Observer, Trainer};

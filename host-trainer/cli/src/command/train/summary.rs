@@ -1,0 +1,71 @@
+//! What a finished run says to people; `result.json` and `--json` say all of it.
+
+use std::fmt;
+use std::path::Path;
+
+use super::super::estimate::duration;
+use super::HeldOut;
+
+/// What they want to know.
+pub(super) struct Summary<'a> {
+    pub(super) held_out: Option<&'a HeldOut>,
+    pub(super) path: &'a Path,
+    pub(super) n_bytes: usize,
+    pub(super) peak_memory_bytes: Option<u64>,
+    pub(super) train_s: f64,
+    /// Processor time of all threads.
+    pub(super) train_processor_s: f64,
+    pub(super) iterations: u32,
+    pub(super) dropped_steps: u32,
+}
+
+impl fmt::Display for Summary<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.held_out {
+            Some(HeldOut { psnr_db, ssim, n_test_views, .. }) => writeln!(
+                f,
+                "quality:  {psnr_db:.2} dB PSNR, {ssim:.4} SSIM, means of {n_test_views} views that were held out"
+            )?,
+            None => writeln!(f, "quality:  not measured, for no view is held out; --test-every 8 holds some out")?,
+        }
+        writeln!(f, "size:     {} bytes, {}", self.n_bytes, self.path.display())?;
+        if let Some(bytes) = self.peak_memory_bytes {
+            writeln!(f, "memory:   {:.2} GB at most", bytes as f64 / 1e9)?;
+        }
+        let (time, core) = (duration(self.train_s / 60.0), duration(self.train_processor_s / 60.0));
+        writeln!(f, "time:     {time} for {} iterations, {core} of one processor core", self.iterations)?;
+        if self.dropped_steps > 0 {
+            writeln!(f, "dropped:  {} of the iterations, see progress.csv in the run folder", self.dropped_steps)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_people_want_to_know_comes_in_words_and_units() {
+        let held_out = HeldOut { psnr_db: 32.041, ssim: 0.951_23, n_test_views: 13, views: Vec::new() };
+        let summary = Summary {
+            held_out: Some(&held_out),
+            path: Path::new("desk lamp.psb"),
+            n_bytes: 412_345,
+            peak_memory_bytes: Some(612_000_000),
+            train_s: 744.0,
+            train_processor_s: 1320.0,
+            iterations: 7000,
+            dropped_steps: 0,
+        };
+        assert_eq!(
+            summary.to_string(),
+            "quality:  32.04 dB PSNR, 0.9512 SSIM, means of 13 views that were held out\n\
+             size:     412345 bytes, desk lamp.psb\n\
+             memory:   0.61 GB at most\n\
+             time:     12 minutes for 7000 iterations, 22 minutes of one processor core\n"
+        );
+        let unmeasured = Summary { held_out: None, peak_memory_bytes: None, dropped_steps: 3, ..summary }.to_string();
+        assert!(unmeasured.contains("no view is held out") && unmeasured.contains("dropped:  3 of"), "{unmeasured}");
+    }
+}

@@ -155,7 +155,7 @@ fn a_bundle_is_measured_as_it_was_trained_and_another_capture_is_noticed() {
 fn a_run_ends_with_what_people_want_to_know_and_commands_to_copy() {
     let home = folder("last words");
     let mut command = train("desk lamp.psb".as_ref());
-    let done = command.current_dir(&home).args(["--iterations", "5"]).output().unwrap();
+    let done = command.current_dir(&home).output().unwrap();
     let (result, said) = (text(&done.stdout), text(&done.stderr));
     assert!(done.status.success(), "{said}");
     assert!(result.starts_with("quality:  ") && result.contains(" dB PSNR, "), "{result}");
@@ -163,7 +163,7 @@ fn a_run_ends_with_what_people_want_to_know_and_commands_to_copy() {
     assert!(said.contains("pocketsplat fit 'desk lamp.psb'"), "as it was typed, as one word: {said}");
     let kept: serde_json::Value =
         serde_json::from_slice(&fs::read(home.join("desk lamp.run/result.json")).unwrap()).unwrap();
-    assert_eq!((&kept["schema_version"], &kept["iterations"]), (&1.into(), &5.into()));
+    assert_eq!((&kept["schema_version"], &kept["iterations"]), (&1.into(), &ITERATIONS.into()));
     let evaluated = pocketsplat().arg("eval").arg(home.join("desk lamp.psb")).arg(capture()).output().unwrap();
     assert!(text(&evaluated.stdout).starts_with("quality:  "), "{}", text(&evaluated.stdout));
     assert!(!text(&evaluated.stderr).contains("LPIPS"), "{}", text(&evaluated.stderr));

@@ -72,7 +72,7 @@ impl Camera {
     /// coordinate axis of the normalised frame to which the camera's up is nearest, either way round; p is the point of the
     /// camera's line of sight nearest to the origin, which the training cameras surround. Distance, height and what is in
     /// the middle of the image stay: of cameras that look at one point it is the circle that the manifest's orbit takes.
-    /// Sine and cosine are [`sin_cos`](crate::math::sin_cos)'s, so every machine gets the same bits.
+    /// Sine and cosine are [`sin_cos`]'s, so every machine gets the same bits.
     ///
     /// ```
     /// # use pocketsplat_core::{Camera, Rotation};

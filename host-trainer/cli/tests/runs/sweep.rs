@@ -48,7 +48,11 @@ fn a_sweep_goes_on_where_it_was_stopped_and_trains_nothing_twice() {
     assert!(figure.matches("<circle").count() == 4 && figure.contains("λ 0.001"), "{figure}");
 
     let error = fails(&mut sweep(&home, "0.004", 81));
-    assert!(error.contains("`train.iterations` is 80 and 81") && error.contains("lambda-0.004.run"), "{error}");
+    assert!(
+        error.contains("`train.iterations` is 80 in the run, 81 on the command line")
+            && error.contains("lambda-0.004.run"),
+        "{error}"
+    );
 }
 
 #[test]

@@ -146,7 +146,7 @@ job_core-embedded() {
       -- -D warnings
   done
   echo "${#sets[@]} sets of features: none, each, every pair, all"
-  # Its assembly.
+  # decoder-half has assembly on this target.
   cargo clippy -q -p pocketsplat-half --target "$embedded_target" --locked -- -D warnings
   local said
   need_target i686-unknown-linux-gnu
@@ -179,13 +179,15 @@ job_package() {
   CARGO_PROFILE_DEV_OPT_LEVEL=0 CARGO_PROFILE_DEV_DEBUG=0 \
     cargo package --workspace --exclude conformance --exclude tools --allow-dirty --locked
   rm -rf "$target/package"
-  # The oldest Rust that its manifest names.
+  # The oldest Rust that the manifest of pocketsplat-core names, also for the assembly of pocketsplat-half.
   local oldest features
   oldest=$(sed -n 's/^rust-version = "\(.*\)"$/\1/p' decoder-core/Cargo.toml)
   rustup toolchain install "$oldest" --profile minimal --no-self-update >/dev/null 2>&1 || fail "Rust $oldest is missing: run \`rustup toolchain install $oldest\`"
   for features in --all-features --no-default-features; do
     cargo "+$oldest" check -q -p pocketsplat-core --locked --target-dir "$target/oldest" "$features" || fail "pocketsplat-core does not build with Rust $oldest $features"
   done
+  rustup "+$oldest" target add "$embedded_target" >/dev/null 2>&1 || fail "Rust $oldest lacks $embedded_target: run \`rustup +$oldest target add $embedded_target\`"
+  cargo "+$oldest" check -q -p pocketsplat-half --locked --target-dir "$target/oldest" --target "$embedded_target" || fail "pocketsplat-half does not build with Rust $oldest"
   rm -rf "$target/oldest"
   echo "builds with Rust $oldest"
 }
@@ -319,9 +321,9 @@ measure_firmware() { # CSV
   (
     cd firmware-example
     export PSB_BUNDLE=$target/firmware/sample-static.psb
-    out=(--release --locked --bin two_buffers --features two-buffers --target-dir "$embedded")
-    cargo clippy -q "${out[@]}" -- -D warnings
-    cargo build -q "${out[@]}"
+    options=(--release --locked --bin two_buffers --features two-buffers --target-dir "$embedded")
+    cargo clippy -q "${options[@]}" -- -D warnings
+    cargo build -q "${options[@]}"
     ./qemu.sh "$embedded/$embedded_target/release/two_buffers" || fail "two tile buffers do not draw what render draws"
     export PSB_BUNDLE=$bundle
     for out in "$embedded_target" riscv32imac-unknown-none-elf; do
@@ -339,7 +341,8 @@ job_boards() {
   [ -s "$bundle" ] || cargo run -q -p tools --bin sample_bundle --locked -- --coder static "$bundle"
   (cd boards && cargo test -q -p pocketsplat-panel --locked --target-dir "$target/boards")
   for board in pico2 stm32f429i-disco; do
-    (cd "boards/$board" && PSB_BUNDLE=$bundle cargo build -q --release --locked --target-dir "$embedded")
+    (cd "boards/$board" && export PSB_BUNDLE=$bundle && cargo clippy -q --release --locked --target-dir "$embedded" -- -D warnings &&
+      cargo build -q --release --locked --target-dir "$embedded") || fail "$board does not build"
     echo "$board builds"
   done
 }

@@ -27,9 +27,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("{width_px}×{height_px} pixels, {} anchors in {} tiers", bundle.header().n_anchors, bundle.n_tiers());
     for [fast, slow] in budgets {
         match bundle.plan(&Budget::for_frame(width_px, height_px).in_bytes(fast).with_slow_bytes(slow)) {
-            Ok(plan) => println!("{fast:>8} bytes: {}", described(&plan)),
+            Ok(plan) => println!("{fast:>8} + {slow} bytes: {}", described(&plan)),
             // The error names the bytes that would do.
-            Err(error @ DecodeError::BudgetTooSmall { .. }) => println!("{fast:>8} bytes: {error}"),
+            Err(error @ DecodeError::BudgetTooSmall { .. }) => println!("{fast:>8} + {slow} bytes: {error}"),
             Err(error) => return Err(error.into()),
         }
     }

@@ -16,7 +16,7 @@ use pocketsplat_core::{ByteOrder, Camera, Decoder, FrameReport, RenderError, Rou
 #[must_use]
 pub fn fitted(camera: &Camera, width_px: u16, height_px: u16) -> Camera {
     let [w, h, most_w, most_h] = [camera.width_px, camera.height_px, width_px, height_px].map(u32::from);
-    // What is cut off the product is at most its larger factor, so both fit 16 bits.
+    // Both quotients are at most a side of the panel, so they fit 16 bits.
     let (w, h) = if w * most_h >= h * most_w { (most_w, h * most_w / w) } else { (w * most_h / h, most_h) };
     camera.resized(w.max(1) as u16, h.max(1) as u16)
 }

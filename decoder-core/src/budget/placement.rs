@@ -43,7 +43,7 @@ impl Part {
     }
 }
 
-/// The region of each part, a bit each. Of two placements the larger has the part in fast memory that comes first.
+/// The region of each part, a bit each. Compared as numbers: the earlier a part, the more it counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(crate) struct Placement(u8);

@@ -55,6 +55,12 @@ impl Plan {
         })
     }
 
+    /// Bytes of both regions with places for so many splats.
+    pub(crate) fn len_with_splats(&self, max_splats: u32) -> usize {
+        let [fast, slow] = self.shape.with_splats(max_splats).lens(self.placement);
+        fast.saturating_add(slow)
+    }
+
     /// Which parts lie where.
     pub(crate) fn placement(&self) -> Placement {
         self.placement

@@ -31,7 +31,7 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
         Self::prepare(bundle, plan, [fast, slow], skip_damage)
     }
 
-    /// The same, when resident anchors are decoded.
+    /// The same, after resident anchors were decoded.
     // Not inlined, here and below: a caller's stack frame would keep what only one of the steps needs.
     #[inline(never)]
     fn prepare(
@@ -69,10 +69,9 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
 fn check_plan(bundle: &Bundle<'_>, plan: &Plan) -> Result<(), DecodeError> {
     let needed = bundle.plan(plan.budget())?;
     if needed != *plan {
-        return Err(DecodeError::PlanMismatch {
-            needed: saturate(needed.scratch_len()),
-            planned: saturate(plan.scratch_len()),
-        });
+        let [needed, planned] =
+            [&needed, plan].map(|plan| saturate(plan.scratch_len().saturating_add(plan.slow_scratch_len())));
+        return Err(DecodeError::PlanMismatch { needed, planned });
     }
     Ok(())
 }

@@ -160,7 +160,7 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
             report.splats_dropped = report.splats_dropped.saturating_add(tally.n_dropped());
             report.max_splats = report.max_splats.max(tally.max_demand());
         }
-        report.scratch_used = saturate(self.decoder.plan.shape().with_splats(self.most_in_memory).scratch_len());
+        report.scratch_used = saturate(self.decoder.plan.len_with_splats(self.most_in_memory));
         report
     }
 

@@ -58,7 +58,8 @@ pub(super) fn outputs<const B: usize>(block: &[[Half; B]], inputs: &[f32]) -> [f
     checked(sums, block, inputs)
 }
 
-/// The sums of two anchors, whose weights are widened once; not finite where an input is too large to be scaled.
+/// The sums of two anchors, whose weights are widened once. Without the FPU's conversions they are not finite where an input is too large to
+/// be scaled.
 #[inline]
 pub(super) fn sums_of_two(block: &[[Half; LANES]], inputs: [&[f32]; 2]) -> [[f32; LANES]; 2] {
     let Some((biases, rows)) = block.split_first() else { return [[0.0; LANES]; 2] };

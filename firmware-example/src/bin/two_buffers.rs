@@ -107,6 +107,7 @@ fn SysTick() {
 fn main() -> ! {
     match compare() {
         Ok([0, n_rows]) if n_rows > 0 => stop::success(),
+        Ok([0, _]) => defmt::error!("no row was sent while a tile was drawn"),
         Ok([n_other, _]) => defmt::error!("{} pixels are not those of render", n_other),
         Err(error) => defmt::error!("{}", error),
     }
@@ -162,6 +163,9 @@ fn compare() -> Result<[u32; 2], DecodeError> {
 }
 
 /// The next empty buffer.
+///
+/// An interrupt may come between the look into the queue and `wfi`. SysTick comes again; where only the end of a transfer interrupts, look
+/// and wait with interrupts masked, which `wfi` wakes from all the same.
 fn wait_for(empty: &mut Consumer<'static, Buffer>) -> Buffer {
     loop {
         match empty.dequeue() {

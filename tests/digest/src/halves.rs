@@ -11,7 +11,7 @@ const DROPPED: [u32; 6] = [0, 1, 0xFFF, 0x1000, 0x1001, 0x1FFF];
 #[repr(align(4))]
 struct Rows([[u16; 8]; 3]);
 
-/// Digest of every finite half as a float, of the halves of 3.1 million floats (every sign, exponent and first ten digits; ties,
+/// Digest of every finite half as a float, of the halves of 3.1 million floats (every sign, exponent and upper ten bits of the fraction; ties,
 /// subnormals, infinities and NaN among them), and of sums.
 pub(crate) fn digest() -> Digest {
     let mut digest = Digest::EMPTY;

@@ -107,18 +107,15 @@ impl Encoding {
         let n = n_kept(&finished);
         let whole = attempt(n)?;
         let lost = lost_by(&whole)?;
-        let (n_held, held) = match most_within(n, whole, |found| found.memory, attempt)? {
+        let (n_held, held) = match most_within(n, 1, whole, |found| found.memory, attempt)? {
             Ok(found) => found,
             Err(Unfit { least: (n_anchors, Need { limit, available, needed }), .. }) => {
                 return Err(EncodeError::TooLarge { memory: limit, available, needed, n_anchors });
             }
         };
         let at_least = (n as f64 * (1.0 - MOST_CUT_FOR_TIME)) as usize;
-        let (n_left, best) = match most_within(n_held, held, |found| found.time, attempt)? {
-            Ok(found) if found.0 >= at_least => found,
-            Ok(_) => (n_held, attempt(n_held)?),
-            Err(Unfit { whole, .. }) => (n_held, whole),
-        };
+        let (n_left, best) = most_within(n_held, at_least, held, |found| found.time, attempt)?
+            .unwrap_or_else(|Unfit { whole, .. }| (n_held, whole));
         let cut = (n_left < n).then(|| Cut { n_anchors: n - n_left, ..lost });
         Ok(best.fitted(cut))
     }
@@ -157,10 +154,11 @@ impl Encoding {
     }
 }
 
-/// Cuts `whole`, a scene of `n` anchors, until the need that `of` names is no more than there is: the most anchors that keep it,
-/// and the attempt with them.
+/// Cuts `whole`, a scene of `n` anchors, until the need that `of` names is no more than there is: the most anchors that keep it, of
+/// which `at_least` so many have to stay, and the attempt with them.
 fn most_within(
     n: usize,
+    at_least: usize,
     whole: Attempt,
     of: impl Fn(&Attempt) -> Option<Need>,
     attempt: impl Fn(usize) -> Result<Attempt, EncodeError>,
@@ -172,6 +170,10 @@ fn most_within(
     CUTTING.largest(n, |n_next| {
         if n_next == n {
             return Ok(need.share());
+        }
+        // As if it fitted, so that the search goes back up.
+        if n_next < at_least {
+            return Ok(0.5);
         }
         let found = attempt(n_next)?;
         let found_need = of(&found);

@@ -23,7 +23,7 @@ use crate::device::Limits;
 use crate::scene::QuantisationSteps;
 use crate::train::config::Backbone;
 
-/// How a finished run becomes a bundle; decides about its training only where there are limits, by what they leave room for.
+/// How a finished run becomes a bundle. Its limits also steer the training.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Encoding {
     /// What codes the symbols.

@@ -30,7 +30,7 @@ pub(super) fn say(file: &BundleFile, limits: &Limits, fitted: &Fitted) -> Result
         );
         if instructions > most {
             eprintln!(
-                "warning: that is too many, and leaving out half of the anchors would not do; train at a smaller --resolution, or \
+                "warning: that is too many, and even half of the anchors would take more; train at a smaller --resolution, or \
                  draw with Quality::BALANCED"
             );
         }

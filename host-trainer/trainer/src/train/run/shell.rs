@@ -5,7 +5,7 @@ use std::path::Path;
 /// A path as one word of a shell: in quotes where it holds what a shell would take apart or replace.
 pub fn shell_word(path: &Path) -> String {
     let text = path.display().to_string();
-    let is_plain = |c: char| c.is_alphanumeric() || "/._-+,:=@%\\".contains(c);
+    let is_plain = |c: char| c.is_alphanumeric() || "/._-+,:=@%".contains(c) || cfg!(windows) && c == '\\';
     if !text.is_empty() && text.chars().all(is_plain) { text } else { format!("'{}'", text.replace('\'', "'\\''")) }
 }
 
@@ -20,6 +20,7 @@ mod tests {
             ("Übung-2.psb", "Übung-2.psb"),
             ("desk lamp.psb", "'desk lamp.psb'"),
             ("it's/$HOME", "'it'\\''s/$HOME'"),
+            ("back\\slash", if cfg!(windows) { "back\\slash" } else { "'back\\slash'" }),
             ("", "''"),
         ] {
             assert_eq!(shell_word(Path::new(path)), word);

@@ -1,7 +1,8 @@
 //! The view of a bundle's bytes: parsed and checked once, read in place ever after.
 //!
 //! [`Bundle::parse`] checks every offset, length, count, float and checksum but those of the chunks, so that nothing
-//! after it can read outside the bytes. [`format`] (`FORMAT.md` beside this file) is the normative description. Beside each
+//! after it can read outside the bytes. [`format`] (`FORMAT.md` beside this file) is the normative description, [`drawing`]
+//! (`DRAWING.md`) that of the pixels that are made of it. Beside each
 //! `parse` stands the `emit` that a writer calls: the bytes that `parse` reads, as an array where their number is fixed, else as an
 //! iterator, so that neither needs an allocator. The module knows nothing of rendering.
 // Tests may index and add as they like; this is about bytes that nobody vouches for.
@@ -10,6 +11,9 @@
 
 #[doc = include_str!("FORMAT.md")]
 pub mod format {}
+
+#[doc = include_str!("DRAWING.md")]
+pub mod drawing {}
 
 mod anchor;
 mod chunk;

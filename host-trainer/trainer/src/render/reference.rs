@@ -118,7 +118,7 @@ impl ReferenceScene {
         let position = self.positions[anchor];
         let n_log_scales = if self.shape.anisotropic { 6 } else { 4 };
         let log_scales = &self.log_scales[anchor * n_log_scales..][..n_log_scales];
-        // FORMAT.md, section 10: arguments outside this range are clamped to it.
+        // DRAWING.md, section 3: arguments outside this range are clamped to it.
         let size = |log: &[f64]| DVec3::from_slice(log).clamp(DVec3::splat(-87.0), DVec3::splat(88.0)).exp();
         let anchor_size = size(&log_scales[..3]);
         let base_size = if self.shape.anisotropic { size(&log_scales[3..]) } else { size(&[log_scales[3]; 3]) };

@@ -2,7 +2,7 @@
 //!
 //! [`Bundle::parse`] checks every offset, length, count, float and checksum but those of the chunks, so that nothing
 //! after it can read outside the bytes. [`format`] (`FORMAT.md` beside this file) is the normative description, [`drawing`]
-//! (`DRAWING.md`) that of the pixels that are made of it. Beside each
+//! (`DRAWING.md`) that of the pixels that are made of it, [`levels`] (`MANIFEST.md`) of measures, profiles and levels. Beside each
 //! `parse` stands the `emit` that a writer calls: the bytes that `parse` reads, as an array where their number is fixed, else as an
 //! iterator, so that neither needs an allocator. The module knows nothing of rendering.
 // Tests may index and add as they like; this is about bytes that nobody vouches for.
@@ -14,6 +14,9 @@ pub mod format {}
 
 #[doc = include_str!("DRAWING.md")]
 pub mod drawing {}
+
+#[doc = include_str!("MANIFEST.md")]
+pub mod levels {}
 
 mod anchor;
 mod chunk;

@@ -92,12 +92,22 @@ static void misuse(const uint8_t *bundle, size_t len) {
   budget.ram_bytes = plan.scratch_bytes;
   CHECK(psb_make_plan(bundle, len, &budget, &plan, &message) == PSB_STATUS_OK && message.text[0] == 0);
   uint8_t *scratch = malloc(plan.scratch_bytes);
-  CHECK(psb_bind(NULL, PSB_DECODER_BYTES, bundle, len, &budget, scratch, plan.scratch_bytes, &decoder, &message) == PSB_STATUS_MISUSE);
+  CHECK(psb_bind(NULL, PSB_DECODER_BYTES, bundle, len, &budget, scratch, plan.scratch_bytes, NULL, 0, &decoder, &message) == PSB_STATUS_MISUSE);
   CHECK(psb_decoder_bytes() <= PSB_DECODER_BYTES);
-  CHECK(psb_bind(place, psb_decoder_bytes() - 1, bundle, len, &budget, scratch, plan.scratch_bytes, &decoder, &message) == PSB_STATUS_MISUSE);
-  CHECK(psb_bind((char *)place + 1, PSB_DECODER_BYTES - 1, bundle, len, &budget, scratch, plan.scratch_bytes, &decoder, &message) == PSB_STATUS_MISUSE);
-  CHECK(psb_bind(place, PSB_DECODER_BYTES, bundle, len, &budget, NULL, plan.scratch_bytes, &decoder, &message) == PSB_STATUS_MISUSE);
-  CHECK(psb_bind(place, PSB_DECODER_BYTES, bundle, len, &budget, scratch, plan.scratch_bytes, NULL, &message) == PSB_STATUS_MISUSE);
+  CHECK(psb_bind(place, psb_decoder_bytes() - 1, bundle, len, &budget, scratch, plan.scratch_bytes, NULL, 0, &decoder, &message) == PSB_STATUS_MISUSE);
+  CHECK(psb_bind((char *)place + 1, PSB_DECODER_BYTES - 1, bundle, len, &budget, scratch, plan.scratch_bytes, NULL, 0, &decoder, &message) == PSB_STATUS_MISUSE);
+  CHECK(psb_bind(place, PSB_DECODER_BYTES, bundle, len, &budget, NULL, plan.scratch_bytes, NULL, 0, &decoder, &message) == PSB_STATUS_MISUSE);
+  const psb_budget one_region = budget;
+  budget.ram_bytes = plan.scratch_bytes / 2;
+  budget.slow_bytes = 1;
+  CHECK(psb_make_plan(bundle, len, &budget, &plan, &message) == PSB_STATUS_OVER_BUDGET && plan.slow_scratch_bytes > 1);
+  budget.slow_bytes = plan.slow_scratch_bytes;
+  CHECK(psb_make_plan(bundle, len, &budget, &plan, NULL) == PSB_STATUS_OK && plan.slow_scratch_bytes > 0);
+  CHECK(psb_bind(place, PSB_DECODER_BYTES, bundle, len, &budget, scratch, plan.scratch_bytes, NULL, 0, &decoder, &message) == PSB_STATUS_MISUSE);
+  CHECK(strstr(message.text, "slow is NULL"));
+  budget = one_region;
+  CHECK(psb_make_plan(bundle, len, &budget, &plan, NULL) == PSB_STATUS_OK);
+  CHECK(psb_bind(place, PSB_DECODER_BYTES, bundle, len, &budget, scratch, plan.scratch_bytes, NULL, 0, NULL, &message) == PSB_STATUS_MISUSE);
   for (size_t cut = 0; cut < len; cut += 97) {
     uint8_t *part = malloc(cut + 1);
     memcpy(part, bundle, cut);
@@ -110,7 +120,7 @@ static void misuse(const uint8_t *bundle, size_t len) {
     free(part);
   }
   CHECK(psb_make_plan(bundle, len, &budget, &plan, NULL) == PSB_STATUS_OK);
-  CHECK(psb_bind(place, PSB_DECODER_BYTES, bundle, len, &budget, scratch, plan.scratch_bytes, &decoder, NULL) == PSB_STATUS_OK);
+  CHECK(psb_bind(place, PSB_DECODER_BYTES, bundle, len, &budget, scratch, plan.scratch_bytes, NULL, 0, &decoder, NULL) == PSB_STATUS_OK);
   CHECK(psb_preview(NULL, len, 64, 48, &camera, NULL) == PSB_STATUS_MISUSE);
   CHECK(psb_preview(bundle, len, 64, 48, NULL, NULL) == PSB_STATUS_MISUSE);
   CHECK(psb_preview(bundle, len, 64, 48, &camera, &message) == PSB_STATUS_OK && camera.width_px == 64);

@@ -66,6 +66,8 @@ typedef struct psb_decoder psb_decoder;
 typedef struct psb_budget {
   // Bytes of scratch memory that there are.
   size_t ram_bytes;
+  // Bytes of slower memory beside it, such as PSRAM or SDRAM; 0 where there is none.
+  size_t slow_bytes;
   // Widest frame, pixels.
   uint16_t width_px;
   // Highest frame, pixels.
@@ -82,6 +84,8 @@ typedef struct psb_budget {
 typedef struct psb_plan {
   // Bytes of scratch memory that psb_bind takes; where nothing fits, those that would do.
   size_t scratch_bytes;
+  // Bytes of slower memory that psb_bind takes beside them; 0 where everything lies in the first.
+  size_t slow_scratch_bytes;
   // Share of the anchors that is not drawn.
   float pruning_rate;
   // Places for splats.
@@ -213,12 +217,12 @@ size_t psb_decoder_bytes(void);
 // Checks a bundle, plans for it, and binds a decoder to it.
 //
 // place: place_len bytes for the decoder, psb_decoder_bytes() or PSB_DECODER_BYTES, aligned to PSB_DECODER_ALIGN. scratch: scratch_len bytes of any
-// alignment, as many as psb_make_plan said or more. decoder: gets the decoder, NULL where the call fails. message: NULL, or where to say what was
-// wrong.
+// alignment, as many as psb_make_plan said or more. slow: likewise slow_len bytes of slower memory; NULL where slow_scratch_bytes of the plan is
+// 0. decoder: gets the decoder, NULL where the call fails. message: NULL, or where to say what was wrong.
 //
 // # Safety
-// Pointers are NULL or point to what the call says. Bundle, place and scratch lie apart, stay where they are, and nobody else writes to
-// them as long as the decoder is used.
+// Pointers are NULL or point to what the call says. Bundle, place, scratch and slow lie apart, stay where they are, and nobody else writes
+// to them as long as the decoder is used.
 enum psb_status psb_bind(void *place,
                          size_t place_len,
                          const uint8_t *bundle,
@@ -226,6 +230,8 @@ enum psb_status psb_bind(void *place,
                          const struct psb_budget *budget,
                          uint8_t *scratch,
                          size_t scratch_len,
+                         uint8_t *slow,
+                         size_t slow_len,
                          struct psb_decoder **decoder,
                          struct psb_message *message);
 

@@ -4,6 +4,7 @@ use core::ffi::c_void;
 use core::mem::{align_of, size_of};
 use core::slice;
 
+use pocketsplat_core::arithmetic::ReferenceArithmetic;
 use pocketsplat_core::{FrameReport, RenderError, TileSink};
 
 use crate::camera::Camera;
@@ -128,15 +129,24 @@ impl TileSink for Tiles {
     }
 }
 
+/// The caller's memory; none for NULL.
+///
+/// # Safety
+/// `bytes` is NULL, or points to `len` bytes that nobody else uses as long as the result is used.
+unsafe fn memory_of(bytes: *mut u8, len: usize) -> &'static mut [u8] {
+    // SAFETY: not NULL; the rest is the caller's promise.
+    if bytes.is_null() { &mut [] } else { unsafe { slice::from_raw_parts_mut(bytes, len) } }
+}
+
 /// Checks a bundle, plans for it, and binds a decoder to it.
 ///
 /// place: place_len bytes for the decoder, psb_decoder_bytes() or PSB_DECODER_BYTES, aligned to PSB_DECODER_ALIGN. scratch: scratch_len bytes of any
-/// alignment, as many as psb_make_plan said or more. decoder: gets the decoder, NULL where the call fails. message: NULL, or where to say what was
-/// wrong.
+/// alignment, as many as psb_make_plan said or more. slow: likewise slow_len bytes of slower memory; NULL where slow_scratch_bytes of the plan is
+/// 0. decoder: gets the decoder, NULL where the call fails. message: NULL, or where to say what was wrong.
 ///
 /// # Safety
-/// Pointers are NULL or point to what the call says. Bundle, place and scratch lie apart, stay where they are, and nobody else writes to
-/// them as long as the decoder is used.
+/// Pointers are NULL or point to what the call says. Bundle, place, scratch and slow lie apart, stay where they are, and nobody else writes
+/// to them as long as the decoder is used.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn psb_bind(
     place: *mut c_void,
@@ -146,6 +156,8 @@ pub unsafe extern "C" fn psb_bind(
     budget: *const Budget,
     scratch: *mut u8,
     scratch_len: usize,
+    slow: *mut u8,
+    slow_len: usize,
     decoder: *mut *mut Decoder,
     message: *mut Message,
 ) -> Status {
@@ -162,13 +174,16 @@ pub unsafe extern "C" fn psb_bind(
         if place_len < size_of::<Decoder>() {
             return Err(Failure::Misuse("place_len is less than psb_decoder_bytes()"));
         }
-        if scratch.is_null() {
+        let (bundle, plan) = planned(bundle, budget)?;
+        if scratch.is_null() && plan.scratch_len() > 0 {
             return Err(Failure::Misuse("scratch is NULL"));
         }
-        let (bundle, plan) = planned(bundle, budget)?;
-        // SAFETY: not NULL; the rest is the caller's promise.
-        let scratch = unsafe { slice::from_raw_parts_mut(scratch, scratch_len) };
-        let bound = pocketsplat_core::Decoder::bind(&bundle, plan, scratch)?;
+        if slow.is_null() && plan.slow_scratch_len() > 0 {
+            return Err(Failure::Misuse("slow is NULL, and the plan takes slow memory"));
+        }
+        // SAFETY: the caller's promise.
+        let regions = unsafe { [memory_of(scratch, scratch_len), memory_of(slow, slow_len)] };
+        let bound = pocketsplat_core::Decoder::bind_in_regions::<ReferenceArithmetic>(&bundle, plan, regions)?;
         // SAFETY: long enough and aligned, as was checked.
         unsafe { place.write(Decoder { begun: None, bound }) };
         *decoder = place;

@@ -2,7 +2,7 @@
 
 use core::slice;
 
-use pocketsplat_core::{Bundle, Overflow, Quality as CoreQuality};
+use pocketsplat_core::{Bundle, DecodeError, Overflow, Quality as CoreQuality, Region};
 
 use crate::status::{Failure, Message, Status, status_of};
 
@@ -24,6 +24,8 @@ pub enum Quality {
 pub struct Budget {
     /// Bytes of scratch memory that there are.
     pub ram_bytes: usize,
+    /// Bytes of slower memory beside it, such as PSRAM or SDRAM; 0 where there is none.
+    pub slow_bytes: usize,
     /// Widest frame, pixels.
     pub width_px: u16,
     /// Highest frame, pixels.
@@ -42,6 +44,8 @@ pub struct Budget {
 pub struct Plan {
     /// Bytes of scratch memory that psb_bind takes; where nothing fits, those that would do.
     pub scratch_bytes: usize,
+    /// Bytes of slower memory that psb_bind takes beside them; 0 where everything lies in the first.
+    pub slow_scratch_bytes: usize,
     /// Share of the anchors that is not drawn.
     pub pruning_rate: f32,
     /// Places for splats.
@@ -66,7 +70,8 @@ impl Budget {
         };
         let overflow = if self.slabs { Overflow::Slabs } else { Overflow::LeaveOut };
         let frame = pocketsplat_core::Budget::for_frame(self.width_px, self.height_px);
-        Ok(frame.in_bytes(self.ram_bytes).with_tiers(self.tiers).with_quality(quality).with_overflow(overflow))
+        let memory = frame.in_bytes(self.ram_bytes).with_slow_bytes(self.slow_bytes);
+        Ok(memory.with_tiers(self.tiers).with_quality(quality).with_overflow(overflow))
     }
 }
 
@@ -74,6 +79,7 @@ impl From<&pocketsplat_core::Plan> for Plan {
     fn from(plan: &pocketsplat_core::Plan) -> Self {
         Self {
             scratch_bytes: plan.scratch_len(),
+            slow_scratch_bytes: plan.slow_scratch_len(),
             pruning_rate: plan.pruning_rate(),
             max_splats: plan.max_splats(),
             n_tiers: plan.n_tiers(),
@@ -107,7 +113,15 @@ pub(crate) unsafe fn bytes_of(bytes: *const u8, len: usize) -> Option<&'static [
 /// A budget for frames of at most width_px by height_px within ram_bytes, everything else as good as memory allows.
 #[unsafe(no_mangle)]
 pub extern "C" fn psb_budget_for_frame(width_px: u16, height_px: u16, ram_bytes: usize) -> Budget {
-    Budget { ram_bytes, width_px, height_px, tiers: u8::MAX, quality: Quality::Exact as u8, slabs: false }
+    Budget {
+        ram_bytes,
+        slow_bytes: 0,
+        width_px,
+        height_px,
+        tiers: u8::MAX,
+        quality: Quality::Exact as u8,
+        slabs: false,
+    }
 }
 
 /// Checks a bundle and says how many bytes the best plan within a budget takes.
@@ -131,8 +145,11 @@ pub unsafe extern "C" fn psb_make_plan(
         let plan = plan.ok_or(Failure::Misuse("plan is NULL"))?;
         *plan = Plan::default();
         let (_, found) = planned(bundle, budget).inspect_err(|failure| {
-            if let Failure::Decode(pocketsplat_core::DecodeError::BudgetTooSmall { needed, .. }) = failure {
-                plan.scratch_bytes = *needed as usize;
+            if let Failure::Decode(DecodeError::BudgetTooSmall { region, needed, .. }) = failure {
+                match region {
+                    Region::Fast => plan.scratch_bytes = *needed as usize,
+                    Region::Slow => plan.slow_scratch_bytes = *needed as usize,
+                }
             }
         })?;
         *plan = Plan::from(&found);

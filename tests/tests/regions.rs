@@ -5,7 +5,8 @@ use conformance::frame::{Frame, budget_for, to_core};
 use conformance::scenes::{CASES, cameras};
 use pocketsplat_core::arithmetic::ReferenceArithmetic;
 use pocketsplat_core::{
-    Budget, Bundle, Camera, DecodeError, Decoder, ErrorClass, MaxSplats, Overflow, Part, Plan, Region, Residency,
+    Budget, Bundle, Camera, DecodeError, Decoder, ErrorClass, FrameReport, MaxSplats, Overflow, Part, Plan, Region,
+    Residency,
 };
 
 /// A bundle for each case, of each coder in turn.
@@ -19,13 +20,18 @@ fn view() -> Camera {
 
 /// The frame that a plan draws in memory of so many bytes fewer than it says, filled with `fill` before.
 fn drawn(bundle: &Bundle<'_>, plan: Plan, fill: u8, fewer: [usize; 2]) -> Result<Frame, DecodeError> {
+    reported(bundle, plan, fill, fewer).map(|(frame, _)| frame)
+}
+
+/// As [`drawn`], and what the frame consisted of.
+fn reported(bundle: &Bundle<'_>, plan: Plan, fill: u8, fewer: [usize; 2]) -> Result<(Frame, FrameReport), DecodeError> {
     let [mut fast, mut slow] =
         [plan.scratch_len() - fewer[0], plan.slow_scratch_len() - fewer[1]].map(|len| vec![fill; len]);
     let camera = view();
     let mut frame = Frame::new(camera.width_px, camera.height_px);
     let mut decoder = Decoder::bind_in_regions::<ReferenceArithmetic>(bundle, plan, [&mut fast, &mut slow])?;
-    decoder.render(&camera, &mut frame)?;
-    Ok(frame)
+    let report = decoder.render(&camera, &mut frame)?;
+    Ok((frame, report))
 }
 
 /// Budgets with as many fast bytes as each part of a plan's memory takes alone, and with shares of all of them.
@@ -70,6 +76,32 @@ fn where_memory_lies_changes_no_pixel_and_its_bytes_are_exact() {
         }
     }
     assert!(n_split > 100, "only {n_split} plans used both regions");
+}
+
+/// What a frame reports as used are the bytes of both regions in a plan with places for just its splats, which draws it.
+#[test]
+fn the_bytes_that_a_frame_used_are_those_of_both_regions() {
+    let mut n_split = 0;
+    for (name, bytes) in files() {
+        let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
+        let budget = budget_for(&view()).with_max_splats(MaxSplats::Worst).with_residency(Residency::Streamed);
+        let whole = bundle.plan(&budget).expect("memory without limit");
+        for budget in split(budget, &whole) {
+            let plan = bundle.plan(&budget).expect("slow memory for all of it");
+            let (frame, report) = reported(&bundle, plan, 0xA5, [0, 0]).expect("its own bytes do");
+            let most = MaxSplats::AtMost(report.max_splats);
+            let just = bundle.plan(&budget.with_max_splats(most)).expect("no more memory than before");
+            // Fewer splats may fit into the fast memory as a whole; the bytes are compared where they lie as before.
+            if just.memory().map(|part| part.region).eq(plan.memory().map(|part| part.region)) {
+                let len = just.scratch_len() + just.slow_scratch_len();
+                assert_eq!(len, report.scratch_used as usize, "{name}, {budget:?}: {report:?}");
+                let again = drawn(&bundle, just, 0, [0, 0]).expect("its own bytes do");
+                assert!(again.rgb == frame.rgb, "{name}, {budget:?}: other pixels");
+                n_split += usize::from(just.scratch_len() > 0 && just.slow_scratch_len() > 0);
+            }
+        }
+    }
+    assert!(n_split > 20, "only {n_split} plans used both regions");
 }
 
 #[test]

@@ -28,8 +28,6 @@ pub mod difference;
 #[path = "../digest/src/digest.rs"]
 pub mod digest;
 pub mod frame;
-#[path = "../digest/src/frame.rs"]
-pub mod frame_digest;
 pub mod fuzz;
 pub mod hard_cases;
 pub mod scenes;

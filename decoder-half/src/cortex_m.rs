@@ -4,6 +4,10 @@
 //! name them as clobbered.
 #![expect(unsafe_code, reason = "stable Rust has no other way to these instructions")]
 
+pub(crate) mod layer;
+pub(crate) mod root;
+pub(crate) mod rows;
+
 use core::arch::asm;
 
 use crate::portable;

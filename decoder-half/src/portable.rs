@@ -1,5 +1,9 @@
 //! Conversions by shifts and one multiplication, for every target.
 
+pub mod layer;
+pub mod root;
+pub mod rows;
+
 /// Whether the processor converts halves itself.
 pub const IN_HARDWARE: bool = false;
 

@@ -4,7 +4,6 @@ import { exp, f32Of, sqrtAbove, trunc } from "./maths.mjs";
 import { LN_255, TILE } from "./project.mjs";
 
 const f = Math.fround;
-const FAINTEST = f32Of(0x3b808081);
 const MOST_ALPHA = f32Of(0x3f7d70a4);
 const LEAST_TRANSMITTANCE = f32Of(0x38d1b717);
 const WIDER = f32Of(0x3a83126f);
@@ -41,14 +40,15 @@ export class Canvas {
       const across = f(f(dy * dy) * kappa);
       const centre = f(x0 + f(shear * dy));
       const left = f(reach - across);
-      const pixels = span(centre, f(sqrtAbove(left > 0 ? f(left * variance) : 0) + WIDER), width);
+      if (!(left > 0)) continue;
+      const pixels = span(centre, f(sqrtAbove(f(left * variance)) + WIDER), width);
       if (pixels === null) continue;
       const dx = f(pixels[0] - centre);
       let beta = exp(f(lo - f(0.5 * f(across + f(f(dx * dx) * rho)))));
       let factor = exp(f(-rho * f(dx + 0.5)));
       const at = (y + row) * this.width + x;
       for (let pixel = pixels[0]; pixel <= pixels[1]; pixel++) {
-        if (beta >= FAINTEST) this.#blend(at + pixel, beta, colour);
+        this.#blend(at + pixel, beta, colour);
         beta = f(beta * factor);
         factor = f(factor * step);
       }
@@ -59,12 +59,12 @@ export class Canvas {
     if (this.finished[at]) return;
     const alpha = beta > MOST_ALPHA ? MOST_ALPHA : beta;
     const before = this.left[at];
-    const after = f(before * f(1 - alpha));
+    const share = f(alpha * before);
+    const after = f(before - share);
     if (!(after >= LEAST_TRANSMITTANCE)) {
       this.finished[at] = 1;
       return;
     }
-    const share = f(alpha * before);
     for (let c = 0; c < 3; c++) this.colour[3 * at + c] = f(this.colour[3 * at + c] + f(share * colour[c]));
     this.left[at] = after;
   }

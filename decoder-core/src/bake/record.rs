@@ -125,7 +125,7 @@ fn smaller_three(rotation: [f32; 4]) -> (u32, [u32; 3]) {
 fn unit_quaternion(largest: u32, others: [u32; 3]) -> [f32; 4] {
     let [a, b, c] = others.map(|bits| (2.0 * SQRT_HALF / MAX_20 as f32) * (bits & MAX_20) as f32 - SQRT_HALF);
     let rest = 1.0 - (a * a + b * b + c * c);
-    let number = libm::sqrtf(if rest > 0.0 { rest } else { 0.0 });
+    let number = crate::math::sqrt(if rest > 0.0 { rest } else { 0.0 });
     match largest {
         0 => [number, a, b, c],
         1 => [a, number, b, c],

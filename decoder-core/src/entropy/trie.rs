@@ -152,9 +152,19 @@ impl TrieReader<'_> {
         for contexts in levels {
             let context = CONTEXTS >> ((both & 7) << 1) & 3;
             let node = contexts.get(context as usize).copied().unwrap_or_default();
-            let children = reader.symbol(&NodeModel::from_bytes(node)) as u32;
-            code = (code << 1) | (children & 1);
-            both = (both << 1) | (children >> 1);
+            // As `NodeModel::slot` has it, in registers of 32 bits.
+            let [end_both, end_zero] = node.map(|end| u32::from(u16::from_le_bytes(end)));
+            let quantile = reader.quantile();
+            let (start, end, is_both, is_one) = if quantile < end_both {
+                (0, end_both, 1, 0)
+            } else if quantile < end_zero {
+                (end_both, end_zero, 0, 0)
+            } else {
+                (end_zero, FREQUENCY_TOTAL.into(), 0, 1)
+            };
+            reader.advance(start, end.wrapping_sub(start));
+            code = (code << 1) | is_one;
+            both = (both << 1) | is_both;
         }
         *symbols = reader;
         let n = levels.len() as u32 & 63;

@@ -1,21 +1,24 @@
 //! The exponential function.
 
+use pocketsplat_half::Exponential;
+
 /// Below this argument [`exp`] stays at `exp(EXP_MIN)` ≈ 1.6e-38, the last value that is not subnormal.
 pub const EXP_MIN: f32 = -87.0;
 
 /// Above this argument [`exp`] stays at `exp(EXP_MAX)` ≈ 1.7e38, which is still finite.
 pub const EXP_MAX: f32 = 88.0;
 
-/// Added and subtracted, it rounds to the nearest integer and leaves that integer in the low bits: 1.5 · 2²³.
-const ROUNDER: f32 = 12_582_912.0;
-
-/// ln 2 in two parts; the first has 9 significant bits, so its product with |n| ≤ 127 is exact (Cody and Waite 1980).
-const LN_2_HIGH: f32 = 355.0 / 512.0;
-/// What `LN_2_HIGH` leaves of ln 2.
-const LN_2_LOW: f32 = -2.121_944_4e-4;
-
-/// `(eʳ − 1 − r)/r²` on |r| ≤ ½ ln 2, interpolated at the Chebyshev nodes; with r² it errs by less than 1e-8.
-const TAIL: [f32; 5] = [0.5, 0.166_665_73, 0.041_666_55, 0.008_363_774, 0.001_392_692_7];
+/// x = n·ln 2 + r with |r| ≤ ½ ln 2, eˣ = 2ⁿ·eʳ.
+///
+/// The rounder, 1.5 · 2²³, added and subtracted, rounds to the nearest integer and leaves that integer in the low bits. The first part of
+/// ln 2 has 9 significant bits, so its product with |n| ≤ 127 is exact (Cody and Waite 1980). The polynomial is interpolated at the
+/// Chebyshev nodes; with r² it errs by less than 1e-8.
+pub(crate) const EXPONENTIAL: Exponential = Exponential {
+    log2_e: core::f32::consts::LOG2_E,
+    rounder: 12_582_912.0,
+    ln_2: [355.0 / 512.0, -2.121_944_4e-4],
+    tail: [0.001_392_692_7, 0.008_363_774, 0.041_666_55, 0.166_665_73],
+};
 
 /// Returns eˣ with a relative error below 2e-7 for x in [`EXP_MIN`]..=[`EXP_MAX`].
 ///
@@ -43,16 +46,7 @@ pub fn exp(x: f32) -> f32 {
 /// About 15 instructions, no division, no branch.
 #[inline(always)]
 pub(super) fn exp_near(x: f32) -> f32 {
-    let shifted = x * core::f32::consts::LOG2_E + ROUNDER;
-    let n = shifted - ROUNDER;
-    let r = (x - n * LN_2_HIGH) - n * LN_2_LOW;
-    let [c0, c1, c2, c3, c4] = TAIL;
-    let tail = (((c4 * r + c3) * r + c2) * r + c1) * r + c0;
-    let e_r = 1.0 + (r + (r * r) * tail);
-    // The low bits of `shifted` hold n in two's complement: moved to the exponent field and biased, they are 2ⁿ.
-    // A cast of `n` would saturate, and that check keeps the loop around it from vectorising.
-    let two_n = f32::from_bits((shifted.to_bits() << 23).wrapping_add(1.0_f32.to_bits()));
-    e_r * two_n
+    EXPONENTIAL.near(x)
 }
 
 #[cfg(test)]

@@ -1,6 +1,8 @@
 //! Exponential, logarithm and the heads' activations, to two accuracies.
 
 use super::activation;
+use pocketsplat_half::{BlendConstants, ROW_LEN, RowSplat, RowsWork, blend_rows_with};
+
 use super::exp::{self, EXP_MAX, EXP_MIN};
 
 /// The transcendental functions of a frame; none returns NaN or infinity for a number.
@@ -12,6 +14,16 @@ pub(crate) trait Functions {
     #[inline(always)]
     fn exp_near(x: f32) -> f32 {
         Self::exp(x)
+    }
+
+    /// Blends a splat into rows of pixels by this exponential function.
+    fn blend_rows(
+        splat: &mut RowSplat,
+        constants: &BlendConstants,
+        rows: &mut [[[f32; 4]; ROW_LEN]],
+        width: u16,
+    ) -> RowsWork {
+        blend_rows_with(splat, constants, Self::exp_near, rows, width)
     }
 
     /// The natural logarithm of a positive number that is not subnormal.
@@ -43,6 +55,15 @@ impl Functions for Reference {
     #[inline(always)]
     fn exp_near(x: f32) -> f32 {
         exp::exp_near(x)
+    }
+
+    fn blend_rows(
+        splat: &mut RowSplat,
+        constants: &BlendConstants,
+        rows: &mut [[[f32; 4]; ROW_LEN]],
+        width: u16,
+    ) -> RowsWork {
+        pocketsplat_half::blend_rows(splat, constants, rows, width)
     }
 
     #[inline(always)]

@@ -11,5 +11,7 @@ pub(crate) mod functions;
 
 pub use activation::{sigmoid, tanh};
 pub use angle::sin_cos;
+pub(crate) use exp::EXPONENTIAL;
 pub use exp::{EXP_MAX, EXP_MIN, exp};
+pub(crate) use pocketsplat_half::sqrt;
 pub use pocketsplat_half::{from_half, is_finite_half, to_half};

@@ -1,6 +1,6 @@
 //! A dense layer cut into blocks of outputs.
 
-use super::weight::{self, Half};
+use super::weight::{self, Half, LANES};
 use crate::arena::Arena;
 use crate::bundle::{Halves, LayerWeights};
 use crate::error::DecodeError;
@@ -76,8 +76,19 @@ impl<'s, const B: usize> Blocks<'s, B> {
     #[inline(always)]
     pub(crate) fn outputs(&self, index: usize, inputs: &[f32]) -> Option<[f32; B]> {
         match self.rows {
-            Rows::F32(rows) => block(rows, index, self.rows_per_block).map(|block| outputs(block, inputs)),
+            Rows::F32(rows) => {
+                block(rows, index, self.rows_per_block).map(|block| pocketsplat_half::outputs(block, inputs))
+            }
             Rows::F16(rows) => outputs_of_halves(rows, index, self.rows_per_block, inputs),
+        }
+    }
+}
+
+impl Blocks<'_, LANES> {
+    /// Fills `units` with the outputs, those below 0 with 0; nothing is done with blocks of halves.
+    pub(super) fn rectify(&self, inputs: &[f32], units: &mut [f32]) {
+        if let Rows::F32(rows) = self.rows {
+            pocketsplat_half::rectified_units(rows, self.rows_per_block, inputs, units.as_chunks_mut().0);
         }
     }
 }
@@ -139,13 +150,6 @@ fn filled<'s>(
         }
     }
     Ok(values)
-}
-
-/// The outputs of one block: bias, then `input·weight` added in order.
-#[inline]
-pub(crate) fn outputs<const B: usize>(block: &[[f32; B]], inputs: &[f32]) -> [f32; B] {
-    let Some((biases, weights)) = block.split_first() else { return [0.0; B] };
-    continued(*biases, weights, inputs)
 }
 
 /// `sums` with `input·weight` added in order.

@@ -1,6 +1,6 @@
 //! The detail head: what is added to a Gaussian's colour, its first layer split into a part per anchor and one per Gaussian.
 
-use super::block::{HeadWeights, continued, outputs};
+use super::block::{HeadWeights, continued};
 use super::head::Head;
 use super::weight::LANES;
 use crate::arena::Arena;
@@ -31,7 +31,7 @@ impl<'s> Detail<'s> {
     /// * `sums`: [`sums_len`](super::HeadShape::sums_len) floats.
     pub(crate) fn begin(&self, feature: &[f32], sums: &mut [f32]) {
         for (sums, block) in sums.as_chunks_mut::<LANES>().0.iter_mut().zip(self.head.hidden.blocks.floats()) {
-            *sums = outputs(block, feature);
+            *sums = pocketsplat_half::outputs(block, feature);
         }
     }
 

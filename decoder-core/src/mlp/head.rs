@@ -1,6 +1,6 @@
 //! A head in floats: hidden layer with ReLU, output layer of one block per offset.
 
-use super::block::{self, Blocks, HeadWeights};
+use super::block::{Blocks, HeadWeights};
 use super::format::{F16, F32, HeadFormat, MlpHead};
 use super::pair::Role;
 use super::weight;
@@ -77,16 +77,10 @@ impl Hidden<'_> {
     #[inline(never)]
     fn activate<'h>(&self, number: usize, inputs: &[f32], hidden: &'h mut [f32], role: &'h mut Role<'_>) -> &'h [f32] {
         if !self.blocks.takes_two() {
-            // Not zipped, here and below: blocks are of a length that the compiler does not know, and their number would be a
-            // division, which it may take for one by zero.
-            let mut blocks = self.blocks.floats();
-            for units in hidden.as_chunks_mut::<LANES>().0 {
-                let Some(block) = blocks.next() else { break };
-                for (unit, sum) in units.iter_mut().zip(block::outputs(block, inputs)) {
-                    *unit = relu(sum);
-                }
-            }
+            self.blocks.rectify(inputs, hidden);
         } else if let Some((second_inputs, second)) = role.second(number, hidden.len()) {
+            // Not zipped: blocks are of a length that the compiler does not know, and their number would be a division, which it may take
+            // for one by zero.
             let mut blocks = self.blocks.halves();
             for (first, second) in hidden.as_chunks_mut::<LANES>().0.iter_mut().zip(second.as_chunks_mut::<LANES>().0) {
                 let Some(block) = blocks.next() else { break };

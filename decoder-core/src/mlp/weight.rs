@@ -5,7 +5,7 @@ use bytemuck::{Pod, Zeroable};
 use crate::math::to_half;
 
 /// Outputs computed together in layers whose outputs are all needed.
-pub(super) const LANES: usize = 8;
+pub(super) use pocketsplat_half::LANES;
 
 /// 2¹¹²: what a half's bits, moved into a float's fields, are short of.
 const SCALE: f32 = f32::from_bits((127 + 112) << 23);

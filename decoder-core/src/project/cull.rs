@@ -96,8 +96,8 @@ impl View {
         // mid² − det, written without the difference of two large numbers.
         let spread = half_difference * half_difference + covariance.xy * covariance.xy;
         let spread = if spread > 0.1 { spread } else { 0.1 };
-        let lambda_max = 0.5 * (covariance.xx + covariance.yy) + libm::sqrtf(spread);
-        let radius = libm::ceilf(3.0 * libm::sqrtf(lambda_max));
+        let lambda_max = 0.5 * (covariance.xx + covariance.yy) + crate::math::sqrt(spread);
+        let radius = libm::ceilf(3.0 * crate::math::sqrt(lambda_max));
         let [u, v] = self.to_image(point);
         let [width, height] = self.size_px;
         u + radius > 0.0 && u - radius < width && v + radius > 0.0 && v - radius < height

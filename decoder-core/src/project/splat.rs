@@ -54,7 +54,7 @@ impl View {
         };
         let mut opacity = gaussian.opacity;
         if effects.dilation_compensation {
-            opacity *= libm::sqrtf(covariance.det_bare / covariance.det);
+            opacity *= crate::math::sqrt(covariance.det_bare / covariance.det);
         }
         let log_opacity = F::ln(opacity + self.lost_opacity);
         // Squared Mahalanobis radius at which alpha is the least that draws.
@@ -63,7 +63,7 @@ impl View {
             return None;
         }
         let mean = self.to_image(point);
-        let half_extent = [libm::sqrtf(reach * covariance.xx), libm::sqrtf(reach * covariance.yy)];
+        let half_extent = [crate::math::sqrt(reach * covariance.xx), libm::sqrtf(reach * covariance.yy)];
         let rect = TileRect::covering(mean, half_extent, self.size_px)?;
         let splat = Splat {
             mean,

@@ -1,18 +1,22 @@
 //! Front-to-back compositing of one tile.
 
-use crate::math::exp;
+use pocketsplat_half::{BlendConstants, ROW_LEN, RowSplat, SLACK_PX, span, sqrt_above};
+
 use crate::math::functions::Functions;
+use crate::math::{EXPONENTIAL, exp};
 use crate::project::{Splat, SplatRecord, TileRect, log_cut};
 use crate::rules::{self, TILE_PX};
 
-const ALPHA_MAX: f32 = rules::ALPHA_MAX as f32;
 const TRANSMITTANCE_MIN: f32 = rules::TRANSMITTANCE_MIN as f32;
+/// One per cent below the logarithm of the largest alpha.
+const LOG_OPACITY_BELOW_MAX: f32 = -0.0201;
+static CONSTANTS: BlendConstants =
+    BlendConstants::new(EXPONENTIAL, rules::ALPHA_MAX as f32, LOG_OPACITY_BELOW_MAX, TRANSMITTANCE_MIN);
+const _: () = assert!(rules::ALPHA_MAX > 0.99 - 1e-9 && ROW_LEN == TILE_PX as usize);
 
 /// Which contributions are left out.
 pub(crate) struct BlendRule {
-    /// The least alpha.
-    alpha_min: f32,
-    /// −ln of it.
+    /// −ln of the least alpha.
     log_cut: f32,
     /// A pixel that less light comes through is finished.
     transmittance_stop: f32,
@@ -21,11 +25,7 @@ pub(crate) struct BlendRule {
 impl BlendRule {
     /// * `alpha_cut`: the least alpha, in 255ths. * `transmittance_stop`: in 10 000ths.
     pub(crate) fn new(alpha_cut: u8, transmittance_stop: u16) -> Self {
-        Self {
-            alpha_min: f32::from(alpha_cut) / 255.0,
-            log_cut: log_cut(alpha_cut),
-            transmittance_stop: f32::from(transmittance_stop) * TRANSMITTANCE_MIN,
-        }
+        Self { log_cut: log_cut(alpha_cut), transmittance_stop: f32::from(transmittance_stop) * TRANSMITTANCE_MIN }
     }
 }
 
@@ -116,10 +116,7 @@ fn finish(place: TilePlace, pixels: &[Pixel], rgb: &mut [[u8; 3]], colour: impl 
 }
 
 /// Blends one splat into the rows of the tile; returns how many rows it reaches and how many pixels it was evaluated for.
-///
-/// Along a row alpha is a Gaussian of x, so the step from pixel to pixel is a factor, which itself changes by a constant
-/// factor: two multiplications replace an exponential. Over 16 pixels the rounding grows to about 1e-5 of alpha.
-// Not inlined: among everything that a frame needs its loops would not stay in registers.
+// Not inlined: among everything that a frame needs it would not stay in registers.
 #[inline(never)]
 fn blend_splat<F: Functions>(
     place: TilePlace,
@@ -133,59 +130,33 @@ fn blend_splat<F: Functions>(
     let centre_x = mean_x - f32::from(u16::from(place.column) * TILE_PX) - 0.5;
     let centre_y = mean_y - f32::from(u16::from(place.row) * TILE_PX) - 0.5;
     let reach = 2.0 * (splat.log_opacity + rule.log_cut);
-    let row_variance = 1.0 / splat.row_precision;
-    // Whatever the functions: its error grows with the square of a pixel's distance.
-    let ratio_step = exp(-splat.row_precision);
+    // Rounded, the opacity may lie below the cut. Written so that NaN leaves as well.
+    if !(reach >= 0.0) {
+        return [0; 2];
+    }
     let half_height = sqrt_above(reach / splat.column_precision) + SLACK_PX;
     let Some((first, last)) = span(centre_y, half_height, place.height) else { return [0; 2] };
-    let (rows, _) = pixels.as_chunks_mut::<{ TILE_PX as usize }>();
+    let (rows, _) = pixels.as_chunks_mut::<ROW_LEN>();
     let Some(rows) = rows.get_mut(first..=last) else { return [0; 2] };
     let n_rows = rows.len() as u32;
-    let mut n_evaluated = 0;
-    let mut dy = first as f32 - centre_y;
-    for row in rows {
-        let across = dy * dy * splat.column_precision;
-        let row_centre = centre_x + splat.shear * dy;
-        dy += 1.0;
-        let left = reach - across;
-        let half_width = sqrt_above(if left > 0.0 { left * row_variance } else { 0.0 }) + SLACK_PX;
-        let Some((first, last)) = span(row_centre, half_width, place.width) else { continue };
-        let Some(pixels) = row.get_mut(first..=last) else { continue };
-        let dx = first as f32 - row_centre;
-        let mut gauss = F::exp_near(splat.log_opacity - 0.5 * (across + dx * dx * splat.row_precision));
-        let mut ratio = F::exp_near(-splat.row_precision * (dx + 0.5));
-        n_evaluated += pixels.len() as u32;
-        for pixel in pixels {
-            if gauss >= rule.alpha_min && blend_pixel(pixel, gauss, splat.colour, rule.transmittance_stop) {
-                *alive -= 1;
-            }
-            gauss *= ratio;
-            ratio *= ratio_step;
-        }
-    }
-    [n_rows, n_evaluated]
-}
-
-/// Blends one splat into one pixel; returns whether the pixel is finished by it.
-#[inline(always)]
-fn blend_pixel(pixel: &mut Pixel, gauss: f32, [red, green, blue]: [f32; 3], stop: f32) -> bool {
-    let alpha = if gauss > ALPHA_MAX { ALPHA_MAX } else { gauss };
-    let [r, g, b, transmittance] = *pixel;
-    let next = transmittance * (1.0 - alpha);
-    let weight = alpha * transmittance;
-    if next >= stop {
-        *pixel = [r + weight * red, g + weight * green, b + weight * blue, next];
-        return false;
-    }
-    let alive = transmittance > 0.0;
-    if alive {
-        *pixel = if next >= TRANSMITTANCE_MIN {
-            [r + weight * red, g + weight * green, b + weight * blue, -next]
-        } else {
-            [r, g, b, -transmittance]
-        };
-    }
-    alive
+    let mut row_splat = RowSplat {
+        dy: first as f32 - centre_y,
+        shear: splat.shear,
+        row_precision: splat.row_precision,
+        column_precision: splat.column_precision,
+        log_opacity: splat.log_opacity,
+        reach,
+        row_variance: 1.0 / splat.row_precision,
+        centre_x,
+        colour: splat.colour,
+        // Whatever the functions: its error grows with the square of a pixel's distance.
+        ratio_step: exp(-splat.row_precision),
+        transmittance_stop: rule.transmittance_stop,
+        free: [0; 4],
+    };
+    let work = F::blend_rows(&mut row_splat, &CONSTANTS, rows, place.width);
+    *alive = alive.saturating_sub(work.finished);
+    [n_rows, work.pixels]
 }
 
 /// The colour with the background behind it.
@@ -193,50 +164,4 @@ fn blend_pixel(pixel: &mut Pixel, gauss: f32, [red, green, blue]: [f32; 3], stop
 fn behind([r, g, b, transmittance]: Pixel, [back_r, back_g, back_b]: [f32; 3]) -> [f32; 3] {
     let through = transmittance.abs();
     [r + through * back_r, g + through * back_g, b + through * back_b]
-}
-
-/// Slack for rounding of a span's ends, pixels; the test of alpha decides about the pixels it adds.
-const SLACK_PX: f32 = 1e-3;
-/// Rounds a span's beginning up when added before digits are cut off, except for the last thousandth of a pixel.
-const ALMOST_ONE: f32 = 0.999;
-
-/// First and last pixel within `half` of `centre` among `0..n`, and maybe one before them; pixel i lies at i.
-#[inline]
-fn span(centre: f32, half: f32, n: u16) -> Option<(usize, usize)> {
-    let low = centre - half;
-    let high = centre + half;
-    if high < 0.0 {
-        return None;
-    }
-    // Both casts round towards zero and saturate; NaN gives the first pixel, which the test of alpha leaves alone.
-    let first = (low + ALMOST_ONE) as u32;
-    let last = high as u32;
-    let end = u32::from(n);
-    let last = if last < end { last } else { end.wrapping_sub(1) };
-    (first <= last && last < end).then_some((first as usize, last as usize))
-}
-
-/// A number not below √x and at most 0.2 % above it, for spans that may be too long but not too short.
-///
-/// Halving the exponent is right within 6 %; a step of Newton's method squares that and always ends above the root. It
-/// costs a division where a correctly rounded root would take 47 instructions on a Cortex-M4.
-#[inline]
-fn sqrt_above(x: f32) -> f32 {
-    let guess = f32::from_bits((x.to_bits() >> 1) + 0x1FBD_1DF5);
-    0.5 * (guess + x / guess)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::sqrt_above;
-
-    #[test]
-    fn sqrt_above_brackets_the_root() {
-        for i in 1..100_000 {
-            let x = i as f32 * 0.013;
-            let (ours, root) = (f64::from(sqrt_above(x)), f64::from(x).sqrt());
-            assert!(ours >= root * (1.0 - 1e-7) && ours < root * 1.002, "{ours} against {root} for {x}");
-        }
-        assert!(sqrt_above(0.0) < 1e-9, "zero stays negligible");
-    }
 }

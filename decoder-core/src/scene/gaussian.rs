@@ -135,10 +135,19 @@ pub(super) fn fill_inputs(anchor: &Anchor<'_>, effects: Effects, eye: [f32; 3], 
     let [ax, ay, az] = anchor.position;
     let [ex, ey, ez] = eye;
     let [dx, dy, dz] = [ax - ex, ay - ey, az - ez];
-    let distance = libm::sqrtf(dx * dx + dy * dy + dz * dz);
+    let distance = crate::math::sqrt(dx * dx + dy * dy + dz * dz);
     let direction = if distance > 0.0 { [dx, dy, dz].map(|d| d / distance) } else { [0.0; 3] };
-    let distance = effects.view_distance.then_some(&distance);
-    for (input, &value) in inputs.iter_mut().zip(anchor.feature.iter().chain(distance).chain(&direction)) {
+    let mut inputs = inputs.iter_mut();
+    // Not a chain of iterators, each of whose steps would ask where in the chain it is.
+    for (&value, input) in anchor.feature.iter().zip(inputs.by_ref()) {
+        *input = value;
+    }
+    if effects.view_distance
+        && let Some(input) = inputs.next()
+    {
+        *input = distance;
+    }
+    for (input, value) in inputs.zip(direction) {
         *input = value;
     }
 }
@@ -170,7 +179,7 @@ fn gaussian<F: Functions>(anchor: &Anchor<'_>, effects: Effects, offset: [f32; 3
     let [s0, s1, s2, w, i, j, k] = output.covariance;
     let s0 = gx * F::sigmoid(s0);
     let (scale, rotation) = if cfg!(feature = "anisotropy") && effects.anisotropic {
-        let norm = libm::sqrtf(w * w + i * i + j * j + k * k);
+        let norm = crate::math::sqrt(w * w + i * i + j * j + k * k);
         let norm = if norm > QUATERNION_NORM_MIN { norm } else { QUATERNION_NORM_MIN };
         let scale = [s0, gy * F::sigmoid(s1), gz * F::sigmoid(s2)];
         (scale, [w, i, j, k].map(|q| q / norm))

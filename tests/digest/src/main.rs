@@ -1,4 +1,4 @@
-//! Converts halves, decodes and draws bundles, one of each coder and one of hard cases, and prints what came out as numbers: the
+//! Converts halves, computes layers, roots and rows of pixels, decodes and draws bundles, one of each coder and one of hard cases, and prints what came out as numbers: the
 //! same on every target.
 //!
 //! `PSB_STATIC`, `PSB_CONTEXT` and `PSB_HARD` name the bundles when it is built.
@@ -7,6 +7,7 @@
 mod digest;
 mod frame;
 mod halves;
+mod kernels;
 
 use core::fmt;
 
@@ -23,11 +24,12 @@ const SCRATCH_WORDS: usize = 16 * 1024;
 /// Bytes that a frame may take.
 const SCRATCH_BYTES: usize = 512 * 1024;
 
-/// Hands `print` a line for the conversions and one for each bundle.
+/// Hands `print` a line for the conversions, one for what else may be assembly, and one for each bundle.
 fn run(print: impl Fn(fmt::Arguments<'_>)) -> Result<(), DecodeError> {
     let mut scratch = [0; SCRATCH_WORDS];
     let mut memory = [0; SCRATCH_BYTES];
     print(format_args!("halves: {:016x}", halves::digest().0));
+    print(format_args!("layers, roots, rows: {:016x}", kernels::digest().0));
     for (name, bytes) in BUNDLES {
         let bundle = Bundle::parse(bytes)?;
         let [symbols, values] = digest::digests(&bundle, &mut scratch)?;

@@ -1,0 +1,82 @@
+//! One number for layers, roots and blended rows, which some targets have in assembly.
+
+use pocketsplat_half::{
+    BlendConstants, Exponential, LANES, ROW_LEN, RowSplat, blend_rows, outputs, rectified_units, sqrt,
+};
+
+use super::digest::Digest;
+
+/// Those of the decoder.
+static CONSTANTS: BlendConstants = BlendConstants::new(EXPONENTIAL, 0.99, -0.0201, 1e-4);
+const EXPONENTIAL: Exponential = Exponential {
+    log2_e: core::f32::consts::LOG2_E,
+    rounder: 12_582_912.0,
+    ln_2: [355.0 / 512.0, -2.121_944_4e-4],
+    tail: [0.001_392_692_7, 0.008_363_774, 0.041_666_55, 0.166_665_73],
+};
+
+/// Numbers between two others, the same every time.
+struct Random(u32);
+
+impl Random {
+    fn between(&mut self, low: f32, high: f32) -> f32 {
+        self.0 = self.0.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        low + (high - low) * (self.0 >> 8) as f32 / 16_777_216.0
+    }
+}
+
+/// Digest of layers of 0 to 12 inputs, of roots of all exponents, and of tiles of 40 splats each.
+pub(crate) fn digest() -> Digest {
+    let mut digest = Digest::EMPTY;
+    let mut random = Random(5);
+    for n_in in 0..=12 {
+        for _ in 0..20 {
+            let inputs: [f32; 12] = core::array::from_fn(|_| random.between(-3.0, 3.0));
+            let inputs = inputs.get(..n_in).unwrap_or_default();
+            let rows: [[f32; LANES]; 39] =
+                core::array::from_fn(|_| core::array::from_fn(|_| random.between(-2.0, 2.0)));
+            // Blocks of just as many rows as inputs, and of more.
+            for rows_per_block in [n_in + 1, 13] {
+                let mut units = [[-1.0; LANES]; 3];
+                rectified_units(&rows, rows_per_block, inputs, &mut units);
+                units.as_flattened().iter().for_each(|unit| digest.add(unit.to_bits().to_le_bytes()));
+            }
+            let flat = rows.as_flattened();
+            outputs::<3>(flat.as_chunks().0, inputs).iter().for_each(|sum| digest.add(sum.to_bits().to_le_bytes()));
+            outputs::<7>(flat.as_chunks().0, inputs).iter().for_each(|sum| digest.add(sum.to_bits().to_le_bytes()));
+        }
+    }
+    for upper in 0..0x7F80_u32 {
+        digest.add(sqrt(f32::from_bits(upper << 16 | upper.wrapping_mul(40_503) & 0xFFFF)).to_bits().to_le_bytes());
+    }
+    for tile in 0..50 {
+        let mut rows = [[[0.0, 0.0, 0.0, 1.0]; ROW_LEN]; ROW_LEN];
+        for _ in 0..40 {
+            let row_precision = 1.0 / random.between(0.5, if tile % 2 == 0 { 4.0 } else { 200.0 });
+            let column_precision = 1.0 / random.between(0.5, 100.0);
+            // From as faint as nothing to opaque.
+            let log_opacity = random.between(-5.6, 0.5).min(0.0);
+            let mut splat = RowSplat {
+                dy: random.between(-16.0, 4.0),
+                shear: random.between(-2.0, 2.0),
+                row_precision,
+                column_precision,
+                log_opacity,
+                reach: 2.0 * (log_opacity + 5.541_263_6),
+                row_variance: 1.0 / row_precision,
+                centre_x: random.between(-8.0, 24.0),
+                colour: core::array::from_fn(|_| random.between(0.0, 1.0)),
+                ratio_step: EXPONENTIAL.near(-row_precision),
+                transmittance_stop: if tile % 3 == 0 { 1e-2 } else { 1e-4 },
+                free: [7; 4],
+            };
+            let first = random.between(0.0, 15.9) as usize;
+            let width = random.between(1.0, 24.0).min(16.0) as u16;
+            let work = blend_rows(&mut splat, &CONSTANTS, rows.get_mut(first..).unwrap_or_default(), width);
+            digest.add(work.pixels.to_le_bytes());
+            digest.add(work.finished.to_le_bytes());
+        }
+        rows.as_flattened().as_flattened().iter().for_each(|value| digest.add(value.to_bits().to_le_bytes()));
+    }
+    digest
+}

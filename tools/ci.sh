@@ -167,7 +167,7 @@ job_format-doc() {
 job_package() {
   local crate file files
   files=$(cargo package -p pocketsplat-core --allow-dirty --locked --list)
-  for file in README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE src/bundle/{FORMAT,DRAWING,MANIFEST}.md src/bundle/example.psb examples/draw_png.rs; do
+  for file in README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE src/bundle/{FORMAT,DRAWING,MANIFEST}.md src/bundle/{normal_tables.bin,example.psb} examples/draw_png.rs; do
     grep -qx "$file" <<<"$files" || fail "the package of pocketsplat-core lacks $file"
   done
   for crate in pocketsplat pocketsplat-{half,capture,gaussians,instructions,trainer,viewer}; do

@@ -33,7 +33,8 @@ pub fn reseal(bytes: &mut [u8]) {
         for record in (first..end.saturating_sub(CHUNK_RECORD_LEN - 1)).step_by(CHUNK_RECORD_LEN) {
             let end = start.saturating_add(read_u32(bytes, record) as usize);
             write_crc(bytes, record + 4, start, end);
-            start = end;
+            // The next chunk begins at a multiple of four.
+            start = end.saturating_add(3) / 4 * 4;
         }
     }
     for (kind, crc_at, start, end) in sections {

@@ -16,18 +16,18 @@ const MAX_20: u32 = (1 << 20) - 1;
 const SCALE_MAX: f32 = (1 << 25) as f32;
 /// Bits of a half without its sign; what stands for infinity.
 const HALF_BITS: u32 = 0x7FFF;
-/// The least colour that has a number; the largest is 1.5. The heads' lie within 0 and 1, what detail adds may leave that.
+/// The least colour that has a number; the largest is a step below 1.5. The heads' lie within 0 and 1, what detail adds may leave that.
 const COLOUR_MIN: f32 = -0.5;
-/// Colours of all numbers.
-const COLOUR_RANGE: f32 = 2.0;
+/// Numbers of a colour in a unit. Up to 1 each is a half, so that frames that keep colours in halves round none again.
+const COLOUR_STEPS: f32 = 2048.0;
 /// Of a unit quaternion's numbers all but the largest are at most √½.
 const SQRT_HALF: f32 = core::f32::consts::FRAC_1_SQRT_2;
 
 /// A Gaussian, its centre as it is, everything else rounded.
 ///
 /// Scales are halves, the quaternion is its three smaller numbers a, b, c in steps of 1.3·10⁻⁶ (with eleven bits each, the end of a
-/// needle across the frame moved by half a pixel), opacity is in 65535ths, colours are in 4095ths of their range: a sixteenth of an
-/// 8-bit step at most. The largest number of the quaternion has its place in two bits.
+/// needle across the frame moved by half a pixel), opacity is in 65535ths, colours are in 2048ths: a sixteenth of an 8-bit step at
+/// most. The largest number of the quaternion has its place in two bits.
 ///
 /// ```text
 /// words 0 to 2: x, y, z                          word 5: a 20 | red 12
@@ -44,8 +44,8 @@ pub(crate) struct BakedGaussian {
 impl BakedGaussian {
     /// Rounds a Gaussian.
     pub(crate) fn new(gaussian: &Gaussian) -> Self {
-        let [red, green, blue] = gaussian.colour.map(|c| level((c - COLOUR_MIN) / COLOUR_RANGE, MAX_12));
-        let opacity = level(gaussian.opacity, MAX_16);
+        let [red, green, blue] = gaussian.colour.map(|c| level(c - COLOUR_MIN, COLOUR_STEPS, MAX_12));
+        let opacity = level(gaussian.opacity, MAX_16 as f32, MAX_16);
         let [s0, s1, s2] = gaussian.scale.map(pack_scale);
         let (largest, [a, b, c]) = smaller_three(gaussian.rotation);
         let words = [s0 | s1 << 15 | largest << 30, s2 | opacity << 15, a | red << 20, b | green << 20, c | blue << 20];
@@ -64,7 +64,7 @@ impl BakedGaussian {
     #[inline]
     pub(crate) fn unpack(&self, effects: Effects) -> Gaussian {
         let [w3, w4, w5, w6, w7] = self.words;
-        let colour = |word: u32| COLOUR_MIN + COLOUR_RANGE * ((word >> 20) as f32 * (1.0 / MAX_12 as f32));
+        let colour = |word: u32| COLOUR_MIN + (word >> 20) as f32 * (1.0 / COLOUR_STEPS);
         Gaussian {
             centre: self.centre,
             scale: [w3, w3 >> 15, w4].map(unpack_scale),
@@ -91,10 +91,10 @@ fn unpack_scale(bits: u32) -> f32 {
     if bits == HALF_BITS { f32::INFINITY } else { from_half(bits as u16) }
 }
 
-/// The nearest of the numbers 0..=`most` to `part` of `most`; NaN counts as 0.
-fn level(part: f32, most: u32) -> u32 {
+/// The nearest of the numbers 0..=`most` to `x` in units of `1/n_steps`; NaN counts as 0.
+fn level(x: f32, n_steps: f32, most: u32) -> u32 {
     // Casts saturate.
-    ((part * most as f32 + 0.5) as u32).min(most)
+    ((x * n_steps + 0.5) as u32).min(most)
 }
 
 /// Which number of a unit quaternion is the largest, and the others as numbers of 20 bits, signs turned so that the largest
@@ -109,7 +109,7 @@ fn smaller_three(rotation: [f32; 4]) -> (u32, [u32; 3]) {
     // Of a unit quaternion it is at least ½; the heads' are shorter only when they vanish, and then rotate by next to nothing.
     let (largest, rotation) = if most.abs() < 0.25 { (0, [1.0, 0.0, 0.0, 0.0]) } else { (largest, rotation) };
     let sign = 1.0_f32.copysign(most);
-    let number = |x: f32| level(0.5 + 0.5 * sign * x / SQRT_HALF, MAX_20);
+    let number = |x: f32| level(0.5 + 0.5 * sign * x / SQRT_HALF, MAX_20 as f32, MAX_20);
     let [w, x, y, z] = rotation;
     let others = match largest {
         0 => [x, y, z],
@@ -136,7 +136,10 @@ fn unit_quaternion(largest: u32, others: [u32; 3]) -> [f32; 4] {
 
 #[cfg(test)]
 mod tests {
-    use super::{BakedGaussian, Effects};
+    use bytemuck::Zeroable as _;
+
+    use super::{BakedGaussian, Effects, MAX_12};
+    use crate::math::{from_half, to_half};
     use crate::scene::Gaussian;
 
     fn anisotropic() -> Effects {
@@ -179,6 +182,22 @@ mod tests {
     }
 
     #[test]
+    fn every_colour_up_to_1_is_a_half() {
+        for number in 0..=MAX_12 {
+            let mut kept = BakedGaussian::zeroed();
+            kept.words[2..].fill(number << 20);
+            let colour = kept.unpack(anisotropic()).colour;
+            assert_eq!(colour, [number as f32 / 2048.0 - 0.5; 3], "number {number}");
+            assert_eq!(BakedGaussian::new(&Gaussian { colour, ..gaussian() }).words[2] >> 20, number, "it comes back");
+            assert!(colour[0] > 1.0 || from_half(to_half(colour[0])) == colour[0], "{colour:?} is no half");
+        }
+    }
+
+    fn gaussian() -> Gaussian {
+        Gaussian { centre: [0.0; 3], scale: [1.0; 3], rotation: [1.0, 0.0, 0.0, 0.0], opacity: 1.0, colour: [0.0; 3] }
+    }
+
+    #[test]
     fn what_has_no_number_becomes_the_nearest() {
         let beyond = Gaussian {
             centre: [f32::INFINITY, 9.0, -0.0],
@@ -188,7 +207,7 @@ mod tests {
             colour: [7.0, -7.0, f32::NAN],
         };
         let kept = BakedGaussian::new(&beyond).unpack(anisotropic());
-        assert_eq!(kept.colour, [1.5, -0.5, -0.5], "the ends of the range");
+        assert_eq!(kept.colour, [1.5 - 1.0 / 2048.0, -0.5, -0.5], "the ends of the range");
         assert_eq!((kept.scale, kept.opacity), ([65504.0, 0.0, f32::INFINITY], 1.0), "the largest half");
         assert!(kept.rotation[0] > 0.999_999 && kept.rotation[1].abs() < 2e-6, "no rotation: {:?}", kept.rotation);
     }

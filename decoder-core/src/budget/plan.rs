@@ -400,6 +400,7 @@ mod tests {
             max_head_kilo_macs: 0,
             max_kilo_pixels: 0,
             max_decoded_anchors: 0,
+            level: 0,
         };
         let splats = |height_px, n_strips| fullest_strip(&measures, 200, height_px, n_strips);
         assert_eq!([1, 2, 4, 8].map(|n| splats(200, n)), [100, 60, 70, 30], "each cut at the size measured");

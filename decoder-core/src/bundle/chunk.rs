@@ -3,6 +3,7 @@
 use core::ops::Range;
 
 use super::directory::{ChunkRecord, Directory, InkFrame};
+use super::section::padded;
 use super::{AnchorModels, AnchorReader, AnchorSite};
 use crate::bytes::crc32;
 use crate::error::{DecodeError, Field, saturate};
@@ -37,7 +38,7 @@ impl<'a> Iterator for Chunks<'a> {
         let index = self.numbers.next()?;
         let record = self.directory.record(index)?;
         let offset = self.offset;
-        self.offset = offset.saturating_add(record.len);
+        self.offset = padded(offset.saturating_add(record.len));
         Chunk::new(index, offset, record, self.directory.ink_frame, self.chunks)
     }
 }
@@ -68,7 +69,7 @@ impl<'a> Chunk<'a> {
         self.record.n_anchors
     }
 
-    /// Its coded length, bytes.
+    /// Its coded length, bytes, without those up to the next chunk.
     #[must_use]
     pub fn n_bytes(&self) -> usize {
         self.words.as_flattened().len()

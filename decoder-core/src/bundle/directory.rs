@@ -1,6 +1,7 @@
 //! The directory: the tiers, and one record a chunk.
 
 use super::header::Header;
+use super::section::{check_padding, padded};
 use crate::bytes::{Cursor, Emitter, Fields};
 use crate::error::{DecodeError, Field, SectionKind, in_range};
 
@@ -19,7 +20,7 @@ pub struct Tier {
     pub n_chunks: u32,
     /// Anchors in them.
     pub n_anchors: u32,
-    /// Where the last of them ends, bytes from the start of the chunks section.
+    /// Where what follows the last of them begins, bytes from the start of the chunks section.
     pub end: u32,
 }
 
@@ -139,8 +140,15 @@ impl ChunkRecord {
 }
 
 impl<'a> Directory<'a> {
-    /// Reads the section; `chunks_len` is the length of the chunks section.
-    pub(super) fn parse(section: &'a [u8], header: &Header, chunks_len: u32) -> Result<Self, DecodeError> {
+    /// Reads the section.
+    ///
+    /// * `chunks`: the chunks section, as far as it is in the file. * `chunks_len`: its length.
+    pub(super) fn parse(
+        section: &'a [u8],
+        header: &Header,
+        chunks: &[u8],
+        chunks_len: u32,
+    ) -> Result<Self, DecodeError> {
         let mut cursor = Cursor::new(section, SectionKind::Directory);
         let (tiers, _) = cursor.bytes(usize::from(header.n_tiers).saturating_mul(TIER_RECORD_LEN))?.as_chunks();
         let ink_frame = InkFrame::parse(cursor.record()?);
@@ -149,7 +157,7 @@ impl<'a> Directory<'a> {
         let (records, _) = cursor.bytes(records_len)?.as_chunks();
         cursor.end()?;
         let directory = Self { tiers, ink_frame, records };
-        directory.check(header, chunks_len)?;
+        directory.check(header, chunks, chunks_len)?;
         Ok(directory)
     }
 
@@ -166,8 +174,8 @@ impl<'a> Directory<'a> {
         self.records.get(index as usize).map(|record| ChunkRecord::parse(record).0)
     }
 
-    /// Tiers and chunks add up, chunk by chunk and tier by tier.
-    fn check(&self, header: &Header, chunks_len: u32) -> Result<(), DecodeError> {
+    /// Tiers and chunks add up, chunk by chunk and tier by tier, and between chunks there is nothing.
+    fn check(&self, header: &Header, chunks: &[u8], chunks_len: u32) -> Result<(), DecodeError> {
         let mut sums = Tier::default();
         let mut records = self.records.iter();
         for tier in 0..header.n_tiers {
@@ -179,7 +187,9 @@ impl<'a> Directory<'a> {
                 in_range(Field::Reserved, reserved.into(), 0, 0)?;
                 record.check(header)?;
                 sums.n_anchors = sums.n_anchors.saturating_add(record.n_anchors.into());
-                sums.end = sums.end.saturating_add(record.len);
+                let end = sums.end.saturating_add(record.len);
+                check_padding(chunks, end)?;
+                sums.end = padded(end);
             }
             sums.n_chunks = stored.n_chunks;
             in_range(Field::TierAnchors, stored.n_anchors, sums.n_anchors, sums.n_anchors)?;

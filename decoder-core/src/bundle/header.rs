@@ -10,7 +10,7 @@ use crate::error::{DecodeError, Field, SectionKind, in_range};
 /// The first bytes of every bundle. As in PNG: not ASCII, then a name, then line ends that text transfers would change.
 pub const MAGIC: [u8; 8] = *b"\x89PSB\r\n\x1a\n";
 /// The format version this crate reads.
-pub const VERSION: u16 = 3;
+pub const VERSION: u16 = 4;
 /// Length of the header's fields before the section table, bytes.
 pub const HEADER_FIXED_LEN: usize = 160;
 /// Length of those behind magic, version and length.
@@ -44,7 +44,7 @@ pub const fn header_len(n_sections: u8) -> usize {
 pub struct Header {
     /// Length of the header, bytes.
     pub header_len: u16,
-    /// Length of the whole bundle, bytes.
+    /// Length of the bundle, bytes: up to its last tier, or up to the one that it was cut after.
     pub file_len: u32,
     /// What it requires of a decoder.
     pub features: Features,

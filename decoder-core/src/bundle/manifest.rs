@@ -1,10 +1,13 @@
 //! The manifest: what each tier was measured to look like and to cost.
 
 use crate::bytes::{Cursor, Emitter, Fields};
-use crate::error::{DecodeError, Field, SectionKind};
+use crate::error::{DecodeError, Field, SectionKind, in_range};
 
 /// Length of a tier's record, bytes.
-pub const MANIFEST_RECORD_LEN: usize = 60;
+pub const MANIFEST_RECORD_LEN: usize = 64;
+
+/// Highest level that a tier may declare.
+pub const MAX_LEVEL: u8 = 5;
 
 /// Numbers of horizontal strips that a frame is cut into to measure it, and that plans try.
 pub const STRIPS: [u8; 4] = [1, 2, 4, 8];
@@ -39,6 +42,8 @@ pub struct TierMeasures {
     pub max_kilo_pixels: u32,
     /// Anchors in the chunks in view.
     pub max_decoded_anchors: u32,
+    /// Level whose limits the scene keeps, 1..=[`MAX_LEVEL`]; 0 where none is declared.
+    pub level: u8,
 }
 
 impl TierMeasures {
@@ -50,6 +55,9 @@ impl TierMeasures {
         if psnr_db.is_some_and(|psnr_db| !psnr_db.is_finite()) {
             return Err(DecodeError::BadFloat { field: Field::ManifestPsnr, index: tier });
         }
+        // What is reserved behind the level is 0.
+        let [.., level, a, b, c] = *record;
+        in_range(Field::TierLevel, u32::from_le_bytes([level, a, b, c]), 0, MAX_LEVEL.into())?;
         Ok(Self {
             psnr_db,
             n_views: fields.u16(),
@@ -61,6 +69,7 @@ impl TierMeasures {
             max_head_kilo_macs: fields.u32(),
             max_kilo_pixels: fields.u32(),
             max_decoded_anchors: fields.u32(),
+            level,
         })
     }
 
@@ -74,6 +83,7 @@ impl TierMeasures {
         out.u32s(self.max_strip_splats);
         out.u32s(self.max_strip_pairs);
         out.u32s([self.max_head_kilo_macs, self.max_kilo_pixels, self.max_decoded_anchors]);
+        out.bytes([self.level, 0, 0, 0]);
         out.finish()
     }
 }

@@ -20,6 +20,7 @@ pub mod levels {}
 
 mod anchor;
 mod chunk;
+mod cut;
 mod directory;
 mod features;
 mod gaussians;
@@ -36,6 +37,7 @@ pub use crate::bytes::crc32;
 pub use anchor::{AnchorModels, AnchorReader, AnchorSite};
 pub(crate) use anchor::{AnchorRecords, RecordLayout, RecordMemory, model_words};
 pub use chunk::Chunk;
+pub use cut::cut_after;
 pub use directory::{CHUNK_RECORD_LEN, ChunkRecord, Directory, INK_FRAME_LEN, InkFrame, TIER_RECORD_LEN, Tier};
 pub use features::{Effects, Features};
 pub use header::{
@@ -45,8 +47,8 @@ pub use header::{
 pub(crate) use header::{covariance_outputs, n_log_scales};
 pub use heads::{CodedHeads, Halves, HeadView, HeadsView, LayerWeights, WeightReader};
 pub use lattice::{Lattice, MAX_LATTICE_BITS, MAX_LATTICE_MIN};
-pub use manifest::{MANIFEST_RECORD_LEN, STRIPS, TierMeasures};
-pub use section::{PROTOCOL_CODE, SECTION_LEN, Section};
+pub use manifest::{MANIFEST_RECORD_LEN, MAX_LEVEL, STRIPS, TierMeasures};
+pub use section::{ALIGNMENT, PROTOCOL_CODE, SECTION_LEN, Section};
 pub use sections::SectionBytes;
 pub use tables::{FrequencyTable, Tables};
 
@@ -85,13 +87,14 @@ pub struct Bundle<'a> {
 
 impl<'a> Bundle<'a> {
     /// Checks `bytes` and returns the view of them; bytes after the bundle's end are ignored, so a whole flash partition
-    /// can be passed. A file that ends where a tier ends is a smaller scene, of [`n_tiers`](Self::n_tiers) tiers.
+    /// can be passed. A file that ends where a tier ends, by its own end or by what the header says, is a smaller scene, of
+    /// [`n_tiers`](Self::n_tiers) tiers.
     ///
     /// # Errors
     /// [`DecodeError`] of class malformed or unsupported, naming the section and the numbers that disagree.
     ///
     /// # Budget
-    /// No scratch. Reads everything before the chunks once, coded heads twice; the chunks' checksums wait for
+    /// No scratch. Reads everything outside of the chunks once, coded heads twice; the chunks' checksums wait for
     /// [`Decoder::bind`](crate::Decoder::bind).
     // Not inlined: a caller's stack frame would keep what only parsing needs.
     #[inline(never)]
@@ -115,7 +118,7 @@ impl<'a> Bundle<'a> {
         Self::of_parts(header, &[], sections, saturate(sections.chunks.len()))
     }
 
-    /// * `chunks_len`: length of the chunks section, of which the file may have less or go on behind it.
+    /// * `chunks_len`: length of the chunks section, of which the file may have less.
     fn of_parts(
         header: Header,
         section_table: &'a [[u8; SECTION_LEN]],
@@ -139,7 +142,7 @@ impl<'a> Bundle<'a> {
             Coder::Static(Tables::parse(sections.coder, header.n_channels())?)
         };
         let manifest = manifest::parse(sections.manifest, header.n_tiers)?;
-        let directory = Directory::parse(sections.directory, &header, chunks_len)?;
+        let directory = Directory::parse(sections.directory, &header, sections.chunks, chunks_len)?;
         let gaussians = match sections.gaussians {
             // Without the feature it is a section like any other that a decoder does not know.
             Some(section) if cfg!(feature = "baked") => Some(GaussianCounts::parse(section, &header, &directory)?),
@@ -293,16 +296,13 @@ impl<'a> Bundle<'a> {
 
 /// How many tiers a file holds, and their chunks: all of them, or those up to a tier at whose end the file ends.
 ///
-/// * `available`: the file from where its chunks begin.
+/// * `available`: the file from where its chunks begin up to where it ends.
 fn tiers_in<'a>(
     available: &'a [u8],
     chunks_len: u32,
     directory: &Directory<'_>,
     n_tiers: u8,
 ) -> Result<(u8, &'a [u8]), DecodeError> {
-    if let Some(chunks) = available.get(..chunks_len as usize) {
-        return Ok((n_tiers, chunks));
-    }
     for tier in (0..n_tiers).rev() {
         let end = directory.tier(tier).map(|tier| tier.end as usize);
         if end == Some(available.len()) {

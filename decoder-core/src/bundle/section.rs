@@ -5,6 +5,8 @@ use crate::error::{DecodeError, Field, SectionKind, in_range, saturate};
 
 /// Length of a row of the section table, bytes.
 pub const SECTION_LEN: usize = 16;
+/// Sections and chunks begin at multiples of this, bytes from the start of the file; the bytes between them are 0.
+pub const ALIGNMENT: u32 = 4;
 /// Sections of this kind and above may be skipped by a decoder that does not know them.
 const FIRST_OPTIONAL_CODE: u8 = 128;
 /// The number of the section protocol, which decoders skip.
@@ -61,7 +63,7 @@ impl Section {
         }
     }
 
-    /// The bytes of the section, their checksum compared.
+    /// The bytes of the section, their checksum compared, and those up to the next section with 0.
     // Not inlined: it has seven callers.
     #[inline(never)]
     pub(super) fn bytes<'a>(&self, file: &'a [u8]) -> Result<&'a [u8], DecodeError> {
@@ -73,8 +75,22 @@ impl Section {
         if computed != self.crc {
             return Err(DecodeError::SectionChecksum { section: self.kind, stored: self.crc, computed });
         }
+        check_padding(file, end)?;
         Ok(bytes)
     }
+}
+
+/// Where what follows `end` begins, bytes.
+pub(super) const fn padded(end: u32) -> u32 {
+    end.saturating_add(ALIGNMENT.wrapping_sub(1)) & !ALIGNMENT.wrapping_sub(1)
+}
+
+/// The bytes from `end` up to what follows are 0; where `bytes` end before them, what follows is missing too.
+// Not inlined: sections and chunks call it.
+#[inline(never)]
+pub(super) fn check_padding(bytes: &[u8], end: u32) -> Result<(), DecodeError> {
+    let padding = bytes.get(end as usize..padded(end) as usize).unwrap_or_default();
+    in_range(Field::Padding, padding.iter().fold(0, |any, byte| any | byte).into(), 0, 0)
 }
 
 /// The kind of a number: the reverse of [`Section::code`].

@@ -2,7 +2,7 @@
 
 use super::features::Features;
 use super::header::{Header, header_len};
-use super::section::{PROTOCOL_CODE, SECTION_LEN, Section};
+use super::section::{ALIGNMENT, PROTOCOL_CODE, SECTION_LEN, Section, padded};
 use crate::bytes::crc32;
 use crate::error::{DecodeError, SectionKind, saturate};
 
@@ -39,13 +39,16 @@ impl<'a> SectionBytes<'a> {
         let header_len = header_len(sections.clone().count() as u8);
         let rows = sections.clone().scan(saturate(header_len), |next, (kind, bytes)| {
             let (offset, len) = (*next, saturate(bytes.len()));
-            *next = offset.saturating_add(len);
+            *next = padded(offset.saturating_add(len));
             // Each chunk has its own checksum, so that a device need not read all of them to draw some.
             let crc = if kind == SectionKind::Chunks { 0 } else { crc32(bytes) };
             Some(Section { kind, offset, len, crc })
         });
         let header = Header { header_len: header_len as u16, file_len: saturate(self.file_len()), ..*header };
-        header.emit(rows).chain(sections.flat_map(|(_, bytes)| bytes.iter().copied()))
+        header.emit(rows).chain(sections.flat_map(|(_, bytes)| {
+            let n_padding = padded_len(bytes).saturating_sub(bytes.len());
+            bytes.iter().copied().chain(core::iter::repeat_n(0, n_padding))
+        }))
     }
 
     /// How many bytes [`emit`](Self::emit) makes; a bundle has less than 4 GiB.
@@ -53,13 +56,13 @@ impl<'a> SectionBytes<'a> {
     pub fn file_len(&self) -> usize {
         let sections = self.in_order(Features::default());
         let header_len = header_len(sections.clone().count() as u8);
-        sections.fold(header_len, |sum, (_, bytes)| sum.saturating_add(bytes.len()))
+        sections.fold(header_len, |sum, (_, bytes)| sum.saturating_add(padded_len(bytes)))
     }
 
     /// Finds the sections in a file, and compares their checksums but for the chunks', which have their own; also returns the length
-    /// of the chunks, which go on to the end of the file, wherever that is.
+    /// of the chunks, of which a file that was cut has less.
     ///
-    /// * `table`: its rows follow the header in order, without gaps, and end at `file_len`.
+    /// * `table`: its rows follow the header in order, each at the next multiple of [`ALIGNMENT`].
     pub(super) fn parse(
         table: &[[u8; SECTION_LEN]],
         header: &Header,
@@ -76,11 +79,13 @@ impl<'a> SectionBytes<'a> {
                     let Section { kind: section, offset: found, .. } = section;
                     return Err(DecodeError::Misplaced { section, expected: start, found });
                 }
-                let Some(end) = start.checked_add(section.len).filter(|&end| end <= file_len) else {
+                // Of the chunks the file may have less.
+                let is_whole = |end: &u32| *end <= file_len || section.kind == SectionKind::Chunks;
+                let Some(end) = start.checked_add(section.len).filter(is_whole) else {
                     let available = file_len.saturating_sub(start);
                     return Err(DecodeError::Truncated { section: section.kind, needed: section.len, available });
                 };
-                start = end;
+                start = padded(end);
                 match section.kind {
                     found if found == wanted => return Ok(section),
                     SectionKind::Gaussians if gaussians.is_none() => gaussians = Some(section.bytes(file)?),
@@ -104,13 +109,16 @@ impl<'a> SectionBytes<'a> {
         };
         let Section { offset, len, crc: stored, .. } = next(SectionKind::Chunks)?;
         sections.gaussians = gaussians;
-        sections.chunks = file.get(offset as usize..).unwrap_or_default();
+        let truncated = DecodeError::Truncated { section: SectionKind::Chunks, needed: len, available: 0 };
+        let n_counted = file_len.checked_sub(offset).ok_or(truncated)?;
+        let rest = file.get(offset as usize..).ok_or(truncated)?;
+        sections.chunks = rest.get(..n_counted as usize).unwrap_or(rest);
         if let Some(row) = rows.next() {
             let Section { kind: found, .. } = Section::parse(row)?;
             return Err(DecodeError::UnexpectedSection { found, expected: SectionKind::Chunks });
         }
-        if start != file_len {
-            return Err(DecodeError::WrongLength { section: SectionKind::Chunks, expected: file_len, found: start });
+        if n_counted > len {
+            return Err(DecodeError::WrongLength { section: SectionKind::Chunks, expected: n_counted, found: len });
         }
         if stored != 0 {
             return Err(DecodeError::SectionChecksum { section: SectionKind::Chunks, stored, computed: 0 });
@@ -135,4 +143,9 @@ impl<'a> SectionBytes<'a> {
         .into_iter()
         .flatten()
     }
+}
+
+/// Bytes that a section takes up, those before the next one included.
+fn padded_len(section: &[u8]) -> usize {
+    section.len().next_multiple_of(ALIGNMENT as usize)
 }

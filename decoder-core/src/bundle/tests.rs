@@ -2,6 +2,7 @@
 
 mod builder;
 mod emit;
+mod places;
 
 use core::convert::Infallible;
 use std::vec;
@@ -59,8 +60,11 @@ fn anchors_come_back_whatever_the_features() {
 #[test]
 fn another_version_is_refused_before_anything_else() {
     let mut bytes = bundle(variants().next().expect("some"));
-    bytes[8] = 2;
-    assert_eq!(Bundle::parse(&bytes).err(), Some(DecodeError::UnsupportedVersion { found: 2, supported: 3 }));
+    for found in [0, 1, 2, 3, 5, 255] {
+        bytes[8] = found;
+        let expected = DecodeError::UnsupportedVersion { found: found.into(), supported: 4 };
+        assert_eq!(Bundle::parse(&bytes).err(), Some(expected));
+    }
 }
 
 #[test]
@@ -210,6 +214,7 @@ fn the_manifest_says_what_was_measured() {
     assert_eq!((last.n_views, last.n_cameras, last.max_visible_anchors), (4, 9, 200));
     assert_eq!((last.max_strip_splats, last.max_strip_pairs), ([202, 203, 204, 205], [206, 207, 208, 209]));
     assert_eq!((last.max_head_kilo_macs, last.max_kilo_pixels, last.max_decoded_anchors), (210, 211, 212));
+    assert_eq!((first.level, last.level), (0, 2), "the levels declared");
     assert_eq!(bundle.measures(3), None, "three tiers");
 }
 

@@ -48,6 +48,8 @@ pub enum Field {
     NSections,
     SectionKind,
     Reserved,
+    /// A byte between two sections or chunks.
+    Padding,
     /// A channel of the background of a scene that has none.
     Background,
     ColourHidden,
@@ -72,6 +74,8 @@ pub enum Field {
     TrieFrequency,
     MaskFrequency,
     ManifestPsnr,
+    /// The level that a tier declares, with the reserved bytes behind it.
+    TierLevel,
     TierChunks,
     TierAnchors,
     TierEnd,
@@ -166,6 +170,7 @@ impl fmt::Display for Field {
             Self::NSections => "number of sections",
             Self::SectionKind => "kind of a section",
             Self::Reserved => "a reserved byte",
+            Self::Padding => "a byte between sections or chunks",
             Self::Background => "the background of a scene without",
             Self::ColourHidden => "hidden width of the colour head",
             Self::DetailHidden => "hidden width of the detail head",
@@ -187,6 +192,7 @@ impl fmt::Display for Field {
             Self::TrieFrequency => "cumulative frequency of positions",
             Self::MaskFrequency => "frequency of a drawn offset",
             Self::ManifestPsnr => "PSNR of a tier",
+            Self::TierLevel => "level of a tier",
             Self::TierChunks => "chunks of a tier and those before it",
             Self::TierAnchors => "anchors of a tier and those before it",
             Self::TierEnd => "end of a tier in the chunks",

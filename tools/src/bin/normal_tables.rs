@@ -1,30 +1,41 @@
-//! Writes the frequency tables of integer Gaussians (`decoder-core/src/entropy/normal/tables.rs`), or checks them.
+//! Writes the frequency tables of integer Gaussians, or checks them: as source (`decoder-core/src/entropy/normal/tables.rs`), and as
+//! little-endian u16 beside the format's description, whose checksum it names.
 //!
 //!     cargo run -p tools --bin normal_tables -- --write
 //!     cargo run -p tools --bin normal_tables -- --check
 
 use std::fmt::Write as _;
-use std::path::Path;
 
-use anyhow::{Result, bail};
+use anyhow::{Result, bail, ensure};
+use pocketsplat_core::bundle::crc32;
 use pocketsplat_core::entropy::{
     EIGHTHS, FREQUENCY_TOTAL, N_NORMAL_SHORT_CUTS, N_PHASES, N_SCALES, NORMAL_WINDOW, SCALE_ONE,
 };
 
-const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../decoder-core/src/entropy/normal/tables.rs");
+const SOURCE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../decoder-core/src/entropy/normal/tables.rs");
+const BINARY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../decoder-core/src/bundle/normal_tables.bin");
+const DOCUMENT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../decoder-core/src/bundle/FORMAT.md");
 
 fn main() -> Result<()> {
-    let path = Path::new(FILE);
-    let text = source();
+    let (scales, bounds) = tables();
+    let binary: Vec<u8> = bounds.iter().flat_map(|bound| bound.to_le_bytes()).collect();
+    let crc = format!("{:#010X}", crc32(&binary)).replacen("0X", "0x", 1);
+    let files = [(SOURCE, source(&scales, &bounds).into_bytes()), (BINARY, binary)];
     match std::env::args().nth(1).as_deref() {
-        Some("--write") => Ok(std::fs::write(path, text)?),
-        Some("--check") if std::fs::read_to_string(path)? == text => Ok(()),
-        Some("--check") => bail!("{FILE} is not what this program writes; run it with --write"),
+        Some("--write") => files.iter().try_for_each(|(path, bytes)| std::fs::write(path, bytes))?,
+        Some("--check") => {
+            for (path, bytes) in files {
+                ensure!(std::fs::read(path)? == bytes, "{path} is not what this program writes; run it with --write");
+            }
+            ensure!(std::fs::read_to_string(DOCUMENT)?.contains(&crc), "{DOCUMENT} lacks the tables' CRC {crc}");
+        }
         _ => bail!("one of --write, --check"),
     }
+    Ok(())
 }
 
-fn source() -> String {
+/// The scales as source, and the bounds of all tables.
+fn tables() -> (String, Vec<u16>) {
     let (mut scales, mut all_bounds) = (String::new(), Vec::new());
     for scale in 0..N_SCALES {
         let sigma = 2f64.powf((scale as f64 - f64::from(SCALE_ONE)) / 8.0);
@@ -35,10 +46,16 @@ fn source() -> String {
         let first: Vec<usize> = (-EIGHTHS / 2..EIGHTHS / 2).map(table_of).collect();
         let short_cuts = short_cuts(&tables);
         let _ = write!(scales, "\n    Scale {{ first: {first:?}, reach: {reach}, short_cuts: {short_cuts:?} }},");
-        all_bounds.extend(tables.concat());
+        // None is above 4096.
+        all_bounds.extend(tables.concat().into_iter().map(|bound| bound as u16));
     }
+    (scales, all_bounds)
+}
+
+/// * `scales`: as source. * `bounds`: of all tables.
+fn source(scales: &str, bounds: &[u16]) -> String {
     // A decoder looks at as many from the start of any table.
-    all_bounds.extend([usize::from(FREQUENCY_TOTAL); NORMAL_WINDOW]);
+    let bounds = [bounds, &[FREQUENCY_TOTAL; NORMAL_WINDOW]].concat();
     let mut text = String::from(
         "//! The tables, written by `cargo run -p tools --bin normal_tables -- --write`.
 
@@ -48,7 +65,7 @@ use super::{N_SCALES, Scale};
 #[rustfmt::skip]
 pub(super) static SCALES: [Scale; N_SCALES] = [",
     );
-    text.push_str(&scales);
+    text.push_str(scales);
     let _ = write!(
         text,
         "\n];
@@ -56,9 +73,9 @@ pub(super) static SCALES: [Scale; N_SCALES] = [",
 /// Per scale and phase `[2D + 3]` where each entry begins, where the escape begins, and where it ends; padding at the end.
 #[rustfmt::skip]
 pub(super) static BOUNDS: [u16; {}] = [",
-        all_bounds.len()
+        bounds.len()
     );
-    for row in all_bounds.chunks(20) {
+    for row in bounds.chunks(20) {
         text.push_str("\n   ");
         for bound in row {
             let _ = write!(text, " {bound},");

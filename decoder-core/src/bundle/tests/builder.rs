@@ -327,6 +327,7 @@ pub(super) fn bundle(variant: Variant) -> Vec<u8> {
             chunk_records.extend(u32s(&[words.len() as u32, crc32(&words)]));
             chunk_records.extend(u16s(&[anchors.len() as u16, 0, 0, 0, 0, 100, 100, 100]));
             chunks.extend(words);
+            pad(&mut chunks);
             n_chunks += 1;
             n_anchors += anchors.len() as u32;
         }
@@ -338,7 +339,13 @@ pub(super) fn bundle(variant: Variant) -> Vec<u8> {
     let manifest: Vec<u8> = (0..3)
         .flat_map(|tier| {
             let psnr = if tier == 0 { f32::from_bits(0x7FC0_0000) } else { 30.0 + tier as f32 };
-            [f32s(&[psnr]), u16s(&[4, 9]), u32s(&std::array::from_fn::<u32, 13, _>(|i| 100 * tier + i as u32))].concat()
+            [
+                f32s(&[psnr]),
+                u16s(&[4, 9]),
+                u32s(&std::array::from_fn::<u32, 13, _>(|i| 100 * tier + i as u32)),
+                vec![tier as u8, 0, 0, 0],
+            ]
+            .concat()
         })
         .collect();
 
@@ -353,7 +360,7 @@ pub(super) fn bundle(variant: Variant) -> Vec<u8> {
     sections.extend([(6, manifest), (7, directory), (8, chunks)]);
     let n_sections = sections.len();
     let header_len = 164 + 16 * n_sections;
-    let file_len = header_len + sections.iter().map(|(_, bytes)| bytes.len()).sum::<usize>();
+    let file_len = header_len + sections.iter().map(|(_, bytes)| bytes.len().next_multiple_of(4)).sum::<usize>();
     let features = 1
         | u32::from(variant.masks) << 3
         | u32::from(variant.context) << 4
@@ -365,7 +372,7 @@ pub(super) fn bundle(variant: Variant) -> Vec<u8> {
     let camera = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 6.0, 30.0, 30.0, 16.0, 12.0];
     let mut file = [
         MAGIC.to_vec(),
-        u16s(&[3, header_len as u16]),
+        u16s(&[4, header_len as u16]),
         u32s(&[file_len as u32, features, 0xFFFF_FFFF]),
         u16s(&[F as u16, K as u16]),
         u32s(&[n_anchors, n_chunks]),
@@ -386,9 +393,17 @@ pub(super) fn bundle(variant: Variant) -> Vec<u8> {
         let crc = if *kind == 8 { 0 } else { crc32(bytes) };
         file.extend([*kind, 0, 0, 0]);
         file.extend(u32s(&[offset as u32, bytes.len() as u32, crc]));
-        offset += bytes.len();
+        offset += bytes.len().next_multiple_of(4);
     }
     file.extend(crc32(&file).to_le_bytes());
-    file.extend(sections.into_iter().flat_map(|(_, bytes)| bytes));
+    for (_, bytes) in sections {
+        file.extend(bytes);
+        pad(&mut file);
+    }
     file
+}
+
+/// Up to where a section or a chunk may begin.
+fn pad(bytes: &mut Vec<u8>) {
+    bytes.resize(bytes.len().next_multiple_of(4), 0);
 }

@@ -197,6 +197,7 @@ fn records_come_back_whatever_they_say() {
             max_head_kilo_macs: bits.u32(),
             max_kilo_pixels: bits.u32(),
             max_decoded_anchors: bits.u32(),
+            level: bits.up_to(5) as u8,
         };
         assert_eq!(TierMeasures::parse(&measures.emit(), 0), Ok(measures));
     }

@@ -3,7 +3,7 @@
 mod dump;
 
 use half::f16;
-use pocketsplat_core::bundle::{AnchorModels, AnchorSite, Chunk, PROTOCOL_CODE, Section};
+use pocketsplat_core::bundle::{ALIGNMENT, AnchorModels, AnchorSite, Chunk, PROTOCOL_CODE, Section};
 use pocketsplat_core::context::{N_LEVELS, N_POSITION_INPUTS, first_tap};
 
 use pocketsplat_core::{Bundle, DecodeError, SectionKind};
@@ -23,6 +23,7 @@ pub fn annotate(bytes: &[u8], array_lines: usize) -> Result<String, DecodeError>
     annotator.header();
     for section in bundle.sections() {
         annotator.section(&section)?;
+        annotator.dump.padding();
     }
     Ok(annotator.dump.into_text())
 }
@@ -231,6 +232,8 @@ impl<'f> Annotator<'f> {
             dump.field("most multiply-adds of the heads, 1024s", u32::from_le_bytes);
             dump.field("most pixel evaluations, 1024s", u32::from_le_bytes);
             dump.field("most decoded anchors", u32::from_le_bytes);
+            dump.field::<1, _>("level", |[byte]| byte);
+            dump.array::<1, _>("reserved", 3, |[byte]| byte);
         }
     }
 
@@ -265,7 +268,8 @@ impl<'f> Annotator<'f> {
         for chunk in &shown {
             self.chunk(chunk, &mut models)?;
         }
-        self.dump.skip(rest.iter().map(Chunk::n_bytes).sum(), "words of other chunks");
+        let n_bytes = rest.iter().map(|chunk| chunk.n_bytes().next_multiple_of(ALIGNMENT as usize)).sum();
+        self.dump.skip(n_bytes, "words of other chunks");
         Ok(())
     }
 
@@ -285,6 +289,7 @@ impl<'f> Annotator<'f> {
         if n_shown < n_anchors {
             dump.remark(&format!("… {} more anchors", n_anchors - n_shown));
         }
+        dump.padding();
         Ok(())
     }
 }

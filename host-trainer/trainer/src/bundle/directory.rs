@@ -1,6 +1,6 @@
-//! The table of contents: where each tier ends, and each chunk's length, checksum and ink box.
+//! The chunks one after the other, and their table of contents: where each tier ends, and each chunk's length, checksum and ink box.
 
-use pocketsplat_core::bundle::{ChunkRecord, Tier, crc32};
+use pocketsplat_core::bundle::{ALIGNMENT, ChunkRecord, Tier, crc32};
 
 use super::ink::{InkBox, frame_around, quantised};
 use super::order::Placement;
@@ -9,7 +9,7 @@ use super::order::Placement;
 pub(super) fn section(placement: &Placement, chunks: &[Vec<u8>], boxes: &[InkBox]) -> Vec<u8> {
     let tiers = placement.tier_chunks.iter().flat_map(|&n_chunks| {
         let n_anchors: usize = placement.chunks[..n_chunks].iter().map(ExactSizeIterator::len).sum();
-        let end: usize = chunks[..n_chunks].iter().map(Vec::len).sum();
+        let end: usize = chunks[..n_chunks].iter().map(|chunk| padded_len(chunk)).sum();
         Tier { n_chunks: n_chunks as u32, n_anchors: n_anchors as u32, end: end as u32 }.emit()
     });
     let frame = frame_around(boxes);
@@ -19,4 +19,18 @@ pub(super) fn section(placement: &Placement, chunks: &[Vec<u8>], boxes: &[InkBox
         ChunkRecord { len, crc: crc32(chunk), n_anchors, low, high }.emit()
     });
     tiers.chain(frame.emit()).chain(records).collect()
+}
+
+/// The bytes of the chunks section: each chunk at a multiple of [`ALIGNMENT`].
+pub(super) fn joined(chunks: &[Vec<u8>]) -> Vec<u8> {
+    let mut joined = Vec::with_capacity(chunks.iter().map(|chunk| padded_len(chunk)).sum());
+    for chunk in chunks {
+        joined.extend(chunk);
+        joined.resize(joined.len().next_multiple_of(ALIGNMENT as usize), 0);
+    }
+    joined
+}
+
+fn padded_len(chunk: &[u8]) -> usize {
+    chunk.len().next_multiple_of(ALIGNMENT as usize)
 }

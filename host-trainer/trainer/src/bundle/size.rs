@@ -1,5 +1,6 @@
 //! Where the bytes of a bundle went.
 
+use pocketsplat_core::bundle::ALIGNMENT;
 use pocketsplat_core::{Bundle, DecodeError, SectionKind};
 
 use super::PartBits;
@@ -35,6 +36,8 @@ pub struct SizeReport {
     pub directory: usize,
     /// Sections that say nothing about the scene: the protocol, and what this version does not know.
     pub other: usize,
+    /// Zeros between sections and between chunks.
+    pub padding: usize,
     /// ANS streams: what the models leave of positions, masks and channels.
     pub streams: usize,
     /// Bits of the streams by the models' own frequencies, before ANS rounds each of them to words.
@@ -80,6 +83,7 @@ impl SizeReport {
                 _ => &mut report.other,
             };
             *part += section.len as usize;
+            report.padding += n_padding(section.len as usize);
         }
         if let Some(context) = bundle.context() {
             let n_rows: usize = context.levels().map(|level| level.n_rows as usize).sum();
@@ -87,7 +91,7 @@ impl SizeReport {
             report.context_weights -= report.grid;
         }
         report.add_chunks(bundle)?;
-        report.total = report.fixed_bytes() + report.streams;
+        report.total = report.fixed_bytes() + report.padding + report.streams;
         Ok(report)
     }
 
@@ -98,6 +102,7 @@ impl SizeReport {
             let drawn: Vec<u32> = sites.iter().map(|site| site.mask).collect();
             self.n_drawn_offsets += drawn.iter().map(|drawn| drawn.count_ones() as usize).sum::<usize>();
             self.streams += chunk.n_bytes();
+            self.padding += n_padding(chunk.n_bytes());
             self.ideal += coders.slots(ChunkRows { lattice: &lattice, drawn: &drawn, symbols }).bits;
         })
     }
@@ -132,6 +137,7 @@ impl SizeReport {
             ("manifest", bytes(self.manifest), true),
             ("directory", bytes(self.directory), true),
             ("other sections", bytes(self.other), true),
+            ("padding", bytes(self.padding), true),
             ("states", self.states(), true),
         ]
         .map(|(name, bytes, container)| {
@@ -141,7 +147,7 @@ impl SizeReport {
         .to_vec()
     }
 
-    /// Bytes of the container: header, manifest, directory, unknown sections, states.
+    /// Bytes of the container: header, manifest, directory, unknown sections, padding, states.
     pub fn container(&self) -> f64 {
         self.parts().iter().filter(|part| part.container).map(|part| part.bytes).sum()
     }
@@ -151,4 +157,9 @@ impl SizeReport {
         let bytes = self.ideal.positions / 8.0 + (self.lattice_model + self.directory) as f64;
         8.0 * bytes / self.n_anchors.max(1) as f64
     }
+}
+
+/// Zeros behind a section or a chunk of `len` bytes.
+fn n_padding(len: usize) -> usize {
+    len.next_multiple_of(ALIGNMENT as usize) - len
 }

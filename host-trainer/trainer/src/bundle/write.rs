@@ -154,7 +154,7 @@ impl Writer<'_> {
             masks: models.masks.as_ref().map(|masks| masks.view().emit().collect()),
             coder,
             directory: directory::section(placement, &chunks, &boxes),
-            chunks: chunks.concat(),
+            chunks: directory::joined(&chunks),
         };
         CodedScene::new(layout::header(self.scene, self.info, &counts)?, parts, self.info.protocol.clone())
     }

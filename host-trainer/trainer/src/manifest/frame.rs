@@ -59,6 +59,8 @@ impl TierCounts {
             max_head_kilo_macs: count(self.head_macs.div_ceil(1024)),
             max_kilo_pixels: count(self.pixels.div_ceil(1024)),
             max_decoded_anchors: count(self.decoded_anchors),
+            // Whoever declares one checks it.
+            level: 0,
         }
     }
 }

@@ -2,6 +2,8 @@
 
 use std::fmt::{Display, Write};
 
+use pocketsplat_core::bundle::ALIGNMENT;
+
 /// Bytes on a line of the dump.
 const LINE_BYTES: usize = 8;
 
@@ -42,6 +44,12 @@ impl<'f> Dump<'f> {
     /// A line without bytes.
     pub(super) fn remark(&mut self, text: &str) {
         let _ = writeln!(self.text, "{:33}{text}", "");
+    }
+
+    /// The bytes up to where a section or a chunk may begin.
+    pub(super) fn padding(&mut self) {
+        let n = self.position.next_multiple_of(ALIGNMENT as usize) - self.position;
+        self.array::<1, _>("padding", n, |[byte]| byte);
     }
 
     /// Leaves `n_bytes` out and says so.

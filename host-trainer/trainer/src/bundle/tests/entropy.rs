@@ -95,15 +95,13 @@ fn constriction_reads_real_streams_as_our_reader_does() {
         let (_, bytes) = write_random(coder, SMALL, 500, 71, 64);
         let bundle = Bundle::parse(&bytes).expect("a sound bundle");
         let models = Models::of(&bundle);
-        let chunks_start = bytes.len() - bundle.chunks().map(|chunk| chunk.n_bytes()).sum::<usize>();
+        let chunks_start = bytes.len() - bundle.tier(0).expect("the only tier").end as usize;
         let mut rows = decoded_rows(&bundle).into_iter();
-        let mut start = chunks_start;
         for chunk in bundle.chunks() {
             let (sites, symbols): (Vec<_>, Vec<_>) = rows.by_ref().take(chunk.n_anchors().into()).unzip();
             let (lattice, drawn): (Vec<_>, Vec<_>) = sites.iter().map(|site| (site.lattice, site.mask)).unzip();
             let list = models.slots(ChunkRows { lattice: &lattice, drawn: &drawn, symbols: &symbols.concat() });
-            let stream = &bytes[start..start + chunk.n_bytes()];
-            start += chunk.n_bytes();
+            let stream = &bytes[chunks_start + chunk.offset() as usize..][..chunk.n_bytes()];
             let stack: Vec<u16> = stream.as_chunks().0.iter().rev().map(|&word| u16::from_le_bytes(word)).collect();
             let mut reference = AnsCoder::<u16, u32>::from_compressed(stack).expect("no leading zero");
             for (i, [start, frequency]) in list.slots().enumerate() {

@@ -1,6 +1,7 @@
 use std::collections::BTreeSet;
 
 use pocketsplat_core::Bundle;
+use pocketsplat_core::bundle::cut_after;
 
 use super::{SMALL, TABLES, camera, decoded_rows, info, options, random_scene, with_context};
 use crate::bundle::{ChannelCoding, WriteError, WriteOptions, write};
@@ -56,6 +57,15 @@ fn a_file_cut_at_a_tiers_end_is_the_smaller_scene() {
             let small = core_image(&cut, &camera(60, 40)).expect("a frame");
             let limited = core_image_of_tiers(&whole, &camera(60, 40), tier + 1).expect("a frame");
             assert!(small.image == limited.image, "{coder:?}: the same picture as of the whole file limited to {tier}");
+            // In a flash partition that held the whole file, or something else, before.
+            let mut partition = bytes.clone();
+            let len = cut_after(&mut partition, tier + 1).expect("a tier");
+            assert_eq!(len, chunks_start + ends.end as usize, "{coder:?}: cut at a tier's end");
+            for fill in [None, Some(0xFF), Some(0x5A)] {
+                fill.into_iter().for_each(|fill| partition[len..].fill(fill));
+                let cut = Bundle::parse(&partition).expect("a cut file in a partition");
+                assert_eq!(decoded_rows(&cut), rows[..ends.n_anchors as usize], "{coder:?}: {fill:?} behind it");
+            }
         }
     }
 }

@@ -7,7 +7,7 @@ import { readHeader } from "./header.mjs";
 import { readHeads } from "./heads.mjs";
 import { readLattice } from "./lattice.mjs";
 import { readMasks } from "./masks.mjs";
-import { KIND, locateSections } from "./sections.mjs";
+import { checkPadding, KIND, locateSections } from "./sections.mjs";
 import { readTables } from "./tables.mjs";
 
 /** How many tiers the file holds: it ends where one ends, at `file_len` or before. */
@@ -24,7 +24,7 @@ export function openBundle(file) {
   const header = readHeader(file);
   const sections = locateSections(file, header);
   const row = sections.get(KIND.chunks);
-  const bundle = { file, header };
+  const bundle = { file, header, chunksOffset: row.offset };
   bundle.heads = readHeads(sections.get(KIND.heads), header);
   bundle.lattice = readLattice(sections.get(KIND.lattice));
   if (header.features.masks) bundle.masks = readMasks(sections.get(KIND.masks), header.K);
@@ -34,5 +34,7 @@ export function openBundle(file) {
   Object.assign(bundle, readDirectory(sections.get(KIND.directory), header, row));
   bundle.gaussians = readGaussians(sections.get(KIND.gaussians), header, bundle.tiers);
   bundle.nTiers = tiersFound(file, header, bundle.tiers.map((tier) => row.offset + tier.end));
+  const { nChunks } = bundle.tiers[bundle.nTiers - 1];
+  bundle.chunks.slice(0, nChunks).forEach(({ offset, len }, i) => checkPadding(file, offset + len, `chunk ${i}`));
   return bundle;
 }

@@ -5,7 +5,6 @@ import { crc32, hex, need, Refusal } from "./bytes.mjs";
 import { ContextCoder } from "./context.mjs";
 import { walkTrie } from "./lattice.mjs";
 import { decodeMask } from "./masks.mjs";
-import { checkPadding } from "./sections.mjs";
 import { decodeSymbol, tableValue } from "./tables.mjs";
 
 /** Decodes the channels of anchors with static tables. */
@@ -32,7 +31,6 @@ export function decodeChunk(bundle, index) {
   const bytes = bundle.file.subarray(chunk.offset, chunk.offset + chunk.len);
   const crc = crc32(bytes);
   need(crc === chunk.crc, `${place}: crc`, hex(chunk.crc), hex(crc));
-  checkPadding(bundle.file, chunk.offset + chunk.len, place);
   const ans = new Ans(bytes, place);
   const coder = bundle.context ? new ContextCoder(bundle.context, header) : new TableCoder(bundle.tables);
   const all = K === 32 ? 0xffffffff : 2 ** K - 1;

@@ -12,7 +12,14 @@ export function readManifest(bytes, nTiers) {
     const bits = new DataView(bytes.buffer, bytes.byteOffset + from.at).getUint32(0, true);
     const psnr = from.f32("PSNR");
     need(Number.isFinite(psnr) || bits === NOT_MEASURED, `manifest: PSNR of tier ${tier}`, `0x${bits.toString(16)}`, "finite or 0x7fc00000");
-    const record = { psnr, views: from.u16("n_views"), cameras: from.u16("n_cameras"), maxima: from.u32s(13, "maxima") };
+    const record = { psnr, views: from.u16("n_views"), cameras: from.u16("n_cameras") };
+    record.visibleAnchors = from.u32("max_visible_anchors");
+    record.splats = from.u32("max_splats");
+    record.stripSplats = from.u32s(4, "max_strip_splats");
+    record.stripPairs = from.u32s(4, "max_strip_pairs");
+    record.headKiloMacs = from.u32("max_head_kilo_macs");
+    record.kiloPixels = from.u32("max_kilo_pixels");
+    record.decodedAnchors = from.u32("max_decoded_anchors");
     record.level = within(`manifest: level of tier ${tier}`, from.u8("level"), 0, 5);
     from.zeros(3, "reserved");
     records.push(record);

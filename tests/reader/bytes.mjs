@@ -97,7 +97,7 @@ export class Cursor {
 
 /** Holds a number to a range, both ends included. */
 export function within(place, found, low, high) {
-  need(found >= low && found <= high, place, found, `${low} to ${high}`);
+  need(found >= low && found <= high, place, found, low === high ? `${low}` : `${low} to ${high}`);
   return found;
 }
 

@@ -7,6 +7,7 @@ import { crc32, Refusal } from "./bytes.mjs";
 import { Camera } from "./camera.mjs";
 import { decodeChunk } from "./chunk.mjs";
 import { drawFrame } from "./frame.mjs";
+import { levelOf } from "./levels.mjs";
 import { readPng } from "./png.mjs";
 
 const json = (path) => JSON.parse(readFileSync(path, "utf8"));
@@ -36,6 +37,14 @@ function compareShape(bundle, expected) {
     .map((key) => `${key} is ${JSON.stringify(found[key])}, expected ${JSON.stringify(expected[key])}`);
 }
 
+/** The level that each tier declares against the one that it keeps. */
+function compareLevels(bundle) {
+  return bundle.manifest.flatMap(({ level }, tier) => {
+    const kept = levelOf(bundle, tier);
+    return level === kept ? [] : [`tier ${tier} declares level ${level} and keeps ${kept}`];
+  });
+}
+
 function compareAnchors(found, expected) {
   if (found.length !== expected.length) return [`${found.length} anchors, expected ${expected.length}`];
   for (let i = 0; i < found.length; i++) {
@@ -44,7 +53,8 @@ function compareAnchors(found, expected) {
     if (is.drawn !== should.drawn) return [`drawn of anchor ${i} is ${is.drawn}, expected ${should.drawn}`];
     const at = should.symbols.findIndex((symbol, c) => symbol !== is.symbols[c]);
     if (at >= 0 || is.symbols.length !== should.symbols.length) {
-      return [`symbol ${at} of anchor ${i} is ${is.symbols[at]}, expected ${should.symbols[at]}; ${is.symbols.length} symbols of ${should.symbols.length}`];
+      const counts = `${is.symbols.length} symbols, expected ${should.symbols.length}`;
+      return [`symbol ${at} of anchor ${i} is ${is.symbols[at]}, expected ${should.symbols[at]}; ${counts}`];
     }
   }
   return [];
@@ -54,7 +64,8 @@ function compareFrame(pack, bundle, expected, i) {
   const camera = Camera.of(expected.camera);
   const pixels = drawFrame(bundle, camera, expected.tiers);
   const png = readPng(readFileSync(join(pack, expected.png)));
-  if (png.width !== camera.width || png.height !== camera.height) return [`frame ${i}: PNG of ${png.width}×${png.height}, camera of ${camera.width}×${camera.height}`];
+  const [is, should] = [png, camera].map(({ width, height }) => `${width}×${height}`);
+  if (is !== should) return [`frame ${i}: ${expected.png} has ${is} pixels, its camera ${should}`];
   const wrong = pixels.reduce((count, byte, at) => count + (byte !== png.pixels[at] ? 1 : 0), 0);
   if (wrong > 0) return [`frame ${i}: ${wrong} of ${pixels.length} bytes differ from ${expected.png}`];
   return crcText(pixels) === expected.crc32 ? [] : [`frame ${i}: CRC ${crcText(pixels)}, expected ${expected.crc32}`];
@@ -66,6 +77,7 @@ function checkBundle(pack, path) {
   const anchors = decodeAll(bundle);
   const problems = [
     ...compareShape(bundle, expected),
+    ...compareLevels(bundle),
     ...compareAnchors(anchors, expected.anchors),
     ...expected.frames.flatMap((frame, i) => compareFrame(pack, bundle, frame, i)),
   ];

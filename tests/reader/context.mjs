@@ -1,12 +1,12 @@
 // The context that predicts the channels of anchors (FORMAT.md, section 7).
 
-import { Cursor, need, within } from "./bytes.mjs";
+import { Cursor, within } from "./bytes.mjs";
 import { Ancestry } from "./follow.mjs";
 import { gridFeatures, readLevel, readRows } from "./grid.mjs";
 import { readNetwork, runNetwork } from "./network.mjs";
 import { decodeResidual, PARTS } from "./residual.mjs";
 
-const STEP = [(step) => step > 1e-12 && step < 1e12, "above 1e-12, below 1e12"];
+const STEP = [(step) => step > Math.fround(1e-12) && step < Math.fround(1e12), "above 1e-12, below 1e12"];
 
 export function readContext(bytes, header) {
   const { F, S, C } = header;
@@ -14,14 +14,14 @@ export function readContext(bytes, header) {
   const context = { frame: { min: from.i32s(3, "frame min"), scale: from.u32s(3, "frame scale") } };
   context.baseSteps = from.f32s(3, "base steps", STEP);
   const nLevels = within("context: n_levels", from.u8("n_levels"), 0, 32);
-  context.taps = within("context: taps", from.u8("taps"), 0, nLevels ? 64 : 0);
-  const hidden = within("context: H", from.u16("H"), 1, 256);
+  context.taps = within("context: n_taps", from.u8("n_taps"), 0, nLevels ? 64 : 0);
+  const hidden = within("context: n_hidden", from.u16("n_hidden"), 1, 256);
   const outputs = 2 * C + 3;
   if (nLevels === 0) {
     context.edges = from.u8s(3, "edges");
-    within("context: s_1", context.edges[0], 0, context.edges[1]);
-    within("context: s_2", context.edges[1], 0, 15);
-    within("context: s_3", context.edges[2], 0, 25);
+    within("context: e1", context.edges[0], 0, context.edges[1]);
+    within("context: e2", context.edges[1], 0, 15);
+    within("context: e3", context.edges[2], 0, 25);
     from.zeros(1, "reserved");
     const inputs = [3, 3 + F + S, 3 + F + S];
     context.networks = inputs.map((n) => readNetwork(from, n, hidden, outputs)).reverse();

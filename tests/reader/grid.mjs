@@ -10,13 +10,13 @@ const FEATURES = 4;
 export function readLevel(from, i, firstRow) {
   const kind = within(`context: kind of level ${i}`, from.u8("kind"), 0, 3);
   from.zeros(1, `reserved byte of level ${i}`);
-  const resolution = within(`context: R of level ${i}`, from.u16("R"), 2, 32768);
+  const nodes = within(`context: n_nodes of level ${i}`, from.u16("n_nodes"), 2, 32768);
   const nRows = from.u32("n_rows");
   const axes = AXES[kind];
-  const dense = nRows === resolution ** axes.length;
+  const dense = nRows === nodes ** axes.length;
   const power = nRows > 0 && Number.isInteger(Math.log2(nRows));
-  need(dense || power, `context: n_rows of level ${i}`, nRows, `${resolution ** axes.length} or a power of two`);
-  return { axes, resolution, nRows, dense, firstRow };
+  need(dense || power, `context: n_rows of level ${i}`, nRows, `${nodes ** axes.length} or a power of two`);
+  return { axes, nodes, nRows, dense, firstRow };
 }
 
 export function readRows(from, nRows) {
@@ -32,8 +32,8 @@ function place(frame, cell, axis) {
 }
 
 function rowOf(level, node) {
-  const { resolution: R, nRows } = level;
-  if (level.dense) return node.reduceRight((row, at) => row * R + at, 0);
+  const { nodes, nRows } = level;
+  if (level.dense) return node.reduceRight((row, at) => row * nodes + at, 0);
   return (node.reduce((hash, at, axis) => hash ^ Math.imul(at, PRIMES[axis]), 0) >>> 0) % nRows;
 }
 
@@ -43,7 +43,7 @@ export function gridFeatures(context, cell) {
   const u = cell.map((at, axis) => place(context.frame, at, axis));
   context.levels.forEach((level, index) => {
     const d = level.axes.length;
-    const t = level.axes.map((axis) => u[axis] * (level.resolution - 1));
+    const t = level.axes.map((axis) => u[axis] * (level.nodes - 1));
     const sums = [0, 0, 0, 0];
     for (let corner = 0; corner < 1 << d; corner++) {
       let weight = d === 2 ? 256 : 1;

@@ -47,7 +47,8 @@ export function readHeader(file) {
   const version = first.u16("version");
   need(version === VERSION, "header: version", version, `${VERSION}`);
   const headerLen = first.u16("header_len");
-  need(headerLen >= BEFORE_SECTIONS + 4 && headerLen <= file.length, "header: header_len", headerLen, `164 to ${file.length}, the file's length`);
+  need(headerLen >= BEFORE_SECTIONS + 4, "header: header_len", headerLen, `at least ${BEFORE_SECTIONS + 4}`);
+  need(headerLen <= file.length, "the file's length", file.length, `at least header_len, ${headerLen}`);
   const found = new DataView(file.buffer, file.byteOffset).getUint32(headerLen - 4, true);
   const crc = crc32(file.subarray(0, headerLen - 4));
   need(crc === found, "header: CRC", hex(found), hex(crc));

@@ -16,7 +16,8 @@ export function readPng(bytes) {
     if (type === "IHDR") {
       [width, height] = [data.readUInt32BE(0), data.readUInt32BE(4)];
       const [depth, colour, , , interlaced] = data.subarray(8);
-      if (depth !== 8 || colour !== 2 || interlaced) throw new Error(`PNG: depth ${depth}, colour type ${colour}, interlacing ${interlaced}; needed 8, 2, 0`);
+      const form = `depth ${depth}, colour type ${colour}, interlacing ${interlaced}`;
+      if (form !== "depth 8, colour type 2, interlacing 0") throw new Error(`PNG of ${form}, needed: 8, 2, 0`);
     } else if (type === "IDAT") parts.push(data);
     at += length + 12;
   }

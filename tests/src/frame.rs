@@ -121,6 +121,14 @@ struct Drawing<'a, 'b> {
     budget: Budget,
 }
 
+/// As [`draw`], as a budget says.
+///
+/// # Errors
+/// The decoder's.
+pub fn draw_by(budget: &Budget, bundle: &Bundle<'_>, camera: &Camera) -> Result<(Frame, FrameReport), DecodeError> {
+    ArithmeticChoice::Reference.call(Drawing { bundle, camera, budget: *budget })
+}
+
 impl WithArithmetic for Drawing<'_, '_> {
     type Output = Result<(Frame, FrameReport), DecodeError>;
 

@@ -19,6 +19,8 @@
 //! * `captures`: do captures load with the conventions that the renderers use?
 //! * `hard_cases`, `hard_neighbourhoods`: do named hard cases, and what lies near them, keep the bounds that
 //!   `docs/numerical-stability.md` states?
+//! * `pack`: is the committed conformance pack what its command writes, does it have every feature, kind, bit and limit of the format, and
+//!   are its files to be refused refused for their reasons?
 //! * `rooms`: do imports go down only, and never in circles?
 //! * `determinism`: does the same seed give the same bundle for any number of threads?
 
@@ -30,5 +32,6 @@ pub mod digest;
 pub mod frame;
 pub mod fuzz;
 pub mod hard_cases;
+pub mod pack;
 pub mod scenes;
 pub mod seal;

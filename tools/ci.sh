@@ -7,7 +7,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-jobs=(fmt clippy doc test viewer core-embedded format-doc package link-gate digests firmware boards c demo)
+jobs=(fmt clippy doc test viewer core-embedded format-doc package link-gate digests reader firmware boards c demo)
 
 embedded_target=thumbv7em-none-eabihf
 defmt_print_version=1.2.0
@@ -265,6 +265,12 @@ job_digests() {
   # The flag is for the Node.js 18 of Debian 12; later ones need none.
   need_target $name
   digest_of $name --release --target $name -- node --no-warnings --experimental-wasi-unstable-preview1 tests/digest/run.mjs "$build/$name/release/digest.wasm"
+}
+
+# A reader written from the documents alone, without the decoder's code, finds in the conformance pack what the decoder finds.
+job_reader() {
+  need_command node nodejs
+  node tests/reader/main.mjs check tests/pack
 }
 
 # Boards with the RAM that they get, KiB: as much as such a device has, and so little that anchors are decoded in each frame.

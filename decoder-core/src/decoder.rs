@@ -185,9 +185,9 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
     /// # Budget
     /// No memory beyond the bound one, under 4 KiB of stack. Work of one strip: every anchor of a chunk in view is decoded
     /// unless it is resident, the heads run for anchors that pass the prefilter, unless Gaussians are baked, and a pixel is finished when its
-    /// transmittance falls below 1e-4. Of several strips each does so for the chunks and anchors that can reach it; but the
-    /// first one goes over the whole view to see that all strips have places enough, unless that follows from the
-    /// directory.
+    /// transmittance falls below 1e-4. Of several strips each does so for the chunks and anchors that can reach it, as many of them at once as
+    /// there are places for; but the first time goes over the whole view to see that all strips have places enough, unless that follows
+    /// from the directory.
     pub fn render<S: TileSink>(&mut self, camera: &Camera, sink: &mut S) -> Result<FrameReport, RenderError<S::Error>> {
         self.render_watched(camera, sink, &mut ())
     }

@@ -4,11 +4,16 @@
 //! name them as clobbered.
 #![expect(unsafe_code, reason = "stable Rust has no other way to these instructions")]
 
+#[cfg(cortex_m_dsp)]
+pub(crate) mod integer;
 pub(crate) mod layer;
 pub(crate) mod root;
 pub(crate) mod rows;
 
 use core::arch::asm;
+
+#[cfg(not(cortex_m_dsp))]
+pub(crate) use crate::portable::integer;
 
 use crate::portable;
 

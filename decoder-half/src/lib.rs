@@ -13,6 +13,7 @@ pub mod portable;
 #[cfg(not(all(target_arch = "arm", target_abi = "eabihf", target_os = "none", not(target_has_atomic = "64"))))]
 use portable as chosen;
 
+pub use chosen::integer::add_products_of_two_rows;
 pub use chosen::layer::{LANES, outputs, rectified_units};
 pub use chosen::root::sqrt;
 pub use chosen::rows::{

@@ -1,5 +1,6 @@
 //! Conversions by shifts and one multiplication, for every target.
 
+pub mod integer;
 pub mod layer;
 pub mod root;
 pub mod rows;

@@ -51,6 +51,14 @@ impl Row<'_> {
     }
 }
 
+/// The outputs of two rows, limited to i16.
+#[inline(always)]
+fn outputs([a, b]: [Row<'_>; 2], inputs: &[i16]) -> [i16; 2] {
+    let biases = [a.bias, b.bias].map(i32::from_le_bytes);
+    let [sum_a, sum_b] = pocketsplat_half::add_products_of_two_rows(biases, [a.weights, b.weights], inputs);
+    [limited(sum_a, a.shift), limited(sum_b, b.shift)]
+}
+
 /// `sum >> shift`, limited to i16.
 #[inline(always)]
 fn limited(sum: i32, shift: u8) -> i16 {
@@ -123,19 +131,12 @@ impl<'a> Layer<'a> {
     /// * `inputs`: `[n_in]`.
     ///
     /// # Budget
-    /// Per pair 2·n_in multiply-adds, about 3.3 instructions each on a Cortex-M4, and 30 instructions.
+    /// Per pair 2·n_in multiply-adds, about 1.8 instructions each on a Cortex-M4, and 30 instructions.
     // On its own it gets the registers that it needs.
     #[inline(never)]
     pub(super) fn pairs(&self, first: usize, second: usize, inputs: &[i16], pairs: &mut [[i16; 2]]) {
         for ((a, b), pair) in self.rows(first, inputs.len()).zip(self.rows(second, inputs.len())).zip(pairs) {
-            let biases = (i32::from_le_bytes(a.bias), i32::from_le_bytes(b.bias));
-            // An input is fetched once for both.
-            let weights = a.weights.iter().zip(b.weights);
-            let sums = weights.zip(inputs).fold(biases, |(sum_a, sum_b), ((&weight_a, &weight_b), &input)| {
-                let times = |weight: u8| i32::from(weight as i8).wrapping_mul(i32::from(input));
-                (sum_a.wrapping_add(times(weight_a)), sum_b.wrapping_add(times(weight_b)))
-            });
-            *pair = [limited(sums.0, a.shift), limited(sums.1, b.shift)];
+            *pair = outputs([a, b], inputs);
         }
     }
 
@@ -145,8 +146,14 @@ impl<'a> Layer<'a> {
     #[inline(always)]
     pub(super) fn rectified(&self, inputs: &[i16], outputs: &mut [i16]) {
         let n_in = self.weights.len().checked_div(self.biases.len()).unwrap_or_default();
-        for (row, output) in self.rows(0, n_in).zip(outputs) {
-            *output = limited(row.output(inputs), row.shift).max(0);
+        let mut rows = self.rows(0, n_in);
+        for pair in outputs.chunks_mut(2) {
+            let Some(first) = rows.next() else { break };
+            // The last of an odd number is computed twice.
+            let second = rows.next().unwrap_or(first);
+            for (output, unit) in pair.iter_mut().zip(self::outputs([first, second], inputs)) {
+                *output = unit.max(0);
+            }
         }
     }
 }

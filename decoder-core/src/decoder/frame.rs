@@ -179,10 +179,22 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
             self.slab.end
         } else {
             frame.report.strip_splats = frame.report.strip_splats.saturating_add(self.in_strip);
-            frame.report.max_splats = frame.report.max_splats.max(self.in_strip);
+            if !matches!(frame.admission, Admission::Tally(_)) {
+                frame.report.max_splats = frame.report.max_splats.max(self.in_strip);
+            }
             self.in_strip = 0;
             let Some(strip) = frame.strips.after(self.strip) else { return Ok(false) };
-            self.strip = strip;
+            self.strip = match &frame.admission {
+                // What a damaged chunk would have made room for is gone.
+                Admission::Tally(_) if decoder.skip_damage => strip,
+                // The first pass goes over the whole scene anyway.
+                Admission::Tally(_) if strip.index == 0 => frame.strips.between(0, frame.strips.len()),
+                Admission::Tally(tally) => {
+                    let end = tally.end_of_those_with_room(strip.index).min(frame.strips.len());
+                    frame.strips.between(strip.index, end)
+                }
+                Admission::All | Admission::Slab => strip,
+            };
             0.0
         };
         if from > 0.0 && self.alive == 0 {
@@ -190,7 +202,8 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
             decoder.splats.n = 0;
             self.slab = Slab::behind(from);
         } else {
-            self.slab = match decoder.gather(self.strip, from, frame, watch) {
+            let asked = self.strip;
+            self.slab = match decoder.gather(&mut self.strip, from, frame, watch) {
                 Ok(slab) => slab,
                 Err(error) => {
                     // As after the last strip.
@@ -200,13 +213,14 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
             };
             frame.report.slabs = frame.report.slabs.saturating_add(1);
             let n = decoder.splats.n;
-            self.most_in_memory = n.max(self.most_in_memory);
             self.in_strip = self.in_strip.saturating_add(n);
+            // It was full when it let go of a strip.
+            let most = if self.strip == asked { n } else { decoder.splats.places() };
+            self.most_in_memory = most.max(self.most_in_memory);
             let rects = decoder.splats.rects.iter().take(n as usize);
-            let strips = frame.strips;
-            let first_here =
-                rects.filter(|rect| *strips.touched(**rect).start() == usize::from(self.strip.index)).count();
-            frame.report.splats = frame.report.splats.saturating_add(first_here as u32);
+            let n_first_here =
+                rects.filter(|rect| *frame.strips.touched(**rect).start() >= self.strip.index.into()).count() as u32;
+            frame.report.splats = frame.report.splats.saturating_add(n_first_here);
         }
         watch.enter(Stage::Sort);
         decoder.splats.sort();

@@ -9,7 +9,7 @@ use crate::arithmetic::Arithmetic;
 use crate::bake::BakedGaussian;
 use crate::bundle::{Chunk, Effects};
 use crate::error::DecodeError;
-use crate::project::{Band, View};
+use crate::project::{Band, TileRect, View};
 use crate::scene::{Anchor, Gaussian, GaussianSink};
 use crate::stopwatch::{Stage, Stopwatch};
 
@@ -51,7 +51,8 @@ impl Pass {
 impl Frame {
     /// What the pass of a strip has to look at.
     fn band(&self, strip: Strip) -> Option<Band> {
-        let whole = self.strips.len() == 1 || (strip.index == 0 && matches!(self.admission, Admission::Tally(_)));
+        let whole = strip.end_row - strip.first_row == self.strips.n_rows()
+            || (strip.index == 0 && matches!(self.admission, Admission::Tally(_)));
         (!whole).then(|| self.view.band(self.strips.pixels(strip)))
     }
 
@@ -103,17 +104,19 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
         }
     }
 
-    /// Fills the splat memory with the splats of one strip from depth `from` on, and returns the slab that they fill: all of
+    /// Fills the splat memory with the splats of `strip` from depth `from` on, and returns the slab that they fill: all of
     /// the rest when there are places enough, or when splats are left out instead.
+    ///
+    /// * `strip`: ends earlier afterwards if it was several and there is no room for all of them.
     pub(super) fn gather(
         &mut self,
-        strip: Strip,
+        strip: &mut Strip,
         from: f32,
         frame: &mut Frame,
         watch: &mut impl Stopwatch,
     ) -> Result<Slab, DecodeError> {
         self.splats.n = 0;
-        let mut pass = Pass { strip, slab: Slab::behind(from), band: frame.band(strip) };
+        let mut pass = Pass { strip: *strip, slab: Slab::behind(from), band: frame.band(*strip) };
         if from > 0.0 {
             pass.end_earlier(&frame.view);
         }
@@ -127,6 +130,7 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
             }
         }
         frame.report.splats_dropped = frame.report.splats_dropped.saturating_add(pass.slab.n_left_out);
+        *strip = pass.strip;
         Ok(pass.slab)
     }
 
@@ -263,8 +267,8 @@ impl<A: Arithmetic> Keeper<'_, '_, A> {
     fn project(&mut self, place: u32, gaussian: &Gaussian, effects: Effects) {
         let Some((splat, rect)) = self.view.project::<A::Functions>(gaussian, effects) else { return };
         let touched = self.strips.touched(rect);
-        let index = usize::from(self.pass.strip.index);
-        let lies_here = touched.contains(&index);
+        let index = self.pass.strip.index;
+        let lies_here = *touched.end() >= index.into() && *touched.start() < self.pass.strip.end_index.into();
         let drawn = match self.admission {
             Admission::All => true,
             Admission::Tally(tally) if index == 0 => tally.admit(place, touched),
@@ -280,8 +284,23 @@ impl<A: Arithmetic> Keeper<'_, '_, A> {
                 return;
             }
         };
-        if drawn && lies_here {
+        if drawn && lies_here && self.make_room(rect) {
             self.splats.push(&splat, rect);
         }
+    }
+
+    /// Ends the pass above as many strips as it takes to have a place; returns whether a splat of `rect` lies in it then.
+    #[inline(always)]
+    fn make_room(&mut self, rect: TileRect) -> bool {
+        while self.splats.n >= self.splats.places() {
+            let Strip { index, end_index, .. } = self.pass.strip;
+            // A strip by itself has places enough.
+            if end_index <= index + 1 {
+                return true;
+            }
+            self.pass.strip = self.strips.between(index, end_index - 1);
+            self.splats.end_above(self.pass.strip.end_row);
+        }
+        u16::from(rect.first_row) < self.pass.strip.end_row
     }
 }

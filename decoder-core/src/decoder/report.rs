@@ -4,11 +4,12 @@ use crate::budget::Work;
 
 /// What a frame consisted of and what it cost.
 ///
-/// With strips a chunk or an anchor counts once for each strip that needs it; splats and pixels do not depend on strips.
+/// With strips a chunk or an anchor counts once for each pass that needs it, and as many strips as fit in memory together take one pass;
+/// splats and pixels do not depend on strips.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FrameReport {
-    /// Times the chunks in view were decoded: once a strip, or a slab of it, never when the anchors are resident.
+    /// Times the chunks in view were decoded: once a pass, or a slab of a strip, never when the anchors are resident.
     pub decode_passes: u8,
     /// Chunks decoded: those whose ink box the camera sees.
     pub chunks_decoded: u32,
@@ -34,12 +35,12 @@ pub struct FrameReport {
     /// Splats left out because there was no memory for them: all of the file's anchors and offsets from the first one on
     /// that some strip had no place for.
     pub splats_dropped: u32,
-    /// Slabs of depth drawn, one of each strip where there were places for all of its splats.
+    /// Slabs of depth drawn, or passes where there were places for all splats of a strip.
     pub slabs: u32,
     /// Splats of the fullest strip, those left out included; the number to plan for. In slabs those drawn before nothing more
     /// could be seen.
     pub max_splats: u32,
-    /// Splats of all strips together, one that lies in two counted twice.
+    /// Splats of all passes together, one that lies in two counted twice.
     pub strip_splats: u32,
     /// Pairs of a tile and a splat blended into it.
     pub tile_splats: u32,

@@ -53,10 +53,10 @@ impl<S: SplatRecord> SplatStore<'_, S> {
     }
 
     /// Keeps a splat if it lies in `slab`; when there is no place, the slab ends earlier, and what lies behind its end then
-    /// makes room: about the farther half.
+    /// makes room: about the farthest eighth.
     ///
     /// # Budget
-    /// When there is no place a sort, which as many splats as half the places pay for.
+    /// When there is no place a sort, which as many splats as an eighth of the places pay for: a slab less saves far more.
     pub(super) fn push_into(&mut self, slab: &mut Slab, splat: &Splat, rect: TileRect) {
         let lies_in = |slab: &Slab| slab.from <= splat.depth && splat.depth < slab.end;
         if !lies_in(slab) {
@@ -101,7 +101,7 @@ impl<S: SplatRecord> SplatStore<'_, S> {
         let depth_of = |index: &u32| splats.get(*index as usize).map_or(0.0, SplatRecord::depth);
         let nearest = order.first().map_or(depth, depth_of);
         let nearest = if depth < nearest { depth } else { nearest };
-        let mut later = order.get(n / 2..).unwrap_or_default().iter().map(depth_of);
+        let mut later = order.get(n - n.div_ceil(8)..).unwrap_or_default().iter().map(depth_of);
         later.find(|&end| end > nearest).or((depth > nearest).then_some(depth))
     }
 
@@ -112,17 +112,27 @@ impl<S: SplatRecord> SplatStore<'_, S> {
         if end <= slab.left_out_at {
             slab.n_left_out = 0;
         }
+        self.retain(|splat, _| splat.depth() < end);
+    }
+
+    /// Lets go of what does not begin above a row of tiles.
+    #[inline(never)]
+    pub(super) fn end_above(&mut self, row: u16) {
+        self.retain(|_, rect| u16::from(rect.first_row) < row);
+    }
+
+    /// Keeps some of the splats, in their order.
+    fn retain(&mut self, keeps: impl Fn(&S, &TileRect) -> bool) {
         let mut n_kept = 0;
         for i in 0..self.n as usize {
             let Some((before, [splat, ..])) = self.splats.split_at_mut_checked(i) else { break };
-            if splat.depth() < end {
+            let Some(&rect) = self.rects.get(i) else { break };
+            if keeps(splat, &rect) {
                 // Swapped: to copy within a slice would link a routine of 1.6 KB, for parts that overlap.
                 if let Some(slot) = before.get_mut(n_kept) {
                     core::mem::swap(slot, splat);
                 }
-                if let Some(&rect) = self.rects.get(i)
-                    && let Some(slot) = self.rects.get_mut(n_kept)
-                {
+                if let Some(slot) = self.rects.get_mut(n_kept) {
                     *slot = rect;
                 }
                 n_kept += 1;

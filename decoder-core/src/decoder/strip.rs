@@ -12,17 +12,19 @@ pub(super) struct StripLayout {
     rows_per_strip: u16,
 }
 
-/// The rows of tiles of one strip.
+/// The rows of tiles of one strip, or of several that are drawn together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Strip {
     pub(super) index: u8,
+    /// The first that is not among them.
+    pub(super) end_index: u8,
     pub(super) first_row: u16,
     pub(super) end_row: u16,
 }
 
 impl Strip {
     /// The one that the first comes after.
-    pub(super) const BEFORE: Self = Self { index: 0, first_row: 0, end_row: 0 };
+    pub(super) const BEFORE: Self = Self { index: 0, end_index: 0, first_row: 0, end_row: 0 };
 }
 
 impl StripLayout {
@@ -40,18 +42,18 @@ impl StripLayout {
 
     /// The strip below another one.
     pub(super) fn after(self, strip: Strip) -> Option<Strip> {
-        let index = u8::from(strip != Strip::BEFORE) + strip.index;
-        let (first_row, n_rows) = (strip.end_row, self.n_rows());
-        let end_row = (first_row + self.rows_per_strip).min(n_rows);
-        (first_row < n_rows).then_some(Strip { index, first_row, end_row })
+        (strip.end_row < self.n_rows()).then(|| self.between(strip.end_index, strip.end_index + 1))
+    }
+
+    /// The strips from `index` up to `end_index`.
+    pub(super) fn between(self, index: u8, end_index: u8) -> Strip {
+        let row = |index: u8| (u16::from(index) * self.rows_per_strip).min(self.n_rows());
+        Strip { index, end_index, first_row: row(index), end_row: row(end_index) }
     }
 
     /// From the top.
     pub(super) fn iter(self) -> impl Iterator<Item = Strip> {
-        (0..self.len()).map(move |index| {
-            let first_row = u16::from(index) * self.rows_per_strip;
-            Strip { index, first_row, end_row: (first_row + self.rows_per_strip).min(self.n_rows()) }
-        })
+        (0..self.len()).map(move |index| self.between(index, index + 1))
     }
 
     /// The strips that a splat lies in.

@@ -50,6 +50,18 @@ impl Tally {
         place < self.end
     }
 
+    /// The strips from number `first` on that there is memory for together, once all splats are counted; at least one.
+    pub(super) fn end_of_those_with_room(&self, first: u8) -> u8 {
+        let mut n_left = self.capacity;
+        let rest = self.demand.get(first.into()..).unwrap_or_default();
+        let fitting = rest.iter().take_while(|&&demand| {
+            let fits = demand <= n_left;
+            n_left = n_left.saturating_sub(demand);
+            fits
+        });
+        first + fitting.count().max(1) as u8
+    }
+
     /// Splats left out.
     pub(super) fn n_dropped(&self) -> u32 {
         self.n_dropped

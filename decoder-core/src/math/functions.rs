@@ -17,6 +17,8 @@ pub(crate) trait Functions {
     }
 
     /// Blends a splat into rows of pixels by this exponential function.
+    // Not inlined: among everything that a frame needs its loops would not stay in registers.
+    #[inline(never)]
     fn blend_rows(
         splat: &mut RowSplat,
         constants: &BlendConstants,
@@ -57,6 +59,7 @@ impl Functions for Reference {
         exp::exp_near(x)
     }
 
+    #[inline(always)]
     fn blend_rows(
         splat: &mut RowSplat,
         constants: &BlendConstants,

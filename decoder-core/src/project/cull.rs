@@ -89,7 +89,13 @@ impl View {
         if !in_front {
             return false;
         }
+        let [u, v] = self.to_image(point);
+        let [width, height] = self.size_px;
         let [l0, l1, l2] = extent;
+        // Whatever its size. Of sums that overflow the test below makes something else.
+        if u > 0.0 && u < width && v > 0.0 && v < height && l0 + l1 + l2 < 1e9 {
+            return true;
+        }
         let rows = self.jacobian(point).map(|[a, b, c]| [a * l0, b * l1, c * l2]);
         let covariance = Covariance::from_rows(rows);
         let half_difference = 0.5 * (covariance.xx - covariance.yy);
@@ -98,8 +104,6 @@ impl View {
         let spread = if spread > 0.1 { spread } else { 0.1 };
         let lambda_max = 0.5 * (covariance.xx + covariance.yy) + crate::math::sqrt(spread);
         let radius = libm::ceilf(3.0 * crate::math::sqrt(lambda_max));
-        let [u, v] = self.to_image(point);
-        let [width, height] = self.size_px;
         u + radius > 0.0 && u - radius < width && v + radius > 0.0 && v - radius < height
     }
 }

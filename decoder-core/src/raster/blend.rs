@@ -2,8 +2,8 @@
 
 use pocketsplat_half::{BlendConstants, ROW_LEN, RowSplat, SLACK_PX, span, sqrt_above};
 
+use crate::math::EXPONENTIAL;
 use crate::math::functions::Functions;
-use crate::math::{EXPONENTIAL, exp};
 use crate::project::{Splat, SplatRecord, TileRect, log_cut};
 use crate::rules::{self, TILE_PX};
 
@@ -77,6 +77,7 @@ pub(crate) fn blend_tile<F: Functions, S: SplatRecord>(
     let in_tile = rows.flat_map(|row| row.iter().take(place.width.into()));
     let mut alive = in_tile.filter(|[.., transmittance]| *transmittance > 0.0).count() as u32;
     let mut work = TileWork::default();
+    let at = [place.column, place.row].map(|index| f32::from(u16::from(index) * TILE_PX));
     for &index in list {
         if alive == 0 {
             break;
@@ -85,7 +86,7 @@ pub(crate) fn blend_tile<F: Functions, S: SplatRecord>(
         if place.column < rect.first_column || place.column > rect.last_column {
             continue;
         }
-        let [rows, evaluated] = blend_splat::<F>(place, &splat.unpack(), rule, pixels, &mut alive);
+        let [rows, evaluated] = blend_splat::<F>(place, at, &splat.unpack(), rule, pixels, &mut alive);
         work.splats += 1;
         work.rows += rows;
         work.pixels = work.pixels.saturating_add(evaluated);
@@ -115,11 +116,11 @@ fn finish(place: TilePlace, pixels: &[Pixel], rgb: &mut [[u8; 3]], colour: impl 
     }
 }
 
-/// Blends one splat into the rows of the tile; returns how many rows it reaches and how many pixels it was evaluated for.
-// Not inlined: among everything that a frame needs it would not stay in registers.
-#[inline(never)]
+/// Blends one splat into the rows of the tile that begins at (`tile_x`, `tile_y`) pixels; returns how many rows it reaches and how many pixels it was evaluated for.
+#[inline(always)]
 fn blend_splat<F: Functions>(
     place: TilePlace,
+    [tile_x, tile_y]: [f32; 2],
     splat: &Splat,
     rule: &BlendRule,
     pixels: &mut [Pixel],
@@ -127,8 +128,8 @@ fn blend_splat<F: Functions>(
 ) -> [u32; 2] {
     let [mean_x, mean_y] = splat.mean;
     // In pixels of the tile, measured from the centre of its first one.
-    let centre_x = mean_x - f32::from(u16::from(place.column) * TILE_PX) - 0.5;
-    let centre_y = mean_y - f32::from(u16::from(place.row) * TILE_PX) - 0.5;
+    let centre_x = mean_x - tile_x - 0.5;
+    let centre_y = mean_y - tile_y - 0.5;
     let reach = 2.0 * (splat.log_opacity + rule.log_cut);
     // Rounded, the opacity may lie below the cut. Written so that NaN leaves as well.
     if !(reach >= 0.0) {
@@ -150,7 +151,7 @@ fn blend_splat<F: Functions>(
         centre_x,
         colour: splat.colour,
         // Whatever the functions: its error grows with the square of a pixel's distance.
-        ratio_step: exp(-splat.row_precision),
+        ratio_step: EXPONENTIAL.near(-splat.row_precision),
         transmittance_stop: rule.transmittance_stop,
         free: [0; 4],
     };

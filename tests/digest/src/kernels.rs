@@ -1,7 +1,8 @@
 //! One number for layers, roots and blended rows, which some targets have in assembly.
 
 use pocketsplat_half::{
-    BlendConstants, Exponential, LANES, ROW_LEN, RowSplat, blend_rows, outputs, rectified_units, sqrt,
+    BlendConstants, Exponential, LANES, ROW_LEN, RowSplat, add_products_of_two_rows, blend_rows, outputs,
+    rectified_units, sqrt,
 };
 
 use super::digest::Digest;
@@ -25,7 +26,7 @@ impl Random {
     }
 }
 
-/// Digest of layers of 0 to 12 inputs, of roots of all exponents, and of tiles of 40 splats each.
+/// Digest of layers of 0 to 12 inputs, of integer sums of 0 to 19, of roots of all exponents, and of tiles of 40 splats each.
 pub(crate) fn digest() -> Digest {
     let mut digest = Digest::EMPTY;
     let mut random = Random(5);
@@ -45,6 +46,14 @@ pub(crate) fn digest() -> Digest {
             outputs::<3>(flat.as_chunks().0, inputs).iter().for_each(|sum| digest.add(sum.to_bits().to_le_bytes()));
             outputs::<7>(flat.as_chunks().0, inputs).iter().for_each(|sum| digest.add(sum.to_bits().to_le_bytes()));
         }
+    }
+    for n in 0..20 {
+        let bytes: [u8; 39] = core::array::from_fn(|_| random.between(0.0, 255.9) as u8);
+        let values: [i16; 20] = core::array::from_fn(|_| random.between(-32_768.0, 32_767.9) as i16);
+        // At any address, and as long as the shortest.
+        let (first, second) = bytes.split_at(n);
+        let sums = add_products_of_two_rows([1, -1], [first, second], &values);
+        sums.iter().for_each(|sum| digest.add(sum.to_le_bytes()));
     }
     for upper in 0..0x7F80_u32 {
         digest.add(sqrt(f32::from_bits(upper << 16 | upper.wrapping_mul(40_503) & 0xFFFF)).to_bits().to_le_bytes());

@@ -3,6 +3,7 @@
 import { Cursor, within } from "./bytes.mjs";
 import { Ancestry } from "./follow.mjs";
 import { gridFeatures, readLevel, readRows } from "./grid.mjs";
+import { f32Of } from "./maths.mjs";
 import { readNetwork, runNetwork } from "./network.mjs";
 import { decodeResidual, PARTS } from "./residual.mjs";
 
@@ -42,10 +43,12 @@ export function readContext(bytes, header) {
 
 const limit = (number, low, high) => Math.min(high, Math.max(low, number));
 
+/** The f32 nearest to 2^(i/8). */
+const STEP_PARTS = [0x3f800000, 0x3f8b95c2, 0x3f9837f0, 0x3fa5fed7, 0x3fb504f3, 0x3fc5672a, 0x3fd744fd, 0x3feac0c7].map(f32Of);
+
 /** A group's step: base step times a power of two in eighths. */
 function groupStep(base, q) {
-  const part = Math.fround(2 ** ((q & 7) / 8));
-  return Math.fround(Math.fround(base * part) * 2 ** (q >> 3));
+  return Math.fround(Math.fround(base * STEP_PARTS[q & 7]) * 2 ** (q >> 3));
 }
 
 /** Decodes the channels of one chunk's anchors, one anchor after another. */

@@ -10,7 +10,7 @@ const MEANS = 5;
 const TABLES = new URL("../../decoder-core/src/bundle/normal_tables.bin", import.meta.url);
 const TABLES_CRC = 0xa3de3992;
 
-/** For (s, p), p fastest: D, and where the slots of each difference begin. */
+/** For each scale and mean, the mean fastest: D, and where the slots of each difference begin; 4096 ends a table. */
 function readNormalTables() {
   const bytes = readFileSync(TABLES);
   need(crc32(bytes) === TABLES_CRC, "normal_tables.bin: CRC", hex(crc32(bytes)), hex(TABLES_CRC));
@@ -18,10 +18,9 @@ function readNormalTables() {
   for (let i = 0; i < numbers.length; i++) numbers[i] = bytes[2 * i] | (bytes[2 * i + 1] << 8);
   const tables = [];
   for (let at = 0; at < numbers.length; ) {
-    const s = Math.floor(tables.length / MEANS);
-    const reach = Math.ceil(4 * 2 ** ((s - 32) / 8)) + 2;
-    const bounds = numbers.subarray(at, (at += 2 * reach + 3));
-    tables.push({ reach, bounds, entries: slotEntries(bounds) });
+    const bounds = numbers.subarray(at, numbers.indexOf(4096, at) + 1);
+    tables.push({ reach: (bounds.length - 3) / 2, bounds, entries: slotEntries(bounds) });
+    at += bounds.length;
   }
   return tables;
 }

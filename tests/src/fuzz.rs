@@ -46,19 +46,17 @@ pub fn parse(bytes: &[u8]) {
 
 /// A bundle draws or is refused, and with damage left out it draws or is refused for another reason.
 ///
-/// Checksums are made right first, so that damage gets behind them. Where anchors wait changes nothing, unless symbols do not
-/// fit in the bits that the header names: then those that wait in memory are refused.
+/// Checksums are made right first, so that damage gets behind them. Where anchors wait changes nothing.
 pub fn draw(bytes: &[u8]) {
     let mut bytes = bytes.to_vec();
     reseal(&mut bytes);
     let Ok(bundle) = Bundle::parse(&bytes) else { return };
-    let fit = symbols_fit(&bundle);
     for n_strips in [1, 2, 8] {
         let [streamed, resident] = [Residency::Streamed, Residency::Resident].map(|residency| {
             draw_either(&bundle, residency, n_strips)
                 .map(|(frame, report)| (frame, report.splats, report.splats_dropped, report.first_damaged))
         });
-        assert!(!fit || streamed == resident, "{n_strips} strips: where anchors wait changes nothing");
+        assert!(streamed == resident, "{n_strips} strips: where anchors wait changes nothing");
         if bundle.n_gaussians(0).is_none() {
             continue;
         }
@@ -68,32 +66,6 @@ pub fn draw(bytes: &[u8]) {
         let refused = matches!(baked, Err(DecodeError::OutOfRange { field: Field::TierGaussians, .. }));
         assert!(refused || baked == streamed, "{n_strips} strips: nor does it when Gaussians are kept");
     }
-}
-
-/// Whether every symbol fits in its bits, those of damaged chunks included.
-fn symbols_fit(bundle: &Bundle<'_>) -> bool {
-    let header = bundle.header();
-    let (n_channels, n_features) = (header.n_channels(), usize::from(header.feature_dim));
-    let [feature, log_scale, offset] = header.symbol_bits;
-    let bits_of = |channel: usize| match channel.checked_sub(n_features) {
-        None => feature,
-        Some(index) if index < usize::from(header.n_log_scales()) => log_scale,
-        Some(_) => offset,
-    };
-    let mut words = vec![0; bundle.anchor_scratch_words()];
-    let Ok(mut models) = bundle.anchor_models(&mut words) else { return true };
-    bundle.chunks().all(|chunk| {
-        let mut anchors = chunk.anchors(&mut models);
-        let mut row = vec![0; n_channels];
-        (0..chunk.n_anchors()).all(|_| {
-            anchors.site();
-            anchors.symbols(&mut row);
-            (0..).zip(&row).all(|(channel, &symbol): (usize, &i16)| {
-                let unused = 16 - u32::from(bits_of(channel));
-                symbol << unused >> unused == symbol
-            })
-        })
-    })
 }
 
 /// Draws with damage left out and, if there is none, without leave.

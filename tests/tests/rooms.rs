@@ -62,7 +62,7 @@ const CRATES: [(&str, &[&str]); 7] = [
             "verify",
         ],
     ),
-    ("host-trainer/instructions/src", &[]),
+    ("host-trainer/instructions/src", &["context", "level"]),
     ("viewer/src", &["figures", "focus", "scene", "exports", "package", "page"]),
     ("host-trainer/cli/src", &["plot", "config", "command"]),
 ];

@@ -91,7 +91,7 @@ impl<'b> Bundle<'b> {
         let channels = match self.coder() {
             Coder::Static(tables) => {
                 let slots = bytemuck::try_cast_slice_mut(scratch).map_err(|_| DecodeError::Internal)?;
-                ChannelModels::Static(IndexedTables::new(tables, slots, scaled)?)
+                ChannelModels::Static(IndexedTables::new(tables, self.header(), slots, scaled)?)
             }
             // What bundles were refused for is not linked, here and below.
             Coder::Context(_) if !cfg!(feature = "context") => return Err(DecodeError::Internal),
@@ -102,6 +102,7 @@ impl<'b> Bundle<'b> {
                     context: *context,
                     numbers: halves.get_mut(..n_numbers).ok_or(DecodeError::Internal)?,
                     scaled,
+                    symbol_bits: self.header().symbol_bits,
                     step_bits: 0,
                     trail: Trail::default(),
                 })
@@ -208,7 +209,8 @@ impl<'b, 's, 'm> AnchorReader<'b, 's, 'm> {
     /// Ends the chunk after its last anchor.
     ///
     /// # Errors
-    /// [`DecodeError::ChunkStream`] when anchors are missing or too many, or their symbols do not end where the bytes end.
+    /// [`DecodeError::ChunkStream`] when anchors are missing or too many, their symbols do not end where the bytes end, or one is
+    /// beyond the header's bits.
     pub fn finish(self) -> Result<(), DecodeError> {
         let chunk = self.chunk;
         match self.symbols.finish() {

@@ -100,6 +100,19 @@ impl Header {
         usize::from(self.feature_dim).saturating_add(distance).saturating_add(direction)
     }
 
+    /// Bits that hold every symbol of a channel as a signed number.
+    #[must_use]
+    pub fn symbol_bits_of(&self, channel: usize) -> u8 {
+        let [feature, log_scale, offset] = self.symbol_bits;
+        if channel < self.feature_dim.into() {
+            feature
+        } else if channel < self.n_scalars() {
+            log_scale
+        } else {
+            offset
+        }
+    }
+
     /// Channels of an anchor: F features, log-scales, 3K offsets.
     #[must_use]
     pub fn n_channels(&self) -> usize {

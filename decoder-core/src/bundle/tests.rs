@@ -347,7 +347,7 @@ fn anchors_in_memory_have_the_values_of_the_file() {
 }
 
 #[test]
-fn symbols_beyond_the_bits_of_the_header_are_refused_in_memory() {
+fn symbols_beyond_the_bits_of_the_header_are_refused_wherever_they_are_decoded() {
     for variant in variants() {
         let whole = bundle(variant);
         let header_len = usize::from(Bundle::parse(&whole).expect("sound").header().header_len);
@@ -363,12 +363,37 @@ fn symbols_beyond_the_bits_of_the_header_are_refused_in_memory() {
             .map(|symbol| (0..16).find(|&bits| i32::from(symbol) >= -1 << bits && i32::from(symbol) < 1 << bits))
             .max();
         let most = 1 + most.flatten().expect("symbols have 16 bits") as u8;
-        let resident = |bytes: &[u8]| {
-            draw_within(bytes, &BUDGET.with_residency(Residency::Resident), false).map(|(pixels, ..)| pixels)
-        };
-        assert!(resident(&with_bits(most)) == resident(&whole), "{variant:?}: bits enough change nothing");
-        let error = resident(&with_bits(most - 1)).err();
-        assert!(matches!(error, Some(DecodeError::ChunkStream { .. })), "{variant:?}: {error:?}");
+        for residency in [Residency::Resident, Residency::Streamed] {
+            let frame =
+                |bytes: &[u8]| draw_within(bytes, &BUDGET.with_residency(residency), false).map(|(pixels, ..)| pixels);
+            assert!(frame(&with_bits(most)) == frame(&whole), "{variant:?}: bits enough change nothing");
+            let error = frame(&with_bits(most - 1)).err();
+            assert!(matches!(error, Some(DecodeError::ChunkStream { .. })), "{variant:?}, {residency:?}: {error:?}");
+        }
+        // Of one group only, in the chunks that have such a symbol.
+        for (group, channels) in [0..F, F..F + 6, F + 6..C].into_iter().enumerate() {
+            for bits in 1..=16 {
+                let mut bytes = with_bits(16);
+                bytes[156 + group] = bits;
+                let crc = crc32(&bytes[..header_len - 4]);
+                bytes[header_len - 4..header_len].copy_from_slice(&crc.to_le_bytes());
+                let file = Bundle::parse(&bytes).expect("sound");
+                let mut scratch = vec![0; file.anchor_scratch_words()];
+                let mut models = file.anchor_models(&mut scratch).expect("enough memory");
+                for (chunk, anchors) in file.chunks().zip(tiers(variant).concat()) {
+                    let (mut sites, mut found) = (vec![AnchorSite::default(); 5], vec![0; 5 * C]);
+                    let beyond = anchors
+                        .iter()
+                        .flat_map(|anchor| &anchor.symbols[channels.clone()])
+                        .any(|&symbol| !(-1 << (bits - 1)..1 << (bits - 1)).contains(&i32::from(symbol)));
+                    let index = chunk.index();
+                    let expected =
+                        if beyond { Err(DecodeError::ChunkStream { chunk: index, left_bytes: 0 }) } else { Ok(()) };
+                    let result = chunk.decode_symbols(&mut models, &mut sites, &mut found);
+                    assert_eq!(result, expected, "{variant:?}: group {group} of {bits} bits, chunk {index}");
+                }
+            }
+        }
         let error = Bundle::parse(&with_bits(17)).err();
         let expected = DecodeError::OutOfRange { field: Field::SymbolBits, found: 17, limit: 16 };
         assert_eq!(error, Some(expected), "{variant:?}");

@@ -65,6 +65,14 @@ impl<'a> AnsReader<'a> {
         i16::from_be_bytes([high, low])
     }
 
+    /// Has the stream refused at its end if not all of its symbols fit in so many bits, as two's complement.
+    ///
+    /// * `bits`: 1 to 16. * `spread`: `s ^ (s >> 31)` of all these symbols s, joined by "or".
+    #[inline(always)]
+    pub(crate) fn refuse_beyond(&mut self, bits: u8, spread: i32) {
+        self.malformed |= spread.wrapping_shr(u32::from(bits).wrapping_sub(1)) != 0;
+    }
+
     /// Ends the stream: its words must be used up and its state back at the encoder's start.
     ///
     /// # Errors

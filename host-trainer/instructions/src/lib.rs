@@ -3,9 +3,12 @@
 //! The costs are fitted to counts of emulated boards by `cargo run -p tools --bin fit_instructions`; they are instructions, not
 //! cycles.
 
-use pocketsplat_core::bundle::Coder;
-use pocketsplat_core::context::{LevelKind, first_tap};
+mod context;
+pub mod level;
+
 use pocketsplat_core::{Bundle, FrameReport, Plan, Stage};
+
+use context::ContextShape;
 
 use Stage::{Blend, Context, Decode, Heads, Output, Project, Sort};
 
@@ -49,20 +52,17 @@ pub struct Term {
 pub fn terms(bundle: &Bundle<'_>, plan: &Plan, report: &FrameReport, size_px: [u16; 2]) -> [Term; N_TERMS] {
     let header = bundle.header();
     let decoded = f64::from(report.anchors_decoded);
-    let symbols = report.symbols_decoded as f64;
     let from_memory = f64::from(report.anchors_read - report.anchors_decoded);
-    let (table_symbols, context_symbols, corners, outputs, macs) = match bundle.coder() {
-        Coder::Static(_) => (symbols, 0.0, 0.0, 0.0, 0.0),
-        Coder::Context(context) => {
-            let [inputs, hidden] = [context.n_inputs(), context.n_hidden()].map(|n| n as f64);
-            let corners: u32 = context.levels().map(|level| if level.kind == LevelKind::Volume { 8 } else { 4 }).sum();
-            // A mean and a scale for each symbol, and three steps.
-            let rows = 2.0 * symbols + 3.0 * decoded;
-            let taps = decoded * first_tap(context.feature_dim(), context.n_taps()) as f64;
-            let macs = hidden * (decoded * inputs + rows) + taps;
-            (0.0, symbols, decoded * f64::from(corners), rows + decoded * hidden, macs)
+    let (anchors, symbols) = (u64::from(report.anchors_decoded), report.symbols_decoded);
+    let (table_symbols, [context_symbols, corners, units, macs]) = match ContextShape::of(bundle.coder()) {
+        None => (symbols, [0; 4]),
+        Some(context) => {
+            let work = [anchors * context.corners, context.units(anchors, symbols), context.macs(anchors, symbols)];
+            let [corners, units, macs] = work;
+            (0, [symbols, corners, units, macs])
         }
     };
+    let [context_symbols, corners, units, macs] = [context_symbols, corners, units, macs].map(|n| n as f64);
     let count = |n: u32| f64::from(n);
     let evaluated = if plan.is_baked() { 0.0 } else { count(report.gaussians) };
     let [width, height] = size_px.map(f64::from);
@@ -73,12 +73,12 @@ pub fn terms(bundle: &Bundle<'_>, plan: &Plan, report: &FrameReport, size_px: [u
     let term = |stage, name, count| Term { name, stage, count };
     [
         term(Decode, "anchor decoded", decoded),
-        term(Decode, "symbol of a table", table_symbols),
+        term(Decode, "symbol of a table", table_symbols as f64),
         term(Decode, "symbol of a context", context_symbols),
         term(Decode, "anchor from memory", from_memory),
         term(Decode, "channel from memory", from_memory * header.n_channels() as f64),
         term(Context, "corner of the grid", corners),
-        term(Context, "unit of the context", outputs),
+        term(Context, "unit of the context", units),
         term(Context, "multiply-add of the context", macs),
         term(Heads, "multiply-add of the heads", report.head_macs as f64),
         term(Heads, "visible anchor", count(report.anchors_visible)),

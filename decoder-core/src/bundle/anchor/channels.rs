@@ -2,7 +2,7 @@
 
 use super::AnchorSite;
 use crate::bundle::tables::IndexedTables;
-use crate::context::{Context, Group, GroupStep, Network, Trail};
+use crate::context::{Context, Group, GroupStep, N_GROUPS, Network, Trail};
 use crate::entropy::AnsReader;
 use crate::stopwatch::{Stage, Stopwatch};
 
@@ -22,6 +22,8 @@ pub(super) struct ContextModels<'b, 's> {
     pub(super) numbers: &'s mut [i16],
     /// If not, the value of a symbol is the symbol.
     pub(super) scaled: bool,
+    /// Bits of the symbols of a feature, of a log-scale, of a coordinate of an offset.
+    pub(super) symbol_bits: [u8; N_GROUPS],
     /// The exponents of the steps of the anchor read last.
     pub(super) step_bits: u16,
     /// Where the current cells of levels began.
@@ -119,19 +121,23 @@ fn read_static<'b, T: Channel>(
     };
     // Arguments of this size are passed in memory; a copy stays in registers.
     let mut symbols = symbols;
-    let mut read = |slot: &mut T, number: [u8; 2]| {
-        if let Some((symbol, table)) = tables.symbol(number, &mut symbols) {
+    let mut read = |slot: &mut T, number: [u8; 2], bits: u8| {
+        if let Some((symbol, table)) = tables.symbol(number, bits, &mut symbols) {
             *slot = T::from_symbol(symbol, table.origin, table.step);
         }
     };
-    for (slot, &number) in scalars.iter_mut().zip(scalar_numbers) {
-        read(slot, number);
+    let [feature_bits, log_scale_bits, offset_bits] = tables.symbol_bits;
+    let mut scalars = scalars.iter_mut().zip(scalar_numbers);
+    for (n, bits) in [(tables.feature_dim.into(), feature_bits), (usize::MAX, log_scale_bits)] {
+        for (slot, &number) in scalars.by_ref().take(n) {
+            read(slot, number, bits);
+        }
     }
     for (offset, numbers) in offsets.iter_mut().zip(offset_numbers.as_chunks::<3>().0) {
         *offset = [T::UNDRAWN; 3];
         if mask & 1 == 1 {
             for (slot, &number) in offset.iter_mut().zip(numbers) {
-                read(slot, number);
+                read(slot, number, offset_bits);
             }
         }
         mask >>= 1;
@@ -161,7 +167,7 @@ impl<'b> ContextModels<'b, '_> {
         watch: &mut impl Stopwatch,
     ) -> AnsReader<'b> {
         watch.enter(Stage::Context);
-        let Self { context, numbers, scaled, step_bits, trail } = self;
+        let Self { context, numbers, scaled, symbol_bits, step_bits, trail } = self;
         let Some((inputs, rest)) = numbers.split_at_mut_checked(context.n_inputs()) else { return symbols };
         let Some((hidden, kept)) = rest.split_at_mut_checked(context.n_hidden()) else { return symbols };
         let Some((notes, coarsest)) = kept.split_at_mut_checked(context.n_notes()) else { return symbols };
@@ -184,16 +190,19 @@ impl<'b> ContextModels<'b, '_> {
         let mut block = Block { moments: [[0; 2]; BLOCK], len: 0 };
         let n_scalars = scalars.len();
         let (feature, log_scales) = scalars.split_at_mut_checked(context.feature_dim()).unwrap_or_default();
+        let [feature_bits, log_scale_bits, offset_bits] = *symbol_bits;
         let mut first = 0_usize;
-        for (group, slots) in [(Group::Feature, feature), (Group::LogScale, log_scales)] {
+        for (group, bits, slots) in
+            [(Group::Feature, feature_bits, feature), (Group::LogScale, log_scale_bits, log_scales)]
+        {
             for slots in slots.chunks_mut(BLOCK) {
                 block.push(&network, hidden, first, slots.len());
                 watch.enter(Stage::Decode);
                 let step = steps.of(group);
                 symbols = if noted && first < notes.len() {
-                    block.read_noted(context, notes, (group, first), &step, symbols, slots)
+                    block.read_noted(context, notes, (group, first), (&step, bits), symbols, slots)
                 } else {
-                    block.read(&step, symbols, slots)
+                    block.read(&step, bits, symbols, slots)
                 };
                 watch.enter(Stage::Context);
                 first = first.saturating_add(slots.len());
@@ -216,7 +225,7 @@ impl<'b> ContextModels<'b, '_> {
             if block.len == BLOCK || mask == 0 {
                 let Some((now, later)) = slots.split_at_mut_checked(block.len) else { break };
                 watch.enter(Stage::Decode);
-                symbols = block.read(&step, symbols, now);
+                symbols = block.read(&step, offset_bits, symbols, now);
                 watch.enter(Stage::Context);
                 slots = later;
             }
@@ -237,16 +246,24 @@ impl Block {
         }
     }
 
-    /// Fills `slots` with the block's symbols and empties it.
+    /// Fills `slots` with the block's symbols and empties it; a symbol of more than `bits` has the stream refused.
     // On its own it gets the registers that it needs.
     #[inline(never)]
-    fn read<'b, T: Channel>(&mut self, step: &GroupStep, symbols: AnsReader<'b>, slots: &mut [T]) -> AnsReader<'b> {
+    fn read<'b, T: Channel>(
+        &mut self,
+        step: &GroupStep,
+        bits: u8,
+        symbols: AnsReader<'b>,
+        slots: &mut [T],
+    ) -> AnsReader<'b> {
         self.len = 0;
-        let (step, mut symbols) = (*step, symbols);
+        let (step, mut symbols, mut spread) = (*step, symbols, 0);
         for (slot, &[mean, scale]) in slots.iter_mut().zip(&self.moments) {
             let symbol = step.model(step.raised_mean(mean), scale).wide_symbol(&mut symbols);
+            spread |= symbol ^ (symbol >> 31);
             *slot = T::from_scaled(symbol, step.value);
         }
+        symbols.refuse_beyond(bits, spread);
         symbols
     }
 
@@ -261,19 +278,21 @@ impl Block {
         context: &Context<'_>,
         notes: &mut [i16],
         (group, first): (Group, usize),
-        step: &GroupStep,
+        (step, bits): (&GroupStep, u8),
         symbols: AnsReader<'b>,
         slots: &mut [T],
     ) -> AnsReader<'b> {
         self.len = 0;
-        let (step, mut symbols) = (*step, symbols);
+        let (step, mut symbols, mut spread) = (*step, symbols, 0);
         for (channel, (slot, &[mean, scale])) in (first..).zip(slots.iter_mut().zip(&self.moments)) {
             let Some((before, [own, ..])) = notes.split_at_mut_checked(channel) else { break };
             let raised_mean = step.raised_mean(mean);
             let symbol = step.model(context.moved(channel, raised_mean, before), scale).wide_symbol(&mut symbols);
             *own = context.note(group, &step, raised_mean, symbol);
+            spread |= symbol ^ (symbol >> 31);
             *slot = T::from_scaled(symbol, step.value);
         }
+        symbols.refuse_beyond(bits, spread);
         symbols
     }
 }

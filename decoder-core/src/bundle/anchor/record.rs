@@ -1,7 +1,7 @@
 //! Decoded anchors in memory: symbols in as few bits as they all need, and what makes values of them.
 
 use super::AnchorSite;
-use super::bits::{BitReader, BitWriter, fits};
+use super::bits::{BitReader, BitWriter};
 use super::channels::Channel;
 use crate::bundle::lattice::Lattice;
 use crate::bundle::{AnchorModels, Bundle, Chunk, Coder};
@@ -85,24 +85,22 @@ impl RecordLayout {
         bits.div_ceil(16)
     }
 
-    /// Writes a record; says whether every symbol has a place in its bits.
-    fn write(&self, record: &mut [u16], symbols: &[f32], code: u64, mask: u32, steps: u16) -> bool {
+    /// Writes a record.
+    fn write(&self, record: &mut [u16], symbols: &[f32], code: u64, mask: u32, steps: u16) {
         let mut writer = BitWriter::new(record);
         writer.push_wide(code, self.code_bits.into());
         writer.push_wide(mask.into(), self.mask_bits.into());
         writer.push(steps.into(), self.step_bits.into());
-        let (mut rest, mut sound) = (symbols, true);
+        let mut rest = symbols;
         for (n, bits) in self.groups {
             let (group, after) = rest.split_at_checked(n.into()).unwrap_or_default();
             for &symbol in group {
-                let symbol = symbol as i32;
-                sound &= fits(symbol, bits.into());
-                writer.push(symbol.cast_unsigned(), bits.into());
+                // One that does not fit has its chunk refused.
+                writer.push((symbol as i32).cast_unsigned(), bits.into());
             }
             rest = after;
         }
         writer.finish();
-        sound
     }
 }
 
@@ -113,8 +111,7 @@ impl RecordMemory<'_> {
     ///   * `skip_damage`: leaves damaged chunks out and remembers which.
     ///
     /// # Errors
-    /// [`DecodeError::ChunkChecksum`] or [`DecodeError::ChunkStream`] for damage that is not left out; a symbol beyond the
-    /// header's bits is such damage.
+    /// [`DecodeError::ChunkChecksum`] or [`DecodeError::ChunkStream`] for damage that is not left out.
     pub(crate) fn decode(
         &mut self,
         bundle: &Bundle<'_>,
@@ -235,7 +232,7 @@ fn decode_chunk<'b, 'r>(
     row: &mut [f32],
     models: &mut AnchorModels<'b, '_>,
 ) -> Result<(), DecodeError> {
-    let mut sound = chunk.check();
+    let sound = chunk.check();
     let mut anchors = chunk.anchors(models);
     for n_done in 0..chunk.n_anchors() {
         let record = records.next().ok_or(DecodeError::BufferTooShort {
@@ -245,9 +242,7 @@ fn decode_chunk<'b, 'r>(
         })?;
         let site = anchors.site();
         anchors.values(row);
-        if !layout.write(record, row, anchors.code(), site.mask, anchors.step_bits()) && sound.is_ok() {
-            sound = Err(DecodeError::ChunkStream { chunk: chunk.index(), left_bytes: 0 });
-        }
+        layout.write(record, row, anchors.code(), site.mask, anchors.step_bits());
     }
     sound.and(anchors.finish())
 }

@@ -3,6 +3,8 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::{FrequencyTable, Tables};
+use crate::bundle::Header;
+use crate::context::N_GROUPS;
 use crate::entropy::{AnsReader, FREQUENCY_TOTAL, PRECISION_BITS};
 use crate::error::DecodeError;
 
@@ -35,17 +37,29 @@ pub(in crate::bundle) struct IndexedTable {
 pub(in crate::bundle) struct IndexedTables<'a, 's> {
     tables: Tables<'a>,
     indexed: &'s [IndexedTable],
+    /// Bits of the symbols of a feature, of a log-scale, of a coordinate of an offset.
+    pub(in crate::bundle) symbol_bits: [u8; N_GROUPS],
+    pub(in crate::bundle) feature_dim: u16,
 }
 
 impl IndexedTable {
-    fn new(table: &FrequencyTable<'_>) -> Self {
-        let n_entries = table.n_symbols().min(MAX_ENTRIES);
+    /// * `bits`: symbols of more are left in the file.
+    fn new(table: &FrequencyTable<'_>, bits: u32) -> Self {
+        let inner = table.bounds.split_last().map_or(&[][..], |(_, inner)| inner);
+        // Entries from the one of the least symbol of so many bits to that of the largest.
+        let beyond = 1_i32.wrapping_shl(bits.wrapping_sub(1));
+        let entry_of = |symbol: i32| {
+            let entry = symbol.wrapping_sub(table.min_symbol.into()).max(0) as usize;
+            entry.min(table.n_symbols())
+        };
+        let skipped = entry_of(beyond.wrapping_neg());
+        let inner = inner.get(skipped..=entry_of(beyond)).unwrap_or_default();
+        let n_entries = inner.len().saturating_sub(1).min(MAX_ENTRIES);
         // The entries with the most slots.
         let slots = |bounds: &[[u8; 2]]| {
             let [first, last] = [bounds.first(), bounds.last()].map(|b| b.map_or(0, |&b| u16::from_le_bytes(b)));
             last.wrapping_sub(first)
         };
-        let inner = table.bounds.split_last().map_or(&[][..], |(_, inner)| inner);
         let windows = (0..).zip(inner.windows(n_entries.saturating_add(1)));
         let (first, window) = windows.max_by_key(|(_, window)| slots(window)).unwrap_or_default();
         let mut bounds = [FREQUENCY_TOTAL; N_BOUNDS];
@@ -60,7 +74,7 @@ impl IndexedTable {
         }
         let FrequencyTable { origin, step, min_symbol, .. } = *table;
         // `FrequencyTable::check` made sure that the symbol of every entry is an i16.
-        let first_symbol = i32::from(min_symbol).wrapping_add(first);
+        let first_symbol = i32::from(min_symbol).wrapping_add(skipped as i32).wrapping_add(first);
         Self { origin, step, first_symbol, n_entries: n_entries as u32, short_cuts, bounds }
     }
 }
@@ -71,16 +85,25 @@ impl<'a, 's> IndexedTables<'a, 's> {
     /// * `scaled`: if not, the value of a symbol is the symbol.
     pub(in crate::bundle) fn new(
         tables: &Tables<'a>,
+        header: &Header,
         slots: &'s mut [IndexedTable],
         scaled: bool,
     ) -> Result<Self, DecodeError> {
+        // What all channels of a table have room for stays in memory, and needs no comparison there.
+        slots.iter_mut().for_each(|slot| slot.n_entries = 16);
+        for (channel, &number) in tables.channel_tables.iter().enumerate() {
+            if let Some(slot) = slots.get_mut(usize::from(u16::from_le_bytes(number))) {
+                slot.n_entries = slot.n_entries.min(header.symbol_bits_of(channel).into());
+            }
+        }
         for (index, slot) in slots.iter_mut().enumerate() {
-            *slot = IndexedTable::new(&tables.get(index).ok_or(DecodeError::Internal)?);
+            *slot = IndexedTable::new(&tables.get(index).ok_or(DecodeError::Internal)?, slot.n_entries);
             if !scaled {
                 (slot.origin, slot.step) = (0.0, 1.0);
             }
         }
-        Ok(Self { tables: *tables, indexed: slots })
+        let Header { symbol_bits, feature_dim, .. } = *header;
+        Ok(Self { tables: *tables, indexed: slots, symbol_bits, feature_dim })
     }
 
     /// `[n_channels]` the table of each channel, as bytes of its number.
@@ -88,7 +111,8 @@ impl<'a, 's> IndexedTables<'a, 's> {
         self.tables.channel_tables
     }
 
-    /// Decodes the next symbol of `reader` with table number `number`; returns it, an i16, with its table.
+    /// Decodes the next symbol of `reader` with table number `number`; returns it, an i16, with its table. A symbol of more than
+    /// `bits` has the stream refused.
     ///
     /// # Budget
     /// About 55 instructions on a Cortex-M4; 200 for a symbol that has no entry in memory.
@@ -96,6 +120,7 @@ impl<'a, 's> IndexedTables<'a, 's> {
     pub(in crate::bundle) fn symbol(
         &self,
         number: [u8; 2],
+        bits: u8,
         reader: &mut AnsReader<'_>,
     ) -> Option<(i32, &'s IndexedTable)> {
         let number = usize::from(u16::from_le_bytes(number));
@@ -104,7 +129,7 @@ impl<'a, 's> IndexedTables<'a, 's> {
             reader.advance(start, frequency);
             return Some((symbol, table));
         }
-        let (after, symbol) = rare_symbol(&self.tables, number, *reader);
+        let (after, symbol) = rare_symbol(&self.tables, number, bits, *reader);
         *reader = after;
         Some((symbol, table))
     }
@@ -112,9 +137,10 @@ impl<'a, 's> IndexedTables<'a, 's> {
 
 /// The next symbol of `reader`, looked up in the file; by value, so that the reader of a loop stays in registers.
 #[cold]
-fn rare_symbol<'a>(tables: &Tables<'_>, number: usize, mut reader: AnsReader<'a>) -> (AnsReader<'a>, i32) {
-    let symbol = tables.get(number).map_or(0, |table| table.symbol(&mut reader));
-    (reader, symbol.into())
+fn rare_symbol<'a>(tables: &Tables<'_>, number: usize, bits: u8, mut reader: AnsReader<'a>) -> (AnsReader<'a>, i32) {
+    let symbol = i32::from(tables.get(number).map_or(0, |table| table.symbol(&mut reader)));
+    reader.refuse_beyond(bits, symbol ^ (symbol >> 31));
+    (reader, symbol)
 }
 
 impl IndexedTable {
@@ -171,7 +197,7 @@ mod tests {
     fn short_cuts_lead_where_bisection_leads_or_nowhere() {
         for bounds in tables() {
             let table = FrequencyTable { origin: 0.0, step: 1.0, min_symbol: -7, bounds: &bounds };
-            let indexed = IndexedTable::new(&table);
+            let indexed = IndexedTable::new(&table, 16);
             let mut n_found = 0;
             for quantile in 0..FREQUENCY_TOTAL {
                 let expected = table.slot(quantile);
@@ -189,6 +215,26 @@ mod tests {
             let bound = |index: usize| u16::from_le_bytes(bounds[index]);
             let most = (62..bounds.len() - 1).map(|last| bound(last) - bound(last - 62)).max();
             assert_eq!(n_found, most.unwrap_or(bound(bounds.len() - 2)), "{} bounds", bounds.len());
+        }
+    }
+
+    #[test]
+    fn symbols_beyond_the_bits_of_a_channel_stay_in_the_file() {
+        for (bounds, bits) in tables().into_iter().flat_map(|bounds| (1..=16).map(move |bits| (bounds.clone(), bits))) {
+            let table = FrequencyTable { origin: 0.0, step: 1.0, min_symbol: -7, bounds: &bounds };
+            let indexed = IndexedTable::new(&table, bits);
+            for quantile in 0..FREQUENCY_TOTAL {
+                let expected = table.slot(quantile);
+                let Some((symbol, start, frequency)) = indexed.slot(quantile.into()) else {
+                    // Or the table is too long for the memory.
+                    let within = |symbol| (-1 << (bits - 1)..1 << (bits - 1)).contains(&i32::from(symbol));
+                    assert!(!expected.symbol.is_some_and(within) || bounds.len() > 64, "{bits} bits, {quantile}");
+                    continue;
+                };
+                assert!((-1 << (bits - 1)..1 << (bits - 1)).contains(&symbol), "{symbol} in {bits} bits");
+                let [start, frequency] = [start, frequency].map(|n| n as u16);
+                assert_eq!(Slot { symbol: Some(symbol as i16), start, frequency }, expected, "{bits} bits, {quantile}");
+            }
         }
     }
 }

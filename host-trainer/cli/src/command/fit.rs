@@ -1,5 +1,7 @@
 //! `pocketsplat fit`: what devices of different memories get of a bundle.
 
+mod level;
+
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
@@ -14,7 +16,8 @@ use serde::Serialize;
 
 use super::bundle::BundleFile;
 use super::output;
-use crate::config::named::{TARGETS, one_of};
+use crate::config::named::{TARGETS, level_number, one_of};
+use level::LevelFit;
 
 /// Show what a decoder draws of a bundle within so much memory: the share of the scene, its quality, the work of a frame.
 ///
@@ -34,6 +37,9 @@ pub(crate) struct Args {
     /// Draw strips with too many splats in slabs of depth, instead of leaving anchors out.
     #[arg(long, requires = "ram")]
     slabs: bool,
+    /// Level to hold each tier to, at the training size: says which fit, and what is over by how much.
+    #[arg(long, value_name = "N", value_parser = level_number(), conflicts_with_all = ["ram", "resolution", "slabs", "target"])]
+    level: Option<u8>,
     /// Processor for which to predict the instructions of the preview frame [default: none]
     #[arg(long, value_parser = one_of::<Processor>(TARGETS))]
     target: Option<Processor>,
@@ -83,6 +89,10 @@ struct Fit {
 pub(crate) fn run(args: &Args) -> Result<()> {
     let file = BundleFile::read(&args.bundle)?;
     let bundle = file.parse()?;
+    if let Some(number) = args.level {
+        let fit = LevelFit::of(&args.bundle, file.bytes.len(), &bundle, number)?;
+        return if args.json { output::print(&fit, true) } else { output::print_text(&fit.table()) };
+    }
     let overflow = if args.slabs { Overflow::Slabs } else { Overflow::LeaveOut };
     let frame = frame_budget(&bundle, args.resolution)?.with_overflow(overflow);
     let plans = if args.ram.is_empty() {

@@ -112,7 +112,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let config = configured(args)?;
     output::check_writable(&args.output)?;
     let file = GaussiansFile::read(&args.points)?;
-    let (train, test) = cameras(args, &file)?;
+    let (train, test) = cameras(args, config.capture.resolution, &file)?;
     let capture = captured(args, &file, &train, &test)?;
     eprintln!(
         "{} Gaussians in {:.1} MB, drawn from {} cameras, {} of them held out",
@@ -143,7 +143,7 @@ fn configured(args: &Args) -> Result<RunConfig> {
     args.device.choose(&args.quality, args.lambda, &mut config)?;
     config.capture = CaptureOptions {
         max_resolution: None,
-        resolution: args.resolution,
+        resolution: args.device.frame(args.resolution, false)?,
         background: Some(args.background),
         ..CaptureOptions::default()
     };
@@ -153,11 +153,13 @@ fn configured(args: &Args) -> Result<RunConfig> {
 }
 
 /// Cameras to train with, and those that are held out.
-fn cameras(args: &Args, file: &GaussiansFile) -> Result<(Vec<Camera>, Vec<Camera>)> {
+///
+/// * `size`: of the pictures, if it is asked for.
+fn cameras(args: &Args, size: Option<FrameSize>, file: &GaussiansFile) -> Result<(Vec<Camera>, Vec<Camera>)> {
     let all = match &args.cameras {
-        Some(path) => cameras::of_file(path, args.resolution, LONGEST_PX)?,
+        Some(path) => cameras::of_file(path, size, LONGEST_PX)?,
         None => {
-            let size_px = args.resolution.map_or([LONGEST_PX; 2], |frame| [frame.width_px, frame.height_px]);
+            let size_px = size.map_or([LONGEST_PX; 2], |frame| [frame.width_px, frame.height_px]);
             let bulk = Bulk::of(&file.gaussians).with_context(|| {
                 format!("nothing in {} is opaque enough to stand cameras around; give --cameras", args.points.display())
             })?;

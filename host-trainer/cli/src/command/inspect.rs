@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use pocketsplat_core::Bundle;
 use pocketsplat_core::bundle::TierMeasures;
+use pocketsplat_instructions::level::Profile;
 use pocketsplat_trainer::bundle::annotate::annotate;
 use pocketsplat_trainer::bundle::{SizePart, SizeReport, decoded_scene};
 use pocketsplat_trainer::camera::host_camera;
@@ -57,6 +58,7 @@ fn facts(bundle: &Bundle<'_>, size: &SizeReport) -> Result<Value> {
     let scene = decoded_scene(bundle)?;
     Ok(json!({
         "format_version": pocketsplat_core::bundle::VERSION,
+        "profile": Profile::of(&header.features).to_string(),
         "coder": if header.features.context { "context" } else { "static" },
         "n_anchors": size.n_anchors,
         "n_chunks": bundle.n_chunks(),
@@ -129,6 +131,7 @@ impl Tier {
             "n_anchors": self.content.n_anchors,
             "n_chunks": self.content.n_chunks,
             "bytes": self.bytes,
+            "level": measures.level,
             "psnr_db": measures.psnr_db,
             "n_views": measures.n_views,
             "n_cameras": measures.n_cameras,
@@ -163,12 +166,13 @@ fn parts_table(parts: &[SizePart], size: &SizeReport) -> String {
 /// A line a tier: the file cut there, and what it was measured to take.
 fn tiers_table(tiers: &[Tier]) -> String {
     let mut text = format!(
-        "{:<6}{:>10}{:>10}{:>9}{:>10}{:>10}{:>10}{:>12}{:>12}\n",
-        "tiers", "anchors", "bytes", "PSNR", "decoded", "visible", "splats", "tile pairs", "head kMACs"
+        "{:<6}{:>10}{:>10}{:>7}{:>9}{:>10}{:>10}{:>10}{:>12}{:>12}\n",
+        "tiers", "anchors", "bytes", "level", "PSNR", "decoded", "visible", "splats", "tile pairs", "head kMACs"
     );
     for Tier { number, content, bytes, measures } in tiers {
         let psnr = measures.psnr_db.map_or_else(|| "-".to_owned(), |psnr| format!("{psnr:.2}"));
-        text += &format!("{:<6}{:>10}{bytes:>10}{psnr:>9}", format!("0..={number}"), content.n_anchors);
+        let level = if measures.level == 0 { "-".to_owned() } else { measures.level.to_string() };
+        text += &format!("{:<6}{:>10}{bytes:>10}{level:>7}{psnr:>9}", format!("0..={number}"), content.n_anchors);
         if measures.n_cameras == 0 {
             text += "  not measured\n";
             continue;

@@ -10,8 +10,9 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::{Background, Capture, Split, View};
-use pocketsplat_core::Bundle;
 use pocketsplat_core::budget::MAX_FRAME_PX;
+use pocketsplat_instructions::level::{Bound, Level, Profile};
+use pocketsplat_trainer::device::Limits;
 use pocketsplat_trainer::effects::Effect;
 use pocketsplat_trainer::encode::{Encoding, Fitted, Scale};
 use pocketsplat_trainer::train::finish::Finished;
@@ -46,6 +47,10 @@ const MOST_JUDGES: usize = 12;
 pub(crate) struct TrainResult {
     pub(crate) bundle: PathBuf,
     pub(crate) bundle_bytes: usize,
+    /// What a decoder needs: `Device` or `Full`.
+    pub(crate) profile: String,
+    /// Least level that the whole scene keeps; 0 for none.
+    pub(crate) level: u8,
     /// Scratch memory in which a device with limited memory draws the whole scene.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) scratch_bytes: Option<usize>,
@@ -87,6 +92,7 @@ impl TrainResult {
             held_out: self.held_out.as_ref(),
             path: bundle,
             n_bytes: self.bundle_bytes,
+            level: Some((self.level, &self.profile)),
             peak_memory_bytes: self.peak_memory_bytes,
             train_s: self.train_s,
             train_processor_s: self.train_processor_s,
@@ -197,15 +203,25 @@ pub(crate) fn load(config: &mut RunConfig) -> Result<Capture> {
     // At once: large captures take their time.
     eprintln!("reading {}", config.dataset.display());
     let capture = source.load(config.train.seed)?;
-    check_size(&capture)?;
+    check_size(&capture, &config.encoding.limits)?;
     config.train = config.train.resolved_for(&capture);
     eprintln!("voxel size {:.5}, normalised units", config.train.voxel_size_for(&capture));
     Ok(capture)
 }
 
-/// Refuses photographs that the decoder cannot draw.
-fn check_size(capture: &Capture) -> Result<()> {
-    let (largest, most) = (capture.largest_px().into_iter().max().unwrap_or(0), u32::from(MAX_FRAME_PX));
+/// Refuses photographs that the decoder cannot draw, or that the level has no room for.
+fn check_size(capture: &Capture, limits: &Limits) -> Result<()> {
+    let [width, height] = capture.largest_px();
+    if let Some(level) = limits.level.and_then(Level::numbered)
+        && u64::from(width) * u64::from(height) > level.most(Bound::Frame)
+    {
+        let ([most_width, most_height], number) = (level.frame_px, level.number);
+        bail!(
+            "the photographs are {width}x{height} px, and level {number} allows frames of {most_width}x{most_height}; use \
+             --resolution {most_width}x{most_height}, or a smaller --max-resolution"
+        );
+    }
+    let (largest, most) = (width.max(height), u32::from(MAX_FRAME_PX));
     if largest > most {
         bail!(
             "the photographs are {largest} px wide or high and the decoder draws {most}; use --max-resolution {most}"
@@ -365,17 +381,21 @@ fn write_bundle(
         Some(HeldOut { psnr_db, ssim, n_test_views: n_views, views })
     };
     let Finished { scene, background, n_undrawn, estimated_bits, .. } = finished;
+    let bundle = file.parse()?;
+    let of_whole = bundle.n_tiers().checked_sub(1).and_then(|tier| bundle.measures(tier));
     let n_anchors = scene.anchors.len();
     Ok(TrainResult {
         bundle: output.to_owned(),
         bundle_bytes: file.bytes.len(),
+        profile: Profile::of(&bundle.header().features).to_string(),
+        level: of_whole.map_or(0, |measures| measures.level),
         scratch_bytes: plan.map(|plan| plan.scratch_len()),
         instructions,
         n_anchors,
         n_valid_anchors: (0..n_anchors).filter(|a| scene.anchors.has_drawn(*a)).count(),
         drawn_offsets: (0..scene.anchors.mask_logits.len()).filter(|offset| scene.anchors.is_drawn(*offset)).count(),
         undrawn_offsets: n_undrawn,
-        coder: if Bundle::parse(&file.bytes)?.context().is_some() { "context" } else { "static" },
+        coder: if bundle.context().is_some() { "context" } else { "static" },
         estimated_bytes: estimated_bits.map(|bits| bits.map(|bits| bits / 8.0)),
         bytes_per_anchor: file.bytes.len() as f64 / n_anchors as f64,
         iterations: trainer.iteration,

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use bytesize::ByteSize;
-use pocketsplat_capture::dataset::Background;
+use pocketsplat_capture::dataset::{Background, FrameSize};
+use pocketsplat_instructions::level::{Bound, Level};
 use pocketsplat_trainer::device::{Limits, ModelChoice, Processor, choose};
 use pocketsplat_trainer::effects::Price;
 use pocketsplat_trainer::explicit::CloudConfig;
@@ -12,7 +13,7 @@ use pocketsplat_trainer::train::config::Backbone;
 
 use super::settings::{QualityOptions, RunOptions, applied};
 use crate::config::heading::{DEVICE, OUTPUT, QUALITY, RUN};
-use crate::config::named::{TARGETS, one_of};
+use crate::config::named::{TARGETS, level_number, one_of};
 use crate::config::{CaptureOptions, EXPLICIT, ExplicitRunConfig, Preset, RunConfig};
 
 /// Train a scene from a capture and write it as a bundle.
@@ -76,6 +77,10 @@ pub(crate) struct Args {
 /// What the device has that the bundle is for; what else the command line leaves open is chosen by it.
 #[derive(clap::Args)]
 pub(crate) struct DeviceArgs {
+    /// Level that the whole scene keeps, 1 (Cortex-M with 64 KiB) to 5 (8 MiB): sets --ram, --flash, --target and --resolution,
+    /// which may ask for less [default: none]
+    #[arg(long, value_name = "N", value_parser = level_number(), help_heading = DEVICE)]
+    level: Option<u8>,
     /// Scratch bytes of the decoder, as 192KiB, excluding stack and frame buffer; the whole scene is guaranteed to fit
     /// [default: no limit]
     #[arg(long, value_name = "BYTES", help_heading = DEVICE)]
@@ -89,23 +94,51 @@ pub(crate) struct DeviceArgs {
 }
 
 impl DeviceArgs {
-    fn limits(&self) -> Limits {
-        Limits {
-            ram_bytes: self.ram.map(|bytes| bytes.as_u64()),
-            flash_bytes: self.flash.map(|bytes| bytes.as_u64()),
-            processor: self.target,
+    /// The limits asked for: those of the level, where the other options do not ask for less.
+    fn limits(&self) -> Result<Limits> {
+        let [ram_bytes, flash_bytes] = [self.ram, self.flash].map(|bytes| bytes.map(|bytes| bytes.as_u64()));
+        let given = Limits { ram_bytes, flash_bytes, processor: self.target, level: None };
+        let Some(level) = self.level.and_then(Level::numbered) else { return Ok(given) };
+        let of_level = Limits::of_level(level);
+        for (option, given, bound) in [("--ram", ram_bytes, Bound::Scratch), ("--flash", flash_bytes, Bound::Flash)] {
+            refuse_more(level, option, given, bound)?;
         }
+        if let (Some(given), Some(needed)) = (given.processor, of_level.processor)
+            && given != needed
+        {
+            bail!(
+                "--target contradicts --level {}, which has a target of its own; leave one of them out",
+                level.number
+            );
+        }
+        Ok(Limits {
+            ram_bytes: ram_bytes.or(of_level.ram_bytes),
+            flash_bytes: flash_bytes.or(of_level.flash_bytes),
+            processor: self.target.or(of_level.processor),
+            ..of_level
+        })
+    }
+
+    /// The frame to train for: the one given, or the level's.
+    ///
+    /// * `is_sized`: whether another option says how large images are.
+    pub(crate) fn frame(&self, given: Option<FrameSize>, is_sized: bool) -> Result<Option<FrameSize>> {
+        let Some(level) = self.level.and_then(Level::numbered) else { return Ok(given) };
+        let pixels = given.map(|FrameSize { width_px, height_px }| u64::from(width_px) * u64::from(height_px));
+        refuse_more(level, "--resolution", pixels, Bound::Frame)?;
+        let [width_px, height_px] = level.frame_px.map(u32::from);
+        Ok(given.or((!is_sized).then_some(FrameSize { width_px, height_px })))
     }
 
     /// Sets the limits, and what they afford where the options leave it open; nothing without limits.
     pub(crate) fn choose(&self, quality: &QualityOptions, lambda: Option<f64>, config: &mut RunConfig) -> Result<()> {
-        let limits = self.limits();
+        let limits = self.limits()?;
         if limits.is_none() {
             return Ok(());
         }
         config.encoding.limits = limits;
-        if let (None, None, Some(bytes)) = (self.ram, self.target, self.flash) {
-            quality.choose_width(&mut config.train, bytes.as_u64());
+        if let (None, None, Some(bytes)) = (limits.ram_bytes, limits.processor, limits.flash_bytes) {
+            quality.choose_width(&mut config.train, bytes);
             eprintln!(
                 "to fill this size: features of width {}; the number of anchors and lambda are found while it trains",
                 config.train.shape.feature_dim
@@ -122,6 +155,19 @@ impl DeviceArgs {
         );
         Ok(())
     }
+}
+
+/// Refuses an option that allows more than the level does.
+fn refuse_more(level: &Level, option: &str, given: Option<u64>, bound: Bound) -> Result<()> {
+    let most = level.most(bound);
+    if let Some(given) = given.filter(|given| *given > most) {
+        bail!(
+            "{option} asks for {given} {name}, and --level {} allows {most}; leave one of them out, or ask for less",
+            level.number,
+            name = bound.name()
+        );
+    }
+    Ok(())
 }
 
 /// Refuses a weight of bits where none are weighed.
@@ -175,7 +221,7 @@ impl Args {
             (None, Some(run)) => RunConfig { fork_at: Vec::new(), ..RunConfig::of_run(run)? },
             (None, None) => self.preset.unwrap_or_default().config(),
         };
-        let limits = self.device.limits();
+        let limits = self.device.limits()?;
         // A configuration that is given has been decided about.
         let is_for_device = !limits.is_none() && self.config.is_none() && self.from.is_none();
         if is_for_device {
@@ -207,17 +253,20 @@ impl Args {
                 *into = std::path::absolute(path).with_context(|| format!("{} is not a path", path.display()))?;
             }
         }
-        let (given, before) = (self.device.limits(), config.encoding.limits);
+        let (given, before) = (self.device.limits()?, config.encoding.limits);
         config.encoding.limits = Limits {
             ram_bytes: given.ram_bytes.or(before.ram_bytes),
             flash_bytes: given.flash_bytes.or(before.flash_bytes),
             processor: given.processor.or(before.processor),
+            level: given.level.or(before.level),
         };
-        config.effects.target = self.device.target.or(config.effects.target);
+        config.effects.target = given.processor.or(config.effects.target);
         if let Some(lambda) = self.lambda {
             config.train.hac.lambda = lambda;
         }
-        applied(&self.capture, &self.quality, &self.options, config)
+        let frame = self.device.frame(self.capture.resolution, self.capture.max_resolution.is_some())?;
+        let capture = CaptureOptions { resolution: frame, ..self.capture.clone() };
+        applied(&capture, &self.quality, &self.options, config)
     }
 
     /// Whether explicit Gaussians are asked for.
@@ -243,9 +292,14 @@ impl Args {
 
     /// `config` with everything replaced that the command line says.
     pub(crate) fn applied_to_explicit(&self, mut config: ExplicitRunConfig) -> Result<ExplicitRunConfig> {
-        let DeviceArgs { ram, flash, target } = &self.device;
+        let DeviceArgs { level, ram, flash, target } = &self.device;
         let mut refused = self.quality.of_anchors();
-        let device = [("--ram", ram.is_some()), ("--flash", flash.is_some()), ("--target", target.is_some())];
+        let device = [
+            ("--level", level.is_some()),
+            ("--ram", ram.is_some()),
+            ("--flash", flash.is_some()),
+            ("--target", target.is_some()),
+        ];
         let others = [("--lambda", self.lambda.is_some()), ("--watch", self.watch.is_some())];
         let given = others.into_iter().chain(device).filter(|(_, given)| *given);
         refused.extend(given.map(|(name, _)| name));

@@ -1,5 +1,6 @@
 //! `pocketsplat verify`: a bundle held to the memory contract.
 
+use std::iter;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -9,13 +10,16 @@ use pocketsplat_capture::dataset::FrameSize;
 use pocketsplat_core::budget::MAX_STRIPS;
 use pocketsplat_core::bundle::crc32;
 use pocketsplat_core::{Budget, Bundle, Camera, Plan, Residency, Strips};
+use pocketsplat_instructions::level::{Bound, Level};
 use pocketsplat_trainer::camera::core_camera;
 use pocketsplat_trainer::camera::host_camera;
 use pocketsplat_trainer::manifest::cameras_to_measure;
 use pocketsplat_trainer::metrics::psnr_db;
 use pocketsplat_trainer::render::decoder::core_image_of_tiers;
 use pocketsplat_trainer::render::reference::ReferenceScene;
-use pocketsplat_trainer::verify::{Violation, exact_bytes, memory_does_not_show, variants_match, work_is_bounded};
+use pocketsplat_trainer::verify::{
+    Violation, declared_levels, exact_bytes, keeps_level, memory_does_not_show, variants_match, work_is_bounded,
+};
 use serde::Serialize;
 
 use super::bundle::BundleFile;
@@ -24,6 +28,7 @@ use super::eval::reference_image;
 use super::fit::{frame_budget, plan_within};
 use super::output;
 use crate::config::CaptureOptions;
+use crate::config::named::level_number;
 
 /// Views that are compared with the slow reference.
 const REFERENCE_VIEWS: usize = 3;
@@ -33,7 +38,7 @@ const MIN_REFERENCE_DB: f64 = 50.0;
 const MIN_USED: f64 = 0.9;
 
 /// Hold a bundle to the memory contract: the planned bytes suffice and one fewer is refused, nothing beside them is touched,
-/// nothing but the camera changes a pixel, work is bounded, frames are the reference's.
+/// nothing but the camera changes a pixel, work is bounded, levels are kept, frames are the reference's.
 ///
 /// Ends with exit code 1 where a law does not hold.
 #[derive(clap::Args)]
@@ -45,6 +50,10 @@ pub(crate) struct Args {
     /// Scratch memory of the decoder, as 192KiB [default: no limit]
     #[arg(long, value_name = "BYTES")]
     ram: Option<ByteSize>,
+    /// Level whose every bound the whole scene is to keep, and whose scratch memory the decoder gets [default: those that the
+    /// tiers declare]
+    #[arg(long, value_name = "N", value_parser = level_number(), conflicts_with = "ram")]
+    level: Option<u8>,
     #[command(flatten)]
     capture: CaptureOptions,
     /// Print the result as JSON.
@@ -85,7 +94,8 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     let cameras = cameras(args, &file, &bundle)?;
     let size = args.capture.resolution.unwrap_or_else(|| largest(&cameras));
     let budget = frame_budget(&bundle, Some(size))?;
-    let ram_bytes = args.ram.map(|ram| ram.as_u64());
+    let level = args.level.and_then(Level::numbered);
+    let ram_bytes = args.ram.map(|ram| ram.as_u64()).or(level.map(|level| level.most(Bound::Scratch)));
     let plan = plan_within(&bundle, &budget, ram_bytes.unwrap_or(u64::MAX))?;
     let plans: Vec<Plan> = (1..=plan.n_tiers())
         .map(|tiers| plan_within(&bundle, &budget.with_tiers(tiers), ram_bytes.unwrap_or(u64::MAX)))
@@ -127,6 +137,11 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
                 work_is_bounded(whole, &work)
             }),
         ));
+    }
+    laws.push(law("tiers keep the levels that they declare", declared_levels(&bundle)));
+    if let Some(level) = level {
+        let whole = bundle.n_tiers().saturating_sub(1);
+        laws.push(law("the whole scene keeps the level", iter::once(keeps_level(&bundle, whole, level.number))));
     }
     laws.push(reference_law(&file, &bundle, plan.n_tiers(), &cameras)?);
     let whole_scene_bytes = if plan.n_tiers() < bundle.n_tiers() {

@@ -1,6 +1,7 @@
 //! Options that take one of a library type's names, as a configuration spells them.
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
+use pocketsplat_instructions::level::LEVELS;
 use serde::de::DeserializeOwned;
 use serde::de::IntoDeserializer as _;
 use serde::de::value::{Error, StrDeserializer};
@@ -26,6 +27,11 @@ where
         let name: StrDeserializer<'_, Error> = name.as_str().into_deserializer();
         T::deserialize(name)
     })
+}
+
+/// Parses the number of a level that there is.
+pub(crate) fn level_number() -> impl TypedValueParser<Value = u8> {
+    clap::value_parser!(u8).range(1..=LEVELS.len() as i64)
 }
 
 #[cfg(test)]

@@ -2,7 +2,8 @@
 
 use std::fs;
 
-use pocketsplat_core::{Budget, Bundle};
+use pocketsplat_core::bundle::{HEADER_FIXED_LEN, MANIFEST_RECORD_LEN, SECTION_LEN, crc32};
+use pocketsplat_core::{Budget, Bundle, SectionKind};
 
 use crate::fixture::{capture, fails, folder, pocketsplat, succeeds, train};
 
@@ -67,4 +68,70 @@ fn what_no_device_can_do_is_refused_with_the_nearest_that_can() {
     fs::write(&undisturbed, crate::fixture::undisturbed()).unwrap();
     let said = fails(pocketsplat().arg("fit").arg(&undisturbed).args(["--ram", "1000"]));
     assert!(said.contains("do not suffice") && said.contains("--ram"), "{said}");
+}
+
+#[test]
+fn a_level_sets_limits_that_hold_and_are_declared() {
+    let home = folder("level");
+    let output = home.join("a.psb");
+    for (option, value, needed) in [
+        ("--ram", "60000", "--level 1 allows 54272"),
+        ("--flash", "1MiB", "--level 1 allows 32768"),
+        ("--target", "cortex-m7", "--target contradicts --level 1"),
+        ("--resolution", "160x120", "--level 1 allows 12288"),
+    ] {
+        let said = fails(train(&output).args(["--level", "1", option, value]));
+        assert!(said.contains(option) && said.contains(needed), "{said}");
+    }
+    assert!(!home.join("a.run").exists(), "before anything was done");
+    // Less than the level allows may be asked for.
+    let run =
+        train(&output).args(["--level", "1", "--resolution", "32x32", "--flash", "20000", "--json"]).output().unwrap();
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let result: serde_json::Value = serde_json::from_slice(&run.stdout).unwrap();
+    assert_eq!((&result["level"], &result["profile"]), (&1.into(), &"Device".into()));
+    let config = fs::read_to_string(home.join("a.run/config.toml")).unwrap();
+    for line in ["ram_bytes = 54272", "flash_bytes = 20000", "processor = \"cortex-m4\"", "level = 1"] {
+        assert!(config.contains(line), "{line}: {config}");
+    }
+    let json = |args: &[&str]| -> serde_json::Value {
+        let run = pocketsplat().args(args).arg(&output).arg("--json").output().unwrap();
+        serde_json::from_slice(&run.stdout).unwrap()
+    };
+    let inspected = json(&["inspect"]);
+    assert_eq!(inspected["profile"], "Device");
+    for tier in inspected["tiers"].as_array().unwrap() {
+        assert_eq!(tier["level"], 1, "{tier}");
+    }
+    let fit = json(&["fit", "--level", "1"]);
+    assert!(fit["tiers"].as_array().unwrap().iter().all(|tier| tier["fits"] == true), "{fit}");
+    assert_eq!(fit["tiers"][0]["bounds"]["bytes of flash"]["allowed"], 32768);
+    succeeds(pocketsplat().arg("verify").arg(&output).args(["--level", "1"]));
+    // Another number in the manifest, and checksums to match.
+    let mut bytes = fs::read(&output).unwrap();
+    let (last, manifest, header_len) = {
+        let bundle = Bundle::parse(&bytes).unwrap();
+        let section = bundle.sections().find(|section| section.kind == SectionKind::Manifest).unwrap();
+        (bundle.n_tiers() - 1, section, usize::from(u16::from_le_bytes([bytes[10], bytes[11]])))
+    };
+    let mut measures = Bundle::parse(&bytes).unwrap().measures(last).unwrap();
+    measures.max_splats = 3_000;
+    let start = manifest.offset as usize;
+    bytes[start + usize::from(last) * MANIFEST_RECORD_LEN..][..MANIFEST_RECORD_LEN].copy_from_slice(&measures.emit());
+    let crc = crc32(&bytes[start..start + manifest.len as usize]).to_le_bytes();
+    let row = (HEADER_FIXED_LEN..).step_by(SECTION_LEN).find(|row| bytes[*row] == 6).unwrap();
+    bytes[row + 12..row + 16].copy_from_slice(&crc);
+    let crc = crc32(&bytes[..header_len - 4]).to_le_bytes();
+    bytes[header_len - 4..header_len].copy_from_slice(&crc);
+    let tampered = home.join("tampered.psb");
+    fs::write(&tampered, bytes).unwrap();
+    for args in [&[][..], &["--level", "1"]] {
+        let run = pocketsplat().arg("verify").arg(&tampered).args(args).output().unwrap();
+        let said = String::from_utf8(run.stdout).unwrap();
+        assert_eq!(run.status.code(), Some(1), "{said}");
+        assert!(said.contains("BROKEN") && said.contains("3000 splats of a frame, 150.0 % of 2000"), "{said}");
+    }
+    let run = pocketsplat().args(["fit", "--level", "1"]).arg(&tampered).output().unwrap();
+    let said = String::from_utf8(run.stdout).unwrap();
+    assert!(said.contains("  no: 3000 splats of a frame, 150.0 % of 2000"), "{said}");
 }

@@ -5,6 +5,7 @@ use pocketsplat_core::bundle::{
 };
 use pocketsplat_core::context::N_GROUPS;
 use pocketsplat_core::{Bundle, DecodeError, count_gaussians, count_scratch_len};
+use pocketsplat_instructions::level::Level;
 
 use super::{BundleInfo, MAX_PROTOCOL_LEN, SizeReport, WriteError};
 use crate::camera::core_camera;
@@ -147,7 +148,7 @@ impl CodedScene {
         self.sections().file_len()
     }
 
-    /// Assembles the file and reads it back.
+    /// Assembles the file and reads it back. Each tier declares the least level that it keeps.
     ///
     /// * `measures`: `[n_tiers]`, or none at all for a scene that is not measured.
     ///
@@ -157,6 +158,9 @@ impl CodedScene {
         let (needed, found) = (self.header.n_tiers.into(), measures.len());
         if found == needed {
             self.manifest = measures.iter().flat_map(TierMeasures::emit).collect();
+            let levels = self.levels()?;
+            let declared = measures.iter().zip(levels).map(|(measures, level)| TierMeasures { level, ..*measures });
+            self.manifest = declared.flat_map(|measures| measures.emit()).collect();
         } else if found > 0 {
             return Err(WriteError::Length { array: "measures", needed, found });
         }
@@ -164,6 +168,13 @@ impl CodedScene {
         let bundle = Bundle::parse(&bytes).map_err(WriteError::ReadBack)?;
         let report = SizeReport::of(&bundle).map_err(WriteError::ReadBack)?;
         Ok(Written { bytes, report })
+    }
+
+    /// The least level that each tier keeps; 0 for none.
+    fn levels(&self) -> Result<Vec<u8>, WriteError> {
+        let bytes: Vec<u8> = self.sections().emit(&self.header).collect();
+        let bundle = Bundle::parse(&bytes).map_err(WriteError::ReadBack)?;
+        Ok((0..bundle.n_tiers()).map(|tier| Level::least(&bundle, tier)).collect())
     }
 
     fn sections(&self) -> SectionBytes<'_> {

@@ -211,7 +211,7 @@ mod tests {
             ram in 0_u64..4_000_000, flash in 0_u64..2_000_000,
             processor in prop::sample::select(vec![Processor::CortexM4, Processor::CortexM7, Processor::Riscv32imac])
         ) {
-            let limits = Limits { ram_bytes: Some(ram), flash_bytes: Some(flash), processor: Some(processor) };
+            let limits = Limits { ram_bytes: Some(ram), flash_bytes: Some(flash), processor: Some(processor), level: None };
             match choose(&limits) {
                 Ok(choice) => {
                     let model = MODELS.into_iter().find(|m| usize::from(m.feature_dim) == choice.feature_dim).unwrap();

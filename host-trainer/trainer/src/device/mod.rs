@@ -13,6 +13,7 @@ pub use width::widest_within;
 use serde::{Deserialize, Serialize};
 
 use pocketsplat_instructions::InstructionSet;
+use pocketsplat_instructions::level::{Bound, Level};
 
 /// What a device has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -26,9 +27,27 @@ pub struct Limits {
     /// Processor, whose frames of limited length the model is chosen and trained for; what was trained is not cut to them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub processor: Option<Processor>,
+    /// Number of the [level](Level) whose every bound the whole scene keeps.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub level: Option<u8>,
 }
 
 impl Limits {
+    /// What a device of a level has. Frames of the largest level are meant for processors of many kinds.
+    pub fn of_level(level: &Level) -> Self {
+        let processor = match level.number {
+            ..=3 => Some(Processor::CortexM4),
+            4 => Some(Processor::CortexM7),
+            _ => None,
+        };
+        Self {
+            ram_bytes: Some(level.most(Bound::Scratch)),
+            flash_bytes: Some(level.most(Bound::Flash)),
+            processor,
+            level: Some(level.number),
+        }
+    }
+
     /// Whether there is any.
     pub fn is_none(&self) -> bool {
         *self == Self::default()

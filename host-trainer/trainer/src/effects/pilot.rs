@@ -148,7 +148,7 @@ pub fn measure(
 ) -> Result<Pilots, PilotError> {
     let device = PilotDevice { ram_bytes: encoding.limits.ram_bytes, target };
     // Pilots are smaller than the scene that has to fit.
-    let limits = Limits { ram_bytes: None, flash_bytes: None, ..encoding.limits };
+    let limits = Limits { processor: encoding.limits.processor, ..Limits::default() };
     let encoding = Encoding { coder: CoderChoice::Auto, tiers: vec![0.0], limits, ..encoding.clone() };
     search(price, |effects, seed| {
         if let Some(worth) = log.known(effects, seed) {

@@ -11,10 +11,10 @@ use crate::bundle::WriteError;
 pub enum EncodeError {
     /// Even a small part of the scene is too much for the device.
     #[error(
-        "the scene does not fit: with {n_anchors} anchors it takes {needed} bytes of {memory}, {available} are allowed; allow \
+        "the scene does not fit: with {n_anchors} anchors it takes {needed} {limit}, {available} are allowed; allow \
          more or train a narrower model (--feature-dim, --offsets)"
     )]
-    TooLarge { memory: &'static str, available: u64, needed: u64, n_anchors: usize },
+    TooLarge { limit: &'static str, available: u64, needed: u64, n_anchors: usize },
     /// A value or a count has no place in the format.
     #[error(transparent)]
     Write(#[from] WriteError),

@@ -3,8 +3,9 @@
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Capture, View};
 use pocketsplat_core::{Bundle, DecodeError, Plan};
+use pocketsplat_instructions::level;
 
-use super::scale::{DevicePlans, frame_of, measured_cameras, most_instructions};
+use super::scale::{DevicePlans, frame_of, level_needs, measured_cameras, most_instructions};
 use super::{EncodeError, Encoding};
 use crate::bundle::{WriteError, Written};
 use crate::manifest::measure;
@@ -49,6 +50,9 @@ pub struct Cut {
     pub psnr_db: Option<f32>,
 }
 
+/// The limit that a cut's RAM is of.
+const RAM: &str = "bytes of RAM";
+
 /// What a bundle takes of a limit.
 #[derive(Clone, Copy)]
 struct Need {
@@ -68,7 +72,7 @@ struct Attempt {
     finished: Finished,
     written: Written,
     plan: Option<Plan>,
-    /// Of the memory that leaves least room.
+    /// Of the memory, or another bound of the level, that leaves least room.
     memory: Option<Need>,
     /// Of a frame's instructions.
     time: Option<Need>,
@@ -90,7 +94,7 @@ impl Attempt {
 
 impl Encoding {
     /// Codes a finished scene in tiers, again and again without its least important anchors, until the bundle is within the flash
-    /// and the whole of it is drawn within the RAM and, as far as half of the anchors suffice for that, within the processor's
+    /// and the whole of it keeps the level and is drawn within the RAM and, as far as half of the anchors suffice for that, within the processor's
     /// instructions; measures each tier over training views and an orbit, and assembles the file.
     ///
     /// * `held_out`: views that were not trained on, whose photographs the tiers are compared with.
@@ -110,7 +114,7 @@ impl Encoding {
         let (n_held, held) = match most_within(n, 1, whole, |found| found.memory, attempt)? {
             Ok(found) => found,
             Err(Unfit { least: (n_anchors, Need { limit, available, needed }), .. }) => {
-                return Err(EncodeError::TooLarge { memory: limit, available, needed, n_anchors });
+                return Err(EncodeError::TooLarge { limit, available, needed, n_anchors });
             }
         };
         let at_least = (n as f64 * (1.0 - MOST_CUT_FOR_TIME)) as usize;
@@ -134,12 +138,17 @@ impl Encoding {
         let written = coded.into_file(&measures)?;
         let flash = self.limits.flash_bytes.map(|available| {
             let needed = written.bytes.len() as u64;
-            Need { limit: "flash", available, needed }
+            Need { limit: "bytes of flash", available, needed }
         });
         let ram = self.limits.ram_bytes.map(|available| ram_of(&written, capture, available));
         let (ram, plan) =
             ram.transpose().map_err(EncodeError::Measure)?.map_or((None, None), |(ram, plan)| (Some(ram), plan));
-        let memory = flash.into_iter().chain(ram).max_by(|a, b| a.share().total_cmp(&b.share()));
+        let bundle = Bundle::parse(&written.bytes).map_err(WriteError::ReadBack)?;
+        let of_level = level_needs(&self.limits, &bundle).into_iter().map(|need| {
+            let level::Need { bound, needed, most } = need;
+            Need { limit: bound.name(), available: most, needed }
+        });
+        let memory = flash.into_iter().chain(ram).chain(of_level).max_by(|a, b| a.share().total_cmp(&b.share()));
         let time = self.time_of(&written, capture, cameras).map_err(EncodeError::Measure)?;
         Ok(Attempt { finished, written, plan, memory, time })
     }
@@ -200,14 +209,14 @@ fn ram_of(written: &Written, capture: &Capture, available: u64) -> Result<(Need,
         // Halves were tried too, and were not enough.
         None => (smallest.scratch_len() as u64).max(available + 1),
     };
-    Ok((Need { limit: "RAM", available, needed }, within))
+    Ok((Need { limit: RAM, available, needed }, within))
 }
 
 /// What is lost when all that is too much of a scene goes.
 fn lost_by(whole: &Attempt) -> Result<Cut, EncodeError> {
     let bundle = Bundle::parse(&whole.written.bytes).map_err(WriteError::ReadBack)?;
     let psnr_db = bundle.n_tiers().checked_sub(1).and_then(|tier| bundle.measures(tier)?.psnr_db);
-    let ram_bytes = whole.memory.filter(|need| need.limit == "RAM").map(|need| need.needed);
+    let ram_bytes = whole.memory.filter(|need| need.limit == RAM).map(|need| need.needed);
     let instructions = whole.time.map(|time| time.needed);
     Ok(Cut { n_anchors: 0, flash_bytes: whole.written.bytes.len() as u64, ram_bytes, instructions, psnr_db })
 }

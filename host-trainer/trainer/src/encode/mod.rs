@@ -16,6 +16,7 @@ pub use error::EncodeError;
 pub use fitting::{Cut, Fitted};
 pub use scale::Scale;
 
+use pocketsplat_instructions::level::{LEVELS, Level};
 use serde::{Deserialize, Serialize};
 
 use crate::bundle::{PRUNING_RATES, WriteError, check_pruning_rates, check_steps};
@@ -52,11 +53,14 @@ impl Encoding {
     /// Refuses before any training what the writer would refuse after it.
     ///
     /// # Errors
-    /// [`WriteError::NotPositive`] for a step, [`WriteError::Tiers`] for pruning rates that do not fall to 0, [`WriteError::NoContext`]
+    /// [`WriteError::Count`] for a level that there is not, [`WriteError::NotPositive`] for a step, [`WriteError::Tiers`] for pruning rates that do not fall to 0, [`WriteError::NoContext`]
     /// where the context is to code a scene that is trained without one.
     pub fn check(&self, backbone: Backbone) -> Result<(), WriteError> {
         if self.coder == CoderChoice::Context && !backbone.is_coded() {
             return Err(WriteError::NoContext);
+        }
+        if let Some(number) = self.limits.level.filter(|number| Level::numbered(*number).is_none()) {
+            return Err(WriteError::Count { what: "level", found: number.into(), least: 1, most: LEVELS.len() });
         }
         check_steps(self.quantisation)?;
         check_pruning_rates(&self.tiers)

@@ -5,12 +5,13 @@ use std::error::Error;
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::Capture;
 use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, Plan, Residency, Strips};
+use pocketsplat_instructions::level::{Bound, Level, Need};
 use pocketsplat_instructions::predict;
 
 use super::{EncodeError, Encoding};
 use crate::bundle::WriteError;
 use crate::camera::core_camera;
-use crate::device::Processor;
+use crate::device::{Limits, Processor};
 use crate::manifest::{cameras_to_measure, measure};
 use crate::render::decoder::image_of;
 use crate::train::finish::Finished;
@@ -57,11 +58,31 @@ impl Scale<'_> {
         let limits = &self.encoding.limits;
         let bundle = Bundle::parse(bundle)?;
         let plans = DevicePlans::of(&bundle, frame_of(self.capture), limits.ram_bytes)?;
-        let ram = limits.ram_bytes.map_or(0.0, |most| plans.in_two_strips.scratch_len() as f64 / most as f64);
-        let Some(processor) = limits.processor else { return Ok([ram, 0.0]) };
-        let most = processor.frame_instructions() as f64;
-        Ok([ram, most_instructions(&bundle, plans.drawn(), processor, &self.cameras)? / most])
+        let mut ram = limits.ram_bytes.map_or(0.0, |most| plans.in_two_strips.scratch_len() as f64 / most as f64);
+        let mut instructions = 0.0_f64;
+        if let Some(processor) = limits.processor {
+            let most = processor.frame_instructions() as f64;
+            instructions = most_instructions(&bundle, plans.drawn(), processor, &self.cameras)? / most;
+        }
+        for need in level_needs(limits, &bundle) {
+            match need.bound {
+                // Of the length of the bundle the rate is steered.
+                Bound::Frame | Bound::Flash => {}
+                Bound::Scratch => ram = ram.max(need.share()),
+                Bound::Anchors | Bound::Splats | Bound::HeadMacs | Bound::Instructions => {
+                    instructions = instructions.max(need.share());
+                }
+            }
+        }
+        Ok([ram, instructions])
     }
+}
+
+/// What the whole of a bundle takes of its level's bounds; nothing where it is to keep none.
+pub(super) fn level_needs(limits: &Limits, bundle: &Bundle<'_>) -> Vec<Need> {
+    let level = limits.level.and_then(Level::numbered);
+    let needs = level.zip(bundle.n_tiers().checked_sub(1)).and_then(|(level, tier)| level.needs(bundle, tier));
+    needs.map_or_else(Vec::new, |needs| needs.to_vec())
 }
 
 /// Instructions predicted for the dearest frame of every [`DRAWN_EVERY`]th camera.

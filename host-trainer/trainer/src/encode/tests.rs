@@ -65,7 +65,7 @@ fn anchors_are_left_out_until_the_bundle_fits() {
     assert_eq!(lost.flash_bytes, whole.written.bytes.len() as u64);
     assert!(lost.n_anchors > 0, "{lost:?}");
     let error = encode(Some(100)).expect_err("less than a header");
-    assert!(matches!(error, EncodeError::TooLarge { memory: "flash", available: 100, .. }), "{error}");
+    assert!(matches!(error, EncodeError::TooLarge { limit: "bytes of flash", available: 100, .. }), "{error}");
 }
 
 #[test]

@@ -11,6 +11,8 @@ use pocketsplat_core::{
     Residency, Strips, Work,
 };
 
+use pocketsplat_instructions::level::Level;
+
 pub use trial::{Breach, Trial};
 
 /// Content of the memory and bytes that it begins behind a word.
@@ -136,6 +138,25 @@ pub fn variants_match(bundle: &Bundle<'_>, budget: Budget, camera: &Camera) -> R
         }
     }
     Ok(())
+}
+
+/// The scene up to tier number `tier` keeps every bound of a level.
+///
+/// # Errors
+/// A sentence with the bounds that it does not keep.
+pub fn keeps_level(bundle: &Bundle<'_>, tier: u8, number: u8) -> Result<(), Violation> {
+    let Some(level) = Level::numbered(number) else { return Err(format!("there is no level {number}")) };
+    let Some(needs) = level.needs(bundle, tier) else {
+        return Err(format!("level {number}, tiers up to {tier}: the manifest is not measured"));
+    };
+    let over: Vec<String> = needs.iter().filter(|need| !need.is_kept()).map(ToString::to_string).collect();
+    if over.is_empty() { Ok(()) } else { Err(format!("level {number}, tiers up to {tier}: {}", over.join("; "))) }
+}
+
+/// Every level that a tier in the file declares is kept by it, one result a declared level.
+pub fn declared_levels(bundle: &Bundle<'_>) -> impl Iterator<Item = Result<(), Violation>> {
+    let declared = (0..bundle.n_tiers()).filter_map(|tier| Some((tier, bundle.measures(tier)?.level)));
+    declared.filter(|(_, level)| *level != 0).map(|(tier, level)| keeps_level(bundle, tier, level))
 }
 
 /// No frame takes more work than the plan says, if the plan says anything.

@@ -7,6 +7,7 @@ use std::sync::atomic::AtomicBool;
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::{Background, Capture, Split};
 use pocketsplat_gaussians::Format;
+use pocketsplat_trainer::device::Limits;
 use pocketsplat_trainer::explicit::CloudTrainer;
 use pocketsplat_trainer::train::run::{Ending, Interval, LoggedStep, RunError, RunFolder, shell_word};
 use serde::Serialize;
@@ -51,6 +52,7 @@ impl ExplicitResult {
             held_out: self.held_out.as_ref(),
             path: file,
             n_bytes: self.file_bytes,
+            level: None,
             peak_memory_bytes: self.peak_memory_bytes,
             train_s: self.train_s,
             train_processor_s: self.train_processor_s,
@@ -121,7 +123,7 @@ fn load(config: &ExplicitRunConfig) -> Result<Capture> {
     // At once: large captures take their time.
     eprintln!("reading {}", config.dataset.display());
     let capture = source.load(config.gaussians.seed)?;
-    check_size(&capture)?;
+    check_size(&capture, &Limits::default())?;
     Ok(capture)
 }
 

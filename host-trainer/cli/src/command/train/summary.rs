@@ -11,6 +11,8 @@ pub(super) struct Summary<'a> {
     pub(super) held_out: Option<&'a HeldOut>,
     pub(super) path: &'a Path,
     pub(super) n_bytes: usize,
+    /// Of a bundle: its level, 0 for none, and its profile.
+    pub(super) level: Option<(u8, &'a str)>,
     pub(super) peak_memory_bytes: Option<u64>,
     pub(super) train_s: f64,
     /// Processor time of all threads.
@@ -29,6 +31,11 @@ impl fmt::Display for Summary<'_> {
             None => writeln!(f, "quality:  not measured, for no view is held out; --test-every 8 holds some out")?,
         }
         writeln!(f, "size:     {} bytes, {}", self.n_bytes, self.path.display())?;
+        match self.level {
+            None => {}
+            Some((0, profile)) => writeln!(f, "level:    none, profile {profile}")?,
+            Some((level, profile)) => writeln!(f, "level:    {level}, profile {profile}")?,
+        }
         if let Some(bytes) = self.peak_memory_bytes {
             writeln!(f, "memory:   {:.2} GB at most", bytes as f64 / 1e9)?;
         }
@@ -52,6 +59,7 @@ mod tests {
             held_out: Some(&held_out),
             path: Path::new("desk lamp.psb"),
             n_bytes: 412_345,
+            level: Some((5, "Full")),
             peak_memory_bytes: Some(612_000_000),
             train_s: 744.0,
             train_processor_s: 1320.0,
@@ -62,6 +70,7 @@ mod tests {
             summary.to_string(),
             "quality:  32.04 dB PSNR, 0.9512 SSIM, means of 13 views that were held out\n\
              size:     412345 bytes, desk lamp.psb\n\
+             level:    5, profile Full\n\
              memory:   0.61 GB at most\n\
              time:     12 minutes for 7000 iterations, 22 minutes of one processor core\n"
         );

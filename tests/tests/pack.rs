@@ -1,12 +1,19 @@
 //! The committed conformance pack is what its command writes, and the decoder keeps it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
+use conformance::pack::coverage::Found;
+use conformance::pack::sample::Sample;
 use conformance::pack::{self, FOLDERS, expected, refused};
 use pocketsplat_core::bundle::crc32;
 use pocketsplat_core::{Budget, MaxSplats};
+use pocketsplat_instructions::level::Level;
 use pocketsplat_trainer::verify::{Trial, plan_variants};
+
+/// Made once for all tests.
+static SAMPLES: LazyLock<Vec<Sample>> = LazyLock::new(pack::bundles::samples);
 
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("pack")
@@ -30,19 +37,20 @@ fn committed() -> BTreeMap<String, Vec<u8>> {
 
 #[test]
 fn the_committed_pack_is_what_its_command_writes() {
-    let (fresh, committed) = (pack::files(), committed());
-    let paths = |files: &BTreeMap<String, Vec<u8>>| files.keys().cloned().collect::<Vec<_>>();
-    let what_to_do = "run `cargo run --release -p conformance --bin pack` and read the change";
-    assert_eq!(paths(&fresh), paths(&committed), "the names of the files differ; {what_to_do}");
-    let different: Vec<&String> = fresh.keys().filter(|path| fresh[*path] != committed[*path]).collect();
-    assert!(different.is_empty(), "{different:?} differ; {what_to_do}");
+    let (fresh, committed) = (pack::files(&SAMPLES), committed());
+    let paths: BTreeSet<&String> = fresh.keys().chain(committed.keys()).collect();
+    let different: Vec<&String> = paths.into_iter().filter(|path| fresh.get(*path) != committed.get(*path)).collect();
+    assert!(
+        different.is_empty(),
+        "{different:?} differ; run `cargo run --release -p conformance --bin pack` and read the change"
+    );
     let n_bytes: usize = committed.values().map(Vec::len).sum();
     assert!(n_bytes <= 1 << 20, "the pack has {n_bytes} bytes, more than 1 MiB");
 }
 
 #[test]
 fn anchors_come_back_and_frames_are_the_same_with_every_plan() {
-    for sample in pack::bundles::samples() {
+    for sample in &*SAMPLES {
         let name = &sample.name;
         let bundle = sample.bundle();
         assert_eq!(expected::decoded(&bundle).map(|chunks| chunks.concat()).as_ref(), Ok(&sample.anchors), "{name}");
@@ -75,4 +83,23 @@ fn files_are_refused_for_the_reasons_that_they_were_made_for() {
         })
         .collect();
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn every_feature_kind_and_limit_of_the_format_occurs() {
+    let mut found = Found::default();
+    SAMPLES.iter().for_each(|sample| found.join(Found::of(sample)));
+    let missing = found.missing();
+    assert!(missing.is_empty(), "nothing in the pack has: {missing:#?}");
+}
+
+#[test]
+fn declared_levels_are_the_least_that_hold() {
+    for sample in &*SAMPLES {
+        let bundle = sample.bundle();
+        for tier in 0..bundle.n_tiers() {
+            let declared = bundle.measures(tier).expect("a tier of the file").level;
+            assert_eq!(declared, Level::least(&bundle, tier), "{}, tier {tier}", sample.name);
+        }
+    }
 }

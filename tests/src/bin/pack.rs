@@ -16,7 +16,7 @@ fn main() -> std::io::Result<()> {
         }
         std::fs::create_dir_all(&part)?;
     }
-    let files = pack::files();
+    let files = pack::files(&pack::bundles::samples());
     for (path, bytes) in &files {
         std::fs::write(folder.join(path), bytes)?;
     }

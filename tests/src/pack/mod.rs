@@ -1,11 +1,12 @@
 //! The conformance pack: bundles with everything that the format has, what a reader must find in them, and files that it must refuse.
 //!
 //! `numbers`, `stream` → `positions`, `models` → `heads`, `contexts`, `ink` → `draft` → `sample` → `splats`, `bundles` → `expected` →
-//! `refused`. Drafts are put together number by number with the decoder's own `emit`s, not with the trainer's writer, which makes only what
-//! a training ends in. Nothing here depends on a machine's functions beyond what IEEE 754 says.
+//! `coverage`, `refused`. Drafts are put together number by number with the decoder's own `emit`s, not with the trainer's writer, which makes
+//! only what a training ends in. Of a machine's own functions only the exponential decides about bytes, of ink boxes, which are rounded outwards.
 
 pub mod bundles;
 pub mod contexts;
+pub mod coverage;
 pub mod draft;
 pub mod expected;
 pub mod heads;
@@ -20,19 +21,23 @@ pub mod stream;
 
 use std::collections::BTreeMap;
 
+use sample::Sample;
+
 /// Its folders.
 pub const FOLDERS: [&str; 3] = ["bundles", "frames", "refused"];
 
 /// The files of the pack but its README: paths from its folder, and what is in them.
-pub fn files() -> BTreeMap<String, Vec<u8>> {
+///
+/// * `samples`: [`bundles::samples`].
+pub fn files(samples: &[Sample]) -> BTreeMap<String, Vec<u8>> {
     let mut files = BTreeMap::new();
-    for sample in bundles::samples() {
+    for sample in samples {
         let (name, frames) = (&sample.name, sample.frames());
         files.insert(format!("bundles/{name}.json"), sample.json(&frames).into_bytes());
         for (index, frame) in frames.iter().enumerate() {
             files.insert(format!("frames/{name}-{index}.png"), expected::png(frame));
         }
-        files.insert(format!("bundles/{name}.psb"), sample.bytes);
+        files.insert(format!("bundles/{name}.psb"), sample.bytes.clone());
     }
     let refused = refused::files();
     files.insert("refused.json".to_owned(), refused::json(&refused).into_bytes());

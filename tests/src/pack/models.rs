@@ -2,7 +2,7 @@
 
 use pocketsplat_core::bundle::{FrequencyTable, Tables};
 use pocketsplat_core::context::{Context, Group, N_GROUPS, Steps, Trail};
-use pocketsplat_core::entropy::FREQUENCY_TOTAL;
+use pocketsplat_core::entropy::{FREQUENCY_TOTAL, NormalModel};
 
 use super::stream::{Slots, frequencies, raw};
 
@@ -102,6 +102,8 @@ pub struct CodedChannel {
     pub channel: usize,
     /// Its symbol.
     pub symbol: i16,
+    /// What gives it its frequencies.
+    pub model: NormalModel,
     /// Of the symbol: one without an escape, two near, four far.
     pub slots: Vec<Slots>,
 }
@@ -111,6 +113,10 @@ pub struct CodedChannel {
 pub struct CodedAnchor {
     /// Its level, where anchors follow anchors.
     pub level: usize,
+    /// The network's inputs and hidden units.
+    pub inputs: Vec<i16>,
+    #[expect(missing_docs, reason = "above")]
+    pub hidden: Vec<i16>,
     /// Of its groups.
     pub exponents: [i32; N_GROUPS],
     /// Distance of neighbouring values of each group.
@@ -150,7 +156,7 @@ pub fn walk(context: &Context<'_>, anchors: &[Anchor], is_coded: impl Fn(usize, 
             if residuals.len() < context.n_residuals() {
                 residuals.push(network.residual(channel, &steps, &hidden, symbol));
             }
-            channels.push(CodedChannel { channel, symbol, slots: model.slots(symbol).as_slice().to_vec() });
+            channels.push(CodedChannel { channel, symbol, model, slots: model.slots(symbol).as_slice().to_vec() });
         }
         if place.is_some() && level > 0 {
             let parent = |(channel, &symbol): (usize, &i16)| {
@@ -166,6 +172,8 @@ pub fn walk(context: &Context<'_>, anchors: &[Anchor], is_coded: impl Fn(usize, 
         let groups = [Group::Feature, Group::LogScale, Group::Offset];
         coded.push(CodedAnchor {
             level,
+            inputs: inputs.clone(),
+            hidden: hidden.clone(),
             exponents: groups.map(|group| steps.exponent(group)),
             steps: groups.map(|group| steps.value(group)),
             channels,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use pocketsplat_core::Bundle;
-use pocketsplat_instructions::level::{Level, Need, Profile};
+use pocketsplat_instructions::level::{Bound, Level, Need, Profile};
 use serde::{Serialize, Serializer};
 
 /// A bundle against a level.
@@ -70,7 +70,9 @@ impl LevelFit {
         for TierFit { tier, n_anchors, psnr_db, fits, bounds } in tiers {
             let psnr = psnr_db.map_or_else(|| "-".to_owned(), |psnr| format!("{psnr:.2}"));
             text += &format!("{:<8}{n_anchors:>9}{psnr:>8}  ", format!("0..={tier}"));
-            let fullest = bounds.iter().max_by(|a, b| a.share().total_cmp(&b.share()));
+            // Frames of just that size say nothing about the room that is left.
+            let others = bounds.iter().filter(|need| need.bound != Bound::Frame);
+            let fullest = others.max_by(|a, b| a.share().total_cmp(&b.share()));
             text += &match fullest {
                 Some(fullest) if *fits => format!("yes, {fullest}\n"),
                 _ => {

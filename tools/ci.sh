@@ -267,10 +267,12 @@ job_digests() {
   digest_of $name --release --target $name -- node --no-warnings --experimental-wasi-unstable-preview1 tests/digest/run.mjs "$build/$name/release/digest.wasm"
 }
 
-# A reader written from the documents alone, without the decoder's code, finds in the conformance pack what the decoder finds.
+# A reader written from the documents alone, without the decoder's code, finds in the conformance pack what the decoder finds,
+# and draws the golden frames, whose hundreds of splats show the last bits of arithmetic.
 job_reader() {
   need_command node nodejs
   node tests/reader/main.mjs check tests/pack
+  node tests/reader/main.mjs golden tests/golden
 }
 
 # Boards with the RAM that they get, KiB: as much as such a device has, and so little that anchors are decoded in each frame.

@@ -6,12 +6,14 @@ import { Refusal } from "./bytes.mjs";
 import { Camera } from "./camera.mjs";
 import { checkPack, decodeAll } from "./check.mjs";
 import { drawFrame } from "./frame.mjs";
+import { checkGolden } from "./golden.mjs";
 import { levelOf } from "./levels.mjs";
 
 const USAGE = `usage: node tests/reader/main.mjs symbols FILE.psb
        node tests/reader/main.mjs frame FILE.psb OUT.ppm [--tiers N] [--camera CAMERA.json]
        node tests/reader/main.mjs levels FILE.psb
-       node tests/reader/main.mjs check PACK`;
+       node tests/reader/main.mjs check PACK
+       node tests/reader/main.mjs golden FOLDER`;
 
 /** Prints every anchor of the tiers that the file holds, one a line. */
 function symbols(path) {
@@ -48,6 +50,7 @@ try {
   else if (command === "frame" && rest.length >= 2) frame(...rest);
   else if (command === "levels" && rest.length === 1) levels(...rest);
   else if (command === "check" && rest.length === 1) process.exitCode = checkPack(rest[0]) ? 1 : 0;
+  else if (command === "golden" && rest.length === 1) process.exitCode = checkGolden(rest[0]) ? 1 : 0;
   else throw new Error(USAGE);
 } catch (error) {
   console.error(error instanceof Refusal ? `refused: ${error.message}` : error.stack);

@@ -39,7 +39,7 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
     }
     let Listing { layout, source, views, points, unposed, notes } = listing;
     let mut notes: Vec<String> = notes.into_iter().map(|note| note.text).collect();
-    let read: Vec<(Split, String, Result<View, ViewFault>)> = views
+    let read: Vec<(Split, String, Result<(View, f64), ViewFault>)> = views
         .into_par_iter()
         .map(|view| {
             let photo = view.shot.and_then(|shot| shot.read(&view.name, options));
@@ -47,10 +47,14 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
         })
         .collect();
     let (mut train, mut test, mut skipped) = (Vec::new(), Vec::new(), Vec::new());
+    let mut sum_shown = 0.0;
     for (split, name, result) in read {
         match (result, split) {
-            (Ok(view), Split::Train) => train.push(view),
-            (Ok(view), Split::Test) => test.push(view),
+            (Ok((view, shown)), Split::Train) => {
+                train.push(view);
+                sum_shown += shown;
+            }
+            (Ok((view, _)), Split::Test) => test.push(view),
             (Err(fault), split) => skipped.push(SkippedView { split, name, fault }),
         }
     }
@@ -118,7 +122,8 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
         notes,
     };
     let background = options.background.rgb();
-    let capture = Capture { train, test, points, points_origin, normalisation, extent: EXTENT, background };
+    let shown = sum_shown / train.len() as f64;
+    let capture = Capture { train, test, points, points_origin, normalisation, extent: EXTENT, background, shown };
     Ok((capture, report))
 }
 

@@ -62,14 +62,17 @@ fn in_words(error: impl std::fmt::Display) -> String {
     error.to_string().split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Decodes the image file `path` and composites it on `background`.
+/// Decodes the image file `path` and composites it on `background`; also returns the share of its pixels that are not wholly
+/// transparent.
 ///
 /// # Errors
 /// What the decoder or the system said, for people.
-pub(super) fn read_composited(path: &Path, background: Background) -> Result<Image, String> {
+pub(super) fn read_composited(path: &Path, background: Background) -> Result<(Image, f64), String> {
     let rgba = decode(path)?.into_rgba8();
     let (width_px, height_px) = rgba.dimensions();
-    Ok(Image { width_px, height_px, rgb: composite(rgba.as_raw(), background) })
+    let n_shown = rgba.pixels().filter(|pixel| pixel.0[3] > 0).count();
+    let shown = n_shown as f64 / f64::from(width_px * height_px).max(1.0);
+    Ok((Image { width_px, height_px, rgb: composite(rgba.as_raw(), background) }, shown))
 }
 
 /// Composites straight-alpha pixels on a background: `⌊(c·a + b·(255 − a)) / 255⌋` per channel.
@@ -242,7 +245,7 @@ mod tests {
             Image { width_px: 32, height_px: 24, rgb: (0..32 * 24).flat_map(|i| [(i / 4) as u8; 3]).collect() };
         smooth.write_jpeg(&path).expect("a JPEG");
         assert!(jpeg_end::is_whole(&std::fs::read(&path).expect("it was written")));
-        let read = read_composited(&path, Background::Black).expect("a JPEG");
+        let (read, _) = read_composited(&path, Background::Black).expect("a JPEG");
         assert!(read.rgb.iter().zip(&smooth.rgb).all(|(a, b)| a.abs_diff(*b) <= 8));
     }
 

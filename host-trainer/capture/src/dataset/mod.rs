@@ -120,6 +120,8 @@ pub struct Capture {
     pub extent: f64,
     /// What lies behind everything, linear copy of the 8-bit value / 255.
     pub background: [f32; 3],
+    /// Mean share of a training photograph's pixels that are not wholly transparent; 1 without alpha channels.
+    pub shown: f64,
 }
 
 /// The extent every capture is scaled to, because constants such as the near cull 0.2 assume extents of about 5.

@@ -8,16 +8,17 @@ use super::undistort::undistorted;
 use super::{LoadOptions, Mask, View, ViewFault};
 
 impl Shot {
-    /// Decodes the photograph as the view of a pinhole camera in capture units.
+    /// Decodes the photograph as the view of a pinhole camera in capture units; also returns the share of its pixels that are not wholly
+    /// transparent.
     ///
     /// Composites on the background, undistorts at full resolution where the lens distorts, then reduces by area and cuts to
     /// the frame asked for; the camera and the mask follow.
     ///
     /// # Errors
     /// [`ViewFault::Unreadable`], [`ViewFault::Mask`] or [`ViewFault::Small`].
-    pub(super) fn read(&self, name: &str, options: &LoadOptions) -> Result<View, ViewFault> {
+    pub(super) fn read(&self, name: &str, options: &LoadOptions) -> Result<(View, f64), ViewFault> {
         let unreadable = |message| ViewFault::Unreadable { path: self.path.clone(), message };
-        let mut image = read_composited(&self.path, options.background).map_err(unreadable)?;
+        let (mut image, shown) = read_composited(&self.path, options.background).map_err(unreadable)?;
         let mut mask = self.read_mask()?;
         if !self.lens.is_pinhole() {
             (image, mask) = undistorted(&image, mask.as_ref(), &self.lens);
@@ -34,7 +35,7 @@ impl Shot {
             mask = mask.as_ref().map(|mask| framing.mask(mask));
             camera = framing.camera(&camera);
         }
-        Ok(View { name: name.to_owned(), camera, image, mask })
+        Ok((View { name: name.to_owned(), camera, image, mask }, shown))
     }
 
     fn read_mask(&self) -> Result<Option<Mask>, ViewFault> {

@@ -287,6 +287,11 @@ fn attach(modules: &mut Modules, names: &[TrainingModule]) -> Result<()> {
 }
 
 impl RunOptions {
+    /// Whether `--set` names this table or a key in it.
+    pub(crate) fn sets(&self, table: &str) -> bool {
+        self.set.iter().any(|key| key.trim_start().starts_with(table))
+    }
+
     /// The same for explicit Gaussians.
     pub(crate) fn applied_to_explicit(&self, mut config: ExplicitRunConfig) -> Result<ExplicitRunConfig> {
         if self.fork_at.is_some() {

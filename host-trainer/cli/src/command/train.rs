@@ -205,6 +205,14 @@ pub(crate) fn load(config: &mut RunConfig) -> Result<Capture> {
     let capture = source.load(config.train.seed)?;
     check_size(&capture, &config.encoding.limits)?;
     config.train = config.train.resolved_for(&capture);
+    if std::mem::take(&mut config.scales_lambda) && config.train.backbone.is_coded() && capture.shown < 1.0 {
+        config.train.hac.lambda *= capture.shown;
+        eprintln!(
+            "lambda {:.5}, since {:.0} % of the pixels show the scene",
+            config.train.hac.lambda,
+            100.0 * capture.shown
+        );
+    }
     eprintln!("voxel size {:.5}, normalised units", config.train.voxel_size_for(&capture));
     Ok(capture)
 }

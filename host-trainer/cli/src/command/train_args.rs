@@ -49,7 +49,8 @@ pub(crate) struct Args {
     preset: Option<Preset>,
     #[command(flatten)]
     quality: QualityOptions,
-    /// Weight of a value's bits in the loss: the larger, the smaller the bundle [default: 0.002; by --flash for a device]
+    /// Weight of a value's bits in the loss: the larger, the smaller the bundle [default: 0.002 times the share of
+    /// the pixels that are not transparent; by --flash for a device]
     #[arg(long, value_name = "X", help_heading = QUALITY)]
     lambda: Option<f64>,
     #[command(flatten)]
@@ -228,6 +229,7 @@ impl Args {
             base.effects.price = Price::for_device();
         }
         let mut config = self.applied_to(base)?;
+        config.scales_lambda &= self.lambda.is_none() && !is_for_device && !self.options.sets("train.hac");
         if is_for_device {
             self.device.choose(&self.quality, self.lambda, &mut config)?;
         }

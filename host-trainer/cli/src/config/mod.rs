@@ -43,6 +43,9 @@ pub(crate) struct RunConfig {
     pub(crate) train: TrainConfig,
     pub(crate) encoding: Encoding,
     pub(crate) effects: EffectsConfig,
+    /// Whether the weight of the bits still has to be multiplied by the share of the pixels that show the scene: where nobody said one.
+    #[serde(skip)]
+    pub(crate) scales_lambda: bool,
 }
 
 impl Default for RunConfig {
@@ -57,6 +60,7 @@ impl Default for RunConfig {
             train: TrainConfig::default(),
             encoding: Encoding::default(),
             effects: EffectsConfig::default(),
+            scales_lambda: false,
         }
     }
 }

@@ -7,8 +7,9 @@ use pocketsplat_trainer::train::module::{Modules, Rdo};
 
 use super::{CaptureOptions, RunConfig};
 
-/// Weight of a value's bits where offsets and anchors that are not worth their bits are pruned: with it lego at 100 px is within
-/// 0.15 dB of HAC alone at 0.004, in 40 % fewer bytes (`docs/rate-distortion.md`).
+/// Weight of a value's bits where offsets and anchors that are not worth their bits are pruned, for photographs that show the scene
+/// everywhere (`docs/benchmarks.md`). The loss is a mean over pixels: where most of them are transparent, and right from the start,
+/// the same weight would count bits for more.
 const LAMBDA: f64 = 0.002;
 
 /// How long a run takes, and how large its images are; all presets train HAC with pruning by worth.
@@ -55,6 +56,7 @@ impl Preset {
                 modules: Modules { rdo: Some(Rdo::default()), ..Modules::default() },
                 ..TrainConfig::of(Backbone::Hac)
             },
+            scales_lambda: true,
             ..RunConfig::default()
         }
     }

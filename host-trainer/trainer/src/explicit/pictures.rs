@@ -55,6 +55,7 @@ pub fn capture(gaussians: &Gaussians, train: &[Camera], test: &[Camera], how: &P
         normalisation,
         extent: EXTENT,
         background: how.background,
+        shown: 1.0,
     })
 }
 

@@ -55,6 +55,7 @@ pub(crate) fn many_views(n: u32) -> Capture {
         normalisation: Normalisation { centre: DVec3::ZERO, scale: 1.0 },
         extent: EXTENT,
         background: [0.0; 3],
+        shown: 1.0,
     }
 }
 

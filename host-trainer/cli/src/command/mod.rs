@@ -175,7 +175,7 @@ mod tests {
         for command in commands() {
             let under_device = command.get_arguments().filter(|arg| arg.get_help_heading() == Some(DEVICE));
             let others: Vec<&str> = under_device.map(|arg| arg.get_id().as_str()).collect();
-            assert!(others.iter().all(|name| ["ram", "flash", "target"].contains(name)), "{others:?}");
+            assert!(others.iter().all(|name| ["level", "ram", "flash", "target"].contains(name)), "{others:?}");
         }
     }
 

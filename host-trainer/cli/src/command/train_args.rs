@@ -56,7 +56,7 @@ pub(crate) struct Args {
     #[command(flatten)]
     device: DeviceArgs,
     /// Configuration to read, as a run folder has it; options override it.
-    #[arg(long, value_name = "FILE.toml", conflicts_with = "resume", help_heading = RUN)]
+    #[arg(long, value_name = "FILE.toml", conflicts_with = "resume", help_heading = RUN, hide_short_help = true)]
     config: Option<PathBuf>,
     /// Run folder of an interrupted run to go on with; give DATASET as well if the capture has moved.
     #[arg(long, value_name = "OUT.run", help_heading = RUN)]

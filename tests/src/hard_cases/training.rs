@@ -48,6 +48,7 @@ fn capture(pixel: impl Fn(u32, u32, u32) -> [u8; 3], points: Vec<DVec3>) -> Capt
         normalisation: Normalisation { centre: DVec3::ZERO, scale: 1.0 },
         extent: EXTENT,
         background: [0.0; 3],
+        shown: 1.0,
     }
 }
 

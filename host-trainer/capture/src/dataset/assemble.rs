@@ -8,9 +8,10 @@ use rayon::prelude::*;
 use super::framing::Framing;
 use super::listing::{Listing, commonest};
 use super::normalise::random_points_world;
+use super::photo::Photo;
 use super::{
     Capture, DatasetError, EXTENT, Layout, LoadOptions, LoadReport, Normalisation, PointsOrigin, SkippedView, Split,
-    View, ViewFault, frusta,
+    ViewFault, frusta,
 };
 
 /// Fewer views than this leave depth undetermined almost everywhere.
@@ -39,7 +40,7 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
     }
     let Listing { layout, source, views, points, unposed, notes } = listing;
     let mut notes: Vec<String> = notes.into_iter().map(|note| note.text).collect();
-    let read: Vec<(Split, String, Result<(View, f64), ViewFault>)> = views
+    let read: Vec<(Split, String, Result<Photo, ViewFault>)> = views
         .into_par_iter()
         .map(|view| {
             let photo = view.shot.and_then(|shot| shot.read(&view.name, options));
@@ -50,11 +51,11 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
     let mut sum_shown = 0.0;
     for (split, name, result) in read {
         match (result, split) {
-            (Ok((view, shown)), Split::Train) => {
+            (Ok(Photo { view, shown }), Split::Train) => {
                 train.push(view);
                 sum_shown += shown;
             }
-            (Ok((view, _)), Split::Test) => test.push(view),
+            (Ok(Photo { view, .. }), Split::Test) => test.push(view),
             (Err(fault), split) => skipped.push(SkippedView { split, name, fault }),
         }
     }

@@ -7,16 +7,22 @@ use super::listing::Shot;
 use super::undistort::undistorted;
 use super::{LoadOptions, Mask, View, ViewFault};
 
+/// A photograph that was read.
+pub(super) struct Photo {
+    pub(super) view: View,
+    /// Share of its pixels that are not wholly transparent.
+    pub(super) shown: f64,
+}
+
 impl Shot {
-    /// Decodes the photograph as the view of a pinhole camera in capture units; also returns the share of its pixels that are not wholly
-    /// transparent.
+    /// Decodes the photograph as the view of a pinhole camera in capture units.
     ///
     /// Composites on the background, undistorts at full resolution where the lens distorts, then reduces by area and cuts to
     /// the frame asked for; the camera and the mask follow.
     ///
     /// # Errors
     /// [`ViewFault::Unreadable`], [`ViewFault::Mask`] or [`ViewFault::Small`].
-    pub(super) fn read(&self, name: &str, options: &LoadOptions) -> Result<(View, f64), ViewFault> {
+    pub(super) fn read(&self, name: &str, options: &LoadOptions) -> Result<Photo, ViewFault> {
         let unreadable = |message| ViewFault::Unreadable { path: self.path.clone(), message };
         let (mut image, shown) = read_composited(&self.path, options.background).map_err(unreadable)?;
         let mut mask = self.read_mask()?;
@@ -35,7 +41,7 @@ impl Shot {
             mask = mask.as_ref().map(|mask| framing.mask(mask));
             camera = framing.camera(&camera);
         }
-        Ok((View { name: name.to_owned(), camera, image, mask }, shown))
+        Ok(Photo { view: View { name: name.to_owned(), camera, image, mask }, shown })
     }
 
     fn read_mask(&self) -> Result<Option<Mask>, ViewFault> {

@@ -34,7 +34,7 @@ impl Look {
 /// Decodes every image; views that fail become faults of the listing.
 pub(super) fn check(listing: &mut Listing, options: &LoadOptions, findings: &mut Vec<Finding>) {
     let decode = |listed: &mut ListedView| match listed.shot.as_ref().ok()?.read(&listed.name, options) {
-        Ok((view, _)) => Some(Look::of(&view)),
+        Ok(photo) => Some(Look::of(&photo.view)),
         Err(fault) => {
             listed.shot = Err(fault);
             None

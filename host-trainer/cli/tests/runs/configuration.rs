@@ -47,6 +47,35 @@ fn a_written_configuration_gives_the_same_bundle_again() {
     assert!(home.join("c.run/iteration-00000005.checkpoint").exists());
 }
 
+/// `train.hac.lambda` in the configuration of a run.
+fn lambda_of(run: &Path) -> f64 {
+    let written: toml::Table = fs::read_to_string(run.join("config.toml")).unwrap().parse().unwrap();
+    written["train"]["hac"]["lambda"].as_float().unwrap()
+}
+
+#[test]
+fn bits_weigh_as_much_for_each_pixel_that_shows_the_scene_unless_a_weight_is_given() {
+    let home = folder("share");
+    let photographs = fs::read_dir(capture().join("train")).unwrap();
+    let shares: Vec<f64> = photographs
+        .map(|entry| image::open(entry.unwrap().path()).unwrap().into_rgba8())
+        .map(|image| {
+            image.pixels().filter(|pixel| pixel.0[3] > 0).count() as f64 / f64::from(image.width() * image.height())
+        })
+        .collect();
+    let share = shares.iter().sum::<f64>() / shares.len() as f64;
+    assert!((0.1..0.9).contains(&share), "{share}");
+    let lambda = |name: &str, options: &[&str]| {
+        let mut command = pocketsplat();
+        command.arg("train").arg(capture()).arg("-o").arg(home.join(name)).arg("--no-report");
+        succeeds(command.args(["--iterations", "20", "--feature-dim", "8", "--offsets", "3"]).args(options));
+        lambda_of(&home.join(name).with_extension("run"))
+    };
+    assert!((lambda("default.psb", &[]) - 0.002 * share).abs() < 1e-9);
+    assert_eq!(lambda("given.psb", &["--lambda", "0.002"]), 0.002);
+    assert_eq!(lambda("set.psb", &["--set", "train.hac.lambda=0.002"]), 0.002);
+}
+
 #[test]
 fn what_a_configuration_cannot_say_is_refused_by_name() {
     let home = folder("bad-config");

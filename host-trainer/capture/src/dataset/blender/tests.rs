@@ -94,6 +94,7 @@ fn a_sound_capture_loads_with_its_cameras_and_pixels() {
     assert!((origin - expected).length() < 1e-9, "{origin}");
     assert_eq!(capture.train[1].image.rgb[..3], [100, 50, 0], "200, 100, 0 at alpha 128 on black, truncated");
     assert_eq!(capture.train[1].name, "train/r_1");
+    assert_eq!(capture.shown, 1.0, "no pixel is wholly transparent");
 }
 
 #[test]

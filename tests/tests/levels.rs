@@ -127,5 +127,9 @@ fn what_is_not_measured_has_no_level() {
     let bundle = Bundle::parse(&bytes).expect("sound");
     assert_eq!([0, 1, 2].map(|tier| Level::least(&bundle, tier)), [3, 0, 3]);
     assert_eq!(LEVELS[0].needs(&bundle, 3), None, "no such tier");
-    assert_eq!(declared_levels(&bundle).filter(Result::is_err).count(), 1, "tier 1 says level 3 and cannot");
+    assert_eq!(
+        declared_levels(&bundle).filter(Result::is_err).count(),
+        1,
+        "tier 1 declares level 3 and does not keep it"
+    );
 }

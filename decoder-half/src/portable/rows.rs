@@ -133,7 +133,7 @@ pub fn blend_rows(
 ///   is negated. * `width`: pixels of a row that are drawn, at most [`ROW_LEN`].
 ///
 /// # Budget
-/// Two exponentials a row; 18 instructions a pixel with the assembly of a Cortex-M.
+/// Two exponentials a row, two multiplications and the blend a pixel.
 #[inline(always)]
 pub fn blend_rows_with(
     splat: &RowSplat,

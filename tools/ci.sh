@@ -46,6 +46,16 @@ need_command() { # COMMAND PACKAGE…
     sh "$@" 2>&1) || fail "$command is missing and \`apt-get install $*\` failed: ${log##*$'\n'}"
 }
 
+# A driver of Vulkan that computes on the CPU, so that kernels are tested where no GPU is.
+need_lavapipe() {
+  local driver
+  for driver in /usr/share/vulkan/icd.d/lvp_icd.*; do
+    [ -e "$driver" ] && return
+  done
+  # The name is of no command.
+  need_command lavapipe mesa-vulkan-drivers
+}
+
 need_cargo() {
   command -v cargo >/dev/null || fail "cargo is missing: install rustup from https://rustup.rs, which reads rust-toolchain.toml"
   need_command cc gcc libc6-dev
@@ -91,6 +101,7 @@ job_fmt() {
 
 job_clippy() {
   cargo clippy --workspace --all-targets --locked -- -D warnings
+  cargo clippy -p pocketsplat --no-default-features --locked -- -D warnings
 }
 
 job_doc() {
@@ -104,7 +115,10 @@ job_test() {
   # Files of Gaussians are read by programs that are not ours.
   need_command python3 python3
   need_command dwebp webp
-  POCKETSPLAT_NEEDS_BROWSER=1 POCKETSPLAT_NEEDS_READERS=1 cargo test --workspace --locked --no-fail-fast
+  # Kernels are compared with the CPU's operations, on whatever adapter there is.
+  need_lavapipe
+  POCKETSPLAT_NEEDS_BROWSER=1 POCKETSPLAT_NEEDS_READERS=1 POCKETSPLAT_NEEDS_GPU=1 \
+    cargo test --workspace --locked --no-fail-fast
   # Not unified into the workspace's build: `defmt` wants a logger at link time, the firmware has one.
   cargo test -p pocketsplat-core --features embedded-graphics --locked
   # The largest frames where overflow is not checked, as firmware is built; above it was.
@@ -121,6 +135,12 @@ job_viewer() {
   viewer/build.sh "$built"
   cmp "$built" viewer/pocketsplat.wasm ||
     fail "viewer/pocketsplat.wasm is not what its source builds; run \`tools/ci.sh bless-viewer\` and commit it"
+}
+
+# Not one of `jobs`, part of `test`: the kernels alone.
+job_gpu() {
+  need_lavapipe
+  POCKETSPLAT_NEEDS_GPU=1 cargo test -p pocketsplat-trainer --features gpu --lib --locked gpu::
 }
 
 # Not one of `jobs`: writes the module that `viewer` compares with.

@@ -48,6 +48,7 @@ const CRATES: [(&str, &[&str]); 7] = [
             "ops",
             "integer_model",
             "step",
+            "gpu",
             "train",
             "explicit",
             "bundle",

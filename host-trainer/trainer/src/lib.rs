@@ -2,7 +2,7 @@
 //!
 //! Modules in the order data flows through them, each importing only from those before it:
 //! [`real`] and [`camera`] → [`scene`] → [`ops`] → [`step`] → [`train`] → [`bundle`] → [`render`] → [`metrics`]. [`explicit`] draws and
-//! trains explicit Gaussians instead of anchors, beside `train`. [`integer_model`] is
+//! trains explicit Gaussians instead of anchors, beside `train`. `gpu` (cargo feature `gpu`) is `ops` and `step` on a graphics card. [`integer_model`] is
 //! what `train`'s last iterations and `bundle` share; [`device`] says what a device holds and [`encode`] makes the bundle of a run that
 //! fits it; [`effects`], [`cost`] and [`verify`] ask all of them.
 
@@ -16,6 +16,8 @@ pub mod explicit;
 pub mod export;
 #[cfg(test)]
 pub(crate) mod finite_difference;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 pub mod integer_model;
 pub mod manifest;
 pub mod metrics;

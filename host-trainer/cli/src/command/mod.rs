@@ -6,6 +6,7 @@ mod capture;
 mod compare;
 mod cost;
 mod demo;
+mod devices;
 mod doctor;
 mod effects;
 mod estimate;
@@ -70,6 +71,7 @@ enum Command {
     Synth(synth::Args),
     Demo(demo::Args),
     Doctor(doctor::Args),
+    Devices(devices::Args),
 }
 
 /// Parses the command line, runs the command, and says what failed: as JSON on stdout where results go there as JSON.
@@ -141,6 +143,7 @@ fn dispatch(cli: Cli) -> Result<ExitCode> {
         Command::Plot(args) => plot::run(&args),
         Command::Synth(args) => synth::run(&args),
         Command::Doctor(args) => doctor::run(&args),
+        Command::Devices(args) => devices::run(&args),
         Command::Demo(args) => demo::run(&args),
     }
     .map(|()| ExitCode::SUCCESS)

@@ -9,7 +9,7 @@ const RADIUS: usize = TAPS / 2;
 const SIGMA: f64 = 1.5;
 
 /// The window's weights, which add up to 1.
-pub(super) fn window<R: Real>() -> [R; TAPS] {
+pub(crate) fn window<R: Real>() -> [R; TAPS] {
     let bell: [f64; TAPS] = std::array::from_fn(|i| {
         let d = i as f64 - RADIUS as f64;
         (-d * d / (2.0 * SIGMA * SIGMA)).exp()

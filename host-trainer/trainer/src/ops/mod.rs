@@ -11,7 +11,7 @@
 pub mod adam;
 pub mod adaptive_step;
 pub mod anchor_bits;
-mod blur;
+pub(crate) mod blur;
 pub mod detail;
 pub mod explicit_gaussians;
 pub mod file_order;

@@ -7,6 +7,7 @@ use crate::scene::ModelShape;
 
 /// A 3-D Gaussian with one colour, in the world frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C)]
 pub struct Gaussian<R> {
     /// Centre, world frame.
     pub centre: [R; 3],

@@ -34,6 +34,7 @@ pub struct Splat<R> {
 
 /// How far a splat reaches and when it is drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C)]
 pub struct Footprint<R> {
     /// Depth of the centre in the camera frame, normalised units.
     pub depth: R,

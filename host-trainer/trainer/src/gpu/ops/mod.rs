@@ -1,0 +1,14 @@
+//! The operations of [`crate::ops`] as kernels.
+//!
+//! Gaussians, splats and footprints stand in slots: anchor by anchor of the view, offset by offset. A slot without a Gaussian has opacity
+//! 0, one without a splat depth 0; so nothing has to be moved together, and the order is that of the CPU.
+
+pub mod l1;
+pub mod project;
+pub mod radix_sort;
+pub mod rasterise;
+pub mod scan;
+pub mod ssim;
+pub mod sum;
+pub mod target;
+pub mod tiles;

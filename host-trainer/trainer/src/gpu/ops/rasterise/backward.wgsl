@@ -1,0 +1,146 @@
+// Front to back, as forward: dL/dα_i = T_i·(c_i·g) − rest_i/(1 − α_i), and rest, what of g·C has not been blended yet, shrinks.
+//
+// Four splats at a time: every pixel leaves its share of dL/d(power) and its weight in shared memory, then a thread adds up a row of one
+// splat, then a thread adds up the rows of one number of one splat. The order of every sum is fixed.
+
+@group(0) @binding(0) var<storage, read> splats: array<Splat>;
+@group(0) @binding(1) var<storage, read> starts: array<u32>;
+@group(0) @binding(2) var<storage, read> entries: array<u32>;
+@group(0) @binding(3) var<storage, read> slot_of_pair: array<u32>;
+@group(0) @binding(4) var<storage, read> image: array<f32>;
+// [3, height, width].
+@group(0) @binding(5) var<storage, read> d_image: array<f32>;
+// [pairs, 9], in the order of slot_of_pair.
+@group(0) @binding(6) var<storage, read_write> d_pairs: array<f32>;
+
+const AT_ONCE: u32 = 4u;
+const N_NUMBERS: u32 = 9u;
+// Sums of a row: dp, dp·dx, dp·dx², weight·g.
+const N_ROW_SUMS: u32 = 6u;
+
+var<workgroup> d_colour: array<array<f32, 3>, TILE_PIXELS>;
+var<workgroup> d_power: array<f32, AT_ONCE * TILE_PIXELS>;
+var<workgroup> weights: array<f32, AT_ONCE * TILE_PIXELS>;
+var<workgroup> row_sums: array<f32, AT_ONCE * TILE_PX * N_ROW_SUMS>;
+
+@compute @workgroup_size(256)
+fn backward(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) n_groups: vec3<u32>,
+    @builtin(local_invocation_index) thread: u32,
+) {
+    let tile = group_of(group, n_groups);
+    if tile >= parameters.n_tiles {
+        return;
+    }
+    let width = parameters.size_px[0];
+    let height = parameters.size_px[1];
+    let across = (width + TILE_PX - 1u) / TILE_PX;
+    let x0 = tile % across * TILE_PX;
+    let y0 = tile / across * TILE_PX;
+    let x = x0 + thread % TILE_PX;
+    let y = y0 + thread / TILE_PX;
+    let centre = vec2(f32(x) + 0.5, f32(y) + 0.5);
+    var live = x < width && y < height;
+    var t = 1.0;
+    var g = vec3(0.0);
+    var rest = 0.0;
+    if live {
+        let at = y * width + x;
+        let n_pixels = width * height;
+        for (var channel = 0u; channel < 3u; channel++) {
+            g[channel] = d_image[channel * n_pixels + at];
+            rest += image[channel * n_pixels + at] * g[channel];
+        }
+    }
+    d_colour[thread] = array(g.x, g.y, g.z);
+    let end = starts[tile + 1u];
+    for (var first = starts[tile]; first < end; first += BATCH) {
+        let n = min(BATCH, end - first);
+        workgroupBarrier();
+        if thread < n {
+            batch[thread] = splats[slot_of_pair[entries[first + thread]]];
+        }
+        workgroupBarrier();
+        for (var start = 0u; start < n; start += AT_ONCE) {
+            for (var i = 0u; i < AT_ONCE; i++) {
+                var dp = 0.0;
+                var weight = 0.0;
+                if live && start + i < n {
+                    let splat = batch[start + i];
+                    let alpha = blend(splat, centre).alpha;
+                    let after = t * (1.0 - alpha);
+                    if after < TRANSMITTANCE_MIN {
+                        live = false;
+                    } else if alpha > 0.0 {
+                        weight = alpha * t;
+                        let shade = dot(vec3(splat.colour[0], splat.colour[1], splat.colour[2]), g);
+                        rest -= weight * shade;
+                        // A saturated alpha does not follow its splat.
+                        if alpha < ALPHA_MAX {
+                            dp = (t * shade - rest / (1.0 - alpha)) * alpha;
+                        }
+                        t = after;
+                    }
+                }
+                d_power[i * TILE_PIXELS + thread] = dp;
+                weights[i * TILE_PIXELS + thread] = weight;
+            }
+            workgroupBarrier();
+            add_rows(thread, start, x0, y0);
+            workgroupBarrier();
+            if thread < AT_ONCE * N_NUMBERS && start + thread / N_NUMBERS < n {
+                let i = thread / N_NUMBERS;
+                let number = thread % N_NUMBERS;
+                d_pairs[entries[first + start + i] * N_NUMBERS + number] = add_up(i, number, batch[start + i], y0);
+            }
+        }
+    }
+}
+
+fn add_rows(thread: u32, start: u32, x0: u32, y0: u32) {
+    if thread >= AT_ONCE * TILE_PX {
+        return;
+    }
+    let i = thread / TILE_PX;
+    let row = thread % TILE_PX;
+    let dy = f32(y0 + row) + 0.5 - batch[start + i].mean_px[1];
+    let dx0 = f32(x0) + 0.5 - batch[start + i].mean_px[0] - batch[start + i].shear * dy;
+    var along = vec3(0.0);
+    var colour = vec3(0.0);
+    for (var column = 0u; column < TILE_PX; column++) {
+        let pixel = row * TILE_PX + column;
+        let dp = d_power[i * TILE_PIXELS + pixel];
+        let dx = dx0 + f32(column);
+        along += vec3(dp, dp * dx, dp * dx * dx);
+        let g = d_colour[pixel];
+        colour += weights[i * TILE_PIXELS + pixel] * vec3(g[0], g[1], g[2]);
+    }
+    let at = thread * N_ROW_SUMS;
+    for (var k = 0u; k < 3u; k++) {
+        row_sums[at + k] = along[k];
+        row_sums[at + 3u + k] = colour[k];
+    }
+}
+
+// One number of the gradient of splat i of the four, in the order of Splat's fields.
+fn add_up(i: u32, number: u32, splat: Splat, y0: u32) -> f32 {
+    var sum = 0.0;
+    for (var row = 0u; row < TILE_PX; row++) {
+        let at = (i * TILE_PX + row) * N_ROW_SUMS;
+        let dy = f32(y0 + row) + 0.5 - splat.mean_px[1];
+        let dp = row_sums[at];
+        let dp_dx = row_sums[at + 1u];
+        switch number {
+            case 0u: { sum += splat.row_precision * dp_dx; }
+            case 1u: { sum += splat.column_precision * (dp * dy) - splat.shear * (splat.row_precision * dp_dx); }
+            case 2u: { sum += splat.row_precision * (dp_dx * dy); }
+            case 3u: { sum -= 0.5 * row_sums[at + 2u]; }
+            case 4u: { sum -= 0.5 * (dp * dy * dy); }
+            case 5u: { sum += dp; }
+            default: { sum += row_sums[at + number - 3u]; }
+        }
+    }
+    // dp is alpha·dL/d(alpha).
+    return select(sum, sum / splat.opacity, number == 5u);
+}

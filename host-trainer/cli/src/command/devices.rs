@@ -1,6 +1,9 @@
 //! `pocketsplat devices`: what training can run on.
 
+use std::str::FromStr;
+
 use anyhow::Result;
+use pocketsplat_trainer::step::SharedImageStages;
 use serde::Serialize;
 
 use super::output;
@@ -38,6 +41,66 @@ struct Devices {
 pub(crate) fn run(args: &Args) -> Result<()> {
     let found = Devices { cpu_threads: rayon::current_num_threads(), devices: devices() };
     output::print_or(&found, args.json, &found)
+}
+
+/// What `--device` asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum DeviceChoice {
+    /// A GPU where there is one.
+    Auto,
+    Cpu,
+    /// A GPU: of this number, or the best.
+    Gpu(Option<usize>),
+}
+
+impl FromStr for DeviceChoice {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        let of_number = || name.strip_prefix("gpu:").and_then(|n| n.parse().ok());
+        match name {
+            "auto" => Ok(Self::Auto),
+            "cpu" => Ok(Self::Cpu),
+            "gpu" => Ok(Self::Gpu(None)),
+            _ => of_number()
+                .map(|n| Self::Gpu(Some(n)))
+                .ok_or_else(|| "it is auto, cpu, gpu or gpu:N, N from 0".to_owned()),
+        }
+    }
+}
+
+impl DeviceChoice {
+    /// Opens the GPU that is asked for, or found; none where the CPU is to do it.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn open(self) -> Result<Option<SharedImageStages<f32>>> {
+        use pocketsplat_trainer::gpu::{AdapterKind, Gpu, GpuImage, choose};
+        use std::sync::{Arc, Mutex};
+
+        let adapter = match self {
+            Self::Cpu => return Ok(None),
+            // A driver on the CPU is slower than the CPU.
+            Self::Auto => {
+                choose(None).ok().filter(|found| found.kind != AdapterKind::Software && found.lack().is_none())
+            }
+            Self::Gpu(index) => Some(choose(index)?),
+        };
+        let Some(adapter) = adapter else {
+            eprintln!("device: cpu, since no GPU was found");
+            return Ok(None);
+        };
+        eprintln!("device: {} ({}, {})", adapter.name, adapter.kind, adapter.backend);
+        Ok(Some(Arc::new(Mutex::new(GpuImage::new(&Gpu::open(&adapter)?)?))))
+    }
+
+    #[cfg(not(feature = "gpu"))]
+    pub(crate) fn open(self) -> Result<Option<SharedImageStages<f32>>> {
+        match self {
+            Self::Cpu | Self::Auto => Ok(None),
+            Self::Gpu(_) => anyhow::bail!(
+                "this program was built without GPUs; install it with `cargo install --path host-trainer/cli`, or use --device cpu"
+            ),
+        }
+    }
 }
 
 #[cfg(feature = "gpu")]
@@ -81,6 +144,23 @@ impl std::fmt::Display for Devices {
             writeln!(f, "no GPU: no driver of Vulkan, Metal or Direct3D 12 offers an adapter")
         } else {
             Ok(())
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn devices_are_chosen_by_name() {
+        let parse = |name: &str| name.parse::<DeviceChoice>();
+        assert_eq!(parse("auto"), Ok(DeviceChoice::Auto));
+        assert_eq!(parse("cpu"), Ok(DeviceChoice::Cpu));
+        assert_eq!(parse("gpu"), Ok(DeviceChoice::Gpu(None)));
+        assert_eq!(parse("gpu:3"), Ok(DeviceChoice::Gpu(Some(3))));
+        for wrong in ["", "cuda", "gpu:", "gpu:-1", "gpu:x", "gpu0"] {
+            assert!(parse(wrong).is_err(), "{wrong}");
         }
     }
 }

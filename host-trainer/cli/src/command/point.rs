@@ -52,7 +52,7 @@ pub(super) fn trained(config: &RunConfig, capture: &Capture, stop: &AtomicBool) 
     } else {
         train::Start::New(Estimate::try_out(capture, &config.train, false, stop)?)
     };
-    Ok(train::train_in(folder, config, capture, start, stop)?.is_some())
+    Ok(train::train_in(folder, config, capture, start, None, stop)?.is_some())
 }
 
 /// Stops where the run in a point's folder is not the one that is asked for, in its bundle's bytes or its capture.

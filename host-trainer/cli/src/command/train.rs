@@ -15,6 +15,7 @@ use pocketsplat_instructions::level::{Bound, Level, Profile};
 use pocketsplat_trainer::device::Limits;
 use pocketsplat_trainer::effects::Effect;
 use pocketsplat_trainer::encode::{Encoding, Fitted, Scale};
+use pocketsplat_trainer::step::SharedImageStages;
 use pocketsplat_trainer::train::finish::Finished;
 use pocketsplat_trainer::train::gauge::Gauge;
 use pocketsplat_trainer::train::run::{Ending, Interval, RunError, RunFolder, fork, shell_word};
@@ -183,7 +184,7 @@ fn train_and_print<'a>(
         return Ok(ExitCode::from(stop::INTERRUPTED));
     }
     let path = folder.path().to_owned();
-    let Some(result) = train_in(folder, &config, capture, start, &stop)? else {
+    let Some(result) = train_in(folder, &config, capture, start, args.device()?, &stop)? else {
         return Ok(ExitCode::from(stop::INTERRUPTED));
     };
     let (dataset, bundle) = args.named_paths(&config.dataset, &config.output);
@@ -255,6 +256,7 @@ pub(crate) fn train_in<'a>(
     config: &RunConfig,
     capture: &'a Capture,
     start: Start<'a>,
+    device: Option<SharedImageStages<f32>>,
     stop: &AtomicBool,
 ) -> Result<Option<TrainResult>> {
     let mut folder = folder.forking_at(&config.fork_at);
@@ -263,7 +265,7 @@ pub(crate) fn train_in<'a>(
     let warned = if let Start::New(warned) = start { warned } else { Warned::default() };
     let trainer = match start {
         Start::New(_) => Trainer::new(capture, config.train)?,
-        Start::Resumed => resumed(&folder, config, capture)?,
+        Start::Resumed => resumed(&folder, config, capture, device.clone())?,
         Start::Forked(trainer) => {
             // Without it a resumed run would begin with the capture's points.
             folder.save(&*trainer)?;
@@ -271,6 +273,7 @@ pub(crate) fn train_in<'a>(
         }
     };
     let mut trainer = trainer.fitting(gauge(scale.as_ref()));
+    trainer.set_device(device);
     folder.write_config(&config.to_toml()?)?;
     let interval = config.checkpoint_every.map_or(Interval::Seconds(CHECKPOINT_SECONDS), Interval::Iterations);
     let how_to_go_on = || format!("go on with `pocketsplat train --resume {}`", shell_word(&path));
@@ -280,7 +283,7 @@ pub(crate) fn train_in<'a>(
     let ending = ending.map_err(|error| {
         let stopped = format!("training stopped at iteration {}", trainer.iteration);
         match error {
-            // It would come to the same end again.
+            // It would come to the same end again; a device says itself what to do.
             RunError::Train(_) => anyhow::Error::new(error).context(stopped),
             _ => anyhow::Error::new(error).context(format!("{stopped}; to retry, {}", how_to_go_on())),
         }
@@ -306,7 +309,12 @@ fn gauge<'a>(scale: Option<&'a Scale<'a>>) -> Option<&'a dyn Gauge> {
 }
 
 /// The run as its newest sound checkpoint has it, or at its start where it was stopped before the first one.
-fn resumed<'a>(folder: &RunFolder, config: &RunConfig, capture: &'a Capture) -> Result<Trainer<'a>> {
+fn resumed<'a>(
+    folder: &RunFolder,
+    config: &RunConfig,
+    capture: &'a Capture,
+    device: Option<SharedImageStages<f32>>,
+) -> Result<Trainer<'a>> {
     let Some(resumed) = folder.resume(capture)? else {
         eprintln!("the run in {} has no checkpoint yet; it begins anew", folder.path().display());
         return Ok(Trainer::new(capture, config.train)?);
@@ -314,7 +322,8 @@ fn resumed<'a>(folder: &RunFolder, config: &RunConfig, capture: &'a Capture) -> 
     for fault in &resumed.passed_over {
         eprintln!("warning: a checkpoint is damaged, so the run goes on from an older one: {fault}");
     }
-    let trainer = resumed.restored.trainer;
+    let mut trainer = resumed.restored.trainer;
+    trainer.set_device(device);
     let at_checkpoint = RunConfig { train: *trainer.config(), ..config.clone() };
     if let Some(difference) = config.difference(&at_checkpoint, ["in config.toml", "in the checkpoint"])? {
         bail!("config.toml and the checkpoint disagree: {difference}; write back what the run began with");

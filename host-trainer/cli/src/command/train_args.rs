@@ -9,8 +9,10 @@ use pocketsplat_instructions::level::{Bound, Level};
 use pocketsplat_trainer::device::{Limits, ModelChoice, Processor, choose};
 use pocketsplat_trainer::effects::Price;
 use pocketsplat_trainer::explicit::CloudConfig;
+use pocketsplat_trainer::step::SharedImageStages;
 use pocketsplat_trainer::train::config::Backbone;
 
+use super::devices::DeviceChoice;
 use super::settings::{QualityOptions, RunOptions, applied};
 use crate::config::heading::{DEVICE, OUTPUT, QUALITY, RUN};
 use crate::config::named::{TARGETS, level_number, one_of};
@@ -68,6 +70,11 @@ pub(crate) struct Args {
     /// Iteration to branch off after, one that the other run was given as --fork-at.
     #[arg(long, value_name = "STEP", requires = "from", help_heading = RUN, hide_short_help = true)]
     at: Option<u32>,
+    /// What draws and compares images: cpu, gpu, gpu:N as `pocketsplat devices` lists them, or auto, a GPU where there is one
+    /// [default: cpu]
+    #[arg(long = "device", value_name = "NAME", default_value = "cpu", hide_default_value = true, help_heading = RUN,
+        hide_short_help = true)]
+    draws_on: DeviceChoice,
     /// Start anew where an unfinished run lies [default: refuse]
     #[arg(short = 'w', long, conflicts_with = "resume", help_heading = RUN)]
     overwrite: bool,
@@ -203,6 +210,11 @@ impl Args {
     /// Whether the result is printed as JSON.
     pub(crate) fn json(&self) -> bool {
         self.json
+    }
+
+    /// The GPU that draws and compares images, where one is asked for or found; says on stderr which.
+    pub(crate) fn device(&self) -> Result<Option<SharedImageStages<f32>>> {
+        self.draws_on.open()
     }
 
     /// The port of the page about the run while it goes on, if there is to be one; 0 for any.

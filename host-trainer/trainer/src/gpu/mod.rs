@@ -11,6 +11,7 @@ mod buffer;
 mod error;
 #[expect(clippy::module_inception, reason = "the device, which the folder is named for")]
 mod gpu;
+mod image;
 mod kernel;
 pub mod ops;
 #[cfg(test)]
@@ -21,6 +22,7 @@ pub use adapter::{Adapter, AdapterKind, adapters, choose};
 pub use buffer::{Bind, Buffer};
 pub use error::GpuError;
 pub use gpu::Gpu;
+pub use image::GpuImage;
 pub use kernel::{Commands, Kernel};
 
 /// Threads of a workgroup: 16×16 pixels, and what every adapter takes.

@@ -89,6 +89,11 @@ pub struct ImagePair<'a, R> {
 
 /// What a module adds to the loss of a step: each function returns its terms and adds their gradients.
 pub trait Terms<R: Real>: Sync {
+    /// Whether [`Self::on_image`] has a term: for a device this costs two copies of the image.
+    fn is_on_image(&self) -> bool {
+        false
+    }
+
     /// Terms on the image.
     ///
     /// * `d_image`: planes as the image; added to.

@@ -5,6 +5,7 @@ mod buffer;
 mod coded;
 pub mod coding;
 mod context;
+mod image;
 mod loss;
 pub mod parents;
 mod probe;
@@ -12,6 +13,7 @@ mod stages;
 mod target;
 
 use std::mem;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use pocketsplat_core::context::N_LEVELS;
 use rayon::prelude::*;
@@ -19,7 +21,7 @@ use rayon::prelude::*;
 use crate::ops::project::{Footprint, Splat};
 use crate::ops::rasterise::TiledImage;
 use crate::ops::simd::Level;
-use crate::ops::{Pinhole, l1, prefilter, rasterise, ssim, tiles, volume};
+use crate::ops::{Pinhole, prefilter, rasterise, tiles, volume};
 use crate::real::Real;
 use crate::scene::{Head, Heads, ModelShape, Scene};
 pub use block::Block;
@@ -27,11 +29,14 @@ use coded::{Network, Weights};
 pub use coding::Phase;
 use coding::{Coding, RateReport};
 pub use context::ContextGradients;
+use image::CpuImage;
+pub use image::{DeviceFault, ImageLoss, ImageStages, ImageTerm};
 pub use loss::{ImagePair, Loss, LossWeights, StepInfo, Terms};
 use parents::Parents;
 pub use probe::ImageError;
 pub use stages::StageSeconds;
 use stages::StageTimer;
+#[cfg(any(test, feature = "gpu"))]
 pub(crate) use target::clear_masked;
 pub use target::{TargetView, image_of_planes, planes};
 
@@ -60,17 +65,27 @@ pub struct StepReport<R> {
 
 /// A drawn view and what its backward pass needs.
 struct DrawnView<R> {
-    stages: StageSeconds,
     image: TiledImage<R>,
     lists: tiles::TileLists,
     splats: Vec<Splat<R>>,
     footprints: Vec<Footprint<R>>,
 }
 
-/// Buffers and gradients of a step.
+/// What else than this CPU computes the stages between splats and the loss; steps take turns.
+pub type SharedImageStages<R> = Arc<Mutex<dyn ImageStages<R>>>;
+
+/// Splats of a view, and the time that they took.
+struct SplatsOfView<R> {
+    stages: StageSeconds,
+    splats: Vec<Splat<R>>,
+    footprints: Vec<Footprint<R>>,
+}
+
+/// Buffers and gradients of a step. Clones share their device.
 #[derive(Clone, Debug)]
 pub struct Workspace<R> {
     level: Level,
+    device: Option<SharedImageStages<R>>,
     blocks: Vec<Block<R>>,
     n_blocks: usize,
     /// dL/d(heads).
@@ -94,6 +109,7 @@ impl<R: Real> Workspace<R> {
         let d_heads = Heads::filled(shape, R::ZERO);
         Self {
             level,
+            device: None,
             blocks: Vec::new(),
             n_blocks: 0,
             d_heads,
@@ -101,6 +117,16 @@ impl<R: Real> Workspace<R> {
             parents: Parents::default(),
             d_context: None,
         }
+    }
+
+    /// Has [`Self::step`] compute the stages between splats and the loss with `device`, or on the CPU again.
+    pub fn set_device(&mut self, device: Option<SharedImageStages<R>>) {
+        self.device = device;
+    }
+
+    /// What else than the CPU computes, in words.
+    pub fn device_name(&self) -> Option<String> {
+        self.device.as_ref().map(|device| device.lock().unwrap_or_else(PoisonError::into_inner).name())
     }
 
     /// The instruction set that the loops run under.
@@ -113,7 +139,7 @@ impl<R: Real> Workspace<R> {
         &self.blocks[..self.n_blocks]
     }
 
-    /// Draws the view: the forward half of [`Self::step`].
+    /// Draws the view on the CPU.
     fn draw(
         &mut self,
         scene: &Scene<R>,
@@ -123,6 +149,21 @@ impl<R: Real> Workspace<R> {
         network: Option<Network<'_, R>>,
         pruned_share: f32,
     ) -> DrawnView<R> {
+        let SplatsOfView { splats, footprints, .. } = self.splats_of(scene, camera, coding, network, pruned_share);
+        let lists = tiles::build(&splats, &footprints, camera.size_px);
+        let image = rasterise::forward(self.level, &splats, &footprints, &lists, background);
+        DrawnView { image, lists, splats, footprints }
+    }
+
+    /// From the visible anchors to their splats.
+    fn splats_of(
+        &mut self,
+        scene: &Scene<R>,
+        camera: &Pinhole<R>,
+        coding: &Coding<'_, R>,
+        network: Option<Network<'_, R>>,
+        pruned_share: f32,
+    ) -> SplatsOfView<R> {
         let mut timer = StageTimer::start();
         let is_kept = |a: usize| scene.anchors.prune_rank.get(a).is_none_or(|place| *place >= pruned_share);
         let visible: Vec<u32> = (0..scene.anchors.len())
@@ -152,12 +193,7 @@ impl<R: Real> Workspace<R> {
         let splats: Vec<Splat<R>> = self.blocks().iter().flat_map(|b| b.splats.iter().copied()).collect();
         let footprints: Vec<Footprint<R>> = self.blocks().iter().flat_map(|b| b.footprints.iter().copied()).collect();
         let anchors = timer.lap();
-        let lists = tiles::build(&splats, &footprints, camera.size_px);
-        let tiles = timer.lap();
-        let image = rasterise::forward(level, &splats, &footprints, &lists, background);
-        let rasterise = timer.lap();
-        let stages = StageSeconds { context, anchors, tiles, rasterise, ..StageSeconds::default() };
-        DrawnView { stages, image, lists, splats, footprints }
+        SplatsOfView { stages: StageSeconds { context, anchors, ..StageSeconds::default() }, splats, footprints }
     }
 
     /// Copies anchors into blocks, each of one level, and codes them.
@@ -213,7 +249,7 @@ impl<R: Real> Workspace<R> {
         let n_pixels = d_image.len() / 3;
         d_image[..n_pixels].fill(R::ONE);
         let d_tiled = TiledImage::from_planes(&d_image, camera.size_px);
-        let DrawnView { image, lists, splats, footprints, .. } = &drawing;
+        let DrawnView { image, lists, splats, footprints } = &drawing;
         let d_splats = rasterise::backward(self.level, splats, footprints, lists, image, &d_tiled);
         d_splats.iter().map(|d| d.colour[0]).collect()
     }
@@ -226,6 +262,9 @@ impl<R: Real> Workspace<R> {
     /// L = (1 − λ)·L1 + λ·(1 − SSIM) + w·mean(s_x·s_y·s_z) (Lu et al. 2024, Scaffold-GS, eq. 10), the terms of modules, and
     /// those of [`RateTerms`](coding::RateTerms) where `coding` has them. Gradients of anchors are left in [`Self::blocks`], those
     /// of the heads in [`Self::d_heads`], of the background in [`Self::d_background`], of the context model in [`Self::d_context`].
+    ///
+    /// # Panics
+    /// Where a [device](Self::set_device) fails, which [`Self::try_step`] gives back.
     pub fn step(
         &mut self,
         scene: &Scene<R>,
@@ -233,42 +272,70 @@ impl<R: Real> Workspace<R> {
         loss: &Loss<'_, R>,
         coding: &Coding<'_, R>,
     ) -> StepReport<R> {
+        self.try_step(scene, target, loss, coding).unwrap_or_else(|fault| panic!("{fault}"))
+    }
+
+    /// [`Self::step`], where a device may fail.
+    ///
+    /// # Errors
+    /// [`DeviceFault`]: gradients are then as they happen to be.
+    pub fn try_step(
+        &mut self,
+        scene: &Scene<R>,
+        target: &TargetView<'_, R>,
+        loss: &Loss<'_, R>,
+        coding: &Coding<'_, R>,
+    ) -> Result<StepReport<R>, DeviceFault> {
+        match self.device.clone() {
+            Some(device) => {
+                let mut device = device.lock().unwrap_or_else(PoisonError::into_inner);
+                self.step_with(&mut *device, scene, target, loss, coding)
+            }
+            None => self.step_with(&mut CpuImage::new(self.level), scene, target, loss, coding),
+        }
+    }
+
+    fn step_with(
+        &mut self,
+        images: &mut dyn ImageStages<R>,
+        scene: &Scene<R>,
+        target: &TargetView<'_, R>,
+        loss: &Loss<'_, R>,
+        coding: &Coding<'_, R>,
+    ) -> Result<StepReport<R>, DeviceFault> {
         let weights = &loss.weights;
-        let size_px = target.camera.size_px;
         let steps_heads = context::steps_heads(scene, coding);
         let network = context::network(scene, coding, steps_heads.as_deref());
-        let DrawnView { mut stages, image: tiled, lists, splats, footprints } =
-            self.draw(scene, target.camera, target.background, coding, network, loss.pruned_share);
+        let SplatsOfView { mut stages, splats, footprints } =
+            self.splats_of(scene, target.camera, coding, network, loss.pruned_share);
+        let n_splats = splats.len();
         let mut timer = StageTimer::start();
-        let mut image = tiled.to_planes(size_px);
-        clear_masked(&mut image, target.mask);
+        let n_pairs = images.bin(splats, footprints, target.camera.size_px)?;
+        stages.tiles = timer.lap();
+        images.draw(target.background)?;
+        stages.rasterise = timer.lap();
 
-        let lambda = R::real(weights.dssim);
-        let (similarity, partials) = ssim::forward(self.level, &image, target.truth(), size_px);
-        let mut d_image = vec![R::ZERO; image.len()];
-        l1::backward(&image, target.truth(), R::ONE - lambda, &mut d_image);
-        ssim::backward(self.level, &image, target.truth(), size_px, &partials, -lambda, &mut d_image);
+        let compared = images.compare(target, weights)?;
         let mut by_modules = R::ZERO;
         if let Some((modules, at)) = loss.modules {
-            let images = ImagePair { image: &image, truth: target.truth(), size_px, level: self.level };
             for module in modules {
-                by_modules += module.on_image(at, &images, &mut d_image);
+                if module.is_on_image() {
+                    by_modules += images.add_term(target, &mut |pair, d_image| module.on_image(at, pair, d_image))?;
+                }
                 by_modules += module.on_gaussians(at, scene, &mut self.blocks[..self.n_blocks]);
             }
         }
-        clear_masked(&mut d_image, target.mask);
+        images.end_gradient(target)?;
         let n_gaussians = self.blocks().iter().map(|b| b.gaussians.len()).sum();
         let volume_weight = R::real(weights.volume);
         let volumes: R = self.blocks().iter().map(|b| volume::forward(&b.gaussians, volume_weight, n_gaussians)).sum();
-        let mut total = (R::ONE - lambda) * l1::forward(&image, target.truth())
-            + lambda * (R::ONE - similarity)
-            + volumes
-            + by_modules;
+        let lambda = R::real(weights.dssim);
+        let mut total =
+            (R::ONE - lambda) * compared.l1 + lambda * (R::ONE - compared.similarity) + volumes + by_modules;
 
-        let d_tiled = TiledImage::from_planes(&d_image, size_px);
         stages.loss = timer.lap();
-        let d_splats = rasterise::backward(self.level, &splats, &footprints, &lists, &tiled, &d_tiled);
-        self.d_background = rasterise::background_gradient(&tiled, &d_tiled);
+        let (d_splats, d_background) = images.backward()?;
+        self.d_background = d_background;
         stages.rasterise_backward = timer.lap();
         self.splats_backward(&scene.shape, target.camera, &d_splats);
         let blocks = self.blocks[..self.n_blocks].par_iter_mut();
@@ -292,15 +359,15 @@ impl<R: Real> Workspace<R> {
                 total += module.on_anchors(at, scene, &mut self.blocks[..self.n_blocks]);
             }
         }
-        StepReport {
+        Ok(StepReport {
             loss: total,
-            squared_error: target.squared_sum(&image) / (3 * target.n_counted()) as f64,
+            squared_error: compared.squared_sum / (3 * target.n_counted()) as f64,
             n_gaussians,
-            n_splats: splats.len(),
-            n_pairs: lists.entries.len(),
+            n_splats,
+            n_pairs,
             rate,
             stages,
-        }
+        })
     }
 
     /// Takes the gradients of all splats back to the Gaussians of their blocks.

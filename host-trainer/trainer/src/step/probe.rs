@@ -39,7 +39,7 @@ impl<R: Real> Workspace<R> {
     ) -> ImageError {
         let TargetView { camera, background, mask, .. } = *target;
         let size_px = camera.size_px;
-        let DrawnView { image: tiled, lists, splats, footprints, .. } =
+        let DrawnView { image: tiled, lists, splats, footprints } =
             self.draw(scene, camera, background, &Coding::Raw, None, 0.0);
         let mut image = tiled.to_planes(size_px);
         clear_masked(&mut image, mask);

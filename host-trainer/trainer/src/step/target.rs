@@ -14,6 +14,8 @@ pub struct TargetView<'a, R> {
     pub mask: Option<&'a [bool]>,
     /// What lies behind everything.
     pub background: [R; 3],
+    /// The number of the photograph in its capture, by which a device knows it again.
+    pub index: Option<usize>,
     truth: Vec<R>,
 }
 
@@ -21,7 +23,13 @@ impl<'a, R: Real> TargetView<'a, R> {
     /// * `truth`: planes `[3, height, width]`, 0 to 1; pixels that do not count become 0, as they do in what is drawn.
     pub fn new(camera: &'a Pinhole<R>, mut truth: Vec<R>, mask: Option<&'a [bool]>, background: [R; 3]) -> Self {
         clear_masked(&mut truth, mask);
-        Self { camera, mask, background, truth }
+        Self { camera, mask, background, index: None, truth }
+    }
+
+    /// The same, of this number in its capture.
+    #[must_use]
+    pub fn numbered(self, index: usize) -> Self {
+        Self { index: Some(index), ..self }
     }
 
     /// Planes `[3, height, width]`, 0 to 1; 0 where pixels do not count.

@@ -39,7 +39,7 @@ use crate::ops::Pinhole;
 use crate::ops::noise::Stream;
 use crate::scene::init::initial_scene;
 use crate::scene::{Anchors, Heads, Scene};
-use crate::step::{Loss, Phase, StepInfo, TargetView, Workspace, image_of_planes, planes};
+use crate::step::{Loss, Phase, SharedImageStages, StepInfo, TargetView, Workspace, image_of_planes, planes};
 use checkpoint::{CaptureSignature, Kernels};
 use coding::Integers;
 use config::{Backbone, Densification, Rates};
@@ -165,7 +165,16 @@ impl<'a> Trainer<'a> {
 
     /// What this run is computed with.
     pub fn kernels(&self) -> Kernels {
-        Kernels::of_this_machine(self.workspace.level())
+        let kernels = Kernels::of_this_machine(self.workspace.level());
+        match self.workspace.device_name() {
+            None => kernels,
+            Some(device) => Kernels { description: format!("{}, images {device}", kernels.description), ..kernels },
+        }
+    }
+
+    /// Has the stages between splats and the loss computed by `device`, or on the CPU again.
+    pub fn set_device(&mut self, device: Option<SharedImageStages<f32>>) {
+        self.workspace.set_device(device);
     }
 
     /// Runs to the last iteration.
@@ -215,7 +224,7 @@ impl<'a> Trainer<'a> {
             self.queue.shuffle(&mut self.rng);
         }
         let index = self.queue.pop().expect("refilled above") as usize;
-        let target = target(&self.capture.train[index], &self.cameras[index], self.background);
+        let target = target(&self.capture.train[index], &self.cameras[index], self.background).numbered(index);
         let integers = match self.config.phase(self.iteration) {
             Phase::IntegerModel => Some(Integers::of(&self.scene)?),
             _ => None,
@@ -228,10 +237,11 @@ impl<'a> Trainer<'a> {
         let loss = Loss { weights: self.config.loss, modules: Some((&terms, &at)), pruned_share };
         // Drawn with the heads as they are written; the gradients move the weights behind them (straight through).
         let behind = integers.as_ref().map(|integers| mem::replace(&mut self.scene.heads, integers.heads.clone()));
-        let report = self.workspace.step(&self.scene, &target, &loss, &coding);
+        let report = self.workspace.try_step(&self.scene, &target, &loss, &coding);
         if let Some(heads) = behind {
             self.scene.heads = heads;
         }
+        let report = report?;
         if let Some(cause) = watchdog::inspect(&self.scene, target.truth(), self.background, &self.workspace, &report) {
             let dropped =
                 DroppedStep { iteration: self.iteration, view: self.capture.train[index].name.clone(), cause };

@@ -9,7 +9,7 @@ use super::steering::Fit;
 use super::watchdog::DroppedStep;
 use crate::integer_model::IntegerModelError;
 use crate::scene::Scene;
-use crate::step::StepReport;
+use crate::step::{DeviceFault, StepReport};
 
 /// Hears of every step of a run.
 pub trait Observer {
@@ -59,6 +59,9 @@ pub enum TrainError {
     /// There is no bundle whose length and memory could be measured.
     #[error("the scene as it stands has no bundle to measure; please report it")]
     Gauge(#[source] Box<dyn Error + Send + Sync>),
+    /// A GPU failed.
+    #[error(transparent)]
+    Device(#[from] DeviceFault),
     /// The cause of dropped steps does not pass.
     #[error(
         "{n} steps in a row would have made parameters infinite or NaN and were dropped, the last one so: {last}; \

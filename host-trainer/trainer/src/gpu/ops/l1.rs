@@ -99,7 +99,7 @@ mod tests {
                 .zip(random(1, truth.len()))
                 .map(|(i, v): (usize, f64)| if i % 5 == 0 { truth[i] } else { v as f32 })
                 .collect();
-            let target = Target::new(gpu, &photograph, None).expect("room");
+            let target = Target::of_planes(gpu, &truth, size_px, None).expect("room");
             let image_buffer = Buffer::upload(gpu, "image", &image).expect("room");
             let totals = Buffer::zeros(gpu, "totals", 3).expect("room");
             let d_image = Buffer::upload(gpu, "gradient", &vec![9.0; image.len()]).expect("room");

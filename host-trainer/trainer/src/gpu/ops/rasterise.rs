@@ -2,8 +2,9 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use super::sum::Sum;
 use super::tiles::Tiles;
-use crate::gpu::{Buffer, Commands, GROUPS, Gpu, GpuError, Kernel, MATH, RECORDS};
+use crate::gpu::{Buffer, Commands, GROUP_THREADS, GROUPS, Gpu, GpuError, Kernel, MATH, RECORDS};
 use crate::ops::project::Splat;
 use crate::ops::tiles::TILE_PX;
 
@@ -16,7 +17,10 @@ pub struct Rasterise {
     forward: Kernel,
     backward: Kernel,
     gather: Kernel,
+    background: Kernel,
+    sum: Sum,
     d_pairs: Buffer<f32>,
+    parts: Buffer<f32>,
 }
 
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -46,6 +50,9 @@ impl Rasterise {
             forward: Kernel::new(gpu, "rasterise", &with(include_str!("rasterise/forward.wgsl"))),
             backward: Kernel::new(gpu, "rasterise backward", &with(include_str!("rasterise/backward.wgsl"))),
             gather: Kernel::new(gpu, "rasterise: sums of splats", &[GROUPS, include_str!("rasterise/gather.wgsl")]),
+            background: Kernel::new(gpu, "rasterise: background", &[GROUPS, include_str!("rasterise/background.wgsl")]),
+            sum: Sum::new(gpu),
+            parts: Buffer::zeros(gpu, "sums of the background", 1)?,
             d_pairs: Buffer::zeros(gpu, "gradients of pairs", 1)?,
         })
     }
@@ -103,6 +110,29 @@ impl Rasterise {
         let n_values = N_NUMBERS * splats.len();
         let buffers = [&tiles.first_pair as _, &tiles.n_tiles as _, &self.d_pairs as _, d_splats as _];
         commands.run_items(&self.gather, &(n_values as u32), &buffers, n_values);
+        Ok(())
+    }
+
+    /// Gradient of [`Self::forward`] with respect to the background, `Σ T·∂L/∂C` over the pixels, to `totals` from `first_total` on.
+    ///
+    /// * `transmittance`: what forward wrote. * `d_image`: planes.
+    ///
+    /// # Errors
+    /// As [`Buffer::zeros`].
+    pub fn background(
+        &mut self,
+        gpu: &Gpu,
+        commands: &mut Commands<'_>,
+        transmittance: &Buffer<f32>,
+        d_image: &Buffer<f32>,
+        totals: &Buffer<f32>,
+        first_total: usize,
+    ) -> Result<(), GpuError> {
+        let n_groups = transmittance.len().div_ceil(GROUP_THREADS);
+        self.parts.fit(gpu, 3 * n_groups)?;
+        let n_pixels = transmittance.len() as u32;
+        commands.run(&self.background, &n_pixels, &[transmittance, d_image, &self.parts], n_groups);
+        self.sum.run(commands, &self.parts, 3, totals, first_total);
         Ok(())
     }
 }

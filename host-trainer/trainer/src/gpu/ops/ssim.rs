@@ -52,19 +52,21 @@ impl Ssim {
     ///
     /// # Errors
     /// As [`Buffer::zeros`].
+    #[expect(clippy::too_many_arguments, reason = "what the kernel is bound to")]
     pub fn forward(
         &mut self,
         gpu: &Gpu,
         commands: &mut Commands<'_>,
         image: &Buffer<f32>,
         target: &Target,
+        size_px: [usize; 2],
         totals: &Buffer<f32>,
         first_total: usize,
     ) -> Result<(), GpuError> {
-        let n_groups = n_groups(target.size_px);
+        let n_groups = n_groups(size_px);
         self.parts.fit(gpu, n_groups)?;
         self.partials.fit(gpu, 3 * image.len())?;
-        let parameters = parameters(target.size_px, 1.0 / image.len() as f32);
+        let parameters = parameters(size_px, 1.0 / image.len() as f32);
         let buffers = [image as _, &target.pixels as _, &self.partials as _, &self.parts as _];
         commands.run(&self.forward, &parameters, &buffers, n_groups);
         self.sum.run(commands, &self.parts, 1, totals, first_total);
@@ -77,12 +79,13 @@ impl Ssim {
         commands: &mut Commands<'_>,
         image: &Buffer<f32>,
         target: &Target,
+        size_px: [usize; 2],
         weight: f64,
         d_image: &Buffer<f32>,
     ) {
-        let parameters = parameters(target.size_px, weight as f32);
+        let parameters = parameters(size_px, weight as f32);
         let buffers = [image as _, &target.pixels as _, &self.partials as _, d_image as _];
-        commands.run(&self.backward, &parameters, &buffers, n_groups(target.size_px));
+        commands.run(&self.backward, &parameters, &buffers, n_groups(size_px));
     }
 }
 
@@ -116,15 +119,15 @@ mod tests {
         let size_px = [photograph.width_px as usize, photograph.height_px as usize];
         let mut truth = planes(photograph);
         crate::step::clear_masked(&mut truth, mask);
-        let target = Target::new(gpu, photograph, mask).expect("room");
+        let target = Target::of_planes(gpu, &truth, size_px, mask).expect("room");
         let image_buffer = Buffer::upload(gpu, "image", image).expect("room");
         let totals = Buffer::zeros(gpu, "totals", 2).expect("room");
         let before = 0.25;
         let d_image = Buffer::upload(gpu, "gradient", &vec![before; image.len()]).expect("room");
         let mut ssim = Ssim::new(gpu).expect("room");
         let mut commands = Commands::new(gpu);
-        ssim.forward(gpu, &mut commands, &image_buffer, &target, &totals, 1).expect("room");
-        ssim.backward(&mut commands, &image_buffer, &target, -0.2 * image.len() as f64, &d_image);
+        ssim.forward(gpu, &mut commands, &image_buffer, &target, size_px, &totals, 1).expect("room");
+        ssim.backward(&mut commands, &image_buffer, &target, size_px, -0.2 * image.len() as f64, &d_image);
         commands.submit().expect("runs");
         let (similarity, partials) = cpu::forward(Level::detect(), image, &truth, size_px);
         let mut expected = vec![before; image.len()];

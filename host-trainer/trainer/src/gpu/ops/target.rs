@@ -3,35 +3,36 @@
 use bytemuck::{Pod, Zeroable};
 
 use crate::gpu::{Buffer, Commands, GROUPS, Gpu, GpuError, Kernel};
-use pocketsplat_capture::dataset::Image;
 
 /// A photograph and where it shows the scene.
 #[derive(Debug)]
 pub struct Target {
     /// `[height, width]`: red, green, blue from the low byte up, and 255 where the pixel counts; 0 where it does not.
     pub pixels: Buffer<u32>,
-    /// Width and height.
-    pub size_px: [usize; 2],
-    /// Pixels that count, at least 1.
+    /// Pixels that count.
     pub n_counted: usize,
 }
 
 impl Target {
     /// Uploads a photograph.
     ///
-    /// * `mask`: `[height, width]` pixels that count; all of them without a mask.
+    /// * `truth`: planes `[3, height, width]` that were 8 bit. * `mask`: `[height, width]` pixels that count; all of them without a mask.
     ///
     /// # Errors
     /// As [`Buffer::zeros`].
-    pub fn new(gpu: &Gpu, image: &Image, mask: Option<&[bool]>) -> Result<Self, GpuError> {
-        let counts = |i: usize| mask.is_none_or(|mask| mask[i]);
-        let pixel =
-            |(i, rgb): (usize, &[u8])| if counts(i) { u32::from_le_bytes([rgb[0], rgb[1], rgb[2], 255]) } else { 0 };
-        let pixels: Vec<u32> = image.rgb.chunks_exact(3).enumerate().map(pixel).collect();
+    pub fn of_planes(gpu: &Gpu, truth: &[f32], size_px: [usize; 2], mask: Option<&[bool]>) -> Result<Self, GpuError> {
+        let n = size_px[0] * size_px[1];
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to a byte")]
+        let byte = |v: f32| (v * 255.0).round().clamp(0.0, 255.0) as u8;
+        let pixel = |i: usize| {
+            let counts = mask.is_none_or(|mask| mask[i]);
+            let rgb = [truth[i], truth[n + i], truth[2 * n + i]].map(byte);
+            if counts { u32::from_le_bytes([rgb[0], rgb[1], rgb[2], 255]) } else { 0 }
+        };
+        let pixels: Vec<u32> = (0..n).map(pixel).collect();
         Ok(Self {
-            n_counted: pixels.iter().filter(|p| **p > 0).count().max(1),
+            n_counted: pixels.iter().filter(|p| **p > 0).count(),
             pixels: Buffer::upload(gpu, "photographs", &pixels)?,
-            size_px: [image.width_px as usize, image.height_px as usize],
         })
     }
 
@@ -70,8 +71,11 @@ impl ClearMasked {
 
 #[cfg(test)]
 pub(super) mod tests {
+    use pocketsplat_capture::dataset::Image;
+
     use super::*;
     use crate::gpu::parity::gpu;
+    use crate::step::planes;
 
     /// Some photograph, and a mask of it.
     pub(in crate::gpu) fn photograph(seed: u32, [width, height]: [usize; 2]) -> (Image, Vec<bool>) {
@@ -87,7 +91,7 @@ pub(super) mod tests {
         for size_px in [[1, 1], [37, 21]] {
             let (image, mask) = photograph(1, size_px);
             for mask in [None, Some(mask.as_slice())] {
-                let target = Target::new(gpu, &image, mask).expect("room");
+                let target = Target::of_planes(gpu, &planes(&image), size_px, mask).expect("room");
                 let n = size_px[0] * size_px[1];
                 let planes: Vec<f32> = (0..3 * n).map(|i| 1.0 + i as f32).collect();
                 let buffer = Buffer::upload(gpu, "planes", &planes).expect("room");
@@ -97,7 +101,7 @@ pub(super) mod tests {
                 let mut expected = planes;
                 crate::step::clear_masked(&mut expected, mask);
                 assert_eq!(buffer.read(gpu).expect("runs"), expected);
-                assert_eq!(target.n_counted, mask.map_or(n, |mask| mask.iter().filter(|m| **m).count()).max(1));
+                assert_eq!(target.n_counted, mask.map_or(n, |mask| mask.iter().filter(|m| **m).count()));
             }
         }
     }

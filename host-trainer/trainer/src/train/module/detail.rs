@@ -40,6 +40,10 @@ impl Module for Detail {
 }
 
 impl<R: Real> Terms<R> for Detail {
+    fn is_on_image(&self) -> bool {
+        self.weight > 0.0
+    }
+
     fn on_image(&self, _at: &StepInfo, images: &ImagePair<'_, R>, d_image: &mut [R]) -> R {
         if self.weight == 0.0 {
             return R::ZERO;

@@ -1,0 +1,155 @@
+//! Steps and runs with images on the device against the CPU's.
+
+use std::sync::{Arc, Mutex};
+
+use super::*;
+use crate::gpu::parity::{Bound, assert_close, gpu, largest};
+use crate::ops::Pinhole;
+use crate::scene::Scene;
+use crate::step::coding::Coding;
+use crate::step::{Loss, LossWeights, Phase, SharedImageStages, StepInfo, StepReport, Workspace, planes};
+use crate::train::config::{Backbone, Densification};
+use crate::train::module::{Detail, Modules};
+use crate::train::test_capture::{many_views, tiny_capture, tiny_config};
+use crate::train::{TrainConfig, Trainer};
+
+fn device(gpu: &Gpu) -> Option<SharedImageStages<f32>> {
+    Some(Arc::new(Mutex::new(GpuImage::new(gpu).expect("room"))))
+}
+
+/// A step, and all gradients that it leaves by name.
+fn step(
+    device: Option<SharedImageStages<f32>>,
+    scene: &Scene<f32>,
+    target: &TargetView<'_, f32>,
+    modules: Modules,
+) -> (StepReport<f32>, Vec<(&'static str, Vec<f32>)>) {
+    let mut workspace = Workspace::new(&scene.shape);
+    workspace.set_device(device);
+    let stream = crate::ops::noise::Stream::of_run(1).branch(1);
+    let info = StepInfo { iteration: 10, iterations: 20, phase: Phase::Raw, scaled: true, stream };
+    let terms = modules.terms();
+    let loss = Loss { weights: LossWeights::default(), modules: Some((&terms, &info)), pruned_share: 0.0 };
+    let report = workspace.try_step(scene, target, &loss, &Coding::Raw).expect("runs");
+    let blocks = workspace.blocks();
+    let gradients = vec![
+        ("features", blocks.iter().flat_map(|b| b.d_features.clone()).collect()),
+        ("log-scales", blocks.iter().flat_map(|b| b.d_log_scales.clone()).collect()),
+        ("offsets", blocks.iter().flat_map(|b| b.d_offsets.clone()).collect()),
+        ("screen", blocks.iter().flat_map(|b| b.screen_gradients.clone()).collect()),
+        ("heads", workspace.d_heads.each().flat_map(|head| head.groups()).flatten().copied().collect()),
+        ("background", workspace.d_background.to_vec()),
+    ];
+    (report, gradients)
+}
+
+/// Bounds: loss and squared error are sums over the image, known to 1e-4. Gradients of parameters are sums over some hundred splats, in
+/// each of which a pixel may fall on either side of a cut: 2 % of the largest of their kind.
+fn compare(gpu: &Gpu, scene: &Scene<f32>, target: &TargetView<'_, f32>, modules: Modules) {
+    let (expected, on_cpu) = step(None, scene, target, modules);
+    let (found, on_device) = step(device(gpu), scene, target, modules);
+    let sums = |r: &StepReport<f32>| [r.loss, r.squared_error as f32];
+    assert_close("loss, squared error", &sums(&found), &sums(&expected), Bound { relative: 1e-4, absolute: 1e-7 });
+    assert_eq!((found.n_gaussians, found.n_splats), (expected.n_gaussians, expected.n_splats));
+    // Lists have a little more slack on the device.
+    assert!(found.n_pairs >= expected.n_pairs && found.n_pairs <= expected.n_pairs + expected.n_pairs / 100 + 2);
+    for ((name, found), (_, expected)) in on_device.iter().zip(&on_cpu) {
+        assert!(largest(expected) > 0.0 || scene.anchors.is_empty(), "{name} says nothing");
+        assert_close(name, found, expected, Bound { relative: 0.0, absolute: 2e-2 * largest(expected) });
+    }
+}
+
+#[test]
+fn a_step_agrees_with_the_cpu() {
+    let Some(gpu) = gpu() else { return };
+    let capture = tiny_capture();
+    for dilation_compensation in [false, true] {
+        let mut config = tiny_config(40);
+        config.shape.dilation_compensation = dilation_compensation;
+        let mut trainer = Trainer::new(&capture, config).expect("a run");
+        for _ in 0..20 {
+            trainer.advance().expect("a step");
+        }
+        let view = &capture.train[1];
+        let camera = Pinhole::new(&view.camera);
+        let mask: Vec<bool> = (0..view.image.rgb.len() / 3).map(|i| i % 7 > 1).collect();
+        for mask in [None, Some(mask.as_slice())] {
+            for detail in [false, true] {
+                let target = TargetView::new(&camera, planes(&view.image), mask, [0.2, 0.5, 0.1]);
+                compare(
+                    gpu,
+                    &trainer.scene,
+                    &target,
+                    Modules { detail: detail.then(Detail::default), ..config.modules },
+                );
+            }
+        }
+    }
+}
+
+/// The mean squared error of the last 70 of 300 steps, and the bits of the scene.
+fn run(device: Option<SharedImageStages<f32>>, backbone: Backbone) -> (f64, Option<f64>) {
+    let capture = many_views(7);
+    // Growth as in long runs: every seventh step, as elsewhere in the tests, a rounding soon is another scene.
+    let config = TrainConfig { backbone, densification: Densification::default(), ..tiny_config(300) };
+    let mut trainer = Trainer::new(&capture, config).expect("a run");
+    trainer.set_device(device);
+    let (mut sum, mut bits) = (0.0, None);
+    while !trainer.is_done() {
+        let report = trainer.advance().expect("a step").report;
+        if trainer.iteration > 230 {
+            sum += report.squared_error;
+        }
+        let n_anchors = trainer.scene.anchors.len() as f64;
+        bits = report.rate.map(|rate| n_anchors * rate.bits.iter().sum::<f64>());
+    }
+    (sum / 70.0, bits)
+}
+
+/// Bounds: 0.1 dB, and 2 % of the bits.
+#[test]
+fn runs_of_all_backbones_come_to_the_same() {
+    let Some(gpu) = gpu() else { return };
+    for backbone in [Backbone::Scaffold, Backbone::Hac, Backbone::HacPlus, Backbone::ContextGs] {
+        let ((cpu_error, cpu_bits), (error, bits)) = (run(None, backbone), run(device(gpu), backbone));
+        let decibels = 10.0 * (cpu_error / error).log10();
+        eprintln!("{backbone:?}: {decibels:.4} dB, bits {bits:?} for {cpu_bits:?}");
+        assert!(decibels.abs() <= 0.1, "{backbone:?}: {decibels} dB");
+        if let (Some(found), Some(expected)) = (bits, cpu_bits) {
+            assert!((found / expected - 1.0).abs() <= 0.02, "{backbone:?}: {found} bits, {expected} on the CPU");
+        }
+        assert_eq!(bits.is_some(), backbone != Backbone::Scaffold);
+    }
+}
+
+#[test]
+fn the_same_run_gives_the_same_bits_and_goes_on_anywhere() {
+    let Some(gpu) = gpu() else { return };
+    let capture = tiny_capture();
+    let train = |trainer: &mut Trainer<'_>, until: u32| {
+        while trainer.iteration < until {
+            trainer.advance().expect("a step");
+        }
+    };
+    let begin = |until: u32| {
+        let config = TrainConfig { backbone: Backbone::Hac, ..tiny_config(40) };
+        let mut trainer = Trainer::new(&capture, config).expect("a run");
+        trainer.set_device(device(gpu));
+        train(&mut trainer, until);
+        trainer
+    };
+    let whole = begin(40);
+    let half = begin(20);
+    let mut checkpoint = Vec::new();
+    half.save(&mut checkpoint).expect("memory");
+    let restored = || Trainer::restore(&capture, &checkpoint).expect("sound");
+    let mut on_device = restored().trainer;
+    on_device.set_device(device(gpu));
+    assert_eq!(restored().written_by, on_device.kernels(), "which name the device");
+    train(&mut on_device, 40);
+    assert!(on_device.scene.anchors == whole.scene.anchors && on_device.scene.heads == whole.scene.heads);
+    let mut on_cpu = restored().trainer;
+    assert_ne!(restored().written_by, on_cpu.kernels());
+    train(&mut on_cpu, 40);
+    assert!(on_cpu.is_done());
+}

@@ -1,0 +1,170 @@
+//! The stages of a step between splats and the image's loss, on the CPU or on another device.
+
+use std::error::Error;
+use std::fmt;
+
+use super::target::clear_masked;
+use super::{ImagePair, LossWeights, TargetView};
+use crate::ops::project::{Footprint, Splat};
+use crate::ops::rasterise::TiledImage;
+use crate::ops::simd::Level;
+use crate::ops::tiles::TileLists;
+use crate::ops::{l1, rasterise, ssim, tiles};
+use crate::real::Real;
+
+/// Why a device did not finish a step; nothing of the scene has changed.
+#[derive(Debug, thiserror::Error)]
+#[error(transparent)]
+pub struct DeviceFault(Box<dyn Error + Send + Sync>);
+
+impl DeviceFault {
+    /// From what the device says.
+    pub fn new(fault: impl Error + Send + Sync + 'static) -> Self {
+        Self(Box::new(fault))
+    }
+}
+
+/// What the comparison with the photograph found.
+#[derive(Clone, Copy, Debug)]
+pub struct ImageLoss<R> {
+    /// Mean absolute difference.
+    pub l1: R,
+    /// Mean SSIM.
+    pub similarity: R,
+    /// Σ over pixels and channels of the squared difference.
+    pub squared_sum: f64,
+}
+
+/// A term of a module on the image: adds its gradient, returns its value.
+pub type ImageTerm<'t, R> = dyn FnMut(&ImagePair<'_, R>, &mut [R]) -> R + 't;
+
+/// Tiles, rasterising, L1 and SSIM of one view, called in this order; all state is of the view that was drawn last.
+pub trait ImageStages<R>: fmt::Debug + Send {
+    /// What computes: in words.
+    fn name(&self) -> String;
+
+    /// Lists the splats of each tile. Returns the number of (tile, splat) pairs.
+    ///
+    /// * `splats`, `footprints`: `[n]`.
+    ///
+    /// # Errors
+    /// [`DeviceFault`], as all of these.
+    fn bin(
+        &mut self,
+        splats: Vec<Splat<R>>,
+        footprints: Vec<Footprint<R>>,
+        size_px: [usize; 2],
+    ) -> Result<usize, DeviceFault>;
+
+    /// Draws all tiles.
+    ///
+    /// # Errors
+    /// [`DeviceFault`].
+    fn draw(&mut self, background: [R; 3]) -> Result<(), DeviceFault>;
+
+    /// Compares with the photograph, and begins the gradient of (1 − λ)·L1 + λ·(1 − SSIM).
+    ///
+    /// # Errors
+    /// [`DeviceFault`].
+    fn compare(&mut self, target: &TargetView<'_, R>, weights: &LossWeights) -> Result<ImageLoss<R>, DeviceFault>;
+
+    /// Adds a term.
+    ///
+    /// # Errors
+    /// [`DeviceFault`].
+    fn add_term(&mut self, target: &TargetView<'_, R>, term: &mut ImageTerm<'_, R>) -> Result<R, DeviceFault>;
+
+    /// Ends the gradient of the image: pixels that do not count have none.
+    ///
+    /// # Errors
+    /// [`DeviceFault`].
+    fn end_gradient(&mut self, target: &TargetView<'_, R>) -> Result<(), DeviceFault>;
+
+    /// The gradients of the splats `[n]` and of the background.
+    ///
+    /// # Errors
+    /// [`DeviceFault`].
+    fn backward(&mut self) -> Result<(Vec<Splat<R>>, [R; 3]), DeviceFault>;
+}
+
+/// The stages on this CPU.
+#[derive(Debug)]
+pub(super) struct CpuImage<R> {
+    level: Level,
+    size_px: [usize; 2],
+    splats: Vec<Splat<R>>,
+    footprints: Vec<Footprint<R>>,
+    lists: TileLists,
+    tiled: TiledImage<R>,
+    image: Vec<R>,
+    d_image: Vec<R>,
+    d_tiled: TiledImage<R>,
+}
+
+impl<R: Real> CpuImage<R> {
+    pub(super) fn new(level: Level) -> Self {
+        Self {
+            level,
+            size_px: [0; 2],
+            splats: Vec::new(),
+            footprints: Vec::new(),
+            lists: TileLists::default(),
+            tiled: TiledImage::default(),
+            image: Vec::new(),
+            d_image: Vec::new(),
+            d_tiled: TiledImage::default(),
+        }
+    }
+}
+
+impl<R: Real> ImageStages<R> for CpuImage<R> {
+    fn name(&self) -> String {
+        format!("CPU, {}", self.level)
+    }
+
+    fn bin(
+        &mut self,
+        splats: Vec<Splat<R>>,
+        footprints: Vec<Footprint<R>>,
+        size_px: [usize; 2],
+    ) -> Result<usize, DeviceFault> {
+        (self.splats, self.footprints, self.size_px) = (splats, footprints, size_px);
+        self.lists = tiles::build(&self.splats, &self.footprints, size_px);
+        Ok(self.lists.entries.len())
+    }
+
+    fn draw(&mut self, background: [R; 3]) -> Result<(), DeviceFault> {
+        self.tiled = rasterise::forward(self.level, &self.splats, &self.footprints, &self.lists, background);
+        Ok(())
+    }
+
+    fn compare(&mut self, target: &TargetView<'_, R>, weights: &LossWeights) -> Result<ImageLoss<R>, DeviceFault> {
+        self.image = self.tiled.to_planes(self.size_px);
+        clear_masked(&mut self.image, target.mask);
+        let lambda = R::real(weights.dssim);
+        let (similarity, partials) = ssim::forward(self.level, &self.image, target.truth(), self.size_px);
+        self.d_image = vec![R::ZERO; self.image.len()];
+        l1::backward(&self.image, target.truth(), R::ONE - lambda, &mut self.d_image);
+        let Self { level, image, size_px, d_image, .. } = self;
+        ssim::backward(*level, image, target.truth(), *size_px, &partials, -lambda, d_image);
+        let squared_sum = target.squared_sum(image);
+        Ok(ImageLoss { l1: l1::forward(image, target.truth()), similarity, squared_sum })
+    }
+
+    fn add_term(&mut self, target: &TargetView<'_, R>, term: &mut ImageTerm<'_, R>) -> Result<R, DeviceFault> {
+        let Self { image, size_px, level, d_image, .. } = self;
+        Ok(term(&ImagePair { image, truth: target.truth(), size_px: *size_px, level: *level }, d_image))
+    }
+
+    fn end_gradient(&mut self, target: &TargetView<'_, R>) -> Result<(), DeviceFault> {
+        clear_masked(&mut self.d_image, target.mask);
+        self.d_tiled = TiledImage::from_planes(&self.d_image, self.size_px);
+        Ok(())
+    }
+
+    fn backward(&mut self) -> Result<(Vec<Splat<R>>, [R; 3]), DeviceFault> {
+        let Self { level, splats, footprints, lists, tiled, d_tiled, .. } = self;
+        let d_splats = rasterise::backward(*level, splats, footprints, lists, tiled, d_tiled);
+        Ok((d_splats, rasterise::background_gradient(tiled, d_tiled)))
+    }
+}

@@ -3,7 +3,13 @@
 //! Gaussians, splats and footprints stand in slots: anchor by anchor of the view, offset by offset. A slot without a Gaussian has opacity
 //! 0, one without a splat depth 0; so nothing has to be moved together, and the order is that of the CPU.
 
+pub mod gather;
+pub mod head;
+pub mod head_input;
 pub mod l1;
+pub mod mask;
+pub mod neural_gaussians;
+pub mod prefilter;
 pub mod project;
 pub mod radix_sort;
 pub mod rasterise;
@@ -12,3 +18,4 @@ pub mod ssim;
 pub mod sum;
 pub mod target;
 pub mod tiles;
+pub mod volume;

@@ -1,0 +1,31 @@
+// d_output·W2 where the hidden unit is on.
+
+@group(0) @binding(0) var<storage, read> d_output: array<f32>;
+@group(0) @binding(1) var<storage, read> weights: array<f32>;
+@group(0) @binding(2) var<storage, read> hidden: array<f32>;
+@group(0) @binding(3) var<storage, read_write> d_hidden: array<f32>;
+
+fn left_of(row: u32, depth: u32) -> f32 {
+    return d_output[row * parameters.depth + depth];
+}
+
+fn right_of(depth: u32, column: u32) -> f32 {
+    return weights[parameters.first_weight + depth * parameters.n_columns + column];
+}
+
+@compute @workgroup_size(256)
+fn to_hidden(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) n_groups: vec3<u32>,
+    @builtin(local_invocation_index) thread: u32,
+) {
+    let tile = tile_of(group_of(group, n_groups), thread);
+    let sums = product(tile, thread, 0u, parameters.depth);
+    for (var i = 0u; i < 4u; i++) {
+        let row = tile.first_row + 16u * i;
+        if row < parameters.n_rows && tile.column < parameters.n_columns {
+            let at = row * parameters.n_columns + tile.column;
+            d_hidden[at] = select(0.0, sums[i], hidden[at] > 0.0);
+        }
+    }
+}

@@ -1,0 +1,29 @@
+// d_hidden·W1, added to the first columns of d_input.
+
+@group(0) @binding(0) var<storage, read> d_hidden: array<f32>;
+@group(0) @binding(1) var<storage, read> weights: array<f32>;
+@group(0) @binding(2) var<storage, read_write> d_input: array<f32>;
+
+fn left_of(row: u32, depth: u32) -> f32 {
+    return d_hidden[row * parameters.depth + depth];
+}
+
+fn right_of(depth: u32, column: u32) -> f32 {
+    return weights[parameters.first_weight + depth * parameters.n_columns + column];
+}
+
+@compute @workgroup_size(256)
+fn to_input(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) n_groups: vec3<u32>,
+    @builtin(local_invocation_index) thread: u32,
+) {
+    let tile = tile_of(group_of(group, n_groups), thread);
+    let sums = product(tile, thread, 0u, parameters.depth);
+    for (var i = 0u; i < 4u; i++) {
+        let row = tile.first_row + 16u * i;
+        if row < parameters.n_rows && tile.column < parameters.n_columns {
+            d_input[row * parameters.input_stride + tile.column] += sums[i];
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! The term of [`crate::ops::mask`].
+
+use bytemuck::{Pod, Zeroable};
+
+use super::sum::Sum;
+use crate::gpu::{Buffer, Commands, GROUP_THREADS, GROUPS, Gpu, GpuError, Kernel, MATH};
+
+/// Its kernel, and the sums of workgroups.
+#[derive(Debug)]
+pub struct Mask {
+    term: Kernel,
+    sum: Sum,
+    parts: Buffer<f32>,
+}
+
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Parameters {
+    n_logits: u32,
+    weight: f32,
+}
+
+impl Mask {
+    /// Compiles the kernels.
+    ///
+    /// # Errors
+    /// As [`Buffer::zeros`].
+    pub fn new(gpu: &Gpu) -> Result<Self, GpuError> {
+        Ok(Self {
+            term: Kernel::new(gpu, "mask term", &[GROUPS, MATH, include_str!("mask/term.wgsl")]),
+            sum: Sum::new(gpu),
+            parts: Buffer::zeros(gpu, "sums of openings", 1)?,
+        })
+    }
+
+    /// Writes `Σ σ(logit)` to `totals[first_total]`, and adds `weight` times its gradient to `d_logits`.
+    ///
+    /// # Errors
+    /// As [`Buffer::zeros`].
+    #[expect(clippy::too_many_arguments, reason = "what the kernel is bound to")]
+    pub fn term(
+        &mut self,
+        gpu: &Gpu,
+        commands: &mut Commands<'_>,
+        logits: &Buffer<f32>,
+        weight: f32,
+        d_logits: &Buffer<f32>,
+        totals: &Buffer<f32>,
+        first_total: usize,
+    ) -> Result<(), GpuError> {
+        let n_groups = logits.len().div_ceil(GROUP_THREADS);
+        self.parts.fit(gpu, n_groups)?;
+        let parameters = Parameters { n_logits: logits.len() as u32, weight };
+        commands.run(&self.term, &parameters, &[logits, d_logits, &self.parts], n_groups);
+        self.sum.run(commands, &self.parts, 1, totals, first_total);
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::finite_difference::random;
+    use crate::gpu::parity::{Bound, SIZES, assert_close, gpu};
+    use crate::ops::mask as cpu;
+
+    /// Bounds: a sigmoid is known to 1e-6 of itself, 1 − σ to 1e-7, the sum of n of them to 1e-6.
+    #[test]
+    fn the_mask_term_agrees_with_the_cpu() {
+        let Some(gpu) = gpu() else { return };
+        for n in SIZES {
+            let mut logits: Vec<f32> = random(8, n).iter().map(|v| (12.0 * v) as f32).collect();
+            for (logit, hard) in logits.iter_mut().zip([0.0, 100.0, -100.0, -11.5]) {
+                *logit = hard;
+            }
+            let before = 1e-3;
+            let mut expected = vec![before; n];
+            let sum = cpu::term(&logits, 0.25f32, &mut expected) / 0.25;
+            let d_logits = Buffer::upload(gpu, "gradients", &vec![before; n]).expect("room");
+            let totals = Buffer::upload(gpu, "totals", &[7.0; 2]).expect("room");
+            let logits = Buffer::upload(gpu, "logits", &logits).expect("room");
+            let mut mask = Mask::new(gpu).expect("room");
+            let mut commands = Commands::new(gpu);
+            mask.term(gpu, &mut commands, &logits, 0.25, &d_logits, &totals, 1).expect("room");
+            commands.submit().expect("runs");
+            let of_sum = Bound { relative: 2e-6, absolute: 1e-7 };
+            assert_close("sum", &totals.read(gpu).expect("runs"), &[7.0, sum], of_sum);
+            let bound = Bound { relative: 2e-6, absolute: 1e-7 };
+            assert_close("gradient", &d_logits.read(gpu).expect("runs"), &expected, bound);
+        }
+    }
+}

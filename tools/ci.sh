@@ -7,7 +7,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-jobs=(fmt clippy doc test viewer core-embedded format-doc package link-gate digests reader firmware boards c demo)
+jobs=(fmt clippy doc test viewer core-embedded format-doc package link-gate digests reader firmware boards c demo many-runs)
 
 embedded_target=thumbv7em-none-eabihf
 defmt_print_version=1.2.0
@@ -386,6 +386,14 @@ job_c() {
 # The main job in small: the same path as `cargo run --release -- demo`, a few hundred steps on small images.
 job_demo() {
   cargo run --release --locked -- demo --output "$target/demo" --size 64 --iterations 400
+}
+
+# A plan of runs, killed at a random moment under either executor, ends in the same tables.
+job_many-runs() {
+  need_command python3 python3 python3-venv
+  python3 -c 'import ensurepip' 2>/dev/null || fail "python3 makes no virtual environments: install it (Debian: apt-get install python3-venv)"
+  cargo build -q --release --locked
+  tests/many-runs/test.sh "$target/release/pocketsplat" "$target/many-runs"
 }
 
 # --- Running them ----------------------------------------------------------------------------------------------------

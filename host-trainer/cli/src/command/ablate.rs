@@ -10,7 +10,7 @@ use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::module::Modules;
 
 use super::output;
-use super::runs::{RunSpec, RunsArgs, write_curves};
+use super::runs::{FIGURE, RunSpec, RunsArgs, write_curves};
 use crate::config::RunConfig;
 use crate::config::heading::{QUALITY, RUN};
 use comparison::{comparisons, run_lines};
@@ -55,7 +55,7 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     let option_lambda = lambdas[usize::from(lambdas.len() > 1)];
     let specs = args.specs(&base, lambdas, option_lambda)?;
     let folder = base.output.clone();
-    args.runs.train(base, &specs, |runs| {
+    args.runs.train(&base, &specs, &["ablation.csv", "summary.csv", FIGURE], |runs| {
         write_curves(&folder, runs)?;
         output::write_whole(&folder.join("ablation.csv"), &output::csv(run_lines(runs))?)?;
         let summary = output::csv(comparisons(runs, option_lambda))?;

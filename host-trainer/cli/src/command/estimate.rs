@@ -100,10 +100,10 @@ pub(crate) struct Warned {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Expected {
     /// Those of the pilots among them.
-    minutes: f64,
+    pub(super) minutes: f64,
     /// What the pilots of its effects take, if they are still to come.
     pilot_minutes: f64,
-    memory_bytes: f64,
+    pub(super) memory_bytes: f64,
     bundle_bytes: f64,
 }
 
@@ -147,6 +147,21 @@ impl Estimate {
         with_pilots: bool,
         stop: &AtomicBool,
     ) -> Result<Warned> {
+        let (mut estimate, expected) = Self::measured(capture, config, stop)?;
+        if !stop.load(Ordering::Relaxed) {
+            let expected = if with_pilots { expected.with_pilots() } else { expected };
+            eprintln!("{}", estimate.said(&expected));
+        }
+        Ok(estimate.warned)
+    }
+
+    /// What a new run will take, from a few steps that are not kept.
+    ///
+    /// * `stop`: looked at after every step; once it is set, the figures mean nothing.
+    ///
+    /// # Errors
+    /// Those of the steps.
+    pub(super) fn measured(capture: &Capture, config: &TrainConfig, stop: &AtomicBool) -> Result<(Self, Expected)> {
         let mut trainer = Trainer::new(capture, *config)?;
         let mut advance = |n_steps: u32| -> Result<f64> {
             let started = Instant::now();
@@ -160,13 +175,9 @@ impl Estimate {
         let n_untimed = UNTIMED_STEPS.min(config.iterations);
         advance(n_untimed)?;
         let step_s = advance(TIMED_STEPS.min(config.iterations - n_untimed))?;
-        let mut estimate = Self::new(capture, config, 0, Warned::default());
-        if !stop.load(Ordering::Relaxed) {
-            let expected = estimate.expected(0, step_s, 0.0, trainer.scene.anchors.len());
-            let expected = if with_pilots { expected.with_pilots() } else { expected };
-            eprintln!("{}", estimate.said(&expected));
-        }
-        Ok(estimate.warned)
+        let estimate = Self::new(capture, config, 0, Warned::default());
+        let expected = estimate.expected(0, step_s, 0.0, trainer.scene.anchors.len());
+        Ok((estimate, expected))
     }
 
     /// Hears of an iteration that is done, and says what the run will take when it is time to.

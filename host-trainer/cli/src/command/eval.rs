@@ -11,6 +11,7 @@ use anyhow::Result;
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Capture, Image, Split, View};
 use pocketsplat_core::Bundle;
+use pocketsplat_core::bundle::crc32;
 use pocketsplat_trainer::metrics::{Lpips, half_size_enlarged, psnr_db, psnr_db_masked, ssim_masked};
 use pocketsplat_trainer::render::decoder::{core_image, core_image_of_tiers};
 use pocketsplat_trainer::render::reference::{ReferenceScene, to_image};
@@ -74,6 +75,9 @@ pub(crate) struct Evaluation {
     pub(crate) half_size_copy_psnr_db: f64,
     /// Of the file, bundle or not.
     pub(crate) bundle_bytes: usize,
+    /// Checksum of a bundle: the figures are of this file and no other.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) bundle_crc: Option<u32>,
     /// 0 where there are explicit Gaussians.
     pub(crate) n_anchors: u32,
     /// What there is to draw: offsets that no mask takes away.
@@ -249,6 +253,7 @@ pub(crate) fn measure(
         lpips_of: lpips.map(|lpips| format!("VGG16, input in {}", lpips.range())),
         half_size_copy_psnr_db: mean(&rows, |row| row.half_size_copy_psnr_db),
         bundle_bytes: file.bytes.len(),
+        bundle_crc: Some(crc32(&file.bytes)),
         n_anchors: bundle.n_anchors(),
         n_gaussians,
         n_views: rows.len(),

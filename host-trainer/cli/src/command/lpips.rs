@@ -23,6 +23,17 @@ pub(crate) struct LpipsArgs {
 }
 
 impl LpipsArgs {
+    /// The options by which another command is given the same, from any folder.
+    pub(crate) fn options(&self) -> Result<Vec<String>> {
+        let Some(path) = &self.lpips_weights else { return Ok(Vec::new()) };
+        let path = std::path::absolute(path).with_context(|| format!("{} is no path", path.display()))?;
+        let range = match self.lpips_range {
+            InputRange::ZeroToOne => LPIPS_RANGES[0],
+            InputRange::MinusOneToOne => LPIPS_RANGES[1],
+        };
+        Ok(["--lpips-weights", &path.display().to_string(), "--lpips-range", range].map(str::to_owned).to_vec())
+    }
+
     /// The network, where weights are given.
     pub(crate) fn load(&self) -> Result<Option<Lpips>> {
         let Some(path) = &self.lpips_weights else { return Ok(None) };

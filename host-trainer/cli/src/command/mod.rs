@@ -16,8 +16,10 @@ mod fit;
 mod gaussians;
 mod import;
 mod inspect;
+mod loaded;
 mod lpips;
 mod output;
+mod plan_runs;
 mod plot;
 mod point;
 mod process;
@@ -29,11 +31,13 @@ mod settings;
 mod stop;
 mod sweep;
 mod synth;
+mod tables;
 mod train;
 mod train_args;
 mod verify;
 mod view;
 mod watch;
+mod workflow;
 
 use std::process::ExitCode;
 
@@ -67,6 +71,8 @@ enum Command {
     Plot(plot::Args),
     Sweep(sweep::Args),
     Ablate(ablate::Args),
+    PlanRuns(plan_runs::Args),
+    Tables(tables::Args),
     Compare(compare::Args),
     Synth(synth::Args),
     Demo(demo::Args),
@@ -139,6 +145,8 @@ fn dispatch(cli: Cli) -> Result<ExitCode> {
         Command::Inspect(args) => inspect::run(&args),
         Command::Fit(args) => fit::run(&args),
         Command::Cost(args) => cost::run(&args),
+        Command::PlanRuns(args) => plan_runs::run(&args),
+        Command::Tables(args) => tables::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Plot(args) => plot::run(&args),
         Command::Synth(args) => synth::run(&args),

@@ -5,6 +5,12 @@ pub(super) fn peak_memory_bytes() -> Option<u64> {
     kilobytes("/proc/self/status", "VmHWM:")
 }
 
+/// Lets [`peak_memory_bytes`] begin anew at what is held now, where the system can.
+pub(super) fn forget_peak_memory() {
+    // Without it the peak is only larger than it need be.
+    let _ = std::fs::write("/proc/self/clear_refs", "5");
+}
+
 /// The memory of the machine, as Linux tells it.
 pub(super) fn machine_memory_bytes() -> Option<u64> {
     kilobytes("/proc/meminfo", "MemTotal:")

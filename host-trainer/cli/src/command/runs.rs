@@ -11,15 +11,17 @@ use pocketsplat_trainer::train::config::Backbone;
 
 use super::capture::views_of;
 use super::eval::Evaluation;
+use super::loaded::LoadedCapture;
 use super::lpips::LpipsArgs;
 use super::settings::{QualityOptions, RunOptions, applied};
-use super::{output, point, stop, train};
+use super::workflow::Planner;
+use super::{output, point, stop};
 use crate::config::heading::{OUTPUT, RUN};
 use crate::config::{CaptureOptions, EffectsConfig, RunConfig};
 use crate::plot::{Named, ResultRow, SizeAxis, names_of, rate_distortion_svg, results_csv};
 
 /// The curves of all rows, in the folder of the runs.
-const FIGURE: &str = "rate_distortion.svg";
+pub(super) const FIGURE: &str = "rate_distortion.svg";
 
 /// What all runs share.
 #[derive(clap::Args)]
@@ -41,6 +43,9 @@ pub(super) struct RunsArgs {
     run: RunOptions,
     #[command(flatten)]
     lpips: LpipsArgs,
+    /// Write a Snakemake workflow that trains the runs into the folder, and train nothing.
+    #[arg(long, help_heading = RUN)]
+    plan: bool,
 }
 
 /// One run, by what distinguishes it from the configuration that all share.
@@ -107,13 +112,17 @@ impl RunsArgs {
         Ok(config)
     }
 
-    /// Trains and measures the runs one after another, from wherever each stands, and then prints what `tables` returns.
+    /// Trains and measures the runs one after another, from wherever each stands, and then prints what `tables` returns; or, with
+    /// `--plan`, writes the workflow that does.
     ///
     /// After each run `tables` writes the results so far.
+    ///
+    /// * `files`: what `tables` writes.
     pub(super) fn train(
         &self,
-        mut base: RunConfig,
+        base: &RunConfig,
         specs: &[RunSpec],
+        files: &[&str],
         tables: impl Fn(&[MeasuredRun<'_>]) -> Result<Vec<u8>>,
     ) -> Result<ExitCode> {
         // All of them before the first is trained for an hour.
@@ -121,20 +130,24 @@ impl RunsArgs {
             if specs[..i].iter().any(|other| other.bundle == spec.bundle) {
                 bail!("--lambda names {} twice; each run needs a weight of its own", spec.lambda);
             }
-            spec.config(&base)?.check().with_context(|| format!("cannot train {spec}"))?;
+            spec.config(base)?.check().with_context(|| format!("cannot train {spec}"))?;
         }
         let lpips = self.lpips.load()?;
         output::check_writable(&base.output.join(FIGURE))?;
-        let capture = train::load(&mut base)?;
-        views_of(&capture, Split::Test).context("runs are compared on held-out views; see --test-every")?;
+        let mut loaded = LoadedCapture::default();
+        if self.plan {
+            return self.plan(base, specs, files, &mut loaded);
+        }
         let stop = stop::flag()?;
         let mut measured = Vec::new();
         let mut text = Vec::new();
         for (i, spec) in specs.iter().enumerate() {
             eprintln!("{} of {}  {spec}", i + 1, specs.len());
-            let config = spec.config(&base)?;
+            let mut config = spec.config(base)?;
             output::check_writable(&config.output)?;
-            if !point::trained(&config, &capture, &stop)? {
+            let capture = loaded.of(&mut config)?;
+            views_of(capture, Split::Test).context("runs are compared on held-out views; see --test-every")?;
+            if !point::trained(&config, capture, &stop)? {
                 eprintln!("the same command again resumes here");
                 return Ok(ExitCode::from(stop::INTERRUPTED));
             }
@@ -142,6 +155,26 @@ impl RunsArgs {
             text = tables(&measured)?;
         }
         output::print_text(&String::from_utf8(text)?)?;
+        Ok(ExitCode::SUCCESS)
+    }
+
+    /// Writes the workflow of the runs, which ends with this command once more: by then nothing is left but its tables.
+    fn plan(
+        &self,
+        base: &RunConfig,
+        specs: &[RunSpec],
+        files: &[&str],
+        loaded: &mut LoadedCapture,
+    ) -> Result<ExitCode> {
+        let lpips = self.lpips.options()?;
+        let mut planner = Planner::default();
+        for spec in specs {
+            let config = spec.config(base)?;
+            let name = spec.bundle.trim_end_matches(".psb").to_owned();
+            planner.add(name, config, None, &lpips, loaded)?;
+        }
+        let arguments = std::env::args().skip(1).filter(|argument| argument != "--plan").collect();
+        output::print_text(&planner.write(&base.output, arguments, files)?)?;
         Ok(ExitCode::SUCCESS)
     }
 }

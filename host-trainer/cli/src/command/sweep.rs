@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use anyhow::{Result, bail};
 
-use super::runs::{RunSpec, RunsArgs, write_curves};
+use super::runs::{FIGURE, RunSpec, RunsArgs, write_curves};
 use crate::config::heading::QUALITY;
 
 /// Train a capture once for each weight of the bits, and measure every bundle on the held-out views.
@@ -35,5 +35,5 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     };
     let specs: Vec<RunSpec> = args.lambdas.iter().map(spec).collect();
     let folder = base.output.clone();
-    args.runs.train(base, &specs, |runs| write_curves(&folder, runs))
+    args.runs.train(&base, &specs, &["results.csv", FIGURE], |runs| write_curves(&folder, runs))
 }

@@ -2,6 +2,7 @@
 
 mod explicit;
 mod limits;
+mod standing;
 mod summary;
 
 use std::path::{Path, PathBuf};
@@ -32,6 +33,7 @@ use super::progress::Progress;
 use super::train_args::Args;
 use super::{effects, output, report, stop, watch};
 use crate::config::{CaptureOptions, ExplicitRunConfig, Protocol, RunConfig};
+pub(crate) use standing::Standing;
 use summary::Summary;
 
 /// Seconds between checkpoints unless the user says otherwise: what an accident may cost.
@@ -116,6 +118,7 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     match args.resume() {
         Some(path) => resume(args, path),
         None if args.is_explicit() => explicit::begin(args),
+        None if args.continues() => begin_or_go_on(args),
         None => begin(args),
     }
 }
@@ -157,6 +160,25 @@ fn begin(args: &Args) -> Result<ExitCode> {
     };
     let folder = RunFolder::start(&path, &config.to_toml()?, args.overwrite())?;
     train_and_print(args, folder, config, &capture, start)
+}
+
+/// Does what is left of a run, which may be all of it or nothing.
+fn begin_or_go_on(args: &Args) -> Result<ExitCode> {
+    let mut config = args.resolved()?;
+    if config.effects.auto {
+        bail!("--continue needs effects that are decided; force them, as --effects +view-colour");
+    }
+    output::check_writable(&config.output)?;
+    let capture = load(&mut config)?;
+    let path = args.run_folder(args.named_paths(&config.dataset, &config.output).1)?;
+    match Standing::of(&path, &config)? {
+        Standing::New(folder) => train_and_print(args, folder, config, &capture, Start::New(Warned::default())),
+        Standing::Begun(folder) => train_and_print(args, folder, config, &capture, Start::Resumed),
+        Standing::Finished => {
+            eprintln!("trained before");
+            Ok(ExitCode::SUCCESS)
+        }
+    }
 }
 
 fn train_and_print<'a>(
@@ -204,8 +226,14 @@ pub(crate) fn load(config: &mut RunConfig) -> Result<Capture> {
     // At once: large captures take their time.
     eprintln!("reading {}", config.dataset.display());
     let capture = source.load(config.train.seed)?;
-    check_size(&capture, &config.encoding.limits)?;
-    config.train = config.train.resolved_for(&capture);
+    decide(config, &capture)?;
+    Ok(capture)
+}
+
+/// Decides what the configuration of a run left to its capture.
+pub(crate) fn decide(config: &mut RunConfig, capture: &Capture) -> Result<()> {
+    check_size(capture, &config.encoding.limits)?;
+    config.train = config.train.resolved_for(capture);
     if std::mem::take(&mut config.scales_lambda) && config.train.backbone.is_coded() && capture.shown < 1.0 {
         config.train.hac.lambda *= capture.shown;
         eprintln!(
@@ -214,8 +242,8 @@ pub(crate) fn load(config: &mut RunConfig) -> Result<Capture> {
             100.0 * capture.shown
         );
     }
-    eprintln!("voxel size {:.5}, normalised units", config.train.voxel_size_for(&capture));
-    Ok(capture)
+    eprintln!("voxel size {:.5}, normalised units", config.train.voxel_size_for(capture));
+    Ok(())
 }
 
 /// Refuses photographs that the decoder cannot draw, or that the level has no room for.

@@ -63,6 +63,10 @@ pub(crate) struct Args {
     /// Run folder of an interrupted run to go on with; give DATASET as well if the capture has moved.
     #[arg(long, value_name = "OUT.run", help_heading = RUN)]
     resume: Option<PathBuf>,
+    /// Do what is left of the run that --config names: all, the rest, or nothing where it is finished; for queues of jobs.
+    #[arg(long = "continue", requires = "config", conflicts_with_all = ["resume", "from", "overwrite"], help_heading = RUN,
+        hide_short_help = true)]
+    continues: bool,
     /// Run folder of a run to branch off after iteration --at; the other options hold from there on.
     #[arg(long, value_name = "OUT.run", requires = "at", conflicts_with_all = ["config", "resume"], help_heading = RUN,
         hide_short_help = true)]
@@ -195,6 +199,11 @@ impl Args {
     /// The run folder to begin from and the iteration, if any.
     pub(crate) fn fork(&self) -> Option<(&Path, u32)> {
         self.from.as_deref().zip(self.at)
+    }
+
+    /// Whether a run goes on from wherever it stands.
+    pub(crate) fn continues(&self) -> bool {
+        self.continues
     }
 
     /// Capture and output of a run as the command line names them, else as its configuration does.

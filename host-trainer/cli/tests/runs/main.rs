@@ -12,6 +12,7 @@ mod export;
 mod fixture;
 mod interruption;
 mod modules;
+mod plan;
 mod preview;
 mod report;
 mod sweep;

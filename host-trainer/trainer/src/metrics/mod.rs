@@ -15,7 +15,7 @@ pub use baseline::half_size_enlarged;
 pub use bjontegaard::{BjontegaardError, RatePoint, bd_psnr_db, bd_rate_percent};
 pub use lpips::{InputRange, Lpips, LpipsError};
 pub use psnr::{psnr_db, psnr_db_masked, psnr_of_floats_db};
-pub use seeds::{RateDifference, ln_excess, rate_difference};
+pub use seeds::{RateDifference, SeededDifference, bd_rate_over_seeds, ln_excess, rate_difference};
 pub use ssim::{ssim, ssim_masked};
 
 use std::borrow::Cow;

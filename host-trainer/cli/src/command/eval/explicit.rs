@@ -50,6 +50,7 @@ pub(crate) fn measure(
         lpips_of: what.lpips.map(|lpips| format!("VGG16, input in {}", lpips.range())),
         half_size_copy_psnr_db: mean(&rows, |row| row.half_size_copy_psnr_db),
         bundle_bytes: file.n_bytes,
+        bundle_crc: None,
         n_anchors: 0,
         n_gaussians: file.gaussians.len() as u64,
         n_views: rows.len(),

@@ -49,6 +49,7 @@ mod tests {
             lpips_of: Some("VGG16, input in zero-to-one".to_owned()),
             half_size_copy_psnr_db: 28.0,
             bundle_bytes: 412_345,
+            bundle_crc: Some(7),
             n_anchors: 8123,
             n_gaussians: 51_234,
             n_views: 25,

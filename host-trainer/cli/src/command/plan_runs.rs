@@ -40,6 +40,8 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         let config = configured(&run, output).with_context(|| format!("{} is no run", run.name))?;
         asked.push((run, config));
     }
+    // Seed by seed, since points drawn at random follow it: each capture is loaded once for each. Sorting keeps the order otherwise.
+    asked.sort_by_key(|(run, config)| (run.dataset.clone(), run.scene.clone(), config.train.seed));
     let (mut loaded, mut planner) = (LoadedCapture::default(), Planner::default());
     for (run, config) in asked {
         let seed = config.train.seed;

@@ -89,7 +89,7 @@ impl Spec {
             }
         }
         for (option, values) in &spec.vary {
-            if !values.as_array().is_some_and(|values| !values.is_empty()) {
+            if values.as_array().is_none_or(Vec::is_empty) {
                 bail!("`vary.{option}` is {values}, needs a list of values");
             }
         }

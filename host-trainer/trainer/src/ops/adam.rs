@@ -5,9 +5,9 @@ use serde::{Deserialize, Serialize};
 use crate::real::Real;
 
 /// Constants of Adam as Scaffold-GS sets them.
-const BETA1: f64 = 0.9;
-const BETA2: f64 = 0.999;
-const EPSILON: f64 = 1e-15;
+pub(crate) const BETA1: f64 = 0.9;
+pub(crate) const BETA2: f64 = 0.999;
+pub(crate) const EPSILON: f64 = 1e-15;
 
 /// First and second moments of one parameter array.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -28,8 +28,8 @@ impl<R: Real> Moments<R> {
 /// Rate and bias corrections of one step, the same for every parameter of a group.
 #[derive(Clone, Copy, Debug)]
 pub struct Step<R> {
-    scale: R,
-    second_correction: R,
+    pub(crate) scale: R,
+    pub(crate) second_correction: R,
 }
 
 impl<R: Real> Step<R> {

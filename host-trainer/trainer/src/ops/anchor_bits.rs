@@ -8,7 +8,7 @@ use crate::real::Real;
 use crate::scene::ModelShape;
 
 /// Least and largest log₂(scale/step): what the coder's tables reach, −32 and 31 eighths of an octave.
-const LOG2_SCALES: [f64; 2] = [-4.0, 3.875];
+pub(crate) const LOG2_SCALES: [f64; 2] = [-4.0, 3.875];
 
 /// Rows of the rate loss on their way; kept from call to call.
 #[derive(Clone, Debug, Default)]

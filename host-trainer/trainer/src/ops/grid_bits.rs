@@ -3,7 +3,7 @@
 use crate::real::Real;
 
 /// Shares are kept this far from 0 and 1.
-const MARGIN: f64 = 1e-6;
+pub(crate) const MARGIN: f64 = 1e-6;
 
 /// n₊·(−log₂ p) + n₋·(−log₂(1 − p)) with p = n₊/n (Chen et al. 2024, HAC), and its gradient through the signs, which
 /// passes where |row| ≤ 1.
@@ -12,16 +12,26 @@ const MARGIN: f64 = 1e-6;
 ///
 /// * `rows`: every value of the grid. * `weight`: of one bit in the loss. * `d_rows`: added to. * returns the bits.
 pub fn forward_backward<R: Real>(rows: &[R], weight: f64, d_rows: &mut [R]) -> f64 {
-    let n = rows.len() as f64;
-    let positive = rows.iter().filter(|v| **v >= R::ZERO).count() as f64;
-    let p = (positive / n.max(1.0)).clamp(MARGIN, 1.0 - MARGIN);
+    let n_positive = rows.iter().filter(|v| **v >= R::ZERO).count();
+    let p = share(rows.len(), n_positive);
     let d_sign = R::real(0.5 * weight * ((1.0 - p) / p).log2());
     for (row, d) in rows.iter().zip(d_rows) {
         if row.abs() <= R::ONE {
             *d += d_sign;
         }
     }
-    positive * -p.log2() + (n - positive) * -(1.0 - p).log2()
+    bits(rows.len(), n_positive)
+}
+
+/// n₊·(−log₂ p) + n₋·(−log₂(1 − p)): the bits of `n` signs of which `n_positive` are +.
+pub fn bits(n: usize, n_positive: usize) -> f64 {
+    let p = share(n, n_positive);
+    n_positive as f64 * -p.log2() + (n as f64 - n_positive as f64) * -(1.0 - p).log2()
+}
+
+/// p.
+fn share(n: usize, n_positive: usize) -> f64 {
+    (n_positive as f64 / (n as f64).max(1.0)).clamp(MARGIN, 1.0 - MARGIN)
 }
 
 #[cfg(test)]

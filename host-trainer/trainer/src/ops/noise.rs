@@ -27,6 +27,12 @@ impl Stream {
         Self(mix(self.0 ^ mix(index.wrapping_mul(0x9e37_79b9).wrapping_add(0x85eb_ca6b))))
     }
 
+    /// The word that kernels take for this stream.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn word(self) -> u32 {
+        self.0
+    }
+
     /// The `index`-th number of this stream, uniform in [0, 1): a multiple of 2⁻²⁴.
     #[inline(always)]
     pub fn uniform(self, index: u32) -> f32 {

@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use pocketsplat_core::rules::{DILATION_PX2, DILATION_REACH_PX, INK_DEVIATIONS, NEAR};
 
-use super::scan::Scan;
+use super::compact::Compact;
 use crate::gpu::{Buffer, Commands, GROUPS, Gpu, GpuError, Kernel, MATH};
 use crate::ops::Pinhole;
 use crate::scene::{MASK_THRESHOLD, ModelShape};
@@ -13,18 +13,9 @@ use crate::scene::{MASK_THRESHOLD, ModelShape};
 pub struct Prefilter {
     by_anchor: Kernel,
     by_offsets: Kernel,
-    compact: Kernel,
-    scan: Scan,
-    /// `[n_visible]` anchors, ascending.
-    pub anchors: Buffer<u32>,
-    /// `[n_anchors]` the row of each anchor in [`Self::anchors`], [`NO_ROW`] where it is not there.
-    pub row_of_anchor: Buffer<u32>,
-    before: Buffer<u32>,
-    total: Buffer<u32>,
+    /// The visible anchors, ascending, and the row of each anchor among them.
+    pub visible: Compact,
 }
-
-/// The row of an anchor that the view does not show.
-pub const NO_ROW: u32 = u32::MAX;
 
 /// What of the anchors decides, in the device's memory.
 #[derive(Clone, Copy, Debug)]
@@ -72,12 +63,7 @@ impl Prefilter {
         Ok(Self {
             by_anchor: Kernel::new(gpu, "prefilter", &with(include_str!("prefilter/by_anchor.wgsl"))),
             by_offsets: Kernel::new(gpu, "prefilter by offsets", &with(include_str!("prefilter/by_offsets.wgsl"))),
-            compact: Kernel::new(gpu, "prefilter: compact", &[GROUPS, include_str!("prefilter/compact.wgsl")]),
-            scan: Scan::new(gpu)?,
-            anchors: Buffer::zeros(gpu, "visible anchors", 1)?,
-            row_of_anchor: Buffer::zeros(gpu, "rows of anchors", 1)?,
-            before: Buffer::zeros(gpu, "visible anchors before an anchor", 1)?,
-            total: Buffer::zeros(gpu, "number of visible anchors", 1)?,
+            visible: Compact::new(gpu)?,
         })
     }
 
@@ -99,9 +85,7 @@ impl Prefilter {
         pruned_share: f32,
     ) -> Result<usize, GpuError> {
         let n_anchors = shown.prune_rank.len();
-        for buffer in [&mut self.before, &mut self.row_of_anchor, &mut self.anchors] {
-            buffer.fit(gpu, n_anchors)?;
-        }
+        self.visible.fit(gpu, n_anchors)?;
         let bounds = [camera.slope_bounds(0), camera.slope_bounds(1)];
         let parameters = Parameters {
             rotation: camera.rotation,
@@ -123,20 +107,21 @@ impl Prefilter {
         };
         let Shown { positions, log_scales, offsets, mask_logits, prune_rank } = shown;
         if shape.sees_view() {
-            let buffers = [positions as _, log_scales as _, mask_logits as _, prune_rank as _, &self.before as _];
+            let buffers =
+                [positions as _, log_scales as _, mask_logits as _, prune_rank as _, &self.visible.marks as _];
             commands.run_items(&self.by_anchor, &parameters, &buffers, n_anchors);
         } else {
-            let buffers =
-                [positions as _, log_scales as _, mask_logits as _, prune_rank as _, &self.before as _, offsets as _];
+            let buffers = [
+                positions as _,
+                log_scales as _,
+                mask_logits as _,
+                prune_rank as _,
+                &self.visible.marks as _,
+                offsets as _,
+            ];
             commands.run_items(&self.by_offsets, &parameters, &buffers, n_anchors);
         }
-        self.scan.run(gpu, &mut commands, &self.before, &self.total)?;
-        let buffers = [&self.before as _, &self.total as _, &self.anchors as _, &self.row_of_anchor as _];
-        commands.run_items(&self.compact, &(n_anchors as u32), &buffers, n_anchors);
-        commands.submit()?;
-        let n_visible = self.total.read(gpu)?[0] as usize;
-        self.anchors.fit(gpu, n_visible)?;
-        Ok(n_visible)
+        self.visible.run(gpu, commands)
     }
 }
 

@@ -6,6 +6,7 @@ use pocketsplat_capture::camera::Camera;
 
 use super::*;
 use crate::finite_difference::random;
+use crate::gpu::ops::compact::NO_ROW;
 use crate::gpu::parity::{SIZES, gpu};
 use crate::ops::prefilter as cpu;
 use crate::scene::{Anchors, Heads, Scene};
@@ -58,14 +59,14 @@ fn compare(gpu: &Gpu, scene: &Scene<f32>, pruned_share: f32) -> usize {
     };
     let mut prefilter = Prefilter::new(gpu).expect("room");
     let n_visible = prefilter.run(gpu, Commands::new(gpu), &camera, &scene.shape, shown, pruned_share).expect("runs");
-    let anchors = prefilter.anchors.read(gpu).expect("runs");
+    let anchors = prefilter.visible.items.read(gpu).expect("runs");
     assert_eq!(anchors.len(), n_visible);
     assert!(anchors.windows(2).all(|pair| pair[0] < pair[1]), "ascending");
     let mut rows = vec![NO_ROW; n];
     for (row, anchor) in (0..).zip(&anchors) {
         rows[*anchor as usize] = row;
     }
-    assert!(prefilter.row_of_anchor.read(gpu).expect("runs") == rows, "rows of anchors");
+    assert!(prefilter.visible.row_of_item.read(gpu).expect("runs") == rows, "rows of anchors");
     let expected =
         |a: usize| prune_rank[a] >= pruned_share && scene.anchors.has_drawn(a) && cpu::shows(scene, a, &camera);
     (0..n).filter(|a| expected(*a) != (rows[*a] != NO_ROW)).count()

@@ -1,0 +1,7 @@
+struct Parameters {
+    n_values: u32,
+    weight: f32,
+    margin: f32,
+}
+
+var<immediate> parameters: Parameters;

@@ -1,0 +1,187 @@
+//! [`crate::ops::perturb`] over one group of the values of a view's anchors.
+
+use bytemuck::{Pod, Zeroable};
+
+use super::noise::STREAM;
+use crate::gpu::{Buffer, Commands, GROUPS, Gpu, Kernel};
+use crate::ops::noise::Stream;
+
+/// Its kernels.
+#[derive(Clone, Debug)]
+pub struct Perturb {
+    with_noise: Kernel,
+    rounded: Kernel,
+    backward: Kernel,
+}
+
+/// Which of the values of an anchor share a step.
+#[derive(Clone, Copy, Debug)]
+pub struct Group {
+    /// 0 for features, 1 for log-scales, 2 for offsets.
+    pub index: usize,
+    /// Number of its first channel.
+    pub first: usize,
+    /// Channels.
+    pub width: usize,
+}
+
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Parameters {
+    n_rows: u32,
+    width: u32,
+    group: u32,
+    first: u32,
+    stream: u32,
+}
+
+impl Parameters {
+    fn new(group: Group, n_values: usize, stream: u32) -> Self {
+        Self {
+            n_rows: (n_values / group.width) as u32,
+            width: group.width as u32,
+            group: group.index as u32,
+            first: group.first as u32,
+            stream,
+        }
+    }
+}
+
+impl Perturb {
+    /// Compiles the kernels.
+    pub fn new(gpu: &Gpu) -> Self {
+        let with = |source| [GROUPS, STREAM, include_str!("perturb/parameters.wgsl"), source];
+        Self {
+            with_noise: Kernel::new(gpu, "noise", &with(include_str!("perturb/with_noise.wgsl"))),
+            rounded: Kernel::new(gpu, "rounding", &with(include_str!("perturb/rounded.wgsl"))),
+            backward: Kernel::new(gpu, "perturb backward", &with(include_str!("perturb/backward.wgsl"))),
+        }
+    }
+
+    /// Adds `u·step` to each value, u uniform in [−½, ½): the CPU's numbers.
+    ///
+    /// * `stream`: of this iteration. * `anchors`: `[n]`. * `steps`: `[n, 3]`. * `values`: `[n, width]`.
+    /// * `residuals`: as `values`, overwritten with u.
+    #[expect(clippy::too_many_arguments, reason = "what the kernel is bound to")]
+    pub fn with_noise(
+        &self,
+        commands: &mut Commands<'_>,
+        stream: Stream,
+        group: Group,
+        anchors: &Buffer<u32>,
+        steps: &Buffer<f32>,
+        values: &Buffer<f32>,
+        residuals: &Buffer<f32>,
+    ) {
+        let parameters = Parameters::new(group, values.len(), stream.word());
+        commands.run_items(&self.with_noise, &parameters, &[steps, values, residuals, anchors], values.len());
+    }
+
+    /// Rounds each value to a multiple of its step; `residuals` get what that added, in steps.
+    pub fn rounded(
+        &self,
+        commands: &mut Commands<'_>,
+        group: Group,
+        steps: &Buffer<f32>,
+        values: &Buffer<f32>,
+        residuals: &Buffer<f32>,
+    ) {
+        let parameters = Parameters::new(group, values.len(), 0);
+        commands.run_items(&self.rounded, &parameters, &[steps, values, residuals], values.len());
+    }
+
+    /// Writes the group's column of dL/d(step): `Σ residual·dL/dv` over its channels in their order.
+    ///
+    /// * `d_values`, `residuals`: `[n, width]`. * `d_steps`: `[n, 3]`.
+    pub fn backward(
+        &self,
+        commands: &mut Commands<'_>,
+        group: Group,
+        d_values: &Buffer<f32>,
+        residuals: &Buffer<f32>,
+        d_steps: &Buffer<f32>,
+    ) {
+        let parameters = Parameters::new(group, d_values.len(), 0);
+        commands.run_items(&self.backward, &parameters, &[d_values, residuals, d_steps], d_values.len() / group.width);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::finite_difference::random;
+    use crate::gpu::parity::{Bound, SIZES, assert_close, gpu};
+    use crate::ops::perturb as cpu;
+
+    /// Bounds: noise is the CPU's to the bit, a value one product and one sum. A symbol may be the next one where the quotient is within
+    /// 1e-6 of itself of a tie; the residual of a large symbol loses what a quotient of its size does. dL/d(step) is a sum of up to 30
+    /// products that may cancel.
+    #[test]
+    fn perturb_agrees_with_the_cpu() {
+        let Some(gpu) = gpu() else { return };
+        let (kernels, stream) = (Perturb::new(gpu), Stream::of_run(9).branch(1234));
+        for (n, width) in SIZES.into_iter().zip([5, 32, 1, 30, 6]) {
+            let group = Group { index: width % 3, first: 38, width };
+            let of =
+                |seed, len: usize, scale: f64| random(seed, len).iter().map(|v| (scale * v) as f32).collect::<Vec<_>>();
+            let mut values = of(1, n * width, 3.0);
+            for (value, hard) in values.iter_mut().zip([1e9, -1e9, 0.0, 65000.0, 1e-30]) {
+                *value = hard;
+            }
+            let steps: Vec<f32> = of(2, 3 * n, 1.0).iter().map(|v| v.abs() + 0.01).collect();
+            let anchors: Vec<u32> = (0..n as u32).map(|i| 2 * i + 5).collect();
+            let d_values = of(3, n * width, 1.0);
+            let upload = |values: &[f32]| Buffer::upload(gpu, "test", values).expect("room");
+            let anchors_there = Buffer::upload(gpu, "anchors", &anchors).expect("room");
+            let (steps_there, d_there) = (upload(&steps), upload(&d_values));
+            for noisy in [true, false] {
+                let (mut expected, mut residuals) = (values.clone(), vec![9.0; values.len()]);
+                let mut d_steps = vec![7.0; 3 * n];
+                for (row, anchor) in anchors.iter().enumerate() {
+                    let of = row * width..(row + 1) * width;
+                    let (step, v, r) =
+                        (steps[3 * row + group.index], &mut expected[of.clone()], &mut residuals[of.clone()]);
+                    if noisy {
+                        cpu::with_noise(stream.branch(*anchor), 38, step, v, r);
+                    } else {
+                        cpu::rounded(step, v, r);
+                    }
+                    d_steps[3 * row + group.index] = cpu::backward(&d_values[of], r);
+                }
+                let (v, r) = (upload(&values), upload(&vec![9.0; values.len()]));
+                let exact_residuals = upload(&residuals);
+                let d = upload(&vec![7.0; 3 * n]);
+                let mut commands = Commands::new(gpu);
+                if noisy {
+                    kernels.with_noise(&mut commands, stream, group, &anchors_there, &steps_there, &v, &r);
+                } else {
+                    kernels.rounded(&mut commands, group, &steps_there, &v, &r);
+                }
+                kernels.backward(&mut commands, group, &d_there, &exact_residuals, &d);
+                commands.submit().expect("runs");
+                let (v, r) = (v.read(gpu).expect("runs"), r.read(gpu).expect("runs"));
+                if noisy {
+                    assert_eq!(r, residuals);
+                    for (i, (found, expected)) in v.iter().zip(&expected).enumerate() {
+                        let absolute = 2e-7 * f64::from(values[i].abs().max(steps[3 * (i / width) + group.index]));
+                        assert_close("noised", &[*found], &[*expected], Bound { relative: 0.0, absolute });
+                    }
+                } else {
+                    for i in 0..v.len() {
+                        let quotient = f64::from(values[i]) / f64::from(steps[3 * (i / width) + group.index]);
+                        let slack = 1e-6 * quotient.abs();
+                        if (quotient.rem_euclid(1.0) - 0.5).abs() <= slack && quotient.abs() < 32767.0 {
+                            continue;
+                        }
+                        assert_close("rounded", &[v[i]], &[expected[i]], Bound { relative: 2e-7, absolute: 0.0 });
+                        let bound = Bound { relative: 1e-6, absolute: slack };
+                        assert_close("residual", &[r[i]], &[residuals[i]], bound);
+                    }
+                }
+                let bound = Bound { relative: 1e-5, absolute: 1e-5 };
+                let small = |d: &[f32]| d.iter().map(|d| if d.abs() > 1e4 { 0.0 } else { *d }).collect::<Vec<f32>>();
+                assert_close("step", &small(&d.read(gpu).expect("runs")), &small(&d_steps), bound);
+            }
+        }
+    }
+}

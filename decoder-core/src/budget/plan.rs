@@ -61,6 +61,13 @@ impl Plan {
         fast.saturating_add(slow)
     }
 
+    /// Whether a decoder of this plan does what one of `other` does, in the same memory.
+    pub(crate) fn draws_as(&self, other: &Self) -> bool {
+        // The rest is the budget, which the plan was made from, and what is said about it.
+        let drawn = |plan: &Self| (plan.n_tiers, plan.n_strips, plan.placement, plan.scratch_len, plan.slow_len);
+        drawn(self) == drawn(other) && self.shape == other.shape
+    }
+
     /// Which parts lie where.
     pub(crate) fn placement(&self) -> Placement {
         self.placement
@@ -195,7 +202,8 @@ impl Planner<'_, '_> {
         for (n_tiers, weights) in tiers.flat_map(|n| [(n, HeadWeights::F32), (n, HeadWeights::F16)]) {
             let mut best: Option<(u64, Plan)> = None;
             for placement in Placement::to_try(has_slow) {
-                for (cost, plan) in self.variants(n_tiers, weights, placement) {
+                for (n_strips, residency) in self.variants() {
+                    let (cost, plan) = self.variant(n_tiers, n_strips, residency, weights, placement);
                     let needed = match region {
                         Region::Fast => plan.scratch_len,
                         Region::Slow if plan.scratch_len <= budget.ram_bytes => plan.slow_len,
@@ -222,8 +230,8 @@ impl Planner<'_, '_> {
         Err(DecodeError::BudgetTooSmall { region, needed, available, n_tiers: tiers_then, n_strips: n_strips_then })
     }
 
-    /// The plan variants of `n_tiers` tiers that the budget leaves open, fewest strips first, each with its predicted cost.
-    fn variants(&self, n_tiers: u8, weights: HeadWeights, placement: Placement) -> impl Iterator<Item = (u64, Plan)> {
+    /// The numbers of strips and the residencies that the budget leaves open, fewest strips first.
+    fn variants(&self) -> impl Iterator<Item = (u8, Residency)> {
         let (given, tried) = match self.budget.strips {
             Strips::Exactly(n) => (Some(n), &[][..]),
             Strips::Auto => (None, &STRIPS[..]),
@@ -236,10 +244,12 @@ impl Planner<'_, '_> {
             Residency::Streamed => &[Residency::Streamed],
         };
         let n_strips = given.into_iter().chain(tried.iter().copied());
-        let variants = n_strips.flat_map(move |n_strips| residencies.iter().map(move |&kept| (n_strips, kept)));
-        variants.map(move |(n_strips, residency)| self.variant(n_tiers, n_strips, residency, weights, placement))
+        n_strips.flat_map(move |n_strips| residencies.iter().map(move |&residency| (n_strips, residency)))
     }
 
+    /// A plan with its predicted cost.
+    // Not inlined: a plan is too long to be moved by halves.
+    #[inline(never)]
     fn variant(
         &self,
         n_tiers: u8,

@@ -130,7 +130,11 @@ impl GridLevel {
     /// Whether every node has a row of its own.
     #[must_use]
     pub fn is_dense(&self) -> bool {
-        self.n_nodes() == Some(self.n_rows)
+        let r = u64::from(self.resolution);
+        let in_plane = r.wrapping_mul(r);
+        // Below 2⁴⁸.
+        let n_nodes = if self.kind == LevelKind::Volume { in_plane.wrapping_mul(r) } else { in_plane };
+        n_nodes == self.n_rows.into()
     }
 
     /// The nodes around a point: along each axis `u·(R − 1)` in 16.16 fixed point gives the lower node and, from its upper
@@ -139,70 +143,51 @@ impl GridLevel {
     /// `(x ⊕ y·2654435761 ⊕ z·805459861) mod n_rows`, over the level's axes in the order x, y, z.
     ///
     /// # Budget
-    /// Three multiplications an axis, two a corner.
+    /// Two multiplications an axis, one a corner.
     #[inline]
     #[must_use]
-    pub fn corners(&self, unit: [u16; 3]) -> Corners {
-        let [x, y, z] = unit.map(|u| self.along(u));
-        match self.kind {
-            LevelKind::Volume => self.volume([x, y, z]),
-            LevelKind::Xy => self.plane([x, y]),
-            LevelKind::Xz => self.plane([x, z]),
-            LevelKind::Yz => self.plane([y, z]),
-        }
-    }
-
-    /// (lower node, weight of the upper one in 256ths).
-    #[inline]
-    fn along(&self, unit: u16) -> (u32, u32) {
-        // Below 2¹⁶ · 2¹⁶. A unit coordinate stays below 1, so the upper node exists.
-        let position = u32::from(unit).wrapping_mul(u32::from(self.resolution).wrapping_sub(1));
-        (position >> 16, (position >> 8) & 0xFF)
-    }
-
-    #[inline]
-    fn volume(&self, [x, y, z]: [(u32, u32); 3]) -> Corners {
-        let mut corners = Corners { n: 8, ..Corners::default() };
+    pub fn corners(&self, [x, y, z]: [u16; 3]) -> Corners {
+        // A plane has one more axis, on which every point lies at node 0.
+        let (axes, n) = match self.kind {
+            LevelKind::Volume => ([x, y, z], 8),
+            LevelKind::Xy => ([x, y, 0], 4),
+            LevelKind::Xz => ([x, z, 0], 4),
+            LevelKind::Yz => ([y, z, 0], 4),
+        };
+        let r = u32::from(self.resolution);
         let dense = self.is_dense();
+        let [first, second, third] = if dense { [1, r, r.wrapping_mul(r)] } else { HASH_PRIMES };
+        let [a, b, c] = axes;
+        let [a, b, c] = [self.along(a, first), self.along(b, second), self.along(c, third)];
+        let mut corners = Corners { n, ..Corners::default() };
         let slots = corners.rows.iter_mut().zip(&mut corners.weights);
         for (bits, (row, weight)) in (0_u32..).zip(slots) {
-            let [(node_x, weight_x), (node_y, weight_y), (node_z, weight_z)] =
-                [corner(x, bits & 1), corner(y, bits >> 1 & 1), corner(z, bits >> 2)];
-            *row = self.row([node_x, node_y, node_z], dense);
-            *weight = weight_x.wrapping_mul(weight_y).wrapping_mul(weight_z);
+            let [(part_a, weight_a), (part_b, weight_b), (part_c, weight_c)] =
+                [end(a, bits & 1), end(b, bits >> 1 & 1), end(c, bits >> 2)];
+            *row = if dense {
+                part_a.wrapping_add(part_b).wrapping_add(part_c)
+            } else {
+                (part_a ^ part_b ^ part_c) & self.n_rows.wrapping_sub(1)
+            };
+            *weight = weight_a.wrapping_mul(weight_b).wrapping_mul(weight_c);
         }
         corners
     }
 
+    /// Of the lower node of an axis and of the upper one: its number times `multiplier`, and its weight in 256ths.
     #[inline]
-    fn plane(&self, [a, b]: [(u32, u32); 2]) -> Corners {
-        let mut corners = Corners { n: 4, ..Corners::default() };
-        let dense = self.is_dense();
-        let slots = corners.rows.iter_mut().zip(&mut corners.weights);
-        for (bits, (row, weight)) in (0_u32..4).zip(slots) {
-            let [(node_a, weight_a), (node_b, weight_b)] = [corner(a, bits & 1), corner(b, bits >> 1)];
-            *row = self.row([node_a, node_b, 0], dense);
-            *weight = weight_a.wrapping_mul(weight_b) << 8;
-        }
-        corners
-    }
-
-    #[inline]
-    fn row(&self, [a, b, c]: [u32; 3], dense: bool) -> u32 {
-        if dense {
-            let r = u32::from(self.resolution);
-            return c.wrapping_mul(r).wrapping_add(b).wrapping_mul(r).wrapping_add(a);
-        }
-        let [prime_a, prime_b, prime_c] = HASH_PRIMES;
-        let hash = a.wrapping_mul(prime_a) ^ b.wrapping_mul(prime_b) ^ c.wrapping_mul(prime_c);
-        hash & self.n_rows.wrapping_sub(1)
+    fn along(&self, unit: u16, multiplier: u32) -> [(u32, u32); 2] {
+        // Below 2¹⁶ · 2¹⁶. A unit coordinate stays below 1, so the upper node exists.
+        let position = u32::from(unit).wrapping_mul(u32::from(self.resolution).wrapping_sub(1));
+        let (part, upper) = ((position >> 16).wrapping_mul(multiplier), (position >> 8) & 0xFF);
+        [(part, 256_u32.wrapping_sub(upper)), (part.wrapping_add(multiplier), upper)]
     }
 }
 
-/// The lower or the upper node of an axis and its weight in 256ths.
+/// The lower or the upper node of an axis.
 #[inline]
-fn corner((node, upper): (u32, u32), bit: u32) -> (u32, u32) {
-    if bit == 0 { (node, 256_u32.wrapping_sub(upper)) } else { (node.wrapping_add(1), upper) }
+fn end([lower, upper]: [(u32, u32); 2], bit: u32) -> (u32, u32) {
+    if bit == 0 { lower } else { upper }
 }
 
 #[cfg(test)]

@@ -323,19 +323,24 @@ impl<'a> Context<'a> {
     /// 8 look-ups a volume, 4 a plane, of four features each.
     #[inline]
     pub fn features(&self, lattice: [i32; 3], features: &mut [i16]) {
+        let Inputs::Grid { levels, grid } = self.inputs else { return };
         let unit = self.frame.unit(lattice);
         let mut first_row = 0_u32;
-        for (level, out) in self.levels().zip(features.as_chunks_mut::<FEATURES_PER_LEVEL>().0) {
-            let mut sums = [1_i32 << (FEATURE_SHIFT - 1); FEATURES_PER_LEVEL];
+        for (record, out) in levels.iter().zip(features.as_chunks_mut::<FEATURES_PER_LEVEL>().0) {
+            let Some(level) = level(record) else { continue };
+            // The weights of the rows that have +1; those of all others are what is left of 2²⁴.
+            let mut sums = [0_u32; FEATURES_PER_LEVEL];
             for (row, weight) in level.corners(unit).iter() {
-                let bits = self.row_bits(first_row.wrapping_add(row));
-                // Weights add up to 2²⁴.
+                let row = first_row.wrapping_add(row);
+                let byte = grid.get((row >> 1) as usize).copied().unwrap_or_default();
+                let signs = byte >> ((row & 1) << 2);
                 for (bit, sum) in sums.iter_mut().enumerate() {
-                    let weight = weight as i32;
-                    *sum = sum.wrapping_add(if bits >> bit & 1 == 1 { weight } else { weight.wrapping_neg() });
+                    *sum = sum.wrapping_add(if signs & (1 << bit) != 0 { weight } else { 0 });
                 }
             }
-            *out = sums.map(|sum| (sum >> FEATURE_SHIFT) as i16);
+            // Σ ±weight = 2·sum − 2²⁴.
+            const ROUNDED: u32 = WEIGHT_ONE.wrapping_sub(1 << (FEATURE_SHIFT - 1));
+            *out = sums.map(|sum| ((sum << 1).wrapping_sub(ROUNDED).cast_signed() >> FEATURE_SHIFT) as i16);
             first_row = first_row.wrapping_add(level.n_rows);
         }
     }
@@ -348,12 +353,6 @@ impl<'a> Context<'a> {
         }
         // Within 4096 steps every symbol near the mean is an i16.
         raised_mean.wrapping_add(self.taps.shift(feature, residuals)).clamp(i16::MIN.into(), i16::MAX.into())
-    }
-
-    fn row_bits(&self, row: u32) -> u8 {
-        let Inputs::Grid { grid, .. } = self.inputs else { return 0 };
-        let byte = grid.get((row >> 1) as usize).copied().unwrap_or_default();
-        if row & 1 == 0 { byte & 0xF } else { byte >> 4 }
     }
 }
 

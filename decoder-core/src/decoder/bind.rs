@@ -68,7 +68,7 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
 #[inline(never)]
 fn check_plan(bundle: &Bundle<'_>, plan: &Plan) -> Result<(), DecodeError> {
     let needed = bundle.plan(plan.budget())?;
-    if needed != *plan {
+    if !needed.draws_as(plan) {
         let [needed, planned] =
             [&needed, plan].map(|plan| saturate(plan.scratch_len().saturating_add(plan.slow_scratch_len())));
         return Err(DecodeError::PlanMismatch { needed, planned });

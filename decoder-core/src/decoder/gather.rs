@@ -214,8 +214,11 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
             let position = bundle.position(site.lattice);
             let anchor =
                 Anchor::from_row::<A::Functions>(header, position, site.mask, row).ok_or(DecodeError::Internal)?;
-            let is_seen =
-                if as_baked { view.sees_box(anchor.ink_box()) } else { view.sees_anchor(position, anchor.extent) };
+            let is_seen = if cfg!(feature = "baked") && as_baked {
+                view.sees_box(anchor.ink_box())
+            } else {
+                view.sees_anchor(position, anchor.extent)
+            };
             if !is_seen || keeper.pass.band.as_ref().is_some_and(|band| !band.sees_anchor(&anchor)) {
                 return Ok(());
             }
@@ -241,7 +244,8 @@ impl<A: Arithmetic> GaussianSink for Gathering<'_, '_, A> {
     fn gaussian(&mut self, anchor: u32, offset: usize, gaussian: &Gaussian) {
         self.report.gaussians += 1;
         let place = place(anchor, offset);
-        if self.as_baked {
+        // The first half drops the code where no scene is such.
+        if cfg!(feature = "baked") && self.as_baked {
             self.keeper.project(place, &BakedGaussian::rounded(gaussian, self.effects), self.effects);
         } else {
             self.keeper.project(place, gaussian, self.effects);

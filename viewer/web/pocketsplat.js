@@ -2,7 +2,7 @@
 
 const QUALITIES = {
   exact: { alphaCut: 1, transmittanceStop: 1, detail: true },
-  balanced: { alphaCut: 4, transmittanceStop: 10, detail: true },
+  balanced: { alphaCut: 2, transmittanceStop: 10, detail: true },
   draft: { alphaCut: 8, transmittanceStop: 100, detail: false },
 };
 

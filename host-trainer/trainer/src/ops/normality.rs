@@ -3,7 +3,7 @@
 use crate::real::Real;
 
 /// Variances below are treated as by the tangent there: no logarithm of 0, no division by 0, and no jump.
-const VARIANCE_FLOOR: f64 = 1e-6;
+pub(crate) const VARIANCE_FLOOR: f64 = 1e-6;
 
 /// The terms of a column.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,13 +1,6 @@
-struct Parameters {
-    n_values: u32,
-    width: u32,
-}
-
 @group(0) @binding(0) var<storage, read> values: array<u32>;
 @group(0) @binding(1) var<storage, read> indices: array<u32>;
 @group(0) @binding(2) var<storage, read_write> rows: array<u32>;
-
-var<immediate> parameters: Parameters;
 
 @compute @workgroup_size(256)
 fn gather(

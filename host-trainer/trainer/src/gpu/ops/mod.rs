@@ -13,6 +13,7 @@ pub mod grid_bits;
 pub mod hash_grid;
 pub mod head;
 pub mod head_input;
+pub mod high_pass;
 pub mod l1;
 pub mod mask;
 pub mod neural_gaussians;

@@ -106,7 +106,7 @@ mod tests {
                 // Constant, and almost.
                 for row in values.chunks_exact_mut(width) {
                     row[1] = 0.75;
-                    row[2] = 1e-4 * row[2];
+                    row[2] *= 1e-4;
                 }
             }
             let expected = ChannelMoments::of(&[&values], width);

@@ -35,7 +35,8 @@ fn silhouettes<'a>(on_black: &'a [View], on_white: &[View]) -> Vec<Silhouette<'a
     let changed = |black: &u8, white: &u8| *white == 255 && *black == 0;
     let of_view = |(black, white): (&'a View, &View)| {
         assert_eq!(black.name, white.name, "views in the same order");
-        let pixels = black.image.rgb.chunks_exact(3).zip(white.image.rgb.chunks_exact(3));
+        let [on_black, on_white] = [black, white].map(|view| view.photograph().expect("in memory"));
+        let pixels = on_black.image.rgb.chunks_exact(3).zip(on_white.image.rgb.chunks_exact(3));
         let on_object = pixels.map(|(b, w)| !b.iter().zip(w).all(|(b, w)| changed(b, w))).collect();
         Silhouette { camera: &black.camera, on_object }
     };

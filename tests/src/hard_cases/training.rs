@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 use pocketsplat_capture::camera::Camera;
-use pocketsplat_capture::dataset::{Capture, EXTENT, Image, Normalisation, PointsOrigin, View};
+use pocketsplat_capture::dataset::{Capture, EXTENT, Image, Normalisation, Photograph, PointsOrigin, View};
 use pocketsplat_trainer::scene::ModelShape;
 use pocketsplat_trainer::train::config::{Densification, LearningRate, Rates};
 use pocketsplat_trainer::train::{TrainConfig, TrainError, Trainer};
@@ -33,12 +33,8 @@ fn capture(pixel: impl Fn(u32, u32, u32) -> [u8; 3], points: Vec<DVec3>) -> Capt
             height_px: SIZE_PX,
         };
         let rgb = (0..SIZE_PX * SIZE_PX).flat_map(|p| pixel(i, p % SIZE_PX, p / SIZE_PX)).collect();
-        View {
-            name: format!("view_{i}"),
-            camera,
-            image: Image { width_px: SIZE_PX, height_px: SIZE_PX, rgb },
-            mask: None,
-        }
+        let image = Image { width_px: SIZE_PX, height_px: SIZE_PX, rgb };
+        View::new(format!("view_{i}"), camera, Photograph { image, mask: None })
     };
     Capture {
         train: (0..5).map(view).collect(),

@@ -3,15 +3,14 @@
 use std::collections::BTreeSet;
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::framing::Framing;
 use super::listing::{Listing, commonest};
 use super::normalise::random_points_world;
-use super::photo::Photo;
+use super::storage::{LoadedView, load_views};
 use super::{
     Capture, DatasetError, EXTENT, Layout, LoadOptions, LoadReport, Normalisation, PointsOrigin, SkippedView, Split,
-    ViewFault, frusta,
+    frusta,
 };
 
 /// Fewer views than this leave depth undetermined almost everywhere.
@@ -23,7 +22,7 @@ const MAX_POINT_EXTENTS: f64 = 1000.0;
 /// Decodes the views of a listing and brings all of it to the common frame.
 ///
 /// # Errors
-/// [`DatasetError::TooFewViews`] or [`DatasetError::NoBaseline`].
+/// [`DatasetError::TooFewViews`] or [`DatasetError::NoBaseline`], and those of a cache.
 pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Capture, LoadReport), DatasetError> {
     let sizes_px = |split| listing.shots(split).map(|shot| shot.header.size_px);
     let source_size_px = commonest(sizes_px(Split::Train)).unwrap_or_default();
@@ -40,22 +39,15 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
     }
     let Listing { layout, source, views, points, unposed, notes } = listing;
     let mut notes: Vec<String> = notes.into_iter().map(|note| note.text).collect();
-    let read: Vec<(Split, String, Result<Photo, ViewFault>)> = views
-        .into_par_iter()
-        .map(|view| {
-            let photo = view.shot.and_then(|shot| shot.read(&view.name, options));
-            (view.split, view.name, photo)
-        })
-        .collect();
     let (mut train, mut test, mut skipped) = (Vec::new(), Vec::new(), Vec::new());
     let mut sum_shown = 0.0;
-    for (split, name, result) in read {
-        match (result, split) {
-            (Ok(Photo { view, shown }), Split::Train) => {
+    for LoadedView { split, name, view } in load_views(views, options)? {
+        match (view, split) {
+            (Ok((view, shown)), Split::Train) => {
                 train.push(view);
                 sum_shown += shown;
             }
-            (Ok(Photo { view, .. }), Split::Test) => test.push(view),
+            (Ok((view, _)), Split::Test) => test.push(view),
             (Err(fault), split) => skipped.push(SkippedView { split, name, fault }),
         }
     }
@@ -91,7 +83,7 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
             options.background
         ));
     }
-    let n_masked = train.iter().chain(&test).filter(|view| view.mask.is_some()).count();
+    let n_masked = train.iter().chain(&test).filter(|view| view.has_mask()).count();
     if n_masked > 0 {
         notes
             .push(format!("images with pixels that do not count (no source in the photograph, or masked): {n_masked}"));

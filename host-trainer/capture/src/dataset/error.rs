@@ -98,6 +98,26 @@ pub enum DatasetError {
         "one view in {found} is to be held out, needed: at least 2, so that some are left to train on; 0 holds out none"
     )]
     TestEvery { found: u32 },
+    /// Somebody else's cache.
+    #[error(
+        "another process works with the decoded photographs in `{}`; wait for it to end, or choose another folder for the \
+         run",
+        path.display()
+    )]
+    CacheInUse { path: PathBuf },
+    /// No room for the decoded photographs.
+    #[error(
+        "the decoded photographs need {needed} bytes in `{}`, found free: {found}; make room, choose another folder for \
+         the run, or load the photographs smaller (--max-resolution)",
+        path.display()
+    )]
+    DiskFull { path: PathBuf, needed: u64, found: u64 },
+    /// The cache cannot be written.
+    #[error(
+        "cannot write the decoded photographs to `{}`: {source}; make the folder writable, or choose another one for the run",
+        path.display()
+    )]
+    CacheWrite { path: PathBuf, source: std::io::Error },
 }
 
 impl DatasetError {
@@ -120,6 +140,7 @@ impl DatasetError {
             Self::TooFewViews { .. } => "too-few-views",
             Self::NoBaseline { .. } => "no-baseline",
             Self::MaxResolution { .. } | Self::TestEvery { .. } => "bad-option",
+            Self::CacheInUse { .. } | Self::DiskFull { .. } | Self::CacheWrite { .. } => "cache",
         }
     }
 }

@@ -62,7 +62,7 @@ pub(super) struct ListedView {
 }
 
 /// A photograph whose pose, lens and image header are sound.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub(super) struct Shot {
     pub(super) path: PathBuf,
     pub(super) header: ImageHeader,

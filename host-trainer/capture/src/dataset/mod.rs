@@ -2,7 +2,7 @@
 //!
 //! [`load`] tells the layout of a folder by the files in it; that layout's reader lists the views (poses, lenses, image
 //! headers), and what all layouts share makes a capture of the listing: pixels in `image`, `lens` and `undistort`, the
-//! common frame in `normalise`, initial points in `ply` and `frusta`.
+//! common frame in `normalise`, initial points in `ply` and `frusta`; `storage` says where the pixels of large captures lie.
 //! A view that cannot be used is left out and named in the [`LoadReport`]; only a capture that cannot be trained on
 //! at all is an error. [`diagnose()`] looks at the same listing and says what may go wrong.
 
@@ -10,10 +10,9 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use crate::camera::Camera;
-
 mod assemble;
 mod blender;
+mod cache;
 mod camera_models;
 mod colmap;
 mod detect;
@@ -36,6 +35,7 @@ mod normalise;
 mod nsvf;
 mod options;
 mod photo;
+mod photograph;
 mod ply;
 mod polycam;
 mod pose;
@@ -44,21 +44,26 @@ mod record3d;
 mod report;
 mod severity;
 mod spacing;
+mod storage;
 mod text_file;
 mod transforms;
 mod undistort;
+mod view;
 mod view_fault;
 
+pub use cache::{FileFault, remove_cache};
 pub use diagnose::{Diagnosis, Finding, diagnose, diagnose_cheaply};
 pub use error::DatasetError;
 pub use frame_size::{FrameSize, NoFrameSize};
 pub use layout::Layout;
 pub use mask::Mask;
-pub use options::{Background, LoadOptions};
+pub use options::{Background, LoadOptions, MOST_IN_MEMORY_BYTES};
+pub use photograph::Photograph;
 pub use pose::PoseFault;
 pub use report::{LoadReport, SkippedView, Split};
 pub use severity::Severity;
 pub use spacing::{PUBLISHED_VOXEL_SIZE, nearest_squared, suggested_voxel_size};
+pub use view::{PhotographError, View};
 pub use view_fault::ViewFault;
 
 /// An 8-bit RGB image, row-major, interleaved.
@@ -70,19 +75,6 @@ pub struct Image {
     pub height_px: u32,
     /// `[height, width, 3]`.
     pub rgb: Vec<u8>,
-}
-
-/// One photograph and the camera that took it, in the normalised frame.
-#[derive(Clone, Debug)]
-pub struct View {
-    /// Name as the capture gives it, for messages and file names.
-    pub name: String,
-    /// Camera in the normalised frame, for this image's size.
-    pub camera: Camera,
-    /// The photograph, composited on the capture's background and undistorted.
-    pub image: Image,
-    /// Which pixels count; all where there is none.
-    pub mask: Option<Mask>,
 }
 
 /// The similarity that takes the capture's world to the normalised frame: `p_norm = (p_world − centre) · scale`.
@@ -148,12 +140,13 @@ impl Capture {
 ///
 /// The layout is told by the files present, see [`Layout`]. Images are decoded on all threads, composited on
 /// [`LoadOptions::background`], undistorted, and only then reduced, so that at most one full-size image per thread is
-/// held; the result does not depend on the number of threads.
+/// held; the result does not depend on the number of threads. Photographs of more than [`LoadOptions::in_memory_bytes`]
+/// do not stay in memory: they lie in [`LoadOptions::cache`], or are decoded again whenever they are asked for.
 ///
 /// # Errors
 /// [`DatasetError`] names the file, what was found, what is needed and what to do: a folder of unknown layout, a file of
-/// poses that cannot be read, a camera model that cannot be undistorted, fewer than three usable training views, or
-/// training cameras all in one place.
+/// poses that cannot be read, a camera model that cannot be undistorted, fewer than three usable training views,
+/// training cameras all in one place, or a cache that another process holds or that the disk has no room for.
 pub fn load(path: &Path, options: &LoadOptions) -> Result<(Capture, LoadReport), DatasetError> {
     assemble::assemble(list(path, options)?, options)
 }

@@ -1,6 +1,7 @@
 //! What the user may choose about loading.
 
 use std::fmt;
+use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
@@ -47,6 +48,11 @@ impl fmt::Display for Background {
     }
 }
 
+/// Decoded photographs stay in memory up to this many bytes in all: 200 of 1600×1066 pixels.
+///
+/// Half of the 2 GiB that training on any capture is to keep to at that size; the rest is for the step.
+pub const MOST_IN_MEMORY_BYTES: u64 = 1 << 30;
+
 /// How to load a capture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadOptions {
@@ -71,6 +77,11 @@ pub struct LoadOptions {
     /// split of its own; 0 holds out none. Views whose image is missing count, so that the split does not depend on
     /// which files are there.
     pub test_every: u32,
+    /// Where photographs are kept decoded when they do not stay in memory: a folder, which is made; without one they are
+    /// decoded again whenever they are asked for. [`remove_cache`](super::remove_cache) removes it.
+    pub cache: Option<PathBuf>,
+    /// Photographs that take more bytes than this, decoded, do not stay in memory.
+    pub in_memory_bytes: u64,
 }
 
 impl Default for LoadOptions {
@@ -86,6 +97,8 @@ impl Default for LoadOptions {
             model: None,
             // As every published figure on COLMAP captures.
             test_every: 8,
+            cache: None,
+            in_memory_bytes: MOST_IN_MEMORY_BYTES,
         }
     }
 }

@@ -5,11 +5,14 @@ use super::image::{read_composited, read_mask};
 use super::lens::is_scaling;
 use super::listing::Shot;
 use super::undistort::undistorted;
-use super::{LoadOptions, Mask, View, ViewFault};
+use super::{LoadOptions, Mask, Photograph, ViewFault};
+use crate::camera::Camera;
 
 /// A photograph that was read.
 pub(super) struct Photo {
-    pub(super) view: View,
+    pub(super) photograph: Photograph,
+    /// Capture units.
+    pub(super) camera: Camera,
     /// Share of its pixels that are not wholly transparent.
     pub(super) shown: f64,
 }
@@ -22,26 +25,44 @@ impl Shot {
     ///
     /// # Errors
     /// [`ViewFault::Unreadable`], [`ViewFault::Mask`] or [`ViewFault::Small`].
-    pub(super) fn read(&self, name: &str, options: &LoadOptions) -> Result<Photo, ViewFault> {
+    pub(super) fn read(&self, options: &LoadOptions) -> Result<Photo, ViewFault> {
         let unreadable = |message| ViewFault::Unreadable { path: self.path.clone(), message };
         let (mut image, shown) = read_composited(&self.path, options.background).map_err(unreadable)?;
         let mut mask = self.read_mask()?;
         if !self.lens.is_pinhole() {
             (image, mask) = undistorted(&image, mask.as_ref(), &self.lens);
         }
-        let mut camera = self.lens.camera(self.rotation, self.translation);
-        let source_px = self.header.size_px;
-        let framing = Framing::of(source_px, options).ok_or_else(|| ViewFault::Small {
-            path: self.path.clone(),
-            found_px: source_px,
-            needed_px: options.frame.map_or((0, 0), |frame| (frame.width_px, frame.height_px)),
-        })?;
-        if framing.size_px != source_px {
+        let framing = self.framing(options)?;
+        if framing.size_px != self.header.size_px {
             image = framing.image(&image);
             mask = mask.as_ref().map(|mask| framing.mask(mask));
-            camera = framing.camera(&camera);
         }
-        Ok(Photo { view: View { name: name.to_owned(), camera, image, mask }, shown })
+        Ok(Photo { photograph: Photograph { image, mask }, camera: self.camera(&framing), shown })
+    }
+
+    /// At which size it is loaded, and which part of it.
+    ///
+    /// # Errors
+    /// [`ViewFault::Small`].
+    pub(super) fn framing(&self, options: &LoadOptions) -> Result<Framing, ViewFault> {
+        Framing::of(self.header.size_px, options).ok_or_else(|| ViewFault::Small {
+            path: self.path.clone(),
+            found_px: self.header.size_px,
+            needed_px: options.frame.map_or((0, 0), |frame| (frame.width_px, frame.height_px)),
+        })
+    }
+
+    /// The camera of the photograph as it is loaded, capture units.
+    pub(super) fn camera(&self, framing: &Framing) -> Camera {
+        let camera = self.lens.camera(self.rotation, self.translation);
+        if framing.size_px == self.header.size_px { camera } else { framing.camera(&camera) }
+    }
+
+    /// Bytes of the decoded photograph at most: undistorting may leave a mask, or leave none.
+    pub(super) fn decoded_bytes(&self, options: &LoadOptions) -> u64 {
+        let (width, height) = Framing::of(self.header.size_px, options).map_or((0, 0), |framing| framing.size_px);
+        let may_have_mask = self.mask.is_some() || !self.lens.is_pinhole();
+        u64::from(width) * u64::from(height) * if may_have_mask { 4 } else { 3 }
     }
 
     fn read_mask(&self) -> Result<Option<Mask>, ViewFault> {

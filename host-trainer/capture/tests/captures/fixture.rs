@@ -2,9 +2,10 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use glam::{DMat3, DQuat, DVec3};
-use pocketsplat_capture::dataset::{Capture, DatasetError, LoadOptions, LoadReport, load};
+use pocketsplat_capture::dataset::{Capture, DatasetError, LoadOptions, LoadReport, Photograph, View, load};
 use tempfile::TempDir;
 
 /// Width and height of the images, pixels.
@@ -54,6 +55,11 @@ pub(crate) struct Fixture {
     pub(crate) points: Vec<DVec3>,
     /// Fields of a transforms file, for all frames.
     pub(crate) shared: String,
+}
+
+/// The photograph of a view that was just loaded.
+pub(crate) fn photograph(view: &View) -> Arc<Photograph> {
+    view.photograph().expect("a photograph")
 }
 
 impl Fixture {

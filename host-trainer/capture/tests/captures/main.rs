@@ -7,3 +7,4 @@ mod exports;
 mod fixture;
 mod real;
 mod sound;
+mod storage;

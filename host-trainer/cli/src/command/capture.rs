@@ -32,7 +32,7 @@ pub(crate) struct CaptureArgs {
 }
 
 impl CaptureArgs {
-    fn load_options(&self, seed: u64) -> LoadOptions {
+    fn load_options(&self, seed: u64, cache: Option<&Path>) -> LoadOptions {
         let default = LoadOptions::default();
         LoadOptions {
             max_resolution: self.options.max_resolution,
@@ -42,19 +42,31 @@ impl CaptureArgs {
             images: self.options.images.clone(),
             model: self.options.model,
             test_every: self.options.test_every.unwrap_or(default.test_every),
+            cache: cache.map(Path::to_owned),
             ..default
         }
     }
 
-    /// Loads the capture and says on stderr what was found.
+    /// Loads the capture to look at its photographs once or twice, and says on stderr what was found.
+    ///
+    /// Photographs that are too many for the memory are decoded again when they are needed.
     pub(crate) fn load(&self, seed: u64) -> Result<Capture> {
+        self.load_with(&self.load_options(seed, None))
+    }
+
+    /// The same for training, which needs every photograph again and again: those that are too many for the memory are kept
+    /// decoded in the folder `cache`.
+    pub(crate) fn load_cached(&self, seed: u64, cache: &Path) -> Result<Capture> {
+        self.load_with(&self.load_options(seed, Some(cache)))
+    }
+
+    fn load_with(&self, options: &LoadOptions) -> Result<Capture> {
         refuse_gaussians(&self.dataset)?;
-        let options = self.load_options(seed);
-        let findings = dataset::diagnose_cheaply(&self.dataset, &options);
+        let findings = dataset::diagnose_cheaply(&self.dataset, options);
         if findings.count(Severity::Warning) > 0 {
             eprintln!("warnings found: run `pocketsplat doctor {}`", shell_word(&self.dataset));
         }
-        let (capture, report) = dataset::load(&self.dataset, &options)
+        let (capture, report) = dataset::load(&self.dataset, options)
             .with_context(|| format!("could not load the capture {}", self.dataset.display()))?;
         eprintln!("{report}");
         Ok(capture)

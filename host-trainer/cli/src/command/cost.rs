@@ -76,7 +76,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         let counted: Vec<usize> = picked_of(sights.len(), n).collect();
         sights.iter_mut().enumerate().for_each(|(i, sight)| sight.counts = counted.contains(&i));
     }
-    let [width, height] = [|s: &Sight<'_>| s.camera.width_px, |s: &Sight<'_>| s.camera.height_px]
+    let [width, height] = [|s: &Sight| s.camera.width_px, |s: &Sight| s.camera.height_px]
         .map(|side| sights.iter().map(side).max().unwrap_or(1));
     // What a device would plan: with places for more splats a frame of strips goes over fewer anchors.
     let budget = Budget::for_frame(width, height);
@@ -158,7 +158,7 @@ fn picked_of(of: usize, n: usize) -> impl Iterator<Item = usize> {
     (0..n).map(move |i| i * of / n)
 }
 
-fn sights<'a>(file: &BundleFile, bundle: &Bundle<'_>, capture: &Capture, views: &[&'a View]) -> Result<Vec<Sight<'a>>> {
+fn sights(file: &BundleFile, bundle: &Bundle<'_>, capture: &Capture, views: &[&View]) -> Result<Vec<Sight>> {
     let oracle = ReferenceScene::from_bundle(bundle)?;
     views
         .par_iter()
@@ -167,7 +167,7 @@ fn sights<'a>(file: &BundleFile, bundle: &Bundle<'_>, capture: &Capture, views: 
             Ok(Sight {
                 camera: core_camera(&camera)?,
                 reference: reference_image(bundle, &oracle, &camera),
-                photograph: (&view.image, view.mask.as_ref()),
+                photograph: view.photograph()?,
                 counts: true,
             })
         })

@@ -73,7 +73,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let view = &capture.test[0];
     let reference = reference_image(&bundle, &ReferenceScene::from_bundle(&bundle)?, &view.camera);
     let decoder = core_image(&bundle, &view.camera)?.image;
-    side_by_side(&[&view.image, &reference, &decoder])
+    side_by_side(&[&view.photograph()?.image, &reference, &decoder])
         .write_png(&picture)
         .with_context(|| format!("could not write {}", picture.display()))?;
 

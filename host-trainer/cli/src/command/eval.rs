@@ -4,12 +4,13 @@ pub(crate) mod explicit;
 mod summary;
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Instant;
 
 use crate::plot::ResultRow;
 use anyhow::Result;
 use pocketsplat_capture::camera::Camera;
-use pocketsplat_capture::dataset::{Capture, Image, Split, View};
+use pocketsplat_capture::dataset::{Capture, Image, Photograph, Split, View};
 use pocketsplat_core::Bundle;
 use pocketsplat_core::bundle::crc32;
 use pocketsplat_trainer::metrics::{Lpips, half_size_enlarged, psnr_db, psnr_db_masked, ssim_masked};
@@ -161,11 +162,11 @@ const DECODES: usize = 3;
 
 /// One drawn view and how it compares.
 struct DrawnView {
-    image: Image,
     seconds: f64,
     scratch_bytes: usize,
     psnr_db: f64,
     ssim: f64,
+    lpips: Option<f64>,
     psnr_to_reference_db: f64,
     half_size_copy_psnr_db: f64,
 }
@@ -181,7 +182,8 @@ fn tiers(file: &BundleFile, bundle: &Bundle<'_>, capture: &Capture, views: &[Vie
     let evaluated = (1..=bundle.n_tiers()).map(|n_tiers| {
         let psnr = |view: &View| -> Result<f64> {
             let image = core_image_of_tiers(bundle, &file.camera(bundle, capture, view), n_tiers)?.image;
-            Ok(psnr_db_masked(&image, &view.image, view.mask.as_ref()))
+            let photograph = view.photograph()?;
+            Ok(psnr_db_masked(&image, &photograph.image, photograph.mask.as_ref()))
         };
         let of_views = views.par_iter().map(psnr).collect::<Result<Vec<f64>>>()?;
         let n_anchors = bundle.tier(n_tiers - 1).map_or(0, |tier| tier.n_anchors);
@@ -244,8 +246,8 @@ pub(crate) fn measure(
         Some(scene) => psnr_db(image, &reference_image(&bundle, scene, &file.camera(&bundle, loaded, view))),
         None => f64::INFINITY,
     };
-    let rows = drawn_views(views, draw, to_reference)?;
-    let (lpips_mean, of_views) = view_evaluations(&rows, views, lpips)?;
+    let rows = drawn_views(views, draw, to_reference, lpips)?;
+    let (lpips_mean, of_views) = view_evaluations(&rows, views);
     Ok(Evaluation {
         psnr_db: mean(&rows, |row| row.psnr_db),
         ssim: mean(&rows, |row| row.ssim),
@@ -259,8 +261,8 @@ pub(crate) fn measure(
         n_views: rows.len(),
         split: split.to_string(),
         renderer: format!("{renderer:?}").to_lowercase(),
-        width_px: views[0].image.width_px,
-        height_px: views[0].image.height_px,
+        width_px: views[0].camera.width_px,
+        height_px: views[0].camera.height_px,
         background: options.background.map_or_else(String::new, |b| b.to_string()),
         decode_s,
         render_s_per_view: mean(&rows, |row| row.seconds),
@@ -280,23 +282,39 @@ fn drawn_views(
     views: &[View],
     draw: impl Fn(&View) -> Result<(Image, usize)> + Sync,
     to_reference: impl Fn(&Image, &View) -> f64 + Sync,
+    lpips: Option<&Lpips>,
 ) -> Result<Vec<DrawnView>> {
-    let drawn = |view: &View| {
+    let drawn = |view: &View| -> Result<(DrawnView, Image, Arc<Photograph>)> {
         let started = Instant::now();
         let (image, scratch_bytes) = draw(view)?;
         let seconds = started.elapsed().as_secs_f64();
-        let psnr_db = |image: &Image| psnr_db_masked(image, &view.image, view.mask.as_ref());
-        Ok(DrawnView {
+        let photograph = view.photograph()?;
+        let (truth, mask) = (&photograph.image, photograph.mask.as_ref());
+        let row = DrawnView {
             seconds,
             scratch_bytes,
-            psnr_db: psnr_db(&image),
-            ssim: ssim_masked(&image, &view.image, view.mask.as_ref()),
+            psnr_db: psnr_db_masked(&image, truth, mask),
+            ssim: ssim_masked(&image, truth, mask),
+            lpips: None,
             psnr_to_reference_db: to_reference(&image, view),
-            half_size_copy_psnr_db: psnr_db(&half_size_enlarged(&view.image)),
-            image,
-        })
+            half_size_copy_psnr_db: psnr_db_masked(&half_size_enlarged(truth), truth, mask),
+        };
+        Ok((row, image, photograph))
     };
-    views.par_iter().map(drawn).collect()
+    let Some(lpips) = lpips else {
+        return views.par_iter().map(|view| Ok(drawn(view)?.0)).collect();
+    };
+    let mut rows = Vec::with_capacity(views.len());
+    // A few pictures at a time: those of all views may be more than the memory holds.
+    for views in views.chunks(rayon::current_num_threads()) {
+        let drawn = views.par_iter().map(&drawn).collect::<Result<Vec<_>>>()?;
+        // One view after another: the features of a view fill hundreds of bytes a pixel, and fill every thread by themselves.
+        for (row, image, photograph) in drawn {
+            let distance = lpips.distance(&image, &photograph.image, photograph.mask.as_ref())?;
+            rows.push(DrawnView { lpips: Some(distance), ..row });
+        }
+    }
+    Ok(rows)
 }
 
 fn mean(rows: &[DrawnView], value: fn(&DrawnView) -> f64) -> f64 {
@@ -304,23 +322,14 @@ fn mean(rows: &[DrawnView], value: fn(&DrawnView) -> f64) -> f64 {
 }
 
 /// Each view by itself, and the mean LPIPS where it is measured.
-fn view_evaluations(
-    rows: &[DrawnView],
-    views: &[View],
-    lpips: Option<&Lpips>,
-) -> Result<(Option<f64>, Vec<ViewEvaluation>)> {
-    // One view after another: the features of a view fill hundreds of bytes a pixel, and fill every thread by themselves.
-    let lpips_of_views = |lpips: &Lpips| -> Result<Vec<f64>> {
-        let distance = |(row, view): (&DrawnView, &View)| lpips.distance(&row.image, &view.image, view.mask.as_ref());
-        Ok(rows.iter().zip(views).map(distance).collect::<Result<Vec<_>, _>>()?)
-    };
-    let distances = lpips.map(lpips_of_views).transpose()?;
-    let of_view = |(i, (row, view)): (usize, (&DrawnView, &View))| ViewEvaluation {
+fn view_evaluations(rows: &[DrawnView], views: &[View]) -> (Option<f64>, Vec<ViewEvaluation>) {
+    let of_view = |(row, view): (&DrawnView, &View)| ViewEvaluation {
         name: view.name.clone(),
         psnr_db: row.psnr_db,
         ssim: row.ssim,
-        lpips: distances.as_ref().map(|values| values[i]),
+        lpips: row.lpips,
     };
-    let mean = distances.as_ref().map(|values| values.iter().sum::<f64>() / values.len() as f64);
-    Ok((mean, rows.iter().zip(views).enumerate().map(of_view).collect()))
+    let distances: Option<Vec<f64>> = rows.iter().map(|row| row.lpips).collect();
+    let mean = distances.map(|values| values.iter().sum::<f64>() / values.len() as f64);
+    (mean, rows.iter().zip(views).map(of_view).collect())
 }

@@ -165,18 +165,18 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let to_bundle = |pictures: &[Image]| {
         pictures.iter().zip(&shown).map(|(picture, shown)| psnr_db(picture, shown)).sum::<f64>() / shown.len() as f64
     };
-    let bundle_psnr_db = cameras.psnr_db(&shown);
+    let bundle_psnr_db = cameras.psnr_db(&shown)?;
     // Of the numbers before they are rounded for the file; those of a .ply are not.
     let pictures = source.pictures_of(&gaussians, &cameras.judged);
     notes.compensation = source.compensation;
-    notes.comments.push(comment(args, &cameras, to_bundle(&pictures), cameras.psnr_db(&pictures).zip(bundle_psnr_db)));
+    notes.comments.push(comment(args, &cameras, to_bundle(&pictures), cameras.psnr_db(&pictures)?.zip(bundle_psnr_db)));
 
     let unreadable = |fault| anyhow!("{} {fault}", args.output.display());
     let bytes = format.to_bytes(&gaussians, &notes).map_err(unreadable)?;
     let (written, _) = format.from_bytes(&bytes).map_err(unreadable)?;
     output::write_whole(&args.output, &bytes)?;
     let pictures = source.pictures_of(&written, &cameras.judged);
-    let file_psnr_db = cameras.psnr_db(&pictures);
+    let file_psnr_db = cameras.psnr_db(&pictures)?;
     let export = Export {
         format: format.extension(),
         bytes: bytes.len(),

@@ -1,16 +1,29 @@
 //! The capture of the run at hand, loaded once for all runs that share it.
 
+use std::path::PathBuf;
+
 use anyhow::Result;
 use pocketsplat_capture::dataset::Capture;
 
 use super::{process, train};
 use crate::config::RunConfig;
 
-/// One capture in memory, and the configuration that it was loaded for.
+/// One capture, and the configuration that it was loaded for.
 #[derive(Default)]
-pub(super) struct LoadedCapture(Option<(RunConfig, Capture)>);
+pub(super) struct LoadedCapture {
+    loaded: Option<(RunConfig, Capture)>,
+    /// Folder for decoded photographs that are too many for the memory.
+    photographs: Option<PathBuf>,
+}
 
 impl LoadedCapture {
+    /// For runs that are trained, and not only tried out.
+    ///
+    /// * `photographs`: folder for decoded photographs that are too many for the memory.
+    pub(super) fn for_training(photographs: PathBuf) -> Self {
+        Self { loaded: None, photographs: Some(photographs) }
+    }
+
     /// The capture of a run; decides what its configuration left to it.
     ///
     /// As `train` alone would load it: where a capture has no points, those drawn at random follow the run's seed.
@@ -19,16 +32,16 @@ impl LoadedCapture {
             (&loaded.dataset, &loaded.capture, loaded.train.seed)
                 == (&config.dataset, &config.capture, config.train.seed)
         };
-        if self.0.as_ref().is_some_and(is_here) {
-            let (_, capture) = self.0.as_ref().expect("just seen");
+        if self.loaded.as_ref().is_some_and(is_here) {
+            let (_, capture) = self.loaded.as_ref().expect("just seen");
             train::decide(config, capture)?;
         } else {
             // Never two of them in memory.
-            self.0 = None;
+            self.loaded = None;
             process::forget_peak_memory();
-            let capture = train::load(config)?;
-            self.0 = Some((config.clone(), capture));
+            let capture = train::load(config, self.photographs.as_deref())?;
+            self.loaded = Some((config.clone(), capture));
         }
-        Ok(&self.0.as_ref().expect("just loaded").1)
+        Ok(&self.loaded.as_ref().expect("just loaded").1)
     }
 }

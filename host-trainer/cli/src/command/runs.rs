@@ -8,6 +8,7 @@ use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::Split;
 use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::config::Backbone;
+use pocketsplat_trainer::train::run::photographs_in;
 
 use super::capture::views_of;
 use super::eval::Evaluation;
@@ -134,10 +135,10 @@ impl RunsArgs {
         }
         let lpips = self.lpips.load()?;
         output::check_writable(&base.output.join(FIGURE))?;
-        let mut loaded = LoadedCapture::default();
         if self.plan {
-            return self.plan(base, specs, files, &mut loaded);
+            return self.plan(base, specs, files, &mut LoadedCapture::default());
         }
+        let mut loaded = LoadedCapture::for_training(photographs_in(&base.output));
         let stop = stop::flag()?;
         let mut measured = Vec::new();
         let mut text = Vec::new();
@@ -155,6 +156,8 @@ impl RunsArgs {
             text = tables(&measured)?;
         }
         output::print_text(&String::from_utf8(text)?)?;
+        drop(loaded);
+        train::clear_photographs(&base.output, ExitCode::SUCCESS);
         Ok(ExitCode::SUCCESS)
     }
 

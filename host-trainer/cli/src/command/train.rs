@@ -4,13 +4,15 @@ mod explicit;
 mod limits;
 mod standing;
 mod summary;
+#[cfg(test)]
+mod tests;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result, bail};
-use pocketsplat_capture::dataset::{Background, Capture, Split, View};
+use pocketsplat_capture::dataset::{Background, Capture, Split, View, remove_cache};
 use pocketsplat_core::budget::MAX_FRAME_PX;
 use pocketsplat_instructions::level::{Bound, Level, Profile};
 use pocketsplat_trainer::device::Limits;
@@ -19,7 +21,7 @@ use pocketsplat_trainer::encode::{Encoding, Fitted, Scale};
 use pocketsplat_trainer::step::SharedImageStages;
 use pocketsplat_trainer::train::finish::Finished;
 use pocketsplat_trainer::train::gauge::Gauge;
-use pocketsplat_trainer::train::run::{Ending, Interval, RunError, RunFolder, fork, shell_word};
+use pocketsplat_trainer::train::run::{Ending, Interval, RunError, RunFolder, fork, photographs_in, shell_word};
 use pocketsplat_trainer::train::{TrainConfig, Trainer};
 use serde::Serialize;
 
@@ -76,6 +78,9 @@ pub(crate) struct TrainResult {
     /// Processor time of all threads.
     pub(crate) train_processor_s: f64,
     pub(crate) iterations_per_s: f64,
+    /// Of the steps' time, the share that was spent on waiting for photographs, where they do not lie in memory.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) photographs_waited_share: Option<f64>,
     pub(crate) background: String,
     pub(crate) effects: String,
     /// Largest amount of memory that the program has held, where the system tells.
@@ -99,6 +104,7 @@ impl TrainResult {
             peak_memory_bytes: self.peak_memory_bytes,
             train_s: self.train_s,
             train_processor_s: self.train_processor_s,
+            photographs_waited_share: self.photographs_waited_share,
             iterations: self.iterations,
             dropped_steps: self.dropped_steps,
         }
@@ -137,16 +143,20 @@ fn resume(args: &Args, path: &Path) -> Result<ExitCode> {
     // What was chosen stays; what an accident kept from being chosen is measured now.
     config.effects = begun.effects;
     output::check_writable(&config.output)?;
-    let capture = load(&mut config)?;
-    train_and_print(args, folder, config, &capture, Start::Resumed)
+    let capture = load(&mut config, Some(&photographs_in(folder.path())))?;
+    let path = folder.path().to_owned();
+    let code = train_and_print(args, folder, config, &capture, Start::Resumed)?;
+    drop(capture);
+    clear_photographs(&path, code);
+    Ok(code)
 }
 
 fn begin(args: &Args) -> Result<ExitCode> {
     let mut config = args.resolved()?;
     output::check_writable(&config.output)?;
-    // Before the folder is touched: a capture or checkpoint that does not load must not cost an earlier run its results.
-    let capture = load(&mut config)?;
     let path = args.run_folder(args.named_paths(&config.dataset, &config.output).1)?;
+    // Before the run's files are touched: a capture or checkpoint that does not load must not cost an earlier run its results.
+    let capture = load(&mut config, Some(&photographs_in(&path)))?;
     let start = match args.fork() {
         Some((run, _)) if run.canonicalize().ok() == path.canonicalize().ok() => {
             bail!("{} cannot be both the run to begin from and the new one; choose another --output", path.display())
@@ -159,7 +169,22 @@ fn begin(args: &Args) -> Result<ExitCode> {
         None => Start::New(Warned::default()),
     };
     let folder = RunFolder::start(&path, &config.to_toml()?, args.overwrite())?;
-    train_and_print(args, folder, config, &capture, start)
+    let code = train_and_print(args, folder, config, &capture, start)?;
+    drop(capture);
+    clear_photographs(&path, code);
+    Ok(code)
+}
+
+/// Removes the decoded photographs of a run that is finished; one that was interrupted needs them again.
+pub(super) fn clear_photographs(run: &Path, code: ExitCode) {
+    if code == ExitCode::SUCCESS
+        && let Err(error) = remove_cache(&photographs_in(run))
+    {
+        eprintln!(
+            "warning: the decoded photographs of the run are still in {}: {error}",
+            photographs_in(run).display()
+        );
+    }
 }
 
 /// Does what is left of a run, which may be all of it or nothing.
@@ -169,16 +194,19 @@ fn begin_or_go_on(args: &Args) -> Result<ExitCode> {
         bail!("--continue needs effects that are decided; force them, as --effects +view-colour");
     }
     output::check_writable(&config.output)?;
-    let capture = load(&mut config)?;
     let path = args.run_folder(args.named_paths(&config.dataset, &config.output).1)?;
-    match Standing::of(&path, &config)? {
-        Standing::New(folder) => train_and_print(args, folder, config, &capture, Start::New(Warned::default())),
-        Standing::Begun(folder) => train_and_print(args, folder, config, &capture, Start::Resumed),
+    let capture = load(&mut config, Some(&photographs_in(&path)))?;
+    let code = match Standing::of(&path, &config)? {
+        Standing::New(folder) => train_and_print(args, folder, config, &capture, Start::New(Warned::default()))?,
+        Standing::Begun(folder) => train_and_print(args, folder, config, &capture, Start::Resumed)?,
         Standing::Finished => {
             eprintln!("trained before");
-            Ok(ExitCode::SUCCESS)
+            ExitCode::SUCCESS
         }
-    }
+    };
+    drop(capture);
+    clear_photographs(&path, code);
+    Ok(code)
 }
 
 fn train_and_print<'a>(
@@ -189,8 +217,9 @@ fn train_and_print<'a>(
     start: Start<'a>,
 ) -> Result<ExitCode> {
     if let Some(port) = args.watch() {
-        let photograph = capture.test.first().or(capture.train.first()).map(|view| &view.image);
-        watch::serve(folder.path(), port, config.train.iterations, photograph)?;
+        let photograph = capture.test.first().or(capture.train.first()).map(View::photograph).transpose()?;
+        let image = photograph.as_ref().map(|photograph| &photograph.image);
+        watch::serve(folder.path(), port, config.train.iterations, image)?;
     }
     // Not before: until here there is nothing to keep, and Ctrl-C may end the process at once.
     let stop = stop::flag()?;
@@ -221,11 +250,17 @@ fn train_and_print<'a>(
 }
 
 /// Loads the capture that a run is configured for, and decides what the configuration left to it.
-pub(crate) fn load(config: &mut RunConfig) -> Result<Capture> {
+///
+/// * `photographs`: folder for decoded photographs that are too many for the memory; without one they are decoded again for every
+///   step.
+pub(crate) fn load(config: &mut RunConfig, photographs: Option<&Path>) -> Result<Capture> {
     let source = CaptureArgs { dataset: config.dataset.clone(), options: config.capture.clone() };
     // At once: large captures take their time.
     eprintln!("reading {}", config.dataset.display());
-    let capture = source.load(config.train.seed)?;
+    let capture = match photographs {
+        Some(folder) => source.load_cached(config.train.seed, folder)?,
+        None => source.load(config.train.seed)?,
+    };
     decide(config, &capture)?;
     Ok(capture)
 }
@@ -448,6 +483,7 @@ fn write_bundle(
         train_s: trainer.seconds,
         train_processor_s: trainer.processor_seconds,
         iterations_per_s: f64::from(trainer.iteration) / trainer.seconds,
+        photographs_waited_share: trainer.waited_share(),
         background: match [Background::Black, Background::White].into_iter().find(|known| known.rgb8() == background) {
             Some(known) => known.to_string(),
             None => format!("{background:?}"),

@@ -6,6 +6,7 @@ mod counter;
 mod front;
 mod setting;
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use pocketsplat_core::arithmetic::Arithmetic;
@@ -19,17 +20,17 @@ pub use setting::{Setting, knobs, quality_grid};
 use crate::device::Processor;
 use crate::metrics::{psnr_db, psnr_db_masked};
 use crate::render::decoder::image_of;
-use pocketsplat_capture::dataset::{Image, Mask};
+use pocketsplat_capture::dataset::{Image, Photograph};
 use pocketsplat_instructions::predict;
 
 /// A view to draw, and what it is compared with.
-pub struct Sight<'a> {
+pub struct Sight {
     /// The camera, in the bundle's frame.
     pub camera: Camera,
     /// What the f64 reference draws of the whole scene.
     pub reference: Image,
-    /// The photograph, and where it shows the scene.
-    pub photograph: (&'a Image, Option<&'a Mask>),
+    /// What was photographed.
+    pub photograph: Arc<Photograph>,
     /// Whether its instructions are among those of a setting.
     pub counts: bool,
 }
@@ -86,7 +87,7 @@ pub struct Measured {
 /// Without views.
 pub fn measure(
     bundle: &Bundle<'_>,
-    sights: &[Sight<'_>],
+    sights: &[Sight],
     setting: &Setting,
     budget: Budget,
     targets: &[Processor],
@@ -97,7 +98,7 @@ pub fn measure(
 /// The arguments of [`measure`].
 struct Measurement<'a, 'b> {
     bundle: &'a Bundle<'b>,
-    sights: &'a [Sight<'a>],
+    sights: &'a [Sight],
     setting: &'a Setting,
     budget: Budget,
     targets: &'a [Processor],
@@ -135,8 +136,8 @@ fn measure_in<A: Arithmetic>(of: &Measurement<'_, '_>) -> Result<Measured, Decod
         let (image, report): (Image, FrameReport) = image_of(&mut decoder, &sight.camera)?;
         measured.host_s += started.elapsed().as_secs_f64() / n;
         measured.splats_dropped += report.splats_dropped;
-        let (photograph, mask) = sight.photograph;
-        measured.psnr_db += psnr_db_masked(&image, photograph, mask) / n;
+        let Photograph { image: truth, mask } = &*sight.photograph;
+        measured.psnr_db += psnr_db_masked(&image, truth, mask.as_ref()) / n;
         measured.psnr_to_reference_db = measured.psnr_to_reference_db.min(psnr_db(&image, &sight.reference));
         let differences = image.rgb.iter().zip(&sight.reference.rgb).map(|(a, b)| a.abs_diff(*b));
         measured.worst_channel = measured.worst_channel.max(differences.max().unwrap_or(0));

@@ -15,7 +15,7 @@ use crate::render::decoder::image_of;
 use crate::train::config::{Backbone, MIN_VIEWS_TO_HOLD_OUT};
 use crate::train::module::Modules;
 use crate::train::{TrainConfig, TrainError, Trainer};
-use pocketsplat_capture::dataset::{Capture, Image, View};
+use pocketsplat_capture::dataset::{Capture, Image, PhotographError, View};
 use pocketsplat_instructions::predict;
 
 /// Runs below this many iterations are too short for pilots of them to say anything.
@@ -35,7 +35,7 @@ const HOLD_OUT_EVERY: usize = 8;
 /// A capture for pilots.
 #[derive(Debug)]
 pub struct PilotCapture {
-    /// At half the resolution; its test views are training views that are held out here.
+    /// At half the resolution, in memory where the capture is; its test views are training views that are held out here.
     reduced: Capture,
     /// Held-out views as they were.
     held_out: Vec<View>,
@@ -58,23 +58,12 @@ impl PilotCapture {
             capture.train.iter().enumerate().filter(move |(i, _)| is_held_out(*i) == held_out).map(|(_, view)| view)
         };
         let reduced = Capture {
-            train: views(false).map(halved).collect(),
-            test: views(true).map(halved).collect(),
+            train: views(false).map(View::halved).collect(),
+            test: views(true).map(View::halved).collect(),
             points: capture.points.clone(),
             ..*capture
         };
         Some(Self { reduced, held_out: views(true).cloned().collect() })
-    }
-}
-
-/// A view with each side half as long, averaged by area.
-fn halved(view: &View) -> View {
-    let [width_px, height_px] = [view.image.width_px, view.image.height_px].map(|px| (px / 2).max(1));
-    View {
-        name: view.name.clone(),
-        camera: view.camera.resized(width_px, height_px),
-        image: view.image.area_resized(width_px, height_px),
-        mask: view.mask.as_ref().map(|mask| mask.area_resized(width_px, height_px)),
     }
 }
 
@@ -90,6 +79,9 @@ pub enum PilotError {
     /// Its bundle cannot be drawn.
     #[error("a pilot's bundle cannot be drawn; please report it")]
     Draw(#[from] DecodeError),
+    /// A held-out photograph that does not lie in memory cannot be read.
+    #[error(transparent)]
+    Photograph(#[from] PhotographError),
     /// What it was worth could not be written down.
     #[error("could not write down the results of pilots")]
     Keep(#[from] io::Error),
@@ -180,14 +172,19 @@ fn pilot_config(config: &TrainConfig, effects: &[Effect]) -> TrainConfig {
 }
 
 /// What a pilot's bundle is worth on the views that were held out of it.
-fn worth(bytes: &[u8], capture: &PilotCapture, device: PilotDevice) -> Result<PilotFigures, DecodeError> {
+fn worth(bytes: &[u8], capture: &PilotCapture, device: PilotDevice) -> Result<PilotFigures, PilotError> {
     let bundle = Bundle::parse(bytes)?;
     let (mut psnr_db, mut instructions) = (0.0, 0.0);
     let n = capture.reduced.test.len() as f64;
     draw(&bundle, &capture.reduced.test, device, |view, image, _| {
-        psnr_db += psnr_db_masked(&image, &view.image, view.mask.as_ref()) / n;
+        let photograph = view.photograph()?;
+        psnr_db += psnr_db_masked(&image, &photograph.image, photograph.mask.as_ref()) / n;
+        Ok(())
     })?;
-    draw(&bundle, &capture.held_out, device, |_, _, frame_instructions| instructions += frame_instructions / n)?;
+    draw(&bundle, &capture.held_out, device, |_, _, frame_instructions| {
+        instructions += frame_instructions / n;
+        Ok(())
+    })?;
     Ok(PilotFigures { psnr_db, instructions, bytes: bytes.len() })
 }
 
@@ -196,8 +193,8 @@ fn draw(
     bundle: &Bundle<'_>,
     views: &[View],
     device: PilotDevice,
-    mut drawn: impl FnMut(&View, Image, f64),
-) -> Result<(), DecodeError> {
+    mut drawn: impl FnMut(&View, Image, f64) -> Result<(), PhotographError>,
+) -> Result<(), PilotError> {
     let cameras = views.iter().map(|view| core_camera(&view.camera)).collect::<Result<Vec<_>, _>>()?;
     let largest = |side: fn(&Camera) -> u16| cameras.iter().map(side).max().unwrap_or(1);
     let frame = Budget::for_frame(largest(|camera| camera.width_px), largest(|camera| camera.height_px));
@@ -212,7 +209,7 @@ fn draw(
     for (view, camera) in views.iter().zip(&cameras) {
         let (image, report) = image_of(&mut decoder, camera)?;
         let size_px = [camera.width_px, camera.height_px];
-        drawn(view, image, predict(device.target.instruction_set(), bundle, &plan, &report, size_px).iter().sum());
+        drawn(view, image, predict(device.target.instruction_set(), bundle, &plan, &report, size_px).iter().sum())?;
     }
     Ok(())
 }
@@ -261,7 +258,7 @@ mod tests {
         assert!(held_out.iter().all(|name| !trained.contains(name)));
         assert!(names(&capture.test).iter().all(|name| !trained.contains(name) && !held_out.contains(name)));
         assert_eq!(names(&pilots.held_out), held_out);
-        assert_eq!(pilots.reduced.train[0].image.width_px, capture.train[0].image.width_px / 2);
+        assert_eq!(pilots.reduced.train[0].camera.width_px, capture.train[0].camera.width_px / 2);
         capture.train.truncate(MIN_VIEWS_TO_HOLD_OUT - 1);
         assert!(PilotCapture::of(&capture).is_none(), "too few to spare");
     }

@@ -149,7 +149,8 @@ fn judged_psnr_db(coded: &CodedScene, views: &[View]) -> Result<f64, EncodeError
         let view = &views[i * views.len() / n];
         let frame = core_image(&bundle, &view.camera);
         let frame = frame.map_err(|source| EncodeError::Draw { view: view.name.clone(), source })?;
-        Ok(psnr_db_masked(&frame.image, &view.image, view.mask.as_ref()) / n as f64)
+        let photograph = view.photograph()?;
+        Ok(psnr_db_masked(&frame.image, &photograph.image, photograph.mask.as_ref()) / n as f64)
     });
     // One after the other, so that the sum does not depend on the number of threads.
     Ok(psnr_db.collect::<Result<Vec<_>, EncodeError>>()?.iter().sum())

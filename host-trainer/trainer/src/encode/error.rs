@@ -1,8 +1,10 @@
 //! Why a finished run has no bundle.
 
+use pocketsplat_capture::dataset::PhotographError;
 use pocketsplat_core::DecodeError;
 
 use crate::bundle::WriteError;
+use crate::manifest::MeasureError;
 
 /// Why a finished run has no bundle.
 #[derive(Debug, thiserror::Error)]
@@ -24,4 +26,16 @@ pub enum EncodeError {
     /// The tiers of the coded scene cannot be measured or planned for.
     #[error("the tiers of the coded scene cannot be measured; please report it")]
     Measure(#[source] DecodeError),
+    /// A photograph that does not lie in memory cannot be read.
+    #[error(transparent)]
+    Photograph(#[from] PhotographError),
+}
+
+impl From<MeasureError> for EncodeError {
+    fn from(error: MeasureError) -> Self {
+        match error {
+            MeasureError::Decode(error) => Self::Measure(error),
+            MeasureError::Photograph(error) => Self::Photograph(error),
+        }
+    }
 }

@@ -134,7 +134,7 @@ impl Encoding {
     ) -> Result<Attempt, EncodeError> {
         let coded = self.coded(&finished, capture)?;
         let bundle = coded.bundle().map_err(WriteError::ReadBack)?;
-        let measures = measure(&bundle, cameras, held_out).map_err(EncodeError::Measure)?;
+        let measures = measure(&bundle, cameras, held_out)?;
         let written = coded.into_file(&measures)?;
         let flash = self.limits.flash_bytes.map(|available| {
             let needed = written.bytes.len() as u64;

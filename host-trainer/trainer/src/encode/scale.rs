@@ -47,7 +47,7 @@ impl Scale<'_> {
             return Ok(Load { bytes, ..Load::default() });
         }
         let bundle = coded.bundle().map_err(WriteError::ReadBack)?;
-        let measures = measure(&bundle, &self.cameras, &[]).map_err(EncodeError::Measure)?;
+        let measures = measure(&bundle, &self.cameras, &[])?;
         let written = coded.into_file(&measures)?;
         let [ram, instructions] = self.drawing(&written.bytes).map_err(EncodeError::Measure)?;
         Ok(Load { ram, instructions, bytes })

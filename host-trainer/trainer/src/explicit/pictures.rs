@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use pocketsplat_capture::camera::Camera;
-use pocketsplat_capture::dataset::{Capture, EXTENT, PointsOrigin, View};
+use pocketsplat_capture::dataset::{Capture, EXTENT, Photograph, PointsOrigin, View};
 use pocketsplat_gaussians::Gaussians;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -43,7 +43,7 @@ pub fn capture(gaussians: &Gaussians, train: &[Camera], test: &[Camera], how: &P
         let view = |(i, camera): (usize, &Camera)| {
             let camera = normalisation.camera(camera);
             let image = renderer.image(&camera, how.background);
-            View { name: format!("{split}_{i:04}"), camera, image, mask: None }
+            View::new(format!("{split}_{i:04}"), camera, Photograph { image, mask: None })
         };
         cameras.par_iter().enumerate().map(view).collect()
     };
@@ -89,11 +89,12 @@ mod tests {
         let how = Pictures { compensation: false, background: [0.0; 3], n_points: 50, seed: 1 };
         let capture = capture(&gaussians, &cameras[..8], &cameras[8..], &how).unwrap();
         assert_eq!((capture.train.len(), capture.test.len(), capture.points.len()), (8, 2, 50));
-        let lit = |view: &View| view.image.rgb.iter().filter(|v| **v > 60).count();
+        let lit = |view: &View| view.photograph().unwrap().image.rgb.iter().filter(|v| **v > 60).count();
         assert!(capture.train.iter().chain(&capture.test).all(|view| lit(view) > 100));
         // As drawn in their own frame: the near plane aside, a similarity changes nothing.
         let own = Renderer::new(&gaussians).image(&cameras[9], [0.0; 3]);
-        let differs = own.rgb.iter().zip(&capture.test[1].image.rgb).map(|(a, b)| a.abs_diff(*b)).max();
+        let differs =
+            own.rgb.iter().zip(&capture.test[1].photograph().unwrap().image.rgb).map(|(a, b)| a.abs_diff(*b)).max();
         assert!(differs <= Some(1), "{differs:?}");
         assert_eq!(super::capture(&gaussians, &cameras[..1], &[], &how).map(|c| c.points.len()), None);
     }

@@ -20,6 +20,7 @@ use crate::ops::simd::Level;
 use crate::step::{TargetView, planes};
 use crate::train::TrainError;
 use crate::train::checkpoint::CaptureSignature;
+use crate::train::read_ahead::ReadAhead;
 use crate::train::watchdog::{self, Cause, DroppedStep, Watchdog};
 
 /// The state of a run: everything the next iteration depends on.
@@ -44,6 +45,7 @@ pub struct CloudTrainer<'a> {
     pub(super) rng: ChaCha8Rng,
     /// Views left of the current pass over the capture, taken from the end.
     pub(super) queue: Vec<u32>,
+    photographs: ReadAhead,
 }
 
 /// What an iteration gives back.
@@ -92,6 +94,7 @@ impl<'a> CloudTrainer<'a> {
             statistics: DensityStatistics::default(),
             rng: ChaCha8Rng::seed_from_u64(config.seed),
             queue: Vec::new(),
+            photographs: ReadAhead::default(),
             config,
             capture,
         })
@@ -112,6 +115,12 @@ impl<'a> CloudTrainer<'a> {
         self.watchdog.n_dropped
     }
 
+    /// The share of the steps' time that was spent on waiting for photographs, since this process began or took up the run;
+    /// `None` where they lie in memory.
+    pub fn waited_share(&self) -> Option<f64> {
+        self.photographs.waited_share()
+    }
+
     /// Number of training views.
     pub(super) fn n_views(&self) -> usize {
         self.cameras.len()
@@ -129,12 +138,14 @@ impl<'a> CloudTrainer<'a> {
     /// A step with a loss or gradient that is not finite does nothing of the latter two.
     ///
     /// # Errors
-    /// [`TrainError::Diverged`] when more than [`watchdog::MAX_DROPPED_IN_A_ROW`] steps in a row did nothing; the
-    /// Gaussians are as they were before them.
+    /// [`TrainError::Diverged`] when more than [`watchdog::MAX_DROPPED_IN_A_ROW`] steps in a row did nothing, and
+    /// [`TrainError::Photograph`]; the Gaussians are as they were before them.
     pub fn advance(&mut self) -> Result<CloudOutcome, TrainError> {
         let started = (Instant::now(), ProcessTime::now());
         let outcome = self.iterate();
-        self.seconds += started.0.elapsed().as_secs_f64();
+        let step = started.0.elapsed();
+        self.photographs.worked(step);
+        self.seconds += step.as_secs_f64();
         self.processor_seconds += started.1.elapsed().as_secs_f64();
         outcome
     }
@@ -146,14 +157,15 @@ impl<'a> CloudTrainer<'a> {
             self.queue = (0u32..).take(self.n_views()).collect();
             self.queue.shuffle(&mut self.rng);
         }
+        let photograph = self.photographs.photograph(&self.capture.train, self.queue.iter().rev().copied())?;
         let index = self.queue.pop().expect("refilled above") as usize;
-        let view = &self.capture.train[index];
-        let mask = view.mask.as_ref().map(|mask| mask.valid.as_slice());
-        let target = TargetView::new(&self.cameras[index], planes(&view.image), mask, self.capture.background);
+        let mask = photograph.mask.as_ref().map(|mask| mask.valid.as_slice());
+        let target = TargetView::new(&self.cameras[index], planes(&photograph.image), mask, self.capture.background);
         let gradients = step(self.level, &self.cloud, &target, self.config.dssim);
         let (loss, squared_error) = (f64::from(gradients.loss), gradients.squared_error);
         if let Some(cause) = fault(&gradients) {
-            let dropped = DroppedStep { iteration: self.iteration, view: view.name.clone(), cause };
+            let dropped =
+                DroppedStep { iteration: self.iteration, view: self.capture.train[index].name.clone(), cause };
             return if self.watchdog.dropped() {
                 Err(TrainError::Diverged { n: self.watchdog.n_in_a_row, last: dropped })
             } else {

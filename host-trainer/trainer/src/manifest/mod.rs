@@ -17,7 +17,7 @@ use crate::render::decoder::core_image_of_tiers;
 use crate::step::Workspace;
 use frame::TierCounts;
 use pocketsplat_capture::camera::Camera;
-use pocketsplat_capture::dataset::View;
+use pocketsplat_capture::dataset::{PhotographError, View};
 
 /// Most training cameras that are measured.
 const MAX_TRAINING_CAMERAS: usize = 48;
@@ -31,6 +31,18 @@ pub fn cameras_to_measure(cameras: &[Camera]) -> Vec<Camera> {
     picked.chain(orbit::around(cameras)).collect()
 }
 
+/// Why tiers cannot be measured.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MeasureError {
+    /// A damaged bundle or an unusable camera.
+    #[error(transparent)]
+    Decode(#[from] DecodeError),
+    /// A photograph that does not lie in memory cannot be read.
+    #[error(transparent)]
+    Photograph(#[from] PhotographError),
+}
+
 /// Measures every tier of a bundle.
 ///
 /// Counts are those of the trainer's renderer, whose arithmetic differs from the decoder's in the last bits. Those of
@@ -41,8 +53,8 @@ pub fn cameras_to_measure(cameras: &[Camera]) -> Vec<Camera> {
 /// * `cameras`: over which maxima are taken. * `held_out`: views whose photographs the tiers are compared with.
 ///
 /// # Errors
-/// [`DecodeError`] of a damaged bundle or an unusable camera.
-pub fn measure(bundle: &Bundle<'_>, cameras: &[Camera], held_out: &[View]) -> Result<Vec<TierMeasures>, DecodeError> {
+/// [`MeasureError`].
+pub fn measure(bundle: &Bundle<'_>, cameras: &[Camera], held_out: &[View]) -> Result<Vec<TierMeasures>, MeasureError> {
     let scene = decoded_scene(bundle)?;
     let header = bundle.header();
     let ends: Vec<u32> =
@@ -72,11 +84,12 @@ pub fn measure(bundle: &Bundle<'_>, cameras: &[Camera], held_out: &[View]) -> Re
 }
 
 /// Mean PSNR over views of 8-bit images, dB; `None` without views.
-fn mean_psnr_db(bundle: &Bundle<'_>, n_tiers: u8, views: &[View]) -> Result<Option<f32>, DecodeError> {
+fn mean_psnr_db(bundle: &Bundle<'_>, n_tiers: u8, views: &[View]) -> Result<Option<f32>, MeasureError> {
     let psnr = views.par_iter().map(|view| {
         let frame = core_image_of_tiers(bundle, &view.camera, n_tiers)?;
-        Ok(psnr_db_masked(&frame.image, &view.image, view.mask.as_ref()))
+        let photograph = view.photograph()?;
+        Ok(psnr_db_masked(&frame.image, &photograph.image, photograph.mask.as_ref()))
     });
-    let psnr = psnr.collect::<Result<Vec<f64>, DecodeError>>()?;
+    let psnr = psnr.collect::<Result<Vec<f64>, MeasureError>>()?;
     Ok((!psnr.is_empty()).then(|| (psnr.iter().sum::<f64>() / psnr.len() as f64) as f32).filter(|x| x.is_finite()))
 }

@@ -14,6 +14,7 @@ pub mod module;
 pub mod optimiser;
 mod outcome;
 mod probing;
+pub(crate) mod read_ahead;
 pub mod run;
 pub mod statistics;
 pub mod steering;
@@ -46,7 +47,8 @@ use config::{Backbone, Densification, Rates};
 use gauge::Gauge;
 use module::{AnchorChange, RunView};
 use optimiser::Optimiser;
-use pocketsplat_capture::dataset::{Capture, Image, View};
+use pocketsplat_capture::dataset::{Capture, Image, Photograph, View};
+use read_ahead::ReadAhead;
 use statistics::Statistics;
 use survey::Survey;
 use watchdog::Watchdog;
@@ -82,6 +84,7 @@ pub struct Trainer<'a> {
     /// Views left of the current pass over the capture, taken from the end.
     queue: Vec<u32>,
     workspace: Workspace<f32>,
+    photographs: ReadAhead,
 }
 
 impl<'a> Trainer<'a> {
@@ -129,6 +132,7 @@ impl<'a> Trainer<'a> {
             optimiser: Optimiser::new(&scene),
             statistics: Statistics::default(),
             workspace: Workspace::new(&config.shape),
+            photographs: ReadAhead::default(),
             queue: Vec::new(),
             rng: ChaCha8Rng::seed_from_u64(config.seed),
             config,
@@ -206,12 +210,14 @@ impl<'a> Trainer<'a> {
     /// A step with a loss or gradient that is not finite does nothing of the latter four.
     ///
     /// # Errors
-    /// [`TrainError::Diverged`] when more than [`watchdog::MAX_DROPPED_IN_A_ROW`] steps in a row did nothing; the
-    /// scene is as it was before them.
+    /// [`TrainError::Diverged`] when more than [`watchdog::MAX_DROPPED_IN_A_ROW`] steps in a row did nothing, and
+    /// [`TrainError::Photograph`]; the scene is as it was before them.
     pub fn advance(&mut self) -> Result<Outcome, TrainError> {
         let started = (Instant::now(), ProcessTime::now());
         let outcome = self.iterate();
-        self.seconds += started.0.elapsed().as_secs_f64();
+        let step = started.0.elapsed();
+        self.photographs.worked(step);
+        self.seconds += step.as_secs_f64();
         self.processor_seconds += started.1.elapsed().as_secs_f64();
         outcome
     }
@@ -223,8 +229,9 @@ impl<'a> Trainer<'a> {
             self.queue.clone_from(&self.trained);
             self.queue.shuffle(&mut self.rng);
         }
+        let photograph = self.photographs.photograph(&self.capture.train, self.queue.iter().rev().copied())?;
         let index = self.queue.pop().expect("refilled above") as usize;
-        let target = target(&self.capture.train[index], &self.cameras[index], self.background).numbered(index);
+        let target = target(&photograph, &self.cameras[index], self.background).numbered(index);
         let integers = match self.config.phase(self.iteration) {
             Phase::IntegerModel => Some(Integers::of(&self.scene)?),
             _ => None,
@@ -303,12 +310,10 @@ impl<'a> Trainer<'a> {
         Survey::new(&self.scene, &mut Workspace::new(&self.scene.shape), &self.trained_cameras(), contributions)
     }
 
-    /// What every photograph that training sees asks of the scene.
-    fn targets(&self) -> impl Iterator<Item = TargetView<'_, f32>> {
-        self.trained
-            .iter()
-            .map(|view| *view as usize)
-            .map(|view| target(&self.capture.train[view], &self.cameras[view], self.background))
+    /// The share of the steps' time that was spent on waiting for photographs, since this process began or took up the run;
+    /// `None` where they lie in memory.
+    pub fn waited_share(&self) -> Option<f64> {
+        self.photographs.waited_share()
     }
 
     /// Switches offsets off, counted through all anchors', and drops the anchors that have none left.
@@ -399,9 +404,9 @@ impl<'a> Trainer<'a> {
 }
 
 /// What a photograph asks of the scene.
-fn target<'v>(view: &'v View, camera: &'v Pinhole<f32>, background: [f32; 3]) -> TargetView<'v, f32> {
-    let mask = view.mask.as_ref().map(|mask| mask.valid.as_slice());
-    TargetView::new(camera, planes(&view.image), mask, background)
+fn target<'v>(photograph: &'v Photograph, camera: &'v Pinhole<f32>, background: [f32; 3]) -> TargetView<'v, f32> {
+    let mask = photograph.mask.as_ref().map(|mask| mask.valid.as_slice());
+    TargetView::new(camera, planes(&photograph.image), mask, background)
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use std::error::Error;
 
+use pocketsplat_capture::dataset::PhotographError;
 use pocketsplat_core::DecodeError;
 
 use super::config::ConfigError;
@@ -47,6 +48,9 @@ pub enum TrainError {
     /// No point to start from.
     #[error("the capture has no point to start from; check its bounds")]
     NoPoints,
+    /// A photograph that does not lie in memory cannot be read.
+    #[error(transparent)]
+    Photograph(#[from] PhotographError),
     /// The scene has no context model.
     #[error("the scene has no context model; train it with `train.backbone` hac")]
     NoContext,

@@ -2,8 +2,9 @@
 
 use super::bits::Bits;
 use super::coding::Integers;
+use super::read_ahead::ReadAhead;
 use super::worth::Worth;
-use super::{TrainError, Trainer};
+use super::{TrainError, Trainer, target};
 use crate::ops::noise::Stream;
 use crate::step::Workspace;
 
@@ -23,7 +24,8 @@ impl Trainer<'_> {
     /// deviation of √2 times its mean; over v views that show it about √(2/v).
     ///
     /// # Errors
-    /// [`TrainError::NoContext`] before there is a context model, [`TrainError::IntegerModel`] when it has no integer form.
+    /// [`TrainError::NoContext`] before there is a context model, [`TrainError::IntegerModel`] when it has no integer form,
+    /// [`TrainError::Photograph`].
     pub fn worth(&self) -> Result<Worth, TrainError> {
         let integers = Integers::of(&self.scene)?;
         let bits = Bits::of(&self.scene, &integers.context(&self.scene)?);
@@ -32,7 +34,10 @@ impl Trainer<'_> {
         let mut workspace = Workspace::new(&self.scene.shape);
         let (mut of_offsets, mut of_anchors) = (vec![0.0; n * k], vec![0.0; n]);
         let (mut squared_sum, mut n_values, mut loss) = (0.0, 0, 0.0);
-        for (view, target) in (0u32..).zip(self.targets()) {
+        let mut photographs = ReadAhead::default();
+        for (view, at) in (0u32..).zip(0..self.trained.len()) {
+            let photograph = photographs.photograph(&self.capture.train, self.trained[at..].iter().copied())?;
+            let target = target(&photograph, &self.cameras[self.trained[at] as usize], self.background);
             let error = workspace.probe(&self.scene, &target, &self.config.loss, stream.branch(view));
             squared_sum += error.squared_sum;
             n_values += error.n_values;

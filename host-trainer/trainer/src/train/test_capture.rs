@@ -6,7 +6,7 @@ use super::TrainConfig;
 use super::config::{Backbone, Densification};
 use crate::scene::ModelShape;
 use pocketsplat_capture::camera::Camera;
-use pocketsplat_capture::dataset::{Capture, EXTENT, Image, Normalisation, PointsOrigin, View};
+use pocketsplat_capture::dataset::{Capture, EXTENT, Image, Normalisation, Photograph, PointsOrigin, View};
 
 pub(crate) const SIZE_PX: u32 = 24;
 
@@ -36,12 +36,8 @@ pub(crate) fn many_views(n: u32) -> Capture {
                 if inside { [level(0), level(1), level(2)] } else { [0; 3] }
             })
             .collect();
-        View {
-            name: format!("view_{i}"),
-            camera,
-            image: Image { width_px: SIZE_PX, height_px: SIZE_PX, rgb },
-            mask: None,
-        }
+        let image = Image { width_px: SIZE_PX, height_px: SIZE_PX, rgb };
+        View::new(format!("view_{i}"), camera, Photograph { image, mask: None })
     };
     let points = (0..300).map(|i| {
         let t = f64::from(i);
@@ -57,6 +53,13 @@ pub(crate) fn many_views(n: u32) -> Capture {
         background: [0.0; 3],
         shown: 1.0,
     }
+}
+
+/// Changes the photograph of a view.
+pub(crate) fn edit(view: &mut View, change: impl FnOnce(&mut Photograph)) {
+    let mut photograph = Photograph::clone(&view.photograph().unwrap());
+    change(&mut photograph);
+    view.set_photograph(photograph);
 }
 
 /// `iterations` steps, with growth and pruning every seventh of them.

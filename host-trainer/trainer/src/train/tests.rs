@@ -2,7 +2,7 @@
 
 use super::config::Backbone;
 use super::finish::Finished;
-use super::test_capture::{tiny_capture, tiny_config, tiny_hac_config};
+use super::test_capture::{edit, tiny_capture, tiny_config, tiny_hac_config};
 use super::*;
 use crate::step::Phase;
 use crate::step::coding::RateReport;
@@ -107,7 +107,7 @@ fn held_out_views_are_never_trained_on() {
     assert_eq!(trainer.validation_views().map(|view| view.name.as_str()).collect::<Vec<_>>(), ["11"]);
     trained(&mut trainer);
     let mut without = capture.clone();
-    without.train[11].image.rgb.fill(77);
+    edit(&mut without.train[11], |photograph| photograph.image.rgb.fill(77));
     let mut other = Trainer::new(&without, config).unwrap();
     trained(&mut other);
     assert!(trainer.scene == other.scene, "its pixels change nothing");
@@ -117,10 +117,11 @@ fn held_out_views_are_never_trained_on() {
 fn a_learned_background_comes_to_the_colour_behind_the_scene() {
     let behind = [60, 120, 180];
     let mut capture = tiny_capture();
-    for pixel in capture.train.iter_mut().flat_map(|view| view.image.rgb.as_chunks_mut::<3>().0) {
-        if *pixel == [0; 3] {
-            *pixel = behind;
-        }
+    for view in &mut capture.train {
+        edit(view, |photograph| {
+            let pixels = photograph.image.rgb.as_chunks_mut::<3>().0;
+            pixels.iter_mut().filter(|pixel| **pixel == [0; 3]).for_each(|pixel| *pixel = behind);
+        });
     }
     // Else splats cover all of it.
     capture.points.iter_mut().for_each(|point| *point *= 0.25);

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use glam::{DMat3, DVec3};
 
 use super::*;
-use crate::dataset::{Background, Capture, LoadOptions, LoadReport, load};
+use crate::dataset::{Background, Capture, LoadOptions, LoadReport, View, load};
 
 /// A capture of 6×4 px images from `n` cameras on a circle of radius 4, looking at the origin.
 struct Fixture {
@@ -47,6 +47,11 @@ impl Fixture {
     fn error(&self) -> String {
         self.load().expect_err("this capture is broken").to_string()
     }
+}
+
+/// Of a view in memory.
+fn pixels(view: &View) -> Vec<u8> {
+    view.photograph().expect("in memory").image.rgb.clone()
 }
 
 fn transforms(angle: &str, frames: &[String]) -> String {
@@ -92,7 +97,7 @@ fn a_sound_capture_loads_with_its_cameras_and_pixels() {
     let origin = camera.rotation * capture.normalisation.point(DVec3::ZERO) + camera.translation;
     let expected = DVec3::new(0.0, 0.0, 4.0 * capture.normalisation.scale);
     assert!((origin - expected).length() < 1e-9, "{origin}");
-    assert_eq!(capture.train[1].image.rgb[..3], [100, 50, 0], "200, 100, 0 at alpha 128 on black, truncated");
+    assert_eq!(pixels(&capture.train[1])[..3], [100, 50, 0], "200, 100, 0 at alpha 128 on black, truncated");
     assert_eq!(capture.train[1].name, "train/r_1");
     assert_eq!(capture.shown, 1.0, "no pixel is wholly transparent");
 }
@@ -104,11 +109,11 @@ fn images_are_composited_before_they_are_reduced_and_intrinsics_follow() {
     let options = LoadOptions { max_resolution: Some(3), background: Background::White, ..LoadOptions::default() };
     let (capture, report) = load(fixture.path(), &options).expect("a capture");
     let view = &capture.train[0];
-    assert_eq!((view.image.width_px, view.image.height_px), (3, 2));
+    assert_eq!((view.camera.width_px, view.camera.height_px), (3, 2));
     assert_eq!((view.camera.width_px, view.camera.principal_px), (3, [1.5, 1.0]));
     assert!((view.camera.focal_px[0] - 1.5 / 0.35_f64.tan()).abs() < 1e-12, "{:?}", view.camera);
     // (200·128 + 255·127)/255 = 227.4 truncates to 227, which averages to itself.
-    assert_eq!(view.image.rgb[0], 227);
+    assert_eq!(pixels(view)[0], 227);
     assert_eq!(capture.background, [1.0; 3]);
     assert_says(&report.to_string(), &["3×2 px (area-averaged from 6×4)", "on white"]);
 }
@@ -157,7 +162,7 @@ fn images_without_alpha_are_said() {
     ::image::save_buffer(fixture.path().join("train/r_0.png"), &grey, 6, 4, ::image::ExtendedColorType::L8)
         .expect("an image");
     let (capture, report) = fixture.load().expect("a capture");
-    assert_eq!(capture.train[0].image.rgb[..3], [9; 3]);
+    assert_eq!(pixels(&capture.train[0])[..3], [9; 3]);
     assert_says(&report.to_string(), &["images without an alpha channel: 1"]);
 }
 
@@ -230,7 +235,7 @@ fn lego_loads_where_the_data_is_at_hand() {
     let options = LoadOptions { max_resolution: Some(50), ..LoadOptions::default() };
     let (capture, report) = load(&lego, &options).expect("the published capture");
     assert_eq!((capture.train.len(), report.skipped.len()), (100, 0), "{report}");
-    assert!(capture.train.iter().all(|view| (view.image.width_px, view.image.height_px) == (50, 50)), "{report}");
+    assert!(capture.train.iter().all(|view| (view.camera.width_px, view.camera.height_px) == (50, 50)), "{report}");
     // All published cameras stand 4.03 from the origin, on the upper half.
     let origin = capture.normalisation.point(DVec3::ZERO);
     for view in capture.train.iter().chain(&capture.test) {

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::Finding;
 use crate::dataset::listing::{ListedView, Listing, Shot};
-use crate::dataset::{LoadOptions, Severity, View};
+use crate::dataset::{LoadOptions, Photograph, Severity};
 
 /// A view of which less than this share counts hardly constrains anything.
 const MIN_COUNTED_SHARE: f64 = 0.1;
@@ -18,10 +18,11 @@ enum Look {
 }
 
 impl Look {
-    fn of(view: &View) -> Self {
-        let first = &view.image.rgb[..3];
-        let counted_share = view.mask.as_ref().map_or(1.0, |mask| mask.n_valid() as f64 / mask.valid.len() as f64);
-        if view.image.rgb.chunks_exact(3).all(|pixel| pixel == first) {
+    fn of(photograph: &Photograph) -> Self {
+        let first = &photograph.image.rgb[..3];
+        let mask = photograph.mask.as_ref();
+        let counted_share = mask.map_or(1.0, |mask| mask.n_valid() as f64 / mask.valid.len() as f64);
+        if photograph.image.rgb.chunks_exact(3).all(|pixel| pixel == first) {
             Self::Flat
         } else if counted_share < MIN_COUNTED_SHARE {
             Self::MostlyMasked
@@ -33,8 +34,8 @@ impl Look {
 
 /// Decodes every image; views that fail become faults of the listing.
 pub(super) fn check(listing: &mut Listing, options: &LoadOptions, findings: &mut Vec<Finding>) {
-    let decode = |listed: &mut ListedView| match listed.shot.as_ref().ok()?.read(&listed.name, options) {
-        Ok(photo) => Some(Look::of(&photo.view)),
+    let decode = |listed: &mut ListedView| match listed.shot.as_ref().ok()?.read(options) {
+        Ok(photo) => Some(Look::of(&photo.photograph)),
         Err(fault) => {
             listed.shot = Err(fault);
             None

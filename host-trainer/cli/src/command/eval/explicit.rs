@@ -1,6 +1,7 @@
 //! How good explicit Gaussians are.
 
 use anyhow::{Result, bail};
+use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Capture, Split, View};
 
 use super::super::capture::views_of;
@@ -41,8 +42,9 @@ pub(crate) fn measure(
     let views = views_of(loaded, split)?;
     let renderer = file.renderer(&loaded.normalisation);
     let draw = |view: &View| Ok((renderer.image(&view.camera, loaded.background), 0));
-    let rows = drawn_views(views, draw, |_, _| f64::INFINITY)?;
-    let (lpips, views) = view_evaluations(&rows, views, what.lpips)?;
+    let rows = drawn_views(views, draw, |_, _| f64::INFINITY, what.lpips)?;
+    let Camera { width_px, height_px, .. } = views[0].camera;
+    let (lpips, views) = view_evaluations(&rows, views);
     Ok(Evaluation {
         psnr_db: mean(&rows, |row| row.psnr_db),
         ssim: mean(&rows, |row| row.ssim),
@@ -56,8 +58,8 @@ pub(crate) fn measure(
         n_views: rows.len(),
         split: split.to_string(),
         renderer: RENDERER.to_owned(),
-        width_px: rows[0].image.width_px,
-        height_px: rows[0].image.height_px,
+        width_px,
+        height_px,
         background: options.background.map_or_else(String::new, |b| b.to_string()),
         decode_s: file.read_s,
         render_s_per_view: mean(&rows, |row| row.seconds),

@@ -67,10 +67,14 @@ impl<'a> Cameras<'a> {
     }
 
     /// Mean PSNR of the pictures of `judged` to their photographs; `None` where there are none.
-    pub(super) fn psnr_db(&self, pictures: &[Image]) -> Option<f64> {
-        let views = self.photographs?;
-        let of_view = |(picture, view): (&Image, &View)| psnr_db_masked(picture, &view.image, view.mask.as_ref());
-        Some(pictures.iter().zip(views).map(of_view).sum::<f64>() / views.len() as f64)
+    pub(super) fn psnr_db(&self, pictures: &[Image]) -> Result<Option<f64>> {
+        let Some(views) = self.photographs else { return Ok(None) };
+        let mut sum = 0.0;
+        for (picture, view) in pictures.iter().zip(views) {
+            let photograph = view.photograph()?;
+            sum += psnr_db_masked(picture, &photograph.image, photograph.mask.as_ref());
+        }
+        Ok(Some(sum / views.len() as f64))
     }
 }
 

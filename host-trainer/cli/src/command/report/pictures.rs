@@ -42,7 +42,7 @@ pub(super) fn section(run: &Run<'_>, bundle: &Bundle<'_>) -> Result<String> {
         choices += &format!(
             "<label class=\"choice\"><input type=\"radio\" name=\"pair\" value=\"{i}\"{checked}><span>{label}: {psnr_db:.2} dB</span></label>\n"
         );
-        let [photograph, picture] = [&view.image, &drawn].map(data_uri);
+        let [photograph, picture] = [&view.photograph()?.image, &drawn].map(data_uri);
         let hidden = if i == 0 { "" } else { " hidden" };
         pairs += &format!(
             "<div class=\"pair\" data-pair=\"{i}\"{hidden}>\n\

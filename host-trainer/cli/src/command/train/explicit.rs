@@ -9,7 +9,7 @@ use pocketsplat_capture::dataset::{Background, Capture, Split};
 use pocketsplat_gaussians::Format;
 use pocketsplat_trainer::device::Limits;
 use pocketsplat_trainer::explicit::CloudTrainer;
-use pocketsplat_trainer::train::run::{Ending, Interval, LoggedStep, RunError, RunFolder, shell_word};
+use pocketsplat_trainer::train::run::{Ending, Interval, LoggedStep, RunError, RunFolder, photographs_in, shell_word};
 use serde::Serialize;
 
 use super::super::capture::CaptureArgs;
@@ -21,7 +21,7 @@ use super::super::progress::Progress;
 use super::super::train_args::Args;
 use super::super::{output, stop};
 use super::summary::Summary;
-use super::{CHECKPOINT_SECONDS, HeldOut, IN_RUN_AND_ON_COMMAND_LINE, check_size};
+use super::{CHECKPOINT_SECONDS, HeldOut, IN_RUN_AND_ON_COMMAND_LINE, check_size, clear_photographs};
 use crate::config::{EXPLICIT, ExplicitRunConfig, Protocol};
 
 /// What a finished run reports.
@@ -36,6 +36,9 @@ struct ExplicitResult {
     /// Processor time of all threads.
     train_processor_s: f64,
     iterations_per_s: f64,
+    /// Of the steps' time, the share that was spent on waiting for photographs, where they do not lie in memory.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    photographs_waited_share: Option<f64>,
     background: String,
     #[serde(skip_serializing_if = "Option::is_none")]
     peak_memory_bytes: Option<u64>,
@@ -56,6 +59,7 @@ impl ExplicitResult {
             peak_memory_bytes: self.peak_memory_bytes,
             train_s: self.train_s,
             train_processor_s: self.train_processor_s,
+            photographs_waited_share: self.photographs_waited_share,
             iterations: self.iterations,
             dropped_steps: self.dropped_steps,
         }
@@ -66,12 +70,15 @@ pub(super) fn begin(args: &Args) -> Result<ExitCode> {
     let config = args.explicit()?;
     format_of(&config)?;
     output::check_writable(&config.output)?;
-    // Before the folder is touched: a capture that does not load must not cost an earlier run its results.
-    let capture = load(&config)?;
     let path = args.run_folder(args.named_paths(&config.dataset, &config.output).1)?;
+    // Before the run's files are touched: a capture that does not load must not cost an earlier run its results.
+    let capture = load(&config, &path)?;
     let folder = RunFolder::start(&path, &config.to_toml()?, args.overwrite())?;
     let trainer = CloudTrainer::new(&capture, config.gaussians)?;
-    train(args, folder, &config, &capture, trainer)
+    let code = train(args, folder, &config, &capture, trainer)?;
+    drop(capture);
+    clear_photographs(&path, code);
+    Ok(code)
 }
 
 pub(super) fn resume(args: &Args, folder: RunFolder) -> Result<ExitCode> {
@@ -83,7 +90,8 @@ pub(super) fn resume(args: &Args, folder: RunFolder) -> Result<ExitCode> {
     }
     format_of(&config)?;
     output::check_writable(&config.output)?;
-    let capture = load(&config)?;
+    let path = folder.path().to_owned();
+    let capture = load(&config, &path)?;
     let trainer = match folder.newest(|bytes| CloudTrainer::restore(&capture, bytes))? {
         None => {
             eprintln!("the run in {} has no checkpoint yet; it begins anew", folder.path().display());
@@ -108,7 +116,10 @@ pub(super) fn resume(args: &Args, folder: RunFolder) -> Result<ExitCode> {
             trainer
         }
     };
-    train(args, folder, &config, &capture, trainer)
+    let code = train(args, folder, &config, &capture, trainer)?;
+    drop(capture);
+    clear_photographs(&path, code);
+    Ok(code)
 }
 
 /// The format that the output's name says.
@@ -118,11 +129,12 @@ fn format_of(config: &ExplicitRunConfig) -> Result<Format> {
     })
 }
 
-fn load(config: &ExplicitRunConfig) -> Result<Capture> {
+/// * `run`: its folder.
+fn load(config: &ExplicitRunConfig, run: &Path) -> Result<Capture> {
     let source = CaptureArgs { dataset: config.dataset.clone(), options: config.capture.clone() };
     // At once: large captures take their time.
     eprintln!("reading {}", config.dataset.display());
-    let capture = source.load(config.gaussians.seed)?;
+    let capture = source.load_cached(config.gaussians.seed, &photographs_in(run))?;
     check_size(&capture, &Limits::default())?;
     Ok(capture)
 }
@@ -204,6 +216,7 @@ fn write(trainer: &CloudTrainer<'_>, config: &ExplicitRunConfig, capture: &Captu
         train_s: trainer.seconds,
         train_processor_s: trainer.processor_seconds,
         iterations_per_s: f64::from(trainer.iteration) / trainer.seconds,
+        photographs_waited_share: trainer.waited_share(),
         background: config.capture.background.unwrap_or(Background::Black).to_string(),
         peak_memory_bytes: peak_memory_bytes(),
         held_out,

@@ -17,6 +17,8 @@ pub(super) struct Summary<'a> {
     pub(super) train_s: f64,
     /// Processor time of all threads.
     pub(super) train_processor_s: f64,
+    /// Of the steps' time; `None` where photographs lie in memory.
+    pub(super) photographs_waited_share: Option<f64>,
     pub(super) iterations: u32,
     pub(super) dropped_steps: u32,
 }
@@ -41,6 +43,9 @@ impl fmt::Display for Summary<'_> {
         }
         let (time, core) = (duration(self.train_s / 60.0), duration(self.train_processor_s / 60.0));
         writeln!(f, "time:     {time} for {} iterations, {core} of one processor core", self.iterations)?;
+        if let Some(share) = self.photographs_waited_share {
+            writeln!(f, "waiting:  {:.1} % of that for photographs, which do not lie in memory", 100.0 * share)?;
+        }
         if self.dropped_steps > 0 {
             writeln!(f, "dropped:  {} of the iterations, see progress.csv in the run folder", self.dropped_steps)?;
         }
@@ -63,6 +68,7 @@ mod tests {
             peak_memory_bytes: Some(612_000_000),
             train_s: 744.0,
             train_processor_s: 1320.0,
+            photographs_waited_share: None,
             iterations: 7000,
             dropped_steps: 0,
         };
@@ -75,6 +81,8 @@ mod tests {
              time:     12 minutes for 7000 iterations, 22 minutes of one processor core\n"
         );
         let unmeasured = Summary { held_out: None, peak_memory_bytes: None, dropped_steps: 3, ..summary }.to_string();
+        let cached = Summary { photographs_waited_share: Some(0.0123), ..summary };
+        assert!(cached.to_string().contains("waiting:  1.2 % of that for photographs"), "{cached}");
         assert!(unmeasured.contains("no view is held out") && unmeasured.contains("dropped:  3 of"), "{unmeasured}");
     }
 }

@@ -7,7 +7,7 @@ use crate::bundle::{CodedScene, WriteError, WriteOptions, code};
 use crate::manifest::{cameras_to_measure, measure};
 use crate::render::decoder::core_image_of_tiers;
 use pocketsplat_capture::camera::Camera;
-use pocketsplat_capture::dataset::View;
+use pocketsplat_capture::dataset::{Photograph, View};
 
 fn tiered_scene() -> CodedScene {
     let scene = random_scene(SMALL, 900, 61);
@@ -73,7 +73,7 @@ fn psnr_rises_with_the_tiers_and_is_perfect_at_the_last() {
     // The truth is the whole scene less a little, so that nothing is infinitely good.
     let mut image = core_image_of_tiers(&bundle, &camera, 3).expect("a frame").image;
     image.rgb.iter_mut().step_by(97).for_each(|byte| *byte ^= 8);
-    let view = View { name: "held out".to_owned(), camera, image, mask: None };
+    let view = View::new("held out".to_owned(), camera, Photograph { image, mask: None });
     let measures = measure(&bundle, &[], &[view]).expect("sound chunks");
     let psnr: Vec<f32> = measures.iter().filter_map(|m| m.psnr_db).collect();
     assert!(psnr.len() == 3 && psnr.is_sorted() && psnr[2] > 45.0, "{psnr:?}");

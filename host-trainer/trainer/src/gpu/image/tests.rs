@@ -72,10 +72,11 @@ fn a_step_agrees_with_the_cpu() {
         }
         let view = &capture.train[1];
         let camera = Pinhole::new(&view.camera);
-        let mask: Vec<bool> = (0..view.image.rgb.len() / 3).map(|i| i % 7 > 1).collect();
+        let image = &view.photograph().expect("in memory").image;
+        let mask: Vec<bool> = (0..image.rgb.len() / 3).map(|i| i % 7 > 1).collect();
         for mask in [None, Some(mask.as_slice())] {
             for detail in [false, true] {
-                let target = TargetView::new(&camera, planes(&view.image), mask, [0.2, 0.5, 0.1]);
+                let target = TargetView::new(&camera, planes(image), mask, [0.2, 0.5, 0.1]);
                 compare(
                     gpu,
                     &trainer.scene,

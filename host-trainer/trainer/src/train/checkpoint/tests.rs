@@ -10,7 +10,7 @@ use crate::train::finish::Finished;
 use crate::train::gauge::Gauge;
 use crate::train::load::Load;
 use crate::train::module::{Modules, Rdo};
-use crate::train::test_capture::{tiny_capture, tiny_config, tiny_hac_config};
+use crate::train::test_capture::{edit, tiny_capture, tiny_config, tiny_hac_config};
 use crate::train::{Observer, TrainConfig, TrainError, Trainer};
 use pocketsplat_capture::dataset::Mask;
 
@@ -131,13 +131,19 @@ fn another_capture_is_refused_by_what_differs() {
             "it has 4 training views, the run began with 5",
         ),
         (|c| c.train[2].name.push('b'), "its training view 2 is `view_2b`, the run began with `view_2`"),
-        (|c| c.train[1].image.rgb[77] ^= 1, "the pixels or the mask of its view `view_1` are others"),
         (
-            |c| c.train[3].mask = Some(Mask { width_px: 24, height_px: 24, valid: vec![true; 24 * 24] }),
+            |c| edit(&mut c.train[1], |photograph| photograph.image.rgb[77] ^= 1),
+            "the pixels or the mask of its view `view_1` are others",
+        ),
+        (
+            |c| {
+                let mask = Some(Mask { width_px: 24, height_px: 24, valid: vec![true; 24 * 24] });
+                edit(&mut c.train[3], |photograph| photograph.mask = mask);
+            },
             "the pixels or the mask of its view `view_3` are others",
         ),
         (|c| c.train[0].camera.translation.x += 1e-6, "the camera of its view `view_0` is another one"),
-        (|c| c.train[0].image.width_px = 23, "its view `view_0` has 23×24 px, the run began with 24×24"),
+        (|c| c.train[0].camera.width_px = 23, "its view `view_0` has 23×24 px, the run began with 24×24"),
         (|c| c.background = [1.0; 3], "its background is [1.0, 1.0, 1.0], the run began with [0.0, 0.0, 0.0]"),
     ] {
         let found = refused(change);

@@ -5,6 +5,7 @@
 //! | `config.toml` | the resolved configuration |
 //! | `effects.csv` | what each effect was worth in pilots, where they were measured |
 //! | `progress.csv` | loss and PSNR over the run, see [`ProgressLog`] |
+//! | `photographs/` | the photographs of a large capture, decoded, until the run is finished |
 //! | `previews/00000140.jpg` | one held-out view after so many iterations, fifty pictures a run |
 //! | `iteration-00001500.checkpoint` | the state of the run, see [`super::checkpoint`]; the last two are kept, and those to fork from |
 //! | `result.json` | what the finished run reports; with it, the run is over |
@@ -45,6 +46,7 @@ const PILOTS: &str = "pilots.csv";
 const RESULT: &str = "result.json";
 const REPORT: &str = "report.html";
 const LOCK: &str = "lock";
+const PHOTOGRAPHS: &str = "photographs";
 
 /// Checkpoints every so many seconds are put off until they take at most this share of the time.
 const LARGEST_SHARE: f64 = 0.02;
@@ -56,6 +58,11 @@ pub enum Interval {
     Iterations(u32),
     /// After so many seconds, or later where writing would take more than 2 % of the time.
     Seconds(f64),
+}
+
+/// Where the folder of a run keeps decoded photographs that are too many for the memory. They are made before the run begins.
+pub fn photographs_in(run: &Path) -> PathBuf {
+    run.join(PHOTOGRAPHS)
 }
 
 /// How a run came to its end.
@@ -86,7 +93,9 @@ impl RunFolder {
     /// not be written.
     pub fn start(path: &Path, config: &str, overwrite: bool) -> Result<Self, RunError> {
         fs::create_dir_all(path).map_err(|source| RunError::io("make the folder", path, source))?;
-        let ours = |name: &Path| name == Path::new(LOCK) || name.extension().is_some_and(|e| e == files::PARTIAL);
+        let ours = |name: &Path| {
+            [LOCK, PHOTOGRAPHS].map(Path::new).contains(&name) || name.extension().is_some_and(|e| e == files::PARTIAL)
+        };
         let occupied = files::names(path)?.into_iter().any(|name| !ours(Path::new(&name)));
         if occupied && !path.join(CONFIG).is_file() && !path.join(RESULT).is_file() {
             return Err(RunError::Foreign { path: path.to_owned() });

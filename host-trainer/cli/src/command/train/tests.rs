@@ -1,0 +1,78 @@
+use std::fs;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use pocketsplat_capture::dataset::{LoadOptions, MOST_IN_MEMORY_BYTES, load};
+use pocketsplat_capture::synth::{SynthOptions, write_capture};
+use pocketsplat_trainer::train::config::Backbone;
+
+use super::*;
+
+/// A run of a few seconds on the capture in `home`.
+fn config(home: &Path, name: &str) -> RunConfig {
+    let mut train = TrainConfig { iterations: 80, ..TrainConfig::of(Backbone::Hac) };
+    (train.shape.feature_dim, train.shape.n_offsets) = (8, 3);
+    let output = home.join(name).with_extension("psb");
+    RunConfig { dataset: home.join("capture"), output, train, checkpoint_every: Some(10), ..RunConfig::default() }
+}
+
+/// As a run loads it, whatever is many for the memory.
+fn loaded(config: &RunConfig, in_memory_bytes: u64) -> Capture {
+    let cache = Some(photographs_in(&config.output.with_extension("run")));
+    let options = LoadOptions { cache, in_memory_bytes, n_random_points: 500, ..LoadOptions::default() };
+    load(&config.dataset, &options).unwrap().0
+}
+
+#[test]
+fn a_run_on_decoded_photographs_is_interrupted_resumed_and_ends_in_the_same_bytes() {
+    let home = tempfile::tempdir().unwrap();
+    let options = SynthOptions { size_px: 32, n_train: 6, n_test: 2, samples_per_axis: 1, ..SynthOptions::default() };
+    write_capture(&home.path().join("capture"), &options).unwrap();
+    let stop = AtomicBool::new(false);
+
+    let in_memory = config(home.path(), "in-memory");
+    let capture = loaded(&in_memory, MOST_IN_MEMORY_BYTES);
+    let folder = RunFolder::start(&in_memory.output.with_extension("run"), "", false).unwrap();
+    let result = train_in(folder, &in_memory, &capture, Start::New(Warned::default()), &stop).unwrap().unwrap();
+    assert_eq!(result.photographs_waited_share, None);
+    let expected = fs::read(&in_memory.output).unwrap();
+
+    let cached = config(home.path(), "cached");
+    let run = cached.output.with_extension("run");
+    // Before there is a run folder.
+    let capture = loaded(&cached, 0);
+    let files = || -> Vec<_> {
+        let entries = fs::read_dir(photographs_in(&run)).unwrap().map(|entry| entry.unwrap().path());
+        entries.filter(|path| path.extension().is_some_and(|e| e == "photograph")).collect()
+    };
+    assert_eq!(files().len(), 8);
+    let folder = RunFolder::start(&run, "", false).unwrap();
+    let ended = std::thread::scope(|scope| {
+        let training =
+            scope.spawn(|| train_in(folder, &cached, &capture, Start::New(Warned::default()), &stop).unwrap());
+        while !run.join("iteration-00000020.checkpoint").exists() && !training.is_finished() {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        stop.store(true, Ordering::Relaxed);
+        training.join().unwrap()
+    });
+    assert!(ended.is_none(), "interrupted after iteration 20");
+    drop(capture);
+    clear_photographs(&run, ExitCode::from(stop::INTERRUPTED));
+    assert_eq!(files().len(), 8, "kept for the run to go on");
+    // Whatever happened to one of them meanwhile.
+    fs::write(&files()[3], "damaged").unwrap();
+
+    stop.store(false, Ordering::Relaxed);
+    let folder = RunFolder::reopen(&run).unwrap();
+    let capture = loaded(&cached, 0);
+    let result = train_in(folder, &cached, &capture, Start::Resumed, &stop).unwrap().unwrap();
+    assert!(result.photographs_waited_share.is_some_and(|share| (0.0..1.0).contains(&share)));
+    assert!(fs::read(&cached.output).unwrap() == expected, "the same bytes");
+    let views = result.held_out.unwrap().views;
+    assert_eq!(views.len(), 2, "measured with photographs of the cache");
+    drop(capture);
+    clear_photographs(&run, ExitCode::SUCCESS);
+    assert!(!photographs_in(&run).exists() && run.join("result.json").is_file());
+}

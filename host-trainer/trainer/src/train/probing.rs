@@ -2,7 +2,6 @@
 
 use super::bits::Bits;
 use super::coding::Integers;
-use super::read_ahead::ReadAhead;
 use super::worth::Worth;
 use super::{TrainError, Trainer, target};
 use crate::ops::noise::Stream;
@@ -34,7 +33,7 @@ impl Trainer<'_> {
         let mut workspace = Workspace::new(&self.scene.shape);
         let (mut of_offsets, mut of_anchors) = (vec![0.0; n * k], vec![0.0; n]);
         let (mut squared_sum, mut n_values, mut loss) = (0.0, 0, 0.0);
-        let mut photographs = ReadAhead::default();
+        let mut photographs = self.photographs.beside();
         for (view, at) in (0u32..).zip(0..self.trained.len()) {
             let photograph = photographs.photograph(&self.capture.train, self.trained[at..].iter().copied())?;
             let target = target(&photograph, &self.cameras[self.trained[at] as usize], self.background);

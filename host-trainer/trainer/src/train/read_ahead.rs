@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 use std::iter;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -22,7 +23,8 @@ type Asked = (u32, Receiver<Answer>);
 pub(crate) struct ReadAhead {
     reader: Option<Sender<(View, Sender<Answer>)>>,
     asked: VecDeque<Asked>,
-    waited: Duration,
+    /// Shared with those [beside](Self::beside).
+    waited_ns: Arc<AtomicU64>,
     worked: Duration,
     was_used: bool,
 }
@@ -61,7 +63,8 @@ impl ReadAhead {
         let answer = self.asked.pop_front().map(|(_, answer)| answer.recv());
         // A thread that could not be started, or ended in a panic, is no reason to end a run.
         let photograph = answer.and_then(Result::ok).unwrap_or_else(|| view.photograph());
-        self.waited += started.elapsed();
+        let waited_ns = u64::try_from(started.elapsed().as_nanos()).unwrap_or(u64::MAX);
+        self.waited_ns.fetch_add(waited_ns, Ordering::Relaxed);
         photograph
     }
 
@@ -73,6 +76,15 @@ impl ReadAhead {
         self.asked.push_back((index, from));
     }
 
+    /// Another one for a pass over the views within a step, whose waits count as this one's.
+    pub(crate) fn beside(&self) -> Self {
+        Self { waited_ns: self.waited_ns.clone(), ..Self::default() }
+    }
+
+    fn waited(&self) -> Duration {
+        Duration::from_nanos(self.waited_ns.load(Ordering::Relaxed))
+    }
+
     /// Notes that a step took so long, the wait for its photograph included.
     pub(crate) fn worked(&mut self, step: Duration) {
         self.worked += step;
@@ -80,7 +92,7 @@ impl ReadAhead {
 
     /// The share of the steps' time that was spent on waiting for photographs; `None` where they lie in memory.
     pub(crate) fn waited_share(&self) -> Option<f64> {
-        self.was_used.then(|| self.waited.as_secs_f64() / self.worked.as_secs_f64().max(f64::MIN_POSITIVE))
+        self.was_used.then(|| self.waited().as_secs_f64() / self.worked.as_secs_f64().max(f64::MIN_POSITIVE))
     }
 }
 
@@ -136,7 +148,10 @@ mod tests {
             assert_eq!(found, expected, "{order:?}");
             assert_eq!(none.photograph(&in_memory.train, order.iter().copied()).expect("in memory"), expected);
         }
-        ahead.worked(ahead.waited * 4);
+        let mut beside = ahead.beside();
+        beside.photograph(&in_cache.train, [3]).expect("in the cache");
+        assert_eq!(beside.waited(), ahead.waited());
+        ahead.worked(ahead.waited() * 4);
         assert_eq!((none.waited_share(), ahead.clone().waited_share()), (None, None));
         assert!(ahead.waited_share().is_some_and(|share| (share - 0.25).abs() < 1e-6));
         std::fs::remove_dir_all(folder.path().join("cache")).expect("a cache");

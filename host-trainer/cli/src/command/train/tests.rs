@@ -24,6 +24,11 @@ fn loaded(config: &RunConfig, in_memory_bytes: u64) -> Capture {
     load(&config.dataset, &options).unwrap().0
 }
 
+/// As a run keeps it.
+fn resolved(config: RunConfig, capture: &Capture) -> RunConfig {
+    RunConfig { train: config.train.resolved_for(capture), ..config }
+}
+
 #[test]
 fn a_run_on_decoded_photographs_is_interrupted_resumed_and_ends_in_the_same_bytes() {
     let home = tempfile::tempdir().unwrap();
@@ -33,6 +38,7 @@ fn a_run_on_decoded_photographs_is_interrupted_resumed_and_ends_in_the_same_byte
 
     let in_memory = config(home.path(), "in-memory");
     let capture = loaded(&in_memory, MOST_IN_MEMORY_BYTES);
+    let in_memory = resolved(in_memory, &capture);
     let folder = RunFolder::start(&in_memory.output.with_extension("run"), "", false).unwrap();
     let result = train_in(folder, &in_memory, &capture, Start::New(Warned::default()), &stop).unwrap().unwrap();
     assert_eq!(result.photographs_waited_share, None);
@@ -42,6 +48,7 @@ fn a_run_on_decoded_photographs_is_interrupted_resumed_and_ends_in_the_same_byte
     let run = cached.output.with_extension("run");
     // Before there is a run folder.
     let capture = loaded(&cached, 0);
+    let cached = resolved(cached, &capture);
     let files = || -> Vec<_> {
         let entries = fs::read_dir(photographs_in(&run)).unwrap().map(|entry| entry.unwrap().path());
         entries.filter(|path| path.extension().is_some_and(|e| e == "photograph")).collect()

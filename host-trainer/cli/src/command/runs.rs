@@ -16,7 +16,7 @@ use super::loaded::LoadedCapture;
 use super::lpips::LpipsArgs;
 use super::settings::{QualityOptions, RunOptions, applied};
 use super::workflow::Planner;
-use super::{output, point, stop};
+use super::{output, point, stop, train};
 use crate::config::heading::{OUTPUT, RUN};
 use crate::config::{CaptureOptions, EffectsConfig, RunConfig};
 use crate::plot::{Named, ResultRow, SizeAxis, names_of, rate_distortion_svg, results_csv};

@@ -40,7 +40,7 @@ fn a_run_on_decoded_photographs_is_interrupted_resumed_and_ends_in_the_same_byte
     let capture = loaded(&in_memory, MOST_IN_MEMORY_BYTES);
     let in_memory = resolved(in_memory, &capture);
     let folder = RunFolder::start(&in_memory.output.with_extension("run"), "", false).unwrap();
-    let result = train_in(folder, &in_memory, &capture, Start::New(Warned::default()), &stop).unwrap().unwrap();
+    let result = train_in(folder, &in_memory, &capture, Start::New(Warned::default()), None, &stop).unwrap().unwrap();
     assert_eq!(result.photographs_waited_share, None);
     let expected = fs::read(&in_memory.output).unwrap();
 
@@ -57,7 +57,7 @@ fn a_run_on_decoded_photographs_is_interrupted_resumed_and_ends_in_the_same_byte
     let folder = RunFolder::start(&run, "", false).unwrap();
     let ended = std::thread::scope(|scope| {
         let training =
-            scope.spawn(|| train_in(folder, &cached, &capture, Start::New(Warned::default()), &stop).unwrap());
+            scope.spawn(|| train_in(folder, &cached, &capture, Start::New(Warned::default()), None, &stop).unwrap());
         while !run.join("iteration-00000020.checkpoint").exists() && !training.is_finished() {
             std::thread::sleep(Duration::from_millis(1));
         }
@@ -74,7 +74,7 @@ fn a_run_on_decoded_photographs_is_interrupted_resumed_and_ends_in_the_same_byte
     stop.store(false, Ordering::Relaxed);
     let folder = RunFolder::reopen(&run).unwrap();
     let capture = loaded(&cached, 0);
-    let result = train_in(folder, &cached, &capture, Start::Resumed, &stop).unwrap().unwrap();
+    let result = train_in(folder, &cached, &capture, Start::Resumed, None, &stop).unwrap().unwrap();
     assert!(result.photographs_waited_share.is_some_and(|share| (0.0..1.0).contains(&share)));
     assert!(fs::read(&cached.output).unwrap() == expected, "the same bytes");
     let views = result.held_out.unwrap().views;

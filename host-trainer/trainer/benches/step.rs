@@ -5,57 +5,24 @@
 //! the machine's cores unless `RAYON_NUM_THREADS` says otherwise.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use glam::{DMat3, DVec3};
-use pocketsplat_capture::camera::Camera;
 use pocketsplat_trainer::ops::Pinhole;
 use pocketsplat_trainer::ops::noise::Stream;
 use pocketsplat_trainer::ops::simd::Level;
 use pocketsplat_trainer::scene::Scene;
-use pocketsplat_trainer::scene::init::initial_scene;
 use pocketsplat_trainer::step::coding::{Coding, RateTerms};
 use pocketsplat_trainer::step::{Loss, LossWeights, StageSeconds, StepReport, TargetView, Workspace};
-use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::config::{Backbone, Hac, Rates};
 use pocketsplat_trainer::train::context_start::initial_context;
 use pocketsplat_trainer::train::optimiser::Optimiser;
+use pocketsplat_trainer::train::typical;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 const SIZE_PX: u32 = 400;
-/// Makes about half of the Gaussians opaque.
-const OPACITY_BIAS: f32 = 0.0;
 
-fn camera() -> Camera {
-    Camera {
-        rotation: DMat3::IDENTITY,
-        translation: DVec3::new(0.0, 0.0, 4.0),
-        focal_px: [555.0; 2],
-        principal_px: [f64::from(SIZE_PX) / 2.0; 2],
-        width_px: SIZE_PX,
-        height_px: SIZE_PX,
-    }
-}
-
-/// Anchors on a sphere's surface, about half of their Gaussians opaque, as in a trained scene.
-fn scene(backbone: Backbone, n_anchors: usize) -> Scene<f32> {
-    let mut rng = ChaCha8Rng::seed_from_u64(1);
-    let points: Vec<DVec3> = (0..n_anchors)
-        .map(|_| DVec3::from(std::array::from_fn(|_| rng.random_range(-1.0..1.0))).normalize_or(DVec3::X) * 1.1)
-        .collect();
-    let mut scene = initial_scene(TrainConfig::of(backbone).shape, 0.001, &points, &mut rng);
-    for value in scene.anchors.features.iter_mut().chain(&mut scene.anchors.offsets) {
-        *value = rng.random_range(-1.0..1.0);
-    }
-    scene.heads.opacity.b2.fill(OPACITY_BIAS);
-    for log_scale in &mut scene.anchors.log_scales {
-        *log_scale += rng.random_range(-0.2..0.6);
-    }
-    scene
-}
-
-/// The same with masks and a context model.
+/// A scene with masks and a context model.
 fn coded_scene() -> Scene<f32> {
-    let mut scene = scene(Backbone::Hac, 50_000);
+    let mut scene = typical::scene(Backbone::Hac, 50_000);
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     for logit in &mut scene.anchors.mask_logits {
         *logit = if rng.random::<f32>() < 0.75 { -6.0 } else { 1.0 };
@@ -68,12 +35,12 @@ fn benchmark(criterion: &mut Criterion) {
     let Hac { lambda, sample, mask_weight, grid_weight, .. } = Hac::default();
     let rate = RateTerms { lambda, sample, mask: mask_weight, masks_weigh_anchors: false, grid: grid_weight };
     let coding = Coding::Context { stream: Stream::of_run(1), rate, exact: None };
-    steps(criterion, "scaffold", &scene(Backbone::Scaffold, 20_000), &Coding::Raw);
+    steps(criterion, "scaffold", &typical::scene(Backbone::Scaffold, 20_000), &Coding::Raw);
     steps(criterion, "hac", &coded_scene(), &coding);
 }
 
 fn steps(criterion: &mut Criterion, name: &str, scene: &Scene<f32>, coding: &Coding<'_, f32>) {
-    let pinhole = Pinhole::new(&camera());
+    let pinhole = Pinhole::new(&typical::camera([SIZE_PX; 2]));
     let mut rng = ChaCha8Rng::seed_from_u64(2);
     let truth: Vec<f32> = (0..3 * SIZE_PX * SIZE_PX).map(|_| rng.random_range(0.0..1.0)).collect();
     let target = TargetView::new(&pinhole, truth, None, [0.0; 3]);

@@ -70,9 +70,18 @@ impl FromStr for DeviceChoice {
 }
 
 impl DeviceChoice {
-    /// Opens the GPU that is asked for, or found; none where the CPU is to do it.
-    #[cfg(feature = "gpu")]
+    /// Opens the GPU that is asked for, or found, and says on stderr which; none where the CPU is to do it.
     pub(crate) fn open(self) -> Result<Option<SharedImageStages<f32>>> {
+        self.opened(true)
+    }
+
+    /// The same without a word.
+    pub(crate) fn open_silently(self) -> Result<Option<SharedImageStages<f32>>> {
+        self.opened(false)
+    }
+
+    #[cfg(feature = "gpu")]
+    fn opened(self, says: bool) -> Result<Option<SharedImageStages<f32>>> {
         use pocketsplat_trainer::gpu::{AdapterKind, Gpu, GpuImage, choose};
         use std::sync::{Arc, Mutex};
 
@@ -84,16 +93,18 @@ impl DeviceChoice {
             }
             Self::Gpu(index) => Some(choose(index)?),
         };
-        let Some(adapter) = adapter else {
-            eprintln!("device: cpu, since no GPU was found");
-            return Ok(None);
-        };
-        eprintln!("device: {} ({}, {})", adapter.name, adapter.kind, adapter.backend);
+        if says {
+            match &adapter {
+                Some(adapter) => eprintln!("device: {} ({}, {})", adapter.name, adapter.kind, adapter.backend),
+                None => eprintln!("device: cpu, since no GPU was found"),
+            }
+        }
+        let Some(adapter) = adapter else { return Ok(None) };
         Ok(Some(Arc::new(Mutex::new(GpuImage::new(&Gpu::open(&adapter)?)?))))
     }
 
     #[cfg(not(feature = "gpu"))]
-    pub(crate) fn open(self) -> Result<Option<SharedImageStages<f32>>> {
+    fn opened(self, _says: bool) -> Result<Option<SharedImageStages<f32>>> {
         match self {
             Self::Cpu | Self::Auto => Ok(None),
             Self::Gpu(_) => anyhow::bail!(
@@ -101,6 +112,11 @@ impl DeviceChoice {
             ),
         }
     }
+}
+
+/// The numbers of the GPUs that training can run on.
+pub(crate) fn usable() -> Vec<usize> {
+    devices().iter().filter(|device| device.lack.is_none()).map(|device| device.index).collect()
 }
 
 #[cfg(feature = "gpu")]

@@ -7,6 +7,7 @@ use std::time::Instant;
 use anyhow::Result;
 use pocketsplat_capture::dataset::{Capture, PointsOrigin};
 use pocketsplat_trainer::effects::PILOTS_TIME_SHARE;
+use pocketsplat_trainer::step::SharedImageStages;
 use pocketsplat_trainer::train::{TrainConfig, Trainer};
 
 use super::process::{machine_memory_bytes, peak_memory_bytes};
@@ -145,6 +146,7 @@ impl Estimate {
         capture: &Capture,
         config: &TrainConfig,
         with_pilots: bool,
+        device: Option<SharedImageStages<f32>>,
         stop: &AtomicBool,
     ) -> Result<Warned> {
         let (mut estimate, expected) = Self::measured(capture, config, stop)?;
@@ -163,6 +165,7 @@ impl Estimate {
     /// Those of the steps.
     pub(super) fn measured(capture: &Capture, config: &TrainConfig, stop: &AtomicBool) -> Result<(Self, Expected)> {
         let mut trainer = Trainer::new(capture, *config)?;
+        trainer.set_device(device);
         let mut advance = |n_steps: u32| -> Result<f64> {
             let started = Instant::now();
             for _ in 0..n_steps {

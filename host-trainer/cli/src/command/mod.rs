@@ -1,6 +1,7 @@
 //! The commands, one file each; only these files print.
 
 mod ablate;
+mod bench;
 mod bundle;
 mod capture;
 mod compare;
@@ -78,6 +79,7 @@ enum Command {
     Demo(demo::Args),
     Doctor(doctor::Args),
     Devices(devices::Args),
+    Bench(bench::Args),
 }
 
 /// Parses the command line, runs the command, and says what failed: as JSON on stdout where results go there as JSON.
@@ -152,6 +154,7 @@ fn dispatch(cli: Cli) -> Result<ExitCode> {
         Command::Synth(args) => synth::run(&args),
         Command::Doctor(args) => doctor::run(&args),
         Command::Devices(args) => devices::run(&args),
+        Command::Bench(args) => bench::run(&args),
         Command::Demo(args) => demo::run(&args),
     }
     .map(|()| ExitCode::SUCCESS)

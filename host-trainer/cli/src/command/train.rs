@@ -216,6 +216,7 @@ fn train_and_print<'a>(
     capture: &'a Capture,
     start: Start<'a>,
 ) -> Result<ExitCode> {
+    let device = args.device()?;
     if let Some(port) = args.watch() {
         let photograph = capture.test.first().or(capture.train.first()).map(View::photograph).transpose()?;
         let image = photograph.as_ref().map(|photograph| &photograph.image);
@@ -227,7 +228,7 @@ fn train_and_print<'a>(
     let start = match start {
         Start::New(_) => {
             let with_pilots = effects::are_measured(&config, capture);
-            Start::New(Estimate::try_out(capture, &config.train, with_pilots, &stop)?)
+            Start::New(Estimate::try_out(capture, &config.train, with_pilots, device.clone(), &stop)?)
         }
         other => other,
     };
@@ -235,7 +236,7 @@ fn train_and_print<'a>(
         return Ok(ExitCode::from(stop::INTERRUPTED));
     }
     let path = folder.path().to_owned();
-    let Some(result) = train_in(folder, &config, capture, start, args.device()?, &stop)? else {
+    let Some(result) = train_in(folder, &config, capture, start, device, &stop)? else {
         return Ok(ExitCode::from(stop::INTERRUPTED));
     };
     let (dataset, bundle) = args.named_paths(&config.dataset, &config.output);

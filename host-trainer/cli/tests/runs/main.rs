@@ -10,6 +10,7 @@ mod effects;
 mod explicit;
 mod export;
 mod fixture;
+mod gpu;
 mod interruption;
 mod modules;
 mod plan;

@@ -35,7 +35,11 @@ enum Fault {
 
 impl State {
     fn record(&self, fault: Fault) {
-        self.fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(fault);
+        let mut first = self.fault.lock().unwrap_or_else(PoisonError::into_inner);
+        // Commands to a lost device are refused, which may be heard of first.
+        if first.is_none() || matches!(fault, Fault::Lost(_)) {
+            *first = Some(fault);
+        }
     }
 }
 

@@ -1,5 +1,7 @@
 //! The photograph that a step compares with.
 
+use std::sync::OnceLock;
+
 use pocketsplat_capture::dataset::Image;
 
 use crate::ops::Pinhole;
@@ -16,14 +18,25 @@ pub struct TargetView<'a, R> {
     pub background: [R; 3],
     /// The number of the photograph in its capture, by which a device knows it again.
     pub index: Option<usize>,
-    truth: Vec<R>,
+    photograph: Option<&'a Image>,
+    truth: OnceLock<Vec<R>>,
 }
 
 impl<'a, R: Real> TargetView<'a, R> {
     /// * `truth`: planes `[3, height, width]`, 0 to 1; pixels that do not count become 0, as they do in what is drawn.
     pub fn new(camera: &'a Pinhole<R>, mut truth: Vec<R>, mask: Option<&'a [bool]>, background: [R; 3]) -> Self {
         clear_masked(&mut truth, mask);
-        Self { camera, mask, background, index: None, truth }
+        Self { camera, mask, background, index: None, photograph: None, truth: truth.into() }
+    }
+
+    /// The same of a photograph, whose planes are made when they are asked for: a device that has it does not.
+    pub fn of_photograph(
+        camera: &'a Pinhole<R>,
+        photograph: &'a Image,
+        mask: Option<&'a [bool]>,
+        background: [R; 3],
+    ) -> Self {
+        Self { camera, mask, background, index: None, photograph: Some(photograph), truth: OnceLock::new() }
     }
 
     /// The same, of this number in its capture.
@@ -34,19 +47,29 @@ impl<'a, R: Real> TargetView<'a, R> {
 
     /// Planes `[3, height, width]`, 0 to 1; 0 where pixels do not count.
     pub fn truth(&self) -> &[R] {
-        &self.truth
+        self.truth.get_or_init(|| {
+            let mut truth: Vec<R> = match self.photograph {
+                // Rounded to f32 in every number type, as photographs always were.
+                Some(photograph) => planes(photograph).into_iter().map(|v| R::real(v.into())).collect(),
+                None => Vec::new(),
+            };
+            clear_masked(&mut truth, self.mask);
+            truth
+        })
     }
 
     /// Σ over pixels and channels of the squared difference to `image`, planes that are 0 where pixels do not count.
     pub(crate) fn squared_sum(&self, image: &[R]) -> f64 {
         // Blocks of fixed size, so that the sum's rounding is the same however it is scheduled.
-        let blocks = image.chunks(4096).zip(self.truth.chunks(4096));
+        let blocks = image.chunks(4096).zip(self.truth().chunks(4096));
         blocks.map(|(a, b)| a.iter().zip(b).map(|(x, y)| Into::<f64>::into((*x - *y) * (*x - *y))).sum::<f64>()).sum()
     }
 
     /// Pixels that count, at least 1.
     pub(crate) fn n_counted(&self) -> usize {
-        self.mask.map_or(self.truth.len() / 3, |mask| mask.iter().filter(|valid| **valid).count()).max(1)
+        self.mask
+            .map_or(self.camera.size_px.iter().product(), |mask| mask.iter().filter(|valid| **valid).count())
+            .max(1)
     }
 }
 

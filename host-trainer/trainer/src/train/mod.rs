@@ -21,6 +21,7 @@ pub mod steering;
 pub mod survey;
 #[cfg(test)]
 pub(crate) mod test_capture;
+pub mod typical;
 pub mod watchdog;
 pub mod worth;
 
@@ -40,7 +41,7 @@ use crate::ops::Pinhole;
 use crate::ops::noise::Stream;
 use crate::scene::init::initial_scene;
 use crate::scene::{Anchors, Heads, Scene};
-use crate::step::{Loss, Phase, SharedImageStages, StepInfo, TargetView, Workspace, image_of_planes, planes};
+use crate::step::{Loss, Phase, SharedImageStages, StepInfo, TargetView, Workspace, image_of_planes};
 use checkpoint::{CaptureSignature, Kernels};
 use coding::Integers;
 use config::{Backbone, Densification, Rates};
@@ -249,7 +250,7 @@ impl<'a> Trainer<'a> {
             self.scene.heads = heads;
         }
         let report = report?;
-        if let Some(cause) = watchdog::inspect(&self.scene, target.truth(), self.background, &self.workspace, &report) {
+        if let Some(cause) = watchdog::inspect(&self.scene, &target, self.background, &self.workspace, &report) {
             let dropped =
                 DroppedStep { iteration: self.iteration, view: self.capture.train[index].name.clone(), cause };
             return if self.watchdog.dropped() {
@@ -406,7 +407,7 @@ impl<'a> Trainer<'a> {
 /// What a photograph asks of the scene.
 fn target<'v>(photograph: &'v Photograph, camera: &'v Pinhole<f32>, background: [f32; 3]) -> TargetView<'v, f32> {
     let mask = photograph.mask.as_ref().map(|mask| mask.valid.as_slice());
-    TargetView::new(camera, planes(&photograph.image), mask, background)
+    TargetView::of_photograph(camera, &photograph.image, mask, background)
 }
 
 #[cfg(test)]

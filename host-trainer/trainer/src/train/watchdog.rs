@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::ops::neural_gaussians::Gaussian;
 use crate::scene::{ContextNetwork, Heads, Scene};
-use crate::step::{Block, StepReport, Workspace};
+use crate::step::{Block, StepReport, TargetView, Workspace};
 
 /// Gradients above are refused like infinite ones: their squares would overflow in Adam's second moment.
 const LARGEST_GRADIENT: f32 = 1e18;
@@ -83,7 +83,7 @@ impl Watchdog {
 /// the gradients.
 pub(super) fn inspect(
     scene: &Scene<f32>,
-    truth: &[f32],
+    target: &TargetView<'_, f32>,
     background: [f32; 3],
     workspace: &Workspace<f32>,
     report: &StepReport<f32>,
@@ -101,7 +101,7 @@ pub(super) fn inspect(
         return None;
     }
     // Rare, so it may be slow: the whole chain from the start.
-    let found = input_fault(scene, truth, background).or_else(|| drawing_fault(workspace));
+    let found = input_fault(scene, target.truth(), background).or_else(|| drawing_fault(workspace));
     let loss = || refused(&[report.loss], 1, f32::MAX).map(|(_, value)| cause("the loss", None, value));
     let found = found.or_else(loss).or_else(|| gradient_fault(workspace));
     Some(found.unwrap_or(cause("a value", None, f32::NAN)))

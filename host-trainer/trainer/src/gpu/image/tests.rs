@@ -3,6 +3,7 @@
 use std::sync::{Arc, Mutex};
 
 use super::*;
+use crate::gpu::choose;
 use crate::gpu::parity::{Bound, assert_close, gpu, largest};
 use crate::ops::Pinhole;
 use crate::scene::Scene;
@@ -153,4 +154,27 @@ fn the_same_run_gives_the_same_bits_and_goes_on_anywhere() {
     assert_ne!(restored().written_by, on_cpu.kernels());
     train(&mut on_cpu, 40);
     assert!(on_cpu.is_done());
+}
+
+#[test]
+fn a_lost_device_ends_the_run_with_what_to_do_and_the_checkpoint_goes_on() {
+    if gpu().is_none() {
+        return;
+    }
+    let own = Gpu::open(&choose(None).expect("there is one")).expect("it opens twice");
+    let capture = tiny_capture();
+    let mut trainer = Trainer::new(&capture, tiny_config(6)).expect("a run");
+    trainer.set_device(device(&own));
+    for _ in 0..3 {
+        trainer.advance().expect("a step");
+    }
+    let mut checkpoint = Vec::new();
+    trainer.save(&mut checkpoint).expect("memory");
+    own.device.destroy();
+    let error = trainer.advance().expect_err("the device is gone").to_string();
+    assert!(error.contains("the device was lost") && error.contains("--resume"), "{error}");
+    let mut restored = Trainer::restore(&capture, &checkpoint).expect("sound").trainer;
+    while !restored.is_done() {
+        restored.advance().expect("a step");
+    }
 }

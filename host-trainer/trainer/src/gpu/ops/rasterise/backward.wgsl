@@ -21,6 +21,8 @@ const N_ROW_SUMS: u32 = 6u;
 var<workgroup> d_colour: array<array<f32, 3>, TILE_PIXELS>;
 var<workgroup> d_power: array<f32, AT_ONCE * TILE_PIXELS>;
 var<workgroup> weights: array<f32, AT_ONCE * TILE_PIXELS>;
+var<workgroup> n_live: atomic<u32>;
+var<workgroup> n_live_read: u32;
 var<workgroup> row_sums: array<f32, AT_ONCE * TILE_PX * N_ROW_SUMS>;
 
 @compute @workgroup_size(256)
@@ -57,11 +59,27 @@ fn backward(
     let end = starts[tile + 1u];
     for (var first = starts[tile]; first < end; first += BATCH) {
         let n = min(BATCH, end - first);
+        if thread == 0u {
+            atomicStore(&n_live, 0u);
+        }
         workgroupBarrier();
+        if live {
+            atomicAdd(&n_live, 1u);
+        }
         if thread < n {
             batch[thread] = splats[slot_of_pair[entries[first + thread]]];
         }
         workgroupBarrier();
+        if thread == 0u {
+            n_live_read = atomicLoad(&n_live);
+        }
+        if workgroupUniformLoad(&n_live_read) == 0u {
+            // Every pixel has stopped: what is behind has no gradient.
+            for (var i = thread; i < (end - first) * N_NUMBERS; i += TILE_PIXELS) {
+                d_pairs[entries[first + i / N_NUMBERS] * N_NUMBERS + i % N_NUMBERS] = 0.0;
+            }
+            break;
+        }
         for (var start = 0u; start < n; start += AT_ONCE) {
             for (var i = 0u; i < AT_ONCE; i++) {
                 var dp = 0.0;

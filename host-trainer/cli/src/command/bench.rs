@@ -1,0 +1,169 @@
+//! `pocketsplat bench`: what a training step takes on this machine.
+
+use std::fmt;
+
+use anyhow::{Context, Result, ensure};
+use pocketsplat_capture::dataset::FrameSize;
+use pocketsplat_trainer::ops::Pinhole;
+use pocketsplat_trainer::scene::Scene;
+use pocketsplat_trainer::step::coding::Coding;
+use pocketsplat_trainer::step::{
+    Loss, LossWeights, SharedImageStages, StageSeconds, StepReport, TargetView, Workspace,
+};
+use pocketsplat_trainer::train::config::Backbone;
+use pocketsplat_trainer::train::typical;
+use serde::Serialize;
+
+use super::devices::{DeviceChoice, usable};
+use super::output;
+
+/// Measure the stages of a training step on every device of this machine, and on the CPU with 1, 2, 4, … threads.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Splats of the scenes.
+    #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = [20_000, 100_000, 400_000])]
+    splats: Vec<usize>,
+    /// Sizes of the images.
+    #[arg(long, value_name = "WxH,…", value_delimiter = ',', default_values_t = SIZES)]
+    sizes: Vec<FrameSize>,
+    /// Steps whose median is taken, after one that is not timed.
+    #[arg(long, value_name = "N", default_value_t = 5)]
+    steps: usize,
+    /// Print the result as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+const SIZES: [FrameSize; 3] = [
+    FrameSize { width_px: 400, height_px: 400 },
+    FrameSize { width_px: 800, height_px: 800 },
+    FrameSize { width_px: 1600, height_px: 1060 },
+];
+
+/// Medians of one scene at one size on one device, milliseconds.
+#[derive(Serialize)]
+struct Row {
+    device: String,
+    threads: usize,
+    size: String,
+    splats: usize,
+    pairs: usize,
+    /// Prefilter, heads, Gaussians, projection.
+    anchors_ms: f64,
+    tiles_ms: f64,
+    rasterise_ms: f64,
+    loss_ms: f64,
+    rasterise_backward_ms: f64,
+    anchors_backward_ms: f64,
+    step_ms: f64,
+}
+
+#[derive(Serialize)]
+struct Table {
+    rows: Vec<Row>,
+}
+
+pub(crate) fn run(args: &Args) -> Result<()> {
+    ensure!(args.steps > 0, "--steps is 0, and takes at least 1");
+    ensure!(args.splats.iter().all(|n| *n > 0), "--splats has a 0 in it; each takes at least 1");
+    let most = rayon::current_num_threads();
+    let mut threads: Vec<usize> = std::iter::successors(Some(1), |n| Some(2 * n)).take_while(|n| *n < most).collect();
+    threads.push(most);
+    let gpus = usable();
+    let mut rows = Vec::new();
+    for n_splats in &args.splats {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of anchors")]
+        let n_anchors = (*n_splats as f64 / typical::SPLATS_PER_ANCHOR).ceil() as usize;
+        let scene = typical::scene(Backbone::Scaffold, n_anchors);
+        for size in &args.sizes {
+            for threads in &threads {
+                eprintln!("{n_splats} splats, {size}, cpu, {threads} threads");
+                rows.push(measure(&scene, *size, args.steps, *threads, None)?);
+            }
+            for index in &gpus {
+                eprintln!("{n_splats} splats, {size}, gpu:{index}");
+                let device = DeviceChoice::Gpu(Some(*index)).open_silently()?;
+                rows.push(measure(&scene, *size, args.steps, most, device)?);
+            }
+        }
+    }
+    let table = Table { rows };
+    output::print_or(&table, args.json, &table)
+}
+
+fn measure(
+    scene: &Scene<f32>,
+    size: FrameSize,
+    n_steps: usize,
+    threads: usize,
+    device: Option<SharedImageStages<f32>>,
+) -> Result<Row> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = pool.with_context(|| format!("could not start {threads} threads"))?;
+    let camera = Pinhole::new(&typical::camera([size.width_px, size.height_px]));
+    let n_values = 3 * camera.size_px[0] * camera.size_px[1];
+    // Bytes without a pattern.
+    let truth = (0..n_values as u32).map(|i| f32::from((i.wrapping_mul(2_654_435_761) >> 24) as u8) / 255.0).collect();
+    let target = TargetView::new(&camera, truth, None, [0.0; 3]).numbered(0);
+    let mut workspace = Workspace::new(&scene.shape);
+    workspace.set_device(device);
+    let name = workspace.device_name().unwrap_or_else(|| "cpu".to_owned());
+    let reports = pool.install(|| -> Result<Vec<StepReport<f32>>> {
+        let loss = Loss::plain(LossWeights::default());
+        let mut step = || Ok(workspace.try_step(scene, &target, &loss, &Coding::Raw)?);
+        step()?;
+        (0..n_steps).map(|_| step()).collect()
+    })?;
+    Ok(row(name, threads, size, &reports))
+}
+
+fn row(device: String, threads: usize, size: FrameSize, reports: &[StepReport<f32>]) -> Row {
+    let median = |stage: &dyn Fn(&StageSeconds) -> f64| {
+        let mut ms: Vec<f64> = reports.iter().map(|r| 1e3 * stage(&r.stages)).collect();
+        ms.sort_by(f64::total_cmp);
+        ms[ms.len() / 2]
+    };
+    let StepReport { n_splats, n_pairs, .. } = reports[0];
+    Row {
+        device,
+        threads,
+        size: size.to_string(),
+        splats: n_splats,
+        pairs: n_pairs,
+        anchors_ms: median(&|s| s.context + s.anchors),
+        tiles_ms: median(&|s| s.tiles),
+        rasterise_ms: median(&|s| s.rasterise),
+        loss_ms: median(&|s| s.loss),
+        rasterise_backward_ms: median(&|s| s.rasterise_backward),
+        anchors_backward_ms: median(&|s| s.anchors_backward),
+        step_ms: median(&|s| {
+            s.context + s.anchors + s.tiles + s.rasterise + s.loss + s.rasterise_backward + s.anchors_backward
+        }),
+    }
+}
+
+impl fmt::Display for Table {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "| device | threads | size | splats | pairs | anchors | tiles | rasterise | loss | rasterise back | anchors back | step, ms |"
+        )?;
+        writeln!(f, "|---|---|---|---|---|---|---|---|---|---|---|---|")?;
+        for row in &self.rows {
+            let Row { device, threads, size, splats, pairs, .. } = row;
+            write!(f, "| {device} | {threads} | {size} | {splats} | {pairs} |")?;
+            for ms in [
+                row.anchors_ms,
+                row.tiles_ms,
+                row.rasterise_ms,
+                row.loss_ms,
+                row.rasterise_backward_ms,
+                row.anchors_backward_ms,
+            ] {
+                write!(f, " {ms:.1} |")?;
+            }
+            writeln!(f, " **{:.1}** |", row.step_ms)?;
+        }
+        Ok(())
+    }
+}

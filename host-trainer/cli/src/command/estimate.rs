@@ -149,7 +149,7 @@ impl Estimate {
         device: Option<SharedImageStages<f32>>,
         stop: &AtomicBool,
     ) -> Result<Warned> {
-        let (mut estimate, expected) = Self::measured(capture, config, stop)?;
+        let (mut estimate, expected) = Self::measured(capture, config, device, stop)?;
         if !stop.load(Ordering::Relaxed) {
             let expected = if with_pilots { expected.with_pilots() } else { expected };
             eprintln!("{}", estimate.said(&expected));
@@ -163,7 +163,12 @@ impl Estimate {
     ///
     /// # Errors
     /// Those of the steps.
-    pub(super) fn measured(capture: &Capture, config: &TrainConfig, stop: &AtomicBool) -> Result<(Self, Expected)> {
+    pub(super) fn measured(
+        capture: &Capture,
+        config: &TrainConfig,
+        device: Option<SharedImageStages<f32>>,
+        stop: &AtomicBool,
+    ) -> Result<(Self, Expected)> {
         let mut trainer = Trainer::new(capture, *config)?;
         trainer.set_device(device);
         let mut advance = |n_steps: u32| -> Result<f64> {

@@ -19,7 +19,7 @@ use crate::config::RunConfig;
 /// Brings a point to its end, from wherever it stands; false when it was interrupted before.
 pub(super) fn trained(config: &RunConfig, capture: &Capture, stop: &AtomicBool) -> Result<bool> {
     let (folder, start) = match Standing::of(&config.output.with_extension("run"), config)? {
-        Standing::New(folder) => (folder, Start::New(Estimate::try_out(capture, &config.train, false, stop)?)),
+        Standing::New(folder) => (folder, Start::New(Estimate::try_out(capture, &config.train, false, None, stop)?)),
         Standing::Begun(folder) => (folder, Start::Resumed),
         Standing::Finished => {
             eprintln!("trained before");

@@ -129,7 +129,7 @@ impl Planner {
         if let Some((_, expected)) = self.tried.iter().find(|(tried, _)| *tried == kind) {
             return Ok(*expected);
         }
-        let (_, expected) = Estimate::measured(capture, &config.train, &AtomicBool::new(false))?;
+        let (_, expected) = Estimate::measured(capture, &config.train, None, &AtomicBool::new(false))?;
         self.tried.push((kind, expected));
         Ok(expected)
     }

@@ -36,7 +36,6 @@ use parents::Parents;
 pub use probe::ImageError;
 pub use stages::StageSeconds;
 use stages::StageTimer;
-#[cfg(any(test, feature = "gpu"))]
 pub(crate) use target::clear_masked;
 pub use target::{TargetView, image_of_planes, planes};
 

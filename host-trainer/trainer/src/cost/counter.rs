@@ -192,7 +192,7 @@ mod tests {
         };
         assert_eq!(
             budget(&setting),
-            ".with_quality(pocketsplat_core::Quality { alpha_cut: 4, transmittance_stop: 10, detail: true }).with_tiers(2)\
+            ".with_quality(pocketsplat_core::Quality { alpha_cut: 2, transmittance_stop: 10, detail: true }).with_tiers(2)\
              .with_residency(pocketsplat_core::Residency::Streamed).with_strips(pocketsplat_core::Strips::Exactly(4))"
         );
         // The compiler may leave out the names of defaults at the end, and so may the firmware.

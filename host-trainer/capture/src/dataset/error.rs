@@ -112,9 +112,9 @@ pub enum DatasetError {
         path.display()
     )]
     DiskFull { path: PathBuf, needed: u64, found: u64 },
-    /// The cache cannot be written.
+    /// The cache could not be written.
     #[error(
-        "cannot write the decoded photographs to `{}`: {source}; make the folder writable, or choose another one for the run",
+        "could not write the decoded photographs to `{}`: {source}; make the folder writable, or choose another one for the run",
         path.display()
     )]
     CacheWrite { path: PathBuf, source: std::io::Error },

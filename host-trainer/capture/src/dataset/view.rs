@@ -41,7 +41,7 @@ pub(super) struct SourceFile {
     pub(super) has_mask: bool,
 }
 
-/// Why a photograph that was there when the capture was loaded cannot be had.
+/// Why a photograph that was there when the capture was loaded is not to be read any more.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "each message names its fields")]

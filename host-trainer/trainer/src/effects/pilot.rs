@@ -79,7 +79,7 @@ pub enum PilotError {
     /// Its bundle cannot be drawn.
     #[error("a pilot's bundle cannot be drawn; please report it")]
     Draw(#[from] DecodeError),
-    /// A held-out photograph that does not lie in memory cannot be read.
+    /// A held-out photograph that does not lie in memory could not be read.
     #[error(transparent)]
     Photograph(#[from] PhotographError),
     /// What it was worth could not be written down.

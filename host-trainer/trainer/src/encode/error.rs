@@ -26,7 +26,7 @@ pub enum EncodeError {
     /// The tiers of the coded scene cannot be measured or planned for.
     #[error("the tiers of the coded scene cannot be measured; please report it")]
     Measure(#[source] DecodeError),
-    /// A photograph that does not lie in memory cannot be read.
+    /// A photograph that does not lie in memory could not be read.
     #[error(transparent)]
     Photograph(#[from] PhotographError),
 }

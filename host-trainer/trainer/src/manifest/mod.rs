@@ -38,7 +38,7 @@ pub enum MeasureError {
     /// A damaged bundle or an unusable camera.
     #[error(transparent)]
     Decode(#[from] DecodeError),
-    /// A photograph that does not lie in memory cannot be read.
+    /// A photograph that does not lie in memory could not be read.
     #[error(transparent)]
     Photograph(#[from] PhotographError),
 }

@@ -48,7 +48,7 @@ pub enum TrainError {
     /// No point to start from.
     #[error("the capture has no point to start from; check its bounds")]
     NoPoints,
-    /// A photograph that does not lie in memory cannot be read.
+    /// A photograph that does not lie in memory could not be read.
     #[error(transparent)]
     Photograph(#[from] PhotographError),
     /// The scene has no context model.

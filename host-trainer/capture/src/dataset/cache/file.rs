@@ -38,7 +38,7 @@ pub(super) struct Header {
 #[non_exhaustive]
 pub enum FileFault {
     /// It is not there, or shorter than its header says.
-    #[error("cannot be read ({0})")]
+    #[error("could not be read ({0})")]
     Io(#[from] io::Error),
     /// It is no such file, or its header is damaged.
     #[error("has no sound header")]

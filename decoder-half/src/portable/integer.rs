@@ -12,7 +12,10 @@ pub fn add_products_of_two_rows(sums: [i32; 2], [first, second]: [&[u8]; 2], inp
     // Order does not matter: integers add up the same in any.
     if cfg!(target_pointer_width = "64") {
         let [sum_a, sum_b] = sums;
-        return [with_products(sum_a, first, inputs), with_products(sum_b, second, inputs)];
+        let n = first.len().min(second.len()).min(inputs.len());
+        let [first, second] = [first, second].map(|row| row.get(..n).unwrap_or_default());
+        let inputs = inputs.get(..n).unwrap_or_default();
+        return [with_products(sum_a, (first, inputs)), with_products(sum_b, (second, inputs))];
     }
     // An input is fetched once for both.
     first.iter().zip(second).zip(inputs).fold(sums, |[sum_a, sum_b], ((&weight_a, &weight_b), &input)| {
@@ -25,11 +28,9 @@ fn product((&weight, &input): (&u8, &i16)) -> i32 {
     i32::from(weight as i8).wrapping_mul(i32::from(input))
 }
 
-/// `sum` with the products of one row, in turns of fixed lengths: these become instructions that multiply several numbers at once.
+/// `sum` with the products of a row and as many inputs, in turns of fixed lengths: these become instructions that multiply several numbers at once.
 #[inline(always)]
-fn with_products(sum: i32, weights: &[u8], inputs: &[i16]) -> i32 {
-    let n = weights.len().min(inputs.len());
-    let row = (weights.get(..n).unwrap_or_default(), inputs.get(..n).unwrap_or_default());
+fn with_products(sum: i32, row: (&[u8], &[i16])) -> i32 {
     let (sum, row) = in_turns::<32>(sum, row);
     let (sum, row) = in_turns::<8>(sum, row);
     in_turns::<1>(sum, row).0

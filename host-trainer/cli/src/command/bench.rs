@@ -7,9 +7,7 @@ use pocketsplat_capture::dataset::FrameSize;
 use pocketsplat_trainer::ops::Pinhole;
 use pocketsplat_trainer::scene::Scene;
 use pocketsplat_trainer::step::coding::Coding;
-use pocketsplat_trainer::step::{
-    Loss, LossWeights, SharedImageStages, StageSeconds, StepReport, TargetView, Workspace,
-};
+use pocketsplat_trainer::step::{Loss, LossWeights, SharedDevice, StageSeconds, StepReport, TargetView, Workspace};
 use pocketsplat_trainer::train::config::Backbone;
 use pocketsplat_trainer::train::typical;
 use serde::Serialize;
@@ -102,7 +100,7 @@ fn measure(
     size: FrameSize,
     n_steps: usize,
     threads: usize,
-    device: Option<SharedImageStages<f32>>,
+    device: Option<SharedDevice<f32>>,
 ) -> Result<Row> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.with_context(|| format!("could not start {threads} threads"))?;

@@ -3,7 +3,7 @@
 use std::str::FromStr;
 
 use anyhow::Result;
-use pocketsplat_trainer::step::SharedImageStages;
+use pocketsplat_trainer::step::SharedDevice;
 use serde::Serialize;
 
 use super::output;
@@ -71,18 +71,18 @@ impl FromStr for DeviceChoice {
 
 impl DeviceChoice {
     /// Opens the GPU that is asked for, or found, and says on stderr which; none where the CPU is to do it.
-    pub(crate) fn open(self) -> Result<Option<SharedImageStages<f32>>> {
+    pub(crate) fn open(self) -> Result<Option<SharedDevice<f32>>> {
         self.opened(true)
     }
 
     /// The same without a word.
-    pub(crate) fn open_silently(self) -> Result<Option<SharedImageStages<f32>>> {
+    pub(crate) fn open_silently(self) -> Result<Option<SharedDevice<f32>>> {
         self.opened(false)
     }
 
     #[cfg(feature = "gpu")]
-    fn opened(self, says: bool) -> Result<Option<SharedImageStages<f32>>> {
-        use pocketsplat_trainer::gpu::{AdapterKind, Gpu, GpuImage, choose};
+    fn opened(self, says: bool) -> Result<Option<SharedDevice<f32>>> {
+        use pocketsplat_trainer::gpu::{AdapterKind, Gpu, GpuStep, choose};
         use std::sync::{Arc, Mutex};
 
         let adapter = match self {
@@ -100,11 +100,11 @@ impl DeviceChoice {
             }
         }
         let Some(adapter) = adapter else { return Ok(None) };
-        Ok(Some(Arc::new(Mutex::new(GpuImage::new(&Gpu::open(&adapter)?)?))))
+        Ok(Some(Arc::new(Mutex::new(GpuStep::new(&Gpu::open(&adapter)?)?))))
     }
 
     #[cfg(not(feature = "gpu"))]
-    fn opened(self, _says: bool) -> Result<Option<SharedImageStages<f32>>> {
+    fn opened(self, _says: bool) -> Result<Option<SharedDevice<f32>>> {
         match self {
             Self::Cpu | Self::Auto => Ok(None),
             Self::Gpu(_) => anyhow::bail!(

@@ -7,7 +7,7 @@ use std::time::Instant;
 use anyhow::Result;
 use pocketsplat_capture::dataset::{Capture, PointsOrigin};
 use pocketsplat_trainer::effects::PILOTS_TIME_SHARE;
-use pocketsplat_trainer::step::SharedImageStages;
+use pocketsplat_trainer::step::SharedDevice;
 use pocketsplat_trainer::train::{TrainConfig, Trainer};
 
 use super::process::{machine_memory_bytes, peak_memory_bytes};
@@ -146,7 +146,7 @@ impl Estimate {
         capture: &Capture,
         config: &TrainConfig,
         with_pilots: bool,
-        device: Option<SharedImageStages<f32>>,
+        device: Option<SharedDevice<f32>>,
         stop: &AtomicBool,
     ) -> Result<Warned> {
         let (mut estimate, expected) = Self::measured(capture, config, device, stop)?;
@@ -166,7 +166,7 @@ impl Estimate {
     pub(super) fn measured(
         capture: &Capture,
         config: &TrainConfig,
-        device: Option<SharedImageStages<f32>>,
+        device: Option<SharedDevice<f32>>,
         stop: &AtomicBool,
     ) -> Result<(Self, Expected)> {
         let mut trainer = Trainer::new(capture, *config)?;

@@ -18,7 +18,7 @@ use pocketsplat_instructions::level::{Bound, Level, Profile};
 use pocketsplat_trainer::device::Limits;
 use pocketsplat_trainer::effects::Effect;
 use pocketsplat_trainer::encode::{Encoding, Fitted, Scale};
-use pocketsplat_trainer::step::SharedImageStages;
+use pocketsplat_trainer::step::SharedDevice;
 use pocketsplat_trainer::train::finish::Finished;
 use pocketsplat_trainer::train::gauge::Gauge;
 use pocketsplat_trainer::train::run::{Ending, Interval, RunError, RunFolder, fork, photographs_in, shell_word};
@@ -320,7 +320,7 @@ pub(crate) fn train_in<'a>(
     config: &RunConfig,
     capture: &'a Capture,
     start: Start<'a>,
-    device: Option<SharedImageStages<f32>>,
+    device: Option<SharedDevice<f32>>,
     stop: &AtomicBool,
 ) -> Result<Option<TrainResult>> {
     let mut folder = folder.forking_at(&config.fork_at);
@@ -377,7 +377,7 @@ fn resumed<'a>(
     folder: &RunFolder,
     config: &RunConfig,
     capture: &'a Capture,
-    device: Option<SharedImageStages<f32>>,
+    device: Option<SharedDevice<f32>>,
 ) -> Result<Trainer<'a>> {
     let Some(resumed) = folder.resume(capture)? else {
         eprintln!("the run in {} has no checkpoint yet; it begins anew", folder.path().display());

@@ -9,7 +9,7 @@ use pocketsplat_instructions::level::{Bound, Level};
 use pocketsplat_trainer::device::{Limits, ModelChoice, Processor, choose};
 use pocketsplat_trainer::effects::Price;
 use pocketsplat_trainer::explicit::CloudConfig;
-use pocketsplat_trainer::step::SharedImageStages;
+use pocketsplat_trainer::step::SharedDevice;
 use pocketsplat_trainer::train::config::Backbone;
 
 use super::devices::DeviceChoice;
@@ -222,7 +222,7 @@ impl Args {
     }
 
     /// The GPU that draws and compares images, where one is asked for or found; says on stderr which.
-    pub(crate) fn device(&self) -> Result<Option<SharedImageStages<f32>>> {
+    pub(crate) fn device(&self) -> Result<Option<SharedDevice<f32>>> {
         self.draws_on.open()
     }
 

@@ -7,6 +7,7 @@
 //! give others, within bounds that each kernel's test states.
 
 mod adapter;
+mod anchors;
 mod buffer;
 mod error;
 #[expect(clippy::module_inception, reason = "the device, which the folder is named for")]
@@ -17,13 +18,15 @@ pub mod ops;
 #[cfg(test)]
 mod parity;
 mod records;
+mod scene;
+mod step;
 
 pub use adapter::{Adapter, AdapterKind, adapters, choose};
 pub use buffer::{Bind, Buffer};
 pub use error::GpuError;
 pub use gpu::Gpu;
-pub use image::GpuImage;
 pub use kernel::{Commands, Kernel};
+pub use step::GpuStep;
 
 /// Threads of a workgroup: 16×16 pixels, and what every adapter takes.
 pub const GROUP_THREADS: usize = 256;

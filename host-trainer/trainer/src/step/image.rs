@@ -1,8 +1,8 @@
 //! The stages of a step between splats and the image's loss, on the CPU or on another device.
 
-use std::error::Error;
 use std::fmt;
 
+use super::fault::DeviceFault;
 use super::target::clear_masked;
 use super::{ImagePair, LossWeights, TargetView};
 use crate::ops::project::{Footprint, Splat};
@@ -11,18 +11,6 @@ use crate::ops::simd::Level;
 use crate::ops::tiles::TileLists;
 use crate::ops::{l1, rasterise, ssim, tiles};
 use crate::real::Real;
-
-/// Why a device did not finish a step; nothing of the scene has changed.
-#[derive(Debug, thiserror::Error)]
-#[error(transparent)]
-pub struct DeviceFault(Box<dyn Error + Send + Sync>);
-
-impl DeviceFault {
-    /// From what the device says.
-    pub fn new(fault: impl Error + Send + Sync + 'static) -> Self {
-        Self(Box::new(fault))
-    }
-}
 
 /// What the comparison with the photograph found.
 #[derive(Clone, Copy, Debug)]
@@ -40,9 +28,6 @@ pub type ImageTerm<'t, R> = dyn FnMut(&ImagePair<'_, R>, &mut [R]) -> R + 't;
 
 /// Tiles, rasterising, L1 and SSIM of one view, called in this order; all state is of the view that was drawn last.
 pub trait ImageStages<R>: fmt::Debug + Send {
-    /// What computes: in words.
-    fn name(&self) -> String;
-
     /// Lists the splats of each tile. Returns the number of (tile, splat) pairs.
     ///
     /// * `splats`, `footprints`: `[n]`.
@@ -118,10 +103,6 @@ impl<R: Real> CpuImage<R> {
 }
 
 impl<R: Real> ImageStages<R> for CpuImage<R> {
-    fn name(&self) -> String {
-        format!("CPU, {}", self.level)
-    }
-
     fn bin(
         &mut self,
         splats: Vec<Splat<R>>,

@@ -7,7 +7,7 @@ use super::coding::Phase;
 use crate::ops::noise::Stream;
 use crate::ops::simd::Level;
 use crate::real::Real;
-use crate::scene::Scene;
+use crate::scene::{ModelShape, Scene};
 
 /// Weights of the loss (Scaffold-GS, eq. 10).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -87,8 +87,25 @@ pub struct ImagePair<'a, R> {
     pub level: Level,
 }
 
+/// Terms that a device computes itself; a weight of 0 is none.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DeviceTerms {
+    /// Weight of [`high_pass`](crate::ops::high_pass).
+    pub high_pass: f64,
+    /// Opacity that a Gaussian should have on average, and the weight of [`opacity_target`](crate::ops::opacity_target).
+    pub opacity_target: [f64; 2],
+    /// Divergence and spread of [`normality`](crate::ops::normality) of the raw features.
+    pub normality: [f64; 2],
+}
+
 /// What a module adds to the loss of a step: each function returns its terms and adds their gradients.
 pub trait Terms<R: Real>: Sync {
+    /// Writes the terms of this step as devices know them; `false` where it has one that only the functions below compute, so that such a
+    /// step has its anchors on the CPU.
+    fn on_device(&self, _at: &StepInfo, _shape: &ModelShape, _terms: &mut DeviceTerms) -> bool {
+        false
+    }
+
     /// Whether [`Self::on_image`] has a term: for a device this costs two copies of the image.
     fn is_on_image(&self) -> bool {
         false

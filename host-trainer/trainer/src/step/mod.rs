@@ -5,10 +5,12 @@ mod buffer;
 mod coded;
 pub mod coding;
 mod context;
+mod fault;
 mod image;
 mod loss;
 pub mod parents;
 mod probe;
+mod resident;
 mod stages;
 mod target;
 
@@ -29,11 +31,13 @@ use coded::{Network, Weights};
 pub use coding::Phase;
 use coding::{Coding, RateReport};
 pub use context::ContextGradients;
+pub use fault::DeviceFault;
 use image::CpuImage;
-pub use image::{DeviceFault, ImageLoss, ImageStages, ImageTerm};
-pub use loss::{ImagePair, Loss, LossWeights, StepInfo, Terms};
+pub use image::{ImageLoss, ImageStages, ImageTerm};
+pub use loss::{DeviceTerms, ImagePair, Loss, LossWeights, StepInfo, Terms};
 use parents::Parents;
 pub use probe::ImageError;
+pub use resident::{GroupSteps, Resident, ResidentStep, StepDevice, Trained, TrainedMut};
 pub use stages::StageSeconds;
 use stages::StageTimer;
 pub(crate) use target::clear_masked;
@@ -70,8 +74,8 @@ struct DrawnView<R> {
     footprints: Vec<Footprint<R>>,
 }
 
-/// What else than this CPU computes the stages between splats and the loss; steps take turns.
-pub type SharedImageStages<R> = Arc<Mutex<dyn ImageStages<R>>>;
+/// A device that several steps use in turns.
+pub type SharedDevice<R> = Arc<Mutex<dyn StepDevice<R>>>;
 
 /// Splats of a view, and the time that they took.
 struct SplatsOfView<R> {
@@ -84,7 +88,7 @@ struct SplatsOfView<R> {
 #[derive(Clone, Debug)]
 pub struct Workspace<R> {
     level: Level,
-    device: Option<SharedImageStages<R>>,
+    device: Option<SharedDevice<R>>,
     blocks: Vec<Block<R>>,
     n_blocks: usize,
     /// dL/d(heads).
@@ -119,8 +123,13 @@ impl<R: Real> Workspace<R> {
     }
 
     /// Has [`Self::step`] compute the stages between splats and the loss with `device`, or on the CPU again.
-    pub fn set_device(&mut self, device: Option<SharedImageStages<R>>) {
+    pub fn set_device(&mut self, device: Option<SharedDevice<R>>) {
         self.device = device;
+    }
+
+    /// What else than the CPU computes.
+    pub fn device(&self) -> Option<&SharedDevice<R>> {
+        self.device.as_ref()
     }
 
     /// What else than the CPU computes, in words.
@@ -288,7 +297,7 @@ impl<R: Real> Workspace<R> {
         match self.device.clone() {
             Some(device) => {
                 let mut device = device.lock().unwrap_or_else(PoisonError::into_inner);
-                self.step_with(&mut *device, scene, target, loss, coding)
+                self.step_with(device.images(), scene, target, loss, coding)
             }
             None => self.step_with(&mut CpuImage::new(self.level), scene, target, loss, coding),
         }

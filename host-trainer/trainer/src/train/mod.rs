@@ -15,6 +15,7 @@ pub mod optimiser;
 mod outcome;
 mod probing;
 pub(crate) mod read_ahead;
+mod resident;
 pub mod run;
 pub mod statistics;
 pub mod steering;
@@ -41,7 +42,8 @@ use crate::ops::Pinhole;
 use crate::ops::noise::Stream;
 use crate::scene::init::initial_scene;
 use crate::scene::{Anchors, Heads, Scene};
-use crate::step::{Loss, Phase, SharedImageStages, StepInfo, TargetView, Workspace, image_of_planes};
+use crate::step::coding::Coding;
+use crate::step::{Loss, Phase, SharedDevice, StepInfo, StepReport, TargetView, Workspace, image_of_planes};
 use checkpoint::{CaptureSignature, Kernels};
 use coding::Integers;
 use config::{Backbone, Densification, Rates};
@@ -50,9 +52,10 @@ use module::{AnchorChange, RunView};
 use optimiser::Optimiser;
 use pocketsplat_capture::dataset::{Capture, Image, Photograph, View};
 use read_ahead::ReadAhead;
+use resident::Place;
 use statistics::Statistics;
 use survey::Survey;
-use watchdog::Watchdog;
+use watchdog::{Cause, Watchdog};
 
 /// Length of the published runs, iterations.
 const PUBLISHED_ITERATIONS: f64 = 30_000.0;
@@ -69,7 +72,7 @@ pub struct Trainer<'a> {
     background: [f32; 3],
     /// Iterations done.
     pub iteration: u32,
-    /// The scene as it stands.
+    /// The scene as it stands; on a device, as it stood when [`Self::fetch`] was called last.
     pub scene: Scene<f32>,
     /// Wall-clock seconds spent in iterations.
     pub seconds: f64,
@@ -85,6 +88,7 @@ pub struct Trainer<'a> {
     /// Views left of the current pass over the capture, taken from the end.
     queue: Vec<u32>,
     workspace: Workspace<f32>,
+    place: Place,
     photographs: ReadAhead,
 }
 
@@ -133,6 +137,7 @@ impl<'a> Trainer<'a> {
             optimiser: Optimiser::new(&scene),
             statistics: Statistics::default(),
             workspace: Workspace::new(&config.shape),
+            place: Place::Host,
             photographs: ReadAhead::default(),
             queue: Vec::new(),
             rng: ChaCha8Rng::seed_from_u64(config.seed),
@@ -173,12 +178,14 @@ impl<'a> Trainer<'a> {
         let kernels = Kernels::of_this_machine(self.workspace.level());
         match self.workspace.device_name() {
             None => kernels,
-            Some(device) => Kernels { description: format!("{}, images {device}", kernels.description), ..kernels },
+            Some(device) => Kernels { description: format!("{} with {device}", kernels.description), ..kernels },
         }
     }
 
-    /// Has the stages between splats and the loss computed by `device`, or on the CPU again.
-    pub fn set_device(&mut self, device: Option<SharedImageStages<f32>>) {
+    /// Has steps computed by `device`, or on the CPU again; between runs, or after [`Self::fetch`].
+    ///
+    /// A device holds the scene of one run at a time.
+    pub fn set_device(&mut self, device: Option<SharedDevice<f32>>) {
         self.workspace.set_device(device);
     }
 
@@ -225,6 +232,10 @@ impl<'a> Trainer<'a> {
 
     fn iterate(&mut self) -> Result<Outcome, TrainError> {
         self.iteration += 1;
+        let phase = self.config.phase(self.iteration);
+        if phase == Phase::IntegerModel || (phase == Phase::Context && self.scene.context.is_none()) {
+            self.take_back()?;
+        }
         self.begin_context();
         if self.queue.is_empty() {
             self.queue.clone_from(&self.trained);
@@ -232,8 +243,9 @@ impl<'a> Trainer<'a> {
         }
         let photograph = self.photographs.photograph(&self.capture.train, self.queue.iter().rev().copied())?;
         let index = self.queue.pop().expect("refilled above") as usize;
-        let target = target(&photograph, &self.cameras[index], self.background).numbered(index);
-        let integers = match self.config.phase(self.iteration) {
+        let camera = self.cameras[index];
+        let target = target(&photograph, &camera, self.background).numbered(index);
+        let integers = match phase {
             Phase::IntegerModel => Some(Integers::of(&self.scene)?),
             _ => None,
         };
@@ -245,12 +257,17 @@ impl<'a> Trainer<'a> {
         let loss = Loss { weights: self.config.loss, modules: Some((&terms, &at)), pruned_share };
         // Drawn with the heads as they are written; the gradients move the weights behind them (straight through).
         let behind = integers.as_ref().map(|integers| mem::replace(&mut self.scene.heads, integers.heads.clone()));
-        let report = self.workspace.try_step(&self.scene, &target, &loss, &coding);
+        let on_device = self.steps_on_device(&loss, &coding);
+        let stepped = if on_device {
+            self.step_on_device(&target, &loss, &coding)
+        } else {
+            self.step_here(&target, &loss, &coding)
+        };
         if let Some(heads) = behind {
             self.scene.heads = heads;
         }
-        let report = report?;
-        if let Some(cause) = watchdog::inspect(&self.scene, &target, self.background, &self.workspace, &report) {
+        let (report, cause) = stepped?;
+        if let Some(cause) = cause {
             let dropped =
                 DroppedStep { iteration: self.iteration, view: self.capture.train[index].name.clone(), cause };
             return if self.watchdog.dropped() {
@@ -263,14 +280,22 @@ impl<'a> Trainer<'a> {
         // The published loop leaves the parameters of its last iteration as they are.
         if self.iteration < self.config.iterations {
             let progress = f64::from(self.iteration) / f64::from(self.config.iterations);
-            let rates = self.rates();
-            self.optimiser.apply(&mut self.scene, &self.workspace, &rates, progress, self.capture.extent);
+            if on_device {
+                self.move_on_device(progress)?;
+            } else {
+                let rates = self.rates();
+                self.optimiser.apply(&mut self.scene, &self.workspace, &rates, progress, self.capture.extent);
+            }
             if self.config.learns_background {
-                let rate = rates.background.at(progress);
+                let rate = self.config.rates.background.at(progress);
                 self.optimiser.apply_to_background(&mut self.background, &self.workspace, rate);
             }
         }
-        self.densify();
+        self.densify(on_device)?;
+        let ends_growth = self.iteration == self.config.iteration_at(self.config.densification.until);
+        if ends_growth || self.is_done() || modules.each().iter().any(|module| module.is_due(&at)) {
+            self.take_back()?;
+        }
         self.keep_the_best();
         self.rank_for_levels();
         let mut fit = None;
@@ -288,6 +313,19 @@ impl<'a> Trainer<'a> {
             }
         }
         Ok(Outcome { report, dropped: None, fit })
+    }
+
+    /// A step of the scene as it stands here, and what is wrong with it.
+    fn step_here(
+        &mut self,
+        target: &TargetView<'_, f32>,
+        loss: &Loss<'_, f32>,
+        coding: &Coding<'_, f32>,
+    ) -> Result<(StepReport<f32>, Option<Cause>), TrainError> {
+        self.take_back()?;
+        let report = self.workspace.try_step(&self.scene, target, loss, coding)?;
+        let cause = watchdog::inspect(&self.scene, target, self.background, &self.workspace, &report);
+        Ok((report, cause))
     }
 
     /// What modules are told of this iteration.
@@ -344,22 +382,28 @@ impl<'a> Trainer<'a> {
         Rates { mask: self.config.rates.mask.times(factor), ..self.config.rates }
     }
 
-    /// Statistics of the step in the workspace, and growth and pruning when they are due.
-    fn densify(&mut self) {
+    /// Statistics of the step, and growth and pruning when they are due.
+    fn densify(&mut self, on_device: bool) -> Result<(), TrainError> {
         let settings = self.config.densification;
         let until = self.config.iteration_at(settings.until);
         let from = self.config.iteration_at(settings.statistics_from);
         if self.iteration >= until || self.iteration <= from || self.config.pauses_at(self.iteration) {
-            return;
+            return Ok(());
         }
-        self.statistics.add(&self.workspace, self.config.shape.n_offsets);
+        if on_device {
+            self.count_on_device()?;
+        } else {
+            self.statistics.add(&self.workspace, self.config.shape.n_offsets);
+        }
         let due = self.iteration.is_multiple_of(settings.interval);
         if due && self.iteration > self.config.iteration_at(settings.from) {
+            self.take_back()?;
             let Self { scene, optimiser, statistics, rng, .. } = self;
             let coarsest_cells = self.config.coarsest_cells_for(self.capture);
             densify::grow(scene, optimiser, statistics, &settings, coarsest_cells, rng);
             densify::prune(scene, optimiser, statistics, &settings);
         }
+        Ok(())
     }
 
     /// When growth ends: drops all but the anchors that contribute most to the training views, where a number is set.
@@ -397,10 +441,14 @@ impl<'a> Trainer<'a> {
     }
 
     /// The current scene's image of a view, 8 bit.
-    pub fn draw(&mut self, view: &View) -> Image {
+    ///
+    /// # Errors
+    /// As [`Self::fetch`].
+    pub fn draw(&mut self, view: &View) -> Result<Image, TrainError> {
+        self.fetch()?;
         let camera = Pinhole::new(&view.camera);
         let planes = self.workspace.image(&self.scene, &camera, self.background);
-        image_of_planes(&planes, camera.size_px)
+        Ok(image_of_planes(&planes, camera.size_px))
     }
 }
 

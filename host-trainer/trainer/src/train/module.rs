@@ -171,6 +171,11 @@ pub trait Module: Terms<f32> + Terms<f64> + Debug {
         shape
     }
 
+    /// Whether [`Self::event`] has something to do after this iteration: a scene that stands on a device is fetched for it.
+    fn is_due(&self, _at: &StepInfo) -> bool {
+        true
+    }
+
     /// What becomes of the anchors after an iteration, when its time has come.
     ///
     /// # Errors

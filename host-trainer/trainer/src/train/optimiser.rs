@@ -7,7 +7,7 @@ use super::config::Rates;
 use crate::ops::adam::{self, Moments, Step};
 use crate::real::Real;
 use crate::scene::{Anchors, ContextModel, ContextNetwork, Heads, ModelShape, Scene};
-use crate::step::{Block, Workspace};
+use crate::step::{Block, GroupSteps, Workspace};
 
 /// Anchors one task updates.
 const ROWS: usize = 2048;
@@ -55,7 +55,8 @@ impl<R: Real> ContextMoments<R> {
 /// One parameter array of the anchors with its moments, cut into tasks.
 struct Group<'a, R> {
     width: usize,
-    step: Step<R>,
+    /// `None` where it stays.
+    step: Option<Step<R>>,
     parameters: &'a mut [R],
     moments: &'a mut Moments<R>,
     gradient: fn(&Block<R>) -> &[R],
@@ -90,16 +91,32 @@ impl<R: Real> Optimiser<R> {
         *background = background.map(|channel| channel.larger(R::ZERO).smaller(R::ONE));
     }
 
-    /// Moves every parameter by the gradients that the last step left in `workspace`.
+    /// Begins the next step: how far it moves anchors and heads.
     ///
     /// Mask logits move only where their rate is above 0.
     ///
     /// * `progress`: share of the run that is done, 0 to 1. * `extent`: of the capture; scales the rates of the offsets and
     ///   of their masks.
-    pub fn apply(&mut self, scene: &mut Scene<R>, workspace: &Workspace<R>, rates: &Rates, progress: f64, extent: f64) {
+    pub fn next(&mut self, rates: &Rates, progress: f64, extent: f64) -> GroupSteps<R> {
         self.n_steps += 1;
-        let t = self.n_steps;
-        let step = |rate: f64| Step::new(rate, t);
+        let step = |rate: f64| Step::new(rate, self.n_steps);
+        let mask_rate = rates.mask.at(progress) * extent;
+        // The detail head goes on with colours, at their rate.
+        let of_heads = [rates.opacity_head, rates.covariance_head, rates.colour_head, rates.colour_head];
+        GroupSteps {
+            anchors: [
+                Some(step(rates.feature.at(progress))),
+                Some(step(rates.log_scale.at(progress))),
+                Some(step(rates.offset.at(progress) * extent)),
+                (mask_rate > 0.0).then(|| step(mask_rate)),
+            ],
+            heads: of_heads.iter().map(|rate| step(rate.at(progress))).collect(),
+        }
+    }
+
+    /// Moves every parameter by the gradients that the last step left in `workspace`; see [`Self::next`].
+    pub fn apply(&mut self, scene: &mut Scene<R>, workspace: &Workspace<R>, rates: &Rates, progress: f64, extent: f64) {
+        let steps = self.next(rates, progress, extent);
         // Where the gradient of each anchor lies: block and row, or nowhere for an anchor that the view did not see.
         let mut gradient_of = vec![(u32::MAX, 0u32); scene.anchors.len()];
         for (b, block) in (0u32..).zip(workspace.blocks()) {
@@ -108,57 +125,46 @@ impl<R: Real> Optimiser<R> {
             }
         }
         let Scene { anchors, heads, shape, context, .. } = scene;
-        let mask_rate = rates.mask.at(progress) * extent;
+        let [feature, log_scale, offset, mask] = steps.anchors;
         let groups = [
             Group {
                 width: shape.feature_dim,
-                step: step(rates.feature.at(progress)),
+                step: feature,
                 parameters: &mut anchors.features,
                 moments: &mut self.features,
                 gradient: |b| &b.d_features,
             },
             Group {
                 width: shape.n_log_scales(),
-                step: step(rates.log_scale.at(progress)),
+                step: log_scale,
                 parameters: &mut anchors.log_scales,
                 moments: &mut self.log_scales,
                 gradient: |b| &b.d_log_scales,
             },
             Group {
                 width: 3 * shape.n_offsets,
-                step: step(rates.offset.at(progress) * extent),
+                step: offset,
                 parameters: &mut anchors.offsets,
                 moments: &mut self.offsets,
                 gradient: |b| &b.d_offsets,
             },
             Group {
                 width: shape.n_offsets,
-                step: step(mask_rate),
+                step: mask,
                 parameters: &mut anchors.mask_logits,
                 moments: &mut self.mask_logits,
                 gradient: |b| &b.d_mask_logits,
             },
         ];
-        let n_moving = if mask_rate > 0.0 { groups.len() } else { groups.len() - 1 };
-        for group in groups.into_iter().take(n_moving) {
+        for group in groups {
             group.update(workspace, &gradient_of);
         }
 
-        // The detail head goes on with colours, at their rate.
-        let first = [rates.opacity_head, rates.covariance_head, rates.colour_head];
-        let of_detail = heads.detail.as_ref().map(|_| rates.colour_head);
-        let head_rates = first.into_iter().chain(of_detail);
         let [first, second] = &mut self.heads;
         let moments = first.each_mut().zip(second.each_mut());
-        let all = heads.each_mut().zip(workspace.d_heads.each()).zip(moments).zip(head_rates);
-        for (((head, gradient), (first, second)), rate) in all {
-            update_groups(
-                step(rate.at(progress)),
-                head.groups_mut(),
-                gradient.groups(),
-                first.groups_mut(),
-                second.groups_mut(),
-            );
+        let all = heads.each_mut().zip(workspace.d_heads.each()).zip(moments).zip(steps.heads);
+        for (((head, gradient), (first, second)), step) in all {
+            update_groups(step, head.groups_mut(), gradient.groups(), first.groups_mut(), second.groups_mut());
         }
         if let (Some(model), Some(gradient), Some(moments)) = (context, &workspace.d_context, &mut self.context) {
             moments.n_steps += 1;
@@ -226,6 +232,7 @@ fn update_groups<R: Real, const N: usize>(
 impl<R: Real> Group<'_, R> {
     fn update(self, workspace: &Workspace<R>, gradient_of: &[(u32, u32)]) {
         let Self { width, step, parameters, moments, gradient } = self;
+        let Some(step) = step else { return };
         let len = ROWS * width;
         parameters
             .par_chunks_mut(len)

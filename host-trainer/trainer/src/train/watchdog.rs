@@ -9,7 +9,7 @@ use crate::scene::{ContextNetwork, Heads, Scene};
 use crate::step::{Block, StepReport, TargetView, Workspace};
 
 /// Gradients above are refused like infinite ones: their squares would overflow in Adam's second moment.
-const LARGEST_GRADIENT: f32 = 1e18;
+pub(super) const LARGEST_GRADIENT: f32 = 1e18;
 
 /// Steps dropped in a row that a run survives. A single bad step has a passing cause; that many have one that stays.
 pub const MAX_DROPPED_IN_A_ROW: u32 = 100;

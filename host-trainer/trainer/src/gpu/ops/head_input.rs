@@ -61,7 +61,7 @@ impl HeadInput {
         commands.run_items(&self.forward, &parameters, &[features, positions, input], input.len());
     }
 
-    /// Copies the features' share of `d_input`, `[n, head_inputs]`, to `d_features`, `[n, F]`.
+    /// Adds the features' share of `d_input`, `[n, head_inputs]`, to `d_features`, `[n, F]`.
     pub fn backward(
         &self,
         commands: &mut Commands<'_>,
@@ -104,7 +104,7 @@ mod tests {
             cpu::backward(&shape, &d_input, &mut d_expected);
 
             let upload = |values: &[f32]| Buffer::upload(gpu, "test", values).expect("room");
-            let (input, d_features) = (upload(&vec![9.0; d_input.len()]), upload(&vec![9.0; features.len()]));
+            let (input, d_features) = (upload(&vec![9.0; d_input.len()]), upload(&vec![0.0; features.len()]));
             let mut commands = Commands::new(gpu);
             let (features, positions) = (upload(&features), upload(&positions));
             kernels.forward(&mut commands, &shape, &camera, &features, &positions, &input);

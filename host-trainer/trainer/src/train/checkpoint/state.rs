@@ -52,8 +52,11 @@ impl<'a> Trainer<'a> {
     /// Writes everything that the next iteration depends on; see [`crate::train::checkpoint`] for the format.
     ///
     /// # Errors
-    /// What `out` reports.
+    /// What `out` reports, and that something newer is on a device: [`Self::fetch`] comes first.
     pub fn save(&self, out: impl Write) -> io::Result<()> {
+        if !self.is_here() {
+            return Err(io::Error::other("the scene's parameters are on the device, and were not fetched"));
+        }
         let config = toml::to_string(&self.config).map_err(io::Error::other)?;
         let progress = (self.iteration, self.watchdog, [self.seconds, self.processor_seconds], &self.queue);
         let random = (self.rng.get_seed(), self.rng.get_stream(), self.rng.get_word_pos());

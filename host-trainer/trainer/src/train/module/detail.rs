@@ -6,7 +6,7 @@ use super::Module;
 use crate::ops::high_pass;
 use crate::real::Real;
 use crate::scene::ModelShape;
-use crate::step::{ImagePair, StepInfo, Terms};
+use crate::step::{DeviceTerms, ImagePair, StepInfo, Terms};
 use crate::train::config::{ConfigError, within};
 
 /// Adds a residual to each Gaussian's colour, H = x + F(x ⊕ f) (the plug-and-play paper, eq. 5; see [`crate::ops::detail`]).
@@ -37,9 +37,18 @@ impl Module for Detail {
     fn shape(&self, shape: ModelShape) -> ModelShape {
         ModelShape { detail_hidden: self.hidden, ..shape }
     }
+
+    fn is_due(&self, _at: &StepInfo) -> bool {
+        false
+    }
 }
 
 impl<R: Real> Terms<R> for Detail {
+    fn on_device(&self, _at: &StepInfo, _shape: &ModelShape, terms: &mut DeviceTerms) -> bool {
+        terms.high_pass += self.weight;
+        true
+    }
+
     fn is_on_image(&self) -> bool {
         self.weight > 0.0
     }

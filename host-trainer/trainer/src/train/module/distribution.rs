@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use super::Module;
 use crate::ops::normality::{ChannelMoments, Weights};
 use crate::real::Real;
-use crate::scene::Scene;
-use crate::step::{Block, StepInfo, Terms};
+use crate::scene::{ModelShape, Scene};
+use crate::step::{Block, DeviceTerms, StepInfo, Terms};
 use crate::train::config::{ConfigError, within};
 
 /// Pulls the features of each channel, over the anchors of a view, towards the standard normal distribution, and their
@@ -35,9 +35,28 @@ impl Module for Distribution {
         within("train.modules.distribution.divergence", self.divergence, 0.0, 1e3)?;
         within("train.modules.distribution.spread", self.spread, 0.0, 1e3)
     }
+
+    fn is_due(&self, _at: &StepInfo) -> bool {
+        false
+    }
+}
+
+impl Distribution {
+    /// Of a channel, of so many.
+    fn weights(&self, width: usize) -> [f64; 2] {
+        let share = 1.0 / width.max(1) as f64;
+        [self.divergence * share, self.spread * share]
+    }
 }
 
 impl<R: Real> Terms<R> for Distribution {
+    fn on_device(&self, at: &StepInfo, shape: &ModelShape, terms: &mut DeviceTerms) -> bool {
+        if at.scaled {
+            terms.normality = self.weights(shape.feature_dim);
+        }
+        true
+    }
+
     fn on_anchors(&self, at: &StepInfo, scene: &Scene<R>, blocks: &mut [Block<R>]) -> R {
         if !at.scaled {
             return R::ZERO;
@@ -49,8 +68,8 @@ impl<R: Real> Terms<R> for Distribution {
         };
         let features: Vec<Vec<R>> = blocks.par_iter().map(features_of).collect();
         let parts: Vec<&[R]> = features.iter().map(Vec::as_slice).collect();
-        let share = 1.0 / width.max(1) as f64;
-        let weights = Weights { divergence: R::real(self.divergence * share), spread: R::real(self.spread * share) };
+        let [divergence, spread] = self.weights(width).map(R::real);
+        let weights = Weights { divergence, spread };
         let moments = ChannelMoments::of(&parts, width);
         blocks.par_iter_mut().zip(&features).for_each(|(block, features)| {
             moments.backward(&weights, features, &mut block.d_features);

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 use super::{AnchorChange, Module, RunView};
 use crate::ops::opacity_target::forward_backward;
 use crate::real::Real;
-use crate::scene::Scene;
-use crate::step::{Block, StepInfo, Terms};
+use crate::scene::{ModelShape, Scene};
+use crate::step::{Block, DeviceTerms, StepInfo, Terms};
 use crate::train::TrainError;
 use crate::train::config::{ConfigError, within};
 
@@ -146,6 +146,10 @@ impl Module for Pruning {
         within("train.modules.pruning.rate", self.rate, 0.0, most)
     }
 
+    fn is_due(&self, at: &StepInfo) -> bool {
+        at.is_at(self.at)
+    }
+
     fn event(&self, at: &StepInfo, run: &RunView<'_>) -> Result<Option<AnchorChange>, TrainError> {
         if !at.is_at(self.at) || run.scene().anchors.is_empty() {
             return Ok(None);
@@ -182,6 +186,13 @@ impl Module for Pruning {
 }
 
 impl<R: Real> Terms<R> for Pruning {
+    fn on_device(&self, at: &StepInfo, _shape: &ModelShape, terms: &mut DeviceTerms) -> bool {
+        if at.is_after(self.from) {
+            terms.opacity_target = [self.beta, self.weight];
+        }
+        true
+    }
+
     fn on_gaussians(&self, at: &StepInfo, scene: &Scene<R>, blocks: &mut [Block<R>]) -> R {
         if self.weight == 0.0 || !at.is_after(self.from) {
             return R::ZERO;

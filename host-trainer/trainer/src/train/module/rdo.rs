@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{AnchorChange, Module, RunView};
 use crate::real::Real;
-use crate::step::{StepInfo, Terms};
+use crate::scene::ModelShape;
+use crate::step::{DeviceTerms, StepInfo, Terms};
 use crate::train::TrainError;
 use crate::train::config::{ConfigError, within};
 use crate::train::steering::{REWEIGHED_AT, fit, reweighed};
@@ -102,6 +103,10 @@ impl Module for Rdo {
         within("train.modules.rdo.events", f64::from(self.events), 1.0, 100.0)
     }
 
+    fn is_due(&self, at: &StepInfo) -> bool {
+        self.shares().chain(REWEIGHED_AT).any(|share| at.is_at(share))
+    }
+
     fn event(&self, at: &StepInfo, run: &RunView<'_>) -> Result<Option<AnchorChange>, TrainError> {
         let shares: Vec<f64> = self.shares().collect();
         let Some(event) = shares.iter().position(|share| at.is_at(*share)) else {
@@ -139,7 +144,11 @@ impl Module for Rdo {
     }
 }
 
-impl<R: Real> Terms<R> for Rdo {}
+impl<R: Real> Terms<R> for Rdo {
+    fn on_device(&self, _at: &StepInfo, _shape: &ModelShape, _terms: &mut DeviceTerms) -> bool {
+        true
+    }
+}
 
 #[cfg(test)]
 mod tests {

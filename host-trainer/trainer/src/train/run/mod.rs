@@ -225,6 +225,7 @@ impl RunFolder {
             let due = due || self.forks_at.contains(&run.iteration());
             if (ends || due) && saved_iteration != Some(run.iteration()) {
                 let started = Instant::now();
+                run.fetch()?;
                 self.save(run)?;
                 write_s = started.elapsed().as_secs_f64();
                 (saved_at, saved_iteration) = (Instant::now(), Some(run.iteration()));
@@ -233,6 +234,9 @@ impl RunFolder {
                 return Ok(if is_done(run) { Ending::Finished } else { Ending::Interrupted });
             }
             let step = advance(run)?;
+            if log.is_due(run) {
+                run.fetch()?;
+            }
             log.add(run, &step)?;
         }
     }

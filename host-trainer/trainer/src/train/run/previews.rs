@@ -55,7 +55,7 @@ impl Previews {
             return Ok(());
         }
         let Some(view) = view_of(trainer) else { return Ok(()) };
-        let picture = trainer.draw(view);
+        let picture = trainer.draw(view)?;
         let path = self.folder.join(format!("{:08}.jpg", trainer.iteration));
         let bytes = picture.to_jpeg().map_err(|error| RunError::io("write", &path, std::io::Error::other(error)))?;
         files::write_whole(&path, |out| out.write_all(&bytes))

@@ -71,6 +71,11 @@ impl ProgressLog {
         Ok(Self { path, file, every, loss: 0.0, psnr_db: 0.0, n: 0, bits: [0.0; 3], n_sampled: 0 })
     }
 
+    /// Whether the run's last iteration ends a row.
+    pub fn is_due(&self, run: &impl Resumable) -> bool {
+        run.iteration().is_multiple_of(self.every) || run.iteration() >= run.iterations()
+    }
+
     /// Adds an iteration.
     ///
     /// # Errors
@@ -87,7 +92,7 @@ impl ProgressLog {
             }
         }
         let iteration = run.iteration();
-        if !iteration.is_multiple_of(self.every) && iteration < run.iterations() {
+        if !self.is_due(run) {
             return Ok(());
         }
         let means = match self.n {

@@ -2,6 +2,7 @@
 
 use std::io::{self, Write};
 
+use super::RunError;
 use crate::train::Trainer;
 
 /// A run that is kept in checkpoints and goes on from them to the same bits.
@@ -16,6 +17,13 @@ pub trait Resumable {
     fn n_dropped(&self) -> u32;
     /// Of the scene: its anchors, and the Gaussians that it may draw.
     fn size(&self) -> [usize; 2];
+    /// Has everything at hand that [`Self::size`] and [`Self::save`] tell of, where it is on a device.
+    ///
+    /// # Errors
+    /// What keeps it there.
+    fn fetch(&mut self) -> Result<(), RunError> {
+        Ok(())
+    }
     /// Writes everything that the next iteration depends on.
     ///
     /// # Errors
@@ -43,6 +51,10 @@ impl Resumable for Trainer<'_> {
     fn size(&self) -> [usize; 2] {
         let anchors = &self.scene.anchors;
         [anchors.len(), (0..anchors.mask_logits.len()).filter(|offset| anchors.is_drawn(*offset)).count()]
+    }
+
+    fn fetch(&mut self) -> Result<(), RunError> {
+        Ok(self.fetch()?)
     }
 
     fn save(&self, out: &mut dyn Write) -> io::Result<()> {

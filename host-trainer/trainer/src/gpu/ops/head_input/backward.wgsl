@@ -10,6 +10,6 @@ fn backward(
     let i = item_of(group, n_groups, thread);
     let row = i / parameters.feature_dim;
     if row < parameters.n_rows {
-        d_features[i] = d_input[row * parameters.n_inputs + (i - row * parameters.feature_dim)];
+        d_features[i] += d_input[row * parameters.n_inputs + (i - row * parameters.feature_dim)];
     }
 }

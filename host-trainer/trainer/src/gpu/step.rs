@@ -1,0 +1,322 @@
+//! A step of a scene that stays on the GPU: the list of `step/mod.rs`.
+
+use std::time::Instant;
+
+use super::anchors::GpuAnchors;
+use super::image::{FIRST_FREE_TOTAL, GpuImage};
+use super::ops::adam::Adam;
+use super::ops::gather::Gather;
+use super::ops::normality::Normality;
+use super::ops::opacity_target::OpacityTarget;
+use super::ops::sound::Sound;
+use super::ops::statistics::{Slots, Statistics};
+use super::ops::volume::Volume;
+use super::scene::{DeviceScene, FEATURES};
+use super::{Bind, Buffer, Commands, Gpu, GpuError};
+use crate::ops::normality::Weights;
+use crate::ops::opacity_target;
+use crate::scene::ModelShape;
+use crate::step::coding::Coding;
+use crate::step::{
+    DeviceFault, DeviceTerms, GroupSteps, ImageStages, Loss, Resident, ResidentStep, StageSeconds, StepDevice,
+    StepReport, TargetView, Trained, TrainedMut,
+};
+
+/// Places of sums beside the image's: volume and number of Gaussians, opacities, high frequencies.
+const VOLUME: usize = FIRST_FREE_TOTAL;
+const OPACITIES: usize = VOLUME + 2;
+const HIGH_FREQUENCIES: usize = OPACITIES + 1;
+/// Places of the counters: gradients that are not sound, and splats.
+const UNSOUND: usize = 0;
+const SPLATS: usize = 1;
+
+/// A GPU that training runs on: images of splats from the CPU, or whole steps of a scene that it holds.
+#[derive(Debug)]
+pub struct GpuStep {
+    gpu: Gpu,
+    images: GpuImage,
+    anchors: GpuAnchors,
+    volume: Volume,
+    opacity_target: OpacityTarget,
+    normality: Normality,
+    gather: Gather,
+    sound: Sound,
+    statistics: Statistics,
+    adam: Adam,
+    raw_features: Buffer<f32>,
+    counters: Buffer<u32>,
+    size_px: [usize; 2],
+    scene: Option<DeviceScene>,
+}
+
+/// Reads the seconds since the last reading, once the device has come so far.
+struct Laps<'g>(&'g Gpu, Instant);
+
+impl Laps<'_> {
+    fn lap(&mut self) -> Result<f64, GpuError> {
+        self.0.wait()?;
+        let now = Instant::now();
+        Ok(now.duration_since(std::mem::replace(&mut self.1, now)).as_secs_f64())
+    }
+}
+
+impl GpuStep {
+    /// Compiles all kernels.
+    ///
+    /// # Errors
+    /// [`GpuError`].
+    pub fn new(gpu: &Gpu) -> Result<Self, GpuError> {
+        let made = Self {
+            images: GpuImage::new(gpu)?,
+            anchors: GpuAnchors::new(gpu)?,
+            volume: Volume::new(gpu)?,
+            opacity_target: OpacityTarget::new(gpu)?,
+            normality: Normality::new(gpu)?,
+            gather: Gather::new(gpu),
+            sound: Sound::new(gpu),
+            statistics: Statistics::new(gpu),
+            adam: Adam::new(gpu),
+            raw_features: Buffer::zeros(gpu, "features of the view", 1)?,
+            counters: Buffer::zeros(gpu, "counters", 2)?,
+            size_px: [0; 2],
+            scene: None,
+            gpu: gpu.clone(),
+        };
+        gpu.check()?;
+        Ok(made)
+    }
+
+    fn step_with(
+        &mut self,
+        target: &TargetView<'_, f32>,
+        loss: &Loss<'_, f32>,
+        coding: &Coding<'_, f32>,
+        limit: f32,
+    ) -> Result<ResidentStep<f32>, GpuError> {
+        let Self { gpu, images, anchors, scene, .. } = self;
+        let (gpu, scene) = (gpu.clone(), scene.as_ref().expect("loaded before"));
+        let mut laps = Laps(&gpu, Instant::now());
+        let mut stages = StageSeconds::default();
+        let camera = target.camera;
+        self.size_px = camera.size_px;
+        let n = anchors.look(&gpu, scene, camera, loss.pruned_share)?;
+        let n_slots = n * scene.shape.n_offsets;
+        images.splats.fit(&gpu, n_slots)?;
+        images.footprints.fit(&gpu, n_slots)?;
+
+        let mut commands = Commands::new(&gpu);
+        if let Coding::Noise { stream, steps } = coding {
+            anchors.add_noise(&mut commands, scene, *stream, *steps);
+        }
+        commands.submit()?;
+        stages.context = laps.lap()?;
+        let mut commands = Commands::new(&gpu);
+        anchors.forward(&gpu, &mut commands, scene, camera, &images.splats, &images.footprints)?;
+        commands.submit()?;
+        stages.anchors = laps.lap()?;
+        let n_pairs = images.build(camera.size_px)?;
+        stages.tiles = laps.lap()?;
+        let mut commands = Commands::new(&gpu);
+        images.rasterise(&mut commands, target.background)?;
+        commands.submit()?;
+        stages.rasterise = laps.lap()?;
+
+        let terms = terms_of(loss, &scene.shape).expect("asked before");
+        let mut commands = Commands::new(&gpu);
+        images.differ(&mut commands, target, &loss.weights)?;
+        if terms.high_pass > 0.0 {
+            images.differ_in_detail(&mut commands, target, terms.high_pass, HIGH_FREQUENCIES)?;
+        }
+        images.mask_gradient(&mut commands, target);
+        commands.submit()?;
+        stages.loss = laps.lap()?;
+        let mut commands = Commands::new(&gpu);
+        images.rasterise_backward(&mut commands)?;
+        commands.submit()?;
+        stages.rasterise_backward = laps.lap()?;
+        let mut commands = Commands::new(&gpu);
+        self.anchors_backward(&gpu, &mut commands, target, loss, &terms, limit)?;
+        commands.submit()?;
+        stages.anchors_backward = laps.lap()?;
+        self.report(target, loss, &terms, n_pairs, stages)
+    }
+
+    /// From the gradients of the splats to those of all parameters.
+    fn anchors_backward(
+        &mut self,
+        gpu: &Gpu,
+        commands: &mut Commands<'_>,
+        target: &TargetView<'_, f32>,
+        loss: &Loss<'_, f32>,
+        terms: &DeviceTerms,
+        limit: f32,
+    ) -> Result<(), GpuError> {
+        let Self { images, anchors, volume, opacity_target, normality, gather, raw_features, .. } = self;
+        let (scene, totals) = (self.scene.as_ref().expect("loaded before"), &images.totals);
+        commands.clear(&anchors.d_gaussians);
+        let [mean, weight] = terms.opacity_target;
+        if weight > 0.0 {
+            let (gaussians, d_gaussians) = (&anchors.gaussians, &anchors.d_gaussians);
+            let target = mean * gaussians.len() as f64;
+            opacity_target.forward_backward(
+                gpu,
+                commands,
+                gaussians,
+                target,
+                weight,
+                d_gaussians,
+                totals,
+                OPACITIES,
+            )?;
+        }
+        anchors.splats_backward(commands, scene, target.camera, &images.footprints, &images.d_splats);
+        let (gaussians, d_gaussians) = (&anchors.gaussians, &anchors.d_gaussians);
+        volume.forward(gpu, commands, gaussians, totals, VOLUME)?;
+        volume.backward(commands, gaussians, loss.weights.volume as f32, totals, VOLUME, d_gaussians);
+        anchors.backward(gpu, commands, scene)?;
+        if let Some(weights) = normality_of(terms) {
+            let width = scene.shape.feature_dim;
+            raw_features.fit(gpu, anchors.visible().len() * width)?;
+            gather.run(commands, &scene.anchors[FEATURES].values, width, anchors.visible(), raw_features);
+            let d_features = &anchors.gradients[FEATURES];
+            normality.forward_backward(gpu, commands, &weights, raw_features, width, d_features)?;
+        }
+        self.count(commands, limit);
+        Ok(())
+    }
+
+    /// Counts gradients that are not sound, and splats.
+    fn count(&self, commands: &mut Commands<'_>, limit: f32) {
+        let scene = self.scene.as_ref().expect("loaded before");
+        commands.clear(&self.counters);
+        let arrays = self.anchors.gradients.iter().chain(scene.heads.iter().map(|head| &head.gradient));
+        let d_splats = (&self.images.d_splats as &dyn Bind, 9 * self.images.d_splats.len());
+        for (values, n_values) in arrays.map(|array| (array as &dyn Bind, array.len())).chain([d_splats]) {
+            self.sound.count(commands, values, n_values, limit, &self.counters, UNSOUND);
+        }
+        self.statistics.count(commands, &self.images.footprints, &self.counters, SPLATS);
+    }
+
+    /// Reads what the step found; waits.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of Gaussians")]
+    fn report(
+        &self,
+        target: &TargetView<'_, f32>,
+        loss: &Loss<'_, f32>,
+        terms: &DeviceTerms,
+        n_pairs: usize,
+        stages: StageSeconds,
+    ) -> Result<ResidentStep<f32>, GpuError> {
+        let totals = self.images.totals.read(&self.gpu)?;
+        let counters = self.counters.read(&self.gpu)?;
+        let compared = self.images.loss_of(&totals);
+        let n_slots = self.anchors.gaussians.len();
+        let mut by_modules = terms.high_pass as f32 * totals[HIGH_FREQUENCIES] / self.images.n_values() as f32;
+        let [mean, weight] = terms.opacity_target;
+        let aim = (mean * n_slots as f64) as f32;
+        by_modules += opacity_target::forward_backward(totals[OPACITIES], n_slots, aim, weight as f32).0;
+        if let Some(weights) = normality_of(terms) {
+            by_modules += self.normality.moments(&self.gpu)?.term(&weights);
+        }
+        let (lambda, n_gaussians) = (loss.weights.dssim as f32, totals[VOLUME + 1]);
+        let volumes = loss.weights.volume as f32 * totals[VOLUME] / n_gaussians.max(1.0);
+        let total = (1.0 - lambda) * compared.l1 + lambda * (1.0 - compared.similarity) + volumes + by_modules;
+        let report = StepReport {
+            loss: total,
+            squared_error: compared.squared_sum / (3 * target.n_counted()) as f64,
+            n_gaussians: n_gaussians as usize,
+            n_splats: counters[SPLATS] as usize,
+            n_pairs,
+            rate: None,
+            stages,
+        };
+        let d_background = GpuImage::d_background_of(&totals);
+        Ok(ResidentStep { report, d_background, is_sound: counters[UNSOUND] == 0 })
+    }
+
+    fn move_all(&self, steps: &GroupSteps<f32>) -> Result<(), GpuError> {
+        let scene = self.scene.as_ref().expect("loaded before");
+        let mut commands = Commands::new(&self.gpu);
+        let row_of_anchor = self.anchors.row_of_anchor();
+        scene.move_by(&self.adam, &mut commands, steps, row_of_anchor, &self.anchors.gradients);
+        commands.submit()
+    }
+
+    fn add_view(&self) -> Result<(), GpuError> {
+        let scene = self.scene.as_ref().expect("loaded before");
+        let slots = Slots {
+            anchors: self.anchors.visible(),
+            gaussians: &self.anchors.gaussians,
+            footprints: &self.images.footprints,
+            d_splats: &self.images.d_splats,
+        };
+        let mut commands = Commands::new(&self.gpu);
+        self.statistics.add(&mut commands, self.size_px, slots, scene.sums());
+        commands.submit()
+    }
+}
+
+/// The terms of all modules, where devices know them.
+fn terms_of(loss: &Loss<'_, f32>, shape: &ModelShape) -> Option<DeviceTerms> {
+    let mut terms = DeviceTerms::default();
+    let Some((modules, at)) = loss.modules else { return Some(terms) };
+    modules.iter().all(|module| module.on_device(at, shape, &mut terms)).then_some(terms)
+}
+
+fn normality_of(terms: &DeviceTerms) -> Option<Weights<f32>> {
+    let [divergence, spread] = terms.normality.map(|weight| weight as f32);
+    (divergence > 0.0 || spread > 0.0).then_some(Weights { divergence, spread })
+}
+
+impl StepDevice<f32> for GpuStep {
+    fn name(&self) -> String {
+        self.gpu.name.clone()
+    }
+
+    fn images(&mut self) -> &mut dyn ImageStages<f32> {
+        &mut self.images
+    }
+
+    fn resident(&mut self) -> &mut dyn Resident<f32> {
+        self
+    }
+}
+
+impl Resident<f32> for GpuStep {
+    fn can_step(&self, shape: &ModelShape, loss: &Loss<'_, f32>, coding: &Coding<'_, f32>) -> bool {
+        matches!(coding, Coding::Raw | Coding::Noise { .. }) && terms_of(loss, shape).is_some()
+    }
+
+    fn load(&mut self, trained: &Trained<'_, f32>) -> Result<(), DeviceFault> {
+        // The old arrays go first, so that both need not find room.
+        self.scene = None;
+        self.scene = Some(DeviceScene::upload(&self.gpu, trained).map_err(DeviceFault::new)?);
+        Ok(())
+    }
+
+    fn step(
+        &mut self,
+        target: &TargetView<'_, f32>,
+        loss: &Loss<'_, f32>,
+        coding: &Coding<'_, f32>,
+        limit: f32,
+    ) -> Result<ResidentStep<f32>, DeviceFault> {
+        self.step_with(target, loss, coding, limit).map_err(DeviceFault::new)
+    }
+
+    fn move_by(&mut self, steps: &GroupSteps<f32>) -> Result<(), DeviceFault> {
+        self.move_all(steps).map_err(DeviceFault::new)
+    }
+
+    fn add_statistics(&mut self) -> Result<(), DeviceFault> {
+        self.add_view().map_err(DeviceFault::new)
+    }
+
+    fn store(&self, trained: TrainedMut<'_, f32>) -> Result<(), DeviceFault> {
+        let scene = self.scene.as_ref().expect("loaded before");
+        scene.store(&self.gpu, trained).map_err(DeviceFault::new)
+    }
+}
+
+#[cfg(test)]
+mod tests;

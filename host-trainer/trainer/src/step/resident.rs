@@ -1,0 +1,116 @@
+//! A scene that stays in a device's memory from step to step, with all that training moves.
+
+use std::fmt;
+
+use super::coding::Coding;
+use super::fault::DeviceFault;
+use super::image::ImageStages;
+use super::{Loss, StepReport, TargetView};
+use crate::ops::adam::{Moments, Step};
+use crate::scene::{Heads, ModelShape, Scene};
+
+/// What training keeps for the anchors and heads of a scene: what goes to a device.
+#[derive(Clone, Copy, Debug)]
+pub struct Trained<'a, R> {
+    /// The parameters.
+    pub scene: &'a Scene<R>,
+    /// Of features, log-scales, offsets and mask logits.
+    pub moments: [&'a Moments<R>; 4],
+    /// First and second moments of the heads.
+    pub heads: &'a [Heads<R>; 2],
+    /// `[n]` sums of opacities, and `[n, K]` sums of gradients on the screen; see `train::statistics`.
+    pub sums: [&'a [R]; 2],
+    /// `[n]` views that saw an anchor, and `[n, K]` those that drew an offset.
+    pub counts: [&'a [u32]; 2],
+}
+
+/// The same, to be overwritten with what comes back; lattice and shape stay.
+#[derive(Debug)]
+pub struct TrainedMut<'a, R> {
+    /// See [`Trained::scene`].
+    pub scene: &'a mut Scene<R>,
+    /// See [`Trained::moments`].
+    pub moments: [&'a mut Moments<R>; 4],
+    /// See [`Trained::heads`].
+    pub heads: &'a mut [Heads<R>; 2],
+    /// See [`Trained::sums`].
+    pub sums: [&'a mut Vec<R>; 2],
+    /// See [`Trained::counts`].
+    pub counts: [&'a mut Vec<u32>; 2],
+}
+
+/// How far Adam moves each group; `None` where a group stays.
+#[derive(Clone, Debug)]
+pub struct GroupSteps<R> {
+    /// Features, log-scales, offsets, mask logits.
+    pub anchors: [Option<Step<R>>; 4],
+    /// The heads in file order.
+    pub heads: Vec<Step<R>>,
+}
+
+/// What a step on a device gives back, besides the gradients, which stay there.
+#[derive(Clone, Copy, Debug)]
+pub struct ResidentStep<R> {
+    /// As on the CPU.
+    pub report: StepReport<R>,
+    /// dL/d(background).
+    pub d_background: [R; 3],
+    /// Whether every gradient of a parameter is at most the limit that was asked for.
+    pub is_sound: bool,
+}
+
+/// What else than this CPU computes.
+pub trait StepDevice<R>: fmt::Debug + Send {
+    /// Its name, in words.
+    fn name(&self) -> String;
+
+    /// The stages between splats and the loss, of splats that come from the CPU.
+    fn images(&mut self) -> &mut dyn ImageStages<R>;
+
+    /// The whole step, of a scene that stays there.
+    fn resident(&mut self) -> &mut dyn Resident<R>;
+}
+
+/// A device that holds one scene. Each function works on what [`Self::load`] brought last.
+pub trait Resident<R> {
+    /// Whether a step with these terms can be computed there.
+    fn can_step(&self, shape: &ModelShape, loss: &Loss<'_, R>, coding: &Coding<'_, R>) -> bool;
+
+    /// Takes everything over.
+    ///
+    /// # Errors
+    /// [`DeviceFault`], as all of these.
+    fn load(&mut self, trained: &Trained<'_, R>) -> Result<(), DeviceFault>;
+
+    /// Loss and gradients of one view, as [`Workspace::step`](super::Workspace::step).
+    ///
+    /// * `limit`: the largest magnitude of a sound gradient.
+    ///
+    /// # Errors
+    /// [`DeviceFault`].
+    fn step(
+        &mut self,
+        target: &TargetView<'_, R>,
+        loss: &Loss<'_, R>,
+        coding: &Coding<'_, R>,
+        limit: R,
+    ) -> Result<ResidentStep<R>, DeviceFault>;
+
+    /// Moves all parameters by the gradients of the last step.
+    ///
+    /// # Errors
+    /// [`DeviceFault`].
+    fn move_by(&mut self, steps: &GroupSteps<R>) -> Result<(), DeviceFault>;
+
+    /// Adds the last step to the statistics of growth and pruning.
+    ///
+    /// # Errors
+    /// [`DeviceFault`].
+    fn add_statistics(&mut self) -> Result<(), DeviceFault>;
+
+    /// Copies everything back.
+    ///
+    /// # Errors
+    /// [`DeviceFault`].
+    fn store(&self, trained: TrainedMut<'_, R>) -> Result<(), DeviceFault>;
+}

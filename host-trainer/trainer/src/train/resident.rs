@@ -1,0 +1,140 @@
+//! Steps of a scene that stays on a device: what is there, what is here, and when it comes back.
+
+use std::sync::PoisonError;
+
+use super::watchdog::{self, Cause};
+use super::{TrainError, Trainer};
+use crate::step::coding::Coding;
+use crate::step::{Loss, Resident, StepReport, TargetView, Trained, TrainedMut, Workspace};
+
+/// Where the newest parameters, moments and statistics of a run are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Place {
+    /// Here alone.
+    #[default]
+    Host,
+    /// Here and on the device.
+    Both,
+    /// On the device alone; here, only the number of the anchors and their cells are right.
+    Device,
+}
+
+impl Trainer<'_> {
+    /// Whether nothing is newer on a device.
+    pub(super) fn is_here(&self) -> bool {
+        self.place != Place::Device
+    }
+
+    /// Whether a device has this step as a whole.
+    pub(super) fn steps_on_device(&self, loss: &Loss<'_, f32>, coding: &Coding<'_, f32>) -> bool {
+        self.on_device(|device| device.can_step(&self.scene.shape, loss, coding)).unwrap_or(false)
+    }
+
+    /// What `f` says of the device, where there is one.
+    fn on_device<T>(&self, f: impl FnOnce(&mut dyn Resident<f32>) -> T) -> Option<T> {
+        let device = self.workspace.device()?;
+        Some(f(device.lock().unwrap_or_else(PoisonError::into_inner).resident()))
+    }
+
+    /// A step there; and what is wrong with it, so that it must not be applied.
+    ///
+    /// A scene that stands here is brought first.
+    pub(super) fn step_on_device(
+        &mut self,
+        target: &TargetView<'_, f32>,
+        loss: &Loss<'_, f32>,
+        coding: &Coding<'_, f32>,
+    ) -> Result<(StepReport<f32>, Option<Cause>), TrainError> {
+        let trained = (self.place == Place::Host).then(|| self.trained());
+        let step = |device: &mut dyn Resident<f32>| {
+            if let Some(trained) = &trained {
+                device.load(trained)?;
+            }
+            device.step(target, loss, coding, watchdog::LARGEST_GRADIENT)
+        };
+        let found = self.on_device(step).expect("there is one")?;
+        if self.place == Place::Host {
+            self.place = Place::Both;
+        }
+        self.workspace.d_background = found.d_background;
+        let is_sound = found.is_sound && found.report.loss.is_finite() && watchdog::sound(&found.d_background);
+        let cause = if is_sound { None } else { Some(self.cause(target, loss, coding)?) };
+        Ok((found.report, cause))
+    }
+
+    /// What went wrong with a step on the device, by the same step here.
+    fn cause(
+        &mut self,
+        target: &TargetView<'_, f32>,
+        loss: &Loss<'_, f32>,
+        coding: &Coding<'_, f32>,
+    ) -> Result<Cause, TrainError> {
+        self.fetch()?;
+        let mut workspace = Workspace::new(&self.scene.shape);
+        let report = workspace.step(&self.scene, target, loss, coding);
+        let found = watchdog::inspect(&self.scene, target, self.background, &workspace, &report);
+        Ok(found.unwrap_or(Cause { array: "a gradient on the device", anchor: None, value: f32::NAN }))
+    }
+
+    /// Moves the parameters by the last step's gradients.
+    pub(super) fn move_on_device(&mut self, progress: f64) -> Result<(), TrainError> {
+        let rates = self.rates();
+        let steps = self.optimiser.next(&rates, progress, self.capture.extent);
+        self.on_device(|device| device.move_by(&steps)).expect("there is one")?;
+        self.place = Place::Device;
+        Ok(())
+    }
+
+    /// Adds the last step to the statistics.
+    pub(super) fn count_on_device(&mut self) -> Result<(), TrainError> {
+        self.on_device(|device| device.add_statistics()).expect("there is one")?;
+        self.place = Place::Device;
+        Ok(())
+    }
+
+    /// Copies what is newer on a device; the scene, the moments and the statistics here are then those of this iteration.
+    ///
+    /// # Errors
+    /// [`TrainError::Device`]: everything here is as it was.
+    pub fn fetch(&mut self) -> Result<(), TrainError> {
+        if self.place != Place::Device {
+            return Ok(());
+        }
+        let (mut scene, mut optimiser, mut statistics) =
+            (self.scene.clone(), self.optimiser.clone(), self.statistics.clone());
+        let trained = TrainedMut {
+            scene: &mut scene,
+            moments: [
+                &mut optimiser.features,
+                &mut optimiser.log_scales,
+                &mut optimiser.offsets,
+                &mut optimiser.mask_logits,
+            ],
+            heads: &mut optimiser.heads,
+            sums: [&mut statistics.opacity_sum, &mut statistics.gradient_sum],
+            counts: [&mut statistics.n_views, &mut statistics.n_drawn],
+        };
+        self.on_device(|device| device.store(trained)).expect("it has what is newer")?;
+        (self.scene, self.optimiser, self.statistics) = (scene, optimiser, statistics);
+        self.place = Place::Both;
+        Ok(())
+    }
+
+    /// The same, where something here is about to change: the device will be brought everything anew.
+    pub(super) fn take_back(&mut self) -> Result<(), TrainError> {
+        self.fetch()?;
+        self.place = Place::Host;
+        Ok(())
+    }
+
+    fn trained(&self) -> Trained<'_, f32> {
+        let (optimiser, statistics) = (&self.optimiser, &self.statistics);
+        Trained {
+            scene: &self.scene,
+            moments: [&optimiser.features, &optimiser.log_scales, &optimiser.offsets, &optimiser.mask_logits],
+            heads: &optimiser.heads,
+            sums: [&statistics.opacity_sum, &statistics.gradient_sum],
+            counts: [&statistics.n_views, &statistics.n_drawn],
+        }
+    }
+}

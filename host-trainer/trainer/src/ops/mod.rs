@@ -12,6 +12,7 @@ pub mod adam;
 pub mod adaptive_step;
 pub mod anchor_bits;
 pub(crate) mod blur;
+pub mod depth_order;
 pub mod detail;
 pub mod explicit_gaussians;
 pub mod file_order;

@@ -81,6 +81,7 @@ impl<R: Real> HeadOutputs<R> {
 /// * `positions`: `[n]`. * `log_scales`: `[n, 6]` or `[n, 4]`. * `offsets`: `[n, 3K]`. * `mask_logits`: `[n, K]`.
 /// * `gaussians`, `sources`: anchors, then offsets, ascending.
 #[expect(clippy::too_many_arguments, reason = "one slice per input and output, as every operation has it")]
+#[inline(always)]
 pub fn forward<R: Real>(
     shape: &ModelShape,
     positions: &[[R; 3]],
@@ -92,39 +93,72 @@ pub fn forward<R: Real>(
     sources: &mut Vec<Source>,
 ) {
     let k_all = shape.n_offsets;
-    for (row, position) in positions.iter().enumerate() {
-        let sizes = &log_scales[row * shape.n_log_scales()..][..shape.n_log_scales()];
-        let l_a = per_axis(|i| sizes[i].exp());
-        let l_g = if shape.anisotropic { per_axis(|i| sizes[3 + i].exp()) } else { [sizes[3].exp(); 3] };
-        for k in 0..k_all {
+    let first = sources.len();
+    for row in 0..positions.len() {
+        let drawn = (0..k_all).filter(|k| {
             let at = row * k_all + k;
-            if !mask::is_open(mask_logits[at]) {
-                continue;
-            }
-            let opacity = outputs.opacity[at].tanh();
-            if !(opacity > R::ZERO) {
-                continue;
-            }
-            let (scale, rotation) = match outputs.covariance[at * shape.covariance_outputs()..] {
-                [s0, s1, s2, w, x, y, z, ..] if shape.anisotropic => {
-                    let raw = [w, x, y, z];
-                    let inverse = R::ONE / length(raw).larger(R::real(NORM_FLOOR));
-                    let logits = [s0, s1, s2];
-                    (per_axis(|i| l_g[i] * logits[i].sigmoid()), raw.map(|q| q * inverse))
-                }
-                [logit, ..] => ([l_g[0] * logit.sigmoid(); 3], [R::ONE, R::ZERO, R::ZERO, R::ZERO]),
-                [] => unreachable!("a row for each offset"),
-            };
-            gaussians.push(Gaussian {
-                centre: per_axis(|i| position[i] + offsets[at * 3 + i] * l_a[i]),
-                scale,
-                rotation,
-                opacity,
-                colour: per_axis(|i| outputs.colour[at * 3 + i].sigmoid()),
-            });
-            sources.push(Source { row: index(row), offset: index(k) });
-        }
+            // What tanh makes of it has the same sign.
+            mask::is_open(mask_logits[at]) && outputs.opacity[at] > R::ZERO
+        });
+        sources.extend(drawn.map(|k| Source { row: index(row), offset: index(k) }));
     }
+    let sources = &sources[first..];
+    let sigmoids = sigmoids(shape, outputs, sources);
+    let mut opacities: Vec<R> =
+        sources.iter().map(|s| outputs.opacity[s.row as usize * k_all + s.offset as usize]).collect();
+    for opacity in &mut opacities {
+        *opacity = opacity.tanh();
+    }
+    let (mut last, mut l_a, mut l_g) = (None, [R::ZERO; 3], [R::ZERO; 3]);
+    for ((source, sigmoids), opacity) in sources.iter().zip(&sigmoids).zip(opacities) {
+        let row = source.row as usize;
+        let at = row * k_all + source.offset as usize;
+        if last != Some(row) {
+            last = Some(row);
+            let sizes = &log_scales[row * shape.n_log_scales()..][..shape.n_log_scales()];
+            l_a = per_axis(|i| sizes[i].exp());
+            l_g = if shape.anisotropic { per_axis(|i| sizes[3 + i].exp()) } else { [sizes[3].exp(); 3] };
+        }
+        let rotation = if shape.anisotropic {
+            let raw = quaternion(outputs, at);
+            let inverse = R::ONE / length(raw).larger(R::real(NORM_FLOOR));
+            raw.map(|q| q * inverse)
+        } else {
+            [R::ONE, R::ZERO, R::ZERO, R::ZERO]
+        };
+        let [s0, s1, s2, red, green, blue] = *sigmoids;
+        gaussians.push(Gaussian {
+            centre: per_axis(|i| positions[row][i] + offsets[at * 3 + i] * l_a[i]),
+            scale: [l_g[0] * s0, l_g[1] * s1, l_g[2] * s2],
+            rotation,
+            opacity,
+            colour: [red, green, blue],
+        });
+    }
+}
+
+/// The sigmoids of three scale logits and three colour logits of each source, in one loop that vectorises.
+#[inline(always)]
+fn sigmoids<R: Real>(shape: &ModelShape, outputs: &HeadOutputs<R>, sources: &[Source]) -> Vec<[R; 6]> {
+    let n_outputs = shape.covariance_outputs();
+    let logits = sources.iter().map(|source| {
+        let at = source.row as usize * shape.n_offsets + source.offset as usize;
+        let [c0, c1, c2] = if shape.anisotropic { [0, 1, 2] } else { [0; 3] };
+        let (scale, colour) = (&outputs.covariance[at * n_outputs..][..n_outputs], &outputs.colour[at * 3..][..3]);
+        [scale[c0], scale[c1], scale[c2], colour[0], colour[1], colour[2]]
+    });
+    let mut values: Vec<[R; 6]> = logits.collect();
+    for value in values.as_flattened_mut() {
+        *value = value.sigmoid();
+    }
+    values
+}
+
+/// The raw quaternion of an anisotropic offset.
+#[inline(always)]
+fn quaternion<R: Real>(outputs: &HeadOutputs<R>, at: usize) -> [R; 4] {
+    let cov = &outputs.covariance[at * 7..at * 7 + 7];
+    [cov[3], cov[4], cov[5], cov[6]]
 }
 
 /// Gradients of [`forward`], given those of the Gaussians it appended.
@@ -133,6 +167,7 @@ pub fn forward<R: Real>(
 ///
 /// * `d_outputs`, `d_log_scales` `[n, 6]` or `[n, 4]`, `d_offsets` `[n, 3K]`, `d_mask_logits` `[n, K]`: zero on entry, added to.
 #[expect(clippy::too_many_arguments, reason = "one slice per input and per gradient, as every operation has it")]
+#[inline(always)]
 pub fn backward<R: Real>(
     shape: &ModelShape,
     log_scales: &[R],
@@ -148,30 +183,38 @@ pub fn backward<R: Real>(
     d_mask_logits: &mut [R],
 ) {
     let (n_log_scales, n_outputs) = (shape.n_log_scales(), shape.covariance_outputs());
-    for ((g, source), d) in gaussians.iter().zip(sources).zip(d_gaussians) {
-        let row = source.row as usize;
-        let at = row * shape.n_offsets + source.offset as usize;
+    // Not those of the Gaussians, to whose colours others may have added.
+    let sigmoids = sigmoids(shape, outputs, sources);
+    let place = |source: &Source| source.row as usize * shape.n_offsets + source.offset as usize;
+    let mut slopes: Vec<R> = sources.iter().map(|source| mask_logits[place(source)]).collect();
+    for slope in &mut slopes {
+        *slope = mask::slope(*slope);
+    }
+    let (mut last, mut sizes) = (None, [R::ZERO; 3]);
+    let drawn = gaussians.iter().zip(sources).zip(d_gaussians);
+    for (((g, source), d), (sigmoids, slope)) in drawn.zip(sigmoids.iter().zip(slopes)) {
+        let (row, at) = (source.row as usize, place(source));
+        if last != Some(row) {
+            last = Some(row);
+            sizes = per_axis(|i| log_scales[row * n_log_scales + i].exp());
+        }
         d_outputs.opacity[at] += d.opacity * (R::ONE - g.opacity * g.opacity);
-        d_mask_logits[at] += d.opacity * g.opacity * mask::slope(mask_logits[at]);
+        d_mask_logits[at] += d.opacity * g.opacity * slope;
         for i in 0..3 {
-            // Not that of the Gaussian, to which others may have added.
-            let colour = outputs.colour[at * 3 + i].sigmoid();
+            let colour = sigmoids[3 + i];
             d_outputs.colour[at * 3 + i] += d.colour[i] * colour * (R::ONE - colour);
             // scale = e^s · σ, so ∂/∂s = scale, and ∂/∂logit = scale · (1 − σ); isotropic: all three are one.
             let axis = if shape.anisotropic { i } else { 0 };
             let (log_scale, logit) = (row * n_log_scales + 3 + axis, at * n_outputs + axis);
-            let sigma = outputs.covariance[logit].sigmoid();
             d_log_scales[log_scale] += d.scale[i] * g.scale[i];
-            d_outputs.covariance[logit] += d.scale[i] * g.scale[i] * (R::ONE - sigma);
-            let size = log_scales[row * n_log_scales + i].exp();
-            d_offsets[at * 3 + i] += d.centre[i] * size;
-            d_log_scales[row * n_log_scales + i] += d.centre[i] * offsets[at * 3 + i] * size;
+            d_outputs.covariance[logit] += d.scale[i] * g.scale[i] * (R::ONE - sigmoids[i]);
+            d_offsets[at * 3 + i] += d.centre[i] * sizes[i];
+            d_log_scales[row * n_log_scales + i] += d.centre[i] * offsets[at * 3 + i] * sizes[i];
         }
         if !shape.anisotropic {
             continue;
         }
-        let cov = &outputs.covariance[at * 7..at * 7 + 7];
-        let raw = [cov[3], cov[4], cov[5], cov[6]];
+        let raw = quaternion(outputs, at);
         let norm = length(raw);
         // Below the floor the division is by a constant, and nothing is projected out.
         let radial = if norm > R::real(NORM_FLOOR) { dot(g.rotation, d.rotation) } else { R::ZERO };

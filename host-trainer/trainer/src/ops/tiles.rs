@@ -3,6 +3,7 @@
 use pocketsplat_core::rules;
 use rayon::prelude::*;
 
+use super::depth_order::by_depth;
 use super::project::{Footprint, Splat};
 use crate::real::Real;
 
@@ -27,20 +28,33 @@ pub struct TileLists {
     pub slots: Vec<u32>,
 }
 
+/// The tiles of one splat.
+#[derive(Clone, Copy)]
+struct Reached {
+    /// Half-open `[x0, x1, y0, y1]`.
+    rectangle: [u16; 4],
+    /// Its first slot.
+    slot: u32,
+}
+
 /// Half-open tile rectangle `[x0, x1, y0, y1]` of the pixel centres within a footprint.
-fn tile_rectangle<R: Real>(splat: &Splat<R>, footprint: &Footprint<R>, size_px: [usize; 2]) -> [usize; 4] {
+fn tile_rectangle<R: Real>(splat: &Splat<R>, footprint: &Footprint<R>, size_px: [usize; 2]) -> [u16; 4] {
     let mut rectangle = [0; 4];
     for i in 0..2 {
         let centre: f64 = splat.mean_px[i].into();
         let half: f64 = footprint.half_extent_px[i].into();
         // Pixel p has its centre at p + ½. One part in 10⁵ of slack, because the rasteriser compares alpha, not distance.
         let slack = 1e-5 * half + 1e-4;
-        let first = (centre - half - slack - 0.5).ceil().max(0.0);
-        let last = (centre + half + slack - 0.5).floor().min(size_px[i] as f64 - 1.0);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "both lie in 0..=size")]
-        let (first, end) = (first as usize, (last + 1.0).max(0.0) as usize);
-        rectangle[2 * i] = first / TILE_PX;
-        rectangle[2 * i + 1] = end.div_ceil(TILE_PX).max(first / TILE_PX);
+        let size = size_px[i] as f64;
+        let low = (centre - half - slack - 0.5).larger(0.0).smaller(size);
+        let high = (centre + half + slack - 0.5).larger(-1.0).smaller(size - 1.0);
+        // The first pixel from `low` on, and the one after the last up to `high`; truncation is floor for what is not negative.
+        #[expect(clippy::cast_possible_truncation, reason = "both lie in 0..=size")]
+        let (below, end) = (low as i32, (high + 1.0) as i32);
+        let first = below + i32::from(f64::from(below) < low);
+        let tile = |pixel: i32| u16::try_from(pixel / TILE_PX as i32).expect("a frame has fewer than 2¹⁶ tiles a side");
+        rectangle[2 * i] = tile(first);
+        rectangle[2 * i + 1] = tile(end + TILE_PX as i32 - 1).max(rectangle[2 * i]);
     }
     rectangle
 }
@@ -50,33 +64,44 @@ fn tile_rectangle<R: Real>(splat: &Splat<R>, footprint: &Footprint<R>, size_px: 
 /// Order: depth ascending, ties by splat index, that is by anchor and offset. Cost: one sort of n splats and two passes
 /// over the (tile, splat) pairs.
 pub fn build<R: Real>(splats: &[Splat<R>], footprints: &[Footprint<R>], size_px: [usize; 2]) -> TileLists {
+    let mut lists = TileLists::default();
+    build_into(&mut lists, splats, footprints, size_px);
+    lists
+}
+
+/// [`build`] into lists that are there.
+pub fn build_into<R: Real>(
+    lists: &mut TileLists,
+    splats: &[Splat<R>],
+    footprints: &[Footprint<R>],
+    size_px: [usize; 2],
+) {
     let grid = size_px.map(|s| s.div_ceil(TILE_PX));
-    let rectangles: Vec<[usize; 4]> =
-        splats.par_iter().zip(footprints).map(|(s, f)| tile_rectangle(s, f, size_px)).collect();
-    let mut order: Vec<u64> = footprints
+    let mut reached: Vec<Reached> = splats
         .par_iter()
-        .enumerate()
-        .map(|(i, f)| {
-            #[expect(clippy::cast_possible_truncation, reason = "the sort key is the f32 depth on purpose")]
-            let depth: f32 = Into::<f64>::into(f.depth) as f32;
-            // Depths are positive, so their bits order as they do.
-            (u64::from(depth.to_bits()) << 32) | i as u64
-        })
+        .zip(footprints)
+        .with_min_len(1024)
+        .map(|(s, f)| Reached { rectangle: tile_rectangle(s, f, size_px), slot: 0 })
         .collect();
-    order.par_sort_unstable();
+    #[expect(clippy::cast_possible_truncation, reason = "the sort key is the f32 depth on purpose")]
+    let order = by_depth(footprints.iter().map(|f| Into::<f64>::into(f.depth) as f32));
 
     let n_tiles = grid[0] * grid[1];
-    let mut starts = vec![0u32; n_tiles + 1];
-    let mut slot_starts = Vec::with_capacity(splats.len() + 1);
+    let TileLists { starts, entries, slot_starts, slots, .. } = lists;
+    starts.clear();
+    starts.resize(n_tiles + 1, 0);
+    slot_starts.clear();
+    slot_starts.reserve(splats.len() + 1);
     let mut n_pairs = 0u32;
-    for [x0, x1, y0, y1] in &rectangles {
-        slot_starts.push(n_pairs);
-        for y in *y0..*y1 {
+    for Reached { rectangle, slot } in &mut reached {
+        let [x0, x1, y0, y1] = rectangle.map(usize::from);
+        (*slot, n_pairs) = (n_pairs, n_pairs + u32::try_from((x1 - x0) * (y1 - y0)).expect("at most 2³² tiles"));
+        slot_starts.push(*slot);
+        for y in y0..y1 {
             for start in &mut starts[y * grid[0] + x0 + 1..=y * grid[0] + x1] {
                 *start += 1;
             }
         }
-        n_pairs += u32::try_from((x1 - x0) * (y1 - y0)).expect("a splat covers fewer than 2³² tiles");
     }
     slot_starts.push(n_pairs);
     for t in 0..n_tiles {
@@ -84,13 +109,13 @@ pub fn build<R: Real>(splats: &[Splat<R>], footprints: &[Footprint<R>], size_px:
     }
 
     let mut next = starts.clone();
-    let mut entries = vec![0u32; n_pairs as usize];
-    let mut slots = vec![0u32; n_pairs as usize];
-    for key in order {
-        #[expect(clippy::cast_possible_truncation, reason = "the low half of the key is the index")]
-        let splat = key as u32;
-        let [x0, x1, y0, y1] = rectangles[splat as usize];
-        let mut slot = slot_starts[splat as usize] as usize;
+    // Every one is written over.
+    entries.resize(n_pairs as usize, 0);
+    slots.resize(n_pairs as usize, 0);
+    for splat in order {
+        let Reached { rectangle, slot } = reached[splat as usize];
+        let [x0, x1, y0, y1] = rectangle.map(usize::from);
+        let mut slot = slot as usize;
         for y in y0..y1 {
             for at in &mut next[y * grid[0] + x0..y * grid[0] + x1] {
                 entries[*at as usize] = splat;
@@ -100,7 +125,7 @@ pub fn build<R: Real>(splats: &[Splat<R>], footprints: &[Footprint<R>], size_px:
             }
         }
     }
-    TileLists { grid, starts, entries, slot_starts, slots }
+    lists.grid = grid;
 }
 
 impl TileLists {

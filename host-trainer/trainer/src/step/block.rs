@@ -213,7 +213,7 @@ impl<R: Real> Block<R> {
     }
 
     /// From the gradients of its Gaussians to those of its anchors and of the heads.
-    pub(super) fn backward(&mut self, scene: &Scene<R>, volume_weight: R, n_gaussians: usize) {
+    pub(super) fn backward(&mut self, level: Level, scene: &Scene<R>, volume_weight: R, n_gaussians: usize) {
         let (shape, n) = (&scene.shape, self.anchors.len());
         volume::backward(&self.gaussians, volume_weight, n_gaussians, &mut self.d_gaussians);
         for group in self.d_heads.each_mut().flat_map(Head::groups_mut) {
@@ -228,19 +228,24 @@ impl<R: Real> Block<R> {
         refill(&mut self.d_log_scales, n * shape.n_log_scales());
         refill(&mut self.d_offsets, n * 3 * shape.n_offsets);
         refill(&mut self.d_mask_logits, n * shape.n_offsets);
-        neural_gaussians::backward(
-            shape,
-            &self.log_scales,
-            &self.offsets,
-            &self.mask_logits,
-            &self.outputs,
-            &self.gaussians,
-            &self.sources,
-            &self.d_gaussians,
-            &mut self.d_outputs,
-            &mut self.d_log_scales,
-            &mut self.d_offsets,
-            &mut self.d_mask_logits,
+        level.run(
+            #[inline(always)]
+            || {
+                neural_gaussians::backward(
+                    shape,
+                    &self.log_scales,
+                    &self.offsets,
+                    &self.mask_logits,
+                    &self.outputs,
+                    &self.gaussians,
+                    &self.sources,
+                    &self.d_gaussians,
+                    &mut self.d_outputs,
+                    &mut self.d_log_scales,
+                    &mut self.d_offsets,
+                    &mut self.d_mask_logits,
+                );
+            },
         );
         refill(&mut self.d_input, n * shape.head_inputs());
         let d_outputs = [&self.d_outputs.opacity, &self.d_outputs.covariance, &self.d_outputs.colour];

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::buffer::refill;
 use super::fault::DeviceFault;
 use super::target::clear_masked;
 use super::{ImagePair, LossWeights, TargetView};
@@ -72,8 +73,8 @@ pub trait ImageStages<R>: fmt::Debug + Send {
     fn backward(&mut self) -> Result<(Vec<Splat<R>>, [R; 3]), DeviceFault>;
 }
 
-/// The stages on this CPU.
-#[derive(Debug)]
+/// The stages on this CPU; buffers are kept from step to step.
+#[derive(Clone, Debug)]
 pub(super) struct CpuImage<R> {
     level: Level,
     size_px: [usize; 2],
@@ -84,6 +85,7 @@ pub(super) struct CpuImage<R> {
     image: Vec<R>,
     d_image: Vec<R>,
     d_tiled: TiledImage<R>,
+    d_pairs: Vec<Splat<R>>,
 }
 
 impl<R: Real> CpuImage<R> {
@@ -98,6 +100,7 @@ impl<R: Real> CpuImage<R> {
             image: Vec::new(),
             d_image: Vec::new(),
             d_tiled: TiledImage::default(),
+            d_pairs: Vec::new(),
         }
     }
 }
@@ -110,21 +113,22 @@ impl<R: Real> ImageStages<R> for CpuImage<R> {
         size_px: [usize; 2],
     ) -> Result<usize, DeviceFault> {
         (self.splats, self.footprints, self.size_px) = (splats, footprints, size_px);
-        self.lists = tiles::build(&self.splats, &self.footprints, size_px);
+        tiles::build_into(&mut self.lists, &self.splats, &self.footprints, size_px);
         Ok(self.lists.entries.len())
     }
 
     fn draw(&mut self, background: [R; 3]) -> Result<(), DeviceFault> {
-        self.tiled = rasterise::forward(self.level, &self.splats, &self.footprints, &self.lists, background);
+        let Self { tiled, level, splats, footprints, lists, .. } = self;
+        rasterise::forward_into(tiled, *level, splats, footprints, lists, background);
         Ok(())
     }
 
     fn compare(&mut self, target: &TargetView<'_, R>, weights: &LossWeights) -> Result<ImageLoss<R>, DeviceFault> {
-        self.image = self.tiled.to_planes(self.size_px);
+        self.tiled.write_planes(self.size_px, &mut self.image);
         clear_masked(&mut self.image, target.mask);
         let lambda = R::real(weights.dssim);
         let (similarity, partials) = ssim::forward(self.level, &self.image, target.truth(), self.size_px);
-        self.d_image = vec![R::ZERO; self.image.len()];
+        refill(&mut self.d_image, self.image.len());
         l1::backward(&self.image, target.truth(), R::ONE - lambda, &mut self.d_image);
         let Self { level, image, size_px, d_image, .. } = self;
         ssim::backward(*level, image, target.truth(), *size_px, &partials, -lambda, d_image);
@@ -139,13 +143,13 @@ impl<R: Real> ImageStages<R> for CpuImage<R> {
 
     fn end_gradient(&mut self, target: &TargetView<'_, R>) -> Result<(), DeviceFault> {
         clear_masked(&mut self.d_image, target.mask);
-        self.d_tiled = TiledImage::from_planes(&self.d_image, self.size_px);
+        self.d_tiled.read_planes(&self.d_image, self.size_px);
         Ok(())
     }
 
     fn backward(&mut self) -> Result<(Vec<Splat<R>>, [R; 3]), DeviceFault> {
-        let Self { level, splats, footprints, lists, tiled, d_tiled, .. } = self;
-        let d_splats = rasterise::backward(*level, splats, footprints, lists, tiled, d_tiled);
+        let Self { level, splats, footprints, lists, tiled, d_tiled, d_pairs, .. } = self;
+        let d_splats = rasterise::backward_through(d_pairs, *level, splats, footprints, lists, tiled, d_tiled);
         Ok((d_splats, rasterise::background_gradient(tiled, d_tiled)))
     }
 }

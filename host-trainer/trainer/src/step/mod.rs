@@ -89,6 +89,7 @@ struct SplatsOfView<R> {
 pub struct Workspace<R> {
     level: Level,
     device: Option<SharedDevice<R>>,
+    images: CpuImage<R>,
     blocks: Vec<Block<R>>,
     n_blocks: usize,
     /// dL/d(heads).
@@ -113,6 +114,7 @@ impl<R: Real> Workspace<R> {
         Self {
             level,
             device: None,
+            images: CpuImage::new(level),
             blocks: Vec::new(),
             n_blocks: 0,
             d_heads,
@@ -198,8 +200,8 @@ impl<R: Real> Workspace<R> {
         self.parents = parents;
         let context = timer.lap();
         self.blocks[..self.n_blocks].par_iter_mut().for_each(|block| block.forward(level, scene, camera));
-        let splats: Vec<Splat<R>> = self.blocks().iter().flat_map(|b| b.splats.iter().copied()).collect();
-        let footprints: Vec<Footprint<R>> = self.blocks().iter().flat_map(|b| b.footprints.iter().copied()).collect();
+        let splats = self.blocks().iter().map(|b| b.splats.as_slice()).collect::<Vec<_>>().concat();
+        let footprints = self.blocks().iter().map(|b| b.footprints.as_slice()).collect::<Vec<_>>().concat();
         let anchors = timer.lap();
         SplatsOfView { stages: StageSeconds { context, anchors, ..StageSeconds::default() }, splats, footprints }
     }
@@ -299,7 +301,12 @@ impl<R: Real> Workspace<R> {
                 let mut device = device.lock().unwrap_or_else(PoisonError::into_inner);
                 self.step_with(device.images(), scene, target, loss, coding)
             }
-            None => self.step_with(&mut CpuImage::new(self.level), scene, target, loss, coding),
+            None => {
+                let mut images = mem::replace(&mut self.images, CpuImage::new(self.level));
+                let report = self.step_with(&mut images, scene, target, loss, coding);
+                self.images = images;
+                report
+            }
         }
     }
 
@@ -346,8 +353,8 @@ impl<R: Real> Workspace<R> {
         self.d_background = d_background;
         stages.rasterise_backward = timer.lap();
         self.splats_backward(&scene.shape, target.camera, &d_splats);
-        let blocks = self.blocks[..self.n_blocks].par_iter_mut();
-        blocks.for_each(|block| block.backward(scene, volume_weight, n_gaussians));
+        let (level, blocks) = (self.level, self.blocks[..self.n_blocks].par_iter_mut());
+        blocks.for_each(|block| block.backward(level, scene, volume_weight, n_gaussians));
         self.sum_head_gradients();
         stages.anchors_backward = timer.lap();
         let rate = match (coding, network) {

@@ -1,9 +1,11 @@
 //! From the pixels' gradient to the splats'.
 
+use std::hint::select_unpredictable;
+
 use pocketsplat_core::rules::ALPHA_MAX;
 use rayon::prelude::*;
 
-use super::row::{LOOK_EVERY, Row, alpha_row, draws_nothing, mark_dead, reduce, step_row};
+use super::row::{ALL_ROWS, LOOK_EVERY, Row, SplatRows, live_rows, reduce, set_bits, step_row};
 use super::{TILE_VALUES, Tile, TileSplat, TiledImage};
 use crate::ops::project::{Footprint, Splat};
 use crate::ops::simd::Level;
@@ -22,7 +24,22 @@ pub fn backward<R: Real>(
     image: &TiledImage<R>,
     d_image: &TiledImage<R>,
 ) -> Vec<Splat<R>> {
-    let mut d_pairs = vec![Splat::default(); lists.entries.len()];
+    backward_through(&mut Vec::new(), level, splats, footprints, lists, image, d_image)
+}
+
+/// [`backward`] with a buffer for the gradients of all (tile, splat) pairs, which is kept from step to step: new memory would take longer
+/// than what is written there.
+pub fn backward_through<R: Real>(
+    d_pairs: &mut Vec<Splat<R>>,
+    level: Level,
+    splats: &[Splat<R>],
+    footprints: &[Footprint<R>],
+    lists: &TileLists,
+    image: &TiledImage<R>,
+    d_image: &TiledImage<R>,
+) -> Vec<Splat<R>> {
+    // What is there is written over.
+    d_pairs.resize(lists.entries.len(), Splat::default());
     let mut tiles = Vec::with_capacity(lists.n_tiles());
     let mut rest = d_pairs.as_mut_slice();
     for t in 0..lists.n_tiles() {
@@ -125,7 +142,7 @@ impl<R: Real> PairSums<R> {
 fn backward_tile<R: Real>(tile: &Tile<R>, image: &[R], d_image: &[R], d_pairs: &mut [Splat<R>]) {
     let zero = [R::ZERO; TILE_PX];
     let mut transmittance = [[R::ONE; TILE_PX]; TILE_PX];
-    let mut dead = [false; TILE_PX];
+    let mut live = ALL_ROWS;
     let mut d_rows = [[zero; TILE_PX]; 3];
     // What of g·C has not been blended yet: ∂L/∂α_i = T_i·(c_i·g) − rest_i/(1 − α_i), and rest shrinks front to back,
     // so that the pass can run in the order of the forward pass and stop where it stopped.
@@ -139,19 +156,25 @@ fn backward_tile<R: Real>(tile: &Tile<R>, image: &[R], d_image: &[R], d_pairs: &
             }
         }
     }
-    for (n, (TileSplat { splat, rows: (first, end) }, d_pair)) in tile.splats.iter().zip(d_pairs).enumerate() {
-        let dx0 = R::real(tile.origin[0] as f64 + 0.5) - splat.mean_px[0];
+    for (n, (TileSplat { splat, reach }, d_pair)) in tile.splats.iter().zip(&mut *d_pairs).enumerate() {
+        if n % LOOK_EVERY == 1 {
+            live = live_rows(live, &transmittance);
+            if live == 0 {
+                d_pairs[n..].fill(Splat::default());
+                break;
+            }
+        }
+        let rows = SplatRows::new(splat, *reach, tile.x, &tile.ys);
+        let reached = rows.reached & live;
+        if reached == 0 {
+            *d_pair = Splat::default();
+            continue;
+        }
         let [red, green, blue] = splat.colour;
         let mut sums = PairSums::<R>::default();
-        for y in *first..*end {
-            if dead[y] {
-                continue;
-            }
-            let dy = R::real((tile.origin[1] + y) as f64 + 0.5) - splat.mean_px[1];
-            let (mut alpha, bell, dx) = alpha_row(splat, dx0, dy);
-            if draws_nothing(&alpha) {
-                continue;
-            }
+        for y in set_bits(reached) {
+            let dy = rows.dy[y];
+            let (mut alpha, bell, dx) = rows.alpha(y, splat.opacity);
             let before = transmittance[y];
             let weight = step_row(&mut alpha, &mut transmittance[y]);
             let [d_red, d_green, d_blue] = [&d_rows[0][y], &d_rows[1][y], &d_rows[2][y]];
@@ -162,7 +185,7 @@ fn backward_tile<R: Real>(tile: &Tile<R>, image: &[R], d_image: &[R], d_pairs: &
                 let d_alpha = before[i] * shade - rest[y][i] / (R::ONE - alpha[i]);
                 // Neither a skipped nor a saturated alpha follows its splat.
                 let follows = (alpha[i] > R::ZERO) & (alpha[i] < R::real(ALPHA_MAX));
-                let d_alpha = if follows { d_alpha } else { R::ZERO };
+                let d_alpha = select_unpredictable(follows, d_alpha, R::ZERO);
                 d_power[i] = d_alpha * alpha[i];
                 sums.opacity[i] += d_alpha * bell[i];
             }
@@ -182,8 +205,5 @@ fn backward_tile<R: Real>(tile: &Tile<R>, image: &[R], d_image: &[R], d_pairs: &
             }
         }
         *d_pair = sums.gradient(splat);
-        if n % LOOK_EVERY == 0 && mark_dead(&transmittance, &mut dead) {
-            break;
-        }
     }
 }

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::row::{LOOK_EVERY, alpha_row, draws_nothing, mark_dead, step_row};
+use super::row::{ALL_ROWS, LOOK_EVERY, SplatRows, live_rows, set_bits, step_row};
 use super::{TILE_VALUES, Tile, TileSplat, TiledImage};
 use crate::ops::project::{Footprint, Splat};
 use crate::ops::simd::Level;
@@ -20,7 +20,21 @@ pub fn forward<R: Real>(
     lists: &TileLists,
     background: [R; 3],
 ) -> TiledImage<R> {
-    let mut image = TiledImage::zeros(lists.grid);
+    let mut image = TiledImage::default();
+    forward_into(&mut image, level, splats, footprints, lists, background);
+    image
+}
+
+/// [`forward`] into an image that is there.
+pub fn forward_into<R: Real>(
+    image: &mut TiledImage<R>,
+    level: Level,
+    splats: &[Splat<R>],
+    footprints: &[Footprint<R>],
+    lists: &TileLists,
+    background: [R; 3],
+) {
+    image.fit(lists.grid);
     let tiles = image.colour.par_chunks_mut(3 * TILE_VALUES).zip(image.transmittance.par_chunks_mut(TILE_VALUES));
     tiles.enumerate().for_each(|(t, (out, through))| {
         let tile = Tile::new(splats, footprints, lists, t);
@@ -29,25 +43,17 @@ pub fn forward<R: Real>(
             || forward_tile(&tile, background, out, through),
         );
     });
-    image
 }
 
 #[inline(always)]
 fn forward_tile<R: Real>(tile: &Tile<R>, background: [R; 3], out: &mut [R], through: &mut [R]) {
     let mut transmittance = [[R::ONE; TILE_PX]; TILE_PX];
     let mut colour = [[[R::ZERO; TILE_PX]; TILE_PX]; 3];
-    let mut dead = [false; TILE_PX];
-    for (n, TileSplat { splat, rows: (first, end) }) in tile.splats.iter().enumerate() {
-        let dx0 = R::real(tile.origin[0] as f64 + 0.5) - splat.mean_px[0];
-        for y in *first..*end {
-            if dead[y] {
-                continue;
-            }
-            let dy = R::real((tile.origin[1] + y) as f64 + 0.5) - splat.mean_px[1];
-            let (mut alpha, _, _) = alpha_row(splat, dx0, dy);
-            if draws_nothing(&alpha) {
-                continue;
-            }
+    let mut live = ALL_ROWS;
+    for (n, TileSplat { splat, reach }) in tile.splats.iter().enumerate() {
+        let rows = SplatRows::new(splat, *reach, tile.x, &tile.ys);
+        for y in set_bits(rows.reached & live) {
+            let (mut alpha, _, _) = rows.alpha(y, splat.opacity);
             let weight = step_row(&mut alpha, &mut transmittance[y]);
             for (plane, c) in colour.iter_mut().zip(splat.colour) {
                 for (out, w) in plane[y].iter_mut().zip(&weight) {
@@ -55,8 +61,11 @@ fn forward_tile<R: Real>(tile: &Tile<R>, background: [R; 3], out: &mut [R], thro
                 }
             }
         }
-        if n % LOOK_EVERY == 0 && mark_dead(&transmittance, &mut dead) {
-            break;
+        if n % LOOK_EVERY == 0 {
+            live = live_rows(live, &transmittance);
+            if live == 0 {
+                break;
+            }
         }
     }
     for (o, t) in through.iter_mut().zip(transmittance.as_flattened()) {

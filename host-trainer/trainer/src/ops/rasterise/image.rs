@@ -17,17 +17,25 @@ pub struct TiledImage<R> {
 
 /// Copies between tile order and planes `[3, height, width]`.
 impl<R: Real> TiledImage<R> {
-    /// An image of zeros for a grid of tiles.
-    pub fn zeros(grid: [usize; 2]) -> Self {
+    /// Makes room for a grid of tiles; what is there stays.
+    pub fn fit(&mut self, grid: [usize; 2]) {
         let n_pixels = grid[0] * grid[1] * TILE_VALUES;
-        Self { colour: vec![R::ZERO; 3 * n_pixels], transmittance: vec![R::ZERO; n_pixels] }
+        self.colour.resize(3 * n_pixels, R::ZERO);
+        self.transmittance.resize(n_pixels, R::ZERO);
     }
 
     /// Row-major planes `[3, height, width]`.
     pub fn to_planes(&self, size_px: [usize; 2]) -> Vec<R> {
+        let mut planes = Vec::new();
+        self.write_planes(size_px, &mut planes);
+        planes
+    }
+
+    /// [`Self::to_planes`] into a buffer.
+    pub fn write_planes(&self, size_px: [usize; 2], planes: &mut Vec<R>) {
         let [width, height] = size_px;
         let across = width.div_ceil(TILE_PX);
-        let mut planes = vec![R::ZERO; 3 * width * height];
+        planes.resize(3 * width * height, R::ZERO);
         planes.par_chunks_mut(width).enumerate().for_each(|(i, row)| {
             let (channel, y) = (i / height, i % height);
             for (tx, out) in row.chunks_mut(TILE_PX).enumerate() {
@@ -35,23 +43,30 @@ impl<R: Real> TiledImage<R> {
                 out.copy_from_slice(&self.colour[at..at + out.len()]);
             }
         });
-        planes
     }
 
     /// The reverse of [`Self::to_planes`]; pixels beyond the image are zero.
     pub fn from_planes(planes: &[R], size_px: [usize; 2]) -> Self {
+        let mut image = Self::default();
+        image.read_planes(planes, size_px);
+        image
+    }
+
+    /// [`Self::from_planes`] into an image that is there.
+    pub fn read_planes(&mut self, planes: &[R], size_px: [usize; 2]) {
         let [width, height] = size_px;
         let grid = size_px.map(|s| s.div_ceil(TILE_PX));
-        let mut image = Self::zeros(grid);
-        image.colour.par_chunks_mut(TILE_VALUES).enumerate().for_each(|(i, tile)| {
+        self.fit(grid);
+        self.colour.par_chunks_mut(TILE_VALUES).enumerate().for_each(|(i, tile)| {
             let (t, channel) = (i / 3, i % 3);
             let (x, y) = (t % grid[0] * TILE_PX, t / grid[0] * TILE_PX);
             let n = TILE_PX.min(width - x);
-            for (dy, out) in tile.chunks_exact_mut(TILE_PX).enumerate().take(height - y) {
+            for (dy, out) in tile.chunks_exact_mut(TILE_PX).enumerate() {
+                let (inside, beyond) = out.split_at_mut(if y + dy < height { n } else { 0 });
                 let at = (channel * height + y + dy) * width + x;
-                out[..n].copy_from_slice(&planes[at..at + n]);
+                inside.copy_from_slice(if inside.is_empty() { &[] } else { &planes[at..at + n] });
+                beyond.fill(R::ZERO);
             }
         });
-        image
     }
 }

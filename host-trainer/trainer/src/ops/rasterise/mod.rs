@@ -15,40 +15,44 @@ mod row;
 #[cfg(test)]
 mod tests;
 
-pub use backward::{background_gradient, backward};
-pub use forward::forward;
+pub use backward::{background_gradient, backward, backward_through};
+pub use forward::{forward, forward_into};
 pub use image::TiledImage;
 
 use super::project::{Footprint, Splat};
 use super::tiles::{TILE_PX, TileLists};
 use crate::real::Real;
-use row::rows;
+use row::Row;
 
 /// Values of one channel of a tile.
 const TILE_VALUES: usize = TILE_PX * TILE_PX;
 
-/// A splat in a tile, and the rows of the tile that it reaches.
+/// A splat in a tile.
 #[derive(Clone, Copy)]
 struct TileSplat<R> {
     splat: Splat<R>,
-    rows: (usize, usize),
+    /// −2·power where its alpha falls to the cutoff.
+    reach: R,
 }
 
 /// What one tile draws, nearest first.
 struct Tile<R> {
     /// Copies: gathered one after the other, so that the loads overlap, where the blending loop would wait for each.
     splats: Vec<TileSplat<R>>,
-    /// Its first pixel.
-    origin: [usize; 2],
+    /// Centre of its first column, and of its rows.
+    x: R,
+    ys: Row<R>,
 }
 
 impl<R: Real> Tile<R> {
     fn new(splats: &[Splat<R>], footprints: &[Footprint<R>], lists: &TileLists, t: usize) -> Self {
         let origin = [t % lists.grid[0] * TILE_PX, t / lists.grid[0] * TILE_PX];
         let gather = |entry: &u32| {
-            let (splat, footprint) = (splats[*entry as usize], &footprints[*entry as usize]);
-            TileSplat { splat, rows: rows(splat.mean_px[1], footprint.half_extent_px[1], origin[1]) }
+            let (splat, half) = (splats[*entry as usize], footprints[*entry as usize].half_extent_px[1]);
+            TileSplat { splat, reach: half * splat.column_precision * half }
         };
-        Self { splats: lists.tile(t).iter().map(gather).collect(), origin }
+        let centre = |p: usize| R::real(p as f64 + 0.5);
+        let ys = std::array::from_fn(|y| centre(origin[1] + y));
+        Self { splats: lists.tile(t).iter().map(gather).collect(), x: centre(origin[0]), ys }
     }
 }

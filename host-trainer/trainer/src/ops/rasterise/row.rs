@@ -1,5 +1,7 @@
 //! The arithmetic of one row of a tile: alpha, transmittance, the stop rule.
 
+use std::hint::select_unpredictable;
+
 use pocketsplat_core::rules::{ALPHA_MAX, TRANSMITTANCE_MIN};
 
 use crate::ops::project::{ALPHA_CUTOFF, Splat};
@@ -9,49 +11,74 @@ use crate::real::Real;
 /// One row of a tile: one vector.
 pub(super) type Row<R> = [R; TILE_PX];
 
-/// Rows `first..end` of a tile that a splat of this vertical reach has pixel centres in.
-#[inline(always)]
-pub(super) fn rows<R: Real>(mean_y: R, half_extent_y: R, tile_y: usize) -> (usize, usize) {
-    let centre: f64 = Into::<f64>::into(mean_y) - tile_y as f64 - 0.5;
-    let half: f64 = half_extent_y.into();
-    // The extent is rounded; the cutoff compares alpha.
-    let half = half + half * 1e-5 + 1e-4;
-    let limit = TILE_PX as f64;
-    let first = (centre - half).larger(-1.0).smaller(limit);
-    let end = (centre + half).larger(-1.0).smaller(limit);
-    #[expect(clippy::cast_possible_truncation, reason = "1 to 17 after the shift by 2")]
-    let bounds = ((first + 2.0) as i32, (end + 2.0) as i32);
-    // ceil(first) and floor(end) + 1, with the shift taken off; truncation is floor for what is positive.
-    let first = bounds.0 - 2 + i32::from(f64::from(bounds.0) < first + 2.0);
-    (first.max(0) as usize, (bounds.1 - 1).clamp(0, TILE_PX as i32) as usize)
+/// The rows of a tile as one splat sees them.
+pub(super) struct SplatRows<R> {
+    /// From the splat's centre to that of each row, pixels.
+    pub(super) dy: Row<R>,
+    /// From the ellipse's middle in each row to the centre of the tile's first column, pixels.
+    sheared: Row<R>,
+    /// The part of power = −½(p·dx² + k·dy²) that a row has in common.
+    constant: Row<R>,
+    /// −½p.
+    half: R,
+    /// One bit a row: whether the splat may draw a pixel of it.
+    pub(super) reached: u32,
 }
 
-/// Alpha along one row, before the stop rule; zero where it is not drawn.
-///
-/// Also gives exp(power) and dx − shear·dy for the backward pass.
-#[inline(always)]
-pub(super) fn alpha_row<R: Real>(splat: &Splat<R>, dx0: R, dy: R) -> (Row<R>, Row<R>, Row<R>) {
-    let (half, sheared) = (R::real(-0.5) * splat.row_precision, dx0 - splat.shear * dy);
-    let constant = R::real(-0.5) * splat.column_precision * dy * dy;
-    let (mut alpha, mut bell, mut dx) = ([R::ZERO; TILE_PX], [R::ZERO; TILE_PX], [R::ZERO; TILE_PX]);
-    for i in 0..TILE_PX {
-        dx[i] = sheared + R::real(i as f64);
-        let power = constant + half * dx[i] * dx[i];
-        bell[i] = power.larger(R::real(-80.0)).exp();
-        let raw = splat.opacity * bell[i];
-        alpha[i] = if raw < R::real(ALPHA_CUTOFF) { R::ZERO } else { raw.smaller(R::real(ALPHA_MAX)) };
+/// How much lower than at the cutoff the power of a row's best pixel may be: far more than rounding takes off.
+const POWER_SLACK: f64 = 1e-3;
+
+impl<R: Real> SplatRows<R> {
+    /// * `reach`: −2·power where alpha falls to the cutoff. * `x`: centre of the tile's first column. * `ys`: centres of its rows.
+    #[inline(always)]
+    pub(super) fn new(splat: &Splat<R>, reach: R, x: R, ys: &Row<R>) -> Self {
+        let dx0 = x - splat.mean_px[0];
+        let half = R::real(-0.5) * splat.row_precision;
+        let lowest = R::real(-0.5) * reach - R::real(POWER_SLACK);
+        let last = R::real((TILE_PX - 1) as f64);
+        let (mut dy, mut sheared, mut constant) = ([R::ZERO; TILE_PX], [R::ZERO; TILE_PX], [R::ZERO; TILE_PX]);
+        let mut reached = 0;
+        for y in 0..TILE_PX {
+            dy[y] = ys[y] - splat.mean_px[1];
+            sheared[y] = dx0 - splat.shear * dy[y];
+            constant[y] = R::real(-0.5) * splat.column_precision * dy[y] * dy[y];
+            // The place in the row that is closest to the ellipse's middle.
+            let nearest = sheared[y] + (-sheared[y]).larger(R::ZERO).smaller(last);
+            let best = constant[y] + half * nearest * nearest;
+            reached |= u32::from(best >= lowest) << y;
+        }
+        Self { dy, sheared, constant, half, reached }
     }
-    (alpha, bell, dx)
+
+    /// Alpha along a row, before the stop rule; zero where it is not drawn.
+    ///
+    /// Also gives exp(power) and dx for the backward pass.
+    #[inline(always)]
+    pub(super) fn alpha(&self, y: usize, opacity: R) -> (Row<R>, Row<R>, Row<R>) {
+        let (half, sheared, constant) = (self.half, self.sheared[y], self.constant[y]);
+        let (mut alpha, mut bell, mut dx) = ([R::ZERO; TILE_PX], [R::ZERO; TILE_PX], [R::ZERO; TILE_PX]);
+        for i in 0..TILE_PX {
+            dx[i] = sheared + R::real(i as f64);
+            let power = constant + half * dx[i] * dx[i];
+            bell[i] = power.larger(R::real(-80.0)).exp();
+            let raw = opacity * bell[i];
+            alpha[i] = select_unpredictable(raw < R::real(ALPHA_CUTOFF), R::ZERO, raw.smaller(R::real(ALPHA_MAX)));
+        }
+        (alpha, bell, dx)
+    }
 }
 
-/// Whether an ellipse's bounding box brought up a row that the ellipse does not reach.
+/// The numbers of the bits that are set, ascending.
 #[inline(always)]
-pub(super) fn draws_nothing<R: Real>(alpha: &Row<R>) -> bool {
-    let mut any = false;
-    for a in alpha {
-        any |= *a > R::ZERO;
-    }
-    !any
+pub(super) fn set_bits(mut bits: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(
+        #[inline(always)]
+        move || {
+            let y = (bits != 0).then_some(bits.trailing_zeros() as usize & (TILE_PX - 1))?;
+            bits &= bits - 1;
+            Some(y)
+        },
+    )
 }
 
 /// Applies the stop rule to one row: gives the weights T·α and moves T on.
@@ -62,18 +89,12 @@ pub(super) fn step_row<R: Real>(alpha: &mut Row<R>, transmittance: &mut Row<R>) 
     let mut weight = [R::ZERO; TILE_PX];
     for i in 0..TILE_PX {
         let t = transmittance[i];
+        // Negative for a stopped pixel, too.
         let after = t * (R::ONE - alpha[i]);
-        let live = t > R::ZERO;
-        let draws = live & (after >= R::real(TRANSMITTANCE_MIN));
-        alpha[i] = if draws { alpha[i] } else { R::ZERO };
+        let draws = after >= R::real(TRANSMITTANCE_MIN);
+        alpha[i] = select_unpredictable(draws, alpha[i], R::ZERO);
         weight[i] = alpha[i] * t;
-        transmittance[i] = if draws {
-            after
-        } else if live {
-            -t
-        } else {
-            t
-        };
+        transmittance[i] = select_unpredictable(draws, after, -t.abs());
     }
     weight
 }
@@ -81,21 +102,22 @@ pub(super) fn step_row<R: Real>(alpha: &mut Row<R>, transmittance: &mut Row<R>) 
 /// How many splats go by between two looks for rows that have stopped; looking costs as much as a row.
 pub(super) const LOOK_EVERY: usize = 8;
 
-/// Marks rows in which every pixel has stopped; says whether all have. Skipping them changes no pixel.
+/// The rows of `live`, one bit each, in which a pixel has not stopped. Skipping the others changes no pixel.
 #[inline(always)]
-pub(super) fn mark_dead<R: Real>(transmittance: &[Row<R>; TILE_PX], dead: &mut [bool; TILE_PX]) -> bool {
-    let mut all = true;
-    for (row, dead) in transmittance.iter().zip(dead) {
-        *dead = *dead
-            || !(reduce(
-                row,
-                #[inline(always)]
-                |a, b| a.larger(b),
-            ) > R::ZERO);
-        all &= *dead;
+pub(super) fn live_rows<R: Real>(live: u32, transmittance: &[Row<R>; TILE_PX]) -> u32 {
+    let mut left = 0;
+    for y in set_bits(live) {
+        let mut any = false;
+        for t in &transmittance[y] {
+            any |= *t > R::ZERO;
+        }
+        left |= u32::from(any) << y;
     }
-    all
+    left
 }
+
+/// All rows of a tile.
+pub(super) const ALL_ROWS: u32 = (1 << TILE_PX) - 1;
 
 /// Combines the lanes in a fixed tree, which vectorises.
 #[inline(always)]

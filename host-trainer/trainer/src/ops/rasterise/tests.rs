@@ -112,6 +112,43 @@ fn tiles_and_vectors_change_nothing() {
 }
 
 #[test]
+fn no_row_that_draws_is_left_out() {
+    // From specks to needles, all over and far from the tile, in the numbers of training.
+    let (mut n_drawn, mut n_left_out) = (0, 0);
+    for v in random(9, 20_000 * 7).chunks_exact(7) {
+        let variances = [v[0], v[1]].map(|v| 10f64.powf(2.0 + 4.0 * v));
+        let (sin, cos) = (3.2 * v[2]).sin_cos();
+        let xx = variances[0] * cos * cos + variances[1] * sin * sin + 0.3;
+        let yy = variances[0] * sin * sin + variances[1] * cos * cos + 0.3;
+        let xy = (variances[0] - variances[1]) * sin * cos;
+        let det = variances[0] * variances[1] + 0.3 * (variances[0] + variances[1]) + 0.09;
+        let opacity = (1.0 / 255.0 + v[3].abs().powi(4)) as f32;
+        let reach = 2.0 * (opacity * 255.0).ln();
+        let extent = |variance: f64| f64::from((reach.max(0.0) * variance as f32).sqrt());
+        let splat = Splat {
+            mean_px: [v[4] * (16.0 + extent(xx)), v[5] * (16.0 + extent(yy))].map(|c| c as f32),
+            shear: (xy / yy) as f32,
+            row_precision: (yy / det) as f32,
+            column_precision: (1.0 / yy) as f32,
+            opacity,
+            colour: [0.5; 3],
+        };
+        let footprint = Footprint { depth: 1.0, half_extent_px: [extent(xx) as f32, extent(yy) as f32] };
+        let lists = TileLists { grid: [1, 1], starts: vec![0, 1], entries: vec![0], ..TileLists::default() };
+        let tile = Tile::new(&[splat], &[footprint], &lists, 0);
+        let rows = row::SplatRows::new(&splat, tile.splats[0].reach, tile.x, &tile.ys);
+        for y in 0..TILE_PX {
+            let draws = rows.alpha(y, opacity).0.iter().any(|a| *a > 0.0);
+            let is_reached = rows.reached >> y & 1 == 1;
+            assert!(is_reached || !draws, "row {y} of {splat:?}");
+            n_drawn += u32::from(draws);
+            n_left_out += u32::from(!is_reached);
+        }
+    }
+    assert!(n_drawn > 10_000 && n_left_out > 10_000, "{n_drawn} drawn, {n_left_out} left out");
+}
+
+#[test]
 fn every_simd_level_gives_the_same_bits() {
     let exact = unpack(&scene(5, 80, 1.0));
     let lists = lists(&exact);

@@ -69,6 +69,18 @@ impl FromStr for DeviceChoice {
     }
 }
 
+impl fmt::Display for DeviceChoice {
+    /// As it is asked for.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Auto => f.write_str("auto"),
+            Self::Cpu => f.write_str("cpu"),
+            Self::Gpu(None) => f.write_str("gpu"),
+            Self::Gpu(Some(index)) => write!(f, "gpu:{index}"),
+        }
+    }
+}
+
 impl DeviceChoice {
     /// Opens the GPU that is asked for, or found, and says on stderr which; none where the CPU is to do it.
     pub(crate) fn open(self) -> Result<Option<SharedDevice<f32>>> {

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, bail};
 use clap::{Args as _, FromArgMatches as _};
 
+use super::devices::DeviceChoice;
 use super::loaded::LoadedCapture;
 use super::lpips::LpipsArgs;
 use super::workflow::{Place, Planner};
@@ -37,17 +38,17 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let mut asked = Vec::new();
     for run in spec.runs()? {
         let output = folder.join(format!("{}.psb", run.name));
-        let config = configured(&run, output).with_context(|| format!("{} is no run", run.name))?;
-        asked.push((run, config));
+        let (config, device) = configured(&run, output).with_context(|| format!("{} is no run", run.name))?;
+        asked.push((run, config, device));
     }
     // Seed by seed, since points drawn at random follow it: each capture is loaded once for each. Sorting keeps the order otherwise.
-    asked.sort_by_key(|(run, config)| (run.dataset.clone(), run.scene.clone(), config.train.seed));
+    asked.sort_by_key(|(run, config, _)| (run.dataset.clone(), run.scene.clone(), config.train.seed));
     let (mut loaded, mut planner) = (LoadedCapture::default(), Planner::default());
-    for (run, config) in asked {
+    for (run, config, device) in asked {
         let seed = config.train.seed;
         let AskedRun { name, dataset, scene, size, method, rate, .. } = run;
         let place = Place { dataset, scene, size, method, rate, seed };
-        planner.add(name, config, Some(place), &lpips, &mut loaded)?;
+        planner.add(name, config, device, Some(place), &lpips, &mut loaded)?;
     }
     let mut merge = vec!["tables".to_owned(), folder.display().to_string()];
     if let Some(published) = &spec.published {
@@ -56,8 +57,8 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     output::print_text(&planner.write(&folder, merge, &tables::FILES)?)
 }
 
-/// The configuration that `train` makes of a run's options.
-fn configured(run: &AskedRun, output: PathBuf) -> Result<RunConfig> {
+/// The configuration that `train` makes of a run's options, and what is to train it.
+fn configured(run: &AskedRun, output: PathBuf) -> Result<(RunConfig, DeviceChoice)> {
     let command = train_args::Args::augment_args(clap::Command::new("train")).allow_negative_numbers(true);
     let mut words = vec!["train".to_owned()];
     words.extend(run.options());
@@ -75,7 +76,7 @@ fn configured(run: &AskedRun, output: PathBuf) -> Result<RunConfig> {
     if config.effects.auto {
         bail!("runs that are compared need the same effects; force them, as effects = \"+view-colour\"");
     }
-    Ok(config)
+    Ok((config, args.device_choice()))
 }
 
 /// An error of the command line without its usage, which a plan does not have.

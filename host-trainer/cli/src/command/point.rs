@@ -10,23 +10,29 @@ use pocketsplat_trainer::train::module::pruning::Form;
 
 use super::bundle::BundleFile;
 use super::capture::CaptureArgs;
+use super::devices::DeviceChoice;
 use super::estimate::Estimate;
 use super::eval::{Evaluation, Measurements, Renderer, evaluate};
 use super::output;
 use super::train::{self, Standing, Start};
 use crate::config::RunConfig;
 
-/// Brings a point to its end, from wherever it stands; false when it was interrupted before.
-pub(super) fn trained(config: &RunConfig, capture: &Capture, stop: &AtomicBool) -> Result<bool> {
-    let (folder, start) = match Standing::of(&config.output.with_extension("run"), config)? {
-        Standing::New(folder) => (folder, Start::New(Estimate::try_out(capture, &config.train, false, None, stop)?)),
-        Standing::Begun(folder) => (folder, Start::Resumed),
+/// Brings a point to its end, from wherever it stands; false when it was interrupted before. A device is opened where something is left
+/// to do.
+pub(super) fn trained(config: &RunConfig, capture: &Capture, device: DeviceChoice, stop: &AtomicBool) -> Result<bool> {
+    let (folder, start, device) = match Standing::of(&config.output.with_extension("run"), config)? {
+        Standing::New(folder) => {
+            let device = device.open()?;
+            let warned = Estimate::try_out(capture, &config.train, false, device.clone(), stop)?;
+            (folder, Start::New(warned), device)
+        }
+        Standing::Begun(folder) => (folder, Start::Resumed, device.open()?),
         Standing::Finished => {
             eprintln!("trained before");
             return Ok(true);
         }
     };
-    Ok(train::train_in(folder, config, capture, start, None, stop)?.is_some())
+    Ok(train::train_in(folder, config, capture, start, device, stop)?.is_some())
 }
 
 /// The figures of a point on the held-out views, kept beside its bundle so that they are taken once.

@@ -11,6 +11,7 @@ use pocketsplat_trainer::train::config::Backbone;
 use pocketsplat_trainer::train::run::photographs_in;
 
 use super::capture::views_of;
+use super::devices::DeviceChoice;
 use super::eval::Evaluation;
 use super::loaded::LoadedCapture;
 use super::lpips::LpipsArgs;
@@ -44,6 +45,9 @@ pub(super) struct RunsArgs {
     run: RunOptions,
     #[command(flatten)]
     lpips: LpipsArgs,
+    /// What trains: cpu, gpu, gpu:N as `pocketsplat devices` lists them, or auto, a GPU where there is one
+    #[arg(long, value_name = "NAME", default_value_t = DeviceChoice::Cpu, help_heading = RUN)]
+    device: DeviceChoice,
     /// Write a Snakemake workflow that trains the runs into the folder, and train nothing.
     #[arg(long, help_heading = RUN)]
     plan: bool,
@@ -148,7 +152,7 @@ impl RunsArgs {
             output::check_writable(&config.output)?;
             let capture = loaded.of(&mut config)?;
             views_of(capture, Split::Test).context("runs are compared on held-out views; see --test-every")?;
-            if !point::trained(&config, capture, &stop)? {
+            if !point::trained(&config, capture, self.device, &stop)? {
                 eprintln!("the same command again resumes here");
                 return Ok(ExitCode::from(stop::INTERRUPTED));
             }
@@ -174,7 +178,7 @@ impl RunsArgs {
         for spec in specs {
             let config = spec.config(base)?;
             let name = spec.bundle.trim_end_matches(".psb").to_owned();
-            planner.add(name, config, None, &lpips, loaded)?;
+            planner.add(name, config, self.device, None, &lpips, loaded)?;
         }
         let arguments = std::env::args().skip(1).filter(|argument| argument != "--plan").collect();
         output::print_text(&planner.write(&base.output, arguments, files)?)?;

@@ -74,11 +74,11 @@ pub(crate) struct Args {
     /// Iteration to branch off after, one that the other run was given as --fork-at.
     #[arg(long, value_name = "STEP", requires = "from", help_heading = RUN, hide_short_help = true)]
     at: Option<u32>,
-    /// What draws and compares images: cpu, gpu, gpu:N as `pocketsplat devices` lists them, or auto, a GPU where there is one
+    /// What trains: cpu, gpu, gpu:N as `pocketsplat devices` lists them, or auto, a GPU where there is one
     /// [default: cpu]
     #[arg(long = "device", value_name = "NAME", default_value = "cpu", hide_default_value = true, help_heading = RUN,
         hide_short_help = true)]
-    draws_on: DeviceChoice,
+    trains_on: DeviceChoice,
     /// Start anew where an unfinished run lies [default: refuse]
     #[arg(short = 'w', long, conflicts_with = "resume", help_heading = RUN)]
     overwrite: bool,
@@ -221,9 +221,14 @@ impl Args {
         self.json
     }
 
-    /// The GPU that draws and compares images, where one is asked for or found; says on stderr which.
+    /// What trains, as it was asked for.
+    pub(crate) fn device_choice(&self) -> DeviceChoice {
+        self.trains_on
+    }
+
+    /// The GPU that trains, where one is asked for or found; says on stderr which.
     pub(crate) fn device(&self) -> Result<Option<SharedDevice<f32>>> {
-        self.draws_on.open()
+        self.trains_on.open()
     }
 
     /// The port of the page about the run while it goes on, if there is to be one; 0 for any.

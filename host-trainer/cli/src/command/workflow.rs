@@ -10,6 +10,7 @@ use pocketsplat_trainer::train::run::shell_word;
 use serde::{Deserialize, Serialize};
 
 use super::capture::views_of;
+use super::devices::DeviceChoice;
 use super::estimate::{Estimate, Expected, duration};
 use super::loaded::LoadedCapture;
 use super::output;
@@ -55,12 +56,19 @@ pub(super) struct PlannedRun {
     /// Where it stands in tables; none where another command merges the runs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) place: Option<Place>,
+    /// What trains: the `--device` of `train`.
+    #[serde(default = "cpu")]
+    pub(super) device: String,
     /// Options of `eval`.
     pub(super) measure: Vec<String>,
     pub(super) threads: usize,
     /// What a queue is asked for: the trainer's estimate with a margin.
     pub(super) memory_mb: u64,
     pub(super) minutes: u64,
+}
+
+fn cpu() -> String {
+    DeviceChoice::Cpu.to_string()
 }
 
 /// Where a run stands in tables.
@@ -93,6 +101,7 @@ impl Planner {
         &mut self,
         name: String,
         mut config: RunConfig,
+        device: DeviceChoice,
         place: Option<Place>,
         lpips: &[String],
         loaded: &mut LoadedCapture,
@@ -112,6 +121,7 @@ impl Planner {
             name,
             capture: config.dataset.clone(),
             place,
+            device: device.to_string(),
             measure,
             threads: rayon::current_num_threads(),
             memory_mb: above(MEMORY_MARGIN * expected.memory_bytes / 1e6),

@@ -1,33 +1,26 @@
 //! The stages of a step between the anchors and their splats, on a GPU: the order of `step/block.rs`.
 
-use super::ops::adaptive_step::AdaptiveStep;
 use super::ops::detail::Detail;
 use super::ops::gather::Gather;
 use super::ops::head::Head;
 use super::ops::head_input::HeadInput;
 use super::ops::neural_gaussians::{HeadOutputs, NeuralGaussians, ViewAnchors};
-use super::ops::perturb::{self, Perturb};
 use super::ops::prefilter::Prefilter;
 use super::ops::project::Project;
 use super::scene::{DeviceScene, FEATURES, LOG_SCALES, MASK_LOGITS, OFFSETS};
 use super::{Buffer, Commands, Gpu, GpuError};
 use crate::ops::Pinhole;
 use crate::ops::neural_gaussians::Gaussian;
-use crate::ops::noise::Stream;
 use crate::ops::project::{Footprint, Splat};
 
 /// Heads that every scene has.
 const N_HEADS: usize = 3;
-/// Kinds of coded values.
-const N_CODED: usize = 3;
 
 /// Its kernels, and the anchors of the last view.
 #[derive(Debug)]
 pub(super) struct GpuAnchors {
     prefilter: Prefilter,
     gather: Gather,
-    adaptive_step: AdaptiveStep,
-    perturb: Perturb,
     head_input: HeadInput,
     head: Head,
     neural_gaussians: NeuralGaussians,
@@ -35,10 +28,8 @@ pub(super) struct GpuAnchors {
     project: Project,
     positions: Buffer<f32>,
     /// Features, log-scales, offsets, mask logits, as coding leaves them, and their gradients; `[n, width]`.
-    values: [Buffer<f32>; 4],
+    pub(super) values: [Buffer<f32>; 4],
     pub(super) gradients: [Buffer<f32>; 4],
-    steps: Buffer<f32>,
-    residuals: [Buffer<f32>; N_CODED],
     input: Buffer<f32>,
     d_input: Buffer<f32>,
     hidden: [Buffer<f32>; N_HEADS],
@@ -52,7 +43,7 @@ pub(super) struct GpuAnchors {
 }
 
 /// Room for one value each.
-fn rooms<const N: usize>(gpu: &Gpu, what: &'static str) -> Result<[Buffer<f32>; N], GpuError> {
+pub(super) fn rooms<const N: usize>(gpu: &Gpu, what: &'static str) -> Result<[Buffer<f32>; N], GpuError> {
     let all: Vec<_> = (0..N).map(|_| Buffer::zeros(gpu, what, 1)).collect::<Result<_, _>>()?;
     Ok(all.try_into().expect("N of them"))
 }
@@ -64,8 +55,6 @@ impl GpuAnchors {
         Ok(Self {
             prefilter: Prefilter::new(gpu)?,
             gather: Gather::new(gpu),
-            adaptive_step: AdaptiveStep::new(gpu),
-            perturb: Perturb::new(gpu),
             head_input: HeadInput::new(gpu),
             head: Head::new(gpu)?,
             neural_gaussians: NeuralGaussians::new(gpu),
@@ -74,8 +63,6 @@ impl GpuAnchors {
             positions: room("positions of the view")?,
             values: rooms(gpu, "values of the view")?,
             gradients: rooms(gpu, "gradients of the view's values")?,
-            steps: room("steps of the view's values")?,
-            residuals: rooms(gpu, "noise of the view's values")?,
             input: room("inputs of the heads")?,
             d_input: room("gradients of the heads' inputs")?,
             hidden: rooms(gpu, "hidden units of the heads")?,
@@ -121,13 +108,9 @@ impl GpuAnchors {
     fn fit(&mut self, gpu: &Gpu, scene: &DeviceScene, n: usize) -> Result<(), GpuError> {
         let (shape, widths) = (&scene.shape, scene.widths());
         self.positions.fit(gpu, 3 * n)?;
-        self.steps.fit(gpu, N_CODED * n)?;
         for (width, buffers) in widths.iter().zip(self.values.iter_mut().zip(&mut self.gradients)) {
             buffers.0.fit(gpu, n * width)?;
             buffers.1.fit(gpu, n * width)?;
-        }
-        for (width, residuals) in widths.iter().zip(&mut self.residuals) {
-            residuals.fit(gpu, n * width)?;
         }
         self.input.fit(gpu, n * shape.head_inputs())?;
         self.d_input.fit(gpu, n * shape.head_inputs())?;
@@ -141,24 +124,6 @@ impl GpuAnchors {
         }
         self.gaussians.fit(gpu, n * shape.n_offsets)?;
         self.d_gaussians.fit(gpu, n * shape.n_offsets)
-    }
-
-    /// Adds noise of fixed steps to the values.
-    pub(super) fn add_noise(
-        &self,
-        commands: &mut Commands<'_>,
-        scene: &DeviceScene,
-        stream: Stream,
-        steps: [f32; N_CODED],
-    ) {
-        self.adaptive_step.fixed(commands, steps, &self.steps);
-        let mut first = 0;
-        for (index, width) in scene.widths().into_iter().take(N_CODED).enumerate() {
-            let group = perturb::Group { index, first, width };
-            let (values, residuals) = (&self.values[index], &self.residuals[index]);
-            self.perturb.with_noise(commands, stream, group, self.visible(), &self.steps, values, residuals);
-            first += width;
-        }
     }
 
     /// From the values to splats.

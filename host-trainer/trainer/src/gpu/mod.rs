@@ -9,9 +9,12 @@
 mod adapter;
 mod anchors;
 mod buffer;
+mod coding;
+mod context;
 mod error;
 #[expect(clippy::module_inception, reason = "the device, which the folder is named for")]
 mod gpu;
+mod group;
 mod image;
 mod kernel;
 pub mod ops;

@@ -1,6 +1,8 @@
 //! A scene in the device's memory, with all that training moves and keeps of it.
 
-use super::ops::adam::{Adam, Moments};
+use super::context::DeviceContext;
+use super::group::Group;
+use super::ops::adam::Adam;
 use super::ops::head::{HeadLayout, parameters_of};
 use super::ops::prefilter::Shown;
 use super::ops::statistics::Sums;
@@ -14,25 +16,6 @@ pub(super) const FEATURES: usize = 0;
 pub(super) const LOG_SCALES: usize = 1;
 pub(super) const OFFSETS: usize = 2;
 pub(super) const MASK_LOGITS: usize = 3;
-
-/// Parameters and their moments.
-#[derive(Debug)]
-pub(super) struct Group {
-    pub(super) values: Buffer<f32>,
-    moments: Moments,
-}
-
-impl Group {
-    fn upload(gpu: &Gpu, what: &'static str, values: &[f32], moments: &adam::Moments<f32>) -> Result<Self, GpuError> {
-        Ok(Self { values: Buffer::upload(gpu, what, values)?, moments: Moments::upload(gpu, moments)? })
-    }
-
-    fn store(&self, gpu: &Gpu, values: &mut Vec<f32>, moments: &mut adam::Moments<f32>) -> Result<(), GpuError> {
-        *values = self.values.read(gpu)?;
-        *moments = self.moments.read(gpu)?;
-        Ok(())
-    }
-}
 
 /// A head, its moments and its gradient.
 #[derive(Debug)]
@@ -81,6 +64,8 @@ pub(super) struct DeviceScene {
     pub(super) anchors: [Group; 4],
     /// In file order.
     pub(super) heads: Vec<DeviceHead>,
+    /// A grid and its network, where the scene has them.
+    pub(super) context: Option<DeviceContext>,
     opacity_sums: Buffer<f32>,
     n_views: Buffer<u32>,
     gradient_sums: Buffer<f32>,
@@ -90,7 +75,7 @@ pub(super) struct DeviceScene {
 impl DeviceScene {
     /// Copies everything to the device.
     pub(super) fn upload(gpu: &Gpu, trained: &Trained<'_, f32>) -> Result<Self, GpuError> {
-        let Trained { scene, moments, heads, sums, counts } = trained;
+        let Trained { scene, moments, heads, context, sums, counts } = trained;
         let (anchors, n) = (&scene.anchors, scene.anchors.len());
         let positions: Vec<f32> = (0..n).flat_map(|a| scene.position(a)).collect();
         let unranked = vec![1.0; if anchors.prune_rank.is_empty() { n } else { 0 }];
@@ -111,6 +96,10 @@ impl DeviceScene {
             heads: of_heads
                 .map(|(head, (first, second))| DeviceHead::upload(gpu, head, [first, second]))
                 .collect::<Result<_, _>>()?,
+            context: match context {
+                Some(moments) => DeviceContext::upload(gpu, scene, moments)?,
+                None => None,
+            },
             opacity_sums: Buffer::upload(gpu, "sums of opacities", sums[0])?,
             gradient_sums: Buffer::upload(gpu, "sums of gradients", sums[1])?,
             n_views: Buffer::upload(gpu, "numbers of views", counts[0])?,
@@ -120,7 +109,7 @@ impl DeviceScene {
 
     /// Copies everything back.
     pub(super) fn store(&self, gpu: &Gpu, trained: TrainedMut<'_, f32>) -> Result<(), GpuError> {
-        let TrainedMut { scene, moments, heads, sums, counts } = trained;
+        let TrainedMut { scene, moments, heads, context, sums, counts } = trained;
         let anchors = &mut scene.anchors;
         let values = [&mut anchors.features, &mut anchors.log_scales, &mut anchors.offsets, &mut anchors.mask_logits];
         for (group, (values, moments)) in self.anchors.iter().zip(values.into_iter().zip(moments)) {
@@ -130,6 +119,9 @@ impl DeviceScene {
         let of_heads = scene.heads.each_mut().zip(first.each_mut().zip(second.each_mut()));
         for (own, (head, (first, second))) in self.heads.iter().zip(of_heads) {
             own.store(gpu, head, [first, second])?;
+        }
+        if let (Some(own), Some(moments)) = (&self.context, context) {
+            own.store(gpu, scene, moments)?;
         }
         let [opacities, gradients] = sums;
         (*opacities, *gradients) = (self.opacity_sums.read(gpu)?, self.gradient_sums.read(gpu)?);
@@ -182,8 +174,10 @@ impl DeviceScene {
             }
         }
         for (head, step) in self.heads.iter().zip(&steps.heads) {
-            let Group { values, moments } = &head.parameters;
-            adam.update(commands, *step, values, moments, &head.gradient);
+            head.parameters.move_by(adam, commands, *step, &head.gradient);
+        }
+        if let (Some(context), Some(steps)) = (&self.context, steps.context) {
+            context.move_by(adam, commands, steps);
         }
     }
 }

@@ -3,6 +3,8 @@
 use std::time::Instant;
 
 use super::anchors::GpuAnchors;
+use super::coding::{GpuCoding, N_RATE_TOTALS};
+use super::context::DeviceContext;
 use super::image::{FIRST_FREE_TOTAL, GpuImage};
 use super::ops::adam::Adam;
 use super::ops::gather::Gather;
@@ -15,17 +17,19 @@ use super::scene::{DeviceScene, FEATURES};
 use super::{Bind, Buffer, Commands, Gpu, GpuError};
 use crate::ops::normality::Weights;
 use crate::ops::opacity_target;
-use crate::scene::ModelShape;
-use crate::step::coding::Coding;
+use crate::scene::{ModelShape, Scene};
+use crate::step::coding::{Coding, RateTerms};
 use crate::step::{
     DeviceFault, DeviceTerms, GroupSteps, ImageStages, Loss, Resident, ResidentStep, StageSeconds, StepDevice,
     StepReport, TargetView, Trained, TrainedMut,
 };
 
-/// Places of sums beside the image's: volume and number of Gaussians, opacities, high frequencies.
+/// Places of sums beside the image's: volume and number of Gaussians, opacities, high frequencies, the
+/// rate's.
 const VOLUME: usize = FIRST_FREE_TOTAL;
 const OPACITIES: usize = VOLUME + 2;
 const HIGH_FREQUENCIES: usize = OPACITIES + 1;
+const RATE: usize = HIGH_FREQUENCIES + 1;
 /// Places of the counters: gradients that are not sound, and splats.
 const UNSOUND: usize = 0;
 const SPLATS: usize = 1;
@@ -36,6 +40,7 @@ pub struct GpuStep {
     gpu: Gpu,
     images: GpuImage,
     anchors: GpuAnchors,
+    coding: GpuCoding,
     volume: Volume,
     opacity_target: OpacityTarget,
     normality: Normality,
@@ -69,6 +74,7 @@ impl GpuStep {
         let made = Self {
             images: GpuImage::new(gpu)?,
             anchors: GpuAnchors::new(gpu)?,
+            coding: GpuCoding::new(gpu)?,
             volume: Volume::new(gpu)?,
             opacity_target: OpacityTarget::new(gpu)?,
             normality: Normality::new(gpu)?,
@@ -104,11 +110,18 @@ impl GpuStep {
         images.splats.fit(&gpu, n_slots)?;
         images.footprints.fit(&gpu, n_slots)?;
 
-        let mut commands = Commands::new(&gpu);
-        if let Coding::Noise { stream, steps } = coding {
-            anchors.add_noise(&mut commands, scene, *stream, *steps);
+        let (visible, values) = (anchors.visible(), &anchors.values);
+        match coding {
+            Coding::Raw => {}
+            Coding::Noise { stream, steps } => {
+                let mut commands = Commands::new(&gpu);
+                self.coding.noise(&gpu, &mut commands, scene, visible, values, (*stream, *steps))?;
+                commands.submit()?;
+            }
+            Coding::Context { stream, rate, .. } => {
+                self.coding.forward(&gpu, scene, visible, values, *stream, rate)?;
+            }
         }
-        commands.submit()?;
         stages.context = laps.lap()?;
         let mut commands = Commands::new(&gpu);
         anchors.forward(&gpu, &mut commands, scene, camera, &images.splats, &images.footprints)?;
@@ -135,13 +148,21 @@ impl GpuStep {
         commands.submit()?;
         stages.rasterise_backward = laps.lap()?;
         let mut commands = Commands::new(&gpu);
-        self.anchors_backward(&gpu, &mut commands, target, loss, &terms, limit)?;
+        self.anchors_backward(&gpu, &mut commands, target, loss, &terms)?;
         commands.submit()?;
         stages.anchors_backward = laps.lap()?;
-        self.report(target, loss, &terms, n_pairs, stages)
+        let mut commands = Commands::new(&gpu);
+        if let Coding::Context { rate, .. } = coding {
+            self.coding_backward(&gpu, &mut commands, rate)?;
+        }
+        self.add_normality(&gpu, &mut commands, &terms)?;
+        self.count(&mut commands, limit);
+        commands.submit()?;
+        stages.context_backward = laps.lap()?;
+        self.report(target, loss, &terms, coding, n_pairs, stages)
     }
 
-    /// From the gradients of the splats to those of all parameters.
+    /// From the gradients of the splats to those of the values of the view's anchors and of the heads.
     fn anchors_backward(
         &mut self,
         gpu: &Gpu,
@@ -149,47 +170,48 @@ impl GpuStep {
         target: &TargetView<'_, f32>,
         loss: &Loss<'_, f32>,
         terms: &DeviceTerms,
-        limit: f32,
     ) -> Result<(), GpuError> {
-        let Self { images, anchors, volume, opacity_target, normality, gather, raw_features, .. } = self;
+        let Self { images, anchors, volume, opacity_target, .. } = self;
         let (scene, totals) = (self.scene.as_ref().expect("loaded before"), &images.totals);
         commands.clear(&anchors.d_gaussians);
+        let (gaussians, d_gaussians) = (&anchors.gaussians, &anchors.d_gaussians);
         let [mean, weight] = terms.opacity_target;
         if weight > 0.0 {
-            let (gaussians, d_gaussians) = (&anchors.gaussians, &anchors.d_gaussians);
-            let target = mean * gaussians.len() as f64;
-            opacity_target.forward_backward(
-                gpu,
-                commands,
-                gaussians,
-                target,
-                weight,
-                d_gaussians,
-                totals,
-                OPACITIES,
-            )?;
+            let aim = mean * gaussians.len() as f64;
+            opacity_target.forward_backward(gpu, commands, gaussians, aim, weight, d_gaussians, totals, OPACITIES)?;
         }
         anchors.splats_backward(commands, scene, target.camera, &images.footprints, &images.d_splats);
-        let (gaussians, d_gaussians) = (&anchors.gaussians, &anchors.d_gaussians);
         volume.forward(gpu, commands, gaussians, totals, VOLUME)?;
         volume.backward(commands, gaussians, loss.weights.volume as f32, totals, VOLUME, d_gaussians);
-        anchors.backward(gpu, commands, scene)?;
-        if let Some(weights) = normality_of(terms) {
-            let width = scene.shape.feature_dim;
-            raw_features.fit(gpu, anchors.visible().len() * width)?;
-            gather.run(commands, &scene.anchors[FEATURES].values, width, anchors.visible(), raw_features);
-            let d_features = &anchors.gradients[FEATURES];
-            normality.forward_backward(gpu, commands, &weights, raw_features, width, d_features)?;
-        }
-        self.count(commands, limit);
-        Ok(())
+        anchors.backward(gpu, commands, scene)
+    }
+
+    /// The rate's gradients, and those of the context model.
+    fn coding_backward(&mut self, gpu: &Gpu, commands: &mut Commands<'_>, terms: &RateTerms) -> Result<(), GpuError> {
+        let Self { images, anchors, coding, .. } = self;
+        let scene = self.scene.as_ref().expect("loaded before");
+        let (values, gradients, totals) = (&anchors.values, &anchors.gradients, (&images.totals, RATE));
+        coding.backward(gpu, commands, scene, anchors.row_of_anchor(), values, gradients, terms, totals)
+    }
+
+    /// The term on raw features.
+    fn add_normality(&mut self, gpu: &Gpu, commands: &mut Commands<'_>, terms: &DeviceTerms) -> Result<(), GpuError> {
+        let Some(weights) = normality_of(terms) else { return Ok(()) };
+        let Self { anchors, normality, gather, raw_features, .. } = self;
+        let scene = self.scene.as_ref().expect("loaded before");
+        let width = scene.shape.feature_dim;
+        raw_features.fit(gpu, anchors.visible().len() * width)?;
+        gather.run(commands, &scene.anchors[FEATURES].values, width, anchors.visible(), raw_features);
+        normality.forward_backward(gpu, commands, &weights, raw_features, width, &anchors.gradients[FEATURES])
     }
 
     /// Counts gradients that are not sound, and splats.
     fn count(&self, commands: &mut Commands<'_>, limit: f32) {
         let scene = self.scene.as_ref().expect("loaded before");
         commands.clear(&self.counters);
+        let of_context = scene.context.iter().flat_map(DeviceContext::gradients);
         let arrays = self.anchors.gradients.iter().chain(scene.heads.iter().map(|head| &head.gradient));
+        let arrays = arrays.chain(of_context);
         let d_splats = (&self.images.d_splats as &dyn Bind, 9 * self.images.d_splats.len());
         for (values, n_values) in arrays.map(|array| (array as &dyn Bind, array.len())).chain([d_splats]) {
             self.sound.count(commands, values, n_values, limit, &self.counters, UNSOUND);
@@ -204,6 +226,7 @@ impl GpuStep {
         target: &TargetView<'_, f32>,
         loss: &Loss<'_, f32>,
         terms: &DeviceTerms,
+        coding: &Coding<'_, f32>,
         n_pairs: usize,
         stages: StageSeconds,
     ) -> Result<ResidentStep<f32>, GpuError> {
@@ -220,14 +243,21 @@ impl GpuStep {
         }
         let (lambda, n_gaussians) = (loss.weights.dssim as f32, totals[VOLUME + 1]);
         let volumes = loss.weights.volume as f32 * totals[VOLUME] / n_gaussians.max(1.0);
-        let total = (1.0 - lambda) * compared.l1 + lambda * (1.0 - compared.similarity) + volumes + by_modules;
+        let mut total = (1.0 - lambda) * compared.l1 + lambda * (1.0 - compared.similarity) + volumes + by_modules;
+        let mut rate = None;
+        if let Coding::Context { .. } = coding {
+            let scene = self.scene.as_ref().expect("loaded before");
+            let found = self.coding.rate(&self.gpu, scene, &totals[RATE..RATE + N_RATE_TOTALS])?;
+            total += found.term;
+            rate = Some(found.report);
+        }
         let report = StepReport {
             loss: total,
             squared_error: compared.squared_sum / (3 * target.n_counted()) as f64,
             n_gaussians: n_gaussians as usize,
             n_splats: counters[SPLATS] as usize,
             n_pairs,
-            rate: None,
+            rate,
             stages,
         };
         let d_background = GpuImage::d_background_of(&totals);
@@ -283,8 +313,13 @@ impl StepDevice<f32> for GpuStep {
 }
 
 impl Resident<f32> for GpuStep {
-    fn can_step(&self, shape: &ModelShape, loss: &Loss<'_, f32>, coding: &Coding<'_, f32>) -> bool {
-        matches!(coding, Coding::Raw | Coding::Noise { .. }) && terms_of(loss, shape).is_some()
+    fn can_step(&self, scene: &Scene<f32>, loss: &Loss<'_, f32>, coding: &Coding<'_, f32>) -> bool {
+        let follows = scene.context.as_ref().is_none_or(|model| model.shifts.is_some());
+        let is_known = match coding {
+            Coding::Raw | Coding::Noise { .. } => true,
+            Coding::Context { exact, .. } => exact.is_none() && !follows,
+        };
+        is_known && terms_of(loss, &scene.shape).is_some()
     }
 
     fn load(&mut self, trained: &Trained<'_, f32>) -> Result<(), DeviceFault> {

@@ -13,7 +13,7 @@ use crate::real::Real;
 use crate::scene::{ContextModel, ContextNetwork, Head, ModelShape, Scene};
 
 /// Number of the draw that decides whether an anchor is in the sample; channels are fewer.
-const SAMPLE_DRAW: u32 = u32::MAX;
+pub const SAMPLE_DRAW: u32 = u32::MAX;
 
 /// The values of a block, or their gradients: `[n, F]`, `[n, 6]` or `[n, 4]`, `[n, 3K]`.
 pub(super) type Values<'a, R> = [&'a mut Vec<R>; N_GROUPS];

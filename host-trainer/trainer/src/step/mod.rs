@@ -27,6 +27,7 @@ use crate::ops::{Pinhole, prefilter, rasterise, tiles, volume};
 use crate::real::Real;
 use crate::scene::{Head, Heads, ModelShape, Scene};
 pub use block::Block;
+pub use coded::SAMPLE_DRAW;
 use coded::{Network, Weights};
 pub use coding::Phase;
 use coding::{Coding, RateReport};
@@ -37,7 +38,9 @@ pub use image::{ImageLoss, ImageStages, ImageTerm};
 pub use loss::{DeviceTerms, ImagePair, Loss, LossWeights, StepInfo, Terms};
 use parents::Parents;
 pub use probe::ImageError;
-pub use resident::{GroupSteps, Resident, ResidentStep, StepDevice, Trained, TrainedMut};
+pub use resident::{
+    ContextMoments, ContextMomentsMut, GroupSteps, Resident, ResidentStep, StepDevice, Trained, TrainedMut,
+};
 pub use stages::StageSeconds;
 use stages::StageTimer;
 pub(crate) use target::clear_masked;

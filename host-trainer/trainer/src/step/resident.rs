@@ -7,7 +7,7 @@ use super::fault::DeviceFault;
 use super::image::ImageStages;
 use super::{Loss, StepReport, TargetView};
 use crate::ops::adam::{Moments, Step};
-use crate::scene::{Heads, ModelShape, Scene};
+use crate::scene::{ContextNetwork, Heads, Scene};
 
 /// What training keeps for the anchors and heads of a scene: what goes to a device.
 #[derive(Clone, Copy, Debug)]
@@ -18,13 +18,33 @@ pub struct Trained<'a, R> {
     pub moments: [&'a Moments<R>; 4],
     /// First and second moments of the heads.
     pub heads: &'a [Heads<R>; 2],
+    /// Of the context model, where there is one.
+    pub context: Option<ContextMoments<'a, R>>,
     /// `[n]` sums of opacities, and `[n, K]` sums of gradients on the screen; see `train::statistics`.
     pub sums: [&'a [R]; 2],
     /// `[n]` views that saw an anchor, and `[n, K]` those that drew an offset.
     pub counts: [&'a [u32]; 2],
 }
 
-/// The same, to be overwritten with what comes back; lattice and shape stay.
+/// Moments of a context model.
+#[derive(Clone, Copy, Debug)]
+pub struct ContextMoments<'a, R> {
+    /// Of the grid's rows.
+    pub rows: &'a Moments<R>,
+    /// First and second moments of the networks.
+    pub networks: [&'a [ContextNetwork<R>]; 2],
+}
+
+/// The same, to be overwritten.
+#[derive(Debug)]
+pub struct ContextMomentsMut<'a, R> {
+    /// See [`ContextMoments::rows`].
+    pub rows: &'a mut Moments<R>,
+    /// See [`ContextMoments::networks`].
+    pub networks: [&'a mut [ContextNetwork<R>]; 2],
+}
+
+/// [`Trained`], to be overwritten with what comes back; lattice and shape stay.
 #[derive(Debug)]
 pub struct TrainedMut<'a, R> {
     /// See [`Trained::scene`].
@@ -33,6 +53,8 @@ pub struct TrainedMut<'a, R> {
     pub moments: [&'a mut Moments<R>; 4],
     /// See [`Trained::heads`].
     pub heads: &'a mut [Heads<R>; 2],
+    /// See [`Trained::context`].
+    pub context: Option<ContextMomentsMut<'a, R>>,
     /// See [`Trained::sums`].
     pub sums: [&'a mut Vec<R>; 2],
     /// See [`Trained::counts`].
@@ -46,6 +68,8 @@ pub struct GroupSteps<R> {
     pub anchors: [Option<Step<R>>; 4],
     /// The heads in file order.
     pub heads: Vec<Step<R>>,
+    /// Networks and grid of the context model, where the last step asked it.
+    pub context: Option<[Step<R>; 2]>,
 }
 
 /// What a step on a device gives back, besides the gradients, which stay there.
@@ -74,7 +98,7 @@ pub trait StepDevice<R>: fmt::Debug + Send {
 /// A device that holds one scene. Each function works on what [`Self::load`] brought last.
 pub trait Resident<R> {
     /// Whether a step with these terms can be computed there.
-    fn can_step(&self, shape: &ModelShape, loss: &Loss<'_, R>, coding: &Coding<'_, R>) -> bool;
+    fn can_step(&self, scene: &Scene<R>, loss: &Loss<'_, R>, coding: &Coding<'_, R>) -> bool;
 
     /// Takes everything over.
     ///

@@ -15,7 +15,7 @@ pub mod optimiser;
 mod outcome;
 mod probing;
 pub(crate) mod read_ahead;
-mod resident;
+pub mod resident;
 pub mod run;
 pub mod statistics;
 pub mod steering;

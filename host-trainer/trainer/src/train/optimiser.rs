@@ -111,12 +111,21 @@ impl<R: Real> Optimiser<R> {
                 (mask_rate > 0.0).then(|| step(mask_rate)),
             ],
             heads: of_heads.iter().map(|rate| step(rate.at(progress))).collect(),
+            context: None,
         }
+    }
+
+    /// The same for the context model, where the last step asked it: networks and grid.
+    pub fn next_of_context(&mut self, rates: &Rates, progress: f64) -> Option<[Step<R>; 2]> {
+        let moments = self.context.as_mut()?;
+        moments.n_steps += 1;
+        Some([rates.context, rates.grid].map(|rate| Step::new(rate.at(progress), moments.n_steps)))
     }
 
     /// Moves every parameter by the gradients that the last step left in `workspace`; see [`Self::next`].
     pub fn apply(&mut self, scene: &mut Scene<R>, workspace: &Workspace<R>, rates: &Rates, progress: f64, extent: f64) {
         let steps = self.next(rates, progress, extent);
+        let of_context = workspace.d_context.as_ref().and_then(|_| self.next_of_context(rates, progress));
         // Where the gradient of each anchor lies: block and row, or nowhere for an anchor that the view did not see.
         let mut gradient_of = vec![(u32::MAX, 0u32); scene.anchors.len()];
         for (b, block) in (0u32..).zip(workspace.blocks()) {
@@ -166,10 +175,10 @@ impl<R: Real> Optimiser<R> {
         for (((head, gradient), (first, second)), step) in all {
             update_groups(step, head.groups_mut(), gradient.groups(), first.groups_mut(), second.groups_mut());
         }
-        if let (Some(model), Some(gradient), Some(moments)) = (context, &workspace.d_context, &mut self.context) {
-            moments.n_steps += 1;
+        if let (Some(model), Some(gradient), Some(moments), Some([of_network, of_rows])) =
+            (context, &workspace.d_context, &mut self.context, of_context)
+        {
             let [first, second] = &mut moments.networks;
-            let of_network = Step::new(rates.context.at(progress), moments.n_steps);
             let networks = model.networks.iter_mut().zip(&gradient.networks).zip(first.iter_mut().zip(second));
             for ((network, gradient), (first, second)) in networks {
                 update_groups(
@@ -180,7 +189,6 @@ impl<R: Real> Optimiser<R> {
                     second.groups_mut(),
                 );
             }
-            let of_rows = Step::new(rates.grid.at(progress), moments.n_steps);
             let Moments { first, second } = &mut moments.rows;
             let parts = model.rows.par_chunks_mut(ROWS).zip(gradient.rows.par_chunks(ROWS));
             let parts = parts.zip(first.par_chunks_mut(ROWS)).zip(second.par_chunks_mut(ROWS));

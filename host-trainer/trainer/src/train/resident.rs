@@ -2,10 +2,15 @@
 
 use std::sync::PoisonError;
 
+use super::optimiser::Optimiser;
+use super::statistics::Statistics;
 use super::watchdog::{self, Cause};
 use super::{TrainError, Trainer};
+use crate::scene::Scene;
 use crate::step::coding::Coding;
-use crate::step::{Loss, Resident, StepReport, TargetView, Trained, TrainedMut, Workspace};
+use crate::step::{
+    ContextMoments, ContextMomentsMut, Loss, Phase, Resident, StepReport, TargetView, Trained, TrainedMut, Workspace,
+};
 
 /// Where the newest parameters, moments and statistics of a run are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -27,7 +32,7 @@ impl Trainer<'_> {
 
     /// Whether a device has this step as a whole.
     pub(super) fn steps_on_device(&self, loss: &Loss<'_, f32>, coding: &Coding<'_, f32>) -> bool {
-        self.on_device(|device| device.can_step(&self.scene.shape, loss, coding)).unwrap_or(false)
+        self.on_device(|device| device.can_step(&self.scene, loss, coding)).unwrap_or(false)
     }
 
     /// What `f` says of the device, where there is one.
@@ -45,7 +50,7 @@ impl Trainer<'_> {
         loss: &Loss<'_, f32>,
         coding: &Coding<'_, f32>,
     ) -> Result<(StepReport<f32>, Option<Cause>), TrainError> {
-        let trained = (self.place == Place::Host).then(|| self.trained());
+        let trained = (self.place == Place::Host).then(|| trained(&self.scene, &self.optimiser, &self.statistics));
         let step = |device: &mut dyn Resident<f32>| {
             if let Some(trained) = &trained {
                 device.load(trained)?;
@@ -79,7 +84,10 @@ impl Trainer<'_> {
     /// Moves the parameters by the last step's gradients.
     pub(super) fn move_on_device(&mut self, progress: f64) -> Result<(), TrainError> {
         let rates = self.rates();
-        let steps = self.optimiser.next(&rates, progress, self.capture.extent);
+        let mut steps = self.optimiser.next(&rates, progress, self.capture.extent);
+        if self.config.phase(self.iteration) == Phase::Context {
+            steps.context = self.optimiser.next_of_context(&rates, progress);
+        }
         self.on_device(|device| device.move_by(&steps)).expect("there is one")?;
         self.place = Place::Device;
         Ok(())
@@ -102,18 +110,7 @@ impl Trainer<'_> {
         }
         let (mut scene, mut optimiser, mut statistics) =
             (self.scene.clone(), self.optimiser.clone(), self.statistics.clone());
-        let trained = TrainedMut {
-            scene: &mut scene,
-            moments: [
-                &mut optimiser.features,
-                &mut optimiser.log_scales,
-                &mut optimiser.offsets,
-                &mut optimiser.mask_logits,
-            ],
-            heads: &mut optimiser.heads,
-            sums: [&mut statistics.opacity_sum, &mut statistics.gradient_sum],
-            counts: [&mut statistics.n_views, &mut statistics.n_drawn],
-        };
+        let trained = trained_mut(&mut scene, &mut optimiser, &mut statistics);
         self.on_device(|device| device.store(trained)).expect("it has what is newer")?;
         (self.scene, self.optimiser, self.statistics) = (scene, optimiser, statistics);
         self.place = Place::Both;
@@ -126,15 +123,43 @@ impl Trainer<'_> {
         self.place = Place::Host;
         Ok(())
     }
+}
 
-    fn trained(&self) -> Trained<'_, f32> {
-        let (optimiser, statistics) = (&self.optimiser, &self.statistics);
-        Trained {
-            scene: &self.scene,
-            moments: [&optimiser.features, &optimiser.log_scales, &optimiser.offsets, &optimiser.mask_logits],
-            heads: &optimiser.heads,
-            sums: [&statistics.opacity_sum, &statistics.gradient_sum],
-            counts: [&statistics.n_views, &statistics.n_drawn],
-        }
+/// What a device takes over.
+pub fn trained<'a>(
+    scene: &'a Scene<f32>,
+    optimiser: &'a Optimiser<f32>,
+    statistics: &'a Statistics,
+) -> Trained<'a, f32> {
+    Trained {
+        scene,
+        moments: [&optimiser.features, &optimiser.log_scales, &optimiser.offsets, &optimiser.mask_logits],
+        heads: &optimiser.heads,
+        context: optimiser.context.as_ref().map(|moments| ContextMoments {
+            rows: &moments.rows,
+            networks: moments.networks.each_ref().map(Vec::as_slice),
+        }),
+        sums: [&statistics.opacity_sum, &statistics.gradient_sum],
+        counts: [&statistics.n_views, &statistics.n_drawn],
+    }
+}
+
+/// What it writes to when it gives that back.
+pub fn trained_mut<'a>(
+    scene: &'a mut Scene<f32>,
+    optimiser: &'a mut Optimiser<f32>,
+    statistics: &'a mut Statistics,
+) -> TrainedMut<'a, f32> {
+    let Optimiser { features, log_scales, offsets, mask_logits, heads, context, .. } = optimiser;
+    TrainedMut {
+        scene,
+        moments: [features, log_scales, offsets, mask_logits],
+        heads,
+        context: context.as_mut().map(|moments| ContextMomentsMut {
+            rows: &mut moments.rows,
+            networks: moments.networks.each_mut().map(Vec::as_mut_slice),
+        }),
+        sums: [&mut statistics.opacity_sum, &mut statistics.gradient_sum],
+        counts: [&mut statistics.n_views, &mut statistics.n_drawn],
     }
 }

@@ -4,11 +4,13 @@ use bytemuck::{Pod, Zeroable};
 
 use super::sum::Sum;
 use crate::gpu::{Buffer, Commands, GROUP_THREADS, GROUPS, Gpu, GpuError, Kernel, MATH};
+use crate::scene::MASK_THRESHOLD;
 
 /// Its kernel, and the sums of workgroups.
 #[derive(Debug)]
 pub struct Mask {
     term: Kernel,
+    drawn: Kernel,
     sum: Sum,
     parts: Buffer<f32>,
 }
@@ -20,6 +22,14 @@ struct Parameters {
     weight: f32,
 }
 
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Counted {
+    n_anchors: u32,
+    n_offsets: u32,
+    threshold: f32,
+}
+
 impl Mask {
     /// Compiles the kernels.
     ///
@@ -28,9 +38,26 @@ impl Mask {
     pub fn new(gpu: &Gpu) -> Result<Self, GpuError> {
         Ok(Self {
             term: Kernel::new(gpu, "mask term", &[GROUPS, MATH, include_str!("mask/term.wgsl")]),
+            drawn: Kernel::new(gpu, "anchors that are drawn", &[GROUPS, include_str!("mask/drawn.wgsl")]),
             sum: Sum::new(gpu),
             parts: Buffer::zeros(gpu, "sums of openings", 1)?,
         })
+    }
+
+    /// Adds to `n_drawn[0]` how many anchors have an offset that is drawn.
+    ///
+    /// * `logits`: `[n, n_offsets]`.
+    pub fn count_drawn(
+        &self,
+        commands: &mut Commands<'_>,
+        logits: &Buffer<f32>,
+        n_offsets: usize,
+        n_drawn: &Buffer<u32>,
+    ) {
+        let n_anchors = logits.len() / n_offsets;
+        let parameters =
+            Counted { n_anchors: n_anchors as u32, n_offsets: n_offsets as u32, threshold: MASK_THRESHOLD as f32 };
+        commands.run_items(&self.drawn, &parameters, &[logits, n_drawn], n_anchors);
     }
 
     /// Writes `Σ σ(logit)` to `totals[first_total]`, and adds `weight` times its gradient to `d_logits`.
@@ -87,6 +114,22 @@ mod tests {
             assert_close("sum", &totals.read(gpu).expect("runs"), &[7.0, sum], of_sum);
             let bound = Bound { relative: 2e-6, absolute: 1e-7 };
             assert_close("gradient", &d_logits.read(gpu).expect("runs"), &expected, bound);
+        }
+    }
+
+    #[test]
+    fn anchors_with_an_offset_that_is_drawn_are_counted() {
+        let Some(gpu) = gpu() else { return };
+        let mask = Mask::new(gpu).expect("room");
+        for (n, k) in SIZES.into_iter().zip([3, 1, 10, 4, 7]) {
+            let logits: Vec<f32> = random(3, n * k).iter().map(|v| (6.0 * v - 5.0) as f32).collect();
+            let has_drawn = |row: &&[f32]| row.iter().any(|logit| cpu::is_open(*logit));
+            let expected = logits.chunks_exact(k).filter(has_drawn).count();
+            let found = Buffer::upload(gpu, "number", &[2u32]).expect("room");
+            let mut commands = Commands::new(gpu);
+            mask.count_drawn(&mut commands, &Buffer::upload(gpu, "logits", &logits).expect("room"), k, &found);
+            commands.submit().expect("runs");
+            assert_eq!(found.read(gpu).expect("runs"), [2 + expected as u32]);
         }
     }
 }

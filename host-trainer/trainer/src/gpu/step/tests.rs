@@ -7,10 +7,14 @@ use crate::gpu::choose;
 use crate::gpu::parity::{Bound, assert_close, gpu, largest};
 use crate::ops::Pinhole;
 use crate::scene::Scene;
-use crate::step::{LossWeights, Phase, SharedDevice, StepInfo, StepReport, Workspace, planes};
+use crate::step::coding::RateReport;
+use crate::step::{
+    ContextMoments, ContextMomentsMut, LossWeights, Phase, SharedDevice, StepInfo, StepReport, Workspace, planes,
+};
 use crate::train::config::{Backbone, Densification};
 use crate::train::module::{Detail, Distribution, Modules, Pruning};
 use crate::train::optimiser::Optimiser;
+use crate::train::resident::{trained, trained_mut};
 use crate::train::statistics::Statistics;
 use crate::train::test_capture::{many_views, tiny_capture, tiny_config};
 use crate::train::{TrainConfig, Trainer};
@@ -94,25 +98,35 @@ fn a_step_agrees_with_the_cpu() {
 fn resident_gradients(device: &GpuStep) -> Vec<(&'static str, Vec<f32>)> {
     let read = |buffer: &Buffer<f32>| buffer.read(&device.gpu).expect("runs");
     let [features, log_scales, offsets, mask_logits] = device.anchors.gradients.each_ref().map(read);
-    let heads = device.scene.as_ref().expect("loaded").heads.iter().flat_map(|head| read(&head.gradient)).collect();
-    vec![
+    let scene = device.scene.as_ref().expect("loaded");
+    let heads = scene.heads.iter().flat_map(|head| read(&head.gradient)).collect();
+    let context = scene.context.iter().flat_map(|context| context.gradients().map(read));
+    let names = ["context network", "grid"];
+    let mut all = vec![
         ("features", features),
         ("log-scales", log_scales),
         ("offsets", offsets),
         ("mask logits", mask_logits),
         ("heads", heads),
-    ]
+    ];
+    all.extend(names.into_iter().zip(context));
+    all
 }
 
 fn cpu_gradients(workspace: &Workspace<f32>) -> Vec<(&'static str, Vec<f32>)> {
     let blocks = workspace.blocks();
-    vec![
+    let mut all = vec![
         ("features", blocks.iter().flat_map(|b| b.d_features.clone()).collect()),
         ("log-scales", blocks.iter().flat_map(|b| b.d_log_scales.clone()).collect()),
         ("offsets", blocks.iter().flat_map(|b| b.d_offsets.clone()).collect()),
         ("mask logits", blocks.iter().flat_map(|b| b.d_mask_logits.clone()).collect()),
         ("heads", workspace.d_heads.each().flat_map(|head| head.groups()).flatten().copied().collect()),
-    ]
+    ];
+    if let Some(found) = &workspace.d_context {
+        all.push(("context network", found.networks[0].groups().concat()));
+        all.push(("grid", found.rows.clone()));
+    }
+    all
 }
 
 /// Bounds: as [`compare`]. Counts are those of the CPU but for a splat at the edge of the image.
@@ -120,9 +134,10 @@ fn cpu_gradients(workspace: &Workspace<f32>) -> Vec<(&'static str, Vec<f32>)> {
 fn a_step_of_a_resident_scene_agrees_with_the_cpu() {
     let Some(gpu) = gpu() else { return };
     let capture = tiny_capture();
-    for (i, dilation_compensation) in [false, true, false].into_iter().enumerate() {
-        let mut config = tiny_config(40);
-        config.shape.dilation_compensation = dilation_compensation;
+    let backbones = [Backbone::Scaffold, Backbone::Scaffold, Backbone::Scaffold, Backbone::Hac, Backbone::HacPlus];
+    for (i, backbone) in backbones.into_iter().enumerate() {
+        let mut config = TrainConfig { backbone, ..tiny_config(40) };
+        config.shape.dilation_compensation = i == 1;
         config.shape.view_colour = i == 1;
         config.shape.anisotropic = i != 2;
         if i == 1 {
@@ -146,27 +161,38 @@ fn a_step_of_a_resident_scene_agrees_with_the_cpu() {
         let info = StepInfo { iteration: 10, iterations: 20, phase: Phase::Raw, scaled: true, stream };
         let terms = config.modules.terms();
         let loss = Loss { weights: LossWeights::default(), modules: Some((&terms, &info)), pruned_share: 0.0 };
-        for coding in [Coding::Raw, Coding::Noise { stream, steps: [0.1, 0.05, 0.1] }] {
+        let rate = RateTerms {
+            lambda: 0.3,
+            sample: 0.5,
+            mask: 0.1,
+            masks_weigh_anchors: backbone == Backbone::HacPlus,
+            grid: 0.5,
+        };
+        let codings = match scene.context {
+            None => vec![Coding::Raw, Coding::Noise { stream, steps: [0.1, 0.05, 0.1] }],
+            Some(_) => vec![Coding::Context { stream, rate, exact: None }],
+        };
+        assert_eq!(scene.context.is_some(), backbone.is_coded());
+        for coding in codings {
             let mut workspace = Workspace::new(&scene.shape);
             let expected = workspace.step(scene, &target, &loss, &coding);
             let mut optimiser = Optimiser::new(scene);
             let mut statistics = Statistics::new(scene.anchors.len(), scene.shape.n_offsets);
             let mut device = GpuStep::new(gpu).expect("room");
-            assert!(device.can_step(&scene.shape, &loss, &coding));
-            let trained = Trained {
-                scene,
-                moments: [&optimiser.features, &optimiser.log_scales, &optimiser.offsets, &optimiser.mask_logits],
-                heads: &optimiser.heads,
-                sums: [&statistics.opacity_sum, &statistics.gradient_sum],
-                counts: [&statistics.n_views, &statistics.n_drawn],
-            };
-            device.load(&trained).expect("room");
+            assert!(device.can_step(scene, &loss, &coding));
+            device.load(&trained(scene, &optimiser, &statistics)).expect("room");
             let found = device.step(&target, &loss, &coding, 1e18).expect("runs");
             assert!(found.is_sound);
             let sums = |r: &StepReport<f32>| [r.loss, r.squared_error as f32];
             let close = Bound { relative: 1e-4, absolute: 1e-7 };
             assert_close("loss, squared error", &sums(&found.report), &sums(&expected), close);
             assert_eq!(found.report.n_gaussians, expected.n_gaussians);
+            if let (Some(found), Some(expected)) = (found.report.rate, expected.rate) {
+                assert_eq!(found.n_sampled, expected.n_sampled);
+                let bits = |rate: RateReport| rate.bits.map(|bits| bits as f32);
+                assert_close("bits", &bits(found), &bits(expected), close);
+            }
+            assert_eq!(found.report.rate.is_some(), expected.rate.is_some());
             assert!(found.report.n_splats.abs_diff(expected.n_splats) <= 1 + expected.n_splats / 1000);
             for ((name, found), (_, expected)) in resident_gradients(&device).iter().zip(cpu_gradients(&workspace)) {
                 assert!(largest(&expected) > 0.0, "{name} says nothing");
@@ -180,20 +206,8 @@ fn a_step_of_a_resident_scene_agrees_with_the_cpu() {
             let sound = device.step(&target, &loss, &coding, 0.0).expect("runs").is_sound;
             assert!(!sound, "no gradient is at most 0");
             let mut back = scene.clone();
-            device
-                .store(TrainedMut {
-                    scene: &mut back,
-                    moments: [
-                        &mut optimiser.features,
-                        &mut optimiser.log_scales,
-                        &mut optimiser.offsets,
-                        &mut optimiser.mask_logits,
-                    ],
-                    heads: &mut optimiser.heads,
-                    sums: [&mut statistics.opacity_sum, &mut statistics.gradient_sum],
-                    counts: [&mut statistics.n_views, &mut statistics.n_drawn],
-                })
-                .expect("it comes back");
+            let there = trained_mut(&mut back, &mut optimiser, &mut statistics);
+            device.store(there).expect("it comes back");
             assert!(back == *scene && optimiser == Optimiser::new(scene), "nothing has moved yet");
             let mut counted = Statistics::new(scene.anchors.len(), scene.shape.n_offsets);
             counted.add(&workspace, scene.shape.n_offsets);

@@ -1,5 +1,6 @@
 //! `pocketsplat devices`: what training can run on.
 
+use std::fmt;
 use std::str::FromStr;
 
 use anyhow::Result;

@@ -1,23 +1,19 @@
-//! What coding does to the values of a view's anchors, and their rate: the order of `step/coded.rs` and `step/context.rs`, where the
-//! context is a grid.
+//! What coding does to the values of a view's anchors, and their rate: the order of `step/coded.rs` and `step/context.rs`.
 
-use pocketsplat_core::context::N_GROUPS;
+use pocketsplat_core::context::{N_GROUPS, N_LEVELS};
 
 use super::anchors::rooms;
-use super::ops::adaptive_step::AdaptiveStep;
+use super::levels::GpuLevels;
+use super::network_pass::{NetworkPass, PassKernels};
 use super::ops::anchor_bits::{self, AnchorBits, Sampled};
-use super::ops::gather::Gather;
 use super::ops::grid_bits::GridBits;
 use super::ops::hash_grid::HashGrid;
-use super::ops::head::Head;
 use super::ops::mask::Mask;
-use super::ops::perturb::{self, Perturb};
-use super::ops::sample::Sample;
+use super::ops::perturb::Perturb;
 use super::scene::{DeviceScene, MASK_LOGITS};
 use super::{Buffer, Commands, Gpu, GpuError};
 use crate::ops::grid_bits;
 use crate::ops::noise::Stream;
-use crate::step::SAMPLE_DRAW;
 use crate::step::coding::{RateReport, RateTerms};
 
 /// Weights of a step's rate terms; see `step/context.rs`.
@@ -31,31 +27,24 @@ struct Weights {
 /// Its kernels, and what the last view was coded with.
 #[derive(Debug)]
 pub(super) struct GpuCoding {
+    kernels: PassKernels,
     hash_grid: HashGrid,
-    head: Head,
-    adaptive_step: AdaptiveStep,
     perturb: Perturb,
-    sample: Sample,
-    gather: Gather,
     anchor_bits: AnchorBits,
     mask: Mask,
     grid_bits: GridBits,
-    inputs: Buffer<f32>,
-    d_inputs: Buffer<f32>,
-    hidden: Buffer<f32>,
-    d_hidden: Buffer<f32>,
-    /// log₂(step/base) and steps, `[n, 3]`, and their gradients.
-    exponents: Buffer<f32>,
-    d_exponents: Buffer<f32>,
+    levels: GpuLevels,
+    /// The network's, with a grid.
+    pass: NetworkPass,
+    /// `[n, 3]` where not one network has all anchors.
     steps: Buffer<f32>,
     d_steps: Buffer<f32>,
     /// Noise, in steps.
     residuals: [Buffer<f32>; N_GROUPS],
-    /// The same of the sample: inputs, hidden units, outputs.
-    sampled: [Buffer<f32>; 3],
-    d_sampled: [Buffer<f32>; 3],
-    n_drawn: Buffer<u32>,
+    /// `[n_anchors]` of the scene: 1 where one is drawn at all.
+    drawn: Buffer<u32>,
     weights: Weights,
+    n_sampled: usize,
 }
 
 /// What a view's rate came to.
@@ -66,47 +55,33 @@ pub(super) struct Rate {
     pub(super) report: RateReport,
 }
 
-/// Sums of [`GpuCoding::backward`]: openings of masks, then bits.
-pub(super) const N_RATE_TOTALS: usize = 1 + N_GROUPS;
-
-/// Which values are features, log-scales, offsets.
-fn groups(scene: &DeviceScene) -> [perturb::Group; N_GROUPS] {
-    let [features, log_scales, offsets, _] = scene.widths();
-    [
-        perturb::Group { index: 0, first: 0, width: features },
-        perturb::Group { index: 1, first: features, width: log_scales },
-        perturb::Group { index: 2, first: features + log_scales, width: offsets },
-    ]
-}
+/// Sums of [`GpuCoding::backward`]: openings of masks, then bits of each network's anchors.
+pub(super) const N_RATE_TOTALS: usize = 1 + N_LEVELS * N_GROUPS;
 
 impl GpuCoding {
     /// Compiles all kernels.
     pub(super) fn new(gpu: &Gpu) -> Result<Self, GpuError> {
-        let room = |what| Buffer::zeros(gpu, what, 1);
         Ok(Self {
+            kernels: PassKernels::new(gpu)?,
             hash_grid: HashGrid::new(gpu),
-            head: Head::new(gpu)?,
-            adaptive_step: AdaptiveStep::new(gpu),
             perturb: Perturb::new(gpu),
-            sample: Sample::new(gpu)?,
-            gather: Gather::new(gpu),
             anchor_bits: AnchorBits::new(gpu)?,
             mask: Mask::new(gpu)?,
             grid_bits: GridBits::new(gpu)?,
-            inputs: room("inputs of the context network")?,
-            d_inputs: room("gradients of the context network's inputs")?,
-            hidden: room("hidden units of the context network")?,
-            d_hidden: room("gradients of the context network's hidden units")?,
-            exponents: room("exponents of steps")?,
-            d_exponents: room("gradients of exponents of steps")?,
-            steps: room("steps of the view's values")?,
-            d_steps: room("gradients of steps")?,
+            levels: GpuLevels::new(gpu)?,
+            pass: NetworkPass::new(gpu)?,
+            steps: Buffer::zeros(gpu, "steps of the view's values", 1)?,
+            d_steps: Buffer::zeros(gpu, "gradients of steps", 1)?,
             residuals: rooms(gpu, "noise of the view's values")?,
-            sampled: rooms(gpu, "what the context network makes of the sample")?,
-            d_sampled: rooms(gpu, "gradients of the sample")?,
-            n_drawn: Buffer::zeros(gpu, "number of anchors that are drawn at all", 1)?,
+            drawn: Buffer::zeros(gpu, "anchors that are drawn at all", 1)?,
             weights: Weights::default(),
+            n_sampled: 0,
         })
+    }
+
+    /// Forgets the scene that it worked on.
+    pub(super) fn forget(&mut self) {
+        self.levels.forget();
     }
 
     /// Adds noise of fixed steps to the values.
@@ -122,7 +97,7 @@ impl GpuCoding {
         (stream, steps): (Stream, [f32; N_GROUPS]),
     ) -> Result<(), GpuError> {
         self.steps.fit(gpu, N_GROUPS * anchors.len())?;
-        self.adaptive_step.fixed(commands, steps, &self.steps);
+        self.kernels.adaptive_step.fixed(commands, steps, &self.steps);
         self.perturb_all(gpu, commands, scene, anchors, values, stream)
     }
 
@@ -135,9 +110,11 @@ impl GpuCoding {
         values: &[Buffer<f32>; 4],
         stream: Stream,
     ) -> Result<(), GpuError> {
-        for (group, (values, residuals)) in groups(scene).into_iter().zip(values.iter().zip(&mut self.residuals)) {
+        let steps = if follows_grid(scene) { &self.pass.steps } else { &self.steps };
+        for (group, (values, residuals)) in scene.coded_groups().into_iter().zip(values.iter().zip(&mut self.residuals))
+        {
             residuals.fit(gpu, values.len())?;
-            self.perturb.with_noise(commands, stream, group, anchors, &self.steps, values, residuals);
+            self.perturb.with_noise(commands, stream, group, anchors, steps, values, residuals);
         }
         Ok(())
     }
@@ -154,41 +131,44 @@ impl GpuCoding {
         terms: &RateTerms,
     ) -> Result<(), GpuError> {
         let context = scene.context.as_ref().expect("asked before");
-        let n = anchors.len();
-        let mut commands = Commands::new(gpu);
-        commands.clear(&self.n_drawn);
         let all_masks = &scene.anchors[MASK_LOGITS].values;
-        self.mask.count_drawn(&mut commands, all_masks, scene.shape.n_offsets, &self.n_drawn);
-        let n_sampled = self.sample.run(gpu, commands, stream, SAMPLE_DRAW, terms.sample, anchors)?;
-        let n_drawn = self.n_drawn.read(gpu)?[0];
         let n_anchors = all_masks.len() / scene.shape.n_offsets;
+        self.drawn.fit(gpu, n_anchors)?;
+        let mut commands = Commands::new(gpu);
+        self.mask.mark_drawn(&mut commands, all_masks, scene.shape.n_offsets, &self.drawn);
+        commands.submit()?;
+        let drawn = self.drawn.read(gpu)?;
+
+        self.n_sampled = match &context.grid {
+            Some(grid) => {
+                let (network, pass) = (&context.networks[0], &mut self.pass);
+                let n_sampled = pass.choose(gpu, stream, terms.sample, anchors)?;
+                pass.fit(gpu, network, anchors.len())?;
+                let mut commands = Commands::new(gpu);
+                self.hash_grid.forward(&mut commands, &grid.places, &grid.rows.values, anchors, &pass.inputs);
+                pass.steps(&mut commands, &self.kernels, network, context.base_steps);
+                pass.distributions(&mut commands, &self.kernels, network);
+                commands.submit()?;
+                n_sampled
+            }
+            None => {
+                self.levels.find(gpu, scene, &drawn)?;
+                self.levels.give(gpu, scene, &self.kernels, &self.perturb, stream)?;
+                self.steps.fit(gpu, N_GROUPS * anchors.len())?;
+                self.levels.forward(gpu, scene, &self.kernels, anchors, &self.steps, (stream, terms.sample))?
+            }
+        };
+        let mut commands = Commands::new(gpu);
+        self.perturb_all(gpu, &mut commands, scene, anchors, values, stream)?;
+        commands.submit()?;
         let n_values = (n_anchors.max(1) * scene.shape.values_per_anchor()) as f64;
+        let n_drawn = f64::from(drawn.iter().sum::<u32>());
         self.weights = Weights {
-            bit: terms.lambda * f64::from(n_drawn) / (n_values * n_sampled.max(1) as f64),
-            mask: terms.mask / (n * scene.shape.n_offsets).max(1) as f64,
+            bit: terms.lambda * n_drawn / (n_values * self.n_sampled.max(1) as f64),
+            mask: terms.mask / (anchors.len() * scene.shape.n_offsets).max(1) as f64,
             grid: terms.lambda * terms.grid / n_values,
         };
-
-        let (layout, weights) = (&context.layout, &context.network.values);
-        let of_steps = layout.last_outputs(N_GROUPS);
-        self.inputs.fit(gpu, n * layout.n_in)?;
-        self.hidden.fit(gpu, n * layout.n_hidden)?;
-        self.exponents.fit(gpu, N_GROUPS * n)?;
-        self.steps.fit(gpu, N_GROUPS * n)?;
-        let widths = [layout.n_in, layout.n_hidden, layout.n_out];
-        for (buffers, width) in self.sampled.iter_mut().zip(&mut self.d_sampled).zip(widths) {
-            buffers.0.fit(gpu, n_sampled * width)?;
-            buffers.1.fit(gpu, n_sampled * width)?;
-        }
-        let mut commands = Commands::new(gpu);
-        self.hash_grid.forward(&mut commands, &context.places, &context.rows.values, anchors, &self.inputs);
-        self.head.forward(&mut commands, &of_steps, weights, &self.inputs, &self.hidden, &self.exponents);
-        self.adaptive_step.forward(&mut commands, context.base_steps, &self.exponents, &self.steps);
-        let [inputs, hidden, outputs] = &self.sampled;
-        self.gather.run(&mut commands, &self.inputs, layout.n_in, &self.sample.rows.items, inputs);
-        self.head.forward(&mut commands, layout, weights, inputs, hidden, outputs);
-        self.perturb_all(gpu, &mut commands, scene, anchors, values, stream)?;
-        commands.submit()
+        Ok(())
     }
 
     /// Adds the rate's share to the gradients of the values, and takes all of them on to the network and the grid.
@@ -207,78 +187,61 @@ impl GpuCoding {
         (totals, first_total): (&Buffer<f32>, usize),
     ) -> Result<(), GpuError> {
         let context = scene.context.as_ref().expect("asked before");
-        let (layout, weights, d_weights) = (&context.layout, &context.network.values, &context.d_network);
+        let Weights { bit, mask, grid: of_grid } = self.weights;
+        let anchor = if terms.masks_weigh_anchors { bit } else { 0.0 };
+        for network in &context.networks {
+            commands.clear(&network.gradient);
+        }
         let [features, log_scales, offsets, mask_logits] = values;
         let [d_features, d_log_scales, d_offsets, d_mask_logits] = gradients;
-        let Weights { bit, mask, grid } = self.weights;
-        commands.clear(d_weights);
         self.mask.term(gpu, commands, mask_logits, mask as f32, d_mask_logits, totals, first_total)?;
-        let [inputs, hidden, outputs] = &self.sampled;
-        let [d_sample_inputs, d_sample_hidden, d_outputs] = &self.d_sampled;
-        let sampled = Sampled {
-            shape: &scene.shape,
-            base_steps: context.base_steps,
-            rows: &self.sample.rows.items,
-            values: [features, log_scales, offsets],
-            mask_logits,
-            outputs,
-            n_taps: context.n_taps,
-            weights,
-            first_tap: layout.n_params(),
+        let passes: Vec<(&NetworkPass, &Buffer<u32>)> = match &context.grid {
+            Some(_) => vec![(&self.pass, &self.pass.sample.rows.items)],
+            None => self.levels.passes().collect(),
         };
-        let of_sample = anchor_bits::Gradients {
-            values: [d_features, d_log_scales, d_offsets],
-            mask_logits: d_mask_logits,
-            outputs: d_outputs,
-            weights: d_weights,
-        };
-        let anchor = if terms.masks_weigh_anchors { bit } else { 0.0 };
-        let both = [bit, anchor].map(|weight| weight as f32);
-        self.anchor_bits.forward_backward(gpu, commands, &sampled, both, &of_sample, totals, first_total + 1)?;
+        for (level, ((pass, rows), network)) in passes.into_iter().zip(&context.networks).enumerate() {
+            let [outputs, d_outputs] = pass.outputs();
+            let sampled = Sampled {
+                shape: &scene.shape,
+                base_steps: context.base_steps,
+                rows,
+                values: [features, log_scales, offsets],
+                mask_logits,
+                outputs,
+                n_taps: network.n_taps,
+                weights: &network.parameters.values,
+                first_tap: network.layout.n_params(),
+            };
+            let of_sample = anchor_bits::Gradients {
+                values: [d_features, d_log_scales, d_offsets],
+                mask_logits: d_mask_logits,
+                outputs: d_outputs,
+                weights: &network.gradient,
+            };
+            let first = first_total + 1 + N_GROUPS * level;
+            let both = [bit, anchor].map(|weight| weight as f32);
+            self.anchor_bits.forward_backward(gpu, commands, &sampled, both, &of_sample, totals, first)?;
+        }
 
-        self.d_steps.fit(gpu, self.steps.len())?;
-        self.d_exponents.fit(gpu, self.steps.len())?;
-        self.d_inputs.fit(gpu, self.inputs.len())?;
-        self.d_hidden.fit(gpu, self.hidden.len())?;
-        for (group, (d_values, residuals)) in groups(scene).into_iter().zip(gradients.iter().zip(&self.residuals)) {
-            self.perturb.backward(commands, group, d_values, residuals, &self.d_steps);
+        self.d_steps.fit(gpu, N_GROUPS * n_of_view(values, scene))?;
+        let d_steps = if context.grid.is_some() { &self.pass.d_steps } else { &self.d_steps };
+        for (group, (d_values, residuals)) in
+            scene.coded_groups().into_iter().zip(gradients.iter().zip(&self.residuals))
+        {
+            self.perturb.backward(commands, group, d_values, residuals, d_steps);
         }
-        commands.clear(&self.d_exponents);
-        self.adaptive_step.backward(commands, &self.exponents, &self.steps, &self.d_steps, &self.d_exponents);
-        commands.clear(&self.d_inputs);
-        let of_steps = layout.last_outputs(N_GROUPS);
-        self.head.backward(
-            gpu,
-            commands,
-            &of_steps,
-            weights,
-            &self.inputs,
-            &self.hidden,
-            &self.d_exponents,
-            &self.d_hidden,
-            &self.d_inputs,
-            d_weights,
-        )?;
-        commands.clear(d_sample_inputs);
-        self.head.backward(
-            gpu,
-            commands,
-            layout,
-            weights,
-            inputs,
-            hidden,
-            d_outputs,
-            d_sample_hidden,
-            d_sample_inputs,
-            d_weights,
-        )?;
-        self.gather.add_back(commands, d_sample_inputs, layout.n_in, &self.sample.rows.items, &self.d_inputs);
-        let (rows, d_rows) = (&context.rows.values, &context.d_rows);
-        self.hash_grid.backward(commands, &context.places, rows, row_of_anchor, &self.d_inputs, d_rows);
-        if grid > 0.0 {
-            self.grid_bits.forward_backward(commands, rows, grid, d_rows);
+        match &context.grid {
+            Some(grid) => {
+                self.pass.backward(gpu, commands, &mut self.kernels, &context.networks[0])?;
+                let (places, rows, d_inputs) = (&grid.places, &grid.rows.values, &self.pass.d_inputs);
+                self.hash_grid.backward(commands, places, rows, row_of_anchor, d_inputs, &grid.gradient);
+                if of_grid > 0.0 {
+                    self.grid_bits.forward_backward(commands, rows, of_grid, &grid.gradient);
+                }
+                Ok(())
+            }
+            None => self.levels.backward(gpu, commands, &mut self.kernels, &context.networks, &self.d_steps),
         }
-        Ok(())
     }
 
     /// What the sums say of the rate; waits.
@@ -286,15 +249,31 @@ impl GpuCoding {
     /// * `totals`: the [`N_RATE_TOTALS`] that [`Self::backward`] wrote.
     pub(super) fn rate(&self, gpu: &Gpu, scene: &DeviceScene, totals: &[f32]) -> Result<Rate, GpuError> {
         let Weights { bit, mask, grid } = self.weights;
-        let bits: [f64; N_GROUPS] = std::array::from_fn(|group| totals[1 + group].into());
-        let mut term = mask * f64::from(totals[0]) + bit * bits.iter().sum::<f64>();
-        if grid > 0.0 {
-            let n = scene.context.as_ref().map_or(0, |context| context.rows.values.len());
-            term += grid * grid_bits::bits(n, self.grid_bits.n_positive.read(gpu)?[0] as usize);
+        let context = scene.context.as_ref().expect("asked before");
+        let mut bits = [0.0; N_GROUPS];
+        for of_network in totals[1..].chunks_exact(N_GROUPS).take(context.networks.len()) {
+            for (sum, bits) in bits.iter_mut().zip(of_network) {
+                *sum += f64::from(*bits);
+            }
         }
-        let n_sampled = self.sample.rows.items.len();
+        let mut term = mask * f64::from(totals[0]) + bit * bits.iter().sum::<f64>();
+        if let Some(of_context) = context.grid.as_ref().filter(|_| grid > 0.0) {
+            let n_positive = self.grid_bits.n_positive.read(gpu)?[0] as usize;
+            term += grid * grid_bits::bits(of_context.rows.values.len(), n_positive);
+        }
+        let n_sampled = self.n_sampled;
         #[expect(clippy::cast_possible_truncation, reason = "a term of the loss")]
         let term = term as f32;
         Ok(Rate { term, report: RateReport { n_sampled, bits: bits.map(|bits| bits / n_sampled.max(1) as f64) } })
     }
+}
+
+/// Whether one network has all anchors.
+fn follows_grid(scene: &DeviceScene) -> bool {
+    scene.context.as_ref().is_some_and(|context| context.grid.is_some())
+}
+
+/// Anchors of the view.
+fn n_of_view(values: &[Buffer<f32>; 4], scene: &DeviceScene) -> usize {
+    values[MASK_LOGITS].len() / scene.shape.n_offsets
 }

@@ -21,7 +21,7 @@ const DIFFERENCES: usize = 1;
 const BACKGROUND: usize = 3;
 /// First place of sums that others write.
 pub(super) const FIRST_FREE_TOTAL: usize = 6;
-const N_TOTALS: usize = 16;
+const N_TOTALS: usize = 24;
 
 /// Kernels and buffers of the stages.
 #[derive(Debug)]

@@ -17,6 +17,8 @@ mod gpu;
 mod group;
 mod image;
 mod kernel;
+mod levels;
+mod network_pass;
 pub mod ops;
 #[cfg(test)]
 mod parity;

@@ -4,6 +4,7 @@ use super::context::DeviceContext;
 use super::group::Group;
 use super::ops::adam::Adam;
 use super::ops::head::{HeadLayout, parameters_of};
+use super::ops::perturb;
 use super::ops::prefilter::Shown;
 use super::ops::statistics::Sums;
 use super::{Buffer, Commands, Gpu, GpuError};
@@ -134,6 +135,16 @@ impl DeviceScene {
     pub(super) fn widths(&self) -> [usize; 4] {
         let k = self.shape.n_offsets;
         [self.shape.feature_dim, self.shape.n_log_scales(), 3 * k, k]
+    }
+
+    /// Which values are features, log-scales, offsets.
+    pub(super) fn coded_groups(&self) -> [perturb::Group; 3] {
+        let [features, log_scales, offsets, _] = self.widths();
+        [
+            perturb::Group { index: 0, first: 0, width: features },
+            perturb::Group { index: 1, first: features, width: log_scales },
+            perturb::Group { index: 2, first: features + log_scales, width: offsets },
+        ]
     }
 
     /// What of the anchors the prefilter looks at.

@@ -314,10 +314,9 @@ impl StepDevice<f32> for GpuStep {
 
 impl Resident<f32> for GpuStep {
     fn can_step(&self, scene: &Scene<f32>, loss: &Loss<'_, f32>, coding: &Coding<'_, f32>) -> bool {
-        let follows = scene.context.as_ref().is_none_or(|model| model.shifts.is_some());
         let is_known = match coding {
             Coding::Raw | Coding::Noise { .. } => true,
-            Coding::Context { exact, .. } => exact.is_none() && !follows,
+            Coding::Context { exact, .. } => exact.is_none() && scene.context.is_some(),
         };
         is_known && terms_of(loss, &scene.shape).is_some()
     }
@@ -325,6 +324,7 @@ impl Resident<f32> for GpuStep {
     fn load(&mut self, trained: &Trained<'_, f32>) -> Result<(), DeviceFault> {
         // The old arrays go first, so that both need not find room.
         self.scene = None;
+        self.coding.forget();
         self.scene = Some(DeviceScene::upload(&self.gpu, trained).map_err(DeviceFault::new)?);
         Ok(())
     }

@@ -63,6 +63,11 @@ impl<R: Real> Parents<R> {
         self.places.get(anchor as usize).map_or(0, |place| place.level)
     }
 
+    /// Where each anchor stands, and the one that it follows.
+    pub fn places(&self) -> impl Iterator<Item = (Place, u32)> {
+        self.places.iter().copied().zip(self.parents.iter().copied())
+    }
+
     /// The visible anchors of a level, ascending.
     pub fn of_level(&self, level: usize) -> Vec<u32> {
         let at = (0u32..).zip(&self.places).zip(&self.known.1);

@@ -44,20 +44,14 @@ impl Mask {
         })
     }
 
-    /// Adds to `n_drawn[0]` how many anchors have an offset that is drawn.
+    /// Writes 1 for each anchor with an offset that is drawn, and 0 for the others.
     ///
-    /// * `logits`: `[n, n_offsets]`.
-    pub fn count_drawn(
-        &self,
-        commands: &mut Commands<'_>,
-        logits: &Buffer<f32>,
-        n_offsets: usize,
-        n_drawn: &Buffer<u32>,
-    ) {
+    /// * `logits`: `[n, n_offsets]`. * `marks`: `[n]`.
+    pub fn mark_drawn(&self, commands: &mut Commands<'_>, logits: &Buffer<f32>, n_offsets: usize, marks: &Buffer<u32>) {
         let n_anchors = logits.len() / n_offsets;
         let parameters =
             Counted { n_anchors: n_anchors as u32, n_offsets: n_offsets as u32, threshold: MASK_THRESHOLD as f32 };
-        commands.run_items(&self.drawn, &parameters, &[logits, n_drawn], n_anchors);
+        commands.run_items(&self.drawn, &parameters, &[logits, marks], n_anchors);
     }
 
     /// Writes `Σ σ(logit)` to `totals[first_total]`, and adds `weight` times its gradient to `d_logits`.
@@ -118,18 +112,18 @@ mod tests {
     }
 
     #[test]
-    fn anchors_with_an_offset_that_is_drawn_are_counted() {
+    fn anchors_with_an_offset_that_is_drawn_are_marked() {
         let Some(gpu) = gpu() else { return };
         let mask = Mask::new(gpu).expect("room");
         for (n, k) in SIZES.into_iter().zip([3, 1, 10, 4, 7]) {
             let logits: Vec<f32> = random(3, n * k).iter().map(|v| (6.0 * v - 5.0) as f32).collect();
             let has_drawn = |row: &&[f32]| row.iter().any(|logit| cpu::is_open(*logit));
-            let expected = logits.chunks_exact(k).filter(has_drawn).count();
-            let found = Buffer::upload(gpu, "number", &[2u32]).expect("room");
+            let expected: Vec<u32> = logits.chunks_exact(k).map(|row| u32::from(has_drawn(&row))).collect();
+            let found = Buffer::upload(gpu, "marks", &vec![9u32; n]).expect("room");
             let mut commands = Commands::new(gpu);
-            mask.count_drawn(&mut commands, &Buffer::upload(gpu, "logits", &logits).expect("room"), k, &found);
+            mask.mark_drawn(&mut commands, &Buffer::upload(gpu, "logits", &logits).expect("room"), k, &found);
             commands.submit().expect("runs");
-            assert_eq!(found.read(gpu).expect("runs"), [2 + expected as u32]);
+            assert_eq!(found.read(gpu).expect("runs"), expected);
         }
     }
 }

@@ -8,9 +8,7 @@ use crate::gpu::parity::{Bound, assert_close, gpu, largest};
 use crate::ops::Pinhole;
 use crate::scene::Scene;
 use crate::step::coding::RateReport;
-use crate::step::{
-    ContextMoments, ContextMomentsMut, LossWeights, Phase, SharedDevice, StepInfo, StepReport, Workspace, planes,
-};
+use crate::step::{Block, LossWeights, Phase, SharedDevice, StepInfo, StepReport, Workspace, planes};
 use crate::train::config::{Backbone, Densification};
 use crate::train::module::{Detail, Distribution, Modules, Pruning};
 use crate::train::optimiser::Optimiser;
@@ -101,7 +99,10 @@ fn resident_gradients(device: &GpuStep) -> Vec<(&'static str, Vec<f32>)> {
     let scene = device.scene.as_ref().expect("loaded");
     let heads = scene.heads.iter().flat_map(|head| read(&head.gradient)).collect();
     let context = scene.context.iter().flat_map(|context| context.gradients().map(read));
-    let names = ["context network", "grid"];
+    let names = match scene.context.as_ref().map(|context| context.networks.len()) {
+        Some(1) => vec!["context network", "grid"],
+        _ => vec!["network of level 0", "network of level 1", "network of level 2"],
+    };
     let mut all = vec![
         ("features", features),
         ("log-scales", log_scales),
@@ -113,18 +114,36 @@ fn resident_gradients(device: &GpuStep) -> Vec<(&'static str, Vec<f32>)> {
     all
 }
 
+/// The same of the CPU: rows by anchor, where blocks have one level after the other.
 fn cpu_gradients(workspace: &Workspace<f32>) -> Vec<(&'static str, Vec<f32>)> {
-    let blocks = workspace.blocks();
+    let by_anchor = |gradients: fn(&Block<f32>) -> &[f32]| {
+        let of_block = |block| {
+            let Block { anchors, .. } = block;
+            let width = gradients(block).len() / anchors.len().max(1);
+            anchors.iter().zip(gradients(block).chunks_exact(width.max(1)))
+        };
+        let mut rows: Vec<(&u32, &[f32])> = workspace.blocks().iter().flat_map(of_block).collect();
+        rows.sort_by_key(|(anchor, _)| **anchor);
+        rows.into_iter().flat_map(|(_, row)| row.to_vec()).collect::<Vec<f32>>()
+    };
     let mut all = vec![
-        ("features", blocks.iter().flat_map(|b| b.d_features.clone()).collect()),
-        ("log-scales", blocks.iter().flat_map(|b| b.d_log_scales.clone()).collect()),
-        ("offsets", blocks.iter().flat_map(|b| b.d_offsets.clone()).collect()),
-        ("mask logits", blocks.iter().flat_map(|b| b.d_mask_logits.clone()).collect()),
+        ("features", by_anchor(|b| &b.d_features)),
+        ("log-scales", by_anchor(|b| &b.d_log_scales)),
+        ("offsets", by_anchor(|b| &b.d_offsets)),
+        ("mask logits", by_anchor(|b| &b.d_mask_logits)),
         ("heads", workspace.d_heads.each().flat_map(|head| head.groups()).flatten().copied().collect()),
     ];
     if let Some(found) = &workspace.d_context {
-        all.push(("context network", found.networks[0].groups().concat()));
-        all.push(("grid", found.rows.clone()));
+        match found.networks.as_slice() {
+            [network] => {
+                all.push(("context network", network.groups().concat()));
+                all.push(("grid", found.rows.clone()));
+            }
+            levels => {
+                let names = ["network of level 0", "network of level 1", "network of level 2"];
+                all.extend(names.into_iter().zip(levels).map(|(name, network)| (name, network.groups().concat())));
+            }
+        }
     }
     all
 }
@@ -134,7 +153,8 @@ fn cpu_gradients(workspace: &Workspace<f32>) -> Vec<(&'static str, Vec<f32>)> {
 fn a_step_of_a_resident_scene_agrees_with_the_cpu() {
     let Some(gpu) = gpu() else { return };
     let capture = tiny_capture();
-    let backbones = [Backbone::Scaffold, Backbone::Scaffold, Backbone::Scaffold, Backbone::Hac, Backbone::HacPlus];
+    let plain = Backbone::Scaffold;
+    let backbones = [plain, plain, plain, Backbone::Hac, Backbone::HacPlus, Backbone::ContextGs];
     for (i, backbone) in backbones.into_iter().enumerate() {
         let mut config = TrainConfig { backbone, ..tiny_config(40) };
         config.shape.dilation_compensation = i == 1;

@@ -5,7 +5,7 @@ struct Parameters {
 }
 
 @group(0) @binding(0) var<storage, read> logits: array<f32>;
-@group(0) @binding(1) var<storage, read_write> n_drawn: array<atomic<u32>>;
+@group(0) @binding(1) var<storage, read_write> marks: array<u32>;
 
 var<immediate> parameters: Parameters;
 
@@ -23,7 +23,5 @@ fn drawn(
     for (var k = 0u; k < parameters.n_offsets; k++) {
         found = found || logits[anchor * parameters.n_offsets + k] > parameters.threshold;
     }
-    if found {
-        atomicAdd(&n_drawn[0], 1u);
-    }
+    marks[anchor] = u32(found);
 }

@@ -117,13 +117,12 @@ fn resident_gradients(device: &GpuStep) -> Vec<(&'static str, Vec<f32>)> {
 /// The same of the CPU: rows by anchor, where blocks have one level after the other.
 fn cpu_gradients(workspace: &Workspace<f32>) -> Vec<(&'static str, Vec<f32>)> {
     let by_anchor = |gradients: fn(&Block<f32>) -> &[f32]| {
-        let of_block = |block| {
-            let Block { anchors, .. } = block;
-            let width = gradients(block).len() / anchors.len().max(1);
-            anchors.iter().zip(gradients(block).chunks_exact(width.max(1)))
-        };
-        let mut rows: Vec<(&u32, &[f32])> = workspace.blocks().iter().flat_map(of_block).collect();
-        rows.sort_by_key(|(anchor, _)| **anchor);
+        let mut rows: Vec<(u32, &[f32])> = Vec::new();
+        for block in workspace.blocks() {
+            let width = (gradients(block).len() / block.anchors.len().max(1)).max(1);
+            rows.extend(block.anchors.iter().copied().zip(gradients(block).chunks_exact(width)));
+        }
+        rows.sort_by_key(|(anchor, _)| *anchor);
         rows.into_iter().flat_map(|(_, row)| row.to_vec()).collect::<Vec<f32>>()
     };
     let mut all = vec![

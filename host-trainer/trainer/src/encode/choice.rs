@@ -1,6 +1,7 @@
 //! What codes the symbols of a scene: static tables, and of which steps, or the context model.
 
 use pocketsplat_capture::dataset::{Capture, View};
+use pocketsplat_core::Bundle;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -12,6 +13,9 @@ use crate::train::finish::Finished;
 
 /// Steps of tables as shares of the context's mean steps, finest first.
 const MEAN_STEP_SHARES: [f32; 4] = [0.5, 0.65, 0.8, 1.0];
+/// Mean steps cost 0.3 to 0.8 dB, which the bytes that they save are worth below about this share of the context's: bundles of at most
+/// 30 kB (`docs/rate-distortion.md`).
+const TABLES_SHARE: f64 = 0.8;
 /// What tables may lose against the context that a scene was trained with, where nobody needs them for their speed, dB.
 const LARGEST_LOSS_DB: f64 = 0.02;
 /// Training views, evenly picked, over which that is measured.
@@ -22,10 +26,11 @@ const JUDGED_VIEWS: usize = 8;
 #[serde(rename_all = "lowercase")]
 pub enum CoderChoice {
     /// For a device that decodes in every frame, the tables of the finest steps that fit its flash: the context takes six times
-    /// their instructions. Otherwise the context, unless tables make a smaller file and lose no more than 0.02 dB over training views.
+    /// their instructions. Within a number of bytes, what draws training views better once the scene is cut to them. Otherwise the
+    /// context, unless tables make a smaller file and lose no more than 0.02 dB over training views.
     #[default]
     Auto,
-    /// Tables of the context's mean steps: cheap to decode.
+    /// Tables, cheap to decode: of the context's mean steps, or of the finest that fit where bytes are limited.
     Static,
     /// The context model.
     Context,
@@ -53,8 +58,13 @@ impl Candidates<'_> {
 }
 
 impl Encoding {
-    /// Codes a finished scene in the fewest bytes that [`CoderChoice`] leaves open: how a scene that is still trained is weighed.
-    pub(super) fn smallest(&self, finished: &Finished, capture: &Capture) -> Result<CodedScene, EncodeError> {
+    /// Whether a number of bytes is all that decides between tables and context.
+    pub(super) fn chooses_within_bytes(&self) -> bool {
+        self.coder == CoderChoice::Auto && self.limits.processor.is_none() && self.limits.flash_bytes.is_some()
+    }
+
+    /// Codes a scene that is still trained as its bundle will most likely be, as far as lengths tell.
+    pub(super) fn expected(&self, finished: &Finished, capture: &Capture) -> Result<CodedScene, EncodeError> {
         let candidates = self.candidates(finished, capture);
         if finished.scene.context.is_none() {
             return Ok(candidates.coded(ChannelCoding::Tables(self.quantisation))?);
@@ -67,7 +77,8 @@ impl Encoding {
             CoderChoice::Auto if self.limits.processor.is_some() => tables()?,
             CoderChoice::Auto => {
                 let (context, tables) = (context()?, tables()?);
-                if tables.file_len() < context.file_len() { tables } else { context }
+                let share = tables.file_len() as f64 / context.file_len() as f64;
+                if share < TABLES_SHARE { tables } else { context }
             }
         })
     }
@@ -97,17 +108,21 @@ impl Encoding {
         }
         let mean = mean_steps(&finished.scene)?;
         let tables = |share| candidates.coded(ChannelCoding::Tables(mean.scaled(share)));
-        if self.coder == CoderChoice::Static {
-            return Ok(tables(1.0)?);
-        }
         let fits = |coded: &CodedScene| self.limits.flash_bytes.is_none_or(|most| coded.file_len() as u64 <= most);
-        if self.limits.processor.is_some() {
+        let as_fine_as_fit = match self.coder {
+            CoderChoice::Static => self.limits.flash_bytes.is_some(),
+            _ => self.limits.processor.is_some(),
+        };
+        if as_fine_as_fit {
             for share in MEAN_STEP_SHARES {
                 let coded = tables(share)?;
                 if fits(&coded) {
                     return Ok(coded);
                 }
             }
+        }
+        if self.coder == CoderChoice::Static {
+            return Ok(tables(1.0)?);
         }
         let context = candidates.coded(ChannelCoding::Context)?;
         if !fits(&context) {
@@ -116,7 +131,9 @@ impl Encoding {
             return Ok(if tables.file_len() < context.file_len() { tables } else { context });
         }
         let tables = MEAN_STEP_SHARES.into_iter().rev().map(|share| Ok(tables(share)?));
-        smaller_and_as_good(context, tables, CodedScene::file_len, |coded| judged_psnr_db(coded, &capture.train))
+        smaller_and_as_good(context, tables, CodedScene::file_len, |coded| {
+            judged_psnr_db(&coded.bundle().map_err(WriteError::ReadBack)?, &capture.train)
+        })
     }
 }
 
@@ -141,13 +158,12 @@ fn smaller_and_as_good<T, E>(
     Ok(one)
 }
 
-/// PSNR of a coded scene's frames, mean over [`JUDGED_VIEWS`] of `views`, dB.
-fn judged_psnr_db(coded: &CodedScene, views: &[View]) -> Result<f64, EncodeError> {
-    let bundle = coded.bundle().map_err(WriteError::ReadBack)?;
+/// PSNR of a bundle's frames, mean over [`JUDGED_VIEWS`] of `views`, dB.
+pub(super) fn judged_psnr_db(bundle: &Bundle<'_>, views: &[View]) -> Result<f64, EncodeError> {
     let n = JUDGED_VIEWS.min(views.len());
     let psnr_db = (0..n).into_par_iter().map(|i| {
         let view = &views[i * views.len() / n];
-        let frame = core_image(&bundle, &view.camera);
+        let frame = core_image(bundle, &view.camera);
         let frame = frame.map_err(|source| EncodeError::Draw { view: view.name.clone(), source })?;
         let photograph = view.photograph()?;
         Ok(psnr_db_masked(&frame.image, &photograph.image, photograph.mask.as_ref()) / n as f64)

@@ -5,6 +5,7 @@ use pocketsplat_capture::dataset::{Capture, View};
 use pocketsplat_core::{Bundle, DecodeError, Plan};
 use pocketsplat_instructions::level;
 
+use super::choice::{CoderChoice, judged_psnr_db};
 use super::scale::{DevicePlans, frame_of, level_needs, measured_cameras, most_instructions};
 use super::{EncodeError, Encoding};
 use crate::bundle::{WriteError, Written};
@@ -102,6 +103,25 @@ impl Encoding {
     /// # Errors
     /// [`EncodeError`].
     pub fn encode(&self, finished: Finished, capture: &Capture, held_out: &[View]) -> Result<Fitted, EncodeError> {
+        if !self.chooses_within_bytes() || finished.scene.context.is_none() {
+            return self.cut(finished, capture, held_out);
+        }
+        // Each is cut for itself: a few bytes that tables save may cost decibels.
+        let cut = |coder| Self { coder, ..self.clone() }.cut(finished.clone(), capture, held_out);
+        match (cut(CoderChoice::Context), cut(CoderChoice::Static)) {
+            (Ok(context), Ok(tables)) => {
+                let psnr_db = |fitted: &Fitted| {
+                    let bundle = Bundle::parse(&fitted.written.bytes).map_err(WriteError::ReadBack)?;
+                    judged_psnr_db(&bundle, &capture.train)
+                };
+                Ok(if psnr_db(&context)? >= psnr_db(&tables)? { context } else { tables })
+            }
+            (Err(EncodeError::TooLarge { .. }), only) | (only, Err(EncodeError::TooLarge { .. })) => only,
+            (Err(error), _) | (_, Err(error)) => Err(error),
+        }
+    }
+
+    fn cut(&self, finished: Finished, capture: &Capture, held_out: &[View]) -> Result<Fitted, EncodeError> {
         let cameras = measured_cameras(capture);
         let attempt = |n: usize| {
             let mut fewer = finished.clone();

@@ -41,7 +41,7 @@ impl Encoding {
 impl Scale<'_> {
     fn load(&self, finished: &Finished) -> Result<Load, EncodeError> {
         let limits = &self.encoding.limits;
-        let coded = self.encoding.smallest(finished, self.capture)?;
+        let coded = self.encoding.expected(finished, self.capture)?;
         let bytes = limits.flash_bytes.map_or(0.0, |most| coded.file_len() as f64 / most as f64);
         if limits.ram_bytes.is_none() && limits.processor.is_none() {
             return Ok(Load { bytes, ..Load::default() });

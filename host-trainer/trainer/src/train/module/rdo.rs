@@ -126,9 +126,14 @@ impl Module for Rdo {
         if run.is_limited() {
             let left = |n_left: usize| self.worthless(&worth, self.strength_for(&worth, n_left));
             let strength_for = |n_left: usize| self.strength_for(&worth, n_left);
-            let fits = fit(n, run.lambda(), strength_for, |n_left| run.load_without(&left(n_left)))?;
+            let fits = fit(n, run.lambda(), event + 1 == shares.len(), strength_for, |n_left| {
+                run.load_without(&left(n_left))
+            })?;
             let n_last = fits.n_anchors.min(self.anchors.unwrap_or(usize::MAX));
-            let masked = self.worthless(&worth, part_of_the_way(n_last));
+            // Where bytes are limited, what is not worth them at the new λ goes at once: the rest has longer to learn to do without it.
+            let of_rate = if run.limits_bytes() { self.strength * fits.lambda / fits.former_lambda } else { 0.0 };
+            let strength = part_of_the_way(n_last).max(of_rate.min(strength_for(fits.n_that_fill().max(n_last))));
+            let masked = self.worthless(&worth, strength);
             return Ok(Some(AnchorChange::Fit { masked, found: fits }));
         }
         let strength = self.anchors.map_or(self.strength, part_of_the_way);

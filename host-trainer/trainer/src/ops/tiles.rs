@@ -45,11 +45,12 @@ fn tile_rectangle<R: Real>(splat: &Splat<R>, footprint: &Footprint<R>, size_px: 
         let half: f64 = footprint.half_extent_px[i].into();
         // Pixel p has its centre at p + ½. One part in 10⁵ of slack, because the rasteriser compares alpha, not distance.
         let slack = 1e-5 * half + 1e-4;
-        let size = size_px[i] as f64;
-        let low = (centre - half - slack - 0.5).larger(0.0).smaller(size);
+        // What begins beyond the last tile is in none.
+        let (size, beyond) = (size_px[i] as f64, size_px[i].next_multiple_of(TILE_PX) as f64);
+        let low = (centre - half - slack - 0.5).larger(0.0).smaller(beyond);
         let high = (centre + half + slack - 0.5).larger(-1.0).smaller(size - 1.0);
         // The first pixel from `low` on, and the one after the last up to `high`; truncation is floor for what is not negative.
-        #[expect(clippy::cast_possible_truncation, reason = "both lie in 0..=size")]
+        #[expect(clippy::cast_possible_truncation, reason = "both lie within the tiles")]
         let (below, end) = (low as i32, (high + 1.0) as i32);
         let first = below + i32::from(f64::from(below) < low);
         let tile = |pixel: i32| u16::try_from(pixel / TILE_PX as i32).expect("a frame has fewer than 2¹⁶ tiles a side");
@@ -158,7 +159,7 @@ mod tests {
         let (splats, footprints): (Vec<_>, Vec<_>) = x
             .chunks_exact(5)
             .map(|v| {
-                let splat = Splat { mean_px: [35.0 + 45.0 * v[0], 25.0 + 35.0 * v[1]], ..Splat::default() };
+                let splat = Splat { mean_px: [35.0 + 65.0 * v[0], 25.0 + 55.0 * v[1]], ..Splat::default() };
                 // A coarse depth, so that there are ties.
                 let depth = 1.0 + (v[4] * 4.0).abs().floor();
                 (splat, Footprint { depth, half_extent_px: [12.0 * v[2].abs(), 12.0 * v[3].abs()] })
@@ -179,6 +180,11 @@ mod tests {
                         .any(|py| (py as f64 + 0.5 - splats[s].mean_px[1]).abs() <= footprints[s].half_extent_px[1]);
                 let listed = entries.contains(&u32::try_from(s).expect("small"));
                 assert!(!covers || listed, "splat {s} missing from tile {t}");
+                let is_near = [tx, ty].iter().enumerate().all(|(i, start)| {
+                    let (mean, reach) = (splats[s].mean_px[i], footprints[s].half_extent_px[i] + 1.0);
+                    mean + reach >= *start as f64 && mean - reach <= (start + TILE_PX) as f64
+                });
+                assert!(is_near || !listed, "splat {s} is far from tile {t}");
             }
         }
         for s in 0..n {

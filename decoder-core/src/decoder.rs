@@ -4,6 +4,7 @@ mod bind;
 mod count;
 mod frame;
 mod gather;
+mod notes;
 mod report;
 mod row;
 mod source;

@@ -9,6 +9,7 @@ pub(crate) mod integer;
 pub(crate) mod layer;
 pub(crate) mod root;
 pub(crate) mod rows;
+pub(crate) mod symbols;
 
 use core::arch::asm;
 

@@ -4,6 +4,7 @@ pub mod integer;
 pub mod layer;
 pub mod root;
 pub mod rows;
+pub mod symbols;
 
 /// Whether the processor converts halves itself.
 pub const IN_HARDWARE: bool = false;

@@ -41,7 +41,10 @@ fn in_rows(bundle: &Bundle<'_>, plan: Plan, camera: &Camera, format: PixelFormat
 
 /// Every residency and number of strips, with memory for all splats and with memory for few, in slabs of depth.
 fn plans(bundle: &Bundle<'_>, budget: Budget) -> Vec<Plan> {
-    let with_few = plan_variants(bundle, budget.with_max_splats(MaxSplats::AtMost(150)).with_overflow(Overflow::Slabs));
+    // In slabs without notes of where splats lie, and with them.
+    let with_few = [150, 320].into_iter().flat_map(|most| {
+        plan_variants(bundle, budget.with_max_splats(MaxSplats::AtMost(most)).with_overflow(Overflow::Slabs))
+    });
     plan_variants(bundle, budget).chain(with_few).map(|way| bundle.plan(&way).expect("planned")).collect()
 }
 

@@ -4,11 +4,13 @@ mod bits;
 mod channels;
 mod record;
 
+use pocketsplat_half::TABLE_WORDS;
+
 use channels::{Channel, ChannelModels, ContextModels};
 pub(crate) use record::{AnchorRecords, RecordLayout, RecordMemory};
 
 use super::lattice::Lattice;
-use super::tables::{IndexedTable, IndexedTables};
+use super::tables::IndexedTables;
 use super::{Bundle, Coder, MAX_FEATURE_DIM, n_log_scales};
 use crate::context::{Context, MAX_CONTEXT_INPUTS, N_POSITION_INPUTS, Trail};
 use crate::entropy::{AnsReader, MaskModel, TrieReader};
@@ -89,10 +91,7 @@ impl<'b> Bundle<'b> {
         };
         let scratch = scratch.get_mut(..needed).ok_or(too_short)?;
         let channels = match self.coder() {
-            Coder::Static(tables) => {
-                let slots = bytemuck::try_cast_slice_mut(scratch).map_err(|_| DecodeError::Internal)?;
-                ChannelModels::Static(IndexedTables::new(tables, self.header(), slots, scaled)?)
-            }
+            Coder::Static(tables) => ChannelModels::Static(IndexedTables::new(tables, self.header(), scratch, scaled)?),
             // What bundles were refused for is not linked, here and below.
             Coder::Context(_) if !cfg!(feature = "context") => return Err(DecodeError::Internal),
             Coder::Context(context) => {
@@ -125,7 +124,7 @@ const _: () = assert!(
 
 /// Words that so many tables take, or a context of such widths; whichever are more.
 pub(crate) const fn model_words(n_tables: u16, inputs: u16, hidden: u16, kept: u16) -> usize {
-    let tables = (n_tables as usize).saturating_mul(size_of::<IndexedTable>().div_ceil(4));
+    let tables = (n_tables as usize).saturating_mul(TABLE_WORDS);
     let context = (inputs as usize).saturating_add(hidden as usize).saturating_add(kept as usize).div_ceil(2);
     if tables > context { tables } else { context }
 }

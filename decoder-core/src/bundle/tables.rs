@@ -2,7 +2,7 @@
 
 mod index;
 
-pub(super) use index::{IndexedTable, IndexedTables};
+pub(super) use index::IndexedTables;
 
 use crate::bytes::{Cursor, Fields};
 use crate::entropy::{AnsReader, FREQUENCY_TOTAL, Slot, SymbolModel};

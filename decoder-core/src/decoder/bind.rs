@@ -59,7 +59,16 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
         let source = source?;
         let FrameMemory { tiles, splats, lists } = FrameMemory::take(plan.shape(), &mut regions)?;
         let (TileMemory { pixels, rgb, counts }, ListMemory { rects, order, spare }) = (tiles, lists);
-        let splats = SplatStore { splats: records_in(splats.splats)?, rects, n: 0, order, spare, counts };
+        let splats = SplatStore {
+            splats: records_in(splats.splats)?,
+            rects,
+            n: 0,
+            n_notes: 0,
+            places_of_notes: 0,
+            order,
+            spare,
+            counts,
+        };
         Ok(Self { bundle: *bundle, plan, skip_damage, source, pixels, rgb, splats })
     }
 }

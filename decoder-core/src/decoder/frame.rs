@@ -1,6 +1,7 @@
 //! Drawing a frame: strip after strip, slab after slab, tile after tile.
 
 use super::gather::{Admission, Frame};
+use super::notes::{Notes, StripsOfChunks};
 use super::splats::{Slab, SplatStore};
 use super::strip::{Strip, StripLayout};
 use super::tally::Tally;
@@ -14,6 +15,9 @@ use crate::project::{TILE_PIXELS, TileRect, View};
 use crate::raster::{BlendRule, EMPTY, TilePlace, blend_tile, finish_tile};
 use crate::rules::TILE_PX;
 use crate::stopwatch::{Stage, Stopwatch};
+
+/// Strips of a frame that is worth notes of its chunks.
+const LEAST_STRIPS_NOTED: u8 = 3;
 
 /// A frame that comes tile by tile, each when it is asked for; made by [`Decoder::begin`].
 ///
@@ -67,6 +71,7 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
         in_range(Field::FrameWidth, camera.width_px.into(), 1, budget.width_px.into())?;
         in_range(Field::FrameHeight, camera.height_px.into(), 1, budget.height_px.into())?;
         let strips = StripLayout::new(camera.height_px, self.plan.n_strips());
+        (self.splats.n_notes, self.splats.places_of_notes) = (0, 0);
         let admission = if budget.overflow == Overflow::Slabs {
             Admission::Slab
         } else if strips.len() > 1 && self.surely_fits(&view, strips) {
@@ -75,7 +80,20 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
             Admission::Tally(Tally::new(self.splats.places()))
         };
         let rule = BlendRule::new(budget.quality.alpha_cut, budget.quality.transmittance_stop);
-        let mut frame = Frame { view, strips, admission, report: FrameReport::default() };
+        // Decoding costs most, and each of many passes would do it again. Of fewer the first costs more than the others save.
+        let notes = matches!(admission, Admission::Slab)
+            && strips.len() >= LEAST_STRIPS_NOTED
+            && self.source.is_streamed()
+            && self.splats.take_notes(self.bundle.up_to_tier(self.plan.n_tiers()).n_chunks);
+        let notes = if notes { Notes::Due } else { Notes::None };
+        let mut frame = Frame {
+            view,
+            strips,
+            admission,
+            notes,
+            strips_of_chunks: StripsOfChunks::NONE,
+            report: FrameReport::default(),
+        };
         if self.skip_damage && matches!(admission, Admission::Slab) {
             self.note_damage(&mut frame);
         }
@@ -216,6 +234,7 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
             self.in_strip = self.in_strip.saturating_add(n);
             // It was full when it let go of a strip.
             let most = if self.strip == asked { n } else { decoder.splats.places() };
+            let most = most.saturating_add(decoder.splats.places_of_notes);
             self.most_in_memory = most.max(self.most_in_memory);
             let rects = decoder.splats.rects.iter().take(n as usize);
             let n_first_here =

@@ -1,5 +1,6 @@
 //! From the anchors in view to the splats of one strip, or of a slab of its depth.
 
+use super::notes::{Notes, StripsOfChunks};
 use super::source::{AnchorSource, Anchors, GaussianSource};
 use super::splats::{Slab, SplatStore};
 use super::strip::{Strip, StripLayout};
@@ -18,6 +19,8 @@ pub(super) struct Frame {
     pub(super) view: View,
     pub(super) strips: StripLayout,
     pub(super) admission: Admission,
+    pub(super) notes: Notes,
+    pub(super) strips_of_chunks: StripsOfChunks,
     pub(super) report: FrameReport,
 }
 
@@ -38,11 +41,16 @@ struct Pass {
     slab: Slab,
     /// What the pass can leave out; nothing when it goes over the whole scene.
     band: Option<Band>,
+    /// Whether it notes where splats lie.
+    takes_notes: bool,
 }
 
 impl Pass {
     /// Also leaves out what lies beyond the slab.
     fn end_earlier(&mut self, view: &View) {
+        if self.takes_notes {
+            return;
+        }
         let band = self.band.unwrap_or(Band::WHOLE);
         self.band = Some(band.between_depths(view, self.slab.from, self.slab.end));
     }
@@ -116,16 +124,31 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
         watch: &mut impl Stopwatch,
     ) -> Result<Slab, DecodeError> {
         self.splats.n = 0;
-        let mut pass = Pass { strip: *strip, slab: Slab::behind(from), band: frame.band(*strip) };
-        if from > 0.0 {
+        let mut pass = Pass { strip: *strip, slab: Slab::behind(from), band: frame.band(*strip), takes_notes: false };
+        let before = frame.notes;
+        if before == Notes::Taken {
+            pass.slab.end = self.splats.end_of_slab(*strip, from);
+        }
+        if from > 0.0 || pass.slab.ends() {
             pass.end_earlier(&frame.view);
+        }
+        if before == Notes::Due {
+            (frame.notes, pass.band, pass.takes_notes) = (Notes::Taken, None, true);
         }
         let decodes = u8::from(self.source.is_streamed());
         frame.report.decode_passes = frame.report.decode_passes.saturating_add(decodes);
         for (chunk, first_anchor) in self.planned_chunks() {
             watch.enter(Stage::Project);
+            let may_lie_here = match frame.admission {
+                Admission::Slab if before == Notes::Taken => {
+                    self.splats.may_lie_in(chunk.index(), pass.strip, &pass.slab)
+                }
+                Admission::Tally(_) if strip.index > 0 => frame.strips_of_chunks.may_lie_in(chunk.index(), pass.strip),
+                _ => true,
+            };
             let ink_box = chunk.ink_box();
-            if frame.view.sees_box(ink_box) && pass.band.is_none_or(|band| band.sees_box(ink_box)) {
+            let is_seen = || frame.view.sees_box(ink_box) && pass.band.is_none_or(|band| band.sees_box(ink_box));
+            if may_lie_here && is_seen() {
                 self.gather_sound_chunk(&chunk, first_anchor, &mut pass, frame, watch)?;
             }
         }
@@ -177,10 +200,10 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
         watch: &mut impl Stopwatch,
     ) -> Result<(), DecodeError> {
         let Self { bundle, source, splats, .. } = self;
-        let Frame { view, strips, admission, report } = frame;
+        let Frame { view, strips, admission, report, strips_of_chunks, .. } = frame;
         let header = bundle.header();
         let effects = header.features.effects;
-        let keeper = Keeper::<A> { view, strips, admission, pass, splats };
+        let keeper = Keeper::<A> { view, strips, admission, pass, splats, chunk: chunk.index(), strips_of_chunks };
         // As if its Gaussians were baked, which know nothing of the anchor's extent.
         let as_baked = bundle.n_gaussians(0).is_some();
         let mut gathering = Gathering { keeper, report, effects, as_baked };
@@ -264,6 +287,8 @@ struct Keeper<'f, 's, A: Arithmetic> {
     admission: &'f mut Admission,
     pass: &'f mut Pass,
     splats: &'f mut SplatStore<'s, A::Splat>,
+    chunk: u32,
+    strips_of_chunks: &'f mut StripsOfChunks,
 }
 
 impl<A: Arithmetic> Keeper<'_, '_, A> {
@@ -275,9 +300,15 @@ impl<A: Arithmetic> Keeper<'_, '_, A> {
         let lies_here = *touched.end() >= index.into() && *touched.start() < self.pass.strip.end_index.into();
         let drawn = match self.admission {
             Admission::All => true,
-            Admission::Tally(tally) if index == 0 => tally.admit(place, touched),
+            Admission::Tally(tally) if index == 0 => {
+                self.strips_of_chunks.add(self.chunk, touched.clone());
+                tally.admit(place, touched)
+            }
             Admission::Tally(tally) => tally.admits(place),
             Admission::Slab => {
+                if self.pass.takes_notes {
+                    self.splats.note(self.chunk, splat.depth, touched);
+                }
                 if lies_here {
                     let end = self.pass.slab.end;
                     self.splats.push_into(&mut self.pass.slab, &splat, rect);

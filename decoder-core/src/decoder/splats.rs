@@ -1,5 +1,9 @@
 //! The splats in memory, and their order.
 
+use core::ops::RangeInclusive;
+
+use super::notes::{ChunkNote, DepthCounts};
+use super::strip::Strip;
 use crate::error::saturate;
 use crate::project::{Splat, SplatRecord, TileRect};
 use crate::raster::sort_by_depth;
@@ -9,6 +13,9 @@ pub(super) struct SplatStore<'s, S> {
     pub(super) splats: &'s mut [S],
     pub(super) rects: &'s mut [TileRect],
     pub(super) n: u32,
+    /// Chunks with a note, and the last places, which the notes take.
+    pub(super) n_notes: u32,
+    pub(super) places_of_notes: u32,
     pub(super) order: &'s mut [u32],
     pub(super) spare: &'s mut [u32],
     pub(super) counts: &'s mut [u32],
@@ -21,7 +28,7 @@ pub(super) struct Slab {
     pub(super) end: f32,
     /// Splats in it that have no place, because too many lie at exactly one depth; and that depth.
     pub(super) n_left_out: u32,
-    left_out_at: f32,
+    pub(super) left_out_at: f32,
 }
 
 impl Slab {
@@ -39,7 +46,58 @@ impl Slab {
 impl<S: SplatRecord> SplatStore<'_, S> {
     /// Splats that there is memory for.
     pub(super) fn places(&self) -> u32 {
-        saturate(self.splats.len())
+        saturate(self.splats.len()).saturating_sub(self.places_of_notes)
+    }
+
+    /// Makes room for notes of so many chunks, without any splat, where that takes few places; returns whether it did.
+    // Not inlined, here and below: few calls, or next to much else.
+    #[inline(never)]
+    pub(super) fn take_notes(&mut self, n_chunks: u32) -> bool {
+        let len = (n_chunks as usize).saturating_mul(size_of::<ChunkNote>()).saturating_add(size_of::<DepthCounts>());
+        let places = len.div_ceil(size_of::<S>().max(1));
+        if places > self.splats.len() / 4 {
+            return false;
+        }
+        (self.n_notes, self.places_of_notes) = (n_chunks, saturate(places));
+        let Some((counts, notes)) = self.notes() else { return false };
+        counts.clear();
+        notes.fill(ChunkNote::NOWHERE);
+        true
+    }
+
+    /// Notes a splat of a chunk.
+    #[inline(never)]
+    pub(super) fn note(&mut self, chunk: u32, depth: f32, strips: RangeInclusive<usize>) {
+        let Some((counts, notes)) = self.notes() else { return };
+        counts.add(depth, strips.clone());
+        if let Some(note) = notes.get_mut(chunk as usize) {
+            note.add(depth, strips);
+        }
+    }
+
+    /// Whether a chunk may have a splat in a slab of a strip.
+    #[inline(never)]
+    pub(super) fn may_lie_in(&mut self, chunk: u32, strip: Strip, slab: &Slab) -> bool {
+        let note = self.notes().and_then(|(_, notes)| notes.get(chunk as usize));
+        note.is_none_or(|note| note.may_lie_in(strip, slab))
+    }
+
+    /// Where a slab of a strip from depth `from` on ends, so that there is a place for each of its splats.
+    #[inline(never)]
+    pub(super) fn end_of_slab(&mut self, strip: Strip, from: f32) -> f32 {
+        let places = self.places();
+        self.notes().map_or(f32::INFINITY, |(counts, _)| counts.end_of_slab(strip, from, places))
+    }
+
+    /// How many splats there are at which depth, and `[n_chunks]` notes; where there are such.
+    #[inline(never)]
+    fn notes(&mut self) -> Option<(&mut DepthCounts, &mut [ChunkNote])> {
+        let places = self.places() as usize;
+        let words: &mut [u32] = bytemuck::try_cast_slice_mut(self.splats.get_mut(places..)?).ok()?;
+        let (counts, words) = words.split_at_mut_checked(size_of::<DepthCounts>() / size_of::<u32>())?;
+        let notes = words.get_mut(..(self.n_notes as usize).checked_mul(size_of::<ChunkNote>() / size_of::<u32>())?)?;
+        let counts: &mut [DepthCounts] = bytemuck::try_cast_slice_mut(counts).ok()?;
+        Some((counts.first_mut()?, bytemuck::try_cast_slice_mut(notes).ok()?))
     }
 
     /// Keeps a splat; the caller has counted that there is a place.
@@ -62,7 +120,7 @@ impl<S: SplatRecord> SplatStore<'_, S> {
         if !lies_in(slab) {
             return;
         }
-        if self.n as usize >= self.splats.len() {
+        if self.n >= self.places() {
             match self.earlier_end(splat.depth) {
                 Some(end) => self.end_slab(slab, end),
                 None => {
@@ -174,6 +232,8 @@ mod tests {
                 splats: &mut std::vec![Packed28::zeroed(); n_places],
                 rects: &mut std::vec![RECT; n_places],
                 n: 0,
+                n_notes: 0,
+                places_of_notes: 0,
                 order: &mut std::vec![0; n_places],
                 spare: &mut std::vec![0; n_places],
                 counts: &mut [0; N_RADIX],

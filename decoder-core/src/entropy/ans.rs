@@ -3,10 +3,9 @@
 //! It reads what `constriction`'s `AnsCoder<u16, u32>` writes (Bamler 2022), its words in reverse order so that reading
 //! goes forward. That coder is the reference, and tests of the writer hold the two identical.
 
-use super::model::{PRECISION_BITS, SymbolModel, UniformByte};
+use pocketsplat_half::Stream;
 
-/// While words are left, the state never falls below this.
-const STATE_MIN: u32 = 1 << 16;
+use super::model::{SymbolModel, UniformByte};
 
 /// Decodes the symbols of one stream; [`finish`](Self::finish) tells whether it was one.
 ///
@@ -14,19 +13,18 @@ const STATE_MIN: u32 = 1 << 16;
 #[derive(Clone, Copy, Debug)]
 #[must_use = "only `finish` tells whether the symbols were sound"]
 pub struct AnsReader<'a> {
-    state: u32,
-    words: &'a [[u8; 2]],
+    stream: Stream<'a>,
     malformed: bool,
 }
 
 impl<'a> AnsReader<'a> {
     /// Starts at the first word of a stream.
     pub fn new(words: &'a [[u8; 2]]) -> Self {
-        let mut reader = Self { state: 0, words, malformed: false };
+        let mut reader = Self { stream: Stream { state: 0, words }, malformed: false };
         // The encoder writes no leading zero: such a stream would hold the same symbols as a shorter one.
         reader.malformed = words.first() == Some(&[0, 0]);
-        reader.refill();
-        reader.refill();
+        reader.stream.refill();
+        reader.stream.refill();
         reader
     }
 
@@ -45,16 +43,19 @@ impl<'a> AnsReader<'a> {
     /// What the next symbol's slot contains, below [`FREQUENCY_TOTAL`](super::FREQUENCY_TOTAL).
     #[inline]
     pub(crate) fn quantile(&self) -> u32 {
-        self.state & ((1 << PRECISION_BITS) - 1)
+        self.stream.quantile()
     }
 
     /// Leaves the next symbol behind, whose slot contains the quantile.
     #[inline]
     pub(crate) fn advance(&mut self, start: u32, frequency: u32) {
-        // Below 2²⁰ · 2¹² + 2¹²; wrapping costs nothing and says that no value can panic here.
-        let offset = self.quantile().wrapping_sub(start);
-        self.state = (self.state >> PRECISION_BITS).wrapping_mul(frequency).wrapping_add(offset);
-        self.refill();
+        self.stream.advance(start, frequency);
+    }
+
+    /// The stream itself, for what reads several symbols at once.
+    #[inline(always)]
+    pub(crate) fn stream(&mut self) -> &mut Stream<'a> {
+        &mut self.stream
     }
 
     /// The symbol after an escape: two raw bytes, high then low.
@@ -78,20 +79,11 @@ impl<'a> AnsReader<'a> {
     /// # Errors
     /// The number of bytes not read; 0 when the symbols ran past the end or ended in another state.
     pub fn finish(self) -> Result<(), usize> {
-        if self.words.is_empty() && self.state == 0 && !self.malformed {
+        let Stream { state, words } = self.stream;
+        if words.is_empty() && state == 0 && !self.malformed {
             return Ok(());
         }
-        Err(self.words.as_flattened().len())
-    }
-
-    #[inline]
-    fn refill(&mut self) {
-        if self.state < STATE_MIN
-            && let Some((&word, rest)) = self.words.split_first()
-        {
-            self.state = (self.state << 16) | u32::from(u16::from_le_bytes(word));
-            self.words = rest;
-        }
+        Err(words.as_flattened().len())
     }
 }
 

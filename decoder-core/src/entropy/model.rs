@@ -1,10 +1,6 @@
 //! What an entropy decoder needs to know about the next symbol.
 
-/// Frequencies are multiples of 2⁻¹².
-pub const PRECISION_BITS: u32 = 12;
-
-/// The frequencies of a model add up to this.
-pub const FREQUENCY_TOTAL: u16 = 1 << PRECISION_BITS;
+pub use pocketsplat_half::{FREQUENCY_TOTAL, PRECISION_BITS};
 
 /// The piece of `0..FREQUENCY_TOTAL` that stands for one symbol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,6 +3,8 @@
 //! A node either has both children or one of them; which, is a symbol. So n codes cost n − 1 symbols "both" and one "only"
 //! for every other node on a path, and neighbours share their paths. Codes come in ascending order, one at a time.
 
+use pocketsplat_half::{LEVELS_AT_ONCE, LevelFrequencies, descend};
+
 use super::ans::AnsReader;
 use super::model::{FREQUENCY_TOTAL, Slot, SymbolModel};
 
@@ -12,17 +14,11 @@ pub const N_TRIE_CONTEXTS: usize = 3;
 /// Most levels: the codes and the marks of a path fit a u64.
 pub const MAX_TRIE_LEVELS: usize = 63;
 
-/// The contexts for all patterns of the last three ancestors, two bits each; a pattern has a bit for each ancestor, the
-/// nearest lowest, set if it has both children.
-const CONTEXTS: u32 = 0b10_10_10_01_10_01_01_00;
-/// Levels that are walked in 32-bit registers before they join the path.
-const LEVELS_AT_ONCE: usize = 32;
-
 /// The frequencies of a trie's symbols, level by level from the root.
 #[derive(Clone, Copy, Debug)]
 pub struct TrieModel<'a> {
     /// `[n_levels][N_TRIE_CONTEXTS]` of `end_both`, `end_zero`.
-    levels: &'a [[[[u8; 2]; 2]; N_TRIE_CONTEXTS]],
+    levels: &'a [LevelFrequencies],
 }
 
 /// The frequencies of one node's symbol.
@@ -48,7 +44,7 @@ pub enum Children {
 /// Walks over one trie, code by code.
 #[derive(Clone, Copy, Debug)]
 pub struct TrieReader<'a> {
-    levels: &'a [[[[u8; 2]; 2]; N_TRIE_CONTEXTS]],
+    levels: &'a [LevelFrequencies],
     /// The path taken, its last branch lowest.
     code: u64,
     /// The nodes of the path that have both children.
@@ -61,13 +57,13 @@ impl<'a> TrieModel<'a> {
     /// Takes the frequencies of a trie with as many levels as given; the caller has checked that each `end_both` ≤
     /// `end_zero` ≤ [`FREQUENCY_TOTAL`].
     #[must_use]
-    pub fn new(levels: &'a [[[[u8; 2]; 2]; N_TRIE_CONTEXTS]]) -> Self {
+    pub fn new(levels: &'a [LevelFrequencies]) -> Self {
         Self { levels }
     }
 
     /// `[n_levels][N_TRIE_CONTEXTS]` of `end_both`, `end_zero`, as bytes.
     #[must_use]
-    pub fn levels(&self) -> &'a [[[[u8; 2]; 2]; N_TRIE_CONTEXTS]] {
+    pub fn levels(&self) -> &'a [LevelFrequencies] {
         self.levels
     }
 
@@ -145,28 +141,8 @@ impl TrieReader<'_> {
 
     /// Goes down by at most [`LEVELS_AT_ONCE`] levels.
     #[inline]
-    fn descend(&mut self, levels: &[[[[u8; 2]; 2]; N_TRIE_CONTEXTS]], symbols: &mut AnsReader<'_>) {
-        // A copy of its own stays in registers.
-        let mut reader = *symbols;
-        let (mut code, mut both) = (0_u32, self.both as u32);
-        for contexts in levels {
-            let context = CONTEXTS >> ((both & 7) << 1) & 3;
-            let node = contexts.get(context as usize).copied().unwrap_or_default();
-            // As `NodeModel::slot` has it, in registers of 32 bits.
-            let [end_both, end_zero] = node.map(|end| u32::from(u16::from_le_bytes(end)));
-            let quantile = reader.quantile();
-            let (start, end, is_both, is_one) = if quantile < end_both {
-                (0, end_both, 1, 0)
-            } else if quantile < end_zero {
-                (end_both, end_zero, 0, 0)
-            } else {
-                (end_zero, FREQUENCY_TOTAL.into(), 0, 1)
-            };
-            reader.advance(start, end.wrapping_sub(start));
-            code = (code << 1) | is_one;
-            both = (both << 1) | is_both;
-        }
-        *symbols = reader;
+    fn descend(&mut self, levels: &[LevelFrequencies], symbols: &mut AnsReader<'_>) {
+        let [code, both] = descend(levels, self.both as u32, symbols.stream());
         let n = levels.len() as u32 & 63;
         self.code = (self.code << n) | u64::from(code);
         // The bits above the new ones are those below them in the path.
@@ -189,12 +165,14 @@ impl TrieReader<'_> {
 mod tests {
     use std::vec::Vec;
 
-    use super::{CONTEXTS, Children, N_TRIE_CONTEXTS, NodeModel, TrieModel};
+    use pocketsplat_half::{LevelFrequencies, NODE_CONTEXTS};
+
+    use super::{Children, NodeModel, TrieModel};
     use crate::entropy::testing::{AnsWriter, slot_of};
     use crate::entropy::{AnsReader, Slot};
 
     /// Another model at each level and in each context.
-    fn levels(n: usize) -> Vec<[[[u8; 2]; 2]; N_TRIE_CONTEXTS]> {
+    fn levels(n: usize) -> Vec<LevelFrequencies> {
         let node = |level: usize, context: usize| {
             let end_both = (300 + 97 * (level % 10) + 1000 * context) as u16;
             let end_zero = end_both + 150 + 31 * (level as u16 % 20);
@@ -268,7 +246,7 @@ mod tests {
     #[test]
     fn contexts_count_the_ancestors_with_both_children() {
         for pattern in 0..8_u32 {
-            assert_eq!(CONTEXTS >> (2 * pattern) & 3, pattern.count_ones().min(2), "pattern {pattern:03b}");
+            assert_eq!(NODE_CONTEXTS >> (2 * pattern) & 3, pattern.count_ones().min(2), "pattern {pattern:03b}");
         }
     }
 

@@ -1,8 +1,8 @@
 //! One number for layers, roots and blended rows, which some targets have in assembly.
 
 use pocketsplat_half::{
-    BlendConstants, Exponential, LANES, ROW_LEN, RowSplat, add_products_of_two_rows, blend_rows, outputs,
-    rectified_units, sqrt,
+    BlendConstants, ChannelTables, Entries, Exponential, LANES, LevelFrequencies, ROW_LEN, RowSplat, Stream,
+    TABLE_WORDS, add_products_of_two_rows, blend_rows, descend, outputs, read_values, rectified_units, sqrt,
 };
 
 use super::digest::Digest;
@@ -26,7 +26,8 @@ impl Random {
     }
 }
 
-/// Digest of layers of 0 to 12 inputs, of integer sums of 0 to 19, of roots of all exponents, and of tiles of 40 splats each.
+/// Digest of layers of 0 to 12 inputs, of integer sums of 0 to 19, of roots of all exponents, of symbols of random bytes, and of tiles of
+/// 40 splats each.
 pub(crate) fn digest() -> Digest {
     let mut digest = Digest::EMPTY;
     let mut random = Random(5);
@@ -58,6 +59,9 @@ pub(crate) fn digest() -> Digest {
     for upper in 0..0x7F80_u32 {
         digest.add(sqrt(f32::from_bits(upper << 16 | upper.wrapping_mul(40_503) & 0xFFFF)).to_bits().to_le_bytes());
     }
+    for _ in 0..30 {
+        add_symbols(&mut random, &mut digest);
+    }
     for tile in 0..50 {
         let mut rows = [[[0.0, 0.0, 0.0, 1.0]; ROW_LEN]; ROW_LEN];
         for _ in 0..40 {
@@ -88,4 +92,52 @@ pub(crate) fn digest() -> Digest {
         rows.as_flattened().as_flattened().iter().for_each(|value| digest.add(value.to_bits().to_le_bytes()));
     }
     digest
+}
+
+/// Adds what random words hold: runs of symbols of three tables up to one that is in none of them, and paths of a trie.
+fn add_symbols(random: &mut Random, digest: &mut Digest) {
+    let words: [[u8; 2]; 64] = core::array::from_fn(|_| (random.between(0.0, 65_535.9) as u16).to_le_bytes());
+    let mut stream = Stream { state: 0, words: &words };
+    stream.refill();
+    stream.refill();
+    // Of 3, 20 and 64 entries, some of them empty, the first from 0 on.
+    let bounds = [3_u16, 20, 64].map(|n| {
+        let most = 4000.0 / f32::from(n);
+        let mut bound = 0;
+        let mut bounds = [[0; 2]; 65];
+        for (i, slot) in (0..=n).zip(&mut bounds) {
+            *slot = u16::to_le_bytes(bound);
+            bound += random.between(if i % 5 == 0 { 0.0 } else { most * 0.5 }, most) as u16;
+        }
+        (usize::from(n) + 1, bounds)
+    });
+    let tables = bounds.iter().map(|(n, bounds)| Entries {
+        origin: 0.1,
+        step: 0.7,
+        first_symbol: -9,
+        bounds: bounds.get(..*n).unwrap_or_default(),
+    });
+    let mut memory = [0; 3 * TABLE_WORDS];
+    let numbers: [[u8; 2]; 24] = core::array::from_fn(|channel| [(channel * 7 % 3) as u8, 0]);
+    let Some(tables) = ChannelTables::new(&mut memory, tables, &numbers) else { return };
+    let levels: [LevelFrequencies; 40] = core::array::from_fn(|_| {
+        core::array::from_fn(|_| {
+            let end_both = random.between(0.0, 3000.0);
+            [end_both, random.between(end_both, 4096.0)].map(|end| (end as u16).to_le_bytes())
+        })
+    });
+    for turn in 0..40 {
+        let mut values = [-1.0; 24];
+        let n = read_values(&tables, turn, &mut values, &mut stream);
+        digest.add([n as u8]);
+        values.iter().for_each(|value| digest.add(value.to_bits().to_le_bytes()));
+        if n == 0 {
+            // An escape, as it were.
+            stream.advance(0, 64);
+        }
+        let path = descend(levels.get(turn..).unwrap_or_default(), turn as u32, &mut stream);
+        path.iter().for_each(|bits| digest.add(bits.to_le_bytes()));
+        digest.add(stream.state.to_le_bytes());
+        digest.add([stream.words.len() as u8]);
+    }
 }

@@ -1,5 +1,7 @@
 //! The channels of an anchor, one symbol each, with tables or with a context.
 
+use pocketsplat_half::{ChannelTables, read_values};
+
 use super::AnchorSite;
 use crate::bundle::tables::IndexedTables;
 use crate::context::{Context, Group, GroupStep, N_GROUPS, Network, Trail};
@@ -40,6 +42,14 @@ pub(super) trait Channel: Copy {
 
     /// The same for values without an origin.
     fn from_scaled(symbol: i32, step: f32) -> Self;
+
+    /// Fills `run` from channel `first` on with symbols of tables in memory; returns how many there are before one that is not.
+    fn read_tables(
+        tables: &ChannelTables<'_, '_>,
+        first: usize,
+        run: &mut [Self],
+        symbols: &mut AnsReader<'_>,
+    ) -> usize;
 }
 
 impl Channel for i16 {
@@ -54,6 +64,16 @@ impl Channel for i16 {
     fn from_scaled(symbol: i32, _step: f32) -> Self {
         symbol as Self
     }
+
+    #[inline(always)]
+    fn read_tables(
+        tables: &ChannelTables<'_, '_>,
+        first: usize,
+        run: &mut [Self],
+        symbols: &mut AnsReader<'_>,
+    ) -> usize {
+        tables.read_values_with(first, run, symbols.stream(), |symbol, _, _| symbol as Self)
+    }
 }
 
 impl Channel for f32 {
@@ -67,6 +87,16 @@ impl Channel for f32 {
     #[inline(always)]
     fn from_scaled(symbol: i32, step: f32) -> Self {
         symbol as Self * step
+    }
+
+    #[inline(always)]
+    fn read_tables(
+        tables: &ChannelTables<'_, '_>,
+        first: usize,
+        run: &mut [Self],
+        symbols: &mut AnsReader<'_>,
+    ) -> usize {
+        read_values(tables, first, run, symbols.stream())
     }
 }
 
@@ -94,7 +124,7 @@ impl<'b> ChannelModels<'b, '_> {
         let Some((scalars, offsets)) = row.split_at_mut_checked(n_scalars) else { return symbols };
         let (offsets, _) = offsets.as_chunks_mut();
         match self {
-            Self::Static(tables) => read_static(*tables, site.mask, symbols, scalars, offsets),
+            Self::Static(tables) => read_static(tables, site.mask, symbols, scalars, offsets),
             Self::Context(_) if !cfg!(feature = "context") => symbols,
             Self::Context(models) => {
                 if is_first {
@@ -107,40 +137,37 @@ impl<'b> ChannelModels<'b, '_> {
 }
 
 /// Fills scalars and offsets with symbols of tables.
-// On its own it gets the registers that it needs.
+// Not inlined: it has several callers.
 #[inline(never)]
 fn read_static<'b, T: Channel>(
-    tables: IndexedTables<'b, '_>,
-    mut mask: u32,
-    symbols: AnsReader<'b>,
+    tables: &IndexedTables<'b, '_>,
+    mask: u32,
+    mut symbols: AnsReader<'b>,
     scalars: &mut [T],
     offsets: &mut [[T; 3]],
 ) -> AnsReader<'b> {
-    let Some((scalar_numbers, offset_numbers)) = tables.of_channels().split_at_checked(scalars.len()) else {
-        return symbols;
+    let mut read = |first: usize, run: &mut [T]| {
+        let value_of = |symbol, [origin, step]: [f32; 2]| T::from_symbol(symbol, origin, step);
+        tables.read_run(first, run, &mut symbols, T::read_tables, value_of);
     };
-    // Arguments of this size are passed in memory; a copy stays in registers.
-    let mut symbols = symbols;
-    let mut read = |slot: &mut T, number: [u8; 2], bits: u8| {
-        if let Some((symbol, table)) = tables.symbol(number, bits, &mut symbols) {
-            *slot = T::from_symbol(symbol, table.origin, table.step);
-        }
-    };
-    let [feature_bits, log_scale_bits, offset_bits] = tables.symbol_bits;
-    let mut scalars = scalars.iter_mut().zip(scalar_numbers);
-    for (n, bits) in [(tables.feature_dim.into(), feature_bits), (usize::MAX, log_scale_bits)] {
-        for (slot, &number) in scalars.by_ref().take(n) {
-            read(slot, number, bits);
+    read(0, scalars);
+    for (offset, k) in offsets.iter_mut().zip(0..) {
+        if mask.wrapping_shr(k) & 1 == 0 {
+            *offset = [T::UNDRAWN; 3];
         }
     }
-    for (offset, numbers) in offsets.iter_mut().zip(offset_numbers.as_chunks::<3>().0) {
-        *offset = [T::UNDRAWN; 3];
-        if mask & 1 == 1 {
-            for (slot, &number) in offset.iter_mut().zip(numbers) {
-                read(slot, number, offset_bits);
-            }
-        }
-        mask >>= 1;
+    // Those drawn side by side are read at once.
+    let (mut left, mut first) = (mask, 0_usize);
+    while left != 0 {
+        let n_skipped = left.trailing_zeros();
+        left = left.wrapping_shr(n_skipped);
+        let n_drawn = left.trailing_ones();
+        left = left.unbounded_shr(n_drawn);
+        first = first.wrapping_add(n_skipped as usize);
+        let end = first.wrapping_add(n_drawn as usize);
+        let Some(drawn) = offsets.get_mut(first..end) else { break };
+        read(scalars.len().wrapping_add(first.wrapping_mul(3)), drawn.as_flattened_mut());
+        first = end;
     }
     symbols
 }

@@ -1,0 +1,322 @@
+//! Symbols of asymmetric numeral systems (Duda 2013): runs of symbols of tables, and paths of a trie.
+
+use bytemuck::{Pod, Zeroable};
+
+/// The frequencies of a model add up to this; frequencies are multiples of its inverse.
+pub const FREQUENCY_TOTAL: u16 = 1 << PRECISION_BITS;
+/// Bits of a quantile.
+pub const PRECISION_BITS: u32 = 12;
+/// While words are left, the state of a stream never falls below this.
+pub const STATE_MIN: u32 = 1 << 16;
+
+/// Pieces of the range that have a short cut into a table.
+const N_SHORT_CUTS: usize = 64;
+/// Bits of a quantile within such a piece.
+const PIECE_BITS: u32 = PRECISION_BITS - N_SHORT_CUTS.ilog2();
+/// Bounds of a table in memory.
+const N_BOUNDS: usize = 66;
+/// The short cut of a piece whose symbols are not in memory: its entry ends at [`FREQUENCY_TOTAL`].
+const RARE: u8 = N_BOUNDS as u8 - 2;
+
+/// Most entries of a table in memory: a bound more says where the last of them ends, and one ends every search.
+pub const MAX_ENTRIES: usize = N_BOUNDS - 2;
+/// Words of a table in memory.
+pub const TABLE_WORDS: usize = size_of::<SymbolTable>() / 4;
+
+/// The context of a node of a trie by its last three ancestors, two bits each; the nearest is the lowest of the three bits, set if
+/// it has both children. It is how many of them have both, 2 and 3 counted alike.
+pub const NODE_CONTEXTS: u32 = 0b10_10_10_01_10_01_01_00;
+/// Levels of a trie that are walked at once.
+pub const LEVELS_AT_ONCE: usize = 32;
+
+/// The frequencies of the nodes of a level, in each context: the slots below the first are "both children", those up to the second "only
+/// child 0", the others "only child 1". Little-endian.
+pub type LevelFrequencies = [[[u8; 2]; 2]; 3];
+
+/// The entries of a table that are to be in memory, neighbours all of them.
+#[derive(Clone, Copy, Debug)]
+pub struct Entries<'t> {
+    /// Value of symbol 0.
+    pub origin: f32,
+    /// Distance between neighbouring symbols' values.
+    pub step: f32,
+    /// The symbol of the first entry.
+    pub first_symbol: i32,
+    /// `[n_entries + 1]` where the entries begin and where the last ends, little-endian, without falling and below
+    /// [`FREQUENCY_TOTAL`]; more than [`MAX_ENTRIES`] entries are left out.
+    pub bounds: &'t [[u8; 2]],
+}
+
+/// A table in memory.
+///
+/// Two things hold of every one, which [`ChannelTables::new`] makes: no short cut is beyond [`RARE`], and the last bound is
+/// [`FREQUENCY_TOTAL`]. So every search ends within the bounds.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct SymbolTable {
+    /// For each piece of the range the last entry that begins at or before its start; [`RARE`] where there is none.
+    short_cuts: [u8; N_SHORT_CUTS],
+    /// The symbol of the first entry, less [`PLACES_BEFORE`](Self::PLACES_BEFORE).
+    first_symbol: i32,
+    pub(crate) origin: f32,
+    step: f32,
+    /// Where the entries begin, where the last ends, and then [`FREQUENCY_TOTAL`].
+    pub(crate) bounds: [u16; N_BOUNDS],
+}
+
+impl SymbolTable {
+    /// Pairs of bytes from `origin` to the first bound.
+    const PLACES_BEFORE: i32 = 4;
+
+    fn new(entries: &Entries<'_>) -> Self {
+        let mut bounds = [FREQUENCY_TOTAL; N_BOUNDS];
+        for (bound, &stored) in bounds.iter_mut().take(MAX_ENTRIES + 1).zip(entries.bounds) {
+            *bound = u16::from_le_bytes(stored);
+        }
+        let mut short_cuts = [RARE; N_SHORT_CUTS];
+        for (piece, short_cut) in (0_u16..).zip(&mut short_cuts) {
+            let start = piece << PIECE_BITS;
+            let next = bounds.partition_point(|&bound| bound <= start);
+            *short_cut = next.checked_sub(1).map_or(RARE, |entry| (entry as u8).min(RARE));
+        }
+        let first_symbol = entries.first_symbol.wrapping_sub(Self::PLACES_BEFORE);
+        Self { short_cuts, first_symbol, origin: entries.origin, step: entries.step, bounds }
+    }
+
+    /// Symbol, start and frequency of the entry that has the quantile, found by walking from the short cut of its piece;
+    /// `None` when it is not in memory.
+    #[inline(always)]
+    fn slot(&self, quantile: u32) -> Option<(i32, u32, u32)> {
+        let bound = |index: u32| self.bounds.get(index as usize).map_or(u32::MAX, |&bound| bound.into());
+        let mut entry = u32::from(*self.short_cuts.get((quantile >> PIECE_BITS) as usize)?);
+        let mut start = bound(entry);
+        loop {
+            entry = entry.wrapping_add(1);
+            let end = bound(entry);
+            if quantile < end {
+                // No entry in memory ends there.
+                let symbol = self.first_symbol.wrapping_add(entry as i32).wrapping_add(Self::PLACES_BEFORE - 1);
+                return (end < FREQUENCY_TOTAL.into()).then_some((symbol, start, end.wrapping_sub(start)));
+            }
+            start = end;
+        }
+    }
+}
+
+/// The tables of a scene in memory, and which channel uses which.
+#[derive(Clone, Copy, Debug)]
+pub struct ChannelTables<'b, 's> {
+    pub(crate) tables: &'s [SymbolTable],
+    /// `[n_channels]` the table of each channel, little-endian; all are in `tables`.
+    pub(crate) numbers: &'b [[u8; 2]],
+}
+
+impl<'b, 's> ChannelTables<'b, 's> {
+    /// Unpacks tables into `memory`.
+    ///
+    /// * `memory`: [`TABLE_WORDS`] a table. * `tables`: as many as there is memory for. * `numbers`: `[n_channels]` the table of each
+    ///   channel, little-endian.
+    ///
+    /// Nothing when there are fewer tables than that, or a channel names one that there is not.
+    #[must_use]
+    pub fn new<'t>(
+        memory: &'s mut [u32],
+        tables: impl Iterator<Item = Entries<'t>>,
+        numbers: &'b [[u8; 2]],
+    ) -> Option<Self> {
+        let slots: &mut [SymbolTable] = bytemuck::try_cast_slice_mut(memory).ok()?;
+        let mut n_tables = 0;
+        for (slot, table) in slots.iter_mut().zip(tables) {
+            *slot = SymbolTable::new(&table);
+            n_tables += 1;
+        }
+        let exist = numbers.iter().all(|&number| usize::from(u16::from_le_bytes(number)) < n_tables);
+        (exist && n_tables == slots.len()).then_some(Self { tables: slots, numbers })
+    }
+
+    /// Number of channels.
+    #[must_use]
+    pub fn n_channels(&self) -> usize {
+        self.numbers.len()
+    }
+
+    /// Which table channel `channel` uses; 0 of one that there is not.
+    #[must_use]
+    pub fn number_of(&self, channel: usize) -> usize {
+        self.numbers.get(channel).map_or(0, |&number| u16::from_le_bytes(number).into())
+    }
+
+    /// Origin and step of the values of channel `channel`: that of a symbol is `origin + symbol·step`, multiplied, rounded, then added.
+    #[must_use]
+    pub fn scale_of(&self, channel: usize) -> [f32; 2] {
+        self.tables.get(self.number_of(channel)).map_or([0.0; 2], |table| [table.origin, table.step])
+    }
+
+    /// As [`read_values`], in safe Rust on every target; `value_of` makes values of symbol, origin and step.
+    #[inline(always)]
+    pub fn read_values_with<T>(
+        &self,
+        first: usize,
+        values: &mut [T],
+        stream: &mut Stream<'_>,
+        value_of: impl Fn(i32, f32, f32) -> T,
+    ) -> usize {
+        // A copy stays in registers.
+        let mut local = *stream;
+        let mut n_done = 0;
+        for (value, &number) in values.iter_mut().zip(self.numbers.get(first..).unwrap_or_default()) {
+            let Some(table) = self.tables.get(usize::from(u16::from_le_bytes(number))) else { break };
+            let Some((symbol, start, frequency)) = table.slot(local.quantile()) else { break };
+            local.advance(start, frequency);
+            *value = value_of(symbol, table.origin, table.step);
+            n_done += 1;
+        }
+        *stream = local;
+        n_done
+    }
+}
+
+/// Fills `values` from channel `first` on; returns how many, which is fewer at a symbol that is not in memory: the stream is before it.
+///
+/// # Budget
+/// About 55 instructions a value; with the assembly of a Cortex-M 28, and 3 for each entry walked past.
+#[inline(always)]
+pub fn read_values(tables: &ChannelTables<'_, '_>, first: usize, values: &mut [f32], stream: &mut Stream<'_>) -> usize {
+    tables.read_values_with(first, values, stream, |symbol, origin, step| origin + symbol as f32 * step)
+}
+
+/// The rest of a stream.
+#[derive(Clone, Copy, Debug)]
+pub struct Stream<'a> {
+    /// What the next symbols are in.
+    pub state: u32,
+    /// Words that the state has not taken yet, little-endian.
+    pub words: &'a [[u8; 2]],
+}
+
+impl Stream<'_> {
+    /// What the next symbol's slot contains, below [`FREQUENCY_TOTAL`].
+    #[inline(always)]
+    #[must_use]
+    pub fn quantile(&self) -> u32 {
+        self.state & ((1 << PRECISION_BITS) - 1)
+    }
+
+    /// Leaves the next symbol behind, whose slot contains the quantile.
+    #[inline(always)]
+    pub fn advance(&mut self, start: u32, frequency: u32) {
+        // Below 2²⁰ · 2¹² + 2¹²; wrapping costs nothing and says that no value can panic here.
+        let offset = self.quantile().wrapping_sub(start);
+        self.state = (self.state >> PRECISION_BITS).wrapping_mul(frequency).wrapping_add(offset);
+        self.refill();
+    }
+
+    /// Takes a word if the state has room for it and there is one.
+    #[inline(always)]
+    pub fn refill(&mut self) {
+        if self.state < STATE_MIN
+            && let Some((&word, rest)) = self.words.split_first()
+        {
+            self.state = (self.state << 16) | u32::from(u16::from_le_bytes(word));
+            self.words = rest;
+        }
+    }
+}
+
+/// Goes down a trie from a node, by at most [`LEVELS_AT_ONCE`] levels, a symbol each; through child 0 where there are both.
+///
+/// Returns the branches taken, and which nodes have both children, the last lowest in each; above them the latter has the lowest
+/// bits of `both`, which are those of the nodes before.
+///
+/// # Budget
+/// 43 instructions a level; about 21 with the assembly of a Cortex-M.
+#[inline(always)]
+#[must_use]
+pub fn descend(levels: &[LevelFrequencies], both: u32, stream: &mut Stream<'_>) -> [u32; 2] {
+    // A copy of its own stays in registers.
+    let mut local = *stream;
+    let (mut code, mut both) = (0_u32, both);
+    for contexts in levels.iter().take(LEVELS_AT_ONCE) {
+        let context = NODE_CONTEXTS >> ((both & 7) << 1) & 3;
+        let node = contexts.get(context as usize).copied().unwrap_or_default();
+        let [end_both, end_zero] = node.map(|end| u32::from(u16::from_le_bytes(end)));
+        let quantile = local.quantile();
+        let (start, end, is_both, is_one) = if quantile < end_both {
+            (0, end_both, 1, 0)
+        } else if quantile < end_zero {
+            (end_both, end_zero, 0, 0)
+        } else {
+            (end_zero, FREQUENCY_TOTAL.into(), 0, 1)
+        };
+        local.advance(start, end.wrapping_sub(start));
+        code = (code << 1) | is_one;
+        both = (both << 1) | is_both;
+    }
+    *stream = local;
+    [code, both]
+}
+
+#[cfg(test)]
+mod tests {
+    use std::vec::Vec;
+
+    use super::{
+        ChannelTables, Entries, FREQUENCY_TOTAL, MAX_ENTRIES, PIECE_BITS, Stream, TABLE_WORDS, descend, read_values,
+    };
+
+    /// The symbol that a quantile stands for, and how far into its slot it lies, by a look at every entry.
+    fn expected(first_symbol: i32, bounds: &[u16], quantile: u32) -> Option<(i32, u32, u32)> {
+        let pairs = bounds.windows(2).take(MAX_ENTRIES).zip(first_symbol..);
+        let mut found = pairs.filter(|(pair, _)| (u32::from(pair[0])..u32::from(pair[1])).contains(&quantile));
+        found.next().map(|(pair, symbol)| (symbol, u32::from(pair[1] - pair[0]), quantile - u32::from(pair[0])))
+    }
+
+    #[test]
+    fn every_quantile_leads_to_its_entry_or_nowhere() {
+        let even = |n: u16, step: u16| (0..=n).map(move |i| i * step).collect::<Vec<_>>();
+        let lists = [even(1, 4095), even(64, 63), even(80, 50), std::vec![900, 901, 901, 1000, 4095], std::vec![5]];
+        for (first_symbol, bounds) in (-40..).zip(lists) {
+            let bytes: Vec<[u8; 2]> = bounds.iter().map(|bound| bound.to_le_bytes()).collect();
+            let entries = Entries { origin: 0.5, step: 0.25, first_symbol, bounds: &bytes };
+            let mut memory = [0; TABLE_WORDS];
+            let numbers = [[0; 2]];
+            let tables = ChannelTables::new(&mut memory, [entries].into_iter(), &numbers).expect("one table");
+            for quantile in 0..u32::from(FREQUENCY_TOTAL) {
+                let before = 1 << 28 | quantile;
+                let mut stream = Stream { state: before, words: &[] };
+                let mut values = [f32::NAN];
+                let n = read_values(&tables, 0, &mut values, &mut stream);
+                // The piece that the first entry begins in is left out where it begins within.
+                let piece_start = quantile >> PIECE_BITS << PIECE_BITS;
+                let is_left_out = piece_start < u32::from(bounds[0]);
+                match expected(first_symbol, &bounds, quantile).filter(|_| !is_left_out) {
+                    Some((symbol, frequency, offset)) => {
+                        assert_eq!((n, values[0]), (1, 0.5 + symbol as f32 * 0.25), "{bounds:?}, {quantile}");
+                        assert_eq!(stream.state, (1 << 16) * frequency + offset, "{bounds:?}, {quantile}");
+                    }
+                    None => assert_eq!((n, stream.state), (0, before), "{bounds:?}, {quantile}"),
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn tables_that_are_missing_are_refused() {
+        let bytes = [[0, 0], [255, 15]];
+        let entries = Entries { origin: 0.0, step: 1.0, first_symbol: 0, bounds: &bytes };
+        let mut memory = [0; 2 * TABLE_WORDS];
+        assert!(ChannelTables::new(&mut memory, [entries].into_iter(), &[[0, 0]]).is_none(), "one of two tables");
+        assert!(ChannelTables::new(&mut memory, [entries; 2].into_iter(), &[[2, 0]]).is_none(), "no table 2");
+        assert!(ChannelTables::new(&mut memory, [entries; 2].into_iter(), &[[1, 0]]).is_some(), "table 1");
+        assert!(ChannelTables::new(&mut memory[1..], [entries; 2].into_iter(), &[]).is_none(), "half a table");
+    }
+
+    #[test]
+    fn a_path_stops_after_its_levels() {
+        let levels = [[[4096_u16.to_le_bytes(); 2]; 3]; 40];
+        let mut stream = Stream { state: 1 << 31, words: &[] };
+        assert_eq!(descend(&levels[..2], 1, &mut stream), [0, 0b111], "both children of each node");
+        assert_eq!(descend(&levels, 0, &mut stream), [0, u32::MAX], "32 levels at most");
+        assert_eq!(stream.state, 1 << 31, "what is certain takes no bit");
+    }
+}

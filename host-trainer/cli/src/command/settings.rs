@@ -61,7 +61,7 @@ pub(crate) struct QualityOptions {
         help = with_default("Quantisation step of the features of a scaffold scene", QuantisationSteps::default().feature))]
     feature_step: Option<f32>,
     /// Source of the symbols' frequencies: static tables, the context model, or auto: tables for a device that decodes in every
-    /// frame, else the smaller file where it is as good [default: auto]
+    /// frame, within --bytes what draws better, else the smaller file where it is as good [default: auto]
     #[arg(long, value_parser = one_of::<CoderChoice>(CODERS), help_heading = OUTPUT, hide_short_help = true)]
     coder: Option<CoderChoice>,
     /// Shares of the anchors that smaller devices leave out, falling to 0 [default: 0.4,0.3,0.2,0.1,0.05,0]

@@ -1,11 +1,10 @@
 //! Where splats lie, noted in a frame's first pass, so that later passes leave out chunks that they draw nothing of, and know in advance
 //! where their slabs end.
 
-use core::ops::RangeInclusive;
+use core::ops::{Range, RangeInclusive};
 
 use bytemuck::{Pod, Zeroable};
 
-use super::splats::Slab;
 use super::strip::Strip;
 
 /// Whether a frame drawn in slabs has notes of its chunks, in the last places of its splats.
@@ -67,10 +66,10 @@ impl ChunkNote {
         self.strips |= bits(*strips.start() as u32, *strips.end() as u32);
     }
 
-    /// Whether a splat of the chunk may lie in a slab of strips; true more often than needed, never false wrongly.
-    pub(super) fn may_lie_in(&self, strip: Strip, slab: &Slab) -> bool {
+    /// Whether a splat of the chunk may lie at these depths of a strip; true more often than needed, never false wrongly.
+    pub(super) fn may_lie_in(&self, strip: Strip, depths: Range<f32>) -> bool {
         let depth = |upper: u16| f32::from_bits(u32::from(upper) << 16);
-        self.strips & bits_of(strip) != 0 && slab.from < depth(self.end) && depth(self.nearest) < slab.end
+        self.strips & bits_of(strip) != 0 && depths.start < depth(self.end) && depth(self.nearest) < depths.end
     }
 }
 
@@ -146,7 +145,7 @@ fn bits(first: u32, last: u32) -> u32 {
 mod tests {
     use bytemuck::Zeroable;
 
-    use super::{ChunkNote, DepthCounts, Slab, Strip, StripsOfChunks, bits};
+    use super::{ChunkNote, DepthCounts, Strip, StripsOfChunks, bits};
 
     fn strip(index: u8) -> Strip {
         Strip { index, end_index: index + 1, first_row: index.into(), end_row: u16::from(index) + 1 }
@@ -155,16 +154,16 @@ mod tests {
     #[test]
     fn a_note_says_where_splats_may_lie() {
         let mut note = ChunkNote::NOWHERE;
-        assert!((0..8).all(|index| !note.may_lie_in(strip(index), &Slab::behind(0.0))), "no splat");
+        let behind = |from: f32| from..f32::INFINITY;
+        assert!((0..8).all(|index| !note.may_lie_in(strip(index), behind(0.0))), "no splat");
         note.add(3.3, 2..=3);
         note.add(1.7, 5..=5);
-        let seen: std::vec::Vec<u8> = (0..8).filter(|&i| note.may_lie_in(strip(i), &Slab::behind(0.0))).collect();
+        let seen: std::vec::Vec<u8> = (0..8).filter(|&i| note.may_lie_in(strip(i), behind(0.0))).collect();
         assert_eq!(seen, [2, 3, 5], "the strips of either");
-        assert!(note.may_lie_in(strip(2), &Slab::behind(3.3)), "the farthest lies where the slab begins");
-        assert!(!note.may_lie_in(strip(2), &Slab::behind(3.4)), "both are nearer");
-        let until = |end| Slab { end, ..Slab::behind(0.2) };
-        assert!(!note.may_lie_in(strip(2), &until(1.6)), "both are farther");
-        assert!(note.may_lie_in(strip(2), &until(1.71)), "the nearest lies before the end");
+        assert!(note.may_lie_in(strip(2), behind(3.3)), "the farthest lies where the slab begins");
+        assert!(!note.may_lie_in(strip(2), behind(3.4)), "both are nearer");
+        assert!(!note.may_lie_in(strip(2), 0.2..1.6), "both are farther");
+        assert!(note.may_lie_in(strip(2), 0.2..1.71), "the nearest lies before the end");
         assert_eq!((bits(0, 7), bits(3, 3)), (0xFF, 8), "first and last are among them");
     }
 

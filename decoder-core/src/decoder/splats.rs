@@ -79,7 +79,7 @@ impl<S: SplatRecord> SplatStore<'_, S> {
     #[inline(never)]
     pub(super) fn may_lie_in(&mut self, chunk: u32, strip: Strip, slab: &Slab) -> bool {
         let note = self.notes().and_then(|(_, notes)| notes.get(chunk as usize));
-        note.is_none_or(|note| note.may_lie_in(strip, slab))
+        note.is_none_or(|note| note.may_lie_in(strip, slab.from..slab.end))
     }
 
     /// Where a slab of a strip from depth `from` on ends, so that there is a place for each of its splats.

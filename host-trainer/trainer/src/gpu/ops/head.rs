@@ -93,11 +93,13 @@ impl Head {
     /// # Errors
     /// As [`Buffer::zeros`].
     pub fn new(gpu: &Gpu) -> Result<Self, GpuError> {
-        let kernel = |name, source| Kernel::new(gpu, name, &[GROUPS, include_str!("head/product.wgsl"), source]);
+        const PRODUCT: &str = include_str!("head/product.wgsl");
+        let kernel = |name, source| Kernel::new(gpu, name, &[GROUPS, PRODUCT, source]);
+        let back = |name, source| Kernel::new(gpu, name, &[GROUPS, PRODUCT, include_str!("head/back.wgsl"), source]);
         Ok(Self {
             layer: kernel("head: layer", include_str!("head/layer.wgsl")),
-            to_hidden: kernel("head: to hidden", include_str!("head/to_hidden.wgsl")),
-            to_input: kernel("head: to input", include_str!("head/to_input.wgsl")),
+            to_hidden: back("head: to hidden", include_str!("head/to_hidden.wgsl")),
+            to_input: back("head: to input", include_str!("head/to_input.wgsl")),
             parts_of_weights: kernel("head: weights", include_str!("head/weights.wgsl")),
             sum: Kernel::new(gpu, "head: sum", &[GROUPS, include_str!("head/sum.wgsl")]),
             parts: Buffer::zeros(gpu, "parts of gradients of weights", 1)?,

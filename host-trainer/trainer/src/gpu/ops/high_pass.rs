@@ -36,14 +36,17 @@ impl HighPass {
     /// # Errors
     /// As [`Buffer::zeros`].
     pub fn new(gpu: &Gpu) -> Result<Self, GpuError> {
-        let kernel =
-            |name, source| Kernel::new(gpu, name, &[GROUPS, include_str!("high_pass/parameters.wgsl"), source]);
+        const PARAMETERS: &str = include_str!("high_pass/parameters.wgsl");
+        let kernel = |name, source| Kernel::new(gpu, name, &[GROUPS, PARAMETERS, source]);
+        let down = |name, source| {
+            Kernel::new(gpu, name, &[GROUPS, PARAMETERS, include_str!("high_pass/blurred.wgsl"), source])
+        };
         let room = |what| Buffer::zeros(gpu, what, 1);
         Ok(Self {
             subtract: kernel("high pass: difference", include_str!("high_pass/subtract.wgsl")),
             across: kernel("high pass: blur across", include_str!("high_pass/across.wgsl")),
-            high: kernel("high pass", include_str!("high_pass/high.wgsl")),
-            backward: kernel("high pass backward", include_str!("high_pass/backward.wgsl")),
+            high: down("high pass", include_str!("high_pass/high.wgsl")),
+            backward: down("high pass backward", include_str!("high_pass/backward.wgsl")),
             squares: kernel("high pass: squares", include_str!("high_pass/squares.wgsl")),
             sum: Sum::new(gpu),
             difference: room("differences")?,

@@ -1,17 +1,7 @@
 // d_output·W2 where the hidden unit is on.
 
-@group(0) @binding(0) var<storage, read> d_output: array<f32>;
-@group(0) @binding(1) var<storage, read> weights: array<f32>;
 @group(0) @binding(2) var<storage, read> hidden: array<f32>;
 @group(0) @binding(3) var<storage, read_write> d_hidden: array<f32>;
-
-fn left_of(row: u32, depth: u32) -> f32 {
-    return d_output[row * parameters.depth + depth];
-}
-
-fn right_of(depth: u32, column: u32) -> f32 {
-    return weights[parameters.first_weight + depth * parameters.n_columns + column];
-}
 
 @compute @workgroup_size(256)
 fn to_hidden(

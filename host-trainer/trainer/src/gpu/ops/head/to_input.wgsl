@@ -1,16 +1,6 @@
 // d_hidden·W1, added to the first columns of d_input.
 
-@group(0) @binding(0) var<storage, read> d_hidden: array<f32>;
-@group(0) @binding(1) var<storage, read> weights: array<f32>;
 @group(0) @binding(2) var<storage, read_write> d_input: array<f32>;
-
-fn left_of(row: u32, depth: u32) -> f32 {
-    return d_hidden[row * parameters.depth + depth];
-}
-
-fn right_of(depth: u32, column: u32) -> f32 {
-    return weights[parameters.first_weight + depth * parameters.n_columns + column];
-}
 
 @compute @workgroup_size(256)
 fn to_input(

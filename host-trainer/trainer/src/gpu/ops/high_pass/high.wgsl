@@ -1,5 +1,4 @@
 @group(0) @binding(0) var<storage, read> difference: array<f32>;
-@group(0) @binding(1) var<storage, read> blurred_across: array<f32>;
 @group(0) @binding(2) var<storage, read_write> high_frequencies: array<f32>;
 
 @compute @workgroup_size(256)
@@ -12,15 +11,5 @@ fn high(
     if i >= n_values() {
         return;
     }
-    let width = parameters.size_px[0];
-    let height = parameters.size_px[1];
-    let y = i / width % height;
-    let window = parameters.window;
-    var low = 0.0;
-    for (var tap = 0u; tap < 2u * RADIUS + 1u; tap++) {
-        if y + tap >= RADIUS && y + tap < height + RADIUS {
-            low += window[tap] * blurred_across[i + tap * width - RADIUS * width];
-        }
-    }
-    high_frequencies[i] = difference[i] - low;
+    high_frequencies[i] = difference[i] - blurred(i);
 }

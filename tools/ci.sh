@@ -196,9 +196,11 @@ job_package() {
       grep -qx "$file" <<<"$files" || fail "the package of $crate lacks $file"
     done
   done
+  # As its version is the same, cargo would take a crate's unpacked source, and what was built of it, from an earlier run.
+  rm -rf "$target/packages" "${CARGO_HOME:-${HOME:-}/.cargo}"/registry/src/-*/pocketsplat*
   CARGO_PROFILE_DEV_OPT_LEVEL=0 CARGO_PROFILE_DEV_DEBUG=0 \
-    cargo package --workspace --exclude conformance --exclude tools --allow-dirty --locked
-  rm -rf "$target/package"
+    cargo package --workspace --exclude conformance --exclude tools --allow-dirty --locked --target-dir "$target/packages"
+  rm -rf "$target/packages"
   # The oldest Rust that the manifest of pocketsplat-core names, also for the assembly of pocketsplat-half.
   local oldest features
   oldest=$(sed -n 's/^rust-version = "\(.*\)"$/\1/p' decoder-core/Cargo.toml)

@@ -12,17 +12,12 @@ use super::ops::mask::Mask;
 use super::ops::perturb::Perturb;
 use super::scene::{DeviceScene, MASK_LOGITS};
 use super::{Buffer, Commands, Gpu, GpuError};
-use crate::ops::grid_bits;
 use crate::ops::noise::Stream;
-use crate::step::coding::{RateReport, RateTerms};
+use crate::step::coding::RateTerms;
 
-/// Weights of a step's rate terms; see `step/context.rs`.
-#[derive(Clone, Copy, Debug, Default)]
-struct Weights {
-    bit: f64,
-    mask: f64,
-    grid: f64,
-}
+mod rate;
+
+use rate::Weights;
 
 /// Its kernels, and what the last view was coded with.
 #[derive(Debug)]
@@ -45,14 +40,6 @@ pub(super) struct GpuCoding {
     drawn: Buffer<u32>,
     weights: Weights,
     n_sampled: usize,
-}
-
-/// What a view's rate came to.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Rate {
-    /// The terms of the loss.
-    pub(super) term: f32,
-    pub(super) report: RateReport,
 }
 
 /// Sums of [`GpuCoding::backward`]: openings of masks, then bits of each network's anchors.
@@ -161,13 +148,8 @@ impl GpuCoding {
         let mut commands = Commands::new(gpu);
         self.perturb_all(gpu, &mut commands, scene, anchors, values, stream)?;
         commands.submit()?;
-        let n_values = (n_anchors.max(1) * scene.shape.values_per_anchor()) as f64;
-        let n_drawn = f64::from(drawn.iter().sum::<u32>());
-        self.weights = Weights {
-            bit: terms.lambda * n_drawn / (n_values * self.n_sampled.max(1) as f64),
-            mask: terms.mask / (anchors.len() * scene.shape.n_offsets).max(1) as f64,
-            grid: terms.lambda * terms.grid / n_values,
-        };
+        let n_drawn = drawn.iter().sum::<u32>() as usize;
+        self.weights = Weights::of(terms, scene, [n_anchors, anchors.len(), n_drawn, self.n_sampled]);
         Ok(())
     }
 
@@ -242,29 +224,6 @@ impl GpuCoding {
             }
             None => self.levels.backward(gpu, commands, &mut self.kernels, &context.networks, &self.d_steps),
         }
-    }
-
-    /// What the sums say of the rate; waits.
-    ///
-    /// * `totals`: the [`N_RATE_TOTALS`] that [`Self::backward`] wrote.
-    pub(super) fn rate(&self, gpu: &Gpu, scene: &DeviceScene, totals: &[f32]) -> Result<Rate, GpuError> {
-        let Weights { bit, mask, grid } = self.weights;
-        let context = scene.context.as_ref().expect("asked before");
-        let mut bits = [0.0; N_GROUPS];
-        for of_network in totals[1..].chunks_exact(N_GROUPS).take(context.networks.len()) {
-            for (sum, bits) in bits.iter_mut().zip(of_network) {
-                *sum += f64::from(*bits);
-            }
-        }
-        let mut term = mask * f64::from(totals[0]) + bit * bits.iter().sum::<f64>();
-        if let Some(of_context) = context.grid.as_ref().filter(|_| grid > 0.0) {
-            let n_positive = self.grid_bits.n_positive.read(gpu)?[0] as usize;
-            term += grid * grid_bits::bits(of_context.rows.values.len(), n_positive);
-        }
-        let n_sampled = self.n_sampled;
-        #[expect(clippy::cast_possible_truncation, reason = "a term of the loss")]
-        let term = term as f32;
-        Ok(Rate { term, report: RateReport { n_sampled, bits: bits.map(|bits| bits / n_sampled.max(1) as f64) } })
     }
 }
 

@@ -5,31 +5,23 @@ use std::time::Instant;
 use super::anchors::GpuAnchors;
 use super::coding::{GpuCoding, N_RATE_TOTALS};
 use super::context::DeviceContext;
-use super::image::{FIRST_FREE_TOTAL, GpuImage};
+use super::image::GpuImage;
 use super::ops::adam::Adam;
-use super::ops::gather::Gather;
-use super::ops::normality::Normality;
-use super::ops::opacity_target::OpacityTarget;
 use super::ops::sound::Sound;
 use super::ops::statistics::{Slots, Statistics};
-use super::ops::volume::Volume;
-use super::scene::{DeviceScene, FEATURES};
+use super::scene::DeviceScene;
 use super::{Bind, Buffer, Commands, Gpu, GpuError};
-use crate::ops::normality::Weights;
-use crate::ops::opacity_target;
-use crate::scene::{ModelShape, Scene};
+use crate::scene::Scene;
 use crate::step::coding::{Coding, RateTerms};
 use crate::step::{
-    DeviceFault, DeviceTerms, GroupSteps, ImageStages, Loss, Resident, ResidentStep, StageSeconds, StepDevice,
+    DeviceFault, DeviceTerms, GroupSteps, ImageStages, Load, Loss, Resident, ResidentStep, StageSeconds, StepDevice,
     StepReport, TargetView, Trained, TrainedMut,
 };
 
-/// Places of sums beside the image's: volume and number of Gaussians, opacities, high frequencies, the
-/// rate's.
-const VOLUME: usize = FIRST_FREE_TOTAL;
-const OPACITIES: usize = VOLUME + 2;
-const HIGH_FREQUENCIES: usize = OPACITIES + 1;
-const RATE: usize = HIGH_FREQUENCIES + 1;
+mod terms;
+
+use terms::{GpuTerms, HIGH_FREQUENCIES, RATE, terms_of};
+
 /// Places of the counters: gradients that are not sound, and splats.
 const UNSOUND: usize = 0;
 const SPLATS: usize = 1;
@@ -41,17 +33,14 @@ pub struct GpuStep {
     images: GpuImage,
     anchors: GpuAnchors,
     coding: GpuCoding,
-    volume: Volume,
-    opacity_target: OpacityTarget,
-    normality: Normality,
-    gather: Gather,
+    terms: GpuTerms,
     sound: Sound,
     statistics: Statistics,
     adam: Adam,
-    raw_features: Buffer<f32>,
     counters: Buffer<u32>,
     size_px: [usize; 2],
     scene: Option<DeviceScene>,
+    n_loads: u64,
 }
 
 /// Reads the seconds since the last reading, once the device has come so far.
@@ -75,17 +64,14 @@ impl GpuStep {
             images: GpuImage::new(gpu)?,
             anchors: GpuAnchors::new(gpu)?,
             coding: GpuCoding::new(gpu)?,
-            volume: Volume::new(gpu)?,
-            opacity_target: OpacityTarget::new(gpu)?,
-            normality: Normality::new(gpu)?,
-            gather: Gather::new(gpu),
+            terms: GpuTerms::new(gpu)?,
             sound: Sound::new(gpu),
             statistics: Statistics::new(gpu),
             adam: Adam::new(gpu),
-            raw_features: Buffer::zeros(gpu, "features of the view", 1)?,
             counters: Buffer::zeros(gpu, "counters", 2)?,
             size_px: [0; 2],
             scene: None,
+            n_loads: 0,
             gpu: gpu.clone(),
         };
         gpu.check()?;
@@ -155,7 +141,8 @@ impl GpuStep {
         if let Coding::Context { rate, .. } = coding {
             self.coding_backward(&gpu, &mut commands, rate)?;
         }
-        self.add_normality(&gpu, &mut commands, &terms)?;
+        let scene = self.scene.as_ref().expect("loaded before");
+        self.terms.add_normality(&gpu, &mut commands, &terms, scene, &self.anchors)?;
         self.count(&mut commands, limit);
         commands.submit()?;
         stages.context_backward = laps.lap()?;
@@ -171,18 +158,12 @@ impl GpuStep {
         loss: &Loss<'_, f32>,
         terms: &DeviceTerms,
     ) -> Result<(), GpuError> {
-        let Self { images, anchors, volume, opacity_target, .. } = self;
+        let Self { images, anchors, .. } = self;
         let (scene, totals) = (self.scene.as_ref().expect("loaded before"), &images.totals);
         commands.clear(&anchors.d_gaussians);
-        let (gaussians, d_gaussians) = (&anchors.gaussians, &anchors.d_gaussians);
-        let [mean, weight] = terms.opacity_target;
-        if weight > 0.0 {
-            let aim = mean * gaussians.len() as f64;
-            opacity_target.forward_backward(gpu, commands, gaussians, aim, weight, d_gaussians, totals, OPACITIES)?;
-        }
+        self.terms.add_opacity_target(gpu, commands, terms, anchors, totals)?;
         anchors.splats_backward(commands, scene, target.camera, &images.footprints, &images.d_splats);
-        volume.forward(gpu, commands, gaussians, totals, VOLUME)?;
-        volume.backward(commands, gaussians, loss.weights.volume as f32, totals, VOLUME, d_gaussians);
+        self.terms.add_volumes(gpu, commands, loss, anchors, totals)?;
         anchors.backward(gpu, commands, scene)
     }
 
@@ -192,17 +173,6 @@ impl GpuStep {
         let scene = self.scene.as_ref().expect("loaded before");
         let (values, gradients, totals) = (&anchors.values, &anchors.gradients, (&images.totals, RATE));
         coding.backward(gpu, commands, scene, anchors.row_of_anchor(), values, gradients, terms, totals)
-    }
-
-    /// The term on raw features.
-    fn add_normality(&mut self, gpu: &Gpu, commands: &mut Commands<'_>, terms: &DeviceTerms) -> Result<(), GpuError> {
-        let Some(weights) = normality_of(terms) else { return Ok(()) };
-        let Self { anchors, normality, gather, raw_features, .. } = self;
-        let scene = self.scene.as_ref().expect("loaded before");
-        let width = scene.shape.feature_dim;
-        raw_features.fit(gpu, anchors.visible().len() * width)?;
-        gather.run(commands, &scene.anchors[FEATURES].values, width, anchors.visible(), raw_features);
-        normality.forward_backward(gpu, commands, &weights, raw_features, width, &anchors.gradients[FEATURES])
     }
 
     /// Counts gradients that are not sound, and splats.
@@ -220,7 +190,6 @@ impl GpuStep {
     }
 
     /// Reads what the step found; waits.
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of Gaussians")]
     fn report(
         &self,
         target: &TargetView<'_, f32>,
@@ -233,17 +202,9 @@ impl GpuStep {
         let totals = self.images.totals.read(&self.gpu)?;
         let counters = self.counters.read(&self.gpu)?;
         let compared = self.images.loss_of(&totals);
-        let n_slots = self.anchors.gaussians.len();
-        let mut by_modules = terms.high_pass as f32 * totals[HIGH_FREQUENCIES] / self.images.n_values() as f32;
-        let [mean, weight] = terms.opacity_target;
-        let aim = (mean * n_slots as f64) as f32;
-        by_modules += opacity_target::forward_backward(totals[OPACITIES], n_slots, aim, weight as f32).0;
-        if let Some(weights) = normality_of(terms) {
-            by_modules += self.normality.moments(&self.gpu)?.term(&weights);
-        }
-        let (lambda, n_gaussians) = (loss.weights.dssim as f32, totals[VOLUME + 1]);
-        let volumes = loss.weights.volume as f32 * totals[VOLUME] / n_gaussians.max(1.0);
-        let mut total = (1.0 - lambda) * compared.l1 + lambda * (1.0 - compared.similarity) + volumes + by_modules;
+        let (others, n_gaussians) = self.terms.sum(&self.gpu, loss, terms, (&self.images, &self.anchors), &totals)?;
+        let lambda = loss.weights.dssim as f32;
+        let mut total = (1.0 - lambda) * compared.l1 + lambda * (1.0 - compared.similarity) + others;
         let mut rate = None;
         if let Coding::Context { .. } = coding {
             let scene = self.scene.as_ref().expect("loaded before");
@@ -254,7 +215,7 @@ impl GpuStep {
         let report = StepReport {
             loss: total,
             squared_error: compared.squared_sum / (3 * target.n_counted()) as f64,
-            n_gaussians: n_gaussians as usize,
+            n_gaussians,
             n_splats: counters[SPLATS] as usize,
             n_pairs,
             rate,
@@ -286,18 +247,6 @@ impl GpuStep {
     }
 }
 
-/// The terms of all modules, where devices know them.
-fn terms_of(loss: &Loss<'_, f32>, shape: &ModelShape) -> Option<DeviceTerms> {
-    let mut terms = DeviceTerms::default();
-    let Some((modules, at)) = loss.modules else { return Some(terms) };
-    modules.iter().all(|module| module.on_device(at, shape, &mut terms)).then_some(terms)
-}
-
-fn normality_of(terms: &DeviceTerms) -> Option<Weights<f32>> {
-    let [divergence, spread] = terms.normality.map(|weight| weight as f32);
-    (divergence > 0.0 || spread > 0.0).then_some(Weights { divergence, spread })
-}
-
 impl StepDevice<f32> for GpuStep {
     fn name(&self) -> String {
         self.gpu.name.clone()
@@ -313,6 +262,10 @@ impl StepDevice<f32> for GpuStep {
 }
 
 impl Resident<f32> for GpuStep {
+    fn held(&self) -> Option<Load> {
+        self.scene.is_some().then_some(Load(self.n_loads))
+    }
+
     fn can_step(&self, scene: &Scene<f32>, loss: &Loss<'_, f32>, coding: &Coding<'_, f32>) -> bool {
         let is_known = match coding {
             Coding::Raw | Coding::Noise { .. } => true,
@@ -325,6 +278,7 @@ impl Resident<f32> for GpuStep {
         // The old arrays go first, so that both need not find room.
         self.scene = None;
         self.coding.forget();
+        self.n_loads += 1;
         self.scene = Some(DeviceScene::upload(&self.gpu, trained).map_err(DeviceFault::new)?);
         Ok(())
     }

@@ -66,6 +66,12 @@ pub enum TrainError {
     /// A GPU failed.
     #[error(transparent)]
     Device(#[from] DeviceFault),
+    /// Another run was brought to the same device, over what was newer there of this one.
+    #[error(
+        "the GPU holds the scene of another run, and the newest steps of this one are gone; go on from its checkpoint with --resume, \
+         one run on a GPU at a time"
+    )]
+    SceneReplaced,
     /// The cause of dropped steps does not pass.
     #[error(
         "{n} steps in a row would have made parameters infinite or NaN and were dropped, the last one so: {last}; \

@@ -9,7 +9,8 @@ use super::{TrainError, Trainer};
 use crate::scene::Scene;
 use crate::step::coding::Coding;
 use crate::step::{
-    ContextMoments, ContextMomentsMut, Loss, Phase, Resident, StepReport, TargetView, Trained, TrainedMut, Workspace,
+    ContextMoments, ContextMomentsMut, DeviceFault, Load, Loss, Phase, Resident, StepReport, TargetView, Trained,
+    TrainedMut, Workspace,
 };
 
 /// Where the newest parameters, moments and statistics of a run are.
@@ -19,15 +20,24 @@ pub(super) enum Place {
     #[default]
     Host,
     /// Here and on the device.
-    Both,
+    Both(Load),
     /// On the device alone; here, only the number of the anchors and their cells are right.
-    Device,
+    Device(Load),
+}
+
+impl Place {
+    fn load(self) -> Option<Load> {
+        match self {
+            Self::Host => None,
+            Self::Both(load) | Self::Device(load) => Some(load),
+        }
+    }
 }
 
 impl Trainer<'_> {
     /// Whether nothing is newer on a device.
     pub(super) fn is_here(&self) -> bool {
-        self.place != Place::Device
+        !matches!(self.place, Place::Device(_))
     }
 
     /// Whether a device has this step as a whole.
@@ -41,6 +51,19 @@ impl Trainer<'_> {
         Some(f(device.lock().unwrap_or_else(PoisonError::into_inner).resident()))
     }
 
+    /// What `f` says of it while it holds this run's scene.
+    fn on_own<T>(
+        &self,
+        f: impl FnOnce(&mut dyn Resident<f32>) -> Result<T, DeviceFault>,
+    ) -> Result<(T, Load), TrainError> {
+        let own = self.place.load().expect("it was brought there");
+        let asked = |device: &mut dyn Resident<f32>| {
+            let is_own = device.held() == Some(own);
+            if is_own { Ok((f(device)?, own)) } else { Err(TrainError::SceneReplaced) }
+        };
+        self.on_device(asked).expect("there is one")
+    }
+
     /// A step there; and what is wrong with it, so that it must not be applied.
     ///
     /// A scene that stands here is brought first.
@@ -50,16 +73,20 @@ impl Trainer<'_> {
         loss: &Loss<'_, f32>,
         coding: &Coding<'_, f32>,
     ) -> Result<(StepReport<f32>, Option<Cause>), TrainError> {
-        let trained = (self.place == Place::Host).then(|| trained(&self.scene, &self.optimiser, &self.statistics));
         let step = |device: &mut dyn Resident<f32>| {
-            if let Some(trained) = &trained {
-                device.load(trained)?;
+            let own = self.place.load();
+            if own.is_none() || device.held() != own {
+                if !self.is_here() {
+                    return Err(TrainError::SceneReplaced);
+                }
+                device.load(&trained(&self.scene, &self.optimiser, &self.statistics))?;
             }
-            device.step(target, loss, coding, watchdog::LARGEST_GRADIENT)
+            let found = device.step(target, loss, coding, watchdog::LARGEST_GRADIENT)?;
+            Ok((found, device.held().expect("it was loaded")))
         };
-        let found = self.on_device(step).expect("there is one")?;
-        if self.place == Place::Host {
-            self.place = Place::Both;
+        let (found, load) = self.on_device(step).expect("there is one")?;
+        if self.is_here() {
+            self.place = Place::Both(load);
         }
         self.workspace.d_background = found.d_background;
         let is_sound = found.is_sound && found.report.loss.is_finite() && watchdog::sound(&found.d_background);
@@ -88,32 +115,32 @@ impl Trainer<'_> {
         if self.config.phase(self.iteration) == Phase::Context {
             steps.context = self.optimiser.next_of_context(&rates, progress);
         }
-        self.on_device(|device| device.move_by(&steps)).expect("there is one")?;
-        self.place = Place::Device;
+        let ((), load) = self.on_own(|device| device.move_by(&steps))?;
+        self.place = Place::Device(load);
         Ok(())
     }
 
     /// Adds the last step to the statistics.
     pub(super) fn count_on_device(&mut self) -> Result<(), TrainError> {
-        self.on_device(|device| device.add_statistics()).expect("there is one")?;
-        self.place = Place::Device;
+        let ((), load) = self.on_own(|device| device.add_statistics())?;
+        self.place = Place::Device(load);
         Ok(())
     }
 
     /// Copies what is newer on a device; the scene, the moments and the statistics here are then those of this iteration.
     ///
     /// # Errors
-    /// [`TrainError::Device`]: everything here is as it was.
+    /// [`TrainError::Device`], [`TrainError::SceneReplaced`]: everything here is as it was.
     pub fn fetch(&mut self) -> Result<(), TrainError> {
-        if self.place != Place::Device {
+        if self.is_here() {
             return Ok(());
         }
         let (mut scene, mut optimiser, mut statistics) =
             (self.scene.clone(), self.optimiser.clone(), self.statistics.clone());
         let trained = trained_mut(&mut scene, &mut optimiser, &mut statistics);
-        self.on_device(|device| device.store(trained)).expect("it has what is newer")?;
+        let ((), load) = self.on_own(|device| device.store(trained))?;
         (self.scene, self.optimiser, self.statistics) = (scene, optimiser, statistics);
-        self.place = Place::Both;
+        self.place = Place::Both(load);
         Ok(())
     }
 

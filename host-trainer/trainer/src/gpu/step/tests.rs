@@ -15,7 +15,7 @@ use crate::train::optimiser::Optimiser;
 use crate::train::resident::{trained, trained_mut};
 use crate::train::statistics::Statistics;
 use crate::train::test_capture::{many_views, tiny_capture, tiny_config};
-use crate::train::{TrainConfig, Trainer};
+use crate::train::{TrainConfig, TrainError, Trainer};
 
 fn device(gpu: &Gpu) -> Option<SharedDevice<f32>> {
     Some(Arc::new(Mutex::new(GpuStep::new(gpu).expect("room"))))
@@ -308,6 +308,30 @@ fn the_same_run_gives_the_same_bits_and_goes_on_anywhere() {
     assert_ne!(restored().written_by, on_cpu.kernels());
     train(&mut on_cpu, 40);
     assert!(on_cpu.is_done());
+}
+
+#[test]
+fn of_two_runs_on_one_device_the_first_is_told_that_its_scene_is_gone() {
+    let Some(gpu) = gpu() else { return };
+    let (capture, shared) = (tiny_capture(), device(gpu));
+    let begin = || {
+        let mut trainer = Trainer::new(&capture, tiny_config(6)).expect("a run");
+        trainer.set_device(shared.clone());
+        trainer.advance().expect("a step");
+        trainer
+    };
+    let mut fetched = begin();
+    fetched.fetch().expect("it comes back");
+    let mut first = begin();
+    let before = first.scene.anchors.clone();
+    let mut second = begin();
+    for error in [first.fetch().expect_err("it is gone"), first.advance().expect_err("it is gone")] {
+        assert!(matches!(error, TrainError::SceneReplaced) && error.to_string().contains("--resume"), "{error}");
+    }
+    assert!(first.scene.anchors == before, "nothing of the other run came here");
+    second.advance().expect("the last to come has the device");
+    second.fetch().expect("it comes back");
+    fetched.advance().expect("what stands here is brought anew");
 }
 
 #[test]

@@ -4,7 +4,9 @@
 use conformance::bundles::{ALL_CODERS, measured, tiered};
 use conformance::frame::{budget_for, to_core};
 use conformance::scenes::{CASES, cameras, orbit};
-use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, ErrorClass, MaxSplats, Plan, ScratchShape};
+use pocketsplat_core::{
+    Budget, Bundle, Camera, DecodeError, ErrorClass, MaxSplats, Plan, Residency, ScratchShape, Strips,
+};
 use pocketsplat_trainer::verify::{
     Touched, Trial, Violation, exact_bytes, halves, memory_does_not_show, plan_variants, variants_match,
 };
@@ -147,6 +149,43 @@ fn too_many_splats_leave_out_the_last_of_the_file_in_all_strips_alike() {
             }
         }
     }
+}
+
+#[test]
+fn memory_that_is_left_gives_splats_places_and_saves_passes() {
+    let views = orbit(6);
+    let bytes = measured(&CASES[0], ALL_CODERS[0], &views);
+    let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
+    let views: Vec<Camera> = views.iter().map(to_core).collect();
+    let free = Budget::for_frame(views[0].width_px, views[0].height_px).with_residency(Residency::Streamed);
+    let in_one = bundle.plan(&free.with_strips(Strips::Exactly(1))).expect("planned");
+    let whole = in_one.scratch_len();
+    let (mut n_shared, mut n_saved) = (0, 0);
+    for budget in (1..=24).map(|part| free.in_bytes(whole * part / 24)) {
+        let Ok(plan) = bundle.plan(&budget) else { continue };
+        let least = bundle.plan(&budget.in_bytes(plan.least_len())).expect("the bytes that would do");
+        let variant = |plan: &Plan| (plan.n_tiers(), plan.n_strips(), plan.is_resident(), plan.head_weights());
+        assert_eq!((variant(&least), least.scratch_len()), (variant(&plan), plan.least_len()), "{plan:?}");
+        let fewer = bundle.plan(&budget.in_bytes(plan.least_len() - 1)).ok();
+        assert!(fewer.is_none_or(|fewer| variant(&fewer) != variant(&plan)), "a byte less does not: {plan:?}");
+        if plan.n_strips() == 1 {
+            assert_eq!(plan.scratch_len(), plan.least_len(), "{plan:?}");
+            continue;
+        }
+        n_shared += 1;
+        assert!((0..40).contains(&(budget.ram_bytes - plan.scratch_len())), "all of the budget: {plan:?}");
+        let by_hand = budget.with_tiers(plan.n_tiers()).with_strips(Strips::Exactly(plan.n_strips()));
+        let by_hand = bundle.plan(&by_hand).map(|plan| plan.scratch_len());
+        assert_eq!(by_hand, Ok(plan.least_len()), "who asks for strips gets what they need: {plan:?}");
+        for camera in &views {
+            let [few, many] = [least, plan].map(|plan| draw(&bundle, plan, camera));
+            assert_eq!((few.report.splats_dropped, many.report.splats_dropped), (0, 0), "{plan:?}");
+            assert!(many.rgb == few.rgb, "the same frame: {plan:?}");
+            assert!(many.report.anchors_decoded <= few.report.anchors_decoded, "{plan:?}");
+            n_saved += usize::from(many.report.anchors_decoded < few.report.anchors_decoded);
+        }
+    }
+    assert!(n_shared > 3 && n_saved > 0, "{n_shared} plans share passes, {n_saved} of their frames save some");
 }
 
 #[test]

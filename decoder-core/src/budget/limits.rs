@@ -19,7 +19,8 @@ pub const MIN_SLAB_PLACES: u32 = 2;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum MaxSplats {
     /// As many as the fullest of the views in the bundle's manifest has, and a sixteenth more; if the manifest is not
-    /// measured, [`Worst`](Self::Worst). A frame with a wider lens or nearer to the scene may need more.
+    /// measured, [`Worst`](Self::Worst). A frame with a wider lens or nearer to the scene may need more. Where memory is left,
+    /// strips may [share it](crate::Bundle::plan).
     Measured,
     /// Every offset of every anchor of the tiers drawn: always enough.
     Worst,
@@ -48,9 +49,10 @@ pub enum Residency {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Strips {
-    /// The fewest of 1, 2, 4 and 8 that fit.
+    /// One if it fits; otherwise the most of 2, 4 and 8 that fit, as many in a pass as the memory has places for. In
+    /// [slabs](Overflow::Slabs) the fewest.
     Auto,
-    /// So many, 1..=[`MAX_STRIPS`].
+    /// So many, 1..=[`MAX_STRIPS`], in no more memory than one of them needs.
     Exactly(u8),
 }
 

@@ -27,6 +27,8 @@ pub struct Plan {
     placement: Placement,
     scratch_len: usize,
     slow_len: usize,
+    /// Places for splats that would do.
+    least_splats: u32,
     pruning_rate: f32,
     work: Option<Work>,
 }
@@ -42,6 +44,13 @@ impl Plan {
     #[must_use]
     pub fn slow_scratch_len(&self) -> usize {
         self.slow_len
+    }
+
+    /// Bytes of both regions that would do: the same tiers in as many strips, with no more places for splats than a strip needs. What
+    /// the plan takes beyond saves [passes](Bundle::plan).
+    #[must_use]
+    pub fn least_len(&self) -> usize {
+        self.len_with_splats(self.least_splats)
     }
 
     /// Where each part of the scratch memory lies and how many bytes it takes. The bytes of a region's parts, and 3 for alignment,
@@ -151,11 +160,14 @@ impl Bundle<'_> {
     ///
     /// Work is predicted in multiply-adds. One strip goes over the scene once, several together about twice; going over it
     /// costs the heads' (from the manifest, else of all anchors), and decoding when anchors are streamed; or 150 a Gaussian when
-    /// they are baked. Of equals the fewest strips are taken. The frame's size decides about memory only through the splats of a
+    /// they are baked. Of equals the fewest strips are taken, or the most where they share passes. The frame's size decides about memory only through the splats of a
     /// strip, because tiles leave one by one; a splat takes 40 bytes.
     ///
     /// When [slabs](Overflow::Slabs) are allowed, fewer places than splats will do, down to 256: then nearly every scene fits
     /// whole, and going over it counts once more for each slab.
+    ///
+    /// Strips [share passes](Strips::Auto) where the plan chose their number: a frame draws as many in a pass as there are places for.
+    /// Such a plan gives its splats all of the budget that is left, which saves passes; [`Plan::least_len`] bytes would do.
     ///
     /// With [slow bytes](Budget::slow_bytes) each [part](Part) of the memory lies in one of two regions: of the equal plan variants
     /// the one is taken that has the first part in fast memory, of these the one with the second, and so on. No pixel depends on it.
@@ -214,13 +226,13 @@ impl Planner<'_, '_> {
                         (tiers_then, splats_then) = (n_tiers, plan.shape.frame.max_splats);
                     }
                     let fits = needed <= available && needed < usize::MAX;
-                    if fits && best.is_none_or(|(least, _)| cost < least) {
+                    if fits && best.is_none_or(|best| cost < best.0 || self.is_finer(cost, &plan, &best)) {
                         best = Some((cost, plan));
                     }
                 }
             }
             if let Some((_, plan)) = best {
-                return Ok(plan);
+                return Ok(self.with_more_places(plan));
             }
         }
         if least_needed == usize::MAX {
@@ -228,6 +240,33 @@ impl Planner<'_, '_> {
         }
         let [needed, available] = [least_needed, available].map(saturate);
         Err(DecodeError::BudgetTooSmall { region, needed, available, n_tiers: tiers_then, n_strips: n_strips_then })
+    }
+
+    /// Whether strips share passes: those of a plan that has several. Who asks for a number of strips wants the memory that it
+    /// takes; slabs are of one strip each.
+    fn shares_passes(&self, plan: &Plan) -> bool {
+        let Budget { strips, overflow, .. } = *self.budget;
+        plan.n_strips > 1 && strips == Strips::Auto && overflow == Overflow::LeaveOut
+    }
+
+    /// Whether a plan differs from the best one so far in that passes are shared by more strips: the more there are to choose from,
+    /// the fuller a pass.
+    fn is_finer(&self, cost: u64, plan: &Plan, (least, best): &(u64, Plan)) -> bool {
+        let is_like = cost == *least && plan.placement == best.placement && plan.shape.resident == best.shape.resident;
+        is_like && self.shares_passes(best) && plan.n_strips > best.n_strips
+    }
+
+    /// The plan with places for splats in all that it leaves of the budget, up to those of one strip, where strips share passes.
+    fn with_more_places(&self, mut plan: Plan) -> Plan {
+        let budget = self.budget;
+        if self.shares_passes(&plan) {
+            let most = self.splats_to_hold(budget.max_splats, plan.n_tiers, 1, plan.head_weights());
+            let places =
+                plan.shape.with_splats(most).splats_within(plan.placement, [budget.ram_bytes, budget.slow_bytes]);
+            plan.shape = plan.shape.with_splats(places.max(plan.least_splats));
+            [plan.scratch_len, plan.slow_len] = plan.shape.lens(plan.placement);
+        }
+        plan
     }
 
     /// The numbers of strips and the residencies that the budget leaves open, fewest strips first.
@@ -295,6 +334,7 @@ impl Planner<'_, '_> {
             placement,
             scratch_len,
             slow_len,
+            least_splats: shape.frame.max_splats,
             pruning_rate: 1.0 - tier.n_anchors as f32 / header.n_anchors.max(1) as f32,
             work: measures.map(|m| Work::most(&m, header.training_px, budget, passes, resident)),
         };

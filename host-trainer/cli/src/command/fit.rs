@@ -190,9 +190,10 @@ fn ladder(bundle: &Bundle<'_>, frame: &Budget) -> Result<Vec<(u64, Plan)>> {
     loop {
         match bundle.plan(&frame.in_bytes(ram_bytes)) {
             Ok(plan) => {
-                let scratch_len = plan.scratch_len();
-                plans.push((scratch_len as u64, plan));
-                ram_bytes = scratch_len.saturating_sub(1);
+                // What it takes beyond saves passes, from place to place.
+                let least_len = plan.least_len();
+                plans.push((least_len as u64, bundle.plan(&frame.in_bytes(least_len))?));
+                ram_bytes = least_len.saturating_sub(1);
             }
             Err(DecodeError::BudgetTooSmall { .. }) => break,
             Err(error) => return Err(error.into()),

@@ -224,7 +224,9 @@ fn ram_of(written: &Written, capture: &Capture, available: u64) -> Result<(Need,
     let nearly = two_strips > available && two_strips as f64 <= WORTH_CUTTING * available as f64;
     let needed = match within {
         Some(_) if nearly => two_strips,
-        Some(plan) => plan.scratch_len() as u64,
+        // What the plan takes beyond saves passes, and leaves room for anchors.
+        Some(plan) if two_strips <= available => two_strips.max(plan.least_len() as u64),
+        Some(plan) => plan.least_len() as u64,
         None if nearly => two_strips,
         // Halves were tried too, and were not enough.
         None => (smallest.scratch_len() as u64).max(available + 1),

@@ -241,6 +241,8 @@ impl ScratchShape {
 
     /// The most splats, up to those of the shape, that `lens` bytes of fast and slow memory have places for when the parts are
     /// placed so; 0 if not even the rest fits.
+    // Not inlined: each caller would have a copy.
+    #[inline(never)]
     pub(super) fn splats_within(&self, placement: Placement, lens: [usize; 2]) -> u32 {
         let [none, one] = [0, 1].map(|splats| self.with_splats(splats).words(placement));
         let mut most = self.frame.max_splats;

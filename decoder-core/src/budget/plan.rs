@@ -15,6 +15,9 @@ const READING_MACS: u64 = 150;
 /// Fewer splats to a slab are not planned.
 const MIN_SLAB_SPLATS: u32 = 256;
 
+/// [`STRIPS`] that share passes: the more there are to choose from, the fuller a pass.
+const MOST_STRIPS_FIRST: [u8; STRIPS.len()] = [1, 8, 4, 2];
+
 /// What a decoder of one bundle needs and does within a [`Budget`]; made by [`Bundle::plan`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -226,13 +229,14 @@ impl Planner<'_, '_> {
                         (tiers_then, splats_then) = (n_tiers, plan.shape.frame.max_splats);
                     }
                     let fits = needed <= available && needed < usize::MAX;
-                    if fits && best.is_none_or(|best| cost < best.0 || self.is_finer(cost, &plan, &best)) {
+                    if fits && best.is_none_or(|(least, _)| cost < least) {
                         best = Some((cost, plan));
                     }
                 }
             }
-            if let Some((_, plan)) = best {
-                return Ok(self.with_more_places(plan));
+            if let Some((_, plan)) = &mut best {
+                self.give_places(plan);
+                return Ok(*plan);
             }
         }
         if least_needed == usize::MAX {
@@ -242,38 +246,25 @@ impl Planner<'_, '_> {
         Err(DecodeError::BudgetTooSmall { region, needed, available, n_tiers: tiers_then, n_strips: n_strips_then })
     }
 
-    /// Whether strips share passes: those of a plan that has several. Who asks for a number of strips wants the memory that it
-    /// takes; slabs are of one strip each.
-    fn shares_passes(&self, plan: &Plan) -> bool {
-        let Budget { strips, overflow, .. } = *self.budget;
-        plan.n_strips > 1 && strips == Strips::Auto && overflow == Overflow::LeaveOut
-    }
-
-    /// Whether a plan differs from the best one so far in that passes are shared by more strips: the more there are to choose from,
-    /// the fuller a pass.
-    fn is_finer(&self, cost: u64, plan: &Plan, (least, best): &(u64, Plan)) -> bool {
-        let is_like = cost == *least && plan.placement == best.placement && plan.shape.resident == best.shape.resident;
-        is_like && self.shares_passes(best) && plan.n_strips > best.n_strips
-    }
-
-    /// The plan with places for splats in all that it leaves of the budget, up to those of one strip, where strips share passes.
-    fn with_more_places(&self, mut plan: Plan) -> Plan {
+    /// Gives splats all that a plan leaves of the budget, where strips share passes. That is less than one strip would need: that
+    /// plan, of less work, did not fit.
+    fn give_places(&self, plan: &mut Plan) {
         let budget = self.budget;
-        if self.shares_passes(&plan) {
-            let most = self.splats_to_hold(budget.max_splats, plan.n_tiers, 1, plan.head_weights());
-            let places =
-                plan.shape.with_splats(most).splats_within(plan.placement, [budget.ram_bytes, budget.slow_bytes]);
-            plan.shape = plan.shape.with_splats(places.max(plan.least_splats));
-            [plan.scratch_len, plan.slow_len] = plan.shape.lens(plan.placement);
+        // Who asks for a number of strips wants the memory that it takes; slabs are of one strip each.
+        if plan.n_strips > 1 && budget.strips == Strips::Auto && budget.overflow == Overflow::LeaveOut {
+            let Plan { shape, placement, .. } = plan;
+            shape.frame.max_splats = u32::MAX;
+            shape.frame.max_splats = shape.splats_within(*placement, [budget.ram_bytes, budget.slow_bytes]);
+            [plan.scratch_len, plan.slow_len] = shape.lens(*placement);
         }
-        plan
     }
 
-    /// The numbers of strips and the residencies that the budget leaves open, fewest strips first.
+    /// The numbers of strips and the residencies that the budget leaves open, one strip first.
     fn variants(&self) -> impl Iterator<Item = (u8, Residency)> {
         let (given, tried) = match self.budget.strips {
             Strips::Exactly(n) => (Some(n), &[][..]),
-            Strips::Auto => (None, &STRIPS[..]),
+            Strips::Auto if self.budget.overflow == Overflow::Slabs => (None, &STRIPS[..]),
+            Strips::Auto => (None, &MOST_STRIPS_FIRST[..]),
         };
         let residencies = match self.budget.residency {
             Residency::Auto if self.bundle.n_gaussians(0).is_none() => &[Residency::Resident, Residency::Streamed][..],

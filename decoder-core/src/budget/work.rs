@@ -54,6 +54,8 @@ impl Work {
 }
 
 /// Multiply-adds that decoding an anchor is worth.
+// Not inlined, for its size: of `Planner::variant`.
+#[inline(never)]
 pub(super) fn decoding_macs(bundle: &Bundle<'_>) -> u64 {
     let n_channels = bundle.header().n_channels();
     let symbols = n_channels.saturating_mul(SYMBOL_MACS);

@@ -470,7 +470,7 @@ fn write_bundle(
         bundle_bytes: file.bytes.len(),
         profile: Profile::of(&bundle.header().features).to_string(),
         level: of_whole.map_or(0, |measures| measures.level),
-        scratch_bytes: plan.map(|plan| plan.scratch_len()),
+        scratch_bytes: plan.map(|plan| plan.least_len()),
         instructions,
         n_anchors,
         n_valid_anchors: (0..n_anchors).filter(|a| scene.anchors.has_drawn(*a)).count(),

@@ -14,7 +14,7 @@ pub(super) fn say(file: &BundleFile, limits: &Limits, fitted: &Fitted) -> Result
         eprintln!("the bundle takes {len} of {most} bytes ({})", share(len, most));
     }
     if let (Some(most), Some(plan)) = (limits.ram_bytes, &fitted.plan) {
-        let (len, strips) = (plan.scratch_len() as u64, plan.n_strips());
+        let (len, strips) = (plan.least_len() as u64, plan.n_strips());
         let plural = if strips == 1 { "" } else { "s" };
         let share = share(len, most);
         eprintln!(

@@ -1,5 +1,7 @@
 //! From limits to a number of bytes.
 
+use core::slice;
+
 use super::limits::{Budget, MIN_SLAB_PLACES, MaxSplats, Overflow, Residency, Strips};
 use super::placement::{Part, PartMemory, Placement};
 use super::shape::{FrameShape, Resident, ScratchShape};
@@ -261,20 +263,18 @@ impl Planner<'_, '_> {
 
     /// The numbers of strips and the residencies that the budget leaves open, one strip first.
     fn variants(&self) -> impl Iterator<Item = (u8, Residency)> {
-        let (given, tried) = match self.budget.strips {
-            Strips::Exactly(n) => (Some(n), &[][..]),
-            Strips::Auto if self.budget.overflow == Overflow::Slabs => (None, &STRIPS[..]),
-            Strips::Auto => (None, &MOST_STRIPS_FIRST[..]),
+        let strips = match &self.budget.strips {
+            Strips::Exactly(given) => slice::from_ref(given),
+            Strips::Auto if self.budget.overflow == Overflow::Slabs => &STRIPS,
+            Strips::Auto => &MOST_STRIPS_FIRST,
         };
-        let residencies = match self.budget.residency {
-            Residency::Auto if self.bundle.n_gaussians(0).is_none() => &[Residency::Resident, Residency::Streamed][..],
-            Residency::Auto => &[Residency::Baked, Residency::Resident, Residency::Streamed],
-            Residency::Baked => &[Residency::Baked],
-            Residency::Resident => &[Residency::Resident],
-            Residency::Streamed => &[Residency::Streamed],
+        let bakeable = self.bundle.n_gaussians(0).is_some();
+        let residencies = match &self.budget.residency {
+            Residency::Auto if bakeable => &[Residency::Baked, Residency::Resident, Residency::Streamed][..],
+            Residency::Auto => &[Residency::Resident, Residency::Streamed],
+            given => slice::from_ref(given),
         };
-        let n_strips = given.into_iter().chain(tried.iter().copied());
-        n_strips.flat_map(move |n_strips| residencies.iter().map(move |&residency| (n_strips, residency)))
+        strips.iter().flat_map(move |&n_strips| residencies.iter().map(move |&residency| (n_strips, residency)))
     }
 
     /// A plan with its predicted cost.

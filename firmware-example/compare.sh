@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Compares two tables of instructions row by row: counts within 1 %, no row more, none fewer.
+# Compares two tables of instructions row by row: counts within 1 %, no row more, none fewer. The clock of a Cortex-M board moves once
+# in 40 instructions, so that a stage of a thousand, read a few times, is known to four ticks: frames of the same work differ by three.
 #
 #   compare.sh KNOWN.csv MEASURED.csv
 set -euo pipefail
@@ -13,12 +14,12 @@ awk -F, -v known_file="$known" '
   {
     difference = $NF - known[key]
     if (difference < 0) difference = -difference
-    if (100 * difference > known[key]) { print "compare: " key " took " $NF " instructions, known are " known[key]; bad = 1 }
+    if (difference > 160 && 100 * difference > known[key]) { print "compare: " key " took " $NF " instructions, known are " known[key]; bad = 1 }
     delete known[key]
     n++
   }
   END {
     for (key in known) if (key !~ /^board,/) { print "compare: not measured: " key; bad = 1 }
-    if (!bad) print "compare: " n " rows within 1 %"
+    if (!bad) print "compare: " n " rows within 1 %, or 160 instructions"
     exit bad
   }' "$known" "$measured"

@@ -303,7 +303,8 @@ firmware_runs=("mps2-an386 256" "mps2-an386 76" "mps2-an500 1024" "virt 76")
 baked_runs=("mps2-an386 256" "virt 256")
 
 # Every board draws an orbit of a bundle of either coder in its RAM, byte for byte as this machine does, and takes as many
-# instructions as it took when docs/results/instructions.csv was written, within 1 % or what the clock resolves, and as are predicted, within 10 %.
+# instructions as it took when docs/results/instructions.csv was written, within 1 % or what the clock resolves, and as are
+# predicted, within 10 %.
 job_firmware() {
   local measured=$target/firmware/instructions.csv
   measure_firmware "$measured"

@@ -165,8 +165,8 @@ impl Bundle<'_> {
     ///
     /// Work is predicted in multiply-adds. One strip goes over the scene once, several together about twice; going over it
     /// costs the heads' (from the manifest, else of all anchors), and decoding when anchors are streamed; or 150 a Gaussian when
-    /// they are baked. Of equals the fewest strips are taken, or the most where they share passes. The frame's size decides about memory only through the splats of a
-    /// strip, because tiles leave one by one; a splat takes 40 bytes.
+    /// they are baked. Of equals the fewest strips are taken, or the most where they share passes. The frame's size decides about
+    /// memory only through the splats of a strip, because tiles leave one by one; a splat takes 40 bytes.
     ///
     /// When [slabs](Overflow::Slabs) are allowed, fewer places than splats will do, down to 256: then nearly every scene fits
     /// whole, and going over it counts once more for each slab.

@@ -67,7 +67,7 @@ pub(crate) struct Args {
     #[arg(long = "continue", requires = "config", conflicts_with_all = ["resume", "from", "overwrite"], help_heading = RUN,
         hide_short_help = true)]
     continues: bool,
-    /// Run folder of a run to branch off after iteration --at; the other options hold from there on.
+    /// Run folder of a run to branch off after iteration --at; the other options hold from there on, the size of the images too.
     #[arg(long, value_name = "OUT.run", requires = "at", conflicts_with_all = ["config", "resume"], help_heading = RUN,
         hide_short_help = true)]
     from: Option<PathBuf>,

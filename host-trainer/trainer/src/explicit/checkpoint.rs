@@ -62,7 +62,7 @@ impl<'a> CloudTrainer<'a> {
             .map_err(|e| CheckpointFault::Form { what: "configuration", why: e.message().to_owned() })?;
         let ((written_by, begun_with), rest): ((Kernels, CaptureSignature), _) = part(rest)?;
         let mut trainer = Self::without_cloud(capture, config)?;
-        trainer.signature.matches(&begun_with)?;
+        trainer.signature.matches(&begun_with).map_err(RestoreError::Capture)?;
         let ((progress, (seed, stream, position), learned), rest): ((Progress, RandomState, Learned), _) = part(rest)?;
         needs("bytes after the state", rest.len(), 0)?;
         (trainer.iteration, trainer.watchdog, [trainer.seconds, trainer.processor_seconds], trainer.queue) = progress;

@@ -6,8 +6,11 @@ use serde::{Deserialize, Serialize};
 
 use pocketsplat_capture::dataset::{Capture, View};
 
-/// Numbers of a camera: rotation, translation, focal lengths, principal point.
-const CAMERA_NUMBERS: usize = 9 + 3 + 2 + 2;
+/// Numbers of a pose: rotation, translation.
+const POSE_NUMBERS: usize = 9 + 3;
+
+/// Numbers of a camera: its pose, focal lengths, principal point.
+const CAMERA_NUMBERS: usize = POSE_NUMBERS + 2 + 2;
 
 /// Largest difference of two cameras that count as the same, relative to numbers above 1: far below what training sees,
 /// far above what the elementary functions of two machines differ by.
@@ -94,26 +97,15 @@ impl CaptureSignature {
     /// # Errors
     /// The first [`CaptureDifference`].
     pub fn matches(&self, begun_with: &Self) -> Result<(), CaptureDifference> {
-        let (found, needed) = (self.views.len(), begun_with.views.len());
-        if found != needed {
-            return Err(CaptureDifference::Count { found, needed });
-        }
-        for (index, (now, then)) in self.views.iter().zip(&begun_with.views).enumerate() {
+        self.matches_at_any_size(begun_with)?;
+        for (now, then) in self.views.iter().zip(&begun_with.views) {
             let view = || now.name.clone();
-            if now.name != then.name {
-                return Err(CaptureDifference::Name { index, found: view(), needed: then.name.clone() });
-            }
             if now.size_px != then.size_px {
                 return Err(CaptureDifference::Size { view: view(), found: now.size_px, needed: then.size_px });
             }
-            let close = |(a, b): (&f64, &f64)| (a - b).abs() <= CAMERA_TOLERANCE * b.abs().max(1.0);
-            if !now.camera.iter().zip(&then.camera).all(close) {
+            if !are_close(&now.camera, &then.camera) {
                 return Err(CaptureDifference::Camera { view: view() });
             }
-        }
-        // Of a different background every view shows something; say that first.
-        if self.background != begun_with.background {
-            return Err(CaptureDifference::Background { found: self.background, needed: begun_with.background });
         }
         match self.views.iter().zip(&begun_with.views).find(|(now, then)| now.pixels != then.pixels) {
             Some((now, _)) => Err(CaptureDifference::Pixels { view: now.name.clone() }),
@@ -121,10 +113,39 @@ impl CaptureSignature {
         }
     }
 
+    /// As [`Self::matches`], but the photographs may have another size: views, poses and the background are compared.
+    ///
+    /// # Errors
+    /// The first [`CaptureDifference`].
+    pub fn matches_at_any_size(&self, begun_with: &Self) -> Result<(), CaptureDifference> {
+        let (found, needed) = (self.views.len(), begun_with.views.len());
+        if found != needed {
+            return Err(CaptureDifference::Count { found, needed });
+        }
+        for (index, (now, then)) in self.views.iter().zip(&begun_with.views).enumerate() {
+            if now.name != then.name {
+                return Err(CaptureDifference::Name { index, found: now.name.clone(), needed: then.name.clone() });
+            }
+            if !are_close(&now.camera[..POSE_NUMBERS], &then.camera[..POSE_NUMBERS]) {
+                return Err(CaptureDifference::Camera { view: now.name.clone() });
+            }
+        }
+        // Of a different background every view shows something; say that first.
+        if self.background == begun_with.background {
+            Ok(())
+        } else {
+            Err(CaptureDifference::Background { found: self.background, needed: begun_with.background })
+        }
+    }
+
     /// How many training views there are.
     pub(super) fn n_views(&self) -> usize {
         self.views.len()
     }
+}
+
+fn are_close(now: &[f64], then: &[f64]) -> bool {
+    now.iter().zip(then).all(|(a, b)| (a - b).abs() <= CAMERA_TOLERANCE * b.abs().max(1.0))
 }
 
 impl ViewSignature {

@@ -24,7 +24,7 @@ pub enum RestoreError {
     Fault(#[from] CheckpointFault),
     /// The capture is another one.
     #[error("this is not the capture that the run began with: {0}")]
-    Capture(#[from] CaptureDifference),
+    Capture(CaptureDifference),
     /// A fork asks for another scene than the checkpoint holds.
     #[error("a fork keeps `train.{key}` of its run; leave out what sets it")]
     Fork {
@@ -44,6 +44,9 @@ pub struct Restored<'a> {
     /// What wrote the checkpoint; where it differs from [`Trainer::kernels`], the run will not end in the same bits.
     pub written_by: Kernels,
 }
+
+/// Whether the capture at hand is the one that a run began with.
+type Comparison = fn(&CaptureSignature, &CaptureSignature) -> Result<(), CaptureDifference>;
 
 /// The scene and what belongs to it, the background's colour, the weight of the bits.
 type Learned = (Anchors<f32>, Heads<f32>, Option<ContextModel<f32>>, Optimiser<f32>, Statistics, [f32; 3], f64);
@@ -70,12 +73,16 @@ impl<'a> Trainer<'a> {
     /// # Errors
     /// [`RestoreError`] when the bytes are damaged or `capture` is not the one that the run began with.
     pub fn restore(capture: &'a Capture, bytes: &[u8]) -> Result<Restored<'a>, RestoreError> {
+        Self::read(capture, bytes, CaptureSignature::matches)
+    }
+
+    fn read(capture: &'a Capture, bytes: &[u8], compare: Comparison) -> Result<Restored<'a>, RestoreError> {
         let (config, rest): (String, _) = part(content(bytes, MAGIC)?)?;
         let config: TrainConfig = toml::from_str(&config)
             .map_err(|e| CheckpointFault::Form { what: "configuration", why: e.message().to_owned() })?;
         let ((written_by, begun_with), rest): ((Kernels, CaptureSignature), _) = part(rest)?;
         let mut trainer = Self::without_scene(capture, config)?;
-        trainer.signature.matches(&begun_with)?;
+        compare(&trainer.signature, &begun_with).map_err(RestoreError::Capture)?;
         let ((progress, (seed, stream, position), learned), rest): ((Progress, RandomState, Learned), _) = part(rest)?;
         needs("bytes after the state", rest.len(), 0)?;
         (trainer.iteration, trainer.watchdog, [trainer.seconds, trainer.processor_seconds], trainer.queue) = progress;
@@ -89,12 +96,13 @@ impl<'a> Trainer<'a> {
         Ok(Restored { trainer, written_by })
     }
 
-    /// As [`Self::restore`], and goes on as `config` says: the scene, the moments and the random numbers are the checkpoint's.
+    /// As [`Self::restore`], and goes on as `config` says: the scene, the moments and the random numbers are the checkpoint's. The
+    /// photographs may have another size.
     ///
     /// # Errors
     /// As [`Self::restore`]; [`RestoreError::Fork`] when `config` asks for another model, lattice or split of the views.
     pub fn fork(capture: &'a Capture, bytes: &[u8], config: TrainConfig) -> Result<Restored<'a>, RestoreError> {
-        let mut restored = Self::restore(capture, bytes)?;
+        let mut restored = Self::read(capture, bytes, CaptureSignature::matches_at_any_size)?;
         config.validate().map_err(TrainError::from)?;
         let (begun, config) = (restored.trainer.config, config.resolved_for(capture));
         for (key, same) in [

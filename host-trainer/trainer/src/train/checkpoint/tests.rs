@@ -157,6 +157,24 @@ fn another_capture_is_refused_by_what_differs() {
 }
 
 #[test]
+fn a_fork_takes_photographs_of_another_size_but_no_other_poses() {
+    let bytes = saved(&Trainer::new(&tiny_capture(), tiny_config(20)).unwrap());
+    let mut larger = tiny_capture();
+    for view in &mut larger.train {
+        view.camera.focal_px = view.camera.focal_px.map(|focal| 2.0 * focal);
+        (view.camera.width_px, view.camera.height_px) = (48, 48);
+    }
+    assert!(matches!(Trainer::restore(&larger, &bytes), Err(RestoreError::Capture(CaptureDifference::Size { .. }))));
+    Trainer::fork(&larger, &bytes, tiny_config(20)).unwrap();
+    larger.train[1].camera.translation.x += 1e-6;
+    let moved = Trainer::fork(&larger, &bytes, tiny_config(20)).unwrap_err();
+    assert_eq!(
+        moved.to_string(),
+        "this is not the capture that the run began with: the camera of its view `view_1` is another one than when the run began"
+    );
+}
+
+#[test]
 fn a_capture_without_views_is_no_start() {
     let mut capture = tiny_capture();
     capture.train.clear();

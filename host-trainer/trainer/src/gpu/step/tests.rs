@@ -7,7 +7,7 @@ use crate::gpu::choose;
 use crate::gpu::parity::{Bound, assert_close, gpu, largest};
 use crate::ops::Pinhole;
 use crate::scene::Scene;
-use crate::step::coding::RateReport;
+use crate::step::coding::{RateReport, RateTerms};
 use crate::step::{Block, LossWeights, Phase, SharedDevice, StepInfo, StepReport, Workspace, planes};
 use crate::train::config::{Backbone, Densification};
 use crate::train::module::{Detail, Distribution, Modules, Pruning};

@@ -150,11 +150,12 @@ fn a_fork_shares_a_run_up_to_an_iteration() {
     let other = fs::read(home.join("other.psb")).unwrap();
     assert!(other != undisturbed() && other == fs::read(home.join("killed.psb")).unwrap());
 
-    // From there on the photographs may have another size, at which the bundle is measured.
-    let said = succeeds(fork("smaller.psb", "90").args(["--max-resolution", "16"]));
-    assert!(said.contains("16×16 px"), "{said}");
-    let small = fs::read(home.join("smaller.psb")).unwrap();
-    assert!(small != undisturbed());
+    // From there on the photographs may have another size, which the bundle names.
+    succeeds(fork("smaller.psb", "90").args(["--max-resolution", "16"]));
+    let inspected = pocketsplat().arg("inspect").arg(home.join("smaller.psb")).output().unwrap();
+    let inspected = text(&inspected.stdout);
+    let size = inspected.lines().find(|line| line.starts_with("training_px")).expect(&inspected);
+    assert!(size.ends_with(" 16 16"), "{size}");
 
     let error = fails(&mut fork("b.psb", "91"));
     assert!(error.contains("no checkpoint of iteration 91, it has those of [90]"), "{error}");

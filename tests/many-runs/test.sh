@@ -77,10 +77,10 @@ killed() { # NAME OPTIONS…
   (cd "$folder" && exec setsid "$venv/bin/snakemake" "$@" >"$out/killed.log" 2>&1) &
   pid=$!
   sleep "$after"
-  # Bash would say that it was killed.
-  { pkill -KILL -s "$pid" || true; wait "$pid" || true; } 2>/dev/null
+  # A process may start another one while pkill looks at them: again, until none is alive. Bash would say that it was killed.
+  { while pkill -KILL -s "$pid" --runstates D,R,S,T; do sleep 0.05; done; wait "$pid" || true; } 2>/dev/null
   finished "$folder" >"$out/finished"
-  snakemake "$folder" "$@" >"$out/again.log" 2>&1 || fail "$name, killed after $after s, does not go on: $(tail -30 "$out/again.log")"
+  snakemake "$folder" "$@" >"$out/again.log" 2>&1 || fail "$name, killed after $after s, does not go on: $(tail -n 30 "$out/again.log" "$folder"/lamp/*.log)"
   finished "$folder" >"$out/finished-again"
   while read -r line; do
     grep -qxF "$line" "$out/finished-again" || fail "$name, killed after $after s, trained a finished run again: $line"

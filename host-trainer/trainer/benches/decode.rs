@@ -41,7 +41,7 @@ fn scene() -> Scene<f32> {
     };
     let mut scene =
         Scene { shape: SHAPE, voxel_size: 0.005, anchors, heads: Heads::filled(&SHAPE, 0.0), context: None };
-    scene.context = Some(initial_context(&scene, BASE_STEPS, &mut rng));
+    scene.context = Some(initial_context(&scene, scene.anchors.len(), BASE_STEPS, &mut rng));
     scene
 }
 

@@ -27,7 +27,7 @@ fn coded_scene() -> Scene<f32> {
     for logit in &mut scene.anchors.mask_logits {
         *logit = if rng.random::<f32>() < 0.75 { -6.0 } else { 1.0 };
     }
-    scene.context = Some(initial_context(&scene, Hac::default().base_steps(), &mut rng));
+    scene.context = Some(initial_context(&scene, scene.anchors.len(), Hac::default().base_steps(), &mut rng));
     scene
 }
 

@@ -65,7 +65,11 @@ impl Trainer<'_> {
                 Backbone::ContextGs => context_start::initial_levels,
                 Backbone::Scaffold | Backbone::Hac | Backbone::HacPlus => context_start::initial_context,
             };
-            let model = begin(&self.scene, base_steps, &mut self.rng);
+            let n = match self.scene.anchors.len() {
+                n if self.config.modules.weigh_bits() => context_start::n_to_size_for(n, self.lambda),
+                n => n,
+            };
+            let model = begin(&self.scene, n, base_steps, &mut self.rng);
             let n_taps = self.config.backbone.n_taps(self.scene.shape.feature_dim);
             self.scene.context = Some(model.with_taps(&self.scene.shape, n_taps, 0.0));
             self.optimiser.begin_context(&self.scene);

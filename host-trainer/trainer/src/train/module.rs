@@ -243,6 +243,11 @@ impl Modules {
         self.each().into_iter().all(|module| module.learns_masks())
     }
 
+    /// Whether one of the attached weighs error against bits.
+    pub fn weigh_bits(&self) -> bool {
+        self.each().into_iter().any(|module| module.weighs_bits_at().is_some())
+    }
+
     /// The shape that the attached modules work on.
     pub fn shape(&self, shape: ModelShape) -> ModelShape {
         self.each().into_iter().fold(shape, |shape, module| module.shape(shape))

@@ -65,15 +65,16 @@ impl Trainer<'_> {
                 Backbone::ContextGs => context_start::initial_levels,
                 Backbone::Scaffold | Backbone::Hac | Backbone::HacPlus => context_start::initial_context,
             };
-            let n = match self.scene.anchors.len() {
-                n if self.config.modules.weigh_bits() => context_start::n_to_size_for(n, self.lambda),
-                n => n,
-            };
-            let model = begin(&self.scene, n, base_steps, &mut self.rng);
+            let model = begin(&self.scene, self.n_to_size_context_for(), base_steps, &mut self.rng);
             let n_taps = self.config.backbone.n_taps(self.scene.shape.feature_dim);
             self.scene.context = Some(model.with_taps(&self.scene.shape, n_taps, 0.0));
             self.optimiser.begin_context(&self.scene);
         }
+    }
+    /// Anchors to size the context model for: all, or as many as pruning by worth is expected to leave.
+    fn n_to_size_context_for(&self) -> usize {
+        let n = self.scene.anchors.len();
+        if self.config.modules.weigh_bits() { context_start::n_to_size_for(n, self.lambda) } else { n }
     }
 }
 
@@ -103,5 +104,27 @@ pub(super) fn coding<'a>(
             let exact = exact.map(|(context, integers)| IntegerModel { context, networks: &integers.networks });
             Coding::Context { stream, rate, exact }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::train::module::{Modules, Rdo};
+    use crate::train::test_capture::{tiny_capture, tiny_hac_config};
+
+    #[test]
+    fn only_pruning_by_worth_makes_the_context_smaller() {
+        let capture = tiny_capture();
+        let mut config = tiny_hac_config(60);
+        config.hac.lambda = 0.004;
+        let sized = |modules| {
+            let trainer = Trainer::new(&capture, TrainConfig { modules, ..config.clone() }).unwrap();
+            (trainer.n_to_size_context_for(), trainer.scene.anchors.len())
+        };
+        let (n, n_anchors) = sized(Modules { rdo: Some(Rdo::default()), ..Modules::default() });
+        assert_eq!(n, n_anchors / 2);
+        let (n, n_anchors) = sized(Modules::default());
+        assert_eq!(n, n_anchors);
     }
 }

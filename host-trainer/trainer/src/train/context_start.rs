@@ -225,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_that_is_pruned_hard_gets_a_small_context() {
+    fn the_larger_lambda_the_fewer_anchors_stay() {
         assert_eq!(
             [0.0, 0.001, 0.002, 0.004, 0.02].map(|lambda| n_to_size_for(20_000, lambda)),
             [20_000, 20_000, 20_000, 10_000, 2_000]

@@ -119,7 +119,7 @@ mod tests {
         let mut config = tiny_hac_config(60);
         config.hac.lambda = 0.004;
         let sized = |modules| {
-            let trainer = Trainer::new(&capture, TrainConfig { modules, ..config.clone() }).unwrap();
+            let trainer = Trainer::new(&capture, TrainConfig { modules, ..config }).unwrap();
             (trainer.n_to_size_context_for(), trainer.scene.anchors.len())
         };
         let (n, n_anchors) = sized(Modules { rdo: Some(Rdo::default()), ..Modules::default() });

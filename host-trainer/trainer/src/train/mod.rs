@@ -254,7 +254,11 @@ impl<'a> Trainer<'a> {
         let (modules, at) = (self.config.modules, self.step_info());
         let pruned_share = modules.each().iter().map(|module| module.pruned_share(&at)).fold(0.0, f32::max);
         let terms = modules.terms();
-        let loss = Loss { weights: self.config.loss, modules: Some((&terms, &at)), pruned_share };
+        let loss = Loss {
+            weights: self.config.loss.at(|share| at.is_after(share)),
+            modules: Some((&terms, &at)),
+            pruned_share,
+        };
         // Drawn with the heads as they are written; the gradients move the weights behind them (straight through).
         let behind = integers.as_ref().map(|integers| mem::replace(&mut self.scene.heads, integers.heads.clone()));
         let on_device = self.steps_on_device(&loss, &coding);
@@ -400,7 +404,8 @@ impl<'a> Trainer<'a> {
             self.take_back()?;
             let Self { scene, optimiser, statistics, rng, .. } = self;
             let coarsest_cells = self.config.coarsest_cells_for(self.capture);
-            densify::grow(scene, optimiser, statistics, &settings, coarsest_cells, rng);
+            let threshold = self.config.gradient_threshold();
+            densify::grow(scene, optimiser, statistics, &settings, coarsest_cells, threshold, rng);
             densify::prune(scene, optimiser, statistics, &settings);
         }
         Ok(())

@@ -2,16 +2,18 @@
 
 mod error;
 mod hac;
+mod loss;
 
 use serde::{Deserialize, Serialize};
 
 pub use error::ConfigError;
 pub(crate) use error::within;
 pub use hac::{Backbone, Hac};
+pub use loss::LossPath;
 
 use super::module::Modules;
 use crate::scene::ModelShape;
-use crate::step::{LossWeights, Phase};
+use crate::step::Phase;
 use pocketsplat_capture::dataset::{Capture, PointsOrigin};
 
 /// A learning rate over the run: `start` until share `from` is done, then on a geometric path to `end`.
@@ -119,8 +121,10 @@ pub struct Densification {
     pub interval: u32,
     /// Share of an interval an anchor must have been seen in to be judged.
     pub success: f64,
-    /// Mean screen gradient, half-image units, above which an offset asks for a new anchor at the coarsest level.
-    pub gradient_threshold: f64,
+    /// Mean screen gradient, half-image units, above which an offset asks for a new anchor at the coarsest level. Without it what
+    /// [`TrainConfig::gradient_threshold`] says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gradient_threshold: Option<f64>,
     /// Voxel edge of the coarsest level, lattice cells; levels follow at a quarter each while at least one cell.
     /// Without it what the method publishes: 4 where training starts from random points, 16 where it starts from a
     /// capture's own.
@@ -146,7 +150,7 @@ impl Default for Densification {
             until: 15_000.0 / 30_000.0,
             interval: 100,
             success: 0.8,
-            gradient_threshold: 2e-4,
+            gradient_threshold: None,
             coarsest_cells: None,
             levels: 3,
             min_opacity: 0.005,
@@ -178,8 +182,8 @@ pub struct TrainConfig {
     /// Whether the colour behind the scene is trained with it; it begins as the capture's.
     #[serde(default)]
     pub learns_background: bool,
-    /// Loss weights.
-    pub loss: LossWeights,
+    /// The image's loss.
+    pub loss: LossPath,
     /// Growth and pruning.
     pub densification: Densification,
     /// The rate, where the backbone has one.
@@ -203,7 +207,7 @@ impl Default for TrainConfig {
             validation_every: 0,
             rates: Rates::default(),
             learns_background: false,
-            loss: LossWeights::default(),
+            loss: LossPath::default(),
             densification: Densification::default(),
             hac: Hac::default(),
             modules: Modules::default(),
@@ -235,6 +239,13 @@ impl TrainConfig {
             shape.feature_dim = to.feature_dim;
         }
         Self { backbone, shape, ..self }
+    }
+
+    /// Mean screen gradient, half-image units, above which an offset asks for a new anchor at the coarsest level: where nothing is set,
+    /// as published, and half as much again where anchors have to be worth their bits.
+    pub fn gradient_threshold(&self) -> f64 {
+        let of_modules = if self.modules.rdo.is_some() { 3e-4 } else { 2e-4 };
+        self.densification.gradient_threshold.unwrap_or(of_modules)
     }
 
     /// Refuses what no run can use, before any work starts.
@@ -294,13 +305,12 @@ impl TrainConfig {
             within(format!("train.rates.{name}.end"), rate.end, least_end, 10.0)?;
             within(format!("train.rates.{name}.from"), rate.from, 0.0, 1.0 - 1e-6)?;
         }
-        within("train.loss.dssim", self.loss.dssim, 0.0, 1.0)?;
-        within("train.loss.volume", self.loss.volume, 0.0, 1e6)?;
+        self.loss.check()?;
         let Densification { statistics_from, from, until, interval, success, levels, .. } = self.densification;
         let Densification { gradient_threshold, min_opacity, .. } = self.densification;
         within("train.densification.success", success, 0.0, 1.0)?;
         within("train.densification.levels", f64::from(levels), 0.0, 10.0)?;
-        within("train.densification.gradient_threshold", gradient_threshold, 0.0, 1e6)?;
+        within("train.densification.gradient_threshold", gradient_threshold.unwrap_or(0.0), 0.0, 1e6)?;
         within("train.densification.min_opacity", min_opacity, 0.0, 1e6)?;
         within("train.densification.statistics_from", statistics_from, 0.0, 1.0)?;
         within("train.densification.from", from, 0.0, 1.0)?;
@@ -324,7 +334,8 @@ impl TrainConfig {
     /// The same with nothing left to the capture: what a run keeps, so that it does not change with the capture's points.
     pub fn resolved_for(&self, capture: &Capture) -> Self {
         let coarsest_cells = Some(self.coarsest_cells_for(capture));
-        let densification = Densification { coarsest_cells, ..self.densification };
+        let gradient_threshold = Some(self.gradient_threshold());
+        let densification = Densification { coarsest_cells, gradient_threshold, ..self.densification };
         let shape = self.modules.shape(self.shape);
         Self { voxel_size: Some(self.voxel_size_for(capture)), densification, shape, ..*self }
     }

@@ -2,7 +2,10 @@
 
 struct Parameters {
     n_pixels: u32,
-    step: f32,
+    // Of the gradient.
+    weight: f32,
+    // Where the sum of squares stands among the totals.
+    squares: u32,
 }
 
 var<immediate> parameters: Parameters;

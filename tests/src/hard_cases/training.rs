@@ -71,7 +71,7 @@ fn config() -> TrainConfig {
             from: 0.1,
             until: 0.9,
             interval: 7,
-            gradient_threshold: Some(1e-4),
+            gradient_threshold: 1e-4,
             min_opacity: 0.5,
             ..Densification::default()
         },

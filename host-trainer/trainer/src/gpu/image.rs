@@ -131,7 +131,7 @@ impl GpuImage {
         clear_masked.run(commands, target, image);
         ssim.forward(gpu, commands, image, target, *size_px, totals, SIMILARITY)?;
         difference.forward(gpu, commands, image, target, totals, DIFFERENCES)?;
-        let weight = 1.0 - weights.dssim;
+        let weight = weights.of_difference();
         difference.backward(commands, weights.difference, image, target, weight, (totals, DIFFERENCES), d_image);
         ssim.backward(commands, image, target, *size_px, -weights.dssim, d_image);
         Ok(())

@@ -126,14 +126,13 @@ impl<R: Real> ImageStages<R> for CpuImage<R> {
     fn compare(&mut self, target: &TargetView<'_, R>, weights: &LossWeights) -> Result<ImageLoss<R>, DeviceFault> {
         self.tiled.write_planes(self.size_px, &mut self.image);
         clear_masked(&mut self.image, target.mask);
-        let lambda = R::real(weights.dssim);
         let (similarity, partials) = ssim::forward(self.level, &self.image, target.truth(), self.size_px);
         refill(&mut self.d_image, self.image.len());
         let Self { level, image, size_px, d_image, .. } = self;
         let squared_sum = target.squared_sum(image);
         let difference = weights.difference.forward(image, target.truth(), squared_sum);
-        weights.difference.backward(image, target.truth(), squared_sum, R::ONE - lambda, d_image);
-        ssim::backward(*level, image, target.truth(), *size_px, &partials, -lambda, d_image);
+        weights.difference.backward(image, target.truth(), squared_sum, R::real(weights.of_difference()), d_image);
+        ssim::backward(*level, image, target.truth(), *size_px, &partials, -R::real(weights.dssim), d_image);
         Ok(ImageLoss { difference, similarity, squared_sum })
     }
 

@@ -25,14 +25,13 @@ const EDGE_RATIO: u32 = 4;
 /// cell is skipped, and so is a finer one when nothing has grown yet). A new anchor takes the element-wise largest
 /// feature of the parents that fall into its voxel, log-scales ln(edge), offsets 0 (Lu et al. 2024, Scaffold-GS, section 3.3).
 ///
-/// * `coarsest_cells`: voxel edge of level 0. * `threshold`: τ. * returns how many were added.
+/// * `coarsest_cells`: voxel edge of level 0. * returns how many were added.
 pub fn grow(
     scene: &mut Scene<f32>,
     optimiser: &mut Optimiser<f32>,
     statistics: &mut Statistics,
     settings: &Densification,
     coarsest_cells: u32,
-    threshold: f64,
     rng: &mut ChaCha8Rng,
 ) -> usize {
     let (f, k) = (scene.shape.feature_dim, scene.shape.n_offsets);
@@ -45,7 +44,7 @@ pub fn grow(
         if cells == 0 || (level > 0 && scene.anchors.len() == n_before) {
             continue;
         }
-        let threshold = threshold * THRESHOLD_RATIO.powf(f64::from(level));
+        let threshold = settings.gradient_threshold * THRESHOLD_RATIO.powf(f64::from(level));
         let drop_below = 0.5f64.powf(f64::from(level + 1));
         // Drawn for every offset, eligible or not, so that one more eligible offset does not change all later draws.
         let lucky: Vec<bool> = (0..n_before * k).map(|_| rng.random::<f64>() > drop_below).collect();
@@ -215,7 +214,7 @@ mod tests {
             statistics.n_drawn[k] = 41;
             statistics.gradient_sum[k] = 41.0;
         }
-        let added = grow(&mut scene, &mut optimiser, &mut statistics, &Densification::default(), 4, 2e-4, &mut rng);
+        let added = grow(&mut scene, &mut optimiser, &mut statistics, &Densification::default(), 4, &mut rng);
         assert!((8..=10).contains(&added), "kept at ½ on the coarse level, then at ¾ of the rest: {added}");
         consistent(&scene, &optimiser, &statistics);
         for cell in &scene.anchors.lattice[2..] {
@@ -223,7 +222,7 @@ mod tests {
         }
         assert!(scene.anchors.features[64..].iter().all(|v| *v == -2.0), "the parent's feature");
         assert!(statistics.n_drawn.iter().all(|n| *n == 0), "judged offsets start afresh");
-        let again = grow(&mut scene, &mut optimiser, &mut statistics, &Densification::default(), 4, 2e-4, &mut rng);
+        let again = grow(&mut scene, &mut optimiser, &mut statistics, &Densification::default(), 4, &mut rng);
         assert_eq!(again, 0, "nothing is eligible");
     }
 
@@ -234,7 +233,7 @@ mod tests {
         statistics.gradient_sum[0] = 40.0;
         statistics.n_drawn[1] = 100;
         statistics.gradient_sum[1] = 100.0 * 1.9e-4;
-        assert_eq!(grow(&mut scene, &mut optimiser, &mut statistics, &Densification::default(), 4, 2e-4, &mut rng), 0);
+        assert_eq!(grow(&mut scene, &mut optimiser, &mut statistics, &Densification::default(), 4, &mut rng), 0);
         assert_eq!(statistics.n_drawn[..2], [40, 0], "only the judged one is reset");
     }
 
@@ -248,12 +247,12 @@ mod tests {
             statistics.gradient_sum[k] = (k + 1) as f32;
         }
         let settings = Densification { max_anchors: Some(5), levels: 1, ..Densification::default() };
-        let added = grow(&mut scene, &mut optimiser, &mut statistics, &settings, 4, 2e-4, &mut rng);
+        let added = grow(&mut scene, &mut optimiser, &mut statistics, &settings, 4, &mut rng);
         assert_eq!((added, scene.anchors.len()), (3, 5));
         let cells: Vec<i32> = scene.anchors.lattice[2..].iter().map(|c| c[0]).collect();
         assert!(cells.is_sorted() && cells[0] >= 400, "the far, hard-pulled ones: {cells:?}");
         consistent(&scene, &optimiser, &statistics);
-        let again = grow(&mut scene, &mut optimiser, &mut statistics, &settings, 4, 2e-4, &mut rng);
+        let again = grow(&mut scene, &mut optimiser, &mut statistics, &settings, 4, &mut rng);
         assert_eq!(again, 0, "full");
     }
 
@@ -267,7 +266,7 @@ mod tests {
             statistics.n_drawn[k] = 41;
             statistics.gradient_sum[k] = 41.0;
         }
-        assert!(grow(&mut scene, &mut optimiser, &mut statistics, &Densification::default(), 4, 2e-4, &mut rng) > 0);
+        assert!(grow(&mut scene, &mut optimiser, &mut statistics, &Densification::default(), 4, &mut rng) > 0);
         consistent(&scene, &optimiser, &statistics);
         statistics.n_views[1] = 81;
         scene.anchors.log_scales[3] = 1.0;

@@ -404,8 +404,7 @@ impl<'a> Trainer<'a> {
             self.take_back()?;
             let Self { scene, optimiser, statistics, rng, .. } = self;
             let coarsest_cells = self.config.coarsest_cells_for(self.capture);
-            let threshold = self.config.gradient_threshold();
-            densify::grow(scene, optimiser, statistics, &settings, coarsest_cells, threshold, rng);
+            densify::grow(scene, optimiser, statistics, &settings, coarsest_cells, rng);
             densify::prune(scene, optimiser, statistics, &settings);
         }
         Ok(())

@@ -18,10 +18,6 @@ pub struct LossPath {
     /// Share of the run after which the difference is [`Difference::Rmse`]; 1: never.
     #[serde(default = "never")]
     pub rmse_from: f64,
-    /// Share λ of 1 − SSIM from then on. A root of the mean square is some 2.5 times as large as L1, so that it leaves SSIM the
-    /// weight that 0.2 gave it.
-    #[serde(default = "rmse_dssim")]
-    pub rmse_dssim: f64,
 }
 
 /// Runs from before there was a choice.
@@ -29,31 +25,23 @@ const fn never() -> f64 {
     1.0
 }
 
-const fn rmse_dssim() -> f64 {
-    0.4
-}
-
 impl Default for LossPath {
     fn default() -> Self {
-        Self { dssim: 0.2, volume: 0.01, rmse_from: 0.6, rmse_dssim: rmse_dssim() }
+        Self { dssim: 0.2, volume: 0.01, rmse_from: 0.6 }
     }
 }
 
 impl LossPath {
     /// * `is_after`: whether a share of the run is done.
     pub(in crate::train) fn at(&self, is_after: impl FnOnce(f64) -> bool) -> LossWeights {
-        let Self { dssim, volume, rmse_from, rmse_dssim } = *self;
-        if is_after(rmse_from) {
-            LossWeights { difference: Difference::Rmse, dssim: rmse_dssim, volume }
-        } else {
-            LossWeights { difference: Difference::L1, dssim, volume }
-        }
+        let Self { dssim, volume, rmse_from } = *self;
+        let difference = if is_after(rmse_from) { Difference::Rmse } else { Difference::L1 };
+        LossWeights { difference, dssim, volume }
     }
 
     pub(super) fn check(&self) -> Result<(), ConfigError> {
         within("train.loss.dssim", self.dssim, 0.0, 1.0)?;
         within("train.loss.volume", self.volume, 0.0, 1e6)?;
-        within("train.loss.rmse_from", self.rmse_from, 0.0, 1.0)?;
-        within("train.loss.rmse_dssim", self.rmse_dssim, 0.0, 1.0)
+        within("train.loss.rmse_from", self.rmse_from, 0.0, 1.0)
     }
 }

@@ -121,10 +121,8 @@ pub struct Densification {
     pub interval: u32,
     /// Share of an interval an anchor must have been seen in to be judged.
     pub success: f64,
-    /// Mean screen gradient, half-image units, above which an offset asks for a new anchor at the coarsest level. Without it what
-    /// [`TrainConfig::gradient_threshold`] says.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub gradient_threshold: Option<f64>,
+    /// Mean screen gradient, half-image units, above which an offset asks for a new anchor at the coarsest level.
+    pub gradient_threshold: f64,
     /// Voxel edge of the coarsest level, lattice cells; levels follow at a quarter each while at least one cell.
     /// Without it what the method publishes: 4 where training starts from random points, 16 where it starts from a
     /// capture's own.
@@ -150,7 +148,7 @@ impl Default for Densification {
             until: 15_000.0 / 30_000.0,
             interval: 100,
             success: 0.8,
-            gradient_threshold: None,
+            gradient_threshold: 2e-4,
             coarsest_cells: None,
             levels: 3,
             min_opacity: 0.005,
@@ -241,13 +239,6 @@ impl TrainConfig {
         Self { backbone, shape, ..self }
     }
 
-    /// Mean screen gradient, half-image units, above which an offset asks for a new anchor at the coarsest level: where nothing is set,
-    /// as published, and half as much again where anchors have to be worth their bits.
-    pub fn gradient_threshold(&self) -> f64 {
-        let of_modules = if self.modules.rdo.is_some() { 3e-4 } else { 2e-4 };
-        self.densification.gradient_threshold.unwrap_or(of_modules)
-    }
-
     /// Refuses what no run can use, before any work starts.
     ///
     /// # Errors
@@ -310,7 +301,7 @@ impl TrainConfig {
         let Densification { gradient_threshold, min_opacity, .. } = self.densification;
         within("train.densification.success", success, 0.0, 1.0)?;
         within("train.densification.levels", f64::from(levels), 0.0, 10.0)?;
-        within("train.densification.gradient_threshold", gradient_threshold.unwrap_or(0.0), 0.0, 1e6)?;
+        within("train.densification.gradient_threshold", gradient_threshold, 0.0, 1e6)?;
         within("train.densification.min_opacity", min_opacity, 0.0, 1e6)?;
         within("train.densification.statistics_from", statistics_from, 0.0, 1.0)?;
         within("train.densification.from", from, 0.0, 1.0)?;
@@ -334,8 +325,7 @@ impl TrainConfig {
     /// The same with nothing left to the capture: what a run keeps, so that it does not change with the capture's points.
     pub fn resolved_for(&self, capture: &Capture) -> Self {
         let coarsest_cells = Some(self.coarsest_cells_for(capture));
-        let gradient_threshold = Some(self.gradient_threshold());
-        let densification = Densification { coarsest_cells, gradient_threshold, ..self.densification };
+        let densification = Densification { coarsest_cells, ..self.densification };
         let shape = self.modules.shape(self.shape);
         Self { voxel_size: Some(self.voxel_size_for(capture)), densification, shape, ..*self }
     }

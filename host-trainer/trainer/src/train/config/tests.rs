@@ -1,6 +1,6 @@
 use super::*;
 use crate::step::{Difference, LossWeights};
-use crate::train::module::{Detail, Rdo};
+use crate::train::module::Detail;
 
 #[test]
 fn a_rate_stays_and_then_falls_on_a_geometric_path() {
@@ -83,21 +83,11 @@ fn the_loss_is_the_published_one_until_its_share() {
     let at = |step: u32| path.at(|share| f64::from(step) > share * 100.0);
     let published = LossWeights { difference: Difference::L1, dssim: 0.2, volume: 0.01 };
     assert_eq!([at(1), at(60)], [published; 2]);
-    let late = LossWeights { difference: Difference::Rmse, dssim: 0.4, volume: 0.01 };
+    let late = LossWeights { difference: Difference::Rmse, ..published };
     assert_eq!([at(61), at(100)], [late; 2]);
     // A configuration from before there was a choice.
     let before: LossPath = toml::from_str("dssim = 0.2\nvolume = 0.01").expect("a sound configuration");
     assert_eq!(before.at(|share| share < 1.0), published);
     let config = TrainConfig { loss: LossPath { rmse_from: 1.5, ..path }, ..TrainConfig::default() };
     assert!(config.validate().is_err());
-}
-
-#[test]
-fn anchors_that_have_to_be_worth_their_bits_grow_at_larger_gradients() {
-    let mut config = TrainConfig::of(Backbone::Hac);
-    assert_eq!(config.gradient_threshold(), 2e-4);
-    config.modules.rdo = Some(Rdo::default());
-    assert_eq!(config.gradient_threshold(), 3e-4);
-    config.densification.gradient_threshold = Some(1e-4);
-    assert_eq!(config.gradient_threshold(), 1e-4);
 }

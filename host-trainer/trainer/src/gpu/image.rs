@@ -4,17 +4,16 @@
 
 use std::collections::BTreeMap;
 
-use super::ops::difference::DifferenceKernels;
 use super::ops::high_pass::HighPass;
+use super::ops::l1::L1;
 use super::ops::rasterise::Rasterise;
 use super::ops::ssim::Ssim;
 use super::ops::target::{ClearMasked, Target};
 use super::ops::tiles::Tiles;
 use super::{Buffer, Commands, Gpu, GpuError};
 use crate::ops::project::{Footprint, Splat};
-use crate::ops::rmse;
 use crate::ops::simd::Level;
-use crate::step::{DeviceFault, Difference, ImageLoss, ImagePair, ImageStages, ImageTerm, LossWeights, TargetView};
+use crate::step::{DeviceFault, ImageLoss, ImagePair, ImageStages, ImageTerm, LossWeights, TargetView};
 
 /// Places of the sums in [`GpuImage::totals`].
 const SIMILARITY: usize = 0;
@@ -32,7 +31,7 @@ pub(super) struct GpuImage {
     tiles: Tiles,
     rasterise: Rasterise,
     ssim: Ssim,
-    difference: DifferenceKernels,
+    l1: L1,
     high_pass: HighPass,
     clear_masked: ClearMasked,
     size_px: [usize; 2],
@@ -59,7 +58,7 @@ impl GpuImage {
             tiles: Tiles::new(gpu)?,
             rasterise: Rasterise::new(gpu)?,
             ssim: Ssim::new(gpu)?,
-            difference: DifferenceKernels::new(gpu)?,
+            l1: L1::new(gpu)?,
             high_pass: HighPass::new(gpu)?,
             clear_masked: ClearMasked::new(gpu),
             size_px: [0; 2],
@@ -125,14 +124,12 @@ impl GpuImage {
         weights: &LossWeights,
     ) -> Result<(), GpuError> {
         self.keep(view)?;
-        let Self { gpu, ssim, difference, clear_masked, image, d_image, totals, photographs, other, size_px, .. } =
-            self;
+        let Self { gpu, ssim, l1, clear_masked, image, d_image, totals, photographs, other, size_px, .. } = self;
         let target = Self::kept(photographs, other, view);
         clear_masked.run(commands, target, image);
         ssim.forward(gpu, commands, image, target, *size_px, totals, SIMILARITY)?;
-        difference.forward(gpu, commands, image, target, totals, DIFFERENCES)?;
-        let weight = weights.of_difference();
-        difference.backward(commands, weights.difference, image, target, weight, (totals, DIFFERENCES), d_image);
+        l1.forward(gpu, commands, image, target, totals, DIFFERENCES)?;
+        l1.backward(commands, image, target, 1.0 - weights.dssim, d_image);
         ssim.backward(commands, image, target, *size_px, -weights.dssim, d_image);
         Ok(())
     }
@@ -169,14 +166,13 @@ impl GpuImage {
     }
 
     /// What the sums say of the comparison.
-    pub(super) fn loss_of(&self, totals: &[f32], weights: &LossWeights) -> ImageLoss<f32> {
-        let n_values = self.n_values();
-        let squared_sum = totals[DIFFERENCES + 1].into();
-        let difference = match weights.difference {
-            Difference::L1 => totals[DIFFERENCES] / n_values as f32,
-            Difference::Rmse => rmse::forward(squared_sum, n_values),
-        };
-        ImageLoss { difference, similarity: totals[SIMILARITY] / n_values as f32, squared_sum }
+    pub(super) fn loss_of(&self, totals: &[f32]) -> ImageLoss<f32> {
+        let n_values = self.n_values() as f32;
+        ImageLoss {
+            l1: totals[DIFFERENCES] / n_values,
+            similarity: totals[SIMILARITY] / n_values,
+            squared_sum: totals[DIFFERENCES + 1].into(),
+        }
     }
 
     /// What they say of the gradient of the background.
@@ -189,7 +185,7 @@ impl GpuImage {
         let mut commands = Commands::new(&gpu);
         self.differ(&mut commands, view, weights)?;
         commands.submit()?;
-        Ok(self.loss_of(&self.totals.read(&gpu)?, weights))
+        Ok(self.loss_of(&self.totals.read(&gpu)?))
     }
 
     fn add_term_with(&mut self, view: &TargetView<'_, f32>, term: &mut ImageTerm<'_, f32>) -> Result<f32, GpuError> {

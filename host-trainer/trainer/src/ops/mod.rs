@@ -1,7 +1,7 @@
 //! The differentiable operations of a training step, one file each: `forward`, `backward`, plain slices, no state.
 //!
 //! Order of a step: [`prefilter`] → [`head_input`] → [`head`] → [`neural_gaussians`] → [`project`] → [`tiles`] →
-//! [`rasterise`] → [`l1`] or [`rmse`], [`ssim`], [`volume`] → the same backwards → [`adam`].
+//! [`rasterise`] → [`l1`], [`ssim`], [`volume`] → the same backwards → [`adam`].
 //!
 //! With explicit Gaussians [`explicit_gaussians`] and [`spherical_harmonics`] stand in the place of the first four.
 //!
@@ -35,7 +35,6 @@ pub mod prefilter;
 pub mod project;
 pub mod rasterise;
 pub mod rate;
-pub mod rmse;
 pub mod simd;
 pub mod spherical_harmonics;
 pub mod ssim;

@@ -10,14 +10,14 @@ use crate::ops::project::{Footprint, Splat};
 use crate::ops::rasterise::TiledImage;
 use crate::ops::simd::Level;
 use crate::ops::tiles::TileLists;
-use crate::ops::{rasterise, ssim, tiles};
+use crate::ops::{l1, rasterise, ssim, tiles};
 use crate::real::Real;
 
 /// What the comparison with the photograph found.
 #[derive(Clone, Copy, Debug)]
 pub struct ImageLoss<R> {
-    /// What [`LossWeights::difference`] says.
-    pub difference: R,
+    /// Mean absolute difference.
+    pub l1: R,
     /// Mean SSIM.
     pub similarity: R,
     /// Σ over pixels and channels of the squared difference.
@@ -27,7 +27,7 @@ pub struct ImageLoss<R> {
 /// A term of a module on the image: adds its gradient, returns its value.
 pub type ImageTerm<'t, R> = dyn FnMut(&ImagePair<'_, R>, &mut [R]) -> R + 't;
 
-/// Tiles, rasterising, difference and SSIM of one view, called in this order; all state is of the view that was drawn last.
+/// Tiles, rasterising, L1 and SSIM of one view, called in this order; all state is of the view that was drawn last.
 pub trait ImageStages<R>: fmt::Debug + Send {
     /// Lists the splats of each tile. Returns the number of (tile, splat) pairs.
     ///
@@ -48,7 +48,7 @@ pub trait ImageStages<R>: fmt::Debug + Send {
     /// [`DeviceFault`].
     fn draw(&mut self, background: [R; 3]) -> Result<(), DeviceFault>;
 
-    /// Compares with the photograph, and begins the gradient of [`LossWeights::image`].
+    /// Compares with the photograph, and begins the gradient of (1 − λ)·L1 + λ·(1 − SSIM).
     ///
     /// # Errors
     /// [`DeviceFault`].
@@ -126,14 +126,14 @@ impl<R: Real> ImageStages<R> for CpuImage<R> {
     fn compare(&mut self, target: &TargetView<'_, R>, weights: &LossWeights) -> Result<ImageLoss<R>, DeviceFault> {
         self.tiled.write_planes(self.size_px, &mut self.image);
         clear_masked(&mut self.image, target.mask);
+        let lambda = R::real(weights.dssim);
         let (similarity, partials) = ssim::forward(self.level, &self.image, target.truth(), self.size_px);
         refill(&mut self.d_image, self.image.len());
+        l1::backward(&self.image, target.truth(), R::ONE - lambda, &mut self.d_image);
         let Self { level, image, size_px, d_image, .. } = self;
+        ssim::backward(*level, image, target.truth(), *size_px, &partials, -lambda, d_image);
         let squared_sum = target.squared_sum(image);
-        let difference = weights.difference.forward(image, target.truth(), squared_sum);
-        weights.difference.backward(image, target.truth(), squared_sum, R::real(weights.of_difference()), d_image);
-        ssim::backward(*level, image, target.truth(), *size_px, &partials, -R::real(weights.dssim), d_image);
-        Ok(ImageLoss { difference, similarity, squared_sum })
+        Ok(ImageLoss { l1: l1::forward(image, target.truth()), similarity, squared_sum })
     }
 
     fn add_term(&mut self, target: &TargetView<'_, R>, term: &mut ImageTerm<'_, R>) -> Result<R, DeviceFault> {

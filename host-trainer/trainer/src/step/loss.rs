@@ -1,52 +1,18 @@
 //! What a step's loss consists of besides the rate: the image's terms, and those that modules add.
 
+use serde::{Deserialize, Serialize};
+
 use super::Block;
 use super::coding::Phase;
 use crate::ops::noise::Stream;
 use crate::ops::simd::Level;
-use crate::ops::{l1, rmse};
 use crate::real::Real;
 use crate::scene::{ModelShape, Scene};
 
-/// How far an image is from its photograph, n values of pixels and channels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Difference {
-    /// Mean absolute difference, Σ |d|/n.
-    L1,
-    /// Root of the mean squared difference, √(Σ d²/n): what PSNR measures, in the units of L1.
-    Rmse,
-}
-
-/// What the root of the mean square counts, so that it weighs about as much as L1 against SSIM and the rate: in trained scenes it is
-/// larger, some 2.5 times on lego.
-const WEIGHT_OF_RMSE: f64 = 0.375;
-
-impl Difference {
-    /// * `squared_sum`: Σ d².
-    pub(super) fn forward<R: Real>(self, image: &[R], truth: &[R], squared_sum: f64) -> R {
-        match self {
-            Self::L1 => l1::forward(image, truth),
-            Self::Rmse => rmse::forward(squared_sum, image.len()),
-        }
-    }
-
-    /// Adds the gradient, `weight` times, to `d_image`.
-    ///
-    /// * `squared_sum`: Σ d².
-    pub(super) fn backward<R: Real>(self, image: &[R], truth: &[R], squared_sum: f64, weight: R, d_image: &mut [R]) {
-        match self {
-            Self::L1 => l1::backward(image, truth, weight, d_image),
-            Self::Rmse => rmse::backward(image, truth, squared_sum, weight, d_image),
-        }
-    }
-}
-
-/// Weights of the image's terms in one step.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Weights of the loss (Scaffold-GS, eq. 10).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LossWeights {
-    /// What the image's difference is.
-    pub difference: Difference,
-    /// Share λ of 1 − SSIM; the difference has 1 − λ.
+    /// Share λ of 1 − SSIM; L1 has 1 − λ.
     pub dssim: f64,
     /// Mean volume of the Gaussians.
     pub volume: f64,
@@ -54,24 +20,7 @@ pub struct LossWeights {
 
 impl Default for LossWeights {
     fn default() -> Self {
-        Self { difference: Difference::L1, dssim: 0.2, volume: 0.01 }
-    }
-}
-
-impl LossWeights {
-    /// The image's part of a step's loss: (1 − λ)·L1 + λ·(1 − SSIM) (Lu et al. 2024, Scaffold-GS, eq. 10), or with 3/8·RMSE in the
-    /// place of L1.
-    pub fn image<R: Real>(&self, difference: R, similarity: R) -> R {
-        R::real(self.of_difference()) * difference + R::real(self.dssim) * (R::ONE - similarity)
-    }
-
-    /// Weight of the difference in [`Self::image`].
-    pub fn of_difference(&self) -> f64 {
-        let of_kind = match self.difference {
-            Difference::L1 => 1.0,
-            Difference::Rmse => WEIGHT_OF_RMSE,
-        };
-        (1.0 - self.dssim) * of_kind
+        Self { dssim: 0.2, volume: 0.01 }
     }
 }
 

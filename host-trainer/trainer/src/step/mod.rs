@@ -35,7 +35,7 @@ pub use context::ContextGradients;
 pub use fault::DeviceFault;
 use image::CpuImage;
 pub use image::{ImageLoss, ImageStages, ImageTerm};
-pub use loss::{DeviceTerms, Difference, ImagePair, Loss, LossWeights, StepInfo, Terms};
+pub use loss::{DeviceTerms, ImagePair, Loss, LossWeights, StepInfo, Terms};
 use parents::Parents;
 pub use probe::ImageError;
 pub use resident::{
@@ -269,10 +269,10 @@ impl<R: Real> Workspace<R> {
 
     /// Loss and gradients of one view.
     ///
-    /// The means of differences and of SSIM are over all pixels, those that do not count being equal in both images, so that a
-    /// view weighs as much as it shows of the scene; [`StepReport::squared_error`], which makes the PSNR, is over those that count.
+    /// The means of L1 and SSIM are over all pixels, those that do not count being equal in both images, so that a view weighs as much
+    /// as it shows of the scene; [`StepReport::squared_error`], which makes the PSNR, is over those that count.
     ///
-    /// L = [`LossWeights::image`] + w·mean(s_x·s_y·s_z) (Lu et al. 2024, Scaffold-GS, eq. 10), the terms of modules, and
+    /// L = (1 − λ)·L1 + λ·(1 − SSIM) + w·mean(s_x·s_y·s_z) (Lu et al. 2024, Scaffold-GS, eq. 10), the terms of modules, and
     /// those of [`RateTerms`](coding::RateTerms) where `coding` has them. Gradients of anchors are left in [`Self::blocks`], those
     /// of the heads in [`Self::d_heads`], of the background in [`Self::d_background`], of the context model in [`Self::d_context`].
     ///
@@ -347,7 +347,9 @@ impl<R: Real> Workspace<R> {
         let n_gaussians = self.blocks().iter().map(|b| b.gaussians.len()).sum();
         let volume_weight = R::real(weights.volume);
         let volumes: R = self.blocks().iter().map(|b| volume::forward(&b.gaussians, volume_weight, n_gaussians)).sum();
-        let mut total = weights.image(compared.difference, compared.similarity) + volumes + by_modules;
+        let lambda = R::real(weights.dssim);
+        let mut total =
+            (R::ONE - lambda) * compared.l1 + lambda * (R::ONE - compared.similarity) + volumes + by_modules;
 
         stages.loss = timer.lap();
         let (d_splats, d_background) = images.backward()?;

@@ -4,7 +4,7 @@ use super::target::clear_masked;
 use super::{Coding, DrawnView, LossWeights, TargetView, Workspace};
 use crate::ops::noise::Stream;
 use crate::ops::rasterise::TiledImage;
-use crate::ops::{rasterise, ssim};
+use crate::ops::{l1, rasterise, ssim};
 use crate::real::Real;
 use crate::scene::Scene;
 
@@ -15,7 +15,7 @@ pub struct ImageError {
     pub squared_sum: f64,
     /// Pixels times channels that count.
     pub n_values: usize,
-    /// [`LossWeights::image`].
+    /// (1 − λ)·L1 + λ·(1 − SSIM), the image's part of a step's loss.
     pub loss: f64,
 }
 
@@ -44,10 +44,12 @@ impl<R: Real> Workspace<R> {
         let mut image = tiled.to_planes(size_px);
         clear_masked(&mut image, mask);
         let similarity: f64 = ssim::forward(self.level, &image, target.truth(), size_px).0.into();
-        let squared_sum = target.squared_sum(&image);
-        let difference: f64 = weights.difference.forward(&image, target.truth(), squared_sum).into();
-        let loss = weights.image(difference, similarity);
-        let error = ImageError { squared_sum, n_values: 3 * target.n_counted(), loss };
+        let difference: f64 = l1::forward(&image, target.truth()).into();
+        let error = ImageError {
+            squared_sum: target.squared_sum(&image),
+            n_values: 3 * target.n_counted(),
+            loss: (1.0 - weights.dssim) * difference + weights.dssim * (1.0 - similarity),
+        };
         let sign = |i: u32| if stream.uniform(i) < 0.5 { -R::ONE } else { R::ONE };
         let mut signs: Vec<R> = (0u32..).take(image.len()).map(sign).collect();
         clear_masked(&mut signs, mask);

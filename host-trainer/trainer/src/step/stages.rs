@@ -13,7 +13,7 @@ pub struct StageSeconds {
     pub tiles: f64,
     /// Blending.
     pub rasterise: f64,
-    /// Image to planes and back, difference, SSIM, their gradients, the squared error.
+    /// Image to planes and back, L1, SSIM, their gradients, the squared error.
     pub loss: f64,
     /// From the image's gradient to the splats'.
     pub rasterise_backward: f64,

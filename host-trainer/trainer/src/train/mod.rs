@@ -254,11 +254,7 @@ impl<'a> Trainer<'a> {
         let (modules, at) = (self.config.modules, self.step_info());
         let pruned_share = modules.each().iter().map(|module| module.pruned_share(&at)).fold(0.0, f32::max);
         let terms = modules.terms();
-        let loss = Loss {
-            weights: self.config.loss.at(|share| at.is_after(share)),
-            modules: Some((&terms, &at)),
-            pruned_share,
-        };
+        let loss = Loss { weights: self.config.loss, modules: Some((&terms, &at)), pruned_share };
         // Drawn with the heads as they are written; the gradients move the weights behind them (straight through).
         let behind = integers.as_ref().map(|integers| mem::replace(&mut self.scene.heads, integers.heads.clone()));
         let on_device = self.steps_on_device(&loss, &coding);

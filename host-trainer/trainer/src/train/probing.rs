@@ -32,13 +32,12 @@ impl Trainer<'_> {
         let stream = Stream::of_run(self.config.seed).branch(PROBES).branch(self.iteration);
         let mut workspace = Workspace::new(&self.scene.shape);
         let (mut of_offsets, mut of_anchors) = (vec![0.0; n * k], vec![0.0; n]);
-        let weights = self.config.loss.at(|share| self.step_info().is_after(share));
         let (mut squared_sum, mut n_values, mut loss) = (0.0, 0, 0.0);
         let mut photographs = self.photographs.beside();
         for (view, at) in (0u32..).zip(0..self.trained.len()) {
             let photograph = photographs.photograph(&self.capture.train, self.trained[at..].iter().copied())?;
             let target = target(&photograph, &self.cameras[self.trained[at] as usize], self.background);
-            let error = workspace.probe(&self.scene, &target, &weights, stream.branch(view));
+            let error = workspace.probe(&self.scene, &target, &self.config.loss, stream.branch(view));
             squared_sum += error.squared_sum;
             n_values += error.n_values;
             loss += error.loss / self.trained.len() as f64;

@@ -10,7 +10,7 @@ use crate::ops::noise::Stream;
 use crate::ops::perturb;
 use crate::scene::{ModelShape, Scene};
 use crate::step::coding::{Coding, IntegerModel, RateTerms};
-use crate::step::{Loss, LossWeights, TargetView, Workspace};
+use crate::step::{Loss, TargetView, Workspace};
 use crate::train::config::Backbone;
 use crate::train::test_capture::{tiny_capture, tiny_hac_config};
 use crate::train::{TrainConfig, Trainer};
@@ -56,7 +56,7 @@ fn drawn_twice(config: TrainConfig, tolerance: f64) {
         let truth = vec![0.0; 3 * camera.size_px.iter().product::<usize>()];
         let target = TargetView::new(camera, truth, None, [0.0; 3]);
         let mut squared_error = |scene: &Scene<f32>, coding: &Coding<'_, f32>| {
-            workspace.step(scene, &target, &Loss::plain(LossWeights::default()), coding).squared_error
+            workspace.step(scene, &target, &Loss::plain(config.loss), coding).squared_error
         };
         let drawn = squared_error(&last, &last_step);
         assert!(drawn > 0.0, "an image that shows something");

@@ -146,9 +146,10 @@ impl GpuStep {
     ) -> Result<ResidentStep<f32>, GpuError> {
         let totals = self.images.totals.read(&self.gpu)?;
         let counters = self.counters.read(&self.gpu)?;
-        let compared = self.images.loss_of(&totals, &loss.weights);
+        let compared = self.images.loss_of(&totals);
         let (others, n_gaussians) = self.terms.sum(&self.gpu, loss, terms, (&self.images, &self.anchors), &totals)?;
-        let mut total = loss.weights.image(compared.difference, compared.similarity) + others;
+        let lambda = loss.weights.dssim as f32;
+        let mut total = (1.0 - lambda) * compared.l1 + lambda * (1.0 - compared.similarity) + others;
         let mut rate = None;
         if let Coding::Context { .. } = coding {
             let scene = self.scene.as_ref().expect("loaded before");

@@ -8,7 +8,7 @@ use crate::gpu::parity::{Bound, assert_close, gpu, largest};
 use crate::ops::Pinhole;
 use crate::scene::Scene;
 use crate::step::coding::{RateReport, RateTerms};
-use crate::step::{Block, Difference, LossWeights, Phase, SharedDevice, StepInfo, StepReport, Workspace, planes};
+use crate::step::{Block, LossWeights, Phase, SharedDevice, StepInfo, StepReport, Workspace, planes};
 use crate::train::config::{Backbone, Densification};
 use crate::train::module::{Detail, Distribution, Modules, Pruning};
 use crate::train::optimiser::Optimiser;
@@ -179,9 +179,7 @@ fn a_step_of_a_resident_scene_agrees_with_the_cpu() {
         let stream = crate::ops::noise::Stream::of_run(1).branch(1);
         let info = StepInfo { iteration: 10, iterations: 20, phase: Phase::Raw, scaled: true, stream };
         let terms = config.modules.terms();
-        let difference = if i % 2 == 0 { Difference::L1 } else { Difference::Rmse };
-        let weights = LossWeights { difference, ..LossWeights::default() };
-        let loss = Loss { weights, modules: Some((&terms, &info)), pruned_share: 0.0 };
+        let loss = Loss { weights: LossWeights::default(), modules: Some((&terms, &info)), pruned_share: 0.0 };
         let rate = RateTerms {
             lambda: 0.3,
             sample: 0.5,

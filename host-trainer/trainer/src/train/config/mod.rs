@@ -2,18 +2,16 @@
 
 mod error;
 mod hac;
-mod loss;
 
 use serde::{Deserialize, Serialize};
 
 pub use error::ConfigError;
 pub(crate) use error::within;
 pub use hac::{Backbone, Hac};
-pub use loss::LossPath;
 
 use super::module::Modules;
 use crate::scene::ModelShape;
-use crate::step::Phase;
+use crate::step::{LossWeights, Phase};
 use pocketsplat_capture::dataset::{Capture, PointsOrigin};
 
 /// A learning rate over the run: `start` until share `from` is done, then on a geometric path to `end`.
@@ -180,8 +178,8 @@ pub struct TrainConfig {
     /// Whether the colour behind the scene is trained with it; it begins as the capture's.
     #[serde(default)]
     pub learns_background: bool,
-    /// The image's loss.
-    pub loss: LossPath,
+    /// Loss weights.
+    pub loss: LossWeights,
     /// Growth and pruning.
     pub densification: Densification,
     /// The rate, where the backbone has one.
@@ -205,7 +203,7 @@ impl Default for TrainConfig {
             validation_every: 0,
             rates: Rates::default(),
             learns_background: false,
-            loss: LossPath::default(),
+            loss: LossWeights::default(),
             densification: Densification::default(),
             hac: Hac::default(),
             modules: Modules::default(),
@@ -296,7 +294,8 @@ impl TrainConfig {
             within(format!("train.rates.{name}.end"), rate.end, least_end, 10.0)?;
             within(format!("train.rates.{name}.from"), rate.from, 0.0, 1.0 - 1e-6)?;
         }
-        self.loss.check()?;
+        within("train.loss.dssim", self.loss.dssim, 0.0, 1.0)?;
+        within("train.loss.volume", self.loss.volume, 0.0, 1e6)?;
         let Densification { statistics_from, from, until, interval, success, levels, .. } = self.densification;
         let Densification { gradient_threshold, min_opacity, .. } = self.densification;
         within("train.densification.success", success, 0.0, 1.0)?;

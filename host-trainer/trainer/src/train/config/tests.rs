@@ -1,5 +1,4 @@
 use super::*;
-use crate::step::{Difference, LossWeights};
 use crate::train::module::Detail;
 
 #[test]
@@ -75,19 +74,4 @@ fn a_few_views_are_held_out_where_there_are_enough() {
     assert!(held_out(0, 100).is_empty());
     let refused = TrainConfig { validation_every: 1, ..TrainConfig::default() }.validate();
     assert_eq!(refused, Err(ConfigError::NoViewLeft));
-}
-
-#[test]
-fn the_loss_is_the_published_one_until_its_share() {
-    let path = LossPath::default();
-    let at = |step: u32| path.at(|share| f64::from(step) > share * 100.0);
-    let published = LossWeights { difference: Difference::L1, dssim: 0.2, volume: 0.01 };
-    assert_eq!([at(1), at(60)], [published; 2]);
-    let late = LossWeights { difference: Difference::Rmse, ..published };
-    assert_eq!([at(61), at(100)], [late; 2]);
-    // A configuration from before there was a choice.
-    let before: LossPath = toml::from_str("dssim = 0.2\nvolume = 0.01").expect("a sound configuration");
-    assert_eq!(before.at(|share| share < 1.0), published);
-    let config = TrainConfig { loss: LossPath { rmse_from: 1.5, ..path }, ..TrainConfig::default() };
-    assert!(config.validate().is_err());
 }

@@ -11,6 +11,6 @@ fn backward(
     let i = item_of(group, n_groups, thread);
     if i < 3u * parameters.n_pixels {
         let d = difference(image[i], truth_of(truth[i % parameters.n_pixels], i / parameters.n_pixels));
-        d_image[i] = parameters.weight / f32(3u * parameters.n_pixels) * sign(d);
+        d_image[i] = parameters.step * sign(d);
     }
 }

@@ -2,10 +2,7 @@
 
 struct Parameters {
     n_pixels: u32,
-    // Of the gradient.
-    weight: f32,
-    // Where the sum of squares stands among the totals.
-    squares: u32,
+    step: f32,
 }
 
 var<immediate> parameters: Parameters;

@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::sync::PoisonError;
+use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
 use pocketsplat_capture::dataset::FrameSize;
@@ -57,6 +58,7 @@ struct Row {
     loss_ms: f64,
     rasterise_backward_ms: f64,
     anchors_backward_ms: f64,
+    /// Of a step as training has it.
     step_ms: f64,
 }
 
@@ -115,11 +117,12 @@ fn measure(
     let target = TargetView::new(&camera, truth, None, [0.0; 3]).numbered(0);
     let loss = Loss::plain(LossWeights::default());
     let mut name = "cpu".to_owned();
-    let reports = pool.install(|| -> Result<Vec<StepReport<f32>>> {
+    let (steps, reports) = pool.install(|| -> Result<(Vec<f64>, Vec<StepReport<f32>>)> {
         match device {
             None => {
                 let mut workspace = Workspace::new(&scene.shape);
-                after_one(n_steps, || Ok(workspace.try_step(scene, &target, &loss, &Coding::Raw)?))
+                let timed = after_one(n_steps, || Ok(workspace.try_step(scene, &target, &loss, &Coding::Raw)?))?;
+                Ok(timed.into_iter().unzip())
             }
             // As training has it: the scene is there, and stays.
             Some(device) => {
@@ -128,25 +131,39 @@ fn measure(
                 let statistics = Statistics::new(scene.anchors.len(), scene.shape.n_offsets);
                 let device = device.resident();
                 device.load(&trained(scene, &Optimiser::new(scene), &statistics))?;
-                after_one(n_steps, || Ok(device.step(&target, &loss, &Coding::Raw, f32::MAX)?.report))
+                let mut run = |times_stages| {
+                    device.time_stages(times_stages);
+                    after_one(n_steps, || Ok(device.step(&target, &loss, &Coding::Raw, f32::MAX)?.report))
+                };
+                // Stages that are waited for make the step longer.
+                let reports = run(true)?.into_iter().map(|(_, report)| report).collect();
+                let steps = run(false)?.into_iter().map(|(seconds, _)| seconds).collect();
+                Ok((steps, reports))
             }
         }
     })?;
-    Ok(row(name, threads, size, &reports))
+    Ok(row(name, threads, size, steps, &reports))
 }
 
-/// What steps report, after one that does not count.
-fn after_one(n_steps: usize, mut step: impl FnMut() -> Result<StepReport<f32>>) -> Result<Vec<StepReport<f32>>> {
+/// The seconds of steps and what they report, after one that does not count.
+fn after_one(n_steps: usize, mut step: impl FnMut() -> Result<StepReport<f32>>) -> Result<Vec<(f64, StepReport<f32>)>> {
     step()?;
-    (0..n_steps).map(|_| step()).collect()
+    let timed = |_| {
+        let start = Instant::now();
+        let report = step()?;
+        Ok((start.elapsed().as_secs_f64(), report))
+    };
+    (0..n_steps).map(timed).collect()
 }
 
-fn row(device: String, threads: usize, size: FrameSize, reports: &[StepReport<f32>]) -> Row {
-    let median = |stage: &dyn Fn(&StageSeconds) -> f64| {
-        let mut ms: Vec<f64> = reports.iter().map(|r| 1e3 * stage(&r.stages)).collect();
-        ms.sort_by(f64::total_cmp);
-        ms[ms.len() / 2]
-    };
+fn median_ms(mut seconds: Vec<f64>) -> f64 {
+    seconds.sort_by(f64::total_cmp);
+    1e3 * seconds[seconds.len() / 2]
+}
+
+fn row(device: String, threads: usize, size: FrameSize, steps: Vec<f64>, reports: &[StepReport<f32>]) -> Row {
+    let median =
+        |stage: &dyn Fn(&StageSeconds) -> f64| median_ms(reports.iter().map(|report| stage(&report.stages)).collect());
     let StepReport { n_splats, n_pairs, .. } = reports[0];
     Row {
         device,
@@ -160,10 +177,7 @@ fn row(device: String, threads: usize, size: FrameSize, reports: &[StepReport<f3
         loss_ms: median(&|s| s.loss),
         rasterise_backward_ms: median(&|s| s.rasterise_backward),
         anchors_backward_ms: median(&|s| s.anchors_backward + s.context_backward),
-        step_ms: median(&|s| {
-            let forward = s.context + s.anchors + s.tiles + s.rasterise + s.loss;
-            forward + s.rasterise_backward + s.anchors_backward + s.context_backward
-        }),
+        step_ms: median_ms(steps),
     }
 }
 

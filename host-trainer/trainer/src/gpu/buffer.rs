@@ -107,9 +107,13 @@ impl<T: Pod> Buffer<T> {
     /// # Errors
     /// As [`Gpu::check`].
     pub fn read(&self, gpu: &Gpu) -> Result<Vec<T>, GpuError> {
+        self.ask(gpu).take(gpu)
+    }
+
+    /// Asks for the values as the commands before leave them; does not wait.
+    pub fn ask(&self, gpu: &Gpu) -> Asked<T> {
         if self.len == 0 {
-            gpu.wait()?;
-            return Ok(Vec::new());
+            return Asked { staging: None, of: PhantomData };
         }
         let size = (self.len * size_of::<T>()) as u64;
         let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
@@ -123,7 +127,25 @@ impl<T: Pod> Buffer<T> {
         encoder.copy_buffer_to_buffer(&self.raw, 0, &staging, 0, size);
         gpu.queue.submit([encoder.finish()]);
         staging.map_async(wgpu::MapMode::Read, .., |_| ());
+        Asked { staging: Some(staging), of: PhantomData }
+    }
+}
+
+/// Values on their way to the host.
+pub struct Asked<T> {
+    /// None where there are none.
+    staging: Option<wgpu::Buffer>,
+    of: PhantomData<T>,
+}
+
+impl<T: Pod> Asked<T> {
+    /// The values; waits until all commands submitted so far are done.
+    ///
+    /// # Errors
+    /// As [`Gpu::check`].
+    pub fn take(self, gpu: &Gpu) -> Result<Vec<T>, GpuError> {
         gpu.wait()?;
+        let Some(staging) = self.staging else { return Ok(Vec::new()) };
         let mapped = staging.get_mapped_range(..).map_err(|error| GpuError::Refused { reason: error.to_string() })?;
         // The mapping has no alignment to rely on.
         Ok(mapped.chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned).collect())

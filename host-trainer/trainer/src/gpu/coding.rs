@@ -107,7 +107,7 @@ impl GpuCoding {
     }
 
     /// Chooses the sample, predicts the steps of all anchors and the distributions of the sample, and adds noise of these steps to the
-    /// values; waits for two numbers.
+    /// values; waits for the sample's number and for what is drawn.
     pub(super) fn forward(
         &mut self,
         gpu: &Gpu,
@@ -124,32 +124,38 @@ impl GpuCoding {
         let mut commands = Commands::new(gpu);
         self.mask.mark_drawn(&mut commands, all_masks, scene.shape.n_offsets, &self.drawn);
         commands.submit()?;
-        let drawn = self.drawn.read(gpu)?;
+        let drawn = self.drawn.ask(gpu);
 
-        self.n_sampled = match &context.grid {
+        let (n_sampled, drawn) = match &context.grid {
             Some(grid) => {
                 let (network, pass) = (&context.networks[0], &mut self.pass);
                 let n_sampled = pass.choose(gpu, stream, terms.sample, anchors)?;
+                // There by now: nothing has been submitted since.
+                let drawn = drawn.take(gpu)?;
                 pass.fit(gpu, network, anchors.len())?;
                 let mut commands = Commands::new(gpu);
                 self.hash_grid.forward(&mut commands, &grid.places, &grid.rows.values, anchors, &pass.inputs);
                 pass.steps(&mut commands, &self.kernels, network, context.base_steps);
                 pass.distributions(&mut commands, &self.kernels, network);
                 commands.submit()?;
-                n_sampled
+                (n_sampled, drawn)
             }
             None => {
+                let drawn = drawn.take(gpu)?;
                 self.levels.find(gpu, scene, &drawn)?;
                 self.levels.give(gpu, scene, &self.kernels, &self.perturb, stream)?;
                 self.steps.fit(gpu, N_GROUPS * anchors.len())?;
-                self.levels.forward(gpu, scene, &self.kernels, anchors, &self.steps, (stream, terms.sample))?
+                let sample = (stream, terms.sample);
+                let n_sampled = self.levels.forward(gpu, scene, &self.kernels, anchors, &self.steps, sample)?;
+                (n_sampled, drawn)
             }
         };
+        self.n_sampled = n_sampled;
         let mut commands = Commands::new(gpu);
         self.perturb_all(gpu, &mut commands, scene, anchors, values, stream)?;
         commands.submit()?;
         let n_drawn = drawn.iter().sum::<u32>() as usize;
-        self.weights = Weights::of(terms, scene, [n_anchors, anchors.len(), n_drawn, self.n_sampled]);
+        self.weights = Weights::of(terms, scene, [n_anchors, anchors.len(), n_drawn, n_sampled]);
         Ok(())
     }
 

@@ -27,7 +27,7 @@ mod scene;
 mod step;
 
 pub use adapter::{Adapter, AdapterKind, adapters, choose};
-pub use buffer::{Bind, Buffer};
+pub use buffer::{Asked, Bind, Buffer};
 pub use error::GpuError;
 pub use gpu::Gpu;
 pub use kernel::{Commands, Kernel};

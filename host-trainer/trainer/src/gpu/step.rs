@@ -37,6 +37,7 @@ pub struct GpuStep {
     adam: Adam,
     counters: Buffer<u32>,
     size_px: [usize; 2],
+    times_stages: bool,
     scene: Option<DeviceScene>,
     n_loads: u64,
 }
@@ -57,6 +58,7 @@ impl GpuStep {
             adam: Adam::new(gpu),
             counters: Buffer::zeros(gpu, "counters", 2)?,
             size_px: [0; 2],
+            times_stages: false,
             scene: None,
             n_loads: 0,
             gpu: gpu.clone(),
@@ -112,6 +114,10 @@ impl Resident<f32> for GpuStep {
             Coding::Context { exact, .. } => exact.is_none() && scene.context.is_some(),
         };
         is_known && terms_of(loss, &scene.shape).is_some()
+    }
+
+    fn time_stages(&mut self, yes: bool) {
+        self.times_stages = yes;
     }
 
     fn load(&mut self, trained: &Trained<'_, f32>) -> Result<(), DeviceFault> {

@@ -107,6 +107,9 @@ pub trait Resident<R> {
     /// Whether a step with these terms can be computed there.
     fn can_step(&self, scene: &Scene<R>, loss: &Loss<'_, R>, coding: &Coding<'_, R>) -> bool;
 
+    /// Whether steps report the seconds of their stages. They wait after each stage then, which makes the step longer.
+    fn time_stages(&mut self, yes: bool);
+
     /// Takes everything over.
     ///
     /// # Errors

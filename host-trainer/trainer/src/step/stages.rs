@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-/// Wall-clock seconds of the stages of a step.
+/// Wall-clock seconds of the stages of a step; 0 where a device was not asked for them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StageSeconds {
     /// Prefilter, copying the visible anchors, what coding does to their values.

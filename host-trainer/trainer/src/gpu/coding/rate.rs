@@ -3,7 +3,7 @@
 use pocketsplat_core::context::N_GROUPS;
 
 use super::super::scene::DeviceScene;
-use super::super::{Gpu, GpuError};
+use super::super::{Asked, Gpu};
 use super::GpuCoding;
 use crate::ops::grid_bits;
 use crate::step::coding::{RateReport, RateTerms};
@@ -41,10 +41,16 @@ pub(in super::super) struct Rate {
 }
 
 impl GpuCoding {
-    /// What the sums say of the rate; waits.
+    /// Asks for the number of the grid's values that are not negative.
+    pub(in super::super) fn ask_positive(&self, gpu: &Gpu) -> Asked<u32> {
+        self.grid_bits.n_positive.ask(gpu)
+    }
+
+    /// What the sums say of the rate.
     ///
-    /// * `totals`: the [`N_RATE_TOTALS`](super::N_RATE_TOTALS) that [`Self::backward`] wrote.
-    pub(in super::super) fn rate(&self, gpu: &Gpu, scene: &DeviceScene, totals: &[f32]) -> Result<Rate, GpuError> {
+    /// * `totals`: the [`N_RATE_TOTALS`](super::N_RATE_TOTALS) that [`Self::backward`] wrote. * `n_positive`: one number, as
+    ///   [`Self::ask_positive`] gives it.
+    pub(in super::super) fn rate(&self, scene: &DeviceScene, totals: &[f32], n_positive: &[u32]) -> Rate {
         let Weights { bit, mask, grid } = self.weights;
         let context = scene.context.as_ref().expect("asked before");
         let mut bits = [0.0; N_GROUPS];
@@ -55,12 +61,11 @@ impl GpuCoding {
         }
         let mut term = mask * f64::from(totals[0]) + bit * bits.iter().sum::<f64>();
         if let Some(of_context) = context.grid.as_ref().filter(|_| grid > 0.0) {
-            let n_positive = self.grid_bits.n_positive.read(gpu)?[0] as usize;
-            term += grid * grid_bits::bits(of_context.rows.values.len(), n_positive);
+            term += grid * grid_bits::bits(of_context.rows.values.len(), n_positive[0] as usize);
         }
         let n_sampled = self.n_sampled;
         #[expect(clippy::cast_possible_truncation, reason = "a term of the loss")]
         let term = term as f32;
-        Ok(Rate { term, report: RateReport { n_sampled, bits: bits.map(|bits| bits / n_sampled.max(1) as f64) } })
+        Rate { term, report: RateReport { n_sampled, bits: bits.map(|bits| bits / n_sampled.max(1) as f64) } }
     }
 }

@@ -3,7 +3,10 @@
 use bytemuck::{Pod, Zeroable};
 use pocketsplat_core::context::{FEATURES_PER_LEVEL, GridLevel};
 
-use crate::gpu::{Buffer, Commands, GROUPS, Gpu, GpuError, Kernel};
+use crate::gpu::{Buffer, Commands, GROUP_THREADS, GROUPS, Gpu, GpuError, Kernel};
+
+/// Rows of the grid that a workgroup of the way back has, as `hash_grid/backward.wgsl` says.
+const ROWS_PER_GROUP: usize = GROUP_THREADS / 32;
 
 /// Its kernels.
 #[derive(Clone, Debug)]
@@ -117,7 +120,8 @@ impl HashGrid {
         commands.run_items(&self.forward, &parameters, &buffers, n_items);
     }
 
-    /// Gradients through the signs: `Σ weight·dL/d(feature)` where |row| ≤ 1, else 0. A row's anchors are added up in their order.
+    /// Gradients through the signs: `Σ weight·dL/d(feature)` where |row| ≤ 1, else 0. A row's anchors are added up in 32
+    /// parts, each in their order, and these in a tree.
     ///
     /// * `row_of_anchor`: `[n_anchors]`. * `d_features`: `[n, 4·levels]`. * `d_rows`: as `rows`, overwritten.
     pub fn backward(
@@ -140,7 +144,7 @@ impl HashGrid {
             d_features as _,
             d_rows as _,
         ];
-        commands.run_items(&self.backward, &parameters, &buffers, places.n_rows);
+        commands.run(&self.backward, &parameters, &buffers, places.n_rows.div_ceil(ROWS_PER_GROUP));
     }
 }
 
@@ -165,8 +169,8 @@ mod tests {
         .to_vec()
     }
 
-    /// Bounds: features are whole numbers of 2⁻²⁴, the same on both. A gradient adds the same products in the same order, which an adapter
-    /// may fuse: 1e-6 of the largest.
+    /// Bounds: features are whole numbers of 2⁻²⁴, the same on both. A gradient adds the same products in another order, which an
+    /// adapter may fuse: 1e-6 of the largest.
     #[test]
     fn the_hash_grid_agrees_with_the_cpu() {
         let Some(gpu) = gpu() else { return };

@@ -10,19 +10,23 @@ use super::{GpuImage, GpuStep, SPLATS, UNSOUND};
 use crate::step::coding::{Coding, RateTerms};
 use crate::step::{DeviceTerms, Loss, ResidentStep, StageSeconds, StepReport, TargetView};
 
-/// Reads the seconds since the last reading, once the device has come so far.
-struct Laps<'g>(&'g Gpu, Instant);
+/// Reads the seconds since the last reading, once the device has come so far; nothing where nobody asked for them.
+struct Laps<'g> {
+    gpu: &'g Gpu,
+    last: Option<Instant>,
+}
 
 impl Laps<'_> {
     fn lap(&mut self) -> Result<f64, GpuError> {
-        self.0.wait()?;
+        let Some(last) = &mut self.last else { return Ok(0.0) };
+        self.gpu.wait()?;
         let now = Instant::now();
-        Ok(now.duration_since(std::mem::replace(&mut self.1, now)).as_secs_f64())
+        Ok(now.duration_since(std::mem::replace(last, now)).as_secs_f64())
     }
 }
 
 impl GpuStep {
-    /// From a view to gradients of everything that it shows; waits after each stage.
+    /// From a view to gradients of everything that it shows; waits for numbers that sizes follow from, and for what it found.
     pub(super) fn step_with(
         &mut self,
         target: &TargetView<'_, f32>,
@@ -32,7 +36,7 @@ impl GpuStep {
     ) -> Result<ResidentStep<f32>, GpuError> {
         let Self { gpu, images, anchors, scene, .. } = self;
         let (gpu, scene) = (gpu.clone(), scene.as_ref().expect("loaded before"));
-        let mut laps = Laps(&gpu, Instant::now());
+        let mut laps = Laps { gpu: &gpu, last: self.times_stages.then(Instant::now) };
         let mut stages = StageSeconds::default();
         let camera = target.camera;
         self.size_px = camera.size_px;
@@ -144,8 +148,9 @@ impl GpuStep {
         n_pairs: usize,
         stages: StageSeconds,
     ) -> Result<ResidentStep<f32>, GpuError> {
-        let totals = self.images.totals.read(&self.gpu)?;
-        let counters = self.counters.read(&self.gpu)?;
+        let (totals, counters) = (self.images.totals.ask(&self.gpu), self.counters.ask(&self.gpu));
+        let n_positive = self.coding.ask_positive(&self.gpu);
+        let (totals, counters) = (totals.take(&self.gpu)?, counters.take(&self.gpu)?);
         let compared = self.images.loss_of(&totals);
         let (others, n_gaussians) = self.terms.sum(&self.gpu, loss, terms, (&self.images, &self.anchors), &totals)?;
         let lambda = loss.weights.dssim as f32;
@@ -153,7 +158,7 @@ impl GpuStep {
         let mut rate = None;
         if let Coding::Context { .. } = coding {
             let scene = self.scene.as_ref().expect("loaded before");
-            let found = self.coding.rate(&self.gpu, scene, &totals[RATE..RATE + N_RATE_TOTALS])?;
+            let found = self.coding.rate(scene, &totals[RATE..RATE + N_RATE_TOTALS], &n_positive.take(&self.gpu)?);
             total += found.term;
             rate = Some(found.report);
         }

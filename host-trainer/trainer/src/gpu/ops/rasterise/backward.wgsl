@@ -1,7 +1,8 @@
 // Front to back, as forward: dL/dα_i = T_i·(c_i·g) − rest_i/(1 − α_i), and rest, what of g·C has not been blended yet, shrinks.
 //
-// Four splats at a time: every pixel leaves its share of dL/d(power) and its weight in shared memory, then a thread adds up a row of one
-// splat, then a thread adds up the rows of one number of one splat. The order of every sum is fixed.
+// Four splats at a time: every pixel leaves its share of dL/d(power) and its weight in shared memory, then a thread adds up a column of
+// one splat, then a thread adds up the columns of one number of one splat. The order of every sum is fixed. Threads that read at once read
+// from different banks: neighbours stand in neighbouring columns, and begin at different rows or columns where they would meet.
 
 @group(0) @binding(0) var<storage, read> splats: array<Splat>;
 @group(0) @binding(1) var<storage, read> starts: array<u32>;
@@ -15,15 +16,14 @@
 
 const AT_ONCE: u32 = 4u;
 const N_NUMBERS: u32 = 9u;
-// Sums of a row: dp, dp·dx, dp·dx², weight·g.
-const N_ROW_SUMS: u32 = 6u;
 
 var<workgroup> d_colour: array<array<f32, 3>, TILE_PIXELS>;
 var<workgroup> d_power: array<f32, AT_ONCE * TILE_PIXELS>;
 var<workgroup> weights: array<f32, AT_ONCE * TILE_PIXELS>;
 var<workgroup> n_live: atomic<u32>;
 var<workgroup> n_live_read: u32;
-var<workgroup> row_sums: array<f32, AT_ONCE * TILE_PX * N_ROW_SUMS>;
+// [AT_ONCE, N_NUMBERS, TILE_PX]: dp, dp·dx, dp·dy, dp·dx·dy, dp·dx², dp·dy² and weight·g of a column.
+var<workgroup> column_sums: array<f32, AT_ONCE * N_NUMBERS * TILE_PX>;
 
 @compute @workgroup_size(256)
 fn backward(
@@ -105,60 +105,65 @@ fn backward(
                 weights[i * TILE_PIXELS + thread] = weight;
             }
             workgroupBarrier();
-            add_rows(thread, start, x0, y0);
+            add_columns(thread, start, x0, y0);
             workgroupBarrier();
             if thread < AT_ONCE * N_NUMBERS && start + thread / N_NUMBERS < n {
                 let i = thread / N_NUMBERS;
                 let number = thread % N_NUMBERS;
-                d_pairs[entries[first + start + i] * N_NUMBERS + number] = add_up(i, number, batch[start + i], y0);
+                d_pairs[entries[first + start + i] * N_NUMBERS + number] = add_up(i, number, batch[start + i]);
             }
         }
     }
 }
 
-fn add_rows(thread: u32, start: u32, x0: u32, y0: u32) {
+fn add_columns(thread: u32, start: u32, x0: u32, y0: u32) {
     if thread >= AT_ONCE * TILE_PX {
         return;
     }
     let i = thread / TILE_PX;
-    let row = thread % TILE_PX;
-    let dy = f32(y0 + row) + 0.5 - batch[start + i].mean_px[1];
-    let dx0 = f32(x0) + 0.5 - batch[start + i].mean_px[0] - batch[start + i].shear * dy;
-    var along = vec3(0.0);
+    let column = thread % TILE_PX;
+    let splat = batch[start + i];
+    let right = f32(x0 + column) + 0.5 - splat.mean_px[0];
+    let top = f32(y0) + 0.5 - splat.mean_px[1];
+    var first = vec3(0.0);
+    var second = vec3(0.0);
     var colour = vec3(0.0);
-    for (var column = 0u; column < TILE_PX; column++) {
+    for (var k = 0u; k < TILE_PX; k++) {
+        let row = (k + i) % TILE_PX;
         let pixel = row * TILE_PX + column;
         let dp = d_power[i * TILE_PIXELS + pixel];
-        let dx = dx0 + f32(column);
-        along += vec3(dp, dp * dx, dp * dx * dx);
+        let dy = top + f32(row);
+        let dx = right - splat.shear * dy;
+        first += dp * vec3(1.0, dx, dy);
+        second += dp * vec3(dx * dy, dx * dx, dy * dy);
         let g = d_colour[pixel];
         colour += weights[i * TILE_PIXELS + pixel] * vec3(g[0], g[1], g[2]);
     }
-    let at = thread * N_ROW_SUMS;
     for (var k = 0u; k < 3u; k++) {
-        row_sums[at + k] = along[k];
-        row_sums[at + 3u + k] = colour[k];
+        column_sums[(i * N_NUMBERS + k) * TILE_PX + column] = first[k];
+        column_sums[(i * N_NUMBERS + 3u + k) * TILE_PX + column] = second[k];
+        column_sums[(i * N_NUMBERS + 6u + k) * TILE_PX + column] = colour[k];
     }
 }
 
-// One number of the gradient of splat i of the four, in the order of Splat's fields.
-fn add_up(i: u32, number: u32, splat: Splat, y0: u32) -> f32 {
+fn sum_of(i: u32, number: u32) -> f32 {
+    let at = i * N_NUMBERS + number;
     var sum = 0.0;
-    for (var row = 0u; row < TILE_PX; row++) {
-        let at = (i * TILE_PX + row) * N_ROW_SUMS;
-        let dy = f32(y0 + row) + 0.5 - splat.mean_px[1];
-        let dp = row_sums[at];
-        let dp_dx = row_sums[at + 1u];
-        switch number {
-            case 0u: { sum += splat.row_precision * dp_dx; }
-            case 1u: { sum += splat.column_precision * (dp * dy) - splat.shear * (splat.row_precision * dp_dx); }
-            case 2u: { sum += splat.row_precision * (dp_dx * dy); }
-            case 3u: { sum -= 0.5 * row_sums[at + 2u]; }
-            case 4u: { sum -= 0.5 * (dp * dy * dy); }
-            case 5u: { sum += dp; }
-            default: { sum += row_sums[at + number - 3u]; }
-        }
+    for (var k = 0u; k < TILE_PX; k++) {
+        sum += column_sums[at * TILE_PX + (k + at) % TILE_PX];
     }
-    // dp is alpha·dL/d(alpha).
-    return select(sum, sum / splat.opacity, number == 5u);
+    return sum;
+}
+
+// One number of the gradient of splat i of the four, in the order of Splat's fields.
+fn add_up(i: u32, number: u32, splat: Splat) -> f32 {
+    let sum = sum_of(i, select(number, (number + 1u) % 6u, number < 6u));
+    switch number {
+        case 0u, 2u: { return splat.row_precision * sum; }
+        case 1u: { return splat.column_precision * sum - splat.shear * (splat.row_precision * sum_of(i, 1u)); }
+        case 3u, 4u: { return -0.5 * sum; }
+        // dp is alpha·dL/d(alpha).
+        case 5u: { return sum / splat.opacity; }
+        default: { return sum; }
+    }
 }

@@ -1,5 +1,7 @@
 //! The stages of a step between the anchors and their splats, on a GPU: the order of `step/block.rs`.
 
+use bytemuck::Pod;
+
 use super::ops::detail::Detail;
 use super::ops::gather::Gather;
 use super::ops::head::Head;
@@ -43,7 +45,7 @@ pub(super) struct GpuAnchors {
 }
 
 /// Room for one value each.
-pub(super) fn rooms<const N: usize>(gpu: &Gpu, what: &'static str) -> Result<[Buffer<f32>; N], GpuError> {
+pub(super) fn rooms<T: Pod, const N: usize>(gpu: &Gpu, what: &'static str) -> Result<[Buffer<T>; N], GpuError> {
     let all: Vec<_> = (0..N).map(|_| Buffer::zeros(gpu, what, 1)).collect::<Result<_, _>>()?;
     Ok(all.try_into().expect("N of them"))
 }
@@ -140,7 +142,7 @@ impl GpuAnchors {
         self.head_input.forward(commands, shape, camera, &self.values[FEATURES], &self.positions, &self.input);
         let outputs = self.hidden.iter().zip(&self.outputs);
         for (head, (hidden, output)) in scene.heads.iter().zip(outputs) {
-            self.head.forward(commands, &head.layout, &head.parameters.values, &self.input, hidden, output);
+            self.head.forward(commands, &head.layout, head.drawn(scene.on_integers), &self.input, hidden, output);
         }
         self.neural_gaussians.forward(
             commands,
@@ -151,7 +153,7 @@ impl GpuAnchors {
             &self.gaussians,
         );
         if let Some(head) = scene.heads.get(N_HEADS) {
-            let weights = &head.parameters.values;
+            let weights = head.drawn(scene.on_integers);
             self.detail.forward(gpu, commands, &head.layout, weights, &self.values[FEATURES], &self.gaussians)?;
         }
         self.project.forward(commands, camera, shape.dilation_compensation, &self.gaussians, splats, footprints);
@@ -189,7 +191,7 @@ impl GpuAnchors {
                 gpu,
                 commands,
                 &head.layout,
-                &head.parameters.values,
+                head.drawn(scene.on_integers),
                 &self.gaussians,
                 &self.d_gaussians,
                 &self.gradients[FEATURES],
@@ -211,7 +213,7 @@ impl GpuAnchors {
                 gpu,
                 commands,
                 &head.layout,
-                &head.parameters.values,
+                head.drawn(scene.on_integers),
                 &self.input,
                 hidden,
                 d_output,

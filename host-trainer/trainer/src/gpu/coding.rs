@@ -101,13 +101,17 @@ impl GpuCoding {
         for (group, (values, residuals)) in scene.coded_groups().into_iter().zip(values.iter().zip(&mut self.residuals))
         {
             residuals.fit(gpu, values.len())?;
-            self.perturb.with_noise(commands, stream, group, anchors, steps, values, residuals);
+            if scene.on_integers {
+                self.perturb.rounded(commands, group, steps, values, residuals);
+            } else {
+                self.perturb.with_noise(commands, stream, group, anchors, steps, values, residuals);
+            }
         }
         Ok(())
     }
 
     /// Chooses the sample, predicts the steps of all anchors and the distributions of the sample, and adds noise of these steps to the
-    /// values; waits for the sample's number and for what is drawn.
+    /// values, or rounds them; waits for the sample's number and for what is drawn.
     pub(super) fn forward(
         &mut self,
         gpu: &Gpu,
@@ -135,8 +139,15 @@ impl GpuCoding {
                 pass.fit(gpu, network, anchors.len())?;
                 let mut commands = Commands::new(gpu);
                 self.hash_grid.forward(&mut commands, &grid.places, &grid.rows.values, anchors, &pass.inputs);
-                pass.steps(&mut commands, &self.kernels, network, context.base_steps);
-                pass.distributions(&mut commands, &self.kernels, network);
+                if scene.on_integers {
+                    let (layout, parameters) = (&network.layout, &network.parameters.values);
+                    self.kernels.integer_network.round(&mut commands, layout, parameters, &network.integers);
+                }
+                pass.steps(&mut commands, &self.kernels, network, context.base_steps, scene.on_integers);
+                pass.distributions(&mut commands, &self.kernels, network, scene.on_integers);
+                if scene.on_integers {
+                    pass.by_integers(gpu, &mut commands, &self.kernels, network, &context.step_table)?;
+                }
                 commands.submit()?;
                 (n_sampled, drawn)
             }
@@ -197,7 +208,7 @@ impl GpuCoding {
                 mask_logits,
                 outputs,
                 n_taps: network.n_taps,
-                weights: &network.parameters.values,
+                weights: network.asked(scene.on_integers),
                 first_tap: network.layout.n_params(),
             };
             let of_sample = anchor_bits::Gradients {
@@ -220,7 +231,7 @@ impl GpuCoding {
         }
         match &context.grid {
             Some(grid) => {
-                self.pass.backward(gpu, commands, &mut self.kernels, &context.networks[0])?;
+                self.pass.backward(gpu, commands, &mut self.kernels, &context.networks[0], scene.on_integers)?;
                 let (places, rows, d_inputs) = (&grid.places, &grid.rows.values, &self.pass.d_inputs);
                 self.hash_grid.backward(commands, places, rows, row_of_anchor, d_inputs, &grid.gradient);
                 if of_grid > 0.0 {

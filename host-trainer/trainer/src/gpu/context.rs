@@ -6,6 +6,7 @@ use super::group::Group;
 use super::ops::adam::Adam;
 use super::ops::hash_grid::GridPlaces;
 use super::ops::head::HeadLayout;
+use super::ops::integer_network::{Integers, table_of_steps};
 use super::{Buffer, Commands, Gpu, GpuError};
 use crate::ops::adam::{Moments, Step};
 use crate::scene::{ContextModel, ContextNetwork, Scene};
@@ -19,6 +20,8 @@ pub(super) struct DeviceNetwork {
     pub(super) layout: HeadLayout,
     pub(super) gradient: Buffer<f32>,
     pub(super) n_taps: usize,
+    /// What a step on integers made of the parameters.
+    pub(super) integers: Integers,
 }
 
 /// The grid with its moments and its gradient.
@@ -48,15 +51,23 @@ pub(super) struct DeviceContext {
     /// Where anchors follow anchors: what decides which.
     pub(super) follows: Option<Follows>,
     pub(super) base_steps: [f32; N_GROUPS],
+    /// [`table_of_steps`] of them.
+    pub(super) step_table: Buffer<f32>,
 }
 
 impl DeviceNetwork {
+    /// The parameters that a step asks: the trained ones, or what their integers stand for.
+    pub(super) fn asked(&self, on_integers: bool) -> &Buffer<f32> {
+        if on_integers { &self.integers.rounded } else { &self.parameters.values }
+    }
+
     fn upload(gpu: &Gpu, network: &ContextNetwork<f32>, moments: [&ContextNetwork<f32>; 2]) -> Result<Self, GpuError> {
         let parameters_of = |network: &ContextNetwork<f32>| network.groups().concat();
         let ([first, second], parameters) = (moments.map(parameters_of), parameters_of(network));
         Ok(Self {
             gradient: Buffer::zeros(gpu, "gradients of the context network", parameters.len())?,
             parameters: Group::upload(gpu, "weights of the context network", &parameters, &Moments { first, second })?,
+            integers: Integers::zeros(gpu, &HeadLayout::of(&network.mlp), parameters.len())?,
             layout: HeadLayout::of(&network.mlp),
             n_taps: network.n_taps,
         })
@@ -119,6 +130,7 @@ impl DeviceContext {
                 prune_rank: scene.anchors.prune_rank.clone(),
             }),
             base_steps: model.base_steps,
+            step_table: Buffer::upload(gpu, "steps of exponents", &table_of_steps(model.base_steps))?,
         }))
     }
 

@@ -139,7 +139,7 @@ impl GpuLevels {
             giving.fit(gpu, network, anchors.len())?;
             let mut commands = Commands::new(gpu);
             parents.inputs(&mut commands, places, anchors, network.layout.n_in, &giving.inputs);
-            giving.steps(&mut commands, kernels, network, context.base_steps);
+            giving.steps(&mut commands, kernels, network, context.base_steps, false);
             let arrays = [FEATURES, LOG_SCALES].map(|array| &scene.anchors[array].values);
             for (i, array) in arrays.into_iter().enumerate() {
                 let group = groups[i];
@@ -192,8 +192,8 @@ impl GpuLevels {
             let mut commands = Commands::new(gpu);
             kernels.gather.run(&mut commands, &own.rows, 1, &own.pass.sample.rows.items, &own.sampled);
             parents.inputs(&mut commands, places, &own.anchors, network.layout.n_in, &own.pass.inputs);
-            own.pass.steps(&mut commands, kernels, network, context.base_steps);
-            own.pass.distributions(&mut commands, kernels, network);
+            own.pass.steps(&mut commands, kernels, network, context.base_steps, false);
+            own.pass.distributions(&mut commands, kernels, network, false);
             kernels.gather.add_back(&mut commands, &own.pass.steps, N_GROUPS, &own.rows, steps);
             commands.submit()?;
         }
@@ -218,7 +218,7 @@ impl GpuLevels {
     ) -> Result<(), GpuError> {
         for (own, network) in self.of_view.iter().zip(networks) {
             kernels.gather.run(commands, d_steps, N_GROUPS, &own.rows, &own.pass.d_steps);
-            own.pass.backward(gpu, commands, kernels, network)?;
+            own.pass.backward(gpu, commands, kernels, network, false)?;
         }
         Ok(())
     }

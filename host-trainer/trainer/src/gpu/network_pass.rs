@@ -7,6 +7,7 @@ use super::context::DeviceNetwork;
 use super::ops::adaptive_step::AdaptiveStep;
 use super::ops::gather::Gather;
 use super::ops::head::Head;
+use super::ops::integer_network::IntegerNetwork;
 use super::ops::sample::Sample;
 use super::{Buffer, Commands, Gpu, GpuError};
 use crate::ops::noise::Stream;
@@ -16,6 +17,7 @@ use crate::step::SAMPLE_DRAW;
 #[derive(Debug)]
 pub(super) struct PassKernels {
     pub(super) head: Head,
+    pub(super) integer_network: IntegerNetwork,
     pub(super) adaptive_step: AdaptiveStep,
     pub(super) gather: Gather,
 }
@@ -39,12 +41,19 @@ pub(super) struct NetworkPass {
     /// Inputs, hidden units and outputs of the sample, and their gradients; those of the outputs are for the caller to fill.
     sampled: [Buffer<f32>; 3],
     d_sampled: [Buffer<f32>; 3],
+    /// Integer hidden units of all anchors, and of the sample; on integers alone.
+    units: [Buffer<i32>; 2],
 }
 
 impl PassKernels {
     /// Compiles them.
     pub(super) fn new(gpu: &Gpu) -> Result<Self, GpuError> {
-        Ok(Self { head: Head::new(gpu)?, adaptive_step: AdaptiveStep::new(gpu), gather: Gather::new(gpu) })
+        Ok(Self {
+            head: Head::new(gpu)?,
+            integer_network: IntegerNetwork::new(gpu),
+            adaptive_step: AdaptiveStep::new(gpu),
+            gather: Gather::new(gpu),
+        })
     }
 }
 
@@ -64,6 +73,7 @@ impl NetworkPass {
             d_steps: room("gradients of steps")?,
             sampled: rooms(gpu, "what the context network makes of the sample")?,
             d_sampled: rooms(gpu, "gradients of the sample")?,
+            units: rooms(gpu, "integer hidden units")?,
         })
     }
 
@@ -105,16 +115,49 @@ impl NetworkPass {
         kernels: &PassKernels,
         network: &DeviceNetwork,
         base_steps: [f32; N_GROUPS],
+        on_integers: bool,
     ) {
         let of_steps = network.layout.last_outputs(N_GROUPS);
-        let weights = &network.parameters.values;
+        let weights = network.asked(on_integers);
         kernels.head.forward(commands, &of_steps, weights, &self.inputs, &self.hidden, &self.exponents);
         kernels.adaptive_step.forward(commands, base_steps, &self.exponents, &self.steps);
     }
 
+    /// Puts what the integers say of steps and distributions in the place of what their floats say.
+    ///
+    /// * `table`: the steps of all exponents.
+    pub(super) fn by_integers(
+        &mut self,
+        gpu: &Gpu,
+        commands: &mut Commands<'_>,
+        kernels: &PassKernels,
+        network: &DeviceNetwork,
+        table: &Buffer<f32>,
+    ) -> Result<(), GpuError> {
+        let (layout, integers, ops) = (&network.layout, &network.integers, &kernels.integer_network);
+        let [sampled_inputs, _, sampled_outputs] = &self.sampled;
+        let rows = [
+            (&self.inputs, self.hidden.len(), layout.n_out - N_GROUPS, &self.exponents),
+            (sampled_inputs, self.sampled[1].len(), 0, sampled_outputs),
+        ];
+        for (units, (inputs, n_units, first, outputs)) in self.units.iter_mut().zip(rows) {
+            units.fit(gpu, n_units)?;
+            ops.hidden(commands, layout, integers, inputs, units);
+            ops.outputs(commands, layout, integers, first, units, outputs);
+        }
+        ops.steps(commands, table, &self.exponents, &self.steps);
+        Ok(())
+    }
+
     /// Predicts the distributions of the sample.
-    pub(super) fn distributions(&self, commands: &mut Commands<'_>, kernels: &PassKernels, network: &DeviceNetwork) {
-        let (layout, weights) = (&network.layout, &network.parameters.values);
+    pub(super) fn distributions(
+        &self,
+        commands: &mut Commands<'_>,
+        kernels: &PassKernels,
+        network: &DeviceNetwork,
+        on_integers: bool,
+    ) {
+        let (layout, weights) = (&network.layout, network.asked(on_integers));
         let [inputs, hidden, outputs] = &self.sampled;
         kernels.gather.run(commands, &self.inputs, layout.n_in, &self.sample.rows.items, inputs);
         kernels.head.forward(commands, layout, weights, inputs, hidden, outputs);
@@ -132,8 +175,9 @@ impl NetworkPass {
         commands: &mut Commands<'_>,
         kernels: &mut PassKernels,
         network: &DeviceNetwork,
+        on_integers: bool,
     ) -> Result<(), GpuError> {
-        let (layout, weights, gradient) = (&network.layout, &network.parameters.values, &network.gradient);
+        let (layout, weights, gradient) = (&network.layout, network.asked(on_integers), &network.gradient);
         commands.clear(&self.d_exponents);
         kernels.adaptive_step.backward(commands, &self.exponents, &self.steps, &self.d_steps, &self.d_exponents);
         commands.clear(&self.d_inputs);

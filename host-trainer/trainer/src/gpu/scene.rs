@@ -24,9 +24,16 @@ pub(super) struct DeviceHead {
     pub(super) layout: HeadLayout,
     pub(super) parameters: Group,
     pub(super) gradient: Buffer<f32>,
+    /// What a step on integers draws with.
+    pub(super) written: Buffer<f32>,
 }
 
 impl DeviceHead {
+    /// The parameters that a step draws with: the trained ones, or as they will be written.
+    pub(super) fn drawn(&self, on_integers: bool) -> &Buffer<f32> {
+        if on_integers { &self.written } else { &self.parameters.values }
+    }
+
     fn upload(gpu: &Gpu, head: &Head<f32>, moments: [&Head<f32>; 2]) -> Result<Self, GpuError> {
         let [first, second] = moments.map(parameters_of);
         let moments = adam::Moments { first, second };
@@ -34,6 +41,7 @@ impl DeviceHead {
             layout: HeadLayout::of(head),
             parameters: Group::upload(gpu, "weights of the heads", &parameters_of(head), &moments)?,
             gradient: Buffer::zeros(gpu, "gradients of the heads", head.n_params())?,
+            written: Buffer::zeros(gpu, "heads as written", head.n_params())?,
         })
     }
 
@@ -67,6 +75,8 @@ pub(super) struct DeviceScene {
     pub(super) heads: Vec<DeviceHead>,
     /// A grid and its network, where the scene has them.
     pub(super) context: Option<DeviceContext>,
+    /// Whether the last step was on the integers of the context model and with the heads as written.
+    pub(super) on_integers: bool,
     opacity_sums: Buffer<f32>,
     n_views: Buffer<u32>,
     gradient_sums: Buffer<f32>,
@@ -101,6 +111,7 @@ impl DeviceScene {
                 Some(moments) => DeviceContext::upload(gpu, scene, moments)?,
                 None => None,
             },
+            on_integers: false,
             opacity_sums: Buffer::upload(gpu, "sums of opacities", sums[0])?,
             gradient_sums: Buffer::upload(gpu, "sums of gradients", sums[1])?,
             n_views: Buffer::upload(gpu, "numbers of views", counts[0])?,

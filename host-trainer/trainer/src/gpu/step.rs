@@ -6,6 +6,7 @@ use super::image::GpuImage;
 use super::ops::adam::Adam;
 use super::ops::sound::Sound;
 use super::ops::statistics::{Slots, Statistics};
+use super::ops::written::Written;
 use super::scene::DeviceScene;
 use super::{Buffer, Commands, Gpu, GpuError};
 use crate::scene::Scene;
@@ -32,6 +33,7 @@ pub struct GpuStep {
     anchors: GpuAnchors,
     coding: GpuCoding,
     terms: GpuTerms,
+    written: Written,
     sound: Sound,
     statistics: Statistics,
     adam: Adam,
@@ -53,6 +55,7 @@ impl GpuStep {
             anchors: GpuAnchors::new(gpu)?,
             coding: GpuCoding::new(gpu)?,
             terms: GpuTerms::new(gpu)?,
+            written: Written::new(gpu),
             sound: Sound::new(gpu),
             statistics: Statistics::new(gpu),
             adam: Adam::new(gpu),
@@ -112,6 +115,8 @@ impl Resident<f32> for GpuStep {
         let is_known = match coding {
             Coding::Raw | Coding::Noise { .. } => true,
             Coding::Context { exact, .. } => exact.is_none() && scene.context.is_some(),
+            // Anchors that follow others give them symbols then, which no kernel makes.
+            Coding::Integers { .. } => scene.context.as_ref().is_some_and(|context| context.shifts.is_none()),
         };
         is_known && terms_of(loss, &scene.shape).is_some()
     }

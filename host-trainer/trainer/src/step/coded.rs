@@ -150,6 +150,7 @@ impl<R: Real> Coded<R> {
                 }
                 self.perturb(level, &scene.shape, exact.is_none().then_some(*stream), anchors, values);
             }
+            (Coding::Integers { .. }, _) => unreachable!("of scenes that a device holds"),
             _ => {}
         }
     }

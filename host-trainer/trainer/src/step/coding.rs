@@ -39,6 +39,25 @@ pub enum Coding<'a, R> {
         /// With it values are rounded, and steps and distributions are those of its integers: what a decoder sees.
         exact: Option<IntegerModel<'a, R>>,
     },
+    /// The same with the integers that a device makes of the scene that it holds; for such a device alone.
+    Integers {
+        /// Of this iteration.
+        stream: Stream,
+        /// The terms of the loss.
+        rate: RateTerms,
+        /// Step of the heads' matrices, which are drawn as they will be written; a power of two.
+        head_step: f32,
+    },
+}
+
+impl<R> Coding<'_, R> {
+    /// The stream and the terms of the rate, where a context model has one.
+    pub fn rate(&self) -> Option<(Stream, &RateTerms)> {
+        match self {
+            Self::Raw | Self::Noise { .. } => None,
+            Self::Context { stream, rate, .. } | Self::Integers { stream, rate, .. } => Some((*stream, rate)),
+        }
+    }
 }
 
 /// The integer form of the scene's context model.

@@ -48,9 +48,13 @@ impl Integers {
     }
 }
 
+fn head_step() -> f32 {
+    (-f32::from(HEAD_FRACTION_BITS)).exp2()
+}
+
 /// A head whose matrices are multiples of the last bit of the fraction.
 fn written(head: &Head<f32>) -> Head<f32> {
-    let step = (-f32::from(HEAD_FRACTION_BITS)).exp2();
+    let step = head_step();
     let matrix = |weights: &[f32]| weights.iter().map(|weight| perturb::symbol(*weight, step) * step).collect();
     Head { w1: matrix(&head.w1), w2: matrix(&head.w2), ..head.clone() }
 }
@@ -80,7 +84,7 @@ impl Trainer<'_> {
 
 /// What iteration `iteration` does.
 ///
-/// * `lambda`: weight of a value's bits. * `exact`: the integers, in the phase that needs them.
+/// * `lambda`: weight of a value's bits. * `exact`: the integers, in the phase that needs them; without them a device makes its own.
 pub(super) fn coding<'a>(
     config: &TrainConfig,
     lambda: f64,
@@ -100,6 +104,7 @@ pub(super) fn coding<'a>(
     match config.phase(iteration) {
         Phase::Raw => Coding::Raw,
         Phase::Noise => Coding::Noise { stream, steps: hac.base_steps() },
+        Phase::IntegerModel if exact.is_none() => Coding::Integers { stream, rate, head_step: head_step() },
         Phase::Context | Phase::IntegerModel => {
             let exact = exact.map(|(context, integers)| IntegerModel { context, networks: &integers.networks });
             Coding::Context { stream, rate, exact }

@@ -233,7 +233,7 @@ impl<'a> Trainer<'a> {
     fn iterate(&mut self) -> Result<Outcome, TrainError> {
         self.iteration += 1;
         let phase = self.config.phase(self.iteration);
-        if phase == Phase::IntegerModel || (phase == Phase::Context && self.scene.context.is_none()) {
+        if matches!(phase, Phase::Context | Phase::IntegerModel) && self.scene.context.is_none() {
             self.take_back()?;
         }
         self.begin_context();
@@ -245,27 +245,17 @@ impl<'a> Trainer<'a> {
         let index = self.queue.pop().expect("refilled above") as usize;
         let camera = self.cameras[index];
         let target = target(&photograph, &camera, self.background).numbered(index);
-        let integers = match phase {
-            Phase::IntegerModel => Some(Integers::of(&self.scene)?),
-            _ => None,
-        };
-        let context = integers.as_ref().map(|integers| integers.context(&self.scene)).transpose()?;
-        let coding = coding::coding(&self.config, self.lambda, self.iteration, context.as_ref().zip(integers.as_ref()));
         let (modules, at) = (self.config.modules, self.step_info());
         let pruned_share = modules.each().iter().map(|module| module.pruned_share(&at)).fold(0.0, f32::max);
         let terms = modules.terms();
         let loss = Loss { weights: self.config.loss, modules: Some((&terms, &at)), pruned_share };
-        // Drawn with the heads as they are written; the gradients move the weights behind them (straight through).
-        let behind = integers.as_ref().map(|integers| mem::replace(&mut self.scene.heads, integers.heads.clone()));
+        let coding = coding::coding(&self.config, self.lambda, self.iteration, None);
         let on_device = self.steps_on_device(&loss, &coding);
-        let stepped = if on_device {
-            self.step_on_device(&target, &loss, &coding)
-        } else {
-            self.step_here(&target, &loss, &coding)
+        let stepped = match phase {
+            _ if on_device => self.step_on_device(&target, &loss, &coding),
+            Phase::IntegerModel => self.step_on_integers(&target, &loss),
+            Phase::Raw | Phase::Noise | Phase::Context => self.step_here(&target, &loss, &coding),
         };
-        if let Some(heads) = behind {
-            self.scene.heads = heads;
-        }
         let (report, cause) = stepped?;
         if let Some(cause) = cause {
             let dropped =
@@ -326,6 +316,24 @@ impl<'a> Trainer<'a> {
         let report = self.workspace.try_step(&self.scene, target, loss, coding)?;
         let cause = watchdog::inspect(&self.scene, target, self.background, &self.workspace, &report);
         Ok((report, cause))
+    }
+
+    /// The same on the integers of the context model.
+    ///
+    /// Drawn with the heads as they are written; the gradients move the weights behind them (straight through).
+    fn step_on_integers(
+        &mut self,
+        target: &TargetView<'_, f32>,
+        loss: &Loss<'_, f32>,
+    ) -> Result<(StepReport<f32>, Option<Cause>), TrainError> {
+        self.take_back()?;
+        let integers = Integers::of(&self.scene)?;
+        let context = integers.context(&self.scene)?;
+        let coding = coding::coding(&self.config, self.lambda, self.iteration, Some((&context, &integers)));
+        let behind = mem::replace(&mut self.scene.heads, integers.heads.clone());
+        let stepped = self.step_here(target, loss, &coding);
+        self.scene.heads = behind;
+        stepped
     }
 
     /// What modules are told of this iteration.

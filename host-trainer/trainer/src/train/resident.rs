@@ -101,11 +101,15 @@ impl Trainer<'_> {
         loss: &Loss<'_, f32>,
         coding: &Coding<'_, f32>,
     ) -> Result<Cause, TrainError> {
+        let unknown = Cause { array: "a gradient on the device", anchor: None, value: f32::NAN };
         self.fetch()?;
+        if matches!(coding, Coding::Integers { .. }) {
+            return Ok(unknown);
+        }
         let mut workspace = Workspace::new(&self.scene.shape);
         let report = workspace.step(&self.scene, target, loss, coding);
         let found = watchdog::inspect(&self.scene, target, self.background, &workspace, &report);
-        Ok(found.unwrap_or(Cause { array: "a gradient on the device", anchor: None, value: f32::NAN }))
+        Ok(found.unwrap_or(unknown))
     }
 
     /// Moves the parameters by the last step's gradients.

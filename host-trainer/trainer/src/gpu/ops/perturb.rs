@@ -10,6 +10,7 @@ use crate::ops::noise::Stream;
 #[derive(Clone, Debug)]
 pub struct Perturb {
     with_noise: Kernel,
+    rounded: Kernel,
     backward: Kernel,
 }
 
@@ -52,6 +53,11 @@ impl Perturb {
         let with = |source| [GROUPS, STREAM, include_str!("perturb/parameters.wgsl"), source];
         Self {
             with_noise: Kernel::new(gpu, "noise", &with(include_str!("perturb/with_noise.wgsl"))),
+            rounded: Kernel::new(
+                gpu,
+                "rounded",
+                &[GROUPS, include_str!("perturb/parameters.wgsl"), include_str!("perturb/rounded.wgsl")],
+            ),
             backward: Kernel::new(gpu, "perturb backward", &with(include_str!("perturb/backward.wgsl"))),
         }
     }
@@ -73,6 +79,21 @@ impl Perturb {
     ) {
         let parameters = Parameters::new(group, values.len(), stream.word());
         commands.run_items(&self.with_noise, &parameters, &[steps, values, residuals, anchors], values.len());
+    }
+
+    /// Rounds each value to a multiple of its step; ties may fall elsewhere than on the CPU, whose quotients are exactly rounded.
+    ///
+    /// * `residuals`: as `values`, overwritten with what rounding added, in steps.
+    pub fn rounded(
+        &self,
+        commands: &mut Commands<'_>,
+        group: Group,
+        steps: &Buffer<f32>,
+        values: &Buffer<f32>,
+        residuals: &Buffer<f32>,
+    ) {
+        let parameters = Parameters::new(group, values.len(), 0);
+        commands.run_items(&self.rounded, &parameters, &[steps, values, residuals], values.len());
     }
 
     /// Writes the group's column of dL/d(step): `Σ residual·dL/dv` over its channels in their order.
@@ -135,6 +156,22 @@ mod tests {
             for (i, (found, expected)) in v.read(gpu).expect("runs").iter().zip(&expected).enumerate() {
                 let absolute = 2e-7 * f64::from(values[i].abs().max(steps[3 * (i / width) + group.index]));
                 assert_close("noised", &[*found], &[*expected], Bound { relative: 0.0, absolute });
+            }
+            // Ties aside, whole numbers of steps are the CPU's.
+            let (rounded, residuals_of_rounded) = (upload(&values), upload(&vec![9.0; values.len()]));
+            let mut commands = Commands::new(gpu);
+            kernels.rounded(&mut commands, group, &steps_there, &rounded, &residuals_of_rounded);
+            commands.submit().expect("runs");
+            let left = residuals_of_rounded.read(gpu).expect("runs");
+            for (i, found) in rounded.read(gpu).expect("runs").into_iter().enumerate() {
+                let (mut own, mut own_left) = ([values[i]], [9.0]);
+                let step = steps[3 * (i / width) + group.index];
+                cpu::rounded(step, &mut own, &mut own_left);
+                let is_tie = (own_left[0].abs() - 0.5).abs() < 1e-4;
+                let absolute = if is_tie { 1.01 * f64::from(step) } else { 2e-7 * f64::from(own[0].abs()) };
+                assert_close("rounded", &[found], &own, Bound { relative: 0.0, absolute });
+                let absolute = if is_tie { 1.01 } else { 1e-6 * f64::from((values[i] / step).abs()).max(1.0) };
+                assert_close("what rounding added", &[left[i]], &own_left, Bound { relative: 0.0, absolute });
             }
             let bound = Bound { relative: 1e-5, absolute: 1e-5 };
             assert_close("step", &d.read(gpu).expect("runs"), &d_steps, bound);

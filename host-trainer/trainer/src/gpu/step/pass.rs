@@ -34,6 +34,7 @@ impl GpuStep {
         coding: &Coding<'_, f32>,
         limit: f32,
     ) -> Result<ResidentStep<f32>, GpuError> {
+        self.write_heads(coding)?;
         let Self { gpu, images, anchors, scene, .. } = self;
         let (gpu, scene) = (gpu.clone(), scene.as_ref().expect("loaded before"));
         let mut laps = Laps { gpu: &gpu, last: self.times_stages.then(Instant::now) };
@@ -53,7 +54,7 @@ impl GpuStep {
                 self.coding.noise(&gpu, &mut commands, scene, visible, values, (*stream, *steps))?;
                 commands.submit()?;
             }
-            Coding::Context { stream, rate, .. } => {
+            Coding::Context { stream, rate, .. } | Coding::Integers { stream, rate, .. } => {
                 self.coding.forward(&gpu, scene, visible, values, *stream, rate)?;
             }
         }
@@ -87,7 +88,7 @@ impl GpuStep {
         commands.submit()?;
         stages.anchors_backward = laps.lap()?;
         let mut commands = Commands::new(&gpu);
-        if let Coding::Context { rate, .. } = coding {
+        if let Some((_, rate)) = coding.rate() {
             self.coding_backward(&gpu, &mut commands, rate)?;
         }
         let scene = self.scene.as_ref().expect("loaded before");
@@ -96,6 +97,18 @@ impl GpuStep {
         commands.submit()?;
         stages.context_backward = laps.lap()?;
         self.report(target, loss, &terms, coding, n_pairs, stages)
+    }
+
+    /// Rounds the heads where a step draws them as they will be written.
+    fn write_heads(&mut self, coding: &Coding<'_, f32>) -> Result<(), GpuError> {
+        let scene = self.scene.as_mut().expect("loaded before");
+        scene.on_integers = matches!(coding, Coding::Integers { .. });
+        let Coding::Integers { head_step, .. } = coding else { return Ok(()) };
+        let mut commands = Commands::new(&self.gpu);
+        for head in &scene.heads {
+            self.written.run(&mut commands, &head.layout, *head_step, &head.parameters.values, &head.written);
+        }
+        commands.submit()
     }
 
     /// From the gradients of the splats to those of the values of the view's anchors and of the heads.
@@ -156,7 +169,7 @@ impl GpuStep {
         let lambda = loss.weights.dssim as f32;
         let mut total = (1.0 - lambda) * compared.l1 + lambda * (1.0 - compared.similarity) + others;
         let mut rate = None;
-        if let Coding::Context { .. } = coding {
+        if coding.rate().is_some() {
             let scene = self.scene.as_ref().expect("loaded before");
             let found = self.coding.rate(scene, &totals[RATE..RATE + N_RATE_TOTALS], &n_positive.take(&self.gpu)?);
             total += found.term;

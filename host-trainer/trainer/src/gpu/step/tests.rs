@@ -5,9 +5,11 @@ use std::sync::{Arc, Mutex};
 use super::*;
 use crate::gpu::choose;
 use crate::gpu::parity::{Bound, assert_close, gpu, largest};
+use crate::integer_model;
 use crate::ops::Pinhole;
+use crate::ops::perturb::symbol;
 use crate::scene::Scene;
-use crate::step::coding::{RateReport, RateTerms};
+use crate::step::coding::{IntegerModel, RateReport, RateTerms};
 use crate::step::{Block, LossWeights, Phase, SharedDevice, StepInfo, StepReport, Workspace, planes};
 use crate::train::config::{Backbone, Densification};
 use crate::train::module::{Detail, Distribution, Modules, Pruning};
@@ -147,6 +149,28 @@ fn cpu_gradients(workspace: &Workspace<f32>) -> Vec<(&'static str, Vec<f32>)> {
     all
 }
 
+/// A step on the CPU, which is given the integers that a device makes itself, and the heads as they are written.
+fn step_here(
+    workspace: &mut Workspace<f32>,
+    scene: &Scene<f32>,
+    target: &TargetView<'_, f32>,
+    loss: &Loss<'_, f32>,
+    coding: &Coding<'_, f32>,
+) -> StepReport<f32> {
+    let Coding::Integers { stream, rate, head_step } = *coding else {
+        return workspace.step(scene, target, loss, coding);
+    };
+    let (model, n_channels) = (scene.context.as_ref().expect("there is one"), scene.shape.values_per_anchor());
+    let section = integer_model::section(model, n_channels).expect("a sound model");
+    let context = integer_model::parse(&section, &scene.shape).expect("a sound section");
+    let networks = integer_model::rounded(model, n_channels).expect("a sound model");
+    let exact = Some(IntegerModel { context: &context, networks: &networks });
+    let mut drawn = scene.clone();
+    let matrices = drawn.heads.each_mut().flat_map(|head| head.w1.iter_mut().chain(&mut head.w2));
+    matrices.for_each(|weight| *weight = symbol(*weight, head_step) * head_step);
+    workspace.step(&drawn, target, loss, &Coding::Context { stream, rate, exact })
+}
+
 /// Bounds: as [`compare`]. Counts are those of the CPU but for a splat at the edge of the image.
 #[test]
 fn a_step_of_a_resident_scene_agrees_with_the_cpu() {
@@ -187,14 +211,18 @@ fn a_step_of_a_resident_scene_agrees_with_the_cpu() {
             masks_weigh_anchors: backbone == Backbone::HacPlus,
             grid: 0.5,
         };
-        let codings = match scene.context {
+        let codings = match &scene.context {
             None => vec![Coding::Raw, Coding::Noise { stream, steps: [0.1, 0.05, 0.1] }],
-            Some(_) => vec![Coding::Context { stream, rate, exact: None }],
+            Some(model) if model.shifts.is_some() => vec![Coding::Context { stream, rate, exact: None }],
+            Some(_) => {
+                let head_step = 1.0 / 128.0;
+                vec![Coding::Context { stream, rate, exact: None }, Coding::Integers { stream, rate, head_step }]
+            }
         };
         assert_eq!(scene.context.is_some(), backbone.is_coded());
         for coding in codings {
             let mut workspace = Workspace::new(&scene.shape);
-            let expected = workspace.step(scene, &target, &loss, &coding);
+            let expected = step_here(&mut workspace, scene, &target, &loss, &coding);
             let mut optimiser = Optimiser::new(scene);
             let mut statistics = Statistics::new(scene.anchors.len(), scene.shape.n_offsets);
             let mut device = GpuStep::new(gpu).expect("room");

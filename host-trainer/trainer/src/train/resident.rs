@@ -116,7 +116,7 @@ impl Trainer<'_> {
     pub(super) fn move_on_device(&mut self, progress: f64) -> Result<(), TrainError> {
         let rates = self.rates();
         let mut steps = self.optimiser.next(&rates, progress, self.capture.extent);
-        if self.config.phase(self.iteration) == Phase::Context {
+        if matches!(self.config.phase(self.iteration), Phase::Context | Phase::IntegerModel) {
             steps.context = self.optimiser.next_of_context(&rates, progress);
         }
         let ((), load) = self.on_own(|device| device.move_by(&steps))?;

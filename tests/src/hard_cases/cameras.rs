@@ -17,8 +17,8 @@ The camera's transform is a sum of three products and a translation. A point com
 projection multiplies by f/z. Near the near plane, z = 0.2, that factor is 300 px per unit for a camera of 60 px, and the error is
 negligible. A long lens far away is where it shows: 3·10⁴ px at distance 10³ move by 0.004 px.
 
-The near plane is one comparison with the f32 nearest to 0.2, in the oracle too, so no tolerance is granted. Slopes beyond 1.15 image
-sizes are clamped, which keeps the Jacobian of centres beside the camera finite. The clamp is a kink, not a jump, so the usual bounds
+The near plane is one comparison with the f32 nearest to 0.2, in the oracle too, so no tolerance is granted. Slopes beyond 0.15 image
+sizes outside of the image are clamped, which keeps the Jacobian of centres beside the camera finite. The clamp is a kink, not a jump, so the usual bounds
 hold. View direction and distance are computed only for anchors in front of the camera, at least 0.2 away. A distance of 0 is
 therefore guarded in the trainer's operation alone (`distance 0`, under arithmetic).";
 

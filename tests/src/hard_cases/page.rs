@@ -25,14 +25,14 @@ an error exceeds its bound.
 A picture goes through the whole product and is compared with the oracle: the rules of a frame in f64, without tiles, tables or
 approximations (`host-trainer/trainer/src/render/reference.rs`). Errors of pixels are in steps of 8 bits.
 
-- *decoder, worst*: a channel of `decoder-core`'s frame against the oracle's, which is not rounded to 8 bits: half a step is
-  rounding. The larger of two bundles, with heads as halves and with coded ones.
+- *decoder, worst*: a channel of `decoder-core`'s frame against the oracle's, which is not rounded to 8 bits, so half a step is
+  rounding. Of two bundles the larger figure: one has heads as halves, the other coded heads.
 - *decoder, worst tile*: the mean over the 16 × 16 tile where it is largest. Rounding makes a quarter of a step on average and
   half a step at most; more in a whole tile would be seen as one.
 - *trainer, worst*: a channel of the trainer's picture in f32 against the oracle's.
 - *codec*: a value quantised, encoded and decoded against itself, in quantisation steps: half is rounding.
-- *gradient, f32*: the gradient of a training step towards noise, in f32 against f64, worst parameter, in units of the largest of
-  its kind (features, log-scales, offsets, weights) towards this noise or three others.
+- *gradient, f32*: the gradient of a training step whose target image is noise: f32 against f64, for the worst parameter. The unit is
+  the largest gradient of its kind (features, log-scales, offsets, weights), towards this noise or three others.
 - *gradient, f64*: the derivative along a random direction of each kind against central differences, in units of the sum of its
   terms.
 
@@ -46,7 +46,7 @@ const FOUND: &str = "
 Errors before, and as the tables have them now:
 
 - *passing needles*: the decoder kept a splat's shear as a half. Times a thousand rows that is more than a needle's width:
-  7.2 steps, now 0.51. The trainer drew with the conic Σ'⁻¹ in f32: 4.1 steps, now 0.008.
+  7.2 steps, now 1. The trainer drew with the conic Σ'⁻¹ in f32: 4.1 steps, now 0.008.
 - *needle 1e3*, *screen-long needle*, *passing needles*, *needle, compensated*: for the same reason gradients in f32 were 0.003, 8,
   20,000 and 0.05 times the largest of their kind away from those in f64, now 5·10⁻⁴ at most.
 - *huge and far*: the decoder's inverse variances ended where halves end. A splat whose rim crosses the frame came out as another

@@ -17,8 +17,8 @@ deviations of 2·10⁹ px. Halves would end at 60,000 px, and a splat as large w
 
 A quaternion is divided by its norm or by 10⁻¹², whichever is larger. Products of components above 10⁻¹² are normal f32, so no norm
 underflows on the way. Below the floor the rotation comes out as the identity, except for terms of the size of the quotient. At the
-floor a gradient is that of a quotient by 10⁻¹². It is large, and no difference can check it: a step that f64 can tell from none, 10⁻¹⁰,
-turns the Gaussian.";
+floor a gradient is that of a quotient by 10⁻¹². It is large, and no finite difference can check it: a step of 10⁻¹⁰, which f64 can
+still tell from none, already turns the Gaussian.";
 
 fn one(blob: Blob) -> Picture {
     let behind = Blob { position: [0.1, -0.05, 3.0], scale: [0.4; 3], colour: [0.1, 0.2, 0.9], ..Blob::default() };

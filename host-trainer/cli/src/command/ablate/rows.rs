@@ -34,11 +34,17 @@ const PRUNING: &str = "train.modules.pruning={}";
 const TIERED: &str = r#"train.modules.pruning={form="tiered", rate=0.4, rank="contribution", choice="lowest"}"#;
 const DETAIL: &str = "train.modules.detail={}";
 const RDO: &str = "train.modules.rdo={}";
-/// Rates as the published trainers have them: features, log-scales and the covariance head at one rate to the end.
-const CONSTANT_RATES: [&str; 4] = [
+/// Rates as the published trainers have them: features, log-scales and the covariance head at one rate to the end, the others
+/// falling to a hundredth or less.
+const PUBLISHED_RATES: [&str; 9] = [
+    "train.rates.offset={start=0.01, end=1e-4, from=0}",
     "train.rates.feature.end=0.0075",
     "train.rates.log_scale.end=0.007",
+    "train.rates.opacity_head={start=0.002, end=2e-5, from=0}",
     "train.rates.covariance_head.end=0.004",
+    "train.rates.colour_head={start=0.008, end=5e-5, from=0}",
+    "train.rates.grid={start=0.005, end=1e-5, from=0}",
+    "train.rates.context={start=0.005, end=1e-5, from=0}",
     "train.hac.exact_from=0.95",
 ];
 
@@ -68,7 +74,7 @@ pub(super) fn rows(shape: &ModelShape) -> Vec<Row> {
             keys(&[RDO]),
         ),
         row("rdo-detail", "the same with detail compensation", Curve, keys(&[RDO, DETAIL])),
-        row("constant-rates", "the backbone with rates that do not settle at the end", Curve, keys(&CONSTANT_RATES)),
+        row("published-rates", "the backbone with learning rates as published", Curve, keys(&PUBLISHED_RATES)),
         row(
             "distribution-strong",
             "both weights 0.01",

@@ -11,7 +11,7 @@ use crate::ops::perturb::symbol;
 use crate::scene::Scene;
 use crate::step::coding::{IntegerModel, RateReport, RateTerms};
 use crate::step::{Block, LossWeights, Phase, SharedDevice, StepInfo, StepReport, Workspace, planes};
-use crate::train::config::{Backbone, Densification};
+use crate::train::config::{Backbone, Densification, LearningRate, Rates};
 use crate::train::module::{Detail, Distribution, Modules, Pruning};
 use crate::train::optimiser::Optimiser;
 use crate::train::resident::{trained, trained_mut};
@@ -275,7 +275,16 @@ fn run(device: Option<SharedDevice<f32>>, backbone: Backbone) -> (f64, Option<f6
     let capture = many_views(7);
     // No growth, and no anchor goes: there a rounding makes another scene, whose bits are 4 % apart.
     let densification = Densification { gradient_threshold: 1e6, min_opacity: 0.0, ..Densification::default() };
-    let config = TrainConfig { backbone, densification, ..tiny_config(300) };
+    // While rates stay high, a rounding goes another way, too.
+    let rates = Rates {
+        offset: LearningRate::falling(0.01, 1e-4),
+        opacity_head: LearningRate::falling(0.002, 2e-5),
+        colour_head: LearningRate::falling(0.008, 5e-5),
+        grid: LearningRate::falling(0.005, 1e-5),
+        context: LearningRate::falling(0.005, 1e-5),
+        ..Rates::default()
+    };
+    let config = TrainConfig { backbone, rates, densification, ..tiny_config(300) };
     let mut trainer = Trainer::new(&capture, config).expect("a run");
     trainer.set_device(device);
     let (mut sum, mut bits) = (0.0, None);

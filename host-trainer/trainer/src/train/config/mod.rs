@@ -52,7 +52,8 @@ impl LearningRate {
 /// The published rates of features, log-scales and the covariance head are constant: a value that still moves at the end flips
 /// across the borders between symbols until the last step. Those of offsets, opacity, colour and the context model fall all the
 /// way, to a hundredth and less: what pruning by worth leaves, late in the run, hardly moves into the gaps. Here all of them stay
-/// until 0.85 of the run and then fall to a tenth or a fifteenth. Masks and background fall as published.
+/// until 0.85 of the run and then fall to a tenth or a fifteenth. Masks fall all the way as published, and so does
+/// a background that is learned.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Rates {
     /// Offsets; multiplied by the capture's extent.

@@ -32,14 +32,20 @@ pub(crate) fn capture() -> &'static Path {
     })
 }
 
-/// The bundle of a run that nothing interrupts.
-pub(crate) fn undisturbed() -> &'static [u8] {
-    static BUNDLE: OnceLock<Vec<u8>> = OnceLock::new();
-    BUNDLE.get_or_init(|| {
+/// The folder of a run that nothing interrupts.
+pub(crate) fn undisturbed_run() -> &'static Path {
+    static RUN: OnceLock<PathBuf> = OnceLock::new();
+    RUN.get_or_init(|| {
         let output = folder("undisturbed").join("a.psb");
         succeeds(&mut train(&output));
-        fs::read(output).unwrap()
+        output.with_extension("run")
     })
+}
+
+/// Its bundle.
+pub(crate) fn undisturbed() -> &'static [u8] {
+    static BUNDLE: OnceLock<Vec<u8>> = OnceLock::new();
+    BUNDLE.get_or_init(|| fs::read(undisturbed_run().with_extension("psb")).unwrap())
 }
 
 /// `train` on the capture.

@@ -1,10 +1,12 @@
 //! Runs on a GPU, and where there is none.
 
 use std::fs;
+use std::path::Path;
 use std::process::Command;
 
 use crate::fixture::{
-    checkpoints, fails, folder, pocketsplat, resume, starts, succeeds, text, train, undisturbed, wait_for,
+    checkpoints, fails, folder, pocketsplat, resume, starts, succeeds, text, train, undisturbed, undisturbed_run,
+    wait_for,
 };
 
 /// The same, where the loader of Vulkan finds no driver.
@@ -22,6 +24,11 @@ fn on(device: &str, mut command: Command) -> Command {
     // Without it a driver complains on stderr in a line of its own.
     command.args(["--device", device]).env("XDG_RUNTIME_DIR", std::env::temp_dir());
     command
+}
+
+/// What a finished run says of itself.
+fn result_of(run: &Path) -> serde_json::Value {
+    serde_json::from_slice(&fs::read(run.join("result.json")).unwrap()).unwrap()
 }
 
 fn has_gpu() -> bool {
@@ -78,9 +85,17 @@ fn a_run_on_a_gpu_that_is_killed_goes_on_to_the_same_bytes() {
     assert!(!checkpoints(&run).is_empty());
     succeeds(&mut on_gpu(resume(&run)));
     assert!(fs::read(home.join("a.psb")).unwrap() == whole, "the same bytes");
-    let (on_gpu, on_cpu) = (whole.len() as f64, undisturbed().len() as f64);
-    // Another rounding grows other anchors, as another seed does, which moves bytes by 7 to 10 %. Steps are compared in the trainer.
-    assert!((on_gpu / on_cpu - 1.0).abs() < 0.1, "{on_gpu} bytes, {on_cpu} on the CPU");
+    // A run of 160 steps is unsettled: another rounding moves its bytes by 10 %, but not the scene that they hold.
+    let (on_gpu, on_cpu) = (result_of(&home.join("whole.run")), result_of(undisturbed_run()));
+    let (psnr_gpu, psnr_cpu) = (on_gpu["psnr_db"].as_f64().unwrap(), on_cpu["psnr_db"].as_f64().unwrap());
+    assert!((psnr_gpu - psnr_cpu).abs() < 0.3, "{psnr_gpu} dB, {psnr_cpu} on the CPU");
+    let drawn = |result: &serde_json::Value| result["drawn_offsets"].as_f64().unwrap();
+    assert!(
+        (drawn(&on_gpu) / drawn(&on_cpu) - 1.0).abs() < 0.05,
+        "{} offsets drawn, {} on the CPU",
+        drawn(&on_gpu),
+        drawn(&on_cpu)
+    );
 }
 
 #[test]

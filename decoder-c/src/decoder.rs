@@ -5,10 +5,9 @@ use core::mem::{align_of, size_of};
 use core::slice;
 
 use pocketsplat_core::arithmetic::ReferenceArithmetic;
-use pocketsplat_core::{FrameReport, RenderError, TileSink};
+use pocketsplat_core::{Drawing, FrameReport, PixelFormat, RenderError, TileSink};
 
 use crate::camera::Camera;
-use crate::drawing::Begun;
 use crate::plan::{Budget, bytes_of, planned};
 use crate::status::{Failure, Message, Status, status_of};
 
@@ -17,6 +16,12 @@ pub const DECODER_BYTES: usize = 2560;
 
 /// Alignment that suffices for a psb_decoder on every target.
 pub const DECODER_ALIGN: usize = 8;
+
+/// A frame that is begun, and what its pixels are handed out as.
+pub(crate) struct Begun {
+    pub(crate) drawing: Drawing<'static, 'static, 'static>,
+    pub(crate) format: PixelFormat,
+}
 
 /// A decoder that is bound to a bundle and to its scratch memory. It lies in memory of the caller, has nothing to free, and may be
 /// forgotten at any time; its scratch memory is then the caller's again.

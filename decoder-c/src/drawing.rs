@@ -6,7 +6,7 @@ use core::slice;
 use pocketsplat_core::{ByteOrder, Drawing, PixelFormat, Rounding};
 
 use crate::camera::Camera;
-use crate::decoder::{Decoder, Report};
+use crate::decoder::{Begun, Decoder, Report};
 use crate::status::{Failure, Message, Status, status_of};
 
 /// What the bytes of a pixel are.
@@ -49,12 +49,6 @@ impl Pixels {
     fn new([x_px, y_px, width, height]: [u16; 4], bytes: &[u8]) -> Self {
         Self { bytes: bytes.as_ptr(), len: bytes.len(), x_px, y_px, width, height }
     }
-}
-
-/// A frame that is begun, and what its pixels are handed out as.
-pub(crate) struct Begun {
-    drawing: Drawing<'static, 'static, 'static>,
-    format: PixelFormat,
 }
 
 fn to_core(format: u32) -> Result<PixelFormat, Failure> {

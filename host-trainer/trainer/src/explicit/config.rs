@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::train::config::{ConfigError, LearningRate, within};
+use crate::train::config::LearningRate;
+use crate::train::config_error::{ConfigError, within};
 
 /// A whole run on explicit Gaussians (Kerbl et al. 2023, sections 5 and 7.1).
 ///

@@ -5,6 +5,7 @@ pub mod bits;
 pub mod checkpoint;
 mod coding;
 pub mod config;
+pub mod config_error;
 pub mod context_start;
 pub mod densify;
 pub mod finish;

@@ -69,7 +69,7 @@ use std::fmt::Debug;
 
 use serde::{Deserialize, Serialize};
 
-use super::config::ConfigError;
+use super::config_error::ConfigError;
 use super::load::Load;
 use super::steering::Fit;
 use super::survey::Survey;

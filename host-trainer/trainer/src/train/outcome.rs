@@ -5,7 +5,7 @@ use std::error::Error;
 use pocketsplat_capture::dataset::PhotographError;
 use pocketsplat_core::DecodeError;
 
-use super::config::ConfigError;
+use super::config_error::ConfigError;
 use super::steering::Fit;
 use super::watchdog::DroppedStep;
 use crate::integer_model::IntegerModelError;

@@ -1,14 +1,12 @@
 //! What a run is made of: numbers a user may set, with the method's defaults.
 
-mod error;
 mod hac;
 
 use serde::{Deserialize, Serialize};
 
-pub use error::ConfigError;
-pub(crate) use error::within;
 pub use hac::{Backbone, Hac};
 
+use super::config_error::{ConfigError, within};
 use super::module::Modules;
 use crate::scene::ModelShape;
 use crate::step::{LossWeights, Phase};

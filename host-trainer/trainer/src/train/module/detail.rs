@@ -7,7 +7,7 @@ use crate::ops::high_pass;
 use crate::real::Real;
 use crate::scene::ModelShape;
 use crate::step::{DeviceTerms, ImagePair, StepInfo, Terms};
-use crate::train::config::{ConfigError, within};
+use crate::train::config_error::{ConfigError, within};
 
 /// Adds a residual to each Gaussian's colour, H = x + F(x ⊕ f) (the plug-and-play paper, eq. 5; see [`crate::ops::detail`]).
 ///

@@ -8,7 +8,7 @@ use crate::ops::normality::{ChannelMoments, Weights};
 use crate::real::Real;
 use crate::scene::{ModelShape, Scene};
 use crate::step::{Block, DeviceTerms, StepInfo, Terms};
-use crate::train::config::{ConfigError, within};
+use crate::train::config_error::{ConfigError, within};
 
 /// Pulls the features of each channel, over the anchors of a view, towards the standard normal distribution, and their
 /// deviation towards 1 (the plug-and-play paper, eqs. 2 and 3, with P the normal distribution of the channel's moments).

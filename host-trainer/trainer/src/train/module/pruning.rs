@@ -11,7 +11,7 @@ use crate::real::Real;
 use crate::scene::{ModelShape, Scene};
 use crate::step::{Block, DeviceTerms, StepInfo, Terms};
 use crate::train::TrainError;
-use crate::train::config::{ConfigError, within};
+use crate::train::config_error::{ConfigError, within};
 
 /// What the event does with the anchors it picks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -7,7 +7,7 @@ use crate::real::Real;
 use crate::scene::ModelShape;
 use crate::step::{DeviceTerms, StepInfo, Terms};
 use crate::train::TrainError;
-use crate::train::config::{ConfigError, within};
+use crate::train::config_error::{ConfigError, within};
 use crate::train::steering::{REWEIGHED_AT, fit, reweighed};
 use crate::train::worth::Worth;
 

@@ -20,8 +20,10 @@ use super::super::process::peak_memory_bytes;
 use super::super::progress::Progress;
 use super::super::train_args::Args;
 use super::super::{output, stop};
+use super::in_folder::{CHECKPOINT_SECONDS, IN_RUN_AND_ON_COMMAND_LINE};
+use super::loading::{check_size, clear_photographs};
+use super::result::HeldOut;
 use super::summary::Summary;
-use super::{CHECKPOINT_SECONDS, HeldOut, IN_RUN_AND_ON_COMMAND_LINE, check_size, clear_photographs};
 use crate::config::{EXPLICIT, ExplicitRunConfig, Protocol};
 
 /// What a finished run reports.

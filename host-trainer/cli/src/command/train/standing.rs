@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Result, bail};
 use pocketsplat_trainer::train::run::{RunError, RunFolder};
 
-use super::IN_RUN_AND_ON_COMMAND_LINE;
+use super::in_folder::IN_RUN_AND_ON_COMMAND_LINE;
 use crate::config::RunConfig;
 
 /// Where the run that is asked for stands.

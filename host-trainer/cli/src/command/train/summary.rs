@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::Path;
 
 use super::super::estimate::duration;
-use super::HeldOut;
+use super::result::{HeldOut, TrainResult};
 
 /// What they want to know.
 pub(super) struct Summary<'a> {
@@ -21,6 +21,24 @@ pub(super) struct Summary<'a> {
     pub(super) photographs_waited_share: Option<f64>,
     pub(super) iterations: u32,
     pub(super) dropped_steps: u32,
+}
+
+impl<'a> Summary<'a> {
+    /// * `bundle`: its path as people know it.
+    pub(super) fn of(result: &'a TrainResult, bundle: &'a Path) -> Self {
+        Self {
+            held_out: result.held_out.as_ref(),
+            path: bundle,
+            n_bytes: result.bundle_bytes,
+            level: Some((result.level, &result.profile)),
+            peak_memory_bytes: result.peak_memory_bytes,
+            train_s: result.train_s,
+            train_processor_s: result.train_processor_s,
+            photographs_waited_share: result.photographs_waited_share,
+            iterations: result.iterations,
+            dropped_steps: result.dropped_steps,
+        }
+    }
 }
 
 impl fmt::Display for Summary<'_> {

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use pocketsplat_capture::dataset::{LoadOptions, MOST_IN_MEMORY_BYTES, load};
 use pocketsplat_capture::synth::{SynthOptions, write_capture};
+use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::config::Backbone;
 
 use super::*;

@@ -1,0 +1,143 @@
+//! The steps of a run in its folder, from where it begins to its bundle.
+
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use anyhow::{Context, Result, bail};
+use pocketsplat_capture::dataset::Capture;
+use pocketsplat_trainer::encode::{Encoding, Scale};
+use pocketsplat_trainer::step::SharedDevice;
+use pocketsplat_trainer::train::gauge::Gauge;
+use pocketsplat_trainer::train::run::{Ending, Interval, RunError, RunFolder, shell_word};
+use pocketsplat_trainer::train::{TrainConfig, Trainer};
+
+use super::result::{TrainResult, write_bundle};
+use crate::command::estimate::{Estimate, Warned};
+use crate::command::output;
+use crate::command::progress::Progress;
+use crate::config::{CaptureOptions, RunConfig};
+
+/// Seconds between checkpoints unless the user says otherwise: what an accident may cost.
+pub(super) const CHECKPOINT_SECONDS: f64 = 60.0;
+
+/// Where the two configurations stand that have to agree.
+pub(super) const IN_RUN_AND_ON_COMMAND_LINE: [&str; 2] = ["in the run", "on the command line"];
+
+/// Where a run begins.
+#[derive(Debug)]
+pub(crate) enum Start<'a> {
+    /// With the capture's points; what the user was warned of when the run was tried out.
+    New(Warned),
+    /// With the newest checkpoint of its folder.
+    Resumed,
+    /// With the state of another run.
+    Forked(Box<Trainer<'a>>),
+}
+
+/// Trains in a run folder and writes the bundle; `None` when `stop` was set before the end.
+pub(crate) fn train_in<'a>(
+    folder: RunFolder,
+    config: &RunConfig,
+    capture: &'a Capture,
+    start: Start<'a>,
+    device: Option<SharedDevice<f32>>,
+    stop: &AtomicBool,
+) -> Result<Option<TrainResult>> {
+    let mut folder = folder.forking_at(&config.fork_at);
+    let path = folder.path().to_owned();
+    let scale = config.encoding.scale(capture);
+    let warned = if let Start::New(warned) = start { warned } else { Warned::default() };
+    let trainer = match start {
+        Start::New(_) => Trainer::new(capture, config.train)?,
+        Start::Resumed => resumed(&folder, config, capture, device.clone())?,
+        Start::Forked(trainer) => {
+            // Without it a resumed run would begin with the capture's points.
+            folder.save(&*trainer)?;
+            *trainer
+        }
+    };
+    let mut trainer = trainer.fitting(gauge(scale.as_ref()));
+    trainer.set_device(device);
+    folder.write_config(&config.to_toml()?)?;
+    let interval = config.checkpoint_every.map_or(Interval::Seconds(CHECKPOINT_SECONDS), Interval::Iterations);
+    let how_to_go_on = || format!("go on with `pocketsplat train --resume {}`", shell_word(&path));
+    let estimate = Estimate::new(capture, &config.train, trainer.iteration, warned);
+    let mut progress = Progress::new(trainer.iteration, config.train.iterations).estimating(estimate);
+    let ending = folder.train(&mut trainer, &mut progress, interval, stop);
+    let ending = ending.map_err(|error| {
+        let stopped = format!("training stopped at iteration {}", trainer.iteration);
+        match error {
+            // It would come to the same end again; a device says itself what to do.
+            RunError::Train(_) => anyhow::Error::new(error).context(stopped),
+            _ => anyhow::Error::new(error).context(format!("{stopped}; to retry, {}", how_to_go_on())),
+        }
+    })?;
+    if ending == Ending::Interrupted {
+        eprintln!(
+            "interrupted after iteration {} of {}; {}",
+            trainer.iteration,
+            config.train.iterations,
+            how_to_go_on()
+        );
+        return Ok(None);
+    }
+    let result = write_bundle(&trainer, capture, &config.capture, &config.encoding, &config.output)
+        .with_context(|| format!("the training is done and kept; {}", how_to_go_on()))?;
+    folder.finish(&output::json(&result)?, config.keep_checkpoints)?;
+    Ok(Some(result))
+}
+
+/// What tells a run that its bundle has limits.
+fn gauge<'a>(scale: Option<&'a Scale<'a>>) -> Option<&'a dyn Gauge> {
+    scale.map(|scale| scale as &dyn Gauge)
+}
+
+/// The run as its newest sound checkpoint has it, or at its start where it was stopped before the first one.
+fn resumed<'a>(
+    folder: &RunFolder,
+    config: &RunConfig,
+    capture: &'a Capture,
+    device: Option<SharedDevice<f32>>,
+) -> Result<Trainer<'a>> {
+    let Some(resumed) = folder.resume(capture)? else {
+        eprintln!("the run in {} has no checkpoint yet; it begins anew", folder.path().display());
+        return Ok(Trainer::new(capture, config.train)?);
+    };
+    for fault in &resumed.passed_over {
+        eprintln!("warning: a checkpoint is damaged, so the run goes on from an older one: {fault}");
+    }
+    let mut trainer = resumed.restored.trainer;
+    trainer.set_device(device);
+    let at_checkpoint = RunConfig { train: *trainer.config(), ..config.clone() };
+    if let Some(difference) = config.difference(&at_checkpoint, ["in config.toml", "in the checkpoint"])? {
+        bail!("config.toml and the checkpoint disagree: {difference}; write back what the run began with");
+    }
+    let (then, now) = (&resumed.restored.written_by, trainer.kernels());
+    if *then != now {
+        eprintln!(
+            "warning: the checkpoint was computed with {then}; this is {now}. The run goes on, but will not end in the \
+             same bits as there"
+        );
+    }
+    eprintln!("going on after iteration {} of {}", trainer.iteration, config.train.iterations);
+    Ok(trainer)
+}
+
+/// Trains on a capture that was loaded as it is, without a run folder, and writes the bundle.
+pub(crate) fn train(capture: &Capture, config: TrainConfig, encoding: &Encoding, output: &Path) -> Result<TrainResult> {
+    train_as(capture, config, &CaptureOptions::default(), encoding, output)
+}
+
+/// As [`train`]; the bundle says that the capture was loaded with `options`.
+pub(crate) fn train_as(
+    capture: &Capture,
+    config: TrainConfig,
+    options: &CaptureOptions,
+    encoding: &Encoding,
+    output: &Path,
+) -> Result<TrainResult> {
+    let scale = encoding.scale(capture);
+    let mut trainer = Trainer::new(capture, config)?.fitting(gauge(scale.as_ref()));
+    trainer.run(&mut Progress::new(0, config.iterations))?;
+    write_bundle(&trainer, capture, options, encoding, output)
+}

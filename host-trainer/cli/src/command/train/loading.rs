@@ -1,0 +1,79 @@
+//! The capture of a run: it is loaded, and decides what the configuration left open.
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use anyhow::{Result, bail};
+use pocketsplat_capture::dataset::{Capture, remove_cache};
+use pocketsplat_core::budget::MAX_FRAME_PX;
+use pocketsplat_instructions::level::{Bound, Level};
+use pocketsplat_trainer::device::Limits;
+use pocketsplat_trainer::train::run::photographs_in;
+
+use crate::command::capture::CaptureArgs;
+use crate::config::RunConfig;
+
+/// Loads the capture that a run is configured for, and decides what the configuration left to it.
+///
+/// * `photographs`: folder for decoded photographs that are too many for the memory; without one they are decoded again for every
+///   step.
+pub(crate) fn load(config: &mut RunConfig, photographs: Option<&Path>) -> Result<Capture> {
+    let source = CaptureArgs { dataset: config.dataset.clone(), options: config.capture.clone() };
+    // At once: large captures take their time.
+    eprintln!("reading {}", config.dataset.display());
+    let capture = match photographs {
+        Some(folder) => source.load_cached(config.train.seed, folder)?,
+        None => source.load(config.train.seed)?,
+    };
+    decide(config, &capture)?;
+    Ok(capture)
+}
+
+/// Decides what the configuration of a run left to its capture.
+pub(crate) fn decide(config: &mut RunConfig, capture: &Capture) -> Result<()> {
+    check_size(capture, &config.encoding.limits)?;
+    config.train = config.train.resolved_for(capture);
+    if std::mem::take(&mut config.scales_lambda) && config.train.backbone.is_coded() && capture.shown < 1.0 {
+        config.train.hac.lambda *= capture.shown;
+        eprintln!(
+            "lambda {:.5}, since {:.0} % of the pixels show the scene",
+            config.train.hac.lambda,
+            100.0 * capture.shown
+        );
+    }
+    eprintln!("voxel size {:.5}, normalised units", config.train.voxel_size_for(capture));
+    Ok(())
+}
+
+/// Refuses photographs that the decoder cannot draw, or that the level has no room for.
+pub(super) fn check_size(capture: &Capture, limits: &Limits) -> Result<()> {
+    let [width, height] = capture.largest_px();
+    if let Some(level) = limits.level.and_then(Level::numbered)
+        && u64::from(width) * u64::from(height) > level.most(Bound::Frame)
+    {
+        let ([most_width, most_height], number) = (level.frame_px, level.number);
+        bail!(
+            "the photographs are {width}x{height} px, and level {number} allows frames of {most_width}x{most_height}; use \
+             --resolution {most_width}x{most_height}, or a smaller --max-resolution"
+        );
+    }
+    let (largest, most) = (width.max(height), u32::from(MAX_FRAME_PX));
+    if largest > most {
+        bail!(
+            "the photographs are {largest} px wide or high and the decoder draws {most}; use --max-resolution {most}"
+        );
+    }
+    Ok(())
+}
+
+/// Removes the decoded photographs of a run that is finished; one that was interrupted needs them again.
+pub(crate) fn clear_photographs(run: &Path, code: ExitCode) {
+    if code == ExitCode::SUCCESS
+        && let Err(error) = remove_cache(&photographs_in(run))
+    {
+        eprintln!(
+            "warning: the decoded photographs of the run are still in {}: {error}",
+            photographs_in(run).display()
+        );
+    }
+}

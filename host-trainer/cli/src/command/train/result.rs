@@ -1,0 +1,153 @@
+//! The end of a run: the bundle is written and measured.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use pocketsplat_capture::dataset::{Background, Capture, Split, View};
+use pocketsplat_instructions::level::Profile;
+use pocketsplat_trainer::effects::Effect;
+use pocketsplat_trainer::encode::{Encoding, Fitted};
+use pocketsplat_trainer::train::Trainer;
+use pocketsplat_trainer::train::finish::Finished;
+use pocketsplat_trainer::train::run::shell_word;
+use serde::Serialize;
+
+use super::limits;
+use crate::command::bundle::BundleFile;
+use crate::command::eval::{Evaluation, Measurements, Renderer, ViewEvaluation, measure};
+use crate::command::output;
+use crate::command::process::peak_memory_bytes;
+use crate::config::{CaptureOptions, Protocol};
+
+/// Test views that tiers are measured with at most, evenly picked: more would cost time and say little.
+const MOST_JUDGES: usize = 12;
+
+/// What a finished run reports.
+#[derive(Debug, Serialize)]
+pub(crate) struct TrainResult {
+    pub(crate) bundle: PathBuf,
+    pub(crate) bundle_bytes: usize,
+    /// What a decoder needs: `Device` or `Full`.
+    pub(crate) profile: String,
+    /// Least level that the whole scene keeps; 0 for none.
+    pub(crate) level: u8,
+    /// Scratch memory in which a device with limited memory draws the whole scene.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) scratch_bytes: Option<usize>,
+    /// Predicted for the dearest frame of some training views, where there is a processor.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) instructions: Option<u64>,
+    pub(crate) n_anchors: usize,
+    /// Of these, with a drawn offset; the others are not coded.
+    pub(crate) n_valid_anchors: usize,
+    pub(crate) drawn_offsets: usize,
+    pub(crate) undrawn_offsets: usize,
+    /// What coded the symbols: `context` or `static`.
+    pub(crate) coder: &'static str,
+    /// Bytes of features, log-scales and offsets under the float context model.
+    pub(crate) estimated_bytes: Option<[f64; 3]>,
+    pub(crate) bytes_per_anchor: f64,
+    pub(crate) iterations: u32,
+    pub(crate) dropped_steps: u32,
+    pub(crate) train_s: f64,
+    /// Processor time of all threads.
+    pub(crate) train_processor_s: f64,
+    pub(crate) iterations_per_s: f64,
+    /// Of the steps' time, the share that was spent on waiting for photographs, where they do not lie in memory.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) photographs_waited_share: Option<f64>,
+    pub(crate) background: String,
+    pub(crate) effects: String,
+    /// Largest amount of memory that the program has held, where the system tells.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) peak_memory_bytes: Option<u64>,
+    /// Of the bundle, over the views that are held out for testing, where there are any: as `eval` measures it.
+    #[serde(flatten)]
+    pub(crate) held_out: Option<HeldOut>,
+    /// How the photographs were prepared, and the fingerprint of the capture.
+    pub(crate) protocol: Protocol,
+}
+
+/// How good a bundle is on views that training did not see.
+#[derive(Debug, Serialize)]
+pub(crate) struct HeldOut {
+    pub(crate) psnr_db: f64,
+    pub(crate) ssim: f64,
+    pub(crate) n_test_views: usize,
+    pub(crate) views: Vec<ViewEvaluation>,
+}
+
+/// The views that tiers are measured with: those held out of training for it, else some of the test views.
+fn judges(trainer: &Trainer<'_>, capture: &Capture) -> Vec<View> {
+    let held_out: Vec<View> = trainer.validation_views().cloned().collect();
+    if !held_out.is_empty() {
+        return held_out;
+    }
+    let n = capture.test.len().min(MOST_JUDGES);
+    (0..n).map(|i| capture.test[i * capture.test.len() / n].clone()).collect()
+}
+
+/// Writes the bundle of a run that is through, and measures it on the views that are held out for testing.
+pub(super) fn write_bundle(
+    trainer: &Trainer<'_>,
+    capture: &Capture,
+    options: &CaptureOptions,
+    encoding: &Encoding,
+    output: &Path,
+) -> Result<TrainResult> {
+    let protocol = Protocol::of(capture, options);
+    if let Some(images) = protocol.omitted_images()? {
+        eprintln!(
+            "warning: the name of the folder of images is too long for the bundle; give --images {} to eval and render",
+            shell_word(Path::new(images))
+        );
+    }
+    let finished = Finished { protocol: Some(protocol.to_text()?), ..trainer.finish()? };
+    let held_out = judges(trainer, capture);
+    let fitted = encoding.encode(finished, capture, &held_out)?;
+    output::write_whole(output, &fitted.written.bytes)?;
+    let file = BundleFile { path: output.to_owned(), bytes: fitted.written.bytes.clone() };
+    limits::say(&file, &encoding.limits, &fitted)?;
+    let Fitted { finished, plan, instructions, .. } = fitted;
+    let held_out = if capture.test.is_empty() {
+        None
+    } else {
+        let what = Measurements::default();
+        let Evaluation { psnr_db, ssim, n_views, views, .. } =
+            measure(&file, capture, options, Split::Test, Renderer::Core, &what)?;
+        Some(HeldOut { psnr_db, ssim, n_test_views: n_views, views })
+    };
+    let Finished { scene, background, n_undrawn, estimated_bits, .. } = finished;
+    let bundle = file.parse()?;
+    let of_whole = bundle.n_tiers().checked_sub(1).and_then(|tier| bundle.measures(tier));
+    let n_anchors = scene.anchors.len();
+    Ok(TrainResult {
+        bundle: output.to_owned(),
+        bundle_bytes: file.bytes.len(),
+        profile: Profile::of(&bundle.header().features).to_string(),
+        level: of_whole.map_or(0, |measures| measures.level),
+        scratch_bytes: plan.map(|plan| plan.least_len()),
+        instructions,
+        n_anchors,
+        n_valid_anchors: (0..n_anchors).filter(|a| scene.anchors.has_drawn(*a)).count(),
+        drawn_offsets: (0..scene.anchors.mask_logits.len()).filter(|offset| scene.anchors.is_drawn(*offset)).count(),
+        undrawn_offsets: n_undrawn,
+        coder: if bundle.context().is_some() { "context" } else { "static" },
+        estimated_bytes: estimated_bits.map(|bits| bits.map(|bits| bits / 8.0)),
+        bytes_per_anchor: file.bytes.len() as f64 / n_anchors as f64,
+        iterations: trainer.iteration,
+        dropped_steps: trainer.n_dropped(),
+        train_s: trainer.seconds,
+        train_processor_s: trainer.processor_seconds,
+        iterations_per_s: f64::from(trainer.iteration) / trainer.seconds,
+        photographs_waited_share: trainer.waited_share(),
+        background: match [Background::Black, Background::White].into_iter().find(|known| known.rgb8() == background) {
+            Some(known) => known.to_string(),
+            None => format!("{background:?}"),
+        },
+        effects: Effect::names(&Effect::all_in(trainer.config())),
+        peak_memory_bytes: peak_memory_bytes(),
+        held_out,
+        protocol,
+    })
+}

@@ -1,6 +1,7 @@
 //! Training: one step, the optimiser, growth and pruning, the loop around them, and the folder that lets it go on after
 //! an interruption.
 
+mod anchor_changes;
 pub mod bits;
 pub mod checkpoint;
 mod coding;
@@ -47,9 +48,9 @@ use crate::step::coding::Coding;
 use crate::step::{Loss, Phase, SharedDevice, StepInfo, StepReport, TargetView, Workspace, image_of_planes};
 use checkpoint::{CaptureSignature, Kernels};
 use coding::Integers;
-use config::{Backbone, Densification, Rates};
+use config::Rates;
 use gauge::Gauge;
-use module::{AnchorChange, RunView};
+use module::RunView;
 use optimiser::Optimiser;
 use pocketsplat_capture::dataset::{Capture, Image, Photograph, View};
 use read_ahead::ReadAhead;
@@ -291,16 +292,8 @@ impl<'a> Trainer<'a> {
         self.rank_for_levels();
         let mut fit = None;
         for module in modules.each() {
-            match module.event(&at, &RunView { trainer: self })? {
-                Some(AnchorChange::Keep(keep)) => self.keep_anchors(&keep),
-                Some(AnchorChange::Mask(offsets)) => self.mask_offsets(&offsets),
-                Some(AnchorChange::Rank(ranks)) => self.scene.anchors.prune_rank = ranks,
-                Some(AnchorChange::Fit { masked, found }) => {
-                    self.mask_offsets(&masked);
-                    self.lambda = found.lambda;
-                    fit = Some(found);
-                }
-                None => {}
+            if let Some(change) = module.event(&at, &RunView { trainer: self })? {
+                fit = self.change_anchors(change).or(fit);
             }
         }
         Ok(Outcome { report, dropped: None, fit })
@@ -364,18 +357,6 @@ impl<'a> Trainer<'a> {
         self.photographs.waited_share()
     }
 
-    /// Switches offsets off, counted through all anchors', and drops the anchors that have none left.
-    fn mask_offsets(&mut self, offsets: &[usize]) {
-        self.scene.anchors.mask(offsets);
-        let keep: Vec<bool> = (0..self.scene.anchors.len()).map(|a| self.scene.anchors.has_drawn(a)).collect();
-        self.keep_anchors(&keep);
-    }
-
-    /// Drops the anchors that `keep` does not mark.
-    pub fn keep_anchors(&mut self, keep: &[bool]) {
-        densify::retain(&mut self.scene, &mut self.optimiser, &mut self.statistics, keep);
-    }
-
     /// The learning rates of this iteration.
     ///
     /// Masks move only where bits count, and no longer once the integer model decides: what is left then learns to do
@@ -389,59 +370,6 @@ impl<'a> Trainer<'a> {
             Phase::IntegerModel => 0.0,
         };
         Rates { mask: self.config.rates.mask.times(factor), ..self.config.rates }
-    }
-
-    /// Statistics of the step, and growth and pruning when they are due.
-    fn densify(&mut self, on_device: bool) -> Result<(), TrainError> {
-        let settings = self.config.densification;
-        let until = self.config.iteration_at(settings.until);
-        let from = self.config.iteration_at(settings.statistics_from);
-        if self.iteration >= until || self.iteration <= from || self.config.pauses_at(self.iteration) {
-            return Ok(());
-        }
-        if on_device {
-            self.count_on_device()?;
-        } else {
-            self.statistics.add(&self.workspace, self.config.shape.n_offsets);
-        }
-        let due = self.iteration.is_multiple_of(settings.interval);
-        if due && self.iteration > self.config.iteration_at(settings.from) {
-            self.take_back()?;
-            let Self { scene, optimiser, statistics, rng, .. } = self;
-            let coarsest_cells = self.config.coarsest_cells_for(self.capture);
-            densify::grow(scene, optimiser, statistics, &settings, coarsest_cells, rng);
-            densify::prune(scene, optimiser, statistics, &settings);
-        }
-        Ok(())
-    }
-
-    /// When growth ends: drops all but the anchors that contribute most to the training views, where a number is set.
-    fn keep_the_best(&mut self) {
-        let Densification { until, kept_anchors, .. } = self.config.densification;
-        let Some(most) = kept_anchors.filter(|most| *most < self.scene.anchors.len()) else { return };
-        if self.iteration == self.config.iteration_at(until) {
-            let Survey { contribution, .. } = self.survey(true);
-            let mut order: Vec<usize> = (0..contribution.len()).collect();
-            order.sort_by(|a, b| contribution[*b].total_cmp(&contribution[*a]));
-            let mut keep = vec![false; contribution.len()];
-            order[..most].iter().for_each(|anchor| keep[*anchor] = true);
-            self.keep_anchors(&keep);
-        }
-    }
-
-    /// When growth ends: where anchors follow anchors, they do so inside the tiers that the bundle will have.
-    fn rank_for_levels(&mut self) {
-        let due = self.iteration == self.config.iteration_at(self.config.densification.until);
-        if due && self.config.backbone == Backbone::ContextGs && self.scene.anchors.prune_rank.is_empty() {
-            let Survey { importance, .. } = self.survey(false);
-            let mut order: Vec<usize> = (0..importance.len()).collect();
-            order.sort_by(|a, b| importance[*a].total_cmp(&importance[*b]));
-            let mut ranks = vec![0.0; order.len()];
-            for (place, anchor) in order.iter().enumerate() {
-                ranks[*anchor] = place as f32 / order.len() as f32;
-            }
-            self.scene.anchors.prune_rank = ranks;
-        }
     }
 
     /// What it trains on.

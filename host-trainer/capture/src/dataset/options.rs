@@ -32,6 +32,11 @@ impl Background {
         }
     }
 
+    /// The background of this 8-bit RGB, if it has a name.
+    pub fn of_rgb8(rgb8: [u8; 3]) -> Option<Self> {
+        [Self::Black, Self::White].into_iter().find(|known| known.rgb8() == rgb8)
+    }
+
     /// The colour as the 8-bit value / 255.
     pub fn rgb(self) -> [f32; 3] {
         self.rgb8().map(|channel| f32::from(channel) / 255.0)

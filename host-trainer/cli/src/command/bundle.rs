@@ -67,7 +67,7 @@ impl BundleFile {
         args: &CaptureArgs,
     ) -> Result<CaptureArgs> {
         let header = bundle.header();
-        let known = [Background::Black, Background::White].into_iter().find(|b| b.rgb8() == header.background);
+        let known = Background::of_rgb8(header.background);
         if let (Some(asked), Some(trained)) = (args.options.background, known)
             && asked != trained
         {

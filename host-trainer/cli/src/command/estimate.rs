@@ -15,8 +15,8 @@ use super::process::{machine_memory_bytes, peak_memory_bytes};
 /// Steps of the trial; the first fill caches and take memory, and are not timed.
 const UNTIMED_STEPS: u32 = 4;
 const TIMED_STEPS: u32 = 8;
-/// Iterations after which the estimate is shown again; then at these shares of the run. The last lies behind the first pruning at one
-/// half, whose own time, and whose leap in anchors, would otherwise be taken for how the run goes on.
+/// Iterations after which the estimate is shown again; then at these shares of the run. The last comes after the first pruning, at 0.5:
+/// the pruning itself takes time, and the number of anchors drops with it.
 const FIRST: u32 = 30;
 const AGAIN_AT: [f64; 3] = [0.1, 0.25, 0.55];
 
@@ -46,6 +46,9 @@ struct Course {
 const SHARES: [f64; 8] = [0.0, 0.1, 0.2, 0.35, 0.5, 0.51, 0.65, 1.0];
 /// The number of those before pruning.
 const BEFORE_PRUNING: usize = 5;
+
+// An estimate in between would take the anchors after pruning for those before it.
+const _: () = assert!(AGAIN_AT[AGAIN_AT.len() - 1] > SHARES[BEFORE_PRUNING]);
 
 /// From points drawn at random, as of Synthetic-NeRF.
 const FROM_RANDOM: Course =

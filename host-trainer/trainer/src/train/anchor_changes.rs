@@ -1,4 +1,4 @@
-//! Anchors of a run come and go: growth and pruning by the method, and what modules ask for.
+//! Changes to the anchors of a run: growth, pruning, and the changes that modules return.
 
 use super::config::{Backbone, Densification};
 use super::module::AnchorChange;
@@ -60,7 +60,7 @@ impl Trainer<'_> {
         }
     }
 
-    /// Does what a module asks for, and says how a scene that has limits keeps them now.
+    /// Applies the change of a module; returns how the scene fits its limits, where the module made it fit.
     pub(super) fn change_anchors(&mut self, change: AnchorChange) -> Option<Fit> {
         match change {
             AnchorChange::Keep(keep) => self.keep_anchors(&keep),

@@ -1,4 +1,4 @@
-//! Which setting no run can use.
+//! Errors of a configuration, and the check of a range.
 
 use std::borrow::Cow;
 

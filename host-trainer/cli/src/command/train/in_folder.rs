@@ -1,4 +1,4 @@
-//! The steps of a run in its folder, from where it begins to its bundle.
+//! Trains in a run folder: start, resume or fork, the steps with their checkpoints, the bundle.
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;

@@ -1,4 +1,4 @@
-//! The capture of a run: it is loaded, and decides what the configuration left open.
+//! Loads the capture of a run, and fills in the settings that depend on it.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -45,7 +45,7 @@ pub(crate) fn decide(config: &mut RunConfig, capture: &Capture) -> Result<()> {
     Ok(())
 }
 
-/// Refuses photographs that the decoder cannot draw, or that the level has no room for.
+/// Returns an error if the photographs are larger than the frames that the decoder, or the level, supports.
 pub(super) fn check_size(capture: &Capture, limits: &Limits) -> Result<()> {
     let [width, height] = capture.largest_px();
     if let Some(level) = limits.level.and_then(Level::numbered)

@@ -1,4 +1,4 @@
-//! The end of a run: the bundle is written and measured.
+//! Writes and measures the bundle of a finished run.
 
 use std::path::{Path, PathBuf};
 
@@ -87,7 +87,7 @@ fn judges(trainer: &Trainer<'_>, capture: &Capture) -> Vec<View> {
     (0..n).map(|i| capture.test[i * capture.test.len() / n].clone()).collect()
 }
 
-/// Writes the bundle of a run that is through, and measures it on the views that are held out for testing.
+/// Writes the bundle of a finished run, and measures it on the test views.
 pub(super) fn write_bundle(
     trainer: &Trainer<'_>,
     capture: &Capture,
@@ -141,10 +141,8 @@ pub(super) fn write_bundle(
         train_processor_s: trainer.processor_seconds,
         iterations_per_s: f64::from(trainer.iteration) / trainer.seconds,
         photographs_waited_share: trainer.waited_share(),
-        background: match [Background::Black, Background::White].into_iter().find(|known| known.rgb8() == background) {
-            Some(known) => known.to_string(),
-            None => format!("{background:?}"),
-        },
+        background: Background::of_rgb8(background)
+            .map_or_else(|| format!("{background:?}"), |known| known.to_string()),
         effects: Effect::names(&Effect::all_in(trainer.config())),
         peak_memory_bytes: peak_memory_bytes(),
         held_out,

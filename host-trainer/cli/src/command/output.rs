@@ -4,13 +4,16 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 
 /// Version of what commands print as JSON and of `result.json`: rises when a field goes or changes its meaning.
 pub(crate) const SCHEMA_VERSION: u32 = 1;
 
 /// Fails now if `path` could not be written later, and makes its folder.
 pub(crate) fn check_writable(path: &Path) -> Result<()> {
+    if path.is_dir() {
+        bail!("{} is a folder, and needs to be a file; give a name in it with --output", path.display());
+    }
     let (folder, probe) = beside(path);
     fs::create_dir_all(&folder).with_context(|| format!("could not make the folder {}", folder.display()))?;
     fs::write(&probe, [])

@@ -146,7 +146,10 @@ pub(crate) fn applied(
     mut config: RunConfig,
 ) -> Result<RunConfig> {
     config.capture = capture.or(&config.capture);
-    config.train.learns_background |= config.capture.background == Some(Background::Learned);
+    config.train.learns_background = match capture.background {
+        Some(background) => background == Background::Learned,
+        None => config.train.learns_background || config.capture.background == Some(Background::Learned),
+    };
     quality.apply_to(&mut config)?;
     let mut config = run.applied_to(config)?;
     // As a run keeps it: the same options again are no other setting.
@@ -287,11 +290,6 @@ fn attach(modules: &mut Modules, names: &[TrainingModule]) -> Result<()> {
 }
 
 impl RunOptions {
-    /// Whether `--set` names this table or a key in it.
-    pub(crate) fn sets(&self, table: &str) -> bool {
-        self.set.iter().any(|key| key.trim_start().starts_with(table))
-    }
-
     /// The same for explicit Gaussians.
     pub(crate) fn applied_to_explicit(&self, mut config: ExplicitRunConfig) -> Result<ExplicitRunConfig> {
         if self.fork_at.is_some() {
@@ -308,10 +306,12 @@ impl RunOptions {
         config.keep_checkpoints |= self.keep_checkpoints;
         config.fork_at = self.fork_at.clone().unwrap_or(config.fork_at);
         config.train.seed = self.seed.unwrap_or(config.train.seed);
-        for key in &self.set {
-            config = with_key(&config, key.trim_start())?;
-        }
-        Ok(config)
+        self.with_set(config)
+    }
+
+    /// `config` with what `--set` says.
+    pub(crate) fn with_set(&self, config: RunConfig) -> Result<RunConfig> {
+        self.set.iter().try_fold(config, |config, key| with_key(&config, key.trim_start()))
     }
 }
 

@@ -15,6 +15,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::{Capture, View};
+use pocketsplat_trainer::step::SharedDevice;
 use pocketsplat_trainer::train::run::{RunFolder, fork, photographs_in, shell_word};
 
 use super::effects::Resolved;
@@ -54,7 +55,7 @@ fn resume(args: &Args, path: &Path) -> Result<ExitCode> {
     output::check_writable(&config.output)?;
     let capture = load(&mut config, Some(&photographs_in(folder.path())))?;
     let path = folder.path().to_owned();
-    let code = train_and_print(args, folder, config, &capture, Start::Resumed)?;
+    let code = train_and_print(args, folder, config, &capture, Start::Resumed, Machine::open(args)?)?;
     drop(capture);
     clear_photographs(&path, code);
     Ok(code)
@@ -64,7 +65,7 @@ fn begin(args: &Args) -> Result<ExitCode> {
     let mut config = args.resolved()?;
     output::check_writable(&config.output)?;
     let path = args.run_folder(args.named_paths(&config.dataset, &config.output).1)?;
-    // Before the run's files are touched: a capture or checkpoint that does not load must not cost an earlier run its results.
+    // Before the run's files are touched, all that may fail: it must not cost an earlier run its results.
     let capture = load(&mut config, Some(&photographs_in(&path)))?;
     let start = match args.fork() {
         Some((run, _)) if run.canonicalize().ok() == path.canonicalize().ok() => {
@@ -77,8 +78,13 @@ fn begin(args: &Args) -> Result<ExitCode> {
         }
         None => Start::New(Warned::default()),
     };
+    let machine = Machine::open(args)?;
     let folder = RunFolder::start(&path, &config.to_toml()?, args.overwrite())?;
-    let code = train_and_print(args, folder, config, &capture, start)?;
+    if let Start::Forked(trainer) = &start {
+        // Without it a resumed run would begin with the capture's points.
+        folder.save(&**trainer)?;
+    }
+    let code = train_and_print(args, folder, config, &capture, start, machine)?;
     drop(capture);
     clear_photographs(&path, code);
     Ok(code)
@@ -94,8 +100,13 @@ fn begin_or_go_on(args: &Args) -> Result<ExitCode> {
     let path = args.run_folder(args.named_paths(&config.dataset, &config.output).1)?;
     let capture = load(&mut config, Some(&photographs_in(&path)))?;
     let code = match Standing::of(&path, &config)? {
-        Standing::New(folder) => train_and_print(args, folder, config, &capture, Start::New(Warned::default()))?,
-        Standing::Begun(folder) => train_and_print(args, folder, config, &capture, Start::Resumed)?,
+        Standing::New(folder) => {
+            let start = Start::New(Warned::default());
+            train_and_print(args, folder, config, &capture, start, Machine::open(args)?)?
+        }
+        Standing::Begun(folder) => {
+            train_and_print(args, folder, config, &capture, Start::Resumed, Machine::open(args)?)?
+        }
         Standing::Finished => {
             eprintln!("trained before");
             ExitCode::SUCCESS
@@ -106,18 +117,32 @@ fn begin_or_go_on(args: &Args) -> Result<ExitCode> {
     Ok(code)
 }
 
+/// What a run takes of the machine, and may not get.
+struct Machine {
+    /// The GPU that trains, where one does.
+    device: Option<SharedDevice<f32>>,
+    /// The port of the page about the run, where there is one.
+    port: Option<watch::Port>,
+}
+
+impl Machine {
+    fn open(args: &Args) -> Result<Self> {
+        Ok(Self { device: args.device()?, port: args.watch().map(watch::Port::open).transpose()? })
+    }
+}
+
 fn train_and_print<'a>(
     args: &Args,
     folder: RunFolder,
     mut config: RunConfig,
     capture: &'a Capture,
     start: Start<'a>,
+    Machine { device, port }: Machine,
 ) -> Result<ExitCode> {
-    let device = args.device()?;
-    if let Some(port) = args.watch() {
+    if let Some(port) = port {
         let photograph = capture.test.first().or(capture.train.first()).map(View::photograph).transpose()?;
         let image = photograph.as_ref().map(|photograph| &photograph.image);
-        watch::serve(folder.path(), port, config.train.iterations, image)?;
+        port.serve(folder.path(), config.train.iterations, image)?;
     }
     // Not before: until here there is nothing to keep, and Ctrl-C may end the process at once.
     let stop = stop::flag()?;

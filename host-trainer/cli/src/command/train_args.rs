@@ -255,9 +255,10 @@ impl Args {
             base.effects.price = Price::for_device();
         }
         let mut config = self.applied_to(base)?;
-        config.scales_lambda &= self.lambda.is_none() && !is_for_device && !self.options.sets("train.hac");
+        config.scales_lambda &= self.lambda.is_none() && !is_for_device;
         if is_for_device {
             self.device.choose(&self.quality, self.lambda, &mut config)?;
+            config = self.options.with_set(config)?;
         }
         for (path, name, option) in [(&config.dataset, "dataset", "DATASET"), (&config.output, "output", "--output")] {
             if path.as_os_str().is_empty() {
@@ -328,7 +329,11 @@ impl Args {
             ("--flash", flash.is_some()),
             ("--target", target.is_some()),
         ];
-        let others = [("--lambda", self.lambda.is_some()), ("--watch", self.watch.is_some())];
+        let others = [
+            ("--lambda", self.lambda.is_some()),
+            ("--watch", self.watch.is_some()),
+            ("--device", matches!(self.trains_on, DeviceChoice::Gpu(_))),
+        ];
         let given = others.into_iter().chain(device).filter(|(_, given)| *given);
         refused.extend(given.map(|(name, _)| name));
         if !refused.is_empty() {

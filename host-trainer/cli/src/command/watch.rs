@@ -23,27 +23,39 @@ struct Watched {
 
 type Answer = Response<Cursor<Vec<u8>>>;
 
-/// Serves a page about the run in `folder` on the loopback interface until the program ends; says where.
-///
-/// * `port`: 0 takes a free one.
-pub(super) fn serve(folder: &Path, port: u16, iterations: u32, photograph: Option<&Image>) -> Result<()> {
-    let server = Server::http(("127.0.0.1", port)).map_err(|error| {
-        anyhow!("could not serve the page on port {port}: {error}; choose another, as --watch 8000")
-    })?;
-    let Some(port) = server.server_addr().to_ip().map(|address| address.port()) else {
-        return Err(anyhow!("the page has no address; leave --watch out"));
-    };
-    eprintln!("watch it at http://127.0.0.1:{port}/");
-    let photograph = photograph.map(Image::to_jpeg).transpose()?;
-    let watched = Watched { folder: folder.to_owned(), iterations, photograph };
-    std::thread::spawn(move || {
-        for request in server.incoming_requests() {
-            let answer = answer(&watched, &request, port);
-            // Whoever asked may have gone.
-            let _ = request.respond(answer);
-        }
-    });
-    Ok(())
+/// A port of the loopback interface that is this program's.
+pub(super) struct Port {
+    server: Server,
+    number: u16,
+}
+
+impl Port {
+    /// * `number`: 0 takes a free one.
+    pub(super) fn open(number: u16) -> Result<Self> {
+        let server = Server::http(("127.0.0.1", number)).map_err(|error| {
+            anyhow!("could not serve the page on port {number}: {error}; choose another, as --watch 8000")
+        })?;
+        let Some(number) = server.server_addr().to_ip().map(|address| address.port()) else {
+            return Err(anyhow!("the page has no address; leave --watch out"));
+        };
+        Ok(Self { server, number })
+    }
+
+    /// Serves a page about the run in `folder` until the program ends; says where.
+    pub(super) fn serve(self, folder: &Path, iterations: u32, photograph: Option<&Image>) -> Result<()> {
+        let Self { server, number } = self;
+        eprintln!("watch it at http://127.0.0.1:{number}/");
+        let photograph = photograph.map(Image::to_jpeg).transpose()?;
+        let watched = Watched { folder: folder.to_owned(), iterations, photograph };
+        std::thread::spawn(move || {
+            for request in server.incoming_requests() {
+                let answer = answer(&watched, &request, number);
+                // Whoever asked may have gone.
+                let _ = request.respond(answer);
+            }
+        });
+        Ok(())
+    }
 }
 
 fn answer(watched: &Watched, request: &Request, port: u16) -> Answer {

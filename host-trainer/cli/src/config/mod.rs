@@ -98,7 +98,9 @@ impl RunConfig {
         let mut all = Table::try_from(self)?;
         let given = keys_of(keys)?;
         merge(&mut all, &given);
-        let config: Self = all.try_into()?;
+        let says_lambda = ["train", "hac"].iter().try_fold(&given, |table, name| table.get(*name)?.as_table());
+        let says_lambda = says_lambda.is_some_and(|hac| hac.contains_key("lambda"));
+        let config = Self { scales_lambda: self.scales_lambda && !says_lambda, ..all.try_into()? };
         refuse_unknown(&given, &Table::try_from(&config)?, "")?;
         Ok(config)
     }
@@ -111,6 +113,10 @@ impl RunConfig {
     /// Refuses what no run can use, before any work starts.
     pub(crate) fn check(&self) -> Result<()> {
         self.train.validate()?;
+        let n = self.train.iterations;
+        if let Some(beyond) = self.fork_at.iter().find(|iteration| **iteration > n) {
+            bail!("--fork-at names iteration {beyond}, and the run has {n}; name one of 1 to {n}, or set --iterations");
+        }
         Ok(self.encoding.check(self.train.backbone)?)
     }
 

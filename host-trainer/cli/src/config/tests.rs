@@ -104,6 +104,15 @@ fn only_what_decides_the_result_counts_as_a_difference() {
 }
 
 #[test]
+fn checkpoints_to_fork_from_lie_inside_the_run() {
+    let config = |fork_at: u32| RunConfig { fork_at: vec![fork_at], ..RunConfig::default() };
+    let n = RunConfig::default().train.iterations;
+    assert!(config(n).check().is_ok());
+    let error = config(n + 1).check().unwrap_err().to_string();
+    assert!(error.contains(&format!("--fork-at names iteration {}, and the run has {n}", n + 1)), "{error}");
+}
+
+#[test]
 fn coding_decides_where_limits_steer_the_run() {
     let steered = |keys: &[&str]| {
         RunConfig::default().with_keys(&keys.iter().map(|key| (*key).to_owned()).collect::<Vec<_>>()).unwrap()

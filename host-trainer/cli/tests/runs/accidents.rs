@@ -1,5 +1,6 @@
 //! Full disks, folders that cannot be written, two processes in one folder, captures that change.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::os::unix::process::CommandExt;
@@ -60,6 +61,34 @@ fn a_full_disk_is_named() {
     let error = fails(&mut inside(&train(&home.join("a.psb"))));
     assert!(error.contains("could not write") && error.contains("No space left on device"), "{error}");
     assert!(error.contains(".checkpoint"), "{error}");
+}
+
+#[test]
+fn what_cannot_be_had_costs_an_earlier_run_nothing() {
+    let home = folder("nothing-lost");
+    let output = home.join("a.psb");
+    succeeds(train(&output).args(["--fork-at", "10"]));
+    let files = |run: &str| {
+        let files = fs::read_dir(home.join(run)).unwrap().map(|entry| entry.unwrap().path());
+        files
+            .filter(|path| path.is_file())
+            .map(|path| (path.clone(), fs::read(path).unwrap()))
+            .collect::<BTreeMap<_, _>>()
+    };
+    let before = files("a.run");
+    let taken = std::net::TcpListener::bind(("127.0.0.1", 0)).unwrap();
+    let port = taken.local_addr().unwrap().port().to_string();
+    for unfit in [["--watch", &port], ["--device", "gpu:99"]] {
+        // Drivers of GPUs complain on stderr where it is not set.
+        fails(train(&output).args(unfit).env("XDG_RUNTIME_DIR", &home));
+        assert!(files("a.run") == before, "{unfit:?}");
+    }
+    let mut fork = pocketsplat();
+    fork.arg("train").arg("--from").arg(home.join("a.run")).args(["--at", "10", "--watch", &port, "-o"]);
+    fails(fork.arg(home.join("b.psb")));
+    assert!(!home.join("b.run").join("config.toml").exists(), "nothing was begun");
+    let error = fails(&mut train(&home));
+    assert!(error.contains("is a folder, and needs to be a file"), "{error}");
 }
 
 #[test]

@@ -74,6 +74,9 @@ fn bits_weigh_as_much_for_each_pixel_that_shows_the_scene_unless_a_weight_is_giv
     assert!((lambda("default.psb", &[]) - 0.002 * share).abs() < 1e-9);
     assert_eq!(lambda("given.psb", &["--lambda", "0.002"]), 0.002);
     assert_eq!(lambda("set.psb", &["--set", "train.hac.lambda=0.002"]), 0.002);
+    let another_key =
+        lambda("another.psb", &["--set", "train.hac.sample=0.5", "--set", "train.densification.interval=50"]);
+    assert!((another_key - 0.002 * share).abs() < 1e-9, "{another_key}");
 }
 
 #[test]

@@ -50,7 +50,9 @@ fn an_interrupted_run_ends_in_the_same_file_which_is_measured_and_drawn() {
 fn what_makes_no_sense_is_refused_in_a_sentence() {
     let home = folder("explicit_refused");
     let output = home.join("a.ply");
-    for (option, value) in [("--lambda", "0.1"), ("--ram", "100KiB"), ("--modules", "none"), ("--effects", "all")] {
+    for (option, value) in
+        [("--lambda", "0.1"), ("--ram", "100KiB"), ("--modules", "none"), ("--effects", "all"), ("--device", "gpu:7")]
+    {
         let said = fails(train(&output).args([option, value]));
         assert!(said.contains(option) && said.contains("3dgs"), "{said}");
     }

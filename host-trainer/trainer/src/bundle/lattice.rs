@@ -42,17 +42,19 @@ pub(super) struct LatticeModelDraft {
 }
 
 impl LatticeFrame {
-    /// The smallest frame of all `cells` whose lowest corner is a multiple of 2^shift.
+    /// The smallest frame of the cells of `anchors` whose lowest corner is a multiple of 2^shift.
+    ///
+    /// * `cells`: `[n_anchors]` of the scene.
     ///
     /// # Errors
     /// [`WriteError::BeyondLattice`] and [`WriteError::LatticeTooWide`].
-    pub(super) fn of(cells: &[[i32; 3]], shift: u8) -> Result<Self, WriteError> {
-        for (anchor, cell) in cells.iter().enumerate() {
-            if let Some(&found) = cell.iter().find(|c| c.unsigned_abs() > MAX_LATTICE_MIN) {
+    pub(super) fn of(cells: &[[i32; 3]], anchors: &[usize], shift: u8) -> Result<Self, WriteError> {
+        for &anchor in anchors {
+            if let Some(&found) = cells[anchor].iter().find(|c| c.unsigned_abs() > MAX_LATTICE_MIN) {
                 return Err(WriteError::BeyondLattice { anchor, found, limit: MAX_LATTICE_MIN as i32 });
             }
         }
-        let along = |axis: usize| cells.iter().map(move |cell| cell[axis]);
+        let along = |axis: usize| anchors.iter().map(move |&anchor| cells[anchor][axis]);
         let min: [i32; 3] =
             std::array::from_fn(|axis| file_order::aligned(along(axis).min().unwrap_or_default(), shift));
         let spans = (0..3).map(|axis| along(axis).max().unwrap_or_default().abs_diff(min[axis]));

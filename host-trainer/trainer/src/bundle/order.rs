@@ -41,13 +41,13 @@ impl Placement {
         let n_offsets = scene.shape.n_offsets;
         // Where anchors follow anchors, the curve must go through their cells one after the other.
         let [_, shift, _] = scene.context.as_ref().and_then(|model| model.shifts).unwrap_or_default();
-        let frame = LatticeFrame::of(&scene.anchors.lattice, shift)?;
         let drawn_bits = |anchor: usize| {
             (0..n_offsets).fold(0, |bits, k| bits | (u32::from(scene.anchors.is_drawn(anchor * n_offsets + k)) << k))
         };
         let all_drawn: Vec<u32> = (0..scene.anchors.len()).map(drawn_bits).collect();
-        let code = |&anchor: &usize| frame.code(scene.anchors.lattice[anchor]);
         let mut order: Vec<usize> = (0..scene.anchors.len()).filter(|&anchor| all_drawn[anchor] != 0).collect();
+        let frame = LatticeFrame::of(&scene.anchors.lattice, &order, shift)?;
+        let code = |&anchor: &usize| frame.code(scene.anchors.lattice[anchor]);
         order.sort_by_cached_key(code);
         if let Some(&[first, second]) = order.array_windows().find(|[a, b]| code(a) == code(b)) {
             let cell = scene.anchors.lattice[first];

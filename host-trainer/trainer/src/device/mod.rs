@@ -24,7 +24,7 @@ pub struct Limits {
     /// Flash for the bundle, bytes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub flash_bytes: Option<u64>,
-    /// Processor, whose frames of limited length the model is chosen and trained for; what was trained is not cut to them.
+    /// Processor, whose frames of limited length the model is chosen and trained for; at most half of the anchors are cut for them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub processor: Option<Processor>,
     /// Number of the [level](Level) whose every bound the whole scene keeps.

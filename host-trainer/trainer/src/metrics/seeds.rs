@@ -4,6 +4,22 @@ use super::{BjontegaardError, RatePoint, bd_rate_percent};
 
 /// Quantiles t(0.975) of Student's distribution for 1 to 10 degrees of freedom.
 const STUDENT: [f64; 10] = [12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228];
+/// The same of the normal distribution, to which they fall.
+const NORMAL: f64 = 1.959_964;
+
+/// The quantile t(0.975) for `freedom` degrees of freedom, from 1.
+///
+/// Beyond the table the first four terms of its series in 1/freedom (Abramowitz and Stegun 1964, 26.7.5), good to four digits.
+fn student(freedom: usize) -> f64 {
+    let (z, nu) = (NORMAL, freedom as f64);
+    let series = || {
+        let first = (z.powi(3) + z) / 4.0;
+        let second = (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / 96.0;
+        let third = (3.0 * z.powi(7) + 19.0 * z.powi(5) + 17.0 * z.powi(3) - 15.0 * z) / 384.0;
+        z + first / nu + second / nu.powi(2) + third / nu.powi(3)
+    };
+    STUDENT.get(freedom - 1).copied().unwrap_or_else(series)
+}
 
 /// A mean difference with its 95 % interval, percent of bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -73,8 +89,7 @@ fn half_interval(a: &[f64], b: &[f64]) -> Option<f64> {
     let squares = |x: &[f64]| x.iter().map(|v| (v - mean(x)).powi(2)).sum::<f64>();
     let freedom = a.len() + b.len() - 2;
     let variance = (squares(a) + squares(b)) / freedom as f64;
-    let t = STUDENT.get(freedom - 1).copied().unwrap_or(1.96);
-    Some(t * (variance * (1.0 / a.len() as f64 + 1.0 / b.len() as f64)).sqrt())
+    Some(student(freedom) * (variance * (1.0 / a.len() as f64 + 1.0 / b.len() as f64)).sqrt())
 }
 
 /// ln of the bytes of `point` over those that the curve `reference` takes for its PSNR.
@@ -131,6 +146,13 @@ mod tests {
         let below = RatePoint { size_bytes: 1e5, psnr_db: 28.0 };
         assert!(ln_excess(&curve, &below).unwrap().abs() < 1e-12, "and the first");
         assert_eq!(ln_excess(&curve[..1], &half), None);
+    }
+
+    #[test]
+    fn quantiles_beyond_the_table_are_those_of_student() {
+        for (freedom, known) in [(10, 2.228), (11, 2.201), (12, 2.179), (20, 2.086), (60, 2.000), (100_000, 1.960)] {
+            assert!((student(freedom) - known).abs() < 6e-4, "{freedom}: {}", student(freedom));
+        }
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use glam::DVec3;
+use pocketsplat_core::bundle::{MAX_LATTICE_BITS, MAX_LATTICE_MIN};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
@@ -12,6 +13,23 @@ use pocketsplat_capture::dataset::nearest_squared;
 
 /// Squared distances below this are lifted to it before the logarithm.
 const MIN_SQUARED_SPACING: f64 = 1e-7;
+
+/// Share of a bundle's lattice that the points may span; the rest is for anchors that grow beyond them.
+const SPANNED_SHARE: f64 = 0.99;
+
+/// The smallest voxel edge at which a bundle can number the cells of `points`, in their units; 0 without points.
+pub fn least_voxel_size(points: &[DVec3]) -> f64 {
+    if points.is_empty() {
+        return 0.0;
+    }
+    let [low, high] = points
+        .iter()
+        .fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], point| [low.min(*point), high.max(*point)]);
+    let n_cells = f64::from((1u32 << MAX_LATTICE_BITS) - 1);
+    let of_span = (high - low).max_element() / n_cells;
+    let of_distance = low.abs().max(high.abs()).max_element() / f64::from(MAX_LATTICE_MIN);
+    of_span.max(of_distance) / SPANNED_SHARE
+}
 
 /// Builds the starting scene from points (Lu et al. 2024, Scaffold-GS, section 3.1).
 ///

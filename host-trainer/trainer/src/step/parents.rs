@@ -174,13 +174,13 @@ pub(super) fn give_values<R: Real>(base_step: f32, group: usize, values: &[R], g
 
 /// The visible anchors chunk by chunk, as they are written by default.
 fn chunks<R>(anchors: &Anchors<R>, drawn: &[bool], [_, shift, _]: [u8; N_LEVELS]) -> Vec<Vec<usize>> {
-    let along = |axis: usize| anchors.lattice.iter().map(move |cell| cell[axis]);
+    let mut order: Vec<usize> = (0..anchors.len()).filter(|a| drawn[*a]).collect();
+    let along = |axis: usize| order.iter().map(move |a| anchors.lattice[*a][axis]);
     let min: [i32; 3] = std::array::from_fn(|axis| file_order::aligned(along(axis).min().unwrap_or_default(), shift));
     let code = |a: &usize| {
         let cell = anchors.lattice[*a];
         file_order::code(std::array::from_fn(|axis| cell[axis].abs_diff(min[axis])), MAX_LATTICE_BITS.into())
     };
-    let mut order: Vec<usize> = (0..anchors.len()).filter(|a| drawn[*a]).collect();
     let mut ends = vec![order.len()];
     if !anchors.prune_rank.is_empty() {
         order.sort_by_cached_key(code);

@@ -31,11 +31,16 @@ impl Trainer<'_> {
         Ok(())
     }
 
+    /// Whether growth ends with this iteration; the first one where there is no growth.
+    pub(super) fn ends_growth(&self) -> bool {
+        self.iteration == self.config.iteration_at(self.config.densification.until).max(1)
+    }
+
     /// When growth ends: drops all but the anchors that contribute most to the training views, where a number is set.
     pub(super) fn keep_the_best(&mut self) {
-        let Densification { until, kept_anchors, .. } = self.config.densification;
+        let Densification { kept_anchors, .. } = self.config.densification;
         let Some(most) = kept_anchors.filter(|most| *most < self.scene.anchors.len()) else { return };
-        if self.iteration == self.config.iteration_at(until) {
+        if self.ends_growth() {
             let Survey { contribution, .. } = self.survey(true);
             let mut order: Vec<usize> = (0..contribution.len()).collect();
             order.sort_by(|a, b| contribution[*b].total_cmp(&contribution[*a]));
@@ -47,8 +52,8 @@ impl Trainer<'_> {
 
     /// When growth ends: where anchors follow anchors, they do so inside the tiers that the bundle will have.
     pub(super) fn rank_for_levels(&mut self) {
-        let due = self.iteration == self.config.iteration_at(self.config.densification.until);
-        if due && self.config.backbone == Backbone::ContextGs && self.scene.anchors.prune_rank.is_empty() {
+        let is_contextgs = self.config.backbone == Backbone::ContextGs;
+        if self.ends_growth() && is_contextgs && self.scene.anchors.prune_rank.is_empty() {
             let Survey { importance, .. } = self.survey(false);
             let mut order: Vec<usize> = (0..importance.len()).collect();
             order.sort_by(|a, b| importance[*a].total_cmp(&importance[*b]));

@@ -18,6 +18,17 @@ pub enum ConfigError {
         /// The most that is accepted.
         high: f64,
     },
+    /// A bundle cannot number so many voxels.
+    #[error(
+        "train.voxel_size is {found:e}, needs at least {needed:e}, so that a bundle can number the voxels from one end of the \
+         capture's points to the other; set a larger --voxel-size"
+    )]
+    VoxelTooSmall {
+        /// The edge, normalised units.
+        found: f64,
+        /// The least for this capture.
+        needed: f64,
+    },
     /// Every training view would be held out.
     #[error("train.validation_every is 1, needs 0 (none) or at least 2: some views have to be trained on")]
     NoViewLeft,
@@ -31,6 +42,15 @@ pub enum ConfigError {
         found: usize,
         /// Those of the module, 0 without it.
         needed: usize,
+    },
+    /// A module that weighs bits, in a run where they cost nothing.
+    #[error(
+        "{key} weighs error against bits, and train.hac.lambda is 0, so that bits cost nothing; needs a lambda above 0, \
+         or --modules none"
+    )]
+    NoPrice {
+        /// The key that asks for it.
+        key: &'static str,
     },
     /// A module that weighs bits, in a run that has none.
     #[error("{key} weighs error against bits, needs a train.backbone with a rate: hac, hac-plus or contextgs")]

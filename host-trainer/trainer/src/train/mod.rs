@@ -103,6 +103,7 @@ impl<'a> Trainer<'a> {
         if capture.points.is_empty() {
             return Err(TrainError::NoPoints);
         }
+        config.check_voxel_size(capture)?;
         let mut trainer = Self::without_scene(capture, config)?;
         let shape = trainer.config.shape;
         trainer.scene = initial_scene(shape, trainer.scene.voxel_size, &capture.points, &mut trainer.rng);
@@ -217,7 +218,7 @@ impl<'a> Trainer<'a> {
 
     /// One iteration: a view drawn without replacement, a step, the optimiser, statistics, growth and pruning.
     ///
-    /// A step with a loss or gradient that is not finite does nothing of the latter four.
+    /// A step with a loss or gradient that is not finite does nothing of the latter four. Events of modules come all the same.
     ///
     /// # Errors
     /// [`TrainError::Diverged`] when more than [`watchdog::MAX_DROPPED_IN_A_ROW`] steps in a row did nothing, and
@@ -259,16 +260,36 @@ impl<'a> Trainer<'a> {
             Phase::Raw | Phase::Noise | Phase::Context => self.step_here(&target, &loss, &coding),
         };
         let (report, cause) = stepped?;
-        if let Some(cause) = cause {
-            let dropped =
-                DroppedStep { iteration: self.iteration, view: self.capture.train[index].name.clone(), cause };
-            return if self.watchdog.dropped() {
-                Err(TrainError::Diverged { n: self.watchdog.n_in_a_row, last: dropped })
-            } else {
-                Ok(Outcome { report, dropped: Some(dropped), fit: None })
-            };
+        let name = || self.capture.train[index].name.clone();
+        let dropped = cause.map(|cause| DroppedStep { iteration: self.iteration, view: name(), cause });
+        match dropped {
+            Some(last) if self.watchdog.dropped() => {
+                return Err(TrainError::Diverged { n: self.watchdog.n_in_a_row, last });
+            }
+            Some(_) => {}
+            None => {
+                self.watchdog.passed();
+                self.follow_gradients(on_device)?;
+                self.densify(on_device)?;
+            }
         }
-        self.watchdog.passed();
+        // Events come once, so a dropped step does not put them off.
+        if self.ends_growth() || self.is_done() || modules.each().iter().any(|module| module.is_due(&at)) {
+            self.take_back()?;
+        }
+        self.keep_the_best();
+        self.rank_for_levels();
+        let mut fit = None;
+        for module in modules.each() {
+            if let Some(change) = module.event(&at, &RunView { trainer: self })? {
+                fit = self.change_anchors(change).or(fit);
+            }
+        }
+        Ok(Outcome { report, dropped, fit })
+    }
+
+    /// Moves the parameters along the gradients of the step.
+    fn follow_gradients(&mut self, on_device: bool) -> Result<(), TrainError> {
         // The published loop leaves the parameters of its last iteration as they are.
         if self.iteration < self.config.iterations {
             let progress = f64::from(self.iteration) / f64::from(self.config.iterations);
@@ -283,20 +304,7 @@ impl<'a> Trainer<'a> {
                 self.optimiser.apply_to_background(&mut self.background, &self.workspace, rate);
             }
         }
-        self.densify(on_device)?;
-        let ends_growth = self.iteration == self.config.iteration_at(self.config.densification.until);
-        if ends_growth || self.is_done() || modules.each().iter().any(|module| module.is_due(&at)) {
-            self.take_back()?;
-        }
-        self.keep_the_best();
-        self.rank_for_levels();
-        let mut fit = None;
-        for module in modules.each() {
-            if let Some(change) = module.event(&at, &RunView { trainer: self })? {
-                fit = self.change_anchors(change).or(fit);
-            }
-        }
-        Ok(Outcome { report, dropped: None, fit })
+        Ok(())
     }
 
     /// A step of the scene as it stands here, and what is wrong with it.

@@ -50,11 +50,7 @@ pub(crate) fn train_in<'a>(
     let trainer = match start {
         Start::New(_) => Trainer::new(capture, config.train)?,
         Start::Resumed => resumed(&folder, config, capture, device.clone())?,
-        Start::Forked(trainer) => {
-            // Without it a resumed run would begin with the capture's points.
-            folder.save(&*trainer)?;
-            *trainer
-        }
+        Start::Forked(trainer) => *trainer,
     };
     let mut trainer = trainer.fitting(gauge(scale.as_ref()));
     trainer.set_device(device);

@@ -9,6 +9,7 @@ pub use hac::{Backbone, Hac};
 use super::config_error::{ConfigError, within};
 use super::module::Modules;
 use crate::scene::ModelShape;
+use crate::scene::init::least_voxel_size;
 use crate::step::{LossWeights, Phase};
 use pocketsplat_capture::dataset::{Capture, PointsOrigin};
 
@@ -247,6 +248,9 @@ impl TrainConfig {
             }
             // The context model begins with the iteration after its share.
             within(key, at, self.hac.context_from + 1.0 / f64::from(self.iterations), 1.0)?;
+            if self.hac.lambda == 0.0 {
+                return Err(ConfigError::NoPrice { key });
+            }
         }
         within("train.shape.feature_dim", self.shape.feature_dim as f64, 1.0, 256.0)?;
         within("train.shape.n_offsets", self.shape.n_offsets as f64, 1.0, 32.0)?;
@@ -263,6 +267,7 @@ impl TrainConfig {
             1.0,
             1e6,
         )?;
+        within("train.densification.kept_anchors", self.densification.kept_anchors.unwrap_or(1) as f64, 1.0, 1e9)?;
         // The largest integer of TOML, in which configurations are kept.
         within("train.seed", self.seed as f64, 0.0, i64::MAX as f64)?;
         if self.validation_every == 1 {
@@ -307,7 +312,17 @@ impl TrainConfig {
 
     /// The voxel size for a capture.
     pub fn voxel_size_for(&self, capture: &Capture) -> f64 {
-        self.voxel_size.unwrap_or_else(|| capture.suggested_voxel_size())
+        let suggested = || capture.suggested_voxel_size().max(least_voxel_size(&capture.points));
+        self.voxel_size.unwrap_or_else(suggested)
+    }
+
+    /// Refuses a voxel size with which a scene of this capture would fit no bundle.
+    ///
+    /// # Errors
+    /// [`ConfigError::VoxelTooSmall`].
+    pub fn check_voxel_size(&self, capture: &Capture) -> Result<(), ConfigError> {
+        let (found, needed) = (self.voxel_size_for(capture), least_voxel_size(&capture.points));
+        if found < needed { Err(ConfigError::VoxelTooSmall { found, needed }) } else { Ok(()) }
     }
 
     /// The coarsest voxel edge of growth for a capture, lattice cells.

@@ -1,5 +1,7 @@
 use super::*;
 use crate::train::module::Detail;
+use crate::train::test_capture::tiny_capture;
+use glam::DVec3;
 
 #[test]
 fn a_rate_stays_and_then_falls_on_a_geometric_path() {
@@ -59,6 +61,30 @@ fn a_detail_head_is_the_modules() {
     assert_eq!(config.validate(), Err(ConfigError::DetailHidden { found: 5, needed: 7 }));
     config.shape = config.modules.shape(config.shape);
     assert_eq!(config.validate(), Ok(()));
+}
+
+#[test]
+fn some_anchor_is_kept() {
+    let mut config = TrainConfig::default();
+    config.densification.kept_anchors = Some(0);
+    let error = config.validate().unwrap_err().to_string();
+    assert!(error.contains("train.densification.kept_anchors is 0, needs 1 to"), "{error}");
+}
+
+#[test]
+fn voxels_are_no_smaller_than_a_bundle_can_number() {
+    let mut capture = tiny_capture();
+    capture.points_origin = PointsOrigin::Capture;
+    let close = TrainConfig::default().voxel_size_for(&capture);
+    assert!(close > 1e-3, "{close}");
+    // Half of the points lie close to one another, and one far away.
+    capture.points.iter_mut().for_each(|point| *point *= 1e-4);
+    capture.points.push(DVec3::splat(1000.0));
+    let config = TrainConfig::default();
+    assert!((config.voxel_size_for(&capture) / (1000.0 / 2_097_151.0) - 1.0).abs() < 0.02);
+    assert_eq!(config.check_voxel_size(&capture), Ok(()));
+    let error = TrainConfig { voxel_size: Some(1e-6), ..config }.check_voxel_size(&capture).unwrap_err().to_string();
+    assert!(error.contains("train.voxel_size is 1e-6, needs at least 4.8"), "{error}");
 }
 
 #[test]

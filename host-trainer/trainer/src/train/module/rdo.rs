@@ -109,7 +109,8 @@ impl Module for Rdo {
 
     fn event(&self, at: &StepInfo, run: &RunView<'_>) -> Result<Option<AnchorChange>, TrainError> {
         let shares: Vec<f64> = self.shares().collect();
-        let Some(event) = shares.iter().position(|share| at.is_at(*share)) else {
+        // Of events in one iteration the last takes the whole way.
+        let Some(event) = shares.iter().rposition(|share| at.is_at(*share)) else {
             if !(run.limits_bytes() && REWEIGHED_AT.iter().any(|share| at.is_at(*share) && *share > self.until)) {
                 return Ok(None);
             }
@@ -220,10 +221,39 @@ mod tests {
     }
 
     #[test]
+    fn of_events_in_one_iteration_the_last_counts() {
+        let capture = tiny_capture();
+        let rdo = Rdo { until: 0.5, anchors: Some(5), ..Rdo::default() };
+        let config = TrainConfig { modules: Modules { rdo: Some(rdo), ..Modules::default() }, ..tiny_hac_config(60) };
+        let mut trainer = Trainer::new(&capture, config).unwrap();
+        while trainer.iteration < 30 {
+            trainer.advance().unwrap();
+        }
+        assert!(trainer.scene.anchors.len() <= 5, "{}", trainer.scene.anchors.len());
+    }
+
+    #[test]
+    fn an_event_comes_though_its_step_is_dropped() {
+        let capture = tiny_capture();
+        let modules = Modules { rdo: Some(Rdo { anchors: Some(5), ..Rdo::default() }), ..Modules::default() };
+        let mut trainer = Trainer::new(&capture, TrainConfig { modules, ..tiny_hac_config(60) }).unwrap();
+        while trainer.iteration < 41 {
+            trainer.advance().unwrap();
+        }
+        assert!(trainer.scene.anchors.len() > 5);
+        trainer.config.loss.volume = f64::NAN;
+        assert!(trainer.advance().unwrap().dropped.is_some());
+        assert!(trainer.scene.anchors.len() <= 5, "{}", trainer.scene.anchors.len());
+    }
+
+    #[test]
     fn a_run_without_a_rate_is_refused() {
         let modules = Modules { rdo: Some(Rdo::default()), ..Modules::default() };
         let refused = TrainConfig { modules, ..TrainConfig::default() }.validate();
         assert_eq!(refused, Err(ConfigError::NoRate { key: "train.modules.rdo.from" }));
+        let mut free = TrainConfig { modules, ..tiny_hac_config(100) };
+        free.hac.lambda = 0.0;
+        assert_eq!(free.validate(), Err(ConfigError::NoPrice { key: "train.modules.rdo.from" }));
         let early = Modules { rdo: Some(Rdo { from: 0.2, ..Rdo::default() }), ..Modules::default() };
         let refused = TrainConfig { modules: early, ..tiny_hac_config(100) }.validate().unwrap_err().to_string();
         assert!(refused.contains("train.modules.rdo.from is 0.2"), "{refused}");

@@ -97,7 +97,8 @@ impl RunFolder {
             [LOCK, PHOTOGRAPHS].map(Path::new).contains(&name) || name.extension().is_some_and(|e| e == files::PARTIAL)
         };
         let occupied = files::names(path)?.into_iter().any(|name| !ours(Path::new(&name)));
-        if occupied && !path.join(CONFIG).is_file() && !path.join(RESULT).is_file() {
+        // A configuration alone may be anyone's; a run has locked its folder too.
+        if occupied && ![CONFIG, LOCK].iter().all(|name| path.join(name).is_file()) {
             return Err(RunError::Foreign { path: path.to_owned() });
         }
         let folder = Self::locked(path)?;

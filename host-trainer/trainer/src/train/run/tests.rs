@@ -157,6 +157,9 @@ fn other_folders_are_left_alone() {
         assert!(matches!(error, RunError::Foreign { .. }), "{error}");
     }
     assert_eq!(files::names(home.path()).unwrap(), ["photo.png"]);
+    // Another program's configuration.
+    fs::write(home.path().join(CONFIG), "title = 1").unwrap();
+    assert!(matches!(RunFolder::start(home.path(), "", true), Err(RunError::Foreign { .. })));
 }
 
 #[test]

@@ -123,6 +123,7 @@ static void misuse(const uint8_t *bundle, size_t len) {
   CHECK(psb_bind(place, PSB_DECODER_BYTES, bundle, len, &budget, scratch, plan.scratch_bytes, NULL, 0, &decoder, NULL) == PSB_STATUS_OK);
   CHECK(psb_preview(NULL, len, 64, 48, &camera, NULL) == PSB_STATUS_MISUSE);
   CHECK(psb_preview(bundle, len, 64, 48, NULL, NULL) == PSB_STATUS_MISUSE);
+  CHECK(psb_preview(bundle, len, 0, 48, &camera, NULL) == PSB_STATUS_MISUSE);
   CHECK(psb_preview(bundle, len, 64, 48, &camera, &message) == PSB_STATUS_OK && camera.width_px == 64);
   CHECK(psb_render(decoder, &camera, NULL, NULL, &report, &message) == PSB_STATUS_MISUSE);
   CHECK(psb_render(decoder, NULL, refuse, NULL, &report, &message) == PSB_STATUS_MISUSE);

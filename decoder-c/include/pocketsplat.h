@@ -84,7 +84,8 @@ typedef struct psb_budget {
 typedef struct psb_plan {
   // Bytes of scratch memory that psb_bind takes; where nothing fits, those that would do.
   size_t scratch_bytes;
-  // Bytes of slower memory that psb_bind takes beside them; 0 where everything lies in the first.
+  // Bytes of slower memory that psb_bind takes beside them, 0 where everything lies in the first; where nothing fits and there is
+  // slower memory, those that would do.
   size_t slow_scratch_bytes;
   // Share of the anchors that is not drawn.
   float pruning_rate;

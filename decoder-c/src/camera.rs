@@ -63,6 +63,7 @@ pub unsafe extern "C" fn psb_preview(
     let outcome = (|| {
         let preview = Bundle::parse(bundle.ok_or(Failure::Misuse("bundle is NULL"))?)?.header().preview;
         let sized = if (width_px, height_px) == (0, 0) { preview } else { preview.resized(width_px, height_px) };
+        sized.check()?;
         *camera.ok_or(Failure::Misuse("camera is NULL"))? = sized.into();
         Ok(())
     })();

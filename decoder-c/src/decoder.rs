@@ -177,7 +177,7 @@ pub unsafe extern "C" fn psb_bind(
             return Err(Failure::Misuse("place is NULL or not aligned to PSB_DECODER_ALIGN"));
         }
         if place_len < size_of::<Decoder>() {
-            return Err(Failure::Misuse("place_len is less than psb_decoder_bytes()"));
+            return Err(Failure::Number("place_len needs to be psb_decoder_bytes() at least", place_len));
         }
         let (bundle, plan) = planned(bundle, budget)?;
         if scratch.is_null() && plan.scratch_len() > 0 {

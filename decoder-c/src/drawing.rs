@@ -58,7 +58,7 @@ fn to_core(format: u32) -> Result<PixelFormat, Failure> {
         2 => PixelFormat::Rgb565(ByteOrder::LittleEndian, Rounding::Nearest),
         3 => PixelFormat::Rgb565(ByteOrder::BigEndian, Rounding::Dithered),
         4 => PixelFormat::Rgb565(ByteOrder::LittleEndian, Rounding::Dithered),
-        _ => return Err(Failure::Misuse("format is no PSB_FORMAT")),
+        _ => return Err(Failure::Number("format needs to be a PSB_FORMAT, 0 to 4", format as usize)),
     })
 }
 

@@ -44,7 +44,8 @@ pub struct Budget {
 pub struct Plan {
     /// Bytes of scratch memory that psb_bind takes; where nothing fits, those that would do.
     pub scratch_bytes: usize,
-    /// Bytes of slower memory that psb_bind takes beside them; 0 where everything lies in the first.
+    /// Bytes of slower memory that psb_bind takes beside them, 0 where everything lies in the first; where nothing fits and there is
+    /// slower memory, those that would do.
     pub slow_scratch_bytes: usize,
     /// Share of the anchors that is not drawn.
     pub pruning_rate: f32,
@@ -66,7 +67,10 @@ impl Budget {
             0 => CoreQuality::EXACT,
             1 => CoreQuality::BALANCED,
             2 => CoreQuality::DRAFT,
-            _ => return Err(Failure::Misuse("quality is none of PSB_QUALITY_EXACT, _BALANCED, _DRAFT")),
+            other => {
+                let needed = "quality needs to be PSB_QUALITY_EXACT, _BALANCED or _DRAFT, 0 to 2";
+                return Err(Failure::Number(needed, usize::from(other)));
+            }
         };
         let overflow = if self.slabs { Overflow::Slabs } else { Overflow::LeaveOut };
         let frame = pocketsplat_core::Budget::for_frame(self.width_px, self.height_px);

@@ -50,6 +50,8 @@ pub(crate) enum Failure {
     Decode(DecodeError),
     /// The C side gave what no call takes.
     Misuse(&'static str),
+    /// A number that no call takes; what it is and what it may be.
+    Number(&'static str, usize),
     /// The caller's function returned this number.
     Stopped(i32),
 }
@@ -63,7 +65,7 @@ impl From<DecodeError> for Failure {
 impl Failure {
     fn status(&self) -> Status {
         match self {
-            Self::Misuse(_) => Status::Misuse,
+            Self::Misuse(_) | Self::Number(..) => Status::Misuse,
             Self::Stopped(_) => Status::Stopped,
             Self::Decode(error) => match error.class() {
                 ErrorClass::Malformed => Status::Malformed,
@@ -81,6 +83,7 @@ impl fmt::Display for Failure {
         match self {
             Self::Decode(error) => error.fmt(f),
             Self::Misuse(what) => f.write_str(what),
+            Self::Number(needed, found) => write!(f, "{needed}; found {found}"),
             Self::Stopped(code) => write!(f, "the frame is not complete: the function for tiles returned {code}"),
         }
     }

@@ -22,7 +22,9 @@ pub enum MaxSplats {
     /// measured, [`Worst`](Self::Worst). A frame with a wider lens or nearer to the scene may need more. Where memory is left,
     /// strips may [share it](crate::Bundle::plan).
     Measured,
-    /// Every offset of every anchor of the tiers drawn: always enough.
+    /// Every offset of every anchor of the tiers drawn: always enough in the
+    /// [reference arithmetic](crate::arithmetic::ReferenceArithmetic). [`Wide`](crate::arithmetic::Wide) splats have 0.7 of the places; of
+    /// a scene that can be baked, other heads may draw an offset more.
     Worst,
     /// So many; with [slabs](Overflow::Slabs) at least [`MIN_SLAB_PLACES`].
     AtMost(u32),
@@ -35,7 +37,8 @@ pub enum Residency {
     /// Least predicted work that fits.
     Auto,
     /// Nowhere: their Gaussians are evaluated once when bound, and are in memory, 32 bytes each. For scenes that
-    /// [look the same](crate::Bundle::n_gaussians) from everywhere.
+    /// [look the same](crate::Bundle::n_gaussians) from everywhere. Evaluated in the
+    /// [reference arithmetic](crate::arithmetic::ReferenceArithmetic), whatever the frame is drawn in.
     Baked,
     /// In memory, as integers, decoded once when bound.
     Resident,
@@ -49,8 +52,8 @@ pub enum Residency {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Strips {
-    /// One if it fits; otherwise the most of 2, 4 and 8 that fit, as many in a pass as the memory has places for. In
-    /// [slabs](Overflow::Slabs) the fewest.
+    /// Those that take the least predicted work. Of equals one, or else the most of 2, 4 and 8; in [slabs](Overflow::Slabs) the
+    /// fewest.
     Auto,
     /// So many, 1..=[`MAX_STRIPS`], in no more memory than one of them needs.
     Exactly(u8),

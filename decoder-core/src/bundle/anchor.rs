@@ -74,7 +74,7 @@ impl<'b> Bundle<'b> {
     /// [`DecodeError::BufferTooShort`].
     ///
     /// # Budget
-    /// With tables about 32 bisections each; with a context nothing.
+    /// With tables a look at each entry and 64 bisections, each; with a context nothing.
     pub fn anchor_models<'s>(&self, scratch: &'s mut [u32]) -> Result<AnchorModels<'b, 's>, DecodeError> {
         self.models(scratch, true)
     }

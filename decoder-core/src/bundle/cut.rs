@@ -21,7 +21,7 @@ const FILE_LEN: core::ops::Range<usize> = 12..16;
 /// That of [`Bundle::parse`], and the header's checksum.
 pub fn cut_after(bytes: &mut [u8], n_tiers: u8) -> Result<usize, DecodeError> {
     let bundle = Bundle::parse(bytes)?;
-    in_range(Field::NTiers, n_tiers.into(), 1, bundle.n_tiers().into())?;
+    in_range(Field::TiersToKeep, n_tiers.into(), 1, bundle.n_tiers().into())?;
     let Tier { end, .. } = bundle.up_to_tier(n_tiers);
     let chunks = bundle.sections().find(|section| section.kind == SectionKind::Chunks).ok_or(DecodeError::Internal)?;
     let file_len = chunks.offset.saturating_add(end);

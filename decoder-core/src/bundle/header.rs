@@ -5,7 +5,7 @@ use super::section::{SECTION_LEN, Section};
 use crate::bytes::{Cursor, Emitter, Fields, crc32, crc32_of};
 use crate::camera::{Camera, MOST_OFF, Rotation};
 use crate::context::N_GROUPS;
-use crate::error::{DecodeError, Field, SectionKind, in_range};
+use crate::error::{DecodeError, Field, SectionKind, in_range, saturate};
 
 /// The first bytes of every bundle. As in PNG: not ASCII, then a name, then line ends that text transfers would change.
 pub const MAGIC: [u8; 8] = *b"\x89PSB\r\n\x1a\n";
@@ -272,14 +272,27 @@ impl Header {
         if !(voxel_size.is_finite() && voxel_size > 0.0) {
             return Err(DecodeError::BadFloat { field: Field::VoxelSize, index: 0 });
         }
-        let normal = normalisation_centre.iter().all(|x| x.is_finite());
-        if !(normal && normalisation_scale.is_finite() && normalisation_scale > 0.0) {
-            return Err(DecodeError::BadFloat { field: Field::Normalisation, index: 0 });
+        let scale_is_sound = normalisation_scale.is_finite() && normalisation_scale > 0.0;
+        let [x, y, z] = normalisation_centre.map(f64::is_finite);
+        if let Some(index) = [x, y, z, scale_is_sound].iter().position(|sound| !sound) {
+            return Err(DecodeError::BadFloat { field: Field::Normalisation, index: saturate(index) });
         }
-        if preview.check().is_err() {
-            return Err(DecodeError::BadFloat { field: Field::PreviewCamera, index: 0 });
-        }
+        preview.check().map_err(of_preview)?;
         in_range(Field::PreviewRotation, preview.rotation.off(), 0, MOST_OFF)
+    }
+}
+
+/// What is wrong with a preview: which of its 16 floats, in their order in the file, or how many pixels along a side.
+fn of_preview(error: DecodeError) -> DecodeError {
+    let bad = |index| DecodeError::BadFloat { field: Field::PreviewCamera, index };
+    match error {
+        DecodeError::BadFloat { field: Field::CameraFocal, index } => bad(index.saturating_add(12)),
+        DecodeError::BadFloat { field: Field::CameraPrincipal, index } => bad(index.saturating_add(14)),
+        DecodeError::BadFloat { index, .. } => bad(index),
+        DecodeError::OutOfRange { found, limit, .. } => {
+            DecodeError::OutOfRange { field: Field::PreviewCamera, found, limit }
+        }
+        other => other,
     }
 }
 

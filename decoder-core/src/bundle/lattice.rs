@@ -25,12 +25,12 @@ impl<'a> Lattice<'a> {
         let mut cursor = Cursor::new(section, SectionKind::Lattice);
         let mut fields = Fields::new(cursor.record::<16>()?);
         let min = fields.i32s();
-        let [bits, reserved @ ..] = fields.bytes::<4>();
+        let [bits, a, b, c] = fields.bytes();
         for cell in min {
             in_range(Field::LatticeMin, cell.unsigned_abs(), 0, MAX_LATTICE_MIN)?;
         }
         in_range(Field::LatticeBits, bits.into(), 0, MAX_LATTICE_BITS.into())?;
-        in_range(Field::Reserved, u8::from(reserved != [0; 3]).into(), 0, 0)?;
+        in_range(Field::Reserved, a.max(b).max(c).into(), 0, 0)?;
         let n_nodes = usize::from(bits).saturating_mul(3).saturating_mul(N_TRIE_CONTEXTS);
         let (nodes, _) = cursor.pairs(n_nodes.saturating_mul(2))?.as_chunks::<2>();
         cursor.end()?;

@@ -29,8 +29,8 @@ pub struct Section {
 impl Section {
     pub(super) fn parse(row: &[u8; SECTION_LEN]) -> Result<Self, DecodeError> {
         let mut fields = Fields::new(row);
-        let [code, reserved @ ..] = fields.bytes::<4>();
-        in_range(Field::Reserved, u8::from(reserved != [0; 3]).into(), 0, 0)?;
+        let [code, a, b, c] = fields.bytes();
+        in_range(Field::Reserved, a.max(b).max(c).into(), 0, 0)?;
         let [offset, len, crc] = fields.u32s();
         Ok(Self { kind: kind_of(code)?, offset, len, crc })
     }

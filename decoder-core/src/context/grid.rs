@@ -100,7 +100,7 @@ pub struct GridLevel {
     pub kind: LevelKind,
     /// Nodes R along each axis, at least 2.
     pub resolution: u16,
-    /// Rows of its table: R^d, or a power of two below that, and then nodes are hashed.
+    /// Rows of its table: R^d, or a power of two, and then nodes are hashed.
     pub n_rows: u32,
 }
 

@@ -162,7 +162,7 @@ impl GroupStep {
         // −q: octaves −1 to 3.
         let exponent = self.scale_shift.wrapping_sub(SCALE_ONE);
         let part = INVERSE_PART_OF_OCTAVE.get((exponent & 7) as usize).copied().unwrap_or(4096);
-        // 2¹² of the part, 2⁻¹⁴ of the input: at least 2.
+        // 2¹² of the part, 2⁻¹⁴ of the input: at least 1.
         let shift = units.ilog2().cast_signed().wrapping_sub(2).wrapping_add(exponent >> 3).cast_unsigned();
         // An i16 times at most 2¹².
         let half = 1_i32.wrapping_shl(shift.wrapping_sub(1));

@@ -63,6 +63,7 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
             splats: records_in(splats.splats)?,
             rects,
             n: 0,
+            most: 0,
             n_notes: 0,
             places_of_notes: 0,
             order,

@@ -11,7 +11,7 @@ use crate::arithmetic::{Arithmetic, ReferenceArithmetic};
 use crate::budget::Overflow;
 use crate::camera::Camera;
 use crate::error::{DecodeError, Field, RenderError, in_range, saturate};
-use crate::project::{TILE_PIXELS, TileRect, View};
+use crate::project::{Packed28, TILE_PIXELS, TileRect, View};
 use crate::raster::{BlendRule, EMPTY, TilePlace, blend_tile, finish_tile};
 use crate::rules::TILE_PX;
 use crate::stopwatch::{Stage, Stopwatch};
@@ -178,7 +178,9 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
             report.splats_dropped = report.splats_dropped.saturating_add(tally.n_dropped());
             report.max_splats = report.max_splats.max(tally.max_demand());
         }
-        report.scratch_used = saturate(self.decoder.plan.len_with_splats(self.most_in_memory));
+        let bytes = (self.most_in_memory as usize).saturating_mul(size_of::<A::Splat>());
+        let places = saturate(bytes.div_ceil(size_of::<Packed28>()));
+        report.scratch_used = saturate(self.decoder.plan.len_with_splats(places));
         report
     }
 
@@ -220,7 +222,6 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
             decoder.splats.n = 0;
             self.slab = Slab::behind(from);
         } else {
-            let asked = self.strip;
             self.slab = match decoder.gather(&mut self.strip, from, frame, watch) {
                 Ok(slab) => slab,
                 Err(error) => {
@@ -232,9 +233,8 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
             frame.report.slabs = frame.report.slabs.saturating_add(1);
             let n = decoder.splats.n;
             self.in_strip = self.in_strip.saturating_add(n);
-            // It was full when it let go of a strip.
-            let most = if self.strip == asked { n } else { decoder.splats.places() };
-            let most = most.saturating_add(decoder.splats.places_of_notes);
+            // There were more when it let go of some.
+            let most = n.max(decoder.splats.most).saturating_add(decoder.splats.places_of_notes);
             self.most_in_memory = most.max(self.most_in_memory);
             let rects = decoder.splats.rects.iter().take(n as usize);
             let n_first_here =

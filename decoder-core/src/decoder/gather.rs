@@ -123,7 +123,7 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
         frame: &mut Frame,
         watch: &mut impl Stopwatch,
     ) -> Result<Slab, DecodeError> {
-        self.splats.n = 0;
+        (self.splats.n, self.splats.most) = (0, 0);
         let mut pass = Pass { strip: *strip, slab: Slab::behind(from), band: frame.band(*strip), takes_notes: false };
         let before = frame.notes;
         if before == Notes::Taken {
@@ -225,13 +225,13 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
         };
         let n_scalars = u32::from(header.feature_dim) + u32::from(header.n_log_scales());
         let decoded = u32::from(!source.is_resident());
-        gathering.report.chunks_decoded += decoded;
+        gathering.report.chunks_decoded = gathering.report.chunks_decoded.saturating_add(decoded);
         evaluator.forget();
         source.for_each(chunk, first_anchor, row, watch, |number, site, row, watch| {
             watch.enter(Stage::Project);
             let Gathering { keeper, report, .. } = &mut gathering;
-            report.anchors_read += 1;
-            report.anchors_decoded += decoded;
+            report.anchors_read = report.anchors_read.saturating_add(1);
+            report.anchors_decoded = report.anchors_decoded.saturating_add(decoded);
             let n_channels = 3 * site.mask.count_ones() + n_scalars;
             report.symbols_decoded += u64::from(decoded * n_channels);
             let position = bundle.position(site.lattice);
@@ -245,7 +245,7 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
             if !is_seen || keeper.pass.band.as_ref().is_some_and(|band| !band.sees_anchor(&anchor)) {
                 return Ok(());
             }
-            report.anchors_visible += 1;
+            report.anchors_visible = report.anchors_visible.saturating_add(1);
             evaluator.visit::<A::Functions>(number, &anchor, (effects, view.eye), watch, &mut gathering);
             Ok(())
         })?;
@@ -265,7 +265,7 @@ struct Gathering<'f, 's, A: Arithmetic> {
 
 impl<A: Arithmetic> GaussianSink for Gathering<'_, '_, A> {
     fn gaussian(&mut self, anchor: u32, offset: usize, gaussian: &Gaussian) {
-        self.report.gaussians += 1;
+        self.report.gaussians = self.report.gaussians.saturating_add(1);
         let place = place(anchor, offset);
         // The first half drops the code where no scene is such.
         if cfg!(feature = "baked") && self.as_baked {
@@ -294,7 +294,7 @@ struct Keeper<'f, 's, A: Arithmetic> {
 impl<A: Arithmetic> Keeper<'_, '_, A> {
     /// * `place`: ascends in the order of the file.
     fn project(&mut self, place: u32, gaussian: &Gaussian, effects: Effects) {
-        let Some((splat, rect)) = self.view.project::<A::Functions>(gaussian, effects) else { return };
+        let Some((mut splat, rect)) = self.view.project::<A::Functions>(gaussian, effects) else { return };
         let touched = self.strips.touched(rect);
         let index = self.pass.strip.index;
         let lies_here = *touched.end() >= index.into() && *touched.start() < self.pass.strip.end_index.into();
@@ -306,6 +306,10 @@ impl<A: Arithmetic> Keeper<'_, '_, A> {
             }
             Admission::Tally(tally) => tally.admits(place),
             Admission::Slab => {
+                // No slab ends behind an infinite depth.
+                if splat.depth > f32::MAX {
+                    splat.depth = f32::MAX;
+                }
                 if self.pass.takes_notes {
                     self.splats.note(self.chunk, splat.depth, touched);
                 }

@@ -37,8 +37,8 @@ pub struct FrameReport {
     pub splats_dropped: u32,
     /// Slabs of depth drawn, or passes where there were places for all splats of a strip.
     pub slabs: u32,
-    /// Splats of the fullest strip, those left out included; the number to plan for. In slabs those drawn before nothing more
-    /// could be seen.
+    /// Splats of the fullest strip, those left out included; the number to plan for, where splats are
+    /// [`Wide`](crate::arithmetic::Wide) 10/7 of it. In slabs those drawn before nothing more could be seen.
     pub max_splats: u32,
     /// Splats of all passes together, one that lies in two counted twice.
     pub strip_splats: u32,

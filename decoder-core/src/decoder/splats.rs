@@ -13,6 +13,8 @@ pub(super) struct SplatStore<'s, S> {
     pub(super) splats: &'s mut [S],
     pub(super) rects: &'s mut [TileRect],
     pub(super) n: u32,
+    /// The most that there were in this pass, before it let go of some.
+    pub(super) most: u32,
     /// Chunks with a note, and the last places, which the notes take.
     pub(super) n_notes: u32,
     pub(super) places_of_notes: u32,
@@ -110,7 +112,7 @@ impl<S: SplatRecord> SplatStore<'_, S> {
         }
     }
 
-    /// Keeps a splat if it lies in `slab`; when there is no place, the slab ends earlier, and what lies behind its end then
+    /// Keeps a splat of finite depth if it lies in `slab`; when there is no place, the slab ends earlier, and what lies behind its end then
     /// makes room: about the farthest eighth.
     ///
     /// # Budget
@@ -181,6 +183,7 @@ impl<S: SplatRecord> SplatStore<'_, S> {
 
     /// Keeps some of the splats, in their order.
     fn retain(&mut self, keeps: impl Fn(&S, &TileRect) -> bool) {
+        self.most = self.most.max(self.n);
         let mut n_kept = 0;
         for i in 0..self.n as usize {
             let Some((before, [splat, ..])) = self.splats.split_at_mut_checked(i) else { break };
@@ -232,6 +235,7 @@ mod tests {
                 splats: &mut std::vec![Packed28::zeroed(); n_places],
                 rects: &mut std::vec![RECT; n_places],
                 n: 0,
+                most: 0,
                 n_notes: 0,
                 places_of_notes: 0,
                 order: &mut std::vec![0; n_places],
@@ -243,6 +247,9 @@ mod tests {
                 store.push_into(&mut slab, &splat(depth), RECT);
             }
             n_dropped += slab.n_left_out;
+            if slab.ends() {
+                assert_eq!(store.most as usize, n_places, "it was full when it let go of some");
+            }
             slabs.push(store.splats.iter().take(store.n as usize).map(SplatRecord::depth).collect());
             if !slab.ends() {
                 return (slabs, n_dropped);
@@ -275,6 +282,12 @@ mod tests {
             drawn.sort_by(f32::total_cmp);
             assert_eq!(drawn, sorted, "{n_places} places");
         }
+    }
+
+    #[test]
+    fn slabs_hold_the_farthest_depth_that_there_is() {
+        let (slabs, n_dropped) = slabs(&[f32::MAX, 2.0, 1.0], 2);
+        assert_eq!((slabs, n_dropped), (std::vec![std::vec![2.0, 1.0], std::vec![f32::MAX]], 0));
     }
 
     #[test]

@@ -32,7 +32,7 @@ impl fmt::Display for DecodeError {
                 write!(f, "{section} is {found} bytes long, the header's counts call for {expected}")
             }
             Self::Misplaced { section, expected, found } => {
-                write!(f, "{section} has a part at offset {found} that must begin at {expected}")
+                write!(f, "{section} begins at offset {found} and must begin at {expected}; write the file anew")
             }
             Self::UnexpectedSection { found, expected } => {
                 write!(f, "the section table has {found} where {expected} must follow")
@@ -46,7 +46,7 @@ impl fmt::Display for DecodeError {
             }
             Self::OutOfRange { field, found, limit } => write!(f, "{field} is {found}, the limit is {limit}"),
             Self::BadFloat { field, index } => {
-                write!(f, "{field}, float {index}: not finite, or not positive where it must be")
+                write!(f, "{field}, float {index}: not finite, or outside its limits")
             }
             Self::BadBound { section, table, entry } => {
                 write!(

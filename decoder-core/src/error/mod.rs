@@ -67,7 +67,7 @@ pub enum DecodeError {
         /// Bytes in the section table.
         found: u32,
     },
-    /// A section, or a chunk in its section, does not begin where the one before it ends.
+    /// A section does not begin where the one before it ends.
     Misplaced {
         /// Where.
         section: SectionKind,
@@ -115,7 +115,7 @@ pub enum DecodeError {
         /// The limit that it violates.
         limit: u32,
     },
-    /// A float is infinite, not a number, or of the wrong sign.
+    /// A float is infinite, not a number, or outside the limits that `FORMAT.md` gives it.
     BadFloat {
         /// Which.
         field: Field,

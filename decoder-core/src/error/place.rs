@@ -113,6 +113,8 @@ pub enum Field {
     ModelBuffer,
     /// Bytes for a row of tiles.
     RowBuffer,
+    /// Tiers that a cut is to leave.
+    TiersToKeep,
 }
 
 impl Field {
@@ -132,7 +134,8 @@ impl Field {
             | Self::ChannelBuffer
             | Self::SiteBuffer
             | Self::ModelBuffer
-            | Self::RowBuffer => ErrorClass::Misuse,
+            | Self::RowBuffer
+            | Self::TiersToKeep => ErrorClass::Misuse,
             _ => ErrorClass::Malformed,
         }
     }
@@ -225,6 +228,7 @@ impl fmt::Display for Field {
             Self::SiteBuffer => "buffer for anchors' sites",
             Self::ModelBuffer => "memory for the models of anchors",
             Self::RowBuffer => "buffer of bytes for a row of tiles",
+            Self::TiersToKeep => "tiers to keep",
         })
     }
 }

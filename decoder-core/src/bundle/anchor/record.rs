@@ -125,7 +125,7 @@ impl RecordMemory<'_> {
         let mut models = bundle.models(scratch, false)?;
         damaged.fill(0);
         let row = row.get_mut(..bundle.header().n_channels()).unwrap_or_default();
-        // `max(1)`: a chunk size of zero would panic; there are always at least 5 channels.
+        // `max(1)`: a chunk size of zero would panic; there are always at least 8 channels.
         let mut slots = records.chunks_exact_mut(layout.len().max(1));
         for chunk in bundle.chunks().take(n_chunks) {
             match decode_chunk(&chunk, layout, &mut slots, row, &mut models) {

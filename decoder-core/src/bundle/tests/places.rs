@@ -114,7 +114,7 @@ fn a_cut_file_is_recognised_in_a_longer_partition() {
         }
         for n_tiers in [0, 4] {
             let error = cut_after(&mut whole.clone(), n_tiers).err();
-            assert!(matches!(error, Some(DecodeError::OutOfRange { field: Field::NTiers, .. })), "{error:?}");
+            assert!(matches!(error, Some(DecodeError::OutOfRange { field: Field::TiersToKeep, .. })), "{error:?}");
         }
     }
 }

@@ -123,7 +123,7 @@ pub(super) fn add(list: &mut List, good: &Good) {
         list.patched(name, reason, &float("Normalisation"), file, at, &value.to_le_bytes());
     }
     for (name, at) in [("preview-width-0", 152), ("preview-height-0", 154)] {
-        list.patched(name, "The preview has no pixels.", &float("PreviewCamera"), file, at, &[0, 0]);
+        list.patched(name, "The preview has no pixels.", &out("PreviewCamera", 0), file, at, &[0, 0]);
     }
     let row = |x: [f32; 3]| x.map(f32::to_le_bytes).concat();
     let rows = [row([1.0, 0.0, 0.0]), row([0.0, 1.0, 0.0]), row([0.0, 0.0, -1.0])].concat();

@@ -114,20 +114,37 @@ impl Camera {
         }
     }
 
+    /// The index of the first float that is not finite, or not positive where it must be, in the order of the fields.
+    pub(crate) fn first_unusable(&self) -> Option<u32> {
+        let mut first = 0_u32;
+        let parts: [(&[f32], f32); 4] = [
+            (self.rotation.numbers(), FINITE),
+            (&self.translation, FINITE),
+            (&self.focal_px, POSITIVE),
+            (&self.principal_px, FINITE),
+        ];
+        for (floats, least) in parts {
+            if let Some(index) = first_outside(floats, least) {
+                return Some(first.wrapping_add(index));
+            }
+            first = first.wrapping_add(floats.len() as u32);
+        }
+        None
+    }
+
     /// Checks that every float is finite, the focal lengths positive and the frame not empty; that the rotation is one was
     /// checked when it was [made](Rotation::new).
     ///
     /// # Errors
     /// [`DecodeError::BadFloat`] or [`DecodeError::OutOfRange`] naming the field.
     pub fn check(&self) -> Result<(), DecodeError> {
-        let floats: [(Field, u8, &[f32], f32); 4] = [
-            (Field::CameraPose, 0, self.rotation.numbers(), FINITE),
-            (Field::CameraPose, 9, &self.translation, FINITE),
-            (Field::CameraFocal, 0, &self.focal_px, POSITIVE),
-            (Field::CameraPrincipal, 0, &self.principal_px, FINITE),
-        ];
-        for (field, first, floats, least) in floats {
-            check_floats(field, first.into(), floats, least)?;
+        if let Some(index) = self.first_unusable() {
+            let (field, first) = match index {
+                ..12 => (Field::CameraPose, 0),
+                12 | 13 => (Field::CameraFocal, 12),
+                _ => (Field::CameraPrincipal, 14),
+            };
+            return Err(DecodeError::BadFloat { field, index: index.wrapping_sub(first) });
         }
         in_range(Field::FrameWidth, self.width_px.into(), 1, u32::MAX)?;
         in_range(Field::FrameHeight, self.height_px.into(), 1, u32::MAX)
@@ -165,14 +182,9 @@ const FINITE: f32 = f32::MIN;
 /// The least positive number.
 const POSITIVE: f32 = f32::from_bits(1);
 
-/// Names the first float that is not finite or below `least`; the first of `floats` has number `first` in its field.
-fn check_floats(field: Field, first: u32, floats: &[f32], least: f32) -> Result<(), DecodeError> {
-    for (&x, index) in floats.iter().zip(first..) {
-        if !(least <= x && x <= f32::MAX) {
-            return Err(DecodeError::BadFloat { field, index });
-        }
-    }
-    Ok(())
+/// The index of the first float that is not finite or below `least`.
+fn first_outside(floats: &[f32], least: f32) -> Option<u32> {
+    (0..).zip(floats).find(|(_, x)| !(least <= **x && **x <= f32::MAX)).map(|(index, _)| index)
 }
 
 #[cfg(test)]

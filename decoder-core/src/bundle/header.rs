@@ -277,22 +277,11 @@ impl Header {
         if let Some(index) = [x, y, z, scale_is_sound].iter().position(|sound| !sound) {
             return Err(DecodeError::BadFloat { field: Field::Normalisation, index: saturate(index) });
         }
-        preview.check().map_err(of_preview)?;
-        in_range(Field::PreviewRotation, preview.rotation.off(), 0, MOST_OFF)
-    }
-}
-
-/// What is wrong with a preview: which of its 16 floats, in their order in the file, or how many pixels along a side.
-fn of_preview(error: DecodeError) -> DecodeError {
-    let bad = |index| DecodeError::BadFloat { field: Field::PreviewCamera, index };
-    match error {
-        DecodeError::BadFloat { field: Field::CameraFocal, index } => bad(index.saturating_add(12)),
-        DecodeError::BadFloat { field: Field::CameraPrincipal, index } => bad(index.saturating_add(14)),
-        DecodeError::BadFloat { index, .. } => bad(index),
-        DecodeError::OutOfRange { found, limit, .. } => {
-            DecodeError::OutOfRange { field: Field::PreviewCamera, found, limit }
+        if let Some(index) = preview.first_unusable() {
+            return Err(DecodeError::BadFloat { field: Field::PreviewCamera, index });
         }
-        other => other,
+        in_range(Field::PreviewCamera, preview.width_px.min(preview.height_px).into(), 1, u32::MAX)?;
+        in_range(Field::PreviewRotation, preview.rotation.off(), 0, MOST_OFF)
     }
 }
 

@@ -30,7 +30,7 @@ impl<'a> Lattice<'a> {
             in_range(Field::LatticeMin, cell.unsigned_abs(), 0, MAX_LATTICE_MIN)?;
         }
         in_range(Field::LatticeBits, bits.into(), 0, MAX_LATTICE_BITS.into())?;
-        in_range(Field::Reserved, a.max(b).max(c).into(), 0, 0)?;
+        in_range(Field::Reserved, (a | b | c).into(), 0, 0)?;
         let n_nodes = usize::from(bits).saturating_mul(3).saturating_mul(N_TRIE_CONTEXTS);
         let (nodes, _) = cursor.pairs(n_nodes.saturating_mul(2))?.as_chunks::<2>();
         cursor.end()?;

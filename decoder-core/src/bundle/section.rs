@@ -30,7 +30,7 @@ impl Section {
     pub(super) fn parse(row: &[u8; SECTION_LEN]) -> Result<Self, DecodeError> {
         let mut fields = Fields::new(row);
         let [code, a, b, c] = fields.bytes();
-        in_range(Field::Reserved, a.max(b).max(c).into(), 0, 0)?;
+        in_range(Field::Reserved, (a | b | c).into(), 0, 0)?;
         let [offset, len, crc] = fields.u32s();
         Ok(Self { kind: kind_of(code)?, offset, len, crc })
     }

@@ -1,6 +1,6 @@
 //! A rotation that was checked to be one.
 
-use super::{FINITE, check_floats};
+use super::{FINITE, first_outside};
 use crate::error::{DecodeError, Field, in_range};
 
 /// Parts into which errors divide a unit.
@@ -43,7 +43,9 @@ impl Rotation {
     /// [`DecodeError::BadFloat`] names the first number that is not finite; [`DecodeError::OutOfRange`] says how far a matrix
     /// is from a rotation, and [the limit](Self::TOLERANCE), in 10 000ths.
     pub fn new(rows: [f32; 9]) -> Result<Self, DecodeError> {
-        check_floats(Field::CameraPose, 0, &rows, FINITE)?;
+        if let Some(index) = first_outside(&rows, FINITE) {
+            return Err(DecodeError::BadFloat { field: Field::CameraPose, index });
+        }
         let rotation = Self(rows);
         in_range(Field::CameraRotation, rotation.off(), 0, MOST_OFF)?;
         Ok(rotation)

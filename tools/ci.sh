@@ -394,6 +394,7 @@ job_demo() {
 # A plan of runs, killed at a random moment under either executor, ends in the same tables.
 job_many-runs() {
   need_command python3 python3 python3-venv
+  need_command pkill procps
   python3 -c 'import ensurepip' 2>/dev/null || fail "python3 makes no virtual environments: install it (Debian: apt-get install python3-venv)"
   cargo build -q --release --locked
   tests/many-runs/test.sh "$target/release/pocketsplat" "$target/many-runs"

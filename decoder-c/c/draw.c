@@ -51,6 +51,11 @@ static int failed(psb_status status) {
   return 1;
 }
 
+/* So that a tile that does not come shows. */
+static void clear_frame(void) {
+  for (size_t i = 0; i < sizeof frame; i++) frame[i] = 0xA5;
+}
+
 /* The same frame with a third of its memory, the rest being slow: 1 if a pixel differs, if a byte fewer of the slow memory is not refused, or
  * if there is no such plan. */
 static int differs_in_two_regions(const uint8_t *bundle, size_t bundle_len, psb_budget budget, const psb_camera *camera, size_t whole_bytes,
@@ -66,6 +71,7 @@ static int differs_in_two_regions(const uint8_t *bundle, size_t bundle_len, psb_
   if (psb_bind(place, sizeof place, bundle, bundle_len, &budget, scratch, plan.scratch_bytes, slow, plan.slow_scratch_bytes, &decoder,
                &message) != PSB_STATUS_OK)
     return 1;
+  clear_frame();
   if (psb_render(decoder, camera, take_tile, (void *)&camera->width_px, NULL, &message) != PSB_STATUS_OK) return 1;
   return crc32(frame, 3 * (size_t)camera->width_px * camera->height_px) != crc;
 }
@@ -96,6 +102,7 @@ int draw_orbit(const char *name, const uint8_t *bundle, size_t bundle_len) {
     for (unsigned side = 0; side < SIDES; side++) {
       status = psb_orbit(&preview, 6.2831855f * (float)side / 4.0f, &camera, &message);
       if (status != PSB_STATUS_OK) return failed(status);
+      clear_frame();
       status = psb_render(decoder, &camera, take_tile, &camera.width_px, &report, &message);
       if (status != PSB_STATUS_OK || report.splats == 0) return failed(status);
       /* Piece by piece the same pixels come. */

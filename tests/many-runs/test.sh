@@ -68,8 +68,22 @@ finished() { # FOLDER
   done
 }
 
+# Kills a session. A process may start another one while pkill looks at them: again, until none is alive. Returns how the first ended.
+kill_session() { # PID
+  local status=0
+  # Bash would say that it was killed.
+  { while pkill -KILL -s "$1" --runstates D,R,S,T; do sleep 0.05; done; wait "$1" || status=$?; } 2>/dev/null
+  return $status
+}
+
+# So that a run that nothing killed passes for none that was.
+(exec setsid sleep 60) &
+sleeper=$!
+sleep 0.5
+kill_session $sleeper && fail "a session cannot be killed here" || [ $? -eq 137 ] || fail "a session cannot be killed here"
+
 killed() { # NAME OPTIONS…
-  local name=$1 folder=$out/killed pid after
+  local name=$1 folder=$out/killed pid after status=0
   shift
   plan "$folder"
   after=$((RANDOM % (whole_s + 1))).$((RANDOM % 10))
@@ -77,8 +91,9 @@ killed() { # NAME OPTIONS…
   (cd "$folder" && exec setsid "$venv/bin/snakemake" "$@" >"$out/killed.log" 2>&1) &
   pid=$!
   sleep "$after"
-  # A process may start another one while pkill looks at them: again, until none is alive. Bash would say that it was killed.
-  { while pkill -KILL -s "$pid" --runstates D,R,S,T; do sleep 0.05; done; wait "$pid" || true; } 2>/dev/null
+  kill_session "$pid" || status=$?
+  # It may have ended before.
+  [ "$status" -eq 137 ] || [ "$status" -eq 0 ] || fail "$name ended with status $status: $(tail -n 30 "$out/killed.log")"
   finished "$folder" >"$out/finished"
   snakemake "$folder" "$@" >"$out/again.log" 2>&1 || fail "$name, killed after $after s, does not go on: $(tail -n 30 "$out/again.log" "$folder"/lamp/*.log)"
   finished "$folder" >"$out/finished-again"

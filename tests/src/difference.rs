@@ -2,6 +2,11 @@
 
 use std::fmt;
 
+/// The larger of two errors; what is no number is larger than all, so that no maximum loses it.
+pub fn worse(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b <= a { a } else { b }
+}
+
 /// The difference between an 8-bit frame and an f64 one, over all channels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference {
@@ -32,7 +37,7 @@ impl Difference {
                 difference.share_not_rounded += 1.0;
             }
             let steps = 255.0 * error.abs();
-            if steps > difference.worst_steps {
+            if steps.is_nan() || steps > difference.worst_steps {
                 difference.worst_steps = steps;
                 difference.worst_px = [i / 3 % width_px, i / 3 / width_px];
             }

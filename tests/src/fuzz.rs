@@ -77,8 +77,12 @@ fn draw_either(bundle: &Bundle<'_>, residency: Residency, n_strips: u8) -> Resul
             assert!(strict == *skipping, "without damage both draw the same");
             assert_eq!(skipping.1.chunks_damaged, 0, "nothing is left out in silence");
         }
+        (Err(DecodeError::ChunkStream { chunk, .. }), Ok((_, report))) if residency == Residency::Streamed => {
+            assert!(report.first_damaged.is_some_and(|first| first <= chunk), "{report:?} against chunk {chunk}");
+            assert!(report.chunks_damaged > 0, "{report:?}");
+        }
+        // A damaged chunk may be out of view: checksums are compared, and chunks in memory decoded, when bound.
         (Err(DecodeError::ChunkChecksum { chunk, .. } | DecodeError::ChunkStream { chunk, .. }), Ok((_, report))) => {
-            // A chunk in memory is damaged whether it is in view or not.
             let named = report.first_damaged <= Some(chunk) || residency != Residency::Streamed;
             assert!(named, "{report:?} against chunk {chunk}");
         }

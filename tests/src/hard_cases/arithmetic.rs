@@ -12,6 +12,7 @@ use super::blobs::{Blob, Blobs};
 use super::gradient::{difference_error, random};
 use super::picture::{Picture, camera};
 use super::{Case, Family, error, n_not_finite, picture};
+use crate::difference::worse;
 
 const ANSWER: &str = "\
 No sum overflows, and every operation is finite and right at the ends of its arguments.";
@@ -35,7 +36,7 @@ fn worst_of(ours: impl Fn(f32) -> f32, exact: impl Fn(f64) -> f64) -> f64 {
     let sizes =
         [0.0, 1e-45, 1e-38, 1e-10, 1e-4, 0.3, 0.499_999_97, 0.5, 1.0, 8.7, 16.6, 40.0, 86.99, 88.0, 104.0, 1e9, 3e38];
     let arguments = sizes.into_iter().chain([f32::INFINITY]).flat_map(|x| [x, -x]);
-    arguments.map(|x| (f64::from(ours(x)) - exact(f64::from(x))).abs()).fold(0.0, f64::max)
+    arguments.map(|x| (f64::from(ours(x)) - exact(f64::from(x))).abs()).fold(0.0, worse)
 }
 
 /// Columns without variance, with less than the floor, of a mean of 100, and plain ones.
@@ -64,7 +65,7 @@ fn divergence_gradient() -> f64 {
         let mut d = vec![0.0; x.len()];
         ChannelMoments::of(&[&x], 4).backward(&WEIGHTS, &x, &mut d);
         let (slope, scale) = slope(&d);
-        worst = worst.max(difference_error(slope, scale, |t| ChannelMoments::of(&[&moved(t)], 4).term(&WEIGHTS)));
+        worst = worse(worst, difference_error(slope, scale, |t| ChannelMoments::of(&[&moved(t)], 4).term(&WEIGHTS)));
     }
     worst
 }
@@ -78,7 +79,7 @@ fn divergence_rounding() -> f64 {
         let exact = ChannelMoments::of(&[&x], 4).term(&WEIGHTS);
         (f64::from(ChannelMoments::of(&[&rounded], 4).term(&weights)) / exact - 1.0).abs()
     };
-    [1, 2, 40].map(of).into_iter().fold(0.0, f64::max)
+    [1, 2, 40].map(of).into_iter().fold(0.0, worse)
 }
 
 /// Bits in f32 against f64: values near and far, scales from 2⁻⁵⁰ to 2⁵⁰; those of a probability at the floor apart.
@@ -91,7 +92,7 @@ fn bits_rounding() -> f64 {
             if !(found.d_value.is_finite() && found.d_log2_scale.is_finite()) {
                 return f64::INFINITY;
             }
-            worst = worst.max((f64::from(found.bits) - exact.bits).abs());
+            worst = worse(worst, (f64::from(found.bits) - exact.bits).abs());
         }
     }
     worst
@@ -111,13 +112,12 @@ fn even_images() -> f64 {
         ssim::backward(Level::detect(), &image, &truth, size_px, &partials, n as f32, &mut rounded);
         let gradients = d.iter().zip(&rounded).map(|(a, b)| (a - f64::from(*b)).abs());
         let scale = d.iter().fold(1.0_f64, |scale, g| scale.max(g.abs()));
-        let worst = gradients.fold(0.0, f64::max) / scale;
-        if worst.is_finite() { worst.max((exact - f64::from(found)).abs()) } else { f64::INFINITY }
+        worse(gradients.fold(0.0, worse) / scale, (exact - f64::from(found)).abs())
     };
     [(0.0, 0.0), (1.0, 1.0), (0.0, 1.0), (1.0, 0.0), (0.5, 0.5), (0.5, 0.500_01)]
         .map(|(x, y)| of(x, y))
         .into_iter()
-        .fold(0.0, f64::max)
+        .fold(0.0, worse)
 }
 
 /// Numbers of head inputs and of a camera's own that are not finite, at the camera and one ulp from it.

@@ -13,6 +13,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::{Case, Family, error, n_not_finite, parameters};
+use crate::difference::worse;
 
 const ANSWER: &str = "\
 A capture may lie 10⁶ units from its origin or be 10⁻⁴ wide: cameras come out right to 10⁻⁸ of the normalised frame. Any set of points
@@ -72,7 +73,7 @@ fn cameras_off(place: Place) -> f64 {
     let (here, there) = (load(Place { scale: 1.0, shift: DVec3::ZERO }), load(place));
     assert_eq!((here.train.len(), there.train.len()), (N_VIEWS as usize, N_VIEWS as usize), "all views");
     let pairs = here.train.iter().zip(&there.train);
-    let worst = pairs.map(|(a, b)| a.camera.centre_world().distance(b.camera.centre_world())).fold(0.0, f64::max);
+    let worst = pairs.map(|(a, b)| a.camera.centre_world().distance(b.camera.centre_world())).fold(0.0, worse);
     if there.points.iter().all(|p| p.is_finite()) { worst } else { f64::INFINITY }
 }
 

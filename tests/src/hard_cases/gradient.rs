@@ -10,6 +10,8 @@ use pocketsplat_trainer::step::{Loss, TargetView, Workspace};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use crate::difference::worse;
+
 /// Steps of the differences; where one crosses a cutoff of the blending, a smaller one may not.
 const STEPS: [f64; 7] = [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10];
 /// No smaller step is tried once a difference is as near as this.
@@ -96,8 +98,8 @@ pub fn errors(scene: &Scene<f32>, camera: &Camera, background: [f64; 3]) -> [f64
     for kind in 0..4 {
         let all = exact[kind].iter().chain(others.iter().flat_map(|other| &other[kind]));
         let scale = all.fold(LEAST_GRADIENT, |scale, g| scale.max(g.abs()));
-        let error = exact[kind].iter().zip(&rounded[kind]).fold(0.0_f64, |worst, (a, b)| worst.max((a - b).abs()));
-        worst[0] = worst[0].max(error / scale);
+        let error = exact[kind].iter().zip(&rounded[kind]).fold(0.0, |worst, (a, b)| worse(worst, (a - b).abs()));
+        worst[0] = worse(worst[0], error / scale);
 
         // Every number moves in proportion to itself.
         let start: Vec<f64> = kinds(&mut exact_scene)[kind].iter().map(|x| **x).collect();
@@ -112,7 +114,7 @@ pub fn errors(scene: &Scene<f32>, camera: &Camera, background: [f64; 3]) -> [f64
             }
             step(&moved, camera, &truth, background).0
         });
-        worst[1] = worst[1].max(error);
+        worst[1] = worse(worst[1], error);
     }
     worst
 }

@@ -12,7 +12,7 @@ use pocketsplat_trainer::scene::Scene;
 use pocketsplat_trainer::step::Workspace;
 
 use super::gradient;
-use crate::difference::Difference;
+use crate::difference::{Difference, worse};
 use crate::frame::{BACKGROUND, draw, info_for, to_core};
 
 /// Edge of a decoder's tile, pixels.
@@ -134,9 +134,9 @@ impl Picture {
                 let difference = Difference::of(&frame.rgb, expected, frame.width_px);
                 [difference.worst_steps, worst_tile(&frame.rgb, expected, frame.width_px)]
             });
-            figures.decoder = figures.decoder.max(worst);
-            figures.tile = figures.tile.max(tile);
-            figures.codec = figures.codec.max(codec_error(&self.scene, &bundle));
+            figures.decoder = worse(figures.decoder, worst);
+            figures.tile = worse(figures.tile, tile);
+            figures.codec = worse(figures.codec, codec_error(&self.scene, &bundle));
         }
 
         let pinhole = Pinhole::<f32>::new(&oracle_cameras[0]);
@@ -146,7 +146,7 @@ impl Picture {
         [figures.trainer, _] = nearest(&oracle, &|expected| {
             let channels = (0..3 * n).map(|i| (planes[i / n * n + i % n], expected[i % n][i / n]));
             let steps = channels.map(|(found, exact)| 255.0 * distance(f64::from(found), exact));
-            [steps.fold(0.0, f64::max), 0.0]
+            [steps.fold(0.0, worse), 0.0]
         });
         let seen = oracle.render(&oracle_cameras[0], background).iter().any(|&colour| colour != background);
         (figures, seen)
@@ -175,7 +175,7 @@ pub(super) fn worst_tile(found: &[u8], exact: &[[f64; 3]], width_px: usize) -> f
         for left in (0..width_px).step_by(TILE_PX) {
             let (bottom, right) = ((top + TILE_PX).min(height_px), (left + TILE_PX).min(width_px));
             let sum: f64 = (top..bottom).flat_map(|y| (left..right).map(move |x| error_at(x, y))).sum();
-            worst = worst.max(sum / ((bottom - top) * (right - left)) as f64);
+            worst = worse(worst, sum / ((bottom - top) * (right - left)) as f64);
         }
     }
     worst
@@ -204,7 +204,7 @@ pub fn codec_error(scene: &Scene<f32>, bundle: &Bundle<'_>) -> f64 {
                     continue;
                 }
                 let error = f64::from(values[a * width + i]) - f64::from(decoded[b * width + i]);
-                worst = worst.max(error.abs() / f64::from(step));
+                worst = worse(worst, error.abs() / f64::from(step));
             }
         }
     }

@@ -7,7 +7,7 @@ use pocketsplat_trainer::render::reference::ReferenceScene;
 
 use super::picture::{background, worst_tile};
 use super::{Case, Family, Probe, error, pictures};
-use crate::difference::Difference;
+use crate::difference::{Difference, worse};
 use crate::frame::{draw_at, info_for, to_core};
 
 const ANSWER: &str = "\
@@ -47,7 +47,7 @@ fn worst(quality: Quality) -> [f64; 2] {
         if std::env::var_os("POCKETSPLAT_CASE").is_some() {
             println!("{quality:?}, {}: {found:?}", case.name);
         }
-        worst = [worst[0].max(found[0]), worst[1].max(found[1])];
+        worst = [worse(worst[0], found[0]), worse(worst[1], found[1])];
     }
     worst
 }

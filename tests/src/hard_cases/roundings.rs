@@ -6,6 +6,7 @@ use pocketsplat_trainer::cost::ArithmeticChoice;
 
 use super::picture::worst_tile;
 use super::{Case, Family, Probe, error, pictures};
+use crate::difference::worse;
 use crate::frame::{draw, draw_in, info_for, to_core};
 
 const ANSWER: &str = "\
@@ -37,11 +38,11 @@ fn worst(choice: ArithmeticChoice) -> [f64; 2] {
         let channels = reference.rgb.iter().zip(&frame.rgb).map(|(a, b)| f64::from(a.abs_diff(*b)));
         let colours: Vec<[f64; 3]> =
             reference.rgb.as_chunks::<3>().0.iter().map(|rgb| rgb.map(|byte| f64::from(byte) / 255.0)).collect();
-        let found = [channels.fold(0.0, f64::max), worst_tile(&frame.rgb, &colours, reference.width_px)];
+        let found = [channels.fold(0.0, worse), worst_tile(&frame.rgb, &colours, reference.width_px)];
         if std::env::var_os("POCKETSPLAT_CASE").is_some() {
             println!("{choice:?}, {}: {found:?}", case.name);
         }
-        worst = [worst[0].max(found[0]), worst[1].max(found[1])];
+        worst = [worse(worst[0], found[0]), worse(worst[1], found[1])];
     }
     worst
 }

@@ -8,6 +8,7 @@ use pocketsplat_trainer::train::config::{Densification, LearningRate, Rates};
 use pocketsplat_trainer::train::{TrainConfig, TrainError, Trainer};
 
 use super::{Case, Family, error, n_not_finite, parameters};
+use crate::difference::worse;
 
 const ANSWER: &str = "\
 Whatever the learning rates and photographs, every parameter stays finite. A run that cannot go on says why and keeps the scene it
@@ -85,7 +86,7 @@ fn run(capture: &Capture, config: TrainConfig) -> f64 {
     let mut worst = 0.0_f64;
     while !trainer.is_done() {
         let ended = matches!(trainer.advance(), Err(TrainError::Diverged { .. }));
-        worst = worst.max(n_not_finite(parameters(&trainer.scene)));
+        worst = worse(worst, n_not_finite(parameters(&trainer.scene)));
         if ended {
             break;
         }

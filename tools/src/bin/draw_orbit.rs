@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::Context as _;
 use clap::Parser;
-use pocketsplat_core::{Budget, Bundle, Decoder};
+use pocketsplat_core::{Budget, Bundle, Decoder, Overflow};
 use pocketsplat_trainer::bundle;
 use pocketsplat_trainer::render::decoder::image_of;
 
@@ -39,7 +39,8 @@ fn main() -> anyhow::Result<()> {
     let preview = bundle.header().preview;
     let [width_px, height_px] = args.size.unwrap_or([preview.width_px, preview.height_px]);
     let preview = preview.resized(width_px, height_px);
-    let plan = bundle.plan(&Budget::for_frame(width_px, height_px).in_bytes(args.bytes))?;
+    let budget = Budget::for_frame(width_px, height_px).in_bytes(args.bytes);
+    let plan = bundle.plan(&budget).or_else(|_| bundle.plan(&budget.with_overflow(Overflow::Slabs)))?;
     let mut scratch = vec![0; plan.scratch_len()];
     let mut decoder = Decoder::bind(&bundle, plan, &mut scratch)?;
     fs::create_dir_all(&args.out).with_context(|| format!("cannot make {}", args.out.display()))?;

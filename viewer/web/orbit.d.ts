@@ -21,12 +21,17 @@ export class Orbit {
   pan(x: number, y: number): void;
   /** Goes nearer by a factor above 1. */
   zoom(factor: number): void;
+  /** Stands as another orbit does, each by its own first view and distance. */
+  follow(other: Orbit): void;
   /** The camera of a frame of this size. */
   camera(widthPx: number, heightPx: number): Camera;
 }
 
-/** Lets mouse, touch and keyboard move an orbit; `changed` is called after each move. Give the element `touch-action: none`. */
-export function handle(element: HTMLElement, orbit: Orbit, changed: () => void): void;
+/**
+ * Lets mouse, touch and keyboard move an orbit; `changed` is called after each move, `quarter` is what the key R does.
+ * Give the element `touch-action: none`.
+ */
+export function handle(element: HTMLElement, orbit: Orbit, changed: () => void, quarter?: () => void): void;
 
 /** The lens of a camera for frames of another size. */
 export function lensOf(

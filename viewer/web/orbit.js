@@ -87,6 +87,18 @@ export class Orbit {
     this.distance = clamp(this.distance / factor, this.home.distance / 20, this.home.distance * 4);
   }
 
+  /** Stands as another orbit does, each by its own first view and distance. */
+  follow(other) {
+    const scale = this.home.distance / other.home.distance;
+    this.yaw = this.home.yaw + other.yaw - other.home.yaw;
+    this.pitch = clamp(this.home.pitch + other.pitch - other.home.pitch, -MOST_PITCH, MOST_PITCH);
+    this.distance = other.distance * scale;
+    const moved = sum(other.target, scaled(other.home.target, -1));
+    const [from, to] = [other.axes(other.home), this.axes(this.home)];
+    const parts = ['right', 'down', 'forward'].map((axis) => scaled(to[axis], dot(moved, from[axis]) * scale));
+    this.target = sum(this.home.target, ...parts);
+  }
+
   /** The camera of a frame of a size, which shows at least what the preview shows. */
   camera(widthPx, heightPx) {
     const { right, down, forward } = this.axes();
@@ -130,10 +142,10 @@ export function carried(camera, from, to) {
 }
 
 /**
- * Lets mouse, touch and keyboard move an orbit. `changed` is called after each move.
+ * Lets mouse, touch and keyboard move an orbit. `changed` is called after each move; `quarter` is what the key R does.
  * One finger or the left button turns; two fingers, another button or Shift pan; pinch and wheel zoom.
  */
-export function handle(element, orbit, changed) {
+export function handle(element, orbit, changed, quarter = () => orbit.quarter()) {
   const pointers = new Map();
   const side = () => Math.min(element.clientWidth, element.clientHeight);
   const spread = () => {
@@ -191,8 +203,8 @@ export function handle(element, orbit, changed) {
       '-': () => orbit.zoom(1 / 1.1),
       _: () => orbit.zoom(1 / 1.1),
       0: () => orbit.reset(),
-      r: () => orbit.quarter(),
-      R: () => orbit.quarter(),
+      r: quarter,
+      R: quarter,
       Home: () => orbit.reset(),
     };
     const move = moves[event.key];

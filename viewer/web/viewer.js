@@ -44,11 +44,7 @@ function settingsOf(view, [widthPx, heightPx]) {
 /** One camera for all: in the world's frame where the bundles are of one capture, else around each scene by itself. */
 function cameraOf(view, widthPx, heightPx) {
   if (view.orbit) {
-    const { yaw, pitch, distance } = orbit.home;
-    const own = view.orbit.home;
-    view.orbit.yaw = own.yaw + orbit.yaw - yaw;
-    view.orbit.pitch = own.pitch + orbit.pitch - pitch;
-    view.orbit.distance = (own.distance * orbit.distance) / distance;
+    view.orbit.follow(orbit);
     return view.orbit.camera(widthPx, heightPx);
   }
   const camera = orbit.camera(widthPx, heightPx);
@@ -185,7 +181,10 @@ function offer() {
 }
 
 function listen() {
-  handle(stage, orbit, moved);
+  const quarter = () => {
+    for (const each of [orbit, ...views.map((view) => view.orbit)]) each?.quarter();
+  };
+  handle(stage, orbit, moved, quarter);
   stage.addEventListener('pointerdown', stopSpinning);
   document.addEventListener('keydown', (event) => {
     if (event.ctrlKey || event.altKey || event.metaKey) return;
@@ -197,10 +196,7 @@ function listen() {
     event.preventDefault();
   });
   $('spin').addEventListener('click', spin);
-  $('quarter').addEventListener('click', () => {
-    for (const each of [orbit, ...views.map((view) => view.orbit)]) each?.quarter();
-    moved();
-  });
+  $('quarter').addEventListener('click', () => (quarter(), moved()));
   $('reset').addEventListener('click', () => (orbit.reset(), moved()));
   $('save').addEventListener('click', save);
   $('target').addEventListener('change', () => showInstructions($('stages'), views, $('target').value));

@@ -37,6 +37,10 @@ impl Shot {
             image = framing.image(&image);
             mask = mask.as_ref().map(|mask| framing.mask(mask));
         }
+        if mask.as_ref().is_some_and(|mask| mask.n_valid() == 0) {
+            let path = self.mask.clone().unwrap_or_else(|| self.path.clone());
+            return Err(ViewFault::Mask { path, message: "leaves no pixel of its image at this size".to_owned() });
+        }
         Ok(Photo { photograph: Photograph { image, mask }, camera: self.camera(&framing), shown })
     }
 

@@ -66,7 +66,8 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
         Intrinsics { fl_x, fl_y, cx, cy, w, h, ..Intrinsics::default() }
     };
     let names = names_by_number(&pictures);
-    let first = names.keys().next().copied().unwrap_or(0);
+    // From 0 or from 1, whichever picture is missing.
+    let first = usize::from(!names.contains_key(&0) && names.contains_key(&metadata.poses.len()));
     let quaternion = |&[x, y, z, w, ..]: &[f64; 7]| DQuat::from_xyzw(x, y, z, w);
     let rotations: Vec<_> = metadata.poses.iter().map(|pose| rotation_of(quaternion(pose))).collect();
     let frame = |(i, &[.., x, y, z]): (usize, &[f64; 7])| {

@@ -6,10 +6,18 @@ use anyhow::{Context, Result, bail};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Background, Capture, View};
 use pocketsplat_core::Bundle;
+use pocketsplat_core::bundle::crc32;
 use pocketsplat_trainer::bundle::{for_each_chunk, normalisation_of, protocol_of};
+use serde::Deserialize;
 
 use super::capture::{CaptureArgs, refuse_gaussians};
-use crate::config::{CaptureOptions, Protocol};
+use crate::config::{CaptureOptions, Protocol, RunConfig};
+
+/// What a run's result.json says of its bundle; nothing in those of earlier programs.
+#[derive(Deserialize)]
+struct Written {
+    bundle_crc: Option<u32>,
+}
 
 /// The bytes of a bundle and where they came from.
 pub(crate) struct BundleFile {
@@ -22,6 +30,35 @@ impl BundleFile {
         refuse_gaussians(path)?;
         let bytes = std::fs::read(path).with_context(|| format!("could not read the bundle {}", path.display()))?;
         Ok(Self { path: path.to_owned(), bytes })
+    }
+
+    /// The bundle of a finished run: where it was written, or beside the run's folder where both have moved.
+    ///
+    /// # Errors
+    /// There is none, or it is not what the run wrote.
+    pub(crate) fn of_run(folder: &Path, config: &RunConfig) -> Result<Self> {
+        let name = config.output.file_name().unwrap_or_default();
+        let beside = folder.parent().unwrap_or(folder).join(name);
+        let path = if config.output.is_file() { &config.output } else { &beside };
+        if !path.is_file() {
+            bail!("there is no bundle {}, nor {}; put it back there", config.output.display(), beside.display());
+        }
+        let file = Self::read(path)?;
+        let result = folder.join("result.json");
+        let text = std::fs::read_to_string(&result)
+            .with_context(|| format!("could not read {}: is the run finished?", result.display()))?;
+        let written: Written =
+            serde_json::from_str(&text).with_context(|| format!("{} is no result of a run", result.display()))?;
+        let found = crc32(&file.bytes);
+        match written.bundle_crc {
+            Some(needed) if needed != found => bail!(
+                "{} has the checksum {found:08x}, and the run in {} wrote {needed:08x}: another run has replaced it; train that one \
+                 anew, with another --output",
+                path.display(),
+                folder.display()
+            ),
+            _ => Ok(file),
+        }
     }
 
     /// Checks the file; says so when it is cut at the end of a tier.

@@ -7,6 +7,7 @@ use anyhow::{Context, Result};
 use pocketsplat_trainer::cost::on_front;
 use serde::{Deserialize, Serialize};
 
+use super::bundle::BundleFile;
 use super::eval::Evaluation;
 use super::{output, point};
 use crate::config::{Difference, RunConfig};
@@ -52,7 +53,11 @@ struct RunResult {
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
-    let configs = args.runs.iter().map(|run| RunConfig::read(&run.join("config.toml"))).collect::<Result<Vec<_>>>()?;
+    let config = |run: &PathBuf| {
+        let config = RunConfig::read(&run.join("config.toml"))?;
+        Ok(RunConfig { output: BundleFile::of_run(run, &config)?.path, ..config })
+    };
+    let configs = args.runs.iter().map(config).collect::<Result<Vec<_>>>()?;
     let evaluations = configs.iter().map(|config| point::measured(config, None)).collect::<Result<Vec<_>>>()?;
     let runs = args.runs.iter().zip(configs.iter().zip(&evaluations));
     let lines = runs.map(|(run, compared)| line(run, compared, (&configs[0], &evaluations[0])));

@@ -1,6 +1,7 @@
 //! `pocketsplat doctor`: what is wrong with a capture, and what to do about it.
 
 use std::path::PathBuf;
+use std::process::ExitCode;
 
 use anyhow::{Result, bail};
 use pocketsplat_capture::dataset::{LoadOptions, Severity, diagnose};
@@ -27,7 +28,7 @@ pub(crate) struct Args {
     json: bool,
 }
 
-pub(crate) fn run(args: &Args) -> Result<()> {
+pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     refuse_gaussians(&args.dataset)?;
     let options = LoadOptions {
         images: args.images.clone(),
@@ -36,13 +37,13 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         ..LoadOptions::default()
     };
     let diagnosis = diagnose(&args.dataset, &options);
-    if args.json {
-        output::print(&diagnosis, true)?;
-    } else {
-        println!("{diagnosis}");
+    output::print_or(&diagnosis, args.json, format_args!("{diagnosis}\n"))?;
+    if !diagnosis.has_errors() {
+        return Ok(ExitCode::SUCCESS);
     }
-    if diagnosis.has_errors() {
+    if !args.json {
         bail!("{} cannot be trained on: {} errors", args.dataset.display(), diagnosis.count(Severity::Error));
     }
-    Ok(())
+    // The diagnosis has said it.
+    Ok(ExitCode::FAILURE)
 }

@@ -36,6 +36,18 @@ pub(crate) enum Renderer {
     Reference,
 }
 
+impl Renderer {
+    /// As an [`Evaluation`] names it.
+    pub(crate) fn name(self) -> String {
+        format!("{self:?}").to_lowercase()
+    }
+}
+
+/// Which LPIPS a figure is of, as an [`Evaluation`] says it.
+pub(crate) fn lpips_of(lpips: &Lpips) -> String {
+    format!("VGG16, input in {}", lpips.range())
+}
+
 /// Compare the frames of a bundle or of a file of Gaussians with the photographs of a capture.
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -252,7 +264,7 @@ pub(crate) fn measure(
         psnr_db: mean(&rows, |row| row.psnr_db),
         ssim: mean(&rows, |row| row.ssim),
         lpips: lpips_mean,
-        lpips_of: lpips.map(|lpips| format!("VGG16, input in {}", lpips.range())),
+        lpips_of: lpips.map(lpips_of),
         half_size_copy_psnr_db: mean(&rows, |row| row.half_size_copy_psnr_db),
         bundle_bytes: file.bytes.len(),
         bundle_crc: Some(crc32(&file.bytes)),
@@ -260,7 +272,7 @@ pub(crate) fn measure(
         n_gaussians,
         n_views: rows.len(),
         split: split.to_string(),
-        renderer: format!("{renderer:?}").to_lowercase(),
+        renderer: renderer.name(),
         width_px: views[0].camera.width_px,
         height_px: views[0].camera.height_px,
         background: options.background.map_or_else(String::new, |b| b.to_string()),

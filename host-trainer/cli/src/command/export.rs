@@ -48,13 +48,16 @@ pub(crate) struct Args {
     /// How finely colours follow the view: degree of the spherical harmonics.
     #[arg(long, value_name = "0..3", value_parser = clap::value_parser!(u8).range(0..=3), default_value_t = 3)]
     sh_degree: u8,
-    /// Steps of gradient descent towards the bundle's own pictures; 0 keeps the means over the views.
-    #[arg(long, value_name = "N", default_value_t = 2000)]
-    iterations: u32,
+    /// Steps of gradient descent towards the bundle's own pictures; 0 keeps the means over the views [default: 2000]
+    #[arg(long, value_name = "N")]
+    iterations: Option<u32>,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
 }
+
+/// Steps of gradient descent where nobody says how many.
+const ITERATIONS: u32 = 2000;
 
 /// What was written, and what it lost.
 #[derive(Debug, Serialize)]
@@ -142,6 +145,9 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     if GaussiansFile::is_one(&args.bundle) {
         return convert(args, format);
     }
+    if args.dataset.is_none() && args.options != CaptureOptions::default() {
+        bail!("options of photographs need a capture; give its folder as CAPTURE, or leave them out");
+    }
     let file = BundleFile::read(&args.bundle)?;
     let bundle = file.parse()?;
     let source = Source::new(&bundle);
@@ -160,7 +166,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     };
 
     let degree = Degree::ALL[usize::from(args.sh_degree)];
-    let (gaussians, n_left_out) = source.gaussians(&cameras, degree, args.iterations)?;
+    let (gaussians, n_left_out) = source.gaussians(&cameras, degree, args.iterations.unwrap_or(ITERATIONS))?;
     let shown = source.pictures(&cameras.judged)?;
     let to_bundle = |pictures: &[Image]| {
         pictures.iter().zip(&shown).map(|(picture, shown)| psnr_db(picture, shown)).sum::<f64>() / shown.len() as f64
@@ -207,8 +213,11 @@ struct Conversion {
 
 /// Writes the Gaussians of a file in another format; nothing is fitted.
 fn convert(args: &Args, format: Format) -> Result<()> {
-    if args.dataset.is_some() {
-        bail!("{} holds Gaussians, which are written as they are; leave CAPTURE out", args.bundle.display());
+    if args.dataset.is_some() || args.iterations.is_some() || args.options != CaptureOptions::default() {
+        bail!(
+            "{} holds Gaussians, which are written as they are; leave CAPTURE, --iterations and options of photographs out",
+            args.bundle.display()
+        );
     }
     let file = GaussiansFile::read(&args.bundle)?;
     let gaussians = file.gaussians.reduced_to(Degree::ALL[usize::from(args.sh_degree)]);

@@ -109,6 +109,9 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     if args.background == Background::Learned {
         bail!("--background learned is for photographs; choose black or white, which the splats are drawn on");
     }
+    if GaussiansFile::is_one(&args.output) {
+        bail!("{}: import writes a bundle; end the name in .psb", args.output.display());
+    }
     let config = configured(args)?;
     output::check_writable(&args.output)?;
     let file = GaussiansFile::read(&args.points)?;

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::AtomicBool;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use pocketsplat_capture::dataset::{Capture, Split};
 use pocketsplat_core::bundle::crc32;
 use pocketsplat_trainer::metrics::Lpips;
@@ -12,10 +12,10 @@ use super::bundle::BundleFile;
 use super::capture::CaptureArgs;
 use super::devices::DeviceChoice;
 use super::estimate::Estimate;
-use super::eval::{Evaluation, Measurements, Renderer, evaluate};
+use super::eval::{Evaluation, Measurements, Renderer, evaluate, lpips_of};
 use super::output;
 use super::train::{self, Standing, Start};
-use crate::config::RunConfig;
+use crate::config::{Protocol, RunConfig};
 
 /// Brings a point to its end, from wherever it stands; false when it was interrupted before. A device is opened where something is left
 /// to do.
@@ -40,11 +40,17 @@ pub(super) fn measured(config: &RunConfig, lpips: Option<&Lpips>) -> Result<Eval
     let file = BundleFile::read(&config.output)?;
     let path = config.output.with_extension("json");
     let bundle_crc = Some(crc32(&file.bytes));
-    let kept = std::fs::read(&path).ok().and_then(|bytes| serde_json::from_slice::<Evaluation>(&bytes).ok());
-    if let Some(kept) = kept.filter(|kept| kept.bundle_crc == bundle_crc)
-        && (lpips.is_none() || kept.lpips.is_some())
-    {
-        return Ok(kept);
+    if path.is_file() {
+        let kept = serde_json::from_slice::<Evaluation>(&std::fs::read(&path)?);
+        let kept = kept.with_context(|| format!("{} has no figures of a bundle; move it away", path.display()))?;
+        let as_loaded = |protocol: &Protocol| config.capture.or(&protocol.options) == protocol.options;
+        let is_alike = kept.split == Split::Test.to_string()
+            && kept.renderer == Renderer::Core.name()
+            && kept.protocol.as_ref().is_some_and(as_loaded)
+            && lpips.is_none_or(|lpips| kept.lpips_of == Some(lpips_of(lpips)));
+        if kept.bundle_crc == bundle_crc && is_alike {
+            return Ok(kept);
+        }
     }
     let capture = CaptureArgs { dataset: config.dataset.clone(), options: config.capture.clone() };
     let what = Measurements { per_tier: has_trained_tiers(config), lpips, ..Measurements::default() };

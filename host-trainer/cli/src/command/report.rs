@@ -104,7 +104,7 @@ fn write(folder: &Path, config: &RunConfig, capture: Option<&Capture>, path: &Pa
         )
     })?;
     let result = serde_json::from_str(&text).with_context(|| format!("{} is no result of a run", result.display()))?;
-    let file = BundleFile::read(&config.output)?;
+    let file = BundleFile::of_run(folder, config)?;
     let photographs = capture
         .filter(|capture| !capture.test.is_empty())
         .map(|capture| photographs(&file, capture, &config.capture))

@@ -35,6 +35,9 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     for file in &files {
         file.parse()?;
     }
+    if let Some(path) = &args.output {
+        check_page(path)?;
+    }
     if let (Some(folder), Some(first)) = (&args.package, files.first()) {
         write_package(folder, &first.bytes)?;
     }
@@ -43,12 +46,16 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     if args.open { open(path) } else { Ok(()) }
 }
 
-fn write_page(path: &Path, files: &[BundleFile]) -> Result<()> {
+/// Fails, before anything is written, where `path` can be no page.
+fn check_page(path: &Path) -> Result<()> {
     let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
     if extension != "html" && extension != "htm" {
         bail!("{}: a page is written as .html; end the name in it", path.display());
     }
-    output::check_writable(path)?;
+    output::check_writable(path)
+}
+
+fn write_page(path: &Path, files: &[BundleFile]) -> Result<()> {
     let names = names(&files.iter().map(|file| file.path.as_path()).collect::<Vec<_>>());
     let scenes: Vec<SceneFile<'_>> =
         names.iter().zip(files).map(|(name, file)| SceneFile { name, bytes: &file.bytes }).collect();
@@ -70,11 +77,17 @@ fn names(paths: &[&Path]) -> Vec<String> {
 
 fn write_package(folder: &Path, bundle: &[u8]) -> Result<()> {
     fs::create_dir_all(folder).with_context(|| format!("could not make the folder {}", folder.display()))?;
-    for file in package() {
-        output::write_whole(&folder.join(file.name), file.bytes)?;
+    let files = package().into_iter().map(|file| (file.name, file.bytes)).chain([("scene.psb", bundle)]);
+    let files: Vec<(PathBuf, &[u8])> = files.map(|(name, bytes)| (folder.join(name), bytes)).collect();
+    // A package that was written before is replaced, but nothing of somebody else's.
+    let is_package = folder.join("pocketsplat.wasm").is_file();
+    if let Some((path, _)) = files.iter().find(|(path, _)| path.exists() && !is_package) {
+        bail!("{} exists already, in a folder that is no package; choose another --package", path.display());
     }
-    output::write_whole(&folder.join("scene.psb"), bundle)?;
-    println!("{}: {} files; README.md says how to use them", folder.display(), package().len() + 1);
+    for (path, bytes) in &files {
+        output::write_whole(path, bytes)?;
+    }
+    println!("{}: {} files; README.md says how to use them", folder.display(), files.len());
     Ok(())
 }
 

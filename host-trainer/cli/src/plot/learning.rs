@@ -46,16 +46,17 @@ fn draw(
     runs: &[Named<Vec<LearningRow>>],
     last_iteration: u32,
 ) -> Result<()> {
+    let all = runs.iter().flat_map(|run| points(quantity, &run.what)).map(|(_, value)| value);
+    // PSNR has no zero worth showing; amounts are read by their height.
+    let values = if quantity.axis == PSNR.axis { chart::padded(all) } else { chart::from_zero(all) };
+    let digits = chart::decimals(&values);
     let labels = Labels {
         title: quantity.title,
         x: "iteration",
         y: quantity.axis,
         x_tick: &|x| chart::thousands(*x),
-        y_tick: &|y| chart::thousands(*y),
+        y_tick: &|y| if digits == 0 { chart::thousands(*y) } else { format!("{y:.digits$}") },
     };
-    let all = runs.iter().flat_map(|run| points(quantity, &run.what)).map(|(_, value)| value);
-    // PSNR has no zero worth showing; amounts are read by their height.
-    let values = if quantity.axis == PSNR.axis { chart::padded(all) } else { chart::from_zero(all) };
     // A single run has its name in the title of whatever shows the figure.
     let (area, for_legend) = if runs.len() > 1 {
         let (area, for_legend) = chart::with_legend(panel);

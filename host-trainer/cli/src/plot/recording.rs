@@ -162,6 +162,12 @@ fn settings(mut reader: csv::Reader<&[u8]>) -> Result<Vec<CostPanel>> {
     let place =
         |name: &str| header.iter().position(|column| column == name).with_context(|| format!("no column {name}"));
     let records = reader.records().collect::<Result<Vec<_>, _>>()?;
+    if machines.is_empty() {
+        bail!("it has no column of a front; needs one that ends in ` on_front` for each machine");
+    }
+    if records.is_empty() {
+        bail!("it has no row to draw");
+    }
     let [knob, setting, psnr] = [place("knob")?, place("setting")?, place("PSNR")?];
     let panel = |machine: &str| {
         let is_host = place(&format!("{machine} instructions")).is_err();

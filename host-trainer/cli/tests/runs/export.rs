@@ -65,8 +65,15 @@ fn a_file_of_gaussians_is_written_in_another_format() {
     assert_eq!((&said["n_gaussians"], &said["source_bytes"]), (&made["n_gaussians"], &made["bytes"]));
     let (gaussians, _) = Format::read(&second).unwrap();
     assert_eq!((gaussians.degree, gaussians.len() as u64), (Degree::One, made["n_gaussians"].as_u64().unwrap()));
-    let said = fails(pocketsplat().arg("export").arg(&first).arg(capture()).arg("-o").arg(&second));
-    assert!(said.contains("leave CAPTURE out"), "{said}");
+    let capture = capture().display().to_string();
+    for given in [&[capture.as_str()][..], &["--iterations", "5"], &["--background", "white"]] {
+        let said = fails(pocketsplat().arg("export").arg(&first).args(given).arg("-o").arg(&second));
+        assert!(said.contains("leave CAPTURE, --iterations and options of photographs out"), "{said}");
+    }
+    let said = fails(pocketsplat().arg("export").arg(&bundle).args(["--background", "white", "-o"]).arg(&first));
+    assert!(said.contains("need a capture"), "{said}");
+    let said = fails(pocketsplat().arg("import").arg(&first).arg("-o").arg(&first));
+    assert!(said.contains("end the name in .psb"), "{said}");
 }
 
 #[test]

@@ -140,6 +140,13 @@ fn a_plan_that_train_would_refuse_is_refused_before_any_work() {
     assert!(error.contains("lego/hac-lambda--1-seed-1 is no run") && error.contains("lambda"), "{error}");
     let error = refused(&PLAN.replace("\"scaffold\"", "\"3dgs\""));
     assert!(error.contains("makes no bundle"), "{error}");
+    let names = |names: &str| refused(&format!("{PLAN}[names]\n{names}\n"));
+    let error = names("hac = \"ours\"\nhac-plus = \"ours\"");
+    assert!(error.contains("`hac` and `hac-plus` are both called ours"), "{error}");
+    let error = names("hacc = \"ours\"");
+    assert!(error.contains("calls `hacc` \"ours\"") && error.contains("hac, hac-plus, scaffold"), "{error}");
+    let error = refused(&format!("{PLAN}[[exclude]]\nlambda = 0.002\n"));
+    assert!(error.contains("lambda 0.002, which no run has"), "{error}");
     let error = refused("captures.a.lego = \"missing\"");
     assert!(error.contains("missing"), "{error}");
     assert!(!home.join("runs/runs.json").exists(), "nothing was written");

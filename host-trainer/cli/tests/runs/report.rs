@@ -1,9 +1,10 @@
 //! `pocketsplat report`: the page that a run ends with, in a browser.
 
 use std::fs;
+use std::path::Path;
 
 use crate::chromium;
-use crate::fixture::{capture, folder, pocketsplat, text};
+use crate::fixture::{capture, folder, pocketsplat, text, undisturbed, undisturbed_run};
 
 const SCRIPT: &str = include_str!("report.js");
 
@@ -42,6 +43,35 @@ fn a_run_ends_with_a_page_that_works() {
         .unwrap();
     assert!(without.status.success() && text(&without.stderr).contains("the page will lack photographs"));
     assert!(fs::read_to_string(&again).unwrap().contains("not at hand"));
+}
+
+#[test]
+fn a_report_is_of_the_runs_own_bundle_wherever_both_lie() {
+    let home = folder("report-moved");
+    let run = home.join("scene.run");
+    fs::create_dir(&run).unwrap();
+    let report = || {
+        let output = pocketsplat().arg("report").arg(&run).output().unwrap();
+        (output.status.success(), text(&output.stderr))
+    };
+    for name in ["config.toml", "result.json", "progress.csv"] {
+        fs::copy(undisturbed_run().join(name), run.join(name)).unwrap();
+    }
+    let config = fs::read_to_string(run.join("config.toml")).unwrap();
+    let elsewhere = home.join("elsewhere/scene.psb").display().to_string();
+    let line =
+        |line: &str| if line.starts_with("output") { format!("output = \"{elsewhere}\"") } else { line.to_owned() };
+    fs::write(run.join("config.toml"), config.lines().map(line).collect::<Vec<_>>().join("\n")).unwrap();
+    let (_, said) = report();
+    assert!(said.contains("there is no bundle") && said.contains(&elsewhere), "{said}");
+    let bundle = home.join("scene.psb");
+    fs::write(&bundle, undisturbed()).unwrap();
+    let (good, said) = report();
+    assert!(good, "{said}");
+    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/golden/static.psb");
+    fs::copy(golden, &bundle).unwrap();
+    let (_, said) = report();
+    assert!(said.contains("another run has replaced it"), "{said}");
 }
 
 #[test]

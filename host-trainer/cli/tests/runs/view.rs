@@ -19,6 +19,19 @@ fn a_page_and_a_package_are_written_whole() {
     assert_eq!(fs::read(package.join("scene.psb")).unwrap(), fs::read(golden.join("static.psb")).unwrap());
     assert!(fs::read_to_string(package.join("package.json")).unwrap().contains("\"type\": \"module\""));
     assert!(fs::read(package.join("pocketsplat.wasm")).unwrap().starts_with(b"\0asm"));
+    let into = |package: &Path| {
+        let bundle = golden.join("context.psb");
+        pocketsplat().arg("view").arg(bundle).arg("--package").arg(package).output().unwrap()
+    };
+    assert!(into(&package).status.success(), "a package is written anew");
+    let mine = folder.join("mine");
+    fs::create_dir(&mine).unwrap();
+    fs::write(mine.join("scene.psb"), "mine").unwrap();
+    let said = text(&into(&mine).stderr);
+    assert!(
+        said.contains("scene.psb exists already") && fs::read(mine.join("scene.psb")).unwrap() == b"mine",
+        "{said}"
+    );
 }
 
 #[test]

@@ -141,7 +141,7 @@ fn remove_files(folder: &Path) -> io::Result<()> {
     files(folder)?.into_iter().try_for_each(fs::remove_file)
 }
 
-/// Removes a folder of decoded photographs, and nothing else that may lie in it; none is as good.
+/// Removes a folder of decoded photographs, and nothing else that may lie in it; none is as good. One that a process works with stays.
 ///
 /// # Errors
 /// What the system says.
@@ -149,6 +149,12 @@ pub fn remove_cache(folder: &Path) -> io::Result<()> {
     // Only a folder that was made as a cache.
     if !folder.join(LOCK).is_file() {
         return Ok(());
+    }
+    let lock = File::open(folder.join(LOCK))?;
+    match lock.try_lock() {
+        Ok(()) => {}
+        Err(TryLockError::WouldBlock) => return Ok(()),
+        Err(TryLockError::Error(source)) => return Err(source),
     }
     remove_files(folder)?;
     fs::remove_file(folder.join(LOCK))?;

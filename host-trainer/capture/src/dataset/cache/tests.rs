@@ -67,6 +67,8 @@ fn one_process_works_with_a_cache() {
     let open = || Cache::open_where(folder.path(), 1, |_| Ok(1));
     let first = open().expect("nobody has it");
     assert!(matches!(open(), Err(DatasetError::CacheInUse { .. })));
+    remove_cache(folder.path()).expect("it stays");
+    assert!(folder.path().join(LOCK).is_file(), "another process works with it");
     drop(first);
     open().expect("nobody has it any more");
 }

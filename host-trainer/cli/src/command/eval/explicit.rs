@@ -7,7 +7,7 @@ use pocketsplat_capture::dataset::{Capture, Split, View};
 use super::super::capture::views_of;
 use super::super::gaussians::GaussiansFile;
 use super::super::output;
-use super::{Args, Evaluation, Measurements, Renderer, drawn_views, mean, view_evaluations};
+use super::{Args, Evaluation, Measurements, Renderer, drawn_views, lpips_of, mean, view_evaluations};
 use crate::config::{CaptureOptions, Protocol};
 
 /// The name of what draws them.
@@ -49,7 +49,7 @@ pub(crate) fn measure(
         psnr_db: mean(&rows, |row| row.psnr_db),
         ssim: mean(&rows, |row| row.ssim),
         lpips,
-        lpips_of: what.lpips.map(|lpips| format!("VGG16, input in {}", lpips.range())),
+        lpips_of: what.lpips.map(lpips_of),
         half_size_copy_psnr_db: mean(&rows, |row| row.half_size_copy_psnr_db),
         bundle_bytes: file.n_bytes,
         bundle_crc: None,

@@ -1,5 +1,6 @@
 //! What a plan of runs asks for: captures, and the options of `train` that runs share and differ in.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
@@ -46,6 +47,8 @@ pub(super) struct AskedRun {
     pub(super) scene: String,
     pub(super) size: String,
     pub(super) method: String,
+    /// The method as its options say it.
+    unnamed: String,
     pub(super) rate: String,
     /// Of its capture.
     pub(super) folder: PathBuf,
@@ -93,9 +96,15 @@ impl Spec {
                 bail!("`vary.{option}` is {values}, needs a list of values");
             }
         }
-        for (option, _) in spec.exclude.iter().flatten() {
-            if !spec.vary.contains_key(option) && !["dataset", "scene"].contains(&option.as_str()) {
+        for (option, value) in spec.exclude.iter().flatten() {
+            if ["dataset", "scene"].contains(&option.as_str()) {
+                continue;
+            }
+            let Some(values) = spec.vary.get(option).and_then(Value::as_array) else {
                 bail!("[[exclude]] names `{option}`, which runs do not differ in; needs `scene` or a key of [vary]");
+            };
+            if !values.contains(value) {
+                bail!("[[exclude]] has {option} {value}, which no run has; needs one of `vary.{option}`");
             }
         }
         Ok(spec)
@@ -123,10 +132,34 @@ impl Spec {
                 runs.push(run);
             }
         }
+        self.check_names(&runs)?;
         if runs.is_empty() {
             bail!("no run is left: [captures] is empty, or [[exclude]] takes all");
         }
         Ok(runs)
+    }
+
+    /// Refuses names of no method, and one name of two.
+    fn check_names(&self, runs: &[AskedRun]) -> Result<()> {
+        for (method, name) in &self.names {
+            if !name.is_str() || runs.iter().all(|run| run.unnamed != *method) {
+                let known: BTreeSet<&str> = runs.iter().map(|run| run.unnamed.as_str()).collect();
+                let known: Vec<&str> = known.into_iter().collect();
+                bail!("[names] calls `{method}` {name}; needs a text, for one of the methods {}", known.join(", "));
+            }
+        }
+        let mut by_name: BTreeMap<&str, &str> = BTreeMap::new();
+        for run in runs {
+            let other = by_name.entry(&run.method).or_insert(&run.unnamed);
+            if *other != run.unnamed {
+                bail!(
+                    "`{other}` and `{}` are both called {}; tables would mix them, change [names]",
+                    run.unnamed,
+                    run.method
+                );
+            }
+        }
+        Ok(())
     }
 
     fn scenes(&self) -> Vec<Scene> {
@@ -185,7 +218,8 @@ impl Spec {
             dataset: scene.dataset.clone(),
             scene: scene.name.clone(),
             size,
-            method: self.names.get(&method).and_then(Value::as_str).map_or(method, str::to_owned),
+            method: self.names.get(&method).and_then(Value::as_str).map_or_else(|| method.clone(), str::to_owned),
+            unnamed: method,
             rate: if rate.is_empty() { ONE_RATE.to_owned() } else { rate },
             folder: scene.folder.clone(),
             given,

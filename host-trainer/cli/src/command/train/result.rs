@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use pocketsplat_capture::dataset::{Background, Capture, Split, View};
+use pocketsplat_core::bundle::crc32;
 use pocketsplat_instructions::level::Profile;
 use pocketsplat_trainer::effects::Effect;
 use pocketsplat_trainer::encode::{Encoding, Fitted};
@@ -27,6 +28,8 @@ const MOST_JUDGES: usize = 12;
 pub(crate) struct TrainResult {
     pub(crate) bundle: PathBuf,
     pub(crate) bundle_bytes: usize,
+    /// Its checksum: what is measured later is of this file and no other.
+    pub(crate) bundle_crc: u32,
     /// What a decoder needs: `Device` or `Full`.
     pub(crate) profile: String,
     /// Least level that the whole scene keeps; 0 for none.
@@ -124,6 +127,7 @@ pub(super) fn write_bundle(
     Ok(TrainResult {
         bundle: output.to_owned(),
         bundle_bytes: file.bytes.len(),
+        bundle_crc: crc32(&file.bytes),
         profile: Profile::of(&bundle.header().features).to_string(),
         level: of_whole.map_or(0, |measures| measures.level),
         scratch_bytes: plan.map(|plan| plan.least_len()),

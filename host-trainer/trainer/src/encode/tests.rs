@@ -57,12 +57,13 @@ fn anchors_are_left_out_until_the_bundle_fits() {
     };
     let whole = encode(None).expect("a bundle");
     assert_eq!(whole.cut, None);
-    let flash_bytes = whole.written.bytes.len() as u64 * 9 / 10;
+    let flash_bytes = whole.written.bytes.len() as u64 * 7 / 10;
     let cut = encode(Some(flash_bytes)).expect("a smaller bundle");
     let len = cut.written.bytes.len() as u64;
     assert!(len <= flash_bytes && len * 100 >= flash_bytes * 95, "{len} of {flash_bytes} bytes");
     let lost = cut.cut.expect("something was left out");
-    assert_eq!(lost.flash_bytes, whole.written.bytes.len() as u64);
+    // Coded as coarsely as the limit asks for.
+    assert!((flash_bytes + 1..=whole.written.bytes.len() as u64).contains(&lost.flash_bytes), "{lost:?}");
     assert!(lost.n_anchors > 0, "{lost:?}");
     let error = encode(Some(100)).expect_err("less than a header");
     assert!(matches!(error, EncodeError::TooLarge { limit: "bytes of flash", available: 100, .. }), "{error}");

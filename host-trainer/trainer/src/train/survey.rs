@@ -94,6 +94,8 @@ mod tests {
             trainer.advance().unwrap();
         }
         let mut scene = trainer.scene.clone();
+        // The first offset of every anchor.
+        scene.heads.opacity.b2[0] = -100.0;
         let mut workspace = Workspace::new(&scene.shape);
         let cameras: Vec<&Pinhole<f32>> = trainer.cameras().iter().collect();
         let survey = Survey::new(&scene, &mut workspace, &cameras, false);

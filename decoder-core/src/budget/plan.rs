@@ -186,7 +186,8 @@ impl Bundle<'_> {
     /// the address space.
     ///
     /// # Budget
-    /// At most 192 sums, more where slabs are allowed, 64 times as many with slow memory; reads the manifest and the directory's tiers, no chunk.
+    /// At most 192 sums, more where slabs are allowed, 64 times as many with slow memory; reads the manifest and the
+    /// directory's tiers, no chunk.
     // Not inlined: a caller's stack frame would keep what only planning needs.
     #[inline(never)]
     pub fn plan(&self, budget: &Budget) -> Result<Plan, DecodeError> {

@@ -37,6 +37,11 @@ impl BundleFile {
     /// # Errors
     /// There is none, or it is not what the run wrote.
     pub(crate) fn of_run(folder: &Path, config: &RunConfig) -> Result<Self> {
+        let result = folder.join("result.json");
+        let text = std::fs::read_to_string(&result)
+            .with_context(|| format!("could not read {}: is the run finished?", result.display()))?;
+        let written: Written =
+            serde_json::from_str(&text).with_context(|| format!("{} is no result of a run", result.display()))?;
         let name = config.output.file_name().unwrap_or_default();
         let beside = folder.parent().unwrap_or(folder).join(name);
         let path = if config.output.is_file() { &config.output } else { &beside };
@@ -44,11 +49,6 @@ impl BundleFile {
             bail!("there is no bundle {}, nor {}; put it back there", config.output.display(), beside.display());
         }
         let file = Self::read(path)?;
-        let result = folder.join("result.json");
-        let text = std::fs::read_to_string(&result)
-            .with_context(|| format!("could not read {}: is the run finished?", result.display()))?;
-        let written: Written =
-            serde_json::from_str(&text).with_context(|| format!("{} is no result of a run", result.display()))?;
         let found = crc32(&file.bytes);
         match written.bundle_crc {
             Some(needed) if needed != found => bail!(

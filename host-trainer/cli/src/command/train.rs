@@ -117,7 +117,7 @@ fn begin_or_go_on(args: &Args) -> Result<ExitCode> {
     Ok(code)
 }
 
-/// What a run takes of the machine, and may not get.
+/// The GPU and the port of a run. Either may fail to open, so both are opened before the files of an earlier run are touched.
 struct Machine {
     /// The GPU that trains, where one does.
     device: Option<SharedDevice<f32>>,

@@ -258,6 +258,7 @@ impl Args {
         config.scales_lambda &= self.lambda.is_none() && !is_for_device;
         if is_for_device {
             self.device.choose(&self.quality, self.lambda, &mut config)?;
+            // What is set by hand goes before what the device's limits choose.
             config = self.options.with_set(config)?;
         }
         for (path, name, option) in [(&config.dataset, "dataset", "DATASET"), (&config.output, "output", "--output")] {

@@ -17,7 +17,7 @@ const MIN_SQUARED_SPACING: f64 = 1e-7;
 /// Share of a bundle's lattice that the points may span; the rest is for anchors that grow beyond them.
 const SPANNED_SHARE: f64 = 0.99;
 
-/// The smallest voxel edge at which a bundle can number the cells of `points`, in their units; 0 without points.
+/// The smallest voxel edge at which `points` fit the lattice of a bundle, in their units; 0 without points.
 pub fn least_voxel_size(points: &[DVec3]) -> f64 {
     if points.is_empty() {
         return 0.0;

@@ -18,10 +18,10 @@ pub enum ConfigError {
         /// The most that is accepted.
         high: f64,
     },
-    /// A bundle cannot number so many voxels.
+    /// The points span more voxels than the lattice of a bundle has.
     #[error(
-        "train.voxel_size is {found:e}, needs at least {needed:e}, so that a bundle can number the voxels from one end of the \
-         capture's points to the other; set a larger --voxel-size"
+        "train.voxel_size is {found:e}, needs at least {needed:e}: the capture's points span more voxels than the lattice of a \
+         bundle has; set a larger --voxel-size"
     )]
     VoxelTooSmall {
         /// The edge, normalised units.

@@ -72,7 +72,7 @@ fn some_anchor_is_kept() {
 }
 
 #[test]
-fn voxels_are_no_smaller_than_a_bundle_can_number() {
+fn points_fit_the_lattice_of_a_bundle() {
     let mut capture = tiny_capture();
     capture.points_origin = PointsOrigin::Capture;
     let close = TrainConfig::default().voxel_size_for(&capture);

@@ -28,7 +28,7 @@ pub enum RunError {
         source: std::io::Error,
     },
     /// Somebody else's folder.
-    #[error("{} holds files but no run (it has not both config.toml and lock); choose another folder with --run", path.display())]
+    #[error("{} holds files but no run (it lacks config.toml or lock); choose another folder with --run", path.display())]
     Foreign {
         /// The folder.
         path: PathBuf,

@@ -270,7 +270,7 @@ fn a_step_of_a_resident_scene_agrees_with_the_cpu() {
     }
 }
 
-/// The mean squared error of the last 70 of 300 steps over anchors that stay, and the bits of the scene.
+/// Means of the last 70 of 300 steps over anchors that stay: the squared error, and the bits of the scene.
 fn run(device: Option<SharedDevice<f32>>, backbone: Backbone) -> (f64, Option<f64>) {
     let capture = many_views(7);
     // No growth, and no anchor goes: there a rounding makes another scene, whose bits are 4 % apart.
@@ -287,19 +287,23 @@ fn run(device: Option<SharedDevice<f32>>, backbone: Backbone) -> (f64, Option<f6
     let config = TrainConfig { backbone, rates, densification, ..tiny_config(300) };
     let mut trainer = Trainer::new(&capture, config).expect("a run");
     trainer.set_device(device);
-    let (mut sum, mut bits) = (0.0, None);
+    let (mut error, mut bits) = (0.0, None);
     while !trainer.is_done() {
         let report = trainer.advance().expect("a step").report;
-        if trainer.iteration > 230 {
-            sum += report.squared_error;
+        if trainer.iteration <= 230 {
+            continue;
         }
+        error += report.squared_error / 70.0;
         let n_anchors = trainer.scene.anchors.len() as f64;
-        bits = report.rate.map(|rate| n_anchors * rate.bits.iter().sum::<f64>());
+        if let Some(rate) = report.rate {
+            *bits.get_or_insert(0.0) += n_anchors * rate.bits.iter().sum::<f64>() / 70.0;
+        }
     }
-    (sum / 70.0, bits)
+    (error, bits)
 }
 
-/// Bounds: 0.1 dB, and 2 % of the bits.
+/// Bounds: 0.1 dB, and 2 % of the bits. On the CPU alone, log-scales that begin one rounding away change the mean of the bits by
+/// up to 0.5 %, those of the last step by 5 %.
 #[test]
 fn runs_of_all_backbones_come_to_the_same() {
     let Some(gpu) = gpu() else { return };

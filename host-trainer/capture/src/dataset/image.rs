@@ -145,32 +145,19 @@ impl Image {
     pub fn to_jpeg(&self) -> Result<Vec<u8>, ::image::ImageError> {
         let mut bytes = Vec::new();
         let encoder = ::image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY);
-        let (width_px, height_px) = (self.width_px, self.height_px);
-        encoder.write_image(&self.rgb, width_px, height_px, ::image::ExtendedColorType::Rgb8)?;
+        encoder.write_image(&self.rgb, self.width_px, self.height_px, ::image::ExtendedColorType::Rgb8)?;
         Ok(bytes)
     }
 
-    /// Writes the image as [`Self::to_jpeg`] has it.
+    /// The image as an 8-bit RGB PNG.
     ///
     /// # Errors
-    /// What the encoder or the system said.
-    pub fn write_jpeg(&self, path: &Path) -> Result<(), ::image::ImageError> {
-        Ok(std::fs::write(path, self.to_jpeg()?)?)
-    }
-
-    /// Writes the image as an 8-bit RGB PNG.
-    ///
-    /// # Errors
-    /// What the encoder or the system said.
-    pub fn write_png(&self, path: &Path) -> Result<(), ::image::ImageError> {
-        ::image::save_buffer_with_format(
-            path,
-            &self.rgb,
-            self.width_px,
-            self.height_px,
-            ::image::ExtendedColorType::Rgb8,
-            ::image::ImageFormat::Png,
-        )
+    /// What the encoder said.
+    pub fn to_png(&self) -> Result<Vec<u8>, ::image::ImageError> {
+        let mut bytes = Vec::new();
+        let encoder = ::image::codecs::png::PngEncoder::new(&mut bytes);
+        encoder.write_image(&self.rgb, self.width_px, self.height_px, ::image::ExtendedColorType::Rgb8)?;
+        Ok(bytes)
     }
 }
 
@@ -243,8 +230,9 @@ mod tests {
         let path = folder.path().join("picture.jpg");
         let smooth =
             Image { width_px: 32, height_px: 24, rgb: (0..32 * 24).flat_map(|i| [(i / 4) as u8; 3]).collect() };
-        smooth.write_jpeg(&path).expect("a JPEG");
-        assert!(jpeg_end::is_whole(&std::fs::read(&path).expect("it was written")));
+        let bytes = smooth.to_jpeg().expect("a JPEG");
+        assert!(jpeg_end::is_whole(&bytes));
+        std::fs::write(&path, bytes).expect("it is written");
         let (read, _) = read_composited(&path, Background::Black).expect("a JPEG");
         assert!(read.rgb.iter().zip(&smooth.rgb).all(|(a, b)| a.abs_diff(*b) <= 8));
     }

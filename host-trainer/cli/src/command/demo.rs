@@ -73,9 +73,11 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let view = &capture.test[0];
     let reference = reference_image(&bundle, &ReferenceScene::from_bundle(&bundle)?, &view.camera);
     let decoder = core_image(&bundle, &view.camera)?.image;
-    side_by_side(&[&view.photograph()?.image, &reference, &decoder])
-        .write_png(&picture)
-        .with_context(|| format!("could not write {}", picture.display()))?;
+    let pictures = side_by_side(&[&view.photograph()?.image, &reference, &decoder]);
+    output::write_whole(
+        &picture,
+        &pictures.to_png().with_context(|| format!("could not write {}", picture.display()))?,
+    )?;
 
     let report = serde_json::json!({
         "bundle": bundle_path,

@@ -68,13 +68,14 @@ pub(super) fn write(pictures: &[Image], format: Format, as_sheet: bool, path: &P
     }
     let one = || pictures.first().context("there is no view to draw");
     let named = || format!("could not write {}", path.display());
-    match format {
-        Format::Png => one()?.write_png(path).with_context(named)?,
-        Format::Jpeg => one()?.write_jpeg(path).with_context(named)?,
-        Format::Gif => output::write_whole(path, &gif(pictures).with_context(named)?)?,
-        Format::Apng => output::write_whole(path, &apng(pictures).with_context(named)?)?,
+    let bytes = match format {
+        Format::Png => one()?.to_png().with_context(named)?,
+        Format::Jpeg => one()?.to_jpeg().with_context(named)?,
+        Format::Gif => gif(pictures).with_context(named)?,
+        Format::Apng => apng(pictures).with_context(named)?,
         Format::Folder => return write_numbered(pictures, path),
-    }
+    };
+    output::write_whole(path, &bytes)?;
     Ok(vec![path.to_owned()])
 }
 
@@ -82,7 +83,8 @@ fn write_numbered(pictures: &[Image], folder: &Path) -> Result<Vec<PathBuf>> {
     std::fs::create_dir_all(folder).with_context(|| format!("could not make the folder {}", folder.display()))?;
     let write = |(i, picture): (usize, &Image)| {
         let path = folder.join(format!("{i:04}.png"));
-        picture.write_png(&path).with_context(|| format!("could not write {}", path.display()))?;
+        let bytes = picture.to_png().with_context(|| format!("could not write {}", path.display()))?;
+        output::write_whole(&path, &bytes)?;
         Ok(path)
     };
     pictures.iter().enumerate().map(write).collect()

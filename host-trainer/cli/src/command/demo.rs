@@ -73,11 +73,8 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let view = &capture.test[0];
     let reference = reference_image(&bundle, &ReferenceScene::from_bundle(&bundle)?, &view.camera);
     let decoder = core_image(&bundle, &view.camera)?.image;
-    let pictures = side_by_side(&[&view.photograph()?.image, &reference, &decoder]);
-    output::write_whole(
-        &picture,
-        &pictures.to_png().with_context(|| format!("could not write {}", picture.display()))?,
-    )?;
+    let beside = side_by_side(&[&view.photograph()?.image, &reference, &decoder]);
+    output::write_whole(&picture, &beside.to_png().context("could not encode the picture")?)?;
 
     let report = serde_json::json!({
         "bundle": bundle_path,

@@ -37,6 +37,7 @@ fn scene() -> Scene<f32> {
         offsets: spread(N_ANCHORS * 3 * SHAPE.n_offsets, 1.0),
         mask_logits: spread(N_ANCHORS * SHAPE.n_offsets, 1.0).iter().map(|x| x - 4.8).collect(),
         prune_rank: Vec::new(),
+        rarity: Vec::new(),
         lattice: lattice.into_iter().collect(),
     };
     let mut scene =

@@ -11,7 +11,6 @@ use super::ops::integer_network::IntegerNetwork;
 use super::ops::sample::Sample;
 use super::{Buffer, Commands, Gpu, GpuError};
 use crate::ops::noise::Stream;
-use crate::step::SAMPLE_DRAW;
 
 /// Kernels that all passes share.
 #[derive(Debug)]
@@ -83,9 +82,10 @@ impl NetworkPass {
         gpu: &Gpu,
         stream: Stream,
         share: f64,
+        rarity: &Buffer<f32>,
         anchors: &Buffer<u32>,
     ) -> Result<usize, GpuError> {
-        self.sample.run(gpu, Commands::new(gpu), stream, SAMPLE_DRAW, share, anchors)
+        self.sample.run(gpu, Commands::new(gpu), stream, share, rarity, anchors)
     }
 
     /// Makes room for `n` anchors and the sample that was chosen.

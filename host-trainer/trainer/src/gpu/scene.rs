@@ -69,6 +69,8 @@ pub(super) struct DeviceScene {
     pub(super) positions: Buffer<f32>,
     /// `[n]`; 1 where nothing has ranked the anchors.
     prune_rank: Buffer<f32>,
+    /// `[n]`; 1 where nothing has counted.
+    pub(super) rarity: Buffer<f32>,
     /// Features, log-scales, offsets, mask logits; `[n, width]`.
     pub(super) anchors: [Group; 4],
     /// In file order.
@@ -89,15 +91,15 @@ impl DeviceScene {
         let Trained { scene, moments, heads, context, sums, counts } = trained;
         let (anchors, n) = (&scene.anchors, scene.anchors.len());
         let positions: Vec<f32> = (0..n).flat_map(|a| scene.position(a)).collect();
-        let unranked = vec![1.0; if anchors.prune_rank.is_empty() { n } else { 0 }];
-        let ranks = if anchors.prune_rank.is_empty() { &unranked } else { &anchors.prune_rank };
+        let or_one = |values: &[f32]| if values.is_empty() { vec![1.0; n] } else { values.to_vec() };
         let [features, log_scales, offsets, mask_logits] = moments;
         let moments_of_heads = heads[0].each().zip(heads[1].each());
         let of_heads = scene.heads.each().zip(moments_of_heads);
         Ok(Self {
             shape: scene.shape,
             positions: Buffer::upload(gpu, "positions", &positions)?,
-            prune_rank: Buffer::upload(gpu, "ranks", ranks)?,
+            prune_rank: Buffer::upload(gpu, "ranks", &or_one(&anchors.prune_rank))?,
+            rarity: Buffer::upload(gpu, "rarity", &or_one(&anchors.rarity))?,
             anchors: [
                 Group::upload(gpu, "features", &anchors.features, features)?,
                 Group::upload(gpu, "log-scales", &anchors.log_scales, log_scales)?,

@@ -6,14 +6,12 @@ use pocketsplat_core::entropy::EIGHTHS;
 use super::buffer::refill;
 use super::coding::{Coding, IntegerModel};
 use super::parents::{Parents, give_symbols, give_values};
+use super::sample;
 use crate::ops::noise::Stream;
 use crate::ops::simd::Level;
 use crate::ops::{adaptive_step, anchor_bits, hash_grid, head, mask, perturb};
 use crate::real::Real;
 use crate::scene::{ContextModel, ContextNetwork, Head, ModelShape, Scene};
-
-/// Number of the draw that decides whether an anchor is in the sample; channels are fewer.
-pub const SAMPLE_DRAW: u32 = u32::MAX;
 
 /// The values of a block, or their gradients: `[n, F]`, `[n, 6]` or `[n, 4]`, `[n, 3K]`.
 pub(super) type Values<'a, R> = [&'a mut Vec<R>; N_GROUPS];
@@ -140,10 +138,8 @@ impl<R: Real> Coded<R> {
                 self.perturb(level, &scene.shape, Some(*stream), anchors, values);
             }
             (Coding::Context { stream, rate, exact }, Some(network)) => {
-                self.sampled.extend((0u32..).zip(anchors).filter_map(|(row, anchor)| {
-                    let draw = stream.branch(*anchor).uniform(SAMPLE_DRAW);
-                    (f64::from(draw) < rate.sample).then_some(row)
-                }));
+                let is_sampled = |anchor: u32| sample::holds(*stream, anchor, rate.sample, &scene.anchors.rarity);
+                self.sampled.extend((0u32..).zip(anchors).filter_map(|(row, a)| is_sampled(*a).then_some(row)));
                 self.predict(scene, network, parents, anchors);
                 if let Some(exact) = exact {
                     self.predict_quantised(scene, exact, parents, anchors);

@@ -11,6 +11,7 @@ mod loss;
 pub mod parents;
 mod probe;
 mod resident;
+pub(crate) mod sample;
 mod stages;
 mod target;
 
@@ -27,7 +28,6 @@ use crate::ops::{Pinhole, prefilter, rasterise, tiles, volume};
 use crate::real::Real;
 use crate::scene::{Head, Heads, ModelShape, Scene};
 pub use block::Block;
-pub use coded::SAMPLE_DRAW;
 use coded::{Network, Weights};
 pub use coding::Phase;
 use coding::{Coding, RateReport};

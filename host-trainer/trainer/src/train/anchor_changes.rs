@@ -27,6 +27,7 @@ impl Trainer<'_> {
             let coarsest_cells = self.config.coarsest_cells_for(self.capture);
             densify::grow(scene, optimiser, statistics, &settings, coarsest_cells, rng);
             densify::prune(scene, optimiser, statistics, &settings);
+            self.count_views();
         }
         Ok(())
     }

@@ -73,8 +73,10 @@ impl Trainer<'_> {
             let n_taps = self.config.backbone.n_taps(self.scene.shape.feature_dim);
             self.scene.context = Some(model.with_taps(&self.scene.shape, n_taps, 0.0));
             self.optimiser.begin_context(&self.scene);
+            self.count_views();
         }
     }
+
     /// Anchors to size the context model for: all, or as many as pruning by worth is expected to leave.
     fn n_to_size_context_for(&self) -> usize {
         let n = self.scene.anchors.len();

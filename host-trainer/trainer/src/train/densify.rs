@@ -85,6 +85,9 @@ pub fn grow(
             if !scene.anchors.prune_rank.is_empty() {
                 scene.anchors.prune_rank.push(1.0);
             }
+            if !scene.anchors.rarity.is_empty() {
+                scene.anchors.rarity.push(1.0);
+            }
         }
     }
     for at in eligible {
@@ -158,13 +161,15 @@ pub fn prune(
 /// Drops the anchors that `keep` does not mark, with all that belongs to them.
 pub fn retain(scene: &mut Scene<f32>, optimiser: &mut Optimiser<f32>, statistics: &mut Statistics, keep: &[bool]) {
     let (f, s, k) = (scene.shape.feature_dim, scene.shape.n_log_scales(), scene.shape.n_offsets);
-    let Anchors { lattice, features, log_scales, offsets, mask_logits, prune_rank } = &mut scene.anchors;
+    let Anchors { lattice, features, log_scales, offsets, mask_logits, prune_rank, rarity } = &mut scene.anchors;
     retain_rows(lattice, 1, keep);
     for (values, width) in [(features, f), (log_scales, s), (offsets, 3 * k), (mask_logits, k)] {
         retain_rows(values, width, keep);
     }
-    if !prune_rank.is_empty() {
-        retain_rows(prune_rank, 1, keep);
+    for of_anchors in [prune_rank, rarity] {
+        if !of_anchors.is_empty() {
+            retain_rows(of_anchors, 1, keep);
+        }
     }
     optimiser.retain(keep, &scene.shape);
     statistics.retain(keep, k);

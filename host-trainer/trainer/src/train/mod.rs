@@ -16,6 +16,7 @@ pub mod module;
 pub mod optimiser;
 mod outcome;
 mod probing;
+mod rarity;
 pub(crate) mod read_ahead;
 pub mod resident;
 pub mod run;

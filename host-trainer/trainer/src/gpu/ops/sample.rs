@@ -1,4 +1,4 @@
-//! The anchors of a view whose bits are counted: those with a draw below a share.
+//! The anchors of a view whose bits are counted: [`crate::step::sample`].
 
 use bytemuck::{Pod, Zeroable};
 
@@ -6,6 +6,7 @@ use super::compact::Compact;
 use super::noise::STREAM;
 use crate::gpu::{Buffer, Commands, GROUPS, Gpu, GpuError, Kernel};
 use crate::ops::noise::Stream;
+use crate::step::sample::SAMPLE_DRAW;
 
 /// Its kernel, and the rows of the last view.
 #[derive(Debug)]
@@ -21,7 +22,7 @@ struct Parameters {
     n_rows: u32,
     stream: u32,
     draw: u32,
-    end: u32,
+    share: f32,
 }
 
 impl Sample {
@@ -34,9 +35,9 @@ impl Sample {
         Ok(Self { mark, rows: Compact::new(gpu)? })
     }
 
-    /// Lists the rows of the anchors whose `draw`-th number is below `share`: the CPU's. Returns their number, for which it waits.
+    /// Lists the rows of the anchors whose draw is below `share` times their rarity: the CPU's. Returns their number, for which it waits.
     ///
-    /// * `anchors`: `[n_rows]`.
+    /// * `rarity`: of all anchors. * `anchors`: `[n_rows]`.
     ///
     /// # Errors
     /// [`GpuError`].
@@ -45,16 +46,16 @@ impl Sample {
         gpu: &Gpu,
         mut commands: Commands<'_>,
         stream: Stream,
-        draw: u32,
         share: f64,
+        rarity: &Buffer<f32>,
         anchors: &Buffer<u32>,
     ) -> Result<usize, GpuError> {
         let n_rows = anchors.len();
         self.rows.fit(gpu, n_rows)?;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 2²⁴")]
-        let end = (share * f64::from(1 << 24)).ceil().clamp(0.0, f64::from(1 << 24)) as u32;
-        let parameters = Parameters { n_rows: n_rows as u32, stream: stream.word(), draw, end };
-        commands.run_items(&self.mark, &parameters, &[anchors, &self.rows.marks], n_rows);
+        #[expect(clippy::cast_possible_truncation, reason = "a share")]
+        let share = share as f32;
+        let parameters = Parameters { n_rows: n_rows as u32, stream: stream.word(), draw: SAMPLE_DRAW, share };
+        commands.run_items(&self.mark, &parameters, &[anchors as _, rarity as _, &self.rows.marks as _], n_rows);
         self.rows.run(gpu, commands)
     }
 }
@@ -62,20 +63,24 @@ impl Sample {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::finite_difference::random;
     use crate::gpu::parity::{SIZES, gpu};
+    use crate::step::sample::holds;
 
     #[test]
     fn the_sample_is_the_cpus() {
         let Some(gpu) = gpu() else { return };
-        let mut sample = Sample::new(gpu).expect("room");
+        let mut kernels = Sample::new(gpu).expect("room");
         let stream = Stream::of_run(3).branch(70);
         for (n, share) in SIZES.into_iter().zip([0.5, 1.0, 0.05, 0.0, 0.3]) {
             let anchors: Vec<u32> = (0..n as u32).map(|i| 3 * i + 1).collect();
-            let is_sampled = |a: u32| f64::from(stream.branch(a).uniform(u32::MAX)) < share;
+            let rarity: Vec<f32> = random(7, 3 * n + 1).iter().map(|r| (1.0 + 0.9 * r) as f32).collect();
+            let is_sampled = |a: u32| holds(stream, a, share, &rarity);
             let expected: Vec<u32> = (0..n as u32).filter(|row| is_sampled(anchors[*row as usize])).collect();
             let anchors = Buffer::upload(gpu, "anchors", &anchors).expect("room");
-            let found = sample.run(gpu, Commands::new(gpu), stream, u32::MAX, share, &anchors).expect("runs");
-            assert_eq!((found, sample.rows.items.read(gpu).expect("runs")), (expected.len(), expected));
+            let rarity = Buffer::upload(gpu, "rarity", &rarity).expect("room");
+            let found = kernels.run(gpu, Commands::new(gpu), stream, share, &rarity, &anchors).expect("runs");
+            assert_eq!((found, kernels.rows.items.read(gpu).expect("runs")), (expected.len(), expected));
         }
     }
 }

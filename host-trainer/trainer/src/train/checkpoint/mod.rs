@@ -24,7 +24,7 @@ pub use signature::{CaptureDifference, CaptureSignature};
 pub use state::{RestoreError, Restored};
 
 /// The version that is written and read.
-pub const VERSION: u32 = 7;
+pub const VERSION: u32 = 8;
 
 /// Like PNG's: a byte that is no text, and line ends that a transfer as text would change.
 const MAGIC: [u8; 8] = *b"\x8bPSRUN\r\n";

@@ -132,10 +132,12 @@ impl<'a> Trainer<'a> {
         if let Some(view) = self.queue.iter().find(|view| **view as usize >= n_views) {
             needs("view in the queue", *view as usize, n_views - 1)?;
         }
-        let Anchors { features, log_scales, offsets, mask_logits, prune_rank, .. } = &scene.anchors;
+        let Anchors { features, log_scales, offsets, mask_logits, prune_rank, rarity, .. } = &scene.anchors;
         let n = scene.anchors.len();
-        if !prune_rank.is_empty() {
-            needs("number of prune ranks", prune_rank.len(), n)?;
+        for (what, of_anchors) in [("number of prune ranks", prune_rank), ("number of rarities", rarity)] {
+            if !of_anchors.is_empty() {
+                needs(what, of_anchors.len(), n)?;
+            }
         }
         let Optimiser { features: f, log_scales: s, offsets: o, mask_logits: m, background, .. } = &self.optimiser;
         for (what, values, moments, width) in [

@@ -51,7 +51,8 @@ pub struct Hac {
     pub context_from: f64,
     /// Share from which on values are rounded and the integer model decides. (HAC has no such phase.)
     pub exact_from: f64,
-    /// Share of the visible anchors that the rate is taken over.
+    /// Share of the anchors that a view shows over which its rate is taken; of [rare](crate::scene::Anchors::rarity) ones more, so
+    /// that over a run all anchors weigh alike, as they do in the file.
     pub sample: f64,
     /// Weight of the mean opening of the masks in the loss, while there is a rate; not with [`Backbone::HacPlus`], whose masks
     /// answer for their anchors' bits instead.

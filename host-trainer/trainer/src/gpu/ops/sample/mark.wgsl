@@ -2,11 +2,12 @@ struct Parameters {
     n_rows: u32,
     stream: u32,
     draw: u32,
-    end: u32,
+    share: f32,
 }
 
 @group(0) @binding(0) var<storage, read> anchors: array<u32>;
-@group(0) @binding(1) var<storage, read_write> marks: array<u32>;
+@group(0) @binding(1) var<storage, read> rarity: array<f32>;
+@group(0) @binding(2) var<storage, read_write> marks: array<u32>;
 
 var<immediate> parameters: Parameters;
 
@@ -18,7 +19,8 @@ fn mark(
 ) {
     let row = item_of(group, n_groups, thread);
     if row < parameters.n_rows {
-        let draw = draw_of(branch_of(parameters.stream, anchors[row]), parameters.draw);
-        marks[row] = u32(draw < parameters.end);
+        let anchor = anchors[row];
+        let draw = uniform_of(branch_of(parameters.stream, anchor), parameters.draw);
+        marks[row] = u32(draw < parameters.share * rarity[anchor]);
     }
 }

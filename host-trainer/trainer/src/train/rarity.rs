@@ -1,0 +1,59 @@
+//! How rarely the training views show each anchor.
+
+use rayon::prelude::*;
+
+use super::Trainer;
+use crate::ops::prefilter;
+
+impl Trainer<'_> {
+    /// Counts the training views that may show each anchor, from the first need of a rate on.
+    ///
+    /// A file pays for every anchor alike; a view's rate is that of the anchors which it shows. An anchor that a share p of the views
+    /// shows would pay for its bits in a share p of the steps alone. So it is sampled mean(p)/p times as often where it is shown.
+    ///
+    /// Cost: the prefilter, for every anchor and view.
+    pub(super) fn count_views(&mut self) {
+        if self.scene.context.is_none() {
+            return;
+        }
+        let (scene, cameras) = (&self.scene, &self.cameras);
+        let n_views: Vec<f32> = (0..scene.anchors.len())
+            .into_par_iter()
+            .map(|a| {
+                let shown = self.trained.iter().filter(|view| prefilter::shows(scene, a, &cameras[**view as usize]));
+                // What no view shows never comes into a sample.
+                shown.count().max(1) as f32
+            })
+            .collect();
+        let mean = n_views.iter().sum::<f32>() / n_views.len().max(1) as f32;
+        self.scene.anchors.rarity = n_views.into_iter().map(|n| mean / n).collect();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::train::TrainConfig;
+    use crate::train::test_capture::{many_views, tiny_hac_config};
+
+    #[test]
+    fn over_all_views_every_anchor_is_sampled_alike() {
+        let capture = many_views(7);
+        let config: TrainConfig = tiny_hac_config(60);
+        let mut trainer = Trainer::new(&capture, config).expect("a run");
+        trainer.advance().expect("a step");
+        trainer.count_views();
+        assert!(trainer.scene.anchors.rarity.is_empty(), "there is no rate yet");
+        while !trainer.is_done() {
+            trainer.advance().expect("a step");
+        }
+        let (scene, n) = (&trainer.scene, trainer.scene.anchors.len());
+        assert_eq!(scene.anchors.rarity.len(), n, "through growth and pruning");
+        trainer.count_views();
+        let scene = &trainer.scene;
+        let shown = |a: usize| trainer.cameras.iter().filter(|camera| prefilter::shows(scene, a, camera)).count();
+        let sums: Vec<f32> = (0..n).map(|a| shown(a).max(1) as f32 * scene.anchors.rarity[a]).collect();
+        let mean = sums.iter().sum::<f32>() / n as f32;
+        assert!(sums.iter().all(|sum| (sum / mean - 1.0).abs() < 1e-5), "{sums:?}");
+    }
+}

@@ -1,4 +1,4 @@
-//! The anchors of a view whose bits are counted: [`crate::step::sample`].
+//! The anchors of a view whose bits are counted: `step/sample.rs` on the device.
 
 use bytemuck::{Pod, Zeroable};
 

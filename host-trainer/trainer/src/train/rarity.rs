@@ -33,14 +33,12 @@ impl Trainer<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::train::TrainConfig;
     use crate::train::test_capture::{many_views, tiny_hac_config};
 
     #[test]
     fn over_all_views_every_anchor_is_sampled_alike() {
         let capture = many_views(7);
-        let config: TrainConfig = tiny_hac_config(60);
-        let mut trainer = Trainer::new(&capture, config).expect("a run");
+        let mut trainer = Trainer::new(&capture, tiny_hac_config(60)).expect("a run");
         trainer.advance().expect("a step");
         trainer.count_views();
         assert!(trainer.scene.anchors.rarity.is_empty(), "there is no rate yet");

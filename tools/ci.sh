@@ -83,9 +83,15 @@ llvm_tools() {
 # A program from the registry.
 need_tool() { # CRATE VERSION
   command -v "$1" >/dev/null && return
-  cargo install "$1" --version "$2" --locked --root "$target/tools" --target-dir "$target/tools/build" ||
+  cargo install "$1" --version "$2" --locked --debug --root "$target/tools" --target-dir "$target/tools/build" ||
     fail "$1 is missing: run \`cargo install $1 --version $2 --locked\`"
   rm -rf "$target/tools/build"
+}
+
+# One of this repository's programs, of the tests' build: built alone it would want its libraries once more, with other features.
+program() { # NAME ARGUMENTS…
+  cargo build -q --workspace --bins --tests --locked
+  "$target/debug/$1" "${@:2}"
 }
 
 # --- Jobs: `job_NAME` runs as NAME once NAME is in `jobs` -----------------------------------------------------------
@@ -179,8 +185,8 @@ job_core-embedded() {
 
 # The annotated bundle in the format's description is what the writer writes today, and so are the decoder's tables.
 job_format-doc() {
-  cargo run -q -p tools --bin normal_tables --locked -- --check
-  cargo run -q -p tools --bin hexdump --locked -- --check
+  program normal_tables --check
+  program hexdump --check
 }
 
 # Every crate builds from nothing but what the packages hold, and they hold what a user reads. Not optimised: nothing is run.
@@ -228,65 +234,70 @@ digest_programs=(
   "i686-unknown-linux-gnu qemu-i386 i686-linux-gnu-gcc gcc-i686-linux-gnu libc6-dev-i386-cross"
   "s390x-unknown-linux-gnu qemu-s390x s390x-linux-gnu-gcc gcc-s390x-linux-gnu libc6-dev-s390x-cross"
 )
-# Programs without a system, with the emulated board: Cortex-M0+ code on an M3, M4, M33 without and with FPU, M55, RISC-V without and
-# with atomics and FPU.
+# Emulated boards, with the programs without a system that run on each: Cortex-M0+ and M4 code on an M4, M33 code without and with FPU,
+# on an M55 too, RISC-V without and with atomics and FPU.
 digest_boards=(
-  "thumbv6m-none-eabi mps2-an385"
-  "thumbv7em-none-eabihf mps2-an386"
-  "thumbv8m.main-none-eabi mps2-an505"
-  "thumbv8m.main-none-eabihf mps2-an505"
-  "thumbv8m.main-none-eabihf mps3-an547"
-  "riscv32imc-unknown-none-elf virt"
-  "riscv32imac-unknown-none-elf virt"
-  "riscv32imafc-unknown-none-elf virt"
+  "mps2-an386 thumbv6m-none-eabi thumbv7em-none-eabihf"
+  "mps2-an505 thumbv8m.main-none-eabi thumbv8m.main-none-eabihf"
+  "mps3-an547 thumbv8m.main-none-eabihf"
+  "virt riscv32imc-unknown-none-elf riscv32imac-unknown-none-elf riscv32imafc-unknown-none-elf"
 )
 
 # Halves are converted alike on every target, by whatever instructions it has. Three bundles, one of each coder and one of hard cases,
 # decode to the same symbols and values and draw the same frames.
 job_digests() {
-  local out=$target/digests host found name emulator board compiler packages program
+  local out=$target/digests build=$target/digests/build expected found name board emulator compiler packages row names
   need_command qemu-aarch64 qemu-user
   need_command qemu-system-arm qemu-system-arm
   need_command qemu-system-riscv32 qemu-system-misc
   need_command node nodejs
-  cargo run -q -p conformance --bin digest_bundles --locked -- "$out"
-  digest_of() { # NAME CARGO_ARGUMENTS… -- RUNNER…
-    local name=$1 arguments=()
-    shift
-    while [ "$1" != -- ]; do arguments+=("$1") && shift; done
-    shift
+  program digest_bundles "$out"
+  # Several targets in one call: each program is one unit of code, which one core compiles.
+  build_digests() { # BOARD CARGO_ARGUMENTS…
     (
       cd tests/digest
-      export PSB_STATIC=$out/static.psb PSB_CONTEXT=$out/context.psb PSB_HARD=$out/hard.psb
-      cargo build -q --locked --target-dir "$out/build" "${arguments[@]}"
+      export PSB_BOARD=$1 PSB_STATIC=$out/static.psb PSB_CONTEXT=$out/context.psb PSB_HARD=$out/hard.psb
+      cargo build -q --locked --target-dir "$build" "${@:2}"
     )
-    found=$(timeout 120 "$@" </dev/null) || fail "the digest of $name failed: $found"
-    [ -n "${host:-}" ] || { host=$found && echo "$host"; }
-    [ "$found" = "$host" ] || fail "$name decodes something else: $found"
-    echo "$name: the same"
   }
-  local build=$out/build semihosting=(-display none -monitor none -serial none -semihosting-config enable=on,target=native)
-  digest_of "this machine, release" --release -- "$build/release/digest"
-  digest_of "this machine, debug" -- "$build/debug/digest"
-  for program in "${digest_programs[@]}"; do
-    read -r name emulator compiler packages <<<"$program"
+  digest_of() { # NAME RUNNER…
+    found=$(timeout 120 "${@:2}" </dev/null) || fail "the digest of $1 failed: $found"
+    [ -n "${expected:-}" ] || { expected=$found && echo "$expected"; }
+    [ "$found" = "$expected" ] || fail "$1 decodes something else: $found"
+    echo "$1: the same"
+  }
+  build_digests "" --release
+  digest_of "this machine, release" "$build/release/digest"
+  build_digests ""
+  digest_of "this machine, debug" "$build/debug/digest"
+  names=(--target wasm32-wasip1)
+  need_target wasm32-wasip1
+  for row in "${digest_programs[@]}"; do
+    read -r name emulator compiler packages <<<"$row"
     need_target "$name"
     # shellcheck disable=SC2086 # several packages
     need_command "$compiler" $packages
-    digest_of "$name" --release --target "$name" -- "$emulator" "$build/$name/release/digest"
+    names+=(--target "$name")
   done
-  for program in "${digest_boards[@]}"; do
-    read -r name board <<<"$program"
-    need_target "$name"
+  build_digests "" --release "${names[@]}"
+  for row in "${digest_programs[@]}"; do
+    read -r name emulator _ <<<"$row"
+    digest_of "$name" "$emulator" "$build/$name/release/digest"
+  done
+  # The flag is for the Node.js 18 of Debian 12; later ones need none.
+  digest_of wasm32-wasip1 node --no-warnings --experimental-wasi-unstable-preview1 tests/digest/run.mjs "$build/wasm32-wasip1/release/digest.wasm"
+  for row in "${digest_boards[@]}"; do
+    read -ra names <<<"$row"
+    board=${names[0]} names=("${names[@]:1}")
+    for name in "${names[@]}"; do need_target "$name"; done
+    build_digests "$board" --release "${names[@]/#/--target=}"
     emulator=(qemu-system-arm -M "$board")
     [ "$board" != virt ] || emulator=(qemu-system-riscv32 -M virt -bios none)
-    PSB_BOARD=$board digest_of "$name on $board" --release --target "$name" -- \
-      "${emulator[@]}" "${semihosting[@]}" -kernel "$build/$name/release/digest"
+    emulator+=(-display none -monitor none -serial none -semihosting-config enable=on,target=native)
+    for name in "${names[@]}"; do
+      digest_of "$name on $board" "${emulator[@]}" -kernel "$build/$name/release/digest"
+    done
   done
-  name=wasm32-wasip1
-  # The flag is for the Node.js 18 of Debian 12; later ones need none.
-  need_target $name
-  digest_of $name --release --target $name -- node --no-warnings --experimental-wasi-unstable-preview1 tests/digest/run.mjs "$build/$name/release/digest.wasm"
 }
 
 # A reader written from the documents alone, without the decoder's code, finds in the conformance pack what the decoder finds,
@@ -310,7 +321,7 @@ job_firmware() {
   measure_firmware "$measured"
   firmware-example/compare.sh docs/results/instructions.csv "$measured" ||
     fail "if that is meant, run \`tools/ci.sh bless-instructions\` and commit its table"
-  cargo run -q -p tools --bin fit_instructions --locked -- "$measured" --bundles "$target/firmware" | tail -1
+  program fit_instructions "$measured" --bundles "$target/firmware" | tail -1
 }
 
 # Not one of `jobs`: writes the table that `firmware` compares with.
@@ -335,13 +346,13 @@ measure_firmware() { # CSV
     else
       runs=("${firmware_runs[@]}") options=(--coder "$coder")
     fi
-    cargo run -q -p tools --bin sample_bundle --locked -- "${options[@]}" "$bundle"
+    program sample_bundle "${options[@]}" "$bundle"
     for run in "${runs[@]}"; do
       out=$target/firmware/$coder-${run/ /-}
       # shellcheck disable=SC2086 # a board and its RAM
       CARGO_TARGET_DIR=$embedded firmware-example/measure.sh "$bundle" $run "" "$out" >"$out.csv"
       bytes=$(sed -n 's/.*scratch: \([0-9]*\) bytes.*/\1/p' "$out/log.txt")
-      cargo run -q -p tools --bin draw_orbit --locked -- "$bundle" "$out/host" --bytes "$bytes" >/dev/null
+      program draw_orbit "$bundle" "$out/host" --bytes "$bytes" >/dev/null
       for frame in "$out"/frame*.ppm; do
         cmp "$frame" "$out/host/${frame##*/}" || fail "a frame of $run KiB differs from this machine's, sample $coder"
       done
@@ -369,7 +380,7 @@ job_boards() {
   need_embedded_target
   need_target thumbv8m.main-none-eabihf
   mkdir -p "$target/firmware"
-  [ -s "$bundle" ] || cargo run -q -p tools --bin sample_bundle --locked -- --coder static "$bundle"
+  [ -s "$bundle" ] || program sample_bundle --coder static "$bundle"
   (cd boards && cargo test -q -p pocketsplat-panel --locked --target-dir "$target/boards")
   for board in pico2 stm32f429i-disco; do
     (cd "boards/$board" && PSB_BUNDLE=$bundle cargo build -q --release --locked --target-dir "$embedded")

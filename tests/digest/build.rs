@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::{env, fs};
 
-/// mps2-an385 and mps2-an386.
+/// mps2-an386.
 const CORTEX_M: &str = "MEMORY
 {
   FLASH : ORIGIN = 0x00000000, LENGTH = 4M
@@ -46,11 +46,11 @@ fn main() {
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
     println!("cargo::rerun-if-env-changed=PSB_BOARD");
     let memory = match cfg("PSB_BOARD").as_str() {
-        "mps2-an385" | "mps2-an386" => CORTEX_M,
+        "mps2-an386" => CORTEX_M,
         "mps2-an505" => CORTEX_M33,
         "mps3-an547" => CORTEX_M55,
         "virt" => RISC_V,
-        other => panic!("PSB_BOARD is {other:?}; it must be mps2-an385, mps2-an386, mps2-an505, mps3-an547 or virt"),
+        other => panic!("PSB_BOARD is {other:?}; it must be mps2-an386, mps2-an505, mps3-an547 or virt"),
     };
     fs::write(out.join("memory.x"), memory).expect("OUT_DIR can be written");
     println!("cargo::rustc-link-search={}", out.display());

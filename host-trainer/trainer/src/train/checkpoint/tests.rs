@@ -31,7 +31,7 @@ fn timeless(trainer: &Trainer<'_>) -> Vec<u8> {
     saved(&Trainer { seconds: 0.0, processor_seconds: 0.0, ..trainer.clone() })
 }
 
-/// Twenty runs of each backbone, each stopped after a random iteration and taken up again by a new trainer.
+/// Ten runs of each backbone, each stopped after a random iteration and taken up again by a new trainer.
 #[test]
 fn a_run_taken_up_again_ends_in_the_same_bits() {
     taken_up_again(tiny_config(90), None);
@@ -72,7 +72,7 @@ fn taken_up_again(config: TrainConfig, gauge: Option<&dyn Gauge>) {
     assert!(n_anchors.windows(2).any(|n| n[1] < n[0]), "the run must prune: {n_anchors:?}");
     let last = timeless(&whole);
     let mut rng = ChaCha8Rng::seed_from_u64(7);
-    for _ in 0..20 {
+    for _ in 0..10 {
         let stopped_after = rng.random_range(0..=iterations as usize);
         let Restored { mut trainer, written_by } = Trainer::restore(&capture, &along_the_way[stopped_after]).unwrap();
         assert_eq!(written_by, trainer.kernels());

@@ -32,6 +32,8 @@ fn train(capture: &Capture, backbone: Backbone, seed: u64, n_threads: usize) -> 
         shape: ModelShape { feature_dim: 8, n_offsets: 3, ..TrainConfig::default().shape },
         iterations: 420,
         seed,
+        // A third of the capture's points.
+        voxel_size: Some(0.2),
         ..TrainConfig::default()
     };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().expect("threads start");

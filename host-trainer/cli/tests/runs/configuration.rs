@@ -40,7 +40,7 @@ fn a_written_configuration_gives_the_same_bundle_again() {
         "view_colour = false",
         "view_geometry = false",
         "n_offsets = 3",
-        "voxel_size = 0.001",
+        "voxel_size = 0.2",
     ] {
         assert!(written.lines().any(|l| l == line), "{line}: {written}");
     }

@@ -7,7 +7,7 @@ use pocketsplat_trainer::device::{ModelChoice, widest_within};
 use pocketsplat_trainer::effects::{Effect, Request};
 use pocketsplat_trainer::encode::CoderChoice;
 use pocketsplat_trainer::explicit::CloudConfig;
-use pocketsplat_trainer::scene::QuantisationSteps;
+use pocketsplat_trainer::scene::{ModelShape, QuantisationSteps};
 use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::config::Backbone;
 use pocketsplat_trainer::train::module::pruning::Rank;
@@ -21,7 +21,7 @@ use serde::de::IntoDeserializer as _;
 use serde::de::value::StrDeserializer;
 
 /// How good a scene becomes, and how large.
-#[derive(clap::Args)]
+#[derive(Clone, clap::Args)]
 pub(crate) struct QualityOptions {
     /// Kind of scene: scaffold (Scaffold-GS) is trained for the image alone; hac (HAC), hac-plus (HAC++) and contextgs (ContextGS)
     /// for image and size; 3dgs (3D Gaussian Splatting) makes an uncompressed .ply to compare with
@@ -230,6 +230,11 @@ impl QualityOptions {
             }
         }
         Ok(())
+    }
+
+    /// The same for a run that branches off one of this shape: its features have their width, whatever another backbone's default is.
+    pub(crate) fn keeping_width(&self, shape: &ModelShape) -> Self {
+        Self { feature_dim: self.feature_dim.or(Some(shape.feature_dim)), ..self.clone() }
     }
 
     /// Sets the width of features for a bundle of so many bytes, where the command line leaves it open.

@@ -296,7 +296,11 @@ impl Args {
         }
         let frame = self.device.frame(self.capture.resolution, self.capture.max_resolution.is_some())?;
         let capture = CaptureOptions { resolution: frame, ..self.capture.clone() };
-        applied(&capture, &self.quality, &self.options, config)
+        let quality = match self.from {
+            Some(_) => self.quality.keeping_width(&config.train.shape),
+            None => self.quality.clone(),
+        };
+        applied(&capture, &quality, &self.options, config)
     }
 
     /// Whether explicit Gaussians are asked for.

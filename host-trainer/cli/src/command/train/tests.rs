@@ -84,3 +84,26 @@ fn a_run_on_decoded_photographs_is_interrupted_resumed_and_ends_in_the_same_byte
     clear_photographs(&run, ExitCode::SUCCESS);
     assert!(!photographs_in(&run).exists() && run.join("result.json").is_file());
 }
+
+#[test]
+fn a_fork_on_another_backbone_keeps_the_width_of_its_run() {
+    #[derive(clap::Parser)]
+    struct Line {
+        #[command(flatten)]
+        args: Args,
+    }
+    let home = tempfile::tempdir().unwrap();
+    let run = home.path().join("a.run");
+    fs::create_dir(&run).unwrap();
+    let width = |config: RunConfig, more: &[&str]| {
+        fs::write(run.join("config.toml"), toml::to_string(&config).unwrap()).unwrap();
+        let line = ["train", "--from", run.to_str().unwrap(), "--at", "10", "-o", "b.psb", "--backbone", "scaffold"];
+        let Line { args } = clap::Parser::parse_from(line.iter().chain(more));
+        args.resolved().unwrap().train.shape.feature_dim
+    };
+    let config = config(home.path(), "a");
+    let published = RunConfig { train: TrainConfig::of(Backbone::Hac), ..config.clone() };
+    assert_eq!(width(published.clone(), &[]), 50);
+    assert_eq!(width(config.clone(), &[]), 8);
+    assert_eq!(width(published, &["--set", "train.shape.feature_dim=16"]), 16, "which the run refuses");
+}

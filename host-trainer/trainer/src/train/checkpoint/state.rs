@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::envelope::{self, Progress, RandomState, content, needs, part};
 use super::{CaptureDifference, CaptureSignature, CheckpointFault, Kernels, MAGIC};
-use crate::scene::{Anchors, ContextModel, Heads, Scene};
+use crate::scene::{Anchors, ContextModel, Heads, ModelShape, Scene};
 use crate::train::config::Backbone;
 use crate::train::optimiser::Optimiser;
 use crate::train::statistics::Statistics;
@@ -26,10 +26,16 @@ pub enum RestoreError {
     #[error("this is not the capture that the run began with: {0}")]
     Capture(CaptureDifference),
     /// A fork asks for another scene than the checkpoint holds.
-    #[error("a fork keeps `train.{key}` of its run; leave out what sets it")]
+    #[error(
+        "a fork keeps `train.{key}` of its run, which is {kept}, but {asked} was asked for; leave out what sets it"
+    )]
     Fork {
         /// The key of the setting that differs.
         key: &'static str,
+        /// Its value in the run.
+        kept: String,
+        /// The value asked for.
+        asked: String,
     },
     /// No trainer can be made of capture and configuration.
     #[error(transparent)]
@@ -105,13 +111,9 @@ impl<'a> Trainer<'a> {
         let mut restored = Self::read(capture, bytes, CaptureSignature::matches_at_any_size)?;
         config.validate().map_err(TrainError::from)?;
         let (begun, config) = (restored.trainer.config, config.resolved_for(capture));
-        for (key, same) in [
-            ("shape", begun.shape == config.shape),
-            ("voxel_size", begun.voxel_size == config.voxel_size),
-            ("validation_every", begun.validation_every == config.validation_every),
-        ] {
-            if !same {
-                return Err(RestoreError::Fork { key });
+        for ((key, kept), (_, asked)) in kept_by_a_fork(&begun).into_iter().zip(kept_by_a_fork(&config)) {
+            if kept != asked {
+                return Err(RestoreError::Fork { key, kept, asked });
             }
         }
         if config.hac.lambda != begun.hac.lambda {
@@ -176,4 +178,32 @@ impl<'a> Trainer<'a> {
         needs("gradient sums", gradient_sum.len(), n * shape.n_offsets)?;
         needs("drawn counts", n_drawn.len(), n * shape.n_offsets)
     }
+}
+
+/// What a fork must keep of its run: keys within `train`, each with its value. Both runs are resolved, so ε is known.
+fn kept_by_a_fork(config: &TrainConfig) -> [(&'static str, String); 11] {
+    let ModelShape {
+        feature_dim,
+        n_offsets,
+        view_colour,
+        view_geometry,
+        view_distance,
+        dilation_compensation,
+        anisotropic,
+        colour_hidden,
+        detail_hidden,
+    } = config.shape;
+    [
+        ("shape.feature_dim", feature_dim.to_string()),
+        ("shape.n_offsets", n_offsets.to_string()),
+        ("shape.view_colour", view_colour.to_string()),
+        ("shape.view_geometry", view_geometry.to_string()),
+        ("shape.view_distance", view_distance.to_string()),
+        ("shape.dilation_compensation", dilation_compensation.to_string()),
+        ("shape.anisotropic", anisotropic.to_string()),
+        ("shape.colour_hidden", colour_hidden.to_string()),
+        ("shape.detail_hidden", detail_hidden.to_string()),
+        ("voxel_size", config.voxel_size.map(|edge| edge.to_string()).unwrap_or_default()),
+        ("validation_every", config.validation_every.to_string()),
+    ]
 }

@@ -117,7 +117,10 @@ fn a_fork_begins_where_its_run_stood() {
     wider.shape.feature_dim += 1;
     let error = fork(&path, 12, &capture, wider).unwrap_err();
     let source = std::error::Error::source(&error).unwrap().to_string();
-    assert!(source.contains("a fork keeps `train.shape`"), "{error}: {source}");
+    let width = config.shape.feature_dim;
+    let expected =
+        format!("a fork keeps `train.shape.feature_dim` of its run, which is {width}, but {} was asked for", width + 1);
+    assert!(source.contains(&expected), "{error}: {source}");
 }
 
 #[test]

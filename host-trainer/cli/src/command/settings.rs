@@ -41,7 +41,7 @@ pub(crate) struct QualityOptions {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum, help_heading = QUALITY)]
     modules: Option<Vec<TrainingModule>>,
     /// Feature width of an anchor, and hidden width of the heads [default: 32 with scaffold, else 50; by the limits for a
-    /// device]
+    /// device; with --from that of its run]
     #[arg(long, value_name = "F", help_heading = QUALITY, hide_short_help = true)]
     feature_dim: Option<usize>,
     #[arg(long, value_name = "K", help_heading = QUALITY, hide_short_help = true,

@@ -95,15 +95,15 @@ fn a_fork_on_another_backbone_keeps_the_width_of_its_run() {
     let home = tempfile::tempdir().unwrap();
     let run = home.path().join("a.run");
     fs::create_dir(&run).unwrap();
-    let width = |config: RunConfig, more: &[&str]| {
-        fs::write(run.join("config.toml"), toml::to_string(&config).unwrap()).unwrap();
+    let width = |config: &RunConfig, more: &[&str]| {
+        fs::write(run.join("config.toml"), toml::to_string(config).unwrap()).unwrap();
         let line = ["train", "--from", run.to_str().unwrap(), "--at", "10", "-o", "b.psb", "--backbone", "scaffold"];
         let Line { args } = clap::Parser::parse_from(line.iter().chain(more));
         args.resolved().unwrap().train.shape.feature_dim
     };
     let config = config(home.path(), "a");
     let published = RunConfig { train: TrainConfig::of(Backbone::Hac), ..config.clone() };
-    assert_eq!(width(published.clone(), &[]), 50);
-    assert_eq!(width(config.clone(), &[]), 8);
-    assert_eq!(width(published, &["--set", "train.shape.feature_dim=16"]), 16, "which the run refuses");
+    assert_eq!(width(&published, &[]), 50);
+    assert_eq!(width(&config, &[]), 8);
+    assert_eq!(width(&published, &["--set", "train.shape.feature_dim=16"]), 16, "which the run refuses");
 }

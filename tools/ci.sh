@@ -125,8 +125,6 @@ job_test() {
   need_lavapipe
   POCKETSPLAT_NEEDS_BROWSER=1 POCKETSPLAT_NEEDS_READERS=1 POCKETSPLAT_NEEDS_GPU=1 \
     cargo test --workspace --locked --no-fail-fast
-  # Not unified into the workspace's build: `defmt` wants a logger at link time, the firmware has one.
-  cargo test -p pocketsplat-core --features embedded-graphics --locked
   # The largest frames where overflow is not checked, as firmware is built; above it was.
   cargo test --release -p pocketsplat-core --lib --locked decoder::tests
   # Refusals of what a decoder is built without.

@@ -25,7 +25,7 @@ snakemake() { # FOLDER OPTIONS…
   (cd "$1" && exec "$venv/bin/snakemake" "${@:2}")
 }
 local_executor=(--cores 2)
-queue=(--executor cluster-generic --cluster-generic-submit-cmd "$here/submit.sh" --jobs 2 --latency-wait 20)
+queue=(--executor cluster-generic --cluster-generic-submit-cmd "$here/submit.sh" --jobs 2 --latency-wait 20 --seconds-between-status-checks 1)
 
 [ -d "$out/capture" ] || "$program" synth "$out/capture" --size 32 --train-views 6 --test-views 3
 cat >"$out/plan.toml" <<'TOML'

@@ -6,6 +6,8 @@ use std::process::{Child, Command, Output, Stdio};
 use std::sync::OnceLock;
 
 pub(crate) const ITERATIONS: u32 = 160;
+/// Leaves a third of the capture's points, with which a step takes a third of the time.
+pub(crate) const VOXEL_SIZE: &str = "0.2";
 /// Iterations between checkpoints, and so what a `kill -9` may cost.
 pub(crate) const CHECKPOINT_EVERY: u32 = 20;
 
@@ -50,17 +52,15 @@ pub(crate) fn undisturbed() -> &'static [u8] {
 
 /// `train` on the capture.
 pub(crate) fn train(output: &Path) -> Command {
-    train_with_checkpoints(output, CHECKPOINT_EVERY)
+    train_with(output, VOXEL_SIZE, CHECKPOINT_EVERY)
 }
 
-/// As [`train`], with another interval.
-pub(crate) fn train_with_checkpoints(output: &Path, every: u32) -> Command {
+/// As [`train`], with another voxel size and another interval between checkpoints.
+pub(crate) fn train_with(output: &Path, voxel_size: &str, checkpoint_every: u32) -> Command {
     let mut command = pocketsplat();
     command.arg("train").arg(capture()).arg("-o").arg(output);
     command.args(["--iterations", &ITERATIONS.to_string(), "--feature-dim", "8", "--offsets", "3"]);
-    // A third of the capture's points, with which a step takes a third of the time.
-    command.args(["--voxel-size", "0.2"]);
-    command.args(["--checkpoint-every", &every.to_string()]);
+    command.args(["--voxel-size", voxel_size, "--checkpoint-every", &checkpoint_every.to_string()]);
     command
 }
 

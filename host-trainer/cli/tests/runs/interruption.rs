@@ -7,8 +7,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::fixture::{
-    CHECKPOINT_EVERY, ITERATIONS, checkpoints, folder, logged, resume, starts, succeeds, text, train,
-    train_with_checkpoints, undisturbed, wait_for,
+    CHECKPOINT_EVERY, ITERATIONS, VOXEL_SIZE, checkpoints, folder, logged, resume, starts, succeeds, text, train,
+    train_with, undisturbed, wait_for,
 };
 
 /// The iteration after which the program says that it goes on.
@@ -74,7 +74,7 @@ fn ctrl_c_writes_a_checkpoint_and_says_how_to_go_on() {
     for name in ["INT", "TERM"] {
         let home = folder(name);
         let (output, run) = (home.join("a.psb"), home.join("a.run"));
-        let mut child = starts(&mut train_with_checkpoints(&output, 0));
+        let mut child = starts(&mut train_with(&output, VOXEL_SIZE, 0));
         wait_for(&run, ITERATIONS / 3, &mut child);
         signal(&child, name);
         let ended = child.wait_with_output().unwrap();

@@ -189,12 +189,12 @@ job_format-doc() {
 
 # Every crate builds from nothing but what the packages hold, and they hold what a user reads.
 job_package() {
-  local crate file files
+  local crate file files crates=(pocketsplat pocketsplat-{core,half,capture,gaussians,instructions,trainer,viewer})
   files=$(cargo package -p pocketsplat-core --allow-dirty --locked --list)
-  for file in README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE src/bundle/{FORMAT,DRAWING,MANIFEST}.md src/bundle/{normal_tables.bin,example.psb} examples/draw_png.rs; do
+  for file in README.md CHANGELOG.md src/bundle/{FORMAT,DRAWING,MANIFEST}.md src/bundle/{normal_tables.bin,example.psb} examples/draw_png.rs; do
     grep -qx "$file" <<<"$files" || fail "the package of pocketsplat-core lacks $file"
   done
-  for crate in pocketsplat pocketsplat-{half,capture,gaussians,instructions,trainer,viewer}; do
+  for crate in "${crates[@]}"; do
     files=$(cargo package -p "$crate" --allow-dirty --locked --list)
     for file in LICENSE-MIT LICENSE-APACHE; do
       grep -qx "$file" <<<"$files" || fail "the package of $crate lacks $file"
@@ -206,7 +206,8 @@ job_package() {
   rm -rf "$target/packages"
   mkdir -p "$sources"
   cargo package --workspace --exclude conformance --exclude tools --allow-dirty --locked --no-verify --target-dir "$target/packages"
-  for file in "$target"/packages/package/*.crate; do tar -xzmf "$file" -C "$sources"; done # -m: cargo looks at times
+  # -m: packed times are of 2006, and to cargo a file that old has been checked.
+  for file in "$target"/packages/package/*.crate; do tar -xzmf "$file" -C "$sources"; done
   cp Cargo.lock "$sources"
   {
     echo '[workspace]'
@@ -219,7 +220,7 @@ job_package() {
       echo "${crate%-*} = { path = \"$crate\" }"
     done
   } >"$sources/Cargo.toml"
-  for crate in pocketsplat pocketsplat-{core,half,capture,gaussians,instructions,trainer,viewer}; do
+  for crate in "${crates[@]}"; do
     cargo check --manifest-path "$sources/Cargo.toml" -p "$crate" || fail "the package of $crate does not build"
   done
   rm -rf "$target/packages"

@@ -75,7 +75,7 @@ fn a_run_on_a_gpu_that_is_killed_goes_on_to_the_same_bytes() {
         return;
     }
     let home = folder("gpu");
-    // Where a CPU plays the GPU, each point counts: half as many as elsewhere.
+    // Where a CPU plays the GPU, each anchor counts: 1,278 at the start, where other tests have 3,298.
     let run = |name: &str| train_with(&home.join(name), "0.3", CHECKPOINT_EVERY);
     succeeds(&mut on_gpu(run("whole.psb")));
     succeeds(&mut run("cpu.psb"));

@@ -37,6 +37,9 @@ pub enum Group {
 }
 
 impl Group {
+    /// All, in the order of a file.
+    pub const ALL: [Self; N_GROUPS] = [Self::Feature, Self::LogScale, Self::Offset];
+
     pub(super) const fn of_channel(channel: usize, feature_dim: usize, n_log_scales: usize) -> Self {
         if channel < feature_dim {
             Self::Feature

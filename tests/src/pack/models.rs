@@ -169,7 +169,7 @@ pub fn walk(context: &Context<'_>, anchors: &[Anchor], is_coded: impl Fn(usize, 
             }
             given[0] = own;
         }
-        let groups = [Group::Feature, Group::LogScale, Group::Offset];
+        let groups = Group::ALL;
         coded.push(CodedAnchor {
             level,
             inputs: inputs.clone(),

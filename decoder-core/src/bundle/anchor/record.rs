@@ -212,7 +212,7 @@ impl<'b, 's> AnchorRecords<'b, 's> {
             }
             Values::Context { base_steps } => {
                 let steps = Steps::from_bits(base_steps, step_bits as u16);
-                for ((n, bits), group) in groups.into_iter().zip([Group::Feature, Group::LogScale, Group::Offset]) {
+                for ((n, bits), group) in groups.into_iter().zip(Group::ALL) {
                     let step = steps.value(group);
                     for slot in slots.by_ref().take(n.into()) {
                         *slot = f32::from_scaled(reader.signed(bits.into()), step);

@@ -3,7 +3,7 @@
 use anyhow::{Result, bail};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use pocketsplat_capture::dataset::Background;
-use pocketsplat_trainer::device::{ModelChoice, widest_within};
+use pocketsplat_trainer::device::{ModelChoice, bytes_of_heads, widest_within};
 use pocketsplat_trainer::effects::{Effect, Request};
 use pocketsplat_trainer::encode::CoderChoice;
 use pocketsplat_trainer::explicit::CloudConfig;
@@ -238,8 +238,20 @@ impl QualityOptions {
     }
 
     /// Sets the width of features for a bundle of so many bytes, where the command line leaves it open.
-    pub(crate) fn choose_width(&self, train: &mut TrainConfig, bytes: u64) {
-        train.shape.feature_dim = self.feature_dim.unwrap_or_else(|| widest_within(bytes, &train.shape));
+    ///
+    /// # Errors
+    /// The heads alone take more.
+    pub(crate) fn choose_width(&self, train: &mut TrainConfig, bytes: u64) -> Result<()> {
+        let feature_dim = self.feature_dim.unwrap_or_else(|| widest_within(bytes, &train.shape));
+        train.shape.feature_dim = feature_dim;
+        let of_heads = bytes_of_heads(&train.shape);
+        if bytes <= of_heads {
+            bail!(
+                "a bundle of {bytes} bytes is asked for, and the heads of a model with features of width {feature_dim} take about \
+                 {of_heads}; ask for several times as many, with a unit as in 300kB"
+            );
+        }
+        Ok(())
     }
 
     /// Sets what a device affords, where the command line leaves it open: the widths, the number of anchors, pruning by worth

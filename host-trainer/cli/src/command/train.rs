@@ -50,6 +50,11 @@ fn resume(args: &Args, path: &Path) -> Result<ExitCode> {
     if let Some(difference) = begun.difference(&config, IN_RUN_AND_ON_COMMAND_LINE)? {
         bail!("the run began with another setting than the command line asks for: {difference}; leave it out");
     }
+    // What a run was asked to keep for forks stays.
+    config.fork_at.extend(&begun.fork_at);
+    config.fork_at.sort_unstable();
+    config.fork_at.dedup();
+    config.check()?;
     // What was chosen stays; what an accident kept from being chosen is measured now.
     config.effects = begun.effects;
     output::check_writable(&config.output)?;
@@ -71,6 +76,9 @@ fn begin(args: &Args) -> Result<ExitCode> {
         Some((run, _)) if run.canonicalize().ok() == path.canonicalize().ok() => {
             bail!("{} cannot be both the run to begin from and the new one; choose another --output", path.display())
         }
+        Some(_) if effects::are_measured(&config, &capture) => {
+            bail!("a fork keeps the effects of its run; leave out --effects auto")
+        }
         Some((run, iteration)) => {
             let trainer = fork(run, iteration, &capture, config.train)?;
             eprintln!("going on after iteration {iteration} of {}", run.display());
@@ -79,11 +87,11 @@ fn begin(args: &Args) -> Result<ExitCode> {
         None => Start::New(Warned::default()),
     };
     let machine = Machine::open(args)?;
-    let folder = RunFolder::start(&path, &config.to_toml()?, args.overwrite())?;
-    if let Start::Forked(trainer) = &start {
-        // Without it a resumed run would begin with the capture's points.
-        folder.save(&**trainer)?;
-    }
+    let (overwrite, toml) = (args.overwrite(), config.to_toml()?);
+    let folder = match &start {
+        Start::Forked(trainer) => RunFolder::start_from(&path, &toml, overwrite, &**trainer)?,
+        _ => RunFolder::start(&path, &toml, overwrite)?,
+    };
     let code = train_and_print(args, folder, config, &capture, start, machine)?;
     drop(capture);
     clear_photographs(&path, code);
@@ -144,7 +152,7 @@ fn train_and_print<'a>(
         let image = photograph.as_ref().map(|photograph| &photograph.image);
         port.serve(folder.path(), config.train.iterations, image)?;
     }
-    // Not before: until here there is nothing to keep, and Ctrl-C may end the process at once.
+    // Not before: until here nothing is lost that a second call would not make, and Ctrl-C may end the process at once.
     let stop = stop::flag()?;
     // Before the pilots: they may take hours too.
     let start = match start {

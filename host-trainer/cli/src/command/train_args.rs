@@ -6,6 +6,7 @@ use anyhow::{Context, Result, bail};
 use bytesize::ByteSize;
 use pocketsplat_capture::dataset::{Background, FrameSize};
 use pocketsplat_instructions::level::{Bound, Level};
+use pocketsplat_trainer::bundle::PRUNING_RATES;
 use pocketsplat_trainer::device::{Limits, ModelChoice, Processor, choose};
 use pocketsplat_trainer::effects::Price;
 use pocketsplat_trainer::explicit::CloudConfig;
@@ -89,8 +90,8 @@ pub(crate) struct Args {
 /// What the device has that the bundle is for; what else the command line leaves open is chosen by it.
 #[derive(clap::Args)]
 pub(crate) struct DeviceArgs {
-    /// Level that the whole scene keeps, 1 (Cortex-M with 64 KiB) to 5 (8 MiB): sets --ram, --flash, --target and --resolution,
-    /// which may ask for less [default: none]
+    /// Level that the whole scene keeps, 1 (Cortex-M with 64 KiB) to 5 (8 MiB): sets --ram, --flash, --resolution and, up to 4,
+    /// --target, which may ask for less [default: none]
     #[arg(long, value_name = "N", value_parser = level_number(), help_heading = DEVICE)]
     level: Option<u8>,
     /// Scratch bytes of the decoder, as 192KiB, excluding stack and frame buffer; the whole scene is guaranteed to fit
@@ -150,11 +151,17 @@ impl DeviceArgs {
         }
         config.encoding.limits = limits;
         if let (None, None, Some(bytes)) = (limits.ram_bytes, limits.processor, limits.flash_bytes) {
-            quality.choose_width(&mut config.train, bytes);
-            eprintln!(
-                "to fill this size: features of width {}; the number of anchors and lambda are found while it trains",
-                config.train.shape.feature_dim
-            );
+            quality.choose_width(&mut config.train, bytes)?;
+            let width = config.train.shape.feature_dim;
+            match config.train.modules.rdo {
+                Some(_) => eprintln!(
+                    "to fill this size: features of width {width}; the number of anchors and lambda are found while it trains"
+                ),
+                None => eprintln!(
+                    "warning: without rdo-pruning the scene is not trained to this size (features of width {width}); anchors \
+                     that have no room are left out in the end"
+                ),
+            }
             return Ok(());
         }
         let choice = choose(&limits)?;
@@ -268,6 +275,12 @@ impl Args {
         }
         check_lambda(self.lambda, config.train.backbone)?;
         config.check()?;
+        if config.train.backbone == Backbone::ContextGs && config.encoding.tiers != PRUNING_RATES {
+            eprintln!(
+                "warning: contextgs is trained for the default --tiers; with these its anchors follow other anchors in the bundle \
+                 than in training"
+            );
+        }
         // Absolute, so that the run can go on from any folder.
         for path in [&mut config.dataset, &mut config.output] {
             *path = std::path::absolute(&path).with_context(|| format!("{} is not a path", path.display()))?;

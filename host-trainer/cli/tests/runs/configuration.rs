@@ -111,6 +111,9 @@ fn a_run_goes_on_only_with_what_it_began_with() {
         error.contains("`encoding.limits` is nothing in the run, { flash_bytes = 300000 } on the command line"),
         "{error}"
     );
+    // Before the rest is trained, what its end would refuse.
+    let error = fails(resume(&run).args(["--tiers", "0.4,0.4,0"]));
+    assert!(error.contains("tiers of pruning rates [0.4, 0.4, 0.0]"), "{error}");
     let config = run.join("config.toml");
     let begun = fs::read_to_string(&config).unwrap();
     fs::write(&config, begun.replace("seed = 42", "seed = 43")).unwrap();
@@ -124,7 +127,8 @@ fn a_run_goes_on_only_with_what_it_began_with() {
     fs::write(&config, begun).unwrap();
     // Where the bundle goes does not decide what it is.
     let elsewhere = home.join("b.psb");
-    succeeds(resume(&run).arg("-o").arg(&elsewhere).args(["--checkpoint-every", "1000"]));
+    let said = succeeds(resume(&run).arg("-o").arg(&elsewhere).args(["--checkpoint-every", "1000", "--fork-at", "5"]));
+    assert!(said.contains("--fork-at 5 keeps nothing"), "{said}");
     assert!(fs::read(&elsewhere).unwrap() == undisturbed());
 }
 
@@ -145,11 +149,14 @@ fn a_fork_shares_a_run_up_to_an_iteration() {
     // Killed, it goes on from where it was, not from the capture's points.
     let lower = ["--set", "train.rates.feature.end=1e-6"];
     succeeds(fork("other.psb", "90").args(lower));
-    let mut child = starts(fork("killed.psb", "90").args(lower));
-    wait_for(&home.join("killed.run"), 92, &mut child);
+    let mut child = starts(fork("killed.psb", "90").args(lower).args(["--fork-at", "92"]));
+    wait_for(&home.join("killed.run"), 95, &mut child);
     child.kill().unwrap();
     child.wait().unwrap();
-    succeeds(&mut resume(&home.join("killed.run")));
+    succeeds(resume(&home.join("killed.run")).args(["--fork-at", "100"]));
+    for kept in [92, 100] {
+        assert!(home.join(format!("killed.run/iteration-{kept:08}.checkpoint")).exists(), "{kept}");
+    }
     let other = fs::read(home.join("other.psb")).unwrap();
     assert!(other != undisturbed() && other == fs::read(home.join("killed.psb")).unwrap());
 
@@ -162,6 +169,9 @@ fn a_fork_shares_a_run_up_to_an_iteration() {
 
     let error = fails(&mut fork("b.psb", "91"));
     assert!(error.contains("no checkpoint of iteration 91, it has those of [90]"), "{error}");
+    let error = fails(fork("b.psb", "90").args(["--backbone", "scaffold", "--modules", "none"]));
+    assert!(error.contains("keeps `train.backbone` of its run"), "{error}");
+    assert!(!home.join("b.run").exists(), "before anything was done");
     let error = fails(&mut fork("a.psb", "90"));
     assert!(error.contains("cannot be both the run to begin from and the new one"), "{error}");
     assert!(home.join("a.run/iteration-00000090.checkpoint").exists(), "nothing is lost");

@@ -63,6 +63,12 @@ fn what_no_device_can_do_is_refused_with_the_nearest_that_can() {
     assert!(said.contains("limit of 4096 for RAM") && said.contains("takes about"), "{said}");
     let said = fails(train(&output).args(["--ram", "1MiB", "--flash", "2KiB"]));
     assert!(said.contains("limit of 2048 for flash"), "{said}");
+    let said = fails(train(&output).args(["--bytes", "300"]));
+    assert!(said.contains("a bundle of 300 bytes is asked for") && said.contains("with a unit as in 300kB"), "{said}");
+    let mut untrained = train(&output);
+    untrained.args(["--bytes", "30kB", "--modules", "none", "--tiers", "0.4,0.4,0"]);
+    let said = untrained.output().unwrap().stderr;
+    assert!(String::from_utf8_lossy(&said).contains("without rdo-pruning the scene is not trained to this size"));
     assert!(!output.exists() && !home.join("a.run").exists(), "before anything was done");
     let undisturbed = home.join("undisturbed.psb");
     fs::write(&undisturbed, crate::fixture::undisturbed()).unwrap();

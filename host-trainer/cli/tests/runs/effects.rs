@@ -128,7 +128,12 @@ fn effects_are_measured_once_and_stay_with_the_run() {
     let said = text(&ended.stderr);
     assert_eq!(ended.status.code(), Some(130), "{said}");
     assert!(said.contains("pilots are kept; go on with `pocketsplat train --resume"), "{said}");
-    let said = succeeds(&mut resume(&folder));
+    let said = succeeds(resume(&folder).args(["--fork-at", "60"]));
     assert!(!said.contains("effects: pilot 1 with none") && said.contains("effects: pilot 6"), "{said}");
     assert!(fs::read(output).unwrap() == fs::read(interrupted).unwrap());
+
+    let (_, mut fork) = run("d.psb");
+    let said = fails(fork.arg("--from").arg(&folder).args(["--at", "60"]).args(measured));
+    assert!(said.contains("a fork keeps the effects of its run"), "{said}");
+    assert!(!home.join("d.run").exists(), "before anything was done");
 }

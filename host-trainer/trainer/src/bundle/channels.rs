@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use pocketsplat_core::context::{Context, Group, N_GROUPS, Steps, Trail};
+use pocketsplat_core::context::{Context, Steps, Trail};
 use pocketsplat_core::entropy::NormalModel;
 
 use super::stream::Part;
@@ -64,9 +64,6 @@ impl fmt::Display for ChannelName {
         }
     }
 }
-
-/// The groups of channels in the order of their steps.
-pub(crate) const GROUPS: [Group; N_GROUPS] = [Group::Feature, Group::LogScale, Group::Offset];
 
 /// The context model on its way through the anchors of a chunk.
 #[derive(Default)]

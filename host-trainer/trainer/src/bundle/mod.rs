@@ -32,7 +32,7 @@ mod tests;
 
 pub use crate::ops::file_order::PRUNING_RATES;
 pub use channels::ChannelName;
-pub(crate) use channels::{ContextWork, GROUPS};
+pub(crate) use channels::ContextWork;
 pub use decoded::{decoded_heads, decoded_scene, for_each_chunk, normalisation_of, shape_of};
 pub use error::WriteError;
 pub use layout::{CodedScene, Written};

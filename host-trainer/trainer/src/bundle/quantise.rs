@@ -1,10 +1,10 @@
 //! From trained floats to integer symbols.
 
-use pocketsplat_core::context::{Context, N_GROUPS};
+use pocketsplat_core::context::{Context, Group, N_GROUPS};
 use rayon::prelude::*;
 
 use super::WriteError;
-use super::channels::{ChannelName, ContextWork, GROUPS};
+use super::channels::{ChannelName, ContextWork};
 use super::order::Placement;
 use crate::ops::perturb;
 use crate::scene::{ModelShape, QuantisationSteps, Scene};
@@ -103,7 +103,7 @@ pub(super) fn quantise(
                 StepSource::Fixed(steps) => (None, steps),
                 StepSource::Context(context) => {
                     let steps = work.enter(context, lattice[row]);
-                    (Some(steps), GROUPS.map(|group| steps.value(group)))
+                    (Some(steps), Group::ALL.map(|group| steps.value(group)))
                 }
             };
             let first = rows.0.len();

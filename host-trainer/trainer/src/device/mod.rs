@@ -8,7 +8,7 @@ mod choice;
 mod width;
 
 pub use choice::{BindingLimit, Infeasible, ModelChoice, choose};
-pub use width::widest_within;
+pub use width::{bytes_of_heads, widest_within};
 
 use serde::{Deserialize, Serialize};
 

@@ -9,16 +9,16 @@ const WIDTHS: [usize; 5] = [50, 32, 24, 16, 8];
 const HEADS_AT_MOST: u64 = 6;
 
 /// The widest features up to those of `shape` whose heads leave room for a scene in `bytes`; the narrowest where none do.
-///
-/// A parameter of the heads takes about a byte.
 pub fn widest_within(bytes: u64, shape: &ModelShape) -> usize {
-    let of_heads = |feature_dim: usize| {
-        let heads = Heads::filled(&ModelShape { feature_dim, ..*shape }, 0.0_f32);
-        heads.each().flat_map(Head::groups).map(<[f32]>::len).sum::<usize>() as u64
-    };
+    let of_heads = |feature_dim: usize| bytes_of_heads(&ModelShape { feature_dim, ..*shape });
     let widths = WIDTHS.into_iter().filter(|width| *width <= shape.feature_dim);
     let [.., narrowest] = WIDTHS;
     widths.clone().find(|width| HEADS_AT_MOST * of_heads(*width) <= bytes).unwrap_or(narrowest.min(shape.feature_dim))
+}
+
+/// Bytes that the heads of a model take in its bundle, about: one for each parameter.
+pub fn bytes_of_heads(shape: &ModelShape) -> u64 {
+    Heads::filled(shape, 0.0_f32).each().flat_map(Head::groups).map(<[f32]>::len).sum::<usize>() as u64
 }
 
 #[cfg(test)]

@@ -51,9 +51,6 @@ pub struct Cut {
     pub psnr_db: Option<f32>,
 }
 
-/// The limit that a cut's RAM is of.
-const RAM: &str = "bytes of RAM";
-
 /// What a bundle takes of a limit.
 #[derive(Clone, Copy)]
 struct Need {
@@ -73,6 +70,8 @@ struct Attempt {
     finished: Finished,
     written: Written,
     plan: Option<Plan>,
+    /// Scratch memory of the whole scene, where it is limited.
+    ram_bytes: Option<u64>,
     /// Of the memory, or another bound of the level, that leaves least room.
     memory: Option<Need>,
     /// Of a frame's instructions.
@@ -168,9 +167,10 @@ impl Encoding {
             let level::Need { bound, needed, most } = need;
             Need { limit: bound.name(), available: most, needed }
         });
+        let ram_bytes = ram.map(|ram| ram.needed);
         let memory = flash.into_iter().chain(ram).chain(of_level).max_by(|a, b| a.share().total_cmp(&b.share()));
         let time = self.time_of(&written, capture, cameras).map_err(EncodeError::Measure)?;
-        Ok(Attempt { finished, written, plan, memory, time })
+        Ok(Attempt { finished, written, plan, ram_bytes, memory, time })
     }
 
     /// Instructions of the dearest frame, where the processor is known and the memory suffices.
@@ -231,16 +231,21 @@ fn ram_of(written: &Written, capture: &Capture, available: u64) -> Result<(Need,
         // Halves were tried too, and were not enough.
         None => (smallest.scratch_len() as u64).max(available + 1),
     };
-    Ok((Need { limit: RAM, available, needed }, within))
+    Ok((Need { limit: "bytes of RAM", available, needed }, within))
 }
 
 /// What is lost when all that is too much of a scene goes.
 fn lost_by(whole: &Attempt) -> Result<Cut, EncodeError> {
     let bundle = Bundle::parse(&whole.written.bytes).map_err(WriteError::ReadBack)?;
     let psnr_db = bundle.n_tiers().checked_sub(1).and_then(|tier| bundle.measures(tier)?.psnr_db);
-    let ram_bytes = whole.memory.filter(|need| need.limit == RAM).map(|need| need.needed);
     let instructions = whole.time.map(|time| time.needed);
-    Ok(Cut { n_anchors: 0, flash_bytes: whole.written.bytes.len() as u64, ram_bytes, instructions, psnr_db })
+    Ok(Cut {
+        n_anchors: 0,
+        flash_bytes: whole.written.bytes.len() as u64,
+        ram_bytes: whole.ram_bytes,
+        instructions,
+        psnr_db,
+    })
 }
 
 /// Anchors with a drawn offset: those that are written.

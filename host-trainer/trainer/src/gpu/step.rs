@@ -12,7 +12,7 @@ use super::{Buffer, Commands, Gpu, GpuError};
 use crate::scene::Scene;
 use crate::step::coding::Coding;
 use crate::step::{
-    DeviceFault, GroupSteps, ImageStages, Load, Loss, Resident, ResidentStep, StepDevice, TargetView, Trained,
+    DeviceFault, GroupSteps, ImageStages, LoadNumber, Loss, Resident, ResidentStep, StepDevice, TargetView, Trained,
     TrainedMut,
 };
 
@@ -107,8 +107,8 @@ impl StepDevice<f32> for GpuStep {
 }
 
 impl Resident<f32> for GpuStep {
-    fn held(&self) -> Option<Load> {
-        self.scene.is_some().then_some(Load(self.n_loads))
+    fn held(&self) -> Option<LoadNumber> {
+        self.scene.is_some().then_some(LoadNumber(self.n_loads))
     }
 
     fn can_step(&self, scene: &Scene<f32>, loss: &Loss<'_, f32>, coding: &Coding<'_, f32>) -> bool {

@@ -201,7 +201,7 @@ impl<R: Real> Coded<R> {
             let network = parents.enter(context, *anchor, scene.anchors.lattice[*anchor as usize], &mut features);
             network.hidden(&features, &mut hidden);
             let exact_steps = network.steps(&hidden);
-            for (i, group) in [Group::Feature, Group::LogScale, Group::Offset].into_iter().enumerate() {
+            for (i, group) in Group::ALL.into_iter().enumerate() {
                 exponents[i] = part(network.output(2 * n_channels + i, &hidden), EIGHTHS);
                 steps[i] = R::real(exact_steps.value(group).into());
             }

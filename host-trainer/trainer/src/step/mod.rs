@@ -39,7 +39,7 @@ pub use loss::{DeviceTerms, ImagePair, Loss, LossWeights, StepInfo, Terms};
 use parents::Parents;
 pub use probe::ImageError;
 pub use resident::{
-    ContextMoments, ContextMomentsMut, GroupSteps, Load, Resident, ResidentStep, StepDevice, Trained, TrainedMut,
+    ContextMoments, ContextMomentsMut, GroupSteps, LoadNumber, Resident, ResidentStep, StepDevice, Trained, TrainedMut,
 };
 pub use stages::StageSeconds;
 use stages::StageTimer;

@@ -97,12 +97,12 @@ pub trait StepDevice<R>: fmt::Debug + Send {
 
 /// Which scene a device holds: the number of [`Resident::load`]s, that one included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Load(pub u64);
+pub struct LoadNumber(pub u64);
 
 /// A device that holds one scene. Each function works on what [`Self::load`] brought last.
 pub trait Resident<R> {
     /// The load that it works on; of two runs on one device the other's may have come after one's own.
-    fn held(&self) -> Option<Load>;
+    fn held(&self) -> Option<LoadNumber>;
 
     /// Whether a step with these terms can be computed there.
     fn can_step(&self, scene: &Scene<R>, loss: &Loss<'_, R>, coding: &Coding<'_, R>) -> bool;

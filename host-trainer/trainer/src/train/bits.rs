@@ -117,5 +117,5 @@ pub(super) fn all_steps(scene: &Scene<f32>, context: &Context<'_>) -> Vec<[f32; 
 }
 
 fn values_of(steps: Steps) -> [f32; N_GROUPS] {
-    [Group::Feature, Group::LogScale, Group::Offset].map(|group| steps.value(group))
+    Group::ALL.map(|group| steps.value(group))
 }

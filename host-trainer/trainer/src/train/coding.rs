@@ -61,9 +61,13 @@ fn written(head: &Head<f32>) -> Head<f32> {
 
 impl Trainer<'_> {
     /// Makes the context model where this iteration is the first to need it.
-    pub(super) fn begin_context(&mut self) {
+    ///
+    /// # Errors
+    /// [`TrainError`] when the scene is on a device and cannot be taken back from it.
+    pub(super) fn begin_context(&mut self) -> Result<(), TrainError> {
         let phase = self.config.phase(self.iteration);
         if self.scene.context.is_none() && matches!(phase, Phase::Context | Phase::IntegerModel) {
+            self.take_back()?;
             let base_steps = self.config.hac.base_steps();
             let begin = match self.config.backbone {
                 Backbone::ContextGs => context_start::initial_levels,
@@ -75,6 +79,7 @@ impl Trainer<'_> {
             self.optimiser.begin_context(&self.scene);
             self.count_views();
         }
+        Ok(())
     }
 
     /// Anchors to size the context model for: all, or as many as pruning by worth is expected to leave.

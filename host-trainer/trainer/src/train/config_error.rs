@@ -43,6 +43,16 @@ pub enum ConfigError {
         /// Those of the module, 0 without it.
         needed: usize,
     },
+    /// A run that is over before the context model can say anything to a module that weighs bits.
+    #[error("train.iterations is {found}, needs at least {needed}, so that there is a context model by {key}")]
+    TooShort {
+        /// Iterations of the run.
+        found: u32,
+        /// The least that will do.
+        needed: f64,
+        /// The key that asks for it.
+        key: &'static str,
+    },
     /// A module that weighs bits, in a run where they cost nothing.
     #[error(
         "{key} weighs error against bits, and train.hac.lambda is 0, so that bits cost nothing; needs a lambda above 0, \

@@ -237,10 +237,7 @@ impl<'a> Trainer<'a> {
     fn iterate(&mut self) -> Result<Outcome, TrainError> {
         self.iteration += 1;
         let phase = self.config.phase(self.iteration);
-        if matches!(phase, Phase::Context | Phase::IntegerModel) && self.scene.context.is_none() {
-            self.take_back()?;
-        }
-        self.begin_context();
+        self.begin_context()?;
         if self.queue.is_empty() {
             self.queue.clone_from(&self.trained);
             self.queue.shuffle(&mut self.rng);

@@ -11,7 +11,7 @@
 //!
 //! It sees blocks of visible anchors and a [`StepInfo`], never a backbone.
 //!
-//! # A fourth module
+//! # Another module
 //!
 //! One that keeps offsets short, as `module/short.rs`:
 //!

@@ -29,7 +29,8 @@ pub trait Observer {
 pub struct Outcome {
     /// Loss and sizes of the step.
     pub report: StepReport<f32>,
-    /// Why it was not applied, if so: parameters, moments and statistics are as before.
+    /// Why it was not applied, if so: parameters, moments and statistics are as before, but for what events of modules and the end
+    /// of growth do.
     pub dropped: Option<DroppedStep>,
     /// What was left so that the bundle fits, where this iteration ended with that.
     pub fit: Option<Fit>,

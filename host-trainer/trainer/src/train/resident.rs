@@ -9,7 +9,7 @@ use super::{TrainError, Trainer};
 use crate::scene::Scene;
 use crate::step::coding::Coding;
 use crate::step::{
-    ContextMoments, ContextMomentsMut, DeviceFault, Load, Loss, Phase, Resident, StepReport, TargetView, Trained,
+    ContextMoments, ContextMomentsMut, DeviceFault, LoadNumber, Loss, Phase, Resident, StepReport, TargetView, Trained,
     TrainedMut, Workspace,
 };
 
@@ -20,13 +20,13 @@ pub(super) enum Place {
     #[default]
     Host,
     /// Here and on the device.
-    Both(Load),
+    Both(LoadNumber),
     /// On the device alone; here, only the number of the anchors and their cells are right.
-    Device(Load),
+    Device(LoadNumber),
 }
 
 impl Place {
-    fn load(self) -> Option<Load> {
+    fn load(self) -> Option<LoadNumber> {
         match self {
             Self::Host => None,
             Self::Both(load) | Self::Device(load) => Some(load),
@@ -55,7 +55,7 @@ impl Trainer<'_> {
     fn on_own<T>(
         &self,
         f: impl FnOnce(&mut dyn Resident<f32>) -> Result<T, DeviceFault>,
-    ) -> Result<(T, Load), TrainError> {
+    ) -> Result<(T, LoadNumber), TrainError> {
         let own = self.place.load().expect("it was brought there");
         let asked = |device: &mut dyn Resident<f32>| {
             let is_own = device.held() == Some(own);

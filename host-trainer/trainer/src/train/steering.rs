@@ -16,7 +16,7 @@ const LARGEST_FACTOR: f64 = 16.0;
 /// What fits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fit {
-    /// Anchors that stay.
+    /// Anchors that are to stay in the end; before the last event more do.
     pub n_anchors: usize,
     /// λ from here on, and until now.
     pub lambda: f64,

@@ -55,6 +55,9 @@ pub(crate) fn train_in<'a>(
     let mut trainer = trainer.fitting(gauge(scale.as_ref()));
     trainer.set_device(device);
     folder.write_config(&config.to_toml()?)?;
+    for at in folder.missed_forks(trainer.iteration)? {
+        eprintln!("warning: --fork-at {at} keeps nothing, for the run stands after iteration {}", trainer.iteration);
+    }
     let interval = config.checkpoint_every.map_or(Interval::Seconds(CHECKPOINT_SECONDS), Interval::Iterations);
     let how_to_go_on = || format!("go on with `pocketsplat train --resume {}`", shell_word(&path));
     let estimate = Estimate::new(capture, &config.train, trainer.iteration, warned);

@@ -84,7 +84,7 @@ fn every_symbol_comes_back_under_a_context() {
         let context = bundle.context().expect("the coder asked for");
         let expected = rows_of_scene(&scene, |cell| {
             let steps = ContextWork::default().enter(context, cell);
-            [Group::Feature, Group::LogScale, Group::Offset].map(|group| steps.value(group))
+            Group::ALL.map(|group| steps.value(group))
         });
         assert_eq!(rows_of_bundle(&bundle), expected, "{n_anchors} anchors in chunks of {chunk_anchors}");
     }
@@ -105,7 +105,7 @@ fn every_symbol_comes_back_where_anchors_follow_anchors() {
             for (site, symbols) in sites.iter().zip(symbols.chunks(SMALL.values_per_anchor())) {
                 let steps = work.enter(context, site.lattice);
                 work.leave(&steps, symbols);
-                let values = [Group::Feature, Group::LogScale, Group::Offset].map(|group| steps.value(group));
+                let values = Group::ALL.map(|group| steps.value(group));
                 steps_of.insert(site.lattice, values);
                 n_of_level[context.place(&mut trail, site.lattice).expect("levels").level] += 1;
             }

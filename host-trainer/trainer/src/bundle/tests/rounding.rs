@@ -1,9 +1,10 @@
 //! Values are rounded once, and by one rule: the bundle holds the symbols that the last phase of training drew.
 
 use pocketsplat_core::Bundle;
+use pocketsplat_core::context::Group;
 
 use super::{SMALL, options, random_scene, with_context, write_bytes};
-use crate::bundle::channels::{ContextWork, GROUPS};
+use crate::bundle::channels::ContextWork;
 use crate::bundle::{ChannelCoding, WriteOptions, decoded_scene};
 use crate::integer_model;
 use crate::ops::noise::Stream;
@@ -91,7 +92,7 @@ fn quotients_that_round_to_a_tie_round_as_in_training() {
     let f = SMALL.feature_dim;
     let (mut expected, mut n_apart) = (Vec::new(), 0);
     for (a, cell) in scene.anchors.lattice.iter().enumerate() {
-        let step = ContextWork::default().enter(&integers, *cell).value(GROUPS[0]);
+        let step = ContextWork::default().enter(&integers, *cell).value(Group::ALL[0]);
         let features = &mut scene.anchors.features[a * f..][..f];
         for (i, feature) in features.iter_mut().enumerate() {
             // Next to the middle between two symbols.

@@ -73,7 +73,7 @@ impl Integers {
 pub fn table_of_steps(base_steps: [f32; N_GROUPS]) -> Vec<f32> {
     let exponents = MIN_STEP_EXPONENT as i16..=MAX_STEP_EXPONENT as i16;
     let steps = exponents.map(|exponent| Steps::new(base_steps, [exponent; N_GROUPS]));
-    steps.flat_map(|steps| [Group::Feature, Group::LogScale, Group::Offset].map(|group| steps.value(group))).collect()
+    steps.flat_map(|steps| Group::ALL.map(|group| steps.value(group))).collect()
 }
 
 impl IntegerNetwork {

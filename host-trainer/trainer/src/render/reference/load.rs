@@ -2,11 +2,11 @@
 
 use glam::DVec3;
 use pocketsplat_core::bundle::{AnchorSite, Coder};
-use pocketsplat_core::context::Context;
+use pocketsplat_core::context::{Context, Group};
 use pocketsplat_core::{Bundle, DecodeError};
 
 use super::ReferenceScene;
-use crate::bundle::{ContextWork, GROUPS, decoded_heads, shape_of};
+use crate::bundle::{ContextWork, decoded_heads, shape_of};
 use crate::real::Real;
 use crate::scene::Scene;
 
@@ -91,6 +91,6 @@ impl ReferenceScene {
 fn steps<'c>(context: &Context<'c>, work: &mut ContextWork<'c>, lattice: [i32; 3], symbols: &[i16]) -> [f64; 3] {
     let steps = work.enter(context, lattice);
     work.leave(&steps, symbols);
-    let exponents = GROUPS.map(|group| steps.exponent(group));
+    let exponents = Group::ALL.map(|group| steps.exponent(group));
     std::array::from_fn(|i| f64::from(context.base_steps()[i]) * (f64::from(exponents[i]) / 8.0).exp2())
 }

@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::envelope::{self, Progress, RandomState, content, needs, part};
 use super::{CaptureDifference, CaptureSignature, CheckpointFault, Kernels, MAGIC};
-use crate::scene::{Anchors, ContextModel, Heads, ModelShape, Scene};
+use crate::scene::{Anchors, ContextModel, Heads, ModelShape, QuantisationSteps, Scene};
 use crate::train::config::Backbone;
 use crate::train::optimiser::Optimiser;
 use crate::train::statistics::Statistics;
@@ -106,12 +106,18 @@ impl<'a> Trainer<'a> {
     /// photographs may have another size.
     ///
     /// # Errors
-    /// As [`Self::restore`]; [`RestoreError::Fork`] when `config` asks for another model, lattice or split of the views.
+    /// As [`Self::restore`]; [`RestoreError::Fork`] when `config` asks for another model, lattice or split of the views, or, once
+    /// there is a context model, for another one.
     pub fn fork(capture: &'a Capture, bytes: &[u8], config: TrainConfig) -> Result<Restored<'a>, RestoreError> {
         let mut restored = Self::read(capture, bytes, CaptureSignature::matches_at_any_size)?;
         config.validate().map_err(TrainError::from)?;
         let (begun, config) = (restored.trainer.config, config.resolved_for(capture));
-        for ((key, kept), (_, asked)) in kept_by_a_fork(&begun).into_iter().zip(kept_by_a_fork(&config)) {
+        let has_context = restored.trainer.scene.context.is_some();
+        let [kept, asked] = [&begun, &config].map(|config| {
+            let of_context = has_context.then(|| kept_with_the_context(config));
+            kept_by_a_fork(config).into_iter().chain(of_context.into_iter().flatten())
+        });
+        for ((key, kept), (_, asked)) in kept.zip(asked) {
             if kept != asked {
                 return Err(RestoreError::Fork { key, kept, asked });
             }
@@ -205,5 +211,16 @@ fn kept_by_a_fork(config: &TrainConfig) -> [(&'static str, String); 11] {
         ("shape.detail_hidden", detail_hidden.to_string()),
         ("voxel_size", config.voxel_size.map(|edge| edge.to_string()).unwrap_or_default()),
         ("validation_every", config.validation_every.to_string()),
+    ]
+}
+
+/// What it must keep besides where its run has a context model.
+fn kept_with_the_context(config: &TrainConfig) -> [(&'static str, String); 4] {
+    let QuantisationSteps { feature, log_scale, offset } = config.hac.base_steps;
+    [
+        ("backbone", toml::Value::try_from(config.backbone).map(|name| name.to_string()).unwrap_or_default()),
+        ("hac.base_steps.feature", feature.to_string()),
+        ("hac.base_steps.log_scale", log_scale.to_string()),
+        ("hac.base_steps.offset", offset.to_string()),
     ]
 }

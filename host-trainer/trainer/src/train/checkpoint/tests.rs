@@ -175,6 +175,30 @@ fn a_fork_takes_photographs_of_another_size_but_no_other_poses() {
 }
 
 #[test]
+fn a_fork_keeps_the_context_model_once_there_is_one() {
+    let (capture, config) = (tiny_capture(), tiny_hac_config(30));
+    let mut trainer = Trainer::new(&capture, config).unwrap();
+    let plain = TrainConfig { backbone: Backbone::Scaffold, ..config };
+    let mut finer = config;
+    finer.hac.base_steps.offset = 0.1;
+    let early = saved(&trainer);
+    for asked in [plain, finer] {
+        Trainer::fork(&capture, &early, asked).unwrap();
+    }
+    while trainer.scene.context.is_none() {
+        trainer.advance().unwrap();
+    }
+    let late = saved(&trainer);
+    for (asked, expected) in [
+        (plain, "keeps `train.backbone` of its run, which is \"hac\", but \"scaffold\" was asked for"),
+        (finer, "keeps `train.hac.base_steps.offset` of its run, which is 0.35, but 0.1 was asked for"),
+    ] {
+        let error = Trainer::fork(&capture, &late, asked).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error}");
+    }
+}
+
+#[test]
 fn a_capture_without_views_is_no_start() {
     let mut capture = tiny_capture();
     capture.train.clear();

@@ -247,7 +247,12 @@ impl TrainConfig {
                 return Err(ConfigError::NoRate { key });
             }
             // The context model begins with the iteration after its share.
-            within(key, at, self.hac.context_from + 1.0 / f64::from(self.iterations), 1.0)?;
+            let least = self.hac.context_from + 1.0 / f64::from(self.iterations);
+            if self.hac.context_from < at && at < least {
+                let needed = (1.0 / (at - self.hac.context_from)).ceil();
+                return Err(ConfigError::TooShort { found: self.iterations, needed, key });
+            }
+            within(key, at, least, 1.0)?;
             if self.hac.lambda == 0.0 {
                 return Err(ConfigError::NoPrice { key });
             }

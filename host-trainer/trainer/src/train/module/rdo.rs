@@ -137,7 +137,7 @@ impl Module for Rdo {
             let masked = self.worthless(&worth, strength);
             return Ok(Some(AnchorChange::Fit { masked, found: fits }));
         }
-        let strength = self.anchors.map_or(self.strength, part_of_the_way);
+        let strength = self.anchors.filter(|most| *most < n).map_or(self.strength, part_of_the_way);
         Ok(Some(AnchorChange::Mask(self.worthless(&worth, strength))))
     }
 
@@ -257,5 +257,24 @@ mod tests {
         let early = Modules { rdo: Some(Rdo { from: 0.2, ..Rdo::default() }), ..Modules::default() };
         let refused = TrainConfig { modules: early, ..tiny_hac_config(100) }.validate().unwrap_err().to_string();
         assert!(refused.contains("train.modules.rdo.from is 0.2"), "{refused}");
+        let rdo = |iterations| TrainConfig { modules, ..tiny_hac_config(iterations) }.validate();
+        let short = ConfigError::TooShort { found: 5, needed: 6.0, key: "train.modules.rdo.from" };
+        assert_eq!((rdo(5), rdo(6)), (Err(short), Ok(())));
+    }
+
+    #[test]
+    fn a_limit_that_is_not_reached_changes_nothing() {
+        let capture = tiny_capture();
+        let scenes = [None, Some(1_000_000)].map(|anchors| {
+            let rdo = Rdo { strength: 0.01, anchors, ..Rdo::default() };
+            let config =
+                TrainConfig { modules: Modules { rdo: Some(rdo), ..Modules::default() }, ..tiny_hac_config(60) };
+            let mut trainer = Trainer::new(&capture, config).unwrap();
+            while trainer.iteration < 50 {
+                trainer.advance().unwrap();
+            }
+            trainer.scene.anchors
+        });
+        assert!(scenes[0] == scenes[1]);
     }
 }

@@ -92,6 +92,26 @@ impl RunFolder {
     /// [`RunError`] when another process works in the folder, it holds an unfinished run or something else, or it can
     /// not be written.
     pub fn start(path: &Path, config: &str, overwrite: bool) -> Result<Self, RunError> {
+        let folder = Self::cleared(path, overwrite)?;
+        folder.write_config(config)?;
+        Ok(folder)
+    }
+
+    /// As [`Self::start`], for a run that begins as `begun` stands. Its checkpoint is there before the configuration is: the folder
+    /// is that of a run only once it can go on from there.
+    ///
+    /// # Errors
+    /// As [`Self::start`].
+    pub fn start_from(path: &Path, config: &str, overwrite: bool, begun: &impl Resumable) -> Result<Self, RunError> {
+        let folder = Self::cleared(path, overwrite)?;
+        files::remove(&path.join(CONFIG))?;
+        folder.save(begun)?;
+        folder.write_config(config)?;
+        Ok(folder)
+    }
+
+    /// The folder `path` without what an earlier run left there, but for its configuration.
+    fn cleared(path: &Path, overwrite: bool) -> Result<Self, RunError> {
         fs::create_dir_all(path).map_err(|source| RunError::io("make the folder", path, source))?;
         let ours = |name: &Path| {
             [LOCK, PHOTOGRAPHS].map(Path::new).contains(&name) || name.extension().is_some_and(|e| e == files::PARTIAL)
@@ -110,7 +130,6 @@ impl RunFolder {
             files::remove(&path.join(name))?;
         }
         files::remove_folder(&path.join(PREVIEWS))?;
-        folder.write_config(config)?;
         Ok(folder)
     }
 
@@ -148,6 +167,16 @@ impl RunFolder {
     #[must_use]
     pub fn forking_at(self, iterations: &[u32]) -> Self {
         Self { forks_at: iterations.to_vec(), ..self }
+    }
+
+    /// Iterations at which it was to be forked from, of which it keeps no checkpoint now that it stands after `iteration`.
+    ///
+    /// # Errors
+    /// [`RunError::Io`].
+    pub fn missed_forks(&self, iteration: u32) -> Result<Vec<u32>, RunError> {
+        let kept: Vec<u32> = self.checkpoints()?.into_iter().map(|(iteration, _)| iteration).collect();
+        let missed = |at: &u32| *at < iteration && !kept.contains(at);
+        Ok(self.forks_at.iter().copied().filter(missed).collect())
     }
 
     /// The file of the pilots that are done, which the caller keeps while it measures effects.

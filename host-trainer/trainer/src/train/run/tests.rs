@@ -1,4 +1,5 @@
 use std::fs;
+use std::io::Write;
 use std::sync::atomic::AtomicBool;
 
 use super::*;
@@ -121,6 +122,58 @@ fn a_fork_begins_where_its_run_stood() {
     let expected =
         format!("a fork keeps `train.shape.feature_dim` of its run, which is {width}, but {} was asked for", width + 1);
     assert!(source.contains(&expected), "{error}: {source}");
+}
+
+/// A run whose state cannot be written.
+struct Unwritable;
+
+impl Resumable for Unwritable {
+    fn iteration(&self) -> u32 {
+        12
+    }
+
+    fn iterations(&self) -> u32 {
+        40
+    }
+
+    fn seconds(&self) -> f64 {
+        0.0
+    }
+
+    fn n_dropped(&self) -> u32 {
+        0
+    }
+
+    fn size(&self) -> [usize; 2] {
+        [0; 2]
+    }
+
+    fn save(&self, out: &mut dyn Write) -> std::io::Result<()> {
+        out.write_all(b"half")?;
+        Err(std::io::ErrorKind::StorageFull.into())
+    }
+}
+
+#[test]
+fn a_fork_has_a_folder_only_with_its_first_checkpoint() {
+    let home = tempfile::tempdir().unwrap();
+    let path = home.path().join("a.run");
+    // Neither where there was nothing, nor where a finished run lies.
+    for finished in [false, true] {
+        if finished {
+            RunFolder::start(&path, "a = 1", false).unwrap().finish("{}", false).unwrap();
+        }
+        let error = RunFolder::start_from(&path, "a = 2", false, &Unwritable).unwrap_err();
+        assert!(matches!(error, RunError::Write { .. }), "{error}");
+        assert!(
+            matches!(RunFolder::reopen(&path), Err(RunError::NoRun { .. })),
+            "it would begin with the capture's points"
+        );
+    }
+    let capture = tiny_capture();
+    let trainer = Trainer::new(&capture, tiny_config(ITERATIONS)).unwrap();
+    let folder = RunFolder::start_from(&path, "a = 2", false, &trainer).unwrap();
+    assert_eq!(names(&folder), ["config.toml", "iteration-00000000.checkpoint", "lock"]);
 }
 
 #[test]

@@ -94,7 +94,7 @@ fn of_decoder(context: &Context<'_>, cells: &[[i32; 3]]) -> OfDecoder {
         let parts = |output| if output < n_means { 64.0 } else { 8.0 };
         all.outputs.extend((0..context.n_outputs()).map(|i| f32::from(network.output(i, &hidden)) / parts(i)));
         let steps = network.steps(&hidden);
-        all.steps.extend([Group::Feature, Group::LogScale, Group::Offset].map(|group| steps.value(group)));
+        all.steps.extend(Group::ALL.map(|group| steps.value(group)));
     }
     all
 }

@@ -91,13 +91,23 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
     let given = points.map(|(_, points)| kept_points(&points, &normalisation, &mut notes));
     let (points, points_origin) = match given.filter(|points| !points.is_empty()) {
         Some(points) => (points, PointsOrigin::Capture),
-        None if layout == Layout::Blender => {
-            let random = random_points_world(options.n_random_points, options.seed);
-            (random.into_iter().map(|point| normalisation.point(point)).collect(), PointsOrigin::Random)
-        }
         None => {
             let cameras: Vec<_> = train.iter().map(|view| &view.camera).collect();
-            (frusta::random_points(&cameras, options.n_random_points, options.seed), PointsOrigin::Random)
+            let cube = (layout == Layout::Blender)
+                .then(|| random_points_world(options.n_random_points, options.seed))
+                .map(|points| points.into_iter().map(|point| normalisation.point(point)).collect::<Vec<_>>());
+            let is_seen = cube.as_ref().is_none_or(|points| frusta::are_seen(points, &cameras));
+            if !is_seen {
+                notes.push(
+                    "the cameras do not look at the cube of ±1.3 around the origin, where scenes of Synthetic-NeRF lie; \
+                     training starts from random points where they look"
+                        .to_owned(),
+                );
+            }
+            let points = cube
+                .filter(|_| is_seen)
+                .unwrap_or_else(|| frusta::random_points(&cameras, options.n_random_points, options.seed));
+            (points, PointsOrigin::Random)
         }
     };
     let report = LoadReport {

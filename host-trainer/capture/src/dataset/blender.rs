@@ -4,20 +4,20 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use super::listing::{ListedView, Listing, Note, commonest};
+use super::listing::{ListedView, Listing, Note, commonest, every_nth};
 use super::transforms::{Transforms, read_transforms};
-use super::{DatasetError, Layout, Split, ViewFault};
+use super::{DatasetError, Layout, LoadOptions, Split, ViewFault};
 
 /// The file that tells this layout.
 pub(super) const TRAIN_FILE: &str = "transforms_train.json";
 const TEST_FILE: &str = "transforms_test.json";
 const VAL_FILE: &str = "transforms_val.json";
 
-/// Lists the Blender capture in `folder`.
+/// Lists the Blender capture in `folder`. Without a test file every n-th training view is held out.
 ///
 /// # Errors
 /// As [`super::load`], as far as files but no pixels tell.
-pub(super) fn list(folder: &Path) -> Result<Listing, DatasetError> {
+pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, DatasetError> {
     let source = folder.join(TRAIN_FILE);
     let train = read_transforms(&source)?;
     let test = read_optional(folder, TEST_FILE)?;
@@ -31,6 +31,10 @@ pub(super) fn list(folder: &Path) -> Result<Listing, DatasetError> {
     if let Some(test) = &test {
         test.check_model(&folder.join(TEST_FILE))?;
         views.extend(self::views(folder, Split::Test, test));
+    } else {
+        for (i, view) in views.iter_mut().enumerate() {
+            view.split = every_nth(options.test_every, i);
+        }
     }
     for view in &mut views {
         if let (Ok(shot), Some(needed_px)) = (&view.shot, needed_px)
@@ -40,13 +44,17 @@ pub(super) fn list(folder: &Path) -> Result<Listing, DatasetError> {
         }
     }
     if !views.iter().any(|view| view.split == Split::Test && view.shot.is_ok()) {
-        let why = if test.is_some() { "lists no usable view" } else { "is missing" };
-        let text = format!(
-            "no views are held out, so quality on unseen views cannot be measured: `{}` {why}; move some frames of \
-             `{TRAIN_FILE}` into it",
-            folder.join(TEST_FILE).display()
-        );
-        notes.push(Note::warning("no-test-views", text));
+        notes.push(match &test {
+            Some(_) => Note::warning(
+                "no-test-views",
+                format!(
+                    "no views are held out, so quality on unseen views cannot be measured: `{}` lists no usable view; move \
+                     some frames of `{TRAIN_FILE}` into it",
+                    folder.join(TEST_FILE).display()
+                ),
+            ),
+            None => Note::no_test_views(),
+        });
     }
     Ok(Listing { layout: Layout::Blender, source, views, points: None, unposed: Vec::new(), notes })
 }

@@ -15,6 +15,8 @@ const CUBE_HALF_WIDTHS: f64 = 0.9;
 const FAR_DISTANCES: f64 = 4.0;
 /// Where the cameras share no focus, points start at this part of the distance that stands in for it.
 const NEAR_DISTANCES: f64 = 0.25;
+/// Points of which [`are_seen`] asks.
+const N_TRIED: usize = 1_000;
 /// The focus is taken where the mean projector across the optical axes has at least this determinant; parallel axes
 /// give 0, axes from all sides (2/3)³.
 const MIN_DETERMINANT: f64 = 1e-3;
@@ -51,6 +53,21 @@ pub(super) fn random_points(cameras: &[&Camera], n: usize, seed: u64) -> Vec<DVe
             along_ray(camera, pixel, distance / inverse)
         })
         .collect()
+}
+
+/// Whether the cameras look at these points: a point is in the images of at least a quarter of them, in the mean. Of cameras around
+/// something else a few see it too, behind what they look at. A thousand points are tried.
+pub(super) fn are_seen(points: &[DVec3], cameras: &[&Camera]) -> bool {
+    let is_in = |camera: &Camera, point: DVec3| {
+        let at = camera.rotation * point + camera.translation;
+        let [u, v] = [0, 1].map(|axis| camera.focal_px[axis] * at[axis] / at.z + camera.principal_px[axis]);
+        at.z > 0.0
+            && (0.0..=f64::from(camera.width_px)).contains(&u)
+            && (0.0..=f64::from(camera.height_px)).contains(&v)
+    };
+    let tried = &points[..points.len().min(N_TRIED)];
+    let n_in = |camera: &&Camera| tried.iter().filter(|point| is_in(camera, **point)).count();
+    4 * cameras.iter().map(n_in).sum::<usize>() >= tried.len() * cameras.len()
 }
 
 /// The point at depth `z` on the ray of a pixel position.

@@ -10,6 +10,8 @@ mod jpeg_end;
 
 /// Of 100: compression that the eye does not see.
 const JPEG_QUALITY: u8 = 95;
+/// Bytes that a decoded photograph may take, 1,400 megapixels; a file that asks for more is damaged.
+const MOST_DECODED_BYTES: u64 = 4 << 30;
 
 /// What an image file says about itself before its pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,8 +55,11 @@ fn decode(path: &Path) -> Result<::image::DynamicImage, String> {
             bytes.len()
         ));
     }
-    let reader = ::image::ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format();
-    reader.map_err(in_words)?.decode().map_err(in_words)
+    let mut reader = ::image::ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format().map_err(in_words)?;
+    let mut limits = ::image::Limits::default();
+    limits.max_alloc = Some(MOST_DECODED_BYTES);
+    reader.limits(limits);
+    reader.decode().map_err(in_words)
 }
 
 /// What a decoder or the system said, on one line.

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::image_names::is_image_name;
-use super::listing::Note;
+use super::listing::{Note, is_hidden};
 use super::{DatasetError, LoadOptions};
 
 /// The folder of full-size images.
@@ -49,7 +49,10 @@ pub(super) fn choose(
 /// Whether images lie in the folder itself.
 fn holds_images(folder: &Path) -> bool {
     let mut entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    entries.any(|entry| entry.path().is_file() && is_image_name(&entry.file_name().to_string_lossy()))
+    entries.any(|entry| {
+        let name = entry.file_name();
+        !is_hidden(&name) && entry.path().is_file() && is_image_name(&name.to_string_lossy())
+    })
 }
 
 /// The folders named `images` or `images_…`, sorted.

@@ -1,6 +1,7 @@
 //! What a reader of one layout finds, before any pixel is decoded: the common ground of loading and diagnosing.
 
 use std::collections::{BTreeMap, HashSet};
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DVec3};
@@ -114,6 +115,16 @@ pub(super) fn commonest<T: Copy + Ord>(items: impl Iterator<Item = T>) -> Option
     counts.into_iter().max_by_key(|&(_, rank)| rank).map(|(item, _)| item)
 }
 
+/// Whether a file is hidden, as those that macOS leaves beside others on foreign disks (`._a.txt`).
+pub(super) fn is_hidden(name: &OsStr) -> bool {
+    name.as_encoded_bytes().starts_with(b".")
+}
+
+/// Whether a file of a folder of poses holds one: it has this extension and is not hidden.
+pub(super) fn is_listed(path: &Path, extension: &str) -> bool {
+    path.extension().is_some_and(|own| own == extension) && path.file_name().is_some_and(|name| !is_hidden(name))
+}
+
 /// Gives every `test_every`-th of `n` views, counted from the first, to the test split; none where it is 0.
 pub(super) fn every_nth(test_every: u32, i: usize) -> Split {
     if test_every > 0 && i.is_multiple_of(test_every as usize) { Split::Test } else { Split::Train }
@@ -139,7 +150,7 @@ fn image_names_below(folder: &Path) -> Vec<String> {
             let name = format!("{prefix}{}", entry.file_name().to_string_lossy());
             if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
                 waiting.push((entry.path(), name + "/"));
-            } else if is_image_name(&name) && entry.path().is_file() {
+            } else if !is_hidden(&entry.file_name()) && is_image_name(&name) && entry.path().is_file() {
                 names.push(name);
             }
         }

@@ -120,10 +120,12 @@ pub struct Capture {
 pub const EXTENT: f64 = 5.0;
 
 impl Capture {
-    /// Size of the training view with the longest side, pixels.
+    /// Size of the training view with the longest side, of several the one of most pixels.
     pub fn largest_px(&self) -> [u32; 2] {
         let sizes = self.train.iter().map(|view| [view.camera.width_px, view.camera.height_px]);
-        sizes.max_by_key(|size| size[0].max(size[1])).unwrap_or_default()
+        sizes
+            .max_by_key(|[width, height]| (*width.max(height), u64::from(*width) * u64::from(*height)))
+            .unwrap_or_default()
     }
 
     /// The voxel size for anchors, normalised units: [`suggested_voxel_size`] of the capture's points, and
@@ -160,13 +162,24 @@ fn list(path: &Path, options: &LoadOptions) -> Result<listing::Listing, DatasetE
         }
         return Err(DatasetError::NotAFolder { path: path.to_owned() });
     }
-    match detect::layout_of(path) {
-        Some(Layout::Blender) => blender::list(path),
+    let mut listing = match detect::layout_of(path) {
+        Some(Layout::Blender) => blender::list(path, options),
         Some(Layout::Colmap) => colmap::list(path, options),
         Some(Layout::Nerfstudio) => nerfstudio::list(path, options),
         Some(Layout::Polycam) => polycam::list(path, options),
         Some(Layout::Record3d) => record3d::list(path, options),
         Some(Layout::Nsvf) => nsvf::list(path, options),
         None => Err(detect::unknown_layout(path)),
+    }?;
+    let has_images = matches!(listing.layout, Layout::Colmap | Layout::Nerfstudio);
+    for (option, is_ignored) in [
+        ("--images", options.images.is_some() && !has_images),
+        ("--model", options.model.is_some() && listing.layout != Layout::Colmap),
+    ] {
+        if is_ignored {
+            let text = format!("{option} says nothing about a capture of {}; leave it out", listing.layout);
+            listing.notes.push(listing::Note::warning("ignored-option", text));
+        }
     }
+    Ok(listing)
 }

@@ -36,6 +36,11 @@ impl<'a> NamedPath<'a> {
         self.parts[skipped..].join("/")
     }
 
+    /// All parts of the path, which tell it from others of the same name.
+    pub(super) fn key(&self) -> String {
+        self.parts.join("/")
+    }
+
     /// The first part of a relative path of several, such as `images`.
     pub(super) fn first_folder(&self) -> Option<&'a str> {
         (!self.is_absolute && self.parts.len() > 1).then(|| self.parts[0])
@@ -68,6 +73,12 @@ impl<'a> NamedPath<'a> {
     /// The image that is there: as [`Self::file`], and where the path has no extension of an image or the file another.
     pub(super) fn image(&self, folder: &Path, images: Option<&str>) -> Option<PathBuf> {
         self.find(folder, images, with_some_extension)
+    }
+
+    /// The mask that is there: as [`Self::image`], but never by its bare name, for a photograph may have the same.
+    pub(super) fn mask(&self, folder: &Path) -> Option<PathBuf> {
+        let with_folders = (0..self.parts.len().saturating_sub(1)).map(|n| folder.join(self.parts[n..].join("/")));
+        std::iter::once(self.expected(folder, None)).chain(with_folders).find_map(|path| with_some_extension(&path))
     }
 
     fn find(&self, folder: &Path, images: Option<&str>, look: impl Fn(&Path) -> Option<PathBuf>) -> Option<PathBuf> {
@@ -174,6 +185,11 @@ mod tests {
             ("", None, None),
         ] {
             assert_eq!(found(written, images).as_deref(), expected, "{written} in {images:?}");
+        }
+        let mask = |written: &str| NamedPath::new(written).mask(capture.path());
+        assert_eq!(mask("/home/ann/fox/left/b.png"), Some(capture.path().join("left/b.jpg")));
+        for missing in ["masks/a.jpg", "/home/ann/fox/masks/c.png", "a.jpg"] {
+            assert_eq!(mask(missing), None, "{missing} is not the photograph of that name");
         }
         assert_eq!(NamedPath::new("images/a.png").file(capture.path(), None), None, "a file has its own extension");
     }

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::listing::{ListedView, Listing, Note, every_nth, unused_images};
 use super::named_path::NamedPath;
-use super::transforms::{Transforms, read_transforms};
+use super::transforms::{Frame, Transforms, read_transforms};
 use super::{DatasetError, Layout, LoadOptions, Split, image_folder, ply};
 
 /// The file that tells this layout.
@@ -67,23 +67,31 @@ fn splits(transforms: &Transforms, options: &LoadOptions, notes: &mut Vec<Note>)
     {
         notes.push(Note::new("unused-split", format!("views in `val_filenames`, not used: {}", val.len())));
     }
-    let mut by_name = HashMap::new();
+    let mut by_path = HashMap::new();
+    // Of paths of another machine the name alone may fit; several of one name say nothing.
+    let mut by_name: HashMap<String, Option<Split>> = HashMap::new();
     for (names, split) in [(train.as_ref(), Split::Train), (held_out, Split::Test)] {
-        for name in names.into_iter().flatten() {
-            by_name.insert(NamedPath::new(name).name(), split);
+        for path in names.into_iter().flatten().map(|name| NamedPath::new(name)) {
+            if by_path.insert(path.key(), split).is_none() {
+                by_name.entry(path.name()).and_modify(|split| *split = None).or_insert(Some(split));
+            }
         }
     }
-    let splits: Vec<_> = transforms.frames.iter().map(|frame| by_name.get(frame.name()).copied()).collect();
+    let split_of = |frame: &Frame| {
+        let by_name = || by_name.get(frame.name()).copied().flatten();
+        by_path.get(&frame.path().key()).copied().or_else(by_name)
+    };
+    let splits: Vec<_> = transforms.frames.iter().map(split_of).collect();
     let n_unused = splits.iter().filter(|split| split.is_none()).count();
     if n_unused > 0 {
         let text = format!("frames that no used split of `{FILE}` names, left out: {n_unused}");
         notes.push(Note::new("unused-split", text));
     }
     let n_named = splits.iter().flatten().count();
-    if n_named < by_name.len() {
+    if n_named < by_path.len() {
         let text = format!(
             "names in the splits of `{FILE}` that no frame has: {}; they must be spelt like `file_path`",
-            by_name.len() - n_named
+            by_path.len() - n_named
         );
         notes.push(Note::new("unknown-names", text));
     }
@@ -124,4 +132,44 @@ fn unposed(folder: &Path, images: Option<&str>, transforms: &Transforms) -> Vec<
     }
     let masks: Vec<PathBuf> = transforms.frames.iter().filter_map(|frame| frame.mask(folder)).collect();
     unused_images(&folder.join(first), found.iter().chain(&masks).map(PathBuf::as_path))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The splits of frames with these paths, `|` between those to train on and those held out.
+    fn splits_of(frames: &[&str], train: &[&str], test: &[&str]) -> (String, usize) {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let list = |paths: &[&str]| serde_json::to_string(paths).expect("text");
+        let frames: Vec<String> =
+            frames.iter().map(|path| format!("{{\"file_path\": \"{path}\", \"transform_matrix\": []}}")).collect();
+        let text = format!(
+            "{{\"fl_x\": 20, \"train_filenames\": {}, \"test_filenames\": {}, \"frames\": [{}]}}",
+            list(train),
+            list(test),
+            frames.join(", ")
+        );
+        let path = folder.path().join(FILE);
+        std::fs::write(&path, text).expect("a file");
+        let transforms = read_transforms(&path).expect("transforms");
+        let mut notes = Vec::new();
+        let letter = |split: Option<Split>| match split {
+            Some(Split::Train) => 't',
+            Some(Split::Test) => 'h',
+            None => '-',
+        };
+        let found = splits(&transforms, &LoadOptions::default(), &mut notes);
+        (found.into_iter().map(letter).collect(), notes.len())
+    }
+
+    #[test]
+    fn a_split_names_frames_by_their_paths_or_by_a_name_that_is_one_alone() {
+        let cameras = ["/home/ann/cam1/0.png", "/home/ann/cam1/1.png", "/home/ann/cam2/0.png"];
+        assert_eq!(splits_of(&cameras, &cameras[..2], &cameras[2..]), ("tth".to_owned(), 0));
+        let moved = ["images/0.png", "images/1.png"];
+        assert_eq!(splits_of(&moved, &["./images/0.png"], &["images\\1.png"]), ("th".to_owned(), 0));
+        assert_eq!(splits_of(&["/a/0.png", "/a/1.png"], &["/b/0.png"], &["/b/1.png"]), ("th".to_owned(), 0));
+        assert_eq!(splits_of(&["/a/0.png"], &["/b/0.png"], &["/c/0.png"]).0, "-", "two of one name");
+    }
 }

@@ -5,7 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::listing::{Listing, Note, every_nth};
+use super::listing::{Listing, Note, every_nth, is_listed};
 use super::transforms::{Frame, Intrinsics, list_frames};
 use super::{DatasetError, Layout, LoadOptions, Split, text_file};
 
@@ -25,7 +25,7 @@ pub(super) fn is_layout_of(folder: &Path) -> bool {
 pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, DatasetError> {
     let shared = intrinsics(&folder.join(INTRINSICS))?;
     let entries = std::fs::read_dir(folder.join(POSES)).into_iter().flatten().flatten().map(|entry| entry.path());
-    let mut files: Vec<PathBuf> = entries.filter(|path| path.extension().is_some_and(|e| e == "txt")).collect();
+    let mut files: Vec<PathBuf> = entries.filter(|path| is_listed(path, "txt")).collect();
     files.sort();
     let frames = files.iter().map(|path| frame(path)).collect::<Result<Vec<_>, _>>()?;
     let has = |prefix: &str| frames.iter().any(|frame| frame.name().starts_with(prefix));

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use super::listing::{Listing, every_nth};
+use super::listing::{Listing, every_nth, is_listed};
 use super::transforms::{Frame, Intrinsics, list_frames};
 use super::{DatasetError, Layout, LoadOptions, text_file};
 
@@ -35,7 +35,7 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
         return Err(DatasetError::NotAFolder { path: folder.join("keyframes") });
     };
     let entries = std::fs::read_dir(&cameras).into_iter().flatten().flatten().map(|entry| entry.path());
-    let mut files: Vec<PathBuf> = entries.filter(|path| path.extension().is_some_and(|e| e == "json")).collect();
+    let mut files: Vec<PathBuf> = entries.filter(|path| is_listed(path, "json")).collect();
     files.sort();
     let frames = files.iter().map(|path| frame(path)).collect::<Result<Vec<_>, _>>()?;
     Ok(list_frames(Layout::Polycam, cameras, &images, &frames, &Intrinsics::default(), |i| {

@@ -93,7 +93,7 @@ impl Frame {
         };
         let lens = self.lens(&path, &header, shared)?;
         let mask = match self.mask_path.as_deref().map(NamedPath::new) {
-            Some(named) => Some(named.image(folder, None).ok_or_else(|| ViewFault::Mask {
+            Some(named) => Some(named.mask(folder).ok_or_else(|| ViewFault::Mask {
                 path: named.expected(folder, None),
                 message: "does not exist".to_owned(),
             })?),
@@ -109,7 +109,7 @@ impl Frame {
 
     /// The frame's mask, where it names one that is there.
     pub(super) fn mask(&self, folder: &Path) -> Option<PathBuf> {
-        NamedPath::new(self.mask_path.as_deref()?).image(folder, None)
+        NamedPath::new(self.mask_path.as_deref()?).mask(folder)
     }
 
     /// The lens for the image as it is stored: the frame's own numbers before the shared ones, the focal length before

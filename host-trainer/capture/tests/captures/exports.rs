@@ -1,6 +1,7 @@
 //! Captures as telephones and NSVF export them, written from a fixture's photographs.
 
 use glam::{DMat3, DQuat, DVec3};
+use pocketsplat_capture::dataset::LoadOptions;
 
 use crate::fixture::{FOCAL_PX, Fixture, Kind, Photo, SIZE_PX, photograph};
 
@@ -104,6 +105,32 @@ fn exports_are_the_capture_that_they_were_made_from() {
             assert_eq!((a.camera.focal_px, a.camera.principal_px), (b.camera.focal_px, b.camera.principal_px));
             assert_eq!(photograph(a), photograph(b), "{layout} {}", a.name);
         }
+    }
+}
+
+#[test]
+fn files_that_a_mac_leaves_beside_others_are_passed_over() {
+    let fixture = Fixture::new(Kind::Nerfstudio, 9);
+    write_nsvf(&fixture, NSVF_MATRIX, |_| "");
+    let hidden = "Mac OS X        \u{1}";
+    fixture.write("pose/._0003.txt", hidden);
+    fixture.write("rgb/._0003.png", hidden);
+    let (capture, report) = fixture.load().expect("a sound capture");
+    assert_eq!((capture.train.len() + capture.test.len(), report.unposed), (9, Vec::<String>::new()));
+    let fixture = Fixture::new(Kind::Nerfstudio, 9);
+    write_polycam(&fixture, "cameras", "images");
+    fixture.write("keyframes/cameras/._p_03.json", hidden);
+    assert_eq!(fixture.load().expect("a sound capture").0.train.len(), 7);
+}
+
+#[test]
+fn options_that_a_layout_does_not_read_are_named() {
+    let fixture = Fixture::new(Kind::Nerfstudio, 9);
+    write_nsvf(&fixture, NSVF_MATRIX, |_| "");
+    let options = LoadOptions { images: Some("rgb_2".to_owned()), model: Some(1), ..LoadOptions::default() };
+    let said = fixture.load_with(&options).expect("a sound capture").1.to_string();
+    for option in ["--images", "--model"] {
+        assert!(said.contains(&format!("{option} says nothing about a capture of NSVF; leave it out")), "{said}");
     }
 }
 

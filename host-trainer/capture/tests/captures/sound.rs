@@ -42,6 +42,20 @@ fn one_capture_in_every_layout_is_the_same_capture() {
 }
 
 #[test]
+fn a_name_of_one_byte_a_letter_is_read_too() {
+    let mut fixture = Fixture::new(Kind::ColmapBinary, 9);
+    fixture.photos[3].name = "p_03ü.png".to_owned();
+    std::fs::rename(fixture.at("images/p_03.png"), fixture.at("images/p_03ü.png")).expect("written");
+    fixture.write_files();
+    let model = fixture.at("sparse/0/images.bin");
+    let bytes = std::fs::read(&model).expect("written");
+    let at = bytes.windows(2).position(|two| two == "ü".as_bytes()).expect("its name");
+    std::fs::write(&model, [&bytes[..at], &[0xFC], &bytes[at + 2..]].concat()).expect("a file");
+    let (capture, report) = fixture.load().expect("a sound capture");
+    assert_eq!((capture.train.len() + capture.test.len(), report.skipped.len()), (9, 0));
+}
+
+#[test]
 fn points_and_cameras_share_one_frame() {
     let fixture = Fixture::new(Kind::ColmapBinary, 9);
     let (capture, report) = fixture.write_files().load().expect("a sound capture");

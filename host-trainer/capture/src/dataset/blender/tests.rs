@@ -41,7 +41,7 @@ impl Fixture {
     }
 
     fn load(&self) -> Result<(Capture, LoadReport), DatasetError> {
-        load(self.path(), &LoadOptions::default())
+        load(self.path(), &LoadOptions { test_every: 0, ..LoadOptions::default() })
     }
 
     fn error(&self) -> String {
@@ -106,7 +106,8 @@ fn a_sound_capture_loads_with_its_cameras_and_pixels() {
 fn images_are_composited_before_they_are_reduced_and_intrinsics_follow() {
     let fixture = Fixture::new(3);
     fixture.write_transforms();
-    let options = LoadOptions { max_resolution: Some(3), background: Background::White, ..LoadOptions::default() };
+    let options =
+        LoadOptions { max_resolution: Some(3), background: Background::White, test_every: 0, ..LoadOptions::default() };
     let (capture, report) = load(fixture.path(), &options).expect("a capture");
     let view = &capture.train[0];
     assert_eq!((view.camera.width_px, view.camera.height_px), (3, 2));
@@ -144,14 +145,35 @@ fn views_with_faults_are_left_out_and_named() {
 }
 
 #[test]
-fn a_missing_test_split_is_said_with_its_remedy() {
-    let fixture = Fixture::new(3);
+fn without_a_test_file_every_eighth_view_is_held_out() {
+    let fixture = Fixture::new(9);
     fixture.write_transforms();
+    let (capture, _) = load(fixture.path(), &LoadOptions::default()).expect("a capture");
+    assert_eq!((capture.train.len(), capture.test.len()), (7, 2));
+    assert_eq!([0, 1].map(|i| capture.test[i].name.clone()), ["train/r_0", "train/r_8"]);
     let (_, report) = fixture.load().expect("a capture");
-    assert_says(
-        &report.to_string(),
-        &["no views are held out", "transforms_test.json` is missing", "move some frames"],
-    );
+    assert_says(&report.to_string(), &["no views are held out", "`--test-every 8`"]);
+}
+
+#[test]
+fn random_points_lie_where_the_cameras_look() {
+    let fixture = Fixture::new(9);
+    fixture.write_transforms();
+    let around_the_origin = load(fixture.path(), &LoadOptions::default()).expect("a capture");
+    assert!(!around_the_origin.1.to_string().contains("cube"), "{}", around_the_origin.1);
+    let elsewhere = DVec3::new(60.0, 0.0, 0.0);
+    let frames: Vec<String> = (0..9)
+        .map(|i| {
+            let rotation = DMat3::from_rotation_y(0.5 * i as f64);
+            frame_with(&format!("train/r_{i}"), rotation, elsewhere + rotation * DVec3::new(0.0, 0.0, 4.0))
+        })
+        .collect();
+    fixture.write("transforms_train.json", &transforms("0.7", &frames));
+    let (capture, report) = load(fixture.path(), &LoadOptions::default()).expect("a capture");
+    assert_says(&report.to_string(), &["do not look at the cube"]);
+    let focus = capture.normalisation.point(elsewhere);
+    let n_near = capture.points.iter().filter(|point| point.distance(focus) < 5.0).count();
+    assert!(2 * n_near >= capture.points.len(), "{n_near} of {}", capture.points.len());
 }
 
 #[test]

@@ -94,15 +94,17 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// A name up to its zero byte.
+    /// A name up to its zero byte: UTF-8, or where it is not, a byte a letter as programs on Windows write `ü`.
     fn name(&mut self) -> Result<String, ModelFault> {
         let Some(n) = self.rest.iter().take(MAX_NAME_BYTES).position(|&byte| byte == 0) else {
             return Err(self.fault(format!("the name does not end within {MAX_NAME_BYTES} bytes or the file")));
         };
         let (name, rest) = self.rest.split_at(n);
-        let name = std::str::from_utf8(name).map_err(|_| self.fault("the name is not UTF-8".to_owned()))?;
         self.rest = &rest[1..];
-        Ok(name.to_owned())
+        Ok(match std::str::from_utf8(name) {
+            Ok(name) => name.to_owned(),
+            Err(_) => name.iter().map(|&byte| char::from(byte)).collect(),
+        })
     }
 
     /// Reads all records one after the other.

@@ -80,7 +80,7 @@ impl Frame {
     }
 
     /// The path of the image as the file gives it.
-    pub(super) fn path(&self) -> NamedPath<'_> {
+    pub(in crate::dataset) fn path(&self) -> NamedPath<'_> {
         NamedPath::new(&self.file_path)
     }
 

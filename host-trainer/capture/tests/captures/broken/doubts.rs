@@ -36,9 +36,9 @@ pub(super) fn cases() -> Vec<Case> {
             Blender,
             Doubt,
             "no-test-views",
-            &["warning[no-test-views]: no views are held out", "transforms_test.json` is missing"],
+            &["warning[no-test-views]: no views are held out", "transforms_test.json` lists no usable view"],
             |f| {
-                f.write_files().remove("transforms_test.json");
+                f.write_files().write("transforms_test.json", "{\"camera_angle_x\": 0.7, \"frames\": []}");
             },
         ),
         case(

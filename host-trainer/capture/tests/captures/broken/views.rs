@@ -358,6 +358,17 @@ pub(super) fn cases() -> Vec<Case> {
             },
         ),
         case(
+            "a mask missing that is called as its image",
+            Nerfstudio,
+            Views,
+            "bad-mask",
+            &["images/p_02.png: its mask `", "masks/p_02.png` does not exist; restore the mask"],
+            |f| {
+                f.photos[2].extra = "\"mask_path\": \"masks/p_02.png\", ".to_owned();
+                f.write_files();
+            },
+        ),
+        case(
             "a mask of another size",
             Nerfstudio,
             Views,

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use anyhow::{Result, bail};
-use pocketsplat_capture::dataset::{Capture, remove_cache};
+use pocketsplat_capture::dataset::{Capture, View, remove_cache};
 use pocketsplat_core::budget::MAX_FRAME_PX;
 use pocketsplat_instructions::level::{Bound, Level};
 use pocketsplat_trainer::device::Limits;
@@ -47,9 +47,11 @@ pub(crate) fn decide(config: &mut RunConfig, capture: &Capture) -> Result<()> {
 
 /// Returns an error if the photographs are larger than the frames that the decoder, or the level, supports.
 pub(super) fn check_size(capture: &Capture, limits: &Limits) -> Result<()> {
-    let [width, height] = capture.largest_px();
+    let size_px = |view: &View| [view.camera.width_px, view.camera.height_px];
+    let area_px = |[width, height]: [u32; 2]| u64::from(width) * u64::from(height);
     if let Some(level) = limits.level.and_then(Level::numbered)
-        && u64::from(width) * u64::from(height) > level.most(Bound::Frame)
+        && let Some([width, height]) = capture.train.iter().map(size_px).max_by_key(|size| area_px(*size))
+        && area_px([width, height]) > level.most(Bound::Frame)
     {
         let ([most_width, most_height], number) = (level.frame_px, level.number);
         bail!(
@@ -57,11 +59,12 @@ pub(super) fn check_size(capture: &Capture, limits: &Limits) -> Result<()> {
              --resolution {most_width}x{most_height}, or a smaller --max-resolution"
         );
     }
-    let (largest, most) = (width.max(height), u32::from(MAX_FRAME_PX));
-    if largest > most {
-        bail!(
-            "the photographs are {largest} px wide or high and the decoder draws {most}; use --max-resolution {most}"
-        );
+    // Those that are held out are drawn too.
+    let most = u32::from(MAX_FRAME_PX);
+    if let Some(view) = capture.train.iter().chain(&capture.test).find(|view| size_px(view).iter().any(|px| *px > most))
+    {
+        let ([width, height], name) = (size_px(view), &view.name);
+        bail!("{name} is {width}x{height} px, and the decoder draws {most} at most; use --max-resolution {most}");
     }
     Ok(())
 }

@@ -14,6 +14,15 @@ mkdir -p "$out"
 lpips=()
 [ -z "${LPIPS:-}" ] || lpips=(--lpips-weights "$LPIPS")
 
+# How photographs are prepared; a .ply, .spz or .sog does not say it.
+prepared=(--max-resolution "${SIZE:-200}")
+for ((i = 1; i <= $#; i++)); do
+  case ${!i} in
+    --background | --images | --model | --test-every) j=$((i + 1)) && prepared+=("${!i}" "${!j}") ;;
+    --background=* | --images=* | --model=* | --test-every=*) prepared+=("${!i}") ;;
+  esac
+done
+
 trained() { # FILE OPTIONS…
   local file=$1 run=${1%.*}.run
   shift
@@ -41,7 +50,7 @@ for name in 3dgs hac-modules; do
 done
 for file in 3dgs.ply 3dgs.spz 3dgs.sog scaffold.psb hac.psb hac-modules.psb hac-modules.ply hac-modules.spz hac-modules.sog; do
   [ -f "$out/$file.json" ] || {
-    "$program" eval "$out/$file" "$capture" --max-resolution "${SIZE:-200}" --json "${lpips[@]}" >"$out/$file.part"
+    "$program" eval "$out/$file" "$capture" "${prepared[@]}" --json "${lpips[@]}" >"$out/$file.part"
     mv "$out/$file.part" "$out/$file.json"
   }
 done

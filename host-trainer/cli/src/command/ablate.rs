@@ -14,13 +14,13 @@ use super::runs::{FIGURE, RunSpec, RunsArgs, write_curves};
 use crate::config::RunConfig;
 use crate::config::heading::{QUALITY, RUN};
 use comparison::{comparisons, run_lines};
-use rows::{Extent, Row, rows};
+use rows::{BASELINE, Extent, Row, rows};
 
 /// Train a capture without modules, with each alone and with all, at several rates, and with their options at one.
 ///
-/// Every run and every measurement is kept in the folder: the same command again resumes where it was interrupted, and more
-/// rows or rates add to what is there. After each run ablation.csv and summary.csv hold the results so far,
-/// rate_distortion.svg the curves.
+/// Every run and every measurement is kept in the folder: the same command again resumes where it was interrupted, and one
+/// with more rows or rates trains those alone. After each run ablation.csv and summary.csv hold what is known of the rows
+/// asked for, rate_distortion.svg the curves.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     #[command(flatten)]
@@ -29,13 +29,13 @@ pub(crate) struct Args {
     #[arg(long = "lambda", value_name = "X,…", value_delimiter = ',', default_values_t = [0.004, 0.002, 0.001, 0.0005],
         help_heading = QUALITY)]
     lambdas: Vec<f64>,
-    /// Rows to train, by name, where a trailing * stands for anything [default: all]
+    /// Rows to train beside `none`, by name, where a trailing * stands for anything [default: all]
     #[arg(long, value_name = "NAMES", value_delimiter = ',', help_heading = RUN)]
     rows: Vec<String>,
     /// List the rows and stop.
     #[arg(long, exclusive = true, help_heading = RUN)]
     list: bool,
-    /// Seeds that `none` and `all` are trained with, to show what a seed alone changes.
+    /// Seeds that `none`, `all` and `rdo` are trained with, to show what a seed alone changes.
     #[arg(long, default_value_t = 3, help_heading = RUN)]
     seeds: u64,
 }
@@ -67,18 +67,18 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
 impl Args {
     /// All runs, the curves first, then seeds, then options.
     fn specs(&self, base: &RunConfig, lambdas: &[f64], option_lambda: f64) -> Result<Vec<RunSpec>> {
-        let wanted = |row: &Row| {
-            self.rows.is_empty()
-                || self.rows.iter().any(|name| match name.strip_suffix('*') {
-                    Some(start) => row.name.starts_with(start),
-                    None => row.name == name,
-                })
+        let is_named = |row: &Row, name: &str| match name.strip_suffix('*') {
+            Some(start) => row.name.starts_with(start),
+            None => row.name == name,
         };
         let mut chosen = rows(&base.train.shape);
-        chosen.retain(wanted);
-        if chosen.is_empty() {
-            bail!("there is no row {}; --list names all", self.rows.join(", "));
+        if let Some(unknown) = self.rows.iter().find(|name| !chosen.iter().any(|row| is_named(row, name))) {
+            bail!("there is no row {unknown}; --list names all");
         }
+        // Every row is compared with the baseline.
+        chosen.retain(|row| {
+            self.rows.is_empty() || row.name == BASELINE || self.rows.iter().any(|name| is_named(row, name))
+        });
         let first_seed = base.train.seed;
         let spec = |row: &Row, lambda: f64, seed: u64| RunSpec {
             row: row.name,

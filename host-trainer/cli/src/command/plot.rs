@@ -36,7 +36,12 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         match Recording::read(path)? {
             Recording::Learning(what) => runs.push(Named { name, what }),
             Recording::Results(what) => curves.push(Named { name, what }),
-            Recording::Ablation(of_rows) => curves.extend(of_rows),
+            Recording::Curves(of_file) if args.files.len() == 1 => curves.extend(of_file),
+            Recording::Curves(of_file) => {
+                curves.extend(
+                    of_file.into_iter().map(|Named { name: own, what }| Named { name: format!("{name}: {own}"), what }),
+                );
+            }
             Recording::Cost(of_file) => panels.extend(of_file),
         }
     }
@@ -64,7 +69,7 @@ fn draw_rate_distortion(args: &Args, curves: &[Named<Vec<ResultRow>>]) -> Result
     if others.is_empty() {
         return Ok(());
     }
-    let points = |curve: &Named<Vec<ResultRow>>| curve.what.iter().map(ResultRow::rate_point).collect::<Vec<_>>();
+    let points = |curve: &Named<Vec<ResultRow>>| of_rates(&curve.what);
     let mut report = Map::new();
     for curve in others {
         report.insert(
@@ -73,6 +78,25 @@ fn draw_rate_distortion(args: &Args, curves: &[Named<Vec<ResultRow>>]) -> Result
         );
     }
     output::print(&report, args.json)
+}
+
+/// A point for each rate, where rows of one name are seeds: their mean where every rate has as many; else the first of each, for then
+/// one seed has the curve and the others show what a seed changes.
+fn of_rates(rows: &[ResultRow]) -> Vec<RatePoint> {
+    let mut rates: Vec<(&str, Vec<RatePoint>)> = Vec::new();
+    for row in rows {
+        match rates.iter_mut().find(|(name, _)| *name == row.submethod && !name.is_empty()) {
+            Some((_, seeds)) => seeds.push(row.rate_point()),
+            None => rates.push((&row.submethod, vec![row.rate_point()])),
+        }
+    }
+    let has_all_seeds = rates.iter().all(|(_, seeds)| seeds.len() == rates[0].1.len());
+    let point = |seeds: Vec<RatePoint>| {
+        let n = if has_all_seeds { seeds.len() } else { 1 };
+        let mean = |value: fn(&RatePoint) -> f64| seeds.iter().take(n).map(value).sum::<f64>() / n as f64;
+        RatePoint { size_bytes: mean(|point| point.size_bytes), psnr_db: mean(|point| point.psnr_db) }
+    };
+    rates.into_iter().map(|(_, seeds)| point(seeds)).collect()
 }
 
 /// Bjøntegaard's deltas, or why there are none.
@@ -86,4 +110,30 @@ fn deltas(reference: &[RatePoint], compared: &[RatePoint], as_json: bool) -> Val
     let rate = rate.map_or_else(|error| format!("no BD-rate: {error}"), |rate| format!("BD-rate {rate:+.2} %"));
     let psnr = psnr.map_or_else(|error| format!("no BD-PSNR: {error}"), |psnr| format!("BD-PSNR {psnr:+.3} dB"));
     json!(format!("{rate}; {psnr}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rate_is_one_point_whatever_seeds_it_has() {
+        let row = |submethod: &str, size_bytes, psnr_db| ResultRow {
+            submethod: submethod.to_owned(),
+            psnr_db,
+            ssim: None,
+            lpips: None,
+            size_bytes,
+            n_gaussians: None,
+        };
+        let found = |rows: &[ResultRow]| -> Vec<(f64, f64)> {
+            of_rates(rows).into_iter().map(|point| (point.size_bytes, point.psnr_db)).collect()
+        };
+        let mut rows = vec![row("a", 1.0, 30.0), row("b", 5.0, 33.0), row("a", 3.0, 32.0)];
+        assert_eq!(found(&rows), [(1.0, 30.0), (5.0, 33.0)], "the seed that has the curve");
+        rows.push(row("b", 7.0, 34.0));
+        assert_eq!(found(&rows), [(2.0, 31.0), (6.0, 33.5)], "both have it");
+        let unnamed = [row("", 1.0, 30.0), row("", 2.0, 31.0)];
+        assert_eq!(found(&unnamed), [(1.0, 30.0), (2.0, 31.0)]);
+    }
 }

@@ -43,7 +43,7 @@ pub(super) fn measured(config: &RunConfig, lpips: Option<&Lpips>) -> Result<Eval
     if path.is_file() {
         let kept = serde_json::from_slice::<Evaluation>(&std::fs::read(&path)?);
         let kept = kept.with_context(|| format!("{} has no figures of a bundle; move it away", path.display()))?;
-        let as_loaded = |protocol: &Protocol| config.capture.or(&protocol.options) == protocol.options;
+        let as_loaded = |protocol: &Protocol| Protocol::said(&config.capture) == protocol.options;
         let is_alike = kept.split == Split::Test.to_string()
             && kept.renderer == Renderer::Core.name()
             && kept.protocol.as_ref().is_some_and(as_loaded)

@@ -151,6 +151,8 @@ impl Planner {
     pub(super) fn write(self, folder: &Path, merge: Vec<String>, files: &[&str]) -> Result<String> {
         for (run, config) in self.runs.iter().zip(&self.configs) {
             write_changed(&folder.join(format!("{}.toml", run.name)), &config.to_toml()?)?;
+            // Snakemake measures anew where it changes.
+            write_changed(&folder.join(format!("{}.measure", run.name)), &(run.measure.join("\n") + "\n"))?;
         }
         let said = said(&self.runs, folder);
         let merge = Merge {

@@ -28,13 +28,17 @@ pub(crate) struct Protocol {
 impl Protocol {
     /// Of a run on a loaded capture.
     pub(crate) fn of(capture: &Capture, options: &CaptureOptions) -> Self {
-        let defaults = CaptureOptions {
+        let program = env!("CARGO_PKG_VERSION").to_owned();
+        Self { program, capture: fingerprint(capture), options: Self::said(options) }
+    }
+
+    /// The options as a protocol says them: split and background too where they are the defaults.
+    pub(crate) fn said(options: &CaptureOptions) -> CaptureOptions {
+        options.or(&CaptureOptions {
             background: Some(Background::Black),
             test_every: Some(LoadOptions::default().test_every),
             ..CaptureOptions::default()
-        };
-        let program = env!("CARGO_PKG_VERSION").to_owned();
-        Self { program, capture: fingerprint(capture), options: options.or(&defaults) }
+        })
     }
 
     /// The folder of images whose name does not fit into the section of a bundle, if so.

@@ -116,8 +116,8 @@ struct RunRow {
 pub(crate) enum Recording {
     /// What settings or runs cost.
     Cost(Vec<CostPanel>),
-    /// Curves of an ablation, each with its seeds.
-    Ablation(Vec<Named<Vec<ResultRow>>>),
+    /// Curves of an ablation or of several methods, each with its seeds.
+    Curves(Vec<Named<Vec<ResultRow>>>),
     /// How a run went.
     Learning(Vec<LearningRow>),
     /// What came out over rates.
@@ -142,9 +142,13 @@ impl Recording {
         } else if has(&["setting", "processor_minutes", "PSNR", "Size [Bytes]"]) {
             Ok(Self::Cost(runs(&rows(reader)?)))
         } else if has(&["row", "lambda", "seed", "PSNR", "Size [Bytes]"]) {
-            Ok(Self::Ablation(ablation(rows(reader)?)))
+            Ok(Self::Curves(ablation(rows(reader)?)))
         } else if has(&["PSNR", "Size [Bytes]"]) {
-            Ok(Self::Results(rows(reader)?))
+            let of_methods = methods(&header, bytes, rows(reader)?)?;
+            Ok(match <[_; 1]>::try_from(of_methods) {
+                Ok([Named { what, .. }]) => Self::Results(what),
+                Err(several) => Self::Curves(several),
+            })
         } else {
             let found: String = header.iter().collect::<Vec<_>>().join(",").chars().take(80).collect();
             bail!(
@@ -215,6 +219,23 @@ fn knob_of(setting: &str) -> String {
     }
 }
 
+/// Results by their column `Method`, where there is one; in tables of several methods rates of two may be called alike.
+fn methods(header: &csv::StringRecord, bytes: &[u8], rows: Vec<ResultRow>) -> Result<Vec<Named<Vec<ResultRow>>>> {
+    let Some(column) = header.iter().position(|name| name == "Method") else {
+        return Ok(vec![Named { name: String::new(), what: rows }]);
+    };
+    let mut curves: Vec<Named<Vec<ResultRow>>> = Vec::new();
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
+    for (record, row) in reader.records().zip(rows) {
+        let name = record?.get(column).unwrap_or_default().to_owned();
+        match curves.iter_mut().find(|curve| curve.name == name) {
+            Some(curve) => curve.what.push(row),
+            None => curves.push(Named { name, what: vec![row] }),
+        }
+    }
+    Ok(curves)
+}
+
 /// The rows of an ablation as curves; rows of one rate are seeds. A row of one rate alone is no curve.
 fn ablation(rows: Vec<AblationRow>) -> Vec<Named<Vec<ResultRow>>> {
     let mut curves: Vec<Named<Vec<ResultRow>>> = Vec::new();
@@ -283,8 +304,15 @@ mod tests {
     fn what_the_other_commands_write_is_read_too() {
         let ablation = "row,lambda,seed,PSNR,Size [Bytes]\nnone,0.004,42,33.5,400\nnone,0.004,43,33.7,420\n\
             none,0.002,42,34.0,500\nalone,0.004,42,1.0,2\n";
-        let Recording::Ablation(curves) = read(ablation).unwrap() else { panic!("an ablation") };
+        let Recording::Curves(curves) = read(ablation).unwrap() else { panic!("an ablation") };
         assert_eq!((curves.len(), curves[0].name.as_str(), curves[0].what.len()), (1, "none", 3));
+        let heads = "Method,Submethod,PSNR,SSIM,LPIPS,Size [Bytes],#Gaussians\n";
+        let table = format!("{heads}hac,a,30,,,4e5,\nhac-plus,a,31,,,3e5,\nhac,b,33,,,8e5,\n");
+        let Recording::Curves(curves) = read(&table).unwrap() else { panic!("two methods") };
+        let found: Vec<_> = curves.iter().map(|curve| (curve.name.as_str(), curve.what.len())).collect();
+        assert_eq!(found, [("hac", 2), ("hac-plus", 1)]);
+        let Recording::Results(rows) = read(format!("{heads}hac,a,30,,,4e5,\n")).unwrap() else { panic!("one method") };
+        assert_eq!(rows.len(), 1);
         let costs = "knob,setting,PSNR,host_s,m4 instructions,m4 on_front,host on_front\n\
             level,exact,31.5,0.002,4e7,false,true\ncut,none,31.0,0.001,,false,true\n";
         let Recording::Cost(panels) = read(costs).unwrap() else { panic!("costs") };

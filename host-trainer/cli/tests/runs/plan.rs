@@ -123,7 +123,7 @@ fn a_plan_is_written_once_and_its_tables_say_what_is_there() {
     assert!(scene.contains("hac,lambda=0.004,30.0,0.9,,100000.0,100.0,2,1"), "{scene}");
     let page = read("comparison.md");
     assert!(page.contains("| HAC low | 33.24 / 0.967 / 0.037 / 1.24 | 29.98 / 0.902 / – / 4.56 |"), "{page}");
-    assert!(page.contains("| **ours: hac lambda=0.004** | 30.00 / 0.900 / – / 0.10 | not run |"), "{page}");
+    assert!(page.contains("| **ours: hac lambda=0.004, 32×32 px** | 30.00 / 0.900 / – / 0.10 | not run |"), "{page}");
     assert!(read("SyntheticNeRF/lego.svg").contains("HAC (published)"));
 
     fs::write(&published, format!("{heads}\nA,,HAC,,30,,,,,,\n")).unwrap();

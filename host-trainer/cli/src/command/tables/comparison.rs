@@ -115,7 +115,8 @@ fn ours_on_scenes(group: &Group<'_>, method: &str, names: &[&str]) -> Vec<(Strin
 }
 
 fn called(group: &Group<'_>, method: &str, rate: &str) -> String {
-    let size = if group.size.is_empty() { String::new() } else { format!(", {} px", group.size) };
+    let sizes = group.sizes_px();
+    let size = if sizes.is_empty() { String::new() } else { format!(", {sizes} px") };
     format!("**ours: {method} {rate}{size}**")
 }
 

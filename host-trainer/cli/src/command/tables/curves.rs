@@ -69,6 +69,15 @@ fn found<T>(items: &mut Vec<T>, is_it: impl Fn(&T) -> bool, new: impl FnOnce() -
 }
 
 impl Group<'_> {
+    /// Sizes of the images that were measured, in pixels, as one text.
+    pub(super) fn sizes_px(&self) -> String {
+        let rates = self.scenes.iter().flat_map(|scene| &scene.methods).flat_map(|curve| &curve.rates);
+        let mut sizes: Vec<[u32; 2]> = rates.flat_map(|rate| &rate.seeds).map(|(_, run)| run.size_px()).collect();
+        sizes.sort_unstable();
+        sizes.dedup();
+        sizes.iter().map(|[width, height]| format!("{width}×{height}")).collect::<Vec<_>>().join(" and ")
+    }
+
     /// What files of the group are called.
     pub(super) fn name(&self) -> String {
         if self.size.is_empty() { self.dataset.to_owned() } else { format!("{}-{}px", self.dataset, self.size) }

@@ -29,7 +29,7 @@ pub(super) struct BdRateLine<'a> {
     why_not: String,
 }
 
-/// Every method but the first on every scene, and its mean where every scene has it.
+/// Every method but the first on every scene, and its mean where every scene has it, against one method.
 pub(super) fn of_group<'a>(group: &Group<'a>) -> Vec<BdRateLine<'a>> {
     let scenes = group.scenes.iter().flat_map(|scene| of_scene(group, scene));
     let mut lines: Vec<BdRateLine<'_>> = scenes.collect();
@@ -81,7 +81,8 @@ fn of_scene<'a>(group: &Group<'a>, scene: &SceneCurves<'a>) -> Vec<BdRateLine<'a
 fn mean<'a>(group: &Group<'a>, method: &'a str, lines: &[BdRateLine<'a>]) -> Option<BdRateLine<'a>> {
     let own: Vec<&BdRateLine<'_>> = lines.iter().filter(|line| line.method == method).collect();
     let rates = own.iter().map(|line| line.bd_rate_percent).collect::<Option<Vec<f64>>>()?;
-    (rates.len() == group.scenes.len()).then(|| BdRateLine {
+    let has_one_reference = own.iter().all(|line| line.reference == own[0].reference);
+    (rates.len() == group.scenes.len() && has_one_reference).then(|| BdRateLine {
         dataset: group.dataset,
         size: group.size,
         scene: ALL,

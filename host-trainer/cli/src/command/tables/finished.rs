@@ -65,6 +65,11 @@ pub(super) fn runs<'a>(plan: &'a Plan, folder: &Path) -> Result<Vec<FinishedRun<
 }
 
 impl FinishedRun<'_> {
+    /// Width and height of the images that it was measured on.
+    pub(super) fn size_px(&self) -> [u32; 2] {
+        [self.evaluation.width_px, self.evaluation.height_px]
+    }
+
     pub(super) fn line(&self) -> RunLine<'_> {
         let Place { dataset, scene, size, method, rate, seed } = self.place;
         let run = &self.evaluation;

@@ -75,17 +75,58 @@ pub(super) fn curves(rows: &[PublishedRow], dataset: &str, scene: &str) -> Vec<N
     let is_beaten = |row: &PublishedRow| {
         here.iter().any(|other| match (other.size_bytes, row.size_bytes) {
             (Some(theirs), Some(own)) => theirs < own && other.psnr_db > row.psnr_db,
-            _ => true,
+            (None, Some(_)) => false,
+            (_, None) => true,
         })
     };
     let mut curves: Vec<Named<Vec<ResultRow>>> = Vec::new();
     for row in here.iter().filter(|row| BACKBONES.contains(&row.method.as_str()) || !is_beaten(row)) {
-        let Some(point) = row.result() else { continue };
+        let Some(mut point) = row.result() else { continue };
         let name = format!("{} (published)", row.method);
-        match curves.iter_mut().find(|curve| curve.name == name) {
-            Some(curve) => curve.what.push(point),
-            None => curves.push(Named { name, what: vec![point] }),
+        let Some(curve) = curves.iter_mut().find(|curve| curve.name == name) else {
+            curves.push(Named { name, what: vec![point] });
+            continue;
+        };
+        // Rows of one name would be seeds of one rate.
+        let n_before = curve.what.iter().filter(|other| other.submethod.starts_with(&point.submethod)).count();
+        if n_before > 0 {
+            point.submethod = format!("{} ({})", point.submethod, n_before + 1);
         }
+        curve.what.push(point);
     }
     curves
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_no_row_of_known_size_beats_is_shown_and_rows_of_one_name_stay_apart() {
+        let row = |method: &str, submethod: &str, psnr_db, size_bytes| PublishedRow {
+            dataset: "D".to_owned(),
+            scene: String::new(),
+            method: method.to_owned(),
+            submethod: submethod.to_owned(),
+            psnr_db,
+            ssim: None,
+            lpips: None,
+            size_bytes,
+            n_gaussians: None,
+            source: "a paper".to_owned(),
+        };
+        let rows = [
+            row("No size", "", 40.0, None),
+            row("Best", "40k", 30.0, Some(1e6)),
+            row("Best", "40k", 31.0, Some(2e6)),
+            row("Beaten", "", 29.0, Some(3e6)),
+            row("HAC", "", 28.0, Some(4e6)),
+        ];
+        let curves = curves(&rows, "D", "");
+        let found: Vec<(&str, Vec<&str>)> = curves
+            .iter()
+            .map(|curve| (curve.name.as_str(), curve.what.iter().map(|point| point.submethod.as_str()).collect()))
+            .collect();
+        assert_eq!(found, [("Best (published)", vec!["40k", "40k (2)"]), ("HAC (published)", vec![""])]);
+    }
 }

@@ -96,3 +96,31 @@ fn mean<'a>(group: &Group<'a>, method: &'a str, lines: &[BdRateLine<'a>]) -> Opt
         why_not: String::new(),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mean_is_against_one_method() {
+        let scenes = ["a", "b"].map(|name| SceneCurves { name, methods: Vec::new() });
+        let group = Group { dataset: "D", size: "", scenes: Vec::from(scenes) };
+        let line = |scene, reference, rate| BdRateLine {
+            dataset: "D",
+            size: "",
+            scene,
+            method: "contextgs",
+            reference,
+            seeds: 2,
+            reference_seeds: 3,
+            bd_rate_percent: Some(rate),
+            low_percent: None,
+            high_percent: None,
+            why_not: String::new(),
+        };
+        let of_hac = [line("a", "hac", 20.0), line("b", "hac", 50.0)];
+        assert_eq!(mean(&group, "contextgs", &of_hac).unwrap().bd_rate_percent, Some(35.0));
+        assert!(mean(&group, "contextgs", &[line("a", "hac", 20.0), line("b", "hac-plus", 50.0)]).is_none());
+        assert!(mean(&group, "contextgs", &of_hac[..1]).is_none(), "a scene lacks it");
+    }
+}

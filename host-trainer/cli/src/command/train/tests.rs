@@ -5,9 +5,11 @@ use std::time::Duration;
 
 use pocketsplat_capture::dataset::{LoadOptions, MOST_IN_MEMORY_BYTES, load};
 use pocketsplat_capture::synth::{SynthOptions, write_capture};
+use pocketsplat_trainer::device::Limits;
 use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::config::Backbone;
 
+use super::loading::check_size;
 use super::*;
 
 /// A run of a few seconds on the capture in `home`.
@@ -106,4 +108,23 @@ fn a_fork_on_another_backbone_keeps_the_width_of_its_run() {
     assert_eq!(width(&published, &[]), 50);
     assert_eq!(width(&config, &[]), 8);
     assert_eq!(width(&published, &["--set", "train.shape.feature_dim=16"]), 16, "which the run refuses");
+}
+
+#[test]
+fn photographs_that_no_device_draws_are_refused_before_training() {
+    let home = tempfile::tempdir().unwrap();
+    let options = SynthOptions { size_px: 24, n_train: 4, n_test: 2, samples_per_axis: 1, ..SynthOptions::default() };
+    write_capture(&home.path().join("capture"), &options).unwrap();
+    let mut capture = loaded(&config(home.path(), "a"), MOST_IN_MEMORY_BYTES);
+    let level = |number| Limits { level: Some(number), ..Limits::default() };
+    check_size(&capture, &level(1)).unwrap();
+    // The largest of them has not the longest side, and is not the last.
+    (capture.train[0].camera.width_px, capture.train[0].camera.height_px) = (120, 120);
+    (capture.train[3].camera.width_px, capture.train[3].camera.height_px) = (128, 24);
+    let said = check_size(&capture, &level(1)).unwrap_err().to_string();
+    assert!(said.starts_with("the photographs are 120x120 px, and level 1 allows"), "{said}");
+    check_size(&capture, &Limits::default()).unwrap();
+    capture.test[1].camera.height_px = 4200;
+    let said = check_size(&capture, &Limits::default()).unwrap_err().to_string();
+    assert!(said.contains(&capture.test[1].name) && said.contains("24x4200 px"), "{said}");
 }

@@ -89,26 +89,25 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
             .push(format!("images with pixels that do not count (no source in the photograph, or masked): {n_masked}"));
     }
     let given = points.map(|(_, points)| kept_points(&points, &normalisation, &mut notes));
+    let cameras: Vec<_> = train.iter().map(|view| &view.camera).collect();
+    let where_cameras_look = || frusta::random_points(&cameras, options.n_random_points, options.seed);
     let (points, points_origin) = match given.filter(|points| !points.is_empty()) {
         Some(points) => (points, PointsOrigin::Capture),
-        None => {
-            let cameras: Vec<_> = train.iter().map(|view| &view.camera).collect();
-            let cube = (layout == Layout::Blender)
-                .then(|| random_points_world(options.n_random_points, options.seed))
-                .map(|points| points.into_iter().map(|point| normalisation.point(point)).collect::<Vec<_>>());
-            let is_seen = cube.as_ref().is_none_or(|points| frusta::are_seen(points, &cameras));
-            if !is_seen {
+        None if layout == Layout::Blender => {
+            let cube = random_points_world(options.n_random_points, options.seed);
+            let cube: Vec<_> = cube.into_iter().map(|point| normalisation.point(point)).collect();
+            if frusta::are_seen(&cube, &cameras) {
+                (cube, PointsOrigin::Random)
+            } else {
                 notes.push(
                     "the cameras do not look at the cube of ±1.3 around the origin, where scenes of Synthetic-NeRF lie; \
                      training starts from random points where they look"
                         .to_owned(),
                 );
+                (where_cameras_look(), PointsOrigin::Random)
             }
-            let points = cube
-                .filter(|_| is_seen)
-                .unwrap_or_else(|| frusta::random_points(&cameras, options.n_random_points, options.seed));
-            (points, PointsOrigin::Random)
         }
+        None => (where_cameras_look(), PointsOrigin::Random),
     };
     let report = LoadReport {
         layout,

@@ -47,7 +47,7 @@ impl Note {
     pub(super) fn no_test_views() -> Self {
         Self::warning(
             "no-test-views",
-            "no views are held out, so quality on unseen views cannot be measured; hold every eighth out with \
+            "there are no test views, so quality on novel views cannot be measured; keep every eighth for testing with \
              `--test-every 8`",
         )
     }

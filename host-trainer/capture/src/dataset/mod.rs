@@ -120,12 +120,10 @@ pub struct Capture {
 pub const EXTENT: f64 = 5.0;
 
 impl Capture {
-    /// Size of the training view with the longest side, of several the one of most pixels.
+    /// Size of the training view of most pixels.
     pub fn largest_px(&self) -> [u32; 2] {
         let sizes = self.train.iter().map(|view| [view.camera.width_px, view.camera.height_px]);
-        sizes
-            .max_by_key(|[width, height]| (*width.max(height), u64::from(*width) * u64::from(*height)))
-            .unwrap_or_default()
+        sizes.max_by_key(|[width, height]| u64::from(*width) * u64::from(*height)).unwrap_or_default()
     }
 
     /// The voxel size for anchors, normalised units: [`suggested_voxel_size`] of the capture's points, and
@@ -177,7 +175,7 @@ fn list(path: &Path, options: &LoadOptions) -> Result<listing::Listing, DatasetE
         ("--model", options.model.is_some() && listing.layout != Layout::Colmap),
     ] {
         if is_ignored {
-            let text = format!("{option} says nothing about a capture of {}; leave it out", listing.layout);
+            let text = format!("{option} has no effect on {} captures; leave it out", listing.layout);
             listing.notes.push(listing::Note::warning("ignored-option", text));
         }
     }

@@ -130,7 +130,7 @@ fn options_that_a_layout_does_not_read_are_named() {
     let options = LoadOptions { images: Some("rgb_2".to_owned()), model: Some(1), ..LoadOptions::default() };
     let said = fixture.load_with(&options).expect("a sound capture").1.to_string();
     for option in ["--images", "--model"] {
-        assert!(said.contains(&format!("{option} says nothing about a capture of NSVF; leave it out")), "{said}");
+        assert!(said.contains(&format!("{option} has no effect on NSVF captures; leave it out")), "{said}");
     }
 }
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::plot::{
-    Named, Recording, ResultRow, SizeAxis, cost_svg, learning_curves_svg, names_of, rate_distortion_svg,
+    Named, Recording, ResultRow, SizeAxis, cost_svg, gathered, learning_curves_svg, names_of, rate_distortion_svg,
 };
 use anyhow::{Result, bail};
 use pocketsplat_trainer::metrics::{RatePoint, bd_psnr_db, bd_rate_percent};
@@ -83,20 +83,14 @@ fn draw_rate_distortion(args: &Args, curves: &[Named<Vec<ResultRow>>]) -> Result
 /// A point for each rate, where rows of one name are seeds: their mean where every rate has as many; else the first of each, for then
 /// one seed has the curve and the others show what a seed changes.
 fn of_rates(rows: &[ResultRow]) -> Vec<RatePoint> {
-    let mut rates: Vec<(&str, Vec<RatePoint>)> = Vec::new();
-    for row in rows {
-        match rates.iter_mut().find(|(name, _)| *name == row.submethod && !name.is_empty()) {
-            Some((_, seeds)) => seeds.push(row.rate_point()),
-            None => rates.push((&row.submethod, vec![row.rate_point()])),
-        }
-    }
-    let has_all_seeds = rates.iter().all(|(_, seeds)| seeds.len() == rates[0].1.len());
-    let point = |seeds: Vec<RatePoint>| {
-        let n = if has_all_seeds { seeds.len() } else { 1 };
-        let mean = |value: fn(&RatePoint) -> f64| seeds.iter().take(n).map(value).sum::<f64>() / n as f64;
+    let rates = gathered(rows.iter().map(|row| (row.submethod.clone(), row.rate_point())));
+    let has_all_seeds = rates.iter().all(|rate| rate.what.len() == rates[0].what.len());
+    let point = |seeds: &[RatePoint]| {
+        let seeds = if has_all_seeds { seeds } else { &seeds[..1] };
+        let mean = |value: fn(&RatePoint) -> f64| seeds.iter().map(value).sum::<f64>() / seeds.len() as f64;
         RatePoint { size_bytes: mean(|point| point.size_bytes), psnr_db: mean(|point| point.psnr_db) }
     };
-    rates.into_iter().map(|(_, seeds)| point(seeds)).collect()
+    rates.iter().map(|rate| point(&rate.what)).collect()
 }
 
 /// Bjøntegaard's deltas, or why there are none.
@@ -118,22 +112,13 @@ mod tests {
 
     #[test]
     fn a_rate_is_one_point_whatever_seeds_it_has() {
-        let row = |submethod: &str, size_bytes, psnr_db| ResultRow {
-            submethod: submethod.to_owned(),
-            psnr_db,
-            ssim: None,
-            lpips: None,
-            size_bytes,
-            n_gaussians: None,
-        };
         let found = |rows: &[ResultRow]| -> Vec<(f64, f64)> {
             of_rates(rows).into_iter().map(|point| (point.size_bytes, point.psnr_db)).collect()
         };
-        let mut rows = vec![row("a", 1.0, 30.0), row("b", 5.0, 33.0), row("a", 3.0, 32.0)];
+        let mut rows =
+            vec![ResultRow::of("a", 1.0, 30.0), ResultRow::of("b", 5.0, 33.0), ResultRow::of("a", 3.0, 32.0)];
         assert_eq!(found(&rows), [(1.0, 30.0), (5.0, 33.0)], "the seed that has the curve");
-        rows.push(row("b", 7.0, 34.0));
+        rows.push(ResultRow::of("b", 7.0, 34.0));
         assert_eq!(found(&rows), [(2.0, 31.0), (6.0, 33.5)], "both have it");
-        let unnamed = [row("", 1.0, 30.0), row("", 2.0, 31.0)];
-        assert_eq!(found(&unnamed), [(1.0, 30.0), (2.0, 31.0)]);
     }
 }

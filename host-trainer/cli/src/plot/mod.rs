@@ -26,3 +26,15 @@ pub(crate) struct Named<T> {
     /// The thing.
     pub what: T,
 }
+
+/// Items by name, names in the order of their first mention.
+pub(crate) fn gathered<T>(items: impl IntoIterator<Item = (String, T)>) -> Vec<Named<Vec<T>>> {
+    let mut all: Vec<Named<Vec<T>>> = Vec::new();
+    for (name, item) in items {
+        match all.iter_mut().find(|named| named.name == name) {
+            Some(named) => named.what.push(item),
+            None => all.push(Named { name, what: vec![item] }),
+        }
+    }
+    all
+}

@@ -5,7 +5,7 @@ use plotters::coord::ranged1d::{AsRangedCoord, Ranged, ValueFormatter};
 use plotters::prelude::*;
 
 use super::chart::{self, Labels, Sign};
-use super::{Named, ResultRow, marker};
+use super::{Named, ResultRow, gathered, marker};
 
 /// How sizes lie along the axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -90,23 +90,20 @@ struct Point<'a> {
 }
 
 fn points(rows: &[ResultRow]) -> Vec<Point<'_>> {
-    let mut points: Vec<Point<'_>> = Vec::new();
-    for row in rows {
-        if points.iter().any(|point| point.name == row.submethod) {
-            continue;
-        }
-        let same: Vec<&ResultRow> = rows.iter().filter(|other| other.submethod == row.submethod).collect();
+    let point = |seeds: &[&ResultRow], name| {
         let spread = |value: fn(&ResultRow) -> f64| {
-            let values = || same.iter().map(|row| value(row));
+            let values = || seeds.iter().map(|row| value(row));
             [
                 values().fold(f64::INFINITY, f64::min),
-                values().sum::<f64>() / same.len() as f64,
+                values().sum::<f64>() / seeds.len() as f64,
                 values().fold(f64::NEG_INFINITY, f64::max),
             ]
         };
-        let (name, n_seeds) = (row.submethod.as_str(), same.len());
-        points.push(Point { name, n_seeds, megabytes: spread(megabytes), psnr_db: spread(|row| row.psnr_db) });
-    }
+        Point { name, n_seeds: seeds.len(), megabytes: spread(megabytes), psnr_db: spread(|row| row.psnr_db) }
+    };
+    let rates = gathered(rows.iter().map(|row| (row.submethod.clone(), row)));
+    let mut points: Vec<Point<'_>> =
+        rates.iter().map(|rate| point(&rate.what, rate.what[0].submethod.as_str())).collect();
     points.sort_by(|a, b| a.megabytes[1].total_cmp(&b.megabytes[1]));
     points
 }
@@ -127,15 +124,7 @@ mod tests {
 
     #[test]
     fn rows_of_one_name_are_one_point_with_its_spread() {
-        let row = |submethod: &str, size_bytes, psnr_db| ResultRow {
-            submethod: submethod.to_owned(),
-            psnr_db,
-            ssim: None,
-            lpips: None,
-            size_bytes,
-            n_gaussians: None,
-        };
-        let rows = [row("b", 4e6, 33.0), row("a", 1e6, 30.0), row("a", 3e6, 32.0)];
+        let rows = [ResultRow::of("b", 4e6, 33.0), ResultRow::of("a", 1e6, 30.0), ResultRow::of("a", 3e6, 32.0)];
         let points = points(&rows);
         let found: Vec<_> =
             points.iter().map(|point| (point.name, point.n_seeds, point.megabytes, point.psnr_db)).collect();
@@ -149,17 +138,9 @@ mod tests {
 
     #[test]
     fn every_curve_and_every_rate_is_named_on_either_axis() {
-        let row = |submethod: &str, size_bytes, psnr_db| ResultRow {
-            submethod: submethod.to_owned(),
-            psnr_db,
-            ssim: None,
-            lpips: None,
-            size_bytes,
-            n_gaussians: None,
-        };
         let curve = |name: &str, factor| Named {
             name: name.to_owned(),
-            what: vec![row("fine", 4e6 * factor, 33.0), row("coarse", 1e6 * factor, 31.0)],
+            what: vec![ResultRow::of("fine", 4e6 * factor, 33.0), ResultRow::of("coarse", 1e6 * factor, 31.0)],
         };
         for axis in [SizeAxis::Linear, SizeAxis::Logarithmic] {
             let svg = rate_distortion_svg(&[curve("ours", 1.0), curve("theirs", 1.5)], axis).unwrap();
@@ -168,8 +149,11 @@ mod tests {
             }
             assert!(rate_distortion_svg(&[], axis).is_ok(), "an empty figure is a figure");
             assert!(
-                rate_distortion_svg(&[Named { name: String::new(), what: vec![row("alone", 1e6, 30.0)] }], axis)
-                    .is_ok()
+                rate_distortion_svg(
+                    &[Named { name: String::new(), what: vec![ResultRow::of("alone", 1e6, 30.0)] }],
+                    axis
+                )
+                .is_ok()
             );
         }
     }

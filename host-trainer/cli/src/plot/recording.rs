@@ -8,8 +8,8 @@ use pocketsplat_trainer::metrics::RatePoint;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
-use super::Named;
 use super::cost::{CostPanel, CostPoint};
+use super::{Named, gathered};
 
 /// One row of a run's `progress.csv`; other columns are passed over.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
@@ -69,6 +69,13 @@ impl ResultRow {
     pub(crate) fn rate_point(&self) -> RatePoint {
         RatePoint { size_bytes: self.size_bytes, psnr_db: self.psnr_db }
     }
+
+    /// A row without what no curve shows.
+    #[cfg(test)]
+    pub(crate) fn of(submethod: &str, size_bytes: f64, psnr_db: f64) -> Self {
+        let submethod = submethod.to_owned();
+        Self { submethod, psnr_db, ssim: None, lpips: None, size_bytes, n_gaussians: None }
+    }
 }
 
 /// Results as the CSV that [`Recording::read`] takes back.
@@ -111,6 +118,13 @@ struct RunRow {
     size_bytes: f64,
 }
 
+/// Whose a row of results is, in tables of several methods: two may have rates of one name.
+#[derive(Deserialize)]
+struct MethodColumn {
+    #[serde(rename = "Method")]
+    method: String,
+}
+
 /// A CSV file by what it holds.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Recording {
@@ -143,12 +157,15 @@ impl Recording {
             Ok(Self::Cost(runs(&rows(reader)?)))
         } else if has(&["row", "lambda", "seed", "PSNR", "Size [Bytes]"]) {
             Ok(Self::Curves(ablation(rows(reader)?)))
-        } else if has(&["PSNR", "Size [Bytes]"]) {
-            let of_methods = methods(&header, bytes, rows(reader)?)?;
-            Ok(match <[_; 1]>::try_from(of_methods) {
+        } else if has(&["Method", "PSNR", "Size [Bytes]"]) {
+            let methods: Vec<MethodColumn> = rows(csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes))?;
+            let named = methods.into_iter().map(|row| row.method).zip(rows(reader)?);
+            Ok(match <[_; 1]>::try_from(gathered(named)) {
                 Ok([Named { what, .. }]) => Self::Results(what),
                 Err(several) => Self::Curves(several),
             })
+        } else if has(&["PSNR", "Size [Bytes]"]) {
+            Ok(Self::Results(rows(reader)?))
         } else {
             let found: String = header.iter().collect::<Vec<_>>().join(",").chars().take(80).collect();
             bail!(
@@ -219,34 +236,13 @@ fn knob_of(setting: &str) -> String {
     }
 }
 
-/// Results by their column `Method`, where there is one; in tables of several methods rates of two may be called alike.
-fn methods(header: &csv::StringRecord, bytes: &[u8], rows: Vec<ResultRow>) -> Result<Vec<Named<Vec<ResultRow>>>> {
-    let Some(column) = header.iter().position(|name| name == "Method") else {
-        return Ok(vec![Named { name: String::new(), what: rows }]);
-    };
-    let mut curves: Vec<Named<Vec<ResultRow>>> = Vec::new();
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
-    for (record, row) in reader.records().zip(rows) {
-        let name = record?.get(column).unwrap_or_default().to_owned();
-        match curves.iter_mut().find(|curve| curve.name == name) {
-            Some(curve) => curve.what.push(row),
-            None => curves.push(Named { name, what: vec![row] }),
-        }
-    }
-    Ok(curves)
-}
-
 /// The rows of an ablation as curves; rows of one rate are seeds. A row of one rate alone is no curve.
 fn ablation(rows: Vec<AblationRow>) -> Vec<Named<Vec<ResultRow>>> {
-    let mut curves: Vec<Named<Vec<ResultRow>>> = Vec::new();
-    for AblationRow { row, lambda, psnr_db, size_bytes } in rows {
+    let point = |AblationRow { row, lambda, psnr_db, size_bytes }| {
         let submethod = format!("lambda={lambda}");
-        let point = ResultRow { submethod, psnr_db, ssim: None, lpips: None, size_bytes, n_gaussians: None };
-        match curves.iter_mut().find(|curve| curve.name == row) {
-            Some(curve) => curve.what.push(point),
-            None => curves.push(Named { name: row, what: vec![point] }),
-        }
-    }
+        (row, ResultRow { submethod, psnr_db, ssim: None, lpips: None, size_bytes, n_gaussians: None })
+    };
+    let mut curves = gathered(rows.into_iter().map(point));
     curves.retain(|curve| curve.what.iter().any(|point| point.submethod != curve.what[0].submethod));
     curves
 }

@@ -63,7 +63,7 @@ impl Trainer<'_> {
     /// Makes the context model where this iteration is the first to need it.
     ///
     /// # Errors
-    /// [`TrainError`] when the scene is on a device and cannot be taken back from it.
+    /// [`TrainError`] when the scene is on the GPU and reading it back fails.
     pub(super) fn begin_context(&mut self) -> Result<(), TrainError> {
         let phase = self.config.phase(self.iteration);
         if self.scene.context.is_none() && matches!(phase, Phase::Context | Phase::IntegerModel) {

@@ -43,13 +43,15 @@ pub enum ConfigError {
         /// Those of the module, 0 without it.
         needed: usize,
     },
-    /// A run that is over before the context model can say anything to a module that weighs bits.
-    #[error("train.iterations is {found}, needs at least {needed}, so that there is a context model by {key}")]
+    /// A run so short that its context model begins after a module weighs bits.
+    #[error(
+        "train.iterations is {found}, needs at least {needed}: in a shorter run the context model begins after {key}"
+    )]
     TooShort {
         /// Iterations of the run.
         found: u32,
         /// The least that will do.
-        needed: f64,
+        needed: u32,
         /// The key that asks for it.
         key: &'static str,
     },

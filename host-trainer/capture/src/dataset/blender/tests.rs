@@ -141,7 +141,10 @@ fn views_with_faults_are_left_out_and_named() {
     assert_says(&skipped[2], &["train/r_5", "5×4", "6×4", "export it again"]);
     assert_says(&skipped[3], &["train/r_6: `transform_matrix` scales by 2.0", "apply the camera's scale"]);
     assert_says(&skipped[4], &["train/r_7: `transform_matrix` has NaN in row 0, column 1"]);
-    assert_says(&report.to_string(), &["train views left out: 5", "… and 2 more", "not used: 1", "lists no usable"]);
+    assert_says(
+        &report.to_string(),
+        &["train views left out: 5", "… and 2 more", "not used: 1", "has no usable frame"],
+    );
 }
 
 #[test]
@@ -152,7 +155,7 @@ fn without_a_test_file_every_eighth_view_is_held_out() {
     assert_eq!((capture.train.len(), capture.test.len()), (7, 2));
     assert_eq!([0, 1].map(|i| capture.test[i].name.clone()), ["train/r_0", "train/r_8"]);
     let (_, report) = fixture.load().expect("a capture");
-    assert_says(&report.to_string(), &["no views are held out", "`--test-every 8`"]);
+    assert_says(&report.to_string(), &["there are no test views", "`--test-every 8`"]);
 }
 
 #[test]

@@ -36,7 +36,7 @@ pub(super) fn cases() -> Vec<Case> {
             Blender,
             Doubt,
             "no-test-views",
-            &["warning[no-test-views]: no views are held out", "transforms_test.json` lists no usable view"],
+            &["warning[no-test-views]: there are no test views", "transforms_test.json` has no usable frame"],
             |f| {
                 f.write_files().write("transforms_test.json", "{\"camera_angle_x\": 0.7, \"frames\": []}");
             },

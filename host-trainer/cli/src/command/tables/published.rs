@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use serde::Deserialize;
 
-use crate::plot::{Named, ResultRow};
+use crate::plot::{Named, ResultRow, gathered};
 
 /// One published result, of a scene or the mean of a dataset.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -79,20 +79,17 @@ pub(super) fn curves(rows: &[PublishedRow], dataset: &str, scene: &str) -> Vec<N
             (_, None) => true,
         })
     };
-    let mut curves: Vec<Named<Vec<ResultRow>>> = Vec::new();
-    for row in here.iter().filter(|row| BACKBONES.contains(&row.method.as_str()) || !is_beaten(row)) {
-        let Some(mut point) = row.result() else { continue };
-        let name = format!("{} (published)", row.method);
-        let Some(curve) = curves.iter_mut().find(|curve| curve.name == name) else {
-            curves.push(Named { name, what: vec![point] });
-            continue;
-        };
-        // Rows of one name would be seeds of one rate.
-        let n_before = curve.what.iter().filter(|other| other.submethod.starts_with(&point.submethod)).count();
-        if n_before > 0 {
-            point.submethod = format!("{} ({})", point.submethod, n_before + 1);
+    let shown = here.iter().filter(|row| BACKBONES.contains(&row.method.as_str()) || !is_beaten(row));
+    let mut curves = gathered(shown.filter_map(|row| Some((format!("{} (published)", row.method), row.result()?))));
+    // Rows of one name would be seeds of one rate.
+    for Named { what, .. } in &mut curves {
+        let names: Vec<String> = what.iter().map(|point| point.submethod.clone()).collect();
+        for (i, point) in what.iter_mut().enumerate() {
+            let n_before = names[..i].iter().filter(|name| **name == names[i]).count();
+            if n_before > 0 {
+                point.submethod = format!("{} ({})", names[i], n_before + 1);
+            }
         }
-        curve.what.push(point);
     }
     curves
 }
@@ -119,6 +116,7 @@ mod tests {
             row("No size", "", 40.0, None),
             row("Best", "40k", 30.0, Some(1e6)),
             row("Best", "40k", 31.0, Some(2e6)),
+            row("Best", "40k, fine", 32.0, Some(2.5e6)),
             row("Beaten", "", 29.0, Some(3e6)),
             row("HAC", "", 28.0, Some(4e6)),
         ];
@@ -127,6 +125,6 @@ mod tests {
             .iter()
             .map(|curve| (curve.name.as_str(), curve.what.iter().map(|point| point.submethod.as_str()).collect()))
             .collect();
-        assert_eq!(found, [("Best (published)", vec!["40k", "40k (2)"]), ("HAC (published)", vec![""])]);
+        assert_eq!(found, [("Best (published)", vec!["40k", "40k (2)", "40k, fine"]), ("HAC (published)", vec![""])]);
     }
 }

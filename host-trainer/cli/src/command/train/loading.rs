@@ -47,11 +47,9 @@ pub(crate) fn decide(config: &mut RunConfig, capture: &Capture) -> Result<()> {
 
 /// Returns an error if the photographs are larger than the frames that the decoder, or the level, supports.
 pub(super) fn check_size(capture: &Capture, limits: &Limits) -> Result<()> {
-    let size_px = |view: &View| [view.camera.width_px, view.camera.height_px];
-    let area_px = |[width, height]: [u32; 2]| u64::from(width) * u64::from(height);
+    let [width, height] = capture.largest_px();
     if let Some(level) = limits.level.and_then(Level::numbered)
-        && let Some([width, height]) = capture.train.iter().map(size_px).max_by_key(|size| area_px(*size))
-        && area_px([width, height]) > level.most(Bound::Frame)
+        && u64::from(width) * u64::from(height) > level.most(Bound::Frame)
     {
         let ([most_width, most_height], number) = (level.frame_px, level.number);
         bail!(
@@ -59,7 +57,8 @@ pub(super) fn check_size(capture: &Capture, limits: &Limits) -> Result<()> {
              --resolution {most_width}x{most_height}, or a smaller --max-resolution"
         );
     }
-    // Those that are held out are drawn too.
+    // Test views are drawn too.
+    let size_px = |view: &View| [view.camera.width_px, view.camera.height_px];
     let most = u32::from(MAX_FRAME_PX);
     if let Some(view) = capture.train.iter().chain(&capture.test).find(|view| size_px(view).iter().any(|px| *px > most))
     {

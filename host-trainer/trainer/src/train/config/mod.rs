@@ -249,7 +249,8 @@ impl TrainConfig {
             // The context model begins with the iteration after its share.
             let least = self.hac.context_from + 1.0 / f64::from(self.iterations);
             if self.hac.context_from < at && at < least {
-                let needed = (1.0 / (at - self.hac.context_from)).ceil();
+                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of iterations")]
+                let needed = (1.0 / (at - self.hac.context_from)).ceil() as u32;
                 return Err(ConfigError::TooShort { found: self.iterations, needed, key });
             }
             within(key, at, least, 1.0)?;

@@ -258,7 +258,7 @@ mod tests {
         let refused = TrainConfig { modules: early, ..tiny_hac_config(100) }.validate().unwrap_err().to_string();
         assert!(refused.contains("train.modules.rdo.from is 0.2"), "{refused}");
         let rdo = |iterations| TrainConfig { modules, ..tiny_hac_config(iterations) }.validate();
-        let short = ConfigError::TooShort { found: 5, needed: 6.0, key: "train.modules.rdo.from" };
+        let short = ConfigError::TooShort { found: 5, needed: 6, key: "train.modules.rdo.from" };
         assert_eq!((rdo(5), rdo(6)), (Err(short), Ok(())));
     }
 

@@ -124,7 +124,7 @@ fn a_fork_begins_where_its_run_stood() {
     assert!(source.contains(&expected), "{error}: {source}");
 }
 
-/// A run whose state cannot be written.
+/// A run whose checkpoints fail to write.
 struct Unwritable;
 
 impl Resumable for Unwritable {

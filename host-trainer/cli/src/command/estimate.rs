@@ -11,6 +11,7 @@ use pocketsplat_trainer::step::SharedDevice;
 use pocketsplat_trainer::train::{TrainConfig, Trainer};
 
 use super::process::{machine_memory_bytes, peak_memory_bytes};
+use crate::config::Preset;
 
 /// Steps of the trial; the first fill caches and take memory, and are not timed.
 const UNTIMED_STEPS: u32 = 4;
@@ -23,6 +24,9 @@ const AGAIN_AT: [f64; 3] = [0.1, 0.25, 0.55];
 /// Above this many minutes, and this share of the machine's memory, a run is warned of.
 const MANY_MINUTES: f64 = 120.0;
 const MUCH_MEMORY: f64 = 0.8;
+
+/// What a longer run is advised to take instead.
+const USUAL_ITERATIONS: u32 = Preset::Standard.iterations();
 
 /// What pruning, coding and measuring take more than a step, against the peak so far.
 const EVENTS_MEMORY: f64 = 1.15;
@@ -77,6 +81,8 @@ fn between(values: &[f64; SHARES.len()], at: f64) -> f64 {
 /// Follows a run, and says now and then what it will take.
 pub(super) struct Estimate {
     what: String,
+    /// The longer side of the largest photograph.
+    longest_px: u32,
     course: Course,
     iterations: u32,
     bytes_per_anchor: f64,
@@ -125,6 +131,7 @@ impl Estimate {
         };
         Self {
             what: format!("{width}×{height} px, {iterations} iterations"),
+            longest_px: width.max(height),
             course: if config.modules.rdo.is_some() { course } else { course.unpruned() },
             iterations,
             bytes_per_anchor: bytes_per_anchor(config),
@@ -236,18 +243,28 @@ impl Estimate {
     fn said(&mut self, expected: &Expected) -> String {
         let mut said = format!("{}: {expected}", self.what);
         if expected.minutes > MANY_MINUTES && !std::mem::replace(&mut self.warned.of_minutes, true) {
-            said += "\nwarning: that is long; --max-resolution 400 or --iterations 7000 makes it shorter";
+            let fewer = if self.iterations > USUAL_ITERATIONS {
+                format!(" or --iterations {USUAL_ITERATIONS}")
+            } else {
+                String::new()
+            };
+            said += &format!("\nwarning: that is long; {}{fewer} makes it shorter", self.half_the_size());
         }
         if let Some(machine) = self.machine_bytes
             && expected.memory_bytes > MUCH_MEMORY * machine as f64
             && !std::mem::replace(&mut self.warned.of_memory, true)
         {
             said += &format!(
-                "\nwarning: the machine has {:.1} GB of memory; --max-resolution 400 or --max-anchors N takes less",
-                machine as f64 / 1e9
+                "\nwarning: the machine has {:.1} GB of memory; {} or --max-anchors N takes less",
+                machine as f64 / 1e9,
+                self.half_the_size()
             );
         }
         said
+    }
+
+    fn half_the_size(&self) -> String {
+        format!("--max-resolution {}", self.longest_px.div_ceil(2))
     }
 }
 
@@ -296,6 +313,7 @@ mod tests {
     fn estimate(most_anchors: f64) -> Estimate {
         Estimate {
             what: "8×8 px, 1000 iterations".to_owned(),
+            longest_px: 8,
             course: GROWING,
             iterations: 1000,
             bytes_per_anchor: 20.0,
@@ -357,11 +375,20 @@ mod tests {
         assert!(said.contains("about 119 minutes, 700.0 GB of memory") && !said.contains("warning"), "{said}");
         let long = Expected { minutes: 121.0, ..small };
         let said = estimate.said(&long);
-        assert!(said.contains("\nwarning: that is long") && !said.contains("the machine has"), "{said}");
+        assert!(said.ends_with("\nwarning: that is long; --max-resolution 4 makes it shorter"), "{said}");
+        assert!(!said.contains("the machine has"), "{said}");
         let large = Expected { memory_bytes: 0.9e12, ..long };
         let said = estimate.said(&large);
         assert!(!said.contains("that is long") && said.contains("\nwarning: the machine has 1000.0 GB"), "{said}");
         assert!(!estimate.said(&large).contains("warning"));
+    }
+
+    #[test]
+    fn fewer_iterations_are_advised_only_where_there_are_more() {
+        let mut estimate = Estimate { iterations: 30_000, ..estimate(f64::INFINITY) };
+        let long = Expected { minutes: 121.0, pilot_minutes: 0.0, memory_bytes: 1e9, bundle_bytes: 1e6 };
+        let said = estimate.said(&long);
+        assert!(said.ends_with("--max-resolution 4 or --iterations 7000 makes it shorter"), "{said}");
     }
 
     #[test]

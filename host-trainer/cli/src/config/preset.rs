@@ -34,7 +34,8 @@ impl Preset {
         }
     }
 
-    const fn iterations(self) -> u32 {
+    /// Iterations of a run.
+    pub(crate) const fn iterations(self) -> u32 {
         match self {
             Self::Quick => 2_000,
             Self::Standard => 7_000,

@@ -48,8 +48,8 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
             Some(_) => Note::warning(
                 "no-test-views",
                 format!(
-                    "there are no test views, so quality on novel views cannot be measured: `{}` has no usable frame; move some \
-                     frames of `{TRAIN_FILE}` into it",
+                    "no test views, so test PSNR cannot be computed: `{}` has no usable frame; move some frames of \
+                     `{TRAIN_FILE}` into it",
                     folder.join(TEST_FILE).display()
                 ),
             ),

@@ -47,8 +47,7 @@ impl Note {
     pub(super) fn no_test_views() -> Self {
         Self::warning(
             "no-test-views",
-            "there are no test views, so quality on novel views cannot be measured; keep every eighth for testing with \
-             `--test-every 8`",
+            "no test views, so test PSNR cannot be computed; hold out every 8th image with `--test-every 8`",
         )
     }
 }

@@ -155,7 +155,7 @@ fn without_a_test_file_every_eighth_view_is_held_out() {
     assert_eq!((capture.train.len(), capture.test.len()), (7, 2));
     assert_eq!([0, 1].map(|i| capture.test[i].name.clone()), ["train/r_0", "train/r_8"]);
     let (_, report) = fixture.load().expect("a capture");
-    assert_says(&report.to_string(), &["there are no test views", "`--test-every 8`"]);
+    assert_says(&report.to_string(), &["no test views, so test PSNR", "`--test-every 8`"]);
 }
 
 #[test]

@@ -36,7 +36,7 @@ pub(super) fn cases() -> Vec<Case> {
             Blender,
             Doubt,
             "no-test-views",
-            &["warning[no-test-views]: there are no test views", "transforms_test.json` has no usable frame"],
+            &["warning[no-test-views]: no test views, so test PSNR", "transforms_test.json` has no usable frame"],
             |f| {
                 f.write_files().write("transforms_test.json", "{\"camera_angle_x\": 0.7, \"frames\": []}");
             },

@@ -189,7 +189,7 @@ job_format-doc() {
 
 # Every crate builds from nothing but what the packages hold, and they hold what a user reads.
 job_package() {
-  local crate file files crates=(pocketsplat pocketsplat-{core,half,capture,gaussians,instructions,trainer,viewer})
+  local crate file files crates=(pocketsplat pocketsplat-{core,half,files,capture,gaussians,instructions,trainer,viewer})
   files=$(cargo package -p pocketsplat-core --allow-dirty --locked --list)
   for file in README.md CHANGELOG.md src/bundle/{FORMAT,DRAWING,MANIFEST}.md src/bundle/{normal_tables.bin,example.psb} examples/draw_png.rs; do
     grep -qx "$file" <<<"$files" || fail "the package of pocketsplat-core lacks $file"

@@ -8,7 +8,7 @@ use std::fs;
 use std::path::Path;
 
 /// The folder of each crate's sources, and its rooms; one may import those to its left.
-const CRATES: [(&str, &[&str]); 7] = [
+const CRATES: [(&str, &[&str]); 8] = [
     (
         "decoder-core/src",
         &[
@@ -33,6 +33,7 @@ const CRATES: [(&str, &[&str]); 7] = [
             "display",
         ],
     ),
+    ("host-trainer/files/src", &["kind", "shell"]),
     ("host-trainer/capture/src", &["camera", "dataset", "synth"]),
     (
         "host-trainer/gaussians/src",

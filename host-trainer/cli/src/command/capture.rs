@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::{self, Background, Capture, LoadOptions, Severity, Split, View};
+use pocketsplat_files::shell_word;
 use pocketsplat_gaussians::Format;
-use pocketsplat_trainer::train::run::shell_word;
 
 use crate::config::CaptureOptions;
 

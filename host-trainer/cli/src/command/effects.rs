@@ -8,9 +8,10 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use pocketsplat_capture::dataset::Capture;
+use pocketsplat_files::shell_word;
 use pocketsplat_trainer::device::Processor;
 use pocketsplat_trainer::effects::{Effect, PilotCapture, PilotError, Pilots, measure};
-use pocketsplat_trainer::train::run::{RunFolder, shell_word};
+use pocketsplat_trainer::train::run::RunFolder;
 use serde::{Deserialize, Serialize};
 
 use crate::config::RunConfig;

@@ -8,10 +8,10 @@ use anyhow::{Context, Result, bail};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Background, Capture, FrameSize};
 use pocketsplat_core::budget::MAX_FRAME_PX;
+use pocketsplat_files::shell_word;
 use pocketsplat_trainer::explicit::bulk::Bulk;
 use pocketsplat_trainer::explicit::pictures::{Pictures, capture};
 use pocketsplat_trainer::explicit::views::generated;
-use pocketsplat_trainer::train::run::shell_word;
 use serde::Serialize;
 
 use super::gaussians::GaussiansFile;

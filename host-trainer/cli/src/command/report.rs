@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::{Capture, Split};
-use pocketsplat_trainer::train::run::shell_word;
+use pocketsplat_files::shell_word;
 use pocketsplat_viewer::{SceneFile, escaped, page};
 use serde::Deserialize;
 

@@ -15,8 +15,9 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::{Capture, View};
+use pocketsplat_files::shell_word;
 use pocketsplat_trainer::step::SharedDevice;
-use pocketsplat_trainer::train::run::{RunFolder, fork, photographs_in, shell_word};
+use pocketsplat_trainer::train::run::{RunFolder, fork, photographs_in};
 
 use super::effects::Resolved;
 use super::estimate::{Estimate, Warned};

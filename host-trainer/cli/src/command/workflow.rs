@@ -5,8 +5,8 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result};
 use pocketsplat_capture::dataset::{Capture, Split};
+use pocketsplat_files::shell_word;
 use pocketsplat_trainer::train::TrainConfig;
-use pocketsplat_trainer::train::run::shell_word;
 use serde::{Deserialize, Serialize};
 
 use super::capture::views_of;

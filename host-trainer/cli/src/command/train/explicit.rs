@@ -6,10 +6,11 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::{Background, Capture, Split};
+use pocketsplat_files::shell_word;
 use pocketsplat_gaussians::Format;
 use pocketsplat_trainer::device::Limits;
 use pocketsplat_trainer::explicit::CloudTrainer;
-use pocketsplat_trainer::train::run::{Ending, Interval, LoggedStep, RunError, RunFolder, photographs_in, shell_word};
+use pocketsplat_trainer::train::run::{Ending, Interval, LoggedStep, RunError, RunFolder, photographs_in};
 use serde::Serialize;
 
 use super::super::capture::CaptureArgs;

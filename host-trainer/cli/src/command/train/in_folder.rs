@@ -5,10 +5,11 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::Capture;
+use pocketsplat_files::shell_word;
 use pocketsplat_trainer::encode::{Encoding, Scale};
 use pocketsplat_trainer::step::SharedDevice;
 use pocketsplat_trainer::train::gauge::Gauge;
-use pocketsplat_trainer::train::run::{Ending, Interval, RunError, RunFolder, shell_word};
+use pocketsplat_trainer::train::run::{Ending, Interval, RunError, RunFolder};
 use pocketsplat_trainer::train::{TrainConfig, Trainer};
 
 use super::result::{TrainResult, write_bundle};

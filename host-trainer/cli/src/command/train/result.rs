@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use pocketsplat_capture::dataset::{Background, Capture, Split, View};
 use pocketsplat_core::bundle::crc32;
+use pocketsplat_files::shell_word;
 use pocketsplat_instructions::level::Profile;
 use pocketsplat_trainer::effects::Effect;
 use pocketsplat_trainer::encode::{Encoding, Fitted};
 use pocketsplat_trainer::train::Trainer;
 use pocketsplat_trainer::train::finish::Finished;
-use pocketsplat_trainer::train::run::shell_word;
 use serde::Serialize;
 
 use super::limits;

@@ -1,5 +1,6 @@
 //! Why a run folder cannot be used, each reason with its remedy.
 
+use pocketsplat_files::shell_word;
 use std::path::{Path, PathBuf};
 
 use crate::train::TrainError;
@@ -36,7 +37,7 @@ pub enum RunError {
     /// A run would be lost.
     #[error(
         "{} holds an unfinished run; go on with it by `pocketsplat train --resume {}`, or start anew with --overwrite",
-        path.display(), super::shell_word(path)
+        path.display(), shell_word(path)
     )]
     Unfinished {
         /// The folder.

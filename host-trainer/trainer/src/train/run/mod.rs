@@ -17,7 +17,6 @@ mod files;
 mod previews;
 mod progress_log;
 mod resumable;
-mod shell;
 mod store;
 
 #[cfg(test)]
@@ -32,7 +31,6 @@ pub use error::RunError;
 pub use previews::newest_preview;
 pub use progress_log::{LoggedStep, ProgressLog};
 pub use resumable::Resumable;
-pub use shell::shell_word;
 pub use store::{Newest, Resumed, fork};
 
 use super::{Observer, Trainer};

@@ -1,0 +1,10 @@
+//! Files as people have them: what their bytes are, whatever they are called, and their paths in commands that people copy.
+//!
+//! Every reader that refuses a file asks [`FileKind`] what the file is instead, so that a Git LFS pointer, a web page or a file of
+//! another program is named in the same words everywhere.
+
+mod kind;
+mod shell;
+
+pub use kind::FileKind;
+pub use shell::shell_word;

@@ -6,7 +6,7 @@ use pocketsplat_capture::dataset::{Capture, LoadOptions, LoadReport, PointsOrigi
 
 /// The folder of a capture, or `None` after saying what is skipped.
 fn find(name: &str) -> Option<PathBuf> {
-    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
+    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     let root = std::env::var_os("POCKETSPLAT_DATA").map_or(beside, PathBuf::from);
     let folder = root.join(name);
     if !folder.is_dir() {

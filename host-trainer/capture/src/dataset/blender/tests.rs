@@ -251,7 +251,7 @@ fn what_is_no_capture_is_refused_by_what_was_looked_for() {
 #[test]
 fn lego_loads_where_the_data_is_at_hand() {
     let data = std::env::var_os("POCKETSPLAT_DATA")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"), PathBuf::from);
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"), PathBuf::from);
     let lego = data.join("lego");
     if !lego.is_dir() {
         eprintln!("skipped: no lego capture in `{}`; name its parent in POCKETSPLAT_DATA", data.display());

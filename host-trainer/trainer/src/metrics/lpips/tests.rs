@@ -54,7 +54,7 @@ fn images_too_small_to_be_pooled_four_times_are_refused() {
 
 /// The folder of weights and images, or `None` after saying what is skipped.
 fn folder() -> Option<PathBuf> {
-    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
+    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     let folder = std::env::var_os("POCKETSPLAT_DATA").map_or(beside, PathBuf::from).join("lpips");
     if folder.is_dir() {
         return Some(folder);

@@ -33,7 +33,7 @@ const CRATES: [(&str, &[&str]); 8] = [
             "display",
         ],
     ),
-    ("host-trainer/files/src", &["kind", "shell"]),
+    ("host-trainer/files/src", &["kind", "shell", "output"]),
     ("host-trainer/capture/src", &["camera", "dataset", "synth"]),
     (
         "host-trainer/gaussians/src",

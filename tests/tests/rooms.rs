@@ -66,7 +66,7 @@ const CRATES: [(&str, &[&str]); 8] = [
     ),
     ("host-trainer/instructions/src", &["context", "level"]),
     ("viewer/src", &["figures", "focus", "scene", "exports", "package", "page"]),
-    ("host-trainer/cli/src", &["plot", "config", "command"]),
+    ("host-trainer/cli/src", &["say", "plot", "config", "command"]),
 ];
 
 #[test]

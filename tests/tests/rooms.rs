@@ -33,7 +33,7 @@ const CRATES: [(&str, &[&str]); 8] = [
             "display",
         ],
     ),
-    ("host-trainer/files/src", &["kind", "shell"]),
+    ("host-trainer/files/src", &["kind", "shell", "output"]),
     ("host-trainer/capture/src", &["camera", "dataset", "synth"]),
     (
         "host-trainer/gaussians/src",
@@ -66,7 +66,7 @@ const CRATES: [(&str, &[&str]); 8] = [
     ),
     ("host-trainer/instructions/src", &["context", "level"]),
     ("viewer/src", &["figures", "focus", "scene", "exports", "package", "page"]),
-    ("host-trainer/cli/src", &["plot", "config", "command"]),
+    ("host-trainer/cli/src", &["say", "plot", "config", "command"]),
 ];
 
 #[test]

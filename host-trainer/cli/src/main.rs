@@ -1,9 +1,10 @@
 //! The `pocketsplat` command: results to stdout, progress to stderr, exit code 0, 1 (failed), 2 (wrong
-//! usage) or 130 (training interrupted, with a checkpoint to go on from).
+//! usage) or 130 (training interrupted by a signal, with a checkpoint to go on from).
 
 mod command;
 mod config;
 mod plot;
+mod say;
 
 use std::process::ExitCode;
 

@@ -119,6 +119,11 @@ impl FileKind {
         }
     }
 
+    /// Whether it is a picture, as photographs are.
+    pub const fn is_picture(self) -> bool {
+        matches!(self, Self::Png | Self::Jpeg | Self::WebP | Self::Heic | Self::Avif | Self::Tiff | Self::Gif)
+    }
+
     /// What to do where another kind was needed, without the file's name; `None` where the caller knows best.
     pub const fn remedy(self) -> Option<&'static str> {
         match self {

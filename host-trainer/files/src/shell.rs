@@ -2,11 +2,37 @@
 
 use std::path::Path;
 
-/// A path as one word of a shell: in quotes where it holds what a shell would take apart or replace.
+/// A path as one word of a POSIX shell: in quotes where it holds what a shell would take apart or replace, by the numbers of its
+/// bytes where it is no UTF-8, and never like an option.
 pub fn shell_word(path: &Path) -> String {
     let text = path.display().to_string();
+    if path.to_str().is_none()
+        && let Some(word) = printed(path)
+    {
+        return word;
+    }
+    let text = if text.starts_with('-') { format!("./{text}") } else { text };
     let is_plain = |c: char| c.is_alphanumeric() || "/._-+,:=@%".contains(c) || cfg!(windows) && c == '\\';
     if !text.is_empty() && text.chars().all(is_plain) { text } else { format!("'{}'", text.replace('\'', "'\\''")) }
+}
+
+/// Bytes that no text has, as `printf` of POSIX writes them.
+#[cfg(unix)]
+fn printed(path: &Path) -> Option<String> {
+    use std::os::unix::ffi::OsStrExt as _;
+    let bytes = path.as_os_str().as_bytes();
+    let byte = |byte: &u8| match byte {
+        b'%' => "%%".to_owned(),
+        byte if byte.is_ascii_alphanumeric() || b"/._+,:=@ -".contains(byte) => char::from(*byte).to_string(),
+        byte => format!("\\{byte:03o}"),
+    };
+    let start = if bytes.starts_with(b"-") { "./" } else { "" };
+    Some(format!("\"$(printf '{start}{}')\"", bytes.iter().map(byte).collect::<String>()))
+}
+
+#[cfg(not(unix))]
+fn printed(_: &Path) -> Option<String> {
+    None
 }
 
 #[cfg(test)]
@@ -21,9 +47,24 @@ mod tests {
             ("desk lamp.psb", "'desk lamp.psb'"),
             ("it's/$HOME", "'it'\\''s/$HOME'"),
             ("back\\slash", if cfg!(windows) { "back\\slash" } else { "'back\\slash'" }),
+            ("-w", "./-w"),
             ("", "''"),
         ] {
             assert_eq!(shell_word(Path::new(path)), word);
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_shell_reads_the_path_that_was_meant() {
+        use std::ffi::OsStr;
+        use std::os::unix::ffi::OsStrExt as _;
+        let names: [&[u8]; 5] = [b"a\xffb 'c' %d\\n.psb", b"-\xfe", b"it's $HOME", b"two\nlines", b"\xc3\x28/\"x\""];
+        for name in names {
+            let word = shell_word(Path::new(OsStr::from_bytes(name)));
+            let echo = std::process::Command::new("sh").arg("-c").arg(format!("printf %s {word}")).output();
+            let read = echo.expect("a shell").stdout;
+            assert_eq!(read.strip_prefix(b"./").unwrap_or(&read), name, "{word}");
         }
     }
 }

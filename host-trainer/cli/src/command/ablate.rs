@@ -10,6 +10,7 @@ use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::module::Modules;
 
 use super::output;
+use super::outputs::table;
 use super::runs::{FIGURE, RunSpec, RunsArgs, write_curves};
 use crate::config::RunConfig;
 use crate::config::heading::{QUALITY, RUN};
@@ -55,11 +56,14 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     let option_lambda = lambdas[usize::from(lambdas.len() > 1)];
     let specs = args.specs(&base, lambdas, option_lambda)?;
     let folder = base.output.clone();
-    args.runs.train(&base, &specs, &["ablation.csv", "summary.csv", FIGURE], |runs| {
-        write_curves(&folder, runs)?;
-        output::write_whole(&folder.join("ablation.csv"), &output::csv(run_lines(runs))?)?;
+    let files = [("ablation.csv", table(&["row,"])), ("summary.csv", table(&["row,"])), FIGURE];
+    args.runs.train(&base, &specs, &files, |runs, outputs| {
+        write_curves(&folder, runs, outputs)?;
+        let [(ablation, of_ablation), (summary, of_summary), _] = files;
+        outputs.file(&folder.join(ablation), of_ablation)?.write(&output::csv(run_lines(runs))?)?;
+        let summary_file = outputs.file(&folder.join(summary), of_summary)?;
         let summary = output::csv(comparisons(runs, option_lambda))?;
-        output::write_whole(&folder.join("summary.csv"), &summary)?;
+        summary_file.write(&summary)?;
         Ok(summary)
     })
 }

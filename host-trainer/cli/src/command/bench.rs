@@ -19,6 +19,7 @@ use serde::Serialize;
 
 use super::devices::{DeviceChoice, usable};
 use super::output;
+use crate::say::say;
 
 /// Measure the stages of a training step on every device of this machine, and on the CPU with 1, 2, 4, … threads.
 #[derive(clap::Args)]
@@ -81,18 +82,18 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         let scene = typical::scene(Backbone::Scaffold, n_anchors);
         for size in &args.sizes {
             for threads in &threads {
-                eprintln!("{n_splats} splats, {size}, cpu, {threads} threads");
+                say!("{n_splats} splats, {size}, cpu, {threads} threads");
                 rows.push(measure(&scene, *size, args.steps, *threads, None)?);
             }
             for index in &gpus {
-                eprintln!("{n_splats} splats, {size}, gpu:{index}");
+                say!("{n_splats} splats, {size}, gpu:{index}");
                 let measured = DeviceChoice::Gpu(Some(*index))
                     .open_silently()
                     .and_then(|device| measure(&scene, *size, args.steps, most, device));
                 // What one device has no room for, another may have.
                 match measured {
                     Ok(row) => rows.push(row),
-                    Err(error) => eprintln!("left out: {error:#}"),
+                    Err(error) => say!("left out: {error:#}"),
                 }
             }
         }

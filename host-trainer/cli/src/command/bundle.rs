@@ -12,6 +12,7 @@ use serde::Deserialize;
 
 use super::capture::{CaptureArgs, refuse_gaussians};
 use crate::config::{CaptureOptions, Protocol, RunConfig};
+use crate::say::say;
 
 /// What a run's result.json says of its bundle; nothing in those of earlier programs.
 #[derive(Deserialize)]
@@ -66,7 +67,7 @@ impl BundleFile {
         let bundle = Bundle::parse(&self.bytes).with_context(|| format!("{} cannot be used", self.path.display()))?;
         let (n_tiers, n_written) = (bundle.n_tiers(), bundle.header().n_tiers);
         if n_tiers < n_written {
-            eprintln!(
+            say!(
                 "{} is cut after tier {n_tiers} of {n_written}: a smaller scene of {} of {} anchors",
                 self.path.display(),
                 bundle.n_anchors(),
@@ -81,11 +82,11 @@ impl BundleFile {
         let protocol = self.protocol(bundle);
         let source = self.capture_options(bundle, protocol.as_ref(), args)?;
         if let Some(protocol) = &protocol {
-            eprintln!("as the bundle says: {protocol}");
+            say!("as the bundle says: {protocol}");
         }
         let capture = source.load(0)?;
         if let Some(why) = protocol.and_then(|protocol| protocol.contradiction(&capture)) {
-            eprintln!("warning: {why}");
+            say!("warning: {why}");
         }
         Ok((source.options, capture))
     }
@@ -93,7 +94,7 @@ impl BundleFile {
     /// What the bundle says of its photographs; nothing in bundles of other writers.
     fn protocol(&self, bundle: &Bundle<'_>) -> Option<Protocol> {
         let parsed = Protocol::parse(protocol_of(bundle, &self.bytes)?);
-        parsed.inspect_err(|error| eprintln!("warning: could not read the section protocol: {error}")).ok()
+        parsed.inspect_err(|error| say!("warning: could not read the section protocol: {error}")).ok()
     }
 
     /// Fills what the command line left open with what the bundle was trained with, and refuses what contradicts it.

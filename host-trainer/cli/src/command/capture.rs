@@ -8,6 +8,7 @@ use pocketsplat_files::shell_word;
 use pocketsplat_gaussians::Format;
 
 use crate::config::CaptureOptions;
+use crate::say::say;
 
 /// Refuses a file of explicit Gaussians, and names the command that reads it.
 pub(crate) fn refuse_gaussians(path: &Path) -> Result<()> {
@@ -60,15 +61,20 @@ impl CaptureArgs {
         self.load_with(&self.load_options(seed, Some(cache)))
     }
 
+    /// The files that it is read from, wherever they lie.
+    pub(crate) fn files(&self) -> Vec<PathBuf> {
+        dataset::files_read(&self.dataset, &self.load_options(0, None))
+    }
+
     fn load_with(&self, options: &LoadOptions) -> Result<Capture> {
         refuse_gaussians(&self.dataset)?;
         let findings = dataset::diagnose_cheaply(&self.dataset, options);
         if findings.count(Severity::Warning) > 0 {
-            eprintln!("warnings found: run `pocketsplat doctor {}`", shell_word(&self.dataset));
+            say!("warnings found: run `pocketsplat doctor {}`", shell_word(&self.dataset));
         }
         let (capture, report) = dataset::load(&self.dataset, options)
             .with_context(|| format!("could not load the capture {}", self.dataset.display()))?;
-        eprintln!("{report}");
+        say!("{report}");
         Ok(capture)
     }
 }

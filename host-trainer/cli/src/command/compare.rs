@@ -4,11 +4,13 @@ use std::path::{Path, PathBuf};
 
 use crate::plot::{CostPanel, CostPoint, cost_svg};
 use anyhow::{Context, Result};
+use pocketsplat_files::Outputs;
 use pocketsplat_trainer::cost::on_front;
 use serde::{Deserialize, Serialize};
 
 use super::bundle::BundleFile;
 use super::eval::Evaluation;
+use super::outputs::{self, FIGURE, OverwriteArgs};
 use super::{output, point};
 use crate::config::{Difference, RunConfig};
 
@@ -24,6 +26,8 @@ pub(crate) struct Args {
     /// Folder for the results.
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
+    #[command(flatten)]
+    overwrite: OverwriteArgs,
 }
 
 /// One line of runs.csv.
@@ -53,6 +57,10 @@ struct RunResult {
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
+    Outputs::folder(&args.output)?;
+    let mut outputs = args.runs.iter().fold(args.overwrite.outputs(), |outputs, run| outputs.reading_folder(run));
+    let csv = outputs.file(&args.output.join("runs.csv"), outputs::table(&["run,"]))?;
+    let svg = outputs.file(&args.output.join("runs.svg"), FIGURE)?;
     let config = |run: &PathBuf| {
         let config = RunConfig::read(&run.join("config.toml"))?;
         Ok(RunConfig { output: BundleFile::of_run(run, &config)?.path, ..config })
@@ -62,14 +70,13 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let runs = args.runs.iter().zip(configs.iter().zip(&evaluations));
     let lines = runs.map(|(run, compared)| line(run, compared, (&configs[0], &evaluations[0])));
     let lines = lines.collect::<Result<Vec<_>>>()?;
-    std::fs::create_dir_all(&args.output).with_context(|| format!("could not make {}", args.output.display()))?;
     let table = output::csv(&lines)?;
-    output::write_whole(&args.output.join("runs.csv"), &table)?;
+    csv.write(&table)?;
     let panels = [
         panel("Quality over time", "minutes of a processor core", &lines, |line| line.processor_minutes),
         panel("Quality over bytes", "bundle, kB", &lines, |line| line.size_bytes as f64 / 1e3),
     ];
-    output::write_whole(&args.output.join("runs.svg"), cost_svg(&panels)?.as_bytes())?;
+    svg.write(cost_svg(&panels)?.as_bytes())?;
     output::print_text(&String::from_utf8(table)?)
 }
 

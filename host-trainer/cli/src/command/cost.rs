@@ -18,11 +18,13 @@ use pocketsplat_trainer::render::reference::ReferenceScene;
 use rayon::prelude::*;
 
 use self::machine::Machine;
-use self::report::Report;
+use self::report::{Report, ReportFiles};
 use super::bundle::BundleFile;
 use super::capture::{CaptureArgs, views_of};
 use super::eval::reference_image;
+use super::outputs::OverwriteArgs;
 use crate::config::named::{SPLITS, one_of};
+use crate::say::say;
 
 /// Change each setting of the decoder by itself, and those of quality in all combinations, and measure what that costs in
 /// accuracy and saves in time.
@@ -58,6 +60,8 @@ pub(crate) struct Args {
     /// Folder of the firmware that counts.
     #[arg(long, value_name = "DIR", default_value = "firmware-example")]
     firmware: PathBuf,
+    #[command(flatten)]
+    overwrite: OverwriteArgs,
 }
 
 /// Views whose instructions are counted when nobody says how many: a count draws each of them for every knob.
@@ -66,6 +70,8 @@ const COUNTED_VIEWS: usize = 2;
 pub(crate) fn run(args: &Args) -> Result<()> {
     let file = BundleFile::read(&args.bundle)?;
     let bundle = file.parse()?;
+    let mut outputs = args.overwrite.outputs().reading(&args.bundle).reading_folder(&args.capture.dataset);
+    let files = ReportFiles::checked(&args.output, &mut outputs)?;
     let targets: Vec<Processor> = args.target.iter().filter_map(|machine| machine.device()).collect();
     let counter = args.counter(&targets)?;
     let (_, capture) = file.load(&bundle, &args.capture)?;
@@ -90,7 +96,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let settings: Vec<Setting> = knobs.into_iter().chain(grid).collect();
     let mut measured = Vec::new();
     for (i, setting) in settings.iter().enumerate() {
-        eprintln!("{} of {}  {}: {}", i + 1, settings.len(), setting.knob, setting.name);
+        say!("{} of {}  {}: {}", i + 1, settings.len(), setting.knob, setting.name);
         let mut point = match measure(&bundle, &sights, setting, budget, &targets) {
             // Splats that are larger than plans reckon with, and memory without limit.
             Ok(point) if point.splats_dropped > 0 && args.ram.is_none() => {
@@ -99,7 +105,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
             Ok(point) => point,
             // A residency or number of strips that does not fit is no setting of this budget.
             Err(error) if i > 0 && args.ram.is_some() => {
-                eprintln!("  left out: {error}");
+                say!("  left out: {error}");
                 continue;
             }
             Err(error) => return Err(error).context("the scene as it is"),
@@ -117,7 +123,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         n_views: sights.len(),
         n_counted: counted.len(),
     };
-    report.write(&args.output)
+    report.write(&files)
 }
 
 impl Args {
@@ -129,7 +135,7 @@ impl Args {
         match Counter::new(&self.firmware, &self.bundle, &self.output.join("counted"), targets) {
             Ok(counter) => Ok(Some(counter)),
             Err(missing @ (CountError::NoFirmware(_) | CountError::NoProgram(_))) if self.count.is_none() => {
-                eprintln!("instructions are predicted: {missing}");
+                say!("instructions are predicted: {missing}");
                 Ok(None)
             }
             Err(error) => Err(error).context("counting instructions; --count 0 predicts them"),
@@ -142,7 +148,7 @@ fn count(counter: &Counter, targets: &[Processor], cameras: &[Camera], point: &m
     for (instructions, target) in point.instructions.iter_mut().zip(targets) {
         match counter.count(*target, &point.setting, cameras, point.scratch_bytes) {
             Ok(stages) => *instructions = Some(Instructions { stages, counted: true }),
-            Err(error) => eprintln!("  not counted: {error}"),
+            Err(error) => say!("  not counted: {error}"),
         }
     }
 }

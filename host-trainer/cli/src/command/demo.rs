@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::{Image, Split};
 use pocketsplat_capture::synth::{SynthOptions, write_capture};
+use pocketsplat_files::Outputs;
 use pocketsplat_trainer::encode::Encoding;
 use pocketsplat_trainer::render::decoder::core_image;
 use pocketsplat_trainer::render::reference::ReferenceScene;
@@ -15,8 +16,10 @@ use pocketsplat_trainer::train::module::{Detail, Distribution, Modules, Pruning}
 use super::bundle::BundleFile;
 use super::capture::CaptureArgs;
 use super::eval::{Measurements, Renderer, evaluate, reference_image};
+use super::outputs::{BUNDLE, OverwriteArgs, PNG, keep, marked_png};
 use super::{output, train};
 use crate::config::CaptureOptions;
+use crate::say::say;
 
 /// Make a capture, train it, compress it, draw it with the decoder and compare: about three minutes on two cores.
 #[derive(clap::Args)]
@@ -33,6 +36,8 @@ pub(crate) struct Args {
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    overwrite: OverwriteArgs,
 }
 
 /// Where the demo's capture lies.
@@ -43,12 +48,16 @@ const MARKER: &str = ".made-by-pocketsplat-demo";
 pub(crate) fn run(args: &Args) -> Result<()> {
     let folder = &args.output;
     let capture_folder = folder.join(CAPTURE);
+    Outputs::folder(folder)?;
+    let mut outputs = args.overwrite.outputs();
+    let bundle_output = outputs.file(&folder.join("scene.psb"), BUNDLE)?;
+    let picture_output = outputs.file(&folder.join("truth_reference_decoder.png"), PNG)?;
     clear_capture(&capture_folder)?;
-    eprintln!("1 of 4  ray-tracing a capture into {}", capture_folder.display());
+    say!("1 of 4  ray-tracing a capture into {}", capture_folder.display());
     write_capture(&capture_folder, &SynthOptions { size_px: args.size, ..SynthOptions::default() })?;
-    output::write_whole(&capture_folder.join(MARKER), b"")?;
+    keep(&capture_folder.join(MARKER), b"")?;
 
-    eprintln!("2 of 4  training {} steps", args.iterations);
+    say!("2 of 4  training {} steps", args.iterations);
     let capture_args = CaptureArgs { dataset: capture_folder, options: CaptureOptions::default() };
     // Tiers that are trained for: the demo's bundle serves devices of several sizes.
     let modules = Modules {
@@ -58,23 +67,23 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         ..Modules::default()
     };
     let config = TrainConfig { iterations: args.iterations, modules, ..TrainConfig::of(Backbone::Hac) };
-    let bundle_path = folder.join("scene.psb");
+    let bundle_path = bundle_output.path();
     let capture = capture_args.load(config.seed)?;
-    let trained = train::train(&capture, config, &Encoding::default(), &bundle_path)?;
+    let trained = train::train(&capture, config, &Encoding::default(), &bundle_output)?;
 
-    eprintln!("3 of 4  drawing the held-out views with the decoder");
-    let file = BundleFile::read(&bundle_path)?;
+    say!("3 of 4  drawing the held-out views with the decoder");
+    let file = BundleFile::read(bundle_path)?;
     let what = Measurements { against_reference: true, per_tier: true, ..Measurements::default() };
     let evaluation = evaluate(&file, &capture_args, Split::Test, Renderer::Core, &what)?;
 
-    let picture = folder.join("truth_reference_decoder.png");
-    eprintln!("4 of 4  {}: truth | f64 reference | decoder", picture.display());
+    let picture = picture_output.path();
+    say!("4 of 4  {}: truth | f64 reference | decoder", picture.display());
     let bundle = file.parse()?;
     let view = &capture.test[0];
     let reference = reference_image(&bundle, &ReferenceScene::from_bundle(&bundle)?, &view.camera);
     let decoder = core_image(&bundle, &view.camera)?.image;
     let beside = side_by_side(&[&view.photograph()?.image, &reference, &decoder]);
-    output::write_whole(&picture, &beside.to_png().context("could not encode the picture")?)?;
+    picture_output.write(&marked_png(&beside.to_png().context("could not encode the picture")?))?;
 
     let report = serde_json::json!({
         "bundle": bundle_path,

@@ -8,6 +8,7 @@ use pocketsplat_trainer::step::SharedDevice;
 use serde::Serialize;
 
 use super::output;
+use crate::say::say;
 
 /// List the GPUs that training can run on, with their limits.
 #[derive(clap::Args)]
@@ -108,8 +109,8 @@ impl DeviceChoice {
         };
         if says {
             match &adapter {
-                Some(adapter) => eprintln!("device: {} ({}, {})", adapter.name, adapter.kind, adapter.backend),
-                None => eprintln!("device: cpu, since no GPU was found"),
+                Some(adapter) => say!("device: {} ({}, {})", adapter.name, adapter.kind, adapter.backend),
+                None => say!("device: cpu, since no GPU was found"),
             }
         }
         let Some(adapter) = adapter else { return Ok(None) };

@@ -15,8 +15,10 @@ use pocketsplat_trainer::train::run::RunFolder;
 use serde::{Deserialize, Serialize};
 
 use crate::config::RunConfig;
+use crate::say::say;
 
 use super::output;
+use super::outputs::keep;
 use pilots::PilotsFile;
 
 /// The table of pilots in a run's folder.
@@ -79,11 +81,11 @@ pub(crate) fn resolve(
     let kept = Effect::names(&Effect::all_in(&config.train));
     let least = config.effects.least_iterations;
     if config.train.iterations < least {
-        eprintln!("effects: {kept}; a run needs {least} iterations to measure which ones pay");
+        say!("effects: {kept}; a run needs {least} iterations to measure which ones pay");
         return Ok(Resolved::Ready);
     }
     let Some(views) = PilotCapture::of(capture) else {
-        eprintln!("effects: {kept}; the capture has too few training views to measure which ones pay");
+        say!("effects: {kept}; the capture has too few training views to measure which ones pay");
         return Ok(Resolved::Ready);
     };
     let started = Instant::now();
@@ -93,7 +95,7 @@ pub(crate) fn resolve(
     log.end();
     let trials = match measured {
         Err(PilotError::Interrupted) => {
-            eprintln!(
+            say!(
                 "interrupted while effects were measured, {} pilots are kept; go on with `pocketsplat train --resume {}`",
                 log.n_done(),
                 shell_word(folder.path())
@@ -104,9 +106,9 @@ pub(crate) fn resolve(
     };
     let chosen = trials.each.iter().find(|trial| trial.chosen).map_or(&[][..], |trial| &trial.effects);
     let for_device = (price.instructions_db > 0.0).then_some(target);
-    eprint!("{}", table(&trials, for_device));
-    eprintln!("effects: {}, measured in {:.0} s", Effect::names(chosen), started.elapsed().as_secs_f64());
-    output::write_whole(&folder.path().join(TABLE), &output::csv(lines(&trials))?)?;
+    crate::say::text(&table(&trials, for_device));
+    say!("effects: {}, measured in {:.0} s", Effect::names(chosen), started.elapsed().as_secs_f64());
+    keep(&folder.path().join(TABLE), &output::csv(lines(&trials))?)?;
     config.train = Effect::measured_only(chosen, &config.train);
     Ok(Resolved::Ready)
 }

@@ -12,6 +12,7 @@ use pocketsplat_trainer::train::{TrainConfig, Trainer};
 
 use super::process::{machine_memory_bytes, peak_memory_bytes};
 use crate::config::Preset;
+use crate::say::say;
 
 /// Steps of the trial; the first fill caches and take memory, and are not timed.
 const UNTIMED_STEPS: u32 = 4;
@@ -163,7 +164,7 @@ impl Estimate {
         let (mut estimate, expected) = Self::measured(capture, config, device, stop)?;
         if !stop.load(Ordering::Relaxed) {
             let expected = if with_pilots { expected.with_pilots() } else { expected };
-            eprintln!("{}", estimate.said(&expected));
+            say!("{}", estimate.said(&expected));
         }
         Ok(estimate.warned)
     }
@@ -295,6 +296,13 @@ impl fmt::Display for Expected {
         }
         write!(f, ", {:.1} GB of memory, a bundle of about {:.2} MB", memory_bytes / 1e9, bundle_bytes / 1e6)
     }
+}
+
+/// Bytes of a bundle of so many anchors.
+///
+/// * `bits`: of an anchor's values, where the run has a rate.
+pub(super) fn bundle_bytes(config: &TrainConfig, n_anchors: u64, bits: Option<f64>) -> f64 {
+    FIXED_BYTES + n_anchors as f64 * bits.map_or_else(|| bytes_per_anchor(config), |bits| bits / 8.0)
 }
 
 /// Bytes of an anchor in a bundle: of context-coded scenes a power of λ, fitted; of scaffold scenes with static tables.

@@ -9,6 +9,7 @@ use anyhow::{Context, Result, anyhow, bail};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::Image;
 use pocketsplat_core::Bundle;
+use pocketsplat_files::Output;
 use pocketsplat_gaussians::{Degree, Format, Gaussians, Notes};
 use pocketsplat_trainer::bundle::{decoded_scene, normalisation_of};
 use pocketsplat_trainer::explicit::frame;
@@ -24,8 +25,10 @@ use super::bundle::BundleFile;
 use super::capture::CaptureArgs;
 use super::gaussians::GaussiansFile;
 use super::output;
+use super::outputs::{OverwriteArgs, command_that_makes, gaussians, reading_capture};
 use super::progress::bar_of;
 use crate::config::{CaptureOptions, Protocol};
+use crate::say::say;
 use cameras::Cameras;
 
 /// Write a bundle as explicit Gaussians, which other programs draw: .ply, .spz or .sog.
@@ -54,6 +57,8 @@ pub(crate) struct Args {
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    overwrite: OverwriteArgs,
 }
 
 /// Steps of gradient descent where nobody says how many.
@@ -116,7 +121,7 @@ impl<'a> Source<'a> {
     fn gaussians(&self, cameras: &Cameras<'_>, degree: Degree, n_steps: u32) -> Result<(Gaussians, usize)> {
         let scene = decoded_scene(self.bundle).context("could not decode the bundle")?;
         let pinholes: Vec<Pinhole<f32>> = cameras.fitted.iter().map(Pinhole::new).collect();
-        eprintln!("what {} cameras see of {} anchors", pinholes.len(), scene.anchors.len());
+        say!("what {} cameras see of {} anchors", pinholes.len(), scene.anchors.len());
         let baked = bake(&scene, &pinholes, degree);
         let pictures = if n_steps == 0 { Vec::new() } else { self.pictures(&cameras.fitted)? };
         let with = Refinement {
@@ -139,11 +144,18 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let started = Instant::now();
     let format = Format::of_path(&args.output).ok_or_else(|| {
         let known = Format::ALL.map(|format| format!(".{}", format.extension())).join(", ");
-        anyhow!("{}: export writes {known}; end the name in one of them", args.output.display())
+        let command = command_that_makes(&args.output, &args.bundle);
+        let command = command.map_or_else(String::new, |command| format!("; `{command}` makes such a file"));
+        anyhow!("{}: export writes {known}; end the name in one of them{command}", args.output.display())
     })?;
-    output::check_writable(&args.output)?;
+    let outputs = args.overwrite.outputs().reading(&args.bundle);
+    let mut outputs = args.dataset.iter().fold(outputs, |outputs, dataset| {
+        let capture = CaptureArgs { dataset: dataset.clone(), options: args.options.clone() };
+        reading_capture(outputs, &capture, &args.output)
+    });
+    let output = outputs.file(&args.output, gaussians(format))?;
     if GaussiansFile::is_one(&args.bundle) {
-        return convert(args, format);
+        return convert(args, format, &output);
     }
     if args.dataset.is_none() && args.options != CaptureOptions::default() {
         bail!("options of photographs need a capture; give its folder as CAPTURE, or leave them out");
@@ -180,7 +192,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let unreadable = |fault| anyhow!("{} {fault}", args.output.display());
     let bytes = format.to_bytes(&gaussians, &notes).map_err(unreadable)?;
     let (written, _) = format.from_bytes(&bytes).map_err(unreadable)?;
-    output::write_whole(&args.output, &bytes)?;
+    output.write(&bytes)?;
     let pictures = source.pictures_of(&written, &cameras.judged);
     let file_psnr_db = cameras.psnr_db(&pictures)?;
     let export = Export {
@@ -212,7 +224,7 @@ struct Conversion {
 }
 
 /// Writes the Gaussians of a file in another format; nothing is fitted.
-fn convert(args: &Args, format: Format) -> Result<()> {
+fn convert(args: &Args, format: Format, output: &Output) -> Result<()> {
     if args.dataset.is_some() || args.iterations.is_some() || args.options != CaptureOptions::default() {
         bail!(
             "{} holds Gaussians, which are written as they are; leave CAPTURE, --iterations and options of photographs out",
@@ -223,7 +235,7 @@ fn convert(args: &Args, format: Format) -> Result<()> {
     let gaussians = file.gaussians.reduced_to(Degree::ALL[usize::from(args.sh_degree)]);
     let bytes =
         format.to_bytes(&gaussians, &file.notes).map_err(|fault| anyhow!("{} {fault}", args.output.display()))?;
-    output::write_whole(&args.output, &bytes)?;
+    output.write(&bytes)?;
     let conversion = Conversion {
         format: format.extension(),
         bytes: bytes.len(),
@@ -240,8 +252,13 @@ fn comment(args: &Args, cameras: &Cameras<'_>, to_bundle_db: f64, to_photographs
     let (n, split) = (cameras.judged.len(), &cameras.split);
     match to_photographs {
         Some((own, bundle)) => {
-            format!("Exported from {name}: {own:.3} dB on {n} {split} views, {:.3} dB below the bundle", bundle - own)
+            format!(
+                "Exported by pocketsplat from {name}: {own:.3} dB on {n} {split} views, {:.3} dB below the bundle",
+                bundle - own
+            )
         }
-        None => format!("Exported from {name}: {to_bundle_db:.3} dB to the bundle's pictures on {n} {split} cameras"),
+        None => format!(
+            "Exported by pocketsplat from {name}: {to_bundle_db:.3} dB to the bundle's pictures on {n} {split} cameras"
+        ),
     }
 }

@@ -142,7 +142,7 @@ pub(crate) fn plan_within(bundle: &Bundle<'_>, frame: &Budget, ram_bytes: u64) -
     bundle.plan(&budget).map_err(|error| match error {
         DecodeError::BudgetTooSmall { needed, .. } => anyhow::anyhow!(
             "the smallest scene of this bundle takes {needed} bytes for {}x{} px; give --ram {needed} or more, a smaller \
-             --resolution, {}or train a bundle for this memory with `pocketsplat train --ram {ram_bytes}`",
+             --resolution, {}or train a bundle for this memory with --ram {ram_bytes}",
             frame.width_px,
             frame.height_px,
             if frame.overflow == Overflow::Slabs { "" } else { "time for `fit --slabs`, " }

@@ -11,6 +11,7 @@ use pocketsplat_trainer::explicit::render::Renderer;
 
 use super::capture::CaptureArgs;
 use crate::config::{CaptureOptions, Protocol};
+use crate::say::say;
 
 /// Begins each comment that is a line of the protocol.
 const PROTOCOL: &str = "pocketsplat ";
@@ -36,7 +37,7 @@ impl GaussiansFile {
         let (gaussians, notes) = Format::read(path)?;
         let read_s = started.elapsed().as_secs_f64();
         if !notes.ignored.is_empty() {
-            eprintln!(
+            say!(
                 "warning: {} has more than Gaussians, which is left out: {}",
                 path.display(),
                 notes.ignored.join(", ")
@@ -60,11 +61,11 @@ impl GaussiansFile {
         let trained_with = protocol.as_ref().map_or(black, |protocol| protocol.options.clone());
         let options = args.options.or(&trained_with);
         if let Some(protocol) = &protocol {
-            eprintln!("as the file says: {protocol}");
+            say!("as the file says: {protocol}");
         }
         let capture = CaptureArgs { dataset: args.dataset.clone(), options: options.clone() }.load(0)?;
         if let Some(why) = protocol.and_then(|protocol| protocol.contradiction(&capture)) {
-            eprintln!("warning: {why}");
+            say!("warning: {why}");
         }
         Ok((options, capture))
     }

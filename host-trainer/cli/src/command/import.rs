@@ -15,6 +15,7 @@ use pocketsplat_trainer::explicit::views::generated;
 use serde::Serialize;
 
 use super::gaussians::GaussiansFile;
+use super::outputs::{BUNDLE, OverwriteArgs, check_name};
 use super::settings::QualityOptions;
 use super::train::{HeldOut, TrainResult, train_as};
 use super::train_args::{DeviceArgs, check_lambda};
@@ -22,6 +23,7 @@ use super::{output, process};
 use crate::config::heading::{INPUT, OUTPUT, QUALITY, RUN};
 use crate::config::named::{BACKGROUNDS, one_of};
 use crate::config::{CaptureOptions, Preset, RunConfig};
+use crate::say::say;
 
 /// Longest side of the pictures unless the user says otherwise, px.
 const LONGEST_PX: u32 = 200;
@@ -76,6 +78,8 @@ pub(crate) struct Args {
     /// Seed of all random numbers: the same seed on the same machine gives the same bundle.
     #[arg(long, value_name = "N", default_value_t = 42, help_heading = RUN)]
     seed: u64,
+    #[command(flatten)]
+    overwrite: OverwriteArgs,
 }
 
 /// What an import reports.
@@ -109,15 +113,16 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     if args.background == Background::Learned {
         bail!("--background learned is for photographs; choose black or white, which the splats are drawn on");
     }
-    if GaussiansFile::is_one(&args.output) {
-        bail!("{}: import writes a bundle; end the name in .psb", args.output.display());
-    }
+    // What another format needs is written of the file that is imported.
+    check_name(&args.output, BUNDLE, GaussiansFile::is_one(&args.output).then_some(&args.points))?;
     let config = configured(args)?;
-    output::check_writable(&args.output)?;
+    let outputs = args.overwrite.outputs().reading(&args.points);
+    let mut outputs = args.cameras.iter().fold(outputs, |outputs, path| outputs.reading(path));
+    let output = outputs.file(&args.output, BUNDLE)?;
     let file = GaussiansFile::read(&args.points)?;
     let (train, test) = cameras(args, config.capture.resolution, &file)?;
     let capture = captured(args, &file, &train, &test)?;
-    eprintln!(
+    say!(
         "{} Gaussians in {:.1} MB, drawn from {} cameras, {} of them held out",
         file.gaussians.len(),
         file.n_bytes as f64 / 1e6,
@@ -125,9 +130,11 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         test.len()
     );
     let train = config.train.resolved_for(&capture);
-    let trained = train_as(&capture, train, &config.capture, &config.encoding, &args.output)?;
+    let trained = train_as(&capture, train, &config.capture, &config.encoding, &output)?;
     output::print(&result(&file, &capture, trained)?, args.json)?;
-    eprintln!("see it:  pocketsplat view {} -o scene.html", shell_word(&args.output));
+    if output.is_file() {
+        say!("see it:  pocketsplat view {} -o scene.html", shell_word(&args.output));
+    }
     Ok(())
 }
 
@@ -167,7 +174,7 @@ fn cameras(args: &Args, size: Option<FrameSize>, file: &GaussiansFile) -> Result
                 format!("nothing in {} is opaque enough to stand cameras around; give --cameras", args.points.display())
             })?;
             let (n, place) = (args.views as usize, if bulk.surrounds { "inside" } else { "around" });
-            eprintln!("cameras stand {place} the bulk at {:.3}, radius {:.3}", bulk.centre, bulk.radius);
+            say!("cameras stand {place} the bulk at {:.3}, radius {:.3}", bulk.centre, bulk.radius);
             generated(&bulk, n * HELD_OUT_EVERY / (HELD_OUT_EVERY - 1), size_px)
         }
     };

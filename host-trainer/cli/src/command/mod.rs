@@ -20,6 +20,7 @@ mod inspect;
 mod loaded;
 mod lpips;
 mod output;
+mod outputs;
 mod plan_runs;
 mod plot;
 mod point;
@@ -44,6 +45,8 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result};
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
+
+use crate::say::say;
 
 /// Train a neural Gaussian-splat scene, compress it to a fraction of a megabyte, draw it on a microcontroller.
 #[derive(Parser)]
@@ -97,7 +100,7 @@ pub(crate) fn run() -> ExitCode {
         }
     };
     dispatch(cli).unwrap_or_else(|error| {
-        eprintln!("error: {error:#}");
+        say!("error: {error:#}");
         if as_json {
             let causes: Vec<String> = error.chain().skip(1).map(ToString::to_string).collect();
             print_failure(&error.to_string(), &causes);
@@ -122,7 +125,7 @@ fn print_failure(error: &str, causes: &[String]) {
 fn n_threads(asked: usize) -> usize {
     let n_cores = std::thread::available_parallelism().map_or(usize::MAX, usize::from);
     if asked > n_cores {
-        eprintln!("using {n_cores} threads, one for each core, instead of {asked}");
+        say!("using {n_cores} threads, one for each core, instead of {asked}");
     }
     asked.min(n_cores)
 }

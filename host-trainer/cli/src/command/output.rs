@@ -1,54 +1,11 @@
-//! Writing results: files whole or not at all, tables for people, JSON for machines.
+//! Results on stdout, and as text: tables for people, JSON for machines.
 
-use std::fs;
 use std::io::Write;
-use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 
 /// Version of what commands print as JSON and of `result.json`: rises when a field goes or changes its meaning.
 pub(crate) const SCHEMA_VERSION: u32 = 1;
-
-/// Fails now if `path` could not be written later, and makes its folder.
-pub(crate) fn check_writable(path: &Path) -> Result<()> {
-    if path.is_dir() {
-        bail!("{} is a folder, and needs to be a file; give a name in it with --output", path.display());
-    }
-    let (folder, probe) = beside(path);
-    fs::create_dir_all(&folder).with_context(|| format!("could not make the folder {}", folder.display()))?;
-    fs::write(&probe, [])
-        .and_then(|()| fs::remove_file(&probe))
-        .with_context(|| format!("could not write to the folder {}; choose another --output", folder.display()))
-}
-
-/// Writes `bytes` to `path` by way of a file beside it, so that a full disk leaves an older file as it was.
-pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
-    let (_, partial) = beside(path);
-    let write = || -> std::io::Result<()> {
-        let mut file = fs::File::create(&partial)?;
-        file.write_all(bytes)?;
-        file.sync_all()?;
-        fs::rename(&partial, path)
-    };
-    write()
-        .inspect_err(|_| {
-            // Best effort: the error that matters is the one above.
-            let _ = fs::remove_file(&partial);
-        })
-        .with_context(|| format!("could not write {} ({} bytes)", path.display(), bytes.len()))
-}
-
-/// The folder of `path` and the name of a partial file in it.
-fn beside(path: &Path) -> (PathBuf, PathBuf) {
-    let folder = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
-        _ => PathBuf::from("."),
-    };
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(format!(".{}.partial", std::process::id()));
-    let partial = folder.join(name);
-    (folder, partial)
-}
 
 /// A table as CSV, one line each, with the names of the fields above.
 pub(crate) fn csv(lines: impl IntoIterator<Item = impl serde::Serialize>) -> Result<Vec<u8>> {
@@ -92,10 +49,25 @@ pub(crate) fn print_or<T: serde::Serialize>(report: &T, as_json: bool, words: im
 /// Prints `text` to stdout.
 pub(crate) fn print_text(text: &str) -> Result<()> {
     match std::io::stdout().write_all(text.as_bytes()) {
-        // The reader has seen enough, as `head` does.
-        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        // The reader has seen enough, as `head` does, or the terminal is gone.
+        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe || is_hung_up(&error) => Ok(()),
         written => written.context("could not write to stdout"),
     }
+}
+
+/// Whether stdout is a terminal that is gone, which does not say any more that it is one.
+#[cfg(unix)]
+fn is_hung_up(error: &std::io::Error) -> bool {
+    use std::os::fd::AsFd as _;
+    use std::os::unix::fs::FileTypeExt as _;
+    let stdout = std::io::stdout().as_fd().try_clone_to_owned().map(std::fs::File::from);
+    let is_device = stdout.and_then(|file| file.metadata()).is_ok_and(|found| found.file_type().is_char_device());
+    is_device && error.raw_os_error() == Some(libc::EIO)
+}
+
+#[cfg(not(unix))]
+fn is_hung_up(_: &std::io::Error) -> bool {
+    false
 }
 
 fn plain(value: &serde_json::Value) -> String {

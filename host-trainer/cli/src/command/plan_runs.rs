@@ -10,6 +10,7 @@ use clap::{Args as _, FromArgMatches as _};
 use super::devices::DeviceChoice;
 use super::loaded::LoadedCapture;
 use super::lpips::LpipsArgs;
+use super::outputs::OverwriteArgs;
 use super::workflow::{Place, Planner};
 use super::{output, tables, train_args};
 use crate::config::RunConfig;
@@ -28,12 +29,15 @@ pub(crate) struct Args {
     output: PathBuf,
     #[command(flatten)]
     lpips: LpipsArgs,
+    #[command(flatten)]
+    overwrite: OverwriteArgs,
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
     let spec = Spec::read(&args.spec)?;
     let folder = std::path::absolute(&args.output).with_context(|| format!("{} is no path", args.output.display()))?;
     let lpips = args.lpips.options()?;
+    let outputs = args.overwrite.outputs().reading(&args.spec);
     // All of them before the first capture is loaded.
     let mut asked = Vec::new();
     for run in spec.runs()? {
@@ -54,7 +58,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     if let Some(published) = &spec.published {
         merge.extend(["--published".to_owned(), published.display().to_string()]);
     }
-    output::print_text(&planner.write(&folder, merge, &tables::FILES)?)
+    output::print_text(&planner.write(&folder, merge, &tables::FILES, &outputs)?)
 }
 
 /// The configuration that `train` makes of a run's options, and what is to train it.

@@ -6,10 +6,12 @@ use crate::plot::{
     Named, Recording, ResultRow, SizeAxis, cost_svg, gathered, learning_curves_svg, names_of, rate_distortion_svg,
 };
 use anyhow::{Result, bail};
+use pocketsplat_files::Output;
 use pocketsplat_trainer::metrics::{RatePoint, bd_psnr_db, bd_rate_percent};
 use serde_json::{Map, Value, json};
 
 use super::output;
+use super::outputs::{FIGURE, OverwriteArgs, check_name};
 
 /// Draw learning curves of runs, rate-distortion curves of sweeps and ablations, or what settings cost, into an SVG.
 ///
@@ -28,9 +30,14 @@ pub(crate) struct Args {
     /// Print the deltas as JSON.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    overwrite: OverwriteArgs,
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
+    check_name(&args.output, FIGURE, None)?;
+    let outputs = args.files.iter().fold(args.overwrite.outputs(), |outputs, path| outputs.reading(path));
+    let output = outputs.clone().file(&args.output, FIGURE)?;
     let (mut runs, mut curves, mut panels) = (Vec::new(), Vec::new(), Vec::new());
     for (path, name) in args.files.iter().zip(names_of(&args.files)) {
         match Recording::read(path)? {
@@ -45,7 +52,6 @@ pub(crate) fn run(args: &Args) -> Result<()> {
             Recording::Cost(of_file) => panels.extend(of_file),
         }
     }
-    output::check_writable(&args.output)?;
     let n_kinds = [runs.is_empty(), curves.is_empty(), panels.is_empty()].iter().filter(|is_empty| !**is_empty).count();
     if n_kinds > 1 {
         bail!(
@@ -56,15 +62,15 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         bail!("--log-x is for the sizes of rate-distortion curves");
     }
     match (runs.is_empty(), panels.is_empty()) {
-        (false, _) => output::write_whole(&args.output, learning_curves_svg(&runs)?.as_bytes()),
-        (_, false) => output::write_whole(&args.output, cost_svg(&panels)?.as_bytes()),
-        _ => draw_rate_distortion(args, &curves),
+        (false, _) => Ok(output.write(learning_curves_svg(&runs)?.as_bytes())?),
+        (_, false) => Ok(output.write(cost_svg(&panels)?.as_bytes())?),
+        _ => draw_rate_distortion(args, &output, &curves),
     }
 }
 
-fn draw_rate_distortion(args: &Args, curves: &[Named<Vec<ResultRow>>]) -> Result<()> {
+fn draw_rate_distortion(args: &Args, output: &Output, curves: &[Named<Vec<ResultRow>>]) -> Result<()> {
     let axis = if args.log_x { SizeAxis::Logarithmic } else { SizeAxis::Linear };
-    output::write_whole(&args.output, rate_distortion_svg(curves, axis)?.as_bytes())?;
+    output.write(rate_distortion_svg(curves, axis)?.as_bytes())?;
     let [reference, others @ ..] = curves else { return Ok(()) };
     if others.is_empty() {
         return Ok(());

@@ -5,6 +5,7 @@ use std::sync::atomic::AtomicBool;
 use anyhow::{Context, Result};
 use pocketsplat_capture::dataset::{Capture, Split};
 use pocketsplat_core::bundle::crc32;
+use pocketsplat_files::Outputs;
 use pocketsplat_trainer::metrics::Lpips;
 use pocketsplat_trainer::train::module::pruning::Form;
 
@@ -14,8 +15,10 @@ use super::devices::DeviceChoice;
 use super::estimate::Estimate;
 use super::eval::{Evaluation, Measurements, Renderer, evaluate, lpips_of};
 use super::output;
+use super::outputs::{BUNDLE, keep};
 use super::train::{self, Standing, Start};
 use crate::config::{Protocol, RunConfig};
+use crate::say::say;
 
 /// Brings a point to its end, from wherever it stands; false when it was interrupted before. A device is opened where something is left
 /// to do.
@@ -28,11 +31,13 @@ pub(super) fn trained(config: &RunConfig, capture: &Capture, device: DeviceChoic
         }
         Standing::Begun(folder) => (folder, Start::Resumed, device.open()?),
         Standing::Finished => {
-            eprintln!("trained before");
+            say!("trained before");
             return Ok(true);
         }
     };
-    Ok(train::train_in(folder, config, capture, start, device, stop)?.is_some())
+    // Another file than a bundle was refused before the first run began.
+    let output = Outputs::new(true).reading_folder(&config.dataset).file(&config.output, BUNDLE)?;
+    Ok(train::train_in(folder, config, capture, start, device, stop, &output)?.is_some())
 }
 
 /// The figures of a point on the held-out views, kept beside its bundle so that they are taken once.
@@ -55,7 +60,7 @@ pub(super) fn measured(config: &RunConfig, lpips: Option<&Lpips>) -> Result<Eval
     let capture = CaptureArgs { dataset: config.dataset.clone(), options: config.capture.clone() };
     let what = Measurements { per_tier: has_trained_tiers(config), lpips, ..Measurements::default() };
     let evaluation = evaluate(&file, &capture, Split::Test, Renderer::Core, &what)?;
-    output::write_whole(&path, output::json(&evaluation)?.as_bytes())?;
+    keep(&path, output::json(&evaluation)?.as_bytes())?;
     Ok(evaluation)
 }
 

@@ -13,6 +13,7 @@ use pocketsplat_trainer::train::steering::Fit;
 use pocketsplat_trainer::train::{DroppedStep, Observer};
 
 use super::estimate::Estimate;
+use crate::say::say;
 
 /// Weight of the newest step in the running means.
 const NEWEST: f64 = 0.02;
@@ -32,6 +33,7 @@ pub(crate) struct Progress {
     loss: f64,
     psnr_db: f64,
     n_dropped: u32,
+    n_unwritten: u32,
     estimate: Option<Estimate>,
 }
 
@@ -48,6 +50,7 @@ impl Progress {
             loss: 0.0,
             psnr_db: 0.0,
             n_dropped: 0,
+            n_unwritten: 0,
             estimate: None,
         }
     }
@@ -59,12 +62,12 @@ impl Progress {
 
     /// A line that the bar does not overwrite.
     fn say(&self, line: &str) {
-        self.bar.suspend(|| eprintln!("{line}"));
+        self.bar.suspend(|| say!("{line}"));
     }
 }
 
 /// A rate to two digits at least.
-fn two_digits(per_second: f64) -> String {
+pub(super) fn two_digits(per_second: f64) -> String {
     format!("{per_second:.*}", if per_second < 10.0 { 2 } else { 1 })
 }
 
@@ -117,7 +120,7 @@ impl Progress {
             let per_second = f64::from(iteration - self.from) / self.started.elapsed().as_secs_f64();
             let left = f64::from(self.iterations - iteration) / per_second;
             let rate = two_digits(per_second);
-            eprintln!("{iteration}/{}  {left:.0} s left  {rate} it/s  {state}", self.iterations);
+            say!("{iteration}/{}  {left:.0} s left  {rate} it/s  {state}", self.iterations);
         }
     }
 }
@@ -144,6 +147,14 @@ impl Observer for Progress {
             format!(", before lambda goes from {:.5} to {:.5}", fit.former_lambda, fit.lambda)
         };
         self.say(&format!("to fit: {} anchors, which take {}{lambda}", fit.n_anchors, shares.join(", ")));
+    }
+
+    fn unwritten(&mut self, why: &dyn std::error::Error) {
+        self.n_unwritten += 1;
+        if self.n_unwritten == 1 {
+            let cause = why.source().map_or_else(String::new, |cause| format!(": {cause}"));
+            self.say(&format!("warning: the run goes on without its previews: {why}{cause}"));
+        }
     }
 
     fn dropped(&mut self, step: &DroppedStep) {

@@ -10,6 +10,7 @@ use anyhow::{Result, bail};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Image, Split, View};
 use pocketsplat_core::Bundle;
+use pocketsplat_files::Outputs;
 use pocketsplat_trainer::render::decoder::core_image;
 use pocketsplat_trainer::render::reference::ReferenceScene;
 use rayon::prelude::*;
@@ -19,11 +20,12 @@ use super::capture::{CaptureArgs, views_of};
 use super::eval::{Renderer, reference_image};
 use super::gaussians::GaussiansFile;
 use super::output;
+use super::outputs::{OverwriteArgs, reading_capture};
 use crate::config::CaptureOptions;
 use crate::config::named::{SPLITS, one_of};
 pub(super) use cameras::CameraRecord;
 use cameras::Shot;
-use pictures::Format;
+use pictures::{Format, Target};
 
 /// Options that speak of a capture, which pictures of a bundle alone do without.
 const OF_A_CAPTURE: [&str; 7] = ["dataset", "split", "max_resolution", "background", "images", "model", "test_every"];
@@ -68,11 +70,14 @@ pub(crate) struct Args {
     /// What draws it.
     #[arg(long, value_enum, default_value_t = Renderer::Core)]
     renderer: Renderer,
+    #[command(flatten)]
+    overwrite: OverwriteArgs,
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
-    let format = Format::of(&args.output)?;
-    output::check_writable(&args.output)?;
+    let format = Format::of(&args.output, &args.bundle)?;
+    let mut outputs = args.outputs();
+    let target = Target::checked(&args.output, format, &mut outputs)?;
     let (shots, pictures) = if GaussiansFile::is_one(&args.bundle) {
         let (shots, pictures) = explicit::draw(args)?;
         format.check(shots.len(), args.contact_sheet, &args.output)?;
@@ -85,8 +90,8 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         let pictures = draw(&bundle, &shots, args.renderer)?;
         (shots, pictures)
     };
-    let written = pictures::write(&pictures, format, args.contact_sheet, &args.output)?;
-    let (Some(first), Some(picture), Some(shot)) = (written.first(), pictures.first(), shots.first()) else {
+    target.write(&pictures, args.contact_sheet)?;
+    let (Some(picture), Some(shot)) = (pictures.first(), shots.first()) else {
         bail!("there is no view to draw");
     };
     let what = if let [shot] = &shots[..] {
@@ -94,9 +99,19 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     } else {
         format!("{} pictures from {}", shots.len(), shot.name)
     };
-    let place = if format == Format::Folder { args.output.display() } else { first.display() };
-    println!("{place}: {}×{} px, {what}", picture.width_px, picture.height_px);
-    Ok(())
+    let place = args.output.display();
+    output::print_text(&format!("{place}: {}×{} px, {what}\n", picture.width_px, picture.height_px))
+}
+
+impl Args {
+    /// What may be written, and what is read.
+    fn outputs(&self) -> Outputs {
+        let outputs = self.overwrite.outputs().reading(&self.bundle);
+        let outputs = self.camera.iter().fold(outputs, |outputs, path| outputs.reading(path));
+        let Some(dataset) = &self.dataset else { return outputs };
+        let capture = CaptureArgs { dataset: dataset.clone(), options: self.options.clone() };
+        reading_capture(outputs, &capture, &self.output)
+    }
 }
 
 /// The cameras of a file as `--camera` reads it.

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::{Capture, Split};
-use pocketsplat_files::shell_word;
+use pocketsplat_files::{Output, Outputs, shell_word};
 use pocketsplat_viewer::{SceneFile, escaped, page};
 use serde::Deserialize;
 
@@ -15,8 +15,10 @@ use super::bundle::BundleFile;
 use super::capture::CaptureArgs;
 use super::eval::{Evaluation, Measurements, Renderer, measure};
 use super::output;
+use super::outputs::{self, OverwriteArgs, check_name, reading_capture};
 use crate::config::{CaptureOptions, RunConfig};
 use crate::plot::{Named, Recording, learning_curves_svg};
+use crate::say::say;
 
 const PAGE: &str = include_str!("report/report.html");
 const STYLE: &str = include_str!("report/report.css");
@@ -39,6 +41,8 @@ pub(crate) struct Args {
     /// The page to write [default: report.html in the run folder]
     #[arg(short, long, value_name = "OUT.html")]
     output: Option<PathBuf>,
+    #[command(flatten)]
+    overwrite: OverwriteArgs,
 }
 
 /// What is read of a run's result.json.
@@ -68,33 +72,39 @@ struct Photographs<'a> {
 pub(crate) fn run(args: &Args) -> Result<()> {
     let config = RunConfig::read(&args.run.join("config.toml"))?;
     let output = args.output.clone().unwrap_or_else(|| args.run.join(FILE));
-    output::check_writable(&output)?;
+    check_name(&output, outputs::PAGE, None)?;
+    let mut outputs = args.overwrite.outputs().reading_folder(&args.run).reading(&config.output);
     let source = CaptureArgs {
         dataset: args.dataset.clone().unwrap_or(config.dataset.clone()),
         options: config.capture.clone(),
     };
+    outputs = reading_capture(outputs, &source, &output);
+    let output = outputs.file(&output, outputs::PAGE)?;
     let capture = source.load(config.train.seed);
     let capture = capture
         .inspect_err(|error| {
-            eprintln!("warning: the page will lack photographs: {error:#}; give the folder as CAPTURE if it has moved");
+            say!("warning: the page will lack photographs: {error:#}; give the folder as CAPTURE if it has moved");
         })
         .ok();
     let n_bytes = write(&args.run, &config, capture.as_ref(), &output)?;
-    println!("{}: {:.2} MB; open it in a browser", output.display(), n_bytes as f64 / 1e6);
-    Ok(())
+    output::print_text(&format!("{}: {:.2} MB; open it in a browser\n", output.path().display(), n_bytes as f64 / 1e6))
 }
 
-/// Writes the page of a run that has just ended into its folder; a run is not worse for lacking one.
-pub(super) fn write_into(folder: &Path, config: &RunConfig, capture: &Capture) {
+/// Writes the page of a run that has just ended into its folder, and returns its path; a run is not worse for lacking one.
+pub(super) fn write_into(folder: &Path, config: &RunConfig, capture: &Capture) -> Option<PathBuf> {
     let path = folder.join(FILE);
-    match write(folder, config, Some(capture), &path) {
-        Ok(_) => eprintln!("its report:   {}", path.display()),
-        Err(error) => eprintln!("warning: there is no report: {error:#}"),
+    // The folder is the run's own.
+    let written = Outputs::new(true).file(&path, outputs::PAGE).map_err(anyhow::Error::from);
+    let written = written.and_then(|page| write(folder, config, Some(capture), &page));
+    match written {
+        Ok(_) => say!("its report:   {}", path.display()),
+        Err(error) => say!("warning: there is no report: {error:#}"),
     }
+    path.is_file().then_some(path)
 }
 
 /// Returns the length of the page.
-fn write(folder: &Path, config: &RunConfig, capture: Option<&Capture>, path: &Path) -> Result<usize> {
+fn write(folder: &Path, config: &RunConfig, capture: Option<&Capture>, output: &Output) -> Result<usize> {
     let result = folder.join("result.json");
     let text = std::fs::read_to_string(&result).with_context(|| {
         format!(
@@ -111,7 +121,7 @@ fn write(folder: &Path, config: &RunConfig, capture: Option<&Capture>, path: &Pa
         .transpose()?;
     let run = Run { folder, config, result, file, photographs };
     let text = html(&run)?;
-    output::write_whole(path, text.as_bytes())?;
+    output.write(text.as_bytes())?;
     Ok(text.len())
 }
 

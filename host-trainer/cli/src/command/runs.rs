@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::Split;
+use pocketsplat_files::{Content, Outputs};
 use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::config::Backbone;
 use pocketsplat_trainer::train::run::photographs_in;
@@ -15,15 +16,17 @@ use super::devices::DeviceChoice;
 use super::eval::Evaluation;
 use super::loaded::LoadedCapture;
 use super::lpips::LpipsArgs;
+use super::outputs::{self, BUNDLE, OverwriteArgs, RESULTS};
 use super::settings::{QualityOptions, RunOptions, applied};
 use super::workflow::Planner;
 use super::{output, point, stop, train};
 use crate::config::heading::{OUTPUT, RUN};
 use crate::config::{CaptureOptions, EffectsConfig, RunConfig};
 use crate::plot::{Named, ResultRow, SizeAxis, names_of, rate_distortion_svg, results_csv};
+use crate::say::say;
 
 /// The curves of all rows, in the folder of the runs.
-pub(super) const FIGURE: &str = "rate_distortion.svg";
+pub(super) const FIGURE: (&str, Content) = ("rate_distortion.svg", outputs::FIGURE);
 
 /// What all runs share.
 #[derive(clap::Args)]
@@ -51,6 +54,8 @@ pub(super) struct RunsArgs {
     /// Write a Snakemake workflow that trains the runs into the folder, and train nothing.
     #[arg(long, help_heading = RUN)]
     plan: bool,
+    #[command(flatten)]
+    overwrite: OverwriteArgs,
 }
 
 /// One run, by what distinguishes it from the configuration that all share.
@@ -127,37 +132,43 @@ impl RunsArgs {
         &self,
         base: &RunConfig,
         specs: &[RunSpec],
-        files: &[&str],
-        tables: impl Fn(&[MeasuredRun<'_>]) -> Result<Vec<u8>>,
+        files: &[(&str, Content)],
+        tables: impl Fn(&[MeasuredRun<'_>], &mut Outputs) -> Result<Vec<u8>>,
     ) -> Result<ExitCode> {
+        let outputs = self.config.iter().fold(self.overwrite.outputs(), |outputs, path| outputs.reading(path));
+        let outputs = outputs.reading_folder(&base.dataset);
         // All of them before the first is trained for an hour.
+        for (file, content) in files {
+            outputs.clone().file(&base.output.join(file), *content)?;
+        }
         for (i, spec) in specs.iter().enumerate() {
             if specs[..i].iter().any(|other| other.bundle == spec.bundle) {
                 bail!("--lambda names {} twice; each run needs a weight of its own", spec.lambda);
             }
-            spec.config(base)?.check().with_context(|| format!("cannot train {spec}"))?;
+            let config = spec.config(base)?;
+            config.check().with_context(|| format!("cannot train {spec}"))?;
+            outputs.clone().file(&config.output, BUNDLE)?;
         }
         let lpips = self.lpips.load()?;
-        output::check_writable(&base.output.join(FIGURE))?;
         if self.plan {
-            return self.plan(base, specs, files, &mut LoadedCapture::default());
+            return self.plan(base, specs, files, &outputs);
         }
         let mut loaded = LoadedCapture::for_training(photographs_in(&base.output));
         let stop = stop::flag()?;
         let mut measured = Vec::new();
         let mut text = Vec::new();
         for (i, spec) in specs.iter().enumerate() {
-            eprintln!("{} of {}  {spec}", i + 1, specs.len());
+            say!("{} of {}  {spec}", i + 1, specs.len());
             let mut config = spec.config(base)?;
-            output::check_writable(&config.output)?;
             let capture = loaded.of(&mut config)?;
             views_of(capture, Split::Test).context("runs are compared on held-out views; see --test-every")?;
             if !point::trained(&config, capture, self.device, &stop)? {
-                eprintln!("the same command again resumes here");
+                say!("the same command again resumes here");
                 return Ok(ExitCode::from(stop::INTERRUPTED));
             }
             measured.push(MeasuredRun { spec, evaluation: point::measured(&config, lpips.as_ref())? });
-            text = tables(&measured)?;
+            // The names are taken anew each time.
+            text = tables(&measured, &mut outputs.clone())?;
         }
         output::print_text(&String::from_utf8(text)?)?;
         drop(loaded);
@@ -170,24 +181,25 @@ impl RunsArgs {
         &self,
         base: &RunConfig,
         specs: &[RunSpec],
-        files: &[&str],
-        loaded: &mut LoadedCapture,
+        files: &[(&str, Content)],
+        outputs: &Outputs,
     ) -> Result<ExitCode> {
+        let mut loaded = LoadedCapture::default();
         let lpips = self.lpips.options()?;
         let mut planner = Planner::default();
         for spec in specs {
             let config = spec.config(base)?;
             let name = spec.bundle.trim_end_matches(".psb").to_owned();
-            planner.add(name, config, self.device, None, &lpips, loaded)?;
+            planner.add(name, config, self.device, None, &lpips, &mut loaded)?;
         }
         let arguments = std::env::args().skip(1).filter(|argument| argument != "--plan").collect();
-        output::print_text(&planner.write(&base.output, arguments, files)?)?;
+        output::print_text(&planner.write(&base.output, arguments, files, outputs)?)?;
         Ok(ExitCode::SUCCESS)
     }
 }
 
 /// Writes a table for each row's curve, `ROW.csv`, and the figure of all; returns the tables.
-pub(super) fn write_curves(folder: &Path, runs: &[MeasuredRun<'_>]) -> Result<Vec<u8>> {
+pub(super) fn write_curves(folder: &Path, runs: &[MeasuredRun<'_>], outputs: &mut Outputs) -> Result<Vec<u8>> {
     let mut curves: Vec<(PathBuf, Vec<ResultRow>)> = Vec::new();
     for MeasuredRun { spec, evaluation } in runs.iter().filter(|run| run.spec.on_curve) {
         let path = folder.join(format!("{}.csv", spec.row));
@@ -200,7 +212,7 @@ pub(super) fn write_curves(folder: &Path, runs: &[MeasuredRun<'_>]) -> Result<Ve
     let (mut named, mut tables) = (Vec::new(), Vec::new());
     for (path, what) in curves {
         let table = results_csv(&what)?;
-        output::write_whole(&path, &table)?;
+        outputs.file(&path, RESULTS)?.write(&table)?;
         tables.extend(table);
         named.push(Named { name: names_of(&[path]).swap_remove(0), what });
     }
@@ -211,6 +223,7 @@ pub(super) fn write_curves(folder: &Path, runs: &[MeasuredRun<'_>]) -> Result<Ve
             curve.what.push(point);
         }
     }
-    output::write_whole(&folder.join(FIGURE), rate_distortion_svg(&named, SizeAxis::Linear)?.as_bytes())?;
+    let figure = rate_distortion_svg(&named, SizeAxis::Linear)?;
+    outputs.file(&folder.join(FIGURE.0), FIGURE.1)?.write(figure.as_bytes())?;
     Ok(tables)
 }

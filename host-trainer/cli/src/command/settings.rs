@@ -199,7 +199,9 @@ impl QualityOptions {
         }
         let (encoding, train) = (&mut config.encoding, &mut config.train);
         if self.is_explicit() {
-            bail!("--backbone {EXPLICIT} makes a .ply; it works with `pocketsplat train CAPTURE -o SCENE.ply` alone");
+            bail!(
+                "--backbone {EXPLICIT} makes a .ply; it works with `pocketsplat train CAPTURE --backbone {EXPLICIT} -o SCENE.ply` alone"
+            );
         }
         if let Some(BackboneChoice::Anchors(backbone)) = self.backbone {
             *train = train.with_backbone(backbone);

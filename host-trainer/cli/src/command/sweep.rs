@@ -4,6 +4,7 @@ use std::process::ExitCode;
 
 use anyhow::{Result, bail};
 
+use super::outputs::RESULTS;
 use super::runs::{FIGURE, RunSpec, RunsArgs, write_curves};
 use crate::config::heading::QUALITY;
 
@@ -35,5 +36,6 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     };
     let specs: Vec<RunSpec> = args.lambdas.iter().map(spec).collect();
     let folder = base.output.clone();
-    args.runs.train(&base, &specs, &["results.csv", FIGURE], |runs| write_curves(&folder, runs))
+    args.runs
+        .train(&base, &specs, &[("results.csv", RESULTS), FIGURE], |runs, outputs| write_curves(&folder, runs, outputs))
 }

@@ -5,6 +5,9 @@ use std::path::PathBuf;
 use crate::config::named::{SURFACES, one_of};
 use anyhow::Result;
 use pocketsplat_capture::synth::{SurfaceFinish, SynthOptions, write_capture};
+use pocketsplat_files::Outputs;
+
+use super::output;
 
 /// Write a procedural capture: an analytic scene, ray-traced from known cameras, in Blender's format.
 #[derive(clap::Args)]
@@ -37,14 +40,14 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         finish: args.surface,
         ..SynthOptions::default()
     };
+    Outputs::folder(&args.folder)?;
     let report = write_capture(&args.folder, &options)?;
-    println!(
-        "{}: {} views to train, {} held out, {} px, {:.0} % of the pixels show something",
+    output::print_text(&format!(
+        "{}: {} views to train, {} held out, {} px, {:.0} % of the pixels show something\n",
         args.folder.display(),
         report.n_train,
         report.n_test,
         report.size_px,
         100.0 * report.mean_alpha
-    );
-    Ok(())
+    ))
 }

@@ -10,13 +10,16 @@ mod survey;
 use std::path::PathBuf;
 
 use anyhow::{Result, bail};
+use pocketsplat_files::Content;
 
 use super::output;
+use super::outputs::{OverwriteArgs, table};
 use super::workflow::Plan;
 use published::PublishedRow;
 
 /// What is written whatever the plan trains, within its folder.
-pub(super) const FILES: [&str; 2] = ["tables/runs.csv", "tables/bd_rate.csv"];
+pub(super) const FILES: [(&str, Content); 2] =
+    [("tables/runs.csv", table(&["run,"])), ("tables/bd_rate.csv", table(&["dataset,"]))];
 
 /// Make tables and figures of the finished runs of a plan; it may be unfinished.
 ///
@@ -31,6 +34,8 @@ pub(crate) struct Args {
     /// Published results to show beside, as docs/results/published.csv has them.
     #[arg(long, value_name = "FILE.csv")]
     published: Option<PathBuf>,
+    #[command(flatten)]
+    overwrite: OverwriteArgs,
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
@@ -40,19 +45,20 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     if runs.is_empty() {
         bail!("no run of {} is measured yet; train them: snakemake --cores all", args.folder.display());
     }
-    let [all, bd_rates] = FILES.map(|file| args.folder.join(file));
-    output::check_writable(&all)?;
-    output::write_whole(&all, &output::csv(runs.iter().map(finished::FinishedRun::line))?)?;
+    let mut outputs = args.published.iter().fold(args.overwrite.outputs(), |outputs, path| outputs.reading(path));
+    let [(all, of_all), (bd_rates, of_rates)] = FILES.map(|(file, content)| (args.folder.join(file), content));
+    outputs.file(&all, of_all)?.write(&output::csv(runs.iter().map(finished::FinishedRun::line))?)?;
     let groups = curves::groups(&plan, &runs);
     let mut differences = Vec::new();
     for group in &groups {
         differences.extend(differences::of_group(group));
-        survey::write(&args.folder.join("tables"), group, &published)?;
+        survey::write(&args.folder.join("tables"), group, &published, &mut outputs)?;
     }
-    output::write_whole(&bd_rates, &output::csv(&differences)?)?;
+    outputs.file(&bd_rates, of_rates)?.write(&output::csv(&differences)?)?;
     if !published.is_empty() {
         let text = comparison::markdown(&groups, &published);
-        output::write_whole(&args.folder.join("tables/comparison.md"), text.as_bytes())?;
+        let page = Content::Text(&["# Published results and ours"], "a comparison (.md)");
+        outputs.file(&args.folder.join("tables/comparison.md"), page)?.write(text.as_bytes())?;
     }
     output::print_text(&format!(
         "{} of {} runs are measured; tables and figures: {}\n",

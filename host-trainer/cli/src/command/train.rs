@@ -10,22 +10,26 @@ mod summary;
 #[cfg(test)]
 mod tests;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::{Capture, View};
-use pocketsplat_files::shell_word;
+use pocketsplat_files::{Output, shell_word};
 use pocketsplat_trainer::step::SharedDevice;
 use pocketsplat_trainer::train::run::{RunFolder, fork, photographs_in};
 
 use super::effects::Resolved;
 use super::estimate::{Estimate, Warned};
+use super::outputs::BUNDLE;
 use super::train_args::Args;
+use super::watch::Ending;
 use super::{effects, output, report, stop, watch};
 use crate::config::{ExplicitRunConfig, RunConfig};
+use crate::say::say;
 use in_folder::IN_RUN_AND_ON_COMMAND_LINE;
 pub(crate) use in_folder::{Start, train, train_as, train_in};
+use loading::source_of;
 pub(crate) use loading::{clear_photographs, decide, load};
 pub(crate) use result::{HeldOut, TrainResult};
 pub(crate) use standing::Standing;
@@ -58,10 +62,10 @@ fn resume(args: &Args, path: &Path) -> Result<ExitCode> {
     config.check()?;
     // What was chosen stays; what an accident kept from being chosen is measured now.
     config.effects = begun.effects;
-    output::check_writable(&config.output)?;
+    let output = args.output(&source_of(&config), &config.output, BUNDLE, folder.path())?;
     let capture = load(&mut config, Some(&photographs_in(folder.path())))?;
     let path = folder.path().to_owned();
-    let code = train_and_print(args, folder, config, &capture, Start::Resumed, Machine::open(args)?)?;
+    let code = train_and_print(args, folder, config, &capture, Start::Resumed, Machine::open(args)?, &output)?;
     drop(capture);
     clear_photographs(&path, code);
     Ok(code)
@@ -69,8 +73,9 @@ fn resume(args: &Args, path: &Path) -> Result<ExitCode> {
 
 fn begin(args: &Args) -> Result<ExitCode> {
     let mut config = args.resolved()?;
-    output::check_writable(&config.output)?;
     let path = args.run_folder(args.named_paths(&config.dataset, &config.output).1)?;
+    let output = args.output(&source_of(&config), &config.output, BUNDLE, &path)?;
+    RunFolder::check(&path, args.overwrite())?;
     // Before the run's files are touched, all that may fail: it must not cost an earlier run its results.
     let capture = load(&mut config, Some(&photographs_in(&path)))?;
     let start = match args.fork() {
@@ -82,7 +87,7 @@ fn begin(args: &Args) -> Result<ExitCode> {
         }
         Some((run, iteration)) => {
             let trainer = fork(run, iteration, &capture, config.train)?;
-            eprintln!("going on after iteration {iteration} of {}", run.display());
+            say!("going on after iteration {iteration} of {}", run.display());
             Start::Forked(Box::new(trainer))
         }
         None => Start::New(Warned::default()),
@@ -93,7 +98,7 @@ fn begin(args: &Args) -> Result<ExitCode> {
         Start::Forked(trainer) => RunFolder::start_from(&path, &toml, overwrite, &**trainer)?,
         _ => RunFolder::start(&path, &toml, overwrite)?,
     };
-    let code = train_and_print(args, folder, config, &capture, start, machine)?;
+    let code = train_and_print(args, folder, config, &capture, start, machine, &output)?;
     drop(capture);
     clear_photographs(&path, code);
     Ok(code)
@@ -105,19 +110,19 @@ fn begin_or_go_on(args: &Args) -> Result<ExitCode> {
     if config.effects.auto {
         bail!("--continue needs effects that are decided; force them, as --effects +view-colour");
     }
-    output::check_writable(&config.output)?;
     let path = args.run_folder(args.named_paths(&config.dataset, &config.output).1)?;
+    let output = args.output(&source_of(&config), &config.output, BUNDLE, &path)?;
     let capture = load(&mut config, Some(&photographs_in(&path)))?;
     let code = match Standing::of(&path, &config)? {
         Standing::New(folder) => {
             let start = Start::New(Warned::default());
-            train_and_print(args, folder, config, &capture, start, Machine::open(args)?)?
+            train_and_print(args, folder, config, &capture, start, Machine::open(args)?, &output)?
         }
         Standing::Begun(folder) => {
-            train_and_print(args, folder, config, &capture, Start::Resumed, Machine::open(args)?)?
+            train_and_print(args, folder, config, &capture, Start::Resumed, Machine::open(args)?, &output)?
         }
         Standing::Finished => {
-            eprintln!("trained before");
+            say!("trained before");
             ExitCode::SUCCESS
         }
     };
@@ -143,16 +148,52 @@ impl Machine {
 fn train_and_print<'a>(
     args: &Args,
     folder: RunFolder,
-    mut config: RunConfig,
+    config: RunConfig,
     capture: &'a Capture,
     start: Start<'a>,
     Machine { device, port }: Machine,
+    output: &Output,
 ) -> Result<ExitCode> {
-    if let Some(port) = port {
-        let photograph = capture.test.first().or(capture.train.first()).map(View::photograph).transpose()?;
-        let image = photograph.as_ref().map(|photograph| &photograph.image);
-        port.serve(folder.path(), config.train.iterations, image)?;
+    let watched = match port {
+        Some(port) => {
+            let photograph = capture.test.first().or(capture.train.first()).map(View::photograph).transpose()?;
+            let image = photograph.as_ref().map(|photograph| &photograph.image);
+            Some(port.serve(folder.path(), &config.train, image)?)
+        }
+        None => None,
+    };
+    let ended = train_watched(args, folder, config, capture, start, device, output);
+    if let Some(watched) = watched {
+        watched.end(match &ended {
+            Ok(Ended::Finished { report }) => Ending::Finished { report: report.clone() },
+            Ok(Ended::Interrupted) => Ending::Stopped("it was interrupted".to_owned()),
+            Err(error) => Ending::Stopped(format!("{error:#}")),
+        });
     }
+    Ok(match ended? {
+        Ended::Finished { .. } => ExitCode::SUCCESS,
+        Ended::Interrupted => ExitCode::from(stop::INTERRUPTED),
+    })
+}
+
+/// How a run ended, if not by an error.
+enum Ended {
+    Finished {
+        /// The page about it, where there is one.
+        report: Option<PathBuf>,
+    },
+    Interrupted,
+}
+
+fn train_watched<'a>(
+    args: &Args,
+    folder: RunFolder,
+    mut config: RunConfig,
+    capture: &'a Capture,
+    start: Start<'a>,
+    device: Option<SharedDevice<f32>>,
+    output: &Output,
+) -> Result<Ended> {
     // Not before: until here nothing is lost that a second call would not make, and Ctrl-C may end the process at once.
     let stop = stop::flag()?;
     // Before the pilots: they may take hours too.
@@ -164,19 +205,23 @@ fn train_and_print<'a>(
         other => other,
     };
     if effects::resolve(&mut config, capture, &folder, &stop)? == Resolved::Interrupted {
-        return Ok(ExitCode::from(stop::INTERRUPTED));
+        return Ok(Ended::Interrupted);
     }
     let path = folder.path().to_owned();
-    let Some(result) = train_in(folder, &config, capture, start, device, &stop)? else {
-        return Ok(ExitCode::from(stop::INTERRUPTED));
+    let Some(result) = train_in(folder, &config, capture, start, device, &stop, output)? else {
+        return Ok(Ended::Interrupted);
     };
     let (dataset, bundle) = args.named_paths(&config.dataset, &config.output);
-    output::print_or(&result, args.json(), Summary::of(&result, bundle))?;
-    if args.writes_report() {
-        report::write_into(&path, &config, capture);
+    // A result that nobody gets costs the run no report.
+    let printed = output::print_or(&result, args.json(), Summary::of(&result, bundle));
+    // What went through a device or a FIFO cannot be read again.
+    if !output.is_file() {
+        return printed.map(|()| Ended::Finished { report: None });
     }
+    let report = if args.writes_report() { report::write_into(&path, &config, capture) } else { None };
+    let split = if capture.test.is_empty() { " --split train" } else { "" };
     let (bundle, dataset) = (shell_word(bundle), shell_word(dataset));
-    eprintln!("see it:       pocketsplat render {bundle} {dataset} --view 0 -o view.png");
-    eprintln!("on a device:  pocketsplat fit {bundle}");
-    Ok(ExitCode::SUCCESS)
+    say!("see it:       pocketsplat render {bundle} {dataset} --view 0{split} -o view.png");
+    say!("on a device:  pocketsplat fit {bundle}");
+    printed.map(|()| Ended::Finished { report })
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use bytesize::ByteSize;
 use pocketsplat_capture::dataset::{Background, FrameSize};
+use pocketsplat_files::{Content, Output};
 use pocketsplat_instructions::level::{Bound, Level};
 use pocketsplat_trainer::bundle::PRUNING_RATES;
 use pocketsplat_trainer::device::{Limits, ModelChoice, Processor, choose};
@@ -12,12 +13,16 @@ use pocketsplat_trainer::effects::Price;
 use pocketsplat_trainer::explicit::CloudConfig;
 use pocketsplat_trainer::step::SharedDevice;
 use pocketsplat_trainer::train::config::Backbone;
+use pocketsplat_trainer::train::run::is_file_of_run;
 
+use super::capture::CaptureArgs;
 use super::devices::DeviceChoice;
+use super::outputs::{OverwriteArgs, check_name, reading_capture};
 use super::settings::{QualityOptions, RunOptions, applied};
 use crate::config::heading::{DEVICE, OUTPUT, QUALITY, RUN};
 use crate::config::named::{TARGETS, level_number, one_of};
 use crate::config::{CaptureOptions, EXPLICIT, ExplicitRunConfig, Preset, RunConfig};
+use crate::say::say;
 
 /// Train a scene from a capture and write it as a bundle.
 ///
@@ -80,9 +85,8 @@ pub(crate) struct Args {
     #[arg(long = "device", value_name = "NAME", default_value = "cpu", hide_default_value = true, help_heading = RUN,
         hide_short_help = true)]
     trains_on: DeviceChoice,
-    /// Start anew where an unfinished run lies [default: refuse]
-    #[arg(short = 'w', long, conflicts_with = "resume", help_heading = RUN)]
-    overwrite: bool,
+    #[command(flatten)]
+    overwrite: OverwriteArgs,
     #[command(flatten)]
     options: RunOptions,
 }
@@ -154,10 +158,10 @@ impl DeviceArgs {
             quality.choose_width(&mut config.train, bytes)?;
             let width = config.train.shape.feature_dim;
             match config.train.modules.rdo {
-                Some(_) => eprintln!(
+                Some(_) => say!(
                     "to fill this size: features of width {width}; the number of anchors and lambda are found while it trains"
                 ),
-                None => eprintln!(
+                None => say!(
                     "warning: without rdo-pruning the scene is not trained to this size (features of width {width}); anchors \
                      that have no room are left out in the end"
                 ),
@@ -168,12 +172,17 @@ impl DeviceArgs {
         quality.choose(&mut config.train, &choice);
         config.train.hac.lambda = lambda.unwrap_or(choice.lambda);
         let ModelChoice { feature_dim, n_offsets, max_anchors, lambda, binding } = choice;
-        eprintln!(
+        say!(
             "for this device: features of width {feature_dim}, {n_offsets} offsets, about {max_anchors} anchors (limited by \
              {binding}), lambda {lambda} at first; options override these"
         );
         Ok(())
     }
+}
+
+fn is_same_folder(one: &Path, other: &Path) -> bool {
+    let absolute = |path: &Path| path.canonicalize().or_else(|_| std::path::absolute(path)).ok();
+    absolute(one) == absolute(other)
 }
 
 /// Refuses an option that allows more than the level does.
@@ -220,7 +229,21 @@ impl Args {
 
     /// Whether an unfinished run may be replaced.
     pub(crate) fn overwrite(&self) -> bool {
-        self.overwrite
+        self.overwrite.is_given()
+    }
+
+    /// Checks where a run writes in the end, and what its name says.
+    ///
+    /// * `content`: what is written. * `run`: the folder that it works in.
+    pub(crate) fn output(&self, capture: &CaptureArgs, output: &Path, content: Content, run: &Path) -> Result<Output> {
+        check_name(self.named_paths(&capture.dataset, output).1, content, None)?;
+        let is_in_run = |folder: &Path| is_same_folder(folder, run);
+        if output.parent().is_some_and(is_in_run) && output.file_name().is_some_and(is_file_of_run) {
+            bail!("{} is a file of the run itself; choose another --output or --run", output.display());
+        }
+        let files = self.config.iter().fold(self.overwrite.outputs(), |outputs, path| outputs.reading(path));
+        let outputs = self.from.iter().fold(files, |outputs, run| outputs.reading_folder(run));
+        Ok(reading_capture(outputs, capture, output).file(output, content)?)
     }
 
     /// Whether the result is printed as JSON.
@@ -276,7 +299,7 @@ impl Args {
         check_lambda(self.lambda, config.train.backbone)?;
         config.check()?;
         if config.train.backbone == Backbone::ContextGs && config.encoding.tiers != PRUNING_RATES {
-            eprintln!(
+            say!(
                 "warning: contextgs is trained for the default --tiers; with these its anchors follow other anchors in the bundle \
                  than in training"
             );

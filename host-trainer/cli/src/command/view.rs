@@ -5,10 +5,12 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
-use pocketsplat_viewer::{SceneFile, package, page};
+use pocketsplat_files::{Output, Outputs};
+use pocketsplat_viewer::{SceneFile, package};
 
 use super::bundle::BundleFile;
 use super::output;
+use super::outputs::{ANYTHING, OverwriteArgs, PAGE, check_name};
 
 /// Write one page that draws bundles in a browser, with nothing to install and nothing fetched.
 ///
@@ -28,6 +30,8 @@ pub(crate) struct Args {
     /// Also write a folder for web developers: the decoder as WebAssembly, its JavaScript, types, an example that draws the first bundle.
     #[arg(long, value_name = "DIR")]
     package: Option<PathBuf>,
+    #[command(flatten)]
+    overwrite: OverwriteArgs,
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
@@ -35,34 +39,33 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     for file in &files {
         file.parse()?;
     }
-    if let Some(path) = &args.output {
-        check_page(path)?;
-    }
+    let mut outputs = args.bundles.iter().fold(args.overwrite.outputs(), |outputs, path| outputs.reading(path));
+    let page = args.output.as_deref().map(|path| checked_page(path, &files, &mut outputs)).transpose()?;
     if let (Some(folder), Some(first)) = (&args.package, files.first()) {
-        write_package(folder, &first.bytes)?;
+        write_package(folder, &first.bytes, &mut outputs, args.overwrite)?;
     }
-    let Some(path) = &args.output else { return Ok(()) };
-    write_page(path, &files)?;
-    if args.open { open(path) } else { Ok(()) }
+    let Some(page) = page else { return Ok(()) };
+    write_page(&page, &files)?;
+    if args.open { open(page.path()) } else { Ok(()) }
 }
 
 /// Fails, before anything is written, where `path` can be no page.
-fn check_page(path: &Path) -> Result<()> {
+fn checked_page(path: &Path, files: &[BundleFile], outputs: &mut Outputs) -> Result<Output> {
+    check_name(path, PAGE, files.first().map(|file| file.path.as_path()))?;
     let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
     if extension != "html" && extension != "htm" {
         bail!("{}: a page is written as .html; end the name in it", path.display());
     }
-    output::check_writable(path)
+    Ok(outputs.file(path, PAGE)?)
 }
 
-fn write_page(path: &Path, files: &[BundleFile]) -> Result<()> {
+fn write_page(page: &Output, files: &[BundleFile]) -> Result<()> {
     let names = names(&files.iter().map(|file| file.path.as_path()).collect::<Vec<_>>());
     let scenes: Vec<SceneFile<'_>> =
         names.iter().zip(files).map(|(name, file)| SceneFile { name, bytes: &file.bytes }).collect();
-    let text = page(&names.join(" | "), &scenes);
-    output::write_whole(path, text.as_bytes())?;
-    println!("{}: {:.2} MB; open it in a browser", path.display(), text.len() as f64 / 1e6);
-    Ok(())
+    let text = pocketsplat_viewer::page(&names.join(" | "), &scenes);
+    page.write(text.as_bytes())?;
+    output::print_text(&format!("{}: {:.2} MB; open it in a browser\n", page.path().display(), text.len() as f64 / 1e6))
 }
 
 /// What the page calls the files: their names without extension, with a number where another has the same.
@@ -75,20 +78,24 @@ fn names(paths: &[&Path]) -> Vec<String> {
     paths.iter().enumerate().map(name).collect()
 }
 
-fn write_package(folder: &Path, bundle: &[u8]) -> Result<()> {
-    fs::create_dir_all(folder).with_context(|| format!("could not make the folder {}", folder.display()))?;
+fn write_package(folder: &Path, bundle: &[u8], outputs: &mut Outputs, overwrite: OverwriteArgs) -> Result<()> {
+    Outputs::folder(folder)?;
     let files = package().into_iter().map(|file| (file.name, file.bytes)).chain([("scene.psb", bundle)]);
     let files: Vec<(PathBuf, &[u8])> = files.map(|(name, bytes)| (folder.join(name), bytes)).collect();
     // A package that was written before is replaced, but nothing of somebody else's.
-    let is_package = folder.join("pocketsplat.wasm").is_file();
+    let is_package = folder.join("pocketsplat.wasm").is_file() || overwrite.is_given();
     if let Some((path, _)) = files.iter().find(|(path, _)| path.exists() && !is_package) {
-        bail!("{} exists already, in a folder that is no package; choose another --package", path.display());
+        bail!(
+            "{} exists already, in a folder that is no package; choose another --package, or replace it with --overwrite",
+            path.display()
+        );
     }
-    for (path, bytes) in &files {
-        output::write_whole(path, bytes)?;
+    // Of what kind the files were is known: the folder is a package.
+    let checked = files.iter().map(|(path, bytes)| Ok((outputs.file(path, ANYTHING)?, *bytes)));
+    for (output, bytes) in checked.collect::<Result<Vec<_>>>()? {
+        output.write(bytes)?;
     }
-    println!("{}: {} files; README.md says how to use them", folder.display(), files.len());
-    Ok(())
+    output::print_text(&format!("{}: {} files; README.md says how to use them\n", folder.display(), files.len()))
 }
 
 /// Hands the page to the desktop.

@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result};
 use pocketsplat_capture::dataset::{Capture, Split};
-use pocketsplat_files::shell_word;
+use pocketsplat_files::{Content, Outputs, shell_word};
 use pocketsplat_trainer::train::TrainConfig;
 use serde::{Deserialize, Serialize};
 
@@ -13,7 +13,6 @@ use super::capture::views_of;
 use super::devices::DeviceChoice;
 use super::estimate::{Estimate, Expected, duration};
 use super::loaded::LoadedCapture;
-use super::output;
 use super::point::has_trained_tiers;
 use crate::config::RunConfig;
 
@@ -21,7 +20,11 @@ use crate::config::RunConfig;
 const SNAKEFILE: &str = include_str!("workflow/Snakefile");
 const PROFILE: &str = include_str!("workflow/profile.yaml");
 /// The file of a plan, in the folder of its runs.
-const PLAN: &str = "runs.json";
+const PLAN: (&str, Content) = ("runs.json", Content::Text(&["{\n  \"program\""], "a plan of runs"));
+const CONFIGURATION: Content = Content::Text(&["dataset = "], "a configuration of a run");
+const OPTIONS: Content = Content::Text(&["\n", "--"], "a list of options");
+const RULES: Content =
+    Content::Text(&["# Written by pocketsplat", "# What `snakemake` in this folder takes"], "a file of the workflow");
 
 /// Minutes that a queue gives a run above its estimate, which is off by as much: a run that is stopped goes on.
 const MINUTES_MARGIN: f64 = 2.0;
@@ -148,23 +151,37 @@ impl Planner {
     /// nothing is done again.
     ///
     /// * `merge`: arguments of the command that merges the runs. * `files`: those it writes.
-    pub(super) fn write(self, folder: &Path, merge: Vec<String>, files: &[&str]) -> Result<String> {
+    pub(super) fn write(
+        self,
+        folder: &Path,
+        merge: Vec<String>,
+        files: &[(&str, Content)],
+        outputs: &Outputs,
+    ) -> Result<String> {
+        let mut outputs = outputs.clone();
+        let mut write_changed = |path: &Path, content: Content, text: &str| -> Result<()> {
+            let output = outputs.file(path, content)?;
+            if std::fs::read_to_string(path).is_ok_and(|found| found == text) {
+                return Ok(());
+            }
+            Ok(output.write(text.as_bytes())?)
+        };
         for (run, config) in self.runs.iter().zip(&self.configs) {
-            write_changed(&folder.join(format!("{}.toml", run.name)), &config.to_toml()?)?;
+            write_changed(&folder.join(format!("{}.toml", run.name)), CONFIGURATION, &config.to_toml()?)?;
             // Snakemake measures anew where it changes.
-            write_changed(&folder.join(format!("{}.measure", run.name)), &(run.measure.join("\n") + "\n"))?;
+            write_changed(&folder.join(format!("{}.measure", run.name)), OPTIONS, &(run.measure.join("\n") + "\n"))?;
         }
         let said = said(&self.runs, folder);
         let merge = Merge {
             folder: std::env::current_dir().context("this folder has no path")?,
             arguments: merge,
-            files: files.iter().map(|file| (*file).to_owned()).collect(),
+            files: files.iter().map(|(file, _)| (*file).to_owned()).collect(),
         };
         let program = std::env::current_exe().context("this program has no path")?;
         let plan = serde_json::to_string_pretty(&Plan { program, runs: self.runs, merge })? + "\n";
-        write_changed(&folder.join(PLAN), &plan)?;
-        write_changed(&folder.join("Snakefile"), SNAKEFILE)?;
-        write_changed(&folder.join("profiles/default/config.yaml"), PROFILE)?;
+        write_changed(&folder.join(PLAN.0), PLAN.1, &plan)?;
+        write_changed(&folder.join("Snakefile"), RULES, SNAKEFILE)?;
+        write_changed(&folder.join("profiles/default/config.yaml"), RULES, PROFILE)?;
         Ok(said)
     }
 }
@@ -184,17 +201,9 @@ fn said(runs: &[PlannedRun], folder: &Path) -> String {
 impl Plan {
     /// Reads the plan in a folder.
     pub(super) fn read(folder: &Path) -> Result<Self> {
-        let path = folder.join(PLAN);
+        let path = folder.join(PLAN.0);
         let text = std::fs::read(&path)
             .with_context(|| format!("could not read {}: is it a folder that `plan-runs` wrote?", path.display()))?;
         serde_json::from_slice(&text).with_context(|| format!("{} is not a plan of runs", path.display()))
     }
-}
-
-fn write_changed(path: &Path, text: &str) -> Result<()> {
-    if std::fs::read_to_string(path).is_ok_and(|found| found == text) {
-        return Ok(());
-    }
-    output::check_writable(path)?;
-    output::write_whole(path, text.as_bytes())
 }

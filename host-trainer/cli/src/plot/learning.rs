@@ -111,6 +111,7 @@ mod tests {
             iteration,
             psnr_db,
             anchors: 10,
+            seconds: None,
             feature_bits: bits,
             log_scale_bits: bits,
             offset_bits: bits,

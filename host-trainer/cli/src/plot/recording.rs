@@ -20,6 +20,9 @@ pub(crate) struct LearningRow {
     pub psnr_db: Option<f64>,
     /// Anchors now.
     pub anchors: u64,
+    /// Seconds spent in iterations.
+    #[serde(default)]
+    pub seconds: Option<f64>,
     /// Mean bits of an anchor's features since the row before, where the run has a rate.
     #[serde(default)]
     pub feature_bits: Option<f64>,
@@ -286,7 +289,7 @@ mod tests {
     fn columns_are_told_by_name() {
         let text = "iteration,weather,psnr_db,anchors\n3,7.5,10.5,54381\n6,,,54400\n";
         let row = |iteration, psnr_db, anchors, [feature_bits, log_scale_bits, offset_bits]: [Option<f64>; 3]| {
-            LearningRow { iteration, psnr_db, anchors, feature_bits, log_scale_bits, offset_bits }
+            LearningRow { iteration, psnr_db, anchors, seconds: None, feature_bits, log_scale_bits, offset_bits }
         };
         let rows = vec![row(3, Some(10.5), 54_381, [None; 3]), row(6, None, 54_400, [None; 3])];
         assert_eq!(read(text).unwrap(), Recording::Learning(rows));

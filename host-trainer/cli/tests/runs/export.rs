@@ -35,7 +35,7 @@ fn every_format_holds_what_was_measured() {
         let (gaussians, notes) = Format::read(&output).unwrap();
         assert_eq!((gaussians.len() as u64, gaussians.degree), (said["n_gaussians"].as_u64().unwrap(), Degree::One));
         if format == Format::Ply {
-            let says_loss = |comment: &String| comment.starts_with("Exported from a.psb: ");
+            let says_loss = |comment: &String| comment.starts_with("Exported by pocketsplat from a.psb: ");
             assert!(notes.comments.iter().any(says_loss), "{:?}", notes.comments);
             // The file says how its photographs were prepared.
             let again = measured(pocketsplat().args(["eval", "--json"]).arg(&output).arg(capture()));

@@ -69,9 +69,20 @@ pub(crate) fn signal(child: &Child, name: &str) {
     assert!(sent.success());
 }
 
+/// Whether this process ignores a signal, and so what it starts: Ctrl-C in the background of a script.
+pub(crate) fn is_ignored(number: u32) -> bool {
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_some_and(|mask| mask >> (number - 1) & 1 == 1)
+}
+
 #[test]
 fn ctrl_c_writes_a_checkpoint_and_says_how_to_go_on() {
-    for name in ["INT", "TERM"] {
+    for (name, number) in [("INT", 2), ("TERM", 15)] {
+        if is_ignored(number) {
+            eprintln!("skipped: SIG{name} is ignored here");
+            continue;
+        }
         let home = folder(name);
         let (output, run) = (home.join("a.psb"), home.join("a.run"));
         let mut child = starts(&mut train_with(&output, VOXEL_SIZE, 0));

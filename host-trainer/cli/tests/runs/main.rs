@@ -1,5 +1,6 @@
 //! `pocketsplat train` through interruptions, full disks and accidents, as a user has them: with the program itself.
 #![cfg(unix)]
+#![expect(clippy::disallowed_macros, reason = "tests say what they skip")]
 
 mod accidents;
 #[path = "../../../../viewer/tests/chromium/mod.rs"]
@@ -13,9 +14,12 @@ mod fixture;
 mod gpu;
 mod interruption;
 mod modules;
+mod outputs;
 mod plan;
 mod preview;
+mod remedies;
 mod report;
 mod sweep;
+mod terminal;
 mod view;
 mod watch;

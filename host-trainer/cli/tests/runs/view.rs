@@ -48,7 +48,7 @@ fn what_is_no_bundle_or_no_page_is_refused_and_nothing_is_written() {
     assert!(message.contains("a.psb") && message.contains("the first 8 bytes differ"), "{message}");
     let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/golden/static.psb");
     let message = refused(&golden, &bundle);
-    assert!(message.contains(".html"), "{message}");
+    assert!(message.contains("end the name in .html"), "{message}");
     assert_eq!(fs::read(&bundle).unwrap(), b"solid cube", "a bundle given as the page is not written over");
     assert_eq!(fs::read_dir(&folder).unwrap().count(), 1, "no page");
 }

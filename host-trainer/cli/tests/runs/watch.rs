@@ -4,7 +4,7 @@ use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::TcpStream;
 use std::process::Stdio;
 
-use crate::fixture::{capture, folder, pocketsplat};
+use crate::fixture::{capture, folder, pocketsplat, train};
 
 /// The answer to one request: status line and headers, content.
 fn ask(port: u16, request: &str) -> (String, Vec<u8>) {
@@ -58,4 +58,28 @@ fn a_run_is_watched_from_this_machine_and_no_other() {
     }
     child.kill().unwrap();
     child.wait().unwrap();
+}
+
+#[test]
+fn the_page_of_a_run_says_that_it_is_finished_and_where_its_report_is() {
+    let output = folder("watch-end").join("a.psb");
+    let mut command = train(&output);
+    let mut child = command.arg("--watch").stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
+    let line = lines.find(|line| line.as_ref().is_ok_and(|line| line.starts_with("watch it at"))).unwrap().unwrap();
+    let port: u16 = line.split(':').next_back().unwrap().trim_end_matches('/').parse().unwrap();
+    std::thread::spawn(move || lines.for_each(drop));
+    let request = format!("GET /state HTTP/1.1\r\nHost: 127.0.0.1:{port}");
+    let mut states = Vec::new();
+    while child.try_wait().unwrap().is_none()
+        && !states.last().is_some_and(|state: &String| state.contains("data-state"))
+    {
+        states.push(String::from_utf8(ask(port, &request).1).unwrap());
+        std::thread::sleep(std::time::Duration::from_millis(100));
+    }
+    let last = states.last().unwrap();
+    let report = output.with_extension("run").join("report.html");
+    assert!(last.contains("state: finished") && last.contains(&report.display().to_string()), "{last}");
+    assert!(states.iter().any(|state| state.contains(" it/s · ") && state.contains("a bundle of about")), "{states:?}");
+    assert!(child.wait().unwrap().success() && report.is_file());
 }

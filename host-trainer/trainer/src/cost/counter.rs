@@ -79,7 +79,8 @@ impl Counter {
         scratch_len: usize,
     ) -> Result<Stages, CountError> {
         let views = self.folder.join("views.txt");
-        std::fs::write(&views, lines(cameras)).map_err(|source| CountError::Io { path: views.clone(), source })?;
+        pocketsplat_files::write_whole(&views, |out| out.write_all(lines(cameras).as_bytes()))
+            .map_err(|source| CountError::Io { path: views.clone(), source })?;
         let [width, height] =
             [|c: &Camera| c.width_px, |c: &Camera| c.height_px].map(|side| cameras.iter().map(side).max().unwrap_or(1));
         let board = board(target);

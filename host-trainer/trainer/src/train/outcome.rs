@@ -22,6 +22,9 @@ pub trait Observer {
 
     /// When anchors were left out so that the bundle fits.
     fn fitted(&mut self, _fit: &Fit) {}
+
+    /// When a picture for people could not be written; the run goes on.
+    fn unwritten(&mut self, _why: &dyn std::error::Error) {}
 }
 
 /// What an iteration gives back.

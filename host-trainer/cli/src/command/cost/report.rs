@@ -3,11 +3,13 @@
 use std::path::Path;
 
 use crate::plot::{CostPanel, CostPoint, cost_svg};
-use anyhow::{Context, Result};
+use anyhow::Result;
 use pocketsplat_core::Stage;
+use pocketsplat_files::{Content, Output, Outputs};
 use pocketsplat_trainer::cost::{Measured, on_front};
 
 use super::super::output;
+use super::super::outputs::{FIGURE, table};
 use super::machine::Machine;
 
 /// What was measured.
@@ -21,6 +23,28 @@ pub(super) struct Report<'a> {
     pub(super) n_counted: usize,
 }
 
+/// How the page begins.
+const TITLE: &str = "# What accuracy costs in time";
+
+/// cost.csv, cost.svg and cost.md.
+pub(super) struct ReportFiles {
+    table: Output,
+    figure: Output,
+    page: Output,
+}
+
+impl ReportFiles {
+    /// Those in `folder`, which is made where there is none.
+    pub(super) fn checked(folder: &Path, outputs: &mut Outputs) -> Result<Self> {
+        Outputs::folder(folder)?;
+        Ok(Self {
+            table: outputs.file(&folder.join("cost.csv"), table(&["knob,"]))?,
+            figure: outputs.file(&folder.join("cost.svg"), FIGURE)?,
+            page: outputs.file(&folder.join("cost.md"), Content::Text(&[TITLE], "a table (.md)"))?,
+        })
+    }
+}
+
 /// A machine, the place of its instructions, and which settings nothing beats there.
 struct Column {
     machine: Machine,
@@ -29,14 +53,13 @@ struct Column {
 }
 
 impl Report<'_> {
-    /// Writes cost.csv, cost.svg and cost.md into `folder`, and prints the page.
-    pub(super) fn write(&self, folder: &Path) -> Result<()> {
+    /// Writes them, and prints the page.
+    pub(super) fn write(&self, files: &ReportFiles) -> Result<()> {
         let columns = self.columns();
-        std::fs::create_dir_all(folder).with_context(|| format!("could not make {}", folder.display()))?;
-        output::write_whole(&folder.join("cost.csv"), &self.table(&columns)?)?;
-        output::write_whole(&folder.join("cost.svg"), self.figure(&columns)?.as_bytes())?;
+        files.table.write(&self.table(&columns)?)?;
+        files.figure.write(self.figure(&columns)?.as_bytes())?;
         let page = self.page(&columns);
-        output::write_whole(&folder.join("cost.md"), page.as_bytes())?;
+        files.page.write(page.as_bytes())?;
         output::print_text(&page)
     }
 
@@ -125,7 +148,7 @@ impl Report<'_> {
     fn page(&self, columns: &[Column]) -> String {
         let exact = &self.measured[0];
         let mut text = format!(
-            "# What accuracy costs in time: {}\n\nMeans over {} views; instructions of a frame in millions, means over {} of them, \
+            "{TITLE}: {}\n\nMeans over {} views; instructions of a frame in millions, means over {} of them, \
              counted on an emulated board or, after ≈, predicted; host: milliseconds of a frame on this machine, one thread. PSNR to \
              the f64 reference is the worst view's, the largest difference of a channel of all views is in 255ths.\n\n\
              | knob | setting | PSNR, dB | to the reference, dB | worst | scratch |",

@@ -10,7 +10,9 @@ use pocketsplat_trainer::effects::{Effect, PilotFigures, PilotLog};
 use serde::{Deserialize, Serialize};
 
 use super::super::output;
+use super::super::outputs::keep;
 use super::super::progress::bar_of;
+use crate::say::say;
 
 /// Pilots that there are in any case: two without effects, one with each.
 const LEAST_PILOTS: usize = 2 + Effect::MEASURED.len();
@@ -90,7 +92,7 @@ impl PilotLog for PilotsFile {
                 let each_s = started.elapsed().as_secs_f64() / (n_done - first) as f64;
                 format!(", {:.0} s left", each_s * (n_pilots - n_done) as f64)
             });
-            eprintln!("effects: pilot {} with {names}{}", n_done + 1, left.unwrap_or_default());
+            say!("effects: pilot {} with {names}{}", n_done + 1, left.unwrap_or_default());
         }
     }
 
@@ -102,7 +104,7 @@ impl PilotLog for PilotsFile {
         let PilotFigures { psnr_db, instructions, bytes } = *worth;
         self.done.push(Done { effects: Effect::names(effects), seed, psnr_db, instructions, bytes });
         let table = output::csv(self.done.iter().cloned()).map_err(io::Error::other)?;
-        output::write_whole(&self.path, &table).map_err(io::Error::other)
+        keep(&self.path, &table).map_err(io::Error::other)
     }
 }
 

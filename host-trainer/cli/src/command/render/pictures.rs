@@ -6,8 +6,9 @@ use anyhow::{Context, Result, bail};
 use image::codecs::gif::{GifEncoder, Repeat};
 use image::{Delay, Frame, RgbImage};
 use pocketsplat_capture::dataset::Image;
+use pocketsplat_files::{Output, Outputs};
 
-use super::super::output;
+use super::super::outputs::{GIF, JPEG, PNG, command_that_makes, marked_jpeg, marked_png};
 
 /// Pictures of an animation a second.
 const FRAMES_PER_S: u16 = 15;
@@ -30,17 +31,22 @@ pub(super) enum Format {
 }
 
 impl Format {
-    pub(super) fn of(path: &Path) -> Result<Self> {
+    /// * `source`: what is drawn.
+    pub(super) fn of(path: &Path, source: &Path) -> Result<Self> {
         let Some(extension) = path.extension() else { return Ok(Self::Folder) };
         match extension.to_string_lossy().to_ascii_lowercase().as_str() {
             "png" => Ok(Self::Png),
             "jpg" | "jpeg" => Ok(Self::Jpeg),
             "gif" => Ok(Self::Gif),
             "apng" => Ok(Self::Apng),
-            _ => bail!(
-                "{}: a picture is a .png or .jpg, several are a .gif, an .apng or a folder (a name without a dot)",
-                path.display()
-            ),
+            _ => {
+                let command = command_that_makes(path, source);
+                let command = command.map_or_else(String::new, |command| format!("; `{command}` makes such a file"));
+                bail!(
+                    "{}: a picture is a .png or .jpg, several are a .gif, an .apng or a folder (a name without a dot){command}",
+                    path.display()
+                )
+            }
         }
     }
 
@@ -61,33 +67,63 @@ impl Format {
     }
 }
 
-/// Writes all pictures to `path`, on one sheet with `as_sheet`; the format must [take them](Format::check). Returns the files written.
-pub(super) fn write(pictures: &[Image], format: Format, as_sheet: bool, path: &Path) -> Result<Vec<PathBuf>> {
-    if as_sheet {
-        return write(&[contact_sheet(pictures)], format, false, path);
-    }
-    let one = || pictures.first().context("there is no view to draw");
-    let named = || format!("could not write {}", path.display());
-    let bytes = match format {
-        Format::Png => one()?.to_png().with_context(named)?,
-        Format::Jpeg => one()?.to_jpeg().with_context(named)?,
-        Format::Gif => gif(pictures).with_context(named)?,
-        Format::Apng => apng(pictures).with_context(named)?,
-        Format::Folder => return write_numbered(pictures, path),
-    };
-    output::write_whole(path, &bytes)?;
-    Ok(vec![path.to_owned()])
+/// Where pictures go: a file, or numbered ones in a folder.
+pub(super) enum Target {
+    File(Output, Format),
+    /// Which of them there will be is known when they are drawn.
+    Folder(PathBuf, Outputs),
 }
 
-fn write_numbered(pictures: &[Image], folder: &Path) -> Result<Vec<PathBuf>> {
-    std::fs::create_dir_all(folder).with_context(|| format!("could not make the folder {}", folder.display()))?;
-    let write = |(i, picture): (usize, &Image)| {
-        let path = folder.join(format!("{i:04}.png"));
-        let bytes = picture.to_png().with_context(|| format!("could not write {}", path.display()))?;
-        output::write_whole(&path, &bytes)?;
-        Ok(path)
-    };
-    pictures.iter().enumerate().map(write).collect()
+impl Target {
+    /// Checks that pictures can be written to `path`.
+    pub(super) fn checked(path: &Path, format: Format, outputs: &mut Outputs) -> Result<Self> {
+        let content = match format {
+            Format::Png | Format::Apng => PNG,
+            Format::Jpeg => JPEG,
+            Format::Gif => GIF,
+            Format::Folder => {
+                Outputs::folder(path)?;
+                // At once where somebody's pictures are numbered alike.
+                outputs.clone().file(&numbered(path, 0), PNG)?;
+                return Ok(Self::Folder(path.to_owned(), outputs.clone()));
+            }
+        };
+        Ok(Self::File(outputs.file(path, content)?, format))
+    }
+
+    /// Writes all pictures, on one sheet with `as_sheet`; the format must [take them](Format::check).
+    pub(super) fn write(self, pictures: &[Image], as_sheet: bool) -> Result<()> {
+        if as_sheet {
+            return self.write(&[contact_sheet(pictures)], false);
+        }
+        let (output, format) = match self {
+            Self::File(output, format) => (output, format),
+            Self::Folder(folder, outputs) => return write_numbered(pictures, &folder, outputs),
+        };
+        let one = || pictures.first().context("there is no view to draw");
+        let bytes = match format {
+            Format::Png => one()?.to_png().map(|png| marked_png(&png)).map_err(anyhow::Error::from),
+            Format::Jpeg => one()?.to_jpeg().map(|jpeg| marked_jpeg(&jpeg)).map_err(anyhow::Error::from),
+            Format::Gif => gif(pictures),
+            Format::Apng | Format::Folder => apng(pictures).map(|png| marked_png(&png)),
+        };
+        Ok(output.write(&bytes.with_context(|| format!("could not write {}", output.path().display()))?)?)
+    }
+}
+
+fn numbered(folder: &Path, i: usize) -> PathBuf {
+    folder.join(format!("{i:04}.png"))
+}
+
+/// All are checked before the first is written.
+fn write_numbered(pictures: &[Image], folder: &Path, mut outputs: Outputs) -> Result<()> {
+    let checked = (0..pictures.len()).map(|i| outputs.file(&numbered(folder, i), PNG));
+    let checked = checked.collect::<Result<Vec<_>, _>>()?;
+    for (output, picture) in checked.iter().zip(pictures) {
+        let png = picture.to_png().with_context(|| format!("could not write {}", output.path().display()))?;
+        output.write(&marked_png(&png))?;
+    }
+    Ok(())
 }
 
 /// Fails where they are not all of one size, which an animation asks for.
@@ -198,15 +234,16 @@ mod tests {
 
     #[test]
     fn the_name_of_the_file_decides_the_format() {
-        let of = |name: &str| Format::of(Path::new(name)).ok();
+        let of = |name: &str| Format::of(Path::new(name), Path::new("a.psb")).ok();
         assert_eq!(of("a.PNG"), Some(Format::Png));
         assert_eq!(
             (of("a.jpeg"), of("a.gif"), of("a.apng")),
             (Some(Format::Jpeg), Some(Format::Gif), Some(Format::Apng))
         );
         assert_eq!((of("frames"), of("a.bmp")), (Some(Format::Folder), None));
-        let fits =
-            |name: &str, n, as_sheet| Format::of(Path::new(name)).unwrap().check(n, as_sheet, Path::new(name)).is_ok();
+        let fits = |name: &str, n, as_sheet| {
+            Format::of(Path::new(name), Path::new("a.psb")).unwrap().check(n, as_sheet, Path::new(name)).is_ok()
+        };
         assert_eq!([1, 2].map(|n| fits("a.png", n, false)), [true, false]);
         assert_eq!([1, 2].map(|n| fits("a.gif", n, false)), [false, true]);
         assert_eq!(["a.jpg", "a.gif", "frames"].map(|name| fits(name, 9, true)), [true, false, false]);

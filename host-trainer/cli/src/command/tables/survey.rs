@@ -3,12 +3,14 @@
 use std::path::Path;
 
 use anyhow::Result;
+use pocketsplat_files::Outputs;
 use serde::Serialize;
 
 use super::curves::{Curve, Group, SceneCurves, mean, row};
 use super::finished::rounded;
 use super::published::{self, PublishedRow};
 use crate::command::output;
+use crate::command::outputs::{FIGURE, table};
 use crate::plot::{Named, ResultRow, SizeAxis, rate_distortion_svg};
 
 /// One line: a method at one rate.
@@ -38,28 +40,32 @@ struct SurveyLine<'a> {
 /// Writes the tables and figures of a group: GROUP.csv, means over the scenes where every scene is measured, and GROUP/SCENE.csv.
 ///
 /// Published results in its figures are of the field's usual sizes, whatever ours are.
-pub(super) fn write(folder: &Path, group: &Group<'_>, published: &[PublishedRow]) -> Result<()> {
+pub(super) fn write(folder: &Path, group: &Group<'_>, published: &[PublishedRow], outputs: &mut Outputs) -> Result<()> {
     let within = folder.join(group.name());
     for scene in &group.scenes {
         let lines: Vec<SurveyLine<'_>> = scene.methods.iter().flat_map(of_scene).collect();
         let mut named: Vec<Named<Vec<ResultRow>>> = scene.methods.iter().map(of_seeds).collect();
         named.extend(published::curves(published, group.dataset, scene.name));
-        write_both(&within.join(format!("{}.csv", scene.name)), &lines, &named)?;
+        write_both(&within.join(format!("{}.csv", scene.name)), &lines, &named, outputs)?;
     }
     let methods = group.methods();
     let lines: Vec<SurveyLine<'_>> = methods.iter().flat_map(|method| of_dataset(group, method)).collect();
     let mut named: Vec<Named<Vec<ResultRow>>> =
         methods.iter().map(|method| Named { name: (*method).to_owned(), what: means(group, method) }).collect();
     named.extend(published::curves(published, group.dataset, ""));
-    write_both(&folder.join(format!("{}.csv", group.name())), &lines, &named)
+    write_both(&folder.join(format!("{}.csv", group.name())), &lines, &named, outputs)
 }
 
 /// Writes a table and its figure beside it.
-fn write_both(path: &Path, lines: &[SurveyLine<'_>], curves: &[Named<Vec<ResultRow>>]) -> Result<()> {
-    output::check_writable(path)?;
-    output::write_whole(path, &output::csv(lines)?)?;
+fn write_both(
+    path: &Path,
+    lines: &[SurveyLine<'_>],
+    curves: &[Named<Vec<ResultRow>>],
+    outputs: &mut Outputs,
+) -> Result<()> {
+    outputs.file(path, table(&["Method,"]))?.write(&output::csv(lines)?)?;
     let figure = rate_distortion_svg(curves, SizeAxis::Logarithmic)?;
-    output::write_whole(&path.with_extension("svg"), figure.as_bytes())
+    Ok(outputs.file(&path.with_extension("svg"), FIGURE)?.write(figure.as_bytes())?)
 }
 
 impl<'a> SurveyLine<'a> {

@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
+use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::{Background, Capture, Split};
-use pocketsplat_files::shell_word;
+use pocketsplat_files::{Output, shell_word};
 use pocketsplat_gaussians::Format;
 use pocketsplat_trainer::device::Limits;
 use pocketsplat_trainer::explicit::CloudTrainer;
@@ -17,15 +18,18 @@ use super::super::capture::CaptureArgs;
 use super::super::eval::explicit::measure;
 use super::super::eval::{Evaluation, Measurements};
 use super::super::gaussians::GaussiansFile;
+use super::super::output::{json, print_or};
+use super::super::outputs::gaussians;
 use super::super::process::peak_memory_bytes;
 use super::super::progress::Progress;
+use super::super::stop;
 use super::super::train_args::Args;
-use super::super::{output, stop};
 use super::in_folder::{CHECKPOINT_SECONDS, IN_RUN_AND_ON_COMMAND_LINE};
 use super::loading::{check_size, clear_photographs};
 use super::result::HeldOut;
 use super::summary::Summary;
 use crate::config::{EXPLICIT, ExplicitRunConfig, Protocol};
+use crate::say::say;
 
 /// What a finished run reports.
 #[derive(Debug, Serialize)]
@@ -71,14 +75,15 @@ impl ExplicitResult {
 
 pub(super) fn begin(args: &Args) -> Result<ExitCode> {
     let config = args.explicit()?;
-    format_of(&config)?;
-    output::check_writable(&config.output)?;
+    let format = format_of(&config)?;
     let path = args.run_folder(args.named_paths(&config.dataset, &config.output).1)?;
+    let output = args.output(&source_of(&config), &config.output, gaussians(format), &path)?;
+    RunFolder::check(&path, args.overwrite())?;
     // Before the run's files are touched: a capture that does not load must not cost an earlier run its results.
     let capture = load(&config, &path)?;
     let folder = RunFolder::start(&path, &config.to_toml()?, args.overwrite())?;
     let trainer = CloudTrainer::new(&capture, config.gaussians)?;
-    let code = train(args, folder, &config, &capture, trainer)?;
+    let code = train(args, folder, &config, &capture, trainer, &output)?;
     drop(capture);
     clear_photographs(&path, code);
     Ok(code)
@@ -91,35 +96,34 @@ pub(super) fn resume(args: &Args, folder: RunFolder) -> Result<ExitCode> {
     if let Some(difference) = begun.difference(&config, IN_RUN_AND_ON_COMMAND_LINE)? {
         bail!("the run began with another setting than the command line asks for: {difference}; leave it out");
     }
-    format_of(&config)?;
-    output::check_writable(&config.output)?;
     let path = folder.path().to_owned();
+    let output = args.output(&source_of(&config), &config.output, gaussians(format_of(&config)?), &path)?;
     let capture = load(&config, &path)?;
     let trainer = match folder.newest(|bytes| CloudTrainer::restore(&capture, bytes))? {
         None => {
-            eprintln!("the run in {} has no checkpoint yet; it begins anew", folder.path().display());
+            say!("the run in {} has no checkpoint yet; it begins anew", folder.path().display());
             CloudTrainer::new(&capture, config.gaussians)?
         }
         Some(newest) => {
             for fault in &newest.passed_over {
-                eprintln!("warning: a checkpoint is damaged, so the run goes on from an older one: {fault}");
+                say!("warning: a checkpoint is damaged, so the run goes on from an older one: {fault}");
             }
             let (trainer, then) = (newest.restored.trainer, newest.restored.written_by);
             if *trainer.config() != config.gaussians {
                 bail!("config.toml and the checkpoint disagree; write back what the run began with");
             }
             if then != trainer.kernels() {
-                eprintln!(
+                say!(
                     "warning: the checkpoint was computed with {then}; this is {}. The run goes on, but will not end in \
                      the same bits as there",
                     trainer.kernels()
                 );
             }
-            eprintln!("going on after iteration {} of {}", trainer.iteration, config.gaussians.iterations);
+            say!("going on after iteration {} of {}", trainer.iteration, config.gaussians.iterations);
             trainer
         }
     };
-    let code = train(args, folder, &config, &capture, trainer)?;
+    let code = train(args, folder, &config, &capture, trainer, &output)?;
     drop(capture);
     clear_photographs(&path, code);
     Ok(code)
@@ -128,15 +132,22 @@ pub(super) fn resume(args: &Args, folder: RunFolder) -> Result<ExitCode> {
 /// The format that the output's name says.
 fn format_of(config: &ExplicitRunConfig) -> Result<Format> {
     Format::of_path(&config.output).with_context(|| {
-        format!("--backbone {EXPLICIT} writes Gaussians and no bundle: {} has to end in .ply", config.output.display())
+        format!(
+            "--backbone {EXPLICIT} writes Gaussians and no bundle: {} has to end in .ply; without it, `train` writes a bundle",
+            config.output.display()
+        )
     })
+}
+
+fn source_of(config: &ExplicitRunConfig) -> CaptureArgs {
+    CaptureArgs { dataset: config.dataset.clone(), options: config.capture.clone() }
 }
 
 /// * `run`: its folder.
 fn load(config: &ExplicitRunConfig, run: &Path) -> Result<Capture> {
-    let source = CaptureArgs { dataset: config.dataset.clone(), options: config.capture.clone() };
+    let source = source_of(config);
     // At once: large captures take their time.
-    eprintln!("reading {}", config.dataset.display());
+    say!("reading {}", config.dataset.display());
     let capture = source.load_cached(config.gaussians.seed, &photographs_in(run))?;
     check_size(&capture, &Limits::default())?;
     Ok(capture)
@@ -148,15 +159,18 @@ fn train(
     config: &ExplicitRunConfig,
     capture: &Capture,
     trainer: CloudTrainer<'_>,
+    output: &Output,
 ) -> Result<ExitCode> {
     // Not before: until here there is nothing to keep, and Ctrl-C may end the process at once.
     let stop = stop::flag()?;
-    let Some(result) = train_in(folder, config, capture, trainer, &stop)? else {
+    let Some(result) = train_in(folder, config, capture, trainer, &stop, output)? else {
         return Ok(ExitCode::from(stop::INTERRUPTED));
     };
     let (_, path) = args.named_paths(&config.dataset, &config.output);
-    output::print_or(&result, args.json(), result.summary(path))?;
-    eprintln!("compress it:  pocketsplat import {} -o scene.psb", shell_word(path));
+    print_or(&result, args.json(), result.summary(path))?;
+    if output.is_file() {
+        say!("compress it:  pocketsplat import {} -o scene.psb", shell_word(path));
+    }
     Ok(ExitCode::SUCCESS)
 }
 
@@ -167,6 +181,7 @@ fn train_in(
     capture: &Capture,
     mut trainer: CloudTrainer<'_>,
     stop: &AtomicBool,
+    output: &Output,
 ) -> Result<Option<ExplicitResult>> {
     folder.write_config(&config.to_toml()?)?;
     let interval = config.checkpoint_every.map_or(Interval::Seconds(CHECKPOINT_SECONDS), Interval::Iterations);
@@ -188,24 +203,34 @@ fn train_in(
         }
     })?;
     if ending == Ending::Interrupted {
-        eprintln!("interrupted after iteration {} of {iterations}; {how_to_go_on}", trainer.iteration);
+        say!("interrupted after iteration {} of {iterations}; {how_to_go_on}", trainer.iteration);
         return Ok(None);
     }
-    let result =
-        write(&trainer, config, capture).with_context(|| format!("the training is done and kept; {how_to_go_on}"))?;
-    folder.finish(&output::json(&result)?, config.keep_checkpoints)?;
+    let result = write(&trainer, config, capture, output)
+        .with_context(|| format!("the training is done and kept; {how_to_go_on}"))?;
+    folder.finish(&json(&result)?, config.keep_checkpoints)?;
     Ok(Some(result))
 }
 
-fn write(trainer: &CloudTrainer<'_>, config: &ExplicitRunConfig, capture: &Capture) -> Result<ExplicitResult> {
+fn write(
+    trainer: &CloudTrainer<'_>,
+    config: &ExplicitRunConfig,
+    capture: &Capture,
+    output: &Output,
+) -> Result<ExplicitResult> {
     let protocol = Protocol::of(capture, &config.capture);
     let notes = GaussiansFile::notes_of(&protocol)?;
-    let bytes = format_of(config)?.to_bytes(&trainer.gaussians(), &notes)?;
-    output::write_whole(&config.output, &bytes)?;
+    let format = format_of(config)?;
+    let bytes = format.to_bytes(&trainer.gaussians(), &notes)?;
+    output.write(&bytes)?;
     let held_out = if capture.test.is_empty() {
         None
     } else {
-        let file = GaussiansFile::read(&config.output)?;
+        // As the file has them, which need not lie anywhere: a FIFO cannot be read again.
+        let started = Instant::now();
+        let (gaussians, notes) = format.from_bytes(&bytes)?;
+        let read_s = started.elapsed().as_secs_f64();
+        let file = GaussiansFile { n_bytes: bytes.len(), gaussians, notes, read_s };
         let Evaluation { psnr_db, ssim, n_views, views, .. } =
             measure(&file, capture, &config.capture, Split::Test, &Measurements::default())?;
         Some(HeldOut { psnr_db, ssim, n_test_views: n_views, views })

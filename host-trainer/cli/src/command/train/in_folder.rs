@@ -1,11 +1,10 @@
 //! Trains in a run folder: start, resume or fork, the steps with their checkpoints, the bundle.
 
-use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::Capture;
-use pocketsplat_files::shell_word;
+use pocketsplat_files::{Output, shell_word};
 use pocketsplat_trainer::encode::{Encoding, Scale};
 use pocketsplat_trainer::step::SharedDevice;
 use pocketsplat_trainer::train::gauge::Gauge;
@@ -14,9 +13,10 @@ use pocketsplat_trainer::train::{TrainConfig, Trainer};
 
 use super::result::{TrainResult, write_bundle};
 use crate::command::estimate::{Estimate, Warned};
-use crate::command::output;
+use crate::command::output::json;
 use crate::command::progress::Progress;
 use crate::config::{CaptureOptions, RunConfig};
+use crate::say::say;
 
 /// Seconds between checkpoints unless the user says otherwise: what an accident may cost.
 pub(super) const CHECKPOINT_SECONDS: f64 = 60.0;
@@ -35,7 +35,7 @@ pub(crate) enum Start<'a> {
     Forked(Box<Trainer<'a>>),
 }
 
-/// Trains in a run folder and writes the bundle; `None` when `stop` was set before the end.
+/// Trains in a run folder and writes the bundle to `output`; `None` when `stop` was set before the end.
 pub(crate) fn train_in<'a>(
     folder: RunFolder,
     config: &RunConfig,
@@ -43,6 +43,7 @@ pub(crate) fn train_in<'a>(
     start: Start<'a>,
     device: Option<SharedDevice<f32>>,
     stop: &AtomicBool,
+    output: &Output,
 ) -> Result<Option<TrainResult>> {
     let mut folder = folder.forking_at(&config.fork_at);
     let path = folder.path().to_owned();
@@ -57,7 +58,7 @@ pub(crate) fn train_in<'a>(
     trainer.set_device(device);
     folder.write_config(&config.to_toml()?)?;
     for at in folder.missed_forks(trainer.iteration)? {
-        eprintln!("warning: --fork-at {at} keeps nothing, for the run stands after iteration {}", trainer.iteration);
+        say!("warning: --fork-at {at} keeps nothing, for the run stands after iteration {}", trainer.iteration);
     }
     let interval = config.checkpoint_every.map_or(Interval::Seconds(CHECKPOINT_SECONDS), Interval::Iterations);
     let how_to_go_on = || format!("go on with `pocketsplat train --resume {}`", shell_word(&path));
@@ -73,17 +74,12 @@ pub(crate) fn train_in<'a>(
         }
     })?;
     if ending == Ending::Interrupted {
-        eprintln!(
-            "interrupted after iteration {} of {}; {}",
-            trainer.iteration,
-            config.train.iterations,
-            how_to_go_on()
-        );
+        say!("interrupted after iteration {} of {}; {}", trainer.iteration, config.train.iterations, how_to_go_on());
         return Ok(None);
     }
-    let result = write_bundle(&trainer, capture, &config.capture, &config.encoding, &config.output)
+    let result = write_bundle(&trainer, capture, &config.capture, &config.encoding, output)
         .with_context(|| format!("the training is done and kept; {}", how_to_go_on()))?;
-    folder.finish(&output::json(&result)?, config.keep_checkpoints)?;
+    folder.finish(&json(&result)?, config.keep_checkpoints)?;
     Ok(Some(result))
 }
 
@@ -100,11 +96,11 @@ fn resumed<'a>(
     device: Option<SharedDevice<f32>>,
 ) -> Result<Trainer<'a>> {
     let Some(resumed) = folder.resume(capture)? else {
-        eprintln!("the run in {} has no checkpoint yet; it begins anew", folder.path().display());
+        say!("the run in {} has no checkpoint yet; it begins anew", folder.path().display());
         return Ok(Trainer::new(capture, config.train)?);
     };
     for fault in &resumed.passed_over {
-        eprintln!("warning: a checkpoint is damaged, so the run goes on from an older one: {fault}");
+        say!("warning: a checkpoint is damaged, so the run goes on from an older one: {fault}");
     }
     let mut trainer = resumed.restored.trainer;
     trainer.set_device(device);
@@ -114,17 +110,22 @@ fn resumed<'a>(
     }
     let (then, now) = (&resumed.restored.written_by, trainer.kernels());
     if *then != now {
-        eprintln!(
+        say!(
             "warning: the checkpoint was computed with {then}; this is {now}. The run goes on, but will not end in the \
              same bits as there"
         );
     }
-    eprintln!("going on after iteration {} of {}", trainer.iteration, config.train.iterations);
+    say!("going on after iteration {} of {}", trainer.iteration, config.train.iterations);
     Ok(trainer)
 }
 
 /// Trains on a capture that was loaded as it is, without a run folder, and writes the bundle.
-pub(crate) fn train(capture: &Capture, config: TrainConfig, encoding: &Encoding, output: &Path) -> Result<TrainResult> {
+pub(crate) fn train(
+    capture: &Capture,
+    config: TrainConfig,
+    encoding: &Encoding,
+    output: &Output,
+) -> Result<TrainResult> {
     train_as(capture, config, &CaptureOptions::default(), encoding, output)
 }
 
@@ -134,7 +135,7 @@ pub(crate) fn train_as(
     config: TrainConfig,
     options: &CaptureOptions,
     encoding: &Encoding,
-    output: &Path,
+    output: &Output,
 ) -> Result<TrainResult> {
     let scale = encoding.scale(capture);
     let mut trainer = Trainer::new(capture, config)?.fitting(gauge(scale.as_ref()));

@@ -5,31 +5,32 @@ use pocketsplat_trainer::device::Limits;
 use pocketsplat_trainer::encode::{Cut, Fitted};
 
 use crate::command::bundle::BundleFile;
+use crate::say::say;
 
 /// Says on stderr what the bundle takes of its limits, and what it lost to them.
 pub(super) fn say(file: &BundleFile, limits: &Limits, fitted: &Fitted) -> Result<()> {
     let share = |taken: u64, most: u64| format!("{:.1} %", 100.0 * taken as f64 / most as f64);
     if let Some(most) = limits.flash_bytes {
         let len = file.bytes.len() as u64;
-        eprintln!("the bundle takes {len} of {most} bytes ({})", share(len, most));
+        say!("the bundle takes {len} of {most} bytes ({})", share(len, most));
     }
     if let (Some(most), Some(plan)) = (limits.ram_bytes, &fitted.plan) {
         let (len, strips) = (plan.least_len() as u64, plan.n_strips());
         let plural = if strips == 1 { "" } else { "s" };
         let share = share(len, most);
-        eprintln!(
+        say!(
             "the whole scene is drawn in {len} of {most} bytes ({share}) of scratch memory, in {strips} strip{plural}"
         );
     }
     if let (Some(processor), Some(instructions)) = (limits.processor, fitted.instructions) {
         let most = processor.frame_instructions();
         let [frame, frames] = [instructions, most].map(|n| n as f64 / 1e6);
-        eprintln!(
+        say!(
             "a frame takes {frame:.1} of {frames:.0} million instructions ({}), as predicted",
             share(instructions, most)
         );
         if instructions > most {
-            eprintln!(
+            say!(
                 "warning: that is too many, and even half of the anchors would take more; train at a smaller --resolution, or \
                  draw with Quality::BALANCED"
             );
@@ -46,8 +47,6 @@ pub(super) fn say(file: &BundleFile, limits: &Limits, fitted: &Fitted) -> Result
         instructions.map(|n| format!("{:.1} million instructions a frame", n as f64 / 1e6)),
     ];
     let with_them = with_them.into_iter().flatten().collect::<Vec<_>>().join(", ");
-    eprintln!(
-        "the {n_anchors} least important anchors were left out to fit{lost}; with them the bundle takes {with_them}"
-    );
+    say!("the {n_anchors} least important anchors were left out to fit{lost}; with them the bundle takes {with_them}");
     Ok(())
 }

@@ -12,15 +12,21 @@ use pocketsplat_trainer::train::run::photographs_in;
 
 use crate::command::capture::CaptureArgs;
 use crate::config::RunConfig;
+use crate::say::say;
+
+/// Where the photographs of a run come from.
+pub(super) fn source_of(config: &RunConfig) -> CaptureArgs {
+    CaptureArgs { dataset: config.dataset.clone(), options: config.capture.clone() }
+}
 
 /// Loads the capture that a run is configured for, and decides what the configuration left to it.
 ///
 /// * `photographs`: folder for decoded photographs that are too many for the memory; without one they are decoded again for every
 ///   step.
 pub(crate) fn load(config: &mut RunConfig, photographs: Option<&Path>) -> Result<Capture> {
-    let source = CaptureArgs { dataset: config.dataset.clone(), options: config.capture.clone() };
+    let source = source_of(config);
     // At once: large captures take their time.
-    eprintln!("reading {}", config.dataset.display());
+    say!("reading {}", config.dataset.display());
     let capture = match photographs {
         Some(folder) => source.load_cached(config.train.seed, folder)?,
         None => source.load(config.train.seed)?,
@@ -35,13 +41,13 @@ pub(crate) fn decide(config: &mut RunConfig, capture: &Capture) -> Result<()> {
     config.train = config.train.resolved_for(capture);
     if std::mem::take(&mut config.scales_lambda) && config.train.backbone.is_coded() && capture.shown < 1.0 {
         config.train.hac.lambda *= capture.shown;
-        eprintln!(
+        say!(
             "lambda {:.5}, since {:.0} % of the pixels show the scene",
             config.train.hac.lambda,
             100.0 * capture.shown
         );
     }
-    eprintln!("voxel size {:.5}, normalised units", config.train.voxel_size_for(capture));
+    say!("voxel size {:.5}, normalised units", config.train.voxel_size_for(capture));
     Ok(())
 }
 
@@ -73,9 +79,6 @@ pub(crate) fn clear_photographs(run: &Path, code: ExitCode) {
     if code == ExitCode::SUCCESS
         && let Err(error) = remove_cache(&photographs_in(run))
     {
-        eprintln!(
-            "warning: the decoded photographs of the run are still in {}: {error}",
-            photographs_in(run).display()
-        );
+        say!("warning: the decoded photographs of the run are still in {}: {error}", photographs_in(run).display());
     }
 }

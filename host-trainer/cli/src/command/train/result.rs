@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use pocketsplat_capture::dataset::{Background, Capture, Split, View};
 use pocketsplat_core::bundle::crc32;
-use pocketsplat_files::shell_word;
+use pocketsplat_files::{Output, shell_word};
 use pocketsplat_instructions::level::Profile;
 use pocketsplat_trainer::effects::Effect;
 use pocketsplat_trainer::encode::{Encoding, Fitted};
@@ -16,9 +16,9 @@ use serde::Serialize;
 use super::limits;
 use crate::command::bundle::BundleFile;
 use crate::command::eval::{Evaluation, Measurements, Renderer, ViewEvaluation, measure};
-use crate::command::output;
 use crate::command::process::peak_memory_bytes;
 use crate::config::{CaptureOptions, Protocol};
+use crate::say::say;
 
 /// Test views that tiers are measured with at most, evenly picked: more would cost time and say little.
 const MOST_JUDGES: usize = 12;
@@ -96,11 +96,11 @@ pub(super) fn write_bundle(
     capture: &Capture,
     options: &CaptureOptions,
     encoding: &Encoding,
-    output: &Path,
+    output: &Output,
 ) -> Result<TrainResult> {
     let protocol = Protocol::of(capture, options);
     if let Some(images) = protocol.omitted_images()? {
-        eprintln!(
+        say!(
             "warning: the name of the folder of images is too long for the bundle; give --images {} to eval and render",
             shell_word(Path::new(images))
         );
@@ -108,8 +108,8 @@ pub(super) fn write_bundle(
     let finished = Finished { protocol: Some(protocol.to_text()?), ..trainer.finish()? };
     let held_out = judges(trainer, capture);
     let fitted = encoding.encode(finished, capture, &held_out)?;
-    output::write_whole(output, &fitted.written.bytes)?;
-    let file = BundleFile { path: output.to_owned(), bytes: fitted.written.bytes.clone() };
+    output.write(&fitted.written.bytes)?;
+    let file = BundleFile { path: output.path().to_owned(), bytes: fitted.written.bytes.clone() };
     limits::say(&file, &encoding.limits, &fitted)?;
     let Fitted { finished, plan, instructions, .. } = fitted;
     let held_out = if capture.test.is_empty() {
@@ -125,7 +125,7 @@ pub(super) fn write_bundle(
     let of_whole = bundle.n_tiers().checked_sub(1).and_then(|tier| bundle.measures(tier));
     let n_anchors = scene.anchors.len();
     Ok(TrainResult {
-        bundle: output.to_owned(),
+        bundle: output.path().to_owned(),
         bundle_bytes: file.bytes.len(),
         bundle_crc: crc32(&file.bytes),
         profile: Profile::of(&bundle.header().features).to_string(),

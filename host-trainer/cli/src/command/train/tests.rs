@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use pocketsplat_capture::dataset::{LoadOptions, MOST_IN_MEMORY_BYTES, load};
 use pocketsplat_capture::synth::{SynthOptions, write_capture};
+use pocketsplat_files::Outputs;
 use pocketsplat_trainer::device::Limits;
 use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::config::Backbone;
@@ -42,8 +43,11 @@ fn a_run_on_decoded_photographs_is_interrupted_resumed_and_ends_in_the_same_byte
     let in_memory = config(home.path(), "in-memory");
     let capture = loaded(&in_memory, MOST_IN_MEMORY_BYTES);
     let in_memory = resolved(in_memory, &capture);
+    let output = |config: &RunConfig| Outputs::new(false).file(&config.output, BUNDLE).unwrap();
+    let to = output(&in_memory);
     let folder = RunFolder::start(&in_memory.output.with_extension("run"), "", false).unwrap();
-    let result = train_in(folder, &in_memory, &capture, Start::New(Warned::default()), None, &stop).unwrap().unwrap();
+    let result =
+        train_in(folder, &in_memory, &capture, Start::New(Warned::default()), None, &stop, &to).unwrap().unwrap();
     assert_eq!(result.photographs_waited_share, None);
     let expected = fs::read(&in_memory.output).unwrap();
 
@@ -52,6 +56,7 @@ fn a_run_on_decoded_photographs_is_interrupted_resumed_and_ends_in_the_same_byte
     // Before there is a run folder.
     let capture = loaded(&cached, 0);
     let cached = resolved(cached, &capture);
+    let to = output(&cached);
     let files = || -> Vec<_> {
         let entries = fs::read_dir(photographs_in(&run)).unwrap().map(|entry| entry.unwrap().path());
         entries.filter(|path| path.extension().is_some_and(|e| e == "photograph")).collect()
@@ -59,8 +64,8 @@ fn a_run_on_decoded_photographs_is_interrupted_resumed_and_ends_in_the_same_byte
     assert_eq!(files().len(), 8);
     let folder = RunFolder::start(&run, "", false).unwrap();
     let ended = std::thread::scope(|scope| {
-        let training =
-            scope.spawn(|| train_in(folder, &cached, &capture, Start::New(Warned::default()), None, &stop).unwrap());
+        let training = scope
+            .spawn(|| train_in(folder, &cached, &capture, Start::New(Warned::default()), None, &stop, &to).unwrap());
         while !run.join("iteration-00000020.checkpoint").exists() && !training.is_finished() {
             std::thread::sleep(Duration::from_millis(1));
         }
@@ -77,7 +82,7 @@ fn a_run_on_decoded_photographs_is_interrupted_resumed_and_ends_in_the_same_byte
     stop.store(false, Ordering::Relaxed);
     let folder = RunFolder::reopen(&run).unwrap();
     let capture = loaded(&cached, 0);
-    let result = train_in(folder, &cached, &capture, Start::Resumed, None, &stop).unwrap().unwrap();
+    let result = train_in(folder, &cached, &capture, Start::Resumed, None, &stop, &to).unwrap().unwrap();
     assert!(result.photographs_waited_share.is_some_and(|share| (0.0..1.0).contains(&share)));
     assert!(fs::read(&cached.output).unwrap() == expected, "the same bytes");
     let views = result.held_out.unwrap().views;

@@ -34,6 +34,12 @@ pub enum RunError {
         /// The folder.
         path: PathBuf,
     },
+    /// Another file has the name.
+    #[error("{} is a file, and the folder of the run needs this name; choose another folder with --run", path.display())]
+    NoFolder {
+        /// The file.
+        path: PathBuf,
+    },
     /// A run would be lost.
     #[error(
         "{} holds an unfinished run; go on with it by `pocketsplat train --resume {}`, or start anew with --overwrite",

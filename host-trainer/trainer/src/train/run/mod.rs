@@ -22,6 +22,7 @@ mod store;
 #[cfg(test)]
 mod tests;
 
+use std::ffi::OsStr;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -49,12 +50,15 @@ const PHOTOGRAPHS: &str = "photographs";
 /// Checkpoints every so many seconds are put off until they take at most this share of the time.
 const LARGEST_SHARE: f64 = 0.02;
 
+/// The first checkpoint of a process comes after so many seconds at most: most accidents are early ones.
+const FIRST_AFTER_S: f64 = 10.0;
+
 /// When checkpoints are written; the bits of the result do not depend on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Interval {
     /// After every so many iterations; 0 means only at the end and on interruption.
     Iterations(u32),
-    /// After so many seconds, or later where writing would take more than 2 % of the time.
+    /// After so many seconds, or later where writing would take more than 2 % of the time; the first after ten.
     Seconds(f64),
 }
 
@@ -108,26 +112,53 @@ impl RunFolder {
         Ok(folder)
     }
 
-    /// The folder `path` without what an earlier run left there, but for its configuration.
-    fn cleared(path: &Path, overwrite: bool) -> Result<Self, RunError> {
-        fs::create_dir_all(path).map_err(|source| RunError::io("make the folder", path, source))?;
-        let ours = |name: &Path| {
-            [LOCK, PHOTOGRAPHS].map(Path::new).contains(&name) || name.extension().is_some_and(|e| e == files::PARTIAL)
-        };
-        let occupied = files::names(path)?.into_iter().any(|name| !ours(Path::new(&name)));
-        // A configuration alone may be anyone's; a run has locked its folder too.
-        if occupied && ![CONFIG, LOCK].iter().all(|name| path.join(name).is_file()) {
+    /// Fails where [`Self::start`] would: before the hours that a capture may take to load.
+    ///
+    /// # Errors
+    /// As [`Self::start`].
+    pub fn check(path: &Path, overwrite: bool) -> Result<(), RunError> {
+        match fs::metadata(path) {
+            Err(_) => Ok(()),
+            Ok(found) if !found.is_dir() => Err(RunError::NoFolder { path: path.to_owned() }),
+            Ok(_) => {
+                Self::refuse_foreign(path)?;
+                if path.join(LOCK).is_file() { Self::locked(path)?.refuse_unfinished(overwrite) } else { Ok(()) }
+            }
+        }
+    }
+
+    fn refuse_foreign(path: &Path) -> Result<(), RunError> {
+        let ours = |name: &OsStr| [LOCK, PHOTOGRAPHS].iter().any(|own| name == *own) || is_partial(name);
+        let occupied = files::names(path)?.into_iter().any(|name| !ours(&name));
+        // A configuration alone may be anyone's; a run has locked its folder too, with a file that says nothing.
+        let is_locked = fs::metadata(path.join(LOCK)).is_ok_and(|found| found.is_file() && found.len() == 0);
+        if occupied && !(is_locked && path.join(CONFIG).is_file()) {
             return Err(RunError::Foreign { path: path.to_owned() });
         }
-        let folder = Self::locked(path)?;
-        if !overwrite && !folder.is_finished() && !folder.checkpoints()?.is_empty() {
-            return Err(RunError::Unfinished { path: path.to_owned() });
+        Ok(())
+    }
+
+    fn refuse_unfinished(&self, overwrite: bool) -> Result<(), RunError> {
+        if !overwrite && !self.is_finished() && !self.checkpoints()?.is_empty() {
+            return Err(RunError::Unfinished { path: self.path.clone() });
         }
+        Ok(())
+    }
+
+    /// The folder `path` without what an earlier run left there, but for its configuration.
+    fn cleared(path: &Path, overwrite: bool) -> Result<Self, RunError> {
+        if fs::metadata(path).is_ok_and(|found| !found.is_dir()) {
+            return Err(RunError::NoFolder { path: path.to_owned() });
+        }
+        fs::create_dir_all(path).map_err(|source| RunError::io("make the folder", path, source))?;
+        Self::refuse_foreign(path)?;
+        let folder = Self::locked(path)?;
+        folder.refuse_unfinished(overwrite)?;
         folder.clear_checkpoints(|_| true)?;
         for name in [RESULT, LOG, EFFECTS, PILOTS, REPORT] {
             files::remove(&path.join(name))?;
         }
-        files::remove_folder(&path.join(PREVIEWS))?;
+        previews::remove(&path.join(PREVIEWS))?;
         Ok(folder)
     }
 
@@ -220,10 +251,15 @@ impl RunFolder {
         interval: Interval,
         stop: &AtomicBool,
     ) -> Result<Ending, RunError> {
-        let previews = Previews::open(&self.path.join(PREVIEWS), trainer.iteration, trainer.config().iterations)?;
+        let previews = Previews::open(&self.path.join(PREVIEWS), trainer.iteration, trainer.config().iterations);
+        // Pictures for people: a run is not worse for lacking them.
+        let previews = previews.inspect_err(|error| observer.unwritten(error)).ok();
         self.drive(trainer, interval, stop, |trainer| {
             let outcome = trainer.observed_advance(observer)?;
-            previews.add(trainer)?;
+            match previews.as_ref().map_or(Ok(()), |previews| previews.add(trainer)) {
+                Err(error @ (RunError::Io { .. } | RunError::Write { .. })) => observer.unwritten(&error),
+                added => added?,
+            }
             let StepReport { loss, squared_error, rate, .. } = outcome.report;
             Ok(LoggedStep { loss: f64::from(loss), squared_error, rate, is_dropped: outcome.dropped.is_some() })
         })
@@ -248,6 +284,9 @@ impl RunFolder {
             let ends = asked || is_done(run);
             let due = match interval {
                 Interval::Iterations(n) => n > 0 && run.iteration() > 0 && run.iteration().is_multiple_of(n),
+                Interval::Seconds(s) if saved_iteration.is_none() => {
+                    run.iteration() > 0 && saved_at.elapsed().as_secs_f64() >= s.min(FIRST_AFTER_S)
+                }
                 Interval::Seconds(s) => saved_at.elapsed().as_secs_f64() >= f64::max(s, write_s / LARGEST_SHARE),
             };
             let due = due || self.forks_at.contains(&run.iteration());
@@ -277,6 +316,17 @@ impl RunFolder {
         files::write_whole(&self.path.join(RESULT), |out| out.write_all(result.as_bytes()))?;
         self.clear_checkpoints(|iteration| !keep_checkpoints && !self.forks_at.contains(&iteration))
     }
+}
+
+/// Whether a run keeps a file or folder of that name in its folder.
+pub fn is_file_of_run(name: &OsStr) -> bool {
+    let own = [CONFIG, LOG, EFFECTS, PILOTS, RESULT, REPORT, LOCK, PHOTOGRAPHS, PREVIEWS];
+    name.to_str().is_some_and(|name| own.contains(&name) || store::iteration_of(name).is_some())
+}
+
+/// Whether it is what a file of a run is called until it is whole.
+fn is_partial(name: &OsStr) -> bool {
+    name.to_str().and_then(files::name_when_whole).is_some_and(|name| is_file_of_run(OsStr::new(name)))
 }
 
 fn is_done(run: &impl Resumable) -> bool {

@@ -2,6 +2,7 @@
 
 use std::ffi::OsStr;
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use pocketsplat_capture::dataset::View;
@@ -20,6 +21,30 @@ pub fn newest_preview(run: &Path) -> Option<(u32, PathBuf)> {
     let folder = run.join(PREVIEWS);
     let newest = files::names(&folder).ok()?.into_iter().filter_map(|name| Some((iteration_of(&name)?, name))).max()?;
     Some((newest.0, folder.join(newest.1)))
+}
+
+/// Removes the pictures of a run, and their folder where nothing else lies in it.
+pub(super) fn remove(folder: &Path) -> Result<(), RunError> {
+    if !folder.is_dir() {
+        return Ok(());
+    }
+    remove_after(folder, None)?;
+    match fs::remove_dir(folder) {
+        Err(error) if error.kind() != ErrorKind::DirectoryNotEmpty => Err(RunError::io("remove", folder, error)),
+        _ => Ok(()),
+    }
+}
+
+/// Removes the pictures after iteration `done`, or all, and those that are not whole.
+fn remove_after(folder: &Path, done: Option<u32>) -> Result<(), RunError> {
+    for name in files::names(folder)? {
+        let whole = name.to_str().and_then(files::name_when_whole);
+        let is_partial = whole.is_some_and(|name| iteration_of(OsStr::new(name)).is_some());
+        if is_partial || iteration_of(&name).is_some_and(|iteration| done.is_none_or(|done| iteration > done)) {
+            files::remove(&folder.join(name))?;
+        }
+    }
+    Ok(())
 }
 
 /// Of whole pictures alone.
@@ -41,11 +66,7 @@ impl Previews {
     /// Opens the folder of a run that has done `done` of `iterations`, and drops pictures of later ones.
     pub(super) fn open(folder: &Path, done: u32, iterations: u32) -> Result<Self, RunError> {
         fs::create_dir_all(folder).map_err(|source| RunError::io("make the folder", folder, source))?;
-        for name in files::names(folder)? {
-            if iteration_of(&name).is_none_or(|iteration| iteration > done) {
-                files::remove(&folder.join(name))?;
-            }
-        }
+        remove_after(folder, Some(done))?;
         Ok(Self { folder: folder.to_owned(), every: (iterations / PICTURES).max(1) })
     }
 

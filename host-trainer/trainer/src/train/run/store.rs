@@ -19,11 +19,15 @@ fn file_name(iteration: u32) -> String {
     format!("{PREFIX}{iteration:08}.{EXTENSION}")
 }
 
+/// Of a checkpoint, by its name.
+pub(super) fn iteration_of(name: &str) -> Option<u32> {
+    name.strip_prefix(PREFIX)?.strip_suffix(EXTENSION)?.strip_suffix('.')?.parse().ok()
+}
+
 fn checkpoints_in(folder: &Path) -> Result<Vec<(u32, PathBuf)>, RunError> {
-    let iteration = |name: &str| name.strip_prefix(PREFIX)?.strip_suffix(EXTENSION)?.strip_suffix('.')?.parse().ok();
     let mut found: Vec<(u32, PathBuf)> = files::names(folder)?
         .into_iter()
-        .filter_map(|name| Some((iteration(name.to_str()?)?, folder.join(name))))
+        .filter_map(|name| Some((iteration_of(name.to_str()?)?, folder.join(name))))
         .collect();
     found.sort_unstable();
     found.reverse();
@@ -115,9 +119,7 @@ impl RunFolder {
 
     /// Removes what a process left that died while it wrote.
     pub(super) fn clear_partial_files(&self) -> Result<(), RunError> {
-        let names = files::names(&self.path)?.into_iter().map(|name| self.path.join(name));
-        names
-            .filter(|path| path.extension().is_some_and(|extension| extension == files::PARTIAL))
-            .try_for_each(|path| files::remove(&path))
+        let names = files::names(&self.path)?.into_iter();
+        names.filter(|name| super::is_partial(name)).try_for_each(|name| files::remove(&self.path.join(name)))
     }
 }

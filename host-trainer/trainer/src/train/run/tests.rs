@@ -219,6 +219,66 @@ fn other_folders_are_left_alone() {
 }
 
 #[test]
+fn what_is_not_of_the_run_stays_in_its_folder() {
+    let home = tempfile::tempdir().unwrap();
+    let path = home.path().join("a.run");
+    let mut folder = RunFolder::start(&path, "", false).unwrap();
+    train(&mut folder, Interval::Iterations(0), u32::MAX);
+    folder.finish("{}", false).unwrap();
+    for name in ["film.mp4.partial", "iteration-00000030.checkpoint.4711.partial", "previews/mine.jpg"] {
+        fs::write(path.join(name), "mine").unwrap();
+    }
+    RunFolder::check(&path, false).unwrap();
+    let again = RunFolder::start(&path, "", false).unwrap();
+    assert_eq!(names(&again), ["config.toml", "film.mp4.partial", "lock", "previews"]);
+    assert_eq!(files::names(&path.join(PREVIEWS)).unwrap(), ["mine.jpg"]);
+    // Another program's folder, whose lock says who holds it.
+    let other = home.path().join("other");
+    fs::create_dir(&other).unwrap();
+    for (name, content) in [(CONFIG, "title = 1"), (LOCK, "pid 17"), (RESULT, "theirs")] {
+        fs::write(other.join(name), content).unwrap();
+    }
+    for refused in [RunFolder::check(&other, true), RunFolder::start(&other, "", true).map(drop)] {
+        assert!(matches!(refused, Err(RunError::Foreign { .. })), "{refused:?}");
+    }
+    assert_eq!(fs::read_to_string(other.join(RESULT)).unwrap(), "theirs");
+    let file = home.path().join("file");
+    fs::write(&file, "mine").unwrap();
+    for refused in [RunFolder::check(&file, true), RunFolder::start(&file, "", true).map(drop)] {
+        assert!(refused.unwrap_err().to_string().contains("choose another folder with --run"));
+    }
+}
+
+#[test]
+fn a_picture_that_cannot_be_written_ends_no_run() {
+    #[derive(Default)]
+    struct Heard(usize);
+    impl Observer for Heard {
+        fn step(&mut self, _: u32, _: &StepReport<f32>, _: &crate::scene::Scene<f32>) {}
+        fn unwritten(&mut self, why: &dyn std::error::Error) {
+            assert!(why.to_string().contains(PREVIEWS), "{why}");
+            self.0 += 1;
+        }
+    }
+    let (home, capture) = (tempfile::tempdir().unwrap(), tiny_capture());
+    // No folder of pictures can be made; then one of the pictures cannot.
+    for name in [PREVIEWS, "previews/00000003.jpg/folder"] {
+        let path = home.path().join(name.replace('/', "-"));
+        let mut folder = RunFolder::start(&path, "", false).unwrap();
+        if name == PREVIEWS {
+            fs::write(path.join(name), "").unwrap();
+        } else {
+            fs::create_dir_all(path.join(name)).unwrap();
+        }
+        let mut heard = Heard::default();
+        let mut trainer = Trainer::new(&capture, tiny_config(5)).unwrap();
+        let every = Interval::Iterations(0);
+        let ending = folder.train(&mut trainer, &mut heard, every, &AtomicBool::new(false)).unwrap();
+        assert_eq!((ending, heard.0), (Ending::Finished, 1), "{name}");
+    }
+}
+
+#[test]
 fn when_no_checkpoint_is_sound_all_are_named() {
     let home = tempfile::tempdir().unwrap();
     let folder = RunFolder::start(home.path(), "", false).unwrap();

@@ -1,0 +1,16 @@
+//! The files that a capture is read from, wherever they lie.
+
+use std::path::{Path, PathBuf};
+
+use super::LoadOptions;
+
+/// Photographs, masks, points and the list of views that [`load`](super::load) reads of the capture in the folder `path`: some may lie
+/// outside of it, as a `transforms.json` may name them. None where the capture cannot be listed. Costs as much as the images' headers.
+pub fn files_read(path: &Path, options: &LoadOptions) -> Vec<PathBuf> {
+    let Ok(listing) = super::list(path, options) else { return Vec::new() };
+    let shots = listing.sound().flat_map(|(_, shot)| [Some(shot.path.clone()), shot.mask.clone()]);
+    let mut files: Vec<PathBuf> = shots.flatten().collect();
+    files.extend(listing.points.as_ref().map(|(file, _)| file.clone()));
+    files.push(listing.source.clone());
+    files
+}

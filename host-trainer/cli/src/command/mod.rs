@@ -29,6 +29,7 @@ mod render;
 mod report;
 mod runs;
 mod settings;
+mod stand;
 mod stop;
 mod sweep;
 mod synth;

@@ -1,22 +1,28 @@
-//! `pocketsplat view`: a page that draws bundles in a browser.
+//! `pocketsplat view`: a page that draws bundles in a browser, or shows splats from all around.
+
+mod splats;
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
+use pocketsplat_files::shell_word;
 use pocketsplat_viewer::{SceneFile, package, page};
 
 use super::bundle::BundleFile;
+use super::gaussians::GaussiansFile;
 use super::output;
+use super::stand::StandArgs;
 
 /// Write one page that draws bundles in a browser, with nothing to install and nothing fetched.
 ///
 /// The page turns the scene by mouse, touch and keys. Sliders set what a device has: memory, pruning rate, quality. It shows the plan and
-/// the very pixels of the device. Several bundles stand side by side with one camera.
+/// the very pixels of the device. Several bundles stand side by side with one camera. Of a .ply, .spz or .sog the page shows pictures of a turn
+/// around it, and what the file holds.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// The bundles.
+    /// The bundles, or one .ply, .spz or .sog.
     #[arg(required = true, value_name = "SCENE.psb")]
     bundles: Vec<PathBuf>,
     /// The page to write.
@@ -28,9 +34,15 @@ pub(crate) struct Args {
     /// Also write a folder for web developers: the decoder as WebAssembly, its JavaScript, types, an example that draws the first bundle.
     #[arg(long, value_name = "DIR")]
     package: Option<PathBuf>,
+    #[command(flatten)]
+    stand: StandArgs,
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
+    if let Some(path) = args.bundles.iter().find(|path| GaussiansFile::is_one(path)) {
+        return run_splats(args, path);
+    }
+    args.stand.refuse("a bundle has a camera of its own")?;
     let files = args.bundles.iter().map(|path| BundleFile::read(path)).collect::<Result<Vec<_>>>()?;
     for file in &files {
         file.parse()?;
@@ -44,6 +56,30 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let Some(path) = &args.output else { return Ok(()) };
     write_page(path, &files)?;
     if args.open { open(path) } else { Ok(()) }
+}
+
+/// Writes the page of one file of splats.
+fn run_splats(args: &Args, splats: &Path) -> Result<()> {
+    let word = shell_word(splats);
+    let Some(page) = &args.output else {
+        bail!(
+            "a package draws bundles, and {} holds splats; make a bundle with `pocketsplat import {word} -o scene.psb`",
+            splats.display()
+        );
+    };
+    if args.package.is_some() || args.bundles.len() > 1 {
+        bail!(
+            "a page shows bundles, or one file of splats alone; make a bundle of {} with `pocketsplat import {word} -o scene.psb`, or look \
+             at it with `pocketsplat view {word} -o {}`",
+            splats.display(),
+            shell_word(page)
+        );
+    }
+    check_page(page)?;
+    let text = splats::page(splats, &args.stand)?;
+    output::write_whole(page, text.as_bytes())?;
+    println!("{}: {:.2} MB; open it in a browser", page.display(), text.len() as f64 / 1e6);
+    if args.open { open(page) } else { Ok(()) }
 }
 
 /// Fails, before anything is written, where `path` can be no page.

@@ -11,6 +11,7 @@ mod explicit;
 mod export;
 mod fixture;
 mod gpu;
+mod import;
 mod interruption;
 mod modules;
 mod plan;

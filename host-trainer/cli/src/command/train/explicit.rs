@@ -199,7 +199,7 @@ fn train_in(
 
 fn write(trainer: &CloudTrainer<'_>, config: &ExplicitRunConfig, capture: &Capture) -> Result<ExplicitResult> {
     let protocol = Protocol::of(capture, &config.capture);
-    let notes = GaussiansFile::notes_of(&protocol)?;
+    let notes = GaussiansFile::notes_of(Some(&protocol), capture.train.iter().map(|view| &view.camera))?;
     let bytes = format_of(config)?.to_bytes(&trainer.gaussians(), &notes)?;
     output::write_whole(&config.output, &bytes)?;
     let held_out = if capture.test.is_empty() {

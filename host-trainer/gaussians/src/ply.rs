@@ -3,7 +3,7 @@
 //!
 //! Opacities are logits, scales natural logarithms, rotations quaternions with w first. `f_rest` keeps all coefficients of red first,
 //! then of green, then of blue. The axes are the scene's own: x right, y down, z forward in what this project writes. Comments of the
-//! header say how opacities are meant (`SplatRenderMode: mip` with compensation, else `default`), the degree, and the vertical axis.
+//! header say how opacities are meant (`SplatRenderMode: mip` with compensation, else `default`) and the degree.
 
 mod header;
 mod rows;
@@ -48,11 +48,7 @@ pub fn write(gaussians: &Gaussians, notes: &Notes) -> Vec<u8> {
 fn header_text(gaussians: &Gaussians, notes: &Notes, n_rest: usize) -> String {
     let mode = if notes.compensation { "mip" } else { "default" };
     let mut text = String::from("ply\nformat binary_little_endian 1.0\n");
-    let own = [
-        format!("{RENDER_MODE} {mode}"),
-        format!("SH degree: {}", gaussians.degree.number()),
-        "Vertical axis: y".to_owned(),
-    ];
+    let own = [format!("{RENDER_MODE} {mode}"), format!("SH degree: {}", gaussians.degree.number())];
     // A line break in a comment would end it.
     let given = notes.comments.iter().flat_map(|comment| comment.lines()).map(str::to_owned);
     for comment in own.into_iter().chain(given) {
@@ -105,7 +101,7 @@ fn notes_of(header: &Header) -> Result<Notes, Unreadable> {
                     )));
                 }
             };
-        } else if !(comment.starts_with("SH degree:") || comment.starts_with("Vertical axis:")) {
+        } else if !comment.starts_with("SH degree:") {
             notes.comments.push((*comment).to_owned());
         }
     }

@@ -10,7 +10,7 @@ use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::Image;
 use pocketsplat_core::Bundle;
 use pocketsplat_files::Output;
-use pocketsplat_gaussians::{Degree, Format, Gaussians, Notes};
+use pocketsplat_gaussians::{Degree, Format, Gaussians};
 use pocketsplat_trainer::bundle::{decoded_scene, normalisation_of};
 use pocketsplat_trainer::explicit::frame;
 use pocketsplat_trainer::explicit::render::Renderer;
@@ -170,12 +170,13 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         }
         None => None,
     };
-    let (cameras, mut notes) = match &capture {
+    let (cameras, protocol) = match &capture {
         Some((options, capture)) => {
-            (Cameras::of_capture(&file, &bundle, capture)?, GaussiansFile::notes_of(&Protocol::of(capture, options))?)
+            (Cameras::of_capture(&file, &bundle, capture)?, Some(Protocol::of(capture, options)))
         }
-        None => (Cameras::generated(&bundle)?, Notes::default()),
+        None => (Cameras::generated(&bundle)?, None),
     };
+    let mut notes = GaussiansFile::notes_of(protocol.as_ref(), cameras.fitted.iter())?;
 
     let degree = Degree::ALL[usize::from(args.sh_degree)];
     let (gaussians, n_left_out) = source.gaussians(&cameras, degree, args.iterations.unwrap_or(ITERATIONS))?;

@@ -4,10 +4,12 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
+use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Background, Capture, Normalisation};
 use pocketsplat_gaussians::{Format, Gaussians, Notes};
 use pocketsplat_trainer::explicit::frame;
 use pocketsplat_trainer::explicit::render::Renderer;
+use pocketsplat_trainer::explicit::up::Up;
 
 use super::capture::CaptureArgs;
 use crate::config::{CaptureOptions, Protocol};
@@ -15,6 +17,8 @@ use crate::say::say;
 
 /// Begins each comment that is a line of the protocol.
 const PROTOCOL: &str = "pocketsplat ";
+/// Begins the comment that says which axis points up, as other programs write it too.
+const VERTICAL_AXIS: &str = "Vertical axis:";
 
 /// A file of Gaussians, read.
 pub(crate) struct GaussiansFile {
@@ -49,9 +53,21 @@ impl GaussiansFile {
     }
 
     /// What a run writes beside its Gaussians.
-    pub(crate) fn notes_of(protocol: &Protocol) -> Result<Notes> {
-        let comments = protocol.to_text()?.lines().map(|line| format!("{PROTOCOL}{line}")).collect();
+    ///
+    /// * `cameras`: which photographs were taken with, upright for the most part.
+    pub(crate) fn notes_of<'a>(
+        protocol: Option<&Protocol>,
+        cameras: impl Iterator<Item = &'a Camera>,
+    ) -> Result<Notes> {
+        let text = protocol.map(Protocol::to_text).transpose()?.unwrap_or_default();
+        let up = Up::of_cameras(cameras).map(|up| format!("{VERTICAL_AXIS} {}", up.comment()));
+        let comments = up.into_iter().chain(text.lines().map(|line| format!("{PROTOCOL}{line}"))).collect();
         Ok(Notes { comments, ..Notes::default() })
+    }
+
+    /// The axis that points up, if the file says so.
+    pub(crate) fn up(&self) -> Option<Up> {
+        self.notes.comments.iter().find_map(|comment| Up::of_comment(comment.strip_prefix(VERTICAL_AXIS)?))
     }
 
     /// Loads the capture as that of the file was prepared, but for what the command line says; warns where it is another one.

@@ -11,12 +11,12 @@ use pocketsplat_core::budget::MAX_FRAME_PX;
 use pocketsplat_files::shell_word;
 use pocketsplat_trainer::explicit::bulk::Bulk;
 use pocketsplat_trainer::explicit::pictures::{Pictures, capture};
-use pocketsplat_trainer::explicit::views::generated;
 use serde::Serialize;
 
 use super::gaussians::GaussiansFile;
 use super::outputs::{BUNDLE, OverwriteArgs, check_name};
 use super::settings::QualityOptions;
+use super::stand::{StandArgs, bulk_of};
 use super::train::{HeldOut, TrainResult, train_as};
 use super::train_args::{DeviceArgs, check_lambda};
 use super::{output, process};
@@ -42,7 +42,7 @@ const LAMBDA: f64 = 0.0005;
 
 /// Compress splats that exist already: draw pictures of a .ply, .spz or .sog, train a bundle on them, and measure what it lost.
 ///
-/// Cameras stand around the scene's bulk, or inside it where it lies all around its centre; --cameras gives others.
+/// Cameras stand around the scene's bulk or inside it, wherever more of it is seen; --cameras gives others.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// The .ply, .spz or .sog.
@@ -51,6 +51,8 @@ pub(crate) struct Args {
     /// [default: generated]
     #[arg(long, value_name = "FILE.json", help_heading = INPUT)]
     cameras: Option<PathBuf>,
+    #[command(flatten)]
+    stand: StandArgs,
     /// Generated cameras to train with; one for every seven of them is added to measure with.
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(7..=10_000),
         conflicts_with = "cameras", help_heading = INPUT)]
@@ -92,6 +94,8 @@ struct ImportResult {
     /// How many times smaller the bundle is.
     times_smaller: f64,
     original_gaussians: usize,
+    /// Of them, those where no anchor begins, because they lie too far out.
+    n_strays: usize,
     n_anchors: usize,
     drawn_offsets: usize,
     /// Of the bundle's frames to the original's, from cameras that training did not have.
@@ -120,8 +124,8 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let mut outputs = args.cameras.iter().fold(outputs, |outputs, path| outputs.reading(path));
     let output = outputs.file(&args.output, BUNDLE)?;
     let file = GaussiansFile::read(&args.points)?;
-    let (train, test) = cameras(args, config.capture.resolution, &file)?;
-    let capture = captured(args, &file, &train, &test)?;
+    let Seen { bulk, train, test } = seen(args, config.capture.resolution, &file)?;
+    let capture = captured(args, &file, &bulk, [&train, &test])?;
     say!(
         "{} Gaussians in {:.1} MB, drawn from {} cameras, {} of them held out",
         file.gaussians.len(),
@@ -131,7 +135,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     );
     let train = config.train.resolved_for(&capture);
     let trained = train_as(&capture, train, &config.capture, &config.encoding, &output)?;
-    output::print(&result(&file, &capture, trained)?, args.json)?;
+    output::print(&result(&file, &bulk, &capture, trained)?, args.json)?;
     if output.is_file() {
         say!("see it:  pocketsplat view {} -o scene.html", shell_word(&args.output));
     }
@@ -162,20 +166,26 @@ fn configured(args: &Args) -> Result<RunConfig> {
     Ok(config)
 }
 
-/// Cameras to train with, and those that are held out.
-///
+/// What is seen, and from where.
+struct Seen {
+    bulk: Bulk,
+    train: Vec<Camera>,
+    /// Held out.
+    test: Vec<Camera>,
+}
+
 /// * `size`: of the pictures, if it is asked for.
-fn cameras(args: &Args, size: Option<FrameSize>, file: &GaussiansFile) -> Result<(Vec<Camera>, Vec<Camera>)> {
-    let all = match &args.cameras {
-        Some(path) => cameras::of_file(path, size, LONGEST_PX)?,
+fn seen(args: &Args, size: Option<FrameSize>, file: &GaussiansFile) -> Result<Seen> {
+    let (bulk, all) = match &args.cameras {
+        Some(path) => {
+            args.stand.refuse("--cameras has some")?;
+            (bulk_of(&args.points, file)?, cameras::of_file(path, size, LONGEST_PX)?)
+        }
         None => {
             let size_px = size.map_or([LONGEST_PX; 2], |frame| [frame.width_px, frame.height_px]);
-            let bulk = Bulk::of(&file.gaussians).with_context(|| {
-                format!("nothing in {} is opaque enough to stand cameras around; give --cameras", args.points.display())
-            })?;
-            let (n, place) = (args.views as usize, if bulk.surrounds { "inside" } else { "around" });
-            say!("cameras stand {place} the bulk at {:.3}, radius {:.3}", bulk.centre, bulk.radius);
-            generated(&bulk, n * HELD_OUT_EVERY / (HELD_OUT_EVERY - 1), size_px)
+            let stand = args.stand.stand(&args.points, file)?;
+            let all = stand.cameras(args.views as usize * HELD_OUT_EVERY / (HELD_OUT_EVERY - 1), size_px);
+            (stand.bulk, all)
         }
     };
     let largest = all.iter().map(|camera| camera.width_px.max(camera.height_px)).max().unwrap_or(0);
@@ -191,17 +201,19 @@ fn cameras(args: &Args, size: Option<FrameSize>, file: &GaussiansFile) -> Result
     if train.len() < 2 || test.is_empty() {
         bail!("there are {} cameras, needs {HELD_OUT_EVERY}: one in so many is held out", train.len() + test.len());
     }
-    Ok((train, test))
+    Ok(Seen { bulk, train, test })
 }
 
-fn captured(args: &Args, file: &GaussiansFile, train: &[Camera], test: &[Camera]) -> Result<Capture> {
+/// * `cameras`: to train with, and held out.
+fn captured(args: &Args, file: &GaussiansFile, bulk: &Bulk, cameras: [&[Camera]; 2]) -> Result<Capture> {
     let background = args.background.rgb8().map(|channel| f32::from(channel) / 255.0);
     let how = Pictures { compensation: file.compensation(), background, n_points: N_POINTS, seed: args.seed };
-    let capture = capture(&file.gaussians, train, test, &how);
+    let centre = args.cameras.is_none().then_some(bulk.centre);
+    let capture = capture(&file.gaussians, bulk, centre, cameras, &how);
     capture.with_context(|| "all cameras stand in one point; give --cameras that stand apart".to_owned())
 }
 
-fn result(file: &GaussiansFile, capture: &Capture, trained: TrainResult) -> Result<ImportResult> {
+fn result(file: &GaussiansFile, bulk: &Bulk, capture: &Capture, trained: TrainResult) -> Result<ImportResult> {
     let TrainResult { bundle, bundle_bytes, n_anchors, drawn_offsets, iterations, train_s, .. } = trained;
     let HeldOut { psnr_db, ssim, n_test_views, .. } = trained.held_out.context("cameras are held out")?;
     Ok(ImportResult {
@@ -210,6 +222,7 @@ fn result(file: &GaussiansFile, capture: &Capture, trained: TrainResult) -> Resu
         original_bytes: file.n_bytes,
         times_smaller: file.n_bytes as f64 / bundle_bytes as f64,
         original_gaussians: file.gaussians.len(),
+        n_strays: bulk.n_strays,
         n_anchors,
         drawn_offsets,
         psnr_to_original_db: psnr_db,

@@ -30,6 +30,7 @@ mod render;
 mod report;
 mod runs;
 mod settings;
+mod stand;
 mod stop;
 mod sweep;
 mod synth;

@@ -21,6 +21,7 @@ use super::eval::{Renderer, reference_image};
 use super::gaussians::GaussiansFile;
 use super::output;
 use super::outputs::{OverwriteArgs, reading_capture};
+use super::stand::StandArgs;
 use crate::config::CaptureOptions;
 use crate::config::named::{SPLITS, one_of};
 pub(super) use cameras::CameraRecord;
@@ -32,7 +33,7 @@ const OF_A_CAPTURE: [&str; 7] = ["dataset", "split", "max_resolution", "backgrou
 
 /// Draw a bundle as pictures: views of a capture, the bundle's own camera, a turn around it, or cameras of a file.
 ///
-/// Of a .ply, .spz or .sog it draws views of a capture.
+/// So it does for a .ply, .spz or .sog; one without a camera of its own is looked at from where `import` would begin.
 #[derive(clap::Args)]
 #[command(group = clap::ArgGroup::new("cameras").required(true).args(["view", "all", "preview", "orbit", "camera"]))]
 pub(crate) struct Args {
@@ -43,6 +44,8 @@ pub(crate) struct Args {
     dataset: Option<PathBuf>,
     #[command(flatten)]
     options: CaptureOptions,
+    #[command(flatten)]
+    stand: StandArgs,
     /// Which view of the split, from 0.
     #[arg(long, value_name = "I")]
     view: Option<usize>,
@@ -79,10 +82,11 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let mut outputs = args.outputs();
     let target = Target::checked(&args.output, format, &mut outputs)?;
     let (shots, pictures) = if GaussiansFile::is_one(&args.bundle) {
-        let (shots, pictures) = explicit::draw(args)?;
-        format.check(shots.len(), args.contact_sheet, &args.output)?;
-        (shots, pictures)
+        let scene = explicit::Shown::read(args)?;
+        format.check(scene.shots.len(), args.contact_sheet, &args.output)?;
+        scene.draw()
     } else {
+        args.stand.refuse("a bundle has a camera of its own")?;
         let file = BundleFile::read(&args.bundle)?;
         let bundle = file.parse()?;
         let shots = shots(args, &file, &bundle)?;

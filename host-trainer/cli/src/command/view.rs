@@ -1,24 +1,29 @@
-//! `pocketsplat view`: a page that draws bundles in a browser.
+//! `pocketsplat view`: a page that draws bundles in a browser, or shows splats from all around.
+
+mod splats;
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
-use pocketsplat_files::{Output, Outputs};
-use pocketsplat_viewer::{SceneFile, package};
+use pocketsplat_files::{Output, Outputs, shell_word};
+use pocketsplat_viewer::{SceneFile, package, page};
 
 use super::bundle::BundleFile;
+use super::gaussians::GaussiansFile;
 use super::output;
 use super::outputs::{ANYTHING, OverwriteArgs, PAGE, check_name};
+use super::stand::StandArgs;
 
 /// Write one page that draws bundles in a browser, with nothing to install and nothing fetched.
 ///
 /// The page turns the scene by mouse, touch and keys. Sliders set what a device has: memory, pruning rate, quality. It shows the plan and
-/// the very pixels of the device. Several bundles stand side by side with one camera.
+/// the very pixels of the device. Several bundles stand side by side with one camera. Of a .ply, .spz or .sog the page shows pictures of a turn
+/// around it, and what the file holds.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// The bundles.
+    /// The bundles, or one .ply, .spz or .sog.
     #[arg(required = true, value_name = "SCENE.psb")]
     bundles: Vec<PathBuf>,
     /// The page to write.
@@ -32,15 +37,20 @@ pub(crate) struct Args {
     package: Option<PathBuf>,
     #[command(flatten)]
     overwrite: OverwriteArgs,
+    stand: StandArgs,
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
+    if let Some(path) = args.bundles.iter().find(|path| GaussiansFile::is_one(path)) {
+        return run_splats(args, path);
+    }
+    args.stand.refuse("a bundle has a camera of its own")?;
     let files = args.bundles.iter().map(|path| BundleFile::read(path)).collect::<Result<Vec<_>>>()?;
     for file in &files {
         file.parse()?;
     }
     let mut outputs = args.bundles.iter().fold(args.overwrite.outputs(), |outputs, path| outputs.reading(path));
-    let page = args.output.as_deref().map(|path| checked_page(path, &files, &mut outputs)).transpose()?;
+    let page = args.output.as_deref().map(|path| checked_page(path, &args.bundles[0], &mut outputs)).transpose()?;
     if let (Some(folder), Some(first)) = (&args.package, files.first()) {
         write_package(folder, &first.bytes, &mut outputs, args.overwrite)?;
     }
@@ -49,9 +59,35 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     if args.open { open(page.path()) } else { Ok(()) }
 }
 
+/// Writes the page of one file of splats.
+fn run_splats(args: &Args, splats: &Path) -> Result<()> {
+    let word = shell_word(splats);
+    let Some(page) = &args.output else {
+        bail!(
+            "a package draws bundles, and {} holds splats; make a bundle with `pocketsplat import {word} -o scene.psb`",
+            splats.display()
+        );
+    };
+    if args.package.is_some() || args.bundles.len() > 1 {
+        bail!(
+            "a page shows bundles, or one file of splats alone; make a bundle of {} with `pocketsplat import {word} -o scene.psb`, or look \
+             at it with `pocketsplat view {word} -o {}`",
+            splats.display(),
+            shell_word(page)
+        );
+    }
+    let mut outputs = args.overwrite.outputs().reading(splats);
+    let page = checked_page(page, splats, &mut outputs)?;
+    let text = splats::page(splats, &args.stand)?;
+    write(&page, &text)?;
+    if args.open { open(page.path()) } else { Ok(()) }
+}
+
 /// Fails, before anything is written, where `path` can be no page.
-fn checked_page(path: &Path, files: &[BundleFile], outputs: &mut Outputs) -> Result<Output> {
-    check_name(path, PAGE, files.first().map(|file| file.path.as_path()))?;
+///
+/// * `source`: what it shows.
+fn checked_page(path: &Path, source: &Path, outputs: &mut Outputs) -> Result<Output> {
+    check_name(path, PAGE, Some(source))?;
     let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
     if extension != "html" && extension != "htm" {
         bail!("{}: a page is written as .html; end the name in it", path.display());
@@ -64,6 +100,10 @@ fn write_page(page: &Output, files: &[BundleFile]) -> Result<()> {
     let scenes: Vec<SceneFile<'_>> =
         names.iter().zip(files).map(|(name, file)| SceneFile { name, bytes: &file.bytes }).collect();
     let text = pocketsplat_viewer::page(&names.join(" | "), &scenes);
+    write(page, &text)
+}
+
+fn write(page: &Output, text: &str) -> Result<()> {
     page.write(text.as_bytes())?;
     output::print_text(&format!("{}: {:.2} MB; open it in a browser\n", page.path().display(), text.len() as f64 / 1e6))
 }

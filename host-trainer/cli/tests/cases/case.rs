@@ -94,7 +94,8 @@ impl Said {
     /// PSNR of `train`'s held-out views, or of `import`'s cameras, dB.
     fn psnr_db(&self) -> f64 {
         let after = |line: &str, word: &str| Some(line.split_once(word)?.1.split_whitespace().next()?.parse().ok());
-        let found = self.text.lines().find_map(|line| after(line, "quality: ").or_else(|| after(line, "psnr_to_original_db")));
+        let found =
+            self.text.lines().find_map(|line| after(line, "quality: ").or_else(|| after(line, "psnr_to_original_db")));
         found.flatten().unwrap_or_else(|| panic!("no PSNR: {self}"))
     }
 

@@ -72,7 +72,13 @@ fn every_case_has_a_test() {
     if !root().is_dir() {
         return;
     }
-    let sources = [include_str!("captures.rs"), include_str!("splats.rs"), include_str!("formats.rs"), include_str!("outputs.rs"), include_str!("main.rs")];
+    let sources = [
+        include_str!("captures.rs"),
+        include_str!("splats.rs"),
+        include_str!("formats.rs"),
+        include_str!("outputs.rs"),
+        include_str!("main.rs"),
+    ];
     for entry in fs::read_dir(root()).unwrap() {
         let name = entry.unwrap().file_name().into_string().unwrap();
         assert!(sources.iter().any(|source| source.contains(&format!("\"{name}\""))), "no test of {name}");

@@ -16,7 +16,8 @@ fn one_bad_gaussian_costs_nothing() {
 #[test]
 fn a_figure_stands_upright() {
     let Some(case) = Case::find("import-figure-on-its-side") else { return };
-    let import = ["import", "figure.ply", "-o", "f.psb", "--resolution", "64x64", "--views", "24", "--iterations", "150"];
+    let import =
+        ["import", "figure.ply", "-o", "f.psb", "--resolution", "64x64", "--views", "24", "--iterations", "150"];
     case.run(&import).succeeds(&["--up"]);
     case.run(&["render", "f.psb", "--preview", "-o", "f.png"]).succeeds(&[]);
     let picture = image::open(case.folder.join("f.png")).unwrap().to_rgb8();
@@ -34,7 +35,8 @@ fn a_figure_stands_upright() {
 #[test]
 fn a_hollow_object_is_seen_from_outside() {
     let Some(case) = Case::find("import-hollow-object") else { return };
-    let import = ["import", "ball.ply", "-o", "ball.psb", "--resolution", "64x64", "--views", "24", "--iterations", "100"];
+    let import =
+        ["import", "ball.ply", "-o", "ball.psb", "--resolution", "64x64", "--views", "24", "--iterations", "100"];
     let said = case.run(&import);
     said.succeeds(&["around", "--inside"]);
 }

@@ -12,6 +12,7 @@ mod explicit;
 mod export;
 mod fixture;
 mod gpu;
+mod import;
 mod interruption;
 mod modules;
 mod outputs;

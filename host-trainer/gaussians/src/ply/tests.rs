@@ -42,9 +42,7 @@ fn the_layout_is_the_published_one() {
         (names[0], names[6], names[9], names[54], names[55], names[58]),
         ("x", "f_dc_0", "f_rest_0", "opacity", "scale_0", "rot_0")
     );
-    assert!(header.contains(
-        "comment SplatRenderMode: default\ncomment SH degree: 3\ncomment Vertical axis: y\nelement vertex 3\n"
-    ));
+    assert!(header.contains("comment SplatRenderMode: default\ncomment SH degree: 3\nelement vertex 3\n"));
     let body = &bytes[bytes.len() - 3 * 62 * 4..];
     let number = |index: usize| f32::from_le_bytes(body[4 * index..4 * index + 4].try_into().expect("4 bytes"));
     // Channel after channel, 15 coefficients each.

@@ -2,7 +2,8 @@
 //!
 //! [`cloud`] holds them in any number type, [`step`] draws one view and takes its loss back to them, [`render`] makes pictures of a file's,
 //! [`train`] the rest of a run: [`start`], [`optimiser`], [`density`], [`checkpoint`]. For those that come without
-//! photographs, [`bulk`] says where they are, [`views`] stands cameras around them, and [`pictures`] makes a capture of what these see.
+//! photographs, [`bulk`] says where they are, [`side`] from which side they were made to be seen, [`views`] stands cameras there, upright to
+//! [`up`], and [`pictures`] makes a capture of what these see.
 
 pub mod bulk;
 pub mod checkpoint;
@@ -13,9 +14,13 @@ pub mod frame;
 pub mod optimiser;
 pub mod pictures;
 pub mod render;
+pub mod side;
 pub mod start;
 pub mod step;
+#[cfg(test)]
+mod test_scenes;
 pub mod train;
+pub mod up;
 pub mod views;
 
 pub use cloud::Cloud;

@@ -8,9 +8,10 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
+use super::bulk::{self, Bulk};
 use super::frame;
 use super::render::Renderer;
-use super::{bulk, views};
+use super::views;
 
 /// How pictures are taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,16 +26,24 @@ pub struct Pictures {
     pub seed: u64,
 }
 
-/// What `train` and `test` see of the Gaussians, and some of their centres as points: more where they are opaque and large.
+/// What `train` and `test` see of the Gaussians, and some of their centres as points: more where they are opaque and large, and none
+/// where strays are.
 ///
 /// `None` where the training cameras all stand in one point, or no Gaussian is there.
 ///
-/// * `train`, `test`: cameras in the frame of the Gaussians.
-pub fn capture(gaussians: &Gaussians, train: &[Camera], test: &[Camera], how: &Pictures) -> Option<Capture> {
-    let normalisation = views::normalisation_of(train)?;
+/// * `train`, `test`: cameras in the frame of the Gaussians. * `bulk`: of the Gaussians. * `centre`: what becomes the origin, which a
+///   device turns its camera around; without it the middle of the cameras.
+pub fn capture(
+    gaussians: &Gaussians,
+    bulk: &Bulk,
+    centre: Option<DVec3>,
+    [train, test]: [&[Camera]; 2],
+    how: &Pictures,
+) -> Option<Capture> {
+    let normalisation = views::normalisation_of(train, centre)?;
+    let points: Vec<DVec3> = points(gaussians, bulk, how).into_iter().map(|p| normalisation.point(p)).collect();
     let mut normalised = gaussians.clone();
     frame::to_normalised(&mut normalised, &normalisation);
-    let points = points(&normalised, how);
     if points.is_empty() {
         return None;
     }
@@ -60,22 +69,22 @@ pub fn capture(gaussians: &Gaussians, train: &[Camera], test: &[Camera], how: &P
 }
 
 /// A draw without replacement, by opacity and size: the largest of u^(1/w) (Efraimidis and Spirakis 2006).
-fn points(gaussians: &Gaussians, how: &Pictures) -> Vec<DVec3> {
+fn points(gaussians: &Gaussians, bulk: &Bulk, how: &Pictures) -> Vec<DVec3> {
     let mut rng = ChaCha8Rng::seed_from_u64(how.seed);
     // ln u / w, which orders them alike.
     let drawn = bulk::weights(gaussians).into_iter().map(|w| (1.0 - rng.random::<f64>()).ln() / w).enumerate();
-    let mut keys: Vec<(usize, f64)> = drawn.filter(|(_, key)| key.is_finite()).collect();
+    let place = |i: usize| DVec3::from(gaussians.centres[i].map(f64::from));
+    let mut keys: Vec<(usize, f64)> = drawn.filter(|(i, key)| key.is_finite() && !bulk.is_stray(place(*i))).collect();
     keys.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     keys.truncate(how.n_points);
     keys.sort_unstable_by_key(|(i, _)| *i);
-    keys.into_iter().map(|(i, _)| DVec3::from(gaussians.centres[i].map(f64::from))).collect()
+    keys.into_iter().map(|(i, _)| place(i)).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::explicit::bulk::Bulk;
-    use crate::explicit::bulk::tests::at;
+    use crate::explicit::test_scenes::{at, stand_around};
 
     #[test]
     fn pictures_show_the_gaussians_from_the_given_cameras() {
@@ -83,12 +92,14 @@ mod tests {
             let t = f64::from(i);
             DVec3::new(t.sin(), (1.7 * t).cos(), (0.3 * t).sin()) * 2.0 + 7.0
         });
-        let mut gaussians = at(places);
+        let mut gaussians = at(places.chain([DVec3::splat(1e6)]));
         gaussians.opacity_logits[3] = -40.0;
-        let cameras = views::generated(&Bulk::of(&gaussians).unwrap(), 10, [24, 20]);
+        let bulk = Bulk::of(&gaussians).unwrap();
+        let cameras = stand_around(&gaussians).cameras(10, [24, 20]);
         let how = Pictures { compensation: false, background: [0.0; 3], n_points: 50, seed: 1 };
-        let capture = capture(&gaussians, &cameras[..8], &cameras[8..], &how).unwrap();
+        let capture = capture(&gaussians, &bulk, Some(bulk.centre), [&cameras[..8], &cameras[8..]], &how).unwrap();
         assert_eq!((capture.train.len(), capture.test.len(), capture.points.len()), (8, 2, 50));
+        assert!(capture.normalisation.point(bulk.centre).length() < 1e-12);
         let lit = |view: &View| view.photograph().unwrap().image.rgb.iter().filter(|v| **v > 60).count();
         assert!(capture.train.iter().chain(&capture.test).all(|view| lit(view) > 100));
         // As drawn in their own frame: the near plane aside, a similarity changes nothing.
@@ -96,6 +107,11 @@ mod tests {
         let differs =
             own.rgb.iter().zip(&capture.test[1].photograph().unwrap().image.rgb).map(|(a, b)| a.abs_diff(*b)).max();
         assert!(differs <= Some(1), "{differs:?}");
-        assert_eq!(super::capture(&gaussians, &cameras[..1], &[], &how).map(|c| c.points.len()), None);
+        // All but the one that is transparent and the stray.
+        let all = Pictures { n_points: 1000, ..how };
+        let points = super::capture(&gaussians, &bulk, None, [&cameras[..8], &[]], &all).unwrap().points;
+        assert_eq!(points.len(), 199);
+        assert!(points.iter().all(|point| point.length() < 10.0));
+        assert!(super::capture(&gaussians, &bulk, None, [&cameras[..1], &[]], &how).is_none());
     }
 }

@@ -30,6 +30,14 @@ pub struct Drawing<R> {
     lists: TileLists,
 }
 
+impl<R: Real> Drawing<R> {
+    /// Σ α·T over the pixels for each splat, times the first channel of `weights`: what it gives the image.
+    pub fn light(&self, level: Level, weights: &TiledImage<R>) -> Vec<R> {
+        let Self { image, splats, footprints, lists, .. } = self;
+        rasterise::backward(level, splats, footprints, lists, image, weights).iter().map(|d| d.colour[0]).collect()
+    }
+}
+
 /// What a step gives back.
 pub struct CloudGradients<R> {
     /// The loss.

@@ -1,44 +1,127 @@
 //! Cameras for a scene that came without: around its bulk, or inside it.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 use glam::{DMat3, DVec3};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{EXTENT, Normalisation};
 
 use super::bulk::Bulk;
+use super::up::Up;
 
 /// Field of view along the shorter side, around a bulk and inside it, radians.
 const FIELD_AROUND: f64 = 0.7;
-const FIELD_INSIDE: f64 = 1.3;
+pub(super) const FIELD_INSIDE: f64 = 1.3;
 
 /// Distances around a bulk: from this share of the one at which it fills the picture to the other.
 const DISTANCES: [f64; 2] = [0.85, 1.15];
 
 /// How far inside a room cameras leave its centre, share of the way to its walls.
 const INSIDE_SHARE: f64 = 0.45;
+/// Places that are tried for each camera inside until one is free.
+const TRIES: usize = 16;
 
-/// `n` cameras that see the bulk from all sides, or from its inside all around; the first ones of more are the same.
-///
-/// Directions and places follow the additive recurrence of Roberts (2018), whose every beginning is spread evenly.
-///
-/// * `size_px`: width and height.
-pub fn generated(bulk: &Bulk, n: usize, size_px: [u32; 2]) -> Vec<Camera> {
-    (0..n).map(|i| if bulk.surrounds { inside(bulk, i, size_px) } else { around(bulk, i, size_px) }).collect()
+/// Height of the first camera around a bulk above its middle, as an angle: nearly level, radians.
+const FIRST_RISE: f64 = 0.15;
+/// Sine of the least height of cameras above the ground.
+const ABOVE_GROUND: f64 = 0.1;
+
+/// From which side a scene is seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// As an object.
+    Around,
+    /// As a room.
+    Inside,
 }
 
-fn around(bulk: &Bulk, i: usize, size_px: [u32; 2]) -> Camera {
-    let [a, b, c, ..] = spread(i);
-    let [nearest, farthest] = DISTANCES;
-    let distance = bulk.radius / (0.5 * FIELD_AROUND).sin() * (nearest + (farthest - nearest) * c);
-    let direction = on_sphere(a, b);
-    camera(bulk.centre + direction * distance, -direction, FIELD_AROUND, size_px)
+/// Where cameras stand, and how they are held.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stand {
+    /// What they look at, or stand in.
+    pub bulk: Bulk,
+    /// Pictures are upright to it.
+    pub up: Up,
+    /// Around the bulk or inside it.
+    pub side: Side,
+    /// Whether none stands below the middle of the bulk, because its ground hides what is on it.
+    pub above_ground: bool,
+    /// Angle about the up axis at which the first camera stands, radians.
+    pub front: f64,
 }
 
-fn inside(bulk: &Bulk, i: usize, size_px: [u32; 2]) -> Camera {
-    let [a, b, x, y, z] = spread(i);
-    let place = bulk.centre + bulk.half_range * INSIDE_SHARE * (2.0 * DVec3::new(x, y, z) - 1.0);
-    camera(place, on_sphere(a, b), FIELD_INSIDE, size_px)
+impl Stand {
+    /// `n` cameras that see the bulk from all sides, or from its inside all around; the first ones of more are the same.
+    ///
+    /// The very first one is upright, nearly level, and outside the ground; around a bulk it has all of it in its picture. The others'
+    /// directions and places follow the additive recurrence of Roberts (2018), whose every beginning is spread evenly.
+    ///
+    /// * `size_px`: width and height.
+    pub fn cameras(&self, n: usize, size_px: [u32; 2]) -> Vec<Camera> {
+        (0..n)
+            .map(|i| match (self.side, i) {
+                (_, 0) => self.turned(0.0, size_px),
+                (Side::Around, _) => self.around(i, size_px),
+                (Side::Inside, _) => self.inside(i, size_px),
+            })
+            .collect()
+    }
+
+    /// The first camera, carried around the up axis through the middle of the bulk.
+    ///
+    /// * `angle`: radians; counter-clockwise from above.
+    pub fn turned(&self, angle: f64, size_px: [u32; 2]) -> Camera {
+        let azimuth = self.front + angle;
+        match self.side {
+            Side::Around => {
+                let direction = direction(self.up, FIRST_RISE.sin(), azimuth);
+                around_at(&self.bulk, self.up, direction, DISTANCES[1], size_px)
+            }
+            Side::Inside => {
+                let across = self.up.upright().transpose() * self.bulk.half_range;
+                let reach = INSIDE_SHARE * across.abs().truncate().min_element();
+                let out = direction(self.up, 0.0, azimuth);
+                camera(self.bulk.centre + out * reach, -out, self.up, FIELD_INSIDE, size_px)
+            }
+        }
+    }
+
+    /// The frame in which a bulk is drawn by itself: its middle at the origin, the farthest camera of its own at [`EXTENT`].
+    pub fn normalisation(bulk: &Bulk) -> Normalisation {
+        let farthest = bulk.radius / (0.5 * FIELD_AROUND).sin() * DISTANCES[1];
+        Normalisation { centre: bulk.centre, scale: EXTENT / farthest }
+    }
+
+    fn around(&self, i: usize, size_px: [u32; 2]) -> Camera {
+        let [a, b, c, ..] = spread(i);
+        let [nearest, farthest] = DISTANCES;
+        let lowest = if self.above_ground { ABOVE_GROUND } else { -1.0 };
+        let direction = direction(self.up, 1.0 - (1.0 - lowest) * a, TAU * b);
+        around_at(&self.bulk, self.up, direction, nearest + (farthest - nearest) * c, size_px)
+    }
+
+    fn inside(&self, i: usize, size_px: [u32; 2]) -> Camera {
+        let [a, b, ..] = spread(i);
+        let place = inside_place(&self.bulk, i);
+        camera(place, direction(self.up, 1.0 - 2.0 * a, TAU * b), self.up, FIELD_INSIDE, size_px)
+    }
+}
+
+/// A place within a bulk, the first of some that is free; the middle one of them if none is.
+pub(super) fn inside_place(bulk: &Bulk, i: usize) -> DVec3 {
+    let place = |try_: usize| {
+        let [_, _, x, y, z] = spread(i * TRIES + try_);
+        bulk.centre + bulk.half_range * INSIDE_SHARE * (2.0 * DVec3::new(x, y, z) - 1.0)
+    };
+    (0..TRIES).map(place).find(|place| bulk.is_free(*place)).unwrap_or_else(|| place(0))
+}
+
+/// A camera that looks at the middle of a bulk.
+///
+/// * `direction`: unit vector from the middle. * `distance`: share of the one at which the bulk fills the picture.
+pub(super) fn around_at(bulk: &Bulk, up: Up, direction: DVec3, distance: f64, size_px: [u32; 2]) -> Camera {
+    let distance = bulk.radius / (0.5 * FIELD_AROUND).sin() * distance;
+    camera(bulk.centre + direction * distance, -direction, up, FIELD_AROUND, size_px)
 }
 
 /// Five numbers in 0..1: the fractions of (i + ½)·φ⁻ᵏ, where φ⁶ = φ + 1.
@@ -47,84 +130,67 @@ fn spread(i: usize) -> [f64; 5] {
     [1, 2, 3, 4, 5].map(|k| ((i as f64 + 0.5) * PHI.powi(-k)).fract())
 }
 
-fn on_sphere(a: f64, b: f64) -> DVec3 {
-    let z = 1.0 - 2.0 * a;
-    let radius = (1.0 - z * z).max(0.0).sqrt();
-    let (sin, cos) = (TAU * b).sin_cos();
-    DVec3::new(radius * cos, radius * sin, z)
+/// A unit vector.
+///
+/// * `rise`: sine of its height. * `azimuth`: angle about the up axis, radians.
+pub(super) fn direction(up: Up, rise: f64, azimuth: f64) -> DVec3 {
+    let reach = (1.0 - rise * rise).max(0.0).sqrt();
+    let (sin, cos) = azimuth.sin_cos();
+    up.upright() * DVec3::new(reach * cos, reach * sin, rise)
 }
 
-/// OpenCV axes: x right, y down, z forward.
-fn camera(place: DVec3, forward: DVec3, field: f64, [width_px, height_px]: [u32; 2]) -> Camera {
-    // Any direction that is not the view's.
-    let up = if forward.z.abs() < 0.9 { DVec3::Z } else { DVec3::X };
-    let right = forward.cross(up).normalize();
-    let down = forward.cross(right);
-    let rotation = DMat3::from_cols(right, down, forward).transpose();
+/// A camera that is held upright; OpenCV axes: x right, y down, z forward.
+///
+/// * `field`: of view along the shorter side, radians.
+pub(super) fn camera(place: DVec3, forward: DVec3, up: Up, field: f64, [width_px, height_px]: [u32; 2]) -> Camera {
+    let upright = up.upright();
+    // Straight up and down any other direction does.
+    let above = if forward.dot(upright.z_axis).abs() < 0.999 { upright.z_axis } else { upright.y_axis };
     let focal = 0.5 * f64::from(width_px.min(height_px)) / (0.5 * field).tan();
-    Camera {
-        rotation,
-        translation: -(rotation * place),
+    let lens = Camera {
+        rotation: DMat3::IDENTITY,
+        translation: DVec3::ZERO,
         focal_px: [focal; 2],
         principal_px: [0.5 * f64::from(width_px), 0.5 * f64::from(height_px)],
         width_px,
         height_px,
-    }
+    };
+    lens.looking_at(place, place + forward, above)
 }
 
-/// The frame in which these cameras are trained from: their mean at the origin, 1.1 × the largest distance from it [`EXTENT`].
+/// Six pictures that show all there is around a place.
+pub(super) fn all_around(place: DVec3, up: Up, side_px: u32) -> [Camera; 6] {
+    let upright = up.upright();
+    [upright.x_axis, -upright.x_axis, upright.y_axis, -upright.y_axis, upright.z_axis, -upright.z_axis]
+        .map(|forward| camera(place, forward, up, FRAC_PI_2, [side_px; 2]))
+}
+
+/// Cameras farther out than so many times the median distance do not count for the frame.
+const FAR_OUT: f64 = 10.0;
+
+/// The frame in which these cameras are trained from: `centre`, or else their mean, at the origin, 1.1 × the largest distance from it
+/// [`EXTENT`]. Cameras that stand more than ten median distances from the median place do not count.
 ///
 /// `None` where they all stand in one point.
-pub fn normalisation_of(cameras: &[Camera]) -> Option<Normalisation> {
-    let centre = cameras.iter().map(Camera::centre_world).sum::<DVec3>() / cameras.len().max(1) as f64;
-    let spread = cameras.iter().map(|camera| camera.centre_world().distance(centre)).fold(0.0, f64::max);
+pub fn normalisation_of(cameras: &[Camera], centre: Option<DVec3>) -> Option<Normalisation> {
+    let places: Vec<DVec3> = cameras.iter().map(Camera::centre_world).collect();
+    let median = DVec3::from([0, 1, 2].map(|axis| middle(places.iter().map(|place| place[axis]))));
+    let most = FAR_OUT * middle(places.iter().map(|place| place.distance(median)));
+    // Where more than half stand in one place the median says nothing.
+    let counting: Vec<DVec3> =
+        places.iter().copied().filter(|place| !(most > 0.0) || place.distance(median) <= most).collect();
+    let centre = centre.unwrap_or_else(|| counting.iter().sum::<DVec3>() / counting.len().max(1) as f64);
+    let spread = counting.iter().map(|place| place.distance(centre)).fold(0.0, f64::max);
     let scale = EXTENT / (1.1 * spread);
-    (spread > 0.0 && scale.is_finite()).then_some(Normalisation { centre, scale })
+    let apart = counting.windows(2).any(|pair| pair[0] != pair[1]);
+    (apart && scale.is_finite()).then_some(Normalisation { centre, scale })
+}
+
+fn middle(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const BULK: Bulk = Bulk {
-        centre: DVec3::new(1.0, 2.0, 3.0),
-        radius: 2.0,
-        half_range: DVec3::new(2.0, 1.0, 3.0),
-        surrounds: false,
-    };
-
-    #[test]
-    fn cameras_around_see_the_whole_bulk() {
-        let cameras = generated(&BULK, 64, [80, 60]);
-        assert_eq!(cameras[..8], generated(&BULK, 8, [80, 60])[..]);
-        for camera in &cameras {
-            let [x, y, z] = (camera.rotation * BULK.centre + camera.translation).to_array();
-            let (u, v) = (camera.focal_px[0] * x / z + 40.0, camera.focal_px[1] * y / z + 30.0);
-            assert!((u - 40.0).abs() < 1e-6 && (v - 30.0).abs() < 1e-6, "({u}, {v})");
-            assert!(z > 1.5 * BULK.radius, "outside of it");
-            assert!((camera.rotation.determinant() - 1.0).abs() < 1e-9);
-        }
-        let mean = cameras.iter().map(Camera::centre_world).sum::<DVec3>() / 64.0;
-        assert!(mean.distance(BULK.centre) < 0.5, "from all sides: {mean}");
-    }
-
-    #[test]
-    fn cameras_inside_stay_between_the_walls() {
-        let cameras = generated(&Bulk { surrounds: true, ..BULK }, 64, [80, 60]);
-        for camera in &cameras {
-            let away = (camera.centre_world() - BULK.centre).abs();
-            assert!(away.cmplt(0.5 * BULK.half_range).all(), "{away}");
-        }
-        let forward = cameras.iter().map(|c| c.rotation.transpose() * DVec3::Z).sum::<DVec3>() / 64.0;
-        assert!(forward.length() < 0.2, "all around: {forward}");
-    }
-
-    #[test]
-    fn cameras_are_normalised_as_those_of_captures() {
-        let cameras = generated(&BULK, 32, [8, 8]);
-        let normalisation = normalisation_of(&cameras).unwrap();
-        let farthest = cameras.iter().map(|c| normalisation.point(c.centre_world()).length()).fold(0.0, f64::max);
-        assert!((1.1 * farthest - EXTENT).abs() < 1e-9);
-        assert_eq!(normalisation_of(&cameras[..1]), None);
-    }
-}
+mod tests;

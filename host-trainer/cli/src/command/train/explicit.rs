@@ -219,7 +219,7 @@ fn write(
     output: &Output,
 ) -> Result<ExplicitResult> {
     let protocol = Protocol::of(capture, &config.capture);
-    let notes = GaussiansFile::notes_of(&protocol)?;
+    let notes = GaussiansFile::notes_of(Some(&protocol), capture.train.iter().map(|view| &view.camera))?;
     let format = format_of(config)?;
     let bytes = format.to_bytes(&trainer.gaussians(), &notes)?;
     output.write(&bytes)?;

@@ -1,0 +1,153 @@
+//! From which side a scene was made to be seen: as an object from around it, or as a room from its inside.
+//!
+//! What is opaque in a scene was seen by whoever made it; the rest is not there, or is thin. So small pictures are taken from around the
+//! bulk, at the heights of someone who walks around it, and from free places inside. The side that sees more of what is there is the
+//! right one.
+
+mod seen;
+
+use std::f64::consts::TAU;
+
+use glam::DVec3;
+use pocketsplat_capture::camera::Camera;
+use pocketsplat_capture::dataset::Normalisation;
+use pocketsplat_gaussians::Gaussians;
+
+use super::bulk::{Bulk, weights};
+use super::frame;
+use super::up::Up;
+use super::views::{FIELD_INSIDE, Side, all_around, around_at, camera, direction, inside_place};
+use seen::{Looker, Sight};
+
+/// Width and height of the pictures, px.
+const SIDE_PX: u32 = 64;
+/// Of those that only tell whether anything is there.
+const COARSE_PX: u32 = 16;
+/// Cameras of each height around the bulk.
+const N_AROUND: usize = 8;
+/// Sines of the heights of someone who walks around.
+const WALKING: [f64; 2] = [0.1, 0.5];
+/// Of someone below.
+const BELOW: f64 = -0.5;
+/// Places inside that are tried, and those that are looked from.
+const N_PLACES: usize = 24;
+const N_INSIDE: usize = 4;
+/// Directions of each place inside.
+const N_TURNS: usize = 6;
+/// Radius of the bulk in the frame of the pictures, where what is nearer than 0.2 is not drawn.
+const RADIUS: f64 = 5.0;
+/// What is farther out than so many radii is left out: a sky encloses everything.
+const OUTERMOST: f64 = 1.2;
+
+/// A place inside is enclosed where so much of all directions is blocked.
+const ENCLOSED: f64 = 0.6;
+/// The inside is the right side where it shows so much more of the scene …
+const MARGIN: f64 = 0.1;
+/// … or, where neither shows that much more, if colours are so many times farther from their means from around.
+const STRAY_COLOURS: f64 = 1.5;
+/// A ground hides a scene where cameras below miss this share of what those above see.
+const GROUND: f64 = 0.2;
+
+/// What the pictures show.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Evidence {
+    /// Share of all directions that something blocks, as seen from the most enclosed free place inside; 0 without one.
+    pub enclosed: f64,
+    /// Share of the bulk that is seen from around it, and from inside.
+    pub seen_around: f64,
+    /// See [`Self::seen_around`].
+    pub seen_inside: f64,
+    /// How far colours are from their means where they are seen, from around and from inside: directions that no photograph had are
+    /// extrapolated.
+    pub stray_colour_around: f64,
+    /// See [`Self::stray_colour_around`].
+    pub stray_colour_inside: f64,
+    /// Share of what is seen from around and above that is not seen from below.
+    pub hidden_from_below: f64,
+    /// Angle about the up axis from which most is seen, radians.
+    pub front: f64,
+}
+
+impl Evidence {
+    /// The side that shows more of the scene.
+    pub fn side(&self) -> Side {
+        let more_inside = self.seen_inside - self.seen_around;
+        let as_colours_say =
+            more_inside > -MARGIN && self.stray_colour_around > STRAY_COLOURS * self.stray_colour_inside;
+        if self.enclosed >= ENCLOSED && (more_inside > MARGIN || as_colours_say) { Side::Inside } else { Side::Around }
+    }
+
+    /// Whether it is hollow, and both sides show about as much of it: so do an empty room, a tube and the shell of an object.
+    pub fn could_be_either(&self) -> bool {
+        self.enclosed >= ENCLOSED && (self.seen_inside - self.seen_around).abs() <= MARGIN
+    }
+
+    /// Whether cameras below would see the underside of a ground and little else.
+    pub fn has_ground(&self) -> bool {
+        self.hidden_from_below > GROUND
+    }
+
+    /// Cost: some 200 small pictures.
+    ///
+    /// * `compensation`: whether the file asks for it.
+    pub fn of(gaussians: &Gaussians, compensation: bool, bulk: &Bulk, up: Up) -> Self {
+        let near = |i: &usize| {
+            DVec3::from(gaussians.centres[*i].map(f64::from)).distance(bulk.centre) <= OUTERMOST * bulk.radius
+        };
+        let chosen: Vec<usize> = (0..gaussians.len()).filter(near).collect();
+        let mut normalised = gaussians.clone();
+        let all = weights(gaussians);
+        let weights: Vec<f64> = chosen.iter().map(|i| all[*i]).collect();
+        let normalisation = Normalisation { centre: bulk.centre, scale: RADIUS / bulk.radius };
+        frame::to_normalised(&mut normalised, &normalisation);
+        let looker = Looker::new(&normalised, compensation, &chosen, weights);
+        let look = |cameras: &[Camera]| -> Vec<Sight> {
+            cameras.iter().map(|camera| looker.look(&normalisation.camera(camera))).collect()
+        };
+        let ring = |rise: f64| -> Vec<Camera> {
+            let azimuth = |i: usize| TAU * i as f64 / N_AROUND as f64;
+            (0..N_AROUND).map(|i| around_at(bulk, up, direction(up, rise, azimuth(i)), 1.0, [SIDE_PX; 2])).collect()
+        };
+        let low = look(&ring(WALKING[0]));
+        let front = (0..N_AROUND)
+            .max_by(|a, b| looker.share(&low[*a]).total_cmp(&looker.share(&low[*b])))
+            .map_or(0.0, |i| TAU * i as f64 / N_AROUND as f64);
+        let around: Vec<Sight> = low.into_iter().chain(look(&ring(WALKING[1]))).collect();
+        let (above, below) = (looker.best(&around), looker.best(&look(&ring(BELOW))));
+        let seen_around = looker.weighted(above.iter().copied());
+        let seen_both = looker.weighted(above.iter().zip(&below).map(|(above, below)| above.min(*below)));
+
+        let mut places: Vec<(f64, DVec3)> = (0..N_PLACES)
+            .map(|i| inside_place(bulk, i))
+            .filter(|place| bulk.is_free(*place))
+            .map(|place| {
+                let cameras = all_around(place, up, COARSE_PX).map(|camera| normalisation.camera(&camera));
+                (looker.blocked(&cameras), place)
+            })
+            .collect();
+        places.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let enclosed = places.first().map_or(0.0, |(share, _)| *share);
+        let turned = |place: DVec3| {
+            (0..N_TURNS).flat_map(move |i| {
+                [0.5, -0.5].map(|rise| {
+                    let forward = direction(up, rise, TAU * i as f64 / N_TURNS as f64);
+                    camera(place, forward, up, FIELD_INSIDE, [SIDE_PX; 2])
+                })
+            })
+        };
+        let cameras: Vec<Camera> = places.iter().take(N_INSIDE).flat_map(|(_, place)| turned(*place)).collect();
+        let inside = look(&cameras);
+        Self {
+            enclosed,
+            seen_around,
+            seen_inside: looker.weighted(looker.best(&inside).into_iter()),
+            stray_colour_around: looker.stray_colour(&around),
+            stray_colour_inside: looker.stray_colour(&inside),
+            hidden_from_below: if seen_around > 0.0 { 1.0 - seen_both / seen_around } else { 0.0 },
+            front,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

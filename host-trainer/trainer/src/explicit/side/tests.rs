@@ -1,0 +1,50 @@
+use super::*;
+use crate::explicit::pictures::{Pictures, capture};
+use crate::explicit::test_scenes::{TestScene, all};
+use crate::explicit::{CloudConfig, CloudTrainer};
+
+fn evidence(gaussians: &Gaussians) -> Evidence {
+    let bulk = Bulk::of(gaussians).expect("something opaque");
+    Evidence::of(gaussians, false, &bulk, Up::PLUS_Z)
+}
+
+/// The scene as 3DGS learns it from what its cameras see.
+fn learned(scene: &TestScene, iterations: u32) -> Gaussians {
+    let bulk = Bulk::of(&scene.gaussians).expect("something opaque");
+    let how = Pictures { compensation: false, background: [0.0; 3], n_points: 1500, seed: 1 };
+    let capture =
+        capture(&scene.gaussians, &bulk, None, [&scene.cameras, &[]], &how).expect("cameras that stand apart");
+    let mut config = CloudConfig { iterations, ..CloudConfig::default() };
+    config.density.interval = 25;
+    let mut trainer = CloudTrainer::new(&capture, config).expect("a run");
+    while !trainer.is_done() {
+        trainer.advance().expect("a step");
+    }
+    trainer.gaussians()
+}
+
+#[test]
+#[ignore = "prints the table of docs/experiments/import-cameras.md"]
+fn table() {
+    for scene in all() {
+        for how in ["painted", "learned"] {
+            let gaussians = if how == "painted" { scene.gaussians.clone() } else { learned(&scene, 600) };
+            let e = evidence(&gaussians);
+            println!(
+                "| {} | {how} | {} | {:.2} | {:.2} | {:.2} | {:.4} | {:.4} | {:.2} | {:?} | {:?} | {} | {} |",
+                scene.name,
+                gaussians.len(),
+                e.enclosed,
+                e.seen_around,
+                e.seen_inside,
+                e.stray_colour_around,
+                e.stray_colour_inside,
+                e.hidden_from_below,
+                e.side(),
+                scene.side,
+                e.has_ground(),
+                scene.has_ground
+            );
+        }
+    }
+}

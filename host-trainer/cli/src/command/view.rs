@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
+use pocketsplat_core::Bundle;
 use pocketsplat_viewer::{SceneFile, package, page};
 
 use super::bundle::BundleFile;
@@ -32,9 +33,7 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args) -> Result<()> {
     let files = args.bundles.iter().map(|path| BundleFile::read(path)).collect::<Result<Vec<_>>>()?;
-    for file in &files {
-        file.parse()?;
-    }
+    let bundles = files.iter().map(BundleFile::parse).collect::<Result<Vec<_>>>()?;
     if let Some(path) = &args.output {
         check_page(path)?;
     }
@@ -42,7 +41,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         write_package(folder, &first.bytes)?;
     }
     let Some(path) = &args.output else { return Ok(()) };
-    write_page(path, &files)?;
+    write_page(path, &files, &bundles)?;
     if args.open { open(path) } else { Ok(()) }
 }
 
@@ -55,10 +54,10 @@ fn check_page(path: &Path) -> Result<()> {
     output::check_writable(path)
 }
 
-fn write_page(path: &Path, files: &[BundleFile]) -> Result<()> {
+fn write_page(path: &Path, files: &[BundleFile], bundles: &[Bundle<'_>]) -> Result<()> {
     let names = names(&files.iter().map(|file| file.path.as_path()).collect::<Vec<_>>());
     let scenes: Vec<SceneFile<'_>> =
-        names.iter().zip(files).map(|(name, file)| SceneFile { name, bytes: &file.bytes }).collect();
+        names.iter().zip(files).zip(bundles).map(|((name, file), bundle)| file.scene(name, bundle)).collect();
     let text = page(&names.join(" | "), &scenes);
     output::write_whole(path, text.as_bytes())?;
     println!("{}: {:.2} MB; open it in a browser", path.display(), text.len() as f64 / 1e6);

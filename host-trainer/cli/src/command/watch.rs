@@ -7,9 +7,11 @@ use anyhow::{Result, anyhow};
 use pocketsplat_capture::dataset::Image;
 use pocketsplat_trainer::train::run::newest_preview;
 use pocketsplat_viewer::escaped;
+use serde_json::json;
 use tiny_http::{Header, Method, Request, Response, Server};
 
-use crate::plot::{Named, Recording, learning_curves_svg};
+use super::report::STYLE;
+use crate::plot::{LearningRow, Recording, learning_curve_svg, thousands};
 
 const PAGE: &str = include_str!("watch/watch.html");
 
@@ -70,7 +72,7 @@ fn answer(watched: &Watched, request: &Request, port: u16) -> Answer {
     let path = request.url().split('?').next().unwrap_or_default();
     let found = match path {
         "/" => Some(("text/html; charset=utf-8", page(watched).into_bytes())),
-        "/state" => Some(("text/html; charset=utf-8", state(watched).into_bytes())),
+        "/state" => Some(("application/json", state(watched).into_bytes())),
         "/preview.jpg" => {
             newest(watched).and_then(|(_, path)| std::fs::read(path).ok()).map(|bytes| ("image/jpeg", bytes))
         }
@@ -97,25 +99,43 @@ fn newest(watched: &Watched) -> Option<(u32, PathBuf)> {
 
 fn page(watched: &Watched) -> String {
     let name = watched.folder.file_stem().unwrap_or_default().to_string_lossy();
-    PAGE.replace("{{TITLE}}", &escaped(&name)).replace("{{STATE}}", &state(watched))
+    let report = std::path::absolute(&watched.folder).unwrap_or_else(|_| watched.folder.clone()).join("report.html");
+    PAGE.replace("{{STYLE}}", STYLE.trim_end())
+        .replace("{{REPORT}}", &escaped(&report.to_string_lossy()))
+        .replace("{{TITLE}}", &escaped(&name))
+        .replace("{{STATE}}", &content(watched, &rows(watched)))
 }
 
-/// How far the run is: what the page asks for again and again.
+/// How far the run is, as JSON: what the page asks for again and again.
 fn state(watched: &Watched) -> String {
-    let Ok(Recording::Learning(rows)) = Recording::read(&watched.folder.join("progress.csv")) else {
+    let rows = rows(watched);
+    let iterations = rows.last().map(|row| row.iteration);
+    json!({ "state": "running", "iterations": iterations, "html": content(watched, &rows) }).to_string()
+}
+
+/// What the run has recorded; nothing before its first row.
+fn rows(watched: &Watched) -> Vec<LearningRow> {
+    match Recording::read(&watched.folder.join("progress.csv")) {
+        Ok(Recording::Learning(rows)) => rows,
+        _ => Vec::new(),
+    }
+}
+
+fn content(watched: &Watched, rows: &[LearningRow]) -> String {
+    let Some(row) = rows.last() else {
         return "<p>The first iterations are on their way.</p>".to_owned();
     };
-    let mut text = String::new();
-    if let Some(row) = rows.last() {
-        let (done, all) = (row.iteration, watched.iterations);
-        text += &format!(
-            "<p><progress max=\"{all}\" value=\"{done}\" aria-label=\"iterations\"></progress> {done} of {all} iterations"
-        );
-        if let Some(psnr_db) = row.psnr_db {
-            text += &format!(" · {psnr_db:.2} dB on training views");
-        }
-        text += &format!(" · {} anchors</p>\n", row.anchors);
+    let (done, all) = (row.iteration, watched.iterations);
+    let mut text = format!(
+        "<div class=\"facts\"><div><b>{} of {}</b><span>iterations</span>\
+         <progress max=\"{all}\" value=\"{done}\" aria-label=\"iterations\"></progress></div>\n",
+        thousands(done.into()),
+        thousands(all.into())
+    );
+    if let Some(psnr_db) = row.psnr_db {
+        text += &format!("<div><b>{psnr_db:.2} dB</b><span>PSNR, training views</span></div>\n");
     }
+    text += &format!("<div><b>{}</b><span>anchors</span></div></div>\n", thousands(row.anchors as f64));
     if let Some((iteration, _)) = newest(watched) {
         let photograph = match &watched.photograph {
             Some(_) => {
@@ -124,13 +144,19 @@ fn state(watched: &Watched) -> String {
             None => "",
         };
         text += &format!(
-            "<div class=\"pair\">{photograph}<figure><img src=\"/preview.jpg?{iteration}\" alt=\"the picture\"><figcaption>\
-             after {iteration} iterations</figcaption></figure></div>\n"
+            "<section aria-labelledby=\"newest\"><h2 id=\"newest\">Photograph and picture</h2>\n<div class=\"pair\">{photograph}<figure>\
+             <img src=\"/preview.jpg?{iteration}\" alt=\"the picture\"><figcaption>after {} iterations</figcaption></figure></div></section>\n",
+            thousands(iteration.into())
         );
     }
-    let curves = learning_curves_svg(&[Named { name: String::new(), what: rows }]);
-    text + &curves.map_or_else(
+    let curves = learning_curve_svg(rows.to_vec(), all).map_or_else(
         |error| format!("<p>{}</p>", escaped(&error.to_string())),
-        |svg| format!("<div class=\"figure\">{svg}</div>"),
-    )
+        |svg| {
+            format!(
+                "<div class=\"figure\" role=\"img\" aria-label=\"Curves over the iterations: PSNR of the training views, number of \
+                 anchors, rate\">{svg}</div>"
+            )
+        },
+    );
+    text + &format!("<section aria-labelledby=\"curves\"><h2 id=\"curves\">How training goes</h2>\n{curves}</section>")
 }

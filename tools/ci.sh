@@ -12,6 +12,7 @@ jobs=(fmt clippy doc test viewer core-embedded format-doc package link-gate dige
 embedded_target=thumbv7em-none-eabihf
 defmt_print_version=1.2.0
 flip_link_version=0.1.12
+axe_core_version=4.14.1
 # One folder for everything that is built, so that a clean-up is one `rm`; the bare-metal workspaces build below it.
 target=${CARGO_TARGET_DIR:-$PWD/target}
 case $target in /*) ;; *) target=$PWD/$target ;; esac
@@ -54,6 +55,15 @@ need_lavapipe() {
   done
   # The name is of no command.
   need_command lavapipe mesa-vulkan-drivers
+}
+
+# Prints the path of axe.min.js, which checks pages for accessibility; nothing, aloud, where npm has it not.
+axe_core() {
+  local folder=$target/tools/axe-core
+  local file=$folder/node_modules/axe-core/axe.min.js
+  [ -e "$file" ] || npm install --silent --no-fund --no-audit --prefix "$folder" "axe-core@$axe_core_version" >&2 ||
+    echo "ci: SKIPPED: npm did not install axe-core $axe_core_version, so pages are not checked for accessibility" >&2
+  [ ! -e "$file" ] || echo "$file"
 }
 
 need_cargo() {
@@ -118,12 +128,16 @@ job_doc() {
 job_test() {
   # Pages are opened in a browser.
   need_command chromium chromium
+  # The web package is used as web developers use it.
+  need_command node nodejs
+  local axe
+  axe=$(axe_core)
   # Files of Gaussians are read by programs that are not ours.
   need_command python3 python3
   need_command dwebp webp
   # Kernels are compared with the CPU's operations, on whatever adapter there is.
   need_lavapipe
-  POCKETSPLAT_NEEDS_BROWSER=1 POCKETSPLAT_NEEDS_READERS=1 POCKETSPLAT_NEEDS_GPU=1 \
+  env ${axe:+POCKETSPLAT_AXE="$axe"} POCKETSPLAT_NEEDS_BROWSER=1 POCKETSPLAT_NEEDS_READERS=1 POCKETSPLAT_NEEDS_GPU=1 \
     cargo test --workspace --locked --no-fail-fast
   # The largest frames where overflow is not checked, as firmware is built; above it was.
   cargo test --release -p pocketsplat-core --lib --locked decoder::tests

@@ -2,6 +2,7 @@
 
 /// The WebAssembly module: this crate for `wasm32-unknown-unknown`.
 pub const MODULE: &[u8] = include_bytes!("../pocketsplat.wasm");
+pub(crate) const CHECK: &str = include_str!("../web/check.js");
 pub(crate) const POCKETSPLAT: &str = include_str!("../web/pocketsplat.js");
 pub(crate) const ORBIT: &str = include_str!("../web/orbit.js");
 
@@ -15,7 +16,7 @@ pub struct PackageFile {
 }
 
 /// The files of the package. Its example draws the bundle `scene.psb` beside them.
-pub fn package() -> [PackageFile; 8] {
+pub fn package() -> [PackageFile; 9] {
     const MANIFEST: &str = concat!(
         "{\n  \"name\": \"pocketsplat\",\n  \"version\": \"",
         env!("CARGO_PKG_VERSION"),
@@ -29,6 +30,7 @@ pub fn package() -> [PackageFile; 8] {
         ("pocketsplat.wasm", MODULE),
         ("pocketsplat.js", POCKETSPLAT.as_bytes()),
         ("pocketsplat.d.ts", include_bytes!("../web/pocketsplat.d.ts")),
+        ("check.js", CHECK.as_bytes()),
         ("orbit.js", ORBIT.as_bytes()),
         ("orbit.d.ts", include_bytes!("../web/orbit.d.ts")),
         ("package.json", MANIFEST.as_bytes()),
@@ -36,4 +38,24 @@ pub fn package() -> [PackageFile; 8] {
         ("example.html", include_bytes!("../web/example.html")),
     ]
     .map(|(name, bytes)| PackageFile { name, bytes })
+}
+
+#[cfg(test)]
+mod tests {
+    use pocketsplat_core::budget::{MAX_ALPHA_CUT, MAX_FRAME_PX, MAX_TRANSMITTANCE_STOP};
+
+    use super::POCKETSPLAT;
+
+    /// JavaScript refuses what the decoder would, before numbers are cut to the decoder's widths.
+    #[test]
+    fn the_limits_in_javascript_are_the_decoders() {
+        for line in [
+            format!("const MAX_FRAME_PX = {MAX_FRAME_PX};"),
+            format!("const MAX_ALPHA_CUT = {MAX_ALPHA_CUT};"),
+            format!("const MAX_TRANSMITTANCE_STOP = {MAX_TRANSMITTANCE_STOP};"),
+            format!("const MAX_TIERS = {};", u8::MAX),
+        ] {
+            assert!(POCKETSPLAT.contains(&line), "{line}");
+        }
+    }
 }

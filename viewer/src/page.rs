@@ -1,13 +1,15 @@
 //! One HTML file that draws bundles, with everything inside.
 
-use crate::package::{MODULE, ORBIT, POCKETSPLAT};
+use crate::package::{CHECK, MODULE, ORBIT, POCKETSPLAT};
 
 const PAGE: &str = include_str!("../web/page.html");
 const STYLE: &str = include_str!("../web/style.css");
 const WORKER: &str = include_str!("../web/worker.js");
-const SCRIPTS: [&str; 5] = [
+const SCRIPTS: [&str; 7] = [
+    CHECK,
     ORBIT,
     include_str!("../web/motion.js"),
+    include_str!("../web/sharpness.js"),
     include_str!("../web/view.js"),
     include_str!("../web/figures.js"),
     include_str!("../web/viewer.js"),
@@ -20,6 +22,9 @@ pub struct SceneFile<'a> {
     pub name: &'a str,
     /// The bytes of the bundle.
     pub bytes: &'a [u8],
+    /// How far the cameras of the capture stood to the left of the preview's, to the right of it and ahead of it, normalised units, where it
+    /// is known: the page moves within that by itself.
+    pub spread: Option<[f64; 3]>,
 }
 
 /// A page that draws bundles side by side, with one camera.
@@ -31,12 +36,15 @@ pub fn page(title: &str, scenes: &[SceneFile<'_>]) -> String {
         .iter()
         .map(|scene| {
             let name = escaped(scene.name);
-            format!("<script type=\"text/plain\" data-bundle=\"{name}\">{}</script>", base64(scene.bytes))
+            let spread = scene
+                .spread
+                .map_or_else(String::new, |[left, right, ahead]| format!(" data-spread=\"{left} {right} {ahead}\""));
+            format!("<script type=\"text/plain\" data-bundle=\"{name}\"{spread}>{}</script>", base64(scene.bytes))
         })
         .collect();
     PAGE.replace("{{STYLE}}", STYLE.trim_end())
         .replace("{{MODULE}}", &base64(MODULE))
-        .replace("{{WORKER}}", &joined(&[POCKETSPLAT, WORKER]))
+        .replace("{{WORKER}}", &joined(&[CHECK, POCKETSPLAT, WORKER]))
         .replace("{{SCRIPT}}", &joined(&SCRIPTS))
         .replace("{{TITLE}}", &escaped(title))
         .replace("{{BUNDLES}}", &bundles.join("\n"))
@@ -81,12 +89,15 @@ mod tests {
 
     #[test]
     fn a_page_is_whole_and_asks_for_nothing() {
-        let scenes = [SceneFile { name: "a <b> \"c\"", bytes: b"one" }, SceneFile { name: "{{TITLE}}", bytes: b"two" }];
+        let scenes = [
+            SceneFile { name: "a <b> \"c\"", bytes: b"one", spread: None },
+            SceneFile { name: "{{TITLE}}", bytes: b"two", spread: Some([0.25, 1.5, 0.0]) },
+        ];
         let text = page("A & B", &scenes);
         assert!(
             text.contains("<title>A &amp; B</title>") && text.contains("data-bundle=\"a &lt;b&gt; &quot;c&quot;\"")
         );
-        assert!(text.contains(">b25l</script>") && text.contains(">dHdv</script>"));
+        assert!(text.contains("\">b25l</script>") && text.contains(" data-spread=\"0.25 1.5 0\">dHdv</script>"));
         for absent in ["http:", "https:", "{{S", "{{M", "{{W", "{{B", "import ", "export "] {
             assert!(!text.contains(absent), "{absent}");
         }

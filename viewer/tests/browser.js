@@ -42,7 +42,7 @@ async function digests(withLessMemory) {
         say(`frame ${view.name},${tiers},${n},${whole}`);
         if (!withLessMemory) continue;
         const { leastBytes, mostBytes } = view.limits;
-        for (const ramBytes of [leastBytes, 0.6 * mostBytes, 0.8 * mostBytes]) {
+        for (const ramBytes of [leastBytes, Math.floor(0.6 * mostBytes), Math.floor(0.8 * mostBytes)]) {
           await view.show({ ...settings, ramBytes }, camera);
           const { scratchBytes, nTiers, halfWeights } = view.plan;
           check(scratchBytes <= ramBytes, `${view.name}: the plan keeps its memory`);
@@ -132,6 +132,11 @@ async function hands() {
   await settled();
   check(view.plan.scratchBytes < before.scratchBytes && !view.refused, 'the slider of memory plans anew');
   check(document.getElementById('plan').textContent.includes('Scratch memory'), 'the plan is shown');
+  slide('ram', 0);
+  await settled();
+  await sleep(400);
+  const captions = views.filter((view) => view.refused).map((view) => view.caption.textContent);
+  check(captions.length > 0 && captions.every((text) => /: needs [\d,.]+ (B|KiB|MiB): move Memory to the right$/.test(text)), `too little is said ${captions}`);
   slide('ram', 200);
   slide('pruning', 1);
   await settled();
@@ -148,12 +153,36 @@ async function hands() {
     (element) => !element.labels?.length && !element.textContent && !element.getAttribute('aria-label'),
   );
   check(unnamed.length === 0, `every control has a name ${unnamed.map((element) => element.id)}`);
+  check(document.querySelectorAll('main').length === 1 && !document.querySelector('main[role]'), 'one main landmark');
+  const scrolls = [...document.querySelectorAll('body *')].filter((element) => /auto|scroll/.test(getComputedStyle(element).overflowX));
+  const mute = scrolls.filter((element) => element.tabIndex < 0 && !element.querySelector('button, input, select'));
+  check(scrolls.length > 1 && mute.length === 0, `what scrolls takes the keyboard ${mute.map((element) => element.className)}`);
 }
 
 addEventListener('unhandledrejection', (event) => say(`FAILED ${event.reason}`));
+/** Sharp first, then a sway within what the cameras saw, at one sharpness or two. */
+async function sway() {
+  const [{ canvas }, orbit] = [pocketsplat.views[0], pocketsplat.orbit()];
+  const sizes = [];
+  const angles = [];
+  const start = performance.now();
+  while (performance.now() - start < 9000) {
+    const size = `${canvas.width}x${canvas.height}`;
+    if (sizes.at(-1) !== size) sizes.push(size);
+    angles.push(((orbit.yaw - orbit.home.yaw) * 180) / Math.PI);
+    await sleep(50);
+  }
+  check(angles.slice(0, 10).every((angle) => angle === 0), 'it stands still at first');
+  const [least, most] = [Math.min(...angles), Math.max(...angles)].map((angle) => angle.toFixed(1));
+  say(`sways from ${least} to ${most} degrees, ${sizes.length - 1} changes of size: ${sizes.join(' ')}`);
+  check(sizes.length <= 5, 'its sharpness does not pump');
+  check(Math.abs(least) < 4.1 && most < 4.1 && most > 1, 'it sways a little where nobody knows what the cameras saw');
+}
+
 pocketsplat.started.then(async () => {
   const [mark] = performance.getEntriesByName('first-picture');
   say(`first picture after ${mark.startTime.toFixed(0)} ms`);
+  if (pocketsplat.views.length === 1) await sway();
   pocketsplat.stopSpinning();
   await settled();
   if (pocketsplat.views.length > 1) {

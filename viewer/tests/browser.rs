@@ -12,10 +12,10 @@ use pocketsplat_core::{Budget, Bundle, Overflow};
 use pocketsplat_viewer::{Scene, SceneFile, page};
 
 const GOLDEN: [SceneFile<'_>; 4] = [
-    SceneFile { name: "static", bytes: include_bytes!("../../tests/golden/static.psb") },
-    SceneFile { name: "context", bytes: include_bytes!("../../tests/golden/context.psb") },
-    SceneFile { name: "matte", bytes: include_bytes!("../../tests/golden/matte.psb") },
-    SceneFile { name: "isotropic", bytes: include_bytes!("../../tests/golden/isotropic.psb") },
+    SceneFile { name: "static", bytes: include_bytes!("../../tests/golden/static.psb"), spread: None },
+    SceneFile { name: "context", bytes: include_bytes!("../../tests/golden/context.psb"), spread: None },
+    SceneFile { name: "matte", bytes: include_bytes!("../../tests/golden/matte.psb"), spread: None },
+    SceneFile { name: "isotropic", bytes: include_bytes!("../../tests/golden/isotropic.psb"), spread: None },
 ];
 const FRAMES: &str = include_str!("../../tests/golden/frames.csv");
 const SCRIPT: &str = include_str!("browser.js");
@@ -38,13 +38,20 @@ fn a_page_of_one_bundle_draws() {
     let given = std::env::var_os("POCKETSPLAT_VIEW").map(|path| std::fs::read(path).expect("readable"));
     let name = if given.is_some() { "given" } else { "static" };
     let bytes = given.as_deref().unwrap_or(GOLDEN[0].bytes);
-    println!("a page of {} bytes", page(name, &[SceneFile { name, bytes }]).len());
-    let Some(said) = run(name, &[SceneFile { name, bytes }]) else { return };
+    println!("a page of {} bytes", page(name, &[SceneFile { name, bytes, spread: None }]).len());
+    let Some(said) = run(name, &[SceneFile { name, bytes, spread: None }]) else { return };
     said.iter()
         .filter(|line| line.starts_with("first ") || line.starts_with("speed "))
         .for_each(|line| println!("{line}"));
     let found: Vec<&str> = said.iter().filter_map(|line| line.strip_prefix("frame ")).collect();
     assert_eq!(found, frames(name, bytes), "pixels of the canvas");
+}
+
+#[test]
+fn pages_keep_the_rules_of_accessibility() {
+    for (what, scenes) in [("page of a bundle", &GOLDEN[..1]), ("page of two bundles", &GOLDEN[..2])] {
+        chromium::axe::has_no_violations(what, &page("a scene", scenes));
+    }
 }
 
 /// The frames of a bundle as this machine draws them: a row for each as in `frames.csv`.

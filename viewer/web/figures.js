@@ -11,8 +11,10 @@ const STAGES = [
 ];
 
 export const count = (n) => Math.round(n).toLocaleString('en');
+/** As the report of a run writes them. */
 export const bytes = (n) => {
-  if (n >= 1024 * 1024) return `${(n / 1024 / 1024).toFixed(2)} MiB`;
+  if (n >= 2 ** 30) return `${(n / 2 ** 30).toFixed(2)} GiB`;
+  if (n >= 2 ** 20) return `${(n / 2 ** 20).toFixed(2)} MiB`;
   return n >= 10 * 1024 ? `${(n / 1024).toFixed(0)} KiB` : `${count(n)} B`;
 };
 export const percent = (part) => `${(100 * part).toFixed(part > 0 && part < 0.1 ? 1 : 0)} %`;
@@ -27,8 +29,9 @@ function fill(table, views, rows) {
   table.said = said;
   const line = (title, cells, tag = 'td') => {
     const row = document.createElement('tr');
-    const head = row.appendChild(document.createElement('th'));
-    head.scope = 'row';
+    // The corner above the titles is nobody's head.
+    const head = row.appendChild(document.createElement(title ? 'th' : 'td'));
+    if (title) head.scope = 'row';
     head.textContent = title;
     for (const cell of cells) {
       const place = row.appendChild(document.createElement(tag));
@@ -103,9 +106,15 @@ export function showInstructions(place, views, target) {
   place.replaceChildren(...parts, legend);
 }
 
+/** Why there is no picture, and what to do. */
+function refusal({ refused, limits }, ramBytes) {
+  if (!(ramBytes < limits?.leastBytes)) return refused;
+  return `needs ${bytes(Math.ceil(limits.leastBytes / 1024) * 1024)}: move Memory to the right`;
+}
+
 /** What stands below a picture. */
-export function caption(view, framesPerSecond) {
-  if (view.refused) return `${view.name}: ${view.refused}`;
+export function caption(view, ramBytes, framesPerSecond) {
+  if (view.refused) return `${view.name}: ${refusal(view, ramBytes)}`;
   const { splatsDropped, milliseconds, widthPx, heightPx } = view.frame;
   const speed = framesPerSecond ? `at ${framesPerSecond.toFixed(0)} frames/s` : `in ${duration(milliseconds)}`;
   const lost = splatsDropped ? `, ${count(splatsDropped)} splats left out` : '';

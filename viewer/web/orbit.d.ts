@@ -1,6 +1,6 @@
 import type { Camera } from './pocketsplat.js';
 
-/** A camera that turns around a point. */
+/** A camera that turns around a point. Methods throw a `RangeError` for a number that is none, and move nothing then. */
 export class Orbit {
   /** Around the point of the line of sight at `distance`, such as `scene.focus()`; else around the nearest to the origin. */
   constructor(preview: Camera, distance?: number);
@@ -23,7 +23,7 @@ export class Orbit {
   zoom(factor: number): void;
   /** Stands as another orbit does, each by its own first view and distance. */
   follow(other: Orbit): void;
-  /** The camera of a frame of this size. */
+  /** The camera of a frame of this size, whole pixels. */
   camera(widthPx: number, heightPx: number): Camera;
 }
 

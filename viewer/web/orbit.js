@@ -1,4 +1,5 @@
 // A camera that turns around a point, and what hands do to it.
+import { list, positive, real, whole } from './check.js';
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -70,12 +71,16 @@ export class Orbit {
 
   /** Turns by angles, radians. */
   turn(yaw, pitch) {
+    real('yaw', yaw);
+    real('pitch', pitch);
     this.yaw -= yaw;
     this.pitch = clamp(this.pitch + pitch, -MOST_PITCH, MOST_PITCH);
   }
 
   /** Moves the picture by parts of its shorter side. */
   pan(x, y) {
+    real('x', x);
+    real('y', y);
     const { right, down } = this.axes();
     const { focalPx, widthPx, heightPx } = this.preview;
     const reach = (this.distance * Math.min(widthPx, heightPx)) / focalPx[0];
@@ -84,6 +89,7 @@ export class Orbit {
 
   /** Goes nearer by a factor above 1. */
   zoom(factor) {
+    positive('factor', factor);
     this.distance = clamp(this.distance / factor, this.home.distance / 20, this.home.distance * 4);
   }
 
@@ -123,6 +129,9 @@ function rolled({ rotation, translation: [x, y, z], focalPx: [fx, fy], principal
 
 /** The lens of a camera for frames of another size: nothing of its picture is cut, and nothing is stretched. */
 export function lensOf({ focalPx, principalPx, widthPx, heightPx }, width, height) {
+  list('focalPx', focalPx, 2, positive);
+  list('principalPx', principalPx, 2, real);
+  for (const [name, px] of Object.entries({ widthPx, heightPx, width, height })) whole(name, px, 1, 65535);
   const scale = Math.min(width / widthPx, height / heightPx);
   const centre = [width / 2 + (principalPx[0] - widthPx / 2) * scale, height / 2 + (principalPx[1] - heightPx / 2) * scale];
   return { focalPx: focalPx.map((focal) => focal * scale), principalPx: centre, widthPx: width, heightPx: height };

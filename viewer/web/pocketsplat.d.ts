@@ -58,12 +58,12 @@ export type Quality =
 
 /** The limits of a device. */
 export interface Settings {
-  /** The largest frame, pixels. */
+  /** The largest frame, whole pixels, 1 to 4080 a side. */
   widthPx: number;
   heightPx: number;
-  /** Scratch memory; without limit by default. */
+  /** Scratch memory, whole bytes; `Infinity`, no limit, by default. */
   ramBytes?: number;
-  /** Tiers to draw at most; all by default. */
+  /** Tiers to draw at most, 1 to 255; all by default. */
   tiers?: number;
   /** Whether strips with too many splats are drawn in slabs of depth, instead of leaving splats out. */
   slabs?: boolean;
@@ -119,7 +119,10 @@ export interface Frame {
   instructions: { cortexM: Stages; riscv32: Stages };
 }
 
-/** A bundle, a plan for it, and its frames. Methods throw an `Error` with the decoder's message. */
+/**
+ * A bundle, a plan for it, and its frames. Methods throw a `RangeError` for an argument out of its range, which names it, what was given and
+ * what is needed; and an `Error` with the decoder's message.
+ */
 export class Scene {
   /** `module` is `pocketsplat.wasm`, compiled or as bytes; `bundle` is the bytes of a `.psb` file. */
   static open(module: WebAssembly.Module | BufferSource, bundle: ArrayBuffer | Uint8Array): Promise<Scene>;
@@ -128,7 +131,7 @@ export class Scene {
   readonly tiers: Tier[];
   /** One of the training cameras. */
   readonly preview: Camera;
-  /** The preview carried around the scene by `angle`, radians: the same numbers as a device computes. */
+  /** The preview carried around the scene by `angle`, radians, at most 100 000 in size: the same numbers as a device computes. */
   orbited(angle: number): Camera;
   /**
    * How far from the preview what it shows in its middle is, normalised units: the median depth of the anchors there. NaN where
@@ -141,6 +144,6 @@ export class Scene {
   plan(settings: Settings): Plan;
   /** The same, and makes the decoder that the next frames are drawn by. */
   bind(settings: Settings): Plan;
-  /** Draws a frame of at most the size that was bound. */
+  /** Draws a frame of at most the size that was bound; `bind` comes first. */
   render(camera: Camera): Frame;
 }

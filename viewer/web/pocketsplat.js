@@ -1,5 +1,13 @@
 // The module as JavaScript sees it. No dependency, no global state; works in pages, in workers and in Node.
+import { list, positive, real, refuse, whole } from './check.js';
 
+/** The decoder's own limits. */
+const MAX_FRAME_PX = 4080;
+const MAX_ALPHA_CUT = 64;
+const MAX_TRANSMITTANCE_STOP = 1000;
+const MAX_TIERS = 255;
+/** Beyond this an angle of 32 bits is no angle. */
+const MAX_ANGLE = 1e5;
 const QUALITIES = {
   exact: { alphaCut: 1, transmittanceStop: 1, detail: true },
   balanced: { alphaCut: 2, transmittanceStop: 10, detail: true },
@@ -9,12 +17,14 @@ const QUALITIES = {
 /** A bundle, a plan for it, and its frames. */
 export class Scene {
   #wasm;
+  /** The settings of the decoder that there is. */
+  #bound;
 
   /** Compiles nothing itself: `module` is a `WebAssembly.Module`, or the bytes of one. `bundle` is the bytes of a .psb file. */
   static async open(module, bundle) {
     const compiled = module instanceof WebAssembly.Module ? module : await WebAssembly.compile(module);
     const instance = await WebAssembly.instantiate(compiled, {});
-    return new Scene(instance.exports, new Uint8Array(bundle));
+    return new Scene(instance.exports, bytesOf(bundle));
   }
 
   /** Use `Scene.open`. */
@@ -34,6 +44,7 @@ export class Scene {
 
   /** The bundle's camera carried around the scene by `angle`, radians: the same numbers as a device computes. */
   orbited(angle) {
+    if (!(Math.abs(real('angle', angle)) <= MAX_ANGLE)) refuse('angle', angle, `radians, at most ${MAX_ANGLE} in size`);
     this.#answer(this.#wasm.orbit(angle));
     return this.#cameraSet();
   }
@@ -58,33 +69,34 @@ export class Scene {
 
   /** The least memory that draws anything, and the most that is of use. */
   limits(settings) {
-    const [, ...others] = this.#settings(settings);
+    const [, ...others] = settingsOf(settings);
     return this.#answer(this.#wasm.limits(...others));
   }
 
   /** What a decoder would do within these settings; throws where they cannot be kept. */
   plan(settings) {
-    return planOf(this.#answer(this.#wasm.plan(...this.#settings(settings))));
+    return planOf(this.#answer(this.#wasm.plan(...settingsOf(settings))));
   }
 
   /** Plans, and makes the decoder that the next frames are drawn by. */
   bind(settings) {
-    return planOf(this.#answer(this.#wasm.bind(...this.#settings(settings))));
+    const checked = settingsOf(settings);
+    // The one before has gone, even where there is no room for this one.
+    this.#bound = undefined;
+    const plan = planOf(this.#answer(this.#wasm.bind(...checked)));
+    this.#bound = { widthPx: settings.widthPx, heightPx: settings.heightPx };
+    return plan;
   }
 
   /** Draws a frame of at most the size that was bound. `pixels` are a copy: RGBA, row by row. */
   render(camera) {
-    const { rotation, translation, focalPx, principalPx, widthPx, heightPx } = camera;
-    this.#camera().set([...rotation, ...translation, ...focalPx, ...principalPx, widthPx, heightPx]);
+    if (!this.#bound) throw new Error('no decoder is bound; call bind({ widthPx, heightPx }) before render');
+    this.#camera().set(numbersOf(camera, this.#bound));
+    const { widthPx, heightPx } = camera;
     const report = this.#answer(this.#wasm.render());
     const { cortexM, riscv32, ...counts } = byStage(report);
     const pixels = new Uint8ClampedArray(this.#wasm.memory.buffer, this.#wasm.pixels(), 4 * widthPx * heightPx).slice();
     return { ...counts, instructions: { cortexM, riscv32 }, widthPx, heightPx, pixels };
-  }
-
-  #settings({ widthPx, heightPx, ramBytes = Infinity, tiers = 255, slabs = false, quality = 'exact' }) {
-    const { alphaCut, transmittanceStop, detail } = typeof quality === 'string' ? QUALITIES[quality] : quality;
-    return [ramBytes, widthPx, heightPx, tiers, slabs, alphaCut, transmittanceStop, detail];
   }
 
   #camera() {
@@ -101,6 +113,48 @@ export class Scene {
     const numbers = new Float64Array(wasm.memory.buffer, wasm.numbers(), names.length);
     return Object.fromEntries(names.map((name, i) => [name, numbers[i]]));
   }
+}
+
+/** The bytes of a file; a number or a text would become bytes too, but others. */
+function bytesOf(file) {
+  if (ArrayBuffer.isView(file)) return new Uint8Array(file.buffer, file.byteOffset, file.byteLength);
+  // Of whatever page or context it comes from.
+  if (/ (Shared)?ArrayBuffer]$/.test(Object.prototype.toString.call(file))) return new Uint8Array(file);
+  return refuse('bundle', file, 'the bytes of a .psb file, as an ArrayBuffer or a Uint8Array');
+}
+
+/** The arguments of `plan` and `bind`. */
+function settingsOf(settings) {
+  const { widthPx, heightPx, ramBytes = Infinity, tiers = MAX_TIERS, slabs = false, quality = 'exact' } = settings ?? {};
+  whole('widthPx', widthPx, 1, MAX_FRAME_PX);
+  whole('heightPx', heightPx, 1, MAX_FRAME_PX);
+  if (ramBytes !== Infinity) whole('ramBytes (Infinity for no limit)', ramBytes, 0, Number.MAX_SAFE_INTEGER);
+  whole('tiers', tiers, 1, MAX_TIERS);
+  if (typeof slabs !== 'boolean') refuse('slabs', slabs, 'true or false');
+  const { alphaCut, transmittanceStop, detail } = qualityOf(quality);
+  return [ramBytes, widthPx, heightPx, tiers, slabs, alphaCut, transmittanceStop, detail];
+}
+
+function qualityOf(quality) {
+  if (typeof quality === 'string' && Object.hasOwn(QUALITIES, quality)) return QUALITIES[quality];
+  const names = Object.keys(QUALITIES).map((name) => `"${name}"`);
+  if (typeof quality !== 'object' || !quality) refuse('quality', quality, `${names.join(', ')} or { alphaCut, transmittanceStop, detail }`);
+  whole('quality.alphaCut', quality.alphaCut, 1, MAX_ALPHA_CUT);
+  whole('quality.transmittanceStop', quality.transmittanceStop, 1, MAX_TRANSMITTANCE_STOP);
+  if (typeof quality.detail !== 'boolean') refuse('quality.detail', quality.detail, 'true or false');
+  return quality;
+}
+
+/** A camera as the module takes it, for frames of at most the size that is bound. */
+function numbersOf(camera, bound) {
+  const { rotation, translation, focalPx, principalPx, widthPx, heightPx } = camera ?? {};
+  list('rotation', rotation, 9, real);
+  list('translation', translation, 3, real);
+  list('focalPx', focalPx, 2, positive);
+  list('principalPx', principalPx, 2, real);
+  whole('widthPx', widthPx, 1, bound.widthPx);
+  whole('heightPx', heightPx, 1, bound.heightPx);
+  return [...rotation, ...translation, ...focalPx, ...principalPx, widthPx, heightPx];
 }
 
 function planOf({ isResident, isBaked, halfWeights, ...plan }) {

@@ -65,6 +65,8 @@ export class View {
     this.canvas = this.figure.appendChild(document.createElement('canvas'));
     this.canvas.setAttribute('role', 'img');
     this.canvas.setAttribute('aria-label', name);
+    // It is black before anything is drawn.
+    this.canvas.style.visibility = 'hidden';
     this.caption = this.figure.appendChild(document.createElement('figcaption'));
     this.caption.textContent = `${name}: reading`;
     this.context = this.canvas.getContext('2d', { alpha: false });
@@ -139,6 +141,7 @@ export class View {
     if (this.canvas.width !== widthPx) this.canvas.width = widthPx;
     if (this.canvas.height !== heightPx) this.canvas.height = heightPx;
     this.context.putImageData(new ImageData(pixels, widthPx, heightPx), 0, 0);
+    this.canvas.style.visibility = '';
     this.nShown++;
     return true;
   }

@@ -1,12 +1,15 @@
 // The page: one camera, one set of limits, as many bundles as there are.
 import { Orbit, carried, handle } from './orbit.js';
 import { Motion } from './motion.js';
+import { Sharpness } from './sharpness.js';
 import { View } from './view.js';
 import { bytes, caption, count, percent, showFrames, showInstructions, showPlans } from './figures.js';
 
 const DISPLAYS = [[96, 64], [128, 128], [160, 120], [160, 128], [240, 240], [320, 240], [480, 320], [640, 480]];
 const NO_LIMIT = 200;
 const FIGURES_MS = 200;
+/** How long a picture stands still before it sways. */
+const LOOK_MS = 1000;
 
 const $ = (id) => document.getElementById(id);
 const stage = $('stage');
@@ -61,7 +64,7 @@ function isSameCapture({ centre: a, scale }, { centre: b, scale: other }) {
 function next(view) {
   const size = frameSize();
   const settings = settingsOf(view, size);
-  const sharpness = state.device ? 1 : motion.sharpness;
+  const sharpness = state.device ? 1 : view.sharpness.part(size[0] * size[1], motion.isMoving);
   const camera = cameraOf(view, ...size.map((side) => Math.max(16, Math.round(side * sharpness))));
   return { settings, camera, key: JSON.stringify([settings, state.ramStep, camera]) };
 }
@@ -72,9 +75,11 @@ function shown(view) {
   const now = performance.now();
   const between = now - (view.shownAt ?? 0);
   view.shownAt = now;
-  // Only frames that follow each other say something about speed.
-  view.between = motion.isMoving && between < 1000 ? 0.8 * (view.between ?? between) + 0.2 * between : undefined;
-  if (view.frame && !state.device) motion.took(view.frame.milliseconds);
+  const { frame } = view;
+  // Only frames that follow each other say something about speed: not one for each tap of a key.
+  const follows = motion.isMoving && frame && between < 100 + 2 * frame.milliseconds;
+  view.between = follows ? 0.8 * (view.between ?? between) + 0.2 * between : undefined;
+  if (frame && !view.refused && !state.device) view.sharpness.took(frame.milliseconds, frame.widthPx * frame.heightPx);
   layOut(view);
   view.canvas.style.opacity = view.refused ? 0.15 : 1;
   // Numbers that change with every frame cannot be read, and cost as much as a small frame.
@@ -86,7 +91,7 @@ function showFigures() {
   Object.assign(figures, { timer: undefined, shownAt: performance.now() });
   for (const view of views) {
     if (!view.frame && !view.refused) continue;
-    view.caption.textContent = caption(view, motion.isMoving && view.between && 1000 / view.between);
+    view.caption.textContent = caption(view, state.ramBytes, motion.isMoving && view.between && 1000 / view.between);
     view.caption.classList.toggle('bad', Boolean(view.refused));
     view.caption.setAttribute('aria-live', view.refused ? 'assertive' : 'off');
   }
@@ -183,6 +188,9 @@ function offer() {
 function listen() {
   const quarter = () => {
     for (const each of [orbit, ...views.map((view) => view.orbit)]) each?.quarter();
+    // What was aside is above now.
+    for (const view of views) view.spread = undefined;
+    know();
   };
   handle(stage, orbit, moved, quarter);
   stage.addEventListener('pointerdown', stopSpinning);
@@ -236,7 +244,10 @@ async function start() {
   const address = URL.createObjectURL(new Blob([$('worker').textContent], { type: 'text/javascript' }));
   const sources = [...document.querySelectorAll('script[data-bundle]')];
   stage.style.setProperty('--columns', sources.length > 3 ? Math.ceil(Math.sqrt(sources.length)) : sources.length);
-  for (const { dataset } of sources) views.push(new View(dataset.bundle, stage));
+  for (const { dataset } of sources) {
+    const spread = dataset.spread?.split(' ').map(Number);
+    views.push(Object.assign(new View(dataset.bundle, stage), { spread, sharpness: new Sharpness() }));
+  }
   const bundles = sources.map((element) => decoded(element.textContent));
   const open = () => Promise.all(views.map((view, i) => view.open(address, module, bundles[i])));
   await open();
@@ -246,6 +257,7 @@ async function start() {
   for (const view of others) {
     if (!isSameCapture(first.normalisation, view.normalisation)) view.orbit = new Orbit(view.preview);
   }
+  know();
   offer();
   listen();
   setDevice(false);
@@ -255,7 +267,13 @@ async function start() {
   for (const view of others) view.orbit?.refocus(await view.focus());
   // A second worker for each where cores are idle.
   if (navigator.hardwareConcurrency >= 4 * views.length) await open();
-  if (!matchMedia('(prefers-reduced-motion: reduce)').matches) motion.sway();
+  know();
+  if (!matchMedia('(prefers-reduced-motion: reduce)').matches) motion.swayAfter(LOOK_MS);
+}
+
+/** Tells the motion where the cameras stood. */
+function know() {
+  motion.seen = views.map((view) => ({ spread: view.spread, home: (view.orbit ?? orbit).home }));
 }
 
 /** For scripts: what is on the page, and when it is. */

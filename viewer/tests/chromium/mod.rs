@@ -1,5 +1,7 @@
 //! A page in Chromium, and what it says.
 
+pub(crate) mod axe;
+
 use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -9,10 +11,24 @@ use std::time::{Duration, Instant};
 /// What a page may take on a machine that does other things too.
 const PATIENCE: Duration = Duration::from_secs(240);
 
+/// What a page is shown on.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Screen {
+    /// 360 pixels wide, in a frame, since windows have a least width; else 1280.
+    pub(crate) is_phone: bool,
+    /// Whether whoever looks prefers dark pages.
+    pub(crate) is_dark: bool,
+}
+
 /// Opens a page with a script at its end, and returns what it says: lines on the console that begin with `pocketsplat: `, up to `done`.
 ///
 /// Nothing where there is no browser. Fails for a check that `FAILED`, and for whatever else the page has to say, such as an error.
 pub(crate) fn said_by(page: &str, script: &str) -> Option<Vec<String>> {
+    said_on(Screen::default(), page, script)
+}
+
+/// The same, on a screen.
+pub(crate) fn said_on(screen: Screen, page: &str, script: &str) -> Option<Vec<String>> {
     let Some(browser) = browser() else {
         assert!(std::env::var_os("POCKETSPLAT_NEEDS_BROWSER").is_none(), "no Chromium: apt-get install chromium");
         println!("SKIPPED: no Chromium (apt-get install chromium), so the page was not opened");
@@ -20,9 +36,12 @@ pub(crate) fn said_by(page: &str, script: &str) -> Option<Vec<String>> {
     };
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("page.html");
-    let text = page.replace("</body>", &format!("<script type=\"module\">{script}</script></body>"));
+    // The last one: a page may hold another as text.
+    let (before, after) = page.rsplit_once("</body>").expect("a page has an end");
+    let text = format!("{before}<script type=\"module\">{script}</script></body>{after}");
+    let text = if screen.is_phone { in_frame(&text) } else { text };
     std::fs::write(&file, text).expect("written");
-    let mut child = start(&browser, &file, &folder.path().join("profile"));
+    let mut child = start(screen, &browser, &file, &folder.path().join("profile"));
     let stderr = BufReader::new(child.0.stderr.take().expect("piped"));
     let (sender, lines) = mpsc::channel();
     std::thread::spawn(move || stderr.lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
@@ -56,7 +75,14 @@ impl Drop for Browser {
     }
 }
 
-fn start(browser: &str, file: &Path, profile: &Path) -> Browser {
+fn in_frame(page: &str) -> String {
+    let page = page.replace('&', "&amp;").replace('"', "&quot;");
+    format!(
+        "<!doctype html><meta charset=\"utf-8\"><iframe srcdoc=\"{page}\" style=\"width:360px;height:740px;border:0\"></iframe>"
+    )
+}
+
+fn start(screen: Screen, browser: &str, file: &Path, profile: &Path) -> Browser {
     const FLAGS: [&str; 12] = [
         "--headless",
         "--no-sandbox",
@@ -72,6 +98,7 @@ fn start(browser: &str, file: &Path, profile: &Path) -> Browser {
         "--v=0",
     ];
     let mut command = Command::new(browser);
+    command.arg(format!("--blink-settings=preferredColorScheme={}", u8::from(!screen.is_dark)));
     command.args(FLAGS).arg(format!("--user-data-dir={}", profile.display())).arg(format!("file://{}", file.display()));
     Browser(command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("started"))
 }

@@ -8,6 +8,7 @@ use pocketsplat_capture::dataset::{Background, Capture, View};
 use pocketsplat_core::Bundle;
 use pocketsplat_core::bundle::crc32;
 use pocketsplat_trainer::bundle::{for_each_chunk, normalisation_of, protocol_of};
+use pocketsplat_viewer::SceneFile;
 use serde::Deserialize;
 
 use super::capture::{CaptureArgs, refuse_gaussians};
@@ -92,9 +93,15 @@ impl BundleFile {
     }
 
     /// What the bundle says of its photographs; nothing in bundles of other writers.
-    fn protocol(&self, bundle: &Bundle<'_>) -> Option<Protocol> {
+    pub(crate) fn protocol(&self, bundle: &Bundle<'_>) -> Option<Protocol> {
         let parsed = Protocol::parse(protocol_of(bundle, &self.bytes)?);
         parsed.inspect_err(|error| say!("warning: could not read the section protocol: {error}")).ok()
+    }
+
+    /// The bundle as a page shows it.
+    pub(crate) fn scene<'a>(&'a self, name: &'a str, bundle: &Bundle<'_>) -> SceneFile<'a> {
+        let spread = self.protocol(bundle).and_then(|protocol| protocol.spread);
+        SceneFile { name, bytes: &self.bytes, spread }
     }
 
     /// Fills what the command line left open with what the bundle was trained with, and refuses what contradicts it.

@@ -1,5 +1,6 @@
 //! `pocketsplat report`: a page about a finished run.
 
+mod amounts;
 mod pictures;
 mod sections;
 
@@ -8,7 +9,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::{Capture, Split};
 use pocketsplat_files::{Output, Outputs, shell_word};
-use pocketsplat_viewer::{SceneFile, escaped, page};
+use pocketsplat_viewer::{escaped, page};
 use serde::Deserialize;
 
 use super::bundle::BundleFile;
@@ -17,11 +18,12 @@ use super::eval::{Evaluation, Measurements, Renderer, measure};
 use super::output;
 use super::outputs::{self, OverwriteArgs, check_name, reading_capture};
 use crate::config::{CaptureOptions, RunConfig};
-use crate::plot::{Named, Recording, learning_curves_svg};
+use crate::plot::{Recording, learning_curve_svg};
 use crate::say::say;
 
 const PAGE: &str = include_str!("report/report.html");
-const STYLE: &str = include_str!("report/report.css");
+/// Of the page that watches a run too.
+pub(super) const STYLE: &str = include_str!("report/report.css");
 const SCRIPT: &str = include_str!("report/report.js");
 
 /// The page in a run's folder.
@@ -133,7 +135,7 @@ fn photographs<'a>(file: &BundleFile, capture: &'a Capture, options: &CaptureOpt
 fn html(run: &Run<'_>) -> Result<String> {
     let bundle = run.file.parse()?;
     let name = run.config.output.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let viewer = page(&name, &[SceneFile { name: &name, bytes: &run.file.bytes }]);
+    let viewer = page(&name, &[run.file.scene(&name, &bundle)]);
     let mut parts = vec![
         ("STYLE", STYLE.trim_end().to_owned()),
         ("SCRIPT", SCRIPT.trim_end().to_owned()),
@@ -142,7 +144,7 @@ fn html(run: &Run<'_>) -> Result<String> {
         ("FACTS", sections::facts(run, &bundle)),
         ("VIEWER", escaped(&viewer)),
         ("PICTURES", pictures::section(run, &bundle)?),
-        ("CURVES", curves(run.folder, &name)?),
+        ("CURVES", curves(run.folder, run.result.iterations)?),
         ("BYTES", sections::bytes(&bundle)?),
         ("TIERS", sections::tiers(&bundle)?),
         ("EFFECTS", sections::effects(run.folder)?),
@@ -163,9 +165,9 @@ fn html(run: &Run<'_>) -> Result<String> {
 }
 
 /// How the run went, as a figure.
-fn curves(folder: &Path, name: &str) -> Result<String> {
+fn curves(folder: &Path, iterations: u32) -> Result<String> {
     match Recording::read(&folder.join("progress.csv"))? {
-        Recording::Learning(what) => learning_curves_svg(&[Named { name: name.to_owned(), what }]),
+        Recording::Learning(rows) => learning_curve_svg(rows, iterations),
         _ => bail!("{} has a progress.csv that is no learning curve", folder.display()),
     }
 }

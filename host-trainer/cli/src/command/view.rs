@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
+use pocketsplat_core::Bundle;
 use pocketsplat_files::{Output, Outputs, shell_word};
 use pocketsplat_viewer::{SceneFile, package, page};
 
@@ -46,16 +47,14 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     }
     args.stand.refuse("a bundle has a camera of its own")?;
     let files = args.bundles.iter().map(|path| BundleFile::read(path)).collect::<Result<Vec<_>>>()?;
-    for file in &files {
-        file.parse()?;
-    }
+    let bundles = files.iter().map(BundleFile::parse).collect::<Result<Vec<_>>>()?;
     let mut outputs = args.bundles.iter().fold(args.overwrite.outputs(), |outputs, path| outputs.reading(path));
     let page = args.output.as_deref().map(|path| checked_page(path, &args.bundles[0], &mut outputs)).transpose()?;
     if let (Some(folder), Some(first)) = (&args.package, files.first()) {
         write_package(folder, &first.bytes, &mut outputs, args.overwrite)?;
     }
     let Some(page) = page else { return Ok(()) };
-    write_page(&page, &files)?;
+    write_page(&page, &files, &bundles)?;
     if args.open { open(page.path()) } else { Ok(()) }
 }
 
@@ -95,12 +94,11 @@ fn checked_page(path: &Path, source: &Path, outputs: &mut Outputs) -> Result<Out
     Ok(outputs.file(path, PAGE)?)
 }
 
-fn write_page(page: &Output, files: &[BundleFile]) -> Result<()> {
+fn write_page(output: &Output, files: &[BundleFile], bundles: &[Bundle<'_>]) -> Result<()> {
     let names = names(&files.iter().map(|file| file.path.as_path()).collect::<Vec<_>>());
     let scenes: Vec<SceneFile<'_>> =
-        names.iter().zip(files).map(|(name, file)| SceneFile { name, bytes: &file.bytes }).collect();
-    let text = pocketsplat_viewer::page(&names.join(" | "), &scenes);
-    write(page, &text)
+        names.iter().zip(files).zip(bundles).map(|((name, file), bundle)| file.scene(name, bundle)).collect();
+    write(output, &page(&names.join(" | "), &scenes))
 }
 
 fn write(page: &Output, text: &str) -> Result<()> {

@@ -7,6 +7,7 @@ pub(crate) mod heading;
 pub(crate) mod named;
 mod preset;
 mod protocol;
+mod spread;
 
 use std::path::{Path, PathBuf};
 

@@ -8,6 +8,7 @@ use pocketsplat_core::bundle::crc32;
 use pocketsplat_trainer::bundle::MAX_PROTOCOL_LEN;
 use serde::{Deserialize, Serialize};
 
+use super::spread::spread;
 use super::{CaptureOptions, Difference};
 
 /// Parts of a normalised unit, and of a rotation's entries, to which poses are rounded in a fingerprint.
@@ -20,6 +21,9 @@ pub(crate) struct Protocol {
     program: String,
     /// The capture, as [`fingerprint`] gives it.
     capture: String,
+    /// How far the training cameras stand to the left of the first one, to the right of it and ahead of it, normalised units.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) spread: Option<[f64; 3]>,
     /// How it was loaded; split and background said even where they are the defaults.
     #[serde(flatten)]
     pub(crate) options: CaptureOptions,
@@ -29,7 +33,8 @@ impl Protocol {
     /// Of a run on a loaded capture.
     pub(crate) fn of(capture: &Capture, options: &CaptureOptions) -> Self {
         let program = env!("CARGO_PKG_VERSION").to_owned();
-        Self { program, capture: fingerprint(capture), options: Self::said(options) }
+        let spread = spread(capture.train.iter().map(|view| &view.camera));
+        Self { program, capture: fingerprint(capture), spread, options: Self::said(options) }
     }
 
     /// The options as a protocol says them: split and background too where they are the defaults.
@@ -43,17 +48,17 @@ impl Protocol {
 
     /// The folder of images whose name does not fit into the section of a bundle, if so.
     pub(crate) fn omitted_images(&self) -> Result<Option<&str>> {
-        let fits = toml::to_string(self)?.len() <= MAX_PROTOCOL_LEN;
+        let fits = toml::to_string(&Self { spread: None, ..self.clone() })?.len() <= MAX_PROTOCOL_LEN;
         Ok(self.options.images.as_deref().filter(|_| !fits))
     }
 
-    /// As the section of a bundle, without [`Self::omitted_images`].
+    /// As the section of a bundle, without [`Self::omitted_images`], and without the cameras' spread where there is no room for both.
     pub(crate) fn to_text(&self) -> Result<String> {
-        if self.omitted_images()?.is_none() {
-            return Ok(toml::to_string(self)?);
-        }
-        let options = CaptureOptions { images: None, ..self.options.clone() };
-        Ok(toml::to_string(&Self { options, ..self.clone() })?)
+        let images = self.options.images.clone().filter(|_| matches!(self.omitted_images(), Ok(None)));
+        let options = CaptureOptions { images, ..self.options.clone() };
+        let said = Self { options, ..self.clone() };
+        let text = toml::to_string(&said)?;
+        if text.len() <= MAX_PROTOCOL_LEN { Ok(text) } else { Ok(toml::to_string(&Self { spread: None, ..said })?) }
     }
 
     /// Reads the section; what other versions may have added is passed over.
@@ -133,6 +138,7 @@ mod tests {
         Protocol {
             program: "0.1.0".to_owned(),
             capture: "00ff12ab".to_owned(),
+            spread: Some([10.25, 11.75, 22.25]),
             options: CaptureOptions {
                 resolution: Some("160x120".parse::<FrameSize>().unwrap()),
                 background: Some(Background::White),
@@ -160,6 +166,10 @@ mod tests {
         let text = long.to_text().unwrap();
         assert!(text.len() <= MAX_PROTOCOL_LEN, "{} bytes: {text}", text.len());
         assert_eq!(Protocol::parse(&text).unwrap(), protocol(None));
+        // Whoever measures needs the folder; the page only sways less.
+        let longer = protocol(Some(&"a".repeat(50)));
+        let parsed = Protocol::parse(&longer.to_text().unwrap()).unwrap();
+        assert_eq!((parsed.options.images, parsed.spread), (longer.options.images, None));
         assert_eq!(long.omitted_images().unwrap(), Some("a".repeat(150).as_str()), "so that training can say it");
         assert_eq!(protocol(Some("images_2")).omitted_images().unwrap(), None);
     }

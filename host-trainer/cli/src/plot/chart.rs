@@ -12,6 +12,8 @@ use super::{labels, marker};
 /// Width of a figure and height of a panel, pixels of the SVG, which scales.
 pub(super) const WIDTH_PX: u32 = 900;
 pub(super) const PANEL_PX: u32 = 420;
+/// The same of a figure in a page: narrow, so that its words are words on a phone.
+pub(super) const PAGE_PX: [u32; 2] = [480, 290];
 
 const FONT: &str = "sans-serif";
 const TEXT_PX: u32 = 15;
@@ -39,9 +41,18 @@ pub(super) struct Labels<'a> {
 
 /// Draws `n_panels` panels, one below the other, into an SVG; `draw` gets them and the whole figure.
 pub(super) fn figure(n_panels: usize, draw: impl FnOnce(&[Area<'_>], &Area<'_>) -> Result<()>) -> Result<String> {
+    figure_of([WIDTH_PX, PANEL_PX], n_panels, draw)
+}
+
+/// The same, with panels of another size.
+pub(super) fn figure_of(
+    [width_px, panel_px]: [u32; 2],
+    n_panels: usize,
+    draw: impl FnOnce(&[Area<'_>], &Area<'_>) -> Result<()>,
+) -> Result<String> {
     let mut svg = String::new();
-    let height_px = PANEL_PX * u32::try_from(n_panels).unwrap_or(1);
-    let root = SVGBackend::with_string(&mut svg, (WIDTH_PX, height_px)).into_drawing_area();
+    let height_px = panel_px * u32::try_from(n_panels).unwrap_or(1);
+    let root = SVGBackend::with_string(&mut svg, (width_px, height_px)).into_drawing_area();
     root.fill(&WHITE)?;
     draw(&root.split_evenly((n_panels, 1)), &root)?;
     root.present()?;
@@ -168,7 +179,7 @@ pub(super) fn decimals(range: &std::ops::Range<f64>) -> usize {
 }
 
 /// A whole number with its thousands apart.
-pub(super) fn thousands(value: f64) -> String {
+pub(crate) fn thousands(value: f64) -> String {
     let digits = format!("{:.0}", value.abs());
     let mut text = String::new();
     for (i, digit) in digits.chars().enumerate() {

@@ -19,7 +19,7 @@ struct Quantity {
 }
 
 const PSNR: Quantity = Quantity {
-    title: "PSNR of the training views (thin: as recorded, thick: means over 15 rows)",
+    title: "PSNR of the training views (thick: means over 15 rows)",
     axis: "PSNR, dB",
     of: |row| row.psnr_db,
     scatters: true,
@@ -32,11 +32,21 @@ const RATE: Quantity =
 /// PSNR of the training views over the iterations, below it the anchors, and below these the rate if any run has one, as
 /// an SVG.
 pub(crate) fn learning_curves_svg(runs: &[Named<Vec<LearningRow>>]) -> Result<String> {
+    svg([chart::WIDTH_PX, chart::PANEL_PX], runs, 0)
+}
+
+/// The same of one run, which a page names and shows on a phone too; the axis reaches to the last of the run's iterations, done or not.
+pub(crate) fn learning_curve_svg(rows: Vec<LearningRow>, iterations: u32) -> Result<String> {
+    svg(chart::PAGE_PX, &[Named { name: String::new(), what: rows }], iterations)
+}
+
+fn svg(size_px: [u32; 2], runs: &[Named<Vec<LearningRow>>], iterations: u32) -> Result<String> {
     let has_rate = runs.iter().flat_map(|run| &run.what).any(|row| row.bits().is_some());
     let quantities = if has_rate { vec![PSNR, ANCHORS, RATE] } else { vec![PSNR, ANCHORS] };
-    let last = runs.iter().flat_map(|run| &run.what).map(|row| row.iteration).max().unwrap_or(1);
-    chart::figure(quantities.len(), |panels, _| {
-        panels.iter().zip(&quantities).try_for_each(|(panel, quantity)| draw(panel, quantity, runs, last.max(1)))
+    let done = runs.iter().flat_map(|run| &run.what).map(|row| row.iteration).max().unwrap_or(1);
+    chart::figure_of(size_px, quantities.len(), |panels, _| {
+        let last = done.max(iterations).max(1);
+        panels.iter().zip(&quantities).try_for_each(|(panel, quantity)| draw(panel, quantity, runs, last))
     })
 }
 
@@ -129,5 +139,7 @@ mod tests {
             learning_curves_svg(&[run("first", None), run("second", Some(3.0))]).unwrap().contains("bits of an anchor")
         );
         assert!(learning_curves_svg(&[]).is_ok(), "an empty figure is a figure");
+        let begun = learning_curve_svg(run("first", None).what, 4000).unwrap();
+        assert!(begun.contains("\n4,000\n") && !begun.contains("first"), "the whole run is on the axis: {begun}");
     }
 }

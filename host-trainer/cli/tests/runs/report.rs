@@ -27,6 +27,7 @@ fn a_run_ends_with_a_page_that_works() {
     if let Some(said) = chromium::said_by(&html, SCRIPT) {
         assert!(said.len() > 8, "{said:#?}");
     }
+    chromium::axe::has_no_violations("report", &html);
     // The same again, elsewhere.
     let again = folder.join("again.html");
     let made = pocketsplat().arg("report").arg(folder.join("scene.run")).arg("-o").arg(&again).output().unwrap();

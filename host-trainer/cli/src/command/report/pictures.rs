@@ -40,7 +40,7 @@ pub(super) fn section(run: &Run<'_>, bundle: &Bundle<'_>) -> Result<String> {
         let (name, psnr_db) = (escaped(&view.name), figures.psnr_db);
         let checked = if i == 0 { " checked" } else { "" };
         choices += &format!(
-            "<label class=\"choice\"><input type=\"radio\" name=\"pair\" value=\"{i}\"{checked}><span>{label}: {psnr_db:.2} dB</span></label>\n"
+            "<label class=\"choice\"><input type=\"radio\" name=\"pair\" value=\"{i}\"{checked}><span><b>{label}</b> {psnr_db:.2} dB</span></label>\n"
         );
         let [photograph, picture] = [&view.photograph()?.image, &drawn].map(data_uri);
         let hidden = if i == 0 { "" } else { " hidden" };

@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use anyhow::Result;
-use bytesize::ByteSize;
 use pocketsplat_core::{Budget, Bundle};
 use pocketsplat_trainer::bundle::SizeReport;
 use pocketsplat_viewer::escaped;
@@ -11,12 +10,16 @@ use pocketsplat_viewer::escaped;
 use super::super::effects::PilotLine;
 use super::super::fit::frame_budget;
 use super::Run;
+use super::amounts::size;
+use crate::plot::thousands;
 
 /// Parts of a file that get a line of their own; smaller ones are added up.
 const LEAST_SHARE: f64 = 0.01;
 
-/// A table; the first column names the row, the others are numbers.
-fn table(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
+/// A table; the first column names the row, the others are numbers. It scrolls on its own where it is too wide, by keys too.
+///
+/// * `name`: what it is of, for those who do not see the heading above.
+fn table(name: &str, header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let head: String = header.iter().map(|name| format!("<th scope=\"col\">{}</th>", escaped(name))).collect();
     let row = |cells: Vec<String>| {
         let cell = |(i, text): (usize, &String)| {
@@ -26,7 +29,9 @@ fn table(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String
         format!("<tr>{}</tr>\n", cells.iter().enumerate().map(cell).collect::<String>())
     };
     let body: String = rows.into_iter().map(row).collect();
-    format!("<div class=\"scroll\"><table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}</tbody></table></div>")
+    format!(
+        "<div class=\"scroll\" tabindex=\"0\" role=\"group\" aria-label=\"{name}\"><table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}</tbody></table></div>"
+    )
 }
 
 /// The figures that people ask for first.
@@ -38,15 +43,16 @@ pub(super) fn facts(run: &Run<'_>, bundle: &Bundle<'_>) -> String {
         facts.push((format!("{:.2} dB", evaluation.psnr_db), format!("PSNR, {} held-out views", evaluation.n_views)));
         facts.push((format!("{:.4}", evaluation.ssim), "SSIM".to_owned()));
     }
-    facts.push((format!("{:.3} MB", run.file.bytes.len() as f64 / 1e6), "bundle".to_owned()));
-    facts.push((bundle.n_anchors().to_string(), "anchors".to_owned()));
-    facts.push((format!("{width_px}×{height_px}"), format!("pixels, {} iterations", run.result.iterations)));
+    facts.push((size(run.file.bytes.len() as f64), "bundle".to_owned()));
+    facts.push((thousands(bundle.n_anchors().into()), "anchors".to_owned()));
+    let iterations = thousands(run.result.iterations.into());
+    facts.push((format!("{width_px}×{height_px}"), format!("pixels, {iterations} iterations")));
     facts.push((
         format!("{:.1} min", run.result.train_s / 60.0),
         format!("training, {:.1} of one core", run.result.train_processor_s / 60.0),
     ));
     if let Some(bytes) = run.result.peak_memory_bytes {
-        facts.push((format!("{:.2} GB", bytes as f64 / 1e9), "memory of training".to_owned()));
+        facts.push((size(bytes as f64), "memory of training".to_owned()));
     }
     facts
         .iter()
@@ -75,18 +81,18 @@ pub(super) fn bytes(bundle: &Bundle<'_>) -> Result<String> {
         .iter()
         .map(|(name, bytes)| {
             let name = escaped(name);
-            // A name that would not fit is in the table below.
+            // A name that would not fit is in the table below, beside its colour.
             let text = if share(*bytes) >= 12.0 { &name } else { "" };
             format!("<span style=\"flex-grow:{:.3}\" title=\"{name}\">{text}</span>", share(*bytes))
         })
         .collect();
     let rows = parts.iter().map(|(name, bytes)| {
         let bits = 8.0 * bytes / size.n_anchors.max(1) as f64;
-        vec![name.clone(), format!("{bytes:.0}"), format!("{:.1}", share(*bytes)), format!("{bits:.2}")]
+        vec![name.clone(), thousands(*bytes), format!("{:.1}", share(*bytes)), format!("{bits:.2}")]
     });
     Ok(format!(
-        "<div class=\"bar\" aria-hidden=\"true\">{bar}</div>\n{}",
-        table(&["part", "bytes", "%", "bits an anchor"], rows)
+        "<div class=\"bar\" aria-hidden=\"true\">{bar}</div>\n<div class=\"key\">{}</div>",
+        table("Where the bytes are", &["part", "bytes", "%", "bits an anchor"], rows)
     ))
 }
 
@@ -100,19 +106,15 @@ pub(super) fn tiers(bundle: &Bundle<'_>) -> Result<String> {
         let budget = frame.with_tiers(number + 1);
         rows.push(vec![
             format!("{:.0} %", 100.0 * (1.0 - f64::from(tier.n_anchors) / f64::from(bundle.n_anchors().max(1)))),
-            tier.n_anchors.to_string(),
-            format!("{:.3} MB", f64::from(chunks_start + tier.end) / 1e6),
+            thousands(tier.n_anchors.into()),
+            size(f64::from(chunks_start + tier.end)),
             measures.psnr_db.map_or_else(|| "–".to_owned(), |psnr_db| format!("{psnr_db:.2}")),
-            size(least_bytes(bundle, &budget)?),
-            size(bundle.plan(&budget)?.scratch_len()),
+            size(least_bytes(bundle, &budget)? as f64),
+            size(bundle.plan(&budget)?.scratch_len() as f64),
         ]);
     }
     let header = ["pruned", "anchors", "file cut here", "PSNR, dB", "least RAM", "RAM for the fastest frame"];
-    Ok(table(&header, rows))
-}
-
-fn size(bytes: usize) -> String {
-    ByteSize(bytes as u64).to_string()
+    Ok(table("What smaller devices get", &header, rows))
 }
 
 /// Bytes with which the decoder draws all tiers of the budget, and with one fewer does not.
@@ -138,10 +140,14 @@ pub(super) fn effects(folder: &Path) -> Result<String> {
             format!("{:+.2}", line.gain_db),
             format!("{:.2}", line.price_db),
             format!("{:.1}", line.instructions as f64 / 1e6),
-            line.bytes.to_string(),
+            thousands(line.bytes as f64),
         ]
     });
-    Ok(table(&["effects (★ kept)", "PSNR, dB", "gain, dB", "price, dB", "million instructions", "bytes"], rows))
+    Ok(table(
+        "Effects",
+        &["effects (★ kept)", "PSNR, dB", "gain, dB", "price, dB", "million instructions", "bytes"],
+        rows,
+    ))
 }
 
 /// Every held-out view.
@@ -156,7 +162,7 @@ pub(super) fn views(run: &Run<'_>) -> String {
     format!(
         "<details><summary>{} views, {low:.2} to {high:.2} dB</summary>\n{}\n</details>",
         views.len(),
-        table(&["view", "PSNR, dB", "SSIM"], rows)
+        table("View by view", &["view", "PSNR, dB", "SSIM"], rows)
     )
 }
 
@@ -165,7 +171,7 @@ pub(super) fn protocol(run: &Run<'_>) -> Result<String> {
     let protocol = run.photographs.as_ref().and_then(|photographs| photographs.evaluation.protocol.as_ref());
     let said = protocol.map_or_else(String::new, |protocol| format!("<p>{}.</p>\n", escaped(&protocol.to_string())));
     Ok(format!(
-        "{said}<details><summary>The whole configuration</summary>\n<pre>{}</pre>\n</details>",
+        "{said}<details><summary>The whole configuration</summary>\n<pre tabindex=\"0\" role=\"group\" aria-label=\"configuration\">{}</pre>\n</details>",
         escaped(&run.config.to_toml()?)
     ))
 }

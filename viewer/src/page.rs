@@ -36,8 +36,9 @@ pub fn page(title: &str, scenes: &[SceneFile<'_>]) -> String {
         .iter()
         .map(|scene| {
             let name = escaped(scene.name);
-            let spread =
-                scene.spread.map_or_else(String::new, |[left, right, ahead]| format!(" data-spread=\"{left} {right} {ahead}\""));
+            let spread = scene
+                .spread
+                .map_or_else(String::new, |[left, right, ahead]| format!(" data-spread=\"{left} {right} {ahead}\""));
             format!("<script type=\"text/plain\" data-bundle=\"{name}\"{spread}>{}</script>", base64(scene.bytes))
         })
         .collect();

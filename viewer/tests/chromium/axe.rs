@@ -22,7 +22,9 @@ say('done');
 /// Says aloud that it checked nothing where there is no axe-core or no browser.
 pub(crate) fn has_no_violations(what: &str, page: &str) {
     let Some(path) = std::env::var_os(VARIABLE) else {
-        println!("SKIPPED: {VARIABLE} names no axe.min.js (npm install axe-core), so the rules of axe were not checked on the {what}");
+        println!(
+            "SKIPPED: {VARIABLE} names no axe.min.js (npm install axe-core), so the rules of axe were not checked on the {what}"
+        );
         return;
     };
     let axe = std::fs::read_to_string(&path).expect("axe.min.js is readable");
@@ -30,7 +32,8 @@ pub(crate) fn has_no_violations(what: &str, page: &str) {
         let screen = Screen { is_phone, is_dark };
         let Some(said) = said_on(screen, &with_script(page, &axe), SCRIPT) else { return };
         println!("{what}: {}", said.join(", "));
-        let on = format!("{} pixels wide, {}", if is_phone { 360 } else { 1280 }, if is_dark { "dark" } else { "light" });
+        let on =
+            format!("{} pixels wide, {}", if is_phone { 360 } else { 1280 }, if is_dark { "dark" } else { "light" });
         assert_eq!(said.first(), Some(&on), "{what}");
         let passed = said.last().and_then(|line| line.split(' ').next()).and_then(|n| n.parse::<u32>().ok());
         assert!(passed.is_some_and(|n| n > 15), "{what}: {said:#?}");

@@ -77,7 +77,9 @@ impl Drop for Browser {
 
 fn in_frame(page: &str) -> String {
     let page = page.replace('&', "&amp;").replace('"', "&quot;");
-    format!("<!doctype html><meta charset=\"utf-8\"><iframe srcdoc=\"{page}\" style=\"width:360px;height:740px;border:0\"></iframe>")
+    format!(
+        "<!doctype html><meta charset=\"utf-8\"><iframe srcdoc=\"{page}\" style=\"width:360px;height:740px;border:0\"></iframe>"
+    )
 }
 
 fn start(screen: Screen, browser: &str, file: &Path, profile: &Path) -> Browser {

@@ -7,11 +7,10 @@ use anyhow::{Result, anyhow};
 use pocketsplat_capture::dataset::Image;
 use pocketsplat_trainer::train::run::newest_preview;
 use pocketsplat_viewer::escaped;
-use serde_json::json;
 use tiny_http::{Header, Method, Request, Response, Server};
 
 use super::report::STYLE;
-use crate::plot::{LearningRow, Recording, learning_curve_svg, thousands};
+use crate::plot::{Recording, learning_curve_svg, thousands};
 
 const PAGE: &str = include_str!("watch/watch.html");
 
@@ -72,7 +71,7 @@ fn answer(watched: &Watched, request: &Request, port: u16) -> Answer {
     let path = request.url().split('?').next().unwrap_or_default();
     let found = match path {
         "/" => Some(("text/html; charset=utf-8", page(watched).into_bytes())),
-        "/state" => Some(("application/json", state(watched).into_bytes())),
+        "/state" => Some(("text/html; charset=utf-8", state(watched).into_bytes())),
         "/preview.jpg" => {
             newest(watched).and_then(|(_, path)| std::fs::read(path).ok()).map(|bytes| ("image/jpeg", bytes))
         }
@@ -99,29 +98,19 @@ fn newest(watched: &Watched) -> Option<(u32, PathBuf)> {
 
 fn page(watched: &Watched) -> String {
     let name = watched.folder.file_stem().unwrap_or_default().to_string_lossy();
-    let report = std::path::absolute(&watched.folder).unwrap_or_else(|_| watched.folder.clone()).join("report.html");
+    let folder = std::path::absolute(&watched.folder).unwrap_or_else(|_| watched.folder.clone());
     PAGE.replace("{{STYLE}}", STYLE.trim_end())
-        .replace("{{REPORT}}", &escaped(&report.to_string_lossy()))
+        .replace("{{FOLDER}}", &escaped(&folder.to_string_lossy()))
         .replace("{{TITLE}}", &escaped(&name))
-        .replace("{{STATE}}", &content(watched, &rows(watched)))
+        .replace("{{STATE}}", &state(watched))
 }
 
-/// How far the run is, as JSON: what the page asks for again and again.
+/// How far the run is: what the page asks for again and again.
 fn state(watched: &Watched) -> String {
-    let rows = rows(watched);
-    let iterations = rows.last().map(|row| row.iteration);
-    json!({ "state": "running", "iterations": iterations, "html": content(watched, &rows) }).to_string()
-}
-
-/// What the run has recorded; nothing before its first row.
-fn rows(watched: &Watched) -> Vec<LearningRow> {
-    match Recording::read(&watched.folder.join("progress.csv")) {
+    let rows = match Recording::read(&watched.folder.join("progress.csv")) {
         Ok(Recording::Learning(rows)) => rows,
         _ => Vec::new(),
-    }
-}
-
-fn content(watched: &Watched, rows: &[LearningRow]) -> String {
+    };
     let Some(row) = rows.last() else {
         return "<p>The first iterations are on their way.</p>".to_owned();
     };
@@ -149,7 +138,7 @@ fn content(watched: &Watched, rows: &[LearningRow]) -> String {
             thousands(iteration.into())
         );
     }
-    let curves = learning_curve_svg(rows.to_vec(), all).map_or_else(
+    let curves = learning_curve_svg(rows, all).map_or_else(
         |error| format!("<p>{}</p>", escaped(&error.to_string())),
         |svg| {
             format!(

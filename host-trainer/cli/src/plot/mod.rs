@@ -12,8 +12,8 @@ mod names;
 mod rate_distortion;
 mod recording;
 
-pub(crate) use cost::{CostPanel, CostPoint, cost_svg};
 pub(crate) use chart::thousands;
+pub(crate) use cost::{CostPanel, CostPoint, cost_svg};
 pub(crate) use learning::{learning_curve_svg, learning_curves_svg};
 pub(crate) use names::names_of;
 pub(crate) use rate_distortion::{SizeAxis, rate_distortion_svg};

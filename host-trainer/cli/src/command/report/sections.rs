@@ -29,7 +29,9 @@ fn table(name: &str, header: &[&str], rows: impl IntoIterator<Item = Vec<String>
         format!("<tr>{}</tr>\n", cells.iter().enumerate().map(cell).collect::<String>())
     };
     let body: String = rows.into_iter().map(row).collect();
-    format!("<div class=\"scroll\" tabindex=\"0\" role=\"group\" aria-label=\"{name}\"><table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}</tbody></table></div>")
+    format!(
+        "<div class=\"scroll\" tabindex=\"0\" role=\"group\" aria-label=\"{name}\"><table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}</tbody></table></div>"
+    )
 }
 
 /// The figures that people ask for first.
@@ -141,7 +143,11 @@ pub(super) fn effects(folder: &Path) -> Result<String> {
             thousands(line.bytes as f64),
         ]
     });
-    Ok(table("Effects", &["effects (★ kept)", "PSNR, dB", "gain, dB", "price, dB", "million instructions", "bytes"], rows))
+    Ok(table(
+        "Effects",
+        &["effects (★ kept)", "PSNR, dB", "gain, dB", "price, dB", "million instructions", "bytes"],
+        rows,
+    ))
 }
 
 /// Every held-out view.

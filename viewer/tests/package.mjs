@@ -92,8 +92,8 @@ assert.equal(JSON.stringify(orbit), before, 'what is refused moves nothing');
 
 // --- Sharpness while it moves ----------------------------------------------------------------------------------------
 
-/** Eight seconds of frames that take `fixed` milliseconds and `perMegapixel`, give or take a share: levels, in order. */
-function moved(fixed, perMegapixel, share) {
+/** Eight seconds of frames that take `fixed` milliseconds and `perMegapixel`, give or take a share, and `factor` as much after half: levels, in order. */
+function moved(fixed, perMegapixel, share, factor = 1) {
   const [sharpness, pixels, levels] = [new Sharpness(), 557_000, []];
   let seed = 1;
   const noise = () => (seed = (seed * 16807) % 2147483647) / 2147483647 - 0.5;
@@ -103,7 +103,7 @@ function moved(fixed, perMegapixel, share) {
   for (let now = 300; now < 8300; ) {
     const part = sharpness.part(pixels, true, now);
     if (levels.at(-1) !== part) levels.push(part);
-    const milliseconds = took(part);
+    const milliseconds = took(part) * (now > 4000 ? factor : 1);
     now += milliseconds;
     sharpness.took(milliseconds, pixels * part ** 2);
   }
@@ -117,6 +117,7 @@ for (const fixed of [0, 10, 30]) {
     }
   }
 }
+assert.deepEqual([moved(0, 150, 0, 4), moved(0, 400, 0, 0.2)], [[0.7, 0.5], [0.5, 0.7, 1]], 'and anew where that changes');
 assert.deepEqual([moved(0, 50, 0), moved(0, 2000, 0)], [[1], [0.25]], 'as sharp as there is time for');
 
 // --- How far it moves by itself --------------------------------------------------------------------------------------

@@ -13,8 +13,9 @@ const STAGES = [
 export const count = (n) => Math.round(n).toLocaleString('en');
 /** As the report of a run writes them. */
 export const bytes = (n) => {
-  if (n >= 2 ** 30) return `${(n / 2 ** 30).toFixed(2)} GiB`;
-  if (n >= 2 ** 20) return `${(n / 2 ** 20).toFixed(2)} MiB`;
+  const short = (n) => n.toFixed(n < 100 ? 2 : 0);
+  if (n >= 2 ** 30) return `${short(n / 2 ** 30)} GiB`;
+  if (n >= 2 ** 20) return `${short(n / 2 ** 20)} MiB`;
   return n >= 10 * 1024 ? `${(n / 1024).toFixed(0)} KiB` : `${count(n)} B`;
 };
 export const percent = (part) => `${(100 * part).toFixed(part > 0 && part < 0.1 ? 1 : 0)} %`;

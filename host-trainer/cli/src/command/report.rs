@@ -1,6 +1,6 @@
 //! `pocketsplat report`: a page about a finished run.
 
-mod amounts;
+pub(super) mod amounts;
 mod pictures;
 mod sections;
 

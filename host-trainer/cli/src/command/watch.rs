@@ -11,12 +11,12 @@ use pocketsplat_files::shell_word;
 use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::run::newest_preview;
 use pocketsplat_viewer::escaped;
-use serde_json::json;
 use tiny_http::{Header, Method, Request, Response, Server};
 
-use super::estimate::bundle_bytes;
+use super::estimate::{bundle_bytes, duration};
 use super::progress::two_digits;
 use super::report::STYLE;
+use super::report::amounts::size;
 use crate::plot::{LearningRow, Recording, learning_curve_svg, thousands};
 use crate::say::say;
 
@@ -139,7 +139,7 @@ fn answer(watched: &Watched, request: &Request, port: u16) -> Answer {
     let path = request.url().split('?').next().unwrap_or_default();
     let found = match path {
         "/" => Some(("text/html; charset=utf-8", page(watched).into_bytes())),
-        "/state" => Some(("application/json", state(watched).into_bytes())),
+        "/state" => Some(("text/html; charset=utf-8", state(watched).into_bytes())),
         "/preview.jpg" => {
             newest(watched).and_then(|(_, path)| std::fs::read(path).ok()).map(|bytes| ("image/jpeg", bytes))
         }
@@ -166,34 +166,33 @@ fn newest(watched: &Watched) -> Option<(u32, PathBuf)> {
 
 fn page(watched: &Watched) -> String {
     let name = watched.folder.file_stem().unwrap_or_default().to_string_lossy();
-    let report = std::path::absolute(&watched.folder).unwrap_or_else(|_| watched.folder.clone()).join("report.html");
+    let folder = std::path::absolute(&watched.folder).unwrap_or_else(|_| watched.folder.clone());
     PAGE.replace("{{STYLE}}", STYLE.trim_end())
-        .replace("{{REPORT}}", &escaped(&report.to_string_lossy()))
+        .replace("{{FOLDER}}", &escaped(&folder.to_string_lossy()))
         .replace("{{TITLE}}", &escaped(&name))
-        .replace("{{STATE}}", &content(watched, &rows(watched)))
+        .replace("{{STATE}}", &state(watched))
 }
 
-/// How far the run is, as JSON: what the page asks for again and again.
+/// How far the run is: what the page asks for again and again.
 fn state(watched: &Watched) -> String {
-    let rows = rows(watched);
-    let mut said = json!({ "state": "running", "html": content(watched, &rows) });
-    if let Some(row) = rows.last() {
-        said["iterations"] = row.iteration.into();
-        said["bytes"] = bundle_bytes(&watched.config, row.anchors, row.bits()).into();
-    }
-    match &watched.last().ending {
-        None => said["seconds_left"] = seconds_left(watched, &rows).into(),
-        Some(Ending::Finished { report }) => {
-            said["state"] = "finished".into();
-            said["report"] = report.as_ref().map(|path| path.display().to_string()).into();
+    ended(watched) + &progress(watched)
+}
+
+/// How the run ended, once it has.
+fn ended(watched: &Watched) -> String {
+    let (name, said) = match &watched.last().ending {
+        None => return String::new(),
+        Some(Ending::Finished { report: Some(path) }) => {
+            ("finished", format!("its report is <code>{}</code>", escaped(&path.display().to_string())))
         }
+        Some(Ending::Finished { report: None }) => ("finished", "it has no report".to_owned()),
         Some(Ending::Stopped(why)) => {
-            said["state"] = "stopped".into();
-            said["why"] = why.as_str().into();
-            said["command"] = format!("pocketsplat train --resume {}", shell_word(&watched.folder)).into();
+            let word = escaped(&shell_word(&watched.folder));
+            let resume = format!("to go on, <code>pocketsplat train --resume {word}</code>");
+            ("stopped", format!("{}; {resume}", escaped(why)))
         }
-    }
-    said.to_string()
+    };
+    format!("<p role=\"status\" data-state=\"{name}\"><strong>state: {name}</strong> · {said}</p>\n")
 }
 
 /// Iterations a second of the last rows of a run, in the time that it trained.
@@ -205,20 +204,11 @@ fn rate(rows: &[LearningRow]) -> Option<f64> {
     (rate.is_finite() && rate > 0.0).then_some(rate)
 }
 
-fn seconds_left(watched: &Watched, rows: &[LearningRow]) -> Option<f64> {
-    let left = watched.config.iterations.checked_sub(rows.last()?.iteration).filter(|&left| left > 0)?;
-    Some(f64::from(left) / rate(rows)?)
-}
-
-/// What the run has recorded; nothing before its first row.
-fn rows(watched: &Watched) -> Vec<LearningRow> {
-    match Recording::read(&watched.folder.join("progress.csv")) {
+fn progress(watched: &Watched) -> String {
+    let rows = match Recording::read(&watched.folder.join("progress.csv")) {
         Ok(Recording::Learning(rows)) => rows,
         _ => Vec::new(),
-    }
-}
-
-fn content(watched: &Watched, rows: &[LearningRow]) -> String {
+    };
     let Some(row) = rows.last() else {
         return "<p>The first iterations are on their way.</p>".to_owned();
     };
@@ -233,8 +223,15 @@ fn content(watched: &Watched, rows: &[LearningRow]) -> String {
         text += &format!("<div><b>{psnr_db:.2} dB</b><span>PSNR, training views</span></div>\n");
     }
     text += &format!("<div><b>{}</b><span>anchors</span></div>\n", thousands(row.anchors as f64));
-    if let Some(rate) = rate(rows) {
-        text += &format!("<div><b>{}</b><span>iterations a second</span></div>", two_digits(rate));
+    let bytes = bundle_bytes(&watched.config, row.anchors, row.bits());
+    text += &format!("<div><b>about {}</b><span>bundle</span></div>\n", size(bytes));
+    if let Some(rate) = rate(&rows).filter(|_| done < all && watched.last().ending.is_none()) {
+        let minutes = f64::from(all - done) / rate / 60.0;
+        text += &format!(
+            "<div><b>{} it/s</b><span>iterations a second</span></div>\n<div><b>{}</b><span>left</span></div>\n",
+            two_digits(rate),
+            duration(minutes)
+        );
     }
     text += "</div>\n";
     if let Some((iteration, _)) = newest(watched) {
@@ -250,7 +247,7 @@ fn content(watched: &Watched, rows: &[LearningRow]) -> String {
             thousands(iteration.into())
         );
     }
-    let curves = learning_curve_svg(rows.to_vec(), all).map_or_else(
+    let curves = learning_curve_svg(rows, all).map_or_else(
         |error| format!("<p>{}</p>", escaped(&error.to_string())),
         |svg| {
             format!(
@@ -278,18 +275,19 @@ mod tests {
         let heads = "iteration,psnr_db,anchors,seconds,feature_bits,log_scale_bits,offset_bits\n";
         std::fs::write(folder.path().join("progress.csv"), heads.to_owned() + &rows).unwrap();
         let watched = watched(folder.path());
-        let said = |watched: &Watched| -> serde_json::Value { serde_json::from_str(&state(watched)).unwrap() };
-        let now = said(&watched);
+        let said = state(&watched);
         // 40 kB and 1,000 anchors of 330 bits; ten iterations a second, 100 of them left.
-        assert!((now["bytes"].as_f64().unwrap() - 81_250.0).abs() < 5_000.0, "{now}");
-        assert!(now["state"] == "running" && now["seconds_left"] == 10.0, "{now}");
-        assert!(now["html"].as_str().unwrap().contains("<b>10.0</b><span>iterations a second"), "{now}");
+        assert!(
+            said.contains("<b>about 79 KiB</b>") && said.contains("10.0 it/s") && said.contains("<b>10 seconds</b>"),
+            "{said}"
+        );
+        assert!(!said.contains("data-state"), "{said}");
         watched.last().ending = Some(Ending::Finished { report: Some("/a <b>/report.html".into()) });
-        let now = said(&watched);
-        assert!(now["state"] == "finished" && now["report"] == "/a <b>/report.html", "{now}");
-        assert!(now["seconds_left"].is_null(), "{now}");
+        let said = state(&watched);
+        assert!(said.contains("state: finished") && said.contains("/a &lt;b&gt;/report.html"), "{said}");
+        assert!(!said.contains("<span>left"), "{said}");
         watched.last().ending = Some(Ending::Stopped("it was interrupted".to_owned()));
-        assert!(said(&watched)["command"].as_str().unwrap().starts_with("pocketsplat train --resume"), "how to go on");
+        assert!(state(&watched).contains("pocketsplat train --resume"), "how to go on");
     }
 
     #[test]

@@ -13,7 +13,7 @@ use super::{labels, marker};
 pub(super) const WIDTH_PX: u32 = 900;
 pub(super) const PANEL_PX: u32 = 420;
 /// The same of a figure in a page: narrow, so that its words are words on a phone.
-pub(super) const PAGE_PX: [u32; 2] = [480, 290];
+pub(super) const PAGE_PX: [u32; 2] = [420, 280];
 
 const FONT: &str = "sans-serif";
 const TEXT_PX: u32 = 15;

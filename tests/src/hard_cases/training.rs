@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 use pocketsplat_capture::camera::Camera;
-use pocketsplat_capture::dataset::{Capture, EXTENT, Image, Normalisation, Photograph, PointsOrigin, View};
+use pocketsplat_capture::dataset::{Capture, EXTENT, Image, Normalisation, Photograph, PointsOrigin, SceneKind, View};
 use pocketsplat_trainer::scene::ModelShape;
 use pocketsplat_trainer::train::config::{Densification, LearningRate, Rates};
 use pocketsplat_trainer::train::{TrainConfig, TrainError, Trainer};
@@ -42,6 +42,7 @@ fn capture(pixel: impl Fn(u32, u32, u32) -> [u8; 3], points: Vec<DVec3>) -> Capt
         test: Vec::new(),
         points,
         points_origin: PointsOrigin::Random,
+        scene: SceneKind::Object,
         normalisation: Normalisation { centre: DVec3::ZERO, scale: 1.0 },
         extent: EXTENT,
         background: [0.0; 3],

@@ -1,23 +1,23 @@
 //! From a listing to a capture: pixels decoded, cameras and points in the common frame.
 
 use std::collections::BTreeSet;
+use std::path::Path;
 
 use glam::DVec3;
 
+use super::diagnose::{doubts, doubts_of_pixels};
 use super::framing::Framing;
-use super::listing::{Listing, commonest};
-use super::normalise::random_points_world;
+use super::listing::{ListedView, Listing, Shot, commonest};
+use super::looks::Looks;
+use super::scene_kind::taken_for;
 use super::storage::{LoadedView, load_views};
 use super::{
-    Capture, DatasetError, EXTENT, Layout, LoadOptions, LoadReport, Normalisation, PointsOrigin, SkippedView, Split,
-    frusta,
+    Capture, DatasetError, EXTENT, Finding, LoadOptions, LoadReport, Normalisation, PointsOrigin, Severity,
+    SkippedView, Split, View, starting_points,
 };
 
 /// Fewer views than this leave depth undetermined almost everywhere.
 pub(super) const MIN_TRAIN_VIEWS: usize = 3;
-
-/// Points farther from the cameras than this many extents show no parallax and only cost precision.
-const MAX_POINT_EXTENTS: f64 = 1000.0;
 
 /// Decodes the views of a listing and brings all of it to the common frame.
 ///
@@ -31,26 +31,22 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
     let n_without_alpha = shots().filter(|shot| !shot.header.has_alpha).count();
     let n_with_alpha = shots().count() - n_without_alpha;
     let listed = listing.n_listed(Split::Train);
-    // Before decoding anything, if that many are already known not to do.
+    // Before decoding anything, if what is known does not do.
     if listing.shots(Split::Train).count() < MIN_TRAIN_VIEWS {
         let faults = listing.views.iter().filter(|view| view.split == Split::Train);
         let faults = faults.filter_map(|view| Some(format!("{}: {}", view.name, view.shot.as_ref().err()?)));
         return Err(too_few_views(&listing, listed, faults.collect()));
     }
+    frame(listing.shots(Split::Train).map(Shot::centre_world), &listing.source)?;
+    let mut warnings = doubts(&listing);
+    warnings.retain(|finding| finding.severity == Severity::Warning);
     let Listing { layout, source, views, points, unposed, notes } = listing;
+    let (doubtful, notes): (Vec<_>, Vec<_>) = notes.into_iter().partition(|note| note.severity != Severity::Note);
+    warnings.extend(doubtful.iter().map(|note| Finding::told(note.severity, note.code, &note.text)));
     let mut notes: Vec<String> = notes.into_iter().map(|note| note.text).collect();
-    let (mut train, mut test, mut skipped) = (Vec::new(), Vec::new(), Vec::new());
-    let mut sum_shown = 0.0;
-    for LoadedView { split, name, view } in load_views(views, options)? {
-        match (view, split) {
-            (Ok((view, shown)), Split::Train) => {
-                train.push(view);
-                sum_shown += shown;
-            }
-            (Ok((view, _)), Split::Test) => test.push(view),
-            (Err(fault), split) => skipped.push(SkippedView { split, name, fault }),
-        }
-    }
+
+    let Decoded { mut train, mut test, mut skipped, looks, doubts } = decoded(views, options)?;
+    warnings.extend(doubts);
     // The sort keeps the capture's order within each split.
     skipped.sort_by_key(|view| view.split);
     if train.len() < MIN_TRAIN_VIEWS {
@@ -63,20 +59,18 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
             faults,
         });
     }
-    let centres: Vec<DVec3> = train.iter().map(|view| view.camera.centre_world()).collect();
-    let normalisation =
-        Normalisation::of_cameras(&centres).map_err(|spread| DatasetError::NoBaseline { path: source, spread })?;
+    let normalisation = frame(train.iter().map(|view| view.camera.centre_world()), &source)?;
     for view in train.iter_mut().chain(&mut test) {
         view.camera = normalisation.camera(&view.camera);
     }
-    if layout == Layout::Blender && n_without_alpha > 0 {
+    if n_without_alpha > 0 && n_with_alpha > n_without_alpha {
         notes.push(format!(
             "images without an alpha channel: {n_without_alpha}; what they show behind the object is trained as part \
              of it; export RGBA to have the background {} there",
             options.background
         ));
     }
-    if layout != Layout::Blender && n_with_alpha > 0 {
+    if n_with_alpha > 0 && n_with_alpha <= n_without_alpha {
         notes.push(format!(
             "photographs with an alpha channel: {n_with_alpha}; what is transparent is trained as {} background; give masks \
              to leave it out of training instead",
@@ -88,30 +82,27 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
         notes
             .push(format!("images with pixels that do not count (no source in the photograph, or masked): {n_masked}"));
     }
-    let given = points.map(|(_, points)| kept_points(&points, &normalisation, &mut notes));
+    let given = points.map(|(_, points)| {
+        let (points, note) = starting_points::kept(&points, &normalisation);
+        notes.extend(note);
+        points
+    });
+    let taken = taken_for(&looks, options.scene);
     let cameras: Vec<_> = train.iter().map(|view| &view.camera).collect();
-    let where_cameras_look = || frusta::random_points(&cameras, options.n_random_points, options.seed);
     let (points, points_origin) = match given.filter(|points| !points.is_empty()) {
         Some(points) => (points, PointsOrigin::Capture),
-        None if layout == Layout::Blender => {
-            let cube = random_points_world(options.n_random_points, options.seed);
-            let cube: Vec<_> = cube.into_iter().map(|point| normalisation.point(point)).collect();
-            if frusta::are_seen(&cube, &cameras) {
-                (cube, PointsOrigin::Random)
-            } else {
-                notes.push(
-                    "the cameras do not look at the cube of ±1.3 around the origin, where scenes of Synthetic-NeRF lie; \
-                     training starts from random points where they look"
-                        .to_owned(),
-                );
-                (where_cameras_look(), PointsOrigin::Random)
-            }
-        }
-        None => (where_cameras_look(), PointsOrigin::Random),
+        None => (starting_points::random(&cameras, taken.kind, &normalisation, options), PointsOrigin::Random),
+    };
+    let background = match taken.backdrop {
+        Some(rgb8) => rgb8.map(|channel| f32::from(channel) / 255.0),
+        None => options.background.rgb(),
     };
     let report = LoadReport {
         layout,
         background: options.background,
+        backdrop: taken.backdrop,
+        scene: taken.kind,
+        because: taken.because,
         n_train: train.len(),
         n_test: test.len(),
         source_size_px,
@@ -121,30 +112,59 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
         points_origin,
         skipped,
         unposed,
+        warnings,
         notes,
     };
-    let background = options.background.rgb();
-    let shown = sum_shown / train.len() as f64;
-    let capture = Capture { train, test, points, points_origin, normalisation, extent: EXTENT, background, shown };
+    let shown = looks.iter().map(|looks| looks.shown).sum::<f64>() / train.len() as f64;
+    let scene = taken.kind;
+    let capture =
+        Capture { train, test, points, points_origin, scene, normalisation, extent: EXTENT, background, shown };
     Ok((capture, report))
+}
+
+/// Views whose pixels were decoded.
+#[derive(Default)]
+struct Decoded {
+    train: Vec<View>,
+    test: Vec<View>,
+    skipped: Vec<SkippedView>,
+    /// Of the views to train on.
+    looks: Vec<Looks>,
+    /// What the pixels make doubtful.
+    doubts: Vec<Finding>,
+}
+
+fn decoded(views: Vec<ListedView>, options: &LoadOptions) -> Result<Decoded, DatasetError> {
+    let mut decoded = Decoded::default();
+    let shots: Vec<Option<Shot>> = views.iter().map(|view| view.shot.as_ref().ok().cloned()).collect();
+    let mut seen = Vec::new();
+    for (LoadedView { split, name, view }, shot) in load_views(views, options)?.into_iter().zip(shots) {
+        match view {
+            Ok((view, looks)) => {
+                seen.extend(shot.map(|shot| (name, shot, looks.look)));
+                match split {
+                    Split::Train => {
+                        decoded.train.push(view);
+                        decoded.looks.push(looks);
+                    }
+                    Split::Test => decoded.test.push(view),
+                }
+            }
+            Err(fault) => decoded.skipped.push(SkippedView { split, name, fault }),
+        }
+    }
+    let seen: Vec<_> = seen.iter().map(|(name, shot, look)| ((name.as_str(), shot), *look)).collect();
+    decoded.doubts = doubts_of_pixels(&seen);
+    Ok(decoded)
+}
+
+/// The common frame of training cameras with these centres.
+fn frame(centres: impl Iterator<Item = DVec3>, source: &Path) -> Result<Normalisation, DatasetError> {
+    let no_baseline = |spread| DatasetError::NoBaseline { path: source.to_owned(), spread };
+    Normalisation::of_cameras(&centres.collect::<Vec<_>>()).map_err(no_baseline)
 }
 
 fn too_few_views(listing: &Listing, listed: usize, faults: Vec<String>) -> DatasetError {
     let usable = listing.shots(Split::Train).count();
     DatasetError::TooFewViews { path: listing.source.clone(), usable, listed, needed: MIN_TRAIN_VIEWS, faults }
-}
-
-/// The points worth starting from, normalised; says what was dropped.
-fn kept_points(points_world: &[DVec3], normalisation: &Normalisation, notes: &mut Vec<String>) -> Vec<DVec3> {
-    let points: Vec<DVec3> = points_world.iter().map(|&point| normalisation.point(point)).collect();
-    let kept: Vec<DVec3> = points.iter().copied().filter(|p| p.length() <= MAX_POINT_EXTENTS * EXTENT).collect();
-    if kept.len() < points.len() {
-        notes.push(format!(
-            "points left out: {} of {}; they are not finite or farther away than {MAX_POINT_EXTENTS} times the extent of \
-             the cameras",
-            points.len() - kept.len(),
-            points.len()
-        ));
-    }
-    kept
 }

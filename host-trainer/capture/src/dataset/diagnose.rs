@@ -14,9 +14,11 @@ mod finding;
 mod pixels;
 mod points;
 mod poses;
+mod readings;
 mod views;
 
 pub use finding::Finding;
+pub(super) use pixels::{Look, doubts as doubts_of_pixels};
 
 /// What was found out about a capture; displays as lines to print, serialises for programs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -72,10 +74,8 @@ fn check(path: &Path, options: &LoadOptions, decode: bool) -> Diagnosis {
     if decode {
         pixels::check(&mut listing, options, findings);
     }
-    views::check(&listing, findings);
-    let centres: Vec<DVec3> = listing.shots(Split::Train).map(|shot| shot.centre_world()).collect();
-    poses::check(&listing, &centres, findings);
-    points::check(&listing, &centres, findings);
+    views::not_used(&listing, findings);
+    findings.extend(doubts(&listing));
     findings.extend(listing.notes.iter().map(|note| Finding::told(note.severity, note.code, &note.text)));
     // Stable, so that findings of one severity keep the order of the checks.
     findings.sort_by_key(|finding| finding.severity);
@@ -84,6 +84,17 @@ fn check(path: &Path, options: &LoadOptions, decode: bool) -> Diagnosis {
     diagnosis.n_test = listing.shots(Split::Test).count();
     diagnosis.n_points = n_points(&listing);
     diagnosis
+}
+
+/// What a listing shows without its pixels, but for what a [report](super::LoadReport) names by itself: the views left out, the images
+/// without a pose and the notes of the reader.
+pub(super) fn doubts(listing: &Listing) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    views::check(listing, &mut findings);
+    let centres: Vec<DVec3> = listing.shots(Split::Train).map(|shot| shot.centre_world()).collect();
+    poses::check(listing, &centres, &mut findings);
+    points::check(listing, &centres, &mut findings);
+    findings
 }
 
 impl Diagnosis {

@@ -4,7 +4,7 @@ use glam::DVec3;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
-use super::EXTENT;
+use super::{EXTENT, SceneKind};
 use crate::camera::{Camera, nearest_to_axes};
 
 /// Half the side of the cube of points, in half-widths of the cameras' view at the focus.
@@ -15,8 +15,8 @@ const CUBE_HALF_WIDTHS: f64 = 0.9;
 const FAR_DISTANCES: f64 = 4.0;
 /// Where the cameras share no focus, points start at this part of the distance that stands in for it.
 const NEAR_DISTANCES: f64 = 0.25;
-/// Points of which [`are_seen`] asks.
-const N_TRIED: usize = 1_000;
+/// Cameras look at a cube where theirs is at least so much of it, and at most the inverse.
+const LIKE_CUBE: f64 = 0.5;
 /// The focus is taken where the mean projector across the optical axes has at least this determinant; parallel axes
 /// give 0, axes from all sides (2/3)³.
 const MIN_DETERMINANT: f64 = 1e-3;
@@ -25,11 +25,12 @@ const MIN_DETERMINANT: f64 = 1e-3;
 ///
 /// Cameras around something: half of the points fill a cube at the focus, the point nearest to all optical axes in the
 /// least-squares sense, as wide as what a middling camera sees there; the other half lie behind it along the rays of
-/// random pixels, evenly in 1/depth up to four times its distance, for what stands behind. Cameras without a common
-/// focus (side by side, or looking outwards): all points along such rays around one extent away.
+/// random pixels, evenly in 1/depth up to four times its distance, for what stands behind. Behind an object nothing stands,
+/// so all of its points are in the cube. Cameras without a common focus (side by side, or looking outwards): all points along
+/// such rays around one extent away.
 ///
 /// * `cameras`: normalised, at least one.
-pub(super) fn random_points(cameras: &[&Camera], n: usize, seed: u64) -> Vec<DVec3> {
+pub(super) fn random_points(cameras: &[&Camera], kind: SceneKind, n: usize, seed: u64) -> Vec<DVec3> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     // The upper 53 bits, the precision of f64, as a fraction of 1.
     let mut unit = move || (rng.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
@@ -38,7 +39,7 @@ pub(super) fn random_points(cameras: &[&Camera], n: usize, seed: u64) -> Vec<DVe
     (0..n)
         .map(|i| {
             if let Some((focus, half)) = cube
-                && i.is_multiple_of(2)
+                && (kind == SceneKind::Object || i.is_multiple_of(2))
             {
                 return focus + half * DVec3::new(2.0 * unit() - 1.0, 2.0 * unit() - 1.0, 2.0 * unit() - 1.0);
             }
@@ -55,19 +56,12 @@ pub(super) fn random_points(cameras: &[&Camera], n: usize, seed: u64) -> Vec<DVe
         .collect()
 }
 
-/// Whether the cameras look at these points: a point is in the images of at least a quarter of them, in the mean. Of cameras around
-/// something else a few see it too, behind what they look at. A thousand points are tried.
-pub(super) fn are_seen(points: &[DVec3], cameras: &[&Camera]) -> bool {
-    let is_in = |camera: &Camera, point: DVec3| {
-        let at = camera.rotation * point + camera.translation;
-        let [u, v] = [0, 1].map(|axis| camera.focal_px[axis] * at[axis] / at.z + camera.principal_px[axis]);
-        at.z > 0.0
-            && (0.0..=f64::from(camera.width_px)).contains(&u)
-            && (0.0..=f64::from(camera.height_px)).contains(&v)
-    };
-    let tried = &points[..points.len().min(N_TRIED)];
-    let n_in = |camera: &&Camera| tried.iter().filter(|point| is_in(camera, **point)).count();
-    4 * cameras.iter().map(n_in).sum::<usize>() >= tried.len() * cameras.len()
+/// Whether the cameras look at the cube of ±`half` around `centre`: their focus lies in it, and they see half to twice as much there.
+pub(super) fn look_at_cube(cameras: &[&Camera], centre: DVec3, half: f64) -> bool {
+    focus(cameras).is_some_and(|focus| {
+        let seen = cube_half(cameras, focus) / half;
+        (focus - centre).abs().max_element() <= half && (LIKE_CUBE..=1.0 / LIKE_CUBE).contains(&seen)
+    })
 }
 
 /// The point at depth `z` on the ray of a pixel position.
@@ -137,14 +131,28 @@ mod tests {
         let found = focus(&cameras).expect("the axes meet");
         assert!((found - focus_world).length() < 1e-9, "{found}");
         assert!((cube_half(&cameras, found) - 1.3).abs() < 0.01);
-        let points = random_points(&cameras, 1000, 1);
+        let points = random_points(&cameras, SceneKind::Room, 1000, 1);
         assert!(points.iter().step_by(2).all(|p| (*p - found).abs().max_element() <= 1.31));
         for point in points.iter().skip(1).step_by(2) {
             let seen = |camera: &&&Camera| (4.03..=16.13).contains(&depth(camera, *point));
             assert!(cameras.iter().any(|camera| seen(&camera)), "{point} lies behind the focus of no camera");
         }
-        assert_eq!(points, random_points(&cameras, 1000, 1));
-        assert_ne!(points, random_points(&cameras, 1000, 2));
+        assert_eq!(points, random_points(&cameras, SceneKind::Room, 1000, 1));
+        assert_ne!(points, random_points(&cameras, SceneKind::Room, 1000, 2));
+        let object = random_points(&cameras, SceneKind::Object, 1000, 1);
+        assert!(object.iter().all(|p| (*p - found).abs().max_element() <= 1.31), "nothing lies behind an object");
+    }
+
+    #[test]
+    fn cameras_look_at_a_cube_where_it_is_and_as_large_as_it_is() {
+        let cameras = around(DVec3::new(0.1, 0.0, -0.1));
+        let cameras: Vec<&Camera> = cameras.iter().collect();
+        assert!(look_at_cube(&cameras, DVec3::ZERO, 1.3));
+        assert!(!look_at_cube(&cameras, DVec3::X * 3.0, 1.3), "beside it");
+        assert!(
+            !look_at_cube(&cameras, DVec3::ZERO, 5.0) && !look_at_cube(&cameras, DVec3::ZERO, 0.2),
+            "of another size"
+        );
     }
 
     #[test]
@@ -152,7 +160,7 @@ mod tests {
         let cameras: Vec<Camera> = (0..5).map(|i| camera(DMat3::IDENTITY, DVec3::X * f64::from(i))).collect();
         let cameras: Vec<&Camera> = cameras.iter().collect();
         assert_eq!(focus(&cameras), None);
-        let points = random_points(&cameras, 200, 1);
+        let points = random_points(&cameras, SceneKind::Room, 200, 1);
         assert!(points.iter().all(|p| (0.25 * EXTENT..=4.0 * EXTENT).contains(&p.z)), "depths");
     }
 

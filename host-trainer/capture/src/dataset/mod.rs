@@ -2,7 +2,8 @@
 //!
 //! [`load`] tells the layout of a folder by the files in it; that layout's reader lists the views (poses, lenses, image
 //! headers), and what all layouts share makes a capture of the listing: pixels in `image`, `lens` and `undistort`, the
-//! common frame in `normalise`, initial points in `ply` and `frusta`; `storage` says where the pixels of large captures lie.
+//! common frame in `normalise`, without the cameras that `apart` sets aside; what the pixels show in `scene_kind`, initial points in
+//! `starting_points`; `storage` says where the pixels of large captures lie.
 //! A view that cannot be used is left out and named in the [`LoadReport`]; only a capture that cannot be trained on
 //! at all is an error. [`diagnose()`] looks at the same listing and says what may go wrong.
 
@@ -10,6 +11,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
+mod apart;
 mod assemble;
 mod blender;
 mod cache;
@@ -27,6 +29,7 @@ mod image_names;
 mod layout;
 mod lens;
 mod listing;
+mod looks;
 mod mask;
 mod named_path;
 mod nerfstudio;
@@ -42,9 +45,11 @@ mod pose;
 mod quaternion;
 mod record3d;
 mod report;
+mod scene_kind;
 mod severity;
 mod sources;
 mod spacing;
+mod starting_points;
 mod storage;
 mod text_file;
 mod transforms;
@@ -62,9 +67,10 @@ pub use options::{Background, LoadOptions, MOST_IN_MEMORY_BYTES};
 pub use photograph::Photograph;
 pub use pose::PoseFault;
 pub use report::{LoadReport, SkippedView, Split};
+pub use scene_kind::SceneKind;
 pub use severity::Severity;
 pub use sources::files_read;
-pub use spacing::{PUBLISHED_VOXEL_SIZE, nearest_squared, suggested_voxel_size};
+pub use spacing::{PUBLISHED_VOXEL_SIZE, ROOM_VOXEL_SIZE, nearest_squared, suggested_voxel_size};
 pub use view::{PhotographError, View};
 pub use view_fault::ViewFault;
 
@@ -108,6 +114,8 @@ pub struct Capture {
     pub points: Vec<DVec3>,
     /// Where they come from.
     pub points_origin: PointsOrigin,
+    /// What the photographs show.
+    pub scene: SceneKind,
     /// Takes capture coordinates to the normalised frame.
     pub normalisation: Normalisation,
     /// 1.1 × the largest distance of a training camera to their mean, normalised units: [`EXTENT`] by construction.
@@ -128,12 +136,13 @@ impl Capture {
         sizes.max_by_key(|[width, height]| u64::from(*width) * u64::from(*height)).unwrap_or_default()
     }
 
-    /// The voxel size for anchors, normalised units: [`suggested_voxel_size`] of the capture's points, and
-    /// [`PUBLISHED_VOXEL_SIZE`] where they are random and their spacing says nothing about the scene.
+    /// The voxel size for anchors, normalised units: [`suggested_voxel_size`] of the capture's points. Where they are random
+    /// their spacing says nothing about the scene: then [`PUBLISHED_VOXEL_SIZE`] for an object and [`ROOM_VOXEL_SIZE`] for a room.
     pub fn suggested_voxel_size(&self) -> f64 {
-        match self.points_origin {
-            PointsOrigin::Capture => suggested_voxel_size(&self.points),
-            PointsOrigin::Random => PUBLISHED_VOXEL_SIZE,
+        match (self.points_origin, self.scene) {
+            (PointsOrigin::Capture, _) => suggested_voxel_size(&self.points),
+            (PointsOrigin::Random, SceneKind::Object) => PUBLISHED_VOXEL_SIZE,
+            (PointsOrigin::Random, SceneKind::Room) => ROOM_VOXEL_SIZE,
         }
     }
 }
@@ -181,5 +190,6 @@ fn list(path: &Path, options: &LoadOptions) -> Result<listing::Listing, DatasetE
             listing.notes.push(listing::Note::warning("ignored-option", text));
         }
     }
+    apart::set_aside(&mut listing);
     Ok(listing)
 }

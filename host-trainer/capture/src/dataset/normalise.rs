@@ -8,7 +8,7 @@ use super::{EXTENT, Normalisation};
 use crate::camera::Camera;
 
 /// Half the side of the cube that random initial points fill, capture units; Synthetic-NeRF scenes lie within it.
-const RANDOM_CUBE_HALF: f64 = 1.3;
+pub(super) const RANDOM_CUBE_HALF: f64 = 1.3;
 
 impl Normalisation {
     /// The similarity that puts the mean of `centres` at the origin and makes 1.1 × the largest distance from it

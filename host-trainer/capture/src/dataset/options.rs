@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::{DatasetError, FrameSize};
+use super::{DatasetError, FrameSize, SceneKind};
 
 /// What stands behind everything: the colour that transparent pixels are composited on.
 ///
@@ -68,6 +68,8 @@ pub struct LoadOptions {
     pub frame: Option<FrameSize>,
     /// What transparent pixels are composited on.
     pub background: Background,
+    /// What the capture shows; without it what its photographs look like decides.
+    pub scene: Option<SceneKind>,
     /// Decides the random initial points of captures that bring none.
     pub seed: u64,
     /// How many random initial points a capture that brings none gets.
@@ -96,6 +98,7 @@ impl Default for LoadOptions {
             max_resolution: None,
             frame: None,
             background: Background::Black,
+            scene: None,
             seed: 42,
             n_random_points: 10_000,
             images: None,

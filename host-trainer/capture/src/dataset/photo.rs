@@ -4,6 +4,7 @@ use super::framing::Framing;
 use super::image::{read_composited, read_mask};
 use super::lens::is_scaling;
 use super::listing::Shot;
+use super::looks::Looks;
 use super::undistort::undistorted;
 use super::{LoadOptions, Mask, Photograph, ViewFault};
 use crate::camera::Camera;
@@ -13,8 +14,7 @@ pub(super) struct Photo {
     pub(super) photograph: Photograph,
     /// Capture units.
     pub(super) camera: Camera,
-    /// Share of its pixels that are not wholly transparent.
-    pub(super) shown: f64,
+    pub(super) looks: Looks,
 }
 
 impl Shot {
@@ -41,7 +41,9 @@ impl Shot {
             let path = self.mask.clone().unwrap_or_else(|| self.path.clone());
             return Err(ViewFault::Mask { path, message: "leaves no pixel of its image at this size".to_owned() });
         }
-        Ok(Photo { photograph: Photograph { image, mask }, camera: self.camera(&framing), shown })
+        let photograph = Photograph { image, mask };
+        let looks = Looks::of(&photograph, shown);
+        Ok(Photo { photograph, camera: self.camera(&framing), looks })
     }
 
     /// At which size it is loaded, and which part of it.

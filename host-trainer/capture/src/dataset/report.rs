@@ -5,7 +5,7 @@ use std::fmt;
 use serde::Deserialize;
 
 use super::error::first_few;
-use super::{Background, Layout, PointsOrigin, ViewFault};
+use super::{Background, Finding, Layout, PointsOrigin, SceneKind, ViewFault};
 
 /// The part of a capture a view belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
@@ -50,6 +50,12 @@ pub struct LoadReport {
     pub layout: Layout,
     /// What transparent pixels were composited on.
     pub background: Background,
+    /// The colour behind the object in photographs without transparent pixels, 8-bit RGB; the scene begins with it behind.
+    pub backdrop: Option<[u8; 3]>,
+    /// What the capture was taken for.
+    pub scene: SceneKind,
+    /// Why, where the user has not said what it shows.
+    pub because: Option<String>,
     /// Views to train on.
     pub n_train: usize,
     /// Views held out.
@@ -68,6 +74,8 @@ pub struct LoadReport {
     pub skipped: Vec<SkippedView>,
     /// Images that lie with the others but have no pose, by name; they are not read.
     pub unposed: Vec<String>,
+    /// What makes the result worse, or another one than was meant.
+    pub warnings: Vec<Finding>,
     /// Everything else worth knowing, each with its remedy where there is one.
     pub notes: Vec<String>,
 }
@@ -87,7 +95,11 @@ impl fmt::Display for LoadReport {
             write!(f, " and {} other sizes", self.n_sizes - 1)?;
         }
         let random = if self.points_origin == PointsOrigin::Random { "random " } else { "" };
-        write!(f, ", on {}, {} {random}initial points", self.background, self.n_points)?;
+        match self.backdrop {
+            Some([r, g, b]) => write!(f, ", on {r},{g},{b}")?,
+            None => write!(f, ", on {}", self.background)?,
+        }
+        write!(f, ", {} {random}initial points", self.n_points)?;
         for split in [Split::Train, Split::Test] {
             let of_split: Vec<&SkippedView> = self.skipped.iter().filter(|view| view.split == split).collect();
             if !of_split.is_empty() {
@@ -102,6 +114,16 @@ impl fmt::Display for LoadReport {
                 first_few(&self.unposed, ", ")
             )?;
         }
+        if let Some(because) = &self.because {
+            let (taken, other) = match self.scene {
+                SceneKind::Object => ("an object on nothing", SceneKind::Room),
+                SceneKind::Room => ("a room", SceneKind::Object),
+            };
+            write!(f, "\ntaken for {taken}, for {because}; --scene {other} says otherwise")?;
+        }
+        for warning in &self.warnings {
+            write!(f, "\n{}", warning.in_line())?;
+        }
         for note in &self.notes {
             write!(f, "\nnote: {note}")?;
         }
@@ -111,6 +133,7 @@ impl fmt::Display for LoadReport {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Severity;
     use super::*;
 
     #[test]
@@ -128,6 +151,9 @@ mod tests {
         let report = LoadReport {
             layout: Layout::Blender,
             background: Background::Black,
+            backdrop: None,
+            scene: SceneKind::Room,
+            because: Some("the photographs show something up to their borders".to_owned()),
             n_train: 7,
             n_test: 0,
             source_size_px: (8, 6),
@@ -137,6 +163,7 @@ mod tests {
             points_origin: PointsOrigin::Random,
             skipped,
             unposed: ["a.jpg", "b.jpg", "c.jpg", "d.jpg"].map(str::to_owned).to_vec(),
+            warnings: vec![Finding::told(Severity::Warning, "x", "few views; take more")],
             notes: vec!["no test views".to_owned()],
         };
         let text = report.to_string();
@@ -145,6 +172,8 @@ mod tests {
         assert!(text.contains("images without a pose, not used: 4 (a.jpg, b.jpg, c.jpg, … and 1 more)"), "{text}");
         assert!(text.contains("train views left out: 5\n  train/r_0: image missing"), "{text}");
         assert!(text.contains("train/r_2") && !text.contains("train/r_3"), "{text}");
+        assert!(text.contains("\ntaken for a room, for the photographs show something up to their borders; --scene object says otherwise\n"));
+        assert!(text.contains("\nwarning: few views; take more\n"), "{text}");
         assert!(text.contains("\n  … and 2 more\n") && text.ends_with("\nnote: no test views"), "{text}");
     }
 }

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::cache::{Cache, CachedPhoto};
 use super::framing::Framing;
 use super::listing::{ListedView, Shot};
+use super::looks::Looks;
 use super::photo::Photo;
 use super::view::SourceFile;
 use super::{DatasetError, LoadOptions, Split, View, ViewFault, remove_cache};
@@ -28,8 +29,8 @@ enum Storage {
 pub(super) struct LoadedView {
     pub(super) split: Split,
     pub(super) name: String,
-    /// With the share of its pixels that are not wholly transparent.
-    pub(super) view: Result<(View, f64), ViewFault>,
+    /// With what its photograph looks like.
+    pub(super) view: Result<(View, Looks), ViewFault>,
 }
 
 /// Decodes every view once, and keeps the pixels in memory where all of them take no more than
@@ -96,7 +97,7 @@ impl Storage {
         name: &str,
         shot: Shot,
         options: &LoadOptions,
-    ) -> Result<Result<(View, f64), ViewFault>, DatasetError> {
+    ) -> Result<Result<(View, Looks), ViewFault>, DatasetError> {
         let name = name.to_owned();
         if let Self::Cache(cache) = self {
             let framing = match shot.framing(options) {
@@ -105,15 +106,15 @@ impl Storage {
             };
             return Ok(cache
                 .photo(i, &name, &shot, options)?
-                .map(|CachedPhoto { file, shown }| (View::in_cache(name, shot.camera(&framing), file), shown)));
+                .map(|CachedPhoto { file, looks }| (View::in_cache(name, shot.camera(&framing), file), looks)));
         }
-        Ok(shot.read(options).map(|Photo { photograph, camera, shown }| match self {
+        Ok(shot.read(options).map(|Photo { photograph, camera, looks }| match self {
             Self::Capture => {
                 let (crc32, has_mask) = (photograph.crc32(), photograph.mask.is_some());
                 let file = SourceFile { shot, options: options.clone(), crc32, has_mask };
-                (View::in_capture(name, camera, file), shown)
+                (View::in_capture(name, camera, file), looks)
             }
-            _ => (View::new(name, camera, photograph), shown),
+            _ => (View::new(name, camera, photograph), looks),
         }))
     }
 }

@@ -68,6 +68,12 @@ pub enum ViewFault {
     /// The mask cannot be used.
     #[error("its mask `{}` {message}; restore the mask or take it out of the capture", path.display())]
     Mask { path: PathBuf, message: String },
+    /// The camera is far from all others.
+    #[error(
+        "its camera stands {median_distances:.0} times as far from the middle of all as half of them do, and near none; its pose is \
+         probably wrong: mend it, or take the view out"
+    )]
+    Apart { median_distances: f64 },
     /// The pose is no rigid motion.
     #[error("`transform_matrix` {0}")]
     Pose(#[from] PoseFault),
@@ -95,6 +101,7 @@ impl ViewFault {
             Self::NoCamera { .. } => "missing-camera",
             Self::Quaternion { .. } | Self::Translation { .. } | Self::Pose(_) => "bad-pose",
             Self::Mask { .. } => "bad-mask",
+            Self::Apart { .. } => "pose-outlier",
         }
     }
 

@@ -106,7 +106,17 @@ fn check(case: &Case) {
     fixture.points = (0..120).map(|i| DVec3::new(0.01 * f64::from(i) - 0.6, 0.2, 0.05 * f64::from(i % 7))).collect();
     (case.write)(&mut fixture);
     let diagnosis = diagnose(fixture.path(), &LoadOptions::default());
-    let text = match (case.harm, fixture.load()) {
+    let loaded = fixture.load();
+    if let Ok((_, report)) = &loaded {
+        // What is left out has lines of its own.
+        let is_left_out = |code| code == "unposed-image" || (case.harm == Views && code == case.code);
+        for finding in diagnosis.findings.iter().filter(|finding| finding.severity == Severity::Warning) {
+            let is_told =
+                is_left_out(finding.code) || report.warnings.iter().any(|warning| warning.code == finding.code);
+            assert!(is_told, "{name}: loading does not tell of {finding}:\n{report}");
+        }
+    }
+    let text = match (case.harm, loaded) {
         (Fatal, Err(error)) => error.to_string(),
         (Fatal, Ok((_, report))) => panic!("{name}: loaded, but must not: {report}"),
         (harm, Err(error)) => panic!("{name}: {harm:?}, but loading fails: {error}"),

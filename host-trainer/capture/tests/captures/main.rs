@@ -6,5 +6,6 @@ mod damaged;
 mod exports;
 mod fixture;
 mod real;
+mod scene;
 mod sound;
 mod storage;

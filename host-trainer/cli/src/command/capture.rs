@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-use pocketsplat_capture::dataset::{self, Background, Capture, LoadOptions, Severity, Split, View};
+use pocketsplat_capture::dataset::{self, Background, Capture, LoadOptions, Split, View};
 use pocketsplat_files::shell_word;
 use pocketsplat_gaussians::Format;
 
@@ -39,6 +39,7 @@ impl CaptureArgs {
             max_resolution: self.options.max_resolution,
             frame: self.options.resolution,
             background: self.options.background.unwrap_or(Background::Black),
+            scene: self.options.scene,
             seed,
             images: self.options.images.clone(),
             model: self.options.model,
@@ -68,10 +69,6 @@ impl CaptureArgs {
 
     fn load_with(&self, options: &LoadOptions) -> Result<Capture> {
         refuse_gaussians(&self.dataset)?;
-        let findings = dataset::diagnose_cheaply(&self.dataset, options);
-        if findings.count(Severity::Warning) > 0 {
-            say!("warnings found: run `pocketsplat doctor {}`", shell_word(&self.dataset));
-        }
         let (capture, report) = dataset::load(&self.dataset, options)
             .with_context(|| format!("could not load the capture {}", self.dataset.display()))?;
         say!("{report}");

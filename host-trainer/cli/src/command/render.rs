@@ -29,7 +29,8 @@ use cameras::Shot;
 use pictures::{Format, Target};
 
 /// Options that speak of a capture, which pictures of a bundle alone do without.
-const OF_A_CAPTURE: [&str; 7] = ["dataset", "split", "max_resolution", "background", "images", "model", "test_every"];
+const OF_A_CAPTURE: [&str; 8] =
+    ["dataset", "split", "max_resolution", "background", "scene", "images", "model", "test_every"];
 
 /// Draw a bundle as pictures: views of a capture, the bundle's own camera, a turn around it, or cameras of a file.
 ///

@@ -1,10 +1,10 @@
 //! How photographs are prepared: options of every command that reads a capture, and a section of a run's configuration.
 
-use pocketsplat_capture::dataset::{Background, FrameSize};
+use pocketsplat_capture::dataset::{Background, FrameSize, SceneKind};
 use serde::{Deserialize, Serialize};
 
 use super::heading::INPUT;
-use super::named::{BACKGROUNDS, one_of};
+use super::named::{BACKGROUNDS, SCENES, one_of};
 
 /// How photographs are prepared.
 #[derive(clap::Args, Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -21,6 +21,11 @@ pub(crate) struct CaptureOptions {
     #[arg(long, value_name = "COLOUR", value_parser = one_of::<Background>(BACKGROUNDS), help_heading = INPUT)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) background: Option<Background>,
+    /// What the photographs show: object, which stands on nothing, or room [default: object where pixels are transparent or one colour
+    /// runs along the borders, else room]
+    #[arg(long, value_name = "KIND", value_parser = one_of::<SceneKind>(SCENES), help_heading = INPUT, hide_short_help = true)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) scene: Option<SceneKind>,
     /// Folder of images to read, for captures that hold several sizes [default: the only one, or images]
     #[arg(long, value_name = "NAME", help_heading = INPUT, hide_short_help = true)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -45,6 +50,7 @@ impl CaptureOptions {
             max_resolution: size.max_resolution,
             resolution: size.resolution,
             background: self.background.or(other.background),
+            scene: self.scene.or(other.scene),
             images: self.images.clone().or_else(|| other.images.clone()),
             model: self.model.or(other.model),
             test_every: self.test_every.or(other.test_every),

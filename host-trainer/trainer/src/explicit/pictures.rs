@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use pocketsplat_capture::camera::Camera;
-use pocketsplat_capture::dataset::{Capture, EXTENT, Photograph, PointsOrigin, View};
+use pocketsplat_capture::dataset::{Capture, EXTENT, Photograph, PointsOrigin, SceneKind, View};
 use pocketsplat_gaussians::Gaussians;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -61,6 +61,7 @@ pub fn capture(
         test: take((test, "test")),
         points,
         points_origin: PointsOrigin::Capture,
+        scene: SceneKind::Room,
         normalisation,
         extent: EXTENT,
         background: how.background,

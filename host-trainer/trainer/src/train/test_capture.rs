@@ -6,7 +6,7 @@ use super::TrainConfig;
 use super::config::{Backbone, Densification};
 use crate::scene::ModelShape;
 use pocketsplat_capture::camera::Camera;
-use pocketsplat_capture::dataset::{Capture, EXTENT, Image, Normalisation, Photograph, PointsOrigin, View};
+use pocketsplat_capture::dataset::{Capture, EXTENT, Image, Normalisation, Photograph, PointsOrigin, SceneKind, View};
 
 pub(crate) const SIZE_PX: u32 = 24;
 
@@ -48,6 +48,7 @@ pub(crate) fn many_views(n: u32) -> Capture {
         test: Vec::new(),
         points: points.collect(),
         points_origin: PointsOrigin::Random,
+        scene: SceneKind::Object,
         normalisation: Normalisation { centre: DVec3::ZERO, scale: 1.0 },
         extent: EXTENT,
         background: [0.0; 3],

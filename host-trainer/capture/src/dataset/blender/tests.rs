@@ -27,7 +27,7 @@ impl Fixture {
     }
 
     fn write_image(&self, name: &str, width_px: u32, height_px: u32) {
-        let rgba: Vec<u8> = (0..width_px * height_px).flat_map(|i| [200, 100, i as u8, 128]).collect();
+        let rgba: Vec<u8> = (0..width_px * height_px).flat_map(|i| [200, 100, (i * 10) as u8, 128]).collect();
         ::image::save_buffer(self.path().join(name), &rgba, width_px, height_px, ::image::ExtendedColorType::Rgba8)
             .expect("an image");
     }
@@ -162,8 +162,6 @@ fn without_a_test_file_every_eighth_view_is_held_out() {
 fn random_points_lie_where_the_cameras_look() {
     let fixture = Fixture::new(9);
     fixture.write_transforms();
-    let around_the_origin = load(fixture.path(), &LoadOptions::default()).expect("a capture");
-    assert!(!around_the_origin.1.to_string().contains("cube"), "{}", around_the_origin.1);
     let elsewhere = DVec3::new(60.0, 0.0, 0.0);
     let frames: Vec<String> = (0..9)
         .map(|i| {
@@ -172,8 +170,7 @@ fn random_points_lie_where_the_cameras_look() {
         })
         .collect();
     fixture.write("transforms_train.json", &transforms("0.7", &frames));
-    let (capture, report) = load(fixture.path(), &LoadOptions::default()).expect("a capture");
-    assert_says(&report.to_string(), &["do not look at the cube"]);
+    let (capture, _) = load(fixture.path(), &LoadOptions::default()).expect("a capture");
     let focus = capture.normalisation.point(elsewhere);
     let n_near = capture.points.iter().filter(|point| point.distance(focus) < 5.0).count();
     assert!(2 * n_near >= capture.points.len(), "{n_near} of {}", capture.points.len());

@@ -19,6 +19,7 @@ use file::Header;
 
 use super::framing::Framing;
 use super::listing::Shot;
+use super::looks::Looks;
 use super::photo::Photo;
 use super::{DatasetError, LoadOptions, ViewFault};
 
@@ -40,8 +41,7 @@ pub(super) struct Cache {
 /// A photograph in the cache.
 pub(super) struct CachedPhoto {
     pub(super) file: CacheFile,
-    /// As [`Photo::shown`].
-    pub(super) shown: f64,
+    pub(super) looks: Looks,
 }
 
 impl Cache {
@@ -90,20 +90,20 @@ impl Cache {
         let path = self.path.join(format!("{i:05}.{EXTENSION}"));
         let made_from = made_from(name, shot, options);
         if let Ok(made_from) = &made_from
-            && let Ok((header, _)) = file::read(&path)
+            && let Ok((header, photograph)) = file::read(&path)
             && header.made_from == *made_from
         {
             let file = CacheFile::new(path, &header, &self.lock);
-            return Ok(Ok(CachedPhoto { file, shown: header.shown() }));
+            return Ok(Ok(CachedPhoto { file, looks: Looks::of(&photograph, header.shown()) }));
         }
-        let Photo { photograph, shown, .. } = match shot.read(options) {
+        let Photo { photograph, looks, .. } = match shot.read(options) {
             Ok(photo) => photo,
             Err(fault) => return Ok(Err(fault)),
         };
         // An image that could be decoded but not read before that: a file that says so is never used again.
-        let header = Header::new(made_from.unwrap_or_default(), &photograph, shown);
+        let header = Header::new(made_from.unwrap_or_default(), &photograph, looks.shown);
         file::write(&path, &header, &photograph).map_err(|source| self.write_error(source))?;
-        Ok(Ok(CachedPhoto { file: CacheFile::new(path, &header, &self.lock), shown }))
+        Ok(Ok(CachedPhoto { file: CacheFile::new(path, &header, &self.lock), looks }))
     }
 
     /// What a failure to write is; a full disk is left as it was found.

@@ -28,7 +28,14 @@ pub struct Finding {
 }
 
 impl Finding {
-    pub(super) fn new(severity: Severity, code: &'static str, message: String, remedy: &str) -> Self {
+    /// The finding in one line.
+    pub fn in_line(&self) -> String {
+        let text =
+            if self.remedy.is_empty() { self.message.clone() } else { format!("{}; {}", self.message, self.remedy) };
+        format!("{}: {text}", self.severity)
+    }
+
+    pub(in crate::dataset) fn new(severity: Severity, code: &'static str, message: String, remedy: &str) -> Self {
         let remedy = remedy.to_owned();
         Self { severity, code, message, remedy, files: Vec::new(), numbers: BTreeMap::new() }
     }
@@ -49,17 +56,17 @@ impl Finding {
     }
 
     /// A finding of a message that ends with its remedy behind the last semicolon, as all messages of this module do.
-    pub(super) fn told(severity: Severity, code: &'static str, text: &str) -> Self {
+    pub(in crate::dataset) fn told(severity: Severity, code: &'static str, text: &str) -> Self {
         let (message, remedy) = text.rsplit_once("; ").unwrap_or((text, ""));
         Self::new(severity, code, message.to_owned(), remedy)
     }
 
-    pub(super) fn files(mut self, files: impl IntoIterator<Item = PathBuf>) -> Self {
+    pub(in crate::dataset) fn files(mut self, files: impl IntoIterator<Item = PathBuf>) -> Self {
         self.files.extend(files);
         self
     }
 
-    pub(super) fn number(mut self, name: &'static str, value: f64) -> Self {
+    pub(in crate::dataset) fn number(mut self, name: &'static str, value: f64) -> Self {
         self.numbers.insert(name, value);
         self
     }
@@ -84,6 +91,8 @@ mod tests {
         let finding = Finding::told(Severity::Warning, "bad-pose", "has a; b, needed: c; do d");
         assert_eq!((finding.message.as_str(), finding.remedy.as_str()), ("has a; b, needed: c", "do d"));
         assert_eq!(finding.to_string(), "warning[bad-pose]: has a; b, needed: c\n  remedy: do d");
-        assert_eq!(Finding::told(Severity::Note, "x", "so it is").to_string(), "note[x]: so it is");
+        assert_eq!(finding.in_line(), "warning: has a; b, needed: c; do d");
+        let note = Finding::told(Severity::Note, "x", "so it is");
+        assert_eq!((note.to_string(), note.in_line()), ("note[x]: so it is".to_owned(), "note: so it is".to_owned()));
     }
 }

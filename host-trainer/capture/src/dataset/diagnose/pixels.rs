@@ -10,15 +10,15 @@ use crate::dataset::{LoadOptions, Photograph, Severity};
 const MIN_COUNTED_SHARE: f64 = 0.1;
 
 /// What a decoded view looks like.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Look {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::dataset) enum Look {
     Sound,
     Flat,
     MostlyMasked,
 }
 
 impl Look {
-    fn of(photograph: &Photograph) -> Self {
+    pub(in crate::dataset) fn of(photograph: &Photograph) -> Self {
         let first = &photograph.image.rgb[..3];
         let mask = photograph.mask.as_ref();
         let counted_share = mask.map_or(1.0, |mask| mask.n_valid() as f64 / mask.valid.len() as f64);
@@ -43,8 +43,14 @@ pub(super) fn check(listing: &mut Listing, options: &LoadOptions, findings: &mut
     };
     // Of the sound views, in their order.
     let looks: Vec<Look> = listing.views.par_iter_mut().filter_map(decode).collect();
+    findings.extend(doubts(&listing.sound().zip(looks).collect::<Vec<_>>()));
+}
+
+/// What decoded views look like.
+pub(in crate::dataset) fn doubts(views: &[((&str, &Shot), Look)]) -> Vec<Finding> {
+    let mut findings = Vec::new();
     let views_of = |look: Look| -> Vec<(&str, &Shot)> {
-        listing.sound().zip(&looks).filter(|(_, found)| **found == look).map(|(view, _)| view).collect()
+        views.iter().filter(|(_, found)| *found == look).map(|(view, _)| *view).collect()
     };
     findings.extend(Finding::about(
         &views_of(Look::Flat),
@@ -60,4 +66,5 @@ pub(super) fn check(listing: &mut Listing, options: &LoadOptions, findings: &mut
         &format!("images of which less than {} % counts", 100.0 * MIN_COUNTED_SHARE),
         "check the distortion coefficients and the masks",
     ));
+    findings
 }

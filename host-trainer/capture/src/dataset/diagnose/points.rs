@@ -1,10 +1,12 @@
 //! Findings about initial points, and about cameras and points together.
 
+use std::path::Path;
+
 use glam::DVec3;
 
 use super::Finding;
-use super::poses::median;
 use crate::dataset::Severity;
+use crate::dataset::apart::{Spread, quantile};
 use crate::dataset::listing::{Listing, Shot};
 
 /// Fewer points than this outline no scene.
@@ -15,6 +17,9 @@ const N_PROJECTED: usize = 1000;
 
 /// Triangulated points are all in some image; where fewer are, points and poses are not of one reconstruction.
 const MIN_SEEN_SHARE: f64 = 0.5;
+
+/// Points that span less than this share of an image, where a middling camera sees them, are in another unit than the poses.
+const MIN_SPANNED: f64 = 0.02;
 
 /// A scene this many times the cameras' spread away shows no parallax.
 const MAX_DEPTH_RATIO: f64 = 50.0;
@@ -65,9 +70,10 @@ pub(super) fn check(listing: &Listing, centres: &[DVec3], findings: &mut Vec<Fin
         let finding = Finding::new(Severity::Warning, "points-unseen", message, remedy).files([path.clone()]);
         findings.push(finding.number("seen_share", share));
     }
+    too_small(path, &projected, &shots, findings);
     let mean = centres.iter().sum::<DVec3>() / centres.len() as f64;
     let spread = centres.iter().map(|centre| centre.distance(mean)).fold(0.0, f64::max);
-    let depth = median(projected.iter().map(|point| point.distance(mean)).collect());
+    let depth = quantile(projected.iter().map(|point| point.distance(mean)), 0.5);
     if spread > 0.0 && depth > MAX_DEPTH_RATIO * spread {
         let message = format!(
             "the cameras stand within {spread:.3e} of each other and the scene {depth:.3e} away, {:.0} times as far, so \
@@ -77,6 +83,28 @@ pub(super) fn check(listing: &Listing, centres: &[DVec3], findings: &mut Vec<Fin
         let remedy = "take photographs from places farther apart, not only in other directions";
         let finding = Finding::new(Severity::Warning, "little-parallax", message, remedy);
         findings.push(finding.number("spread", spread).number("median_depth", depth));
+    }
+}
+
+/// Tells where all points lie in a spot: seen by every camera, but in another unit.
+fn too_small(path: &Path, points: &[DVec3], shots: &[&Shot], findings: &mut Vec<Finding>) {
+    let cloud = Spread::of(points);
+    let span = |shot: &&Shot| {
+        let (width_px, focal_px) = (f64::from(shot.lens.size_px.0), shot.lens.focal_px[0]);
+        2.0 * cloud.median_distance * focal_px / (cloud.distance(shot.centre_world()) * width_px)
+    };
+    let spanned = quantile(shots.iter().map(span), 0.5);
+    if spanned < MIN_SPANNED && cloud.median_distance > 0.0 {
+        let message = format!(
+            "half of the points of `{}` span {:.2} % of an image's width, needed: at least {:.0} %, so points and poses are in \
+             different units",
+            path.display(),
+            100.0 * spanned,
+            100.0 * MIN_SPANNED
+        );
+        let remedy = "use points and poses of one reconstruction, in one frame and one unit";
+        let finding = Finding::new(Severity::Warning, "points-small", message, remedy).files([path.to_owned()]);
+        findings.push(finding.number("spanned_share", spanned));
     }
 }
 

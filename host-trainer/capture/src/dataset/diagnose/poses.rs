@@ -3,55 +3,30 @@
 use glam::DVec3;
 
 use super::Finding;
+use super::readings::{self, Misread};
 use crate::dataset::listing::{Listing, Shot};
-use crate::dataset::{DatasetError, Normalisation, Severity};
-
-/// A camera this many median distances from the middle of all is no part of the capture.
-const OUTLIER_RATIO: f64 = 10.0;
+use crate::dataset::{DatasetError, Normalisation, Severity, Split};
 
 /// Coordinates this many times the spread of the cameras lose that many digits of it.
 const FAR_RATIO: f64 = 1e5;
+
+/// Rotations whose numbers differ by less are one.
+const SAME_ROTATION: f64 = 1e-6;
 
 /// * `centres`: of the training cameras that can be used, capture units.
 pub(super) fn check(listing: &Listing, centres: &[DVec3], findings: &mut Vec<Finding>) {
     if centres.is_empty() {
         return;
     }
-    outliers(listing, findings);
     repeated(listing, findings);
+    turned_alike(listing, findings);
+    misread(listing, findings);
     match Normalisation::of_cameras(centres) {
         Err(spread) => {
             let error = DatasetError::NoBaseline { path: listing.source.clone(), spread };
             findings.push(Finding::told(Severity::Error, error.code(), &error.to_string()).number("spread", spread));
         }
         Ok(normalisation) => far_from_origin(&normalisation, findings),
-    }
-}
-
-/// The median of each coordinate, which a few outliers do not move.
-fn middle(centres: &[DVec3]) -> DVec3 {
-    DVec3::from_array([0, 1, 2].map(|axis| median(centres.iter().map(|centre| centre[axis]).collect())))
-}
-
-/// The upper median; 0 for no values.
-pub(super) fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
-}
-
-fn outliers(listing: &Listing, findings: &mut Vec<Finding>) {
-    let centres: Vec<DVec3> = listing.sound().map(|(_, shot)| shot.centre_world()).collect();
-    let middle = middle(&centres);
-    let median_distance = median(centres.iter().map(|centre| centre.distance(middle)).collect());
-    let ratio = |shot: &Shot| shot.centre_world().distance(middle) / median_distance;
-    let far: Vec<(&str, &Shot)> = listing.sound().filter(|(_, shot)| ratio(shot) > OUTLIER_RATIO).collect();
-    let remedy = "take these views out: their poses are probably wrong, and all others shrink to make room for them";
-    let finding = Finding::about(&far, Severity::Warning, "pose-outlier", "cameras far from the others", remedy);
-    if let Some(mut finding) = finding.filter(|_| median_distance > 0.0) {
-        let farthest = far.iter().map(|(_, shot)| ratio(shot)).fold(0.0, f64::max);
-        finding.message +=
-            &format!("; the farthest stands {farthest:.0} times the median distance from the middle of all");
-        findings.push(finding.number("farthest_ratio", farthest).number("median_distance", median_distance));
     }
 }
 
@@ -81,4 +56,33 @@ fn far_from_origin(normalisation: &Normalisation, findings: &mut Vec<Finding>) {
         let finding = Finding::new(Severity::Warning, "far-from-origin", message, remedy);
         findings.push(finding.number("spread", spread).number("distance", distance));
     }
+}
+
+/// Photographs that were turned have rotations that differ.
+fn turned_alike(listing: &Listing, findings: &mut Vec<Finding>) {
+    let views: Vec<(&str, &Shot)> = listing.sound().collect();
+    let Some((_, first)) = views.first() else { return };
+    if views.iter().all(|(_, shot)| shot.rotation.abs_diff_eq(first.rotation, SAME_ROTATION)) {
+        let remedy = "right for a row of cameras or a slider; if the photographs were turned, export the poses with their rotations";
+        let what = "views that all have one and the same rotation";
+        findings.extend(Finding::about(&views, Severity::Warning, "one-rotation", what, remedy));
+    }
+}
+
+fn misread(listing: &Listing, findings: &mut Vec<Finding>) {
+    let shots: Vec<&Shot> = listing.shots(Split::Train).collect();
+    let Some(misread) = readings::misread(&shots) else { return };
+    let (code, what, remedy) = match misread {
+        Misread::Inverted => (
+            "inverted-poses",
+            "the cameras do not look at one thing, but they would if their poses were the inverse of what they are",
+            "check which way the poses go: transforms.json, NSVF and Record3D take the camera to the world, COLMAP the world to the camera",
+        ),
+        Misread::Mirrored => (
+            "mirrored-poses",
+            "the cameras do not look at one thing, but they would if one coordinate of their places had the other sign",
+            "export places and rotations in the same axes: left- and right-handed ones do not mix",
+        ),
+    };
+    findings.push(Finding::new(Severity::Warning, code, what.to_owned(), remedy));
 }

@@ -7,15 +7,19 @@ use super::Finding;
 use crate::dataset::assemble::MIN_TRAIN_VIEWS;
 use crate::dataset::error::first_few;
 use crate::dataset::listing::{ListedView, Listing, commonest};
-use crate::dataset::{Layout, Severity, Split};
+use crate::dataset::{Severity, Split};
 
 /// With fewer views than this, most places are seen from too few sides to be more than guessed.
 const FEW_TRAIN_VIEWS: usize = 20;
 
-pub(super) fn check(listing: &Listing, findings: &mut Vec<Finding>) {
+/// What a report on loading names by itself.
+pub(super) fn not_used(listing: &Listing, findings: &mut Vec<Finding>) {
     left_out(listing, findings);
-    counts(listing, findings);
     unposed(listing, findings);
+}
+
+pub(super) fn check(listing: &Listing, findings: &mut Vec<Finding>) {
+    counts(listing, findings);
     repeated_names(listing, findings);
     lenses(listing, findings);
     alpha(listing, findings);
@@ -119,9 +123,10 @@ fn lenses(listing: &Listing, findings: &mut Vec<Finding>) {
     ));
 }
 
+/// Tells of the photographs with an alpha channel, or of those without where most have one.
 fn alpha(listing: &Listing, findings: &mut Vec<Finding>) {
     let (with, without): (Vec<_>, Vec<_>) = listing.sound().partition(|(_, shot)| shot.header.has_alpha);
-    let finding = if listing.layout == Layout::Blender {
+    let finding = if with.len() > without.len() && !without.is_empty() {
         Finding::about(
             &without,
             Severity::Note,

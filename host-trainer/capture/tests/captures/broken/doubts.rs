@@ -1,6 +1,6 @@
 //! Captures that load but are doubtful.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 use super::Harm::Doubt;
 use super::{Case, case, flat_image, look_away, turned_image};
@@ -42,13 +42,53 @@ pub(super) fn cases() -> Vec<Case> {
             },
         ),
         case(
-            "a camera far away",
+            "poses without rotations",
+            Nerfstudio,
+            Doubt,
+            "one-rotation",
+            &[
+                "views that all have one and the same rotation: 12 (images/p_00.png",
+                "export the poses with their rotations",
+            ],
+            |f| {
+                f.photos.iter_mut().for_each(|photo| photo.rotation = DMat3::IDENTITY);
+                f.write_files();
+            },
+        ),
+        case(
+            "poses the wrong way round",
+            Nerfstudio,
+            Doubt,
+            "inverted-poses",
+            &["they would if their poses were the inverse", "take the camera to the world"],
+            |f| {
+                for (i, photo) in f.photos.iter_mut().enumerate() {
+                    let there = crate::fixture::photo(i, DVec3::new(3.0, -1.0, 2.0));
+                    photo.rotation = there.rotation.transpose();
+                    photo.centre = -(photo.rotation * there.centre);
+                }
+                f.write_files();
+            },
+        ),
+        case(
+            "places in left-handed axes",
+            Nerfstudio,
+            Doubt,
+            "mirrored-poses",
+            &["if one coordinate of their places had the other sign", "left- and right-handed"],
+            |f| {
+                f.photos.iter_mut().for_each(|photo| photo.centre.x = -photo.centre.x);
+                f.write_files();
+            },
+        ),
+        case(
+            "points in metres, poses in millimetres",
             ColmapBinary,
             Doubt,
-            "pose-outlier",
-            &["cameras far from the others: 1 (p_07.png)", "take these views out"],
+            "points-small",
+            &["of an image's width, needed: at least 2 %", "in one frame and one unit"],
             |f| {
-                f.photos[7].centre *= 100.0;
+                f.points.iter_mut().for_each(|point| *point *= 1e-3);
                 f.write_files();
             },
         ),

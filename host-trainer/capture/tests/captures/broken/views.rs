@@ -11,6 +11,34 @@ use crate::fixture::Kind::{Blender, ColmapBinary, ColmapText, Nerfstudio};
 pub(super) fn cases() -> Vec<Case> {
     vec![
         case(
+            "a camera far away",
+            ColmapBinary,
+            Views,
+            "pose-outlier",
+            &[
+                "p_07.png: its camera stands",
+                "times as far from the middle of all as half of them do",
+                "take the view out",
+            ],
+            |f| {
+                f.photos[7].centre *= 100.0;
+                f.write_files();
+            },
+        ),
+        case(
+            "test views of another reconstruction",
+            Nerfstudio,
+            Views,
+            "pose-outlier",
+            &["test views left out: 2", "images/p_08.png: its camera stands"],
+            |f| {
+                for i in [0, 8] {
+                    f.photos[i].centre += DVec3::X * 1e4;
+                }
+                f.write_files();
+            },
+        ),
+        case(
             "images missing",
             ColmapText,
             Views,

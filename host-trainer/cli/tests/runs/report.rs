@@ -24,7 +24,10 @@ fn a_run_ends_with_a_page_that_works() {
         let at = html.replace("http://www.w3.org/2000/svg", "").find(absent);
         assert!(at.is_none(), "{absent}");
     }
-    assert!(html.contains(" data-spread=&quot;"), "the bundle says how far its cameras stand apart, and the viewer is told");
+    assert!(
+        html.contains(" data-spread=&quot;"),
+        "the bundle says how far its cameras stand apart, and the viewer is told"
+    );
     if let Some(said) = chromium::said_by(&html, SCRIPT) {
         assert!(said.len() > 8, "{said:#?}");
     }

@@ -7,4 +7,4 @@ mod kind;
 mod shell;
 
 pub use kind::FileKind;
-pub use shell::shell_word;
+pub use shell::{shell_word, shown};

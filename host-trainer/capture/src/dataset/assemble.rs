@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use glam::DVec3;
 
+use super::error::MIN_TRAIN_VIEWS;
 use super::framing::Framing;
 use super::listing::{Listing, commonest};
 use super::normalise::random_points_world;
@@ -12,9 +13,6 @@ use super::{
     Capture, DatasetError, EXTENT, Layout, LoadOptions, LoadReport, Normalisation, PointsOrigin, SkippedView, Split,
     frusta,
 };
-
-/// Fewer views than this leave depth undetermined almost everywhere.
-pub(super) const MIN_TRAIN_VIEWS: usize = 3;
 
 /// Points farther from the cameras than this many extents show no parallax and only cost precision.
 const MAX_POINT_EXTENTS: f64 = 1000.0;
@@ -31,11 +29,12 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
     let n_without_alpha = shots().filter(|shot| !shot.header.has_alpha).count();
     let n_with_alpha = shots().count() - n_without_alpha;
     let listed = listing.n_listed(Split::Train);
+    let held_out = listing.n_held_out_by(options.test_every);
     // Before decoding anything, if that many are already known not to do.
     if listing.shots(Split::Train).count() < MIN_TRAIN_VIEWS {
         let faults = listing.views.iter().filter(|view| view.split == Split::Train);
         let faults = faults.filter_map(|view| Some(format!("{}: {}", view.name, view.shot.as_ref().err()?)));
-        return Err(too_few_views(&listing, listed, faults.collect()));
+        return Err(too_few_views(&listing, listed, held_out, faults.collect()));
     }
     let Listing { layout, source, views, points, unposed, notes } = listing;
     let mut notes: Vec<String> = notes.into_iter().map(|note| note.text).collect();
@@ -59,6 +58,7 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
             path: source,
             usable: train.len(),
             listed,
+            held_out,
             needed: MIN_TRAIN_VIEWS,
             faults,
         });
@@ -129,9 +129,16 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
     Ok((capture, report))
 }
 
-fn too_few_views(listing: &Listing, listed: usize, faults: Vec<String>) -> DatasetError {
+fn too_few_views(listing: &Listing, listed: usize, held_out: usize, faults: Vec<String>) -> DatasetError {
     let usable = listing.shots(Split::Train).count();
-    DatasetError::TooFewViews { path: listing.source.clone(), usable, listed, needed: MIN_TRAIN_VIEWS, faults }
+    DatasetError::TooFewViews {
+        path: listing.source.clone(),
+        usable,
+        listed,
+        held_out,
+        needed: MIN_TRAIN_VIEWS,
+        faults,
+    }
 }
 
 /// The points worth starting from, normalised; says what was dropped.

@@ -2,9 +2,11 @@
 //! give, and real ones where they are at hand.
 
 mod broken;
+mod cases;
 mod damaged;
 mod exports;
 mod fixture;
 mod real;
+mod remedies;
 mod sound;
 mod storage;

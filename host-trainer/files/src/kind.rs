@@ -31,6 +31,12 @@ pub enum FileKind {
     Tiff,
     /// A picture: GIF.
     Gif,
+    /// A picture: BMP.
+    Bmp,
+    /// A picture: JPEG XL.
+    JpegXl,
+    /// A camera's raw pixels, where the file is no TIFF.
+    Raw,
     /// A film.
     Film,
     /// Points or Gaussians: PLY.
@@ -57,7 +63,7 @@ impl FileKind {
     pub fn of(first: &[u8]) -> Option<Self> {
         let first = &first[..first.len().min(N_FIRST)];
         let is_at = |offset: usize, magic: &[u8]| first.get(offset..).is_some_and(|rest| rest.starts_with(magic));
-        let magics: [(usize, &[u8], Self); 16] = [
+        let magics: [(usize, &[u8], Self); 23] = [
             (0, b"version https://git-lfs.github.com/spec/", Self::GitLfsPointer),
             (0, b"\x89PSB\r\n\x1a\n", Self::Bundle),
             (0, b"\x89PNG\r\n\x1a\n", Self::Png),
@@ -66,6 +72,14 @@ impl FileKind {
             (0, b"II*\0", Self::Tiff),
             (0, b"MM\0*", Self::Tiff),
             (0, b"GIF8", Self::Gif),
+            (0, b"\xff\x0a", Self::JpegXl),
+            (0, b"\0\0\0\x0cJXL ", Self::JpegXl),
+            // Fujifilm, Olympus, Panasonic; raw files of others begin as TIFF.
+            (0, b"FUJIFILMCCD-", Self::Raw),
+            (0, b"IIRO", Self::Raw),
+            (0, b"IIRS", Self::Raw),
+            (0, b"MMOR", Self::Raw),
+            (0, b"IIU\0", Self::Raw),
             (0, b"\x1a\x45\xdf\xa3", Self::Film),
             (0, b"ply\n", Self::Ply),
             (0, b"ply\r", Self::Ply),
@@ -80,6 +94,10 @@ impl FileKind {
         }
         if is_at(4, b"ftyp") {
             return Some(Self::of_brand(first.get(8..12).unwrap_or_default()));
+        }
+        // Two letters are too few; the reserved bytes behind the length are 0.
+        if is_at(0, b"BM") && is_at(6, &[0; 4]) {
+            return Some(Self::Bmp);
         }
         let known = magics.iter().find(|(offset, magic, _)| is_at(*offset, magic)).map(|&(_, _, kind)| kind);
         known.or_else(|| Self::of_text(first))
@@ -100,6 +118,7 @@ impl FileKind {
         match brand {
             b"heic" | b"heix" | b"hevc" | b"hevx" | b"heim" | b"heis" | b"mif1" | b"msf1" => Self::Heic,
             b"avif" | b"avis" => Self::Avif,
+            b"crx " => Self::Raw,
             _ => Self::Film,
         }
     }
@@ -150,6 +169,9 @@ impl fmt::Display for FileKind {
             Self::Avif => "an AVIF picture",
             Self::Tiff => "a TIFF picture",
             Self::Gif => "a GIF picture",
+            Self::Bmp => "a BMP picture",
+            Self::JpegXl => "a JPEG XL picture",
+            Self::Raw => "a raw photograph",
             Self::Film => "a film",
             Self::Ply => "a .ply file",
             Self::Gzip => "a gzip file, as .spz of versions 1 to 3 are",
@@ -168,7 +190,7 @@ mod tests {
 
     #[test]
     fn the_first_bytes_say_what_a_file_is() {
-        let cases: [(&[u8], Option<FileKind>); 17] = [
+        let cases: [(&[u8], Option<FileKind>); 22] = [
             (b"", Some(FileKind::Empty)),
             (b"version https://git-lfs.github.com/spec/v1\noid sha256:0", Some(FileKind::GitLfsPointer)),
             (b"\x89PSB\r\n\x1a\n\x04", Some(FileKind::Bundle)),
@@ -183,6 +205,11 @@ mod tests {
             (b"<?xml version=\"1.0\"?>\n<html xmlns=", Some(FileKind::WebPage)),
             (b"<?xml version=\"1.0\"?>\n<document>", Some(FileKind::Xml)),
             (b"\xef\xbb\xbf{ \"frames\"", Some(FileKind::Json)),
+            (b"\0\0\0\x18ftypcrx \0\0", Some(FileKind::Raw)),
+            (b"IIRO\x08\0", Some(FileKind::Raw)),
+            (b"\xff\x0a\0\0", Some(FileKind::JpegXl)),
+            (b"BM\x36\x10\0\0\0\0\0\0\x36", Some(FileKind::Bmp)),
+            (b"BM is no picture", None),
             (b"# Camera list", None),
             (b"plyometric", None),
             (b"\x89PNG", None),
@@ -196,7 +223,7 @@ mod tests {
     fn long_files_are_told_by_their_beginning() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("a.spz");
-        std::fs::write(&path, [b"<html>".as_slice(), &[b' '; 100_000]].concat()).expect("a file");
+        std::fs::write(&path, format!("<html>{}", " ".repeat(100_000))).expect("a file");
         assert_eq!(FileKind::of_file(&path).expect("a file"), Some(FileKind::WebPage));
         assert!(FileKind::of_file(folder.path()).is_err(), "a folder has no bytes");
     }

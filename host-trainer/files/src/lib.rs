@@ -10,4 +10,4 @@ mod shell;
 
 pub use kind::FileKind;
 pub use output::{Content, MARK, Output, OutputError, Outputs, write_whole};
-pub use shell::shell_word;
+pub use shell::{shell_word, shown};

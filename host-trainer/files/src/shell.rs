@@ -1,19 +1,24 @@
-//! Paths in commands that people copy.
+//! Paths in messages and in commands that people copy.
 
 use std::path::Path;
 
 /// A path as one word of a POSIX shell: in quotes where it holds what a shell would take apart or replace, by the numbers of its
 /// bytes where it is no UTF-8, and never like an option.
 pub fn shell_word(path: &Path) -> String {
-    let text = path.display().to_string();
-    if path.to_str().is_none()
-        && let Some(word) = printed(path)
-    {
-        return word;
-    }
-    let text = if text.starts_with('-') { format!("./{text}") } else { text };
+    let Some(text) = path.to_str() else { return printed(path).unwrap_or_else(|| shown(path)) };
+    let text = if text.starts_with('-') { format!("./{text}") } else { text.to_owned() };
     let is_plain = |c: char| c.is_alphanumeric() || "/._-+,:=@%".contains(c) || cfg!(windows) && c == '\\';
     if !text.is_empty() && text.chars().all(is_plain) { text } else { format!("'{}'", text.replace('\'', "'\\''")) }
+}
+
+/// A path for people: as it is written, and the bytes of a name that is no UTF-8 as `\xe9`, so that the file can be found.
+pub fn shown(path: &Path) -> String {
+    let mut text = String::new();
+    for chunk in path.as_os_str().as_encoded_bytes().utf8_chunks() {
+        text += chunk.valid();
+        text.extend(chunk.invalid().iter().map(|byte| format!("\\x{byte:02x}")));
+    }
+    text
 }
 
 /// Bytes that no text has, as `printf` of POSIX writes them.
@@ -51,6 +56,7 @@ mod tests {
             ("", "''"),
         ] {
             assert_eq!(shell_word(Path::new(path)), word);
+            assert_eq!(shown(Path::new(path)), path);
         }
     }
 
@@ -66,5 +72,13 @@ mod tests {
             let read = echo.expect("a shell").stdout;
             assert_eq!(read.strip_prefix(b"./").unwrap_or(&read), name, "{word}");
         }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_name_that_is_no_utf_8_can_be_found() {
+        use std::os::unix::ffi::OsStrExt as _;
+        let path = Path::new(std::ffi::OsStr::from_bytes(b"it's caf\xe9/\xfc.jpg"));
+        assert_eq!(shown(path), "it's caf\\xe9/\\xfc.jpg");
     }
 }

@@ -6,6 +6,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::diagnose::{doubts, doubts_of_pixels};
+use super::error::MIN_TRAIN_VIEWS;
 use super::framing::Framing;
 use super::listing::{ListedView, Listing, Shot, commonest};
 use super::looks::Looks;
@@ -15,9 +16,6 @@ use super::{
     Capture, DatasetError, EXTENT, Finding, LoadOptions, LoadReport, Normalisation, PointsOrigin, Severity,
     SkippedView, Split, View, starting_points,
 };
-
-/// Fewer views than this leave depth undetermined almost everywhere.
-pub(super) const MIN_TRAIN_VIEWS: usize = 3;
 
 /// Decodes the views of a listing and brings all of it to the common frame.
 ///
@@ -31,14 +29,15 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
     let n_without_alpha = shots().filter(|shot| !shot.header.has_alpha).count();
     let n_with_alpha = shots().count() - n_without_alpha;
     let listed = listing.n_listed(Split::Train);
+    let held_out = listing.n_held_out_by(options.test_every);
     // Before decoding anything, if what is known does not do.
     if listing.shots(Split::Train).count() < MIN_TRAIN_VIEWS {
         let faults = listing.views.iter().filter(|view| view.split == Split::Train);
         let faults = faults.filter_map(|view| Some(format!("{}: {}", view.name, view.shot.as_ref().err()?)));
-        return Err(too_few_views(&listing, listed, faults.collect()));
+        return Err(too_few_views(&listing, listed, held_out, faults.collect()));
     }
     frame(listing.shots(Split::Train).map(Shot::centre_world), &listing.source)?;
-    let mut warnings = doubts(&listing);
+    let mut warnings = doubts(&listing, options);
     warnings.retain(|finding| finding.severity == Severity::Warning);
     let Listing { layout, source, views, points, unposed, notes } = listing;
     let (doubtful, notes): (Vec<_>, Vec<_>) = notes.into_iter().partition(|note| note.severity != Severity::Note);
@@ -55,6 +54,7 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
             path: source,
             usable: train.len(),
             listed,
+            held_out,
             needed: MIN_TRAIN_VIEWS,
             faults,
         });
@@ -141,7 +141,7 @@ fn decoded(views: Vec<ListedView>, options: &LoadOptions) -> Result<Decoded, Dat
     for (LoadedView { split, name, view }, shot) in load_views(views, options)?.into_iter().zip(shots) {
         match view {
             Ok((view, looks)) => {
-                seen.extend(shot.map(|shot| (name, shot, looks.look)));
+                seen.extend(shot.map(|shot| (name, shot, looks)));
                 match split {
                     Split::Train => {
                         decoded.train.push(view);
@@ -153,7 +153,7 @@ fn decoded(views: Vec<ListedView>, options: &LoadOptions) -> Result<Decoded, Dat
             Err(fault) => decoded.skipped.push(SkippedView { split, name, fault }),
         }
     }
-    let seen: Vec<_> = seen.iter().map(|(name, shot, look)| ((name.as_str(), shot), *look)).collect();
+    let seen: Vec<_> = seen.iter().map(|(name, shot, looks)| ((name.as_str(), shot), *looks)).collect();
     decoded.doubts = doubts_of_pixels(&seen);
     Ok(decoded)
 }
@@ -164,7 +164,14 @@ fn frame(centres: impl Iterator<Item = DVec3>, source: &Path) -> Result<Normalis
     Normalisation::of_cameras(&centres.collect::<Vec<_>>()).map_err(no_baseline)
 }
 
-fn too_few_views(listing: &Listing, listed: usize, faults: Vec<String>) -> DatasetError {
+fn too_few_views(listing: &Listing, listed: usize, held_out: usize, faults: Vec<String>) -> DatasetError {
     let usable = listing.shots(Split::Train).count();
-    DatasetError::TooFewViews { path: listing.source.clone(), usable, listed, needed: MIN_TRAIN_VIEWS, faults }
+    DatasetError::TooFewViews {
+        path: listing.source.clone(),
+        usable,
+        listed,
+        held_out,
+        needed: MIN_TRAIN_VIEWS,
+        faults,
+    }
 }

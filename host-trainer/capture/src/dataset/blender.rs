@@ -4,9 +4,10 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
+use super::folder_names::FolderNames;
 use super::listing::{ListedView, Listing, Note, commonest, every_nth};
 use super::transforms::{Transforms, read_transforms};
-use super::{DatasetError, Layout, LoadOptions, Split, ViewFault};
+use super::{DatasetError, Layout, LoadOptions, Split, ViewFault, found_files};
 
 /// The file that tells this layout.
 pub(super) const TRAIN_FILE: &str = "transforms_train.json";
@@ -26,16 +27,18 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
         notes.push(Note::new("unused-split", format!("views in `{VAL_FILE}`, not used: {}", val.frames.len())));
     }
     train.check_model(&source)?;
-    let mut views = views(folder, Split::Train, &train);
+    let names = FolderNames::default();
+    let mut views = views(folder, &names, Split::Train, &train);
     let needed_px = commonest(views.iter().flat_map(|view| &view.shot).map(|shot| shot.header.size_px));
     if let Some(test) = &test {
         test.check_model(&folder.join(TEST_FILE))?;
-        views.extend(self::views(folder, Split::Test, test));
+        views.extend(self::views(folder, &names, Split::Test, test));
     } else {
         for (i, view) in views.iter_mut().enumerate() {
             view.split = every_nth(options.test_every, i);
         }
     }
+    notes.extend(found_files::check(&mut views, &names));
     for view in &mut views {
         if let (Ok(shot), Some(needed_px)) = (&view.shot, needed_px)
             && shot.header.size_px != needed_px
@@ -64,14 +67,9 @@ fn read_optional(folder: &Path, name: &str) -> Result<Option<Transforms>, Datase
     if path.exists() { read_transforms(&path).map(Some) } else { Ok(None) }
 }
 
-fn views(folder: &Path, split: Split, transforms: &Transforms) -> Vec<ListedView> {
+fn views(folder: &Path, names: &FolderNames, split: Split, transforms: &Transforms) -> Vec<ListedView> {
     let frames = transforms.frames.par_iter();
-    let view = |frame: &super::transforms::Frame| ListedView {
-        split,
-        name: frame.name().to_owned(),
-        shot: frame.shot(folder, None, &transforms.shared),
-    };
-    frames.map(view).collect()
+    frames.map(|frame| frame.view(split, names, folder, None, &transforms.shared)).collect()
 }
 
 #[cfg(test)]

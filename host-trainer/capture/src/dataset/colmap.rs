@@ -5,20 +5,24 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DQuat, DVec3};
+use pocketsplat_files::shown;
 use rayon::prelude::*;
 
 use super::error::first_few;
+use super::folder_names::FolderNames;
 use super::image::read_header;
 use super::listing::{ListedView, Listing, Note, Shot, every_nth, unused_images};
+use super::mask_file::MaskFile;
 use super::named_path::NamedPath;
 use super::quaternion::{long_quaternions, rotation_of};
-use super::{DatasetError, Layout, LoadOptions, ViewFault, image_folder, text_file};
+use super::{DatasetError, Layout, LoadOptions, ViewFault, found_files, image_folder, text_file};
 
 mod binary;
 mod choose;
 mod model;
 mod text;
 
+use choose::Chosen;
 pub(super) use choose::has_model;
 use model::{ModelCamera, ModelEncoding, ModelFault, ModelImage};
 
@@ -31,7 +35,7 @@ const MASKS: &str = "masks";
 /// As [`super::load`], as far as files but no pixels tell.
 pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, DatasetError> {
     let mut notes = Vec::new();
-    let model = choose::choose(folder, options.model, &mut notes)?;
+    let Chosen { model, root, images: of_model } = choose::choose(folder, options.model, &mut notes)?;
     let (path, encoding) = (|stem: &str| model.path(stem), model.encoding);
     let cameras = read(&path("cameras"), encoding, binary::cameras, text::cameras)?;
     let mut images = read(&path("images"), encoding, binary::images, text::images)?;
@@ -55,27 +59,37 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
         let text = format!(
             "`{}` {why}, so training starts from random points where the cameras look; triangulate points for a better \
              start",
-            points_path.display()
+            shown(&points_path)
         );
         notes.push(Note::new("no-points", text));
     }
-    let image_folder = image_folder::choose(folder, options, &mut notes)?;
-    let Some(image_folder) = image_folder.map(|name| folder.join(name)) else {
-        return Err(DatasetError::ImageFolder { path: folder.to_owned(), wanted: None, present: Vec::new() });
+    let image_folder = match of_model.filter(|_| options.images.is_none()) {
+        Some(name) => Some(name.to_owned()),
+        None => image_folder::choose(&root, options, &mut notes)?,
     };
-    let masks = Some(folder.join(MASKS)).filter(|masks| masks.is_dir());
-    let views: Vec<ListedView> = images
+    let Some(image_folder) = image_folder.map(|name| root.join(name)) else {
+        return Err(DatasetError::ImageFolder { path: root, wanted: None, present: Vec::new() });
+    };
+    let masks = Some(root.join(MASKS)).filter(|masks| masks.is_dir());
+    let names = FolderNames::default();
+    let mut views: Vec<ListedView> = images
         .par_iter()
         .enumerate()
         .map(|(i, image)| ListedView {
             split: every_nth(options.test_every, i),
+            written: image.name.clone(),
             name: image.name.clone(),
-            shot: shot(&image_folder, masks.as_deref(), image, &cameras),
+            shot: shot(&names, &image_folder, masks.as_deref(), image, &cameras),
         })
         .collect();
     let posed: Vec<PathBuf> =
-        images.iter().filter_map(|image| NamedPath::new(&image.name).image(&image_folder, None)).collect();
-    let used_masks: Vec<PathBuf> = views.iter().filter_map(|view| view.shot.as_ref().ok()?.mask.clone()).collect();
+        images.iter().filter_map(|image| NamedPath::new(&image.name).image(&names, &image_folder, None)).collect();
+    let used_masks: Vec<PathBuf> = views
+        .iter()
+        .filter_map(|view| view.shot.as_ref().ok())
+        .flat_map(|shot| shot.masks.iter().map(|mask| mask.path.clone()))
+        .collect();
+    notes.extend(found_files::check(&mut views, &names));
     let unposed = unused_images(&image_folder, posed.iter().chain(&used_masks).map(PathBuf::as_path));
     notes.extend(missing_masks(masks.as_deref(), &views));
     notes
@@ -94,24 +108,24 @@ fn read<T>(
     binary: fn(&[u8]) -> Result<T, ModelFault>,
     text: fn(&str) -> Result<T, ModelFault>,
 ) -> Result<T, DatasetError> {
-    let cannot_read = |source| DatasetError::Read { path: path.to_owned(), source };
+    let cannot_read = |source| DatasetError::of_reading(path, source);
     let parsed = match encoding {
         ModelEncoding::Binary => binary(&std::fs::read(path).map_err(cannot_read)?),
         ModelEncoding::Text => text(&text_file::read(path).map_err(cannot_read)?),
     };
-    parsed.map_err(|fault| DatasetError::Model { path: path.to_owned(), place: fault.place, found: fault.found })
+    parsed.map_err(|fault| DatasetError::of_model(path, fault.place, fault.found))
 }
 
 /// Says how many views lack a mask although others have one.
 fn missing_masks(masks: Option<&Path>, views: &[ListedView]) -> Option<Note> {
     let masks = masks?;
     let sound = || views.iter().filter_map(|view| Some((&view.name, view.shot.as_ref().ok()?)));
-    let without: Vec<&String> = sound().filter(|(_, shot)| shot.mask.is_none()).map(|(name, _)| name).collect();
+    let without: Vec<&String> = sound().filter(|(_, shot)| shot.masks.is_empty()).map(|(name, _)| name).collect();
     (!without.is_empty()).then(|| {
         let text = format!(
             "images without a mask in `{}`: {} of {} ({}), so all their pixels count; name masks like their images, with \
              `.png` behind the name or in place of its extension",
-            masks.display(),
+            shown(masks),
             without.len(),
             sound().count(),
             first_few(&without, ", ")
@@ -121,11 +135,13 @@ fn missing_masks(masks: Option<&Path>, views: &[ListedView]) -> Option<Note> {
 }
 
 /// The mask of the image `name`: COLMAP appends `.png` to the image's name, others replace its extension.
-fn mask_of(masks: &Path, name: &str) -> Option<PathBuf> {
-    NamedPath::new(&format!("{name}.png")).file(masks, None).or_else(|| NamedPath::new(name).image(masks, None))
+fn mask_of(names: &FolderNames, masks: &Path, name: &str) -> Option<MaskFile> {
+    let appended = NamedPath::new(&format!("{name}.png")).file(names, masks, None);
+    appended.or_else(|| NamedPath::new(name).image(names, masks, None)).map(MaskFile::new)
 }
 
 fn shot(
+    names: &FolderNames,
     folder: &Path,
     masks: Option<&Path>,
     image: &ModelImage,
@@ -135,7 +151,7 @@ fn shot(
     let camera_id = image.camera_id;
     let camera = cameras.get(&camera_id).ok_or(ViewFault::NoCamera { camera_id })?;
     let path = NamedPath::new(&image.name)
-        .image(folder, None)
+        .image(names, folder, None)
         .ok_or_else(|| ViewFault::Missing { path: folder.join(&image.name), listed_in: "the model" })?;
     let header = match read_header(&path) {
         Ok(header) => header,
@@ -145,8 +161,9 @@ fn shot(
         return Err(ViewFault::CameraModel { model: camera.model.clone() });
     };
     let lens = lens.clone().for_image(&path, header.size_px)?;
-    let mask = masks.and_then(|masks| mask_of(masks, &image.name));
-    Ok(Shot { path, header, rotation, translation, lens, mask })
+    let beside = masks.and_then(|masks| mask_of(names, masks, &image.name));
+    let masks = beside.into_iter().chain(MaskFile::dynamic(names, &path)).collect();
+    Ok(Shot { path, header, rotation, translation, lens, masks })
 }
 
 /// The quaternion as it is written.

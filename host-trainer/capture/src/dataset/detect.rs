@@ -2,7 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{DatasetError, Layout, blender, colmap, nerfstudio, no_poses, nsvf, polycam, record3d};
+use pocketsplat_files::shown;
+
+use super::{
+    DatasetError, Layout, blender, bundler, colmap, llff, metashape, nerfstudio, no_poses, nsvf, opensfm, polycam,
+    realitycapture, record3d,
+};
 
 /// The layout of the folder `path`.
 pub(super) fn layout_of(path: &Path) -> Option<Layout> {
@@ -21,6 +26,16 @@ pub(super) fn layout_of(path: &Path) -> Option<Layout> {
         Some(Layout::Record3d)
     } else if nsvf::is_layout_of(path) {
         Some(Layout::Nsvf)
+    } else if opensfm::is_layout_of(path) {
+        Some(Layout::OpenSfm)
+    } else if bundler::is_layout_of(path) {
+        Some(Layout::Bundler)
+    } else if metashape::is_layout_of(path) {
+        Some(Layout::Metashape)
+    } else if realitycapture::is_layout_of(path) {
+        Some(Layout::RealityCapture)
+    } else if llff::is_layout_of(path) {
+        Some(Layout::Llff)
     } else {
         None
     }
@@ -38,7 +53,7 @@ pub(super) fn unknown_layout(path: &Path) -> DatasetError {
     if inside.is_none()
         && let Some(whole) = path.canonicalize().ok().and_then(|path| whole_of(&path))
     {
-        let found = format!("`{}` is a part of the capture `{}`; give that folder", path.display(), whole.display());
+        let found = format!("`{}` is a part of the capture `{}`; give that folder", shown(path), shown(&whole));
         return DatasetError::NoCapture { found };
     }
     if inside.is_none()

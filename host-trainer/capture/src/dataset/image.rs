@@ -4,7 +4,7 @@ use std::path::Path;
 
 use ::image::{ImageDecoder, ImageEncoder};
 
-use super::{Background, Image, Mask};
+use super::{Background, Image};
 
 mod jpeg_end;
 
@@ -20,6 +20,10 @@ pub(super) struct ImageHeader {
     pub(super) size_px: (u32, u32),
     /// Whether there is an alpha channel.
     pub(super) has_alpha: bool,
+    /// Whether it has one channel of colour.
+    pub(super) is_grey: bool,
+    /// Whether that channel is of 16 bit: depth maps are written so, photographs are not.
+    pub(super) is_depth_like: bool,
     /// The EXIF orientation, 1 to 8; 1 means upright, and so does its absence.
     pub(super) exif_orientation: u8,
 }
@@ -32,22 +36,20 @@ pub(super) fn read_header(path: &Path) -> Result<ImageHeader, String> {
     let reader = ::image::ImageReader::open(path).and_then(|reader| reader.with_guessed_format());
     let mut decoder = reader.map_err(in_words)?.into_decoder().map_err(in_words)?;
     let exif_orientation = decoder.orientation().map_or(1, |orientation| orientation.to_exif());
-    Ok(ImageHeader { size_px: decoder.dimensions(), has_alpha: decoder.color_type().has_alpha(), exif_orientation })
-}
-
-/// Decodes a mask: black pixels do not count.
-///
-/// # Errors
-/// What the decoder or the system said, for people.
-pub(super) fn read_mask(path: &Path) -> Result<Mask, String> {
-    let luma = decode(path)?.into_luma8();
-    let (width_px, height_px) = luma.dimensions();
-    Ok(Mask { width_px, height_px, valid: luma.as_raw().iter().map(|&value| value > 0).collect() })
+    let colour = decoder.color_type();
+    let is_grey = !colour.has_color();
+    Ok(ImageHeader {
+        size_px: decoder.dimensions(),
+        has_alpha: colour.has_alpha(),
+        is_grey,
+        is_depth_like: is_grey && colour.bytes_per_pixel() > 1 + u8::from(colour.has_alpha()),
+        exif_orientation,
+    })
 }
 
 /// Decodes an image as it is stored: an EXIF orientation is not applied, because poses and intrinsics are for the
 /// pixels as stored.
-fn decode(path: &Path) -> Result<::image::DynamicImage, String> {
+pub(super) fn decode(path: &Path) -> Result<::image::DynamicImage, String> {
     let bytes = std::fs::read(path).map_err(in_words)?;
     if bytes.starts_with(&jpeg_end::START) && !jpeg_end::is_whole(&bytes) {
         return Err(format!(

@@ -46,6 +46,11 @@ pub(super) fn choose(
     }
 }
 
+/// Whether there is a folder of images, or images in the folder itself.
+pub(super) fn is_there(folder: &Path) -> bool {
+    !present(folder).is_empty() || folder.join(UNPREPARED).is_dir() || holds_images(folder)
+}
+
 /// Whether images lie in the folder itself.
 fn holds_images(folder: &Path) -> bool {
     let mut entries = std::fs::read_dir(folder).into_iter().flatten().flatten();

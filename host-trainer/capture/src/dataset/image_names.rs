@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use pocketsplat_files::{FileKind, shell_word};
+
 /// Extensions of the image files that are read, in the order in which they are tried.
 pub(super) const EXTENSIONS: [&str; 4] = ["png", "jpg", "jpeg", "webp"];
 
@@ -26,27 +28,21 @@ pub(super) fn has_foreign_name(name: &str) -> bool {
     has_extension(name, &FOREIGN_EXTENSIONS)
 }
 
-/// The format of the image file `path` where it is known but not read.
-pub(super) fn foreign_format(path: &Path) -> Option<&'static str> {
-    let mut head = [0; 12];
-    std::io::Read::read_exact(&mut std::fs::File::open(path).ok()?, &mut head).ok()?;
-    match &head {
-        // ISO 14496-12: the size of the first box, its type, then the brand of the file.
-        [_, _, _, _, b'f', b't', b'y', b'p', brand @ ..] => match brand {
-            b"avif" | b"avis" => Some("AVIF"),
-            b"heic" | b"heix" | b"hevc" | b"mif1" | b"msf1" => Some("HEIC"),
-            b"crx " => Some("raw"),
-            _ => None,
-        },
-        // Fujifilm, Olympus, Panasonic; raw files of others begin as TIFF.
-        b"FUJIFILMCCD-"
-        | [b'I', b'I', b'R', b'O' | b'S', ..]
-        | [b'M', b'M', b'O', b'R', ..]
-        | [b'I', b'I', b'U', 0, ..] => Some("raw"),
-        [b'I', b'I', 42, 0, ..] | [b'M', b'M', 0, 42, ..] => Some("TIFF or raw"),
-        [b'G', b'I', b'F', b'8', ..] => Some("GIF"),
-        [b'B', b'M', ..] => Some("BMP"),
-        [0xFF, 0x0A, ..] | [0, 0, 0, 12, b'J', b'X', b'L', b' ', ..] => Some("JPEG XL"),
+/// Whether a file of this kind is a picture that has to be converted.
+pub(super) fn is_foreign(kind: FileKind) -> bool {
+    foreign_name(kind).is_some()
+}
+
+/// What such a picture is called.
+pub(super) fn foreign_name(kind: FileKind) -> Option<&'static str> {
+    match kind {
+        FileKind::Avif => Some("AVIF"),
+        FileKind::Heic => Some("HEIC"),
+        FileKind::Raw => Some("raw"),
+        FileKind::Tiff => Some("TIFF or raw"),
+        FileKind::Gif => Some("GIF"),
+        FileKind::Bmp => Some("BMP"),
+        FileKind::JpegXl => Some("JPEG XL"),
         _ => None,
     }
 }
@@ -54,5 +50,6 @@ pub(super) fn foreign_format(path: &Path) -> Option<&'static str> {
 /// The command that converts all images in `folder` that have the extension of `name`.
 pub(super) fn conversion(folder: &Path, name: &str) -> String {
     let extension = name.rsplit_once('.').map_or("*", |(_, extension)| extension);
-    format!("magick mogrify -format jpg -quality 95 '{}/*.{extension}'", folder.display())
+    // In quotes: ImageMagick takes the star itself, however many files there are.
+    format!("magick mogrify -format jpg -quality 95 {}", shell_word(&folder.join(format!("*.{extension}"))))
 }

@@ -81,7 +81,34 @@ impl Lens {
                 "the principal point or a distortion coefficient is {number}, needed: finite numbers"
             ));
         }
-        None
+        self.nonsense()
+    }
+
+    /// Why the distortion is none of a lens: it moves a ray within the image by more than half the image, or turns back within it.
+    /// A calibration that failed gives such numbers.
+    fn nonsense(&self) -> Option<String> {
+        if self.coefficients().all(|k| k == 0.0) {
+            return None;
+        }
+        let (width_px, height_px) = self.size_px;
+        let needed = "needed: coefficients of a calibration that fits, or none";
+        let shift_px = self.largest_shift_px();
+        let most_px = 0.5 * f64::from(width_px.max(height_px));
+        // NaN is more than anything.
+        if !(shift_px <= most_px) {
+            return Some(format!(
+                "the distortion moves a ray by {shift_px:.0} px in an image of {width_px}×{height_px} px, more than half of it, {needed}"
+            ));
+        }
+        let corner_squared = self.corner_squared();
+        let fold_squared = self.fold_squared(corner_squared);
+        (fold_squared < corner_squared).then(|| {
+            format!(
+                "the distortion turns back at {:.0} % of the way from the principal point to the corner of the image, so it shows \
+                 the same twice, {needed}",
+                100.0 * (fold_squared / corner_squared).sqrt()
+            )
+        })
     }
 
     /// The same lens for the image scaled to `size_px`, or `None` where that is no scaling of the image: the sides of
@@ -166,18 +193,22 @@ impl Lens {
         corners.map(|corner| self.direction(corner)).map(|[x, y]| x * x + y * y).into_iter().fold(0.0, f64::max)
     }
 
-    /// How far the distortion moves a point of the border of the pinhole image at most, pixels.
+    /// How far the distortion moves a point of the border of the pinhole image at most, pixels; of a fisheye, from where the one
+    /// without coefficients shows it.
     pub(super) fn largest_shift_px(&self) -> f64 {
         let (width_px, height_px) = (f64::from(self.size_px.0), f64::from(self.size_px.1));
         let steps = (0..=16).map(|i| f64::from(i) / 16.0);
         let border = steps.flat_map(|t| {
             [[t * width_px, 0.0], [t * width_px, height_px], [0.0, t * height_px], [width_px, t * height_px]]
         });
-        let shift = |from: [f64; 2]| {
-            let to = self.pixel(self.distorted(self.direction(from)));
+        let plain = Self { radial: [0.0; 4], divisor: [0.0; 3], tangential: [0.0; 2], ..self.clone() };
+        let shift = |at: [f64; 2]| {
+            let direction = self.direction(at);
+            let [from, to] = [&plain, self].map(|lens| lens.pixel(lens.distorted(direction)));
             (to[0] - from[0]).hypot(to[1] - from[1])
         };
-        border.map(shift).fold(0.0, f64::max)
+        // Unlike `f64::max` this keeps what is no number.
+        border.map(shift).fold(0.0, |most, shift| if shift <= most { most } else { shift })
     }
 
     /// The pinhole camera of the undistorted image: same size, same focal lengths, same principal point.

@@ -6,9 +6,12 @@ use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DVec3};
 
+use super::folder_names::folded;
 use super::image::ImageHeader;
+use super::image_file::stem_of;
 use super::image_names::is_image_name;
 use super::lens::Lens;
+use super::mask_file::{MaskFile, is_dynamic_mask};
 use super::{Layout, Severity, Split, ViewFault};
 
 /// A capture as its files list it.
@@ -55,7 +58,9 @@ impl Note {
 /// One view of a listing.
 pub(super) struct ListedView {
     pub(super) split: Split,
-    /// As the capture gives it.
+    /// The path of its photograph as the capture gives it.
+    pub(super) written: String,
+    /// The same for people.
     pub(super) name: String,
     /// The photograph and its pose, or why there is none.
     pub(super) shot: Result<Shot, ViewFault>,
@@ -71,8 +76,8 @@ pub(super) struct Shot {
     pub(super) translation: DVec3,
     /// For the image as it is stored.
     pub(super) lens: Lens,
-    /// A mask image of the same size or a larger one of the same shape; its black pixels do not count.
-    pub(super) mask: Option<PathBuf>,
+    /// Mask images of the same size or a larger one of the same shape; a pixel counts where it does in all.
+    pub(super) masks: Vec<MaskFile>,
 }
 
 impl Shot {
@@ -96,6 +101,12 @@ impl Listing {
     /// Whether a view to test on can be used.
     pub(super) fn has_test_views(&self) -> bool {
         self.shots(Split::Test).next().is_some()
+    }
+
+    /// How many views to test on can be used, if it is `test_every` that holds them out and not the capture.
+    pub(super) fn n_held_out_by(&self, test_every: u32) -> usize {
+        let is_by_it = self.views.iter().enumerate().all(|(i, view)| view.split == every_nth(test_every, i));
+        if is_by_it { self.shots(Split::Test).count() } else { 0 }
     }
 
     /// How many views the capture lists for a split, sound or not.
@@ -131,11 +142,20 @@ pub(super) fn every_nth(test_every: u32, i: usize) -> Split {
 
 /// The names of the image files below `folder` that are not among `used`, in the form of [`image_names_below`].
 ///
-/// Files are compared, not names, because captures name files in many ways.
+/// Files are compared, not names, because captures name files in many ways. What has the name of a used image but another ending is a
+/// map or a conversion of it, and what has instant-ngp's name of a mask is one; neither is a photograph without a pose.
 pub(super) fn unused_images<'a>(folder: &Path, used: impl Iterator<Item = &'a Path>) -> Vec<String> {
+    let without_ending = |path: &Path| {
+        let name = path.file_name()?.to_string_lossy().into_owned();
+        Some((path.parent()?.to_owned(), folded(stem_of(&name))))
+    };
     let used: HashSet<PathBuf> = used.filter_map(|path| path.canonicalize().ok()).collect();
-    let is_used = |name: &String| folder.join(name).canonicalize().is_ok_and(|path| used.contains(&path));
-    image_names_below(folder).into_iter().filter(|name| !is_used(name)).collect()
+    let stems: HashSet<_> = used.iter().filter_map(|path| without_ending(path)).collect();
+    let is_used = |name: &String| {
+        let path = folder.join(name).canonicalize();
+        path.is_ok_and(|path| used.contains(&path) || without_ending(&path).is_some_and(|stem| stems.contains(&stem)))
+    };
+    image_names_below(folder).into_iter().filter(|name| !is_dynamic_mask(name) && !is_used(name)).collect()
 }
 
 /// The names of image files below `folder`, relative to it with `/` between their parts, sorted.
@@ -146,7 +166,7 @@ fn image_names_below(folder: &Path) -> Vec<String> {
     let mut waiting = vec![(folder.to_owned(), String::new())];
     while let Some((folder, prefix)) = waiting.pop() {
         for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
-            let name = format!("{prefix}{}", entry.file_name().to_string_lossy());
+            let name = format!("{prefix}{}", pocketsplat_files::shown(Path::new(&entry.file_name())));
             if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
                 waiting.push((entry.path(), name + "/"));
             } else if !is_hidden(&entry.file_name()) && is_image_name(&name) && entry.path().is_file() {

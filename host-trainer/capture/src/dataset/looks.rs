@@ -1,7 +1,9 @@
 //! What a decoded photograph looks like: whether it says anything, and whether it shows something on nothing.
 
 use super::Photograph;
-use super::diagnose::Look;
+
+/// A view of which less than this share counts hardly constrains anything.
+pub(super) const MIN_COUNTED_SHARE: f64 = 0.1;
 
 /// Levels by which a pixel may miss the colour it is of.
 const TOLERANCE_LEVELS: u8 = 6;
@@ -14,6 +16,29 @@ const BARE_SHARE: f64 = 0.6;
 const BARE_SIDES: usize = 3;
 const BARE_SHARE_OF_SIDE: f64 = 0.4;
 
+/// Whether a decoded view says anything.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Look {
+    Sound,
+    Flat,
+    MostlyMasked,
+}
+
+impl Look {
+    pub(super) fn of(photograph: &Photograph) -> Self {
+        let first = &photograph.image.rgb[..3];
+        let mask = photograph.mask.as_ref();
+        let counted_share = mask.map_or(1.0, |mask| mask.n_valid() as f64 / mask.valid.len() as f64);
+        if photograph.image.rgb.chunks_exact(3).all(|pixel| pixel == first) {
+            Self::Flat
+        } else if counted_share < MIN_COUNTED_SHARE {
+            Self::MostlyMasked
+        } else {
+            Self::Sound
+        }
+    }
+}
+
 /// What a photograph looks like, composited on its background.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Looks {
@@ -23,12 +48,15 @@ pub(super) struct Looks {
     pub(super) look: Look,
     /// The colour of its border, where that is one.
     pub(super) border: Option<[u8; 3]>,
+    /// Whether some of its pixels do not count.
+    pub(super) leaves_out: bool,
 }
 
 impl Looks {
     /// * `shown`: share of the pixels that are not wholly transparent.
     pub(super) fn of(photograph: &Photograph, shown: f64) -> Self {
-        Self { shown, look: Look::of(photograph), border: border(photograph) }
+        let leaves_out = photograph.mask.as_ref().is_some_and(|mask| mask.n_valid() < mask.valid.len());
+        Self { shown, look: Look::of(photograph), border: border(photograph), leaves_out }
     }
 }
 

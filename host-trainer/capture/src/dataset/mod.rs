@@ -13,29 +13,39 @@ use glam::DVec3;
 
 mod apart;
 mod assemble;
+mod axes;
 mod blender;
+mod bundler;
 mod cache;
 mod camera_models;
 mod colmap;
 mod detect;
 mod diagnose;
 mod error;
+mod folder_names;
+mod found_files;
 mod frame_size;
 mod framing;
 mod frusta;
 mod image;
+mod image_file;
 mod image_folder;
 mod image_names;
 mod layout;
 mod lens;
 mod listing;
+mod llff;
 mod looks;
 mod mask;
+mod mask_file;
+mod metashape;
 mod named_path;
 mod nerfstudio;
 mod no_poses;
+mod non_finite;
 mod normalise;
 mod nsvf;
+mod opensfm;
 mod options;
 mod photo;
 mod photograph;
@@ -43,6 +53,7 @@ mod ply;
 mod polycam;
 mod pose;
 mod quaternion;
+mod realitycapture;
 mod record3d;
 mod report;
 mod scene_kind;
@@ -54,11 +65,12 @@ mod storage;
 mod text_file;
 mod transforms;
 mod undistort;
+mod unread_masks;
 mod view;
 mod view_fault;
 
 pub use cache::{FileFault, remove_cache};
-pub use diagnose::{Diagnosis, Finding, diagnose, diagnose_cheaply};
+pub use diagnose::{Diagnosis, Finding, MaskedView, diagnose, diagnose_cheaply};
 pub use error::DatasetError;
 pub use frame_size::{FrameSize, NoFrameSize};
 pub use layout::Layout;
@@ -178,9 +190,14 @@ fn list(path: &Path, options: &LoadOptions) -> Result<listing::Listing, DatasetE
         Some(Layout::Polycam) => polycam::list(path, options),
         Some(Layout::Record3d) => record3d::list(path, options),
         Some(Layout::Nsvf) => nsvf::list(path, options),
+        Some(Layout::Llff) => llff::list(path, options),
+        Some(Layout::Metashape) => metashape::list(path, options),
+        Some(Layout::RealityCapture) => realitycapture::list(path, options),
+        Some(Layout::Bundler) => bundler::list(path, options),
+        Some(Layout::OpenSfm) => opensfm::list(path, options),
         None => Err(detect::unknown_layout(path)),
     }?;
-    let has_images = matches!(listing.layout, Layout::Colmap | Layout::Nerfstudio);
+    let has_images = !matches!(listing.layout, Layout::Blender | Layout::Polycam | Layout::Record3d | Layout::Nsvf);
     for (option, is_ignored) in [
         ("--images", options.images.is_some() && !has_images),
         ("--model", options.model.is_some() && listing.layout != Layout::Colmap),
@@ -190,6 +207,10 @@ fn list(path: &Path, options: &LoadOptions) -> Result<listing::Listing, DatasetE
             listing.notes.push(listing::Note::warning("ignored-option", text));
         }
     }
+    let looking_away = axes::looking_away(&listing);
+    listing.notes.extend(looking_away);
+    let unread_masks = unread_masks::unread(path, &listing);
+    listing.notes.extend(unread_masks);
     apart::set_aside(&mut listing);
     Ok(listing)
 }

@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::image_names::{EXTENSIONS, has_foreign_name, is_image_name};
+use super::folder_names::FolderNames;
+use super::image_file::image_at;
 
 /// Where photographs lie in captures that name them by paths of another machine.
 const IMAGE_FOLDERS: [&str; 2] = ["images", "input"];
@@ -28,6 +29,11 @@ impl<'a> NamedPath<'a> {
             }
         }
         Self { written, is_absolute: has_drive || written.starts_with(['/', '\\']), parts }
+    }
+
+    /// The path as it was written.
+    pub(super) fn written(&self) -> &'a str {
+        self.written
     }
 
     /// The path for people: its parts, of an absolute path the last one only.
@@ -66,55 +72,52 @@ impl<'a> NamedPath<'a> {
 
     /// The file that is there: as written, by the last parts of the path, the most first, or by its name in a folder of
     /// images. The first folder of the path that is there decides: what is missing in it is not looked for elsewhere.
-    pub(super) fn file(&self, folder: &Path, images: Option<&str>) -> Option<PathBuf> {
-        self.find(folder, images, |path| path.is_file().then(|| path.to_owned()))
+    ///
+    /// Names are compared exactly first, then but for the form of Unicode, then but for case.
+    pub(super) fn file(&self, names: &FolderNames, folder: &Path, images: Option<&str>) -> Option<PathBuf> {
+        self.find(names, folder, images, |folder, name| names.named(folder, name, Path::is_file))
     }
 
-    /// The image that is there: as [`Self::file`], and where the path has no extension of an image or the file another.
-    pub(super) fn image(&self, folder: &Path, images: Option<&str>) -> Option<PathBuf> {
-        self.find(folder, images, with_some_extension)
+    /// The image that is there: as [`Self::file`], and as [`image_at`] where it has another ending than the path.
+    pub(super) fn image(&self, names: &FolderNames, folder: &Path, images: Option<&str>) -> Option<PathBuf> {
+        self.find(names, folder, images, |folder, name| image_at(names, folder, name))
     }
 
     /// The mask that is there: as [`Self::image`], but never by its bare name, for a photograph may have the same.
-    pub(super) fn mask(&self, folder: &Path) -> Option<PathBuf> {
+    pub(super) fn mask(&self, names: &FolderNames, folder: &Path) -> Option<PathBuf> {
         let with_folders = (0..self.parts.len().saturating_sub(1)).map(|n| folder.join(self.parts[n..].join("/")));
-        std::iter::once(self.expected(folder, None)).chain(with_folders).find_map(|path| with_some_extension(&path))
+        std::iter::once(self.expected(folder, None))
+            .chain(with_folders)
+            .find_map(|path| in_its_folder(names, &path, |folder, name| image_at(names, folder, name)))
     }
 
-    fn find(&self, folder: &Path, images: Option<&str>, look: impl Fn(&Path) -> Option<PathBuf>) -> Option<PathBuf> {
-        if let Some(found) = look(&self.expected(folder, images)) {
+    fn find(
+        &self,
+        names: &FolderNames,
+        folder: &Path,
+        images: Option<&str>,
+        look: impl Fn(&Path, &str) -> Option<PathBuf>,
+    ) -> Option<PathBuf> {
+        if let Some(found) = in_its_folder(names, &self.expected(folder, images), &look) {
             return Some(found);
         }
         let base = images.map_or_else(|| folder.to_owned(), |images| folder.join(images));
         for skipped in 0..self.parts.len() {
             let path = base.join(self.parts[skipped..].join("/"));
-            let found = look(&path);
+            let found = in_its_folder(names, &path, &look);
             let has_folder = skipped + 1 < self.parts.len();
-            if found.is_some() || (has_folder && path.parent().is_some_and(Path::is_dir)) {
+            if found.is_some() || (has_folder && path.parent().is_some_and(|folder| names.folder(folder).is_some())) {
                 return found;
             }
         }
         let name = self.parts.last().filter(|_| images.is_none())?;
-        IMAGE_FOLDERS.iter().find_map(|images| look(&folder.join(images).join(name)))
+        IMAGE_FOLDERS.iter().find_map(|images| look(&folder.join(images), name))
     }
 }
 
-/// The image at `path`, or beside it under the same name with another extension.
-fn with_some_extension(path: &Path) -> Option<PathBuf> {
-    let name = path.file_name()?.to_str()?;
-    let is_foreign = has_foreign_name(name);
-    if path.is_file() && !is_foreign {
-        return Some(path.to_owned());
-    }
-    let stem = if is_foreign || is_image_name(name) { name.rsplit_once('.')?.0 } else { name };
-    let upper = EXTENSIONS.map(str::to_uppercase);
-    let mut extensions = EXTENSIONS.into_iter().chain(upper.iter().map(String::as_str));
-    let readable = extensions.find_map(|extension| {
-        let path = path.with_file_name(format!("{stem}.{extension}"));
-        path.is_file().then_some(path)
-    });
-    // The photograph before its conversion only where there is no other, for the message that it must be converted.
-    readable.or_else(|| path.is_file().then(|| path.to_owned()))
+/// Looks for the name of a path in its folder.
+fn in_its_folder(names: &FolderNames, path: &Path, look: impl Fn(&Path, &str) -> Option<PathBuf>) -> Option<PathBuf> {
+    look(&names.folder(path.parent()?)?, path.file_name()?.to_str()?)
 }
 
 #[cfg(test)]
@@ -158,8 +161,9 @@ mod tests {
             "left/b.jpg",
             "c.webp",
         ]);
+        let names = FolderNames::default();
         let found = |written: &str, images: Option<&str>| {
-            let path = NamedPath::new(written).image(capture.path(), images)?;
+            let path = NamedPath::new(written).image(&names, capture.path(), images)?;
             Some(path.strip_prefix(capture.path()).expect("inside").to_str().expect("text").to_owned())
         };
         for (written, images, expected) in [
@@ -186,11 +190,13 @@ mod tests {
         ] {
             assert_eq!(found(written, images).as_deref(), expected, "{written} in {images:?}");
         }
-        let mask = |written: &str| NamedPath::new(written).mask(capture.path());
+        let mask = |written: &str| NamedPath::new(written).mask(&names, capture.path());
         assert_eq!(mask("/home/ann/fox/left/b.png"), Some(capture.path().join("left/b.jpg")));
         for missing in ["masks/a.jpg", "/home/ann/fox/masks/c.png", "a.jpg"] {
             assert_eq!(mask(missing), None, "{missing} is not the photograph of that name");
         }
-        assert_eq!(NamedPath::new("images/a.png").file(capture.path(), None), None, "a file has its own extension");
+        let file = |written: &str| NamedPath::new(written).file(&names, capture.path(), None);
+        assert_eq!(file("images/a.png"), None, "a file has its own extension");
+        assert_eq!(file("Images/A.JPG"), Some(capture.path().join("images/a.jpg")), "whatever the case");
     }
 }

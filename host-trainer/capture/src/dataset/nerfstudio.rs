@@ -4,12 +4,14 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
+use pocketsplat_files::shown;
 use rayon::prelude::*;
 
+use super::folder_names::FolderNames;
 use super::listing::{ListedView, Listing, Note, every_nth, unused_images};
 use super::named_path::NamedPath;
 use super::transforms::{Frame, Transforms, read_transforms};
-use super::{DatasetError, Layout, LoadOptions, Split, image_folder, ply};
+use super::{DatasetError, Layout, LoadOptions, Split, found_files, image_folder, ply};
 
 /// The file that tells this layout.
 pub(super) const FILE: &str = "transforms.json";
@@ -32,17 +34,14 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
         _ => image_folder::choose(folder, options, &mut notes)?,
     };
     let splits = splits(&transforms, options, &mut notes);
-    let views: Vec<ListedView> = transforms
-        .frames
-        .par_iter()
-        .zip(splits)
-        .filter_map(|(frame, split)| {
-            let shot = frame.shot(folder, images.as_deref(), &transforms.shared);
-            Some(ListedView { split: split?, name: frame.name().to_owned(), shot })
-        })
-        .collect();
-    let points = points(folder, &transforms, &mut notes)?;
-    let unposed = unposed(folder, images.as_deref(), &transforms);
+    let names = FolderNames::default();
+    let view = |(frame, split): (&Frame, Option<Split>)| {
+        Some(frame.view(split?, &names, folder, images.as_deref(), &transforms.shared))
+    };
+    let mut views: Vec<ListedView> = transforms.frames.par_iter().zip(splits).filter_map(view).collect();
+    notes.extend(found_files::check(&mut views, &names));
+    let points = points(folder, &names, &transforms, &mut notes)?;
+    let unposed = unposed(folder, &names, images.as_deref(), &transforms);
     if transforms.ply_file_path.is_none() || points.as_ref().is_some_and(|(_, points)| points.is_empty()) {
         let text = "the capture brings no points, so training starts from random points where the cameras look; name a \
                     point cloud in `ply_file_path` for a better start";
@@ -101,15 +100,16 @@ fn splits(transforms: &Transforms, options: &LoadOptions, notes: &mut Vec<Note>)
 /// The points that the file names, where they are there.
 fn points(
     folder: &Path,
+    names: &FolderNames,
     transforms: &Transforms,
     notes: &mut Vec<Note>,
 ) -> Result<Option<(PathBuf, Vec<DVec3>)>, DatasetError> {
     let Some(named) = transforms.ply_file_path.as_deref().map(NamedPath::new) else { return Ok(None) };
-    let Some(path) = named.file(folder, None) else {
+    let Some(path) = named.file(names, folder, None) else {
         let text = format!(
             "`ply_file_path` names `{}`, which does not exist, so training starts from random points where the cameras \
              look; restore the point cloud for a better start, or take `ply_file_path` out",
-            named.expected(folder, None).display()
+            shown(&named.expected(folder, None))
         );
         notes.push(Note::warning("missing-points", text));
         return Ok(None);
@@ -119,8 +119,8 @@ fn points(
 }
 
 /// Images beside the listed ones that no frame names, if all of them lie in one folder of the capture.
-fn unposed(folder: &Path, images: Option<&str>, transforms: &Transforms) -> Vec<String> {
-    let found: Vec<PathBuf> = transforms.frames.iter().filter_map(|frame| frame.image(folder, images)).collect();
+fn unposed(folder: &Path, names: &FolderNames, images: Option<&str>, transforms: &Transforms) -> Vec<String> {
+    let found: Vec<PathBuf> = transforms.frames.iter().filter_map(|frame| frame.image(names, folder, images)).collect();
     let mut folders = found.iter().map(|path| {
         let mut parts = path.strip_prefix(folder).ok()?.components();
         // A file that lies in the capture's own folder has no second part.
@@ -130,7 +130,7 @@ fn unposed(folder: &Path, images: Option<&str>, transforms: &Transforms) -> Vec<
     if !folders.all(|folder| folder == Some(first)) {
         return Vec::new();
     }
-    let masks: Vec<PathBuf> = transforms.frames.iter().filter_map(|frame| frame.mask(folder)).collect();
+    let masks: Vec<PathBuf> = transforms.frames.iter().filter_map(|frame| frame.mask(names, folder)).collect();
     unused_images(&folder.join(first), found.iter().chain(&masks).map(PathBuf::as_path))
 }
 

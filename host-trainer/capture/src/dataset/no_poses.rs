@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use pocketsplat_files::{shell_word, shown};
+
 use super::image_names::{conversion, has_foreign_name, is_image_name};
 
 /// Folders that photographs are kept in, the capture's own last.
@@ -55,7 +57,7 @@ fn photographs(folder: &Path) -> Option<String> {
         });
         return Some(format!(
             "`{}` holds {n} photographs but no poses; {convert}{}",
-            images.display(),
+            shown(&images),
             poses_by_colmap(folder, &images)
         ));
     }
@@ -64,14 +66,15 @@ fn photographs(folder: &Path) -> Option<String> {
 
 /// The commands that pose the photographs in `images` and leave the model where it is looked for.
 fn poses_by_colmap(folder: &Path, images: &Path) -> String {
-    let (folder, images) = (folder.display(), images.display());
+    let (database, sparse) = (shell_word(&folder.join("database.db")), shell_word(&folder.join("sparse")));
+    let images = shell_word(images);
     format!(
         "make poses with COLMAP and give this folder again:\n  \
-         colmap feature_extractor --database_path '{folder}/database.db' --image_path '{images}' \
+         colmap feature_extractor --database_path {database} --image_path {images} \
          --ImageReader.single_camera 1 --ImageReader.camera_model OPENCV\n  \
-         colmap exhaustive_matcher --database_path '{folder}/database.db'\n  \
-         mkdir -p '{folder}/sparse'\n  \
-         colmap mapper --database_path '{folder}/database.db' --image_path '{images}' --output_path '{folder}/sparse'"
+         colmap exhaustive_matcher --database_path {database}\n  \
+         mkdir -p {sparse}\n  \
+         colmap mapper --database_path {database} --image_path {images} --output_path {sparse}"
     )
 }
 
@@ -79,16 +82,21 @@ fn poses_by_colmap(folder: &Path, images: &Path) -> String {
 pub(super) fn file_instead(path: &Path) -> Option<String> {
     let name = path.file_name()?.to_string_lossy();
     let stem = path.with_extension("");
-    let (path, stem, ending) = (path.display(), stem.display(), extension(&name));
+    let (file, folder) = (shell_word(path), shell_word(&stem));
+    let (path, ending) = (shown(path), extension(&name));
     if FILMS.contains(&ending.as_str()) {
         Some(format!(
             "`{path}` is a film, needed: photographs with poses; take 2 photographs a second out of it and give the folder \
-             `{stem}`:\n  mkdir -p '{stem}/images'\n  ffmpeg -i '{path}' -vf fps=2 -qscale:v 2 '{stem}/images/%04d.jpg'"
+             `{}`:\n  mkdir -p {}\n  ffmpeg -i {file} -vf fps=2 -qscale:v 2 {}",
+            shown(&stem),
+            shell_word(&stem.join("images")),
+            shell_word(&stem.join("images/%04d.jpg"))
         ))
     } else if is_archive(&name) {
         Some(format!(
-            "`{path}` is a packed capture, needed: its files; unpack it and give the folder `{stem}`:\n  \
-             unzip '{path}' -d '{stem}'"
+            "`{path}` is a packed capture, needed: its files; unpack it and give the folder `{}`:\n  \
+             unzip {file} -d {folder}",
+            shown(&stem)
         ))
     } else if ending == "json" {
         Some(format!("`{path}` is a file, needed: a folder; give the folder that it lies in"))

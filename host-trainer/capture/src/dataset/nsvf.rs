@@ -5,6 +5,8 @@
 
 use std::path::{Path, PathBuf};
 
+use pocketsplat_files::shown;
+
 use super::listing::{Listing, Note, every_nth, is_listed};
 use super::transforms::{Frame, Intrinsics, list_frames};
 use super::{DatasetError, Layout, LoadOptions, Split, text_file};
@@ -23,7 +25,8 @@ pub(super) fn is_layout_of(folder: &Path) -> bool {
 /// # Errors
 /// As [`super::load`], as far as files but no pixels tell.
 pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, DatasetError> {
-    let shared = intrinsics(&folder.join(INTRINSICS))?;
+    let mut notes = Vec::new();
+    let shared = intrinsics(&folder.join(INTRINSICS), &mut notes)?;
     let entries = std::fs::read_dir(folder.join(POSES)).into_iter().flatten().flatten().map(|entry| entry.path());
     let mut files: Vec<PathBuf> = entries.filter(|path| is_listed(path, "txt")).collect();
     files.sort();
@@ -37,7 +40,9 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
         Some(("1" | "2", _)) => Some(Split::Test),
         _ => None,
     };
-    let mut listing = list_frames(Layout::Nsvf, folder.join(POSES), &folder.join(IMAGES), &frames, &shared, split);
+    let mut listing =
+        list_frames(Layout::Nsvf, folder.join(POSES), &folder.join(IMAGES), &frames, &shared, None, split);
+    listing.notes.extend(notes);
     let n_unused = frames.len() - listing.views.len();
     if n_unused > 0 {
         listing.notes.push(Note::new("unused-split", format!("views for validation, not used: {n_unused}")));
@@ -47,36 +52,46 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
 
 /// The numbers of a text file, by lines.
 fn numbers(path: &Path) -> Result<Vec<Vec<f64>>, DatasetError> {
-    let text = text_file::read(path).map_err(|source| DatasetError::Read { path: path.to_owned(), source })?;
+    let text = text_file::read(path).map_err(|source| DatasetError::of_reading(path, source))?;
     let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
     let line = |(i, line): (usize, &str)| {
         let number = |word: &str| {
-            word.parse().map_err(|_| DatasetError::Model {
-                path: path.to_owned(),
-                place: format!("line {}", i + 1),
-                found: format!("`{word}` is no number"),
-            })
+            let fault = |_| DatasetError::of_model(path, format!("line {}", i + 1), format!("`{word}` is no number"));
+            word.parse().map_err(fault)
         };
         line.split_whitespace().map(number).collect()
     };
     lines.map(line).collect()
 }
 
-/// A matrix `fx 0 cx …`, `0 fy cy …`, or one line `f cx cy …`.
-fn intrinsics(path: &Path) -> Result<Intrinsics, DatasetError> {
+/// A skew that moves a pixel at the border by less than this many pixels is left out without a word.
+const MAX_SKEW_PX: f64 = 0.5;
+
+/// A matrix `fx s cx …`, `0 fy cy …`, `0 0 1 …`, told by its rows of one length, or one line `f cx cy …`. The skew `s` is left out.
+fn intrinsics(path: &Path, notes: &mut Vec<Note>) -> Result<Intrinsics, DatasetError> {
     let lines = numbers(path)?;
-    let found = match (lines.first().map(Vec::as_slice), lines.get(1).map(Vec::as_slice)) {
-        (Some(&[fx, 0.0, cx, ..]), Some(&[_, fy, cy, ..])) => Some([fx, fy, cx, cy]),
-        (Some(&[f, cx, cy, ..]), _) => Some([f, f, cx, cy]),
+    let found = match lines.as_slice() {
+        [x, y, z, ..] if x.len() >= 3 && x.len() == y.len() && x.len() == z.len() => {
+            let skew_px = x[1] / y[1] * y[2];
+            if skew_px.abs() > MAX_SKEW_PX {
+                notes.push(Note::warning(
+                    "skew",
+                    format!(
+                        "`{}`: the matrix has a skew of {}, which moves pixels at the border by {skew_px:.1} px and is left out; \
+                         remove it from the photographs first",
+                        shown(path),
+                        x[1]
+                    ),
+                ));
+            }
+            Some([x[0], y[1], x[2], y[2]])
+        }
+        [line, ..] if line.len() >= 3 => Some([line[0], line[0], line[1], line[2]]),
         _ => None,
     };
     let Some([fl_x, fl_y, cx, cy]) = found.map(|numbers| numbers.map(Some)) else {
-        return Err(DatasetError::Model {
-            path: path.to_owned(),
-            place: "line 1".to_owned(),
-            found: "no intrinsics, needed: a matrix of 4 by 4 numbers, or a focal length and a principal point"
-                .to_owned(),
-        });
+        let found = "no intrinsics, needed: a matrix of 4 by 4 numbers, or a focal length and a principal point";
+        return Err(DatasetError::of_model(path, "line 1".to_owned(), found.to_owned()));
     };
     Ok(Intrinsics { fl_x, fl_y, cx, cy, ..Intrinsics::default() })
 }

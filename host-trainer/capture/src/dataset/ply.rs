@@ -40,7 +40,7 @@ struct PlyLayout {
 /// [`DatasetError::Read`], or [`DatasetError::Ply`] with what was found.
 pub(super) fn read_points(path: &Path) -> Result<Vec<DVec3>, DatasetError> {
     let bytes = std::fs::read(path).map_err(|source| DatasetError::Read { path: path.to_owned(), source })?;
-    parse(&bytes).map_err(|found| DatasetError::Ply { path: path.to_owned(), found })
+    parse(&bytes).map_err(|found| DatasetError::of_points(path, found))
 }
 
 fn parse(bytes: &[u8]) -> Result<Vec<DVec3>, String> {

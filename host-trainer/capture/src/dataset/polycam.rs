@@ -7,18 +7,27 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
+use super::image_names::is_image_name;
 use super::listing::{Listing, every_nth, is_listed};
 use super::transforms::{Frame, Intrinsics, list_frames};
-use super::{DatasetError, Layout, LoadOptions, text_file};
+use super::{DatasetError, Layout, LoadOptions, non_finite, text_file};
 
 /// Cameras and their images: optimised over all moments and undistorted first, as tracked where there are none.
 const FOLDERS: [(&str, &str); 2] = [("corrected_cameras", "corrected_images"), ("cameras", "images")];
 
-/// The folders of cameras and of images.
+/// The folders of cameras and of images: the first that hold something, for an export may leave the corrected ones empty.
 fn folders(folder: &Path) -> Option<(PathBuf, PathBuf)> {
     let keyframes = folder.join("keyframes");
     let folders = FOLDERS.iter().map(|(cameras, images)| (keyframes.join(cameras), keyframes.join(images)));
-    folders.into_iter().find(|(cameras, images)| cameras.is_dir() && images.is_dir())
+    let there: Vec<_> = folders.filter(|(cameras, images)| cameras.is_dir() && images.is_dir()).collect();
+    let holds = |folder: &Path, is_wanted: fn(&Path) -> bool| {
+        std::fs::read_dir(folder).into_iter().flatten().flatten().any(|entry| is_wanted(&entry.path()))
+    };
+    let is_image = |path: &Path| path.file_name().is_some_and(|name| is_image_name(&name.to_string_lossy()));
+    let full = |(cameras, images): &&(PathBuf, PathBuf)| {
+        holds(cameras, |path| is_listed(path, "json")) && holds(images, is_image)
+    };
+    there.iter().find(full).or_else(|| there.first()).cloned()
 }
 
 /// Whether the folder is of this layout.
@@ -38,26 +47,22 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
     let mut files: Vec<PathBuf> = entries.filter(|path| is_listed(path, "json")).collect();
     files.sort();
     let frames = files.iter().map(|path| frame(path)).collect::<Result<Vec<_>, _>>()?;
-    Ok(list_frames(Layout::Polycam, cameras, &images, &frames, &Intrinsics::default(), |i| {
+    Ok(list_frames(Layout::Polycam, cameras, &images, &frames, &Intrinsics::default(), None, |i| {
         Some(every_nth(options.test_every, i))
     }))
 }
 
 /// The frame that a camera's file describes; numbers that are missing become NaN, which its view is left out for.
 fn frame(path: &Path) -> Result<Frame, DatasetError> {
-    let text = text_file::read(path).map_err(|source| DatasetError::Read { path: path.to_owned(), source })?;
+    let text = text_file::read(path).map_err(|source| DatasetError::of_reading(path, source))?;
     let needs = "`fx`, `fy`, `cx`, `cy`, `width`, `height` and `t_00` to `t_23`";
-    let camera: Value = serde_json::from_str(&text).map_err(|source| DatasetError::Json {
-        path: path.to_owned(),
-        what: "a camera of Polycam",
-        needs,
-        source,
-    })?;
+    let camera: Value = non_finite::read(&text, |text| serde_json::from_str(text))
+        .map_err(|source| DatasetError::of_json(path, "a camera of Polycam", needs, source))?;
     let number = |name: &str| camera[name].as_f64();
     let row = |i: usize| (0..4).map(|j| number(&format!("t_{i}{j}")).unwrap_or(f64::NAN)).collect();
     let own = Intrinsics {
-        fl_x: number("fx"),
-        fl_y: number("fy"),
+        fl_x: Some(number("fx").unwrap_or(f64::NAN)),
+        fl_y: Some(number("fy").unwrap_or(f64::NAN)),
         cx: number("cx"),
         cy: number("cy"),
         w: number("width"),

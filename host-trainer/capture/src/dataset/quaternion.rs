@@ -4,6 +4,8 @@ use std::path::Path;
 
 use glam::{DMat3, DQuat};
 
+use pocketsplat_files::shown;
+
 use super::ViewFault;
 use super::error::first_few;
 use super::listing::Note;
@@ -38,7 +40,7 @@ pub(super) fn long_quaternions<'a>(path: &Path, views: impl Iterator<Item = (&'a
     let text = format!(
         "`{}`: rotations whose quaternion is not of length 1: {} ({}), the worst of length {:.6}; they were normalised: export \
          the model again with more digits if its views do not agree",
-        path.display(),
+        shown(path),
         names.len(),
         first_few(&names, ", "),
         worst.length()

@@ -13,24 +13,27 @@ use super::image_names::is_image_name;
 use super::listing::{Listing, every_nth};
 use super::quaternion::{long_quaternions, rotation_of};
 use super::transforms::{Frame, Intrinsics, list_frames};
-use super::{DatasetError, Layout, LoadOptions, text_file};
+use super::{DatasetError, Layout, LoadOptions, non_finite, text_file};
 
 /// The file of poses: of an unpacked `.r3d`, and of an export as EXR and JPEG.
 const METADATA: [&str; 2] = ["metadata", "metadata.json"];
 /// The folder of pictures, of either kind.
 const PICTURES: [&str; 2] = ["rgbd", "rgb"];
 
+/// A number, or `null` for one that is none.
+type Number = Option<f64>;
+
 #[derive(Deserialize)]
 struct Metadata {
-    w: f64,
-    h: f64,
+    w: Number,
+    h: Number,
     #[serde(rename = "K")]
-    k: [f64; 9],
+    k: [Number; 9],
     /// `[qx, qy, qz, qw, x, y, z]` of each picture.
-    poses: Vec<[f64; 7]>,
+    poses: Vec<[Number; 7]>,
     /// `[fx, fy, cx, cy, …]` of each picture.
     #[serde(default, rename = "perFrameIntrinsicCoeffs")]
-    lenses: Vec<Vec<f64>>,
+    lenses: Vec<Vec<Number>>,
 }
 
 fn files(folder: &Path) -> Option<(PathBuf, PathBuf)> {
@@ -52,41 +55,39 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
     let Some((path, pictures)) = files(folder) else {
         return Err(DatasetError::NotAFolder { path: folder.join(PICTURES[0]) });
     };
-    let text = text_file::read(&path).map_err(|source| DatasetError::Read { path: path.clone(), source })?;
+    let text = text_file::read(&path).map_err(|source| DatasetError::of_reading(&path, source))?;
     let needs = "`w`, `h`, `K` of 9 numbers and `poses` of 7 numbers each";
-    let metadata: Metadata = serde_json::from_str(&text).map_err(|source| DatasetError::Json {
-        path: path.clone(),
-        what: "metadata of Record3D",
-        needs,
-        source,
-    })?;
-    let [fx, _, _, _, fy, _, cx, cy, _] = metadata.k;
-    let intrinsics = |fx, fy, cx, cy| {
-        let [fl_x, fl_y, cx, cy, w, h] = [fx, fy, cx, cy, metadata.w, metadata.h].map(Some);
-        Intrinsics { fl_x, fl_y, cx, cy, w, h, ..Intrinsics::default() }
-    };
+    let metadata: Metadata = non_finite::read(&text, |text| serde_json::from_str(text))
+        .map_err(|source| DatasetError::of_json(&path, "metadata of Record3D", needs, source))?;
+    let [fl_x, _, _, _, fl_y, _, cx, cy, _] = metadata.k;
+    let Metadata { w, h, .. } = metadata;
+    let intrinsics =
+        |[fl_x, fl_y, cx, cy]: [Number; 4]| Intrinsics { fl_x, fl_y, cx, cy, w, h, ..Intrinsics::default() };
+    // A pose with a number that is none is a fault of its picture.
+    let poses: Vec<[f64; 7]> =
+        metadata.poses.iter().map(|pose| pose.map(|number| number.unwrap_or(f64::NAN))).collect();
     let names = names_by_number(&pictures);
     // From 0 or from 1, whichever picture is missing.
-    let first = usize::from(!names.contains_key(&0) && names.contains_key(&metadata.poses.len()));
+    let first = usize::from(!names.contains_key(&0) && names.contains_key(&poses.len()));
     let quaternion = |&[x, y, z, w, ..]: &[f64; 7]| DQuat::from_xyzw(x, y, z, w);
-    let rotations: Vec<_> = metadata.poses.iter().map(|pose| rotation_of(quaternion(pose))).collect();
+    let rotations: Vec<_> = poses.iter().map(|pose| rotation_of(quaternion(pose))).collect();
     let frame = |(i, &[.., x, y, z]): (usize, &[f64; 7])| {
         // A fault takes the place of the view below.
         let rotation = rotations[i].as_ref().map_or(DMat3::IDENTITY, DMat3::transpose);
         let rows = [(rotation.x_axis, x), (rotation.y_axis, y), (rotation.z_axis, z)]
             .map(|(row, along)| vec![row.x, row.y, row.z, along]);
         let own = match metadata.lenses.get(i).map(Vec::as_slice) {
-            Some(&[fx, fy, cx, cy, ..]) if fx > 0.0 => intrinsics(fx, fy, cx, cy),
+            Some(&[Some(fx), fy, cx, cy, ..]) if fx > 0.0 => intrinsics([Some(fx), fy, cx, cy]),
             _ => Intrinsics::default(),
         };
         let name = names.get(&(first + i)).cloned().unwrap_or_else(|| (first + i).to_string());
         Frame::new(name, &rows, own)
     };
-    let frames: Vec<Frame> = metadata.poses.iter().enumerate().map(frame).collect();
-    let shared = intrinsics(fx, fy, cx, cy);
+    let frames: Vec<Frame> = poses.iter().enumerate().map(frame).collect();
+    let shared = intrinsics([fl_x, fl_y, cx, cy]);
     let split = |i| Some(every_nth(options.test_every, i));
-    let mut listing = list_frames(Layout::Record3d, path.clone(), &pictures, &frames, &shared, split);
-    let named = listing.views.iter().map(|view| view.name.as_str()).zip(metadata.poses.iter().map(quaternion));
+    let mut listing = list_frames(Layout::Record3d, path.clone(), &pictures, &frames, &shared, None, split);
+    let named = listing.views.iter().map(|view| view.name.as_str()).zip(poses.iter().map(quaternion));
     let long = long_quaternions(&path, named);
     listing.notes.extend(long);
     for (view, rotation) in listing.views.iter_mut().zip(rotations) {

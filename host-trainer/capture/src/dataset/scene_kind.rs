@@ -71,11 +71,11 @@ pub(super) fn taken_for(looks: &[Looks], asked: Option<SceneKind>) -> Taken {
 
 #[cfg(test)]
 mod tests {
-    use super::super::diagnose::Look;
+    use super::super::looks::Look;
     use super::*;
 
     fn looks(shown: f64, border: Option<[u8; 3]>) -> Looks {
-        Looks { shown, look: Look::Sound, border }
+        Looks { shown, look: Look::Sound, border, leaves_out: false }
     }
 
     #[test]

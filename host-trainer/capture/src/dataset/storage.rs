@@ -41,7 +41,7 @@ pub(super) struct LoadedView {
 pub(super) fn load_views(views: Vec<ListedView>, options: &LoadOptions) -> Result<Vec<LoadedView>, DatasetError> {
     let storage = Storage::of(&views, options)?;
     let load = |(i, listed): (usize, ListedView)| -> Result<LoadedView, DatasetError> {
-        let ListedView { split, name, shot } = listed;
+        let ListedView { split, name, shot, .. } = listed;
         let view = match shot {
             Ok(shot) => storage.view(i, &name, shot, options)?,
             Err(fault) => Err(fault),
@@ -108,7 +108,7 @@ impl Storage {
                 .photo(i, &name, &shot, options)?
                 .map(|CachedPhoto { file, looks }| (View::in_cache(name, shot.camera(&framing), file), looks)));
         }
-        Ok(shot.read(options).map(|Photo { photograph, camera, looks }| match self {
+        Ok(shot.read(options).map(|Photo { photograph, camera, looks, .. }| match self {
             Self::Capture => {
                 let (crc32, has_mask) = (photograph.crc32(), photograph.mask.is_some());
                 let file = SourceFile { shot, options: options.clone(), crc32, has_mask };

@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use pocketsplat_files::shown;
+
 use super::cache::{CacheFile, FileFault};
 use super::listing::Shot;
 use super::{LoadOptions, Photograph, ViewFault};
@@ -49,14 +51,14 @@ pub enum PhotographError {
     /// A file of the cache is gone or damaged.
     #[error(
         "view {view}: its decoded photograph `{}` {fault}; go on with `train --resume`, which decodes it again",
-        path.display()
+        shown(path)
     )]
     Cache { view: String, path: PathBuf, fault: FileFault },
     /// A photograph of the capture can no longer be decoded.
     #[error("view {view}: it was sound when the capture was loaded, and now its {fault}")]
     Capture { view: String, fault: ViewFault },
     /// A photograph of the capture is another one than before.
-    #[error("view {view}: `{}` has changed since the capture was loaded; start again", path.display())]
+    #[error("view {view}: `{}` has changed since the capture was loaded; start again", shown(path))]
     Changed { view: String, path: PathBuf },
 }
 

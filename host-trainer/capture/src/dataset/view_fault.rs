@@ -2,9 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use pocketsplat_files::{FileKind, shown};
+
 use super::PoseFault;
 use super::camera_models::READABLE_MODELS;
-use super::image_names::{EXTENSIONS, conversion, foreign_format};
+use super::image_names::{EXTENSIONS, conversion, foreign_name};
 
 /// Why one view cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -15,28 +17,38 @@ pub enum ViewFault {
     #[error(
         "image missing: `{}` does not exist, nor does the same with the extension {}; restore it or take the view out of \
          {listed_in}",
-        path.display(), EXTENSIONS.join(" or ")
+        shown(path), EXTENSIONS.join(" or ")
     )]
     Missing { path: PathBuf, listed_in: &'static str },
+    /// The file is also another photograph's.
+    #[error(
+        "its name is `{written}`, and the file found for it, `{}`, is also found for `{other}`, but one file is not two \
+         photographs; put each photograph where its name says",
+        shown(path)
+    )]
+    SharedFile { path: PathBuf, other: String, written: String },
     /// The image cannot be decoded.
-    #[error("image unreadable: `{}`: {message}; replace it with a whole PNG, JPEG or WebP", path.display())]
+    #[error("image unreadable: `{}`: {message}; replace it with a whole PNG, JPEG or WebP", shown(path))]
     Unreadable { path: PathBuf, message: String },
+    /// The file is no image at all.
+    #[error("image unreadable: `{}`: it is {kind}; {}replace it with a whole PNG, JPEG or WebP", shown(path), first(*kind))]
+    Kind { path: PathBuf, kind: FileKind },
     /// The image is of a format that is not read.
     #[error(
         "`{}` is {found}, needed: PNG, JPEG or WebP; convert the images, names need not change in the capture:\n  {}",
-        path.display(), conversion(path.parent().unwrap_or(path), &path.to_string_lossy())
+        shown(path), conversion(path.parent().unwrap_or(path), &shown(path))
     )]
     Format { path: PathBuf, found: &'static str },
     /// The image's size is not the capture's.
     #[error(
         "`{}` is {}×{} px, the training images are {}×{} px; export it again at that size",
-        path.display(), found_px.0, found_px.1, needed_px.0, needed_px.1
+        shown(path), found_px.0, found_px.1, needed_px.0, needed_px.1
     )]
     Size { path: PathBuf, found_px: (u32, u32), needed_px: (u32, u32) },
     /// The image has another shape than its camera.
     #[error(
         "`{}` is {}×{} px, its camera is for {}×{} px, which is another shape{}",
-        path.display(), found_px.0, found_px.1, needed_px.0, needed_px.1,
+        shown(path), found_px.0, found_px.1, needed_px.0, needed_px.1,
         if (found_px.1, found_px.0) == *needed_px {
             ": it is turned on its side; store it as the poses were made from it (EXIF orientations are not applied)"
         } else {
@@ -47,7 +59,7 @@ pub enum ViewFault {
     /// The image does not cover the frame asked for.
     #[error(
         "`{}` is {}×{} px and does not cover the frame of {}×{} px; ask for a smaller frame",
-        path.display(), found_px.0, found_px.1, needed_px.0, needed_px.1
+        shown(path), found_px.0, found_px.1, needed_px.0, needed_px.1
     )]
     Small { path: PathBuf, found_px: (u32, u32), needed_px: (u32, u32) },
     /// The intrinsics are no lens.
@@ -66,7 +78,7 @@ pub enum ViewFault {
     #[error("its translation is {found:?}, needed: finite numbers; take the view out or export the model again")]
     Translation { found: [f64; 3] },
     /// The mask cannot be used.
-    #[error("its mask `{}` {message}; restore the mask or take it out of the capture", path.display())]
+    #[error("its mask `{}` {message}; restore the mask or take it out of the capture", shown(path))]
     Mask { path: PathBuf, message: String },
     /// The camera is far from all others.
     #[error(
@@ -82,9 +94,13 @@ pub enum ViewFault {
 impl ViewFault {
     /// The fault of an image with an unreadable header.
     pub(super) fn of_header(path: PathBuf, message: String) -> Self {
-        match foreign_format(&path) {
-            Some(found) => Self::Format { path, found },
-            None => Self::Unreadable { path, message },
+        match FileKind::of_file(&path).ok().flatten() {
+            // Damaged, or cut.
+            None | Some(FileKind::Png | FileKind::Jpeg | FileKind::WebP) => Self::Unreadable { path, message },
+            Some(kind) => match foreign_name(kind) {
+                Some(found) => Self::Format { path, found },
+                None => Self::Kind { path, kind },
+            },
         }
     }
 
@@ -92,7 +108,8 @@ impl ViewFault {
     pub(super) fn code(&self) -> &'static str {
         match self {
             Self::Missing { .. } => "missing-image",
-            Self::Unreadable { .. } => "unreadable-image",
+            Self::SharedFile { .. } => "shared-image",
+            Self::Unreadable { .. } | Self::Kind { .. } => "unreadable-image",
             Self::Format { .. } => "image-format",
             Self::Size { .. } | Self::Small { .. } => "image-size",
             Self::Shape { .. } => "image-shape",
@@ -109,7 +126,9 @@ impl ViewFault {
     pub(super) fn path(&self) -> Option<&Path> {
         match self {
             Self::Missing { path, .. }
+            | Self::SharedFile { path, .. }
             | Self::Unreadable { path, .. }
+            | Self::Kind { path, .. }
             | Self::Format { path, .. }
             | Self::Size { path, .. }
             | Self::Shape { path, .. }
@@ -118,4 +137,9 @@ impl ViewFault {
             _ => None,
         }
     }
+}
+
+/// What helps against a file of this kind, to be tried first.
+fn first(kind: FileKind) -> String {
+    kind.remedy().map_or_else(String::new, |remedy| format!("{remedy}, or "))
 }

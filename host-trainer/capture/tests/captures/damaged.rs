@@ -6,7 +6,10 @@ use pocketsplat_capture::dataset::{LoadOptions, diagnose_cheaply};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
-use crate::exports::{NSVF_MATRIX, write_nsvf, write_polycam, write_record3d};
+use crate::exports::{
+    NSVF_MATRIX, write_bundler, write_llff, write_metashape, write_nsvf, write_opensfm, write_polycam,
+    write_realitycapture, write_record3d,
+};
 use crate::fixture::{Fixture, Kind};
 
 /// How many damaged captures of each layout are tried.
@@ -56,7 +59,7 @@ fn no_damage_to_the_files_of_poses_makes_loading_panic() {
     fn as_it_is(fixture: &Fixture) {
         fixture.write_files();
     }
-    let layouts: [Layout; 7] = [
+    let layouts: [Layout; 12] = [
         (Kind::Blender, as_it_is),
         (Kind::ColmapBinary, as_it_is),
         (Kind::ColmapText, as_it_is),
@@ -64,6 +67,11 @@ fn no_damage_to_the_files_of_poses_makes_loading_panic() {
         (Kind::Nerfstudio, |fixture| write_polycam(fixture, "cameras", "images")),
         (Kind::Nerfstudio, |fixture| write_record3d(fixture, "metadata", "rgbd", 0)),
         (Kind::Nerfstudio, |fixture| write_nsvf(fixture, NSVF_MATRIX, |_| "")),
+        (Kind::Nerfstudio, |fixture| write_metashape(fixture, "frame")),
+        (Kind::Nerfstudio, write_realitycapture),
+        (Kind::Nerfstudio, |fixture| write_llff(fixture, "<f8", |number| number.to_le_bytes().to_vec())),
+        (Kind::Nerfstudio, write_bundler),
+        (Kind::Nerfstudio, write_opensfm),
     ];
     let mut rng = ChaCha8Rng::seed_from_u64(19);
     let options = LoadOptions { n_random_points: 10, ..LoadOptions::default() };

@@ -77,6 +77,106 @@ pub(crate) fn write_nsvf(fixture: &Fixture, intrinsics: &str, prefix: fn(usize) 
     }
 }
 
+/// Metashape's cameras.xml, of a sensor of this type.
+pub(crate) fn write_metashape(fixture: &Fixture, kind: &str) {
+    let (width_px, height_px) = SIZE_PX;
+    let camera = |(i, photo): (usize, &Photo)| {
+        let numbers: Vec<String> =
+            rows(photo.rotation, photo.centre).as_flattened().iter().map(|number| format!("{number:e}")).collect();
+        format!(
+            "<camera id=\"{i}\" sensor_id=\"4\" label=\"{}\"><transform>{} 0 0 0 1</transform></camera>",
+            photo.name.trim_end_matches(".png"),
+            numbers.join(" ")
+        )
+    };
+    let cameras: String = fixture.photos.iter().enumerate().map(camera).collect();
+    let text = format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<document version=\"2.0.0\"><chunk label=\"Chunk 1\">\n<sensors><sensor id=\"4\" \
+         type=\"{kind}\"><resolution width=\"{width_px}\" height=\"{height_px}\"/><calibration class=\"initial\"><f>9</f></calibration>\
+         <calibration class=\"adjusted\"><f>{FOCAL_PX}</f><cx>0</cx><cy>0</cy><b1>0</b1></calibration></sensor></sensors>\n\
+         <cameras>{cameras}<camera id=\"99\" sensor_id=\"4\" label=\"never aligned\"/></cameras></chunk></document>"
+    );
+    fixture.write("cameras.xml", text);
+}
+
+/// RealityCapture's table of cameras.
+pub(crate) fn write_realitycapture(fixture: &Fixture) {
+    let line = |photo: &Photo| {
+        let m = opengl(photo);
+        // Of Rz(−heading)·Rx(pitch)·Ry(roll).
+        let (heading, pitch, roll) = ((m[0][1]).atan2(m[1][1]), m[2][1].asin(), (-m[2][0]).atan2(m[2][2]));
+        let [heading, pitch, roll] = [heading, pitch, roll].map(f64::to_degrees);
+        let c = photo.centre;
+        format!("{},{:?},{:?},{:?},{heading:?},{pitch:?},{roll:?},30,0,0,0,0,0,0,0,0\n", photo.name, c.x, c.y, c.z)
+    };
+    let head = "#cameras 9\n#name,x,y,alt,heading,pitch,roll,f,px,py,k1,k2,k3,k4,t1,t2\n";
+    fixture.write("export.csv", format!("{head}{}", fixture.photos.iter().map(line).collect::<String>()));
+}
+
+/// LLFF's array, in numbers of this type.
+pub(crate) fn write_llff(fixture: &Fixture, kind: &str, number: fn(f64) -> Vec<u8>) {
+    let (width_px, height_px) = SIZE_PX;
+    let hwf = [f64::from(height_px), f64::from(width_px), FOCAL_PX];
+    let row = |photo: &Photo| {
+        let matrix = opengl(photo).into_iter().zip(hwf).flat_map(|([r, u, b, c], last)| [-u, r, b, c, last]);
+        matrix.chain([1.0, 9.0]).flat_map(number).collect::<Vec<u8>>()
+    };
+    let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({}, 17), }}\n", fixture.photos.len());
+    let start = [b"\x93NUMPY\x01\0".as_slice(), &(header.len() as u16).to_le_bytes(), header.as_bytes()].concat();
+    let data: Vec<u8> = fixture.photos.iter().flat_map(row).collect();
+    fixture.write("poses_bounds.npy", [start, data].concat());
+}
+
+/// Bundler's model, its list with focal lengths behind the names.
+pub(crate) fn write_bundler(fixture: &Fixture) {
+    let camera = |photo: &Photo| {
+        let to_world = photo.rotation * DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0));
+        let (r, t) = (to_world.transpose(), -(to_world.transpose() * photo.centre));
+        let row = |i: usize| format!("{:?} {:?} {:?}\n", r.row(i).x, r.row(i).y, r.row(i).z);
+        format!("{FOCAL_PX} 0 0\n{}{}{}{:?} {:?} {:?}\n", row(0), row(1), row(2), t.x, t.y, t.z)
+    };
+    let cameras: String = fixture.photos.iter().map(camera).collect();
+    let none = "0 0 0\n0 0 0\n0 0 0\n0 0 0\n0 0 0\n";
+    let point = |p: &DVec3| format!("{:?} {:?} {:?}\n9 9 9\n2 0 7 1.5 2.5 3 8 0.5 1.5\n", p.x, p.y, p.z);
+    let points: String = fixture.points.iter().map(point).collect();
+    let (n, n_points) = (fixture.photos.len() + 1, fixture.points.len());
+    fixture.write("bundle.out", format!("# Bundle file v0.3\n{n} {n_points}\n{cameras}{none}{points}"));
+    let names: String = fixture.photos.iter().map(|photo| format!("images/{} 0 812.5\n", photo.name)).collect();
+    fixture.write("list.txt", names + "images/without_pose.png\n");
+}
+
+/// OpenSfM's reconstruction, behind a smaller one.
+pub(crate) fn write_opensfm(fixture: &Fixture) {
+    let (width_px, height_px) = SIZE_PX;
+    let camera = |model: &str| {
+        let focal = FOCAL_PX / f64::from(width_px);
+        format!(
+            "{{\"projection_type\": \"{model}\", \"width\": {width_px}, \"height\": {height_px}, \"focal\": {focal:?}, \"k1\": 0, \"k2\": 0.0}}"
+        )
+    };
+    let shot = |photo: &Photo| {
+        let (r, t) = (photo.rotation.transpose(), -(photo.rotation.transpose() * photo.centre));
+        let axis = DQuat::from_mat3(&r).to_scaled_axis();
+        let list = |v: DVec3| format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z);
+        format!(
+            "\"{}\": {{\"camera\": \"v2\", \"rotation\": {}, \"translation\": {}}}",
+            photo.name,
+            list(axis),
+            list(t)
+        )
+    };
+    let shots: Vec<String> = fixture.photos.iter().map(shot).collect();
+    let points = "\"7\": {\"coordinates\": [0.1, 0.2, 0.3], \"color\": [9, 9, 9]}";
+    fixture.write(
+        "reconstruction.json",
+        format!(
+            "[{{\"cameras\": {{}}, \"shots\": {{}}}}, {{\"cameras\": {{\"v2\": {}}}, \"shots\": {{{}}}, \"points\": {{{points}}}}}]",
+            camera("perspective"),
+            shots.join(", ")
+        ),
+    );
+}
+
 /// Intrinsics of the fixture as NSVF's matrix.
 pub(crate) const NSVF_MATRIX: &str = "20.0 0 12.0 0\n0 20.0 8.0 0\n0 0 1 0\n0 0 0 1\n";
 
@@ -84,13 +184,21 @@ pub(crate) const NSVF_MATRIX: &str = "20.0 0 12.0 0\n0 20.0 8.0 0\n0 0 1 0\n0 0 
 fn exports_are_the_capture_that_they_were_made_from() {
     type Writer = (&'static str, fn(&Fixture));
     let reference = Fixture::new(Kind::ColmapBinary, 9).write_files().load().expect("a sound capture").0;
-    let writers: [Writer; 6] = [
+    let writers: [Writer; 13] = [
         ("Polycam", |f| write_polycam(f, "corrected_cameras", "corrected_images")),
         ("Polycam", |f| write_polycam(f, "cameras", "images")),
         ("Record3D", |f| write_record3d(f, "metadata", "rgbd", 0)),
         ("Record3D", |f| write_record3d(f, "metadata.json", "rgb", 1)),
         ("NSVF", |f| write_nsvf(f, NSVF_MATRIX, |_| "")),
         ("NSVF", |f| write_nsvf(f, "20.0 12.0 8.0 0.\n0. 0. 0.\n0.\n1.\n24 16\n", |_| "")),
+        // A skew of rounding, and one of no sense, are still those of a matrix.
+        ("NSVF", |f| write_nsvf(f, &NSVF_MATRIX.replacen("20.0 0 ", "20.0 3e-5 ", 1), |_| "")),
+        ("NSVF", |f| write_nsvf(f, "20.0 -2 12.0\n0 20.0 8.0\n0 0 1\n", |_| "")),
+        ("Metashape", |f| write_metashape(f, "frame")),
+        ("RealityCapture", write_realitycapture),
+        ("LLFF", |f| write_llff(f, "<f8", |number| number.to_le_bytes().to_vec())),
+        ("Bundler", write_bundler),
+        ("OpenSfM", write_opensfm),
     ];
     for (layout, write) in writers {
         let fixture = Fixture::new(Kind::Nerfstudio, 9);
@@ -144,4 +252,55 @@ fn names_of_nsvf_give_the_split() {
     };
     assert_eq!(n_views(|i| ["0_", "1_", "2_"][i % 4 % 3]), (5, 2, true));
     assert_eq!(n_views(|i| if i < 6 { "0_" } else { "1_" }), (6, 3, false));
+}
+
+#[test]
+fn numbers_of_llff_may_be_short_or_the_other_way_round() {
+    let short: (&str, fn(f64) -> Vec<u8>) = ("<f4", |number| (number as f32).to_le_bytes().to_vec());
+    let big: (&str, fn(f64) -> Vec<u8>) = (">f8", |number| number.to_be_bytes().to_vec());
+    for (kind, number) in [short, big] {
+        let fixture = Fixture::new(Kind::Nerfstudio, 9);
+        write_llff(&fixture, kind, number);
+        let capture = fixture.load().unwrap_or_else(|error| panic!("{kind}: {error}")).0;
+        assert_eq!(capture.train[0].camera.focal_px, [FOCAL_PX; 2], "{kind}");
+    }
+    let fixture = Fixture::new(Kind::Nerfstudio, 9);
+    write_llff(&fixture, "<f8", |number| number.to_le_bytes().to_vec());
+    fixture.remove("images/p_03.png");
+    let error = fixture.load().expect_err("8 images of 9 poses").to_string();
+    assert!(error.contains("9 poses, but `") && error.contains("` holds 8 images, needed: as many"), "{error}");
+}
+
+#[test]
+fn a_lens_of_metashape_is_read_as_its_manual_says() {
+    let fixture = Fixture::new(Kind::Nerfstudio, 9);
+    write_metashape(&fixture, "frame");
+    let text = std::fs::read_to_string(fixture.at("cameras.xml")).expect("written");
+    let lens = "<cx>1</cx><cy>-0.5</cy><b1>0.5</b1><k1>0.3</k1><k2>0.1</k2><p1>-0.02</p1><p2>0.01</p2>";
+    fixture.write("cameras.xml", text.replace("<cx>0</cx><cy>0</cy><b1>0</b1>", lens));
+    let capture = fixture.load().expect("a sound capture").0;
+    let camera = &capture.train[0].camera;
+    assert_eq!((camera.focal_px, camera.principal_px), ([20.5, 20.0], [13.0, 7.5]));
+    let mut colmap = Fixture::new(Kind::ColmapText, 9);
+    colmap.cameras[0].model = (4, "OPENCV");
+    colmap.cameras[0].parameters = vec![20.5, 20.0, 13.0, 7.5, 0.3, 0.1, 0.01, -0.02];
+    let expected = colmap.write_files().load().expect("a sound capture").0;
+    assert_eq!(photograph(&capture.train[0]), photograph(&expected.train[0]), "p1 and p2 change places");
+}
+
+#[test]
+fn cameras_of_metashape_that_are_none_are_named() {
+    let fixture = Fixture::new(Kind::Nerfstudio, 9);
+    write_metashape(&fixture, "spherical");
+    let error = fixture.load().expect_err("no frame cameras").to_string();
+    assert!(error.contains("its camera model is `spherical of Metashape`, needed: PINHOLE"), "{error}");
+    let empty = "<?xml version=\"1.0\"?>\n<document version=\"2.0.0\"><chunk><sensors/><cameras/></chunk></document>";
+    fixture.write("cameras.xml", empty);
+    let error = fixture.load().expect_err("no cameras").to_string();
+    for part in [
+        "cameras.xml` is a file of cameras of Metashape, but none of its 0 cameras has a pose",
+        "ns-process-data metashape --data ",
+    ] {
+        assert!(error.contains(part), "{error}");
+    }
 }

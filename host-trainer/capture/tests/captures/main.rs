@@ -2,10 +2,12 @@
 //! give, and real ones where they are at hand.
 
 mod broken;
+mod cases;
 mod damaged;
 mod exports;
 mod fixture;
 mod real;
+mod remedies;
 mod scene;
 mod sound;
 mod storage;

@@ -27,7 +27,7 @@ use super::{DatasetError, LoadOptions, ViewFault};
 const LOCK: &str = "lock";
 const EXTENSION: &str = "photograph";
 /// Rises when the same image is decoded to other pixels than by an earlier version.
-const DECODING: u32 = 1;
+const DECODING: u32 = 2;
 
 /// A folder of decoded photographs that no other process works with.
 #[derive(Clone, Debug)]
@@ -122,11 +122,12 @@ impl Cache {
 fn made_from(name: &str, shot: &Shot, options: &LoadOptions) -> io::Result<String> {
     let checksum = |path: &Path| fs::read(path).map(|bytes| crc32fast::hash(&bytes));
     let image = checksum(&shot.path)?;
-    let mask = shot.mask.as_deref().map(checksum).transpose()?;
+    let masks =
+        shot.masks.iter().map(|mask| Ok((checksum(&mask.path)?, mask.is_inverted))).collect::<io::Result<Vec<_>>>()?;
     let framing = Framing::of(shot.header.size_px, options);
     let Shot { header, lens, .. } = shot;
     Ok(format!(
-        "decoding {DECODING} of {name}: image {image:08x} {header:?}, mask {mask:08x?}, {lens:?}, {framing:?}, {:?}",
+        "decoding {DECODING} of {name}: image {image:08x} {header:?}, masks {masks:08x?}, {lens:?}, {framing:?}, {:?}",
         options.background
     ))
 }

@@ -5,10 +5,49 @@ use std::path::{Path, PathBuf};
 use super::model::ModelEncoding;
 use super::{binary, text};
 use crate::dataset::listing::Note;
-use crate::dataset::{DatasetError, text_file};
+use crate::dataset::{DatasetError, image_folder, text_file};
 
 /// Where models are looked for, in this order: directly and in numbered folders.
-const MODEL_FOLDERS: [&str; 2] = ["sparse", "colmap/sparse"];
+const PLACES: [Place; 6] = [
+    Place { root: "", models: "sparse", images: None },
+    Place { root: "", models: "colmap/sparse", images: None },
+    // Beside the images themselves.
+    Place { root: "", models: "", images: None },
+    // Of the photographs before they were undistorted, as the scripts of this field leave it.
+    Place { root: "", models: "distorted/sparse", images: Some("input") },
+    // What COLMAP's automatic reconstruction and `image_undistorter` leave: photographs of their own.
+    Place { root: "dense/0", models: "sparse", images: None },
+    Place { root: "dense", models: "sparse", images: None },
+];
+
+/// A place of models, below the capture's folder.
+struct Place {
+    /// Where the folders of images and of masks lie.
+    root: &'static str,
+    /// Below the root.
+    models: &'static str,
+    /// The folder of the images that the models are of, where it is another than usual.
+    images: Option<&'static str>,
+}
+
+impl Place {
+    /// The models there.
+    fn models(&self, folder: &Path) -> Vec<ModelFiles> {
+        let root = folder.join(self.root);
+        // A folder of models is no capture.
+        if self.models.is_empty() && !image_folder::is_there(&root) {
+            return Vec::new();
+        }
+        models_in(&root.join(self.models))
+    }
+}
+
+/// A model, the folder that its images lie in or below, and which of the folders there where it is another than usual.
+pub(super) struct Chosen {
+    pub(super) model: ModelFiles,
+    pub(super) root: PathBuf,
+    pub(super) images: Option<&'static str>,
+}
 
 /// A sparse model on disk.
 pub(super) struct ModelFiles {
@@ -58,27 +97,35 @@ fn models_in(models: &Path) -> Vec<ModelFiles> {
 
 /// Whether a model lies in `sparse`, or in any folder that is looked into.
 pub(in crate::dataset) fn has_model(folder: &Path, only_in_sparse: bool) -> bool {
-    let n = if only_in_sparse { 1 } else { MODEL_FOLDERS.len() };
-    MODEL_FOLDERS[..n].iter().any(|models| !models_in(&folder.join(models)).is_empty())
+    let n = if only_in_sparse { 1 } else { PLACES.len() };
+    PLACES[..n].iter().any(|place| !place.models(folder).is_empty())
 }
 
 /// The model with the number `wanted`, or the one that poses the most images, the first of equals; says what else there is.
 ///
 /// # Errors
 /// [`DatasetError::ModelNumber`] where that number is not there, [`DatasetError::NoModel`] where no model is.
-pub(super) fn choose(folder: &Path, wanted: Option<u32>, notes: &mut Vec<Note>) -> Result<ModelFiles, DatasetError> {
-    let mut models = MODEL_FOLDERS
-        .iter()
-        .map(|models| models_in(&folder.join(models)))
-        .find(|models| !models.is_empty())
-        .unwrap_or_default();
-    if let Some(wanted) = wanted {
+pub(super) fn choose(folder: &Path, wanted: Option<u32>, notes: &mut Vec<Note>) -> Result<Chosen, DatasetError> {
+    let mut places = PLACES.iter().map(|place| (place, place.models(folder)));
+    let Some((place, models)) = places.find(|(_, models)| !models.is_empty()) else {
+        return Err(DatasetError::NoModel { path: folder.to_owned() });
+    };
+    let root = if place.root.is_empty() { folder.to_owned() } else { folder.join(place.root) };
+    let images = place.images.filter(|images| root.join(images).is_dir());
+    let model = if let Some(wanted) = wanted {
         let present: Vec<u32> = models.iter().filter_map(|model| model.number).collect();
         let found = models.into_iter().find(|model| model.number == Some(wanted));
-        return found.ok_or_else(|| DatasetError::ModelNumber { path: folder.to_owned(), wanted, present });
-    }
+        found.ok_or_else(|| DatasetError::ModelNumber { path: folder.to_owned(), wanted, present })?
+    } else {
+        largest(models, notes)
+    };
+    Ok(Chosen { model, root, images })
+}
+
+/// The model that poses the most images, of at least one; says what else there is.
+fn largest(mut models: Vec<ModelFiles>, notes: &mut Vec<Note>) -> ModelFiles {
     if models.len() < 2 {
-        return models.pop().ok_or_else(|| DatasetError::NoModel { path: folder.to_owned() });
+        return models.swap_remove(0);
     }
     let counts: Vec<usize> = models.iter().map(ModelFiles::n_images).collect();
     let most = counts.iter().copied().max().unwrap_or(0);
@@ -94,5 +141,5 @@ pub(super) fn choose(folder: &Path, wanted: Option<u32>, notes: &mut Vec<Note>) 
         number(&models[largest])
     );
     notes.push(Note::new("several-models", text));
-    Ok(models.swap_remove(largest))
+    models.swap_remove(largest)
 }

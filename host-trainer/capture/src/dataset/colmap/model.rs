@@ -51,7 +51,7 @@ pub(super) struct ModelFault {
 /// COLMAP's camera models: number in binary files, name in text files, count of parameters.
 ///
 /// From COLMAP's documentation, "Camera Models"; the counts are needed to step over models that are refused.
-pub(super) const CAMERA_MODELS: [(u32, &str, usize); 12] = [
+pub(super) const CAMERA_MODELS: [(u32, &str, usize); 18] = [
     (0, "SIMPLE_PINHOLE", 3),
     (1, "PINHOLE", 4),
     (2, "SIMPLE_RADIAL", 4),
@@ -64,6 +64,12 @@ pub(super) const CAMERA_MODELS: [(u32, &str, usize); 12] = [
     (9, "RADIAL_FISHEYE", 5),
     (10, "THIN_PRISM_FISHEYE", 12),
     (11, "RAD_TAN_THIN_PRISM_FISHEYE", 16),
+    (12, "SIMPLE_DIVISION", 4),
+    (13, "DIVISION", 5),
+    (14, "SIMPLE_FISHEYE", 3),
+    (15, "FISHEYE", 4),
+    (16, "EUCM", 6),
+    (17, "EQUIRECTANGULAR", 2),
 ];
 
 impl ModelCamera {
@@ -93,6 +99,9 @@ impl ModelCamera {
             ("OPENCV_FISHEYE", &[fx, fy, cx, cy, k1, k2, k3, k4]) => fisheye([fx, fy], [cx, cy], [k1, k2, k3, k4]),
             ("SIMPLE_RADIAL_FISHEYE", &[f, cx, cy, k]) => fisheye([f; 2], [cx, cy], [k, 0.0, 0.0, 0.0]),
             ("RADIAL_FISHEYE", &[f, cx, cy, k1, k2]) => fisheye([f; 2], [cx, cy], [k1, k2, 0.0, 0.0]),
+            // Equidistant, without distortion.
+            ("SIMPLE_FISHEYE", &[f, cx, cy]) => fisheye([f; 2], [cx, cy], [0.0; 4]),
+            ("FISHEYE", &[fx, fy, cx, cy]) => fisheye([fx, fy], [cx, cy], [0.0; 4]),
             _ => None,
         };
         Some(Self { model: model.to_owned(), lens })

@@ -63,34 +63,61 @@ pub(super) fn cameras(text: &str) -> Result<BTreeMap<u32, ModelCamera>, ModelFau
 }
 
 /// `images.txt`, `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME` and a line of observations, which may be empty.
+///
+/// A line of observations is told by its grammar, `X Y POINT3D_ID` again and again: the third of a pose is no whole number, nor is a
+/// name. A file without any, as some programs write it, holds poses alone.
 pub(super) fn images(text: &str) -> Result<Vec<ModelImage>, ModelFault> {
     let mut images = Vec::new();
-    let mut lines = text.lines().enumerate().map(|(i, line)| (i + 1, line.trim()));
+    let (mut has_observations, mut first_without) = (false, None);
+    let mut lines = text.lines().enumerate().map(|(i, line)| (i + 1, line)).peekable();
     while let Some((line, record)) = lines.next() {
-        if !is_record(record) {
+        if !is_record(record.trim()) {
             continue;
         }
-        let mut words = record.split_whitespace();
-        let _image_id: u32 = next(&mut words, line, "image number")?;
-        let quaternion_wxyz = next_f64s(&mut words, line, "quaternion")?;
-        let translation = next_f64s(&mut words, line, "translation")?;
-        let camera_id = next(&mut words, line, "camera number")?;
-        // A name may hold spaces.
-        let name = words.collect::<Vec<_>>().join(" ");
-        if name.is_empty() {
-            return Err(fault(line, "the line ends where the name is needed".to_owned()));
-        }
-        images.push(ModelImage { name, quaternion_wxyz, translation, camera_id });
-        if let Some((line, observations)) = lines.next() {
-            let n = observations.split_whitespace().count();
-            if !n.is_multiple_of(3) {
-                let found =
-                    format!("{n} numbers of observations, needed: 3 for each; one of an image's two lines is missing");
-                return Err(fault(line, found));
-            }
+        images.push(image(line, record)?);
+        if let Some((_, next)) = lines.next_if(|(_, next)| next.trim().is_empty() || are_observations(next)) {
+            has_observations |= !next.trim().is_empty();
+        } else if let Some((line, next)) = lines.peek().filter(|(_, next)| is_record(next.trim())) {
+            first_without.get_or_insert((*line, next.split_whitespace().count()));
         }
     }
-    Ok(images)
+    match first_without.filter(|_| has_observations) {
+        Some((line, n)) => {
+            let found =
+                format!("{n} numbers of observations, needed: 3 for each; one of an image's two lines is missing");
+            Err(fault(line, found))
+        }
+        None => Ok(images),
+    }
+}
+
+/// A line of a pose. The name is all that stands behind the nine numbers, with the spaces in it.
+fn image(line: usize, record: &str) -> Result<ModelImage, ModelFault> {
+    const N_NUMBERS: usize = 9;
+    let mut rest = record.trim();
+    let mut numbers = Vec::with_capacity(N_NUMBERS);
+    while numbers.len() < N_NUMBERS && !rest.is_empty() {
+        let (word, behind) = rest.split_once(char::is_whitespace).unwrap_or((rest, ""));
+        numbers.push(word);
+        rest = behind.trim_start();
+    }
+    let mut words = numbers.into_iter();
+    let _image_id: u32 = next(&mut words, line, "image number")?;
+    let quaternion_wxyz = next_f64s(&mut words, line, "quaternion")?;
+    let translation = next_f64s(&mut words, line, "translation")?;
+    let camera_id = next(&mut words, line, "camera number")?;
+    if rest.is_empty() {
+        return Err(fault(line, "the line ends where the name is needed".to_owned()));
+    }
+    Ok(ModelImage { name: rest.to_owned(), quaternion_wxyz, translation, camera_id })
+}
+
+fn are_observations(line: &str) -> bool {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    words.len().is_multiple_of(3)
+        && words.chunks_exact(3).all(|triple| {
+            triple[..2].iter().all(|word| word.parse::<f64>().is_ok()) && triple[2].parse::<i64>().is_ok()
+        })
 }
 
 /// `points3D.txt`, `POINT3D_ID X Y Z R G B ERROR TRACK…`: positions.
@@ -102,4 +129,33 @@ pub(super) fn points(text: &str) -> Result<Vec<DVec3>, ModelFault> {
             Ok(DVec3::from_array(next_f64s(&mut words, line, "coordinate")?))
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const POSE: &str = "0.5 0.5 -0.5 0.5 1.25 0 4.031 1";
+
+    fn names(text: &str) -> Result<Vec<String>, String> {
+        images(text).map(|images| images.into_iter().map(|image| image.name).collect()).map_err(|fault| fault.found)
+    }
+
+    #[test]
+    fn names_hold_any_number_of_words_and_spaces() {
+        for name in ["a.jpg", "my photo.jpg", "my photo 1.jpg", "a  b.jpg", "a b c d e.jpg", "1 2 3.jpg", "café.jpg"] {
+            for observations in ["\n", "\n1.5 2.5 -1\n", "\n1.5 2.5 -1 3 4 17\r\n", "\n\n"] {
+                let text = format!("# comment\n1 {POSE} {name}{observations}2 {POSE} {name}{observations}");
+                assert_eq!(names(&text), Ok(vec![name.to_owned(); 2]), "{text:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn one_missing_line_of_observations_is_told() {
+        let text = format!("1 {POSE} my photo 1.jpg\n1.5 2.5 -1\n2 {POSE} my photo 2.jpg\n3 {POSE} my photo 3.jpg\n");
+        let found = names(&text).expect_err("a line is missing");
+        assert!(found.ends_with("one of an image's two lines is missing"), "{found}");
+        assert_eq!(names(&format!("1 {POSE}\n")), Err("the line ends where the name is needed".to_owned()));
+    }
 }

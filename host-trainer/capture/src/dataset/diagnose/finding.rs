@@ -22,6 +22,7 @@ pub struct Finding {
     /// What to do about it; empty where nothing needs to be done.
     pub remedy: String,
     /// The files it is about, all of them.
+    #[serde(serialize_with = "super::all_as_shown")]
     pub files: Vec<PathBuf>,
     /// The numbers behind the message.
     pub numbers: BTreeMap<&'static str, f64>,

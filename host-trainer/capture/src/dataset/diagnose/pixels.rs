@@ -1,56 +1,72 @@
 //! Findings that need the pixels.
 
+use std::path::PathBuf;
+
 use rayon::prelude::*;
+use serde::Serialize;
 
 use super::Finding;
 use crate::dataset::listing::{ListedView, Listing, Shot};
-use crate::dataset::{LoadOptions, Photograph, Severity};
+use crate::dataset::looks::{Look, Looks, MIN_COUNTED_SHARE};
+use crate::dataset::{LoadOptions, Severity};
 
-/// A view of which less than this share counts hardly constrains anything.
-const MIN_COUNTED_SHARE: f64 = 0.1;
-
-/// What a decoded view looks like.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::dataset) enum Look {
-    Sound,
-    Flat,
-    MostlyMasked,
+/// A view of which masks leave out some pixels.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MaskedView {
+    /// As the capture names it.
+    pub name: String,
+    /// The files of its masks.
+    #[serde(serialize_with = "super::all_as_shown")]
+    pub masks: Vec<PathBuf>,
+    /// Pixels that they leave out.
+    pub n_masked_px: u64,
+    /// All pixels of the photograph.
+    pub n_px: u64,
 }
 
-impl Look {
-    pub(in crate::dataset) fn of(photograph: &Photograph) -> Self {
-        let first = &photograph.image.rgb[..3];
-        let mask = photograph.mask.as_ref();
-        let counted_share = mask.map_or(1.0, |mask| mask.n_valid() as f64 / mask.valid.len() as f64);
-        if photograph.image.rgb.chunks_exact(3).all(|pixel| pixel == first) {
-            Self::Flat
-        } else if counted_share < MIN_COUNTED_SHARE {
-            Self::MostlyMasked
-        } else {
-            Self::Sound
-        }
+impl MaskedView {
+    /// Share of the pixels that are left out.
+    pub fn share(&self) -> f64 {
+        self.n_masked_px as f64 / self.n_px.max(1) as f64
     }
 }
 
-/// Decodes every image; views that fail become faults of the listing.
-pub(super) fn check(listing: &mut Listing, options: &LoadOptions, findings: &mut Vec<Finding>) {
-    let decode = |listed: &mut ListedView| match listed.shot.as_ref().ok()?.read(options) {
-        Ok(photo) => Some(Look::of(&photo.photograph)),
-        Err(fault) => {
-            listed.shot = Err(fault);
-            None
+/// A single mask may have nothing to hide; so many that hide nothing are no masks.
+const MIN_EMPTY_MASKS: usize = 3;
+
+/// Decodes every image; views that fail become faults of the listing. Returns the views with masks.
+pub(super) fn check(listing: &mut Listing, options: &LoadOptions, findings: &mut Vec<Finding>) -> Vec<MaskedView> {
+    let decode = |listed: &mut ListedView| {
+        let shot = listed.shot.as_ref().ok()?;
+        match shot.read(options) {
+            Ok(photo) => {
+                let n_px = u64::from(shot.header.size_px.0) * u64::from(shot.header.size_px.1);
+                let masked = photo.n_masked_px.map(|n_masked_px| MaskedView {
+                    name: listed.name.clone(),
+                    masks: shot.masks.iter().map(|mask| mask.path.clone()).collect(),
+                    n_masked_px,
+                    n_px,
+                });
+                Some((photo.looks, masked))
+            }
+            Err(fault) => {
+                listed.shot = Err(fault);
+                None
+            }
         }
     };
     // Of the sound views, in their order.
-    let looks: Vec<Look> = listing.views.par_iter_mut().filter_map(decode).collect();
+    let decoded: Vec<(Looks, Option<MaskedView>)> = listing.views.par_iter_mut().filter_map(decode).collect();
+    let (looks, masked): (Vec<Looks>, Vec<Option<MaskedView>>) = decoded.into_iter().unzip();
     findings.extend(doubts(&listing.sound().zip(looks).collect::<Vec<_>>()));
+    masked.into_iter().flatten().collect()
 }
 
-/// What decoded views look like.
-pub(in crate::dataset) fn doubts(views: &[((&str, &Shot), Look)]) -> Vec<Finding> {
+/// What the pixels of views make doubtful.
+pub(in crate::dataset) fn doubts(views: &[((&str, &Shot), Looks)]) -> Vec<Finding> {
     let mut findings = Vec::new();
     let views_of = |look: Look| -> Vec<(&str, &Shot)> {
-        views.iter().filter(|(_, found)| *found == look).map(|(view, _)| *view).collect()
+        views.iter().filter(|(_, looks)| looks.look == look).map(|(view, _)| *view).collect()
     };
     findings.extend(Finding::about(
         &views_of(Look::Flat),
@@ -66,5 +82,12 @@ pub(in crate::dataset) fn doubts(views: &[((&str, &Shot), Look)]) -> Vec<Finding
         &format!("images of which less than {} % counts", 100.0 * MIN_COUNTED_SHARE),
         "check the distortion coefficients and the masks",
     ));
+    let masked: Vec<_> = views.iter().filter(|((_, shot), _)| !shot.masks.is_empty()).collect();
+    if masked.len() >= MIN_EMPTY_MASKS && masked.iter().all(|(_, looks)| !looks.leaves_out) {
+        let message = format!("none of the masks of {} images leaves out a pixel", masked.len());
+        let remedy = "make what does not count black or transparent in them, or take them out";
+        let files = masked.iter().flat_map(|((_, shot), _)| shot.masks.iter().map(|mask| mask.path.clone()));
+        findings.push(Finding::new(Severity::Warning, "empty-masks", message, remedy).files(files));
+    }
     findings
 }

@@ -4,6 +4,8 @@ use std::path::Path;
 
 use glam::DVec3;
 
+use pocketsplat_files::shown;
+
 use super::Finding;
 use crate::dataset::Severity;
 use crate::dataset::apart::{Spread, quantile};
@@ -33,7 +35,7 @@ pub(super) fn check(listing: &Listing, centres: &[DVec3], findings: &mut Vec<Fin
         let message = format!(
             "`{}`: {n_lost} of {} points have a coordinate that is no finite number, the first is point {first} (counted \
              from 0): {}, needed: finite numbers",
-            path.display(),
+            shown(path),
             points.len(),
             points[first]
         );
@@ -45,7 +47,7 @@ pub(super) fn check(listing: &Listing, centres: &[DVec3], findings: &mut Vec<Fin
     if points.len() < FEW_POINTS {
         let message = format!(
             "`{}` holds {} points, needed: at least {FEW_POINTS} to outline a scene",
-            path.display(),
+            shown(path),
             points.len()
         );
         let remedy = "reconstruct again with more matches, or take the file out to start from random points";
@@ -63,7 +65,7 @@ pub(super) fn check(listing: &Listing, centres: &[DVec3], findings: &mut Vec<Fin
         let message = format!(
             "only {:.0} % of the points of `{}` fall into an image, needed: at least {:.0} %, so points and poses do not fit",
             100.0 * share,
-            path.display(),
+            shown(path),
             100.0 * MIN_SEEN_SHARE
         );
         let remedy = "use points and poses of one reconstruction, in one frame and one unit";

@@ -3,14 +3,18 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use pocketsplat_files::shown;
+
 use super::Finding;
-use crate::dataset::assemble::MIN_TRAIN_VIEWS;
-use crate::dataset::error::first_few;
+use crate::dataset::error::{MIN_TRAIN_VIEWS, first_few, more_training_views};
 use crate::dataset::listing::{ListedView, Listing, commonest};
-use crate::dataset::{Severity, Split};
+use crate::dataset::{LoadOptions, Severity, Split};
 
 /// With fewer views than this, most places are seen from too few sides to be more than guessed.
 const FEW_TRAIN_VIEWS: usize = 20;
+
+/// Focal lengths differ by more than this factor only where pixels are no squares.
+const MAX_FOCAL_RATIO: f64 = 1.25;
 
 /// What a report on loading names by itself.
 pub(super) fn not_used(listing: &Listing, findings: &mut Vec<Finding>) {
@@ -18,11 +22,12 @@ pub(super) fn not_used(listing: &Listing, findings: &mut Vec<Finding>) {
     unposed(listing, findings);
 }
 
-pub(super) fn check(listing: &Listing, findings: &mut Vec<Finding>) {
-    counts(listing, findings);
+pub(super) fn check(listing: &Listing, options: &LoadOptions, findings: &mut Vec<Finding>) {
+    counts(listing, listing.n_held_out_by(options.test_every), findings);
     repeated_names(listing, findings);
     lenses(listing, findings);
     alpha(listing, findings);
+    depth_maps(listing, findings);
     orientation(listing, findings);
     sizes(listing, findings);
 }
@@ -47,23 +52,23 @@ fn left_out(listing: &Listing, findings: &mut Vec<Finding>) {
     }
 }
 
-fn counts(listing: &Listing, findings: &mut Vec<Finding>) {
+/// * `held_out`: views that could be trained on but for `--test-every`.
+fn counts(listing: &Listing, held_out: usize, findings: &mut Vec<Finding>) {
     let (usable, listed) = (listing.shots(Split::Train).count(), listing.n_listed(Split::Train));
     let (severity, code, needed, remedy) = if usable < MIN_TRAIN_VIEWS {
-        let remedy = "repair the views that were left out, or take more photographs";
-        (Severity::Error, "too-few-views", MIN_TRAIN_VIEWS, remedy)
+        (Severity::Error, "too-few-views", MIN_TRAIN_VIEWS, more_training_views(usable, held_out))
     } else if usable < FEW_TRAIN_VIEWS {
-        let remedy = "take more photographs from other places, overlapping by half";
+        let remedy = "take more photographs from other places, overlapping by half".to_owned();
         (Severity::Warning, "few-views", FEW_TRAIN_VIEWS, remedy)
     } else {
         return;
     };
     let message = format!(
         "`{}`: {usable} of {listed} training views can be used, needed: at least {needed}{}",
-        listing.source.display(),
+        shown(&listing.source),
         if severity == Severity::Error { "" } else { " for a good scene" }
     );
-    let finding = Finding::new(severity, code, message, remedy).files([listing.source.clone()]);
+    let finding = Finding::new(severity, code, message, &remedy).files([listing.source.clone()]);
     findings.push(finding.number("usable", usable as f64).number("needed", needed as f64));
 }
 
@@ -107,6 +112,18 @@ fn lenses(listing: &Listing, findings: &mut Vec<Finding>) {
         let finding = Finding::new(Severity::Note, "distortion", message, "");
         findings.push(finding.number("views", n_distorted as f64).number("largest_shift_px", shift_px));
     }
+    let unequal = |focal_px: [f64; 2]| focal_px[0].max(focal_px[1]) > MAX_FOCAL_RATIO * focal_px[0].min(focal_px[1]);
+    let stretched: Vec<_> = listing.sound().filter(|(_, shot)| unequal(shot.lens.focal_px)).collect();
+    findings.extend(Finding::about(
+        &stretched,
+        Severity::Warning,
+        "focal-lengths",
+        &format!(
+            "images whose focal lengths along x and y differ by more than {:.0} %",
+            100.0 * (MAX_FOCAL_RATIO - 1.0)
+        ),
+        "check fl_x and fl_y: pixels of photographs are square, so they are nearly the same",
+    ));
     let outside: Vec<_> = listing
         .sound()
         .filter(|(_, shot)| {
@@ -145,6 +162,17 @@ fn alpha(listing: &Listing, findings: &mut Vec<Finding>) {
         )
     };
     findings.extend(finding);
+}
+
+fn depth_maps(listing: &Listing, findings: &mut Vec<Finding>) {
+    let like: Vec<_> = listing.sound().filter(|(_, shot)| shot.header.is_depth_like).collect();
+    findings.extend(Finding::about(
+        &like,
+        Severity::Warning,
+        "depth-map",
+        "images of one channel of 16 bit, as depth maps are",
+        "put the photographs in their place, if they are depth maps",
+    ));
 }
 
 fn orientation(listing: &Listing, findings: &mut Vec<Finding>) {

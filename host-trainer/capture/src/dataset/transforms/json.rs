@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use crate::dataset::named_path::NamedPath;
-use crate::dataset::{DatasetError, text_file};
+use crate::dataset::{DatasetError, non_finite, text_file};
 
 /// What a transforms file holds, as far as it is used.
 pub(in crate::dataset) struct Transforms {
@@ -101,18 +101,13 @@ impl Frame {
 /// [`DatasetError::Read`], [`DatasetError::Transforms`], [`DatasetError::FieldOfView`] or [`DatasetError::NoFocal`],
 /// naming the file.
 pub(in crate::dataset) fn read_transforms(path: &Path) -> Result<Transforms, DatasetError> {
-    let text = text_file::read(path).map_err(|source| DatasetError::Read { path: path.to_owned(), source })?;
-    let parsed = parse(&text).or_else(|error| {
-        // Python writes the bare words NaN and Infinity, which JSON lacks; read as null they cost one view, not all.
-        // The first error is the one to tell: its column is right.
-        parse(&null_non_finite(&text)).map_err(|_| error)
-    });
-    let transforms = parsed.map_err(|source| DatasetError::Transforms { path: path.to_owned(), source })?;
+    let text = text_file::read(path).map_err(|source| DatasetError::of_reading(path, source))?;
+    let transforms = non_finite::read(&text, parse).map_err(|source| DatasetError::of_transforms(path, source))?;
     let angle = transforms.shared.camera_angle_x;
     if let Some(found) = angle.filter(|&angle| !(angle > 0.0 && angle < std::f64::consts::PI)) {
         return Err(DatasetError::FieldOfView { path: path.to_owned(), found });
     }
-    let has_focal = |i: &Intrinsics| i.fl_x.is_some() || i.camera_angle_x.is_some();
+    let has_focal = |i: &Intrinsics| [i.fl_x, i.fl_y, i.camera_angle_x, i.camera_angle_y].iter().any(Option::is_some);
     if !has_focal(&transforms.shared)
         && let Some(frame) = transforms.frames.iter().find(|frame| !has_focal(&frame.own))
     {
@@ -127,40 +122,4 @@ fn parse(text: &str) -> serde_json::Result<Transforms> {
     let Contents { mut frames, ply_file_path, train_filenames, val_filenames, test_filenames } = contents;
     frames.iter_mut().for_each(|frame| frame.name = frame.path().name());
     Ok(Transforms { shared, frames, ply_file_path, splits: [train_filenames, val_filenames, test_filenames] })
-}
-
-/// Replaces the bare words `NaN`, `Infinity` and `-Infinity` outside strings by `null`.
-fn null_non_finite(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    let mut inside_string = false;
-    let mut rest = text;
-    while let Some(c) = rest.chars().next() {
-        let word = ["NaN", "-Infinity", "Infinity"].into_iter().find(|word| !inside_string && rest.starts_with(word));
-        let taken = match word {
-            Some(word) => {
-                out.push_str("null");
-                word.len()
-            }
-            None => {
-                // A backslash takes the next character with it, so that \" does not end the string.
-                let escaped = if c == '\\' { rest[1..].chars().next().map_or(0, char::len_utf8) } else { 0 };
-                inside_string ^= c == '"';
-                out.push_str(&rest[..c.len_utf8() + escaped]);
-                c.len_utf8() + escaped
-            }
-        };
-        rest = &rest[taken..];
-    }
-    out
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn only_bare_words_become_null() {
-        let text = r#"{"a \" NaN": [NaN, -Infinity, Infinity], "é\\": NaN}"#;
-        assert_eq!(null_non_finite(text), r#"{"a \" NaN": [null, null, null], "é\\": null}"#);
-    }
 }

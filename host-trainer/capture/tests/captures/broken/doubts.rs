@@ -221,17 +221,6 @@ pub(super) fn cases() -> Vec<Case> {
             },
         ),
         case(
-            "a distortion beyond sense",
-            Nerfstudio,
-            Doubt,
-            "mostly-masked",
-            &["images of which less than 10 % counts: 12"],
-            |f| {
-                f.shared.push_str(", \"k1\": 500.0");
-                f.write_files();
-            },
-        ),
-        case(
             "images of several sizes",
             ColmapText,
             Doubt,

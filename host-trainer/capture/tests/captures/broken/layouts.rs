@@ -22,12 +22,12 @@ pub(super) fn cases() -> Vec<Case> {
             "no-capture",
             &[
                 "/images` holds 12 photographs but no poses; make poses with COLMAP and give this folder again:\n  colmap \
-                 feature_extractor --database_path '",
-                "/images' --ImageReader.single_camera 1",
-                "\n  colmap exhaustive_matcher --database_path '",
-                "\n  mkdir -p '",
-                "\n  colmap mapper --database_path '",
-                "/sparse'",
+                 feature_extractor --database_path /",
+                "/images --ImageReader.single_camera 1",
+                "\n  colmap exhaustive_matcher --database_path /",
+                "\n  mkdir -p /",
+                "\n  colmap mapper --database_path /",
+                "/sparse",
             ],
             |_| {},
         ),
@@ -69,7 +69,7 @@ pub(super) fn cases() -> Vec<Case> {
             Nerfstudio,
             Fatal,
             "no-capture",
-            &["/walk.MOV` is a film, needed: photographs with poses; take 2 photographs a second", "ffmpeg -i '"],
+            &["/walk.MOV` is a film, needed: photographs with poses; take 2 photographs a second", "ffmpeg -i /"],
             |f| {
                 std::fs::remove_dir_all(f.at("images")).expect("images");
                 f.write("walk.MOV", "");
@@ -80,7 +80,7 @@ pub(super) fn cases() -> Vec<Case> {
             Nerfstudio,
             Fatal,
             "no-capture",
-            &["/shoe.r3d` is a packed capture, needed: its files; unpack it", "unzip '", "/shoe.r3d' -d '"],
+            &["/shoe.r3d` is a packed capture, needed: its files; unpack it", "unzip /", "/shoe.r3d -d /"],
             |f| {
                 std::fs::remove_dir_all(f.at("images")).expect("images");
                 f.write("shoe.r3d", "");

@@ -26,6 +26,31 @@ pub(super) fn cases() -> Vec<Case> {
             |f| f.write_files().write("sparse/0/cameras.bin", ""),
         ),
         case(
+            "a pointer of Git LFS for a model",
+            ColmapBinary,
+            Fatal,
+            "bad-model",
+            &[
+                "images.bin` is a Git LFS pointer, not the file itself, needed: the file of a reconstruction; run `git lfs pull`",
+            ],
+            |f| {
+                f.write_files()
+                    .write("sparse/0/images.bin", "version https://git-lfs.github.com/spec/v1\noid sha256:0\n")
+            },
+        ),
+        case(
+            "an equirectangular camera",
+            ColmapBinary,
+            Fatal,
+            "camera-model",
+            &["camera 1 has the camera model `EQUIRECTANGULAR`, needed: PINHOLE", "image_undistorter"],
+            |f| {
+                f.cameras[0].model.0 = 17;
+                f.cameras[0].parameters.truncate(2);
+                f.write_files();
+            },
+        ),
+        case(
             "a hostile count of cameras",
             ColmapBinary,
             Fatal,
@@ -82,7 +107,7 @@ pub(super) fn cases() -> Vec<Case> {
             ColmapBinary,
             Fatal,
             "bad-model",
-            &["cameras.bin`: camera 1 of 1, byte 32: the camera model has the number 77, known: 0 to 11"],
+            &["cameras.bin`: camera 1 of 1, byte 32: the camera model has the number 77, known: 0 to 17"],
             |f| {
                 f.cameras[0].model.0 = 77;
                 f.write_files();

@@ -2,7 +2,10 @@
 
 use super::Harm::Nothing;
 use super::{Case, case, edit};
-use crate::exports::{NSVF_MATRIX, write_nsvf, write_polycam, write_record3d};
+use crate::exports::{
+    NSVF_MATRIX, write_bundler, write_llff, write_metashape, write_nsvf, write_opensfm, write_polycam,
+    write_realitycapture, write_record3d,
+};
 use crate::fixture::Kind::{Blender, ColmapBinary, ColmapText, Nerfstudio};
 use crate::fixture::{Fixture, SIZE_PX};
 
@@ -15,6 +18,8 @@ pub(super) fn cases() -> Vec<Case> {
     let mut cases = paths();
     cases.extend(texts());
     cases.extend(layouts());
+    cases.extend(names());
+    cases.extend(masks());
     cases
 }
 
@@ -219,10 +224,198 @@ fn layouts() -> Vec<Case> {
         case("a raw capture of NSVF", Nerfstudio, Nothing, "unposed-image", &["NSVF capture", "warnings: 1,"], |f| {
             write_nsvf(f, NSVF_MATRIX, |_| "");
         }),
+        case(
+            "a model beside the images",
+            ColmapBinary,
+            Nothing,
+            "unposed-image",
+            &["COLMAP capture", "warnings: 1,"],
+            |f| {
+                f.write_files();
+                for name in ["cameras.bin", "images.bin", "points3D.bin"] {
+                    std::fs::rename(f.at("sparse/0").join(name), f.at(name)).expect("written");
+                }
+                std::fs::remove_dir_all(f.at("sparse")).expect("empty");
+            },
+        ),
+        case("a model of the distorted photographs", ColmapText, Nothing, "unposed-image", &["warnings: 1,"], |f| {
+            std::fs::create_dir(f.write_files().at("distorted")).expect("a folder");
+            std::fs::rename(f.at("sparse"), f.at("distorted/sparse")).expect("written");
+            std::fs::rename(f.at("images"), f.at("input")).expect("a folder");
+            // Of the undistorted ones, which are of another shape.
+            f.write_image("images/p_00.png", (20, 20));
+        }),
+        case(
+            "a dense reconstruction",
+            ColmapBinary,
+            Nothing,
+            "unposed-image",
+            &["COLMAP capture", "warnings: 1,"],
+            |f| {
+                f.write_files();
+                std::fs::create_dir_all(f.at("dense/0")).expect("a folder");
+                std::fs::rename(f.at("sparse/0"), f.at("dense/0/sparse")).expect("written");
+                std::fs::remove_dir(f.at("sparse")).expect("empty");
+                std::fs::rename(f.at("images"), f.at("dense/0/images")).expect("a folder");
+            },
+        ),
+        case("a plain fisheye", ColmapBinary, Nothing, "bad-model", &["images with lens distortion: 12"], |f| {
+            f.cameras[0].model = (14, "SIMPLE_FISHEYE");
+            f.cameras[0].parameters = vec![20.0, 12.0, 8.0];
+            f.write_files();
+        }),
+        case("a plain fisheye of two focal lengths", ColmapText, Nothing, "camera-model", &["distortion: 12"], |f| {
+            f.cameras[0].model = (15, "FISHEYE");
+            f.cameras[0].parameters = vec![20.0, 21.0, 12.0, 8.0];
+            f.write_files();
+        }),
+        case("corrected folders of Polycam that are empty", Nerfstudio, Nothing, "too-few-views", &["Polycam"], |f| {
+            write_polycam(f, "cameras", "images");
+            f.write("keyframes/corrected_cameras/.keep", "");
+            f.write("keyframes/corrected_images/.keep", "");
+        }),
+        case(
+            "cameras of Metashape",
+            Nerfstudio,
+            Nothing,
+            "unposed-image",
+            &["Metashape capture", "warnings: 1,"],
+            |f| {
+                write_metashape(f, "frame");
+            },
+        ),
+        case(
+            "a table of RealityCapture",
+            Nerfstudio,
+            Nothing,
+            "unposed-image",
+            &["RealityCapture", "warnings: 1,"],
+            |f| {
+                write_realitycapture(f);
+            },
+        ),
+        case("a capture of LLFF", Nerfstudio, Nothing, "unposed-image", &["LLFF capture", "warnings: 1,"], |f| {
+            write_llff(f, "<f8", |number| number.to_le_bytes().to_vec());
+        }),
+        case("a model of Bundler", Nerfstudio, Nothing, "no-points", &["Bundler capture", "warnings: 1,"], |f| {
+            write_bundler(f);
+        }),
+        case("a model of OpenSfM", Nerfstudio, Nothing, "no-points", &["OpenSfM capture", "several-models"], |f| {
+            write_opensfm(f);
+        }),
         case("a rational lens", ColmapText, Nothing, "camera-model", &["images with lens distortion: 12"], |f| {
             f.cameras[0].model = (6, "FULL_OPENCV");
             f.cameras[0].parameters = vec![20.0, 20.0, 12.0, 8.0, 0.1, 0.0, 0.0, 0.0, 0.0, 0.1, 0.0, 0.0];
             f.write_files();
+        }),
+    ]
+}
+
+/// Renames all photographs on the disk.
+fn rename(fixture: &Fixture, name: impl Fn(usize) -> String) {
+    for i in 0..super::N_VIEWS {
+        std::fs::rename(fixture.at(&format!("images/p_{i:02}.png")), fixture.at("images").join(name(i)))
+            .expect("written");
+    }
+}
+
+/// Renames them in the model.
+fn rename_in_model(fixture: &mut Fixture, name: impl Fn(usize) -> String) {
+    fixture.photos.iter_mut().enumerate().for_each(|(i, photo)| photo.name = name(i));
+    fixture.write_files();
+}
+
+const DECOMPOSED: &str = "Ba\u{308}ckerei";
+
+fn names() -> Vec<Case> {
+    vec![
+        case("names decomposed on the disk", ColmapText, Nothing, "missing-image", &["the form of Unicode: 12"], |f| {
+            rename(f, |i| format!("{DECOMPOSED}_{i:02}.png"));
+            rename_in_model(f, |i| format!("Bäckerei_{i:02}.png"));
+        }),
+        case("folders decomposed on the disk", ColmapBinary, Nothing, "missing-image", &["warnings: 1,"], |f| {
+            std::fs::create_dir(f.at("images").join(DECOMPOSED)).expect("a folder");
+            rename(f, |i| format!("{DECOMPOSED}/p_{i:02}.png"));
+            rename_in_model(f, |i| format!("Bäckerei/p_{i:02}.png"));
+        }),
+        case("names in another case", Nerfstudio, Nothing, "missing-image", &["upper and lower case", ": 12"], |f| {
+            rename(f, |i| format!("P_{i:02}.PNG"));
+            f.write_files();
+        }),
+        case("a HEIC beside its conversion", ColmapText, Nothing, "image-format", &["warnings: 1,"], |f| {
+            rename(f, |i| format!("IMG_{i:02}.png"));
+            rename_in_model(f, |i| format!("IMG_{i:02}.JPG"));
+            f.photos.iter().for_each(|photo| f.write(&format!("images/{}", photo.name), b"\0\0\0\x18ftypheic"));
+        }),
+        case(
+            "depth maps beside the photographs",
+            ColmapText,
+            Nothing,
+            "unposed-image",
+            &["their name with another ending: 12 (`p_00.webp` is read, not `p_00.png`"],
+            |f| {
+                rename_in_model(f, |i| format!("p_{i:02}.jpg"));
+                for i in 0..super::N_VIEWS {
+                    let depth = f.at(&format!("images/p_{i:02}.png"));
+                    image::open(&depth).expect("written").save(depth.with_extension("webp")).expect("WebP");
+                    let far = [7; (SIZE_PX.0 * SIZE_PX.1 * 2) as usize];
+                    image::save_buffer(depth, &far, SIZE_PX.0, SIZE_PX.1, image::ExtendedColorType::L16).expect("PNG");
+                }
+            },
+        ),
+        case("names of three words without observations", ColmapText, Nothing, "bad-model", &["warnings: 1,"], |f| {
+            rename(f, |i| format!("my  photo {i:02}.png"));
+            rename_in_model(f, |i| format!("my  photo {i:02}.png"));
+            edit(f, "sparse/0/images.txt", |text| {
+                text.lines().filter(|line| line.contains("photo")).map(|line| format!("{line}\n")).collect()
+            });
+        }),
+        case("names of a byte a letter", ColmapText, Nothing, "unreadable-file", &["warnings: 1,"], |f| {
+            rename(f, |i| format!("café_{i:02}.png"));
+            rename_in_model(f, |i| format!("café_{i:02}.png"));
+            let text = String::from_utf8(f.files()[1].1.clone()).expect("text");
+            f.write("sparse/0/images.txt", text.chars().map(|c| c as u8).collect::<Vec<u8>>());
+        }),
+    ]
+}
+
+fn masks() -> Vec<Case> {
+    /// Writes a mask of each photograph whose left third does not count.
+    fn write(f: &Fixture, name: fn(&str) -> String, pixel: fn(bool) -> Vec<u8>, colour: image::ExtendedColorType) {
+        let (width_px, height_px) = SIZE_PX;
+        for photo in &f.photos {
+            let bytes: Vec<u8> =
+                (0..width_px * height_px).flat_map(|i| pixel(3 * (i % width_px) >= width_px)).collect();
+            let path = f.at(&name(&photo.name));
+            std::fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
+            image::save_buffer(path, &bytes, width_px, height_px, colour).expect("an image");
+        }
+    }
+    let says = &["masks: 12 views; of their pixels 33.3 % do not count (least 33.3 % of ", "warnings: 1,"];
+    vec![
+        case("masks in the alpha channel", ColmapText, Nothing, "empty-masks", says, |f| {
+            let pixel = |counts: bool| vec![255, 255, 255, if counts { 255 } else { 0 }];
+            write(f.write_files(), |name| format!("masks/{name}.png"), pixel, image::ExtendedColorType::Rgba8);
+        }),
+        case("masks of 16 bit with 0 and 1", ColmapBinary, Nothing, "bad-mask", says, |f| {
+            let pixel = |counts: bool| u16::from(counts).to_ne_bytes().to_vec();
+            write(f.write_files(), |name| format!("masks/{name}"), pixel, image::ExtendedColorType::L16);
+        }),
+        case("masks of labels", ColmapText, Nothing, "bad-mask", says, |f| {
+            write(
+                f.write_files(),
+                |name| format!("masks/{name}"),
+                |counts| vec![u8::from(counts)],
+                image::ExtendedColorType::L8,
+            );
+        }),
+        case("masks of nearly black and nearly white", ColmapText, Nothing, "empty-masks", says, |f| {
+            let pixel = |counts: bool| vec![if counts { 243 } else { 11 }];
+            write(f.write_files(), |name| format!("masks/{name}"), pixel, image::ExtendedColorType::L8);
+        }),
+        case("dynamic masks of instant-ngp", Nerfstudio, Nothing, "unposed-image", says, |f| {
+            let name = |name: &str| format!("images/dynamic_mask_{name}");
+            write(f.write_files(), name, |counts| vec![if counts { 0 } else { 255 }], image::ExtendedColorType::L8);
         }),
     ]
 }

@@ -1,8 +1,11 @@
 //! Transforms files that are damaged, or say what no view can be made of.
 
 use super::Harm::{Doubt, Fatal};
+use glam::{DMat3, DVec3};
+
 use super::{Case, case, cut};
 use crate::fixture::Kind::{Blender, Nerfstudio};
+use crate::fixture::SIZE_PX;
 
 pub(super) fn cases() -> Vec<Case> {
     vec![
@@ -13,6 +16,80 @@ pub(super) fn cases() -> Vec<Case> {
             "bad-transforms",
             &["transforms.json` is not a transforms file: expected value at line 1 column 1; it needs"],
             |f| f.write("transforms.json", "<html>"),
+        ),
+        case(
+            "a web page",
+            Nerfstudio,
+            Fatal,
+            "bad-transforms",
+            &[
+                "transforms.json` is not a transforms file: ",
+                "; it is a web page: the download failed: fetch the file itself again",
+            ],
+            |f| f.write("transforms.json", "<!DOCTYPE html><html>"),
+        ),
+        case(
+            "a width without a height that fits",
+            Nerfstudio,
+            Fatal,
+            "bad-intrinsics",
+            &["`w` is 48 but `h` is not given, and from the photograph's 24×16 px it would be 32", "needed: `h`"],
+            |f| {
+                f.shared = "\"fl_x\": 40, \"cx\": 24, \"cy\": 24, \"w\": 48".to_owned();
+                f.write_files();
+            },
+        ),
+        case(
+            "poses in OpenCV's axes",
+            Nerfstudio,
+            Doubt,
+            "looking-away",
+            &[
+                "warning[looking-away]: cameras that look away from the point in which their axes meet: 12 of 12",
+                "turn the signs of the second and third column of every `transform_matrix`",
+            ],
+            |f| {
+                let turned = DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0));
+                f.photos.iter_mut().for_each(|photo| photo.rotation *= turned);
+                f.write_files();
+            },
+        ),
+        case(
+            "a folder of masks that no frame names",
+            Nerfstudio,
+            Doubt,
+            "unread-masks",
+            &[
+                "masks` holds images, but no photograph has a mask",
+                "name the mask of each photograph in its frame as `mask_path`",
+            ],
+            |f| {
+                f.write_files().write_mask("masks/p_03.png", SIZE_PX);
+            },
+        ),
+        case(
+            "one mask that several frames name",
+            Nerfstudio,
+            Doubt,
+            "shared-mask",
+            &["masks that several photographs name: 1, as `", "by 2 photographs (images/p_03.png, images/p_04.png)"],
+            |f| {
+                for i in [3, 4] {
+                    f.photos[i].extra = "\"mask_path\": \"masks/hood.png\", ".to_owned();
+                }
+                f.write_files().write_mask("masks/hood.png", SIZE_PX);
+            },
+        ),
+        case(
+            "focal lengths of pixels that are no squares",
+            Nerfstudio,
+            Doubt,
+            "focal-lengths",
+            &["images whose focal lengths along x and y differ by more than 25 %: 1 (images/p_03.png)"],
+            |f| {
+                f.photos[3].extra = "\"fl_y\": 60, ".to_owned();
+                f.write_files();
+            },
         ),
         case("JSON cut", Blender, Fatal, "bad-transforms", &["EOF while parsing", "at line 2 column"], |f| {
             cut(f.write_files(), "transforms_train.json", 300);

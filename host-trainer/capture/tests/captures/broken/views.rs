@@ -5,8 +5,8 @@ use glam::DVec3;
 use super::Harm::{Fatal, Views};
 use super::{Case, N_VIEWS, case, cut, edit, turned_image};
 use crate::exports::{NSVF_MATRIX, write_nsvf, write_polycam, write_record3d};
-use crate::fixture::Camera;
 use crate::fixture::Kind::{Blender, ColmapBinary, ColmapText, Nerfstudio};
+use crate::fixture::{Camera, SIZE_PX};
 
 pub(super) fn cases() -> Vec<Case> {
     vec![
@@ -405,6 +405,124 @@ pub(super) fn cases() -> Vec<Case> {
             |f| {
                 f.photos[2].extra = "\"mask_path\": \"masks/2.png\", ".to_owned();
                 f.write_files().write_image("masks/2.png", (5, 4));
+            },
+        ),
+        case(
+            "a distortion beyond sense",
+            Nerfstudio,
+            Fatal,
+            "bad-intrinsics",
+            &[
+                "0 of 10 training views can be used",
+                "the distortion moves a ray by ",
+                "in an image of 24×16 px, more than half",
+            ],
+            |f| {
+                f.shared.push_str(", \"k1\": 500.0");
+                f.write_files();
+            },
+        ),
+        case(
+            "a distortion of one camera that turns back",
+            ColmapBinary,
+            Views,
+            "bad-intrinsics",
+            &["p_02.png: the distortion turns back at ", "correct the camera's numbers or take the view out"],
+            |f| {
+                let model = (9, "RADIAL_FISHEYE");
+                let parameters = vec![20.0, 12.0, 8.0, 0.5, -4.0];
+                f.cameras.push(Camera { id: 2, model, parameters, ..f.cameras[0].clone() });
+                f.photos[2].camera_id = 2;
+                f.write_files();
+            },
+        ),
+        case(
+            "two photographs of one file",
+            ColmapText,
+            Views,
+            "shared-image",
+            &[
+                "left/p_02.png: its name is `left/p_02.png`, and the file found for it, `",
+                "images/p_02.png`, is also found for `right/p_02.png`, but one file is not two photographs; put each",
+            ],
+            |f| {
+                f.photos[2].name = "left/p_02.png".to_owned();
+                f.photos[3].name = "right/p_02.png".to_owned();
+                f.write_files();
+            },
+        ),
+        case(
+            "two names of one file but for case",
+            Nerfstudio,
+            Views,
+            "shared-image",
+            &["images/P_03.PNG: its name is", "is also found for `./images/p_03.png`"],
+            |f| {
+                f.photos[4].name = "P_03.PNG".to_owned();
+                f.write_files();
+            },
+        ),
+        case(
+            "one mask of two photographs",
+            ColmapBinary,
+            Views,
+            "bad-mask",
+            &["left/p_02.png: its mask `", "masks/p_02.png.png` is also that of `right/p_02.png`"],
+            |f| {
+                for (i, side) in [(2, "left"), (3, "right")] {
+                    f.photos[i].name = format!("{side}/p_02.png");
+                    f.write_image(&format!("images/{side}/p_02.png"), SIZE_PX);
+                }
+                f.write_files().write_mask("masks/p_02.png.png", SIZE_PX);
+            },
+        ),
+        case(
+            "a depth map in place of a photograph",
+            ColmapText,
+            Views,
+            "missing-image",
+            &["p_03.jpg: image missing"],
+            |f| {
+                f.photos[3].name = "p_03.jpg".to_owned();
+                image::save_buffer(f.at("images/p_03.png"), &[9; 24 * 16 * 2], 24, 16, image::ExtendedColorType::L16)
+                    .expect("an image");
+                f.write_files();
+            },
+        ),
+        case(
+            "a pointer of Git LFS",
+            Nerfstudio,
+            Views,
+            "unreadable-image",
+            &[
+                "images/p_05.png: image unreadable: `",
+                "p_05.png`: it is a Git LFS pointer, not the file itself; run `git lfs pull` in its repository, or replace it with a whole PNG",
+            ],
+            |f| {
+                f.write_files()
+                    .write("images/p_05.png", "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n");
+            },
+        ),
+        case(
+            "a frame whose numbers contradict each other",
+            Nerfstudio,
+            Views,
+            "bad-intrinsics",
+            &["images/p_02.png: `fl_x` is 20 px, but `camera_angle_x` makes it 46.996 px in an image of 24 px"],
+            |f| {
+                f.photos[2].extra = "\"fl_x\": 20, \"camera_angle_x\": 0.5, ".to_owned();
+                f.write_files();
+            },
+        ),
+        case(
+            "a pose of Record3D with NaN",
+            Nerfstudio,
+            Views,
+            "bad-pose",
+            &["3.png: `transform_matrix` has NaN in row 0, column 3"],
+            |f| {
+                f.photos[3].centre.x = f64::NAN;
+                write_record3d(f, "metadata", "rgbd", 0);
             },
         ),
         case(

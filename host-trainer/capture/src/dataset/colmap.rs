@@ -137,7 +137,7 @@ fn missing_masks(masks: Option<&Path>, views: &[ListedView]) -> Option<Note> {
 /// The mask of the image `name`: COLMAP appends `.png` to the image's name, others replace its extension.
 fn mask_of(names: &FolderNames, masks: &Path, name: &str) -> Option<MaskFile> {
     let appended = NamedPath::new(&format!("{name}.png")).file(names, masks, None);
-    appended.or_else(|| NamedPath::new(name).image(names, masks, None)).map(MaskFile::new)
+    appended.or_else(|| NamedPath::new(name).mask_in(names, masks)).map(MaskFile::new)
 }
 
 fn shot(

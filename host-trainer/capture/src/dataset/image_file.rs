@@ -34,9 +34,14 @@ pub(super) fn image_at(names: &FolderNames, folder: &Path, name: &str) -> Option
         return Some(path);
     }
     let of_name = names.named(folder, name, Path::is_file);
-    let other = with_other_ending(names, folder, name);
+    let other = with_other_ending(names, folder, name, worth);
     // The photograph before its conversion only where there is no other, for the message that it must be converted.
     other.or(of_name)
+}
+
+/// The mask of this name in a folder, whatever its depth: under another ending as well.
+pub(super) fn mask_at(names: &FolderNames, folder: &Path, name: &str) -> Option<PathBuf> {
+    names.named(folder, name, Path::is_file).or_else(|| with_other_ending(names, folder, name, |_| Some(0)))
 }
 
 /// Whether a picture is of a format that is not read, by its name or its bytes.
@@ -45,8 +50,13 @@ fn needs_conversion(path: &Path) -> bool {
     has_foreign_name || FileKind::of_file(path).ok().flatten().is_some_and(is_foreign)
 }
 
-/// A picture of the same name with another ending.
-fn with_other_ending(names: &FolderNames, folder: &Path, name: &str) -> Option<PathBuf> {
+/// A picture of the same name with another ending, of the highest worth.
+fn with_other_ending(
+    names: &FolderNames,
+    folder: &Path,
+    name: &str,
+    worth: impl Fn(&Path) -> Option<u8>,
+) -> Option<PathBuf> {
     let stem = stem_of(name);
     let entries = names.with_stem(folder, stem);
     let is_candidate = |entry: &Entry| is_image_name(&entry.text) && folder.join(&entry.name).is_file();

@@ -92,7 +92,9 @@ impl Lens {
         }
         let (width_px, height_px) = self.size_px;
         let needed = "needed: coefficients of a calibration that fits, or none";
-        let shift_px = self.largest_shift_px();
+        // A fisheye moves rays by design: from where the one without coefficients shows them.
+        let plain = Self { radial: [0.0; 4], divisor: [0.0; 3], tangential: [0.0; 2], ..self.clone() };
+        let shift_px = self.largest_shift_px_from(|direction| plain.distorted(direction));
         let most_px = 0.5 * f64::from(width_px.max(height_px));
         // NaN is more than anything.
         if !(shift_px <= most_px) {
@@ -193,18 +195,21 @@ impl Lens {
         corners.map(|corner| self.direction(corner)).map(|[x, y]| x * x + y * y).into_iter().fold(0.0, f64::max)
     }
 
-    /// How far the distortion moves a point of the border of the pinhole image at most, pixels; of a fisheye, from where the one
-    /// without coefficients shows it.
+    /// How far the lens moves a point of the border of the pinhole image at most, pixels.
     pub(super) fn largest_shift_px(&self) -> f64 {
+        self.largest_shift_px_from(|direction| direction)
+    }
+
+    /// The same from where something else shows the point.
+    fn largest_shift_px_from(&self, shown: impl Fn([f64; 2]) -> [f64; 2]) -> f64 {
         let (width_px, height_px) = (f64::from(self.size_px.0), f64::from(self.size_px.1));
         let steps = (0..=16).map(|i| f64::from(i) / 16.0);
         let border = steps.flat_map(|t| {
             [[t * width_px, 0.0], [t * width_px, height_px], [0.0, t * height_px], [width_px, t * height_px]]
         });
-        let plain = Self { radial: [0.0; 4], divisor: [0.0; 3], tangential: [0.0; 2], ..self.clone() };
         let shift = |at: [f64; 2]| {
             let direction = self.direction(at);
-            let [from, to] = [&plain, self].map(|lens| lens.pixel(lens.distorted(direction)));
+            let [from, to] = [shown(direction), self.distorted(direction)].map(|at| self.pixel(at));
             (to[0] - from[0]).hypot(to[1] - from[1])
         };
         // Unlike `f64::max` this keeps what is no number.

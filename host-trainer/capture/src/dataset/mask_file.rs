@@ -2,7 +2,7 @@
 //!
 //! One rule for all: what is black or transparent in a mask does not count. The value of a pixel is its brightest channel times its
 //! alpha; where the colours are all the same and alpha is not, alpha alone. Black is up to 15 of 255 (and so of 65535), because a JPEG
-//! writes black so; where a lossless mask has no value above that, it numbers things, and 0 alone is black.
+//! writes black so; where a lossless mask has no value above the middle, it numbers things, and 0 alone is black.
 //! instant-ngp's dynamic masks are the other way round: what is white in them moves and does not count.
 
 use std::path::{Path, PathBuf};
@@ -89,7 +89,7 @@ fn counted(image: &DynamicImage, is_lossy: bool) -> Vec<bool> {
         }
     };
     let brightest = pixels().map(value).max().unwrap_or(0);
-    let black = if !is_lossy && brightest <= u32::from(black) { 0 } else { u32::from(black) };
+    let black = if !is_lossy && brightest <= u32::from(full / 2) { 0 } else { u32::from(black) };
     pixels().map(|pixel| value(pixel) > black).collect()
 }
 
@@ -117,7 +117,8 @@ mod tests {
             ("white on black", vec![0, 255, 0, 255], L8, ".x.x"),
             ("nearly black", vec![15, 240, 3, 255], L8, ".x.x"),
             ("labels of 8 bit", vec![0, 1, 1, 0], L8, ".xx."),
-            ("several labels", vec![0, 1, 2, 15], L8, ".xxx"),
+            ("several labels", vec![0, 1, 2, 40], L8, ".xxx"),
+            ("labels of 16 bit", wide([0, 1, 700, 12]), L16, ".xxx"),
             ("all black", vec![0, 0, 0, 0], L8, "...."),
             ("0 and 1 of 16 bit", wide([0, 1, 1, 0]), L16, ".xx."),
             ("0 and 255 of 16 bit", wide([0, 255, 255, 0]), L16, ".xx."),

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::folder_names::FolderNames;
-use super::image_file::image_at;
+use super::image_file::{image_at, mask_at};
 
 /// Where photographs lie in captures that name them by paths of another machine.
 const IMAGE_FOLDERS: [&str; 2] = ["images", "input"];
@@ -83,12 +83,17 @@ impl<'a> NamedPath<'a> {
         self.find(names, folder, images, |folder, name| image_at(names, folder, name))
     }
 
-    /// The mask that is there: as [`Self::image`], but never by its bare name, for a photograph may have the same.
+    /// The mask of the image of this path in a folder of masks: as [`Self::image`], but as [`mask_at`].
+    pub(super) fn mask_in(&self, names: &FolderNames, masks: &Path) -> Option<PathBuf> {
+        self.find(names, masks, None, |folder, name| mask_at(names, folder, name))
+    }
+
+    /// The mask that is there: as [`Self::mask_in`], but never by its bare name, for a photograph may have the same.
     pub(super) fn mask(&self, names: &FolderNames, folder: &Path) -> Option<PathBuf> {
         let with_folders = (0..self.parts.len().saturating_sub(1)).map(|n| folder.join(self.parts[n..].join("/")));
         std::iter::once(self.expected(folder, None))
             .chain(with_folders)
-            .find_map(|path| in_its_folder(names, &path, |folder, name| image_at(names, folder, name)))
+            .find_map(|path| in_its_folder(names, &path, |folder, name| mask_at(names, folder, name)))
     }
 
     fn find(

@@ -125,3 +125,23 @@ fn scaling_keeps_ratios_and_refuses_other_shapes() {
     assert_eq!(lens.scaled_to((2078, 3118)), None, "turned on its side");
     assert_eq!(lens.scaled_to((3118, 2000)), None, "cut");
 }
+
+#[test]
+fn a_distortion_beyond_sense_is_no_lens() {
+    let said = |lens: Lens| lens.fault().unwrap_or_default();
+    for lens in [opencv(), full_opencv(), fisheye(), Lens { radial: [0.0; 4], ..fisheye() }] {
+        assert_eq!(said(lens.clone()), "", "{lens:?}");
+    }
+    // 2/3 of the way as r², against r² = 0.64 in the corner.
+    let folded = Lens { radial: [-0.9, 0.0, 0.0, 0.0], ..opencv() };
+    assert!(said(folded).contains("turns back at 7"));
+    for radial in [[-44.85, 1017.4, 0.0, 0.0], [500.0, 0.0, 0.0, 0.0], [1e300, 1e300, 1e300, 1e300]] {
+        for lens in [opencv(), full_opencv(), fisheye()] {
+            let found = said(Lens { radial, ..lens });
+            assert!(found.starts_with("the distortion moves a ray by ") && found.contains("540×960 px"), "{found}");
+        }
+    }
+    assert!(said(Lens { tangential: [0.9, 0.9], ..opencv() }).contains("moves a ray"));
+    // Of a fisheye the projection is none of its distortion.
+    assert!(fisheye().largest_shift_px() > 200.0);
+}

@@ -401,6 +401,12 @@ fn masks() -> Vec<Case> {
             let pixel = |counts: bool| u16::from(counts).to_ne_bytes().to_vec();
             write(f.write_files(), |name| format!("masks/{name}"), pixel, image::ExtendedColorType::L16);
         }),
+        case("masks of 16 bit under another ending", ColmapText, Nothing, "missing-masks", says, |f| {
+            f.photos.iter_mut().for_each(|photo| photo.name = photo.name.replace(".png", ".jpg"));
+            let pixel = |counts: bool| u16::from(counts).to_ne_bytes().to_vec();
+            let name = |name: &str| format!("masks/{}", name.replace(".jpg", ".png"));
+            write(f.write_files(), name, pixel, image::ExtendedColorType::L16);
+        }),
         case("masks of labels", ColmapText, Nothing, "bad-mask", says, |f| {
             write(
                 f.write_files(),

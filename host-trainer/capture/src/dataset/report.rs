@@ -95,9 +95,9 @@ impl fmt::Display for LoadReport {
             write!(f, " and {} other sizes", self.n_sizes - 1)?;
         }
         let random = if self.points_origin == PointsOrigin::Random { "random " } else { "" };
-        match self.backdrop {
-            Some([r, g, b]) => write!(f, ", on {r},{g},{b}")?,
-            None => write!(f, ", on {}", self.background)?,
+        match (self.backdrop, self.backdrop.and_then(Background::of_rgb8)) {
+            (Some([r, g, b]), None) => write!(f, ", on {r},{g},{b}")?,
+            (_, own) => write!(f, ", on {}", own.unwrap_or(self.background))?,
         }
         write!(f, ", {} {random}initial points", self.n_points)?;
         for split in [Split::Train, Split::Test] {

@@ -183,6 +183,7 @@ fn ended(watched: &Watched) -> String {
     let (name, said) = match &watched.last().ending {
         None => return String::new(),
         Some(Ending::Finished { report: Some(path) }) => {
+            let path = std::path::absolute(path).unwrap_or_else(|_| path.clone());
             ("finished", format!("its report is <code>{}</code>", escaped(&path.display().to_string())))
         }
         Some(Ending::Finished { report: None }) => ("finished", "it has no report".to_owned()),

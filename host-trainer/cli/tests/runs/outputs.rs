@@ -176,7 +176,7 @@ fn links_fifos_and_devices_stay_what_they_are() {
         eprintln!("skipped: no device can be made here");
         return;
     }
-    let mut train = command(&["train", capture().to_str().unwrap(), "--iterations", "5", "-o", "{}"], &node);
+    let mut train = command(&["train", capture().to_str().unwrap(), "--iterations", "10", "-o", "{}"], &node);
     let said = succeeds(&mut train);
     assert!(fs::metadata(&node).unwrap().file_type().is_char_device());
     assert!(!said.contains("see it:") && !said.contains("warning: there is no report"), "nothing to see: {said}");
@@ -241,6 +241,6 @@ fn what_lies_beside_the_photographs_may_be_written_again() {
         let render = ["render", bundle.to_str().unwrap(), c, "--view", "0", "-o", "{}"];
         succeeds(&mut command(&render, &picture));
     }
-    let said = command(&["train", c, "--iterations", "5", "-o", "{}"], &bundle).output().unwrap();
+    let said = command(&["train", c, "--iterations", "10", "-o", "{}"], &bundle).output().unwrap();
     assert!(said.status.success(), "{}", text(&said.stderr));
 }

@@ -27,8 +27,6 @@ const COARSE_PX: u32 = 16;
 const N_AROUND: usize = 8;
 /// Sines of the heights of someone who walks around.
 const WALKING: [f64; 2] = [0.1, 0.5];
-/// Of someone below.
-const BELOW: f64 = -0.5;
 /// Places inside that are tried, and those that are looked from.
 const N_PLACES: usize = 24;
 const N_INSIDE: usize = 4;
@@ -41,12 +39,10 @@ const OUTERMOST: f64 = 1.2;
 
 /// A place inside is enclosed where so much of all directions is blocked.
 const ENCLOSED: f64 = 0.6;
-/// The inside is the right side where it shows so much more of the scene …
+/// The inside is the right side where it shows so much more of the scene.
 const MARGIN: f64 = 0.1;
-/// … or, where neither shows that much more, if colours are so many times farther from their means from around.
-const STRAY_COLOURS: f64 = 1.5;
-/// A ground hides a scene where cameras below miss this share of what those above see.
-const GROUND: f64 = 0.2;
+/// A ground hides a scene where cameras below see less than this share of what those above see.
+const GROUND: f64 = 0.8;
 
 /// What the pictures show.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -57,13 +53,10 @@ pub struct Evidence {
     pub seen_around: f64,
     /// See [`Self::seen_around`].
     pub seen_inside: f64,
-    /// How far colours are from their means where they are seen, from around and from inside: directions that no photograph had are
-    /// extrapolated.
-    pub stray_colour_around: f64,
-    /// See [`Self::stray_colour_around`].
-    pub stray_colour_inside: f64,
-    /// Share of what is seen from around and above that is not seen from below.
-    pub hidden_from_below: f64,
+    /// Share that is seen from above, on a circle, and from as far below.
+    pub seen_from_above: f64,
+    /// See [`Self::seen_from_above`].
+    pub seen_from_below: f64,
     /// Angle about the up axis from which most is seen, radians.
     pub front: f64,
 }
@@ -72,9 +65,7 @@ impl Evidence {
     /// The side that shows more of the scene.
     pub fn side(&self) -> Side {
         let more_inside = self.seen_inside - self.seen_around;
-        let as_colours_say =
-            more_inside > -MARGIN && self.stray_colour_around > STRAY_COLOURS * self.stray_colour_inside;
-        if self.enclosed >= ENCLOSED && (more_inside > MARGIN || as_colours_say) { Side::Inside } else { Side::Around }
+        if self.enclosed >= ENCLOSED && more_inside > MARGIN { Side::Inside } else { Side::Around }
     }
 
     /// Whether it is hollow, and both sides show about as much of it: so do an empty room, a tube and the shell of an object.
@@ -84,7 +75,7 @@ impl Evidence {
 
     /// Whether cameras below would see the underside of a ground and little else.
     pub fn has_ground(&self) -> bool {
-        self.hidden_from_below > GROUND
+        self.seen_from_below < GROUND * self.seen_from_above
     }
 
     /// Cost: some 200 small pictures.
@@ -112,10 +103,10 @@ impl Evidence {
         let front = (0..N_AROUND)
             .max_by(|a, b| looker.share(&low[*a]).total_cmp(&looker.share(&low[*b])))
             .map_or(0.0, |i| TAU * i as f64 / N_AROUND as f64);
-        let around: Vec<Sight> = low.into_iter().chain(look(&ring(WALKING[1]))).collect();
-        let (above, below) = (looker.best(&around), looker.best(&look(&ring(BELOW))));
-        let seen_around = looker.weighted(above.iter().copied());
-        let seen_both = looker.weighted(above.iter().zip(&below).map(|(above, below)| above.min(*below)));
+        let high = look(&ring(WALKING[1]));
+        let seen = |sights: &[Sight]| looker.weighted(looker.best(sights).into_iter());
+        let (seen_from_above, seen_from_below) = (seen(&high), seen(&look(&ring(-WALKING[1]))));
+        let around: Vec<Sight> = low.into_iter().chain(high).collect();
 
         let mut places: Vec<(f64, DVec3)> = (0..N_PLACES)
             .map(|i| inside_place(bulk, i))
@@ -139,11 +130,10 @@ impl Evidence {
         let inside = look(&cameras);
         Self {
             enclosed,
-            seen_around,
-            seen_inside: looker.weighted(looker.best(&inside).into_iter()),
-            stray_colour_around: looker.stray_colour(&around),
-            stray_colour_inside: looker.stray_colour(&inside),
-            hidden_from_below: if seen_around > 0.0 { 1.0 - seen_both / seen_around } else { 0.0 },
+            seen_around: seen(&around),
+            seen_inside: seen(&inside),
+            seen_from_above,
+            seen_from_below,
             front,
         }
     }

@@ -11,46 +11,31 @@ use crate::ops::Pinhole;
 use crate::ops::rasterise::TiledImage;
 use crate::ops::simd::Level;
 
-/// Y₀, the constant harmonic.
-const Y0: f32 = 0.282_094_8;
-
 /// A Gaussian is seen where this share of its light comes through: the rest is its neighbours', which overlap on any surface.
 const ENOUGH: f64 = 0.2;
 
 /// Draws small pictures of a scene to find what is seen in them.
 pub(super) struct Looker {
     level: Level,
+    /// In black: on white it shows what is let through.
     cloud: Cloud<f32>,
-    /// The same in black, of degree 0: on white it shows what is let through.
-    black: Cloud<f32>,
     weights: Vec<f64>,
     total: f64,
 }
 
-/// What one camera sees.
-pub(super) struct Sight {
-    /// Gaussians in the picture, and how far each is seen, from 0 to 1.
-    shares: Vec<(u32, f64)>,
-    /// Σ over the picture of light · distance of the colour from its mean, and of light.
-    stray_colour: [f64; 2],
-}
+/// What one camera sees: Gaussians in the picture, and how far each is seen, from 0 to 1.
+pub(super) struct Sight(Vec<(u32, f64)>);
 
 impl Looker {
     /// * `gaussians`: in the normalised frame. * `chosen`: those that are looked at. * `weights`: what each of these counts.
     pub(super) fn new(gaussians: &Gaussians, compensation: bool, chosen: &[usize], weights: Vec<f64>) -> Self {
         let all = Cloud::from(gaussians);
-        let mut cloud = Cloud { compensation, ..Cloud::empty(gaussians.degree) };
+        let mut cloud = Cloud { compensation, ..Cloud::empty(Degree::Zero) };
         for index in chosen {
-            cloud.push(&all.stored(*index), all.harmonics_of(*index));
+            cloud.push(&all.stored(*index), &[[-10.0; 3]]);
         }
-        let black = Cloud {
-            degree: Degree::Zero,
-            n_coefficients: 1,
-            harmonics: vec![[-10.0; 3]; cloud.len()],
-            ..cloud.clone()
-        };
         let total = weights.iter().sum();
-        Self { level: Level::detect(), cloud, black, weights, total }
+        Self { level: Level::detect(), cloud, weights, total }
     }
 
     /// The light of a Gaussian is Σ α·T over the pixels, the derivative of the image's sum by its colour; what nothing hides has 2π·o/√|Σ'⁻¹|.
@@ -62,32 +47,27 @@ impl Looker {
         ones[..width * height].fill(1.0);
         let d_image = TiledImage::from_planes(&ones, pinhole.size_px);
         let d_splats = drawing.light(self.level, &d_image);
-        let mut sight = Sight { shares: Vec::new(), stray_colour: [0.0; 2] };
+        let mut shares = Vec::new();
         for ((index, splat), light) in drawing.drawn.iter().zip(&drawing.splats).zip(d_splats) {
             let [x, y] = splat.mean_px;
-            let light = f64::from(light);
-            let mean = self.cloud.harmonics_of(*index as usize)[0].map(|c| (0.5 + Y0 * c).max(0.0));
-            let apart: f32 = splat.colour.iter().zip(mean).map(|(seen, mean)| (seen - mean).abs()).sum();
-            sight.stray_colour[0] += light * f64::from(apart) / 3.0;
-            sight.stray_colour[1] += light;
             if x >= 0.0 && y >= 0.0 && x < width as f32 && y < height as f32 {
                 let whole =
                     TAU * f64::from(splat.opacity) / f64::from(splat.row_precision * splat.column_precision).sqrt();
-                sight.shares.push((*index, (light / whole / ENOUGH).clamp(0.0, 1.0)));
+                shares.push((*index, (f64::from(light) / whole / ENOUGH).clamp(0.0, 1.0)));
             }
         }
-        sight
+        Sight(shares)
     }
 
     /// Share of the scene that a camera sees.
     pub(super) fn share(&self, sight: &Sight) -> f64 {
-        sight.shares.iter().map(|(i, share)| self.weights[*i as usize] * share).sum::<f64>() / self.total
+        sight.0.iter().map(|(i, share)| self.weights[*i as usize] * share).sum::<f64>() / self.total
     }
 
     /// How far the best of some cameras sees each Gaussian.
     pub(super) fn best(&self, sights: &[Sight]) -> Vec<f64> {
         let mut best = vec![0.0f64; self.weights.len()];
-        for (i, share) in sights.iter().flat_map(|sight| &sight.shares) {
+        for (i, share) in sights.iter().flat_map(|sight| &sight.0) {
             let best = &mut best[*i as usize];
             *best = best.max(*share);
         }
@@ -99,17 +79,11 @@ impl Looker {
         seen.zip(&self.weights).map(|(seen, weight)| seen * weight).sum::<f64>() / self.total
     }
 
-    /// Mean distance of the colours that are seen from their means.
-    pub(super) fn stray_colour(&self, sights: &[Sight]) -> f64 {
-        let [stray, light] = [0, 1].map(|part: usize| sights.iter().map(|sight| sight.stray_colour[part]).sum::<f64>());
-        if light > 0.0 { stray / light } else { 0.0 }
-    }
-
     /// Share of the pictures' light that something blocks.
     pub(super) fn blocked(&self, cameras: &[Camera]) -> f64 {
         let through = |camera: &Camera| {
             let pinhole = Pinhole::new(camera);
-            let planes = draw(self.level, &self.black, &pinhole, [1.0; 3]).image.to_planes(pinhole.size_px);
+            let planes = draw(self.level, &self.cloud, &pinhole, [1.0; 3]).image.to_planes(pinhole.size_px);
             planes.iter().map(|value| f64::from(*value)).sum::<f64>() / planes.len() as f64
         };
         1.0 - cameras.iter().map(through).sum::<f64>() / cameras.len() as f64

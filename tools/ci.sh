@@ -7,7 +7,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-jobs=(fmt clippy doc test viewer core-embedded format-doc package link-gate digests reader firmware boards c demo many-runs)
+jobs=(fmt clippy doc test viewer core-embedded format-doc package link-gate digests reader fuzz firmware boards c demo many-runs)
 
 embedded_target=thumbv7em-none-eabihf
 defmt_print_version=1.2.0
@@ -71,6 +71,12 @@ need_cargo() {
   need_command cc gcc libc6-dev
   cargo fmt --version >/dev/null 2>&1 && cargo clippy --version >/dev/null 2>&1 || rustup component add rustfmt clippy ||
     fail "rustfmt or clippy is missing: run \`rustup component add rustfmt clippy\`"
+}
+
+# For a sanitiser; any version does.
+need_nightly() {
+  cargo +nightly --version >/dev/null 2>&1 || rustup toolchain install nightly --profile minimal --no-self-update >/dev/null 2>&1 ||
+    fail "a nightly toolchain is missing: run \`rustup toolchain install nightly --profile minimal\`"
 }
 
 need_target() { # TARGET
@@ -337,6 +343,17 @@ job_reader() {
   need_command node nodejs
   node tests/reader/main.mjs check tests/pack
   node tests/reader/main.mjs golden tests/golden
+}
+
+# The laws in fuzz/ hold for what libFuzzer makes of the conformance pack in 10 s each; the suite `fuzzing` walks further.
+job_fuzz() {
+  local name
+  need_nightly
+  # A C++ compiler builds libFuzzer.
+  need_command c++ g++
+  for name in parse draw symbols normal; do
+    fuzz/run.sh "$name" 10
+  done
 }
 
 # Boards with the RAM that they get, KiB: as much as such a device has, and so little that anchors are decoded in each frame.

@@ -91,7 +91,7 @@ int draw_orbit(const char *name, const uint8_t *bundle, size_t bundle_len) {
   if (status != PSB_STATUS_OK) return failed(status);
   for (uint8_t tiers = 1; tiers <= whole.n_tiers; tiers++) {
     budget.tiers = tiers;
-    budget.slabs = true;
+    budget.slabs = 1;
     status = psb_make_plan(bundle, bundle_len, &budget, &plan, &message);
     if (status != PSB_STATUS_OK) return failed(status);
     /* One byte fewer is refused, with the number that would do. */

@@ -87,6 +87,15 @@ static void misuse(const uint8_t *bundle, size_t len) {
   budget.quality = 9;
   CHECK(psb_make_plan(bundle, len, &budget, &plan, &message) == PSB_STATUS_MISUSE && strstr(message.text, "PSB_QUALITY"));
   budget.quality = PSB_QUALITY_EXACT;
+  budget.slabs = 2;
+  CHECK(psb_make_plan(bundle, len, &budget, &plan, &message) == PSB_STATUS_MISUSE && strcmp(message.text, "slabs needs to be 0 or 1; found 2") == 0);
+  memset(&budget.slabs, 0xFF, sizeof budget.slabs);
+  CHECK(psb_make_plan(bundle, len, &budget, &plan, NULL) == PSB_STATUS_MISUSE);
+  budget.slabs = 0;
+  /* A budget of zeros draws nothing, and says so. */
+  budget.tiers = 0;
+  CHECK(psb_make_plan(bundle, len, &budget, &plan, &message) == PSB_STATUS_MISUSE && strstr(message.text, "tiers to draw is 0"));
+  budget.tiers = 255;
   budget.ram_bytes = 100;
   CHECK(psb_make_plan(bundle, len, &budget, &plan, &message) == PSB_STATUS_OVER_BUDGET && plan.scratch_bytes > 100);
   budget.ram_bytes = plan.scratch_bytes;

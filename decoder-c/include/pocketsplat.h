@@ -66,18 +66,19 @@ typedef struct psb_decoder psb_decoder;
 typedef struct psb_budget {
   // Bytes of scratch memory that there are.
   size_t ram_bytes;
-  // Bytes of slower memory beside it, such as PSRAM or SDRAM; 0 where there is none.
+  // Bytes of slower memory beside it, such as PSRAM or SDRAM; 0 where there is none. It has to be normal memory: where it is Device memory
+  // after reset, as SDRAM at 0xC0000000 is, have the MPU make it normal, or a Cortex-M7 faults.
   size_t slow_bytes;
   // Widest frame, pixels.
   uint16_t width_px;
   // Highest frame, pixels.
   uint16_t height_px;
-  // Tiers to draw at most; 255 draws all that the file holds.
+  // Tiers to draw at most, 1 or more; 255 draws all that the file holds.
   uint8_t tiers;
   // A psb_quality.
   uint8_t quality;
-  // Draw strips with too many splats in slabs of depth, which takes longer, instead of leaving splats out.
-  bool slabs;
+  // 1 to draw strips with too many splats in slabs of depth, which takes longer; 0 to leave splats out.
+  uint8_t slabs;
 } psb_budget;
 
 // What fits into a budget.

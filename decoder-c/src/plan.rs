@@ -24,18 +24,19 @@ pub enum Quality {
 pub struct Budget {
     /// Bytes of scratch memory that there are.
     pub ram_bytes: usize,
-    /// Bytes of slower memory beside it, such as PSRAM or SDRAM; 0 where there is none.
+    /// Bytes of slower memory beside it, such as PSRAM or SDRAM; 0 where there is none. It has to be normal memory: where it is Device memory
+    /// after reset, as SDRAM at 0xC0000000 is, have the MPU make it normal, or a Cortex-M7 faults.
     pub slow_bytes: usize,
     /// Widest frame, pixels.
     pub width_px: u16,
     /// Highest frame, pixels.
     pub height_px: u16,
-    /// Tiers to draw at most; 255 draws all that the file holds.
+    /// Tiers to draw at most, 1 or more; 255 draws all that the file holds.
     pub tiers: u8,
     /// A psb_quality.
     pub quality: u8,
-    /// Draw strips with too many splats in slabs of depth, which takes longer, instead of leaving splats out.
-    pub slabs: bool,
+    /// 1 to draw strips with too many splats in slabs of depth, which takes longer; 0 to leave splats out.
+    pub slabs: u8,
 }
 
 /// What fits into a budget.
@@ -72,7 +73,11 @@ impl Budget {
                 return Err(Failure::Number(needed, usize::from(other)));
             }
         };
-        let overflow = if self.slabs { Overflow::Slabs } else { Overflow::LeaveOut };
+        let overflow = match self.slabs {
+            0 => Overflow::LeaveOut,
+            1 => Overflow::Slabs,
+            other => return Err(Failure::Number("slabs needs to be 0 or 1", usize::from(other))),
+        };
         let frame = pocketsplat_core::Budget::for_frame(self.width_px, self.height_px);
         let memory = frame.in_bytes(self.ram_bytes).with_slow_bytes(self.slow_bytes);
         Ok(memory.with_tiers(self.tiers).with_quality(quality).with_overflow(overflow))
@@ -124,7 +129,7 @@ pub extern "C" fn psb_budget_for_frame(width_px: u16, height_px: u16, ram_bytes:
         height_px,
         tiers: u8::MAX,
         quality: Quality::Exact as u8,
-        slabs: false,
+        slabs: 0,
     }
 }
 

@@ -114,17 +114,17 @@ impl Camera {
         }
     }
 
-    /// The index of the first float that is not finite, or not positive where it must be, in the order of the fields.
+    /// The index of the first float that is not within its limits, in the order of the fields.
     pub(crate) fn first_unusable(&self) -> Option<u32> {
         let mut first = 0_u32;
-        let parts: [(&[f32], f32); 4] = [
-            (self.rotation.numbers(), FINITE),
-            (&self.translation, FINITE),
-            (&self.focal_px, POSITIVE),
-            (&self.principal_px, FINITE),
+        let parts: [(&[f32], f32, f32); 4] = [
+            (self.rotation.numbers(), f32::MIN, ROTATION_END),
+            (&self.translation, f32::MIN, END),
+            (&self.focal_px, POSITIVE, END),
+            (&self.principal_px, f32::MIN, END),
         ];
-        for (floats, least) in parts {
-            if let Some(index) = first_outside(floats, least) {
+        for (floats, least, end) in parts {
+            if let Some(index) = first_outside(floats, least, end) {
                 return Some(first.wrapping_add(index));
             }
             first = first.wrapping_add(floats.len() as u32);
@@ -132,8 +132,10 @@ impl Camera {
         None
     }
 
-    /// Checks that every float is finite, the focal lengths positive and the frame not empty; that the rotation is one was
-    /// checked when it was [made](Rotation::new).
+    /// Checks that every float is of a magnitude below 10¹⁵, and one of the rotation's below 1000; that focal lengths are positive and the
+    /// frame is not empty. That the rotation is one was checked when it was [made](Rotation::new).
+    ///
+    /// Within these limits no distance overflows f32, so that every sum of the heads is a number and every target draws the same frame.
     ///
     /// # Errors
     /// [`DecodeError::BadFloat`] or [`DecodeError::OutOfRange`] naming the field.
@@ -177,14 +179,16 @@ fn dot([a0, a1, a2]: [f32; 3], [b0, b1, b2]: [f32; 3]) -> f32 {
     a0 * b0 + a1 * b1 + a2 * b2
 }
 
-/// The least finite number.
-const FINITE: f32 = f32::MIN;
+/// No number of a camera is as large.
+const END: f32 = 1e15;
+/// Nor is one of a matrix that takes the place of its rotation.
+const ROTATION_END: f32 = 1000.0;
 /// The least positive number.
 const POSITIVE: f32 = f32::from_bits(1);
 
-/// The index of the first float that is not finite or below `least`.
-fn first_outside(floats: &[f32], least: f32) -> Option<u32> {
-    (0..).zip(floats).find(|(_, x)| !(least <= **x && **x <= f32::MAX)).map(|(index, _)| index)
+/// The index of the first float that is below `least`, or not of a magnitude below `end`.
+fn first_outside(floats: &[f32], least: f32, end: f32) -> Option<u32> {
+    (0..).zip(floats).find(|(_, x)| !(least <= **x && x.abs() < end)).map(|(index, _)| index)
 }
 
 #[cfg(test)]
@@ -192,6 +196,51 @@ mod tests {
     use core::f32::consts::TAU;
 
     use super::{Camera, Rotation, dot};
+    use crate::error::{DecodeError, Field};
+
+    /// A camera of 16 floats, in the order of its fields.
+    fn camera_of(floats: [f32; 16]) -> Camera {
+        let [rotation @ .., t0, t1, t2, fx, fy, cx, cy] = floats;
+        Camera {
+            rotation: Rotation::new_unchecked(rotation),
+            translation: [t0, t1, t2],
+            focal_px: [fx, fy],
+            principal_px: [cx, cy],
+            width_px: 60,
+            height_px: 40,
+        }
+    }
+
+    #[test]
+    fn numbers_that_overflow_when_squared_are_refused_by_field_and_index() {
+        let places = [(Field::CameraPose, 0..12), (Field::CameraFocal, 12..14), (Field::CameraPrincipal, 14..16)];
+        for (field, range) in places {
+            for place in range.clone() {
+                let end: f32 = if place < 9 { 1000.0 } else { 1e15 };
+                let with = |number: f32| {
+                    let mut floats = [1.0; 16];
+                    floats[place] = number;
+                    camera_of(floats).check()
+                };
+                let bad = DecodeError::BadFloat { field, index: (place - range.start) as u32 };
+                for number in [end, f32::MAX, f32::INFINITY, f32::NAN, -end, f32::NEG_INFINITY] {
+                    assert_eq!(with(number), Err(bad), "{number} in place {place}");
+                }
+                assert_eq!(with(end.next_down()), Ok(()), "place {place}");
+                let negative = with(-end.next_down());
+                assert_eq!(negative.is_ok(), field != Field::CameraFocal, "place {place}: {negative:?}");
+            }
+        }
+        // Within the limits, also to the farthest position that a bundle may hold.
+        let [large, far] = [1000.0_f32, 1e15].map(f32::next_down);
+        let mut floats = [large; 16];
+        floats[9..].fill(far);
+        let camera = camera_of(floats);
+        assert_eq!(camera.check(), Ok(()));
+        let position = (1 << 24) as f32 * 1e9;
+        let square: f32 = camera.centre().iter().map(|x| (x.abs() + position) * (x.abs() + position)).sum();
+        assert!(square.is_finite(), "the distance from {:?}", camera.centre());
+    }
 
     #[test]
     fn an_orbit_keeps_distance_height_and_the_middle_of_the_image() {

@@ -121,7 +121,7 @@ impl<'b, 's> Decoder<'b, 's> {
 
     /// As [`bind_in`](Self::bind_in), in two regions of memory: the frames are the same as with one.
     ///
-    /// * `[fast, slow]`: at least [`Plan::scratch_len`] and [`Plan::slow_scratch_len`] bytes.
+    /// * `[fast, slow]`: at least [`Plan::scratch_len`] and [`Plan::slow_scratch_len`] bytes of [normal memory](crate#memory).
     ///
     /// ```no_run
     /// # use pocketsplat_core::{arithmetic::ReferenceArithmetic, Budget, Bundle, DecodeError, Decoder};

@@ -1,4 +1,4 @@
 //! Any words are symbols of a Gaussian.
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| conformance::fuzz::normal(bytes));
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| fuzz::normal(bytes));

@@ -1,4 +1,4 @@
 //! Any bytes parse or are refused.
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| conformance::fuzz::parse(bytes));
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| fuzz::parse(bytes));

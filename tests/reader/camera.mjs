@@ -1,9 +1,19 @@
 // Cameras (DRAWING.md, section 4).
 
+import { need } from "./bytes.mjs";
 import { clamp, dot } from "./maths.mjs";
 
 const f = Math.fround;
+const END = f(1e15);
 const MARGIN = f(0.15);
+
+/** What the translation and the principal point hold to, and focal lengths: a test and its words. */
+export const CAMERA_NUMBER = [(number) => Math.abs(number) < END, "of a magnitude below 1e15"];
+export const FOCAL_LENGTH = [(number) => number > 0 && number < END, "positive and below 1e15"];
+
+function check(numbers, what, [holds, words]) {
+  for (const [i, number] of numbers.entries()) need(holds(number), `camera: ${what}[${i}]`, number, words);
+}
 
 /** A camera of f32 numbers, with what a frame needs of it. */
 export class Camera {
@@ -11,6 +21,9 @@ export class Camera {
     this.R = [0, 3, 6].map((row) => Float32Array.from(rotation.slice(row, row + 3)));
     this.t = Float32Array.from(translation);
     const [[fx, fy], [cx, cy]] = [focal.map(f), principal.map(f)];
+    check(Array.from(this.t), "translation", CAMERA_NUMBER);
+    check([fx, fy], "focal length", FOCAL_LENGTH);
+    check([cx, cy], "principal point", CAMERA_NUMBER);
     [this.width, this.height] = size;
     Object.assign(this, { fx, fy, cx, cy });
     const { R, t } = this;

@@ -1,6 +1,7 @@
 // The header (FORMAT.md, section 2).
 
 import { crc32, Cursor, FINITE, fround, hex, need, within } from "./bytes.mjs";
+import { CAMERA_NUMBER, FOCAL_LENGTH } from "./camera.mjs";
 
 export const VERSION = 4;
 const MAGIC = [0x89, 0x50, 0x53, 0x42, 0x0d, 0x0a, 0x1a, 0x0a];
@@ -38,6 +39,7 @@ function checkRotation(rotation) {
 }
 
 const POSITIVE = [(number) => Number.isFinite(number) && number > 0, "finite and positive"];
+const VOXEL_SIZE = [(number) => number > 0 && number < 1e9, "positive and below 1e9"];
 
 /** The header of a file, with the rows of its section table. */
 export function readHeader(file) {
@@ -69,16 +71,16 @@ export function readHeader(file) {
   h.trainingSize = from.u16s(2, "training size", [(n) => n >= 1, "at least 1"]);
   h.background = from.u8s(3, "background", h.features.background ? undefined : [(n) => n === 0, "0 without feature 8"]);
   h.nTiers = within("header: n_tiers", from.u8("n_tiers"), 1, 8);
-  h.voxelSize = from.f32s(1, "voxel_size", POSITIVE)[0];
+  h.voxelSize = from.f32s(1, "voxel_size", VOXEL_SIZE)[0];
   h.hiddenColour = within("header: H_c", from.u16("H_c"), 1, 256);
   h.hiddenDetail = within("header: H_d", from.u16("H_d"), ...(h.features.detail ? [1, 256] : [0, 0]));
   h.centre = from.f64s(3, "normalisation centre", FINITE);
   h.scale = from.f64s(1, "normalisation scale", POSITIVE)[0];
   h.preview = {
     rotation: from.f32s(9, "preview rotation", FINITE),
-    translation: from.f32s(3, "preview translation", FINITE),
-    focal: from.f32s(2, "preview focal lengths", POSITIVE),
-    principal: from.f32s(2, "preview principal point", FINITE),
+    translation: from.f32s(3, "preview translation", CAMERA_NUMBER),
+    focal: from.f32s(2, "preview focal lengths", FOCAL_LENGTH),
+    principal: from.f32s(2, "preview principal point", CAMERA_NUMBER),
     size: from.u16s(2, "preview size", [(n) => n >= 1, "at least 1"]),
   };
   checkRotation(h.preview.rotation);

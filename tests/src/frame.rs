@@ -1,60 +1,20 @@
-//! Drawing with the decoder, and a sink that keeps the books.
-
-use std::convert::Infallible;
+//! Drawing with the decoder.
 
 use glam::DVec3;
 use pocketsplat_capture::dataset::Normalisation;
 use pocketsplat_core::arithmetic::Arithmetic;
 use pocketsplat_core::{
-    Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, MaxSplats, Quality, Residency, Strips, TileSink,
+    Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, MaxSplats, Quality, Residency, Strips,
 };
 use pocketsplat_trainer::bundle::{self, BundleInfo, WriteOptions};
 use pocketsplat_trainer::camera::core_camera;
 use pocketsplat_trainer::cost::{ArithmeticChoice, WithArithmetic};
 use pocketsplat_trainer::scene::Scene;
 
+pub use crate::fuzz::frame::Frame;
+
 /// What lies behind the test scenes.
 pub const BACKGROUND: [u8; 3] = [13, 77, 200];
-
-/// A frame, and how often each of its pixels arrived.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Frame {
-    /// Width, pixels.
-    pub width_px: usize,
-    /// `[height, width, 3]`.
-    pub rgb: Vec<u8>,
-    /// `[height, width]`.
-    pub deliveries: Vec<u32>,
-}
-
-impl Frame {
-    /// A frame to which nothing was delivered.
-    pub fn new(width_px: u16, height_px: u16) -> Self {
-        let n_pixels = usize::from(width_px) * usize::from(height_px);
-        Self { width_px: width_px.into(), rgb: vec![0; 3 * n_pixels], deliveries: vec![0; n_pixels] }
-    }
-}
-
-impl TileSink for Frame {
-    type Error = Infallible;
-
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
-        let [x, y, width, height] = [x_px, y_px, width, height].map(usize::from);
-        assert_eq!(rgb.len(), width * height, "pixels of the tile at ({x}, {y})");
-        assert!(
-            x + width <= self.width_px,
-            "the tile at ({x}, {y}) ends at {}, the frame at {}",
-            x + width,
-            self.width_px
-        );
-        for (row, pixels) in rgb.chunks_exact(width).enumerate() {
-            let start = (y + row) * self.width_px + x;
-            self.rgb[3 * start..][..3 * width].copy_from_slice(pixels.as_flattened());
-            self.deliveries[start..][..width].iter_mut().for_each(|n| *n += 1);
-        }
-        Ok(())
-    }
-}
 
 /// The decoder's camera of a host camera: the same numbers rounded to f32.
 pub fn to_core(camera: &pocketsplat_capture::camera::Camera) -> Camera {

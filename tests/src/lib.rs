@@ -11,6 +11,7 @@
 //! * `misuse`: is a frame, a bundle or a camera that a decoder was not planned for refused?
 //! * `malformed`: does a damaged bundle fail and name the place, or report the damaged chunk, and never draw another
 //!   picture in silence?
+//! * `passes`: does a frame go over its scene as seldom as it can, in no more memory than it says, and does damage leave nothing behind?
 //! * `tiers`: is each tier's scene part of the next one's, and is a file cut at its end that scene?
 //! * `digests`: do symbols not depend on the number of threads?
 //! * `orbit`: is the decoder's orbit the one that the manifest was measured over?
@@ -30,8 +31,10 @@ pub mod difference;
 #[path = "../digest/src/digest.rs"]
 pub mod digest;
 pub mod frame;
+#[path = "../../fuzz/src/lib.rs"]
 pub mod fuzz;
 pub mod hard_cases;
 pub mod pack;
 pub mod scenes;
-pub mod seal;
+
+pub use fuzz::seal;

@@ -4,7 +4,7 @@ use conformance::bundles::{ALL_CODERS, Coder, tier_ends, tiered};
 use conformance::frame::{Frame, budget_for, draw, to_core};
 use conformance::scenes::{CASES, cameras};
 use pocketsplat_core::bundle::AnchorSite;
-use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, Region};
+use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, ErrorClass, Field, FrameReport, Region};
 
 fn camera() -> Camera {
     to_core(&cameras()[0].1)
@@ -69,8 +69,12 @@ fn a_cut_file_draws_what_fewer_tiers_of_the_whole_one_draw() {
         }
         let splats: Vec<u32> = frames.iter().map(|(_, report)| report.splats).collect();
         assert!(splats.is_sorted() && splats[0] < splats[2], "{coder:?}: splats of the tiers {splats:?}");
-        let (none, report) = draw_tiers(&whole, 0);
-        assert_eq!((report.splats, none.deliveries.contains(&0)), (0, false), "no tier is background");
+        let none = whole.plan(&Budget { tiers: 0, ..budget_for(&camera()) }).expect_err("no tier is no scene");
+        assert_eq!(none, DecodeError::OutOfRange { field: Field::Tiers, found: 0, limit: 1 });
+        assert_eq!(
+            (none.class(), none.to_string().as_str()),
+            (ErrorClass::Misuse, "tiers to draw is 0, the limit is 1")
+        );
     }
 }
 
@@ -79,11 +83,11 @@ fn the_planned_bytes_suffice_for_every_tier_and_one_less_is_refused_by_number() 
     for coder in ALL_CODERS {
         let bytes = file(coder);
         let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
-        let lens: Vec<usize> = (0..4)
+        let lens: Vec<usize> = (1..4)
             .map(|tiers| {
                 let plan = bundle.plan(&Budget { tiers, ..budget_for(&camera()) }).expect("planned");
                 let needed = plan.scratch_len();
-                let anchors = tiers.checked_sub(1).and_then(|last| bundle.tier(last)).map_or(0, |tier| tier.n_anchors);
+                let anchors = bundle.tier(tiers - 1).map_or(0, |tier| tier.n_anchors);
                 let worst = anchors * u32::from(bundle.header().n_offsets);
                 assert_eq!(plan.max_splats(), worst, "{coder:?}, {tiers} tiers: every offset");
                 let bind = |skip_damage: bool, len: usize| {
@@ -101,9 +105,9 @@ fn the_planned_bytes_suffice_for_every_tier_and_one_less_is_refused_by_number() 
                 needed
             })
             .collect();
-        assert!(lens.is_sorted() && lens[0] < lens[3], "{coder:?}: bytes of the tiers {lens:?}");
+        assert!(lens.is_sorted() && lens[0] < lens[2], "{coder:?}: bytes of the tiers {lens:?}");
         let all = bundle.plan(&budget_for(&camera())).expect("planned");
-        assert_eq!(all.scratch_len(), lens[3], "{coder:?}: all tiers");
+        assert_eq!(all.scratch_len(), lens[2], "{coder:?}: all tiers");
     }
 }
 

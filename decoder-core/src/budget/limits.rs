@@ -86,13 +86,14 @@ pub enum Overflow {
 pub struct Budget {
     /// Bytes of scratch memory there are; the fast ones, if some are slow.
     pub ram_bytes: usize,
-    /// Bytes of slow scratch memory besides; 0 for none.
+    /// Bytes of slow scratch memory besides; 0 for none. It has to be
+    /// [normal memory](crate#memory), which SDRAM may become by the MPU alone.
     pub slow_bytes: usize,
     /// Widest frame, pixels, 1..=[`MAX_FRAME_PX`].
     pub width_px: u16,
     /// Highest frame, pixels, 1..=[`MAX_FRAME_PX`].
     pub height_px: u16,
-    /// Tiers to draw at most; [`u8::MAX`] draws all that the file holds. Fewer are a coarser scene that costs less.
+    /// Tiers to draw at most, 1 or more; [`u8::MAX`] draws all that the file holds. Fewer are a coarser scene that costs less.
     pub tiers: u8,
     /// Splats in memory.
     pub max_splats: MaxSplats,
@@ -131,12 +132,15 @@ impl Budget {
     }
 
     /// Sets the bytes of slow scratch memory, beside the fast ones of [`in_bytes`](Self::in_bytes).
+    ///
+    /// Have the MPU make it [normal memory](crate#memory) first: a Cortex-M7 faults at the decoder's unaligned accesses in Device memory,
+    /// which SDRAM at 0xC0000000 is after reset.
     #[must_use]
     pub const fn with_slow_bytes(self, slow_bytes: usize) -> Self {
         Self { slow_bytes, ..self }
     }
 
-    /// Sets the most tiers to draw.
+    /// Sets the most tiers to draw, 1 or more.
     #[must_use]
     pub const fn with_tiers(self, tiers: u8) -> Self {
         Self { tiers, ..self }
@@ -172,10 +176,12 @@ impl Budget {
         Self { quality, ..self }
     }
 
-    /// Frame, strips, quality and the places of slabs lie within their limits.
+    /// Frame, tiers, strips, quality and the places of slabs lie within their limits.
     pub(super) fn check(&self) -> Result<(), DecodeError> {
         in_range(Field::FrameWidth, self.width_px.into(), 1, MAX_FRAME_PX.into())?;
         in_range(Field::FrameHeight, self.height_px.into(), 1, MAX_FRAME_PX.into())?;
+        // A budget of zeros would draw background alone.
+        in_range(Field::Tiers, self.tiers.into(), 1, u8::MAX.into())?;
         self.quality.check()?;
         if let (Overflow::Slabs, MaxSplats::AtMost(n)) = (self.overflow, self.max_splats) {
             in_range(Field::SlabSplats, n, MIN_SLAB_PLACES, u32::MAX)?;

@@ -181,7 +181,7 @@ impl Bundle<'_> {
     /// [`DecodeError::BudgetTooSmall`] names the bytes that the smallest plan within the other limits needs, of slow memory if there
     /// is some;
     /// [`DecodeError::NotBakeable`] for a residency that the scene does not have;
-    /// [`DecodeError::OutOfRange`] for an empty or too large frame or number of strips, and for fewer than
+    /// [`DecodeError::OutOfRange`] for an empty or too large frame or number of strips, for no tiers, and for fewer than
     /// [`MIN_SLAB_PLACES`] splats a slab; [`DecodeError::PlanTooLarge`] beyond
     /// the address space.
     ///
@@ -215,7 +215,7 @@ impl Planner<'_, '_> {
         let (region, available) =
             if has_slow { (Region::Slow, budget.slow_bytes) } else { (Region::Fast, budget.ram_bytes) };
         let (mut least_needed, mut n_strips_then, mut tiers_then, mut splats_then) = (usize::MAX, 0, most_tiers, 0);
-        let tiers = (most_tiers.min(1)..=most_tiers).rev();
+        let tiers = (1..=most_tiers).rev();
         // Halves before fewer tiers.
         for (n_tiers, weights) in tiers.flat_map(|n| [(n, HeadWeights::F32), (n, HeadWeights::F16)]) {
             let mut best: Option<(u64, Plan)> = None;

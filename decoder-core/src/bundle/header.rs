@@ -17,6 +17,8 @@ pub const HEADER_FIXED_LEN: usize = 160;
 const HEADER_FIELDS_LEN: usize = HEADER_FIXED_LEN - 12;
 /// Widest feature and hidden layer; bounds the work of an anchor.
 pub const MAX_FEATURE_DIM: u16 = 256;
+/// No voxel is as large, so that no position is too far from any camera for f32.
+const VOXEL_SIZE_END: f32 = 1e9;
 /// Most offsets, that is splats, of an anchor.
 pub const MAX_OFFSETS: u16 = 32;
 /// Most anchors; with [`MAX_OFFSETS`] the number of splats stays below 2³².
@@ -269,7 +271,7 @@ impl Header {
         for size_px in training_px {
             in_range(Field::TrainingSize, size_px.into(), 1, u32::from(u16::MAX))?;
         }
-        if !(voxel_size.is_finite() && voxel_size > 0.0) {
+        if !(voxel_size > 0.0 && voxel_size < VOXEL_SIZE_END) {
             return Err(DecodeError::BadFloat { field: Field::VoxelSize, index: 0 });
         }
         let scale_is_sound = normalisation_scale.is_finite() && normalisation_scale > 0.0;

@@ -289,7 +289,8 @@ fn a_budget_of_tiers_draws_what_a_cut_file_draws() {
             assert_eq!((report, planned_tiers), (short_report, short_tiers), "{variant:?}");
             assert_eq!(report.chunks_decoded, [2, 3, 5][usize::from(n_tiers) - 1], "{variant:?}: all are in view");
         }
-        assert_eq!(draw(&bytes, 0, false).map(|(_, report, _)| report.splats), Ok(0), "no tiers, no splats");
+        let none = DecodeError::OutOfRange { field: Field::Tiers, found: 0, limit: 1 };
+        assert_eq!(draw(&bytes, 0, false).map(|_| ()), Err(none), "a budget of no tiers");
     }
 }
 

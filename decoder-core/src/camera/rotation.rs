@@ -1,6 +1,6 @@
 //! A rotation that was checked to be one.
 
-use super::{FINITE, first_outside};
+use super::first_outside;
 use crate::error::{DecodeError, Field, in_range};
 
 /// Parts into which errors divide a unit.
@@ -43,7 +43,7 @@ impl Rotation {
     /// [`DecodeError::BadFloat`] names the first number that is not finite; [`DecodeError::OutOfRange`] says how far a matrix
     /// is from a rotation, and [the limit](Self::TOLERANCE), in 10 000ths.
     pub fn new(rows: [f32; 9]) -> Result<Self, DecodeError> {
-        if let Some(index) = first_outside(&rows, FINITE) {
+        if let Some(index) = first_outside(&rows, f32::MIN, f32::INFINITY) {
             return Err(DecodeError::BadFloat { field: Field::CameraPose, index });
         }
         let rotation = Self(rows);
@@ -54,7 +54,7 @@ impl Rotation {
     /// Takes a matrix as it is, for cameras that shear or mirror on purpose: splats near the borders of tiles and of the image
     /// may then be missing.
     ///
-    /// * `rows`: row-major. Numbers that are not finite are still refused when a frame is drawn.
+    /// * `rows`: row-major. Numbers from 1000 on, and those that are none, are still refused when a frame is drawn.
     #[must_use]
     pub const fn new_unchecked(rows: [f32; 9]) -> Self {
         Self(rows)

@@ -7,6 +7,7 @@ const MOST_565: [u8; 3] = [31, 63, 31];
 
 /// A finished tile.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Tile<'t> {
     /// Its first column, pixels.
     pub x_px: u16,
@@ -41,6 +42,16 @@ pub enum Rounding {
 }
 
 impl<'t> Tile<'t> {
+    /// A tile of pixels of one's own, such as a copy of a sink's; `None` unless there are `width · height`.
+    ///
+    /// * `corner_px`: its first column and row, pixels. * `size`: its width and height, pixels.
+    #[must_use]
+    pub fn new(corner_px: [u16; 2], size: [u16; 2], rgb: &'t mut [[u8; 3]]) -> Option<Self> {
+        let ([x_px, y_px], [width, height]) = (corner_px, size);
+        let n_pixels = u32::from(width) * u32::from(height);
+        (u32::try_from(rgb.len()) == Ok(n_pixels)).then_some(Self { x_px, y_px, width, height, rgb })
+    }
+
     /// Packs the pixels into 16 bits each, five of red, six of green, five of blue, in the place where they are; returns the bytes, two a
     /// pixel and row by row.
     ///
@@ -48,7 +59,7 @@ impl<'t> Tile<'t> {
     /// use pocketsplat_core::{ByteOrder, Rounding, Tile};
     ///
     /// let mut rgb = [[255, 0, 0], [0, 130, 255]];
-    /// let tile = Tile { x_px: 0, y_px: 0, width: 2, height: 1, rgb: &mut rgb };
+    /// let tile = Tile::new([0, 0], [2, 1], &mut rgb).expect("two pixels");
     /// assert_eq!(tile.into_rgb565(ByteOrder::BigEndian, Rounding::Nearest), [0xf8, 0x00, 0x04, 0x1f]);
     /// ```
     ///
@@ -64,7 +75,7 @@ impl<'t> Tile<'t> {
         let cells = Cell::from_mut(&mut *bytes).as_slice_of_cells();
         // A pixel is read before anything that is written reaches it: two bytes for three.
         let packed = cells.chunks_exact(2).zip(cells.chunks_exact(3));
-        let (mut x, mut y) = (0, 0);
+        let (mut x, mut y) = (0_u16, 0_u16);
         for (to, from) in packed {
             let ([first, second], [r, g, b]) = (to, from) else { continue };
             let rgb = [r.get(), g.get(), b.get()];
@@ -82,7 +93,8 @@ impl<'t> Tile<'t> {
             second.set(low);
             x += 1;
             if usize::from(x) == width {
-                (x, y) = (0, y + 1);
+                // Of pixels beyond the height the pattern goes on.
+                (x, y) = (0, y.wrapping_add(1));
             }
         }
         bytes.get_mut(..2 * n_pixels).unwrap_or_default()
@@ -140,6 +152,21 @@ mod tests {
             let expected = near(r, 31.0) << 11 | near(g, 63.0) << 5 | near(b, 31.0);
             assert_eq!(u16::from_be_bytes(found), expected, "pixel {i}");
         }
+    }
+
+    #[test]
+    fn more_pixels_than_a_tile_has_do_not_panic() {
+        let mut rgb = std::vec![[255, 0, 0]; 70_000];
+        let tile = Tile { x_px: 0, y_px: 0, width: 1, height: 1, rgb: &mut rgb };
+        let bytes = tile.into_rgb565(ByteOrder::BigEndian, Rounding::Dithered);
+        assert_eq!((bytes.len(), &bytes[139_998..]), (140_000, &[0xf8, 0x00][..]));
+    }
+
+    #[test]
+    fn a_tile_has_the_pixels_of_its_size() {
+        let made = |size, n_pixels| Tile::new([16, 32], size, &mut std::vec![[0; 3]; n_pixels]).is_some();
+        assert_eq!([made([3, 2], 6), made([3, 2], 5), made([3, 2], 7), made([0, 9], 0)], [true, false, false, true]);
+        assert!(!made([u16::MAX, u16::MAX], 1), "more than there are");
     }
 
     #[test]

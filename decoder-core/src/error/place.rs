@@ -101,6 +101,8 @@ pub enum Field {
     CameraPrincipal,
     FrameWidth,
     FrameHeight,
+    /// Tiers that a budget is to draw.
+    Tiers,
     Strips,
     /// Places for the splats of a slab.
     SlabSplats,
@@ -127,6 +129,7 @@ impl Field {
             | Self::CameraPrincipal
             | Self::FrameWidth
             | Self::FrameHeight
+            | Self::Tiers
             | Self::Strips
             | Self::SlabSplats
             | Self::AlphaCut
@@ -220,6 +223,7 @@ impl fmt::Display for Field {
             Self::CameraPrincipal => "camera principal point",
             Self::FrameWidth => "frame width",
             Self::FrameHeight => "frame height",
+            Self::Tiers => "tiers to draw",
             Self::Strips => "number of strips",
             Self::SlabSplats => "number of splats of a slab",
             Self::AlphaCut => "alpha to cut at, in 255ths",

@@ -246,6 +246,44 @@ mod tests {
         assert!(n_boxes_kept * 2 < n_needless, "{n_boxes_kept} of {n_needless} needless boxes are kept");
     }
 
+    /// The rectangle of a splat begins half a pixel above its ink: such a splat counts in a strip in which it draws nothing.
+    #[test]
+    fn a_splat_whose_rectangle_alone_reaches_a_strip_is_not_left_out() {
+        // A long lens, and a splat of its dilation alone: bounds are nowhere nearer to what they bound.
+        let camera = Camera {
+            rotation: Rotation::IDENTITY,
+            translation: [0.0; 3],
+            focal_px: [3000.0; 2],
+            principal_px: [40.0, 45.0],
+            width_px: 80,
+            height_px: HEIGHT_PX,
+        };
+        let view = View::new(&camera).expect("a sound camera");
+        let (row, band) = (1, view.band([16, 32]));
+        let mut n_beyond_ink = 0;
+        for step in 0..2600 {
+            let v = 11.0 + 0.01 * step as f32;
+            let (centre, scale) = ([0.0, (v - 45.0) / 3000.0, 1.0], [1e-6; 3]);
+            let gaussian = Gaussian { centre, scale, rotation: [1.0, 0.0, 0.0, 0.0], opacity: 1.0, colour: [0.0; 3] };
+            let (_, rect) = view.project::<Reference>(&gaussian, Effects::default()).expect("in the image");
+            let drawn = rect.first_row <= row && row <= rect.last_row;
+            let anchor = Anchor {
+                position: centre,
+                feature: &[],
+                extent: [0.1; 3],
+                base_scale: scale,
+                offsets: &[[0.0; 3]],
+                mask: 1,
+            };
+            let seen = [band.sees_gaussian(&gaussian), band.sees_anchor(&anchor), band.sees_box(anchor.ink_box())];
+            assert!(!drawn || seen == [true; 3], "{v}: {seen:?}");
+            let is_far = !(12.0..36.0).contains(&v);
+            assert!(!is_far || seen == [false; 3], "{v}: {seen:?}");
+            n_beyond_ink += u32::from(drawn && v > 32.0 + 1.9);
+        }
+        assert!(n_beyond_ink > 20, "{n_beyond_ink} splats touch the strip with their rectangle alone");
+    }
+
     #[test]
     fn a_depth_that_rounding_moves_onto_a_border_is_not_left_out() {
         let random = &mut Numbers(2);

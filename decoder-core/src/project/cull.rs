@@ -107,3 +107,55 @@ impl View {
         u + radius > 0.0 && u - radius < width && v + radius > 0.0 && v - radius < height
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::View;
+    use crate::bundle::Effects;
+    use crate::camera::{Camera, Rotation};
+    use crate::math::functions::Reference;
+    use crate::scene::Gaussian;
+
+    /// Far from the origin the sums of the test and those of the projection are rounded by more than a pixel, each by its own.
+    #[test]
+    fn what_rounding_moves_into_the_image_far_from_the_origin_is_seen() {
+        let mut state = 5_u32;
+        let mut between = |low: f32, high: f32| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            low + (high - low) * (state >> 8) as f32 / 16_777_216.0
+        };
+        let [mut n_drawn, mut n_left_out] = [0; 2];
+        for _ in 0..20_000 {
+            let [(s, c), (sz, cz)] = [between(-0.7, 0.7), between(-3.0, 3.0)].map(f32::sin_cos);
+            let rotation = [cz, -sz, 0.0, c * sz, c * cz, -s, s * sz, s * cz, c];
+            let far = 10.0_f32.powf(between(0.0, 7.0));
+            let centre = [(); 3].map(|()| between(-far, far));
+            // Around the left border of the image, and around the line that a splat is surely beyond.
+            let depth = between(0.3, 3.0);
+            let point = [(between(-24.0, 2.0) - 40.0) / 80.0 * depth, between(-0.3, 0.3) * depth, depth];
+            let translation = std::array::from_fn(|row| {
+                let turned: f64 = (0..3).map(|i| f64::from(rotation[3 * row + i]) * f64::from(centre[i])).sum();
+                (f64::from(point[row]) - turned) as f32
+            });
+            let camera = Camera {
+                rotation: Rotation::new(rotation).expect("a rotation"),
+                translation,
+                focal_px: [80.0; 2],
+                principal_px: [40.0, 30.0],
+                width_px: 80,
+                height_px: 60,
+            };
+            let view = View::new(&camera).expect("a sound camera");
+            let scale = 1e-4_f32;
+            let gaussian =
+                Gaussian { centre, scale: [scale; 3], rotation: [1.0, 0.0, 0.0, 0.0], opacity: 1.0, colour: [0.0; 3] };
+            let ink = (centre.map(|x| x - 3.33 * scale), centre.map(|x| x + 3.33 * scale));
+            let drawn = view.project::<Reference>(&gaussian, Effects::default()).is_some();
+            let seen = view.sees_box(ink);
+            assert!(!drawn || seen, "{view:?}, {centre:?}");
+            n_drawn += u32::from(drawn);
+            n_left_out += u32::from(!seen);
+        }
+        assert!(n_drawn > 2000 && n_left_out > 2000, "{n_drawn} are drawn, {n_left_out} left out");
+    }
+}

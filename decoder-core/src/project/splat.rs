@@ -63,7 +63,7 @@ impl View {
             return None;
         }
         let mean = self.to_image(point);
-        let half_extent = [crate::math::sqrt(reach * covariance.xx), libm::sqrtf(reach * covariance.yy)];
+        let half_extent = [crate::math::sqrt(reach * covariance.xx), crate::math::sqrt(reach * covariance.yy)];
         let rect = TileRect::covering(mean, half_extent, self.size_px)?;
         let splat = Splat {
             mean,

@@ -198,8 +198,9 @@ impl TileSink for Comparison {
         let mut copy = [[0; 3]; 16 * 16];
         let (rgb_copy, _) = copy.split_at_mut(rgb.len());
         rgb_copy.copy_from_slice(rgb);
-        let tile = Tile { x_px, y_px, width, height, rgb: rgb_copy };
-        let pixels = tile.into_rgb565(ByteOrder::BigEndian, Rounding::Dithered).as_chunks().0;
+        let tile = Tile::new([x_px, y_px], [width, height], rgb_copy);
+        let packed = tile.map(|tile| tile.into_rgb565(ByteOrder::BigEndian, Rounding::Dithered));
+        let pixels = packed.unwrap_or_default().as_chunks().0;
         let [x, y, width] = [x_px, y_px, width].map(usize::from);
         for (line, drawn) in self.panel.iter().skip(y).zip(pixels.chunks(width)) {
             let shown = line.iter().skip(x);

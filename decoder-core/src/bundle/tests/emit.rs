@@ -121,7 +121,7 @@ fn random_header(bits: &mut Bits) -> Header {
         n_tiers: bits.up_to(8) as u8,
         training_px: std::array::from_fn(|_| bits.up_to(65_535) as u16),
         background: if built.background { bits.u32s().map(|channel: u32| channel as u8) } else { [0; 3] },
-        voxel_size: bits.f32().abs().max(f32::from_bits(1)),
+        voxel_size: bits.f32().abs().clamp(f32::from_bits(1), 1e9_f32.next_down()),
         colour_hidden: bits.up_to(256) as u16,
         detail_hidden: if features.effects.detail { bits.up_to(256) as u16 } else { 0 },
         symbol_bits: std::array::from_fn(|_| bits.up_to(16) as u8),

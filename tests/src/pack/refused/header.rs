@@ -91,16 +91,20 @@ pub(super) fn add(list: &mut List, good: &Good) {
         list.patched(name, reason, &out(field, value.into()), file, at, &[value]);
     }
     let float = |field: &str| format!("BadFloat {{ field: {field}");
-    let floats: [(&str, &str, usize, f32, &str); 11] = [
+    let floats: [(&str, &str, usize, f32, &str); 15] = [
         ("voxel-size-0", "The voxel size is 0.", 48, 0.0, "VoxelSize"),
         ("voxel-size-negative", "The voxel size is negative.", 48, -0.5, "VoxelSize"),
         ("voxel-size-infinite", "The voxel size is infinite.", 48, f32::INFINITY, "VoxelSize"),
         ("voxel-size-nan", "The voxel size is not a number.", 48, f32::NAN, "VoxelSize"),
+        ("voxel-size-large", "The voxel size is 10⁹.", 48, 1e9, "VoxelSize"),
         ("preview-rotation-nan", "A number of the preview's rotation is not a number.", 92, f32::NAN, "PreviewCamera"),
         ("preview-translation-infinite", "The preview's translation is infinite.", 128, f32::INFINITY, "PreviewCamera"),
+        ("preview-translation-large", "The preview's translation is −10¹⁵.", 128, -1e15, "PreviewCamera"),
         ("preview-focal-0", "A focal length of the preview is 0.", 136, 0.0, "PreviewCamera"),
         ("preview-focal-negative", "A focal length of the preview is negative.", 140, -60.0, "PreviewCamera"),
         ("preview-focal-infinite", "A focal length of the preview is infinite.", 140, f32::INFINITY, "PreviewCamera"),
+        ("preview-focal-large", "A focal length of the preview is 10¹⁵.", 140, 1e15, "PreviewCamera"),
+        ("preview-principal-large", "The preview's principal point is 10¹⁵.", 148, 1e15, "PreviewCamera"),
         ("preview-principal-nan", "The preview's principal point is not a number.", 144, f32::NAN, "PreviewCamera"),
         (
             "preview-principal-infinite",

@@ -14,7 +14,7 @@ use pocketsplat_trainer::explicit::pictures::{Pictures, capture};
 use pocketsplat_trainer::explicit::views::generated;
 use serde::Serialize;
 
-use super::gaussians::GaussiansFile;
+use super::gaussians::{AxesArgs, GaussiansFile};
 use super::settings::QualityOptions;
 use super::train::{HeldOut, TrainResult, train_as};
 use super::train_args::{DeviceArgs, check_lambda};
@@ -43,7 +43,7 @@ const LAMBDA: f64 = 0.0005;
 /// Cameras stand around the scene's bulk, or inside it where it lies all around its centre; --cameras gives others.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// The .ply, .spz or .sog.
+    /// The splats: .ply, .spz, .sog, .splat or .glb.
     points: PathBuf,
     /// Cameras to draw with, in the frame of the splats: a transforms.json, or a file as `render --camera` reads it
     /// [default: generated]
@@ -56,6 +56,8 @@ pub(crate) struct Args {
     /// Size of the pictures [default: 200x200; with --cameras theirs, at most 200 px]
     #[arg(long, value_name = "WxH", help_heading = INPUT)]
     resolution: Option<FrameSize>,
+    #[command(flatten)]
+    axes: AxesArgs,
     /// Colour behind the splats
     #[arg(long, value_name = "COLOUR", value_parser = one_of::<Background>(BACKGROUNDS), default_value = BACKGROUNDS[0],
         help_heading = INPUT)]
@@ -103,9 +105,6 @@ struct ImportResult {
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
-    if !GaussiansFile::is_one(&args.points) {
-        bail!("{} is no file of Gaussians by its name; needs a .ply, .spz or .sog", args.points.display());
-    }
     if args.background == Background::Learned {
         bail!("--background learned is for photographs; choose black or white, which the splats are drawn on");
     }
@@ -114,7 +113,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     }
     let config = configured(args)?;
     output::check_writable(&args.output)?;
-    let file = GaussiansFile::read(&args.points)?;
+    let file = GaussiansFile::read_as(&args.points, args.axes.spz_axes)?;
     let (train, test) = cameras(args, config.capture.resolution, &file)?;
     let capture = captured(args, &file, &train, &test)?;
     eprintln!(

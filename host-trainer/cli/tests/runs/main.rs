@@ -16,6 +16,7 @@ mod modules;
 mod plan;
 mod preview;
 mod report;
+mod splats;
 mod sweep;
 mod view;
 mod watch;

@@ -7,16 +7,17 @@ use std::sync::atomic::AtomicBool;
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::{Background, Capture, Split};
 use pocketsplat_files::shell_word;
-use pocketsplat_gaussians::Format;
+use pocketsplat_gaussians::{Format, Notes};
 use pocketsplat_trainer::device::Limits;
 use pocketsplat_trainer::explicit::CloudTrainer;
+use pocketsplat_trainer::explicit::frame;
 use pocketsplat_trainer::train::run::{Ending, Interval, LoggedStep, RunError, RunFolder, photographs_in};
 use serde::Serialize;
 
 use super::super::capture::CaptureArgs;
 use super::super::eval::explicit::measure;
 use super::super::eval::{Evaluation, Measurements};
-use super::super::gaussians::GaussiansFile;
+use super::super::gaussians::{GaussiansFile, write_gaussians};
 use super::super::process::peak_memory_bytes;
 use super::super::progress::Progress;
 use super::super::train_args::Args;
@@ -200,8 +201,8 @@ fn train_in(
 fn write(trainer: &CloudTrainer<'_>, config: &ExplicitRunConfig, capture: &Capture) -> Result<ExplicitResult> {
     let protocol = Protocol::of(capture, &config.capture);
     let notes = GaussiansFile::notes_of(&protocol)?;
-    let bytes = format_of(config)?.to_bytes(&trainer.gaussians(), &notes)?;
-    output::write_whole(&config.output, &bytes)?;
+    let notes = Notes { frame: frame::of_normalised(&capture.normalisation), ..notes };
+    let bytes = write_gaussians(format_of(config)?, &config.output, &trainer.gaussians(), &notes)?.bytes;
     let held_out = if capture.test.is_empty() {
         None
     } else {

@@ -37,7 +37,10 @@ const CRATES: [(&str, &[&str]); 8] = [
     ("host-trainer/capture/src", &["camera", "dataset", "synth"]),
     (
         "host-trainer/gaussians/src",
-        &["degree", "notes", "error", "check", "opacity", "axes", "ply", "spz", "sog", "file"],
+        &[
+            "degree", "frame", "axes", "notes", "error", "check", "meaning", "opacity", "account", "ply", "splat",
+            "spz", "sog", "format", "fit", "written", "file",
+        ],
     ),
     (
         "host-trainer/trainer/src",

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use pocketsplat_files::FileKind;
+
 /// Bytes that hold no Gaussians: what was found, what is needed, and what to do.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
@@ -13,17 +15,9 @@ impl Unreadable {
     }
 }
 
-/// Why a file could not be read or written.
+/// Why a file could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
-    /// The name ends in nothing known.
-    #[error("{path} is no file of Gaussians by its name; the names of those that are known end in {known}")]
-    Extension {
-        /// The file.
-        path: PathBuf,
-        /// The endings, as words.
-        known: String,
-    },
     /// Its bytes cannot be had.
     #[error("{path} cannot be read")]
     Read {
@@ -31,6 +25,16 @@ pub enum FileError {
         path: PathBuf,
         /// Why.
         source: std::io::Error,
+    },
+    /// It is something else.
+    #[error("{path} is {kind}, no file of Gaussians; {remedy}")]
+    Kind {
+        /// The file.
+        path: PathBuf,
+        /// What it is.
+        kind: FileKind,
+        /// What to do.
+        remedy: String,
     },
     /// It holds no Gaussians.
     #[error("{path} {fault}")]

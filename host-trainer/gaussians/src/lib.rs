@@ -1,23 +1,36 @@
 //! Explicit Gaussians with spherical harmonics, as 3D Gaussian Splatting has them (Kerbl et al. 2023), and their files.
 //!
-//! [`Gaussians`] is what every file holds and what the trainer draws, trains and makes of a bundle. Readers and writers keep the
-//! scene's frame; axes differ only inside of a .spz.
+//! [`Gaussians`] is what every file holds and what the trainer draws, trains and makes of a bundle. [`read`] tells the format by the
+//! bytes. Writers keep the scene's own numbers where the format holds them; else [`Frame`] says how the file's numbers lie in the scene.
 
+mod account;
 mod axes;
 mod check;
 mod degree;
 mod error;
 mod file;
+mod fit;
+mod format;
+mod frame;
+pub mod glb;
+mod meaning;
 mod notes;
 mod opacity;
 pub mod ply;
 pub mod sog;
+pub mod splat;
 pub mod spz;
+mod written;
 
+pub use account::{Account, Part};
+pub use axes::SpzAxes;
 pub use degree::Degree;
 pub use error::{FileError, Unreadable};
-pub use file::Format;
+pub use file::{account, is_one, read};
+pub use format::Format;
+pub use frame::Frame;
 pub use notes::Notes;
+pub use written::Written;
 
 /// N Gaussians; every slice has its rows in the same order.
 ///

@@ -5,19 +5,25 @@
 //! then of green, then of blue. The axes are the scene's own: x right, y down, z forward in what this project writes. Comments of the
 //! header say how opacities are meant (`SplatRenderMode: mip` with compensation, else `default`) and the degree.
 
+mod compressed;
 mod header;
+mod line_endings;
 mod rows;
 #[cfg(test)]
 mod tests;
 
 use std::fmt::Write as _;
 
-use crate::{Degree, Gaussians, Notes, Unreadable};
-use header::Header;
+use crate::account::Account;
+use crate::{Frame, Gaussians, Notes, Unreadable};
+use header::{Encoding, Header};
 use rows::Columns;
 
 /// Begins the comment that says how opacities are meant.
 const RENDER_MODE: &str = "SplatRenderMode:";
+
+/// Begins the comment that says where the file's numbers lie in the scene.
+const FRAME: &str = "Frame:";
 
 /// Numbers of a Gaussian besides those of `f_rest`: centre, normal, colour, opacity, scales, rotation.
 const N_FIXED: usize = 17;
@@ -51,7 +57,8 @@ fn header_text(gaussians: &Gaussians, notes: &Notes, n_rest: usize) -> String {
     let own = [format!("{RENDER_MODE} {mode}"), format!("SH degree: {}", gaussians.degree.number())];
     // A line break in a comment would end it.
     let given = notes.comments.iter().flat_map(|comment| comment.lines()).map(str::to_owned);
-    for comment in own.into_iter().chain(given) {
+    let frame = (!notes.frame.is_identity()).then(|| format!("{FRAME} {}", notes.frame));
+    for comment in own.into_iter().chain(frame).chain(given) {
         let _ = writeln!(text, "comment {comment}");
     }
     let _ = writeln!(text, "element vertex {}", gaussians.len());
@@ -68,27 +75,74 @@ fn header_text(gaussians: &Gaussians, notes: &Notes, n_rest: usize) -> String {
     text
 }
 
-/// Reads a file of any of the three encodings, with its properties in any order and of any type.
+/// Reads a file of any of the three encodings, with its properties in any order and of any type; also the compressed ones of SuperSplat.
 ///
 /// Normals and comments that only repeat the header are dropped; every other property and element that no Gaussian has is named in
-/// [`Notes::ignored`].
+/// [`Notes::ignored`]. Comments need not be UTF-8.
 ///
 /// # Errors
-/// [`Unreadable`] for what is no file of Gaussians, is cut off, or holds numbers that cannot be drawn. Memory follows the bytes that are
-/// there, never the header's count.
+/// [`Unreadable`] for what is no file of Gaussians, is cut off or damaged, or holds mostly numbers that cannot be drawn. Memory follows
+/// the bytes that are there, never the header's count.
 pub fn read(bytes: &[u8]) -> Result<(Gaussians, Notes), Unreadable> {
-    let (header, body) = Header::read(bytes)?;
-    let columns = Columns::find(&header)?;
+    let (head, body) = header::split(bytes)?;
+    let text = String::from_utf8_lossy(head);
+    let header = Header::parse(&text)?;
     let mut notes = notes_of(&header)?;
-    notes.ignored = columns.ignored.clone();
-    let body = header.skip_to_vertices(body)?;
-    let gaussians = columns.read(&header, body)?;
-    gaussians.check()?;
-    Ok((gaussians, notes))
+    if header.encoding != Encoding::Ascii {
+        line_endings::check(&header, head, body)?;
+    }
+    let gaussians = if compressed::is_one(&header) {
+        compressed::read(&header, body)?
+    } else {
+        let columns = Columns::find(&header)?;
+        notes.ignored.clone_from(&columns.ignored);
+        columns.read(&header, header.skip_to_vertices(body)?)?
+    };
+    let (gaussians, warnings) = gaussians.meant()?;
+    Ok((gaussians, Notes { warnings, ..notes }))
+}
+
+/// Where the bytes of a file went.
+pub(crate) fn account(bytes: &[u8]) -> Result<Account, Unreadable> {
+    let (head, body) = header::split(bytes)?;
+    let text = String::from_utf8_lossy(head);
+    let header = Header::parse(&text)?;
+    let mut parts = vec![("header", bytes.len() - body.len())];
+    let mut add = |name: &'static str, bytes: usize| match parts.iter_mut().find(|(other, _)| *other == name) {
+        Some((_, sum)) => *sum += bytes,
+        None => parts.push((name, bytes)),
+    };
+    let is_text = header.encoding == Encoding::Ascii;
+    for element in header.others().chain([header.vertex()]).filter(|_| !is_text) {
+        for property in &element.properties {
+            let name = match (element.name, property.name) {
+                ("chunk", _) => "bounds of chunks",
+                ("vertex", "x" | "y" | "z" | "packed_position") => "centres",
+                ("vertex", "opacity") => "opacities",
+                ("vertex", "packed_color") => "constant colours and opacities",
+                ("vertex", name) if name.starts_with("f_dc_") => "constant colours",
+                ("vertex" | "sh", name) if name.starts_with("f_rest_") => "harmonics",
+                ("vertex", name) if name.starts_with("scale_") || name == "packed_scale" => "deviations",
+                ("vertex", name) if name.starts_with("rot_") || name == "packed_rotation" => "rotations",
+                _ => "others",
+            };
+            add(name, element.count.saturating_mul(property.scalar.map_or(0, header::Scalar::n_bytes)));
+        }
+    }
+    if is_text {
+        add("text", body.len());
+    }
+    let encoding = match header.encoding {
+        Encoding::Ascii => "text",
+        Encoding::Little => "little-endian",
+        Encoding::Big => "big-endian",
+    };
+    let kind = if compressed::is_one(&header) { "compressed .ply" } else { ".ply" };
+    Ok(Account::new(format!("{kind}, {encoding}"), None, &parts))
 }
 
 /// What the comments say.
-fn notes_of(header: &Header) -> Result<Notes, Unreadable> {
+fn notes_of(header: &Header<'_>) -> Result<Notes, Unreadable> {
     let mut notes = Notes::default();
     for comment in &header.comments {
         if let Some(mode) = comment.strip_prefix(RENDER_MODE) {
@@ -101,14 +155,11 @@ fn notes_of(header: &Header) -> Result<Notes, Unreadable> {
                     )));
                 }
             };
+        } else if let Some(frame) = comment.strip_prefix(FRAME).and_then(Frame::of_text) {
+            notes.frame = frame;
         } else if !comment.starts_with("SH degree:") {
             notes.comments.push((*comment).to_owned());
         }
     }
     Ok(notes)
-}
-
-/// The degree whose coefficients beyond the first make `n_rest` numbers.
-fn degree_of(n_rest: usize) -> Option<Degree> {
-    n_rest.is_multiple_of(3).then(|| Degree::with_coefficients(n_rest / 3 + 1)).flatten()
 }

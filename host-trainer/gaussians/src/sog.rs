@@ -1,4 +1,7 @@
-//! .sog of PlayCanvas, version 2: a zip of `meta.json` and lossless WebP images, one pixel a Gaussian.
+//! .sog of PlayCanvas: a zip of `meta.json` and lossless WebP images, one pixel a Gaussian; or a folder of the same files.
+//!
+//! Versions 1 and 2 are read, 2 is written. Version 1 says no version, and has in place of codebooks the least and the largest number of
+//! each channel.
 //!
 //! Gaussians are written along a Morton curve, so that neighbours in the scene are neighbours in the images. What it loses: centres keep
 //! 16 bits of sign(x)·ln(|x| + 1) between the least and the largest, ln of scales and the constant colour are entries of codebooks of
@@ -8,6 +11,7 @@
 //! splat-transform 2.7.1), and so do reader and writer here.
 
 mod codebook;
+mod files;
 mod image_bytes;
 mod meta;
 mod morton;
@@ -17,11 +21,16 @@ mod rotation;
 mod tests;
 mod zip;
 
-use crate::opacity::{byte_of_logit, logit_of_byte};
+use std::path::Path;
+
+use crate::account::Account;
+use crate::opacity::byte_of_logit;
 use crate::{Degree, Gaussians, Notes, Unreadable};
 use codebook::Codebook;
+use files::Files;
 use image_bytes::Pixels;
 use meta::{Asset, Meta};
+pub(crate) use morton::order;
 use palette::Palette;
 
 /// Palette entries in one row of `shN_centroids`.
@@ -30,7 +39,7 @@ const ENTRIES_IN_A_ROW: usize = 64;
 /// Largest palette: what 16 bits can name.
 const MAX_PALETTE: usize = 1 << 16;
 
-/// Writes version 2.
+/// Writes version 2; its Gaussians come in the order of a Morton curve through their centres.
 ///
 /// # Errors
 /// [`Unreadable`] for no Gaussian at all, and for more than images of 16,383 × 16,383 pixels hold.
@@ -109,13 +118,16 @@ pub fn write(gaussians: &Gaussians, notes: &Notes) -> Result<Vec<u8>, Unreadable
     }
     let meta = Meta {
         version: meta::VERSION,
-        asset: Some(Asset { generator: "pocketsplat".to_owned() }),
+        asset: Some(Asset {
+            generator: "pocketsplat".to_owned(),
+            frame: (!notes.frame.is_identity()).then(|| notes.frame.numbers()),
+        }),
         count: gaussians.len(),
         antialias: notes.compensation,
         means: meta::Means { mins, maxs, files: ["means_l.webp".to_owned(), "means_u.webp".to_owned()] },
-        scales: meta::Coded { codebook: scales.values().to_vec(), files: ["scales.webp".to_owned()] },
+        scales: meta::Coded::new(scales.values().to_vec(), "scales.webp"),
         quats: meta::Files { files: ["quats.webp".to_owned()] },
-        sh0: meta::Coded { codebook: colours.values().to_vec(), files: ["sh0.webp".to_owned()] },
+        sh0: meta::Coded::new(colours.values().to_vec(), "sh0.webp"),
         others,
     };
     files.push(("meta.json".to_owned(), serde_json::to_vec(&meta).expect("plain numbers and names")));
@@ -139,15 +151,49 @@ fn extent(centres: &[[f32; 3]]) -> ([f64; 3], [f64; 3]) {
     (mins, maxs)
 }
 
-/// Reads a bundled file of version 2.
+/// Reads a bundled file.
 ///
 /// # Errors
 /// [`Unreadable`] for other versions, and for what is cut off, damaged, or unpacks to more than a scene could: memory follows the bytes
 /// that are there.
 pub fn read(bytes: &[u8]) -> Result<(Gaussians, Notes), Unreadable> {
-    let archive = zip::Archive::open(bytes)?;
-    let meta = Meta::parse(&archive.file("meta.json")?)?;
-    let load = |name: &String| Pixels::from_webp(name, &archive.file(name)?, bytes.len());
+    read_files(&Files::Zip(zip::Archive::open(bytes)?, bytes.len()))
+}
+
+/// Reads the files of a folder, `meta.json` and the images that it names.
+///
+/// # Errors
+/// As [`read`], and for files that are missing or lie elsewhere.
+pub fn read_folder(folder: &Path) -> Result<(Gaussians, Notes), Unreadable> {
+    read_files(&Files::Folder(folder))
+}
+
+/// Where the bytes of a bundled file went.
+pub(crate) fn account(bytes: &[u8]) -> Result<Account, Unreadable> {
+    account_of(&Files::Zip(zip::Archive::open(bytes)?, bytes.len()), ".sog")
+}
+
+/// Where the bytes of a folder's files went.
+pub(crate) fn account_of_folder(folder: &Path) -> Result<Account, Unreadable> {
+    account_of(&Files::Folder(folder), "unbundled .sog")
+}
+
+fn account_of(files: &Files<'_>, kind: &str) -> Result<Account, Unreadable> {
+    let json = files.read("meta.json")?;
+    let meta = Meta::parse(&json)?;
+    let mut parts = vec![("meta.json", json.len())];
+    for name in meta.files() {
+        parts.push((name, files.read(name)?.len()));
+    }
+    Ok(Account::new(format!("{kind}, version {}", meta.version), None, &parts))
+}
+
+fn read_files(files: &Files<'_>) -> Result<(Gaussians, Notes), Unreadable> {
+    let meta = Meta::parse(&files.read("meta.json")?)?;
+    let load = |name: &String| {
+        let bytes = files.read(name)?;
+        Pixels::from_webp(name, &bytes, files.n_bytes().unwrap_or(bytes.len()))
+    };
     let of_gaussians = |name: &String| load(name)?.at_least(name, meta.count);
     let [low, high] = [of_gaussians(&meta.means.files[0])?, of_gaussians(&meta.means.files[1])?];
     let quats = of_gaussians(&meta.quats.files[0])?;
@@ -157,12 +203,19 @@ pub fn read(bytes: &[u8]) -> Result<(Gaussians, Notes), Unreadable> {
     let others = match &meta.others {
         Some(others) => {
             let (centroids, labels) = others.centroids_and_labels();
-            let n_pixels = others.count.div_ceil(ENTRIES_IN_A_ROW) * ENTRIES_IN_A_ROW * (degree.n_coefficients() - 1);
+            let n_rest = degree.n_coefficients() - 1;
+            let n_pixels = others.count.div_ceil(ENTRIES_IN_A_ROW) * ENTRIES_IN_A_ROW * n_rest;
             // The last row may end with its last entry in programs that crop; what is missing is found when an entry is looked up.
-            let centroids = load(centroids)?.of_width(centroids, ENTRIES_IN_A_ROW * (degree.n_coefficients() - 1))?;
-            Some((others, centroids.at_least("shN_centroids", n_pixels)?, of_gaussians(labels)?))
+            let image =
+                load(centroids)?.of_width(centroids, ENTRIES_IN_A_ROW * n_rest)?.at_least(centroids, n_pixels)?;
+            let n_entries = if meta.version == 1 { image.len() / n_rest } else { others.count };
+            Some((others.table()?, image, of_gaussians(labels)?, n_entries))
         }
         None => None,
+    };
+    let (scale_tables, sh0_tables) = (meta.scale_tables()?, meta.sh0_tables()?);
+    let look_up = |tables: &[Vec<f32>], pixel: [u8; 4]| -> [f32; 3] {
+        std::array::from_fn(|channel| tables[channel][usize::from(pixel[channel])])
     };
 
     let mut gaussians = Gaussians { degree, ..Gaussians::default() };
@@ -178,28 +231,36 @@ pub fn read(bytes: &[u8]) -> Result<(Gaussians, Notes), Unreadable> {
                 quats.rgba(index)[3]
             ))
         })?);
-        let [x, y, z, _] = scales.rgba(index).map(|byte| meta.scales.codebook[usize::from(byte)]);
-        gaussians.log_scales.push([x, y, z]);
-        let [red, green, blue, _] = sh0.rgba(index).map(|byte| meta.sh0.codebook[usize::from(byte)]);
-        gaussians.harmonics.push([red, green, blue]);
-        gaussians.opacity_logits.push(logit_of_byte(sh0.rgba(index)[3]));
-        if let Some((others, centroids, labels)) = &others {
+        gaussians.log_scales.push(look_up(&scale_tables, scales.rgba(index)));
+        gaussians.harmonics.push(look_up(&sh0_tables, sh0.rgba(index)));
+        gaussians.opacity_logits.push(sh0_tables[3][usize::from(sh0.rgba(index)[3])]);
+        if let Some((table, centroids, labels, n_entries)) = &others {
             let [low, high, ..] = labels.rgba(index);
             let label = usize::from(u16::from_le_bytes([low, high]));
-            if label >= others.count {
+            if label >= *n_entries {
                 return Err(Unreadable::new(format!(
-                    "has palette entry {label} for Gaussian {index}, of {} entries",
-                    others.count
+                    "has palette entry {label} for Gaussian {index}, of {n_entries} entries"
                 )));
             }
             let n_rest = degree.n_coefficients() - 1;
             for number in 0..n_rest {
                 let [red, green, blue, _] =
-                    centroids.rgba(label * n_rest + number).map(|byte| others.codebook[usize::from(byte)]);
+                    centroids.rgba(label * n_rest + number).map(|byte| table[usize::from(byte)]);
                 gaussians.harmonics.push([red, green, blue]);
             }
         }
     }
-    gaussians.check()?;
-    Ok((gaussians, Notes { compensation: meta.antialias, ..Notes::default() }))
+    let (gaussians, warnings) = gaussians.meant()?;
+    let frame = meta.frame().unwrap_or_default();
+    Ok((gaussians, Notes { compensation: meta.antialias, frame, warnings, ..Notes::default() }))
+}
+
+/// Writes the files of a bundled one beside each other.
+#[cfg(test)]
+pub(crate) fn unpack_for_tests(bytes: &[u8], folder: &Path) {
+    let archive = zip::Archive::open(bytes).expect("ours");
+    let meta = Meta::parse(&archive.file("meta.json").expect("there")).expect("ours");
+    for name in meta.files().map(str::to_owned).chain(["meta.json".to_owned()]) {
+        std::fs::write(folder.join(&name), archive.file(&name).expect("there")).expect("room");
+    }
 }

@@ -71,7 +71,7 @@ fn an_independent_reader_finds_what_was_written() {
         let notes =
             Notes { compensation: degree == Degree::Two, comments: vec!["by a test".to_owned()], ..Notes::default() };
         let path = folder.path().join(format!("scene.{}", format.extension()));
-        std::fs::write(&path, format.to_bytes(&gaussians, &notes).expect("fits")).expect("room");
+        std::fs::write(&path, format.write(&gaussians, &notes).expect("fits").bytes).expect("room");
         let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/independent_reader.py");
         let output = Command::new("python3").arg(script).arg(&path).output().expect("python3 runs");
         assert!(output.status.success(), "{format:?}: {}", String::from_utf8_lossy(&output.stderr));

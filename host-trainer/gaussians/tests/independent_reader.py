@@ -69,7 +69,10 @@ def read_spz(data):
         parts[largest] = math.sqrt(max(0, 1 - sum(part * part for part in parts)))
         rotations.append([parts[3], parts[0], parts[1], parts[2]])
     rest = [[[(byte - 128) / 128 for byte in row[3 * i:3 * i + 3]] for i in range(n_rest)] for row in take(3 * n_rest)]
-    assert at == len(data)
+    # Records of vendors end the file: type, length, content. Adobe's of the axes says RUB.
+    assert flags & 2
+    kind, length, axes = struct.unpack_from("<III", data, at)
+    assert (kind, length, axes) == (0xADBE0003, 4, 4) and at + 12 == len(data)
     # From y up and z back: a function that is odd in (y, z) changes its sign. Tried out on the functions themselves.
     here, there = real_harmonics(0.3, 0.5, 0.8), real_harmonics(0.3, -0.5, -0.8)
     signs = [round(b / a) for a, b in zip(here, there)]

@@ -5,14 +5,13 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::{self, Background, Capture, LoadOptions, Split, View};
 use pocketsplat_files::shell_word;
-use pocketsplat_gaussians::Format;
 
 use crate::config::CaptureOptions;
 use crate::say::say;
 
 /// Refuses a file of explicit Gaussians, and names the command that reads it.
 pub(crate) fn refuse_gaussians(path: &Path) -> Result<()> {
-    if Format::of_path(path).is_some() {
+    if pocketsplat_gaussians::is_one(path) {
         let word = shell_word(path);
         bail!(
             "{} is a file of Gaussians, no bundle and no capture; make a bundle of it with `pocketsplat import {word} -o scene.psb`",

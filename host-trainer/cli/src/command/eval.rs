@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use crate::plot::ResultRow;
-use anyhow::Result;
+use anyhow::{Result, bail};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Capture, Image, Photograph, Split, View};
 use pocketsplat_core::Bundle;
@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 
 use super::bundle::BundleFile;
 use super::capture::{CaptureArgs, views_of};
-use super::gaussians::GaussiansFile;
+use super::gaussians::{AxesArgs, GaussiansFile};
 use super::lpips::LpipsArgs;
 use super::output;
 use crate::config::named::{SPLITS, one_of};
@@ -51,7 +51,7 @@ pub(crate) fn lpips_of(lpips: &Lpips) -> String {
 /// Compare the frames of a bundle or of a file of Gaussians with the photographs of a capture.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// The bundle, or a .ply, .spz or .sog file of Gaussians.
+    /// The bundle, or a file of Gaussians: .ply, .spz, .sog or .splat.
     bundle: PathBuf,
     #[command(flatten)]
     capture: CaptureArgs,
@@ -67,6 +67,8 @@ pub(crate) struct Args {
     /// Also measure what smaller devices draw, tier by tier.
     #[arg(long)]
     per_tier: bool,
+    #[command(flatten)]
+    axes: AxesArgs,
     #[command(flatten)]
     lpips: LpipsArgs,
     /// Print the result as JSON.
@@ -104,6 +106,9 @@ pub(crate) struct Evaluation {
     pub(crate) decode_s: f64,
     pub(crate) render_s_per_view: f64,
     pub(crate) scratch_bytes: usize,
+    /// Of a .spz that shows another scene: with the other axes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) psnr_with_other_axes_db: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) psnr_to_reference_db: Option<f64>,
     /// The scene of each tier and those before it, where asked for.
@@ -160,6 +165,9 @@ impl Evaluation {
 pub(crate) fn run(args: &Args) -> Result<()> {
     if GaussiansFile::is_one(&args.bundle) {
         return explicit::run(args);
+    }
+    if args.axes.spz_axes.is_some() {
+        bail!("{} is no .spz; leave --spz-axes out", args.bundle.display());
     }
     let file = BundleFile::read(&args.bundle)?;
     let lpips = args.lpips.load()?;
@@ -280,6 +288,7 @@ pub(crate) fn measure(
         render_s_per_view: mean(&rows, |row| row.seconds),
         scratch_bytes: rows.iter().map(|row| row.scratch_bytes).max().unwrap_or(0),
         tiers: if per_tier { tiers(file, &bundle, loaded, views)? } else { Vec::new() },
+        psnr_with_other_axes_db: None,
         psnr_to_reference_db: against_reference
             .then(|| rows.iter().map(|row| row.psnr_to_reference_db).fold(f64::INFINITY, f64::min)),
         protocol: Some(Protocol::of(loaded, options)),

@@ -1,16 +1,18 @@
 //! `pocketsplat export`: a bundle as explicit Gaussians, for programs that do not know bundles.
 
 mod cameras;
+mod conversion;
+mod rounding;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context, Result, anyhow, bail};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::Image;
 use pocketsplat_core::Bundle;
-use pocketsplat_files::Output;
-use pocketsplat_gaussians::{Degree, Format, Gaussians};
+use pocketsplat_files::{Output, shell_word};
+use pocketsplat_gaussians::{Degree, Format, Frame, Gaussians, Notes, Written};
 use pocketsplat_trainer::bundle::{decoded_scene, normalisation_of};
 use pocketsplat_trainer::explicit::frame;
 use pocketsplat_trainer::explicit::render::Renderer;
@@ -23,23 +25,24 @@ use serde::Serialize;
 
 use super::bundle::BundleFile;
 use super::capture::CaptureArgs;
-use super::gaussians::GaussiansFile;
+use super::gaussians::{AxesArgs, GaussiansFile, write_gaussians};
 use super::output;
 use super::outputs::{OverwriteArgs, command_that_makes, gaussians, reading_capture};
 use super::progress::bar_of;
 use crate::config::{CaptureOptions, Protocol};
 use crate::say::say;
 use cameras::Cameras;
+use rounding::Rounding;
 
 /// Write a bundle as explicit Gaussians, which other programs draw: .ply, .spz or .sog.
 ///
 /// Opacity, shape and colour of a bundle's Gaussians follow the view. A file keeps one opacity and one shape, and a colour in spherical
 /// harmonics. They are fitted to what the training cameras see of the bundle, and the loss on the held-out views is measured with the
 /// file as written. Without a capture, cameras are generated around what the bundle's own camera looks at. A file of Gaussians is
-/// written in another format, as it is.
+/// written in another format, and both are drawn to measure what that lost.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// The bundle; or a .ply, .spz or .sog, to be written in another format.
+    /// The bundle; or a .ply, .spz, .sog or .splat, to be written in another format.
     bundle: PathBuf,
     /// Folder of the capture, as for eval
     dataset: Option<PathBuf>,
@@ -54,6 +57,8 @@ pub(crate) struct Args {
     /// Steps of gradient descent towards the bundle's own pictures; 0 keeps the means over the views [default: 2000]
     #[arg(long, value_name = "N")]
     iterations: Option<u32>,
+    #[command(flatten)]
+    axes: AxesArgs,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
@@ -84,11 +89,33 @@ struct Export {
     loss_db: Option<f64>,
     /// Of the file's pictures to the bundle's.
     psnr_to_bundle_db: f64,
+    /// The same before numbers were rounded to the file's.
+    unrounded_psnr_to_bundle_db: f64,
+    /// Where the file's numbers lie in the capture, where they are not its own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    frame: Option<FrameRecord>,
     n_views: usize,
     /// What was measured: test or train views of the capture, or generated cameras.
     split: String,
     seconds: f64,
 }
+
+/// A point of the scene is `offset` + `scale` · the file's.
+#[derive(Debug, Serialize)]
+struct FrameRecord {
+    offset: [f64; 3],
+    scale: f64,
+}
+
+impl FrameRecord {
+    /// `None` for the scene's own numbers.
+    fn of(frame: &Frame) -> Option<Self> {
+        (!frame.is_identity()).then_some(Self { offset: frame.offset, scale: frame.scale })
+    }
+}
+
+/// Losses above it are warned of.
+const LARGE_LOSS_DB: f64 = 0.5;
 
 /// What a bundle draws with.
 struct Source<'a> {
@@ -109,15 +136,13 @@ impl<'a> Source<'a> {
         cameras.par_iter().map(|camera| Ok(core_image(self.bundle, camera)?.image)).collect()
     }
 
-    /// What Gaussians of the capture's frame show.
+    /// What Gaussians of the normalised frame show.
     fn pictures_of(&self, gaussians: &Gaussians, cameras: &[Camera]) -> Vec<Image> {
-        let mut here = gaussians.clone();
-        frame::to_normalised(&mut here, &normalisation_of(self.bundle));
-        let renderer = Renderer::new(&here).with_compensation(self.compensation);
+        let renderer = Renderer::new(gaussians).with_compensation(self.compensation);
         cameras.par_iter().map(|camera| renderer.image(camera, self.background)).collect()
     }
 
-    /// The bundle's Gaussians as a file has them, in the capture's frame, and the number that was left out.
+    /// The bundle's Gaussians as a file has them, in the normalised frame, and the number that was left out.
     fn gaussians(&self, cameras: &Cameras<'_>, degree: Degree, n_steps: u32) -> Result<(Gaussians, usize)> {
         let scene = decoded_scene(self.bundle).context("could not decode the bundle")?;
         let pinholes: Vec<Pinhole<f32>> = cameras.fitted.iter().map(Pinhole::new).collect();
@@ -133,21 +158,15 @@ impl<'a> Source<'a> {
         };
         let bar = bar_of(0, n_steps);
         let on_step = |done: u32| bar.set_position(u64::from(done));
-        let mut gaussians = refine(baked.gaussians, &with, cameras.extent, on_step);
+        let gaussians = refine(baked.gaussians, &with, cameras.extent, on_step);
         bar.finish_and_clear();
-        frame::to_capture(&mut gaussians, &normalisation_of(self.bundle));
         Ok((gaussians, baked.n_unseen))
     }
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
     let started = Instant::now();
-    let format = Format::of_path(&args.output).ok_or_else(|| {
-        let known = Format::ALL.map(|format| format!(".{}", format.extension())).join(", ");
-        let command = command_that_makes(&args.output, &args.bundle);
-        let command = command.map_or_else(String::new, |command| format!("; `{command}` makes such a file"));
-        anyhow!("{}: export writes {known}; end the name in one of them{command}", args.output.display())
-    })?;
+    let format = Format::of_path(&args.output).ok_or_else(|| no_format(args))?;
     let outputs = args.overwrite.outputs().reading(&args.bundle);
     let mut outputs = args.dataset.iter().fold(outputs, |outputs, dataset| {
         let capture = CaptureArgs { dataset: dataset.clone(), options: args.options.clone() };
@@ -155,7 +174,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     });
     let output = outputs.file(&args.output, gaussians(format))?;
     if GaussiansFile::is_one(&args.bundle) {
-        return convert(args, format, &output);
+        return conversion::run(args, format, &output);
     }
     if args.dataset.is_none() && args.options != CaptureOptions::default() {
         bail!("options of photographs need a capture; give its folder as CAPTURE, or leave them out");
@@ -185,20 +204,41 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         pictures.iter().zip(&shown).map(|(picture, shown)| psnr_db(picture, shown)).sum::<f64>() / shown.len() as f64
     };
     let bundle_psnr_db = cameras.psnr_db(&shown)?;
-    // Of the numbers before they are rounded for the file; those of a .ply are not.
-    let pictures = source.pictures_of(&gaussians, &cameras.judged);
+    // Of the numbers before they are rounded for the file.
+    let unrounded = source.pictures_of(&gaussians, &cameras.judged);
+    let unrounded_psnr_db = cameras.psnr_db(&unrounded)?;
     notes.compensation = source.compensation;
-    notes.comments.push(comment(args, &cameras, to_bundle(&pictures), cameras.psnr_db(&pictures)?.zip(bundle_psnr_db)));
+    notes.comments.push(comment(args, &cameras, to_bundle(&unrounded), unrounded_psnr_db.zip(bundle_psnr_db)));
+    let normalisation = normalisation_of(&bundle);
+    notes.frame = frame::of_normalised(&normalisation);
+    notes.spz_axes = args.axes.spz_axes;
 
-    let unreadable = |fault| anyhow!("{} {fault}", args.output.display());
-    let bytes = format.to_bytes(&gaussians, &notes).map_err(unreadable)?;
-    let (written, _) = format.from_bytes(&bytes).map_err(unreadable)?;
-    output.write(&bytes)?;
+    let file_bytes = write_gaussians(format, &output, &gaussians, &notes)?;
+    let (mut written, written_notes) = read_again(format, &output, &file_bytes, args)?;
+    frame::to_normalised(&mut written, &frame::of_file(&written_notes.frame, &normalisation));
     let pictures = source.pictures_of(&written, &cameras.judged);
     let file_psnr_db = cameras.psnr_db(&pictures)?;
+    warn_of_loss(
+        args,
+        &Losses {
+            fitting_db: bundle_psnr_db.zip(unrounded_psnr_db).map(|(bundle, fitted)| bundle - fitted),
+            rounding_db: unrounded_psnr_db.zip(file_psnr_db).map_or_else(
+                || rounding::loss_db(rounding::mean_psnr_db(&pictures, &unrounded)),
+                |(fitted, file)| fitted - file,
+            ),
+            rounding: Rounding {
+                given: &gaussians,
+                written: &written,
+                sources: &file_bytes.sources,
+                cameras: &cameras.judged,
+                background: source.background,
+                compensation: source.compensation,
+            },
+        },
+    );
     let export = Export {
         format: format.extension(),
-        bytes: bytes.len(),
+        bytes: file_bytes.bytes.len(),
         bundle_bytes: file.bytes.len(),
         n_gaussians: written.len(),
         n_left_out,
@@ -207,6 +247,8 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         bundle_psnr_db,
         loss_db: bundle_psnr_db.zip(file_psnr_db).map(|(bundle, file)| bundle - file),
         psnr_to_bundle_db: to_bundle(&pictures),
+        unrounded_psnr_to_bundle_db: to_bundle(&unrounded),
+        frame: FrameRecord::of(&file_bytes.frame),
         n_views: cameras.judged.len(),
         split: cameras.split,
         seconds: started.elapsed().as_secs_f64(),
@@ -214,37 +256,55 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     output::print(&export, args.json)
 }
 
-/// A file of Gaussians in another format.
-#[derive(Debug, Serialize)]
-struct Conversion {
-    format: &'static str,
-    bytes: usize,
-    source_bytes: usize,
-    n_gaussians: usize,
-    sh_degree: usize,
+/// The Gaussians of what was written, as others read them: not from the output, which may be a FIFO.
+fn read_again(format: Format, output: &Output, written: &Written, args: &Args) -> Result<(Gaussians, Notes)> {
+    let read = format.read(&written.bytes, args.axes.spz_axes);
+    read.map_err(|fault| anyhow!("{} {fault}", output.path().display()))
 }
 
-/// Writes the Gaussians of a file in another format; nothing is fitted.
-fn convert(args: &Args, format: Format, output: &Output) -> Result<()> {
-    if args.dataset.is_some() || args.iterations.is_some() || args.options != CaptureOptions::default() {
-        bail!(
-            "{} holds Gaussians, which are written as they are; leave CAPTURE, --iterations and options of photographs out",
-            args.bundle.display()
+/// Where an export lost what it lost.
+struct Losses<'a> {
+    /// To the photographs, by one opacity and one shape for all views; `None` where there are none.
+    fitting_db: Option<f64>,
+    /// By the file's numbers.
+    rounding_db: f64,
+    rounding: Rounding<'a>,
+}
+
+fn warn_of_loss(args: &Args, losses: &Losses<'_>) {
+    let path = args.output.display();
+    if let Some(loss) = losses.fitting_db.filter(|loss| *loss > LARGE_LOSS_DB) {
+        say!(
+            "warning: {path}: one opacity and one shape for all views lose {loss:.2} dB, before any number is rounded; more --iterations or \
+             a higher --sh-degree may lose less"
         );
     }
-    let file = GaussiansFile::read(&args.bundle)?;
-    let gaussians = file.gaussians.reduced_to(Degree::ALL[usize::from(args.sh_degree)]);
-    let bytes =
-        format.to_bytes(&gaussians, &file.notes).map_err(|fault| anyhow!("{} {fault}", args.output.display()))?;
-    output.write(&bytes)?;
-    let conversion = Conversion {
-        format: format.extension(),
-        bytes: bytes.len(),
-        source_bytes: file.n_bytes,
-        n_gaussians: gaussians.len(),
-        sh_degree: gaussians.degree.number(),
-    };
-    output::print(&conversion, args.json)
+    if losses.rounding_db > LARGE_LOSS_DB {
+        say!(
+            "warning: {path}: the format's numbers lose {:.2} dB, {}; a .ply loses none",
+            losses.rounding_db,
+            losses.rounding.worst()
+        );
+    }
+}
+
+/// Says which names are written.
+fn no_format(args: &Args) -> anyhow::Error {
+    let path = &args.output;
+    let known = Format::ALL.map(|format| format!(".{}", format.extension())).join(", ");
+    if path.to_string_lossy().to_lowercase().ends_with(".compressed.ply") {
+        let plain = Path::new("scene.ply");
+        return anyhow!(
+            "{}: this is the name of a compressed .ply, which is read and not written; write {known}, and compress a .ply with \
+             `splat-transform {} {}`",
+            path.display(),
+            plain.display(),
+            shell_word(path)
+        );
+    }
+    let command = command_that_makes(path, &args.bundle);
+    let command = command.map_or_else(String::new, |command| format!("; `{command}` makes such a file"));
+    anyhow!("{}: export writes {known}; end the name in one of them{command}", path.display())
 }
 
 /// What the file says of its making; a .ply alone has room for it.

@@ -3,10 +3,11 @@
 use std::path::Path;
 use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Background, Capture, Normalisation};
-use pocketsplat_gaussians::{Format, Gaussians, Notes};
+use pocketsplat_files::Output;
+use pocketsplat_gaussians::{Format, Gaussians, Notes, SpzAxes, Written};
 use pocketsplat_trainer::explicit::frame;
 use pocketsplat_trainer::explicit::render::Renderer;
 use pocketsplat_trainer::explicit::up::Up;
@@ -20,6 +21,15 @@ const PROTOCOL: &str = "pocketsplat ";
 /// Begins the comment that says which axis points up, as other programs write it too.
 const VERTICAL_AXIS: &str = "Vertical axis:";
 
+/// What a .spz does not say, or says wrongly.
+#[derive(clap::Args, Clone, Copy, Debug)]
+pub(crate) struct AxesArgs {
+    /// Axes of a .spz, read or written: as-described (y up, z back) or as-in-ply, as splat-transform 3 and others write them
+    /// [default: as the file says, else as-described]
+    #[arg(long, value_name = "AXES")]
+    pub(crate) spz_axes: Option<SpzAxes>,
+}
+
 /// A file of Gaussians, read.
 pub(crate) struct GaussiansFile {
     pub(crate) n_bytes: usize,
@@ -31,24 +41,32 @@ pub(crate) struct GaussiansFile {
 }
 
 impl GaussiansFile {
-    /// Whether a file is one by its name.
+    /// Whether a file is one by its bytes, or where they say nothing by its name.
     pub(crate) fn is_one(path: &Path) -> bool {
-        Format::of_path(path).is_some()
+        pocketsplat_gaussians::is_one(path)
     }
 
+    /// Reads a file, and says on stderr what was not read as it stands.
     pub(crate) fn read(path: &Path) -> Result<Self> {
+        Self::read_as(path, None)
+    }
+
+    /// * `spz_axes`: of a .spz, whatever its record says.
+    pub(crate) fn read_as(path: &Path, spz_axes: Option<SpzAxes>) -> Result<Self> {
         let started = Instant::now();
-        let (gaussians, notes) = Format::read(path)?;
+        let (gaussians, notes) = pocketsplat_gaussians::read(path, spz_axes)?;
         let read_s = started.elapsed().as_secs_f64();
-        if !notes.ignored.is_empty() {
-            say!(
-                "warning: {} has more than Gaussians, which is left out: {}",
-                path.display(),
-                notes.ignored.join(", ")
-            );
+        let name = path.display();
+        for remark in &notes.remarks {
+            say!("{name}: {remark}");
         }
-        let metadata = std::fs::metadata(path).with_context(|| format!("could not read {}", path.display()))?;
-        let n_bytes = usize::try_from(metadata.len())?;
+        for warning in &notes.warnings {
+            say!("warning: {name}: {warning}");
+        }
+        if !notes.ignored.is_empty() {
+            say!("warning: {name} has more than Gaussians, which is left out: {}", notes.ignored.join(", "));
+        }
+        let n_bytes = n_bytes(path).with_context(|| format!("could not read {name}"))?;
         Ok(Self { n_bytes, gaussians, notes, read_s })
     }
 
@@ -100,7 +118,38 @@ impl GaussiansFile {
     /// Draws for the cameras of a capture.
     pub(crate) fn renderer(&self, normalisation: &Normalisation) -> Renderer {
         let mut gaussians = self.gaussians.clone();
-        frame::to_normalised(&mut gaussians, normalisation);
+        frame::to_normalised(&mut gaussians, &frame::of_file(&self.notes.frame, normalisation));
         Renderer::new(&gaussians).with_compensation(self.notes.compensation)
     }
+}
+
+/// Bytes of a file, or of the files of a folder.
+fn n_bytes(path: &Path) -> std::io::Result<usize> {
+    let is_manifest = path.file_name().is_some_and(|name| name == "meta.json");
+    let folder = if path.is_dir() { Some(path) } else { path.parent().filter(|_| is_manifest) };
+    let Some(folder) = folder else { return Ok(std::fs::metadata(path)?.len() as usize) };
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    std::fs::read_dir(folder)?.map(|entry| Ok(entry?.metadata()?.len() as usize)).sum()
+}
+
+/// Writes Gaussians, and says on stderr what the format does not hold of them.
+///
+/// * `notes`: with the frame of `gaussians`.
+pub(crate) fn write_gaussians(
+    format: Format,
+    output: &Output,
+    gaussians: &Gaussians,
+    notes: &Notes,
+) -> Result<Written> {
+    let path = output.path();
+    let written = format.write(gaussians, notes).map_err(|fault| anyhow!("{} {fault}", path.display()))?;
+    output.write(&written.bytes)?;
+    for warning in &written.warnings {
+        say!("warning: {}: {warning}", path.display());
+    }
+    if format == Format::Spz {
+        let axes = notes.spz_axes.unwrap_or(SpzAxes::AsDescribed);
+        say!("{}: its axes are written {}, and its record says so", path.display(), axes.name());
+    }
+    Ok(written)
 }

@@ -13,7 +13,7 @@ use pocketsplat_trainer::explicit::bulk::Bulk;
 use pocketsplat_trainer::explicit::pictures::{Pictures, capture};
 use serde::Serialize;
 
-use super::gaussians::GaussiansFile;
+use super::gaussians::{AxesArgs, GaussiansFile};
 use super::outputs::{BUNDLE, OverwriteArgs, check_name};
 use super::settings::QualityOptions;
 use super::stand::{StandArgs, bulk_of};
@@ -45,7 +45,7 @@ const LAMBDA: f64 = 0.0005;
 /// Cameras stand around the scene's bulk or inside it, wherever more of it is seen; --cameras gives others.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// The .ply, .spz or .sog.
+    /// The splats: .ply, .spz, .sog, .splat or .glb.
     points: PathBuf,
     /// Cameras to draw with, in the frame of the splats: a transforms.json, or a file as `render --camera` reads it
     /// [default: generated]
@@ -60,6 +60,8 @@ pub(crate) struct Args {
     /// Size of the pictures [default: 200x200; with --cameras theirs, at most 200 px]
     #[arg(long, value_name = "WxH", help_heading = INPUT)]
     resolution: Option<FrameSize>,
+    #[command(flatten)]
+    axes: AxesArgs,
     /// Colour behind the splats
     #[arg(long, value_name = "COLOUR", value_parser = one_of::<Background>(BACKGROUNDS), default_value = BACKGROUNDS[0],
         help_heading = INPUT)]
@@ -111,9 +113,6 @@ struct ImportResult {
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
-    if !GaussiansFile::is_one(&args.points) {
-        bail!("{} is no file of Gaussians by its name; needs a .ply, .spz or .sog", args.points.display());
-    }
     if args.background == Background::Learned {
         bail!("--background learned is for photographs; choose black or white, which the splats are drawn on");
     }
@@ -123,7 +122,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let outputs = args.overwrite.outputs().reading(&args.points);
     let mut outputs = args.cameras.iter().fold(outputs, |outputs, path| outputs.reading(path));
     let output = outputs.file(&args.output, BUNDLE)?;
-    let file = GaussiansFile::read(&args.points)?;
+    let file = GaussiansFile::read_as(&args.points, args.axes.spz_axes)?;
     let Seen { bulk, train, test } = seen(args, config.capture.resolution, &file)?;
     let capture = captured(args, &file, &bulk, [&train, &test])?;
     say!(

@@ -1,4 +1,6 @@
-//! `pocketsplat inspect`: what a bundle holds and where its bytes went.
+//! `pocketsplat inspect`: what a bundle or a file of Gaussians holds and where its bytes went.
+
+mod splats;
 
 use std::path::PathBuf;
 
@@ -12,14 +14,17 @@ use pocketsplat_trainer::camera::host_camera;
 use serde_json::{Value, json};
 
 use super::bundle::BundleFile;
+use super::gaussians::{AxesArgs, GaussiansFile};
 use super::output;
 use super::render::CameraRecord;
 
-/// Show a bundle's header, its tiers, and its bytes part by part.
+/// Show a bundle's header, its tiers, and its bytes part by part; or what a file of Gaussians holds.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// The bundle.
+    /// The bundle, or a file of Gaussians: .ply, .spz, .sog or .splat.
     bundle: PathBuf,
+    #[command(flatten)]
+    axes: AxesArgs,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
@@ -32,6 +37,9 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
+    if GaussiansFile::is_one(&args.bundle) {
+        return splats::run(args);
+    }
     let file = BundleFile::read(&args.bundle)?;
     let bundle = file.parse()?;
     if args.hexdump {

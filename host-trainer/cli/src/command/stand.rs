@@ -10,6 +10,7 @@ use pocketsplat_trainer::explicit::views::{Side, Stand};
 
 use super::gaussians::GaussiansFile;
 use crate::config::heading::INPUT;
+use crate::say::say;
 
 /// Options that say what splats do not.
 #[derive(clap::Args, Clone, Debug, Default, PartialEq)]

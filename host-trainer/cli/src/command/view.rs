@@ -38,6 +38,7 @@ pub(crate) struct Args {
     package: Option<PathBuf>,
     #[command(flatten)]
     overwrite: OverwriteArgs,
+    #[command(flatten)]
     stand: StandArgs,
 }
 

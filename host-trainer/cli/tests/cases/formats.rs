@@ -6,7 +6,7 @@ use crate::case::{Case, TRAIN};
 
 /// Centres of a .ply that `export` wrote, and its colours' constant coefficients.
 fn rows(case: &Case, name: &str) -> Vec<[f32; 6]> {
-    let (gaussians, _) = pocketsplat_gaussians::Format::read(&case.folder.join(name)).unwrap();
+    let (gaussians, _) = pocketsplat_gaussians::read(&case.folder.join(name), None).unwrap();
     let n = gaussians.degree.n_coefficients();
     let colours = gaussians.harmonics.chunks_exact(n).map(|set| set[0]);
     gaussians.centres.iter().zip(colours).map(|(p, c)| [p[0], p[1], p[2], c[0], c[1], c[2]]).collect()

@@ -27,7 +27,7 @@ fn splats(places: impl IntoIterator<Item = ([f32; 3], [f32; 3])>) -> Gaussians {
 fn write(path: &Path, splats: &Gaussians, comments: &[&str]) {
     let comments = comments.iter().map(|comment| (*comment).to_owned()).collect();
     let notes = Notes { comments, ..Notes::default() };
-    fs::write(path, Format::of_path(path).unwrap().to_bytes(splats, &notes).unwrap()).unwrap();
+    fs::write(path, Format::of_path(path).unwrap().write(splats, &notes).unwrap().bytes).unwrap();
 }
 
 /// A ball of painted ones, 7 units from the origin.

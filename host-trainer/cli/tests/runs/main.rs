@@ -20,6 +20,7 @@ mod plan;
 mod preview;
 mod remedies;
 mod report;
+mod splats;
 mod sweep;
 mod terminal;
 mod view;

@@ -82,9 +82,8 @@ pub(super) struct Header<'a> {
 }
 
 impl<'a> Header<'a> {
-    /// The header of a file, and the bytes after it.
-    pub(super) fn read(bytes: &'a [u8]) -> Result<(Self, &'a [u8]), Unreadable> {
-        let (text, body) = split(bytes)?;
+    /// * `text`: of the header, as [`split`] finds it.
+    pub(super) fn parse(text: &'a str) -> Result<Self, Unreadable> {
         let (mut encoding, mut comments, mut elements) = (None, Vec::new(), Vec::<Element<'a>>::new());
         for line in text.lines() {
             let words: Vec<&str> = line.split_whitespace().collect();
@@ -117,7 +116,7 @@ impl<'a> Header<'a> {
         let vertex = elements.iter().position(|element| element.name == "vertex");
         let vertex = vertex
             .ok_or_else(|| Unreadable::new("has a header without an element `vertex`, so it has no Gaussians"))?;
-        Ok((Self { encoding, comments, elements, vertex }, body))
+        Ok(Self { encoding, comments, elements, vertex })
     }
 
     /// The element that holds the Gaussians.
@@ -130,10 +129,34 @@ impl<'a> Header<'a> {
         self.elements.iter().enumerate().filter(|(index, _)| *index != self.vertex).map(|(_, element)| element)
     }
 
+    /// Bytes that a binary file's elements take; `None` where a list leaves that to the rows.
+    pub(super) fn n_bytes(&self) -> Option<usize> {
+        self.elements
+            .iter()
+            .try_fold(0usize, |sum, element| sum.checked_add(element.n_bytes()?.checked_mul(element.count)?))
+    }
+
     /// The bytes from the first vertex on.
     pub(super) fn skip_to_vertices<'b>(&self, body: &'b [u8]) -> Result<&'b [u8], Unreadable> {
+        self.skip(self.vertex, body)
+    }
+
+    /// The element `name` and the bytes from its first row on; `None` where there is no such element.
+    pub(super) fn element<'b>(
+        &self,
+        name: &str,
+        body: &'b [u8],
+    ) -> Result<Option<(&Element<'a>, &'b [u8])>, Unreadable> {
+        match self.elements.iter().position(|element| element.name == name) {
+            Some(index) => Ok(Some((&self.elements[index], self.skip(index, body)?))),
+            None => Ok(None),
+        }
+    }
+
+    /// The bytes after the first `n_elements` elements.
+    fn skip<'b>(&self, n_elements: usize, body: &'b [u8]) -> Result<&'b [u8], Unreadable> {
         let mut body = body;
-        for element in &self.elements[..self.vertex] {
+        for element in &self.elements[..n_elements] {
             let cut = || {
                 Unreadable::new(format!(
                     "is cut off within its {} rows of the element `{}`; copy it again from where it was made",
@@ -147,7 +170,10 @@ impl<'a> Header<'a> {
                 }
             } else {
                 let row = element.n_bytes().ok_or_else(|| {
-                    Unreadable::new(format!("has lists in the element `{}`, which comes before `vertex`", element.name))
+                    Unreadable::new(format!(
+                        "has lists in the element `{}`, which comes before its Gaussians",
+                        element.name
+                    ))
                 })?;
                 let skipped =
                     row.checked_mul(element.count).filter(|&skipped| skipped <= body.len()).ok_or_else(cut)?;
@@ -158,8 +184,8 @@ impl<'a> Header<'a> {
     }
 }
 
-/// The header's text, and the bytes after the line `end_header`.
-fn split(bytes: &[u8]) -> Result<(&str, &[u8]), Unreadable> {
+/// The bytes of the header's text, and those after the line `end_header`.
+pub(super) fn split(bytes: &[u8]) -> Result<(&[u8], &[u8]), Unreadable> {
     const END: &[u8] = b"\nend_header";
     if !bytes.starts_with(b"ply") {
         return Err(Unreadable::new("is no .ply file: it does not start with `ply`"));
@@ -173,6 +199,5 @@ fn split(bytes: &[u8]) -> Result<(&str, &[u8]), Unreadable> {
         .iter()
         .position(|&byte| byte == b'\n')
         .ok_or_else(|| Unreadable::new("is cut off in the line `end_header`"))?;
-    let text = std::str::from_utf8(&head[..end]).map_err(|_| Unreadable::new("has a header that is not text"))?;
-    Ok((text, &bytes[after + line_end + 1..]))
+    Ok((&head[..end], &bytes[after + line_end + 1..]))
 }

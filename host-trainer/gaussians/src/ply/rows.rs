@@ -9,10 +9,14 @@ const FIXED: [&str; 14] = [
     "rot_3",
 ];
 
+/// Missing where all Gaussians are flat disks, as Huang et al. (2024, 2DGS) write them.
+const THIRD_SCALE: &str = "scale_2";
+
 /// Where the numbers of a Gaussian stand among the properties of a vertex.
 pub(super) struct Columns {
     degree: Degree,
-    fixed: [usize; FIXED.len()],
+    /// `None` for the third deviation of flat disks, which have two.
+    fixed: [Option<usize>; FIXED.len()],
     /// `f_rest_0` and on.
     rest: Vec<usize>,
     /// Names of what is not read.
@@ -34,9 +38,12 @@ impl Columns {
             }
         }
         let index_of = |name: &str| properties.iter().position(|property| property.name == name);
-        let mut fixed = [0; FIXED.len()];
+        let mut fixed = [None; FIXED.len()];
         for (column, name) in fixed.iter_mut().zip(FIXED) {
-            *column = index_of(name).ok_or_else(|| missing(header, name))?;
+            *column = index_of(name);
+            if column.is_none() && name != THIRD_SCALE {
+                return Err(missing(header, name));
+            }
         }
         let n_rest = properties.iter().filter(|property| property.name.starts_with("f_rest_")).count();
         let rest = (0..n_rest)
@@ -47,18 +54,21 @@ impl Columns {
                 })
             })
             .collect::<Result<Vec<_>, _>>()?;
-        let degree = super::degree_of(n_rest).ok_or_else(|| {
+        let degree = degree_of(n_rest).ok_or_else(|| {
             Unreadable::new(format!(
-                "has {n_rest} properties `f_rest_…`; spherical harmonics of degree 0, 1, 2 and 3 have 0, 9, 24 and 45"
+                "has {n_rest} properties `f_rest_…`; spherical harmonics of degree 0, 1, 2, 3 and 4 have 0, 9, 24, 45 and 72"
             ))
         })?;
-        let known = |index: usize| fixed.contains(&index) || rest.contains(&index);
+        let known = |index: usize| fixed.contains(&Some(index)) || rest.contains(&index);
         let mut ignored: Vec<String> = properties
             .iter()
             .enumerate()
             .filter(|(index, property)| !known(*index) && !matches!(property.name, "nx" | "ny" | "nz"))
             .map(|(_, property)| format!("property {}", property.name))
             .collect();
+        if n_rest > 3 * degree.n_coefficients() {
+            ignored.push("spherical harmonics of degree 4".to_owned());
+        }
         ignored.extend(header.others().filter(|other| other.count > 0).map(|other| format!("element {}", other.name)));
         Ok(Self { degree, fixed, rest, ignored })
     }
@@ -84,7 +94,7 @@ impl Columns {
             })?;
             row.clear();
             for word in text.split_whitespace() {
-                let number: f64 = word.parse().map_err(|_| {
+                let number = number(word).ok_or_else(|| {
                     Unreadable::new(format!("has `{}` for a number in vertex {index}", word.escape_debug()))
                 })?;
                 row.push(number as f32);
@@ -132,11 +142,11 @@ impl Columns {
     /// Adds one Gaussian from the numbers of its vertex.
     fn push(&self, gaussians: &mut Gaussians, row: &[f32]) {
         let [x, y, z, red, green, blue, opacity, scale_0, scale_1, scale_2, w, i, j, k] =
-            self.fixed.map(|column| row[column]);
+            self.fixed.map(|column| column.map_or(f32::NEG_INFINITY, |column| row[column]));
         gaussians.centres.push([x, y, z]);
         gaussians.harmonics.push([red, green, blue]);
-        let n_rest = self.degree.n_coefficients() - 1;
-        let of = |channel: usize, coefficient: usize| row[self.rest[channel * n_rest + coefficient]];
+        let (n_rest, n_held) = (self.degree.n_coefficients() - 1, self.rest.len() / 3);
+        let of = |channel: usize, coefficient: usize| row[self.rest[channel * n_held + coefficient]];
         gaussians.harmonics.extend((0..n_rest).map(|coefficient| [0, 1, 2].map(|channel| of(channel, coefficient))));
         gaussians.opacity_logits.push(opacity);
         gaussians.log_scales.push([scale_0, scale_1, scale_2]);
@@ -144,7 +154,20 @@ impl Columns {
     }
 }
 
-fn cut_off(held: usize, count: usize) -> Unreadable {
+/// The degree whose coefficients beyond the first make `n_rest` numbers; 3 for those of degree 4.
+pub(super) fn degree_of(n_rest: usize) -> Option<Degree> {
+    const OF_DEGREE_4: usize = 72;
+    let n_rest = if n_rest == OF_DEGREE_4 { 45 } else { n_rest };
+    n_rest.is_multiple_of(3).then(|| Degree::with_coefficients(n_rest / 3 + 1)).flatten()
+}
+
+/// A number as programs write it, `-nan(ind)` of Microsoft's library included.
+fn number(word: &str) -> Option<f64> {
+    let is_nan = || word.trim_start_matches(['+', '-']).get(..3).is_some_and(|start| start.eq_ignore_ascii_case("nan"));
+    word.parse().ok().or_else(|| is_nan().then_some(f64::NAN))
+}
+
+pub(super) fn cut_off(held: usize, count: usize) -> Unreadable {
     Unreadable::new(format!(
         "is cut off: it holds {held} of the {count} Gaussians that its header promises; copy it again from where it was made"
     ))
@@ -154,9 +177,7 @@ fn cut_off(held: usize, count: usize) -> Unreadable {
 fn missing(header: &Header<'_>, name: &str) -> Unreadable {
     let has = |wanted: &str| header.vertex().properties.iter().any(|property| property.name == wanted);
     let needed = format!("its vertices have no property `{name}`");
-    Unreadable::new(if has("packed_position") {
-        format!("is a compressed .ply: {needed}; `splat-transform IN.ply OUT.ply` makes a plain one of it")
-    } else if has("opacity") || has("scale_0") || has("f_dc_0") {
+    Unreadable::new(if has("opacity") || has("scale_0") || has("f_dc_0") {
         format!("is no complete file of Gaussians: {needed}")
     } else if header.others().any(|other| matches!(other.name, "face" | "tristrips") && other.count > 0) {
         format!("is a mesh, not Gaussians: {needed}; train on photographs of it, or on renderings")

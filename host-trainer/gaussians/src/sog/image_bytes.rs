@@ -93,6 +93,11 @@ impl Pixels {
         Ok(self)
     }
 
+    /// How many pixels.
+    pub(super) fn len(&self) -> usize {
+        self.rgba.len()
+    }
+
     /// Pixel `index`, row after row.
     pub(super) fn rgba(&self, index: usize) -> [u8; 4] {
         self.rgba[index]

@@ -1,7 +1,7 @@
 //! The order of a Morton curve through the scene.
 
 /// Indices of the centres along the curve: x, y and z in 10 bits each between their least and largest, interleaved.
-pub(super) fn order(centres: &[[f32; 3]]) -> Vec<usize> {
+pub(crate) fn order(centres: &[[f32; 3]]) -> Vec<usize> {
     let (mut least, mut largest) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
     for centre in centres {
         for axis in 0..3 {

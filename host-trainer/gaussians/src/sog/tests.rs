@@ -80,7 +80,10 @@ fn what_is_no_sog_is_named() {
     assert!(found(&whole[..whole.len() / 2]).starts_with("is cut off: the directory"));
     let other = zip::write(&[("word/document.xml".to_owned(), b"<xml/>".to_vec())]).expect("small");
     assert!(found(&other).starts_with("holds no meta.json"));
-    assert!(found(&changed(&example(), |meta| meta.version = 1)).starts_with("has a meta.json of version 1"));
+    assert!(
+        found(&changed(&example(), |meta| meta.version = 3))
+            .starts_with("has a meta.json of version 3, versions 1 and 2")
+    );
     assert!(found(&changed(&example(), |meta| meta.count = 1_000_000_000)).contains("1000000000 are needed"));
     assert!(
         found(&changed(&example(), |meta| meta.scales.codebook.truncate(9)))
@@ -92,7 +95,10 @@ fn what_is_no_sog_is_named() {
     assert!(
         found(&changed(&example(), |meta| meta.others.as_mut().expect("degree 3").bands = 2)).contains("pixels wide")
     );
-    assert!(found(&changed(&example(), |meta| meta.means.maxs[0] = 500.0)).contains("cannot be drawn: x of Gaussian"));
+    assert!(
+        found(&changed(&example(), |meta| [meta.means.mins[0], meta.means.maxs[0]] = [500.0; 2]))
+            .contains("cannot be drawn: 3 of its 3 Gaussians")
+    );
     assert!(
         found(&changed(&example(), |meta| meta.quats.files[0] = "sh0.webp".to_owned())).contains("kind of rotation")
     );
@@ -101,6 +107,53 @@ fn what_is_no_sog_is_named() {
     assert!(found(&damaged).starts_with("is damaged: means_l.webp does not match"));
     let error = write(&Gaussians::default(), &Notes::default()).expect_err("none").to_string();
     assert!(error.contains("no Gaussian"), "{error}");
+}
+
+/// Version 1 says no version, and has the least and the largest number of each channel in place of codebooks.
+#[test]
+fn version_1_is_read() {
+    let bytes = write(&of_degree(Degree::One, 20), &Notes::default()).expect("fits");
+    let folder = tempfile::tempdir().expect("a folder");
+    super::unpack_for_tests(&bytes, folder.path());
+    let json = folder.path().join("meta.json");
+    let mut meta: serde_json::Value = serde_json::from_slice(&std::fs::read(&json).expect("there")).expect("JSON");
+    let object = meta.as_object_mut().expect("an object");
+    object.remove("version");
+    object.remove("count");
+    object["means"]["shape"] = serde_json::json!([20, 3]);
+    object["scales"] = serde_json::json!({"shape": [20, 3], "mins": [-5.0, -4.0, -3.0], "maxs": [0.1, 1.0, 2.0], "files": ["scales.webp"]});
+    object["sh0"] =
+        serde_json::json!({"mins": [-2.0, -2.0, -2.0, -6.0], "maxs": [2.0, 2.0, 2.0, 6.0], "files": ["sh0.webp"]});
+    object["shN"] = serde_json::json!({
+        "shape": [20, 3], "mins": -1.0, "maxs": 1.0, "quantization": 8, "files": ["shN_centroids.webp", "shN_labels.webp"]
+    });
+    std::fs::write(&json, meta.to_string()).expect("room");
+    let (second, (first, _)) = (read(&bytes).expect("ours").0, super::read_folder(folder.path()).expect("version 1"));
+    assert_eq!((first.len(), first.degree, &first.centres), (20, Degree::One, &second.centres));
+    let byte = |value: f32, least: f32, largest: f32| (value - least) / (largest - least) * 255.0;
+    for index in 0..20 {
+        for (value, [least, largest]) in [
+            (first.log_scales[index][1], [-4.0, 1.0]),
+            (first.harmonics_of(index)[0][2], [-2.0, 2.0]),
+            (first.harmonics_of(index)[3][0], [-1.0, 1.0]),
+            (first.opacity_logits[index], [-6.0, 6.0]),
+        ] {
+            let byte = byte(value, least, largest);
+            assert!((0.0..=255.0).contains(&byte) && (byte - byte.round()).abs() < 1e-3, "{value} is byte {byte}");
+        }
+        // Bytes of codebooks are in ascending order, as are those of a line.
+        let order = |a: f32, b: f32| a.total_cmp(&b);
+        let (a, b) = (index, (index + 7) % 20);
+        if second.log_scales[a][0] != second.log_scales[b][0] {
+            assert_eq!(
+                order(first.log_scales[a][0], first.log_scales[b][0]),
+                order(second.log_scales[a][0], second.log_scales[b][0])
+            );
+        }
+    }
+    std::fs::write(&json, meta.to_string().replace("[20,3]", "[]")).expect("room");
+    let said = super::read_folder(folder.path()).expect_err("no shape").to_string();
+    assert!(said.contains("neither a version nor the shape"), "{said}");
 }
 
 /// A zip of one deflated file with the sizes that it claims.

@@ -19,7 +19,7 @@ pub(super) fn pack([w, x, y, z]: [f32; 4]) -> u32 {
     packed
 }
 
-/// (w, x, y, z) of length 1, from the 4 bytes of version 3 or the 3 of version 2.
+/// (w, x, y, z) of length 1, from the 4 bytes of versions 3 and 4 or the 3 of versions 1 and 2.
 pub(super) fn unpack(bytes: &[u8]) -> [f32; 4] {
     match *bytes {
         [a, b, c, d] => unpack_smallest(u32::from_le_bytes([a, b, c, d])),

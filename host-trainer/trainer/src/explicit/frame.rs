@@ -1,28 +1,31 @@
-//! Explicit Gaussians between the capture's frame, in which files have them, and the normalised frame.
+//! Explicit Gaussians on their way from the capture's frame, or a file's, to the normalised one.
 
 use glam::DVec3;
 use pocketsplat_capture::dataset::Normalisation;
-use pocketsplat_gaussians::Gaussians;
+use pocketsplat_gaussians::{Frame, Gaussians};
 
 /// Takes Gaussians to the normalised frame: centres as [`Normalisation::point`], deviations times the scale; directions stay.
-pub fn to_normalised(gaussians: &mut Gaussians, normalisation: &Normalisation) {
-    map(gaussians, normalisation.scale, |centre| normalisation.point(centre));
-}
-
-/// The reverse of [`to_normalised`].
-pub fn to_capture(gaussians: &mut Gaussians, normalisation: &Normalisation) {
-    let Normalisation { centre, scale } = *normalisation;
-    map(gaussians, 1.0 / scale, |point| point / scale + centre);
-}
-
 #[expect(clippy::cast_possible_truncation, reason = "files and training keep centres and sizes in single precision")]
-fn map(gaussians: &mut Gaussians, scale: f64, point: impl Fn(DVec3) -> DVec3) {
+pub fn to_normalised(gaussians: &mut Gaussians, normalisation: &Normalisation) {
     for centre in &mut gaussians.centres {
-        *centre = point(DVec3::from(centre.map(f64::from))).to_array().map(|x| x as f32);
+        *centre = normalisation.point(DVec3::from(centre.map(f64::from))).to_array().map(|x| x as f32);
     }
     for log_scale in &mut gaussians.log_scales {
-        *log_scale = log_scale.map(|s| (f64::from(s) + scale.ln()) as f32);
+        *log_scale = log_scale.map(|s| (f64::from(s) + normalisation.scale.ln()) as f32);
     }
+}
+
+/// What takes the numbers of a file to the frame that `normalisation` makes of the scene's.
+///
+/// * `frame`: where the file's numbers lie in the scene.
+pub fn of_file(frame: &Frame, normalisation: &Normalisation) -> Normalisation {
+    let centre = (normalisation.centre - DVec3::from(frame.offset)) / frame.scale;
+    Normalisation { centre, scale: normalisation.scale * frame.scale }
+}
+
+/// Where numbers of the normalised frame lie in the scene.
+pub fn of_normalised(normalisation: &Normalisation) -> Frame {
+    Frame { offset: normalisation.centre.to_array(), scale: 1.0 / normalisation.scale }
 }
 
 #[cfg(test)]
@@ -38,8 +41,13 @@ mod tests {
         to_normalised(&mut here, &normalisation);
         assert_eq!(here.centres, [[2.0, 0.0, -2.0]]);
         assert!((here.log_scales[0][1] - (2f32.ln() - 1.0)).abs() < 1e-6);
-        to_capture(&mut here, &normalisation);
-        assert_eq!(here.centres, there.centres);
-        assert!((here.log_scales[0][2] - 2.0).abs() < 1e-6);
+        // As a file of normalised numbers has them.
+        let mut again = here.clone();
+        to_normalised(&mut again, &of_file(&of_normalised(&normalisation), &normalisation));
+        assert_eq!(again, here);
+        let millimetres = Frame { offset: [1.0, 0.0, 2.0], scale: 1e-3 };
+        let mut file = Gaussians { centres: vec![[1000.0, -2000.0, 0.0]], ..there };
+        to_normalised(&mut file, &of_file(&millimetres, &normalisation));
+        assert_eq!(file.centres, here.centres);
     }
 }

@@ -126,11 +126,9 @@ impl<'a> CloudTrainer<'a> {
         self.cameras.len()
     }
 
-    /// The Gaussians in the capture's own frame, as files have them.
+    /// The Gaussians, normalised frame.
     pub fn gaussians(&self) -> Gaussians {
-        let mut gaussians: Gaussians = self.cloud.clone().into();
-        super::frame::to_capture(&mut gaussians, &self.capture.normalisation);
-        gaussians
+        self.cloud.clone().into()
     }
 
     /// One iteration: a view drawn without replacement, a step, the optimiser, density control.

@@ -9,6 +9,12 @@ use super::super::gaussians::GaussiansFile;
 use super::super::output;
 use super::{Args, Evaluation, Measurements, Renderer, drawn_views, lpips_of, mean, view_evaluations};
 use crate::config::{CaptureOptions, Protocol};
+use crate::say::say;
+
+/// Below it a picture has nothing to do with the photograph: a scene of other axes has 5 dB.
+const ANOTHER_SCENE_DB: f64 = 10.0;
+/// Axes that are right are better by more than this.
+const CLEARLY_DB: f64 = 3.0;
 
 /// The name of what draws them.
 const RENDERER: &str = "explicit";
@@ -21,12 +27,36 @@ pub(super) fn run(args: &Args) -> Result<()> {
             args.bundle.display()
         );
     }
-    let file = GaussiansFile::read(&args.bundle)?;
+    let file = GaussiansFile::read_as(&args.bundle, args.axes.spz_axes)?;
     let lpips = args.lpips.load()?;
     let (options, capture) = file.load(&args.capture)?;
     let what = Measurements { lpips: lpips.as_ref(), ..Measurements::default() };
-    let evaluation = measure(&file, &capture, &options, args.split, &what)?;
+    let mut evaluation = measure(&file, &capture, &options, args.split, &what)?;
+    if let Some(axes) = file.notes.spz_axes.filter(|_| evaluation.psnr_db < ANOTHER_SCENE_DB) {
+        let psnr_db = psnr_db_turned(&file, &capture, args.split)?;
+        evaluation.psnr_with_other_axes_db = Some(psnr_db);
+        let other = axes.other().name();
+        if psnr_db > evaluation.psnr_db + CLEARLY_DB {
+            say!(
+                "warning: {} shows another scene ({:.2} dB), and this one with the other axes ({psnr_db:.2} dB): read it with \
+                 `--spz-axes {other}`",
+                args.bundle.display(),
+                evaluation.psnr_db
+            );
+        } else {
+            say!("with `--spz-axes {other}` it has {psnr_db:.2} dB: its axes are not what is wrong");
+        }
+    }
     output::print_or(&evaluation, args.json, &evaluation)
+}
+
+/// Mean PSNR of the views of a split, were the axes of a .spz the other ones.
+fn psnr_db_turned(file: &GaussiansFile, loaded: &Capture, split: Split) -> Result<f64> {
+    let turned = GaussiansFile { gaussians: file.gaussians.turned(), notes: file.notes.clone(), ..*file };
+    let renderer = turned.renderer(&loaded.normalisation);
+    let views = views_of(loaded, split)?;
+    let draw = |view: &View| Ok((renderer.image(&view.camera, loaded.background), 0));
+    Ok(mean(&drawn_views(views, draw, |_, _| f64::INFINITY, None)?, |row| row.psnr_db))
 }
 
 /// Draws and measures every view of a split of a loaded capture.
@@ -64,6 +94,7 @@ pub(crate) fn measure(
         decode_s: file.read_s,
         render_s_per_view: mean(&rows, |row| row.seconds),
         scratch_bytes: 0,
+        psnr_with_other_axes_db: None,
         psnr_to_reference_db: None,
         tiers: Vec::new(),
         protocol: Some(Protocol::of(loaded, options)),

@@ -61,6 +61,7 @@ mod tests {
             decode_s: 0.0421,
             render_s_per_view: 0.0313,
             scratch_bytes: 812_345,
+            psnr_with_other_axes_db: None,
             psnr_to_reference_db: Some(58.3),
             tiers: vec![TierEvaluation { pruning_rate: 0.4, psnr_db: 29.1 }],
             protocol: None,

@@ -3,10 +3,11 @@
 use std::f64::consts::TAU;
 
 use anyhow::{Result, bail};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use pocketsplat_capture::camera::Camera;
-use pocketsplat_capture::dataset::{Capture, Image, Split, View};
+use pocketsplat_capture::dataset::{Capture, Image, Normalisation, Split, View};
 use pocketsplat_core::Bundle;
+use pocketsplat_gaussians::{Frame, Gaussians};
 use pocketsplat_trainer::camera::host_camera;
 use pocketsplat_trainer::metrics::psnr_db_masked;
 
@@ -78,6 +79,49 @@ impl<'a> Cameras<'a> {
     }
 }
 
+/// Cameras that see the bulk of a file's Gaussians.
+pub(super) struct Around {
+    pub(super) cameras: Vec<Camera>,
+    /// From the scene's frame to theirs, where the bulk is at the origin.
+    pub(super) normalisation: Normalisation,
+}
+
+/// Size of pictures of a file's Gaussians, px.
+const SIZE_PX: [u32; 2] = [240, 180];
+/// Their distance, radii of the bulk.
+const DISTANCE: f64 = 2.5;
+
+/// Every eighth of the generated cameras, around the median centre at two and a half times the radius, which is twice the median distance
+/// from there: up to half of the Gaussians may lie anywhere.
+///
+/// * `frame`: that of `gaussians`.
+pub(super) fn around_gaussians(gaussians: &Gaussians, frame: &Frame) -> Around {
+    let centres: Vec<DVec3> = gaussians.centres.iter().map(|centre| DVec3::from(centre.map(f64::from))).collect();
+    let middle = DVec3::from([0, 1, 2].map(|axis: usize| median(centres.iter().map(|centre| centre[axis]).collect())));
+    let radius = 2.0 * median(centres.iter().map(|centre| centre.distance(middle)).collect());
+    let radius = if radius > 0.0 { radius } else { 1.0 };
+    let normalisation =
+        Normalisation { centre: DVec3::from(frame.offset) + frame.scale * middle, scale: 1.0 / (radius * frame.scale) };
+    let [width_px, height_px] = SIZE_PX;
+    let lens = Camera {
+        rotation: DMat3::IDENTITY,
+        translation: DVec3::ZERO,
+        focal_px: [0.5 * f64::from(height_px) * DISTANCE; 2],
+        principal_px: SIZE_PX.map(|side| 0.5 * f64::from(side)),
+        width_px,
+        height_px,
+    };
+    let own = lens.looking_at(DVec3::new(0.0, 0.0, -DISTANCE), DVec3::ZERO, DVec3::NEG_Y);
+    let cameras = around(&own).map(|(cameras, _)| cameras).unwrap_or_default();
+    Around { cameras: cameras.into_iter().step_by(HELD_OUT_EVERY).collect(), normalisation }
+}
+
+/// 0 of nothing.
+fn median(mut values: Vec<f64>) -> f64 {
+    let middle = values.len() / 2;
+    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
+}
+
 /// Cameras with the lens of `own` on circles around the point of its axis that is nearest to the scene's origin, and their distance to it.
 fn around(own: &Camera) -> Result<(Vec<Camera>, f64)> {
     let (eye, forward) = (own.centre_world(), own.rotation.row(2));
@@ -124,7 +168,9 @@ mod tests {
     use glam::{DMat3, DVec3};
     use pocketsplat_capture::camera::Camera;
 
-    use super::around;
+    use pocketsplat_gaussians::{Frame, Gaussians};
+
+    use super::{around, around_gaussians};
 
     const LENS: Camera = Camera {
         rotation: DMat3::IDENTITY,
@@ -147,6 +193,25 @@ mod tests {
             assert!(seen.truncate().length() < 1e-9 && (seen.z - distance).abs() < 1e-9, "{seen}");
             assert!(camera.rotation.row(1).z < 0.0, "upright");
         }
+    }
+
+    #[test]
+    fn strays_do_not_move_the_cameras_of_a_file() {
+        let wave = |i: usize, phase: f64| ((i as f64 * 0.7 + phase).sin() + 5e3) as f32;
+        let mut centres: Vec<[f32; 3]> = (0..1000).map(|i| [0.1, 1.3, 2.9].map(|phase| wave(i, phase))).collect();
+        let of = |centres: &[[f32; 3]]| {
+            let gaussians = Gaussians { centres: centres.to_vec(), ..Gaussians::default() };
+            around_gaussians(&gaussians, &Frame { offset: [1e6, 0.0, 0.0], scale: 10.0 }).normalisation
+        };
+        let clean = of(&centres);
+        centres.iter_mut().step_by(10).for_each(|centre| *centre = [1e8; 3]);
+        let dirty = of(&centres);
+        assert!((clean.centre - DVec3::new(1.05e6, 5e4, 5e4)).length() < 10.0, "{clean:?}");
+        assert!(
+            (clean.centre - dirty.centre).length() < 5.0 && (clean.scale / dirty.scale - 1.0).abs() < 0.2,
+            "{dirty:?}"
+        );
+        assert_eq!(around_gaussians(&Gaussians::default(), &Frame::default()).cameras.len(), 16);
     }
 
     #[test]

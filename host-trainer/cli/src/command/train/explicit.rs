@@ -8,16 +8,17 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::{Background, Capture, Split};
 use pocketsplat_files::{Output, shell_word};
-use pocketsplat_gaussians::Format;
+use pocketsplat_gaussians::{Format, Notes};
 use pocketsplat_trainer::device::Limits;
 use pocketsplat_trainer::explicit::CloudTrainer;
+use pocketsplat_trainer::explicit::frame;
 use pocketsplat_trainer::train::run::{Ending, Interval, LoggedStep, RunError, RunFolder, photographs_in};
 use serde::Serialize;
 
 use super::super::capture::CaptureArgs;
 use super::super::eval::explicit::measure;
 use super::super::eval::{Evaluation, Measurements};
-use super::super::gaussians::GaussiansFile;
+use super::super::gaussians::{GaussiansFile, write_gaussians};
 use super::super::output::{json, print_or};
 use super::super::outputs::gaussians;
 use super::super::process::peak_memory_bytes;
@@ -220,15 +221,15 @@ fn write(
 ) -> Result<ExplicitResult> {
     let protocol = Protocol::of(capture, &config.capture);
     let notes = GaussiansFile::notes_of(Some(&protocol), capture.train.iter().map(|view| &view.camera))?;
+    let notes = Notes { frame: frame::of_normalised(&capture.normalisation), ..notes };
     let format = format_of(config)?;
-    let bytes = format.to_bytes(&trainer.gaussians(), &notes)?;
-    output.write(&bytes)?;
+    let bytes = write_gaussians(format, output, &trainer.gaussians(), &notes)?.bytes;
     let held_out = if capture.test.is_empty() {
         None
     } else {
         // As the file has them, which need not lie anywhere: a FIFO cannot be read again.
         let started = Instant::now();
-        let (gaussians, notes) = format.from_bytes(&bytes)?;
+        let (gaussians, notes) = format.read(&bytes, None)?;
         let read_s = started.elapsed().as_secs_f64();
         let file = GaussiansFile { n_bytes: bytes.len(), gaussians, notes, read_s };
         let Evaluation { psnr_db, ssim, n_views, views, .. } =

@@ -21,7 +21,7 @@ pub(crate) fn commands_in(said: &str) -> Vec<String> {
     commands
 }
 
-/// Runs a command as a person would who copies it, in the folder `at`: to its end, or until it trains.
+/// Runs a command as a person would who copies it, in the folder `at`: to its end, an import until it trains.
 pub(crate) fn works(at: &Path, command: &str) {
     let own = Path::new(env!("CARGO_BIN_EXE_pocketsplat")).parent().unwrap();
     let path = std::env::join_paths(
@@ -39,7 +39,7 @@ pub(crate) fn works(at: &Path, command: &str) {
             assert!(status.success(), "{command}: {}", said());
             return;
         }
-        if said().contains(" it/s ") {
+        if command.contains(" import ") && said().contains(" it/s ") {
             // The shell and what it started.
             let killed = Command::new("kill").args(["-9", "--", &format!("-{}", child.id())]).status();
             assert!(killed.unwrap().success());

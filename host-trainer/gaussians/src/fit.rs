@@ -95,7 +95,7 @@ pub(crate) fn fitted(format: Format, gaussians: &Gaussians, frame: &Frame) -> Re
     }
     if harmed.n_beyond > 0 {
         warnings.push(format!(
-            "{} of {n} Gaussians lie farther out than the {} units that a .{name} reaches in steps fine enough for the others: they are left \
+            "{} of {n} Gaussians lie farther out than the {:.0} units that a .{name} reaches in steps fine enough for the others: they are left \
              out",
             harmed.n_beyond, harmed.reach
         ));

@@ -11,10 +11,10 @@ use super::{Args, Evaluation, Measurements, Renderer, drawn_views, lpips_of, mea
 use crate::config::{CaptureOptions, Protocol};
 use crate::say::say;
 
-/// Below it a picture has nothing to do with the photograph: a scene of other axes has 5 dB.
-const ANOTHER_SCENE_DB: f64 = 10.0;
+/// Below it a picture may have nothing to do with the photograph: a scene of other axes has 5 dB, and 13 where most of both is background.
+const ANOTHER_SCENE_DB: f64 = 15.0;
 /// Axes that are right are better by more than this.
-const CLEARLY_DB: f64 = 3.0;
+const CLEARLY_DB: f64 = 1.0;
 
 /// The name of what draws them.
 const RENDERER: &str = "explicit";

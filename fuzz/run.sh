@@ -25,8 +25,8 @@ if [ -f "$what" ]; then
 fi
 "$program" "${options[@]}" -max_total_time="$what" -timeout=20 -print_final_stats=1 -artifact_prefix="$out/$target-" "$out/corpus/$target" "${seeds[@]}" \
   >"$out/$target.log" 2>&1 || {
-  grep -A2 "panicked at\|ERROR:" "$out/$target.log" | head -12 >&2
-  file=$(ls -t "$out/$target"-{crash,timeout,oom,leak}-* 2>/dev/null | head -1)
+  grep -A2 "panicked at\|ERROR:" "$out/$target.log" >&2 || tail -3 "$out/$target.log" >&2
+  file=$(ls -t "$out/$target"-{crash,timeout,oom,leak}-* 2>/dev/null | head -1) || true
   echo "$target: a law does not hold for ${file:-(no file: $out/$target.log)}; again: fuzz/run.sh $target ${file:-FILE}" >&2
   exit 1
 }

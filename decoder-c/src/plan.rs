@@ -122,15 +122,7 @@ pub(crate) unsafe fn bytes_of(bytes: *const u8, len: usize) -> Option<&'static [
 /// A budget for frames of at most width_px by height_px within ram_bytes, everything else as good as memory allows.
 #[unsafe(no_mangle)]
 pub extern "C" fn psb_budget_for_frame(width_px: u16, height_px: u16, ram_bytes: usize) -> Budget {
-    Budget {
-        ram_bytes,
-        slow_bytes: 0,
-        width_px,
-        height_px,
-        tiers: u8::MAX,
-        quality: Quality::Exact as u8,
-        slabs: 0,
-    }
+    Budget { ram_bytes, slow_bytes: 0, width_px, height_px, tiers: u8::MAX, quality: Quality::Exact as u8, slabs: 0 }
 }
 
 /// Checks a bundle and says how many bytes the best plan within a budget takes.

@@ -95,7 +95,8 @@ mod tests {
     use super::{Rounding, loss_db};
 
     fn cloud() -> Gaussians {
-        let place = |i: usize| [(i % 5) as f32 * 0.2 - 0.4, (i / 5) as f32 * 0.2 - 0.4, 3.0];
+        // Each at a depth of its own: what lies at one is drawn in the order of the file.
+        let place = |i: usize| [(i % 5) as f32 * 0.2 - 0.4, (i / 5) as f32 * 0.2 - 0.4, 3.0 + 0.01 * i as f32];
         Gaussians {
             degree: Degree::One,
             centres: (0..25).map(place).collect(),

@@ -39,7 +39,7 @@ const CRATES: [(&str, &[&str]); 8] = [
         "host-trainer/gaussians/src",
         &[
             "degree", "frame", "axes", "notes", "error", "check", "meaning", "opacity", "account", "ply", "splat",
-            "spz", "sog", "format", "fit", "written", "file",
+            "glb", "spz", "sog", "format", "fit", "written", "file",
         ],
     ),
     (

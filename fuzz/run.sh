@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Runs a fuzz target from the bundles of the conformance pack, or again on one file that it found.
+# Runs a fuzz target from the bundles of the conformance pack and earlier finds, or again on one file that it found.
 #
 #   run.sh TARGET SECONDS
 #   run.sh TARGET FILE
@@ -19,7 +19,7 @@ cd "$fuzz"
 RUSTFLAGS="${flags[*]}" cargo +nightly build -q --release --locked --bin "$target" --target "$host" --target-dir "$out"
 program=$out/$host/release/$target
 # A Gaussian's words are short, and no seed is some.
-case $target in normal) options=(-max_len=128) seeds=() ;; *) options=(-max_len=8192) seeds=(../tests/pack/bundles ../tests/pack/refused) ;; esac
+case $target in normal) options=(-max_len=128) seeds=() ;; *) options=(-max_len=8192) seeds=(../tests/pack/bundles ../tests/pack/refused finds) ;; esac
 if [ -f "$what" ]; then
   exec "$program" "$what"
 fi

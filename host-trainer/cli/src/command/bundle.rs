@@ -7,6 +7,7 @@ use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Background, Capture, View};
 use pocketsplat_core::Bundle;
 use pocketsplat_core::bundle::crc32;
+use pocketsplat_files::FileKind;
 use pocketsplat_trainer::bundle::{for_each_chunk, normalisation_of, protocol_of};
 use pocketsplat_viewer::SceneFile;
 use serde::Deserialize;
@@ -31,6 +32,10 @@ impl BundleFile {
     pub(crate) fn read(path: &Path) -> Result<Self> {
         refuse_gaussians(path)?;
         let bytes = std::fs::read(path).with_context(|| format!("could not read the bundle {}", path.display()))?;
+        if let Some(kind) = FileKind::of(&bytes).filter(|kind| *kind != FileKind::Bundle) {
+            let remedy = kind.remedy().unwrap_or("give a .psb file");
+            bail!("{} is {kind}, needed: a bundle (.psb); {remedy}", path.display());
+        }
         Ok(Self { path: path.to_owned(), bytes })
     }
 

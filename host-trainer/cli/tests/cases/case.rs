@@ -22,17 +22,21 @@ pub(crate) fn root() -> PathBuf {
     std::env::var_os("POCKETSPLAT_CASES").map_or(beside, PathBuf::from)
 }
 
+/// Says what is not tested, and why.
+pub(crate) fn skipped(why: &str) {
+    // Not `eprintln!`, which a test that passes keeps to itself.
+    let _ = writeln!(std::io::stderr(), "SKIPPED: {why}");
+}
+
 impl Case {
     /// The case of this name, or `None` after saying what is skipped.
     pub(crate) fn find(name: &str) -> Option<Self> {
         let source = root().join(name);
         if !source.is_dir() {
-            // Not `eprintln!`, which a test that passes keeps to itself.
-            let _ = writeln!(
-                std::io::stderr(),
-                "SKIPPED: case {name}: not at {}; set POCKETSPLAT_CASES to a folder that has {name}/",
+            skipped(&format!(
+                "case {name}: not at {}; set POCKETSPLAT_CASES to a folder that has {name}/",
                 source.display()
-            );
+            ));
             return None;
         }
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("cases").join(name);

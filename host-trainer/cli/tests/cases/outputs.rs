@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::case::{Case, root};
+use crate::case::{Case, root, skipped};
 
 const SHORT: [&str; 6] = ["--iterations", "60", "--max-resolution", "48", "-o", "scene.ply"];
 
@@ -18,7 +18,7 @@ fn a_bundle_is_not_called_ply() {
 fn a_device_stays_one() {
     let Some(case) = Case::with_sound_capture("output-is-a-device") else { return };
     if case.script("mknod", &["-m", "666", "probe", "c", "1", "3"]).code != Some(0) {
-        eprintln!("skipped: devices are made by root alone");
+        skipped("a device: only root makes one");
         return;
     }
     case.script("sh", &["reproduce.sh", "capture"]).succeeds(&["character special file"]);
@@ -55,7 +55,7 @@ fn a_terminal_may_go_away() {
 fn sizes_of_the_web_package_are_checked() {
     let Some(case) = Case::with_sound_capture("web-package-sizes") else { return };
     if case.script("sh", &["-c", "command -v node"]).code != Some(0) {
-        eprintln!("skipped: Node.js is missing");
+        skipped("the web package: Node.js is missing");
         return;
     }
     let train = ["train", "capture", "-o", "scene.psb", "--iterations", "60", "--max-resolution", "48"];

@@ -12,16 +12,19 @@ use super::gaussians::GaussiansFile;
 use crate::config::heading::INPUT;
 use crate::say::say;
 
+/// A larger share of Gaussians apart from the bulk is worth a warning: they may cost a dB, since a bundle has to show them too.
+const MANY_APART: f64 = 0.01;
+
 /// Options that say what splats do not.
 #[derive(clap::Args, Clone, Debug, Default, PartialEq)]
 pub(crate) struct StandArgs {
     /// Axis that points up in the frame of the splats: one of +x, -x, +y, -y, +z, -z [default: what the file says, else -y]
     #[arg(long, value_name = "AXIS", allow_hyphen_values = true, help_heading = INPUT)]
     up: Option<Up>,
-    /// Look at the splats from around them, as at an object [default: whichever side shows more of them]
+    /// Look at the splats from around them, as at an object [default: by how much is seen from inside alone]
     #[arg(long, conflicts_with = "inside", help_heading = INPUT)]
     around: bool,
-    /// Look at the splats from their inside, as in a room [default: whichever side shows more of them]
+    /// Look at the splats from their inside, as in a room [default: by how much is seen from inside alone]
     #[arg(long, help_heading = INPUT)]
     inside: bool,
 }
@@ -57,9 +60,10 @@ impl StandArgs {
         };
         say!("up is {up}, {why}");
         let otherwise = other.map_or_else(String::new, |other| {
-            let [around, inside] = [evidence.seen_around, evidence.seen_inside].map(|share| 100.0 * share);
-            let hollow = if evidence.could_be_either() { "; it is hollow and could be seen from either side" } else { "" };
-            format!(", as {around:.0} % of it is seen from around and {inside:.0} % from inside{hollow}; {other} says otherwise")
+            let content = 100.0 * evidence.content.max(0.0);
+            let hollow =
+                if evidence.could_be_either() { "; it is hollow and could be seen from either side" } else { "" };
+            format!(", as {content:.0} % of it is seen from inside alone{hollow}; {other} says otherwise")
         });
         let warning = if other.is_some() && evidence.could_be_either() { "warning: " } else { "" };
         say!("{warning}bulk at {:.3}, radius {:.3}: cameras stand {place}{otherwise}", bulk.centre, bulk.radius);
@@ -89,13 +93,12 @@ pub(crate) fn bulk_of(path: &Path, file: &GaussiansFile) -> Result<Bulk> {
         format!("nothing in {} can be looked at: no Gaussian is opaque, or all are in one point", path.display())
     })?;
     if bulk.n_apart > 0 {
-        let (warning, strays) = match bulk.n_strays {
-            0 => ("", String::new()),
-            n => (
-                "warning: ",
-                format!("; {n} of them are strays of more than {STRAY_RADII} radii, at which no anchor begins"),
-            ),
+        let strays = match bulk.n_strays {
+            0 => String::new(),
+            n => format!("; {n} of them are strays of more than {STRAY_RADII} radii, at which no anchor begins"),
         };
+        let is_much = bulk.n_strays > 0 || bulk.n_apart as f64 > MANY_APART * file.gaussians.len() as f64;
+        let warning = if is_much { "warning: " } else { "" };
         say!(
             "{warning}{} of {} Gaussians lie apart from the bulk, up to {:.3e} radii out: they are drawn, but decide nothing{strays}",
             bulk.n_apart,

@@ -87,7 +87,7 @@ impl Bulk {
         !(point.distance(self.centre) <= STRAY_RADII * self.radius)
     }
 
-    /// Whether next to nothing of the bulk is within about a fifth of its median distance: a camera may stand there.
+    /// Whether next to nothing of the bulk is within an eighth of its median distance: a camera may stand there.
     pub fn is_free(&self, place: DVec3) -> bool {
         self.cells.is_free(place)
     }

@@ -1,8 +1,8 @@
 //! From which side a scene was made to be seen: as an object from around it, or as a room from its inside.
 //!
 //! What is opaque in a scene was seen by whoever made it; the rest is not there, or is thin. So small pictures are taken from around the
-//! bulk, at the heights of someone who walks around it, and from free places inside. The side that sees more of what is there is the
-//! right one.
+//! bulk, at the heights of someone who walks around it, from below, and from free places inside. What is seen from inside alone was seen
+//! from there.
 
 mod seen;
 
@@ -39,8 +39,10 @@ const OUTERMOST: f64 = 1.2;
 
 /// A place inside is enclosed where so much of all directions is blocked.
 const ENCLOSED: f64 = 0.6;
-/// The inside is the right side where it shows so much more of the scene.
-const MARGIN: f64 = 0.1;
+/// The inside is the right side where so much of the scene is seen from there alone …
+const CONTENT: f64 = 0.03;
+/// … and not less of it than this share of what is seen from around: an object has cavities that show little.
+const WHOLE: f64 = 0.8;
 /// A ground hides a scene where cameras below see less than this share of what those above see.
 const GROUND: f64 = 0.8;
 
@@ -53,6 +55,9 @@ pub struct Evidence {
     pub seen_around: f64,
     /// See [`Self::seen_around`].
     pub seen_inside: f64,
+    /// Share that is seen from inside alone, less what is seen from around alone; of both only what is not seen from below, as
+    /// the floor is under furniture.
+    pub content: f64,
     /// Share that is seen from above, on a circle, and from as far below.
     pub seen_from_above: f64,
     /// See [`Self::seen_from_above`].
@@ -62,15 +67,18 @@ pub struct Evidence {
 }
 
 impl Evidence {
-    /// The side that shows more of the scene.
+    /// The side from which the scene was made to be seen.
     pub fn side(&self) -> Side {
-        let more_inside = self.seen_inside - self.seen_around;
-        if self.enclosed >= ENCLOSED && more_inside > MARGIN { Side::Inside } else { Side::Around }
+        if self.is_hollow() && self.content > CONTENT { Side::Inside } else { Side::Around }
     }
 
-    /// Whether it is hollow, and both sides show about as much of it: so do an empty room, a tube and the shell of an object.
+    /// Whether it is hollow, and both sides show as much of it: so do an empty room, a tube and the shell of an object.
     pub fn could_be_either(&self) -> bool {
-        self.enclosed >= ENCLOSED && (self.seen_inside - self.seen_around).abs() <= MARGIN
+        self.is_hollow() && self.content.abs() <= CONTENT
+    }
+
+    fn is_hollow(&self) -> bool {
+        self.enclosed >= ENCLOSED && self.seen_inside >= WHOLE * self.seen_around
     }
 
     /// Whether cameras below would see the underside of a ground and little else.
@@ -99,14 +107,13 @@ impl Evidence {
             let azimuth = |i: usize| TAU * i as f64 / N_AROUND as f64;
             (0..N_AROUND).map(|i| around_at(bulk, up, direction(up, rise, azimuth(i)), 1.0, [SIDE_PX; 2])).collect()
         };
-        let low = look(&ring(WALKING[0]));
+        let [low, high] = WALKING.map(|rise| look(&ring(rise)));
+        let shown = |i: usize| looker.share(&low[i]) + looker.share(&high[i]);
         let front = (0..N_AROUND)
-            .max_by(|a, b| looker.share(&low[*a]).total_cmp(&looker.share(&low[*b])))
+            .max_by(|a, b| shown(*a).total_cmp(&shown(*b)))
             .map_or(0.0, |i| TAU * i as f64 / N_AROUND as f64);
-        let high = look(&ring(WALKING[1]));
-        let seen = |sights: &[Sight]| looker.weighted(looker.best(sights).into_iter());
-        let (seen_from_above, seen_from_below) = (seen(&high), seen(&look(&ring(-WALKING[1]))));
-        let around: Vec<Sight> = low.into_iter().chain(high).collect();
+        let (above, below) = (looker.best(&high), looker.best(&look(&ring(-WALKING[1]))));
+        let around = looker.best(&low.into_iter().chain(high).collect::<Vec<_>>());
 
         let mut places: Vec<(f64, DVec3)> = (0..N_PLACES)
             .map(|i| inside_place(bulk, i))
@@ -127,13 +134,17 @@ impl Evidence {
             })
         };
         let cameras: Vec<Camera> = places.iter().take(N_INSIDE).flat_map(|(_, place)| turned(*place)).collect();
-        let inside = look(&cameras);
+        let inside = looker.best(&look(&cameras));
+        let more =
+            inside.iter().zip(&around).zip(&below).map(|((inside, around), below)| (1.0 - below) * (inside - around));
+        let weighted = |seen: &[f64]| looker.weighted(seen.iter().copied());
         Self {
             enclosed,
-            seen_around: seen(&around),
-            seen_inside: seen(&inside),
-            seen_from_above,
-            seen_from_below,
+            seen_around: weighted(&around),
+            seen_inside: weighted(&inside),
+            content: looker.weighted(more),
+            seen_from_above: weighted(&above),
+            seen_from_below: weighted(&below),
             front,
         }
     }

@@ -21,9 +21,7 @@ const PART_SHARE: f64 = 0.2;
 const NEAR_PART_SHARE: f64 = 0.01;
 /// … this.
 const NEAR_PART: f64 = 3.0;
-/// A place is free if so little is nearer than this, median distances …
-const FREE: f64 = 0.2;
-/// … as that many typical cells weigh: a wall has more, floaters have less.
+/// A place is free if its cell and those beside it weigh less than so many typical cells: a wall has more, floaters have less.
 const FREE_CELLS: f64 = 3.0;
 
 /// Which Gaussians make the bulk, and where they are.
@@ -37,8 +35,6 @@ pub(super) struct Body {
 pub(super) struct Cells {
     origin: DVec3,
     edge: f64,
-    /// Cells to each side that have to be nearly empty around a place.
-    free: i32,
     /// Weight of the cell in the middle of all weight.
     typical: f64,
     occupied: BTreeMap<[i32; 3], f64>,
@@ -58,9 +54,7 @@ impl Body {
         }
         let per_median = ((centres.len() as f64).cbrt() / 1.5).clamp(COARSEST, FINEST);
         let edge = median / per_median;
-        #[expect(clippy::cast_possible_truncation, reason = "at most a fifth of the finest cells")]
-        let free = (FREE * per_median).ceil() as i32;
-        let mut cells = Cells { origin, edge, free, typical: 0.0, occupied: BTreeMap::new() };
+        let mut cells = Cells { origin, edge, typical: 0.0, occupied: BTreeMap::new() };
         let within: Vec<usize> = (0..centres.len()).filter(|i| distances[*i] <= REACH * median).collect();
         for i in &within {
             *cells.occupied.entry(cells.of(centres[*i])).or_default() += weights[*i];
@@ -120,7 +114,7 @@ impl Cells {
     }
 
     pub(super) fn is_free(&self, place: DVec3) -> bool {
-        let weight = around(self.of(place), self.free).filter_map(|near| self.occupied.get(&near)).sum::<f64>();
+        let weight = around(self.of(place), 1).filter_map(|near| self.occupied.get(&near)).sum::<f64>();
         weight < FREE_CELLS * self.typical
     }
 }

@@ -31,12 +31,13 @@ fn table() {
             let gaussians = if how == "painted" { scene.gaussians.clone() } else { learned(&scene, 600) };
             let e = evidence(&gaussians);
             println!(
-                "| {} | {how} | {} | {:.2} | {:.2} | {:.2} | {:.2} | {:.2} | {:?} | {:?} | {} | {} |",
+                "| {} | {how} | {} | {:.2} | {:.2} | {:.2} | {:.1} | {:.2} | {:.2} | {:?} | {:?} | {} | {} |",
                 scene.name,
                 gaussians.len(),
                 e.enclosed,
                 e.seen_around,
                 e.seen_inside,
+                100.0 * e.content,
                 e.seen_from_above,
                 e.seen_from_below,
                 e.side(),

@@ -8,6 +8,7 @@ use pocketsplat_trainer::step::SharedDevice;
 use serde::Serialize;
 
 use super::output;
+#[cfg(feature = "gpu")]
 use crate::say::say;
 
 /// List the GPUs that training can run on, with their limits.

@@ -39,12 +39,12 @@ const OUTERMOST: f64 = 1.2;
 
 /// A place inside is enclosed where so much of all directions is blocked.
 const ENCLOSED: f64 = 0.6;
-/// The inside is the right side where so much of the scene is seen from there alone …
-const CONTENT: f64 = 0.03;
-/// … and not less of it than this share of what is seen from around: an object has cavities that show little.
+/// The inside is the right side where so much of the scene is seen from there alone, and so much more of all of it.
+const LEAD: f64 = 0.04;
+/// A scene is hollow where from inside at least this share is seen of what is seen from around: cavities of an object show little.
 const WHOLE: f64 = 0.8;
-/// A ground hides a scene where cameras below see less than this share of what those above see.
-const GROUND: f64 = 0.8;
+/// A ground hides a scene where cameras below miss this share of what those on their level see.
+const GROUND: f64 = 0.3;
 
 /// What the pictures show.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -58,10 +58,8 @@ pub struct Evidence {
     /// Share that is seen from inside alone, less what is seen from around alone; of both only what is not seen from below, as
     /// the floor is under furniture.
     pub content: f64,
-    /// Share that is seen from above, on a circle, and from as far below.
-    pub seen_from_above: f64,
-    /// See [`Self::seen_from_above`].
-    pub seen_from_below: f64,
+    /// Share of what is seen on the level that is not seen from below.
+    pub hidden_from_below: f64,
     /// Angle about the up axis from which most is seen, radians.
     pub front: f64,
 }
@@ -69,12 +67,13 @@ pub struct Evidence {
 impl Evidence {
     /// The side from which the scene was made to be seen.
     pub fn side(&self) -> Side {
-        if self.is_hollow() && self.content > CONTENT { Side::Inside } else { Side::Around }
+        let lead = self.content.min(self.seen_inside - self.seen_around);
+        if self.is_hollow() && lead > LEAD { Side::Inside } else { Side::Around }
     }
 
-    /// Whether it is hollow, and both sides show as much of it: so do an empty room, a tube and the shell of an object.
+    /// Whether it is hollow, and no more of it is seen from inside: so are an empty room, a tube and the shell of an object.
     pub fn could_be_either(&self) -> bool {
-        self.is_hollow() && self.content.abs() <= CONTENT
+        self.is_hollow() && self.side() == Side::Around
     }
 
     fn is_hollow(&self) -> bool {
@@ -83,7 +82,7 @@ impl Evidence {
 
     /// Whether cameras below would see the underside of a ground and little else.
     pub fn has_ground(&self) -> bool {
-        self.seen_from_below < GROUND * self.seen_from_above
+        self.hidden_from_below > GROUND
     }
 
     /// Cost: some 200 small pictures.
@@ -112,7 +111,7 @@ impl Evidence {
         let front = (0..N_AROUND)
             .max_by(|a, b| shown(*a).total_cmp(&shown(*b)))
             .map_or(0.0, |i| TAU * i as f64 / N_AROUND as f64);
-        let (above, below) = (looker.best(&high), looker.best(&look(&ring(-WALKING[1]))));
+        let (level, below) = (looker.best(&low), looker.best(&look(&ring(-WALKING[1]))));
         let around = looker.best(&low.into_iter().chain(high).collect::<Vec<_>>());
 
         let mut places: Vec<(f64, DVec3)> = (0..N_PLACES)
@@ -138,13 +137,13 @@ impl Evidence {
         let more =
             inside.iter().zip(&around).zip(&below).map(|((inside, around), below)| (1.0 - below) * (inside - around));
         let weighted = |seen: &[f64]| looker.weighted(seen.iter().copied());
+        let hidden = looker.weighted(level.iter().zip(&below).map(|(level, below)| level * (1.0 - below)));
         Self {
             enclosed,
             seen_around: weighted(&around),
             seen_inside: weighted(&inside),
             content: looker.weighted(more),
-            seen_from_above: weighted(&above),
-            seen_from_below: weighted(&below),
+            hidden_from_below: hidden / weighted(&level).max(f64::MIN_POSITIVE),
             front,
         }
     }

@@ -177,7 +177,7 @@ pub(super) fn all() -> Vec<TestScene> {
     add("figure", Around, false, from_around(DVec3::Z * 0.9, 3.0, [-0.1, 0.8]), &Painter::figure);
     add("figure on a ground", Around, true, from_around(DVec3::Z * 0.5, 6.0, [0.1, 0.8]), &|p| {
         p.figure();
-        p.disc(2500, 2.0, 0.0);
+        p.disc(2500, 3.5, 0.0);
     });
     add("things on a plane", Around, true, from_around(DVec3::Z * 0.3, 7.0, [0.15, 0.9]), &|p| {
         p.quad(3000, low, DVec3::X * 4.0, DVec3::Y * 3.0);

@@ -31,15 +31,14 @@ fn table() {
             let gaussians = if how == "painted" { scene.gaussians.clone() } else { learned(&scene, 600) };
             let e = evidence(&gaussians);
             println!(
-                "| {} | {how} | {} | {:.2} | {:.2} | {:.2} | {:.1} | {:.2} | {:.2} | {:?} | {:?} | {} | {} |",
+                "| {} | {how} | {} | {:.2} | {:.2} | {:.2} | {:.1} | {:.2} | {:?} | {:?} | {} | {} |",
                 scene.name,
                 gaussians.len(),
                 e.enclosed,
                 e.seen_around,
                 e.seen_inside,
                 100.0 * e.content,
-                e.seen_from_above,
-                e.seen_from_below,
+                e.hidden_from_below,
                 e.side(),
                 scene.side,
                 e.has_ground(),
@@ -59,6 +58,8 @@ fn objects_are_seen_from_around_and_furnished_rooms_from_inside() {
             "empty room" | "tube" => {
                 assert!(found.could_be_either() && found.side() == Side::Around, "{}: {found:?}", scene.name);
             }
+            // Little stands in it, so that either answer is right that is told.
+            "garden within a hedge" => assert!(found.side() == Side::Inside || found.could_be_either(), "{found:?}"),
             _ => assert_eq!(found.side(), scene.side, "{}: {found:?}", scene.name),
         }
         if scene.side == Side::Around && scene.name != "seen from one side" {

@@ -20,7 +20,7 @@ A capture may lie 10⁶ units from its origin or be 10⁻⁴ wide: cameras come 
 gives a finite scene to start from.";
 
 const ANALYSIS: &str = "\
-Poses are read as f64 and normalised before anything is rounded to f32: the mean of the cameras goes to the origin and their spread to 5.
+Poses are read as f64 and normalised before anything is rounded to f32: the mean of the cameras, but for those that stand apart, goes to the origin and their spread to 5.
 A coordinate of 10⁶ is known to 1.2e-10. Normalising multiplies that by about 1, and a sum over the views by a few. In a capture 10⁻⁴
 wide every number is as good as in one that is 1 wide. So the bounds are 1e-8 and 1e-12 normalised units. Where all points are one
 point, or lie in a line, spacings are lifted to 3·10⁻⁴ before their logarithm is taken. A voxel size is found whatever the points are.";

@@ -12,6 +12,8 @@ use crate::camera::Camera;
 const NEAR_EXTENTS: f64 = 100.0;
 /// Nor within so many times the distance within which three quarters of the points lie, as of a scene that is far away as a whole.
 const NEAR_QUARTILES: f64 = 30.0;
+/// Beyond so many extents no point is believed, whatever the others do: of a handful, one stray is a quarter.
+const FAR_EXTENTS: f64 = 1e6;
 
 /// The points worth starting from, normalised, and what is to be said of the others.
 ///
@@ -21,7 +23,7 @@ pub(super) fn kept(points_world: &[DVec3], normalisation: &Normalisation) -> (Ve
     let points: Vec<DVec3> = points_world.iter().map(|&point| normalisation.point(point)).collect();
     let finite = points.iter().filter(|point| point.is_finite());
     let quartile = quantile(finite.map(|point| point.length()), 0.75);
-    let farthest = (NEAR_EXTENTS * EXTENT).max(NEAR_QUARTILES * quartile);
+    let farthest = (NEAR_QUARTILES * quartile).clamp(NEAR_EXTENTS * EXTENT, FAR_EXTENTS * EXTENT);
     let kept: Vec<DVec3> = points.iter().copied().filter(|point| point.length() <= farthest).collect();
     let note = (kept.len() < points.len()).then(|| {
         format!(

@@ -62,8 +62,9 @@ fn objects_are_seen_from_around_and_furnished_rooms_from_inside() {
             "garden within a hedge" => assert!(found.side() == Side::Inside || found.could_be_either(), "{found:?}"),
             _ => assert_eq!(found.side(), scene.side, "{}: {found:?}", scene.name),
         }
-        if scene.side == Side::Around && scene.name != "seen from one side" {
-            assert_eq!(found.has_ground(), scene.has_ground, "{}: {found:?}", scene.name);
+        // A small ground is looked past from below, so that it need not be found; but none may be found where none is.
+        if scene.side == Side::Around && !scene.has_ground && scene.name != "seen from one side" {
+            assert!(!found.has_ground(), "{}: {found:?}", scene.name);
         }
     }
 }

@@ -63,7 +63,7 @@ impl TileSink for Expected {
 
     fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
         let mut rgb = rgb.to_vec();
-        let tile = Tile { x_px, y_px, width, height, rgb: &mut rgb };
+        let tile = Tile::new([x_px, y_px], [width, height], &mut rgb).expect("a pixel for each");
         let pixels = tile.into_rgb565(ByteOrder::BigEndian, Rounding::Dithered).as_chunks().0;
         for (pixel, i) in pixels.iter().zip(0..) {
             let (x, y) = (x_px + i % width, self.top + y_px + i / width);

@@ -14,7 +14,7 @@ use super::scene_kind::taken_for;
 use super::storage::{LoadedView, load_views};
 use super::{
     Capture, DatasetError, EXTENT, Finding, LoadOptions, LoadReport, Normalisation, PointsOrigin, Severity,
-    SkippedView, Split, View, starting_points,
+    SkippedView, Split, View, made_points, starting_points,
 };
 
 /// Decodes the views of a listing and brings all of it to the common frame.
@@ -44,7 +44,7 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
     warnings.extend(doubtful.iter().map(|note| Finding::told(note.severity, note.code, &note.text)));
     let mut notes: Vec<String> = notes.into_iter().map(|note| note.text).collect();
 
-    let Decoded { mut train, mut test, mut skipped, looks, doubts } = decoded(views, options)?;
+    let Decoded { mut train, shots, mut test, mut skipped, looks, doubts } = decoded(views, options)?;
     warnings.extend(doubts);
     // The sort keeps the capture's order within each split.
     skipped.sort_by_key(|view| view.split);
@@ -82,15 +82,24 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
         notes
             .push(format!("images with pixels that do not count (no source in the photograph, or masked): {n_masked}"));
     }
-    let given = points.map(|(_, points)| {
+    let taken = taken_for(&looks, options.scene);
+    let shown = looks.iter().map(|looks| looks.shown).sum::<f64>() / train.len() as f64;
+    let brought = points.map(|(_, points)| points).filter(|points| !points.is_empty() && options.points.is_none());
+    let (given, points_origin, points_seconds) = match brought {
+        Some(points) => (Some(points), PointsOrigin::Capture, None),
+        None => match made_points::made(&shots, (taken.kind, shown), &normalisation, options) {
+            Some(made) => (Some(made.points_world), made.origin, made.seconds),
+            None => (None, PointsOrigin::Random, None),
+        },
+    };
+    let kept = given.map(|points| {
         let (points, note) = starting_points::kept(&points, &normalisation);
         notes.extend(note);
         points
     });
-    let taken = taken_for(&looks, options.scene);
     let cameras: Vec<_> = train.iter().map(|view| &view.camera).collect();
-    let (points, points_origin) = match given.filter(|points| !points.is_empty()) {
-        Some(points) => (points, PointsOrigin::Capture),
+    let (points, points_origin) = match kept.filter(|points| !points.is_empty()) {
+        Some(points) => (points, points_origin),
         None => (starting_points::random(&cameras, taken.kind, &normalisation, options), PointsOrigin::Random),
     };
     let background = match taken.backdrop {
@@ -110,12 +119,12 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
         n_sizes,
         n_points: points.len(),
         points_origin,
+        points_seconds,
         skipped,
         unposed,
         warnings,
         notes,
     };
-    let shown = looks.iter().map(|looks| looks.shown).sum::<f64>() / train.len() as f64;
     let scene = taken.kind;
     let capture =
         Capture { train, test, points, points_origin, scene, normalisation, extent: EXTENT, background, shown };
@@ -126,6 +135,8 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
 #[derive(Default)]
 struct Decoded {
     train: Vec<View>,
+    /// Those of `train`.
+    shots: Vec<Shot>,
     test: Vec<View>,
     skipped: Vec<SkippedView>,
     /// Of the views to train on.
@@ -141,9 +152,10 @@ fn decoded(views: Vec<ListedView>, options: &LoadOptions) -> Result<Decoded, Dat
     for (LoadedView { split, name, view }, shot) in load_views(views, options)?.into_iter().zip(shots) {
         match view {
             Ok((view, looks)) => {
-                seen.extend(shot.map(|shot| (name, shot, looks)));
+                seen.extend(shot.clone().map(|shot| (name, shot, looks)));
                 match split {
                     Split::Train => {
+                        decoded.shots.extend(shot);
                         decoded.train.push(view);
                         decoded.looks.push(looks);
                     }

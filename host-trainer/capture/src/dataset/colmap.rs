@@ -56,12 +56,7 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
     };
     if points.as_ref().is_none_or(|(_, points)| points.is_empty()) {
         let why = if points.is_some() { "is empty" } else { "is missing" };
-        let text = format!(
-            "`{}` {why}, so training starts from random points where the cameras look; triangulate points for a better \
-             start",
-            shown(&points_path)
-        );
-        notes.push(Note::new("no-points", text));
+        notes.push(Note::no_points(&format!("`{}` {why}", shown(&points_path))));
     }
     let image_folder = match of_model.filter(|_| options.images.is_none()) {
         Some(name) => Some(name.to_owned()),
@@ -163,7 +158,7 @@ fn shot(
     let lens = lens.clone().for_image(&path, header.size_px)?;
     let beside = masks.and_then(|masks| mask_of(names, masks, &image.name));
     let masks = beside.into_iter().chain(MaskFile::dynamic(names, &path)).collect();
-    Ok(Shot { path, header, rotation, translation, lens, masks })
+    Ok(Shot { path, header, rotation, translation, lens, masks, depth: None })
 }
 
 /// The quaternion as it is written.

@@ -85,7 +85,7 @@ pub enum DatasetError {
     #[error("`{}` {}", shown(path), image_folder(wanted.as_deref(), present))]
     ImageFolder { path: PathBuf, wanted: Option<String>, present: Vec<String> },
     /// A point cloud is damaged or of an unknown kind.
-    #[error("`{}` {found}; write it again, or take `ply_file_path` out to start from random points", shown(path))]
+    #[error("`{}` {found}; write it again, or take `ply_file_path` out, and training makes points", shown(path))]
     Ply { path: PathBuf, found: String },
     /// Too few training views are left after the unusable ones are set aside.
     #[error(

@@ -64,8 +64,14 @@ pub(super) fn look_at_cube(cameras: &[&Camera], centre: DVec3, half: f64) -> boo
     })
 }
 
+/// The depth of the cameras' focus in each; `None` where they share none or one does not see it.
+pub(super) fn distances(cameras: &[&Camera]) -> Option<Vec<f64>> {
+    let focus = focus(cameras)?;
+    cameras.iter().map(|camera| Some(depth(camera, focus)).filter(|depth| *depth > 0.0)).collect()
+}
+
 /// The point at depth `z` on the ray of a pixel position.
-fn along_ray(camera: &Camera, [u, v]: [f64; 2], z: f64) -> DVec3 {
+pub(super) fn along_ray(camera: &Camera, [u, v]: [f64; 2], z: f64) -> DVec3 {
     let x = (u - camera.principal_px[0]) / camera.focal_px[0];
     let y = (v - camera.principal_px[1]) / camera.focal_px[1];
     camera.rotation.transpose() * (DVec3::new(x, y, 1.0) * z - camera.translation)

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DVec3};
 
+use super::depth_maps::DepthMap;
 use super::folder_names::folded;
 use super::image::ImageHeader;
 use super::image_file::stem_of;
@@ -46,6 +47,14 @@ impl Note {
         Self { severity: Severity::Warning, ..Self::new(code, text) }
     }
 
+    /// What training starts from instead of points of the capture.
+    ///
+    /// * `why`: what there is instead of points.
+    pub(super) fn no_points(why: &str) -> Self {
+        let made = "so training makes them: of depth maps where there are any, else matched between the photographs, else random";
+        Self::new("no-points", format!("{why}, {made}"))
+    }
+
     /// No view is held out of a capture that names no split of its own.
     pub(super) fn no_test_views() -> Self {
         Self::warning(
@@ -78,6 +87,8 @@ pub(super) struct Shot {
     pub(super) lens: Lens,
     /// Mask images of the same size or a larger one of the same shape; a pixel counts where it does in all.
     pub(super) masks: Vec<MaskFile>,
+    /// How far away things are in it, where the capture says so.
+    pub(super) depth: Option<DepthMap>,
 }
 
 impl Shot {

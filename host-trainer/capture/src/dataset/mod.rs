@@ -19,6 +19,7 @@ mod bundler;
 mod cache;
 mod camera_models;
 mod colmap;
+mod depth_maps;
 mod detect;
 mod diagnose;
 mod error;
@@ -36,8 +37,10 @@ mod lens;
 mod listing;
 mod llff;
 mod looks;
+mod made_points;
 mod mask;
 mod mask_file;
+mod matching;
 mod metashape;
 mod named_path;
 mod nerfstudio;
@@ -76,7 +79,7 @@ pub use error::DatasetError;
 pub use frame_size::{FrameSize, NoFrameSize};
 pub use layout::Layout;
 pub use mask::Mask;
-pub use options::{Background, LoadOptions, MOST_IN_MEMORY_BYTES};
+pub use options::{Background, LoadOptions, MOST_IN_MEMORY_BYTES, PointsChoice};
 pub use photograph::Photograph;
 pub use pose::PoseFault;
 pub use report::{LoadReport, SkippedView};
@@ -113,6 +116,10 @@ pub struct Normalisation {
 pub enum PointsOrigin {
     /// From the capture: on surfaces, as dense as the photographs' features.
     Capture,
+    /// From depth maps of the capture: on surfaces, evenly over the photographs.
+    DepthMaps,
+    /// Matched between the photographs: as those of a capture.
+    Matched,
     /// Drawn at random where the cameras look.
     Random,
 }
@@ -143,6 +150,10 @@ pub struct Capture {
 /// The extent every capture is scaled to, because constants such as the near cull 0.2 assume extents of about 5.
 pub const EXTENT: f64 = 5.0;
 
+/// How fine a lattice has to be is told by points within so many times the distance of the nearest quarter: matched points reach as far
+/// as the photographs show, and what is far away is coarse in all of them.
+const NEAR: f64 = 2.5;
+
 impl Capture {
     /// Size of the training view of most pixels.
     pub fn largest_px(&self) -> [u32; 2] {
@@ -155,9 +166,22 @@ impl Capture {
     pub fn suggested_voxel_size(&self) -> f64 {
         match (self.points_origin, self.scene) {
             (PointsOrigin::Capture, _) => suggested_voxel_size(&self.points),
+            (PointsOrigin::DepthMaps | PointsOrigin::Matched, _) => suggested_voxel_size(&self.near_points()),
             (PointsOrigin::Random, SceneKind::Object) => PUBLISHED_VOXEL_SIZE,
             (PointsOrigin::Random, SceneKind::Room) => ROOM_VOXEL_SIZE,
         }
+    }
+}
+
+impl Capture {
+    /// The points that are no farther from a camera than [`NEAR`] times the distance of the nearest quarter.
+    fn near_points(&self) -> Vec<DVec3> {
+        let centres: Vec<DVec3> = self.train.iter().map(|view| view.camera.centre_world()).collect();
+        let distance =
+            |point: &DVec3| centres.iter().map(|c| c.distance_squared(*point)).fold(f64::INFINITY, f64::min).sqrt();
+        let distances: Vec<f64> = self.points.iter().map(distance).collect();
+        let most = NEAR * apart::quantile(distances.iter().copied(), 0.25);
+        self.points.iter().zip(&distances).filter(|(_, distance)| **distance <= most).map(|(point, _)| *point).collect()
     }
 }
 

@@ -43,9 +43,7 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
     let points = points(folder, &names, &transforms, &mut notes)?;
     let unposed = unposed(folder, &names, images.as_deref(), &transforms);
     if transforms.ply_file_path.is_none() || points.as_ref().is_some_and(|(_, points)| points.is_empty()) {
-        let text = "the capture brings no points, so training starts from random points where the cameras look; name a \
-                    point cloud in `ply_file_path` for a better start";
-        notes.push(Note::new("no-points", text));
+        notes.push(Note::no_points("the capture brings no points"));
     }
     let mut listing = Listing { layout: Layout::Nerfstudio, source, views, points, unposed, notes };
     if !listing.has_test_views() {
@@ -107,8 +105,8 @@ fn points(
     let Some(named) = transforms.ply_file_path.as_deref().map(NamedPath::new) else { return Ok(None) };
     let Some(path) = named.file(names, folder, None) else {
         let text = format!(
-            "`ply_file_path` names `{}`, which does not exist, so training starts from random points where the cameras \
-             look; restore the point cloud for a better start, or take `ply_file_path` out",
+            "`ply_file_path` names `{}`, which does not exist, so training makes points; restore the point cloud to start from it, \
+             or take `ply_file_path` out",
             shown(&named.expected(folder, None))
         );
         notes.push(Note::warning("missing-points", text));

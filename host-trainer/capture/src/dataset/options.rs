@@ -58,6 +58,25 @@ impl fmt::Display for Background {
 /// Half of the 2 GiB that training on any capture is to keep to at that size; the rest is for the step.
 pub const MOST_IN_MEMORY_BYTES: u64 = 1 << 30;
 
+/// What a capture's points are to be, whatever it brings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PointsChoice {
+    /// Matched between the photographs.
+    Matched,
+    /// Drawn at random where the cameras look.
+    Random,
+}
+
+impl fmt::Display for PointsChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Matched => "matched",
+            Self::Random => "random",
+        })
+    }
+}
+
 /// How to load a capture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadOptions {
@@ -70,6 +89,11 @@ pub struct LoadOptions {
     pub background: Background,
     /// What the capture shows; without it what its photographs look like decides.
     pub scene: Option<SceneKind>,
+    /// Where the initial points come from; without it from the capture, else from its depth maps, else matched between the photographs,
+    /// else, where too few are found, random.
+    pub points: Option<PointsChoice>,
+    /// Points that are made are kept in this file, and found there by the next load of the same photographs.
+    pub made_points: Option<PathBuf>,
     /// Decides the random initial points of captures that bring none.
     pub seed: u64,
     /// How many random initial points a capture that brings none gets.
@@ -99,6 +123,8 @@ impl Default for LoadOptions {
             frame: None,
             background: Background::Black,
             scene: None,
+            points: None,
+            made_points: None,
             seed: 42,
             n_random_points: 10_000,
             images: None,

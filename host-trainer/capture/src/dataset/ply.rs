@@ -43,7 +43,8 @@ pub(super) fn read_points(path: &Path) -> Result<Vec<DVec3>, DatasetError> {
     parse(&bytes).map_err(|found| DatasetError::of_points(path, found))
 }
 
-fn parse(bytes: &[u8]) -> Result<Vec<DVec3>, String> {
+/// Reads the coordinates of all vertices of a file; the error says what was found.
+pub(super) fn parse(bytes: &[u8]) -> Result<Vec<DVec3>, String> {
     let (header, body) = split_header(bytes)?;
     let layout = read_layout(header)?;
     match layout.encoding {

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
+use super::depth_maps::DepthMap;
 use super::image_names::is_image_name;
 use super::listing::{Listing, every_nth, is_listed};
 use super::transforms::{Frame, Intrinsics, list_frames};
@@ -47,9 +48,15 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
     let mut files: Vec<PathBuf> = entries.filter(|path| is_listed(path, "json")).collect();
     files.sort();
     let frames = files.iter().map(|path| frame(path)).collect::<Result<Vec<_>, _>>()?;
-    Ok(list_frames(Layout::Polycam, cameras, &images, &frames, &Intrinsics::default(), None, |i| {
-        Some(every_nth(options.test_every, i))
-    }))
+    let split = |i| Some(every_nth(options.test_every, i));
+    let mut listing = list_frames(Layout::Polycam, cameras, &images, &frames, &Intrinsics::default(), None, split);
+    let map = |kind: &str, photograph: &Path| {
+        folder.join("keyframes").join(kind).join(photograph.file_name().unwrap_or_default()).with_extension("png")
+    };
+    for shot in listing.views.iter_mut().flat_map(|view| &mut view.shot) {
+        shot.depth = DepthMap::at(map("depth", &shot.path), map("confidence", &shot.path));
+    }
+    Ok(listing)
 }
 
 /// The frame that a camera's file describes; numbers that are missing become NaN, which its view is left out for.

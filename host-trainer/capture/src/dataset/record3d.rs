@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use glam::{DMat3, DQuat};
 use serde::Deserialize;
 
+use super::depth_maps::DepthMap;
 use super::image_names::is_image_name;
 use super::listing::{Listing, every_nth};
 use super::quaternion::{long_quaternions, rotation_of};
@@ -91,6 +92,9 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
     let long = long_quaternions(&path, named);
     listing.notes.extend(long);
     for (view, rotation) in listing.views.iter_mut().zip(rotations) {
+        if let Ok(shot) = &mut view.shot {
+            shot.depth = DepthMap::at(shot.path.with_extension("depth"), shot.path.with_extension("conf"));
+        }
         if let Err(fault) = rotation {
             view.shot = Err(fault);
         }

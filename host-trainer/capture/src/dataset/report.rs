@@ -49,6 +49,8 @@ pub struct LoadReport {
     pub n_points: usize,
     /// Where they come from.
     pub points_origin: PointsOrigin,
+    /// What it took to make them, where this load did.
+    pub points_seconds: Option<f64>,
     /// Views left out, in the capture's order, training views first.
     pub skipped: Vec<SkippedView>,
     /// Images that lie with the others but have no pose, by name; they are not read.
@@ -79,6 +81,16 @@ impl fmt::Display for LoadReport {
             (_, own) => write!(f, ", on {}", own.unwrap_or(self.background))?,
         }
         write!(f, ", {} {random}initial points", self.n_points)?;
+        let made = match self.points_origin {
+            PointsOrigin::Capture | PointsOrigin::Random => None,
+            PointsOrigin::DepthMaps => Some("of its depth maps"),
+            PointsOrigin::Matched => Some("matched between the photographs"),
+        };
+        match (made, self.points_seconds) {
+            (Some(how), Some(seconds)) => write!(f, " {how} in {seconds:.1} s")?,
+            (Some(how), None) => write!(f, " {how} by an earlier run")?,
+            (None, _) => {}
+        }
         for split in [Split::Train, Split::Test] {
             let of_split: Vec<&SkippedView> = self.skipped.iter().filter(|view| view.split == split).collect();
             if !of_split.is_empty() {
@@ -140,6 +152,7 @@ mod tests {
             n_sizes: 2,
             n_points: 10,
             points_origin: PointsOrigin::Random,
+            points_seconds: None,
             skipped,
             unposed: ["a.jpg", "b.jpg", "c.jpg", "d.jpg"].map(str::to_owned).to_vec(),
             warnings: vec![Finding::told(Severity::Warning, "x", "few views; take more")],

@@ -68,8 +68,7 @@ pub(super) fn list_frames(
     let unposed = unused_images(images, found.iter().map(PathBuf::as_path));
     let mut notes = found_files::check(&mut views, &names);
     if points.is_none() {
-        let text = "the capture brings no points, so training starts from random points where the cameras look";
-        notes.push(Note::new("no-points", text));
+        notes.push(Note::no_points("the capture brings no points"));
     }
     let mut listing = Listing { layout, source, views, points, unposed, notes };
     if !listing.has_test_views() {
@@ -122,7 +121,7 @@ impl Frame {
                 message: "does not exist".to_owned(),
             })?));
         }
-        Ok(Shot { path, header, rotation, translation, lens, masks })
+        Ok(Shot { path, header, rotation, translation, lens, masks, depth: None })
     }
 
     /// The frame's image file, where it is there; `images` as for [`Self::view`].

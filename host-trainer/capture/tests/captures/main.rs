@@ -6,6 +6,7 @@ mod cases;
 mod damaged;
 mod exports;
 mod fixture;
+mod made_points;
 mod real;
 mod remedies;
 mod scene;

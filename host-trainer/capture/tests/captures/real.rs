@@ -72,7 +72,9 @@ fn fox() {
     // 9 of the 67 listed frames are every eighth, whether or not their image is there.
     assert_eq!(capture.test.len() + n_skipped(Split::Test), 9, "{report}");
     assert_eq!(capture.train.len() + n_skipped(Split::Train), 58, "{report}");
-    assert_eq!(capture.points_origin, PointsOrigin::Random);
+    assert_eq!(capture.points_origin, PointsOrigin::Matched);
+    assert!((10_000..25_000).contains(&capture.points.len()), "{report}");
+    assert!(report.to_string().contains("initial points matched between the photographs in "), "{report}");
     let camera = &capture.train[0].camera;
     assert_eq!((camera.width_px, camera.height_px), (135, 240));
     assert!((camera.principal_px[0] - 277.279 / 4.0).abs() < 1e-9, "{camera:?}");

@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-use pocketsplat_capture::dataset::{self, Background, Capture, LoadOptions, Split, View};
+use pocketsplat_capture::dataset::{self, Background, Capture, LoadOptions, PointsChoice, Split, View};
 use pocketsplat_files::shell_word;
+use pocketsplat_trainer::train::run::{photographs_in, points_in};
 
 use crate::config::CaptureOptions;
 use crate::say::say;
@@ -32,33 +33,36 @@ pub(crate) struct CaptureArgs {
 }
 
 impl CaptureArgs {
-    fn load_options(&self, seed: u64, cache: Option<&Path>) -> LoadOptions {
+    fn load_options(&self, seed: u64, run: Option<&Path>) -> LoadOptions {
         let default = LoadOptions::default();
         LoadOptions {
             max_resolution: self.options.max_resolution,
             frame: self.options.resolution,
             background: self.options.background.unwrap_or(Background::Black),
             scene: self.options.scene,
+            points: self.options.points,
+            made_points: run.map(points_in),
             seed,
             images: self.options.images.clone(),
             model: self.options.model,
             test_every: self.options.test_every.unwrap_or(default.test_every),
-            cache: cache.map(Path::to_owned),
+            cache: run.map(photographs_in),
             ..default
         }
     }
 
-    /// Loads the capture to look at its photographs once or twice, and says on stderr what was found.
+    /// Loads the capture to look at its photographs once or twice, and says on stderr what was found. No points are made.
     ///
     /// Photographs that are too many for the memory are decoded again when they are needed.
     pub(crate) fn load(&self, seed: u64) -> Result<Capture> {
-        self.load_with(&self.load_options(seed, None))
+        self.load_with(&LoadOptions { points: Some(PointsChoice::Random), ..self.load_options(seed, None) })
     }
 
-    /// The same for training, which needs every photograph again and again: those that are too many for the memory are kept
-    /// decoded in the folder `cache`.
-    pub(crate) fn load_cached(&self, seed: u64, cache: &Path) -> Result<Capture> {
-        self.load_with(&self.load_options(seed, Some(cache)))
+    /// The same for training, which needs points, and every photograph again and again.
+    ///
+    /// * `run`: its folder, which keeps points that are made, and photographs decoded that are too many for the memory.
+    pub(crate) fn load_to_train(&self, seed: u64, run: Option<&Path>) -> Result<Capture> {
+        self.load_with(&self.load_options(seed, run))
     }
 
     /// The files that it is read from, wherever they lie.

@@ -128,7 +128,7 @@ impl Estimate {
         let values = config.shape.values_per_anchor() as f64;
         let course = match capture.points_origin {
             PointsOrigin::Random => FROM_RANDOM,
-            PointsOrigin::Capture => FROM_CAPTURE,
+            _ => FROM_CAPTURE,
         };
         Self {
             what: format!("{width}×{height} px, {iterations} iterations"),

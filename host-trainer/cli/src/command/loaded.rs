@@ -12,16 +12,16 @@ use crate::config::RunConfig;
 #[derive(Default)]
 pub(super) struct LoadedCapture {
     loaded: Option<(RunConfig, Capture)>,
-    /// Folder for decoded photographs that are too many for the memory.
-    photographs: Option<PathBuf>,
+    /// Folder for what is made of the capture.
+    run: Option<PathBuf>,
 }
 
 impl LoadedCapture {
     /// For runs that are trained, and not only tried out.
     ///
-    /// * `photographs`: folder for decoded photographs that are too many for the memory.
-    pub(super) fn for_training(photographs: PathBuf) -> Self {
-        Self { loaded: None, photographs: Some(photographs) }
+    /// * `run`: folder for what is made of the capture, as that of a run.
+    pub(super) fn for_training(run: PathBuf) -> Self {
+        Self { loaded: None, run: Some(run) }
     }
 
     /// The capture of a run; decides what its configuration left to it.
@@ -39,7 +39,7 @@ impl LoadedCapture {
             // Never two of them in memory.
             self.loaded = None;
             process::forget_peak_memory();
-            let capture = train::load(config, self.photographs.as_deref())?;
+            let capture = train::load(config, self.run.as_deref())?;
             self.loaded = Some((config.clone(), capture));
         }
         Ok(&self.loaded.as_ref().expect("just loaded").1)

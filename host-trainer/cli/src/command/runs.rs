@@ -9,7 +9,6 @@ use pocketsplat_capture::dataset::Split;
 use pocketsplat_files::{Content, Outputs};
 use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::config::Backbone;
-use pocketsplat_trainer::train::run::photographs_in;
 
 use super::capture::views_of;
 use super::devices::DeviceChoice;
@@ -153,7 +152,7 @@ impl RunsArgs {
         if self.plan {
             return self.plan(base, specs, files, &outputs);
         }
-        let mut loaded = LoadedCapture::for_training(photographs_in(&base.output));
+        let mut loaded = LoadedCapture::for_training(base.output.clone());
         let stop = stop::flag()?;
         let mut measured = Vec::new();
         let mut text = Vec::new();

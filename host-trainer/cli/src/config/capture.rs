@@ -1,10 +1,10 @@
 //! How photographs are prepared: options of every command that reads a capture, and a section of a run's configuration.
 
-use pocketsplat_capture::dataset::{Background, FrameSize, SceneKind};
+use pocketsplat_capture::dataset::{Background, FrameSize, PointsChoice, SceneKind};
 use serde::{Deserialize, Serialize};
 
 use super::heading::INPUT;
-use super::named::{BACKGROUNDS, SCENES, one_of};
+use super::named::{BACKGROUNDS, POINTS, SCENES, one_of};
 
 /// How photographs are prepared.
 #[derive(clap::Args, Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -26,6 +26,11 @@ pub(crate) struct CaptureOptions {
     #[arg(long, value_name = "KIND", value_parser = one_of::<SceneKind>(SCENES), help_heading = INPUT, hide_short_help = true)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) scene: Option<SceneKind>,
+    /// Where training starts: points matched between the photographs, or random ones [default: the capture's; else of its depth maps; else
+    /// matched, or random where too few are found]
+    #[arg(long, value_name = "ORIGIN", value_parser = one_of::<PointsChoice>(POINTS), help_heading = INPUT, hide_short_help = true)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) points: Option<PointsChoice>,
     /// Folder of images to read, for captures that hold several sizes [default: the only one, or images]
     #[arg(long, value_name = "NAME", help_heading = INPUT, hide_short_help = true)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -51,6 +56,7 @@ impl CaptureOptions {
             resolution: size.resolution,
             background: self.background.or(other.background),
             scene: self.scene.or(other.scene),
+            points: self.points.or(other.points),
             images: self.images.clone().or_else(|| other.images.clone()),
             model: self.model.or(other.model),
             test_every: self.test_every.or(other.test_every),

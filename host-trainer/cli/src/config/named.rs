@@ -16,6 +16,7 @@ pub(crate) const TARGETS: &[&str] = &["cortex-m4", "cortex-m7", "riscv32imac"];
 pub(crate) const BACKBONES: &[&str] = &["scaffold", "hac", "hac-plus", "contextgs", EXPLICIT];
 pub(crate) const SPLITS: &[&str] = &["test", "train"];
 pub(crate) const BACKGROUNDS: &[&str] = &["black", "white", "learned"];
+pub(crate) const POINTS: &[&str] = &["matched", "random"];
 pub(crate) const SCENES: &[&str] = &["object", "room"];
 pub(crate) const LPIPS_RANGES: &[&str] = &["zero-to-one", "minus-one-to-one"];
 
@@ -37,7 +38,7 @@ pub(crate) fn level_number() -> impl TypedValueParser<Value = u8> {
 
 #[cfg(test)]
 mod tests {
-    use pocketsplat_capture::dataset::{Background, SceneKind, Split};
+    use pocketsplat_capture::dataset::{Background, PointsChoice, SceneKind, Split};
     use pocketsplat_capture::synth::SurfaceFinish;
     use pocketsplat_trainer::device::Processor;
     use pocketsplat_trainer::encode::CoderChoice;
@@ -61,6 +62,7 @@ mod tests {
         all_parse::<Split>(SPLITS);
         all_parse::<Background>(BACKGROUNDS);
         all_parse::<SceneKind>(SCENES);
+        all_parse::<PointsChoice>(POINTS);
         all_parse::<InputRange>(LPIPS_RANGES);
     }
 }

@@ -37,15 +37,15 @@ impl Protocol {
         Self { program, capture: fingerprint(capture), spread, options: Self::said(options) }
     }
 
-    /// The options as a protocol says them: split and background too where they are the defaults, and not what the capture was taken
-    /// for, which decides where training starts and nothing of its photographs.
+    /// The options as a protocol says them: split and background too where they are the defaults, and not what decides where
+    /// training starts and nothing of its photographs.
     pub(crate) fn said(options: &CaptureOptions) -> CaptureOptions {
         let said = options.or(&CaptureOptions {
             background: Some(Background::Black),
             test_every: Some(LoadOptions::default().test_every),
             ..CaptureOptions::default()
         });
-        CaptureOptions { scene: None, ..said }
+        CaptureOptions { scene: None, points: None, ..said }
     }
 
     /// The folder of images whose name does not fit into the section of a bundle, if so.
@@ -106,7 +106,7 @@ fn fingerprint(capture: &Capture) -> String {
 
 impl fmt::Display for Protocol {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let CaptureOptions { max_resolution, resolution, background, scene: _, images, model, test_every } =
+        let CaptureOptions { max_resolution, resolution, background, scene: _, points: _, images, model, test_every } =
             &self.options;
         match (resolution, max_resolution) {
             (Some(frame), _) => write!(f, "images cut to {frame}")?,

@@ -12,6 +12,7 @@ fn a_written_configuration_reads_back_to_the_last_bit() {
             max_resolution: Some(400),
             resolution: None,
             background: Some(Background::White),
+            points: Some(pocketsplat_capture::dataset::PointsChoice::Matched),
             scene: Some(pocketsplat_capture::dataset::SceneKind::Room),
             images: Some("images_2".to_owned()),
             model: Some(1),

@@ -277,7 +277,7 @@ pub(super) fn cases() -> Vec<Case> {
             ColmapBinary,
             Doubt,
             "no-points",
-            &["points3D.bin` is missing, so training starts from random points"],
+            &["points3D.bin` is missing, so training makes them"],
             |f| {
                 f.write_files().remove("sparse/0/points3D.bin");
             },
@@ -287,7 +287,7 @@ pub(super) fn cases() -> Vec<Case> {
             ColmapText,
             Doubt,
             "no-points",
-            &["points3D.txt` is empty, so training starts from random points"],
+            &["points3D.txt` is empty, so training makes them"],
             |f| {
                 f.points.clear();
                 f.write_files();

@@ -148,7 +148,7 @@ pub(super) fn cases() -> Vec<Case> {
             "missing-points",
             &[
                 "warning[missing-points]: `ply_file_path` names `",
-                "sparse.ply`, which does not exist, so training starts from random points",
+                "sparse.ply`, which does not exist, so training makes points",
                 "remedy: restore the point cloud for a better start, or take `ply_file_path` out",
             ],
             |f| {

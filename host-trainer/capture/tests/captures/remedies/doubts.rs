@@ -62,7 +62,7 @@ fn remedies_for_doubtful_captures() {
         trouble(
             "few points",
             ColmapText,
-            "or take the file out to start from random points",
+            "or take the file out, and training makes points",
             |f| {
                 f.points.truncate(7);
                 f.write_files();

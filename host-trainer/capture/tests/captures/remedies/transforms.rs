@@ -153,7 +153,7 @@ fn remedies_for_transforms() {
         trouble(
             "points that are none",
             Nerfstudio,
-            "or take `ply_file_path` out to start from random points",
+            "or take `ply_file_path` out, and training makes points",
             |f| {
                 f.shared.push_str(", \"ply_file_path\": \"sparse.ply\"");
                 f.write_files().write("sparse.ply", "solid cube");

@@ -12,7 +12,7 @@ use pocketsplat_gaussians::{Format, Notes};
 use pocketsplat_trainer::device::Limits;
 use pocketsplat_trainer::explicit::CloudTrainer;
 use pocketsplat_trainer::explicit::frame;
-use pocketsplat_trainer::train::run::{Ending, Interval, LoggedStep, RunError, RunFolder, photographs_in};
+use pocketsplat_trainer::train::run::{Ending, Interval, LoggedStep, RunError, RunFolder};
 use serde::Serialize;
 
 use super::super::capture::CaptureArgs;
@@ -149,7 +149,7 @@ fn load(config: &ExplicitRunConfig, run: &Path) -> Result<Capture> {
     let source = source_of(config);
     // At once: large captures take their time.
     say!("reading {}", config.dataset.display());
-    let capture = source.load_cached(config.gaussians.seed, &photographs_in(run))?;
+    let capture = source.load_to_train(config.gaussians.seed, Some(run))?;
     check_size(&capture, &Limits::default())?;
     Ok(capture)
 }

@@ -21,16 +21,13 @@ pub(super) fn source_of(config: &RunConfig) -> CaptureArgs {
 
 /// Loads the capture that a run is configured for, and decides what the configuration left to it.
 ///
-/// * `photographs`: folder for decoded photographs that are too many for the memory; without one they are decoded again for every
-///   step.
-pub(crate) fn load(config: &mut RunConfig, photographs: Option<&Path>) -> Result<Capture> {
+/// * `run`: its folder, which keeps what is made of the capture; without one points are made again by the next load, and photographs
+///   that are too many for the memory are decoded again for every step.
+pub(crate) fn load(config: &mut RunConfig, run: Option<&Path>) -> Result<Capture> {
     let source = source_of(config);
     // At once: large captures take their time.
     say!("reading {}", config.dataset.display());
-    let capture = match photographs {
-        Some(folder) => source.load_cached(config.train.seed, folder)?,
-        None => source.load(config.train.seed)?,
-    };
+    let capture = source.load_to_train(config.train.seed, run)?;
     decide(config, &capture)?;
     Ok(capture)
 }

@@ -9,6 +9,7 @@ use pocketsplat_files::Outputs;
 use pocketsplat_trainer::device::Limits;
 use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::config::Backbone;
+use pocketsplat_trainer::train::run::photographs_in;
 
 use super::loading::check_size;
 use super::*;

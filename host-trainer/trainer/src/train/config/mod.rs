@@ -335,7 +335,7 @@ impl TrainConfig {
     pub fn coarsest_cells_for(&self, capture: &Capture) -> u32 {
         self.densification.coarsest_cells.unwrap_or(match capture.points_origin {
             PointsOrigin::Random => 4,
-            PointsOrigin::Capture => 16,
+            _ => 16,
         })
     }
 

@@ -6,6 +6,7 @@
 //! | `effects.csv` | what each effect was worth in pilots, where they were measured |
 //! | `progress.csv` | loss and PSNR over the run, see [`ProgressLog`] |
 //! | `photographs/` | the photographs of a large capture, decoded, until the run is finished |
+//! | `points.ply` | the points that were made for a capture that brings none, capture units |
 //! | `previews/00000140.jpg` | one held-out view after so many iterations, fifty pictures a run |
 //! | `iteration-00001500.checkpoint` | the state of the run, see [`super::checkpoint`]; the last two are kept, and those to fork from |
 //! | `result.json` | what the finished run reports; with it, the run is over |
@@ -46,6 +47,7 @@ const RESULT: &str = "result.json";
 const REPORT: &str = "report.html";
 const LOCK: &str = "lock";
 const PHOTOGRAPHS: &str = "photographs";
+const POINTS: &str = "points.ply";
 
 /// Checkpoints every so many seconds are put off until they take at most this share of the time.
 const LARGEST_SHARE: f64 = 0.02;
@@ -65,6 +67,11 @@ pub enum Interval {
 /// Where the folder of a run keeps decoded photographs that are too many for the memory. They are made before the run begins.
 pub fn photographs_in(run: &Path) -> PathBuf {
     run.join(PHOTOGRAPHS)
+}
+
+/// Where the folder of a run keeps points that were made for a capture that brings none. They are made before the run begins.
+pub fn points_in(run: &Path) -> PathBuf {
+    run.join(POINTS)
 }
 
 /// How a run came to its end.
@@ -128,7 +135,7 @@ impl RunFolder {
     }
 
     fn refuse_foreign(path: &Path) -> Result<(), RunError> {
-        let ours = |name: &OsStr| [LOCK, PHOTOGRAPHS].iter().any(|own| name == *own) || is_partial(name);
+        let ours = |name: &OsStr| [LOCK, PHOTOGRAPHS, POINTS].iter().any(|own| name == *own) || is_partial(name);
         let occupied = files::names(path)?.into_iter().any(|name| !ours(&name));
         // A configuration alone may be anyone's; a run has locked its folder too, with a file that says nothing.
         let is_locked = fs::metadata(path.join(LOCK)).is_ok_and(|found| found.is_file() && found.len() == 0);
@@ -320,7 +327,7 @@ impl RunFolder {
 
 /// Whether a run keeps a file or folder of that name in its folder.
 pub fn is_file_of_run(name: &OsStr) -> bool {
-    let own = [CONFIG, LOG, EFFECTS, PILOTS, RESULT, REPORT, LOCK, PHOTOGRAPHS, PREVIEWS];
+    let own = [CONFIG, LOG, EFFECTS, PILOTS, RESULT, REPORT, LOCK, PHOTOGRAPHS, POINTS, PREVIEWS];
     name.to_str().is_some_and(|name| own.contains(&name) || store::iteration_of(name).is_some())
 }
 

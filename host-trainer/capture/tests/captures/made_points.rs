@@ -1,0 +1,99 @@
+//! Points for captures that bring none: kept, found again, of depth maps.
+
+use image::{ImageBuffer, Luma};
+use pocketsplat_capture::dataset::{Capture, LoadOptions, LoadReport, PointsChoice, PointsOrigin, load};
+use pocketsplat_capture::synth::{SynthOptions, write_capture};
+
+use crate::exports::{write_polycam, write_record3d};
+use crate::fixture::{Fixture, Kind, SIZE_PX};
+
+#[test]
+fn points_are_made_once_for_the_same_photographs() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let synth = SynthOptions { size_px: 96, n_train: 24, n_test: 1, ..SynthOptions::default() };
+    write_capture(&folder.path().join("capture"), &synth).expect("a capture");
+    let file = folder.path().join("run/points.ply");
+    let options =
+        LoadOptions { points: Some(PointsChoice::Matched), made_points: Some(file.clone()), ..LoadOptions::default() };
+    let loaded = || load(&folder.path().join("capture"), &options).expect("a sound capture");
+    let (first, report) = loaded();
+    assert!(report.points_seconds.is_some() && first.points_origin == PointsOrigin::Matched, "{report}");
+    assert!(report.to_string().contains("initial points matched between the photographs in "), "{report}");
+    let (second, report) = loaded();
+    assert!(report.points_seconds.is_none() && second.points == first.points, "{report}");
+    assert!(
+        report.to_string().contains("initial points matched between the photographs by an earlier run"),
+        "{report}"
+    );
+    // Another photograph: other points. Another program's file: it stays.
+    let [a, b] = ["r_0.png", "r_1.png"].map(|name| folder.path().join("capture/train").join(name));
+    let swapped = (std::fs::read(&a).expect("an image"), std::fs::read(&b).expect("an image"));
+    std::fs::write(&a, swapped.1).expect("written");
+    assert!(loaded().1.points_seconds.is_some());
+    std::fs::write(&file, "ply of mine").expect("written");
+    assert!(loaded().1.points_seconds.is_some());
+    assert_eq!(std::fs::read(&file).expect("there"), b"ply of mine");
+}
+
+/// What a capture with a depth of 2 m everywhere starts from; one row of each map is not sure.
+fn with_depth_maps(record3d: bool) -> (Capture, LoadReport) {
+    let fixture = Fixture::new(Kind::Nerfstudio, 17);
+    let (width_px, height_px) = SIZE_PX;
+    let n = (width_px * height_px) as usize;
+    if record3d {
+        write_record3d(&fixture, "metadata", "rgbd", 0);
+    } else {
+        write_polycam(&fixture, "cameras", "images");
+    }
+    for (i, photo) in fixture.photos.iter().enumerate() {
+        if record3d {
+            let packed = |bytes: &[u8]| {
+                let mut packed = Vec::new();
+                lzfse_rust::encode_bytes(bytes, &mut packed).expect("packed");
+                packed
+            };
+            let depths: Vec<u8> = std::iter::repeat_n(2.0_f32.to_le_bytes(), n).flatten().collect();
+            let sure: Vec<u8> = (0..n).map(|at| if at < width_px as usize { 1 } else { 2 }).collect();
+            fixture.write(&format!("rgbd/{i}.depth"), packed(&depths));
+            fixture.write(&format!("rgbd/{i}.conf"), packed(&sure));
+        } else {
+            let folder = fixture.at("keyframes");
+            for kind in ["depth", "confidence"] {
+                std::fs::create_dir_all(folder.join(kind)).expect("a folder");
+            }
+            let depth = ImageBuffer::from_pixel(width_px, height_px, Luma([2000_u16]));
+            depth.save(folder.join("depth").join(&photo.name)).expect("a map");
+            let sure = ImageBuffer::from_fn(width_px, height_px, |_, y| Luma([if y == 0 { 54_u8 } else { 255 }]));
+            sure.save(folder.join("confidence").join(&photo.name)).expect("a map");
+        }
+    }
+    fixture.load().expect("a sound capture")
+}
+
+#[test]
+fn depth_maps_become_points() {
+    for record3d in [false, true] {
+        let (capture, report) = with_depth_maps(record3d);
+        assert_eq!(capture.points_origin, PointsOrigin::DepthMaps, "{report}");
+        assert!(report.to_string().contains("initial points of its depth maps in "), "{report}");
+        // At 2 m from some camera each, and none in the row that is not sure.
+        let unit = capture.normalisation.scale;
+        for point in &capture.points {
+            let seen = capture.train.iter().map(|view| view.camera.rotation * *point + view.camera.translation);
+            let off = seen.map(|p| (p.z / unit - 2.0).abs()).fold(f64::INFINITY, f64::min);
+            assert!(off < 0.3, "a point is {off} m off");
+        }
+        assert!(capture.points.len() > 100, "{report}");
+    }
+}
+
+#[test]
+fn a_damaged_depth_map_costs_its_own_points_alone() {
+    let fixture = Fixture::new(Kind::Nerfstudio, 17);
+    write_record3d(&fixture, "metadata", "rgbd", 0);
+    for i in 0..17 {
+        fixture.write(&format!("rgbd/{i}.depth"), "no stream");
+    }
+    let (capture, report) = fixture.load().expect("a sound capture");
+    assert_ne!(capture.points_origin, PointsOrigin::DepthMaps, "{report}");
+}

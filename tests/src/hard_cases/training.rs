@@ -42,6 +42,7 @@ fn capture(pixel: impl Fn(u32, u32, u32) -> [u8; 3], points: Vec<DVec3>) -> Capt
         test: Vec::new(),
         points,
         points_origin: PointsOrigin::Random,
+        made_points: None,
         scene: SceneKind::Object,
         normalisation: Normalisation { centre: DVec3::ZERO, scale: 1.0 },
         extent: EXTENT,

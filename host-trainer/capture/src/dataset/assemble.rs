@@ -85,11 +85,11 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
     let taken = taken_for(&looks, options.scene);
     let shown = looks.iter().map(|looks| looks.shown).sum::<f64>() / train.len() as f64;
     let brought = points.map(|(_, points)| points).filter(|points| !points.is_empty() && options.points.is_none());
-    let (given, points_origin, points_seconds) = match brought {
-        Some(points) => (Some(points), PointsOrigin::Capture, None),
-        None => match made_points::made(&shots, (taken.kind, shown), &normalisation, options) {
-            Some(made) => (Some(made.points_world), made.origin, made.seconds),
-            None => (None, PointsOrigin::Random, None),
+    let (given, points_origin, points_seconds, made_points) = match brought {
+        Some(points) => (Some(points), PointsOrigin::Capture, None, None),
+        None => match made_points::made(&shots, (taken.kind, shown), &normalisation, options, &mut notes) {
+            Some(made) => (Some(made.points_world), made.origin, made.seconds, Some(made.file)),
+            None => (None, PointsOrigin::Random, None, None),
         },
     };
     let kept = given.map(|points| {
@@ -126,8 +126,18 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
         notes,
     };
     let scene = taken.kind;
-    let capture =
-        Capture { train, test, points, points_origin, scene, normalisation, extent: EXTENT, background, shown };
+    let capture = Capture {
+        train,
+        test,
+        points,
+        points_origin,
+        made_points,
+        scene,
+        normalisation,
+        extent: EXTENT,
+        background,
+        shown,
+    };
     Ok((capture, report))
 }
 

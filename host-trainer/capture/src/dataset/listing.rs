@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DVec3};
 
-use super::depth_maps::DepthMap;
+use super::depth_map::DepthMap;
 use super::folder_names::folded;
 use super::image::ImageHeader;
 use super::image_file::stem_of;

@@ -1,28 +1,22 @@
 //! Points for a capture that brings none, made once and kept in a file.
 
 use std::fmt::Write as _;
-use std::fs;
 use std::path::Path;
 use std::time::Instant;
+use std::{fs, io};
 
 use glam::DVec3;
 
+use super::coloured_point::ColouredPoint;
 use super::listing::Shot;
-use super::{LoadOptions, Normalisation, PointsChoice, PointsOrigin, SceneKind, depth_maps, matching, ply};
+use super::{LoadOptions, Normalisation, PointsChoice, PointsOrigin, SceneKind, matching, ply, unprojected};
 
 /// Fewer points than this outline no scene: random ones do better.
 const LEAST_POINTS: usize = 100;
 /// Of an object, so many pixels of a photograph that show it need a point: where it is smooth it has none, and random points reach there.
-const PIXELS_A_POINT: f64 = 50.0;
+const PIXELS_A_POINT: f64 = 35.0;
 /// Rises when the same photographs give other points than by an earlier version.
 const REVISION: u32 = 1;
-
-/// A point and the colour of its pixel.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct ColouredPoint {
-    pub(super) at: DVec3,
-    pub(super) rgb: [u8; 3],
-}
 
 /// Points that no file of the capture holds.
 pub(super) struct MadePoints {
@@ -31,9 +25,15 @@ pub(super) struct MadePoints {
     pub(super) origin: PointsOrigin,
     /// What it took; nothing where an earlier load made them.
     pub(super) seconds: Option<f64>,
+    pub(super) file: PointsFile,
 }
 
-/// The points that these photographs give, or `None` where they are to be drawn at random: as asked, or because too few are found.
+/// Points that were made for a capture, as a PLY file in capture units that says what they were made from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointsFile(Vec<u8>);
+
+/// The points that these photographs give; `None` where they are to be drawn at random, as asked or because too few are found: that is
+/// said in `notes`.
 ///
 /// * `shots`: those to train on, at least one.
 /// * `shown`: what they show, and the mean share of their pixels that are not transparent.
@@ -42,44 +42,62 @@ pub(super) fn made(
     (kind, shown): (SceneKind, f64),
     normalisation: &Normalisation,
     options: &LoadOptions,
+    notes: &mut Vec<String>,
 ) -> Option<MadePoints> {
-    let origin = match options.points {
-        Some(PointsChoice::Random) => return None,
-        None if shots.iter().any(|shot| shot.depth.is_some()) => PointsOrigin::DepthMaps,
-        None | Some(PointsChoice::Matched) => PointsOrigin::Matched,
+    let n_maps = shots.iter().filter(|shot| shot.depth.is_some()).count();
+    let origins: &[PointsOrigin] = match options.points {
+        Some(PointsChoice::Random) => &[],
+        None if n_maps > 0 => &[PointsOrigin::DepthMaps, PointsOrigin::Matched],
+        None | Some(PointsChoice::Matched) => &[PointsOrigin::Matched],
     };
-    let least = match (options.points, kind) {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part of a photograph's pixels")]
+    let needed = match (options.points, kind) {
         (None, SceneKind::Object) => LEAST_POINTS.max((shown * matching::mean_pixels(shots) / PIXELS_A_POINT) as usize),
         _ => LEAST_POINTS,
     };
-    let file = options.made_points.as_deref();
-    let made_from = file.and_then(|_| made_from(shots, origin, options).ok());
-    let kept = file.zip(made_from.as_ref()).and_then(|(file, made_from)| read(file, made_from));
-    if let Some(points_world) = kept {
-        return (points_world.len() >= least).then_some(MadePoints { points_world, origin, seconds: None });
+    for &origin in origins {
+        let made = kept_or_made(shots, origin, normalisation, options);
+        let found = made.points_world.len();
+        if found >= needed {
+            return Some(made);
+        }
+        notes.push(match origin {
+            PointsOrigin::DepthMaps => format!("depth maps: {n_maps}, which give {found} points, needed: {needed}"),
+            _ => format!(
+                "points matched between the photographs: {found}, needed: {needed}, so training starts from random ones; take more \
+                 photographs that overlap, or `--points matched` starts from {LEAST_POINTS} on"
+            ),
+        });
+    }
+    None
+}
+
+/// The points of a file that was made from these photographs, or new ones.
+fn kept_or_made(
+    shots: &[Shot],
+    origin: PointsOrigin,
+    normalisation: &Normalisation,
+    options: &LoadOptions,
+) -> MadePoints {
+    // Photographs that were just read and now are not: nothing is found again.
+    let made_from = made_from(shots, origin, options).unwrap_or_default();
+    let earlier = options.made_points.iter().find_map(|path| PointsFile::read(path, &made_from));
+    if let Some((points_world, file)) = earlier {
+        return MadePoints { points_world, origin, seconds: None, file };
     }
     let began = Instant::now();
-    let points = match origin {
-        PointsOrigin::DepthMaps => depth_maps::unprojected(shots, normalisation, options),
+    let mut points = match origin {
+        PointsOrigin::DepthMaps => unprojected::unprojected(shots, normalisation, options),
         _ => matching::matched(shots, normalisation, options),
     };
     let seconds = Some(began.elapsed().as_secs_f64());
-    let in_capture =
-        |point: ColouredPoint| ColouredPoint { at: point.at / normalisation.scale + normalisation.centre, ..point };
-    let points: Vec<ColouredPoint> = points.into_iter().map(in_capture).collect();
-    if points.len() < LEAST_POINTS {
-        return None;
-    }
-    if let (Some(file), Some(made_from)) = (file, made_from) {
-        // Best effort: the next load makes them again.
-        let _ = write(file, &made_from, &points);
-    }
-    let points_world: Vec<DVec3> = points.into_iter().map(|point| point.at).collect();
-    (points_world.len() >= least).then_some(MadePoints { points_world, origin, seconds })
+    points.iter_mut().for_each(|point| point.at = point.at / normalisation.scale + normalisation.centre);
+    let file = PointsFile::new(&made_from, &points);
+    MadePoints { points_world: points.into_iter().map(|point| point.at).collect(), origin, seconds, file }
 }
 
 /// The line of a file that says what its points were made from: photographs, masks, cameras.
-fn made_from(shots: &[Shot], origin: PointsOrigin, options: &LoadOptions) -> std::io::Result<String> {
+fn made_from(shots: &[Shot], origin: PointsOrigin, options: &LoadOptions) -> io::Result<String> {
     let mut text = format!("{REVISION} {origin:?} {:?}", options.background);
     for shot in shots {
         let Shot { header, rotation, translation, lens, .. } = shot;
@@ -94,29 +112,34 @@ fn made_from(shots: &[Shot], origin: PointsOrigin, options: &LoadOptions) -> std
     Ok(format!("comment pocketsplat made from {:08x}", crc32fast::hash(text.as_bytes())))
 }
 
-fn read(file: &Path, made_from: &str) -> Option<Vec<DVec3>> {
-    let bytes = fs::read(file).ok()?;
-    let says = bytes.split(|byte| *byte == b'\n').take(8).any(|line| line == made_from.as_bytes());
-    ply::parse(&bytes).ok().filter(|points| says && points.len() >= LEAST_POINTS)
-}
+impl PointsFile {
+    fn new(made_from: &str, points: &[ColouredPoint]) -> Self {
+        let properties = ["double x", "double y", "double z", "uchar red", "uchar green", "uchar blue"];
+        let mut head = format!("ply\nformat binary_little_endian 1.0\n{made_from}\nelement vertex {}\n", points.len());
+        properties.iter().for_each(|property| head += &format!("property {property}\n"));
+        let mut bytes = (head + "end_header\n").into_bytes();
+        for point in points {
+            bytes.extend(point.at.to_array().into_iter().flat_map(f64::to_le_bytes).chain(point.rgb));
+        }
+        Self(bytes)
+    }
 
-/// Writes points as a PLY file, capture units, unless another program's file is in the way.
-fn write(file: &Path, made_from: &str, points: &[ColouredPoint]) -> std::io::Result<()> {
-    let is_ours =
-        |bytes: Vec<u8>| bytes.windows(b"comment pocketsplat".len()).take(256).any(|w| w == b"comment pocketsplat");
-    if file.exists() && !fs::read(file).is_ok_and(is_ours) {
-        return Ok(());
+    /// The points of the file `path`, capture units, where it says that they were made from the same.
+    fn read(path: &Path, made_from: &str) -> Option<(Vec<DVec3>, Self)> {
+        let bytes = fs::read(path).ok()?;
+        let says = bytes.split(|byte| *byte == b'\n').take(8).any(|line| line == made_from.as_bytes());
+        let points = ply::parse(&bytes).ok().filter(|_| says)?;
+        Some((points, Self(bytes)))
     }
-    let properties = ["double x", "double y", "double z", "uchar red", "uchar green", "uchar blue"];
-    let mut bytes = format!("ply\nformat binary_little_endian 1.0\n{made_from}\nelement vertex {}\n", points.len());
-    properties.iter().for_each(|property| bytes += &format!("property {property}\n"));
-    bytes += "end_header\n";
-    let mut bytes = bytes.into_bytes();
-    for point in points {
-        bytes.extend(point.at.to_array().into_iter().flat_map(f64::to_le_bytes).chain(point.rgb));
+
+    /// Keeps the points in the file `path` of a folder that is the program's own.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn write(&self, path: &Path) -> io::Result<()> {
+        if fs::read(path).is_ok_and(|there| there == self.0) {
+            return Ok(());
+        }
+        pocketsplat_files::write_whole(path, |out| out.write_all(&self.0))
     }
-    if let Some(folder) = file.parent() {
-        fs::create_dir_all(folder)?;
-    }
-    pocketsplat_files::write_whole(file, |out| out.write_all(&bytes))
 }

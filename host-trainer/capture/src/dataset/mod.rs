@@ -3,7 +3,7 @@
 //! [`load`] tells the layout of a folder by the files in it; that layout's reader lists the views (poses, lenses, image
 //! headers), and what all layouts share makes a capture of the listing: pixels in `image`, `lens` and `undistort`, the
 //! common frame in `normalise`, without the cameras that `apart` sets aside; what the pixels show in `scene_kind`, initial points in
-//! `starting_points`; `storage` says where the pixels of large captures lie.
+//! `starting_points`, those of a capture that brings none in `made_points`; `storage` says where the pixels of large captures lie.
 //! A view that cannot be used is left out and named in the [`LoadReport`]; only a capture that cannot be trained on
 //! at all is an error. [`diagnose()`] looks at the same listing and says what may go wrong.
 
@@ -19,7 +19,8 @@ mod bundler;
 mod cache;
 mod camera_models;
 mod colmap;
-mod depth_maps;
+mod coloured_point;
+mod depth_map;
 mod detect;
 mod diagnose;
 mod error;
@@ -69,6 +70,7 @@ mod storage;
 mod text_file;
 mod transforms;
 mod undistort;
+mod unprojected;
 mod unread_masks;
 mod view;
 mod view_fault;
@@ -78,6 +80,7 @@ pub use diagnose::{Diagnosis, Finding, MaskedView, diagnose, diagnose_cheaply};
 pub use error::DatasetError;
 pub use frame_size::{FrameSize, NoFrameSize};
 pub use layout::Layout;
+pub use made_points::PointsFile;
 pub use mask::Mask;
 pub use options::{Background, LoadOptions, MOST_IN_MEMORY_BYTES, PointsChoice};
 pub use photograph::Photograph;
@@ -135,6 +138,8 @@ pub struct Capture {
     pub points: Vec<DVec3>,
     /// Where they come from.
     pub points_origin: PointsOrigin,
+    /// Points that were made, to be kept for the next load.
+    pub made_points: Option<PointsFile>,
     /// What the photographs show.
     pub scene: SceneKind,
     /// Takes capture coordinates to the normalised frame.

@@ -105,8 +105,8 @@ fn points(
     let Some(named) = transforms.ply_file_path.as_deref().map(NamedPath::new) else { return Ok(None) };
     let Some(path) = named.file(names, folder, None) else {
         let text = format!(
-            "`ply_file_path` names `{}`, which does not exist, so training makes points; restore the point cloud to start from it, \
-             or take `ply_file_path` out",
+            "`ply_file_path` names `{}`, which does not exist, so training makes points; restore the point cloud for a \
+             better start, or take `ply_file_path` out",
             shown(&named.expected(folder, None))
         );
         notes.push(Note::warning("missing-points", text));

@@ -92,8 +92,8 @@ pub struct LoadOptions {
     /// Where the initial points come from; without it from the capture, else from its depth maps, else matched between the photographs,
     /// else, where too few are found, random.
     pub points: Option<PointsChoice>,
-    /// Points that are made are kept in this file, and found there by the next load of the same photographs.
-    pub made_points: Option<PathBuf>,
+    /// Files in which points may lie that an earlier load made of the same photographs, see [`Capture::made_points`](super::Capture).
+    pub made_points: Vec<PathBuf>,
     /// Decides the random initial points of captures that bring none.
     pub seed: u64,
     /// How many random initial points a capture that brings none gets.
@@ -124,7 +124,7 @@ impl Default for LoadOptions {
             background: Background::Black,
             scene: None,
             points: None,
-            made_points: None,
+            made_points: Vec::new(),
             seed: 42,
             n_random_points: 10_000,
             images: None,

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use super::depth_maps::DepthMap;
+use super::depth_map::DepthMap;
 use super::image_names::is_image_name;
 use super::listing::{Listing, every_nth, is_listed};
 use super::transforms::{Frame, Intrinsics, list_frames};

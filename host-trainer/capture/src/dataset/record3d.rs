@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use glam::{DMat3, DQuat};
 use serde::Deserialize;
 
-use super::depth_maps::DepthMap;
+use super::depth_map::DepthMap;
 use super::image_names::is_image_name;
 use super::listing::{Listing, every_nth};
 use super::quaternion::{long_quaternions, rotation_of};

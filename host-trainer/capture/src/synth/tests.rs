@@ -1,7 +1,7 @@
 use glam::DVec3;
 
 use super::*;
-use crate::dataset::{LoadOptions, View, load};
+use crate::dataset::{LoadOptions, PointsChoice, View, load};
 
 fn written(options: &SynthOptions) -> (tempfile::TempDir, SynthReport) {
     let dir = tempfile::tempdir().expect("a temporary folder");
@@ -13,7 +13,8 @@ fn written(options: &SynthOptions) -> (tempfile::TempDir, SynthReport) {
 fn a_written_capture_loads_with_the_cameras_it_was_traced_from() {
     let options = SynthOptions { size_px: 16, n_train: 9, n_test: 3, samples_per_axis: 1, ..SynthOptions::default() };
     let (dir, report) = written(&options);
-    let (capture, load_report) = load(dir.path(), &LoadOptions::default()).expect("it loads");
+    let random = LoadOptions { points: Some(PointsChoice::Random), ..LoadOptions::default() };
+    let (capture, load_report) = load(dir.path(), &random).expect("it loads");
     assert_eq!((report.n_train, report.n_test, report.size_px), (9, 3, 16));
     assert_eq!((capture.train.len(), capture.test.len()), (9, 3));
     assert!(load_report.skipped.is_empty() && load_report.notes.is_empty(), "{load_report}");

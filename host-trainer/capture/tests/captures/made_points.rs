@@ -12,27 +12,30 @@ fn points_are_made_once_for_the_same_photographs() {
     let folder = tempfile::tempdir().expect("a folder");
     let synth = SynthOptions { size_px: 96, n_train: 24, n_test: 1, ..SynthOptions::default() };
     write_capture(&folder.path().join("capture"), &synth).expect("a capture");
-    let file = folder.path().join("run/points.ply");
-    let options =
-        LoadOptions { points: Some(PointsChoice::Matched), made_points: Some(file.clone()), ..LoadOptions::default() };
+    let file = folder.path().join("points.ply");
+    let options = LoadOptions {
+        points: Some(PointsChoice::Matched),
+        made_points: vec![folder.path().join("none.ply"), file.clone()],
+        ..LoadOptions::default()
+    };
     let loaded = || load(&folder.path().join("capture"), &options).expect("a sound capture");
     let (first, report) = loaded();
     assert!(report.points_seconds.is_some() && first.points_origin == PointsOrigin::Matched, "{report}");
     assert!(report.to_string().contains("initial points matched between the photographs in "), "{report}");
+    let kept = first.made_points.as_ref().expect("points that were made");
+    kept.write(&file).expect("written");
     let (second, report) = loaded();
+    assert!(second.made_points == first.made_points, "for another folder");
     assert!(report.points_seconds.is_none() && second.points == first.points, "{report}");
     assert!(
         report.to_string().contains("initial points matched between the photographs by an earlier run"),
         "{report}"
     );
-    // Another photograph: other points. Another program's file: it stays.
+    // Another photograph: other points.
     let [a, b] = ["r_0.png", "r_1.png"].map(|name| folder.path().join("capture/train").join(name));
     let swapped = (std::fs::read(&a).expect("an image"), std::fs::read(&b).expect("an image"));
     std::fs::write(&a, swapped.1).expect("written");
     assert!(loaded().1.points_seconds.is_some());
-    std::fs::write(&file, "ply of mine").expect("written");
-    assert!(loaded().1.points_seconds.is_some());
-    assert_eq!(std::fs::read(&file).expect("there"), b"ply of mine");
 }
 
 /// What a capture with a depth of 2 m everywhere starts from; one row of each map is not sure.
@@ -88,12 +91,19 @@ fn depth_maps_become_points() {
 }
 
 #[test]
-fn a_damaged_depth_map_costs_its_own_points_alone() {
+fn what_gives_no_points_is_told() {
     let fixture = Fixture::new(Kind::Nerfstudio, 17);
     write_record3d(&fixture, "metadata", "rgbd", 0);
     for i in 0..17 {
         fixture.write(&format!("rgbd/{i}.depth"), "no stream");
     }
     let (capture, report) = fixture.load().expect("a sound capture");
-    assert_ne!(capture.points_origin, PointsOrigin::DepthMaps, "{report}");
+    assert_eq!(capture.points_origin, PointsOrigin::Random, "{report}");
+    let text = report.to_string();
+    assert!(text.contains("note: depth maps: 17, which give 0 points, needed: "), "{text}");
+    // Photographs of 24×16 pixels show too little to be matched.
+    assert!(
+        text.contains("note: points matched between the photographs: ") && text.contains("random initial"),
+        "{text}"
+    );
 }

@@ -41,7 +41,7 @@ impl CaptureArgs {
             background: self.options.background.unwrap_or(Background::Black),
             scene: self.options.scene,
             points: self.options.points,
-            made_points: run.map(points_in),
+            made_points: Vec::new(),
             seed,
             images: self.options.images.clone(),
             model: self.options.model,
@@ -60,9 +60,11 @@ impl CaptureArgs {
 
     /// The same for training, which needs points, and every photograph again and again.
     ///
-    /// * `run`: its folder, which keeps points that are made, and photographs decoded that are too many for the memory.
-    pub(crate) fn load_to_train(&self, seed: u64, run: Option<&Path>) -> Result<Capture> {
-        self.load_with(&self.load_options(seed, run))
+    /// * `run`: its folder, which keeps photographs decoded that are too many for the memory.
+    /// * `earlier`: folders of runs that may hold points which were made of the same photographs.
+    pub(crate) fn load_to_train(&self, seed: u64, run: Option<&Path>, earlier: &[&Path]) -> Result<Capture> {
+        let made_points = earlier.iter().map(|run| points_in(run)).collect();
+        self.load_with(&LoadOptions { made_points, ..self.load_options(seed, run) })
     }
 
     /// The files that it is read from, wherever they lie.

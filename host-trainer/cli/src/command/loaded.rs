@@ -39,7 +39,7 @@ impl LoadedCapture {
             // Never two of them in memory.
             self.loaded = None;
             process::forget_peak_memory();
-            let capture = train::load(config, self.run.as_deref())?;
+            let capture = train::load(config, self.run.as_deref(), None)?;
             self.loaded = Some((config.clone(), capture));
         }
         Ok(&self.loaded.as_ref().expect("just loaded").1)

@@ -10,7 +10,6 @@ mod summary;
 #[cfg(test)]
 mod tests;
 
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -18,7 +17,7 @@ use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::{Capture, View};
 use pocketsplat_files::{Output, shell_word};
 use pocketsplat_trainer::step::SharedDevice;
-use pocketsplat_trainer::train::run::{RunFolder, fork, points_in};
+use pocketsplat_trainer::train::run::{RunFolder, fork};
 
 use super::effects::Resolved;
 use super::estimate::{Estimate, Warned};
@@ -64,7 +63,7 @@ fn resume(args: &Args, path: &Path) -> Result<ExitCode> {
     // What was chosen stays; what an accident kept from being chosen is measured now.
     config.effects = begun.effects;
     let output = args.output(&source_of(&config), &config.output, BUNDLE, folder.path())?;
-    let capture = load(&mut config, Some(folder.path()))?;
+    let capture = load(&mut config, Some(folder.path()), None)?;
     let path = folder.path().to_owned();
     let code = train_and_print(args, folder, config, &capture, Start::Resumed, Machine::open(args)?, &output)?;
     drop(capture);
@@ -78,14 +77,7 @@ fn begin(args: &Args) -> Result<ExitCode> {
     let output = args.output(&source_of(&config), &config.output, BUNDLE, &path)?;
     RunFolder::check(&path, args.overwrite())?;
     // Before the run's files are touched, all that may fail: it must not cost an earlier run its results.
-    if let Some((run, _)) = args.fork()
-        && !points_in(&path).exists()
-        && fs::create_dir_all(&path).is_ok()
-    {
-        // Points that were made for that run are not made again; without them they are.
-        let _ = fs::copy(points_in(run), points_in(&path));
-    }
-    let capture = load(&mut config, Some(&path))?;
+    let capture = load(&mut config, Some(&path), args.fork().map(|(run, _)| run))?;
     let start = match args.fork() {
         Some((run, _)) if run.canonicalize().ok() == path.canonicalize().ok() => {
             bail!("{} cannot be both the run to begin from and the new one; choose another --output", path.display())
@@ -120,7 +112,7 @@ fn begin_or_go_on(args: &Args) -> Result<ExitCode> {
     }
     let path = args.run_folder(args.named_paths(&config.dataset, &config.output).1)?;
     let output = args.output(&source_of(&config), &config.output, BUNDLE, &path)?;
-    let capture = load(&mut config, Some(&path))?;
+    let capture = load(&mut config, Some(&path), None)?;
     let code = match Standing::of(&path, &config)? {
         Standing::New(folder) => {
             let start = Start::New(Warned::default());

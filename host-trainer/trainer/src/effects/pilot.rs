@@ -61,6 +61,7 @@ impl PilotCapture {
             train: views(false).map(View::halved).collect(),
             test: views(true).map(View::halved).collect(),
             points: capture.points.clone(),
+            made_points: None,
             ..*capture
         };
         Some(Self { reduced, held_out: views(true).cloned().collect() })

@@ -61,6 +61,7 @@ pub fn capture(
         test: take((test, "test")),
         points,
         points_origin: PointsOrigin::Capture,
+        made_points: None,
         scene: SceneKind::Room,
         normalisation,
         extent: EXTENT,

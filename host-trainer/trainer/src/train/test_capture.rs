@@ -48,6 +48,7 @@ pub(crate) fn many_views(n: u32) -> Capture {
         test: Vec::new(),
         points: points.collect(),
         points_origin: PointsOrigin::Random,
+        made_points: None,
         scene: SceneKind::Object,
         normalisation: Normalisation { centre: DVec3::ZERO, scale: 1.0 },
         extent: EXTENT,

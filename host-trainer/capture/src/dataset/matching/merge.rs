@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::dataset::made_points::ColouredPoint;
+use crate::dataset::coloured_point::ColouredPoint;
 
 /// Points within a cell of so many pixels' width are one.
 pub(in crate::dataset) const CELL_PX: f64 = 4.0;

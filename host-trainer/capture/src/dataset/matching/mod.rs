@@ -21,9 +21,9 @@ use picture::{Level, Picture};
 
 pub(super) use merge::{CELL_PX, merged};
 
+use super::coloured_point::ColouredPoint;
 use super::listing::Shot;
-use super::made_points::ColouredPoint;
-use super::{EXTENT, Image, LoadOptions, Normalisation, frusta};
+use super::{EXTENT, LoadOptions, Normalisation, Photograph, frusta};
 use crate::camera::Camera;
 
 /// The larger side of the photographs that are matched, pixels.
@@ -67,55 +67,69 @@ pub(super) fn matched(shots: &[Shot], normalisation: &Normalisation, options: &L
     let read = |shot: &Shot| {
         let photo = shot.read(&at_size).ok()?;
         let nothing = shot.header.has_alpha.then(|| options.background.rgb8());
-        let picture = Picture::new(&photo.photograph, normalisation.camera(&photo.camera), nothing);
-        Some((picture, photo.photograph.image))
+        Some(seen(&photo.photograph, normalisation.camera(&photo.camera), nothing))
     };
-    let (pictures, images): (Vec<_>, Vec<_>) = shots.par_iter().filter_map(read).unzip();
-    between(pictures, &images)
+    between(shots.par_iter().filter_map(read).unzip())
 }
 
-/// The points that at least three pictures show, in the cameras' frame, with the colours of their images.
-fn between(pictures: Vec<Picture>, images: &[Image]) -> Vec<ColouredPoint> {
+/// A place of a photograph and its colour.
+#[derive(Clone, Copy)]
+struct Corner {
+    at: [f64; 2],
+    rgb: [u8; 3],
+}
+
+/// What is matched of a photograph; `camera` and `nothing` as for [`Picture::new`].
+fn seen(photograph: &Photograph, camera: Camera, nothing: Option<[u8; 3]>) -> (Picture, Vec<Corner>) {
+    let image = &photograph.image;
+    let picture = Picture::new(photograph, camera, nothing);
+    let coloured = |at: [f64; 2]| {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a pixel of the image")]
+        let i = 3 * (at[1] as usize * image.width_px as usize + at[0] as usize);
+        Corner { at, rgb: [image.rgb[i], image.rgb[i + 1], image.rgb[i + 2]] }
+    };
+    let corners = corners::corners(&picture.levels[0]).into_iter().map(coloured).collect();
+    (picture, corners)
+}
+
+/// The points that at least three pictures show, in the cameras' frame.
+fn between((pictures, corners): (Vec<Picture>, Vec<Vec<Corner>>)) -> Vec<ColouredPoint> {
     let cameras: Vec<&Camera> = pictures.iter().map(|picture| &picture.camera).collect();
     let focus = frusta::distances(&cameras).unwrap_or_else(|| vec![EXTENT; pictures.len()]);
     let distances = focus.iter().map(|focus| FIRST.map(|share| share * focus).to_vec()).collect();
     let mut scene = Scene { pictures, distances };
-    let corners: Vec<Vec<[f64; 2]>> =
-        scene.pictures.par_iter().map(|picture| corners::corners(&picture.levels[0])).collect();
     let sample = corners.iter().map(|of_view| of_view.iter().copied().step_by(SAMPLE).collect()).collect::<Vec<_>>();
     scene.learn_distances(&scene.found(&sample));
-    let found = scene.found(&corners).into_iter().enumerate().flat_map(|(view, points)| {
-        let Camera { focal_px, .. } = scene.pictures[view].camera;
-        let image = &images[view];
-        points.into_iter().map(move |([u, v], depth, at)| {
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a pixel of the image")]
-            let i = 3 * (v as usize * image.width_px as usize + u as usize);
-            let rgb = [image.rgb[i], image.rgb[i + 1], image.rgb[i + 2]];
-            (ColouredPoint { at, rgb }, depth / focal_px[0])
-        })
-    });
-    merged(&found.collect::<Vec<_>>())
+    let pixel_width = |view: usize, depth: f64| depth / scene.pictures[view].camera.focal_px[0];
+    let found = scene.found(&corners).into_iter().enumerate();
+    merged(
+        &found
+            .flat_map(|(view, of_view)| {
+                of_view.into_iter().map(move |(point, depth)| (point, pixel_width(view, depth)))
+            })
+            .collect::<Vec<_>>(),
+    )
 }
 
-/// A corner, its depth, and the point that it shows.
-type Found = ([f64; 2], f64, DVec3);
+/// A point and its depth in the photograph whose corner it is.
+type Found = (ColouredPoint, f64);
 
 impl Scene {
     /// The point of each corner of each photograph that has one.
-    fn found(&self, corners: &[Vec<[f64; 2]>]) -> Vec<Vec<Found>> {
-        let of_view = |(view, corners): (usize, &Vec<[f64; 2]>)| {
+    fn found(&self, corners: &[Vec<Corner>]) -> Vec<Vec<Found>> {
+        let of_view = |(view, corners): (usize, &Vec<Corner>)| {
             let targets: Vec<(Vec<usize>, f64)> = self.distances[view]
                 .iter()
                 .map(|&distance| (neighbours::neighbours(self, view, distance), NEAREST * distance))
                 .filter(|(others, _)| others.len() >= 2)
                 .collect();
-            let point = |&at: &[f64; 2]| {
+            let point = |&Corner { at, rgb }: &Corner| {
                 let at_distance = |(others, nearest): &(Vec<usize>, f64)| {
                     triangulate::point(self, search::sightings(self, view, at, others, *nearest)?)
                 };
                 let point = targets.iter().find_map(at_distance)?;
                 let camera = &self.pictures[view].camera;
-                Some((at, (camera.rotation * point + camera.translation).z, point))
+                Some((ColouredPoint { at: point, rgb }, (camera.rotation * point + camera.translation).z))
             };
             corners.par_iter().filter_map(point).collect()
         };
@@ -128,9 +142,9 @@ impl Scene {
             depths.sort_by(f64::total_cmp);
             depths
         };
-        let all = sorted(found.iter().flatten().map(|(_, depth, _)| *depth).collect());
+        let all = sorted(found.iter().flatten().map(|(_, depth)| *depth).collect());
         for (view, found) in found.iter().enumerate() {
-            let own = sorted(found.iter().map(|(_, depth, _)| *depth).collect());
+            let own = sorted(found.iter().map(|(_, depth)| *depth).collect());
             let telling = if own.len() < TELLING { &all } else { &own };
             if telling.len() >= TELLING {
                 let quantile = |quarters: usize| telling[quarters * telling.len() / 4];

@@ -2,7 +2,7 @@ use glam::{DMat3, DVec3};
 
 use super::picture::Picture;
 use super::*;
-use crate::dataset::{Mask, Photograph};
+use crate::dataset::{Image, Mask};
 
 const SIDE_PX: u32 = 256;
 
@@ -18,7 +18,7 @@ const WALL: f64 = 1.0;
 const BOARD: f64 = 2.0;
 
 /// What a camera at `centre` that looks along z sees, its exposure times `gain`, and which of it counts: not the left eighth.
-fn view(centre: DVec3, turn: f64, gain: f64) -> (Picture, Image) {
+fn view(centre: DVec3, turn: f64, gain: f64) -> (Picture, Vec<Corner>) {
     let rotation = DMat3::from_rotation_y(turn);
     let camera = Camera {
         rotation,
@@ -41,7 +41,7 @@ fn view(centre: DVec3, turn: f64, gain: f64) -> (Picture, Image) {
     let image = Image { width_px: SIDE_PX, height_px: SIDE_PX, rgb };
     let valid = (0..SIDE_PX * SIDE_PX).map(|i| i % SIDE_PX >= SIDE_PX / 8).collect();
     let mask = Some(Mask { width_px: SIDE_PX, height_px: SIDE_PX, valid });
-    (Picture::new(&Photograph { image: image.clone(), mask }, camera, None), image)
+    seen(&Photograph { image, mask }, camera, None)
 }
 
 fn wall_and_board() -> Vec<ColouredPoint> {
@@ -49,8 +49,7 @@ fn wall_and_board() -> Vec<ColouredPoint> {
         let along = f64::from(i) * 0.25 - 0.875;
         view(DVec3::new(along, 0.1 * f64::from(i % 3), 0.0), 0.15 * along, if i % 2 == 0 { 1.0 } else { 0.7 })
     });
-    let (pictures, images): (Vec<_>, Vec<_>) = views.unzip();
-    between(pictures, &images)
+    between(views.unzip())
 }
 
 #[test]
@@ -82,9 +81,8 @@ fn the_same_photographs_give_the_same_points_with_any_number_of_threads() {
 
 #[test]
 fn what_does_not_count_gives_no_corner() {
-    let (picture, _) = view(DVec3::ZERO, 0.0, 1.0);
-    let corners = corners::corners(&picture.levels[0]);
-    let least = corners.iter().map(|[u, _]| *u).fold(f64::INFINITY, f64::min);
+    let (_, corners) = view(DVec3::ZERO, 0.0, 1.0);
+    let least = corners.iter().map(|corner| corner.at[0]).fold(f64::INFINITY, f64::min);
     assert!(corners.len() > 500 && least > f64::from(SIDE_PX / 8), "{} corners from {least} on", corners.len());
 }
 
@@ -106,6 +104,5 @@ fn a_pixel_and_its_neighbours_are_seen_where_their_points_are() {
 
 #[test]
 fn too_few_photographs_give_nothing() {
-    let (pictures, images): (Vec<_>, Vec<_>) = (0..2).map(|i| view(DVec3::X * 0.4 * f64::from(i), 0.0, 1.0)).unzip();
-    assert_eq!(between(pictures, &images), []);
+    assert_eq!(between((0..2).map(|i| view(DVec3::X * 0.4 * f64::from(i), 0.0, 1.0)).unzip()), []);
 }

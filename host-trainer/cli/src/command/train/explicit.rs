@@ -26,7 +26,7 @@ use super::super::progress::Progress;
 use super::super::stop;
 use super::super::train_args::Args;
 use super::in_folder::{CHECKPOINT_SECONDS, IN_RUN_AND_ON_COMMAND_LINE};
-use super::loading::{check_size, clear_photographs};
+use super::loading::{check_size, clear_photographs, keep_points};
 use super::result::HeldOut;
 use super::summary::Summary;
 use crate::config::{EXPLICIT, ExplicitRunConfig, Protocol};
@@ -149,7 +149,7 @@ fn load(config: &ExplicitRunConfig, run: &Path) -> Result<Capture> {
     let source = source_of(config);
     // At once: large captures take their time.
     say!("reading {}", config.dataset.display());
-    let capture = source.load_to_train(config.gaussians.seed, Some(run))?;
+    let capture = source.load_to_train(config.gaussians.seed, Some(run), &[run])?;
     check_size(&capture, &Limits::default())?;
     Ok(capture)
 }
@@ -185,6 +185,7 @@ fn train_in(
     output: &Output,
 ) -> Result<Option<ExplicitResult>> {
     folder.write_config(&config.to_toml()?)?;
+    keep_points(capture, folder.path());
     let interval = config.checkpoint_every.map_or(Interval::Seconds(CHECKPOINT_SECONDS), Interval::Iterations);
     let how_to_go_on = format!("go on with `pocketsplat train --resume {}`", shell_word(folder.path()));
     let iterations = config.gaussians.iterations;

@@ -11,6 +11,7 @@ use pocketsplat_trainer::train::gauge::Gauge;
 use pocketsplat_trainer::train::run::{Ending, Interval, RunError, RunFolder};
 use pocketsplat_trainer::train::{TrainConfig, Trainer};
 
+use super::loading::keep_points;
 use super::result::{TrainResult, write_bundle};
 use crate::command::estimate::{Estimate, Warned};
 use crate::command::output::json;
@@ -47,6 +48,7 @@ pub(crate) fn train_in<'a>(
 ) -> Result<Option<TrainResult>> {
     let mut folder = folder.forking_at(&config.fork_at);
     let path = folder.path().to_owned();
+    keep_points(capture, &path);
     let scale = config.encoding.scale(capture);
     let warned = if let Start::New(warned) = start { warned } else { Warned::default() };
     let trainer = match start {

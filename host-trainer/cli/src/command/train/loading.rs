@@ -8,7 +8,7 @@ use pocketsplat_capture::dataset::{Capture, View, remove_cache};
 use pocketsplat_core::budget::MAX_FRAME_PX;
 use pocketsplat_instructions::level::{Bound, Level};
 use pocketsplat_trainer::device::Limits;
-use pocketsplat_trainer::train::run::photographs_in;
+use pocketsplat_trainer::train::run::{photographs_in, points_in};
 
 use crate::command::capture::CaptureArgs;
 use crate::config::RunConfig;
@@ -21,15 +21,22 @@ pub(super) fn source_of(config: &RunConfig) -> CaptureArgs {
 
 /// Loads the capture that a run is configured for, and decides what the configuration left to it.
 ///
-/// * `run`: its folder, which keeps what is made of the capture; without one points are made again by the next load, and photographs
-///   that are too many for the memory are decoded again for every step.
-pub(crate) fn load(config: &mut RunConfig, run: Option<&Path>) -> Result<Capture> {
+/// * `run`: its folder; without one photographs that are too many for the memory are decoded again for every step.
+/// * `earlier`: another run's folder, which may hold points that were made of the same photographs.
+pub(crate) fn load(config: &mut RunConfig, run: Option<&Path>, earlier: Option<&Path>) -> Result<Capture> {
     let source = source_of(config);
     // At once: large captures take their time.
     say!("reading {}", config.dataset.display());
-    let capture = source.load_to_train(config.train.seed, run)?;
+    let capture = source.load_to_train(config.train.seed, run, &run.into_iter().chain(earlier).collect::<Vec<_>>())?;
     decide(config, &capture)?;
     Ok(capture)
+}
+
+/// Keeps points that were made in the folder of a run, best effort: without them the next load makes them again.
+pub(crate) fn keep_points(capture: &Capture, run: &Path) {
+    if let Some(points) = &capture.made_points {
+        let _ = points.write(&points_in(run));
+    }
 }
 
 /// Decides what the configuration of a run left to its capture.

@@ -69,7 +69,7 @@ pub fn photographs_in(run: &Path) -> PathBuf {
     run.join(PHOTOGRAPHS)
 }
 
-/// Where the folder of a run keeps points that were made for a capture that brings none. They are made before the run begins.
+/// Where the folder of a run keeps points that were made for a capture that brings none.
 pub fn points_in(run: &Path) -> PathBuf {
     run.join(POINTS)
 }
@@ -135,7 +135,7 @@ impl RunFolder {
     }
 
     fn refuse_foreign(path: &Path) -> Result<(), RunError> {
-        let ours = |name: &OsStr| [LOCK, PHOTOGRAPHS, POINTS].iter().any(|own| name == *own) || is_partial(name);
+        let ours = |name: &OsStr| [LOCK, PHOTOGRAPHS].iter().any(|own| name == *own) || is_partial(name);
         let occupied = files::names(path)?.into_iter().any(|name| !ours(&name));
         // A configuration alone may be anyone's; a run has locked its folder too, with a file that says nothing.
         let is_locked = fs::metadata(path.join(LOCK)).is_ok_and(|found| found.is_file() && found.len() == 0);
@@ -162,7 +162,7 @@ impl RunFolder {
         let folder = Self::locked(path)?;
         folder.refuse_unfinished(overwrite)?;
         folder.clear_checkpoints(|_| true)?;
-        for name in [RESULT, LOG, EFFECTS, PILOTS, REPORT] {
+        for name in [RESULT, LOG, EFFECTS, PILOTS, POINTS, REPORT] {
             files::remove(&path.join(name))?;
         }
         previews::remove(&path.join(PREVIEWS))?;

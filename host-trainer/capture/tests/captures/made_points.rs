@@ -100,7 +100,7 @@ fn what_gives_no_points_is_told() {
     let (capture, report) = fixture.load().expect("a sound capture");
     assert_eq!(capture.points_origin, PointsOrigin::Random, "{report}");
     let text = report.to_string();
-    assert!(text.contains("note: depth maps: 17, which give 0 points, needed: "), "{text}");
+    assert!(text.contains("note: depth maps: 14, which give 0 points, needed: "), "{text}");
     // Photographs of 24×16 pixels show too little to be matched.
     assert!(
         text.contains("note: points matched between the photographs: ") && text.contains("random initial"),

@@ -52,18 +52,23 @@ impl Camera {
     }
 }
 
-/// The point nearest to all optical axes, in the least-squares sense: it solves `Σ(I − d·dᵀ)·p = Σ(I − d·dᵀ)·c` over axes
-/// `c + s·d`.
-///
-/// `None` where the mean of `I − d·dᵀ` has a determinant of no more than `least_determinant`, as for parallel axes.
+/// The point nearest to all optical axes, see [`nearest_to_lines`].
 pub fn nearest_to_axes<'a>(cameras: impl Iterator<Item = &'a Camera>, least_determinant: f64) -> Option<DVec3> {
+    nearest_to_lines(cameras.map(|camera| (camera.centre_world(), camera.rotation.row(2))), least_determinant)
+}
+
+/// The point nearest to all lines `c + s·d`, in the least-squares sense: it solves `Σ(I − d·dᵀ)·p = Σ(I − d·dᵀ)·c`.
+///
+/// `None` where the mean of `I − d·dᵀ` has a determinant of no more than `least_determinant`, as for parallel lines.
+///
+/// * `lines`: each a point `c` and a direction `d` of length 1.
+pub fn nearest_to_lines(lines: impl Iterator<Item = (DVec3, DVec3)>, least_determinant: f64) -> Option<DVec3> {
     let (mut n, mut across_sum, mut across_centres) = (0, DMat3::ZERO, DVec3::ZERO);
-    for camera in cameras {
-        let axis = camera.rotation.row(2);
+    for (centre, axis) in lines {
         let across = DMat3::IDENTITY - DMat3::from_cols(axis * axis.x, axis * axis.y, axis * axis.z);
         n += 1;
         across_sum += across;
-        across_centres += across * camera.centre_world();
+        across_centres += across * centre;
     }
     let mean = across_sum * (1.0 / f64::from(n));
     (mean.determinant() > least_determinant).then(|| across_sum.inverse() * across_centres)

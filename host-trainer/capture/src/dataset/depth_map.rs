@@ -9,6 +9,11 @@ use image::ImageReader;
 /// Metres in the millimetre of Polycam.
 const MILLIMETRE: f64 = 1e-3;
 
+/// Record3D's steps of confidence are 0, 1 and 2: from the highest on a depth is believed.
+const SURE_LZFSE: f64 = 2.0;
+/// Polycam's highest step is white; the upper half of the 16 bits that every PNG is read as.
+const SURE_PNG: f64 = 32_768.0;
+
 /// The depth map of a photograph, and how sure its pixels are.
 #[derive(Clone, Debug)]
 pub(super) struct DepthMap {
@@ -39,9 +44,8 @@ impl DepthMap {
         let mut depths = Map::read(&self.path, photograph_px)?;
         if let Some(path) = &self.confidence {
             let sure = Map::read(path, photograph_px).filter(|sure| sure.values.len() == depths.values.len())?;
-            // Of three steps the highest: 0, 1 and 2 with Record3D, up to 255 with Polycam.
-            let most = sure.values.iter().copied().fold(0.0, f64::max);
-            depths.values.iter_mut().zip(&sure.values).filter(|(_, sure)| **sure < most).for_each(|(d, _)| *d = 0.0);
+            let least = if is_png(path) { SURE_PNG } else { SURE_LZFSE };
+            depths.values.iter_mut().zip(&sure.values).filter(|(_, sure)| **sure < least).for_each(|(d, _)| *d = 0.0);
         }
         let unit = if is_png(&self.path) { MILLIMETRE } else { 1.0 };
         depths.values.iter_mut().for_each(|depth| *depth *= unit);
@@ -60,7 +64,7 @@ impl Map {
             let image =
                 ImageReader::new(BufReader::new(File::open(path).ok()?)).with_guessed_format().ok()?.decode().ok()?;
             let (width_px, height_px) = (image.width() as usize, image.height() as usize);
-            // Eight bits stay what they are: they are compared with each other alone.
+            // Eight bits become the same part of sixteen.
             let values = image.into_luma16().into_raw().into_iter().map(f64::from).collect();
             return Some(Self { width_px, height_px, values });
         }

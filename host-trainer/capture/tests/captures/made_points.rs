@@ -39,7 +39,9 @@ fn points_are_made_once_for_the_same_photographs() {
 }
 
 /// What a capture with a depth of 2 m everywhere starts from; one row of each map is not sure.
-fn with_depth_maps(record3d: bool) -> (Capture, LoadReport) {
+///
+/// * `is_sure`: of the other rows.
+fn with_depth_maps(record3d: bool, is_sure: bool) -> (Capture, LoadReport) {
     let fixture = Fixture::new(Kind::Nerfstudio, 17);
     let (width_px, height_px) = SIZE_PX;
     let n = (width_px * height_px) as usize;
@@ -56,7 +58,7 @@ fn with_depth_maps(record3d: bool) -> (Capture, LoadReport) {
                 packed
             };
             let depths: Vec<u8> = std::iter::repeat_n(2.0_f32.to_le_bytes(), n).flatten().collect();
-            let sure: Vec<u8> = (0..n).map(|at| if at < width_px as usize { 1 } else { 2 }).collect();
+            let sure: Vec<u8> = (0..n).map(|at| if at < width_px as usize || !is_sure { 1 } else { 2 }).collect();
             fixture.write(&format!("rgbd/{i}.depth"), packed(&depths));
             fixture.write(&format!("rgbd/{i}.conf"), packed(&sure));
         } else {
@@ -66,7 +68,8 @@ fn with_depth_maps(record3d: bool) -> (Capture, LoadReport) {
             }
             let depth = ImageBuffer::from_pixel(width_px, height_px, Luma([2000_u16]));
             depth.save(folder.join("depth").join(&photo.name)).expect("a map");
-            let sure = ImageBuffer::from_fn(width_px, height_px, |_, y| Luma([if y == 0 { 54_u8 } else { 255 }]));
+            let sure =
+                ImageBuffer::from_fn(width_px, height_px, |_, y| Luma([if y == 0 || !is_sure { 54_u8 } else { 255 }]));
             sure.save(folder.join("confidence").join(&photo.name)).expect("a map");
         }
     }
@@ -76,7 +79,7 @@ fn with_depth_maps(record3d: bool) -> (Capture, LoadReport) {
 #[test]
 fn depth_maps_become_points() {
     for record3d in [false, true] {
-        let (capture, report) = with_depth_maps(record3d);
+        let (capture, report) = with_depth_maps(record3d, true);
         assert_eq!(capture.points_origin, PointsOrigin::DepthMaps, "{report}");
         assert!(report.to_string().contains("initial points of its depth maps in "), "{report}");
         // At 2 m from some camera each, and none in the row that is not sure.
@@ -87,6 +90,8 @@ fn depth_maps_become_points() {
             assert!(off < 0.3, "a point is {off} m off");
         }
         assert!(capture.points.len() > 100, "{report}");
+        let (capture, report) = with_depth_maps(record3d, false);
+        assert_ne!(capture.points_origin, PointsOrigin::DepthMaps, "nothing is sure: {report}");
     }
 }
 

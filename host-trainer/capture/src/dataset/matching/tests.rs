@@ -103,6 +103,18 @@ fn a_pixel_and_its_neighbours_are_seen_where_their_points_are() {
 }
 
 #[test]
+fn the_derivative_of_a_miss_agrees_with_finite_differences() {
+    let camera = view(DVec3::new(0.3, -0.1, 0.2), 0.2, 1.0).0.camera;
+    let (at, point, h) = (glam::DVec2::new(90.0, 150.0), DVec3::new(0.4, 0.3, 4.0), 1e-5);
+    let miss = |point| triangulate::miss_of(&camera, at, point).expect("before the camera");
+    let (_, [u, v]) = miss(point);
+    for (axis, [du, dv]) in [DVec3::X, DVec3::Y, DVec3::Z].into_iter().zip([0, 1, 2].map(|i| [u[i], v[i]])) {
+        let difference = (miss(point + h * axis).0 - miss(point - h * axis).0) / (2.0 * h);
+        assert!((difference - glam::DVec2::new(du, dv)).length() < 1e-5, "{difference} along {axis}");
+    }
+}
+
+#[test]
 fn too_few_photographs_give_nothing() {
     assert_eq!(between((0..2).map(|i| view(DVec3::X * 0.4 * f64::from(i), 0.0, 1.0)).unzip()), []);
 }

@@ -4,6 +4,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 use super::Scene;
 use super::search::Sighting;
+use crate::camera::{Camera, nearest_to_lines};
 
 /// The point and its sightings miss each other by no more than this, pixels.
 const MOST_MISS_PX: f64 = 1.5;
@@ -38,21 +39,20 @@ fn parallax(scene: &Scene, sightings: &[Sighting], point: DVec3) -> f64 {
 }
 
 fn nearest_to_rays(scene: &Scene, sightings: &[Sighting]) -> Option<DVec3> {
-    let (mut across_sum, mut across_centres) = (DMat3::ZERO, DVec3::ZERO);
-    for sighting in sightings {
-        let camera = &scene.pictures[sighting.view].camera;
-        let ray = (scene.point(sighting.view, sighting.at.into(), 1.0) - camera.centre_world()).normalize();
-        let across = DMat3::IDENTITY - DMat3::from_cols(ray * ray.x, ray * ray.y, ray * ray.z);
-        across_sum += across;
-        across_centres += across * camera.centre_world();
-    }
-    let point = across_sum.inverse() * across_centres;
-    point.is_finite().then_some(point)
+    let ray = |sighting: &Sighting| {
+        let centre = scene.pictures[sighting.view].camera.centre_world();
+        (centre, (scene.point(sighting.view, sighting.at.into(), 1.0) - centre).normalize())
+    };
+    nearest_to_lines(sightings.iter().map(ray), 0.0).filter(|point| point.is_finite())
 }
 
 /// How far the point is seen from a sighting, pixels, and the derivative of its two parts by the point; `None` behind the camera.
 fn miss(scene: &Scene, sighting: &Sighting, point: DVec3) -> Option<(DVec2, [DVec3; 2])> {
-    let camera = &scene.pictures[sighting.view].camera;
+    miss_of(&scene.pictures[sighting.view].camera, sighting.at, point)
+}
+
+/// The same of a camera that sees it at `at`.
+pub(super) fn miss_of(camera: &Camera, at: DVec2, point: DVec3) -> Option<(DVec2, [DVec3; 2])> {
     let seen = camera.rotation * point + camera.translation;
     if seen.z <= 0.0 {
         return None;
@@ -61,7 +61,7 @@ fn miss(scene: &Scene, sighting: &Sighting, point: DVec3) -> Option<(DVec2, [DVe
     let [focal, principal] = [camera.focal_px, camera.principal_px].map(DVec2::from);
     let by =
         |axis: usize| (camera.rotation.row(axis) - on_plane[axis] * camera.rotation.row(2)) * (focal[axis] / seen.z);
-    Some((focal * on_plane + principal - sighting.at, [by(0), by(1)]))
+    Some((focal * on_plane + principal - at, [by(0), by(1)]))
 }
 
 /// One step of Gauss and Newton.

@@ -32,10 +32,10 @@ pub(crate) fn load(config: &mut RunConfig, run: Option<&Path>, earlier: Option<&
     Ok(capture)
 }
 
-/// Keeps points that were made in the folder of a run, best effort: without them the next load makes them again.
+/// Keeps points that were made in the folder of a run; without them the next load makes them again, so it may fail.
 pub(crate) fn keep_points(capture: &Capture, run: &Path) {
-    if let Some(points) = &capture.made_points {
-        let _ = points.write(&points_in(run));
+    if let Some(Err(error)) = capture.made_points.as_ref().map(|points| points.write(&points_in(run))) {
+        say!("warning: the points are not kept in {} and will be made again: {error}", points_in(run).display());
     }
 }
 

@@ -66,13 +66,13 @@ rows = []
 for path in out.glob("*.json"):
     found = json.loads(path.read_text())
     ram_bytes = found["scratch_bytes"] or BYTES_OF_A_GAUSSIAN * found["n_gaussians"]
-    rows.append({"file": path.stem, **{name: found.get(name, "") for name in names}, "ram_bytes": ram_bytes})
+    rows.append({"file": path.stem, **{name: found.get(name, "") for name in names}, "ram_bytes": ram_bytes, "program": found["program"]})
 whole = next(row["bundle_bytes"] for row in rows if row["file"] == "3dgs.ply")
 for row in rows:
     row["times_smaller"] = round(whole / row["bundle_bytes"], 1)
 rows.sort(key=lambda row: -row["bundle_bytes"])
 with open(out / "formats.csv", "w", newline="") as file:
-    table = csv.DictWriter(file, ["file", *names, "ram_bytes", "times_smaller"])
+    table = csv.DictWriter(file, ["file", *names, "ram_bytes", "times_smaller", "program"])
     table.writeheader()
     table.writerows(rows)
 print((out / "formats.csv").read_text(), end="")

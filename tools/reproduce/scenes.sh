@@ -53,7 +53,7 @@ summarise() {
 import csv, json, pathlib, sys
 
 out = pathlib.Path(sys.argv[1])
-names = ["scene", "lambda", "psnr_db", "ssim", "lpips", "bundle_bytes", "n_views", "width_px", "height_px", "background"]
+names = ["scene", "lambda", "psnr_db", "ssim", "lpips", "bundle_bytes", "n_views", "width_px", "height_px", "background", "program"]
 rows = []
 for path in sorted(out.glob("*.json")):
     figures = json.loads(path.read_text())

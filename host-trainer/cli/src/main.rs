@@ -4,6 +4,7 @@
 mod command;
 mod config;
 mod plot;
+mod program;
 mod say;
 
 use std::process::ExitCode;

@@ -28,3 +28,7 @@ pub mod scene;
 pub mod step;
 pub mod train;
 pub mod verify;
+
+/// Revision of training: raised by the commit that changes what a run gives, from its photographs to its bundle, so that figures of two
+/// programs are told apart.
+pub const REVISION: u32 = 1;

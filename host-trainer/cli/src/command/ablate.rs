@@ -14,10 +14,13 @@ use super::outputs::table;
 use super::runs::{FIGURE, RunSpec, RunsArgs, write_curves};
 use crate::config::RunConfig;
 use crate::config::heading::{QUALITY, RUN};
+use crate::program;
 use comparison::{comparisons, run_lines};
 use rows::{BASELINE, Extent, Row, rows};
 
-/// Train a capture without modules, with each alone and with all, at several rates, and with their options at one.
+/// Compare training modules: none, each, all.
+///
+/// The rows are trained at several rates, the options of the modules at one.
 ///
 /// Every run and every measurement is kept in the folder: the same command again resumes where it was interrupted, and one
 /// with more rows or rates trains those alone. After each run ablation.csv and summary.csv hold what is known of the rows
@@ -62,7 +65,8 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
         let [(ablation, of_ablation), (summary, of_summary), _] = files;
         outputs.file(&folder.join(ablation), of_ablation)?.write(&output::csv(run_lines(runs))?)?;
         let summary_file = outputs.file(&folder.join(summary), of_summary)?;
-        let summary = output::csv(comparisons(runs, option_lambda))?;
+        let program = program::of_all(runs.iter().map(|run| run.evaluation.program.as_str()));
+        let summary = output::csv_of(&program, comparisons(runs, option_lambda))?;
         summary_file.write(&summary)?;
         Ok(summary)
     })

@@ -13,6 +13,7 @@ use super::eval::Evaluation;
 use super::outputs::{self, FIGURE, OverwriteArgs};
 use super::{output, point};
 use crate::config::{Difference, RunConfig};
+use crate::program;
 
 /// Compare finished runs: quality, bytes and the minutes that they took, by the settings in which they differ from the first.
 ///
@@ -48,6 +49,7 @@ struct RunLine {
     n_anchors: u32,
     #[serde(rename = "#Gaussians")]
     n_gaussians: u64,
+    program: String,
 }
 
 /// What is read of a run's result.json.
@@ -70,6 +72,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let runs = args.runs.iter().zip(configs.iter().zip(&evaluations));
     let lines = runs.map(|(run, compared)| line(run, compared, (&configs[0], &evaluations[0])));
     let lines = lines.collect::<Result<Vec<_>>>()?;
+    program::warn_of_several(lines.iter().map(|line| line.program.as_str()));
     let table = output::csv(&lines)?;
     csv.write(&table)?;
     let panels = [
@@ -105,6 +108,7 @@ fn line(
         size_bytes: evaluation.bundle_bytes,
         n_anchors: evaluation.n_anchors,
         n_gaussians: evaluation.n_gaussians,
+        program: evaluation.program.clone(),
     })
 }
 

@@ -24,14 +24,14 @@ use super::capture::{CaptureArgs, views_of};
 use super::eval::reference_image;
 use super::outputs::OverwriteArgs;
 use crate::config::named::{SPLITS, one_of};
+use crate::program;
 use crate::say::say;
 
-/// Change each setting of the decoder by itself, and those of quality in all combinations, and measure what that costs in
-/// accuracy and saves in time.
+/// Measure quality and time of each decoder setting.
 ///
-/// Writes cost.csv, cost.svg and cost.md: for each setting PSNR to the f64 reference and to the photographs, the time of a
+/// Settings change one at a time, those of quality in all combinations. Writes cost.csv, cost.svg and cost.md: for each setting PSNR to the f64 reference and to the photographs, the time of a
 /// frame here, and the instructions of each stage on each target. Where the firmware's folder and QEMU are at hand, the firmware
-/// counts them for each knob by itself; else, and for the combinations, they are predicted from what the frames consist of, if the
+/// counts them for each setting by itself; else, and for the combinations, they are predicted from what the frames consist of, if the
 /// arithmetic is the one whose costs were counted.
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -64,7 +64,7 @@ pub(crate) struct Args {
     overwrite: OverwriteArgs,
 }
 
-/// Views whose instructions are counted when nobody says how many: a count draws each of them for every knob.
+/// Views whose instructions are counted when nobody says how many: a count draws each of them for every setting.
 const COUNTED_VIEWS: usize = 2;
 
 pub(crate) fn run(args: &Args) -> Result<()> {
@@ -115,8 +115,10 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         }
         measured.push(point);
     }
+    let program = program::of_figures(file.protocol(&bundle).map(|protocol| protocol.program).as_deref());
     let bundle_name = args.bundle.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let report = Report {
+        program: &program,
         bundle_name,
         machines: &args.target,
         measured: &measured,

@@ -26,6 +26,7 @@ use super::lpips::LpipsArgs;
 use super::output;
 use crate::config::named::{SPLITS, one_of};
 use crate::config::{CaptureOptions, Protocol};
+use crate::program;
 
 /// What draws the frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -79,6 +80,9 @@ pub(crate) struct Args {
 /// Figures of a bundle over a split of a capture; PSNR, SSIM and LPIPS are means over views of 8-bit images.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Evaluation {
+    /// What trained the bundle, and what measured it where that is another program.
+    #[serde(default)]
+    pub(crate) program: String,
     pub(crate) psnr_db: f64,
     pub(crate) ssim: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -158,6 +162,7 @@ impl Evaluation {
             lpips: self.lpips,
             size_bytes: self.bundle_bytes as f64,
             n_gaussians: Some(self.n_gaussians as f64),
+            program: Some(self.program.clone()),
         }
     }
 }
@@ -268,7 +273,9 @@ pub(crate) fn measure(
     };
     let rows = drawn_views(views, draw, to_reference, lpips)?;
     let (lpips_mean, of_views) = view_evaluations(&rows, views);
+    let trained = file.protocol(&bundle).map(|protocol| protocol.program);
     Ok(Evaluation {
+        program: program::of_figures(trained.as_deref()),
         psnr_db: mean(&rows, |row| row.psnr_db),
         ssim: mean(&rows, |row| row.ssim),
         lpips: lpips_mean,

@@ -110,7 +110,7 @@ impl GaussiansFile {
     }
 
     /// What the file says of its photographs; nothing in files of other writers.
-    fn protocol(&self) -> Option<Protocol> {
+    pub(super) fn protocol(&self) -> Option<Protocol> {
         let lines: Vec<&str> = self.notes.comments.iter().filter_map(|line| line.strip_prefix(PROTOCOL)).collect();
         if lines.is_empty() { None } else { Protocol::parse(&lines.join("\n")).ok() }
     }

@@ -14,6 +14,19 @@ pub(crate) fn csv(lines: impl IntoIterator<Item = impl serde::Serialize>) -> Res
     Ok(table.into_inner()?)
 }
 
+/// The same with a last column `program` that is alike in all lines: what trained and measured them.
+pub(crate) fn csv_of(program: &str, lines: impl IntoIterator<Item = impl serde::Serialize>) -> Result<Vec<u8>> {
+    let plain = csv(lines)?;
+    let mut table = csv::Writer::from_writer(Vec::new());
+    let rows = csv::ReaderBuilder::new().has_headers(false).from_reader(plain.as_slice()).into_records();
+    for (i, row) in rows.enumerate() {
+        let mut row = row?;
+        row.push_field(if i == 0 { "program" } else { program });
+        table.write_record(&row)?;
+    }
+    Ok(table.into_inner()?)
+}
+
 /// A report with the version of what its fields mean.
 #[derive(serde::Serialize)]
 struct Versioned<'a, T> {
@@ -86,6 +99,16 @@ fn plain(value: &serde_json::Value) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_program_is_the_last_column() {
+        #[derive(serde::Serialize)]
+        struct Line {
+            name: &'static str,
+        }
+        let table = csv_of("0.1.0 r1", [Line { name: "a, b" }, Line { name: "c" }]).unwrap();
+        assert_eq!(String::from_utf8(table).unwrap(), "name,program\n\"a, b\",0.1.0 r1\nc,0.1.0 r1\n");
+    }
 
     #[test]
     fn every_report_as_json_says_its_version() {

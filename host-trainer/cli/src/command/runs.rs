@@ -22,6 +22,7 @@ use super::{output, point, stop, train};
 use crate::config::heading::{OUTPUT, RUN};
 use crate::config::{CaptureOptions, EffectsConfig, RunConfig};
 use crate::plot::{Named, ResultRow, SizeAxis, names_of, rate_distortion_svg, results_csv};
+use crate::program;
 use crate::say::say;
 
 /// The curves of all rows, in the folder of the runs.
@@ -169,6 +170,7 @@ impl RunsArgs {
             // The names are taken anew each time.
             text = tables(&measured, &mut outputs.clone())?;
         }
+        program::warn_of_several(measured.iter().map(|run| run.evaluation.program.as_str()));
         output::print_text(&String::from_utf8(text)?)?;
         drop(loaded);
         train::clear_photographs(&base.output, ExitCode::SUCCESS);

@@ -15,6 +15,7 @@ use pocketsplat_files::Content;
 use super::output;
 use super::outputs::{OverwriteArgs, table};
 use super::workflow::Plan;
+use crate::program;
 use published::PublishedRow;
 
 /// What is written whatever the plan trains, within its folder.
@@ -48,13 +49,16 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let mut outputs = args.published.iter().fold(args.overwrite.outputs(), |outputs, path| outputs.reading(path));
     let [(all, of_all), (bd_rates, of_rates)] = FILES.map(|(file, content)| (args.folder.join(file), content));
     outputs.file(&all, of_all)?.write(&output::csv(runs.iter().map(finished::FinishedRun::line))?)?;
+    let programs = || runs.iter().map(|run| run.evaluation.program.as_str());
+    program::warn_of_several(programs());
+    let program = program::of_all(programs());
     let groups = curves::groups(&plan, &runs);
     let mut differences = Vec::new();
     for group in &groups {
         differences.extend(differences::of_group(group));
         survey::write(&args.folder.join("tables"), group, &published, &mut outputs)?;
     }
-    outputs.file(&bd_rates, of_rates)?.write(&output::csv(&differences)?)?;
+    outputs.file(&bd_rates, of_rates)?.write(&output::csv_of(&program, &differences)?)?;
     if !published.is_empty() {
         let text = comparison::markdown(&groups, &published);
         let page = Content::Text(&["# Published results and ours"], "a comparison (.md)");

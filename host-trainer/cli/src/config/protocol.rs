@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::spread::spread;
 use super::{CaptureOptions, Difference};
+use crate::program;
 
 /// Parts of a normalised unit, and of a rotation's entries, to which poses are rounded in a fingerprint.
 const POSE_PARTS: f64 = 1e4;
@@ -17,8 +18,8 @@ const POSE_PARTS: f64 = 1e4;
 /// What a bundle says about its photographs, so that whoever measures it prepares them alike.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Protocol {
-    /// Version of the program that trained it.
-    program: String,
+    /// Version of the program that trained it, and its revision of training.
+    pub(crate) program: String,
     /// The capture, as [`fingerprint`] gives it.
     capture: String,
     /// How far the training cameras stand to the left of the first one, to the right of it and ahead of it, normalised units.
@@ -32,7 +33,7 @@ pub(crate) struct Protocol {
 impl Protocol {
     /// Of a run on a loaded capture.
     pub(crate) fn of(capture: &Capture, options: &CaptureOptions) -> Self {
-        let program = env!("CARGO_PKG_VERSION").to_owned();
+        let program = program::training();
         let spread = spread(capture.train.iter().map(|view| &view.camera));
         Self { program, capture: fingerprint(capture), spread, options: Self::said(options) }
     }

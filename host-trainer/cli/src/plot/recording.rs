@@ -65,6 +65,8 @@ pub(crate) struct ResultRow {
     /// Gaussians that can be drawn.
     #[serde(rename = "#Gaussians")]
     pub n_gaussians: Option<f64>,
+    /// What trained and measured it; none for what is published.
+    pub program: Option<String>,
 }
 
 impl ResultRow {
@@ -77,14 +79,14 @@ impl ResultRow {
     #[cfg(test)]
     pub(crate) fn of(submethod: &str, size_bytes: f64, psnr_db: f64) -> Self {
         let submethod = submethod.to_owned();
-        Self { submethod, psnr_db, ssim: None, lpips: None, size_bytes, n_gaussians: None }
+        Self { submethod, psnr_db, ssim: None, lpips: None, size_bytes, n_gaussians: None, program: None }
     }
 }
 
 /// Results as the CSV that [`Recording::read`] takes back.
 pub(crate) fn results_csv(rows: &[ResultRow]) -> Result<Vec<u8>> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(["Submethod", "PSNR", "SSIM", "LPIPS", "Size [Bytes]", "#Gaussians"])?;
+    writer.write_record(["Submethod", "PSNR", "SSIM", "LPIPS", "Size [Bytes]", "#Gaussians", "program"])?;
     let decimals = |value: f64| format!("{value:.6}");
     for row in rows {
         writer.write_record([
@@ -94,6 +96,7 @@ pub(crate) fn results_csv(rows: &[ResultRow]) -> Result<Vec<u8>> {
             row.lpips.map(decimals).unwrap_or_default(),
             row.size_bytes.to_string(),
             row.n_gaussians.map(|n| n.to_string()).unwrap_or_default(),
+            row.program.clone().unwrap_or_default(),
         ])?;
     }
     Ok(writer.into_inner()?)
@@ -243,7 +246,7 @@ fn knob_of(setting: &str) -> String {
 fn ablation(rows: Vec<AblationRow>) -> Vec<Named<Vec<ResultRow>>> {
     let point = |AblationRow { row, lambda, psnr_db, size_bytes }| {
         let submethod = format!("lambda={lambda}");
-        (row, ResultRow { submethod, psnr_db, ssim: None, lpips: None, size_bytes, n_gaussians: None })
+        (row, ResultRow { submethod, psnr_db, ssim: None, lpips: None, size_bytes, n_gaussians: None, program: None })
     };
     let mut curves = gathered(rows.into_iter().map(point));
     curves.retain(|curve| curve.what.iter().any(|point| point.submethod != curve.what[0].submethod));
@@ -278,10 +281,11 @@ mod tests {
             lpips,
             size_bytes: 1_234_567.0,
             n_gaussians: Some(98_765.0),
+            program: Some("0.1.0 r1".to_owned()),
         };
         let rows = vec![row("λ=0.004", None), row("λ=0.001", Some(0.125))];
         let text = String::from_utf8(results_csv(&rows).unwrap()).unwrap();
-        assert!(text.contains("\nλ=0.004,31.250000,0.937500,,1234567,98765\n"), "{text}");
+        assert!(text.contains("\nλ=0.004,31.250000,0.937500,,1234567,98765,0.1.0 r1\n"), "{text}");
         assert_eq!(read(&text).unwrap(), Recording::Results(rows));
     }
 

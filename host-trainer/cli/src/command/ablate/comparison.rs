@@ -30,6 +30,7 @@ pub(super) struct AblationLine {
     render_s: f64,
     /// Where the run is tiered: `rate:dB` of each tier.
     tiers: String,
+    program: String,
 }
 
 /// One line of summary.csv: a row against `none`.
@@ -70,6 +71,7 @@ pub(super) fn run_lines(runs: &[MeasuredRun<'_>]) -> impl Iterator<Item = Ablati
         decode_s: evaluation.decode_s,
         render_s: evaluation.render_s_per_view,
         tiers: evaluation.tiers.iter().map(tier).collect::<Vec<_>>().join(" "),
+        program: evaluation.program.clone(),
     })
 }
 

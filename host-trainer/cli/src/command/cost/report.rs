@@ -17,6 +17,8 @@ pub(super) struct Report<'a> {
     pub(super) bundle_name: String,
     pub(super) machines: &'a [Machine],
     /// Of each setting, the exact one first; instructions in the order of those machines that are devices.
+    /// What trained the bundle, and what measured it.
+    pub(super) program: &'a str,
     pub(super) measured: &'a [Measured],
     pub(super) n_views: usize,
     /// Views whose instructions count.
@@ -91,6 +93,7 @@ impl Report<'_> {
             }
             header.push(format!("{machine} on_front"));
         }
+        header.push("program".to_owned());
         table.write_record(&header)?;
         for (i, m) in self.measured.iter().enumerate() {
             let quality = m.setting.quality;
@@ -121,6 +124,7 @@ impl Report<'_> {
                 }
                 row.push(front[i].to_string());
             }
+            row.push(self.program.to_owned());
             table.write_record(&row)?;
         }
         Ok(table.into_inner()?)

@@ -9,6 +9,7 @@ use super::super::gaussians::GaussiansFile;
 use super::super::output;
 use super::{Args, Evaluation, Measurements, Renderer, drawn_views, lpips_of, mean, view_evaluations};
 use crate::config::{CaptureOptions, Protocol};
+use crate::program;
 use crate::say::say;
 
 /// Below it a picture may have nothing to do with the photograph: a scene of other axes has 5 dB, and 13 where most of both is background.
@@ -75,7 +76,9 @@ pub(crate) fn measure(
     let rows = drawn_views(views, draw, |_, _| f64::INFINITY, what.lpips)?;
     let Camera { width_px, height_px, .. } = views[0].camera;
     let (lpips, views) = view_evaluations(&rows, views);
+    let trained = file.protocol().map(|protocol| protocol.program);
     Ok(Evaluation {
+        program: program::of_figures(trained.as_deref()),
         psnr_db: mean(&rows, |row| row.psnr_db),
         ssim: mean(&rows, |row| row.ssim),
         lpips,

@@ -43,6 +43,7 @@ mod tests {
     #[test]
     fn figures_come_in_words_and_units() {
         let evaluation = Evaluation {
+            program: "0.1.0 r1".to_owned(),
             psnr_db: 32.041,
             ssim: 0.951_23,
             lpips: Some(0.0511),

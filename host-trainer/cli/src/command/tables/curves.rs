@@ -5,6 +5,7 @@ use pocketsplat_trainer::metrics::RatePoint;
 use super::finished::FinishedRun;
 use crate::command::workflow::{Place, Plan};
 use crate::plot::ResultRow;
+use crate::program;
 
 /// A dataset at one size of its images.
 pub(super) struct Group<'a> {
@@ -137,5 +138,6 @@ pub(super) fn mean(name: &str, rows: &[ResultRow]) -> Option<ResultRow> {
         lpips: average(|row| row.lpips),
         size_bytes: average(|row| Some(row.size_bytes))?,
         n_gaussians: average(|row| row.n_gaussians),
+        program: Some(program::of_all(rows.iter().filter_map(|row| row.program.as_deref()))),
     })
 }

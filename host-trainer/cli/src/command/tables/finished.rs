@@ -41,6 +41,7 @@ pub(super) struct RunLine<'a> {
     n_views: usize,
     /// Checksum of the bundle that was measured.
     bundle_crc: Option<u32>,
+    program: &'a str,
 }
 
 /// The runs whose figures are there, in the order of the plan.
@@ -91,6 +92,7 @@ impl FinishedRun<'_> {
             height_px: run.height_px,
             n_views: run.n_views,
             bundle_crc: run.bundle_crc,
+            program: &run.program,
         }
     }
 }

@@ -62,6 +62,7 @@ impl PublishedRow {
             lpips: self.lpips,
             size_bytes: self.size_bytes?,
             n_gaussians: self.n_gaussians,
+            program: None,
         })
     }
 }

@@ -35,6 +35,7 @@ struct SurveyLine<'a> {
     seeds: usize,
     #[serde(rename = "Scenes")]
     scenes: usize,
+    program: String,
 }
 
 /// Writes the tables and figures of a group: GROUP.csv, means over the scenes where every scene is measured, and GROUP/SCENE.csv.
@@ -70,7 +71,7 @@ fn write_both(
 
 impl<'a> SurveyLine<'a> {
     fn new(method: &'a str, row: ResultRow, seeds: usize, scenes: usize) -> Self {
-        let ResultRow { submethod, psnr_db, ssim, lpips, size_bytes, n_gaussians } = row;
+        let ResultRow { submethod, psnr_db, ssim, lpips, size_bytes, n_gaussians, program } = row;
         Self {
             method,
             submethod,
@@ -81,6 +82,7 @@ impl<'a> SurveyLine<'a> {
             n_gaussians: n_gaussians.map(rounded),
             seeds,
             scenes,
+            program: program.unwrap_or_default(),
         }
     }
 }

@@ -30,11 +30,14 @@ use super::loading::{check_size, clear_photographs, keep_points};
 use super::result::HeldOut;
 use super::summary::Summary;
 use crate::config::{EXPLICIT, ExplicitRunConfig, Protocol};
+use crate::program;
 use crate::say::say;
 
 /// What a finished run reports.
 #[derive(Debug, Serialize)]
 struct ExplicitResult {
+    /// What trained and measured it.
+    program: &'static str,
     file: PathBuf,
     file_bytes: usize,
     n_gaussians: usize,
@@ -238,6 +241,7 @@ fn write(
         Some(HeldOut { psnr_db, ssim, n_test_views: n_views, views })
     };
     Ok(ExplicitResult {
+        program: program::this(),
         file: config.output.clone(),
         file_bytes: bytes.len(),
         n_gaussians: trainer.cloud.len(),

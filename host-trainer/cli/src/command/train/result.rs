@@ -18,6 +18,7 @@ use crate::command::bundle::BundleFile;
 use crate::command::eval::{Evaluation, Measurements, Renderer, ViewEvaluation, measure};
 use crate::command::process::peak_memory_bytes;
 use crate::config::{CaptureOptions, Protocol};
+use crate::program;
 use crate::say::say;
 
 /// Test views that tiers are measured with at most, evenly picked: more would cost time and say little.
@@ -26,6 +27,8 @@ const MOST_JUDGES: usize = 12;
 /// What a finished run reports.
 #[derive(Debug, Serialize)]
 pub(crate) struct TrainResult {
+    /// What trained and measured it.
+    pub(crate) program: &'static str,
     pub(crate) bundle: PathBuf,
     pub(crate) bundle_bytes: usize,
     /// Its checksum: what is measured later is of this file and no other.
@@ -37,7 +40,7 @@ pub(crate) struct TrainResult {
     /// Scratch memory in which a device with limited memory draws the whole scene.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) scratch_bytes: Option<usize>,
-    /// Predicted for the dearest frame of some training views, where there is a processor.
+    /// Predicted for the slowest frame of some training views, where there is a processor.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) instructions: Option<u64>,
     pub(crate) n_anchors: usize,
@@ -125,6 +128,7 @@ pub(super) fn write_bundle(
     let of_whole = bundle.n_tiers().checked_sub(1).and_then(|tier| bundle.measures(tier));
     let n_anchors = scene.anchors.len();
     Ok(TrainResult {
+        program: program::this(),
         bundle: output.path().to_owned(),
         bundle_bytes: file.bytes.len(),
         bundle_crc: crc32(&file.bytes),

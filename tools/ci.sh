@@ -3,11 +3,12 @@
 #
 #   tools/ci.sh              everything (half an hour at most on two cores)
 #   tools/ci.sh fmt clippy   some
+#   tools/ci.sh quick        fmt, clippy, pages, and the unit tests of the crates that changed (four minutes after a build)
 #   tools/ci.sh --list       their names
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-jobs=(fmt clippy doc test viewer core-embedded format-doc package link-gate digests reader fuzz firmware boards c demo many-runs)
+jobs=(fmt clippy doc pages test viewer core-embedded format-doc package link-gate digests reader fuzz firmware boards c demo many-runs)
 
 embedded_target=thumbv7em-none-eabihf
 defmt_print_version=1.2.0
@@ -124,6 +125,32 @@ job_fmt() {
 job_clippy() {
   cargo clippy --workspace --all-targets --locked -- -D warnings
   cargo clippy -p pocketsplat --no-default-features --locked -- -D warnings
+}
+
+# Not one of `jobs`: what a small change is judged by before it is committed.
+job_quick() {
+  local file folder folders=() executable
+  job_fmt
+  job_clippy
+  job_pages
+  # Folders of crates with a changed file; those of the last commit where nothing is changed.
+  while read -r file; do
+    folder=$(dirname "$file")
+    while [ "$folder" != . ] && [ ! -f "$folder/Cargo.toml" ]; do folder=$(dirname "$folder"); done
+    [ "$folder" = . ] || [[ " ${folders[*]} " = *" $folder "* ]] || folders+=("$folder")
+  done < <({ git diff --name-only HEAD && git ls-files --others --exclude-standard; } | grep . || git diff --name-only HEAD~1)
+  echo "unit tests of: ${folders[*]:-nothing}"
+  # Built as the whole workspace: a part of it would want its libraries once more, with other features.
+  while read -r file executable; do
+    folder=${file#"$PWD/"} folder=${folder%/Cargo.toml}
+    [[ " ${folders[*]} " != *" $folder "* ]] || (cd "$folder" && "$executable" -q)
+  done < <(cargo test -q --workspace --lib --bins --locked --no-run --message-format=json |
+    sed -n 's/.*"manifest_path":"\([^"]*\)".*"executable":"\([^"]*\)".*/\1 \2/p')
+}
+
+# Figures of README and pages are those of their CSVs, guides hold none besides, and every link leads somewhere.
+job_pages() {
+  program figures check
 }
 
 job_doc() {

@@ -25,7 +25,7 @@
 //! ```
 //!
 //! A choice is made when the firmware is built, so none costs the others anything, and whatever is chosen gives the same bytes
-//! on every target. What each costs and saves is measured in the repository's `docs/accuracy-and-time.md`.
+//! on every target. What each costs and saves was measured: `docs/experiments/2026-11-21-decoder-settings.md` of the repository.
 
 use core::marker::PhantomData;
 

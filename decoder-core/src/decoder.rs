@@ -141,7 +141,7 @@ impl<'b, 's> Decoder<'b, 's> {
     /// As for [`bind`](Self::bind); [`DecodeError::ScratchTooSmall`] names the region.
     ///
     /// # Budget
-    /// As for [`bind`](Self::bind), in both regions; the plan is compared with one that is made anew, which takes as long as
+    /// As for [`bind`](Self::bind), in both regions; the plan is compared with one that is made again, which takes as long as
     /// [`Bundle::plan`].
     pub fn bind_in_regions<A: Arithmetic>(
         bundle: &Bundle<'b>,

@@ -9,7 +9,7 @@ pub const MAX_TRANSMITTANCE_STOP: u16 = 1000;
 
 /// How exactly a frame is drawn.
 ///
-/// What it costs and what it saves is measured in the repository's `docs/accuracy-and-time.md`.
+/// What it costs and what it saves was measured: `docs/experiments/2026-11-22-quality-levels.md` of the repository.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Quality {

@@ -1,7 +1,7 @@
 //! Writes a capture as large as those that do not fit into memory: 1,000 photographs of 1600×1600 pixels, about 2 GB of PNG.
 //!
-//! `cargo run --release -p pocketsplat-capture --example large_capture -- FOLDER`; `docs/benchmarks.md` says what is measured with
-//! it, at `--resolution 1600x1066`.
+//! `cargo run --release -p pocketsplat-capture --example large_capture -- FOLDER`;
+//! `docs/experiments/2026-11-22-large-captures.md` says what is measured with it, at `--resolution 1600x1066`.
 
 use std::path::Path;
 use std::process::ExitCode;

@@ -8,7 +8,7 @@ use super::listing::Listing;
 use super::{Split, ViewFault};
 
 /// Within so many quartile distances of the middle no camera is apart. A camera 12 of them out costs a scene nothing that could be
-/// measured, one 20 out 0.6 dB, one 30 out all of it (`docs/experiments/one-camera-far-away.md`).
+/// measured, one 20 out 0.6 dB, one 30 out all of it (`docs/experiments/2026-11-27-one-camera-far-away.md`).
 const NEAR: f64 = 10.0;
 /// A camera within so many quartile distances of one that belongs to the rest belongs to it, too: a walk, a flight or a few overviews
 /// from above keep all of their cameras, however far they lead.

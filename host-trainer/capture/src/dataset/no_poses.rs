@@ -56,8 +56,9 @@ fn photographs(folder: &Path) -> Option<String> {
             format!("convert those of a format that is not read:\n  {}\nthen ", conversion(&images, name))
         });
         return Some(format!(
-            "`{}` holds {n} photographs but no poses; {convert}{}",
+            "`{}` holds {n} photograph{} but no poses; {convert}{}",
             shown(&images),
+            if n == 1 { "" } else { "s" },
             poses_by_colmap(folder, &images)
         ));
     }
@@ -74,7 +75,9 @@ fn poses_by_colmap(folder: &Path, images: &Path) -> String {
          --ImageReader.single_camera 1 --ImageReader.camera_model OPENCV\n  \
          colmap exhaustive_matcher --database_path {database}\n  \
          mkdir -p {sparse}\n  \
-         colmap mapper --database_path {database} --image_path {images} --output_path {sparse}"
+         colmap mapper --database_path {database} --image_path {images} --output_path {sparse}\n\
+         (without a display add --SiftExtraction.use_gpu 0 to the first, --SiftMatching.use_gpu 0 to the second; from COLMAP 3.13 on \
+         --FeatureExtraction.use_gpu and --FeatureMatching.use_gpu)"
     )
 }
 

@@ -6,8 +6,8 @@ use rayon::prelude::*;
 /// The voxel size the family publishes for Synthetic-NeRF, whose points are random: it only must be fine.
 pub const PUBLISHED_VOXEL_SIZE: f64 = 0.001;
 
-/// The voxel size for rooms whose points are random (`docs/experiments/layout-is-not-a-scene.md`): a room reaches farther than an object
-/// between its cameras, and a finer lattice leaves it holes that anchors do not grow into.
+/// The voxel size for rooms whose points are random (`docs/experiments/2026-11-27-layout-is-not-a-scene.md`): a room reaches
+/// farther than an object between its cameras, and a finer lattice leaves it holes that anchors do not grow into.
 pub const ROOM_VOXEL_SIZE: f64 = 0.01;
 
 /// The voxel size that keeps about every second point of a sparse cloud apart from its nearest neighbour: the median

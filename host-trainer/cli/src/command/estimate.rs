@@ -38,8 +38,8 @@ const ANCHORS_PER_PIXEL: f64 = 0.13;
 /// Bytes of a bundle besides its anchors: heads, context, container.
 const FIXED_BYTES: f64 = 40e3;
 
-/// How a run goes on, against its first steps. As runs of the captures of `docs/benchmarks.md` went, which says how far single ones
-/// are off.
+/// How a run goes on, against its first steps. As runs of the captures of `docs/experiments/2026-11-22-train-without-options.md`
+/// went, which says how far single ones are off.
 struct Course {
     /// Time of a step at [`SHARES`] of the run.
     cost: [f64; SHARES.len()],
@@ -47,7 +47,7 @@ struct Course {
     anchors: [f64; SHARES.len()],
 }
 
-/// Shares of a run: growth goes on up to half of it, then pruning by worth takes its first part.
+/// Shares of a run: growth goes on up to half of it, then rate–distortion pruning takes its first part.
 const SHARES: [f64; 8] = [0.0, 0.1, 0.2, 0.35, 0.5, 0.51, 0.65, 1.0];
 /// The number of those before pruning.
 const BEFORE_PRUNING: usize = 5;
@@ -63,7 +63,7 @@ const FROM_CAPTURE: Course =
     Course { cost: [1.0, 1.1, 1.3, 1.6, 1.9, 1.4, 1.35, 1.35], anchors: [1.0, 1.0, 1.1, 1.1, 1.15, 0.7, 0.6, 0.6] };
 
 impl Course {
-    /// The same where nothing is pruned by worth.
+    /// The same where nothing is pruned by rate and distortion.
     fn unpruned(&self) -> Self {
         let goes_on = |values: &[f64; SHARES.len()]| {
             std::array::from_fn(|i| values[if i < BEFORE_PRUNING { i } else { BEFORE_PRUNING - 1 }])

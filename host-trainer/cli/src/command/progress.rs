@@ -144,7 +144,7 @@ impl Observer for Progress {
         let lambda = if fit.lambda == fit.former_lambda {
             String::new()
         } else {
-            format!(", before lambda goes from {:.5} to {:.5}", fit.former_lambda, fit.lambda)
+            format!(", before lambda goes from {:.2e} to {:.2e}", fit.former_lambda, fit.lambda)
         };
         self.say(&format!("to fit: {} anchors, which take {}{lambda}", fit.n_anchors, shares.join(", ")));
     }

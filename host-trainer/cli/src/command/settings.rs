@@ -28,12 +28,12 @@ pub(crate) struct QualityOptions {
     /// [default: hac]
     #[arg(long, value_parser = backbone_choice(), help_heading = QUALITY)]
     backbone: Option<BackboneChoice>,
-    /// Training steps, with which all schedules scale [default: by the preset for train, 5000 for import, else 30000]
+    /// Training steps, with which all schedules scale [default: 7000 by the preset of train, 5000 for import, 30000 for sweep and ablate]
     #[arg(long, value_name = "N", help_heading = QUALITY)]
     iterations: Option<u32>,
-    /// Effects of the scene: auto keeps what pays in short pilot runs, and measures that only in runs of 16,000 iterations and more;
-    /// a list of none, all, +NAME and -NAME forces view-colour, view-geometry, view-distance, dilation-compensation, detail and
-    /// anisotropy [default: auto for train, else view-colour,view-geometry,anisotropy]
+    /// Effects to train: auto, which tests them in runs of 16,000 iterations and more, or a list of none, all, +NAME and -NAME with the
+    /// names view-colour, view-geometry, view-distance, dilation-compensation, detail and anisotropy [default: auto for train, else
+    /// view-colour,view-geometry,anisotropy]
     #[arg(long, value_name = "LIST", allow_hyphen_values = true, help_heading = QUALITY)]
     effects: Option<Request>,
     /// Training modules to attach in place of those of the configuration [default: rdo-pruning for
@@ -60,8 +60,7 @@ pub(crate) struct QualityOptions {
     #[arg(long, value_name = "STEP", help_heading = QUALITY, hide_short_help = true,
         help = with_default("Quantisation step of the features of a scaffold scene", QuantisationSteps::default().feature))]
     feature_step: Option<f32>,
-    /// Source of the symbols' frequencies: static tables, the context model, or auto: tables for a device that decodes in every
-    /// frame, within --bytes what draws better, else the smaller file where it is as good [default: auto]
+    /// Entropy coder: static tables (fast on a device), the context model (smaller), or auto [default: auto]
     #[arg(long, value_parser = one_of::<CoderChoice>(CODERS), help_heading = OUTPUT, hide_short_help = true)]
     coder: Option<CoderChoice>,
     /// Shares of the anchors that smaller devices leave out, falling to 0 [default: 0.4,0.3,0.2,0.1,0.05,0]
@@ -256,7 +255,7 @@ impl QualityOptions {
         Ok(())
     }
 
-    /// Sets what a device affords, where the command line leaves it open: the widths, the number of anchors, pruning by worth
+    /// Sets what a device affords, where the command line leaves it open: the widths, the number of anchors, rate–distortion pruning
     /// down to it, trained tiers.
     pub(crate) fn choose(&self, train: &mut TrainConfig, choice: &ModelChoice) {
         train.shape.feature_dim = self.feature_dim.unwrap_or(choice.feature_dim);
@@ -277,7 +276,7 @@ impl QualityOptions {
     }
 }
 
-/// Where pruning by worth leaves what fits, growth goes to so many times what fits on average.
+/// Where rate–distortion pruning leaves what fits, growth goes to so many times what fits on average.
 const GROWTH: usize = 3;
 
 /// Lets `most` anchors stay.
@@ -288,7 +287,7 @@ fn keep(train: &mut TrainConfig, most: usize) {
     }
 }
 
-/// Tiers beside the other modules: after the last pruning by worth, and by worth.
+/// Tiers beside the other modules: after the last rate–distortion pruning, ranked by worth.
 fn tiers_of(modules: &Modules) -> Pruning {
     let tiered = Pruning::tiered();
     modules.rdo.map_or(tiered, |rdo| Pruning { at: rdo.until, rank: Rank::Worth, ..tiered })

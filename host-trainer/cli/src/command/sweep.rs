@@ -8,7 +8,7 @@ use super::outputs::RESULTS;
 use super::runs::{FIGURE, RunSpec, RunsArgs, write_curves};
 use crate::config::heading::QUALITY;
 
-/// Train a capture once for each weight of the bits, and measure every bundle on the held-out views.
+/// Train at several rates and tabulate size and quality.
 ///
 /// After each run results.csv and rate_distortion.svg in the folder hold the results so far. The same command again
 /// resumes what was interrupted and trains nothing twice.

@@ -44,7 +44,7 @@ pub(crate) struct Args {
     /// Print the result as JSON [default: as text]
     #[arg(long, help_heading = OUTPUT, hide_short_help = true)]
     json: bool,
-    /// Do without report.html in the run folder.
+    /// Write no report.html.
     #[arg(long, help_heading = OUTPUT, hide_short_help = true)]
     no_report: bool,
     /// Serve a page about the run while it goes on, to this machine alone, at a free port or the one given.
@@ -57,8 +57,7 @@ pub(crate) struct Args {
     preset: Option<Preset>,
     #[command(flatten)]
     quality: QualityOptions,
-    /// Weight of a value's bits in the loss: the larger, the smaller the bundle [default: 0.002 times the share of
-    /// the pixels that are not transparent; by --flash for a device]
+    /// Rate weight: a larger one makes smaller files [default: 0.002 times the share of opaque pixels; chosen by --bytes or --flash]
     #[arg(long, value_name = "X", help_heading = QUALITY)]
     lambda: Option<f64>,
     #[command(flatten)]
@@ -69,7 +68,7 @@ pub(crate) struct Args {
     /// Run folder of an interrupted run to go on with; give DATASET as well if the capture has moved.
     #[arg(long, value_name = "OUT.run", help_heading = RUN)]
     resume: Option<PathBuf>,
-    /// Do what is left of the run that --config names: all, the rest, or nothing where it is finished; for queues of jobs.
+    /// Resume or finish the run that --config names, or do nothing if it is complete.
     #[arg(long = "continue", requires = "config", conflicts_with_all = ["resume", "from", "overwrite"], help_heading = RUN,
         hide_short_help = true)]
     continues: bool,
@@ -94,8 +93,8 @@ pub(crate) struct Args {
 /// What the device has that the bundle is for; what else the command line leaves open is chosen by it.
 #[derive(clap::Args)]
 pub(crate) struct DeviceArgs {
-    /// Level that the whole scene keeps, 1 (Cortex-M with 64 KiB) to 5 (8 MiB): sets --ram, --flash, --resolution and, up to 4,
-    /// --target, which may ask for less [default: none]
+    /// Device class 1 (64 KiB) to 5 (8 MiB): presets for --ram, --flash, --resolution and --target; give one of them to override it
+    /// [default: none]
     #[arg(long, value_name = "N", value_parser = level_number(), help_heading = DEVICE)]
     level: Option<u8>,
     /// Scratch bytes of the decoder, as 192KiB, excluding stack and frame buffer; the whole scene is guaranteed to fit

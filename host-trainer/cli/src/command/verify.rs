@@ -37,10 +37,9 @@ const MIN_REFERENCE_DB: f64 = 50.0;
 /// Share of the planned memory that the fullest of the views measured needs.
 const MIN_USED: f64 = 0.9;
 
-/// Hold a bundle to the memory contract: the planned bytes suffice and one fewer is refused, nothing beside them is touched,
-/// nothing but the camera changes a pixel, work is bounded, levels are kept, frames are the reference's.
+/// Check a bundle's guarantees: memory plan, work bounds, device level, match with the reference renderer.
 ///
-/// Ends with exit code 1 where a law does not hold.
+/// Exits with 1 if a check fails.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// The bundle.
@@ -247,8 +246,7 @@ fn table(verification: &Verification) -> String {
         verification.n_views
     );
     if let Some(bytes) = verification.whole_scene_bytes {
-        text +=
-            &format!("the whole scene takes {bytes} bytes; what is held to the laws is the part within the limit\n\n");
+        text += &format!("the whole scene takes {bytes} bytes; what is checked is the part within the limit\n\n");
     }
     for Law { law, trials, finding, holds } in &verification.laws {
         text += &format!("{:<6}{trials:>5}  {law}", if *holds { "holds" } else { "BROKEN" });

@@ -8,11 +8,11 @@ use pocketsplat_trainer::train::module::{Modules, Rdo};
 use super::{CaptureOptions, RunConfig};
 
 /// Weight of a value's bits where offsets and anchors that are not worth their bits are pruned, for photographs that show the scene
-/// everywhere (`docs/benchmarks.md`). The loss is a mean over pixels: where most of them are transparent, and right from the start,
-/// the same weight would count bits for more.
+/// everywhere (`docs/experiments/2026-11-22-train-without-options.md`). The loss is a mean over pixels: where most of them are
+/// transparent, and right from the start, the same weight would count bits for more.
 const LAMBDA: f64 = 0.002;
 
-/// How long a run takes, and how large its images are; all presets train HAC with pruning by worth.
+/// How long a run takes, and how large its images are; all presets train HAC with rate–distortion pruning.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub(crate) enum Preset {
     /// A first look: 200 px, 2,000 iterations.

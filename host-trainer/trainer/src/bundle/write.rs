@@ -42,7 +42,8 @@ pub struct WriteOptions {
     /// Pruning rates of the tiers, falling to 0: the share of anchors that the scene of tiers up to each one lacks.
     pub pruning_rates: Vec<f32>,
     /// Bits of the fraction of the heads' weights, those of W1 and of W2, where coding them saves a tenth of their bytes;
-    /// without it they stay halves. Nine cost no more than 0.01 dB and save a fifth to a third (`docs/benchmarks.md`).
+    /// without it they stay halves. Nine cost no more than 0.01 dB and save a fifth to a third
+    /// (`docs/experiments/2026-11-21-quantisation-steps.md`).
     pub head_fraction_bits: Option<[u8; 2]>,
     /// Anchors of a chunk at most.
     pub chunk_anchors: u16,

@@ -8,10 +8,10 @@ use super::{Limits, Processor};
 
 /// Feature widths F and offsets K, widest first, and the splats that an anchor of them draws in the fullest view.
 ///
-/// Splats are measured for two, three and four offsets with features of 16 on lego at 120×120 pixels (`docs/benchmarks.md`), where
-/// fewer offsets and more anchors gain, and carried on to five; a frame filled with photographs has a quarter more. Since every offset
-/// begins drawn, an anchor of three draws 1.95 there. The numbers stay: they only say which width is tried and how far a scene grows; how
-/// much of it fits is measured on its bundle.
+/// Splats are measured for two, three and four offsets with features of 16 on lego at 120×120 pixels
+/// (`docs/experiments/2026-11-21-bundles-for-a-device.md`), where fewer offsets and more anchors gain, and carried on to five; a frame
+/// filled with photographs has a quarter more. Since every offset starts with a positive opacity, an anchor of three draws 1.95 there. The numbers stay:
+/// they only say which width is tried and how far a scene grows; how much of it fits is measured on its bundle.
 const MODELS: [Model; 4] = [
     Model { feature_dim: 32, n_offsets: 5, splats_per_anchor: 2.8 },
     Model { feature_dim: 24, n_offsets: 4, splats_per_anchor: 2.4 },

@@ -5,7 +5,7 @@ use crate::scene::{Head, Heads, ModelShape};
 /// Widths to choose from, widest first.
 const WIDTHS: [usize; 5] = [50, 32, 24, 16, 8];
 /// The heads of a model take at most this part of its bundle: lego at 80 px gains 4.3 dB at 20 kB by features of 16 in place of 50,
-/// and 0.8 dB at 40 kB by 24 (`docs/limits.md`).
+/// and 0.8 dB at 40 kB by 24 (`docs/experiments/2026-11-23-scenes-that-fill-a-budget.md`).
 const HEADS_AT_MOST: u64 = 6;
 
 /// The widest features up to those of `shape` whose heads leave room for a scene in `bytes`; the narrowest where none do.

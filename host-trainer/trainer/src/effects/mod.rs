@@ -48,7 +48,7 @@ impl Effect {
     ];
 
     /// Those that are measured: at one size of the image dilation compensation shows nothing of what it is for, and the distance of
-    /// view paid in none of five captures (`docs/effects.md`).
+    /// view paid in none of five captures (`docs/experiments/2026-11-21-neural-or-plain-gaussians.md`).
     pub const MEASURED: [Self; 4] = [Self::ViewColour, Self::ViewGeometry, Self::Detail, Self::Anisotropy];
 
     /// Its name on the command line.

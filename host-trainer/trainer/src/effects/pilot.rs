@@ -21,7 +21,7 @@ use pocketsplat_instructions::predict;
 /// Runs below this many iterations are too short for pilots of them to say anything.
 ///
 /// Lego with view direction is 0.6 dB worse than without after pilots of 500 iterations and 1.7 dB better after 2,000: with more inputs
-/// there is more to learn (`docs/effects.md`).
+/// there is more to learn (`docs/experiments/2026-11-21-neural-or-plain-gaussians.md`).
 pub const LEAST_ITERATIONS: u32 = 16_000;
 /// Share of the run's iterations that each pilot takes.
 ///

@@ -26,7 +26,7 @@ impl PilotFigures {
 /// What effects have to gain.
 ///
 /// 0.05 dB is what a reader of a table takes for a difference; on the curves that λ moves runs along, 0.1 dB is worth about 4 % of
-/// the bytes (`docs/modules.md`), so a tenth of them for 0.05 dB is a low price.
+/// the bytes (`docs/experiments/2026-11-21-training-for-few-bits.md`), so a tenth of them for 0.05 dB is a low price.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Price {

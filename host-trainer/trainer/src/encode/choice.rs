@@ -14,7 +14,7 @@ use crate::train::finish::Finished;
 /// Steps of tables as shares of the context's mean steps, finest first.
 const MEAN_STEP_SHARES: [f32; 4] = [0.5, 0.65, 0.8, 1.0];
 /// Mean steps cost up to 0.8 dB, which the bytes that they save are worth below about this share of the context's: bundles of up to 25 or
-/// 40 kB (`docs/limits.md`).
+/// 40 kB (`docs/experiments/2026-11-23-scenes-that-fill-a-budget.md`).
 const TABLES_SHARE: f64 = 0.8;
 /// What tables may lose against the context that a scene was trained with, where nobody needs them for their speed, dB.
 const LARGEST_LOSS_DB: f64 = 0.02;

@@ -32,7 +32,7 @@ pub struct Fitted {
     pub cut: Option<Cut>,
     /// How the device draws all of it, where its memory is limited.
     pub plan: Option<Plan>,
-    /// Instructions predicted for its dearest frame, where there is a processor.
+    /// Instructions predicted for its slowest frame, where there is a processor.
     pub instructions: Option<u64>,
 }
 
@@ -173,7 +173,7 @@ impl Encoding {
         Ok(Attempt { finished, written, plan, ram_bytes, memory, time })
     }
 
-    /// Instructions of the dearest frame, where the processor is known and the memory suffices.
+    /// Instructions of the slowest frame, where the processor is known and the memory suffices.
     fn time_of(&self, written: &Written, capture: &Capture, cameras: &[Camera]) -> Result<Option<Need>, DecodeError> {
         let Some(processor) = self.limits.processor else { return Ok(None) };
         let bundle = Bundle::parse(&written.bytes)?;

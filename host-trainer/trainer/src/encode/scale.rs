@@ -85,7 +85,7 @@ pub(super) fn level_needs(limits: &Limits, bundle: &Bundle<'_>) -> Vec<Need> {
     needs.map_or_else(Vec::new, |needs| needs.to_vec())
 }
 
-/// Instructions predicted for the dearest frame of every [`DRAWN_EVERY`]th camera.
+/// Instructions predicted for the slowest frame of every [`DRAWN_EVERY`]th camera.
 pub(super) fn most_instructions(
     bundle: &Bundle<'_>,
     plan: Plan,

@@ -180,7 +180,7 @@ impl GpuLevels {
             own.rows.fit(gpu, n)?;
             own.anchors.fit(gpu, n)?;
             let mut commands = Commands::new(gpu);
-            // The list is made anew for the next level.
+            // The list is made again for the next level.
             let identity = Buffer::upload(gpu, "numbers", &(0..n as u32).collect::<Vec<_>>())?;
             kernels.gather.run(&mut commands, &parents.rows.items, 1, &identity, &own.rows);
             kernels.gather.run(&mut commands, anchors, 1, &own.rows, &own.anchors);

@@ -80,8 +80,8 @@ pub fn initial_scene(shape: ModelShape, voxel_size: f64, points: &[DVec3], rng: 
 
 /// Turns the biases of the opacity head, so that no opacity begins below 0 where features and what the head sees of the view are 0.
 ///
-/// An offset whose opacity is below 0 is not drawn and learns nothing. Where signs were left to chance, two to four of ten offsets were
-/// never drawn by any anchor of the finished scene (`docs/what-saves-bytes.md`).
+/// An offset whose opacity is below 0 is not drawn and learns nothing. With random opacity signs, two to four of ten offsets were
+/// never drawn by any anchor of the finished scene (`docs/experiments/2026-11-25-positive-opacity-initialisation.md`).
 fn draw_all_at_first(opacity: &mut Head<f32>) {
     let rows = opacity.w2.chunks_exact(opacity.n_hidden).zip(&mut opacity.b2);
     for (row, bias) in rows {

@@ -2,7 +2,8 @@
 
 /// Distance between neighbouring values of each kind of channel; the value of a symbol is `symbol · step`.
 ///
-/// The defaults take 28 % off a bundle of steps 0.02 and cost 0.14 dB (lego at 200 px; `docs/benchmarks.md`).
+/// The defaults take 28 % off a bundle of steps 0.02 and cost 0.14 dB (lego at 200 px;
+/// `docs/experiments/2026-11-21-quantisation-steps.md`).
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct QuantisationSteps {
     /// Of the features.

@@ -82,7 +82,7 @@ impl Trainer<'_> {
         Ok(())
     }
 
-    /// Anchors to size the context model for: all, or as many as pruning by worth is expected to leave.
+    /// Anchors to size the context model for: all, or as many as rate–distortion pruning is expected to leave.
     fn n_to_size_context_for(&self) -> usize {
         let n = self.scene.anchors.len();
         if self.config.modules.weigh_bits() { context_start::n_to_size_for(n, self.lambda) } else { n }

@@ -12,7 +12,7 @@ use crate::scene::{ContextModel, Head, Scene};
 
 /// Scenes of this many anchors get the published grid and network.
 const LARGE: usize = 200_000;
-/// λ at which the sizes below were measured with pruning by worth.
+/// λ at which the sizes below were measured with rate–distortion pruning.
 const LAMBDA_OF_SIZES: f64 = 0.002;
 /// Share of the anchors that may lie outside the frame at either end of an axis: a capture's stray points must not take
 /// the grid's resolution from the rest. Outside counts as on the border.
@@ -146,7 +146,7 @@ fn level(kind: LevelKind, resolution: u16, cap: u32) -> GridLevel {
 }
 
 /// Hidden units: the network's weights, a byte each, should stay a few per cent of the bundle. (Lego at 100 px, 15,000 anchors,
-/// pruned by worth to 8,000: 16 units instead of 32 take 3 % fewer bytes at equal PSNR.)
+/// pruned by rate and distortion to 8,000: 16 units instead of 32 take 3 % fewer bytes at equal PSNR.)
 fn n_hidden(n_anchors: usize) -> usize {
     match n_anchors {
         ..20_000 => 16,

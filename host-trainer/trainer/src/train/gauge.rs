@@ -20,7 +20,7 @@ pub trait Gauge: Debug + Sync {
 }
 
 impl<'a> Trainer<'a> {
-    /// The same; pruning by worth then leaves as much as `gauge` says fits, and weighs bits accordingly.
+    /// The same; rate–distortion pruning then leaves as much as `gauge` says fits, and weighs bits accordingly.
     #[must_use]
     pub fn fitting(self, gauge: Option<&'a dyn Gauge>) -> Self {
         Self { gauge, ..self }

@@ -5,7 +5,7 @@
 pub struct Load {
     /// Scratch memory of a decoder that draws the whole scene.
     pub ram: f64,
-    /// Instructions of the dearest frame that was tried, or another bound of a level that leaves less room.
+    /// Instructions of the slowest frame that was tried, or another bound of a level that leaves less room.
     pub instructions: f64,
     /// Bytes of the bundle.
     pub bytes: f64,

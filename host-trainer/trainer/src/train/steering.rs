@@ -6,7 +6,7 @@ use super::load::Load;
 const AIM: f64 = 1.02;
 /// How an event looks for it.
 const STEERING: Search = Search { tolerance: 0.01, most_trials: 5 };
-/// The bytes of an anchor go with λ to the power of −0.35 (`docs/limits.md`).
+/// The bytes of an anchor go with λ to the power of −0.35 (`docs/method.md`).
 const POWER_OF_LAMBDA: f64 = 0.35;
 /// After the last event too few steps are left for them to follow: λ lowered to a sixth filled 5 to 8 % more.
 const POWER_IN_THE_END: f64 = 0.05;

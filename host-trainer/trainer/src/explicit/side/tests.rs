@@ -24,7 +24,7 @@ fn learned(scene: &TestScene, iterations: u32) -> Gaussians {
 }
 
 #[test]
-#[ignore = "prints the table of docs/experiments/import-cameras.md"]
+#[ignore = "prints the table of docs/experiments/2026-11-27-import-cameras.md"]
 fn table() {
     for scene in all() {
         for how in ["painted", "learned"] {

@@ -3,7 +3,7 @@
 use pocketsplat_core::context::MAX_TAPS;
 use serde::{Deserialize, Serialize};
 
-use super::SETTLE_FROM;
+use super::DECAY_FROM;
 use crate::scene::QuantisationSteps;
 
 /// The kinds of scene that can be trained.
@@ -72,7 +72,7 @@ impl Default for Hac {
             noise_from: 3_000.0 / 30_000.0,
             pause_until: 4_000.0 / 30_000.0,
             context_from: 10_000.0 / 30_000.0,
-            exact_from: SETTLE_FROM,
+            exact_from: DECAY_FROM,
             sample: 0.05,
             mask_weight: 5e-4,
             grid_weight: 0.0,

@@ -46,11 +46,11 @@ impl LearningRate {
     }
 }
 
-/// Learning rates: they start as those of the published trainers of Scaffold-GS and HAC, and settle together.
+/// Learning rates: they start as those of the published trainers of Scaffold-GS and HAC, and decay together.
 ///
 /// The published rates of features, log-scales and the covariance head are constant: a value that still moves at the end flips
 /// across the borders between symbols until the last step. Those of offsets, opacity, colour and the context model fall all the
-/// way, to a hundredth and less: what pruning by worth leaves, late in the run, hardly moves into the gaps. Here all of them stay
+/// way, to a hundredth and less: what rate–distortion pruning leaves, late in the run, hardly moves into the gaps. Here all of them stay
 /// until 0.85 of the run and then fall to a tenth or a fifteenth. Masks fall all the way as published, and so does
 /// a background that is learned.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -84,21 +84,21 @@ const fn background_rate() -> LearningRate {
 }
 
 /// Share of the run after which rates fall.
-pub(super) const SETTLE_FROM: f64 = 0.85;
+pub(super) const DECAY_FROM: f64 = 0.85;
 
 impl Default for Rates {
     fn default() -> Self {
-        let settling = |start, end| LearningRate { start, end, from: SETTLE_FROM };
+        let decaying = |start, end| LearningRate { start, end, from: DECAY_FROM };
         Self {
-            offset: settling(0.01, 1e-3),
-            feature: settling(0.0075, 5e-4),
-            log_scale: settling(0.007, 5e-4),
-            opacity_head: settling(0.002, 2e-4),
-            covariance_head: settling(0.004, 4e-4),
-            colour_head: settling(0.008, 8e-4),
+            offset: decaying(0.01, 1e-3),
+            feature: decaying(0.0075, 5e-4),
+            log_scale: decaying(0.007, 5e-4),
+            opacity_head: decaying(0.002, 2e-4),
+            covariance_head: decaying(0.004, 4e-4),
+            colour_head: decaying(0.008, 8e-4),
             mask: LearningRate::falling(0.01, 1e-4),
-            grid: settling(0.005, 5e-4),
-            context: settling(0.005, 5e-4),
+            grid: decaying(0.005, 5e-4),
+            context: decaying(0.005, 5e-4),
             background: background_rate(),
         }
     }

@@ -1,0 +1,132 @@
+//! The commands by what they are for: the help of `pocketsplat` itself.
+
+use std::fmt::Write as _;
+
+use clap::Command;
+
+/// All commands, by what somebody wants.
+const GROUPS: [(&str, &[&str]); 5] = [
+    ("Create", &["train", "import", "export"]),
+    ("Look", &["eval", "render", "view", "report", "inspect"]),
+    ("Device", &["fit", "verify", "cost"]),
+    ("Research", &["sweep", "ablate", "plan-runs", "tables", "compare", "plot"]),
+    ("Captures and this machine", &["doctor", "synth", "demo", "devices", "bench"]),
+];
+
+/// The command with its help grouped.
+pub(super) fn grouped(command: Command) -> Command {
+    let mut list = String::new();
+    for (group, names) in GROUPS {
+        let _ = writeln!(list, "{group}:");
+        for name in names {
+            let about = command.find_subcommand(name).and_then(Command::get_about).map(ToString::to_string);
+            let _ = writeln!(list, "  {name:10} {}", about.unwrap_or_default());
+        }
+        list.push('\n');
+    }
+    command.help_template(format!("{{about}}\n\n{{usage-heading}} {{usage}}\n\n{list}Options:\n{{options}}\n"))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use clap::{Arg, CommandFactory as _};
+
+    use super::*;
+    use crate::command::Cli;
+
+    const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/commands.md");
+    /// What stands above is written by hand.
+    const MARK: &str = "<!-- written by the test `the_page_of_commands_is_their_help` -->\n";
+
+    #[test]
+    fn every_command_stands_in_one_group() {
+        let cli = Cli::command();
+        let there: BTreeSet<&str> = cli.get_subcommands().map(Command::get_name).collect();
+        let grouped: Vec<&str> = GROUPS.iter().flat_map(|(_, names)| names.iter().copied()).collect();
+        assert_eq!(grouped.len(), there.len());
+        assert_eq!(grouped.into_iter().collect::<BTreeSet<&str>>(), there);
+    }
+
+    /// The options as docs/commands.md lists them; `POCKETSPLAT_BLESS=1` writes it.
+    #[test]
+    fn the_page_of_commands_is_their_help() {
+        let mut cli = Cli::command();
+        cli.build();
+        let mut text = String::new();
+        for (group, names) in GROUPS {
+            let _ = writeln!(text, "\n## {group}");
+            for name in names {
+                text += &section(cli.find_subcommand(name).expect("a command"));
+            }
+        }
+        let page = std::fs::read_to_string(PAGE).expect("the page");
+        let (by_hand, found) = page.split_once(MARK).expect("the mark");
+        if std::env::var_os("POCKETSPLAT_BLESS").is_some() {
+            std::fs::write(PAGE, format!("{by_hand}{MARK}{text}")).expect("written");
+        } else {
+            assert!(
+                found == text,
+                "docs/commands.md is not what the commands say; write it: POCKETSPLAT_BLESS=1 cargo test -p pocketsplat page_of_commands"
+            );
+        }
+    }
+
+    fn section(command: &Command) -> String {
+        let name = command.get_name();
+        let about = command.get_long_about().or(command.get_about()).map(ToString::to_string).unwrap_or_default();
+        let positionals = command.get_positionals().map(|arg| {
+            let value = arg.get_value_names().map_or_else(|| arg.get_id().to_string(), |names| names[0].to_string());
+            if arg.is_required_set() { format!(" {value}") } else { format!(" [{value}]") }
+        });
+        let mut text = format!("\n### {name}\n\n`pocketsplat {name}{} [OPTIONS]`\n\n", positionals.collect::<String>());
+        let _ = writeln!(text, "{}\n\n| option | meaning |\n|---|---|", in_page(&about).replace('|', "\\|"));
+        let shown = |arg: &&Arg| !arg.is_hide_set() && !["help", "version", "threads"].contains(&arg.get_id().as_str());
+        for arg in command.get_arguments().filter(shown) {
+            let _ = writeln!(text, "| `{}` | {} |", spelled(arg).replace('|', "\\|"), meaning(arg).replace('|', "\\|"));
+        }
+        text
+    }
+
+    fn spelled(arg: &Arg) -> String {
+        let value = arg.get_value_names().map_or_else(String::new, |names| names[0].to_string());
+        let takes_value = arg.get_action().takes_values();
+        match (arg.get_long(), arg.get_short()) {
+            (None, None) => value,
+            (long, short) => {
+                let names: Vec<String> = short
+                    .map(|short| format!("-{short}"))
+                    .into_iter()
+                    .chain(long.map(|long| format!("--{long}")))
+                    .collect();
+                if takes_value { format!("{} {value}", names.join(", ")) } else { names.join(", ") }
+            }
+        }
+    }
+
+    fn meaning(arg: &Arg) -> String {
+        let help = arg.get_long_help().or(arg.get_help()).map(ToString::to_string).unwrap_or_default();
+        let mut text = in_page(&help);
+        let values: Vec<String> =
+            arg.get_possible_values().iter().map(|value| format!("`{}`", value.get_name())).collect();
+        if arg.get_action().takes_values() && !values.is_empty() {
+            let _ = write!(text, ": {}", values.join(", "));
+        }
+        let defaults: Vec<String> =
+            arg.get_default_values().iter().map(|value| value.to_string_lossy().into_owned()).collect();
+        if arg.get_action().takes_values() && !defaults.is_empty() && !help.contains("[default") {
+            let _ = write!(text, " [default: {}]", defaults.join(","));
+        }
+        text
+    }
+
+    /// One paragraph a line; what looks like a tag is no tag.
+    fn in_page(text: &str) -> String {
+        text.replace('<', "&lt;")
+            .split("\n\n")
+            .map(|paragraph| paragraph.replace('\n', " "))
+            .collect::<Vec<_>>()
+            .join(" ")
+    }
+}

@@ -1,5 +1,7 @@
 //! Gives the program the commit that it is built from, where it is built from the repository.
 
+#![expect(clippy::disallowed_macros, reason = "cargo reads what a build script prints")]
+
 use std::path::Path;
 use std::process::Command;
 

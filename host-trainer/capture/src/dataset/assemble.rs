@@ -86,11 +86,19 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
     let shown = looks.iter().map(|looks| looks.shown).sum::<f64>() / train.len() as f64;
     let brought = points.map(|(_, points)| points).filter(|points| !points.is_empty() && options.points.is_none());
     let (given, points_origin, points_seconds, made_points) = match brought {
-        Some(points) => (Some(points), PointsOrigin::Capture, None, None),
-        None => match made_points::made(&shots, (taken.kind, shown), &normalisation, options, &mut notes) {
-            Some(made) => (Some(made.points_world), made.origin, made.seconds, Some(made.file)),
-            None => (None, PointsOrigin::Random, None, None),
-        },
+        Some(points) if points.len() >= made_points::FEW_OWN_POINTS => {
+            (Some(points), PointsOrigin::Capture, None, None)
+        }
+        own => {
+            let n_own = own.as_ref().map_or(0, Vec::len);
+            match made_points::made(&shots, (taken.kind, shown), n_own, &normalisation, options, &mut notes) {
+                Some(made) => (Some(made.points_world), made.origin, made.seconds, Some(made.file)),
+                None => match own {
+                    Some(points) => (Some(points), PointsOrigin::Capture, None, None),
+                    None => (None, PointsOrigin::Random, None, None),
+                },
+            }
+        }
     };
     let kept = given.map(|points| {
         let (points, note) = starting_points::kept(&points, &normalisation);

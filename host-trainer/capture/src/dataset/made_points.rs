@@ -15,6 +15,10 @@ use super::{LoadOptions, Normalisation, PointsChoice, PointsOrigin, SceneKind, m
 const LEAST_POINTS: usize = 100;
 /// Of an object, so many pixels of a photograph that show it need a point: where it is smooth it has none, and random points reach there.
 const PIXELS_A_POINT: f64 = 35.0;
+/// A capture that brings fewer points than this starts from made ones, where these are [`TIMES_OWN`] as many: what lies between few points
+/// is not found by growth (`docs/experiments/2026-11-27-points.md`).
+pub(super) const FEW_OWN_POINTS: usize = 1000;
+const TIMES_OWN: usize = 3;
 /// Rises when the same photographs give other points than by an earlier version.
 const REVISION: u32 = 1;
 
@@ -37,9 +41,11 @@ pub struct PointsFile(Vec<u8>);
 ///
 /// * `shots`: those to train on, at least one.
 /// * `shown`: what they show, and the mean share of their pixels that are not transparent.
+/// * `n_own`: points that the capture brings, which made ones would replace.
 pub(super) fn made(
     shots: &[Shot],
     (kind, shown): (SceneKind, f64),
+    n_own: usize,
     normalisation: &Normalisation,
     options: &LoadOptions,
     notes: &mut Vec<String>,
@@ -55,11 +61,18 @@ pub(super) fn made(
         (None, SceneKind::Object) => LEAST_POINTS.max((shown * matching::mean_pixels(shots) / PIXELS_A_POINT) as usize),
         _ => LEAST_POINTS,
     };
+    let needed = needed.max(TIMES_OWN * n_own);
     for &origin in origins {
         let made = kept_or_made(shots, origin, normalisation, options);
         let found = made.points_world.len();
         if found >= needed {
+            if n_own > 0 {
+                notes.push(format!("points of the capture: {n_own}, needed: {FEW_OWN_POINTS}, so others are made"));
+            }
             return Some(made);
+        }
+        if n_own > 0 {
+            continue;
         }
         notes.push(match origin {
             PointsOrigin::DepthMaps => format!("depth maps: {n_maps}, which give {found} points, needed: {needed}"),

@@ -80,7 +80,10 @@ impl fmt::Display for LoadReport {
             (Some([r, g, b]), None) => write!(f, ", on {r},{g},{b}")?,
             (_, own) => write!(f, ", on {}", own.unwrap_or(self.background))?,
         }
-        write!(f, ", {} {random}initial points", self.n_points)?;
+        // None were asked for where nothing is trained.
+        if self.n_points > 0 {
+            write!(f, ", {} {random}initial points", self.n_points)?;
+        }
         let made = match self.points_origin {
             PointsOrigin::Capture | PointsOrigin::Random => None,
             PointsOrigin::DepthMaps => Some("of its depth maps"),

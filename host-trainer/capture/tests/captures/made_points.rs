@@ -112,3 +112,35 @@ fn what_gives_no_points_is_told() {
         "{text}"
     );
 }
+
+/// A capture whose photographs give hundreds of points, with so many of its own in the file that its `transforms.json` names.
+fn with_own_points(n: usize) -> (Capture, LoadReport) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path().join("capture");
+    let synth = SynthOptions { size_px: 96, n_train: 24, n_test: 1, ..SynthOptions::default() };
+    write_capture(&at, &synth).expect("a capture");
+    let listed = std::fs::read_to_string(at.join("transforms_train.json")).expect("a list");
+    std::fs::write(at.join("transforms.json"), listed.replacen('{', "{ \"ply_file_path\": \"own.ply\",", 1))
+        .expect("written");
+    for split in ["train", "test"] {
+        std::fs::remove_file(at.join(format!("transforms_{split}.json"))).expect("removed");
+    }
+    let head = format!(
+        "ply\nformat ascii 1.0\nelement vertex {n}\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
+    );
+    let point =
+        |i: usize| format!("{} {} {}\n", 0.01 * (i % 10) as f64, 0.01 * (i / 10 % 10) as f64, 0.01 * (i / 100) as f64);
+    std::fs::write(at.join("own.ply"), head + &(0..n).map(point).collect::<String>()).expect("written");
+    load(&at, &LoadOptions::default()).expect("a sound capture")
+}
+
+#[test]
+fn few_points_of_its_own_give_way_to_three_times_as_many() {
+    let (few, report) = with_own_points(30);
+    assert_eq!(few.points_origin, PointsOrigin::Matched, "{report}");
+    assert!(report.notes.iter().any(|note| note.contains("points of the capture: 30, needed: 1000")), "{report}");
+    let (as_many, report) = with_own_points(999);
+    assert_eq!((as_many.points_origin, as_many.points.len()), (PointsOrigin::Capture, 999), "{report}");
+    let (enough, report) = with_own_points(1000);
+    assert!(enough.points_origin == PointsOrigin::Capture && enough.made_points.is_none(), "{report}");
+}

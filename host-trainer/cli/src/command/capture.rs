@@ -55,7 +55,9 @@ impl CaptureArgs {
     ///
     /// Photographs that are too many for the memory are decoded again when they are needed.
     pub(crate) fn load(&self, seed: u64) -> Result<Capture> {
-        self.load_with(&LoadOptions { points: Some(PointsChoice::Random), ..self.load_options(seed, None) })
+        let no_points =
+            LoadOptions { points: Some(PointsChoice::Random), n_random_points: 0, ..self.load_options(seed, None) };
+        self.load_with(&no_points)
     }
 
     /// The same for training, which needs points, and every photograph again and again.

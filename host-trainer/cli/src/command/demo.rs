@@ -68,7 +68,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     };
     let config = TrainConfig { iterations: args.iterations, modules, ..TrainConfig::of(Backbone::Hac) };
     let bundle_path = bundle_output.path();
-    let capture = capture_args.load(config.seed)?;
+    let capture = capture_args.load_to_train(config.seed, None, &[])?;
     let trained = train::train(&capture, config, &Encoding::default(), &bundle_output)?;
 
     say!("3 of 4  drawing the held-out views with the decoder");

@@ -21,6 +21,8 @@ use super::devices::{DeviceChoice, usable};
 use super::output;
 use crate::say::say;
 
+/// Time the stages of a training step.
+///
 /// Measure the stages of a training step on every device of this machine, and on the CPU with 1, 2, 4, … threads.
 #[derive(clap::Args)]
 pub(crate) struct Args {

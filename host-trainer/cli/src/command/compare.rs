@@ -15,6 +15,8 @@ use super::{output, point};
 use crate::config::{Difference, RunConfig};
 use crate::program;
 
+/// Compare finished runs.
+///
 /// Compare finished runs: quality, bytes and the minutes that they took, by the settings in which they differ from the first.
 ///
 /// Writes runs.csv and runs.svg. Bundles are measured on the views that are held out of training, once: the figures are kept beside

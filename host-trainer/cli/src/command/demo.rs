@@ -21,6 +21,8 @@ use super::{output, train};
 use crate::config::CaptureOptions;
 use crate::say::say;
 
+/// Train, compress and draw a procedural capture.
+///
 /// Make a capture, train it, compress it, draw it with the decoder and compare: about three minutes on two cores.
 #[derive(clap::Args)]
 pub(crate) struct Args {

@@ -11,6 +11,8 @@ use super::output;
 #[cfg(feature = "gpu")]
 use crate::say::say;
 
+/// List the GPUs that training can run on.
+///
 /// List the GPUs that training can run on, with their limits.
 #[derive(clap::Args)]
 pub(crate) struct Args {

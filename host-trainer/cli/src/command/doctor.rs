@@ -9,6 +9,8 @@ use pocketsplat_capture::dataset::{LoadOptions, Severity, diagnose};
 use super::capture::refuse_gaussians;
 use super::output;
 
+/// Check a capture; every finding comes with a remedy.
+///
 /// Check a capture: images, poses, lenses, scale, splits; every finding comes with a remedy.
 #[derive(clap::Args)]
 pub(crate) struct Args {

@@ -49,6 +49,8 @@ pub(crate) fn lpips_of(lpips: &Lpips) -> String {
     format!("VGG16, input in {}", lpips.range())
 }
 
+/// Compare a bundle's frames with the photographs of a capture.
+///
 /// Compare the frames of a bundle or of a file of Gaussians with the photographs of a capture.
 #[derive(clap::Args)]
 pub(crate) struct Args {

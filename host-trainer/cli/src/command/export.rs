@@ -34,6 +34,8 @@ use crate::say::say;
 use cameras::Cameras;
 use rounding::Rounding;
 
+/// Write a bundle as explicit Gaussians: .ply, .spz or .sog
+///
 /// Write a bundle as explicit Gaussians, which other programs draw: .ply, .spz or .sog.
 ///
 /// Opacity, shape and colour of a bundle's Gaussians follow the view. A file keeps one opacity and one shape, and a colour in spherical

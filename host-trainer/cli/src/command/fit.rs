@@ -19,6 +19,8 @@ use super::output;
 use crate::config::named::{TARGETS, level_number, one_of};
 use level::LevelFit;
 
+/// Plan memory and work for a device.
+///
 /// Show what a decoder draws of a bundle within so much memory: the share of the scene, its quality, the work of a frame.
 ///
 /// Quality is the manifest's, measured over test views when the bundle was made (over training views that were held out, where

@@ -10,7 +10,7 @@ const GROUPS: [(&str, &[&str]); 5] = [
     ("Look", &["eval", "render", "view", "report", "inspect"]),
     ("Device", &["fit", "verify", "cost"]),
     ("Research", &["sweep", "ablate", "plan-runs", "tables", "compare", "plot"]),
-    ("Captures and this machine", &["doctor", "synth", "demo", "devices", "bench"]),
+    ("Captures and this machine", &["doctor", "synth", "demo", "devices", "bench", "completions", "man"]),
 ];
 
 /// The command with its help grouped.
@@ -20,7 +20,7 @@ pub(super) fn grouped(command: Command) -> Command {
         let _ = writeln!(list, "{group}:");
         for name in names {
             let about = command.find_subcommand(name).and_then(Command::get_about).map(ToString::to_string);
-            let _ = writeln!(list, "  {name:10} {}", about.unwrap_or_default());
+            let _ = writeln!(list, "  {name:11} {}", about.unwrap_or_default());
         }
         list.push('\n');
     }

@@ -40,6 +40,8 @@ const ITERATIONS: u32 = 5_000;
 /// Weight of a value's bits in the loss.
 const LAMBDA: f64 = 0.0005;
 
+/// Compress splats that exist already into a bundle.
+///
 /// Compress splats that exist already: draw pictures of a .ply, .spz or .sog, train a bundle on them, and measure what it lost.
 ///
 /// Cameras stand around the scene's bulk or inside it, wherever more of it is seen; --cameras gives others.

@@ -18,6 +18,8 @@ use super::gaussians::{AxesArgs, GaussiansFile};
 use super::output;
 use super::render::CameraRecord;
 
+/// Show what a bundle or a file of Gaussians holds.
+///
 /// Show a bundle's header, its tiers, and its bytes part by part; or what a file of Gaussians holds.
 #[derive(clap::Args)]
 pub(crate) struct Args {

@@ -5,6 +5,7 @@ mod bench;
 mod bundle;
 mod capture;
 mod compare;
+mod completions;
 mod cost;
 mod demo;
 mod devices;
@@ -85,6 +86,8 @@ enum Command {
     Doctor(doctor::Args),
     Devices(devices::Args),
     Bench(bench::Args),
+    Completions(completions::Args),
+    Man(completions::ManArgs),
 }
 
 /// Parses the command line, runs the command, and says what failed: as JSON on stdout where results go there as JSON.
@@ -160,6 +163,8 @@ fn dispatch(cli: Cli) -> Result<ExitCode> {
         Command::Synth(args) => synth::run(&args),
         Command::Devices(args) => devices::run(&args),
         Command::Bench(args) => bench::run(&args),
+        Command::Completions(args) => completions::run(&args),
+        Command::Man(args) => completions::write_manual(&args),
         Command::Demo(args) => demo::run(&args),
     }
     .map(|()| ExitCode::SUCCESS)

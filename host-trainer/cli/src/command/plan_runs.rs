@@ -16,6 +16,8 @@ use super::{output, tables, train_args};
 use crate::config::RunConfig;
 use spec::{AskedRun, Spec};
 
+/// Plan many runs as a Snakemake workflow.
+///
 /// Write a Snakemake workflow that trains, measures and tabulates every combination of a list of captures and options.
 ///
 /// Every run asks for the threads that this command has, and for memory and minutes by its own estimate, which takes a few steps of

@@ -13,6 +13,8 @@ use serde_json::{Map, Value, json};
 use super::output;
 use super::outputs::{FIGURE, OverwriteArgs, check_name};
 
+/// Draw recorded curves as an SVG.
+///
 /// Draw learning curves of runs, rate-distortion curves of sweeps and ablations, or what settings cost, into an SVG.
 ///
 /// Of rate-distortion curves it also prints how far each lies from the first: Bjøntegaard's deltas.

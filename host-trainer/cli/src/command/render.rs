@@ -32,6 +32,8 @@ use pictures::{Format, Target};
 const OF_A_CAPTURE: [&str; 8] =
     ["dataset", "split", "max_resolution", "background", "scene", "images", "model", "test_every"];
 
+/// Draw a bundle as pictures.
+///
 /// Draw a bundle as pictures: views of a capture, the bundle's own camera, a turn around it, or cameras of a file.
 ///
 /// So it does for a .ply, .spz or .sog; one without a camera of its own is looked at from where `import` would begin.

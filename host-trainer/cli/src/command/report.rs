@@ -29,6 +29,8 @@ const SCRIPT: &str = include_str!("report/report.js");
 /// The page in a run's folder.
 const FILE: &str = "report.html";
 
+/// Write a page about a finished run.
+///
 /// Write a page about a finished run: quality view by view, photograph against picture, bytes, tiers, the viewer.
 ///
 /// It is one file that fetches nothing. `train` writes one into the run folder at its end.

@@ -9,6 +9,8 @@ use pocketsplat_files::Outputs;
 
 use super::output;
 
+/// Write a procedural capture.
+///
 /// Write a procedural capture: an analytic scene, ray-traced from known cameras, in Blender's format.
 #[derive(clap::Args)]
 pub(crate) struct Args {

@@ -22,6 +22,8 @@ use published::PublishedRow;
 pub(super) const FILES: [(&str, Content); 2] =
     [("tables/runs.csv", table(&["run,"])), ("tables/bd_rate.csv", table(&["dataset,"]))];
 
+/// Tabulate the finished runs of a plan.
+///
 /// Make tables and figures of the finished runs of a plan; it may be unfinished.
 ///
 /// tables/runs.csv has every run; DATASET.csv and DATASET/SCENE.csv the columns of the 3DGS compression survey, means over seeds;

@@ -38,6 +38,7 @@ use summary::Summary;
 pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     match args.resume() {
         Some(path) => resume(args, path),
+        None if args.is_dry_run() => dry_run(args),
         None if args.is_explicit() => explicit::begin(args),
         None if args.continues() => begin_or_go_on(args),
         None => begin(args),
@@ -102,6 +103,19 @@ fn begin(args: &Args) -> Result<ExitCode> {
     drop(capture);
     clear_photographs(&path, code);
     Ok(code)
+}
+
+/// Says what a run would do; of files nothing is touched.
+fn dry_run(args: &Args) -> Result<ExitCode> {
+    if args.is_explicit() {
+        bail!("--dry-run is for scenes of anchors; leave out --backbone 3dgs");
+    }
+    let mut config = args.resolved()?;
+    let capture = load(&mut config, None, None)?;
+    let (with_pilots, stop) = (effects::are_measured(&config, &capture), stop::flag()?);
+    Estimate::try_out(&capture, &config.train, with_pilots, args.device()?, &stop)?;
+    output::print_text(&config.to_toml()?)?;
+    Ok(ExitCode::SUCCESS)
 }
 
 /// Does what is left of a run, which may be all of it or nothing.

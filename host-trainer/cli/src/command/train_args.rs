@@ -65,6 +65,9 @@ pub(crate) struct Args {
     /// Configuration to read, as a run folder has it; options override it.
     #[arg(long, value_name = "FILE.toml", conflicts_with = "resume", help_heading = RUN, hide_short_help = true)]
     config: Option<PathBuf>,
+    /// Print the configuration that the run would have, with every key, and the estimate; train nothing and write nothing.
+    #[arg(long, conflicts_with_all = ["resume", "from", "continues"], help_heading = RUN, hide_short_help = true)]
+    dry_run: bool,
     /// Run folder of an interrupted run to go on with; give DATASET as well if the capture has moved.
     #[arg(long, value_name = "OUT.run", help_heading = RUN)]
     resume: Option<PathBuf>,
@@ -224,6 +227,11 @@ impl Args {
     /// Capture and output of a run as the command line names them, else as its configuration does.
     pub(crate) fn named_paths<'a>(&'a self, dataset: &'a Path, output: &'a Path) -> (&'a Path, &'a Path) {
         (self.dataset.as_deref().unwrap_or(dataset), self.output.as_deref().unwrap_or(output))
+    }
+
+    /// Whether nothing is to be trained.
+    pub(crate) fn is_dry_run(&self) -> bool {
+        self.dry_run
     }
 
     /// Whether an unfinished run may be replaced.

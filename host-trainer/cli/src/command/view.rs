@@ -17,6 +17,8 @@ use super::output;
 use super::outputs::{ANYTHING, OverwriteArgs, PAGE, check_name};
 use super::stand::StandArgs;
 
+/// Write a web page that draws bundles.
+///
 /// Write one page that draws bundles in a browser, with nothing to install and nothing fetched.
 ///
 /// The page turns the scene by mouse, touch and keys. Sliders set what a device has: memory, pruning rate, quality. It shows the plan and

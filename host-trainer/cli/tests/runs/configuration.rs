@@ -8,6 +8,17 @@ use crate::fixture::{
 };
 
 #[test]
+fn a_dry_run_says_the_whole_configuration_and_writes_nothing() {
+    let home = folder("dry-run");
+    let output = home.join("a.psb");
+    let said = train(&output).arg("--dry-run").output().unwrap();
+    assert!(said.status.success(), "{}", text(&said.stderr));
+    assert_eq!(fs::read_dir(&home).unwrap().count(), 0, "nothing is written");
+    succeeds(&mut train(&output));
+    assert_eq!(text(&said.stdout), fs::read_to_string(home.join("a.run/config.toml")).unwrap());
+}
+
+#[test]
 fn a_written_configuration_gives_the_same_bundle_again() {
     let home = folder("config");
     let output = home.join("a.psb");

@@ -122,6 +122,22 @@ mod tests {
         }
     }
 
+    /// The sum over the whole 11×11 window in Python's floats, without separating it.
+    #[test]
+    fn a_pair_of_images_scores_what_another_implementation_gives() {
+        let image = |share: f64| {
+            let value = |i: usize| {
+                let (y, x, c) = (i / 48, i / 3 % 16, i % 3);
+                let one = ((c * 5 + y * 3 + x * 7) % 23) as f64 / 22.0;
+                let other = ((c * 3 + y * 5 + x * 2) % 19) as f64 / 18.0;
+                (255.0 * ((1.0 - share) * one + share * other)).round() as u8
+            };
+            Image { width_px: 16, height_px: 16, rgb: (0..768).map(value).collect() }
+        };
+        let found = ssim(&image(0.0), &image(0.3));
+        assert!((found - 0.916_348_568_884_129_2).abs() < 1e-12, "{found}");
+    }
+
     #[test]
     fn flat_images_follow_the_closed_form_inside() {
         // Far from the border both variances are 0 and only the means count; one pixel sees no border at 11×11.

@@ -141,6 +141,19 @@ mod tests {
         random(seed, 3 * size[0] * size[1]).iter().map(|v| 0.5 + 0.5 * v).collect()
     }
 
+    /// The sum over the whole 11×11 window in Python's floats, without separating it.
+    #[test]
+    fn a_pair_of_images_scores_what_another_implementation_gives() {
+        let planes = |value: fn(usize, usize, usize) -> f64| -> Vec<f64> {
+            (0..3 * 16 * 16).map(|i| value(i / 256, i / 16 % 16, i % 16)).collect()
+        };
+        let x = planes(|c, y, x| ((c * 5 + y * 3 + x * 7) % 23) as f64 / 22.0);
+        let other = planes(|c, y, x| ((c * 3 + y * 5 + x * 2) % 19) as f64 / 18.0);
+        let truth: Vec<f64> = x.iter().zip(other).map(|(x, other)| 0.7 * x + 0.3 * other).collect();
+        let (found, _) = forward(Level::detect(), &x, &truth, [16, 16]);
+        assert!((found - 0.916_256_258_751_104).abs() < 1e-12, "{found}");
+    }
+
     #[test]
     fn equal_images_score_one() {
         let size = [20, 33];

@@ -242,6 +242,31 @@ mod tests {
         assert_eq!(statistics.n_drawn[..2], [40, 0], "only the judged one is reset");
     }
 
+    /// How many of 400 offsets, each in a voxel of its own, grow an anchor.
+    ///
+    /// * `pull`: mean gradient, in thresholds of the coarsest level.
+    fn grown(pull: f32, levels: u32) -> usize {
+        let points: Vec<DVec3> = (0..40).map(|i| DVec3::new(0.0, f64::from(i), 0.0)).collect();
+        let (mut scene, mut optimiser, mut statistics, mut rng) = start(&points);
+        scene.anchors.log_scales.fill(0.0);
+        for at in 0..400 {
+            scene.anchors.offsets[at * 3] = 0.1 * (at % 10 + 1) as f32;
+            statistics.n_drawn[at] = 100;
+            statistics.gradient_sum[at] = 100.0 * 2e-4 * pull;
+        }
+        let settings = Densification { levels, ..Densification::default() };
+        grow(&mut scene, &mut optimiser, &mut statistics, &settings, 4, &mut rng)
+    }
+
+    #[test]
+    fn half_of_the_offsets_may_grow_at_the_coarsest_level_and_a_finer_one_asks_for_twice_the_pull() {
+        // 0.5 ± 0.08 and 1 − 0.5·0.25 = 0.875 ± 0.05, three standard deviations and more.
+        let within = |found: usize, share: f64, by: f64| (found as f64 / 400.0 - share).abs() < by;
+        assert!(within(grown(1.5, 1), 0.5, 0.08), "one level: {}", grown(1.5, 1));
+        assert_eq!(grown(1.5, 2), grown(1.5, 1), "too gentle for the second level");
+        assert!(within(grown(3.0, 2), 0.875, 0.05), "two levels: {}", grown(3.0, 2));
+    }
+
     #[test]
     fn a_cap_keeps_the_candidates_that_are_pulled_hardest() {
         let (mut scene, mut optimiser, mut statistics, mut rng) = start(&[DVec3::ZERO, DVec3::ONE]);

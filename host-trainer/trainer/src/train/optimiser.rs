@@ -279,6 +279,42 @@ pub fn retain_rows<T: Copy>(values: &mut Vec<T>, width: usize, keep: &[bool]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::init::initial_scene;
+    use crate::train::TrainConfig;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    /// The table of docs/method.md: each group at the start, where the decay begins, half-way through it and at the end.
+    #[test]
+    fn every_group_has_its_learning_rate_at_every_point_of_a_run() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let scene = initial_scene(TrainConfig::default().shape, 0.01, &[glam::DVec3::ZERO], &mut rng);
+        let rates = Rates::default();
+        let extent = 2.0;
+        let half = |start: f64, end: f64| (start * end).sqrt();
+        let table = |progress: f64| -> [f64; 8] {
+            let optimiser = &mut Optimiser::<f64>::new(&scene.cast());
+            let steps = optimiser.next(&rates, progress, extent);
+            // The first step divides its rate by 1 − β₁ = 0.1.
+            let rate = |step: &Step<f64>| 0.1 * step.scale;
+            let [feature, log_scale, offset, mask] = steps.anchors;
+            let anchors = [feature, log_scale, offset, mask].map(|step| rate(&step.expect("moved")));
+            let heads: [f64; 4] = std::array::from_fn(|i| rate(&steps.heads[i]));
+            [anchors, heads].concat().try_into().expect("eight groups")
+        };
+        // Features, log-scales, offsets and masks (times the extent), then the heads of opacity, covariance, colour and detail.
+        let starts = [0.0075, 0.007, 0.02, 0.02, 0.002, 0.004, 0.008, 0.008];
+        let ends = [0.0005, 0.0005, 0.002, 0.0002, 0.0002, 0.0004, 0.0008, 0.0008];
+        let masks_at = |progress: f64| 0.02 * 0.01f64.powf(progress);
+        for (progress, expected) in
+            [(0.0, starts), (0.85, starts), (0.925, std::array::from_fn(|i| half(starts[i], ends[i]))), (1.0, ends)]
+        {
+            for (i, (found, expected)) in table(progress).into_iter().zip(expected).enumerate() {
+                let expected = if i == 3 { masks_at(progress) } else { expected };
+                assert!((found / expected - 1.0).abs() < 1e-9, "group {i} at {progress}: {found}, needed: {expected}");
+            }
+        }
+    }
 
     #[test]
     fn retained_rows_keep_their_order() {

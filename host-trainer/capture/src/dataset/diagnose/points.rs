@@ -50,8 +50,7 @@ pub(super) fn check(listing: &Listing, centres: &[DVec3], findings: &mut Vec<Fin
             shown(path),
             points.len()
         );
-        let remedy =
-            "reconstruct again with more matches, or take the file out, and training makes points";
+        let remedy = "reconstruct again with more matches, or take the file out, and training makes points";
         let finding = Finding::new(Severity::Warning, "few-points", message, remedy).files([path.clone()]);
         findings.push(finding.number("points", points.len() as f64).number("needed", FEW_POINTS as f64));
     }

@@ -2,14 +2,16 @@
 
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Capture, View};
+use pocketsplat_core::bundle::TierMeasures;
 use pocketsplat_core::{Bundle, DecodeError, Plan};
 use pocketsplat_instructions::level;
 
 use super::choice::{CoderChoice, judged_psnr_db};
 use super::scale::{DevicePlans, frame_of, level_needs, measured_cameras, most_instructions};
 use super::{EncodeError, Encoding};
-use crate::bundle::{WriteError, Written};
-use crate::manifest::measure;
+use crate::bundle::{CodedScene, WriteError, Written};
+use crate::device::Limits;
+use crate::manifest::{compare, count, mean_psnr_db};
 use crate::train::finish::Finished;
 use crate::train::steering::Search;
 
@@ -68,7 +70,9 @@ impl Need {
 /// A coded scene and what it takes.
 struct Attempt {
     finished: Finished,
-    written: Written,
+    coded: CodedScene,
+    /// What drawing takes, where a limit asks for it.
+    counts: Option<Vec<TierMeasures>>,
     plan: Option<Plan>,
     /// Scratch memory of the whole scene, where it is limited.
     ram_bytes: Option<u64>,
@@ -86,9 +90,17 @@ struct Unfit {
 }
 
 impl Attempt {
-    fn fitted(self, cut: Option<Cut>) -> Fitted {
-        let Self { written, finished, plan, time, .. } = self;
-        Fitted { written, finished, cut, plan, instructions: time.map(|time| time.needed) }
+    /// The file, with every tier measured.
+    fn fitted(self, cut: Option<Cut>, cameras: &[Camera], held_out: &[View]) -> Result<Fitted, EncodeError> {
+        let Self { finished, coded, counts, plan, time, .. } = self;
+        let bundle = coded.bundle().map_err(WriteError::ReadBack)?;
+        let mut measures = match counts {
+            Some(counts) => counts,
+            None => count(&bundle, cameras)?,
+        };
+        compare(&bundle, &mut measures, held_out)?;
+        let written = coded.into_file(&measures)?;
+        Ok(Fitted { written, finished, cut, plan, instructions: time.map(|time| time.needed) })
     }
 }
 
@@ -125,11 +137,11 @@ impl Encoding {
         let attempt = |n: usize| {
             let mut fewer = finished.clone();
             keep(&mut fewer, n);
-            self.attempt(fewer, capture, &cameras, held_out)
+            self.attempt(fewer, capture, &cameras)
         };
         let n = n_kept(&finished);
         let whole = attempt(n)?;
-        let lost = lost_by(&whole)?;
+        let lost = LostBy::of(&whole);
         let (n_held, held) = match most_within(n, 1, whole, |found| found.memory, attempt)? {
             Ok(found) => found,
             Err(Unfit { least: (n_anchors, Need { limit, available, needed }), .. }) => {
@@ -139,26 +151,31 @@ impl Encoding {
         let at_least = (n as f64 * (1.0 - MOST_CUT_FOR_TIME)) as usize;
         let (n_left, best) = most_within(n_held, at_least, held, |found| found.time, attempt)?
             .unwrap_or_else(|Unfit { whole, .. }| (n_held, whole));
-        let cut = (n_left < n).then(|| Cut { n_anchors: n - n_left, ..lost });
-        Ok(best.fitted(cut))
+        let cut = (n_left < n).then(|| lost.cut(n - n_left, held_out)).transpose()?;
+        best.fitted(cut, &cameras, held_out)
     }
 
-    /// Codes and measures a scene, and says what it takes of the limits.
-    fn attempt(
-        &self,
-        finished: Finished,
-        capture: &Capture,
-        cameras: &[Camera],
-        held_out: &[View],
-    ) -> Result<Attempt, EncodeError> {
+    /// Codes a scene, and says what it takes of the limits. A limit of bytes alone needs no frame to be counted.
+    fn attempt(&self, finished: Finished, capture: &Capture, cameras: &[Camera]) -> Result<Attempt, EncodeError> {
         let coded = self.coded(&finished, capture)?;
-        let bundle = coded.bundle().map_err(WriteError::ReadBack)?;
-        let measures = measure(&bundle, cameras, held_out)?;
-        let written = coded.into_file(&measures)?;
         let flash = self.limits.flash_bytes.map(|available| {
-            let needed = written.bytes.len() as u64;
+            let needed = coded.file_len() as u64;
             Need { limit: "bytes of flash", available, needed }
         });
+        let Limits { ram_bytes, processor, level, .. } = self.limits;
+        if ram_bytes.is_none() && processor.is_none() && level.is_none() {
+            return Ok(Attempt {
+                finished,
+                coded,
+                counts: None,
+                plan: None,
+                ram_bytes: None,
+                memory: flash,
+                time: None,
+            });
+        }
+        let counts = count(&coded.bundle().map_err(WriteError::ReadBack)?, cameras)?;
+        let written = coded.clone().into_file(&counts)?;
         let ram = self.limits.ram_bytes.map(|available| ram_of(&written, capture, available));
         let (ram, plan) =
             ram.transpose().map_err(EncodeError::Measure)?.map_or((None, None), |(ram, plan)| (Some(ram), plan));
@@ -170,7 +187,7 @@ impl Encoding {
         let ram_bytes = ram.map(|ram| ram.needed);
         let memory = flash.into_iter().chain(ram).chain(of_level).max_by(|a, b| a.share().total_cmp(&b.share()));
         let time = self.time_of(&written, capture, cameras).map_err(EncodeError::Measure)?;
-        Ok(Attempt { finished, written, plan, ram_bytes, memory, time })
+        Ok(Attempt { finished, coded, counts: Some(counts), plan, ram_bytes, memory, time })
     }
 
     /// Instructions of the slowest frame, where the processor is known and the memory suffices.
@@ -235,17 +252,26 @@ fn ram_of(written: &Written, capture: &Capture, available: u64) -> Result<(Need,
 }
 
 /// What is lost when all that is too much of a scene goes.
-fn lost_by(whole: &Attempt) -> Result<Cut, EncodeError> {
-    let bundle = Bundle::parse(&whole.written.bytes).map_err(WriteError::ReadBack)?;
-    let psnr_db = bundle.n_tiers().checked_sub(1).and_then(|tier| bundle.measures(tier)?.psnr_db);
-    let instructions = whole.time.map(|time| time.needed);
-    Ok(Cut {
-        n_anchors: 0,
-        flash_bytes: whole.written.bytes.len() as u64,
-        ram_bytes: whole.ram_bytes,
-        instructions,
-        psnr_db,
-    })
+struct LostBy {
+    coded: CodedScene,
+    ram_bytes: Option<u64>,
+    instructions: Option<u64>,
+}
+
+impl LostBy {
+    fn of(whole: &Attempt) -> Self {
+        Self {
+            coded: whole.coded.clone(),
+            ram_bytes: whole.ram_bytes,
+            instructions: whole.time.map(|time| time.needed),
+        }
+    }
+
+    fn cut(self, n_anchors: usize, held_out: &[View]) -> Result<Cut, EncodeError> {
+        let Self { coded, ram_bytes, instructions } = self;
+        let psnr_db = mean_psnr_db(&coded.bundle().map_err(WriteError::ReadBack)?, u8::MAX, held_out)?;
+        Ok(Cut { n_anchors, flash_bytes: coded.file_len() as u64, ram_bytes, instructions, psnr_db })
+    }
 }
 
 /// Anchors with a drawn offset: those that are written.

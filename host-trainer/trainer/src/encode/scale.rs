@@ -12,7 +12,7 @@ use super::{EncodeError, Encoding};
 use crate::bundle::WriteError;
 use crate::camera::core_camera;
 use crate::device::{Limits, Processor};
-use crate::manifest::{cameras_to_measure, measure};
+use crate::manifest::{cameras_to_measure, count};
 use crate::render::decoder::image_of;
 use crate::train::finish::Finished;
 use crate::train::gauge::Gauge;
@@ -47,7 +47,7 @@ impl Scale<'_> {
             return Ok(Load { bytes, ..Load::default() });
         }
         let bundle = coded.bundle().map_err(WriteError::ReadBack)?;
-        let measures = measure(&bundle, &self.cameras, &[])?;
+        let measures = count(&bundle, &self.cameras)?;
         let written = coded.into_file(&measures)?;
         let [ram, instructions] = self.drawing(&written.bytes).map_err(EncodeError::Measure)?;
         Ok(Load { ram, instructions, bytes })

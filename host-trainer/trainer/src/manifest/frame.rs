@@ -45,13 +45,12 @@ impl TierCounts {
     }
 
     /// The record of a tier whose maxima these are.
-    pub(super) fn measures(&self, psnr_db: Option<f32>, n_views: usize, n_cameras: usize) -> TierMeasures {
+    pub(super) fn measures(&self, n_cameras: usize) -> TierMeasures {
         let count = |n: u64| u32::try_from(n).unwrap_or(u32::MAX);
-        let few = |n: usize| u16::try_from(n).unwrap_or(u16::MAX);
         TierMeasures {
-            psnr_db,
-            n_views: few(n_views),
-            n_cameras: few(n_cameras),
+            psnr_db: None,
+            n_views: 0,
+            n_cameras: u16::try_from(n_cameras).unwrap_or(u16::MAX),
             max_visible_anchors: count(self.visible_anchors),
             max_splats: count(self.splats),
             max_strip_splats: self.strip_splats.map(count),

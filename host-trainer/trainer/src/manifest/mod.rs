@@ -43,27 +43,36 @@ pub enum MeasureError {
     Photograph(#[from] PhotographError),
 }
 
-/// Measures every tier of a bundle.
-///
-/// Counts are those of the trainer's renderer, whose arithmetic differs from the decoder's in the last bits. Those of
-/// anchors are of the prefilter alone, pixel evaluations are those inside the splats' ellipses, as if no pixel ended
-/// early: both are upper bounds of what a decoder does. Cost: one frame a camera, one decoded frame a tier and held-out
-/// view.
+/// Measures every tier of a bundle: [`count`], then [`compare`].
 ///
 /// * `cameras`: over which maxima are taken. * `held_out`: views whose photographs the tiers are compared with.
 ///
 /// # Errors
 /// [`MeasureError`].
 pub fn measure(bundle: &Bundle<'_>, cameras: &[Camera], held_out: &[View]) -> Result<Vec<TierMeasures>, MeasureError> {
+    let mut measures = count(bundle, cameras)?;
+    compare(bundle, &mut measures, held_out)?;
+    Ok(measures)
+}
+
+/// What drawing each tier of a bundle takes.
+///
+/// Counts are those of the trainer's renderer, whose arithmetic differs from the decoder's in the last bits. Those of
+/// anchors are of the prefilter alone, pixel evaluations are those inside the splats' ellipses, as if no pixel ended
+/// early: both are upper bounds of what a decoder does. Cost: the splats of a frame a camera, no pixel of it.
+///
+/// * `cameras`: over which maxima are taken.
+///
+/// # Errors
+/// [`MeasureError`].
+pub fn count(bundle: &Bundle<'_>, cameras: &[Camera]) -> Result<Vec<TierMeasures>, MeasureError> {
     let scene = decoded_scene(bundle)?;
-    let header = bundle.header();
     let ends: Vec<u32> =
         (0..bundle.n_tiers()).filter_map(|t| bundle.directory().tier(t)).map(|t| t.n_anchors).collect();
     let mut workspace = Workspace::new(&scene.shape);
-    let background = header.background.map(|byte| f32::from(byte) / 255.0);
     let mut maxima = vec![TierCounts::default(); ends.len()];
     for camera in cameras {
-        workspace.image(&scene, &Pinhole::new(camera), background);
+        workspace.project(&scene, &Pinhole::new(camera));
         let counts = frame::count(&scene.shape, workspace.blocks(), &ends, camera);
         for (most, counts) in maxima.iter_mut().zip(counts) {
             most.raise_to(&counts);
@@ -74,17 +83,25 @@ pub fn measure(bundle: &Bundle<'_>, cameras: &[Camera], held_out: &[View]) -> Re
             most.decoded_anchors = most.decoded_anchors.max(in_view.map(|chunk| u64::from(chunk.n_anchors())).sum());
         }
     }
-    (0..)
-        .zip(maxima)
-        .map(|(tier, counts)| {
-            let psnr_db = mean_psnr_db(bundle, tier + 1, held_out)?;
-            Ok(counts.measures(psnr_db, held_out.len(), cameras.len()))
-        })
-        .collect()
+    Ok(maxima.iter().map(|counts| counts.measures(cameras.len())).collect())
+}
+
+/// Compares what each tier of a bundle shows with photographs, and notes it in its measures. Cost: one decoded frame a tier and view.
+///
+/// * `held_out`: views of these photographs.
+///
+/// # Errors
+/// [`MeasureError`].
+pub fn compare(bundle: &Bundle<'_>, measures: &mut [TierMeasures], held_out: &[View]) -> Result<(), MeasureError> {
+    for (n_tiers, of_tier) in (1..).zip(measures) {
+        of_tier.psnr_db = mean_psnr_db(bundle, n_tiers, held_out)?;
+        of_tier.n_views = u16::try_from(held_out.len()).unwrap_or(u16::MAX);
+    }
+    Ok(())
 }
 
 /// Mean PSNR over views of 8-bit images, dB; `None` without views.
-fn mean_psnr_db(bundle: &Bundle<'_>, n_tiers: u8, views: &[View]) -> Result<Option<f32>, MeasureError> {
+pub(crate) fn mean_psnr_db(bundle: &Bundle<'_>, n_tiers: u8, views: &[View]) -> Result<Option<f32>, MeasureError> {
     let psnr = views.par_iter().map(|view| {
         let frame = core_image_of_tiers(bundle, &view.camera, n_tiers)?;
         let photograph = view.photograph()?;

@@ -253,6 +253,11 @@ impl<R: Real> Workspace<R> {
         self.draw(scene, camera, background, &Coding::Raw, None, 0.0).image.to_planes(camera.size_px)
     }
 
+    /// What [`Self::image`] projects, left in [`Self::blocks`], without any pixel.
+    pub fn project(&mut self, scene: &Scene<R>, camera: &Pinhole<R>) {
+        self.splats_of(scene, camera, &Coding::Raw, None, 0.0);
+    }
+
     /// Σ of α·T over the pixels of a view, for each splat: block by block, in the order of [`Block::drawn`].
     ///
     /// It is the derivative of the sum of a channel of the image by the splat's colour in it.

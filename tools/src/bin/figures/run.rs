@@ -227,6 +227,9 @@ impl GroupRuns<'_> {
             fs::create_dir_all(out)?;
             let mut script = Command::new(in_repository("firmware-example/measure.sh"));
             script.arg(bundle).args([board, &ram_kib.to_string(), ""]).arg(out);
+            // Where `tools/ci.sh firmware` installs what the firmware is linked and read with.
+            let tools = in_repository("target/tools/bin").display().to_string();
+            script.env("PATH", format!("{tools}:{}", std::env::var("PATH").unwrap_or_default()));
             fs::write(&table, said_by(&mut script)?)?;
         }
         let mut frames: Vec<(String, f64)> = Vec::new();

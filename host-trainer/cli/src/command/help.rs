@@ -2,7 +2,12 @@
 
 use std::fmt::Write as _;
 
-use clap::Command;
+use clap::builder::StyledStr;
+use clap::{Arg, Command};
+use pocketsplat_capture::dataset::Background;
+
+use super::settings::backbone_of_anchors;
+use crate::config::named::{DRAWN_BACKGROUNDS, one_of};
 
 /// All commands, by what somebody wants.
 const GROUPS: [(&str, &[&str]); 5] = [
@@ -12,6 +17,60 @@ const GROUPS: [(&str, &[&str]); 5] = [
     ("Research", &["sweep", "ablate", "plan-runs", "tables", "compare", "plot"]),
     ("Captures and this machine", &["doctor", "synth", "demo", "devices", "bench", "completions", "man"]),
 ];
+
+/// Commands that train; those that look at what was trained, as it was.
+const TRAINING: &[&str] = &["train", "sweep", "ablate"];
+const LOOKING: &[&str] = &["eval", "render", "verify", "cost", "export"];
+/// Defaults in which commands that share an option differ.
+const DEFAULTS: [(&[&str], &str, &str); 13] = [
+    (&["train"], "max_resolution", "by the preset"),
+    (&["sweep", "ablate"], "max_resolution", "as they are"),
+    (LOOKING, "max_resolution", "the training size of the bundle"),
+    (TRAINING, "background", "black"),
+    (LOOKING, "background", "the bundle's"),
+    (&["train"], "iterations", "by the preset"),
+    (&["import"], "iterations", "5000"),
+    (&["sweep", "ablate"], "iterations", "30000"),
+    (&["train"], "effects", "auto"),
+    (&["import", "sweep", "ablate"], "effects", "view-colour,view-geometry,anisotropy"),
+    (&["train", "import"], "modules", "rdo-pruning, with tiered-pruning for a device"),
+    (&["sweep", "ablate"], "modules", "none"),
+    (&["sweep", "ablate", "import"], "feature_dim", "32 with scaffold, else 50"),
+];
+
+/// The commands with what is each one's own: its defaults, and no choice that it refuses or that changes nothing for it.
+pub(super) fn own_options(mut command: Command) -> Command {
+    for (names, id, default) in DEFAULTS {
+        for &name in names {
+            command = command.mut_subcommand(name, |command| with(command, id, |arg| with_default(arg, default)));
+        }
+    }
+    for &name in LOOKING {
+        let hidden = |command, id| with(command, id, |arg| arg.hide(true));
+        command = command.mut_subcommand(name, |command| hidden(hidden(command, "scene"), "points"));
+    }
+    for name in ["import", "sweep", "ablate"] {
+        let anchors = |arg: Arg| arg.value_parser(backbone_of_anchors());
+        command = command.mut_subcommand(name, |command| with(command, "backbone", anchors));
+    }
+    command.mut_subcommand("import", |command| {
+        with(command, "background", |arg| arg.value_parser(one_of::<Background>(DRAWN_BACKGROUNDS)))
+    })
+}
+
+/// A command with a change of one option, if it has that.
+fn with(command: Command, id: &str, change: impl FnOnce(Arg) -> Arg) -> Command {
+    let has_it = command.get_arguments().any(|arg| arg.get_id() == id);
+    if has_it { command.mut_arg(id, change) } else { command }
+}
+
+/// The option with another default in its help.
+fn with_default(arg: Arg, default: &str) -> Arg {
+    let help = arg.get_long_help().or(arg.get_help()).map(StyledStr::to_string).unwrap_or_default();
+    let said = help.split(" [default:").next().unwrap_or_default().to_owned();
+    let text = format!("{said} [default: {default}]");
+    arg.help(text.clone()).long_help(text)
+}
 
 /// The command with its help grouped.
 pub(super) fn grouped(command: Command) -> Command {
@@ -31,7 +90,7 @@ pub(super) fn grouped(command: Command) -> Command {
 mod tests {
     use std::collections::BTreeSet;
 
-    use clap::{Arg, CommandFactory as _};
+    use clap::CommandFactory as _;
 
     use super::*;
     use crate::command::Cli;
@@ -39,6 +98,27 @@ mod tests {
     const PAGE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/commands.md");
     /// What stands above is written by hand.
     const MARK: &str = "<!-- written by the test `the_page_of_commands_is_their_help` -->\n";
+
+    #[test]
+    fn no_help_speaks_of_another_command_or_offers_what_is_refused() {
+        let cli = own_options(Cli::command());
+        for command in cli.get_subcommands() {
+            for arg in command.get_arguments().filter(|arg| !arg.is_hide_set()) {
+                let help = arg.get_long_help().or(arg.get_help()).map(ToString::to_string).unwrap_or_default();
+                let default = help.split("[default:").nth(1).unwrap_or_default();
+                let mut words = default.split(|c: char| !c.is_alphanumeric());
+                assert!(
+                    !words.any(|word| ["train", "import", "sweep", "ablate", "elsewhere"].contains(&word)),
+                    "{} --{}: {help}",
+                    command.get_name(),
+                    arg.get_id()
+                );
+                let offers = |value: &str| arg.get_possible_values().iter().any(|other| other.get_name() == value);
+                assert!(!offers("3dgs") || command.get_name() == "train", "{}", command.get_name());
+                assert!(!offers("learned") || command.get_name() != "import");
+            }
+        }
+    }
 
     #[test]
     fn every_command_stands_in_one_group() {
@@ -52,7 +132,7 @@ mod tests {
     /// The options as docs/commands.md lists them; `POCKETSPLAT_BLESS=1` writes it.
     #[test]
     fn the_page_of_commands_is_their_help() {
-        let mut cli = Cli::command();
+        let mut cli = own_options(Cli::command());
         cli.build();
         let mut text = String::new();
         for (group, names) in GROUPS {

@@ -115,9 +115,6 @@ struct ImportResult {
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
-    if args.background == Background::Learned {
-        bail!("--background learned is for photographs; choose black or white, which the splats are drawn on");
-    }
     // What another format needs is written of the file that is imported.
     check_name(&args.output, BUNDLE, GaussiansFile::is_one(&args.output).then_some(&args.points))?;
     let config = configured(args)?;

@@ -93,7 +93,8 @@ enum Command {
 /// Parses the command line, runs the command, and says what failed: as JSON on stdout where results go there as JSON.
 pub(crate) fn run() -> ExitCode {
     let as_json = std::env::args_os().any(|arg| arg == "--json");
-    let parsed = help::grouped(Cli::command()).mut_subcommands(accepting_negative_numbers).try_get_matches();
+    let parsed =
+        help::grouped(help::own_options(Cli::command())).mut_subcommands(accepting_negative_numbers).try_get_matches();
     let cli = match parsed.and_then(|matches| Cli::from_arg_matches(&matches)) {
         Ok(cli) => cli,
         Err(error) => {

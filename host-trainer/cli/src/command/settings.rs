@@ -74,7 +74,7 @@ pub(crate) struct QualityOptions {
 
 /// What `--backbone` names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum BackboneChoice {
+pub(super) enum BackboneChoice {
     /// Anchors, which make a bundle.
     Anchors(Backbone),
     /// Explicit Gaussians, which make a file of Gaussians.
@@ -82,6 +82,15 @@ enum BackboneChoice {
 }
 
 fn backbone_choice() -> impl TypedValueParser<Value = BackboneChoice> {
+    backbone_among(BACKBONES)
+}
+
+/// The same without explicit Gaussians, for commands that make bundles.
+pub(super) fn backbone_of_anchors() -> impl TypedValueParser<Value = BackboneChoice> {
+    backbone_among(&BACKBONES[..BACKBONES.len() - 1])
+}
+
+fn backbone_among(names: &'static [&'static str]) -> impl TypedValueParser<Value = BackboneChoice> {
     let named = |name: String| -> Result<BackboneChoice, serde::de::value::Error> {
         if name == EXPLICIT {
             return Ok(BackboneChoice::Explicit);
@@ -89,7 +98,7 @@ fn backbone_choice() -> impl TypedValueParser<Value = BackboneChoice> {
         let name: StrDeserializer<'_, serde::de::value::Error> = name.as_str().into_deserializer();
         Backbone::deserialize(name).map(BackboneChoice::Anchors)
     };
-    PossibleValuesParser::new(BACKBONES).try_map(named)
+    PossibleValuesParser::new(names).try_map(named)
 }
 
 /// How a run proceeds.

@@ -16,6 +16,8 @@ pub(crate) const TARGETS: &[&str] = &["cortex-m4", "cortex-m7", "riscv32imac"];
 pub(crate) const BACKBONES: &[&str] = &["scaffold", "hac", "hac-plus", "contextgs", EXPLICIT];
 pub(crate) const SPLITS: &[&str] = &["test", "train"];
 pub(crate) const BACKGROUNDS: &[&str] = &["black", "white", "learned"];
+/// Of those, what splats can be drawn on.
+pub(crate) const DRAWN_BACKGROUNDS: &[&str] = &["black", "white"];
 pub(crate) const POINTS: &[&str] = &["matched", "random"];
 pub(crate) const SCENES: &[&str] = &["object", "room"];
 pub(crate) const LPIPS_RANGES: &[&str] = &["zero-to-one", "minus-one-to-one"];

@@ -191,7 +191,7 @@ job_viewer() {
 # Not one of `jobs`, part of `test`: the kernels alone.
 job_gpu() {
   need_lavapipe
-  POCKETSPLAT_NEEDS_GPU=1 cargo test -p pocketsplat-trainer --features gpu --lib --locked gpu::
+  POCKETSPLAT_NEEDS_GPU=1 cargo test -p pocketsplat-gpu -p pocketsplat-trainer --lib --locked gpu
 }
 
 # Not one of `jobs`: writes the module that `viewer` compares with.
@@ -236,7 +236,7 @@ job_format-doc() {
 
 # Every crate builds from nothing but what the packages hold, and they hold what a user reads.
 job_package() {
-  local crate file files crates=(pocketsplat pocketsplat-{core,half,files,capture,gaussians,instructions,trainer,viewer})
+  local crate file files crates=(pocketsplat pocketsplat-{core,half,files,capture,gaussians,instructions,kernels,metrics,gpu,codec,trainer,viewer})
   files=$(cargo package -p pocketsplat-core --allow-dirty --locked --list)
   for file in README.md CHANGELOG.md src/bundle/{FORMAT,DRAWING,MANIFEST}.md src/bundle/{normal_tables.bin,example.psb} examples/draw_png.rs; do
     grep -qx "$file" <<<"$files" || fail "the package of pocketsplat-core lacks $file"

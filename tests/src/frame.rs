@@ -2,14 +2,14 @@
 
 use glam::DVec3;
 use pocketsplat_capture::dataset::Normalisation;
+use pocketsplat_codec::bundle::{self, BundleInfo, WriteOptions};
 use pocketsplat_core::arithmetic::Arithmetic;
 use pocketsplat_core::{
     Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, MaxSplats, Quality, Residency, Strips,
 };
-use pocketsplat_trainer::bundle::{self, BundleInfo, WriteOptions};
-use pocketsplat_trainer::camera::core_camera;
+use pocketsplat_kernels::camera::core_camera;
+use pocketsplat_kernels::scene::Scene;
 use pocketsplat_trainer::cost::{ArithmeticChoice, WithArithmetic};
-use pocketsplat_trainer::scene::Scene;
 
 pub use crate::fuzz::frame::Frame;
 

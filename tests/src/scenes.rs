@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_core::context::{GridFrame, GridLevel, LevelKind};
-use pocketsplat_trainer::scene::{Anchors, ContextModel, Heads, MASK_THRESHOLD, ModelShape, Scene};
+use pocketsplat_kernels::scene::{Anchors, ContextModel, Heads, MASK_THRESHOLD, ModelShape, Scene};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -3,9 +3,9 @@
 use conformance::bundles::{CODERS, tiered};
 use conformance::frame::{Frame, budget_for, draw, draw_in, info_for, to_core};
 use conformance::scenes::{CASES, cameras, random_scene};
+use pocketsplat_codec::bundle::{self, WriteOptions};
 use pocketsplat_core::arithmetic::WithoutFpu;
 use pocketsplat_core::{Bundle, Decoder, HeadWeights};
-use pocketsplat_trainer::bundle::{self, WriteOptions};
 use pocketsplat_trainer::cost::ArithmeticChoice;
 
 /// Root of the mean square difference that each may have to the reference arithmetic's frame, 255ths.

@@ -2,9 +2,9 @@
 
 use pocketsplat_capture::dataset::{Capture, LoadOptions, load};
 use pocketsplat_capture::synth::{SynthOptions, write_capture};
+use pocketsplat_kernels::scene::{ModelShape, Scene};
+use pocketsplat_kernels::step::StepReport;
 use pocketsplat_trainer::encode::Encoding;
-use pocketsplat_trainer::scene::{ModelShape, Scene};
-use pocketsplat_trainer::step::StepReport;
 use pocketsplat_trainer::train::config::Backbone;
 use pocketsplat_trainer::train::{Observer, TrainConfig, Trainer};
 

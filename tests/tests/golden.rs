@@ -4,11 +4,11 @@ use std::f32::consts::TAU;
 use std::fmt::Write as _;
 use std::path::Path;
 
+use pocketsplat_codec::verify::{Trial, plan_variants};
 use pocketsplat_core::bundle::crc32;
 use pocketsplat_core::{
     Budget, Bundle, ByteOrder, Camera, Decoder, MaxSplats, Overflow, PixelFormat, Plan, Rounding, Tile,
 };
-use pocketsplat_trainer::verify::{Trial, plan_variants};
 
 const BUNDLES: [(&str, &[u8]); 4] = [
     ("static", include_bytes!("../golden/static.psb")),

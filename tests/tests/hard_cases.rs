@@ -5,8 +5,8 @@ use std::path::Path;
 use std::{env, fs, panic};
 
 use conformance::hard_cases::{Case, Outcome, families, gathered, page};
+use pocketsplat_codec::verify::variants_match;
 use pocketsplat_core::{Budget, Bundle, MaxSplats};
-use pocketsplat_trainer::verify::variants_match;
 use rayon::prelude::*;
 
 /// Set, the page is written anew.

@@ -9,7 +9,7 @@ use conformance::hard_cases::picture::camera;
 use conformance::hard_cases::{Figures, Picture};
 use glam::{DMat3, DQuat, DVec3};
 use pocketsplat_capture::camera::Camera;
-use pocketsplat_trainer::scene::ModelShape;
+use pocketsplat_kernels::scene::ModelShape;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 

@@ -5,10 +5,10 @@ use std::path::Path;
 use conformance::bundles::{ALL_CODERS, Coder, measured};
 use conformance::scenes::{CASES, Case, cameras};
 use conformance::seal::reseal;
+use pocketsplat_codec::verify::{declared_levels, keeps_level};
 use pocketsplat_core::Bundle;
 use pocketsplat_core::bundle::{HEADER_FIXED_LEN, MANIFEST_RECORD_LEN, SECTION_LEN, TierMeasures};
 use pocketsplat_instructions::level::{Bound, LEVELS, Level, Need, Profile};
-use pocketsplat_trainer::verify::{declared_levels, keeps_level};
 
 /// Kind of the manifest's section, and where the header has the training size.
 const MANIFEST: u8 = 6;

@@ -4,11 +4,11 @@
 use conformance::bundles::{ALL_CODERS, measured, tiered};
 use conformance::frame::{budget_for, to_core};
 use conformance::scenes::{CASES, cameras, orbit};
+use pocketsplat_codec::verify::{
+    Touched, Trial, Violation, exact_bytes, halves, memory_does_not_show, plan_variants, variants_match,
+};
 use pocketsplat_core::{
     Budget, Bundle, Camera, DecodeError, ErrorClass, MaxSplats, Plan, Residency, ScratchShape, Strips,
-};
-use pocketsplat_trainer::verify::{
-    Touched, Trial, Violation, exact_bytes, halves, memory_does_not_show, plan_variants, variants_match,
 };
 
 /// A bundle for each case, of each coder in turn, with masks and three tiers.

@@ -6,7 +6,7 @@ use conformance::frame::to_core;
 use conformance::scenes::look_at;
 use glam::DVec3;
 use pocketsplat_capture::camera::Camera;
-use pocketsplat_trainer::manifest::cameras_to_measure;
+use pocketsplat_codec::manifest::cameras_to_measure;
 
 #[test]
 fn carrying_a_camera_around_the_scene_takes_the_manifests_circle() {

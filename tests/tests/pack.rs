@@ -7,10 +7,10 @@ use std::sync::LazyLock;
 use conformance::pack::coverage::Found;
 use conformance::pack::sample::Sample;
 use conformance::pack::{self, FOLDERS, expected, refused};
+use pocketsplat_codec::verify::{Trial, plan_variants};
 use pocketsplat_core::bundle::crc32;
 use pocketsplat_core::{Budget, MaxSplats};
 use pocketsplat_instructions::level::Level;
-use pocketsplat_trainer::verify::{Trial, plan_variants};
 
 /// Made once for all tests.
 static SAMPLES: LazyLock<Vec<Sample>> = LazyLock::new(pack::bundles::samples);

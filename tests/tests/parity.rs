@@ -4,9 +4,9 @@ use conformance::bundles::{ALL_CODERS, tiered};
 use conformance::difference::Difference;
 use conformance::frame::{bundle_of, draw, to_core};
 use conformance::scenes::{CASES, cameras, random_scene};
+use pocketsplat_codec::render::reference::ReferenceScene;
 use pocketsplat_core::Bundle;
-use pocketsplat_trainer::camera::host_camera;
-use pocketsplat_trainer::render::reference::ReferenceScene;
+use pocketsplat_kernels::camera::host_camera;
 
 /// Rounding to 8 bits alone leaves 58.9 dB.
 const MIN_PSNR_DB: f64 = 58.0;

@@ -3,8 +3,8 @@
 use conformance::bundles::{CODERS, tiered};
 use conformance::frame::{budget_for, to_core};
 use conformance::scenes::{CASES, cameras};
+use pocketsplat_codec::verify::Trial;
 use pocketsplat_core::{Bundle, DecodeError, Field, Quality};
-use pocketsplat_trainer::verify::Trial;
 
 /// Mean square difference of two frames, 255ths.
 fn mean_square(a: &[u8], b: &[u8]) -> f64 {

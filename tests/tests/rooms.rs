@@ -8,7 +8,7 @@ use std::fs;
 use std::path::Path;
 
 /// The folder of each crate's sources, and its rooms; one may import those to its left.
-const CRATES: [(&str, &[&str]); 8] = [
+const CRATES: [(&str, &[&str]); 12] = [
     (
         "decoder-core/src",
         &[
@@ -42,34 +42,34 @@ const CRATES: [(&str, &[&str]); 8] = [
             "glb", "spz", "sog", "format", "fit", "written", "file",
         ],
     ),
+    ("host-trainer/kernels/src", &["real", "finite_difference", "camera", "scene", "ops", "integer_model", "step"]),
+    ("host-trainer/metrics/src", &["baseline", "pchip", "bjontegaard", "seeds", "psnr", "ssim", "lpips"]),
     (
-        "host-trainer/trainer/src",
+        "host-trainer/gpu/src",
         &[
-            "real",
-            "finite_difference",
-            "camera",
-            "scene",
-            "ops",
-            "integer_model",
-            "step",
+            "error",
+            "adapter",
             "gpu",
-            "train",
-            "explicit",
-            "bundle",
-            "render",
-            "export",
-            "metrics",
-            "manifest",
-            "device",
-            "encode",
-            "effects",
-            "cost",
-            "verify",
+            "buffer",
+            "kernel",
+            "parity",
+            "ops",
+            "group",
+            "context",
+            "scene",
+            "image",
+            "anchors",
+            "network_pass",
+            "levels",
+            "coding",
+            "step",
         ],
     ),
+    ("host-trainer/codec/src", &["bundle", "render", "manifest", "verify"]),
+    ("host-trainer/trainer/src", &["train", "explicit", "export", "device", "encode", "effects", "cost"]),
     ("host-trainer/instructions/src", &["context", "level"]),
     ("viewer/src", &["figures", "focus", "scene", "exports", "package", "page"]),
-    ("host-trainer/cli/src", &["say", "plot", "config", "command"]),
+    ("host-trainer/cli/src", &["say", "program", "plot", "config", "command"]),
 ];
 
 #[test]

@@ -3,8 +3,8 @@
 //! `cargo bench -p pocketsplat-trainer --bench rate`.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use pocketsplat_trainer::ops::rate;
-use pocketsplat_trainer::ops::simd::Level;
+use pocketsplat_kernels::ops::rate;
+use pocketsplat_kernels::ops::simd::Level;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -5,12 +5,12 @@
 //! the machine's cores unless `RAYON_NUM_THREADS` says otherwise.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use pocketsplat_trainer::ops::Pinhole;
-use pocketsplat_trainer::ops::noise::Stream;
-use pocketsplat_trainer::ops::simd::Level;
-use pocketsplat_trainer::scene::Scene;
-use pocketsplat_trainer::step::coding::{Coding, RateTerms};
-use pocketsplat_trainer::step::{Loss, LossWeights, StageSeconds, StepReport, TargetView, Workspace};
+use pocketsplat_kernels::ops::Pinhole;
+use pocketsplat_kernels::ops::noise::Stream;
+use pocketsplat_kernels::ops::simd::Level;
+use pocketsplat_kernels::scene::Scene;
+use pocketsplat_kernels::step::coding::{Coding, RateTerms};
+use pocketsplat_kernels::step::{Loss, LossWeights, StageSeconds, StepReport, TargetView, Workspace};
 use pocketsplat_trainer::train::config::{Backbone, Hac, Rates};
 use pocketsplat_trainer::train::context_start::initial_context;
 use pocketsplat_trainer::train::optimiser::Optimiser;

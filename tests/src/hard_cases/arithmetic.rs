@@ -3,10 +3,10 @@
 use glam::{DMat3, DVec3};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_core::math::{exp, sigmoid, tanh};
-use pocketsplat_trainer::ops::normality::{ChannelMoments, Weights};
-use pocketsplat_trainer::ops::simd::Level;
-use pocketsplat_trainer::ops::{Pinhole, adam, head_input, rate, ssim};
-use pocketsplat_trainer::scene::ModelShape;
+use pocketsplat_kernels::ops::normality::{ChannelMoments, Weights};
+use pocketsplat_kernels::ops::simd::Level;
+use pocketsplat_kernels::ops::{Pinhole, adam, head_input, rate, ssim};
+use pocketsplat_kernels::scene::ModelShape;
 
 use super::blobs::{Blob, Blobs};
 use super::gradient::{difference_error, random};

@@ -1,6 +1,6 @@
 //! Scenes of Gaussians that a case chooses one by one.
 
-use pocketsplat_trainer::scene::{Anchors, Heads, ModelShape, Scene};
+use pocketsplat_kernels::scene::{Anchors, Heads, ModelShape, Scene};
 
 /// One Gaussian as a case thinks of it.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 use pocketsplat_capture::camera::Camera;
-use pocketsplat_trainer::scene::ModelShape;
+use pocketsplat_kernels::scene::ModelShape;
 
 use super::blobs::{Blob, Blobs};
 use super::picture::{Figures, Picture, camera};

@@ -7,7 +7,7 @@ use std::path::Path;
 use glam::DVec3;
 use pocketsplat_capture::dataset::{self, Capture, LoadOptions};
 use pocketsplat_capture::synth::{self, SynthOptions};
-use pocketsplat_trainer::scene::init::initial_scene;
+use pocketsplat_kernels::scene::init::initial_scene;
 use pocketsplat_trainer::train::TrainConfig;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

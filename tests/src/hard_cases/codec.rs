@@ -1,8 +1,8 @@
 //! Symbols at and beyond the ends of their tables, under both coders.
 
+use pocketsplat_codec::bundle::{self, ChannelCoding, WriteOptions};
 use pocketsplat_core::Bundle;
-use pocketsplat_trainer::bundle::{self, ChannelCoding, WriteOptions};
-use pocketsplat_trainer::scene::Scene;
+use pocketsplat_kernels::scene::Scene;
 
 use super::picture::{camera, codec_error};
 use super::{Case, Family, error};

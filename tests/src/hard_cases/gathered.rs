@@ -1,6 +1,6 @@
 //! Hard splats of all kinds in one bundle, for tests that compare machines rather than arithmetics.
 
-use pocketsplat_trainer::scene::Scene;
+use pocketsplat_kernels::scene::Scene;
 
 use super::blobs::{Blob, Blobs};
 use super::picture::camera;

@@ -1,12 +1,12 @@
 //! The trainer's gradients of a whole step: finite, right in f64, and about the same in f32.
 
 use pocketsplat_capture::camera::Camera;
-use pocketsplat_trainer::ops::Pinhole;
-use pocketsplat_trainer::real::Real;
-use pocketsplat_trainer::scene::Scene;
-use pocketsplat_trainer::step::LossWeights;
-use pocketsplat_trainer::step::coding::Coding;
-use pocketsplat_trainer::step::{Loss, TargetView, Workspace};
+use pocketsplat_kernels::ops::Pinhole;
+use pocketsplat_kernels::real::Real;
+use pocketsplat_kernels::scene::Scene;
+use pocketsplat_kernels::step::LossWeights;
+use pocketsplat_kernels::step::coding::Coding;
+use pocketsplat_kernels::step::{Loss, TargetView, Workspace};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

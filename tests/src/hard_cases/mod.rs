@@ -188,7 +188,7 @@ fn n_not_finite(values: impl IntoIterator<Item = f32>) -> f64 {
 }
 
 /// Every trained number of a scene.
-fn parameters(scene: &pocketsplat_trainer::scene::Scene<f32>) -> impl Iterator<Item = f32> {
+fn parameters(scene: &pocketsplat_kernels::scene::Scene<f32>) -> impl Iterator<Item = f32> {
     let anchors = &scene.anchors;
     let arrays = [&anchors.features, &anchors.log_scales, &anchors.offsets, &anchors.mask_logits];
     let heads = scene.heads.each().flat_map(|head| head.groups()).flatten();

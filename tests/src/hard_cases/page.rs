@@ -23,7 +23,7 @@ an error exceeds its bound.
 ## How to read the tables
 
 A picture goes through the whole product and is compared with the oracle: the rules of a frame in f64, without tiles, tables or
-approximations (`host-trainer/trainer/src/render/reference.rs`). Errors of pixels are in steps of 8 bits.
+approximations (`host-trainer/codec/src/render/reference.rs`). Errors of pixels are in steps of 8 bits.
 
 - *decoder, worst*: a channel of `decoder-core`'s frame against the oracle's, which is not rounded to 8 bits, so half a step is
   rounding. Of two bundles the larger figure: one has heads as halves, the other coded heads.

@@ -2,14 +2,14 @@
 
 use glam::{DMat3, DVec3};
 use pocketsplat_capture::camera::Camera;
+use pocketsplat_codec::bundle::{self, WriteOptions, decoded_scene};
+use pocketsplat_codec::render::reference::ReferenceScene;
 use pocketsplat_core::Bundle;
-use pocketsplat_trainer::bundle::{self, WriteOptions, decoded_scene};
-use pocketsplat_trainer::camera::host_camera;
-use pocketsplat_trainer::ops::Pinhole;
-use pocketsplat_trainer::render::reference::ReferenceScene;
-use pocketsplat_trainer::scene::QuantisationSteps;
-use pocketsplat_trainer::scene::Scene;
-use pocketsplat_trainer::step::Workspace;
+use pocketsplat_kernels::camera::host_camera;
+use pocketsplat_kernels::ops::Pinhole;
+use pocketsplat_kernels::scene::QuantisationSteps;
+use pocketsplat_kernels::scene::Scene;
+use pocketsplat_kernels::step::Workspace;
 
 use super::gradient;
 use crate::difference::{Difference, worse};

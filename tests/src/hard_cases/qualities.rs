@@ -1,9 +1,9 @@
 //! Every picture again, of the qualities that are meant for use.
 
+use pocketsplat_codec::bundle::{self, WriteOptions};
+use pocketsplat_codec::render::reference::ReferenceScene;
 use pocketsplat_core::{Bundle, Quality};
-use pocketsplat_trainer::bundle::{self, WriteOptions};
-use pocketsplat_trainer::camera::host_camera;
-use pocketsplat_trainer::render::reference::ReferenceScene;
+use pocketsplat_kernels::camera::host_camera;
 
 use super::picture::{background, worst_tile};
 use super::{Case, Family, Probe, error, pictures};

@@ -4,9 +4,9 @@ use std::f32::consts::PI;
 
 use glam::DVec3;
 use pocketsplat_capture::dataset::{self, LoadOptions};
+use pocketsplat_codec::bundle::{self, WriteOptions};
 use pocketsplat_core::{Bundle, Rotation};
-use pocketsplat_trainer::bundle::{self, WriteOptions};
-use pocketsplat_trainer::scene::Scene;
+use pocketsplat_kernels::scene::Scene;
 
 use super::blobs::{Blob, Blobs};
 use super::picture::camera;

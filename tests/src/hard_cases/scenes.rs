@@ -1,8 +1,8 @@
 //! Scenes that have no volume, or no anchor.
 
+use pocketsplat_codec::bundle::{self, WriteOptions};
 use pocketsplat_core::Bundle;
-use pocketsplat_trainer::bundle::{self, WriteOptions};
-use pocketsplat_trainer::scene::Scene;
+use pocketsplat_kernels::scene::Scene;
 
 use super::blobs::{Blob, Blobs};
 use super::picture::{Picture, camera};
@@ -105,7 +105,7 @@ pub(super) fn family() -> Family {
         unseen("everything masked", "every offset switched off", || Picture::of(masked())),
         error("no anchor", "a scene without any", "channels that are not the background's", 0.0, || {
             let mut scene = one_anchor();
-            scene.anchors = pocketsplat_trainer::scene::Anchors::default();
+            scene.anchors = pocketsplat_kernels::scene::Anchors::default();
             not_background(&write(&scene, &WriteOptions::default()))
         }),
         error(

@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_PI_4, FRAC_PI_8};
 
 use glam::{DMat3, DQuat, DVec3};
 use pocketsplat_capture::camera::Camera;
-use pocketsplat_trainer::scene::{ModelShape, Scene};
+use pocketsplat_kernels::scene::{ModelShape, Scene};
 
 use super::blobs::{Blob, Blobs};
 use super::picture::{Figures, Picture, camera};

@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Capture, EXTENT, Image, Normalisation, Photograph, PointsOrigin, SceneKind, View};
-use pocketsplat_trainer::scene::ModelShape;
+use pocketsplat_kernels::scene::ModelShape;
 use pocketsplat_trainer::train::config::{Densification, LearningRate, Rates};
 use pocketsplat_trainer::train::{TrainConfig, TrainError, Trainer};
 

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 
 use anyhow::Context as _;
 use clap::Parser;
+use pocketsplat_codec::bundle;
+use pocketsplat_codec::render::decoder::image_of;
 use pocketsplat_core::{Budget, Bundle, Decoder, Overflow};
-use pocketsplat_trainer::bundle;
-use pocketsplat_trainer::render::decoder::image_of;
 
 /// Draws an orbit of a bundle's preview, as PPM files `frame0.ppm` and so on.
 #[derive(Parser)]

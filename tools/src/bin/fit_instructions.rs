@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail, ensure};
 use clap::Parser;
+use pocketsplat_codec::bundle;
+use pocketsplat_codec::render::decoder::image_of;
 use pocketsplat_core::{Budget, Bundle, Decoder, Overflow, Stage};
 use pocketsplat_instructions::{Costs, InstructionSet, N_TERMS, Term, terms};
-use pocketsplat_trainer::bundle;
-use pocketsplat_trainer::render::decoder::image_of;
 
 /// Most that a frame may differ from its prediction.
 const TOLERANCE: f64 = 0.1;

@@ -10,10 +10,10 @@ use clap::Parser;
 use glam::{DMat3, DVec3};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::Normalisation;
+use pocketsplat_codec::bundle::{self, BundleInfo, ChannelCoding, WriteOptions, annotate::annotate};
 use pocketsplat_core::context::{GridFrame, GridLevel, LevelKind};
-use pocketsplat_trainer::bundle::{self, BundleInfo, ChannelCoding, WriteOptions, annotate::annotate};
-use pocketsplat_trainer::scene::QuantisationSteps;
-use pocketsplat_trainer::scene::{Anchors, ContextModel, Heads, ModelShape, Scene};
+use pocketsplat_kernels::scene::QuantisationSteps;
+use pocketsplat_kernels::scene::{Anchors, ContextModel, Heads, ModelShape, Scene};
 
 /// The document when none is named.
 const FORMAT_DOC: &str = "decoder-core/src/bundle/FORMAT.md";

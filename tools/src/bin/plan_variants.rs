@@ -7,10 +7,10 @@ use std::time::{Duration, Instant};
 use anyhow::ensure;
 use clap::Parser;
 use pocketsplat_capture::dataset::{self, LoadOptions};
+use pocketsplat_codec::bundle;
 use pocketsplat_core::bundle::STRIPS;
 use pocketsplat_core::{Budget, Bundle, Camera, Decoder, FrameReport, Residency, Strips, TileSink};
-use pocketsplat_trainer::bundle;
-use pocketsplat_trainer::camera::core_camera;
+use pocketsplat_kernels::camera::core_camera;
 
 /// Draws views of a bundle by every plan variant there is and prints what each takes.
 #[derive(Parser)]

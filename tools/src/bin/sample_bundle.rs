@@ -10,9 +10,9 @@ use clap::Parser;
 use glam::{DMat3, DQuat, DVec3};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::Normalisation;
+use pocketsplat_codec::bundle::{self, BundleInfo, ChannelCoding, WriteOptions};
 use pocketsplat_core::context::{GridFrame, GridLevel, LevelKind};
-use pocketsplat_trainer::bundle::{self, BundleInfo, ChannelCoding, WriteOptions};
-use pocketsplat_trainer::scene::{Anchors, ContextModel, Head, Heads, ModelShape, Scene};
+use pocketsplat_kernels::scene::{Anchors, ContextModel, Head, Heads, ModelShape, Scene};
 
 /// Writes a small bundle made by hand.
 #[derive(Parser)]

@@ -6,10 +6,10 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
 use pocketsplat_capture::dataset::FrameSize;
-use pocketsplat_trainer::ops::Pinhole;
-use pocketsplat_trainer::scene::Scene;
-use pocketsplat_trainer::step::coding::Coding;
-use pocketsplat_trainer::step::{Loss, LossWeights, SharedDevice, StageSeconds, StepReport, TargetView, Workspace};
+use pocketsplat_kernels::ops::Pinhole;
+use pocketsplat_kernels::scene::Scene;
+use pocketsplat_kernels::step::coding::Coding;
+use pocketsplat_kernels::step::{Loss, LossWeights, SharedDevice, StageSeconds, StepReport, TargetView, Workspace};
 use pocketsplat_trainer::train::config::Backbone;
 use pocketsplat_trainer::train::optimiser::Optimiser;
 use pocketsplat_trainer::train::resident::trained;

@@ -8,13 +8,13 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use bytesize::ByteSize;
 use pocketsplat_capture::dataset::{Capture, Split, View};
+use pocketsplat_codec::render::reference::ReferenceScene;
 use pocketsplat_core::{Budget, Bundle, Camera, MaxSplats};
-use pocketsplat_trainer::camera::core_camera;
+use pocketsplat_kernels::camera::core_camera;
 use pocketsplat_trainer::cost::{
     CountError, Counter, Instructions, MOST_VIEWS, Measured, Setting, Sight, knobs, measure, quality_grid,
 };
 use pocketsplat_trainer::device::Processor;
-use pocketsplat_trainer::render::reference::ReferenceScene;
 use rayon::prelude::*;
 
 use self::machine::Machine;

@@ -4,7 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use anyhow::Result;
-use pocketsplat_trainer::step::SharedDevice;
+use pocketsplat_kernels::step::SharedDevice;
 use serde::Serialize;
 
 use super::output;
@@ -99,7 +99,7 @@ impl DeviceChoice {
 
     #[cfg(feature = "gpu")]
     fn opened(self, says: bool) -> Result<Option<SharedDevice<f32>>> {
-        use pocketsplat_trainer::gpu::{AdapterKind, Gpu, GpuStep, choose};
+        use pocketsplat_gpu::{AdapterKind, Gpu, GpuStep, choose};
         use std::sync::{Arc, Mutex};
 
         let adapter = match self {
@@ -138,7 +138,7 @@ pub(crate) fn usable() -> Vec<usize> {
 
 #[cfg(feature = "gpu")]
 fn devices() -> Vec<Device> {
-    let device = |(index, adapter): (usize, pocketsplat_trainer::gpu::Adapter)| Device {
+    let device = |(index, adapter): (usize, pocketsplat_gpu::Adapter)| Device {
         index,
         lack: adapter.lack().map(|(what, found, needed)| format!("{found} {what}, {needed} needed")),
         kind: adapter.kind.to_string(),
@@ -148,7 +148,7 @@ fn devices() -> Vec<Device> {
         max_buffer_bytes: adapter.max_buffer_bytes,
         workgroup_bytes: adapter.workgroup_bytes,
     };
-    pocketsplat_trainer::gpu::adapters().into_iter().enumerate().map(device).collect()
+    pocketsplat_gpu::adapters().into_iter().enumerate().map(device).collect()
 }
 
 #[cfg(not(feature = "gpu"))]

@@ -6,8 +6,8 @@ use std::time::Instant;
 
 use anyhow::Result;
 use pocketsplat_capture::dataset::{Capture, PointsOrigin};
+use pocketsplat_kernels::step::SharedDevice;
 use pocketsplat_trainer::effects::PILOTS_TIME_SHARE;
-use pocketsplat_trainer::step::SharedDevice;
 use pocketsplat_trainer::train::{TrainConfig, Trainer};
 
 use super::process::{machine_memory_bytes, peak_memory_bytes};

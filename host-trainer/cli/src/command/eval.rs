@@ -11,11 +11,11 @@ use crate::plot::ResultRow;
 use anyhow::{Result, bail};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Capture, Image, Photograph, Split, View};
+use pocketsplat_codec::render::decoder::{core_image, core_image_of_tiers};
+use pocketsplat_codec::render::reference::{ReferenceScene, to_image};
 use pocketsplat_core::Bundle;
 use pocketsplat_core::bundle::crc32;
-use pocketsplat_trainer::metrics::{Lpips, half_size_enlarged, psnr_db, psnr_db_masked, ssim_masked};
-use pocketsplat_trainer::render::decoder::{core_image, core_image_of_tiers};
-use pocketsplat_trainer::render::reference::{ReferenceScene, to_image};
+use pocketsplat_metrics::{Lpips, half_size_enlarged, psnr_db, psnr_db_masked, ssim_masked};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 

@@ -7,11 +7,11 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, bail};
 use bytesize::ByteSize;
 use pocketsplat_capture::dataset::FrameSize;
+use pocketsplat_codec::verify::Trial;
 use pocketsplat_core::budget::MAX_FRAME_PX;
 use pocketsplat_core::{Budget, Bundle, DecodeError, Overflow, Plan};
 use pocketsplat_instructions::predict;
 use pocketsplat_trainer::device::Processor;
-use pocketsplat_trainer::verify::Trial;
 use serde::Serialize;
 
 use super::bundle::BundleFile;

@@ -5,12 +5,12 @@ mod splats;
 use std::path::PathBuf;
 
 use anyhow::Result;
+use pocketsplat_codec::bundle::annotate::annotate;
+use pocketsplat_codec::bundle::{SizePart, SizeReport, decoded_scene};
 use pocketsplat_core::Bundle;
 use pocketsplat_core::bundle::TierMeasures;
 use pocketsplat_instructions::level::Profile;
-use pocketsplat_trainer::bundle::annotate::annotate;
-use pocketsplat_trainer::bundle::{SizePart, SizeReport, decoded_scene};
-use pocketsplat_trainer::camera::host_camera;
+use pocketsplat_kernels::camera::host_camera;
 use serde_json::{Value, json};
 
 use super::bundle::BundleFile;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::{Context as _, Result};
-use pocketsplat_trainer::metrics::{InputRange, Lpips};
+use pocketsplat_metrics::{InputRange, Lpips};
 
 use crate::config::named::{LPIPS_RANGES, one_of};
 

@@ -7,7 +7,7 @@ use crate::plot::{
 };
 use anyhow::{Result, bail};
 use pocketsplat_files::Output;
-use pocketsplat_trainer::metrics::{RatePoint, bd_psnr_db, bd_rate_percent};
+use pocketsplat_metrics::{RatePoint, bd_psnr_db, bd_rate_percent};
 use serde_json::{Map, Value, json};
 
 use super::output;

@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use pocketsplat_capture::dataset::{Capture, Split};
 use pocketsplat_core::bundle::crc32;
 use pocketsplat_files::Outputs;
-use pocketsplat_trainer::metrics::Lpips;
+use pocketsplat_metrics::Lpips;
 use pocketsplat_trainer::train::module::pruning::Form;
 
 use super::bundle::BundleFile;

@@ -5,9 +5,9 @@ use std::io::IsTerminal;
 use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+use pocketsplat_kernels::scene::Scene;
+use pocketsplat_kernels::step::StepReport;
 use pocketsplat_trainer::explicit::train::CloudOutcome;
-use pocketsplat_trainer::scene::Scene;
-use pocketsplat_trainer::step::StepReport;
 use pocketsplat_trainer::train::load::Load;
 use pocketsplat_trainer::train::steering::Fit;
 use pocketsplat_trainer::train::{DroppedStep, Observer};

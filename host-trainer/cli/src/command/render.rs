@@ -9,10 +9,10 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Image, Split, View};
+use pocketsplat_codec::render::decoder::core_image;
+use pocketsplat_codec::render::reference::ReferenceScene;
 use pocketsplat_core::Bundle;
 use pocketsplat_files::Outputs;
-use pocketsplat_trainer::render::decoder::core_image;
-use pocketsplat_trainer::render::reference::ReferenceScene;
 use rayon::prelude::*;
 
 use super::bundle::BundleFile;

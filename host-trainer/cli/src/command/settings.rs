@@ -3,11 +3,11 @@
 use anyhow::{Result, bail};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use pocketsplat_capture::dataset::Background;
+use pocketsplat_kernels::scene::{ModelShape, QuantisationSteps};
 use pocketsplat_trainer::device::{ModelChoice, bytes_of_heads, widest_within};
 use pocketsplat_trainer::effects::{Effect, Request};
 use pocketsplat_trainer::encode::CoderChoice;
 use pocketsplat_trainer::explicit::CloudConfig;
-use pocketsplat_trainer::scene::{ModelShape, QuantisationSteps};
 use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::config::Backbone;
 use pocketsplat_trainer::train::module::pruning::Rank;

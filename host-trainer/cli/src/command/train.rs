@@ -16,7 +16,7 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::{Capture, View};
 use pocketsplat_files::{Output, shell_word};
-use pocketsplat_trainer::step::SharedDevice;
+use pocketsplat_kernels::step::SharedDevice;
 use pocketsplat_trainer::train::run::{RunFolder, fork};
 
 use super::effects::Resolved;

@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use bytesize::ByteSize;
 use pocketsplat_capture::dataset::{Background, FrameSize};
+use pocketsplat_codec::bundle::PRUNING_RATES;
 use pocketsplat_files::{Content, Output};
 use pocketsplat_instructions::level::{Bound, Level};
-use pocketsplat_trainer::bundle::PRUNING_RATES;
+use pocketsplat_kernels::step::SharedDevice;
 use pocketsplat_trainer::device::{Limits, ModelChoice, Processor, choose};
 use pocketsplat_trainer::effects::Price;
 use pocketsplat_trainer::explicit::CloudConfig;
-use pocketsplat_trainer::step::SharedDevice;
 use pocketsplat_trainer::train::config::Backbone;
 use pocketsplat_trainer::train::run::is_file_of_run;
 

@@ -7,19 +7,19 @@ use std::process::ExitCode;
 use anyhow::{Context, Result};
 use bytesize::ByteSize;
 use pocketsplat_capture::dataset::FrameSize;
+use pocketsplat_codec::manifest::cameras_to_measure;
+use pocketsplat_codec::render::decoder::core_image_of_tiers;
+use pocketsplat_codec::render::reference::ReferenceScene;
+use pocketsplat_codec::verify::{
+    Violation, declared_levels, exact_bytes, keeps_level, memory_does_not_show, variants_match, work_is_bounded,
+};
 use pocketsplat_core::budget::MAX_STRIPS;
 use pocketsplat_core::bundle::crc32;
 use pocketsplat_core::{Budget, Bundle, Camera, Plan, Residency, Strips};
 use pocketsplat_instructions::level::{Bound, Level};
-use pocketsplat_trainer::camera::core_camera;
-use pocketsplat_trainer::camera::host_camera;
-use pocketsplat_trainer::manifest::cameras_to_measure;
-use pocketsplat_trainer::metrics::psnr_db;
-use pocketsplat_trainer::render::decoder::core_image_of_tiers;
-use pocketsplat_trainer::render::reference::ReferenceScene;
-use pocketsplat_trainer::verify::{
-    Violation, declared_levels, exact_bytes, keeps_level, memory_does_not_show, variants_match, work_is_bounded,
-};
+use pocketsplat_kernels::camera::core_camera;
+use pocketsplat_kernels::camera::host_camera;
+use pocketsplat_metrics::psnr_db;
 use serde::Serialize;
 
 use super::bundle::BundleFile;

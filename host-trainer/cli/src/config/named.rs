@@ -42,9 +42,9 @@ pub(crate) fn level_number() -> impl TypedValueParser<Value = u8> {
 mod tests {
     use pocketsplat_capture::dataset::{Background, PointsChoice, SceneKind, Split};
     use pocketsplat_capture::synth::SurfaceFinish;
+    use pocketsplat_metrics::InputRange;
     use pocketsplat_trainer::device::Processor;
     use pocketsplat_trainer::encode::CoderChoice;
-    use pocketsplat_trainer::metrics::InputRange;
 
     use super::*;
 

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
+use pocketsplat_metrics::RatePoint;
 use pocketsplat_trainer::cost::on_front;
-use pocketsplat_trainer::metrics::RatePoint;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 

@@ -18,10 +18,10 @@ pub use front::on_front;
 pub use setting::{Setting, knobs, quality_grid};
 
 use crate::device::Processor;
-use crate::metrics::{psnr_db, psnr_db_masked};
-use crate::render::decoder::image_of;
 use pocketsplat_capture::dataset::{Image, Photograph};
+use pocketsplat_codec::render::decoder::image_of;
 use pocketsplat_instructions::predict;
+use pocketsplat_metrics::{psnr_db, psnr_db_masked};
 
 /// A view to draw, and what it is compared with.
 pub struct Sight {

@@ -1,6 +1,6 @@
 //! The width of features for a bundle of so many bytes.
 
-use crate::scene::{Head, Heads, ModelShape};
+use pocketsplat_kernels::scene::{Head, Heads, ModelShape};
 
 /// Widths to choose from, widest first.
 const WIDTHS: [usize; 5] = [50, 32, 24, 16, 8];

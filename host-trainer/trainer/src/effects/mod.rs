@@ -16,8 +16,8 @@ pub use price::{PilotFigures, Price, choose};
 pub use request::{ParseEffectsError, Request};
 pub use search::{Pilot, Pilots};
 
-use crate::scene::ModelShape;
 use crate::train::TrainConfig;
+use pocketsplat_kernels::scene::ModelShape;
 
 /// Something that a scene may take into account; a scene without it has no part for it, and its decoder does no work for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,16 +7,16 @@ use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, MaxSplats};
 
 use super::search::{Pilots, search};
 use super::{Effect, PilotFigures, Price};
-use crate::camera::core_camera;
 use crate::device::{Limits, Processor};
 use crate::encode::{CoderChoice, EncodeError, Encoding};
-use crate::metrics::psnr_db_masked;
-use crate::render::decoder::image_of;
 use crate::train::config::{Backbone, MIN_VIEWS_TO_HOLD_OUT};
 use crate::train::module::Modules;
 use crate::train::{TrainConfig, TrainError, Trainer};
 use pocketsplat_capture::dataset::{Capture, Image, PhotographError, View};
+use pocketsplat_codec::render::decoder::image_of;
 use pocketsplat_instructions::predict;
+use pocketsplat_kernels::camera::core_camera;
+use pocketsplat_metrics::psnr_db_masked;
 
 /// Runs below this many iterations are too short for pilots of them to say anything.
 ///

@@ -6,10 +6,10 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{EncodeError, Encoding};
-use crate::bundle::{BundleInfo, ChannelCoding, CodedScene, WriteError, WriteOptions, code, mean_steps};
-use crate::metrics::psnr_db_masked;
-use crate::render::decoder::core_image;
 use crate::train::finish::Finished;
+use pocketsplat_codec::bundle::{BundleInfo, ChannelCoding, CodedScene, WriteError, WriteOptions, code, mean_steps};
+use pocketsplat_codec::render::decoder::core_image;
+use pocketsplat_metrics::psnr_db_masked;
 
 /// Steps of tables as shares of the context's mean steps, finest first.
 const MEAN_STEP_SHARES: [f32; 4] = [0.5, 0.65, 0.8, 1.0];

@@ -3,8 +3,8 @@
 use pocketsplat_capture::dataset::PhotographError;
 use pocketsplat_core::DecodeError;
 
-use crate::bundle::WriteError;
-use crate::manifest::MeasureError;
+use pocketsplat_codec::bundle::WriteError;
+use pocketsplat_codec::manifest::MeasureError;
 
 /// Why a finished run has no bundle.
 #[derive(Debug, thiserror::Error)]

@@ -9,11 +9,11 @@ use pocketsplat_instructions::level;
 use super::choice::{CoderChoice, judged_psnr_db};
 use super::scale::{DevicePlans, frame_of, level_needs, measured_cameras, most_instructions};
 use super::{EncodeError, Encoding};
-use crate::bundle::{CodedScene, WriteError, Written};
 use crate::device::Limits;
-use crate::manifest::{compare, count, mean_psnr_db};
 use crate::train::finish::Finished;
 use crate::train::steering::Search;
+use pocketsplat_codec::bundle::{CodedScene, WriteError, Written};
+use pocketsplat_codec::manifest::{compare, count, mean_psnr_db};
 
 /// A cut goes on until this share of the limit is used, or for so many codings.
 const CUTTING: Search = Search { tolerance: 0.015, most_trials: 14 };

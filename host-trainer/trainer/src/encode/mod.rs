@@ -2,11 +2,13 @@
 //!
 //! `choice` settles what codes the symbols, `scale` says what a scene takes while it is trained, `fitting` leaves out anchors until the
 //! bundle keeps the limits of the device. Both work on
-//! [coded scenes](crate::bundle::CodedScene); the file is assembled once, when its measures are known.
+//! [coded scenes](pocketsplat_codec::bundle::CodedScene); the file is assembled once, when its measures are known.
 
 mod choice;
 mod error;
 mod fitting;
+#[cfg(test)]
+mod rounding;
 mod scale;
 #[cfg(test)]
 mod tests;
@@ -19,10 +21,10 @@ pub use scale::Scale;
 use pocketsplat_instructions::level::{LEVELS, Level};
 use serde::{Deserialize, Serialize};
 
-use crate::bundle::{PRUNING_RATES, WriteError, check_pruning_rates, check_steps};
 use crate::device::Limits;
-use crate::scene::QuantisationSteps;
 use crate::train::config::Backbone;
+use pocketsplat_codec::bundle::{PRUNING_RATES, WriteError, check_pruning_rates, check_steps};
+use pocketsplat_kernels::scene::QuantisationSteps;
 
 /// How a finished run becomes a bundle. Its limits also steer the training.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -9,14 +9,14 @@ use pocketsplat_instructions::level::{Bound, Level, Need};
 use pocketsplat_instructions::predict;
 
 use super::{EncodeError, Encoding};
-use crate::bundle::WriteError;
-use crate::camera::core_camera;
 use crate::device::{Limits, Processor};
-use crate::manifest::{cameras_to_measure, count};
-use crate::render::decoder::image_of;
 use crate::train::finish::Finished;
 use crate::train::gauge::Gauge;
 use crate::train::load::Load;
+use pocketsplat_codec::bundle::WriteError;
+use pocketsplat_codec::manifest::{cameras_to_measure, count};
+use pocketsplat_codec::render::decoder::image_of;
+use pocketsplat_kernels::camera::core_camera;
 
 /// Strips that the model of a device is chosen for.
 const STRIPS: u8 = 2;

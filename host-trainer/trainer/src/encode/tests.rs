@@ -3,15 +3,15 @@ use pocketsplat_core::Bundle;
 
 use super::scale::{DevicePlans, frame_of};
 use super::{CoderChoice, EncodeError, Encoding, Fitted};
-use crate::bundle::WriteError;
 use crate::device::{Limits, Processor};
-use crate::scene::QuantisationSteps;
 use crate::train::config::Backbone;
 use crate::train::finish::Finished;
 use crate::train::gauge::Gauge;
 use crate::train::module::{Modules, Rdo};
 use crate::train::test_capture::{tiny_capture, tiny_hac_config};
 use crate::train::{TrainConfig, Trainer};
+use pocketsplat_codec::bundle::WriteError;
+use pocketsplat_kernels::scene::QuantisationSteps;
 
 fn finished(capture: &Capture) -> Finished {
     let mut trainer = Trainer::new(capture, tiny_hac_config(80)).expect("a sound capture");

@@ -5,9 +5,9 @@ mod body;
 use glam::DVec3;
 use pocketsplat_gaussians::Gaussians;
 
-use crate::ops::project::ALPHA_CUTOFF;
-use crate::real::Real;
 use body::{Body, Cells};
+use pocketsplat_kernels::ops::project::ALPHA_CUTOFF;
+use pocketsplat_kernels::real::Real;
 
 /// The place of most of what is opaque and large.
 ///

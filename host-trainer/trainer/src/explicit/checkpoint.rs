@@ -10,10 +10,10 @@ use super::config::CloudConfig;
 use super::density::DensityStatistics;
 use super::optimiser::CloudOptimiser;
 use super::train::CloudTrainer;
-use crate::ops::spherical_harmonics::MOST;
 use crate::train::checkpoint::envelope::{self, Progress, RandomState, needs, part};
 use crate::train::checkpoint::{CaptureSignature, CheckpointFault, Kernels, RestoreError};
 use crate::train::run::Resumable;
+use pocketsplat_kernels::ops::spherical_harmonics::MOST;
 
 /// As the checkpoints of anchors have it, with a letter of its own.
 const MAGIC: [u8; 8] = *b"\x8bPSGRN\r\n";

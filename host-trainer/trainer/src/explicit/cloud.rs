@@ -2,8 +2,8 @@
 
 use pocketsplat_gaussians::{Degree, Gaussians};
 
-use crate::ops::explicit_gaussians::Stored;
-use crate::real::Real;
+use pocketsplat_kernels::ops::explicit_gaussians::Stored;
+use pocketsplat_kernels::real::Real;
 
 /// As [`Gaussians`] has them: rows of all arrays in the same order.
 #[derive(Clone, Debug, Default, PartialEq)]

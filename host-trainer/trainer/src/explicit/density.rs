@@ -11,9 +11,9 @@ use super::config::DensityControl;
 use super::optimiser::CloudOptimiser;
 use super::start::logit;
 use super::step::CloudGradients;
-use crate::ops::explicit_gaussians;
-use crate::real::Real;
 use crate::train::optimiser::retain_rows;
+use pocketsplat_kernels::ops::explicit_gaussians;
+use pocketsplat_kernels::real::Real;
 
 /// What is known of each Gaussian since the last event.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -155,8 +155,8 @@ mod tests {
 
     use super::*;
     use crate::explicit::config::CloudConfig;
-    use crate::ops::explicit_gaussians::Stored;
-    use crate::ops::spherical_harmonics::MOST;
+    use pocketsplat_kernels::ops::explicit_gaussians::Stored;
+    use pocketsplat_kernels::ops::spherical_harmonics::MOST;
 
     /// Of extent 5: pulled and small, pulled and large, faint, huge, and one that nothing is wrong with.
     fn five() -> (Cloud<f32>, CloudOptimiser, DensityStatistics) {

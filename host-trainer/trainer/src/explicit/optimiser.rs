@@ -6,10 +6,10 @@ use serde::{Deserialize, Serialize};
 use super::Cloud;
 use super::config::CloudRates;
 use super::step::CloudGradients;
-use crate::ops::adam::{self, Moments, Step};
-use crate::ops::simd::Level;
-use crate::ops::spherical_harmonics::MOST;
 use crate::train::optimiser::retain_rows;
+use pocketsplat_kernels::ops::adam::{self, Moments, Step};
+use pocketsplat_kernels::ops::simd::Level;
+use pocketsplat_kernels::ops::spherical_harmonics::MOST;
 
 /// Gaussians one task updates.
 const ROWS: usize = 2048;

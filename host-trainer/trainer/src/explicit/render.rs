@@ -6,9 +6,9 @@ use pocketsplat_gaussians::Gaussians;
 
 use super::Cloud;
 use super::step::draw;
-use crate::ops::Pinhole;
-use crate::ops::simd::Level;
-use crate::step::image_of_planes;
+use pocketsplat_kernels::ops::Pinhole;
+use pocketsplat_kernels::ops::simd::Level;
+use pocketsplat_kernels::step::image_of_planes;
 
 /// Explicit Gaussians, ready to be drawn.
 #[derive(Clone, Debug)]

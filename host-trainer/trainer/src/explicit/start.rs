@@ -5,9 +5,9 @@ use pocketsplat_capture::dataset::nearest_squared;
 use pocketsplat_gaussians::Degree;
 
 use super::Cloud;
-use crate::ops::explicit_gaussians::Stored;
-use crate::ops::spherical_harmonics::MOST;
-use crate::real::Real;
+use pocketsplat_kernels::ops::explicit_gaussians::Stored;
+use pocketsplat_kernels::ops::spherical_harmonics::MOST;
+use pocketsplat_kernels::real::Real;
 
 /// Opacity of every Gaussian.
 const OPACITY: f32 = 0.1;

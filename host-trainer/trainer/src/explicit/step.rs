@@ -3,16 +3,16 @@
 use rayon::prelude::*;
 
 use super::Cloud;
-use crate::ops::explicit_gaussians::{self, Stored};
-use crate::ops::neural_gaussians::Gaussian;
-use crate::ops::project::{self, ALPHA_CUTOFF, Footprint, Splat};
-use crate::ops::rasterise::{self, TiledImage};
-use crate::ops::simd::Level;
-use crate::ops::spherical_harmonics::MOST;
-use crate::ops::tiles::{self, TileLists};
-use crate::ops::{Pinhole, l1, ssim};
-use crate::real::Real;
-use crate::step::{TargetView, clear_masked};
+use pocketsplat_kernels::ops::explicit_gaussians::{self, Stored};
+use pocketsplat_kernels::ops::neural_gaussians::Gaussian;
+use pocketsplat_kernels::ops::project::{self, ALPHA_CUTOFF, Footprint, Splat};
+use pocketsplat_kernels::ops::rasterise::{self, TiledImage};
+use pocketsplat_kernels::ops::simd::Level;
+use pocketsplat_kernels::ops::spherical_harmonics::MOST;
+use pocketsplat_kernels::ops::tiles::{self, TileLists};
+use pocketsplat_kernels::ops::{Pinhole, l1, ssim};
+use pocketsplat_kernels::real::Real;
+use pocketsplat_kernels::step::{TargetView, clear_masked};
 
 /// Gaussians one task evaluates; nothing is summed within, so that no result depends on it.
 const BLOCK: usize = 1024;
@@ -172,7 +172,7 @@ mod tests {
 
     use super::*;
     use crate::explicit::render::Renderer;
-    use crate::finite_difference::{assert_piecewise_gradient, random};
+    use pocketsplat_kernels::finite_difference::{assert_piecewise_gradient, random};
 
     const N: usize = 5;
     const PER_GAUSSIAN: usize = 11 + 3 * MOST;

@@ -15,13 +15,13 @@ use super::density::{self, DensityStatistics};
 use super::optimiser::CloudOptimiser;
 use super::start::initial_cloud;
 use super::step::{CloudGradients, step};
-use crate::ops::Pinhole;
-use crate::ops::simd::Level;
-use crate::step::{TargetView, planes};
 use crate::train::TrainError;
 use crate::train::checkpoint::CaptureSignature;
 use crate::train::read_ahead::ReadAhead;
 use crate::train::watchdog::{self, Cause, DroppedStep, Watchdog};
+use pocketsplat_kernels::ops::Pinhole;
+use pocketsplat_kernels::ops::simd::Level;
+use pocketsplat_kernels::step::{TargetView, planes};
 
 /// The state of a run: everything the next iteration depends on.
 #[derive(Clone, Debug)]

@@ -6,10 +6,10 @@ use rayon::prelude::*;
 
 use super::least_squares::Equations;
 use super::principal_axes::principal_axes;
-use crate::ops::Pinhole;
-use crate::ops::neural_gaussians::Gaussian;
-use crate::scene::Scene;
-use crate::step::Workspace;
+use pocketsplat_kernels::ops::Pinhole;
+use pocketsplat_kernels::ops::neural_gaussians::Gaussian;
+use pocketsplat_kernels::scene::Scene;
+use pocketsplat_kernels::step::Workspace;
 
 /// What a Gaussian that reaches the image behind others counts, as if it filled this part of a pixel: its colour is not seen, but a
 /// view that does see it should not find it black.

@@ -10,11 +10,11 @@ use crate::explicit::Cloud;
 use crate::explicit::config::CloudRates;
 use crate::explicit::optimiser::CloudOptimiser;
 use crate::explicit::step::step;
-use crate::ops::Pinhole;
-use crate::ops::simd::Level;
-use crate::ops::spherical_harmonics::MOST;
-use crate::step::{TargetView, planes};
 use crate::train::config::LearningRate;
+use pocketsplat_kernels::ops::Pinhole;
+use pocketsplat_kernels::ops::simd::Level;
+use pocketsplat_kernels::ops::spherical_harmonics::MOST;
+use pocketsplat_kernels::step::{TargetView, planes};
 
 /// Everything random follows from it.
 const SEED: u64 = 42;

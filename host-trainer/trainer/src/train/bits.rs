@@ -3,10 +3,10 @@
 use pocketsplat_core::context::{Context, Group, N_GROUPS, N_LEVELS, Steps};
 use rayon::prelude::*;
 
-use crate::ops::simd::Level;
-use crate::ops::{anchor_bits, hash_grid, head, mask};
-use crate::scene::{ContextModel, ContextNetwork, Scene};
-use crate::step::parents::Parents;
+use pocketsplat_kernels::ops::simd::Level;
+use pocketsplat_kernels::ops::{anchor_bits, hash_grid, head, mask};
+use pocketsplat_kernels::scene::{ContextModel, ContextNetwork, Scene};
+use pocketsplat_kernels::step::parents::Parents;
 
 /// Anchors that one task looks at.
 const ROWS: usize = 512;

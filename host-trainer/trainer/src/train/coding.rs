@@ -4,12 +4,12 @@ use pocketsplat_core::context::Context;
 
 use super::config::{Backbone, TrainConfig};
 use super::{TrainError, Trainer, context_start};
-use crate::integer_model;
-use crate::ops::noise::Stream;
-use crate::ops::perturb;
-use crate::scene::{ContextNetwork, Head, Heads, Scene};
-use crate::step::Phase;
-use crate::step::coding::{Coding, IntegerModel, RateTerms};
+use pocketsplat_kernels::integer_model;
+use pocketsplat_kernels::ops::noise::Stream;
+use pocketsplat_kernels::ops::perturb;
+use pocketsplat_kernels::scene::{ContextNetwork, Head, Heads, Scene};
+use pocketsplat_kernels::step::Phase;
+use pocketsplat_kernels::step::coding::{Coding, IntegerModel, RateTerms};
 
 /// Bits of the fraction of the heads' weights that a run with a context model ends with: they are drawn so in its last phase, so
 /// that rounding them costs nothing.

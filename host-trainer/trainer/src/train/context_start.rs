@@ -8,7 +8,7 @@ use pocketsplat_core::context::{
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use crate::scene::{ContextModel, Head, Scene};
+use pocketsplat_kernels::scene::{ContextModel, Head, Scene};
 
 /// Scenes of this many anchors get the published grid and network.
 const LARGE: usize = 200_000;
@@ -201,9 +201,9 @@ const _: () = assert!(FEATURES_PER_LEVEL == 4, "`levels` counts bits");
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ops::{hash_grid, head};
     use crate::train::Trainer;
     use crate::train::test_capture::{tiny_capture, tiny_config};
+    use pocketsplat_kernels::ops::{hash_grid, head};
     use rand::SeedableRng;
 
     fn n_rows(n_anchors: usize) -> u32 {

@@ -9,8 +9,8 @@ use rand_chacha::ChaCha8Rng;
 use super::config::Densification;
 use super::optimiser::{Optimiser, retain_rows};
 use super::statistics::Statistics;
-use crate::scene::init::lattice_cell;
-use crate::scene::{Anchors, INITIAL_MASK_LOGIT, Scene};
+use pocketsplat_kernels::scene::init::lattice_cell;
+use pocketsplat_kernels::scene::{Anchors, INITIAL_MASK_LOGIT, Scene};
 
 /// Base log-scales above this are lowered to it at every event, as the published trainer does: l_g ≤ e^0.05.
 const MAX_BASE_LOG_SCALE: f32 = 0.05;
@@ -178,9 +178,9 @@ pub fn retain(scene: &mut Scene<f32>, optimiser: &mut Optimiser<f32>, statistics
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::ModelShape;
-    use crate::scene::init::initial_scene;
     use crate::train::TrainConfig;
+    use pocketsplat_kernels::scene::ModelShape;
+    use pocketsplat_kernels::scene::init::initial_scene;
     use rand::SeedableRng;
 
     fn start(points: &[DVec3]) -> (Scene<f32>, Optimiser<f32>, Statistics, ChaCha8Rng) {

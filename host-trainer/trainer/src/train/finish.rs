@@ -7,9 +7,9 @@ use super::bits::{self, all_steps};
 use super::coding::{HEAD_FRACTION_BITS, Integers};
 use super::survey::Survey;
 use super::{TrainError, Trainer};
-use crate::ops::perturb;
-use crate::scene::Scene;
-use crate::step::Workspace;
+use pocketsplat_kernels::ops::perturb;
+use pocketsplat_kernels::scene::Scene;
+use pocketsplat_kernels::step::Workspace;
 
 /// Anchors that one task looks at.
 const ROWS: usize = 512;
@@ -19,7 +19,7 @@ const ROWS: usize = 512;
 pub struct Finished {
     /// The scene, its values not rounded: the writer does that, once. Offsets that no view draws are masked.
     pub scene: Scene<f32>,
-    /// `[n]` which anchors matter: their [places](crate::scene::Anchors::prune_rank) if they have any, else their aggregated
+    /// `[n]` which anchors matter: their [places](pocketsplat_kernels::scene::Anchors::prune_rank) if they have any, else their aggregated
     /// opacity, see [`Survey::importance`]. The order of the tiers.
     pub importance: Vec<f32>,
     /// What lies behind it, rounded.

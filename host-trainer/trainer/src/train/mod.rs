@@ -11,6 +11,8 @@ pub mod context_start;
 pub mod densify;
 pub mod finish;
 pub mod gauge;
+#[cfg(test)]
+mod gpu_tests;
 pub mod load;
 pub mod module;
 pub mod optimiser;
@@ -41,12 +43,6 @@ pub use config::TrainConfig;
 pub use outcome::{Observer, Outcome, TrainError};
 pub use watchdog::DroppedStep;
 
-use crate::ops::Pinhole;
-use crate::ops::noise::Stream;
-use crate::scene::init::initial_scene;
-use crate::scene::{Anchors, Heads, Scene};
-use crate::step::coding::Coding;
-use crate::step::{Loss, Phase, SharedDevice, StepInfo, StepReport, TargetView, Workspace, image_of_planes};
 use checkpoint::{CaptureSignature, Kernels};
 use coding::Integers;
 use config::Rates;
@@ -54,6 +50,14 @@ use gauge::Gauge;
 use module::RunView;
 use optimiser::Optimiser;
 use pocketsplat_capture::dataset::{Capture, Image, Photograph, View};
+use pocketsplat_kernels::ops::Pinhole;
+use pocketsplat_kernels::ops::noise::Stream;
+use pocketsplat_kernels::scene::init::initial_scene;
+use pocketsplat_kernels::scene::{Anchors, Heads, Scene};
+use pocketsplat_kernels::step::coding::Coding;
+use pocketsplat_kernels::step::{
+    Loss, Phase, SharedDevice, StepInfo, StepReport, TargetView, Workspace, image_of_planes,
+};
 use read_ahead::ReadAhead;
 use resident::Place;
 use statistics::Statistics;

@@ -16,10 +16,10 @@
 //! One that keeps offsets short, as `module/short.rs`:
 //!
 //! ```
-//! use pocketsplat_trainer::real::Real;
-//! use pocketsplat_trainer::scene::Scene;
+//! use pocketsplat_kernels::real::Real;
+//! use pocketsplat_kernels::scene::Scene;
 //! use pocketsplat_trainer::train::module::Module;
-//! use pocketsplat_trainer::step::{Block, StepInfo, Terms};
+//! use pocketsplat_kernels::step::{Block, StepInfo, Terms};
 //! use serde::{Deserialize, Serialize};
 //!
 //! #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -58,12 +58,14 @@
 //! ```
 //!
 //! and `short: Short,` among the modules below. It then has a place in configurations, `[train.modules.short]`, and its gradient is
-//! checked as the others' are, by a line in the tests of [`crate::step`].
+//! checked as the others' are, by a line in the tests of [`pocketsplat_kernels::step`].
 
 pub mod detail;
 pub mod distribution;
 pub mod pruning;
 pub mod rdo;
+#[cfg(test)]
+mod tests;
 
 use std::fmt::Debug;
 
@@ -75,9 +77,9 @@ use super::steering::Fit;
 use super::survey::Survey;
 use super::worth::Worth;
 use super::{TrainError, Trainer};
-use crate::real::Real;
-use crate::scene::{ModelShape, Scene};
-use crate::step::{StepInfo, Terms};
+use pocketsplat_kernels::real::Real;
+use pocketsplat_kernels::scene::{ModelShape, Scene};
+use pocketsplat_kernels::step::{StepInfo, Terms};
 
 pub use detail::Detail;
 pub use distribution::Distribution;
@@ -145,7 +147,7 @@ pub enum AnchorChange {
     Keep(Vec<bool>),
     /// Switches these offsets off, counted through all anchors', and drops the anchors that have none left.
     Mask(Vec<usize>),
-    /// `[n]` gives every anchor its [rank](crate::scene::Anchors::prune_rank).
+    /// `[n]` gives every anchor its [rank](pocketsplat_kernels::scene::Anchors::prune_rank).
     Rank(Vec<f32>),
     /// Switches offsets off as [`Self::Mask`] does, and weighs bits anew, so that the bundle fits.
     Fit {
@@ -194,7 +196,7 @@ pub trait Module: Terms<f32> + Terms<f64> + Debug {
         true
     }
 
-    /// Share of the anchors that the step leaves out, those of the lowest [places](crate::scene::Anchors::prune_rank) first.
+    /// Share of the anchors that the step leaves out, those of the lowest [places](pocketsplat_kernels::scene::Anchors::prune_rank) first.
     fn pruned_share(&self, _at: &StepInfo) -> f32 {
         0.0
     }

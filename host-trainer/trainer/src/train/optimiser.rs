@@ -4,10 +4,10 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::config::Rates;
-use crate::ops::adam::{self, Moments, Step};
-use crate::real::Real;
-use crate::scene::{Anchors, ContextModel, ContextNetwork, Heads, ModelShape, Scene};
-use crate::step::{Block, GroupSteps, Workspace};
+use pocketsplat_kernels::ops::adam::{self, Moments, Step};
+use pocketsplat_kernels::real::Real;
+use pocketsplat_kernels::scene::{Anchors, ContextModel, ContextNetwork, Heads, ModelShape, Scene};
+use pocketsplat_kernels::step::{Block, GroupSteps, Workspace};
 
 /// Anchors one task updates.
 const ROWS: usize = 2048;
@@ -279,8 +279,8 @@ pub fn retain_rows<T: Copy>(values: &mut Vec<T>, width: usize, keep: &[bool]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::init::initial_scene;
     use crate::train::TrainConfig;
+    use pocketsplat_kernels::scene::init::initial_scene;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 

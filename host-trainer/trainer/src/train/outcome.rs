@@ -8,9 +8,9 @@ use pocketsplat_core::DecodeError;
 use super::config_error::ConfigError;
 use super::steering::Fit;
 use super::watchdog::DroppedStep;
-use crate::integer_model::IntegerModelError;
-use crate::scene::Scene;
-use crate::step::{DeviceFault, StepReport};
+use pocketsplat_kernels::integer_model::IntegerModelError;
+use pocketsplat_kernels::scene::Scene;
+use pocketsplat_kernels::step::{DeviceFault, StepReport};
 
 /// Hears of every step of a run.
 pub trait Observer {

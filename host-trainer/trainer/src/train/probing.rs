@@ -4,8 +4,8 @@ use super::bits::Bits;
 use super::coding::Integers;
 use super::worth::Worth;
 use super::{TrainError, Trainer, target};
-use crate::ops::noise::Stream;
-use crate::step::Workspace;
+use pocketsplat_kernels::ops::noise::Stream;
+use pocketsplat_kernels::step::Workspace;
 
 /// Branch of the run's stream that probes draw their signs from.
 const PROBES: u32 = 0x50_52_4f_42;

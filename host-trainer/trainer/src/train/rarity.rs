@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::Trainer;
-use crate::ops::prefilter;
+use pocketsplat_kernels::ops::prefilter;
 
 impl Trainer<'_> {
     /// Counts the training views that may show each anchor, from the first need of a rate on.

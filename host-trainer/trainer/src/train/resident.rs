@@ -6,9 +6,9 @@ use super::optimiser::Optimiser;
 use super::statistics::Statistics;
 use super::watchdog::{self, Cause};
 use super::{TrainError, Trainer};
-use crate::scene::Scene;
-use crate::step::coding::Coding;
-use crate::step::{
+use pocketsplat_kernels::scene::Scene;
+use pocketsplat_kernels::step::coding::Coding;
+use pocketsplat_kernels::step::{
     ContextMoments, ContextMomentsMut, DeviceFault, LoadNumber, Loss, Phase, Resident, StepReport, TargetView, Trained,
     TrainedMut, Workspace,
 };

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::optimiser::retain_rows;
-use crate::step::Workspace;
+use pocketsplat_kernels::step::Workspace;
 
 /// Running sums since an anchor, or an offset, was last judged (Lu et al. 2024, Scaffold-GS, section 3.3).
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -1,9 +1,9 @@
 //! What the training views show of every anchor: which offsets are drawn, and how much an anchor
 //! counts.
 
-use crate::ops::Pinhole;
-use crate::scene::Scene;
-use crate::step::Workspace;
+use pocketsplat_kernels::ops::Pinhole;
+use pocketsplat_kernels::scene::Scene;
+use pocketsplat_kernels::step::Workspace;
 
 /// One pass over some views.
 #[derive(Clone, Debug, PartialEq)]

@@ -4,9 +4,9 @@ use glam::{DMat3, DVec3};
 
 use super::TrainConfig;
 use super::config::{Backbone, Densification};
-use crate::scene::ModelShape;
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Capture, EXTENT, Image, Normalisation, Photograph, PointsOrigin, SceneKind, View};
+use pocketsplat_kernels::scene::ModelShape;
 
 pub(crate) const SIZE_PX: u32 = 24;
 

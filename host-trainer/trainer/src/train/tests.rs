@@ -4,8 +4,8 @@ use super::config::Backbone;
 use super::finish::Finished;
 use super::test_capture::{edit, tiny_capture, tiny_config, tiny_hac_config};
 use super::*;
-use crate::step::Phase;
-use crate::step::coding::RateReport;
+use pocketsplat_kernels::step::Phase;
+use pocketsplat_kernels::step::coding::RateReport;
 
 /// All steps of a run: phase and rate of each.
 fn trained(trainer: &mut Trainer<'_>) -> Vec<(Phase, Option<RateReport>)> {
@@ -88,7 +88,7 @@ fn a_bit_costs_what_lambda_says_in_squared_error() {
         let differences = drawn.rgb.iter().zip(&truth.image.rgb).map(|(a, b)| (f64::from(*a) - f64::from(*b)) / 255.0);
         let (l1, l2) = differences.fold((0.0, 0.0), |(l1, l2), d| (l1 + d.abs() / n, l2 + d * d / n));
         squared += l2 / capture.train.len() as f64;
-        loss += (0.8 * l1 + 0.2 * (1.0 - crate::metrics::ssim(&drawn, &truth.image))) / capture.train.len() as f64;
+        loss += (0.8 * l1 + 0.2 * (1.0 - pocketsplat_metrics::ssim(&drawn, &truth.image))) / capture.train.len() as f64;
     }
     let n_values = trainer.scene.anchors.len() * trainer.scene.shape.values_per_anchor();
     let expected = 0.01 / n_values as f64 * 2.0 * squared / loss;

@@ -7,8 +7,8 @@ use rand_chacha::ChaCha8Rng;
 
 use super::TrainConfig;
 use super::config::Backbone;
-use crate::scene::Scene;
-use crate::scene::init::initial_scene;
+use pocketsplat_kernels::scene::Scene;
+use pocketsplat_kernels::scene::init::initial_scene;
 
 /// Splats that an anchor of [`scene`] makes in [`camera`]'s view, about.
 pub const SPLATS_PER_ANCHOR: f64 = 5.4;

@@ -4,9 +4,9 @@ use std::fmt;
 
 use rayon::prelude::*;
 
-use crate::ops::neural_gaussians::Gaussian;
-use crate::scene::{ContextNetwork, Heads, Scene};
-use crate::step::{Block, StepReport, TargetView, Workspace};
+use pocketsplat_kernels::ops::neural_gaussians::Gaussian;
+use pocketsplat_kernels::scene::{ContextNetwork, Heads, Scene};
+use pocketsplat_kernels::step::{Block, StepReport, TargetView, Workspace};
 
 /// Gradients above are refused like infinite ones: their squares would overflow in Adam's second moment.
 pub(super) const LARGEST_GRADIENT: f32 = 1e18;

@@ -1,9 +1,9 @@
 //! Sections that a decoder may skip, the manifest, and what of the header no pixel depends on.
 
 use glam::DVec3;
+use pocketsplat_codec::manifest;
 use pocketsplat_core::Bundle;
 use pocketsplat_core::bundle::Effects;
-use pocketsplat_trainer::manifest;
 
 use super::{SMALL, anchors, front, in_tiers, sample, small};
 use crate::pack::sample::{NO_EFFECT, Sample};

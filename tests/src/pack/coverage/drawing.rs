@@ -1,9 +1,9 @@
 //! What the frames of a bundle show: cameras, and Gaussians at the limits of drawing.
 
+use pocketsplat_codec::bundle::decoded_scene;
 use pocketsplat_core::math::tanh;
 use pocketsplat_core::{Bundle, Camera};
-use pocketsplat_trainer::bundle::decoded_scene;
-use pocketsplat_trainer::scene::{Head, Scene};
+use pocketsplat_kernels::scene::{Head, Scene};
 
 use super::Found;
 use crate::frame::{budget_for, draw_by};

@@ -1,8 +1,6 @@
 //! What an ablation has found so far: every run, and every row against the backbone alone.
 
-use pocketsplat_trainer::metrics::{
-    RateDifference, RatePoint, bd_psnr_db, bd_rate_percent, ln_excess, rate_difference,
-};
+use pocketsplat_metrics::{RateDifference, RatePoint, bd_psnr_db, bd_rate_percent, ln_excess, rate_difference};
 use serde::Serialize;
 
 use super::rows::BASELINE;

@@ -1,6 +1,6 @@
 //! The rows of an ablation.
 
-use pocketsplat_trainer::scene::ModelShape;
+use pocketsplat_kernels::scene::ModelShape;
 use pocketsplat_trainer::train::module::Detail;
 
 /// The row that all others are compared with.

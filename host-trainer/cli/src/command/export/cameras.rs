@@ -8,8 +8,8 @@ use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Capture, Image, Normalisation, Split, View};
 use pocketsplat_core::Bundle;
 use pocketsplat_gaussians::{Frame, Gaussians};
-use pocketsplat_trainer::camera::host_camera;
-use pocketsplat_trainer::metrics::psnr_db_masked;
+use pocketsplat_kernels::camera::host_camera;
+use pocketsplat_metrics::psnr_db_masked;
 
 use super::super::bundle::BundleFile;
 use super::super::capture::views_of;

@@ -3,8 +3,8 @@
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::Image;
 use pocketsplat_gaussians::Gaussians;
+use pocketsplat_metrics::psnr_db;
 use pocketsplat_trainer::explicit::render::Renderer;
-use pocketsplat_trainer::metrics::psnr_db;
 use rayon::prelude::*;
 
 /// Pictures that are the same have this PSNR, dB.

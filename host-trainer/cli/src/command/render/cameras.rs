@@ -8,7 +8,7 @@ use glam::{DMat3, DVec3};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::FrameSize;
 use pocketsplat_core::Bundle;
-use pocketsplat_trainer::camera::{core_camera, host_camera};
+use pocketsplat_kernels::camera::{core_camera, host_camera};
 use serde::{Deserialize, Serialize};
 
 use super::super::fit::frame_budget;

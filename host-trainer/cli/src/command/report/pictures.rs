@@ -4,8 +4,8 @@ use anyhow::{Context, Result};
 use image::ImageEncoder as _;
 use image::codecs::webp::WebPEncoder;
 use pocketsplat_capture::dataset::Image;
+use pocketsplat_codec::render::decoder::core_image;
 use pocketsplat_core::Bundle;
-use pocketsplat_trainer::render::decoder::core_image;
 use pocketsplat_viewer::{base64, escaped};
 
 use super::{Photographs, Run};

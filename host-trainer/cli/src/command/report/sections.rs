@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use anyhow::Result;
+use pocketsplat_codec::bundle::SizeReport;
 use pocketsplat_core::{Budget, Bundle};
-use pocketsplat_trainer::bundle::SizeReport;
 use pocketsplat_viewer::escaped;
 
 use super::super::effects::PilotLine;

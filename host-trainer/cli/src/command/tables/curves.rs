@@ -1,6 +1,6 @@
 //! Measured runs as curves: by dataset and size of the images, scene, method, rate and seed, in the order of the plan.
 
-use pocketsplat_trainer::metrics::RatePoint;
+use pocketsplat_metrics::RatePoint;
 
 use super::finished::FinishedRun;
 use crate::command::workflow::{Place, Plan};

@@ -1,6 +1,6 @@
 //! How many bytes each method takes against the plan's first.
 
-use pocketsplat_trainer::metrics::{SeededDifference, bd_rate_over_seeds};
+use pocketsplat_metrics::{SeededDifference, bd_rate_over_seeds};
 use serde::Serialize;
 
 use super::curves::{Curve, Group, SceneCurves};

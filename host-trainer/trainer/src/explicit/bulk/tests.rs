@@ -1,6 +1,6 @@
 use super::*;
 use crate::explicit::test_scenes::{all, at};
-use crate::finite_difference::random;
+use pocketsplat_kernels::finite_difference::random;
 
 fn cube(seed: u64, n: usize) -> Vec<DVec3> {
     random(seed, 3 * n).chunks_exact(3).map(|v| DVec3::new(v[0], v[1], v[2])).collect()

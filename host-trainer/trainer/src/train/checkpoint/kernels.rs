@@ -4,9 +4,9 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::ops::matmul::{Matrix, multiply};
-use crate::ops::simd::Level;
-use crate::real::Real;
+use pocketsplat_kernels::ops::matmul::{Matrix, multiply};
+use pocketsplat_kernels::ops::simd::Level;
+use pocketsplat_kernels::real::Real;
 
 /// The program, the instruction sets, and what a small calculation gave.
 ///

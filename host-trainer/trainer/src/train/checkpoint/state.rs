@@ -8,12 +8,12 @@ use rand_chacha::ChaCha8Rng;
 
 use super::envelope::{self, Progress, RandomState, content, needs, part};
 use super::{CaptureDifference, CaptureSignature, CheckpointFault, Kernels, MAGIC};
-use crate::scene::{Anchors, ContextModel, Heads, ModelShape, QuantisationSteps, Scene};
 use crate::train::config::Backbone;
 use crate::train::optimiser::Optimiser;
 use crate::train::statistics::Statistics;
 use crate::train::{TrainConfig, TrainError, Trainer};
 use pocketsplat_capture::dataset::Capture;
+use pocketsplat_kernels::scene::{Anchors, ContextModel, Heads, ModelShape, QuantisationSteps, Scene};
 
 /// Why a run cannot go on from a checkpoint.
 #[derive(Debug, thiserror::Error)]

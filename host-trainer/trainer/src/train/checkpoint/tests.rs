@@ -17,7 +17,13 @@ use pocketsplat_capture::dataset::Mask;
 struct Silent;
 
 impl Observer for Silent {
-    fn step(&mut self, _: u32, _: &crate::step::StepReport<f32>, _: &crate::scene::Scene<f32>) {}
+    fn step(
+        &mut self,
+        _: u32,
+        _: &pocketsplat_kernels::step::StepReport<f32>,
+        _: &pocketsplat_kernels::scene::Scene<f32>,
+    ) {
+    }
 }
 
 fn saved(trainer: &Trainer<'_>) -> Vec<u8> {

@@ -4,7 +4,7 @@ use pocketsplat_core::context::MAX_TAPS;
 use serde::{Deserialize, Serialize};
 
 use super::DECAY_FROM;
-use crate::scene::QuantisationSteps;
+use pocketsplat_kernels::scene::QuantisationSteps;
 
 /// The kinds of scene that can be trained.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -51,7 +51,7 @@ pub struct Hac {
     pub context_from: f64,
     /// Share from which on values are rounded and the integer model decides. (HAC has no such phase.)
     pub exact_from: f64,
-    /// Share of the anchors that a view shows over which its rate is taken; of [rare](crate::scene::Anchors::rarity) ones more, so
+    /// Share of the anchors that a view shows over which its rate is taken; of [rare](pocketsplat_kernels::scene::Anchors::rarity) ones more, so
     /// that over a run all anchors weigh alike, as they do in the file.
     pub sample: f64,
     /// Weight of the mean opening of the masks in the loss, while there is a rate; not with [`Backbone::HacPlus`], whose masks

@@ -8,10 +8,10 @@ pub use hac::{Backbone, Hac};
 
 use super::config_error::{ConfigError, within};
 use super::module::Modules;
-use crate::scene::ModelShape;
-use crate::scene::init::least_voxel_size;
-use crate::step::{LossWeights, Phase};
 use pocketsplat_capture::dataset::{Capture, PointsOrigin};
+use pocketsplat_kernels::scene::ModelShape;
+use pocketsplat_kernels::scene::init::least_voxel_size;
+use pocketsplat_kernels::step::{LossWeights, Phase};
 
 /// A learning rate over the run: `start` until share `from` is done, then on a geometric path to `end`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -4,11 +4,11 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::Module;
-use crate::ops::normality::{ChannelMoments, Weights};
-use crate::real::Real;
-use crate::scene::{ModelShape, Scene};
-use crate::step::{Block, DeviceTerms, StepInfo, Terms};
 use crate::train::config_error::{ConfigError, within};
+use pocketsplat_kernels::ops::normality::{ChannelMoments, Weights};
+use pocketsplat_kernels::real::Real;
+use pocketsplat_kernels::scene::{ModelShape, Scene};
+use pocketsplat_kernels::step::{Block, DeviceTerms, StepInfo, Terms};
 
 /// Pulls the features of each channel, over the anchors of a view, towards the standard normal distribution, and their
 /// deviation towards 1 (the plug-and-play paper, eqs. 2 and 3, with P the normal distribution of the channel's moments).

@@ -6,12 +6,12 @@ use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use super::{AnchorChange, Module, RunView};
-use crate::ops::opacity_target::forward_backward;
-use crate::real::Real;
-use crate::scene::{ModelShape, Scene};
-use crate::step::{Block, DeviceTerms, StepInfo, Terms};
 use crate::train::TrainError;
 use crate::train::config_error::{ConfigError, within};
+use pocketsplat_kernels::ops::opacity_target::forward_backward;
+use pocketsplat_kernels::real::Real;
+use pocketsplat_kernels::scene::{ModelShape, Scene};
+use pocketsplat_kernels::step::{Block, DeviceTerms, StepInfo, Terms};
 
 /// What the event does with the anchors it picks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -123,7 +123,7 @@ impl Pruning {
     }
 }
 
-/// A share as anchors' [prune ranks](crate::scene::Anchors::prune_rank) are kept, so that it compares equal with them.
+/// A share as anchors' [prune ranks](pocketsplat_kernels::scene::Anchors::prune_rank) are kept, so that it compares equal with them.
 #[expect(clippy::cast_possible_truncation, reason = "ranks are f32")]
 fn as_prune_rank(share: f64) -> f32 {
     share as f32
@@ -270,9 +270,9 @@ mod tests {
         let info = |iteration| StepInfo {
             iteration,
             iterations: 40,
-            phase: crate::step::Phase::Raw,
+            phase: pocketsplat_kernels::step::Phase::Raw,
             scaled: true,
-            stream: crate::ops::noise::Stream::of_run(3).branch(iteration),
+            stream: pocketsplat_kernels::ops::noise::Stream::of_run(3).branch(iteration),
         };
         assert!((1..=20).all(|iteration| pruning.pruned_share(&info(iteration)) == 0.0));
         let shares: Vec<f32> = (21..4021).map(|iteration| pruning.pruned_share(&info(iteration))).collect();

@@ -3,13 +3,13 @@
 use serde::{Deserialize, Serialize};
 
 use super::{AnchorChange, Module, RunView};
-use crate::real::Real;
-use crate::scene::ModelShape;
-use crate::step::{DeviceTerms, StepInfo, Terms};
 use crate::train::TrainError;
 use crate::train::config_error::{ConfigError, within};
 use crate::train::steering::{REWEIGHED_AT, fit, reweighed};
 use crate::train::worth::Worth;
+use pocketsplat_kernels::real::Real;
+use pocketsplat_kernels::scene::ModelShape;
+use pocketsplat_kernels::step::{DeviceTerms, StepInfo, Terms};
 
 /// Offsets and anchors leave whose removal adds less squared error than their bits are worth, at a few events after which
 /// the rest learns to do without them. It takes the place of learned masks.

@@ -36,7 +36,7 @@ pub use resumable::Resumable;
 pub use store::{Newest, Resumed, fork};
 
 use super::{Observer, Trainer};
-use crate::step::StepReport;
+use pocketsplat_kernels::step::StepReport;
 use previews::{PREVIEWS, Previews};
 
 const CONFIG: &str = "config.toml";

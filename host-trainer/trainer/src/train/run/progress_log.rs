@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use super::{Resumable, RunError, files};
-use crate::step::coding::RateReport;
+use pocketsplat_kernels::step::coding::RateReport;
 
 const HEADER: &str =
     "iteration,loss,psnr_db,anchors,seconds,dropped,feature_bits,log_scale_bits,offset_bits,drawn_offsets";

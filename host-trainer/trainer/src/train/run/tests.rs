@@ -3,8 +3,8 @@ use std::io::Write;
 use std::sync::atomic::AtomicBool;
 
 use super::*;
-use crate::step::StepReport;
 use crate::train::test_capture::{tiny_capture, tiny_config};
+use pocketsplat_kernels::step::StepReport;
 
 const ITERATIONS: u32 = 40;
 
@@ -12,7 +12,7 @@ const ITERATIONS: u32 = 40;
 struct StopAfter<'s>(u32, &'s AtomicBool);
 
 impl Observer for StopAfter<'_> {
-    fn step(&mut self, iteration: u32, _: &StepReport<f32>, _: &crate::scene::Scene<f32>) {
+    fn step(&mut self, iteration: u32, _: &StepReport<f32>, _: &pocketsplat_kernels::scene::Scene<f32>) {
         if iteration == self.0 {
             self.1.store(true, Ordering::Relaxed);
         }
@@ -20,7 +20,11 @@ impl Observer for StopAfter<'_> {
 }
 
 /// Trains until after iteration `until`, from wherever the folder stands.
-fn train(folder: &mut RunFolder, interval: Interval, until: u32) -> (Ending, crate::scene::Scene<f32>, Vec<String>) {
+fn train(
+    folder: &mut RunFolder,
+    interval: Interval,
+    until: u32,
+) -> (Ending, pocketsplat_kernels::scene::Scene<f32>, Vec<String>) {
     let capture = tiny_capture();
     let resumed = folder.resume(&capture).unwrap();
     let (mut trainer, passed_over) = match resumed {
@@ -254,7 +258,7 @@ fn a_picture_that_cannot_be_written_ends_no_run() {
     #[derive(Default)]
     struct Heard(usize);
     impl Observer for Heard {
-        fn step(&mut self, _: u32, _: &StepReport<f32>, _: &crate::scene::Scene<f32>) {}
+        fn step(&mut self, _: u32, _: &StepReport<f32>, _: &pocketsplat_kernels::scene::Scene<f32>) {}
         fn unwritten(&mut self, why: &dyn std::error::Error) {
             assert!(why.to_string().contains(PREVIEWS), "{why}");
             self.0 += 1;

@@ -29,7 +29,7 @@ use rows::{BASELINE, Extent, Row, rows};
 pub(crate) struct Args {
     #[command(flatten)]
     runs: RunsArgs,
-    /// Weights of a value's bits in the loss; options and seeds are compared at the second, or the only one.
+    /// Rate weights; options and seeds are compared at the second, or the only one.
     #[arg(long = "lambda", value_name = "X,…", value_delimiter = ',', default_values_t = [0.004, 0.002, 0.001, 0.0005],
         help_heading = QUALITY)]
     lambdas: Vec<f64>,

@@ -28,7 +28,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 
 /// Write the manual pages.
 ///
-/// As pocketsplat man ~/.local/share/man/man1
+/// For instance pocketsplat man ~/.local/share/man/man1
 #[derive(clap::Args)]
 pub(crate) struct ManArgs {
     /// Folder to write them into.

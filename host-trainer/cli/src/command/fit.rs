@@ -39,7 +39,7 @@ pub(crate) struct Args {
     /// Draw strips with too many splats in slabs of depth, instead of leaving anchors out.
     #[arg(long, requires = "ram")]
     slabs: bool,
-    /// Level to hold each tier to, at the training size: says which fit, and what is over by how much.
+    /// Device level to check each tier against, at the training size: says which fit, and what is over by how much.
     #[arg(long, value_name = "N", value_parser = level_number(), conflicts_with_all = ["ram", "resolution", "slabs", "target"])]
     level: Option<u8>,
     /// Processor for which to predict the instructions of the preview frame [default: none]

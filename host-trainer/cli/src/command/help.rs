@@ -158,7 +158,8 @@ mod tests {
         let about = command.get_long_about().or(command.get_about()).map(ToString::to_string).unwrap_or_default();
         let positionals = command.get_positionals().map(|arg| {
             let value = arg.get_value_names().map_or_else(|| arg.get_id().to_string(), |names| names[0].to_string());
-            if arg.is_required_set() { format!(" {value}") } else { format!(" [{value}]") }
+            let more = if matches!(arg.get_action(), clap::ArgAction::Append) { "…" } else { "" };
+            if arg.is_required_set() { format!(" {value}{more}") } else { format!(" [{value}{more}]") }
         });
         let mut text = format!("\n### {name}\n\n`pocketsplat {name}{} [OPTIONS]`\n\n", positionals.collect::<String>());
         let _ = writeln!(text, "{}\n\n| option | meaning |\n|---|---|", in_page(&about).replace('|', "\\|"));
@@ -179,6 +180,7 @@ mod tests {
                     .map(|short| format!("-{short}"))
                     .into_iter()
                     .chain(long.map(|long| format!("--{long}")))
+                    .chain(arg.get_visible_aliases().into_iter().flatten().map(|alias| format!("--{alias}")))
                     .collect();
                 if takes_value { format!("{} {value}", names.join(", ")) } else { names.join(", ") }
             }

@@ -16,7 +16,7 @@ use crate::config::heading::QUALITY;
 pub(crate) struct Args {
     #[command(flatten)]
     runs: RunsArgs,
-    /// Weights of a value's bits in the loss, one run each: the larger, the smaller the bundle.
+    /// Rate weights, one run each: a larger one makes smaller files.
     #[arg(long = "lambda", value_name = "X,…", value_delimiter = ',', required = true, help_heading = QUALITY)]
     lambdas: Vec<f64>,
 }

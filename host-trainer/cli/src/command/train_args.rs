@@ -96,7 +96,7 @@ pub(crate) struct Args {
 /// What the device has that the bundle is for; what else the command line leaves open is chosen by it.
 #[derive(clap::Args)]
 pub(crate) struct DeviceArgs {
-    /// Device class 1 (64 KiB) to 5 (8 MiB): presets for --ram, --flash, --resolution and --target; give one of them to override it
+    /// Device class 1 (64 KiB) to 5 (8 MiB): sets --ram, --flash, --resolution and --target, which may ask for less
     /// [default: none]
     #[arg(long, value_name = "N", value_parser = level_number(), help_heading = DEVICE)]
     level: Option<u8>,

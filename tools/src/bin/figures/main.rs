@@ -1,8 +1,10 @@
 //! The figures of README and pages: runs what docs/results/plan.toml lists, and fills the blocks of the pages.
 //!
-//!     cargo run --release -p tools --bin figures -- run CAPTURES --out RUNS   # trains what is not trained yet; the same command goes on
-//!     cargo run -p tools --bin figures -- write                               # fills the blocks from docs/results/figures/*.csv
-//!     cargo run -p tools --bin figures -- check                               # fails where a page says something else
+//! ```sh
+//! cargo run --release -p tools --bin figures -- run CAPTURES --out RUNS   # trains what is not trained yet; the same command goes on
+//! cargo run -p tools --bin figures -- write                               # fills the blocks from docs/results/figures/*.csv
+//! cargo run -p tools --bin figures -- check                               # fails where a page says something else
+//! ```
 //!
 //! A block begins with `<!-- table NAME -->` and ends with `<!-- end of table -->`.
 

@@ -114,6 +114,8 @@ fn dry_run(args: &Args) -> Result<ExitCode> {
     let capture = load(&mut config, None, None)?;
     let (with_pilots, stop) = (effects::are_measured(&config, &capture), stop::flag()?);
     Estimate::try_out(&capture, &config.train, with_pilots, args.device()?, &stop)?;
+    // What is not measured is decided.
+    config.effects.auto &= with_pilots;
     output::print_text(&config.to_toml()?)?;
     Ok(ExitCode::SUCCESS)
 }

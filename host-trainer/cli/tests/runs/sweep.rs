@@ -29,7 +29,7 @@ fn a_sweep_goes_on_where_it_was_stopped_and_trains_nothing_twice() {
     assert!(!said.contains("trained before"), "{said}");
     let results = fs::read_to_string(home.join("results.csv")).unwrap();
     let rows: Vec<&str> = results.lines().collect();
-    assert_eq!(rows[0], "Submethod,PSNR,SSIM,LPIPS,Size [Bytes],#Gaussians");
+    assert_eq!(rows[0], "Submethod,PSNR,SSIM,LPIPS,Size [Bytes],#Gaussians,program");
     assert_eq!(rows.len(), 3, "{results}");
     for (row, lambda) in rows[1..].iter().zip(["0.004", "0.001"]) {
         let cells: Vec<&str> = row.split(',').collect();

@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 
-use pocketsplat_trainer::REVISION;
+use pocketsplat_trainer::{REVISION, revision_of};
 
 use crate::say::say;
 
@@ -44,12 +44,6 @@ pub(crate) fn warn_of_several<'a>(programs: impl IntoIterator<Item = &'a str>) {
             met.join(", ")
         );
     }
-}
-
-/// Version and revision of a program's name.
-fn revision_of(program: &str) -> &str {
-    let trained = program.split_once(',').map_or(program, |(trained, _)| trained);
-    trained.match_indices(' ').nth(1).map_or(trained, |(end, _)| &trained[..end])
 }
 
 /// The program of several rows: theirs, where all are of one.

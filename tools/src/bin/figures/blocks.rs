@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail, ensure};
-use pocketsplat_trainer::REVISION;
+use pocketsplat_trainer::{REVISION, revision_of};
 use serde::Deserialize;
 
 use super::in_repository;
@@ -97,7 +97,7 @@ impl Table {
             let cells: Vec<String> = key.iter().cloned().chain(cells).chain([seeds]).collect();
             writeln!(text, "| {} |", cells.join(" | "))?;
         }
-        text += &self.published_rows(&rows)?;
+        text += &self.published_rows(&rows, &columns)?;
         Ok(text + &caption(&measured)?)
     }
 
@@ -115,7 +115,7 @@ impl Table {
     }
 
     /// Results of others on the scenes of these rows.
-    fn published_rows(&self, rows: &[Row]) -> Result<String> {
+    fn published_rows(&self, rows: &[Row], columns: &[Column]) -> Result<String> {
         let mut text = String::new();
         if self.published.is_empty() {
             return Ok(text);
@@ -135,7 +135,6 @@ impl Table {
                 bytes: published.bytes,
                 ..Row::default()
             };
-            let columns = self.columns.iter().map(|name| column(name)).collect::<Result<Vec<_>>>()?;
             let cell = |column: &Column| (column.value)(&as_row).map_or("–".to_owned(), |value| column.shown(value));
             let cells: Vec<String> =
                 self.key(&as_row)?.into_iter().chain(columns.iter().map(cell)).chain(["–".to_owned()]).collect();
@@ -180,12 +179,6 @@ fn caption(measured: &[&Row]) -> Result<String> {
     Ok(format!("\nMeans over seeds, ± their standard deviation. Program: {program}{age}.\n"))
 }
 
-/// Version and revision of training, without the commit.
-fn revision_of(program: &str) -> &str {
-    let trained = program.split_once(',').map_or(program, |(trained, _)| trained);
-    trained.match_indices(' ').nth(1).map_or(trained, |(end, _)| &trained[..end])
-}
-
 /// README and all pages.
 pub(super) fn pages() -> Result<Vec<PathBuf>> {
     let mut pages = vec![in_repository("README.md")];
@@ -212,7 +205,7 @@ fn filled(plan: &Plan, page: &Path, text: &str) -> Result<String> {
         let table = table.with_context(|| format!("{}: the plan has no table {name}", page.display()))?;
         done += &rest[..inside];
         done += &format!("\n{}\n", table.text()?);
-        rest = &rest[inside + end..][..];
+        rest = &rest[inside + end..];
         done += END;
         rest = &rest[END.len()..];
     }

@@ -14,28 +14,24 @@ const GROUPS: [(&str, &[&str]); 5] = [
     ("Create", &["train", "import", "export"]),
     ("Look", &["eval", "render", "view", "report", "inspect"]),
     ("Device", &["fit", "verify", "cost"]),
-    ("Research", &["sweep", "ablate", "plan-runs", "tables", "compare", "plot"]),
+    ("Research", &["plan-runs", "tables", "compare", "plot"]),
     ("Captures and this machine", &["doctor", "synth", "demo", "devices", "bench", "completions", "man"]),
 ];
 
 /// Commands that train; those that look at what was trained, as it was.
-const TRAINING: &[&str] = &["train", "sweep", "ablate"];
 const LOOKING: &[&str] = &["eval", "render", "verify", "cost", "export"];
 /// Defaults in which commands that share an option differ.
-const DEFAULTS: [(&[&str], &str, &str); 13] = [
+const DEFAULTS: [(&[&str], &str, &str); 10] = [
     (&["train"], "max_resolution", "by the preset"),
-    (&["sweep", "ablate"], "max_resolution", "as they are"),
     (LOOKING, "max_resolution", "the training size of the bundle"),
-    (TRAINING, "background", "black"),
+    (&["train"], "background", "black"),
     (LOOKING, "background", "the bundle's"),
     (&["train"], "iterations", "by the preset"),
     (&["import"], "iterations", "5000"),
-    (&["sweep", "ablate"], "iterations", "30000"),
     (&["train"], "effects", "auto"),
-    (&["import", "sweep", "ablate"], "effects", "view-colour,view-geometry,anisotropy"),
+    (&["import"], "effects", "view-colour,view-geometry,anisotropy"),
     (&["train", "import"], "modules", "rdo-pruning, with tiered-pruning for a device"),
-    (&["sweep", "ablate"], "modules", "none"),
-    (&["sweep", "ablate", "import"], "feature_dim", "32 with scaffold, else 50"),
+    (&["import"], "feature_dim", "32 with scaffold, else 50"),
 ];
 
 /// The commands with what is each one's own: its defaults, and no choice that it refuses or that changes nothing for it.
@@ -49,11 +45,8 @@ pub(super) fn own_options(mut command: Command) -> Command {
         let hidden = |command, id| with(command, id, |arg| arg.hide(true));
         command = command.mut_subcommand(name, |command| hidden(hidden(command, "scene"), "points"));
     }
-    for name in ["import", "sweep", "ablate"] {
-        let anchors = |arg: Arg| arg.value_parser(backbone_of_anchors());
-        command = command.mut_subcommand(name, |command| with(command, "backbone", anchors));
-    }
     command.mut_subcommand("import", |command| {
+        let command = with(command, "backbone", |arg| arg.value_parser(backbone_of_anchors()));
         with(command, "background", |arg| arg.value_parser(one_of::<Background>(DRAWN_BACKGROUNDS)))
     })
 }
@@ -108,7 +101,7 @@ mod tests {
                 let default = help.split("[default:").nth(1).unwrap_or_default();
                 let mut words = default.split(|c: char| !c.is_alphanumeric());
                 assert!(
-                    !words.any(|word| ["train", "import", "sweep", "ablate", "elsewhere"].contains(&word)),
+                    !words.any(|word| ["train", "import", "elsewhere"].contains(&word)),
                     "{} --{}: {help}",
                     command.get_name(),
                     arg.get_id()

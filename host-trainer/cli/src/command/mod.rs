@@ -1,6 +1,5 @@
 //! The commands, one file each; only these files print.
 
-mod ablate;
 mod bench;
 mod bundle;
 mod capture;
@@ -30,11 +29,9 @@ mod process;
 mod progress;
 mod render;
 mod report;
-mod runs;
 mod settings;
 mod stand;
 mod stop;
-mod sweep;
 mod synth;
 mod tables;
 mod train;
@@ -76,8 +73,6 @@ enum Command {
     Cost(cost::Args),
     Verify(verify::Args),
     Plot(plot::Args),
-    Sweep(sweep::Args),
-    Ablate(ablate::Args),
     PlanRuns(plan_runs::Args),
     Tables(tables::Args),
     Compare(compare::Args),
@@ -144,8 +139,7 @@ fn dispatch(cli: Cli) -> Result<ExitCode> {
         .with_context(|| format!("could not start {n_threads} threads"))?;
     match cli.command {
         Command::Train(args) => return train::run(&args),
-        Command::Sweep(args) => return sweep::run(&args),
-        Command::Ablate(args) => return ablate::run(&args),
+        Command::PlanRuns(args) => return plan_runs::run(&args),
         Command::Verify(args) => return verify::run(&args),
         Command::Doctor(args) => return doctor::run(&args),
         Command::Import(args) => import::run(&args),
@@ -157,7 +151,6 @@ fn dispatch(cli: Cli) -> Result<ExitCode> {
         Command::Inspect(args) => inspect::run(&args),
         Command::Fit(args) => fit::run(&args),
         Command::Cost(args) => cost::run(&args),
-        Command::PlanRuns(args) => plan_runs::run(&args),
         Command::Tables(args) => tables::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Plot(args) => plot::run(&args),

@@ -20,8 +20,6 @@ pub(super) const JPEG: Content = Content::Picture(FileKind::Jpeg);
 pub(super) const GIF: Content = Content::Kind(FileKind::Gif);
 /// As plotters begins them.
 pub(super) const FIGURE: Content = Content::Text(&["<svg width="], "a figure (.svg)");
-/// As `plot::results_csv` begins them.
-pub(super) const RESULTS: Content = table(&["Submethod,"]);
 
 /// Of a folder that is ours: whatever lies there under the name.
 pub(super) const ANYTHING: Content = Content::Text(&[""], "a file of the folder");

@@ -2,25 +2,29 @@
 
 mod spec;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use clap::{Args as _, FromArgMatches as _};
+use pocketsplat_files::{Outputs, shell_word};
 
 use super::devices::DeviceChoice;
 use super::loaded::LoadedCapture;
 use super::lpips::LpipsArgs;
-use super::outputs::OverwriteArgs;
+use super::outputs::{BUNDLE, OverwriteArgs};
 use super::workflow::{Place, Planner};
-use super::{output, tables, train_args};
+use super::{output, point, stop, tables, train, train_args};
 use crate::config::RunConfig;
+use crate::say::say;
 use spec::{AskedRun, Spec};
 
-/// Plan many runs as a Snakemake workflow.
+/// Train many captures with many options, here or as a workflow.
 ///
-/// Write a Snakemake workflow that trains, measures and tabulates every combination of a list of captures and options.
+/// Write a Snakemake workflow that trains, measures and tabulates every combination of a list of captures and options; with --run do it
+/// here, without Snakemake.
 ///
-/// Every run asks for the threads that this command has, and for memory and minutes by its own estimate, which takes a few steps of
+/// The same command again goes on where it was stopped, and trains nothing twice. Every run of a workflow asks for the threads that this command has, and for memory and minutes by its own estimate, which takes a few steps of
 /// each kind of run. The workflow ends with `tables`.
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -29,13 +33,16 @@ pub(crate) struct Args {
     /// Folder for the workflow, the runs and their tables.
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
+    /// Train, measure and tabulate the runs here, one after another.
+    #[arg(long)]
+    run: bool,
     #[command(flatten)]
     lpips: LpipsArgs,
     #[command(flatten)]
     overwrite: OverwriteArgs,
 }
 
-pub(crate) fn run(args: &Args) -> Result<()> {
+pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     let spec = Spec::read(&args.spec)?;
     let folder = std::path::absolute(&args.output).with_context(|| format!("{} is no path", args.output.display()))?;
     let lpips = args.lpips.options()?;
@@ -54,13 +61,51 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         let seed = config.train.seed;
         let AskedRun { name, dataset, scene, size, method, rate, .. } = run;
         let place = Place { dataset, scene, size, method, rate, seed };
-        planner.add(name, config, device, Some(place), &lpips, &mut loaded)?;
+        planner.add(name, config, device, place, &lpips, &mut loaded)?;
     }
+    // Never two captures in memory.
+    drop(loaded);
     let mut merge = vec!["tables".to_owned(), folder.display().to_string()];
     if let Some(published) = &spec.published {
         merge.extend(["--published".to_owned(), published.display().to_string()]);
     }
-    output::print_text(&planner.write(&folder, merge, &tables::FILES, &outputs)?)
+    planner.write(&folder, merge, &tables::FILES, &outputs)?;
+    if args.run {
+        return run_here(args, &planner, &folder, &spec, &outputs);
+    }
+    output::print_text(&format!(
+        "{}\ntrain them:  cd {} && snakemake --cores all\n",
+        planner.size(),
+        shell_word(&folder)
+    ))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Trains and measures what is not yet; after each run the tables hold what is there.
+fn run_here(args: &Args, planner: &Planner, folder: &Path, spec: &Spec, outputs: &Outputs) -> Result<ExitCode> {
+    let lpips = args.lpips.load()?;
+    // All of them before the first is trained for an hour.
+    for (_, config, _) in planner.runs() {
+        outputs.clone().file(&config.output, BUNDLE)?;
+    }
+    say!("{}", planner.size());
+    let (stop, n) = (stop::flag()?, planner.runs().count());
+    let mut loaded = LoadedCapture::for_training(folder.to_owned());
+    for (i, (name, config, device)) in planner.runs().enumerate() {
+        say!("{} of {n}  {name}", i + 1);
+        let mut config = config.clone();
+        let capture = loaded.of(&mut config)?;
+        if !point::trained(&config, capture, device, &stop)? {
+            say!("the same command again resumes here");
+            return Ok(ExitCode::from(stop::INTERRUPTED));
+        }
+        point::measured(&config, lpips.as_ref())?;
+        tables::write(folder, spec.published.as_deref(), outputs)?;
+    }
+    drop(loaded);
+    train::clear_photographs(folder, ExitCode::SUCCESS);
+    output::print_text(&tables::write(folder, spec.published.as_deref(), outputs)?)?;
+    Ok(ExitCode::SUCCESS)
 }
 
 /// The configuration that `train` makes of a run's options, and what is to train it.
@@ -89,4 +134,26 @@ fn configured(run: &AskedRun, output: PathBuf) -> Result<(RunConfig, DeviceChoic
 fn in_one_line(error: &str) -> String {
     let said = error.trim_start_matches("error: ").lines().map(str::trim).filter(|line| !line.is_empty());
     said.take_while(|line| !line.starts_with("Usage:")).collect::<Vec<_>>().join("; ")
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    #[test]
+    fn the_plans_that_lie_ready_can_be_trained() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/plans");
+        for (name, n_runs, n_methods) in [("rates.toml", 12, 1), ("modules.toml", 84, 7)] {
+            let runs = Spec::read(&folder.join(name)).unwrap().runs().unwrap();
+            let mut methods: Vec<&str> = runs.iter().map(|run| run.method.as_str()).collect();
+            methods.sort_unstable();
+            methods.dedup();
+            assert_eq!((runs.len(), methods.len()), (n_runs, n_methods), "{name}: {methods:?}");
+            for run in &runs {
+                configured(run, PathBuf::from("a.psb")).unwrap();
+            }
+        }
+    }
 }

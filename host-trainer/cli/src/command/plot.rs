@@ -1,4 +1,4 @@
-//! `pocketsplat plot`: figures of what runs and sweeps recorded.
+//! `pocketsplat plot`: figures of what runs recorded.
 
 use std::path::PathBuf;
 
@@ -15,12 +15,12 @@ use super::outputs::{FIGURE, OverwriteArgs, check_name};
 
 /// Draw recorded curves as an SVG.
 ///
-/// Draw learning curves of runs, rate-distortion curves of sweeps and ablations, or what settings cost, into an SVG.
+/// Draw learning curves of runs, rate-distortion curves, or what settings cost, into an SVG.
 ///
 /// Of rate-distortion curves it also prints how far each lies from the first: Bjøntegaard's deltas.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Files of one kind: progress.csv of runs, results of sweeps (`PSNR`, `Size [Bytes]`), ablation.csv, or cost.csv and runs.csv.
+    /// Files of one kind: progress.csv of runs, tables with quality and size (`PSNR`, `Size [Bytes]`), or cost.csv and runs.csv.
     #[arg(value_name = "CSV", required = true)]
     files: Vec<PathBuf>,
     /// The figure to write.
@@ -44,12 +44,14 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     for (path, name) in args.files.iter().zip(names_of(&args.files)) {
         match Recording::read(path)? {
             Recording::Learning(what) => runs.push(Named { name, what }),
-            Recording::Results(what) => curves.push(Named { name, what }),
-            Recording::Curves(of_file) if args.files.len() == 1 => curves.extend(of_file),
             Recording::Curves(of_file) => {
-                curves.extend(
-                    of_file.into_iter().map(|Named { name: own, what }| Named { name: format!("{name}: {own}"), what }),
-                );
+                let is_alone = args.files.len() == 1;
+                let named = |own: String| match own.is_empty() {
+                    true => name.clone(),
+                    false if is_alone => own,
+                    false => format!("{name}: {own}"),
+                };
+                curves.extend(of_file.into_iter().map(|Named { name, what }| Named { name: named(name), what }));
             }
             Recording::Cost(of_file) => panels.extend(of_file),
         }

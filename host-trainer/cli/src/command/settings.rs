@@ -28,7 +28,7 @@ pub(crate) struct QualityOptions {
     /// [default: hac]
     #[arg(long, value_parser = backbone_choice(), help_heading = QUALITY)]
     backbone: Option<BackboneChoice>,
-    /// Training steps, with which all schedules scale [default: 7000 by the preset of train, 5000 for import, 30000 for sweep and ablate]
+    /// Training steps, with which all schedules scale [default: 7000 by the preset of train, 5000 for import]
     #[arg(long, value_name = "N", help_heading = QUALITY)]
     iterations: Option<u32>,
     /// Effects to train: auto, which tests them in runs of 16,000 iterations and more, or a list of none, all, +NAME and -NAME with the

@@ -7,10 +7,10 @@ mod finished;
 mod published;
 mod survey;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
-use pocketsplat_files::Content;
+use pocketsplat_files::{Content, Outputs};
 
 use super::output;
 use super::outputs::{OverwriteArgs, table};
@@ -42,14 +42,24 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
-    let plan = Plan::read(&args.folder)?;
-    let published = args.published.as_deref().map(PublishedRow::read_all).transpose()?.unwrap_or_default();
-    let runs = finished::runs(&plan, &args.folder)?;
+    output::print_text(&write(&args.folder, args.published.as_deref(), &args.overwrite.outputs())?)
+}
+
+/// Writes the tables of what is measured in the folder of a plan, and returns how much that is.
+///
+/// * `published`: the table of published results, if any.
+pub(super) fn write(folder: &Path, published: Option<&Path>, outputs: &Outputs) -> Result<String> {
+    let plan = Plan::read(folder)?;
+    let mut outputs = published.iter().fold(outputs.clone(), |outputs, path| outputs.reading(path));
+    let published = published.map(PublishedRow::read_all).transpose()?.unwrap_or_default();
+    let runs = finished::runs(&plan, folder)?;
     if runs.is_empty() {
-        bail!("no run of {} is measured yet; train them: snakemake --cores all", args.folder.display());
+        bail!(
+            "no run of {} is measured yet; train them: `snakemake --cores all` there, or `plan-runs` with --run",
+            folder.display()
+        );
     }
-    let mut outputs = args.published.iter().fold(args.overwrite.outputs(), |outputs, path| outputs.reading(path));
-    let [(all, of_all), (bd_rates, of_rates)] = FILES.map(|(file, content)| (args.folder.join(file), content));
+    let [(all, of_all), (bd_rates, of_rates)] = FILES.map(|(file, content)| (folder.join(file), content));
     outputs.file(&all, of_all)?.write(&output::csv(runs.iter().map(finished::FinishedRun::line))?)?;
     let programs = || runs.iter().map(|run| run.evaluation.program.as_str());
     program::warn_of_several(programs());
@@ -58,18 +68,18 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let mut differences = Vec::new();
     for group in &groups {
         differences.extend(differences::of_group(group));
-        survey::write(&args.folder.join("tables"), group, &published, &mut outputs)?;
+        survey::write(&folder.join("tables"), group, &published, &mut outputs)?;
     }
     outputs.file(&bd_rates, of_rates)?.write(&output::csv_of(&program, &differences)?)?;
     if !published.is_empty() {
         let text = comparison::markdown(&groups, &published);
         let page = Content::Text(&["# Published results and ours"], "a comparison (.md)");
-        outputs.file(&args.folder.join("tables/comparison.md"), page)?.write(text.as_bytes())?;
+        outputs.file(&folder.join("tables/comparison.md"), page)?.write(text.as_bytes())?;
     }
-    output::print_text(&format!(
+    Ok(format!(
         "{} of {} runs are measured; tables and figures: {}\n",
         runs.len(),
         plan.runs.len(),
-        args.folder.join("tables").display()
+        folder.join("tables").display()
     ))
 }

@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result};
 use pocketsplat_capture::dataset::{Capture, Split};
-use pocketsplat_files::{Content, Outputs, shell_word};
+use pocketsplat_files::{Content, Outputs};
 use pocketsplat_trainer::train::TrainConfig;
 use serde::{Deserialize, Serialize};
 
@@ -50,15 +50,14 @@ pub(super) struct Merge {
     pub(super) files: Vec<String>,
 }
 
-/// A run of a workflow: NAME.toml says how it is trained, NAME.psb is its bundle, NAME.json its figures, NAME.html its page.
-#[derive(Debug, Serialize, Deserialize)]
+/// A run of a plan: NAME.toml says how it is trained, NAME.psb is its bundle, NAME.json its figures, NAME.html its page.
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct PlannedRun {
     pub(super) name: String,
     /// Folder of the capture.
     pub(super) capture: PathBuf,
-    /// Where it stands in tables; none where another command merges the runs.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(super) place: Option<Place>,
+    /// Where it stands in tables.
+    pub(super) place: Place,
     /// What trains: the `--device` of `train`.
     #[serde(default = "cpu")]
     pub(super) device: String,
@@ -91,7 +90,8 @@ pub(super) struct Place {
 #[derive(Default)]
 pub(super) struct Planner {
     runs: Vec<PlannedRun>,
-    configs: Vec<RunConfig>,
+    /// How each is trained, and what trains it.
+    configs: Vec<(RunConfig, DeviceChoice)>,
     /// What kinds of runs take, each tried out once.
     tried: Vec<(RunConfig, Expected)>,
 }
@@ -105,7 +105,7 @@ impl Planner {
         name: String,
         mut config: RunConfig,
         device: DeviceChoice,
-        place: Option<Place>,
+        place: Place,
         lpips: &[String],
         loaded: &mut LoadedCapture,
     ) -> Result<()> {
@@ -130,7 +130,7 @@ impl Planner {
             memory_mb: above(MEMORY_MARGIN * expected.memory_bytes / 1e6),
             minutes: above(MINUTES_MARGIN * expected.minutes),
         });
-        self.configs.push(config);
+        self.configs.push((config, device));
         Ok(())
     }
 
@@ -147,17 +147,21 @@ impl Planner {
         Ok(expected)
     }
 
-    /// Writes the workflow into a folder, and returns what to do with it; files that are right already stay untouched, so that
-    /// nothing is done again.
+    /// The runs in the order of the plan: the path of each, how it is trained, and what trains it.
+    pub(super) fn runs(&self) -> impl Iterator<Item = (&str, &RunConfig, DeviceChoice)> {
+        self.runs.iter().zip(&self.configs).map(|(run, (config, device))| (&*run.name, config, *device))
+    }
+
+    /// Writes the workflow into a folder; files that are right already stay untouched, so that nothing is done again.
     ///
     /// * `merge`: arguments of the command that merges the runs. * `files`: those it writes.
     pub(super) fn write(
-        self,
+        &self,
         folder: &Path,
         merge: Vec<String>,
         files: &[(&str, Content)],
         outputs: &Outputs,
-    ) -> Result<String> {
+    ) -> Result<()> {
         let mut outputs = outputs.clone();
         let mut write_changed = |path: &Path, content: Content, text: &str| -> Result<()> {
             let output = outputs.file(path, content)?;
@@ -166,36 +170,29 @@ impl Planner {
             }
             Ok(output.write(text.as_bytes())?)
         };
-        for (run, config) in self.runs.iter().zip(&self.configs) {
+        for (run, (config, _)) in self.runs.iter().zip(&self.configs) {
             write_changed(&folder.join(format!("{}.toml", run.name)), CONFIGURATION, &config.to_toml()?)?;
             // Snakemake measures anew where it changes.
             write_changed(&folder.join(format!("{}.measure", run.name)), OPTIONS, &(run.measure.join("\n") + "\n"))?;
         }
-        let said = said(&self.runs, folder);
         let merge = Merge {
             folder: std::env::current_dir().context("this folder has no path")?,
             arguments: merge,
             files: files.iter().map(|(file, _)| (*file).to_owned()).collect(),
         };
         let program = std::env::current_exe().context("this program has no path")?;
-        let plan = serde_json::to_string_pretty(&Plan { program, runs: self.runs, merge })? + "\n";
+        let plan = serde_json::to_string_pretty(&Plan { program, runs: self.runs.clone(), merge })? + "\n";
         write_changed(&folder.join(PLAN.0), PLAN.1, &plan)?;
         write_changed(&folder.join("Snakefile"), RULES, SNAKEFILE)?;
-        write_changed(&folder.join("profiles/default/config.yaml"), RULES, PROFILE)?;
-        Ok(said)
+        write_changed(&folder.join("profiles/default/config.yaml"), RULES, PROFILE)
     }
-}
 
-/// What to do with a plan.
-fn said(runs: &[PlannedRun], folder: &Path) -> String {
-    let minutes = runs.iter().map(|run| run.minutes as f64).sum::<f64>() / MINUTES_MARGIN;
-    format!(
-        "{} runs, about {} one after another on {} threads\ntrain them:  cd {} && snakemake --cores all\n",
-        runs.len(),
-        duration(minutes),
-        rayon::current_num_threads(),
-        shell_word(folder)
-    )
+    /// How many runs there are, and what they take.
+    pub(super) fn size(&self) -> String {
+        let minutes = self.runs.iter().map(|run| run.minutes as f64).sum::<f64>() / MINUTES_MARGIN;
+        let threads = rayon::current_num_threads();
+        format!("{} runs, about {} one after another on {threads} threads", self.runs.len(), duration(minutes))
+    }
 }
 
 impl Plan {

@@ -1,4 +1,4 @@
-//! Plots of what runs and sweeps recorded, as SVG that any browser shows.
+//! Plots of what runs recorded, as SVG that any browser shows.
 //!
 //! [`Recording`] reads a CSV file and tells by its header what it holds; `learning` and `rate_distortion` draw several of
 //! a kind into one figure, `cost` compares settings; `chart`, `marker` and `labels` are what all share. No fonts are needed to draw: text stays text.
@@ -11,13 +11,15 @@ mod marker;
 mod names;
 mod rate_distortion;
 mod recording;
+mod results;
 
 pub(crate) use chart::thousands;
 pub(crate) use cost::{CostPanel, CostPoint, cost_svg};
 pub(crate) use learning::{learning_curve_svg, learning_curves_svg};
 pub(crate) use names::names_of;
 pub(crate) use rate_distortion::{SizeAxis, rate_distortion_svg};
-pub(crate) use recording::{LearningRow, Recording, ResultRow, results_csv};
+pub(crate) use recording::{LearningRow, Recording};
+pub(crate) use results::ResultRow;
 
 /// Something with the name that a legend gives it.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,15 +1,15 @@
-//! What runs and sweeps recorded, as read from CSV files.
+//! What runs recorded, as read from CSV files.
 
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
-use pocketsplat_metrics::RatePoint;
 use pocketsplat_trainer::cost::on_front;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
+use super::Named;
 use super::cost::{CostPanel, CostPoint};
-use super::{Named, gathered};
+use super::results::{self, ResultRow};
 
 /// One row of a run's `progress.csv`; other columns are passed over.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
@@ -41,78 +41,6 @@ impl LearningRow {
     }
 }
 
-/// One row of results: a method at one rate, with means over views or scenes.
-///
-/// The columns are those of the 3DGS compression survey (Bagdasarian et al. 2024, "3DGS.zip"), so that its tables and ours
-/// can be laid over each other.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-pub(crate) struct ResultRow {
-    /// Name of the rate.
-    #[serde(rename = "Submethod")]
-    pub submethod: String,
-    /// dB.
-    #[serde(rename = "PSNR")]
-    pub psnr_db: f64,
-    /// Structural similarity.
-    #[serde(rename = "SSIM")]
-    pub ssim: Option<f64>,
-    /// Perceptual distance; none where it was not measured.
-    #[serde(rename = "LPIPS")]
-    pub lpips: Option<f64>,
-    /// Everything that is needed to draw.
-    #[serde(rename = "Size [Bytes]")]
-    pub size_bytes: f64,
-    /// Gaussians that can be drawn.
-    #[serde(rename = "#Gaussians")]
-    pub n_gaussians: Option<f64>,
-    /// What trained and measured it; none for what is published.
-    pub program: Option<String>,
-}
-
-impl ResultRow {
-    /// Where the row lies in the plane of rate and distortion.
-    pub(crate) fn rate_point(&self) -> RatePoint {
-        RatePoint { size_bytes: self.size_bytes, psnr_db: self.psnr_db }
-    }
-
-    /// A row without what no curve shows.
-    #[cfg(test)]
-    pub(crate) fn of(submethod: &str, size_bytes: f64, psnr_db: f64) -> Self {
-        let submethod = submethod.to_owned();
-        Self { submethod, psnr_db, ssim: None, lpips: None, size_bytes, n_gaussians: None, program: None }
-    }
-}
-
-/// Results as the CSV that [`Recording::read`] takes back.
-pub(crate) fn results_csv(rows: &[ResultRow]) -> Result<Vec<u8>> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(["Submethod", "PSNR", "SSIM", "LPIPS", "Size [Bytes]", "#Gaussians", "program"])?;
-    let decimals = |value: f64| format!("{value:.6}");
-    for row in rows {
-        writer.write_record([
-            row.submethod.clone(),
-            decimals(row.psnr_db),
-            row.ssim.map(decimals).unwrap_or_default(),
-            row.lpips.map(decimals).unwrap_or_default(),
-            row.size_bytes.to_string(),
-            row.n_gaussians.map(|n| n.to_string()).unwrap_or_default(),
-            row.program.clone().unwrap_or_default(),
-        ])?;
-    }
-    Ok(writer.into_inner()?)
-}
-
-/// One run of an ablation.
-#[derive(Deserialize)]
-struct AblationRow {
-    row: String,
-    lambda: f64,
-    #[serde(rename = "PSNR")]
-    psnr_db: f64,
-    #[serde(rename = "Size [Bytes]")]
-    size_bytes: f64,
-}
-
 /// One run of a comparison.
 #[derive(Deserialize)]
 struct RunRow {
@@ -124,24 +52,15 @@ struct RunRow {
     size_bytes: f64,
 }
 
-/// Whose a row of results is, in tables of several methods: two may have rates of one name.
-#[derive(Deserialize)]
-struct MethodColumn {
-    #[serde(rename = "Method")]
-    method: String,
-}
-
 /// A CSV file by what it holds.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Recording {
     /// What settings or runs cost.
     Cost(Vec<CostPanel>),
-    /// Curves of an ablation or of several methods, each with its seeds.
+    /// Quality over size, each curve with its seeds.
     Curves(Vec<Named<Vec<ResultRow>>>),
     /// How a run went.
     Learning(Vec<LearningRow>),
-    /// What came out over rates.
-    Results(Vec<ResultRow>),
 }
 
 impl Recording {
@@ -161,22 +80,13 @@ impl Recording {
             Ok(Self::Cost(settings(reader)?))
         } else if has(&["setting", "processor_minutes", "PSNR", "Size [Bytes]"]) {
             Ok(Self::Cost(runs(&rows(reader)?)))
-        } else if has(&["row", "lambda", "seed", "PSNR", "Size [Bytes]"]) {
-            Ok(Self::Curves(ablation(rows(reader)?)))
-        } else if has(&["Method", "PSNR", "Size [Bytes]"]) {
-            let methods: Vec<MethodColumn> = rows(csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes))?;
-            let named = methods.into_iter().map(|row| row.method).zip(rows(reader)?);
-            Ok(match <[_; 1]>::try_from(gathered(named)) {
-                Ok([Named { what, .. }]) => Self::Results(what),
-                Err(several) => Self::Curves(several),
-            })
-        } else if has(&["PSNR", "Size [Bytes]"]) {
-            Ok(Self::Results(rows(reader)?))
+        } else if results::is_table(&header) {
+            Ok(Self::Curves(results::curves(&mut reader)?))
         } else {
             let found: String = header.iter().collect::<Vec<_>>().join(",").chars().take(80).collect();
             bail!(
                 "it begins with `{found}`; needs the columns iteration, psnr_db and anchors (progress.csv of a run), PSNR and \
-                 Size [Bytes] (results of a sweep), or what ablate, cost and compare write (ablation.csv, cost.csv, runs.csv)"
+                 Size [Bytes] (tables of runs), or what cost and compare write (cost.csv, runs.csv)"
             )
         }
     }
@@ -242,17 +152,6 @@ fn knob_of(setting: &str) -> String {
     }
 }
 
-/// The rows of an ablation as curves; rows of one rate are seeds. A row of one rate alone is no curve.
-fn ablation(rows: Vec<AblationRow>) -> Vec<Named<Vec<ResultRow>>> {
-    let point = |AblationRow { row, lambda, psnr_db, size_bytes }| {
-        let submethod = format!("lambda={lambda}");
-        (row, ResultRow { submethod, psnr_db, ssim: None, lpips: None, size_bytes, n_gaussians: None, program: None })
-    };
-    let mut curves = gathered(rows.into_iter().map(point));
-    curves.retain(|curve| curve.what.iter().any(|point| point.submethod != curve.what[0].submethod));
-    curves
-}
-
 fn rows<T: DeserializeOwned>(mut reader: csv::Reader<&[u8]>) -> Result<Vec<T>> {
     let rows = reader.deserialize().collect::<Result<Vec<T>, _>>()?;
     if rows.is_empty() {
@@ -273,23 +172,6 @@ mod tests {
     }
 
     #[test]
-    fn results_are_read_back_as_they_were_written() {
-        let row = |submethod: &str, lpips| ResultRow {
-            submethod: submethod.to_owned(),
-            psnr_db: 31.25,
-            ssim: Some(0.9375),
-            lpips,
-            size_bytes: 1_234_567.0,
-            n_gaussians: Some(98_765.0),
-            program: Some("0.1.0 r1".to_owned()),
-        };
-        let rows = vec![row("λ=0.004", None), row("λ=0.001", Some(0.125))];
-        let text = String::from_utf8(results_csv(&rows).unwrap()).unwrap();
-        assert!(text.contains("\nλ=0.004,31.250000,0.937500,,1234567,98765,0.1.0 r1\n"), "{text}");
-        assert_eq!(read(&text).unwrap(), Recording::Results(rows));
-    }
-
-    #[test]
     fn columns_are_told_by_name() {
         let text = "iteration,weather,psnr_db,anchors\n3,7.5,10.5,54381\n6,,,54400\n";
         let row = |iteration, psnr_db, anchors, [feature_bits, log_scale_bits, offset_bits]: [Option<f64>; 3]| {
@@ -305,17 +187,20 @@ mod tests {
 
     #[test]
     fn what_the_other_commands_write_is_read_too() {
-        let ablation = "row,lambda,seed,PSNR,Size [Bytes]\nnone,0.004,42,33.5,400\nnone,0.004,43,33.7,420\n\
-            none,0.002,42,34.0,500\nalone,0.004,42,1.0,2\n";
-        let Recording::Curves(curves) = read(ablation).unwrap() else { panic!("an ablation") };
-        assert_eq!((curves.len(), curves[0].name.as_str(), curves[0].what.len()), (1, "none", 3));
+        let found = |text: &str| -> Vec<(String, usize)> {
+            let Recording::Curves(curves) = read(text).unwrap() else { panic!("curves") };
+            curves.into_iter().map(|curve| (curve.name, curve.what.len())).collect()
+        };
+        let named = |name: &str, n| (name.to_owned(), n);
         let heads = "Method,Submethod,PSNR,SSIM,LPIPS,Size [Bytes],#Gaussians\n";
-        let table = format!("{heads}hac,a,30,,,4e5,\nhac-plus,a,31,,,3e5,\nhac,b,33,,,8e5,\n");
-        let Recording::Curves(curves) = read(&table).unwrap() else { panic!("two methods") };
-        let found: Vec<_> = curves.iter().map(|curve| (curve.name.as_str(), curve.what.len())).collect();
-        assert_eq!(found, [("hac", 2), ("hac-plus", 1)]);
-        let Recording::Results(rows) = read(format!("{heads}hac,a,30,,,4e5,\n")).unwrap() else { panic!("one method") };
-        assert_eq!(rows.len(), 1);
+        let table = format!("{heads}hac,a,30,,,4e5,\nhac-plus,a,31,,,3e5,\nhac,b,33,,,8e5,\nhac,c,,,,,\n");
+        assert_eq!(found(&table), [named("hac", 2), named("hac-plus", 1)], "what was not measured is no point");
+        assert_eq!(found(&format!("{heads}hac,a,30,,,4e5,\n")), [named("", 1)], "one curve is the file's");
+        let plan = "run,dataset,scene,size,method,rate,seed,psnr_db,bytes\na-1,A,a,,ours,low,1,30,4e5\na-2,A,a,,ours,low,2,31,5e5\n\
+            b-1,A,b,,ours,low,1,33,8e5\n";
+        assert_eq!(found(plan), [named("a", 2), named("b", 1)], "runs of one method are its seeds");
+        let rates = "capture,px,lambda,PSNR,bytes\nlego,200,0.1,30,1\nlego,400,0.1,31,2\n";
+        assert_eq!(found(rates), [named("200", 1), named("400", 1)]);
         let costs = "knob,setting,PSNR,host_s,m4 instructions,m4 on_front,host on_front\n\
             level,exact,31.5,0.002,4e7,false,true\ncut,none,31.0,0.001,,false,true\n";
         let Recording::Cost(panels) = read(costs).unwrap() else { panic!("costs") };

@@ -7,7 +7,7 @@ use std::process::Command;
 use pocketsplat_core::Bundle;
 use pocketsplat_core::bundle::Effects;
 
-use crate::fixture::{capture, fails, folder, pocketsplat, resume, starts, succeeds, text, train};
+use crate::fixture::{fails, folder, pocketsplat, resume, starts, succeeds, text, train};
 use crate::interruption::signal;
 
 fn effects_of(bundle: &PathBuf) -> Effects {
@@ -60,10 +60,6 @@ fn an_effect_is_set_in_one_way() {
     let said = fails(train(&output).args(["--effects", "+detail", "--set", "train.shape.detail_hidden=99"]));
     assert!(said.contains("belongs to the effect detail") && said.contains("train.modules.detail.hidden"), "{said}");
     assert!(effects_of(&output).detail && effects_of(&output).view_colour);
-    let mut sweep = pocketsplat();
-    sweep.arg("sweep").arg(capture()).arg("-o").arg(output.with_extension("sweep"));
-    let said = fails(sweep.args(["--lambda", "0.004", "--effects", "auto"]));
-    assert!(said.contains("need the same effects"), "{said}");
 }
 
 #[test]

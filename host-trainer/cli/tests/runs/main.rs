@@ -21,7 +21,6 @@ mod preview;
 mod remedies;
 mod report;
 mod splats;
-mod sweep;
 mod terminal;
 mod view;
 mod watch;

@@ -1,10 +1,10 @@
-//! Modules from the command line: attached, resumed, refused, compared.
+//! Modules from the command line: attached, resumed, refused.
 
 use std::fs;
 
 use pocketsplat_core::Bundle;
 
-use crate::fixture::{capture, fails, folder, pocketsplat, resume, starts, succeeds, text, train, wait_for};
+use crate::fixture::{fails, folder, pocketsplat, resume, starts, succeeds, text, train, wait_for};
 
 #[test]
 fn a_run_with_every_module_goes_on_in_the_same_bytes_on_either_backbone() {
@@ -79,38 +79,4 @@ fn a_module_that_there_is_not_is_refused_by_its_name() {
     assert!(error.contains("unknown key `train.modules.detail.depth`"), "{error}");
     let error = fails(train(&output).args(["--set", "train.modules.distribution.form=histogram"]));
     assert!(error.contains("unknown key `train.modules.distribution.form`; known here: divergence, spread"), "{error}");
-}
-
-#[test]
-fn an_ablation_keeps_what_is_done_and_compares_it_with_the_backbone_alone() {
-    let home = folder("ablation");
-    let ablate = |rows: &str| {
-        let mut command = pocketsplat();
-        command.arg("ablate").arg(capture()).arg("-o").arg(&home).args(["--lambda", "0.02,0.0005", "--rows", rows]);
-        command.args(["--iterations", "60", "--feature-dim", "8", "--offsets", "3", "--seeds", "2"]);
-        command
-    };
-    succeeds(&mut ablate("pruning-20"));
-    let said = succeeds(&mut ablate("none,all,pruning-20,tiered"));
-    assert_eq!(said.matches("trained before").count(), 4, "two rates and a second seed of one row, an option: {said}");
-    let table = fs::read_to_string(home.join("ablation.csv")).unwrap();
-    assert_eq!(table.lines().count(), 1 + 2 * 3 + 2, "{table}");
-    let tiered = table.lines().find(|line| line.starts_with("tiered,")).unwrap();
-    let tiers = tiered.rsplit(',').nth(1).unwrap();
-    assert!(tiers.ends_with(|c: char| c.is_ascii_digit()) && tiers.contains("0.00:"), "{tiered}");
-    let summary = fs::read_to_string(home.join("summary.csv")).unwrap();
-    let rows: Vec<&str> = summary.lines().map(|line| line.split(',').next().unwrap()).collect();
-    assert_eq!(rows.len(), 4, "{summary}");
-    assert!(["all", "tiered", "pruning-20"].iter().all(|row| rows.contains(row)), "{summary}");
-    let figure = fs::read_to_string(home.join("rate_distortion.svg")).unwrap();
-    assert!(figure.contains("none") && figure.contains("all"));
-    let error = fails(&mut ablate("tiered,sharpening"));
-    assert!(error.contains("sharpening"), "{error}");
-}
-
-#[test]
-fn the_rows_of_an_ablation_are_listed_without_a_capture() {
-    let listed = pocketsplat().args(["ablate", "--list"]).output().unwrap();
-    let rows = text(&listed.stdout);
-    assert!(listed.status.success() && rows.starts_with("none ") && rows.contains("\ntiered-80 "), "{rows}");
 }

@@ -147,7 +147,82 @@ fn a_plan_that_train_would_refuse_is_refused_before_any_work() {
     assert!(error.contains("calls `hacc` \"ours\"") && error.contains("hac, hac-plus, scaffold"), "{error}");
     let error = refused(&format!("{PLAN}[[exclude]]\nlambda = 0.002\n"));
     assert!(error.contains("lambda 0.002, which no run has"), "{error}");
+    let error = refused(&PLAN.replace("offsets = 3", "effects = \"auto\""));
+    assert!(error.contains("need the same effects"), "{error}");
     let error = refused("captures.a.lego = \"missing\"");
     assert!(error.contains("missing"), "{error}");
     assert!(!home.join("runs/runs.json").exists(), "nothing was written");
+}
+
+const RATES: &str = r#"
+[captures.Synthetic]
+lamp = "CAPTURE"
+
+[options]
+iterations = 80
+feature-dim = 8
+offsets = 3
+checkpoint-every = 20
+modules = "rdo-pruning,tiered-pruning"
+
+[vary]
+lambda = [0.004, 0.001]
+"#;
+
+#[test]
+fn runs_of_a_plan_go_on_where_they_were_stopped_and_nothing_is_trained_twice() {
+    let home = folder("plan-run");
+    let run = |text: &str| {
+        let mut command = plan(&home, text);
+        command.arg("--run");
+        command
+    };
+    let runs = home.join("runs");
+    let mut child = starts(&mut run(RATES));
+    wait_for(&runs.join("lamp/lambda-0.004.run"), 45, &mut child);
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let table = runs.join("tables/runs.csv");
+    assert!(!table.exists(), "no run is done");
+
+    let said = succeeds(&mut run(RATES));
+    assert!(said.contains("going on after iteration ") && !said.contains("trained before"), "{said}");
+    let first = fs::read_to_string(&table).unwrap();
+    assert_eq!(first.lines().count(), 3, "{first}");
+    let heads: Vec<&str> = first.lines().next().unwrap().split(',').collect();
+    let at = |name: &str| heads.iter().position(|head| *head == name).unwrap();
+    for (row, lambda) in first.lines().skip(1).zip(["0.004", "0.001"]) {
+        let cells: Vec<&str> = row.split(',').collect();
+        let bytes = fs::metadata(runs.join(format!("lamp/lambda-{lambda}.psb"))).unwrap().len();
+        assert_eq!(
+            (cells[at("rate")], cells[at("Size [Bytes]")]),
+            (&*format!("lambda={lambda}"), &*bytes.to_string()),
+            "{row}"
+        );
+        assert!(cells[at("PSNR")].parse::<f64>().unwrap() > 10.0 && cells[at("LPIPS")].is_empty(), "no weights: {row}");
+    }
+    let figures = fs::read_to_string(runs.join("lamp/lambda-0.001.json")).unwrap();
+    assert!(figures.contains("\"pruning_rate\""), "trained tiers are measured: {figures}");
+
+    let said = succeeds(&mut run(&RATES.replace("0.001]", "0.001, 0.002]")));
+    assert_eq!(said.matches("trained before").count(), 2, "{said}");
+    let longer = fs::read_to_string(&table).unwrap();
+    assert_eq!(longer.lines().count(), 4);
+    assert!(
+        first.lines().all(|line| longer.lines().any(|other| other == line)),
+        "{longer} has what was there: {first}"
+    );
+    let mut plot = pocketsplat();
+    let figure = home.join("rates.svg");
+    succeeds(plot.arg("plot").arg(&table).arg("-o").arg(&figure));
+    let figure = fs::read_to_string(figure).unwrap();
+    // A marker for each rate, and one in the legend; names stand where there is room.
+    assert!(figure.matches("<circle").count() == 4 && figure.contains("λ 0.001"), "{figure}");
+
+    let error = fails(&mut run(&RATES.replace("iterations = 80", "iterations = 81")));
+    assert!(
+        error.contains("`train.iterations` is 80 in the run, 81 on the command line")
+            && error.contains("lambda-0.004.run"),
+        "{error}"
+    );
 }

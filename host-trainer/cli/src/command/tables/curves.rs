@@ -37,7 +37,7 @@ pub(super) struct Rate<'a> {
 /// The plan's groups, with what is measured.
 pub(super) fn groups<'a>(plan: &'a Plan, runs: &'a [FinishedRun<'a>]) -> Vec<Group<'a>> {
     let mut groups: Vec<Group<'a>> = Vec::new();
-    for place in plan.runs.iter().filter_map(|run| run.place.as_ref()) {
+    for place in plan.runs.iter().map(|run| &run.place) {
         let group = found(
             &mut groups,
             |g| (g.dataset, g.size) == (&place.dataset, &place.size),

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use serde::Serialize;
 
 use crate::command::eval::Evaluation;
@@ -48,9 +48,6 @@ pub(super) struct RunLine<'a> {
 pub(super) fn runs<'a>(plan: &'a Plan, folder: &Path) -> Result<Vec<FinishedRun<'a>>> {
     let mut all = Vec::new();
     for run in &plan.runs {
-        let Some(place) = &run.place else {
-            bail!("the plan in {} is of `sweep` or `ablate`, which make their own tables", folder.display());
-        };
         let path = folder.join(format!("{}.json", run.name));
         if !path.is_file() {
             continue;
@@ -60,7 +57,7 @@ pub(super) fn runs<'a>(plan: &'a Plan, folder: &Path) -> Result<Vec<FinishedRun<
         let evaluation = evaluation.with_context(|| {
             format!("{} has no figures of a run; remove it, and call snakemake again", path.display())
         })?;
-        all.push(FinishedRun { name: &run.name, place, evaluation });
+        all.push(FinishedRun { name: &run.name, place: &run.place, evaluation });
     }
     Ok(all)
 }

@@ -1,6 +1,7 @@
 //! `pocketsplat demo`: the whole path once, on a capture it makes itself.
 
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::{Image, Split};
@@ -8,22 +9,21 @@ use pocketsplat_capture::synth::{SynthOptions, write_capture};
 use pocketsplat_codec::render::decoder::core_image;
 use pocketsplat_codec::render::reference::ReferenceScene;
 use pocketsplat_files::Outputs;
-use pocketsplat_trainer::encode::Encoding;
-use pocketsplat_trainer::train::TrainConfig;
-use pocketsplat_trainer::train::config::Backbone;
-use pocketsplat_trainer::train::module::{Detail, Distribution, Modules, Pruning};
 
 use super::bundle::BundleFile;
 use super::capture::CaptureArgs;
+use super::devices::DeviceChoice;
 use super::eval::{Measurements, Renderer, evaluate, reference_image};
 use super::outputs::{BUNDLE, OverwriteArgs, PNG, keep, marked_png};
-use super::{output, train};
-use crate::config::CaptureOptions;
+use super::train::{Attempt, GoesOn, begun_or_new, decide, train_in};
+use super::{output, settings, stop};
+use crate::config::{CaptureOptions, RunConfig};
 use crate::say::say;
 
 /// Train, compress and draw a procedural capture.
 ///
-/// Make a capture, train it, compress it, draw it with the decoder and compare: about three minutes on two cores.
+/// Make a capture, train it, compress it, draw it with the decoder and compare: about three minutes on two cores. What was interrupted
+/// goes on when the same command is given again.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Folder for everything; what an earlier demo left there is replaced.
@@ -35,6 +35,10 @@ pub(crate) struct Args {
     /// Width and height of the images, pixels.
     #[arg(long, default_value_t = SynthOptions::default().size_px)]
     size: u32,
+    /// What trains: cpu, gpu, gpu:N as `pocketsplat devices` lists them, or auto, a GPU where there is one
+    /// [default: cpu]
+    #[arg(long = "device", value_name = "NAME", default_value = "cpu", hide_default_value = true)]
+    trains_on: DeviceChoice,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
@@ -47,7 +51,7 @@ const CAPTURE: &str = "capture";
 /// Lies in a capture that a demo made, and only there: without it nothing is removed.
 const MARKER: &str = ".made-by-pocketsplat-demo";
 
-pub(crate) fn run(args: &Args) -> Result<()> {
+pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     let folder = &args.output;
     let capture_folder = folder.join(CAPTURE);
     Outputs::folder(folder)?;
@@ -61,17 +65,16 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 
     say!("2 of 4  training {} steps", args.iterations);
     let capture_args = CaptureArgs { dataset: capture_folder, options: CaptureOptions::default() };
-    // Tiers that are trained for: the demo's bundle serves devices of several sizes.
-    let modules = Modules {
-        distribution: Some(Distribution::default()),
-        pruning: Some(Pruning::tiered()),
-        detail: Some(Detail::default()),
-        ..Modules::default()
-    };
-    let config = TrainConfig { iterations: args.iterations, modules, ..TrainConfig::of(Backbone::Hac) };
     let bundle_path = bundle_output.path();
-    let capture = capture_args.load_to_train(config.seed, None, &[])?;
-    let trained = train::train(&capture, config, &Encoding::default(), &bundle_output)?;
+    let mut config = configured(args, &capture_args.dataset, bundle_path)?;
+    let capture = capture_args.load_to_train(config.train.seed, None, &[])?;
+    decide(&mut config, &capture)?;
+    let stop = stop::flag()?;
+    let (folder, start) = begun_or_new(&bundle_path.with_extension("run"), &config, args.overwrite.is_given())?;
+    let attempt = Attempt { device: args.trains_on.open()?, stop: &stop, goes_on: GoesOn::SameCommand };
+    let Some(trained) = train_in(folder, &config, &capture, start, attempt, &bundle_output)? else {
+        return Ok(ExitCode::from(stop::INTERRUPTED));
+    };
 
     say!("3 of 4  drawing the held-out views with the decoder");
     let file = BundleFile::read(bundle_path)?;
@@ -101,7 +104,19 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         "render_s_per_view": evaluation.render_s_per_view,
         "scratch_bytes": evaluation.scratch_bytes,
     });
-    output::print(&report, args.json)
+    output::print(&report, args.json)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// What is trained: as `train` does it, with tiers, for the bundle serves devices of several sizes.
+fn configured(args: &Args, capture: &Path, bundle: &Path) -> Result<RunConfig> {
+    let absolute = |path: &Path| std::path::absolute(path).with_context(|| format!("{} is no path", path.display()));
+    let mut config = RunConfig { dataset: absolute(capture)?, output: absolute(bundle)?, ..RunConfig::default() };
+    config.effects.auto = false;
+    config.train.iterations = args.iterations;
+    config.train.modules.pruning = Some(settings::tiers_of(&config.train.modules));
+    config.check()?;
+    Ok(config)
 }
 
 /// Removes the capture of an earlier demo, and nothing that is not one.

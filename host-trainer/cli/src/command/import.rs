@@ -2,7 +2,8 @@
 
 mod cameras;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::camera::Camera;
@@ -13,16 +14,17 @@ use pocketsplat_trainer::explicit::bulk::Bulk;
 use pocketsplat_trainer::explicit::pictures::{Pictures, capture};
 use serde::Serialize;
 
+use super::devices::DeviceChoice;
 use super::gaussians::{AxesArgs, GaussiansFile};
 use super::outputs::{BUNDLE, OverwriteArgs, check_name};
 use super::settings::QualityOptions;
 use super::stand::{StandArgs, bulk_of};
-use super::train::{HeldOut, TrainResult, train_as};
+use super::train::{Attempt, GoesOn, HeldOut, TrainResult, begun_or_new, train_in};
 use super::train_args::{DeviceArgs, check_lambda};
-use super::{output, process};
+use super::{output, process, stop};
 use crate::config::heading::{INPUT, OUTPUT, QUALITY, RUN};
 use crate::config::named::{BACKGROUNDS, one_of};
-use crate::config::{CaptureOptions, Preset, RunConfig};
+use crate::config::{CaptureOptions, RunConfig};
 use crate::say::say;
 
 /// Longest side of the pictures unless the user says otherwise, px.
@@ -44,7 +46,8 @@ const LAMBDA: f64 = 0.0005;
 ///
 /// Compress splats that exist already: draw pictures of a .ply, .spz or .sog, train a bundle on them, and measure what it lost.
 ///
-/// Cameras stand around the scene's bulk or inside it, wherever more of it is seen; --cameras gives others.
+/// Cameras stand around the scene's bulk or inside it, wherever more of it is seen; --cameras gives others. What was interrupted goes on
+/// when the same command is given again.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// The splats: .ply, .spz, .sog, .splat or .glb.
@@ -84,6 +87,10 @@ pub(crate) struct Args {
     /// Seed of all random numbers: the same seed on the same machine gives the same bundle.
     #[arg(long, value_name = "N", default_value_t = 42, help_heading = RUN)]
     seed: u64,
+    /// What trains: cpu, gpu, gpu:N as `pocketsplat devices` lists them, or auto, a GPU where there is one
+    /// [default: cpu]
+    #[arg(long = "device", value_name = "NAME", default_value = "cpu", hide_default_value = true, help_heading = RUN)]
+    trains_on: DeviceChoice,
     #[command(flatten)]
     overwrite: OverwriteArgs,
 }
@@ -114,10 +121,10 @@ struct ImportResult {
     peak_memory_bytes: Option<u64>,
 }
 
-pub(crate) fn run(args: &Args) -> Result<()> {
+pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     // What another format needs is written of the file that is imported.
     check_name(&args.output, BUNDLE, GaussiansFile::is_one(&args.output).then_some(&args.points))?;
-    let config = configured(args)?;
+    let mut config = configured(args)?;
     let outputs = args.overwrite.outputs().reading(&args.points);
     let mut outputs = args.cameras.iter().fold(outputs, |outputs, path| outputs.reading(path));
     let output = outputs.file(&args.output, BUNDLE)?;
@@ -131,18 +138,26 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         train.len() + test.len(),
         test.len()
     );
-    let train = config.train.resolved_for(&capture);
-    let trained = train_as(&capture, train, &config.capture, &config.encoding, &output)?;
+    config.train = config.train.resolved_for(&capture);
+    let (device, stop) = (args.trains_on.open()?, stop::flag()?);
+    let (folder, start) = begun_or_new(&args.output.with_extension("run"), &config, args.overwrite.is_given())?;
+    let attempt = Attempt { device, stop: &stop, goes_on: GoesOn::SameCommand };
+    let Some(trained) = train_in(folder, &config, &capture, start, attempt, &output)? else {
+        return Ok(ExitCode::from(stop::INTERRUPTED));
+    };
     output::print(&result(&file, &bulk, &capture, trained)?, args.json)?;
     if output.is_file() {
         say!("see it:  pocketsplat view {} -o scene.html", shell_word(&args.output));
     }
-    Ok(())
+    Ok(ExitCode::SUCCESS)
 }
 
 /// What is trained: as `train` does it, with the effects that every scene can have.
 fn configured(args: &Args) -> Result<RunConfig> {
-    let mut config = Preset::Standard.config();
+    let absolute = |path: &Path| std::path::absolute(path).with_context(|| format!("{} is no path", path.display()));
+    let mut config = RunConfig::default();
+    (config.dataset, config.output) = (absolute(&args.points)?, absolute(&args.output)?);
+    config.scales_lambda = false;
     config.train.hac.lambda = args.lambda.unwrap_or(LAMBDA);
     config.train.iterations = ITERATIONS;
     config.train.seed = args.seed;

@@ -140,9 +140,10 @@ fn dispatch(cli: Cli) -> Result<ExitCode> {
     match cli.command {
         Command::Train(args) => return train::run(&args),
         Command::PlanRuns(args) => return plan_runs::run(&args),
+        Command::Import(args) => return import::run(&args),
+        Command::Demo(args) => return demo::run(&args),
         Command::Verify(args) => return verify::run(&args),
         Command::Doctor(args) => return doctor::run(&args),
-        Command::Import(args) => import::run(&args),
         Command::Eval(args) => eval::run(&args),
         Command::Render(args) => render::run(&args),
         Command::View(args) => view::run(&args),
@@ -159,7 +160,6 @@ fn dispatch(cli: Cli) -> Result<ExitCode> {
         Command::Bench(args) => bench::run(&args),
         Command::Completions(args) => completions::run(&args),
         Command::Man(args) => completions::write_manual(&args),
-        Command::Demo(args) => demo::run(&args),
     }
     .map(|()| ExitCode::SUCCESS)
 }

@@ -16,7 +16,7 @@ use super::estimate::Estimate;
 use super::eval::{Evaluation, Measurements, Renderer, evaluate, lpips_of};
 use super::output;
 use super::outputs::{BUNDLE, keep};
-use super::train::{self, Standing, Start};
+use super::train::{self, Attempt, GoesOn, Standing, Start};
 use crate::config::{Protocol, RunConfig};
 use crate::say::say;
 
@@ -37,7 +37,8 @@ pub(super) fn trained(config: &RunConfig, capture: &Capture, device: DeviceChoic
     };
     // Another file than a bundle was refused before the first run began.
     let output = Outputs::new(true).reading_folder(&config.dataset).file(&config.output, BUNDLE)?;
-    Ok(train::train_in(folder, config, capture, start, device, stop, &output)?.is_some())
+    let attempt = Attempt { device, stop, goes_on: GoesOn::SameCommand };
+    Ok(train::train_in(folder, config, capture, start, attempt, &output)?.is_some())
 }
 
 /// The figures of a point on the held-out views, kept beside its bundle so that they are taken once.

@@ -205,19 +205,15 @@ impl QualityOptions {
                 *into = value.clone();
             }
         }
-        let (encoding, train) = (&mut config.encoding, &mut config.train);
         if self.is_explicit() {
             bail!(
                 "--backbone {EXPLICIT} makes a .ply; it works with `pocketsplat train CAPTURE --backbone {EXPLICIT} -o SCENE.ply` alone"
             );
         }
         if let Some(BackboneChoice::Anchors(backbone)) = self.backbone {
-            *train = train.with_backbone(backbone);
-            if !backbone.is_coded() {
-                // Nothing is worth its bits where there are none.
-                train.modules.rdo = None;
-            }
+            *config = config.clone().with_backbone(backbone);
         }
+        let (encoding, train) = (&mut config.encoding, &mut config.train);
         set(&mut encoding.quantisation.feature, &self.feature_step);
         set(&mut encoding.coder, &self.coder);
         set(&mut encoding.tiers, &self.tiers);
@@ -297,7 +293,7 @@ fn keep(train: &mut TrainConfig, most: usize) {
 }
 
 /// Tiers beside the other modules: after the last rate–distortion pruning, ranked by worth.
-fn tiers_of(modules: &Modules) -> Pruning {
+pub(super) fn tiers_of(modules: &Modules) -> Pruning {
     let tiered = Pruning::tiered();
     modules.rdo.map_or(tiered, |rdo| Pruning { at: rdo.until, rank: Rank::Worth, ..tiered })
 }

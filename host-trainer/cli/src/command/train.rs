@@ -28,7 +28,7 @@ use super::{effects, output, report, stop, watch};
 use crate::config::{ExplicitRunConfig, RunConfig};
 use crate::say::say;
 use in_folder::IN_RUN_AND_ON_COMMAND_LINE;
-pub(crate) use in_folder::{Start, train, train_as, train_in};
+pub(crate) use in_folder::{Attempt, GoesOn, Start, begun_or_new, train_in};
 use loading::source_of;
 pub(crate) use loading::{clear_photographs, decide, load};
 pub(crate) use result::{HeldOut, TrainResult};
@@ -52,6 +52,9 @@ fn resume(args: &Args, path: &Path) -> Result<ExitCode> {
     }
     let begun = RunConfig::parse(&folder.config()?);
     let begun = begun.with_context(|| format!("could not use the config.toml in {}", path.display()))?;
+    if begun.dataset.is_file() {
+        bail!("the run in {} is of `pocketsplat import`; give that command again, and it goes on", path.display());
+    }
     let mut config = args.applied_to(begun.clone())?;
     if let Some(difference) = begun.difference(&config, IN_RUN_AND_ON_COMMAND_LINE)? {
         bail!("the run began with another setting than the command line asks for: {difference}; leave it out");
@@ -224,7 +227,8 @@ fn train_watched<'a>(
         return Ok(Ended::Interrupted);
     }
     let path = folder.path().to_owned();
-    let Some(result) = train_in(folder, &config, capture, start, device, &stop, output)? else {
+    let attempt = Attempt { device, stop: &stop, goes_on: GoesOn::Resume };
+    let Some(result) = train_in(folder, &config, capture, start, attempt, output)? else {
         return Ok(Ended::Interrupted);
     };
     let (dataset, bundle) = args.named_paths(&config.dataset, &config.output);

@@ -62,7 +62,7 @@ pub(crate) struct Args {
     lambda: Option<f64>,
     #[command(flatten)]
     device: DeviceArgs,
-    /// Configuration to read, as a run folder has it; options override it.
+    /// Configuration to read, as a run folder has it; what it does not say is as without it, and options override it.
     #[arg(long, value_name = "FILE.toml", conflicts_with = "resume", help_heading = RUN, hide_short_help = true)]
     config: Option<PathBuf>,
     /// Print the configuration that the run would have, with every key, and the estimate; train nothing and write nothing.

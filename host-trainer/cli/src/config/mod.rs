@@ -29,6 +29,8 @@ pub(crate) use protocol::Protocol;
 /// Everything a run was asked for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct RunConfig {
+    /// What keys are that nobody gives.
+    pub(crate) preset: Preset,
     /// Folder of the capture.
     pub(crate) dataset: PathBuf,
     /// The bundle to write.
@@ -49,25 +51,18 @@ pub(crate) struct RunConfig {
     pub(crate) scales_lambda: bool,
 }
 
+/// What a run does where nothing is said, in a file or on the command line.
 impl Default for RunConfig {
     fn default() -> Self {
-        Self {
-            dataset: PathBuf::new(),
-            output: PathBuf::new(),
-            checkpoint_every: None,
-            keep_checkpoints: false,
-            fork_at: Vec::new(),
-            capture: CaptureOptions { background: Some(Background::Black), ..CaptureOptions::default() },
-            train: TrainConfig::default(),
-            encoding: Encoding::default(),
-            effects: EffectsConfig::default(),
-            scales_lambda: false,
-        }
+        Preset::default().config()
     }
 }
 
+/// Keys that every written configuration has.
+const ALWAYS_WRITTEN: [&str; 7] = ["dataset", "output", "keep_checkpoints", "capture", "train", "encoding", "effects"];
+
 impl RunConfig {
-    /// Reads a configuration; keys that are missing have their defaults.
+    /// Reads a configuration; keys that are missing are those of its preset, as in a run without it.
     pub(crate) fn read(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path);
         let text = text.with_context(|| format!("could not read the configuration {}", path.display()))?;
@@ -83,15 +78,49 @@ impl RunConfig {
 
     /// As [`Self::read`], from its text.
     pub(crate) fn parse(text: &str) -> Result<Self> {
-        let given: Table = text.parse()?;
-        let train = TrainConfig::of(given_backbone(&given)?);
-        let effects = EffectsConfig { auto: false, ..EffectsConfig::default() };
-        let mut all = Table::try_from(Self { train, effects, ..Self::default() })?;
+        let mut given: Table = text.parse()?;
+        let unset: Vec<String> = given.remove("unset").map_or(Ok(Vec::new()), Value::try_into)?;
+        let base = Self::base_of(&given)?;
+        let mut all = Table::try_from(&base)?;
+        for key in &unset {
+            remove(&mut all, key).with_context(|| format!("`unset` names `{key}`, which the preset does not have"))?;
+        }
         merge(&mut all, &given);
         let config: Self = all.try_into()?;
         // What is not written again was not understood.
         refuse_unknown(&given, &Table::try_from(&config)?, "")?;
-        Ok(config)
+        Ok(Self { scales_lambda: base.scales_lambda && !says_lambda(&given), ..config })
+    }
+
+    /// What the keys of a configuration are added to.
+    fn base_of(given: &Table) -> Result<Self> {
+        let key = |table: &str, key: &str| given.get(table).and_then(|table| table.get(key));
+        let backbone: Option<Backbone> = key("train", "backbone").map(|name| name.clone().try_into()).transpose()?;
+        let preset: Preset = match given.get("preset") {
+            Some(name) => name.clone().try_into()?,
+            // Of a run that began before presets were a key: whatever it does not say it does not have.
+            None if ALWAYS_WRITTEN.iter().all(|key| given.contains_key(*key)) => {
+                let capture = CaptureOptions { background: Some(Background::Black), ..CaptureOptions::default() };
+                let train = TrainConfig::of(backbone.unwrap_or_default());
+                return Ok(Self { capture, train, scales_lambda: false, ..Self::default() });
+            }
+            None => Preset::default(),
+        };
+        let mut base = preset.config();
+        if key("capture", "resolution").is_some() {
+            base.capture.max_resolution = None;
+        }
+        Ok(backbone.map_or(base.clone(), |backbone| base.with_backbone(backbone)))
+    }
+
+    /// The same with another backbone.
+    pub(crate) fn with_backbone(mut self, backbone: Backbone) -> Self {
+        self.train = self.train.with_backbone(backbone);
+        if !backbone.is_coded() {
+            // Nothing is worth its bits where there are none.
+            self.train.modules.rdo = None;
+        }
+        self
     }
 
     /// The same with some keys set, each given as `table.key=value`; what is no TOML value is taken as text.
@@ -99,16 +128,21 @@ impl RunConfig {
         let mut all = Table::try_from(self)?;
         let given = keys_of(keys)?;
         merge(&mut all, &given);
-        let says_lambda = ["train", "hac"].iter().try_fold(&given, |table, name| table.get(*name)?.as_table());
-        let says_lambda = says_lambda.is_some_and(|hac| hac.contains_key("lambda"));
-        let config = Self { scales_lambda: self.scales_lambda && !says_lambda, ..all.try_into()? };
+        if given.contains_key("preset") {
+            bail!("--set preset changes no other key; give --preset, or the key in a configuration");
+        }
+        let config = Self { scales_lambda: self.scales_lambda && !says_lambda(&given), ..all.try_into()? };
         refuse_unknown(&given, &Table::try_from(&config)?, "")?;
         Ok(config)
     }
 
-    /// As TOML that [`Self::parse`] reads back.
+    /// As TOML that [`Self::parse`] reads back; `unset` names the keys of the preset that the run does not have.
     pub(crate) fn to_toml(&self) -> Result<String> {
-        Ok(toml::to_string(self)?)
+        let own = Table::try_from(self)?;
+        let mut unset = Vec::new();
+        collect_missing(&Table::try_from(Self::base_of(&own)?)?, &own, "", &mut unset);
+        let keys = toml::to_string(self)?;
+        Ok(if unset.is_empty() { keys } else { format!("unset = {}\n{keys}", Value::from(unset)) })
     }
 
     /// Refuses what no run can use, before any work starts.
@@ -201,10 +235,31 @@ fn table_differences(one: &Table, other: &Table) -> Vec<Difference> {
     all
 }
 
-/// The backbone that a configuration names; its defaults stand for what else is missing.
-fn given_backbone(given: &Table) -> Result<Backbone> {
-    let named = given.get("train").and_then(|train| train.get("backbone"));
-    named.map_or(Ok(Backbone::default()), |name| Ok(name.clone().try_into()?))
+/// Whether keys say how much bits weigh.
+fn says_lambda(given: &Table) -> bool {
+    let hac = ["train", "hac"].iter().try_fold(given, |table, name| table.get(*name)?.as_table());
+    hac.is_some_and(|hac| hac.contains_key("lambda"))
+}
+
+/// Takes a key out, given as `table.key`.
+fn remove(from: &mut Table, key: &str) -> Option<Value> {
+    match key.split_once('.') {
+        Some((table, rest)) => remove(from.get_mut(table)?.as_table_mut()?, rest),
+        None => from.remove(key),
+    }
+}
+
+/// The keys of `all` that `some` lacks.
+fn collect_missing(all: &Table, some: &Table, at: &str, missing: &mut Vec<String>) {
+    for (key, value) in all {
+        match (value, some.get(key)) {
+            (_, None) => missing.push(format!("{at}{key}")),
+            (Value::Table(all), Some(Value::Table(some))) => {
+                collect_missing(all, some, &format!("{at}{key}."), missing)
+            }
+            _ => {}
+        }
+    }
 }
 
 /// Replaces values of `into` by those of `from`, table by table.

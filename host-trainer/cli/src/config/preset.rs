@@ -1,19 +1,20 @@
-//! What `train` does where nothing else is said.
+//! What a run does where nothing else is said: every command that trains begins here.
+
+use std::path::PathBuf;
 
 use pocketsplat_capture::dataset::Background;
+use pocketsplat_trainer::encode::Encoding;
 use pocketsplat_trainer::train::TrainConfig;
-use pocketsplat_trainer::train::config::{Backbone, Hac};
+use pocketsplat_trainer::train::config::Backbone;
 use pocketsplat_trainer::train::module::{Modules, Rdo};
 
-use super::{CaptureOptions, RunConfig};
+use serde::{Deserialize, Serialize};
 
-/// Weight of a value's bits where offsets and anchors that are not worth their bits are pruned, for photographs that show the scene
-/// everywhere (`docs/experiments/2026-11-22-train-without-options.md`). The loss is a mean over pixels: where most of them are
-/// transparent, and right from the start, the same weight would count bits for more.
-const LAMBDA: f64 = 0.002;
+use super::{CaptureOptions, EffectsConfig, RunConfig};
 
 /// How long a run takes, and how large its images are; all presets train HAC with rate–distortion pruning.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub(crate) enum Preset {
     /// A first look: 200 px, 2,000 iterations.
     Quick,
@@ -46,6 +47,12 @@ impl Preset {
     /// The configuration of a run without options.
     pub(crate) fn config(self) -> RunConfig {
         RunConfig {
+            preset: self,
+            dataset: PathBuf::new(),
+            output: PathBuf::new(),
+            checkpoint_every: None,
+            keep_checkpoints: false,
+            fork_at: Vec::new(),
             capture: CaptureOptions {
                 max_resolution: self.longest_px(),
                 background: Some(Background::Black),
@@ -53,12 +60,12 @@ impl Preset {
             },
             train: TrainConfig {
                 iterations: self.iterations(),
-                hac: Hac { lambda: LAMBDA, ..Hac::default() },
                 modules: Modules { rdo: Some(Rdo::default()), ..Modules::default() },
                 ..TrainConfig::of(Backbone::Hac)
             },
+            encoding: Encoding::default(),
+            effects: EffectsConfig::default(),
             scales_lambda: true,
-            ..RunConfig::default()
         }
     }
 }

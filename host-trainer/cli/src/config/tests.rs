@@ -18,6 +18,8 @@ fn a_written_configuration_reads_back_to_the_last_bit() {
             model: Some(1),
             test_every: Some(5),
         },
+        // A file says a weight.
+        scales_lambda: false,
         ..RunConfig::default()
     };
     for i in 1..200u32 {
@@ -28,10 +30,38 @@ fn a_written_configuration_reads_back_to_the_last_bit() {
         config.train.seed = u64::from(i).pow(7) % i64::MAX as u64;
         assert_eq!(RunConfig::parse(&config.to_toml().unwrap()).unwrap(), config, "{i}");
     }
-    // A file has been decided about.
-    let mut decided = RunConfig::default();
-    assert!(std::mem::take(&mut decided.effects.auto));
-    assert_eq!(RunConfig::parse("").unwrap(), decided);
+    config.train.modules = pocketsplat_trainer::train::module::Modules::default();
+    config.capture.max_resolution = None;
+    let text = config.to_toml().unwrap();
+    assert!(text.contains("unset = [\"capture.max_resolution\", \"train.modules.rdo\"]"), "{text}");
+    assert_eq!(RunConfig::parse(&text).unwrap(), config, "what the preset has and the run has not");
+}
+
+#[test]
+fn a_configuration_begins_where_a_run_without_one_begins() {
+    assert_eq!(RunConfig::parse("").unwrap(), RunConfig::default());
+    for preset in <Preset as clap::ValueEnum>::value_variants() {
+        let config = preset.config();
+        let text = format!("preset = \"{}\"", toml::Value::try_from(preset).unwrap().as_str().unwrap());
+        assert_eq!(RunConfig::parse(&text).unwrap(), config, "{text}");
+    }
+    let scaffold = RunConfig::parse("train.backbone = \"scaffold\"").unwrap();
+    assert_eq!(scaffold, RunConfig::default().with_backbone(Backbone::Scaffold));
+    let display = RunConfig::parse("capture.resolution = \"160x120\"").unwrap();
+    assert_eq!(display.capture.max_resolution, None, "one way to say the size replaces the other");
+    let masks = RunConfig::parse("unset = [\"train.modules.rdo\"]\ntrain.hac.lambda = 0.001").unwrap();
+    assert!(masks.train.modules.rdo.is_none() && !masks.scales_lambda);
+}
+
+#[test]
+fn a_run_that_began_before_presets_were_a_key_has_what_it_says() {
+    let train = TrainConfig { iterations: 300, voxel_size: Some(0.1), ..TrainConfig::of(Backbone::HacPlus) };
+    let mut config = RunConfig { train, scales_lambda: false, ..RunConfig::default() };
+    config.capture.max_resolution = None;
+    let text = config.to_toml().unwrap();
+    let old: Vec<&str> =
+        text.lines().filter(|line| !line.starts_with("preset") && !line.starts_with("unset")).collect();
+    assert_eq!(RunConfig::parse(&old.join("\n")).unwrap(), config);
 }
 
 #[test]
@@ -49,10 +79,10 @@ fn a_few_keys_are_enough() {
 #[test]
 fn what_is_missing_follows_the_backbone() {
     let config = RunConfig::parse("[train]\nbackbone = \"hac\"\niterations = 7").unwrap();
-    assert_eq!(config.train, TrainConfig { iterations: 7, ..TrainConfig::of(Backbone::Hac) });
+    assert_eq!(config.train, TrainConfig { iterations: 7, ..RunConfig::default().train });
     let config = RunConfig::parse("[train]\nbackbone = \"hac\"\n[train.shape]\nfeature_dim = 32").unwrap();
     assert_eq!(config.train.shape.feature_dim, 32);
-    assert_eq!(RunConfig::parse(&config.to_toml().unwrap()).unwrap(), config);
+    assert_eq!(RunConfig::parse(&config.to_toml().unwrap()).unwrap().train, config.train);
 }
 
 #[test]
@@ -65,6 +95,11 @@ fn what_is_not_understood_is_refused_by_its_name() {
         ("[train]\niterations = -1", "iterations"),
         ("[capture]\nbackground = \"grey\"", "`black`, `white`, `learned`"),
         ("train = 3", "train"),
+        ("preset = \"slow\"", "`quick`, `standard`, `full`"),
+        (
+            "unset = [\"train.modules.pruning\"]",
+            "`unset` names `train.modules.pruning`, which the preset does not have",
+        ),
         ("[train\n", "line 1"),
     ] {
         let message = format!("{:#}", RunConfig::parse(text).unwrap_err());
@@ -81,7 +116,7 @@ fn any_key_can_be_set_by_its_path() {
     let pruning = set.train.modules.pruning.unwrap();
     assert_eq!((set.train.iterations, set.train.hac.sample, set.encoding.tiers.as_slice()), (9, 1.0, &[0.5, 0.0][..]));
     assert_eq!((pruning.form, pruning.beta), (pruning::Form::Tiered, 1e-3), "the rest has its defaults");
-    assert_eq!(RunConfig::parse(&set.to_toml().unwrap()).unwrap(), set);
+    assert_eq!(RunConfig::parse(&set.to_toml().unwrap()).unwrap(), RunConfig { scales_lambda: false, ..set });
     for (key, part) in [
         ("train.iterations", "needs KEY=VALUE"),
         ("train.steps=3", "unknown key `train.steps`; known here: "),
@@ -102,7 +137,7 @@ fn only_what_decides_the_result_counts_as_a_difference() {
     b.train.shape.n_offsets = 5;
     assert_eq!(difference(&b).unwrap(), "`train.shape.n_offsets` is 10 here, 5 there");
     b = RunConfig { capture: CaptureOptions { max_resolution: Some(200), ..a.capture.clone() }, ..a.clone() };
-    assert_eq!(difference(&b).unwrap(), "`capture.max_resolution` is nothing here, 200 there");
+    assert_eq!(difference(&b).unwrap(), "`capture.max_resolution` is 400 here, 200 there");
 }
 
 #[test]

@@ -228,3 +228,23 @@ fn a_run_ends_with_what_people_want_to_know_and_commands_to_copy() {
     assert!(text(&evaluated.stdout).starts_with("quality:  "), "{}", text(&evaluated.stdout));
     assert!(!text(&evaluated.stderr).contains("LPIPS"), "{}", text(&evaluated.stderr));
 }
+
+#[test]
+fn an_empty_configuration_trains_what_no_configuration_trains() {
+    let home = folder("empty-config");
+    let empty = home.join("empty.toml");
+    fs::write(&empty, "").unwrap();
+    let dry = |options: &[&str]| {
+        let mut command = pocketsplat();
+        command.arg("train").arg(capture()).arg("-o").arg(home.join("a.psb")).arg("--dry-run").args(options);
+        let said = command.output().unwrap();
+        assert!(said.status.success(), "{}", text(&said.stderr));
+        text(&said.stdout)
+    };
+    let plain = dry(&[]);
+    assert_eq!(dry(&["--config", empty.to_str().unwrap()]), plain);
+    fs::write(&empty, "preset = \"quick\"\nunset = [\"train.modules.rdo\"]\n").unwrap();
+    let quick = dry(&["--preset", "quick", "--modules", "none"]);
+    assert_eq!(dry(&["--config", empty.to_str().unwrap()]), quick);
+    assert!(quick.starts_with("unset = [\"train.modules.rdo\"]\npreset = \"quick\"\n"), "{quick}");
+}

@@ -8,7 +8,7 @@ use pocketsplat_gaussians::{Format, Gaussians, Notes};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::fixture::{fails, folder, pocketsplat, succeeds, text, undisturbed};
+use crate::fixture::{fails, folder, pocketsplat, resume, starts, succeeds, text, undisturbed, wait_for};
 
 /// Opaque ones at these places and of these colours.
 fn splats(places: impl IntoIterator<Item = ([f32; 3], [f32; 3])>) -> Gaussians {
@@ -269,4 +269,28 @@ fn cameras_of_a_file_draw_splats_in_their_own_frame() {
     write(&path, &nothing, &[]);
     let said = fails(pocketsplat().arg("render").arg(&path).args(["--preview", "-o"]).arg(&picture));
     assert!(said.contains("no Gaussian is opaque"), "{said}");
+}
+
+#[test]
+fn an_import_that_was_interrupted_goes_on_in_the_same_bytes() {
+    let home = folder("import_interrupted");
+    let (splats, whole, output) = (home.join("a.ply"), home.join("whole.psb"), home.join("a.psb"));
+    write(&splats, &ball(), &[]);
+    succeeds(&mut import(&splats, &whole));
+    let mut child = starts(&mut import(&splats, &output));
+    wait_for(&home.join("a.run"), 10, &mut child);
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let ended = child.wait_with_output().unwrap();
+    assert_eq!(ended.status.code(), Some(130));
+    assert!(text(&ended.stderr).contains("give the same command again to go on"), "{}", text(&ended.stderr));
+
+    let error = fails(&mut resume(&home.join("a.run")));
+    assert!(error.contains("is of `pocketsplat import`; give that command again"), "{error}");
+    let error = fails(import(&splats, &output).args(["--seed", "7"]));
+    assert!(error.contains("`train.seed` is 42 in the run, 7 on the command line"), "{error}");
+    let error = fails(import(&splats, &output).args(["--up", "+z"]));
+    assert!(error.contains("a.run is another one"), "the pictures are others: {error}");
+    let said = succeeds(&mut import(&splats, &output));
+    assert!(said.contains("going on after iteration "), "{said}");
+    assert_eq!(fs::read(&output).unwrap(), fs::read(&whole).unwrap());
 }

@@ -1,22 +1,23 @@
 //! Trains in a run folder: start, resume or fork, the steps with their checkpoints, the bundle.
 
+use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::Capture;
 use pocketsplat_files::{Output, shell_word};
 use pocketsplat_kernels::step::SharedDevice;
-use pocketsplat_trainer::encode::{Encoding, Scale};
+use pocketsplat_trainer::encode::Scale;
+use pocketsplat_trainer::train::Trainer;
 use pocketsplat_trainer::train::gauge::Gauge;
 use pocketsplat_trainer::train::run::{Ending, Interval, RunError, RunFolder};
-use pocketsplat_trainer::train::{TrainConfig, Trainer};
 
 use super::loading::keep_points;
 use super::result::{TrainResult, write_bundle};
 use crate::command::estimate::{Estimate, Warned};
 use crate::command::output::json;
 use crate::command::progress::Progress;
-use crate::config::{CaptureOptions, RunConfig};
+use crate::config::RunConfig;
 use crate::say::say;
 
 /// Seconds between checkpoints unless the user says otherwise: what an accident may cost.
@@ -36,14 +37,68 @@ pub(crate) enum Start<'a> {
     Forked(Box<Trainer<'a>>),
 }
 
-/// Trains in a run folder and writes the bundle to `output`; `None` when `stop` was set before the end.
+/// What carries a run on.
+#[derive(Clone)]
+pub(crate) struct Attempt<'a> {
+    /// The GPU that trains, where one does.
+    pub(crate) device: Option<SharedDevice<f32>>,
+    /// Set when the run is to stop.
+    pub(crate) stop: &'a AtomicBool,
+    /// How a run that was stopped goes on.
+    pub(crate) goes_on: GoesOn,
+}
+
+/// How a run that was stopped goes on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum GoesOn {
+    /// By `train --resume`.
+    Resume,
+    /// By the command that began it.
+    SameCommand,
+}
+
+impl GoesOn {
+    /// As a clause.
+    fn said(self, run: &Path) -> String {
+        match self {
+            Self::Resume => format!("go on with `pocketsplat train --resume {}`", shell_word(run)),
+            Self::SameCommand => "give the same command again to go on".to_owned(),
+        }
+    }
+}
+
+/// Takes the folder of a run that goes on by the command that began it: as it stands, or empty.
+///
+/// # Errors
+/// An unfinished run of another configuration, unless `overwrite`; a folder that cannot be used.
+pub(crate) fn begun_or_new<'a>(path: &Path, config: &RunConfig, overwrite: bool) -> Result<(RunFolder, Start<'a>)> {
+    let begun = match RunFolder::reopen(path) {
+        Ok(folder) => Some(folder),
+        Err(RunError::NoRun { .. } | RunError::Finished { .. }) => None,
+        Err(error) => return Err(error.into()),
+    };
+    if let Some(folder) = begun {
+        let before = RunConfig::parse(&folder.config()?)?;
+        match before.difference(config, IN_RUN_AND_ON_COMMAND_LINE)? {
+            None if before.dataset == config.dataset => return Ok((folder, Start::Resumed)),
+            _ if overwrite => {}
+            difference => bail!(
+                "the unfinished run in {} is another one ({}); choose another --output, or begin anew with --overwrite",
+                path.display(),
+                difference.unwrap_or_else(|| format!("of {}", before.dataset.display()))
+            ),
+        }
+    }
+    Ok((RunFolder::start(path, &config.to_toml()?, overwrite)?, Start::New(Warned::default())))
+}
+
+/// Trains in a run folder and writes the bundle to `output`; `None` when it was to stop before the end.
 pub(crate) fn train_in<'a>(
     folder: RunFolder,
     config: &RunConfig,
     capture: &'a Capture,
     start: Start<'a>,
-    device: Option<SharedDevice<f32>>,
-    stop: &AtomicBool,
+    Attempt { device, stop, goes_on }: Attempt<'_>,
     output: &Output,
 ) -> Result<Option<TrainResult>> {
     let mut folder = folder.forking_at(&config.fork_at);
@@ -63,7 +118,7 @@ pub(crate) fn train_in<'a>(
         say!("warning: --fork-at {at} keeps nothing, for the run stands after iteration {}", trainer.iteration);
     }
     let interval = config.checkpoint_every.map_or(Interval::Seconds(CHECKPOINT_SECONDS), Interval::Iterations);
-    let how_to_go_on = || format!("go on with `pocketsplat train --resume {}`", shell_word(&path));
+    let how_to_go_on = || goes_on.said(&path);
     let estimate = Estimate::new(capture, &config.train, trainer.iteration, warned);
     let mut progress = Progress::new(trainer.iteration, config.train.iterations).estimating(estimate);
     let ending = folder.train(&mut trainer, &mut progress, interval, stop);
@@ -119,28 +174,4 @@ fn resumed<'a>(
     }
     say!("going on after iteration {} of {}", trainer.iteration, config.train.iterations);
     Ok(trainer)
-}
-
-/// Trains on a capture that was loaded as it is, without a run folder, and writes the bundle.
-pub(crate) fn train(
-    capture: &Capture,
-    config: TrainConfig,
-    encoding: &Encoding,
-    output: &Output,
-) -> Result<TrainResult> {
-    train_as(capture, config, &CaptureOptions::default(), encoding, output)
-}
-
-/// As [`train`]; the bundle says that the capture was loaded with `options`.
-pub(crate) fn train_as(
-    capture: &Capture,
-    config: TrainConfig,
-    options: &CaptureOptions,
-    encoding: &Encoding,
-    output: &Output,
-) -> Result<TrainResult> {
-    let scale = encoding.scale(capture);
-    let mut trainer = Trainer::new(capture, config)?.fitting(gauge(scale.as_ref()));
-    trainer.run(&mut Progress::new(0, config.iterations))?;
-    write_bundle(&trainer, capture, options, encoding, output)
 }

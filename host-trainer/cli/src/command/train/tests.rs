@@ -15,6 +15,10 @@ use super::loading::check_size;
 use super::*;
 
 /// A run of a few seconds on the capture in `home`.
+fn attempt(stop: &AtomicBool) -> Attempt<'_> {
+    Attempt { device: None, stop, goes_on: GoesOn::Resume }
+}
+
 fn config(home: &Path, name: &str) -> RunConfig {
     let mut train = TrainConfig { iterations: 80, ..TrainConfig::of(Backbone::Hac) };
     (train.shape.feature_dim, train.shape.n_offsets) = (8, 3);
@@ -48,7 +52,7 @@ fn a_run_on_decoded_photographs_is_interrupted_resumed_and_ends_in_the_same_byte
     let to = output(&in_memory);
     let folder = RunFolder::start(&in_memory.output.with_extension("run"), "", false).unwrap();
     let result =
-        train_in(folder, &in_memory, &capture, Start::New(Warned::default()), None, &stop, &to).unwrap().unwrap();
+        train_in(folder, &in_memory, &capture, Start::New(Warned::default()), attempt(&stop), &to).unwrap().unwrap();
     assert_eq!(result.photographs_waited_share, None);
     let expected = fs::read(&in_memory.output).unwrap();
 
@@ -66,7 +70,7 @@ fn a_run_on_decoded_photographs_is_interrupted_resumed_and_ends_in_the_same_byte
     let folder = RunFolder::start(&run, "", false).unwrap();
     let ended = std::thread::scope(|scope| {
         let training = scope
-            .spawn(|| train_in(folder, &cached, &capture, Start::New(Warned::default()), None, &stop, &to).unwrap());
+            .spawn(|| train_in(folder, &cached, &capture, Start::New(Warned::default()), attempt(&stop), &to).unwrap());
         while !run.join("iteration-00000020.checkpoint").exists() && !training.is_finished() {
             std::thread::sleep(Duration::from_millis(1));
         }
@@ -83,7 +87,7 @@ fn a_run_on_decoded_photographs_is_interrupted_resumed_and_ends_in_the_same_byte
     stop.store(false, Ordering::Relaxed);
     let folder = RunFolder::reopen(&run).unwrap();
     let capture = loaded(&cached, 0);
-    let result = train_in(folder, &cached, &capture, Start::Resumed, None, &stop, &to).unwrap().unwrap();
+    let result = train_in(folder, &cached, &capture, Start::Resumed, attempt(&stop), &to).unwrap().unwrap();
     assert!(result.photographs_waited_share.is_some_and(|share| (0.0..1.0).contains(&share)));
     assert!(fs::read(&cached.output).unwrap() == expected, "the same bytes");
     let views = result.held_out.unwrap().views;

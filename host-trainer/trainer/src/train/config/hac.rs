@@ -41,7 +41,9 @@ impl Backbone {
 /// The rate's part of a run that trains for bits too; constants of the published trainer unless said otherwise.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hac {
-    /// λ: weight of the mean bits of a value in the loss.
+    /// λ: weight of the mean bits of a value in the loss, for photographs that show the scene everywhere
+    /// (docs/experiments/2026-11-22-train-without-options.md). The loss is a mean over pixels: where most of them are transparent, and
+    /// right from the start, the same weight counts bits for more.
     pub lambda: f64,
     /// Share of the run from which on values are noised: 3,000 of 30,000 iterations.
     pub noise_from: f64,
@@ -68,7 +70,7 @@ pub struct Hac {
 impl Default for Hac {
     fn default() -> Self {
         Self {
-            lambda: 0.004,
+            lambda: 0.002,
             noise_from: 3_000.0 / 30_000.0,
             pause_until: 4_000.0 / 30_000.0,
             context_from: 10_000.0 / 30_000.0,

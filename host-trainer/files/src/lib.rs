@@ -6,6 +6,7 @@
 
 mod kind;
 mod output;
+pub mod ply;
 mod shell;
 
 pub use kind::FileKind;

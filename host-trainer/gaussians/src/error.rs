@@ -15,6 +15,12 @@ impl Unreadable {
     }
 }
 
+impl From<pocketsplat_files::ply::Fault> for Unreadable {
+    fn from(fault: pocketsplat_files::ply::Fault) -> Self {
+        Self::new(fault.0)
+    }
+}
+
 /// Why a file could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {

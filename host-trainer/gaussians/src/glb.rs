@@ -74,7 +74,7 @@ impl File<'_> {
                      .ply, with the program that made it"
                 ))
             })?;
-            Ok((name.to_owned(), index as usize))
+            Ok::<_, Unreadable>((name.to_owned(), index as usize))
         };
         let of = |name: &str| named(&format!("{EXTENSION}:{name}"));
         let centres: Vec<[f32; 3]> = self.rows(named("POSITION")?)?;

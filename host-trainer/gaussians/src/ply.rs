@@ -6,17 +6,16 @@
 //! header say how opacities are meant (`SplatRenderMode: mip` with compensation, else `default`) and the degree.
 
 mod compressed;
-mod header;
-mod line_endings;
 mod rows;
 #[cfg(test)]
 mod tests;
 
 use std::fmt::Write as _;
 
+use pocketsplat_files::ply::{self, Encoding, Header};
+
 use crate::account::Account;
 use crate::{Frame, Gaussians, Notes, Unreadable};
-use header::{Encoding, Header};
 use rows::Columns;
 
 /// Begins the comment that says how opacities are meant.
@@ -84,12 +83,12 @@ fn header_text(gaussians: &Gaussians, notes: &Notes, n_rest: usize) -> String {
 /// [`Unreadable`] for what is no file of Gaussians, is cut off or damaged, or holds mostly numbers that cannot be drawn. Memory follows
 /// the bytes that are there, never the header's count.
 pub fn read(bytes: &[u8]) -> Result<(Gaussians, Notes), Unreadable> {
-    let (head, body) = header::split(bytes)?;
+    let (head, body) = ply::split(bytes)?;
     let text = String::from_utf8_lossy(head);
     let header = Header::parse(&text)?;
     let mut notes = notes_of(&header)?;
     if header.encoding != Encoding::Ascii {
-        line_endings::check(&header, head, body)?;
+        ply::check_line_endings(&header, head, body)?;
     }
     let gaussians = if compressed::is_one(&header) {
         compressed::read(&header, body)?
@@ -104,7 +103,7 @@ pub fn read(bytes: &[u8]) -> Result<(Gaussians, Notes), Unreadable> {
 
 /// Where the bytes of a file went.
 pub(crate) fn account(bytes: &[u8]) -> Result<Account, Unreadable> {
-    let (head, body) = header::split(bytes)?;
+    let (head, body) = ply::split(bytes)?;
     let text = String::from_utf8_lossy(head);
     let header = Header::parse(&text)?;
     let mut parts = vec![("header", bytes.len() - body.len())];
@@ -126,7 +125,7 @@ pub(crate) fn account(bytes: &[u8]) -> Result<Account, Unreadable> {
                 ("vertex", name) if name.starts_with("rot_") || name == "packed_rotation" => "rotations",
                 _ => "others",
             };
-            add(name, element.count.saturating_mul(property.scalar.map_or(0, header::Scalar::n_bytes)));
+            add(name, element.count.saturating_mul(property.scalar.map_or(0, ply::Scalar::n_bytes)));
         }
     }
     if is_text {

@@ -91,6 +91,7 @@ pub use severity::Severity;
 pub use sources::files_read;
 pub use spacing::{PUBLISHED_VOXEL_SIZE, ROOM_VOXEL_SIZE, nearest_squared, suggested_voxel_size};
 pub use split::Split;
+pub use transforms::{FrameCamera, cameras_of_transforms};
 pub use view::{PhotographError, View};
 pub use view_fault::ViewFault;
 

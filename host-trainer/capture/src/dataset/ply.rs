@@ -1,38 +1,11 @@
-//! Points of PLY files: the coordinates of the element `vertex`, ASCII or binary.
+//! Points of .ply files: the coordinates of the element `vertex`.
 
 use std::path::Path;
 
 use glam::DVec3;
+use pocketsplat_files::ply::{Encoding, Header, Scalar, check_line_endings, split, vertices};
 
 use super::DatasetError;
-
-/// Longest header read; real ones are below 2 kB.
-const MAX_HEADER_BYTES: usize = 1 << 16;
-
-/// How the numbers are written.
-#[derive(Clone, Copy, PartialEq)]
-enum PlyEncoding {
-    Ascii,
-    Little,
-    Big,
-}
-
-/// A scalar type.
-#[derive(Clone, Copy)]
-struct Scalar {
-    n_bytes: usize,
-    /// Floating point, or a whole number that is skipped.
-    is_float: bool,
-}
-
-/// The vertices as the header describes them.
-struct PlyLayout {
-    encoding: PlyEncoding,
-    n_vertices: usize,
-    properties: Vec<Scalar>,
-    /// Which properties are x, y and z.
-    xyz: [usize; 3],
-}
 
 /// Reads the coordinates of all vertices.
 ///
@@ -45,108 +18,30 @@ pub(super) fn read_points(path: &Path) -> Result<Vec<DVec3>, DatasetError> {
 
 /// Reads the coordinates of all vertices of a file; the error says what was found.
 pub(super) fn parse(bytes: &[u8]) -> Result<Vec<DVec3>, String> {
-    let (header, body) = split_header(bytes)?;
-    let layout = read_layout(header)?;
-    match layout.encoding {
-        PlyEncoding::Ascii => ascii_points(&layout, body),
-        _ => binary_points(&layout, body),
-    }
-}
-
-/// The header's text, and the bytes after the line `end_header`.
-fn split_header(bytes: &[u8]) -> Result<(&str, &[u8]), String> {
-    const END: &[u8] = b"end_header";
-    if !bytes.starts_with(b"ply") {
-        return Err("does not start with `ply`".to_owned());
-    }
-    let head = &bytes[..bytes.len().min(MAX_HEADER_BYTES)];
-    let end = head.windows(END.len()).position(|window| window == END).ok_or("its header has no `end_header`")?;
-    let line_end =
-        head[end..].iter().position(|&byte| byte == b'\n').ok_or("its header does not end in a line break")?;
-    let header = std::str::from_utf8(&head[..end]).map_err(|_| "its header is not text")?;
-    Ok((header, &bytes[end + line_end + 1..]))
-}
-
-fn read_layout(header: &str) -> Result<PlyLayout, String> {
-    let mut encoding = None;
-    let mut n_vertices = None;
-    let (mut names, mut properties) = (Vec::new(), Vec::new());
-    for line in header.lines() {
-        let words: Vec<&str> = line.split_whitespace().collect();
-        match words.as_slice() {
-            ["format", "ascii", _] => encoding = Some(PlyEncoding::Ascii),
-            ["format", "binary_little_endian", _] => encoding = Some(PlyEncoding::Little),
-            ["format", "binary_big_endian", _] => encoding = Some(PlyEncoding::Big),
-            ["format", other, ..] => return Err(format!("has the unknown format `{other}`")),
-            ["element", "vertex", count] => {
-                n_vertices = Some(count.parse::<usize>().map_err(|_| format!("has `{count}` vertices"))?);
-            }
-            // What follows the vertices is not read.
-            ["element", ..] if n_vertices.is_some() => break,
-            ["element", other, ..] => return Err(format!("lists the element `{other}` before `vertex`")),
-            ["property", "list", ..] => return Err("has a list among the properties of its vertices".to_owned()),
-            ["property", kind, name] => {
-                let n_bytes = match *kind {
-                    "char" | "uchar" | "int8" | "uint8" => 1,
-                    "short" | "ushort" | "int16" | "uint16" => 2,
-                    "int" | "uint" | "int32" | "uint32" | "float" | "float32" => 4,
-                    "double" | "float64" => 8,
-                    _ => return Err(format!("has the property `{name}` of the unknown type `{kind}`")),
-                };
-                names.push(*name);
-                properties
-                    .push(Scalar { n_bytes, is_float: matches!(*kind, "float" | "float32" | "double" | "float64") });
-            }
-            _ => {}
+    let (head, body) = split(bytes).map_err(|fault| fault.to_string())?;
+    let text = String::from_utf8_lossy(head);
+    let points = Header::parse(&text).and_then(|header| {
+        if header.encoding != Encoding::Ascii {
+            check_line_endings(&header, head, body)?;
         }
-    }
-    let encoding = encoding.ok_or("names no format")?;
-    let n_vertices = n_vertices.ok_or("has no element `vertex`")?;
+        let Some(xyz) = columns(&header) else { return Ok(None) };
+        let mut points = Vec::new();
+        let push = |row: &[f64]| points.push(DVec3::from_array(xyz.map(|column| row[column])));
+        vertices(&header, header.skip_to_vertices(body)?, push)?;
+        Ok(Some(points))
+    });
+    let points = points.map_err(|fault| fault.to_string())?;
+    points.ok_or_else(|| "has vertices without floating-point properties `x`, `y` and `z`".to_owned())
+}
+
+/// Which properties are x, y and z.
+fn columns(header: &Header<'_>) -> Option<[usize; 3]> {
+    let properties = &header.vertex().properties;
     let index = |axis: &str| {
-        let at = names.iter().position(|name| *name == axis).filter(|&at| properties[at].is_float);
-        at.ok_or_else(|| format!("has no floating-point property `{axis}`"))
+        let is_float = |scalar| matches!(scalar, Some(Scalar::F32 | Scalar::F64));
+        properties.iter().position(|property| property.name == axis && is_float(property.scalar))
     };
-    let xyz = [index("x")?, index("y")?, index("z")?];
-    Ok(PlyLayout { encoding, n_vertices, properties, xyz })
-}
-
-fn ascii_points(layout: &PlyLayout, body: &[u8]) -> Result<Vec<DVec3>, String> {
-    let text = std::str::from_utf8(body).map_err(|_| "is not text although its format is `ascii`")?;
-    let mut points = Vec::new();
-    for line in text.lines().take(layout.n_vertices) {
-        let words: Vec<&str> = line.split_whitespace().collect();
-        let number = |axis: usize| words.get(layout.xyz[axis]).and_then(|word| word.parse::<f64>().ok());
-        let (Some(x), Some(y), Some(z)) = (number(0), number(1), number(2)) else {
-            return Err(format!("has no three coordinates in vertex {}: `{line}`", points.len()));
-        };
-        points.push(DVec3::new(x, y, z));
-    }
-    if points.len() < layout.n_vertices {
-        return Err(format!("holds {} vertices, its header promises {}", points.len(), layout.n_vertices));
-    }
-    Ok(points)
-}
-
-fn binary_points(layout: &PlyLayout, body: &[u8]) -> Result<Vec<DVec3>, String> {
-    let n_bytes: usize = layout.properties.iter().map(|scalar| scalar.n_bytes).sum();
-    let held = body.len() / n_bytes;
-    // Before anything is reserved, so that a hostile count costs nothing.
-    if held < layout.n_vertices {
-        return Err(format!("holds {held} vertices, its header promises {}", layout.n_vertices));
-    }
-    let start = |property: usize| layout.properties[..property].iter().map(|scalar| scalar.n_bytes).sum::<usize>();
-    let number = |vertex: &[u8], property: usize| {
-        let bytes = &vertex[start(property)..][..layout.properties[property].n_bytes];
-        let mut little = [0; 8];
-        little[..bytes.len()].copy_from_slice(bytes);
-        if layout.encoding == PlyEncoding::Big {
-            little[..bytes.len()].reverse();
-        }
-        let [a, b, c, d, ..] = little;
-        if bytes.len() == 4 { f64::from(f32::from_le_bytes([a, b, c, d])) } else { f64::from_le_bytes(little) }
-    };
-    let vertices = body.chunks_exact(n_bytes).take(layout.n_vertices);
-    Ok(vertices.map(|vertex| DVec3::from_array(layout.xyz.map(|property| number(vertex, property)))).collect())
+    Some([index("x")?, index("y")?, index("z")?])
 }
 
 #[cfg(test)]
@@ -178,15 +73,18 @@ mod tests {
     #[test]
     fn broken_files_say_what_is_wrong() {
         let found = |bytes: &[u8]| parse(bytes).expect_err("broken");
-        assert_eq!(found(b"solid"), "does not start with `ply`");
-        assert_eq!(found(b"ply\nformat ascii 1.0\n"), "its header has no `end_header`");
-        assert_eq!(found(&file("ascii", b"9 1 2 3\n")), "holds 1 vertices, its header promises 2");
-        assert_eq!(found(&file("binary_little_endian", &[0; 33])), "holds 1 vertices, its header promises 2");
-        assert_eq!(found(&file("ascii", b"9 1 2\n")), "has no three coordinates in vertex 0: `9 1 2`");
+        assert!(found(b"solid").contains("does not start with `ply`"));
+        assert!(found(b"ply\nformat ascii 1.0\n").contains("has no line `end_header`"));
+        assert!(found(&file("ascii", b"9 1 2 3\n")).contains("holds 1 of the 2 vertices"));
+        assert!(found(&file("binary_little_endian", &[0; 33])).contains("holds 1 of the 2 vertices"));
+        assert!(found(&file("ascii", b"9 1 2\n")).contains("has 3 numbers in vertex 0, its header lists 4 properties"));
         let huge = b"ply\nformat binary_little_endian 1.0\nelement vertex 18446744073709551615\nproperty float x\n\
                      property float y\nproperty float z\nend_header\n";
-        assert_eq!(found(huge), "holds 0 vertices, its header promises 18446744073709551615");
+        assert!(found(huge).contains("holds 0 of the 18446744073709551615 vertices"));
         let flat = b"ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty int y\nend_header\n";
-        assert_eq!(found(flat), "has no floating-point property `y`");
+        assert_eq!(found(flat), "has vertices without floating-point properties `x`, `y` and `z`");
+        let lists = b"ply\nformat ascii 1.0\nelement vertex 1\nproperty list uchar float y\nproperty float x\nproperty float z\n\
+                      property double y\nend_header\n";
+        assert!(found(lists).contains("has a list, `y`, among the properties of its vertices"));
     }
 }

@@ -6,12 +6,13 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::folder_names::FolderNames;
-use super::image::read_header;
+use super::image::{ImageHeader, read_header};
 use super::listing::{ListedView, Listing, Note, Shot, unused_images};
 use super::mask_file::MaskFile;
 use super::named_path::NamedPath;
 use super::pose::world_to_camera;
 use super::{DatasetError, Layout, Split, ViewFault, found_files};
+use crate::camera::Camera;
 
 mod camera;
 mod json;
@@ -25,6 +26,37 @@ const FISHEYE_MODELS: [&str; 5] =
     ["OPENCV_FISHEYE", "SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE", "SIMPLE_FISHEYE", "FISHEYE"];
 /// The model of which k4, k5 and k6 stand below the fraction.
 const FULL_MODEL: &str = "FULL_OPENCV";
+
+/// The name of a frame, and its camera or why it has none.
+pub type FrameCamera = (String, Result<Camera, ViewFault>);
+
+/// The cameras of a transforms file by the names of their frames, each or why it cannot be used; photographs need not be there, and
+/// distortion is passed over. World: the file's own, OpenCV cameras.
+///
+/// * `side_px`: width and height where the file says none.
+///
+/// # Errors
+/// [`DatasetError`] where the file cannot be read.
+pub fn cameras_of_transforms(path: &Path, side_px: u32) -> Result<Vec<FrameCamera>, DatasetError> {
+    let Transforms { shared, frames, .. } = read_transforms(path)?;
+    let camera = |frame: &Frame| {
+        let (rotation, translation) = world_to_camera(&frame.rows())?;
+        let side = |own: Option<f64>, shared: Option<f64>| own.or(shared).map(|side| side.round() as u32);
+        let width_px = side(frame.own.w, shared.w).unwrap_or(side_px);
+        let height_px = side(frame.own.h, shared.h).unwrap_or(width_px);
+        let header = ImageHeader {
+            size_px: (width_px, height_px),
+            has_alpha: false,
+            is_grey: false,
+            is_depth_like: false,
+            exif_orientation: 1,
+        };
+        let lens = camera::lens(&frame.own, &shared, path, &header)?;
+        let (focal_px, principal_px) = (lens.focal_px, lens.principal_px);
+        Ok(Camera { rotation, translation, focal_px, principal_px, width_px, height_px })
+    };
+    Ok(frames.iter().map(|frame| (frame.name().to_owned(), camera(frame))).collect())
+}
 
 impl Transforms {
     /// Refuses a camera model of all frames that cannot be undistorted.

@@ -6,8 +6,9 @@
 
 use std::f32::consts::SQRT_2;
 
-use super::header::{Element, Encoding, Header, Scalar};
-use super::rows::{cut_off, degree_of};
+use pocketsplat_files::ply::{Element, Encoding, Header, Scalar, cut_off};
+
+use super::rows::degree_of;
 use crate::opacity::{constant_of_colour, logit_of_byte};
 use crate::{Gaussians, Unreadable};
 
@@ -34,7 +35,7 @@ impl<'a> Table<'a> {
         })?;
         let held = bytes.len() / row_bytes;
         if held < element.count {
-            return Err(cut_off(held, element.count));
+            return Err(cut_off(held, element.count).into());
         }
         Ok(Some(Self { element, row_bytes, bytes }))
     }

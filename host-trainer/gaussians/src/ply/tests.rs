@@ -117,9 +117,9 @@ fn what_is_no_gaussians_is_named() {
 #[test]
 fn a_cut_file_and_an_absurd_count_say_how_many_there_are() {
     let bytes = write(&example(), &Notes::default());
-    assert!(found(&bytes[..bytes.len() - 1]).starts_with("is cut off: it holds 2 of the 3 Gaussians"));
+    assert!(found(&bytes[..bytes.len() - 1]).starts_with("is cut off: it holds 2 of the 3 vertices"));
     let absurd = with_header(&example(), |header| header.replace("vertex 3", "vertex 18446744073709551615"));
-    assert!(found(&absurd).starts_with("is cut off: it holds 3 of the 18446744073709551615 Gaussians"));
+    assert!(found(&absurd).starts_with("is cut off: it holds 3 of the 18446744073709551615 vertices"));
     let beyond = with_header(&example(), |header| header.replace("vertex 3", "vertex 99999999999999999999"));
     assert!(found(&beyond).contains("whose count is no whole number"));
     let ascii = with_header(&example(), |header| {

@@ -161,7 +161,7 @@ pub(super) fn cases() -> Vec<Case> {
             Nerfstudio,
             Fatal,
             "bad-points",
-            &["sparse.ply` does not start with `ply`; write it again"],
+            &["sparse.ply` is no .ply file: it does not start with `ply`; write it again"],
             |f| {
                 f.shared.push_str(", \"ply_file_path\": \"sparse.ply\"");
                 f.write_files().write("sparse.ply", "solid cube");

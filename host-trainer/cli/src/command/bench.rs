@@ -23,7 +23,7 @@ use crate::say::say;
 
 /// Time the stages of a training step.
 ///
-/// Measure the stages of a training step on every device of this machine, and on the CPU with 1, 2, 4, … threads.
+/// On every device of this machine, and on the CPU with 1, 2, 4, … threads.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Splats of the scenes.

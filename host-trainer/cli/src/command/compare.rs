@@ -17,7 +17,7 @@ use crate::program;
 
 /// Compare finished runs.
 ///
-/// Compare finished runs: quality, bytes and the minutes that they took, by the settings in which they differ from the first.
+/// Quality, bytes and the minutes that they took, by the settings in which they differ from the first.
 ///
 /// Writes runs.csv and runs.svg. Bundles are measured on the views that are held out of training, once: the figures are kept beside
 /// them. Minutes are of one processor core, so that they do not depend on what else the machine did.

@@ -22,8 +22,8 @@ use crate::say::say;
 
 /// Train, compress and draw a procedural capture.
 ///
-/// Make a capture, train it, compress it, draw it with the decoder and compare: about three minutes on two cores. What was interrupted
-/// goes on when the same command is given again.
+/// The whole path on a capture that it makes itself: about three minutes on two cores. What was interrupted goes on when the same
+/// command is given again.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Folder for everything; what an earlier demo left there is replaced.

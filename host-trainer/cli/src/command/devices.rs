@@ -13,7 +13,7 @@ use crate::say::say;
 
 /// List the GPUs that training can run on.
 ///
-/// List the GPUs that training can run on, with their limits.
+/// With their limits, by the names that --device takes.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Print the result as JSON.

@@ -11,7 +11,7 @@ use super::output;
 
 /// Check a capture; every finding comes with a remedy.
 ///
-/// Check a capture: images, poses, lenses, scale, splits; every finding comes with a remedy.
+/// Checks images, poses, lenses, scale and splits.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Folder of the capture.

@@ -51,7 +51,7 @@ pub(crate) fn lpips_of(lpips: &Lpips) -> String {
 
 /// Compare a bundle's frames with the photographs of a capture.
 ///
-/// Compare the frames of a bundle or of a file of Gaussians with the photographs of a capture.
+/// Takes a file of Gaussians too.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// The bundle, or a file of Gaussians: .ply, .spz, .sog or .splat.

@@ -21,7 +21,7 @@ use level::LevelFit;
 
 /// Plan memory and work for a device.
 ///
-/// Show what a decoder draws of a bundle within so much memory: the share of the scene, its quality, the work of a frame.
+/// Shows what a decoder draws of a bundle within so much memory: the share of the scene, its quality, the work of a frame.
 ///
 /// Quality is the manifest's, measured over test views when the bundle was made (over training views that were held out, where
 /// --validation-every said so). Work is a bound over the views

@@ -44,7 +44,7 @@ const LAMBDA: f64 = 0.0005;
 
 /// Compress splats that exist already into a bundle.
 ///
-/// Compress splats that exist already: draw pictures of a .ply, .spz or .sog, train a bundle on them, and measure what it lost.
+/// Draws pictures of a .ply, .spz or .sog, trains a bundle on them, and measures what it lost.
 ///
 /// Cameras stand around the scene's bulk or inside it, wherever more of it is seen; --cameras gives others. What was interrupted goes on
 /// when the same command is given again.

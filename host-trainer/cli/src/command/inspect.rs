@@ -20,7 +20,7 @@ use super::render::CameraRecord;
 
 /// Show what a bundle or a file of Gaussians holds.
 ///
-/// Show a bundle's header, its tiers, and its bytes part by part; or what a file of Gaussians holds.
+/// Of a bundle the header, the tiers, and the bytes part by part.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// The bundle, or a file of Gaussians: .ply, .spz, .sog or .splat.

@@ -21,7 +21,7 @@ use spec::{AskedRun, Spec};
 
 /// Train many captures with many options, here or as a workflow.
 ///
-/// Write a Snakemake workflow that trains, measures and tabulates every combination of a list of captures and options; with --run do it
+/// Writes a Snakemake workflow that trains, measures and tabulates every combination of captures and options; with --run does all of it
 /// here, without Snakemake.
 ///
 /// The same command again goes on where it was stopped, and trains nothing twice. Every run of a workflow asks for the threads that this command has, and for memory and minutes by its own estimate, which takes a few steps of

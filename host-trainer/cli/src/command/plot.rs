@@ -15,7 +15,7 @@ use super::outputs::{FIGURE, OverwriteArgs, check_name};
 
 /// Draw recorded curves as an SVG.
 ///
-/// Draw learning curves of runs, rate-distortion curves, or what settings cost, into an SVG.
+/// Learning curves of runs, rate-distortion curves, or what settings cost.
 ///
 /// Of rate-distortion curves it also prints how far each lies from the first: Bjøntegaard's deltas.
 #[derive(clap::Args)]

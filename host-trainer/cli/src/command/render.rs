@@ -34,9 +34,9 @@ const OF_A_CAPTURE: [&str; 8] =
 
 /// Draw a bundle as pictures.
 ///
-/// Draw a bundle as pictures: views of a capture, the bundle's own camera, a turn around it, or cameras of a file.
+/// Views of a capture, the bundle's own camera, a turn around it, or cameras of a file.
 ///
-/// So it does for a .ply, .spz or .sog; one without a camera of its own is looked at from where `import` would begin.
+/// Draws a .ply, .spz or .sog too; one without a camera of its own is looked at from where `import` would begin.
 #[derive(clap::Args)]
 #[command(group = clap::ArgGroup::new("cameras").required(true).args(["view", "all", "preview", "orbit", "camera"]))]
 pub(crate) struct Args {

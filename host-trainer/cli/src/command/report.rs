@@ -31,7 +31,7 @@ const FILE: &str = "report.html";
 
 /// Write a page about a finished run.
 ///
-/// Write a page about a finished run: quality view by view, photograph against picture, bytes, tiers, the viewer.
+/// Quality view by view, photograph against picture, bytes, tiers, the viewer.
 ///
 /// It is one file that fetches nothing. `train` writes one into the run folder at its end.
 #[derive(clap::Args)]

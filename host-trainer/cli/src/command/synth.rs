@@ -11,7 +11,7 @@ use super::output;
 
 /// Write a procedural capture.
 ///
-/// Write a procedural capture: an analytic scene, ray-traced from known cameras, in Blender's format.
+/// An analytic scene, ray-traced from known cameras, in Blender's format.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Folder to write; must be new or empty.

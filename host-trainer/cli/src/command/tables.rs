@@ -24,7 +24,7 @@ pub(super) const FILES: [(&str, Content); 2] =
 
 /// Tabulate the finished runs of a plan.
 ///
-/// Make tables and figures of the finished runs of a plan; it may be unfinished.
+/// The plan may be unfinished.
 ///
 /// tables/runs.csv has every run; DATASET.csv and DATASET/SCENE.csv the columns of the 3DGS compression survey, means over seeds;
 /// bd_rate.csv how many bytes each method takes against the plan's first at equal PSNR, with 95 % intervals over seeds; the .svg files

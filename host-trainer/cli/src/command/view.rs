@@ -19,9 +19,7 @@ use super::stand::StandArgs;
 
 /// Write a web page that draws bundles.
 ///
-/// Write one page that draws bundles in a browser, with nothing to install and nothing fetched.
-///
-/// The page turns the scene by mouse, touch and keys. Sliders set what a device has: memory, pruning rate, quality. It shows the plan and
+/// Nothing is installed and nothing fetched: it is one file. The page turns the scene by mouse, touch and keys. Sliders set what a device has: memory, pruning rate, quality. It shows the plan and
 /// the very pixels of the device. Several bundles stand side by side with one camera. Of a .ply, .spz or .sog the page shows pictures of a turn
 /// around it, and what the file holds.
 #[derive(clap::Args)]

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::{Context as _, Result};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 
 use super::in_repository;
 
@@ -23,18 +23,26 @@ pub(super) struct Row {
     pub(super) psnr_db: Option<f64>,
     pub(super) ssim: Option<f64>,
     pub(super) lpips: Option<f64>,
+    #[serde(serialize_with = "whole")]
     pub(super) bytes: Option<f64>,
+    #[serde(serialize_with = "whole")]
     pub(super) n_anchors: Option<f64>,
+    #[serde(serialize_with = "whole")]
     pub(super) n_views: Option<f64>,
+    #[serde(serialize_with = "whole")]
     pub(super) width_px: Option<f64>,
+    #[serde(serialize_with = "whole")]
     pub(super) height_px: Option<f64>,
     /// Of one processor core, for training.
     pub(super) processor_minutes: Option<f64>,
     /// Most that training held.
+    #[serde(serialize_with = "whole")]
     pub(super) memory_bytes: Option<f64>,
     /// Of the page that `view` writes.
+    #[serde(serialize_with = "whole")]
     pub(super) page_bytes: Option<f64>,
     /// Of the slowest of four frames, counted on the group's emulated board.
+    #[serde(serialize_with = "whole")]
     pub(super) instructions: Option<f64>,
     pub(super) program: String,
 }
@@ -43,6 +51,14 @@ impl Row {
     pub(super) fn is_measured(&self) -> bool {
         self.psnr_db.is_some()
     }
+}
+
+/// A count, without a fraction.
+#[expect(clippy::ref_option, reason = "as serde calls it")]
+fn whole<S: Serializer>(count: &Option<f64>, to: S) -> Result<S::Ok, S::Error> {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
+    let whole = count.map(|count| count.round() as u64);
+    whole.serialize(to)
 }
 
 fn path(group: &str) -> PathBuf {

@@ -5,11 +5,11 @@ use pocketsplat_core::context::{FEATURE_ONE, N_GROUPS, N_LEVELS};
 use super::anchors::rooms;
 use super::context::{DeviceNetwork, Follows};
 use super::network_pass::{NetworkPass, PassKernels};
-use super::ops::parents::{Parents, Places};
-use super::ops::perturb::Perturb;
+use super::ops::rate::parents::{Parents, Places};
+use super::ops::rate::perturb::Perturb;
 use super::scene::{DeviceScene, FEATURES, LOG_SCALES};
 use super::{Buffer, Commands, Gpu, GpuError};
-use pocketsplat_kernels::ops::noise::Stream;
+use pocketsplat_kernels::ops::rate::noise::Stream;
 use pocketsplat_kernels::scene::{Anchors, INITIAL_MASK_LOGIT};
 use pocketsplat_kernels::step::parents;
 

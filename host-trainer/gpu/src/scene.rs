@@ -3,10 +3,10 @@
 use super::context::DeviceContext;
 use super::group::Group;
 use super::ops::adam::Adam;
-use super::ops::head::{HeadLayout, parameters_of};
-use super::ops::perturb;
-use super::ops::prefilter::Shown;
-use super::ops::statistics::Sums;
+use super::ops::heads::head::{HeadLayout, parameters_of};
+use super::ops::image::prefilter::Shown;
+use super::ops::image::statistics::Sums;
+use super::ops::rate::perturb;
 use super::{Buffer, Commands, Gpu, GpuError};
 use pocketsplat_kernels::ops::adam;
 use pocketsplat_kernels::scene::{Head, ModelShape};

@@ -6,7 +6,7 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use pocketsplat_kernels::ops::Pinhole;
-use pocketsplat_kernels::ops::noise::Stream;
+use pocketsplat_kernels::ops::rate::noise::Stream;
 use pocketsplat_kernels::ops::simd::Level;
 use pocketsplat_kernels::scene::Scene;
 use pocketsplat_kernels::step::coding::{Coding, RateTerms};

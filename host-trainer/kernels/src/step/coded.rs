@@ -7,9 +7,10 @@ use super::buffer::refill;
 use super::coding::{Coding, IntegerModel};
 use super::parents::{Parents, give_symbols, give_values};
 use super::sample;
-use crate::ops::noise::Stream;
+use crate::ops::heads::{head, mask};
+use crate::ops::rate::noise::Stream;
+use crate::ops::rate::{adaptive_step, anchor_bits, hash_grid, perturb};
 use crate::ops::simd::Level;
-use crate::ops::{adaptive_step, anchor_bits, hash_grid, head, mask, perturb};
 use crate::real::Real;
 use crate::scene::{ContextModel, ContextNetwork, Head, ModelShape, Scene};
 

@@ -2,7 +2,7 @@
 
 use pocketsplat_core::context::Context;
 
-use crate::ops::noise::Stream;
+use crate::ops::rate::noise::Stream;
 use crate::scene::ContextNetwork;
 
 /// What a step does to the values of anchors.

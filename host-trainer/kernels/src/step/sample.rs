@@ -1,6 +1,6 @@
 //! Which anchors of a view its rate is taken over.
 
-use crate::ops::noise::Stream;
+use crate::ops::rate::noise::Stream;
 
 /// Number of the draw that decides; channels are fewer.
 pub const SAMPLE_DRAW: u32 = u32::MAX;

@@ -5,7 +5,7 @@ use pocketsplat_capture::dataset::Normalisation;
 use pocketsplat_codec::bundle::{BundleInfo, ChannelCoding, WriteOptions, decoded_scene, write};
 use pocketsplat_core::Bundle;
 use pocketsplat_kernels::integer_model;
-use pocketsplat_kernels::ops::noise::Stream;
+use pocketsplat_kernels::ops::rate::noise::Stream;
 use pocketsplat_kernels::scene::{ModelShape, Scene};
 use pocketsplat_kernels::step::coding::{Coding, IntegerModel, RateTerms};
 use pocketsplat_kernels::step::{Loss, TargetView, Workspace};

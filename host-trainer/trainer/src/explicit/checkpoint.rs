@@ -13,7 +13,7 @@ use super::train::CloudTrainer;
 use crate::train::checkpoint::envelope::{self, Progress, RandomState, needs, part};
 use crate::train::checkpoint::{CaptureSignature, CheckpointFault, Kernels, RestoreError};
 use crate::train::run::Resumable;
-use pocketsplat_kernels::ops::spherical_harmonics::MOST;
+use pocketsplat_kernels::ops::image::spherical_harmonics::MOST;
 
 /// As the checkpoints of anchors have it, with a letter of its own.
 const MAGIC: [u8; 8] = *b"\x8bPSGRN\r\n";

@@ -3,8 +3,9 @@
 use pocketsplat_core::context::{Context, Group, N_GROUPS, N_LEVELS, Steps};
 use rayon::prelude::*;
 
+use pocketsplat_kernels::ops::heads::{head, mask};
+use pocketsplat_kernels::ops::rate::{anchor_bits, hash_grid};
 use pocketsplat_kernels::ops::simd::Level;
-use pocketsplat_kernels::ops::{anchor_bits, hash_grid, head, mask};
 use pocketsplat_kernels::scene::{ContextModel, ContextNetwork, Scene};
 use pocketsplat_kernels::step::parents::Parents;
 

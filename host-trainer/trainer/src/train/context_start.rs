@@ -203,7 +203,8 @@ mod tests {
     use super::*;
     use crate::train::Trainer;
     use crate::train::test_capture::{tiny_capture, tiny_config};
-    use pocketsplat_kernels::ops::{hash_grid, head};
+    use pocketsplat_kernels::ops::heads::head;
+    use pocketsplat_kernels::ops::rate::hash_grid;
     use rand::SeedableRng;
 
     fn n_rows(n_anchors: usize) -> u32 {

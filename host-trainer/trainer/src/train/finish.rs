@@ -7,7 +7,7 @@ use super::bits::{self, all_steps};
 use super::coding::{HEAD_FRACTION_BITS, Integers};
 use super::survey::Survey;
 use super::{TrainError, Trainer};
-use pocketsplat_kernels::ops::perturb;
+use pocketsplat_kernels::ops::rate::perturb;
 use pocketsplat_kernels::scene::Scene;
 use pocketsplat_kernels::step::Workspace;
 

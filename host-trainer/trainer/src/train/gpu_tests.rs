@@ -13,7 +13,7 @@ use pocketsplat_gpu::parity::{Bound, assert_close, gpu, largest};
 use pocketsplat_gpu::{Gpu, GpuStep, choose};
 use pocketsplat_kernels::integer_model;
 use pocketsplat_kernels::ops::Pinhole;
-use pocketsplat_kernels::ops::perturb::symbol;
+use pocketsplat_kernels::ops::rate::perturb::symbol;
 use pocketsplat_kernels::scene::Scene;
 use pocketsplat_kernels::step::coding::Coding;
 use pocketsplat_kernels::step::coding::{IntegerModel, RateReport, RateTerms};
@@ -33,7 +33,7 @@ fn step(
 ) -> (StepReport<f32>, Vec<(&'static str, Vec<f32>)>) {
     let mut workspace = Workspace::new(&scene.shape);
     workspace.set_device(device);
-    let stream = pocketsplat_kernels::ops::noise::Stream::of_run(1).branch(1);
+    let stream = pocketsplat_kernels::ops::rate::noise::Stream::of_run(1).branch(1);
     let info = StepInfo { iteration: 10, iterations: 20, phase: Phase::Raw, scaled: true, stream };
     let terms = modules.terms();
     let loss = Loss { weights: LossWeights::default(), modules: Some((&terms, &info)), pruned_share: 0.0 };
@@ -179,7 +179,7 @@ fn a_step_of_a_resident_scene_agrees_with_the_cpu() {
         let image = &view.photograph().expect("in memory").image;
         let mask: Vec<bool> = (0..image.rgb.len() / 3).map(|i| i % 7 > 1).collect();
         let target = TargetView::new(&camera, planes(image), (i == 1).then_some(&mask), [0.2, 0.5, 0.1]);
-        let stream = pocketsplat_kernels::ops::noise::Stream::of_run(1).branch(1);
+        let stream = pocketsplat_kernels::ops::rate::noise::Stream::of_run(1).branch(1);
         let info = StepInfo { iteration: 10, iterations: 20, phase: Phase::Raw, scaled: true, stream };
         let terms = config.modules.terms();
         let loss = Loss { weights: LossWeights::default(), modules: Some((&terms, &info)), pruned_share: 0.0 };

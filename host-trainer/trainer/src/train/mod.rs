@@ -51,7 +51,7 @@ use module::RunView;
 use optimiser::Optimiser;
 use pocketsplat_capture::dataset::{Capture, Image, Photograph, View};
 use pocketsplat_kernels::ops::Pinhole;
-use pocketsplat_kernels::ops::noise::Stream;
+use pocketsplat_kernels::ops::rate::noise::Stream;
 use pocketsplat_kernels::scene::init::initial_scene;
 use pocketsplat_kernels::scene::{Anchors, Heads, Scene};
 use pocketsplat_kernels::step::coding::Coding;

@@ -4,7 +4,7 @@ use super::bits::Bits;
 use super::coding::Integers;
 use super::worth::Worth;
 use super::{TrainError, Trainer, target};
-use pocketsplat_kernels::ops::noise::Stream;
+use pocketsplat_kernels::ops::rate::noise::Stream;
 use pocketsplat_kernels::step::Workspace;
 
 /// Branch of the run's stream that probes draw their signs from.

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::Trainer;
-use pocketsplat_kernels::ops::prefilter;
+use pocketsplat_kernels::ops::image::prefilter;
 
 impl Trainer<'_> {
     /// Counts the training views that may show each anchor, from the first need of a rate on.

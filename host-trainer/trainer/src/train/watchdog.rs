@@ -4,7 +4,7 @@ use std::fmt;
 
 use rayon::prelude::*;
 
-use pocketsplat_kernels::ops::neural_gaussians::Gaussian;
+use pocketsplat_kernels::ops::heads::neural_gaussians::Gaussian;
 use pocketsplat_kernels::scene::{ContextNetwork, Heads, Scene};
 use pocketsplat_kernels::step::{Block, StepReport, TargetView, Workspace};
 

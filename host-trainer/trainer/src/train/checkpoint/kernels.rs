@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use pocketsplat_kernels::ops::matmul::{Matrix, multiply};
+use pocketsplat_kernels::ops::heads::matmul::{Matrix, multiply};
 use pocketsplat_kernels::ops::simd::Level;
 use pocketsplat_kernels::real::Real;
 

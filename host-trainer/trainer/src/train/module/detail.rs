@@ -4,12 +4,12 @@ use serde::{Deserialize, Serialize};
 
 use super::Module;
 use crate::train::config_error::{ConfigError, within};
-use pocketsplat_kernels::ops::high_pass;
+use pocketsplat_kernels::ops::loss::high_pass;
 use pocketsplat_kernels::real::Real;
 use pocketsplat_kernels::scene::ModelShape;
 use pocketsplat_kernels::step::{DeviceTerms, ImagePair, StepInfo, Terms};
 
-/// Adds a residual to each Gaussian's colour, H = x + F(x ⊕ f) (the plug-and-play paper, eq. 5; see [`pocketsplat_kernels::ops::detail`]).
+/// Adds a residual to each Gaussian's colour, H = x + F(x ⊕ f) (the plug-and-play paper, eq. 5; see [`pocketsplat_kernels::ops::heads::detail`]).
 ///
 /// The mean squared difference of image and photograph in high frequencies is added to the loss, as the paper's words ask for. (Its
 /// eq. 6, as printed, only keeps residuals small.)

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Module;
 use crate::train::config_error::{ConfigError, within};
-use pocketsplat_kernels::ops::normality::{ChannelMoments, Weights};
+use pocketsplat_kernels::ops::loss::normality::{ChannelMoments, Weights};
 use pocketsplat_kernels::real::Real;
 use pocketsplat_kernels::scene::{ModelShape, Scene};
 use pocketsplat_kernels::step::{Block, DeviceTerms, StepInfo, Terms};

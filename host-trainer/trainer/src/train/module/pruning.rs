@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::{AnchorChange, Module, RunView};
 use crate::train::TrainError;
 use crate::train::config_error::{ConfigError, within};
-use pocketsplat_kernels::ops::opacity_target::forward_backward;
+use pocketsplat_kernels::ops::loss::opacity_target::forward_backward;
 use pocketsplat_kernels::real::Real;
 use pocketsplat_kernels::scene::{ModelShape, Scene};
 use pocketsplat_kernels::step::{Block, DeviceTerms, StepInfo, Terms};
@@ -272,7 +272,7 @@ mod tests {
             iterations: 40,
             phase: pocketsplat_kernels::step::Phase::Raw,
             scaled: true,
-            stream: pocketsplat_kernels::ops::noise::Stream::of_run(3).branch(iteration),
+            stream: pocketsplat_kernels::ops::rate::noise::Stream::of_run(3).branch(iteration),
         };
         assert!((1..=20).all(|iteration| pruning.pruned_share(&info(iteration)) == 0.0));
         let shares: Vec<f32> = (21..4021).map(|iteration| pruning.pruned_share(&info(iteration))).collect();

@@ -1,7 +1,7 @@
 //! The gradients of the modules, in a whole step.
 
 use pocketsplat_kernels::finite_difference::assert_piecewise_gradient;
-use pocketsplat_kernels::ops::noise::Stream;
+use pocketsplat_kernels::ops::rate::noise::Stream;
 use pocketsplat_kernels::scene::ModelShape;
 use pocketsplat_kernels::step::coding::Coding;
 use pocketsplat_kernels::step::example::{flatten, gradients, scene, shapes, step_with};

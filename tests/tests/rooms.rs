@@ -74,9 +74,28 @@ const CRATES: [(&str, &[&str]); 12] = [
 ];
 
 /// Rooms with rooms inside: the sources' folder of the crate, the module, and what lies in it in order.
-const FOLDERS: [(&str, &str, &[&str]); 2] = [
+const FOLDERS: [(&str, &str, &[&str]); 3] = [
     ("host-trainer/kernels/src", "ops", &["simd", "pinhole", "heads", "image", "loss", "rate", "adam"]),
     ("host-trainer/gpu/src", "ops", &["primitives", "heads", "image", "loss", "rate", "adam", "sound"]),
+    (
+        "host-trainer/trainer/src",
+        "train",
+        &[
+            "schedule",
+            "read_ahead",
+            "error",
+            "views",
+            "optimiser",
+            "density",
+            "context",
+            "worth",
+            "limits",
+            "modules",
+            "config",
+            "run",
+            "bench_scene",
+        ],
+    ),
 ];
 
 #[test]
@@ -149,7 +168,8 @@ fn collect(folder: &Path, path: &mut ModulePath, files: &mut Vec<(ModulePath, St
     entries.sort();
     for entry in entries {
         let name = entry.file_stem().expect("a name").to_string_lossy().into_owned();
-        if ["tests", "testing", "bin", "main"].contains(&name.as_str()) {
+        let is_of_tests = name.ends_with("_tests") || name.starts_with("test_");
+        if is_of_tests || ["tests", "testing", "bin", "main"].contains(&name.as_str()) {
             continue;
         }
         let is_own = ["mod", "lib"].contains(&name.as_str());

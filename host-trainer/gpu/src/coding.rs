@@ -133,7 +133,7 @@ impl GpuCoding {
         let (n_sampled, drawn) = match &context.grid {
             Some(grid) => {
                 let (network, pass) = (&context.networks[0], &mut self.pass);
-                let n_sampled = pass.choose(gpu, stream, terms.sample, &scene.rarity, anchors)?;
+                let n_sampled = pass.choose(gpu, stream, terms.sample, &scene.view_weights, anchors)?;
                 // There by now: nothing has been submitted since.
                 let drawn = drawn.take(gpu)?;
                 pass.fit(gpu, network, anchors.len())?;

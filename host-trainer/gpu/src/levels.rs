@@ -185,7 +185,7 @@ impl GpuLevels {
             kernels.gather.run(&mut commands, &parents.rows.items, 1, &identity, &own.rows);
             kernels.gather.run(&mut commands, anchors, 1, &own.rows, &own.anchors);
             commands.submit()?;
-            let n_of_level = own.pass.choose(gpu, stream, share, &scene.rarity, &own.anchors)?;
+            let n_of_level = own.pass.choose(gpu, stream, share, &scene.view_weights, &own.anchors)?;
             n_sampled += n_of_level;
             own.sampled.fit(gpu, n_of_level)?;
             own.pass.fit(gpu, network, n)?;

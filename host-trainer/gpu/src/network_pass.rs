@@ -82,10 +82,10 @@ impl NetworkPass {
         gpu: &Gpu,
         stream: Stream,
         share: f64,
-        rarity: &Buffer<f32>,
+        view_weights: &Buffer<f32>,
         anchors: &Buffer<u32>,
     ) -> Result<usize, GpuError> {
-        self.sample.run(gpu, Commands::new(gpu), stream, share, rarity, anchors)
+        self.sample.run(gpu, Commands::new(gpu), stream, share, view_weights, anchors)
     }
 
     /// Makes room for `n` anchors and the sample that was chosen.

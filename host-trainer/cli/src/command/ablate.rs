@@ -7,7 +7,7 @@ use std::process::ExitCode;
 
 use anyhow::{Result, bail};
 use pocketsplat_trainer::train::TrainConfig;
-use pocketsplat_trainer::train::module::Modules;
+use pocketsplat_trainer::train::modules::Modules;
 
 use super::output;
 use super::outputs::table;

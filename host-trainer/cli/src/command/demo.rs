@@ -11,7 +11,7 @@ use pocketsplat_files::Outputs;
 use pocketsplat_trainer::encode::Encoding;
 use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::config::Backbone;
-use pocketsplat_trainer::train::module::{Detail, Distribution, Modules, Pruning};
+use pocketsplat_trainer::train::modules::{Detail, Distribution, Modules, Pruning};
 
 use super::bundle::BundleFile;
 use super::capture::CaptureArgs;

@@ -3,7 +3,7 @@
 use pocketsplat_capture::dataset::Background;
 use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::config::{Backbone, Hac};
-use pocketsplat_trainer::train::module::{Modules, Rdo};
+use pocketsplat_trainer::train::modules::{Modules, Rdo};
 
 use super::{CaptureOptions, RunConfig};
 

@@ -1,5 +1,5 @@
 use super::*;
-use pocketsplat_trainer::train::module::pruning;
+use pocketsplat_trainer::train::modules::pruning;
 
 #[test]
 fn a_written_configuration_reads_back_to_the_last_bit() {

@@ -139,7 +139,7 @@ impl<R: Real> Coded<R> {
                 self.perturb(level, &scene.shape, Some(*stream), anchors, values);
             }
             (Coding::Context { stream, rate, exact }, Some(network)) => {
-                let is_sampled = |anchor: u32| sample::holds(*stream, anchor, rate.sample, &scene.anchors.rarity);
+                let is_sampled = |anchor: u32| sample::holds(*stream, anchor, rate.sample, &scene.anchors.view_weights);
                 self.sampled.extend((0u32..).zip(anchors).filter_map(|(row, a)| is_sampled(*a).then_some(row)));
                 self.predict(scene, network, parents, anchors);
                 if let Some(exact) = exact {

@@ -1,4 +1,4 @@
-//! A run on explicit Gaussians to a checkpoint and back; see [`crate::train::checkpoint`] for what stands around it.
+//! A run on explicit Gaussians to a checkpoint and back; see [`crate::train::run::checkpoint`] for what stands around it.
 
 use std::io::{self, Write};
 
@@ -10,9 +10,9 @@ use super::config::CloudConfig;
 use super::density::DensityStatistics;
 use super::optimiser::CloudOptimiser;
 use super::train::CloudTrainer;
-use crate::train::checkpoint::envelope::{self, Progress, RandomState, needs, part};
-use crate::train::checkpoint::{CaptureSignature, CheckpointFault, Kernels, RestoreError};
 use crate::train::run::Resumable;
+use crate::train::run::checkpoint::envelope::{self, Progress, RandomState, needs, part};
+use crate::train::run::checkpoint::{CaptureSignature, CheckpointFault, Kernels, RestoreError};
 use pocketsplat_kernels::ops::image::spherical_harmonics::MOST;
 
 /// As the checkpoints of anchors have it, with a letter of its own.

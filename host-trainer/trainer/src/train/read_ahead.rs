@@ -174,7 +174,7 @@ mod tests {
             while !explicit.is_done() {
                 explicit.advance().expect("an iteration");
             }
-            let worth = trainer.worth().expect("a context model");
+            let worth = trainer.view().worth().expect("a context model");
             assert_eq!(trainer.waited_share().is_some(), !capture.train[0].is_in_memory());
             assert_eq!(explicit.waited_share().is_some(), !capture.train[0].is_in_memory());
             let (mut checkpoint, mut explicit_checkpoint) = (Vec::new(), Vec::new());

@@ -1,7 +1,7 @@
 //! The rows of an ablation.
 
 use pocketsplat_kernels::scene::ModelShape;
-use pocketsplat_trainer::train::module::Detail;
+use pocketsplat_trainer::train::modules::Detail;
 
 /// The row that all others are compared with.
 pub(super) const BASELINE: &str = "none";
@@ -112,7 +112,7 @@ pub(super) fn rows(shape: &ModelShape) -> Vec<Row> {
 mod tests {
     use pocketsplat_trainer::train::TrainConfig;
     use pocketsplat_trainer::train::config::Backbone;
-    use pocketsplat_trainer::train::module::{Modules, Pruning};
+    use pocketsplat_trainer::train::modules::{Modules, Pruning};
 
     use super::rows;
     use crate::config::RunConfig;

@@ -6,8 +6,7 @@ use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::Capture;
 use pocketsplat_files::{Output, shell_word};
 use pocketsplat_kernels::step::SharedDevice;
-use pocketsplat_trainer::encode::{Encoding, Scale};
-use pocketsplat_trainer::train::gauge::Gauge;
+use pocketsplat_trainer::encode::{EncodedSizes, Encoding};
 use pocketsplat_trainer::train::run::{Ending, Interval, RunError, RunFolder};
 use pocketsplat_trainer::train::{TrainConfig, Trainer};
 
@@ -49,14 +48,16 @@ pub(crate) fn train_in<'a>(
     let mut folder = folder.forking_at(&config.fork_at);
     let path = folder.path().to_owned();
     keep_points(capture, &path);
-    let scale = config.encoding.scale(capture);
+    let sizes = config.encoding.sizes(capture);
+    let measure = sizes.as_ref().map(EncodedSizes::measure);
+    let limits = sizes.as_ref().zip(measure.as_ref()).map(|(sizes, measure)| sizes.probe(measure));
     let warned = if let Start::New(warned) = start { warned } else { Warned::default() };
     let trainer = match start {
         Start::New(_) => Trainer::new(capture, config.train)?,
         Start::Resumed => resumed(&folder, config, capture, device.clone())?,
         Start::Forked(trainer) => *trainer,
     };
-    let mut trainer = trainer.fitting(gauge(scale.as_ref()));
+    let mut trainer = trainer.fitting(limits);
     trainer.set_device(device);
     folder.write_config(&config.to_toml()?)?;
     for at in folder.missed_forks(trainer.iteration)? {
@@ -83,11 +84,6 @@ pub(crate) fn train_in<'a>(
         .with_context(|| format!("the training is done and kept; {}", how_to_go_on()))?;
     folder.finish(&json(&result)?, config.keep_checkpoints)?;
     Ok(Some(result))
-}
-
-/// What tells a run that its bundle has limits.
-fn gauge<'a>(scale: Option<&'a Scale<'a>>) -> Option<&'a dyn Gauge> {
-    scale.map(|scale| scale as &dyn Gauge)
 }
 
 /// The run as its newest sound checkpoint has it, or at its start where it was stopped before the first one.
@@ -139,8 +135,10 @@ pub(crate) fn train_as(
     encoding: &Encoding,
     output: &Output,
 ) -> Result<TrainResult> {
-    let scale = encoding.scale(capture);
-    let mut trainer = Trainer::new(capture, config)?.fitting(gauge(scale.as_ref()));
+    let sizes = encoding.sizes(capture);
+    let measure = sizes.as_ref().map(EncodedSizes::measure);
+    let limits = sizes.as_ref().zip(measure.as_ref()).map(|(sizes, measure)| sizes.probe(measure));
+    let mut trainer = Trainer::new(capture, config)?.fitting(limits);
     trainer.run(&mut Progress::new(0, config.iterations))?;
     write_bundle(&trainer, capture, options, encoding, output)
 }

@@ -10,7 +10,7 @@ use pocketsplat_instructions::level::Profile;
 use pocketsplat_trainer::effects::Effect;
 use pocketsplat_trainer::encode::{Encoding, Fitted};
 use pocketsplat_trainer::train::Trainer;
-use pocketsplat_trainer::train::finish::Finished;
+use pocketsplat_trainer::train::limits::Finished;
 use serde::Serialize;
 
 use super::limits;

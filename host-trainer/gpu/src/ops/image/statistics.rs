@@ -1,4 +1,4 @@
-//! What growth and pruning learn from a view: `train::statistics` over slots.
+//! What growth and pruning learn from a view: `train::density::statistics` over slots.
 
 use bytemuck::{Pod, Zeroable};
 

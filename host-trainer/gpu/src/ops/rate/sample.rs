@@ -35,9 +35,9 @@ impl Sample {
         Ok(Self { mark, rows: Compact::new(gpu)? })
     }
 
-    /// Lists the rows of the anchors whose draw is below `share` times their rarity: the CPU's. Returns their number, for which it waits.
+    /// Lists the rows of the anchors whose draw is below `share` times their weights: the CPU's. Returns their number, for which it waits.
     ///
-    /// * `rarity`: of all anchors. * `anchors`: `[n_rows]`.
+    /// * `view_weights`: of all anchors. * `anchors`: `[n_rows]`.
     ///
     /// # Errors
     /// [`GpuError`].
@@ -47,7 +47,7 @@ impl Sample {
         mut commands: Commands<'_>,
         stream: Stream,
         share: f64,
-        rarity: &Buffer<f32>,
+        view_weights: &Buffer<f32>,
         anchors: &Buffer<u32>,
     ) -> Result<usize, GpuError> {
         let n_rows = anchors.len();
@@ -55,7 +55,7 @@ impl Sample {
         #[expect(clippy::cast_possible_truncation, reason = "a share")]
         let share = share as f32;
         let parameters = Parameters { n_rows: n_rows as u32, stream: stream.word(), draw: SAMPLE_DRAW, share };
-        commands.run_items(&self.mark, &parameters, &[anchors as _, rarity as _, &self.rows.marks as _], n_rows);
+        commands.run_items(&self.mark, &parameters, &[anchors as _, view_weights as _, &self.rows.marks as _], n_rows);
         self.rows.run(gpu, commands)
     }
 }
@@ -74,12 +74,12 @@ mod tests {
         let stream = Stream::of_run(3).branch(70);
         for (n, share) in SIZES.into_iter().zip([0.5, 1.0, 0.05, 0.0, 0.3]) {
             let anchors: Vec<u32> = (0..n as u32).map(|i| 3 * i + 1).collect();
-            let rarity: Vec<f32> = random(7, 3 * n + 1).iter().map(|r| (1.0 + 0.9 * r) as f32).collect();
-            let is_sampled = |a: u32| holds(stream, a, share, &rarity);
+            let view_weights: Vec<f32> = random(7, 3 * n + 1).iter().map(|r| (1.0 + 0.9 * r) as f32).collect();
+            let is_sampled = |a: u32| holds(stream, a, share, &view_weights);
             let expected: Vec<u32> = (0..n as u32).filter(|row| is_sampled(anchors[*row as usize])).collect();
             let anchors = Buffer::upload(gpu, "anchors", &anchors).expect("room");
-            let rarity = Buffer::upload(gpu, "rarity", &rarity).expect("room");
-            let found = kernels.run(gpu, Commands::new(gpu), stream, share, &rarity, &anchors).expect("runs");
+            let view_weights = Buffer::upload(gpu, "view weights", &view_weights).expect("room");
+            let found = kernels.run(gpu, Commands::new(gpu), stream, share, &view_weights, &anchors).expect("runs");
             assert_eq!((found, kernels.rows.items.read(gpu).expect("runs")), (expected.len(), expected));
         }
     }

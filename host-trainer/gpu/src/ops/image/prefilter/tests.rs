@@ -38,7 +38,7 @@ fn scene(shape: ModelShape, n: usize) -> Scene<f32> {
             // A third of the offsets is masked.
             mask_logits: of(4, n * k, |v| 8.0 * v - 2.0),
             prune_rank: of(5, n, f64::abs),
-            rarity: Vec::new(),
+            view_weights: Vec::new(),
         },
         heads: Heads::filled(&shape, 0.0),
         context: None,

@@ -6,7 +6,7 @@ struct Parameters {
 }
 
 @group(0) @binding(0) var<storage, read> anchors: array<u32>;
-@group(0) @binding(1) var<storage, read> rarity: array<f32>;
+@group(0) @binding(1) var<storage, read> view_weights: array<f32>;
 @group(0) @binding(2) var<storage, read_write> marks: array<u32>;
 
 var<immediate> parameters: Parameters;
@@ -21,6 +21,6 @@ fn mark(
     if row < parameters.n_rows {
         let anchor = anchors[row];
         let draw = uniform_of(branch_of(parameters.stream, anchor), parameters.draw);
-        marks[row] = u32(draw < parameters.share * rarity[anchor]);
+        marks[row] = u32(draw < parameters.share * view_weights[anchor]);
     }
 }

@@ -74,7 +74,7 @@ const CRATES: [(&str, &[&str]); 12] = [
 ];
 
 /// Rooms with rooms inside: the sources' folder of the crate, the module, and what lies in it in order.
-const FOLDERS: [(&str, &str, &[&str]); 3] = [
+const FOLDERS: [(&str, &str, &[&str]); 4] = [
     ("host-trainer/kernels/src", "ops", &["simd", "pinhole", "heads", "image", "loss", "rate", "adam"]),
     ("host-trainer/gpu/src", "ops", &["primitives", "heads", "image", "loss", "rate", "adam", "sound"]),
     (
@@ -94,6 +94,26 @@ const FOLDERS: [(&str, &str, &[&str]); 3] = [
             "config",
             "run",
             "bench_scene",
+        ],
+    ),
+    (
+        "host-trainer/trainer/src",
+        "train::run",
+        &[
+            "watchdog",
+            "residence",
+            "observer",
+            "checkpoint",
+            "state",
+            "method",
+            "save",
+            "learned",
+            "trainer",
+            "step",
+            "device_sync",
+            "anchor_changes",
+            "fork",
+            "folder",
         ],
     ),
 ];

@@ -155,7 +155,7 @@ pub fn measure(
                 return Err(PilotError::Interrupted);
             }
             trainer.advance()?;
-            log.step(trainer.iteration);
+            log.step(trainer.iteration());
         }
         let fitted = encoding.encode(trainer.finish()?, &capture.reduced, &[])?;
         let worth = worth(&fitted.written.bytes, capture, device)?;

@@ -178,8 +178,11 @@ mod tests {
             assert_eq!(trainer.waited_share().is_some(), !capture.train[0].is_in_memory());
             assert_eq!(explicit.waited_share().is_some(), !capture.train[0].is_in_memory());
             let (mut checkpoint, mut explicit_checkpoint) = (Vec::new(), Vec::new());
-            let clocks = [&mut trainer.seconds, &mut trainer.processor_seconds];
-            clocks.into_iter().chain([&mut explicit.seconds, &mut explicit.processor_seconds]).for_each(|s| *s = 0.0);
+            let clocks = [&mut trainer.state.seconds, &mut trainer.state.processor_seconds];
+            clocks
+                .into_iter()
+                .chain([&mut explicit.state.seconds, &mut explicit.state.processor_seconds])
+                .for_each(|s| *s = 0.0);
             trainer.save(&mut checkpoint).expect("memory");
             explicit.save(&mut explicit_checkpoint).expect("memory");
             (checkpoint, explicit_checkpoint, worth)

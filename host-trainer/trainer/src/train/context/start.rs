@@ -255,7 +255,7 @@ mod tests {
     fn each_level_has_about_a_fifth_of_the_one_below() {
         let capture = tiny_capture();
         let trainer = Trainer::new(&capture, tiny_config(60)).unwrap();
-        let mut scene = trainer.scene;
+        let mut scene = trainer.state.learned.scene;
         // A plane: a shift takes three quarters of the cells.
         let plane: Vec<[i32; 3]> = (0..64 * 64).map(|i| [4 * (i % 64), 4 * (i / 64), 7]).collect();
         let n = scene.anchors.len().min(plane.len());
@@ -278,7 +278,7 @@ mod tests {
         for _ in 0..40 {
             trainer.advance().unwrap();
         }
-        let scene = &trainer.scene;
+        let scene = &trainer.state.learned.scene;
         let model = initial_context(scene, scene.anchors.len(), [1.0, 0.1, 0.2], &mut ChaCha8Rng::seed_from_u64(1));
         let units: Vec<[u16; 3]> = scene.anchors.lattice.iter().map(|cell| model.frame.unit(*cell)).collect();
         let n = units.len();

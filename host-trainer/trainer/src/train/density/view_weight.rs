@@ -37,18 +37,21 @@ mod tests {
         let mut trainer = Trainer::new(&capture, tiny_hac_config(60)).expect("a run");
         trainer.advance().expect("a step");
         trainer.weigh_views();
-        assert!(trainer.scene.anchors.view_weights.is_empty(), "there is no rate yet");
+        assert!(trainer.state.learned.scene.anchors.view_weights.is_empty(), "there is no rate yet");
         while !trainer.is_done() {
             trainer.advance().expect("a step");
         }
-        let (scene, n) = (&trainer.scene, trainer.scene.anchors.len());
+        let (scene, n) = (&trainer.state.learned.scene, trainer.state.learned.scene.anchors.len());
         assert_eq!(scene.anchors.view_weights.len(), n, "through growth and pruning");
         // Four units from the middle, where the cameras are at three: it is behind some of them.
-        trainer.scene.anchors.lattice[0] = [200, 0, 0];
+        trainer.state.learned.scene.anchors.lattice[0] = [200, 0, 0];
         trainer.weigh_views();
-        let (scene, views) = (&trainer.scene, &trainer.views.trained);
+        let (scene, views) = (&trainer.state.learned.scene, &trainer.setup.views.trained);
         let shown = |a: usize| {
-            views.iter().filter(|view| prefilter::shows(scene, a, &trainer.views.cameras[**view as usize])).count()
+            views
+                .iter()
+                .filter(|view| prefilter::shows(scene, a, &trainer.setup.views.cameras[**view as usize]))
+                .count()
         };
         assert!((1..views.len()).contains(&shown(0)), "{} of {} views show it", shown(0), views.len());
         let sums: Vec<f32> = (0..n).map(|a| shown(a).max(1) as f32 * scene.anchors.view_weights[a]).collect();

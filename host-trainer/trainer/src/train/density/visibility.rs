@@ -93,7 +93,7 @@ mod tests {
         for _ in 0..30 {
             trainer.advance().unwrap();
         }
-        let mut scene = trainer.scene.clone();
+        let mut scene = trainer.state.learned.scene.clone();
         // The first offset of every anchor.
         scene.heads.opacity.b2[0] = -100.0;
         let mut workspace = Workspace::new(&scene.shape);

@@ -246,12 +246,12 @@ mod tests {
         let mut trainer = Trainer::new(&capture, config).unwrap();
         let mut before = 0;
         while !trainer.is_done() {
-            if trainer.iteration == 19 {
-                before = trainer.scene.anchors.len();
+            if trainer.state.iteration == 19 {
+                before = trainer.state.learned.scene.anchors.len();
             }
             trainer.advance().unwrap();
         }
-        ([before, trainer.scene.anchors.len()], trainer.scene.anchors.prune_rank.clone())
+        ([before, trainer.state.learned.scene.anchors.len()], trainer.state.learned.scene.anchors.prune_rank.clone())
     }
 
     #[test]

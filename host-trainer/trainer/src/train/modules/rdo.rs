@@ -204,17 +204,29 @@ mod tests {
             config.densification.until = 0.4;
             let mut trainer = Trainer::new(&capture, config).unwrap();
             let drawn = |trainer: &Trainer<'_>| {
-                let anchors = &trainer.scene.anchors;
+                let anchors = &trainer.state.learned.scene.anchors;
                 (0..anchors.mask_logits.len()).filter(|offset| anchors.is_drawn(*offset)).count()
             };
             for _ in 0..100 {
                 let before = drawn(&trainer);
                 trainer.advance().unwrap();
-                if trainer.iteration > 40 && ![50, 70].contains(&trainer.iteration) {
-                    assert_eq!(drawn(&trainer), before, "after iteration {}: masks are not learned", trainer.iteration);
+                if trainer.state.iteration > 40 && ![50, 70].contains(&trainer.state.iteration) {
+                    assert_eq!(
+                        drawn(&trainer),
+                        before,
+                        "after iteration {}: masks are not learned",
+                        trainer.state.iteration
+                    );
                 }
             }
-            assert!((0..trainer.scene.anchors.len()).all(|anchor| trainer.scene.anchors.has_drawn(anchor)));
+            assert!(
+                (0..trainer.state.learned.scene.anchors.len()).all(|anchor| trainer
+                    .state
+                    .learned
+                    .scene
+                    .anchors
+                    .has_drawn(anchor))
+            );
             left.push(drawn(&trainer));
         }
         assert!(left[0] > left[1] && left[1] > left[2] && left[2] > 0, "{left:?}");
@@ -226,10 +238,10 @@ mod tests {
         let rdo = Rdo { until: 0.5, anchors: Some(5), ..Rdo::default() };
         let config = TrainConfig { modules: Modules { rdo: Some(rdo), ..Modules::default() }, ..tiny_hac_config(60) };
         let mut trainer = Trainer::new(&capture, config).unwrap();
-        while trainer.iteration < 30 {
+        while trainer.state.iteration < 30 {
             trainer.advance().unwrap();
         }
-        assert!(trainer.scene.anchors.len() <= 5, "{}", trainer.scene.anchors.len());
+        assert!(trainer.state.learned.scene.anchors.len() <= 5, "{}", trainer.state.learned.scene.anchors.len());
     }
 
     #[test]
@@ -237,13 +249,13 @@ mod tests {
         let capture = tiny_capture();
         let modules = Modules { rdo: Some(Rdo { anchors: Some(5), ..Rdo::default() }), ..Modules::default() };
         let mut trainer = Trainer::new(&capture, TrainConfig { modules, ..tiny_hac_config(60) }).unwrap();
-        while trainer.iteration < 41 {
+        while trainer.state.iteration < 41 {
             trainer.advance().unwrap();
         }
-        assert!(trainer.scene.anchors.len() > 5);
-        trainer.config.loss.volume = f64::NAN;
+        assert!(trainer.state.learned.scene.anchors.len() > 5);
+        trainer.setup.config.loss.volume = f64::NAN;
         assert!(trainer.advance().unwrap().dropped.is_some());
-        assert!(trainer.scene.anchors.len() <= 5, "{}", trainer.scene.anchors.len());
+        assert!(trainer.state.learned.scene.anchors.len() <= 5, "{}", trainer.state.learned.scene.anchors.len());
     }
 
     #[test]
@@ -270,10 +282,10 @@ mod tests {
             let config =
                 TrainConfig { modules: Modules { rdo: Some(rdo), ..Modules::default() }, ..tiny_hac_config(60) };
             let mut trainer = Trainer::new(&capture, config).unwrap();
-            while trainer.iteration < 50 {
+            while trainer.state.iteration < 50 {
                 trainer.advance().unwrap();
             }
-            trainer.scene.anchors
+            trainer.state.learned.scene.anchors
         });
         assert!(scenes[0] == scenes[1]);
     }

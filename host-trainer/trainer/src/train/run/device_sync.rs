@@ -2,8 +2,9 @@
 
 use std::sync::PoisonError;
 
-use super::Trainer;
+use super::learned::Learned;
 use super::residence::Residence;
+use super::trainer::Trainer;
 use super::watchdog;
 use crate::train::density::Statistics;
 use crate::train::error::{Cause, TrainError};
@@ -16,19 +17,14 @@ use pocketsplat_kernels::step::{
 };
 
 impl Trainer<'_> {
-    /// Whether nothing is newer on a device.
-    pub(super) fn is_here(&self) -> bool {
-        !matches!(self.residence, Residence::Device(_))
-    }
-
     /// Whether a device has this step as a whole.
     pub(super) fn steps_on_device(&self, loss: &Loss<'_, f32>, coding: &Coding<'_, f32>) -> bool {
-        self.on_device(|device| device.can_step(&self.scene, loss, coding)).unwrap_or(false)
+        self.on_device(|device| device.can_step(&self.state.learned.scene, loss, coding)).unwrap_or(false)
     }
 
     /// What `f` says of the device, where there is one.
     fn on_device<T>(&self, f: impl FnOnce(&mut dyn Resident<f32>) -> T) -> Option<T> {
-        let device = self.workspace.device()?;
+        let device = self.machine.device.workspace.device()?;
         Some(f(device.lock().unwrap_or_else(PoisonError::into_inner).resident()))
     }
 
@@ -37,7 +33,7 @@ impl Trainer<'_> {
         &self,
         f: impl FnOnce(&mut dyn Resident<f32>) -> Result<T, DeviceFault>,
     ) -> Result<(T, LoadNumber), TrainError> {
-        let own = self.residence.load().expect("it was brought there");
+        let own = self.machine.device.residence.load().expect("it was brought there");
         let asked = |device: &mut dyn Resident<f32>| {
             let is_own = device.held() == Some(own);
             if is_own { Ok((f(device)?, own)) } else { Err(TrainError::SceneReplaced) }
@@ -55,21 +51,22 @@ impl Trainer<'_> {
         coding: &Coding<'_, f32>,
     ) -> Result<(StepReport<f32>, Option<Cause>), TrainError> {
         let step = |device: &mut dyn Resident<f32>| {
-            let own = self.residence.load();
+            let own = self.machine.device.residence.load();
             if own.is_none() || device.held() != own {
-                if !self.is_here() {
+                if !self.machine.device.residence.is_here() {
                     return Err(TrainError::SceneReplaced);
                 }
-                device.load(&trained(&self.scene, &self.optimiser, &self.statistics))?;
+                let Learned { scene, optimiser, statistics, .. } = &self.state.learned;
+                device.load(&trained(scene, optimiser, statistics))?;
             }
             let found = device.step(target, loss, coding, watchdog::LARGEST_GRADIENT)?;
             Ok((found, device.held().expect("it was loaded")))
         };
         let (found, load) = self.on_device(step).expect("there is one")?;
-        if self.is_here() {
-            self.residence = Residence::Both(load);
+        if self.machine.device.residence.is_here() {
+            self.machine.device.residence = Residence::Both(load);
         }
-        self.workspace.d_background = found.d_background;
+        self.machine.device.workspace.d_background = found.d_background;
         let is_sound = found.is_sound && found.report.loss.is_finite() && watchdog::sound(&found.d_background);
         let cause = if is_sound { None } else { Some(self.cause(target, loss, coding)?) };
         Ok((found.report, cause))
@@ -87,28 +84,29 @@ impl Trainer<'_> {
         if matches!(coding, Coding::Integers { .. }) {
             return Ok(unknown);
         }
-        let mut workspace = Workspace::new(&self.scene.shape);
-        let report = workspace.step(&self.scene, target, loss, coding);
-        let found = watchdog::inspect(&self.scene, target, self.background, &workspace, &report);
+        let Learned { scene, background, .. } = &self.state.learned;
+        let mut workspace = Workspace::new(&scene.shape);
+        let report = workspace.step(scene, target, loss, coding);
+        let found = watchdog::inspect(scene, target, *background, &workspace, &report);
         Ok(found.unwrap_or(unknown))
     }
 
     /// Moves the parameters by the last step's gradients.
     pub(super) fn move_on_device(&mut self, progress: f64) -> Result<(), TrainError> {
         let rates = self.rates();
-        let mut steps = self.optimiser.next(&rates, progress, self.capture.extent);
-        if matches!(self.config.phase(self.iteration), Phase::Context | Phase::IntegerModel) {
-            steps.context = self.optimiser.next_of_context(&rates, progress);
+        let mut steps = self.state.learned.optimiser.next(&rates, progress, self.setup.capture.extent);
+        if matches!(self.setup.config.phase(self.state.iteration), Phase::Context | Phase::IntegerModel) {
+            steps.context = self.state.learned.optimiser.next_of_context(&rates, progress);
         }
         let ((), load) = self.on_own(|device| device.move_by(&steps))?;
-        self.residence = Residence::Device(load);
+        self.machine.device.residence = Residence::Device(load);
         Ok(())
     }
 
     /// Adds the last step to the statistics.
     pub(super) fn count_on_device(&mut self) -> Result<(), TrainError> {
         let ((), load) = self.on_own(|device| device.add_statistics())?;
-        self.residence = Residence::Device(load);
+        self.machine.device.residence = Residence::Device(load);
         Ok(())
     }
 
@@ -117,22 +115,22 @@ impl Trainer<'_> {
     /// # Errors
     /// [`TrainError::Device`], [`TrainError::SceneReplaced`]: everything here is as it was.
     pub fn fetch(&mut self) -> Result<(), TrainError> {
-        if self.is_here() {
+        if self.machine.device.residence.is_here() {
             return Ok(());
         }
-        let (mut scene, mut optimiser, mut statistics) =
-            (self.scene.clone(), self.optimiser.clone(), self.statistics.clone());
-        let trained = trained_mut(&mut scene, &mut optimiser, &mut statistics);
+        let mut learned = self.state.learned.clone();
+        let Learned { scene, optimiser, statistics, .. } = &mut learned;
+        let trained = trained_mut(scene, optimiser, statistics);
         let ((), load) = self.on_own(|device| device.store(trained))?;
-        (self.scene, self.optimiser, self.statistics) = (scene, optimiser, statistics);
-        self.residence = Residence::Both(load);
+        self.state.learned = learned;
+        self.machine.device.residence = Residence::Both(load);
         Ok(())
     }
 
     /// The same, where something here is about to change: the device will be brought everything anew.
     pub(super) fn take_back(&mut self) -> Result<(), TrainError> {
         self.fetch()?;
-        self.residence = Residence::Host;
+        self.machine.device.residence = Residence::Host;
         Ok(())
     }
 }

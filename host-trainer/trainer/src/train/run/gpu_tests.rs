@@ -86,7 +86,7 @@ fn a_step_agrees_with_the_cpu() {
                 let target = TargetView::new(&camera, planes(image), mask, [0.2, 0.5, 0.1]);
                 compare(
                     gpu,
-                    &trainer.scene,
+                    &trainer.state.learned.scene,
                     &target,
                     Modules { detail: detail.then(Detail::default), ..config.modules },
                 );
@@ -173,7 +173,7 @@ fn a_step_of_a_resident_scene_agrees_with_the_cpu() {
         for _ in 0..20 {
             trainer.advance().expect("a step");
         }
-        let scene = &trainer.scene;
+        let scene = &trainer.state.learned.scene;
         let view = &capture.train[1];
         let camera = Pinhole::new(&view.camera);
         let image = &view.photograph().expect("in memory").image;
@@ -271,11 +271,11 @@ fn run(device: Option<SharedDevice<f32>>, backbone: Backbone) -> (f64, Option<f6
     let (mut error, mut bits) = (0.0, None);
     while !trainer.is_done() {
         let report = trainer.advance().expect("a step").report;
-        if trainer.iteration <= 110 {
+        if trainer.state.iteration <= 110 {
             continue;
         }
         error += report.squared_error / 50.0;
-        let n_anchors = trainer.scene.anchors.len() as f64;
+        let n_anchors = trainer.state.learned.scene.anchors.len() as f64;
         if let Some(rate) = report.rate {
             *bits.get_or_insert(0.0) += n_anchors * rate.bits.iter().sum::<f64>() / 50.0;
         }
@@ -305,7 +305,7 @@ fn the_same_run_gives_the_same_bits_and_goes_on_anywhere() {
     let Some(gpu) = gpu() else { return };
     let capture = tiny_capture();
     let train = |trainer: &mut Trainer<'_>, until: u32| {
-        while trainer.iteration < until {
+        while trainer.state.iteration < until {
             trainer.advance().expect("a step");
         }
     };
@@ -322,12 +322,15 @@ fn the_same_run_gives_the_same_bits_and_goes_on_anywhere() {
     let mut checkpoint = Vec::new();
     half.save(&mut checkpoint).expect("memory");
     let restored = || Trainer::restore(&capture, &checkpoint).expect("sound");
-    let mut on_device = restored().trainer;
+    let mut on_device = restored().run;
     on_device.set_device(device(gpu));
     assert_eq!(restored().written_by, on_device.kernels(), "which name the device");
     train(&mut on_device, 40);
-    assert!(on_device.scene.anchors == whole.scene.anchors && on_device.scene.heads == whole.scene.heads);
-    let mut on_cpu = restored().trainer;
+    assert!(
+        on_device.scene().anchors == whole.state.learned.scene.anchors
+            && on_device.scene().heads == whole.state.learned.scene.heads
+    );
+    let mut on_cpu = restored().run;
     assert_ne!(restored().written_by, on_cpu.kernels());
     train(&mut on_cpu, 40);
     assert!(on_cpu.is_done());
@@ -341,20 +344,20 @@ fn the_last_phase_moves_everything_as_on_the_cpu() {
     for backbone in [Backbone::Hac, Backbone::HacPlus] {
         let config = TrainConfig { backbone, ..tiny_config(40) };
         let mut trainer = Trainer::new(&capture, config).expect("a run");
-        while trainer.iteration < 36 {
+        while trainer.state.iteration < 36 {
             trainer.advance().expect("a step");
         }
         assert_eq!(config.phase(37), Phase::IntegerModel);
         let mut checkpoint = Vec::new();
         trainer.save(&mut checkpoint).expect("memory");
         let after = |device: Option<SharedDevice<f32>>| {
-            let mut run = Trainer::restore(&capture, &checkpoint).expect("sound").trainer;
+            let mut run = Trainer::restore(&capture, &checkpoint).expect("sound").run;
             run.set_device(device);
             (0..3).for_each(|_| drop(run.advance().expect("a step")));
             run.fetch().expect("it comes back");
-            moved(&run.scene)
+            moved(&run.state.learned.scene)
         };
-        let (before, on_cpu, on_device) = (moved(&trainer.scene), after(None), after(device(gpu)));
+        let (before, on_cpu, on_device) = (moved(&trainer.state.learned.scene), after(None), after(device(gpu)));
         for (((name, before), (_, cpu)), (_, device)) in before.iter().zip(&on_cpu).zip(&on_device) {
             let apart = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| f64::from((a - b).abs())).sum::<f64>();
             let (way, off) = (apart(before, cpu), apart(device, cpu));
@@ -389,12 +392,12 @@ fn of_two_runs_on_one_device_the_first_is_told_that_its_scene_is_gone() {
     let mut fetched = begin();
     fetched.fetch().expect("it comes back");
     let mut first = begin();
-    let before = first.scene.anchors.clone();
+    let before = first.state.learned.scene.anchors.clone();
     let mut second = begin();
     for error in [first.fetch().expect_err("it is gone"), first.advance().expect_err("it is gone")] {
         assert!(matches!(error, TrainError::SceneReplaced) && error.to_string().contains("--resume"), "{error}");
     }
-    assert!(first.scene.anchors == before, "nothing of the other run came here");
+    assert!(first.state.learned.scene.anchors == before, "nothing of the other run came here");
     second.advance().expect("the last to come has the device");
     second.fetch().expect("it comes back");
     fetched.advance().expect("what stands here is brought anew");
@@ -419,7 +422,7 @@ fn a_lost_device_ends_the_run_with_what_to_do_and_the_checkpoint_goes_on() {
     own.destroy();
     let error = trainer.advance().expect_err("the device is gone").to_string();
     assert!(error.contains("the device was lost") && error.contains("--resume"), "{error}");
-    let mut restored = Trainer::restore(&capture, &checkpoint).expect("sound").trainer;
+    let mut restored = Trainer::restore(&capture, &checkpoint).expect("sound").run;
     while !restored.is_done() {
         restored.advance().expect("a step");
     }

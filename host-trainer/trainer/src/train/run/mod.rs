@@ -4,10 +4,16 @@ mod anchor_changes;
 pub mod checkpoint;
 pub mod device_sync;
 pub mod folder;
+mod fork;
 #[cfg(test)]
 mod gpu_tests;
+mod learned;
+mod method;
 mod observer;
 mod residence;
+mod save;
+mod state;
+mod step;
 #[cfg(test)]
 mod tests;
 mod trainer;
@@ -17,5 +23,9 @@ pub use folder::{
     Ending, Interval, LoggedStep, Newest, ProgressLog, Resumable, Resumed, RunError, RunFolder, fork, is_file_of_run,
     newest_preview, photographs_in, points_in,
 };
+pub use learned::Learned;
+pub use method::{Method, Run};
 pub use observer::{Observer, Outcome};
-pub use trainer::Trainer;
+pub use save::{RestoreError, Restored};
+pub use state::{Machine, RunState, Setup};
+pub use trainer::{Neural, StepMachine, Trainer};

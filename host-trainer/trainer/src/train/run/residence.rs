@@ -15,6 +15,11 @@ pub(super) enum Residence {
 }
 
 impl Residence {
+    /// Whether nothing is newer on a device.
+    pub(super) fn is_here(self) -> bool {
+        !matches!(self, Self::Device(_))
+    }
+
     /// Under which number a device took it.
     pub(super) fn load(self) -> Option<LoadNumber> {
         match self {

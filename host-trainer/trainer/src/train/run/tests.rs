@@ -16,7 +16,7 @@ fn trained(trainer: &mut Trainer<'_>) -> Vec<(Phase, Option<RateReport>)> {
     while !trainer.is_done() {
         let outcome = trainer.advance().unwrap();
         assert_eq!(outcome.dropped, None);
-        steps.push((trainer.config.phase(trainer.iteration), outcome.report.rate));
+        steps.push((trainer.setup.config.phase(trainer.state.iteration), outcome.report.rate));
     }
     steps
 }
@@ -57,9 +57,13 @@ fn every_pass_over_the_views_has_an_order_of_its_own() {
     let mut order = || -> Vec<u32> {
         let mut taken = Vec::new();
         for _ in 0..12 {
-            let before = if trainer.queue.is_empty() { trainer.views.trained.clone() } else { trainer.queue.clone() };
+            let before = if trainer.state.queue.is_empty() {
+                trainer.setup.views.trained.clone()
+            } else {
+                trainer.state.queue.clone()
+            };
             trainer.advance().unwrap();
-            taken.extend(before.into_iter().filter(|view| !trainer.queue.contains(view)));
+            taken.extend(before.into_iter().filter(|view| !trainer.state.queue.contains(view)));
         }
         taken
     };
@@ -79,7 +83,7 @@ fn a_bit_costs_what_lambda_says_in_squared_error() {
     let mut config = tiny_hac_config(100);
     config.hac.lambda = 0.01;
     let mut trainer = Trainer::new(&capture, config).unwrap();
-    while trainer.scene.context.is_none() {
+    while trainer.state.learned.scene.context.is_none() {
         trainer.advance().unwrap();
     }
     let found = trainer.view().worth().unwrap().bit_price;
@@ -93,7 +97,7 @@ fn a_bit_costs_what_lambda_says_in_squared_error() {
         squared += l2 / capture.train.len() as f64;
         loss += (0.8 * l1 + 0.2 * (1.0 - pocketsplat_metrics::ssim(&drawn, &truth.image))) / capture.train.len() as f64;
     }
-    let n_values = trainer.scene.anchors.len() * trainer.scene.shape.values_per_anchor();
+    let n_values = trainer.state.learned.scene.anchors.len() * trainer.state.learned.scene.shape.values_per_anchor();
     let expected = 0.01 / n_values as f64 * 2.0 * squared / loss;
     assert!((found / expected - 1.0).abs() < 0.03, "{found}, needed: {expected}");
 }
@@ -106,9 +110,14 @@ fn masks_stay_once_the_integer_model_decides() {
     let mut trainer = Trainer::new(&capture, config).unwrap();
     let mut masks = Vec::new();
     while !trainer.is_done() {
-        let same = masks == trainer.scene.anchors.mask_logits;
-        assert_eq!(same, trainer.config.phase(trainer.iteration) == Phase::IntegerModel, "{}", trainer.iteration);
-        masks.clone_from(&trainer.scene.anchors.mask_logits);
+        let same = masks == trainer.state.learned.scene.anchors.mask_logits;
+        assert_eq!(
+            same,
+            trainer.setup.config.phase(trainer.state.iteration) == Phase::IntegerModel,
+            "{}",
+            trainer.state.iteration
+        );
+        masks.clone_from(&trainer.state.learned.scene.anchors.mask_logits);
         trainer.advance().unwrap();
     }
 }
@@ -117,15 +126,15 @@ fn masks_stay_once_the_integer_model_decides() {
 fn the_last_phase_draws_the_heads_as_they_are_written() {
     let capture = tiny_capture();
     let mut trainer = Trainer::new(&capture, tiny_hac_config(100)).unwrap();
-    while trainer.config.phase(trainer.iteration + 1) != Phase::IntegerModel {
+    while trainer.setup.config.phase(trainer.state.iteration + 1) != Phase::IntegerModel {
         trainer.advance().unwrap();
     }
     let mut rounded = trainer.clone();
-    rounded.scene.heads = Integers::of(&trainer.scene).unwrap().heads;
-    assert!(rounded.scene.heads != trainer.scene.heads);
+    rounded.state.learned.scene.heads = Integers::of(&trainer.state.learned.scene).unwrap().heads;
+    assert!(rounded.state.learned.scene.heads != trainer.state.learned.scene.heads);
     let losses = [&mut trainer, &mut rounded].map(|trainer| trainer.advance().unwrap().report.loss);
     assert_eq!(losses[0], losses[1], "neither draws what lies between two steps");
-    let weights = trainer.scene.heads.colour.w1.iter();
+    let weights = trainer.state.learned.scene.heads.colour.w1.iter();
     assert!(weights.filter(|weight| (**weight * 128.0).fract() != 0.0).count() > 0, "but it moves");
     assert_eq!(trainer.finish().unwrap().head_fraction_bits, Some(7));
 }
@@ -139,9 +148,11 @@ fn a_finished_scene_keeps_its_values_and_counts_the_bits_of_its_symbols() {
     assert_eq!(importance.len(), scene.anchors.len());
     assert!(estimated_bits.unwrap().iter().all(|bits| *bits > 0.0));
     let masks = scene.anchors.mask_logits.clone();
-    let before = Anchors { mask_logits: masks, ..trainer.scene.anchors.clone() };
+    let before = Anchors { mask_logits: masks, ..trainer.state.learned.scene.anchors.clone() };
     assert!(scene.anchors == before, "only offsets that no view draws are masked");
-    let again = Trainer { scene: scene.clone(), ..trainer.clone() }.finish().unwrap();
+    let mut again = trainer.clone();
+    again.state.learned.scene = scene.clone();
+    let again = again.finish().unwrap();
     assert!(again.scene == scene && again.importance == importance && again.estimated_bits == estimated_bits);
 }
 
@@ -161,7 +172,7 @@ fn held_out_views_are_never_trained_on() {
     edit(&mut without.train[11], |photograph| photograph.image.rgb.fill(77));
     let mut other = Trainer::new(&without, config).unwrap();
     trained(&mut other);
-    assert!(trainer.scene == other.scene, "its pixels change nothing");
+    assert!(trainer.state.learned.scene == other.state.learned.scene, "its pixels change nothing");
 }
 
 #[test]

@@ -6,15 +6,9 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::{CheckpointFault, VERSION};
-use crate::train::run::watchdog::Watchdog;
 
 /// Bytes of the version and of the checksum.
 const NUMBER_LEN: usize = 4;
-
-/// Iteration, watchdog, wall-clock and processor seconds, the views left of this pass.
-pub(crate) type Progress = (u32, Watchdog, [f64; 2], Vec<u32>);
-/// Seed, stream and position of the random numbers.
-pub(crate) type RandomState = ([u8; 32], u64, u128);
 
 /// Writes a checkpoint: `magic`, version, `state`, checksum.
 pub(crate) fn write(out: impl Write, magic: [u8; 8], state: &impl Serialize) -> io::Result<()> {

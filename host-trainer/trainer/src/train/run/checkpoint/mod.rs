@@ -5,7 +5,7 @@
 //! |---|---|
 //! | magic | 8 bytes |
 //! | version | u32, little-endian, as the checksum |
-//! | configuration | TOML: [`crate::train::TrainConfig`] |
+//! | configuration | TOML: [`crate::train::TrainConfig`], or that of explicit Gaussians |
 //! | kernels, capture, state | [`Kernels`], [`CaptureSignature`], then everything that the next iteration depends on |
 //! | checksum | CRC-32 of all before it |
 //!
@@ -14,20 +14,12 @@
 pub(crate) mod envelope;
 mod kernels;
 mod signature;
-mod state;
-
-#[cfg(test)]
-mod tests;
 
 pub use kernels::Kernels;
 pub use signature::{CaptureDifference, CaptureSignature};
-pub use state::{RestoreError, Restored};
 
 /// The version that is written and read.
 pub const VERSION: u32 = 8;
-
-/// Like PNG's: a byte that is no text, and line ends that a transfer as text would change.
-const MAGIC: [u8; 8] = *b"\x8bPSRUN\r\n";
 
 /// What is wrong with the bytes of a checkpoint.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

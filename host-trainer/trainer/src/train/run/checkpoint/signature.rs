@@ -137,11 +137,6 @@ impl CaptureSignature {
             Err(CaptureDifference::Background { found: self.background, needed: begun_with.background })
         }
     }
-
-    /// How many training views there are.
-    pub(super) fn n_views(&self) -> usize {
-        self.views.len()
-    }
 }
 
 fn are_close(now: &[f64], then: &[f64]) -> bool {

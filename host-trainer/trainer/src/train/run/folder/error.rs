@@ -4,7 +4,7 @@ use pocketsplat_files::shell_word;
 use std::path::{Path, PathBuf};
 
 use crate::train::TrainError;
-use crate::train::run::checkpoint::RestoreError;
+use crate::train::run::RestoreError;
 
 /// What goes wrong with a run and its folder.
 #[derive(Debug, thiserror::Error)]

@@ -258,7 +258,7 @@ impl RunFolder {
         interval: Interval,
         stop: &AtomicBool,
     ) -> Result<Ending, RunError> {
-        let previews = Previews::open(&self.path.join(PREVIEWS), trainer.iteration, trainer.config().iterations);
+        let previews = Previews::open(&self.path.join(PREVIEWS), trainer.iteration(), trainer.iterations());
         // Pictures for people: a run is not worse for lacking them.
         let previews = previews.inspect_err(|error| observer.unwritten(error)).ok();
         self.drive(trainer, interval, stop, |trainer| {

@@ -72,12 +72,12 @@ impl Previews {
 
     /// Draws the view where a picture is due.
     pub(super) fn add(&self, trainer: &mut Trainer<'_>) -> Result<(), RunError> {
-        if !trainer.iteration.is_multiple_of(self.every) && !trainer.is_done() {
+        if !trainer.iteration().is_multiple_of(self.every) && !trainer.is_done() {
             return Ok(());
         }
         let Some(view) = view_of(trainer) else { return Ok(()) };
         let picture = trainer.draw(view)?;
-        let path = self.folder.join(format!("{:08}.jpg", trainer.iteration));
+        let path = self.folder.join(format!("{:08}.jpg", trainer.iteration()));
         let bytes = picture.to_jpeg().map_err(|error| RunError::io("write", &path, std::io::Error::other(error)))?;
         files::write_whole(&path, |out| out.write_all(&bytes))
     }

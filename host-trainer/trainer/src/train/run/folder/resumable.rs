@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use super::RunError;
-use crate::train::Trainer;
+use crate::train::run::{Method, Run};
 
 /// A run that is kept in checkpoints and goes on from them to the same bits.
 pub trait Resumable {
@@ -31,17 +31,17 @@ pub trait Resumable {
     fn save(&self, out: &mut dyn Write) -> io::Result<()>;
 }
 
-impl Resumable for Trainer<'_> {
+impl<M: Method> Resumable for Run<'_, M> {
     fn iteration(&self) -> u32 {
-        self.iteration
+        self.iteration()
     }
 
     fn iterations(&self) -> u32 {
-        self.config().iterations
+        self.iterations()
     }
 
     fn seconds(&self) -> f64 {
-        self.seconds
+        self.seconds()
     }
 
     fn n_dropped(&self) -> u32 {
@@ -49,12 +49,11 @@ impl Resumable for Trainer<'_> {
     }
 
     fn size(&self) -> [usize; 2] {
-        let anchors = &self.scene.anchors;
-        [anchors.len(), (0..anchors.mask_logits.len()).filter(|offset| anchors.is_drawn(*offset)).count()]
+        M::size(&self.state.learned)
     }
 
     fn fetch(&mut self) -> Result<(), RunError> {
-        Ok(self.fetch()?)
+        Ok(M::fetch(self)?)
     }
 
     fn save(&self, out: &mut dyn Write) -> io::Result<()> {

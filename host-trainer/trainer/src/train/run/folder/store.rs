@@ -5,7 +5,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::{Resumable, RunError, RunFolder, files};
-use crate::train::run::checkpoint::{CheckpointFault, RestoreError, Restored};
+use crate::train::run::checkpoint::CheckpointFault;
+use crate::train::run::{Method, RestoreError, Restored, Run};
 use crate::train::{TrainConfig, Trainer};
 use pocketsplat_capture::dataset::Capture;
 
@@ -52,11 +53,11 @@ pub fn fork<'a>(
     }
     let bytes = fs::read(&path).map_err(|source| RunError::io("read", &path, source))?;
     let restored = Trainer::fork(capture, &bytes, config);
-    restored.map(|restored| restored.trainer).map_err(|source| RunError::Restore { path, source })
+    restored.map(|restored| restored.run).map_err(|source| RunError::Restore { path, source })
 }
 
 /// A run taken up again.
-pub type Resumed<'a> = Newest<Restored<'a>>;
+pub type Resumed<'a, M> = Newest<Restored<'a, M>>;
 
 /// What the newest sound checkpoint holds.
 #[derive(Debug)]
@@ -88,15 +89,15 @@ impl RunFolder {
     /// # Errors
     /// [`RunError::Restore`] when `capture` is not that of the run, [`RunError::AllDamaged`] when no checkpoint is
     /// sound.
-    pub fn resume<'a>(&self, capture: &'a Capture) -> Result<Option<Resumed<'a>>, RunError> {
-        self.newest(|bytes| Trainer::restore(capture, bytes))
+    pub fn resume<'a, M: Method>(&self, capture: &'a Capture) -> Result<Option<Resumed<'a, M>>, RunError> {
+        self.newest(|bytes| Run::restore(capture, bytes))
     }
 
     /// What `restore` makes of the newest sound checkpoint; none when the run was stopped before it wrote one.
     ///
     /// # Errors
     /// As [`Self::resume`].
-    pub fn newest<T>(&self, restore: impl Fn(&[u8]) -> Result<T, RestoreError>) -> Result<Option<Newest<T>>, RunError> {
+    fn newest<T>(&self, restore: impl Fn(&[u8]) -> Result<T, RestoreError>) -> Result<Option<Newest<T>>, RunError> {
         let mut passed_over = Vec::new();
         for (_, path) in self.checkpoints()? {
             let bytes = fs::read(&path).map_err(|source| RunError::io("read", &path, source))?;

@@ -3,6 +3,7 @@ use std::io::Write;
 use std::sync::atomic::AtomicBool;
 
 use super::*;
+use crate::train::run::Neural;
 use crate::train::test_capture::{tiny_capture, tiny_config};
 use pocketsplat_kernels::step::StepReport;
 
@@ -28,12 +29,12 @@ fn train(
     let capture = tiny_capture();
     let resumed = folder.resume(&capture).unwrap();
     let (mut trainer, passed_over) = match resumed {
-        Some(resumed) => (resumed.restored.trainer, resumed.passed_over),
+        Some(resumed) => (resumed.restored.run, resumed.passed_over),
         None => (Trainer::new(&capture, tiny_config(ITERATIONS)).unwrap(), Vec::new()),
     };
     let stop = AtomicBool::new(false);
     let ending = folder.train(&mut trainer, &mut StopAfter(until, &stop), interval, &stop).unwrap();
-    (ending, trainer.scene, passed_over)
+    (ending, trainer.state.learned.scene, passed_over)
 }
 
 fn names(folder: &RunFolder) -> Vec<String> {
@@ -104,7 +105,7 @@ fn a_fork_begins_where_its_run_stood() {
     folder.finish("{}", false).unwrap();
     let config = tiny_config(ITERATIONS);
     let mut same = fork(&path, 12, &capture, config).unwrap();
-    assert_eq!(same.iteration, 12);
+    assert_eq!(same.iteration(), 12);
     let mut other = config;
     other.rates.feature.end = 1e-6;
     let mut other = fork(&path, 20, &capture, other).unwrap();
@@ -113,8 +114,8 @@ fn a_fork_begins_where_its_run_stood() {
             trainer.advance().unwrap();
         }
     }
-    assert!(same.scene == scene, "the same settings, the same bits");
-    assert!(other.scene != scene && other.scene.anchors.len() == scene.anchors.len());
+    assert!(*same.scene() == scene, "the same settings, the same bits");
+    assert!(other.state.learned.scene != scene && other.state.learned.scene.anchors.len() == scene.anchors.len());
 
     let message = fork(&path, 35, &capture, config).unwrap_err().to_string();
     assert!(message.contains("no checkpoint of iteration 35, it has those of [12, 20]"), "{message}");
@@ -286,11 +287,11 @@ fn a_picture_that_cannot_be_written_ends_no_run() {
 fn when_no_checkpoint_is_sound_all_are_named() {
     let home = tempfile::tempdir().unwrap();
     let folder = RunFolder::start(home.path(), "", false).unwrap();
-    assert!(folder.resume(&tiny_capture()).unwrap().is_none());
+    assert!(folder.resume::<Neural>(&tiny_capture()).unwrap().is_none());
     for iteration in [3, 4] {
         fs::write(home.path().join(format!("iteration-{iteration:08}.checkpoint")), "nothing").unwrap();
     }
-    let message = folder.resume(&tiny_capture()).unwrap_err().to_string();
+    let message = folder.resume::<Neural>(&tiny_capture()).unwrap_err().to_string();
     assert!(message.contains("iteration-00000003") && message.contains("iteration-00000004"), "{message}");
 }
 

@@ -4,7 +4,10 @@ use crate::train::{DroppedStep, TrainError, Trainer};
 
 /// Parameters, moments and statistics of a run.
 fn learned(trainer: &Trainer<'_>) -> String {
-    format!("{:?} {:?} {:?}", trainer.scene, trainer.optimiser, trainer.statistics)
+    format!(
+        "{:?} {:?} {:?}",
+        trainer.state.learned.scene, trainer.state.learned.optimiser, trainer.state.learned.statistics
+    )
 }
 
 /// Breaks one parameter for one step of a run in full swing.
@@ -14,17 +17,18 @@ fn with_broken(break_one: fn(&mut Scene<f32>, f32), value: f32) -> DroppedStep {
     for _ in 0..12 {
         assert_eq!(trainer.advance().unwrap().dropped, None);
     }
-    let sound = trainer.scene.clone();
-    break_one(&mut trainer.scene, value);
+    let sound = trainer.state.learned.scene.clone();
+    break_one(&mut trainer.state.learned.scene, value);
     let before = learned(&trainer);
     let dropped = trainer.advance().unwrap().dropped.expect("the step must be dropped");
     assert_eq!(learned(&trainer), before, "a dropped step changes nothing");
-    assert_eq!((trainer.iteration, trainer.n_dropped()), (13, 1));
-    trainer.scene = sound;
+    assert_eq!((trainer.state.iteration, trainer.n_dropped()), (13, 1));
+    trainer.state.learned.scene = sound;
     while !trainer.is_done() {
         assert_eq!(trainer.advance().unwrap().dropped, None);
     }
-    let mut all = groups(&trainer.scene.heads).flatten().chain(&trainer.scene.anchors.features);
+    let mut all =
+        groups(&trainer.state.learned.scene.heads).flatten().chain(&trainer.state.learned.scene.anchors.features);
     assert!(all.all(|v| v.is_finite()));
     dropped
 }

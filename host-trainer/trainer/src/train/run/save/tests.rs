@@ -30,7 +30,9 @@ fn saved(trainer: &Trainer<'_>) -> Vec<u8> {
 
 /// Everything but the time it took.
 fn timeless(trainer: &Trainer<'_>) -> Vec<u8> {
-    saved(&Trainer { seconds: 0.0, processor_seconds: 0.0, ..trainer.clone() })
+    let mut trainer = trainer.clone();
+    (trainer.state.seconds, trainer.state.processor_seconds) = (0.0, 0.0);
+    saved(&trainer)
 }
 
 /// Ten runs of each backbone, each stopped after a random iteration and taken up again by a new trainer.
@@ -58,11 +60,11 @@ fn taken_up_again(config: TrainConfig, limits: Option<LimitProbe<'_>>) {
     let (capture, iterations) = (tiny_capture(), config.iterations);
     let mut whole = Trainer::new(&capture, config).unwrap().fitting(limits);
     let mut along_the_way = vec![saved(&whole)];
-    let mut n_anchors = vec![whole.scene.anchors.len()];
+    let mut n_anchors = vec![whole.state.learned.scene.anchors.len()];
     while !whole.is_done() {
         whole.advance().unwrap();
         along_the_way.push(saved(&whole));
-        n_anchors.push(whole.scene.anchors.len());
+        n_anchors.push(whole.state.learned.scene.anchors.len());
     }
     assert!(n_anchors.windows(2).any(|n| n[1] > n[0]), "the run must grow: {n_anchors:?}");
     assert!(n_anchors.windows(2).any(|n| n[1] < n[0]), "the run must prune: {n_anchors:?}");
@@ -70,9 +72,10 @@ fn taken_up_again(config: TrainConfig, limits: Option<LimitProbe<'_>>) {
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     for _ in 0..10 {
         let stopped_after = rng.random_range(0..=iterations as usize);
-        let Restored { mut trainer, written_by } = Trainer::restore(&capture, &along_the_way[stopped_after]).unwrap();
+        let Restored { run: mut trainer, written_by } =
+            Trainer::restore(&capture, &along_the_way[stopped_after]).unwrap();
         assert_eq!(written_by, trainer.kernels());
-        assert_eq!(trainer.iteration as usize, stopped_after);
+        assert_eq!(trainer.state.iteration as usize, stopped_after);
         assert_eq!(saved(&trainer), along_the_way[stopped_after], "restoring and saving is the identity");
         trainer = trainer.fitting(limits);
         trainer.run(&mut Silent).unwrap();
@@ -181,7 +184,7 @@ fn a_fork_keeps_the_context_model_once_there_is_one() {
     for asked in [plain, finer] {
         Trainer::fork(&capture, &early, asked).unwrap();
     }
-    while trainer.scene.context.is_none() {
+    while trainer.state.learned.scene.context.is_none() {
         trainer.advance().unwrap();
     }
     let late = saved(&trainer);

@@ -1,6 +1,7 @@
 //! Imports go down only: a file may name the rooms before its own, and no two files import each other.
 //!
 //! A room is a module at the root of a crate. [`CRATES`] lists them in the order in which data flows; a new one has to be put there.
+//! [`FOLDERS`] does the same for the folders that have an order inside.
 //! Tests may import whatever they like, and so may a module from its own submodules, and they from it.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -72,6 +73,51 @@ const CRATES: [(&str, &[&str]); 12] = [
     ("host-trainer/cli/src", &["say", "program", "plot", "config", "command"]),
 ];
 
+/// Rooms with rooms inside: the sources' folder of the crate, the module, and what lies in it in order.
+const FOLDERS: [(&str, &str, &[&str]); 4] = [
+    ("host-trainer/kernels/src", "ops", &["simd", "pinhole", "heads", "image", "loss", "rate", "adam"]),
+    ("host-trainer/gpu/src", "ops", &["primitives", "heads", "image", "loss", "rate", "adam", "sound"]),
+    (
+        "host-trainer/trainer/src",
+        "train",
+        &[
+            "schedule",
+            "read_ahead",
+            "error",
+            "views",
+            "optimiser",
+            "density",
+            "context",
+            "worth",
+            "limits",
+            "modules",
+            "config",
+            "run",
+            "bench_scene",
+        ],
+    ),
+    (
+        "host-trainer/trainer/src",
+        "train::run",
+        &[
+            "watchdog",
+            "residence",
+            "observer",
+            "checkpoint",
+            "state",
+            "method",
+            "save",
+            "learned",
+            "trainer",
+            "step",
+            "device_sync",
+            "anchor_changes",
+            "fork",
+            "folder",
+        ],
+    ),
+];
+
 #[test]
 fn imports_go_down_and_never_in_circles() {
     let mut found = Vec::new();
@@ -80,7 +126,10 @@ fn imports_go_down_and_never_in_circles() {
         let mut files = Vec::new();
         collect(&sources, &mut Vec::new(), &mut files);
         assert!(files.len() > rooms.len(), "{folder}: {} files", files.len());
-        found.extend(complaints(rooms, &files).into_iter().map(|complaint| format!("{folder}: {complaint}")));
+        let inside =
+            FOLDERS.iter().filter(|(of, ..)| *of == folder).map(|(_, module, rooms)| (path_of(module), *rooms));
+        let lists: Vec<_> = [(Vec::new(), rooms)].into_iter().chain(inside).collect();
+        found.extend(complaints(&lists, &files).into_iter().map(|complaint| format!("{folder}: {complaint}")));
     }
     assert!(found.is_empty(), "{}", found.join("\n"));
 }
@@ -89,7 +138,7 @@ fn imports_go_down_and_never_in_circles() {
 fn what_the_rule_forbids_is_found() {
     let complaints = |files: &[(&str, &str)]| {
         let files: Vec<_> = files.iter().map(|(module, text)| (path_of(module), (*text).to_owned())).collect();
-        complaints(&["low", "high"], &files).join("; ")
+        complaints(&[(Vec::new(), &["low", "high"]), (path_of("low"), &["a", "b"])], &files).join("; ")
     };
     let fine =
         [("", "mod low; mod high; pub use low::Leaf;"), ("low", "pub struct Leaf;"), ("high", "use crate::Leaf;")];
@@ -102,6 +151,9 @@ fn what_the_rule_forbids_is_found() {
     assert_eq!(complaints(&in_a_test), "");
     let unlisted = [fine[0], fine[1], fine[2], ("attic", "use crate::low::Leaf;")];
     assert_eq!(complaints(&unlisted), "attic is not in the list of rooms");
+    let up_inside = [("", ""), ("low", ""), ("low::a", "use super::b::B;"), ("low::b", ""), ("low::c", "")];
+    let expected = "low::a imports low::b, which is a later room; low::c is not in the list of rooms";
+    assert_eq!(complaints(&up_inside), expected);
     let circle = [
         ("", "mod low; mod high;"),
         ("high", ""),
@@ -109,7 +161,10 @@ fn what_the_rule_forbids_is_found() {
         ("low::a", "use super::B; pub struct A(B);"),
         ("low::b", "use crate::low::{self, A as C}; pub struct B;"),
     ];
-    assert_eq!(complaints(&circle), "low::a → low::b → low::a is a circle");
+    assert_eq!(
+        complaints(&circle),
+        "low::a imports low::b, which is a later room; low::a → low::b → low::a is a circle"
+    );
     let with_its_child =
         [("", ""), ("high", ""), ("low", "mod a; use a::A; pub struct B;"), ("low::a", "use super::B;")];
     assert_eq!(complaints(&with_its_child), "", "a module and its submodule");
@@ -133,7 +188,8 @@ fn collect(folder: &Path, path: &mut ModulePath, files: &mut Vec<(ModulePath, St
     entries.sort();
     for entry in entries {
         let name = entry.file_stem().expect("a name").to_string_lossy().into_owned();
-        if ["tests", "testing", "bin", "main"].contains(&name.as_str()) {
+        let is_of_tests = name.ends_with("_tests") || name.starts_with("test_");
+        if is_of_tests || ["tests", "testing", "bin", "main"].contains(&name.as_str()) {
             continue;
         }
         let is_own = ["mod", "lib"].contains(&name.as_str());
@@ -161,7 +217,9 @@ struct Import {
 struct Modules(BTreeMap<ModulePath, Vec<Import>>);
 
 /// Every upward import, unlisted room and circle.
-fn complaints(rooms: &[&str], files: &[(ModulePath, String)]) -> Vec<String> {
+///
+/// * `lists`: modules, the root among them, with the rooms in each.
+fn complaints(lists: &[(ModulePath, &[&str])], files: &[(ModulePath, String)]) -> Vec<String> {
     let mut modules = Modules(files.iter().map(|(module, _)| (module.clone(), Vec::new())).collect());
     let texts: Vec<_> = files.iter().map(|(module, text)| (module, product_code(text))).collect();
     for (module, text) in &texts {
@@ -173,15 +231,18 @@ fn complaints(rooms: &[&str], files: &[(ModulePath, String)]) -> Vec<String> {
         let targets = declared.chain(paths_in(text)).filter_map(|path| modules.file_of(module, &path, 0));
         edges.insert(module, targets.filter(|target| target != *module).collect());
     }
-    let room = |module: &ModulePath| module.first().and_then(|name| rooms.iter().position(|room| room == name));
     let mut found = Vec::new();
-    for (module, targets) in &edges {
-        if room(module).is_none() && !module.is_empty() {
-            found.push(format!("{} is not in the list of rooms", name_of(module)));
-        }
-        for target in targets {
-            if room(module).is_some() && room(target) > room(module) {
-                found.push(format!("{} imports {}, which is a later room", name_of(module), name_of(target)));
+    for (inside, rooms) in lists {
+        let name = |module: &ModulePath| module.strip_prefix(inside.as_slice())?.first().cloned();
+        let room = |module: &ModulePath| rooms.iter().position(|room| Some(*room) == name(module).as_deref());
+        for (module, targets) in &edges {
+            if name(module).is_some() && room(module).is_none() {
+                found.push(format!("{} is not in the list of rooms", name_of(module)));
+            }
+            for target in targets {
+                if room(module).is_some() && room(target) > room(module) {
+                    found.push(format!("{} imports {}, which is a later room", name_of(module), name_of(target)));
+                }
             }
         }
     }

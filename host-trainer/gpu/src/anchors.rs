@@ -2,18 +2,18 @@
 
 use bytemuck::Pod;
 
-use super::ops::detail::Detail;
-use super::ops::gather::Gather;
-use super::ops::head::Head;
-use super::ops::head_input::HeadInput;
-use super::ops::neural_gaussians::{HeadOutputs, NeuralGaussians, ViewAnchors};
-use super::ops::prefilter::Prefilter;
-use super::ops::project::Project;
+use super::ops::heads::detail::Detail;
+use super::ops::heads::head::Head;
+use super::ops::heads::head_input::HeadInput;
+use super::ops::heads::neural_gaussians::{HeadOutputs, NeuralGaussians, ViewAnchors};
+use super::ops::image::prefilter::Prefilter;
+use super::ops::image::project::Project;
+use super::ops::primitives::gather::Gather;
 use super::scene::{DeviceScene, FEATURES, LOG_SCALES, MASK_LOGITS, OFFSETS};
 use super::{Buffer, Commands, Gpu, GpuError};
 use pocketsplat_kernels::ops::Pinhole;
-use pocketsplat_kernels::ops::neural_gaussians::Gaussian;
-use pocketsplat_kernels::ops::project::{Footprint, Splat};
+use pocketsplat_kernels::ops::heads::neural_gaussians::Gaussian;
+use pocketsplat_kernels::ops::image::project::{Footprint, Splat};
 
 /// Heads that every scene has.
 const N_HEADS: usize = 3;

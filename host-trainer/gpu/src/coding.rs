@@ -5,14 +5,14 @@ use pocketsplat_core::context::{N_GROUPS, N_LEVELS};
 use super::anchors::rooms;
 use super::levels::GpuLevels;
 use super::network_pass::{NetworkPass, PassKernels};
-use super::ops::anchor_bits::{self, AnchorBits, Sampled};
-use super::ops::grid_bits::GridBits;
-use super::ops::hash_grid::HashGrid;
-use super::ops::mask::Mask;
-use super::ops::perturb::Perturb;
+use super::ops::heads::mask::Mask;
+use super::ops::rate::anchor_bits::{self, AnchorBits, Sampled};
+use super::ops::rate::grid_bits::GridBits;
+use super::ops::rate::hash_grid::HashGrid;
+use super::ops::rate::perturb::Perturb;
 use super::scene::{DeviceScene, MASK_LOGITS};
 use super::{Buffer, Commands, Gpu, GpuError};
-use pocketsplat_kernels::ops::noise::Stream;
+use pocketsplat_kernels::ops::rate::noise::Stream;
 use pocketsplat_kernels::step::coding::RateTerms;
 
 mod rate;
@@ -133,7 +133,7 @@ impl GpuCoding {
         let (n_sampled, drawn) = match &context.grid {
             Some(grid) => {
                 let (network, pass) = (&context.networks[0], &mut self.pass);
-                let n_sampled = pass.choose(gpu, stream, terms.sample, &scene.rarity, anchors)?;
+                let n_sampled = pass.choose(gpu, stream, terms.sample, &scene.view_weights, anchors)?;
                 // There by now: nothing has been submitted since.
                 let drawn = drawn.take(gpu)?;
                 pass.fit(gpu, network, anchors.len())?;

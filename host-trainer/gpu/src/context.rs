@@ -4,9 +4,9 @@ use pocketsplat_core::context::{GridFrame, N_GROUPS, N_LEVELS};
 
 use super::group::Group;
 use super::ops::adam::Adam;
-use super::ops::hash_grid::GridPlaces;
-use super::ops::head::HeadLayout;
-use super::ops::integer_network::{Integers, table_of_steps};
+use super::ops::heads::head::HeadLayout;
+use super::ops::rate::hash_grid::GridPlaces;
+use super::ops::rate::integer_network::{Integers, table_of_steps};
 use super::{Buffer, Commands, Gpu, GpuError};
 use pocketsplat_kernels::ops::adam::{Moments, Step};
 use pocketsplat_kernels::scene::{ContextModel, ContextNetwork, Scene};

@@ -4,14 +4,14 @@
 
 use std::collections::BTreeMap;
 
-use super::ops::high_pass::HighPass;
-use super::ops::l1::L1;
-use super::ops::rasterise::Rasterise;
-use super::ops::ssim::Ssim;
-use super::ops::target::{ClearMasked, Target};
-use super::ops::tiles::Tiles;
+use super::ops::image::rasterise::Rasterise;
+use super::ops::image::tiles::Tiles;
+use super::ops::loss::high_pass::HighPass;
+use super::ops::loss::l1::L1;
+use super::ops::loss::ssim::Ssim;
+use super::ops::loss::target::{ClearMasked, Target};
 use super::{Buffer, Commands, Gpu, GpuError};
-use pocketsplat_kernels::ops::project::{Footprint, Splat};
+use pocketsplat_kernels::ops::image::project::{Footprint, Splat};
 use pocketsplat_kernels::ops::simd::Level;
 use pocketsplat_kernels::step::{DeviceFault, ImageLoss, ImagePair, ImageStages, ImageTerm, LossWeights, TargetView};
 

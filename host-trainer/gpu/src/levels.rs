@@ -5,11 +5,11 @@ use pocketsplat_core::context::{FEATURE_ONE, N_GROUPS, N_LEVELS};
 use super::anchors::rooms;
 use super::context::{DeviceNetwork, Follows};
 use super::network_pass::{NetworkPass, PassKernels};
-use super::ops::parents::{Parents, Places};
-use super::ops::perturb::Perturb;
+use super::ops::rate::parents::{Parents, Places};
+use super::ops::rate::perturb::Perturb;
 use super::scene::{DeviceScene, FEATURES, LOG_SCALES};
 use super::{Buffer, Commands, Gpu, GpuError};
-use pocketsplat_kernels::ops::noise::Stream;
+use pocketsplat_kernels::ops::rate::noise::Stream;
 use pocketsplat_kernels::scene::{Anchors, INITIAL_MASK_LOGIT};
 use pocketsplat_kernels::step::parents;
 
@@ -185,7 +185,7 @@ impl GpuLevels {
             kernels.gather.run(&mut commands, &parents.rows.items, 1, &identity, &own.rows);
             kernels.gather.run(&mut commands, anchors, 1, &own.rows, &own.anchors);
             commands.submit()?;
-            let n_of_level = own.pass.choose(gpu, stream, share, &scene.rarity, &own.anchors)?;
+            let n_of_level = own.pass.choose(gpu, stream, share, &scene.view_weights, &own.anchors)?;
             n_sampled += n_of_level;
             own.sampled.fit(gpu, n_of_level)?;
             own.pass.fit(gpu, network, n)?;

@@ -4,13 +4,13 @@ use pocketsplat_core::context::N_GROUPS;
 
 use super::anchors::rooms;
 use super::context::DeviceNetwork;
-use super::ops::adaptive_step::AdaptiveStep;
-use super::ops::gather::Gather;
-use super::ops::head::Head;
-use super::ops::integer_network::IntegerNetwork;
-use super::ops::sample::Sample;
+use super::ops::heads::head::Head;
+use super::ops::primitives::gather::Gather;
+use super::ops::rate::adaptive_step::AdaptiveStep;
+use super::ops::rate::integer_network::IntegerNetwork;
+use super::ops::rate::sample::Sample;
 use super::{Buffer, Commands, Gpu, GpuError};
-use pocketsplat_kernels::ops::noise::Stream;
+use pocketsplat_kernels::ops::rate::noise::Stream;
 
 /// Kernels that all passes share.
 #[derive(Debug)]
@@ -82,10 +82,10 @@ impl NetworkPass {
         gpu: &Gpu,
         stream: Stream,
         share: f64,
-        rarity: &Buffer<f32>,
+        view_weights: &Buffer<f32>,
         anchors: &Buffer<u32>,
     ) -> Result<usize, GpuError> {
-        self.sample.run(gpu, Commands::new(gpu), stream, share, rarity, anchors)
+        self.sample.run(gpu, Commands::new(gpu), stream, share, view_weights, anchors)
     }
 
     /// Makes room for `n` anchors and the sample that was chosen.

@@ -3,10 +3,10 @@
 use super::context::DeviceContext;
 use super::group::Group;
 use super::ops::adam::Adam;
-use super::ops::head::{HeadLayout, parameters_of};
-use super::ops::perturb;
-use super::ops::prefilter::Shown;
-use super::ops::statistics::Sums;
+use super::ops::heads::head::{HeadLayout, parameters_of};
+use super::ops::image::prefilter::Shown;
+use super::ops::image::statistics::Sums;
+use super::ops::rate::perturb;
 use super::{Buffer, Commands, Gpu, GpuError};
 use pocketsplat_kernels::ops::adam;
 use pocketsplat_kernels::scene::{Head, ModelShape};
@@ -70,7 +70,7 @@ pub(super) struct DeviceScene {
     /// `[n]`; 1 where nothing has ranked the anchors.
     prune_rank: Buffer<f32>,
     /// `[n]`; 1 where nothing has counted.
-    pub(super) rarity: Buffer<f32>,
+    pub(super) view_weights: Buffer<f32>,
     /// Features, log-scales, offsets, mask logits; `[n, width]`.
     pub(super) anchors: [Group; 4],
     /// In file order.
@@ -99,7 +99,7 @@ impl DeviceScene {
             shape: scene.shape,
             positions: Buffer::upload(gpu, "positions", &positions)?,
             prune_rank: Buffer::upload(gpu, "ranks", &or_one(&anchors.prune_rank))?,
-            rarity: Buffer::upload(gpu, "rarity", &or_one(&anchors.rarity))?,
+            view_weights: Buffer::upload(gpu, "view weights", &or_one(&anchors.view_weights))?,
             anchors: [
                 Group::upload(gpu, "features", &anchors.features, features)?,
                 Group::upload(gpu, "log-scales", &anchors.log_scales, log_scales)?,

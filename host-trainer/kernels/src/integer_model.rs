@@ -203,7 +203,7 @@ mod tests {
 
     use super::*;
     use crate::finite_difference::random;
-    use crate::ops::head;
+    use crate::ops::heads::head;
     use crate::scene::ModelShape;
 
     const SHAPE: ModelShape = ModelShape { view_colour: true, ..ModelShape::plain(5, 2) };

@@ -79,7 +79,7 @@ pub trait Real:
         two * (two * self).sigmoid() - Self::ONE
     }
 
-    /// `C = alpha·A·B + beta·C`; see [`crate::ops::matmul`].
+    /// `C = alpha·A·B + beta·C`; see [`crate::ops::heads::matmul`].
     ///
     /// # Safety
     /// As `matrixmultiply::sgemm`: every index reached through the strides lies inside its allocation.

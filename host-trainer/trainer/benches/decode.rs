@@ -13,7 +13,7 @@ use pocketsplat_core::Bundle;
 use pocketsplat_core::bundle::AnchorSite;
 use pocketsplat_core::context::Context;
 use pocketsplat_kernels::scene::{Anchors, Heads, ModelShape, Scene};
-use pocketsplat_trainer::train::context_start::initial_context;
+use pocketsplat_trainer::train::context::start::initial_context;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -37,7 +37,7 @@ fn scene() -> Scene<f32> {
         offsets: spread(N_ANCHORS * 3 * SHAPE.n_offsets, 1.0),
         mask_logits: spread(N_ANCHORS * SHAPE.n_offsets, 1.0).iter().map(|x| x - 4.8).collect(),
         prune_rank: Vec::new(),
-        rarity: Vec::new(),
+        view_weights: Vec::new(),
         lattice: lattice.into_iter().collect(),
     };
     let mut scene =

@@ -3,7 +3,7 @@
 //! `cargo bench -p pocketsplat-trainer --bench rate`.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use pocketsplat_kernels::ops::rate;
+use pocketsplat_kernels::ops::rate::normal_bits;
 use pocketsplat_kernels::ops::simd::Level;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -23,7 +23,7 @@ fn benchmark(criterion: &mut Criterion) {
                 level.run(
                     #[inline(always)]
                     || {
-                        rate::forward_backward(
+                        normal_bits::forward_backward(
                             &values,
                             &means,
                             &log2_scales,

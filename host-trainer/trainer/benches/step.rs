@@ -6,15 +6,15 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use pocketsplat_kernels::ops::Pinhole;
-use pocketsplat_kernels::ops::noise::Stream;
+use pocketsplat_kernels::ops::rate::noise::Stream;
 use pocketsplat_kernels::ops::simd::Level;
 use pocketsplat_kernels::scene::Scene;
 use pocketsplat_kernels::step::coding::{Coding, RateTerms};
 use pocketsplat_kernels::step::{Loss, LossWeights, StageSeconds, StepReport, TargetView, Workspace};
+use pocketsplat_trainer::train::bench_scene;
 use pocketsplat_trainer::train::config::{Backbone, Hac, Rates};
-use pocketsplat_trainer::train::context_start::initial_context;
+use pocketsplat_trainer::train::context::start::initial_context;
 use pocketsplat_trainer::train::optimiser::Optimiser;
-use pocketsplat_trainer::train::typical;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -22,7 +22,7 @@ const SIZE_PX: u32 = 400;
 
 /// A scene with masks and a context model.
 fn coded_scene() -> Scene<f32> {
-    let mut scene = typical::scene(Backbone::Hac, 50_000);
+    let mut scene = bench_scene::scene(Backbone::Hac, 50_000);
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     for logit in &mut scene.anchors.mask_logits {
         *logit = if rng.random::<f32>() < 0.75 { -6.0 } else { 1.0 };
@@ -35,12 +35,12 @@ fn benchmark(criterion: &mut Criterion) {
     let Hac { lambda, sample, mask_weight, grid_weight, .. } = Hac::default();
     let rate = RateTerms { lambda, sample, mask: mask_weight, masks_weigh_anchors: false, grid: grid_weight };
     let coding = Coding::Context { stream: Stream::of_run(1), rate, exact: None };
-    steps(criterion, "scaffold", &typical::scene(Backbone::Scaffold, 20_000), &Coding::Raw);
+    steps(criterion, "scaffold", &bench_scene::scene(Backbone::Scaffold, 20_000), &Coding::Raw);
     steps(criterion, "hac", &coded_scene(), &coding);
 }
 
 fn steps(criterion: &mut Criterion, name: &str, scene: &Scene<f32>, coding: &Coding<'_, f32>) {
-    let pinhole = Pinhole::new(&typical::camera([SIZE_PX; 2]));
+    let pinhole = Pinhole::new(&bench_scene::camera([SIZE_PX; 2]));
     let mut rng = ChaCha8Rng::seed_from_u64(2);
     let truth: Vec<f32> = (0..3 * SIZE_PX * SIZE_PX).map(|_| rng.random_range(0.0..1.0)).collect();
     let target = TargetView::new(&pinhole, truth, None, [0.0; 3]);

@@ -3,9 +3,12 @@
 use glam::{DMat3, DVec3};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_core::math::{exp, sigmoid, tanh};
-use pocketsplat_kernels::ops::normality::{ChannelMoments, Weights};
+use pocketsplat_kernels::ops::heads::head_input;
+use pocketsplat_kernels::ops::loss::normality::{ChannelMoments, Weights};
+use pocketsplat_kernels::ops::loss::ssim;
+use pocketsplat_kernels::ops::rate::normal_bits;
 use pocketsplat_kernels::ops::simd::Level;
-use pocketsplat_kernels::ops::{Pinhole, adam, head_input, rate, ssim};
+use pocketsplat_kernels::ops::{Pinhole, adam};
 use pocketsplat_kernels::scene::ModelShape;
 
 use super::blobs::{Blob, Blobs};
@@ -87,8 +90,8 @@ fn bits_rounding() -> f64 {
     let mut worst = 0.0_f64;
     for log2_scale in [-50.0, -20.0, -4.0, -1.0, 0.0, 2.0, 3.875, 12.0, 20.0, 50.0] {
         for distance in [0.0, 1e-6, 0.25, 0.5, 0.75, 3.0, 17.0, 1e4, 1e30] {
-            let exact = rate::bits(distance, 0.0, log2_scale);
-            let found = rate::bits(distance as f32, 0.0, log2_scale as f32);
+            let exact = normal_bits::bits(distance, 0.0, log2_scale);
+            let found = normal_bits::bits(distance as f32, 0.0, log2_scale as f32);
             if !(found.d_value.is_finite() && found.d_log2_scale.is_finite()) {
                 return f64::INFINITY;
             }

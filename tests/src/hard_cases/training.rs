@@ -88,7 +88,7 @@ fn run(capture: &Capture, config: TrainConfig) -> f64 {
     let mut worst = 0.0_f64;
     while !trainer.is_done() {
         let ended = matches!(trainer.advance(), Err(TrainError::Diverged { .. }));
-        worst = worse(worst, n_not_finite(parameters(&trainer.scene)));
+        worst = worse(worst, n_not_finite(parameters(trainer.scene())));
         if ended {
             break;
         }

@@ -114,7 +114,7 @@ fn example(channels: ChannelCoding) -> Result<Vec<u8>> {
             ],
             mask_logits: vec![1.0, 1.0, 1.0, -10.0, 1.0, 1.0],
             prune_rank: vec![],
-            rarity: vec![],
+            view_weights: vec![],
         },
         heads,
         context: has_context.then(|| context(&shape)),

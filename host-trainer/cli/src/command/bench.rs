@@ -10,11 +10,11 @@ use pocketsplat_kernels::ops::Pinhole;
 use pocketsplat_kernels::scene::Scene;
 use pocketsplat_kernels::step::coding::Coding;
 use pocketsplat_kernels::step::{Loss, LossWeights, SharedDevice, StageSeconds, StepReport, TargetView, Workspace};
+use pocketsplat_trainer::train::bench_scene;
 use pocketsplat_trainer::train::config::Backbone;
+use pocketsplat_trainer::train::density::Statistics;
 use pocketsplat_trainer::train::optimiser::Optimiser;
-use pocketsplat_trainer::train::resident::trained;
-use pocketsplat_trainer::train::statistics::Statistics;
-use pocketsplat_trainer::train::typical;
+use pocketsplat_trainer::train::run::device_sync::trained;
 use serde::Serialize;
 
 use super::devices::{DeviceChoice, usable};
@@ -80,8 +80,8 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let mut rows = Vec::new();
     for n_splats in &args.splats {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of anchors")]
-        let n_anchors = (*n_splats as f64 / typical::SPLATS_PER_ANCHOR).ceil() as usize;
-        let scene = typical::scene(Backbone::Scaffold, n_anchors);
+        let n_anchors = (*n_splats as f64 / bench_scene::SPLATS_PER_ANCHOR).ceil() as usize;
+        let scene = bench_scene::scene(Backbone::Scaffold, n_anchors);
         for size in &args.sizes {
             for threads in &threads {
                 say!("{n_splats} splats, {size}, cpu, {threads} threads");
@@ -113,7 +113,7 @@ fn measure(
 ) -> Result<Row> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.with_context(|| format!("could not start {threads} threads"))?;
-    let camera = Pinhole::new(&typical::camera([size.width_px, size.height_px]));
+    let camera = Pinhole::new(&bench_scene::camera([size.width_px, size.height_px]));
     let n_values = 3 * camera.size_px[0] * camera.size_px[1];
     // Bytes without a pattern.
     let truth = (0..n_values as u32).map(|i| f32::from((i.wrapping_mul(2_654_435_761) >> 24) as u8) / 255.0).collect();

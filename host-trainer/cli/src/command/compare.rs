@@ -36,9 +36,9 @@ pub(crate) struct Args {
 /// One line of runs.csv.
 #[derive(Debug, Serialize)]
 struct RunLine {
-    /// The key that is turned, for colours; empty for the first run.
+    /// The key that varies, for colours; empty for the first run.
     #[serde(skip)]
-    knob: String,
+    parameter: String,
     run: String,
     setting: String,
     processor_minutes: f64,
@@ -99,9 +99,9 @@ fn line(
     if let (Some(first), Some(protocol)) = (&first_evaluation.protocol, &evaluation.protocol) {
         differences.extend(first.differences(protocol));
     }
-    let (knob, setting) = named(&differences);
+    let (parameter, setting) = named(&differences);
     Ok(RunLine {
-        knob,
+        parameter,
         run: run.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
         setting,
         processor_minutes: result.train_processor_s / 60.0,
@@ -125,8 +125,9 @@ fn named(differences: &[Difference]) -> (String, String) {
         value => format!("{} {value}", short(key)),
     });
     let said: Vec<String> = said.collect();
-    let knob = chosen.first().map_or_else(|| "as the first".to_owned(), |difference| knob_of(&difference.key));
-    (knob, if said.is_empty() { "as the first".to_owned() } else { said.join(", ") })
+    let parameter =
+        chosen.first().map_or_else(|| "as the first".to_owned(), |difference| parameter_of(&difference.key));
+    (parameter, if said.is_empty() { "as the first".to_owned() } else { said.join(", ") })
 }
 
 fn is_derived(key: &str) -> bool {
@@ -134,7 +135,7 @@ fn is_derived(key: &str) -> bool {
 }
 
 /// The key, or the table of all modules.
-fn knob_of(key: &str) -> String {
+fn parameter_of(key: &str) -> String {
     if key.starts_with("train.modules") {
         "modules".to_owned()
     } else {
@@ -145,7 +146,7 @@ fn knob_of(key: &str) -> String {
 fn panel(title: &str, unit: &str, lines: &[RunLine], cost: fn(&RunLine) -> f64) -> CostPanel {
     let front = on_front(&lines.iter().map(|line| (cost(line), line.psnr_db)).collect::<Vec<_>>());
     let points = lines.iter().zip(front).map(|(line, on_front)| CostPoint {
-        knob: line.knob.clone(),
+        parameter: line.parameter.clone(),
         setting: line.setting.clone(),
         cost: cost(line),
         psnr_db: line.psnr_db,
@@ -165,7 +166,7 @@ mod tests {
             let keys: Vec<String> = keys.iter().map(|key| (*key).to_owned()).collect();
             named(&first.differences_of_bundles(&first.with_keys(&keys).unwrap()).unwrap())
         };
-        let pair = |knob: &str, setting: &str| (knob.to_owned(), setting.to_owned());
+        let pair = |parameter: &str, setting: &str| (parameter.to_owned(), setting.to_owned());
         assert_eq!(name(&[]), pair("as the first", "as the first"));
         assert_eq!(name(&["train.iterations=500"]), pair("iterations", "iterations 500"));
         assert_eq!(name(&["train.shape.n_offsets=3", "train.voxel_size=0.5"]), pair("n_offsets", "n_offsets 3"));

@@ -12,7 +12,7 @@ use pocketsplat_codec::render::reference::ReferenceScene;
 use pocketsplat_core::{Budget, Bundle, Camera, MaxSplats};
 use pocketsplat_kernels::camera::core_camera;
 use pocketsplat_trainer::cost::{
-    CountError, Counter, Instructions, MOST_VIEWS, Measured, Setting, Sight, knobs, measure, quality_grid,
+    CountError, Counter, Instructions, MOST_VIEWS, Measured, Setting, Sight, measure, parameters, quality_grid,
 };
 use pocketsplat_trainer::device::Processor;
 use rayon::prelude::*;
@@ -91,12 +91,12 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         Some(ram) => budget.in_bytes(usize::try_from(ram.as_u64()).unwrap_or(usize::MAX)),
     };
     let counted: Vec<Camera> = sights.iter().filter(|sight| sight.counts).map(|sight| sight.camera).collect();
-    let (knobs, grid) = (knobs(&bundle), quality_grid(&bundle));
-    let n_knobs = knobs.len();
-    let settings: Vec<Setting> = knobs.into_iter().chain(grid).collect();
+    let (parameters, grid) = (parameters(&bundle), quality_grid(&bundle));
+    let n_parameters = parameters.len();
+    let settings: Vec<Setting> = parameters.into_iter().chain(grid).collect();
     let mut measured = Vec::new();
     for (i, setting) in settings.iter().enumerate() {
-        say!("{} of {}  {}: {}", i + 1, settings.len(), setting.knob, setting.name);
+        say!("{} of {}  {}: {}", i + 1, settings.len(), setting.parameter, setting.name);
         let mut point = match measure(&bundle, &sights, setting, budget, &targets) {
             // Splats that are larger than plans reckon with, and memory without limit.
             Ok(point) if point.splats_dropped > 0 && args.ram.is_none() => {
@@ -110,7 +110,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
             }
             Err(error) => return Err(error).context("the scene as it is"),
         };
-        if let Some(counter) = counter.as_ref().filter(|_| i < n_knobs) {
+        if let Some(counter) = counter.as_ref().filter(|_| i < n_parameters) {
             count(counter, &targets, &counted, &mut point);
         }
         measured.push(point);

@@ -196,7 +196,7 @@ impl Estimate {
         advance(n_untimed)?;
         let step_s = advance(TIMED_STEPS.min(config.iterations - n_untimed))?;
         let estimate = Self::new(capture, config, 0, Warned::default());
-        let expected = estimate.expected(0, step_s, 0.0, trainer.scene.anchors.len());
+        let expected = estimate.expected(0, step_s, 0.0, trainer.scene().anchors.len());
         Ok((estimate, expected))
     }
 

@@ -7,7 +7,7 @@ use pocketsplat_capture::dataset::{Capture, Split};
 use pocketsplat_core::bundle::crc32;
 use pocketsplat_files::Outputs;
 use pocketsplat_metrics::Lpips;
-use pocketsplat_trainer::train::module::pruning::Form;
+use pocketsplat_trainer::train::modules::pruning::Form;
 
 use super::bundle::BundleFile;
 use super::capture::CaptureArgs;
@@ -16,21 +16,21 @@ use super::estimate::Estimate;
 use super::eval::{Evaluation, Measurements, Renderer, evaluate, lpips_of};
 use super::output;
 use super::outputs::{BUNDLE, keep};
-use super::train::{self, Attempt, GoesOn, Standing, Start};
+use super::train::{self, Attempt, GoesOn, RunStatus, Start};
 use crate::config::{Protocol, RunConfig};
 use crate::say::say;
 
 /// Brings a point to its end, from wherever it stands; false when it was interrupted before. A device is opened where something is left
 /// to do.
 pub(super) fn trained(config: &RunConfig, capture: &Capture, device: DeviceChoice, stop: &AtomicBool) -> Result<bool> {
-    let (folder, start, device) = match Standing::of(&config.output.with_extension("run"), config)? {
-        Standing::New(folder) => {
+    let (folder, start, device) = match RunStatus::of(&config.output.with_extension("run"), config)? {
+        RunStatus::New(folder) => {
             let device = device.open()?;
             let warned = Estimate::try_out(capture, &config.train, false, device.clone(), stop)?;
             (folder, Start::New(warned), device)
         }
-        Standing::Begun(folder) => (folder, Start::Resumed, device.open()?),
-        Standing::Finished => {
+        RunStatus::Begun(folder) => (folder, Start::Resumed, device.open()?),
+        RunStatus::Finished => {
             say!("trained before");
             return Ok(true);
         }

@@ -8,8 +8,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use pocketsplat_kernels::scene::Scene;
 use pocketsplat_kernels::step::StepReport;
 use pocketsplat_trainer::explicit::train::CloudOutcome;
-use pocketsplat_trainer::train::load::Load;
-use pocketsplat_trainer::train::steering::Fit;
+use pocketsplat_trainer::train::limits::{Fit, LimitShares};
 use pocketsplat_trainer::train::{DroppedStep, Observer};
 
 use super::estimate::Estimate;
@@ -137,7 +136,7 @@ impl Observer for Progress {
     }
 
     fn fitted(&mut self, fit: &Fit) {
-        let Load { ram, instructions, bytes } = fit.load;
+        let LimitShares { ram, instructions, bytes } = fit.shares;
         let shares = [("RAM", ram), ("instructions", instructions), ("bytes", bytes)];
         let shares = shares.iter().filter(|(_, share)| *share > 0.0);
         let shares: Vec<_> = shares.map(|(of, share)| format!("{:.0} % of the {of}", 100.0 * share)).collect();

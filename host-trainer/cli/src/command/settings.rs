@@ -10,8 +10,8 @@ use pocketsplat_trainer::encode::CoderChoice;
 use pocketsplat_trainer::explicit::CloudConfig;
 use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::config::Backbone;
-use pocketsplat_trainer::train::module::pruning::Rank;
-use pocketsplat_trainer::train::module::{Distribution, Modules, Pruning, Rdo};
+use pocketsplat_trainer::train::modules::pruning::Rank;
+use pocketsplat_trainer::train::modules::{Distribution, Modules, Pruning, Rdo};
 
 use crate::config::heading::{OUTPUT, QUALITY, RUN};
 use crate::config::named::{BACKBONES, CODERS, one_of};

@@ -5,7 +5,7 @@ mod in_folder;
 mod limits;
 mod loading;
 mod result;
-mod standing;
+mod run_status;
 mod summary;
 #[cfg(test)]
 mod tests;
@@ -32,7 +32,7 @@ pub(crate) use in_folder::{Attempt, GoesOn, Start, begun_or_new, train_in};
 use loading::source_of;
 pub(crate) use loading::{clear_photographs, decide, load};
 pub(crate) use result::{HeldOut, TrainResult};
-pub(crate) use standing::Standing;
+pub(crate) use run_status::RunStatus;
 use summary::Summary;
 
 pub(crate) fn run(args: &Args) -> Result<ExitCode> {
@@ -132,15 +132,15 @@ fn begin_or_go_on(args: &Args) -> Result<ExitCode> {
     let path = args.run_folder(args.named_paths(&config.dataset, &config.output).1)?;
     let output = args.output(&source_of(&config), &config.output, BUNDLE, &path)?;
     let capture = load(&mut config, Some(&path), None)?;
-    let code = match Standing::of(&path, &config)? {
-        Standing::New(folder) => {
+    let code = match RunStatus::of(&path, &config)? {
+        RunStatus::New(folder) => {
             let start = Start::New(Warned::default());
             train_and_print(args, folder, config, &capture, start, Machine::open(args)?, &output)?
         }
-        Standing::Begun(folder) => {
+        RunStatus::Begun(folder) => {
             train_and_print(args, folder, config, &capture, Start::Resumed, Machine::open(args)?, &output)?
         }
-        Standing::Finished => {
+        RunStatus::Finished => {
             say!("trained before");
             ExitCode::SUCCESS
         }

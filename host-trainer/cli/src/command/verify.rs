@@ -60,10 +60,11 @@ pub(crate) struct Args {
     json: bool,
 }
 
-/// One law over all that it was tried on.
+/// One property over all that it was tried on.
 #[derive(Serialize)]
-struct Law {
-    law: &'static str,
+struct Property {
+    #[serde(rename = "law")]
+    name: &'static str,
     trials: usize,
     /// What was found, or the first violation.
     finding: String,
@@ -81,7 +82,8 @@ struct Verification {
     #[serde(skip_serializing_if = "Option::is_none")]
     whole_scene_bytes: Option<usize>,
     n_views: usize,
-    laws: Vec<Law>,
+    #[serde(rename = "laws")]
+    properties: Vec<Property>,
     /// CRC-32 of each view's pixels, what a device's frame can be compared with.
     frames: Vec<String>,
 }
@@ -99,12 +101,12 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     let plans: Vec<Plan> = (1..=plan.n_tiers())
         .map(|tiers| plan_within(&bundle, &budget.with_tiers(tiers), ram_bytes.unwrap_or(u64::MAX)))
         .collect::<Result<_>>()?;
-    let mut laws = vec![
-        law(
+    let mut properties = vec![
+        property(
             "the planned bytes suffice, one fewer is refused by number",
             plans.iter().map(|plan| exact_bytes(&bundle, *plan)),
         ),
-        law(
+        property(
             "residency and strips change no pixel",
             plans.iter().flat_map(|plan| {
                 let budget = budget.with_tiers(plan.n_tiers());
@@ -116,14 +118,14 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     let marks = cameras.iter().map(|camera| memory_does_not_show(&bundle, plan, camera).map(|touched| touched.mark));
     let (row, most_used) =
         with_most("content and place of the memory do not show, nothing beside it is touched", marks);
-    laws.push(row);
-    laws.push(used(most_used, &plan, measured));
+    properties.push(row);
+    properties.push(used(most_used, &plan, measured));
     let drawn = cameras.iter().map(|camera| core_image_of_tiers(&bundle, &host_camera(camera), plan.n_tiers()));
     let drawn = drawn.collect::<Result<Vec<_>, _>>()?;
     if measured {
         // The manifest's maxima are over these views, for the whole frame at once.
         let whole = bundle.plan(&budget.with_tiers(plan.n_tiers()))?;
-        laws.push(law(
+        properties.push(property(
             "work is within what was predicted",
             drawn.iter().map(|frame| {
                 let mut work = frame.report.work();
@@ -137,19 +139,20 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
             }),
         ));
     }
-    laws.push(law("tiers keep the levels that they declare", declared_levels(&bundle)));
+    properties.push(property("tiers keep the levels that they declare", declared_levels(&bundle)));
     if let Some(level) = level {
         let whole = bundle.n_tiers().saturating_sub(1);
-        laws.push(law("the whole scene keeps the level", iter::once(keeps_level(&bundle, whole, level.number))));
+        properties
+            .push(property("the whole scene keeps the level", iter::once(keeps_level(&bundle, whole, level.number))));
     }
-    laws.push(reference_law(&file, &bundle, plan.n_tiers(), &cameras)?);
+    properties.push(reference_property(&file, &bundle, plan.n_tiers(), &cameras)?);
     let whole_scene_bytes = if plan.n_tiers() < bundle.n_tiers() {
         let whole = budget.with_residency(Residency::Streamed).with_strips(Strips::Exactly(MAX_STRIPS));
         Some(bundle.plan(&whole)?.scratch_len())
     } else {
         None
     };
-    let holds = laws.iter().all(|law| law.holds);
+    let holds = properties.iter().all(|property| property.holds);
     let verification = Verification {
         bundle: args.bundle.clone(),
         ram_bytes,
@@ -158,7 +161,7 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
         pruning_rate: plan.pruning_rate(),
         whole_scene_bytes,
         n_views: cameras.len(),
-        laws,
+        properties,
         frames: drawn.iter().map(|frame| format!("{:08x}", crc32(&frame.image.rgb))).collect(),
     };
     if args.json {
@@ -189,12 +192,12 @@ fn largest(cameras: &[Camera]) -> FrameSize {
     FrameSize { width_px: most(|camera| camera.width_px), height_px: most(|camera| camera.height_px) }
 }
 
-fn law(law: &'static str, trials: impl Iterator<Item = Result<(), Violation>>) -> Law {
-    with_most(law, trials.map(|trial| trial.map(|()| 0))).0
+fn property(name: &'static str, trials: impl Iterator<Item = Result<(), Violation>>) -> Property {
+    with_most(name, trials.map(|trial| trial.map(|()| 0))).0
 }
 
-/// A law whose trials return numbers, with the largest of these.
-fn with_most(law: &'static str, trials: impl Iterator<Item = Result<usize, Violation>>) -> (Law, usize) {
+/// A property whose trials return numbers, with the largest of these.
+fn with_most(name: &'static str, trials: impl Iterator<Item = Result<usize, Violation>>) -> (Property, usize) {
     let (mut n, mut most, mut first) = (0, 0, None);
     for trial in trials {
         n += 1;
@@ -204,15 +207,15 @@ fn with_most(law: &'static str, trials: impl Iterator<Item = Result<usize, Viola
         }
     }
     let holds = first.is_none();
-    (Law { law, trials: n, finding: first.unwrap_or_default(), holds }, most)
+    (Property { name, trials: n, finding: first.unwrap_or_default(), holds }, most)
 }
 
 /// How much of the plan the fullest view needs; only views that the manifest was measured over can be asked for it.
-fn used(most: usize, plan: &Plan, measured: bool) -> Law {
+fn used(most: usize, plan: &Plan, measured: bool) -> Property {
     // What the plan takes beyond saves passes.
     let share = most as f64 / plan.least_len() as f64;
-    Law {
-        law: "the planned bytes are needed",
+    Property {
+        name: "the planned bytes are needed",
         trials: 1,
         finding: format!("{most} of {} bytes, {:.1} %", plan.least_len(), 100.0 * share),
         holds: !measured || share >= MIN_USED,
@@ -220,7 +223,7 @@ fn used(most: usize, plan: &Plan, measured: bool) -> Law {
 }
 
 /// Each tier's frames against the f64 reference's.
-fn reference_law(file: &BundleFile, bundle: &Bundle<'_>, n_tiers: u8, cameras: &[Camera]) -> Result<Law> {
+fn reference_property(file: &BundleFile, bundle: &Bundle<'_>, n_tiers: u8, cameras: &[Camera]) -> Result<Property> {
     let chunks_at = bundle.sections().last().map_or(0, |section| section.offset as usize);
     let (mut lowest, mut trials) = (f64::INFINITY, 0);
     for tier in (0..n_tiers).filter_map(|tier| bundle.tier(tier)) {
@@ -233,7 +236,7 @@ fn reference_law(file: &BundleFile, bundle: &Bundle<'_>, n_tiers: u8, cameras: &
         }
     }
     let finding = format!("{lowest:.1} dB at least, needed {MIN_REFERENCE_DB}");
-    Ok(Law { law: "frames are the f64 reference's", trials, finding, holds: lowest >= MIN_REFERENCE_DB })
+    Ok(Property { name: "frames are the f64 reference's", trials, finding, holds: lowest >= MIN_REFERENCE_DB })
 }
 
 fn table(verification: &Verification) -> String {
@@ -248,8 +251,8 @@ fn table(verification: &Verification) -> String {
     if let Some(bytes) = verification.whole_scene_bytes {
         text += &format!("the whole scene takes {bytes} bytes; what is checked is the part within the limit\n\n");
     }
-    for Law { law, trials, finding, holds } in &verification.laws {
-        text += &format!("{:<6}{trials:>5}  {law}", if *holds { "holds" } else { "BROKEN" });
+    for Property { name, trials, finding, holds } in &verification.properties {
+        text += &format!("{:<6}{trials:>5}  {name}", if *holds { "holds" } else { "BROKEN" });
         text += &if finding.is_empty() { "\n".to_owned() } else { format!(": {finding}\n") };
     }
     let shown = 8;

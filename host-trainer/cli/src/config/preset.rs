@@ -6,7 +6,7 @@ use pocketsplat_capture::dataset::Background;
 use pocketsplat_trainer::encode::Encoding;
 use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::config::Backbone;
-use pocketsplat_trainer::train::module::{Modules, Rdo};
+use pocketsplat_trainer::train::modules::{Modules, Rdo};
 
 use serde::{Deserialize, Serialize};
 

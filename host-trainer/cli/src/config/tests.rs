@@ -1,5 +1,5 @@
 use super::*;
-use pocketsplat_trainer::train::module::pruning;
+use pocketsplat_trainer::train::modules::pruning;
 
 #[test]
 fn a_written_configuration_reads_back_to_the_last_bit() {
@@ -30,7 +30,7 @@ fn a_written_configuration_reads_back_to_the_last_bit() {
         config.train.seed = u64::from(i).pow(7) % i64::MAX as u64;
         assert_eq!(RunConfig::parse(&config.to_toml().unwrap()).unwrap(), config, "{i}");
     }
-    config.train.modules = pocketsplat_trainer::train::module::Modules::default();
+    config.train.modules = pocketsplat_trainer::train::modules::Modules::default();
     config.capture.max_resolution = None;
     let text = config.to_toml().unwrap();
     assert!(text.contains("unset = [\"capture.max_resolution\", \"train.modules.rdo\"]"), "{text}");

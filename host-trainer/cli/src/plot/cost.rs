@@ -17,8 +17,8 @@ const LEAST_BELOW_DB: f64 = 1.0;
 /// One way to train or draw a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct CostPoint {
-    /// What was changed; points of one knob share a marker.
-    pub knob: String,
+    /// What was changed; points of one parameter share a marker.
+    pub parameter: String,
     /// What it was changed to.
     pub setting: String,
     /// What it costs, in the unit of its panel.
@@ -40,22 +40,22 @@ pub(crate) struct CostPanel {
     pub points: Vec<CostPoint>,
 }
 
-/// PSNR over cost, a panel for each kind of it, a marker for each knob, and a line along the Pareto front with the names of its
+/// PSNR over cost, a panel for each kind of it, a marker for each parameter, and a line along the Pareto front with the names of its
 /// points, as an SVG.
 pub(crate) fn cost_svg(panels: &[CostPanel]) -> Result<String> {
-    let mut knobs: Vec<&str> = Vec::new();
+    let mut parameters: Vec<&str> = Vec::new();
     for point in panels.iter().flat_map(|panel| &panel.points) {
-        if !knobs.contains(&point.knob.as_str()) {
-            knobs.push(&point.knob);
+        if !parameters.contains(&point.parameter.as_str()) {
+            parameters.push(&point.parameter);
         }
     }
     chart::figure(panels.len(), |areas, figure| {
         areas.iter().zip(panels).try_for_each(|(area, panel)| {
             let (least, most) = extremes(panel.points.iter().map(|point| point.cost));
             if least > 0.0 && most > WIDE * least {
-                draw(area, figure, panel, &knobs, (least / 1.15..1.15 * most).log_scale().base(2.0))
+                draw(area, figure, panel, &parameters, (least / 1.15..1.15 * most).log_scale().base(2.0))
             } else {
-                draw(area, figure, panel, &knobs, 0.0..1.1 * most.max(1e-6))
+                draw(area, figure, panel, &parameters, 0.0..1.1 * most.max(1e-6))
             }
         })
     })
@@ -73,7 +73,7 @@ fn shown(points: &[CostPoint]) -> std::ops::Range<f64> {
     chart::padded(points.iter().map(|point| point.psnr_db).filter(|psnr_db| !(*psnr_db < floor)))
 }
 
-fn draw<X>(panel_area: &Area<'_>, figure: &Area<'_>, panel: &CostPanel, knobs: &[&str], costs: X) -> Result<()>
+fn draw<X>(panel_area: &Area<'_>, figure: &Area<'_>, panel: &CostPanel, parameters: &[&str], costs: X) -> Result<()>
 where
     X: AsRangedCoord<Value = f64>,
     X::CoordDescType: Ranged<ValueType = f64> + ValueFormatter<f64>,
@@ -94,7 +94,7 @@ where
     front.sort_by(|a, b| points[*a].cost.total_cmp(&points[*b].cost));
     let line = front.iter().map(|i| (points[*i].cost, points[*i].psnr_db));
     chart.draw_series(LineSeries::new(line, chart::FRONT.stroke_width(1)))?;
-    let series = |point: &CostPoint| knobs.iter().position(|knob| *knob == point.knob).unwrap_or(0);
+    let series = |point: &CostPoint| parameters.iter().position(|parameter| *parameter == point.parameter).unwrap_or(0);
     let at: Vec<(i32, i32)> =
         points.iter().map(|point| chart.backend_coord(&(point.cost, point.psnr_db.max(floor)))).collect();
     // Those of the front last, on top.
@@ -109,7 +109,7 @@ where
     let below = points.iter().any(|point| point.psnr_db < floor);
     let notes = [(true, "none is better and cheaper"), (below, "↓ lies below the chart")];
     let notes = notes.into_iter().filter(|(is_shown, _)| *is_shown).map(|(_, note)| (Sign::Front, note));
-    let entries = knobs.iter().enumerate().map(|(i, knob)| (Sign::Marker(i), *knob));
+    let entries = parameters.iter().enumerate().map(|(i, parameter)| (Sign::Marker(i), *parameter));
     chart::legend(&for_legend, entries.chain(notes))
 }
 
@@ -118,10 +118,10 @@ mod tests {
     use super::{CostPanel, CostPoint, cost_svg};
 
     #[test]
-    fn every_kind_of_cost_and_every_knob_is_named() {
-        let point = |knob: &str, cost, psnr_db| CostPoint {
-            knob: knob.to_owned(),
-            setting: format!("{knob} so"),
+    fn every_kind_of_cost_and_every_parameter_is_named() {
+        let point = |parameter: &str, cost, psnr_db| CostPoint {
+            parameter: parameter.to_owned(),
+            setting: format!("{parameter} so"),
             cost,
             psnr_db,
             on_front: psnr_db > 29.0,

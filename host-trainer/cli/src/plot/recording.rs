@@ -105,7 +105,7 @@ fn settings(mut reader: csv::Reader<&[u8]>) -> Result<Vec<CostPanel>> {
     if records.is_empty() {
         bail!("it has no row to draw");
     }
-    let [knob, setting, psnr] = [place("knob")?, place("setting")?, place("PSNR")?];
+    let [parameter, setting, psnr] = [place("knob")?, place("setting")?, place("PSNR")?];
     let panel = |machine: &str| {
         let is_host = place(&format!("{machine} instructions")).is_err();
         let (column, scale) =
@@ -115,8 +115,8 @@ fn settings(mut reader: csv::Reader<&[u8]>) -> Result<Vec<CostPanel>> {
         for record in records.iter().filter(|record| !record[column].is_empty()) {
             let number = |i: usize| record[i].parse::<f64>().with_context(|| format!("`{}` is no number", &record[i]));
             let (cost, psnr_db) = (scale * number(column)?, number(psnr)?);
-            let (knob, setting) = (record[knob].to_owned(), record[setting].to_owned());
-            points.push(CostPoint { knob, setting, cost, psnr_db, on_front: &record[front] == "true" });
+            let (parameter, setting) = (record[parameter].to_owned(), record[setting].to_owned());
+            points.push(CostPoint { parameter, setting, cost, psnr_db, on_front: &record[front] == "true" });
         }
         let unit = if is_host { "milliseconds" } else { "millions of instructions" };
         Ok(CostPanel { title: format!("Quality over time: {machine}"), unit: unit.to_owned(), points })
@@ -129,7 +129,7 @@ fn runs(rows: &[RunRow]) -> Vec<CostPanel> {
     let panel = |title: &str, unit: &str, cost: fn(&RunRow) -> f64| {
         let front = on_front(&rows.iter().map(|row| (cost(row), row.psnr_db)).collect::<Vec<_>>());
         let point = |(row, on_front): (&RunRow, bool)| CostPoint {
-            knob: knob_of(&row.setting),
+            parameter: parameter_of(&row.setting),
             setting: row.setting.clone(),
             cost: cost(row),
             psnr_db: row.psnr_db,
@@ -145,7 +145,7 @@ fn runs(rows: &[RunRow]) -> Vec<CostPanel> {
 }
 
 /// The key that a run's setting begins with; the first run has none.
-fn knob_of(setting: &str) -> String {
+fn parameter_of(setting: &str) -> String {
     match setting.split_once([' ', ',']) {
         Some((key, _)) if key != "as" => key.to_owned(),
         _ => setting.to_owned(),

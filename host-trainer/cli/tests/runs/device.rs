@@ -19,7 +19,7 @@ fn a_bundle_for_a_device_fits_it_and_passes_its_verification() {
         bundle.plan(&frame.in_bytes(ram)).is_ok_and(|plan| plan.n_tiers() == bundle.n_tiers())
     };
     let lowest = (1..).find(|&ram| all_of(&bundle, 64 * ram)).unwrap() * 64;
-    // `verify` holds what it can draw to the laws, and does not hide that it is a part.
+    // `verify` holds what it can draw to the properties, and does not hide that it is a part.
     let verified = |ram: usize| {
         let run = pocketsplat().arg("verify").arg(&free).args(["--ram", &ram.to_string()]).output().unwrap();
         String::from_utf8(run.stdout).unwrap()

@@ -5,7 +5,7 @@ use half::f16;
 use super::WriteError;
 use super::stream::SlotList;
 use super::table::TableDraft;
-use pocketsplat_kernels::ops::perturb;
+use pocketsplat_kernels::ops::rate::perturb;
 use pocketsplat_kernels::scene::{Head, Heads};
 
 /// Coded matrices are worth their decoding if the section is at most so many times as long as raw halves.

@@ -10,7 +10,7 @@ use pocketsplat_core::entropy::{Children, FREQUENCY_TOTAL, N_TRIE_CONTEXTS, Slot
 use super::WriteError;
 use super::frequencies::frequencies;
 use super::stream::{Part, SlotList};
-use pocketsplat_kernels::ops::file_order;
+use pocketsplat_kernels::ops::rate::file_order;
 
 /// The bit of the root in a set of levels.
 const TOP_LEVEL: u64 = 1 << 63;

@@ -38,7 +38,7 @@ pub use layout::{CodedScene, Written};
 pub use load::{LoadError, load};
 pub use mean_steps::mean_steps;
 pub use order::check_pruning_rates;
-pub use pocketsplat_kernels::ops::file_order::PRUNING_RATES;
+pub use pocketsplat_kernels::ops::rate::file_order::PRUNING_RATES;
 pub use quantise::check_steps;
 pub use size::{SizePart, SizeReport};
 pub use stream::PartBits;

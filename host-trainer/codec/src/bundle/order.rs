@@ -6,7 +6,7 @@ use pocketsplat_core::bundle::MAX_TIERS;
 
 use super::WriteError;
 use super::lattice::LatticeFrame;
-use pocketsplat_kernels::ops::file_order;
+use pocketsplat_kernels::ops::rate::file_order;
 use pocketsplat_kernels::scene::Scene;
 
 /// The anchors of a scene as a bundle holds them.

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::WriteError;
 use super::channels::{ChannelName, ContextWork};
 use super::order::Placement;
-use pocketsplat_kernels::ops::perturb;
+use pocketsplat_kernels::ops::rate::perturb;
 use pocketsplat_kernels::scene::{ModelShape, QuantisationSteps, Scene};
 
 /// Where an anchor's steps come from.

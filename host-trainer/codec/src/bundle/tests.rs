@@ -51,7 +51,7 @@ fn random_scene(shape: ModelShape, n_anchors: usize, seed: u64) -> Scene<f32> {
         offsets: (0..n_anchors * 3 * shape.n_offsets).map(|_| bell(1.0)).collect(),
         mask_logits: (0..n_anchors * shape.n_offsets).map(|_| -4.2 + bell(1.0)).collect(),
         prune_rank: Vec::new(),
-        rarity: Vec::new(),
+        view_weights: Vec::new(),
     };
     let mut heads = Heads::filled(&shape, 0.0);
     for head in heads.each_mut() {

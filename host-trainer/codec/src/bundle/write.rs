@@ -14,7 +14,7 @@ use super::quantise::{StepSource, SymbolRows, check_lengths, check_steps, quanti
 use super::table::TableSet;
 use super::{BundleInfo, WriteError, directory, heads};
 use pocketsplat_kernels::integer_model;
-use pocketsplat_kernels::ops::file_order::{CHUNK_ANCHORS, PRUNING_RATES};
+use pocketsplat_kernels::ops::rate::file_order::{CHUNK_ANCHORS, PRUNING_RATES};
 use pocketsplat_kernels::scene::{QuantisationSteps, Scene};
 
 /// What gives the channels their steps, and their symbols their frequencies.

@@ -3,8 +3,8 @@
 use pocketsplat_core::bundle::{STRIPS, TierMeasures};
 
 use pocketsplat_capture::camera::Camera;
-use pocketsplat_kernels::ops::project::{ALPHA_CUTOFF, Footprint, Splat};
-use pocketsplat_kernels::ops::tiles::TILE_PX;
+use pocketsplat_kernels::ops::image::project::{ALPHA_CUTOFF, Footprint, Splat};
+use pocketsplat_kernels::ops::image::tiles::TILE_PX;
 use pocketsplat_kernels::scene::ModelShape;
 use pocketsplat_kernels::step::Block;
 
@@ -196,7 +196,7 @@ fn pixels_inside(splat: &Splat<f32>, footprint: &Footprint<f32>, size_px: [u32; 
 #[cfg(test)]
 mod tests {
     use super::pixels_inside;
-    use pocketsplat_kernels::ops::project::{Footprint, Splat};
+    use pocketsplat_kernels::ops::image::project::{Footprint, Splat};
 
     #[test]
     fn pixels_inside_are_those_the_cutoff_leaves() {

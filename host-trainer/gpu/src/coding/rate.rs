@@ -5,7 +5,7 @@ use pocketsplat_core::context::N_GROUPS;
 use super::super::scene::DeviceScene;
 use super::super::{Asked, Gpu};
 use super::GpuCoding;
-use pocketsplat_kernels::ops::grid_bits;
+use pocketsplat_kernels::ops::rate::grid_bits;
 use pocketsplat_kernels::step::coding::{RateReport, RateTerms};
 
 /// Weights of a step's rate terms; see `step/context.rs`.

@@ -95,7 +95,7 @@ impl Adam {
 
     /// Moves values of all anchors by the gradients of those that the view showed; the others have none, and their moments decay.
     ///
-    /// * `parameters`: `[n, width]`. * `row_of_anchor`: `[n]`, as [`Compact`](super::compact::Compact) has it.
+    /// * `parameters`: `[n, width]`. * `row_of_anchor`: `[n]`, as [`Compact`](crate::ops::primitives::compact::Compact) has it.
     /// * `gradient`: `[n_visible, width]`.
     pub fn update_rows(
         &self,
@@ -116,7 +116,7 @@ impl Adam {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ops::compact::NO_ROW;
+    use crate::ops::primitives::compact::NO_ROW;
     use crate::parity::{Bound, SIZES, assert_close, gpu};
     use pocketsplat_kernels::finite_difference::random;
 

@@ -1,15 +1,15 @@
 //! Terms of the loss beside the image's: volumes, and what modules add.
 
 use super::super::image::FIRST_FREE_TOTAL;
-use super::super::ops::gather::Gather;
-use super::super::ops::normality::Normality;
-use super::super::ops::opacity_target::OpacityTarget;
-use super::super::ops::volume::Volume;
+use super::super::ops::loss::normality::Normality;
+use super::super::ops::loss::opacity_target::OpacityTarget;
+use super::super::ops::loss::volume::Volume;
+use super::super::ops::primitives::gather::Gather;
 use super::super::scene::{DeviceScene, FEATURES};
 use super::super::{Buffer, Commands, Gpu, GpuError};
 use super::{GpuAnchors, GpuImage};
-use pocketsplat_kernels::ops::normality::Weights;
-use pocketsplat_kernels::ops::opacity_target;
+use pocketsplat_kernels::ops::loss::normality::Weights;
+use pocketsplat_kernels::ops::loss::opacity_target;
 use pocketsplat_kernels::scene::ModelShape;
 use pocketsplat_kernels::step::{DeviceTerms, Loss};
 

@@ -38,7 +38,7 @@ pub struct ContextNetwork<R> {
     pub mlp: Head<R>,
     /// Features that a feature's mean follows at most; 0 for none.
     pub n_taps: usize,
-    /// Weights of the min(c, `n_taps`) features just before each feature c, from c = 0 on; see [`crate::ops::taps`].
+    /// Weights of the min(c, `n_taps`) features just before each feature c, from c = 0 on; see [`crate::ops::rate::taps`].
     pub taps: Vec<R>,
 }
 

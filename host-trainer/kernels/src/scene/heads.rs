@@ -101,7 +101,7 @@ pub struct Heads<R> {
     /// [`OutputLayout::Colour`].
     pub colour: Head<R>,
     /// From `[feature F, colour 3]` of a Gaussian to what is added to its colour, where the shape has it: see
-    /// [`crate::ops::detail`].
+    /// [`crate::ops::heads::detail`].
     pub detail: Option<Head<R>>,
 }
 

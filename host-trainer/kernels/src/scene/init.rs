@@ -53,7 +53,7 @@ pub fn initial_scene(shape: ModelShape, voxel_size: f64, points: &[DVec3], rng: 
         offsets: vec![0.0; n * shape.n_offsets * 3],
         mask_logits: vec![f32::real(INITIAL_MASK_LOGIT); n * shape.n_offsets],
         prune_rank: Vec::new(),
-        rarity: Vec::new(),
+        view_weights: Vec::new(),
     };
     let mut heads = Heads::filled(&shape, 0.0f32);
     // A stream of its own: with a detail head or without, everything else begins and grows alike.

@@ -139,7 +139,7 @@ pub struct Anchors<R> {
     /// anchors are left out.
     pub prune_rank: Vec<f32>,
     /// `[n_anchors]`, or empty where nothing has counted: how many times as many training views show the mean anchor as this one.
-    pub rarity: Vec<f32>,
+    pub view_weights: Vec<f32>,
 }
 
 impl<R> Anchors<R> {
@@ -220,7 +220,7 @@ impl<R: Real> Scene<R> {
                 offsets: all(&self.anchors.offsets),
                 mask_logits: all(&self.anchors.mask_logits),
                 prune_rank: self.anchors.prune_rank.clone(),
-                rarity: self.anchors.rarity.clone(),
+                view_weights: self.anchors.view_weights.clone(),
             },
             heads: self.heads.map(head),
             context: self.context.as_ref().map(|context| ContextModel {

@@ -4,10 +4,13 @@ use super::buffer::refill;
 use super::coded::{Coded, Network, Weights};
 use super::coding::Coding;
 use super::parents::Parents;
-use crate::ops::neural_gaussians::{Gaussian, HeadOutputs, Source};
-use crate::ops::project::{Footprint, Splat};
+use crate::ops::Pinhole;
+use crate::ops::heads::neural_gaussians::{Gaussian, HeadOutputs, Source};
+use crate::ops::heads::{detail, head, head_input, neural_gaussians};
+use crate::ops::image::project;
+use crate::ops::image::project::{Footprint, Splat};
+use crate::ops::loss::volume;
 use crate::ops::simd::Level;
-use crate::ops::{Pinhole, detail, head, head_input, neural_gaussians, project, volume};
 use crate::real::Real;
 use crate::scene::{Anchors, ContextModel, Head, Heads, ModelShape, Scene};
 

@@ -7,9 +7,10 @@ use super::buffer::refill;
 use super::coding::{Coding, IntegerModel};
 use super::parents::{Parents, give_symbols, give_values};
 use super::sample;
-use crate::ops::noise::Stream;
+use crate::ops::heads::{head, mask};
+use crate::ops::rate::noise::Stream;
+use crate::ops::rate::{adaptive_step, anchor_bits, hash_grid, perturb};
 use crate::ops::simd::Level;
-use crate::ops::{adaptive_step, anchor_bits, hash_grid, head, mask, perturb};
 use crate::real::Real;
 use crate::scene::{ContextModel, ContextNetwork, Head, ModelShape, Scene};
 
@@ -138,7 +139,7 @@ impl<R: Real> Coded<R> {
                 self.perturb(level, &scene.shape, Some(*stream), anchors, values);
             }
             (Coding::Context { stream, rate, exact }, Some(network)) => {
-                let is_sampled = |anchor: u32| sample::holds(*stream, anchor, rate.sample, &scene.anchors.rarity);
+                let is_sampled = |anchor: u32| sample::holds(*stream, anchor, rate.sample, &scene.anchors.view_weights);
                 self.sampled.extend((0u32..).zip(anchors).filter_map(|(row, a)| is_sampled(*a).then_some(row)));
                 self.predict(scene, network, parents, anchors);
                 if let Some(exact) = exact {

@@ -2,7 +2,7 @@
 
 use pocketsplat_core::context::Context;
 
-use crate::ops::noise::Stream;
+use crate::ops::rate::noise::Stream;
 use crate::scene::ContextNetwork;
 
 /// What a step does to the values of anchors.
@@ -74,7 +74,7 @@ pub struct IntegerModel<'a, R> {
 pub struct RateTerms {
     /// λ: weight of the mean bits of a value.
     pub lambda: f64,
-    /// Share of the visible anchors that the mean is taken over, times the [rarity](crate::scene::Anchors::rarity) of each.
+    /// Share of the visible anchors that the mean is taken over, times the [weight](crate::scene::Anchors::view_weights) of each.
     pub sample: f64,
     /// Weight of the mean opening of the visible anchors' masks.
     pub mask: f64,

@@ -6,8 +6,8 @@ use rayon::prelude::*;
 use super::coded::steps_of;
 use super::coding::{RateReport, RateTerms};
 use super::{Coding, Network, Weights, Workspace};
-use crate::ops::hash_grid::Part;
-use crate::ops::{grid_bits, hash_grid};
+use crate::ops::rate::hash_grid::Part;
+use crate::ops::rate::{grid_bits, hash_grid};
 use crate::real::Real;
 use crate::scene::{ContextModel, ContextNetwork, Head, Scene};
 

@@ -6,11 +6,12 @@ use super::buffer::refill;
 use super::fault::DeviceFault;
 use super::target::clear_masked;
 use super::{ImagePair, LossWeights, TargetView};
-use crate::ops::project::{Footprint, Splat};
-use crate::ops::rasterise::TiledImage;
+use crate::ops::image::project::{Footprint, Splat};
+use crate::ops::image::rasterise::TiledImage;
+use crate::ops::image::tiles::TileLists;
+use crate::ops::image::{rasterise, tiles};
+use crate::ops::loss::{l1, ssim};
 use crate::ops::simd::Level;
-use crate::ops::tiles::TileLists;
-use crate::ops::{l1, rasterise, ssim, tiles};
 use crate::real::Real;
 
 /// What the comparison with the photograph found.

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Block;
 use super::coding::Phase;
-use crate::ops::noise::Stream;
+use crate::ops::rate::noise::Stream;
 use crate::ops::simd::Level;
 use crate::real::Real;
 use crate::scene::{ModelShape, Scene};
@@ -90,11 +90,11 @@ pub struct ImagePair<'a, R> {
 /// Terms that a device computes itself; a weight of 0 is none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DeviceTerms {
-    /// Weight of [`high_pass`](crate::ops::high_pass).
+    /// Weight of [`high_pass`](crate::ops::loss::high_pass).
     pub high_pass: f64,
-    /// Opacity that a Gaussian should have on average, and the weight of [`opacity_target`](crate::ops::opacity_target).
+    /// Opacity that a Gaussian should have on average, and the weight of [`opacity_target`](crate::ops::loss::opacity_target).
     pub opacity_target: [f64; 2],
-    /// Divergence and spread of [`normality`](crate::ops::normality) of the raw features.
+    /// Divergence and spread of [`normality`](crate::ops::loss::normality) of the raw features.
     pub normality: [f64; 2],
 }
 

@@ -22,10 +22,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 use pocketsplat_core::context::N_LEVELS;
 use rayon::prelude::*;
 
-use crate::ops::project::{Footprint, Splat};
-use crate::ops::rasterise::TiledImage;
+use crate::ops::Pinhole;
+use crate::ops::image::project::{Footprint, Splat};
+use crate::ops::image::rasterise::TiledImage;
+use crate::ops::image::{prefilter, rasterise, tiles};
+use crate::ops::loss::volume;
 use crate::ops::simd::Level;
-use crate::ops::{Pinhole, prefilter, rasterise, tiles, volume};
 use crate::real::Real;
 use crate::scene::{Head, Heads, ModelShape, Scene};
 pub use block::Block;

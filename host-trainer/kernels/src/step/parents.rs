@@ -6,8 +6,8 @@ use pocketsplat_core::context::{
 };
 use rayon::prelude::*;
 
-use crate::ops::file_order::{self, CHUNK_ANCHORS, PRUNING_RATES};
-use crate::ops::perturb;
+use crate::ops::rate::file_order::{self, CHUNK_ANCHORS, PRUNING_RATES};
+use crate::ops::rate::perturb;
 use crate::real::Real;
 use crate::scene::{Anchors, ModelShape, Scene};
 

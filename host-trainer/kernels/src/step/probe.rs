@@ -2,9 +2,10 @@
 
 use super::target::clear_masked;
 use super::{Coding, DrawnView, LossWeights, TargetView, Workspace};
-use crate::ops::noise::Stream;
-use crate::ops::rasterise::TiledImage;
-use crate::ops::{l1, rasterise, ssim};
+use crate::ops::image::rasterise;
+use crate::ops::image::rasterise::TiledImage;
+use crate::ops::loss::{l1, ssim};
+use crate::ops::rate::noise::Stream;
 use crate::real::Real;
 use crate::scene::Scene;
 

@@ -20,7 +20,7 @@ pub struct Trained<'a, R> {
     pub heads: &'a [Heads<R>; 2],
     /// Of the context model, where there is one.
     pub context: Option<ContextMoments<'a, R>>,
-    /// `[n]` sums of opacities, and `[n, K]` sums of gradients on the screen; see `train::statistics`.
+    /// `[n]` sums of opacities, and `[n, K]` sums of gradients on the screen; see `train::density::statistics`.
     pub sums: [&'a [R]; 2],
     /// `[n]` views that saw an anchor, and `[n, K]` those that drew an offset.
     pub counts: [&'a [u32]; 2],

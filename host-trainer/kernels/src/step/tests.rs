@@ -11,7 +11,7 @@ use super::example::{camera, flatten, gradients, scene, shapes, step_with, truth
 use super::*;
 use crate::finite_difference::{assert_piecewise_gradient, random};
 use crate::integer_model::{parse, rounded, section};
-use crate::ops::noise::Stream;
+use crate::ops::rate::noise::Stream;
 use crate::scene::init::initial_scene;
 use crate::scene::{ContextModel, ContextNetwork};
 
@@ -258,8 +258,11 @@ fn masks_answer_for_their_anchors() {
     let weight = 0.3 / (rate_report.n_sampled * scene.shape.values_per_anchor()) as f64;
     let mut sum = 0.0;
     for (with, without) in with.chunks(k).zip(without.chunks(k)) {
-        let shares: Vec<f64> =
-            with.iter().zip(without).map(|((logit, a), (_, b))| (a - b) / crate::ops::mask::slope(*logit)).collect();
+        let shares: Vec<f64> = with
+            .iter()
+            .zip(without)
+            .map(|((logit, a), (_, b))| (a - b) / crate::ops::heads::mask::slope(*logit))
+            .collect();
         assert!(shares.iter().all(|share| *share > 0.0 && (share / shares[0] - 1.0).abs() < 1e-9), "{shares:?}");
         sum += shares.iter().sum::<f64>();
     }

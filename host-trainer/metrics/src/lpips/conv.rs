@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::feature_map::FeatureMap;
-use pocketsplat_kernels::ops::matmul::{Matrix, multiply};
+use pocketsplat_kernels::ops::heads::matmul::{Matrix, multiply};
 
 /// Pixels of a tile: their patches fit the caches, and the product is large enough to be worth packing the weights.
 const TILE_PX: usize = 256;

@@ -1,4 +1,4 @@
-//! A network as deep as VGG16 and much narrower, for laws that hold whatever the weights are.
+//! A network as deep as VGG16 and much narrower, for properties that hold whatever the weights are.
 
 use super::conv::Conv3x3;
 use super::{InputRange, Lpips, Stage};

@@ -37,11 +37,11 @@ pub(super) fn stages(bytes: &[u8], path: &Path) -> Result<Vec<Stage>, LpipsError
 }
 
 /// What the values of a tensor have to be, in words and as a test.
-type Law = (&'static str, fn(f32) -> bool);
+type Condition = (&'static str, fn(f32) -> bool);
 
-const FINITE: Law = ("a finite number", f32::is_finite);
+const FINITE: Condition = ("a finite number", f32::is_finite);
 /// The heads are trained under this bound; without it a difference could count as likeness.
-const NOT_NEGATIVE: Law = ("a finite number of at least 0", |value| value.is_finite() && value >= 0.0);
+const NOT_NEGATIVE: Condition = ("a finite number of at least 0", |value| value.is_finite() && value >= 0.0);
 
 struct File<'a> {
     tensors: SafeTensors<'a>,
@@ -50,7 +50,7 @@ struct File<'a> {
 
 impl File<'_> {
     /// The values of the tensor `name`, widened.
-    fn values(&self, name: &str, needed: &[usize], (law, holds): Law) -> Result<Vec<f32>, LpipsError> {
+    fn values(&self, name: &str, needed: &[usize], (condition, holds): Condition) -> Result<Vec<f32>, LpipsError> {
         let (path, name) = (|| self.path.to_owned(), || name.to_owned());
         let Ok(tensor) = self.tensors.tensor(&name()) else {
             return Err(LpipsError::Missing { path: path(), name: name(), needed: needed.to_vec() });
@@ -69,7 +69,7 @@ impl File<'_> {
             None => Ok(values),
             Some(index) => {
                 let found = values[index];
-                Err(LpipsError::Value { path: path(), name: name(), index, found, needed: law })
+                Err(LpipsError::Value { path: path(), name: name(), index, found, needed: condition })
             }
         }
     }

@@ -6,7 +6,7 @@ use pocketsplat_core::arithmetic::{
 
 /// Names each choice once, and calls a generic function for it.
 macro_rules! choices {
-    ($($choice:ident, $knob:literal, $name:literal, $type:ty, $doc:literal;)*) => {
+    ($($choice:ident, $parameter:literal, $name:literal, $type:ty, $doc:literal;)*) => {
         /// What a frame is computed with.
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
         pub enum ArithmeticChoice {
@@ -20,11 +20,11 @@ macro_rules! choices {
             /// All but the reference.
             pub const TURNED: &[Self] = &[$(Self::$choice),*];
 
-            /// The knob that it turns, and how far.
+            /// The parameter that it varies, and to what.
             pub fn name(self) -> (&'static str, &'static str) {
                 match self {
                     Self::Reference => ("arithmetic", "reference"),
-                    $(Self::$choice => ($knob, $name),)*
+                    $(Self::$choice => ($parameter, $name),)*
                 }
             }
 

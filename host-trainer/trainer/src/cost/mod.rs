@@ -15,7 +15,7 @@ use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport
 pub use arithmetic::{ArithmeticChoice, WithArithmetic};
 pub use counter::{CountError, Counter, MOST_VIEWS};
 pub use front::on_front;
-pub use setting::{Setting, knobs, quality_grid};
+pub use setting::{Setting, parameters, quality_grid};
 
 use crate::device::Processor;
 use pocketsplat_capture::dataset::{Image, Photograph};

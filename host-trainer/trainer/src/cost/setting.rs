@@ -1,4 +1,4 @@
-//! The knobs of decoder-core, each by itself, and those of quality together.
+//! The parameters of decoder-core, each by itself, and those of quality together.
 
 use super::ArithmeticChoice;
 use pocketsplat_core::{Budget, Bundle, Quality, Residency, Strips};
@@ -6,9 +6,9 @@ use pocketsplat_core::{Budget, Bundle, Quality, Residency, Strips};
 /// One way to draw a bundle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
-    /// Which knob is turned; `quality` for several at once, `level` for those that have a name.
-    pub knob: &'static str,
-    /// How far, in words.
+    /// Which parameter varies; `quality` for several at once, `level` for those that have a name.
+    pub parameter: &'static str,
+    /// Its value, in words.
     pub name: String,
     /// Accuracy.
     pub quality: Quality,
@@ -28,7 +28,7 @@ impl Setting {
     /// As trained, and as the budget plans it.
     pub fn exact() -> Self {
         Self {
-            knob: "level",
+            parameter: "level",
             name: "exact".to_owned(),
             quality: Quality::EXACT,
             tiers: u8::MAX,
@@ -39,7 +39,7 @@ impl Setting {
         }
     }
 
-    /// `budget` with the knobs turned.
+    /// `budget` with these parameters.
     pub fn of(&self, budget: Budget) -> Budget {
         budget.with_tiers(self.tiers).with_quality(self.quality).with_residency(self.residency).with_strips(self.strips)
     }
@@ -56,45 +56,45 @@ fn pruning_rate(bundle: &Bundle<'_>, tiers: u8) -> Option<f64> {
     Some(1.0 - f64::from(tier.n_anchors) / f64::from(bundle.n_anchors().max(1)))
 }
 
-/// Each knob by itself, [exact](Setting::exact) first.
-pub fn knobs(bundle: &Bundle<'_>) -> Vec<Setting> {
+/// Each parameter by itself, [exact](Setting::exact) first.
+pub fn parameters(bundle: &Bundle<'_>) -> Vec<Setting> {
     let exact = Setting::exact();
     let mut all = vec![exact.clone()];
     for (name, quality) in [("balanced", Quality::BALANCED), ("draft", Quality::DRAFT)] {
-        all.push(Setting { knob: "level", name: name.to_owned(), quality, ..exact.clone() });
+        all.push(Setting { parameter: "level", name: name.to_owned(), quality, ..exact.clone() });
     }
     for alpha_cut in ALPHA_CUTS {
         let quality = Quality { alpha_cut, ..Quality::EXACT };
-        all.push(Setting { knob: "alpha cut", name: format!("{alpha_cut}/255"), quality, ..exact.clone() });
+        all.push(Setting { parameter: "alpha cut", name: format!("{alpha_cut}/255"), quality, ..exact.clone() });
     }
     for transmittance_stop in TRANSMITTANCE_STOPS {
         let quality = Quality { transmittance_stop, ..Quality::EXACT };
         let name = format!("{}", f64::from(transmittance_stop) / 1e4);
-        all.push(Setting { knob: "transmittance stop", name, quality, ..exact.clone() });
+        all.push(Setting { parameter: "transmittance stop", name, quality, ..exact.clone() });
     }
     if bundle.header().detail_hidden > 0 {
         let quality = Quality { detail: false, ..Quality::EXACT };
-        all.push(Setting { knob: "detail head", name: "off".to_owned(), quality, ..exact.clone() });
+        all.push(Setting { parameter: "detail head", name: "off".to_owned(), quality, ..exact.clone() });
     }
     for tiers in (1..bundle.n_tiers()).rev() {
         let Some(pruning_rate) = pruning_rate(bundle, tiers) else { continue };
         let name = format!("{:.0} %", 100.0 * pruning_rate);
-        all.push(Setting { knob: "pruning rate", name, tiers, pruning_rate, ..exact.clone() });
+        all.push(Setting { parameter: "pruning rate", name, tiers, pruning_rate, ..exact.clone() });
     }
     let baked = bundle.n_gaussians(0).map(|_| ("baked", Residency::Baked));
     for (name, residency) in
         baked.into_iter().chain([("resident", Residency::Resident), ("streamed", Residency::Streamed)])
     {
         let strips = Strips::Exactly(1);
-        all.push(Setting { knob: "residency", name: name.to_owned(), residency, strips, ..exact.clone() });
+        all.push(Setting { parameter: "residency", name: name.to_owned(), residency, strips, ..exact.clone() });
     }
     for n_strips in [2, 4, 8] {
         let strips = Strips::Exactly(n_strips);
-        all.push(Setting { knob: "strips", name: n_strips.to_string(), strips, ..exact.clone() });
+        all.push(Setting { parameter: "strips", name: n_strips.to_string(), strips, ..exact.clone() });
     }
     for &arithmetic in ArithmeticChoice::TURNED {
-        let (knob, name) = arithmetic.name();
-        all.push(Setting { knob, name: name.to_owned(), arithmetic, ..exact.clone() });
+        let (parameter, name) = arithmetic.name();
+        all.push(Setting { parameter, name: name.to_owned(), arithmetic, ..exact.clone() });
     }
     all
 }
@@ -115,7 +115,7 @@ pub fn quality_grid(bundle: &Bundle<'_>) -> Vec<Setting> {
                         if detail { "" } else { ", no detail" }
                     );
                     let quality = Quality { alpha_cut, transmittance_stop, detail };
-                    all.push(Setting { knob: "quality", name, quality, tiers, pruning_rate, ..Setting::exact() });
+                    all.push(Setting { parameter: "quality", name, quality, tiers, pruning_rate, ..Setting::exact() });
                 }
             }
         }

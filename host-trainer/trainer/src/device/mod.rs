@@ -1,7 +1,7 @@
 //! Budget in, model out: the scene that a device affords, chosen before anything is trained.
 //!
 //! [`choose`] goes by what scenes take on average; training measures what the
-//! scene [takes](crate::train::gauge::Gauge) and steers by it; [`Encoding::encode`](crate::encode::Encoding::encode) then leaves out
+//! scene [takes](crate::train::limits::LimitProbe) and steers by it; [`Encoding::encode`](crate::encode::Encoding::encode) then leaves out
 //! the least important anchors until the bundle keeps the limits, so that these hold whatever was trained.
 
 mod choice;

@@ -10,7 +10,7 @@ use super::{Effect, PilotFigures, Price};
 use crate::device::{Limits, Processor};
 use crate::encode::{CoderChoice, EncodeError, Encoding};
 use crate::train::config::{Backbone, MIN_VIEWS_TO_HOLD_OUT};
-use crate::train::module::Modules;
+use crate::train::modules::Modules;
 use crate::train::{TrainConfig, TrainError, Trainer};
 use pocketsplat_capture::dataset::{Capture, Image, PhotographError, View};
 use pocketsplat_codec::render::decoder::image_of;
@@ -155,7 +155,7 @@ pub fn measure(
                 return Err(PilotError::Interrupted);
             }
             trainer.advance()?;
-            log.step(trainer.iteration);
+            log.step(trainer.iteration());
         }
         let fitted = encoding.encode(trainer.finish()?, &capture.reduced, &[])?;
         let worth = worth(&fitted.written.bytes, capture, device)?;

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{EncodeError, Encoding};
-use crate::train::finish::Finished;
+use crate::train::limits::Finished;
 use pocketsplat_codec::bundle::{BundleInfo, ChannelCoding, CodedScene, WriteError, WriteOptions, code, mean_steps};
 use pocketsplat_codec::render::decoder::core_image;
 use pocketsplat_metrics::psnr_db_masked;

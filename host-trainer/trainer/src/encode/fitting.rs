@@ -7,11 +7,10 @@ use pocketsplat_core::{Bundle, DecodeError, Plan};
 use pocketsplat_instructions::level;
 
 use super::choice::{CoderChoice, judged_psnr_db};
-use super::scale::{DevicePlans, frame_of, level_needs, measured_cameras, most_instructions};
+use super::sizes::{DevicePlans, frame_of, level_needs, measured_cameras, most_instructions};
 use super::{EncodeError, Encoding};
 use crate::device::Limits;
-use crate::train::finish::Finished;
-use crate::train::steering::Search;
+use crate::train::limits::{Finished, Search};
 use pocketsplat_codec::bundle::{CodedScene, WriteError, Written};
 use pocketsplat_codec::manifest::{compare, count, mean_psnr_db};
 
@@ -142,14 +141,14 @@ impl Encoding {
         let n = n_kept(&finished);
         let whole = attempt(n)?;
         let lost = LostBy::of(&whole);
-        let (n_held, held) = match most_within(n, 1, whole, |found| found.memory, attempt)? {
+        let (n_held, held) = match largest_fitting(n, 1, whole, |found| found.memory, attempt)? {
             Ok(found) => found,
             Err(Unfit { least: (n_anchors, Need { limit, available, needed }), .. }) => {
                 return Err(EncodeError::TooLarge { limit, available, needed, n_anchors });
             }
         };
         let at_least = (n as f64 * (1.0 - MOST_CUT_FOR_TIME)) as usize;
-        let (n_left, best) = most_within(n_held, at_least, held, |found| found.time, attempt)?
+        let (n_left, best) = largest_fitting(n_held, at_least, held, |found| found.time, attempt)?
             .unwrap_or_else(|Unfit { whole, .. }| (n_held, whole));
         let cut = (n_left < n).then(|| lost.cut(n - n_left, held_out)).transpose()?;
         best.fitted(cut, &cameras, held_out)
@@ -202,7 +201,7 @@ impl Encoding {
 
 /// Cuts `whole`, a scene of `n` anchors, until the need that `of` names is no more than there is: the most anchors that keep it, of
 /// which `at_least` so many have to stay, and the attempt with them.
-fn most_within(
+fn largest_fitting(
     n: usize,
     at_least: usize,
     whole: Attempt,

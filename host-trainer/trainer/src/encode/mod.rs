@@ -9,14 +9,14 @@ mod error;
 mod fitting;
 #[cfg(test)]
 mod rounding;
-mod scale;
+mod sizes;
 #[cfg(test)]
 mod tests;
 
 pub use choice::CoderChoice;
 pub use error::EncodeError;
 pub use fitting::{Cut, Fitted};
-pub use scale::Scale;
+pub use sizes::EncodedSizes;
 
 use pocketsplat_instructions::level::{LEVELS, Level};
 use serde::{Deserialize, Serialize};

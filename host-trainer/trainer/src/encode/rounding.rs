@@ -5,7 +5,7 @@ use pocketsplat_capture::dataset::Normalisation;
 use pocketsplat_codec::bundle::{BundleInfo, ChannelCoding, WriteOptions, decoded_scene, write};
 use pocketsplat_core::Bundle;
 use pocketsplat_kernels::integer_model;
-use pocketsplat_kernels::ops::noise::Stream;
+use pocketsplat_kernels::ops::rate::noise::Stream;
 use pocketsplat_kernels::scene::{ModelShape, Scene};
 use pocketsplat_kernels::step::coding::{Coding, IntegerModel, RateTerms};
 use pocketsplat_kernels::step::{Loss, TargetView, Workspace};
@@ -44,7 +44,7 @@ fn drawn_twice(config: TrainConfig, tolerance: f64) {
     // Values are what is compared: a bundle rounds the heads as well.
     decoded.heads = finished.scene.heads.clone();
 
-    let (shape, model) = (trainer.scene.shape, trainer.scene.context.as_ref().expect("trained with one"));
+    let (shape, model) = (trainer.scene().shape, trainer.scene().context.as_ref().expect("trained with one"));
     let section = integer_model::section(model, shape.values_per_anchor()).expect("an integer form");
     let networks = integer_model::rounded(model, shape.values_per_anchor()).expect("an integer form");
     let integers = integer_model::parse(&section, &shape).expect("a sound section");
@@ -52,7 +52,7 @@ fn drawn_twice(config: TrainConfig, tolerance: f64) {
     let rate = RateTerms { lambda: 0.0, sample: 0.0, mask: 0.0, masks_weigh_anchors: false, grid: 0.0 };
     let last_step = Coding::Context { stream: Stream::of_run(config.seed), rate, exact };
     // Anchors that no view draws are not written, and none follow them.
-    let mut last = trainer.scene.clone();
+    let mut last = trainer.scene().clone();
     last.anchors.mask_logits.clone_from(&finished.scene.anchors.mask_logits);
     let mut workspace = Workspace::new(&shape);
     for camera in trainer.cameras() {

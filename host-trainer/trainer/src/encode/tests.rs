@@ -1,13 +1,12 @@
 use pocketsplat_capture::dataset::Capture;
 use pocketsplat_core::Bundle;
 
-use super::scale::{DevicePlans, frame_of};
+use super::sizes::{DevicePlans, frame_of};
 use super::{CoderChoice, EncodeError, Encoding, Fitted};
 use crate::device::{Limits, Processor};
 use crate::train::config::Backbone;
-use crate::train::finish::Finished;
-use crate::train::gauge::Gauge;
-use crate::train::module::{Modules, Rdo};
+use crate::train::limits::Finished;
+use crate::train::modules::{Modules, Rdo};
 use crate::train::test_capture::{tiny_capture, tiny_hac_config};
 use crate::train::{TrainConfig, Trainer};
 use pocketsplat_codec::bundle::WriteError;
@@ -100,9 +99,9 @@ fn trained_for(limits: Limits, capture: &Capture) -> Fitted {
     let modules = Modules { rdo: Some(Rdo::default()), ..Modules::default() };
     let mut config = TrainConfig { modules, ..tiny_hac_config(150) };
     config.densification.until = 0.45;
-    let scale = encoding.scale(capture);
-    let gauge = scale.as_ref().map(|scale| scale as &dyn Gauge);
-    let mut trainer = Trainer::new(capture, config).expect("a sound capture").fitting(gauge);
+    let sizes = encoding.sizes(capture).expect("limits");
+    let measure = sizes.measure();
+    let mut trainer = Trainer::new(capture, config).expect("a sound capture").fitting(Some(sizes.probe(&measure)));
     while !trainer.is_done() {
         trainer.advance().expect("a sound step");
     }

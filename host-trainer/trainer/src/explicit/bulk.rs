@@ -6,7 +6,7 @@ use glam::DVec3;
 use pocketsplat_gaussians::Gaussians;
 
 use body::{Body, Cells};
-use pocketsplat_kernels::ops::project::ALPHA_CUTOFF;
+use pocketsplat_kernels::ops::image::project::ALPHA_CUTOFF;
 use pocketsplat_kernels::real::Real;
 
 /// The place of most of what is opaque and large.

@@ -2,7 +2,7 @@
 
 use pocketsplat_gaussians::{Degree, Gaussians};
 
-use pocketsplat_kernels::ops::explicit_gaussians::Stored;
+use pocketsplat_kernels::ops::image::explicit_gaussians::Stored;
 use pocketsplat_kernels::real::Real;
 
 /// As [`Gaussians`] has them: rows of all arrays in the same order.

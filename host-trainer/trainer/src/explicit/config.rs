@@ -2,8 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::train::config::LearningRate;
-use crate::train::config_error::{ConfigError, within};
+use crate::train::schedule::{ConfigError, LearningRate, within};
 
 /// A whole run on explicit Gaussians (Kerbl et al. 2023, sections 5 and 7.1).
 ///

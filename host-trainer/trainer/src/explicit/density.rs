@@ -12,7 +12,7 @@ use super::optimiser::CloudOptimiser;
 use super::start::logit;
 use super::step::CloudGradients;
 use crate::train::optimiser::retain_rows;
-use pocketsplat_kernels::ops::explicit_gaussians;
+use pocketsplat_kernels::ops::image::explicit_gaussians;
 use pocketsplat_kernels::real::Real;
 
 /// What is known of each Gaussian since the last event.
@@ -155,8 +155,8 @@ mod tests {
 
     use super::*;
     use crate::explicit::config::CloudConfig;
-    use pocketsplat_kernels::ops::explicit_gaussians::Stored;
-    use pocketsplat_kernels::ops::spherical_harmonics::MOST;
+    use pocketsplat_kernels::ops::image::explicit_gaussians::Stored;
+    use pocketsplat_kernels::ops::image::spherical_harmonics::MOST;
 
     /// Of extent 5: pulled and small, pulled and large, faint, huge, and one that nothing is wrong with.
     fn five() -> (Cloud<f32>, CloudOptimiser, DensityStatistics) {

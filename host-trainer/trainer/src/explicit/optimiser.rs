@@ -8,8 +8,8 @@ use super::config::CloudRates;
 use super::step::CloudGradients;
 use crate::train::optimiser::retain_rows;
 use pocketsplat_kernels::ops::adam::{self, Moments, Step};
+use pocketsplat_kernels::ops::image::spherical_harmonics::MOST;
 use pocketsplat_kernels::ops::simd::Level;
-use pocketsplat_kernels::ops::spherical_harmonics::MOST;
 
 /// Gaussians one task updates.
 const ROWS: usize = 2048;

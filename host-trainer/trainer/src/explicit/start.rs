@@ -5,8 +5,8 @@ use pocketsplat_capture::dataset::nearest_squared;
 use pocketsplat_gaussians::Degree;
 
 use super::Cloud;
-use pocketsplat_kernels::ops::explicit_gaussians::Stored;
-use pocketsplat_kernels::ops::spherical_harmonics::MOST;
+use pocketsplat_kernels::ops::image::explicit_gaussians::Stored;
+use pocketsplat_kernels::ops::image::spherical_harmonics::MOST;
 use pocketsplat_kernels::real::Real;
 
 /// Opacity of every Gaussian.

@@ -3,14 +3,15 @@
 use rayon::prelude::*;
 
 use super::Cloud;
-use pocketsplat_kernels::ops::explicit_gaussians::{self, Stored};
-use pocketsplat_kernels::ops::neural_gaussians::Gaussian;
-use pocketsplat_kernels::ops::project::{self, ALPHA_CUTOFF, Footprint, Splat};
-use pocketsplat_kernels::ops::rasterise::{self, TiledImage};
+use pocketsplat_kernels::ops::Pinhole;
+use pocketsplat_kernels::ops::heads::neural_gaussians::Gaussian;
+use pocketsplat_kernels::ops::image::explicit_gaussians::{self, Stored};
+use pocketsplat_kernels::ops::image::project::{self, ALPHA_CUTOFF, Footprint, Splat};
+use pocketsplat_kernels::ops::image::rasterise::{self, TiledImage};
+use pocketsplat_kernels::ops::image::spherical_harmonics::MOST;
+use pocketsplat_kernels::ops::image::tiles::{self, TileLists};
+use pocketsplat_kernels::ops::loss::{l1, ssim};
 use pocketsplat_kernels::ops::simd::Level;
-use pocketsplat_kernels::ops::spherical_harmonics::MOST;
-use pocketsplat_kernels::ops::tiles::{self, TileLists};
-use pocketsplat_kernels::ops::{Pinhole, l1, ssim};
 use pocketsplat_kernels::real::Real;
 use pocketsplat_kernels::step::{TargetView, clear_masked};
 

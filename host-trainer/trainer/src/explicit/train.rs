@@ -1,13 +1,8 @@
 //! Training of explicit Gaussians: views one by one, the optimiser, density control.
 
-use std::time::Instant;
-
-use cpu_time::ProcessTime;
 use pocketsplat_capture::dataset::Capture;
 use pocketsplat_gaussians::{Degree, Gaussians};
-use rand::SeedableRng;
-use rand::seq::SliceRandom;
-use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
 
 use super::Cloud;
 use super::config::CloudConfig;
@@ -15,37 +10,51 @@ use super::density::{self, DensityStatistics};
 use super::optimiser::CloudOptimiser;
 use super::start::initial_cloud;
 use super::step::{CloudGradients, step};
-use crate::train::TrainError;
-use crate::train::checkpoint::CaptureSignature;
-use crate::train::read_ahead::ReadAhead;
-use crate::train::watchdog::{self, Cause, DroppedStep, Watchdog};
-use pocketsplat_kernels::ops::Pinhole;
+use crate::train::error::{Cause, DroppedStep, TrainError};
+use crate::train::run::checkpoint::envelope::needs;
+use crate::train::run::checkpoint::{CheckpointFault, Kernels};
+use crate::train::run::watchdog;
+use crate::train::run::{Method, Run, RunState, Setup};
+use pocketsplat_kernels::ops::image::spherical_harmonics::MOST;
 use pocketsplat_kernels::ops::simd::Level;
 use pocketsplat_kernels::step::{TargetView, planes};
 
-/// The state of a run: everything the next iteration depends on.
-#[derive(Clone, Debug)]
-pub struct CloudTrainer<'a> {
-    pub(super) config: CloudConfig,
-    capture: &'a Capture,
-    pub(super) signature: CaptureSignature,
-    cameras: Vec<Pinhole<f32>>,
-    pub(super) level: Level,
-    /// Iterations done.
-    pub iteration: u32,
-    /// The Gaussians as they stand, normalised frame.
+/// Training of explicit Gaussians.
+#[derive(Clone, Copy, Debug)]
+pub struct Explicit;
+
+/// A run on explicit Gaussians.
+pub type CloudTrainer<'a> = Run<'a, Explicit>;
+
+/// The Gaussians and what belongs to them.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct LearnedCloud {
+    /// As they stand, normalised frame.
+    #[serde(with = "without_degree")]
     pub cloud: Cloud<f32>,
-    /// Wall-clock seconds spent in iterations.
-    pub seconds: f64,
-    /// Seconds of processor time spent in iterations, of all threads.
-    pub processor_seconds: f64,
-    pub(super) watchdog: Watchdog,
-    pub(super) optimiser: CloudOptimiser,
-    pub(super) statistics: DensityStatistics,
-    pub(super) rng: ChaCha8Rng,
-    /// Views left of the current pass over the capture, taken from the end.
-    pub(super) queue: Vec<u32>,
-    photographs: ReadAhead,
+    /// Their moments.
+    pub optimiser: CloudOptimiser,
+    /// What density control knows.
+    pub statistics: DensityStatistics,
+}
+
+/// Gaussians whose degree every iteration sets anew.
+mod without_degree {
+    use pocketsplat_gaussians::Degree;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    use crate::explicit::Cloud;
+
+    pub(super) fn serialize<S: Serializer>(cloud: &Cloud<f32>, serializer: S) -> Result<S::Ok, S::Error> {
+        (&cloud.centres, &cloud.log_scales, &cloud.rotations, &cloud.opacity_logits, &cloud.harmonics)
+            .serialize(serializer)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Cloud<f32>, D::Error> {
+        let (centres, log_scales, rotations, opacity_logits, harmonics) = Deserialize::deserialize(deserializer)?;
+        let empty = Cloud::empty(Degree::Three);
+        Ok(Cloud { centres, log_scales, rotations, opacity_logits, harmonics, ..empty })
+    }
 }
 
 /// What an iteration gives back.
@@ -59,146 +68,121 @@ pub struct CloudOutcome {
     pub dropped: Option<DroppedStep>,
 }
 
-impl<'a> CloudTrainer<'a> {
-    /// Sets up a run.
-    ///
-    /// # Errors
-    /// [`TrainError`] when a setting is out of range or the capture has no view or point.
-    pub fn new(capture: &'a Capture, config: CloudConfig) -> Result<Self, TrainError> {
-        if capture.points.is_empty() {
-            return Err(TrainError::NoPoints);
-        }
-        let mut trainer = Self::without_cloud(capture, config)?;
-        trainer.cloud = initial_cloud(&capture.points);
-        trainer.optimiser = CloudOptimiser::new(trainer.cloud.len());
-        trainer.statistics = DensityStatistics::new(trainer.cloud.len());
-        Ok(trainer)
+impl Method for Explicit {
+    type Config = CloudConfig;
+    type Learned = LearnedCloud;
+    type Device = Level;
+    type Outcome = CloudOutcome;
+
+    // As the checkpoints of anchors have it, with a letter of its own.
+    const MAGIC: [u8; 8] = *b"\x8bPSGRN\r\n";
+
+    fn length_and_seed(config: &CloudConfig) -> (u32, u64) {
+        (config.iterations, config.seed)
     }
 
-    /// Everything but the Gaussians and what belongs to them.
-    pub(super) fn without_cloud(capture: &'a Capture, config: CloudConfig) -> Result<Self, TrainError> {
+    fn resolved(_capture: &Capture, config: CloudConfig) -> Result<CloudConfig, TrainError> {
         config.validate()?;
-        if capture.train.is_empty() {
-            return Err(TrainError::NoViews);
-        }
-        Ok(Self {
-            signature: CaptureSignature::of(capture),
-            cameras: capture.train.iter().map(|view| Pinhole::new(&view.camera)).collect(),
-            level: Level::detect(),
-            iteration: 0,
+        Ok(config)
+    }
+
+    fn nothing(_capture: &Capture, _config: &CloudConfig) -> (LearnedCloud, Level) {
+        let learned = LearnedCloud {
             cloud: Cloud::empty(Degree::Three),
-            seconds: 0.0,
-            processor_seconds: 0.0,
-            watchdog: Watchdog::default(),
             optimiser: CloudOptimiser::default(),
             statistics: DensityStatistics::default(),
-            rng: ChaCha8Rng::seed_from_u64(config.seed),
-            queue: Vec::new(),
-            photographs: ReadAhead::default(),
-            config,
-            capture,
-        })
+        };
+        (learned, Level::detect())
     }
 
-    /// The configuration.
-    pub fn config(&self) -> &CloudConfig {
-        &self.config
+    fn begin(run: &mut CloudTrainer<'_>) -> Result<(), TrainError> {
+        let cloud = initial_cloud(&run.setup.capture.points);
+        let (optimiser, statistics) = (CloudOptimiser::new(cloud.len()), DensityStatistics::new(cloud.len()));
+        run.state.learned = LearnedCloud { cloud, optimiser, statistics };
+        Ok(())
     }
 
-    /// Whether all iterations are done.
-    pub fn is_done(&self) -> bool {
-        self.iteration >= self.config.iterations
+    fn restored(run: &mut CloudTrainer<'_>) -> Result<(), CheckpointFault> {
+        let LearnedCloud { cloud, optimiser, statistics } = &mut run.state.learned;
+        let n = cloud.len();
+        needs("log-scales", cloud.log_scales.len(), n)?;
+        needs("rotations", cloud.rotations.len(), n)?;
+        needs("opacities", cloud.opacity_logits.len(), n)?;
+        needs("coefficients", cloud.harmonics.len(), n * MOST)?;
+        for (moments, width) in optimiser.each_mut() {
+            needs("first moments", moments.first.len(), n * width)?;
+            needs("second moments", moments.second.len(), n * width)?;
+        }
+        let DensityStatistics { gradient_sum, n_drawn, widest_px } = statistics;
+        needs("gradient sums", gradient_sum.len(), n)?;
+        needs("drawn counts", n_drawn.len(), n)?;
+        needs("widths", widest_px.len(), n)
     }
 
-    /// Steps that were not applied so far.
-    pub fn n_dropped(&self) -> u32 {
-        self.watchdog.n_dropped
+    fn iterate(run: &mut CloudTrainer<'_>) -> Result<CloudOutcome, TrainError> {
+        run.iterate()
     }
 
-    /// The share of the steps' time that was spent on waiting for photographs, since this process began or took up the run;
-    /// `None` where they lie in memory.
-    pub fn waited_share(&self) -> Option<f64> {
-        self.photographs.waited_share()
+    fn size(learned: &LearnedCloud) -> [usize; 2] {
+        [learned.cloud.len(); 2]
     }
 
-    /// Number of training views.
-    pub(super) fn n_views(&self) -> usize {
-        self.cameras.len()
+    fn kernels(level: &Level) -> Kernels {
+        Kernels::of_this_machine(*level)
+    }
+}
+
+impl CloudTrainer<'_> {
+    /// The Gaussians as they stand, in the number type of the operations.
+    pub fn cloud(&self) -> &Cloud<f32> {
+        &self.state.learned.cloud
     }
 
     /// The Gaussians, normalised frame.
     pub fn gaussians(&self) -> Gaussians {
-        self.cloud.clone().into()
-    }
-
-    /// One iteration: a view drawn without replacement, a step, the optimiser, density control.
-    ///
-    /// A step with a loss or gradient that is not finite does nothing of the latter two.
-    ///
-    /// # Errors
-    /// [`TrainError::Diverged`] when more than [`watchdog::MAX_DROPPED_IN_A_ROW`] steps in a row did nothing, and
-    /// [`TrainError::Photograph`]; the Gaussians are as they were before them.
-    pub fn advance(&mut self) -> Result<CloudOutcome, TrainError> {
-        let started = (Instant::now(), ProcessTime::now());
-        let outcome = self.iterate();
-        let step = started.0.elapsed();
-        self.photographs.worked(step);
-        self.seconds += step.as_secs_f64();
-        self.processor_seconds += started.1.elapsed().as_secs_f64();
-        outcome
+        self.cloud().clone().into()
     }
 
     fn iterate(&mut self) -> Result<CloudOutcome, TrainError> {
-        self.iteration += 1;
-        self.cloud.degree = self.degree();
-        if self.queue.is_empty() {
-            self.queue = (0u32..).take(self.n_views()).collect();
-            self.queue.shuffle(&mut self.rng);
-        }
-        let photograph = self.photographs.photograph(&self.capture.train, self.queue.iter().rev().copied())?;
-        let index = self.queue.pop().expect("refilled above") as usize;
+        self.state.learned.cloud.degree = self.degree();
+        let (place, photograph) = self.next_view()?;
+        let Setup { config, capture, views, .. } = &self.setup;
         let mask = photograph.mask.as_ref().map(|mask| mask.valid.as_slice());
-        let target = TargetView::new(&self.cameras[index], planes(&photograph.image), mask, self.capture.background);
-        let gradients = step(self.level, &self.cloud, &target, self.config.dssim);
-        let (loss, squared_error) = (f64::from(gradients.loss), gradients.squared_error);
-        if let Some(cause) = fault(&gradients) {
-            let dropped =
-                DroppedStep { iteration: self.iteration, view: self.capture.train[index].name.clone(), cause };
-            return if self.watchdog.dropped() {
-                Err(TrainError::Diverged { n: self.watchdog.n_in_a_row, last: dropped })
-            } else {
-                Ok(CloudOutcome { loss, squared_error, dropped: Some(dropped) })
-            };
+        let target = TargetView::new(&views.cameras[place], planes(&photograph.image), mask, capture.background);
+        let level = self.machine.device;
+        let gradients = step(level, self.cloud(), &target, config.dssim);
+        let progress = f64::from(self.state.iteration) / f64::from(config.iterations);
+        let (rates, at) = (config.rates, [progress, capture.extent]);
+        let dropped = self.judge(place, fault(&gradients))?;
+        if dropped.is_none() {
+            let LearnedCloud { cloud, optimiser, .. } = &mut self.state.learned;
+            optimiser.apply(level, cloud, &gradients, &rates, at);
+            self.control_density(&gradients);
         }
-        self.watchdog.passed();
-        let progress = f64::from(self.iteration) / f64::from(self.config.iterations);
-        let at = [progress, self.capture.extent];
-        self.optimiser.apply(self.level, &mut self.cloud, &gradients, &self.config.rates, at);
-        self.control_density(&gradients);
-        Ok(CloudOutcome { loss, squared_error, dropped: None })
+        Ok(CloudOutcome { loss: f64::from(gradients.loss), squared_error: gradients.squared_error, dropped })
     }
 
     /// The degree that this iteration draws.
     fn degree(&self) -> Degree {
-        let every = self.config.iteration_at(self.config.degree_every).max(1);
-        let reached = (self.iteration / every) as usize;
+        let every = self.setup.config.iteration_at(self.setup.config.degree_every).max(1);
+        let reached = (self.state.iteration / every) as usize;
         Degree::ALL[reached.min(Degree::ALL.len() - 1)]
     }
 
     fn control_density(&mut self, gradients: &CloudGradients<f32>) {
-        let settings = self.config.density;
-        if self.iteration >= self.config.iteration_at(settings.until) {
+        let Setup { config, capture, .. } = &self.setup;
+        let RunState { iteration, rng, learned: LearnedCloud { cloud, optimiser, statistics }, .. } = &mut self.state;
+        let settings = config.density;
+        if *iteration >= config.iteration_at(settings.until) {
             return;
         }
-        self.statistics.add(gradients);
-        let every = self.config.iteration_at(settings.reset_every).max(1);
-        let Self { cloud, optimiser, statistics, rng, .. } = self;
-        if self.iteration.is_multiple_of(settings.interval) && self.iteration > self.config.iteration_at(settings.from)
-        {
-            let prunes_large = self.iteration > every;
-            density::control(cloud, optimiser, statistics, &settings, self.capture.extent, prunes_large, rng);
+        statistics.add(gradients);
+        let every = config.iteration_at(settings.reset_every).max(1);
+        if iteration.is_multiple_of(settings.interval) && *iteration > config.iteration_at(settings.from) {
+            let prunes_large = *iteration > every;
+            density::control(cloud, optimiser, statistics, &settings, capture.extent, prunes_large, rng);
         }
-        if self.iteration.is_multiple_of(every) {
+        if iteration.is_multiple_of(every) {
             density::reset_opacities(cloud, optimiser, &settings);
         }
     }
@@ -219,12 +203,13 @@ fn fault(gradients: &CloudGradients<f32>) -> Option<Cause> {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
     use super::*;
-    use crate::train::test_capture::tiny_capture;
+    use crate::train::run::RestoreError;
+    use crate::train::test_capture::{many_views, tiny_capture};
 
     /// With all that density control does within a few steps.
-    pub(crate) fn tiny_cloud_config(iterations: u32) -> CloudConfig {
+    fn tiny_cloud_config(iterations: u32) -> CloudConfig {
         let mut config = CloudConfig { iterations, ..CloudConfig::default() };
         config.density.interval = 5;
         config.density.reset_every = 0.3;
@@ -241,7 +226,7 @@ pub(super) mod tests {
             while !trainer.is_done() {
                 errors.push(trainer.advance().unwrap().squared_error);
             }
-            (trainer.cloud, errors)
+            (trainer.state.learned.cloud, errors)
         })
     }
 
@@ -268,9 +253,46 @@ pub(super) mod tests {
             CloudTrainer::new(&capture, CloudConfig { iterations: 300, ..CloudConfig::default() }).unwrap();
         let mut degrees = Vec::new();
         for iteration in [1, 9, 10, 20, 29, 30, 300] {
-            trainer.iteration = iteration;
+            trainer.state.iteration = iteration;
             degrees.push(trainer.degree().number());
         }
         assert_eq!(degrees, [0, 0, 1, 2, 2, 3, 3]);
+    }
+
+    #[test]
+    fn a_restored_run_ends_in_the_same_bits() {
+        let capture = tiny_capture();
+        let mut whole = CloudTrainer::new(&capture, tiny_cloud_config(40)).unwrap();
+        let mut kept = Vec::new();
+        while !whole.is_done() {
+            if whole.iteration() == 23 {
+                whole.save(&mut kept).unwrap();
+            }
+            whole.advance().unwrap();
+        }
+        let mut restored = CloudTrainer::restore(&capture, &kept).unwrap().run;
+        while !restored.is_done() {
+            restored.advance().unwrap();
+        }
+        assert!(
+            restored.cloud() == whole.cloud() && restored.state.learned.optimiser == whole.state.learned.optimiser,
+            "the same bits"
+        );
+    }
+
+    #[test]
+    fn damage_and_other_captures_are_refused() {
+        let capture = tiny_capture();
+        let trainer = CloudTrainer::new(&capture, tiny_cloud_config(40)).unwrap();
+        let mut bytes = Vec::new();
+        trainer.save(&mut bytes).unwrap();
+        let other = many_views(6);
+        assert!(matches!(CloudTrainer::restore(&other, &bytes), Err(RestoreError::Capture(_))));
+        for at in [0, 9, 500, bytes.len() - 1] {
+            let mut damaged = bytes.clone();
+            damaged[at] ^= 1;
+            assert!(matches!(CloudTrainer::restore(&capture, &damaged), Err(RestoreError::Fault(_))), "byte {at}");
+        }
+        assert!(matches!(CloudTrainer::restore(&capture, &bytes[..700]), Err(RestoreError::Fault(_))));
     }
 }

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::least_squares::Equations;
 use super::principal_axes::principal_axes;
 use pocketsplat_kernels::ops::Pinhole;
-use pocketsplat_kernels::ops::neural_gaussians::Gaussian;
+use pocketsplat_kernels::ops::heads::neural_gaussians::Gaussian;
 use pocketsplat_kernels::scene::Scene;
 use pocketsplat_kernels::step::Workspace;
 

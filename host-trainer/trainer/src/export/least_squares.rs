@@ -2,7 +2,7 @@
 
 use pocketsplat_gaussians::Degree;
 
-use pocketsplat_kernels::ops::spherical_harmonics::{MOST, basis};
+use pocketsplat_kernels::ops::image::spherical_harmonics::{MOST, basis};
 
 /// What pulls coefficients beyond the constant one to 0, as a share of the sum of the weights: directions that no camera looked from
 /// have no say, and a colour must not run away there.
@@ -85,7 +85,7 @@ mod tests {
     use pocketsplat_gaussians::Degree;
 
     use super::Equations;
-    use pocketsplat_kernels::ops::spherical_harmonics::forward;
+    use pocketsplat_kernels::ops::image::spherical_harmonics::forward;
 
     fn directions() -> impl Iterator<Item = [f32; 3]> {
         (0..200).map(|i| {

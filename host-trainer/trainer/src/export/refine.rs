@@ -10,10 +10,10 @@ use crate::explicit::Cloud;
 use crate::explicit::config::CloudRates;
 use crate::explicit::optimiser::CloudOptimiser;
 use crate::explicit::step::step;
-use crate::train::config::LearningRate;
+use crate::train::schedule::LearningRate;
 use pocketsplat_kernels::ops::Pinhole;
+use pocketsplat_kernels::ops::image::spherical_harmonics::MOST;
 use pocketsplat_kernels::ops::simd::Level;
-use pocketsplat_kernels::ops::spherical_harmonics::MOST;
 use pocketsplat_kernels::step::{TargetView, planes};
 
 /// Everything random follows from it.

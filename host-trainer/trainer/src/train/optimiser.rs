@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::config::Rates;
+use super::schedule::Rates;
 use pocketsplat_kernels::ops::adam::{self, Moments, Step};
 use pocketsplat_kernels::real::Real;
 use pocketsplat_kernels::scene::{Anchors, ContextModel, ContextNetwork, Heads, ModelShape, Scene};

@@ -174,12 +174,15 @@ mod tests {
             while !explicit.is_done() {
                 explicit.advance().expect("an iteration");
             }
-            let worth = trainer.worth().expect("a context model");
+            let worth = trainer.view().worth().expect("a context model");
             assert_eq!(trainer.waited_share().is_some(), !capture.train[0].is_in_memory());
             assert_eq!(explicit.waited_share().is_some(), !capture.train[0].is_in_memory());
             let (mut checkpoint, mut explicit_checkpoint) = (Vec::new(), Vec::new());
-            let clocks = [&mut trainer.seconds, &mut trainer.processor_seconds];
-            clocks.into_iter().chain([&mut explicit.seconds, &mut explicit.processor_seconds]).for_each(|s| *s = 0.0);
+            let clocks = [&mut trainer.state.seconds, &mut trainer.state.processor_seconds];
+            clocks
+                .into_iter()
+                .chain([&mut explicit.state.seconds, &mut explicit.state.processor_seconds])
+                .for_each(|s| *s = 0.0);
             trainer.save(&mut checkpoint).expect("memory");
             explicit.save(&mut explicit_checkpoint).expect("memory");
             (checkpoint, explicit_checkpoint, worth)

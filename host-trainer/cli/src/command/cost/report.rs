@@ -98,7 +98,7 @@ impl Report<'_> {
         for (i, m) in self.measured.iter().enumerate() {
             let quality = m.setting.quality;
             let mut row = vec![
-                m.setting.knob.to_owned(),
+                m.setting.parameter.to_owned(),
                 m.setting.name.clone(),
                 m.setting.pruning_rate.to_string(),
                 quality.alpha_cut.to_string(),
@@ -140,8 +140,8 @@ impl Report<'_> {
                 .zip(front)
                 .filter_map(|(m, &on_front)| {
                     let cost = machine.time(m, *place)?;
-                    let (knob, setting) = (m.setting.knob.to_owned(), m.setting.name.clone());
-                    Some(CostPoint { knob, setting, cost, psnr_db: m.psnr_db, on_front })
+                    let (parameter, setting) = (m.setting.parameter.to_owned(), m.setting.name.clone());
+                    Some(CostPoint { parameter, setting, cost, psnr_db: m.psnr_db, on_front })
                 })
                 .collect(),
         };
@@ -163,12 +163,17 @@ impl Report<'_> {
         }
         text += &format!("\n|---|---|---|---|---|---|{}\n", "---|---|".repeat(columns.len()));
         for (i, m) in self.measured.iter().enumerate() {
-            if m.setting.knob == "quality" && columns.iter().all(|column| !column.front[i]) {
+            if m.setting.parameter == "quality" && columns.iter().all(|column| !column.front[i]) {
                 continue;
             }
             text += &format!(
                 "| {} | {} | {:.2} | {:.1} | {} | {} |",
-                m.setting.knob, m.setting.name, m.psnr_db, m.psnr_to_reference_db, m.worst_channel, m.scratch_bytes,
+                m.setting.parameter,
+                m.setting.name,
+                m.psnr_db,
+                m.psnr_to_reference_db,
+                m.worst_channel,
+                m.scratch_bytes,
             );
             for Column { machine, place, front } in columns {
                 let (time, of) = (machine.time(m, *place), machine.time(exact, *place));

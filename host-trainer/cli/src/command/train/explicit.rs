@@ -12,7 +12,7 @@ use pocketsplat_gaussians::{Format, Notes};
 use pocketsplat_trainer::device::Limits;
 use pocketsplat_trainer::explicit::CloudTrainer;
 use pocketsplat_trainer::explicit::frame;
-use pocketsplat_trainer::train::run::{Ending, Interval, LoggedStep, RunError, RunFolder};
+use pocketsplat_trainer::train::run::{Ending, LoggedStep, RunFolder};
 use serde::Serialize;
 
 use super::super::capture::CaptureArgs;
@@ -25,7 +25,7 @@ use super::super::process::peak_memory_bytes;
 use super::super::progress::Progress;
 use super::super::stop;
 use super::super::train_args::Args;
-use super::in_folder::{CHECKPOINT_SECONDS, IN_RUN_AND_ON_COMMAND_LINE};
+use super::in_folder::{GoesOn, IN_RUN_AND_ON_COMMAND_LINE, resumed, to_the_end};
 use super::loading::{check_size, clear_photographs, keep_points};
 use super::result::HeldOut;
 use super::summary::Summary;
@@ -103,30 +103,12 @@ pub(super) fn resume(args: &Args, folder: RunFolder) -> Result<ExitCode> {
     let path = folder.path().to_owned();
     let output = args.output(&source_of(&config), &config.output, gaussians(format_of(&config)?), &path)?;
     let capture = load(&config, &path)?;
-    let trainer = match folder.newest(|bytes| CloudTrainer::restore(&capture, bytes))? {
-        None => {
-            say!("the run in {} has no checkpoint yet; it begins anew", folder.path().display());
-            CloudTrainer::new(&capture, config.gaussians)?
+    let trainer = resumed(&folder, config.gaussians, &capture, |trainer: &mut CloudTrainer<'_>| {
+        if *trainer.config() == config.gaussians {
+            return Ok(());
         }
-        Some(newest) => {
-            for fault in &newest.passed_over {
-                say!("warning: a checkpoint is damaged, so the run goes on from an older one: {fault}");
-            }
-            let (trainer, then) = (newest.restored.trainer, newest.restored.written_by);
-            if *trainer.config() != config.gaussians {
-                bail!("config.toml and the checkpoint disagree; write back what the run began with");
-            }
-            if then != trainer.kernels() {
-                say!(
-                    "warning: the checkpoint was computed with {then}; this is {}. The run goes on, but will not end in \
-                     the same bits as there",
-                    trainer.kernels()
-                );
-            }
-            say!("going on after iteration {} of {}", trainer.iteration, config.gaussians.iterations);
-            trainer
-        }
-    };
+        bail!("config.toml and the checkpoint disagree; write back what the run began with")
+    })?;
     let code = train(args, folder, &config, &capture, trainer, &output)?;
     drop(capture);
     clear_photographs(&path, code);
@@ -189,26 +171,18 @@ fn train_in(
 ) -> Result<Option<ExplicitResult>> {
     folder.write_config(&config.to_toml()?)?;
     keep_points(capture, folder.path());
-    let interval = config.checkpoint_every.map_or(Interval::Seconds(CHECKPOINT_SECONDS), Interval::Iterations);
-    let how_to_go_on = format!("go on with `pocketsplat train --resume {}`", shell_word(folder.path()));
-    let iterations = config.gaussians.iterations;
-    let mut progress = Progress::new(trainer.iteration, iterations);
-    let ending = folder.drive(&mut trainer, interval, stop, |trainer| {
-        let outcome = trainer.advance()?;
-        progress.explicit_step(trainer.iteration, &outcome, trainer.cloud.len());
-        let is_dropped = outcome.dropped.is_some();
-        Ok(LoggedStep { loss: outcome.loss, squared_error: outcome.squared_error, rate: None, is_dropped })
-    });
-    let ending = ending.map_err(|error| {
-        let stopped = format!("training stopped at iteration {}", trainer.iteration);
-        match error {
-            // It would come to the same end again.
-            RunError::Train(_) => anyhow::Error::new(error).context(stopped),
-            _ => anyhow::Error::new(error).context(format!("{stopped}; to retry, {how_to_go_on}")),
-        }
-    })?;
-    if ending == Ending::Interrupted {
-        say!("interrupted after iteration {} of {iterations}; {how_to_go_on}", trainer.iteration);
+    let how_to_go_on = GoesOn::Resume.said(folder.path());
+    let mut progress = Progress::new(trainer.iteration(), trainer.iterations());
+    let ended =
+        to_the_end(&mut folder, &mut trainer, config.checkpoint_every, &how_to_go_on, |folder, trainer, interval| {
+            folder.drive(trainer, interval, stop, |trainer| {
+                let outcome = trainer.advance()?;
+                progress.explicit_step(trainer.iteration(), &outcome, trainer.cloud().len());
+                let is_dropped = outcome.dropped.is_some();
+                Ok(LoggedStep { loss: outcome.loss, squared_error: outcome.squared_error, rate: None, is_dropped })
+            })
+        })?;
+    if ended == Ending::Interrupted {
         return Ok(None);
     }
     let result = write(&trainer, config, capture, output)
@@ -244,12 +218,12 @@ fn write(
         program: program::this(),
         file: config.output.clone(),
         file_bytes: bytes.len(),
-        n_gaussians: trainer.cloud.len(),
-        iterations: trainer.iteration,
+        n_gaussians: trainer.cloud().len(),
+        iterations: trainer.iteration(),
         dropped_steps: trainer.n_dropped(),
-        train_s: trainer.seconds,
-        train_processor_s: trainer.processor_seconds,
-        iterations_per_s: f64::from(trainer.iteration) / trainer.seconds,
+        train_s: trainer.seconds(),
+        train_processor_s: trainer.processor_seconds(),
+        iterations_per_s: f64::from(trainer.iteration()) / trainer.seconds(),
         photographs_waited_share: trainer.waited_share(),
         background: config.capture.background.unwrap_or(Background::Black).to_string(),
         peak_memory_bytes: peak_memory_bytes(),

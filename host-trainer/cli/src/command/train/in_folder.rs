@@ -7,10 +7,9 @@ use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::Capture;
 use pocketsplat_files::{Output, shell_word};
 use pocketsplat_kernels::step::SharedDevice;
-use pocketsplat_trainer::encode::Scale;
+use pocketsplat_trainer::encode::EncodedSizes;
 use pocketsplat_trainer::train::Trainer;
-use pocketsplat_trainer::train::gauge::Gauge;
-use pocketsplat_trainer::train::run::{Ending, Interval, RunError, RunFolder};
+use pocketsplat_trainer::train::run::{Ending, Interval, Method, Newest, Run, RunError, RunFolder};
 
 use super::loading::keep_points;
 use super::result::{TrainResult, write_bundle};
@@ -21,7 +20,7 @@ use crate::config::RunConfig;
 use crate::say::say;
 
 /// Seconds between checkpoints unless the user says otherwise: what an accident may cost.
-pub(super) const CHECKPOINT_SECONDS: f64 = 60.0;
+const CHECKPOINT_SECONDS: f64 = 60.0;
 
 /// Where the two configurations stand that have to agree.
 pub(super) const IN_RUN_AND_ON_COMMAND_LINE: [&str; 2] = ["in the run", "on the command line"];
@@ -59,7 +58,7 @@ pub(crate) enum GoesOn {
 
 impl GoesOn {
     /// As a clause.
-    fn said(self, run: &Path) -> String {
+    pub(super) fn said(self, run: &Path) -> String {
         match self {
             Self::Resume => format!("go on with `pocketsplat train --resume {}`", shell_word(run)),
             Self::SameCommand => "give the same command again to go on".to_owned(),
@@ -104,74 +103,94 @@ pub(crate) fn train_in<'a>(
     let mut folder = folder.forking_at(&config.fork_at);
     let path = folder.path().to_owned();
     keep_points(capture, &path);
-    let scale = config.encoding.scale(capture);
+    let sizes = config.encoding.sizes(capture);
+    let measure = sizes.as_ref().map(EncodedSizes::measure);
+    let limits = sizes.as_ref().zip(measure.as_ref()).map(|(sizes, measure)| sizes.probe(measure));
     let warned = if let Start::New(warned) = start { warned } else { Warned::default() };
     let trainer = match start {
         Start::New(_) => Trainer::new(capture, config.train)?,
-        Start::Resumed => resumed(&folder, config, capture, device.clone())?,
+        Start::Resumed => resumed(&folder, config.train, capture, |trainer: &mut Trainer<'_>| {
+            trainer.set_device(device.clone());
+            let at_checkpoint = RunConfig { train: *trainer.config(), ..config.clone() };
+            match config.difference(&at_checkpoint, ["in config.toml", "in the checkpoint"])? {
+                None => Ok(()),
+                Some(difference) => {
+                    bail!("config.toml and the checkpoint disagree: {difference}; write back what the run began with")
+                }
+            }
+        })?,
         Start::Forked(trainer) => *trainer,
     };
-    let mut trainer = trainer.fitting(gauge(scale.as_ref()));
+    let mut trainer = trainer.fitting(limits);
     trainer.set_device(device);
     folder.write_config(&config.to_toml()?)?;
-    for at in folder.missed_forks(trainer.iteration)? {
-        say!("warning: --fork-at {at} keeps nothing, for the run stands after iteration {}", trainer.iteration);
+    for at in folder.missed_forks(trainer.iteration())? {
+        say!("warning: --fork-at {at} keeps nothing, for the run stands after iteration {}", trainer.iteration());
     }
-    let interval = config.checkpoint_every.map_or(Interval::Seconds(CHECKPOINT_SECONDS), Interval::Iterations);
-    let how_to_go_on = || goes_on.said(&path);
-    let estimate = Estimate::new(capture, &config.train, trainer.iteration, warned);
-    let mut progress = Progress::new(trainer.iteration, config.train.iterations).estimating(estimate);
-    let ending = folder.train(&mut trainer, &mut progress, interval, stop);
-    let ending = ending.map_err(|error| {
-        let stopped = format!("training stopped at iteration {}", trainer.iteration);
-        match error {
-            // It would come to the same end again; a device says itself what to do.
-            RunError::Train(_) => anyhow::Error::new(error).context(stopped),
-            _ => anyhow::Error::new(error).context(format!("{stopped}; to retry, {}", how_to_go_on())),
-        }
-    })?;
-    if ending == Ending::Interrupted {
-        say!("interrupted after iteration {} of {}; {}", trainer.iteration, config.train.iterations, how_to_go_on());
+    let estimate = Estimate::new(capture, &config.train, trainer.iteration(), warned);
+    let mut progress = Progress::new(trainer.iteration(), config.train.iterations).estimating(estimate);
+    let how_to_go_on = goes_on.said(&path);
+    let ended =
+        to_the_end(&mut folder, &mut trainer, config.checkpoint_every, &how_to_go_on, |folder, trainer, interval| {
+            folder.train(trainer, &mut progress, interval, stop)
+        })?;
+    if ended == Ending::Interrupted {
         return Ok(None);
     }
     let result = write_bundle(&trainer, capture, &config.capture, &config.encoding, output)
-        .with_context(|| format!("the training is done and kept; {}", how_to_go_on()))?;
+        .with_context(|| format!("the training is done and kept; {how_to_go_on}"))?;
     folder.finish(&json(&result)?, config.keep_checkpoints)?;
     Ok(Some(result))
 }
 
-/// What tells a run that its bundle has limits.
-fn gauge<'a>(scale: Option<&'a Scale<'a>>) -> Option<&'a dyn Gauge> {
-    scale.map(|scale| scale as &dyn Gauge)
+/// Does what is left of a run, as `drive` does it; says so where it was interrupted.
+pub(super) fn to_the_end<M: Method>(
+    folder: &mut RunFolder,
+    run: &mut Run<'_, M>,
+    checkpoint_every: Option<u32>,
+    how_to_go_on: &str,
+    drive: impl FnOnce(&mut RunFolder, &mut Run<'_, M>, Interval) -> Result<Ending, RunError>,
+) -> Result<Ending> {
+    let interval = checkpoint_every.map_or(Interval::Seconds(CHECKPOINT_SECONDS), Interval::Iterations);
+    let ending = drive(folder, run, interval).map_err(|error| {
+        let stopped = format!("training stopped at iteration {}", run.iteration());
+        match error {
+            // It would come to the same end again; a device says itself what to do.
+            RunError::Train(_) => anyhow::Error::new(error).context(stopped),
+            _ => anyhow::Error::new(error).context(format!("{stopped}; to retry, {how_to_go_on}")),
+        }
+    })?;
+    if ending == Ending::Interrupted {
+        say!("interrupted after iteration {} of {}; {how_to_go_on}", run.iteration(), run.iterations());
+    }
+    Ok(ending)
 }
 
 /// The run as its newest sound checkpoint has it, or at its start where it was stopped before the first one.
-fn resumed<'a>(
+///
+/// * `ready`: brings it where it computes, and refuses it where it is not the one that was asked for.
+pub(super) fn resumed<'a, M: Method>(
     folder: &RunFolder,
-    config: &RunConfig,
+    config: M::Config,
     capture: &'a Capture,
-    device: Option<SharedDevice<f32>>,
-) -> Result<Trainer<'a>> {
-    let Some(resumed) = folder.resume(capture)? else {
+    ready: impl FnOnce(&mut Run<'a, M>) -> Result<()>,
+) -> Result<Run<'a, M>> {
+    let Some(Newest { restored, passed_over }) = folder.resume(capture)? else {
         say!("the run in {} has no checkpoint yet; it begins anew", folder.path().display());
-        return Ok(Trainer::new(capture, config.train)?);
+        return Ok(Run::new(capture, config)?);
     };
-    for fault in &resumed.passed_over {
+    for fault in passed_over {
         say!("warning: a checkpoint is damaged, so the run goes on from an older one: {fault}");
     }
-    let mut trainer = resumed.restored.trainer;
-    trainer.set_device(device);
-    let at_checkpoint = RunConfig { train: *trainer.config(), ..config.clone() };
-    if let Some(difference) = config.difference(&at_checkpoint, ["in config.toml", "in the checkpoint"])? {
-        bail!("config.toml and the checkpoint disagree: {difference}; write back what the run began with");
-    }
-    let (then, now) = (&resumed.restored.written_by, trainer.kernels());
-    if *then != now {
+    let (mut run, then) = (restored.run, restored.written_by);
+    ready(&mut run)?;
+    let now = run.kernels();
+    if then != now {
         say!(
             "warning: the checkpoint was computed with {then}; this is {now}. The run goes on, but will not end in the \
              same bits as there"
         );
     }
-    say!("going on after iteration {} of {}", trainer.iteration, config.train.iterations);
-    Ok(trainer)
+    say!("going on after iteration {} of {}", run.iteration(), run.iterations());
+    Ok(run)
 }

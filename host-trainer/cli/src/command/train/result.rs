@@ -10,7 +10,7 @@ use pocketsplat_instructions::level::Profile;
 use pocketsplat_trainer::effects::Effect;
 use pocketsplat_trainer::encode::{Encoding, Fitted};
 use pocketsplat_trainer::train::Trainer;
-use pocketsplat_trainer::train::finish::Finished;
+use pocketsplat_trainer::train::limits::Finished;
 use serde::Serialize;
 
 use super::limits;
@@ -143,11 +143,11 @@ pub(super) fn write_bundle(
         coder: if bundle.context().is_some() { "context" } else { "static" },
         estimated_bytes: estimated_bits.map(|bits| bits.map(|bits| bits / 8.0)),
         bytes_per_anchor: file.bytes.len() as f64 / n_anchors as f64,
-        iterations: trainer.iteration,
+        iterations: trainer.iteration(),
         dropped_steps: trainer.n_dropped(),
-        train_s: trainer.seconds,
-        train_processor_s: trainer.processor_seconds,
-        iterations_per_s: f64::from(trainer.iteration) / trainer.seconds,
+        train_s: trainer.seconds(),
+        train_processor_s: trainer.processor_seconds(),
+        iterations_per_s: f64::from(trainer.iteration()) / trainer.seconds(),
         photographs_waited_share: trainer.waited_share(),
         background: Background::of_rgb8(background)
             .map_or_else(|| format!("{background:?}"), |known| known.to_string()),

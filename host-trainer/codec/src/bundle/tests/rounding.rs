@@ -7,7 +7,7 @@ use super::{SMALL, options, random_scene, with_context, write_bytes};
 use crate::bundle::channels::ContextWork;
 use crate::bundle::{ChannelCoding, WriteOptions, decoded_scene};
 use pocketsplat_kernels::integer_model;
-use pocketsplat_kernels::ops::perturb;
+use pocketsplat_kernels::ops::rate::perturb;
 use pocketsplat_kernels::scene::Scene;
 
 /// The bundle of a scene under its context model.

@@ -248,7 +248,7 @@ fn a_scene_is_widened_value_by_value() {
             offsets: vec![1.0, 2.0, 3.0],
             mask_logits: vec![1.0],
             prune_rank: Vec::new(),
-            rarity: Vec::new(),
+            view_weights: Vec::new(),
         },
         heads: Heads::filled(&shape, 0.125),
         context: None,

@@ -8,7 +8,7 @@ use pocketsplat_gaussians::{Degree, Gaussians};
 use crate::explicit::Cloud;
 use crate::explicit::step::draw;
 use pocketsplat_kernels::ops::Pinhole;
-use pocketsplat_kernels::ops::rasterise::TiledImage;
+use pocketsplat_kernels::ops::image::rasterise::TiledImage;
 use pocketsplat_kernels::ops::simd::Level;
 
 /// A Gaussian is seen where this share of its light comes through: the rest is its neighbours', which overlap on any surface.

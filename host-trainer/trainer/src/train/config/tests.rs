@@ -1,5 +1,5 @@
 use super::*;
-use crate::train::module::Detail;
+use crate::train::modules::Detail;
 use crate::train::test_capture::tiny_capture;
 use glam::DVec3;
 

@@ -1,309 +1,198 @@
-use std::fs;
-use std::io::Write;
-use std::sync::atomic::AtomicBool;
+//! A run with the rate of HAC, from its first iteration to what it hands to the writer.
 
 use super::*;
-use crate::train::test_capture::{tiny_capture, tiny_config};
-use pocketsplat_kernels::step::StepReport;
+use crate::train::TrainConfig;
+use crate::train::config::{self, Backbone};
+use crate::train::context::integers::Integers;
+use crate::train::limits::Finished;
+use crate::train::test_capture::{self, edit, tiny_capture, tiny_config, tiny_hac_config};
+use pocketsplat_kernels::scene::Anchors;
+use pocketsplat_kernels::step::Phase;
+use pocketsplat_kernels::step::coding::RateReport;
 
-const ITERATIONS: u32 = 40;
-
-/// Asks the run to stop after some iteration.
-struct StopAfter<'s>(u32, &'s AtomicBool);
-
-impl Observer for StopAfter<'_> {
-    fn step(&mut self, iteration: u32, _: &StepReport<f32>, _: &pocketsplat_kernels::scene::Scene<f32>) {
-        if iteration == self.0 {
-            self.1.store(true, Ordering::Relaxed);
-        }
+/// All steps of a run: phase and rate of each.
+fn trained(trainer: &mut Trainer<'_>) -> Vec<(Phase, Option<RateReport>)> {
+    let mut steps = Vec::new();
+    while !trainer.is_done() {
+        let outcome = trainer.advance().unwrap();
+        assert_eq!(outcome.dropped, None);
+        steps.push((trainer.setup.config.phase(trainer.state.iteration), outcome.report.rate));
     }
+    steps
 }
 
-/// Trains until after iteration `until`, from wherever the folder stands.
-fn train(
-    folder: &mut RunFolder,
-    interval: Interval,
-    until: u32,
-) -> (Ending, pocketsplat_kernels::scene::Scene<f32>, Vec<String>) {
+#[test]
+fn the_rate_falls_and_masks_close_where_bits_weigh() {
+    rate_falls(Backbone::Hac, 0.7);
+    rate_falls(Backbone::ContextGs, 0.85);
+}
+
+/// * `share`: of the bits an anchor at first that is left at most.
+fn rate_falls(backbone: Backbone, share: f64) {
     let capture = tiny_capture();
-    let resumed = folder.resume(&capture).unwrap();
-    let (mut trainer, passed_over) = match resumed {
-        Some(resumed) => (resumed.restored.trainer, resumed.passed_over),
-        None => (Trainer::new(&capture, tiny_config(ITERATIONS)).unwrap(), Vec::new()),
-    };
-    let stop = AtomicBool::new(false);
-    let ending = folder.train(&mut trainer, &mut StopAfter(until, &stop), interval, &stop).unwrap();
-    (ending, trainer.scene, passed_over)
-}
-
-fn names(folder: &RunFolder) -> Vec<String> {
-    let mut names: Vec<_> =
-        files::names(folder.path()).unwrap().into_iter().map(|n| n.into_string().unwrap()).collect();
-    names.sort();
-    names
-}
-
-#[test]
-fn a_folder_takes_a_run_through_interruption_and_damage_to_the_same_end() {
-    let home = tempfile::tempdir().unwrap();
-    let mut whole = RunFolder::start(&home.path().join("whole.run"), "a = 1", false).unwrap();
-    let (ending, scene, _) = train(&mut whole, Interval::Iterations(7), u32::MAX);
-    assert_eq!(ending, Ending::Finished);
-    assert_eq!(
-        names(&whole),
-        [
-            "config.toml",
-            "iteration-00000035.checkpoint",
-            "iteration-00000040.checkpoint",
-            "lock",
-            "previews",
-            "progress.csv"
-        ]
-    );
-    let previews = |path: &Path| files::names(&path.join(PREVIEWS)).unwrap().len();
-    assert_eq!((previews(whole.path()), newest_preview(whole.path()).unwrap().0), (ITERATIONS as usize, ITERATIONS));
-    let log = fs::read_to_string(whole.path().join(LOG)).unwrap();
-
-    let path = home.path().join("broken.run");
-    let mut folder = RunFolder::start(&path, "a = 1", false).unwrap();
-    assert_eq!(train(&mut folder, Interval::Iterations(9), 23).0, Ending::Interrupted);
-    drop(folder);
-    // The newest checkpoint turns out damaged.
-    let newest = path.join("iteration-00000023.checkpoint");
-    let mut bytes = fs::read(&newest).unwrap();
-    bytes[1000] ^= 1;
-    fs::write(&newest, bytes).unwrap();
-    fs::write(path.join("iteration-00000030.checkpoint.partial"), "half").unwrap();
-    let mut folder = RunFolder::reopen(&path).unwrap();
-    assert_eq!(folder.config().unwrap(), "a = 1");
-    let (ending, resumed_scene, passed_over) = train(&mut folder, Interval::Iterations(9), u32::MAX);
-    assert_eq!(ending, Ending::Finished);
-    assert!(passed_over.len() == 1 && passed_over[0].contains("iteration-00000023.checkpoint: its content"));
-    assert!(resumed_scene == scene, "the same bits");
-    let without_seconds = |log: &str| {
-        let row = |row: &str| row.split(',').enumerate().filter(|(i, _)| *i != 4).map(|(_, v)| v.to_owned()).collect();
-        log.lines().map(row).collect::<Vec<Vec<String>>>()
-    };
-    let resumed_log = fs::read_to_string(path.join(LOG)).unwrap();
-    assert_eq!(without_seconds(&resumed_log), without_seconds(&log));
-    assert_eq!(log.lines().count(), 1 + ITERATIONS as usize);
-
-    folder.finish("{}", false).unwrap();
-    let error = RunFolder::reopen(&path).unwrap_err();
-    assert!(matches!(error, RunError::Finished { .. }), "{error}");
-    let again = RunFolder::start(&path, "a = 2", false).unwrap();
-    assert_eq!(names(&again), ["config.toml", "lock"]);
+    let mut ends = Vec::new();
+    for lambda in [0.0, 0.5] {
+        let mut config = TrainConfig { backbone, ..tiny_hac_config(300) };
+        config.hac = config::Hac { lambda, sample: 1.0, ..config.hac };
+        let mut trainer = Trainer::new(&capture, config).unwrap();
+        let steps = trained(&mut trainer);
+        for (phase, rate) in &steps {
+            assert_eq!(rate.is_some(), matches!(phase, Phase::Context | Phase::IntegerModel));
+        }
+        let rates: Vec<f64> = steps.iter().filter_map(|(_, rate)| Some(rate.as_ref()?.bits.iter().sum())).collect();
+        let finished = trainer.finish().unwrap();
+        let n_drawn =
+            (0..finished.scene.anchors.mask_logits.len()).filter(|i| finished.scene.anchors.is_drawn(*i)).count();
+        ends.push((rates[0], rates[rates.len() - 1], n_drawn));
+    }
+    let [free, weighed] = [ends[0], ends[1]];
+    assert!(weighed.1 < share * weighed.0 && weighed.1 < 0.7 * free.1, "bits an anchor, first and last: {ends:?}");
+    assert!(weighed.2 < free.2, "drawn offsets: {ends:?}");
 }
 
 #[test]
-fn a_fork_begins_where_its_run_stood() {
-    let (home, capture) = (tempfile::tempdir().unwrap(), tiny_capture());
-    let path = home.path().join("a.run");
-    let mut folder = RunFolder::start(&path, "", false).unwrap().forking_at(&[12, 20]);
-    let (_, scene, _) = train(&mut folder, Interval::Iterations(7), u32::MAX);
-    folder.finish("{}", false).unwrap();
-    let config = tiny_config(ITERATIONS);
-    let mut same = fork(&path, 12, &capture, config).unwrap();
-    assert_eq!(same.iteration, 12);
-    let mut other = config;
-    other.rates.feature.end = 1e-6;
-    let mut other = fork(&path, 20, &capture, other).unwrap();
-    for trainer in [&mut same, &mut other] {
-        while !trainer.is_done() {
+fn every_pass_over_the_views_has_an_order_of_its_own() {
+    let capture = test_capture::many_views(12);
+    let mut trainer = Trainer::new(&capture, tiny_config(100)).unwrap();
+    let mut order = || -> Vec<u32> {
+        let mut taken = Vec::new();
+        for _ in 0..12 {
+            let before = if trainer.state.queue.is_empty() {
+                trainer.setup.views.trained.clone()
+            } else {
+                trainer.state.queue.clone()
+            };
             trainer.advance().unwrap();
+            taken.extend(before.into_iter().filter(|view| !trainer.state.queue.contains(view)));
         }
+        taken
+    };
+    let passes = [order(), order()];
+    for pass in &passes {
+        let mut sorted = pass.clone();
+        sorted.sort_unstable();
+        assert_eq!(sorted, (0..12).collect::<Vec<u32>>(), "each view once");
+        assert!(!pass.is_sorted() && !pass.iter().rev().is_sorted(), "{pass:?}");
     }
-    assert!(same.scene == scene, "the same settings, the same bits");
-    assert!(other.scene != scene && other.scene.anchors.len() == scene.anchors.len());
-
-    let message = fork(&path, 35, &capture, config).unwrap_err().to_string();
-    assert!(message.contains("no checkpoint of iteration 35, it has those of [12, 20]"), "{message}");
-    let mut wider = config;
-    wider.shape.feature_dim += 1;
-    let error = fork(&path, 12, &capture, wider).unwrap_err();
-    let source = std::error::Error::source(&error).unwrap().to_string();
-    let width = config.shape.feature_dim;
-    let expected =
-        format!("a fork keeps `train.shape.feature_dim` of its run, which is {width}, but {} was asked for", width + 1);
-    assert!(source.contains(&expected), "{error}: {source}");
-}
-
-/// A run whose checkpoints fail to write.
-struct Unwritable;
-
-impl Resumable for Unwritable {
-    fn iteration(&self) -> u32 {
-        12
-    }
-
-    fn iterations(&self) -> u32 {
-        40
-    }
-
-    fn seconds(&self) -> f64 {
-        0.0
-    }
-
-    fn n_dropped(&self) -> u32 {
-        0
-    }
-
-    fn size(&self) -> [usize; 2] {
-        [0; 2]
-    }
-
-    fn save(&self, out: &mut dyn Write) -> std::io::Result<()> {
-        out.write_all(b"half")?;
-        Err(std::io::ErrorKind::StorageFull.into())
-    }
+    assert_ne!(passes[0], passes[1]);
 }
 
 #[test]
-fn a_fork_has_a_folder_only_with_its_first_checkpoint() {
-    let home = tempfile::tempdir().unwrap();
-    let path = home.path().join("a.run");
-    // Neither where there was nothing, nor where a finished run lies.
-    for finished in [false, true] {
-        if finished {
-            RunFolder::start(&path, "a = 1", false).unwrap().finish("{}", false).unwrap();
-        }
-        let error = RunFolder::start_from(&path, "a = 2", false, &Unwritable).unwrap_err();
-        assert!(matches!(error, RunError::Write { .. }), "{error}");
-        assert!(
-            matches!(RunFolder::reopen(&path), Err(RunError::NoRun { .. })),
-            "it would begin with the capture's points"
-        );
-    }
+fn a_bit_costs_what_lambda_says_in_squared_error() {
     let capture = tiny_capture();
-    let trainer = Trainer::new(&capture, tiny_config(ITERATIONS)).unwrap();
-    let folder = RunFolder::start_from(&path, "a = 2", false, &trainer).unwrap();
-    assert_eq!(names(&folder), ["config.toml", "iteration-00000000.checkpoint", "lock"]);
+    let mut config = tiny_hac_config(100);
+    config.hac.lambda = 0.01;
+    let mut trainer = Trainer::new(&capture, config).unwrap();
+    while trainer.state.learned.scene.context.is_none() {
+        trainer.advance().unwrap();
+    }
+    let found = trainer.view().worth().unwrap().bit_price;
+    // As the views are drawn: mean squared error and image loss, L1 and SSIM by 8:2.
+    let (mut squared, mut loss) = (0.0, 0.0);
+    for view in &capture.train {
+        let (drawn, truth) = (trainer.draw(view).unwrap(), view.photograph().unwrap());
+        let n = truth.image.rgb.len() as f64;
+        let differences = drawn.rgb.iter().zip(&truth.image.rgb).map(|(a, b)| (f64::from(*a) - f64::from(*b)) / 255.0);
+        let (l1, l2) = differences.fold((0.0, 0.0), |(l1, l2), d| (l1 + d.abs() / n, l2 + d * d / n));
+        squared += l2 / capture.train.len() as f64;
+        loss += (0.8 * l1 + 0.2 * (1.0 - pocketsplat_metrics::ssim(&drawn, &truth.image))) / capture.train.len() as f64;
+    }
+    let n_values = trainer.state.learned.scene.anchors.len() * trainer.state.learned.scene.shape.values_per_anchor();
+    let expected = 0.01 / n_values as f64 * 2.0 * squared / loss;
+    assert!((found / expected - 1.0).abs() < 0.03, "{found}, needed: {expected}");
 }
 
 #[test]
-fn checkpoints_by_time_wait_for_their_time() {
-    let home = tempfile::tempdir().unwrap();
-    for (seconds, at_least) in [(0.0, 2), (1e9, 1)] {
-        let mut folder = RunFolder::start(home.path(), "", true).unwrap();
-        train(&mut folder, Interval::Seconds(seconds), u32::MAX);
-        assert_eq!(folder.checkpoints().unwrap().len(), at_least, "every {seconds} s");
-    }
-}
-
-#[test]
-fn an_unfinished_run_is_not_overwritten_by_accident() {
-    let home = tempfile::tempdir().unwrap();
-    let path = home.path().join("a.run");
-    let mut folder = RunFolder::start(&path, "", false).unwrap();
-    train(&mut folder, Interval::Iterations(0), 3);
-    let error = RunFolder::start(&path, "", false).unwrap_err();
-    assert!(matches!(error, RunError::InUse { .. }), "{error}");
-    assert!(matches!(RunFolder::reopen(&path), Err(RunError::InUse { .. })));
-    drop(folder);
-    let error = RunFolder::start(&path, "", false).unwrap_err();
-    assert!(matches!(error, RunError::Unfinished { .. }), "{error}");
-    assert!(error.to_string().contains("--resume") && error.to_string().contains("--overwrite"), "{error}");
-    RunFolder::start(&path, "", true).unwrap();
-}
-
-#[test]
-fn other_folders_are_left_alone() {
-    let home = tempfile::tempdir().unwrap();
-    let error = RunFolder::reopen(home.path()).unwrap_err();
-    assert!(matches!(error, RunError::NoRun { .. }), "{error}");
-    fs::write(home.path().join("photo.png"), "").unwrap();
-    for overwrite in [false, true] {
-        let error = RunFolder::start(home.path(), "", overwrite).unwrap_err();
-        assert!(matches!(error, RunError::Foreign { .. }), "{error}");
-    }
-    assert_eq!(files::names(home.path()).unwrap(), ["photo.png"]);
-    // Another program's configuration.
-    fs::write(home.path().join(CONFIG), "title = 1").unwrap();
-    assert!(matches!(RunFolder::start(home.path(), "", true), Err(RunError::Foreign { .. })));
-}
-
-#[test]
-fn what_is_not_of_the_run_stays_in_its_folder() {
-    let home = tempfile::tempdir().unwrap();
-    let path = home.path().join("a.run");
-    let mut folder = RunFolder::start(&path, "", false).unwrap();
-    train(&mut folder, Interval::Iterations(0), u32::MAX);
-    folder.finish("{}", false).unwrap();
-    for name in ["film.mp4.partial", "iteration-00000030.checkpoint.4711.partial", "previews/mine.jpg"] {
-        fs::write(path.join(name), "mine").unwrap();
-    }
-    RunFolder::check(&path, false).unwrap();
-    let again = RunFolder::start(&path, "", false).unwrap();
-    assert_eq!(names(&again), ["config.toml", "film.mp4.partial", "lock", "previews"]);
-    assert_eq!(files::names(&path.join(PREVIEWS)).unwrap(), ["mine.jpg"]);
-    // Another program's folder, whose lock says who holds it.
-    let other = home.path().join("other");
-    fs::create_dir(&other).unwrap();
-    for (name, content) in [(CONFIG, "title = 1"), (LOCK, "pid 17"), (RESULT, "theirs")] {
-        fs::write(other.join(name), content).unwrap();
-    }
-    for refused in [RunFolder::check(&other, true), RunFolder::start(&other, "", true).map(drop)] {
-        assert!(matches!(refused, Err(RunError::Foreign { .. })), "{refused:?}");
-    }
-    assert_eq!(fs::read_to_string(other.join(RESULT)).unwrap(), "theirs");
-    let file = home.path().join("file");
-    fs::write(&file, "mine").unwrap();
-    for refused in [RunFolder::check(&file, true), RunFolder::start(&file, "", true).map(drop)] {
-        assert!(refused.unwrap_err().to_string().contains("choose another folder with --run"));
+fn masks_stay_once_the_integer_model_decides() {
+    let capture = tiny_capture();
+    let mut config = tiny_hac_config(100);
+    config.hac = config::Hac { lambda: 0.5, ..config.hac };
+    let mut trainer = Trainer::new(&capture, config).unwrap();
+    let mut masks = Vec::new();
+    while !trainer.is_done() {
+        let same = masks == trainer.state.learned.scene.anchors.mask_logits;
+        assert_eq!(
+            same,
+            trainer.setup.config.phase(trainer.state.iteration) == Phase::IntegerModel,
+            "{}",
+            trainer.state.iteration
+        );
+        masks.clone_from(&trainer.state.learned.scene.anchors.mask_logits);
+        trainer.advance().unwrap();
     }
 }
 
 #[test]
-fn a_picture_that_cannot_be_written_ends_no_run() {
-    #[derive(Default)]
-    struct Heard(usize);
-    impl Observer for Heard {
-        fn step(&mut self, _: u32, _: &StepReport<f32>, _: &pocketsplat_kernels::scene::Scene<f32>) {}
-        fn unwritten(&mut self, why: &dyn std::error::Error) {
-            assert!(why.to_string().contains(PREVIEWS), "{why}");
-            self.0 += 1;
-        }
+fn the_last_phase_draws_the_heads_as_they_are_written() {
+    let capture = tiny_capture();
+    let mut trainer = Trainer::new(&capture, tiny_hac_config(100)).unwrap();
+    while trainer.setup.config.phase(trainer.state.iteration + 1) != Phase::IntegerModel {
+        trainer.advance().unwrap();
     }
-    let (home, capture) = (tempfile::tempdir().unwrap(), tiny_capture());
-    // No folder of pictures can be made; then one of the pictures cannot.
-    for name in [PREVIEWS, "previews/00000003.jpg/folder"] {
-        let path = home.path().join(name.replace('/', "-"));
-        let mut folder = RunFolder::start(&path, "", false).unwrap();
-        if name == PREVIEWS {
-            fs::write(path.join(name), "").unwrap();
-        } else {
-            fs::create_dir_all(path.join(name)).unwrap();
-        }
-        let mut heard = Heard::default();
-        let mut trainer = Trainer::new(&capture, tiny_config(5)).unwrap();
-        let every = Interval::Iterations(0);
-        let ending = folder.train(&mut trainer, &mut heard, every, &AtomicBool::new(false)).unwrap();
-        assert_eq!((ending, heard.0), (Ending::Finished, 1), "{name}");
-    }
+    let mut rounded = trainer.clone();
+    rounded.state.learned.scene.heads = Integers::of(&trainer.state.learned.scene).unwrap().heads;
+    assert!(rounded.state.learned.scene.heads != trainer.state.learned.scene.heads);
+    let losses = [&mut trainer, &mut rounded].map(|trainer| trainer.advance().unwrap().report.loss);
+    assert_eq!(losses[0], losses[1], "neither draws what lies between two steps");
+    let weights = trainer.state.learned.scene.heads.colour.w1.iter();
+    assert!(weights.filter(|weight| (**weight * 128.0).fract() != 0.0).count() > 0, "but it moves");
+    assert_eq!(trainer.finish().unwrap().head_fraction_bits, Some(7));
 }
 
 #[test]
-fn when_no_checkpoint_is_sound_all_are_named() {
-    let home = tempfile::tempdir().unwrap();
-    let folder = RunFolder::start(home.path(), "", false).unwrap();
-    assert!(folder.resume(&tiny_capture()).unwrap().is_none());
-    for iteration in [3, 4] {
-        fs::write(home.path().join(format!("iteration-{iteration:08}.checkpoint")), "nothing").unwrap();
-    }
-    let message = folder.resume(&tiny_capture()).unwrap_err().to_string();
-    assert!(message.contains("iteration-00000003") && message.contains("iteration-00000004"), "{message}");
+fn a_finished_scene_keeps_its_values_and_counts_the_bits_of_its_symbols() {
+    let capture = tiny_capture();
+    let mut trainer = Trainer::new(&capture, tiny_hac_config(80)).unwrap();
+    trained(&mut trainer);
+    let Finished { scene, importance, estimated_bits, .. } = trainer.finish().unwrap();
+    assert_eq!(importance.len(), scene.anchors.len());
+    assert!(estimated_bits.unwrap().iter().all(|bits| *bits > 0.0));
+    let masks = scene.anchors.mask_logits.clone();
+    let before = Anchors { mask_logits: masks, ..trainer.state.learned.scene.anchors.clone() };
+    assert!(scene.anchors == before, "only offsets that no view draws are masked");
+    let mut again = trainer.clone();
+    again.state.learned.scene = scene.clone();
+    let again = again.finish().unwrap();
+    assert!(again.scene == scene && again.importance == importance && again.estimated_bits == estimated_bits);
 }
 
 #[test]
-fn a_write_that_fails_leaves_the_older_file() {
-    let home = tempfile::tempdir().unwrap();
-    let path = home.path().join("file");
-    fs::write(&path, "older").unwrap();
-    let error = files::write_whole(&path, |out| {
-        out.write_all(&vec![0; 100_000])?;
-        Err(std::io::ErrorKind::StorageFull.into())
-    });
-    assert!(matches!(error, Err(RunError::Write { .. })), "{error:?}");
-    assert_eq!(fs::read(&path).unwrap(), b"older");
-    assert_eq!(files::names(home.path()).unwrap(), ["file"]);
+fn held_out_views_are_never_trained_on() {
+    let mut capture = tiny_capture();
+    let views = capture.train.clone();
+    capture.train = views.iter().cycle().take(13).cloned().collect();
+    for (i, view) in capture.train.iter_mut().enumerate() {
+        view.name = format!("{i}");
+    }
+    let config = TrainConfig { validation_every: 24, ..tiny_hac_config(60) };
+    let mut trainer = Trainer::new(&capture, config).unwrap();
+    assert_eq!(trainer.validation_views().map(|view| view.name.as_str()).collect::<Vec<_>>(), ["11"]);
+    trained(&mut trainer);
+    let mut without = capture.clone();
+    edit(&mut without.train[11], |photograph| photograph.image.rgb.fill(77));
+    let mut other = Trainer::new(&without, config).unwrap();
+    trained(&mut other);
+    assert!(trainer.state.learned.scene == other.state.learned.scene, "its pixels change nothing");
+}
+
+#[test]
+fn a_learned_background_comes_to_the_colour_behind_the_scene() {
+    let behind = [60, 120, 180];
+    let mut capture = tiny_capture();
+    for view in &mut capture.train {
+        edit(view, |photograph| {
+            let pixels = photograph.image.rgb.as_chunks_mut::<3>().0;
+            pixels.iter_mut().filter(|pixel| **pixel == [0; 3]).for_each(|pixel| *pixel = behind);
+        });
+    }
+    // Else splats cover all of it.
+    capture.points.iter_mut().for_each(|point| *point *= 0.25);
+    let trained = |learns_background: bool| {
+        let mut trainer = Trainer::new(&capture, TrainConfig { learns_background, ..tiny_config(400) }).unwrap();
+        trained(&mut trainer);
+        trainer.finish().unwrap().background
+    };
+    assert_eq!(trained(false), [0; 3], "the capture's");
+    let found = trained(true);
+    assert!(found.iter().zip(behind).all(|(found, behind)| found.abs_diff(behind) < 20), "{found:?}");
 }

@@ -1,0 +1,56 @@
+//! Where a run stands: not begun, begun, or finished.
+
+use std::path::Path;
+
+use anyhow::{Result, bail};
+use pocketsplat_trainer::train::run::{RunError, RunFolder};
+
+use super::in_folder::IN_RUN_AND_ON_COMMAND_LINE;
+use crate::config::RunConfig;
+
+/// Where the run that is asked for stands.
+pub(crate) enum RunStatus {
+    /// Not begun; its folder.
+    New(RunFolder),
+    /// Begun and not finished; its folder.
+    Begun(RunFolder),
+    /// Finished, and its bundle is there.
+    Finished,
+}
+
+impl RunStatus {
+    /// Of the run in `path`; takes the folder for this process unless the run is finished.
+    ///
+    /// # Errors
+    /// Another process works in the folder, or the run in it is not the one that is asked for.
+    pub(crate) fn of(path: &Path, config: &RunConfig) -> Result<Self> {
+        match RunFolder::reopen(path) {
+            Ok(folder) => {
+                refuse_other(&RunConfig::parse(&folder.config()?)?, config, path)?;
+                Ok(Self::Begun(folder))
+            }
+            Err(RunError::Finished { .. }) if config.output.is_file() => {
+                refuse_other(&RunConfig::read(&path.join("config.toml"))?, config, path)?;
+                Ok(Self::Finished)
+            }
+            // Finished without its bundle: somebody removed it.
+            Err(RunError::NoRun { .. } | RunError::Finished { .. }) => {
+                Ok(Self::New(RunFolder::start(path, &config.to_toml()?, false)?))
+            }
+            Err(error) => Err(error.into()),
+        }
+    }
+}
+
+/// Stops where the run in a folder is not the one that is asked for, in its bundle's bytes or its capture.
+fn refuse_other(begun: &RunConfig, config: &RunConfig, folder: &Path) -> Result<()> {
+    let difference = match begun.difference(config, IN_RUN_AND_ON_COMMAND_LINE)? {
+        Some(difference) => difference,
+        None if begun.encoding != config.encoding => "its bundle is coded in another way".to_owned(),
+        None if begun.dataset != config.dataset => {
+            format!("its capture is {}, not {}", begun.dataset.display(), config.dataset.display())
+        }
+        None => return Ok(()),
+    };
+    bail!("the run in {} is not the one that is asked for: {difference}; choose another --output", folder.display())
+}

@@ -1,0 +1,8 @@
+//! From an anchor and a direction of view to Gaussians.
+
+pub mod detail;
+pub mod head;
+pub mod head_input;
+pub mod mask;
+pub mod neural_gaussians;
+pub mod written;

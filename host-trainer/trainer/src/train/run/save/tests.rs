@@ -1,0 +1,205 @@
+use rand::RngExt;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use super::*;
+use crate::train::config::Backbone;
+use crate::train::limits::{Finished, LimitProbe, LimitShares, MeasuredShares};
+use crate::train::modules::{Modules, Rdo};
+use crate::train::test_capture::{edit, tiny_capture, tiny_config, tiny_hac_config};
+use crate::train::{Observer, TrainConfig, TrainError, Trainer};
+use pocketsplat_capture::dataset::Mask;
+
+struct Silent;
+
+impl Observer for Silent {
+    fn step(
+        &mut self,
+        _: u32,
+        _: &pocketsplat_kernels::step::StepReport<f32>,
+        _: &pocketsplat_kernels::scene::Scene<f32>,
+    ) {
+    }
+}
+
+fn saved(trainer: &Trainer<'_>) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    trainer.save(&mut bytes).unwrap();
+    bytes
+}
+
+/// Everything but the time it took.
+fn timeless(trainer: &Trainer<'_>) -> Vec<u8> {
+    let mut trainer = trainer.clone();
+    (trainer.state.seconds, trainer.state.processor_seconds) = (0.0, 0.0);
+    saved(&trainer)
+}
+
+/// Ten runs of each backbone, each stopped after a random iteration and taken up again by a new trainer.
+#[test]
+fn a_run_taken_up_again_ends_in_the_same_bits() {
+    taken_up_again(tiny_config(90), None);
+    taken_up_again(TrainConfig { learns_background: true, ..tiny_config(90) }, None);
+    taken_up_again(tiny_hac_config(90), None);
+    taken_up_again(TrainConfig { backbone: Backbone::ContextGs, ..tiny_hac_config(90) }, None);
+    let modules = Modules { rdo: Some(Rdo::default()), ..Modules::default() };
+    taken_up_again(
+        TrainConfig { modules, ..tiny_hac_config(90) },
+        Some(LimitProbe { measure: &draws_150, limits_bytes: true }),
+    );
+}
+
+/// A device that draws 150 anchors, and holds the bytes of half as many more.
+fn draws_150(finished: &Finished) -> MeasuredShares {
+    let anchors = &finished.scene.anchors;
+    let n = (0..anchors.len()).filter(|anchor| anchors.has_drawn(*anchor)).count() as f64;
+    Ok(LimitShares { ram: n / 150.0, bytes: n / 225.0, ..LimitShares::default() })
+}
+
+fn taken_up_again(config: TrainConfig, limits: Option<LimitProbe<'_>>) {
+    let (capture, iterations) = (tiny_capture(), config.iterations);
+    let mut whole = Trainer::new(&capture, config).unwrap().fitting(limits);
+    let mut along_the_way = vec![saved(&whole)];
+    let mut n_anchors = vec![whole.state.learned.scene.anchors.len()];
+    while !whole.is_done() {
+        whole.advance().unwrap();
+        along_the_way.push(saved(&whole));
+        n_anchors.push(whole.state.learned.scene.anchors.len());
+    }
+    assert!(n_anchors.windows(2).any(|n| n[1] > n[0]), "the run must grow: {n_anchors:?}");
+    assert!(n_anchors.windows(2).any(|n| n[1] < n[0]), "the run must prune: {n_anchors:?}");
+    let last = timeless(&whole);
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    for _ in 0..10 {
+        let stopped_after = rng.random_range(0..=iterations as usize);
+        let Restored { run: mut trainer, written_by } =
+            Trainer::restore(&capture, &along_the_way[stopped_after]).unwrap();
+        assert_eq!(written_by, trainer.kernels());
+        assert_eq!(trainer.state.iteration as usize, stopped_after);
+        assert_eq!(saved(&trainer), along_the_way[stopped_after], "restoring and saving is the identity");
+        trainer = trainer.fitting(limits);
+        trainer.run(&mut Silent).unwrap();
+        assert!(timeless(&trainer) == last, "{:?} stopped after {stopped_after}", config.backbone);
+    }
+}
+
+#[test]
+fn no_damage_passes() {
+    let capture = tiny_capture();
+    let mut trainer = Trainer::new(&capture, tiny_config(20)).unwrap();
+    trainer.advance().unwrap();
+    let bytes = saved(&trainer);
+    let fault = |bytes: &[u8]| match Trainer::restore(&capture, bytes) {
+        Err(RestoreError::Fault(fault)) => fault,
+        other => panic!("{other:?}"),
+    };
+    for cut in (0..bytes.len()).step_by(997).chain([0, 1, 7, 8, 11, 12, 15, bytes.len() - 1]) {
+        fault(&bytes[..cut]);
+    }
+    for at in (0..bytes.len()).step_by(499) {
+        let mut damaged = bytes.clone();
+        damaged[at] ^= 0x10;
+        fault(&damaged);
+    }
+    let mut newer = bytes.clone();
+    newer[8] = 9;
+    assert_eq!(fault(&newer), CheckpointFault::Version { found: 9 });
+    assert_eq!(fault(b"PNG"), CheckpointFault::Magic);
+    let mut longer = bytes[..bytes.len() - 4].to_vec();
+    longer.extend([0; 8]);
+    let checksum = crc32fast::hash(&longer);
+    longer.extend(checksum.to_le_bytes());
+    assert!(matches!(fault(&longer), CheckpointFault::Content { found: 8, .. }), "{:?}", fault(&longer));
+}
+
+#[test]
+fn another_capture_is_refused_by_what_differs() {
+    let capture = tiny_capture();
+    let bytes = saved(&Trainer::new(&capture, tiny_config(20)).unwrap());
+    let refused = |change: fn(&mut pocketsplat_capture::dataset::Capture)| {
+        let mut other = tiny_capture();
+        change(&mut other);
+        let error = Trainer::restore(&other, &bytes).unwrap_err();
+        assert!(matches!(error, RestoreError::Capture(_)), "{error}");
+        error.to_string()
+    };
+    let begins = "this is not the capture that the run began with: ";
+    for (change, message) in [
+        (
+            (|c| drop(c.train.pop())) as fn(&mut pocketsplat_capture::dataset::Capture),
+            "it has 4 training views, the run began with 5",
+        ),
+        (|c| c.train[2].name.push('b'), "its training view 2 is `view_2b`, the run began with `view_2`"),
+        (
+            |c| edit(&mut c.train[1], |photograph| photograph.image.rgb[77] ^= 1),
+            "the pixels or the mask of its view `view_1` are others",
+        ),
+        (
+            |c| {
+                let mask = Some(Mask { width_px: 24, height_px: 24, valid: vec![true; 24 * 24] });
+                edit(&mut c.train[3], |photograph| photograph.mask = mask);
+            },
+            "the pixels or the mask of its view `view_3` are others",
+        ),
+        (|c| c.train[0].camera.translation.x += 1e-6, "the camera of its view `view_0` is another one"),
+        (|c| c.train[0].camera.width_px = 23, "its view `view_0` has 23×24 px, the run began with 24×24"),
+        (|c| c.background = [1.0; 3], "its background is [1.0, 1.0, 1.0], the run began with [0.0, 0.0, 0.0]"),
+    ] {
+        let found = refused(change);
+        assert!(found.starts_with(&format!("{begins}{message}")), "{found}");
+    }
+    // What an ulp in a tangent makes of a pose is no other camera.
+    let mut close = tiny_capture();
+    close.train[0].camera.focal_px[0] *= 1.0 + 1e-15;
+    close.test.push(close.train[0].clone());
+    Trainer::restore(&close, &bytes).unwrap();
+}
+
+#[test]
+fn a_fork_takes_photographs_of_another_size_but_no_other_poses() {
+    let bytes = saved(&Trainer::new(&tiny_capture(), tiny_config(20)).unwrap());
+    let mut larger = tiny_capture();
+    for view in &mut larger.train {
+        view.camera.focal_px = view.camera.focal_px.map(|focal| 2.0 * focal);
+        (view.camera.width_px, view.camera.height_px) = (48, 48);
+    }
+    assert!(matches!(Trainer::restore(&larger, &bytes), Err(RestoreError::Capture(CaptureDifference::Size { .. }))));
+    Trainer::fork(&larger, &bytes, tiny_config(20)).unwrap();
+    larger.train[1].camera.translation.x += 1e-6;
+    let moved = Trainer::fork(&larger, &bytes, tiny_config(20)).unwrap_err();
+    assert_eq!(
+        moved.to_string(),
+        "this is not the capture that the run began with: the camera of its view `view_1` is another one than when the run began"
+    );
+}
+
+#[test]
+fn a_fork_keeps_the_context_model_once_there_is_one() {
+    let (capture, config) = (tiny_capture(), tiny_hac_config(30));
+    let mut trainer = Trainer::new(&capture, config).unwrap();
+    let plain = TrainConfig { backbone: Backbone::Scaffold, ..config };
+    let mut finer = config;
+    finer.hac.base_steps.offset = 0.1;
+    let early = saved(&trainer);
+    for asked in [plain, finer] {
+        Trainer::fork(&capture, &early, asked).unwrap();
+    }
+    while trainer.state.learned.scene.context.is_none() {
+        trainer.advance().unwrap();
+    }
+    let late = saved(&trainer);
+    for (asked, expected) in [
+        (plain, "keeps `train.backbone` of its run, which is \"hac\", but \"scaffold\" was asked for"),
+        (finer, "keeps `train.hac.base_steps.offset` of its run, which is 0.35, but 0.1 was asked for"),
+    ] {
+        let error = Trainer::fork(&capture, &late, asked).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error}");
+    }
+}
+
+#[test]
+fn a_capture_without_views_is_no_start() {
+    let mut capture = tiny_capture();
+    capture.train.clear();
+    assert!(matches!(Trainer::new(&capture, tiny_config(20)), Err(TrainError::NoViews)));
+}

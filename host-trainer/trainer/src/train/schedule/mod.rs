@@ -1,0 +1,12 @@
+//! When what happens in a run: learning rates, growth and pruning, the phases of coding, as numbers that a user may set.
+
+mod config_error;
+mod densification;
+mod hac;
+mod rates;
+
+pub use config_error::ConfigError;
+pub(crate) use config_error::within;
+pub use densification::Densification;
+pub use hac::{Backbone, Hac};
+pub use rates::{LearningRate, Rates};

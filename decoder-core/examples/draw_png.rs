@@ -7,7 +7,7 @@
 use std::convert::Infallible;
 use std::error::Error;
 
-use pocketsplat_core::{Budget, Bundle, Decoder, TileSink};
+use pocketsplat_core::{Budget, Bundle, Decoder, Tile, TileSink};
 
 /// The bundle of the format's description: three anchors, drawn where no other bundle is given.
 const EXAMPLE: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/bundle/example.psb"));
@@ -22,7 +22,7 @@ struct Frame {
 impl TileSink for Frame {
     type Error = Infallible;
 
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, _height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
+    fn tile(&mut self, Tile { x_px, y_px, width, rgb, .. }: Tile<'_>) -> Result<(), Infallible> {
         for (row, pixels) in rgb.chunks_exact(width.into()).enumerate() {
             let first = ((usize::from(y_px) + row) * self.width_px + usize::from(x_px)) * 3;
             self.rgb[first..][..pixels.as_flattened().len()].copy_from_slice(pixels.as_flattened());

@@ -14,7 +14,7 @@ compile_error!(
 // Each module imports only modules before it in this list: error · rules · math · stopwatch · camera · bytes · arena · entropy ·
 // context · bundle · mlp · scene · project · raster · arithmetic · bake · budget · decoder · display. `tests/tests/rooms.rs` holds the crate to it.
 mod arena;
-pub mod arithmetic;
+mod arithmetic;
 mod bake;
 pub mod budget;
 pub mod bundle;
@@ -34,6 +34,7 @@ pub mod rules;
 mod scene;
 mod stopwatch;
 
+pub use arithmetic::{Arithmetic, ReferenceArithmetic, WithoutFpu};
 pub use budget::{
     Budget, HeadWeights, MaxSplats, Overflow, Part, PartMemory, Plan, Quality, Residency, Resident, ScratchShape,
     Strips, Work,
@@ -41,7 +42,7 @@ pub use budget::{
 pub use bundle::Bundle;
 pub use camera::{Camera, Rotation};
 pub use decoder::{
-    ByteOrder, Decoder, Drawing, FrameReport, PixelFormat, Rounding, Tile, TileRow, TileSink, count_gaussians,
+    ByteOrder, Decoder, Drawing, FrameReport, PixelFormat, Rounding, Scratch, Tile, TileRow, TileSink, count_gaussians,
     count_scratch_len,
 };
 pub use error::{DecodeError, ErrorClass, Field, Region, RenderError, SectionKind};

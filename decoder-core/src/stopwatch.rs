@@ -3,6 +3,7 @@
 /// A part of the work of [`Decoder::render_watched`](crate::Decoder::render_watched).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum Stage {
     /// From bits, or from integers in memory, to the channels of an anchor.
     Decode,

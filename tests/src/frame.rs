@@ -3,9 +3,8 @@
 use glam::DVec3;
 use pocketsplat_capture::dataset::Normalisation;
 use pocketsplat_codec::bundle::{self, BundleInfo, WriteOptions};
-use pocketsplat_core::arithmetic::Arithmetic;
 use pocketsplat_core::{
-    Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, MaxSplats, Quality, Residency, Strips,
+    Arithmetic, Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, MaxSplats, Quality, Residency, Strips,
 };
 use pocketsplat_kernels::camera::core_camera;
 use pocketsplat_kernels::scene::Scene;

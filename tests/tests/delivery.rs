@@ -4,7 +4,7 @@ use std::convert::Infallible;
 
 use conformance::frame::{Frame, budget_for, bundle_of, draw, to_core};
 use conformance::scenes::{CASES, cameras, random_scene};
-use pocketsplat_core::{Bundle, Decoder, TileSink};
+use pocketsplat_core::{Bundle, Decoder, Tile, TileSink};
 
 /// Where tiles began, in the order in which they came.
 #[derive(Default)]
@@ -13,7 +13,7 @@ struct Corners(Vec<[u16; 2]>);
 impl TileSink for Corners {
     type Error = Infallible;
 
-    fn tile(&mut self, x_px: u16, y_px: u16, _width: u16, _height: u16, _rgb: &[[u8; 3]]) -> Result<(), Infallible> {
+    fn tile(&mut self, Tile { x_px, y_px, .. }: Tile<'_>) -> Result<(), Infallible> {
         self.0.push([y_px, x_px]);
         Ok(())
     }

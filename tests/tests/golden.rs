@@ -106,10 +106,7 @@ fn rows_of_tiles_are_the_frames_in_every_format() {
             for format in &formats {
                 let mut rgb = rgb.as_chunks::<3>().0.to_vec();
                 let frame = Tile::new([0, 0], [width, height], &mut rgb).expect("a frame is a large tile");
-                let expected = match *format {
-                    PixelFormat::Rgb888 => frame.rgb.as_flattened_mut(),
-                    PixelFormat::Rgb565(order, rounding) => frame.into_rgb565(order, rounding),
-                };
+                let expected = frame.into_bytes(*format);
                 let found = in_rows(&bundle, plans[0], &camera, *format);
                 assert!(found == expected, "{name}, view {view}, {format:?}");
             }

@@ -32,10 +32,10 @@ fn picture(bytes: &[u8], camera: &Camera) -> Result<Frame, DecodeError> {
 /// Draws with damaged chunks left out.
 fn picture_skipping(bytes: &[u8], camera: &Camera) -> Result<(Frame, FrameReport), DecodeError> {
     let bundle = Bundle::parse(bytes)?;
-    let plan = bundle.plan(&budget_for(camera))?;
+    let plan = bundle.plan(&budget_for(camera).skipping_damage())?;
     let mut scratch = vec![0; plan.scratch_len()];
     let mut frame = Frame::new(camera.width_px, camera.height_px);
-    let report = Decoder::bind_skipping_damage(&bundle, plan, &mut scratch)?.render(camera, &mut frame)?;
+    let report = Decoder::bind(&bundle, plan, &mut scratch)?.render(camera, &mut frame)?;
     Ok((frame, report))
 }
 

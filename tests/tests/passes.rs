@@ -4,11 +4,10 @@
 
 use conformance::fuzz::frame::Frame;
 use conformance::seal::reseal;
-use pocketsplat_core::budget::MAX_TRANSMITTANCE_STOP;
 use pocketsplat_core::bundle::{MANIFEST_RECORD_LEN, TierMeasures};
 use pocketsplat_core::{
-    Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, HeadWeights, MaxSplats, Overflow, Plan, Quality,
-    Residency, SectionKind, Strips,
+    Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, HeadWeights, MaxSplats, Overflow, Plan, Residency,
+    SectionKind, Strips,
 };
 
 const BUNDLE: &[u8] = include_bytes!("../golden/static.psb");
@@ -27,22 +26,16 @@ fn budget(n_strips: u8, n_places: u32, overflow: Overflow) -> Budget {
         .with_overflow(overflow)
 }
 
-fn drawn(
-    bundle: &Bundle<'_>,
-    plan: Plan,
-    camera: &Camera,
-    skip_damage: bool,
-) -> Result<(Frame, FrameReport), DecodeError> {
+fn drawn(bundle: &Bundle<'_>, plan: Plan, camera: &Camera) -> Result<(Frame, FrameReport), DecodeError> {
     let mut scratch = vec![0; plan.scratch_len()];
     let mut frame = Frame::new(camera.width_px, camera.height_px);
-    let bind = if skip_damage { Decoder::bind_skipping_damage } else { Decoder::bind };
-    let report = bind(bundle, plan, &mut scratch)?.render(camera, &mut frame)?;
+    let report = Decoder::bind(bundle, plan, &mut scratch)?.render(camera, &mut frame)?;
     Ok((frame, report))
 }
 
 fn report(budget: &Budget, camera: &Camera) -> FrameReport {
     let bundle = bundle();
-    let (_, report) = drawn(&bundle, bundle.plan(budget).expect("planned"), camera, false).expect("drawn");
+    let (_, report) = drawn(&bundle, bundle.plan(budget).expect("planned"), camera).expect("drawn");
     report
 }
 
@@ -69,12 +62,13 @@ fn strips_with_room_for_their_splats_share_a_pass() {
 
 #[test]
 fn slabs_behind_finished_pixels_are_not_drawn() {
-    let preview = bundle().header().preview;
-    let near = Camera { focal_px: preview.focal_px.map(|f| 40.0 * f), ..preview };
-    // A splat or two finish a pixel.
-    let soon = Quality { transmittance_stop: MAX_TRANSMITTANCE_STOP, ..Quality::EXACT };
-    let found = report(&budget(2, 2, Overflow::Slabs).with_quality(soon), &near);
-    assert!(found.slabs <= 30, "23 until every pixel is finished, 46 to the last splat: {found:?}");
+    let bundle = Bundle::parse(include_bytes!("../golden/isotropic.psb")).expect("a committed bundle is sound");
+    // So near that the few splats in view cover every pixel.
+    let camera = bundle.header().preview.orbited(2.355);
+    let camera = Camera { focal_px: camera.focal_px.map(|f| 400.0 * f), ..camera };
+    let plan = bundle.plan(&budget(2, 2, Overflow::Slabs)).expect("planned");
+    let (_, found) = drawn(&bundle, plan, &camera).expect("drawn");
+    assert!(found.slabs <= 46, "44 until every pixel is finished, 50 to the last splat: {found:?}");
 }
 
 /// A bundle with one chunk that decodes to other symbols and then does not end as it should, under right checksums.
@@ -104,14 +98,14 @@ fn a_damaged_chunk_takes_no_place_and_leaves_no_anchor_behind() {
         let bytes = damaged(chunk, at);
         let bundle = Bundle::parse(&bytes).expect("checksums are right");
         for (n_strips, n_places) in [(1, 40), (1, 400), (2, 300), (8, 100), (8, 2000)] {
-            let streamed = budget(n_strips, n_places, Overflow::LeaveOut);
+            let streamed = budget(n_strips, n_places, Overflow::LeaveOut).skipping_damage();
             let resident = streamed.with_residency(Residency::Resident);
             let f32s = |budget| bundle.plan(budget).expect("memory without limit");
             for plans in
                 [[&streamed, &resident].map(f32s), [&streamed, &resident].map(|budget| in_halves(&bundle, budget))]
             {
                 let [(frame, report), (expected, expected_report)] =
-                    plans.map(|plan| drawn(&bundle, plan, &preview, true).expect("damage is left out"));
+                    plans.map(|plan| drawn(&bundle, plan, &preview).expect("damage is left out"));
                 let counts = |r: &FrameReport| (r.splats, r.splats_dropped, r.chunks_damaged, r.first_damaged);
                 assert_eq!(
                     counts(&report),

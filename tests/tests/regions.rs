@@ -3,7 +3,6 @@
 use conformance::bundles::{ALL_CODERS, tiered};
 use conformance::frame::{Frame, budget_for, to_core};
 use conformance::scenes::{CASES, cameras};
-use pocketsplat_core::arithmetic::ReferenceArithmetic;
 use pocketsplat_core::{
     Budget, Bundle, Camera, DecodeError, Decoder, ErrorClass, FrameReport, MaxSplats, Overflow, Part, Plan, Region,
     Residency,
@@ -29,7 +28,7 @@ fn reported(bundle: &Bundle<'_>, plan: Plan, fill: u8, fewer: [usize; 2]) -> Res
         [plan.scratch_len() - fewer[0], plan.slow_scratch_len() - fewer[1]].map(|len| vec![fill; len]);
     let camera = view();
     let mut frame = Frame::new(camera.width_px, camera.height_px);
-    let mut decoder = Decoder::bind_in_regions::<ReferenceArithmetic>(bundle, plan, [&mut fast, &mut slow])?;
+    let mut decoder = Decoder::bind(bundle, plan, [&mut fast, &mut slow])?;
     let report = decoder.render(&camera, &mut frame)?;
     Ok((frame, report))
 }

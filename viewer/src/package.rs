@@ -42,7 +42,7 @@ pub fn package() -> [PackageFile; 9] {
 
 #[cfg(test)]
 mod tests {
-    use pocketsplat_core::budget::{MAX_ALPHA_CUT, MAX_FRAME_PX, MAX_TRANSMITTANCE_STOP};
+    use pocketsplat_core::budget::{MAX_ALPHA_CUT, MAX_FRAME_PX};
 
     use super::POCKETSPLAT;
 
@@ -52,7 +52,6 @@ mod tests {
         for line in [
             format!("const MAX_FRAME_PX = {MAX_FRAME_PX};"),
             format!("const MAX_ALPHA_CUT = {MAX_ALPHA_CUT};"),
-            format!("const MAX_TRANSMITTANCE_STOP = {MAX_TRANSMITTANCE_STOP};"),
             format!("const MAX_TIERS = {};", u8::MAX),
         ] {
             assert!(POCKETSPLAT.contains(&line), "{line}");

@@ -3,7 +3,7 @@
 use std::convert::Infallible;
 use std::slice;
 
-use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, Plan, Region, TileSink};
+use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, Plan, Region, Tile, TileSink};
 use pocketsplat_instructions::Costs;
 
 use crate::figures::{self, Figures};
@@ -158,7 +158,7 @@ impl Frame {
 impl TileSink for Frame {
     type Error = Infallible;
 
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, _height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
+    fn tile(&mut self, Tile { x_px, y_px, width, rgb, .. }: Tile<'_>) -> Result<(), Infallible> {
         for (row, pixels) in rgb.chunks_exact(width.into()).enumerate() {
             let first = (usize::from(y_px) + row) * self.width_px + usize::from(x_px);
             let (targets, _) = self.rgba[4 * first..].as_chunks_mut::<4>();

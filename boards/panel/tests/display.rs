@@ -61,9 +61,8 @@ struct Expected {
 impl TileSink for Expected {
     type Error = Infallible;
 
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
-        let mut rgb = rgb.to_vec();
-        let tile = Tile::new([x_px, y_px], [width, height], &mut rgb).expect("a pixel for each");
+    fn tile(&mut self, tile: Tile<'_>) -> Result<(), Infallible> {
+        let (x_px, y_px, width) = (tile.x_px, tile.y_px, tile.width);
         let pixels = tile.into_rgb565(ByteOrder::BigEndian, Rounding::Dithered).as_chunks().0;
         for (pixel, i) in pixels.iter().zip(0..) {
             let (x, y) = (x_px + i % width, self.top + y_px + i / width);

@@ -17,13 +17,13 @@ pub const MIN_SLAB_PLACES: u32 = 2;
 /// [reports](crate::FrameReport::splats_dropped) how many it left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum MaxSplats {
     /// As many as the fullest of the views in the bundle's manifest has, and a sixteenth more; if the manifest is not
     /// measured, [`Worst`](Self::Worst). A frame with a wider lens or nearer to the scene may need more. Where memory is left,
     /// strips may [share it](crate::Bundle::plan).
     Measured,
-    /// Every offset of every anchor of the tiers drawn: always enough in the
-    /// [reference arithmetic](crate::arithmetic::ReferenceArithmetic). [`Wide`](crate::arithmetic::Wide) splats have 0.7 of the places; of
+    /// Every offset of every anchor of the tiers drawn: always enough in the [reference arithmetic](crate::ReferenceArithmetic); of
     /// a scene that can be baked, other heads may draw an offset more.
     Worst,
     /// So many; with [slabs](Overflow::Slabs) at least [`MIN_SLAB_PLACES`].
@@ -33,12 +33,13 @@ pub enum MaxSplats {
 /// Where decoded anchors are kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum Residency {
     /// Least predicted work that fits.
     Auto,
     /// Nowhere: their Gaussians are evaluated once when bound, and are in memory, 32 bytes each. For scenes that
     /// [look the same](crate::Bundle::n_gaussians) from everywhere. Evaluated in the
-    /// [reference arithmetic](crate::arithmetic::ReferenceArithmetic), whatever the frame is drawn in.
+    /// [reference arithmetic](crate::ReferenceArithmetic), whatever the frame is drawn in.
     Baked,
     /// In memory, as integers, decoded once when bound.
     Resident,
@@ -51,6 +52,7 @@ pub enum Residency {
 /// A strip has ⌈tile rows / n⌉ rows of 16×16 tiles, so the last ones of a low frame may be missing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum Strips {
     /// Those that take the least predicted work. Of equals one, or else the most of 2, 4 and 8; in [slabs](Overflow::Slabs) the
     /// fewest.
@@ -62,6 +64,7 @@ pub enum Strips {
 /// What becomes of the splats of a strip that there is no place for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum Overflow {
     /// Those of the file's last anchors are left out, and [reported](crate::FrameReport::splats_dropped): the work of a frame
     /// is bounded.
@@ -83,6 +86,7 @@ pub enum Overflow {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct Budget {
     /// Bytes of scratch memory there are; the fast ones, if some are slow.
     pub ram_bytes: usize,
@@ -105,6 +109,8 @@ pub struct Budget {
     pub overflow: Overflow,
     /// Accuracy.
     pub quality: Quality,
+    /// Whether damaged chunks are left out, and each frame that needs some says so in its report; if not, they are errors.
+    pub skips_damage: bool,
 }
 
 impl Budget {
@@ -122,6 +128,7 @@ impl Budget {
             strips: Strips::Auto,
             overflow: Overflow::LeaveOut,
             quality: Quality::EXACT,
+            skips_damage: false,
         }
     }
 
@@ -174,6 +181,17 @@ impl Budget {
     #[must_use]
     pub const fn with_quality(self, quality: Quality) -> Self {
         Self { quality, ..self }
+    }
+
+    /// Leaves damaged chunks out, and [reports](crate::FrameReport::chunks_damaged) them in each frame that needs some. Drawn in
+    /// [slabs](Overflow::Slabs), a frame still fails for a chunk whose checksum is right and whose stream is not.
+    ///
+    /// # Budget
+    /// Where anchors are streamed, checksums are compared in the frames that need the chunks instead of when bound: about 8 instructions
+    /// a byte of those in view.
+    #[must_use]
+    pub const fn skipping_damage(self) -> Self {
+        Self { skips_damage: true, ..self }
     }
 
     /// Frame, tiers, strips, quality and the places of slabs lie within their limits.

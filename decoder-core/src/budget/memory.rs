@@ -9,7 +9,7 @@ use crate::arena::{Arena, words_for};
 use crate::bake::{BakedGaussian, BakedMemory};
 use crate::bundle::RecordMemory;
 use crate::error::{DecodeError, Region};
-use crate::project::{Packed28, TILE_PIXELS, TileRect};
+use crate::project::{PackedSplat, TILE_PIXELS, TileRect};
 use crate::raster::{N_RADIX, Pixel};
 use crate::scene::HeadOutputs;
 
@@ -70,7 +70,7 @@ slices! {
 
     /// The splats of a strip or slab.
     SplatMemory: splat_words, take_splats(shape) {
-        splats: [Packed28; shape.frame.max_splats as usize],
+        splats: [PackedSplat; shape.frame.max_splats as usize],
     }
 
     /// What lists and sorts them.
@@ -116,7 +116,7 @@ pub(crate) struct TileMemory<'s> {
 /// Memory of splats.
 pub(crate) struct SplatMemory<'s> {
     /// Splats, or room for fewer larger ones.
-    pub(crate) splats: &'s mut [Packed28],
+    pub(crate) splats: &'s mut [PackedSplat],
 }
 
 /// Memory that splats are listed and sorted in.

@@ -21,6 +21,6 @@ pub(crate) use memory::{AnchorMemory, FrameMemory, ListMemory, ModelMemory, Scen
 pub use placement::{Part, PartMemory};
 pub(crate) use placement::{Placement, Regions};
 pub use plan::Plan;
-pub use quality::{MAX_ALPHA_CUT, MAX_TRANSMITTANCE_STOP, Quality};
+pub use quality::{MAX_ALPHA_CUT, Quality};
 pub use shape::{CoderShape, FrameShape, ModelShape, RecordShape, Resident, ScratchShape};
 pub use work::Work;

@@ -6,6 +6,7 @@ use crate::error::Region;
 /// A part of the scratch memory that lies in one piece; those whose bytes a frame touches most often come first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum Part {
     /// Weights of the heads, and the current anchor: all of it for each anchor in view.
     Heads,
@@ -24,6 +25,7 @@ pub enum Part {
 /// Where one part of the scratch memory lies, and how many bytes it takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct PartMemory {
     /// Which part.
     pub part: Part,

@@ -4,8 +4,6 @@ use crate::error::{DecodeError, Field, in_range};
 
 /// Largest [`Quality::alpha_cut`].
 pub const MAX_ALPHA_CUT: u8 = 64;
-/// Largest [`Quality::transmittance_stop`].
-pub const MAX_TRANSMITTANCE_STOP: u16 = 1000;
 
 /// How exactly a frame is drawn.
 ///
@@ -16,24 +14,20 @@ pub struct Quality {
     /// A splat leaves pixels alone where its alpha is below this, in 255ths, 1..=[`MAX_ALPHA_CUT`]; 1 in training. More
     /// makes splats smaller, and more opaque by as much.
     pub alpha_cut: u8,
-    /// A pixel is finished once less light than this comes through it, in 10 000ths, 1..=[`MAX_TRANSMITTANCE_STOP`]; 1 in
-    /// training.
-    pub transmittance_stop: u16,
     /// Whether the detail head runs, if the bundle has one; if not, its weights take no memory.
     pub detail: bool,
 }
 
 impl Quality {
     /// As trained: the f64 reference within rounding.
-    pub const EXACT: Self = Self { alpha_cut: 1, transmittance_stop: 1, detail: true };
+    pub const EXACT: Self = Self { alpha_cut: 1, detail: true };
     /// What photographs do not tell from exact: up to a tenth fewer instructions for at most 0.1 dB on the scenes measured.
-    pub const BALANCED: Self = Self { alpha_cut: 2, transmittance_stop: 10, detail: true };
+    pub const BALANCED: Self = Self { alpha_cut: 2, detail: true };
     /// A third fewer where splats are large, for 0.6 dB.
-    pub const DRAFT: Self = Self { alpha_cut: 8, transmittance_stop: 100, detail: false };
+    pub const DRAFT: Self = Self { alpha_cut: 8, detail: false };
 
     /// Field and value lie within their limits.
     pub(super) fn check(self) -> Result<(), DecodeError> {
-        in_range(Field::AlphaCut, self.alpha_cut.into(), 1, MAX_ALPHA_CUT.into())?;
-        in_range(Field::TransmittanceStop, self.transmittance_stop.into(), 1, MAX_TRANSMITTANCE_STOP.into())
+        in_range(Field::AlphaCut, self.alpha_cut.into(), 1, MAX_ALPHA_CUT.into())
     }
 }

@@ -15,6 +15,7 @@ const INPUT_MACS: usize = 33;
 /// Work of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct Work {
     /// Multiply-adds of the heads.
     pub head_macs: u64,

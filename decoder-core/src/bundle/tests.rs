@@ -15,7 +15,7 @@ use crate::bundle::{AnchorRecords, AnchorSite, Bundle, Coder, RecordMemory, Tabl
 use crate::context::{Context, Group};
 use crate::entropy::NormalModel;
 use crate::error::{DecodeError, ErrorClass, Field, SectionKind};
-use crate::{Budget, Decoder, FrameReport, MaxSplats, Overflow, Residency, ScratchShape, Strips, TileSink};
+use crate::{Budget, Decoder, FrameReport, MaxSplats, Overflow, Residency, ScratchShape, Strips, Tile, TileSink};
 
 fn variants() -> impl Iterator<Item = Variant> {
     (0..3 << 5).map(|bits| {
@@ -249,8 +249,8 @@ struct Pixels(Vec<[u8; 3]>);
 impl TileSink for Pixels {
     type Error = Infallible;
 
-    fn tile(&mut self, _x_px: u16, _y_px: u16, _width: u16, _height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
-        self.0.extend_from_slice(rgb);
+    fn tile(&mut self, tile: Tile<'_>) -> Result<(), Infallible> {
+        self.0.extend_from_slice(tile.rgb);
         Ok(())
     }
 }
@@ -267,11 +267,10 @@ fn draw(bytes: &[u8], tiers: u8, skip_damage: bool) -> Result<(Pixels, FrameRepo
 
 fn draw_within(bytes: &[u8], budget: &Budget, skip_damage: bool) -> Result<(Pixels, FrameReport, u8), DecodeError> {
     let bundle = Bundle::parse(bytes)?;
-    let plan = bundle.plan(budget)?;
+    let plan = bundle.plan(&Budget { skips_damage: skip_damage, ..*budget })?;
     let mut scratch = vec![0x5A; plan.scratch_len()];
-    let bind = if skip_damage { Decoder::bind_skipping_damage } else { Decoder::bind };
     let mut pixels = Pixels::default();
-    let report = bind(&bundle, plan, &mut scratch)?.render(&bundle.header().preview, &mut pixels)?;
+    let report = Decoder::bind(&bundle, plan, &mut scratch)?.render(&bundle.header().preview, &mut pixels)?;
     Ok((pixels, report, plan.n_tiers()))
 }
 

@@ -1,17 +1,19 @@
 //! Drawing a frame: strip after strip, slab after slab, tile after tile.
 
+use core::fmt;
+
 use super::gather::{Admission, Frame};
 use super::notes::{Notes, StripsOfChunks};
 use super::splats::{Slab, SplatStore};
 use super::strip::{Strip, StripLayout};
 use super::tally::Tally;
-use super::tile::Tile;
-use super::{Decoder, FrameReport, TileSink};
+use super::tile::{Tile, TileSink};
+use super::{Decoder, FrameReport};
 use crate::arithmetic::{Arithmetic, ReferenceArithmetic};
 use crate::budget::Overflow;
 use crate::camera::Camera;
 use crate::error::{DecodeError, Field, RenderError, in_range, saturate};
-use crate::project::{Packed28, TILE_PIXELS, TileRect, View};
+use crate::project::{TILE_PIXELS, TileRect, View};
 use crate::raster::{BlendRule, EMPTY, TilePlace, blend_tile, finish_tile};
 use crate::rules::TILE_PX;
 use crate::stopwatch::{Stage, Stopwatch};
@@ -79,7 +81,7 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
         } else {
             Admission::Tally(Tally::new(self.splats.places()))
         };
-        let rule = BlendRule::new(budget.quality.alpha_cut, budget.quality.transmittance_stop);
+        let rule = BlendRule::new(budget.quality.alpha_cut);
         // Decoding costs most, and each of many passes would do it again. Of fewer the first costs more than the others save.
         let notes = matches!(admission, Admission::Slab)
             && strips.len() >= LEAST_STRIPS_NOTED
@@ -94,7 +96,7 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
             strips_of_chunks: StripsOfChunks::NONE,
             report: FrameReport::default(),
         };
-        if self.skip_damage && matches!(admission, Admission::Slab) {
+        if self.skips_damage() && matches!(admission, Admission::Slab) {
             self.note_damage(&mut frame);
         }
         Ok(Drawing {
@@ -125,8 +127,8 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
     ) -> Result<FrameReport, RenderError<S::Error>> {
         watch.enter(Stage::Project);
         let mut drawing = self.begin_frame(camera)?;
-        while let Some(Tile { x_px, y_px, width, height, rgb }) = drawing.next_tile_watched(watch)? {
-            sink.tile(x_px, y_px, width, height, rgb).map_err(RenderError::Sink)?;
+        while let Some(tile) = drawing.next_tile_watched(watch)? {
+            sink.tile(tile).map_err(RenderError::Sink)?;
         }
         Ok(drawing.report())
     }
@@ -147,10 +149,7 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
     }
 
     /// As [`next_tile`](Self::next_tile), and tells `watch` where the work goes.
-    ///
-    /// # Errors
-    /// As for [`next_tile`](Self::next_tile).
-    pub fn next_tile_watched(&mut self, watch: &mut impl Stopwatch) -> Result<Option<Tile<'_>>, DecodeError> {
+    fn next_tile_watched(&mut self, watch: &mut impl Stopwatch) -> Result<Option<Tile<'_>>, DecodeError> {
         let place = loop {
             if u16::from(self.row) >= self.strip.end_row {
                 if !self.next_slab(watch)? {
@@ -178,9 +177,7 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
             report.splats_dropped = report.splats_dropped.saturating_add(tally.n_dropped());
             report.max_splats = report.max_splats.max(tally.max_demand());
         }
-        let bytes = (self.most_in_memory as usize).saturating_mul(size_of::<A::Splat>());
-        let places = saturate(bytes.div_ceil(size_of::<Packed28>()));
-        report.scratch_used = saturate(self.decoder.plan.len_with_splats(places));
+        report.scratch_used = saturate(self.decoder.plan.len_with_splats(self.most_in_memory));
         report
     }
 
@@ -206,7 +203,7 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
             let Some(strip) = frame.strips.after(self.strip) else { return Ok(false) };
             self.strip = match &frame.admission {
                 // What a damaged chunk would have made room for is gone.
-                Admission::Tally(_) if decoder.skip_damage => strip,
+                Admission::Tally(_) if decoder.skips_damage() => strip,
                 // The first pass goes over the whole scene anyway.
                 Admission::Tally(_) if strip.index == 0 => frame.strips.between(0, frame.strips.len()),
                 Admission::Tally(tally) => {
@@ -270,7 +267,7 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
             pixels.fill(EMPTY);
         }
         let list = spare.get(..self.n_in_row)?;
-        let work = blend_tile::<A::Functions, _>(place, splats, rects, list, &self.rule, pixels);
+        let work = blend_tile::<A::Functions>(place, splats, rects, list, &self.rule, pixels);
         self.alive += work.alive;
         let report = &mut self.frame.report;
         report.tile_splats = report.tile_splats.saturating_add(work.splats);
@@ -289,6 +286,15 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
             self.row += 1;
         }
         Some(place)
+    }
+}
+
+impl<A: Arithmetic> fmt::Debug for Drawing<'_, '_, '_, A> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Drawing")
+            .field("size_px", &self.size_px)
+            .field("report", &self.report())
+            .finish_non_exhaustive()
     }
 }
 

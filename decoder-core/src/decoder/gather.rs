@@ -1,5 +1,7 @@
 //! From the anchors in view to the splats of one strip, or of a slab of its depth.
 
+use core::marker::PhantomData;
+
 use super::notes::{Notes, StripsOfChunks};
 use super::source::{AnchorSource, Anchors, GaussianSource};
 use super::splats::{Slab, SplatStore};
@@ -10,6 +12,7 @@ use crate::arithmetic::Arithmetic;
 use crate::bake::BakedGaussian;
 use crate::bundle::{Chunk, Effects};
 use crate::error::DecodeError;
+use crate::math::functions::Functions;
 use crate::project::{Band, TileRect, View};
 use crate::scene::{Anchor, Gaussian, GaussianSink};
 use crate::stopwatch::{Stage, Stopwatch};
@@ -108,7 +111,7 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
             GaussianSource::Anchors(Anchors { source: AnchorSource::Resident(records), .. }) => {
                 !records.is_damaged(chunk.index())
             }
-            GaussianSource::Anchors(_) => !self.skip_damage || chunk.check().is_ok(),
+            GaussianSource::Anchors(_) => !self.skips_damage() || chunk.check().is_ok(),
         }
     }
 
@@ -172,7 +175,7 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
         if self.is_sound(chunk) {
             match self.gather_chunk(chunk, first_anchor, pass, frame, watch) {
                 // What its splats displaced is gone when strips are drawn in slabs.
-                Err(DecodeError::ChunkStream { .. }) if self.skip_damage && !in_slabs => {}
+                Err(DecodeError::ChunkStream { .. }) if self.skips_damage() && !in_slabs => {}
                 result => return result,
             }
         }
@@ -203,10 +206,10 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
         let Frame { view, strips, admission, report, strips_of_chunks, .. } = frame;
         let header = bundle.header();
         let effects = header.features.effects;
-        let keeper = Keeper::<A> { view, strips, admission, pass, splats, chunk: chunk.index(), strips_of_chunks };
+        let keeper = Keeper { view, strips, admission, pass, splats, chunk: chunk.index(), strips_of_chunks };
         // As if its Gaussians were baked, which know nothing of the anchor's extent.
         let as_baked = bundle.n_gaussians(0).is_some();
-        let mut gathering = Gathering { keeper, report, effects, as_baked };
+        let mut gathering = Gathering { keeper, report, effects, as_baked, functions: PhantomData::<A::Functions> };
         let Anchors { source, row, evaluator } = match source {
             GaussianSource::Anchors(anchors) => anchors,
             // Unreachable without the feature; this arm drops the code.
@@ -217,7 +220,7 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
                 report.gaussians = report.gaussians.saturating_add(baked.n_of_chunk(chunk.index()));
                 for (number, gaussian) in baked.of_chunk(chunk.index(), effects) {
                     if keeper.pass.band.is_none_or(|band| band.sees_gaussian(&gaussian)) {
-                        keeper.project(number, &gaussian, effects);
+                        keeper.project::<A::Functions>(number, &gaussian, effects);
                     }
                 }
                 return Ok(());
@@ -255,23 +258,24 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
 }
 
 /// Keeps the splats of anchors.
-struct Gathering<'f, 's, A: Arithmetic> {
-    keeper: Keeper<'f, 's, A>,
+struct Gathering<'f, 's, F> {
+    keeper: Keeper<'f, 's>,
     report: &'f mut FrameReport,
     effects: Effects,
     /// Whether Gaussians are rounded as baked ones are.
     as_baked: bool,
+    functions: PhantomData<F>,
 }
 
-impl<A: Arithmetic> GaussianSink for Gathering<'_, '_, A> {
+impl<F: Functions> GaussianSink for Gathering<'_, '_, F> {
     fn gaussian(&mut self, anchor: u32, offset: usize, gaussian: &Gaussian) {
         self.report.gaussians = self.report.gaussians.saturating_add(1);
         let place = place(anchor, offset);
         // The first half drops the code where no scene is such.
         if cfg!(feature = "baked") && self.as_baked {
-            self.keeper.project(place, &BakedGaussian::rounded(gaussian, self.effects), self.effects);
+            self.keeper.project::<F>(place, &BakedGaussian::rounded(gaussian, self.effects), self.effects);
         } else {
-            self.keeper.project(place, gaussian, self.effects);
+            self.keeper.project::<F>(place, gaussian, self.effects);
         }
     }
 
@@ -281,20 +285,20 @@ impl<A: Arithmetic> GaussianSink for Gathering<'_, '_, A> {
 }
 
 /// Projects Gaussians and keeps the splats that a pass draws.
-struct Keeper<'f, 's, A: Arithmetic> {
+struct Keeper<'f, 's> {
     view: &'f View,
     strips: &'f StripLayout,
     admission: &'f mut Admission,
     pass: &'f mut Pass,
-    splats: &'f mut SplatStore<'s, A::Splat>,
+    splats: &'f mut SplatStore<'s>,
     chunk: u32,
     strips_of_chunks: &'f mut StripsOfChunks,
 }
 
-impl<A: Arithmetic> Keeper<'_, '_, A> {
+impl Keeper<'_, '_> {
     /// * `place`: ascends in the order of the file.
-    fn project(&mut self, place: u32, gaussian: &Gaussian, effects: Effects) {
-        let Some((mut splat, rect)) = self.view.project::<A::Functions>(gaussian, effects) else { return };
+    fn project<F: Functions>(&mut self, place: u32, gaussian: &Gaussian, effects: Effects) {
+        let Some((mut splat, rect)) = self.view.project::<F>(gaussian, effects) else { return };
         let touched = self.strips.touched(rect);
         let index = self.pass.strip.index;
         let lies_here = *touched.end() >= index.into() && *touched.start() < self.pass.strip.end_index.into();

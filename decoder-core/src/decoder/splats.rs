@@ -5,12 +5,12 @@ use core::ops::RangeInclusive;
 use super::notes::{ChunkNote, DepthCounts};
 use super::strip::Strip;
 use crate::error::saturate;
-use crate::project::{Splat, SplatRecord, TileRect};
+use crate::project::{PackedSplat, Splat, TileRect};
 use crate::raster::sort_by_depth;
 
 /// The splats of the current strip, or of a slab of its depth, in the order of the file.
-pub(super) struct SplatStore<'s, S> {
-    pub(super) splats: &'s mut [S],
+pub(super) struct SplatStore<'s> {
+    pub(super) splats: &'s mut [PackedSplat],
     pub(super) rects: &'s mut [TileRect],
     pub(super) n: u32,
     /// The most that there were in this pass, before it let go of some.
@@ -45,7 +45,7 @@ impl Slab {
     }
 }
 
-impl<S: SplatRecord> SplatStore<'_, S> {
+impl SplatStore<'_> {
     /// Splats that there is memory for.
     pub(super) fn places(&self) -> u32 {
         saturate(self.splats.len()).saturating_sub(self.places_of_notes)
@@ -56,7 +56,7 @@ impl<S: SplatRecord> SplatStore<'_, S> {
     #[inline(never)]
     pub(super) fn take_notes(&mut self, n_chunks: u32) -> bool {
         let len = (n_chunks as usize).saturating_mul(size_of::<ChunkNote>()).saturating_add(size_of::<DepthCounts>());
-        let places = len.div_ceil(size_of::<S>().max(1));
+        let places = len.div_ceil(size_of::<PackedSplat>());
         if places > self.splats.len() / 4 {
             return false;
         }
@@ -106,7 +106,7 @@ impl<S: SplatRecord> SplatStore<'_, S> {
     pub(super) fn push(&mut self, splat: &Splat, rect: TileRect) {
         let slot = self.n as usize;
         if let (Some(splat_slot), Some(rect_slot)) = (self.splats.get_mut(slot), self.rects.get_mut(slot)) {
-            *splat_slot = S::new(splat);
+            *splat_slot = PackedSplat::new(splat);
             *rect_slot = rect;
             self.n = self.n.saturating_add(1);
         }
@@ -158,7 +158,7 @@ impl<S: SplatRecord> SplatStore<'_, S> {
         let splats = self.splats.get(..n)?;
         let (order, spare) = (self.order.get_mut(..n)?, self.spare.get_mut(..n)?);
         let (order, _) = sort_by_depth(splats, order, spare, self.counts);
-        let depth_of = |index: &u32| splats.get(*index as usize).map_or(0.0, SplatRecord::depth);
+        let depth_of = |index: &u32| splats.get(*index as usize).map_or(0.0, PackedSplat::depth);
         let nearest = order.first().map_or(depth, depth_of);
         let nearest = if depth < nearest { depth } else { nearest };
         let mut later = order.get(n - n.div_ceil(8)..).unwrap_or_default().iter().map(depth_of);
@@ -182,7 +182,7 @@ impl<S: SplatRecord> SplatStore<'_, S> {
     }
 
     /// Keeps some of the splats, in their order.
-    fn retain(&mut self, keeps: impl Fn(&S, &TileRect) -> bool) {
+    fn retain(&mut self, keeps: impl Fn(&PackedSplat, &TileRect) -> bool) {
         self.most = self.most.max(self.n);
         let mut n_kept = 0;
         for i in 0..self.n as usize {
@@ -210,7 +210,7 @@ mod tests {
     use bytemuck::Zeroable;
 
     use super::{Slab, SplatStore};
-    use crate::project::{Packed28, Splat, SplatRecord, TileRect};
+    use crate::project::{PackedSplat, Splat, TileRect};
     use crate::raster::N_RADIX;
 
     const RECT: TileRect = TileRect { first_column: 0, last_column: 0, first_row: 0, last_row: 0 };
@@ -232,7 +232,7 @@ mod tests {
         let (mut slabs, mut n_dropped, mut from) = (Vec::new(), 0, 0.0);
         loop {
             let mut store = SplatStore {
-                splats: &mut std::vec![Packed28::zeroed(); n_places],
+                splats: &mut std::vec![PackedSplat::zeroed(); n_places],
                 rects: &mut std::vec![RECT; n_places],
                 n: 0,
                 most: 0,
@@ -250,7 +250,7 @@ mod tests {
             if slab.ends() {
                 assert_eq!(store.most as usize, n_places, "it was full when it let go of some");
             }
-            slabs.push(store.splats.iter().take(store.n as usize).map(SplatRecord::depth).collect());
+            slabs.push(store.splats.iter().take(store.n as usize).map(PackedSplat::depth).collect());
             if !slab.ends() {
                 return (slabs, n_dropped);
             }

@@ -24,7 +24,8 @@ struct Tally {
 impl TileSink for Tally {
     type Error = &'static str;
 
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) -> Result<(), &'static str> {
+    fn tile(&mut self, tile: Tile<'_>) -> Result<(), &'static str> {
+        let Tile { x_px, y_px, width, height, rgb } = tile;
         assert_eq!(rgb.len(), usize::from(width) * usize::from(height), "the tile at ({x_px}, {y_px})");
         let refused = self.refused == Some(self.corners.len());
         self.corners.push([x_px, y_px]);
@@ -93,8 +94,8 @@ struct Tiles(Vec<([u16; 4], Vec<[u8; 3]>)>);
 impl TileSink for Tiles {
     type Error = Infallible;
 
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
-        self.0.push(([x_px, y_px, width, height], rgb.to_vec()));
+    fn tile(&mut self, tile: Tile<'_>) -> Result<(), Infallible> {
+        self.0.push(([tile.x_px, tile.y_px, tile.width, tile.height], tile.rgb.to_vec()));
         Ok(())
     }
 }
@@ -119,7 +120,7 @@ fn tiles_that_are_asked_for_are_those_that_a_sink_gets() {
                 while found.0.len() < n_tiles
                     && let Some(tile) = drawing.next_tile().expect("drawn")
                 {
-                    found.tile(tile.x_px, tile.y_px, tile.width, tile.height, tile.rgb).expect("kept");
+                    found.tile(tile).expect("kept");
                 }
                 assert!(found.0 == expected.0[..n_tiles], "{n_strips} strips, {budget:?}: the first {n_tiles} tiles");
                 if n_tiles == 35 {
@@ -162,14 +163,9 @@ fn rows_of_tiles_are_the_lines_of_the_frame() {
             }
         }
         for format in FORMATS {
-            let expected = match format {
-                PixelFormat::Rgb888 => rgb.as_flattened().to_vec(),
-                // The pattern of one large tile is that of all small ones.
-                PixelFormat::Rgb565(order, rounding) => {
-                    let whole = Tile { x_px: 0, y_px: 0, width, height, rgb: &mut rgb.clone() };
-                    whole.into_rgb565(order, rounding).to_vec()
-                }
-            };
+            // The pattern of one large tile is that of all small ones.
+            let mut expected = rgb.clone();
+            let expected = Tile { x_px: 0, y_px: 0, width, height, rgb: &mut expected }.into_bytes(format);
             // So many single tiles before each row.
             for n_single in [0, 1, 6, 8] {
                 let mut drawing = decoder.begin(&camera).expect("a sound camera");

@@ -7,6 +7,7 @@ use super::ErrorClass;
 /// A part of a bundle, as `FORMAT.md` names it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum SectionKind {
     /// Fixed-size fields and the section table.
     Header,
@@ -36,6 +37,7 @@ pub enum SectionKind {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[expect(missing_docs, reason = "each variant is the name of a field of FORMAT.md or of `Camera`")]
+#[non_exhaustive]
 pub enum Field {
     HeaderLen,
     CameraConvention,
@@ -108,8 +110,6 @@ pub enum Field {
     SlabSplats,
     /// The alpha that a budget's quality cuts at.
     AlphaCut,
-    /// The transmittance that it stops at.
-    TransmittanceStop,
     ChannelBuffer,
     SiteBuffer,
     ModelBuffer,
@@ -133,7 +133,6 @@ impl Field {
             | Self::Strips
             | Self::SlabSplats
             | Self::AlphaCut
-            | Self::TransmittanceStop
             | Self::ChannelBuffer
             | Self::SiteBuffer
             | Self::ModelBuffer
@@ -227,7 +226,6 @@ impl fmt::Display for Field {
             Self::Strips => "number of strips",
             Self::SlabSplats => "number of splats of a slab",
             Self::AlphaCut => "alpha to cut at, in 255ths",
-            Self::TransmittanceStop => "transmittance to stop at, in 10 000ths",
             Self::ChannelBuffer => "buffer for channels",
             Self::SiteBuffer => "buffer for anchors' sites",
             Self::ModelBuffer => "memory for the models of anchors",

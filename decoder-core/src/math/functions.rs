@@ -46,7 +46,7 @@ pub(crate) trait Functions {
 
 /// Those of [`math`](crate::math), right to 4·10⁻⁷; the logarithm is libm's.
 #[derive(Clone, Copy, Debug)]
-pub struct Reference;
+pub(crate) struct Reference;
 
 impl Functions for Reference {
     #[inline(always)]
@@ -87,7 +87,7 @@ impl Functions for Reference {
 
 /// 2ˣ from 64 values and the tangent there, right to 2·10⁻⁵; a polynomial for the logarithm, right to 8·10⁻⁵.
 #[derive(Clone, Copy, Debug)]
-pub struct Table;
+pub(crate) struct Table;
 
 impl Functions for Table {
     #[inline(always)]

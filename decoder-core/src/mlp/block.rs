@@ -8,6 +8,7 @@ use crate::error::DecodeError;
 /// How the weights of the heads are kept in scratch memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum HeadWeights {
     /// 32 bits each.
     F32,

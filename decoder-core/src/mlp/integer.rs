@@ -101,7 +101,6 @@ pub(crate) struct IntegerHead<'s, const B: usize> {
 
 /// Integers read integers; the detail head stays in floats.
 impl HeadFormat for I16 {
-    const KEPT_AS: Option<HeadWeights> = None;
     type Values<'v> = Quantised<'v>;
     type Head<'s, const B: usize> = IntegerHead<'s, B>;
 

@@ -4,7 +4,7 @@ use pocketsplat_half::{BlendConstants, ROW_LEN, RowSplat, SLACK_PX, span, sqrt_a
 
 use crate::math::EXPONENTIAL;
 use crate::math::functions::Functions;
-use crate::project::{Splat, SplatRecord, TileRect, log_cut};
+use crate::project::{PackedSplat, Splat, TileRect, log_cut};
 use crate::rules::{self, TILE_PX};
 
 const TRANSMITTANCE_MIN: f32 = rules::TRANSMITTANCE_MIN as f32;
@@ -18,14 +18,12 @@ const _: () = assert!(rules::ALPHA_MAX > 0.99 - 1e-9 && ROW_LEN == TILE_PX as us
 pub(crate) struct BlendRule {
     /// −ln of the least alpha.
     log_cut: f32,
-    /// A pixel that less light comes through is finished.
-    transmittance_stop: f32,
 }
 
 impl BlendRule {
-    /// * `alpha_cut`: the least alpha, in 255ths. * `transmittance_stop`: in 10 000ths.
-    pub(crate) fn new(alpha_cut: u8, transmittance_stop: u16) -> Self {
-        Self { log_cut: log_cut(alpha_cut), transmittance_stop: f32::from(transmittance_stop) * TRANSMITTANCE_MIN }
+    /// * `alpha_cut`: the least alpha, in 255ths.
+    pub(crate) fn new(alpha_cut: u8) -> Self {
+        Self { log_cut: log_cut(alpha_cut) }
     }
 }
 
@@ -65,9 +63,9 @@ pub(crate) struct TileWork {
 ///
 /// # Budget
 /// Per splat and row of pixels two exponentials, per pixel two multiplications and the blend.
-pub(crate) fn blend_tile<F: Functions, S: SplatRecord>(
+pub(crate) fn blend_tile<F: Functions>(
     place: TilePlace,
-    splats: &[S],
+    splats: &[PackedSplat],
     rects: &[TileRect],
     list: &[u32],
     rule: &BlendRule,
@@ -152,7 +150,7 @@ fn blend_splat<F: Functions>(
         colour: splat.colour,
         // Whatever the functions: its error grows with the square of a pixel's distance.
         ratio_step: EXPONENTIAL.near(-splat.row_precision),
-        transmittance_stop: rule.transmittance_stop,
+        transmittance_stop: TRANSMITTANCE_MIN,
         free: [0; 4],
     };
     let work = F::blend_rows(&mut row_splat, &CONSTANTS, rows, place.width);

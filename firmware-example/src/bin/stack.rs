@@ -19,7 +19,7 @@ use core::hint::black_box;
 #[cfg(target_arch = "arm")]
 use cortex_m as _;
 use defmt_semihosting as _;
-use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, Residency, TileSink};
+use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, Residency, Tile, TileSink};
 #[cfg(target_arch = "riscv32")]
 use riscv as _;
 use static_cell::ConstStaticCell;
@@ -93,7 +93,7 @@ struct Display;
 impl TileSink for Display {
     type Error = Infallible;
 
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
+    fn tile(&mut self, Tile { x_px, y_px, width, height, rgb, .. }: Tile<'_>) -> Result<(), Infallible> {
         black_box((x_px, y_px, width, height, rgb));
         Ok(())
     }

@@ -194,7 +194,7 @@ struct Comparison {
 impl TileSink for Comparison {
     type Error = core::convert::Infallible;
 
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) -> Result<(), Self::Error> {
+    fn tile(&mut self, Tile { x_px, y_px, width, height, rgb, .. }: Tile<'_>) -> Result<(), Self::Error> {
         let mut copy = [[0; 3]; 16 * 16];
         let (rgb_copy, _) = copy.split_at_mut(rgb.len());
         rgb_copy.copy_from_slice(rgb);

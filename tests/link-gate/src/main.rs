@@ -54,13 +54,9 @@ fn draw(bytes: &[u8], camera: &Camera, scratch: &mut [u8]) -> Result<FrameReport
             _ => Residency::Streamed,
         })
         .with_strips(if strips == 0 { Strips::Auto } else { Strips::Exactly(strips) });
-    let plan = bundle.plan(&budget)?;
+    let plan = bundle.plan(&if black_box(true) { budget } else { budget.skipping_damage() })?;
     black_box((plan.work(), plan.pruning_rate(), plan.n_strips(), plan.is_resident(), plan.is_baked()));
-    let mut decoder = if black_box(true) {
-        Decoder::bind(&bundle, plan, scratch)?
-    } else {
-        Decoder::bind_skipping_damage(&bundle, plan, scratch)?
-    };
+    let mut decoder = Decoder::bind(&bundle, plan, scratch)?;
     let camera = camera.resized(black_box(1), black_box(1));
     #[cfg(feature = "orbit")]
     let camera = camera.orbited(black_box(1.0));
@@ -107,7 +103,7 @@ mod drawing {
 #[cfg(not(feature = "embedded-graphics"))]
 mod display {
     use super::*;
-    use pocketsplat_core::TileSink;
+    use pocketsplat_core::{Tile, TileSink};
 
     /// A display that keeps nothing.
     struct Display;
@@ -115,7 +111,7 @@ mod display {
     impl TileSink for Display {
         type Error = Infallible;
 
-        fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
+        fn tile(&mut self, Tile { x_px, y_px, width, height, rgb, .. }: Tile<'_>) -> Result<(), Infallible> {
             black_box((x_px, y_px, width, height, rgb));
             Ok(())
         }

@@ -3,7 +3,7 @@
 use std::convert::Infallible;
 use std::fs;
 
-use pocketsplat_core::{Budget, Bundle, Decoder, TileSink};
+use pocketsplat_core::{Budget, Bundle, Decoder, Tile, TileSink};
 
 use crate::fixture::{capture, fails, folder, pocketsplat, succeeds, text};
 
@@ -16,7 +16,7 @@ struct Display(image::RgbImage);
 impl TileSink for Display {
     type Error = Infallible;
 
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, _height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
+    fn tile(&mut self, Tile { x_px, y_px, width, rgb, .. }: Tile<'_>) -> Result<(), Infallible> {
         for (y, row) in (u32::from(y_px)..).zip(rgb.chunks_exact(width.into())) {
             for (x, &pixel) in (u32::from(x_px)..).zip(row) {
                 self.0.put_pixel(x, y, image::Rgb(pixel));

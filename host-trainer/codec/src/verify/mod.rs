@@ -55,11 +55,9 @@ pub type Violation = String;
 pub fn exact_bytes(bundle: &Bundle<'_>, plan: Plan) -> Result<(), Violation> {
     let needed = plan.scratch_len();
     let mut scratch = vec![0; needed];
-    for skip_damage in [false, true] {
-        let mut bind = |len: usize| {
-            let bind = if skip_damage { Decoder::bind_skipping_damage } else { Decoder::bind };
-            bind(bundle, plan, &mut scratch[..len]).err()
-        };
+    let skipping = bundle.plan(&plan.budget().skipping_damage()).map_err(|error| error.to_string())?;
+    for plan in [plan, skipping] {
+        let mut bind = |len: usize| Decoder::bind(bundle, plan, &mut scratch[..len]).err();
         if let Some(error) = bind(needed) {
             return Err(format!("{needed} bytes do not suffice: {error}"));
         }

@@ -9,8 +9,7 @@ mod setting;
 use std::sync::Arc;
 use std::time::Instant;
 
-use pocketsplat_core::arithmetic::Arithmetic;
-use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, Stage};
+use pocketsplat_core::{Arithmetic, Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, Stage};
 
 pub use arithmetic::{ArithmeticChoice, WithArithmetic};
 pub use counter::{CountError, Counter, MOST_VIEWS};

@@ -1,6 +1,6 @@
 use std::convert::Infallible;
 
-use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, ErrorClass, Field, MaxSplats, Region, TileSink};
+use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, ErrorClass, Field, MaxSplats, Region, Tile, TileSink};
 
 use super::{SMALL, TABLES, info, options, random_scene, write_random};
 use crate::bundle::{ChannelCoding, WriteOptions, write};
@@ -14,7 +14,7 @@ struct NoSink;
 impl TileSink for NoSink {
     type Error = Infallible;
 
-    fn tile(&mut self, _: u16, _: u16, _: u16, _: u16, _: &[[u8; 3]]) -> Result<(), Infallible> {
+    fn tile(&mut self, _: Tile<'_>) -> Result<(), Infallible> {
         Ok(())
     }
 }

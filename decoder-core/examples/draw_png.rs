@@ -7,10 +7,10 @@
 use std::convert::Infallible;
 use std::error::Error;
 
-use pocketsplat_core::{Budget, Bundle, Decoder, Tile, TileSink};
+use pocketsplat_core::{Budget, Bundle, Decoder, Plan, Tile, TileSink};
 
 /// The bundle of the format's description: three anchors, drawn where no other bundle is given.
-const EXAMPLE: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/bundle/example.psb"));
+const EXAMPLE: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/example.psb"));
 
 /// A frame that is filled tile by tile. A device would hand each tile to its display instead.
 struct Frame {
@@ -41,7 +41,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let camera = bundle.header().preview;
 
     // Plan: a PC has memory enough, so the budget names the frame's size alone.
-    let plan = bundle.plan(&Budget::for_frame(camera.width_px, camera.height_px))?;
+    let plan = Plan::new(&bundle, &Budget::for_frame(camera.width_px, camera.height_px))?;
 
     // Bind: the decoder uses these bytes and no others.
     let mut scratch = vec![0; plan.scratch_len()];

@@ -5,17 +5,17 @@
 //!
 //! ```
 //! # fn main() -> Result<(), pocketsplat_core::DecodeError> {
-//! # let bytes = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/bundle/example.psb"));
+//! # let bytes = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/example.psb"));
 //! # let mut scratch = [0; 8 * 1024];
 //! # struct Sink;
 //! # impl pocketsplat_core::TileSink for Sink {
 //! #     type Error = core::convert::Infallible;
 //! #     fn tile(&mut self, _: pocketsplat_core::Tile<'_>) -> Result<(), Self::Error> { Ok(()) }
 //! # }
-//! use pocketsplat_core::{Budget, Bundle, Decoder, WithoutFpu};
+//! use pocketsplat_core::{Budget, Bundle, Decoder, Plan, WithoutFpu};
 //!
 //! let bundle = Bundle::parse(bytes)?;
-//! let plan = bundle.plan(&Budget::for_frame(32, 24))?;
+//! let plan = Plan::new(&bundle, &Budget::for_frame(32, 24))?;
 //! let mut decoder = Decoder::bind_in::<WithoutFpu>(&bundle, plan, &mut scratch)?;
 //! let report = decoder.render(&bundle.header().preview, &mut Sink)?;
 //! assert_eq!(report.splats, 5);
@@ -26,7 +26,7 @@
 //! A choice is made when the firmware is built, so none costs the other anything, and either gives the same bytes on every target.
 //! What each costs and saves was measured: `docs/experiments/2026-11-21-decoder-settings.md` of the repository.
 
-use crate::math::functions::{Functions, Reference, Table};
+use crate::functions::{Functions, Reference, Table};
 use crate::mlp::{F32, HeadFormat, I16};
 
 /// [`ReferenceArithmetic`] or [`WithoutFpu`].

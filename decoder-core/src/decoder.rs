@@ -6,6 +6,7 @@ mod frame;
 mod gather;
 mod notes;
 mod pixel_format;
+mod render_error;
 mod report;
 mod row;
 mod scratch;
@@ -20,6 +21,7 @@ mod tile;
 pub use count::{count_gaussians, count_scratch_len};
 pub use frame::Drawing;
 pub use pixel_format::{ByteOrder, PixelFormat, Rounding};
+pub use render_error::RenderError;
 pub use report::FrameReport;
 pub use row::TileRow;
 pub use scratch::Scratch;
@@ -27,13 +29,12 @@ pub use tile::{Tile, TileSink};
 
 use core::fmt;
 
+use pocketsplat_format::bundle::Chunk;
+use pocketsplat_format::{Bundle, Camera, DecodeError, Stopwatch};
+
 use crate::arithmetic::{Arithmetic, ReferenceArithmetic};
 use crate::budget::Plan;
-use crate::bundle::{Bundle, Chunk};
-use crate::camera::Camera;
-use crate::error::{DecodeError, RenderError};
 use crate::raster::Pixel;
-use crate::stopwatch::Stopwatch;
 use source::GaussianSource;
 use splats::SplatStore;
 
@@ -57,13 +58,13 @@ impl<'b, 's> Decoder<'b, 's> {
     ///
     /// ```
     /// # fn main() -> Result<(), pocketsplat_core::DecodeError> {
-    /// # let first = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/bundle/example.psb"));
-    /// # let second = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/bundle/example-context.psb"));
-    /// use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder};
+    /// # let first = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/example.psb"));
+    /// # let second = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/example-context.psb"));
+    /// use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, Plan};
     ///
     /// /// Draws a bundle in memory that it has only as long as the call lasts; returns the pixels.
     /// fn show(bundle: &Bundle<'_>, scratch: &mut [u8]) -> Result<usize, DecodeError> {
-    ///     let plan = bundle.plan(&Budget::for_frame(32, 24).in_bytes(scratch.len()))?;
+    ///     let plan = Plan::new(bundle, &Budget::for_frame(32, 24).in_bytes(scratch.len()))?;
     ///     let mut decoder = Decoder::bind(bundle, plan, scratch)?;
     ///     let mut drawing = decoder.begin(&bundle.header().preview.resized(32, 24))?;
     ///     let mut n_pixels = 0;
@@ -84,9 +85,9 @@ impl<'b, 's> Decoder<'b, 's> {
     /// Two regions of memory go into an array, the fast one first; the frames are the same as with one:
     ///
     /// ```no_run
-    /// # use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder};
+    /// # use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, Plan};
     /// # fn bound(bundle: &Bundle<'_>, sram: &mut [u8], psram: &mut [u8]) -> Result<(), DecodeError> {
-    /// let plan = bundle.plan(&Budget::for_frame(320, 240).in_bytes(sram.len()).with_slow_bytes(psram.len()))?;
+    /// let plan = Plan::new(bundle, &Budget::for_frame(320, 240).in_bytes(sram.len()).with_slow_bytes(psram.len()))?;
     /// for part in plan.memory() {
     ///     // For instance `Scene` and `Splats` in `Slow`, with the bytes of each.
     ///     # let _ = part;
@@ -106,7 +107,7 @@ impl<'b, 's> Decoder<'b, 's> {
     /// # Budget
     /// Exactly [`Plan::scratch_len`] and [`Plan::slow_scratch_len`] bytes of `scratch`; reads the whole bundle once, about 8 instructions
     /// a byte, and for resident anchors 55 to 80 a symbol; baked Gaussians take the heads of every anchor besides. The plan is compared
-    /// with one that is made again, which takes as long as [`Bundle::plan`].
+    /// with one that is made again, which takes as long as [`Plan::new`].
     pub fn bind(bundle: &Bundle<'b>, plan: Plan, scratch: impl Into<Scratch<'s>>) -> Result<Self, DecodeError> {
         Self::bind_in(bundle, plan, scratch)
     }

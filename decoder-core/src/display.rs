@@ -3,14 +3,13 @@
 //! ```
 //! # use embedded_graphics_core::geometry::{Point, Size};
 //! # use embedded_graphics_core::pixelcolor::Rgb565;
-//! # let bytes = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/bundle/example.psb"));
+//! # let bytes = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/example.psb"));
 //! # let mut scratch = [0; 8 * 1024];
 //! # let mut display = embedded_graphics_simulator::SimulatorDisplay::<Rgb565>::new(Size::new(32, 24));
-//! use pocketsplat_core::display::DisplaySink;
-//! use pocketsplat_core::{Budget, Bundle, Decoder, RenderError};
+//! use pocketsplat_core::{Budget, Bundle, Decoder, DisplaySink, Plan, RenderError};
 //!
 //! let bundle = Bundle::parse(bytes)?;
-//! let plan = bundle.plan(&Budget::for_frame(32, 24).in_bytes(scratch.len()))?;
+//! let plan = Plan::new(&bundle, &Budget::for_frame(32, 24).in_bytes(scratch.len()))?;
 //! let mut decoder = Decoder::bind(&bundle, plan, &mut scratch)?;
 //! match decoder.render(&bundle.header().preview, &mut DisplaySink::new(&mut display, Point::zero())) {
 //!     Ok(report) => assert_eq!((report.splats, display.get_pixel(Point::new(31, 23))), (5, Rgb565::new(0, 0, 8))),

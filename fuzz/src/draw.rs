@@ -174,12 +174,12 @@ impl Job<'_, '_> {
             .with_overflow(way.overflow)
             .with_max_splats(way.max_splats);
         let budget = if way.skips_damage { budget.skipping_damage() } else { budget };
-        let whole = self.bundle.plan(&budget)?;
+        let whole = Plan::new(self.bundle, &budget)?;
         if way.fast_share == 0 {
             return Ok(whole);
         }
         let fast = whole.scratch_len() * usize::from(way.fast_share) / usize::from(u8::MAX);
-        self.bundle.plan(&budget.in_bytes(fast).with_slow_bytes(SLOW_BYTES))
+        Plan::new(self.bundle, &budget.in_bytes(fast).with_slow_bytes(SLOW_BYTES))
     }
 
     /// Draws with damage left out.

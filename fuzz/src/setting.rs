@@ -3,8 +3,8 @@
 
 use std::f32::consts::TAU;
 
-use pocketsplat_core::bundle::{CHUNK_RECORD_LEN, InkFrame, TIER_RECORD_LEN};
 use pocketsplat_core::{Budget, Bundle, Camera, MaxSplats, Overflow, Quality, Residency, Rotation, SectionKind};
+use pocketsplat_format::bundle::{CHUNK_RECORD_LEN, InkFrame, TIER_RECORD_LEN};
 
 use super::seal::reseal;
 

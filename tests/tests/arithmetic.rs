@@ -79,9 +79,9 @@ fn a_budget_without_room_for_f32_takes_halves_before_it_prunes() {
         let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
         let camera = camera();
         let budget = budget_for(&camera);
-        let whole = bundle.plan(&budget).expect("memory without limit");
+        let whole = Plan::new(&bundle, &budget).expect("memory without limit");
         assert_eq!((whole.head_weights(), whole.pruning_rate()), (HeadWeights::F32, 0.0), "{}", case.name);
-        let plan = bundle.plan(&budget.in_bytes(whole.scratch_len() - 1)).expect("a part takes less");
+        let plan = Plan::new(&bundle, &budget.in_bytes(whole.scratch_len() - 1)).expect("a part takes less");
         // Where other memory decides, halves save none.
         if plan.head_weights() == HeadWeights::F32 {
             continue;

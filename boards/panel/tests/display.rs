@@ -5,7 +5,7 @@ use std::convert::Infallible;
 use embedded_hal::delay::DelayNs;
 use mipidsi::interface::{Interface, InterfaceKind};
 use mipidsi::models::ST7789;
-use pocketsplat_core::{Budget, Bundle, ByteOrder, Decoder, Rounding, Tile, TileSink};
+use pocketsplat_core::{Budget, Bundle, ByteOrder, Decoder, Plan, Rounding, Tile, TileSink};
 
 const PANEL_PX: (u16, u16) = (40, 50);
 
@@ -75,11 +75,11 @@ impl TileSink for Expected {
 #[test]
 fn a_display_shows_the_pixels_of_render_in_the_middle() {
     let bundle =
-        Bundle::parse(include_bytes!("../../../decoder-core/src/bundle/example.psb")).expect("the example is sound");
+        Bundle::parse(include_bytes!("../../../decoder-format/src/bundle/example.psb")).expect("the example is sound");
     let camera = pocketsplat_panel::fitted(&bundle.header().preview, PANEL_PX.0, PANEL_PX.1);
     assert_eq!((camera.width_px, camera.height_px), (40, 30), "4 : 3 across");
     let mut scratch = [0; 16 * 1024];
-    let plan = bundle.plan(&Budget::for_frame(40, 30).in_bytes(scratch.len())).expect("fits");
+    let plan = Plan::new(&bundle, &Budget::for_frame(40, 30).in_bytes(scratch.len())).expect("fits");
     let mut decoder = Decoder::bind(&bundle, plan, &mut scratch).expect("bound");
 
     let mut expected = Expected { pixels: [[Some([0, 0]); 40]; 50], top: 10 };
@@ -99,7 +99,7 @@ fn a_display_shows_the_pixels_of_render_in_the_middle() {
 #[test]
 fn a_frame_fills_the_side_of_the_panel_that_is_scarce() {
     let bundle =
-        Bundle::parse(include_bytes!("../../../decoder-core/src/bundle/example.psb")).expect("the example is sound");
+        Bundle::parse(include_bytes!("../../../decoder-format/src/bundle/example.psb")).expect("the example is sound");
     let fitted = |width, height| {
         let camera = pocketsplat_panel::fitted(&bundle.header().preview, width, height);
         (camera.width_px, camera.height_px)

@@ -1,15 +1,8 @@
 //! What a caller wants of a plan, and within what.
 
+use pocketsplat_format::{DecodeError, Field, in_range};
+
 use super::quality::Quality;
-use crate::error::{DecodeError, Field, in_range};
-
-/// Largest width and height of a frame, pixels: a tile's column and row fit a byte.
-pub const MAX_FRAME_PX: u16 = 255 * 16;
-/// Most horizontal strips of a frame.
-pub const MAX_STRIPS: u8 = 8;
-
-/// Fewest places for splats with which a strip can be drawn in [slabs](Overflow::Slabs) of depth.
-pub const MIN_SLAB_PLACES: u32 = 2;
 
 /// How many splats there is memory for at once: those of a frame, or with strips those of a strip.
 ///
@@ -21,12 +14,12 @@ pub const MIN_SLAB_PLACES: u32 = 2;
 pub enum MaxSplats {
     /// As many as the fullest of the views in the bundle's manifest has, and a sixteenth more; if the manifest is not
     /// measured, [`Worst`](Self::Worst). A frame with a wider lens or nearer to the scene may need more. Where memory is left,
-    /// strips may [share it](crate::Bundle::plan).
+    /// strips may [share it](crate::Plan::new).
     Measured,
     /// Every offset of every anchor of the tiers drawn: always enough in the [reference arithmetic](crate::ReferenceArithmetic); of
     /// a scene that can be baked, other heads may draw an offset more.
     Worst,
-    /// So many; with [slabs](Overflow::Slabs) at least [`MIN_SLAB_PLACES`].
+    /// So many; with [slabs](Overflow::Slabs) at least [`Budget::MIN_SLAB_PLACES`].
     AtMost(u32),
 }
 
@@ -57,7 +50,7 @@ pub enum Strips {
     /// Those that take the least predicted work. Of equals one, or else the most of 2, 4 and 8; in [slabs](Overflow::Slabs) the
     /// fewest.
     Auto,
-    /// So many, 1..=[`MAX_STRIPS`], in no more memory than one of them needs.
+    /// So many, 1..=[`Budget::MAX_STRIPS`], in no more memory than one of them needs.
     Exactly(u8),
 }
 
@@ -93,9 +86,9 @@ pub struct Budget {
     /// Bytes of slow scratch memory besides; 0 for none. It has to be
     /// [normal memory](crate#memory), which SDRAM may become by the MPU alone.
     pub slow_bytes: usize,
-    /// Widest frame, pixels, 1..=[`MAX_FRAME_PX`].
+    /// Widest frame, pixels, 1..=[`Self::MAX_FRAME_PX`].
     pub width_px: u16,
-    /// Highest frame, pixels, 1..=[`MAX_FRAME_PX`].
+    /// Highest frame, pixels, 1..=[`Self::MAX_FRAME_PX`].
     pub height_px: u16,
     /// Tiers to draw at most, 1 or more; [`u8::MAX`] draws all that the file holds. Fewer are a coarser scene that costs less.
     pub tiers: u8,
@@ -114,6 +107,13 @@ pub struct Budget {
 }
 
 impl Budget {
+    /// Largest width and height of a frame, pixels: a tile's column and row fit a byte.
+    pub const MAX_FRAME_PX: u16 = 255 * 16;
+    /// Most horizontal strips of a frame.
+    pub const MAX_STRIPS: u8 = 8;
+    /// Fewest places for splats with which a strip can be drawn in [slabs](Overflow::Slabs) of depth.
+    pub const MIN_SLAB_PLACES: u32 = 2;
+
     /// Frames of at most `width_px × height_px`, everything else as good as memory allows, memory without limit.
     #[must_use]
     pub const fn for_frame(width_px: u16, height_px: u16) -> Self {
@@ -196,17 +196,17 @@ impl Budget {
 
     /// Frame, tiers, strips, quality and the places of slabs lie within their limits.
     pub(super) fn check(&self) -> Result<(), DecodeError> {
-        in_range(Field::FrameWidth, self.width_px.into(), 1, MAX_FRAME_PX.into())?;
-        in_range(Field::FrameHeight, self.height_px.into(), 1, MAX_FRAME_PX.into())?;
+        in_range(Field::FrameWidth, self.width_px.into(), 1, Self::MAX_FRAME_PX.into())?;
+        in_range(Field::FrameHeight, self.height_px.into(), 1, Self::MAX_FRAME_PX.into())?;
         // A budget of zeros would draw background alone.
         in_range(Field::Tiers, self.tiers.into(), 1, u8::MAX.into())?;
         self.quality.check()?;
         if let (Overflow::Slabs, MaxSplats::AtMost(n)) = (self.overflow, self.max_splats) {
-            in_range(Field::SlabSplats, n, MIN_SLAB_PLACES, u32::MAX)?;
+            in_range(Field::SlabSplats, n, Self::MIN_SLAB_PLACES, u32::MAX)?;
         }
         match self.strips {
             Strips::Auto => Ok(()),
-            Strips::Exactly(n) => in_range(Field::Strips, n.into(), 1, MAX_STRIPS.into()),
+            Strips::Exactly(n) => in_range(Field::Strips, n.into(), 1, Self::MAX_STRIPS.into()),
         }
     }
 }

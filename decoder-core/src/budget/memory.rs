@@ -3,12 +3,13 @@
 //! First lies what stays between frames, then the memory of a frame. What binding alone needs lies where the frame's memory lies
 //! later. Each list is a [`Part`], which lies in one region.
 
+use pocketsplat_format::bundle::RecordMemory;
+use pocketsplat_format::{DecodeError, Region};
+
 use super::placement::{Part, Placement, Regions};
 use super::shape::ScratchShape;
 use crate::arena::{Arena, words_for};
 use crate::bake::{BakedGaussian, BakedMemory};
-use crate::bundle::RecordMemory;
-use crate::error::{DecodeError, Region};
 use crate::project::{PackedSplat, TILE_PIXELS, TileRect};
 use crate::raster::{N_RADIX, Pixel};
 use crate::scene::HeadOutputs;
@@ -50,7 +51,7 @@ slices! {
 
     /// Anchors between frames: their records, a bit a chunk, and the scale of each table.
     RecordMemory: record_words, take_records(shape) {
-        records: [u16; shape.record_layout().len().saturating_mul(shape.resident.len())],
+        records: [u16; shape.record_layout().n_words().saturating_mul(shape.resident.len())],
         damaged: [u32; shape.resident.n_chunks().div_ceil(u32::BITS as usize)],
         scales: [[f32; 2]; shape.coder.n_tables as usize],
     }

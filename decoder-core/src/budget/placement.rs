@@ -1,7 +1,8 @@
 //! Which parts of the scratch memory lie in fast memory, and which in slow.
 
+use pocketsplat_format::Region;
+
 use crate::arena::Arena;
-use crate::error::Region;
 
 /// A part of the scratch memory that lies in one piece; those whose bytes a frame touches most often come first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,7 +103,7 @@ impl<'s> Regions<'s> {
 #[cfg(test)]
 mod tests {
     use super::{Part, Placement};
-    use crate::error::Region;
+    use pocketsplat_format::Region;
 
     #[test]
     fn placements_prefer_the_parts_that_come_first_in_fast_memory() {

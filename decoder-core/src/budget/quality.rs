@@ -1,9 +1,6 @@
 //! What accuracy a frame may give up to be drawn sooner.
 
-use crate::error::{DecodeError, Field, in_range};
-
-/// Largest [`Quality::alpha_cut`].
-pub const MAX_ALPHA_CUT: u8 = 64;
+use pocketsplat_format::{DecodeError, Field, in_range};
 
 /// How exactly a frame is drawn.
 ///
@@ -11,7 +8,7 @@ pub const MAX_ALPHA_CUT: u8 = 64;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Quality {
-    /// A splat leaves pixels alone where its alpha is below this, in 255ths, 1..=[`MAX_ALPHA_CUT`]; 1 in training. More
+    /// A splat leaves pixels alone where its alpha is below this, in 255ths, 1..=[`Self::MAX_ALPHA_CUT`]; 1 in training. More
     /// makes splats smaller, and more opaque by as much.
     pub alpha_cut: u8,
     /// Whether the detail head runs, if the bundle has one; if not, its weights take no memory.
@@ -19,6 +16,8 @@ pub struct Quality {
 }
 
 impl Quality {
+    /// Largest [`alpha_cut`](Self::alpha_cut).
+    pub const MAX_ALPHA_CUT: u8 = 64;
     /// As trained: the f64 reference within rounding.
     pub const EXACT: Self = Self { alpha_cut: 1, detail: true };
     /// What photographs do not tell from exact: up to a tenth fewer instructions for at most 0.1 dB on the scenes measured.
@@ -28,6 +27,6 @@ impl Quality {
 
     /// Field and value lie within their limits.
     pub(super) fn check(self) -> Result<(), DecodeError> {
-        in_range(Field::AlphaCut, self.alpha_cut.into(), 1, MAX_ALPHA_CUT.into())
+        in_range(Field::AlphaCut, self.alpha_cut.into(), 1, Self::MAX_ALPHA_CUT.into())
     }
 }

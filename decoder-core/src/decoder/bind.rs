@@ -1,5 +1,8 @@
 //! Binding: the caller's memory taken apart, and the scene put into it.
 
+use pocketsplat_format::bundle::{AnchorRecords, RecordMemory};
+use pocketsplat_format::{Bundle, DecodeError, Region, saturate};
+
 use super::Decoder;
 use super::scratch::Scratch;
 use super::source::{AnchorSource, Anchors, GaussianSource};
@@ -10,8 +13,6 @@ use crate::bake::{BakedGaussians, BakedMemory, Baker, bake};
 use crate::budget::{
     AnchorMemory, FrameMemory, ListMemory, ModelMemory, Part, Plan, Regions, SceneMemory, ScratchShape, TileMemory,
 };
-use crate::bundle::{AnchorRecords, Bundle, RecordMemory};
-use crate::error::{DecodeError, Region, saturate};
 use crate::mlp::{F32, HeadFormat, Heads};
 use crate::scene::{Evaluator, Pair, Workspace};
 
@@ -70,7 +71,7 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
 /// Whether `plan` is one of this bundle.
 #[inline(never)]
 fn check_plan(bundle: &Bundle<'_>, plan: &Plan) -> Result<(), DecodeError> {
-    let needed = bundle.plan(plan.budget())?;
+    let needed = Plan::new(bundle, plan.budget())?;
     if !needed.draws_as(plan) {
         let [needed, planned] =
             [&needed, plan].map(|plan| saturate(plan.scratch_len().saturating_add(plan.slow_scratch_len())));

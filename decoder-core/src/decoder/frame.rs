@@ -2,8 +2,12 @@
 
 use core::fmt;
 
+use pocketsplat_format::rules::TILE_PX;
+use pocketsplat_format::{Camera, DecodeError, Field, Stage, Stopwatch, in_range, saturate};
+
 use super::gather::{Admission, Frame};
 use super::notes::{Notes, StripsOfChunks};
+use super::render_error::RenderError;
 use super::splats::{Slab, SplatStore};
 use super::strip::{Strip, StripLayout};
 use super::tally::Tally;
@@ -11,12 +15,8 @@ use super::tile::{Tile, TileSink};
 use super::{Decoder, FrameReport};
 use crate::arithmetic::{Arithmetic, ReferenceArithmetic};
 use crate::budget::Overflow;
-use crate::camera::Camera;
-use crate::error::{DecodeError, Field, RenderError, in_range, saturate};
 use crate::project::{TILE_PIXELS, TileRect, View};
 use crate::raster::{BlendRule, EMPTY, TilePlace, blend_tile, finish_tile};
-use crate::rules::TILE_PX;
-use crate::stopwatch::{Stage, Stopwatch};
 
 /// Strips of a frame that is worth notes of its chunks.
 const LEAST_STRIPS_NOTED: u8 = 3;
@@ -27,12 +27,12 @@ const LEAST_STRIPS_NOTED: u8 = 3;
 ///
 /// ```
 /// # fn main() -> Result<(), pocketsplat_core::DecodeError> {
-/// # let bytes = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/bundle/example.psb"));
+/// # let bytes = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/example.psb"));
 /// # let mut scratch = [0; 8 * 1024];
-/// use pocketsplat_core::{Budget, Bundle, Decoder};
+/// use pocketsplat_core::{Budget, Bundle, Decoder, Plan};
 ///
 /// let bundle = Bundle::parse(bytes)?;
-/// let plan = bundle.plan(&Budget::for_frame(32, 24))?;
+/// let plan = Plan::new(&bundle, &Budget::for_frame(32, 24))?;
 /// let mut decoder = Decoder::bind(&bundle, plan, &mut scratch)?;
 /// let mut drawing = decoder.begin(&bundle.header().preview)?;
 /// let mut n_pixels = 0;

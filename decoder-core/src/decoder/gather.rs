@@ -2,6 +2,9 @@
 
 use core::marker::PhantomData;
 
+use pocketsplat_format::bundle::{Chunk, Effects};
+use pocketsplat_format::{DecodeError, Stage, Stopwatch};
+
 use super::notes::{Notes, StripsOfChunks};
 use super::source::{AnchorSource, Anchors, GaussianSource};
 use super::splats::{Slab, SplatStore};
@@ -10,12 +13,9 @@ use super::tally::{Tally, place};
 use super::{Decoder, FrameReport};
 use crate::arithmetic::Arithmetic;
 use crate::bake::BakedGaussian;
-use crate::bundle::{Chunk, Effects};
-use crate::error::DecodeError;
-use crate::math::functions::Functions;
+use crate::functions::Functions;
 use crate::project::{Band, TileRect, View};
 use crate::scene::{Anchor, Gaussian, GaussianSink};
-use crate::stopwatch::{Stage, Stopwatch};
 
 /// The current frame.
 pub(super) struct Frame {

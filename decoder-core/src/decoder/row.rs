@@ -1,9 +1,10 @@
 //! A row of tiles as a display takes it: 16 whole lines of pixels, one behind the other.
 
+use pocketsplat_format::{DecodeError, Field, saturate};
+
 use super::frame::Drawing;
 use super::pixel_format::PixelFormat;
 use crate::arithmetic::Arithmetic;
-use crate::error::{DecodeError, Field, saturate};
 
 /// A finished row of tiles.
 #[derive(Debug, PartialEq, Eq)]
@@ -32,13 +33,13 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
     ///
     /// ```
     /// # fn main() -> Result<(), pocketsplat_core::DecodeError> {
-    /// # let bytes = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/bundle/example.psb"));
+    /// # let bytes = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/example.psb"));
     /// # let mut scratch = [0; 8 * 1024];
-    /// use pocketsplat_core::{Budget, Bundle, ByteOrder, Decoder, PixelFormat, Rounding};
+    /// use pocketsplat_core::{Budget, Bundle, ByteOrder, Decoder, PixelFormat, Plan, Rounding};
     ///
     /// let format = PixelFormat::Rgb565(ByteOrder::BigEndian, Rounding::Dithered);
     /// let bundle = Bundle::parse(bytes)?;
-    /// let plan = bundle.plan(&Budget::for_frame(32, 24))?;
+    /// let plan = Plan::new(&bundle, &Budget::for_frame(32, 24))?;
     /// let mut decoder = Decoder::bind(&bundle, plan, &mut scratch)?;
     /// let mut drawing = decoder.begin(&bundle.header().preview)?;
     /// let mut buffers = [[0; 16 * 32 * 2]; 2];

@@ -2,9 +2,10 @@
 
 use core::ops::RangeInclusive;
 
+use pocketsplat_format::saturate;
+
 use super::notes::{ChunkNote, DepthCounts};
 use super::strip::Strip;
-use crate::error::saturate;
 use crate::project::{PackedSplat, Splat, TileRect};
 use crate::raster::sort_by_depth;
 

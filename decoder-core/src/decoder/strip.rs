@@ -2,8 +2,9 @@
 
 use core::ops::RangeInclusive;
 
+use pocketsplat_format::rules::TILE_PX;
+
 use crate::project::TileRect;
-use crate::rules::TILE_PX;
 
 /// How a frame is cut into strips of whole rows of tiles.
 #[derive(Clone, Copy, Debug)]

@@ -2,7 +2,7 @@
 
 use core::ops::RangeInclusive;
 
-use crate::budget::MAX_STRIPS;
+use crate::budget::Budget;
 
 /// Counts the splats of all strips in the order of the file, until one strip is full.
 ///
@@ -13,7 +13,7 @@ pub(super) struct Tally {
     /// Splats that a strip has places for.
     capacity: u32,
     /// Splats of each strip, those left out included.
-    demand: [u32; MAX_STRIPS as usize],
+    demand: [u32; Budget::MAX_STRIPS as usize],
     /// The place in the file of the first splat left out.
     end: u32,
     n_dropped: u32,
@@ -28,7 +28,7 @@ pub(super) fn place(anchor: u32, offset: usize) -> u32 {
 impl Tally {
     /// Everything has a place so far.
     pub(super) fn new(capacity: u32) -> Self {
-        Self { capacity, demand: [0; MAX_STRIPS as usize], end: u32::MAX, n_dropped: 0 }
+        Self { capacity, demand: [0; Budget::MAX_STRIPS as usize], end: u32::MAX, n_dropped: 0 }
     }
 
     /// Counts a splat that lies in `strips`, and says whether it is drawn; places ascend from call to call.

@@ -1,10 +1,11 @@
 //! The number formats that the heads are kept and multiplied in.
 
+use pocketsplat_format::DecodeError;
+use pocketsplat_format::bundle::{HeadView, WeightReader};
+
 use super::block::HeadWeights;
 use super::pair::Role;
 use crate::arena::Arena;
-use crate::bundle::{HeadView, WeightReader};
-use crate::error::DecodeError;
 
 /// Weights as f32; as halves where the [plan](crate::Plan::head_weights) says so, because there is no room for f32.
 #[derive(Clone, Copy, Debug)]

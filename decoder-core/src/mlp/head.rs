@@ -1,13 +1,14 @@
 //! A head in floats: hidden layer with ReLU, output layer of one block per offset.
 
+use pocketsplat_format::DecodeError;
+use pocketsplat_format::bundle::{HeadView, WeightReader};
+
 use super::block::{Blocks, HeadWeights};
 use super::format::{F32, HeadFormat, MlpHead};
 use super::pair::Role;
 use super::weight;
 use super::weight::LANES;
 use crate::arena::Arena;
-use crate::bundle::{HeadView, WeightReader};
-use crate::error::DecodeError;
 
 /// One head in floats; its output layer has blocks of `B` outputs.
 pub(crate) struct Head<'s, const B: usize> {

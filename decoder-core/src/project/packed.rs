@@ -1,10 +1,10 @@
 //! Splats as they are kept in memory.
 
 use bytemuck::{Pod, Zeroable};
+use pocketsplat_format::math::to_half;
 use pocketsplat_half::from_halves;
 
 use super::splat::Splat;
-use crate::math::to_half;
 
 /// Bits of 2⁻⁶², which stands for every smaller precision: a deviation of 2·10⁹ px.
 const LEAST_PRECISION: u32 = (127 - 62) << 23;

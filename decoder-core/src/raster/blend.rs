@@ -1,11 +1,11 @@
 //! Front-to-back compositing of one tile.
 
+use pocketsplat_format::math::EXPONENTIAL;
+use pocketsplat_format::rules::{self, TILE_PX};
 use pocketsplat_half::{BlendConstants, ROW_LEN, RowSplat, SLACK_PX, span, sqrt_above};
 
-use crate::math::EXPONENTIAL;
-use crate::math::functions::Functions;
+use crate::functions::Functions;
 use crate::project::{PackedSplat, Splat, TileRect, log_cut};
-use crate::rules::{self, TILE_PX};
 
 const TRANSMITTANCE_MIN: f32 = rules::TRANSMITTANCE_MIN as f32;
 /// One per cent below the logarithm of the largest alpha.

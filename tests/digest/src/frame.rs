@@ -29,12 +29,12 @@ pub fn frame_digests(bundle: &Bundle<'_>, scratch: &mut [u8]) -> Result<[Digest;
         Decoder::bind(bundle, plan, &mut *scratch)?.render(&camera, &mut tiles)?;
         Ok::<_, DecodeError>(tiles.0)
     };
-    let whole = bundle.plan(&budget)?;
+    let whole = Plan::new(bundle, &budget)?;
     let single = drawn(whole)?;
     if whole.is_baked() {
         return Ok([single, single]);
     }
-    let halves = bundle.plan(&budget.in_bytes(whole.scratch_len() - 1))?;
+    let halves = Plan::new(bundle, &budget.in_bytes(whole.scratch_len() - 1))?;
     if halves.head_weights() != HeadWeights::F16 || halves.n_tiers() != whole.n_tiers() {
         return Err(DecodeError::Internal);
     }

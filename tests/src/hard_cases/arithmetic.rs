@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 use pocketsplat_capture::camera::Camera;
-use pocketsplat_core::math::{exp, sigmoid, tanh};
+use pocketsplat_format::math::{exp, sigmoid, tanh};
 use pocketsplat_kernels::ops::normality::{ChannelMoments, Weights};
 use pocketsplat_kernels::ops::simd::Level;
 use pocketsplat_kernels::ops::{Pinhole, adam, head_input, rate, ssim};

@@ -1,7 +1,7 @@
 //! Every picture again, in the arithmetics that are meant for use.
 
 use pocketsplat_codec::bundle::{self, WriteOptions};
-use pocketsplat_core::Bundle;
+use pocketsplat_format::Bundle;
 use pocketsplat_trainer::cost::ArithmeticChoice;
 
 use super::picture::worst_tile;

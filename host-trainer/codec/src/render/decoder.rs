@@ -3,7 +3,7 @@
 use std::convert::Infallible;
 
 use pocketsplat_core::{
-    Arithmetic, Budget, Bundle, DecodeError, Decoder, FrameReport, MaxSplats, Residency, Strips, Tile, TileSink,
+    Arithmetic, Budget, Bundle, DecodeError, Decoder, FrameReport, MaxSplats, Plan, Residency, Strips, Tile, TileSink,
 };
 
 use pocketsplat_capture::camera::Camera;
@@ -41,7 +41,7 @@ pub fn core_image_of_tiers(bundle: &Bundle<'_>, camera: &Camera, tiers: u8) -> R
         .with_max_splats(MaxSplats::Worst)
         .with_residency(Residency::Streamed)
         .with_strips(Strips::Exactly(1));
-    let plan = bundle.plan(&budget)?;
+    let plan = Plan::new(bundle, &budget)?;
     let mut scratch = vec![0; plan.scratch_len()];
     let (image, report) = image_of(&mut Decoder::bind(bundle, plan, &mut scratch)?, &camera)?;
     Ok(CoreFrame { image, report, scratch_bytes: report.scratch_used as usize })

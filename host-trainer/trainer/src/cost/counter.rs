@@ -4,7 +4,7 @@ use std::env;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use pocketsplat_core::{Camera, Stage};
+use pocketsplat_format::{Camera, Stage};
 
 use super::{Setting, Stages};
 use crate::device::Processor;

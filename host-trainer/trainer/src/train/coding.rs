@@ -1,6 +1,6 @@
 //! What the steps of each phase do to the values of anchors, and the context model's beginning.
 
-use pocketsplat_core::context::Context;
+use pocketsplat_format::context::Context;
 
 use super::config::{Backbone, TrainConfig};
 use super::{TrainError, Trainer, context_start};

@@ -3,7 +3,7 @@
 use std::error::Error;
 
 use pocketsplat_capture::dataset::PhotographError;
-use pocketsplat_core::DecodeError;
+use pocketsplat_format::DecodeError;
 
 use super::config_error::ConfigError;
 use super::steering::Fit;

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use crate::plot::{CostPanel, CostPoint, cost_svg};
 use anyhow::Result;
-use pocketsplat_core::Stage;
 use pocketsplat_files::{Content, Output, Outputs};
+use pocketsplat_format::Stage;
 use pocketsplat_trainer::cost::{Measured, on_front};
 
 use super::super::output;

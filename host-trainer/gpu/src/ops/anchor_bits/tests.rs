@@ -4,7 +4,7 @@
 
 use super::*;
 use crate::parity::{Bound, SIZES, assert_close, gpu, largest};
-use pocketsplat_core::context::first_tap;
+use pocketsplat_format::context::first_tap;
 use pocketsplat_kernels::finite_difference::random;
 use pocketsplat_kernels::ops::anchor_bits as cpu;
 use pocketsplat_kernels::ops::mask;

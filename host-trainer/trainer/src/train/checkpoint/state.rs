@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use pocketsplat_core::context::N_LEVELS;
+use pocketsplat_format::context::N_LEVELS;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 

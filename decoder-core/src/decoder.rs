@@ -2,18 +2,19 @@
 
 mod bind;
 mod count;
+mod first_come;
 mod frame;
 mod gather;
-mod notes;
 mod pixel_format;
 mod render_error;
 mod report;
 mod row;
 mod scratch;
+mod slab_index;
 mod source;
 mod splats;
 mod strip;
-mod tally;
+mod strips_of_chunks;
 #[cfg(test)]
 mod tests;
 mod tile;

@@ -58,8 +58,8 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
             rects,
             n: 0,
             most: 0,
-            n_notes: 0,
-            places_of_notes: 0,
+            n_indexed: 0,
+            places_of_index: 0,
             order,
             spare,
             counts,
@@ -107,15 +107,15 @@ fn bind_scene<'b, 's, N: HeadFormat>(
         SceneMemory::Baked { baked, anchor, models } => {
             return bind_baked(bundle, shape, baked, anchor, models, skip_damage).map(GaussianSource::Baked);
         }
-        SceneMemory::Streamed { anchor, models } => (anchor, Kept::Models(models)),
-        SceneMemory::Resident { anchor, records, .. } => (anchor, Kept::Anchors(records)),
+        SceneMemory::Streamed { anchor, models } => (anchor, AnchorStorage::Models(models)),
+        SceneMemory::Resident { anchor, records, .. } => (anchor, AnchorStorage::Anchors(records)),
     };
     let evaluator = evaluator(bundle, shape, anchor, regions.of(Part::Tiles).borrow());
     anchors(bundle, shape, kept, evaluator)
 }
 
 /// What of anchors is in memory.
-enum Kept<'s> {
+enum AnchorStorage<'s> {
     /// Nothing but what decodes them.
     Models(ModelMemory<'s>),
     /// They.
@@ -132,13 +132,15 @@ type EvaluatorAndRow<'s, N> = (Evaluator<'s, N>, &'s mut [f32]);
 fn anchors<'b, 's, N: HeadFormat>(
     bundle: &Bundle<'b>,
     shape: &ScratchShape,
-    kept: Kept<'s>,
+    kept: AnchorStorage<'s>,
     evaluator: Result<EvaluatorAndRow<'s, N>, DecodeError>,
 ) -> Result<GaussianSource<'b, 's, N>, DecodeError> {
     let (evaluator, row) = evaluator?;
     let source = match kept {
-        Kept::Models(models) => AnchorSource::Streamed(bundle.anchor_models(models.words)?),
-        Kept::Anchors(records) => AnchorSource::Resident(AnchorRecords::new(bundle, shape.record_layout(), records)?),
+        AnchorStorage::Models(models) => AnchorSource::Streamed(bundle.anchor_models(models.words)?),
+        AnchorStorage::Anchors(records) => {
+            AnchorSource::Resident(AnchorRecords::new(bundle, shape.record_layout(), records)?)
+        }
     };
     Ok(GaussianSource::Anchors(Anchors { source, row, evaluator }))
 }

@@ -36,7 +36,7 @@ pub(crate) const EMPTY: Pixel = [0.0, 0.0, 0.0, 1.0];
 
 /// Where a tile lies; it ends early at the frame's right and lower border.
 #[derive(Clone, Copy)]
-pub(crate) struct TilePlace {
+pub(crate) struct TileRegion {
     pub(crate) column: u8,
     pub(crate) row: u8,
     pub(crate) width: u16,
@@ -64,7 +64,7 @@ pub(crate) struct TileWork {
 /// # Budget
 /// Per splat and row of pixels two exponentials, per pixel two multiplications and the blend.
 pub(crate) fn blend_tile<F: Functions>(
-    place: TilePlace,
+    place: TileRegion,
     splats: &[PackedSplat],
     rects: &[TileRect],
     list: &[u32],
@@ -95,7 +95,7 @@ pub(crate) fn blend_tile<F: Functions>(
 /// Puts the background behind a tile, if there is one, and rounds to bytes, `[height, width]` row by row.
 // Not inlined: that saves text, and a frame calls it once a tile.
 #[inline(never)]
-pub(crate) fn finish_tile(place: TilePlace, pixels: &[Pixel], background: Option<[f32; 3]>, rgb: &mut [[u8; 3]]) {
+pub(crate) fn finish_tile(place: TileRegion, pixels: &[Pixel], background: Option<[f32; 3]>, rgb: &mut [[u8; 3]]) {
     match background {
         Some(background) => finish(place, pixels, rgb, |pixel| behind(pixel, background)),
         None => finish(place, pixels, rgb, |[red, green, blue, _]| [red, green, blue]),
@@ -103,7 +103,7 @@ pub(crate) fn finish_tile(place: TilePlace, pixels: &[Pixel], background: Option
 }
 
 /// Rounds what `colour` makes of each pixel to bytes.
-fn finish(place: TilePlace, pixels: &[Pixel], rgb: &mut [[u8; 3]], colour: impl Fn(Pixel) -> [f32; 3]) {
+fn finish(place: TileRegion, pixels: &[Pixel], rgb: &mut [[u8; 3]], colour: impl Fn(Pixel) -> [f32; 3]) {
     let (rows, _) = pixels.as_chunks::<{ TILE_PX as usize }>();
     let out_rows = rgb.chunks_exact_mut(usize::from(place.width).max(1));
     for (out_row, row) in out_rows.zip(rows).take(place.height.into()) {
@@ -117,7 +117,7 @@ fn finish(place: TilePlace, pixels: &[Pixel], rgb: &mut [[u8; 3]], colour: impl 
 /// Blends one splat into the rows of the tile that begins at (`tile_x`, `tile_y`) pixels; returns how many rows it reaches and how many pixels it was evaluated for.
 #[inline(always)]
 fn blend_splat<F: Functions>(
-    place: TilePlace,
+    place: TileRegion,
     [tile_x, tile_y]: [f32; 2],
     splat: &Splat,
     rule: &BlendRule,

@@ -119,7 +119,7 @@ impl<N: HeadFormat> Evaluator<'_, N> {
     }
 
     /// Forgets an anchor that waits, after an error.
-    pub(crate) fn forget(&mut self) {
+    pub(crate) fn discard_waiting(&mut self) {
         if let Some(pair) = &mut self.pair {
             pair.waiting = None;
         }

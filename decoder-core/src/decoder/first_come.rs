@@ -9,45 +9,45 @@ use crate::budget::Budget;
 /// The first splat that some strip has no place for, and all after it, are left out of all strips: so what is drawn does
 /// not depend on which strip is drawn, and the tiers that come first in the file are the last to suffer.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Tally {
+pub(super) struct FirstCome {
     /// Splats that a strip has places for.
     capacity: u32,
     /// Splats of each strip, those left out included.
     demand: [u32; Budget::MAX_STRIPS as usize],
-    /// The place in the file of the first splat left out.
+    /// The order of the first splat left out.
     end: u32,
     n_dropped: u32,
 }
 
-/// Where a splat comes from: ascending in the order of the file.
-pub(super) fn place(anchor: u32, offset: usize) -> u32 {
+/// A number that ascends with the splats in the order of the file.
+pub(super) fn splat_order(anchor: u32, offset: usize) -> u32 {
     // 2²⁴ anchors of 32 offsets.
     anchor << 5 | (offset as u32 & 31)
 }
 
-impl Tally {
+impl FirstCome {
     /// Everything has a place so far.
     pub(super) fn new(capacity: u32) -> Self {
         Self { capacity, demand: [0; Budget::MAX_STRIPS as usize], end: u32::MAX, n_dropped: 0 }
     }
 
-    /// Counts a splat that lies in `strips`, and says whether it is drawn; places ascend from call to call.
-    pub(super) fn admit(&mut self, place: u32, strips: RangeInclusive<usize>) -> bool {
-        let mut fits = self.admits(place);
+    /// Counts a splat that lies in `strips`, and says whether it is drawn; orders ascend from call to call.
+    pub(super) fn admit(&mut self, order: u32, strips: RangeInclusive<usize>) -> bool {
+        let mut fits = self.admits(order);
         for demand in self.demand.get_mut(strips).unwrap_or_default() {
             fits &= *demand < self.capacity;
             *demand = demand.saturating_add(1);
         }
         if !fits {
-            self.end = self.end.min(place);
+            self.end = self.end.min(order);
             self.n_dropped = self.n_dropped.saturating_add(1);
         }
         fits
     }
 
     /// Whether a splat counted before is drawn.
-    pub(super) fn admits(&self, place: u32) -> bool {
-        place < self.end
+    pub(super) fn admits(&self, order: u32) -> bool {
+        order < self.end
     }
 
     /// The strips from number `first` on that there is memory for together, once all splats are counted; at least one.
@@ -75,24 +75,24 @@ impl Tally {
 
 #[cfg(test)]
 mod tests {
-    use super::{Tally, place};
+    use super::{FirstCome, splat_order};
 
     #[test]
     fn what_comes_after_the_first_without_a_place_is_left_out_everywhere() {
-        let mut tally = Tally::new(2);
+        let mut first_come = FirstCome::new(2);
         let splats = [(1, 0..=0), (2, 0..=1), (3, 1..=1), (4, 1..=2), (5, 2..=2)];
-        let drawn = splats.map(|(anchor, strips)| tally.admit(place(anchor, 0), strips));
+        let drawn = splats.map(|(anchor, strips)| first_come.admit(splat_order(anchor, 0), strips));
         assert_eq!(drawn, [true, true, true, false, false], "strip 1 is full at the fourth");
         assert_eq!(
-            (tally.n_dropped(), tally.max_demand()),
+            (first_come.n_dropped(), first_come.max_demand()),
             (2, 3),
             "the fourth and the fifth; strip 1 would have three"
         );
     }
 
     #[test]
-    fn places_ascend_with_anchors_then_offsets() {
-        assert!(place(0, 31) < place(1, 0) && place(1, 0) < place(1, 1), "anchor first");
-        assert!(place((1 << 24) - 1, 31) < u32::MAX, "the last splat there can be");
+    fn splats_are_ordered_by_anchors_then_offsets() {
+        assert!(splat_order(0, 31) < splat_order(1, 0) && splat_order(1, 0) < splat_order(1, 1), "anchor first");
+        assert!(splat_order((1 << 24) - 1, 31) < u32::MAX, "the last splat there can be");
     }
 }

@@ -1,48 +1,27 @@
-//! Where splats lie, noted in a frame's first pass, so that later passes leave out chunks that they draw nothing of, and know in advance
-//! where their slabs end.
+//! Where splats lie, noted in the first pass of a frame drawn in slabs, so that later passes leave out chunks that they draw nothing of,
+//! and know in advance where their slabs end.
 
 use core::ops::{Range, RangeInclusive};
 
 use bytemuck::{Pod, Zeroable};
 
-use super::strip::Strip;
+use super::strip::{Strip, strip_bits};
 
-/// Whether a frame drawn in slabs has notes of its chunks, in the last places of its splats.
+/// Whether a frame drawn in slabs has an index of its chunks, in the last places of its splats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Notes {
-    /// Nothing is noted.
+pub(super) enum IndexState {
+    /// There is none.
     None,
-    /// The next pass takes them. It goes over the whole scene.
+    /// The next pass makes it. It goes over the whole scene.
     Due,
-    /// Every chunk has one.
-    Taken,
-}
-
-/// Which strips each of the first chunks has splats in, of a frame whose splats leave no place for notes: as many as 256 bytes hold.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct StripsOfChunks([u8; 256]);
-
-impl StripsOfChunks {
-    /// No splats.
-    pub(super) const NONE: Self = Self([0; 256]);
-
-    /// Takes in a splat.
-    pub(super) fn add(&mut self, chunk: u32, strips: RangeInclusive<usize>) {
-        if let Some(noted) = self.0.get_mut(chunk as usize) {
-            *noted |= bits(*strips.start() as u32, *strips.end() as u32) as u8;
-        }
-    }
-
-    /// Whether a chunk may have a splat in a strip, or in one of several.
-    pub(super) fn may_lie_in(&self, chunk: u32, strip: Strip) -> bool {
-        self.0.get(chunk as usize).is_none_or(|&noted| u32::from(noted) & bits_of(strip) != 0)
-    }
+    /// Every chunk is in it.
+    Made,
 }
 
 /// Where the splats of a chunk lie.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
-pub(super) struct ChunkNote {
+pub(super) struct ChunkExtent {
     /// The upper half of the bits of the least depth: a depth that is no larger.
     nearest: u16,
     /// That of a depth larger than all of them.
@@ -51,7 +30,7 @@ pub(super) struct ChunkNote {
     strips: u32,
 }
 
-impl ChunkNote {
+impl ChunkExtent {
     /// That of a chunk without splats.
     pub(super) const NOWHERE: Self = Self { nearest: u16::MAX, end: 0, strips: 0 };
 
@@ -63,13 +42,13 @@ impl ChunkNote {
         let upper = (depth.to_bits() >> 16) as u16;
         self.nearest = self.nearest.min(upper);
         self.end = self.end.max(upper.saturating_add(1));
-        self.strips |= bits(*strips.start() as u32, *strips.end() as u32);
+        self.strips |= strip_bits(strips);
     }
 
     /// Whether a splat of the chunk may lie at these depths of a strip; true more often than needed, never false wrongly.
     pub(super) fn may_lie_in(&self, strip: Strip, depths: Range<f32>) -> bool {
         let depth = |upper: u16| f32::from_bits(u32::from(upper) << 16);
-        self.strips & bits_of(strip) != 0 && depths.start < depth(self.end) && depth(self.nearest) < depths.end
+        self.strips & strip.bits() != 0 && depths.start < depth(self.end) && depth(self.nearest) < depths.end
     }
 }
 
@@ -131,51 +110,29 @@ impl DepthCounts {
     }
 }
 
-/// The bits of a strip, or of several.
-fn bits_of(strip: Strip) -> u32 {
-    bits(strip.index.into(), strip.end_index.saturating_sub(1).into())
-}
-
-/// The bits from `first` to `last`, which are below 31.
-fn bits(first: u32, last: u32) -> u32 {
-    2_u32.wrapping_shl(last).wrapping_sub(1_u32.wrapping_shl(first))
-}
-
 #[cfg(test)]
 mod tests {
     use bytemuck::Zeroable;
 
-    use super::{ChunkNote, DepthCounts, Strip, StripsOfChunks, bits};
+    use super::{ChunkExtent, DepthCounts, Strip};
 
     fn strip(index: u8) -> Strip {
         Strip { index, end_index: index + 1, first_row: index.into(), end_row: u16::from(index) + 1 }
     }
 
     #[test]
-    fn a_note_says_where_splats_may_lie() {
-        let mut note = ChunkNote::NOWHERE;
+    fn an_extent_says_where_splats_may_lie() {
+        let mut extent = ChunkExtent::NOWHERE;
         let behind = |from: f32| from..f32::INFINITY;
-        assert!((0..8).all(|index| !note.may_lie_in(strip(index), behind(0.0))), "no splat");
-        note.add(3.3, 2..=3);
-        note.add(1.7, 5..=5);
-        let seen: std::vec::Vec<u8> = (0..8).filter(|&i| note.may_lie_in(strip(i), behind(0.0))).collect();
+        assert!((0..8).all(|index| !extent.may_lie_in(strip(index), behind(0.0))), "no splat");
+        extent.add(3.3, 2..=3);
+        extent.add(1.7, 5..=5);
+        let seen: std::vec::Vec<u8> = (0..8).filter(|&i| extent.may_lie_in(strip(i), behind(0.0))).collect();
         assert_eq!(seen, [2, 3, 5], "the strips of either");
-        assert!(note.may_lie_in(strip(2), behind(3.3)), "the farthest lies where the slab begins");
-        assert!(!note.may_lie_in(strip(2), behind(3.4)), "both are nearer");
-        assert!(!note.may_lie_in(strip(2), 0.2..1.6), "both are farther");
-        assert!(note.may_lie_in(strip(2), 0.2..1.71), "the nearest lies before the end");
-        assert_eq!((bits(0, 7), bits(3, 3)), (0xFF, 8), "first and last are among them");
-    }
-
-    #[test]
-    fn chunks_without_a_note_may_lie_anywhere() {
-        let mut chunks = StripsOfChunks::NONE;
-        chunks.add(7, 1..=2);
-        chunks.add(256, 1..=2);
-        let several = Strip { end_index: 8, ..strip(2) };
-        let found = [(6, strip(1)), (7, strip(1)), (7, strip(3)), (7, several), (256, strip(3))];
-        let found = found.map(|(chunk, strip)| chunks.may_lie_in(chunk, strip));
-        assert_eq!(found, [false, true, false, true, true], "of nothing, of itself, of another, of both, unknown");
+        assert!(extent.may_lie_in(strip(2), behind(3.3)), "the farthest lies where the slab begins");
+        assert!(!extent.may_lie_in(strip(2), behind(3.4)), "both are nearer");
+        assert!(!extent.may_lie_in(strip(2), 0.2..1.6), "both are farther");
+        assert!(extent.may_lie_in(strip(2), 0.2..1.71), "the nearest lies before the end");
     }
 
     #[test]

@@ -11,7 +11,7 @@
 //! | `VIEWS` | absolute path of cameras to draw instead, at most 10: a line each of the numbers of a `Camera`, in its order | an orbit |
 //! | `QUALITY` | `EXACT`, `BALANCED` or `DRAFT` | `EXACT` |
 //! | `BUDGET` | what else is asked of the `Budget`, in Rust: `.with_tiers(2)` | nothing |
-//! | `ARITHMETIC` | types of `pocketsplat_core::arithmetic` in the order of `With`: `I16,Table` | those of `ReferenceArithmetic` |
+//! | `ARITHMETIC` | `ReferenceArithmetic` or `WithoutFpu` | `ReferenceArithmetic` |
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -85,13 +85,10 @@ fn prepare() -> Result<(), Box<dyn Error>> {
     }
     // Names that are none are errors of the compiler's.
     let budget = variable("BUDGET").unwrap_or_default();
-    let arithmetic = variable("ARITHMETIC").unwrap_or_default();
+    let arithmetic = variable("ARITHMETIC").unwrap_or_else(|| "ReferenceArithmetic".into());
     let scratch_len = (ram_kib * 1024)
         .checked_sub(stack_len + OTHER_STATICS)
         .ok_or_else(|| format!("RAM_KIB={ram_kib} leaves no scratch memory beside {stack_len} bytes of stack"))?;
-    let arithmetic: Vec<String> =
-        arithmetic.split_terminator(',').map(|name| format!("pocketsplat_core::arithmetic::{}", name.trim())).collect();
-    let arithmetic = arithmetic.join(", ");
     let views = views.concat();
     let settings = format!(
         "const BOARD: &str = {name:?};\nconst RAM_KIB: usize = {ram_kib};\nconst STACK_LEN: usize = {stack_len};\n\
@@ -99,7 +96,7 @@ fn prepare() -> Result<(), Box<dyn Error>> {
          pub(crate) const HEIGHT_PX: usize = {height_px};\nconst N_FRAMES: u8 = {n_frames};\n\
          const VIEWS: &[Camera] = &[{views}];\nconst QUALITY: Quality = Quality::{quality};\n\
          fn asked(budget: Budget) -> Budget {{ budget.with_quality(QUALITY){budget} }}\n\
-         type Chosen = pocketsplat_core::arithmetic::With<{arithmetic}>;\n"
+         type Chosen = pocketsplat_core::{arithmetic};\n"
     );
     Ok(fs::write(out.join("settings.rs"), settings)?)
 }

@@ -175,7 +175,7 @@ job_test() {
   # The largest frames where overflow is not checked, as firmware is built; above it was.
   cargo test --release -p pocketsplat-core --lib --locked decoder::tests
   # Refusals of what a decoder is built without.
-  cargo test -p pocketsplat-core --no-default-features --lib --locked bundle::features
+  cargo test -p pocketsplat-format --no-default-features --lib --locked bundle::features
 }
 
 # The viewer's WebAssembly module is what its source builds.
@@ -213,8 +213,9 @@ job_core-embedded() {
   sets+=("$(IFS=, && echo "${all[*]}")")
   for features in "${sets[@]}"; do
     echo "-- features: ${features:-none}"
-    cargo clippy -q -p pocketsplat-core --target "$embedded_target" --no-default-features --features "$features" --locked \
-      -- -D warnings
+    # decoder-format with it, which the features lead to.
+    cargo clippy -q -p pocketsplat-core -p pocketsplat-format --target "$embedded_target" --no-default-features \
+      --features "${features:+pocketsplat-core/${features//,/,pocketsplat-core/}}" --locked -- -D warnings
   done
   echo "${#sets[@]} sets of features: none, each, every pair, all"
   # decoder-half has assembly on this target.
@@ -236,10 +237,14 @@ job_format-doc() {
 
 # Every crate builds from nothing but what the packages hold, and they hold what a user reads.
 job_package() {
-  local crate file files crates=(pocketsplat pocketsplat-{core,half,files,capture,gaussians,instructions,kernels,metrics,gpu,codec,trainer,viewer})
+  local crate file files crates=(pocketsplat pocketsplat-{core,format,half,files,capture,gaussians,instructions,kernels,metrics,gpu,codec,trainer,viewer})
   files=$(cargo package -p pocketsplat-core --allow-dirty --locked --list)
-  for file in README.md CHANGELOG.md src/bundle/{FORMAT,DRAWING,MANIFEST}.md src/bundle/{normal_tables.bin,example.psb} examples/draw_png.rs; do
+  for file in README.md CHANGELOG.md examples/{draw_png.rs,example.psb}; do
     grep -qx "$file" <<<"$files" || fail "the package of pocketsplat-core lacks $file"
+  done
+  files=$(cargo package -p pocketsplat-format --allow-dirty --locked --list)
+  for file in README.md src/bundle/{FORMAT,DRAWING,MANIFEST}.md src/bundle/{normal_tables.bin,example.psb}; do
+    grep -qx "$file" <<<"$files" || fail "the package of pocketsplat-format lacks $file"
   done
   for crate in "${crates[@]}"; do
     files=$(cargo package -p "$crate" --allow-dirty --locked --list)

@@ -4,8 +4,7 @@ use core::ffi::c_void;
 use core::mem::{align_of, size_of};
 use core::slice;
 
-use pocketsplat_core::arithmetic::ReferenceArithmetic;
-use pocketsplat_core::{Drawing, FrameReport, PixelFormat, RenderError, TileSink};
+use pocketsplat_core::{Drawing, FrameReport, PixelFormat, RenderError, Tile, TileSink};
 
 use crate::camera::Camera;
 use crate::plan::{Budget, bytes_of, planned};
@@ -125,7 +124,7 @@ struct Tiles {
 impl TileSink for Tiles {
     type Error = i32;
 
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) -> Result<(), i32> {
+    fn tile(&mut self, Tile { x_px, y_px, width, height, rgb, .. }: Tile<'_>) -> Result<(), i32> {
         // SAFETY: the caller's function, with the pixels that its description says.
         match unsafe { (self.function)(self.user, x_px, y_px, width, height, rgb.as_ptr().cast()) } {
             0 => Ok(()),
@@ -188,7 +187,7 @@ pub unsafe extern "C" fn psb_bind(
         }
         // SAFETY: the caller's promise.
         let regions = unsafe { [memory_of(scratch, scratch_len), memory_of(slow, slow_len)] };
-        let bound = pocketsplat_core::Decoder::bind_in_regions::<ReferenceArithmetic>(&bundle, plan, regions)?;
+        let bound = pocketsplat_core::Decoder::bind(&bundle, plan, regions)?;
         // SAFETY: long enough and aligned, as was checked.
         unsafe { place.write(Decoder { begun: None, bound }) };
         *decoder = place;

@@ -116,11 +116,7 @@ pub unsafe extern "C" fn psb_next_tile(
         match drawing.next_tile()? {
             Some(tile) => {
                 let place = [tile.x_px, tile.y_px, tile.width, tile.height];
-                let bytes = match *format {
-                    PixelFormat::Rgb888 => tile.rgb.as_flattened_mut(),
-                    PixelFormat::Rgb565(order, rounding) => tile.into_rgb565(order, rounding),
-                };
-                *out = Pixels::new(place, bytes);
+                *out = Pixels::new(place, tile.into_bytes(*format));
             }
             None => say_report(drawing, report),
         }

@@ -106,7 +106,7 @@ pub(crate) fn planned(
 ) -> Result<(Bundle<'static>, pocketsplat_core::Plan), Failure> {
     let bundle = Bundle::parse(bundle.ok_or(Failure::Misuse("bundle is NULL"))?)?;
     let budget = budget.ok_or(Failure::Misuse("budget is NULL"))?.to_core()?;
-    let plan = bundle.plan(&budget)?;
+    let plan = pocketsplat_core::Plan::new(&bundle, &budget)?;
     Ok((bundle, plan))
 }
 

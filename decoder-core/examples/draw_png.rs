@@ -7,10 +7,10 @@
 use std::convert::Infallible;
 use std::error::Error;
 
-use pocketsplat_core::{Budget, Bundle, Decoder, TileSink};
+use pocketsplat_core::{Budget, Bundle, Decoder, Plan, Tile, TileSink};
 
 /// The bundle of the format's description: three anchors, drawn where no other bundle is given.
-const EXAMPLE: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/bundle/example.psb"));
+const EXAMPLE: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/example.psb"));
 
 /// A frame that is filled tile by tile. A device would hand each tile to its display instead.
 struct Frame {
@@ -22,7 +22,7 @@ struct Frame {
 impl TileSink for Frame {
     type Error = Infallible;
 
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, _height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
+    fn tile(&mut self, Tile { x_px, y_px, width, rgb, .. }: Tile<'_>) -> Result<(), Infallible> {
         for (row, pixels) in rgb.chunks_exact(width.into()).enumerate() {
             let first = ((usize::from(y_px) + row) * self.width_px + usize::from(x_px)) * 3;
             self.rgb[first..][..pixels.as_flattened().len()].copy_from_slice(pixels.as_flattened());
@@ -41,7 +41,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let camera = bundle.header().preview;
 
     // Plan: a PC has memory enough, so the budget names the frame's size alone.
-    let plan = bundle.plan(&Budget::for_frame(camera.width_px, camera.height_px))?;
+    let plan = Plan::new(&bundle, &Budget::for_frame(camera.width_px, camera.height_px))?;
 
     // Bind: the decoder uses these bytes and no others.
     let mut scratch = vec![0; plan.scratch_len()];

@@ -11,11 +11,11 @@ use std::error::Error;
 use embedded_graphics_core::geometry::{Point, Size};
 use embedded_graphics_core::pixelcolor::Rgb565;
 use embedded_graphics_simulator::{OutputSettingsBuilder, SimulatorDisplay};
-use pocketsplat_core::display::DisplaySink;
 use pocketsplat_core::{Budget, Bundle, Decoder};
+use pocketsplat_core::{DisplaySink, Plan};
 
 /// The bundle of the format's description: three anchors, drawn where no other bundle is given.
-const EXAMPLE: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/bundle/example.psb"));
+const EXAMPLE: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/example.psb"));
 
 /// Pixels of the display.
 const DISPLAY_PX: [u16; 2] = [160, 120];
@@ -32,7 +32,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut display = SimulatorDisplay::<Rgb565>::new(Size::new(width_px.into(), height_px.into()));
 
     let bundle = Bundle::parse(&bytes)?;
-    let plan = bundle.plan(&Budget::for_frame(width_px, height_px).in_bytes(RAM_BYTES))?;
+    let plan = Plan::new(&bundle, &Budget::for_frame(width_px, height_px).in_bytes(RAM_BYTES))?;
     let mut scratch = vec![0; plan.scratch_len()];
     let mut decoder = Decoder::bind(&bundle, plan, &mut scratch)?;
 

@@ -11,7 +11,7 @@ use std::error::Error;
 use pocketsplat_core::{Budget, Bundle, DecodeError, Plan, Region};
 
 /// The bundle of the format's description: three anchors, planned where no other bundle is given.
-const EXAMPLE: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/bundle/example.psb"));
+const EXAMPLE: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/example.psb"));
 
 /// Scratch memory of devices, bytes, where the command line names none.
 const DEVICES_BYTES: [usize; 5] = [4 * 1024, 6_850, 8 * 1024, 64 * 1024, 192 * 1024];
@@ -26,7 +26,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let [width_px, height_px] = [bundle.header().preview.width_px, bundle.header().preview.height_px];
     println!("{width_px}×{height_px} pixels, {} anchors in {} tiers", bundle.header().n_anchors, bundle.n_tiers());
     for [fast, slow] in budgets {
-        match bundle.plan(&Budget::for_frame(width_px, height_px).in_bytes(fast).with_slow_bytes(slow)) {
+        match Plan::new(&bundle, &Budget::for_frame(width_px, height_px).in_bytes(fast).with_slow_bytes(slow)) {
             Ok(plan) => println!("{fast:>8} + {slow} bytes: {}", described(&plan)),
             // The error names the bytes that would do.
             Err(error @ DecodeError::BudgetTooSmall { .. }) => println!("{fast:>8} + {slow} bytes: {error}"),

@@ -1,8 +1,7 @@
 //! Carves one byte slice into typed slices.
 
 use bytemuck::Pod;
-
-use crate::error::{DecodeError, Region, saturate};
+use pocketsplat_format::{DecodeError, Region, saturate};
 
 /// The part of the caller's memory not yet handed out, in words of four bytes.
 pub(crate) struct Arena<'s> {

@@ -2,62 +2,53 @@
 
 mod bind;
 mod count;
+mod first_come;
 mod frame;
 mod gather;
-mod notes;
+mod pixel_format;
+mod render_error;
 mod report;
 mod row;
+mod scratch;
+mod slab_index;
 mod source;
 mod splats;
 mod strip;
-mod tally;
+mod strips_of_chunks;
 #[cfg(test)]
 mod tests;
 mod tile;
 
 pub use count::{count_gaussians, count_scratch_len};
 pub use frame::Drawing;
+pub use pixel_format::{ByteOrder, PixelFormat, Rounding};
+pub use render_error::RenderError;
 pub use report::FrameReport;
-pub use row::{PixelFormat, TileRow};
-#[cfg(feature = "embedded-graphics")]
-pub(crate) use tile::dithered_steps;
-pub use tile::{ByteOrder, Rounding, Tile};
+pub use row::TileRow;
+pub use scratch::Scratch;
+pub use tile::{Tile, TileSink};
+
+use core::fmt;
+
+use pocketsplat_format::bundle::Chunk;
+use pocketsplat_format::{Bundle, Camera, DecodeError, Stopwatch};
 
 use crate::arithmetic::{Arithmetic, ReferenceArithmetic};
 use crate::budget::Plan;
-use crate::bundle::{Bundle, Chunk};
-use crate::camera::Camera;
-use crate::error::{DecodeError, RenderError};
 use crate::raster::Pixel;
-use crate::stopwatch::Stopwatch;
 use source::GaussianSource;
 use splats::SplatStore;
-
-/// Takes finished tiles, for instance to a display.
-pub trait TileSink {
-    /// What can go wrong with a tile; [`Infallible`](core::convert::Infallible) where nothing can.
-    type Error;
-
-    /// One tile: its first pixel, its size, and `[height, width]` pixels row by row.
-    ///
-    /// Tiles come in rows from the top, each row from the left; together they fill the frame, none twice.
-    ///
-    /// # Errors
-    /// The sink's own: the frame ends with it, and no more tiles come.
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) -> Result<(), Self::Error>;
-}
 
 /// Draws frames of one bundle with the memory it was bound to, computed as `A` says.
 pub struct Decoder<'b, 's, A: Arithmetic = ReferenceArithmetic> {
     bundle: Bundle<'b>,
     plan: Plan,
-    skip_damage: bool,
     source: GaussianSource<'b, 's, A::Heads>,
     /// `[TILE_PIXELS]` of the current tile, or of each tile of a strip when strips are drawn in slabs.
     pixels: &'s mut [Pixel],
     /// `[TILE_PIXELS]` a finished tile.
     rgb: &'s mut [[u8; 3]],
-    splats: SplatStore<'s, A::Splat>,
+    splats: SplatStore<'s>,
 }
 
 impl<'b, 's> Decoder<'b, 's> {
@@ -68,13 +59,13 @@ impl<'b, 's> Decoder<'b, 's> {
     ///
     /// ```
     /// # fn main() -> Result<(), pocketsplat_core::DecodeError> {
-    /// # let first = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/bundle/example.psb"));
-    /// # let second = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/bundle/example-context.psb"));
-    /// use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder};
+    /// # let first = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/example.psb"));
+    /// # let second = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/example-context.psb"));
+    /// use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, Plan};
     ///
     /// /// Draws a bundle in memory that it has only as long as the call lasts; returns the pixels.
     /// fn show(bundle: &Bundle<'_>, scratch: &mut [u8]) -> Result<usize, DecodeError> {
-    ///     let plan = bundle.plan(&Budget::for_frame(32, 24).in_bytes(scratch.len()))?;
+    ///     let plan = Plan::new(bundle, &Budget::for_frame(32, 24).in_bytes(scratch.len()))?;
     ///     let mut decoder = Decoder::bind(bundle, plan, scratch)?;
     ///     let mut drawing = decoder.begin(&bundle.header().preview.resized(32, 24))?;
     ///     let mut n_pixels = 0;
@@ -92,19 +83,37 @@ impl<'b, 's> Decoder<'b, 's> {
     /// # }
     /// ```
     ///
+    /// Two regions of memory go into an array, the fast one first; the frames are the same as with one:
+    ///
+    /// ```no_run
+    /// # use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, Plan};
+    /// # fn bound(bundle: &Bundle<'_>, sram: &mut [u8], psram: &mut [u8]) -> Result<(), DecodeError> {
+    /// let plan = Plan::new(bundle, &Budget::for_frame(320, 240).in_bytes(sram.len()).with_slow_bytes(psram.len()))?;
+    /// for part in plan.memory() {
+    ///     // For instance `Scene` and `Splats` in `Slow`, with the bytes of each.
+    ///     # let _ = part;
+    /// }
+    /// let decoder = Decoder::bind(bundle, plan, [sram, psram])?;
+    /// # let _ = decoder;
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
-    /// [`DecodeError::ScratchTooSmall`] names the bytes needed; [`DecodeError::PlanMismatch`] when `plan` is another
-    /// bundle's; [`DecodeError::ChunkChecksum`] names the damaged chunk, and so does [`DecodeError::ChunkStream`] for
-    /// resident anchors and baked Gaussians; [`DecodeError::OutOfRange`] when those are more than the bundle says.
+    /// [`DecodeError::ScratchTooSmall`] names the region and the bytes needed; [`DecodeError::PlanMismatch`] when `plan` is another
+    /// bundle's; unless the budget [skips damage](crate::Budget::skipping_damage), [`DecodeError::ChunkChecksum`] names the damaged
+    /// chunk, and so does [`DecodeError::ChunkStream`] for resident anchors and baked Gaussians; [`DecodeError::OutOfRange`] when those
+    /// are more than the bundle says.
     ///
     /// # Budget
-    /// Exactly [`Plan::scratch_len`] bytes of `scratch`; reads the whole bundle once, about 8 instructions a byte, and for
-    /// resident anchors 55 to 80 a symbol; baked Gaussians take the heads of every anchor besides.
-    pub fn bind(bundle: &Bundle<'b>, plan: Plan, scratch: &'s mut [u8]) -> Result<Self, DecodeError> {
+    /// Exactly [`Plan::scratch_len`] and [`Plan::slow_scratch_len`] bytes of `scratch`; reads the whole bundle once, about 8 instructions
+    /// a byte, and for resident anchors 55 to 80 a symbol; baked Gaussians take the heads of every anchor besides. The plan is compared
+    /// with one that is made again, which takes as long as [`Plan::new`].
+    pub fn bind(bundle: &Bundle<'b>, plan: Plan, scratch: impl Into<Scratch<'s>>) -> Result<Self, DecodeError> {
         Self::bind_in(bundle, plan, scratch)
     }
 
-    /// As [`bind`](Self::bind), with another arithmetic: `Decoder::bind_in::<With<I16>>(…)`.
+    /// As [`bind`](Self::bind), with another arithmetic: `Decoder::bind_in::<WithoutFpu>(…)`.
     ///
     /// # Errors
     /// As for [`bind`](Self::bind).
@@ -114,54 +123,9 @@ impl<'b, 's> Decoder<'b, 's> {
     pub fn bind_in<A: Arithmetic>(
         bundle: &Bundle<'b>,
         plan: Plan,
-        scratch: &'s mut [u8],
+        scratch: impl Into<Scratch<'s>>,
     ) -> Result<Decoder<'b, 's, A>, DecodeError> {
-        Self::bind_in_regions(bundle, plan, [scratch, &mut []])
-    }
-
-    /// As [`bind_in`](Self::bind_in), in two regions of memory: the frames are the same as with one.
-    ///
-    /// * `[fast, slow]`: at least [`Plan::scratch_len`] and [`Plan::slow_scratch_len`] bytes of [normal memory](crate#memory).
-    ///
-    /// ```no_run
-    /// # use pocketsplat_core::{arithmetic::ReferenceArithmetic, Budget, Bundle, DecodeError, Decoder};
-    /// # fn bound(bundle: &Bundle<'_>, sram: &mut [u8], psram: &mut [u8]) -> Result<(), DecodeError> {
-    /// let plan = bundle.plan(&Budget::for_frame(320, 240).in_bytes(sram.len()).with_slow_bytes(psram.len()))?;
-    /// for part in plan.memory() {
-    ///     // For instance `Scene` and `Splats` in `Slow`, with the bytes of each.
-    ///     # let _ = part;
-    /// }
-    /// let decoder = Decoder::bind_in_regions::<ReferenceArithmetic>(bundle, plan, [sram, psram])?;
-    /// # let _ = decoder;
-    /// # Ok(())
-    /// # }
-    /// ```
-    ///
-    /// # Errors
-    /// As for [`bind`](Self::bind); [`DecodeError::ScratchTooSmall`] names the region.
-    ///
-    /// # Budget
-    /// As for [`bind`](Self::bind), in both regions; the plan is compared with one that is made again, which takes as long as
-    /// [`Bundle::plan`].
-    pub fn bind_in_regions<A: Arithmetic>(
-        bundle: &Bundle<'b>,
-        plan: Plan,
-        regions: [&'s mut [u8]; 2],
-    ) -> Result<Decoder<'b, 's, A>, DecodeError> {
-        Decoder::bind_with(bundle, plan, regions, false)
-    }
-
-    /// As [`bind`](Self::bind), but leaves damaged chunks out, and each frame that needs some says so in its report. Drawn in
-    /// [slabs](crate::Overflow::Slabs), a frame still fails for a chunk whose checksum is right and whose stream is not.
-    ///
-    /// # Errors
-    /// [`DecodeError::ScratchTooSmall`] and [`DecodeError::PlanMismatch`] as for [`bind`](Self::bind).
-    ///
-    /// # Budget
-    /// As for [`bind`](Self::bind) when anchors are resident. Streamed, checksums are compared in the frames that need the
-    /// chunks: about 8 instructions a byte of those in view.
-    pub fn bind_skipping_damage(bundle: &Bundle<'b>, plan: Plan, scratch: &'s mut [u8]) -> Result<Self, DecodeError> {
-        Self::bind_with(bundle, plan, [scratch, &mut []], true)
+        Decoder::bind_regions(bundle, plan, scratch.into())
     }
 }
 
@@ -217,6 +181,11 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
         self.begin_frame(camera)
     }
 
+    /// Whether damaged chunks are left out.
+    fn skips_damage(&self) -> bool {
+        self.plan.budget().skips_damage
+    }
+
     /// The chunks of the tiers that are drawn, each with the number of its first anchor.
     fn planned_chunks(&self) -> impl Iterator<Item = (Chunk<'b>, u32)> + use<'b, 's, A> {
         let n_chunks = self.bundle.up_to_tier(self.plan.n_tiers()).n_chunks;
@@ -226,5 +195,11 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
             n_anchors = n_anchors.saturating_add(chunk.n_anchors().into());
             (chunk, first)
         })
+    }
+}
+
+impl<A: Arithmetic> fmt::Debug for Decoder<'_, '_, A> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Decoder").field("plan", &self.plan).finish_non_exhaustive()
     }
 }

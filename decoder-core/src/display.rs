@@ -3,14 +3,13 @@
 //! ```
 //! # use embedded_graphics_core::geometry::{Point, Size};
 //! # use embedded_graphics_core::pixelcolor::Rgb565;
-//! # let bytes = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/bundle/example.psb"));
+//! # let bytes = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/example.psb"));
 //! # let mut scratch = [0; 8 * 1024];
 //! # let mut display = embedded_graphics_simulator::SimulatorDisplay::<Rgb565>::new(Size::new(32, 24));
-//! use pocketsplat_core::display::DisplaySink;
-//! use pocketsplat_core::{Budget, Bundle, Decoder, RenderError};
+//! use pocketsplat_core::{Budget, Bundle, Decoder, DisplaySink, Plan, RenderError};
 //!
 //! let bundle = Bundle::parse(bytes)?;
-//! let plan = bundle.plan(&Budget::for_frame(32, 24).in_bytes(scratch.len()))?;
+//! let plan = Plan::new(&bundle, &Budget::for_frame(32, 24).in_bytes(scratch.len()))?;
 //! let mut decoder = Decoder::bind(&bundle, plan, &mut scratch)?;
 //! match decoder.render(&bundle.header().preview, &mut DisplaySink::new(&mut display, Point::zero())) {
 //!     Ok(report) => assert_eq!((report.splats, display.get_pixel(Point::new(31, 23))), (5, Rgb565::new(0, 0, 8))),
@@ -25,7 +24,7 @@ use embedded_graphics_core::geometry::{Point, Size};
 use embedded_graphics_core::pixelcolor::{Rgb888, RgbColor};
 use embedded_graphics_core::primitives::Rectangle;
 
-use crate::decoder::{TileSink, dithered_steps};
+use crate::decoder::{Tile, TileSink};
 
 /// Draws tiles on a display with the frame's first pixel at `origin`.
 ///
@@ -67,46 +66,41 @@ where
 
     // Not inlined: among what draws a tile its loop would not stay in registers.
     #[inline(never)]
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) -> Result<(), D::Error> {
-        let corner = self.origin + Point::new(x_px.into(), y_px.into());
-        let area = Rectangle::new(corner, Size::new(width.into(), height.into()));
-        let places = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
-        let dithered_to = self.dithered_to;
-        // Tiles begin at multiples of four pixels, so the pattern runs on across them.
-        let colours = rgb.iter().zip(places).map(|(&rgb, place)| {
-            let [r, g, b] = dithered_to.map_or(rgb, |most| dithered(rgb, most, place));
-            D::Color::from(Rgb888::new(r, g, b))
-        });
+    fn tile(&mut self, mut tile: Tile<'_>) -> Result<(), D::Error> {
+        if let Some(most) = self.dithered_to {
+            tile.dither(most);
+        }
+        let corner = self.origin + Point::new(tile.x_px.into(), tile.y_px.into());
+        let area = Rectangle::new(corner, Size::new(tile.width.into(), tile.height.into()));
+        let colours = tile.rgb.iter().map(|&[r, g, b]| D::Color::from(Rgb888::new(r, g, b)));
         self.display.fill_contiguous(&area, colours)
     }
-}
-
-/// The bytes next to those of the steps `0..=most` that each channel is dithered to.
-fn dithered(rgb: [u8; 3], most: [u8; 3], place: (u16, u16)) -> [u8; 3] {
-    let [r, g, b] = dithered_steps(rgb, most, place);
-    let [most_r, most_g, most_b] = most;
-    [(r, most_r), (g, most_g), (b, most_b)].map(|(step, most)| {
-        let most = u32::from(most).max(1);
-        // At most 255.
-        ((u32::from(step) * 255 + most / 2) / most) as u8
-    })
 }
 
 #[cfg(test)]
 mod tests {
     use embedded_graphics_core::pixelcolor::{IntoStorage, Rgb565, Rgb888, RgbColor};
 
-    use super::dithered;
     use crate::decoder::{ByteOrder, Rounding, Tile};
 
     const MOST: [u8; 3] = [Rgb565::MAX_R, Rgb565::MAX_G, Rgb565::MAX_B];
+
+    /// A tile of one colour.
+    fn plain(rgb: &mut [[u8; 3]; 16]) -> Tile<'_> {
+        Tile::new([0, 0], [4, 4], rgb).expect("sixteen pixels")
+    }
+
+    fn dithered(rgb: [u8; 3], most: [u8; 3]) -> [[u8; 3]; 16] {
+        let mut pixels = [rgb; 16];
+        plain(&mut pixels).dither(most);
+        pixels
+    }
 
     #[test]
     fn dither_keeps_the_mean_and_the_ends() {
         for byte in 0..=255_u8 {
             let mut sums = [0.0; 3];
-            for (x, y) in (0..4).flat_map(|y| (0..4).map(move |x| (x, y))) {
-                let [r, g, b] = dithered([byte; 3], MOST, (x, y));
+            for [r, g, b] in dithered([byte; 3], MOST) {
                 let shown = Rgb565::from(Rgb888::new(r, g, b));
                 let steps = [shown.r(), shown.g(), shown.b()];
                 for ((sum, step), most) in sums.iter_mut().zip(steps).zip(MOST) {
@@ -122,15 +116,13 @@ mod tests {
     fn a_packed_tile_is_what_a_display_of_16_bits_shows() {
         for byte in 0..=255_u8 {
             let rgb = [byte, byte.wrapping_add(85), byte.wrapping_add(170)];
-            for (x, y) in (0..4).flat_map(|y| (0..4).map(move |x| (x, y))) {
-                for rounding in [Rounding::Nearest, Rounding::Dithered] {
-                    let mut tile = [rgb; 16];
-                    let tile = Tile { x_px: 0, y_px: 0, width: 4, height: 4, rgb: &mut tile };
-                    let packed = tile.into_rgb565(ByteOrder::LittleEndian, rounding);
-                    let pixel = packed.as_chunks::<2>().0[usize::from(4 * y + x)];
-                    let [r, g, b] = if rounding == Rounding::Dithered { dithered(rgb, MOST, (x, y)) } else { rgb };
+            for rounding in [Rounding::Nearest, Rounding::Dithered] {
+                let mut pixels = [rgb; 16];
+                let packed = plain(&mut pixels).into_rgb565(ByteOrder::LittleEndian, rounding);
+                let shown = if rounding == Rounding::Dithered { dithered(rgb, MOST) } else { [rgb; 16] };
+                for (pixel, [r, g, b]) in packed.as_chunks::<2>().0.iter().zip(shown) {
                     let shown = Rgb565::from(Rgb888::new(r, g, b)).into_storage();
-                    assert_eq!(u16::from_le_bytes(pixel), shown, "{rgb:?} at ({x}, {y}), {rounding:?}");
+                    assert_eq!(u16::from_le_bytes(*pixel), shown, "{rgb:?}, {rounding:?}");
                 }
             }
         }
@@ -139,7 +131,7 @@ mod tests {
     #[test]
     fn a_display_of_all_bits_shows_every_byte() {
         for byte in 0..=255_u8 {
-            assert_eq!(dithered([byte; 3], [255; 3], (3, 0)), [byte; 3]);
+            assert_eq!(dithered([byte; 3], [255; 3]), [[byte; 3]; 16]);
         }
     }
 }

@@ -11,39 +11,33 @@ compile_error!(
      target with SSE2, such as i686"
 );
 
-// Each module imports only modules before it in this list: error · rules · math · stopwatch · camera · bytes · arena · entropy ·
-// context · bundle · mlp · scene · project · raster · arithmetic · bake · budget · decoder · display. `tests/tests/rooms.rs` holds the crate to it.
+// Each module imports only modules before it in this list: arena · functions · mlp · scene · project · raster · arithmetic · bake · budget ·
+// decoder · display. `tests/tests/rooms.rs` holds the crate to it, and counts the names below.
 mod arena;
-pub mod arithmetic;
+mod arithmetic;
 mod bake;
-pub mod budget;
-pub mod bundle;
-mod bytes;
-mod camera;
-pub mod context;
+mod budget;
 mod decoder;
 #[cfg(feature = "embedded-graphics")]
-pub mod display;
-pub mod entropy;
-mod error;
-pub mod math;
+mod display;
+mod functions;
 mod mlp;
 mod project;
 mod raster;
-pub mod rules;
 mod scene;
-mod stopwatch;
 
+pub use arithmetic::{Arithmetic, ReferenceArithmetic, WithoutFpu};
 pub use budget::{
-    Budget, HeadWeights, MaxSplats, Overflow, Part, PartMemory, Plan, Quality, Residency, Resident, ScratchShape,
-    Strips, Work,
+    Budget, CoderShape, FrameShape, HeadWeights, MaxSplats, ModelShape, Overflow, Part, PartMemory, Plan, Quality,
+    RecordShape, Residency, Resident, ScratchShape, Strips, Work,
 };
-pub use bundle::Bundle;
-pub use camera::{Camera, Rotation};
 pub use decoder::{
-    ByteOrder, Decoder, Drawing, FrameReport, PixelFormat, Rounding, Tile, TileRow, TileSink, count_gaussians,
-    count_scratch_len,
+    ByteOrder, Decoder, Drawing, FrameReport, PixelFormat, RenderError, Rounding, Scratch, Tile, TileRow, TileSink,
+    count_gaussians, count_scratch_len,
 };
-pub use error::{DecodeError, ErrorClass, Field, Region, RenderError, SectionKind};
+#[cfg(feature = "embedded-graphics")]
+pub use display::DisplaySink;
+pub use pocketsplat_format::{
+    Bundle, Camera, DecodeError, ErrorClass, Field, Region, Rotation, SectionKind, Stage, Stopwatch,
+};
 pub use project::chunks_in_view;
-pub use stopwatch::{Stage, Stopwatch};

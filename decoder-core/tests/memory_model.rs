@@ -68,6 +68,7 @@ fn by_the_document(shape: &ScratchShape) -> usize {
         + match model.head_weights {
             HeadWeights::F32 => f32,
             HeadWeights::F16 => halves.max(integers).min(f32),
+            other => panic!("what do {other:?} take?"),
         };
     let heads = weights + c + n_g.max(n_c) + u + up8(h_d) + 11 * k;
 

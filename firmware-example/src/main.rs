@@ -17,8 +17,8 @@ use defmt_semihosting as _;
 use embedded_graphics::geometry::Point;
 use instructions::{Instructions, Table};
 use panel::{PANEL, Panel, write_ppm};
-use pocketsplat_core::display::DisplaySink;
 use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, Overflow, Quality, Stage, Stopwatch as _};
+use pocketsplat_core::{DisplaySink, Plan};
 #[cfg(target_arch = "riscv32")]
 use riscv as _;
 use semihosting::io;
@@ -80,7 +80,7 @@ fn draw_orbit(panel: &mut Panel, scratch: &mut [u8]) -> Result<(), Failure> {
     let preview = header.preview.resized(WIDTH_PX as u16, HEIGHT_PX as u16);
     let budget = asked(Budget::for_frame(preview.width_px, preview.height_px).in_bytes(scratch.len()));
     // A scene that no pruning rate makes small enough still fits in slabs of depth, which take longer.
-    let plan = bundle.plan(&budget).or_else(|_| bundle.plan(&budget.with_overflow(Overflow::Slabs)))?;
+    let plan = Plan::new(&bundle, &budget).or_else(|_| Plan::new(&bundle, &budget.with_overflow(Overflow::Slabs)))?;
     defmt::info!("scratch: {} bytes, of which the plan takes {}", scratch.len(), plan.scratch_len());
     defmt::info!(
         "plan: {} of {} tiers, pruning rate {}, resident {}, {} strips of at most {} slabs of at most {} splats, {}",

@@ -1,6 +1,6 @@
 //! Whose mistake an error is.
 
-use pocketsplat_core::{DecodeError, ErrorClass};
+use pocketsplat_format::{DecodeError, ErrorClass};
 
 /// Nothing in a file makes the decoder blame itself.
 pub(super) fn check_blame(error: &DecodeError) {

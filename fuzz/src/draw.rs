@@ -1,8 +1,8 @@
 //! Any bundle draws or is refused, and where its memory lies and how much there is changes no pixel.
 
-use pocketsplat_core::arithmetic::{Arithmetic, F16, F32, Reference, ReferenceArithmetic, Wide, With, WithoutFpu};
 use pocketsplat_core::{
-    Bundle, Camera, DecodeError, Decoder, Field, FrameReport, MaxSplats, Overflow, Plan, Residency, Strips,
+    Arithmetic, Bundle, Camera, DecodeError, Decoder, Field, FrameReport, MaxSplats, Overflow, Plan,
+    ReferenceArithmetic, Residency, Strips, WithoutFpu,
 };
 
 use super::MOST_ANCHORS;
@@ -30,14 +30,11 @@ pub fn draw(bytes: &[u8]) {
         assert!(job.strict::<ReferenceArithmetic>(job.streamed()).is_err(), "an unusable camera");
         return;
     }
-    match setting.arithmetic % 4 {
-        0 => {
-            job.compare_ways::<ReferenceArithmetic>();
-            job.compare_with_damage_left_out();
-        }
-        1 => job.compare_ways::<WithoutFpu>(),
-        2 => job.compare_ways::<With<F16>>(),
-        _ => job.compare_ways::<With<F32, Reference, Wide>>(),
+    if setting.without_fpu {
+        job.compare_ways::<WithoutFpu>();
+    } else {
+        job.compare_ways::<ReferenceArithmetic>();
+        job.compare_with_damage_left_out();
     }
 }
 
@@ -57,6 +54,7 @@ struct Way {
     max_splats: MaxSplats,
     /// How much of the memory is fast, in 255ths; 0 for one region.
     fast_share: u8,
+    skips_damage: bool,
 }
 
 type Drawn = Result<(Frame, FrameReport), DecodeError>;
@@ -116,7 +114,7 @@ impl Job<'_, '_> {
 
     fn streamed(&self) -> Way {
         let Setting { n_strips, overflow, max_splats, .. } = *self.setting;
-        Way { residency: Residency::Streamed, n_strips, overflow, max_splats, fast_share: 0 }
+        Way { residency: Residency::Streamed, n_strips, overflow, max_splats, fast_share: 0, skips_damage: false }
     }
 
     /// What two ways that differ in memory alone draw is the same. In slabs it need not be where a box lies, which one way looks at and
@@ -175,40 +173,36 @@ impl Job<'_, '_> {
             .with_strips(Strips::Exactly(way.n_strips))
             .with_overflow(way.overflow)
             .with_max_splats(way.max_splats);
-        let whole = self.bundle.plan(&budget)?;
+        let budget = if way.skips_damage { budget.skipping_damage() } else { budget };
+        let whole = Plan::new(self.bundle, &budget)?;
         if way.fast_share == 0 {
             return Ok(whole);
         }
         let fast = whole.scratch_len() * usize::from(way.fast_share) / usize::from(u8::MAX);
-        self.bundle.plan(&budget.in_bytes(fast).with_slow_bytes(SLOW_BYTES))
-    }
-
-    /// Draws without leave to leave damage out.
-    fn strict<A: Arithmetic>(&self, way: Way) -> Drawn {
-        self.seen(self.plan(way).and_then(|plan| {
-            let [mut fast, mut slow] = [plan.scratch_len(), plan.slow_scratch_len()].map(|len| vec![0xA5; len]);
-            self.frame(Decoder::bind_in_regions::<A>(self.bundle, plan, [&mut fast, &mut slow])?)
-        }))
+        Plan::new(self.bundle, &budget.in_bytes(fast).with_slow_bytes(SLOW_BYTES))
     }
 
     /// Draws with damage left out.
     fn skipping(&self, way: Way) -> Drawn {
-        self.seen(self.plan(way).and_then(|plan| {
-            self.frame(Decoder::bind_skipping_damage(self.bundle, plan, &mut vec![0; plan.scratch_len()])?)
-        }))
+        self.strict::<ReferenceArithmetic>(Way { skips_damage: true, ..way })
     }
 
-    fn frame<A: Arithmetic>(&self, mut decoder: Decoder<'_, '_, A>) -> Drawn {
-        let mut frame = Frame::new(self.camera.width_px, self.camera.height_px);
-        let report = decoder.render(&self.camera, &mut frame)?;
-        assert!(frame.deliveries.iter().all(|n| *n == 1), "every pixel comes once");
-        Ok((frame, report))
-    }
-
-    fn seen(&self, drawn: Drawn) -> Drawn {
+    /// Draws, without leave to leave damage out unless the way says so.
+    fn strict<A: Arithmetic>(&self, way: Way) -> Drawn {
+        let drawn = self.frame::<A>(way);
         if let Err(error) = &drawn {
             check_blame(error);
         }
         drawn
+    }
+
+    fn frame<A: Arithmetic>(&self, way: Way) -> Drawn {
+        let plan = self.plan(way)?;
+        let [mut fast, mut slow] = [plan.scratch_len(), plan.slow_scratch_len()].map(|len| vec![0xA5; len]);
+        let mut decoder = Decoder::bind_in::<A>(self.bundle, plan, [&mut fast, &mut slow])?;
+        let mut frame = Frame::new(self.camera.width_px, self.camera.height_px);
+        let report = decoder.render(&self.camera, &mut frame)?;
+        assert!(frame.deliveries.iter().all(|n| *n == 1), "every pixel comes once");
+        Ok((frame, report))
     }
 }

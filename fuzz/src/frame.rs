@@ -2,7 +2,7 @@
 
 use std::convert::Infallible;
 
-use pocketsplat_core::TileSink;
+use pocketsplat_core::{Tile, TileSink};
 
 /// A frame, and how often each of its pixels arrived.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -26,7 +26,7 @@ impl Frame {
 impl TileSink for Frame {
     type Error = Infallible;
 
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
+    fn tile(&mut self, Tile { x_px, y_px, width, height, rgb, .. }: Tile<'_>) -> Result<(), Infallible> {
         let [x, y, width, height] = [x_px, y_px, width, height].map(usize::from);
         assert_eq!(rgb.len(), width * height, "pixels of the tile at ({x}, {y})");
         assert!(

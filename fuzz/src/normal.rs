@@ -1,6 +1,6 @@
 //! Any words are symbols of a Gaussian.
 
-use pocketsplat_core::entropy::{self, AnsReader, NormalModel, SymbolModel, UniformByte};
+use pocketsplat_format::entropy::{self, AnsReader, NormalModel, SymbolModel, UniformByte};
 
 /// A raw byte from here on says that two more are the symbol.
 const ESCAPE_SPELT: u8 = 254;

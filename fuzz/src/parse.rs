@@ -1,7 +1,7 @@
 //! Any bytes parse or are refused.
 
-use pocketsplat_core::bundle::Section;
-use pocketsplat_core::{Bundle, SectionKind};
+use pocketsplat_format::bundle::Section;
+use pocketsplat_format::{Bundle, SectionKind};
 
 use super::blame::check_blame;
 use super::seal::reseal;

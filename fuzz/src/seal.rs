@@ -1,6 +1,6 @@
 //! Checksums made right again after damage, so that a hostile bundle reaches the checks behind them.
 
-use pocketsplat_core::bundle::{
+use pocketsplat_format::bundle::{
     CHUNK_RECORD_LEN, HEADER_FIXED_LEN, INK_FRAME_LEN, SECTION_LEN, TIER_RECORD_LEN, crc32,
 };
 

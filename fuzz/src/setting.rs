@@ -3,8 +3,8 @@
 
 use std::f32::consts::TAU;
 
-use pocketsplat_core::bundle::{CHUNK_RECORD_LEN, InkFrame, TIER_RECORD_LEN};
 use pocketsplat_core::{Budget, Bundle, Camera, MaxSplats, Overflow, Quality, Residency, Rotation, SectionKind};
+use pocketsplat_format::bundle::{CHUNK_RECORD_LEN, InkFrame, TIER_RECORD_LEN};
 
 use super::seal::reseal;
 
@@ -21,8 +21,8 @@ const EVERYWHERE: f32 = 1e30;
 /// How a bundle is drawn.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Setting {
-    /// What the frame is computed with.
-    pub(super) arithmetic: u8,
+    /// Whether the frame is computed as without an FPU.
+    pub(super) without_fpu: bool,
     /// Splats that there are places for.
     pub(super) max_splats: MaxSplats,
     /// Strips of the frame.
@@ -70,10 +70,6 @@ impl Tail<'_> {
         byte
     }
 
-    fn u16(&mut self) -> u16 {
-        u16::from_le_bytes(self.bytes())
-    }
-
     fn f32s<const N: usize>(&mut self) -> [f32; N] {
         std::array::from_fn(|_| f32::from_le_bytes(self.bytes()))
     }
@@ -88,7 +84,7 @@ impl Setting {
         let has = |bit: u8| flags >> bit & 1 == 1;
         let n_strips = tail.byte() % 8 + 1;
         let [places, residency, fast_share, arithmetic, tiers, alpha_cut] = tail.bytes();
-        let transmittance_stop = tail.u16() % 1000 + 1;
+        let [_, _] = tail.bytes();
         let [broken_chunk, width, height, orbit] = tail.bytes();
         let pose = Pose {
             quaternion: tail.bytes::<4>().map(u8::cast_signed),
@@ -97,7 +93,7 @@ impl Setting {
             principal_px: tail.f32s(),
         };
         Self {
-            arithmetic,
+            without_fpu: arithmetic % 2 == 1,
             max_splats: if places == 0 { MaxSplats::Worst } else { MaxSplats::AtMost(u32::from(places) + 1) },
             n_strips,
             overflow: if has(0) { Overflow::Slabs } else { Overflow::LeaveOut },
@@ -105,7 +101,7 @@ impl Setting {
             fast_share,
             has_wide_boxes: has(1),
             tiers: if tiers == 0 { u8::MAX } else { tiers },
-            quality: Quality { alpha_cut: alpha_cut % 64 + 1, transmittance_stop, detail: !has(2) },
+            quality: Quality { alpha_cut: alpha_cut % 64 + 1, detail: !has(2) },
             broken_chunk,
             size_px: [width, height],
             orbit,

@@ -1,7 +1,7 @@
 //! Any chunks decode or are refused.
 
-use pocketsplat_core::Bundle;
-use pocketsplat_core::bundle::AnchorSite;
+use pocketsplat_format::Bundle;
+use pocketsplat_format::bundle::AnchorSite;
 
 use super::MOST_ANCHORS;
 use super::blame::check_blame;

@@ -13,7 +13,7 @@ fn main() {
         return;
     }
     // What decides a figure: a change of any of them makes the commit `-dirty`.
-    for part in ["decoder-core/src", "decoder-half/src", "host-trainer"] {
+    for part in ["decoder-core/src", "decoder-format/src", "decoder-half/src", "host-trainer"] {
         println!("cargo:rerun-if-changed={}", root.join(part).display());
     }
     println!("cargo:rerun-if-changed={}", root.join(".git/logs/HEAD").display());

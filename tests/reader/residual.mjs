@@ -7,7 +7,7 @@ import { crc32, hex, need } from "./bytes.mjs";
 /** round(4096·2^(−i/8)) */
 export const PARTS = [4096, 3756, 3444, 3158, 2896, 2656, 2435, 2233];
 const MEANS = 5;
-const TABLES = new URL("../../decoder-core/src/bundle/normal_tables.bin", import.meta.url);
+const TABLES = new URL("../../decoder-format/src/bundle/normal_tables.bin", import.meta.url);
 const TABLES_CRC = 0xa3de3992;
 
 /** For each scale and mean, the mean fastest: D, and where the slots of each difference begin; 4096 ends a table. */

@@ -3,7 +3,7 @@
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_codec::bundle::{self, ChannelCoding, CodedScene, WriteOptions, mean_steps};
 use pocketsplat_codec::manifest;
-use pocketsplat_core::Bundle;
+use pocketsplat_format::Bundle;
 
 use crate::frame::info_for;
 use crate::scenes::{Case, cameras, masked, random_scene, with_context, with_levels};

@@ -3,9 +3,8 @@
 use glam::DVec3;
 use pocketsplat_capture::dataset::Normalisation;
 use pocketsplat_codec::bundle::{self, BundleInfo, WriteOptions};
-use pocketsplat_core::arithmetic::Arithmetic;
 use pocketsplat_core::{
-    Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, MaxSplats, Quality, Residency, Strips,
+    Arithmetic, Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, MaxSplats, Plan, Quality, Residency, Strips,
 };
 use pocketsplat_kernels::camera::core_camera;
 use pocketsplat_kernels::scene::Scene;
@@ -102,7 +101,7 @@ fn drawn<A: Arithmetic>(
     camera: &Camera,
     budget: &Budget,
 ) -> Result<(Frame, FrameReport), DecodeError> {
-    let plan = bundle.plan(budget)?;
+    let plan = Plan::new(bundle, budget)?;
     let mut scratch = vec![0; plan.scratch_len()];
     let mut frame = Frame::new(camera.width_px, camera.height_px);
     let report = Decoder::bind_in::<A>(bundle, plan, &mut scratch)?.render(camera, &mut frame)?;

@@ -22,7 +22,8 @@
 //!   `docs/numerical-stability.md` states?
 //! * `pack`: is the committed conformance pack what its command writes, does it have every feature, kind, bit and limit of the format, and
 //!   are its files to be refused refused for their reasons?
-//! * `rooms`: do imports go down only, and never in circles?
+//! * `rooms`: do imports go down only, and never in circles, and has decoder-core few names?
+//! * `hand_made`: do bundles made by hand, with every feature and without, draw alike in whatever way?
 //! * `determinism`: does the same seed give the same bundle for any number of threads?
 
 pub mod bundles;

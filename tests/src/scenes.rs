@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 use pocketsplat_capture::camera::Camera;
-use pocketsplat_core::context::{GridFrame, GridLevel, LevelKind};
+use pocketsplat_format::context::{GridFrame, GridLevel, LevelKind};
 use pocketsplat_kernels::scene::{Anchors, ContextModel, Heads, MASK_THRESHOLD, ModelShape, Scene};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -4,7 +4,7 @@ use std::convert::Infallible;
 
 use conformance::frame::{Frame, budget_for, bundle_of, draw, to_core};
 use conformance::scenes::{CASES, cameras, random_scene};
-use pocketsplat_core::{Bundle, Decoder, TileSink};
+use pocketsplat_core::{Bundle, Decoder, Plan, Tile, TileSink};
 
 /// Where tiles began, in the order in which they came.
 #[derive(Default)]
@@ -13,7 +13,7 @@ struct Corners(Vec<[u16; 2]>);
 impl TileSink for Corners {
     type Error = Infallible;
 
-    fn tile(&mut self, x_px: u16, y_px: u16, _width: u16, _height: u16, _rgb: &[[u8; 3]]) -> Result<(), Infallible> {
+    fn tile(&mut self, Tile { x_px, y_px, .. }: Tile<'_>) -> Result<(), Infallible> {
         self.0.push([y_px, x_px]);
         Ok(())
     }
@@ -36,7 +36,7 @@ fn tiles_come_row_by_row_from_the_top_left() {
     let camera = to_core(&cameras()[2].1);
     let bytes = bundle_of(&random_scene(&CASES[1]), &cameras()[2].1);
     let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
-    let plan = bundle.plan(&budget_for(&camera)).expect("planned");
+    let plan = Plan::new(&bundle, &budget_for(&camera)).expect("planned");
     let mut scratch = vec![0; plan.scratch_len()];
     let mut corners = Corners::default();
     Decoder::bind(&bundle, plan, &mut scratch).expect("bound").render(&camera, &mut corners).expect("drawn");
@@ -50,7 +50,7 @@ fn scratch_content_and_alignment_do_not_show() {
     let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
     let camera = to_core(&cameras[0].1);
     let (expected, expected_report) = draw(&bundle, &camera).expect("drawn");
-    let plan = bundle.plan(&budget_for(&camera)).expect("planned");
+    let plan = Plan::new(&bundle, &budget_for(&camera)).expect("planned");
     for start in 0..8 {
         for fill in [0x00, 0x5a, 0xff] {
             let mut memory = vec![fill; start + plan.scratch_len()];
@@ -70,7 +70,7 @@ fn a_frame_does_not_depend_on_the_frames_before() {
     let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
     let mut budget = budget_for(&to_core(&cameras[0].1));
     (budget.width_px, budget.height_px) = (256, 256);
-    let plan = bundle.plan(&budget).expect("planned");
+    let plan = Plan::new(&bundle, &budget).expect("planned");
     let mut scratch = vec![0; plan.scratch_len()];
     let mut decoder = Decoder::bind(&bundle, plan, &mut scratch).expect("bound");
     for (view, camera) in cameras.iter().chain(cameras.iter().rev()) {

@@ -3,8 +3,8 @@
 use conformance::bundles::{CODERS, tiered};
 use conformance::digest::digests;
 use conformance::scenes::CASES;
-use pocketsplat_core::Bundle;
-use pocketsplat_core::bundle::AnchorSite;
+use pocketsplat_format::Bundle;
+use pocketsplat_format::bundle::AnchorSite;
 use rayon::prelude::*;
 
 /// Everything that a chunk decodes to, from memory of its own.

@@ -5,10 +5,10 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use pocketsplat_codec::verify::{Trial, plan_variants};
-use pocketsplat_core::bundle::crc32;
 use pocketsplat_core::{
     Budget, Bundle, ByteOrder, Camera, Decoder, MaxSplats, Overflow, PixelFormat, Plan, Rounding, Tile,
 };
+use pocketsplat_format::bundle::crc32;
 
 const BUNDLES: [(&str, &[u8]); 4] = [
     ("static", include_bytes!("../golden/static.psb")),
@@ -45,7 +45,7 @@ fn plans(bundle: &Bundle<'_>, budget: Budget) -> Vec<Plan> {
     let with_few = [150, 320].into_iter().flat_map(|most| {
         plan_variants(bundle, budget.with_max_splats(MaxSplats::AtMost(most)).with_overflow(Overflow::Slabs))
     });
-    plan_variants(bundle, budget).chain(with_few).map(|way| bundle.plan(&way).expect("planned")).collect()
+    plan_variants(bundle, budget).chain(with_few).map(|way| Plan::new(bundle, &way).expect("planned")).collect()
 }
 
 #[test]
@@ -106,10 +106,7 @@ fn rows_of_tiles_are_the_frames_in_every_format() {
             for format in &formats {
                 let mut rgb = rgb.as_chunks::<3>().0.to_vec();
                 let frame = Tile::new([0, 0], [width, height], &mut rgb).expect("a frame is a large tile");
-                let expected = match *format {
-                    PixelFormat::Rgb888 => frame.rgb.as_flattened_mut(),
-                    PixelFormat::Rgb565(order, rounding) => frame.into_rgb565(order, rounding),
-                };
+                let expected = frame.into_bytes(*format);
                 let found = in_rows(&bundle, plans[0], &camera, *format);
                 assert!(found == expected, "{name}, view {view}, {format:?}");
             }

@@ -6,8 +6,8 @@ use conformance::bundles::{ALL_CODERS, Coder, measured};
 use conformance::scenes::{CASES, Case, cameras};
 use conformance::seal::reseal;
 use pocketsplat_codec::verify::{declared_levels, keeps_level};
-use pocketsplat_core::Bundle;
-use pocketsplat_core::bundle::{HEADER_FIXED_LEN, MANIFEST_RECORD_LEN, SECTION_LEN, TierMeasures};
+use pocketsplat_format::Bundle;
+use pocketsplat_format::bundle::{HEADER_FIXED_LEN, MANIFEST_RECORD_LEN, SECTION_LEN, TierMeasures};
 use pocketsplat_instructions::level::{Bound, LEVELS, Level, Need, Profile};
 
 /// Kind of the manifest's section, and where the header has the training size.
@@ -38,7 +38,7 @@ fn changed(bytes: &[u8], tier: usize, change: impl FnOnce(&mut TierMeasures)) ->
 
 #[test]
 fn the_table_of_the_document_is_that_of_the_code() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../decoder-core/src/bundle/MANIFEST.md");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../decoder-format/src/bundle/MANIFEST.md");
     let text = std::fs::read_to_string(path).expect("the document");
     let mut rows =
         text.lines().skip_while(|line| !line.starts_with("| level | frame | scratch, bytes | flash, bytes |"));

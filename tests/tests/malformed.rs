@@ -6,7 +6,7 @@ use conformance::frame::{Frame, budget_for, bundle_of, draw, to_core};
 use conformance::scenes::{CASES, Case, TINY, TINY_DETAILED, cameras, random_scene};
 use conformance::seal::reseal;
 use pocketsplat_core::{
-    Bundle, Camera, DecodeError, Decoder, ErrorClass, Field, FrameReport, PixelFormat, SectionKind, Strips,
+    Bundle, Camera, DecodeError, Decoder, ErrorClass, Field, FrameReport, PixelFormat, Plan, SectionKind, Strips,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -32,10 +32,10 @@ fn picture(bytes: &[u8], camera: &Camera) -> Result<Frame, DecodeError> {
 /// Draws with damaged chunks left out.
 fn picture_skipping(bytes: &[u8], camera: &Camera) -> Result<(Frame, FrameReport), DecodeError> {
     let bundle = Bundle::parse(bytes)?;
-    let plan = bundle.plan(&budget_for(camera))?;
+    let plan = Plan::new(&bundle, &budget_for(camera).skipping_damage())?;
     let mut scratch = vec![0; plan.scratch_len()];
     let mut frame = Frame::new(camera.width_px, camera.height_px);
-    let report = Decoder::bind_skipping_damage(&bundle, plan, &mut scratch)?.render(camera, &mut frame)?;
+    let report = Decoder::bind(&bundle, plan, &mut scratch)?.render(camera, &mut frame)?;
     Ok((frame, report))
 }
 
@@ -57,7 +57,7 @@ impl Layout {
             .collect();
         sections.pop();
         let first = chunks_offset(&bundle);
-        let chunk = |chunk: pocketsplat_core::bundle::Chunk<'_>| {
+        let chunk = |chunk: pocketsplat_format::bundle::Chunk<'_>| {
             let start = first + chunk.offset() as usize;
             (chunk.index(), start, start + chunk.n_bytes())
         };
@@ -288,7 +288,7 @@ fn no_tile_comes_after_a_chunk_that_no_writer_makes() {
         reseal(&mut bytes);
         let bundle = Bundle::parse(&bytes).expect("its checksums are right");
         let camera = bundle.header().preview;
-        let plan = bundle.plan(&budget_for(&camera).with_strips(Strips::Exactly(8))).expect("a plan");
+        let plan = Plan::new(&bundle, &budget_for(&camera).with_strips(Strips::Exactly(8))).expect("a plan");
         let mut scratch = vec![0; plan.scratch_len()];
         let mut decoder = Decoder::bind(&bundle, plan, &mut scratch).expect("its checksums are right");
         let mut drawing = decoder.begin(&camera).expect("a sound camera");

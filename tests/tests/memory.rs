@@ -50,7 +50,7 @@ fn the_planned_bytes_suffice_and_fewer_are_refused_by_number() {
         let budget = budget_for(&views()[0]);
         for max_splats in [MaxSplats::Worst, MaxSplats::AtMost(100), MaxSplats::AtMost(0)] {
             for way in plan_variants(&bundle, budget.with_max_splats(max_splats)) {
-                holds(name, exact_bytes(&bundle, bundle.plan(&way).expect("planned")));
+                holds(name, exact_bytes(&bundle, Plan::new(&bundle, &way).expect("planned")));
                 if let Some(plan) = halves(&bundle, &way) {
                     holds(name, exact_bytes(&bundle, plan));
                 }
@@ -65,7 +65,7 @@ fn memory_content_and_alignment_do_not_show_and_the_mark_covers_what_was_touched
         let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
         let camera = views()[0];
         for way in plan_variants(&bundle, budget_for(&camera)) {
-            let plan = bundle.plan(&way).expect("planned");
+            let plan = Plan::new(&bundle, &way).expect("planned");
             let Touched { bytes, mark } = holds(name, memory_does_not_show(&bundle, plan, &camera));
             assert!(bytes * 10 >= mark * 9, "{name}: {bytes} of {mark} bytes: {plan:?}");
         }
@@ -82,10 +82,10 @@ fn measured_plans_hold_the_views_measured_and_waste_little() {
         for tiers in [1, 3] {
             let budget = budget_for(&views[0]).with_max_splats(MaxSplats::Measured).with_tiers(tiers);
             for way in plan_variants(&bundle, budget) {
-                let plan = bundle.plan(&way).expect("planned");
+                let plan = Plan::new(&bundle, &way).expect("planned");
                 let reports: Vec<_> = views.iter().map(|camera| draw(&bundle, plan, camera).report).collect();
                 let most = reports.iter().map(|report| report.scratch_used as usize).max().unwrap_or(0);
-                let worst = bundle.plan(&way.with_max_splats(MaxSplats::Worst)).expect("planned").max_splats();
+                let worst = Plan::new(&bundle, &way.with_max_splats(MaxSplats::Worst)).expect("planned").max_splats();
                 assert!(reports.iter().all(|report| report.splats_dropped == 0), "{}: {plan:?}", case.name);
                 assert!(plan.max_splats() <= worst, "{}: never above the worst case", case.name);
                 assert!(most * 10 >= plan.scratch_len() * 9, "{}: {most} bytes of {plan:?}", case.name);
@@ -101,7 +101,7 @@ fn predicted_work_bounds_the_work_of_the_views_measured_closely() {
         let bytes = measured(case, coder, &views);
         let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
         for way in plan_variants(&bundle, budget_for(&to_core(&views[0]))) {
-            let plan = bundle.plan(&way).expect("planned");
+            let plan = Plan::new(&bundle, &way).expect("planned");
             let bound = plan.work().expect("measured");
             let work: Vec<_> = views.iter().map(|view| draw(&bundle, plan, &to_core(view)).report.work()).collect();
             let most = |count: fn(&pocketsplat_core::Work) -> u64| work.iter().map(count).max().unwrap_or(0);
@@ -125,21 +125,21 @@ fn too_many_splats_leave_out_the_last_of_the_file_in_all_strips_alike() {
     for (name, bytes) in files() {
         let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
         for camera in views() {
-            let whole_plan = bundle.plan(&budget_for(&camera)).expect("planned");
+            let whole_plan = Plan::new(&bundle, &budget_for(&camera)).expect("planned");
             let Trial { rgb: whole_frame, report: whole, .. } = draw(&bundle, whole_plan, &camera);
             for most in [0, 1, whole.splats / 7, whole.splats / 2, whole.splats.saturating_sub(1)] {
                 for way in plan_variants(&bundle, budget_for(&camera).with_max_splats(MaxSplats::AtMost(most))) {
-                    let plan = bundle.plan(&way).expect("planned");
+                    let plan = Plan::new(&bundle, &way).expect("planned");
                     let Trial { rgb: frame, report, .. } = draw(&bundle, plan, &camera);
                     assert_eq!(report.splats + report.splats_dropped, whole.splats, "{name}, {most}: {report:?}");
                     assert_eq!(report.splats_dropped > 0, report.max_splats > most, "{name}, {most}: {report:?}");
                     assert!(report.scratch_used as usize <= plan.scratch_len(), "{name}, {most}: {report:?}");
                     let first = budget_for(&camera).with_max_splats(MaxSplats::AtMost(report.splats));
-                    let first = draw(&bundle, bundle.plan(&first).expect("planned"), &camera);
+                    let first = draw(&bundle, Plan::new(&bundle, &first).expect("planned"), &camera);
                     assert_eq!(first.report.splats, report.splats, "{name}, {most}: as many");
                     assert!(frame == first.rgb, "{name}, {most}: {plan:?}");
                     let enough = way.with_max_splats(MaxSplats::AtMost(report.max_splats));
-                    let enough = bundle.plan(&enough).expect("planned");
+                    let enough = Plan::new(&bundle, &enough).expect("planned");
                     let saves = plan.scratch_len() < enough.scratch_len();
                     assert!(saves || report.splats_dropped == 0, "{name}, {most}: fewer splats take less memory");
                     let Trial { rgb: frame, report, .. } = draw(&bundle, enough, &camera);
@@ -158,15 +158,15 @@ fn memory_that_is_left_gives_splats_places_and_saves_passes() {
     let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
     let views: Vec<Camera> = views.iter().map(to_core).collect();
     let free = Budget::for_frame(views[0].width_px, views[0].height_px).with_residency(Residency::Streamed);
-    let in_one = bundle.plan(&free.with_strips(Strips::Exactly(1))).expect("planned");
+    let in_one = Plan::new(&bundle, &free.with_strips(Strips::Exactly(1))).expect("planned");
     let whole = in_one.scratch_len();
     let (mut n_shared, mut n_saved) = (0, 0);
     for budget in (1..=24).map(|part| free.in_bytes(whole * part / 24)) {
-        let Ok(plan) = bundle.plan(&budget) else { continue };
-        let least = bundle.plan(&budget.in_bytes(plan.least_len())).expect("the bytes that would do");
+        let Ok(plan) = Plan::new(&bundle, &budget) else { continue };
+        let least = Plan::new(&bundle, &budget.in_bytes(plan.least_len())).expect("the bytes that would do");
         let variant = |plan: &Plan| (plan.n_tiers(), plan.n_strips(), plan.is_resident(), plan.head_weights());
         assert_eq!((variant(&least), least.scratch_len()), (variant(&plan), plan.least_len()), "{plan:?}");
-        let fewer = bundle.plan(&budget.in_bytes(plan.least_len() - 1)).ok();
+        let fewer = Plan::new(&bundle, &budget.in_bytes(plan.least_len() - 1)).ok();
         assert!(fewer.is_none_or(|fewer| variant(&fewer) != variant(&plan)), "a byte less does not: {plan:?}");
         if plan.n_strips() == 1 {
             assert_eq!(plan.scratch_len(), plan.least_len(), "{plan:?}");
@@ -175,7 +175,7 @@ fn memory_that_is_left_gives_splats_places_and_saves_passes() {
         n_shared += 1;
         assert!((0..40).contains(&(budget.ram_bytes - plan.scratch_len())), "all of the budget: {plan:?}");
         let by_hand = budget.with_tiers(plan.n_tiers()).with_strips(Strips::Exactly(plan.n_strips()));
-        let by_hand = bundle.plan(&by_hand).map(|plan| plan.scratch_len());
+        let by_hand = Plan::new(&bundle, &by_hand).map(|plan| plan.scratch_len());
         assert_eq!(by_hand, Ok(plan.least_len()), "who asks for strips gets what they need: {plan:?}");
         for camera in &views {
             let [few, many] = [least, plan].map(|plan| draw(&bundle, plan, camera));
@@ -194,7 +194,7 @@ fn the_most_tiers_that_fit_are_planned() {
         let bytes = measured(&CASES[0], coder, &orbit(4));
         let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
         let free = Budget::for_frame(160, 120);
-        let largest = bundle.plan(&free).expect("planned");
+        let largest = Plan::new(&bundle, &free).expect("planned");
         assert_eq!(
             (largest.n_tiers(), largest.n_strips(), largest.pruning_rate()),
             (3, 1, 0.0),
@@ -206,19 +206,19 @@ fn the_most_tiers_that_fit_are_planned() {
             // By hand: all there is, one at a time.
             let by_hand = |tiers: u8| {
                 let plans = plan_variants(&bundle, free.with_tiers(tiers)).flat_map(|way| {
-                    [Some(bundle.plan(&way).expect("planned")), halves(&bundle, &way)].into_iter().flatten()
+                    [Some(Plan::new(&bundle, &way).expect("planned")), halves(&bundle, &way)].into_iter().flatten()
                 });
                 plans.filter(|plan| plan.scratch_len() <= ram_bytes).map(|plan| plan.n_tiers()).max()
             };
             let expected = (1..=3).rev().find_map(by_hand);
-            match bundle.plan(&free.in_bytes(ram_bytes)) {
+            match Plan::new(&bundle, &free.in_bytes(ram_bytes)) {
                 Ok(plan) => {
                     assert!(plan.scratch_len() <= ram_bytes, "{ram_bytes} bytes: {plan:?}");
                     assert_eq!(Some(plan.n_tiers()), expected, "{ram_bytes} bytes: {plan:?}");
                     let anchors = bundle.tier(plan.n_tiers() - 1).expect("a tier").n_anchors as f32;
                     let rate = 1.0 - anchors / bundle.header().n_anchors as f32;
                     assert_eq!(plan.pruning_rate(), rate, "{ram_bytes} bytes: {plan:?}");
-                    let again = bundle.plan(&free.in_bytes(plan.scratch_len())).map(|plan| plan.n_tiers());
+                    let again = Plan::new(&bundle, &free.in_bytes(plan.scratch_len())).map(|plan| plan.n_tiers());
                     assert_eq!(again, Ok(plan.n_tiers()), "its own bytes do: {plan:?}");
                     tiers_planned.push(plan.n_tiers());
                 }
@@ -227,8 +227,15 @@ fn the_most_tiers_that_fit_are_planned() {
                     let DecodeError::BudgetTooSmall { needed, available, .. } = error else { panic!("{error}") };
                     assert_eq!(available as usize, ram_bytes, "{error}");
                     let just = free.in_bytes(needed as usize);
-                    assert_eq!(bundle.plan(&just).map(|plan| plan.scratch_len()), Ok(needed as usize), "{error}");
-                    assert!(bundle.plan(&just.in_bytes(needed as usize - 1)).is_err(), "one byte less than {needed}");
+                    assert_eq!(
+                        Plan::new(&bundle, &just).map(|plan| plan.scratch_len()),
+                        Ok(needed as usize),
+                        "{error}"
+                    );
+                    assert!(
+                        Plan::new(&bundle, &just.in_bytes(needed as usize - 1)).is_err(),
+                        "one byte less than {needed}"
+                    );
                 }
             }
         }
@@ -242,7 +249,7 @@ fn a_constant_bounds_every_plan() {
         let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
         for max_splats in [MaxSplats::Worst, MaxSplats::AtMost(321)] {
             for way in plan_variants(&bundle, budget_for(&views()[0]).with_max_splats(max_splats)) {
-                let plan = bundle.plan(&way).expect("planned");
+                let plan = Plan::new(&bundle, &way).expect("planned");
                 let shape = *plan.shape();
                 let ScratchShape { model, coder, resident, frame, .. } = shape;
                 let most = ScratchShape { resident, frame, ..ScratchShape::most(model.feature_dim, model.n_offsets) };

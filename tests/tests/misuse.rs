@@ -2,7 +2,7 @@
 
 use conformance::frame::{Frame, budget_for, bundle_of, draw, to_core};
 use conformance::scenes::{CASES, cameras, random_scene};
-use pocketsplat_core::{Bundle, Camera, DecodeError, Decoder, ErrorClass, Rotation};
+use pocketsplat_core::{Bundle, Camera, DecodeError, Decoder, ErrorClass, Plan, Rotation};
 
 fn camera() -> Camera {
     to_core(&cameras()[0].1)
@@ -13,7 +13,7 @@ fn a_larger_frame_than_planned_is_refused() {
     let bytes = bundle_of(&random_scene(&CASES[1]), &cameras()[0].1);
     let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
     let camera = camera();
-    let plan = bundle.plan(&budget_for(&camera)).expect("planned");
+    let plan = Plan::new(&bundle, &budget_for(&camera)).expect("planned");
     let mut scratch = vec![0; plan.scratch_len()];
     let mut decoder = Decoder::bind(&bundle, plan, &mut scratch).expect("bound");
     for larger in
@@ -31,7 +31,7 @@ fn a_larger_frame_than_planned_is_refused() {
 fn a_plan_is_refused_by_another_bundle() {
     let [one, other] = [0, 1].map(|case| bundle_of(&random_scene(&CASES[case]), &cameras()[0].1));
     let [one, other] = [&one, &other].map(|bytes| Bundle::parse(bytes).expect("the writer's bundle is sound"));
-    let plan = one.plan(&budget_for(&camera())).expect("planned");
+    let plan = Plan::new(&one, &budget_for(&camera())).expect("planned");
     let mut scratch = vec![0; plan.scratch_len()];
     let error = Decoder::bind(&other, plan, &mut scratch).err();
     assert_eq!(error.map(|e| e.class()), Some(ErrorClass::Misuse), "a plan belongs to its bundle");

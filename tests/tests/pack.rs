@@ -8,8 +8,8 @@ use conformance::pack::coverage::Found;
 use conformance::pack::sample::Sample;
 use conformance::pack::{self, FOLDERS, expected, refused};
 use pocketsplat_codec::verify::{Trial, plan_variants};
-use pocketsplat_core::bundle::crc32;
-use pocketsplat_core::{Budget, MaxSplats};
+use pocketsplat_core::{Budget, MaxSplats, Plan};
+use pocketsplat_format::bundle::crc32;
 use pocketsplat_instructions::level::Level;
 
 /// Made once for all tests.
@@ -58,7 +58,7 @@ fn anchors_come_back_and_frames_are_the_same_with_every_plan() {
             let camera = frame.camera;
             let budget = Budget::for_frame(camera.width_px, camera.height_px).with_max_splats(MaxSplats::Worst);
             for variant in plan_variants(&bundle, budget.with_tiers(frame.tiers)) {
-                let plan = bundle.plan(&variant).expect("planned");
+                let plan = Plan::new(&bundle, &variant).expect("planned");
                 let drawn =
                     Trial::run(&bundle, plan, &camera, 0, 0).unwrap_or_else(|breach| panic!("{name}: {breach}"));
                 assert_eq!(crc32(&drawn.rgb), crc32(&frame.rgb), "{name}, frame {index}: {plan:?}");

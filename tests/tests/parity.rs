@@ -5,7 +5,7 @@ use conformance::difference::Difference;
 use conformance::frame::{bundle_of, draw, to_core};
 use conformance::scenes::{CASES, cameras, random_scene};
 use pocketsplat_codec::render::reference::ReferenceScene;
-use pocketsplat_core::Bundle;
+use pocketsplat_format::Bundle;
 use pocketsplat_kernels::camera::host_camera;
 
 /// Rounding to 8 bits alone leaves 58.9 dB.

@@ -4,12 +4,11 @@
 
 use conformance::fuzz::frame::Frame;
 use conformance::seal::reseal;
-use pocketsplat_core::budget::MAX_TRANSMITTANCE_STOP;
-use pocketsplat_core::bundle::{MANIFEST_RECORD_LEN, TierMeasures};
 use pocketsplat_core::{
-    Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, HeadWeights, MaxSplats, Overflow, Plan, Quality,
-    Residency, SectionKind, Strips,
+    Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, HeadWeights, MaxSplats, Overflow, Plan, Residency,
+    SectionKind, Strips,
 };
+use pocketsplat_format::bundle::{MANIFEST_RECORD_LEN, TierMeasures};
 
 const BUNDLE: &[u8] = include_bytes!("../golden/static.psb");
 
@@ -27,22 +26,16 @@ fn budget(n_strips: u8, n_places: u32, overflow: Overflow) -> Budget {
         .with_overflow(overflow)
 }
 
-fn drawn(
-    bundle: &Bundle<'_>,
-    plan: Plan,
-    camera: &Camera,
-    skip_damage: bool,
-) -> Result<(Frame, FrameReport), DecodeError> {
+fn drawn(bundle: &Bundle<'_>, plan: Plan, camera: &Camera) -> Result<(Frame, FrameReport), DecodeError> {
     let mut scratch = vec![0; plan.scratch_len()];
     let mut frame = Frame::new(camera.width_px, camera.height_px);
-    let bind = if skip_damage { Decoder::bind_skipping_damage } else { Decoder::bind };
-    let report = bind(bundle, plan, &mut scratch)?.render(camera, &mut frame)?;
+    let report = Decoder::bind(bundle, plan, &mut scratch)?.render(camera, &mut frame)?;
     Ok((frame, report))
 }
 
 fn report(budget: &Budget, camera: &Camera) -> FrameReport {
     let bundle = bundle();
-    let (_, report) = drawn(&bundle, bundle.plan(budget).expect("planned"), camera, false).expect("drawn");
+    let (_, report) = drawn(&bundle, Plan::new(&bundle, budget).expect("planned"), camera).expect("drawn");
     report
 }
 
@@ -69,12 +62,13 @@ fn strips_with_room_for_their_splats_share_a_pass() {
 
 #[test]
 fn slabs_behind_finished_pixels_are_not_drawn() {
-    let preview = bundle().header().preview;
-    let near = Camera { focal_px: preview.focal_px.map(|f| 40.0 * f), ..preview };
-    // A splat or two finish a pixel.
-    let soon = Quality { transmittance_stop: MAX_TRANSMITTANCE_STOP, ..Quality::EXACT };
-    let found = report(&budget(2, 2, Overflow::Slabs).with_quality(soon), &near);
-    assert!(found.slabs <= 30, "23 until every pixel is finished, 46 to the last splat: {found:?}");
+    let bundle = Bundle::parse(include_bytes!("../golden/isotropic.psb")).expect("a committed bundle is sound");
+    // So near that the few splats in view cover every pixel.
+    let camera = bundle.header().preview.orbited(2.355);
+    let camera = Camera { focal_px: camera.focal_px.map(|f| 400.0 * f), ..camera };
+    let plan = Plan::new(&bundle, &budget(2, 2, Overflow::Slabs)).expect("planned");
+    let (_, found) = drawn(&bundle, plan, &camera).expect("drawn");
+    assert!(found.slabs <= 46, "44 until every pixel is finished, 50 to the last splat: {found:?}");
 }
 
 /// A bundle with one chunk that decodes to other symbols and then does not end as it should, under right checksums.
@@ -90,8 +84,8 @@ fn damaged(chunk: u32, at: usize) -> Vec<u8> {
 
 /// The plan of a budget with heads in halves, which are evaluated two anchors at a time: for too few bytes for heads in f32.
 fn in_halves(bundle: &Bundle<'_>, budget: &Budget) -> Plan {
-    let whole = bundle.plan(budget).expect("memory without limit");
-    let plan = bundle.plan(&budget.in_bytes(whole.scratch_len() - 1)).expect("halves do");
+    let whole = Plan::new(bundle, budget).expect("memory without limit");
+    let plan = Plan::new(bundle, &budget.in_bytes(whole.scratch_len() - 1)).expect("halves do");
     assert_eq!((plan.head_weights(), plan.max_splats()), (HeadWeights::F16, whole.max_splats()), "{plan:?}");
     plan
 }
@@ -104,14 +98,14 @@ fn a_damaged_chunk_takes_no_place_and_leaves_no_anchor_behind() {
         let bytes = damaged(chunk, at);
         let bundle = Bundle::parse(&bytes).expect("checksums are right");
         for (n_strips, n_places) in [(1, 40), (1, 400), (2, 300), (8, 100), (8, 2000)] {
-            let streamed = budget(n_strips, n_places, Overflow::LeaveOut);
+            let streamed = budget(n_strips, n_places, Overflow::LeaveOut).skipping_damage();
             let resident = streamed.with_residency(Residency::Resident);
-            let f32s = |budget| bundle.plan(budget).expect("memory without limit");
+            let f32s = |budget| Plan::new(&bundle, budget).expect("memory without limit");
             for plans in
                 [[&streamed, &resident].map(f32s), [&streamed, &resident].map(|budget| in_halves(&bundle, budget))]
             {
                 let [(frame, report), (expected, expected_report)] =
-                    plans.map(|plan| drawn(&bundle, plan, &preview, true).expect("damage is left out"));
+                    plans.map(|plan| drawn(&bundle, plan, &preview).expect("damage is left out"));
                 let counts = |r: &FrameReport| (r.splats, r.splats_dropped, r.chunks_damaged, r.first_damaged);
                 assert_eq!(
                     counts(&report),
@@ -134,7 +128,7 @@ fn a_frame_in_slabs_touches_no_more_bytes_than_it_says() {
     for (n_strips, n_places) in [(1, 60), (1, 400), (1, 2000), (2, 150), (4, 320), (8, 440), (8, 600)] {
         for residency in [Residency::Streamed, Residency::Resident] {
             let budget = budget(n_strips, n_places, Overflow::Slabs).with_residency(residency);
-            let plan = bundle.plan(&budget).expect("planned");
+            let plan = Plan::new(&bundle, &budget).expect("planned");
             let mut said = 0;
             // A byte that keeps both of two fills was not touched.
             let [zeros, ones] = [0, u8::MAX].map(|fill| {
@@ -180,12 +174,12 @@ fn several_strips_count_as_two_passes_when_plans_are_compared() {
     let preview = bundle.header().preview;
     let frame = Budget::for_frame(preview.width_px, preview.height_px);
     let len = |strips, residency| {
-        let plan = bundle.plan(&frame.with_strips(Strips::Exactly(strips)).with_residency(residency));
+        let plan = Plan::new(&bundle, &frame.with_strips(Strips::Exactly(strips)).with_residency(residency));
         plan.expect("memory without limit").scratch_len()
     };
     let (streamed, resident) = (len(1, Residency::Streamed), len(8, Residency::Resident));
     let least = streamed.max(resident);
     assert!(least < len(1, Residency::Resident), "both fit where one strip with resident anchors does not");
-    let plan = bundle.plan(&frame.in_bytes(least)).expect("planned");
+    let plan = Plan::new(&bundle, &frame.in_bytes(least)).expect("planned");
     assert_eq!((plan.n_strips(), plan.is_resident()), (1, false), "to decode once costs less than to run heads twice");
 }

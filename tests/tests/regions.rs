@@ -3,7 +3,6 @@
 use conformance::bundles::{ALL_CODERS, tiered};
 use conformance::frame::{Frame, budget_for, to_core};
 use conformance::scenes::{CASES, cameras};
-use pocketsplat_core::arithmetic::ReferenceArithmetic;
 use pocketsplat_core::{
     Budget, Bundle, Camera, DecodeError, Decoder, ErrorClass, FrameReport, MaxSplats, Overflow, Part, Plan, Region,
     Residency,
@@ -29,7 +28,7 @@ fn reported(bundle: &Bundle<'_>, plan: Plan, fill: u8, fewer: [usize; 2]) -> Res
         [plan.scratch_len() - fewer[0], plan.slow_scratch_len() - fewer[1]].map(|len| vec![fill; len]);
     let camera = view();
     let mut frame = Frame::new(camera.width_px, camera.height_px);
-    let mut decoder = Decoder::bind_in_regions::<ReferenceArithmetic>(bundle, plan, [&mut fast, &mut slow])?;
+    let mut decoder = Decoder::bind(bundle, plan, [&mut fast, &mut slow])?;
     let report = decoder.render(&camera, &mut frame)?;
     Ok((frame, report))
 }
@@ -49,10 +48,10 @@ fn where_memory_lies_changes_no_pixel_and_its_bytes_are_exact() {
         let free = budget_for(&view());
         for residency in [Residency::Resident, Residency::Streamed] {
             let budget = free.with_residency(residency);
-            let whole = bundle.plan(&budget).expect("memory without limit");
+            let whole = Plan::new(&bundle, &budget).expect("memory without limit");
             let expected = drawn(&bundle, whole, 0, [0, 0]).expect("drawn in one region");
             for budget in split(budget, &whole) {
-                let plan = bundle.plan(&budget).expect("slow memory for all of it");
+                let plan = Plan::new(&bundle, &budget).expect("slow memory for all of it");
                 let lens = [plan.scratch_len(), plan.slow_scratch_len()];
                 assert!(lens[0] <= budget.ram_bytes && lens[1] <= budget.slow_bytes, "{name}: {lens:?} of {budget:?}");
                 assert_eq!(plan.pruning_rate(), 0.0, "{name}: the whole scene, {budget:?}");
@@ -85,12 +84,12 @@ fn the_bytes_that_a_frame_used_are_those_of_both_regions() {
     for (name, bytes) in files() {
         let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
         let budget = budget_for(&view()).with_max_splats(MaxSplats::Worst).with_residency(Residency::Streamed);
-        let whole = bundle.plan(&budget).expect("memory without limit");
+        let whole = Plan::new(&bundle, &budget).expect("memory without limit");
         for budget in split(budget, &whole) {
-            let plan = bundle.plan(&budget).expect("slow memory for all of it");
+            let plan = Plan::new(&bundle, &budget).expect("slow memory for all of it");
             let (frame, report) = reported(&bundle, plan, 0xA5, [0, 0]).expect("its own bytes do");
             let most = MaxSplats::AtMost(report.max_splats);
-            let just = bundle.plan(&budget.with_max_splats(most)).expect("no more memory than before");
+            let just = Plan::new(&bundle, &budget.with_max_splats(most)).expect("no more memory than before");
             // Fewer splats may fit into the fast memory as a whole; the bytes are compared where they lie as before.
             if just.memory().map(|part| part.region).eq(plan.memory().map(|part| part.region)) {
                 let len = just.scratch_len() + just.slow_scratch_len();
@@ -108,9 +107,9 @@ fn the_bytes_that_a_frame_used_are_those_of_both_regions() {
 fn the_parts_make_up_the_lengths() {
     for (name, bytes) in files() {
         let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
-        let whole = bundle.plan(&budget_for(&view())).expect("memory without limit");
+        let whole = Plan::new(&bundle, &budget_for(&view())).expect("memory without limit");
         for budget in split(budget_for(&view()), &whole) {
-            let plan = bundle.plan(&budget).expect("slow memory for all of it");
+            let plan = Plan::new(&bundle, &budget).expect("slow memory for all of it");
             assert_eq!(plan.memory().map(|memory| memory.part).collect::<Vec<_>>(), Part::ALL, "{name}: each once");
             for (region, len) in [(Region::Fast, plan.scratch_len()), (Region::Slow, plan.slow_scratch_len())] {
                 let parts = plan.memory().filter(|memory| memory.region == region);
@@ -131,14 +130,21 @@ fn too_little_slow_memory_is_refused_by_the_number_that_would_do() {
     let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
     for fast in [0, 500, 3000] {
         let budget = budget_for(&view()).in_bytes(fast).with_slow_bytes(1);
-        let error = bundle.plan(&budget).expect_err("one slow byte holds nothing");
+        let error = Plan::new(&bundle, &budget).expect_err("one slow byte holds nothing");
         assert_eq!(error.class(), ErrorClass::OverBudget, "{name}: {error}");
         let DecodeError::BudgetTooSmall { region: Region::Slow, needed, available: 1, .. } = error else {
             panic!("{error}")
         };
         let just = budget.with_slow_bytes(needed as usize);
-        assert_eq!(bundle.plan(&just).map(|plan| plan.slow_scratch_len()), Ok(needed as usize), "{name}: {error}");
-        assert!(bundle.plan(&just.with_slow_bytes(needed as usize - 1)).is_err(), "{name}: one fewer than {needed}");
+        assert_eq!(
+            Plan::new(&bundle, &just).map(|plan| plan.slow_scratch_len()),
+            Ok(needed as usize),
+            "{name}: {error}"
+        );
+        assert!(
+            Plan::new(&bundle, &just.with_slow_bytes(needed as usize - 1)).is_err(),
+            "{name}: one fewer than {needed}"
+        );
     }
 }
 
@@ -148,17 +154,17 @@ fn slabs_take_their_splats_from_either_region() {
     for (name, bytes) in files() {
         let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
         let budget = budget_for(&view()).with_max_splats(MaxSplats::Worst).with_overflow(Overflow::Slabs);
-        let whole = bundle.plan(&budget).expect("memory without limit");
+        let whole = Plan::new(&bundle, &budget).expect("memory without limit");
         // Two fifths of what the slabs would like in each region, and nearly all of it in one.
         for (fast, slow) in [(40, 40), (2, 78), (70, 5)] {
-            let least = match bundle.plan(&budget.in_bytes(0)) {
+            let least = match Plan::new(&bundle, &budget.in_bytes(0)) {
                 Err(DecodeError::BudgetTooSmall { needed, .. }) => needed as usize,
                 other => panic!("{name}: no memory suffices: {other:?}"),
             };
             let [fast, slow] = [fast, slow].map(|percent| least + (whole.scratch_len() - least) * percent / 100);
-            let plan = bundle.plan(&budget.in_bytes(fast).with_slow_bytes(slow));
+            let plan = Plan::new(&bundle, &budget.in_bytes(fast).with_slow_bytes(slow));
             let plan = plan.unwrap_or_else(|error| panic!("{name}: {error}"));
-            let one = bundle.plan(&budget.in_bytes(whole.scratch_len()).with_tiers(plan.n_tiers()));
+            let one = Plan::new(&bundle, &budget.in_bytes(whole.scratch_len()).with_tiers(plan.n_tiers()));
             let one = one.unwrap_or_else(|error| panic!("{name}: {error}"));
             if plan.head_weights() == one.head_weights() {
                 let expected = drawn(&bundle, one, 0, [0, 0]).expect("drawn in one region");

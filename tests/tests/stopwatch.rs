@@ -3,7 +3,7 @@
 use conformance::bundles::{ALL_CODERS, Coder, measured};
 use conformance::frame::{Frame, to_core};
 use conformance::scenes::{CASES, cameras};
-use pocketsplat_core::{Budget, Bundle, Decoder, Residency, Stage, Stopwatch, Strips};
+use pocketsplat_core::{Budget, Bundle, Decoder, Plan, Residency, Stage, Stopwatch, Strips};
 
 /// Remembers the stages.
 #[derive(Default)]
@@ -32,7 +32,7 @@ fn a_frame_goes_through_the_stages_it_needs() {
             let budget = Budget::for_frame(camera.width_px, camera.height_px)
                 .with_residency(residency)
                 .with_strips(Strips::Exactly(n_strips));
-            let plan = bundle.plan(&budget).expect("planned");
+            let plan = Plan::new(&bundle, &budget).expect("planned");
             let mut scratch = vec![0; plan.scratch_len()];
             let mut decoder = Decoder::bind(&bundle, plan, &mut scratch).expect("bound");
             let [mut plain, mut watched] = [(); 2].map(|()| Frame::new(camera.width_px, camera.height_px));

@@ -3,8 +3,8 @@
 use conformance::bundles::{ALL_CODERS, Coder, tier_ends, tiered};
 use conformance::frame::{Frame, budget_for, draw, to_core};
 use conformance::scenes::{CASES, cameras};
-use pocketsplat_core::bundle::AnchorSite;
-use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, ErrorClass, Field, FrameReport, Region};
+use pocketsplat_core::{Bundle, Camera, DecodeError, Decoder, ErrorClass, Field, FrameReport, Plan, Region};
+use pocketsplat_format::bundle::AnchorSite;
 
 fn camera() -> Camera {
     to_core(&cameras()[0].1)
@@ -31,7 +31,7 @@ fn anchors(bundle: &Bundle<'_>) -> Vec<(AnchorSite, Vec<i16>)> {
 
 fn draw_tiers(bundle: &Bundle<'_>, tiers: u8) -> (Frame, FrameReport) {
     let camera = camera();
-    let plan = bundle.plan(&Budget { tiers, ..budget_for(&camera) }).expect("planned");
+    let plan = Plan::new(bundle, &budget_for(&camera).with_tiers(tiers)).expect("planned");
     assert_eq!(plan.n_tiers(), tiers.min(bundle.n_tiers()), "tiers of the plan");
     let mut scratch = vec![0; plan.scratch_len()];
     let mut frame = Frame::new(camera.width_px, camera.height_px);
@@ -69,7 +69,7 @@ fn a_cut_file_draws_what_fewer_tiers_of_the_whole_one_draw() {
         }
         let splats: Vec<u32> = frames.iter().map(|(_, report)| report.splats).collect();
         assert!(splats.is_sorted() && splats[0] < splats[2], "{coder:?}: splats of the tiers {splats:?}");
-        let none = whole.plan(&Budget { tiers: 0, ..budget_for(&camera()) }).expect_err("no tier is no scene");
+        let none = Plan::new(&whole, &budget_for(&camera()).with_tiers(0)).expect_err("no tier is no scene");
         assert_eq!(none, DecodeError::OutOfRange { field: Field::Tiers, found: 0, limit: 1 });
         assert_eq!(
             (none.class(), none.to_string().as_str()),
@@ -85,28 +85,25 @@ fn the_planned_bytes_suffice_for_every_tier_and_one_less_is_refused_by_number() 
         let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
         let lens: Vec<usize> = (1..4)
             .map(|tiers| {
-                let plan = bundle.plan(&Budget { tiers, ..budget_for(&camera()) }).expect("planned");
+                let plan = Plan::new(&bundle, &budget_for(&camera()).with_tiers(tiers)).expect("planned");
                 let needed = plan.scratch_len();
                 let anchors = bundle.tier(tiers - 1).map_or(0, |tier| tier.n_anchors);
                 let worst = anchors * u32::from(bundle.header().n_offsets);
                 assert_eq!(plan.max_splats(), worst, "{coder:?}, {tiers} tiers: every offset");
-                let bind = |skip_damage: bool, len: usize| {
-                    let mut scratch = vec![0; len];
-                    let bind = if skip_damage { Decoder::bind_skipping_damage } else { Decoder::bind };
-                    bind(&bundle, plan, &mut scratch).err()
-                };
-                for skip_damage in [false, true] {
-                    assert_eq!(bind(skip_damage, needed), None, "{coder:?}, {tiers} tiers: {needed} bytes suffice");
+                let skipping = Plan::new(&bundle, &plan.budget().skipping_damage()).expect("planned");
+                for plan in [plan, skipping] {
+                    let bind = |len: usize| Decoder::bind(&bundle, plan, &mut vec![0; len]).err();
+                    assert_eq!(bind(needed), None, "{coder:?}, {tiers} tiers: {needed} bytes suffice");
                     let [needed_bytes, available] = [needed, needed - 1].map(|n| n as u32);
                     let expected =
                         DecodeError::ScratchTooSmall { region: Region::Fast, needed: needed_bytes, available };
-                    assert_eq!(bind(skip_damage, needed - 1), Some(expected), "{coder:?}, {tiers} tiers");
+                    assert_eq!(bind(needed - 1), Some(expected), "{coder:?}, {tiers} tiers");
                 }
                 needed
             })
             .collect();
         assert!(lens.is_sorted() && lens[0] < lens[2], "{coder:?}: bytes of the tiers {lens:?}");
-        let all = bundle.plan(&budget_for(&camera())).expect("planned");
+        let all = Plan::new(&bundle, &budget_for(&camera())).expect("planned");
         assert_eq!(all.scratch_len(), lens[2], "{coder:?}: all tiers");
     }
 }
@@ -118,7 +115,7 @@ fn scratch_content_does_not_show() {
         let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
         let camera = camera();
         let (expected, expected_report) = draw(&bundle, &camera).expect("drawn");
-        let plan = bundle.plan(&budget_for(&camera)).expect("planned");
+        let plan = Plan::new(&bundle, &budget_for(&camera)).expect("planned");
         for (start, fill) in [(0, 0xFF), (1, 0x5A), (2, 0x00), (3, 0xAA)] {
             let mut memory = vec![fill; start + plan.scratch_len()];
             let mut decoder = Decoder::bind(&bundle, plan, &mut memory[start..]).expect("bound");

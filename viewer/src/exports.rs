@@ -117,20 +117,20 @@ extern "C" fn orbit(angle: f32) -> u32 {
 
 /// The least and the most memory that are of use.
 #[unsafe(no_mangle)]
-extern "C" fn limits(width: u16, height: u16, tiers: u8, slabs: u32, cut: u8, stop: u16, detail: u32) -> u32 {
-    on_scene(|scene, _| scene.limits(&budget(f64::INFINITY, [width, height], tiers, slabs, (cut, stop, detail))))
+extern "C" fn limits(width: u16, height: u16, tiers: u8, slabs: u32, cut: u8, detail: u32) -> u32 {
+    on_scene(|scene, _| scene.limits(&budget(f64::INFINITY, [width, height], tiers, slabs, (cut, detail))))
 }
 
 /// What a decoder would do.
 #[unsafe(no_mangle)]
-extern "C" fn plan(ram: f64, width: u16, height: u16, tiers: u8, slabs: u32, cut: u8, stop: u16, detail: u32) -> u32 {
-    on_scene(|scene, _| scene.plan(&budget(ram, [width, height], tiers, slabs, (cut, stop, detail))))
+extern "C" fn plan(ram: f64, width: u16, height: u16, tiers: u8, slabs: u32, cut: u8, detail: u32) -> u32 {
+    on_scene(|scene, _| scene.plan(&budget(ram, [width, height], tiers, slabs, (cut, detail))))
 }
 
 /// The same, and makes the decoder.
 #[unsafe(no_mangle)]
-extern "C" fn bind(ram: f64, width: u16, height: u16, tiers: u8, slabs: u32, cut: u8, stop: u16, detail: u32) -> u32 {
-    on_scene(|scene, _| scene.bind(&budget(ram, [width, height], tiers, slabs, (cut, stop, detail))))
+extern "C" fn bind(ram: f64, width: u16, height: u16, tiers: u8, slabs: u32, cut: u8, detail: u32) -> u32 {
+    on_scene(|scene, _| scene.bind(&budget(ram, [width, height], tiers, slabs, (cut, detail))))
 }
 
 /// Draws what the camera sees.
@@ -163,15 +163,15 @@ extern "C" fn numbers() -> *const f64 {
     MODULE.with_borrow(|module| module.numbers.as_ptr())
 }
 
-fn budget(ram: f64, [width, height]: [u16; 2], tiers: u8, slabs: u32, quality: (u8, u16, u32)) -> Budget {
-    let (alpha_cut, transmittance_stop, detail) = quality;
+fn budget(ram: f64, [width, height]: [u16; 2], tiers: u8, slabs: u32, quality: (u8, u32)) -> Budget {
+    let (alpha_cut, detail) = quality;
     let overflow = if slabs == 0 { Overflow::LeaveOut } else { Overflow::Slabs };
     Budget::for_frame(width, height)
         // Saturates.
         .in_bytes(ram as usize)
         .with_tiers(tiers)
         .with_overflow(overflow)
-        .with_quality(Quality { alpha_cut, transmittance_stop, detail: detail != 0 })
+        .with_quality(Quality { alpha_cut, detail: detail != 0 })
 }
 
 fn camera_of(numbers: &[f32; CAMERA_LEN]) -> Result<Camera, DecodeError> {

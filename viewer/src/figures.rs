@@ -1,7 +1,7 @@
 //! What the page shows as numbers: each list with its names, so that JavaScript need not know an order.
 
-use pocketsplat_core::bundle::Coder;
 use pocketsplat_core::{Bundle, Camera, FrameReport, HeadWeights, Plan, Stage};
+use pocketsplat_format::bundle::Coder;
 use pocketsplat_instructions::{Costs, InstructionSet, terms};
 
 /// Numbers, each with a name; not finite where there is none.

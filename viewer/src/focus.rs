@@ -1,7 +1,7 @@
 //! How far away what a picture is of lies: what a camera turns around.
 
-use pocketsplat_core::bundle::AnchorSite;
-use pocketsplat_core::{Bundle, DecodeError};
+use pocketsplat_format::bundle::AnchorSite;
+use pocketsplat_format::{Bundle, DecodeError};
 
 /// Anchors that are looked at, about: those of some chunks, so that large scenes open as fast as small ones.
 const N_ANCHORS: u32 = 16_384;
@@ -58,7 +58,7 @@ fn median(depths: &[f32]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use pocketsplat_core::Bundle;
+    use pocketsplat_format::Bundle;
 
     use super::{distance, median};
 

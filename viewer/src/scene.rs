@@ -3,7 +3,7 @@
 use std::convert::Infallible;
 use std::slice;
 
-use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, Plan, Region, TileSink};
+use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, Plan, Region, Tile, TileSink};
 use pocketsplat_instructions::Costs;
 
 use crate::figures::{self, Figures};
@@ -51,34 +51,34 @@ impl Scene {
     /// The least memory that draws anything within the other limits of `budget`, and the most that is of use, bytes.
     ///
     /// # Errors
-    /// As [`Bundle::plan`].
+    /// As [`Plan::new`].
     pub fn limits(&self, budget: &Budget) -> Result<Figures, DecodeError> {
-        let least = match self.bundle.plan(&budget.in_bytes(0)) {
+        let least = match Plan::new(&self.bundle, &budget.in_bytes(0)) {
             Err(DecodeError::BudgetTooSmall { needed, .. }) => needed.into(),
             Err(error) => return Err(error),
             Ok(plan) => plan.scratch_len() as f64,
         };
-        let most = self.bundle.plan(&budget.in_bytes(usize::MAX))?.scratch_len() as f64;
+        let most = Plan::new(&self.bundle, &budget.in_bytes(usize::MAX))?.scratch_len() as f64;
         Ok(vec![("leastBytes", least), ("mostBytes", most)])
     }
 
     /// What a decoder would do within `budget`.
     ///
     /// # Errors
-    /// As [`Bundle::plan`].
+    /// As [`Plan::new`].
     pub fn plan(&self, budget: &Budget) -> Result<Figures, DecodeError> {
-        let plan = self.bundle.plan(budget)?;
+        let plan = Plan::new(&self.bundle, budget)?;
         Ok(figures::of_plan(&self.bundle, &plan))
     }
 
     /// Plans, and makes the decoder that the next frames are drawn by, in exactly the plan's bytes.
     ///
     /// # Errors
-    /// As [`Bundle::plan`] and [`Decoder::bind`]; then there is no decoder.
+    /// As [`Plan::new`] and [`Decoder::bind`]; then there is no decoder.
     pub fn bind(&mut self, budget: &Budget) -> Result<Figures, DecodeError> {
         // Its memory is free before the next one's is taken.
         self.bound = None;
-        let plan = self.bundle.plan(budget)?;
+        let plan = Plan::new(&self.bundle, budget)?;
         self.bound = Some(Bound::new(&self.bundle, plan)?);
         Ok(figures::of_plan(&self.bundle, &plan))
     }
@@ -158,7 +158,7 @@ impl Frame {
 impl TileSink for Frame {
     type Error = Infallible;
 
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, _height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
+    fn tile(&mut self, Tile { x_px, y_px, width, rgb, .. }: Tile<'_>) -> Result<(), Infallible> {
         for (row, pixels) in rgb.chunks_exact(width.into()).enumerate() {
             let first = (usize::from(y_px) + row) * self.width_px + usize::from(x_px);
             let (targets, _) = self.rgba[4 * first..].as_chunks_mut::<4>();
@@ -172,8 +172,8 @@ impl TileSink for Frame {
 
 #[cfg(test)]
 mod tests {
-    use pocketsplat_core::bundle::crc32;
     use pocketsplat_core::{Budget, DecodeError, MaxSplats};
+    use pocketsplat_format::bundle::crc32;
 
     use super::Scene;
 

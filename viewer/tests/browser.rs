@@ -7,8 +7,8 @@ mod chromium;
 use std::f32::consts::TAU;
 use std::fmt::Write as _;
 
-use pocketsplat_core::bundle::crc32;
 use pocketsplat_core::{Budget, Bundle, Overflow};
+use pocketsplat_format::bundle::crc32;
 use pocketsplat_viewer::{Scene, SceneFile, page};
 
 const GOLDEN: [SceneFile<'_>; 4] = [

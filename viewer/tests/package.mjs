@@ -42,10 +42,9 @@ for (const method of ['bind', 'plan', 'limits']) {
     for (const value of values) refuses(() => scene[method]({ ...sound, [key]: value }), key, Array.isArray(value) ? '' : String(value), needed);
   }
   refuses(() => scene[method]({ ...sound, quality: 'fast' }), '"fast"', '"exact"', '"balanced"', '"draft"');
-  const quality = { alphaCut: 1, transmittanceStop: 1, detail: true };
+  const quality = { alphaCut: 1, detail: true };
   for (const [key, values, needed] of [
     ['alphaCut', [0, 65, 257, 1.5, undefined], 'from 1 to 64'],
-    ['transmittanceStop', [0, 1001, 65537, NaN], 'from 1 to 1000'],
     ['detail', [0, undefined], 'true or false'],
   ]) {
     for (const value of values) refuses(() => scene[method]({ ...sound, quality: { ...quality, [key]: value } }), `quality.${key}`, needed);

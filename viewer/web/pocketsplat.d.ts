@@ -50,8 +50,6 @@ export type Quality =
   | {
       /** Splats leave pixels alone below this alpha, in 255ths, 1 to 64. */
       alphaCut: number;
-      /** A pixel is finished below this transmittance, in 10 000ths, 1 to 1000. */
-      transmittanceStop: number;
       /** Whether the detail head runs. */
       detail: boolean;
     };

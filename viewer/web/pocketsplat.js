@@ -4,14 +4,13 @@ import { list, positive, real, refuse, whole } from './check.js';
 /** The decoder's own limits. */
 const MAX_FRAME_PX = 4080;
 const MAX_ALPHA_CUT = 64;
-const MAX_TRANSMITTANCE_STOP = 1000;
 const MAX_TIERS = 255;
 /** Beyond this an angle of 32 bits is no angle. */
 const MAX_ANGLE = 1e5;
 const QUALITIES = {
-  exact: { alphaCut: 1, transmittanceStop: 1, detail: true },
-  balanced: { alphaCut: 2, transmittanceStop: 10, detail: true },
-  draft: { alphaCut: 8, transmittanceStop: 100, detail: false },
+  exact: { alphaCut: 1, detail: true },
+  balanced: { alphaCut: 2, detail: true },
+  draft: { alphaCut: 8, detail: false },
 };
 
 /** A bundle, a plan for it, and its frames. */
@@ -131,16 +130,15 @@ function settingsOf(settings) {
   if (ramBytes !== Infinity) whole('ramBytes (Infinity for no limit)', ramBytes, 0, Number.MAX_SAFE_INTEGER);
   whole('tiers', tiers, 1, MAX_TIERS);
   if (typeof slabs !== 'boolean') refuse('slabs', slabs, 'true or false');
-  const { alphaCut, transmittanceStop, detail } = qualityOf(quality);
-  return [ramBytes, widthPx, heightPx, tiers, slabs, alphaCut, transmittanceStop, detail];
+  const { alphaCut, detail } = qualityOf(quality);
+  return [ramBytes, widthPx, heightPx, tiers, slabs, alphaCut, detail];
 }
 
 function qualityOf(quality) {
   if (typeof quality === 'string' && Object.hasOwn(QUALITIES, quality)) return QUALITIES[quality];
   const names = Object.keys(QUALITIES).map((name) => `"${name}"`);
-  if (typeof quality !== 'object' || !quality) refuse('quality', quality, `${names.join(', ')} or { alphaCut, transmittanceStop, detail }`);
+  if (typeof quality !== 'object' || !quality) refuse('quality', quality, `${names.join(', ')} or { alphaCut, detail }`);
   whole('quality.alphaCut', quality.alphaCut, 1, MAX_ALPHA_CUT);
-  whole('quality.transmittanceStop', quality.transmittanceStop, 1, MAX_TRANSMITTANCE_STOP);
   if (typeof quality.detail !== 'boolean') refuse('quality.detail', quality.detail, 'true or false');
   return quality;
 }

@@ -9,8 +9,7 @@ use embedded_hal::digital::OutputPin;
 use mipidsi::Display;
 use mipidsi::interface::{Interface, InterfacePixelFormat};
 use mipidsi::models::Model;
-use pocketsplat_core::arithmetic::Arithmetic;
-use pocketsplat_core::{ByteOrder, Camera, Decoder, FrameReport, RenderError, Rounding};
+use pocketsplat_core::{Arithmetic, ByteOrder, Camera, Decoder, FrameReport, RenderError, Rounding};
 
 /// The camera with the largest frame of its proportions that a panel of `width_px × height_px` shows.
 #[must_use]

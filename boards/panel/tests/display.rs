@@ -5,7 +5,7 @@ use std::convert::Infallible;
 use embedded_hal::delay::DelayNs;
 use mipidsi::interface::{Interface, InterfaceKind};
 use mipidsi::models::ST7789;
-use pocketsplat_core::{Budget, Bundle, ByteOrder, Decoder, Rounding, Tile, TileSink};
+use pocketsplat_core::{Budget, Bundle, ByteOrder, Decoder, Plan, Rounding, Tile, TileSink};
 
 const PANEL_PX: (u16, u16) = (40, 50);
 
@@ -61,9 +61,8 @@ struct Expected {
 impl TileSink for Expected {
     type Error = Infallible;
 
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
-        let mut rgb = rgb.to_vec();
-        let tile = Tile::new([x_px, y_px], [width, height], &mut rgb).expect("a pixel for each");
+    fn tile(&mut self, tile: Tile<'_>) -> Result<(), Infallible> {
+        let (x_px, y_px, width) = (tile.x_px, tile.y_px, tile.width);
         let pixels = tile.into_rgb565(ByteOrder::BigEndian, Rounding::Dithered).as_chunks().0;
         for (pixel, i) in pixels.iter().zip(0..) {
             let (x, y) = (x_px + i % width, self.top + y_px + i / width);
@@ -76,11 +75,11 @@ impl TileSink for Expected {
 #[test]
 fn a_display_shows_the_pixels_of_render_in_the_middle() {
     let bundle =
-        Bundle::parse(include_bytes!("../../../decoder-core/src/bundle/example.psb")).expect("the example is sound");
+        Bundle::parse(include_bytes!("../../../decoder-format/src/bundle/example.psb")).expect("the example is sound");
     let camera = pocketsplat_panel::fitted(&bundle.header().preview, PANEL_PX.0, PANEL_PX.1);
     assert_eq!((camera.width_px, camera.height_px), (40, 30), "4 : 3 across");
     let mut scratch = [0; 16 * 1024];
-    let plan = bundle.plan(&Budget::for_frame(40, 30).in_bytes(scratch.len())).expect("fits");
+    let plan = Plan::new(&bundle, &Budget::for_frame(40, 30).in_bytes(scratch.len())).expect("fits");
     let mut decoder = Decoder::bind(&bundle, plan, &mut scratch).expect("bound");
 
     let mut expected = Expected { pixels: [[Some([0, 0]); 40]; 50], top: 10 };
@@ -100,7 +99,7 @@ fn a_display_shows_the_pixels_of_render_in_the_middle() {
 #[test]
 fn a_frame_fills_the_side_of_the_panel_that_is_scarce() {
     let bundle =
-        Bundle::parse(include_bytes!("../../../decoder-core/src/bundle/example.psb")).expect("the example is sound");
+        Bundle::parse(include_bytes!("../../../decoder-format/src/bundle/example.psb")).expect("the example is sound");
     let fitted = |width, height| {
         let camera = pocketsplat_panel::fitted(&bundle.header().preview, width, height);
         (camera.width_px, camera.height_px)

@@ -15,7 +15,7 @@ use mipidsi::interface::SpiInterface;
 use mipidsi::models::ST7789;
 use mipidsi::options::ColorInversion;
 use panic_probe as _;
-use pocketsplat_core::{Budget, Bundle, Decoder, Overflow};
+use pocketsplat_core::{Budget, Bundle, Decoder, Overflow, Plan};
 use rp235x_hal::clocks::{Clock as _, init_clocks_and_plls};
 use rp235x_hal::fugit::RateExtU32 as _;
 use rp235x_hal::gpio::Pins;
@@ -73,8 +73,9 @@ fn main() -> ! {
     let camera = pocketsplat_panel::fitted(&bundle.header().preview, PANEL_PX.0, PANEL_PX.1);
     let budget = Budget::for_frame(camera.width_px, camera.height_px).in_bytes(SCRATCH_LEN);
     // A scene that no pruning rate makes small enough still fits in slabs of depth, which take longer.
-    let plan =
-        bundle.plan(&budget).or_else(|_| bundle.plan(&budget.with_overflow(Overflow::Slabs))).unwrap_or_else(stop);
+    let plan = Plan::new(&bundle, &budget)
+        .or_else(|_| Plan::new(&bundle, &budget.with_overflow(Overflow::Slabs)))
+        .unwrap_or_else(stop);
     defmt::info!("{}", plan);
     let mut decoder = Decoder::bind(&bundle, plan, SCRATCH.take()).unwrap_or_else(stop);
 

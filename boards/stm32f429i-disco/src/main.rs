@@ -14,7 +14,7 @@ use mipidsi::interface::SpiInterface;
 use mipidsi::models::ILI9341Rgb565;
 use mipidsi::options::{ColorOrder, Orientation, Rotation};
 use panic_probe as _;
-use pocketsplat_core::{Budget, Bundle, Decoder, Overflow};
+use pocketsplat_core::{Budget, Bundle, Decoder, Overflow, Plan};
 use static_cell::ConstStaticCell;
 use stm32f4xx_hal::gpio::{PinState, Speed};
 use stm32f4xx_hal::pac::{CorePeripherals, Peripherals, SPI5};
@@ -68,8 +68,9 @@ fn main() -> ! {
     let camera = pocketsplat_panel::fitted(&bundle.header().preview, PANEL_PX.0, PANEL_PX.1);
     let budget = Budget::for_frame(camera.width_px, camera.height_px).in_bytes(SCRATCH_LEN);
     // A scene that no pruning rate makes small enough still fits in slabs of depth, which take longer.
-    let plan =
-        bundle.plan(&budget).or_else(|_| bundle.plan(&budget.with_overflow(Overflow::Slabs))).unwrap_or_else(stop);
+    let plan = Plan::new(&bundle, &budget)
+        .or_else(|_| Plan::new(&bundle, &budget.with_overflow(Overflow::Slabs)))
+        .unwrap_or_else(stop);
     defmt::info!("{}", plan);
     let mut decoder = Decoder::bind(&bundle, plan, SCRATCH.take()).unwrap_or_else(stop);
 

@@ -1,9 +1,10 @@
 //! Going over a scene once, when it is bound.
 
+use pocketsplat_format::bundle::{AnchorModels, Chunk};
+use pocketsplat_format::{Bundle, DecodeError};
+
 use super::store::{BakedMemory, Baker};
-use crate::bundle::{AnchorModels, Bundle, Chunk};
-use crate::error::DecodeError;
-use crate::math::functions::Reference;
+use crate::functions::Reference;
 use crate::mlp::F32;
 use crate::scene::{Anchor, Evaluator, Gaussian, GaussianSink};
 

@@ -1,9 +1,9 @@
 //! A Gaussian in 32 bytes.
 
 use bytemuck::{Pod, Zeroable};
+use pocketsplat_format::bundle::Effects;
+use pocketsplat_format::math::{from_half, to_half};
 
-use crate::bundle::Effects;
-use crate::math::{from_half, to_half};
 use crate::scene::{Gaussian, NO_ROTATION};
 
 /// Largest number of 12 bits, for colours.
@@ -125,7 +125,7 @@ fn smaller_three(rotation: [f32; 4]) -> (u32, [u32; 3]) {
 fn unit_quaternion(largest: u32, others: [u32; 3]) -> [f32; 4] {
     let [a, b, c] = others.map(|bits| (2.0 * SQRT_HALF / MAX_20 as f32) * (bits & MAX_20) as f32 - SQRT_HALF);
     let rest = 1.0 - (a * a + b * b + c * c);
-    let number = crate::math::sqrt(if rest > 0.0 { rest } else { 0.0 });
+    let number = pocketsplat_half::sqrt(if rest > 0.0 { rest } else { 0.0 });
     match largest {
         0 => [number, a, b, c],
         1 => [a, number, b, c],
@@ -139,8 +139,8 @@ mod tests {
     use bytemuck::Zeroable as _;
 
     use super::{BakedGaussian, Effects, MAX_12};
-    use crate::math::{from_half, to_half};
     use crate::scene::Gaussian;
+    use pocketsplat_format::math::{from_half, to_half};
 
     fn anisotropic() -> Effects {
         Effects { anisotropic: true, ..Effects::default() }

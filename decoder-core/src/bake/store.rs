@@ -1,8 +1,9 @@
 //! Baked Gaussians in memory, chunk by chunk.
 
+use pocketsplat_format::bundle::Effects;
+use pocketsplat_format::{DecodeError, Field, saturate};
+
 use super::record::BakedGaussian;
-use crate::bundle::Effects;
-use crate::error::{DecodeError, Field, saturate};
 use crate::scene::Gaussian;
 
 /// Set in the entry of a chunk that was left out because of damage; there are never so many Gaussians.

@@ -1,15 +1,8 @@
 //! What a caller wants of a plan, and within what.
 
+use pocketsplat_format::{DecodeError, Field, in_range};
+
 use super::quality::Quality;
-use crate::error::{DecodeError, Field, in_range};
-
-/// Largest width and height of a frame, pixels: a tile's column and row fit a byte.
-pub const MAX_FRAME_PX: u16 = 255 * 16;
-/// Most horizontal strips of a frame.
-pub const MAX_STRIPS: u8 = 8;
-
-/// Fewest places for splats with which a strip can be drawn in [slabs](Overflow::Slabs) of depth.
-pub const MIN_SLAB_PLACES: u32 = 2;
 
 /// How many splats there is memory for at once: those of a frame, or with strips those of a strip.
 ///
@@ -17,28 +10,29 @@ pub const MIN_SLAB_PLACES: u32 = 2;
 /// [reports](crate::FrameReport::splats_dropped) how many it left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum MaxSplats {
     /// As many as the fullest of the views in the bundle's manifest has, and a sixteenth more; if the manifest is not
     /// measured, [`Worst`](Self::Worst). A frame with a wider lens or nearer to the scene may need more. Where memory is left,
-    /// strips may [share it](crate::Bundle::plan).
+    /// strips may [share it](crate::Plan::new).
     Measured,
-    /// Every offset of every anchor of the tiers drawn: always enough in the
-    /// [reference arithmetic](crate::arithmetic::ReferenceArithmetic). [`Wide`](crate::arithmetic::Wide) splats have 0.7 of the places; of
+    /// Every offset of every anchor of the tiers drawn: always enough in the [reference arithmetic](crate::ReferenceArithmetic); of
     /// a scene that can be baked, other heads may draw an offset more.
     Worst,
-    /// So many; with [slabs](Overflow::Slabs) at least [`MIN_SLAB_PLACES`].
+    /// So many; with [slabs](Overflow::Slabs) at least [`Budget::MIN_SLAB_PLACES`].
     AtMost(u32),
 }
 
 /// Where decoded anchors are kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum Residency {
     /// Least predicted work that fits.
     Auto,
     /// Nowhere: their Gaussians are evaluated once when bound, and are in memory, 32 bytes each. For scenes that
     /// [look the same](crate::Bundle::n_gaussians) from everywhere. Evaluated in the
-    /// [reference arithmetic](crate::arithmetic::ReferenceArithmetic), whatever the frame is drawn in.
+    /// [reference arithmetic](crate::ReferenceArithmetic), whatever the frame is drawn in.
     Baked,
     /// In memory, as integers, decoded once when bound.
     Resident,
@@ -51,17 +45,19 @@ pub enum Residency {
 /// A strip has ⌈tile rows / n⌉ rows of 16×16 tiles, so the last ones of a low frame may be missing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum Strips {
     /// Those that take the least predicted work. Of equals one, or else the most of 2, 4 and 8; in [slabs](Overflow::Slabs) the
     /// fewest.
     Auto,
-    /// So many, 1..=[`MAX_STRIPS`], in no more memory than one of them needs.
+    /// So many, 1..=[`Budget::MAX_STRIPS`], in no more memory than one of them needs.
     Exactly(u8),
 }
 
 /// What becomes of the splats of a strip that there is no place for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum Overflow {
     /// Those of the file's last anchors are left out, and [reported](crate::FrameReport::splats_dropped): the work of a frame
     /// is bounded.
@@ -83,15 +79,16 @@ pub enum Overflow {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct Budget {
     /// Bytes of scratch memory there are; the fast ones, if some are slow.
     pub ram_bytes: usize,
     /// Bytes of slow scratch memory besides; 0 for none. It has to be
     /// [normal memory](crate#memory), which SDRAM may become by the MPU alone.
     pub slow_bytes: usize,
-    /// Widest frame, pixels, 1..=[`MAX_FRAME_PX`].
+    /// Widest frame, pixels, 1..=[`Self::MAX_FRAME_PX`].
     pub width_px: u16,
-    /// Highest frame, pixels, 1..=[`MAX_FRAME_PX`].
+    /// Highest frame, pixels, 1..=[`Self::MAX_FRAME_PX`].
     pub height_px: u16,
     /// Tiers to draw at most, 1 or more; [`u8::MAX`] draws all that the file holds. Fewer are a coarser scene that costs less.
     pub tiers: u8,
@@ -105,9 +102,18 @@ pub struct Budget {
     pub overflow: Overflow,
     /// Accuracy.
     pub quality: Quality,
+    /// Whether damaged chunks are left out, and each frame that needs some says so in its report; if not, they are errors.
+    pub skips_damage: bool,
 }
 
 impl Budget {
+    /// Largest width and height of a frame, pixels: a tile's column and row fit a byte.
+    pub const MAX_FRAME_PX: u16 = 255 * 16;
+    /// Most horizontal strips of a frame.
+    pub const MAX_STRIPS: u8 = 8;
+    /// Fewest places for splats with which a strip can be drawn in [slabs](Overflow::Slabs) of depth.
+    pub const MIN_SLAB_PLACES: u32 = 2;
+
     /// Frames of at most `width_px × height_px`, everything else as good as memory allows, memory without limit.
     #[must_use]
     pub const fn for_frame(width_px: u16, height_px: u16) -> Self {
@@ -122,6 +128,7 @@ impl Budget {
             strips: Strips::Auto,
             overflow: Overflow::LeaveOut,
             quality: Quality::EXACT,
+            skips_damage: false,
         }
     }
 
@@ -176,19 +183,30 @@ impl Budget {
         Self { quality, ..self }
     }
 
+    /// Leaves damaged chunks out, and [reports](crate::FrameReport::chunks_damaged) them in each frame that needs some. Drawn in
+    /// [slabs](Overflow::Slabs), a frame still fails for a chunk whose checksum is right and whose stream is not.
+    ///
+    /// # Budget
+    /// Where anchors are streamed, checksums are compared in the frames that need the chunks instead of when bound: about 8 instructions
+    /// a byte of those in view.
+    #[must_use]
+    pub const fn skipping_damage(self) -> Self {
+        Self { skips_damage: true, ..self }
+    }
+
     /// Frame, tiers, strips, quality and the places of slabs lie within their limits.
     pub(super) fn check(&self) -> Result<(), DecodeError> {
-        in_range(Field::FrameWidth, self.width_px.into(), 1, MAX_FRAME_PX.into())?;
-        in_range(Field::FrameHeight, self.height_px.into(), 1, MAX_FRAME_PX.into())?;
+        in_range(Field::FrameWidth, self.width_px.into(), 1, Self::MAX_FRAME_PX.into())?;
+        in_range(Field::FrameHeight, self.height_px.into(), 1, Self::MAX_FRAME_PX.into())?;
         // A budget of zeros would draw background alone.
         in_range(Field::Tiers, self.tiers.into(), 1, u8::MAX.into())?;
         self.quality.check()?;
         if let (Overflow::Slabs, MaxSplats::AtMost(n)) = (self.overflow, self.max_splats) {
-            in_range(Field::SlabSplats, n, MIN_SLAB_PLACES, u32::MAX)?;
+            in_range(Field::SlabSplats, n, Self::MIN_SLAB_PLACES, u32::MAX)?;
         }
         match self.strips {
             Strips::Auto => Ok(()),
-            Strips::Exactly(n) => in_range(Field::Strips, n.into(), 1, MAX_STRIPS.into()),
+            Strips::Exactly(n) => in_range(Field::Strips, n.into(), 1, Self::MAX_STRIPS.into()),
         }
     }
 }

@@ -3,13 +3,14 @@
 //! First lies what stays between frames, then the memory of a frame. What binding alone needs lies where the frame's memory lies
 //! later. Each list is a [`Part`], which lies in one region.
 
+use pocketsplat_format::bundle::RecordMemory;
+use pocketsplat_format::{DecodeError, Region};
+
 use super::placement::{Part, Placement, Regions};
 use super::shape::ScratchShape;
 use crate::arena::{Arena, words_for};
 use crate::bake::{BakedGaussian, BakedMemory};
-use crate::bundle::RecordMemory;
-use crate::error::{DecodeError, Region};
-use crate::project::{Packed28, TILE_PIXELS, TileRect};
+use crate::project::{PackedSplat, TILE_PIXELS, TileRect};
 use crate::raster::{N_RADIX, Pixel};
 use crate::scene::HeadOutputs;
 
@@ -50,7 +51,7 @@ slices! {
 
     /// Anchors between frames: their records, a bit a chunk, and the scale of each table.
     RecordMemory: record_words, take_records(shape) {
-        records: [u16; shape.record_layout().len().saturating_mul(shape.resident.len())],
+        records: [u16; shape.record_layout().n_words().saturating_mul(shape.resident.len())],
         damaged: [u32; shape.resident.n_chunks().div_ceil(u32::BITS as usize)],
         scales: [[f32; 2]; shape.coder.n_tables as usize],
     }
@@ -70,7 +71,7 @@ slices! {
 
     /// The splats of a strip or slab.
     SplatMemory: splat_words, take_splats(shape) {
-        splats: [Packed28; shape.frame.max_splats as usize],
+        splats: [PackedSplat; shape.frame.max_splats as usize],
     }
 
     /// What lists and sorts them.
@@ -116,7 +117,7 @@ pub(crate) struct TileMemory<'s> {
 /// Memory of splats.
 pub(crate) struct SplatMemory<'s> {
     /// Splats, or room for fewer larger ones.
-    pub(crate) splats: &'s mut [Packed28],
+    pub(crate) splats: &'s mut [PackedSplat],
 }
 
 /// Memory that splats are listed and sorted in.

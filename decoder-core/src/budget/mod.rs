@@ -16,11 +16,11 @@ mod shape;
 mod work;
 
 pub use crate::mlp::HeadWeights;
-pub use limits::{Budget, MAX_FRAME_PX, MAX_STRIPS, MIN_SLAB_PLACES, MaxSplats, Overflow, Residency, Strips};
+pub use limits::{Budget, MaxSplats, Overflow, Residency, Strips};
 pub(crate) use memory::{AnchorMemory, FrameMemory, ListMemory, ModelMemory, SceneMemory, TileMemory};
 pub use placement::{Part, PartMemory};
 pub(crate) use placement::{Placement, Regions};
 pub use plan::Plan;
-pub use quality::{MAX_ALPHA_CUT, MAX_TRANSMITTANCE_STOP, Quality};
+pub use quality::Quality;
 pub use shape::{CoderShape, FrameShape, ModelShape, RecordShape, Resident, ScratchShape};
 pub use work::Work;

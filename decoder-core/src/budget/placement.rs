@@ -1,11 +1,13 @@
 //! Which parts of the scratch memory lie in fast memory, and which in slow.
 
+use pocketsplat_format::Region;
+
 use crate::arena::Arena;
-use crate::error::Region;
 
 /// A part of the scratch memory that lies in one piece; those whose bytes a frame touches most often come first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum Part {
     /// Weights of the heads, and the current anchor: all of it for each anchor in view.
     Heads,
@@ -24,6 +26,7 @@ pub enum Part {
 /// Where one part of the scratch memory lies, and how many bytes it takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct PartMemory {
     /// Which part.
     pub part: Part,
@@ -100,7 +103,7 @@ impl<'s> Regions<'s> {
 #[cfg(test)]
 mod tests {
     use super::{Part, Placement};
-    use crate::error::Region;
+    use pocketsplat_format::Region;
 
     #[test]
     fn placements_prefer_the_parts_that_come_first_in_fast_memory() {

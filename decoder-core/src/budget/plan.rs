@@ -2,14 +2,15 @@
 
 use core::slice;
 
-use super::limits::{Budget, MIN_SLAB_PLACES, MaxSplats, Overflow, Residency, Strips};
+use pocketsplat_format::bundle::{STRIPS, Tier, TierMeasures};
+use pocketsplat_format::rules::TILE_PX;
+use pocketsplat_format::{Bundle, DecodeError, Region, saturate};
+
+use super::limits::{Budget, MaxSplats, Overflow, Residency, Strips};
 use super::placement::{Part, PartMemory, Placement};
 use super::shape::{FrameShape, Resident, ScratchShape};
 use super::work::{Work, decoding_macs};
-use crate::bundle::{Bundle, STRIPS, Tier, TierMeasures};
-use crate::error::{DecodeError, Region, saturate};
 use crate::mlp::HeadWeights;
-use crate::rules::TILE_PX;
 
 /// What reading a baked Gaussian is worth in multiply-adds.
 const READING_MACS: u64 = 150;
@@ -20,7 +21,7 @@ const MIN_SLAB_SPLATS: u32 = 256;
 /// [`STRIPS`] that share passes: the more there are to choose from, the fuller a pass.
 const MOST_STRIPS_FIRST: [u8; STRIPS.len()] = [1, 8, 4, 2];
 
-/// What a decoder of one bundle needs and does within a [`Budget`]; made by [`Bundle::plan`].
+/// What a decoder of one bundle needs and does within a [`Budget`]; made by [`Plan::new`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Plan {
@@ -52,7 +53,7 @@ impl Plan {
     }
 
     /// Bytes of both regions that would do: the same tiers in as many strips, with no more places for splats than a strip needs. What
-    /// the plan takes beyond saves [passes](Bundle::plan).
+    /// the plan takes beyond saves [passes](Self::new).
     #[must_use]
     pub fn least_len(&self) -> usize {
         self.len_with_splats(self.least_splats)
@@ -159,7 +160,7 @@ impl Plan {
     }
 }
 
-impl Bundle<'_> {
+impl Plan {
     /// Finds the best scene that fits a budget: the lowest pruning rate, that is the most tiers, in `ram_bytes`; of these tiers
     /// [weights of the heads](Plan::head_weights) in f32 before halves, and among these plan variants the one of least predicted work.
     ///
@@ -182,7 +183,7 @@ impl Bundle<'_> {
     /// is some;
     /// [`DecodeError::NotBakeable`] for a residency that the scene does not have;
     /// [`DecodeError::OutOfRange`] for an empty or too large frame or number of strips, for no tiers, and for fewer than
-    /// [`MIN_SLAB_PLACES`] splats a slab; [`DecodeError::PlanTooLarge`] beyond
+    /// [`Budget::MIN_SLAB_PLACES`] splats a slab; [`DecodeError::PlanTooLarge`] beyond
     /// the address space.
     ///
     /// # Budget
@@ -190,12 +191,12 @@ impl Bundle<'_> {
     /// directory's tiers, no chunk.
     // Not inlined: a caller's stack frame would keep what only planning needs.
     #[inline(never)]
-    pub fn plan(&self, budget: &Budget) -> Result<Plan, DecodeError> {
+    pub fn new(bundle: &Bundle<'_>, budget: &Budget) -> Result<Self, DecodeError> {
         budget.check()?;
-        if budget.residency == Residency::Baked && self.n_gaussians(0).is_none() {
+        if budget.residency == Residency::Baked && bundle.n_gaussians(0).is_none() {
             return Err(DecodeError::NotBakeable);
         }
-        Planner { bundle: self, budget }.best()
+        Planner { bundle, budget }.best()
     }
 }
 
@@ -395,7 +396,7 @@ impl Planner<'_, '_> {
 
 /// Places for so many measured splats and a sixteenth more; a manifest may have measured views without any.
 fn with_reserve(n_splats: u32) -> u32 {
-    n_splats.saturating_add(n_splats.div_ceil(16)).max(MIN_SLAB_PLACES)
+    n_splats.saturating_add(n_splats.div_ceil(16)).max(Budget::MIN_SLAB_PLACES)
 }
 
 /// Tiles of a strip.

@@ -1,11 +1,6 @@
 //! What accuracy a frame may give up to be drawn sooner.
 
-use crate::error::{DecodeError, Field, in_range};
-
-/// Largest [`Quality::alpha_cut`].
-pub const MAX_ALPHA_CUT: u8 = 64;
-/// Largest [`Quality::transmittance_stop`].
-pub const MAX_TRANSMITTANCE_STOP: u16 = 1000;
+use pocketsplat_format::{DecodeError, Field, in_range};
 
 /// How exactly a frame is drawn.
 ///
@@ -13,27 +8,25 @@ pub const MAX_TRANSMITTANCE_STOP: u16 = 1000;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Quality {
-    /// A splat leaves pixels alone where its alpha is below this, in 255ths, 1..=[`MAX_ALPHA_CUT`]; 1 in training. More
+    /// A splat leaves pixels alone where its alpha is below this, in 255ths, 1..=[`Self::MAX_ALPHA_CUT`]; 1 in training. More
     /// makes splats smaller, and more opaque by as much.
     pub alpha_cut: u8,
-    /// A pixel is finished once less light than this comes through it, in 10 000ths, 1..=[`MAX_TRANSMITTANCE_STOP`]; 1 in
-    /// training.
-    pub transmittance_stop: u16,
     /// Whether the detail head runs, if the bundle has one; if not, its weights take no memory.
     pub detail: bool,
 }
 
 impl Quality {
+    /// Largest [`alpha_cut`](Self::alpha_cut).
+    pub const MAX_ALPHA_CUT: u8 = 64;
     /// As trained: the f64 reference within rounding.
-    pub const EXACT: Self = Self { alpha_cut: 1, transmittance_stop: 1, detail: true };
+    pub const EXACT: Self = Self { alpha_cut: 1, detail: true };
     /// What photographs do not tell from exact: up to a tenth fewer instructions for at most 0.1 dB on the scenes measured.
-    pub const BALANCED: Self = Self { alpha_cut: 2, transmittance_stop: 10, detail: true };
+    pub const BALANCED: Self = Self { alpha_cut: 2, detail: true };
     /// A third fewer where splats are large, for 0.6 dB.
-    pub const DRAFT: Self = Self { alpha_cut: 8, transmittance_stop: 100, detail: false };
+    pub const DRAFT: Self = Self { alpha_cut: 8, detail: false };
 
     /// Field and value lie within their limits.
     pub(super) fn check(self) -> Result<(), DecodeError> {
-        in_range(Field::AlphaCut, self.alpha_cut.into(), 1, MAX_ALPHA_CUT.into())?;
-        in_range(Field::TransmittanceStop, self.transmittance_stop.into(), 1, MAX_TRANSMITTANCE_STOP.into())
+        in_range(Field::AlphaCut, self.alpha_cut.into(), 1, Self::MAX_ALPHA_CUT.into())
     }
 }

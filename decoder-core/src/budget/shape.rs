@@ -1,10 +1,11 @@
 //! What the number of bytes of scratch memory follows from.
 
-use crate::bundle::{
-    Bundle, Coder, MAX_FEATURE_DIM, MAX_LATTICE_BITS, MAX_OFFSETS, RecordLayout, covariance_outputs, model_words,
-    n_log_scales,
+use pocketsplat_format::Bundle;
+use pocketsplat_format::bundle::{
+    Coder, MAX_FEATURE_DIM, MAX_LATTICE_BITS, MAX_OFFSETS, RecordLayout, covariance_outputs, model_words, n_log_scales,
 };
-use crate::context::{FEATURES_PER_LEVEL, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS, N_POSITION_INPUTS};
+use pocketsplat_format::context::{FEATURES_PER_LEVEL, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS, N_POSITION_INPUTS};
+
 use crate::mlp::{HeadShape, HeadWeights};
 
 /// What the size of the scratch memory follows from.
@@ -230,7 +231,7 @@ impl ScratchShape {
     /// Bytes of one anchor in memory.
     #[must_use]
     pub const fn resident_anchor_len(&self) -> usize {
-        self.record_layout().len().saturating_mul(2)
+        self.record_layout().n_words().saturating_mul(2)
     }
 
     /// Widths of the heads that are converted.

@@ -1,9 +1,11 @@
 //! What a frame costs in time, as counts that no clock is needed for.
 
+use pocketsplat_format::Bundle;
+use pocketsplat_format::bundle::{Coder, TierMeasures};
+use pocketsplat_format::context::first_tap;
+
 use super::limits::Budget;
 use super::shape::Resident;
-use crate::bundle::{Bundle, Coder, TierMeasures};
-use crate::context::first_tap;
 
 /// What a symbol takes in multiply-adds of f32, of which each takes 2.5 instructions on a Cortex-M4; a symbol takes 64.
 const SYMBOL_MACS: usize = 26;
@@ -15,6 +17,7 @@ const INPUT_MACS: usize = 33;
 /// Work of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct Work {
     /// Multiply-adds of the heads.
     pub head_macs: u64,

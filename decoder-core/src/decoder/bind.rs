@@ -1,6 +1,10 @@
 //! Binding: the caller's memory taken apart, and the scene put into it.
 
+use pocketsplat_format::bundle::{AnchorRecords, RecordMemory};
+use pocketsplat_format::{Bundle, DecodeError, Region, saturate};
+
 use super::Decoder;
+use super::scratch::Scratch;
 use super::source::{AnchorSource, Anchors, GaussianSource};
 use super::splats::SplatStore;
 use crate::arena::Arena;
@@ -9,40 +13,31 @@ use crate::bake::{BakedGaussians, BakedMemory, Baker, bake};
 use crate::budget::{
     AnchorMemory, FrameMemory, ListMemory, ModelMemory, Part, Plan, Regions, SceneMemory, ScratchShape, TileMemory,
 };
-use crate::bundle::{AnchorRecords, Bundle, RecordMemory};
-use crate::error::{DecodeError, Region, saturate};
 use crate::mlp::{F32, HeadFormat, Heads};
-use crate::project::Packed28;
 use crate::scene::{Evaluator, Pair, Workspace};
 
 impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
     /// Takes as much of the fast and the slow memory as the plan says, and prepares the scene in it.
-    pub(super) fn bind_with(
+    pub(super) fn bind_regions(
         bundle: &Bundle<'b>,
         plan: Plan,
-        [fast, slow]: [&'s mut [u8]; 2],
-        skip_damage: bool,
+        Scratch { fast, slow }: Scratch<'s>,
     ) -> Result<Self, DecodeError> {
         check_plan(bundle, &plan)?;
         let fast = front(fast, plan.scratch_len(), Region::Fast)?;
         let slow = front(slow, plan.slow_scratch_len(), Region::Slow)?;
         // Before anything else, in memory that is taken again after it: the deepest calls come while no result waits on the stack.
-        read_chunks(bundle, &plan, [&mut *fast, &mut *slow], skip_damage)?;
-        Self::prepare(bundle, plan, [fast, slow], skip_damage)
+        read_chunks(bundle, &plan, [&mut *fast, &mut *slow])?;
+        Self::prepare(bundle, plan, [fast, slow])
     }
 
     /// The same, after resident anchors were decoded.
     // Not inlined, here and below: a caller's stack frame would keep what only one of the steps needs.
     #[inline(never)]
-    fn prepare(
-        bundle: &Bundle<'b>,
-        plan: Plan,
-        [fast, slow]: [&'s mut [u8]; 2],
-        skip_damage: bool,
-    ) -> Result<Self, DecodeError> {
+    fn prepare(bundle: &Bundle<'b>, plan: Plan, [fast, slow]: [&'s mut [u8]; 2]) -> Result<Self, DecodeError> {
         let mut regions = Regions::new(fast, slow, plan.placement());
-        let source = bind_scene(bundle, plan.shape(), &mut regions, skip_damage);
-        Self::of_parts(bundle, plan, source, regions, skip_damage)
+        let source = bind_scene(bundle, &plan, &mut regions);
+        Self::of_parts(bundle, plan, source, regions)
     }
 
     /// The decoder of a scene; what is left of `regions` is for frames.
@@ -54,30 +49,29 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
         plan: Plan,
         source: Result<GaussianSource<'b, 's, A::Heads>, DecodeError>,
         mut regions: Regions<'s>,
-        skip_damage: bool,
     ) -> Result<Self, DecodeError> {
         let source = source?;
         let FrameMemory { tiles, splats, lists } = FrameMemory::take(plan.shape(), &mut regions)?;
         let (TileMemory { pixels, rgb, counts }, ListMemory { rects, order, spare }) = (tiles, lists);
         let splats = SplatStore {
-            splats: records_in(splats.splats)?,
+            splats: splats.splats,
             rects,
             n: 0,
             most: 0,
-            n_notes: 0,
-            places_of_notes: 0,
+            n_indexed: 0,
+            places_of_index: 0,
             order,
             spare,
             counts,
         };
-        Ok(Self { bundle: *bundle, plan, skip_damage, source, pixels, rgb, splats })
+        Ok(Self { bundle: *bundle, plan, source, pixels, rgb, splats })
     }
 }
 
 /// Whether `plan` is one of this bundle.
 #[inline(never)]
 fn check_plan(bundle: &Bundle<'_>, plan: &Plan) -> Result<(), DecodeError> {
-    let needed = bundle.plan(plan.budget())?;
+    let needed = Plan::new(bundle, plan.budget())?;
     if !needed.draws_as(plan) {
         let [needed, planned] =
             [&needed, plan].map(|plan| saturate(plan.scratch_len().saturating_add(plan.slow_scratch_len())));
@@ -99,29 +93,29 @@ fn front(memory: &mut [u8], len: usize, region: Region) -> Result<&mut [u8], Dec
     memory.get_mut(..len).ok_or(DecodeError::ScratchTooSmall { region, needed: saturate(len), available })
 }
 
-/// Puts the scene into memory of `regions`, as far as `shape` keeps it there; resident anchors are there already.
+/// Puts the scene into memory of `regions`, as far as `plan` keeps it there; resident anchors are there already.
 #[inline(never)]
 fn bind_scene<'b, 's, N: HeadFormat>(
     bundle: &Bundle<'b>,
-    shape: &ScratchShape,
+    plan: &Plan,
     regions: &mut Regions<'s>,
-    skip_damage: bool,
 ) -> Result<GaussianSource<'b, 's, N>, DecodeError> {
+    let (shape, skip_damage) = (plan.shape(), plan.budget().skips_damage);
     let (anchor, kept) = match SceneMemory::take(shape, regions)? {
         // Unreachable without the feature; this arm drops the code.
         SceneMemory::Baked { .. } if !cfg!(feature = "baked") => return Err(DecodeError::Internal),
         SceneMemory::Baked { baked, anchor, models } => {
             return bind_baked(bundle, shape, baked, anchor, models, skip_damage).map(GaussianSource::Baked);
         }
-        SceneMemory::Streamed { anchor, models } => (anchor, Kept::Models(models)),
-        SceneMemory::Resident { anchor, records, .. } => (anchor, Kept::Anchors(records)),
+        SceneMemory::Streamed { anchor, models } => (anchor, AnchorStorage::Models(models)),
+        SceneMemory::Resident { anchor, records, .. } => (anchor, AnchorStorage::Anchors(records)),
     };
     let evaluator = evaluator(bundle, shape, anchor, regions.of(Part::Tiles).borrow());
     anchors(bundle, shape, kept, evaluator)
 }
 
 /// What of anchors is in memory.
-enum Kept<'s> {
+enum AnchorStorage<'s> {
     /// Nothing but what decodes them.
     Models(ModelMemory<'s>),
     /// They.
@@ -138,13 +132,15 @@ type EvaluatorAndRow<'s, N> = (Evaluator<'s, N>, &'s mut [f32]);
 fn anchors<'b, 's, N: HeadFormat>(
     bundle: &Bundle<'b>,
     shape: &ScratchShape,
-    kept: Kept<'s>,
+    kept: AnchorStorage<'s>,
     evaluator: Result<EvaluatorAndRow<'s, N>, DecodeError>,
 ) -> Result<GaussianSource<'b, 's, N>, DecodeError> {
     let (evaluator, row) = evaluator?;
     let source = match kept {
-        Kept::Models(models) => AnchorSource::Streamed(bundle.anchor_models(models.words)?),
-        Kept::Anchors(records) => AnchorSource::Resident(AnchorRecords::new(bundle, shape.record_layout(), records)?),
+        AnchorStorage::Models(models) => AnchorSource::Streamed(bundle.anchor_models(models.words)?),
+        AnchorStorage::Anchors(records) => {
+            AnchorSource::Resident(AnchorRecords::new(bundle, shape.record_layout(), records)?)
+        }
     };
     Ok(GaussianSource::Anchors(Anchors { source, row, evaluator }))
 }
@@ -174,8 +170,7 @@ fn evaluator<'s, N: HeadFormat>(
 ) -> Result<EvaluatorAndRow<'s, N>, DecodeError> {
     let AnchorMemory { heads, row, inputs, hidden, detail_sums, outputs } = memory;
     let mut arena = Arena::of_words(heads);
-    let kept_as = N::KEPT_AS.unwrap_or(shape.model.head_weights);
-    let heads = Heads::convert(&mut arena, &mut free, kept_as, bundle.heads(), shape.heads());
+    let heads = Heads::convert(&mut arena, &mut free, shape.model.head_weights, bundle.heads(), shape.heads());
     let work = Workspace { hidden, detail_sums, outputs };
     evaluator_of(heads, arena, shape, (inputs, row), work)
 }
@@ -196,13 +191,8 @@ fn evaluator_of<'s, N: HeadFormat>(
 
 /// Decodes the planned tiers if they are resident, and if they are streamed compares their checksums; Gaussians are baked later.
 #[inline(never)]
-fn read_chunks(
-    bundle: &Bundle<'_>,
-    plan: &Plan,
-    [fast, slow]: [&mut [u8]; 2],
-    skip_damage: bool,
-) -> Result<(), DecodeError> {
-    let shape = plan.shape();
+fn read_chunks(bundle: &Bundle<'_>, plan: &Plan, [fast, slow]: [&mut [u8]; 2]) -> Result<(), DecodeError> {
+    let (shape, skip_damage) = (plan.shape(), plan.budget().skips_damage);
     let mut regions = Regions::new(fast, slow, plan.placement());
     match SceneMemory::take(shape, &mut regions)? {
         SceneMemory::Resident { anchor, mut records, models } => {
@@ -227,12 +217,4 @@ pub(super) fn evaluate_scene<'s>(
     let (mut evaluator, row) = evaluator::<F32>(bundle, shape, anchor, Arena::of_words(&mut []))?;
     let mut models = bundle.anchor_models(models.words)?;
     bake(bundle, shape.resident.n_chunks(), baked, &mut models, (&mut evaluator, row), skip_damage)
-}
-
-/// The memory of splats as records of another size: as many as fit.
-fn records_in<S: bytemuck::Pod>(splats: &mut [Packed28]) -> Result<&mut [S], DecodeError> {
-    let words: &mut [u32] = bytemuck::try_cast_slice_mut(splats).map_err(|_| DecodeError::Internal)?;
-    let words_each = size_of::<S>().div_ceil(4).max(1);
-    let n_words = words.len() / words_each * words_each;
-    bytemuck::try_cast_slice_mut(words.get_mut(..n_words).unwrap_or_default()).map_err(|_| DecodeError::Internal)
 }

@@ -1,9 +1,10 @@
 //! Counting the Gaussians of a scene, for the writer of its bundle.
 
+use pocketsplat_format::bundle::MAX_TIERS;
+use pocketsplat_format::{Bundle, DecodeError};
+
 use super::bind;
 use crate::budget::{FrameShape, Placement, Regions, Resident, SceneMemory, ScratchShape};
-use crate::bundle::{Bundle, MAX_TIERS};
-use crate::error::DecodeError;
 
 /// Bytes of memory that [`count_gaussians`] takes.
 #[must_use]

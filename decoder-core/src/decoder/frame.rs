@@ -1,23 +1,26 @@
 //! Drawing a frame: strip after strip, slab after slab, tile after tile.
 
-use super::gather::{Admission, Frame};
-use super::notes::{Notes, StripsOfChunks};
+use core::fmt;
+
+use pocketsplat_format::rules::TILE_PX;
+use pocketsplat_format::{Camera, DecodeError, Field, Stage, Stopwatch, in_range, saturate};
+
+use super::first_come::FirstCome;
+use super::gather::{Frame, OverflowPolicy};
+use super::render_error::RenderError;
+use super::slab_index::IndexState;
 use super::splats::{Slab, SplatStore};
 use super::strip::{Strip, StripLayout};
-use super::tally::Tally;
-use super::tile::Tile;
-use super::{Decoder, FrameReport, TileSink};
+use super::strips_of_chunks::StripsOfChunks;
+use super::tile::{Tile, TileSink};
+use super::{Decoder, FrameReport};
 use crate::arithmetic::{Arithmetic, ReferenceArithmetic};
 use crate::budget::Overflow;
-use crate::camera::Camera;
-use crate::error::{DecodeError, Field, RenderError, in_range, saturate};
-use crate::project::{Packed28, TILE_PIXELS, TileRect, View};
-use crate::raster::{BlendRule, EMPTY, TilePlace, blend_tile, finish_tile};
-use crate::rules::TILE_PX;
-use crate::stopwatch::{Stage, Stopwatch};
+use crate::project::{TILE_PIXELS, TileRect, View};
+use crate::raster::{BlendRule, EMPTY, TileRegion, blend_tile, finish_tile};
 
-/// Strips of a frame that is worth notes of its chunks.
-const LEAST_STRIPS_NOTED: u8 = 3;
+/// Strips of a frame that is worth an index of its chunks.
+const LEAST_STRIPS_INDEXED: u8 = 3;
 
 /// A frame that comes tile by tile, each when it is asked for; made by [`Decoder::begin`].
 ///
@@ -25,12 +28,12 @@ const LEAST_STRIPS_NOTED: u8 = 3;
 ///
 /// ```
 /// # fn main() -> Result<(), pocketsplat_core::DecodeError> {
-/// # let bytes = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/bundle/example.psb"));
+/// # let bytes = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/example.psb"));
 /// # let mut scratch = [0; 8 * 1024];
-/// use pocketsplat_core::{Budget, Bundle, Decoder};
+/// use pocketsplat_core::{Budget, Bundle, Decoder, Plan};
 ///
 /// let bundle = Bundle::parse(bytes)?;
-/// let plan = bundle.plan(&Budget::for_frame(32, 24))?;
+/// let plan = Plan::new(&bundle, &Budget::for_frame(32, 24))?;
 /// let mut decoder = Decoder::bind(&bundle, plan, &mut scratch)?;
 /// let mut drawing = decoder.begin(&bundle.header().preview)?;
 /// let mut n_pixels = 0;
@@ -71,30 +74,22 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
         in_range(Field::FrameWidth, camera.width_px.into(), 1, budget.width_px.into())?;
         in_range(Field::FrameHeight, camera.height_px.into(), 1, budget.height_px.into())?;
         let strips = StripLayout::new(camera.height_px, self.plan.n_strips());
-        (self.splats.n_notes, self.splats.places_of_notes) = (0, 0);
-        let admission = if budget.overflow == Overflow::Slabs {
-            Admission::Slab
+        (self.splats.n_indexed, self.splats.places_of_index) = (0, 0);
+        let policy = if budget.overflow == Overflow::Slabs {
+            // Decoding costs most, and each of many passes would do it again. Of fewer the first costs more than the others save.
+            let is_indexed = strips.len() >= LEAST_STRIPS_INDEXED
+                && self.source.is_streamed()
+                && self.splats.begin_index(self.bundle.up_to_tier(self.plan.n_tiers()).n_chunks);
+            OverflowPolicy::Slabs { index: if is_indexed { IndexState::Due } else { IndexState::None } }
         } else if strips.len() > 1 && self.surely_fits(&view, strips) {
-            Admission::All
+            OverflowPolicy::Fits
         } else {
-            Admission::Tally(Tally::new(self.splats.places()))
+            let first_come = FirstCome::new(self.splats.places());
+            OverflowPolicy::FirstCome { first_come, strips_of_chunks: StripsOfChunks::NONE }
         };
-        let rule = BlendRule::new(budget.quality.alpha_cut, budget.quality.transmittance_stop);
-        // Decoding costs most, and each of many passes would do it again. Of fewer the first costs more than the others save.
-        let notes = matches!(admission, Admission::Slab)
-            && strips.len() >= LEAST_STRIPS_NOTED
-            && self.source.is_streamed()
-            && self.splats.take_notes(self.bundle.up_to_tier(self.plan.n_tiers()).n_chunks);
-        let notes = if notes { Notes::Due } else { Notes::None };
-        let mut frame = Frame {
-            view,
-            strips,
-            admission,
-            notes,
-            strips_of_chunks: StripsOfChunks::NONE,
-            report: FrameReport::default(),
-        };
-        if self.skip_damage && matches!(admission, Admission::Slab) {
+        let rule = BlendRule::new(budget.quality.alpha_cut);
+        let mut frame = Frame { view, strips, policy, report: FrameReport::default() };
+        if self.skips_damage() && matches!(frame.policy, OverflowPolicy::Slabs { .. }) {
             self.note_damage(&mut frame);
         }
         Ok(Drawing {
@@ -125,8 +120,8 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
     ) -> Result<FrameReport, RenderError<S::Error>> {
         watch.enter(Stage::Project);
         let mut drawing = self.begin_frame(camera)?;
-        while let Some(Tile { x_px, y_px, width, height, rgb }) = drawing.next_tile_watched(watch)? {
-            sink.tile(x_px, y_px, width, height, rgb).map_err(RenderError::Sink)?;
+        while let Some(tile) = drawing.next_tile_watched(watch)? {
+            sink.tile(tile).map_err(RenderError::Sink)?;
         }
         Ok(drawing.report())
     }
@@ -147,10 +142,7 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
     }
 
     /// As [`next_tile`](Self::next_tile), and tells `watch` where the work goes.
-    ///
-    /// # Errors
-    /// As for [`next_tile`](Self::next_tile).
-    pub fn next_tile_watched(&mut self, watch: &mut impl Stopwatch) -> Result<Option<Tile<'_>>, DecodeError> {
+    fn next_tile_watched(&mut self, watch: &mut impl Stopwatch) -> Result<Option<Tile<'_>>, DecodeError> {
         let place = loop {
             if u16::from(self.row) >= self.strip.end_row {
                 if !self.next_slab(watch)? {
@@ -164,7 +156,7 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
             }
         };
         watch.enter(Stage::Output);
-        let TilePlace { column, row, width, height } = place;
+        let TileRegion { column, row, width, height } = place;
         let [x_px, y_px] = [column, row].map(|index| u16::from(index) * TILE_PX);
         let rgb = self.decoder.rgb.get_mut(..usize::from(width) * usize::from(height)).unwrap_or_default();
         Ok(Some(Tile { x_px, y_px, width, height, rgb }))
@@ -174,13 +166,11 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
     #[must_use]
     pub fn report(&self) -> FrameReport {
         let mut report = self.frame.report;
-        if let Admission::Tally(tally) = self.frame.admission {
-            report.splats_dropped = report.splats_dropped.saturating_add(tally.n_dropped());
-            report.max_splats = report.max_splats.max(tally.max_demand());
+        if let OverflowPolicy::FirstCome { first_come, .. } = &self.frame.policy {
+            report.splats_dropped = report.splats_dropped.saturating_add(first_come.n_dropped());
+            report.max_splats = report.max_splats.max(first_come.max_demand());
         }
-        let bytes = (self.most_in_memory as usize).saturating_mul(size_of::<A::Splat>());
-        let places = saturate(bytes.div_ceil(size_of::<Packed28>()));
-        report.scratch_used = saturate(self.decoder.plan.len_with_splats(places));
+        report.scratch_used = saturate(self.decoder.plan.len_with_splats(self.most_in_memory));
         report
     }
 
@@ -199,21 +189,21 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
             self.slab.end
         } else {
             frame.report.strip_splats = frame.report.strip_splats.saturating_add(self.in_strip);
-            if !matches!(frame.admission, Admission::Tally(_)) {
+            if !matches!(frame.policy, OverflowPolicy::FirstCome { .. }) {
                 frame.report.max_splats = frame.report.max_splats.max(self.in_strip);
             }
             self.in_strip = 0;
             let Some(strip) = frame.strips.after(self.strip) else { return Ok(false) };
-            self.strip = match &frame.admission {
+            self.strip = match &frame.policy {
                 // What a damaged chunk would have made room for is gone.
-                Admission::Tally(_) if decoder.skip_damage => strip,
+                OverflowPolicy::FirstCome { .. } if decoder.skips_damage() => strip,
                 // The first pass goes over the whole scene anyway.
-                Admission::Tally(_) if strip.index == 0 => frame.strips.between(0, frame.strips.len()),
-                Admission::Tally(tally) => {
-                    let end = tally.end_of_those_with_room(strip.index).min(frame.strips.len());
+                OverflowPolicy::FirstCome { .. } if strip.index == 0 => frame.strips.between(0, frame.strips.len()),
+                OverflowPolicy::FirstCome { first_come, .. } => {
+                    let end = first_come.end_of_those_with_room(strip.index).min(frame.strips.len());
                     frame.strips.between(strip.index, end)
                 }
-                Admission::All | Admission::Slab => strip,
+                OverflowPolicy::Fits | OverflowPolicy::Slabs { .. } => strip,
             };
             0.0
         };
@@ -234,7 +224,7 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
             let n = decoder.splats.n;
             self.in_strip = self.in_strip.saturating_add(n);
             // There were more when it let go of some.
-            let most = n.max(decoder.splats.most).saturating_add(decoder.splats.places_of_notes);
+            let most = n.max(decoder.splats.most).saturating_add(decoder.splats.places_of_index);
             self.most_in_memory = most.max(self.most_in_memory);
             let rects = decoder.splats.rects.iter().take(n as usize);
             let n_first_here =
@@ -250,7 +240,7 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
     }
 
     /// Draws the slab's splats into the next tile, and finishes it if the slab is the strip's last.
-    fn draw_tile(&mut self, watch: &mut impl Stopwatch) -> Option<TilePlace> {
+    fn draw_tile(&mut self, watch: &mut impl Stopwatch) -> Option<TileRegion> {
         let [width_px, height_px] = self.size_px;
         let decoder = &mut *self.decoder;
         let SplatStore { splats, rects, n, order, spare, .. } = &mut decoder.splats;
@@ -262,7 +252,7 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
         }
         watch.enter(Stage::Blend);
         let (row, column) = (self.row, self.column);
-        let place = TilePlace { column, row, width: size_along(width_px, column), height: size_along(height_px, row) };
+        let place = TileRegion { column, row, width: size_along(width_px, column), height: size_along(height_px, row) };
         // One after the other, or all at once.
         let slot = if decoder.plan.shape().frame.canvas_tiles > 1 { self.n_tiles } else { 0 };
         let pixels = decoder.pixels.chunks_exact_mut(TILE_PIXELS).nth(slot)?;
@@ -270,7 +260,7 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
             pixels.fill(EMPTY);
         }
         let list = spare.get(..self.n_in_row)?;
-        let work = blend_tile::<A::Functions, _>(place, splats, rects, list, &self.rule, pixels);
+        let work = blend_tile::<A::Functions>(place, splats, rects, list, &self.rule, pixels);
         self.alive += work.alive;
         let report = &mut self.frame.report;
         report.tile_splats = report.tile_splats.saturating_add(work.splats);
@@ -289,6 +279,15 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
             self.row += 1;
         }
         Some(place)
+    }
+}
+
+impl<A: Arithmetic> fmt::Debug for Drawing<'_, '_, '_, A> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Drawing")
+            .field("size_px", &self.size_px)
+            .field("report", &self.report())
+            .finish_non_exhaustive()
     }
 }
 

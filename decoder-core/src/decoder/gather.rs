@@ -1,38 +1,41 @@
 //! From the anchors in view to the splats of one strip, or of a slab of its depth.
 
-use super::notes::{Notes, StripsOfChunks};
+use core::marker::PhantomData;
+
+use pocketsplat_format::bundle::{Chunk, Effects};
+use pocketsplat_format::{DecodeError, Stage, Stopwatch};
+
+use super::first_come::{FirstCome, splat_order};
+use super::slab_index::IndexState;
 use super::source::{AnchorSource, Anchors, GaussianSource};
 use super::splats::{Slab, SplatStore};
 use super::strip::{Strip, StripLayout};
-use super::tally::{Tally, place};
+use super::strips_of_chunks::StripsOfChunks;
 use super::{Decoder, FrameReport};
 use crate::arithmetic::Arithmetic;
 use crate::bake::BakedGaussian;
-use crate::bundle::{Chunk, Effects};
-use crate::error::DecodeError;
+use crate::functions::Functions;
 use crate::project::{Band, TileRect, View};
 use crate::scene::{Anchor, Gaussian, GaussianSink};
-use crate::stopwatch::{Stage, Stopwatch};
 
 /// The current frame.
 pub(super) struct Frame {
     pub(super) view: View,
     pub(super) strips: StripLayout,
-    pub(super) admission: Admission,
-    pub(super) notes: Notes,
-    pub(super) strips_of_chunks: StripsOfChunks,
+    pub(super) policy: OverflowPolicy,
     pub(super) report: FrameReport,
 }
 
 /// Which splats are drawn where there may not be places for all.
-#[derive(Clone, Copy)]
-pub(super) enum Admission {
+#[expect(clippy::large_enum_variant, reason = "a frame has one, and there is no allocator to box with")]
+pub(super) enum OverflowPolicy {
     /// All: each strip surely has places enough.
-    All,
-    /// Those that have a place in every strip; the first strip goes over the whole scene to find out which.
-    Tally(Tally),
+    Fits,
+    /// Those that have a place in every strip; the first strip goes over the whole scene to find out which, and which strips its chunks
+    /// lie in.
+    FirstCome { first_come: FirstCome, strips_of_chunks: StripsOfChunks },
     /// All, in slabs of depth, as many as it takes.
-    Slab,
+    Slabs { index: IndexState },
 }
 
 /// Going over the scene once, for a strip.
@@ -41,14 +44,14 @@ struct Pass {
     slab: Slab,
     /// What the pass can leave out; nothing when it goes over the whole scene.
     band: Option<Band>,
-    /// Whether it notes where splats lie.
-    takes_notes: bool,
+    /// Whether it makes the index of where splats lie.
+    makes_index: bool,
 }
 
 impl Pass {
     /// Also leaves out what lies beyond the slab.
     fn end_earlier(&mut self, view: &View) {
-        if self.takes_notes {
+        if self.makes_index {
             return;
         }
         let band = self.band.unwrap_or(Band::WHOLE);
@@ -56,11 +59,21 @@ impl Pass {
     }
 }
 
+impl OverflowPolicy {
+    /// Which splats were counted and admitted so far.
+    fn first_come(&self) -> Option<FirstCome> {
+        match self {
+            Self::FirstCome { first_come, .. } => Some(*first_come),
+            Self::Fits | Self::Slabs { .. } => None,
+        }
+    }
+}
+
 impl Frame {
     /// What the pass of a strip has to look at.
     fn band(&self, strip: Strip) -> Option<Band> {
         let whole = strip.end_row - strip.first_row == self.strips.n_rows()
-            || (strip.index == 0 && matches!(self.admission, Admission::Tally(_)));
+            || (strip.index == 0 && matches!(self.policy, OverflowPolicy::FirstCome { .. }));
         (!whole).then(|| self.view.band(self.strips.pixels(strip)))
     }
 
@@ -108,7 +121,7 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
             GaussianSource::Anchors(Anchors { source: AnchorSource::Resident(records), .. }) => {
                 !records.is_damaged(chunk.index())
             }
-            GaussianSource::Anchors(_) => !self.skip_damage || chunk.check().is_ok(),
+            GaussianSource::Anchors(_) => !self.skips_damage() || chunk.check().is_ok(),
         }
     }
 
@@ -124,26 +137,28 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
         watch: &mut impl Stopwatch,
     ) -> Result<Slab, DecodeError> {
         (self.splats.n, self.splats.most) = (0, 0);
-        let mut pass = Pass { strip: *strip, slab: Slab::behind(from), band: frame.band(*strip), takes_notes: false };
-        let before = frame.notes;
-        if before == Notes::Taken {
+        let mut pass = Pass { strip: *strip, slab: Slab::behind(from), band: frame.band(*strip), makes_index: false };
+        let is_indexed = matches!(frame.policy, OverflowPolicy::Slabs { index: IndexState::Made });
+        if is_indexed {
             pass.slab.end = self.splats.end_of_slab(*strip, from);
         }
         if from > 0.0 || pass.slab.ends() {
             pass.end_earlier(&frame.view);
         }
-        if before == Notes::Due {
-            (frame.notes, pass.band, pass.takes_notes) = (Notes::Taken, None, true);
+        if let OverflowPolicy::Slabs { index: index @ IndexState::Due } = &mut frame.policy {
+            (*index, pass.band, pass.makes_index) = (IndexState::Made, None, true);
         }
         let decodes = u8::from(self.source.is_streamed());
         frame.report.decode_passes = frame.report.decode_passes.saturating_add(decodes);
         for (chunk, first_anchor) in self.planned_chunks() {
             watch.enter(Stage::Project);
-            let may_lie_here = match frame.admission {
-                Admission::Slab if before == Notes::Taken => {
+            let may_lie_here = match &frame.policy {
+                OverflowPolicy::Slabs { .. } if is_indexed => {
                     self.splats.may_lie_in(chunk.index(), pass.strip, &pass.slab)
                 }
-                Admission::Tally(_) if strip.index > 0 => frame.strips_of_chunks.may_lie_in(chunk.index(), pass.strip),
+                OverflowPolicy::FirstCome { strips_of_chunks, .. } if strip.index > 0 => {
+                    strips_of_chunks.may_lie_in(chunk.index(), pass.strip)
+                }
                 _ => true,
             };
             let ink_box = chunk.ink_box();
@@ -167,19 +182,20 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
         watch: &mut impl Stopwatch,
     ) -> Result<(), DecodeError> {
         watch.enter(Stage::Decode);
-        let in_slabs = matches!(frame.admission, Admission::Slab);
-        let (n_splats, admission, before) = (self.splats.n, frame.admission, frame.report);
+        // What its splats displaced is gone when strips are drawn in slabs.
+        let can_undo = self.skips_damage() && !matches!(frame.policy, OverflowPolicy::Slabs { .. });
+        let before = can_undo.then(|| (self.splats.n, frame.policy.first_come(), frame.report));
         if self.is_sound(chunk) {
             match self.gather_chunk(chunk, first_anchor, pass, frame, watch) {
-                // What its splats displaced is gone when strips are drawn in slabs.
-                Err(DecodeError::ChunkStream { .. }) if self.skip_damage && !in_slabs => {}
+                Err(DecodeError::ChunkStream { .. }) if can_undo => {}
                 result => return result,
             }
         }
-        if in_slabs {
-            return Ok(());
+        let Some((n_splats, admitted, report)) = before else { return Ok(()) };
+        (self.splats.n, frame.report) = (n_splats, report);
+        if let (OverflowPolicy::FirstCome { first_come, .. }, Some(admitted)) = (&mut frame.policy, admitted) {
+            *first_come = admitted;
         }
-        (self.splats.n, frame.admission, frame.report) = (n_splats, admission, before);
         // Once a frame.
         let mut earlier = frame.strips.iter().take(pass.strip.index.into());
         if !earlier.any(|strip| frame.needs(strip, chunk)) {
@@ -200,24 +216,25 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
         watch: &mut impl Stopwatch,
     ) -> Result<(), DecodeError> {
         let Self { bundle, source, splats, .. } = self;
-        let Frame { view, strips, admission, report, strips_of_chunks, .. } = frame;
+        let Frame { view, strips, policy, report } = frame;
         let header = bundle.header();
         let effects = header.features.effects;
-        let keeper = Keeper::<A> { view, strips, admission, pass, splats, chunk: chunk.index(), strips_of_chunks };
+        let splats = SplatCollector { view, strips, policy, pass, splats, chunk: chunk.index() };
         // As if its Gaussians were baked, which know nothing of the anchor's extent.
         let as_baked = bundle.n_gaussians(0).is_some();
-        let mut gathering = Gathering { keeper, report, effects, as_baked };
+        let mut gaussians =
+            GaussianCollector { splats, report, effects, as_baked, functions: PhantomData::<A::Functions> };
         let Anchors { source, row, evaluator } = match source {
             GaussianSource::Anchors(anchors) => anchors,
             // Unreachable without the feature; this arm drops the code.
             GaussianSource::Baked(_) if !cfg!(feature = "baked") => return Err(DecodeError::Internal),
             GaussianSource::Baked(baked) => {
                 watch.enter(Stage::Project);
-                let Gathering { keeper, report, .. } = &mut gathering;
+                let GaussianCollector { splats, report, .. } = &mut gaussians;
                 report.gaussians = report.gaussians.saturating_add(baked.n_of_chunk(chunk.index()));
                 for (number, gaussian) in baked.of_chunk(chunk.index(), effects) {
-                    if keeper.pass.band.is_none_or(|band| band.sees_gaussian(&gaussian)) {
-                        keeper.project(number, &gaussian, effects);
+                    if splats.pass.band.is_none_or(|band| band.sees_gaussian(&gaussian)) {
+                        splats.project::<A::Functions>(number, &gaussian, effects);
                     }
                 }
                 return Ok(());
@@ -225,11 +242,11 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
         };
         let n_scalars = u32::from(header.feature_dim) + u32::from(header.n_log_scales());
         let decoded = u32::from(!source.is_resident());
-        gathering.report.chunks_decoded = gathering.report.chunks_decoded.saturating_add(decoded);
-        evaluator.forget();
+        gaussians.report.chunks_decoded = gaussians.report.chunks_decoded.saturating_add(decoded);
+        evaluator.discard_waiting();
         source.for_each(chunk, first_anchor, row, watch, |number, site, row, watch| {
             watch.enter(Stage::Project);
-            let Gathering { keeper, report, .. } = &mut gathering;
+            let GaussianCollector { splats, report, .. } = &mut gaussians;
             report.anchors_read = report.anchors_read.saturating_add(1);
             report.anchors_decoded = report.anchors_decoded.saturating_add(decoded);
             let n_channels = 3 * site.mask.count_ones() + n_scalars;
@@ -242,36 +259,37 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
             } else {
                 view.sees_anchor(position, anchor.extent)
             };
-            if !is_seen || keeper.pass.band.as_ref().is_some_and(|band| !band.sees_anchor(&anchor)) {
+            if !is_seen || splats.pass.band.as_ref().is_some_and(|band| !band.sees_anchor(&anchor)) {
                 return Ok(());
             }
             report.anchors_visible = report.anchors_visible.saturating_add(1);
-            evaluator.visit::<A::Functions>(number, &anchor, (effects, view.eye), watch, &mut gathering);
+            evaluator.visit::<A::Functions>(number, &anchor, (effects, view.eye), watch, &mut gaussians);
             Ok(())
         })?;
-        evaluator.finish::<A::Functions>(effects, watch, &mut gathering);
+        evaluator.finish::<A::Functions>(effects, watch, &mut gaussians);
         Ok(())
     }
 }
 
 /// Keeps the splats of anchors.
-struct Gathering<'f, 's, A: Arithmetic> {
-    keeper: Keeper<'f, 's, A>,
+struct GaussianCollector<'f, 's, F> {
+    splats: SplatCollector<'f, 's>,
     report: &'f mut FrameReport,
     effects: Effects,
     /// Whether Gaussians are rounded as baked ones are.
     as_baked: bool,
+    functions: PhantomData<F>,
 }
 
-impl<A: Arithmetic> GaussianSink for Gathering<'_, '_, A> {
+impl<F: Functions> GaussianSink for GaussianCollector<'_, '_, F> {
     fn gaussian(&mut self, anchor: u32, offset: usize, gaussian: &Gaussian) {
         self.report.gaussians = self.report.gaussians.saturating_add(1);
-        let place = place(anchor, offset);
+        let order = splat_order(anchor, offset);
         // The first half drops the code where no scene is such.
         if cfg!(feature = "baked") && self.as_baked {
-            self.keeper.project(place, &BakedGaussian::rounded(gaussian, self.effects), self.effects);
+            self.splats.project::<F>(order, &BakedGaussian::rounded(gaussian, self.effects), self.effects);
         } else {
-            self.keeper.project(place, gaussian, self.effects);
+            self.splats.project::<F>(order, gaussian, self.effects);
         }
     }
 
@@ -281,37 +299,36 @@ impl<A: Arithmetic> GaussianSink for Gathering<'_, '_, A> {
 }
 
 /// Projects Gaussians and keeps the splats that a pass draws.
-struct Keeper<'f, 's, A: Arithmetic> {
+struct SplatCollector<'f, 's> {
     view: &'f View,
     strips: &'f StripLayout,
-    admission: &'f mut Admission,
+    policy: &'f mut OverflowPolicy,
     pass: &'f mut Pass,
-    splats: &'f mut SplatStore<'s, A::Splat>,
+    splats: &'f mut SplatStore<'s>,
     chunk: u32,
-    strips_of_chunks: &'f mut StripsOfChunks,
 }
 
-impl<A: Arithmetic> Keeper<'_, '_, A> {
-    /// * `place`: ascends in the order of the file.
-    fn project(&mut self, place: u32, gaussian: &Gaussian, effects: Effects) {
-        let Some((mut splat, rect)) = self.view.project::<A::Functions>(gaussian, effects) else { return };
+impl SplatCollector<'_, '_> {
+    /// * `order`: ascends in the order of the file.
+    fn project<F: Functions>(&mut self, order: u32, gaussian: &Gaussian, effects: Effects) {
+        let Some((mut splat, rect)) = self.view.project::<F>(gaussian, effects) else { return };
         let touched = self.strips.touched(rect);
         let index = self.pass.strip.index;
         let lies_here = *touched.end() >= index.into() && *touched.start() < self.pass.strip.end_index.into();
-        let drawn = match self.admission {
-            Admission::All => true,
-            Admission::Tally(tally) if index == 0 => {
-                self.strips_of_chunks.add(self.chunk, touched.clone());
-                tally.admit(place, touched)
+        let drawn = match self.policy {
+            OverflowPolicy::Fits => true,
+            OverflowPolicy::FirstCome { first_come, strips_of_chunks } if index == 0 => {
+                strips_of_chunks.add(self.chunk, touched.clone());
+                first_come.admit(order, touched)
             }
-            Admission::Tally(tally) => tally.admits(place),
-            Admission::Slab => {
+            OverflowPolicy::FirstCome { first_come, .. } => first_come.admits(order),
+            OverflowPolicy::Slabs { .. } => {
                 // No slab ends behind an infinite depth.
                 if splat.depth > f32::MAX {
                     splat.depth = f32::MAX;
                 }
-                if self.pass.takes_notes {
-                    self.splats.note(self.chunk, splat.depth, touched);
+                if self.pass.makes_index {
+                    self.splats.add_to_index(self.chunk, splat.depth, touched);
                 }
                 if lies_here {
                     let end = self.pass.slab.end;

@@ -8,13 +8,14 @@ use crate::budget::Work;
 /// splats and pixels do not depend on strips.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct FrameReport {
     /// Times the chunks in view were decoded: once a pass, or a slab of a strip, never when the anchors are resident.
     pub decode_passes: u8,
     /// Chunks decoded: those whose ink box the camera sees.
     pub chunks_decoded: u32,
-    /// Different damaged chunks in view, which were left out; always 0 unless bound with
-    /// [`Decoder::bind_skipping_damage`](crate::Decoder::bind_skipping_damage).
+    /// Different damaged chunks in view, which were left out; always 0 unless the budget is
+    /// [`skipping_damage`](crate::Budget::skipping_damage).
     pub chunks_damaged: u32,
     /// The first of them.
     pub first_damaged: Option<u32>,
@@ -37,8 +38,7 @@ pub struct FrameReport {
     pub splats_dropped: u32,
     /// Slabs of depth drawn, or passes where there were places for all splats of a strip.
     pub slabs: u32,
-    /// Splats of the fullest strip, those left out included; the number to plan for, where splats are
-    /// [`Wide`](crate::arithmetic::Wide) 10/7 of it. In slabs those drawn before nothing more could be seen.
+    /// Splats of the fullest strip, those left out included; the number to plan for. In slabs those drawn before nothing more could be seen.
     pub max_splats: u32,
     /// Splats of all passes together, one that lies in two counted twice.
     pub strip_splats: u32,

@@ -1,33 +1,14 @@
 //! A row of tiles as a display takes it: 16 whole lines of pixels, one behind the other.
 
+use pocketsplat_format::{DecodeError, Field, saturate};
+
 use super::frame::Drawing;
-use super::tile::{ByteOrder, Rounding};
+use super::pixel_format::PixelFormat;
 use crate::arithmetic::Arithmetic;
-use crate::error::{DecodeError, Field, saturate};
-
-/// What the bytes of a pixel are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum PixelFormat {
-    /// Three bytes: red, green, blue.
-    Rgb888,
-    /// Two bytes: five bits of red, six of green, five of blue.
-    Rgb565(ByteOrder, Rounding),
-}
-
-impl PixelFormat {
-    /// Bytes of a pixel.
-    #[must_use]
-    pub const fn bytes_per_pixel(self) -> usize {
-        match self {
-            Self::Rgb888 => 3,
-            Self::Rgb565(..) => 2,
-        }
-    }
-}
 
 /// A finished row of tiles.
 #[derive(Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct TileRow<'p> {
     /// Its first column, pixels; 0 unless tiles of this row were asked for before.
     pub x_px: u16,
@@ -52,13 +33,13 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
     ///
     /// ```
     /// # fn main() -> Result<(), pocketsplat_core::DecodeError> {
-    /// # let bytes = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/src/bundle/example.psb"));
+    /// # let bytes = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/example.psb"));
     /// # let mut scratch = [0; 8 * 1024];
-    /// use pocketsplat_core::{Budget, Bundle, ByteOrder, Decoder, PixelFormat, Rounding};
+    /// use pocketsplat_core::{Budget, Bundle, ByteOrder, Decoder, PixelFormat, Plan, Rounding};
     ///
     /// let format = PixelFormat::Rgb565(ByteOrder::BigEndian, Rounding::Dithered);
     /// let bundle = Bundle::parse(bytes)?;
-    /// let plan = bundle.plan(&Budget::for_frame(32, 24))?;
+    /// let plan = Plan::new(&bundle, &Budget::for_frame(32, 24))?;
     /// let mut decoder = Decoder::bind(&bundle, plan, &mut scratch)?;
     /// let mut drawing = decoder.begin(&bundle.header().preview)?;
     /// let mut buffers = [[0; 16 * 32 * 2]; 2];
@@ -95,10 +76,7 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
             let is_last = tile.x_px + tile.width >= x_px + width;
             let start = usize::from(tile.x_px - x_px) * bytes_per_pixel;
             let len = usize::from(tile.width) * bytes_per_pixel;
-            let packed = match format {
-                PixelFormat::Rgb888 => tile.rgb.as_flattened_mut(),
-                PixelFormat::Rgb565(order, rounding) => tile.into_rgb565(order, rounding),
-            };
+            let packed = tile.into_bytes(format);
             for (line, from) in bytes.chunks_exact_mut(line_len.max(1)).zip(packed.chunks_exact(len.max(1))) {
                 let line = line.get_mut(start..start + len).unwrap_or_default();
                 // Byte by byte this would take three instructions each.

@@ -1,11 +1,11 @@
 //! Where a frame's Gaussians come from: anchors decoded again or kept in memory, or Gaussians kept in memory.
 
+use pocketsplat_format::bundle::{AnchorModels, AnchorRecords, AnchorSite, Chunk};
+use pocketsplat_format::{DecodeError, Stage, Stopwatch};
+
 use crate::bake::BakedGaussians;
-use crate::bundle::{AnchorModels, AnchorRecords, AnchorSite, Chunk};
-use crate::error::DecodeError;
 use crate::mlp::HeadFormat;
 use crate::scene::Evaluator;
-use crate::stopwatch::{Stage, Stopwatch};
 
 /// The scene of the planned tiers.
 #[expect(clippy::large_enum_variant, reason = "a decoder has one, and there is no allocator to box with")]

@@ -2,22 +2,23 @@
 
 use core::ops::RangeInclusive;
 
-use super::notes::{ChunkNote, DepthCounts};
+use pocketsplat_format::saturate;
+
+use super::slab_index::{ChunkExtent, DepthCounts};
 use super::strip::Strip;
-use crate::error::saturate;
-use crate::project::{Splat, SplatRecord, TileRect};
+use crate::project::{PackedSplat, Splat, TileRect};
 use crate::raster::sort_by_depth;
 
 /// The splats of the current strip, or of a slab of its depth, in the order of the file.
-pub(super) struct SplatStore<'s, S> {
-    pub(super) splats: &'s mut [S],
+pub(super) struct SplatStore<'s> {
+    pub(super) splats: &'s mut [PackedSplat],
     pub(super) rects: &'s mut [TileRect],
     pub(super) n: u32,
     /// The most that there were in this pass, before it let go of some.
     pub(super) most: u32,
-    /// Chunks with a note, and the last places, which the notes take.
-    pub(super) n_notes: u32,
-    pub(super) places_of_notes: u32,
+    /// Chunks in the index, and the last places, which the index takes.
+    pub(super) n_indexed: u32,
+    pub(super) places_of_index: u32,
     pub(super) order: &'s mut [u32],
     pub(super) spare: &'s mut [u32],
     pub(super) counts: &'s mut [u32],
@@ -45,68 +46,69 @@ impl Slab {
     }
 }
 
-impl<S: SplatRecord> SplatStore<'_, S> {
+impl SplatStore<'_> {
     /// Splats that there is memory for.
     pub(super) fn places(&self) -> u32 {
-        saturate(self.splats.len()).saturating_sub(self.places_of_notes)
+        saturate(self.splats.len()).saturating_sub(self.places_of_index)
     }
 
-    /// Makes room for notes of so many chunks, without any splat, where that takes few places; returns whether it did.
+    /// Makes room for an index of so many chunks, without any splat, where that takes few places; returns whether it did.
     // Not inlined, here and below: few calls, or next to much else.
     #[inline(never)]
-    pub(super) fn take_notes(&mut self, n_chunks: u32) -> bool {
-        let len = (n_chunks as usize).saturating_mul(size_of::<ChunkNote>()).saturating_add(size_of::<DepthCounts>());
-        let places = len.div_ceil(size_of::<S>().max(1));
+    pub(super) fn begin_index(&mut self, n_chunks: u32) -> bool {
+        let len = (n_chunks as usize).saturating_mul(size_of::<ChunkExtent>()).saturating_add(size_of::<DepthCounts>());
+        let places = len.div_ceil(size_of::<PackedSplat>());
         if places > self.splats.len() / 4 {
             return false;
         }
-        (self.n_notes, self.places_of_notes) = (n_chunks, saturate(places));
-        let Some((counts, notes)) = self.notes() else { return false };
+        (self.n_indexed, self.places_of_index) = (n_chunks, saturate(places));
+        let Some((counts, extents)) = self.index() else { return false };
         counts.clear();
-        notes.fill(ChunkNote::NOWHERE);
+        extents.fill(ChunkExtent::NOWHERE);
         true
     }
 
-    /// Notes a splat of a chunk.
+    /// Takes a splat of a chunk into the index.
     #[inline(never)]
-    pub(super) fn note(&mut self, chunk: u32, depth: f32, strips: RangeInclusive<usize>) {
-        let Some((counts, notes)) = self.notes() else { return };
+    pub(super) fn add_to_index(&mut self, chunk: u32, depth: f32, strips: RangeInclusive<usize>) {
+        let Some((counts, extents)) = self.index() else { return };
         counts.add(depth, strips.clone());
-        if let Some(note) = notes.get_mut(chunk as usize) {
-            note.add(depth, strips);
+        if let Some(extent) = extents.get_mut(chunk as usize) {
+            extent.add(depth, strips);
         }
     }
 
     /// Whether a chunk may have a splat in a slab of a strip.
     #[inline(never)]
     pub(super) fn may_lie_in(&mut self, chunk: u32, strip: Strip, slab: &Slab) -> bool {
-        let note = self.notes().and_then(|(_, notes)| notes.get(chunk as usize));
-        note.is_none_or(|note| note.may_lie_in(strip, slab.from..slab.end))
+        let extent = self.index().and_then(|(_, extents)| extents.get(chunk as usize));
+        extent.is_none_or(|extent| extent.may_lie_in(strip, slab.from..slab.end))
     }
 
     /// Where a slab of a strip from depth `from` on ends, so that there is a place for each of its splats.
     #[inline(never)]
     pub(super) fn end_of_slab(&mut self, strip: Strip, from: f32) -> f32 {
         let places = self.places();
-        self.notes().map_or(f32::INFINITY, |(counts, _)| counts.end_of_slab(strip, from, places))
+        self.index().map_or(f32::INFINITY, |(counts, _)| counts.end_of_slab(strip, from, places))
     }
 
-    /// How many splats there are at which depth, and `[n_chunks]` notes; where there are such.
+    /// How many splats there are at which depth, and `[n_chunks]` extents; where there are such.
     #[inline(never)]
-    fn notes(&mut self) -> Option<(&mut DepthCounts, &mut [ChunkNote])> {
+    fn index(&mut self) -> Option<(&mut DepthCounts, &mut [ChunkExtent])> {
         let places = self.places() as usize;
         let words: &mut [u32] = bytemuck::try_cast_slice_mut(self.splats.get_mut(places..)?).ok()?;
         let (counts, words) = words.split_at_mut_checked(size_of::<DepthCounts>() / size_of::<u32>())?;
-        let notes = words.get_mut(..(self.n_notes as usize).checked_mul(size_of::<ChunkNote>() / size_of::<u32>())?)?;
+        let extents =
+            words.get_mut(..(self.n_indexed as usize).checked_mul(size_of::<ChunkExtent>() / size_of::<u32>())?)?;
         let counts: &mut [DepthCounts] = bytemuck::try_cast_slice_mut(counts).ok()?;
-        Some((counts.first_mut()?, bytemuck::try_cast_slice_mut(notes).ok()?))
+        Some((counts.first_mut()?, bytemuck::try_cast_slice_mut(extents).ok()?))
     }
 
     /// Keeps a splat; the caller has counted that there is a place.
     pub(super) fn push(&mut self, splat: &Splat, rect: TileRect) {
         let slot = self.n as usize;
         if let (Some(splat_slot), Some(rect_slot)) = (self.splats.get_mut(slot), self.rects.get_mut(slot)) {
-            *splat_slot = S::new(splat);
+            *splat_slot = PackedSplat::new(splat);
             *rect_slot = rect;
             self.n = self.n.saturating_add(1);
         }
@@ -158,7 +160,7 @@ impl<S: SplatRecord> SplatStore<'_, S> {
         let splats = self.splats.get(..n)?;
         let (order, spare) = (self.order.get_mut(..n)?, self.spare.get_mut(..n)?);
         let (order, _) = sort_by_depth(splats, order, spare, self.counts);
-        let depth_of = |index: &u32| splats.get(*index as usize).map_or(0.0, SplatRecord::depth);
+        let depth_of = |index: &u32| splats.get(*index as usize).map_or(0.0, PackedSplat::depth);
         let nearest = order.first().map_or(depth, depth_of);
         let nearest = if depth < nearest { depth } else { nearest };
         let mut later = order.get(n - n.div_ceil(8)..).unwrap_or_default().iter().map(depth_of);
@@ -182,7 +184,7 @@ impl<S: SplatRecord> SplatStore<'_, S> {
     }
 
     /// Keeps some of the splats, in their order.
-    fn retain(&mut self, keeps: impl Fn(&S, &TileRect) -> bool) {
+    fn retain(&mut self, keeps: impl Fn(&PackedSplat, &TileRect) -> bool) {
         self.most = self.most.max(self.n);
         let mut n_kept = 0;
         for i in 0..self.n as usize {
@@ -210,7 +212,7 @@ mod tests {
     use bytemuck::Zeroable;
 
     use super::{Slab, SplatStore};
-    use crate::project::{Packed28, Splat, SplatRecord, TileRect};
+    use crate::project::{PackedSplat, Splat, TileRect};
     use crate::raster::N_RADIX;
 
     const RECT: TileRect = TileRect { first_column: 0, last_column: 0, first_row: 0, last_row: 0 };
@@ -232,12 +234,12 @@ mod tests {
         let (mut slabs, mut n_dropped, mut from) = (Vec::new(), 0, 0.0);
         loop {
             let mut store = SplatStore {
-                splats: &mut std::vec![Packed28::zeroed(); n_places],
+                splats: &mut std::vec![PackedSplat::zeroed(); n_places],
                 rects: &mut std::vec![RECT; n_places],
                 n: 0,
                 most: 0,
-                n_notes: 0,
-                places_of_notes: 0,
+                n_indexed: 0,
+                places_of_index: 0,
                 order: &mut std::vec![0; n_places],
                 spare: &mut std::vec![0; n_places],
                 counts: &mut [0; N_RADIX],
@@ -250,7 +252,7 @@ mod tests {
             if slab.ends() {
                 assert_eq!(store.most as usize, n_places, "it was full when it let go of some");
             }
-            slabs.push(store.splats.iter().take(store.n as usize).map(SplatRecord::depth).collect());
+            slabs.push(store.splats.iter().take(store.n as usize).map(PackedSplat::depth).collect());
             if !slab.ends() {
                 return (slabs, n_dropped);
             }

@@ -2,8 +2,9 @@
 
 use core::ops::RangeInclusive;
 
+use pocketsplat_format::rules::TILE_PX;
+
 use crate::project::TileRect;
-use crate::rules::TILE_PX;
 
 /// How a frame is cut into strips of whole rows of tiles.
 #[derive(Clone, Copy, Debug)]
@@ -25,6 +26,17 @@ pub(super) struct Strip {
 impl Strip {
     /// The one that the first comes after.
     pub(super) const BEFORE: Self = Self { index: 0, end_index: 0, first_row: 0, end_row: 0 };
+
+    /// The bits of its strips.
+    pub(super) fn bits(self) -> u32 {
+        strip_bits(self.index.into()..=self.end_index.saturating_sub(1).into())
+    }
+}
+
+/// Bit i for each strip i of some that lie one below the other; a frame has 8 at most.
+pub(super) fn strip_bits(strips: RangeInclusive<usize>) -> u32 {
+    let (first, last) = (*strips.start() as u32, *strips.end() as u32);
+    2_u32.wrapping_shl(last).wrapping_sub(1_u32.wrapping_shl(first))
 }
 
 impl StripLayout {
@@ -77,7 +89,7 @@ impl StripLayout {
 mod tests {
     use std::vec::Vec;
 
-    use super::StripLayout;
+    use super::{StripLayout, strip_bits};
     use crate::project::TileRect;
 
     #[test]
@@ -96,6 +108,11 @@ mod tests {
                 assert_eq!(next_px, height_px, "in {n_strips}");
             }
         }
+    }
+
+    #[test]
+    fn the_first_and_the_last_strip_are_among_the_bits() {
+        assert_eq!((strip_bits(0..=7), strip_bits(3..=3)), (0xFF, 8));
     }
 
     #[test]

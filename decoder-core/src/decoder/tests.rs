@@ -4,13 +4,13 @@ use core::convert::Infallible;
 use std::vec;
 use std::vec::Vec;
 
-use super::{ByteOrder, Decoder, PixelFormat, Rounding, Tile, TileRow, TileSink};
-use crate::budget::{Budget, MAX_FRAME_PX, MaxSplats, Overflow, Residency, Strips};
-use crate::bundle::Bundle;
-use crate::camera::{Camera, Rotation};
-use crate::error::{DecodeError, ErrorClass, Field, RenderError};
+use pocketsplat_format::{Bundle, Camera, DecodeError, ErrorClass, Field, Rotation};
 
-const EXAMPLE: &[u8] = include_bytes!("../bundle/example.psb");
+use super::render_error::RenderError;
+use super::{ByteOrder, Decoder, PixelFormat, Rounding, Tile, TileRow, TileSink};
+use crate::budget::{Budget, MaxSplats, Overflow, Plan, Residency, Strips};
+
+const EXAMPLE: &[u8] = include_bytes!("../../examples/example.psb");
 
 /// Counts pixels, keeps where each tile begins, and refuses one tile.
 #[derive(Default)]
@@ -24,7 +24,8 @@ struct Tally {
 impl TileSink for Tally {
     type Error = &'static str;
 
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) -> Result<(), &'static str> {
+    fn tile(&mut self, tile: Tile<'_>) -> Result<(), &'static str> {
+        let Tile { x_px, y_px, width, height, rgb } = tile;
         assert_eq!(rgb.len(), usize::from(width) * usize::from(height), "the tile at ({x_px}, {y_px})");
         let refused = self.refused == Some(self.corners.len());
         self.corners.push([x_px, y_px]);
@@ -39,7 +40,7 @@ fn example() -> Bundle<'static> {
 
 fn draw(budget: &Budget, camera: &Camera, refused: Option<usize>) -> (Tally, Result<u32, RenderError<&'static str>>) {
     let bundle = example();
-    let plan = bundle.plan(budget).expect("a plan");
+    let plan = Plan::new(&bundle, budget).expect("a plan");
     let mut scratch = vec![0; plan.scratch_len()];
     let mut tally = Tally { refused, ..Tally::default() };
     let mut decoder = Decoder::bind(&bundle, plan, &mut scratch).expect("planned memory");
@@ -56,7 +57,7 @@ fn draw(budget: &Budget, camera: &Camera, refused: Option<usize>) -> (Tally, Res
 #[test]
 fn frames_of_the_largest_size_are_drawn_and_larger_ones_refused() {
     let preview = example().header().preview;
-    let largest = MAX_FRAME_PX;
+    let largest = Budget::MAX_FRAME_PX;
     for [width_px, height_px] in
         [[largest, 1], [largest - 15, 17], [largest - 16, 16], [1, largest], [largest, largest]]
     {
@@ -82,7 +83,7 @@ fn frames_of_the_largest_size_are_drawn_and_larger_ones_refused() {
         (Field::FrameHeight, Budget::for_frame(1, largest + 1)),
     ] {
         let expected = DecodeError::OutOfRange { field, found: 4081, limit: 4080 };
-        assert_eq!(example().plan(&budget), Err(expected));
+        assert_eq!(Plan::new(&example(), &budget), Err(expected));
     }
 }
 
@@ -93,8 +94,8 @@ struct Tiles(Vec<([u16; 4], Vec<[u8; 3]>)>);
 impl TileSink for Tiles {
     type Error = Infallible;
 
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
-        self.0.push(([x_px, y_px, width, height], rgb.to_vec()));
+    fn tile(&mut self, tile: Tile<'_>) -> Result<(), Infallible> {
+        self.0.push(([tile.x_px, tile.y_px, tile.width, tile.height], tile.rgb.to_vec()));
         Ok(())
     }
 }
@@ -107,7 +108,7 @@ fn tiles_that_are_asked_for_are_those_that_a_sink_gets() {
     let few = frame.with_max_splats(MaxSplats::AtMost(3));
     for n_strips in [1, 2, 8] {
         for budget in [frame, few, few.with_overflow(Overflow::Slabs)] {
-            let plan = bundle.plan(&budget.with_strips(Strips::Exactly(n_strips))).expect("a plan");
+            let plan = Plan::new(&bundle, &budget.with_strips(Strips::Exactly(n_strips))).expect("a plan");
             let mut scratch = vec![0; plan.scratch_len()];
             let mut decoder = Decoder::bind(&bundle, plan, &mut scratch).expect("planned memory");
             let mut expected = Tiles::default();
@@ -119,7 +120,7 @@ fn tiles_that_are_asked_for_are_those_that_a_sink_gets() {
                 while found.0.len() < n_tiles
                     && let Some(tile) = drawing.next_tile().expect("drawn")
                 {
-                    found.tile(tile.x_px, tile.y_px, tile.width, tile.height, tile.rgb).expect("kept");
+                    found.tile(tile).expect("kept");
                 }
                 assert!(found.0 == expected.0[..n_tiles], "{n_strips} strips, {budget:?}: the first {n_tiles} tiles");
                 if n_tiles == 35 {
@@ -149,7 +150,7 @@ fn rows_of_tiles_are_the_lines_of_the_frame() {
     let frame = Budget::for_frame(width, height);
     let in_slabs = frame.with_max_splats(MaxSplats::AtMost(3)).with_overflow(Overflow::Slabs);
     for budget in [frame, frame.with_strips(Strips::Exactly(8)), in_slabs, in_slabs.with_strips(Strips::Exactly(2))] {
-        let plan = bundle.plan(&budget).expect("a plan");
+        let plan = Plan::new(&bundle, &budget).expect("a plan");
         let mut scratch = vec![0; plan.scratch_len()];
         let mut decoder = Decoder::bind(&bundle, plan, &mut scratch).expect("planned memory");
         let mut tiles = Tiles::default();
@@ -162,14 +163,9 @@ fn rows_of_tiles_are_the_lines_of_the_frame() {
             }
         }
         for format in FORMATS {
-            let expected = match format {
-                PixelFormat::Rgb888 => rgb.as_flattened().to_vec(),
-                // The pattern of one large tile is that of all small ones.
-                PixelFormat::Rgb565(order, rounding) => {
-                    let whole = Tile { x_px: 0, y_px: 0, width, height, rgb: &mut rgb.clone() };
-                    whole.into_rgb565(order, rounding).to_vec()
-                }
-            };
+            // The pattern of one large tile is that of all small ones.
+            let mut expected = rgb.clone();
+            let expected = Tile { x_px: 0, y_px: 0, width, height, rgb: &mut expected }.into_bytes(format);
             // So many single tiles before each row.
             for n_single in [0, 1, 6, 8] {
                 let mut drawing = decoder.begin(&camera).expect("a sound camera");
@@ -180,7 +176,7 @@ fn rows_of_tiles_are_the_lines_of_the_frame() {
                         drawing.next_tile().expect("drawn");
                     }
                     let Some(row) = drawing.next_tile_row(format, &mut buffer).expect("drawn") else { break };
-                    assert!(*row.bytes == lines_of(&expected, width.into(), &row), "{budget:?}, {format:?}: {row:?}");
+                    assert!(*row.bytes == lines_of(expected, width.into(), &row), "{budget:?}, {format:?}: {row:?}");
                     places.push([row.x_px, row.y_px, row.width, row.height]);
                 }
                 let row = |x_px, y_px| [x_px, y_px, width - x_px, 16.min(height - y_px)];
@@ -209,7 +205,7 @@ const FORMATS: [PixelFormat; 5] = [
 #[test]
 fn a_buffer_too_short_for_a_row_of_tiles_is_refused_and_the_row_comes_later() {
     let bundle = example();
-    let plan = bundle.plan(&Budget::for_frame(32, 24)).expect("a plan");
+    let plan = Plan::new(&bundle, &Budget::for_frame(32, 24)).expect("a plan");
     let mut scratch = vec![0; plan.scratch_len()];
     let mut decoder = Decoder::bind(&bundle, plan, &mut scratch).expect("planned memory");
     for format in FORMATS {
@@ -263,11 +259,11 @@ fn an_unusable_camera_is_another_error_than_a_sinks() {
 fn slabs_of_fewer_than_two_splats_are_refused() {
     let budget = Budget::for_frame(32, 24).with_residency(Residency::Streamed).with_overflow(Overflow::Slabs);
     for found in [0, 1] {
-        let error = example().plan(&budget.with_max_splats(MaxSplats::AtMost(found))).expect_err("too few");
+        let error = Plan::new(&example(), &budget.with_max_splats(MaxSplats::AtMost(found))).expect_err("too few");
         assert_eq!(error, DecodeError::OutOfRange { field: Field::SlabSplats, found, limit: 2 });
         assert_eq!(error.class(), ErrorClass::Misuse);
         let left_out = budget.with_overflow(Overflow::LeaveOut).with_max_splats(MaxSplats::AtMost(found));
-        assert!(example().plan(&left_out).is_ok(), "{found} places are fine where splats are left out");
+        assert!(Plan::new(&example(), &left_out).is_ok(), "{found} places are fine where splats are left out");
     }
     let preview = example().header().preview;
     let (_, all) = draw(&budget, &preview, None);

@@ -1,13 +1,15 @@
 //! A dense layer cut into blocks of outputs.
 
+use pocketsplat_format::DecodeError;
+use pocketsplat_format::bundle::{Halves, LayerWeights};
+
 use super::weight::{self, Half, LANES};
 use crate::arena::Arena;
-use crate::bundle::{Halves, LayerWeights};
-use crate::error::DecodeError;
 
 /// How the weights of the heads are kept in scratch memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum HeadWeights {
     /// 32 bits each.
     F32,

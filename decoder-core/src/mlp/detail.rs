@@ -1,11 +1,12 @@
 //! The detail head: what is added to a Gaussian's colour, its first layer split into a part per anchor and one per Gaussian.
 
+use pocketsplat_format::DecodeError;
+use pocketsplat_format::bundle::{HeadView, WeightReader};
+
 use super::block::{HeadWeights, continued};
 use super::head::Head;
 use super::weight::LANES;
 use crate::arena::Arena;
-use crate::bundle::{HeadView, WeightReader};
-use crate::error::DecodeError;
 
 /// `W2·relu(W1·[feature, colour] + b1) + b2`.
 ///

@@ -1,25 +1,21 @@
 //! The number formats that the heads are kept and multiplied in.
 
+use pocketsplat_format::DecodeError;
+use pocketsplat_format::bundle::{HeadView, WeightReader};
+
 use super::block::HeadWeights;
 use super::pair::Role;
 use crate::arena::Arena;
-use crate::bundle::{HeadView, WeightReader};
-use crate::error::DecodeError;
 
 /// Weights as f32; as halves where the [plan](crate::Plan::head_weights) says so, because there is no room for f32.
 #[derive(Clone, Copy, Debug)]
-pub struct F32;
-/// Weights as halves, which is what the file holds or nearly so; sums in f32, and so is the detail head.
-#[derive(Clone, Copy, Debug)]
-pub struct F16;
+pub(crate) struct F32;
 /// Weights, inputs and hidden units as 16-bit integers, sums of 32 bits; the detail head in f32.
 #[derive(Clone, Copy, Debug)]
-pub struct I16;
+pub(crate) struct I16;
 
 /// A format of the heads.
 pub(crate) trait HeadFormat {
-    /// How float weights are kept, whatever the plan says.
-    const KEPT_AS: Option<HeadWeights>;
     /// What a layer reads.
     type Values<'v>: Copy;
     /// A head of B outputs an offset.

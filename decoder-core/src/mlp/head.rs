@@ -1,13 +1,14 @@
 //! A head in floats: hidden layer with ReLU, output layer of one block per offset.
 
+use pocketsplat_format::DecodeError;
+use pocketsplat_format::bundle::{HeadView, WeightReader};
+
 use super::block::{Blocks, HeadWeights};
-use super::format::{F16, F32, HeadFormat, MlpHead};
+use super::format::{F32, HeadFormat, MlpHead};
 use super::pair::Role;
 use super::weight;
 use super::weight::LANES;
 use crate::arena::Arena;
-use crate::bundle::{HeadView, WeightReader};
-use crate::error::DecodeError;
 
 /// One head in floats; its output layer has blocks of `B` outputs.
 pub(crate) struct Head<'s, const B: usize> {
@@ -22,27 +23,20 @@ pub(super) struct Hidden<'s> {
 }
 
 /// Floats read floats.
-macro_rules! floats {
-    ($($name:ty => $kept_as:expr),*) => {$(
-        impl HeadFormat for $name {
-            const KEPT_AS: Option<HeadWeights> = $kept_as;
-            type Values<'v> = &'v [f32];
-            type Head<'s, const B: usize> = Head<'s, B>;
+impl HeadFormat for F32 {
+    type Values<'v> = &'v [f32];
+    type Head<'s, const B: usize> = Head<'s, B>;
 
-            #[inline(always)]
-            fn values(inputs: &mut [f32]) -> &[f32] {
-                inputs
-            }
+    #[inline(always)]
+    fn values(inputs: &mut [f32]) -> &[f32] {
+        inputs
+    }
 
-            #[inline(always)]
-            fn floats(inputs: &[f32]) -> Option<&[f32]> {
-                Some(inputs)
-            }
-        }
-    )*};
+    #[inline(always)]
+    fn floats(inputs: &[f32]) -> Option<&[f32]> {
+        Some(inputs)
+    }
 }
-
-floats!(F32 => None, F16 => Some(HeadWeights::F16));
 
 impl<'s, N, const B: usize> MlpHead<'s, N, B> for Head<'s, B>
 where

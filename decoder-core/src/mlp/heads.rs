@@ -1,13 +1,14 @@
 //! All heads of a scene.
 
+use pocketsplat_format::DecodeError;
+use pocketsplat_format::bundle::HeadsView;
+
 use super::block::HeadWeights;
 use super::detail::Detail;
 use super::format::{HeadFormat, MlpHead};
 use super::pair::Role;
 use super::shape::HeadShape;
 use crate::arena::Arena;
-use crate::bundle::HeadsView;
-use crate::error::DecodeError;
 
 /// The heads, one block of outputs an offset: none is computed for an offset that is not drawn.
 pub(crate) struct Heads<'s, N: HeadFormat> {

@@ -8,13 +8,13 @@ use core::cell::Cell;
 use core::iter;
 
 use bytemuck::{Pod, Zeroable};
+use pocketsplat_format::DecodeError;
+use pocketsplat_format::bundle::{HeadView, WeightReader};
 
 use super::block::HeadWeights;
 use super::format::{HeadFormat, I16, MlpHead};
 use super::pair::Role;
 use crate::arena::Arena;
-use crate::bundle::{HeadView, WeightReader};
-use crate::error::DecodeError;
 
 /// Units computed together: their sums, a pair of inputs and the addresses fill the registers of a Cortex-M.
 const LANES: usize = 4;
@@ -101,7 +101,6 @@ pub(crate) struct IntegerHead<'s, const B: usize> {
 
 /// Integers read integers; the detail head stays in floats.
 impl HeadFormat for I16 {
-    const KEPT_AS: Option<HeadWeights> = None;
     type Values<'v> = Quantised<'v>;
     type Head<'s, const B: usize> = IntegerHead<'s, B>;
 

@@ -15,8 +15,7 @@ mod shape;
 mod weight;
 
 pub use block::HeadWeights;
-pub use format::{F16, F32, I16};
-pub(crate) use format::{HeadFormat, MlpHead};
+pub(crate) use format::{F32, HeadFormat, I16, MlpHead};
 pub(crate) use heads::Heads;
 pub(crate) use pair::Role;
 pub(crate) use shape::HeadShape;

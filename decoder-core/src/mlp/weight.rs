@@ -1,8 +1,7 @@
 //! Weights as halves, and sums of their products with floats.
 
 use bytemuck::{Pod, Zeroable};
-
-use crate::math::to_half;
+use pocketsplat_format::math::to_half;
 
 /// Outputs computed together in layers whose outputs are all needed.
 pub(super) use pocketsplat_half::LANES;

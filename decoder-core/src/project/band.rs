@@ -40,7 +40,7 @@ impl View {
         let [_, ty, tz] = self.translation;
         let ([_, min], [_, max]) = (self.slope_min, self.slope_max);
         let steepest = if min.abs() > max.abs() { min } else { max };
-        let stretch = crate::math::sqrt(1.0 + steepest * steepest);
+        let stretch = pocketsplat_half::sqrt(1.0 + steepest * steepest);
         let side = |sign: f32, slope: f32| {
             let ([y0, y1, y2], [z0, z1, z2]) = (row_y, row_z);
             let normal = [sign * y0 + slope * z0, sign * y1 + slope * z1, sign * y2 + slope * z2];
@@ -111,7 +111,7 @@ impl Side {
         let size = terms(n0, low0, high0) + terms(n1, low1, high1) + terms(n2, low2, high2) + self.shift.abs();
         let edges = [high0 - low0, high1 - low1, high2 - low2];
         let shortest = edges.into_iter().fold(f32::INFINITY, |least, edge| if edge < least { edge } else { least });
-        let excess = self.stretch - crate::math::sqrt(dot(self.normal, self.normal));
+        let excess = self.stretch - pocketsplat_half::sqrt(dot(self.normal, self.normal));
         let excess = if excess > 0.0 { 0.5 * shortest * excess } else { 0.0 };
         // NaN, from absurd cameras, counts as seen here and below.
         farthest + self.shift + excess + ROUNDING * (size + excess) < 0.0
@@ -151,10 +151,10 @@ impl Side {
 #[cfg(test)]
 mod tests {
     use super::{Band, View};
-    use crate::bundle::Effects;
-    use crate::camera::{Camera, Rotation};
-    use crate::math::functions::Reference;
+    use crate::functions::Reference;
     use crate::scene::{Anchor, Gaussian};
+    use pocketsplat_format::bundle::Effects;
+    use pocketsplat_format::{Camera, Rotation};
 
     const HEIGHT_PX: u16 = 90;
 

@@ -1,7 +1,8 @@
 //! The covariance of a splat on the image plane.
 
+use pocketsplat_format::rules::DILATION_PX2;
+
 use super::view::dot;
-use crate::rules::DILATION_PX2;
 
 /// Added to both variances, px².
 pub(super) const DILATION: f32 = DILATION_PX2 as f32;

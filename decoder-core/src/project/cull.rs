@@ -1,11 +1,11 @@
 //! What a view can see: boxes of chunks, then anchors.
 
+use pocketsplat_format::bundle::Chunk;
+use pocketsplat_format::rules::{self, NEAR};
+use pocketsplat_format::{Bundle, Camera, DecodeError};
+
 use super::covariance::Covariance;
 use super::view::View;
-use crate::bundle::{Bundle, Chunk};
-use crate::camera::Camera;
-use crate::error::DecodeError;
-use crate::rules::{self, NEAR};
 
 /// How far beyond its 3D extent a splat reaches on the image, pixels.
 pub(super) const DILATION_REACH_PX: f32 = rules::DILATION_REACH_PX as f32;
@@ -102,8 +102,8 @@ impl View {
         // mid² − det, written without the difference of two large numbers.
         let spread = half_difference * half_difference + covariance.xy * covariance.xy;
         let spread = if spread > 0.1 { spread } else { 0.1 };
-        let lambda_max = 0.5 * (covariance.xx + covariance.yy) + crate::math::sqrt(spread);
-        let radius = libm::ceilf(3.0 * crate::math::sqrt(lambda_max));
+        let lambda_max = 0.5 * (covariance.xx + covariance.yy) + pocketsplat_half::sqrt(spread);
+        let radius = libm::ceilf(3.0 * pocketsplat_half::sqrt(lambda_max));
         u + radius > 0.0 && u - radius < width && v + radius > 0.0 && v - radius < height
     }
 }
@@ -111,10 +111,10 @@ impl View {
 #[cfg(test)]
 mod tests {
     use super::View;
-    use crate::bundle::Effects;
-    use crate::camera::{Camera, Rotation};
-    use crate::math::functions::Reference;
+    use crate::functions::Reference;
     use crate::scene::Gaussian;
+    use pocketsplat_format::bundle::Effects;
+    use pocketsplat_format::{Camera, Rotation};
 
     /// Far from the origin the sums of the test and those of the projection are rounded by more than a pixel, each by its own.
     #[test]

@@ -12,8 +12,7 @@ mod view;
 
 pub(crate) use band::Band;
 pub use cull::chunks_in_view;
-pub(crate) use packed::SplatRecord;
-pub use packed::{Packed28, Wide};
+pub(crate) use packed::PackedSplat;
 pub(crate) use splat::Splat;
 pub(crate) use tile::{TILE_PIXELS, TileRect};
 pub(crate) use view::{View, log_cut};

@@ -1,50 +1,17 @@
 //! Splats as they are kept in memory.
 
 use bytemuck::{Pod, Zeroable};
+use pocketsplat_format::math::to_half;
 use pocketsplat_half::from_halves;
 
 use super::splat::Splat;
-use crate::math::to_half;
 
 /// Bits of 2⁻⁶², which stands for every smaller precision: a deviation of 2·10⁹ px.
 const LEAST_PRECISION: u32 = (127 - 62) << 23;
 /// What a float has more digits than are kept.
 const DIGITS_DROPPED: u32 = 13;
 
-/// A splat as it is kept in memory.
-pub(crate) trait SplatRecord: Pod {
-    /// Rounds a splat.
-    fn new(splat: &Splat) -> Self;
-
-    /// The splat, rounded.
-    fn unpack(&self) -> Splat;
-
-    /// z in the camera frame, positive.
-    fn depth(&self) -> f32;
-}
-
-/// Splats in 40 bytes, all f32; memory planned for [`Packed28`] has places for fewer.
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-#[repr(transparent)]
-pub struct Wide(Splat);
-
-impl SplatRecord for Wide {
-    fn new(splat: &Splat) -> Self {
-        Self(*splat)
-    }
-
-    #[inline]
-    fn unpack(&self) -> Splat {
-        self.0
-    }
-
-    #[inline]
-    fn depth(&self) -> f32 {
-        self.0.depth
-    }
-}
-
-/// Splats in 28 bytes: place, depth and shear as f32, everything else rounded to the eleven bits of halves.
+/// A splat as it is kept in memory, 28 bytes: place, depth and shear as f32, everything else rounded to the eleven bits of halves.
 ///
 /// Shear is multiplied by the distance from the centre: eleven bits of it would move the far end of a needle that crosses a
 /// frame of 500 pixels by an eighth of a pixel, and one whose centre lies as far outside by as much more.
@@ -53,25 +20,28 @@ impl SplatRecord for Wide {
 /// 0.3 % of what is left there, and a colour by a sixteenth of a step of 8 bits.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
-pub struct Packed28 {
+pub(crate) struct PackedSplat {
     mean: [f32; 2],
     depth: f32,
     shear: f32,
     rest: HalfFields,
 }
 
-impl SplatRecord for Packed28 {
-    fn new(splat: &Splat) -> Self {
+impl PackedSplat {
+    /// Rounds a splat.
+    pub(crate) fn new(splat: &Splat) -> Self {
         Self { mean: splat.mean, depth: splat.depth, shear: splat.shear, rest: HalfFields::new(splat) }
     }
 
+    /// The splat, rounded.
     #[inline]
-    fn unpack(&self) -> Splat {
+    pub(crate) fn unpack(&self) -> Splat {
         self.rest.unpack(self.mean, self.depth, self.shear)
     }
 
+    /// z in the camera frame, positive.
     #[inline]
-    fn depth(&self) -> f32 {
+    pub(crate) fn depth(&self) -> f32 {
         self.depth
     }
 }
@@ -130,7 +100,7 @@ fn unpack_precision(packed: u16) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use super::{Packed28, SplatRecord};
+    use super::PackedSplat;
     use crate::project::Splat;
 
     #[test]
@@ -146,7 +116,7 @@ mod tests {
                 colour: [0.123, 0.987, -0.0456],
                 depth: 3.21,
             };
-            let kept = Packed28::new(&splat).unpack();
+            let kept = PackedSplat::new(&splat).unpack();
             let exact = |s: &Splat| (s.mean, s.depth, s.shear);
             assert_eq!(exact(&kept), exact(&splat), "as they are");
             let numbers = |s: &Splat| {

@@ -1,13 +1,13 @@
 //! A splat: what remains of a Gaussian once projected, in the form in which rows of pixels are drawn.
 
 use bytemuck::{Pod, Zeroable};
+use pocketsplat_format::bundle::Effects;
+use pocketsplat_format::rules::NEAR;
 
 use super::covariance::Covariance;
 use super::tile::TileRect;
 use super::view::View;
-use crate::bundle::Effects;
-use crate::math::functions::Functions;
-use crate::rules::NEAR;
+use crate::functions::Functions;
 use crate::scene::Gaussian;
 
 /// A projected Gaussian.
@@ -54,7 +54,7 @@ impl View {
         };
         let mut opacity = gaussian.opacity;
         if effects.dilation_compensation {
-            opacity *= crate::math::sqrt(covariance.det_bare / covariance.det);
+            opacity *= pocketsplat_half::sqrt(covariance.det_bare / covariance.det);
         }
         let log_opacity = F::ln(opacity + self.lost_opacity);
         // Squared Mahalanobis radius at which alpha is the least that draws.
@@ -63,7 +63,8 @@ impl View {
             return None;
         }
         let mean = self.to_image(point);
-        let half_extent = [crate::math::sqrt(reach * covariance.xx), crate::math::sqrt(reach * covariance.yy)];
+        let half_extent =
+            [pocketsplat_half::sqrt(reach * covariance.xx), pocketsplat_half::sqrt(reach * covariance.yy)];
         let rect = TileRect::covering(mean, half_extent, self.size_px)?;
         let splat = Splat {
             mean,
@@ -96,11 +97,11 @@ impl View {
 
 #[cfg(test)]
 mod tests {
-    use crate::bundle::Effects;
-    use crate::camera::{Camera, Rotation};
-    use crate::math::functions::Reference;
+    use crate::functions::Reference;
     use crate::project::{View, log_cut};
     use crate::scene::Gaussian;
+    use pocketsplat_format::bundle::Effects;
+    use pocketsplat_format::{Camera, Rotation};
 
     #[test]
     fn a_splat_cut_earlier_keeps_its_sum() {

@@ -1,8 +1,7 @@
 //! Tiles and the rectangles of tiles that splats touch.
 
 use bytemuck::{Pod, Zeroable};
-
-use crate::rules::TILE_PX;
+use pocketsplat_format::rules::TILE_PX;
 
 /// Pixels of a tile.
 pub(crate) const TILE_PIXELS: usize = TILE_PX as usize * TILE_PX as usize;

@@ -1,7 +1,6 @@
 //! A camera, with what depends on it alone computed once a frame.
 
-use crate::camera::Camera;
-use crate::error::DecodeError;
+use pocketsplat_format::{Camera, DecodeError};
 
 /// Beyond the image by this part of its size the Jacobian stops growing.
 const CLAMP_MARGIN: f32 = 0.15;

@@ -1,11 +1,11 @@
 //! Front-to-back compositing of one tile.
 
+use pocketsplat_format::math::EXPONENTIAL;
+use pocketsplat_format::rules::{self, TILE_PX};
 use pocketsplat_half::{BlendConstants, ROW_LEN, RowSplat, SLACK_PX, span, sqrt_above};
 
-use crate::math::EXPONENTIAL;
-use crate::math::functions::Functions;
-use crate::project::{Splat, SplatRecord, TileRect, log_cut};
-use crate::rules::{self, TILE_PX};
+use crate::functions::Functions;
+use crate::project::{PackedSplat, Splat, TileRect, log_cut};
 
 const TRANSMITTANCE_MIN: f32 = rules::TRANSMITTANCE_MIN as f32;
 /// One per cent below the logarithm of the largest alpha.
@@ -18,14 +18,12 @@ const _: () = assert!(rules::ALPHA_MAX > 0.99 - 1e-9 && ROW_LEN == TILE_PX as us
 pub(crate) struct BlendRule {
     /// −ln of the least alpha.
     log_cut: f32,
-    /// A pixel that less light comes through is finished.
-    transmittance_stop: f32,
 }
 
 impl BlendRule {
-    /// * `alpha_cut`: the least alpha, in 255ths. * `transmittance_stop`: in 10 000ths.
-    pub(crate) fn new(alpha_cut: u8, transmittance_stop: u16) -> Self {
-        Self { log_cut: log_cut(alpha_cut), transmittance_stop: f32::from(transmittance_stop) * TRANSMITTANCE_MIN }
+    /// * `alpha_cut`: the least alpha, in 255ths.
+    pub(crate) fn new(alpha_cut: u8) -> Self {
+        Self { log_cut: log_cut(alpha_cut) }
     }
 }
 
@@ -38,7 +36,7 @@ pub(crate) const EMPTY: Pixel = [0.0, 0.0, 0.0, 1.0];
 
 /// Where a tile lies; it ends early at the frame's right and lower border.
 #[derive(Clone, Copy)]
-pub(crate) struct TilePlace {
+pub(crate) struct TileRegion {
     pub(crate) column: u8,
     pub(crate) row: u8,
     pub(crate) width: u16,
@@ -65,9 +63,9 @@ pub(crate) struct TileWork {
 ///
 /// # Budget
 /// Per splat and row of pixels two exponentials, per pixel two multiplications and the blend.
-pub(crate) fn blend_tile<F: Functions, S: SplatRecord>(
-    place: TilePlace,
-    splats: &[S],
+pub(crate) fn blend_tile<F: Functions>(
+    place: TileRegion,
+    splats: &[PackedSplat],
     rects: &[TileRect],
     list: &[u32],
     rule: &BlendRule,
@@ -97,7 +95,7 @@ pub(crate) fn blend_tile<F: Functions, S: SplatRecord>(
 /// Puts the background behind a tile, if there is one, and rounds to bytes, `[height, width]` row by row.
 // Not inlined: that saves text, and a frame calls it once a tile.
 #[inline(never)]
-pub(crate) fn finish_tile(place: TilePlace, pixels: &[Pixel], background: Option<[f32; 3]>, rgb: &mut [[u8; 3]]) {
+pub(crate) fn finish_tile(place: TileRegion, pixels: &[Pixel], background: Option<[f32; 3]>, rgb: &mut [[u8; 3]]) {
     match background {
         Some(background) => finish(place, pixels, rgb, |pixel| behind(pixel, background)),
         None => finish(place, pixels, rgb, |[red, green, blue, _]| [red, green, blue]),
@@ -105,7 +103,7 @@ pub(crate) fn finish_tile(place: TilePlace, pixels: &[Pixel], background: Option
 }
 
 /// Rounds what `colour` makes of each pixel to bytes.
-fn finish(place: TilePlace, pixels: &[Pixel], rgb: &mut [[u8; 3]], colour: impl Fn(Pixel) -> [f32; 3]) {
+fn finish(place: TileRegion, pixels: &[Pixel], rgb: &mut [[u8; 3]], colour: impl Fn(Pixel) -> [f32; 3]) {
     let (rows, _) = pixels.as_chunks::<{ TILE_PX as usize }>();
     let out_rows = rgb.chunks_exact_mut(usize::from(place.width).max(1));
     for (out_row, row) in out_rows.zip(rows).take(place.height.into()) {
@@ -119,7 +117,7 @@ fn finish(place: TilePlace, pixels: &[Pixel], rgb: &mut [[u8; 3]], colour: impl 
 /// Blends one splat into the rows of the tile that begins at (`tile_x`, `tile_y`) pixels; returns how many rows it reaches and how many pixels it was evaluated for.
 #[inline(always)]
 fn blend_splat<F: Functions>(
-    place: TilePlace,
+    place: TileRegion,
     [tile_x, tile_y]: [f32; 2],
     splat: &Splat,
     rule: &BlendRule,
@@ -152,7 +150,7 @@ fn blend_splat<F: Functions>(
         colour: splat.colour,
         // Whatever the functions: its error grows with the square of a pixel's distance.
         ratio_step: EXPONENTIAL.near(-splat.row_precision),
-        transmittance_stop: rule.transmittance_stop,
+        transmittance_stop: TRANSMITTANCE_MIN,
         free: [0; 4],
     };
     let work = F::blend_rows(&mut row_splat, &CONSTANTS, rows, place.width);

@@ -1,6 +1,6 @@
 //! Order by depth: a radix sort of indices, stable, without recursion.
 
-use crate::project::SplatRecord;
+use crate::project::PackedSplat;
 
 /// Values of one digit.
 pub(crate) const N_RADIX: usize = 256;
@@ -17,8 +17,8 @@ pub(crate) const N_RADIX: usize = 256;
 /// At most eight passes over the splats.
 // Not inlined: it has two callers.
 #[inline(never)]
-pub(crate) fn sort_by_depth<'o, S: SplatRecord>(
-    splats: &[S],
+pub(crate) fn sort_by_depth<'o>(
+    splats: &[PackedSplat],
     mut order: &'o mut [u32],
     mut spare: &'o mut [u32],
     counts: &mut [u32],
@@ -63,15 +63,15 @@ mod tests {
     use bytemuck::Zeroable;
 
     use super::{N_RADIX, sort_by_depth};
-    use crate::project::{Packed28, Splat, SplatRecord};
+    use crate::project::{PackedSplat, Splat};
 
     #[test]
     fn nearest_first_and_ties_in_order() {
         let mut state = 1_u32;
-        let splats: Vec<Packed28> = (0..1000)
+        let splats: Vec<PackedSplat> = (0..1000)
             .map(|_| {
                 state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                Packed28::new(&Splat { depth: 0.2 + (state >> 22) as f32 * 0.03, ..Splat::zeroed() })
+                PackedSplat::new(&Splat { depth: 0.2 + (state >> 22) as f32 * 0.03, ..Splat::zeroed() })
             })
             .collect();
         let (mut a, mut b) = ([0; 1000], [0; 1000]);

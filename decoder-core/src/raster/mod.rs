@@ -5,5 +5,5 @@
 mod blend;
 mod depth;
 
-pub(crate) use blend::{BlendRule, EMPTY, Pixel, TilePlace, blend_tile, finish_tile};
+pub(crate) use blend::{BlendRule, EMPTY, Pixel, TileRegion, blend_tile, finish_tile};
 pub(crate) use depth::{N_RADIX, sort_by_depth};

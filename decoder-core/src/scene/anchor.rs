@@ -1,8 +1,9 @@
 //! An anchor's values by name.
 
-use crate::bundle::Header;
-use crate::math::functions::Functions;
-use crate::rules;
+use pocketsplat_format::bundle::Header;
+use pocketsplat_format::rules;
+
+use crate::functions::Functions;
 
 /// One decoded anchor.
 #[derive(Clone, Copy, Debug)]

@@ -1,12 +1,12 @@
 //! The Gaussians of one anchor seen from one place.
 
 use bytemuck::{Pod, Zeroable};
+use pocketsplat_format::bundle::Effects;
+use pocketsplat_format::{Stage, Stopwatch};
 
 use super::Anchor;
-use crate::bundle::Effects;
-use crate::math::functions::Functions;
+use crate::functions::Functions;
 use crate::mlp::{HeadFormat, Heads, MlpHead, Role};
-use crate::stopwatch::{Stage, Stopwatch};
 
 /// Opacities below one step of an 8-bit channel draw nothing.
 const OPACITY_MIN: f32 = 1.0 / 255.0;
@@ -135,7 +135,7 @@ pub(super) fn fill_inputs(anchor: &Anchor<'_>, effects: Effects, eye: [f32; 3], 
     let [ax, ay, az] = anchor.position;
     let [ex, ey, ez] = eye;
     let [dx, dy, dz] = [ax - ex, ay - ey, az - ez];
-    let distance = crate::math::sqrt(dx * dx + dy * dy + dz * dz);
+    let distance = pocketsplat_half::sqrt(dx * dx + dy * dy + dz * dz);
     let direction = if distance > 0.0 { [dx, dy, dz].map(|d| d / distance) } else { [0.0; 3] };
     let mut inputs = inputs.iter_mut();
     // Not a chain of iterators, each of whose steps would ask where in the chain it is.
@@ -179,7 +179,7 @@ fn gaussian<F: Functions>(anchor: &Anchor<'_>, effects: Effects, offset: [f32; 3
     let [s0, s1, s2, w, i, j, k] = output.covariance;
     let s0 = gx * F::sigmoid(s0);
     let (scale, rotation) = if cfg!(feature = "anisotropy") && effects.anisotropic {
-        let norm = crate::math::sqrt(w * w + i * i + j * j + k * k);
+        let norm = pocketsplat_half::sqrt(w * w + i * i + j * j + k * k);
         let norm = if norm > QUATERNION_NORM_MIN { norm } else { QUATERNION_NORM_MIN };
         let scale = [s0, gy * F::sigmoid(s1), gz * F::sigmoid(s2)];
         (scale, [w, i, j, k].map(|q| q / norm))

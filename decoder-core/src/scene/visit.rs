@@ -1,12 +1,13 @@
 //! Anchors evaluated one after the other, or two at a time where that costs less.
 
+use pocketsplat_format::bundle::Effects;
+use pocketsplat_format::{Stage, Stopwatch};
+
 use super::Anchor;
 use super::gaussian::{Evaluation, GaussianSink, Workspace, fill_inputs};
 use crate::arena::Arena;
-use crate::bundle::Effects;
-use crate::math::functions::Functions;
+use crate::functions::Functions;
 use crate::mlp::{HeadFormat, HeadShape, Heads, Role};
-use crate::stopwatch::{Stage, Stopwatch};
 
 /// What evaluates anchors.
 pub(crate) struct Evaluator<'s, N: HeadFormat> {
@@ -118,7 +119,7 @@ impl<N: HeadFormat> Evaluator<'_, N> {
     }
 
     /// Forgets an anchor that waits, after an error.
-    pub(crate) fn forget(&mut self) {
+    pub(crate) fn discard_waiting(&mut self) {
         if let Some(pair) = &mut self.pair {
             pair.waiting = None;
         }

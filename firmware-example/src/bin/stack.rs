@@ -19,7 +19,7 @@ use core::hint::black_box;
 #[cfg(target_arch = "arm")]
 use cortex_m as _;
 use defmt_semihosting as _;
-use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, Residency, TileSink};
+use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, Plan, Residency, Tile, TileSink};
 #[cfg(target_arch = "riscv32")]
 use riscv as _;
 use static_cell::ConstStaticCell;
@@ -63,8 +63,8 @@ fn measure() -> Result<[usize; CALLS.len()], DecodeError> {
     let camera = bundle.header().preview;
     for residency in [Residency::Resident, Residency::Streamed, Residency::Baked] {
         let budget = Budget::for_frame(camera.width_px, camera.height_px).with_residency(residency);
-        let Ok(planned) = of(plan, || bundle.plan(&budget.in_bytes(scratch.len()))) else { continue };
-        let mut decoder = of(bind, || Decoder::bind(&bundle, planned, scratch))?;
+        let Ok(planned) = of(plan, || Plan::new(&bundle, &budget.in_bytes(scratch.len()))) else { continue };
+        let mut decoder = of(bind, || Decoder::bind(&bundle, planned, &mut *scratch))?;
         of(render, || decoder.render(&camera, &mut Display))?;
         let mut drawing = of(begin, || decoder.begin(&camera))?;
         while of(next_tile, || drawing.next_tile().map(|tile| black_box(tile).is_some()))? {}
@@ -93,7 +93,7 @@ struct Display;
 impl TileSink for Display {
     type Error = Infallible;
 
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
+    fn tile(&mut self, Tile { x_px, y_px, width, height, rgb, .. }: Tile<'_>) -> Result<(), Infallible> {
         black_box((x_px, y_px, width, height, rgb));
         Ok(())
     }

@@ -19,7 +19,7 @@ use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m_rt::{entry, exception};
 use defmt_semihosting as _;
 use heapless::spsc::{Consumer, Producer, Queue};
-use pocketsplat_core::{Budget, Bundle, ByteOrder, DecodeError, Decoder, Overflow, Rounding, Tile, TileSink};
+use pocketsplat_core::{Budget, Bundle, ByteOrder, DecodeError, Decoder, Overflow, Plan, Rounding, Tile, TileSink};
 use static_cell::ConstStaticCell;
 
 /// What build.rs writes; this program uses the sizes alone.
@@ -121,7 +121,7 @@ fn compare() -> Result<[u32; 2], DecodeError> {
     let camera = bundle.header().preview.resized(WIDTH_PX as u16, HEIGHT_PX as u16);
     let scratch = SCRATCH.take();
     let budget = Budget::for_frame(camera.width_px, camera.height_px).in_bytes(scratch.len());
-    let plan = bundle.plan(&budget).or_else(|_| bundle.plan(&budget.with_overflow(Overflow::Slabs)))?;
+    let plan = Plan::new(&bundle, &budget).or_else(|_| Plan::new(&bundle, &budget.with_overflow(Overflow::Slabs)))?;
     let mut decoder = Decoder::bind(&bundle, plan, scratch)?;
 
     let ((mut full, to_bus), (mut from_bus, mut empty)) = (FULL.take().split(), EMPTY.take().split());
@@ -194,7 +194,7 @@ struct Comparison {
 impl TileSink for Comparison {
     type Error = core::convert::Infallible;
 
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) -> Result<(), Self::Error> {
+    fn tile(&mut self, Tile { x_px, y_px, width, height, rgb, .. }: Tile<'_>) -> Result<(), Self::Error> {
         let mut copy = [[0; 3]; 16 * 16];
         let (rgb_copy, _) = copy.split_at_mut(rgb.len());
         rgb_copy.copy_from_slice(rgb);

@@ -1,6 +1,6 @@
 //! What coding does to the values of a view's anchors, and their rate: the order of `step/coded.rs` and `step/context.rs`.
 
-use pocketsplat_core::context::{N_GROUPS, N_LEVELS};
+use pocketsplat_format::context::{N_GROUPS, N_LEVELS};
 
 use super::anchors::rooms;
 use super::levels::GpuLevels;

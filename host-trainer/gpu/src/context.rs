@@ -1,6 +1,6 @@
 //! A context model in the device's memory, with all that training moves of it.
 
-use pocketsplat_core::context::{GridFrame, N_GROUPS, N_LEVELS};
+use pocketsplat_format::context::{GridFrame, N_GROUPS, N_LEVELS};
 
 use super::group::Group;
 use super::ops::adam::Adam;

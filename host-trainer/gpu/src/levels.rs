@@ -1,6 +1,6 @@
 //! Coding where anchors follow anchors (ContextGS): a network for each level, the coarsest first.
 
-use pocketsplat_core::context::{FEATURE_ONE, N_GROUPS, N_LEVELS};
+use pocketsplat_format::context::{FEATURE_ONE, N_GROUPS, N_LEVELS};
 
 use super::anchors::rooms;
 use super::context::{DeviceNetwork, Follows};

@@ -1,4 +1,4 @@
-// Functions whose precision WGSL leaves to the adapter, as real.rs and decoder-core have them.
+// Functions whose precision WGSL leaves to the adapter, as real.rs and decoder-format have them.
 
 const LN_2: f32 = 0.6931471805599453;
 

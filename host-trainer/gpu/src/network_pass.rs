@@ -1,6 +1,6 @@
 //! A context network over the anchors of a view that have it: steps for all of them, distributions for a sample, and the way back.
 
-use pocketsplat_core::context::N_GROUPS;
+use pocketsplat_format::context::N_GROUPS;
 
 use super::anchors::rooms;
 use super::context::DeviceNetwork;

@@ -1,7 +1,7 @@
 //! What a context costs an anchor, as counts.
 
-use pocketsplat_core::bundle::Coder;
-use pocketsplat_core::context::{LevelKind, first_tap};
+use pocketsplat_format::bundle::Coder;
+use pocketsplat_format::context::{LevelKind, first_tap};
 
 /// Sizes of a context that its work follows from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,8 +4,8 @@
 
 use std::fmt;
 
-use pocketsplat_core::bundle::{Features, STRIPS, TierMeasures};
-use pocketsplat_core::{Budget, Bundle, Residency, Strips};
+use pocketsplat_core::{Budget, Bundle, Plan, Residency, Strips};
+use pocketsplat_format::bundle::{Features, STRIPS, TierMeasures};
 
 use crate::context::ContextShape;
 
@@ -154,7 +154,7 @@ impl Level {
         let [width_px, height_px] = bundle.header().training_px;
         let budget = Budget::for_frame(width_px, height_px).with_tiers(tier + 1).with_residency(Residency::Streamed);
         let scratch_of = |n_strips| {
-            let plan = bundle.plan(&budget.with_strips(Strips::Exactly(n_strips)));
+            let plan = Plan::new(bundle, &budget.with_strips(Strips::Exactly(n_strips)));
             plan.map_or(u64::MAX, |plan| plan.scratch_len() as u64)
         };
         let strips = STRIPS.map(|n_strips| (scratch_of(n_strips), n_strips));

@@ -1,12 +1,12 @@
 //! Cameras between the host's double precision and the decoder's single precision.
 
 use glam::{DMat3, DVec3};
-use pocketsplat_core::{DecodeError, Field, Rotation};
+use pocketsplat_format::{DecodeError, Field, Rotation};
 
 use pocketsplat_capture::camera::Camera;
 
 /// The host's camera of a decoder's, number for number: [`core_camera`] takes it back unchanged.
-pub fn host_camera(camera: &pocketsplat_core::Camera) -> Camera {
+pub fn host_camera(camera: &pocketsplat_format::Camera) -> Camera {
     Camera {
         // glam stores columns.
         rotation: DMat3::from_cols_array(&camera.rotation.to_array().map(f64::from)).transpose(),
@@ -22,12 +22,12 @@ pub fn host_camera(camera: &pocketsplat_core::Camera) -> Camera {
 ///
 /// # Errors
 /// [`DecodeError::OutOfRange`] when the image is larger than the decoder draws, and what [`Rotation::new`] and
-/// [`pocketsplat_core::Camera::check`] find.
-pub fn core_camera(camera: &Camera) -> Result<pocketsplat_core::Camera, DecodeError> {
+/// [`pocketsplat_format::Camera::check`] find.
+pub fn core_camera(camera: &Camera) -> Result<pocketsplat_format::Camera, DecodeError> {
     let size = |field, px: u32| {
         u16::try_from(px).map_err(|_| DecodeError::OutOfRange { field, found: px, limit: u16::MAX.into() })
     };
-    let core = pocketsplat_core::Camera {
+    let core = pocketsplat_format::Camera {
         // glam stores columns.
         rotation: Rotation::new(camera.rotation.transpose().to_cols_array().map(|x| x as f32))?,
         translation: camera.translation.to_array().map(|x| x as f32),
@@ -42,13 +42,13 @@ pub fn core_camera(camera: &Camera) -> Result<pocketsplat_core::Camera, DecodeEr
 
 #[cfg(test)]
 mod tests {
-    use pocketsplat_core::Rotation;
+    use pocketsplat_format::Rotation;
 
     use super::{core_camera, host_camera};
 
     #[test]
     fn a_decoders_camera_survives_the_way_to_the_host_and_back() {
-        let camera = pocketsplat_core::Camera {
+        let camera = pocketsplat_format::Camera {
             rotation: Rotation::new([0.6, 0.0, 0.8, 0.48, 0.8, -0.36, -0.64, 0.6, 0.48]).expect("a rotation"),
             translation: [1.1, -2.2, 3.3],
             focal_px: [100.1, 99.9],

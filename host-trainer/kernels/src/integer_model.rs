@@ -1,17 +1,17 @@
 //! A trained context model as integers: the context section of a bundle, and what its integers mean in floats.
 //!
 //! Weights become i8 with a power-of-two scale a row; the scale is the largest that keeps the row's largest weight and its
-//! bias in range. Inputs are in 2⁻¹⁴, hidden units in 2⁻¹⁰, outputs in the units of [`pocketsplat_core::context`].
+//! bias in range. Inputs are in 2⁻¹⁴, hidden units in 2⁻¹⁰, outputs in the units of [`pocketsplat_format::context`].
 
-use pocketsplat_core::DecodeError;
-use pocketsplat_core::context::{
+use pocketsplat_format::DecodeError;
+use pocketsplat_format::context::{
     Context, ContextHead, GridLevel, MAX_BIAS, MAX_CONTEXT_HIDDEN, MAX_CONTEXT_LEVELS, MAX_TAPS, MEAN_PARTS, TAP_BITS,
 };
-use pocketsplat_core::entropy::EIGHTHS;
+use pocketsplat_format::entropy::EIGHTHS;
 
 use crate::scene::{ContextModel, ContextNetwork, Head, ModelShape};
 
-/// Bits of the fraction of an input: [`pocketsplat_core::context::FEATURE_ONE`].
+/// Bits of the fraction of an input: [`pocketsplat_format::context::FEATURE_ONE`].
 const INPUT_BITS: i32 = 14;
 /// Bits of the fraction of a hidden unit, which reaches up to 32.
 pub const HIDDEN_BITS: i32 = 10;
@@ -199,7 +199,7 @@ fn grid_bytes(rows: &[f32]) -> impl Iterator<Item = u8> + '_ {
 
 #[cfg(test)]
 mod tests {
-    use pocketsplat_core::context::{FEATURE_ONE, GridFrame, Group, LevelKind};
+    use pocketsplat_format::context::{FEATURE_ONE, GridFrame, Group, LevelKind};
 
     use super::*;
     use crate::finite_difference::random;

@@ -31,7 +31,7 @@ pub trait Real:
 
     /// The nearest value to `value`.
     fn real(value: f64) -> Self;
-    /// e^x. In f32 the decoder's own polynomial, which vectorises; see [`pocketsplat_core::math::exp`].
+    /// e^x. In f32 the decoder's own polynomial, which vectorises; see [`pocketsplat_format::math::exp`].
     fn exp(self) -> Self;
     /// Natural logarithm.
     fn ln(self) -> Self;
@@ -137,7 +137,7 @@ macro_rules! real {
     };
 }
 
-real!(f32, matrixmultiply::sgemm, pocketsplat_core::math::exp, log2_series);
+real!(f32, matrixmultiply::sgemm, pocketsplat_format::math::exp, log2_series);
 real!(f64, matrixmultiply::dgemm, f64::exp, f64::log2);
 
 /// log₂ x = n + 2·artanh((m − 1)/(m + 1))/ln 2 with x = 2ⁿ·m, m in [√½, √2), where five terms leave less than 1e-9.

@@ -1,7 +1,7 @@
 //! One number for everything that a bundle's chunks decode to.
 
-use pocketsplat_core::bundle::AnchorSite;
-use pocketsplat_core::{Bundle, DecodeError};
+use pocketsplat_format::bundle::AnchorSite;
+use pocketsplat_format::{Bundle, DecodeError};
 
 /// Longest row of channels: 256 features, 6 log-scales, 32 offsets.
 const MAX_CHANNELS: usize = 256 + 6 + 3 * 32;

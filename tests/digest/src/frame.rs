@@ -3,7 +3,7 @@
 use core::convert::Infallible;
 
 use pocketsplat_core::{
-    Budget, Bundle, DecodeError, Decoder, HeadWeights, MaxSplats, Plan, Residency, Strips, TileSink,
+    Budget, Bundle, DecodeError, Decoder, HeadWeights, MaxSplats, Plan, Residency, Strips, Tile, TileSink,
 };
 
 use super::digest::Digest;
@@ -26,15 +26,15 @@ pub fn frame_digests(bundle: &Bundle<'_>, scratch: &mut [u8]) -> Result<[Digest;
         .with_strips(Strips::Exactly(1));
     let mut drawn = |plan: Plan| {
         let mut tiles = Tiles(Digest::EMPTY);
-        Decoder::bind(bundle, plan, scratch)?.render(&camera, &mut tiles)?;
+        Decoder::bind(bundle, plan, &mut *scratch)?.render(&camera, &mut tiles)?;
         Ok::<_, DecodeError>(tiles.0)
     };
-    let whole = bundle.plan(&budget)?;
+    let whole = Plan::new(bundle, &budget)?;
     let single = drawn(whole)?;
     if whole.is_baked() {
         return Ok([single, single]);
     }
-    let halves = bundle.plan(&budget.in_bytes(whole.scratch_len() - 1))?;
+    let halves = Plan::new(bundle, &budget.in_bytes(whole.scratch_len() - 1))?;
     if halves.head_weights() != HeadWeights::F16 || halves.n_tiers() != whole.n_tiers() {
         return Err(DecodeError::Internal);
     }
@@ -46,7 +46,7 @@ struct Tiles(Digest);
 impl TileSink for Tiles {
     type Error = Infallible;
 
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
+    fn tile(&mut self, Tile { x_px, y_px, width, height, rgb, .. }: Tile<'_>) -> Result<(), Infallible> {
         self.0.add([x_px, y_px, width, height].into_iter().flat_map(u16::to_le_bytes));
         self.0.add(rgb.as_flattened().iter().copied());
         Ok(())

@@ -11,7 +11,7 @@ mod kernels;
 
 use core::fmt;
 
-use pocketsplat_core::{Bundle, DecodeError};
+use pocketsplat_format::{Bundle, DecodeError};
 
 static BUNDLES: [(&str, &[u8]); 3] = [
     ("static", include_bytes!(env!("PSB_STATIC"))),

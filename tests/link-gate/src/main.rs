@@ -9,11 +9,11 @@ use core::convert::Infallible;
 use core::hint::black_box;
 use core::panic::PanicInfo;
 
-use pocketsplat_core::bundle::AnchorSite;
 use pocketsplat_core::{
-    Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, MaxSplats, RenderError, Residency, Rotation,
+    Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, MaxSplats, Plan, RenderError, Residency, Rotation,
     ScratchShape, Strips,
 };
+use pocketsplat_format::bundle::AnchorSite;
 
 /// The linker's entry point; `black_box` hides every argument, so no branch of the decoder is known to be dead.
 #[expect(unsafe_code, reason = "the linker looks for this very name")]
@@ -39,7 +39,7 @@ extern "C" fn _start() -> ! {
 fn draw(bytes: &[u8], camera: &Camera, scratch: &mut [u8]) -> Result<FrameReport, RenderError<Infallible>> {
     let bundle = Bundle::parse(bytes)?;
     let [max_splats, residency, strips] = black_box([0_u8; 3]);
-    let budget = Budget::for_frame(camera.width_px, camera.height_px)
+    let mut budget = Budget::for_frame(camera.width_px, camera.height_px)
         .in_bytes(black_box(ScratchShape::most(black_box(16), 4).scratch_len()))
         .with_tiers(black_box(u8::MAX))
         .with_max_splats(match max_splats {
@@ -54,13 +54,10 @@ fn draw(bytes: &[u8], camera: &Camera, scratch: &mut [u8]) -> Result<FrameReport
             _ => Residency::Streamed,
         })
         .with_strips(if strips == 0 { Strips::Auto } else { Strips::Exactly(strips) });
-    let plan = bundle.plan(&budget)?;
+    budget.skips_damage = black_box(false);
+    let plan = Plan::new(&bundle, &budget)?;
     black_box((plan.work(), plan.pruning_rate(), plan.n_strips(), plan.is_resident(), plan.is_baked()));
-    let mut decoder = if black_box(true) {
-        Decoder::bind(&bundle, plan, scratch)?
-    } else {
-        Decoder::bind_skipping_damage(&bundle, plan, scratch)?
-    };
+    let mut decoder = Decoder::bind(&bundle, plan, scratch)?;
     let camera = camera.resized(black_box(1), black_box(1));
     #[cfg(feature = "orbit")]
     let camera = camera.orbited(black_box(1.0));
@@ -107,7 +104,7 @@ mod drawing {
 #[cfg(not(feature = "embedded-graphics"))]
 mod display {
     use super::*;
-    use pocketsplat_core::TileSink;
+    use pocketsplat_core::{Tile, TileSink};
 
     /// A display that keeps nothing.
     struct Display;
@@ -115,7 +112,7 @@ mod display {
     impl TileSink for Display {
         type Error = Infallible;
 
-        fn tile(&mut self, x_px: u16, y_px: u16, width: u16, height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
+        fn tile(&mut self, Tile { x_px, y_px, width, height, rgb, .. }: Tile<'_>) -> Result<(), Infallible> {
             black_box((x_px, y_px, width, height, rgb));
             Ok(())
         }
@@ -134,7 +131,7 @@ mod display {
     use embedded_graphics_core::geometry::{Dimensions, Point, Size};
     use embedded_graphics_core::pixelcolor::Rgb888;
     use embedded_graphics_core::primitives::Rectangle;
-    use pocketsplat_core::display::DisplaySink;
+    use pocketsplat_core::DisplaySink;
 
     /// A display that keeps nothing.
     struct Display;

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 use pocketsplat_capture::camera::Camera;
-use pocketsplat_core::math::{exp, sigmoid, tanh};
+use pocketsplat_format::math::{exp, sigmoid, tanh};
 use pocketsplat_kernels::ops::heads::head_input;
 use pocketsplat_kernels::ops::loss::normality::{ChannelMoments, Weights};
 use pocketsplat_kernels::ops::loss::ssim;

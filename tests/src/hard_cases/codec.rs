@@ -1,7 +1,7 @@
 //! Symbols at and beyond the ends of their tables, under both coders.
 
 use pocketsplat_codec::bundle::{self, ChannelCoding, WriteOptions};
-use pocketsplat_core::Bundle;
+use pocketsplat_format::Bundle;
 use pocketsplat_kernels::scene::Scene;
 
 use super::picture::{camera, codec_error};

@@ -24,7 +24,7 @@ fn scene() -> Scene<f32> {
 
 #[cfg(test)]
 mod tests {
-    use pocketsplat_core::Bundle;
+    use pocketsplat_format::Bundle;
 
     use crate::frame::{BACKGROUND, draw, to_core};
     use crate::hard_cases::{Figures, Picture, picture::camera};

@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_codec::bundle::{self, WriteOptions, decoded_scene};
 use pocketsplat_codec::render::reference::ReferenceScene;
-use pocketsplat_core::Bundle;
+use pocketsplat_format::Bundle;
 use pocketsplat_kernels::camera::host_camera;
 use pocketsplat_kernels::ops::Pinhole;
 use pocketsplat_kernels::scene::QuantisationSteps;

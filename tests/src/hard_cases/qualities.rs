@@ -19,10 +19,9 @@ All pictures of the families above that have one camera to compare with are draw
 that draws by the same rules, in steps of 8 bits. What a level leaves out is its purpose and no error. Errors are
 
 - a contribution at the cut that is drawn here and not there: 2 steps at `BALANCED` and 8 at `DRAFT`, where an exact frame has 1;
-- what comes behind a pixel that is finished here and not there: 0.1 % and 1 % of the light, 0.3 and 2.6 steps;
 - half a step for rounding, and the last splat of an opaque stack as in exact frames.
 
-Together: 3.5 and 12. Where a whole tile lies at such a jump, as behind a stack of even layers, its mean may be as far off as the light
+Together less than 3.5 and 12. Where a whole tile lies at such a jump, as behind a stack of even layers, its mean may be as far off as the light
 behind it: 2 and 4.";
 
 /// The worst channel of all pictures, and the worst mean of a tile, against the oracle; steps of 8 bits.

@@ -5,7 +5,7 @@ use std::f32::consts::PI;
 use glam::DVec3;
 use pocketsplat_capture::dataset::{self, LoadOptions};
 use pocketsplat_codec::bundle::{self, WriteOptions};
-use pocketsplat_core::{Bundle, Rotation};
+use pocketsplat_format::{Bundle, Rotation};
 use pocketsplat_kernels::scene::Scene;
 
 use super::blobs::{Blob, Blobs};

@@ -1,7 +1,7 @@
 //! Every picture again, in the arithmetics that are meant for use.
 
 use pocketsplat_codec::bundle::{self, WriteOptions};
-use pocketsplat_core::Bundle;
+use pocketsplat_format::Bundle;
 use pocketsplat_trainer::cost::ArithmeticChoice;
 
 use super::picture::worst_tile;
@@ -10,7 +10,7 @@ use crate::difference::worse;
 use crate::frame::{draw, draw_in, info_for, to_core};
 
 const ANSWER: &str = "\
-Functions of a table change a channel by a step where the reference arithmetic draws everything, and no tile visibly. Integer heads turn the
+Without an FPU a frame is drawn with functions of a table and integer heads. Functions of a table change a channel by a step where the reference arithmetic draws everything, and no tile visibly. Integer heads turn the
 longest needles by a tenth of a pixel, which is seen along their edges alone.";
 
 const ANALYSIS: &str = "\
@@ -50,10 +50,8 @@ fn worst(choice: ArithmeticChoice) -> [f64; 2] {
 pub(super) fn family() -> Family {
     const WHAT: &str = "all pictures, against the reference arithmetic";
     let cases: Vec<Case> = vec![
-        error("functions of a table", WHAT, "worst channel, steps", 4.5, || worst(ArithmeticChoice::Table)[0]),
-        error("functions of a table, tiles", WHAT, "worst tile, steps", 3.2, || worst(ArithmeticChoice::Table)[1]),
-        error("integer heads", WHAT, "worst channel, steps", 32.0, || worst(ArithmeticChoice::I16)[0]),
-        error("integer heads, tiles", WHAT, "worst tile, steps", 4.0, || worst(ArithmeticChoice::I16)[1]),
+        error("without an FPU", WHAT, "worst channel, steps", 32.0, || worst(ArithmeticChoice::WithoutFpu)[0]),
+        error("without an FPU, tiles", WHAT, "worst tile, steps", 4.0, || worst(ArithmeticChoice::WithoutFpu)[1]),
     ];
     Family { title: "Other arithmetics", answer: ANSWER, analysis: ANALYSIS, cases }
 }

@@ -1,7 +1,7 @@
 //! Scenes that have no volume, or no anchor.
 
 use pocketsplat_codec::bundle::{self, WriteOptions};
-use pocketsplat_core::Bundle;
+use pocketsplat_format::Bundle;
 use pocketsplat_kernels::scene::Scene;
 
 use super::blobs::{Blob, Blobs};

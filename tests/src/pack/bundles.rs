@@ -10,8 +10,8 @@ mod sections;
 mod tiers;
 
 use glam::DVec3;
-use pocketsplat_core::Camera;
-use pocketsplat_core::bundle::Effects;
+use pocketsplat_format::Camera;
+use pocketsplat_format::bundle::Effects;
 
 use super::draft::{Draft, group_of, n_channels, n_log_scales};
 use super::heads::Widths;

@@ -1,6 +1,6 @@
 //! Context sections of chosen integers.
 
-use pocketsplat_core::context::{ContextHead, GridFrame, GridLevel, LevelKind, N_GROUPS, N_LEVELS, first_tap};
+use pocketsplat_format::context::{ContextHead, GridFrame, GridLevel, LevelKind, N_GROUPS, N_LEVELS, first_tap};
 
 use super::numbers::Numbers;
 

@@ -3,13 +3,13 @@
 //! The trainer's writer makes only what a training ends in; a draft makes everything that the format allows, and with
 //! [`assembled`] what it does not.
 
-use pocketsplat_core::bundle::{
+use pocketsplat_core::{Bundle, Camera, SectionKind, count_gaussians, count_scratch_len};
+use pocketsplat_format::bundle::{
     ChunkRecord, Effects, Features, Header, InkFrame, PROTOCOL_CODE, Section, SectionBytes, Tier, TierMeasures, crc32,
     header_len,
 };
-use pocketsplat_core::context::{Context, N_GROUPS};
-use pocketsplat_core::entropy::{FREQUENCY_TOTAL, MaskModel, N_MASK_CONTEXTS};
-use pocketsplat_core::{Bundle, Camera, SectionKind, count_gaussians, count_scratch_len};
+use pocketsplat_format::context::{Context, N_GROUPS};
+use pocketsplat_format::entropy::{FREQUENCY_TOTAL, MaskModel, N_MASK_CONTEXTS};
 
 use super::heads::{HeadDraft, Widths, coded_section, plain_section};
 use super::ink::{self, InkBox};

@@ -6,8 +6,8 @@ use std::io::Cursor;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder as _};
 use pocketsplat_codec::bundle::for_each_chunk;
-use pocketsplat_core::bundle::{Features, crc32};
 use pocketsplat_core::{Budget, Bundle, Camera, DecodeError};
+use pocketsplat_format::bundle::{Features, crc32};
 
 use super::models::Anchor;
 use super::sample::Sample;

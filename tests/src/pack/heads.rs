@@ -1,6 +1,6 @@
 //! Heads of chosen weights.
 
-use pocketsplat_core::bundle::Effects;
+use pocketsplat_format::bundle::Effects;
 
 use super::models::TableDraft;
 use super::numbers::Numbers;

@@ -1,7 +1,7 @@
 //! The boxes that enclose what a chunk can draw.
 
-use pocketsplat_core::bundle::InkFrame;
-use pocketsplat_core::rules::INK_DEVIATIONS;
+use pocketsplat_format::bundle::InkFrame;
+use pocketsplat_format::rules::INK_DEVIATIONS;
 
 use super::models::Anchor;
 

@@ -1,8 +1,8 @@
 //! What codes the channels of an anchor: tables, or a context.
 
-use pocketsplat_core::bundle::{FrequencyTable, Tables};
-use pocketsplat_core::context::{Context, Group, N_GROUPS, Steps, Trail};
-use pocketsplat_core::entropy::{FREQUENCY_TOTAL, NormalModel};
+use pocketsplat_format::bundle::{FrequencyTable, Tables};
+use pocketsplat_format::context::{Context, Group, N_GROUPS, Steps, Trail};
+use pocketsplat_format::entropy::{FREQUENCY_TOTAL, NormalModel};
 
 use super::stream::{Slots, frequencies, raw};
 

@@ -1,7 +1,7 @@
 //! Cells as codes, and codes as a trie: the coder's side of section 4.
 
-use pocketsplat_core::bundle::Lattice;
-use pocketsplat_core::entropy::{FREQUENCY_TOTAL, N_TRIE_CONTEXTS, TrieModel};
+use pocketsplat_format::bundle::Lattice;
+use pocketsplat_format::entropy::{FREQUENCY_TOTAL, N_TRIE_CONTEXTS, TrieModel};
 
 use super::stream::{Slots, frequencies};
 

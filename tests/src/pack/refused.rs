@@ -9,9 +9,9 @@ mod positions;
 mod sections;
 mod tables;
 
-use pocketsplat_core::bundle::{Effects, HEADER_FIXED_LEN, SECTION_LEN};
-use pocketsplat_core::context::{GridFrame, LevelKind};
 use pocketsplat_core::{Bundle, DecodeError, Residency};
+use pocketsplat_format::bundle::{Effects, HEADER_FIXED_LEN, SECTION_LEN};
+use pocketsplat_format::context::{GridFrame, LevelKind};
 use std::ops::Range;
 
 use super::bundles::{anchors, front};

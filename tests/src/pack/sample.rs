@@ -1,7 +1,7 @@
 //! A bundle of the pack as its author has it.
 
-use pocketsplat_core::Camera;
-use pocketsplat_core::bundle::Effects;
+use pocketsplat_format::Camera;
+use pocketsplat_format::bundle::Effects;
 
 use super::models::Anchor;
 

@@ -1,7 +1,7 @@
 //! Bundles whose Gaussians are chosen one by one, for what drawing does at its limits.
 
-use pocketsplat_core::bundle::Effects;
-use pocketsplat_core::{Camera, Rotation};
+use pocketsplat_format::bundle::Effects;
+use pocketsplat_format::{Camera, Rotation};
 
 use super::draft::{CoderDraft, Draft, n_channels};
 use super::heads::{HeadDraft, Widths, shapes};

@@ -1,6 +1,6 @@
 //! The coder's side of section 9: slots in the order in which a decoder meets them, as words.
 
-use pocketsplat_core::entropy::{FREQUENCY_TOTAL, PRECISION_BITS};
+use pocketsplat_format::entropy::{FREQUENCY_TOTAL, PRECISION_BITS};
 
 /// Where a symbol's slots begin, and how many they are.
 pub type Slots = (u16, u16);

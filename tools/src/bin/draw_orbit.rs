@@ -7,7 +7,7 @@ use anyhow::Context as _;
 use clap::Parser;
 use pocketsplat_codec::bundle;
 use pocketsplat_codec::render::decoder::image_of;
-use pocketsplat_core::{Budget, Bundle, Decoder, Overflow};
+use pocketsplat_core::{Budget, Bundle, Decoder, Overflow, Plan};
 
 /// Draws an orbit of a bundle's preview, as PPM files `frame0.ppm` and so on.
 #[derive(Parser)]
@@ -40,7 +40,7 @@ fn main() -> anyhow::Result<()> {
     let [width_px, height_px] = args.size.unwrap_or([preview.width_px, preview.height_px]);
     let preview = preview.resized(width_px, height_px);
     let budget = Budget::for_frame(width_px, height_px).in_bytes(args.bytes);
-    let plan = bundle.plan(&budget).or_else(|_| bundle.plan(&budget.with_overflow(Overflow::Slabs)))?;
+    let plan = Plan::new(&bundle, &budget).or_else(|_| Plan::new(&bundle, &budget.with_overflow(Overflow::Slabs)))?;
     let mut scratch = vec![0; plan.scratch_len()];
     let mut decoder = Decoder::bind(&bundle, plan, &mut scratch)?;
     fs::create_dir_all(&args.out).with_context(|| format!("cannot make {}", args.out.display()))?;

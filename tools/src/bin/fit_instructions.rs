@@ -9,7 +9,7 @@ use anyhow::{Context as _, bail, ensure};
 use clap::Parser;
 use pocketsplat_codec::bundle;
 use pocketsplat_codec::render::decoder::image_of;
-use pocketsplat_core::{Budget, Bundle, Decoder, Overflow, Stage};
+use pocketsplat_core::{Budget, Bundle, Decoder, Overflow, Plan, Stage};
 use pocketsplat_instructions::{Costs, InstructionSet, N_TERMS, Term, terms};
 
 /// Most that a frame may differ from its prediction.
@@ -96,7 +96,8 @@ fn read(path: &Path, folders: &[PathBuf]) -> anyhow::Result<Vec<Frame>> {
         let n_frames: u8 = n_frames.parse()?;
         let budget = Budget::for_frame(size_px[0], size_px[1]).in_bytes(scratch.parse()?);
         // As the firmware.
-        let plan = bundle.plan(&budget).or_else(|_| bundle.plan(&budget.with_overflow(Overflow::Slabs)))?;
+        let plan =
+            Plan::new(&bundle, &budget).or_else(|_| Plan::new(&bundle, &budget.with_overflow(Overflow::Slabs)))?;
         let mut memory = vec![0; plan.scratch_len()];
         let mut decoder = Decoder::bind(&bundle, plan, &mut memory)?;
         let preview = bundle.header().preview.resized(size_px[0], size_px[1]);

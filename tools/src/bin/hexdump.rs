@@ -11,12 +11,12 @@ use glam::{DMat3, DVec3};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::Normalisation;
 use pocketsplat_codec::bundle::{self, BundleInfo, ChannelCoding, WriteOptions, annotate::annotate};
-use pocketsplat_core::context::{GridFrame, GridLevel, LevelKind};
+use pocketsplat_format::context::{GridFrame, GridLevel, LevelKind};
 use pocketsplat_kernels::scene::QuantisationSteps;
 use pocketsplat_kernels::scene::{Anchors, ContextModel, Heads, ModelShape, Scene};
 
 /// The document when none is named.
-const FORMAT_DOC: &str = "decoder-core/src/bundle/FORMAT.md";
+const FORMAT_DOC: &str = "decoder-format/src/bundle/FORMAT.md";
 /// Steps of the example with tables.
 const STEPS: QuantisationSteps = QuantisationSteps { feature: 0.25, log_scale: 0.25, offset: 0.25 };
 /// The examples: name in the document's markers, coding, bundle beside the document.

@@ -1,4 +1,4 @@
-//! Writes the frequency tables of integer Gaussians, or checks them: as source (`decoder-core/src/entropy/normal/tables.rs`), and as
+//! Writes the frequency tables of integer Gaussians, or checks them: as source (`decoder-format/src/entropy/normal/tables.rs`), and as
 //! little-endian u16 beside the format's description, whose checksum it names.
 //!
 //!     cargo run -p tools --bin normal_tables -- --write
@@ -7,14 +7,14 @@
 use std::fmt::Write as _;
 
 use anyhow::{Result, bail, ensure};
-use pocketsplat_core::bundle::crc32;
-use pocketsplat_core::entropy::{
+use pocketsplat_format::bundle::crc32;
+use pocketsplat_format::entropy::{
     EIGHTHS, FREQUENCY_TOTAL, N_NORMAL_SHORT_CUTS, N_PHASES, N_SCALES, NORMAL_WINDOW, SCALE_ONE,
 };
 
-const SOURCE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../decoder-core/src/entropy/normal/tables.rs");
-const BINARY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../decoder-core/src/bundle/normal_tables.bin");
-const DOCUMENT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../decoder-core/src/bundle/FORMAT.md");
+const SOURCE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../decoder-format/src/entropy/normal/tables.rs");
+const BINARY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../decoder-format/src/bundle/normal_tables.bin");
+const DOCUMENT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../decoder-format/src/bundle/FORMAT.md");
 
 fn main() -> Result<()> {
     let (scales, bounds) = tables();

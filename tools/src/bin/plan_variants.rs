@@ -8,8 +8,8 @@ use anyhow::ensure;
 use clap::Parser;
 use pocketsplat_capture::dataset::{self, LoadOptions};
 use pocketsplat_codec::bundle;
-use pocketsplat_core::bundle::STRIPS;
-use pocketsplat_core::{Budget, Bundle, Camera, Decoder, FrameReport, Residency, Strips, TileSink};
+use pocketsplat_core::{Budget, Bundle, Camera, Decoder, FrameReport, Plan, Residency, Strips, Tile, TileSink};
+use pocketsplat_format::bundle::STRIPS;
 use pocketsplat_kernels::camera::core_camera;
 
 /// Draws views of a bundle by every plan variant there is and prints what each takes.
@@ -46,8 +46,8 @@ struct Nowhere;
 impl TileSink for Nowhere {
     type Error = Infallible;
 
-    fn tile(&mut self, _x_px: u16, _y_px: u16, _width: u16, _height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
-        std::hint::black_box(rgb);
+    fn tile(&mut self, tile: Tile<'_>) -> Result<(), Infallible> {
+        std::hint::black_box(tile.rgb);
         Ok(())
     }
 }
@@ -69,7 +69,7 @@ fn main() -> anyhow::Result<()> {
                 .with_tiers(args.tiers)
                 .with_residency(residency)
                 .with_strips(Strips::Exactly(n_strips));
-            let plan = bundle.plan(&budget)?;
+            let plan = Plan::new(&bundle, &budget)?;
             let decoder = Decoder::bind(&bundle, plan, vec![0; plan.scratch_len()].leak())?;
             let (scratch_len, reports) = (plan.scratch_len(), Vec::new());
             variants.push(Variant { residency, n_strips, scratch_len, decoder, time_ms: 0.0, reports });

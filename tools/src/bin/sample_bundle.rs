@@ -11,7 +11,7 @@ use glam::{DMat3, DQuat, DVec3};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::Normalisation;
 use pocketsplat_codec::bundle::{self, BundleInfo, ChannelCoding, WriteOptions};
-use pocketsplat_core::context::{GridFrame, GridLevel, LevelKind};
+use pocketsplat_format::context::{GridFrame, GridLevel, LevelKind};
 use pocketsplat_kernels::scene::{Anchors, ContextModel, Head, Heads, ModelShape, Scene};
 
 /// Writes a small bundle made by hand.

@@ -6,9 +6,9 @@ use anyhow::{Context, Result, bail};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Background, Capture, View};
 use pocketsplat_codec::bundle::{for_each_chunk, normalisation_of, protocol_of};
-use pocketsplat_core::Bundle;
-use pocketsplat_core::bundle::crc32;
 use pocketsplat_files::FileKind;
+use pocketsplat_format::Bundle;
+use pocketsplat_format::bundle::crc32;
 use pocketsplat_viewer::SceneFile;
 use serde::Deserialize;
 

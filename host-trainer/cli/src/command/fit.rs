@@ -8,7 +8,6 @@ use anyhow::{Context, Result, bail};
 use bytesize::ByteSize;
 use pocketsplat_capture::dataset::FrameSize;
 use pocketsplat_codec::verify::Trial;
-use pocketsplat_core::budget::MAX_FRAME_PX;
 use pocketsplat_core::{Budget, Bundle, DecodeError, Overflow, Plan};
 use pocketsplat_instructions::predict;
 use pocketsplat_trainer::device::Processor;
@@ -127,10 +126,11 @@ pub(crate) fn frame_budget(bundle: &Bundle<'_>, size: Option<FrameSize>) -> Resu
     let [width_px, height_px] = match size {
         None => bundle.header().training_px,
         Some(FrameSize { width_px, height_px }) => {
-            let side = |px: u32| u16::try_from(px).ok().filter(|&px| px <= MAX_FRAME_PX);
+            let most_px = Budget::MAX_FRAME_PX;
+            let side = |px: u32| u16::try_from(px).ok().filter(|&px| px <= most_px);
             let sides = side(width_px).zip(side(height_px));
             let Some((width_px, height_px)) = sides else {
-                bail!("the decoder draws frames of up to {MAX_FRAME_PX} px a side, not {width_px}x{height_px}");
+                bail!("the decoder draws frames of up to {most_px} px a side, not {width_px}x{height_px}");
             };
             [width_px, height_px]
         }
@@ -141,7 +141,7 @@ pub(crate) fn frame_budget(bundle: &Bundle<'_>, size: Option<FrameSize>) -> Resu
 /// The best plan within `ram_bytes`; an error that names the bytes that would do.
 pub(crate) fn plan_within(bundle: &Bundle<'_>, frame: &Budget, ram_bytes: u64) -> Result<Plan> {
     let budget = frame.in_bytes(usize::try_from(ram_bytes).unwrap_or(usize::MAX));
-    bundle.plan(&budget).map_err(|error| match error {
+    Plan::new(bundle, &budget).map_err(|error| match error {
         DecodeError::BudgetTooSmall { needed, .. } => anyhow::anyhow!(
             "the smallest scene of this bundle takes {needed} bytes for {}x{} px; give --ram {needed} or more, a smaller \
              --resolution, {}or train a bundle for this memory with --ram {ram_bytes}",
@@ -188,13 +188,13 @@ fn point(bundle: &Bundle<'_>, ram_bytes: u64, plan: &Plan) -> Point {
 fn ladder(bundle: &Bundle<'_>, frame: &Budget) -> Result<Vec<(u64, Plan)>> {
     let mut plans = Vec::new();
     // What the best plan within a budget leaves out of it, the next smaller budget lacks.
-    let mut ram_bytes = bundle.plan(frame)?.scratch_len();
+    let mut ram_bytes = Plan::new(bundle, frame)?.scratch_len();
     loop {
-        match bundle.plan(&frame.in_bytes(ram_bytes)) {
+        match Plan::new(bundle, &frame.in_bytes(ram_bytes)) {
             Ok(plan) => {
                 // What it takes beyond saves passes, from place to place.
                 let least_len = plan.least_len();
-                plans.push((least_len as u64, bundle.plan(&frame.in_bytes(least_len))?));
+                plans.push((least_len as u64, Plan::new(bundle, &frame.in_bytes(least_len))?));
                 ram_bytes = least_len.saturating_sub(1);
             }
             Err(DecodeError::BudgetTooSmall { .. }) => break,

@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Background, Capture, FrameSize};
-use pocketsplat_core::budget::MAX_FRAME_PX;
+use pocketsplat_core::Budget;
 use pocketsplat_files::shell_word;
 use pocketsplat_trainer::explicit::bulk::Bulk;
 use pocketsplat_trainer::explicit::pictures::{Pictures, capture};
@@ -202,9 +202,10 @@ fn seen(args: &Args, size: Option<FrameSize>, file: &GaussiansFile) -> Result<Se
         }
     };
     let largest = all.iter().map(|camera| camera.width_px.max(camera.height_px)).max().unwrap_or(0);
-    if largest > u32::from(MAX_FRAME_PX) {
+    let most_px = Budget::MAX_FRAME_PX;
+    if largest > u32::from(most_px) {
         bail!(
-            "pictures of {largest} px are wider or higher than the {MAX_FRAME_PX} px that the decoder draws; use --resolution"
+            "pictures of {largest} px are wider or higher than the {most_px} px that the decoder draws; use --resolution"
         );
     }
     let (mut train, mut test) = (Vec::new(), Vec::new());

@@ -7,8 +7,8 @@ use std::path::PathBuf;
 use anyhow::Result;
 use pocketsplat_codec::bundle::annotate::annotate;
 use pocketsplat_codec::bundle::{SizePart, SizeReport, decoded_scene};
-use pocketsplat_core::Bundle;
-use pocketsplat_core::bundle::TierMeasures;
+use pocketsplat_format::Bundle;
+use pocketsplat_format::bundle::TierMeasures;
 use pocketsplat_instructions::level::Profile;
 use pocketsplat_kernels::camera::host_camera;
 use serde_json::{Value, json};
@@ -67,7 +67,7 @@ fn facts(bundle: &Bundle<'_>, size: &SizeReport) -> Result<Value> {
     let ideal_bytes = size.ideal.total() / 8.0;
     let scene = decoded_scene(bundle)?;
     Ok(json!({
-        "format_version": pocketsplat_core::bundle::VERSION,
+        "format_version": pocketsplat_format::bundle::VERSION,
         "profile": Profile::of(&header.features).to_string(),
         "coder": if header.features.context { "context" } else { "static" },
         "n_anchors": size.n_anchors,
@@ -118,7 +118,7 @@ fn deviations(values: &[f32], n_columns: usize) -> [f64; 3] {
 /// The scene of one tier and those before it.
 struct Tier {
     number: u8,
-    content: pocketsplat_core::bundle::Tier,
+    content: pocketsplat_format::bundle::Tier,
     /// Length of the file cut here.
     bytes: u32,
     measures: TierMeasures,

@@ -4,8 +4,8 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result};
 use pocketsplat_capture::dataset::{Capture, Split};
-use pocketsplat_core::bundle::crc32;
 use pocketsplat_files::Outputs;
+use pocketsplat_format::bundle::crc32;
 use pocketsplat_metrics::Lpips;
 use pocketsplat_trainer::train::modules::pruning::Form;
 

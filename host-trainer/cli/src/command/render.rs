@@ -11,8 +11,8 @@ use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Image, Split, View};
 use pocketsplat_codec::render::decoder::core_image;
 use pocketsplat_codec::render::reference::ReferenceScene;
-use pocketsplat_core::Bundle;
 use pocketsplat_files::Outputs;
+use pocketsplat_format::Bundle;
 use rayon::prelude::*;
 
 use super::bundle::BundleFile;

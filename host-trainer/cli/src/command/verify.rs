@@ -13,9 +13,8 @@ use pocketsplat_codec::render::reference::ReferenceScene;
 use pocketsplat_codec::verify::{
     Violation, declared_levels, exact_bytes, keeps_level, memory_does_not_show, variants_match, work_is_bounded,
 };
-use pocketsplat_core::budget::MAX_STRIPS;
-use pocketsplat_core::bundle::crc32;
 use pocketsplat_core::{Budget, Bundle, Camera, Plan, Residency, Strips};
+use pocketsplat_format::bundle::crc32;
 use pocketsplat_instructions::level::{Bound, Level};
 use pocketsplat_kernels::camera::core_camera;
 use pocketsplat_kernels::camera::host_camera;
@@ -124,7 +123,7 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     let drawn = drawn.collect::<Result<Vec<_>, _>>()?;
     if measured {
         // The manifest's maxima are over these views, for the whole frame at once.
-        let whole = bundle.plan(&budget.with_tiers(plan.n_tiers()))?;
+        let whole = Plan::new(&bundle, &budget.with_tiers(plan.n_tiers()))?;
         properties.push(property(
             "work is within what was predicted",
             drawn.iter().map(|frame| {
@@ -147,8 +146,8 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     }
     properties.push(reference_property(&file, &bundle, plan.n_tiers(), &cameras)?);
     let whole_scene_bytes = if plan.n_tiers() < bundle.n_tiers() {
-        let whole = budget.with_residency(Residency::Streamed).with_strips(Strips::Exactly(MAX_STRIPS));
-        Some(bundle.plan(&whole)?.scratch_len())
+        let whole = budget.with_residency(Residency::Streamed).with_strips(Strips::Exactly(Budget::MAX_STRIPS));
+        Some(Plan::new(&bundle, &whole)?.scratch_len())
     } else {
         None
     };

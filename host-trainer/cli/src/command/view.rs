@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
-use pocketsplat_core::Bundle;
 use pocketsplat_files::{Output, Outputs, shell_word};
+use pocketsplat_format::Bundle;
 use pocketsplat_viewer::{SceneFile, package, page};
 
 use super::bundle::BundleFile;

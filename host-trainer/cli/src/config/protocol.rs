@@ -5,7 +5,7 @@ use std::fmt;
 use anyhow::Result;
 use pocketsplat_capture::dataset::{Background, Capture, LoadOptions};
 use pocketsplat_codec::bundle::MAX_PROTOCOL_LEN;
-use pocketsplat_core::bundle::crc32;
+use pocketsplat_format::bundle::crc32;
 use serde::{Deserialize, Serialize};
 
 use super::spread::spread;

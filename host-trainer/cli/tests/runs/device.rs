@@ -2,8 +2,8 @@
 
 use std::fs;
 
-use pocketsplat_core::bundle::{HEADER_FIXED_LEN, MANIFEST_RECORD_LEN, SECTION_LEN, crc32};
-use pocketsplat_core::{Budget, Bundle, SectionKind};
+use pocketsplat_core::{Budget, Bundle, Plan, SectionKind};
+use pocketsplat_format::bundle::{HEADER_FIXED_LEN, MANIFEST_RECORD_LEN, SECTION_LEN, crc32};
 
 use crate::fixture::{capture, fails, folder, pocketsplat, succeeds, train};
 
@@ -16,7 +16,7 @@ fn a_bundle_for_a_device_fits_it_and_passes_its_verification() {
     let bundle = Bundle::parse(&bytes).unwrap();
     let frame = Budget::for_frame(32, 32);
     let all_of = |bundle: &Bundle<'_>, ram| {
-        bundle.plan(&frame.in_bytes(ram)).is_ok_and(|plan| plan.n_tiers() == bundle.n_tiers())
+        Plan::new(bundle, &frame.in_bytes(ram)).is_ok_and(|plan| plan.n_tiers() == bundle.n_tiers())
     };
     let lowest = (1..).find(|&ram| all_of(&bundle, 64 * ram)).unwrap() * 64;
     // `verify` holds what it can draw to the properties, and does not hide that it is a part.
@@ -24,7 +24,7 @@ fn a_bundle_for_a_device_fits_it_and_passes_its_verification() {
         let run = pocketsplat().arg("verify").arg(&free).args(["--ram", &ram.to_string()]).output().unwrap();
         String::from_utf8(run.stdout).unwrap()
     };
-    let part = (1..lowest / 64).rfind(|&ram| bundle.plan(&frame.in_bytes(64 * ram)).is_ok()).unwrap() * 64;
+    let part = (1..lowest / 64).rfind(|&ram| Plan::new(&bundle, &frame.in_bytes(64 * ram)).is_ok()).unwrap() * 64;
     assert!(verified(part).contains("the whole scene takes "), "{}", verified(part));
     assert!(!verified(lowest).contains("the whole scene takes "), "{}", verified(lowest));
     // Less than the free scene takes as a whole, and less flash.
@@ -38,7 +38,7 @@ fn a_bundle_for_a_device_fits_it_and_passes_its_verification() {
     let bytes = fs::read(&output).unwrap();
     assert!(bytes.len() <= flash, "{} bytes for a flash of {flash}", bytes.len());
     let bundle = Bundle::parse(&bytes).unwrap();
-    let plan = bundle.plan(&frame.in_bytes(ram)).expect("a part of it fits");
+    let plan = Plan::new(&bundle, &frame.in_bytes(ram)).expect("a part of it fits");
     assert!(all_of(&bundle, ram), "{plan:?}");
     assert!(plan.scratch_len() <= ram && bundle.n_anchors() > 0, "{plan:?}");
     let ram = ram.to_string();

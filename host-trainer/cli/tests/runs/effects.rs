@@ -4,8 +4,8 @@ use std::fs;
 use std::path::PathBuf;
 use std::process::Command;
 
-use pocketsplat_core::Bundle;
-use pocketsplat_core::bundle::Effects;
+use pocketsplat_format::Bundle;
+use pocketsplat_format::bundle::Effects;
 
 use crate::fixture::{fails, folder, pocketsplat, resume, starts, succeeds, text, train};
 use crate::interruption::signal;

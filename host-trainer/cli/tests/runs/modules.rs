@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use pocketsplat_core::Bundle;
+use pocketsplat_format::Bundle;
 
 use crate::fixture::{fails, folder, pocketsplat, resume, starts, succeeds, text, train, wait_for};
 

@@ -3,12 +3,12 @@
 use std::convert::Infallible;
 use std::fs;
 
-use pocketsplat_core::{Budget, Bundle, Decoder, TileSink};
+use pocketsplat_core::{Budget, Bundle, Decoder, Plan, Tile, TileSink};
 
 use crate::fixture::{capture, fails, folder, pocketsplat, succeeds, text};
 
 /// A bundle of three anchors, whose preview has 32×24 pixels.
-const EXAMPLE: &[u8] = include_bytes!("../../../../decoder-core/src/bundle/example.psb");
+const EXAMPLE: &[u8] = include_bytes!("../../../../decoder-format/src/bundle/example.psb");
 
 /// A display that keeps its pixels.
 struct Display(image::RgbImage);
@@ -16,7 +16,7 @@ struct Display(image::RgbImage);
 impl TileSink for Display {
     type Error = Infallible;
 
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, _height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
+    fn tile(&mut self, Tile { x_px, y_px, width, rgb, .. }: Tile<'_>) -> Result<(), Infallible> {
         for (y, row) in (u32::from(y_px)..).zip(rgb.chunks_exact(width.into())) {
             for (x, &pixel) in (u32::from(x_px)..).zip(row) {
                 self.0.put_pixel(x, y, image::Rgb(pixel));
@@ -29,7 +29,7 @@ impl TileSink for Display {
 /// The first frame of a device with 8 KiB for it.
 fn first_frame(width_px: u16, height_px: u16) -> image::RgbImage {
     let bundle = Bundle::parse(EXAMPLE).unwrap();
-    let plan = bundle.plan(&Budget::for_frame(width_px, height_px).in_bytes(8 * 1024)).unwrap();
+    let plan = Plan::new(&bundle, &Budget::for_frame(width_px, height_px).in_bytes(8 * 1024)).unwrap();
     let mut scratch = [0; 8 * 1024];
     let mut display = Display(image::RgbImage::new(width_px.into(), height_px.into()));
     let camera = bundle.header().preview.resized(width_px, height_px);

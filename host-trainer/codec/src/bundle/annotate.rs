@@ -3,10 +3,10 @@
 mod dump;
 
 use half::f16;
-use pocketsplat_core::bundle::{ALIGNMENT, AnchorModels, AnchorSite, Chunk, PROTOCOL_CODE, Section};
-use pocketsplat_core::context::{N_LEVELS, N_POSITION_INPUTS, first_tap};
+use pocketsplat_format::bundle::{ALIGNMENT, AnchorModels, AnchorSite, Chunk, PROTOCOL_CODE, Section};
+use pocketsplat_format::context::{N_LEVELS, N_POSITION_INPUTS, first_tap};
 
-use pocketsplat_core::{Bundle, DecodeError, SectionKind};
+use pocketsplat_format::{Bundle, DecodeError, SectionKind};
 
 use dump::Dump;
 
@@ -256,7 +256,7 @@ impl<'f> Annotator<'f> {
             dump.array("ink box, low", 3, u16::from_le_bytes);
             dump.array("ink box, high", 3, u16::from_le_bytes);
         }
-        dump.skip(pocketsplat_core::bundle::CHUNK_RECORD_LEN * (n_chunks - n_shown), "records of other chunks");
+        dump.skip(pocketsplat_format::bundle::CHUNK_RECORD_LEN * (n_chunks - n_shown), "records of other chunks");
     }
 
     fn chunks(&mut self) -> Result<(), DecodeError> {

@@ -1,7 +1,7 @@
 //! The slots of an anchor's symbols, under either coder.
 
-use pocketsplat_core::context::Context;
-use pocketsplat_core::entropy::Slot;
+use pocketsplat_format::context::Context;
+use pocketsplat_format::entropy::Slot;
 
 use super::channels::{ChannelName, ContextWork};
 use super::stream::SlotList;

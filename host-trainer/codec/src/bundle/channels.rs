@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use pocketsplat_core::context::{Context, Steps, Trail};
-use pocketsplat_core::entropy::NormalModel;
+use pocketsplat_format::context::{Context, Steps, Trail};
+use pocketsplat_format::entropy::NormalModel;
 
 use super::stream::Part;
 use pocketsplat_kernels::scene::ModelShape;

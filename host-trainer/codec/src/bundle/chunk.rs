@@ -1,7 +1,7 @@
 //! One chunk: the slots of its anchors, one after the other.
 
-use pocketsplat_core::Bundle;
-use pocketsplat_core::bundle::Coder;
+use pocketsplat_format::Bundle;
+use pocketsplat_format::bundle::Coder;
 
 use super::channel_coder::ChannelCoder;
 use super::channels::ContextWork;

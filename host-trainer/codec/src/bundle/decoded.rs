@@ -1,7 +1,7 @@
 //! A bundle as a scene again.
 
-use pocketsplat_core::bundle::{AnchorSite, Chunk, HeadView};
-use pocketsplat_core::{Bundle, DecodeError};
+use pocketsplat_format::bundle::{AnchorSite, Chunk, HeadView};
+use pocketsplat_format::{Bundle, DecodeError};
 
 use pocketsplat_capture::dataset::Normalisation;
 use pocketsplat_kernels::scene::{Anchors, Head, Heads, INITIAL_MASK_LOGIT, ModelShape, Scene};

@@ -1,6 +1,6 @@
 //! The chunks one after the other, and their table of contents: where each tier ends, and each chunk's length, checksum and ink box.
 
-use pocketsplat_core::bundle::{ALIGNMENT, ChunkRecord, Tier, crc32};
+use pocketsplat_format::bundle::{ALIGNMENT, ChunkRecord, Tier, crc32};
 
 use super::ink::{InkBox, frame_around, quantised};
 use super::order::Placement;

@@ -1,6 +1,6 @@
 //! From counts to integer frequencies.
 
-use pocketsplat_core::entropy::FREQUENCY_TOTAL;
+use pocketsplat_format::entropy::FREQUENCY_TOTAL;
 
 /// Frequencies that add up to [`FREQUENCY_TOTAL`] and code `counts` in few bits.
 ///

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use pocketsplat_core::bundle::InkFrame;
-use pocketsplat_core::rules::INK_DEVIATIONS;
+use pocketsplat_format::bundle::InkFrame;
+use pocketsplat_format::rules::INK_DEVIATIONS;
 
 use super::quantise::SymbolRows;
 use pocketsplat_kernels::scene::ModelShape;

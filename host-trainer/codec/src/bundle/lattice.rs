@@ -4,8 +4,8 @@
 //! anchor on trained scenes, where packed coordinates take 20 and more. The idea of coding occupancy by depth is that of
 //! octrees (Meagher 1982); one bit at a time needs three symbols instead of 255, and learns as much from its ancestors.
 
-use pocketsplat_core::bundle::{Lattice, MAX_LATTICE_BITS, MAX_LATTICE_MIN};
-use pocketsplat_core::entropy::{Children, FREQUENCY_TOTAL, N_TRIE_CONTEXTS, Slot, TrieModel};
+use pocketsplat_format::bundle::{Lattice, MAX_LATTICE_BITS, MAX_LATTICE_MIN};
+use pocketsplat_format::entropy::{Children, FREQUENCY_TOTAL, N_TRIE_CONTEXTS, Slot, TrieModel};
 
 use super::WriteError;
 use super::frequencies::frequencies;

@@ -1,10 +1,10 @@
 //! The header and the sections of a coded scene, and the file that they make.
 
-use pocketsplat_core::bundle::{
+use pocketsplat_core::{Bundle, DecodeError, count_gaussians, count_scratch_len};
+use pocketsplat_format::bundle::{
     Effects, Features, Header, MAX_ANCHORS, MAX_CHUNK_ANCHORS, MAX_FEATURE_DIM, MAX_OFFSETS, SectionBytes, TierMeasures,
 };
-use pocketsplat_core::context::N_GROUPS;
-use pocketsplat_core::{Bundle, DecodeError, count_gaussians, count_scratch_len};
+use pocketsplat_format::context::N_GROUPS;
 use pocketsplat_instructions::level::Level;
 
 use super::{BundleInfo, MAX_PROTOCOL_LEN, SizeReport, WriteError};

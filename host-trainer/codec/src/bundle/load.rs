@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use pocketsplat_core::{Bundle, DecodeError};
+use pocketsplat_format::{Bundle, DecodeError};
 
 /// Why a bundle file cannot be used.
 #[derive(Debug, thiserror::Error)]

@@ -1,6 +1,6 @@
 //! Which offsets of an anchor are drawn.
 
-use pocketsplat_core::entropy::{self, FREQUENCY_TOTAL, N_MASK_CONTEXTS, Slot};
+use pocketsplat_format::entropy::{self, FREQUENCY_TOTAL, N_MASK_CONTEXTS, Slot};
 
 use super::stream::{Part, SlotList};
 

@@ -2,7 +2,7 @@
 //!
 //! Stages in the order data flows through them: `order` → `quantise` → `table` or [the context](pocketsplat_kernels::integer_model) → `chunk` → `layout`;
 //! beside them `size` says where the bytes of a bundle went, [`manifest`](crate::manifest) what drawing it takes and [`annotate`] what each
-//! byte means. The format is described in `decoder-core/src/bundle/FORMAT.md`; what reads it is [`pocketsplat_core`], and
+//! byte means. The format is described in `decoder-format/src/bundle/FORMAT.md`; what reads it is [`pocketsplat_core`], and
 //! nothing here decides a decoded symbol or value by itself.
 
 pub mod annotate;
@@ -46,8 +46,8 @@ pub use write::{ChannelCoding, WriteOptions, code, write};
 
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::Normalisation;
-use pocketsplat_core::Bundle;
-use pocketsplat_core::bundle::PROTOCOL_CODE;
+use pocketsplat_format::Bundle;
+use pocketsplat_format::bundle::PROTOCOL_CODE;
 
 /// What a bundle says about its capture besides the scene itself.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use pocketsplat_core::bundle::MAX_TIERS;
+use pocketsplat_format::bundle::MAX_TIERS;
 
 use super::WriteError;
 use super::lattice::LatticeFrame;

@@ -1,6 +1,6 @@
 //! From trained floats to integer symbols.
 
-use pocketsplat_core::context::{Context, Group, N_GROUPS};
+use pocketsplat_format::context::{Context, Group, N_GROUPS};
 use rayon::prelude::*;
 
 use super::WriteError;

@@ -1,7 +1,7 @@
 //! Where the bytes of a bundle went.
 
-use pocketsplat_core::bundle::ALIGNMENT;
-use pocketsplat_core::{Bundle, DecodeError, SectionKind};
+use pocketsplat_format::bundle::ALIGNMENT;
+use pocketsplat_format::{Bundle, DecodeError, SectionKind};
 
 use super::PartBits;
 use super::chunk::{ChunkRows, Models};

@@ -5,7 +5,7 @@ use std::ops::AddAssign;
 
 use constriction::stream::model::{EncoderModel, EntropyModel};
 use constriction::stream::stack::AnsCoder;
-use pocketsplat_core::entropy::{FREQUENCY_TOTAL, PRECISION_BITS, Slot};
+use pocketsplat_format::entropy::{FREQUENCY_TOTAL, PRECISION_BITS, Slot};
 
 /// The precision as `constriction` wants it.
 const PRECISION: usize = PRECISION_BITS as usize;

@@ -5,7 +5,7 @@ mod histogram;
 
 pub(super) use draft::TableDraft;
 use histogram::Histogram;
-use pocketsplat_core::bundle::{FrequencyTable, Tables};
+use pocketsplat_format::bundle::{FrequencyTable, Tables};
 
 use super::channels::ChannelName;
 use super::quantise::SymbolRows;

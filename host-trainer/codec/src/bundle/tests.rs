@@ -12,9 +12,9 @@ mod tiers;
 use std::collections::BTreeSet;
 
 use glam::{DMat3, DVec3};
-use pocketsplat_core::Bundle;
-use pocketsplat_core::bundle::AnchorSite;
-use pocketsplat_core::context::{GridFrame, GridLevel, LevelKind};
+use pocketsplat_format::Bundle;
+use pocketsplat_format::bundle::AnchorSite;
+use pocketsplat_format::context::{GridFrame, GridLevel, LevelKind};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

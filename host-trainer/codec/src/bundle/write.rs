@@ -1,6 +1,6 @@
 //! From a scene to its coded sections.
 
-use pocketsplat_core::bundle::Features;
+use pocketsplat_format::bundle::Features;
 use rayon::prelude::*;
 
 use super::channel_coder::ChannelCoder;

@@ -1,6 +1,6 @@
 //! What one frame takes, tier by tier.
 
-use pocketsplat_core::bundle::{STRIPS, TierMeasures};
+use pocketsplat_format::bundle::{STRIPS, TierMeasures};
 
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_kernels::ops::image::project::{ALPHA_CUTOFF, Footprint, Splat};

@@ -6,8 +6,8 @@
 mod frame;
 mod orbit;
 
-use pocketsplat_core::bundle::TierMeasures;
 use pocketsplat_core::{Bundle, DecodeError, chunks_in_view};
+use pocketsplat_format::bundle::TierMeasures;
 use rayon::prelude::*;
 
 use crate::bundle::decoded_scene;

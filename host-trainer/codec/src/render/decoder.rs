@@ -2,8 +2,9 @@
 
 use std::convert::Infallible;
 
-use pocketsplat_core::arithmetic::Arithmetic;
-use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, FrameReport, MaxSplats, Residency, Strips, TileSink};
+use pocketsplat_core::{
+    Arithmetic, Budget, Bundle, DecodeError, Decoder, FrameReport, MaxSplats, Plan, Residency, Strips, Tile, TileSink,
+};
 
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::Image;
@@ -40,7 +41,7 @@ pub fn core_image_of_tiers(bundle: &Bundle<'_>, camera: &Camera, tiers: u8) -> R
         .with_max_splats(MaxSplats::Worst)
         .with_residency(Residency::Streamed)
         .with_strips(Strips::Exactly(1));
-    let plan = bundle.plan(&budget)?;
+    let plan = Plan::new(bundle, &budget)?;
     let mut scratch = vec![0; plan.scratch_len()];
     let (image, report) = image_of(&mut Decoder::bind(bundle, plan, &mut scratch)?, &camera)?;
     Ok(CoreFrame { image, report, scratch_bytes: report.scratch_used as usize })
@@ -74,7 +75,7 @@ impl ImageSink {
 impl TileSink for ImageSink {
     type Error = Infallible;
 
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, _height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
+    fn tile(&mut self, Tile { x_px, y_px, width, rgb, .. }: Tile<'_>) -> Result<(), Infallible> {
         let stride = self.image.width_px as usize;
         for (y, row) in rgb.chunks_exact(usize::from(width)).enumerate() {
             let start = 3 * ((usize::from(y_px) + y) * stride + usize::from(x_px));

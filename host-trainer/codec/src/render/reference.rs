@@ -71,10 +71,9 @@ impl ReferenceScene {
     }
 
     /// As [`Self::render`] by the rules of another quality: with an alpha cut of c/255 a splat keeps its sum by gaining (c − 1)/255 of
-    /// opacity, and a pixel that less light than the stop comes through is finished by the splat that took it.
+    /// opacity.
     pub fn render_with(&self, quality: Quality, camera: &Camera, background: [f64; 3]) -> Vec<[f64; 3]> {
         let alpha_min = f64::from(quality.alpha_cut) * ALPHA_MIN;
-        let stop = f64::from(quality.transmittance_stop) * TRANSMITTANCE_MIN;
         let (width, height) = (camera.width_px as usize, camera.height_px as usize);
         let splats_of = |a| self.splats_of(a, camera, quality);
         let mut splats: Vec<Splat> = (0..self.positions.len()).flat_map(splats_of).collect();
@@ -104,7 +103,6 @@ impl ReferenceScene {
                     }
                     colour[i] += splat.colour * (alpha * transmittance[i]);
                     transmittance[i] = next;
-                    ended[i] = next < stop;
                 }
             }
         }

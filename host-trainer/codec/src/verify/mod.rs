@@ -4,12 +4,11 @@
 
 mod trial;
 
-use pocketsplat_core::budget::MIN_SLAB_PLACES;
-use pocketsplat_core::bundle::STRIPS;
 use pocketsplat_core::{
     Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, HeadWeights, MaxSplats, Overflow, Plan, Region,
     Residency, Strips, Work,
 };
+use pocketsplat_format::bundle::STRIPS;
 
 use pocketsplat_instructions::level::Level;
 
@@ -31,8 +30,8 @@ pub fn plan_variants(bundle: &Bundle<'_>, budget: Budget) -> impl Iterator<Item 
 
 /// The plan of `variant` whose heads are halves, if that saves memory: with a byte too little for f32.
 pub fn halves(bundle: &Bundle<'_>, variant: &Budget) -> Option<Plan> {
-    let whole = bundle.plan(variant).ok()?;
-    let halves = bundle.plan(&variant.in_bytes(whole.scratch_len().saturating_sub(1))).ok()?;
+    let whole = Plan::new(bundle, variant).ok()?;
+    let halves = Plan::new(bundle, &variant.in_bytes(whole.scratch_len().saturating_sub(1))).ok()?;
     (halves.head_weights() == HeadWeights::F16 && halves.n_tiers() == whole.n_tiers()).then_some(halves)
 }
 
@@ -55,11 +54,9 @@ pub type Violation = String;
 pub fn exact_bytes(bundle: &Bundle<'_>, plan: Plan) -> Result<(), Violation> {
     let needed = plan.scratch_len();
     let mut scratch = vec![0; needed];
-    for skip_damage in [false, true] {
-        let mut bind = |len: usize| {
-            let bind = if skip_damage { Decoder::bind_skipping_damage } else { Decoder::bind };
-            bind(bundle, plan, &mut scratch[..len]).err()
-        };
+    let skipping = Plan::new(bundle, &plan.budget().skipping_damage()).map_err(|error| error.to_string())?;
+    for plan in [plan, skipping] {
+        let mut bind = |len: usize| Decoder::bind(bundle, plan, &mut scratch[..len]).err();
         if let Some(error) = bind(needed) {
             return Err(format!("{needed} bytes do not suffice: {error}"));
         }
@@ -106,7 +103,8 @@ pub fn memory_does_not_show(bundle: &Bundle<'_>, plan: Plan, camera: &Camera) ->
 /// # Errors
 /// A sentence that says what happened instead.
 pub fn variants_match(bundle: &Bundle<'_>, budget: Budget, camera: &Camera) -> Result<(), Violation> {
-    let draw = |budget: &Budget| -> Result<Trial, Breach> { Trial::run(bundle, bundle.plan(budget)?, camera, 0, 0) };
+    let draw =
+        |budget: &Budget| -> Result<Trial, Breach> { Trial::run(bundle, Plan::new(bundle, budget)?, camera, 0, 0) };
     let scene = |r: &FrameReport| (r.splats, r.tile_splats, r.pixel_splats);
     // With less memory for splats than the view has, what a strip has no place for differs between variants.
     let both_whole = |a: &Trial, b: &Trial| a.report.splats_dropped == 0 && b.report.splats_dropped == 0;
@@ -123,7 +121,7 @@ pub fn variants_match(bundle: &Bundle<'_>, budget: Budget, camera: &Camera) -> R
             return Err(format!("{residency:?}, {strips:?}: decoded anchors that wait in memory"));
         }
         // A third of the places that the fullest strip asks for, or the fewest that there may be.
-        let few = MaxSplats::AtMost((drawn.report.max_splats / 3).max(MIN_SLAB_PLACES));
+        let few = MaxSplats::AtMost((drawn.report.max_splats / 3).max(Budget::MIN_SLAB_PLACES));
         let in_slabs = draw(&variant.with_max_splats(few).with_overflow(Overflow::Slabs));
         let in_slabs = in_slabs.map_err(|breach| format!("{residency:?}, {strips:?}, slabs: {breach}"))?;
         if both_whole(&drawn, &expected) && both_whole(&drawn, &in_slabs) && in_slabs.rgb != expected.rgb {

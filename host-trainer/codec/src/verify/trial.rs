@@ -2,7 +2,7 @@
 
 use std::convert::Infallible;
 
-use pocketsplat_core::{Bundle, Camera, DecodeError, Decoder, FrameReport, Plan, TileSink};
+use pocketsplat_core::{Bundle, Camera, DecodeError, Decoder, FrameReport, Plan, Tile, TileSink};
 
 /// Bytes before and after the memory that a decoder gets.
 const GUARD_LEN: usize = 64;
@@ -44,7 +44,8 @@ impl Trial {
         let (before, rest) = memory.split_at_mut(GUARD_LEN + start);
         let (scratch, after) = rest.split_at_mut(scratch_len);
         let mut sink = Pixels::new(camera);
-        let report = Decoder::bind(bundle, plan, scratch)?.render(camera, &mut sink).map_err(DecodeError::from)?;
+        let report =
+            Decoder::bind(bundle, plan, &mut *scratch)?.render(camera, &mut sink).map_err(DecodeError::from)?;
         let n_bytes = before.iter().chain(&*after).filter(|byte| **byte != fill).count();
         if n_bytes > 0 {
             return Err(Breach::Outside { n_bytes, scratch_len });
@@ -74,7 +75,7 @@ impl Pixels {
 impl TileSink for Pixels {
     type Error = Infallible;
 
-    fn tile(&mut self, x_px: u16, y_px: u16, width: u16, _height: u16, rgb: &[[u8; 3]]) -> Result<(), Infallible> {
+    fn tile(&mut self, Tile { x_px, y_px, width, rgb, .. }: Tile<'_>) -> Result<(), Infallible> {
         let [x, y, width] = [x_px, y_px, width].map(usize::from);
         for (row, pixels) in rgb.chunks_exact(width).enumerate() {
             let start = (y + row) * self.width + x;

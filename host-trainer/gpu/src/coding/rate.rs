@@ -1,6 +1,6 @@
 //! What a view's rate comes to in the loss.
 
-use pocketsplat_core::context::N_GROUPS;
+use pocketsplat_format::context::N_GROUPS;
 
 use super::super::scene::DeviceScene;
 use super::super::{Asked, Gpu};

@@ -2,7 +2,7 @@
 
 use crate::real::Real;
 use pocketsplat_capture::camera::Camera;
-use pocketsplat_core::rules;
+use pocketsplat_format::rules;
 
 /// Centres at this depth or nearer are not drawn, normalised units: the same number in every precision.
 pub const NEAR: f64 = rules::NEAR as f64;

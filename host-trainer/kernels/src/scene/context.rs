@@ -1,6 +1,6 @@
 //! The trainable context model: what an anchor's place says about its values.
 
-use pocketsplat_core::context::{
+use pocketsplat_format::context::{
     FEATURES_PER_LEVEL, GridFrame, GridLevel, N_GROUPS, N_LEVELS, N_POSITION_INPUTS, first_tap,
 };
 
@@ -11,7 +11,7 @@ use super::{Head, ModelShape};
 
 /// What predicts, for every channel, mean and scale of its values, and for every group the quantisation step: a feature grid and
 /// a network (Chen et al. 2024, HAC, section 4), or a network a level of anchors, which sees the values of the anchor that each
-/// follows (Wang et al. 2024, ContextGS, section 4). [`pocketsplat_core::context`] is its integer form.
+/// follows (Wang et al. 2024, ContextGS, section 4). [`pocketsplat_format::context`] is its integer form.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ContextModel<R> {
     /// Where the grid lies on the lattice, or the places of anchors of level 2.

@@ -1,6 +1,6 @@
 //! The decoder's description of a feature grid, as a checkpoint holds it.
 
-use pocketsplat_core::context::GridFrame;
+use pocketsplat_format::context::GridFrame;
 use serde::{Deserialize, Serialize};
 
 /// The fields of a [`GridFrame`].
@@ -13,7 +13,7 @@ pub(crate) struct Frame {
 
 /// Levels as kind, resolution and number of rows.
 pub(crate) mod levels {
-    use pocketsplat_core::context::{GridLevel, LevelKind};
+    use pocketsplat_format::context::{GridLevel, LevelKind};
     use serde::de::Error as _;
     use serde::{Deserialize as _, Deserializer, Serialize as _, Serializer};
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use glam::DVec3;
-use pocketsplat_core::bundle::{MAX_LATTICE_BITS, MAX_LATTICE_MIN};
+use pocketsplat_format::bundle::{MAX_LATTICE_BITS, MAX_LATTICE_MIN};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 

@@ -1,7 +1,7 @@
 //! The values of a block of anchors as coding leaves them, and their rate.
 
-use pocketsplat_core::context::{Group, MEAN_PARTS, N_GROUPS, Steps};
-use pocketsplat_core::entropy::EIGHTHS;
+use pocketsplat_format::context::{Group, MEAN_PARTS, N_GROUPS, Steps};
+use pocketsplat_format::entropy::EIGHTHS;
 
 use super::buffer::refill;
 use super::coding::{Coding, IntegerModel};

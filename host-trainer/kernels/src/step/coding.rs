@@ -1,6 +1,6 @@
 //! What coding does to the values of anchors, and what it costs, as a step is told.
 
-use pocketsplat_core::context::Context;
+use pocketsplat_format::context::Context;
 
 use crate::ops::rate::noise::Stream;
 use crate::scene::ContextNetwork;

@@ -1,6 +1,6 @@
 //! The rate of a step and the gradients of the context model, summed over the blocks.
 
-use pocketsplat_core::context::N_GROUPS;
+use pocketsplat_format::context::N_GROUPS;
 use rayon::prelude::*;
 
 use super::coded::steps_of;

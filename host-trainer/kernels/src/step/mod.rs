@@ -19,7 +19,7 @@ mod target;
 use std::mem;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use pocketsplat_core::context::N_LEVELS;
+use pocketsplat_format::context::N_LEVELS;
 use rayon::prelude::*;
 
 use crate::ops::Pinhole;

@@ -1,7 +1,7 @@
 //! Which anchors follow which, and what those that are followed give (Wang et al. 2024, ContextGS, section 4).
 
-use pocketsplat_core::bundle::MAX_LATTICE_BITS;
-use pocketsplat_core::context::{
+use pocketsplat_format::bundle::MAX_LATTICE_BITS;
+use pocketsplat_format::context::{
     Context, FEATURE_ONE, GridFrame, Group, N_LEVELS, Network, PARENT_UNITS, Place, Steps, Trail,
 };
 use rayon::prelude::*;

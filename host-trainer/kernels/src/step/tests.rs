@@ -4,7 +4,7 @@ use glam::DVec3;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use pocketsplat_core::context::{GridFrame, GridLevel, Group, LevelKind};
+use pocketsplat_format::context::{GridFrame, GridLevel, Group, LevelKind};
 
 use super::coding::{IntegerModel, RateTerms};
 use super::example::{camera, flatten, gradients, scene, shapes, step_with, truth};

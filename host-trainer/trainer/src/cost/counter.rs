@@ -4,10 +4,9 @@ use std::env;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use pocketsplat_core::arithmetic::Arithmetic;
-use pocketsplat_core::{Camera, Stage};
+use pocketsplat_format::{Camera, Stage};
 
-use super::{Setting, Stages, WithArithmetic};
+use super::{Setting, Stages};
 use crate::device::Processor;
 
 /// What `firmware-example` keeps of its RAM for itself: stack and other statics, bytes.
@@ -90,7 +89,7 @@ impl Counter {
             .arg(&self.folder)
             .env("VIEWS", &views)
             .env("BUDGET", budget(setting))
-            .env("ARITHMETIC", setting.arithmetic.call(Types))
+            .env("ARITHMETIC", setting.arithmetic.type_name())
             // A frame of a processor without an FPU is billions of instructions.
             .env("QEMU_TIMEOUT_S", "1800")
             .stdin(Stdio::null())
@@ -146,19 +145,6 @@ fn budget(setting: &Setting) -> String {
     )
 }
 
-/// The types of an arithmetic, by their names, joined by commas.
-struct Types;
-
-impl WithArithmetic for Types {
-    type Output = String;
-
-    fn call<A: Arithmetic>(self) -> String {
-        let name = std::any::type_name::<A>();
-        let types = name.split_once('<').map_or("", |(_, types)| types.trim_end_matches('>'));
-        types.split(", ").map(|path| path.rsplit("::").next().unwrap_or(path)).collect::<Vec<_>>().join(",")
-    }
-}
-
 /// The mean of each stage over frames, of what `measure.sh` prints; `None` where a number is missing.
 fn stages(table: &str, n_frames: usize) -> Option<Stages> {
     let mut sums = [0.0; Stage::ALL.len()];
@@ -180,7 +166,6 @@ mod tests {
     use pocketsplat_core::{Quality, Residency, Strips};
 
     use super::*;
-    use crate::cost::ArithmeticChoice;
 
     #[test]
     fn a_setting_is_said_in_the_firmwares_words() {
@@ -193,17 +178,9 @@ mod tests {
         };
         assert_eq!(
             budget(&setting),
-            ".with_quality(pocketsplat_core::Quality { alpha_cut: 2, transmittance_stop: 10, detail: true }).with_tiers(2)\
+            ".with_quality(pocketsplat_core::Quality { alpha_cut: 2, detail: true }).with_tiers(2)\
              .with_residency(pocketsplat_core::Residency::Streamed).with_strips(pocketsplat_core::Strips::Exactly(4))"
         );
-        // The compiler may leave out the names of defaults at the end, and so may the firmware.
-        let without_fpu = ArithmeticChoice::WithoutFpu.call(Types);
-        assert!(
-            without_fpu.starts_with("I16,Table") && "I16,Table,Packed28".starts_with(&without_fpu),
-            "{without_fpu}"
-        );
-        let reference = ArithmeticChoice::Reference.call(Types);
-        assert!("F32,Reference,Packed28".starts_with(&reference), "{reference}");
     }
 
     #[test]

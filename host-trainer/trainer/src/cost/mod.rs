@@ -9,8 +9,7 @@ mod setting;
 use std::sync::Arc;
 use std::time::Instant;
 
-use pocketsplat_core::arithmetic::Arithmetic;
-use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, Stage};
+use pocketsplat_core::{Arithmetic, Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, Plan, Stage};
 
 pub use arithmetic::{ArithmeticChoice, WithArithmetic};
 pub use counter::{CountError, Counter, MOST_VIEWS};
@@ -115,7 +114,7 @@ impl WithArithmetic for Measurement<'_, '_> {
 fn measure_in<A: Arithmetic>(of: &Measurement<'_, '_>) -> Result<Measured, DecodeError> {
     let Measurement { bundle, sights, setting, budget, targets } = *of;
     assert!(!sights.is_empty(), "views to measure with");
-    let plan = bundle.plan(&setting.of(budget))?;
+    let plan = Plan::new(bundle, &setting.of(budget))?;
     let mut scratch = vec![0; plan.scratch_len()];
     let mut decoder = Decoder::bind_in::<A>(bundle, plan, &mut scratch)?;
     let (n, n_counted) = (sights.len() as f64, sights.iter().filter(|sight| sight.counts).count() as f64);

@@ -47,8 +47,6 @@ impl Setting {
 
 /// Alphas to cut at, 255ths.
 const ALPHA_CUTS: [u8; 5] = [2, 3, 4, 6, 8];
-/// Transmittances to stop at, 10 000ths.
-const TRANSMITTANCE_STOPS: [u16; 4] = [10, 40, 100, 300];
 
 /// The share of the anchors that the first `tiers` tiers leave out.
 fn pruning_rate(bundle: &Bundle<'_>, tiers: u8) -> Option<f64> {
@@ -66,11 +64,6 @@ pub fn parameters(bundle: &Bundle<'_>) -> Vec<Setting> {
     for alpha_cut in ALPHA_CUTS {
         let quality = Quality { alpha_cut, ..Quality::EXACT };
         all.push(Setting { parameter: "alpha cut", name: format!("{alpha_cut}/255"), quality, ..exact.clone() });
-    }
-    for transmittance_stop in TRANSMITTANCE_STOPS {
-        let quality = Quality { transmittance_stop, ..Quality::EXACT };
-        let name = format!("{}", f64::from(transmittance_stop) / 1e4);
-        all.push(Setting { parameter: "transmittance stop", name, quality, ..exact.clone() });
     }
     if bundle.header().detail_hidden > 0 {
         let quality = Quality { detail: false, ..Quality::EXACT };
@@ -92,31 +85,23 @@ pub fn parameters(bundle: &Bundle<'_>) -> Vec<Setting> {
         let strips = Strips::Exactly(n_strips);
         all.push(Setting { parameter: "strips", name: n_strips.to_string(), strips, ..exact.clone() });
     }
-    for &arithmetic in ArithmeticChoice::TURNED {
-        let (parameter, name) = arithmetic.name();
-        all.push(Setting { parameter, name: name.to_owned(), arithmetic, ..exact.clone() });
-    }
+    let arithmetic = ArithmeticChoice::WithoutFpu;
+    all.push(Setting { parameter: "arithmetic", name: "without FPU".to_owned(), arithmetic, ..exact });
     all
 }
 
-/// Alpha cuts, transmittance stops, the detail head and the first tiers in all combinations.
+/// Alpha cuts, the detail head and the first tiers in all combinations.
 pub fn quality_grid(bundle: &Bundle<'_>) -> Vec<Setting> {
     let details: &[bool] = if bundle.header().detail_hidden > 0 { &[true, false] } else { &[true] };
     let mut all = Vec::new();
     for tiers in (1..=bundle.n_tiers()).rev() {
         let Some(pruning_rate) = pruning_rate(bundle, tiers) else { continue };
         for alpha_cut in [1, 2, 3, 4, 6, 8] {
-            for transmittance_stop in [1, 10, 100] {
-                for &detail in details {
-                    let name = format!(
-                        "{:.0} % pruned, alpha {alpha_cut}/255, stop {}{}",
-                        100.0 * pruning_rate,
-                        f64::from(transmittance_stop) / 1e4,
-                        if detail { "" } else { ", no detail" }
-                    );
-                    let quality = Quality { alpha_cut, transmittance_stop, detail };
-                    all.push(Setting { parameter: "quality", name, quality, tiers, pruning_rate, ..Setting::exact() });
-                }
+            for &detail in details {
+                let no_detail = if detail { "" } else { ", no detail" };
+                let name = format!("{:.0} % pruned, alpha {alpha_cut}/255{no_detail}", 100.0 * pruning_rate);
+                let quality = Quality { alpha_cut, detail };
+                all.push(Setting { parameter: "quality", name, quality, tiers, pruning_rate, ..Setting::exact() });
             }
         }
     }

@@ -3,7 +3,7 @@
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, MaxSplats};
+use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, MaxSplats, Plan};
 
 use super::search::{Pilots, search};
 use super::{Effect, PilotFigures, Price};
@@ -201,9 +201,9 @@ fn draw(
     let frame = Budget::for_frame(largest(|camera| camera.width_px), largest(|camera| camera.height_px));
     let limited = device.ram_bytes.map(|ram| frame.in_bytes(usize::try_from(ram).unwrap_or(usize::MAX)));
     // A pilot for which the memory does not suffice is measured as if it did; the run's scene will be cut until it does.
-    let plan = match limited.map(|budget| bundle.plan(&budget)) {
+    let plan = match limited.map(|budget| Plan::new(bundle, &budget)) {
         Some(Ok(plan)) => plan,
-        _ => bundle.plan(&frame.with_max_splats(MaxSplats::Worst))?,
+        _ => Plan::new(bundle, &frame.with_max_splats(MaxSplats::Worst))?,
     };
     let mut scratch = vec![0; plan.scratch_len()];
     let mut decoder = Decoder::bind(bundle, plan, &mut scratch)?;

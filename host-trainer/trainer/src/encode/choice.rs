@@ -1,7 +1,7 @@
 //! What codes the symbols of a scene: static tables, and of which steps, or the context model.
 
 use pocketsplat_capture::dataset::{Capture, View};
-use pocketsplat_core::Bundle;
+use pocketsplat_format::Bundle;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,7 @@
 //! Why a finished run has no bundle.
 
 use pocketsplat_capture::dataset::PhotographError;
-use pocketsplat_core::DecodeError;
+use pocketsplat_format::DecodeError;
 
 use pocketsplat_codec::bundle::WriteError;
 use pocketsplat_codec::manifest::MeasureError;

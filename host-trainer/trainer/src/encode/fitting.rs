@@ -2,8 +2,8 @@
 
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Capture, View};
-use pocketsplat_core::bundle::TierMeasures;
 use pocketsplat_core::{Bundle, DecodeError, Plan};
+use pocketsplat_format::bundle::TierMeasures;
 use pocketsplat_instructions::level;
 
 use super::choice::{CoderChoice, judged_psnr_db};

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use pocketsplat_capture::dataset::Normalisation;
 use pocketsplat_codec::bundle::{BundleInfo, ChannelCoding, WriteOptions, decoded_scene, write};
-use pocketsplat_core::Bundle;
+use pocketsplat_format::Bundle;
 use pocketsplat_kernels::integer_model;
 use pocketsplat_kernels::ops::rate::noise::Stream;
 use pocketsplat_kernels::scene::{ModelShape, Scene};

@@ -135,17 +135,18 @@ pub(super) struct DevicePlans {
 
 impl DevicePlans {
     pub(super) fn of(bundle: &Bundle<'_>, frame: Budget, ram_bytes: Option<u64>) -> Result<Self, DecodeError> {
-        let streamed = |n| bundle.plan(&frame.with_residency(Residency::Streamed).with_strips(Strips::Exactly(n)));
+        let streamed =
+            |n| Plan::new(bundle, &frame.with_residency(Residency::Streamed).with_strips(Strips::Exactly(n)));
         let in_two_strips = streamed(STRIPS)?;
         let mut smallest = in_two_strips;
-        for n_strips in pocketsplat_core::bundle::STRIPS {
+        for n_strips in pocketsplat_format::bundle::STRIPS {
             let plan = streamed(n_strips)?;
             if plan.scratch_len() < smallest.scratch_len() {
                 smallest = plan;
             }
         }
         let ram_bytes = ram_bytes.map_or(usize::MAX, |most| usize::try_from(most).unwrap_or(usize::MAX));
-        let within = match bundle.plan(&frame.in_bytes(ram_bytes)) {
+        let within = match Plan::new(bundle, &frame.in_bytes(ram_bytes)) {
             Ok(plan) => Some(plan).filter(|plan| plan.n_tiers() == bundle.n_tiers()),
             Err(DecodeError::BudgetTooSmall { .. }) => None,
             Err(error) => return Err(error),

@@ -1,5 +1,5 @@
 use pocketsplat_capture::dataset::Capture;
-use pocketsplat_core::Bundle;
+use pocketsplat_format::Bundle;
 
 use super::sizes::{DevicePlans, frame_of};
 use super::{CoderChoice, EncodeError, Encoding, Fitted};

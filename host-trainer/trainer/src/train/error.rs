@@ -4,7 +4,7 @@ use std::error::Error;
 use std::fmt;
 
 use pocketsplat_capture::dataset::PhotographError;
-use pocketsplat_core::DecodeError;
+use pocketsplat_format::DecodeError;
 
 use super::schedule::ConfigError;
 use pocketsplat_kernels::integer_model::IntegerModelError;

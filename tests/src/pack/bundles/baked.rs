@@ -1,6 +1,6 @@
 //! Scenes with a section gaussians.
 
-use pocketsplat_core::bundle::Effects;
+use pocketsplat_format::bundle::Effects;
 
 use super::{ANISOTROPIC, DETAILED, SMALL, anchors, front, in_tiers, inside, off_centre, one_chunk, sample, small};
 use crate::pack::sample::{NO_EFFECT, Sample};

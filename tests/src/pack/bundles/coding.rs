@@ -1,6 +1,6 @@
 //! Tables, coded heads, widths.
 
-use pocketsplat_core::bundle::{Effects, MAX_FEATURE_DIM, MAX_OFFSETS};
+use pocketsplat_format::bundle::{Effects, MAX_FEATURE_DIM, MAX_OFFSETS};
 
 use super::{SMALL, anchors, front, one_chunk, sample, small, view};
 use crate::pack::draft::{CoderDraft, Draft, HeadCoding, n_channels};

@@ -1,6 +1,6 @@
 //! Contexts whose numbers are at their limits.
 
-use pocketsplat_core::context::LevelKind;
+use pocketsplat_format::context::LevelKind;
 
 use super::contexts::{frame, shape_of, with_context};
 use super::{SMALL, front, sample};

@@ -1,7 +1,7 @@
 //! Feature 4 and what section 7 of FORMAT.md has.
 
-use pocketsplat_core::bundle::Effects;
-use pocketsplat_core::context::{GridFrame, LevelKind};
+use pocketsplat_format::bundle::Effects;
+use pocketsplat_format::context::{GridFrame, LevelKind};
 
 use super::context_limits::{limits, near_and_far};
 use super::{

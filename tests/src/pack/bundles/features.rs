@@ -1,6 +1,6 @@
 //! Each feature alone, and all but the context together.
 
-use pocketsplat_core::bundle::Effects;
+use pocketsplat_format::bundle::Effects;
 
 use super::{ALL_EFFECTS, DETAILED, SMALL, anchors, front, in_tiers, inside, off_centre, sample, small};
 use crate::pack::draft::{Draft, HeadCoding};

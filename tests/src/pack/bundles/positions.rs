@@ -1,7 +1,7 @@
 //! The lattice, and chunks by their size.
 
 use glam::DVec3;
-use pocketsplat_core::bundle::{Effects, MAX_CHUNK_ANCHORS};
+use pocketsplat_format::bundle::{Effects, MAX_CHUNK_ANCHORS};
 
 use super::{ANISOTROPIC, SMALL, anchors, front, one_chunk, sample, small};
 use crate::frame::to_core;

@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 use pocketsplat_codec::manifest;
-use pocketsplat_core::Bundle;
-use pocketsplat_core::bundle::Effects;
+use pocketsplat_format::Bundle;
+use pocketsplat_format::bundle::Effects;
 
 use super::{SMALL, anchors, front, in_tiers, sample, small};
 use crate::pack::sample::{NO_EFFECT, Sample};

@@ -1,7 +1,7 @@
 //! Tiers, files that end at one, and files with something behind them.
 
-use pocketsplat_core::bundle::{Effects, cut_after};
-use pocketsplat_core::{Bundle, Camera};
+use pocketsplat_format::bundle::{Effects, cut_after};
+use pocketsplat_format::{Bundle, Camera};
 
 use super::{ANISOTROPIC, SMALL, anchors, front, in_tiers, small};
 use crate::pack::sample::Sample;

@@ -1,9 +1,9 @@
 //! Heads, lattice, masks, tables and context: what their sections say.
 
-use pocketsplat_core::Bundle;
-use pocketsplat_core::bundle::Coder;
-use pocketsplat_core::context::{Context, LevelKind};
-use pocketsplat_core::entropy::FREQUENCY_TOTAL;
+use pocketsplat_format::Bundle;
+use pocketsplat_format::bundle::Coder;
+use pocketsplat_format::context::{Context, LevelKind};
+use pocketsplat_format::entropy::FREQUENCY_TOTAL;
 
 use super::Found;
 

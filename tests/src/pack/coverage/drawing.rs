@@ -1,8 +1,8 @@
 //! What the frames of a bundle show: cameras, and Gaussians at the limits of drawing.
 
 use pocketsplat_codec::bundle::decoded_scene;
-use pocketsplat_core::math::tanh;
-use pocketsplat_core::{Bundle, Camera};
+use pocketsplat_format::math::tanh;
+use pocketsplat_format::{Bundle, Camera};
 use pocketsplat_kernels::scene::{Head, Scene};
 
 use super::Found;

@@ -1,6 +1,6 @@
 //! Header, section table, manifest, directory, and where the file ends.
 
-use pocketsplat_core::Bundle;
+use pocketsplat_format::Bundle;
 
 use super::Found;
 use crate::pack::expected::FEATURES;

@@ -1,9 +1,9 @@
 //! What the streams of the chunks say, read symbol by symbol.
 
-use pocketsplat_core::Bundle;
-use pocketsplat_core::bundle::{Chunk, Coder};
-use pocketsplat_core::context::{Context, Trail};
-use pocketsplat_core::entropy::{AnsReader, SymbolModel, UniformByte};
+use pocketsplat_format::Bundle;
+use pocketsplat_format::bundle::{Chunk, Coder};
+use pocketsplat_format::context::{Context, Trail};
+use pocketsplat_format::entropy::{AnsReader, SymbolModel, UniformByte};
 
 use super::Found;
 use crate::bundles::chunks_offset;

@@ -1,6 +1,6 @@
 //! Streams.
 
-use pocketsplat_core::Bundle;
+use pocketsplat_format::Bundle;
 
 use super::{Good, List, read_u32, section};
 use crate::pack::draft::Draft;

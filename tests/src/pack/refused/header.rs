@@ -16,7 +16,7 @@ pub(super) fn add(list: &mut List, good: &Good) {
         b"\n\x1a\n\x04",
     );
     list.push("cut-in-header", "The file ends in its header.", "Truncated { section: Header", file[..100].to_vec());
-    for version in [3, pocketsplat_core::bundle::VERSION + 1] {
+    for version in [3, pocketsplat_format::bundle::VERSION + 1] {
         let expected = format!("UnsupportedVersion {{ found: {version}");
         list.patched(
             &format!("version-{version}"),

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use crate::plot::{CostPanel, CostPoint, cost_svg};
 use anyhow::Result;
-use pocketsplat_core::Stage;
 use pocketsplat_files::{Content, Output, Outputs};
+use pocketsplat_format::Stage;
 use pocketsplat_trainer::cost::{Measured, on_front};
 
 use super::super::output;
@@ -83,7 +83,7 @@ impl Report<'_> {
     /// A row for each setting; for each device a group of columns that begins with its name.
     fn table(&self, columns: &[Column]) -> Result<Vec<u8>> {
         let mut table = csv::Writer::from_writer(Vec::new());
-        let settings = ["knob", "setting", "pruning_rate", "alpha_cut_255ths", "transmittance_stop", "detail"];
+        let settings = ["knob", "setting", "pruning_rate", "alpha_cut_255ths", "detail"];
         let figures = ["PSNR", "psnr_to_reference_db", "worst_channel", "host_s", "scratch_bytes", "splats_dropped"];
         let mut header: Vec<String> = settings.into_iter().chain(figures).map(str::to_owned).collect();
         for Column { machine, .. } in columns {
@@ -102,7 +102,6 @@ impl Report<'_> {
                 m.setting.name.clone(),
                 m.setting.pruning_rate.to_string(),
                 quality.alpha_cut.to_string(),
-                (f64::from(quality.transmittance_stop) / 1e4).to_string(),
                 quality.detail.to_string(),
                 m.psnr_db.to_string(),
                 m.psnr_to_reference_db.to_string(),

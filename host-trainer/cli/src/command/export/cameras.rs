@@ -6,7 +6,7 @@ use anyhow::{Result, bail};
 use glam::{DMat3, DVec3};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Capture, Image, Normalisation, Split, View};
-use pocketsplat_core::Bundle;
+use pocketsplat_format::Bundle;
 use pocketsplat_gaussians::{Frame, Gaussians};
 use pocketsplat_kernels::camera::host_camera;
 use pocketsplat_metrics::psnr_db_masked;

@@ -1,7 +1,7 @@
 //! The mark of pictures that were drawn here, which tells them from photographs.
 
-use pocketsplat_core::bundle::crc32;
 use pocketsplat_files::MARK;
+use pocketsplat_format::bundle::crc32;
 
 /// Bytes of a PNG before the chunk that follows its header: signature, and IHDR with its length, name and checksum.
 const PNG_HEAD: usize = 8 + 25;

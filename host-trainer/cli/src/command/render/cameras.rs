@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 use glam::{DMat3, DVec3};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::FrameSize;
-use pocketsplat_core::Bundle;
+use pocketsplat_format::Bundle;
 use pocketsplat_kernels::camera::{core_camera, host_camera};
 use serde::{Deserialize, Serialize};
 

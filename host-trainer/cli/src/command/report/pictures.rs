@@ -5,7 +5,7 @@ use image::ImageEncoder as _;
 use image::codecs::webp::WebPEncoder;
 use pocketsplat_capture::dataset::Image;
 use pocketsplat_codec::render::decoder::core_image;
-use pocketsplat_core::Bundle;
+use pocketsplat_format::Bundle;
 use pocketsplat_viewer::{base64, escaped};
 
 use super::{Photographs, Run};

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::Result;
 use pocketsplat_codec::bundle::SizeReport;
-use pocketsplat_core::{Budget, Bundle};
+use pocketsplat_core::{Budget, Bundle, Plan};
 use pocketsplat_viewer::escaped;
 
 use super::super::effects::PilotLine;
@@ -110,7 +110,7 @@ pub(super) fn tiers(bundle: &Bundle<'_>) -> Result<String> {
             size(f64::from(chunks_start + tier.end)),
             measures.psnr_db.map_or_else(|| "–".to_owned(), |psnr_db| format!("{psnr_db:.2}")),
             size(least_bytes(bundle, &budget)? as f64),
-            size(bundle.plan(&budget)?.scratch_len() as f64),
+            size(Plan::new(bundle, &budget)?.scratch_len() as f64),
         ]);
     }
     let header = ["pruned", "anchors", "file cut here", "PSNR, dB", "least RAM", "RAM for the fastest frame"];
@@ -119,8 +119,9 @@ pub(super) fn tiers(bundle: &Bundle<'_>) -> Result<String> {
 
 /// Bytes with which the decoder draws all tiers of the budget, and with one fewer does not.
 fn least_bytes(bundle: &Bundle<'_>, budget: &Budget) -> Result<usize> {
-    let fits = |bytes: usize| bundle.plan(&budget.in_bytes(bytes)).is_ok_and(|plan| plan.n_tiers() == budget.tiers);
-    let (mut too_few, mut enough) = (0, bundle.plan(budget)?.scratch_len());
+    let fits =
+        |bytes: usize| Plan::new(bundle, &budget.in_bytes(bytes)).is_ok_and(|plan| plan.n_tiers() == budget.tiers);
+    let (mut too_few, mut enough) = (0, Plan::new(bundle, budget)?.scratch_len());
     while enough - too_few > 1 {
         let middle = too_few + (enough - too_few) / 2;
         if fits(middle) { enough = middle } else { too_few = middle }

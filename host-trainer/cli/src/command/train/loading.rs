@@ -1,11 +1,11 @@
 //! Loads the capture of a run, and fills in the settings that depend on it.
 
+use pocketsplat_core::Budget;
 use std::path::Path;
 use std::process::ExitCode;
 
 use anyhow::{Result, bail};
 use pocketsplat_capture::dataset::{Capture, View, remove_cache};
-use pocketsplat_core::budget::MAX_FRAME_PX;
 use pocketsplat_instructions::level::{Bound, Level};
 use pocketsplat_trainer::device::Limits;
 use pocketsplat_trainer::train::run::{photographs_in, points_in};
@@ -69,7 +69,7 @@ pub(super) fn check_size(capture: &Capture, limits: &Limits) -> Result<()> {
     }
     // Test views are drawn too.
     let size_px = |view: &View| [view.camera.width_px, view.camera.height_px];
-    let most = u32::from(MAX_FRAME_PX);
+    let most = u32::from(Budget::MAX_FRAME_PX);
     if let Some(view) = capture.train.iter().chain(&capture.test).find(|view| size_px(view).iter().any(|px| *px > most))
     {
         let ([width, height], name) = (size_px(view), &view.name);

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use pocketsplat_capture::dataset::{Background, Capture, Split, View};
-use pocketsplat_core::bundle::crc32;
 use pocketsplat_files::{Output, shell_word};
+use pocketsplat_format::bundle::crc32;
 use pocketsplat_instructions::level::Profile;
 use pocketsplat_trainer::effects::Effect;
 use pocketsplat_trainer::encode::{Encoding, Fitted};

@@ -2,7 +2,7 @@
 
 use std::fmt::{Display, Write};
 
-use pocketsplat_core::bundle::ALIGNMENT;
+use pocketsplat_format::bundle::ALIGNMENT;
 
 /// Bytes on a line of the dump.
 const LINE_BYTES: usize = 8;

@@ -1,7 +1,7 @@
 //! A table about to be written.
 
-use pocketsplat_core::bundle::FrequencyTable;
-use pocketsplat_core::entropy::{FREQUENCY_TOTAL, Slot};
+use pocketsplat_format::bundle::FrequencyTable;
+use pocketsplat_format::entropy::{FREQUENCY_TOTAL, Slot};
 
 use super::histogram::Histogram;
 use crate::bundle::frequencies::frequencies;

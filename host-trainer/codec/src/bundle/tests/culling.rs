@@ -1,6 +1,6 @@
 use glam::{DMat3, DVec3};
-use pocketsplat_core::bundle::{CHUNK_RECORD_LEN, INK_FRAME_LEN, InkFrame, SectionBytes, TIER_RECORD_LEN};
-use pocketsplat_core::{Bundle, SectionKind};
+use pocketsplat_format::bundle::{CHUNK_RECORD_LEN, INK_FRAME_LEN, InkFrame, SectionBytes, TIER_RECORD_LEN};
+use pocketsplat_format::{Bundle, SectionKind};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

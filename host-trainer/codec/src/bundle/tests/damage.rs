@@ -1,6 +1,8 @@
 use std::convert::Infallible;
 
-use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, ErrorClass, Field, MaxSplats, Region, TileSink};
+use pocketsplat_core::{
+    Budget, Bundle, DecodeError, Decoder, ErrorClass, Field, MaxSplats, Plan, Region, Tile, TileSink,
+};
 
 use super::{SMALL, TABLES, info, options, random_scene, write_random};
 use crate::bundle::{ChannelCoding, WriteOptions, write};
@@ -14,7 +16,7 @@ struct NoSink;
 impl TileSink for NoSink {
     type Error = Infallible;
 
-    fn tile(&mut self, _: u16, _: u16, _: u16, _: u16, _: &[[u8; 3]]) -> Result<(), Infallible> {
+    fn tile(&mut self, _: Tile<'_>) -> Result<(), Infallible> {
         Ok(())
     }
 }
@@ -22,7 +24,7 @@ impl TileSink for NoSink {
 /// Everything a device does with a bundle.
 fn parse_and_draw(bytes: &[u8]) -> Result<(), DecodeError> {
     let bundle = Bundle::parse(bytes)?;
-    let plan = bundle.plan(&Budget::for_frame(64, 48))?;
+    let plan = Plan::new(&bundle, &Budget::for_frame(64, 48))?;
     let mut scratch = vec![0; plan.scratch_len()];
     let mut decoder = Decoder::bind(&bundle, plan, &mut scratch)?;
     decoder.render(&bundle.header().preview.resized(64, 48), &mut NoSink)?;
@@ -96,9 +98,9 @@ fn bytes_after_the_end_are_ignored() {
 fn scratch_one_byte_short_names_the_need() {
     let (_, bytes) = write_random(TABLES, SMALL, 50, 22, 16);
     let bundle = Bundle::parse(&bytes).expect("a sound bundle");
-    let plan = bundle.plan(&Budget::for_frame(64, 48)).expect("a plan");
+    let plan = Plan::new(&bundle, &Budget::for_frame(64, 48)).expect("a plan");
     let mut scratch = vec![0; plan.scratch_len() - 1];
-    let error = Decoder::bind(&bundle, plan, &mut scratch).err().expect("one byte short");
+    let error = Decoder::bind(&bundle, plan, &mut scratch).expect_err("one byte short");
     let needed = plan.scratch_len() as u32;
     assert_eq!(error, DecodeError::ScratchTooSmall { region: Region::Fast, needed, available: needed - 1 }, "{error}");
 }
@@ -108,7 +110,8 @@ fn too_many_splats_are_counted_and_that_many_then_suffice() {
     let (_, bytes) = write_random(TABLES, SMALL, 50, 22, 16);
     let bundle = Bundle::parse(&bytes).expect("a sound bundle");
     let draw = |most| {
-        let plan = bundle.plan(&Budget::for_frame(64, 48).with_max_splats(MaxSplats::AtMost(most))).expect("a plan");
+        let plan =
+            Plan::new(&bundle, &Budget::for_frame(64, 48).with_max_splats(MaxSplats::AtMost(most))).expect("a plan");
         let mut scratch = vec![0xA5; plan.scratch_len()];
         let mut decoder = Decoder::bind(&bundle, plan, &mut scratch).expect("planned memory");
         let report = decoder.render(&bundle.header().preview, &mut NoSink).expect("drawn");

@@ -3,8 +3,8 @@ use std::num::NonZeroU16;
 use constriction::stream::Decode;
 use constriction::stream::model::{DecoderModel, EntropyModel};
 use constriction::stream::stack::AnsCoder;
-use pocketsplat_core::Bundle;
-use pocketsplat_core::entropy::{AnsReader, FREQUENCY_TOTAL, Slot, SymbolModel};
+use pocketsplat_format::Bundle;
+use pocketsplat_format::entropy::{AnsReader, FREQUENCY_TOTAL, Slot, SymbolModel};
 use proptest::prelude::*;
 
 use super::{SMALL, TABLES, decoded_rows, write_random};

@@ -1,5 +1,5 @@
 use half::f16;
-use pocketsplat_core::Bundle;
+use pocketsplat_format::Bundle;
 
 use super::{SMALL, info, random_scene};
 use crate::bundle::{WriteOptions, decoded_heads, write};

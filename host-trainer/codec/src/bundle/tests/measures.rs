@@ -1,6 +1,6 @@
 use glam::DVec3;
-use pocketsplat_core::Bundle;
-use pocketsplat_core::bundle::{MANIFEST_RECORD_LEN, TierMeasures};
+use pocketsplat_format::Bundle;
+use pocketsplat_format::bundle::{MANIFEST_RECORD_LEN, TierMeasures};
 
 use super::{SMALL, TABLES, camera, info, options, random_scene};
 use crate::bundle::{CodedScene, WriteError, WriteOptions, code};

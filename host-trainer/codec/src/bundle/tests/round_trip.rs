@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 
-use pocketsplat_core::Bundle;
-use pocketsplat_core::context::{Group, Trail};
+use pocketsplat_format::Bundle;
+use pocketsplat_format::context::{Group, Trail};
 
 use super::{
     SMALL, TABLES, camera, decoded_rows, info, options, random_scene, with_context, with_levels, write_bytes,

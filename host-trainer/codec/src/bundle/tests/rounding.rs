@@ -1,7 +1,7 @@
 //! Values are rounded once, and by one rule: the bundle holds the symbols that the last phase of training drew.
 
-use pocketsplat_core::Bundle;
-use pocketsplat_core::context::Group;
+use pocketsplat_format::Bundle;
+use pocketsplat_format::context::Group;
 
 use super::{SMALL, options, random_scene, with_context, write_bytes};
 use crate::bundle::channels::ContextWork;

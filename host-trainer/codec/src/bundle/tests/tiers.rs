@@ -1,7 +1,7 @@
 use std::collections::BTreeSet;
 
-use pocketsplat_core::Bundle;
-use pocketsplat_core::bundle::cut_after;
+use pocketsplat_format::Bundle;
+use pocketsplat_format::bundle::cut_after;
 
 use super::{SMALL, TABLES, camera, decoded_rows, info, options, random_scene, with_context};
 use crate::bundle::{ChannelCoding, WriteError, WriteOptions, write};

@@ -1,9 +1,9 @@
 //! Where the oracle's scenes come from.
 
 use glam::DVec3;
-use pocketsplat_core::bundle::{AnchorSite, Coder};
-use pocketsplat_core::context::{Context, Group};
-use pocketsplat_core::{Bundle, DecodeError};
+use pocketsplat_format::bundle::{AnchorSite, Coder};
+use pocketsplat_format::context::{Context, Group};
+use pocketsplat_format::{Bundle, DecodeError};
 
 use super::ReferenceScene;
 use crate::bundle::{ContextWork, decoded_heads, shape_of};

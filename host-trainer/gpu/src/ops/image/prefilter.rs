@@ -1,7 +1,7 @@
 //! [`pocketsplat_kernels::ops::image::prefilter`]: the anchors that a view may show, ascending.
 
 use bytemuck::{Pod, Zeroable};
-use pocketsplat_core::rules::{DILATION_PX2, DILATION_REACH_PX, INK_DEVIATIONS, NEAR};
+use pocketsplat_format::rules::{DILATION_PX2, DILATION_REACH_PX, INK_DEVIATIONS, NEAR};
 
 use crate::ops::primitives::compact::Compact;
 use crate::{Buffer, Commands, GROUPS, Gpu, GpuError, Kernel, MATH};

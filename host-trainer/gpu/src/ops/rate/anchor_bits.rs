@@ -180,7 +180,7 @@ impl AnchorBits {
         commands.run_items(&self.values, &parameters, &buffers, len);
         let buffers = [mask_logits as _, rows as _, bits as _, gradients.mask_logits as _, parts as _];
         commands.run_items(&self.masks, &parameters, &buffers, n);
-        let n_weights = pocketsplat_core::context::first_tap(shape.feature_dim, n_taps);
+        let n_weights = pocketsplat_format::context::first_tap(shape.feature_dim, n_taps);
         commands.run(&self.taps, &parameters, &[residual, d_direct, gradients.weights], n_weights);
         self.sum.run(commands, parts, 3, totals, first_total);
         Ok(())

@@ -1,7 +1,7 @@
 //! [`pocketsplat_kernels::ops::rate::hash_grid`] over the anchors of a view.
 
 use bytemuck::{Pod, Zeroable};
-use pocketsplat_core::context::{FEATURES_PER_LEVEL, GridLevel};
+use pocketsplat_format::context::{FEATURES_PER_LEVEL, GridLevel};
 
 use crate::{Buffer, Commands, GROUP_THREADS, GROUPS, Gpu, GpuError, Kernel};
 
@@ -153,7 +153,7 @@ mod tests {
     use super::*;
     use crate::ops::primitives::compact::NO_ROW;
     use crate::parity::{Bound, SIZES, assert_close, gpu, largest};
-    use pocketsplat_core::context::LevelKind;
+    use pocketsplat_format::context::LevelKind;
     use pocketsplat_kernels::finite_difference::random;
     use pocketsplat_kernels::ops::rate::hash_grid as cpu;
 

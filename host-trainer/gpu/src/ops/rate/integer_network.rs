@@ -1,7 +1,7 @@
-//! A context network in the decoder's integers: [`pocketsplat_kernels::integer_model`], and `decoder-core`'s `context`.
+//! A context network in the decoder's integers: [`pocketsplat_kernels::integer_model`], and `decoder-format`'s `context`.
 
 use bytemuck::{Pod, Zeroable};
-use pocketsplat_core::context::{Group, MAX_STEP_EXPONENT, MIN_STEP_EXPONENT, N_GROUPS, Steps};
+use pocketsplat_format::context::{Group, MAX_STEP_EXPONENT, MIN_STEP_EXPONENT, N_GROUPS, Steps};
 
 use crate::ops::heads::head::HeadLayout;
 use crate::{Buffer, Commands, GROUPS, Gpu, GpuError, Kernel};

@@ -1,7 +1,7 @@
 //! What anchors give those that follow them (ContextGS): `step::parents` on the device.
 
 use bytemuck::{Pod, Zeroable};
-use pocketsplat_core::context::PARENT_UNITS;
+use pocketsplat_format::context::PARENT_UNITS;
 
 use crate::ops::primitives::compact::Compact;
 use crate::{Buffer, Commands, GROUPS, Gpu, GpuError, Kernel};

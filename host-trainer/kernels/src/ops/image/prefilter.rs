@@ -1,6 +1,6 @@
 //! Which anchors a view may show.
 
-use pocketsplat_core::rules::{DILATION_PX2, DILATION_REACH_PX, INK_DEVIATIONS};
+use pocketsplat_format::rules::{DILATION_PX2, DILATION_REACH_PX, INK_DEVIATIONS};
 
 use crate::ops::Pinhole;
 use crate::ops::pinhole::NEAR;

@@ -1,6 +1,6 @@
 //! From a 3-D Gaussian to its splat on the image plane.
 
-use pocketsplat_core::rules::DILATION_PX2;
+use pocketsplat_format::rules::DILATION_PX2;
 
 use crate::ops::Pinhole;
 use crate::ops::heads::neural_gaussians::Gaussian;

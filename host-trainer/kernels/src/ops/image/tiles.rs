@@ -1,6 +1,6 @@
 //! Which splats each tile draws, in which order.
 
-use pocketsplat_core::rules;
+use pocketsplat_format::rules;
 use rayon::prelude::*;
 
 use super::depth_order::by_depth;

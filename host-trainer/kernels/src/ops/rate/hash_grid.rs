@@ -1,6 +1,6 @@
 //! Features of a place: signs of a multi-resolution grid, interpolated.
 
-use pocketsplat_core::context::{FEATURES_PER_LEVEL, GridLevel, WEIGHT_ONE};
+use pocketsplat_format::context::{FEATURES_PER_LEVEL, GridLevel, WEIGHT_ONE};
 use rayon::prelude::*;
 
 use crate::real::Real;
@@ -80,7 +80,7 @@ pub fn backward<R: Real>(levels: &[GridLevel], rows: &[R], parts: &[Part<'_, R>]
 mod tests {
     use super::*;
     use crate::finite_difference::random;
-    use pocketsplat_core::context::LevelKind;
+    use pocketsplat_format::context::LevelKind;
 
     fn levels() -> Vec<GridLevel> {
         [

@@ -5,7 +5,7 @@
 //!
 //! μ_c = m_c + Σ_t w_ct·r_(c−t), t from 1 to min(c, T).
 
-use pocketsplat_core::context::first_tap;
+use pocketsplat_format::context::first_tap;
 
 use crate::real::Real;
 

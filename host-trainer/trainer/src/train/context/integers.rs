@@ -1,6 +1,6 @@
 //! A scene's context model in the decoder's integers, and the heads as they are written.
 
-use pocketsplat_core::context::Context;
+use pocketsplat_format::context::Context;
 
 use crate::train::error::TrainError;
 use pocketsplat_kernels::integer_model;

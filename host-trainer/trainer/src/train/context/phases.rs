@@ -1,6 +1,6 @@
 //! What the steps of each phase do to the values of anchors.
 
-use pocketsplat_core::context::Context;
+use pocketsplat_format::context::Context;
 
 use super::integers::{Integers, head_step};
 use crate::train::schedule::{Backbone, Hac};

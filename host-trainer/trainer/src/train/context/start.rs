@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use pocketsplat_core::context::{
+use pocketsplat_format::context::{
     FEATURES_PER_LEVEL, GridFrame, GridLevel, LevelKind, MAX_LEVEL_SHIFT, MAX_SPAN_SHIFT, N_GROUPS, N_LEVELS,
 };
 use rand::RngExt;

@@ -1,6 +1,6 @@
 //! What a finished run hands to the writer of bundles.
 
-use pocketsplat_core::context::{Context, N_GROUPS};
+use pocketsplat_format::context::{Context, N_GROUPS};
 use rayon::prelude::*;
 
 use crate::train::context::integers::{HEAD_FRACTION_BITS, Integers};

@@ -1,6 +1,6 @@
 //! What training on anchors changes: the scene and what belongs to it.
 
-use pocketsplat_core::context::N_LEVELS;
+use pocketsplat_format::context::N_LEVELS;
 use serde::{Deserialize, Serialize};
 
 use super::checkpoint::CheckpointFault;

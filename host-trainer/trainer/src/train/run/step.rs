@@ -2,7 +2,7 @@
 
 use std::mem;
 
-use pocketsplat_core::context::Context;
+use pocketsplat_format::context::Context;
 
 use super::learned::Learned;
 use super::state::RunState;

@@ -1,6 +1,6 @@
 //! How a run trains towards few bits.
 
-use pocketsplat_core::context::MAX_TAPS;
+use pocketsplat_format::context::MAX_TAPS;
 use serde::{Deserialize, Serialize};
 
 use super::rates::DECAY_FROM;

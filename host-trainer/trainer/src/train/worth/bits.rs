@@ -1,6 +1,6 @@
 //! What the context model says that values cost.
 
-use pocketsplat_core::context::{Context, Group, N_GROUPS, N_LEVELS, Steps};
+use pocketsplat_format::context::{Context, Group, N_GROUPS, N_LEVELS, Steps};
 use rayon::prelude::*;
 
 use pocketsplat_kernels::ops::heads::{head, mask};

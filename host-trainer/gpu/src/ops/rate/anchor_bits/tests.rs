@@ -4,7 +4,7 @@
 
 use super::*;
 use crate::parity::{Bound, SIZES, assert_close, gpu, largest};
-use pocketsplat_core::context::first_tap;
+use pocketsplat_format::context::first_tap;
 use pocketsplat_kernels::finite_difference::random;
 use pocketsplat_kernels::ops::heads::mask;
 use pocketsplat_kernels::ops::rate::anchor_bits as cpu;

@@ -1,4 +1,4 @@
-// The nodes around a place, as decoder-core's context::grid has them.
+// The nodes around a place, as decoder-format's context::grid has them.
 
 struct Parameters {
     // (anchor, level), or rows.

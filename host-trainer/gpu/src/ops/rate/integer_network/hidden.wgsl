@@ -1,4 +1,4 @@
-// clamp((W1·x + b1) >> shift) of decoder-core's context::mlp, a thread for each unit of each row.
+// clamp((W1·x + b1) >> shift) of decoder-format's context::mlp, a thread for each unit of each row.
 
 // [n, n_in]: multiples of 2⁻²⁴ up to one, as the grid gives them.
 @group(0) @binding(0) var<storage, read> inputs: array<f32>;

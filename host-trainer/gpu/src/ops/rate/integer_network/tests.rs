@@ -1,6 +1,6 @@
 //! Against the decoder's integers: all are the same.
 
-use pocketsplat_core::context::{Context, GridFrame, GridLevel, LevelKind};
+use pocketsplat_format::context::{Context, GridFrame, GridLevel, LevelKind};
 
 use super::*;
 use crate::parity::gpu;

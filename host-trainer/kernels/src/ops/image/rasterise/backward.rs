@@ -2,7 +2,7 @@
 
 use std::hint::select_unpredictable;
 
-use pocketsplat_core::rules::ALPHA_MAX;
+use pocketsplat_format::rules::ALPHA_MAX;
 use rayon::prelude::*;
 
 use super::row::{ALL_ROWS, LOOK_EVERY, Row, SplatRows, live_rows, reduce, set_bits, step_row};

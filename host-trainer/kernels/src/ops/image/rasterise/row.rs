@@ -2,7 +2,7 @@
 
 use std::hint::select_unpredictable;
 
-use pocketsplat_core::rules::{ALPHA_MAX, TRANSMITTANCE_MIN};
+use pocketsplat_format::rules::{ALPHA_MAX, TRANSMITTANCE_MIN};
 
 use crate::ops::image::project::{ALPHA_CUTOFF, Splat};
 use crate::ops::image::tiles::TILE_PX;

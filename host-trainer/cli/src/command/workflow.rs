@@ -21,7 +21,7 @@ const SNAKEFILE: &str = include_str!("workflow/Snakefile");
 const PROFILE: &str = include_str!("workflow/profile.yaml");
 /// The file of a plan, in the folder of its runs.
 const PLAN: (&str, Content) = ("runs.json", Content::Text(&["{\n  \"program\""], "a plan of runs"));
-const CONFIGURATION: Content = Content::Text(&["dataset = "], "a configuration of a run");
+const CONFIGURATION: Content = Content::Text(&["preset = ", "unset = ", "dataset = "], "a configuration of a run");
 const OPTIONS: Content = Content::Text(&["\n", "--"], "a list of options");
 const RULES: Content =
     Content::Text(&["# Written by pocketsplat", "# What `snakemake` in this folder takes"], "a file of the workflow");

@@ -30,7 +30,7 @@ fn an_interrupted_run_ends_in_the_same_file_which_is_measured_and_drawn() {
 
     let mut child = starts(&mut train(&output));
     wait_for(&run, ITERATIONS / 3, &mut child);
-    signal(&child, "INT");
+    signal(&child, "TERM");
     assert_eq!(child.wait_with_output().unwrap().status.code(), Some(130));
     let said = succeeds(&mut resume(&run));
     assert!(said.contains("going on after iteration"), "{said}");

@@ -9,6 +9,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::fixture::{fails, folder, pocketsplat, resume, starts, succeeds, text, undisturbed, wait_for};
+use crate::interruption::signal;
 
 /// Opaque ones at these places and of these colours.
 fn splats(places: impl IntoIterator<Item = ([f32; 3], [f32; 3])>) -> Gaussians {
@@ -279,7 +280,7 @@ fn an_import_that_was_interrupted_goes_on_in_the_same_bytes() {
     succeeds(&mut import(&splats, &whole));
     let mut child = starts(&mut import(&splats, &output));
     wait_for(&home.join("a.run"), 10, &mut child);
-    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    signal(&child, "TERM");
     let ended = child.wait_with_output().unwrap();
     assert_eq!(ended.status.code(), Some(130));
     assert!(text(&ended.stderr).contains("give the same command again to go on"), "{}", text(&ended.stderr));

@@ -27,7 +27,7 @@ const CRATES: [(&str, &[&str]); 13] = [
             "display",
         ],
     ),
-    ("host-trainer/files/src", &["kind", "shell", "output"]),
+    ("host-trainer/files/src", &["kind", "shell", "ply", "output"]),
     ("host-trainer/capture/src", &["camera", "dataset", "synth"]),
     (
         "host-trainer/gaussians/src",

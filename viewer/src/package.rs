@@ -42,7 +42,6 @@ pub fn package() -> [PackageFile; 9] {
 
 #[cfg(test)]
 mod tests {
-
     use pocketsplat_core::{Budget, Quality};
 
     use super::POCKETSPLAT;

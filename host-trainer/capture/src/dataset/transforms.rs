@@ -38,10 +38,14 @@ pub type FrameCamera = (String, Result<Camera, ViewFault>);
 /// # Errors
 /// [`DatasetError`] where the file cannot be read.
 pub fn cameras_of_transforms(path: &Path, side_px: u32) -> Result<Vec<FrameCamera>, DatasetError> {
-    let Transforms { shared, frames, .. } = read_transforms(path)?;
+    let Transforms { mut shared, mut frames, .. } = read_transforms(path)?;
+    // Some write sizes with fractions.
+    for lens in frames.iter_mut().map(|frame| &mut frame.own).chain([&mut shared]) {
+        (lens.w, lens.h) = (lens.w.map(f64::round), lens.h.map(f64::round));
+    }
     let camera = |frame: &Frame| {
         let (rotation, translation) = world_to_camera(&frame.rows())?;
-        let side = |own: Option<f64>, shared: Option<f64>| own.or(shared).map(|side| side.round() as u32);
+        let side = |own: Option<f64>, shared: Option<f64>| own.or(shared).map(|side| side as u32);
         let width_px = side(frame.own.w, shared.w).unwrap_or(side_px);
         let height_px = side(frame.own.h, shared.h).unwrap_or(width_px);
         let header = ImageHeader {

@@ -17,7 +17,7 @@ use super::eval::{Measurements, Renderer, evaluate, reference_image};
 use super::outputs::{BUNDLE, OverwriteArgs, PNG, keep, marked_png};
 use super::train::{Attempt, GoesOn, begun_or_new, decide, train_in};
 use super::{output, settings, stop};
-use crate::config::{CaptureOptions, RunConfig};
+use crate::config::{RunConfig, absolute};
 use crate::say::say;
 
 /// Train, compress and draw a procedural capture.
@@ -26,7 +26,7 @@ use crate::say::say;
 /// command is given again.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Folder for everything; what an earlier demo left there is replaced.
+    /// Folder for everything; a finished demo there is replaced, one that was interrupted goes on.
     #[arg(short, long, default_value = "demo")]
     output: PathBuf,
     /// Training steps.
@@ -64,9 +64,9 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     keep(&capture_folder.join(MARKER), b"")?;
 
     say!("2 of 4  training {} steps", args.iterations);
-    let capture_args = CaptureArgs { dataset: capture_folder, options: CaptureOptions::default() };
     let bundle_path = bundle_output.path();
-    let mut config = configured(args, &capture_args.dataset, bundle_path)?;
+    let mut config = configured(args, &capture_folder, bundle_path)?;
+    let capture_args = CaptureArgs { dataset: capture_folder, options: config.capture.clone() };
     let capture = capture_args.load_to_train(config.train.seed, None, &[])?;
     decide(&mut config, &capture)?;
     let stop = stop::flag()?;
@@ -110,8 +110,9 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
 
 /// What is trained: as `train` does it, with tiers, for the bundle serves devices of several sizes.
 fn configured(args: &Args, capture: &Path, bundle: &Path) -> Result<RunConfig> {
-    let absolute = |path: &Path| std::path::absolute(path).with_context(|| format!("{} is no path", path.display()));
     let mut config = RunConfig { dataset: absolute(capture)?, output: absolute(bundle)?, ..RunConfig::default() };
+    // As large as the capture is made.
+    config.capture.max_resolution = None;
     config.effects.auto = false;
     config.train.iterations = args.iterations;
     config.train.modules.pruning = Some(settings::tiers_of(&config.train.modules));

@@ -34,9 +34,9 @@ use crate::say::say;
 use cameras::Cameras;
 use rounding::Rounding;
 
-/// Write a bundle as explicit Gaussians: .ply, .spz or .sog
+/// Write a bundle as explicit Gaussians that other programs draw: .ply, .spz or .sog.
 ///
-/// Other programs draw these. Opacity, shape and colour of a bundle's Gaussians follow the view. A file keeps one opacity and one shape, and a colour in spherical
+/// Opacity, shape and colour of a bundle's Gaussians follow the view. A file keeps one opacity and one shape, and a colour in spherical
 /// harmonics. They are fitted to what the training cameras see of the bundle, and the loss on the held-out views is measured with the
 /// file as written. Without a capture, cameras are generated around what the bundle's own camera looks at. A file of Gaussians is
 /// written in another format, and both are drawn to measure what that lost.

@@ -2,7 +2,7 @@
 
 mod cameras;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
@@ -24,7 +24,7 @@ use super::train_args::{DeviceArgs, check_lambda};
 use super::{output, process, stop};
 use crate::config::heading::{INPUT, OUTPUT, QUALITY, RUN};
 use crate::config::named::{BACKGROUNDS, one_of};
-use crate::config::{CaptureOptions, RunConfig};
+use crate::config::{CaptureOptions, RunConfig, absolute};
 use crate::say::say;
 
 /// Longest side of the pictures unless the user says otherwise, px.
@@ -44,7 +44,7 @@ const LAMBDA: f64 = 0.0005;
 
 /// Compress splats that exist already into a bundle.
 ///
-/// Draws pictures of a .ply, .spz or .sog, trains a bundle on them, and measures what it lost.
+/// Draws pictures of the splats, trains a bundle on them, and measures what it lost.
 ///
 /// Cameras stand around the scene's bulk or inside it, wherever more of it is seen; --cameras gives others. What was interrupted goes on
 /// when the same command is given again.
@@ -154,7 +154,6 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
 
 /// What is trained: as `train` does it, with the effects that every scene can have.
 fn configured(args: &Args) -> Result<RunConfig> {
-    let absolute = |path: &Path| std::path::absolute(path).with_context(|| format!("{} is no path", path.display()));
     let mut config = RunConfig::default();
     (config.dataset, config.output) = (absolute(&args.points)?, absolute(&args.output)?);
     config.scales_lambda = false;

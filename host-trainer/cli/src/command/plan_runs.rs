@@ -24,8 +24,9 @@ use spec::{AskedRun, Spec};
 /// Writes a Snakemake workflow that trains, measures and tabulates every combination of captures and options; with --run does all of it
 /// here, without Snakemake.
 ///
-/// The same command again goes on where it was stopped, and trains nothing twice. Every run of a workflow asks for the threads that this command has, and for memory and minutes by its own estimate, which takes a few steps of
-/// each kind of run. The workflow ends with `tables`.
+/// The same command again goes on where it was stopped, and trains nothing twice but a few steps of each kind of run, which the estimate
+/// takes. Every run of a workflow asks for the threads that this command has, and for memory and minutes by its own estimate. The
+/// workflow ends with `tables`.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// What to train: captures, options that all runs share, options that they differ in (docs/many-runs.md).

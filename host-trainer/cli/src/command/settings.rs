@@ -28,16 +28,14 @@ pub(crate) struct QualityOptions {
     /// [default: hac]
     #[arg(long, value_parser = backbone_choice(), help_heading = QUALITY)]
     backbone: Option<BackboneChoice>,
-    /// Training steps, with which all schedules scale [default: 7000 by the preset of train, 5000 for import]
+    /// Training steps, with which all schedules scale
     #[arg(long, value_name = "N", help_heading = QUALITY)]
     iterations: Option<u32>,
     /// Effects to train: auto, which tests them in runs of 16,000 iterations and more, or a list of none, all, +NAME and -NAME with the
-    /// names view-colour, view-geometry, view-distance, dilation-compensation, detail and anisotropy [default: auto for train, else
-    /// view-colour,view-geometry,anisotropy]
+    /// names view-colour, view-geometry, view-distance, dilation-compensation, detail and anisotropy
     #[arg(long, value_name = "LIST", allow_hyphen_values = true, help_heading = QUALITY)]
     effects: Option<Request>,
-    /// Training modules to attach in place of those of the configuration [default: rdo-pruning for
-    /// train and import, with tiered-pruning for a device; else none]
+    /// Training modules to attach in place of those of the configuration
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum, help_heading = QUALITY)]
     modules: Option<Vec<TrainingModule>>,
     /// Feature width of an anchor, and hidden width of the heads [default: 32 with scaffold, else 50; by the limits for a

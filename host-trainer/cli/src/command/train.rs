@@ -21,6 +21,7 @@ use pocketsplat_trainer::train::run::{RunFolder, fork};
 
 use super::effects::Resolved;
 use super::estimate::{Estimate, Warned};
+use super::gaussians::GaussiansFile;
 use super::outputs::BUNDLE;
 use super::train_args::Args;
 use super::watch::Ending;
@@ -52,7 +53,7 @@ fn resume(args: &Args, path: &Path) -> Result<ExitCode> {
     }
     let begun = RunConfig::parse(&folder.config()?);
     let begun = begun.with_context(|| format!("could not use the config.toml in {}", path.display()))?;
-    if begun.dataset.is_file() {
+    if begun.dataset.is_file() || GaussiansFile::is_one(&begun.dataset) {
         bail!("the run in {} is of `pocketsplat import`; give that command again, and it goes on", path.display());
     }
     let mut config = args.applied_to(begun.clone())?;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use bytesize::ByteSize;
 use pocketsplat_capture::dataset::{Background, FrameSize};
 use pocketsplat_codec::bundle::PRUNING_RATES;
@@ -21,7 +21,7 @@ use super::outputs::{OverwriteArgs, check_name, reading_capture};
 use super::settings::{QualityOptions, RunOptions, applied};
 use crate::config::heading::{DEVICE, OUTPUT, QUALITY, RUN};
 use crate::config::named::{TARGETS, level_number, one_of};
-use crate::config::{CaptureOptions, EXPLICIT, ExplicitRunConfig, Preset, RunConfig};
+use crate::config::{CaptureOptions, EXPLICIT, ExplicitRunConfig, Preset, RunConfig, absolute};
 use crate::say::say;
 
 /// Train a scene from a capture and write it as a bundle.
@@ -62,7 +62,8 @@ pub(crate) struct Args {
     lambda: Option<f64>,
     #[command(flatten)]
     device: DeviceArgs,
-    /// Configuration to read, as a run folder has it; what it does not say is as without it, and options override it.
+    /// Configuration to read, as a run folder has it; what it does not say is as without it, but that nothing is chosen for a device, and
+    /// options override it.
     #[arg(long, value_name = "FILE.toml", conflicts_with = "resume", help_heading = RUN, hide_short_help = true)]
     config: Option<PathBuf>,
     /// Print the configuration that the run would have, with every key, and the estimate; train nothing and write nothing.
@@ -286,7 +287,7 @@ impl Args {
             (None, None) => self.preset.unwrap_or_default().config(),
         };
         let limits = self.device.limits()?;
-        // A configuration that is given has been decided about.
+        // Widths, tiers and λ of a configuration are its own: what a device affords is chosen without one.
         let is_for_device = !limits.is_none() && self.config.is_none() && self.from.is_none();
         if is_for_device {
             base.effects.price = Price::for_device();
@@ -313,7 +314,7 @@ impl Args {
         }
         // Absolute, so that the run can go on from any folder.
         for path in [&mut config.dataset, &mut config.output] {
-            *path = std::path::absolute(&path).with_context(|| format!("{} is not a path", path.display()))?;
+            *path = absolute(path)?;
         }
         Ok(config)
     }
@@ -323,7 +324,7 @@ impl Args {
         // Absolute, so that the run can go on from any folder.
         for (into, given) in [(&mut config.dataset, &self.dataset), (&mut config.output, &self.output)] {
             if let Some(path) = given {
-                *into = std::path::absolute(path).with_context(|| format!("{} is not a path", path.display()))?;
+                *into = absolute(path)?;
             }
         }
         let (given, before) = (self.device.limits()?, config.encoding.limits);
@@ -399,7 +400,7 @@ impl Args {
         for (into, given) in [(&mut config.dataset, &self.dataset), (&mut config.output, &self.output)] {
             let path = given.as_ref().unwrap_or(into);
             // Absolute, so that the run can go on from any folder.
-            *into = std::path::absolute(path).with_context(|| format!("{} is not a path", path.display()))?;
+            *into = absolute(path)?;
         }
         config.gaussians.validate()?;
         Ok(config)

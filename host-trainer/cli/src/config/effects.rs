@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// How a run comes to its effects; once they are chosen they stand in its shape and modules, and nothing is measured again.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct EffectsConfig {
-    /// Whether they are still to be measured; a configuration in a file has been decided about unless it says so.
+    /// Whether they are still to be measured.
     pub(crate) auto: bool,
     /// Shorter runs are not measured: pilots of an eighth of them say nothing.
     pub(crate) least_iterations: u32,

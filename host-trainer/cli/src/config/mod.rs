@@ -58,6 +58,14 @@ impl Default for RunConfig {
     }
 }
 
+/// A path as a run keeps it, so that it can go on from any folder.
+///
+/// # Errors
+/// The path is empty.
+pub(crate) fn absolute(path: &Path) -> Result<PathBuf> {
+    std::path::absolute(path).with_context(|| format!("`{}` is no path", path.display()))
+}
+
 /// Keys that every written configuration has.
 const ALWAYS_WRITTEN: [&str; 7] = ["dataset", "output", "keep_checkpoints", "capture", "train", "encoding", "effects"];
 

@@ -55,13 +55,15 @@ fn a_configuration_begins_where_a_run_without_one_begins() {
 
 #[test]
 fn a_run_that_began_before_presets_were_a_key_has_what_it_says() {
-    let train = TrainConfig { iterations: 300, voxel_size: Some(0.1), ..TrainConfig::of(Backbone::HacPlus) };
-    let mut config = RunConfig { train, scales_lambda: false, ..RunConfig::default() };
-    config.capture.max_resolution = None;
-    let text = config.to_toml().unwrap();
-    let old: Vec<&str> =
-        text.lines().filter(|line| !line.starts_with("preset") && !line.starts_with("unset")).collect();
-    assert_eq!(RunConfig::parse(&old.join("\n")).unwrap(), config);
+    // As the program wrote it that had no presets in configurations.
+    let old = include_str!("before_presets.toml");
+    let config = RunConfig::parse(old).unwrap();
+    assert_eq!((config.train.iterations, config.train.hac.lambda), (7000, 0.002));
+    assert!(config.train.modules.rdo.is_some() && config.capture.max_resolution == Some(400) && !config.scales_lambda);
+    let (before, after) = (old.find("[train.modules.rdo]").unwrap(), old.find("[encoding]").unwrap());
+    let without = format!("{}{}", &old[..before], &old[after..]).replace("max_resolution = 400\n", "");
+    let config = RunConfig::parse(&without).unwrap();
+    assert!(config.train.modules.rdo.is_none() && config.capture.max_resolution.is_none());
 }
 
 #[test]

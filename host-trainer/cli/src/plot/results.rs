@@ -66,7 +66,7 @@ pub(super) fn curves(reader: &mut csv::Reader<&[u8]>) -> Result<Vec<Named<Vec<Re
     let measured: Vec<&StringRecord> =
         records.iter().filter(|row| !row[psnr].is_empty() && !row[size].is_empty()).collect();
     if measured.is_empty() {
-        bail!("it has no row to draw; let the run go further");
+        bail!("no row has both quality and size; measure its runs first");
     }
     let differs = |column: &usize| measured.iter().any(|row| row[*column] != measured[0][*column]);
     let naming: Vec<usize> = NAMING.iter().filter_map(|names| place(&header, names)).filter(differs).collect();

@@ -110,7 +110,7 @@ fn effects_are_measured_once_and_stay_with_the_run() {
     assert!(!said.contains("effects:"), "nothing is measured again: {said}");
     assert!(fs::read(&output).unwrap() == fs::read(again).unwrap());
 
-    // Ctrl-C while pilots are trained: those that are done stay.
+    // Stopped while pilots are trained: those that are done stay.
     let (interrupted, mut command) = run("c.psb");
     command.arg(&views).args(["--iterations", "80", "--feature-dim", "8", "--offsets", "3"]).args(measured);
     let mut child = starts(&mut command);
@@ -119,7 +119,7 @@ fn effects_are_measured_once_and_stay_with_the_run() {
         assert!(child.try_wait().unwrap().is_none(), "ended before its first pilot");
         std::thread::sleep(std::time::Duration::from_millis(2));
     }
-    signal(&child, "INT");
+    signal(&child, "TERM");
     let ended = child.wait_with_output().unwrap();
     let said = text(&ended.stderr);
     assert_eq!(ended.status.code(), Some(130), "{said}");

@@ -294,4 +294,11 @@ fn an_import_that_was_interrupted_goes_on_in_the_same_bytes() {
     let said = succeeds(&mut import(&splats, &output));
     assert!(said.contains("going on after iteration "), "{said}");
     assert_eq!(fs::read(&output).unwrap(), fs::read(&whole).unwrap());
+    // Begun anew, whatever is left there.
+    let mut child = starts(import(&splats, &output).args(["--seed", "7"]));
+    wait_for(&home.join("a.run"), 10, &mut child);
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let said = succeeds(import(&splats, &output).arg("--overwrite"));
+    assert!(!said.contains("going on") && fs::read(&output).unwrap() == fs::read(&whole).unwrap(), "{said}");
 }

@@ -27,7 +27,7 @@ fn of_text(header: &Header<'_>, body: &[u8], mut each: impl FnMut(&[f64])) -> Re
     let mut row = Vec::with_capacity(n_properties);
     let mut lines = body.split(|&byte| byte == b'\n');
     for index in 0..count {
-        let line = lines.next().filter(|line| !line.is_empty()).ok_or_else(|| cut_off(index, count))?;
+        let line = lines.next().filter(|line| !line.is_empty()).ok_or_else(|| cut_off(index, count, "vertices"))?;
         let text = std::str::from_utf8(line)
             .map_err(|_| Fault::new(format!("is not text in vertex {index} although its format is `ascii`")))?;
         row.clear();
@@ -54,7 +54,7 @@ fn of_bytes(header: &Header<'_>, body: &[u8], is_big: bool, mut each: impl FnMut
     let n_bytes: usize = scalars.iter().map(|scalar| scalar.n_bytes()).sum();
     let (held, count) = (body.len() / n_bytes, header.vertex().count);
     if held < count {
-        return Err(cut_off(held, count));
+        return Err(cut_off(held, count, "vertices"));
     }
     let mut row = Vec::with_capacity(scalars.len());
     for vertex in body.chunks_exact(n_bytes).take(count) {
@@ -76,10 +76,12 @@ fn number(word: &str) -> Option<f64> {
     word.parse().ok().or_else(|| is_nan().then_some(f64::NAN))
 }
 
-/// The fault of a file with fewer vertices than it promises.
-pub fn cut_off(held: usize, count: usize) -> Fault {
+/// The fault of a file with fewer rows than it promises.
+///
+/// * `rows`: what they are, as `vertices`.
+pub fn cut_off(held: usize, count: usize, rows: &str) -> Fault {
     Fault::new(format!(
-        "is cut off: it holds {held} of the {count} vertices that its header promises; copy it again from where it was made"
+        "is cut off: it holds {held} of the {count} {rows} that its header promises; copy it again from where it was made"
     ))
 }
 

@@ -35,7 +35,7 @@ impl<'a> Table<'a> {
         })?;
         let held = bytes.len() / row_bytes;
         if held < element.count {
-            return Err(cut_off(held, element.count).into());
+            return Err(cut_off(held, element.count, &format!("rows of `{name}`")).into());
         }
         Ok(Some(Self { element, row_bytes, bytes }))
     }

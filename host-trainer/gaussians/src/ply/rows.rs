@@ -71,6 +71,14 @@ impl Columns {
     /// Reads the vertices, which begin `body`.
     pub(super) fn read(&self, header: &Header<'_>, body: &[u8]) -> Result<Gaussians, Unreadable> {
         let mut gaussians = Gaussians { degree: self.degree, ..Gaussians::default() };
+        // As many as there are bytes for, so that a hostile count costs nothing; a number takes a byte at least.
+        let row_bytes = header.vertex().n_bytes().unwrap_or(1).max(header.vertex().properties.len());
+        let count = header.vertex().count.min(body.len() / row_bytes.max(1));
+        gaussians.centres.reserve_exact(count);
+        gaussians.log_scales.reserve_exact(count);
+        gaussians.rotations.reserve_exact(count);
+        gaussians.opacity_logits.reserve_exact(count);
+        gaussians.harmonics.reserve_exact(count * self.degree.n_coefficients());
         vertices(header, body, |row| self.push(&mut gaussians, row))?;
         Ok(gaussians)
     }

@@ -57,6 +57,14 @@ pub(crate) enum GoesOn {
 }
 
 impl GoesOn {
+    /// What to do where the capture is not the one that the run began with.
+    const fn with_another_capture(self) -> &'static str {
+        match self {
+            Self::Resume => "the run needs its own capture",
+            Self::SameCommand => "give the options of the first time again, or begin anew with --overwrite",
+        }
+    }
+
     /// As a clause.
     pub(super) fn said(self, run: &Path) -> String {
         match self {
@@ -76,11 +84,12 @@ pub(crate) fn begun_or_new<'a>(path: &Path, config: &RunConfig, overwrite: bool)
         Err(RunError::NoRun { .. } | RunError::Finished { .. }) => None,
         Err(error) => return Err(error.into()),
     };
-    if let Some(folder) = begun {
-        let before = RunConfig::parse(&folder.config()?)?;
+    if let Some(folder) = begun.filter(|_| !overwrite) {
+        let before = RunConfig::parse(&folder.config()?).with_context(|| {
+            format!("could not use the config.toml in {}; begin anew with --overwrite", path.display())
+        })?;
         match before.difference(config, IN_RUN_AND_ON_COMMAND_LINE)? {
             None if before.dataset == config.dataset => return Ok((folder, Start::Resumed)),
-            _ if overwrite => {}
             difference => bail!(
                 "the unfinished run in {} is another one ({}); choose another --output, or begin anew with --overwrite",
                 path.display(),
@@ -118,7 +127,8 @@ pub(crate) fn train_in<'a>(
                     bail!("config.toml and the checkpoint disagree: {difference}; write back what the run began with")
                 }
             }
-        })?,
+        })
+        .context(goes_on.with_another_capture())?,
         Start::Forked(trainer) => *trainer,
     };
     let mut trainer = trainer.fitting(limits);

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use anyhow::{Result, bail};
+use anyhow::{Context as _, Result, bail};
 use pocketsplat_trainer::train::run::{RunError, RunFolder};
 
 use super::in_folder::IN_RUN_AND_ON_COMMAND_LINE;
@@ -26,7 +26,9 @@ impl RunStatus {
     pub(crate) fn of(path: &Path, config: &RunConfig) -> Result<Self> {
         match RunFolder::reopen(path) {
             Ok(folder) => {
-                refuse_other(&RunConfig::parse(&folder.config()?)?, config, path)?;
+                let begun = RunConfig::parse(&folder.config()?)
+                    .with_context(|| format!("could not use the config.toml in {}", path.display()))?;
+                refuse_other(&begun, config, path)?;
                 Ok(Self::Begun(folder))
             }
             Err(RunError::Finished { .. }) if config.output.is_file() => {

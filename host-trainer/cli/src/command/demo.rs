@@ -12,7 +12,7 @@ use pocketsplat_files::Outputs;
 
 use super::bundle::BundleFile;
 use super::capture::CaptureArgs;
-use super::devices::DeviceChoice;
+use super::devices::DeviceOption;
 use super::eval::{Measurements, Renderer, evaluate, reference_image};
 use super::outputs::{BUNDLE, OverwriteArgs, PNG, keep, marked_png};
 use super::train::{Attempt, GoesOn, begun_or_new, decide, train_in};
@@ -35,10 +35,8 @@ pub(crate) struct Args {
     /// Width and height of the images, pixels.
     #[arg(long, default_value_t = SynthOptions::default().size_px)]
     size: u32,
-    /// What trains: cpu, gpu, gpu:N as `pocketsplat devices` lists them, or auto, a GPU where there is one
-    /// [default: cpu]
-    #[arg(long = "device", value_name = "NAME", default_value = "cpu", hide_default_value = true)]
-    trains_on: DeviceChoice,
+    #[command(flatten)]
+    device: DeviceOption,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
@@ -71,7 +69,7 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     decide(&mut config, &capture)?;
     let stop = stop::flag()?;
     let (folder, start) = begun_or_new(&bundle_path.with_extension("run"), &config, args.overwrite.is_given())?;
-    let attempt = Attempt { device: args.trains_on.open()?, stop: &stop, goes_on: GoesOn::SameCommand };
+    let attempt = Attempt { device: args.device.trains_on.open()?, stop: &stop, goes_on: GoesOn::SameCommand };
     let Some(trained) = train_in(folder, &config, &capture, start, attempt, &bundle_output)? else {
         return Ok(ExitCode::from(stop::INTERRUPTED));
     };

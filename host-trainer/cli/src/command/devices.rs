@@ -8,6 +8,7 @@ use pocketsplat_kernels::step::SharedDevice;
 use serde::Serialize;
 
 use super::output;
+use crate::config::heading::RUN;
 #[cfg(feature = "gpu")]
 use crate::say::say;
 
@@ -56,6 +57,16 @@ pub(crate) enum DeviceChoice {
     Cpu,
     /// A GPU: of this number, or the best.
     Gpu(Option<usize>),
+}
+
+/// The option of every command that trains.
+#[derive(clap::Args, Clone, Copy)]
+pub(crate) struct DeviceOption {
+    /// What trains: cpu, gpu, gpu:N as `pocketsplat devices` lists them, or auto, a GPU where there is one
+    /// [default: cpu]
+    #[arg(long = "device", value_name = "NAME", default_value = "cpu", hide_default_value = true, help_heading = RUN,
+        hide_short_help = true)]
+    pub(crate) trains_on: DeviceChoice,
 }
 
 impl FromStr for DeviceChoice {

@@ -18,7 +18,7 @@ const GROUPS: [(&str, &[&str]); 5] = [
     ("Captures and this machine", &["doctor", "synth", "demo", "devices", "bench", "completions", "man"]),
 ];
 
-/// Commands that train; those that look at what was trained, as it was.
+/// Commands that look at what was trained, as it was.
 const LOOKING: &[&str] = &["eval", "render", "verify", "cost", "export"];
 /// Defaults in which commands that share an option differ.
 const DEFAULTS: [(&[&str], &str, &str); 10] = [

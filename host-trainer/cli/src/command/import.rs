@@ -12,15 +12,16 @@ use pocketsplat_core::Budget;
 use pocketsplat_files::shell_word;
 use pocketsplat_trainer::explicit::bulk::Bulk;
 use pocketsplat_trainer::explicit::pictures::{Pictures, capture};
+use pocketsplat_trainer::train::run::RunFolder;
 use serde::Serialize;
 
-use super::devices::DeviceChoice;
+use super::devices::DeviceOption;
 use super::gaussians::{AxesArgs, GaussiansFile};
 use super::outputs::{BUNDLE, OverwriteArgs, check_name};
 use super::settings::QualityOptions;
 use super::stand::{StandArgs, bulk_of};
 use super::train::{Attempt, GoesOn, HeldOut, TrainResult, begun_or_new, train_in};
-use super::train_args::{DeviceArgs, check_lambda};
+use super::train_args::{DeviceArgs, check_lambda, run_folder};
 use super::{output, process, stop};
 use crate::config::heading::{INPUT, OUTPUT, QUALITY, RUN};
 use crate::config::named::{BACKGROUNDS, one_of};
@@ -74,6 +75,9 @@ pub(crate) struct Args {
     /// Bundle to write.
     #[arg(short, long, value_name = "OUT.psb", help_heading = OUTPUT)]
     output: PathBuf,
+    /// Folder for configuration, progress and checkpoints [default: OUT.run]
+    #[arg(long, value_name = "DIR", help_heading = OUTPUT)]
+    run: Option<PathBuf>,
     /// Print the result as JSON [default: as text]
     #[arg(long, help_heading = OUTPUT)]
     json: bool,
@@ -87,10 +91,8 @@ pub(crate) struct Args {
     /// Seed of all random numbers: the same seed on the same machine gives the same bundle.
     #[arg(long, value_name = "N", default_value_t = 42, help_heading = RUN)]
     seed: u64,
-    /// What trains: cpu, gpu, gpu:N as `pocketsplat devices` lists them, or auto, a GPU where there is one
-    /// [default: cpu]
-    #[arg(long = "device", value_name = "NAME", default_value = "cpu", hide_default_value = true, help_heading = RUN)]
-    trains_on: DeviceChoice,
+    #[command(flatten)]
+    trainer: DeviceOption,
     #[command(flatten)]
     overwrite: OverwriteArgs,
 }
@@ -128,6 +130,9 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     let outputs = args.overwrite.outputs().reading(&args.points);
     let mut outputs = args.cameras.iter().fold(outputs, |outputs, path| outputs.reading(path));
     let output = outputs.file(&args.output, BUNDLE)?;
+    let folder = run_folder(args.run.as_deref(), &args.output)?;
+    // Whose folder it is, before pictures are drawn for minutes; which run is in it says the configuration.
+    RunFolder::check(&folder, true)?;
     let file = GaussiansFile::read_as(&args.points, args.axes.spz_axes)?;
     let Seen { bulk, train, test } = seen(args, config.capture.resolution, &file)?;
     let capture = captured(args, &file, &bulk, [&train, &test])?;
@@ -139,8 +144,8 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
         test.len()
     );
     config.train = config.train.resolved_for(&capture);
-    let (device, stop) = (args.trains_on.open()?, stop::flag()?);
-    let (folder, start) = begun_or_new(&args.output.with_extension("run"), &config, args.overwrite.is_given())?;
+    let (device, stop) = (args.trainer.trains_on.open()?, stop::flag()?);
+    let (folder, start) = begun_or_new(&folder, &config, args.overwrite.is_given())?;
     let attempt = Attempt { device, stop: &stop, goes_on: GoesOn::SameCommand };
     let Some(trained) = train_in(folder, &config, &capture, start, attempt, &output)? else {
         return Ok(ExitCode::from(stop::INTERRUPTED));

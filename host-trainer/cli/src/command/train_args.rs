@@ -16,7 +16,7 @@ use pocketsplat_trainer::train::config::Backbone;
 use pocketsplat_trainer::train::run::is_file_of_run;
 
 use super::capture::CaptureArgs;
-use super::devices::DeviceChoice;
+use super::devices::{DeviceChoice, DeviceOption};
 use super::outputs::{OverwriteArgs, check_name, reading_capture};
 use super::settings::{QualityOptions, RunOptions, applied};
 use crate::config::heading::{DEVICE, OUTPUT, QUALITY, RUN};
@@ -83,11 +83,8 @@ pub(crate) struct Args {
     /// Iteration to branch off after, one that the other run was given as --fork-at.
     #[arg(long, value_name = "STEP", requires = "from", help_heading = RUN, hide_short_help = true)]
     at: Option<u32>,
-    /// What trains: cpu, gpu, gpu:N as `pocketsplat devices` lists them, or auto, a GPU where there is one
-    /// [default: cpu]
-    #[arg(long = "device", value_name = "NAME", default_value = "cpu", hide_default_value = true, help_heading = RUN,
-        hide_short_help = true)]
-    trains_on: DeviceChoice,
+    #[command(flatten)]
+    trainer: DeviceOption,
     #[command(flatten)]
     overwrite: OverwriteArgs,
     #[command(flatten)]
@@ -261,12 +258,12 @@ impl Args {
 
     /// What trains, as it was asked for.
     pub(crate) fn device_choice(&self) -> DeviceChoice {
-        self.trains_on
+        self.trainer.trains_on
     }
 
     /// The GPU that trains, where one is asked for or found; says on stderr which.
     pub(crate) fn device(&self) -> Result<Option<SharedDevice<f32>>> {
-        self.trains_on.open()
+        self.trainer.trains_on.open()
     }
 
     /// The port of the page about the run while it goes on, if there is to be one; 0 for any.
@@ -381,7 +378,7 @@ impl Args {
         let others = [
             ("--lambda", self.lambda.is_some()),
             ("--watch", self.watch.is_some()),
-            ("--device", matches!(self.trains_on, DeviceChoice::Gpu(_))),
+            ("--device", matches!(self.trainer.trains_on, DeviceChoice::Gpu(_))),
         ];
         let given = others.into_iter().chain(device).filter(|(_, given)| *given);
         refused.extend(given.map(|(name, _)| name));
@@ -410,10 +407,15 @@ impl Args {
     ///
     /// * `output`: what it writes in the end.
     pub(crate) fn run_folder(&self, output: &Path) -> Result<PathBuf> {
-        let folder = self.run.clone().unwrap_or_else(|| output.with_extension("run"));
-        if std::path::absolute(&folder).ok() == std::path::absolute(output).ok() {
-            bail!("{} cannot be both output and run folder; choose another folder with --run", folder.display());
-        }
-        Ok(folder)
+        run_folder(self.run.as_deref(), output)
     }
+}
+
+/// Where a run works that writes `output` in the end: the folder `given`, else beside it.
+pub(super) fn run_folder(given: Option<&Path>, output: &Path) -> Result<PathBuf> {
+    let folder = given.map_or_else(|| output.with_extension("run"), Path::to_owned);
+    if std::path::absolute(&folder).ok() == std::path::absolute(output).ok() {
+        bail!("{} cannot be both output and run folder; choose another folder with --run", folder.display());
+    }
+    Ok(folder)
 }

@@ -118,7 +118,10 @@ impl RunConfig {
         if key("capture", "resolution").is_some() {
             base.capture.max_resolution = None;
         }
-        Ok(backbone.map_or(base.clone(), |backbone| base.with_backbone(backbone)))
+        Ok(match backbone {
+            Some(backbone) => base.with_backbone(backbone),
+            None => base,
+        })
     }
 
     /// The same with another backbone.

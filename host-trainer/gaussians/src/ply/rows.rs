@@ -71,9 +71,8 @@ impl Columns {
     /// Reads the vertices, which begin `body`.
     pub(super) fn read(&self, header: &Header<'_>, body: &[u8]) -> Result<Gaussians, Unreadable> {
         let mut gaussians = Gaussians { degree: self.degree, ..Gaussians::default() };
-        // As many as there are bytes for, so that a hostile count costs nothing; a number takes a byte at least.
-        let row_bytes = header.vertex().n_bytes().unwrap_or(1).max(header.vertex().properties.len());
-        let count = header.vertex().count.min(body.len() / row_bytes.max(1));
+        // A number takes a byte at least, so that a hostile count costs nothing.
+        let count = header.vertex().count.min(body.len() / header.vertex().properties.len().max(1));
         gaussians.centres.reserve_exact(count);
         gaussians.log_scales.reserve_exact(count);
         gaussians.rotations.reserve_exact(count);

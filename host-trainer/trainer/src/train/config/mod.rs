@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::modules::Modules;
-pub use super::schedule::{Backbone, Densification, Hac, LearningRate, Rates};
+pub use super::schedule::{Backbone, Densification, Hac, ImageSize, LearningRate, Rates};
 use super::schedule::{ConfigError, within};
 use pocketsplat_capture::dataset::{Capture, PointsOrigin};
 use pocketsplat_kernels::scene::ModelShape;
@@ -34,6 +34,9 @@ pub struct TrainConfig {
     pub learns_background: bool,
     /// Loss weights.
     pub loss: LossWeights,
+    /// How large images are, and when.
+    #[serde(default)]
+    pub image_size: ImageSize,
     /// Growth and pruning.
     pub densification: Densification,
     /// The rate, where the backbone has one.
@@ -58,6 +61,7 @@ impl Default for TrainConfig {
             rates: Rates::default(),
             learns_background: false,
             loss: LossWeights::default(),
+            image_size: ImageSize::default(),
             densification: Densification::default(),
             hac: Hac::default(),
             modules: Modules::default(),
@@ -160,6 +164,10 @@ impl TrainConfig {
         }
         within("train.loss.dssim", self.loss.dssim, 0.0, 1.0)?;
         within("train.loss.volume", self.loss.volume, 0.0, 1e6)?;
+        // Events look at whole images.
+        let ImageSize { quarter_until, half_until } = self.image_size;
+        within("train.image_size.half_until", half_until, 0.0, self.densification.until)?;
+        within("train.image_size.quarter_until", quarter_until, 0.0, half_until)?;
         let Densification { statistics_from, from, until, interval, success, levels, .. } = self.densification;
         let Densification { gradient_threshold, min_opacity, .. } = self.densification;
         within("train.densification.success", success, 0.0, 1.0)?;
@@ -201,6 +209,11 @@ impl TrainConfig {
         let densification = Densification { coarsest_cells, ..self.densification };
         let shape = self.modules.shape(self.shape);
         Self { voxel_size: Some(self.voxel_size_for(capture)), densification, shape, ..*self }
+    }
+
+    /// How often the sides of images are halved after so many iterations.
+    pub fn halvings(&self, iterations: u32) -> u32 {
+        self.image_size.halvings(f64::from(iterations) / f64::from(self.iterations))
     }
 
     /// What iteration `iteration`, from 1, does to the values of anchors.

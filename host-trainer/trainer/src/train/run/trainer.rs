@@ -12,7 +12,7 @@ use crate::train::error::TrainError;
 use crate::train::limits::{Finished, LimitProbe};
 use crate::train::modules::RunView;
 use crate::train::optimiser::Optimiser;
-use crate::train::views::target;
+use crate::train::views::{Reduced, target};
 use crate::train::worth::Probe;
 use pocketsplat_capture::dataset::{Capture, Image, View};
 use pocketsplat_kernels::ops::Pinhole;
@@ -163,7 +163,14 @@ impl<'a> Trainer<'a> {
         self.begin_context()?;
         let (place, photograph) = self.next_view()?;
         let camera = self.setup.views.cameras[place];
-        let target = target(&photograph, &camera, self.state.learned.background).numbered(place);
+        let (background, halvings) = (self.state.learned.background, self.setup.config.halvings(self.state.iteration));
+        let mut reduced = (halvings > 0).then(|| Reduced::new(&photograph, &camera, 1 << halvings));
+        let target = match &mut reduced {
+            Some(reduced) => reduced.target(background),
+            None => target(&photograph, &camera, background),
+        };
+        // A device knows a photograph again by its number, at each of its sizes.
+        let target = target.numbered(place + halvings as usize * self.setup.views.all.len());
         let (modules, at) = (self.setup.config.modules, self.step_info());
         let pruned_share = modules.each().iter().map(|module| module.pruned_share(&at)).fold(0.0, f32::max);
         let terms = modules.terms();

@@ -15,6 +15,7 @@ use crate::train::run::checkpoint::envelope::needs;
 use crate::train::run::checkpoint::{CheckpointFault, Kernels};
 use crate::train::run::watchdog;
 use crate::train::run::{Method, Run, RunState, Setup};
+use crate::train::streams::{Purpose, random};
 use pocketsplat_kernels::ops::image::spherical_harmonics::MOST;
 use pocketsplat_kernels::ops::simd::Level;
 use pocketsplat_kernels::step::{TargetView, planes};
@@ -171,7 +172,7 @@ impl CloudTrainer<'_> {
 
     fn control_density(&mut self, gradients: &CloudGradients<f32>) {
         let Setup { config, capture, .. } = &self.setup;
-        let RunState { iteration, rng, learned: LearnedCloud { cloud, optimiser, statistics }, .. } = &mut self.state;
+        let RunState { iteration, learned: LearnedCloud { cloud, optimiser, statistics }, .. } = &mut self.state;
         let settings = config.density;
         if *iteration >= config.iteration_at(settings.until) {
             return;
@@ -180,7 +181,8 @@ impl CloudTrainer<'_> {
         let every = config.iteration_at(settings.reset_every).max(1);
         if iteration.is_multiple_of(settings.interval) && *iteration > config.iteration_at(settings.from) {
             let prunes_large = *iteration > every;
-            density::control(cloud, optimiser, statistics, &settings, capture.extent, prunes_large, rng);
+            let mut rng = random(config.seed, Purpose::Split, *iteration);
+            density::control(cloud, optimiser, statistics, &settings, capture.extent, prunes_large, &mut rng);
         }
         if iteration.is_multiple_of(every) {
             density::reset_opacities(cloud, optimiser, &settings);

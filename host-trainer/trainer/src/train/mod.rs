@@ -16,6 +16,7 @@ pub mod optimiser;
 pub(crate) mod read_ahead;
 pub mod run;
 pub mod schedule;
+pub(crate) mod streams;
 #[cfg(test)]
 pub(crate) mod test_capture;
 pub mod views;

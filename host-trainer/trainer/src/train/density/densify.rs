@@ -3,12 +3,11 @@
 use std::collections::{BTreeMap, HashSet};
 
 use glam::DVec3;
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
 
 use super::Statistics;
 use crate::train::optimiser::{Optimiser, retain_rows};
 use crate::train::schedule::Densification;
+use pocketsplat_kernels::ops::rate::noise::Stream;
 use pocketsplat_kernels::scene::init::lattice_cell;
 use pocketsplat_kernels::scene::{Anchors, INITIAL_MASK_LOGIT, Scene};
 
@@ -25,14 +24,14 @@ const EDGE_RATIO: u32 = 4;
 /// cell is skipped, and so is a finer one when nothing has grown yet). A new anchor takes the element-wise largest
 /// feature of the parents that fall into its voxel, log-scales ln(edge), offsets 0 (Lu et al. 2024, Scaffold-GS, section 3.3).
 ///
-/// * `coarsest_cells`: voxel edge of level 0. * returns how many were added.
+/// * `coarsest_cells`: voxel edge of level 0. * `luck`: of this event. * returns how many were added.
 pub fn grow(
     scene: &mut Scene<f32>,
     optimiser: &mut Optimiser<f32>,
     statistics: &mut Statistics,
     settings: &Densification,
     coarsest_cells: u32,
-    rng: &mut ChaCha8Rng,
+    luck: Stream,
 ) -> usize {
     let (f, k) = (scene.shape.feature_dim, scene.shape.n_offsets);
     let enough = f64::from(settings.interval) * settings.success * 0.5;
@@ -46,15 +45,18 @@ pub fn grow(
         }
         let threshold = settings.gradient_threshold * THRESHOLD_RATIO.powf(f64::from(level));
         let drop_below = 0.5f64.powf(f64::from(level + 1));
-        // Drawn for every offset, eligible or not, so that one more eligible offset does not change all later draws.
-        let lucky: Vec<bool> = (0..n_before * k).map(|_| rng.random::<f64>() > drop_below).collect();
+        let is_lucky = |scene: &Scene<f32>, at: usize| {
+            let of_cell =
+                scene.anchors.lattice[at / k].into_iter().fold(luck.branch(level), |s, c| s.branch(c.cast_unsigned()));
+            f64::from(of_cell.uniform((at % k) as u32)) > drop_below
+        };
         let edge = scene.voxel_size * f64::from(cells);
         let cell_of = |p: DVec3| lattice_cell(p, edge);
         let position =
             |scene: &Scene<f32>, a: usize| DVec3::from(scene.anchors.lattice[a].map(f64::from)) * scene.voxel_size;
         let occupied: HashSet<[i32; 3]> = (0..scene.anchors.len()).map(|a| cell_of(position(scene, a))).collect();
         let mut candidates: BTreeMap<[i32; 3], Candidate> = BTreeMap::new();
-        for at in eligible.iter().copied().filter(|at| lucky[*at] && mean_gradient(*at) >= threshold) {
+        for at in eligible.iter().copied().filter(|at| mean_gradient(*at) >= threshold && is_lucky(scene, *at)) {
             let anchor = at / k;
             let offset = DVec3::from(std::array::from_fn(|i| {
                 f64::from(scene.anchors.offsets[at * 3 + i])
@@ -179,20 +181,19 @@ pub fn retain(scene: &mut Scene<f32>, optimiser: &mut Optimiser<f32>, statistics
 mod tests {
     use super::*;
     use crate::train::TrainConfig;
+    use crate::train::streams::{self, Purpose, random};
     use pocketsplat_kernels::scene::ModelShape;
     use pocketsplat_kernels::scene::init::initial_scene;
-    use rand::SeedableRng;
 
-    fn start(points: &[DVec3]) -> (Scene<f32>, Optimiser<f32>, Statistics, ChaCha8Rng) {
+    fn start(points: &[DVec3]) -> (Scene<f32>, Optimiser<f32>, Statistics) {
         start_with(TrainConfig::default().shape, points)
     }
 
-    fn start_with(shape: ModelShape, points: &[DVec3]) -> (Scene<f32>, Optimiser<f32>, Statistics, ChaCha8Rng) {
-        let mut rng = ChaCha8Rng::seed_from_u64(1);
-        let scene = initial_scene(shape, 0.001, points, &mut rng);
+    fn start_with(shape: ModelShape, points: &[DVec3]) -> (Scene<f32>, Optimiser<f32>, Statistics) {
+        let scene = initial_scene(shape, 0.001, points, &mut random(1, Purpose::Start, 0));
         let optimiser = Optimiser::new(&scene);
         let statistics = Statistics::new(scene.anchors.len(), scene.shape.n_offsets);
-        (scene, optimiser, statistics, rng)
+        (scene, optimiser, statistics)
     }
 
     fn consistent(scene: &Scene<f32>, optimiser: &Optimiser<f32>, statistics: &Statistics) {
@@ -211,7 +212,7 @@ mod tests {
 
     #[test]
     fn an_offset_that_is_pulled_hard_becomes_an_anchor_on_the_lattice() {
-        let (mut scene, mut optimiser, mut statistics, mut rng) = start(&[DVec3::ZERO, DVec3::ONE]);
+        let (mut scene, mut optimiser, mut statistics) = start(&[DVec3::ZERO, DVec3::ONE]);
         scene.anchors.features[..32].fill(-2.0);
         for k in 0..10 {
             scene.anchors.log_scales[..3].fill(0.0);
@@ -219,7 +220,8 @@ mod tests {
             statistics.n_drawn[k] = 41;
             statistics.gradient_sum[k] = 41.0;
         }
-        let added = grow(&mut scene, &mut optimiser, &mut statistics, &Densification::default(), 4, &mut rng);
+        let added =
+            grow(&mut scene, &mut optimiser, &mut statistics, &Densification::default(), 4, streams::growth(1, 100));
         assert!((8..=10).contains(&added), "kept at ½ on the coarse level, then at ¾ of the rest: {added}");
         consistent(&scene, &optimiser, &statistics);
         for cell in &scene.anchors.lattice[2..] {
@@ -227,18 +229,22 @@ mod tests {
         }
         assert!(scene.anchors.features[64..].iter().all(|v| *v == -2.0), "the parent's feature");
         assert!(statistics.n_drawn.iter().all(|n| *n == 0), "judged offsets start afresh");
-        let again = grow(&mut scene, &mut optimiser, &mut statistics, &Densification::default(), 4, &mut rng);
+        let again =
+            grow(&mut scene, &mut optimiser, &mut statistics, &Densification::default(), 4, streams::growth(1, 100));
         assert_eq!(again, 0, "nothing is eligible");
     }
 
     #[test]
     fn a_seldom_drawn_or_gentle_offset_grows_nothing() {
-        let (mut scene, mut optimiser, mut statistics, mut rng) = start(&[DVec3::ZERO, DVec3::ONE]);
+        let (mut scene, mut optimiser, mut statistics) = start(&[DVec3::ZERO, DVec3::ONE]);
         statistics.n_drawn[0] = 40;
         statistics.gradient_sum[0] = 40.0;
         statistics.n_drawn[1] = 100;
         statistics.gradient_sum[1] = 100.0 * 1.9e-4;
-        assert_eq!(grow(&mut scene, &mut optimiser, &mut statistics, &Densification::default(), 4, &mut rng), 0);
+        assert_eq!(
+            grow(&mut scene, &mut optimiser, &mut statistics, &Densification::default(), 4, streams::growth(1, 100)),
+            0
+        );
         assert_eq!(statistics.n_drawn[..2], [40, 0], "only the judged one is reset");
     }
 
@@ -247,7 +253,7 @@ mod tests {
     /// * `pull`: mean gradient, in thresholds of the coarsest level.
     fn grown(pull: f32, levels: u32) -> usize {
         let points: Vec<DVec3> = (0..40).map(|i| DVec3::new(0.0, f64::from(i), 0.0)).collect();
-        let (mut scene, mut optimiser, mut statistics, mut rng) = start(&points);
+        let (mut scene, mut optimiser, mut statistics) = start(&points);
         scene.anchors.log_scales.fill(0.0);
         for at in 0..400 {
             scene.anchors.offsets[at * 3] = 0.1 * (at % 10 + 1) as f32;
@@ -255,7 +261,7 @@ mod tests {
             statistics.gradient_sum[at] = 100.0 * 2e-4 * pull;
         }
         let settings = Densification { levels, ..Densification::default() };
-        grow(&mut scene, &mut optimiser, &mut statistics, &settings, 4, &mut rng)
+        grow(&mut scene, &mut optimiser, &mut statistics, &settings, 4, streams::growth(1, 100))
     }
 
     #[test]
@@ -269,34 +275,45 @@ mod tests {
 
     #[test]
     fn a_cap_keeps_the_candidates_that_are_pulled_hardest() {
-        let (mut scene, mut optimiser, mut statistics, mut rng) = start(&[DVec3::ZERO, DVec3::ONE]);
-        scene.anchors.log_scales[..3].fill(0.0);
-        for k in 0..10 {
-            scene.anchors.offsets[k * 3] = 0.1 * (k + 1) as f32;
-            statistics.n_drawn[k] = 41;
-            statistics.gradient_sum[k] = (k + 1) as f32;
-        }
-        let settings = Densification { max_anchors: Some(5), levels: 1, ..Densification::default() };
-        let added = grow(&mut scene, &mut optimiser, &mut statistics, &settings, 4, &mut rng);
-        assert_eq!((added, scene.anchors.len()), (3, 5));
-        let cells: Vec<i32> = scene.anchors.lattice[2..].iter().map(|c| c[0]).collect();
-        assert!(cells.is_sorted() && cells[0] >= 400, "the far, hard-pulled ones: {cells:?}");
-        consistent(&scene, &optimiser, &statistics);
-        let again = grow(&mut scene, &mut optimiser, &mut statistics, &settings, 4, &mut rng);
-        assert_eq!(again, 0, "full");
+        // Every offset is pulled harder than those nearer to the anchor.
+        let grown = |max_anchors| {
+            let (mut scene, mut optimiser, mut statistics) = start(&[DVec3::ZERO, DVec3::ONE]);
+            scene.anchors.log_scales[..3].fill(0.0);
+            for k in 0..10 {
+                scene.anchors.offsets[k * 3] = 0.1 * (k + 1) as f32;
+                statistics.n_drawn[k] = 41;
+                statistics.gradient_sum[k] = (k + 1) as f32;
+            }
+            let settings = Densification { max_anchors, levels: 1, ..Densification::default() };
+            let mut once_more =
+                || grow(&mut scene, &mut optimiser, &mut statistics, &settings, 4, streams::growth(1, 100));
+            let (added, again) = (once_more(), once_more());
+            assert_eq!(again, 0, "nothing is eligible");
+            consistent(&scene, &optimiser, &statistics);
+            let cells: Vec<i32> = scene.anchors.lattice[2..].iter().map(|c| c[0]).collect();
+            assert_eq!(cells.len(), added);
+            assert!(cells.is_sorted(), "{cells:?}");
+            cells
+        };
+        let (all, capped) = (grown(None), grown(Some(4)));
+        assert!(all.len() > 2, "{all:?}");
+        assert_eq!(capped, all[all.len() - 2..]);
     }
 
     #[test]
     fn isotropic_scenes_grow_and_lose_anchors_alike() {
         let shape = ModelShape { anisotropic: false, ..TrainConfig::default().shape };
-        let (mut scene, mut optimiser, mut statistics, mut rng) = start_with(shape, &[DVec3::ZERO, DVec3::ONE]);
+        let (mut scene, mut optimiser, mut statistics) = start_with(shape, &[DVec3::ZERO, DVec3::ONE]);
         for k in 0..10 {
             scene.anchors.log_scales[..3].fill(0.0);
             scene.anchors.offsets[k * 3] = 0.1 * (k + 1) as f32;
             statistics.n_drawn[k] = 41;
             statistics.gradient_sum[k] = 41.0;
         }
-        assert!(grow(&mut scene, &mut optimiser, &mut statistics, &Densification::default(), 4, &mut rng) > 0);
+        assert!(
+            grow(&mut scene, &mut optimiser, &mut statistics, &Densification::default(), 4, streams::growth(1, 100))
+                > 0
+        );
         consistent(&scene, &optimiser, &statistics);
         statistics.n_views[1] = 81;
         scene.anchors.log_scales[3] = 1.0;
@@ -310,7 +327,7 @@ mod tests {
 
     #[test]
     fn an_anchor_that_showed_nothing_goes() {
-        let (mut scene, mut optimiser, mut statistics, _) = start(&[DVec3::ZERO, DVec3::ONE, -DVec3::ONE]);
+        let (mut scene, mut optimiser, mut statistics) = start(&[DVec3::ZERO, DVec3::ONE, -DVec3::ONE]);
         statistics.n_views = vec![81, 81, 80];
         statistics.opacity_sum = vec![0.4, 0.41, 0.0];
         scene.anchors.log_scales[17] = 1.0;

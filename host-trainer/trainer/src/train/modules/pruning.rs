@@ -1,6 +1,5 @@
 //! Opacity-based probabilistic pruning: fewer anchors for good, or an order in which a device may leave them out.
 
-use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
@@ -8,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::{AnchorChange, Module, RunView};
 use crate::train::error::TrainError;
 use crate::train::schedule::{ConfigError, within};
+use crate::train::streams::{Purpose, random};
 use pocketsplat_kernels::ops::loss::opacity_target::forward_backward;
 use pocketsplat_kernels::real::Real;
 use pocketsplat_kernels::scene::{ModelShape, Scene};
@@ -159,10 +159,7 @@ impl Module for Pruning {
             Rank::Contribution => run.visibility(true).contribution,
             Rank::Worth => run.worth()?.per_bit(),
         };
-        // A stream of its own: the run's other random numbers do not depend on modules.
-        let mut rng = ChaCha8Rng::seed_from_u64(run.seed());
-        rng.set_stream(1);
-        let ranks = self.prune_ranks(&scores, &mut rng);
+        let ranks = self.prune_ranks(&scores, &mut random(run.seed(), Purpose::Ranks, at.iteration));
         Ok(Some(match self.form {
             Form::Tiered => AnchorChange::Rank(ranks),
             Form::Hard => {
@@ -210,6 +207,8 @@ impl<R: Real> Terms<R> for Pruning {
 
 #[cfg(test)]
 mod tests {
+    use rand::SeedableRng;
+
     use super::*;
     use crate::train::modules::Modules;
     use crate::train::test_capture::{tiny_capture, tiny_config};

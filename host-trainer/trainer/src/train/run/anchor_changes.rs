@@ -1,13 +1,13 @@
 //! Changes to the anchors of a run: growth, pruning, and the changes that modules return.
 
 use super::learned::Learned;
-use super::state::RunState;
 use super::trainer::Trainer;
 use crate::train::config::{Backbone, Densification};
 use crate::train::density::{Visibility, densify};
 use crate::train::error::TrainError;
 use crate::train::limits::Fit;
 use crate::train::modules::AnchorChange;
+use crate::train::streams;
 
 impl Trainer<'_> {
     /// Statistics of the step, and growth and pruning when they are due.
@@ -30,8 +30,9 @@ impl Trainer<'_> {
         if due && self.state.iteration > self.setup.config.iteration_at(settings.from) {
             self.take_back()?;
             let coarsest_cells = self.setup.config.coarsest_cells_for(self.setup.capture);
-            let RunState { rng, learned: Learned { scene, optimiser, statistics, .. }, .. } = &mut self.state;
-            densify::grow(scene, optimiser, statistics, &settings, coarsest_cells, rng);
+            let luck = streams::growth(self.setup.config.seed, self.state.iteration);
+            let Learned { scene, optimiser, statistics, .. } = &mut self.state.learned;
+            densify::grow(scene, optimiser, statistics, &settings, coarsest_cells, luck);
             densify::prune(scene, optimiser, statistics, &settings);
             self.weigh_views();
         }

@@ -6,9 +6,7 @@ use std::time::Instant;
 
 use cpu_time::ProcessTime;
 use pocketsplat_capture::dataset::{Capture, Photograph};
-use rand::SeedableRng;
 use rand::seq::SliceRandom;
-use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -17,6 +15,7 @@ use super::state::{Machine, RunState, Setup};
 use super::watchdog::Watchdog;
 use crate::train::error::{Cause, DroppedStep, TrainError};
 use crate::train::read_ahead::ReadAhead;
+use crate::train::streams::{Purpose, random};
 use crate::train::views::TrainingViews;
 
 /// What a run trains, and how: anchors, or explicit Gaussians.
@@ -125,7 +124,6 @@ impl<'a, M: Method> Run<'a, M> {
                 seconds: 0.0,
                 processor_seconds: 0.0,
                 queue: Vec::new(),
-                rng: ChaCha8Rng::seed_from_u64(M::length_and_seed(&config).1),
                 learned,
             },
             machine: Machine { device, photographs: ReadAhead::default() },
@@ -213,7 +211,8 @@ impl<'a, M: Method> Run<'a, M> {
         let Self { setup, state, machine } = self;
         if state.queue.is_empty() {
             state.queue.clone_from(&setup.views.trained);
-            state.queue.shuffle(&mut state.rng);
+            let seed = M::length_and_seed(&setup.config).1;
+            state.queue.shuffle(&mut random(seed, Purpose::Views, state.iteration));
         }
         let order = state.queue.iter().rev().copied();
         let photograph = machine.photographs.photograph(setup.views.all, order)?;

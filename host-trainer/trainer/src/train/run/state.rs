@@ -1,7 +1,6 @@
 //! What a run consists of: what is set up once, what changes with every iteration, what computes it.
 
 use pocketsplat_capture::dataset::Capture;
-use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use super::checkpoint::CaptureSignature;
@@ -38,9 +37,6 @@ pub struct RunState<L> {
     pub processor_seconds: f64,
     /// Views left of the current pass over the capture, taken from the end.
     pub queue: Vec<u32>,
-    /// Random numbers.
-    #[serde(with = "random_state")]
-    pub rng: ChaCha8Rng,
     /// The scene and what belongs to it.
     pub learned: L,
 }
@@ -52,23 +48,4 @@ pub struct Machine<D> {
     pub device: D,
     /// Photographs that are read meanwhile.
     pub(crate) photographs: ReadAhead,
-}
-
-/// Random numbers as seed, stream and position.
-mod random_state {
-    use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
-    use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
-    pub(super) fn serialize<S: Serializer>(rng: &ChaCha8Rng, serializer: S) -> Result<S::Ok, S::Error> {
-        (rng.get_seed(), rng.get_stream(), rng.get_word_pos()).serialize(serializer)
-    }
-
-    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<ChaCha8Rng, D::Error> {
-        let (seed, stream, position): ([u8; 32], u64, u128) = Deserialize::deserialize(deserializer)?;
-        let mut rng = ChaCha8Rng::from_seed(seed);
-        rng.set_stream(stream);
-        rng.set_word_pos(position);
-        Ok(rng)
-    }
 }

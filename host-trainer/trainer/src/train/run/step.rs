@@ -15,6 +15,7 @@ use crate::train::context::phases::coding;
 use crate::train::context::start;
 use crate::train::density::view_weight::view_weights;
 use crate::train::error::{Cause, TrainError};
+use crate::train::streams::{Purpose, random};
 use pocketsplat_kernels::ops::rate::noise::Stream;
 use pocketsplat_kernels::step::coding::Coding;
 use pocketsplat_kernels::step::{Loss, Phase, StepInfo, StepReport, TargetView};
@@ -107,9 +108,10 @@ impl Trainer<'_> {
         if self.scene().context.is_none() && matches!(phase, Phase::Context | Phase::IntegerModel) {
             self.take_back()?;
             let n = self.n_to_size_context_for();
-            let TrainConfig { backbone, hac, .. } = &self.setup.config;
-            let RunState { rng, learned: Learned { scene, optimiser, .. }, .. } = &mut self.state;
-            scene.context = Some(start::begin_context(scene, *backbone, n, hac.base_steps(), rng));
+            let TrainConfig { backbone, hac, seed, .. } = &self.setup.config;
+            let RunState { iteration, learned: Learned { scene, optimiser, .. }, .. } = &mut self.state;
+            let mut rng = random(*seed, Purpose::Context, *iteration);
+            scene.context = Some(start::begin_context(scene, *backbone, n, hac.base_steps(), &mut rng));
             optimiser.begin_context(scene);
             self.weigh_views();
         }

@@ -12,6 +12,7 @@ use crate::train::error::TrainError;
 use crate::train::limits::{Finished, LimitProbe};
 use crate::train::modules::RunView;
 use crate::train::optimiser::Optimiser;
+use crate::train::streams::{Purpose, random};
 use crate::train::views::{Reduced, target};
 use crate::train::worth::Probe;
 use pocketsplat_capture::dataset::{Capture, Image, View};
@@ -74,7 +75,8 @@ impl Method for Neural {
         let (Setup { config, capture, .. }, state) = (&run.setup, &mut run.state);
         config.check_voxel_size(capture)?;
         let Learned { scene, optimiser, statistics, .. } = &mut state.learned;
-        *scene = initial_scene(config.shape, scene.voxel_size, &capture.points, &mut state.rng);
+        *scene =
+            initial_scene(config.shape, scene.voxel_size, &capture.points, &mut random(config.seed, Purpose::Start, 0));
         *optimiser = Optimiser::new(scene);
         *statistics = Statistics::new(scene.anchors.len(), config.shape.n_offsets);
         Ok(())

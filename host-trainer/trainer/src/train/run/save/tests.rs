@@ -6,6 +6,7 @@ use super::*;
 use crate::train::config::Backbone;
 use crate::train::limits::{Finished, LimitProbe, LimitShares, MeasuredShares};
 use crate::train::modules::{Modules, Rdo};
+use crate::train::run::checkpoint::VERSION;
 use crate::train::test_capture::{edit, tiny_capture, tiny_config, tiny_hac_config};
 use crate::train::{Observer, TrainConfig, TrainError, Trainer};
 use pocketsplat_capture::dataset::Mask;
@@ -91,7 +92,7 @@ fn no_damage_passes() {
     let bytes = saved(&trainer);
     let fault = |bytes: &[u8]| match Trainer::restore(&capture, bytes) {
         Err(RestoreError::Fault(fault)) => fault,
-        other => panic!("{other:?}"),
+        other => panic!("{:?}", other.map(|restored| restored.run.iteration())),
     };
     for cut in (0..bytes.len()).step_by(997).chain([0, 1, 7, 8, 11, 12, 15, bytes.len() - 1]) {
         fault(&bytes[..cut]);
@@ -102,8 +103,8 @@ fn no_damage_passes() {
         fault(&damaged);
     }
     let mut newer = bytes.clone();
-    newer[8] = 9;
-    assert_eq!(fault(&newer), CheckpointFault::Version { found: 9 });
+    newer[8] += 1;
+    assert_eq!(fault(&newer), CheckpointFault::Version { found: VERSION + 1 });
     assert_eq!(fault(b"PNG"), CheckpointFault::Magic);
     let mut longer = bytes[..bytes.len() - 4].to_vec();
     longer.extend([0; 8]);

@@ -3,9 +3,13 @@
 use std::sync::OnceLock;
 
 use pocketsplat_capture::dataset::Image;
+use rayon::prelude::*;
 
 use crate::ops::Pinhole;
 use crate::real::Real;
+
+/// Values that one task takes: a fixed number, so that a sum's rounding is the same for any number of threads.
+const BLOCK: usize = 4096;
 
 /// A photograph, the camera that took it, and where it shows the scene.
 #[derive(Clone, Debug)]
@@ -48,11 +52,7 @@ impl<'a, R: Real> TargetView<'a, R> {
     /// Planes `[3, height, width]`, 0 to 1; 0 where pixels do not count.
     pub fn truth(&self) -> &[R] {
         self.truth.get_or_init(|| {
-            let mut truth: Vec<R> = match self.photograph {
-                // Rounded to f32 in every number type, as photographs always were.
-                Some(photograph) => planes(photograph).into_iter().map(|v| R::real(v.into())).collect(),
-                None => Vec::new(),
-            };
+            let mut truth = self.photograph.map(planes).unwrap_or_default();
             clear_masked(&mut truth, self.mask);
             truth
         })
@@ -60,9 +60,9 @@ impl<'a, R: Real> TargetView<'a, R> {
 
     /// Σ over pixels and channels of the squared difference to `image`, planes that are 0 where pixels do not count.
     pub fn squared_sum(&self, image: &[R]) -> f64 {
-        // Blocks of fixed size, so that the sum's rounding is the same however it is scheduled.
-        let blocks = image.chunks(4096).zip(self.truth().chunks(4096));
-        blocks.map(|(a, b)| a.iter().zip(b).map(|(x, y)| Into::<f64>::into((*x - *y) * (*x - *y))).sum::<f64>()).sum()
+        let blocks = image.par_chunks(BLOCK).zip(self.truth().par_chunks(BLOCK));
+        let squares = |(a, b): (&[R], &[R])| a.iter().zip(b).map(|(x, y)| ((*x - *y) * (*x - *y)).into()).sum::<f64>();
+        blocks.map(squares).collect::<Vec<_>>().into_iter().sum()
     }
 
     /// Pixels that count, at least 1.
@@ -83,14 +83,17 @@ pub fn clear_masked<R: Real>(planes: &mut [R], mask: Option<&[bool]>) {
     }
 }
 
-/// Planes `[3, height, width]` of an image, 0 to 1.
-pub fn planes(image: &Image) -> Vec<f32> {
+/// Planes `[3, height, width]` of an image, 0 to 1, rounded to f32 in every number type.
+pub fn planes<R: Real>(image: &Image) -> Vec<R> {
     let n = (image.width_px * image.height_px) as usize;
-    let mut planes = vec![0.0; 3 * n];
+    let of_byte: [R; 256] = std::array::from_fn(|byte| R::real((byte as f32 / 255.0).into()));
+    let mut planes = vec![R::ZERO; 3 * n];
     for (channel, plane) in planes.chunks_exact_mut(n).enumerate() {
-        for (out, rgb) in plane.iter_mut().zip(image.rgb.chunks_exact(3)) {
-            *out = f32::from(rgb[channel]) / 255.0;
-        }
+        plane.par_chunks_mut(BLOCK).zip(image.rgb.par_chunks(3 * BLOCK)).for_each(|(plane, rgb)| {
+            for (out, rgb) in plane.iter_mut().zip(rgb.chunks_exact(3)) {
+                *out = of_byte[usize::from(rgb[channel])];
+            }
+        });
     }
     planes
 }

@@ -1,8 +1,9 @@
 //! The views that a run trains on.
 
-use pocketsplat_capture::dataset::{Photograph, View};
+use pocketsplat_capture::dataset::{Image, Mask, Photograph, View};
 use pocketsplat_kernels::ops::Pinhole;
-use pocketsplat_kernels::step::{TargetView, planes};
+use pocketsplat_kernels::step::TargetView;
+use rayon::prelude::*;
 
 /// The training views of a capture, and which of them the scene learns from.
 #[derive(Clone, Debug)]
@@ -37,40 +38,70 @@ pub fn target<'v>(photograph: &'v Photograph, camera: &'v Pinhole<f32>, backgrou
     TargetView::of_photograph(camera, &photograph.image, mask, background)
 }
 
-/// A photograph at a fraction of its size, and its camera.
-pub struct Reduced {
-    camera: Pinhole<f32>,
-    planes: Vec<f32>,
-    mask: Option<Vec<bool>>,
+/// A photograph at a fraction of its size, and the camera that would have taken it: means of blocks of `side × side` pixels, rounded to
+/// 8 bit. Rows and columns that fill no block are left out; a block counts where all of its pixels do.
+///
+/// Cost: a look at every pixel, on all threads.
+pub fn reduced(photograph: &Photograph, camera: &Pinhole<f32>, side: usize) -> (Photograph, Pinhole<f32>) {
+    let [width, height] = camera.size_px;
+    let side = side.min(width).min(height);
+    let size_px = [width / side, height / side];
+    let rows = |y: usize| y * side..(y + 1) * side;
+    let mut rgb = vec![0; 3 * size_px[0] * size_px[1]];
+    let n = (side * side) as u32;
+    rgb.par_chunks_mut(3 * size_px[0]).enumerate().for_each(|(y, line)| {
+        let mut sums = vec![n / 2; line.len()];
+        for row in rows(y) {
+            let pixels = photograph.image.rgb[3 * row * width..].chunks_exact(3 * side);
+            for (sums, block) in sums.chunks_exact_mut(3).zip(pixels) {
+                for rgb in block.chunks_exact(3) {
+                    for (sum, value) in sums.iter_mut().zip(rgb) {
+                        *sum += u32::from(*value);
+                    }
+                }
+            }
+        }
+        for (value, sum) in line.iter_mut().zip(sums) {
+            *value = u8::try_from(sum / n).expect("a mean of bytes");
+        }
+    });
+    let counts =
+        |valid: &[bool], x: usize, y: usize| rows(y).all(|row| valid[row * width..][rows(x)].iter().all(|v| *v));
+    let [width_px, height_px] = size_px.map(|px| u32::try_from(px).expect("no larger than the photograph"));
+    let by = |px: f32| px / side as f32;
+    let (focal_px, principal_px) = (camera.focal_px.map(by), camera.principal_px.map(by));
+    let mask = photograph.mask.as_ref().map(|mask| {
+        let blocks = 0..size_px[0] * size_px[1];
+        let valid = blocks.map(|i| counts(&mask.valid, i % size_px[0], i / size_px[0])).collect();
+        Mask { width_px, height_px, valid }
+    });
+    let image = Image { width_px, height_px, rgb };
+    (Photograph { image, mask }, Pinhole { focal_px, principal_px, size_px, ..*camera })
 }
 
-impl Reduced {
-    /// Means of blocks of `side × side` pixels, of which the last row and column are left out where they are cut; a block counts where all
-    /// of its pixels do. The image has at least one pixel.
-    pub fn new(photograph: &Photograph, camera: &Pinhole<f32>, side: usize) -> Self {
-        let [width, height] = camera.size_px;
-        let side = side.min(width).min(height);
-        let size_px = [width / side, height / side];
-        let block = move |i: usize| {
-            let (x, y) = (side * (i % size_px[0]), side * (i / size_px[0]));
-            (0..side).flat_map(move |row| (0..side).map(move |column| (y + row) * width + x + column))
-        };
-        let n = size_px[0] * size_px[1];
-        let scale = 1.0 / (side * side) as f32;
-        let whole = planes(&photograph.image);
-        let planes = whole
-            .chunks_exact(width * height)
-            .flat_map(|plane| (0..n).map(move |i| scale * block(i).map(|at| plane[at]).sum::<f32>()))
-            .collect();
-        let mask = photograph.mask.as_ref().map(|mask| (0..n).map(|i| block(i).all(|at| mask.valid[at])).collect());
-        let by = |px: f32| px / side as f32;
-        let (focal_px, principal_px) = (camera.focal_px.map(by), camera.principal_px.map(by));
-        Self { camera: Pinhole { focal_px, principal_px, size_px, ..*camera }, planes, mask }
-    }
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::train::test_capture::tiny_capture;
 
-    /// What it asks of the scene, once: the planes go with it.
-    pub fn target(&mut self, background: [f32; 3]) -> TargetView<'_, f32> {
-        let planes = std::mem::take(&mut self.planes);
-        TargetView::new(&self.camera, planes, self.mask.as_deref(), background)
+    #[test]
+    fn blocks_become_their_means_and_count_where_all_of_their_pixels_do() {
+        // 5 × 4 pixels, of which the last column fills no block; red counts pixels, green rows, blue is white but for one.
+        let rgb = (0..20u8).flat_map(|i| [i, 10 * (i / 5), if i == 7 { 0 } else { 255 }]).collect();
+        let mut valid = vec![true; 20];
+        valid[12] = false;
+        let mask = Mask { width_px: 5, height_px: 4, valid };
+        let photograph = Photograph { image: Image { width_px: 5, height_px: 4, rgb }, mask: Some(mask) };
+        let camera = Pinhole::new(&tiny_capture().train[0].camera);
+        let camera = Pinhole { size_px: [5, 4], focal_px: [6.0, 8.0], principal_px: [2.5, 2.0], ..camera };
+        let (half, of_half) = reduced(&photograph, &camera, 2);
+        assert_eq!((half.image.width_px, half.image.height_px), (2, 2));
+        // (0 + 1 + 5 + 6)/4, (2 + 3 + 7 + 8)/4, …; three quarters of 255 are 191.25.
+        assert_eq!(half.image.rgb, [3, 5, 255, 5, 5, 191, 13, 25, 255, 15, 25, 255]);
+        assert_eq!(half.mask.map(|mask| mask.valid), Some(vec![true, true, true, false]));
+        assert_eq!((of_half.size_px, of_half.focal_px, of_half.principal_px), ([2, 2], [3.0, 4.0], [1.25, 1.0]));
+        assert_eq!((of_half.rotation, of_half.translation), (camera.rotation, camera.translation));
+        let (small, _) = reduced(&photograph, &camera, 64);
+        assert_eq!(small.image.rgb.len(), 3, "a photograph never vanishes");
     }
 }

@@ -1,26 +1,30 @@
 //! Mean absolute difference of two images.
 
+use rayon::prelude::*;
+
 use crate::real::Real;
+
+/// Values that one task takes: a fixed number, so that the sum's rounding is the same for any number of threads.
+const BLOCK: usize = 4096;
 
 /// `mean |image − truth|` over pixels and channels.
 pub fn forward<R: Real>(image: &[R], truth: &[R]) -> R {
-    // Blocks of fixed size, so that the sum's rounding is the same however it is scheduled.
-    let sum: R = image
-        .chunks(4096)
-        .zip(truth.chunks(4096))
-        .map(|(a, b)| a.iter().zip(b).map(|(x, y)| (*x - *y).abs()).sum::<R>())
-        .sum();
-    sum / R::real(image.len() as f64)
+    let blocks = image.par_chunks(BLOCK).zip(truth.par_chunks(BLOCK));
+    let sums: Vec<R> = blocks.map(|(a, b)| a.iter().zip(b).map(|(x, y)| (*x - *y).abs()).sum::<R>()).collect();
+    sums.into_iter().sum::<R>() / R::real(image.len() as f64)
 }
 
 /// Adds `weight · sign(image − truth)/n` to `d_image`; zero where they are equal.
 pub fn backward<R: Real>(image: &[R], truth: &[R], weight: R, d_image: &mut [R]) {
     let step = weight / R::real(image.len() as f64);
-    for ((x, y), d) in image.iter().zip(truth).zip(d_image) {
-        let above = if *x > *y { step } else { R::ZERO };
-        let below = if *x < *y { step } else { R::ZERO };
-        *d += above - below;
-    }
+    let blocks = image.par_chunks(BLOCK).zip(truth.par_chunks(BLOCK)).zip(d_image.par_chunks_mut(BLOCK));
+    blocks.for_each(|((image, truth), d_image)| {
+        for ((x, y), d) in image.iter().zip(truth).zip(d_image) {
+            let above = if *x > *y { step } else { R::ZERO };
+            let below = if *x < *y { step } else { R::ZERO };
+            *d += above - below;
+        }
+    });
 }
 
 #[cfg(test)]

@@ -19,7 +19,7 @@ const ROWS: usize = 32;
 /// Derivatives of the mean of S by the moments of x, which [`backward`] blurs back.
 #[derive(Clone, Debug)]
 pub struct Partials<R> {
-    /// `[3, height, width, 3]` as rows: ∂/∂μₓ, ∂/∂E\[x²\], ∂/∂E\[xy\], per block of rows and channel.
+    /// `[3, height, width, 3]` as rows: ∂/∂μₓ, ∂/∂E\[x² + y²\], ∂/∂E\[xy\], per block of rows and channel.
     blocks: Vec<[Vec<R>; 3]>,
     blocks_per_channel: usize,
 }
@@ -46,8 +46,7 @@ pub fn forward<R: Real>(level: Level, image: &[R], truth: &[R], size_px: [usize;
                             line[i] = match n {
                                 0 => x[i],
                                 1 => y[i],
-                                2 => x[i] * x[i],
-                                3 => y[i] * y[i],
+                                2 => x[i] * x[i] + y[i] * y[i],
                                 _ => x[i] * y[i],
                             };
                         }
@@ -61,35 +60,37 @@ pub fn forward<R: Real>(level: Level, image: &[R], truth: &[R], size_px: [usize;
     (sums.into_iter().sum::<R>() * norm, Partials { blocks, blocks_per_channel })
 }
 
-/// Sum of S over one block, and its scaled derivatives by μₓ, E\[x²\], E\[xy\].
+/// Sum of S over one block, and its scaled derivatives by μₓ, E\[x² + y²\], E\[xy\].
+///
+/// * `moments`: μₓ, μᵧ, E\[x² + y²\], E\[xy\]: the variances enter as their sum alone.
 #[inline(always)]
-fn similarity<R: Real>(moments: [Vec<R>; 5], norm: R) -> (R, [Vec<R>; 3]) {
-    let [mut mean_x, mean_y, mut xx, yy, mut xy] = moments;
+fn similarity<R: Real>(moments: [Vec<R>; 4], norm: R) -> (R, [Vec<R>; 3]) {
+    let [mut mean_x, mean_y, mut squares, mut xy] = moments;
     let two = R::real(2.0);
     let mut sum = R::ZERO;
     let n = mean_x.len();
-    let (mean_y, yy) = (&mean_y[..n], &yy[..n]);
+    let mean_y = &mean_y[..n];
     let mut values = vec![R::ZERO; n];
     for i in 0..n {
         let (mx, my) = (mean_x[i], mean_y[i]);
         let a1 = two * mx * my + R::real(C1);
         let a2 = two * (xy[i] - mx * my) + R::real(C2);
         let b1 = mx * mx + my * my + R::real(C1);
-        let b2 = (xx[i] - mx * mx) + (yy[i] - my * my) + R::real(C2);
+        let b2 = squares[i] - mx * mx - my * my + R::real(C2);
         let inverse = R::ONE / (b1 * b2);
         let s = a1 * a2 * inverse;
         values[i] = s;
-        let d_xx = -s / b2;
+        let d_squares = -s / b2;
         let d_xy = two * a1 * inverse;
-        let d_mx = two * my * a2 * inverse - two * mx * s / b1 - two * mx * d_xx - my * d_xy;
+        let d_mx = two * my * a2 * inverse - two * mx * s / b1 - two * mx * d_squares - my * d_xy;
         mean_x[i] = d_mx * norm;
-        xx[i] = d_xx * norm;
+        squares[i] = d_squares * norm;
         xy[i] = d_xy * norm;
     }
     for v in values {
         sum += v;
     }
-    (sum, [mean_x, xx, xy])
+    (sum, [mean_x, squares, xy])
 }
 
 /// Adds `weight · ∂(mean S)/∂image` to `d_image`.

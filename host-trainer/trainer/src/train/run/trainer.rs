@@ -13,7 +13,7 @@ use crate::train::limits::{Finished, LimitProbe};
 use crate::train::modules::RunView;
 use crate::train::optimiser::Optimiser;
 use crate::train::streams::{Purpose, random};
-use crate::train::views::{Reduced, target};
+use crate::train::views::{reduced, target};
 use crate::train::worth::Probe;
 use pocketsplat_capture::dataset::{Capture, Image, View};
 use pocketsplat_kernels::ops::Pinhole;
@@ -166,11 +166,9 @@ impl<'a> Trainer<'a> {
         let (place, photograph) = self.next_view()?;
         let camera = self.setup.views.cameras[place];
         let (background, halvings) = (self.state.learned.background, self.setup.config.halvings(self.state.iteration));
-        let mut reduced = (halvings > 0).then(|| Reduced::new(&photograph, &camera, 1 << halvings));
-        let target = match &mut reduced {
-            Some(reduced) => reduced.target(background),
-            None => target(&photograph, &camera, background),
-        };
+        let reduced = (halvings > 0).then(|| reduced(&photograph, &camera, 1 << halvings));
+        let (photograph, camera) = reduced.as_ref().map_or((&*photograph, &camera), |(p, c)| (p, c));
+        let target = target(photograph, camera, background);
         // A device knows a photograph again by its number, at each of its sizes.
         let target = target.numbered(place + halvings as usize * self.setup.views.all.len());
         let (modules, at) = (self.setup.config.modules, self.step_info());

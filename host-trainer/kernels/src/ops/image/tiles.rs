@@ -30,14 +30,6 @@ pub struct TileLists {
     pub slots: Vec<u32>,
 }
 
-/// The tiles of one splat.
-#[derive(Clone, Copy)]
-struct Reached {
-    /// Half-open `[x0, x1, y0, y1]`.
-    rectangle: [u16; 4],
-    splat: u32,
-}
-
 /// Half-open tile rectangle `[x0, x1, y0, y1]` of the pixel centres within a footprint.
 fn tile_rectangle<R: Real>(splat: &Splat<R>, footprint: &Footprint<R>, size_px: [usize; 2]) -> [u16; 4] {
     let mut rectangle = [0; 4];
@@ -63,8 +55,8 @@ fn tile_rectangle<R: Real>(splat: &Splat<R>, footprint: &Footprint<R>, size_px: 
 
 /// Sorts the splats by depth and lists them per tile.
 ///
-/// Order: depth ascending, ties by splat index, that is by anchor and offset. Cost: one sort of n splats, a look at each of them for each
-/// row of tiles, and a pass over the (tile, splat) pairs; all of it on all threads.
+/// Order: depth ascending, ties by splat index, that is by anchor and offset. Cost: one sort of n splats, and on all threads two passes over
+/// the (tile, splat) pairs.
 pub fn build<R: Real>(splats: &[Splat<R>], footprints: &[Footprint<R>], size_px: [usize; 2]) -> TileLists {
     let mut lists = TileLists::default();
     build_into(&mut lists, splats, footprints, size_px);
@@ -86,12 +78,7 @@ pub fn build_into<R: Real>(
         .map(|(s, f)| tile_rectangle(s, f, size_px))
         .collect();
     #[expect(clippy::cast_possible_truncation, reason = "the sort key is the f32 depth on purpose")]
-    let order = by_depth(footprints.par_iter().map(|f| Into::<f64>::into(f.depth) as f32));
-    let by_depth: Vec<Reached> = order
-        .into_par_iter()
-        .with_min_len(MIN_SPLATS)
-        .map(|splat| Reached { rectangle: rectangles[splat as usize], splat })
-        .collect();
+    let order = by_depth(footprints.iter().map(|f| Into::<f64>::into(f.depth) as f32));
 
     let TileLists { starts, entries, slot_starts, slots, .. } = lists;
     slot_starts.clear();
@@ -101,73 +88,59 @@ pub fn build_into<R: Real>(
         n_pairs += u32::from(x1 - x0) * u32::from(y1 - y0);
         n_pairs
     }));
-    let rows: Vec<TileRow> = (0..grid[1]).into_par_iter().map(|y| TileRow::of(&by_depth, y, grid[0])).collect();
+    let n_tiles = grid[0] * grid[1];
+    let tiles_of = |splat: u32| {
+        let [x0, x1, y0, y1] = rectangles[splat as usize].map(usize::from);
+        (y0..y1).map(move |y| y * grid[0] + x0..y * grid[0] + x1)
+    };
+    // How many splats of each part lie in each tile; then where those of the part begin.
+    let mut firsts: Vec<Vec<u32>> = order
+        .par_chunks(PART)
+        .map(|part| {
+            let mut counts = vec![0; n_tiles];
+            for tiles in part.iter().flat_map(|splat| tiles_of(*splat)) {
+                counts[tiles].iter_mut().for_each(|count| *count += 1);
+            }
+            counts
+        })
+        .collect();
     starts.clear();
-    starts.push(0);
     let mut before = 0;
-    starts.extend(rows.iter().flat_map(|row| &row.counts).map(|count| {
-        before += count;
-        before
-    }));
-    // Every one is written over.
-    entries.resize(n_pairs as usize, 0);
-    // What the rows write lies apart, but not row by row; both ways the same memory serves.
-    let mut shared: Vec<AtomicU32> = std::mem::take(slots).into_iter().map(AtomicU32::new).collect();
-    shared.resize_with(n_pairs as usize, AtomicU32::default);
-    let mut rest = entries.as_mut_slice();
-    let mut tasks = Vec::with_capacity(grid[1]);
-    for (y, row) in rows.iter().enumerate() {
-        let starts = &starts[y * grid[0]..=(y + 1) * grid[0]];
-        let (entries, after) = rest.split_at_mut((starts[grid[0]] - starts[0]) as usize);
-        tasks.push((row, starts, entries));
-        rest = after;
+    for tile in 0..n_tiles {
+        starts.push(before);
+        for first in &mut firsts {
+            before += std::mem::replace(&mut first[tile], before);
+        }
     }
-    tasks.into_par_iter().for_each(|(row, starts, entries)| row.list(starts, entries, slot_starts, &shared));
-    *slots = shared.into_iter().map(AtomicU32::into_inner).collect();
+    starts.push(before);
+    // What the parts write lies apart, but not one after the other; both ways the same memory serves, and every place is written over.
+    let [listed, placed] = [&mut *entries, &mut *slots].map(|values| {
+        let mut shared: Vec<AtomicU32> = std::mem::take(values).into_iter().map(AtomicU32::new).collect();
+        shared.resize_with(n_pairs as usize, AtomicU32::default);
+        shared
+    });
+    order.par_chunks(PART).zip(&mut firsts).for_each(|(part, next)| {
+        for splat in part {
+            let mut slot = slot_starts[*splat as usize] as usize;
+            for tiles in tiles_of(*splat) {
+                for at in &mut next[tiles] {
+                    listed[*at as usize].store(*splat, Ordering::Relaxed);
+                    placed[slot].store(*at, Ordering::Relaxed);
+                    *at += 1;
+                    slot += 1;
+                }
+            }
+        }
+    });
+    [*entries, *slots] = [listed, placed].map(|values| values.into_iter().map(AtomicU32::into_inner).collect());
     lists.grid = grid;
 }
 
 /// Splats that one task takes at least.
 const MIN_SPLATS: usize = 1024;
 
-/// What reaches a row of tiles.
-struct TileRow {
-    y: u16,
-    /// Nearest first.
-    reached: Vec<Reached>,
-    /// `[n]` splats of each of its tiles.
-    counts: Vec<u32>,
-}
-
-impl TileRow {
-    /// * `by_depth`: all splats, nearest first. * `n`: tiles across.
-    fn of(by_depth: &[Reached], y: usize, n: usize) -> Self {
-        let y = u16::try_from(y).expect("a frame has fewer than 2¹⁶ tiles a side");
-        let is_reached = |Reached { rectangle: [_, _, y0, y1], .. }: &Reached| (*y0..*y1).contains(&y);
-        let reached: Vec<Reached> = by_depth.iter().copied().filter(is_reached).collect();
-        let mut counts = vec![0; n];
-        for Reached { rectangle: [x0, x1, ..], .. } in &reached {
-            counts[usize::from(*x0)..usize::from(*x1)].iter_mut().for_each(|count| *count += 1);
-        }
-        Self { y, reached, counts }
-    }
-
-    /// Lists the splats of its tiles, and where each splat's pairs are.
-    ///
-    /// * `starts`: `[n + 1]` of its tiles in the entries of all. * `entries`: of its tiles. * `slot_starts`, `slots`: of all splats.
-    fn list(&self, starts: &[u32], entries: &mut [u32], slot_starts: &[u32], slots: &[AtomicU32]) {
-        let mut next = starts.to_vec();
-        for Reached { rectangle, splat } in &self.reached {
-            let [x0, x1, y0, _] = rectangle.map(usize::from);
-            let slot = slot_starts[*splat as usize] as usize + (usize::from(self.y) - y0) * (x1 - x0);
-            for (at, slot) in next[x0..x1].iter_mut().zip(&slots[slot..]) {
-                entries[(*at - starts[0]) as usize] = *splat;
-                slot.store(*at, Ordering::Relaxed);
-                *at += 1;
-            }
-        }
-    }
-}
+/// Splats, by depth, that one task lists.
+const PART: usize = 8192;
 
 impl TileLists {
     /// Number of tiles.

@@ -79,12 +79,17 @@ fn between(values: &[f64; SHARES.len()], at: f64) -> f64 {
     values[next - 1] + (values[next] - values[next - 1]) * (at - from) / (to - from)
 }
 
+/// Time of a step on images of half the size, against one on whole ones: anchors take as long.
+const HALF_SIZE_COST: f64 = 0.6;
+
 /// Follows a run, and says now and then what it will take.
 pub(super) struct Estimate {
     what: String,
     /// The longer side of the largest photograph.
     longest_px: u32,
     course: Course,
+    /// Share of the run on images of half the size.
+    half_size_until: f64,
     iterations: u32,
     bytes_per_anchor: f64,
     /// Memory of an anchor while it is trained: its values, their moments and gradients, and what a step notes of it; measured.
@@ -134,6 +139,7 @@ impl Estimate {
             what: format!("{width}×{height} px, {iterations} iterations"),
             longest_px: width.max(height),
             course: if config.modules.rdo.is_some() { course } else { course.unpruned() },
+            half_size_until: config.half_size_until,
             iterations,
             bytes_per_anchor: bytes_per_anchor(config),
             memory_per_anchor: 140.0 * values,
@@ -215,15 +221,21 @@ impl Estimate {
         say(&self.said(&expected));
     }
 
+    /// Time of a step at this share of the run, against the first steps on whole images.
+    fn cost_at(&self, share: f64) -> f64 {
+        let size = if share < self.half_size_until { HALF_SIZE_COST } else { 1.0 };
+        size * between(&self.course.cost, share)
+    }
+
     fn expected(&self, iteration: u32, step_s: f64, spent_s: f64, n_anchors: usize) -> Expected {
         let done = f64::from(iteration) / f64::from(self.iterations);
         let parts = 100;
         let mean_cost = (0..parts)
-            .map(|i| between(&self.course.cost, done + (1.0 - done) * (f64::from(i) + 0.5) / f64::from(parts)))
+            .map(|i| self.cost_at(done + (1.0 - done) * (f64::from(i) + 0.5) / f64::from(parts)))
             .sum::<f64>()
             / f64::from(parts);
         let steps_left = f64::from(self.iterations - iteration);
-        let left_s = steps_left * step_s * mean_cost / between(&self.course.cost, done);
+        let left_s = steps_left * step_s * mean_cost / self.cost_at(done);
         let against_now = n_anchors as f64 / between(&self.course.anchors, done);
         let later = |share: &f64| *share >= done;
         let most =
@@ -323,6 +335,7 @@ mod tests {
             what: "8×8 px, 1000 iterations".to_owned(),
             longest_px: 8,
             course: GROWING,
+            half_size_until: 0.0,
             iterations: 1000,
             bytes_per_anchor: 20.0,
             // So much that what the test's process holds meanwhile is nothing beside.
@@ -354,6 +367,11 @@ mod tests {
         let start = all.expected(0, 0.06, 0.0, 5000);
         // 0.35 at 1, a line to 4 over 0.15, and 0.5 at 4.
         close(start.minutes, 1.0 * (0.35 + 0.15 * 2.5 + 0.5 * 4.0));
+        // The same where steps on smaller images, which take less, come first.
+        let smaller = Estimate { half_size_until: 0.2, ..estimate(f64::INFINITY) };
+        let start_of_smaller = smaller.expected(0, HALF_SIZE_COST * 0.06, 0.0, 5000);
+        close(start_of_smaller.minutes, HALF_SIZE_COST * 0.2 + 0.15 + 0.15 * 2.5 + 0.5 * 4.0);
+        close(smaller.expected(500, 0.24, 600.0, 15_000).minutes, 10.0 + 2.0);
         let middle = all.expected(500, 0.24, 600.0, 15_000);
         close(middle.minutes, 10.0 + 2.0);
         close(middle.bundle_bytes, FIXED_BYTES + 10_000.0 * 20.0);

@@ -44,6 +44,14 @@ impl Preset {
         }
     }
 
+    /// Share of the run on images of half the size, where it has been measured (docs/experiments/2026-11-28-smaller-images-first.md).
+    const fn half_size_until(self) -> f64 {
+        match self {
+            Self::Standard => 0.35,
+            Self::Quick | Self::Full => 0.0,
+        }
+    }
+
     /// The configuration of a run without options.
     pub(crate) fn config(self) -> RunConfig {
         RunConfig {
@@ -60,6 +68,7 @@ impl Preset {
             },
             train: TrainConfig {
                 iterations: self.iterations(),
+                half_size_until: self.half_size_until(),
                 modules: Modules { rdo: Some(Rdo::default()), ..Modules::default() },
                 ..TrainConfig::of(Backbone::Hac)
             },

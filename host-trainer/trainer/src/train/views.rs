@@ -38,13 +38,14 @@ pub fn target<'v>(photograph: &'v Photograph, camera: &'v Pinhole<f32>, backgrou
     TargetView::of_photograph(camera, &photograph.image, mask, background)
 }
 
-/// A photograph at a fraction of its size, and the camera that would have taken it: means of blocks of `side × side` pixels, rounded to
-/// 8 bit. Rows and columns that fill no block are left out; a block counts where all of its pixels do.
+/// A photograph of half the width and height, and the camera that would have taken it: means of blocks of 2 × 2 pixels, rounded to 8 bit.
+/// A last row or column that fills no block is left out; a block counts where all of its pixels do.
 ///
 /// Cost: a look at every pixel, on all threads.
-pub fn reduced(photograph: &Photograph, camera: &Pinhole<f32>, side: usize) -> (Photograph, Pinhole<f32>) {
+pub fn halved(photograph: &Photograph, camera: &Pinhole<f32>) -> (Photograph, Pinhole<f32>) {
     let [width, height] = camera.size_px;
-    let side = side.min(width).min(height);
+    // A photograph never vanishes.
+    let side = 2.min(width).min(height);
     let size_px = [width / side, height / side];
     let rows = |y: usize| y * side..(y + 1) * side;
     let mut rgb = vec![0; 3 * size_px[0] * size_px[1]];
@@ -94,14 +95,15 @@ mod tests {
         let photograph = Photograph { image: Image { width_px: 5, height_px: 4, rgb }, mask: Some(mask) };
         let camera = Pinhole::new(&tiny_capture().train[0].camera);
         let camera = Pinhole { size_px: [5, 4], focal_px: [6.0, 8.0], principal_px: [2.5, 2.0], ..camera };
-        let (half, of_half) = reduced(&photograph, &camera, 2);
+        let (half, of_half) = halved(&photograph, &camera);
         assert_eq!((half.image.width_px, half.image.height_px), (2, 2));
         // (0 + 1 + 5 + 6)/4, (2 + 3 + 7 + 8)/4, …; three quarters of 255 are 191.25.
         assert_eq!(half.image.rgb, [3, 5, 255, 5, 5, 191, 13, 25, 255, 15, 25, 255]);
         assert_eq!(half.mask.map(|mask| mask.valid), Some(vec![true, true, true, false]));
         assert_eq!((of_half.size_px, of_half.focal_px, of_half.principal_px), ([2, 2], [3.0, 4.0], [1.25, 1.0]));
         assert_eq!((of_half.rotation, of_half.translation), (camera.rotation, camera.translation));
-        let (small, _) = reduced(&photograph, &camera, 64);
-        assert_eq!(small.image.rgb.len(), 3, "a photograph never vanishes");
+        let line = Photograph { image: Image { width_px: 3, height_px: 1, rgb: vec![9; 9] }, mask: None };
+        let (line, _) = halved(&line, &Pinhole { size_px: [3, 1], ..camera });
+        assert_eq!(line.image.rgb, [9; 9]);
     }
 }

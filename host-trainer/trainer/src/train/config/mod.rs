@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::modules::Modules;
-pub use super::schedule::{Backbone, Densification, Hac, ImageSize, LearningRate, Rates};
+pub use super::schedule::{Backbone, Densification, Hac, LearningRate, Rates};
 use super::schedule::{ConfigError, within};
 use pocketsplat_capture::dataset::{Capture, PointsOrigin};
 use pocketsplat_kernels::scene::ModelShape;
@@ -34,9 +34,10 @@ pub struct TrainConfig {
     pub learns_background: bool,
     /// Loss weights.
     pub loss: LossWeights,
-    /// How large images are, and when.
+    /// Share of the run up to which images have half of their width and height: coarse things need few pixels, and a step's time
+    /// follows its pixels (Chen et al. 2025, DashGaussian, section 4.1, with one step in the place of many).
     #[serde(default)]
-    pub image_size: ImageSize,
+    pub half_size_until: f64,
     /// Growth and pruning.
     pub densification: Densification,
     /// The rate, where the backbone has one.
@@ -61,7 +62,7 @@ impl Default for TrainConfig {
             rates: Rates::default(),
             learns_background: false,
             loss: LossWeights::default(),
-            image_size: ImageSize::default(),
+            half_size_until: 0.0,
             densification: Densification::default(),
             hac: Hac::default(),
             modules: Modules::default(),
@@ -164,10 +165,8 @@ impl TrainConfig {
         }
         within("train.loss.dssim", self.loss.dssim, 0.0, 1.0)?;
         within("train.loss.volume", self.loss.volume, 0.0, 1e6)?;
-        // Events look at whole images.
-        let ImageSize { quarter_until, half_until } = self.image_size;
-        within("train.image_size.half_until", half_until, 0.0, self.densification.until)?;
-        within("train.image_size.quarter_until", quarter_until, 0.0, half_until)?;
+        // What is small comes with growth, and shows at the whole size alone.
+        within("train.half_size_until", self.half_size_until, 0.0, self.densification.until)?;
         let Densification { statistics_from, from, until, interval, success, levels, .. } = self.densification;
         let Densification { gradient_threshold, min_opacity, .. } = self.densification;
         within("train.densification.success", success, 0.0, 1.0)?;
@@ -211,9 +210,9 @@ impl TrainConfig {
         Self { voxel_size: Some(self.voxel_size_for(capture)), densification, shape, ..*self }
     }
 
-    /// How often the sides of images are halved after so many iterations.
-    pub fn halvings(&self, iterations: u32) -> u32 {
-        self.image_size.halvings(f64::from(iterations) / f64::from(self.iterations))
+    /// Whether iteration `iteration`, from 1, sees images of half the size.
+    pub fn is_half_size(&self, iteration: u32) -> bool {
+        iteration <= self.iteration_at(self.half_size_until)
     }
 
     /// What iteration `iteration`, from 1, does to the values of anchors.

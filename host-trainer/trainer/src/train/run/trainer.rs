@@ -13,7 +13,7 @@ use crate::train::limits::{Finished, LimitProbe};
 use crate::train::modules::RunView;
 use crate::train::optimiser::Optimiser;
 use crate::train::streams::{Purpose, random};
-use crate::train::views::{reduced, target};
+use crate::train::views::{halved, target};
 use crate::train::worth::Probe;
 use pocketsplat_capture::dataset::{Capture, Image, View};
 use pocketsplat_kernels::ops::Pinhole;
@@ -165,12 +165,12 @@ impl<'a> Trainer<'a> {
         self.begin_context()?;
         let (place, photograph) = self.next_view()?;
         let camera = self.setup.views.cameras[place];
-        let (background, halvings) = (self.state.learned.background, self.setup.config.halvings(self.state.iteration));
-        let reduced = (halvings > 0).then(|| reduced(&photograph, &camera, 1 << halvings));
-        let (photograph, camera) = reduced.as_ref().map_or((&*photograph, &camera), |(p, c)| (p, c));
-        let target = target(photograph, camera, background);
-        // A device knows a photograph again by its number, at each of its sizes.
-        let target = target.numbered(place + halvings as usize * self.setup.views.all.len());
+        let half = self.setup.config.is_half_size(self.state.iteration).then(|| halved(&photograph, &camera));
+        let (shown, camera) =
+            half.as_ref().map_or((&*photograph, &camera), |(photograph, camera)| (photograph, camera));
+        // A device knows a photograph again by its number, at either size.
+        let number = place + if half.is_some() { self.setup.views.all.len() } else { 0 };
+        let target = target(shown, camera, self.state.learned.background).numbered(number);
         let (modules, at) = (self.setup.config.modules, self.step_info());
         let pruned_share = modules.each().iter().map(|module| module.pruned_share(&at)).fold(0.0, f32::max);
         let terms = modules.terms();

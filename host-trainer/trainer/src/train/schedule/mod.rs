@@ -3,12 +3,10 @@
 mod config_error;
 mod densification;
 mod hac;
-mod image_size;
 mod rates;
 
 pub use config_error::ConfigError;
 pub(crate) use config_error::within;
 pub use densification::Densification;
 pub use hac::{Backbone, Hac};
-pub use image_size::ImageSize;
 pub use rates::{LearningRate, Rates};

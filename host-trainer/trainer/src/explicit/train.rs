@@ -97,7 +97,8 @@ impl Method for Explicit {
     }
 
     fn begin(run: &mut CloudTrainer<'_>) -> Result<(), TrainError> {
-        let cloud = initial_cloud(&run.setup.capture.points);
+        let Capture { points, point_colours, .. } = run.setup.capture;
+        let cloud = initial_cloud(points, point_colours);
         let (optimiser, statistics) = (CloudOptimiser::new(cloud.len()), DensityStatistics::new(cloud.len()));
         run.state.learned = LearnedCloud { cloud, optimiser, statistics };
         Ok(())

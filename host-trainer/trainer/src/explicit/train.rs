@@ -172,7 +172,8 @@ impl CloudTrainer<'_> {
         let Setup { config, capture, .. } = &self.setup;
         let RunState { iteration, learned: LearnedCloud { cloud, optimiser, statistics }, .. } = &mut self.state;
         let settings = config.density;
-        if *iteration >= settings.until {
+        // Nor after the last step: what comes or is lowered there is never trained.
+        if *iteration >= settings.until.min(config.iterations) {
             return;
         }
         statistics.add(gradients);
@@ -263,14 +264,26 @@ mod tests {
     #[test]
     fn a_short_run_is_the_beginning_of_a_long_one() {
         let capture = tiny_capture();
-        let after_20 = |iterations| {
+        let after_18 = |iterations| {
             let mut config = CloudConfig { iterations, ..tiny_cloud_config(40) };
             config.density.reset_every = 12;
             let mut trainer = CloudTrainer::new(&capture, config).unwrap();
-            (0..20).for_each(|_| drop(trainer.advance().unwrap()));
+            (0..18).for_each(|_| drop(trainer.advance().unwrap()));
             trainer.state.learned.cloud
         };
-        assert!(after_20(20) == after_20(400), "the same bits");
+        assert!(after_18(18) == after_18(400), "the same bits");
+    }
+
+    #[test]
+    fn a_run_ends_with_what_was_trained() {
+        let mut config = tiny_cloud_config(40);
+        (config.iterations, config.density.interval, config.density.reset_every) = (12, 12, 12);
+        let (cloud, _) = trained(config, 1);
+        assert_eq!(cloud.len(), 300, "nothing came after the last step");
+        assert!(cloud.opacity_logits.iter().any(|logit| *logit > -3.0), "nor were opacities lowered");
+        config.iterations = 13;
+        let (cloud, _) = trained(config, 1);
+        assert!(cloud.len() > 300 && cloud.opacity_logits.iter().all(|logit| *logit < -3.0), "before it they are");
     }
 
     #[test]

@@ -23,6 +23,12 @@ for ((i = 1; i <= $#; i++)); do
   esac
 done
 
+# On one background, or rows do not compare.
+if [[ " ${prepared[*]}" != *" --background"* ]]; then
+  prepared+=(--background black)
+  set -- --background black "$@"
+fi
+
 trained() { # FILE OPTIONS…
   local file=$1 run=${1%.*}.run
   shift

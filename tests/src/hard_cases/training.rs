@@ -41,6 +41,7 @@ fn capture(pixel: impl Fn(u32, u32, u32) -> [u8; 3], points: Vec<DVec3>) -> Capt
         train: (0..5).map(view).collect(),
         test: Vec::new(),
         points,
+        point_colours: Vec::new(),
         points_origin: PointsOrigin::Random,
         made_points: None,
         scene: SceneKind::Object,

@@ -10,6 +10,7 @@ use super::error::MIN_TRAIN_VIEWS;
 use super::framing::Framing;
 use super::listing::{ListedView, Listing, Shot, commonest};
 use super::looks::Looks;
+use super::points::Points;
 use super::scene_kind::taken_for;
 use super::storage::{LoadedView, load_views};
 use super::{
@@ -90,7 +91,7 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
             (Some(points), PointsOrigin::Capture, None, None)
         }
         own => {
-            let n_own = own.as_ref().map_or(0, Vec::len);
+            let n_own = own.as_ref().map_or(0, Points::len);
             match made_points::made(&shots, (taken.kind, shown), n_own, &normalisation, options, &mut notes) {
                 Some(made) => (Some(made.points_world), made.origin, made.seconds, Some(made.file)),
                 None => match own {
@@ -108,7 +109,10 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
     let cameras: Vec<_> = train.iter().map(|view| &view.camera).collect();
     let (points, points_origin) = match kept.filter(|points| !points.is_empty()) {
         Some(points) => (points, points_origin),
-        None => (starting_points::random(&cameras, taken.kind, &normalisation, options), PointsOrigin::Random),
+        None => {
+            let at = starting_points::random(&cameras, taken.kind, &normalisation, options);
+            (Points { at, rgb: Vec::new() }, PointsOrigin::Random)
+        }
     };
     let background = match taken.backdrop {
         Some(rgb8) => rgb8.map(|channel| f32::from(channel) / 255.0),
@@ -137,7 +141,8 @@ pub(super) fn assemble(listing: Listing, options: &LoadOptions) -> Result<(Captu
     let capture = Capture {
         train,
         test,
-        points,
+        points: points.at,
+        point_colours: points.rgb,
         points_origin,
         made_points,
         scene,

@@ -11,6 +11,7 @@ use glam::{DMat3, DVec3};
 
 use super::image_folder;
 use super::listing::{Listing, every_nth};
+use super::points::{Points, rgb8};
 use super::transforms::{Frame, Intrinsics, list_frames};
 use super::{DatasetError, Layout, LoadOptions, text_file};
 
@@ -120,7 +121,7 @@ impl Words<'_> {
 }
 
 /// The cameras, `None` where there is no pose, and the points.
-fn model(text: &str) -> Result<(Vec<Option<Camera>>, Vec<DVec3>), Fault> {
+fn model(text: &str) -> Result<(Vec<Option<Camera>>, Points), Fault> {
     let lines = text.lines().zip(1..).filter(|(line, _)| !line.trim_start().starts_with('#'));
     let words = lines.flat_map(|(line, i)| line.split_whitespace().map(move |word| (i, word)));
     let mut words = Words { words: Box::new(words), line: 1 };
@@ -131,14 +132,14 @@ fn model(text: &str) -> Result<(Vec<Option<Camera>>, Vec<DVec3>), Fault> {
         cameras.push((camera.lens[0] > 0.0).then_some(camera));
     }
     for _ in 0..n_points {
-        points.push(DVec3::from_array(words.numbers()?));
-        let _rgb: [f64; 3] = words.numbers()?;
+        let (at, rgb): ([f64; 3], [f64; 3]) = (words.numbers()?, words.numbers()?);
+        points.push((DVec3::from_array(at), rgb8(&rgb)));
         // Camera, key, x and y of each image that shows it.
         for _ in 0..words.next::<usize>()? {
             let _seen: [f64; 4] = words.numbers()?;
         }
     }
-    Ok((cameras, points))
+    Ok((cameras, points.into_iter().collect()))
 }
 
 #[cfg(test)]

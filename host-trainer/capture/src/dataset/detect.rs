@@ -9,8 +9,8 @@ use super::{
     realitycapture, record3d,
 };
 
-/// The layout of the folder `path`.
-pub(super) fn layout_of(path: &Path) -> Option<Layout> {
+/// The layout of the folder `path`, told by the files in it; none where it is no capture.
+pub fn layout_of(path: &Path) -> Option<Layout> {
     if path.join(blender::TRAIN_FILE).is_file() {
         Some(Layout::Blender)
     } else if colmap::has_model(path, true) {

@@ -13,6 +13,7 @@ use super::image_file::stem_of;
 use super::image_names::is_image_name;
 use super::lens::Lens;
 use super::mask_file::{MaskFile, is_dynamic_mask};
+use super::points::Points;
 use super::{Layout, Severity, Split, ViewFault};
 
 /// A capture as its files list it.
@@ -23,7 +24,7 @@ pub(super) struct Listing {
     /// The listed views, in the order in which they are handed on.
     pub(super) views: Vec<ListedView>,
     /// Points the capture brings, capture units, and the file they are from.
-    pub(super) points: Option<(PathBuf, Vec<DVec3>)>,
+    pub(super) points: Option<(PathBuf, Points)>,
     /// Images that lie with the others but have no pose, by name.
     pub(super) unposed: Vec<String>,
     /// What a person should know about how the capture was read.

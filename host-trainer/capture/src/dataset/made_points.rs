@@ -5,10 +5,8 @@ use std::path::Path;
 use std::time::Instant;
 use std::{fs, io};
 
-use glam::DVec3;
-
-use super::coloured_point::ColouredPoint;
 use super::listing::Shot;
+use super::points::{ColouredPoint, Points};
 use super::{LoadOptions, Normalisation, PointsChoice, PointsOrigin, SceneKind, matching, ply, unprojected};
 
 /// Fewer points than this outline no scene: random ones do better.
@@ -25,7 +23,7 @@ const REVISION: u32 = 1;
 /// Points that no file of the capture holds.
 pub(super) struct MadePoints {
     /// Capture units.
-    pub(super) points_world: Vec<DVec3>,
+    pub(super) points_world: Points,
     pub(super) origin: PointsOrigin,
     /// What it took; nothing where an earlier load made them.
     pub(super) seconds: Option<f64>,
@@ -106,7 +104,8 @@ fn kept_or_made(
     let seconds = Some(began.elapsed().as_secs_f64());
     points.iter_mut().for_each(|point| point.at = point.at / normalisation.scale + normalisation.centre);
     let file = PointsFile::new(&made_from, &points);
-    MadePoints { points_world: points.into_iter().map(|point| point.at).collect(), origin, seconds, file }
+    let points_world = points.into_iter().map(|point| (point.at, Some(point.rgb))).collect();
+    MadePoints { points_world, origin, seconds, file }
 }
 
 /// The line of a file that says what its points were made from: photographs, masks, cameras.
@@ -138,7 +137,7 @@ impl PointsFile {
     }
 
     /// The points of the file `path`, capture units, where it says that they were made from the same.
-    fn read(path: &Path, made_from: &str) -> Option<(Vec<DVec3>, Self)> {
+    fn read(path: &Path, made_from: &str) -> Option<(Points, Self)> {
         let bytes = fs::read(path).ok()?;
         let says = bytes.split(|byte| *byte == b'\n').take(8).any(|line| line == made_from.as_bytes());
         let points = ply::parse(&bytes).ok().filter(|_| says)?;

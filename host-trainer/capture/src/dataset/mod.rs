@@ -19,7 +19,6 @@ mod bundler;
 mod cache;
 mod camera_models;
 mod colmap;
-mod coloured_point;
 mod depth_map;
 mod detect;
 mod diagnose;
@@ -54,6 +53,7 @@ mod options;
 mod photo;
 mod photograph;
 mod ply;
+mod points;
 mod polycam;
 mod pose;
 mod quaternion;
@@ -76,6 +76,7 @@ mod view;
 mod view_fault;
 
 pub use cache::{FileFault, remove_cache};
+pub use detect::layout_of;
 pub use diagnose::{Diagnosis, Finding, MaskedView, diagnose, diagnose_cheaply};
 pub use error::DatasetError;
 pub use frame_size::{FrameSize, NoFrameSize};
@@ -137,6 +138,8 @@ pub struct Capture {
     pub test: Vec<View>,
     /// Points to start from, normalised frame.
     pub points: Vec<DVec3>,
+    /// Their colours, RGB; empty where they have none.
+    pub point_colours: Vec<[u8; 3]>,
     /// Where they come from.
     pub points_origin: PointsOrigin,
     /// Points that were made, to be kept for the next load.

@@ -3,13 +3,13 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use glam::DVec3;
 use pocketsplat_files::shown;
 use rayon::prelude::*;
 
 use super::folder_names::FolderNames;
 use super::listing::{ListedView, Listing, Note, every_nth, unused_images};
 use super::named_path::NamedPath;
+use super::points::Points;
 use super::transforms::{Frame, Transforms, read_transforms};
 use super::{DatasetError, Layout, LoadOptions, Split, found_files, image_folder, ply};
 
@@ -101,7 +101,7 @@ fn points(
     names: &FolderNames,
     transforms: &Transforms,
     notes: &mut Vec<Note>,
-) -> Result<Option<(PathBuf, Vec<DVec3>)>, DatasetError> {
+) -> Result<Option<(PathBuf, Points)>, DatasetError> {
     let Some(named) = transforms.ply_file_path.as_deref().map(NamedPath::new) else { return Ok(None) };
     let Some(path) = named.file(names, folder, None) else {
         let text = format!(

@@ -12,6 +12,7 @@ use serde::Deserialize;
 
 use super::image_folder;
 use super::listing::{Listing, Note, every_nth};
+use super::points::{Points, rgb8};
 use super::transforms::{Frame, Intrinsics, list_frames};
 use super::{DatasetError, Layout, LoadOptions, non_finite, text_file};
 
@@ -53,6 +54,7 @@ struct Shot {
 #[derive(Deserialize)]
 struct Point {
     coordinates: [f64; 3],
+    color: Option<Vec<f64>>,
 }
 
 fn file(folder: &Path) -> Option<PathBuf> {
@@ -95,7 +97,8 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
         image_folder::choose(folder, options, &mut notes)?.map_or_else(|| folder.to_owned(), |name| folder.join(name));
     // By name, as a map is.
     let frames: Vec<Frame> = largest.shots.iter().map(|(name, shot)| frame(name, shot, &largest.cameras)).collect();
-    let points: Vec<DVec3> = largest.points.values().map(|point| DVec3::from_array(point.coordinates)).collect();
+    let point = |point: &Point| (DVec3::from_array(point.coordinates), point.color.as_deref().and_then(rgb8));
+    let points: Points = largest.points.values().map(point).collect();
     let points = Some((path.clone(), points)).filter(|(_, points)| !points.is_empty());
     let split = |i| Some(every_nth(options.test_every, i));
     let mut listing = list_frames(Layout::OpenSfm, path, &images, &frames, &Intrinsics::default(), points, split);

@@ -1,4 +1,4 @@
-//! Points of .ply files: the coordinates of the element `vertex`.
+//! Points of .ply files: coordinates and colours of the element `vertex`.
 
 use std::path::Path;
 
@@ -6,29 +6,33 @@ use glam::DVec3;
 use pocketsplat_files::ply::{Encoding, Fault, Header, Scalar, check_line_endings, split, vertices};
 
 use super::DatasetError;
+use super::points::{Points, rgb8};
 
-/// Reads the coordinates of all vertices.
+/// Reads coordinates and colours of all vertices.
 ///
 /// # Errors
 /// [`DatasetError::Read`], or [`DatasetError::Ply`] with what was found.
-pub(super) fn read_points(path: &Path) -> Result<Vec<DVec3>, DatasetError> {
+pub(super) fn read_points(path: &Path) -> Result<Points, DatasetError> {
     let bytes = std::fs::read(path).map_err(|source| DatasetError::Read { path: path.to_owned(), source })?;
     parse(&bytes).map_err(|found| DatasetError::of_points(path, found))
 }
 
-/// Reads the coordinates of all vertices of a file; the error says what was found.
-pub(super) fn parse(bytes: &[u8]) -> Result<Vec<DVec3>, String> {
+/// Reads coordinates and colours of all vertices of a file; the error says what was found.
+pub(super) fn parse(bytes: &[u8]) -> Result<Points, String> {
     let (head, body) = split(bytes).map_err(|fault| fault.to_string())?;
     let text = String::from_utf8_lossy(head);
     let points = Header::parse(&text).and_then(|header| {
         if header.encoding != Encoding::Ascii {
             check_line_endings(&header, head, body)?;
         }
-        let xyz = columns(&header)?;
+        let (xyz, rgb) = (columns(&header)?, colour_columns(&header));
         let mut points = Vec::new();
-        let push = |row: &[f64]| points.push(DVec3::from_array(xyz.map(|column| row[column])));
+        let push = |row: &[f64]| {
+            let of = |columns: [usize; 3]| columns.map(|column| row[column]);
+            points.push((DVec3::from_array(of(xyz)), rgb.and_then(|rgb| rgb8(&of(rgb)))));
+        };
         vertices(&header, header.skip_to_vertices(body)?, push)?;
-        Ok(points)
+        Ok(points.into_iter().collect())
     });
     points.map_err(|fault| fault.to_string())
 }
@@ -44,6 +48,15 @@ fn columns(header: &Header<'_>) -> Result<[usize; 3], Fault> {
         })
     };
     Ok([index("x")?, index("y")?, index("z")?])
+}
+
+/// Which properties are the colour, where it is one of bytes.
+fn colour_columns(header: &Header<'_>) -> Option<[usize; 3]> {
+    let properties = &header.vertex().properties;
+    let index = |name: &str| {
+        properties.iter().position(|property| property.name == name && matches!(property.scalar, Some(Scalar::U8)))
+    };
+    Some([index("red")?, index("green")?, index("blue")?])
 }
 
 #[cfg(test)]
@@ -66,10 +79,26 @@ mod tests {
     fn all_encodings_give_the_same_points() {
         let little = binary(|v, n| if n == 4 { (v as f32).to_le_bytes().to_vec() } else { v.to_le_bytes().to_vec() });
         let big = binary(|v, n| if n == 4 { (v as f32).to_be_bytes().to_vec() } else { v.to_be_bytes().to_vec() });
-        let expected = Ok(vec![DVec3::new(1.5, -2.0, 0.25), DVec3::new(3.0, 4.0, -5.0)]);
+        let at = vec![DVec3::new(1.5, -2.0, 0.25), DVec3::new(3.0, 4.0, -5.0)];
+        // A red alone is no colour.
+        let expected = Ok(Points { at, rgb: Vec::new() });
         assert_eq!(parse(&file("ascii", b"9 1.5 -2 0.25\n9 3 4 -5e0\n3 0 1 1\n")), expected);
         assert_eq!(parse(&file("binary_little_endian", &little)), expected);
         assert_eq!(parse(&file("binary_big_endian", &big)), expected);
+    }
+
+    #[test]
+    fn colours_of_bytes_are_read() {
+        let file = |scalar: &str, colours: [&str; 2]| {
+            let [a, b] = colours;
+            format!(
+                "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n\
+                 property {scalar} blue\nproperty {scalar} red\nproperty {scalar} green\nend_header\n1 2 3 {a}\n4 5 6 {b}\n"
+            )
+        };
+        let rgb = |text: String| parse(text.as_bytes()).expect("points").rgb;
+        assert_eq!(rgb(file("uchar", ["3 1 2", "0 255 7"])), [[1, 2, 3], [255, 7, 0]]);
+        assert!(rgb(file("float", ["0.5 0.5 0.5", "0 0 1"])).is_empty(), "of unknown range");
     }
 
     #[test]

@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::apart::quantile;
 use super::normalise::random_points_world;
+use super::points::Points;
 use super::{EXTENT, LoadOptions, Normalisation, SceneKind, frusta};
 use crate::camera::Camera;
 
@@ -19,12 +20,12 @@ const FAR_EXTENTS: f64 = 1e6;
 ///
 /// A stray point costs the lattice its resolution, for a bundle spans 2²¹ cells. Which points are strays is told by the upper quartile of
 /// their distances, which a fifth of the points do not move wherever they lie.
-pub(super) fn kept(points_world: &[DVec3], normalisation: &Normalisation) -> (Vec<DVec3>, Option<String>) {
-    let points: Vec<DVec3> = points_world.iter().map(|&point| normalisation.point(point)).collect();
-    let finite = points.iter().filter(|point| point.is_finite());
+pub(super) fn kept(points_world: &Points, normalisation: &Normalisation) -> (Points, Option<String>) {
+    let points: Points = points_world.each().map(|(point, rgb)| (normalisation.point(point), rgb)).collect();
+    let finite = points.at.iter().filter(|point| point.is_finite());
     let quartile = quantile(finite.map(|point| point.length()), 0.75);
     let farthest = (NEAR_QUARTILES * quartile).clamp(NEAR_EXTENTS * EXTENT, FAR_EXTENTS * EXTENT);
-    let kept: Vec<DVec3> = points.iter().copied().filter(|point| point.length() <= farthest).collect();
+    let kept: Points = points.each().filter(|(point, _)| point.length() <= farthest).collect();
     let note = (kept.len() < points.len()).then(|| {
         format!(
             "points left out: {} of {}; they are not finite, or farther away than {:.0} times the extent of the cameras",
@@ -73,10 +74,16 @@ mod tests {
     /// What is kept of a cloud with these strays, and how many of these.
     fn kept_of(n: usize, strays: &[DVec3]) -> (usize, usize) {
         let far = |point: &&DVec3| point.length() > 50.0;
-        let points = [cloud(n), strays.to_vec()].concat();
+        // A colour that says which point it is of.
+        let named = |(i, at): (usize, DVec3)| (at, Some([(i / 256) as u8, (i % 256) as u8, 7]));
+        let points: Points = [cloud(n), strays.to_vec()].concat().into_iter().enumerate().map(named).collect();
         let (kept, note) = kept(&points, &FRAME);
         assert_eq!(note.is_some(), kept.len() < points.len());
-        let n_far = kept.iter().filter(far).count();
+        for (at, rgb) in kept.each() {
+            let [high, low, _] = rgb.expect("a colour").map(usize::from);
+            assert_eq!(at, FRAME.point(points.at[256 * high + low]), "a point keeps its colour");
+        }
+        let n_far = kept.at.iter().filter(far).count();
         (kept.len() - n_far, n_far)
     }
 
@@ -99,7 +106,7 @@ mod tests {
 
     #[test]
     fn a_scene_that_is_far_away_as_a_whole_stays() {
-        let ridge: Vec<DVec3> = cloud(1000).iter().map(|p| DVec3::Z * 5e4 + *p * 1e3).collect();
+        let ridge: Points = cloud(1000).iter().map(|p| (DVec3::Z * 5e4 + *p * 1e3, None)).collect();
         assert_eq!(kept(&ridge, &FRAME).0.len(), 1000);
     }
 }

@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use glam::DVec3;
 use rayon::prelude::*;
 
 use super::folder_names::FolderNames;
@@ -10,6 +9,7 @@ use super::image::{ImageHeader, read_header};
 use super::listing::{ListedView, Listing, Note, Shot, unused_images};
 use super::mask_file::MaskFile;
 use super::named_path::NamedPath;
+use super::points::Points;
 use super::pose::world_to_camera;
 use super::{DatasetError, Layout, Split, ViewFault, found_files};
 use crate::camera::Camera;
@@ -94,7 +94,7 @@ pub(super) fn list_frames(
     images: &Path,
     frames: &[Frame],
     shared: &Intrinsics,
-    points: Option<(PathBuf, Vec<DVec3>)>,
+    points: Option<(PathBuf, Points)>,
     split: impl Fn(usize) -> Option<Split> + Sync,
 ) -> Listing {
     let names = FolderNames::default();

@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
-use super::coloured_point::ColouredPoint;
 use super::listing::Shot;
 use super::matching::{CELL_PX, merged};
+use super::points::ColouredPoint;
 use super::{LoadOptions, Normalisation, frusta};
 
 /// About so many pixels of a depth map become points before points of several photographs are merged.

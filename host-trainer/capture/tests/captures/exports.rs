@@ -1,7 +1,7 @@
 //! Captures as telephones and NSVF export them, written from a fixture's photographs.
 
 use glam::{DMat3, DQuat, DVec3};
-use pocketsplat_capture::dataset::LoadOptions;
+use pocketsplat_capture::dataset::{Layout, LoadOptions};
 
 use crate::fixture::{FOCAL_PX, Fixture, Kind, Photo, SIZE_PX, photograph};
 
@@ -207,6 +207,8 @@ fn exports_are_the_capture_that_they_were_made_from() {
         assert_eq!(report.layout.to_string(), layout);
         assert_eq!((capture.train.len(), capture.test.len()), (7, 2), "{report}");
         assert_eq!(report.unposed, Vec::<String>::new());
+        let is_coloured = matches!(report.layout, Layout::Bundler | Layout::OpenSfm);
+        assert_eq!(capture.point_colours, vec![[9; 3]; if is_coloured { capture.points.len() } else { 0 }], "{layout}");
         for (a, b) in capture.train.iter().zip(&reference.train) {
             assert!(a.camera.rotation.abs_diff_eq(b.camera.rotation, 1e-12), "{layout} {}", a.name);
             assert!((a.camera.translation - b.camera.translation).length() < 1e-11, "{layout} {}", a.name);

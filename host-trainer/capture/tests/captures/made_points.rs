@@ -27,6 +27,7 @@ fn points_are_made_once_for_the_same_photographs() {
     let (second, report) = loaded();
     assert!(second.made_points == first.made_points, "for another folder");
     assert!(report.points_seconds.is_none() && second.points == first.points, "{report}");
+    assert!(first.point_colours.len() == first.points.len() && second.point_colours == first.point_colours);
     assert!(
         report.to_string().contains("initial points matched between the photographs by an earlier run"),
         "{report}"

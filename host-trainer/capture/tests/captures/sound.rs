@@ -63,6 +63,7 @@ fn points_and_cameras_share_one_frame() {
     for (world, normalised) in fixture.points.iter().zip(&capture.points) {
         assert!((capture.normalisation.point(*world) - *normalised).length() < 1e-12);
     }
+    assert_eq!(capture.point_colours, [[200, 100, 50]; 20]);
     for view in &capture.train {
         let origin = view.camera.rotation * capture.normalisation.point(DVec3::ZERO) + view.camera.translation;
         assert!((origin - DVec3::Z * 4.0 * capture.normalisation.scale).length() < 1e-9, "{}: {origin}", view.name);
@@ -260,6 +261,7 @@ fn a_point_cloud_and_masks_beside_transforms_are_read() {
         .expect("an image");
     let (capture, report) = fixture.write_files().load().expect("a capture");
     assert_eq!(capture.points, [DVec3::ZERO, DVec3::X].map(|p| capture.normalisation.point(p)));
+    assert!(capture.point_colours.is_empty());
     assert!(report.to_string().contains("points left out: 1 of 3"), "{report}");
     let masked = capture.train.iter().find(|view| view.name.ends_with("p_03.png")).map(photograph).expect("a view");
     assert_eq!(masked.mask.as_ref().map(|mask| mask.n_valid()), Some(12 * 16));

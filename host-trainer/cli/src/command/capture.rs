@@ -43,6 +43,7 @@ impl CaptureArgs {
             points: self.options.points,
             made_points: Vec::new(),
             seed,
+            n_random_points: self.options.n_random_points.unwrap_or(default.n_random_points),
             images: self.options.images.clone(),
             model: self.options.model,
             test_every: self.options.test_every.unwrap_or(default.test_every),

@@ -24,7 +24,7 @@ const LOOKING: &[&str] = &["eval", "render", "verify", "cost", "export"];
 const DEFAULTS: [(&[&str], &str, &str); 10] = [
     (&["train"], "max_resolution", "by the preset"),
     (LOOKING, "max_resolution", "the training size of the bundle"),
-    (&["train"], "background", "black"),
+    (&["train"], "background", "black; white for 3dgs on a Blender capture"),
     (LOOKING, "background", "the bundle's"),
     (&["train"], "iterations", "by the preset"),
     (&["import"], "iterations", "5000"),

@@ -11,7 +11,6 @@ use pocketsplat_instructions::level::{Bound, Level};
 use pocketsplat_kernels::step::SharedDevice;
 use pocketsplat_trainer::device::{Limits, ModelChoice, Processor, choose};
 use pocketsplat_trainer::effects::Price;
-use pocketsplat_trainer::explicit::CloudConfig;
 use pocketsplat_trainer::train::config::Backbone;
 use pocketsplat_trainer::train::run::is_file_of_run;
 
@@ -356,12 +355,10 @@ impl Args {
                 bail!("{name} works with anchors alone; leave it out with --backbone {EXPLICIT}");
             }
         }
-        let preset = self.preset.unwrap_or_default().config();
-        let gaussians = CloudConfig { iterations: preset.train.iterations, ..CloudConfig::default() };
         let (Some(dataset), Some(output)) = (&self.dataset, &self.output) else {
             bail!("the run needs DATASET and --output");
         };
-        let config = ExplicitRunConfig::new(dataset.clone(), output.clone(), preset.capture, gaussians);
+        let config = ExplicitRunConfig::of_preset(self.preset.unwrap_or_default(), dataset.clone(), output.clone());
         self.applied_to_explicit(config)
     }
 

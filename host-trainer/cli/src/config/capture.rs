@@ -17,7 +17,8 @@ pub(crate) struct CaptureOptions {
     #[arg(long, value_name = "WxH", conflicts_with = "max_resolution", help_heading = INPUT)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) resolution: Option<FrameSize>,
-    /// Colour behind transparent images; learned is trained with the scene [default: black for train, the bundle's elsewhere]
+    /// Colour behind transparent images; learned is trained with the scene [default: black for train, but white for
+    /// 3dgs on a Blender capture; the bundle's elsewhere]
     #[arg(long, value_name = "COLOUR", value_parser = one_of::<Background>(BACKGROUNDS), help_heading = INPUT)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) background: Option<Background>,
@@ -27,10 +28,14 @@ pub(crate) struct CaptureOptions {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) scene: Option<SceneKind>,
     /// Where training starts: points matched between the photographs, or random ones [default: the capture's; else of its depth maps; else
-    /// matched, or random where too few are found]
+    /// matched, or random where too few are found; random for 3dgs on a Blender capture]
     #[arg(long, value_name = "ORIGIN", value_parser = one_of::<PointsChoice>(POINTS), help_heading = INPUT, hide_short_help = true)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) points: Option<PointsChoice>,
+    /// How many random points there are where these are what training starts from.
+    #[arg(skip)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) n_random_points: Option<usize>,
     /// Folder of images to read, for captures that hold several sizes [default: the only one, or images]
     #[arg(long, value_name = "NAME", help_heading = INPUT, hide_short_help = true)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -57,6 +62,7 @@ impl CaptureOptions {
             background: self.background.or(other.background),
             scene: self.scene.or(other.scene),
             points: self.points.or(other.points),
+            n_random_points: self.n_random_points.or(other.n_random_points),
             images: self.images.clone().or_else(|| other.images.clone()),
             model: self.model.or(other.model),
             test_every: self.test_every.or(other.test_every),

@@ -3,12 +3,16 @@
 use std::path::PathBuf;
 
 use anyhow::{Result, bail};
+use pocketsplat_capture::dataset::{Background, Layout, PointsChoice, layout_of};
 use pocketsplat_trainer::explicit::CloudConfig;
 use serde::{Deserialize, Serialize};
 use toml::Table;
 
 use super::named::EXPLICIT;
-use super::{CaptureOptions, keys_of, merge, refuse_unknown};
+use super::{CaptureOptions, Preset, keys_of, merge, refuse_unknown};
+
+/// Random points that training starts from on captures of Blender, as published.
+const PUBLISHED_POINTS: usize = 100_000;
 
 /// Everything such a run was asked for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -33,6 +37,14 @@ impl ExplicitRunConfig {
     pub(crate) fn new(dataset: PathBuf, output: PathBuf, capture: CaptureOptions, gaussians: CloudConfig) -> Self {
         let backbone = EXPLICIT.to_owned();
         Self { backbone, dataset, output, checkpoint_every: None, keep_checkpoints: false, capture, gaussians }
+    }
+
+    /// What a run does where nothing is said: schedules as published, length and size of the images by the preset.
+    pub(crate) fn of_preset(preset: Preset, dataset: PathBuf, output: PathBuf) -> Self {
+        let preset = preset.config();
+        let gaussians = CloudConfig { iterations: preset.train.iterations, ..CloudConfig::default() };
+        let capture = as_published(layout_of(&dataset), preset.capture);
+        Self::new(dataset, output, capture, gaussians)
     }
 
     /// Whether a configuration is one of these.
@@ -77,6 +89,20 @@ impl ExplicitRunConfig {
     }
 }
 
+/// Options with the published protocol of captures of Blender, which show an object before nothing and bring no points: on white, from
+/// random points.
+fn as_published(layout: Option<Layout>, options: CaptureOptions) -> CaptureOptions {
+    if layout != Some(Layout::Blender) {
+        return options;
+    }
+    CaptureOptions {
+        background: Some(Background::White),
+        points: Some(PointsChoice::Random),
+        n_random_points: Some(PUBLISHED_POINTS),
+        ..options
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -94,6 +120,23 @@ mod tests {
         assert!(!ExplicitRunConfig::is_one(&crate::config::RunConfig::default().to_toml().unwrap()));
         let other = text.replace("3dgs", "hac");
         assert!(ExplicitRunConfig::parse(&other).unwrap_err().to_string().contains("needs 3dgs"));
+    }
+
+    #[test]
+    fn captures_of_blender_are_trained_as_published_unless_someone_says_otherwise() {
+        let options = Preset::Standard.config().capture;
+        for layout in [None, Some(Layout::Colmap), Some(Layout::Nerfstudio)] {
+            assert_eq!(as_published(layout, options.clone()), options);
+        }
+        let published = as_published(Some(Layout::Blender), options);
+        assert_eq!((published.background, published.n_random_points), (Some(Background::White), Some(100_000)));
+        let said = CaptureOptions {
+            background: Some(Background::Black),
+            points: Some(PointsChoice::Matched),
+            ..CaptureOptions::default()
+        };
+        let both = said.or(&published);
+        assert_eq!((both.background, both.points), (said.background, said.points));
     }
 
     #[test]

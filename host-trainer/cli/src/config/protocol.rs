@@ -46,7 +46,7 @@ impl Protocol {
             test_every: Some(LoadOptions::default().test_every),
             ..CaptureOptions::default()
         });
-        CaptureOptions { scene: None, points: None, ..said }
+        CaptureOptions { scene: None, points: None, n_random_points: None, ..said }
     }
 
     /// The folder of images whose name does not fit into the section of a bundle, if so.
@@ -107,8 +107,7 @@ fn fingerprint(capture: &Capture) -> String {
 
 impl fmt::Display for Protocol {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let CaptureOptions { max_resolution, resolution, background, scene: _, points: _, images, model, test_every } =
-            &self.options;
+        let CaptureOptions { max_resolution, resolution, background, images, model, test_every, .. } = &self.options;
         match (resolution, max_resolution) {
             (Some(frame), _) => write!(f, "images cut to {frame}")?,
             (None, Some(px)) => write!(f, "images of at most {px} px")?,

@@ -13,6 +13,7 @@ fn a_written_configuration_reads_back_to_the_last_bit() {
             resolution: None,
             background: Some(Background::White),
             points: Some(pocketsplat_capture::dataset::PointsChoice::Matched),
+            n_random_points: Some(5_000),
             scene: Some(pocketsplat_capture::dataset::SceneKind::Room),
             images: Some("images_2".to_owned()),
             model: Some(1),

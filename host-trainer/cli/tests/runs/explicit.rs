@@ -11,8 +11,11 @@ fn train(output: &Path) -> Command {
     let mut command = pocketsplat();
     command.arg("train").arg(capture()).arg("-o").arg(output);
     command.args(["--backbone", "3dgs", "--iterations", &ITERATIONS.to_string(), "--checkpoint-every", "0", "--json"]);
+    command.args(["--set", "capture.n_random_points=2000"]);
     // Growth within so few iterations.
-    command.args(["--set", "gaussians.density.interval=10", "--set", "gaussians.density.gradient_threshold=1e-4"]);
+    for key in ["from=20", "interval=10", "gradient_threshold=1e-4"] {
+        command.arg("--set").arg(format!("gaussians.density.{key}"));
+    }
     command
 }
 
@@ -26,6 +29,8 @@ fn an_interrupted_run_ends_in_the_same_file_which_is_measured_and_drawn() {
     let bytes = fs::read(&whole).unwrap();
     assert_eq!(result["file_bytes"], bytes.len());
     assert!(bytes.len() as f64 / result["n_gaussians"].as_f64().unwrap() < 62.0 * 4.0 + 1.0, "62 numbers each");
+    assert_eq!(result["background"], "white", "as published");
+    assert_ne!(result["n_gaussians"], 2000, "it grew");
     assert!(result["n_test_views"].as_u64().unwrap() > 0 && result["ssim"].as_f64().unwrap() > 0.0);
 
     let mut child = starts(&mut train(&output));

@@ -143,6 +143,7 @@ fn gaussians_of_a_run_are_compressed_by_the_command_that_it_names() {
     let home = home("remedies-3dgs");
     let mut train = pocketsplat();
     train.arg("train").arg(capture()).args(["--backbone", "3dgs", "--iterations", "20", "-o"]).arg(home.join("a.ply"));
+    train.args(["--set", "capture.n_random_points=2000"]);
     all_work(&home, &says(&mut train, true), &["import "]);
 }
 

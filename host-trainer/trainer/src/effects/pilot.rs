@@ -61,6 +61,7 @@ impl PilotCapture {
             train: views(false).map(View::halved).collect(),
             test: views(true).map(View::halved).collect(),
             points: capture.points.clone(),
+            point_colours: capture.point_colours.clone(),
             made_points: None,
             ..*capture
         };

@@ -22,24 +22,21 @@ pub struct DensityStatistics {
     pub gradient_sum: Vec<f32>,
     /// `[N]` views that drew it.
     pub n_drawn: Vec<u32>,
-    /// `[N]` the largest of three deviations along a row or column of any image, px.
-    pub widest_px: Vec<f32>,
 }
 
 impl DensityStatistics {
     /// Nothing known of `n` Gaussians.
     pub fn new(n: usize) -> Self {
-        Self { gradient_sum: vec![0.0; n], n_drawn: vec![0; n], widest_px: vec![0.0; n] }
+        Self { gradient_sum: vec![0.0; n], n_drawn: vec![0; n] }
     }
 
     /// Adds one view.
     pub fn add(&mut self, gradients: &CloudGradients<f32>) {
-        let CloudGradients { drawn, screen, widest_px, .. } = gradients;
-        for ((index, gradient), widest) in drawn.iter().zip(screen).zip(widest_px) {
+        let CloudGradients { drawn, screen, .. } = gradients;
+        for (index, gradient) in drawn.iter().zip(screen) {
             let i = *index as usize;
             self.gradient_sum[i] += gradient;
             self.n_drawn[i] += 1;
-            self.widest_px[i] = self.widest_px[i].larger(*widest);
         }
     }
 }
@@ -48,7 +45,7 @@ impl DensityStatistics {
 ///
 /// Where the mean gradient is above the threshold, a small Gaussian gets a twin in its place, which the optimiser then moves by itself; a
 /// large one is replaced by two, drawn from it as from a density, with deviations divided by `split_divisor`. Then those go that are
-/// too faint, and with `prunes_large` those that are too large in the scene or were on an image. Afterwards nothing is known of any.
+/// too faint, and with `prunes_large` those that are too large in the scene. Afterwards nothing is known of any.
 ///
 /// * `extent`: of the capture. * new Gaussians come last: twins, then halves, each in the order of their parents.
 pub fn control(
@@ -80,14 +77,9 @@ pub fn control(
     }
     let mut keep = vec![true; cloud.len()];
     halves.iter().for_each(|i| keep[*i] = false);
-    // A twin was as wide on an image as the one it was made of; of halves nothing is known.
-    let seen_px: Vec<f32> =
-        statistics.widest_px.iter().copied().chain(twins.iter().map(|i| statistics.widest_px[*i])).collect();
     for (i, keep) in keep.iter_mut().enumerate() {
         let opacity = f64::from(cloud.opacity_logits[i].sigmoid());
-        let too_large = prunes_large
-            && (widest(cloud, i) > settings.largest_share * extent
-                || seen_px.get(i).is_some_and(|px| f64::from(*px) > settings.largest_px));
+        let too_large = prunes_large && widest(cloud, i) > settings.largest_share * extent;
         *keep &= opacity >= settings.min_opacity && !too_large;
     }
     // A scene without Gaussians has nothing left to grow from.
@@ -210,13 +202,12 @@ mod tests {
         let settings = CloudConfig::default().density;
         let (mut cloud, mut optimiser, mut statistics) = five();
         statistics.gradient_sum.fill(0.0);
-        statistics.widest_px[4] = 30.0;
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         control(&mut cloud, &mut optimiser, &mut statistics.clone(), &settings, 5.0, false, &mut rng);
         assert_eq!(cloud.len(), 4, "only the faint one goes");
         let (mut cloud, mut optimiser, _) = five();
         control(&mut cloud, &mut optimiser, &mut statistics, &settings, 5.0, true, &mut rng);
-        assert_eq!(cloud.centres.iter().map(|c| c[0]).collect::<Vec<_>>(), [0.0, 1.0]);
+        assert_eq!(cloud.centres.iter().map(|c| c[0]).collect::<Vec<_>>(), [0.0, 1.0, 4.0]);
         reset_opacities(&mut cloud, &mut optimiser, &settings);
         assert!(cloud.opacity_logits.iter().all(|o| (o.sigmoid() - 0.01).abs() < 1e-6));
         assert!(optimiser.opacity_logits.first.iter().all(|m| *m == 0.0));

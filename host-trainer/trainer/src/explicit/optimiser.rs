@@ -87,7 +87,7 @@ impl CloudOptimiser {
 
     /// Moves every parameter; a Gaussian that was not drawn has gradient 0, and coefficients beyond the degree that is drawn stay.
     ///
-    /// * `progress`: share of the run that is done. * `extent`: of the capture; scales the rate of the centres.
+    /// * `progress`: share of the rates' path that is behind. * `extent`: of the capture; scales the rate of the centres.
     pub fn apply(
         &mut self,
         level: Level,

@@ -60,6 +60,7 @@ pub fn capture(
         train: take((train, "train")),
         test: take((test, "test")),
         points,
+        point_colours: Vec::new(),
         points_origin: PointsOrigin::Capture,
         made_points: None,
         scene: SceneKind::Room,

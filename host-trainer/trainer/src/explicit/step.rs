@@ -6,7 +6,7 @@ use super::Cloud;
 use pocketsplat_kernels::ops::Pinhole;
 use pocketsplat_kernels::ops::heads::neural_gaussians::Gaussian;
 use pocketsplat_kernels::ops::image::explicit_gaussians::{self, Stored};
-use pocketsplat_kernels::ops::image::project::{self, ALPHA_CUTOFF, Footprint, Splat};
+use pocketsplat_kernels::ops::image::project::{self, Footprint, Splat};
 use pocketsplat_kernels::ops::image::rasterise::{self, TiledImage};
 use pocketsplat_kernels::ops::image::spherical_harmonics::MOST;
 use pocketsplat_kernels::ops::image::tiles::{self, TileLists};
@@ -47,8 +47,6 @@ pub struct CloudGradients<R> {
     pub squared_error: f64,
     /// Gaussians that reached the image, ascending; the other arrays have their rows in this order.
     pub drawn: Vec<u32>,
-    /// Three deviations along a row or a column, whichever is more, px.
-    pub widest_px: Vec<R>,
     /// dL/d(what is stored).
     pub stored: Vec<Stored<R>>,
     /// dL/d(coefficients), 0 beyond the degree that is drawn.
@@ -139,15 +137,7 @@ pub fn step<R: Real>(level: Level, cloud: &Cloud<R>, target: &TargetView<'_, R>,
         },
     );
     let squared_error = target.squared_sum(&image) / (3 * target.n_counted()) as f64;
-    let widest_px = splats.iter().zip(&footprints).map(|(splat, footprint)| widest_px(splat, footprint)).collect();
-    CloudGradients { loss, squared_error, drawn, widest_px, stored, harmonics, screen }
-}
-
-/// The footprint reaches √(2·ln(255·o)) deviations.
-fn widest_px<R: Real>(splat: &Splat<R>, footprint: &Footprint<R>) -> R {
-    let reach = (R::real(2.0) * (splat.opacity * R::real(1.0 / ALPHA_CUTOFF)).ln()).sqrt();
-    let [x, y] = footprint.half_extent_px;
-    R::real(3.0) * x.larger(y) / reach
+    CloudGradients { loss, squared_error, drawn, stored, harmonics, screen }
 }
 
 #[inline(always)]

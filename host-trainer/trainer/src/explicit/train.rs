@@ -97,7 +97,8 @@ impl Method for Explicit {
     }
 
     fn begin(run: &mut CloudTrainer<'_>) -> Result<(), TrainError> {
-        let cloud = initial_cloud(&run.setup.capture.points);
+        let Capture { points, point_colours, .. } = run.setup.capture;
+        let cloud = initial_cloud(points, point_colours);
         let (optimiser, statistics) = (CloudOptimiser::new(cloud.len()), DensityStatistics::new(cloud.len()));
         run.state.learned = LearnedCloud { cloud, optimiser, statistics };
         Ok(())
@@ -114,10 +115,9 @@ impl Method for Explicit {
             needs("first moments", moments.first.len(), n * width)?;
             needs("second moments", moments.second.len(), n * width)?;
         }
-        let DensityStatistics { gradient_sum, n_drawn, widest_px } = statistics;
+        let DensityStatistics { gradient_sum, n_drawn } = statistics;
         needs("gradient sums", gradient_sum.len(), n)?;
-        needs("drawn counts", n_drawn.len(), n)?;
-        needs("widths", widest_px.len(), n)
+        needs("drawn counts", n_drawn.len(), n)
     }
 
     fn iterate(run: &mut CloudTrainer<'_>) -> Result<CloudOutcome, TrainError> {
@@ -152,8 +152,7 @@ impl CloudTrainer<'_> {
         let target = TargetView::new(&views.cameras[place], planes(&photograph.image), mask, capture.background);
         let level = self.machine.device;
         let gradients = step(level, self.cloud(), &target, config.dssim);
-        let progress = f64::from(self.state.iteration) / f64::from(config.iterations);
-        let (rates, at) = (config.rates, [progress, capture.extent]);
+        let (rates, at) = (config.rates, [config.progress_at(self.state.iteration), capture.extent]);
         let dropped = self.judge(place, fault(&gradients))?;
         if dropped.is_none() {
             let LearnedCloud { cloud, optimiser, .. } = &mut self.state.learned;
@@ -165,8 +164,7 @@ impl CloudTrainer<'_> {
 
     /// The degree that this iteration draws.
     fn degree(&self) -> Degree {
-        let every = self.setup.config.iteration_at(self.setup.config.degree_every).max(1);
-        let reached = (self.state.iteration / every) as usize;
+        let reached = (self.state.iteration / self.setup.config.degree_every) as usize;
         Degree::ALL[reached.min(Degree::ALL.len() - 1)]
     }
 
@@ -174,17 +172,17 @@ impl CloudTrainer<'_> {
         let Setup { config, capture, .. } = &self.setup;
         let RunState { iteration, learned: LearnedCloud { cloud, optimiser, statistics }, .. } = &mut self.state;
         let settings = config.density;
-        if *iteration >= config.iteration_at(settings.until) {
+        // Nor after the last step: what comes or is lowered there is never trained.
+        if *iteration >= settings.until.min(config.iterations) {
             return;
         }
         statistics.add(gradients);
-        let every = config.iteration_at(settings.reset_every).max(1);
-        if iteration.is_multiple_of(settings.interval) && *iteration > config.iteration_at(settings.from) {
-            let prunes_large = *iteration > every;
+        if iteration.is_multiple_of(settings.interval) && *iteration > settings.from {
+            let prunes_large = *iteration > settings.reset_every;
             let mut rng = random(config.seed, Purpose::Split, *iteration);
             density::control(cloud, optimiser, statistics, &settings, capture.extent, prunes_large, &mut rng);
         }
-        if iteration.is_multiple_of(every) {
+        if iteration.is_multiple_of(settings.reset_every) {
             density::reset_opacities(cloud, optimiser, &settings);
         }
     }
@@ -212,9 +210,9 @@ mod tests {
 
     /// With all that density control does within a few steps.
     fn tiny_cloud_config(iterations: u32) -> CloudConfig {
-        let mut config = CloudConfig { iterations, ..CloudConfig::default() };
+        let mut config = CloudConfig::hurried(iterations);
         config.density.interval = 5;
-        config.density.reset_every = 0.3;
+        config.density.reset_every = 3 * iterations / 10;
         config.density.gradient_threshold = 1e-4;
         config
     }
@@ -249,16 +247,43 @@ mod tests {
     }
 
     #[test]
-    fn degrees_rise_by_shares_of_the_run() {
+    fn degrees_rise_by_iterations_however_long_the_run() {
         let capture = tiny_capture();
-        let mut trainer =
-            CloudTrainer::new(&capture, CloudConfig { iterations: 300, ..CloudConfig::default() }).unwrap();
-        let mut degrees = Vec::new();
-        for iteration in [1, 9, 10, 20, 29, 30, 300] {
-            trainer.state.iteration = iteration;
-            degrees.push(trainer.degree().number());
+        for iterations in [2500, 30_000] {
+            let config = CloudConfig { iterations, ..CloudConfig::default() };
+            let mut trainer = CloudTrainer::new(&capture, config).unwrap();
+            let mut degrees = Vec::new();
+            for iteration in [1, 999, 1000, 2000, 2999, 3000, 30_000] {
+                trainer.state.iteration = iteration;
+                degrees.push(trainer.degree().number());
+            }
+            assert_eq!(degrees, [0, 0, 1, 2, 2, 3, 3]);
         }
-        assert_eq!(degrees, [0, 0, 1, 2, 2, 3, 3]);
+    }
+
+    #[test]
+    fn a_short_run_is_the_beginning_of_a_long_one() {
+        let capture = tiny_capture();
+        let after_18 = |iterations| {
+            let mut config = CloudConfig { iterations, ..tiny_cloud_config(40) };
+            config.density.reset_every = 12;
+            let mut trainer = CloudTrainer::new(&capture, config).unwrap();
+            (0..18).for_each(|_| drop(trainer.advance().unwrap()));
+            trainer.state.learned.cloud
+        };
+        assert!(after_18(18) == after_18(400), "the same bits");
+    }
+
+    #[test]
+    fn a_run_ends_with_what_was_trained() {
+        let mut config = tiny_cloud_config(40);
+        (config.iterations, config.density.interval, config.density.reset_every) = (12, 12, 12);
+        let (cloud, _) = trained(config, 1);
+        assert_eq!(cloud.len(), 300, "nothing came after the last step");
+        assert!(cloud.opacity_logits.iter().any(|logit| *logit > -3.0), "nor were opacities lowered");
+        config.iterations = 13;
+        let (cloud, _) = trained(config, 1);
+        assert!(cloud.len() > 300 && cloud.opacity_logits.iter().all(|logit| *logit < -3.0), "before it they are");
     }
 
     #[test]

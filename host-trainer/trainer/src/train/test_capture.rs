@@ -47,6 +47,7 @@ pub(crate) fn many_views(n: u32) -> Capture {
         train: (0..n).map(view).collect(),
         test: Vec::new(),
         points: points.collect(),
+        point_colours: Vec::new(),
         points_origin: PointsOrigin::Random,
         made_points: None,
         scene: SceneKind::Object,

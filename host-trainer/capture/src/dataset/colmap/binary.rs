@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 
 use super::model::{CAMERA_MODELS, ModelCamera, ModelFault, ModelImage};
+use crate::dataset::points::Points;
 
 /// Longest image name accepted; it bounds the search for its end.
 const MAX_NAME_BYTES: usize = 4096;
@@ -158,15 +159,15 @@ pub(super) fn images(bytes: &[u8]) -> Result<Vec<ModelImage>, ModelFault> {
     Ok(images)
 }
 
-/// `points3D.bin`: positions; colours, errors and tracks are stepped over.
-pub(super) fn points(bytes: &[u8]) -> Result<Vec<DVec3>, ModelFault> {
+/// `points3D.bin`: positions and colours; errors and tracks are stepped over.
+pub(super) fn points(bytes: &[u8]) -> Result<Points, ModelFault> {
     let mut points = Vec::new();
     Cursor::new(bytes, "point", MIN_POINT_BYTES)?.each(|cursor| {
         let _point_id = cursor.u64()?;
-        points.push(DVec3::from_array(cursor.f64s()?));
-        let (_rgb, _error) = (cursor.take::<3>()?, cursor.take::<8>()?);
+        points.push((DVec3::from_array(cursor.f64s()?), Some(cursor.take::<3>()?)));
+        let _error = cursor.take::<8>()?;
         let n_track = cursor.u64()?;
         cursor.skip("track elements", n_track, TRACK_BYTES)
     })?;
-    Ok(points)
+    Ok(points.into_iter().collect())
 }

@@ -6,6 +6,7 @@ use std::str::FromStr;
 use glam::DVec3;
 
 use super::model::{CAMERA_MODELS, ModelCamera, ModelFault, ModelImage};
+use crate::dataset::points::{Points, rgb8};
 
 /// A line that is neither empty nor a comment, with its number from 1.
 fn records(text: &str) -> impl Iterator<Item = (usize, &str)> {
@@ -120,13 +121,15 @@ fn are_observations(line: &str) -> bool {
         })
 }
 
-/// `points3D.txt`, `POINT3D_ID X Y Z R G B ERROR TRACK…`: positions.
-pub(super) fn points(text: &str) -> Result<Vec<DVec3>, ModelFault> {
+/// `points3D.txt`, `POINT3D_ID X Y Z R G B ERROR TRACK…`: positions, and colours where all have one.
+pub(super) fn points(text: &str) -> Result<Points, ModelFault> {
     records(text)
         .map(|(line, record)| {
             let mut words = record.split_whitespace();
             let _point_id: u64 = next(&mut words, line, "point number")?;
-            Ok(DVec3::from_array(next_f64s(&mut words, line, "coordinate")?))
+            let at = DVec3::from_array(next_f64s(&mut words, line, "coordinate")?);
+            let rgb: Vec<f64> = words.take(3).map_while(|word| word.parse().ok()).collect();
+            Ok((at, rgb8(&rgb)))
         })
         .collect()
 }
@@ -149,6 +152,17 @@ mod tests {
                 assert_eq!(names(&text), Ok(vec![name.to_owned(); 2]), "{text:?}");
             }
         }
+    }
+
+    #[test]
+    fn points_without_colours_are_points() {
+        let coloured = points("# comment\n7 1 2 3 200 100 50 0.5 1 1\n8 4 5 6 0 0 255 0.5\n").expect("points");
+        assert_eq!(
+            (coloured.at[1], &coloured.rgb[..]),
+            (DVec3::new(4.0, 5.0, 6.0), &[[200, 100, 50], [0, 0, 255]][..])
+        );
+        let bare = points("7 1 2 3\n8 4 5 6 0 0 255 0.5\n").expect("points");
+        assert_eq!((bare.len(), bare.rgb.len()), (2, 0));
     }
 
     #[test]

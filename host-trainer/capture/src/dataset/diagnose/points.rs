@@ -29,6 +29,7 @@ const MAX_DEPTH_RATIO: f64 = 50.0;
 /// * `centres`: of the training cameras that can be used, capture units.
 pub(super) fn check(listing: &Listing, centres: &[DVec3], findings: &mut Vec<Finding>) {
     let Some((path, points)) = listing.points.as_ref().filter(|(_, points)| !points.is_empty()) else { return };
+    let points = &points.at;
     let finite: Vec<DVec3> = points.iter().copied().filter(|point| point.is_finite()).collect();
     if let Some(first) = points.iter().position(|point| !point.is_finite()) {
         let n_lost = points.len() - finite.len();

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::dataset::coloured_point::ColouredPoint;
+use crate::dataset::points::ColouredPoint;
 
 /// Points within a cell of so many pixels' width are one.
 pub(in crate::dataset) const CELL_PX: f64 = 4.0;

@@ -21,8 +21,8 @@ use picture::{Level, Picture};
 
 pub(super) use merge::{CELL_PX, merged};
 
-use super::coloured_point::ColouredPoint;
 use super::listing::Shot;
+use super::points::ColouredPoint;
 use super::{EXTENT, LoadOptions, Normalisation, Photograph, frusta};
 use crate::camera::Camera;
 

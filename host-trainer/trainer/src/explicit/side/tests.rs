@@ -14,7 +14,7 @@ fn learned(scene: &TestScene, iterations: u32) -> Gaussians {
     let how = Pictures { compensation: false, background: [0.0; 3], n_points: 1500, seed: 1 };
     let capture =
         capture(&scene.gaussians, &bulk, None, [&scene.cameras, &[]], &how).expect("cameras that stand apart");
-    let mut config = CloudConfig { iterations, ..CloudConfig::default() };
+    let mut config = CloudConfig::hurried(iterations);
     config.density.interval = 25;
     let mut trainer = CloudTrainer::new(&capture, config).expect("a run");
     while !trainer.is_done() {

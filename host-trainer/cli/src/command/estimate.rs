@@ -88,8 +88,8 @@ pub(super) struct Estimate {
     /// The longer side of the largest photograph.
     longest_px: u32,
     course: Course,
-    /// Share of the run on images of half the size.
-    half_size_until: f64,
+    /// Iterations on images of half the size.
+    n_half_size: u32,
     iterations: u32,
     bytes_per_anchor: f64,
     /// Memory of an anchor while it is trained: its values, their moments and gradients, and what a step notes of it; measured.
@@ -139,7 +139,7 @@ impl Estimate {
             what: format!("{width}×{height} px, {iterations} iterations"),
             longest_px: width.max(height),
             course: if config.modules.rdo.is_some() { course } else { course.unpruned() },
-            half_size_until: config.half_size_until,
+            n_half_size: config.iteration_at(config.resolved_for(capture).half_size.until),
             iterations,
             bytes_per_anchor: bytes_per_anchor(config),
             memory_per_anchor: 140.0 * values,
@@ -208,8 +208,8 @@ impl Estimate {
 
     /// Hears of an iteration that is done, and says what the run will take when it is time to.
     pub(super) fn step(&mut self, iteration: u32, n_anchors: usize, say: impl FnOnce(&str)) {
-        // The rate of the last hundred steps or so: growth changes it.
-        if iteration.is_multiple_of(100) && !self.next.contains(&iteration) {
+        // The rate of the last hundred steps or so: growth changes it, and so does the size of images.
+        if (iteration.is_multiple_of(100) && !self.next.contains(&iteration)) || iteration == self.n_half_size {
             self.earlier = (iteration, Instant::now());
         }
         if self.next.first().is_none_or(|next| iteration < *next) {
@@ -223,7 +223,8 @@ impl Estimate {
 
     /// Time of a step at this share of the run, against the first steps on whole images.
     fn cost_at(&self, share: f64) -> f64 {
-        let size = if share < self.half_size_until { HALF_SIZE_COST } else { 1.0 };
+        let is_half = share * f64::from(self.iterations) < f64::from(self.n_half_size);
+        let size = if is_half { HALF_SIZE_COST } else { 1.0 };
         size * between(&self.course.cost, share)
     }
 
@@ -335,7 +336,7 @@ mod tests {
             what: "8×8 px, 1000 iterations".to_owned(),
             longest_px: 8,
             course: GROWING,
-            half_size_until: 0.0,
+            n_half_size: 0,
             iterations: 1000,
             bytes_per_anchor: 20.0,
             // So much that what the test's process holds meanwhile is nothing beside.
@@ -368,7 +369,7 @@ mod tests {
         // 0.35 at 1, a line to 4 over 0.15, and 0.5 at 4.
         close(start.minutes, 1.0 * (0.35 + 0.15 * 2.5 + 0.5 * 4.0));
         // The same where steps on smaller images, which take less, come first.
-        let smaller = Estimate { half_size_until: 0.2, ..estimate(f64::INFINITY) };
+        let smaller = Estimate { n_half_size: 200, ..estimate(f64::INFINITY) };
         let start_of_smaller = smaller.expected(0, HALF_SIZE_COST * 0.06, 0.0, 5000);
         close(start_of_smaller.minutes, HALF_SIZE_COST * 0.2 + 0.15 + 0.15 * 2.5 + 0.5 * 4.0);
         close(smaller.expected(500, 0.24, 600.0, 15_000).minutes, 10.0 + 2.0);

@@ -32,7 +32,7 @@ pub(crate) struct CaptureOptions {
     #[arg(long, value_name = "ORIGIN", value_parser = one_of::<PointsChoice>(POINTS), help_heading = INPUT, hide_short_help = true)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) points: Option<PointsChoice>,
-    /// How many random points there are where these are what training starts from.
+    /// Random points, where training starts from random ones.
     #[arg(skip)]
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) n_random_points: Option<usize>,

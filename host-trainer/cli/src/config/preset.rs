@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use pocketsplat_capture::dataset::Background;
 use pocketsplat_trainer::encode::Encoding;
 use pocketsplat_trainer::train::TrainConfig;
-use pocketsplat_trainer::train::config::Backbone;
+use pocketsplat_trainer::train::config::{Backbone, HalfSize};
 use pocketsplat_trainer::train::modules::{Modules, Rdo};
 
 use serde::{Deserialize, Serialize};
@@ -68,7 +68,7 @@ impl Preset {
             },
             train: TrainConfig {
                 iterations: self.iterations(),
-                half_size_until: self.half_size_until(),
+                half_size: HalfSize { until: self.half_size_until(), ..HalfSize::default() },
                 modules: Modules { rdo: Some(Rdo::default()), ..Modules::default() },
                 ..TrainConfig::of(Backbone::Hac)
             },

@@ -30,7 +30,7 @@ fn an_interrupted_run_ends_in_the_same_file_which_is_measured_and_drawn() {
     assert_eq!(result["file_bytes"], bytes.len());
     assert!(bytes.len() as f64 / result["n_gaussians"].as_f64().unwrap() < 62.0 * 4.0 + 1.0, "62 numbers each");
     assert_eq!(result["background"], "white", "as published");
-    assert_ne!(result["n_gaussians"], 2000, "it grew");
+    assert!(result["n_gaussians"].as_u64().is_some_and(|n| n > 2000), "it grew");
     assert!(result["n_test_views"].as_u64().unwrap() > 0 && result["ssim"].as_f64().unwrap() > 0.0);
 
     let mut child = starts(&mut train(&output));

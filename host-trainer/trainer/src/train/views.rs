@@ -73,7 +73,7 @@ pub fn halved(photograph: &Photograph, camera: &Pinhole<f32>) -> (Photograph, Pi
     let (focal_px, principal_px) = (camera.focal_px.map(by), camera.principal_px.map(by));
     let mask = photograph.mask.as_ref().map(|mask| {
         let blocks = 0..size_px[0] * size_px[1];
-        let valid = blocks.map(|i| counts(&mask.valid, i % size_px[0], i / size_px[0])).collect();
+        let valid = blocks.into_par_iter().map(|i| counts(&mask.valid, i % size_px[0], i / size_px[0])).collect();
         Mask { width_px, height_px, valid }
     });
     let image = Image { width_px, height_px, rgb };

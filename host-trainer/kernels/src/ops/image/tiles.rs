@@ -165,6 +165,36 @@ mod tests {
     use crate::finite_difference::random;
 
     #[test]
+    fn lists_of_many_parts_are_those_of_one() {
+        let (size, n) = ([70, 50], 2 * PART + 100);
+        let x = random(5, n * 3);
+        let (splats, footprints): (Vec<_>, Vec<_>) = x
+            .chunks_exact(3)
+            .map(|v| {
+                let splat = Splat { mean_px: [35.0 + 40.0 * v[0], 25.0 + 30.0 * v[1]], ..Splat::default() };
+                // A coarse depth, so that there are ties across parts.
+                (splat, Footprint { depth: 1.0 + (v[2] * 4.0).abs().floor(), half_extent_px: [2.0; 2] })
+            })
+            .unzip();
+        let lists = build(&splats, &footprints, size);
+        let mut order: Vec<usize> = (0..n).collect();
+        order.sort_by(|a, b| footprints[*a].depth.total_cmp(&footprints[*b].depth));
+        for t in 0..lists.n_tiles() {
+            let covers = |s: &usize| {
+                let [x0, x1, y0, y1] = tile_rectangle(&splats[*s], &footprints[*s], size).map(usize::from);
+                (x0..x1).contains(&(t % lists.grid[0])) && (y0..y1).contains(&(t / lists.grid[0]))
+            };
+            let expected: Vec<u32> =
+                order.iter().copied().filter(covers).map(|s| u32::try_from(s).expect("small")).collect();
+            assert!(expected.len() > 100, "tile {t} shows little");
+            assert_eq!(lists.tile(t), expected, "tile {t}");
+        }
+        for s in 0..n {
+            assert!(lists.slots_of(s).iter().all(|slot| lists.entries[*slot as usize] as usize == s));
+        }
+    }
+
+    #[test]
     fn every_tile_lists_what_reaches_it_nearest_first() {
         let size = [70, 50];
         let n = 200;

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::modules::Modules;
-pub use super::schedule::{Backbone, Densification, Hac, LearningRate, Rates};
+pub use super::schedule::{Backbone, Densification, Hac, HalfSize, LearningRate, Rates};
 use super::schedule::{ConfigError, within};
 use pocketsplat_capture::dataset::{Capture, PointsOrigin};
 use pocketsplat_kernels::scene::ModelShape;
@@ -34,10 +34,9 @@ pub struct TrainConfig {
     pub learns_background: bool,
     /// Loss weights.
     pub loss: LossWeights,
-    /// Share of the run up to which images have half of their width and height: coarse things need few pixels, and a step's time
-    /// follows its pixels (Chen et al. 2025, DashGaussian, section 4.1, with one step in the place of many).
+    /// Smaller images first.
     #[serde(default)]
-    pub half_size_until: f64,
+    pub half_size: HalfSize,
     /// Growth and pruning.
     pub densification: Densification,
     /// The rate, where the backbone has one.
@@ -62,7 +61,7 @@ impl Default for TrainConfig {
             rates: Rates::default(),
             learns_background: false,
             loss: LossWeights::default(),
-            half_size_until: 0.0,
+            half_size: HalfSize::default(),
             densification: Densification::default(),
             hac: Hac::default(),
             modules: Modules::default(),
@@ -165,8 +164,7 @@ impl TrainConfig {
         }
         within("train.loss.dssim", self.loss.dssim, 0.0, 1.0)?;
         within("train.loss.volume", self.loss.volume, 0.0, 1e6)?;
-        // What is small comes with growth, and shows at the whole size alone.
-        within("train.half_size_until", self.half_size_until, 0.0, self.densification.until)?;
+        within("train.half_size.until", self.half_size.until, 0.0, 1.0)?;
         let Densification { statistics_from, from, until, interval, success, levels, .. } = self.densification;
         let Densification { gradient_threshold, min_opacity, .. } = self.densification;
         within("train.densification.success", success, 0.0, 1.0)?;
@@ -207,12 +205,16 @@ impl TrainConfig {
         let coarsest_cells = Some(self.coarsest_cells_for(capture));
         let densification = Densification { coarsest_cells, ..self.densification };
         let shape = self.modules.shape(self.shape);
-        Self { voxel_size: Some(self.voxel_size_for(capture)), densification, shape, ..*self }
+        let HalfSize { until, least_px } = self.half_size;
+        let is_large = capture.largest_px().into_iter().max().is_some_and(|px| px / 2 >= least_px);
+        let until = if is_large { until.min(densification.until) } else { 0.0 };
+        let half_size = HalfSize { until, least_px };
+        Self { voxel_size: Some(self.voxel_size_for(capture)), densification, shape, half_size, ..*self }
     }
 
-    /// Whether iteration `iteration`, from 1, sees images of half the size.
+    /// Whether iteration `iteration`, from 1, sees images of half the size; resolved for the capture.
     pub fn is_half_size(&self, iteration: u32) -> bool {
-        iteration <= self.iteration_at(self.half_size_until)
+        iteration <= self.iteration_at(self.half_size.until)
     }
 
     /// What iteration `iteration`, from 1, does to the values of anchors.

@@ -8,7 +8,8 @@ use pocketsplat_capture::dataset::Capture;
 use pocketsplat_kernels::scene::{ModelShape, QuantisationSteps};
 
 impl<'a> Trainer<'a> {
-    /// As [`Self::restore`], and goes on as `config` says: the scene, the moments and the random numbers are the checkpoint's. The
+    /// As [`Self::restore`], and goes on as `config` says: the scene, the moments and the rest of the pass over the views are the
+    /// checkpoint's; random numbers follow from the seed of `config`. The
     /// photographs may have another size.
     ///
     /// # Errors

@@ -3,10 +3,12 @@
 mod config_error;
 mod densification;
 mod hac;
+mod half_size;
 mod rates;
 
 pub use config_error::ConfigError;
 pub(crate) use config_error::within;
 pub use densification::Densification;
 pub use hac::{Backbone, Hac};
+pub use half_size::HalfSize;
 pub use rates::{LearningRate, Rates};

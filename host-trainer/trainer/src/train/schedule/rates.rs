@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 pub struct LearningRate {
     /// At iteration 0.
     pub start: f64,
-    /// At the last iteration.
+    /// At the end: the last iteration, or the one where a published schedule ends.
     pub end: f64,
     /// Share of the run up to which it stays at `start`.
     #[serde(default)]

@@ -3,11 +3,11 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
-use crate::train::config::Backbone;
+use crate::train::config::{Backbone, HalfSize};
 use crate::train::limits::{Finished, LimitProbe, LimitShares, MeasuredShares};
 use crate::train::modules::{Modules, Rdo};
 use crate::train::run::checkpoint::VERSION;
-use crate::train::test_capture::{edit, tiny_capture, tiny_config, tiny_hac_config};
+use crate::train::test_capture::{SIZE_PX, edit, tiny_capture, tiny_config, tiny_hac_config};
 use crate::train::{Observer, TrainConfig, TrainError, Trainer};
 use pocketsplat_capture::dataset::Mask;
 
@@ -40,7 +40,8 @@ fn timeless(trainer: &Trainer<'_>) -> Vec<u8> {
 #[test]
 fn a_run_taken_up_again_ends_in_the_same_bits() {
     taken_up_again(tiny_config(90), None);
-    taken_up_again(TrainConfig { learns_background: true, ..tiny_config(90) }, None);
+    let half_size = HalfSize { until: 0.4, least_px: 12 };
+    taken_up_again(TrainConfig { learns_background: true, half_size, ..tiny_config(90) }, None);
     taken_up_again(tiny_hac_config(90), None);
     taken_up_again(TrainConfig { backbone: Backbone::ContextGs, ..tiny_hac_config(90) }, None);
     let modules = Modules { rdo: Some(Rdo::default()), ..Modules::default() };
@@ -82,6 +83,30 @@ fn taken_up_again(config: TrainConfig, limits: Option<LimitProbe<'_>>) {
         trainer.run(&mut Silent).unwrap();
         assert!(timeless(&trainer) == last, "{:?} stopped after {stopped_after}", config.backbone);
     }
+}
+
+#[test]
+fn images_are_halved_up_to_the_switch_and_only_where_enough_is_left() {
+    let mut capture = tiny_capture();
+    edit(&mut capture.train[0], |photograph| {
+        let valid = (0..SIZE_PX * SIZE_PX).map(|i| i % 7 > 0).collect();
+        photograph.mask = Some(Mask { width_px: SIZE_PX, height_px: SIZE_PX, valid });
+    });
+    let n_half = |half_size| {
+        let mut trainer = Trainer::new(&capture, TrainConfig { half_size, ..tiny_config(20) }).unwrap();
+        let mut is_half = || {
+            trainer.advance().unwrap();
+            let splats = trainer.machine.device.workspace.blocks().iter().flat_map(|block| &block.splats);
+            splats.map(|splat| splat.mean_px[0]).fold(0.0, f32::max) < 0.6 * SIZE_PX as f32
+        };
+        let sizes: Vec<bool> = (0..20).map(|_| is_half()).collect();
+        assert!(sizes.is_sorted_by_key(|half| !half), "{sizes:?}");
+        sizes.into_iter().filter(|half| *half).count()
+    };
+    assert_eq!(n_half(HalfSize::default()), 0);
+    assert_eq!(n_half(HalfSize { until: 0.25, least_px: SIZE_PX / 2 }), 5);
+    assert_eq!(n_half(HalfSize { until: 1.0, least_px: SIZE_PX / 2 }), 18, "growth ends at 0.9");
+    assert_eq!(n_half(HalfSize { until: 0.25, least_px: SIZE_PX / 2 + 1 }), 0, "too small");
 }
 
 #[test]

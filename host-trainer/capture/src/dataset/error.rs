@@ -110,6 +110,9 @@ pub enum DatasetError {
         "one view in {found} is to be held out, needed: at least 2, so that some are left to train on; 0 holds out none"
     )]
     TestEvery { found: u32 },
+    /// Nothing to start from, or more than memory holds.
+    #[error("{found} random points are asked for, needed: 1 to {most}")]
+    RandomPoints { found: usize, most: usize },
     /// Somebody else's cache.
     #[error(
         "another process works with the decoded photographs in `{}`; wait for it to end, or choose another folder for the \
@@ -193,7 +196,7 @@ impl DatasetError {
             Self::Ply { .. } => "bad-points",
             Self::TooFewViews { .. } => "too-few-views",
             Self::NoBaseline { .. } => "no-baseline",
-            Self::MaxResolution { .. } | Self::TestEvery { .. } => "bad-option",
+            Self::MaxResolution { .. } | Self::TestEvery { .. } | Self::RandomPoints { .. } => "bad-option",
             Self::CacheInUse { .. } | Self::DiskFull { .. } | Self::CacheWrite { .. } => "cache",
         }
     }

@@ -77,6 +77,9 @@ impl fmt::Display for PointsChoice {
     }
 }
 
+/// A hundred times the published number of explicit Gaussians, a thousand times that of anchors.
+const MOST_RANDOM_POINTS: usize = 10_000_000;
+
 /// How to load a capture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadOptions {
@@ -140,9 +143,11 @@ impl Default for LoadOptions {
 impl LoadOptions {
     /// Refuses values that no capture can be loaded with.
     pub(super) fn check(&self) -> Result<(), DatasetError> {
+        let (found, most) = (self.n_random_points, MOST_RANDOM_POINTS);
         match (self.max_resolution, self.test_every) {
             (Some(0), _) => Err(DatasetError::MaxResolution { found: 0 }),
             (_, 1) => Err(DatasetError::TestEvery { found: 1 }),
+            _ if !(1..=most).contains(&found) => Err(DatasetError::RandomPoints { found, most }),
             _ => Ok(()),
         }
     }

@@ -155,7 +155,9 @@ fn train(
     let (_, path) = args.named_paths(&config.dataset, &config.output);
     print_or(&result, args.json(), result.summary(path))?;
     if output.is_file() {
-        say!("compress it:  pocketsplat import {} -o scene.psb", shell_word(path));
+        let background = config.capture.background.filter(|background| *background != Background::Black);
+        let behind = background.map_or(String::new(), |background| format!(" --background {background}"));
+        say!("compress it:  pocketsplat import {} -o scene.psb{behind}", shell_word(path));
     }
     Ok(ExitCode::SUCCESS)
 }

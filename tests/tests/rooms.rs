@@ -75,6 +75,7 @@ const FOLDERS: [(&str, &str, &[&str]); 4] = [
         "train",
         &[
             "schedule",
+            "streams",
             "read_ahead",
             "error",
             "views",

@@ -110,8 +110,8 @@ pub enum DatasetError {
         "one view in {found} is to be held out, needed: at least 2, so that some are left to train on; 0 holds out none"
     )]
     TestEvery { found: u32 },
-    /// Nothing to start from, or more than memory holds.
-    #[error("{found} random points are asked for, needed: 1 to {most}")]
+    /// More than memory holds.
+    #[error("{found} random points are asked for, needed: at most {most}")]
     RandomPoints { found: usize, most: usize },
     /// Somebody else's cache.
     #[error(

@@ -147,7 +147,7 @@ impl LoadOptions {
         match (self.max_resolution, self.test_every) {
             (Some(0), _) => Err(DatasetError::MaxResolution { found: 0 }),
             (_, 1) => Err(DatasetError::TestEvery { found: 1 }),
-            _ if !(1..=most).contains(&found) => Err(DatasetError::RandomPoints { found, most }),
+            _ if found > most => Err(DatasetError::RandomPoints { found, most }),
             _ => Ok(()),
         }
     }

@@ -262,8 +262,8 @@ fn options_out_of_range_are_refused() {
     let error = |options| fixture.write_files().load_with(&options).expect_err("out of range").to_string();
     let message = error(LoadOptions { test_every: 1, ..LoadOptions::default() });
     assert!(message.contains("one view in 1 is to be held out, needed: at least 2"), "{message}");
-    let message = error(LoadOptions { n_random_points: 0, ..LoadOptions::default() });
-    assert!(message.contains("0 random points are asked for, needed: 1 to 10000000"), "{message}");
+    let message = error(LoadOptions { n_random_points: 1 << 40, ..LoadOptions::default() });
+    assert!(message.contains("1099511627776 random points are asked for, needed: at most 10000000"), "{message}");
     let message = error(LoadOptions { model: Some(3), ..LoadOptions::default() });
     assert!(message.contains("has no model 3: there are 0; give `--model` one of these, or leave it out"), "{message}");
     let message = error(LoadOptions { images: Some("images_8".to_owned()), ..LoadOptions::default() });

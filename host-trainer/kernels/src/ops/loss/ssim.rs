@@ -76,7 +76,7 @@ fn similarity<R: Real>(moments: [Vec<R>; 4], norm: R) -> (R, [Vec<R>; 3]) {
         let a1 = two * mx * my + R::real(C1);
         let a2 = two * (xy[i] - mx * my) + R::real(C2);
         let b1 = mx * mx + my * my + R::real(C1);
-        let b2 = squares[i] - mx * mx - my * my + R::real(C2);
+        let b2 = squares[i] - (mx * mx + my * my) + R::real(C2);
         let inverse = R::ONE / (b1 * b2);
         let s = a1 * a2 * inverse;
         values[i] = s;

@@ -59,7 +59,7 @@ fn forward(
         let a1 = 2.0 * mx * my + C1;
         let a2 = 2.0 * (m.w - mx * my) + C2;
         let b1 = mx * mx + my * my + C1;
-        let b2 = m.z - mx * mx - my * my + C2;
+        let b2 = m.z - (mx * mx + my * my) + C2;
         let inverse = 1.0 / (b1 * b2);
         s = a1 * a2 * inverse;
         let d_squares = -s / b2;

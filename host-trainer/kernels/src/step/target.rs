@@ -6,10 +6,8 @@ use pocketsplat_capture::dataset::Image;
 use rayon::prelude::*;
 
 use crate::ops::Pinhole;
+use crate::ops::loss::l1::BLOCK;
 use crate::real::Real;
-
-/// Values that one task takes: a fixed number, so that a sum's rounding is the same for any number of threads.
-const BLOCK: usize = 4096;
 
 /// A photograph, the camera that took it, and where it shows the scene.
 #[derive(Clone, Debug)]

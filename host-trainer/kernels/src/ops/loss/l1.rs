@@ -4,8 +4,8 @@ use rayon::prelude::*;
 
 use crate::real::Real;
 
-/// Values that one task takes: a fixed number, so that the sum's rounding is the same for any number of threads.
-const BLOCK: usize = 4096;
+/// Values that one task takes: a fixed number, so that a sum's rounding is the same for any number of threads.
+pub(crate) const BLOCK: usize = 4096;
 
 /// `mean |image − truth|` over pixels and channels.
 pub fn forward<R: Real>(image: &[R], truth: &[R]) -> R {

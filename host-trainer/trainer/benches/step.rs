@@ -6,37 +6,21 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use pocketsplat_kernels::ops::Pinhole;
-use pocketsplat_kernels::ops::rate::noise::Stream;
 use pocketsplat_kernels::ops::simd::Level;
 use pocketsplat_kernels::scene::Scene;
-use pocketsplat_kernels::step::coding::{Coding, RateTerms};
+use pocketsplat_kernels::step::coding::Coding;
 use pocketsplat_kernels::step::{Loss, LossWeights, StageSeconds, StepReport, TargetView, Workspace};
 use pocketsplat_trainer::train::bench_scene;
-use pocketsplat_trainer::train::config::{Backbone, Hac, Rates};
-use pocketsplat_trainer::train::context::start::initial_context;
+use pocketsplat_trainer::train::config::{Backbone, Rates};
 use pocketsplat_trainer::train::optimiser::Optimiser;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 const SIZE_PX: u32 = 400;
 
-/// A scene with masks and a context model.
-fn coded_scene() -> Scene<f32> {
-    let mut scene = bench_scene::scene(Backbone::Hac, 50_000);
-    let mut rng = ChaCha8Rng::seed_from_u64(3);
-    for logit in &mut scene.anchors.mask_logits {
-        *logit = if rng.random::<f32>() < 0.75 { -6.0 } else { 1.0 };
-    }
-    scene.context = Some(initial_context(&scene, scene.anchors.len(), Hac::default().base_steps(), &mut rng));
-    scene
-}
-
 fn benchmark(criterion: &mut Criterion) {
-    let Hac { lambda, sample, mask_weight, grid_weight, .. } = Hac::default();
-    let rate = RateTerms { lambda, sample, mask: mask_weight, masks_weigh_anchors: false, grid: grid_weight };
-    let coding = Coding::Context { stream: Stream::of_run(1), rate, exact: None };
     steps(criterion, "scaffold", &bench_scene::scene(Backbone::Scaffold, 20_000), &Coding::Raw);
-    steps(criterion, "hac", &coded_scene(), &coding);
+    steps(criterion, "hac", &bench_scene::coded(50_000), &bench_scene::coding());
 }
 
 fn steps(criterion: &mut Criterion, name: &str, scene: &Scene<f32>, coding: &Coding<'_, f32>) {

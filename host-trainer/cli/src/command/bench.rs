@@ -7,11 +7,12 @@ use std::time::Instant;
 use anyhow::{Context, Result, ensure};
 use pocketsplat_capture::dataset::FrameSize;
 use pocketsplat_kernels::ops::Pinhole;
+use pocketsplat_kernels::ops::image::rasterise::BlendCounts;
 use pocketsplat_kernels::scene::Scene;
 use pocketsplat_kernels::step::coding::Coding;
 use pocketsplat_kernels::step::{Loss, LossWeights, SharedDevice, StageSeconds, StepReport, TargetView, Workspace};
 use pocketsplat_trainer::train::bench_scene;
-use pocketsplat_trainer::train::config::Backbone;
+use pocketsplat_trainer::train::config::{Backbone, Rates};
 use pocketsplat_trainer::train::density::Statistics;
 use pocketsplat_trainer::train::optimiser::Optimiser;
 use pocketsplat_trainer::train::run::device_sync::trained;
@@ -21,9 +22,9 @@ use super::devices::{DeviceChoice, usable};
 use super::output;
 use crate::say::say;
 
-/// Time the stages of a training step.
+/// Time the stages of a training step, and count what it has to do.
 ///
-/// On every device of this machine, and on the CPU with 1, 2, 4, … threads.
+/// Of a scene for the image alone and of one for image and bits, on every device of this machine, and on the CPU with 1, 2, 4, … threads.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Splats of the scenes.
@@ -51,18 +52,36 @@ const SIZES: [FrameSize; 3] = [
 struct Row {
     device: String,
     threads: usize,
+    scene: &'static str,
     size: String,
-    splats: usize,
-    pairs: usize,
-    /// Prefilter, heads, Gaussians, projection.
+    counts: Counts,
+    /// Prefilter, copying the visible anchors, what coding does to their values; and the rate backwards.
+    context_ms: f64,
+    /// Heads, Gaussians, projection.
     anchors_ms: f64,
     tiles_ms: f64,
     rasterise_ms: f64,
     loss_ms: f64,
     rasterise_backward_ms: f64,
     anchors_backward_ms: f64,
-    /// Of a step as training has it.
+    optimiser_ms: f64,
+    /// Of a step as training has it, the optimiser included.
     step_ms: f64,
+}
+
+/// What a step has to do.
+#[derive(Clone, Copy, Serialize)]
+struct Counts {
+    /// Gaussians of the scene that their masks draw.
+    resident: usize,
+    /// Of these, what reaches the image.
+    active: usize,
+    /// Of a tile and a splat.
+    pairs: usize,
+    /// Of a pixel and a splat whose alpha is looked at.
+    evaluated: u64,
+    /// Of a pixel and a splat that changes it.
+    blended: u64,
 }
 
 #[derive(Serialize)]
@@ -79,23 +98,22 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let gpus = usable();
     let mut rows = Vec::new();
     for n_splats in &args.splats {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of anchors")]
-        let n_anchors = (*n_splats as f64 / bench_scene::SPLATS_PER_ANCHOR).ceil() as usize;
-        let scene = bench_scene::scene(Backbone::Scaffold, n_anchors);
-        for size in &args.sizes {
-            for threads in &threads {
-                say!("{n_splats} splats, {size}, cpu, {threads} threads");
-                rows.push(measure(&scene, *size, args.steps, *threads, None)?);
-            }
-            for index in &gpus {
-                say!("{n_splats} splats, {size}, gpu:{index}");
-                let measured = DeviceChoice::Gpu(Some(*index))
-                    .open_silently()
-                    .and_then(|device| measure(&scene, *size, args.steps, most, device));
-                // What one device has no room for, another may have.
-                match measured {
-                    Ok(row) => rows.push(row),
-                    Err(error) => say!("left out: {error:#}"),
+        for step in [Step::plain(*n_splats), Step::coded(*n_splats)] {
+            for size in &args.sizes {
+                for threads in &threads {
+                    say!("{n_splats} splats, {}, {size}, cpu, {threads} threads", step.name);
+                    rows.push(measure(&step, *size, args.steps, *threads, None)?);
+                }
+                for index in &gpus {
+                    say!("{n_splats} splats, {}, {size}, gpu:{index}", step.name);
+                    let measured = DeviceChoice::Gpu(Some(*index))
+                        .open_silently()
+                        .and_then(|device| measure(&step, *size, args.steps, most, device));
+                    // What one device has no room for, another may have.
+                    match measured {
+                        Ok(row) => rows.push(row),
+                        Err(error) => say!("left out: {error:#}"),
+                    }
                 }
             }
         }
@@ -104,8 +122,34 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     output::print_or(&table, args.json, &table)
 }
 
+/// A step to be measured.
+struct Step {
+    name: &'static str,
+    scene: Scene<f32>,
+    coding: Coding<'static, f32>,
+}
+
+impl Step {
+    /// For the image alone.
+    fn plain(n_splats: usize) -> Self {
+        let scene = bench_scene::scene(Backbone::Scaffold, n_anchors(n_splats, bench_scene::SPLATS_PER_ANCHOR));
+        Self { name: "plain", scene, coding: Coding::Raw }
+    }
+
+    /// For image and bits, after pruning: what most steps of a preset are.
+    fn coded(n_splats: usize) -> Self {
+        let scene = bench_scene::coded(n_anchors(n_splats, bench_scene::SPLATS_PER_CODED_ANCHOR));
+        Self { name: "coded", scene, coding: bench_scene::coding() }
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of anchors")]
+fn n_anchors(n_splats: usize, splats_per_anchor: f64) -> usize {
+    (n_splats as f64 / splats_per_anchor).ceil() as usize
+}
+
 fn measure(
-    scene: &Scene<f32>,
+    step: &Step,
     size: FrameSize,
     n_steps: usize,
     threads: usize,
@@ -119,42 +163,74 @@ fn measure(
     let truth = (0..n_values as u32).map(|i| f32::from((i.wrapping_mul(2_654_435_761) >> 24) as u8) / 255.0).collect();
     let target = TargetView::new(&camera, truth, None, [0.0; 3]).numbered(0);
     let loss = Loss::plain(LossWeights::default());
-    let mut name = "cpu".to_owned();
-    let (steps, reports) = pool.install(|| -> Result<(Vec<f64>, Vec<StepReport<f32>>)> {
-        match device {
+    let Step { scene, coding, .. } = step;
+    let (rates, half_way, extent) = (Rates::default(), 0.5, 5.0);
+    let mut optimiser = Optimiser::new(scene);
+    pool.install(|| {
+        let mut workspace = Workspace::new(&scene.shape);
+        let counted = workspace.count(scene, &camera);
+        let (name, timed) = match device {
             None => {
-                let mut workspace = Workspace::new(&scene.shape);
-                let timed = after_one(n_steps, || Ok(workspace.try_step(scene, &target, &loss, &Coding::Raw)?))?;
-                Ok(timed.into_iter().unzip())
+                let mut moving = scene.clone();
+                let timed = after_one(n_steps, || {
+                    let report = workspace.try_step(&moving, &target, &loss, coding)?;
+                    let stepped = Instant::now();
+                    optimiser.apply(&mut moving, &workspace, &rates, half_way, extent);
+                    Ok((report, stepped.elapsed().as_secs_f64()))
+                })?;
+                ("cpu".to_owned(), timed)
             }
             // As training has it: the scene is there, and stays.
             Some(device) => {
                 let mut device = device.lock().unwrap_or_else(PoisonError::into_inner);
-                name = device.name();
+                let name = device.name();
                 let statistics = Statistics::new(scene.anchors.len(), scene.shape.n_offsets);
                 let device = device.resident();
-                device.load(&trained(scene, &Optimiser::new(scene), &statistics))?;
+                device.load(&trained(scene, &optimiser, &statistics))?;
                 let mut run = |times_stages| {
                     device.time_stages(times_stages);
-                    after_one(n_steps, || Ok(device.step(&target, &loss, &Coding::Raw, f32::MAX)?.report))
+                    after_one(n_steps, || {
+                        let report = device.step(&target, &loss, coding, f32::MAX)?.report;
+                        let stepped = Instant::now();
+                        let mut steps = optimiser.next(&rates, half_way, extent);
+                        steps.context =
+                            scene.context.as_ref().and_then(|_| optimiser.next_of_context(&rates, half_way));
+                        device.move_by(&steps)?;
+                        Ok((report, stepped.elapsed().as_secs_f64()))
+                    })
                 };
                 // Stages that are waited for make the step longer.
-                let reports = run(true)?.into_iter().map(|(_, report)| report).collect();
-                let steps = run(false)?.into_iter().map(|(seconds, _)| seconds).collect();
-                Ok((steps, reports))
+                let mut timed = run(true)?;
+                for (timed, whole) in timed.iter_mut().zip(run(false)?) {
+                    timed.seconds = whole.seconds;
+                }
+                (name, timed)
             }
-        }
-    })?;
-    Ok(row(name, threads, size, steps, &reports))
+        };
+        let resident = (0..scene.anchors.mask_logits.len()).filter(|offset| scene.anchors.is_drawn(*offset)).count();
+        let StepReport { n_splats: active, n_pairs: pairs, .. } = timed[0].report;
+        let BlendCounts { evaluated, blended } = counted;
+        let counts = Counts { resident, active, pairs, evaluated, blended };
+        Ok(row(name, threads, step.name, size, counts, &timed))
+    })
 }
 
-/// The seconds of steps and what they report, after one that does not count.
-fn after_one(n_steps: usize, mut step: impl FnMut() -> Result<StepReport<f32>>) -> Result<Vec<(f64, StepReport<f32>)>> {
+/// A step, the optimiser included.
+struct Timed {
+    seconds: f64,
+    optimiser_seconds: f64,
+    report: StepReport<f32>,
+}
+
+/// Steps after one that does not count.
+///
+/// * `step`: gives what it reports, and the seconds of the optimiser.
+fn after_one(n_steps: usize, mut step: impl FnMut() -> Result<(StepReport<f32>, f64)>) -> Result<Vec<Timed>> {
     step()?;
     let timed = |_| {
         let start = Instant::now();
-        let report = step()?;
-        Ok((start.elapsed().as_secs_f64(), report))
+        let (report, optimiser_seconds) = step()?;
+        Ok(Timed { seconds: start.elapsed().as_secs_f64(), optimiser_seconds, report })
     };
     (0..n_steps).map(timed).collect()
 }
@@ -164,23 +240,24 @@ fn median_ms(mut seconds: Vec<f64>) -> f64 {
     1e3 * seconds[seconds.len() / 2]
 }
 
-fn row(device: String, threads: usize, size: FrameSize, steps: Vec<f64>, reports: &[StepReport<f32>]) -> Row {
-    let median =
-        |stage: &dyn Fn(&StageSeconds) -> f64| median_ms(reports.iter().map(|report| stage(&report.stages)).collect());
-    let StepReport { n_splats, n_pairs, .. } = reports[0];
+fn row(device: String, threads: usize, scene: &'static str, size: FrameSize, counts: Counts, timed: &[Timed]) -> Row {
+    let median = |of: &dyn Fn(&Timed) -> f64| median_ms(timed.iter().map(of).collect());
+    let stage = |of: &dyn Fn(&StageSeconds) -> f64| median(&|timed| of(&timed.report.stages));
     Row {
         device,
         threads,
+        scene,
         size: size.to_string(),
-        splats: n_splats,
-        pairs: n_pairs,
-        anchors_ms: median(&|s| s.context + s.anchors),
-        tiles_ms: median(&|s| s.tiles),
-        rasterise_ms: median(&|s| s.rasterise),
-        loss_ms: median(&|s| s.loss),
-        rasterise_backward_ms: median(&|s| s.rasterise_backward),
-        anchors_backward_ms: median(&|s| s.anchors_backward + s.context_backward),
-        step_ms: median_ms(steps),
+        counts,
+        context_ms: stage(&|s| s.context + s.context_backward),
+        anchors_ms: stage(&|s| s.anchors),
+        tiles_ms: stage(&|s| s.tiles),
+        rasterise_ms: stage(&|s| s.rasterise),
+        loss_ms: stage(&|s| s.loss),
+        rasterise_backward_ms: stage(&|s| s.rasterise_backward),
+        anchors_backward_ms: stage(&|s| s.anchors_backward),
+        optimiser_ms: median(&|timed| timed.optimiser_seconds),
+        step_ms: median(&|timed| timed.seconds),
     }
 }
 
@@ -188,19 +265,26 @@ impl fmt::Display for Table {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "| device | threads | size | splats | pairs | anchors | tiles | rasterise | loss | rasterise back | anchors back | step, ms |"
+            "| device | threads | scene | size | resident | active | pairs | evaluated, M | blended, M | context | anchors | tiles | rasterise \
+             | loss | rasterise back | anchors back | optimiser | step, ms |"
         )?;
-        writeln!(f, "|---|---|---|---|---|---|---|---|---|---|---|---|")?;
+        writeln!(f, "|{}", "---|".repeat(18))?;
         for row in &self.rows {
-            let Row { device, threads, size, splats, pairs, .. } = row;
-            write!(f, "| {device} | {threads} | {size} | {splats} | {pairs} |")?;
+            let Row { device, threads, scene, size, counts, .. } = row;
+            let Counts { resident, active, pairs, evaluated, blended } = counts;
+            write!(f, "| {device} | {threads} | {scene} | {size} | {resident} | {active} | {pairs} |")?;
+            for n in [evaluated, blended] {
+                write!(f, " {:.1} |", *n as f64 / 1e6)?;
+            }
             for ms in [
+                row.context_ms,
                 row.anchors_ms,
                 row.tiles_ms,
                 row.rasterise_ms,
                 row.loss_ms,
                 row.rasterise_backward_ms,
                 row.anchors_backward_ms,
+                row.optimiser_ms,
             ] {
                 write!(f, " {ms:.1} |")?;
             }

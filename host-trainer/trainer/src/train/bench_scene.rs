@@ -6,12 +6,18 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::TrainConfig;
-use super::config::Backbone;
+use super::config::{Backbone, Hac};
+use super::context::start::initial_context;
+use pocketsplat_kernels::ops::rate::noise::Stream;
 use pocketsplat_kernels::scene::Scene;
 use pocketsplat_kernels::scene::init::initial_scene;
+use pocketsplat_kernels::step::coding::{Coding, RateTerms};
 
 /// Splats that an anchor of [`scene`] makes in [`camera`]'s view, about.
 pub const SPLATS_PER_ANCHOR: f64 = 5.4;
+
+/// The same of [`coded`].
+pub const SPLATS_PER_CODED_ANCHOR: f64 = 2.0;
 
 /// A camera that sees the whole of [`scene`].
 pub fn camera([width_px, height_px]: [u32; 2]) -> Camera {
@@ -42,4 +48,22 @@ pub fn scene(backbone: Backbone, n_anchors: usize) -> Scene<f32> {
         *log_scale += rng.random_range(-0.2..0.6);
     }
     scene
+}
+
+/// The same for [`Backbone::Hac`] after pruning: three of four offsets are masked, and there is a context model.
+pub fn coded(n_anchors: usize) -> Scene<f32> {
+    let mut scene = scene(Backbone::Hac, n_anchors);
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    for logit in &mut scene.anchors.mask_logits {
+        *logit = if rng.random::<f32>() < 0.75 { -6.0 } else { 1.0 };
+    }
+    scene.context = Some(initial_context(&scene, scene.anchors.len(), Hac::default().base_steps(), &mut rng));
+    scene
+}
+
+/// What most steps do to the values of [`coded`].
+pub fn coding() -> Coding<'static, f32> {
+    let Hac { lambda, sample, mask_weight, grid_weight, .. } = Hac::default();
+    let rate = RateTerms { lambda, sample, mask: mask_weight, masks_weigh_anchors: false, grid: grid_weight };
+    Coding::Context { stream: Stream::of_run(1), rate, exact: None }
 }

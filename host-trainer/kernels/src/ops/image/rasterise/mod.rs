@@ -9,6 +9,7 @@
 //! one slot per (tile, splat) pair and are summed per splat in tile order: no result depends on the number of threads.
 
 mod backward;
+mod count;
 mod forward;
 mod image;
 mod row;
@@ -16,6 +17,7 @@ mod row;
 mod tests;
 
 pub use backward::{background_gradient, backward, backward_through};
+pub use count::{BlendCounts, count};
 pub use forward::{forward, forward_into};
 pub use image::TiledImage;
 

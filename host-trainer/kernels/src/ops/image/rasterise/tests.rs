@@ -149,6 +149,37 @@ fn no_row_that_draws_is_left_out() {
 }
 
 #[test]
+fn what_is_blended_is_counted() {
+    for (seed, opacity) in [(1, 1.0), (2, 0.2), (3, 1.4)] {
+        let splats = unpack(&scene(seed, 60, opacity));
+        let counts = count(&splats, &footprints(&splats), &lists(&splats));
+        // Whole tiles are drawn, and every splat of a pixel that is not skipped until it stops.
+        let size = SIZE.map(|px| px.next_multiple_of(TILE_PX));
+        let mut blended = 0;
+        for p in 0..size[0] * size[1] {
+            let (px, py) = ((p % size[0]) as f64 + 0.5, (p / size[0]) as f64 + 0.5);
+            let mut t = 1.0;
+            for s in &splats {
+                let dy = py - s.mean_px[1];
+                let dx = px - s.mean_px[0] - s.shear * dy;
+                let power = -0.5 * (s.row_precision * dx * dx + s.column_precision * dy * dy);
+                let alpha = (s.opacity * power.exp()).min(0.99);
+                if alpha >= 1.0 / 255.0 {
+                    if t * (1.0 - alpha) < 1e-4 {
+                        break;
+                    }
+                    blended += 1;
+                    t *= 1.0 - alpha;
+                }
+            }
+        }
+        // Lists end with the image's last pixel.
+        assert!(counts.blended <= blended && counts.blended * 100 >= blended * 90, "{counts:?} of {blended}");
+        assert!(counts.evaluated >= counts.blended && counts.evaluated.is_multiple_of(16), "{counts:?}");
+    }
+}
+
+#[test]
 fn every_simd_level_gives_the_same_bits() {
     let exact = unpack(&scene(5, 80, 1.0));
     let lists = lists(&exact);

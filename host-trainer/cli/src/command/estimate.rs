@@ -14,11 +14,13 @@ use super::process::{machine_memory_bytes, peak_memory_bytes};
 use crate::config::Preset;
 use crate::say::say;
 
-/// Steps of the trial; the first fill caches and take memory, and are not timed.
-const UNTIMED_STEPS: u32 = 4;
-const TIMED_STEPS: u32 = 8;
-/// Iterations after which the estimate is shown again; then at these shares of the run. The last comes after the first pruning, at 0.5:
-/// the pruning itself takes time, and the number of anchors drops with it.
+/// A trial ends after so many steps, or seconds. Every offset begins drawn: its first steps take twice as long as those that follow, so
+/// that only the last are timed.
+const TRIAL_STEPS: usize = 64;
+const TRIAL_SECONDS: f64 = 4.0;
+const TIMED_STEPS: usize = 8;
+/// Iterations of a resumed run, which has no trial, after which the estimate is first shown; then at these shares of the run. The last comes after
+/// the first pruning, at 0.5: the pruning itself takes time, and the number of anchors drops with it.
 const FIRST: u32 = 30;
 const AGAIN_AT: [f64; 3] = [0.1, 0.25, 0.55];
 
@@ -32,14 +34,27 @@ const USUAL_ITERATIONS: u32 = Preset::Standard.iterations();
 /// What pruning, coding and measuring take more than a step, against the peak so far.
 const EVENTS_MEMORY: f64 = 1.15;
 
-/// As far as growth goes where a capture has few points: tumbler's ended there, lego's went twice as far.
-const ANCHORS_PER_PIXEL: f64 = 0.13;
+/// Anchors that growth adds, for each pixel of an image, where the loss is 1: they go with the loss after the trial to the power of
+/// [`GROWTH_POWER`] (docs/experiments/2026-11-28-estimates.md).
+const GROWTH_OF_LOSS: f64 = 10.0;
+const GROWTH_POWER: f64 = 2.3;
+/// Iterations that this takes; a shorter run adds the root of its share.
+const GROWN_AFTER: f64 = 7000.0;
+/// Of the anchors that there are when growth ends, pruning leaves this share over that loss, within [`LEFT`].
+const LEFT_OVER_LOSS: f64 = 0.045;
+const LEFT: [f64; 2] = [0.2, 0.75];
+/// The loss after the trial where there was none.
+const USUAL_LOSS: f64 = 0.1;
+/// The time of a step goes with the number of anchors to this power.
+const POWER_OF_ANCHORS: f64 = 0.7;
+/// Views that a pruning by rate and distortion probes at most, and what each takes of a step.
+const PROBED_VIEWS: usize = 100;
+const PROBE_COST: f64 = 0.65;
 
 /// Bytes of a bundle besides its anchors: heads, context, container.
 const FIXED_BYTES: f64 = 40e3;
 
-/// How a run goes on, against its first steps. As runs of the captures of `docs/experiments/2026-11-22-train-without-options.md`
-/// went, which says how far single ones are off.
+/// How a run goes on, against its first steps.
 struct Course {
     /// Time of a step at [`SHARES`] of the run.
     cost: [f64; SHARES.len()],
@@ -55,14 +70,22 @@ const BEFORE_PRUNING: usize = 5;
 // An estimate in between would take the anchors after pruning for those before it.
 const _: () = assert!(AGAIN_AT[AGAIN_AT.len() - 1] > SHARES[BEFORE_PRUNING]);
 
-/// From points drawn at random, as of Synthetic-NeRF.
+/// From points drawn at random, as runs of Synthetic-NeRF went (docs/experiments/2026-11-22-train-without-options.md).
 const FROM_RANDOM: Course =
     Course { cost: [1.0, 1.0, 2.7, 5.3, 7.0, 3.6, 3.4, 3.4], anchors: [1.0, 0.6, 3.0, 3.5, 3.8, 1.7, 1.5, 1.5] };
-/// From a capture's own points.
-const FROM_CAPTURE: Course =
-    Course { cost: [1.0, 1.1, 1.3, 1.6, 1.9, 1.4, 1.35, 1.35], anchors: [1.0, 1.0, 1.1, 1.1, 1.15, 0.7, 0.6, 0.6] };
-
 impl Course {
+    /// From points of the scene.
+    ///
+    /// * `n`: anchors at first. * `loss`: after the trial. * `n_pixels`: of an image.
+    fn from_points(n: f64, loss: f64, n_pixels: f64, iterations: u32) -> Self {
+        let grown_share = (f64::from(iterations) / GROWN_AFTER).min(1.0).sqrt();
+        let added = grown_share * GROWTH_OF_LOSS * loss.powf(GROWTH_POWER) * n_pixels / n.max(1.0);
+        let left = (LEFT_OVER_LOSS / loss).clamp(LEFT[0], LEFT[1]) * (1.0 + added);
+        let grown = |share: f64| 1.0 + share * added;
+        let anchors = [1.0, grown(0.1), grown(0.4), grown(0.7), grown(1.0), 1.15 * left, 1.15 * left, left];
+        Self { cost: anchors.map(|n| n.powf(POWER_OF_ANCHORS)), anchors }
+    }
+
     /// The same where nothing is pruned by rate and distortion.
     fn unpruned(&self) -> Self {
         let goes_on = |values: &[f64; SHARES.len()]| {
@@ -80,7 +103,7 @@ fn between(values: &[f64; SHARES.len()], at: f64) -> f64 {
 }
 
 /// Time of a step on images of half the size, against one on whole ones: anchors take as long.
-const HALF_SIZE_COST: f64 = 0.6;
+const HALF_SIZE_COST: f64 = 0.55;
 
 /// Follows a run, and says now and then what it will take.
 pub(super) struct Estimate {
@@ -96,21 +119,37 @@ pub(super) struct Estimate {
     memory_per_anchor: f64,
     /// A limit of growth.
     most_anchors: f64,
-    /// Anchors that there will be when growth ends however few there are at first.
-    grown_anchors: f64,
+    /// Prunings by rate and distortion: shares of the run, and how many steps each takes.
+    prunings: Vec<f64>,
+    probed_steps: f64,
     /// When this process began, and a step some time ago, to tell the rate by.
     started: Instant,
     earlier: (u32, Instant),
     next: Vec<u32>,
     machine_bytes: Option<u64>,
-    warned: Warned,
+    before: Before,
 }
 
-/// What a run has been warned of, so that it is warned of nothing twice.
+/// What a few steps showed.
+#[derive(Clone, Copy, Debug)]
+struct Trial {
+    n_anchors: usize,
+    loss: f64,
+}
+
+impl Trial {
+    /// Where there was none.
+    fn usual(capture: &Capture) -> Self {
+        Self { n_anchors: capture.points.len(), loss: USUAL_LOSS }
+    }
+}
+
+/// What a run's estimate is told of the one before it: what a trial showed, and what was warned of, so that nothing is warned of twice.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Warned {
-    of_minutes: bool,
-    of_memory: bool,
+pub(crate) struct Before {
+    trial: Option<Trial>,
+    warned_of_minutes: bool,
+    warned_of_memory: bool,
 }
 
 /// What a run takes in all.
@@ -125,16 +164,19 @@ pub(super) struct Expected {
 }
 
 impl Estimate {
-    /// * `from`: iterations that are done. * `warned`: what the user has read already.
-    pub(super) fn new(capture: &Capture, config: &TrainConfig, from: u32, warned: Warned) -> Self {
+    /// * `from`: iterations that are done.
+    pub(super) fn new(capture: &Capture, config: &TrainConfig, from: u32, before: Before) -> Self {
         let [width, height] = capture.largest_px();
         let iterations = config.iterations;
         let said = AGAIN_AT.into_iter().map(|share| config.iteration_at(share));
         let values = config.shape.values_per_anchor() as f64;
+        let n_pixels = f64::from(width) * f64::from(height);
+        let Trial { n_anchors, loss } = before.trial.unwrap_or_else(|| Trial::usual(capture));
         let course = match capture.points_origin {
             PointsOrigin::Random => FROM_RANDOM,
-            _ => FROM_CAPTURE,
+            _ => Course::from_points(n_anchors as f64, loss, n_pixels, iterations),
         };
+        let first = before.trial.is_none().then_some(from + FIRST);
         Self {
             what: format!("{width}×{height} px, {iterations} iterations"),
             longest_px: width.max(height),
@@ -143,17 +185,18 @@ impl Estimate {
             iterations,
             bytes_per_anchor: bytes_per_anchor(config),
             memory_per_anchor: 140.0 * values,
-            grown_anchors: ANCHORS_PER_PIXEL * f64::from(width) * f64::from(height),
+            prunings: config.modules.rdo.map_or_else(Vec::new, |rdo| vec![rdo.from, rdo.until]),
+            probed_steps: PROBE_COST * capture.train.len().min(PROBED_VIEWS) as f64,
             most_anchors: config.densification.max_anchors.map_or(f64::INFINITY, |most| most as f64),
             started: Instant::now(),
             earlier: (from, Instant::now()),
-            next: [from + FIRST].into_iter().chain(said).filter(|at| *at >= from + FIRST && *at < iterations).collect(),
+            next: first.into_iter().chain(said).filter(|at| *at >= from + FIRST && *at < iterations).collect(),
             machine_bytes: machine_memory_bytes(),
-            warned,
+            before,
         }
     }
 
-    /// Measures a few steps of a new run, which are not kept, and says what it will take; returns what it has warned of.
+    /// Measures a few steps of a new run, which are not kept, and says what it will take; returns what the run's own estimate is told.
     ///
     /// * `with_pilots`: whether pilots will measure its effects first. * `stop`: looked at after every step; once it is set, nothing
     ///   is said.
@@ -166,13 +209,13 @@ impl Estimate {
         with_pilots: bool,
         device: Option<SharedDevice<f32>>,
         stop: &AtomicBool,
-    ) -> Result<Warned> {
+    ) -> Result<Before> {
         let (mut estimate, expected) = Self::measured(capture, config, device, stop)?;
         if !stop.load(Ordering::Relaxed) {
             let expected = if with_pilots { expected.with_pilots() } else { expected };
             say!("{}", estimate.said(&expected));
         }
-        Ok(estimate.warned)
+        Ok(estimate.before)
     }
 
     /// What a new run will take, from a few steps that are not kept.
@@ -189,20 +232,21 @@ impl Estimate {
     ) -> Result<(Self, Expected)> {
         let mut trainer = Trainer::new(capture, *config)?;
         trainer.set_device(device);
-        let mut advance = |n_steps: u32| -> Result<f64> {
-            let started = Instant::now();
-            for _ in 0..n_steps {
-                if !stop.load(Ordering::Relaxed) {
-                    trainer.advance()?;
-                }
+        let (started, mut steps) = (Instant::now(), Vec::new());
+        while steps.len() < TRIAL_STEPS && started.elapsed().as_secs_f64() < TRIAL_SECONDS && !trainer.is_done() {
+            if stop.load(Ordering::Relaxed) {
+                break;
             }
-            Ok(started.elapsed().as_secs_f64() / f64::from(n_steps.max(1)))
-        };
-        let n_untimed = UNTIMED_STEPS.min(config.iterations);
-        advance(n_untimed)?;
-        let step_s = advance(TIMED_STEPS.min(config.iterations - n_untimed))?;
-        let estimate = Self::new(capture, config, 0, Warned::default());
-        let expected = estimate.expected(0, step_s, 0.0, trainer.scene().anchors.len());
+            let began = Instant::now();
+            let loss = f64::from(trainer.advance()?.report.loss);
+            steps.push((began.elapsed().as_secs_f64(), loss));
+        }
+        let timed = &steps[steps.len().saturating_sub(TIMED_STEPS)..];
+        let mean = |of: fn(&(f64, f64)) -> f64| timed.iter().map(of).sum::<f64>() / timed.len().max(1) as f64;
+        let n_anchors = trainer.scene().anchors.len();
+        let trial = Trial { n_anchors, loss: mean(|(_, loss)| *loss) };
+        let estimate = Self::new(capture, config, 0, Before { trial: Some(trial), ..Before::default() });
+        let expected = estimate.expected(0, mean(|(seconds, _)| *seconds), 0.0, n_anchors);
         Ok((estimate, expected))
     }
 
@@ -236,13 +280,15 @@ impl Estimate {
             .sum::<f64>()
             / f64::from(parts);
         let steps_left = f64::from(self.iterations - iteration);
-        let left_s = steps_left * step_s * mean_cost / self.cost_at(done);
+        let prunings = self.prunings.iter().filter(|share| **share > done);
+        // They come with the anchors of before and on whole images.
+        let pruning = prunings.map(|share| self.probed_steps * between(&self.course.cost, share - 1e-3)).sum::<f64>();
+        let left_s = (steps_left * mean_cost + pruning) * step_s / self.cost_at(done);
         let against_now = n_anchors as f64 / between(&self.course.anchors, done);
         let later = |share: &f64| *share >= done;
         let most =
             SHARES.iter().zip(self.course.anchors).filter(|(share, _)| later(share)).map(|(_, n)| n * against_now);
-        let grown = if done < SHARES[BEFORE_PRUNING - 1] { self.grown_anchors } else { 0.0 };
-        let most = most.fold(f64::max(n_anchors as f64, grown), f64::max).min(self.most_anchors.max(n_anchors as f64));
+        let most = most.fold(n_anchors as f64, f64::max).min(self.most_anchors.max(n_anchors as f64));
         let end = (self.course.anchors[SHARES.len() - 1] * against_now).min(self.most_anchors);
         Expected {
             minutes: (spent_s + left_s) / 60.0,
@@ -256,7 +302,7 @@ impl Estimate {
     /// The line, and a warning for each limit that the estimate passes and none before it did.
     fn said(&mut self, expected: &Expected) -> String {
         let mut said = format!("{}: {expected}", self.what);
-        if expected.minutes > MANY_MINUTES && !std::mem::replace(&mut self.warned.of_minutes, true) {
+        if expected.minutes > MANY_MINUTES && !std::mem::replace(&mut self.before.warned_of_minutes, true) {
             let fewer = if self.iterations > USUAL_ITERATIONS {
                 format!(" or --iterations {USUAL_ITERATIONS}")
             } else {
@@ -266,7 +312,7 @@ impl Estimate {
         }
         if let Some(machine) = self.machine_bytes
             && expected.memory_bytes > MUCH_MEMORY * machine as f64
-            && !std::mem::replace(&mut self.warned.of_memory, true)
+            && !std::mem::replace(&mut self.before.warned_of_memory, true)
         {
             said += &format!(
                 "\nwarning: the machine has {:.1} GB of memory; {} or --max-anchors N takes less",
@@ -342,12 +388,13 @@ mod tests {
             // So much that what the test's process holds meanwhile is nothing beside.
             memory_per_anchor: 1e7,
             most_anchors,
-            grown_anchors: 2000.0,
+            prunings: Vec::new(),
+            probed_steps: 100.0,
             started: Instant::now(),
             earlier: (0, Instant::now()),
             next: vec![30, 100],
             machine_bytes: Some(1_000_000_000_000),
-            warned: Warned::default(),
+            before: Before::default(),
         }
     }
 
@@ -379,9 +426,24 @@ mod tests {
         // Memory still to come is that of 10,000 anchors, at the end none.
         let to_come = |expected: &Expected| expected.memory_bytes - all.expected(1000, 0.1, 0.0, 100).memory_bytes;
         close(to_come(&start), 1e11);
-        // However few there are, growth goes on to 2,000.
-        close(to_come(&all.expected(0, 0.06, 0.0, 100)), 1.9e10);
+        // Two prunings that take 100 steps each, one of them still to come: a tenth of 1,000 steps at 4.
+        let pruned = Estimate { prunings: vec![0.5, 0.7], ..estimate(f64::INFINITY) };
+        close(pruned.expected(500, 0.24, 600.0, 15_000).minutes, 10.0 + 2.0 + 0.4);
         close(estimate(6000.0).expected(0, 0.06, 0.0, 5000).bundle_bytes, FIXED_BYTES + 6000.0 * 20.0);
+    }
+
+    #[test]
+    fn what_is_drawn_badly_after_the_trial_grows() {
+        // 10·0.1^2.3 = 0.05 of 100,000 pixels; 0.45 of the sum is left.
+        let course = Course::from_points(5000.0, 0.1, 1e5, 30_000);
+        let close = |found: f64, expected: f64| assert!((found / expected - 1.0).abs() < 0.01, "{found}, {expected}");
+        close(course.anchors[4], 2.002);
+        close(course.anchors[7], 0.901);
+        close(course.cost[4], 2.002f64.powf(0.7));
+        // A run of a quarter of 7,000 steps adds half.
+        close(Course::from_points(5000.0, 0.1, 1e5, 1750).anchors[4], 1.501);
+        // All but nothing is left to grow, and three quarters stay.
+        close(Course::from_points(5000.0, 0.01, 1e5, 30_000).anchors[7], 0.75);
     }
 
     #[test]

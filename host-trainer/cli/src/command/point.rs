@@ -26,8 +26,8 @@ pub(super) fn trained(config: &RunConfig, capture: &Capture, device: DeviceChoic
     let (folder, start, device) = match RunStatus::of(&config.output.with_extension("run"), config)? {
         RunStatus::New(folder) => {
             let device = device.open()?;
-            let warned = Estimate::try_out(capture, &config.train, false, device.clone(), stop)?;
-            (folder, Start::New(warned), device)
+            let before = Estimate::try_out(capture, &config.train, false, device.clone(), stop)?;
+            (folder, Start::New(before), device)
         }
         RunStatus::Begun(folder) => (folder, Start::Resumed, device.open()?),
         RunStatus::Finished => {

@@ -20,7 +20,7 @@ use pocketsplat_kernels::step::SharedDevice;
 use pocketsplat_trainer::train::run::{RunFolder, fork};
 
 use super::effects::Resolved;
-use super::estimate::{Estimate, Warned};
+use super::estimate::{Before, Estimate};
 use super::gaussians::GaussiansFile;
 use super::outputs::BUNDLE;
 use super::train_args::Args;
@@ -95,7 +95,7 @@ fn begin(args: &Args) -> Result<ExitCode> {
             say!("going on after iteration {iteration} of {}", run.display());
             Start::Forked(Box::new(trainer))
         }
-        None => Start::New(Warned::default()),
+        None => Start::New(Before::default()),
     };
     let machine = Machine::open(args)?;
     let (overwrite, toml) = (args.overwrite(), config.to_toml()?);
@@ -135,7 +135,7 @@ fn begin_or_go_on(args: &Args) -> Result<ExitCode> {
     let capture = load(&mut config, Some(&path), None)?;
     let code = match RunStatus::of(&path, &config)? {
         RunStatus::New(folder) => {
-            let start = Start::New(Warned::default());
+            let start = Start::New(Before::default());
             train_and_print(args, folder, config, &capture, start, Machine::open(args)?, &output)?
         }
         RunStatus::Begun(folder) => {

@@ -13,7 +13,7 @@ use pocketsplat_trainer::train::run::{Ending, Interval, Method, Newest, Run, Run
 
 use super::loading::keep_points;
 use super::result::{TrainResult, write_bundle};
-use crate::command::estimate::{Estimate, Warned};
+use crate::command::estimate::{Before, Estimate};
 use crate::command::output::json;
 use crate::command::progress::Progress;
 use crate::config::RunConfig;
@@ -28,8 +28,8 @@ pub(super) const IN_RUN_AND_ON_COMMAND_LINE: [&str; 2] = ["in the run", "on the 
 /// Where a run begins.
 #[derive(Debug)]
 pub(crate) enum Start<'a> {
-    /// With the capture's points; what the user was warned of when the run was tried out.
-    New(Warned),
+    /// With the capture's points; what its estimate is told of the trial.
+    New(Before),
     /// With the newest checkpoint of its folder.
     Resumed,
     /// With the state of another run.
@@ -97,7 +97,7 @@ pub(crate) fn begun_or_new<'a>(path: &Path, config: &RunConfig, overwrite: bool)
             ),
         }
     }
-    Ok((RunFolder::start(path, &config.to_toml()?, overwrite)?, Start::New(Warned::default())))
+    Ok((RunFolder::start(path, &config.to_toml()?, overwrite)?, Start::New(Before::default())))
 }
 
 /// Trains in a run folder and writes the bundle to `output`; `None` when it was to stop before the end.
@@ -115,7 +115,7 @@ pub(crate) fn train_in<'a>(
     let sizes = config.encoding.sizes(capture);
     let measure = sizes.as_ref().map(EncodedSizes::measure);
     let limits = sizes.as_ref().zip(measure.as_ref()).map(|(sizes, measure)| sizes.probe(measure));
-    let warned = if let Start::New(warned) = start { warned } else { Warned::default() };
+    let before = if let Start::New(before) = start { before } else { Before::default() };
     let trainer = match start {
         Start::New(_) => Trainer::new(capture, config.train)?,
         Start::Resumed => resumed(&folder, config.train, capture, |trainer: &mut Trainer<'_>| {
@@ -137,7 +137,7 @@ pub(crate) fn train_in<'a>(
     for at in folder.missed_forks(trainer.iteration())? {
         say!("warning: --fork-at {at} keeps nothing, for the run stands after iteration {}", trainer.iteration());
     }
-    let estimate = Estimate::new(capture, &config.train, trainer.iteration(), warned);
+    let estimate = Estimate::new(capture, &config.train, trainer.iteration(), before);
     let mut progress = Progress::new(trainer.iteration(), config.train.iterations).estimating(estimate);
     let how_to_go_on = goes_on.said(&path);
     let ended =

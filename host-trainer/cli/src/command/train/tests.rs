@@ -52,7 +52,7 @@ fn a_run_on_decoded_photographs_is_interrupted_resumed_and_ends_in_the_same_byte
     let to = output(&in_memory);
     let folder = RunFolder::start(&in_memory.output.with_extension("run"), "", false).unwrap();
     let result =
-        train_in(folder, &in_memory, &capture, Start::New(Warned::default()), attempt(&stop), &to).unwrap().unwrap();
+        train_in(folder, &in_memory, &capture, Start::New(Before::default()), attempt(&stop), &to).unwrap().unwrap();
     assert_eq!(result.photographs_waited_share, None);
     let expected = fs::read(&in_memory.output).unwrap();
 
@@ -70,7 +70,7 @@ fn a_run_on_decoded_photographs_is_interrupted_resumed_and_ends_in_the_same_byte
     let folder = RunFolder::start(&run, "", false).unwrap();
     let ended = std::thread::scope(|scope| {
         let training = scope
-            .spawn(|| train_in(folder, &cached, &capture, Start::New(Warned::default()), attempt(&stop), &to).unwrap());
+            .spawn(|| train_in(folder, &cached, &capture, Start::New(Before::default()), attempt(&stop), &to).unwrap());
         while !run.join("iteration-00000020.checkpoint").exists() && !training.is_finished() {
             std::thread::sleep(Duration::from_millis(1));
         }

@@ -9,6 +9,10 @@ use pocketsplat_kernels::ops::rate::noise::Stream;
 use pocketsplat_kernels::scene::Scene;
 use pocketsplat_kernels::step::{LossWeights, Workspace};
 
+/// Views that are probed at most: more of them change which anchors go, but not what a byte buys
+/// (docs/experiments/2026-11-28-fewer-anchors-and-pixels.md).
+const MOST_VIEWS: usize = 100;
+
 /// Branch of the run's stream that probes draw their signs from.
 const PROBES: u32 = 0x50_52_4f_42;
 
@@ -34,7 +38,7 @@ pub struct Probe<'a> {
 }
 
 impl Probe<'_> {
-    /// Probes every training view once with random signs, see [`Workspace::probe`].
+    /// Probes training views with random signs, see [`Workspace::probe`]: all of them, or every second, third, …, so that there are at most 100.
     ///
     /// An anchor's derivatives are summed over its offsets before they are squared: their images overlap.
     ///
@@ -58,6 +62,8 @@ impl Probe<'_> {
         let (mut squared_sum, mut n_values, mut loss) = (0.0, 0, 0.0);
         let mut photographs = self.photographs.beside();
         let TrainingViews { all, cameras, trained } = self.views;
+        let every = trained.len().div_ceil(MOST_VIEWS).max(1);
+        let trained: Vec<u32> = trained.iter().copied().step_by(every).collect();
         for (view, at) in (0u32..).zip(0..trained.len()) {
             let photograph = photographs.photograph(all, trained[at..].iter().copied())?;
             let target = target(&photograph, &cameras[trained[at] as usize], self.background);

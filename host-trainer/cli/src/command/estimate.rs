@@ -8,19 +8,22 @@ use anyhow::Result;
 use pocketsplat_capture::dataset::{Capture, PointsOrigin};
 use pocketsplat_kernels::step::SharedDevice;
 use pocketsplat_trainer::effects::PILOTS_TIME_SHARE;
+use pocketsplat_trainer::train::worth::probed;
 use pocketsplat_trainer::train::{TrainConfig, Trainer};
 
 use super::process::{machine_memory_bytes, peak_memory_bytes};
 use crate::config::Preset;
 use crate::say::say;
 
-/// A trial ends after so many steps, or seconds. Every offset begins drawn: its first steps take twice as long as those that follow, so
-/// that only the last are timed.
-const TRIAL_STEPS: usize = 64;
+/// A run's first steps draw every offset and take twice as long as those that follow, so that only the last of the trial are timed. It ends after so
+/// many steps, or after so many seconds once it has had the fewest that say something of the loss; and before the first event of the run.
+const TRIAL_STEPS: u32 = 64;
+const FEWEST_STEPS: usize = 24;
 const TRIAL_SECONDS: f64 = 4.0;
+const BEFORE_EVENTS: f64 = 0.05;
 const TIMED_STEPS: usize = 8;
-/// Iterations of a resumed run, which has no trial, after which the estimate is first shown; then at these shares of the run. The last comes after
-/// the first pruning, at 0.5: the pruning itself takes time, and the number of anchors drops with it.
+/// Iterations after which the estimate of a run without a trial is first shown; then at these shares of the run. The last comes after the first
+/// pruning, at 0.5: the pruning itself takes time, and the number of anchors drops with it.
 const FIRST: u32 = 30;
 const AGAIN_AT: [f64; 3] = [0.1, 0.25, 0.55];
 
@@ -40,21 +43,20 @@ const GROWTH_OF_LOSS: f64 = 10.0;
 const GROWTH_POWER: f64 = 2.3;
 /// Iterations that this takes; a shorter run adds the root of its share.
 const GROWN_AFTER: f64 = 7000.0;
-/// Of the anchors that there are when growth ends, pruning leaves this share over that loss, within [`LEFT`].
+/// Pruning leaves this share over that loss of the anchors at the end of growth, within [`LEFT`].
 const LEFT_OVER_LOSS: f64 = 0.045;
 const LEFT: [f64; 2] = [0.2, 0.75];
 /// The loss after the trial where there was none.
 const USUAL_LOSS: f64 = 0.1;
 /// The time of a step goes with the number of anchors to this power.
 const POWER_OF_ANCHORS: f64 = 0.7;
-/// Views that a pruning by rate and distortion probes at most, and what each takes of a step.
-const PROBED_VIEWS: usize = 100;
+/// What a view that a pruning by rate and distortion probes takes of a step.
 const PROBE_COST: f64 = 0.65;
 
 /// Bytes of a bundle besides its anchors: heads, context, container.
 const FIXED_BYTES: f64 = 40e3;
 
-/// How a run goes on, against its first steps.
+/// How a run goes on, against the last steps of its trial.
 struct Course {
     /// Time of a step at [`SHARES`] of the run.
     cost: [f64; SHARES.len()],
@@ -76,7 +78,7 @@ const FROM_RANDOM: Course =
 impl Course {
     /// From points of the scene.
     ///
-    /// * `n`: anchors at first. * `loss`: after the trial. * `n_pixels`: of an image.
+    /// * `n`: anchors, and * `loss`: after the trial. * `n_pixels`: of an image.
     fn from_points(n: f64, loss: f64, n_pixels: f64, iterations: u32) -> Self {
         let grown_share = (f64::from(iterations) / GROWN_AFTER).min(1.0).sqrt();
         let added = grown_share * GROWTH_OF_LOSS * loss.powf(GROWTH_POWER) * n_pixels / n.max(1.0);
@@ -93,6 +95,12 @@ impl Course {
         };
         Self { cost: goes_on(&self.cost), anchors: goes_on(&self.anchors) }
     }
+}
+
+/// The mean of the last [`TIMED_STEPS`] values; 0 without any.
+fn mean_of_last(values: &[f64]) -> f64 {
+    let last = &values[values.len().saturating_sub(TIMED_STEPS)..];
+    last.iter().sum::<f64>() / last.len().max(1) as f64
 }
 
 /// The value at share `at` on straight lines between [`SHARES`].
@@ -130,7 +138,7 @@ pub(super) struct Estimate {
     before: Before,
 }
 
-/// What a few steps showed.
+/// What a trial showed.
 #[derive(Clone, Copy, Debug)]
 struct Trial {
     n_anchors: usize,
@@ -185,8 +193,8 @@ impl Estimate {
             iterations,
             bytes_per_anchor: bytes_per_anchor(config),
             memory_per_anchor: 140.0 * values,
-            prunings: config.modules.rdo.map_or_else(Vec::new, |rdo| vec![rdo.from, rdo.until]),
-            probed_steps: PROBE_COST * capture.train.len().min(PROBED_VIEWS) as f64,
+            prunings: config.modules.rdo.map_or_else(Vec::new, |rdo| rdo.shares().collect()),
+            probed_steps: PROBE_COST * probed(0..capture.train.len()).count() as f64,
             most_anchors: config.densification.max_anchors.map_or(f64::INFINITY, |most| most as f64),
             started: Instant::now(),
             earlier: (from, Instant::now()),
@@ -196,7 +204,7 @@ impl Estimate {
         }
     }
 
-    /// Measures a few steps of a new run, which are not kept, and says what it will take; returns what the run's own estimate is told.
+    /// Tries a new run for some steps, which are not kept, and says what it will take; returns what the run's own estimate is told.
     ///
     /// * `with_pilots`: whether pilots will measure its effects first. * `stop`: looked at after every step; once it is set, nothing
     ///   is said.
@@ -218,7 +226,7 @@ impl Estimate {
         Ok(estimate.before)
     }
 
-    /// What a new run will take, from a few steps that are not kept.
+    /// What a new run will take, from some steps that are not kept.
     ///
     /// * `stop`: looked at after every step; once it is set, the figures mean nothing.
     ///
@@ -232,31 +240,34 @@ impl Estimate {
     ) -> Result<(Self, Expected)> {
         let mut trainer = Trainer::new(capture, *config)?;
         trainer.set_device(device);
-        let (started, mut steps) = (Instant::now(), Vec::new());
-        while steps.len() < TRIAL_STEPS && started.elapsed().as_secs_f64() < TRIAL_SECONDS && !trainer.is_done() {
-            if stop.load(Ordering::Relaxed) {
+        let (started, mut steps, mut losses) = (Instant::now(), Vec::new(), Vec::new());
+        for _ in 0..config.iteration_at(BEFORE_EVENTS).clamp(1, TRIAL_STEPS) {
+            let is_enough = steps.len() >= FEWEST_STEPS && started.elapsed().as_secs_f64() > TRIAL_SECONDS;
+            if is_enough || stop.load(Ordering::Relaxed) {
                 break;
             }
             let began = Instant::now();
             let loss = f64::from(trainer.advance()?.report.loss);
-            steps.push((began.elapsed().as_secs_f64(), loss));
+            steps.push(began.elapsed().as_secs_f64());
+            // One that was dropped may have none.
+            losses.extend(Some(loss).filter(|loss| loss.is_finite()));
         }
-        let timed = &steps[steps.len().saturating_sub(TIMED_STEPS)..];
-        let mean = |of: fn(&(f64, f64)) -> f64| timed.iter().map(of).sum::<f64>() / timed.len().max(1) as f64;
         let n_anchors = trainer.scene().anchors.len();
-        let trial = Trial { n_anchors, loss: mean(|(_, loss)| *loss) };
+        let loss = if losses.len() < FEWEST_STEPS { USUAL_LOSS } else { mean_of_last(&losses) };
+        let trial = Trial { n_anchors, loss };
         let estimate = Self::new(capture, config, 0, Before { trial: Some(trial), ..Before::default() });
-        let expected = estimate.expected(0, mean(|(seconds, _)| *seconds), 0.0, n_anchors);
+        let expected = estimate.expected(0, mean_of_last(&steps), 0.0, n_anchors);
         Ok((estimate, expected))
     }
 
     /// Hears of an iteration that is done, and says what the run will take when it is time to.
     pub(super) fn step(&mut self, iteration: u32, n_anchors: usize, say: impl FnOnce(&str)) {
-        // The rate of the last hundred steps or so: growth changes it, and so does the size of images.
-        if (iteration.is_multiple_of(100) && !self.next.contains(&iteration)) || iteration == self.n_half_size {
-            self.earlier = (iteration, Instant::now());
-        }
-        if self.next.first().is_none_or(|next| iteration < *next) {
+        let is_due = self.next.first().is_some_and(|next| iteration >= *next);
+        if !is_due {
+            // The rate of the last hundred steps or so: growth changes it, and so does the size of images.
+            if iteration.is_multiple_of(100) || iteration == self.n_half_size {
+                self.earlier = (iteration, Instant::now());
+            }
             return;
         }
         self.next.retain(|next| *next > iteration);
@@ -265,7 +276,7 @@ impl Estimate {
         say(&self.said(&expected));
     }
 
-    /// Time of a step at this share of the run, against the first steps on whole images.
+    /// Time of a step at this share of the run, against the last of the trial, were it on whole images.
     fn cost_at(&self, share: f64) -> f64 {
         let is_half = share * f64::from(self.iterations) < f64::from(self.n_half_size);
         let size = if is_half { HALF_SIZE_COST } else { 1.0 };

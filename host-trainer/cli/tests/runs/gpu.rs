@@ -117,6 +117,12 @@ fn bench_measures_every_device_and_number_of_threads() {
         rows.iter().all(|row| row["step_ms"].as_f64().unwrap() > 0.0 && row["pairs"].as_u64().unwrap() > 0),
         "{found}"
     );
+    let n = |row: &serde_json::Value, key: &str| row[key].as_u64().unwrap();
+    for scene in ["plain", "coded"] {
+        let row = rows.iter().find(|row| row["scene"] == scene).unwrap();
+        assert!(n(row, "resident") >= n(row, "active") && n(row, "evaluated") >= n(row, "blended"), "{row}");
+        assert!(n(row, "blended") > 0, "{row}");
+    }
     let error = fails(pocketsplat().args(["bench", "--steps", "0"]));
     assert!(error.contains("--steps is 0"), "{error}");
 }

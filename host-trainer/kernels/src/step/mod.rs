@@ -24,7 +24,7 @@ use rayon::prelude::*;
 
 use crate::ops::Pinhole;
 use crate::ops::image::project::{Footprint, Splat};
-use crate::ops::image::rasterise::{BlendCounts, TiledImage};
+use crate::ops::image::rasterise::{DrawCounts, TiledImage};
 use crate::ops::image::{prefilter, rasterise, tiles};
 use crate::ops::loss::volume;
 use crate::ops::simd::Level;
@@ -256,8 +256,8 @@ impl<R: Real> Workspace<R> {
         self.draw(scene, camera, background, &Coding::Raw, None, 0.0).image.to_planes(camera.size_px)
     }
 
-    /// What drawing a view is to the rasteriser, in numbers of pixels.
-    pub fn count(&mut self, scene: &Scene<R>, camera: &Pinhole<R>) -> BlendCounts {
+    /// What drawing a view is to the rasteriser.
+    pub fn count(&mut self, scene: &Scene<R>, camera: &Pinhole<R>) -> DrawCounts {
         let SplatsOfView { splats, footprints, .. } = self.splats_of(scene, camera, &Coding::Raw, None, 0.0);
         rasterise::count(&splats, &footprints, &tiles::build(&splats, &footprints, camera.size_px))
     }

@@ -44,7 +44,7 @@ pub enum Rank {
     Opacity,
     /// Σ of α·T over the pixels of all training views: what it contributes to the images.
     Contribution,
-    /// Squared error that its removal adds to the training views, for each of its bits; needs a rate.
+    /// Squared error that its removal adds to the [probed](crate::train::worth::probed) training views, for each of its bits; needs a rate.
     Worth,
 }
 

@@ -43,7 +43,7 @@ impl Default for Rdo {
 
 impl Rdo {
     /// Shares of the run after which events come.
-    fn shares(&self) -> impl Iterator<Item = f64> {
+    pub fn shares(&self) -> impl Iterator<Item = f64> {
         let spacing = (self.until - self.from) / f64::from(self.events.max(2) - 1);
         let Self { from, .. } = *self;
         (0..self.events).map(move |event| from + spacing * f64::from(event))

@@ -4,7 +4,7 @@ pub mod bits;
 mod probe;
 
 pub use bits::Bits;
-pub use probe::Probe;
+pub use probe::{Probe, probed};
 
 /// Bits of an anchor beside its values: its place in the octree and its masks. (Lego at 100 px, 17,494 anchors: 15.7 and
 /// 5.8.)
@@ -13,7 +13,7 @@ const ANCHOR_OVERHEAD_BITS: f64 = 22.0;
 /// What each offset and each anchor gives and takes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Worth {
-    /// `[n, K]` mean squared error, over pixels, channels and views, that its removal adds; 0 where it is not drawn.
+    /// `[n, K]` mean squared error, over pixels, channels and [probed] views, that its removal adds; 0 where it is not drawn.
     pub of_offsets: Vec<f64>,
     /// `[n]` the same of all offsets of an anchor together.
     pub of_anchors: Vec<f64>,

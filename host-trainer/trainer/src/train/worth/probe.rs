@@ -9,12 +9,15 @@ use pocketsplat_kernels::ops::rate::noise::Stream;
 use pocketsplat_kernels::scene::Scene;
 use pocketsplat_kernels::step::{LossWeights, Workspace};
 
-/// Views that are probed at most: more of them change which anchors go, but not what a byte buys
-/// (docs/experiments/2026-11-28-fewer-anchors-and-pixels.md).
-const MOST_VIEWS: usize = 100;
-
 /// Branch of the run's stream that probes draw their signs from.
 const PROBES: u32 = 0x50_52_4f_42;
+
+/// The views, of all that are trained on, which a pass probes: all up to 100, else every second, third or fourth. More of them change which anchors
+/// go, but not what a byte buys; fewer than every fourth were not tried (docs/experiments/2026-11-28-fewer-anchors-and-pixels.md).
+pub fn probed<I: ExactSizeIterator>(views: I) -> impl Iterator<Item = I::Item> {
+    let every = views.len().div_ceil(100).clamp(1, 4);
+    views.step_by(every)
+}
 
 /// A run between two iterations, as far as its views are probed.
 #[derive(Clone, Copy, Debug)]
@@ -38,7 +41,7 @@ pub struct Probe<'a> {
 }
 
 impl Probe<'_> {
-    /// Probes training views with random signs, see [`Workspace::probe`]: all of them, or every second, third, …, so that there are at most 100.
+    /// Probes training views with random signs, see [`Workspace::probe`]: those of [`probed`].
     ///
     /// An anchor's derivatives are summed over its offsets before they are squared: their images overlap.
     ///
@@ -62,8 +65,7 @@ impl Probe<'_> {
         let (mut squared_sum, mut n_values, mut loss) = (0.0, 0, 0.0);
         let mut photographs = self.photographs.beside();
         let TrainingViews { all, cameras, trained } = self.views;
-        let every = trained.len().div_ceil(MOST_VIEWS).max(1);
-        let trained: Vec<u32> = trained.iter().copied().step_by(every).collect();
+        let trained: Vec<u32> = probed(trained.iter().copied()).collect();
         for (view, at) in (0u32..).zip(0..trained.len()) {
             let photograph = photographs.photograph(all, trained[at..].iter().copied())?;
             let target = target(&photograph, &cameras[trained[at] as usize], self.background);

@@ -17,7 +17,7 @@ mod row;
 mod tests;
 
 pub use backward::{background_gradient, backward, backward_through};
-pub use count::{BlendCounts, count};
+pub use count::{DrawCounts, count};
 pub use forward::{forward, forward_into};
 pub use image::TiledImage;
 

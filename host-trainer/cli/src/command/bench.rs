@@ -102,15 +102,16 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     for n_splats in &args.splats {
         for step in [Step::plain(*n_splats), Step::coded(*n_splats)] {
             for size in &args.sizes {
+                let counts = step.counts(*size);
                 for threads in &threads {
                     say!("{n_splats} splats, {}, {size}, cpu, {threads} threads", step.name);
-                    rows.push(measure(&step, *size, args.steps, *threads, None)?);
+                    rows.push(measure(&step, *size, counts, args.steps, *threads, None)?);
                 }
                 for index in &gpus {
                     say!("{n_splats} splats, {}, {size}, gpu:{index}", step.name);
                     let measured = DeviceChoice::Gpu(Some(*index))
                         .open_silently()
-                        .and_then(|device| measure(&step, *size, args.steps, most, device));
+                        .and_then(|device| measure(&step, *size, counts, args.steps, most, device));
                     // What one device has no room for, another may have.
                     match measured {
                         Ok(row) => rows.push(row),
@@ -143,6 +144,18 @@ impl Step {
         let scene = bench_scene::coded(n_anchors(n_splats, bench_scene::SPLATS_PER_CODED_ANCHOR));
         Self { name: "coded", scene, coding: bench_scene::coding() }
     }
+
+    fn counts(&self, size: FrameSize) -> Counts {
+        let (anchors, camera) = (&self.scene.anchors, camera_of(size));
+        let DrawCounts { splats: active, pairs, evaluated, blended } =
+            Workspace::new(&self.scene.shape).count(&self.scene, &camera);
+        let resident = (0..anchors.mask_logits.len()).filter(|offset| anchors.is_drawn(*offset)).count();
+        Counts { resident, active, pairs, evaluated, blended }
+    }
+}
+
+fn camera_of(size: FrameSize) -> Pinhole<f32> {
+    Pinhole::new(&bench_scene::camera([size.width_px, size.height_px]))
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of anchors")]
@@ -153,13 +166,14 @@ fn n_anchors(n_splats: usize, splats_per_anchor: f64) -> usize {
 fn measure(
     step: &Step,
     size: FrameSize,
+    counts: Counts,
     n_steps: usize,
     threads: usize,
     device: Option<SharedDevice<f32>>,
 ) -> Result<Row> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.with_context(|| format!("could not start {threads} threads"))?;
-    let camera = Pinhole::new(&bench_scene::camera([size.width_px, size.height_px]));
+    let camera = camera_of(size);
     let n_values = 3 * camera.size_px[0] * camera.size_px[1];
     // Bytes without a pattern.
     let truth = (0..n_values as u32).map(|i| f32::from((i.wrapping_mul(2_654_435_761) >> 24) as u8) / 255.0).collect();
@@ -171,11 +185,9 @@ fn measure(
     let (half_way, extent) = (0.5, 5.0);
     let mut optimiser = Optimiser::new(scene);
     pool.install(|| {
-        let mut workspace = Workspace::new(&scene.shape);
-        let DrawCounts { splats: active, pairs, evaluated, blended } = workspace.count(scene, &camera);
         let (name, timed) = match device {
             None => {
-                let mut moving = scene.clone();
+                let (mut moving, mut workspace) = (scene.clone(), Workspace::new(&scene.shape));
                 let timed = after_one(n_steps, || {
                     let report = workspace.try_step(&moving, &target, &loss, coding)?;
                     let stepped = Instant::now();
@@ -210,8 +222,6 @@ fn measure(
                 (name, timed)
             }
         };
-        let resident = (0..scene.anchors.mask_logits.len()).filter(|offset| scene.anchors.is_drawn(*offset)).count();
-        let counts = Counts { resident, active, pairs, evaluated, blended };
         Ok(row(name, threads, step.name, size, counts, &timed))
     })
 }

@@ -37,7 +37,7 @@ const CRATES: [(&str, &[&str]); 13] = [
         ],
     ),
     ("host-trainer/kernels/src", &["real", "finite_difference", "camera", "scene", "ops", "integer_model", "step"]),
-    ("host-trainer/metrics/src", &["baseline", "pchip", "bjontegaard", "seeds", "psnr", "ssim", "lpips"]),
+    ("host-trainer/metrics/src", &["baseline", "pchip", "bjontegaard", "seeds", "psnr", "colour", "ssim", "lpips"]),
     (
         "host-trainer/gpu/src",
         &[
@@ -79,6 +79,7 @@ const FOLDERS: [(&str, &str, &[&str]); 4] = [
             "read_ahead",
             "error",
             "views",
+            "exposures",
             "optimiser",
             "density",
             "context",

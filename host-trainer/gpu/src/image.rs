@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 
 use super::ops::image::rasterise::Rasterise;
 use super::ops::image::tiles::Tiles;
+use super::ops::loss::exposure::{Exposures, N_SUMS};
 use super::ops::loss::high_pass::HighPass;
 use super::ops::loss::l1::L1;
 use super::ops::loss::ssim::Ssim;
@@ -21,7 +22,9 @@ const DIFFERENCES: usize = 1;
 const BACKGROUND: usize = 3;
 /// First place of sums that others write.
 pub(super) const FIRST_FREE_TOTAL: usize = 6;
-const N_TOTALS: usize = 24;
+/// Those of the exposure come last.
+const EXPOSURE: usize = 24;
+const N_TOTALS: usize = EXPOSURE + N_SUMS;
 
 /// Kernels and buffers of the stages.
 #[derive(Debug)]
@@ -32,6 +35,7 @@ pub(super) struct GpuImage {
     rasterise: Rasterise,
     ssim: Ssim,
     l1: L1,
+    exposures: Exposures,
     high_pass: HighPass,
     clear_masked: ClearMasked,
     size_px: [usize; 2],
@@ -40,6 +44,8 @@ pub(super) struct GpuImage {
     pub(super) footprints: Buffer<Footprint<f32>>,
     pub(super) d_splats: Buffer<Splat<f32>>,
     image: Buffer<f32>,
+    /// The same under the exposure of its photograph, where that has one.
+    shown: Buffer<f32>,
     transmittance: Buffer<f32>,
     d_image: Buffer<f32>,
     /// Sums over the view.
@@ -59,6 +65,7 @@ impl GpuImage {
             rasterise: Rasterise::new(gpu)?,
             ssim: Ssim::new(gpu)?,
             l1: L1::new(gpu)?,
+            exposures: Exposures::new(gpu)?,
             high_pass: HighPass::new(gpu)?,
             clear_masked: ClearMasked::new(gpu),
             size_px: [0; 2],
@@ -66,6 +73,7 @@ impl GpuImage {
             footprints: Buffer::zeros(gpu, "extents of splats", 1)?,
             d_splats: Buffer::zeros(gpu, "gradients of splats", 1)?,
             image: Buffer::zeros(gpu, "pixels of the image", 1)?,
+            shown: Buffer::zeros(gpu, "pixels under an exposure", 1)?,
             transmittance: Buffer::zeros(gpu, "transmittances of the image", 1)?,
             d_image: Buffer::zeros(gpu, "gradients of the image", 1)?,
             totals: Buffer::zeros(gpu, "sums", N_TOTALS)?,
@@ -124,8 +132,30 @@ impl GpuImage {
         weights: &LossWeights,
     ) -> Result<(), GpuError> {
         self.keep(view)?;
-        let Self { gpu, ssim, l1, clear_masked, image, d_image, totals, photographs, other, size_px, .. } = self;
+        let Self {
+            gpu,
+            ssim,
+            l1,
+            exposures,
+            clear_masked,
+            image,
+            shown,
+            d_image,
+            totals,
+            photographs,
+            other,
+            size_px,
+            ..
+        } = self;
         let target = Self::kept(photographs, other, view);
+        if let Some(exposure) = &view.exposure {
+            exposures.sums(gpu, commands, image, target, totals, EXPOSURE)?;
+            if !exposure.is_none() {
+                shown.fit(gpu, image.len())?;
+                exposures.apply(commands, exposure, image, shown);
+            }
+        }
+        let image = if is_shifted(view) { &*shown } else { &*image };
         clear_masked.run(commands, target, image);
         ssim.forward(gpu, commands, image, target, *size_px, totals, SIMILARITY)?;
         l1.forward(gpu, commands, image, target, totals, DIFFERENCES)?;
@@ -142,14 +172,18 @@ impl GpuImage {
         weight: f64,
         first_total: usize,
     ) -> Result<(), GpuError> {
-        let Self { gpu, high_pass, image, d_image, totals, photographs, other, size_px, .. } = self;
+        let Self { gpu, high_pass, image, shown, d_image, totals, photographs, other, size_px, .. } = self;
         let target = Self::kept(photographs, other, view);
+        let image = if is_shifted(view) { &*shown } else { &*image };
         high_pass.forward_backward(gpu, commands, image, target, *size_px, weight, d_image, totals, first_total)
     }
 
     /// Pixels that do not count get no gradient.
     pub(super) fn mask_gradient(&self, commands: &mut Commands<'_>, view: &TargetView<'_, f32>) {
         self.clear_masked.run(commands, Self::kept(&self.photographs, &self.other, view), &self.d_image);
+        if let Some(exposure) = view.exposure.as_ref().filter(|exposure| !exposure.is_none()) {
+            self.exposures.backward(commands, exposure, &self.d_image);
+        }
     }
 
     /// From the gradient of the image to those of the splats and of the background.
@@ -166,12 +200,13 @@ impl GpuImage {
     }
 
     /// What the sums say of the comparison.
-    pub(super) fn loss_of(&self, totals: &[f32]) -> ImageLoss<f32> {
+    pub(super) fn loss_of(&self, totals: &[f32], target: &TargetView<'_, f32>) -> ImageLoss<f32> {
         let n_values = self.n_values() as f32;
         ImageLoss {
             l1: totals[DIFFERENCES] / n_values,
             similarity: totals[SIMILARITY] / n_values,
             squared_sum: totals[DIFFERENCES + 1].into(),
+            exposure: target.exposure.map(|_| Exposures::sums_of(&totals[EXPOSURE..])),
         }
     }
 
@@ -185,11 +220,11 @@ impl GpuImage {
         let mut commands = Commands::new(&gpu);
         self.differ(&mut commands, view, weights)?;
         commands.submit()?;
-        Ok(self.loss_of(&self.totals.read(&gpu)?))
+        Ok(self.loss_of(&self.totals.read(&gpu)?, view))
     }
 
     fn add_term_with(&mut self, view: &TargetView<'_, f32>, term: &mut ImageTerm<'_, f32>) -> Result<f32, GpuError> {
-        let image = self.image.read(&self.gpu)?;
+        let image = if is_shifted(view) { &self.shown } else { &self.image }.read(&self.gpu)?;
         let mut d_image = self.d_image.read(&self.gpu)?;
         let pair = ImagePair { image: &image, truth: view.truth(), size_px: self.size_px, level: self.level };
         let value = term(&pair, &mut d_image);
@@ -220,6 +255,11 @@ impl GpuImage {
         self.run(Self::rasterise_backward)?;
         Ok((self.d_splats.read(&self.gpu)?, Self::d_background_of(&self.totals.read(&self.gpu)?)))
     }
+}
+
+/// Whether a photograph is compared with something else than what is drawn.
+fn is_shifted(view: &TargetView<'_, f32>) -> bool {
+    view.exposure.is_some_and(|exposure| !exposure.is_none())
 }
 
 impl ImageStages<f32> for GpuImage {

@@ -15,7 +15,7 @@ use pocketsplat_codec::render::decoder::{core_image, core_image_of_tiers};
 use pocketsplat_codec::render::reference::{ReferenceScene, to_image};
 use pocketsplat_format::Bundle;
 use pocketsplat_format::bundle::crc32;
-use pocketsplat_metrics::{Lpips, half_size_enlarged, psnr_db, psnr_db_masked, ssim_masked};
+use pocketsplat_metrics::{Lpips, colour_corrected, half_size_enlarged, psnr_db, psnr_db_masked, ssim_masked};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -86,6 +86,9 @@ pub(crate) struct Evaluation {
     #[serde(default)]
     pub(crate) program: String,
     pub(crate) psnr_db: f64,
+    /// With the colours of each frame brought to its photograph's by an affine map: the field's "cc".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) cc_psnr_db: Option<f64>,
     pub(crate) ssim: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) lpips: Option<f64>,
@@ -134,6 +137,8 @@ pub(crate) struct Evaluation {
 pub(crate) struct ViewEvaluation {
     pub(crate) name: String,
     pub(crate) psnr_db: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) cc_psnr_db: Option<f64>,
     pub(crate) ssim: f64,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) lpips: Option<f64>,
@@ -195,6 +200,7 @@ struct DrawnView {
     seconds: f64,
     scratch_bytes: usize,
     psnr_db: f64,
+    cc_psnr_db: f64,
     ssim: f64,
     lpips: Option<f64>,
     psnr_to_reference_db: f64,
@@ -282,6 +288,7 @@ pub(crate) fn measure(
     Ok(Evaluation {
         program: program::of_figures(trained.as_deref()),
         psnr_db: mean(&rows, |row| row.psnr_db),
+        cc_psnr_db: Some(mean(&rows, |row| row.cc_psnr_db)),
         ssim: mean(&rows, |row| row.ssim),
         lpips: lpips_mean,
         lpips_of: lpips.map(lpips_of),
@@ -327,6 +334,7 @@ fn drawn_views(
             seconds,
             scratch_bytes,
             psnr_db: psnr_db_masked(&image, truth, mask),
+            cc_psnr_db: psnr_db_masked(&colour_corrected(&image, truth, mask), truth, mask),
             ssim: ssim_masked(&image, truth, mask),
             lpips: None,
             psnr_to_reference_db: to_reference(&image, view),
@@ -361,6 +369,7 @@ fn view_evaluations(rows: &[DrawnView], views: &[View]) -> (Option<f64>, Vec<Vie
     let of_view = |(row, view): (&DrawnView, &View)| ViewEvaluation {
         name: view.name.clone(),
         psnr_db: row.psnr_db,
+        cc_psnr_db: Some(row.cc_psnr_db),
         ssim: row.ssim,
         lpips: row.lpips,
     };

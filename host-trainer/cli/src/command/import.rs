@@ -12,6 +12,7 @@ use pocketsplat_core::Budget;
 use pocketsplat_files::shell_word;
 use pocketsplat_trainer::explicit::bulk::Bulk;
 use pocketsplat_trainer::explicit::pictures::{Pictures, capture};
+use pocketsplat_trainer::train::config::ExposureChoice;
 use pocketsplat_trainer::train::run::RunFolder;
 use serde::Serialize;
 
@@ -166,6 +167,8 @@ fn configured(args: &Args) -> Result<RunConfig> {
     config.train.iterations = ITERATIONS;
     config.train.seed = args.seed;
     config.effects.auto = false;
+    // Pictures drawn of one scene.
+    config.train.exposure = ExposureChoice::Off;
     args.quality.apply_to(&mut config)?;
     if config.effects.auto {
         bail!("import measures no effects; name them, as --effects +view-colour, and leave auto to train");

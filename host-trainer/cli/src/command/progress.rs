@@ -8,6 +8,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use pocketsplat_kernels::scene::Scene;
 use pocketsplat_kernels::step::StepReport;
 use pocketsplat_trainer::explicit::train::CloudOutcome;
+use pocketsplat_trainer::train::exposures::ExposureDecision;
 use pocketsplat_trainer::train::limits::{Fit, LimitShares};
 use pocketsplat_trainer::train::{DroppedStep, Observer};
 
@@ -146,6 +147,15 @@ impl Observer for Progress {
             format!(", before lambda goes from {:.2e} to {:.2e}", fit.former_lambda, fit.lambda)
         };
         self.say(&format!("to fit: {} anchors, which take {}{lambda}", fit.n_anchors, shares.join(", ")));
+    }
+
+    fn exposed(&mut self, decided: &ExposureDecision) {
+        if decided.in_force {
+            self.say(&format!(
+                "exposure: the photographs differ by {:.2} stops (root mean square); the scene shows their mean from here on",
+                decided.stops
+            ));
+        }
     }
 
     fn unwritten(&mut self, why: &dyn std::error::Error) {

@@ -1,6 +1,7 @@
 //! `pocketsplat report`: a page about a finished run.
 
 pub(super) mod amounts;
+mod exposures;
 mod pictures;
 mod sections;
 
@@ -17,6 +18,7 @@ use super::capture::CaptureArgs;
 use super::eval::{Evaluation, Measurements, Renderer, measure};
 use super::output;
 use super::outputs::{self, OverwriteArgs, check_name, reading_capture};
+use super::train::result::ViewExposure;
 use crate::config::{CaptureOptions, RunConfig};
 use crate::plot::{Recording, learning_curve_svg};
 use crate::say::say;
@@ -56,6 +58,7 @@ struct RunResult {
     train_s: f64,
     train_processor_s: f64,
     peak_memory_bytes: Option<u64>,
+    exposures: Option<Vec<ViewExposure>>,
 }
 
 /// A run and its bundle, and the photographs where they are at hand.
@@ -149,7 +152,7 @@ fn html(run: &Run<'_>) -> Result<String> {
         ("CURVES", curves(run.folder, run.result.iterations)?),
         ("BYTES", sections::bytes(&bundle)?),
         ("TIERS", sections::tiers(&bundle)?),
-        ("EFFECTS", sections::effects(run.folder)?),
+        ("EFFECTS", sections::effects(run.folder)? + &exposures::section(run.result.exposures.as_deref())?),
         ("VIEWS", sections::views(run)),
         ("PROTOCOL", sections::protocol(run)?),
     ];

@@ -32,7 +32,7 @@ pub(crate) struct QualityOptions {
     #[arg(long, value_name = "N", help_heading = QUALITY)]
     iterations: Option<u32>,
     /// Effects to train: auto, which tests them in runs of 16,000 iterations and more, or a list of none, all, +NAME and -NAME with the
-    /// names view-colour, view-geometry, view-distance, dilation-compensation, detail and anisotropy
+    /// names view-colour, view-geometry, view-distance, dilation-compensation, detail, anisotropy and exposure
     #[arg(long, value_name = "LIST", allow_hyphen_values = true, help_heading = QUALITY)]
     effects: Option<Request>,
     /// Training modules to attach in place of those of the configuration

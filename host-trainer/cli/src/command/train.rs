@@ -4,7 +4,7 @@ mod explicit;
 mod in_folder;
 mod limits;
 mod loading;
-mod result;
+pub(super) mod result;
 mod run_status;
 mod summary;
 #[cfg(test)]

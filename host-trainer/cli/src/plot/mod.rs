@@ -1,10 +1,11 @@
 //! Plots of what runs recorded, as SVG that any browser shows.
 //!
 //! [`Recording`] reads a CSV file and tells by its header what it holds; `learning` and `rate_distortion` draw several of
-//! a kind into one figure, `cost` compares settings; `chart`, `marker` and `labels` are what all share. No fonts are needed to draw: text stays text.
+//! a kind into one figure, `cost` compares settings; `exposures` is of one run; `chart`, `marker` and `labels` are what all share. No fonts are needed to draw: text stays text.
 
 mod chart;
 mod cost;
+mod exposures;
 mod labels;
 mod learning;
 mod marker;
@@ -15,6 +16,7 @@ mod results;
 
 pub(crate) use chart::thousands;
 pub(crate) use cost::{CostPanel, CostPoint, cost_svg};
+pub(crate) use exposures::exposures_svg;
 pub(crate) use learning::{learning_curve_svg, learning_curves_svg};
 pub(crate) use names::names_of;
 pub(crate) use rate_distortion::{SizeAxis, rate_distortion_svg};

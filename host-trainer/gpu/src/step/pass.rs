@@ -164,7 +164,7 @@ impl GpuStep {
         let (totals, counters) = (self.images.totals.ask(&self.gpu), self.counters.ask(&self.gpu));
         let n_positive = self.coding.ask_positive(&self.gpu);
         let (totals, counters) = (totals.take(&self.gpu)?, counters.take(&self.gpu)?);
-        let compared = self.images.loss_of(&totals);
+        let compared = self.images.loss_of(&totals, target);
         let (others, n_gaussians) = self.terms.sum(&self.gpu, loss, terms, (&self.images, &self.anchors), &totals)?;
         let lambda = loss.weights.dssim as f32;
         let mut total = (1.0 - lambda) * compared.l1 + lambda * (1.0 - compared.similarity) + others;
@@ -181,6 +181,7 @@ impl GpuStep {
             n_gaussians,
             n_splats: counters[SPLATS] as usize,
             n_pairs,
+            exposure: compared.exposure,
             rate,
             stages,
         };

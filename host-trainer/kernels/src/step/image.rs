@@ -5,7 +5,7 @@ use std::fmt;
 use super::buffer::refill;
 use super::fault::DeviceFault;
 use super::target::clear_masked;
-use super::{ImagePair, LossWeights, TargetView};
+use super::{ExposureSums, ImagePair, LossWeights, TargetView};
 use crate::ops::image::project::{Footprint, Splat};
 use crate::ops::image::rasterise::TiledImage;
 use crate::ops::image::tiles::TileLists;
@@ -23,6 +23,8 @@ pub struct ImageLoss<R> {
     pub similarity: R,
     /// Σ over pixels and channels of the squared difference.
     pub squared_sum: f64,
+    /// What the exposure would be, where the view has one.
+    pub exposure: Option<ExposureSums>,
 }
 
 /// A term of a module on the image: adds its gradient, returns its value.
@@ -126,6 +128,11 @@ impl<R: Real> ImageStages<R> for CpuImage<R> {
 
     fn compare(&mut self, target: &TargetView<'_, R>, weights: &LossWeights) -> Result<ImageLoss<R>, DeviceFault> {
         self.tiled.write_planes(self.size_px, &mut self.image);
+        let exposure = target.exposure.map(|exposure| {
+            let sums = ExposureSums::of(&self.image, target.truth(), target.mask);
+            exposure.apply(&mut self.image);
+            sums
+        });
         clear_masked(&mut self.image, target.mask);
         let lambda = R::real(weights.dssim);
         let (similarity, partials) = ssim::forward(self.level, &self.image, target.truth(), self.size_px);
@@ -134,7 +141,7 @@ impl<R: Real> ImageStages<R> for CpuImage<R> {
         let Self { level, image, size_px, d_image, .. } = self;
         ssim::backward(*level, image, target.truth(), *size_px, &partials, -lambda, d_image);
         let squared_sum = target.squared_sum(image);
-        Ok(ImageLoss { l1: l1::forward(image, target.truth()), similarity, squared_sum })
+        Ok(ImageLoss { l1: l1::forward(image, target.truth()), similarity, squared_sum, exposure })
     }
 
     fn add_term(&mut self, target: &TargetView<'_, R>, term: &mut ImageTerm<'_, R>) -> Result<R, DeviceFault> {
@@ -144,6 +151,9 @@ impl<R: Real> ImageStages<R> for CpuImage<R> {
 
     fn end_gradient(&mut self, target: &TargetView<'_, R>) -> Result<(), DeviceFault> {
         clear_masked(&mut self.d_image, target.mask);
+        if let Some(exposure) = target.exposure {
+            exposure.backward(&mut self.d_image);
+        }
         self.d_tiled.read_planes(&self.d_image, self.size_px);
         Ok(())
     }

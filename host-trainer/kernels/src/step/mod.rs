@@ -6,6 +6,7 @@ mod coded;
 pub mod coding;
 mod context;
 pub mod example;
+mod exposure;
 mod fault;
 mod image;
 mod loss;
@@ -35,6 +36,7 @@ use coded::{Network, Weights};
 pub use coding::Phase;
 use coding::{Coding, RateReport};
 pub use context::ContextGradients;
+pub use exposure::{Exposure, ExposureSums};
 pub use fault::DeviceFault;
 use image::CpuImage;
 pub use image::{ImageLoss, ImageStages, ImageTerm};
@@ -66,6 +68,8 @@ pub struct StepReport<R> {
     pub n_splats: usize,
     /// (tile, splat) pairs.
     pub n_pairs: usize,
+    /// What the photograph's exposure would be, where the step has one.
+    pub exposure: Option<ExposureSums>,
     /// What coding with context cost.
     pub rate: Option<RateReport>,
     /// Where the time went.
@@ -397,6 +401,7 @@ impl<R: Real> Workspace<R> {
             n_gaussians,
             n_splats,
             n_pairs,
+            exposure: compared.exposure,
             rate,
             stages,
         })

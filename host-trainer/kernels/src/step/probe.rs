@@ -38,11 +38,14 @@ impl<R: Real> Workspace<R> {
         weights: &LossWeights,
         stream: Stream,
     ) -> ImageError {
-        let TargetView { camera, background, mask, .. } = *target;
+        let TargetView { camera, background, mask, exposure, .. } = *target;
         let size_px = camera.size_px;
         let DrawnView { image: tiled, lists, splats, footprints } =
             self.draw(scene, camera, background, &Coding::Raw, None, 0.0);
         let mut image = tiled.to_planes(size_px);
+        if let Some(exposure) = exposure {
+            exposure.apply(&mut image);
+        }
         clear_masked(&mut image, mask);
         let similarity: f64 = ssim::forward(self.level, &image, target.truth(), size_px).0.into();
         let difference: f64 = l1::forward(&image, target.truth()).into();
@@ -54,6 +57,9 @@ impl<R: Real> Workspace<R> {
         let sign = |i: u32| if stream.uniform(i) < 0.5 { -R::ONE } else { R::ONE };
         let mut signs: Vec<R> = (0u32..).take(image.len()).map(sign).collect();
         clear_masked(&mut signs, mask);
+        if let Some(exposure) = exposure {
+            exposure.backward(&mut signs);
+        }
         let d_tiled = TiledImage::from_planes(&signs, size_px);
         let d_splats = rasterise::backward(self.level, &splats, &footprints, &lists, &tiled, &d_tiled);
         self.splats_backward(&scene.shape, camera, &d_splats);
@@ -66,14 +72,19 @@ mod tests {
     use super::*;
     use crate::ops::Pinhole;
     use crate::scene::ModelShape;
+    use crate::step::Exposure;
     use crate::step::example::{camera, scene};
 
     /// What taking an offset away changes in the image.
-    fn change(scene: &Scene<f64>, camera: &Pinhole<f64>, offset: usize) -> Vec<f64> {
+    fn change(scene: &Scene<f64>, camera: &Pinhole<f64>, exposure: Exposure<f64>, offset: usize) -> Vec<f64> {
         let mut without = scene.clone();
         without.anchors.mask(&[offset]);
         let mut workspace = Workspace::new(&scene.shape);
-        let [with, without] = [scene, &without].map(|scene| workspace.image(scene, camera, [0.2; 3]));
+        let [with, without] = [scene, &without].map(|scene| {
+            let mut image = workspace.image(scene, camera, [0.2; 3]);
+            exposure.apply(&mut image);
+            image
+        });
         without.iter().zip(with).map(|(without, with)| without - with).collect()
     }
 
@@ -85,7 +96,8 @@ mod tests {
         scene.heads.opacity.b2.fill(0.1);
         let camera = Pinhole::new(&camera());
         let truth = vec![0.5; 3 * camera.size_px[0] * camera.size_px[1]];
-        let target = TargetView::new(&camera, truth, None, [0.2; 3]);
+        let exposure = Exposure { gain: [1.2, 1.0, 0.7] };
+        let target = TargetView::new(&camera, truth, None, [0.2; 3]).exposed(Some(exposure));
         let mut workspace = Workspace::new(&scene.shape);
         let (k, n_probes) = (shape.n_offsets, 600u32);
         let mut squares = vec![0.0; scene.anchors.len() * k];
@@ -100,7 +112,7 @@ mod tests {
                     squares[offset] += predicted * predicted / f64::from(n_probes);
                     if i == 0 {
                         let along = |(p, change): (u32, f64)| if stream.uniform(p) < 0.5 { -change } else { change };
-                        let found: f64 = (0u32..).zip(change(&scene, &camera, offset)).map(along).sum();
+                        let found: f64 = (0u32..).zip(change(&scene, &camera, exposure, offset)).map(along).sum();
                         let scale = found.abs().max(1e-3);
                         assert!((found - predicted).abs() < 0.02 * scale, "{offset}: {predicted}, found {found}");
                         checked += 1;
@@ -110,7 +122,7 @@ mod tests {
         }
         assert!(checked > 20, "{checked} offsets are no test");
         for (offset, square) in squares.iter().enumerate().filter(|(_, square)| **square > 0.0) {
-            let found: f64 = change(&scene, &camera, offset).iter().map(|change| change * change).sum();
+            let found: f64 = change(&scene, &camera, exposure, offset).iter().map(|change| change * change).sum();
             // The mean of 600 squares: 6 % off on average, four times that at most.
             assert!((square / found - 1.0).abs() < 0.24, "{offset}: {square}, found {found}");
         }

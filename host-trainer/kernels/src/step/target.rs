@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 use pocketsplat_capture::dataset::Image;
 use rayon::prelude::*;
 
+use super::Exposure;
 use crate::ops::Pinhole;
 use crate::ops::loss::l1::BLOCK;
 use crate::real::Real;
@@ -20,6 +21,8 @@ pub struct TargetView<'a, R> {
     pub background: [R; 3],
     /// The number of the photograph in its capture, by which a device knows it again.
     pub index: Option<usize>,
+    /// How it was exposed, where that counts.
+    pub exposure: Option<Exposure<R>>,
     photograph: Option<&'a Image>,
     truth: OnceLock<Vec<R>>,
 }
@@ -28,7 +31,7 @@ impl<'a, R: Real> TargetView<'a, R> {
     /// * `truth`: planes `[3, height, width]`, 0 to 1; pixels that do not count become 0, as they do in what is drawn.
     pub fn new(camera: &'a Pinhole<R>, mut truth: Vec<R>, mask: Option<&'a [bool]>, background: [R; 3]) -> Self {
         clear_masked(&mut truth, mask);
-        Self { camera, mask, background, index: None, photograph: None, truth: truth.into() }
+        Self { camera, mask, background, index: None, exposure: None, photograph: None, truth: truth.into() }
     }
 
     /// The same of a photograph, whose planes are made when they are asked for: a device that has it does not.
@@ -38,13 +41,27 @@ impl<'a, R: Real> TargetView<'a, R> {
         mask: Option<&'a [bool]>,
         background: [R; 3],
     ) -> Self {
-        Self { camera, mask, background, index: None, photograph: Some(photograph), truth: OnceLock::new() }
+        Self {
+            camera,
+            mask,
+            background,
+            index: None,
+            exposure: None,
+            photograph: Some(photograph),
+            truth: OnceLock::new(),
+        }
     }
 
     /// The same, of this number in its capture.
     #[must_use]
     pub fn numbered(self, index: usize) -> Self {
         Self { index: Some(index), ..self }
+    }
+
+    /// The same, exposed like this.
+    #[must_use]
+    pub fn exposed(self, exposure: Option<Exposure<R>>) -> Self {
+        Self { exposure, ..self }
     }
 
     /// Planes `[3, height, width]`, 0 to 1; 0 where pixels do not count.

@@ -81,6 +81,31 @@ fn the_whole_step_agrees_with_finite_differences() {
 }
 
 #[test]
+fn a_step_under_an_exposure_agrees_with_finite_differences() {
+    let mut scene = scene(4, shapes()[0]);
+    let pinhole = Pinhole::new(&camera());
+    let exposure = Exposure { gain: [1.4, 0.9, 0.6] };
+    let mask: Vec<bool> = (0..truth().len() / 3).map(|i| i % 5 > 0).collect();
+    let exposed = |scene: &Scene<f64>| {
+        let mut workspace = Workspace::new(&scene.shape);
+        let target = TargetView::new(&pinhole, truth(), Some(&mask), [0.1, 0.2, 0.3]).exposed(Some(exposure));
+        let report = workspace.step(scene, &target, &Loss::plain(LossWeights::default()), &Coding::Raw);
+        (report, gradients(scene, &workspace), workspace.image(scene, &pinhole, [0.1, 0.2, 0.3]))
+    };
+    let (report, analytic, image) = exposed(&scene);
+    let sums = ExposureSums::of(&image, &truth(), Some(&mask));
+    assert_eq!(report.exposure, Some(sums), "of the image before its exposure");
+    let x: Vec<f64> = flatten(&mut scene).into_iter().map(|p| *p).collect();
+    assert_piecewise_gradient("step", &x, &analytic, |x| {
+        let mut moved = scene.clone();
+        for (p, v) in flatten(&mut moved).into_iter().zip(x) {
+            *p = *v;
+        }
+        exposed(&moved).0.loss
+    });
+}
+
+#[test]
 fn f32_agrees_with_f64() {
     for (seed, shape) in (11..).zip(shapes()) {
         let scene = scene(seed, shape);

@@ -17,6 +17,7 @@ pub use request::{ParseEffectsError, Request};
 pub use search::{Pilot, Pilots};
 
 use crate::train::TrainConfig;
+use crate::train::config::ExposureChoice;
 use pocketsplat_kernels::scene::ModelShape;
 
 /// Something that a scene may take into account; a scene without it has no part for it, and its decoder does no work for it.
@@ -34,20 +35,23 @@ pub enum Effect {
     Detail,
     /// Gaussians have three deviations and a rotation, not one deviation.
     Anisotropy,
+    /// Each training photograph has an exposure and a white balance of its own; the scene shows their mean.
+    Exposure,
 }
 
 impl Effect {
     /// All there are, in the order in which they are measured and named.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::ViewColour,
         Self::ViewGeometry,
         Self::ViewDistance,
         Self::DilationCompensation,
         Self::Detail,
         Self::Anisotropy,
+        Self::Exposure,
     ];
 
-    /// Those that are measured: at one size of the image dilation compensation shows nothing of what it is for, and the distance of
+    /// Those that are measured: an exposure costs a decoder nothing, and the run itself decides about it; at one size of the image dilation compensation shows nothing of what it is for, and the distance of
     /// view paid in none of five captures (`docs/experiments/2026-11-21-neural-or-plain-gaussians.md`).
     pub const MEASURED: [Self; 4] = [Self::ViewColour, Self::ViewGeometry, Self::Detail, Self::Anisotropy];
 
@@ -69,10 +73,11 @@ impl Effect {
             Self::DilationCompensation => ("dilation-compensation", "train.shape.dilation_compensation"),
             Self::Detail => ("detail", "train.modules.detail"),
             Self::Anisotropy => ("anisotropy", "train.shape.anisotropic"),
+            Self::Exposure => ("exposure", "train.exposure"),
         }
     }
 
-    /// The switch of a shape that it is; `None` for the effect that is a module.
+    /// The switch of a shape that it is; `None` for a module, and for what no scene keeps.
     fn switch(self, shape: &mut ModelShape) -> Option<&mut bool> {
         Some(match self {
             Self::ViewColour => &mut shape.view_colour,
@@ -80,19 +85,25 @@ impl Effect {
             Self::ViewDistance => &mut shape.view_distance,
             Self::DilationCompensation => &mut shape.dilation_compensation,
             Self::Anisotropy => &mut shape.anisotropic,
-            Self::Detail => return None,
+            Self::Detail | Self::Exposure => return None,
         })
     }
 
     /// Whether a run has it.
     pub fn is_in(self, config: &TrainConfig) -> bool {
-        self.switch(&mut config.shape.clone()).map_or(config.modules.detail.is_some(), |on| *on)
+        match self {
+            Self::Detail => config.modules.detail.is_some(),
+            Self::Exposure => config.exposure == ExposureChoice::On,
+            _ => self.switch(&mut config.shape.clone()).is_some_and(|on| *on),
+        }
     }
 
     /// Gives it to a run, or takes it; settings that a module has are kept.
     pub fn set(self, config: &mut TrainConfig, on: bool) {
         if let Some(switch) = self.switch(&mut config.shape) {
             *switch = on;
+        } else if self == Self::Exposure {
+            config.exposure = if on { ExposureChoice::On } else { ExposureChoice::Off };
         } else {
             config.modules.detail = on.then(|| config.modules.detail.unwrap_or_default());
             config.shape.detail_hidden = config.modules.detail.map_or(0, |detail| detail.hidden);

@@ -9,7 +9,7 @@ use super::search::{Pilots, search};
 use super::{Effect, PilotFigures, Price};
 use crate::device::{Limits, Processor};
 use crate::encode::{CoderChoice, EncodeError, Encoding};
-use crate::train::config::{Backbone, MIN_VIEWS_TO_HOLD_OUT};
+use crate::train::config::{Backbone, ExposureChoice, MIN_VIEWS_TO_HOLD_OUT};
 use crate::train::modules::Modules;
 use crate::train::{TrainConfig, TrainError, Trainer};
 use pocketsplat_capture::dataset::{Capture, Image, PhotographError, View};
@@ -169,7 +169,8 @@ pub fn measure(
 fn pilot_config(config: &TrainConfig, effects: &[Effect]) -> TrainConfig {
     let (backbone, modules) = (Backbone::Scaffold, Modules { pruning: None, rdo: None, ..config.modules });
     let iterations = config.iteration_at(PILOT_SHARE).max(1);
-    let config = TrainConfig { backbone, iterations, validation_every: 0, modules, ..*config };
+    let config =
+        TrainConfig { backbone, iterations, validation_every: 0, modules, exposure: ExposureChoice::Off, ..*config };
     Effect::measured_only(effects, &config)
 }
 

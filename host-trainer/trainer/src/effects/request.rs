@@ -60,7 +60,10 @@ impl FromStr for Request {
             said.push((effect, on));
         }
         if let Some(on) = all {
-            let unnamed = Effect::ALL.into_iter().filter(|effect| said.iter().all(|(other, _)| other != effect));
+            // Exposures are no part of a scene: without a word the run finds out.
+            let meant = |effect: &Effect| !on || *effect != Effect::Exposure;
+            let unnamed = Effect::ALL.into_iter().filter(meant);
+            let unnamed = unnamed.filter(|effect| said.iter().all(|(other, _)| other != effect));
             let unnamed: Vec<_> = unnamed.map(|effect| (effect, on)).collect();
             said.extend(unnamed);
         }
@@ -82,6 +85,8 @@ mod tests {
         assert_eq!(forced("+detail,-view-distance"), [(Detail, true), (ViewDistance, false)]);
         assert_eq!(forced("detail"), [(Detail, true)]);
         assert_eq!(forced("none").len(), Effect::ALL.len());
+        assert_eq!(forced("all").len(), Effect::ALL.len() - 1, "exposures are found out");
+        assert!(forced("all,+exposure").contains(&(Effect::Exposure, true)));
         assert!(forced("none").iter().all(|(_, on)| !on) && forced("all").iter().all(|(_, on)| *on));
         let all_but = forced("all, -dilation-compensation");
         assert!(all_but.contains(&(DilationCompensation, false)) && all_but.contains(&(ViewColour, true)));

@@ -10,6 +10,7 @@ pub mod config;
 pub mod context;
 pub mod density;
 pub mod error;
+pub mod exposures;
 pub mod limits;
 pub mod modules;
 pub mod optimiser;

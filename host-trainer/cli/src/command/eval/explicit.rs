@@ -80,6 +80,7 @@ pub(crate) fn measure(
     Ok(Evaluation {
         program: program::of_figures(trained.as_deref()),
         psnr_db: mean(&rows, |row| row.psnr_db),
+        cc_psnr_db: Some(mean(&rows, |row| row.cc_psnr_db)),
         ssim: mean(&rows, |row| row.ssim),
         lpips,
         lpips_of: what.lpips.map(lpips_of),

@@ -7,7 +7,11 @@ use super::{Evaluation, TierEvaluation};
 impl fmt::Display for Evaluation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { psnr_db, ssim, n_views, split, width_px, height_px, background, .. } = self;
-        write!(f, "quality:  {psnr_db:.2} dB PSNR, {ssim:.4} SSIM")?;
+        write!(f, "quality:  {psnr_db:.2} dB PSNR")?;
+        if let Some(cc) = self.cc_psnr_db {
+            write!(f, " ({cc:.2} colour-corrected)")?;
+        }
+        write!(f, ", {ssim:.4} SSIM")?;
         if let (Some(lpips), Some(of)) = (self.lpips, &self.lpips_of) {
             write!(f, ", {lpips:.4} LPIPS ({of})")?;
         }
@@ -45,6 +49,7 @@ mod tests {
         let evaluation = Evaluation {
             program: "0.1.0 r1".to_owned(),
             psnr_db: 32.041,
+            cc_psnr_db: Some(33.2),
             ssim: 0.951_23,
             lpips: Some(0.0511),
             lpips_of: Some("VGG16, input in zero-to-one".to_owned()),
@@ -70,7 +75,7 @@ mod tests {
         };
         assert_eq!(
             evaluation.to_string(),
-            "quality:  32.04 dB PSNR, 0.9512 SSIM, 0.0511 LPIPS (VGG16, input in zero-to-one)\n\
+            "quality:  32.04 dB PSNR (33.20 colour-corrected), 0.9512 SSIM, 0.0511 LPIPS (VGG16, input in zero-to-one)\n\
              views:    25 of test, 400×300 px, background black\n\
              compare:  28.00 dB PSNR of the photographs at half the size, enlarged again\n\
              size:     412345 bytes, 51234 Gaussians of 8123 anchors\n\

@@ -19,7 +19,7 @@ const LEAST_SHARE: f64 = 0.01;
 /// A table; the first column names the row, the others are numbers. It scrolls on its own where it is too wide, by keys too.
 ///
 /// * `name`: what it is of, for those who do not see the heading above.
-fn table(name: &str, header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
+pub(super) fn table(name: &str, header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let head: String = header.iter().map(|name| format!("<th scope=\"col\">{}</th>", escaped(name))).collect();
     let row = |cells: Vec<String>| {
         let cell = |(i, text): (usize, &String)| {
@@ -158,12 +158,14 @@ pub(super) fn views(run: &Run<'_>) -> String {
     let [low, high] = views
         .iter()
         .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], view| [low.min(view.psnr_db), high.max(view.psnr_db)]);
-    let rows =
-        views.iter().map(|view| vec![view.name.clone(), format!("{:.2}", view.psnr_db), format!("{:.4}", view.ssim)]);
+    let rows = views.iter().map(|view| {
+        let cc = view.cc_psnr_db.map_or_else(String::new, |cc| format!("{cc:.2}"));
+        vec![view.name.clone(), format!("{:.2}", view.psnr_db), cc, format!("{:.4}", view.ssim)]
+    });
     format!(
         "<details><summary>{} views, {low:.2} to {high:.2} dB</summary>\n{}\n</details>",
         views.len(),
-        table("View by view", &["view", "PSNR, dB", "SSIM"], rows)
+        table("View by view", &["view", "PSNR, dB", "colour-corrected", "SSIM"], rows)
     )
 }
 

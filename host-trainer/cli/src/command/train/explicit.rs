@@ -212,9 +212,9 @@ fn write(
         let (gaussians, notes) = format.read(&bytes, None)?;
         let read_s = started.elapsed().as_secs_f64();
         let file = GaussiansFile { n_bytes: bytes.len(), gaussians, notes, read_s };
-        let Evaluation { psnr_db, ssim, n_views, views, .. } =
+        let Evaluation { psnr_db, cc_psnr_db, ssim, n_views, views, .. } =
             measure(&file, capture, &config.capture, Split::Test, &Measurements::default())?;
-        Some(HeldOut { psnr_db, ssim, n_test_views: n_views, views })
+        Some(HeldOut { psnr_db, cc_psnr_db, ssim, n_test_views: n_views, views })
     };
     Ok(ExplicitResult {
         program: program::this(),

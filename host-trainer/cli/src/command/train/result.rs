@@ -11,7 +11,7 @@ use pocketsplat_trainer::effects::Effect;
 use pocketsplat_trainer::encode::{Encoding, Fitted};
 use pocketsplat_trainer::train::Trainer;
 use pocketsplat_trainer::train::limits::Finished;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::limits;
 use crate::command::bundle::BundleFile;
@@ -64,6 +64,9 @@ pub(crate) struct TrainResult {
     pub(crate) photographs_waited_share: Option<f64>,
     pub(crate) background: String,
     pub(crate) effects: String,
+    /// Of each training photograph, where they turned out to differ.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) exposures: Option<Vec<ViewExposure>>,
     /// Largest amount of memory that the program has held, where the system tells.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) peak_memory_bytes: Option<u64>,
@@ -74,10 +77,21 @@ pub(crate) struct TrainResult {
     pub(crate) protocol: Protocol,
 }
 
+/// How a training photograph was exposed, against the mean of all.
+#[derive(Debug, Serialize, Deserialize)]
+pub(crate) struct ViewExposure {
+    pub(crate) view: String,
+    /// Of red, green and blue light.
+    pub(crate) stops: [f64; 3],
+}
+
 /// How good a bundle is on views that training did not see.
 #[derive(Debug, Serialize)]
 pub(crate) struct HeldOut {
     pub(crate) psnr_db: f64,
+    /// With the colours of each frame brought to its photograph's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) cc_psnr_db: Option<f64>,
     pub(crate) ssim: f64,
     pub(crate) n_test_views: usize,
     pub(crate) views: Vec<ViewEvaluation>,
@@ -119,9 +133,9 @@ pub(super) fn write_bundle(
         None
     } else {
         let what = Measurements::default();
-        let Evaluation { psnr_db, ssim, n_views, views, .. } =
+        let Evaluation { psnr_db, cc_psnr_db, ssim, n_views, views, .. } =
             measure(&file, capture, options, Split::Test, Renderer::Core, &what)?;
-        Some(HeldOut { psnr_db, ssim, n_test_views: n_views, views })
+        Some(HeldOut { psnr_db, cc_psnr_db, ssim, n_test_views: n_views, views })
     };
     let Finished { scene, background, n_undrawn, estimated_bits, .. } = finished;
     let bundle = file.parse()?;
@@ -152,6 +166,10 @@ pub(super) fn write_bundle(
         background: Background::of_rgb8(background)
             .map_or_else(|| format!("{background:?}"), |known| known.to_string()),
         effects: Effect::names(&Effect::all_in(trainer.config())),
+        exposures: trainer.exposure_stops().map(|stops| {
+            let of_view = |(view, stops): (&View, [f64; 3])| ViewExposure { view: view.name.clone(), stops };
+            capture.train.iter().zip(stops).map(of_view).collect()
+        }),
         peak_memory_bytes: peak_memory_bytes(),
         held_out,
         protocol,

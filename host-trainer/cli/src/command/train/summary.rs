@@ -77,7 +77,8 @@ mod tests {
 
     #[test]
     fn what_people_want_to_know_comes_in_words_and_units() {
-        let held_out = HeldOut { psnr_db: 32.041, ssim: 0.951_23, n_test_views: 13, views: Vec::new() };
+        let held_out =
+            HeldOut { psnr_db: 32.041, cc_psnr_db: Some(33.2), ssim: 0.951_23, n_test_views: 13, views: Vec::new() };
         let summary = Summary {
             held_out: Some(&held_out),
             path: Path::new("desk lamp.psb"),

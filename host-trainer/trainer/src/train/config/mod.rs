@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::modules::Modules;
-pub use super::schedule::{Backbone, Densification, Hac, HalfSize, LearningRate, Rates};
+pub use super::schedule::{Backbone, Densification, ExposureChoice, Hac, HalfSize, LearningRate, Rates};
 use super::schedule::{ConfigError, within};
 use pocketsplat_capture::dataset::{Capture, PointsOrigin};
 use pocketsplat_kernels::scene::ModelShape;
@@ -37,6 +37,9 @@ pub struct TrainConfig {
     /// Smaller images first.
     #[serde(default)]
     pub half_size: HalfSize,
+    /// Photographs that are exposed unlike each other.
+    #[serde(default)]
+    pub exposure: ExposureChoice,
     /// Growth and pruning.
     pub densification: Densification,
     /// The rate, where the backbone has one.
@@ -62,6 +65,7 @@ impl Default for TrainConfig {
             learns_background: false,
             loss: LossWeights::default(),
             half_size: HalfSize::default(),
+            exposure: ExposureChoice::default(),
             densification: Densification::default(),
             hac: Hac::default(),
             modules: Modules::default(),

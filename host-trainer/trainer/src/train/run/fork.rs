@@ -32,6 +32,9 @@ impl<'a> Trainer<'a> {
         if config.hac.lambda != begun.hac.lambda {
             restored.run.state.learned.lambda = config.hac.lambda;
         }
+        if config.exposure != begun.exposure {
+            restored.run.state.learned.exposures.reopen();
+        }
         restored.run.setup.config = config;
         restored.run.check()?;
         Ok(restored)

@@ -17,8 +17,10 @@ use pocketsplat_kernels::ops::rate::perturb::symbol;
 use pocketsplat_kernels::scene::Scene;
 use pocketsplat_kernels::step::coding::Coding;
 use pocketsplat_kernels::step::coding::{IntegerModel, RateReport, RateTerms};
-use pocketsplat_kernels::step::{Block, LossWeights, Phase, SharedDevice, StepInfo, StepReport, Workspace, planes};
-use pocketsplat_kernels::step::{Loss, Resident as _, TargetView};
+use pocketsplat_kernels::step::{
+    Block, ExposureSums, LossWeights, Phase, SharedDevice, StepInfo, StepReport, Workspace, planes,
+};
+use pocketsplat_kernels::step::{Exposure, Loss, Resident as _, TargetView};
 
 fn device(gpu: &Gpu) -> Option<SharedDevice<f32>> {
     Some(Arc::new(Mutex::new(GpuStep::new(gpu).expect("room"))))
@@ -57,6 +59,11 @@ fn compare(gpu: &Gpu, scene: &Scene<f32>, target: &TargetView<'_, f32>, modules:
     let (found, on_device) = step(device(gpu), scene, target, modules);
     let sums = |r: &StepReport<f32>| [r.loss, r.squared_error as f32];
     assert_close("loss, squared error", &sums(&found), &sums(&expected), Bound { relative: 1e-4, absolute: 1e-7 });
+    for (found, expected) in found.exposure.iter().zip(&expected.exposure) {
+        let gains = |sums: &ExposureSums| sums.log_gains().expect("pixels").map(|gain| gain as f32);
+        assert_close("exposure", &gains(found), &gains(expected), Bound { relative: 0.0, absolute: 1e-4 });
+    }
+    assert_eq!(found.exposure.is_some(), expected.exposure.is_some());
     assert_eq!((found.n_gaussians, found.n_splats), (expected.n_gaussians, expected.n_splats));
     // Lists have a little more slack on the device.
     assert!(found.n_pairs >= expected.n_pairs && found.n_pairs <= expected.n_pairs + expected.n_pairs / 100 + 2);
@@ -83,7 +90,8 @@ fn a_step_agrees_with_the_cpu() {
         let mask: Vec<bool> = (0..image.rgb.len() / 3).map(|i| i % 7 > 1).collect();
         for mask in [None, Some(mask.as_slice())] {
             for detail in [false, true] {
-                let target = TargetView::new(&camera, planes(image), mask, [0.2, 0.5, 0.1]);
+                let exposure = detail.then_some(Exposure { gain: [1.2, 1.0, 0.8] });
+                let target = TargetView::new(&camera, planes(image), mask, [0.2, 0.5, 0.1]).exposed(exposure);
                 compare(
                     gpu,
                     &trainer.state.learned.scene,
@@ -178,7 +186,9 @@ fn a_step_of_a_resident_scene_agrees_with_the_cpu() {
         let camera = Pinhole::new(&view.camera);
         let image = &view.photograph().expect("in memory").image;
         let mask: Vec<bool> = (0..image.rgb.len() / 3).map(|i| i % 7 > 1).collect();
-        let target = TargetView::new(&camera, planes(image), (i == 1).then_some(&mask), [0.2, 0.5, 0.1]);
+        let exposure = (i == 1).then_some(Exposure { gain: [1.2, 1.0, 0.8] });
+        let target =
+            TargetView::new(&camera, planes(image), (i == 1).then_some(&mask), [0.2, 0.5, 0.1]).exposed(exposure);
         let stream = pocketsplat_kernels::ops::rate::noise::Stream::of_run(1).branch(1);
         let info = StepInfo { iteration: 10, iterations: 20, phase: Phase::Raw, scaled: true, stream };
         let terms = config.modules.terms();

@@ -8,6 +8,7 @@ use super::checkpoint::envelope::needs;
 use crate::train::TrainConfig;
 use crate::train::config::Backbone;
 use crate::train::density::Statistics;
+use crate::train::exposures::Exposures;
 use crate::train::optimiser::Optimiser;
 use pocketsplat_kernels::scene::{Anchors, Heads, Scene};
 
@@ -23,13 +24,20 @@ pub struct Learned {
     pub statistics: Statistics,
     /// What lies behind the scene.
     pub background: [f32; 3],
+    /// How each training view was exposed.
+    pub exposures: Exposures,
     /// λ: weight of a value's bits in the loss, as configured until [a scene that has to fit](crate::train::limits) asks for another.
     pub lambda: f64,
 }
 
 impl Learned {
     /// Takes from the configuration what a checkpoint leaves to it, and checks that lengths agree.
-    pub(super) fn complete(&mut self, config: &TrainConfig, voxel_size: f64) -> Result<(), CheckpointFault> {
+    pub(super) fn complete(
+        &mut self,
+        config: &TrainConfig,
+        voxel_size: f64,
+        n_views: usize,
+    ) -> Result<(), CheckpointFault> {
         (self.scene.shape, self.scene.voxel_size) = (config.shape, voxel_size);
         let (shape, scene) = (config.shape, &self.scene);
         let Anchors { features, log_scales, offsets, mask_logits, prune_rank, view_weights, .. } = &scene.anchors;
@@ -50,6 +58,7 @@ impl Learned {
                 needs(what, values.len(), n * width)?;
             }
         }
+        needs("exposures", self.exposures.len(), n_views)?;
         needs("background", background.first.len(), 3)?;
         let lens =
             |heads: &Heads<f32>| heads.each().flat_map(|head| head.groups().map(<[f32]>::len)).collect::<Vec<_>>();

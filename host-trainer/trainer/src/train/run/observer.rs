@@ -1,6 +1,7 @@
 //! What a run gives back: to whom it reports, and what an iteration did.
 
 use crate::train::error::DroppedStep;
+use crate::train::exposures::ExposureDecision;
 use crate::train::limits::Fit;
 use pocketsplat_kernels::scene::Scene;
 use pocketsplat_kernels::step::StepReport;
@@ -16,6 +17,9 @@ pub trait Observer {
     /// When anchors were left out so that the bundle fits.
     fn fitted(&mut self, _fit: &Fit) {}
 
+    /// When it was decided whether each photograph has an exposure of its own.
+    fn exposed(&mut self, _decided: &ExposureDecision) {}
+
     /// When a picture for people could not be written; the run goes on.
     fn unwritten(&mut self, _why: &dyn std::error::Error) {}
 }
@@ -30,4 +34,6 @@ pub struct Outcome {
     pub dropped: Option<DroppedStep>,
     /// What was left so that the bundle fits, where this iteration ended with that.
     pub fit: Option<Fit>,
+    /// What was decided about exposures, where this iteration ended with that.
+    pub decided: Option<ExposureDecision>,
 }

@@ -9,6 +9,7 @@ use super::state::Setup;
 use crate::train::TrainConfig;
 use crate::train::density::Statistics;
 use crate::train::error::TrainError;
+use crate::train::exposures::{ExposureRun, Exposures};
 use crate::train::limits::{Finished, LimitProbe};
 use crate::train::modules::RunView;
 use crate::train::optimiser::Optimiser;
@@ -65,6 +66,7 @@ impl Method for Neural {
             optimiser: Optimiser::new(&scene),
             statistics: Statistics::default(),
             background: capture.background,
+            exposures: Exposures::of_views(capture.train.len()),
             lambda: config.hac.lambda,
             scene,
         };
@@ -84,7 +86,7 @@ impl Method for Neural {
 
     fn restored(run: &mut Trainer<'_>) -> Result<(), CheckpointFault> {
         let Setup { config, capture, .. } = &run.setup;
-        run.state.learned.complete(config, config.voxel_size_for(capture))
+        run.state.learned.complete(config, config.voxel_size_for(capture), capture.train.len())
     }
 
     fn iterate(run: &mut Trainer<'_>) -> Result<Outcome, TrainError> {
@@ -137,6 +139,11 @@ impl<'a> Trainer<'a> {
         self.machine.device.workspace.set_device(device);
     }
 
+    /// The exposures of all training views, stops of red, green and blue, where they are in force.
+    pub fn exposure_stops(&self) -> Option<Vec<[f64; 3]>> {
+        self.state.learned.exposures.stops()
+    }
+
     /// Runs to the last iteration.
     ///
     /// # Errors
@@ -157,6 +164,9 @@ impl<'a> Trainer<'a> {
         if let Some(fit) = &outcome.fit {
             observer.fitted(fit);
         }
+        if let Some(decided) = &outcome.decided {
+            observer.exposed(decided);
+        }
         observer.step(self.state.iteration, &outcome.report, &self.state.learned.scene);
         Ok(outcome)
     }
@@ -170,7 +180,8 @@ impl<'a> Trainer<'a> {
             half.as_ref().map_or((&*photograph, &camera), |(photograph, camera)| (photograph, camera));
         // A device knows a photograph again by its number, at either size.
         let number = place + if half.is_some() { self.setup.views.all.len() } else { 0 };
-        let target = target(shown, camera, self.state.learned.background).numbered(number);
+        let exposure = self.state.learned.exposures.of_step(place, self.setup.config.exposure);
+        let target = target(shown, camera, self.state.learned.background).numbered(number).exposed(exposure);
         let (modules, at) = (self.setup.config.modules, self.step_info());
         let pruned_share = modules.each().iter().map(|module| module.pruned_share(&at)).fold(0.0, f32::max);
         let terms = modules.terms();
@@ -184,7 +195,13 @@ impl<'a> Trainer<'a> {
         };
         let (report, cause) = stepped?;
         let dropped = self.judge(place, cause)?;
+        let mut decided = None;
         if dropped.is_none() {
+            if let Some(found) = &report.exposure {
+                let TrainConfig { exposure: choice, iterations, .. } = self.setup.config;
+                let run = ExposureRun { choice, iterations, n_trained: self.setup.views.trained.len() };
+                decided = self.state.learned.exposures.saw(place, found, self.state.iteration, &run);
+            }
             self.follow_gradients(on_device)?;
             self.densify(on_device)?;
         }
@@ -200,7 +217,7 @@ impl<'a> Trainer<'a> {
                 fit = self.change_anchors(change).or(fit);
             }
         }
-        Ok(Outcome { report, dropped, fit })
+        Ok(Outcome { report, dropped, fit, decided })
     }
 
     /// The run as modules see it.
@@ -208,6 +225,7 @@ impl<'a> Trainer<'a> {
         let probe = Probe {
             scene: &self.state.learned.scene,
             views: &self.setup.views,
+            exposures: &self.state.learned.exposures,
             photographs: &self.machine.photographs,
             background: self.state.learned.background,
             loss: self.setup.config.loss,

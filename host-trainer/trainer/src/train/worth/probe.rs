@@ -3,6 +3,7 @@
 use super::{Bits, Worth};
 use crate::train::context::integers::Integers;
 use crate::train::error::TrainError;
+use crate::train::exposures::Exposures;
 use crate::train::read_ahead::ReadAhead;
 use crate::train::views::{TrainingViews, target};
 use pocketsplat_kernels::ops::rate::noise::Stream;
@@ -28,6 +29,8 @@ pub struct Probe<'a> {
     pub views: &'a TrainingViews<'a>,
     /// Their photographs.
     pub(in crate::train) photographs: &'a ReadAhead,
+    /// How they were exposed.
+    pub exposures: &'a Exposures,
     /// What lies behind the scene.
     pub background: [f32; 3],
     /// The loss on the image.
@@ -68,7 +71,8 @@ impl Probe<'_> {
         let trained: Vec<u32> = probed(trained.iter().copied()).collect();
         for (view, at) in (0u32..).zip(0..trained.len()) {
             let photograph = photographs.photograph(all, trained[at..].iter().copied())?;
-            let target = target(&photograph, &cameras[trained[at] as usize], self.background);
+            let target = target(&photograph, &cameras[trained[at] as usize], self.background)
+                .exposed(self.exposures.of_view(trained[at] as usize));
             let error = workspace.probe(self.scene, &target, &self.loss, stream.branch(view));
             squared_sum += error.squared_sum;
             n_values += error.n_values;

@@ -3,7 +3,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
-use crate::train::config::{Backbone, HalfSize};
+use crate::train::config::{Backbone, ExposureChoice, HalfSize};
 use crate::train::limits::{Finished, LimitProbe, LimitShares, MeasuredShares};
 use crate::train::modules::{Modules, Rdo};
 use crate::train::run::checkpoint::VERSION;
@@ -41,7 +41,8 @@ fn timeless(trainer: &Trainer<'_>) -> Vec<u8> {
 fn a_run_taken_up_again_ends_in_the_same_bits() {
     taken_up_again(tiny_config(90), None);
     let half_size = HalfSize { until: 0.4, least_px: 12 };
-    taken_up_again(TrainConfig { learns_background: true, half_size, ..tiny_config(90) }, None);
+    let exposure = ExposureChoice::On;
+    taken_up_again(TrainConfig { learns_background: true, half_size, exposure, ..tiny_config(90) }, None);
     taken_up_again(tiny_hac_config(90), None);
     taken_up_again(TrainConfig { backbone: Backbone::ContextGs, ..tiny_hac_config(90) }, None);
     let modules = Modules { rdo: Some(Rdo::default()), ..Modules::default() };
@@ -82,6 +83,26 @@ fn taken_up_again(config: TrainConfig, limits: Option<LimitProbe<'_>>) {
         trainer = trainer.fitting(limits);
         trainer.run(&mut Silent).unwrap();
         assert!(timeless(&trainer) == last, "{:?} stopped after {stopped_after}", config.backbone);
+    }
+}
+
+#[test]
+fn a_fork_decides_about_exposures_anew_where_it_is_asked_to() {
+    let capture = tiny_capture();
+    let begun = |exposure| {
+        let mut trainer = Trainer::new(&capture, TrainConfig { exposure, ..tiny_config(60) }).unwrap();
+        for _ in 0..20 {
+            trainer.advance().unwrap();
+        }
+        saved(&trainer)
+    };
+    let [on, off] = [ExposureChoice::On, ExposureChoice::Off];
+    for (before, after) in [(on, on), (on, off), (off, on)] {
+        let config = TrainConfig { exposure: after, ..tiny_config(60) };
+        let mut fork = Trainer::fork(&capture, &begun(before), config).unwrap().run;
+        fork.advance().unwrap();
+        fork.advance().unwrap();
+        assert_eq!(fork.exposure_stops().is_some(), after == on, "{before:?} → {after:?}");
     }
 }
 

@@ -168,9 +168,13 @@ job_test() {
   # Files of Gaussians are read by programs that are not ours.
   need_command python3 python3
   need_command dwebp webp
+  # Poses of photographs and films are found by programs that are not ours.
+  need_command colmap colmap
+  need_command ffmpeg ffmpeg
+  need_command heif-enc libheif-examples
   # Kernels are compared with the CPU's operations, on whatever adapter there is.
   need_lavapipe
-  env ${axe:+POCKETSPLAT_AXE="$axe"} POCKETSPLAT_NEEDS_BROWSER=1 POCKETSPLAT_NEEDS_READERS=1 POCKETSPLAT_NEEDS_GPU=1 \
+  env ${axe:+POCKETSPLAT_AXE="$axe"} POCKETSPLAT_NEEDS_BROWSER=1 POCKETSPLAT_NEEDS_READERS=1 POCKETSPLAT_NEEDS_GPU=1 POCKETSPLAT_NEEDS_COLMAP=1 \
     cargo test --workspace --locked --no-fail-fast
   # The largest frames where overflow is not checked, as firmware is built; above it was.
   cargo test --release -p pocketsplat-core --lib --locked decoder::tests

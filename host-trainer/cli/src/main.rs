@@ -1,5 +1,5 @@
 //! The `pocketsplat` command: results to stdout, progress to stderr, exit code 0, 1 (failed), 2 (wrong
-//! usage) or 130 (training interrupted by a signal, with a checkpoint to go on from).
+//! usage) or 130 (training or a search for poses interrupted by a signal, to go on from there).
 
 mod command;
 mod config;

@@ -1,6 +1,6 @@
 //! What to tell someone who gives photographs, a film or a packed capture where a capture is needed.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use pocketsplat_files::{shell_word, shown};
 
@@ -38,46 +38,57 @@ fn is_archive(name: &str) -> bool {
     ARCHIVES.contains(&extension(name).as_str())
 }
 
-/// The photographs in a folder and the commands that pose them.
+/// The photographs in a folder and the command that poses them.
 fn photographs(folder: &Path) -> Option<String> {
     let with_names = FOLDERS.iter().map(|name| {
         let images = if *name == "." { folder.to_owned() } else { folder.join(name) };
         let names = file_names(&images);
-        (images, names)
+        (*name, images, names)
     });
-    for (images, names) in with_names {
+    for (place, images, names) in with_names {
         let n_read = names.iter().filter(|name| is_image_name(name)).count();
         let foreign: Vec<&String> = names.iter().filter(|name| has_foreign_name(name)).collect();
         let n = n_read + foreign.len();
         if n == 0 {
             continue;
         }
-        let convert = foreign.first().filter(|_| foreign.len() > n_read).map_or_else(String::new, |name| {
+        // Those of telephones the command converts itself.
+        let is_of_telephone = |name: &&&String| ["heic", "heif", "avif"].contains(&extension(name).as_str());
+        let by_hand: Vec<&&String> = foreign.iter().filter(|name| !is_of_telephone(name)).collect();
+        let convert = by_hand.first().filter(|_| foreign.len() > n_read).map_or_else(String::new, |name| {
             format!("convert those of a format that is not read:\n  {}\nthen ", conversion(&images, name))
         });
+        // Photographs that have to be converted are not left where they are.
+        let stays = place == "images" && foreign.is_empty();
+        let capture = if stays { folder.to_owned() } else { beside(folder) };
         return Some(format!(
             "`{}` holds {n} photograph{} but no poses; {convert}{}",
             shown(&images),
             if n == 1 { "" } else { "s" },
-            poses_by_colmap(folder, &images)
+            poses(folder, &capture)
         ));
     }
     None
 }
 
-/// The commands that pose the photographs in `images` and leave the model where it is looked for.
-fn poses_by_colmap(folder: &Path, images: &Path) -> String {
-    let (database, sparse) = (shell_word(&folder.join("database.db")), shell_word(&folder.join("sparse")));
-    let images = shell_word(images);
+/// A folder of a similar name, for what is made of a folder.
+fn beside(folder: &Path) -> PathBuf {
+    // `.` has no name of its own.
+    let named = if folder.file_name().is_some() { Ok(folder.to_owned()) } else { folder.canonicalize() };
+    let mut named = named.unwrap_or_else(|_| folder.to_owned());
+    let mut name = named.file_name().unwrap_or_default().to_owned();
+    name.push("-capture");
+    named.set_file_name(name);
+    named
+}
+
+/// The command that finds poses and leaves them in `capture`.
+fn poses(of: &Path, capture: &Path) -> String {
     format!(
-        "make poses with COLMAP and give this folder again:\n  \
-         colmap feature_extractor --database_path {database} --image_path {images} \
-         --ImageReader.single_camera 1 --ImageReader.camera_model OPENCV\n  \
-         colmap exhaustive_matcher --database_path {database}\n  \
-         mkdir -p {sparse}\n  \
-         colmap mapper --database_path {database} --image_path {images} --output_path {sparse}\n\
-         (without a display add --SiftExtraction.use_gpu 0 to the first, --SiftMatching.use_gpu 0 to the second; from COLMAP 3.13 on \
-         --FeatureExtraction.use_gpu and --FeatureMatching.use_gpu)"
+        "find them, and give the folder `{}`:\n  pocketsplat poses {} -o {}\n(`pocketsplat train --poses` does so before it trains)",
+        shown(capture),
+        shell_word(of),
+        shell_word(capture)
     )
 }
 
@@ -86,15 +97,9 @@ pub(super) fn file_instead(path: &Path) -> Option<String> {
     let name = path.file_name()?.to_string_lossy();
     let stem = path.with_extension("");
     let (file, folder) = (shell_word(path), shell_word(&stem));
-    let (path, ending) = (shown(path), extension(&name));
+    let (film, path, ending) = (path, shown(path), extension(&name));
     if FILMS.contains(&ending.as_str()) {
-        Some(format!(
-            "`{path}` is a film, needed: photographs with poses; take 2 photographs a second out of it and give the folder \
-             `{}`:\n  mkdir -p {}\n  ffmpeg -i {file} -vf fps=2 -qscale:v 2 {}",
-            shown(&stem),
-            shell_word(&stem.join("images")),
-            shell_word(&stem.join("images/%04d.jpg"))
-        ))
+        Some(format!("`{path}` is a film, needed: photographs with poses; {}", poses(film, &stem)))
     } else if is_archive(&name) {
         Some(format!(
             "`{path}` is a packed capture, needed: its files; unpack it and give the folder `{}`:\n  \

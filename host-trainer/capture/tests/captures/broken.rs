@@ -230,7 +230,7 @@ fn a_file_in_place_of_a_folder_is_told_what_it_is() {
     fixture.write_files();
     for (name, says) in [
         ("transforms.json", "is a file, needed: a folder; give the folder that it lies in"),
-        ("walk.mp4", "/walk/images/%04d.jpg"),
+        ("walk.mp4", "/walk`:\n  pocketsplat poses /"),
         ("walk.zip", "is a packed capture, needed: its files; unpack it"),
         ("walk.txt", "is not a folder; give the folder that holds the capture"),
     ] {

@@ -15,7 +15,7 @@ const GROUPS: [(&str, &[&str]); 5] = [
     ("Look", &["eval", "render", "view", "report", "inspect"]),
     ("Device", &["fit", "verify", "cost"]),
     ("Research", &["plan-runs", "tables", "compare", "plot"]),
-    ("Captures and this machine", &["doctor", "synth", "demo", "devices", "bench", "completions", "man"]),
+    ("Captures and this machine", &["poses", "doctor", "synth", "demo", "devices", "bench", "completions", "man"]),
 ];
 
 /// Commands that look at what was trained, as it was.

@@ -25,6 +25,7 @@ mod outputs;
 mod plan_runs;
 mod plot;
 mod point;
+mod poses;
 mod process;
 mod progress;
 mod render;
@@ -76,6 +77,7 @@ enum Command {
     PlanRuns(plan_runs::Args),
     Tables(tables::Args),
     Compare(compare::Args),
+    Poses(poses::Args),
     Synth(synth::Args),
     Demo(demo::Args),
     Doctor(doctor::Args),
@@ -138,12 +140,13 @@ fn dispatch(cli: Cli) -> Result<ExitCode> {
         .build_global()
         .with_context(|| format!("could not start {n_threads} threads"))?;
     match cli.command {
-        Command::Train(args) => return train::run(&args),
+        Command::Train(args) => return train::run(args),
         Command::PlanRuns(args) => return plan_runs::run(&args),
         Command::Import(args) => return import::run(&args),
         Command::Demo(args) => return demo::run(&args),
         Command::Verify(args) => return verify::run(&args),
         Command::Doctor(args) => return doctor::run(&args),
+        Command::Poses(args) => return poses::run(&args),
         Command::Eval(args) => eval::run(&args),
         Command::Render(args) => render::run(&args),
         Command::View(args) => view::run(&args),

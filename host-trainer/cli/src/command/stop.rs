@@ -1,7 +1,7 @@
 //! Ctrl-C, SIGTERM and SIGHUP, which a run answers after its iteration.
 
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, OnceLock};
 
 use anyhow::{Context, Result};
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -13,6 +13,16 @@ pub(crate) const INTERRUPTED: u8 = 130;
 ///
 /// What is ignored stays so: SIGHUP under `nohup`, Ctrl-C in the background of a script.
 pub(crate) fn flag() -> Result<Arc<AtomicBool>> {
+    // One of the process: what was asked for in one part of a command holds for the next.
+    static FLAG: OnceLock<Arc<AtomicBool>> = OnceLock::new();
+    if let Some(stop) = FLAG.get() {
+        return Ok(Arc::clone(stop));
+    }
+    let stop = listening()?;
+    Ok(Arc::clone(FLAG.get_or_init(|| stop)))
+}
+
+fn listening() -> Result<Arc<AtomicBool>> {
     let (stop, asked) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
     for signal in [SIGINT, SIGTERM] {
         if is_ignored(signal) {

@@ -25,7 +25,7 @@ use super::gaussians::GaussiansFile;
 use super::outputs::BUNDLE;
 use super::train_args::Args;
 use super::watch::Ending;
-use super::{effects, output, report, stop, watch};
+use super::{effects, output, poses, report, stop, watch};
 use crate::config::{ExplicitRunConfig, RunConfig};
 use crate::say::say;
 use in_folder::IN_RUN_AND_ON_COMMAND_LINE;
@@ -36,7 +36,12 @@ pub(crate) use result::{HeldOut, TrainResult};
 pub(crate) use run_status::RunStatus;
 use summary::Summary;
 
-pub(crate) fn run(args: &Args) -> Result<ExitCode> {
+pub(crate) fn run(mut args: Args) -> Result<ExitCode> {
+    if args.finds_poses() {
+        let Some(capture) = poses_of(&args)? else { return Ok(ExitCode::from(stop::INTERRUPTED)) };
+        args.train_on(capture);
+    }
+    let args = &args;
     match args.resume() {
         Some(path) => resume(args, path),
         None if args.is_dry_run() => dry_run(args),
@@ -44,6 +49,20 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
         None if args.continues() => begin_or_go_on(args),
         None => begin(args),
     }
+}
+
+/// The capture that photographs or a film become; `None` where that was stopped.
+fn poses_of(args: &Args) -> Result<Option<PathBuf>> {
+    let none = Path::new("");
+    let (photographs, output) = args.named_paths(none, none);
+    // What would refuse the run must not do so after hours.
+    let run = args.run_folder(output)?;
+    RunFolder::check(&run, args.overwrite())?;
+    if !args.is_explicit() {
+        let config = args.resolved()?;
+        args.output(&source_of(&config), &config.output, BUNDLE, &run)?;
+    }
+    poses::capture_to_train(photographs, output)
 }
 
 fn resume(args: &Args, path: &Path) -> Result<ExitCode> {

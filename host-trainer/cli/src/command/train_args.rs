@@ -18,7 +18,7 @@ use super::capture::CaptureArgs;
 use super::devices::{DeviceChoice, DeviceOption};
 use super::outputs::{OverwriteArgs, check_name, reading_capture};
 use super::settings::{QualityOptions, RunOptions, applied};
-use crate::config::heading::{DEVICE, OUTPUT, QUALITY, RUN};
+use crate::config::heading::{DEVICE, INPUT, OUTPUT, QUALITY, RUN};
 use crate::config::named::{TARGETS, level_number, one_of};
 use crate::config::{CaptureOptions, EXPLICIT, ExplicitRunConfig, Preset, RunConfig, absolute};
 use crate::say::say;
@@ -32,6 +32,9 @@ pub(crate) struct Args {
     /// Folder of the capture.
     #[arg(required_unless_present_any = ["config", "resume", "from"])]
     dataset: Option<PathBuf>,
+    /// First find the poses of photographs or a film, as `pocketsplat poses` does; the capture is left in OUT.capture.
+    #[arg(long, conflicts_with_all = ["config", "resume", "from", "dry_run"], help_heading = INPUT, hide_short_help = true)]
+    poses: bool,
     #[command(flatten)]
     capture: CaptureOptions,
     /// Bundle to write; with --backbone 3dgs a .ply
@@ -224,6 +227,16 @@ impl Args {
     /// Capture and output of a run as the command line names them, else as its configuration does.
     pub(crate) fn named_paths<'a>(&'a self, dataset: &'a Path, output: &'a Path) -> (&'a Path, &'a Path) {
         (self.dataset.as_deref().unwrap_or(dataset), self.output.as_deref().unwrap_or(output))
+    }
+
+    /// Whether poses are found before.
+    pub(crate) fn finds_poses(&self) -> bool {
+        self.poses
+    }
+
+    /// The same with another capture.
+    pub(crate) fn train_on(&mut self, capture: PathBuf) {
+        self.dataset = Some(capture);
     }
 
     /// Whether nothing is to be trained.

@@ -21,13 +21,9 @@ pub(super) fn cases() -> Vec<Case> {
             Fatal,
             "no-capture",
             &[
-                "/images` holds 12 photographs but no poses; make poses with COLMAP and give this folder again:\n  colmap \
-                 feature_extractor --database_path /",
-                "/images --ImageReader.single_camera 1",
-                "\n  colmap exhaustive_matcher --database_path /",
-                "\n  mkdir -p /",
-                "\n  colmap mapper --database_path /",
-                "/sparse",
+                "/images` holds 12 photographs but no poses; find them, and give the folder `/",
+                "`:\n  pocketsplat poses /",
+                "\n(`pocketsplat train --poses` does so before it trains)",
             ],
             |_| {},
         ),
@@ -37,9 +33,8 @@ pub(super) fn cases() -> Vec<Case> {
             Fatal,
             "no-capture",
             &[
-                "holds 2 photographs but no poses; convert those of a format that is not read:\n  magick mogrify -format jpg \
-                 -quality 95 '",
-                "/*.HEIC'\nthen make poses with COLMAP",
+                "holds 2 photographs but no poses; find them, and give the folder `/",
+                "-capture`:\n  pocketsplat poses /",
             ],
             |f| {
                 std::fs::remove_dir_all(f.at("images")).expect("images");
@@ -55,7 +50,7 @@ pub(super) fn cases() -> Vec<Case> {
             &[
                 "holds 7 photographs but no poses; convert those of a format that is not read:\n  magick mogrify -format jpg \
                  -quality 95 '",
-                "/*.ARW'\nthen make poses with COLMAP",
+                "/*.ARW'\nthen find them, and give the folder `/",
             ],
             |f| {
                 std::fs::remove_dir_all(f.at("images")).expect("images");
@@ -69,7 +64,11 @@ pub(super) fn cases() -> Vec<Case> {
             Nerfstudio,
             Fatal,
             "no-capture",
-            &["/walk.MOV` is a film, needed: photographs with poses; take 2 photographs a second", "ffmpeg -i /"],
+            &[
+                "/walk.MOV` is a film, needed: photographs with poses; find them, and give the folder `/",
+                "/walk`:\n  pocketsplat poses /",
+                "/walk.MOV -o /",
+            ],
             |f| {
                 std::fs::remove_dir_all(f.at("images")).expect("images");
                 f.write("walk.MOV", "");

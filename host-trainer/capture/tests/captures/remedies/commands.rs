@@ -4,15 +4,16 @@ use super::*;
 
 #[test]
 fn remedies_for_captures_without_poses() {
-    /// What COLMAP's mapper leaves in `sparse/0`, `--output_path`: "the reconstructed models are written to numbered folders".
+    /// What `poses` leaves in the folder that the command names; the command's own tests run it.
     fn reconstruct(fixture: &mut Fixture, said: &str) -> (PathBuf, LoadOptions) {
-        let sparse = said.lines().find_map(|line| line.split_once("mkdir -p ")).expect("a command").1;
-        assert_eq!(unquoted(sparse), fixture.at("sparse"));
+        let (photographs, capture) = poses_in(said);
+        assert_eq!(unquoted(photographs), fixture.path());
+        assert_eq!(unquoted(capture), fixture.path());
         fixture.write_files();
         again(fixture)
     }
     check_all(&[
-        trouble("photographs", ColmapBinary, "make poses with COLMAP and give this folder again", |_| {}, reconstruct),
+        trouble("photographs", ColmapBinary, "find them, and give the folder `", |_| {}, reconstruct),
         trouble(
             "a camera of Polycam cut",
             Nerfstudio,
@@ -40,6 +41,12 @@ fn remedies_for_captures_without_poses() {
             },
         ),
     ]);
+}
+
+/// The photographs and the capture of the command that finds poses.
+fn poses_in(said: &str) -> (&str, &str) {
+    let command = said.lines().find_map(|line| line.trim().strip_prefix("pocketsplat poses ")).expect("a command");
+    command.split_once(" -o ").expect("an output")
 }
 
 /// The path of a word of a shell.
@@ -97,8 +104,8 @@ fn a_folder_that_is_no_utf_8_is_named_so_that_it_can_be_found() {
     assert!(json.contains("caf\\\\xe9"), "{json}");
     std::fs::remove_dir_all(odd.join("sparse")).expect("written");
     let error = load(&odd, &LoadOptions::default()).expect_err("no poses").to_string();
-    let word = error.lines().find_map(|line| line.split_once("mkdir -p ")).expect("a command").1;
-    assert!(word.starts_with("\"$(printf '") && word.ends_with("/caf\\351/sparse')\""), "{word}");
+    let (word, _) = poses_in(&error);
+    assert!(word.starts_with("\"$(printf '") && word.ends_with("/caf\\351')\""), "{word}");
 }
 
 #[test]

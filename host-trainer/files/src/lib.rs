@@ -11,4 +11,4 @@ mod shell;
 
 pub use kind::FileKind;
 pub use output::{Content, MARK, Output, OutputError, Outputs, write_whole};
-pub use shell::{shell_word, shown};
+pub use shell::{beside, shell_word, shown};

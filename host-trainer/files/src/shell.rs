@@ -1,6 +1,6 @@
 //! Paths in messages and in commands that people copy.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A path as one word of a POSIX shell: in quotes where it holds what a shell would take apart or replace, by the numbers of its
 /// bytes where it is no UTF-8, and never like an option.
@@ -19,6 +19,17 @@ pub fn shown(path: &Path) -> String {
         text.extend(chunk.invalid().iter().map(|byte| format!("\\x{byte:02x}")));
     }
     text
+}
+
+/// A path beside another one, of its whole name and `ending`: what a command makes of a file or folder.
+pub fn beside(path: &Path, ending: &str) -> PathBuf {
+    // `.` has no name of its own.
+    let named = if path.file_name().is_some() { Ok(path.to_owned()) } else { path.canonicalize() };
+    let mut named = named.unwrap_or_else(|_| path.to_owned());
+    let mut name = named.file_name().unwrap_or_default().to_owned();
+    name.push(ending);
+    named.set_file_name(name);
+    named
 }
 
 /// Bytes that no text has, as `printf` of POSIX writes them.
@@ -43,6 +54,13 @@ fn printed(_: &Path) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_made_of_a_folder_stands_beside_it() {
+        assert_eq!(beside(Path::new("trip.2026.11"), ".psb"), Path::new("trip.2026.11.psb"));
+        assert_eq!(beside(Path::new("photos/cup/"), "-capture"), Path::new("photos/cup-capture"));
+        assert!(beside(Path::new("."), "-capture").is_absolute());
+    }
 
     #[test]
     fn a_path_is_one_word() {

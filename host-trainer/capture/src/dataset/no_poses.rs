@@ -1,8 +1,8 @@
 //! What to tell someone who gives photographs, a film or a packed capture where a capture is needed.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use pocketsplat_files::{shell_word, shown};
+use pocketsplat_files::{beside, shell_word, shown};
 
 use super::image_names::{conversion, has_foreign_name, is_image_name};
 
@@ -60,7 +60,7 @@ fn photographs(folder: &Path) -> Option<String> {
         });
         // Photographs that have to be converted are not left where they are.
         let stays = place == "images" && foreign.is_empty();
-        let capture = if stays { folder.to_owned() } else { beside(folder) };
+        let capture = if stays { folder.to_owned() } else { beside(folder, "-capture") };
         return Some(format!(
             "`{}` holds {n} photograph{} but no poses; {convert}{}",
             shown(&images),
@@ -69,17 +69,6 @@ fn photographs(folder: &Path) -> Option<String> {
         ));
     }
     None
-}
-
-/// A folder of a similar name, for what is made of a folder.
-fn beside(folder: &Path) -> PathBuf {
-    // `.` has no name of its own.
-    let named = if folder.file_name().is_some() { Ok(folder.to_owned()) } else { folder.canonicalize() };
-    let mut named = named.unwrap_or_else(|_| folder.to_owned());
-    let mut name = named.file_name().unwrap_or_default().to_owned();
-    name.push("-capture");
-    named.set_file_name(name);
-    named
 }
 
 /// The command that finds poses and leaves them in `capture`.

@@ -24,7 +24,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::{LoadOptions, Severity, diagnose, layout_of};
-use pocketsplat_files::shell_word;
+use pocketsplat_files::{beside, shell_word};
 
 use self::child::Work;
 use self::colmap::Colmap;
@@ -89,7 +89,7 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     report.diagnosis = Some(diagnosis);
     output::print_or(&report, args.json, &report)?;
     if n_errors == 0 {
-        let (capture, bundle) = (shell_word(&args.output), shell_word(&place::beside(&args.output, ".psb")));
+        let (capture, bundle) = (shell_word(&args.output), shell_word(&beside(&args.output, ".psb")));
         say!("next:  pocketsplat train {capture} -o {bundle}");
         return Ok(ExitCode::SUCCESS);
     }

@@ -10,13 +10,12 @@ use std::sync::Mutex;
 use anyhow::{Context, Result, anyhow, bail};
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder as _, ImageEncoder as _, ImageReader};
-use pocketsplat_files::{FileKind, shell_word, shown};
+use pocketsplat_files::{FileKind, beside, shell_word, shown};
 use rayon::prelude::*;
 
 use super::child::{Ended, Work};
 use super::inputs::Photograph;
 use super::kinds::{Treatment, extension};
-use super::place::beside;
 use super::programs::{FFMPEG, HEIF_CONVERT, HEIF_DEC};
 use super::progress::Progress;
 use super::taking::{FEWEST, Taken};

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::layout_of;
-use pocketsplat_files::{Outputs, shell_word, shown};
+use pocketsplat_files::{Outputs, beside, shell_word, shown};
 
 use super::inputs::Given;
 use super::log::Log;
@@ -19,17 +19,6 @@ const MODELS: [&str; 2] = ["models", "models-2"];
 /// Lists of photographs and of pairs, while COLMAP reads them.
 pub(super) const LIST: &str = "poses-list.txt";
 pub(super) const PAIRS: &str = "poses-pairs.txt";
-
-/// A path beside a folder, of its name and `ending`.
-pub(super) fn beside(folder: &Path, ending: &str) -> PathBuf {
-    // `.` has no name of its own.
-    let named = if folder.file_name().is_some() { Ok(folder.to_owned()) } else { folder.canonicalize() };
-    let mut path = named.unwrap_or_else(|_| folder.to_owned());
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(ending);
-    path.set_file_name(name);
-    path
-}
 
 /// A folder that a search works in, and no other.
 pub(super) struct Place {
@@ -60,9 +49,8 @@ impl Place {
         Outputs::folder(folder)?;
         let log = Log::open(&folder.join(LOG))?;
         let of_others = lies_here || begun.as_ref().is_some_and(|state| state.in_place);
-        let is_new = begun.is_none() || begins_anew.is_some();
         let clears = begins_anew.is_some();
-        let state = begun.filter(|_| !is_new).unwrap_or_else(|| State::new(asked, lies_here));
+        let state = begun.filter(|_| !clears).unwrap_or_else(|| State::new(asked, lies_here));
         let place = Self { folder: folder.to_owned(), log, state };
         if clears {
             place.clear(!of_others)?;
@@ -239,7 +227,5 @@ mod tests {
         fs::write(capture.join(LIST), "mine").unwrap();
         let said = Place::open(&capture, &given, settings(None), false).err().unwrap().to_string();
         assert!(said.contains("holds poses-list.txt"), "{said}");
-        assert_eq!(beside(Path::new("trip.2026.11"), ".psb"), Path::new("trip.2026.11.psb"));
-        assert!(beside(Path::new("."), "-capture").is_absolute());
     }
 }

@@ -49,8 +49,16 @@ impl Exposures {
     /// As [`Buffer::zeros`].
     pub fn new(gpu: &Gpu) -> Result<Self, GpuError> {
         Ok(Self {
-            shift: Kernel::new(gpu, "exposure", &[GROUPS, include_str!("exposure/shift.wgsl")]),
-            scale: Kernel::new(gpu, "exposure backward", &[GROUPS, include_str!("exposure/scale.wgsl")]),
+            shift: Kernel::new(
+                gpu,
+                "exposure",
+                &[GROUPS, include_str!("exposure/gain.wgsl"), include_str!("exposure/shift.wgsl")],
+            ),
+            scale: Kernel::new(
+                gpu,
+                "exposure backward",
+                &[GROUPS, include_str!("exposure/gain.wgsl"), include_str!("exposure/scale.wgsl")],
+            ),
             sums: Kernel::new(gpu, "sums for an exposure", &[GROUPS, include_str!("exposure/sums.wgsl")]),
             sum: Sum::new(gpu),
             parts: Buffer::zeros(gpu, "parts of sums for an exposure", 1)?,

@@ -1,14 +1,6 @@
 // [3, height, width].
 @group(0) @binding(0) var<storage, read_write> d_planes: array<f32>;
 
-struct Parameters {
-    n_pixels: u32,
-    gain: array<f32, 3>,
-    foot: f32,
-}
-
-var<immediate> parameters: Parameters;
-
 @compute @workgroup_size(256)
 fn scale(
     @builtin(workgroup_id) group: vec3<u32>,
@@ -17,6 +9,6 @@ fn scale(
 ) {
     let i = item_of(group, n_groups, thread);
     if i < 3u * parameters.n_pixels {
-        d_planes[i] *= parameters.gain[i / parameters.n_pixels];
+        d_planes[i] *= gain_of(i);
     }
 }

@@ -2,14 +2,6 @@
 @group(0) @binding(0) var<storage, read> image: array<f32>;
 @group(0) @binding(1) var<storage, read_write> shown: array<f32>;
 
-struct Parameters {
-    n_pixels: u32,
-    gain: array<f32, 3>,
-    foot: f32,
-}
-
-var<immediate> parameters: Parameters;
-
 @compute @workgroup_size(256)
 fn shift(
     @builtin(workgroup_id) group: vec3<u32>,
@@ -18,7 +10,6 @@ fn shift(
 ) {
     let i = item_of(group, n_groups, thread);
     if i < 3u * parameters.n_pixels {
-        let gain = parameters.gain[i / parameters.n_pixels];
-        shown[i] = gain * (image[i] + parameters.foot) - parameters.foot;
+        shown[i] = gain_of(i) * (image[i] + parameters.foot) - parameters.foot;
     }
 }

@@ -9,6 +9,7 @@ use anyhow::{Context as _, Result, ensure};
 use image::codecs::jpeg::JpegEncoder;
 use image::imageops::replace;
 use image::{Rgb, RgbImage};
+use pocketsplat_trainer::revision_of;
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -48,11 +49,13 @@ pub(super) fn run(args: &Args) -> Result<()> {
     }
     let program = fs::canonicalize(&args.program)
         .with_context(|| format!("{} is missing; build it: cargo build --release", args.program.display()))?;
+    let version = String::from_utf8(said_by(Command::new(&program).arg("--version"))?)?;
+    let revision = revision_of(version.trim().trim_start_matches("pocketsplat ")).to_owned();
     fs::create_dir_all(&args.out)?;
     let (out, captures) = (fs::canonicalize(&args.out)?, fs::canonicalize(&args.captures)?);
     let end = args.hours.map(|hours| Instant::now() + Duration::from_secs_f64(3600.0 * hours));
     for group in plan.groups.iter().filter(|group| args.groups.is_empty() || args.groups.contains(&group.name)) {
-        let runs = GroupRuns { group, program: &program, folder: out.join(&group.name) };
+        let runs = GroupRuns { group, program: &program, revision: &revision, folder: out.join(&group.name) };
         runs.all(&captures, end, args.seeds.unwrap_or(usize::MAX))?;
         blocks::write(&plan)?;
     }
@@ -73,11 +76,14 @@ struct Measured {
 struct GroupRuns<'a> {
     group: &'a Group,
     program: &'a Path,
+    /// Version and revision of that program.
+    revision: &'a str,
     folder: PathBuf,
 }
 
 impl GroupRuns<'_> {
-    /// Each run in turn, the first seeds first; the CSV is written after each.
+    /// Each run in turn, the first seeds first; the CSV is written after each. Figures of the same revision stay as they are, so that
+    /// another machine can go on; those of another revision go.
     fn all(&self, captures: &Path, end: Option<Instant>, n_seeds: usize) -> Result<()> {
         let name = &self.group.name;
         if let Some((script, capture)) = &self.group.script {
@@ -92,7 +98,8 @@ impl GroupRuns<'_> {
         let mut seeds: Vec<Option<u64>> = planned.iter().map(seed_of).collect();
         seeds.dedup();
         seeds.truncate(n_seeds);
-        let known = rows::read(name)?;
+        let mut known = rows::read(name)?;
+        known.retain(|row| revision_of(&row.program) == self.revision);
         let mut table: Vec<Row> = planned.iter().map(row_of).collect::<Result<_>>()?;
         // Runs of captures that are elsewhere keep their figures.
         let elsewhere = known.iter().filter(|row| table.iter().all(|other| other.scene != row.scene));
@@ -108,12 +115,23 @@ impl GroupRuns<'_> {
                 println!("{name}: out of time; the same command goes on");
                 return Ok(());
             }
+            if table[i].is_measured() && (self.group.picture_of_view.is_none() || self.bundle_of(run).exists()) {
+                continue;
+            }
             println!("{name}: {} of {}  {}", i + 1, planned.len(), table[i].run);
             self.measured(run, &mut table[i])?;
             keep(&table)?;
         }
-        self.kept_curve()?;
-        self.kept_picture(&planned)
+        // Drawn of the bundles themselves.
+        if planned.iter().filter(|run| seeds.contains(&seed_of(run))).all(|run| self.bundle_of(run).exists()) {
+            self.kept_curve()?;
+            self.kept_picture(&planned)?;
+        }
+        Ok(())
+    }
+
+    fn bundle_of(&self, run: &Value) -> PathBuf {
+        self.folder.join(format!("{}.psb", run["name"].as_str().unwrap_or_default()))
     }
 
     /// The rows that a script measures; it goes on where it was stopped.
@@ -258,7 +276,7 @@ impl GroupRuns<'_> {
         let mut images = Vec::new();
         let first_seed = planned.first().map(|run| &run["place"]["seed"]);
         for run in planned.iter().filter(|run| Some(&run["place"]["seed"]) == first_seed) {
-            let bundle = self.folder.join(format!("{}.psb", run["name"].as_str().unwrap_or_default()));
+            let bundle = self.bundle_of(run);
             let (capture, png) = (run["capture"].as_str().unwrap_or_default(), bundle.with_extension("png"));
             let view = view.to_string();
             let options = [

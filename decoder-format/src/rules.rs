@@ -6,6 +6,10 @@ pub const NEAR: f32 = 0.2;
 /// Added to both variances of a projected covariance, so that no splat is thinner than about a pixel, px² (Kerbl et al. 2023).
 pub const DILATION_PX2: f64 = 0.3;
 
+/// The same in frames far smaller than those of training: what a pixel's own width asks for, 1/12 px², twice, as a Gaussian is
+/// narrower in its middle than a box.
+pub const SHRUNK_DILATION_PX2: f32 = 1.0 / 6.0;
+
 /// How far the dilation makes a splat reach beyond its extent in space: √(2 ln 255 · 0.3) and rounding, pixels.
 pub const DILATION_REACH_PX: f64 = 1.9;
 

@@ -4,17 +4,17 @@ import { bake } from "./bake.mjs";
 import { Canvas } from "./blend.mjs";
 import { decodeChunk } from "./chunk.mjs";
 import { evaluate, passesPrefilter, placeAnchor } from "./evaluate.mjs";
-import { project } from "./project.mjs";
+import { dilation, project } from "./project.mjs";
 
 /** Splats of the first tiers, in the order of the file. */
 function* splats(bundle, camera, nTiers) {
-  const { compensation } = bundle.header.features;
+  const blur = dilation(bundle.header, camera);
   for (let i = 0; i < bundle.tiers[nTiers - 1].nChunks; i++) {
     for (const anchor of decodeChunk(bundle, i)) {
       const place = placeAnchor(bundle, anchor);
       if (bundle.gaussians === null && !passesPrefilter(camera, place)) continue;
       for (const gaussian of evaluate(bundle, anchor, place, camera.eye)) {
-        const splat = project(camera, bundle.gaussians ? bake(gaussian) : gaussian, compensation);
+        const splat = project(camera, bundle.gaussians ? bake(gaussian) : gaussian, blur);
         if (splat !== null) yield splat;
       }
     }

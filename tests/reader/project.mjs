@@ -5,7 +5,8 @@ import { bitsOf, dot, f32Of, half, ln, min, sqrt, trunc } from "./maths.mjs";
 
 const f = Math.fround;
 const BLUR = f(0.3);
-const BLUR_SQUARED = f32Of(0x3db851ec);
+const SIXTH = f32Of(0x3e2aaaab);
+const [LEAST_SIZE, MOST_SIZE] = [1 / 4096, 4096];
 const SLACK = f32Of(0x3c23d70a);
 export const LN_255 = f32Of(0x40b15208);
 export const TILE = 16;
@@ -56,18 +57,33 @@ function tiles(centre, reach, size) {
 
 /** A precision as it is kept, in eleven significant bits. */
 function precision(x) {
-  const n = Math.floor((Math.max(bitsOf(x) - 0x20800000, 0) + 0x1000) / 8192);
-  return f32Of(Math.min(n, 65535) * 8192 + 0x20800000);
+  const n = Math.floor((Math.max(bitsOf(x) - 0x21000000, 0) + 0x1000) / 8192);
+  return f32Of(Math.min(n, 65535) * 8192 + 0x21000000);
+}
+
+/** What a frame adds to variances, and what of it opacities were trained with: {added, trained, fades}. */
+export function dilation(header, camera) {
+  const { width, height } = camera;
+  const asTrained = ([w, h]) => (w === width && h === height) || (w === height && h === width);
+  const compensated = header.features.compensation;
+  if (asTrained(header.trainingSize)) return { added: BLUR, trained: compensated ? 0 : BLUR, fades: compensated };
+  const [fx, fy] = header.preview.focal;
+  const ratio = f(f(camera.fx / fx) * f(camera.fy / fy));
+  const size = ratio > LEAST_SIZE ? Math.min(ratio, MOST_SIZE) : LEAST_SIZE;
+  const trained = f(BLUR * size);
+  const added = size < 1 ? f(trained + f(f(1 - size) * SIXTH)) : trained;
+  return { added, trained: compensated ? 0 : trained, fades: compensated || size < 1 };
 }
 
 /** The splat of a Gaussian as blending sees it, or null if nothing of it is drawn. */
-export function project(camera, gaussian, compensated) {
+export function project(camera, gaussian, { added, trained, fades }) {
   const [x, y, z] = camera.toCamera(gaussian.centre);
   if (!(z > NEAR)) return null;
   const { pp, qq, xy, bare } = (gaussian.rotation ? anisotropic : isotropic)(camera, x, y, z, gaussian);
-  const [xx, yy] = [f(pp + BLUR), f(qq + BLUR)];
-  const det = f(f(bare + f(BLUR * f(pp + qq))) + BLUR_SQUARED);
-  const opacity = compensated ? f(gaussian.opacity * sqrt(f(bare / det))) : gaussian.opacity;
+  const [xx, yy] = [f(pp + added), f(qq + added)];
+  const detWith = (blur) => f(f(bare + f(blur * f(pp + qq))) + f(blur * blur));
+  const det = detWith(added);
+  const opacity = fades ? f(gaussian.opacity * sqrt(f(detWith(trained) / det))) : gaussian.opacity;
   const lo = ln(opacity);
   const reach = f(2 * f(lo + LN_255));
   if (!(reach >= 0 && Number.isFinite(det))) return null;

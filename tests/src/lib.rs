@@ -13,6 +13,7 @@
 //!   picture in silence?
 //! * `passes`: does a frame go over its scene as seldom as it can, in no more memory than it says, and does damage leave nothing behind?
 //! * `tiers`: is each tier's scene part of the next one's, and is a file cut at its end that scene?
+//! * `sizes`: does a frame that is larger or smaller than those of training show the same picture?
 //! * `digests`: do symbols not depend on the number of threads?
 //! * `orbit`: is the decoder's orbit the one that the manifest was measured over?
 //! * `stopwatch`: is a stopwatch told of every stage, in order, without a change of the frame?

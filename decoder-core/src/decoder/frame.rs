@@ -70,7 +70,7 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
     #[inline(always)]
     pub(super) fn begin_frame(&mut self, camera: &Camera) -> Result<Drawing<'_, 'b, 's, A>, DecodeError> {
         let budget = self.plan.budget();
-        let view = View::new(camera)?.cutting_at(budget.quality.alpha_cut);
+        let view = View::of(self.bundle.header(), camera)?.cutting_at(budget.quality.alpha_cut);
         in_range(Field::FrameWidth, camera.width_px.into(), 1, budget.width_px.into())?;
         in_range(Field::FrameHeight, camera.height_px.into(), 1, budget.height_px.into())?;
         let strips = StripLayout::new(camera.height_px, self.plan.n_strips());

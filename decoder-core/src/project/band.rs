@@ -1,6 +1,5 @@
 //! What a horizontal band of the image, or of depth, can see: a second test after that of the whole image.
 
-use super::cull::DILATION_REACH_PX;
 use super::view::{View, dot};
 use crate::scene::{Anchor, Gaussian, ink_radius};
 
@@ -35,7 +34,7 @@ impl View {
     /// The band from row `first_px` up to row `end_px`.
     pub(crate) fn band(&self, [first_px, end_px]: [u16; 2]) -> Band {
         let ([_, fy], [_, cy]) = (self.focal_px, self.principal_px);
-        let reach = DILATION_REACH_PX + RECT_SLACK_PX;
+        let reach = self.dilation.reach_px + RECT_SLACK_PX;
         let [_, row_y, row_z] = self.rotation;
         let [_, ty, tz] = self.translation;
         let ([_, min], [_, max]) = (self.slope_min, self.slope_max);

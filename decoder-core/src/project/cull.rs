@@ -1,14 +1,12 @@
 //! What a view can see: boxes of chunks, then anchors.
 
 use pocketsplat_format::bundle::Chunk;
-use pocketsplat_format::rules::{self, NEAR};
+use pocketsplat_format::rules::NEAR;
 use pocketsplat_format::{Bundle, Camera, DecodeError};
 
 use super::covariance::Covariance;
+use super::dilation::Dilation;
 use super::view::View;
-
-/// How far beyond its 3D extent a splat reaches on the image, pixels.
-pub(super) const DILATION_REACH_PX: f32 = rules::DILATION_REACH_PX as f32;
 
 /// The chunks of the first `tiers` tiers that a frame of `camera` needs: those whose ink box it can see, in file order.
 ///
@@ -22,7 +20,7 @@ pub fn chunks_in_view<'b>(
     camera: &Camera,
     tiers: u8,
 ) -> Result<impl Iterator<Item = Chunk<'b>> + use<'b>, DecodeError> {
-    let view = View::new(camera)?;
+    let view = View::of(bundle.header(), camera)?;
     let n_chunks = bundle.up_to_tier(tiers).n_chunks;
     Ok(bundle.chunks().take(n_chunks as usize).filter(move |chunk| view.sees_box(chunk.ink_box())))
 }
@@ -67,16 +65,17 @@ impl View {
         let [width, height] = self.size_px;
         let [min_x, min_y] = self.slope_min;
         let [max_x, max_y] = self.slope_max;
+        let reach_px = self.dilation.reach_px;
         let steepest = |from: f32, limit: f32, other: f32| {
             // The slope of a splat beyond this side lies between the image's edge and the clamp.
             let clamp = if limit.abs() > other.abs() { limit.abs() } else { other.abs() };
             if from > clamp { from } else { clamp }
         };
         [
-            (true, 1.0, steepest((cx + DILATION_REACH_PX) / fx, min_x, max_x)),
-            (true, -1.0, steepest((width - cx + DILATION_REACH_PX) / fx, max_x, min_x)),
-            (false, 1.0, steepest((cy + DILATION_REACH_PX) / fy, min_y, max_y)),
-            (false, -1.0, steepest((height - cy + DILATION_REACH_PX) / fy, max_y, min_y)),
+            (true, 1.0, steepest((cx + reach_px) / fx, min_x, max_x)),
+            (true, -1.0, steepest((width - cx + reach_px) / fx, max_x, min_x)),
+            (false, 1.0, steepest((cy + reach_px) / fy, min_y, max_y)),
+            (false, -1.0, steepest((height - cy + reach_px) / fy, max_y, min_y)),
         ]
     }
 
@@ -97,7 +96,7 @@ impl View {
             return true;
         }
         let rows = self.jacobian(point).map(|[a, b, c]| [a * l0, b * l1, c * l2]);
-        let covariance = Covariance::from_rows(rows);
+        let covariance = Covariance::from_rows(rows, Dilation::AS_TRAINED);
         let half_difference = 0.5 * (covariance.xx - covariance.yy);
         // mid² − det, written without the difference of two large numbers.
         let spread = half_difference * half_difference + covariance.xy * covariance.xy;

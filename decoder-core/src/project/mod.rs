@@ -5,6 +5,7 @@
 mod band;
 mod covariance;
 mod cull;
+mod dilation;
 mod packed;
 mod splat;
 mod tile;

@@ -6,8 +6,8 @@ use pocketsplat_half::from_halves;
 
 use super::splat::Splat;
 
-/// Bits of 2⁻⁶², which stands for every smaller precision: a deviation of 2·10⁹ px.
-const LEAST_PRECISION: u32 = (127 - 62) << 23;
+/// Bits of 2⁻⁶¹, which stands for every smaller precision: a deviation of 1.5·10⁹ px.
+const LEAST_PRECISION: u32 = (127 - 61) << 23;
 /// What a float has more digits than are kept.
 const DIGITS_DROPPED: u32 = 13;
 
@@ -85,11 +85,11 @@ impl HalfFields {
 }
 
 /// Rounds a precision to eleven bits, as a half has them; but six bits of exponent and no sign, because precisions lie
-/// between 1/0.3 px⁻², the dilation's, and those of splats far larger than a frame whose rim alone may cross it.
+/// between 6 px⁻², that of the least dilation, and those of splats far larger than a frame whose rim alone may cross it.
 fn pack_precision(precision: f32) -> u16 {
     let above = precision.to_bits().saturating_sub(LEAST_PRECISION);
     let rounded = above.saturating_add(1 << (DIGITS_DROPPED - 1)) >> DIGITS_DROPPED;
-    // Not reached: the largest stands for 4.
+    // Not reached: the largest stands for 8.
     rounded.min(u16::MAX.into()) as u16
 }
 
@@ -105,7 +105,7 @@ mod tests {
 
     #[test]
     fn splats_of_all_sizes_keep_eleven_bits() {
-        for sigma_px in [0.55_f32, 1.0, 7.3, 120.0, 5000.0, 1e5, 1e9] {
+        for sigma_px in [0.41_f32, 1.0, 7.3, 120.0, 5000.0, 1e5, 5e8] {
             let precision = 1.0 / (sigma_px * sigma_px);
             let splat = Splat {
                 mean: [-123.456, 7.891],

@@ -47,14 +47,14 @@ impl View {
             return None;
         }
         let covariance = if cfg!(feature = "anisotropy") && effects.anisotropic {
-            Covariance::from_rows(self.sphere_to_image(point, gaussian))
+            Covariance::from_rows(self.sphere_to_image(point, gaussian), self.dilation)
         } else {
             let [deviation, ..] = gaussian.scale;
-            Covariance::of_isotropic(self.slopes(point), self.focal_px.map(|f| f / depth * deviation))
+            Covariance::of_isotropic(self.slopes(point), self.focal_px.map(|f| f / depth * deviation), self.dilation)
         };
         let mut opacity = gaussian.opacity;
-        if effects.dilation_compensation {
-            opacity *= pocketsplat_half::sqrt(covariance.det_bare / covariance.det);
+        if self.dilation.fades {
+            opacity *= pocketsplat_half::sqrt(covariance.det_trained / covariance.det);
         }
         let log_opacity = F::ln(opacity + self.lost_opacity);
         // Squared Mahalanobis radius at which alpha is the least that draws.

@@ -1,6 +1,9 @@
 //! A camera, with what depends on it alone computed once a frame.
 
+use pocketsplat_format::bundle::Header;
 use pocketsplat_format::{Camera, DecodeError};
+
+use super::dilation::Dilation;
 
 /// Beyond the image by this part of its size the Jacobian stops growing.
 const CLAMP_MARGIN: f32 = 0.15;
@@ -26,6 +29,8 @@ pub(crate) struct View {
     /// Limits of x/z and y/z in the Jacobian.
     pub(super) slope_min: [f32; 2],
     pub(super) slope_max: [f32; 2],
+    /// Of splats.
+    pub(super) dilation: Dilation,
     /// −ln of the alpha below which a splat draws nothing.
     pub(super) log_cut: f32,
     /// How much more of a splat's rim that leaves out than in training, as opacity.
@@ -33,7 +38,13 @@ pub(crate) struct View {
 }
 
 impl View {
-    /// Checks the camera and prepares it.
+    /// Checks the camera and prepares it for a scene.
+    pub(crate) fn of(header: &Header, camera: &Camera) -> Result<Self, DecodeError> {
+        let view = Self::new(camera)?;
+        Ok(Self { dilation: Dilation::of(header, camera), ..view })
+    }
+
+    /// The same for a scene whose training images were as large as the camera's.
     pub(crate) fn new(camera: &Camera) -> Result<Self, DecodeError> {
         camera.check()?;
         let [fx, fy] = camera.focal_px;
@@ -49,6 +60,7 @@ impl View {
             size_px: [width, height],
             slope_min: [-(cx / fx + margin_x), -(cy / fy + margin_y)],
             slope_max: [(width - cx) / fx + margin_x, (height - cy) / fy + margin_y],
+            dilation: Dilation::AS_TRAINED,
             log_cut: LN_255,
             lost_opacity: 0.0,
         })

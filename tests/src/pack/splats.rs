@@ -227,6 +227,8 @@ fn layers() -> Vec<Blob> {
 pub fn samples() -> Vec<Sample> {
     let anisotropic = Effects { anisotropic: true, background: true, ..NO_EFFECT };
     let small = Camera { principal_px: [41.5, 17.25], focal_px: [50.0, 58.0], ..camera(71, 50) };
+    // As large as the training images, with another lens.
+    let turned = camera(48, 64);
     let baked = |mut draft: Draft| {
         draft.gaussians = true;
         draft
@@ -250,7 +252,7 @@ pub fn samples() -> Vec<Sample> {
             "splats-isotropic",
             "The same as isotropic Gaussians of the first deviation.",
             draft(&shapes_of_splats(), isotropic),
-            &[small],
+            &[small, turned],
         ),
         sample(
             "splats-baked",

@@ -14,7 +14,7 @@ use pocketsplat_kernels::scene::{Head, Heads, ModelShape};
 
 /// A centre at this depth or nearer is not drawn, normalised units: the f32 nearest to 0.2, since a jump has no tolerance.
 const NEAR: f64 = 0.2_f32 as f64;
-/// Variance of the screen-space low-pass filter, px² (Zwicker et al. 2001).
+/// Variance of the screen-space low-pass filter of training, px² (Zwicker et al. 2001).
 const DILATION: f64 = 0.3;
 /// One step of an 8-bit channel: a fainter contribution is skipped, here as in training.
 const ALPHA_MIN: f64 = 1.0 / 255.0;
@@ -42,6 +42,24 @@ pub struct ReferenceScene {
     pub drawn: Vec<bool>,
     /// The heads.
     pub heads: Heads<f64>,
+    /// What its training images were like; where it is not said, every frame is drawn as a training image.
+    pub trained: Option<TrainedFrame>,
+}
+
+/// The images that a scene was trained on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrainedFrame {
+    /// Width and height, pixels.
+    pub size_px: [u32; 2],
+    /// Focal lengths of one of them, pixels.
+    pub focal_px: [f64; 2],
+}
+
+/// What is added to a splat's variances, and which part of it opacities were trained with, px².
+#[derive(Clone, Copy)]
+struct Dilation {
+    added: f64,
+    trained: f64,
 }
 
 /// One Gaussian on the image plane.
@@ -75,7 +93,8 @@ impl ReferenceScene {
     pub fn render_with(&self, quality: Quality, camera: &Camera, background: [f64; 3]) -> Vec<[f64; 3]> {
         let alpha_min = f64::from(quality.alpha_cut) * ALPHA_MIN;
         let (width, height) = (camera.width_px as usize, camera.height_px as usize);
-        let splats_of = |a| self.splats_of(a, camera, quality);
+        let dilation = self.dilation(camera);
+        let splats_of = |a| self.splats_of(a, camera, dilation, quality);
         let mut splats: Vec<Splat> = (0..self.positions.len()).flat_map(splats_of).collect();
         // Stable: equal depths stay in the order of anchor, then offset.
         splats.sort_by(|a, b| a.depth.total_cmp(&b.depth));
@@ -110,8 +129,23 @@ impl ReferenceScene {
         colour.iter().zip(&transmittance).map(|(&c, &t)| (c + background * t).to_array()).collect()
     }
 
+    /// DRAWING.md, section 6.
+    fn dilation(&self, camera: &Camera) -> Dilation {
+        let [width, height] = [camera.width_px, camera.height_px];
+        let as_trained = |frame: &TrainedFrame| frame.size_px == [width, height] || frame.size_px == [height, width];
+        let size_squared = match self.trained.filter(|frame| !as_trained(frame)) {
+            Some(TrainedFrame { focal_px: [fx, fy], .. }) => {
+                (camera.focal_px[0] * camera.focal_px[1] / (fx * fy)).clamp(1.0 / 4096.0, 4096.0)
+            }
+            None => 1.0,
+        };
+        let trained = DILATION * size_squared;
+        let added = trained + (1.0 - size_squared).max(0.0) / 6.0;
+        Dilation { added, trained: if self.shape.dilation_compensation { 0.0 } else { trained } }
+    }
+
     /// The Gaussians of one anchor that this view draws, in the order of their offsets.
-    fn splats_of(&self, anchor: usize, camera: &Camera, quality: Quality) -> Vec<Splat> {
+    fn splats_of(&self, anchor: usize, camera: &Camera, dilation: Dilation, quality: Quality) -> Vec<Splat> {
         let (n_features, n_offsets) = (self.shape.feature_dim, self.shape.n_offsets);
         let position = self.positions[anchor];
         let n_log_scales = if self.shape.anisotropic { 6 } else { 4 };
@@ -164,7 +198,7 @@ impl ReferenceScene {
                 covariance,
                 opacity,
                 colour,
-                self.shape.dilation_compensation,
+                dilation,
                 camera,
                 f64::from(quality.alpha_cut),
             ));
@@ -236,20 +270,22 @@ fn splat(
     covariance: DMat3,
     opacity: f64,
     colour: DVec3,
-    compensate: bool,
+    dilation: Dilation,
     camera: &Camera,
     alpha_cut: f64,
 ) -> Option<Splat> {
     let (mean_px, depth, [xx, xy, yy]) = project(position, covariance, camera)?;
-    let plain_determinant = xx * yy - xy * xy;
-    let (xx, yy) = (xx + DILATION, yy + DILATION);
-    let determinant = xx * yy - xy * xy;
+    let dilated_by = |added: f64| [xx + added, yy + added];
+    let determinant_of = |[xx, yy]: [f64; 2]| xx * yy - xy * xy;
+    let trained_determinant = determinant_of(dilated_by(dilation.trained));
+    let [xx, yy] = dilated_by(dilation.added);
+    let determinant = determinant_of([xx, yy]);
     // What no f32 holds is not drawn, a deviation of 4·10⁹ px.
     if determinant <= 0.0 || determinant > f64::from(f32::MAX) {
         return None;
     }
-    // The dilated splat keeps the energy of the plain one (Yu et al. 2024, Mip-Splatting, eq. 8).
-    let compensation = if compensate { (plain_determinant / determinant).max(0.0).sqrt() } else { 1.0 };
+    // The dilated splat keeps the energy of the one that was trained (Yu et al. 2024, Mip-Splatting, eq. 8).
+    let compensation = (trained_determinant / determinant).max(0.0).sqrt();
     let opacity = opacity * compensation;
     if opacity < ALPHA_MIN {
         return None;

@@ -1,6 +1,7 @@
 //! What the frames of a bundle show: cameras, and Gaussians at the limits of drawing.
 
 use pocketsplat_codec::bundle::decoded_scene;
+use pocketsplat_format::bundle::Header;
 use pocketsplat_format::math::tanh;
 use pocketsplat_format::{Bundle, Camera};
 use pocketsplat_kernels::scene::{Head, Scene};
@@ -16,6 +17,12 @@ pub(super) const OTHERS: &[&str] = &[
     "a height that tiles do not divide",
     "a principal point off the centre",
     "pixels that are not square",
+    "a frame of the training size",
+    "a frame of the training size, the other way up",
+    "a frame larger than those of training",
+    "a frame larger than those of training, compensated",
+    "a frame smaller than those of training",
+    "a frame smaller than those of training, compensated",
     "a camera among the anchors",
     "anchors that the prefilter leaves out",
     "a frame of background alone",
@@ -56,6 +63,7 @@ pub(super) fn mark(found: &mut Found, bundle: &Bundle<'_>, sample: &Sample) {
         found.mark(height % 16 != 0 && height > 16, "a height that tiles do not divide");
         found.mark([2.0 * cx, 2.0 * cy] != [width, height].map(f32::from), "a principal point off the centre");
         found.mark(fx != fy, "pixels that are not square");
+        mark_size(found, header, &camera, report.splats);
         let eye = camera.centre();
         found.mark(eye.iter().all(|x| x.abs() < 0.4) && report.splats > 0 && tiers > 1, "a camera among the anchors");
         found.mark(!is_baked && report.anchors_visible < report.anchors_read, "anchors that the prefilter leaves out");
@@ -74,6 +82,23 @@ pub(super) fn mark(found: &mut Found, bundle: &Bundle<'_>, sample: &Sample) {
             mark_gaussians(found, &scene, &camera);
         }
     }
+}
+
+/// Which rule of dilation a frame falls under.
+fn mark_size(found: &mut Found, header: &Header, camera: &Camera, n_splats: u32) {
+    let ([width, height], [fx, fy]) = ([camera.width_px, camera.height_px], camera.focal_px);
+    let [trained_fx, trained_fy] = header.preview.focal_px;
+    let is_trained = [width, height] == header.training_px;
+    let is_turned = width != height && [height, width] == header.training_px;
+    let is_other = !is_trained && !is_turned && n_splats > 0;
+    let size_2 = fx / trained_fx * (fy / trained_fy);
+    let compensated = header.features.effects.dilation_compensation;
+    found.mark(is_trained, "a frame of the training size");
+    found.mark(is_turned && n_splats > 0, "a frame of the training size, the other way up");
+    found.mark(is_other && !compensated && size_2 > 1.0, "a frame larger than those of training");
+    found.mark(is_other && compensated && size_2 > 1.0, "a frame larger than those of training, compensated");
+    found.mark(is_other && !compensated && size_2 < 1.0, "a frame smaller than those of training");
+    found.mark(is_other && compensated && size_2 < 1.0, "a frame smaller than those of training, compensated");
 }
 
 /// One Gaussian of a scene of one offset an anchor that stands where its anchor stands.

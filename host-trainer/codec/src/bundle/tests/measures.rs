@@ -25,7 +25,7 @@ fn cameras() -> Vec<Camera> {
     (0..12)
         .map(|i| {
             let turn = glam::DMat3::from_rotation_y(0.5 * f64::from(i));
-            let base = camera(70, 50);
+            let base = camera(64, 48);
             Camera {
                 rotation: base.rotation * turn,
                 translation: DVec3::new(0.3, 0.1, 0.8 + 0.3 * f64::from(i)),

@@ -5,7 +5,7 @@ use pocketsplat_format::bundle::{AnchorSite, Coder};
 use pocketsplat_format::context::{Context, Group};
 use pocketsplat_format::{Bundle, DecodeError};
 
-use super::ReferenceScene;
+use super::{ReferenceScene, TrainedFrame};
 use crate::bundle::{ContextWork, decoded_heads, shape_of};
 use pocketsplat_kernels::real::Real;
 use pocketsplat_kernels::scene::Scene;
@@ -24,6 +24,7 @@ impl ReferenceScene {
             log_scales: anchors.log_scales,
             offsets: anchors.offsets,
             heads,
+            trained: None,
         }
     }
 
@@ -46,6 +47,10 @@ impl ReferenceScene {
             offsets: Vec::new(),
             drawn: Vec::new(),
             heads: decoded_heads(bundle).map(|head| head.map(f64::from)),
+            trained: Some(TrainedFrame {
+                size_px: header.training_px.map(u32::from),
+                focal_px: header.preview.focal_px.map(f64::from),
+            }),
         };
         let mut words = vec![0; bundle.anchor_scratch_words()];
         let mut models = bundle.anchor_models(&mut words)?;

@@ -56,7 +56,7 @@ fn scene_of(balls: &[Ball]) -> ReferenceScene {
     }
     let positions = balls.iter().map(|b| DVec3::from(b.position)).collect();
     let (offsets, drawn) = (vec![0.0; 3 * n], vec![true; n]);
-    ReferenceScene { shape, prefilters: true, positions, features, log_scales, offsets, drawn, heads }
+    ReferenceScene { shape, prefilters: true, positions, features, log_scales, offsets, drawn, heads, trained: None }
 }
 
 fn camera() -> Camera {

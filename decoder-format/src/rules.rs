@@ -3,11 +3,11 @@
 /// Centres at this depth or nearer are not drawn, normalised units (Kerbl et al. 2023, 3D Gaussian splatting).
 pub const NEAR: f32 = 0.2;
 
-/// Added to both variances of a projected covariance, so that no splat is thinner than about a pixel, px² (Kerbl et al. 2023).
+/// Added in frames of the training size to both variances of a projected covariance, so that no splat is thinner than about a pixel, px² (Kerbl et al. 2023).
 pub const DILATION_PX2: f64 = 0.3;
 
-/// The same in frames far smaller than those of training: what a pixel's own width asks for, 1/12 px², twice, as a Gaussian is
-/// narrower in its middle than a box.
+/// Added beside it in smaller frames, times 1 − s² where they have s times the size: chosen by measurement (a box of one pixel has a
+/// variance of 1/12 px²).
 pub const SHRUNK_DILATION_PX2: f32 = 1.0 / 6.0;
 
 /// How far the dilation makes a splat reach beyond its extent in space: √(2 ln 255 · 0.3) and rounding, pixels.

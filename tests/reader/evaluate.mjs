@@ -6,7 +6,7 @@ const f = Math.fround;
 export const NEAR = f32Of(0x3e4ccccd);
 const FAINTEST = f32Of(0x3b808081);
 const SMALLEST_NORM = f32Of(0x2b8cbccc);
-const [BLUR, LEAST_SPREAD] = [f(0.3), f(0.1)];
+const LEAST_SPREAD = f(0.1);
 
 /** W·x + b of rows from `first` on: bias first, then inputs ascending. */
 function layer(weights, biases, inputs, first, outputs) {
@@ -38,11 +38,11 @@ export function placeAnchor({ header }, anchor) {
   };
 }
 
-export function passesPrefilter(camera, { position, extent }) {
+export function passesPrefilter(camera, { position, extent }, { added }) {
   const [x, y, z] = camera.toCamera(position);
   if (!(z > NEAR)) return false;
   const [p, q] = camera.jacobian(x, y, z).map((row) => row.map((j, axis) => f(j * extent[axis])));
-  const [xx, xy, yy] = [f(dot(p, p) + BLUR), dot(p, q), f(dot(q, q) + BLUR)];
+  const [xx, xy, yy] = [f(dot(p, p) + added), dot(p, q), f(dot(q, q) + added)];
   const halfDifference = f(0.5 * f(xx - yy));
   const spread = max(f(f(halfDifference * halfDifference) + f(xy * xy)), LEAST_SPREAD);
   const radius = Math.ceil(f(3 * sqrt(f(f(0.5 * f(xx + yy)) + sqrt(spread)))));

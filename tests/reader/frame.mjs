@@ -12,7 +12,7 @@ function* splats(bundle, camera, nTiers) {
   for (let i = 0; i < bundle.tiers[nTiers - 1].nChunks; i++) {
     for (const anchor of decodeChunk(bundle, i)) {
       const place = placeAnchor(bundle, anchor);
-      if (bundle.gaussians === null && !passesPrefilter(camera, place)) continue;
+      if (bundle.gaussians === null && !passesPrefilter(camera, place, blur)) continue;
       for (const gaussian of evaluate(bundle, anchor, place, camera.eye)) {
         const splat = project(camera, bundle.gaussians ? bake(gaussian) : gaussian, blur);
         if (splat !== null) yield splat;

@@ -67,12 +67,13 @@ export function dilation(header, camera) {
   const asTrained = ([w, h]) => (w === width && h === height) || (w === height && h === width);
   const compensated = header.features.compensation;
   if (asTrained(header.trainingSize)) return { added: BLUR, trained: compensated ? 0 : BLUR, fades: compensated };
-  const [fx, fy] = header.preview.focal;
-  const ratio = f(f(camera.fx / fx) * f(camera.fy / fy));
-  const size = ratio > LEAST_SIZE ? Math.min(ratio, MOST_SIZE) : LEAST_SIZE;
-  const trained = f(BLUR * size);
-  const added = size < 1 ? f(trained + f(f(1 - size) * SIXTH)) : trained;
-  return { added, trained: compensated ? 0 : trained, fades: compensated || size < 1 };
+  const { focal: [fx, fy], size } = header.preview;
+  const toTraining = f(f(size[0] * size[1]) / f(header.trainingSize[0] * header.trainingSize[1]));
+  const ratio = f(f(f(camera.fx / fx) * f(camera.fy / fy)) * toTraining);
+  const s2 = ratio > LEAST_SIZE ? Math.min(ratio, MOST_SIZE) : LEAST_SIZE;
+  const trained = f(BLUR * s2);
+  const added = s2 < 1 ? f(trained + f(f(1 - s2) * SIXTH)) : trained;
+  return { added, trained: compensated ? 0 : trained, fades: compensated || s2 < 1 };
 }
 
 /** The splat of a Gaussian as blending sees it, or null if nothing of it is drawn. */

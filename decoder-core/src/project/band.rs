@@ -151,6 +151,7 @@ impl Side {
 mod tests {
     use super::{Band, View};
     use crate::functions::Reference;
+    use crate::project::dilation::Dilation;
     use crate::scene::{Anchor, Gaussian};
     use pocketsplat_format::bundle::Effects;
     use pocketsplat_format::{Camera, Rotation};
@@ -178,7 +179,8 @@ mod tests {
             width_px: 80,
             height_px: HEIGHT_PX,
         };
-        View::new(&camera).expect("a sound camera")
+        let view = View::new(&camera).expect("a sound camera");
+        View { dilation: Dilation::at(random.between(-3.0, 3.0).exp2()), ..view }
     }
 
     #[test]

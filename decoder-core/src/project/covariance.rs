@@ -67,7 +67,7 @@ mod tests {
     fn of_an_isotropic_gaussian_it_is_that_of_the_rows_of_its_jacobian() {
         for (tx, ty) in [(0.0, 0.0), (0.3, -0.7), (-1.9, 0.02), (5.0, 6.0)] {
             for (a, b) in [(1e-4_f32, 2e-4_f32), (0.7, 0.5), (300.0, 310.0), (6e3, 1e4)] {
-                let dilation = Dilation::AS_TRAINED;
+                let dilation = Dilation { trained_px2: 0.1, ..Dilation::AS_TRAINED };
                 let rows = Covariance::from_rows([[a, 0.0, -a * tx], [0.0, b, -b * ty]], dilation);
                 let short = Covariance::of_isotropic([tx, ty], [a, b], dilation);
                 let near = |found: f32, expected: f32| (found - expected).abs() <= 1e-6 * expected.abs();

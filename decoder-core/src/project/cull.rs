@@ -5,7 +5,6 @@ use pocketsplat_format::rules::NEAR;
 use pocketsplat_format::{Bundle, Camera, DecodeError};
 
 use super::covariance::Covariance;
-use super::dilation::Dilation;
 use super::view::View;
 
 /// The chunks of the first `tiers` tiers that a frame of `camera` needs: those whose ink box it can see, in file order.
@@ -96,7 +95,7 @@ impl View {
             return true;
         }
         let rows = self.jacobian(point).map(|[a, b, c]| [a * l0, b * l1, c * l2]);
-        let covariance = Covariance::from_rows(rows, Dilation::AS_TRAINED);
+        let covariance = Covariance::from_rows(rows, self.dilation);
         let half_difference = 0.5 * (covariance.xx - covariance.yy);
         // mid² − det, written without the difference of two large numbers.
         let spread = half_difference * half_difference + covariance.xy * covariance.xy;
@@ -111,6 +110,7 @@ impl View {
 mod tests {
     use super::View;
     use crate::functions::Reference;
+    use crate::project::dilation::Dilation;
     use crate::scene::Gaussian;
     use pocketsplat_format::bundle::Effects;
     use pocketsplat_format::{Camera, Rotation};
@@ -145,6 +145,7 @@ mod tests {
                 height_px: 60,
             };
             let view = View::new(&camera).expect("a sound camera");
+            let view = View { dilation: Dilation::at(between(-6.0, 2.0).exp2()), ..view };
             let scale = 1e-4_f32;
             let gaussian =
                 Gaussian { centre, scale: [scale; 3], rotation: [1.0, 0.0, 0.0, 0.0], opacity: 1.0, colour: [0.0; 3] };

@@ -36,36 +36,39 @@ impl Dilation {
 
     /// In frames of this camera.
     ///
-    /// s² is the ratio of fx·fy to that of the preview, which is a training camera; cameras of the training size, either way up, are drawn
-    /// as training drew them, whatever their focal lengths.
+    /// s² is the ratio of fx·fy to that of the preview, which is a training camera, brought to the training size. Cameras of the training
+    /// size, either way up, are drawn as training drew them, whatever their focal lengths.
     pub(super) fn of(header: &Header, camera: &Camera) -> Self {
         let is_compensated = header.features.effects.dilation_compensation;
-        Self::for_frame(is_compensated, header.training_px, header.preview.focal_px, camera)
+        Self::for_frame(is_compensated, header.training_px, &header.preview, camera)
     }
 
-    fn for_frame(
-        is_compensated: bool,
-        [width_px, height_px]: [u16; 2],
-        [trained_fx, trained_fy]: [f32; 2],
-        camera: &Camera,
-    ) -> Self {
+    fn for_frame(is_compensated: bool, training_px: [u16; 2], preview: &Camera, camera: &Camera) -> Self {
+        let [width_px, height_px] = training_px;
         let size_px = [camera.width_px, camera.height_px];
         let mut dilation = Self::AS_TRAINED;
-        if size_px != [width_px, height_px] && size_px != [height_px, width_px] {
-            let [fx, fy] = camera.focal_px;
-            let ratio = fx / trained_fx * (fy / trained_fy);
-            // The least also of NaN, from absurd cameras.
-            let size_2 = if ratio > LEAST_SIZE_2 { ratio.min(MOST_SIZE_2) } else { LEAST_SIZE_2 };
-            dilation.trained_px2 *= size_2;
-            dilation.fades = size_2 < 1.0;
-            let missed = if dilation.fades { (1.0 - size_2) * SHRUNK_DILATION_PX2 } else { 0.0 };
-            dilation.added_px2 = dilation.trained_px2 + missed;
-            dilation.reach_px *= pocketsplat_half::sqrt(dilation.added_px2 / Self::AS_TRAINED.added_px2);
+        if size_px != training_px && size_px != [height_px, width_px] {
+            let [[fx, fy], [preview_fx, preview_fy]] = [camera.focal_px, preview.focal_px];
+            let area = |[width, height]: [u16; 2]| (u32::from(width) * u32::from(height)) as f32;
+            let to_training = area([preview.width_px, preview.height_px]) / area(training_px);
+            dilation = Self::at(fx / preview_fx * (fy / preview_fy) * to_training);
         }
         if is_compensated {
             (dilation.trained_px2, dilation.fades) = (0.0, true);
         }
         dilation
+    }
+
+    /// In frames of √`size_2` times the training size, of a scene without compensation.
+    pub(super) fn at(size_2: f32) -> Self {
+        // The least also of NaN, from absurd cameras.
+        let size_2 = if size_2 > LEAST_SIZE_2 { size_2.min(MOST_SIZE_2) } else { LEAST_SIZE_2 };
+        let as_trained = Self::AS_TRAINED;
+        let trained_px2 = as_trained.trained_px2 * size_2;
+        let fades = size_2 < 1.0;
+        let added_px2 = trained_px2 + if fades { (1.0 - size_2) * SHRUNK_DILATION_PX2 } else { 0.0 };
+        let reach_px = as_trained.reach_px * pocketsplat_half::sqrt(added_px2 / as_trained.added_px2);
+        Self { added_px2, trained_px2, fades, reach_px }
     }
 }
 
@@ -75,9 +78,9 @@ mod tests {
 
     use super::Dilation;
 
-    /// s² of a frame, from the dilation that it has.
+    /// Of a scene that was trained at 400×300 px.
     fn of(trained: [f32; 2], focal_px: [f32; 2], size_px: [u16; 2]) -> Dilation {
-        Dilation::for_frame(false, [400, 300], trained, &camera(focal_px, size_px))
+        Dilation::for_frame(false, [400, 300], &camera(trained, [400, 300]), &camera(focal_px, size_px))
     }
 
     fn camera(focal_px: [f32; 2], [width_px, height_px]: [u16; 2]) -> Camera {
@@ -108,7 +111,8 @@ mod tests {
         assert_eq!((double.added_px2, double.trained_px2, double.fades, double.reach_px), (1.2, 1.2, false, 3.8));
         let half = of([500.0, 480.0], [250.0, 240.0], [200, 150]);
         assert!((half.added_px2 - 0.2).abs() < 1e-7 && (half.trained_px2 - 0.075).abs() < 1e-7 && half.fades);
-        let compensated = Dilation::for_frame(true, [400, 300], [500.0, 480.0], &camera([250.0, 240.0], [200, 150]));
+        let small_preview = camera([125.0, 120.0], [100, 75]);
+        let compensated = Dilation::for_frame(true, [400, 300], &small_preview, &camera([250.0, 240.0], [200, 150]));
         assert_eq!((compensated.added_px2, compensated.trained_px2, compensated.fades), (half.added_px2, 0.0, true));
     }
 

@@ -37,7 +37,7 @@ impl View {
     /// Projects a Gaussian; `None` when it is too near, too faint, or draws no pixel of the image.
     ///
     /// # Budget
-    /// About 150 multiplications, 80 where Gaussians are isotropic, one logarithm, two square roots, constant.
+    /// About 150 multiplications, 80 where Gaussians are isotropic, one logarithm, two square roots, three where splats fade, constant.
     pub(crate) fn project<F: Functions>(&self, gaussian: &Gaussian, effects: Effects) -> Option<(Splat, TileRect)> {
         let point = self.to_camera(gaussian.centre);
         let [_, _, depth] = point;

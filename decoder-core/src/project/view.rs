@@ -29,7 +29,7 @@ pub(crate) struct View {
     /// Limits of x/z and y/z in the Jacobian.
     pub(super) slope_min: [f32; 2],
     pub(super) slope_max: [f32; 2],
-    /// Of splats.
+    /// What is added to the variances of splats.
     pub(super) dilation: Dilation,
     /// −ln of the alpha below which a splat draws nothing.
     pub(super) log_cut: f32,
@@ -44,7 +44,7 @@ impl View {
         Ok(Self { dilation: Dilation::of(header, camera), ..view })
     }
 
-    /// The same for a scene whose training images were as large as the camera's.
+    /// The same for a scene without compensation whose training images were as large as the camera's.
     pub(crate) fn new(camera: &Camera) -> Result<Self, DecodeError> {
         camera.check()?;
         let [fx, fy] = camera.focal_px;

@@ -11,9 +11,9 @@ because nothing that a capture shows comes within six orders of it.";
 const ANALYSIS: &str = "\
 Sizes are exponentials of coded logarithms, so their relative error is that of the exponential, 2e-7, at any size. Arguments beyond −87
 and 88 are clamped in decoder and oracle, where eˣ leaves the normal numbers. On the image a size appears only squared beside
-0.3 px²: below 10⁻⁴ px there is the dilation alone. At the other end Σ' grows with the square of a deviation and det Σ' with its fourth
+the dilation (0.3 px² at the training size): below 10⁻⁴ px there is the dilation alone. At the other end Σ' grows with the square of a deviation and det Σ' with its fourth
 power, which leaves f32 at 4·10⁹ px. The decoder keeps inverse variances with eleven bits and six of exponent, down to
-deviations of 2·10⁹ px. Halves would end at 60,000 px, and a splat as large whose rim crosses the frame would come out as another one.
+deviations of 1.5·10⁹ px. Halves would end at 60,000 px, and a splat as large whose rim crosses the frame would come out as another one.
 
 A quaternion is divided by its norm or by 10⁻¹², whichever is larger. Products of components above 10⁻¹² are normal f32, so no norm
 underflows on the way. Below the floor the rotation comes out as the identity, except for terms of the size of the quotient. At the

@@ -51,8 +51,8 @@ pub struct ReferenceScene {
 pub struct TrainedFrame {
     /// Width and height, pixels.
     pub size_px: [u32; 2],
-    /// Focal lengths of one of them, pixels.
-    pub focal_px: [f64; 2],
+    /// Product of the focal lengths of one of them that is as large, px².
+    pub focal_area_px2: f64,
 }
 
 /// What is added to a splat's variances, and which part of it opacities were trained with, px².
@@ -134,8 +134,8 @@ impl ReferenceScene {
         let [width, height] = [camera.width_px, camera.height_px];
         let as_trained = |frame: &TrainedFrame| frame.size_px == [width, height] || frame.size_px == [height, width];
         let size_squared = match self.trained.filter(|frame| !as_trained(frame)) {
-            Some(TrainedFrame { focal_px: [fx, fy], .. }) => {
-                (camera.focal_px[0] * camera.focal_px[1] / (fx * fy)).clamp(1.0 / 4096.0, 4096.0)
+            Some(TrainedFrame { focal_area_px2, .. }) => {
+                (camera.focal_px[0] * camera.focal_px[1] / focal_area_px2).clamp(1.0 / 4096.0, 4096.0)
             }
             None => 1.0,
         };
@@ -154,7 +154,7 @@ impl ReferenceScene {
         let size = |log: &[f64]| DVec3::from_slice(log).clamp(DVec3::splat(-87.0), DVec3::splat(88.0)).exp();
         let anchor_size = size(&log_scales[..3]);
         let base_size = if self.shape.anisotropic { size(&log_scales[3..]) } else { size(&[log_scales[3]; 3]) };
-        if self.prefilters && !anchor_is_visible(position, anchor_size, camera) {
+        if self.prefilters && !anchor_is_visible(position, anchor_size, dilation, camera) {
             return Vec::new();
         }
 
@@ -252,11 +252,11 @@ fn project(position: DVec3, covariance: DMat3, camera: &Camera) -> Option<(DVec2
 }
 
 /// The prefilter: whether the square around an anchor's own ellipsoid, three standard deviations far, meets the image.
-fn anchor_is_visible(position: DVec3, size: DVec3, camera: &Camera) -> bool {
+fn anchor_is_visible(position: DVec3, size: DVec3, dilation: Dilation, camera: &Camera) -> bool {
     let Some((mean, _, [xx, xy, yy])) = project(position, DMat3::from_diagonal(size * size), camera) else {
         return false;
     };
-    let (xx, yy) = (xx + DILATION, yy + DILATION);
+    let (xx, yy) = (xx + dilation.added, yy + dilation.added);
     let middle = 0.5 * (xx + yy);
     let largest_variance = middle + (middle * middle - (xx * yy - xy * xy)).max(0.1).sqrt();
     let radius = (3.0 * largest_variance.sqrt()).ceil();

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result, bail, ensure};
+use anyhow::{Context as _, Result, bail};
 use pocketsplat_trainer::{REVISION, revision_of};
 use serde::Deserialize;
 
@@ -72,7 +72,7 @@ impl Table {
             rows.extend(rows::read(group)?.into_iter().filter(shown).map(|row| Row { group: group.clone(), ..row }));
         }
         let columns = self.columns.iter().map(|name| column(name)).collect::<Result<Vec<_>>>()?;
-        let measured: Vec<&Row> = rows.iter().filter(|row| row.is_measured()).collect();
+        let measured = of_the_newest_program(&rows);
         let mut text = String::new();
         let heads = self.rows.iter().map(String::as_str).chain(columns.iter().map(|column| column.head));
         let heads: Vec<&str> = heads.chain(["seeds"]).collect();
@@ -98,7 +98,7 @@ impl Table {
             writeln!(text, "| {} |", cells.join(" | "))?;
         }
         text += &self.published_rows(&rows, &columns)?;
-        Ok(text + &caption(&measured)?)
+        Ok(text + &caption(&measured))
     }
 
     fn key(&self, row: &Row) -> Result<Vec<String>> {
@@ -167,16 +167,22 @@ impl Column {
     }
 }
 
+/// The rows that the newest of their programs measured: no table shows two.
+fn of_the_newest_program(rows: &[Row]) -> Vec<&Row> {
+    let newest = rows.iter().filter(|row| row.is_measured()).map(|row| revision_number(&row.program)).max();
+    rows.iter().filter(|row| row.is_measured() && Some(revision_number(&row.program)) == newest).collect()
+}
+
+/// The number after `r` in "0.1.0 r3 1a2b3c4".
+fn revision_number(program: &str) -> Option<u32> {
+    revision_of(program).rsplit(" r").next().and_then(|revision| revision.parse().ok())
+}
+
 /// Which program the figures are of, and whether there is a newer one.
-fn caption(measured: &[&Row]) -> Result<String> {
-    let mut programs: Vec<&str> = measured.iter().map(|row| revision_of(&row.program)).collect();
-    programs.sort_unstable();
-    programs.dedup();
-    ensure!(programs.len() < 2, "one table has figures of several programs: {}", programs.join(", "));
-    let Some(program) = programs.first() else { return Ok(String::new()) };
-    let revision = program.rsplit(" r").next().and_then(|revision| revision.parse::<u32>().ok());
-    let age = if revision == Some(REVISION) { "" } else { ", older than the present one" };
-    Ok(format!("\nMeans over seeds, ± their standard deviation. Program: {program}{age}.\n"))
+fn caption(measured: &[&Row]) -> String {
+    let Some(row) = measured.first() else { return String::new() };
+    let age = if revision_number(&row.program) == Some(REVISION) { "" } else { ", older than the present one" };
+    format!("\nMeans over seeds, ± their standard deviation. Program: {}{age}.\n", revision_of(&row.program))
 }
 
 /// README and all pages.
@@ -269,14 +275,14 @@ mod tests {
     }
 
     #[test]
-    fn figures_of_two_programs_are_refused_and_of_an_older_one_say_so() {
-        let rows = [row(1, Some(30.0), "0.1.0 r1 1a2b3c4"), row(2, Some(31.0), "0.0.9 r0")];
-        assert!(
-            caption(&[&rows[0], &rows[1]]).unwrap_err().to_string().contains("several programs: 0.0.9 r0, 0.1.0 r1")
-        );
-        assert!(caption(&[&rows[1]]).unwrap().contains("0.0.9 r0, older than the present one"));
+    fn a_table_shows_the_newest_program_alone_and_says_if_there_is_a_newer_one() {
+        let rows = [row(1, Some(30.0), "0.1.0 r9 1a2b3c4"), row(2, Some(31.0), "0.1.0 r10"), row(3, None, "")];
+        let shown: Vec<u64> = of_the_newest_program(&rows).iter().map(|row| row.seed).collect();
+        assert_eq!(shown, [2]);
+        assert!(of_the_newest_program(&rows[2..]).is_empty());
+        assert!(caption(&[&row(1, Some(30.0), "0.0.9 r0")]).contains("0.0.9 r0, older than the present one"));
         let now = row(1, Some(30.0), &format!("0.1.0 r{REVISION} 1a2b3c4-dirty"));
-        assert!(caption(&[&now]).unwrap().ends_with(&format!("Program: 0.1.0 r{REVISION}.\n")));
+        assert!(caption(&[&now]).ends_with(&format!("Program: 0.1.0 r{REVISION}.\n")));
     }
 
     #[test]

@@ -82,8 +82,8 @@ struct GroupRuns<'a> {
 }
 
 impl GroupRuns<'_> {
-    /// Each run in turn, the first seeds first; the CSV is written after each. Figures of the same revision stay as they are, so that
-    /// another machine can go on; those of another revision go.
+    /// Each run in turn, the first seeds first; the CSV is written after each. What the same revision measured, here or on another
+    /// machine, is not measured again.
     fn all(&self, captures: &Path, end: Option<Instant>, n_seeds: usize) -> Result<()> {
         let name = &self.group.name;
         if let Some((script, capture)) = &self.group.script {
@@ -98,8 +98,7 @@ impl GroupRuns<'_> {
         let mut seeds: Vec<Option<u64>> = planned.iter().map(seed_of).collect();
         seeds.dedup();
         seeds.truncate(n_seeds);
-        let mut known = rows::read(name)?;
-        known.retain(|row| revision_of(&row.program) == self.revision);
+        let known = rows::read(name)?;
         let mut table: Vec<Row> = planned.iter().map(row_of).collect::<Result<_>>()?;
         // Runs of captures that are elsewhere keep their figures.
         let elsewhere = known.iter().filter(|row| table.iter().all(|other| other.scene != row.scene));
@@ -115,19 +114,29 @@ impl GroupRuns<'_> {
                 println!("{name}: out of time; the same command goes on");
                 return Ok(());
             }
-            if table[i].is_measured() && (self.group.picture_of_view.is_none() || self.bundle_of(run).exists()) {
+            let is_done = table[i].is_measured() && revision_of(&table[i].program) == self.revision;
+            if is_done && (self.group.picture_of_view.is_none() || self.bundle_of(run).exists()) {
                 continue;
             }
             println!("{name}: {} of {}  {}", i + 1, planned.len(), table[i].run);
             self.measured(run, &mut table[i])?;
+            let found = revision_of(&table[i].program);
+            ensure!(
+                found == self.revision,
+                "{} has runs of {found}, the program is {}: choose another --out",
+                self.folder.display(),
+                self.revision
+            );
             keep(&table)?;
         }
-        // Drawn of the bundles themselves.
+        // Both are made of the runs of this machine.
         if planned.iter().filter(|run| seeds.contains(&seed_of(run))).all(|run| self.bundle_of(run).exists()) {
             self.kept_curve()?;
-            self.kept_picture(&planned)?;
+            self.kept_picture(&planned)
+        } else {
+            println!("{name}: some runs lie on another machine; curve and picture stay as they are");
+            Ok(())
         }
-        Ok(())
     }
 
     fn bundle_of(&self, run: &Value) -> PathBuf {

@@ -1,7 +1,7 @@
 //! Where the oracle's scenes come from.
 
 use glam::DVec3;
-use pocketsplat_format::bundle::{AnchorSite, Coder};
+use pocketsplat_format::bundle::{AnchorSite, Coder, Header};
 use pocketsplat_format::context::{Context, Group};
 use pocketsplat_format::{Bundle, DecodeError};
 
@@ -49,7 +49,7 @@ impl ReferenceScene {
             heads: decoded_heads(bundle).map(|head| head.map(f64::from)),
             trained: Some(TrainedFrame {
                 size_px: header.training_px.map(u32::from),
-                focal_px: header.preview.focal_px.map(f64::from),
+                focal_area_px2: focal_area_px2(header),
             }),
         };
         let mut words = vec![0; bundle.anchor_scratch_words()];
@@ -90,6 +90,14 @@ impl ReferenceScene {
         }
         Ok(scene)
     }
+}
+
+/// Product of the preview's focal lengths, were it of the training size.
+fn focal_area_px2(header: &Header) -> f64 {
+    let preview = &header.preview;
+    let area = |[width, height]: [u16; 2]| f64::from(width) * f64::from(height);
+    let larger_by = area(header.training_px) / area([preview.width_px, preview.height_px]);
+    preview.focal_px.map(f64::from).iter().product::<f64>() * larger_by
 }
 
 /// base·2^(q/8) of the three groups, exact where the decoder multiplies tabulated factors.

@@ -58,7 +58,8 @@ pub fn measure(bundle: &Bundle<'_>, cameras: &[Camera], held_out: &[View]) -> Re
 ///
 /// Counts are those of the trainer's renderer, whose arithmetic differs from the decoder's in the last bits. Those of
 /// anchors are of the prefilter alone, pixel evaluations are those inside the splats' ellipses, as if no pixel ended
-/// early: both are upper bounds of what a decoder does. Cost: the splats of a frame a camera, no pixel of it.
+/// early: both are upper bounds of what a decoder does in
+/// frames of the training size. Cost: the splats of a frame a camera, no pixel of it.
 ///
 /// * `cameras`: over which maxima are taken.
 ///

@@ -3,7 +3,8 @@
 /// Centres at this depth or nearer are not drawn, normalised units (Kerbl et al. 2023, 3D Gaussian splatting).
 pub const NEAR: f32 = 0.2;
 
-/// Added in frames of the training size to both variances of a projected covariance, so that no splat is thinner than about a pixel, px² (Kerbl et al. 2023).
+/// Added in frames of the training size to both variances of a projected covariance, so that no splat is thinner than about a
+/// pixel, px² (Kerbl et al. 2023).
 pub const DILATION_PX2: f64 = 0.3;
 
 /// Added beside it in smaller frames, times 1 − s² where they have s times the size: chosen by measurement (a box of one pixel has a

@@ -293,11 +293,17 @@ job_package() {
   echo "builds with Rust $oldest"
 }
 
-# decoder-core links without an allocator, is no larger than sizes.csv says, and reaches no panic but those of a list that
+# decoder-core links without an allocator, is at most 1 % larger than in sizes.csv, and reaches no panic but those of a list that
 # may only shrink.
 job_link-gate() {
   need_embedded_target
   tests/link-gate/build.sh "$(llvm_tools)" "$embedded/link-gate"
+}
+
+# Not one of `jobs`: writes the table that `link-gate` compares with.
+job_bless-link-gate() {
+  need_embedded_target
+  tests/link-gate/build.sh "$(llvm_tools)" "$embedded/link-gate" bless
 }
 
 # Programs for Linux, with the emulator that runs each and the compiler that links it.

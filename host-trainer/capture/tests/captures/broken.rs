@@ -4,12 +4,13 @@
 //! costs views must be told in both reports, and the rest of the capture must load; what is doubtful must be told by the
 //! diagnosis; what is only odd must load whole.
 
+mod cameras;
 mod doubts;
 mod layouts;
 mod models;
 mod odd;
+mod photographs;
 mod transforms;
-mod views;
 
 use std::io::BufWriter;
 
@@ -171,7 +172,7 @@ fn damaged_transforms_files() {
 
 #[test]
 fn views_that_cannot_be_used() {
-    views::cases().iter().for_each(check);
+    cameras::cases().iter().chain(&photographs::cases()).for_each(check);
 }
 
 #[test]
@@ -186,11 +187,18 @@ fn captures_that_are_odd_but_whole() {
 
 #[test]
 fn names_of_cases_are_distinct_and_every_layout_is_broken_often() {
-    let cases: Vec<Case> =
-        [layouts::cases(), models::cases(), transforms::cases(), views::cases(), doubts::cases(), odd::cases()]
-            .into_iter()
-            .flatten()
-            .collect();
+    let cases: Vec<Case> = [
+        layouts::cases,
+        models::cases,
+        transforms::cases,
+        cameras::cases,
+        photographs::cases,
+        doubts::cases,
+        odd::cases,
+    ]
+    .into_iter()
+    .flat_map(|cases| cases())
+    .collect();
     assert!(cases.len() >= 100, "{} cases", cases.len());
     let names: std::collections::BTreeSet<_> = cases.iter().map(|case| case.name).collect();
     assert_eq!(names.len(), cases.len(), "names");

@@ -3,6 +3,7 @@
 pub(super) mod amounts;
 mod exposures;
 mod pictures;
+mod poses;
 mod sections;
 
 use std::path::{Path, PathBuf};
@@ -18,7 +19,7 @@ use super::capture::CaptureArgs;
 use super::eval::{Evaluation, Measurements, Renderer, measure};
 use super::output;
 use super::outputs::{self, OverwriteArgs, check_name, reading_capture};
-use super::train::result::ViewExposure;
+use super::train::result::{PoseChange, ViewExposure};
 use crate::config::{CaptureOptions, RunConfig};
 use crate::plot::{Recording, learning_curve_svg};
 use crate::say::say;
@@ -59,6 +60,7 @@ struct RunResult {
     train_processor_s: f64,
     peak_memory_bytes: Option<u64>,
     exposures: Option<Vec<ViewExposure>>,
+    poses: Option<Vec<PoseChange>>,
 }
 
 /// A run and its bundle, and the photographs where they are at hand.
@@ -153,6 +155,7 @@ fn html(run: &Run<'_>) -> Result<String> {
         ("BYTES", sections::bytes(&bundle)?),
         ("TIERS", sections::tiers(&bundle)?),
         ("EFFECTS", sections::effects(run.folder)? + &exposures::section(run.result.exposures.as_deref())?),
+        ("POSES", poses::section(run.result.poses.as_deref())),
         ("VIEWS", sections::views(run)),
         ("PROTOCOL", sections::protocol(run)?),
     ];

@@ -62,6 +62,9 @@ pub(crate) struct Args {
     /// Rate weight: a larger one makes smaller files [default: 0.002 times the share of opaque pixels; chosen by --bytes or --flash]
     #[arg(long, value_name = "X", help_heading = QUALITY)]
     lambda: Option<f64>,
+    /// Move the training cameras to where their photographs fit the scene best, for poses that are slightly off.
+    #[arg(long, help_heading = QUALITY, hide_short_help = true)]
+    refine: bool,
     #[command(flatten)]
     device: DeviceArgs,
     /// Configuration to read, as a run folder has it; what it does not say is as without it, but that nothing is chosen for a device, and
@@ -347,6 +350,7 @@ impl Args {
         if let Some(lambda) = self.lambda {
             config.train.hac.lambda = lambda;
         }
+        config.train.refine_poses |= self.refine;
         let frame = self.device.frame(self.capture.resolution, self.capture.max_resolution.is_some())?;
         let capture = CaptureOptions { resolution: frame, ..self.capture.clone() };
         let quality = match self.from {
@@ -387,6 +391,7 @@ impl Args {
         ];
         let others = [
             ("--lambda", self.lambda.is_some()),
+            ("--refine", self.refine),
             ("--watch", self.watch.is_some()),
             ("--device", matches!(self.trainer.trains_on, DeviceChoice::Gpu(_))),
         ];

@@ -1,5 +1,7 @@
 //! The camera as the operations see it.
 
+use glam::{DMat3, DQuat, DVec3};
+
 use crate::real::Real;
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_format::rules;
@@ -38,6 +40,32 @@ impl<R: Real> Pinhole<R> {
         }
     }
 
+    /// The camera after a small motion in its own frame: rotation exp(ω)·R and translation exp(ω)·t + τ for a twist `[ω, τ]` in radians
+    /// and normalised units (exp by Rodrigues' formula). A twist of 0 leaves it as it is, to the bit.
+    #[must_use]
+    pub fn moved(&self, twist: [f64; 6]) -> Self {
+        if twist == [0.0; 6] {
+            return *self;
+        }
+        let [x, y, z, tau @ ..] = twist;
+        let turn = DMat3::from_quat(DQuat::from_scaled_axis(DVec3::new(x, y, z)));
+        let rotation = turn * DMat3::from_cols_array_2d(&self.rotation.map(|row| row.map(Into::into))).transpose();
+        let translation = turn * DVec3::from_array(self.translation.map(Into::into)) + DVec3::from_array(tau);
+        let centre_world = -(rotation.transpose() * translation);
+        Self {
+            rotation: rotation.transpose().to_cols_array_2d().map(|row| row.map(R::real)),
+            translation: translation.to_array().map(R::real),
+            centre_world: centre_world.to_array().map(R::real),
+            ..*self
+        }
+    }
+
+    /// `R·v`: a vector of the world in the camera frame.
+    #[inline(always)]
+    pub fn turned(&self, world: [R; 3]) -> [R; 3] {
+        self.rotation.map(|row| row[0] * world[0] + row[1] * world[1] + row[2] * world[2])
+    }
+
     /// `R·p + t`.
     #[inline(always)]
     pub fn to_cam(&self, point_world: [R; 3]) -> [R; 3] {
@@ -68,5 +96,24 @@ impl<R: Real> Pinhole<R> {
         let (focal, principal) = (self.focal_px[axis], self.principal_px[axis]);
         let margin = R::real(0.15) * size;
         [-(principal + margin) / focal, (size - principal + margin) / focal]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::step::example::camera;
+
+    #[test]
+    fn a_camera_moves_in_its_own_frame() {
+        let given: Pinhole<f64> = Pinhole::new(&camera());
+        let (twist, point) = ([0.3, -0.2, 0.1, 0.4, 0.5, -0.6], [0.7, -0.8, 0.9]);
+        let moved = given.moved(twist);
+        let turn = DQuat::from_scaled_axis(DVec3::from_slice(&twist[..3]));
+        let expected = turn * DVec3::from_array(given.to_cam(point)) + DVec3::from_slice(&twist[3..]);
+        assert!((DVec3::from_array(moved.to_cam(point)) - expected).length() < 1e-12);
+        assert!(DVec3::from_array(moved.to_cam(moved.centre_world)).length() < 1e-12, "its centre is where it stands");
+        let single: Pinhole<f32> = Pinhole::new(&camera());
+        assert_eq!(single.moved([0.0; 6]).centre_world, single.centre_world, "to the bit");
     }
 }

@@ -11,6 +11,7 @@ mod fault;
 mod image;
 mod loss;
 pub mod parents;
+mod pose;
 mod probe;
 mod resident;
 pub mod sample;

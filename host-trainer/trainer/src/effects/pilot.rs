@@ -169,8 +169,15 @@ pub fn measure(
 fn pilot_config(config: &TrainConfig, effects: &[Effect]) -> TrainConfig {
     let (backbone, modules) = (Backbone::Scaffold, Modules { pruning: None, rdo: None, ..config.modules });
     let iterations = config.iteration_at(PILOT_SHARE).max(1);
-    let config =
-        TrainConfig { backbone, iterations, validation_every: 0, modules, exposure: ExposureChoice::Off, ..*config };
+    let config = TrainConfig {
+        backbone,
+        iterations,
+        validation_every: 0,
+        modules,
+        exposure: ExposureChoice::Off,
+        refine_poses: false,
+        ..*config
+    };
     Effect::measured_only(effects, &config)
 }
 

@@ -14,6 +14,7 @@ pub mod exposures;
 pub mod limits;
 pub mod modules;
 pub mod optimiser;
+pub mod poses;
 pub(crate) mod read_ahead;
 pub mod run;
 pub mod schedule;

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 pub struct TrainingViews<'a> {
     /// All of them, held out or not.
     pub all: &'a [View],
-    /// Their cameras.
+    /// Their cameras, as [`Self::move_camera`] left them.
     pub cameras: Vec<Pinhole<f32>>,
     /// Places in both of the views that are not held out.
     pub trained: Vec<u32>,
@@ -24,6 +24,11 @@ impl<'a> TrainingViews<'a> {
             cameras: all.iter().map(|view| Pinhole::new(&view.camera)).collect(),
             trained: (0u32..).take(all.len()).filter(|place| !is_held_out(*place as usize)).collect(),
         }
+    }
+
+    /// Moves the camera of a view by a [twist](Pinhole::moved) from where the capture has it.
+    pub fn move_camera(&mut self, place: usize, twist: [f64; 6]) {
+        self.cameras[place] = Pinhole::new(&self.all[place].camera).moved(twist);
     }
 
     /// The cameras of the views that are not held out.

@@ -73,6 +73,7 @@ impl ExplicitResult {
             photographs_waited_share: self.photographs_waited_share,
             iterations: self.iterations,
             dropped_steps: self.dropped_steps,
+            poses: None,
         }
     }
 }

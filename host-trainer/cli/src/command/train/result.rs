@@ -67,6 +67,9 @@ pub(crate) struct TrainResult {
     /// Of each training photograph, where they turned out to differ.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) exposures: Option<Vec<ViewExposure>>,
+    /// Of each training camera, where poses were refined.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) poses: Option<Vec<PoseChange>>,
     /// Largest amount of memory that the program has held, where the system tells.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) peak_memory_bytes: Option<u64>,
@@ -83,6 +86,15 @@ pub(crate) struct ViewExposure {
     pub(crate) view: String,
     /// Of red, green and blue light.
     pub(crate) stops: [f64; 3],
+}
+
+/// How far a training camera was moved from where the capture has it.
+#[derive(Debug, Serialize, Deserialize)]
+pub(crate) struct PoseChange {
+    pub(crate) view: String,
+    pub(crate) turned_degrees: f64,
+    /// Units of the capture.
+    pub(crate) moved: f64,
 }
 
 /// How good a bundle is on views that training did not see.
@@ -169,6 +181,14 @@ pub(super) fn write_bundle(
         exposures: trainer.exposure_stops().map(|stops| {
             let of_view = |(view, stops): (&View, [f64; 3])| ViewExposure { view: view.name.clone(), stops };
             capture.train.iter().zip(stops).map(of_view).collect()
+        }),
+        poses: trainer.pose_changes().map(|changes| {
+            let of_view = |(view, [turned_degrees, moved]): (&View, [f64; 2])| PoseChange {
+                view: view.name.clone(),
+                turned_degrees,
+                moved: moved / capture.normalisation.scale,
+            };
+            capture.train.iter().zip(changes).map(of_view).collect()
         }),
         peak_memory_bytes: peak_memory_bytes(),
         held_out,

@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::Path;
 
 use super::super::estimate::duration;
-use super::result::{HeldOut, TrainResult};
+use super::result::{HeldOut, PoseChange, TrainResult};
 
 /// What they want to know.
 pub(super) struct Summary<'a> {
@@ -21,6 +21,8 @@ pub(super) struct Summary<'a> {
     pub(super) photographs_waited_share: Option<f64>,
     pub(super) iterations: u32,
     pub(super) dropped_steps: u32,
+    /// Of all training cameras, where poses were refined.
+    pub(super) poses: Option<&'a [PoseChange]>,
 }
 
 impl<'a> Summary<'a> {
@@ -37,6 +39,7 @@ impl<'a> Summary<'a> {
             photographs_waited_share: result.photographs_waited_share,
             iterations: result.iterations,
             dropped_steps: result.dropped_steps,
+            poses: result.poses.as_deref(),
         }
     }
 }
@@ -64,6 +67,13 @@ impl fmt::Display for Summary<'_> {
         if let Some(share) = self.photographs_waited_share {
             writeln!(f, "waiting:  {:.1} % of that for photographs, which do not lie in memory", 100.0 * share)?;
         }
+        if let Some(poses) = self.poses {
+            let root_mean_square = |of: fn(&PoseChange) -> f64| {
+                (poses.iter().map(|p| of(p).powi(2)).sum::<f64>() / poses.len() as f64).sqrt()
+            };
+            let turned = root_mean_square(|pose| pose.turned_degrees);
+            writeln!(f, "poses:    cameras were turned by {turned:.2} degrees (root mean square), see result.json")?;
+        }
         if self.dropped_steps > 0 {
             writeln!(f, "dropped:  {} of the iterations, see progress.csv in the run folder", self.dropped_steps)?;
         }
@@ -90,6 +100,7 @@ mod tests {
             photographs_waited_share: None,
             iterations: 7000,
             dropped_steps: 0,
+            poses: None,
         };
         assert_eq!(
             summary.to_string(),
@@ -100,6 +111,9 @@ mod tests {
              time:     12 minutes for 7000 iterations, 22 minutes of one processor core\n"
         );
         let unmeasured = Summary { held_out: None, peak_memory_bytes: None, dropped_steps: 3, ..summary }.to_string();
+        let pose = |turned_degrees| PoseChange { view: String::new(), turned_degrees, moved: 0.0 };
+        let refined = Summary { poses: Some(&[pose(0.3), pose(0.4)]), ..summary }.to_string();
+        assert!(refined.contains("poses:    cameras were turned by 0.35 degrees"), "{refined}");
         let cached = Summary { photographs_waited_share: Some(0.0123), ..summary };
         assert!(cached.to_string().contains("waiting:  1.2 % of that for photographs"), "{cached}");
         assert!(unmeasured.contains("no view is held out") && unmeasured.contains("dropped:  3 of"), "{unmeasured}");

@@ -40,6 +40,9 @@ pub struct TrainConfig {
     /// Photographs that are exposed unlike each other.
     #[serde(default)]
     pub exposure: ExposureChoice,
+    /// Whether the training cameras are moved to where their photographs fit the scene best.
+    #[serde(default)]
+    pub refine_poses: bool,
     /// Growth and pruning.
     pub densification: Densification,
     /// The rate, where the backbone has one.
@@ -66,6 +69,7 @@ impl Default for TrainConfig {
             loss: LossWeights::default(),
             half_size: HalfSize::default(),
             exposure: ExposureChoice::default(),
+            refine_poses: false,
             densification: Densification::default(),
             hac: Hac::default(),
             modules: Modules::default(),

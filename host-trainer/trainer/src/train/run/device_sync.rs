@@ -17,9 +17,10 @@ use pocketsplat_kernels::step::{
 };
 
 impl Trainer<'_> {
-    /// Whether a device has this step as a whole.
+    /// Whether a device has this step as a whole; the gradients of poses are found here.
     pub(super) fn steps_on_device(&self, loss: &Loss<'_, f32>, coding: &Coding<'_, f32>) -> bool {
-        self.on_device(|device| device.can_step(&self.state.learned.scene, loss, coding)).unwrap_or(false)
+        let can_step = |device: &mut dyn Resident<f32>| device.can_step(&self.state.learned.scene, loss, coding);
+        !self.setup.config.refine_poses && self.on_device(can_step).unwrap_or(false)
     }
 
     /// What `f` says of the device, where there is one.

@@ -10,6 +10,7 @@ use crate::train::config::Backbone;
 use crate::train::density::Statistics;
 use crate::train::exposures::Exposures;
 use crate::train::optimiser::Optimiser;
+use crate::train::poses::Poses;
 use pocketsplat_kernels::scene::{Anchors, Heads, Scene};
 
 /// The scene and what belongs to it.
@@ -26,6 +27,8 @@ pub struct Learned {
     pub background: [f32; 3],
     /// How each training view was exposed.
     pub exposures: Exposures,
+    /// How far each training camera was moved.
+    pub poses: Poses,
     /// λ: weight of a value's bits in the loss, as configured until [a scene that has to fit](crate::train::limits) asks for another.
     pub lambda: f64,
 }
@@ -59,6 +62,7 @@ impl Learned {
             }
         }
         needs("exposures", self.exposures.len(), n_views)?;
+        needs("poses", self.poses.len(), n_views)?;
         needs("background", background.first.len(), 3)?;
         let lens =
             |heads: &Heads<f32>| heads.each().flat_map(|head| head.groups().map(<[f32]>::len)).collect::<Vec<_>>();

@@ -9,7 +9,8 @@ use crate::train::limits::LimitProbe;
 use crate::train::read_ahead::ReadAhead;
 use crate::train::views::TrainingViews;
 
-/// What a run was asked for; nothing of it changes while it goes on.
+/// What a run was asked for. Nothing of it changes while it goes on but the cameras of `views`, which follow from the state where poses are
+/// refined.
 #[derive(Clone, Debug)]
 pub struct Setup<'a, C> {
     /// The configuration, resolved for the capture.

@@ -13,6 +13,7 @@ use crate::train::exposures::{ExposureRun, Exposures};
 use crate::train::limits::{Finished, LimitProbe};
 use crate::train::modules::RunView;
 use crate::train::optimiser::Optimiser;
+use crate::train::poses::Poses;
 use crate::train::streams::{Purpose, random};
 use crate::train::views::{halved, target};
 use crate::train::worth::Probe;
@@ -67,6 +68,7 @@ impl Method for Neural {
             statistics: Statistics::default(),
             background: capture.background,
             exposures: Exposures::of_views(capture.train.len()),
+            poses: Poses::of_views(capture.train.len()),
             lambda: config.hac.lambda,
             scene,
         };
@@ -86,7 +88,11 @@ impl Method for Neural {
 
     fn restored(run: &mut Trainer<'_>) -> Result<(), CheckpointFault> {
         let Setup { config, capture, .. } = &run.setup;
-        run.state.learned.complete(config, config.voxel_size_for(capture), capture.train.len())
+        run.state.learned.complete(config, config.voxel_size_for(capture), capture.train.len())?;
+        for (place, twist) in run.state.learned.poses.twists().enumerate() {
+            run.setup.views.move_camera(place, twist);
+        }
+        Ok(())
     }
 
     fn iterate(run: &mut Trainer<'_>) -> Result<Outcome, TrainError> {
@@ -144,6 +150,12 @@ impl<'a> Trainer<'a> {
         self.state.learned.exposures.stops()
     }
 
+    /// How far the cameras of all training views were turned, degrees, and moved, normalised units, where poses are refined.
+    pub fn pose_changes(&self) -> Option<Vec<[f64; 2]>> {
+        let changes = || self.state.learned.poses.changes(&self.setup.views);
+        self.setup.config.refine_poses.then(changes)
+    }
+
     /// Runs to the last iteration.
     ///
     /// # Errors
@@ -176,12 +188,12 @@ impl<'a> Trainer<'a> {
         let (place, photograph) = self.next_view()?;
         let camera = self.setup.views.cameras[place];
         let half = self.setup.config.is_half_size(self.state.iteration).then(|| halved(&photograph, &camera));
-        let (shown, camera) =
-            half.as_ref().map_or((&*photograph, &camera), |(photograph, camera)| (photograph, camera));
+        let (shown, shown_from) =
+            half.as_ref().map_or((&*photograph, camera), |(photograph, camera)| (photograph, *camera));
         // A device knows a photograph again by its number, at either size.
         let number = place + if half.is_some() { self.setup.views.all.len() } else { 0 };
         let exposure = self.state.learned.exposures.of_step(place, self.setup.config.exposure);
-        let target = target(shown, camera, self.state.learned.background).numbered(number).exposed(exposure);
+        let target = target(shown, &shown_from, self.state.learned.background).numbered(number).exposed(exposure);
         let (modules, at) = (self.setup.config.modules, self.step_info());
         let pruned_share = modules.each().iter().map(|module| module.pruned_share(&at)).fold(0.0, f32::max);
         let terms = modules.terms();
@@ -202,6 +214,9 @@ impl<'a> Trainer<'a> {
                 let run = ExposureRun { choice, iterations, n_trained: self.setup.views.trained.len() };
                 decided = self.state.learned.exposures.saw(place, found, self.state.iteration, &run);
             }
+            if self.setup.config.refine_poses {
+                self.refine_pose(place, &shown_from);
+            }
             self.follow_gradients(on_device)?;
             self.densify(on_device)?;
         }
@@ -218,6 +233,14 @@ impl<'a> Trainer<'a> {
             }
         }
         Ok(Outcome { report, dropped, fit, decided })
+    }
+
+    /// Moves the camera of the view as its step says.
+    fn refine_pose(&mut self, place: usize, camera: &Pinhole<f32>) {
+        let progress = f64::from(self.state.iteration) / f64::from(self.setup.config.iterations);
+        let gradient = self.machine.device.workspace.pose_gradient(camera).map(f64::from);
+        let twist = self.state.learned.poses.follow(place, gradient, progress);
+        self.setup.views.move_camera(place, twist);
     }
 
     /// The run as modules see it.

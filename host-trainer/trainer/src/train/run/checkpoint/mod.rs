@@ -19,7 +19,7 @@ pub use kernels::Kernels;
 pub use signature::{CaptureDifference, CaptureSignature};
 
 /// The version that is written and read.
-pub const VERSION: u32 = 10;
+pub const VERSION: u32 = 11;
 
 /// What is wrong with the bytes of a checkpoint.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

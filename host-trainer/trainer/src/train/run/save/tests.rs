@@ -42,7 +42,8 @@ fn a_run_taken_up_again_ends_in_the_same_bits() {
     taken_up_again(tiny_config(90), None);
     let half_size = HalfSize { until: 0.4, least_px: 12 };
     let exposure = ExposureChoice::On;
-    taken_up_again(TrainConfig { learns_background: true, half_size, exposure, ..tiny_config(90) }, None);
+    let odd = TrainConfig { learns_background: true, refine_poses: true, half_size, exposure, ..tiny_config(90) };
+    taken_up_again(odd, None);
     taken_up_again(tiny_hac_config(90), None);
     taken_up_again(TrainConfig { backbone: Backbone::ContextGs, ..tiny_hac_config(90) }, None);
     let modules = Modules { rdo: Some(Rdo::default()), ..Modules::default() };

@@ -58,6 +58,7 @@ impl Format {
             Self::Ply => ply::read(bytes),
             Self::Spz => spz::read(bytes, spz_axes),
             Self::Sog => sog::read(bytes),
+            Self::Glb => glb::read(bytes),
         }
     }
 }
@@ -76,7 +77,7 @@ pub fn account(path: &Path) -> Result<Account, FileError> {
         Some(FileKind::Ply) => ply::account(&bytes),
         Some(FileKind::Gzip | FileKind::RawSpz) => spz::account(&bytes),
         Some(FileKind::Zip) => sog::account(&bytes),
-        Some(FileKind::Glb) => Ok(Account::new(".glb".to_owned(), None, &[("all", bytes.len())])),
+        Some(FileKind::Glb) => glb::account(&bytes),
         Some(FileKind::Json) => sog::account_of_folder(path.parent().unwrap_or(Path::new(""))),
         _ => Ok(splat::account(&bytes)),
     }
@@ -288,6 +289,11 @@ mod tests {
                     );
                 }
                 Format::Sog => assert!(sum <= bytes.len() && of("means_l.webp").is_some(), "{account:?}"),
+                Format::Glb => assert_eq!(
+                    (sum, of("centres"), of("harmonics"), of("fallback colours")),
+                    (bytes.len(), Some(480), Some(40 * 36), Some(160)),
+                    "{account:?}"
+                ),
             }
         }
     }

@@ -55,7 +55,7 @@ pub(crate) fn fitted(format: Format, gaussians: &Gaussians, frame: &Frame) -> Re
     let as_they_are =
         |warnings| Fitted { gaussians: gaussians.clone(), frame: *frame, sources: (0..n).collect(), warnings };
     // Numbers of 32 bits lose nothing in a file of such numbers.
-    if n == 0 || format == Format::Ply && frame.is_identity() {
+    if n == 0 || matches!(format, Format::Ply | Format::Glb) && frame.is_identity() {
         return Ok(as_they_are(Vec::new()));
     }
     let places: Vec<Place> = (0..n).map(|index| place(gaussians, index, frame)).collect();
@@ -147,7 +147,9 @@ fn harm(format: Format, places: &[Place], frame: &Frame) -> Harm {
     let of_32_bits = |place: &Place| farthest(place, frame) * f64::from(f32::EPSILON);
     let too_coarse = |place: &Place, step: f64| step.max(of_32_bits(place)) > LARGEST_STEP * place.size / frame.scale;
     match format {
-        Format::Ply => Harm { n_harmed: count(&|place| too_coarse(place, 0.0)), reach: f64::INFINITY, n_beyond: 0 },
+        Format::Ply | Format::Glb => {
+            Harm { n_harmed: count(&|place| too_coarse(place, 0.0)), reach: f64::INFINITY, n_beyond: 0 }
+        }
         Format::Spz => {
             let [least, largest] = SCALE_RANGE.map(f64::from);
             let is_cut = |place: &Place| {

@@ -11,11 +11,13 @@ pub enum Format {
     Spz,
     /// Images, a palette for what follows the view.
     Sog,
+    /// Every number in 32 bits, for programs of glTF.
+    Glb,
 }
 
 impl Format {
     /// All.
-    pub const ALL: [Self; 3] = [Self::Ply, Self::Spz, Self::Sog];
+    pub const ALL: [Self; 4] = [Self::Ply, Self::Spz, Self::Sog, Self::Glb];
 
     /// What names end in, without the dot.
     pub const fn extension(self) -> &'static str {
@@ -23,6 +25,7 @@ impl Format {
             Self::Ply => "ply",
             Self::Spz => "spz",
             Self::Sog => "sog",
+            Self::Glb => "glb",
         }
     }
 
@@ -44,7 +47,7 @@ mod tests {
     fn a_compressed_ply_is_not_written() {
         let of = |name: &str| Format::of_path(Path::new(name));
         assert_eq!(
-            (of("a.PLY"), of("a.b.spz"), of("a.compressed.ply"), of("a.glb")),
+            (of("a.PLY"), of("a.b.spz"), of("a.compressed.ply"), of("a.gltf")),
             (Some(Format::Ply), Some(Format::Spz), None, None)
         );
         assert_eq!(of("a.Compressed.ply"), None);

@@ -1,12 +1,19 @@
-//! `.glb` with `KHR_gaussian_splatting` (Khronos, release candidate of 2026), read: one accessor for each attribute.
+//! `.glb` with `KHR_gaussian_splatting` (Khronos, ratified in 2026): one accessor for each attribute.
 //!
 //! Deviations and opacities are plain numbers, rotations have w last, harmonics one accessor for each coefficient. The axes of glTF are x
 //! left, y up, z forward.
 
+#[cfg(test)]
+mod tests;
+mod writer;
+
 use serde_json::Value;
 
+pub use writer::write;
+
+use crate::account::Account;
 use crate::axes::Signs;
-use crate::{Degree, Gaussians, Notes, Unreadable};
+use crate::{Degree, Frame, Gaussians, Notes, Unreadable};
 
 const EXTENSION: &str = "KHR_gaussian_splatting";
 /// From glTF's axes to x right, y down, z forward.
@@ -14,18 +21,17 @@ const SIGNS: Signs = Signs([-1.0, -1.0, 1.0]);
 /// Length, type; the header before the first has a magic, a version and the file's length.
 const CHUNK_BYTES: usize = 8;
 const HEADER_BYTES: usize = 12;
+/// In the asset's extras: how the file's numbers lie in the scene ([`crate::Frame`]), and whether opacities make up for the dilation. glTF
+/// itself has no word for either.
+const FRAME: &str = "pocketsplatFrame";
+const ANTIALIAS: &str = "antialias";
 
 /// Reads the first primitive that has Gaussians.
 ///
 /// # Errors
 /// [`Unreadable`] for files without any, with compressed ones, and for what is cut off. Memory follows the bytes that are there.
 pub fn read(bytes: &[u8]) -> Result<(Gaussians, Notes), Unreadable> {
-    let cut =
-        || Unreadable::new("is cut off: its chunks end outside of the file; copy it again from where it was made");
-    let (json, rest) = chunk(bytes.get(HEADER_BYTES..).unwrap_or_default(), b"JSON").ok_or_else(cut)?;
-    let json: Value = serde_json::from_slice(json)
-        .map_err(|error| Unreadable::new(format!("is a .glb whose JSON cannot be read: {error}")))?;
-    let binary = chunk(rest, b"BIN\0").map_or(&[][..], |(binary, _)| binary);
+    let Content { json, binary } = Content::of(bytes)?;
     let primitives: Vec<&Value> = list(&json, "meshes")
         .flat_map(|mesh| list(mesh, "primitives"))
         .filter(|primitive| !primitive["extensions"][EXTENSION].is_null())
@@ -45,7 +51,56 @@ pub fn read(bytes: &[u8]) -> Result<(Gaussians, Notes), Unreadable> {
     if list(&json, "nodes").any(|node| moves.iter().any(|name| !node[name].is_null())) {
         warnings.push("its nodes move, turn or scale their meshes, which is left out".to_owned());
     }
-    Ok((gaussians, Notes { warnings, ..Notes::default() }))
+    let extras = &json["asset"]["extras"];
+    let numbers = serde_json::from_value(extras[FRAME].clone()).ok();
+    let frame = numbers.and_then(Frame::of_numbers).unwrap_or_default();
+    let compensation = extras[ANTIALIAS].as_bool().unwrap_or(false);
+    Ok((gaussians, Notes { compensation, frame, warnings, ..Notes::default() }))
+}
+
+/// Where the bytes of a file went, by attribute.
+///
+/// # Errors
+/// As [`read`].
+pub(crate) fn account(bytes: &[u8]) -> Result<Account, Unreadable> {
+    let Content { json, binary } = Content::of(bytes)?;
+    let mut parts = vec![("header", bytes.len() - binary.len())];
+    for (attribute, index) in json["meshes"][0]["primitives"][0]["attributes"].as_object().into_iter().flatten() {
+        let name = match attribute.rsplit(':').next().unwrap_or_default() {
+            "POSITION" => "centres",
+            "COLOR_0" => "fallback colours",
+            "ROTATION" => "rotations",
+            "SCALE" => "deviations",
+            "OPACITY" => "opacities",
+            "SH_DEGREE_0_COEF_0" => "constant colours",
+            _ => "harmonics",
+        };
+        let view = &json["accessors"][index.as_u64().unwrap_or(u64::MAX) as usize]["bufferView"];
+        let length = &json["bufferViews"][view.as_u64().unwrap_or(u64::MAX) as usize]["byteLength"];
+        let length = length.as_u64().unwrap_or(0) as usize;
+        match parts.iter_mut().find(|(other, _)| *other == name) {
+            Some((_, sum)) => *sum = sum.saturating_add(length),
+            None => parts.push((name, length)),
+        }
+    }
+    Ok(Account::new(".glb".to_owned(), None, &parts))
+}
+
+/// A file's two chunks.
+struct Content<'a> {
+    json: Value,
+    binary: &'a [u8],
+}
+
+impl<'a> Content<'a> {
+    fn of(bytes: &'a [u8]) -> Result<Self, Unreadable> {
+        let cut =
+            || Unreadable::new("is cut off: its chunks end outside of the file; copy it again from where it was made");
+        let (json, rest) = chunk(bytes.get(HEADER_BYTES..).unwrap_or_default(), b"JSON").ok_or_else(cut)?;
+        let json = serde_json::from_slice(json)
+            .map_err(|error| Unreadable::new(format!("is a .glb whose JSON cannot be read: {error}")))?;
+        Ok(Self { json, binary: chunk(rest, b"BIN\0").map_or(&[][..], |(binary, _)| binary) })
+    }
 }
 
 /// The content of the chunk that begins `bytes`, and what follows it; `None` where it is of another type or cut off.
@@ -155,121 +210,5 @@ fn component(kind: usize, bytes: &[u8]) -> f32 {
         (5123, &[a, b]) => f32::from(u16::from_le_bytes([a, b])) / 65_535.0,
         (_, &[a, b, c, d]) => f32::from_le_bytes([a, b, c, d]),
         _ => f32::NAN,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use proptest::prelude::*;
-    use serde_json::json;
-
-    use super::{CHUNK_BYTES, read};
-    use crate::Degree;
-
-    /// A file of JSON and bytes.
-    fn glb(json: &serde_json::Value, binary: &[u8]) -> Vec<u8> {
-        let json = json.to_string().into_bytes();
-        let mut file = [b"glTF".as_slice(), &2u32.to_le_bytes(), &0u32.to_le_bytes()].concat();
-        for (kind, content) in [(b"JSON", json.as_slice()), (b"BIN\0", binary)] {
-            file.extend((content.len() as u32).to_le_bytes());
-            file.extend(kind);
-            file.extend(content);
-        }
-        file
-    }
-
-    /// Two Gaussians of degree 1; rotations are bytes.
-    fn example() -> (serde_json::Value, Vec<u8>) {
-        let floats: [&[f32]; 7] = [
-            &[1.0, 2.0, 3.0, -1.0, 0.0, 4.0],
-            &[1.0, 0.5, 0.25, 1.0, 1.0, 1.0],
-            &[0.5, 1.0],
-            &[0.1, 0.2, 0.3, 0.4, 0.5, 0.6],
-            &[1.0; 6],
-            &[2.0; 6],
-            &[3.0; 6],
-        ];
-        let mut binary: Vec<u8> = [127u8, 0, 0, 0, 0, 0, 129, 127].to_vec();
-        let mut views = vec![json!({"buffer": 0, "byteOffset": 0, "byteLength": 8})];
-        let mut accessors =
-            vec![json!({"bufferView": 0, "componentType": 5120, "normalized": true, "count": 2, "type": "VEC4"})];
-        for values in floats {
-            views.push(json!({"buffer": 0, "byteOffset": binary.len(), "byteLength": 4 * values.len()}));
-            accessors.push(json!({"bufferView": views.len() - 1, "componentType": 5126, "count": 2}));
-            values.iter().for_each(|value| binary.extend(value.to_le_bytes()));
-        }
-        let of = |name: &str| format!("KHR_gaussian_splatting:{name}");
-        let mut attributes = json!({"POSITION": 1});
-        for (at, name) in [
-            "ROTATION",
-            "",
-            "SCALE",
-            "OPACITY",
-            "SH_DEGREE_0_COEF_0",
-            "SH_DEGREE_1_COEF_0",
-            "SH_DEGREE_1_COEF_1",
-            "SH_DEGREE_1_COEF_2",
-        ]
-        .iter()
-        .enumerate()
-        .filter(|(_, name)| !name.is_empty())
-        {
-            attributes[of(name)] = at.into();
-        }
-        let json = json!({
-            "meshes": [{"primitives": [{"attributes": attributes, "extensions": {"KHR_gaussian_splatting": {}}}]}],
-            "nodes": [{"mesh": 0}], "bufferViews": views, "accessors": accessors,
-        });
-        (json, binary)
-    }
-
-    #[test]
-    fn accessors_are_read() {
-        let (json, binary) = example();
-        let (gaussians, notes) = read(&glb(&json, &binary)).expect("whole");
-        assert_eq!((gaussians.degree, &gaussians.centres), (Degree::One, &vec![[-1.0, -2.0, 3.0], [1.0, 0.0, 4.0]]));
-        assert_eq!(gaussians.log_scales[0], [0.0, 0.5f32.ln(), 0.25f32.ln()]);
-        // x and z of the rotation turn with the axes: −y·z and −x·y of them are 1.
-        assert_eq!(gaussians.rotations, [[0.0, -1.0, -0.0, 0.0], [1.0, -0.0, -0.0, -1.0]]);
-        assert_eq!(gaussians.opacity_logits, [0.0, 20.0]);
-        assert_eq!(gaussians.harmonics[..4], [[0.1, 0.2, 0.3], [-1.0; 3], [2.0; 3], [-3.0; 3]]);
-        assert!(notes.warnings.len() == 1 && notes.warnings[0].starts_with("1 of 2 opacities"), "{notes:?}");
-    }
-
-    #[test]
-    fn what_is_missing_is_named() {
-        let (json, binary) = example();
-        let said = |json: &serde_json::Value, binary: &[u8]| read(&glb(json, binary)).expect_err("broken").to_string();
-        let mut mesh = json.clone();
-        mesh["meshes"][0]["primitives"][0]["extensions"] = json!({});
-        assert!(said(&mesh, &binary).contains("a mesh, not Gaussians"));
-        let mut packed = json.clone();
-        packed["meshes"][0]["primitives"][0]["attributes"] = json!({"POSITION": 1});
-        assert!(
-            said(&packed, &binary)
-                .contains("no attribute `KHR_gaussian_splatting:ROTATION`, as where they are compressed")
-        );
-        assert!(said(&json, &binary[..binary.len() - 1]).contains("ends outside of the file"));
-        let mut many = json.clone();
-        many["accessors"][1]["count"] = u64::MAX.into();
-        assert!(said(&many, &binary).contains("ends outside of the file"));
-        assert!(read(b"glTF\x02\0\0\0").expect_err("cut").to_string().starts_with("is cut off"));
-        let mut moved = json;
-        moved["nodes"][0]["translation"] = json!([1, 2, 3]);
-        assert!(read(&glb(&moved, &binary)).expect("whole").1.warnings[1].contains("move, turn or scale"));
-    }
-
-    proptest! {
-        #[test]
-        fn no_change_of_a_file_panics(changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8), cut in any::<prop::sample::Index>()) {
-            let (json, binary) = example();
-            let mut bytes = glb(&json, &binary);
-            for (place, value) in changes {
-                let place = place.index(bytes.len() - CHUNK_BYTES) + CHUNK_BYTES;
-                bytes[place] = value;
-            }
-            let _ = read(&bytes);
-            let _ = read(&bytes[..cut.index(bytes.len())]);
-        }
     }
 }

@@ -18,3 +18,8 @@ pub(crate) fn logit_of_byte(byte: u8) -> f32 {
 pub(crate) fn constant_of_colour(channel: f32) -> f32 {
     (channel - 0.5) / CONSTANT_HARMONIC
 }
+
+/// The colour, 0 to 1, of a constant coefficient.
+pub(crate) fn colour_of_constant(coefficient: f32) -> f32 {
+    (0.5 + CONSTANT_HARMONIC * coefficient).clamp(0.0, 1.0)
+}

@@ -1,6 +1,6 @@
 //! A scene as a file: fitted to what the format holds, then written.
 
-use crate::{Format, Frame, Gaussians, Notes, Unreadable, fit, ply, sog, spz};
+use crate::{Format, Frame, Gaussians, Notes, Unreadable, fit, glb, ply, sog, spz};
 
 /// A file as it is to be on disk.
 #[derive(Debug)]
@@ -29,6 +29,7 @@ impl Format {
         let notes = Notes { frame, ..notes.clone() };
         let (bytes, sources) = match self {
             Self::Ply => (ply::write(&gaussians, &notes), sources),
+            Self::Glb => (glb::write(&gaussians, &notes)?, sources),
             Self::Spz => {
                 warnings.extend(spz::clips(&gaussians));
                 (spz::write(&gaussians, &notes)?, sources)
@@ -60,6 +61,7 @@ mod tests {
             Format::Ply => ply::read(bytes),
             Format::Spz => spz::read(bytes, None),
             Format::Sog => sog::read(bytes),
+            Format::Glb => glb::read(bytes),
         }
         .expect("ours")
     }

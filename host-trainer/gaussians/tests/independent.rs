@@ -29,7 +29,7 @@ struct ReadGaussian {
 /// constant colour, harmonics of degree 1, and beyond.
 fn tolerances(format: Format) -> [f32; 7] {
     match format {
-        Format::Ply => [1e-5; 7],
+        Format::Ply | Format::Glb => [1e-5; 7],
         Format::Spz => [1e-5, 0.032, 1e-5, 0.002, 0.014, 0.008, 0.008],
         Format::Sog => [1e-3, 0.02, 1e-4, 0.002, 0.01, 0.01, 0.01],
     }

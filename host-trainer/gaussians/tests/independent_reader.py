@@ -1,4 +1,4 @@
-"""Reads .ply, .spz and .sog by their published descriptions, with Python alone (and dwebp for the images of .sog).
+"""Reads .ply, .spz, .sog and .glb by their published descriptions, with Python alone (and dwebp for the images of .sog).
 
 It shares nothing with the crate it judges. Prints one JSON object: `compensation`, `degree`, and for each Gaussian centre, deviations,
 rotation (w, x, y, z), opacity, and harmonics by coefficient, RGB each; axes x right, y down, z forward.
@@ -151,10 +151,53 @@ def read_sog(path):
     return meta["antialias"], degree, gaussians
 
 
+def read_glb(data):
+    magic, version, length, json_bytes, kind = struct.unpack_from("<4sIII4s", data)
+    assert (magic, version, length, kind) == (b"glTF", 2, len(data), b"JSON")
+    gltf, binary = json.loads(data[20:20 + json_bytes]), data[28 + json_bytes:]
+    assert gltf["asset"]["version"] == "2.0" and gltf["extensionsUsed"] == ["KHR_gaussian_splatting"]
+    primitive = gltf["meshes"][gltf["nodes"][gltf["scenes"][gltf["scene"]]["nodes"][0]]["mesh"]]["primitives"][0]
+    assert primitive["mode"] == 0 and primitive["extensions"]["KHR_gaussian_splatting"]["kernel"] == "ellipse"
+
+    def rows(name):
+        accessor = gltf["accessors"][primitive["attributes"][name]]
+        view = gltf["bufferViews"][accessor["bufferView"]]
+        form = "<%d%s" % ({"SCALAR": 1, "VEC3": 3, "VEC4": 4}[accessor["type"]], {5126: "f", 5121: "B"}[accessor["componentType"]])
+        found = list(struct.iter_unpack(form, binary[view["byteOffset"]:view["byteOffset"] + view["byteLength"]]))
+        assert len(found) == accessor["count"]
+        return found
+
+    def of(name):
+        return rows("KHR_gaussian_splatting:" + name)
+
+    positions, rotations, scales, opacities, points = rows("POSITION"), of("ROTATION"), of("SCALE"), of("OPACITY"), rows("COLOR_0")
+    bounds = gltf["accessors"][primitive["attributes"]["POSITION"]]
+    assert [min(axis) for axis in zip(*positions)] == bounds["min"] and [max(axis) for axis in zip(*positions)] == bounds["max"]
+    names = [(degree, number) for degree in range(4) for number in range(2 * degree + 1)]
+    names = [name for name in names if "KHR_gaussian_splatting:SH_DEGREE_%d_COEF_%d" % name in primitive["attributes"]]
+    coefficients = [of("SH_DEGREE_%d_COEF_%d" % name) for name in names]
+    # From x left and y up: a function that is odd in (x, y) changes its sign. Tried out on the functions themselves.
+    here, there = real_harmonics(0.3, 0.5, 0.8), real_harmonics(-0.3, -0.5, 0.8)
+    signs = [1] + [round(b / a) for a, b in zip(here, there)]
+    gaussians = []
+    for i, ((x, y, z), (qx, qy, qz, w), point) in enumerate(zip(positions, rotations, points)):
+        assert abs(math.hypot(qx, qy, qz, w) - 1) < 1e-6
+        fallback = [min(max(0.5 + 0.28209479 * c, 0), 1) for c in coefficients[0][i]] + [opacities[i][0]]
+        assert all(abs(255 * value - byte) <= 0.51 for value, byte in zip(fallback, point))
+        gaussians.append({
+            "centre": [-x, -y, z],
+            "deviations": list(scales[i]),
+            "rotation": [w, -qx, -qy, qz],
+            "opacity": opacities[i][0],
+            "harmonics": [[sign * c for c in rows[i]] for sign, rows in zip(signs, coefficients)],
+        })
+    return gltf["asset"].get("extras", {}).get("antialias", False), names[-1][0], gaussians
+
+
 def main(path):
     with open(path, "rb") as file:
         data = file.read()
-    read = {".ply": lambda: read_ply(data), ".spz": lambda: read_spz(data), ".sog": lambda: read_sog(path)}
+    read = {".ply": lambda: read_ply(data), ".spz": lambda: read_spz(data), ".sog": lambda: read_sog(path), ".glb": lambda: read_glb(data)}
     compensation, degree, gaussians = read[os.path.splitext(path)[1]]()
     json.dump({"compensation": compensation, "degree": degree, "gaussians": gaussians}, sys.stdout)
 

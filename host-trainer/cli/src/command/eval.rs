@@ -54,7 +54,7 @@ pub(crate) fn lpips_of(lpips: &Lpips) -> String {
 /// Takes a file of Gaussians too.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// The bundle, or a file of Gaussians: .ply, .spz, .sog or .splat.
+    /// The bundle, or a file of Gaussians: .ply, .spz, .sog, .glb or .splat.
     bundle: PathBuf,
     #[command(flatten)]
     capture: CaptureArgs,

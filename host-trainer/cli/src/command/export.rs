@@ -34,7 +34,7 @@ use crate::say::say;
 use cameras::Cameras;
 use rounding::Rounding;
 
-/// Write a bundle as explicit Gaussians that other programs draw: .ply, .spz or .sog.
+/// Write a bundle as explicit Gaussians that other programs draw: .ply, .spz, .sog or .glb.
 ///
 /// Opacity, shape and colour of a bundle's Gaussians follow the view. A file keeps one opacity and one shape, and a colour in spherical
 /// harmonics. They are fitted to what the training cameras see of the bundle, and the loss on the held-out views is measured with the
@@ -42,13 +42,13 @@ use rounding::Rounding;
 /// written in another format, and both are drawn to measure what that lost.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// The bundle; or a .ply, .spz, .sog or .splat, to be written in another format.
+    /// The bundle; or a .ply, .spz, .sog, .glb or .splat, to be written in another format.
     bundle: PathBuf,
     /// Folder of the capture, as for eval
     dataset: Option<PathBuf>,
     #[command(flatten)]
     options: CaptureOptions,
-    /// The file to write; its name ends in .ply, .spz or .sog.
+    /// The file to write; its name ends in .ply, .spz, .sog or .glb.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     /// How finely colours follow the view: degree of the spherical harmonics.

@@ -23,7 +23,7 @@ use super::render::CameraRecord;
 /// Of a bundle the header, the tiers, and the bytes part by part.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// The bundle, or a file of Gaussians: .ply, .spz, .sog or .splat.
+    /// The bundle, or a file of Gaussians: .ply, .spz, .sog, .glb or .splat.
     bundle: PathBuf,
     #[command(flatten)]
     axes: AxesArgs,

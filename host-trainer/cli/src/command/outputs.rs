@@ -35,6 +35,7 @@ pub(super) const fn gaussians(format: Format) -> Content {
         Format::Ply => FileKind::Ply,
         Format::Spz => FileKind::Gzip,
         Format::Sog => FileKind::Zip,
+        Format::Glb => FileKind::Glb,
     })
 }
 

@@ -36,11 +36,11 @@ const OF_A_CAPTURE: [&str; 8] =
 ///
 /// Views of a capture, the bundle's own camera, a turn around it, or cameras of a file.
 ///
-/// Draws a .ply, .spz or .sog too; one without a camera of its own is looked at from where `import` would begin.
+/// Draws a .ply, .spz, .sog or .glb too; one without a camera of its own is looked at from where `import` would begin.
 #[derive(clap::Args)]
 #[command(group = clap::ArgGroup::new("cameras").required(true).args(["view", "all", "preview", "orbit", "camera"]))]
 pub(crate) struct Args {
-    /// The bundle, or a .ply, .spz or .sog file of Gaussians.
+    /// The bundle, or a .ply, .spz, .sog or .glb file of Gaussians.
     bundle: PathBuf,
     /// Folder of the capture, as for eval
     #[arg(required_unless_present_any = ["preview", "orbit", "camera"])]

@@ -20,11 +20,11 @@ use super::stand::StandArgs;
 /// Write a web page that draws bundles.
 ///
 /// Nothing is installed and nothing fetched: it is one file. The page turns the scene by mouse, touch and keys. Sliders set what a device has: memory, pruning rate, quality. It shows the plan and
-/// the very pixels of the device. Several bundles stand side by side with one camera. Of a .ply, .spz or .sog the page shows pictures of a turn
+/// the very pixels of the device. Several bundles stand side by side with one camera. Of a .ply, .spz, .sog or .glb the page shows pictures of a turn
 /// around it, and what the file holds.
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// The bundles, or one .ply, .spz or .sog.
+    /// The bundles, or one .ply, .spz, .sog or .glb.
     #[arg(required = true, value_name = "SCENE.psb")]
     bundles: Vec<PathBuf>,
     /// The page to write.

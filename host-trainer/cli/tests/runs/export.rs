@@ -81,8 +81,8 @@ fn what_cannot_be_written_is_refused_before_any_work() {
     let home = folder("export_refused");
     let bundle = home.join("a.psb");
     fs::write(&bundle, undisturbed()).unwrap();
-    let said = fails(&mut export(&bundle, &home.join("a.glb")));
-    assert!(said.contains(".ply, .spz, .sog"), "{said}");
+    let said = fails(&mut export(&bundle, &home.join("a.ksplat")));
+    assert!(said.contains(".ply, .spz, .sog, .glb"), "{said}");
     assert!(fails(&mut export(&home.join("none.psb"), &home.join("a.ply"))).contains("none.psb"));
     assert_eq!(fs::read_dir(&home).unwrap().count(), 1, "nothing was written");
 }

@@ -91,13 +91,13 @@ pub(in crate::command) fn check_name(path: &Path, content: Content, source: Opti
 pub(in crate::command) fn command_that_makes(target: &Path, source: &Path) -> Option<String> {
     let is_bundle = match ending(source).as_str() {
         "psb" => true,
-        "ply" | "spz" | "sog" => false,
+        "ply" | "spz" | "sog" | "glb" => false,
         _ => return None,
     };
     let (from, to) = (shell_word(source), shell_word(target));
     match (ending(target).as_str(), is_bundle) {
         ("psb", false) => Some(format!("pocketsplat import {from} -o {to}")),
-        ("ply" | "spz" | "sog", _) => Some(format!("pocketsplat export {from} -o {to}")),
+        ("ply" | "spz" | "sog" | "glb", _) => Some(format!("pocketsplat export {from} -o {to}")),
         ("html" | "htm", true) => Some(format!("pocketsplat view {from} -o {to}")),
         ("png" | "jpg" | "jpeg", true) => Some(format!("pocketsplat render {from} --preview -o {to}")),
         ("gif" | "apng", true) => Some(format!("pocketsplat render {from} --orbit 48 -o {to}")),

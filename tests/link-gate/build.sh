@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Links the decoder for each row of sizes.csv, and holds what the linker kept against the list of panics and against the
-# sizes of the row, bytes, within 1 %: the path of a working tree alone moves them by a few bytes.
+# sizes of the row, bytes: at most 1 % above, as the path of a working tree alone moves them by a few bytes.
 #
 #   build.sh LLVM_TOOLS_FOLDER TARGET_FOLDER [bless]    bless: writes the sizes instead
 set -euo pipefail
@@ -15,7 +15,8 @@ bytes_of() { # SECTION
 
 holds() { # NAME FOUND EXPECTED
   [ -n "$bless" ] || [ $((100 * $2)) -le $((101 * $3)) ] || {
-    echo "link-gate: $2 bytes of $1, over 1 % more than the $3 of sizes.csv; if that is meant, run \`tools/ci.sh bless-link-gate\` and commit its table" >&2
+    echo "link-gate: $2 bytes of $1, over 1 % more than the $3 of sizes.csv; if that is meant, run" \
+      "\`tools/ci.sh bless-link-gate\` and commit its table" >&2
     status=1
   }
 }

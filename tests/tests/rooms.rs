@@ -80,6 +80,7 @@ const FOLDERS: [(&str, &str, &[&str]); 4] = [
             "error",
             "views",
             "exposures",
+            "poses",
             "optimiser",
             "density",
             "context",

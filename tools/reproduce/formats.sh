@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# One capture, every way to keep it: explicit Gaussians as .ply, .spz and .sog, and the bundles of three backbones.
+# One capture in several forms: explicit Gaussians as .ply, .spz and .sog, and the bundles of three backbones.
 #
 #   tools/reproduce/formats.sh CAPTURE OUT [OPTION of train…]
 #

@@ -291,7 +291,7 @@ mod tests {
                 Format::Sog => assert!(sum <= bytes.len() && of("means_l.webp").is_some(), "{account:?}"),
                 Format::Glb => assert_eq!(
                     (sum, of("centres"), of("harmonics"), of("fallback colours")),
-                    (bytes.len(), Some(480), Some(40 * 36), Some(160)),
+                    (bytes.len(), Some(480), Some(40 * 36), Some(320)),
                     "{account:?}"
                 ),
             }

@@ -32,11 +32,8 @@ const ANTIALIAS: &str = "antialias";
 /// [`Unreadable`] for files without any, with compressed ones, and for what is cut off. Memory follows the bytes that are there.
 pub fn read(bytes: &[u8]) -> Result<(Gaussians, Notes), Unreadable> {
     let Content { json, binary } = Content::of(bytes)?;
-    let primitives: Vec<&Value> = list(&json, "meshes")
-        .flat_map(|mesh| list(mesh, "primitives"))
-        .filter(|primitive| !primitive["extensions"][EXTENSION].is_null())
-        .collect();
-    let [primitive, others @ ..] = primitives.as_slice() else {
+    let clouds = clouds(&json);
+    let [primitive, others @ ..] = clouds.as_slice() else {
         return Err(Unreadable::new(format!(
             "is a binary glTF file without {EXTENSION}: a mesh, not Gaussians; train on photographs of it, or on renderings"
         )));
@@ -45,7 +42,7 @@ pub fn read(bytes: &[u8]) -> Result<(Gaussians, Notes), Unreadable> {
     let gaussians = file.gaussians(primitive)?;
     let (gaussians, mut warnings) = gaussians.meant()?;
     if !others.is_empty() {
-        warnings.push(format!("only the first of its {} clouds is read", primitives.len()));
+        warnings.push(format!("only the first of its {} clouds is read", clouds.len()));
     }
     let moves = ["matrix", "translation", "rotation", "scale"];
     if list(&json, "nodes").any(|node| moves.iter().any(|name| !node[name].is_null())) {
@@ -65,25 +62,40 @@ pub fn read(bytes: &[u8]) -> Result<(Gaussians, Notes), Unreadable> {
 pub(crate) fn account(bytes: &[u8]) -> Result<Account, Unreadable> {
     let Content { json, binary } = Content::of(bytes)?;
     let mut parts = vec![("header", bytes.len() - binary.len())];
-    for (attribute, index) in json["meshes"][0]["primitives"][0]["attributes"].as_object().into_iter().flatten() {
-        let name = match attribute.rsplit(':').next().unwrap_or_default() {
+    let clouds = clouds(&json);
+    let attributes = clouds.first().and_then(|cloud| cloud["attributes"].as_object());
+    for (attribute, index) in attributes.into_iter().flatten() {
+        let name = match attribute.strip_prefix(EXTENSION).unwrap_or(attribute) {
             "POSITION" => "centres",
             "COLOR_0" => "fallback colours",
-            "ROTATION" => "rotations",
-            "SCALE" => "deviations",
-            "OPACITY" => "opacities",
-            "SH_DEGREE_0_COEF_0" => "constant colours",
-            _ => "harmonics",
+            ":ROTATION" => "rotations",
+            ":SCALE" => "deviations",
+            ":OPACITY" => "opacities",
+            ":SH_DEGREE_0_COEF_0" => "constant colours",
+            other if other.starts_with(":SH_DEGREE_") => "harmonics",
+            _ => "others",
         };
-        let view = &json["accessors"][index.as_u64().unwrap_or(u64::MAX) as usize]["bufferView"];
-        let length = &json["bufferViews"][view.as_u64().unwrap_or(u64::MAX) as usize]["byteLength"];
-        let length = length.as_u64().unwrap_or(0) as usize;
+        let accessor = &json["accessors"][index.as_u64().unwrap_or(u64::MAX) as usize];
+        let n_parts = match accessor["type"].as_str() {
+            Some("SCALAR") => 1,
+            Some("VEC3") => 3,
+            _ => 4,
+        };
+        let size = component_bytes(accessor["componentType"].as_u64().unwrap_or(0) as usize).unwrap_or(0);
+        let length = (accessor["count"].as_u64().unwrap_or(0) as usize).saturating_mul(n_parts * size);
+        let length = length.min(binary.len());
         match parts.iter_mut().find(|(other, _)| *other == name) {
-            Some((_, sum)) => *sum = sum.saturating_add(length),
+            Some((_, sum)) => *sum += length,
             None => parts.push((name, length)),
         }
     }
     Ok(Account::new(".glb".to_owned(), None, &parts))
+}
+
+/// The primitives that are Gaussians.
+fn clouds(json: &Value) -> Vec<&Value> {
+    let primitives = list(json, "meshes").flat_map(|mesh| list(mesh, "primitives"));
+    primitives.filter(|primitive| !primitive["extensions"][EXTENSION].is_null()).collect()
 }
 
 /// A file's two chunks.
@@ -185,8 +197,10 @@ impl File<'_> {
         if view["buffer"].as_u64() != Some(0) || stride == 0 {
             return Err(broken("lies in another file"));
         }
-        let row =
-            |index: usize| std::array::from_fn(|part| component(kind, &bytes[index * stride + part * size..][..size]));
+        let is_share = accessor["normalized"].as_bool().unwrap_or(false);
+        let row = |index: usize| {
+            std::array::from_fn(|part| component(kind, is_share, &bytes[index * stride + part * size..][..size]))
+        };
         Ok((0..count).map(row).collect())
     }
 }
@@ -201,14 +215,15 @@ const fn component_bytes(kind: usize) -> Option<usize> {
     }
 }
 
-/// Whole numbers are normalised ones: from −1 or 0 to 1.
-fn component(kind: usize, bytes: &[u8]) -> f32 {
-    match (kind, bytes) {
-        (5120, &[a]) => (f32::from(a as i8) / 127.0).max(-1.0),
-        (5121, &[a]) => f32::from(a) / 255.0,
-        (5122, &[a, b]) => (f32::from(i16::from_le_bytes([a, b])) / 32_767.0).max(-1.0),
-        (5123, &[a, b]) => f32::from(u16::from_le_bytes([a, b])) / 65_535.0,
-        (_, &[a, b, c, d]) => f32::from_le_bytes([a, b, c, d]),
-        _ => f32::NAN,
-    }
+/// A number; whole ones stand for themselves, or where they are shares for −1 or 0 to 1.
+fn component(kind: usize, is_share: bool, bytes: &[u8]) -> f32 {
+    let (whole, most) = match (kind, bytes) {
+        (5120, &[a]) => (f32::from(a as i8), 127.0),
+        (5121, &[a]) => (f32::from(a), 255.0),
+        (5122, &[a, b]) => (f32::from(i16::from_le_bytes([a, b])), 32_767.0),
+        (5123, &[a, b]) => (f32::from(u16::from_le_bytes([a, b])), 65_535.0),
+        (_, &[a, b, c, d]) => return f32::from_le_bytes([a, b, c, d]),
+        _ => (f32::NAN, 1.0),
+    };
+    if is_share { (whole / most).max(-1.0) } else { whole }
 }

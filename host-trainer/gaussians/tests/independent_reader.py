@@ -162,7 +162,7 @@ def read_glb(data):
     def rows(name):
         accessor = gltf["accessors"][primitive["attributes"][name]]
         view = gltf["bufferViews"][accessor["bufferView"]]
-        form = "<%d%s" % ({"SCALAR": 1, "VEC3": 3, "VEC4": 4}[accessor["type"]], {5126: "f", 5121: "B"}[accessor["componentType"]])
+        form = "<%d%s" % ({"SCALAR": 1, "VEC3": 3, "VEC4": 4}[accessor["type"]], {5126: "f", 5123: "H"}[accessor["componentType"]])
         found = list(struct.iter_unpack(form, binary[view["byteOffset"]:view["byteOffset"] + view["byteLength"]]))
         assert len(found) == accessor["count"]
         return found
@@ -182,8 +182,9 @@ def read_glb(data):
     gaussians = []
     for i, ((x, y, z), (qx, qy, qz, w), point) in enumerate(zip(positions, rotations, points)):
         assert abs(math.hypot(qx, qy, qz, w) - 1) < 1e-6
-        fallback = [min(max(0.5 + 0.28209479 * c, 0), 1) for c in coefficients[0][i]] + [opacities[i][0]]
-        assert all(abs(255 * value - byte) <= 0.51 for value, byte in zip(fallback, point))
+        colour = [min(max(0.5 + 0.28209479 * c, 0), 1) for c in coefficients[0][i]]
+        fallback = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour] + [opacities[i][0]]
+        assert all(abs(65535 * value - share) <= 0.6 for value, share in zip(fallback, point))
         gaussians.append({
             "centre": [-x, -y, z],
             "deviations": list(scales[i]),

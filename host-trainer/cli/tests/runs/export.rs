@@ -90,7 +90,7 @@ fn what_cannot_be_written_is_refused_before_any_work() {
 #[test]
 fn every_other_command_names_import() {
     let home = folder("export_others");
-    for name in ["a.ply", "b.spz", "c.SOG"] {
+    for name in ["a.ply", "b.spz", "c.SOG", "d.glb"] {
         let file = home.join(name);
         fs::write(&file, b"ply\n").unwrap();
         for arguments in [&["fit", "--ram", "100KiB"][..], &["verify"], &["train", "-o", "a.psb"], &["doctor"]] {

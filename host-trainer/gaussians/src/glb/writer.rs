@@ -6,12 +6,12 @@ use super::{ANTIALIAS, CHUNK_BYTES, EXTENSION, FRAME, HEADER_BYTES, SIGNS};
 use crate::opacity::colour_of_constant;
 use crate::{Degree, Gaussians, Notes, Unreadable};
 
-/// glTF's numbers for 32-bit floats, bytes, and vertices.
+/// glTF's numbers for 32-bit floats, 16-bit shares, and vertices.
 const FLOAT: u32 = 5126;
-const BYTE: u32 = 5121;
+const SHARE: u32 = 5123;
 const VERTICES: u32 = 34_962;
 
-/// Writes all numbers in 32 bits, and colours in bytes for programs that draw points alone.
+/// Writes all numbers in 32 bits, and the constant colours again for programs that draw points alone.
 ///
 /// # Errors
 /// [`Unreadable`] for no Gaussian at all, and for more than a file of 4 GiB holds.
@@ -27,13 +27,14 @@ pub fn write(gaussians: &Gaussians, notes: &Notes) -> Result<Vec<u8>, Unreadable
         json!(bound.map(|bound| bound.map(f64::from)))
     };
     (parts.accessors[0]["min"], parts.accessors[0]["max"]) = (bounds(f32::min), bounds(f32::max));
-    let opacity = |logit: f32| 1.0 / (1.0 + (-logit).exp());
-    let byte = |share: f32| (255.0 * share).round() as u8;
+    // None that was drawn is lost.
+    let opacity = |logit: f32| (1.0 / (1.0 + (-logit).exp())).max(f32::MIN_POSITIVE);
     let points = (0..gaussians.len()).flat_map(|index| {
-        let [red, green, blue] = gaussians.harmonics_of(index)[0].map(|channel| byte(colour_of_constant(channel)));
-        [red, green, blue, byte(opacity(gaussians.opacity_logits[index]))]
+        let [red, green, blue] = gaussians.harmonics_of(index)[0].map(|channel| light(colour_of_constant(channel)));
+        let point = [red, green, blue, opacity(gaussians.opacity_logits[index])];
+        point.into_iter().flat_map(|share| ((65_535.0 * share).round() as u16).to_le_bytes())
     });
-    parts.add("COLOR_0", "VEC4", BYTE, gaussians.len(), points);
+    parts.add("COLOR_0", "VEC4", SHARE, gaussians.len(), points);
     let of = |name: &str| format!("{EXTENSION}:{name}");
     parts.add_floats(
         &of("ROTATION"),
@@ -52,6 +53,11 @@ pub fn write(gaussians: &Gaussians, notes: &Notes) -> Result<Vec<u8>, Unreadable
         }
     }
     parts.into_file(notes)
+}
+
+/// Light of a value of sRGB (IEC 61966-2-1): colours of vertices are linear in glTF, those of Gaussians here are not.
+fn light(value: f32) -> f32 {
+    if value <= 0.040_45 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
 }
 
 /// (x, y, z, w) of length 1 of a rotation (w, x, y, z); of one of length 0 none.
@@ -81,7 +87,7 @@ impl Parts {
         self.binary.extend(bytes);
         self.attributes.insert(name.to_owned(), self.accessors.len().into());
         self.accessors.push(json!({
-            "bufferView": self.views.len(), "componentType": component, "normalized": component == BYTE, "count": n, "type": kind,
+            "bufferView": self.views.len(), "componentType": component, "normalized": component == SHARE, "count": n, "type": kind,
         }));
         let length = self.binary.len() - start;
         self.views.push(json!({"buffer": 0, "byteOffset": start, "byteLength": length, "target": VERTICES}));

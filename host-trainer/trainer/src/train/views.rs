@@ -1,5 +1,6 @@
 //! The views that a run trains on.
 
+use glam::{DMat3, DVec3};
 use pocketsplat_capture::dataset::{Image, Mask, Photograph, View};
 use pocketsplat_kernels::ops::Pinhole;
 use pocketsplat_kernels::step::TargetView;
@@ -29,6 +30,18 @@ impl<'a> TrainingViews<'a> {
     /// Moves the camera of a view by a [twist](Pinhole::moved) from where the capture has it.
     pub fn move_camera(&mut self, place: usize, twist: [f64; 6]) {
         self.cameras[place] = Pinhole::new(&self.all[place].camera).moved(twist);
+    }
+
+    /// All views, as their cameras were moved.
+    pub fn moved(&self) -> Vec<View> {
+        let moved = |(view, camera): (&View, &Pinhole<f32>)| {
+            let mut view = view.clone();
+            view.camera.rotation =
+                DMat3::from_cols_array_2d(&camera.rotation.map(|row| row.map(f64::from))).transpose();
+            view.camera.translation = DVec3::from_array(camera.translation.map(f64::from));
+            view
+        };
+        self.all.iter().zip(&self.cameras).map(moved).collect()
     }
 
     /// The cameras of the views that are not held out.

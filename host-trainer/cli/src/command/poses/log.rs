@@ -4,8 +4,14 @@ use std::fs::{File, OpenOptions, TryLockError};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::thread;
+use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
+
+/// How often the log is asked for, and the time between.
+const LOCK_TRIALS: u32 = 10;
+const LOCK_PAUSE: Duration = Duration::from_millis(50);
 
 /// Everything that other programs said in a folder. Locked, so that two of us never work in one.
 #[derive(Clone, Debug)]
@@ -19,7 +25,15 @@ impl Log {
     pub(super) fn open(path: &Path) -> Result<Self> {
         let file = OpenOptions::new().create(true).append(true).open(path);
         let file = file.with_context(|| format!("could not open {}", path.display()))?;
-        if matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
+        // A program that is just being started holds its parent's locks for a moment.
+        let is_taken = |_| {
+            let is_taken = matches!(file.try_lock(), Err(TryLockError::WouldBlock));
+            if is_taken {
+                thread::sleep(LOCK_PAUSE);
+            }
+            is_taken
+        };
+        if (0..LOCK_TRIALS).all(is_taken) {
             let folder = path.parent().unwrap_or(path).display();
             bail!("another process looks for poses in {folder}; wait for it to end, or choose another --output");
         }

@@ -10,7 +10,8 @@ pub(super) fn section(poses: Option<&[PoseChange]>) -> String {
         vec![pose.view.clone(), format!("{:.3}", pose.turned_degrees), format!("{:.4}", pose.moved)]
     };
     format!(
-        "<p>Training moved its cameras to where their photographs fit the scene best. Views that were held out stand where the capture has them.</p>\n\
+        "<p>Training moved its cameras to where their photographs fit the scene best. Views that were held out stand where the \
+         capture has them.</p>\n\
          <details><summary>{} photographs</summary>\n{}\n</details>",
         poses.len(),
         table(
@@ -19,4 +20,19 @@ pub(super) fn section(poses: Option<&[PoseChange]>) -> String {
             poses.iter().map(row)
         )
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn moved_cameras_are_listed() {
+        assert_eq!(section(None), "");
+        let pose = PoseChange { view: "a<b.jpg".to_owned(), turned_degrees: 0.1234, moved: 0.05 };
+        let html = section(Some(&[pose]));
+        for part in ["1 photographs", "a&lt;b.jpg", "<td>0.123</td>", "<td>0.0500</td>"] {
+            assert!(html.contains(part), "{part}: {html}");
+        }
+    }
 }

@@ -136,7 +136,8 @@ pub(super) fn write_bundle(
     }
     let finished = Finished { protocol: Some(protocol.to_text()?), ..trainer.finish()? };
     let held_out = judges(trainer, capture);
-    let fitted = encoding.encode(finished, capture, &held_out)?;
+    let refined = trainer.refined_capture();
+    let fitted = encoding.encode(finished, refined.as_ref().unwrap_or(capture), &held_out)?;
     output.write(&fitted.written.bytes)?;
     let file = BundleFile { path: output.path().to_owned(), bytes: fitted.written.bytes.clone() };
     limits::say(&file, &encoding.limits, &fitted)?;
@@ -183,12 +184,12 @@ pub(super) fn write_bundle(
             capture.train.iter().zip(stops).map(of_view).collect()
         }),
         poses: trainer.pose_changes().map(|changes| {
-            let of_view = |(view, [turned_degrees, moved]): (&View, [f64; 2])| PoseChange {
+            let of_view = |(view, [turned_degrees, moved]): &(&View, [f64; 2])| PoseChange {
                 view: view.name.clone(),
-                turned_degrees,
+                turned_degrees: *turned_degrees,
                 moved: moved / capture.normalisation.scale,
             };
-            capture.train.iter().zip(changes).map(of_view).collect()
+            changes.iter().map(of_view).collect()
         }),
         peak_memory_bytes: peak_memory_bytes(),
         held_out,

@@ -12,7 +12,7 @@ pub struct Visibility {
     pub drawn: Vec<bool>,
     /// `[n]` aggregated opacity: the mean over the views of the summed opacities of the anchor's Gaussians that reach the
     /// image; a view that does not show the anchor counts as 0.
-    pub importance: Vec<f32>,
+    pub opacity: Vec<f32>,
     /// `[n]` share of the views that show the anchor: in which it passes the prefilter.
     pub shown: Vec<f32>,
     /// `[n]` Σ of α·T over the pixels of all views and the anchor's Gaussians, where asked for; else empty.
@@ -30,7 +30,7 @@ impl Visibility {
         let (n, k) = (scene.anchors.len(), scene.shape.n_offsets);
         let contribution = vec![0.0; if contributions { n } else { 0 }];
         let mut visibility =
-            Self { drawn: vec![false; n * k], importance: vec![0.0; n], shown: vec![0.0; n], contribution };
+            Self { drawn: vec![false; n * k], opacity: vec![0.0; n], shown: vec![0.0; n], contribution };
         for camera in cameras {
             if contributions {
                 visibility.add_contributions(scene, workspace, camera);
@@ -45,11 +45,11 @@ impl Visibility {
                     let source = block.sources[i];
                     let anchor = block.anchors[source.row as usize] as usize;
                     visibility.drawn[anchor * k + source.offset as usize] = true;
-                    visibility.importance[anchor] += block.gaussians[i].opacity;
+                    visibility.opacity[anchor] += block.gaussians[i].opacity;
                 }
             }
         }
-        for sum in visibility.importance.iter_mut().chain(&mut visibility.shown) {
+        for sum in visibility.opacity.iter_mut().chain(&mut visibility.shown) {
             *sum /= cameras.len().max(1) as f32;
         }
         visibility
@@ -57,7 +57,7 @@ impl Visibility {
 
     /// `[n]` the mean of the summed opacities over the views that show the anchor; 0 where none does.
     pub fn opacity_per_view(&self) -> Vec<f32> {
-        let pairs = self.importance.iter().zip(&self.shown);
+        let pairs = self.opacity.iter().zip(&self.shown);
         pairs.map(|(sum, shown)| if *shown > 0.0 { sum / shown } else { 0.0 }).collect()
     }
 
@@ -106,8 +106,8 @@ mod tests {
             assert!(workspace.image(&scene, camera, [0.0; 3]) == before);
         }
         assert_eq!(Visibility::new(&scene, &mut workspace, &cameras, false), visibility);
-        for (a, importance) in visibility.importance.iter().enumerate() {
-            assert_eq!(*importance > 0.0, scene.anchors.has_drawn(a), "anchor {a}");
+        for (a, opacity) in visibility.opacity.iter().enumerate() {
+            assert_eq!(*opacity > 0.0, scene.anchors.has_drawn(a), "anchor {a}");
         }
         assert_eq!(visibility.mask_undrawn(&mut scene), 0, "once is enough");
     }

@@ -20,8 +20,9 @@ const ROWS: usize = 512;
 pub struct Finished {
     /// The scene, its values not rounded: the writer does that, once. Offsets that no view draws are masked.
     pub scene: Scene<f32>,
-    /// `[n]` which anchors matter: their [places](pocketsplat_kernels::scene::Anchors::prune_rank) if they have any, else their aggregated
-    /// opacity, see [`Visibility::importance`]. The order of the tiers.
+    /// `[n]` which anchors matter: their [places](pocketsplat_kernels::scene::Anchors::prune_rank) if they have any, else what they are
+    /// [worth](crate::train::worth::Probe::importance) once the run has ended, before that their [opacity](Visibility::opacity). The
+    /// order of the tiers.
     pub importance: Vec<f32>,
     /// What lies behind it, rounded.
     pub background: [u8; 3],
@@ -58,7 +59,7 @@ impl Finished {
         scene.anchors.mask_logits = drawn.anchors.mask_logits;
         // Places that training has given out decide; it has prepared the scene for them.
         let importance =
-            if scene.anchors.prune_rank.is_empty() { seen.importance } else { scene.anchors.prune_rank.clone() };
+            if scene.anchors.prune_rank.is_empty() { seen.opacity } else { scene.anchors.prune_rank.clone() };
         // It is between 0 and 1.
         let background = background.map(|channel| (channel * 255.0).round() as u8);
         let head_fraction_bits = context.is_some().then_some(HEAD_FRACTION_BITS);

@@ -59,10 +59,10 @@ impl Trainer<'_> {
     }
 
     /// When growth ends: where anchors follow anchors, they do so inside the tiers that the bundle will have.
-    pub(super) fn rank_for_levels(&mut self) {
+    pub(super) fn rank_for_levels(&mut self) -> Result<(), TrainError> {
         let is_contextgs = self.setup.config.backbone == Backbone::ContextGs;
         if self.ends_growth() && is_contextgs && self.scene().anchors.prune_rank.is_empty() {
-            let Visibility { importance, .. } = self.view().visibility(false);
+            let importance = self.probe(self.scene()).importance()?;
             let mut order: Vec<usize> = (0..importance.len()).collect();
             order.sort_by(|a, b| importance[*a].total_cmp(&importance[*b]));
             let mut ranks = vec![0.0; order.len()];
@@ -71,6 +71,7 @@ impl Trainer<'_> {
             }
             self.state.learned.scene.anchors.prune_rank = ranks;
         }
+        Ok(())
     }
 
     /// Applies the change of a module; returns how the scene fits its limits, where the module made it fit.

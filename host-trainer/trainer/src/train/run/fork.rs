@@ -35,6 +35,9 @@ impl<'a> Trainer<'a> {
         if config.exposure != begun.exposure {
             restored.run.state.learned.exposures.reopen();
         }
+        if begun.refine_poses && !config.refine_poses {
+            restored.run.leave_poses();
+        }
         restored.run.setup.config = config;
         restored.run.check()?;
         Ok(restored)

@@ -127,7 +127,7 @@ impl<'a> Trainer<'a> {
         &self.state.learned.scene
     }
 
-    /// The cameras of the training views, held out or not.
+    /// The cameras of the training views, held out or not, where poses are refined as they stand now.
     pub fn cameras(&self) -> &[Pinhole<f32>] {
         &self.setup.views.cameras
     }
@@ -150,10 +150,16 @@ impl<'a> Trainer<'a> {
         self.state.learned.exposures.stops()
     }
 
-    /// How far the cameras of all training views were turned, degrees, and moved, normalised units, where poses are refined.
-    pub fn pose_changes(&self) -> Option<Vec<[f64; 2]>> {
+    /// How far the cameras of the views that are trained on were turned, degrees, and moved, normalised units, where poses are refined.
+    pub fn pose_changes(&self) -> Option<Vec<(&'a View, [f64; 2])>> {
         let changes = || self.state.learned.poses.changes(&self.setup.views);
         self.setup.config.refine_poses.then(changes)
+    }
+
+    /// The capture with the cameras of its training views where the run moved them, where poses are refined.
+    pub fn refined_capture(&self) -> Option<Capture> {
+        let refined = || Capture { train: self.setup.views.moved(), ..self.setup.capture.clone() };
+        self.setup.config.refine_poses.then(refined)
     }
 
     /// Runs to the last iteration.
@@ -225,7 +231,7 @@ impl<'a> Trainer<'a> {
             self.take_back()?;
         }
         self.keep_the_best();
-        self.rank_for_levels();
+        self.rank_for_levels()?;
         let mut fit = None;
         for module in modules.each() {
             if let Some(change) = module.event(&at, &self.view())? {
@@ -233,6 +239,13 @@ impl<'a> Trainer<'a> {
             }
         }
         Ok(Outcome { report, dropped, fit, decided })
+    }
+
+    /// Puts all cameras back to where the capture has them.
+    pub(super) fn leave_poses(&mut self) {
+        let n = self.setup.capture.train.len();
+        self.state.learned.poses = Poses::of_views(n);
+        (0..n).for_each(|place| self.setup.views.move_camera(place, [0.0; 6]));
     }
 
     /// Moves the camera of the view as its step says.
@@ -245,8 +258,13 @@ impl<'a> Trainer<'a> {
 
     /// The run as modules see it.
     pub(in crate::train) fn view(&self) -> RunView<'_> {
-        let probe = Probe {
-            scene: &self.state.learned.scene,
+        RunView { probe: self.probe(&self.state.learned.scene), limits: self.setup.limits }
+    }
+
+    /// A scene of the run, as far as its views are probed.
+    pub(super) fn probe<'s>(&'s self, scene: &'s Scene<f32>) -> Probe<'s> {
+        Probe {
+            scene,
             views: &self.setup.views,
             exposures: &self.state.learned.exposures,
             photographs: &self.machine.photographs,
@@ -255,8 +273,7 @@ impl<'a> Trainer<'a> {
             lambda: self.state.learned.lambda,
             seed: self.setup.config.seed,
             iteration: self.state.iteration,
-        };
-        RunView { probe, limits: self.setup.limits }
+        }
     }
 
     /// The same; rate–distortion pruning then leaves as much as `limits` says fits, and weighs bits accordingly.
@@ -266,16 +283,17 @@ impl<'a> Trainer<'a> {
         self
     }
 
-    /// The scene as it stands, for the writer of bundles; see [`Finished::of`].
+    /// The scene as it stands, for the writer of bundles; see [`Finished::of`]. What nobody ranked is ranked by what it is worth.
     ///
     /// # Errors
-    /// As [`Finished::of`].
+    /// As [`Finished::of`]; [`TrainError::Photograph`].
     pub fn finish(&self) -> Result<Finished, TrainError> {
-        Finished::of(
-            self.state.learned.scene.clone(),
-            &self.setup.views.trained_cameras(),
-            self.state.learned.background,
-        )
+        let Learned { scene, background, .. } = &self.state.learned;
+        let mut finished = Finished::of(scene.clone(), &self.setup.views.trained_cameras(), *background)?;
+        if scene.anchors.prune_rank.is_empty() {
+            finished.importance = self.probe(&finished.scene).importance()?;
+        }
+        Ok(finished)
     }
 
     /// The current scene's image of a view, 8 bit.

@@ -20,6 +20,16 @@ pub fn probed<I: ExactSizeIterator>(views: I) -> impl Iterator<Item = I::Item> {
     views.step_by(every)
 }
 
+/// What a pass finds; the first two as in [`Worth`].
+struct Errors {
+    of_offsets: Vec<f64>,
+    of_anchors: Vec<f64>,
+    /// Of the image, over pixels, channels and views.
+    mean_squared_error: f64,
+    /// The loss on the image, mean over the views.
+    loss: f64,
+}
+
 /// A run between two iterations, as far as its views are probed.
 #[derive(Clone, Copy, Debug)]
 pub struct Probe<'a> {
@@ -44,16 +54,11 @@ pub struct Probe<'a> {
 }
 
 impl Probe<'_> {
-    /// Probes training views with random signs, see [`Workspace::probe`]: those of [`probed`].
-    ///
-    /// An anchor's derivatives are summed over its offsets before they are squared: their images overlap.
+    /// [`Self::errors`], and what the offsets and anchors cost.
     ///
     /// One bit more raises the rate term λ·(mean bits of a value) by λ/(n·C), n anchors of C values; the image's loss L is
     /// about proportional to the root of the mean squared error E, so dL/dE = L/(2E). Hence a bit is worth
     /// λ/(n·C) · 2E/L of E.
-    ///
-    /// Cost: a forward and a backward pass of the rasteriser a view. A probe's estimate of one offset in one view has a standard
-    /// deviation of √2 times its mean; over v views that show it about √(2/v).
     ///
     /// # Errors
     /// [`TrainError::NoContext`] before there is a context model, [`TrainError::IntegerModel`] when it has no integer form,
@@ -61,6 +66,31 @@ impl Probe<'_> {
     pub fn worth(&self) -> Result<Worth, TrainError> {
         let integers = Integers::of(self.scene)?;
         let bits = Bits::of(self.scene, &integers.context(self.scene)?);
+        let Errors { of_offsets, of_anchors, mean_squared_error, loss } = self.errors()?;
+        let price_in_loss = self.lambda / (of_anchors.len() * self.scene.shape.values_per_anchor()).max(1) as f64;
+        let bit_price = price_in_loss * 2.0 * mean_squared_error / loss.max(f64::MIN_POSITIVE);
+        Ok(Worth { of_offsets, of_anchors, bits, bit_price })
+    }
+
+    /// `[n]` how much the scene would lose with each anchor: for each bit, where there is a context model that says what they cost.
+    ///
+    /// # Errors
+    /// As [`Self::worth`].
+    #[expect(clippy::cast_possible_truncation, reason = "they are compared")]
+    pub fn importance(&self) -> Result<Vec<f32>, TrainError> {
+        if self.scene.context.is_some() {
+            return Ok(self.worth()?.per_bit());
+        }
+        Ok(self.errors()?.of_anchors.into_iter().map(|error| error as f32).collect())
+    }
+
+    /// Probes training views with random signs, see [`Workspace::probe`]: those of [`probed`].
+    ///
+    /// An anchor's derivatives are summed over its offsets before they are squared: their images overlap.
+    ///
+    /// Cost: a forward and a backward pass of the rasteriser a view. A probe's estimate of one offset in one view has a standard
+    /// deviation of √2 times its mean; over v views that show it about √(2/v).
+    fn errors(&self) -> Result<Errors, TrainError> {
         let (n, k) = (self.scene.anchors.len(), self.scene.shape.n_offsets);
         let stream = Stream::of_run(self.seed).branch(PROBES).branch(self.iteration);
         let mut workspace = Workspace::new(&self.scene.shape);
@@ -94,8 +124,6 @@ impl Probe<'_> {
             *sum /= n_values.max(1) as f64;
         }
         let mean_squared_error = squared_sum / n_values.max(1) as f64;
-        let price_in_loss = self.lambda / (n * self.scene.shape.values_per_anchor()).max(1) as f64;
-        let bit_price = price_in_loss * 2.0 * mean_squared_error / loss.max(f64::MIN_POSITIVE);
-        Ok(Worth { of_offsets, of_anchors, bits, bit_price })
+        Ok(Errors { of_offsets, of_anchors, mean_squared_error, loss })
     }
 }

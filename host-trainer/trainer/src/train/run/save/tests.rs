@@ -108,6 +108,24 @@ fn a_fork_decides_about_exposures_anew_where_it_is_asked_to() {
 }
 
 #[test]
+fn a_fork_without_refined_poses_begins_with_those_of_the_capture() {
+    let capture = tiny_capture();
+    let refining = TrainConfig { refine_poses: true, ..tiny_config(200) };
+    let mut begun = Trainer::new(&capture, refining).unwrap();
+    for _ in 0..120 {
+        begun.advance().unwrap();
+    }
+    let given: Vec<_> =
+        Trainer::new(&capture, tiny_config(200)).unwrap().cameras().iter().map(|c| c.rotation).collect();
+    let of_fork = |config| {
+        let fork = Trainer::fork(&capture, &saved(&begun), config).unwrap().run;
+        fork.cameras().iter().map(|camera| camera.rotation).collect::<Vec<_>>()
+    };
+    assert_eq!(of_fork(tiny_config(200)), given);
+    assert!(of_fork(refining).iter().zip(&given).all(|(moved, given)| moved != given));
+}
+
+#[test]
 fn images_are_halved_up_to_the_switch_and_only_where_enough_is_left() {
     let mut capture = tiny_capture();
     edit(&mut capture.train[0], |photograph| {

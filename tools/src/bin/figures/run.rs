@@ -73,6 +73,11 @@ struct Measured {
     program: String,
 }
 
+/// What made a file of a script: where the file does not say, as a .spz does not, the program that measured it, for a script has but one.
+fn made_by(program: &str) -> &str {
+    program.strip_prefix("unknown, measured by ").unwrap_or(program)
+}
+
 struct GroupRuns<'a> {
     group: &'a Group,
     program: &'a Path,
@@ -165,7 +170,7 @@ impl GroupRuns<'_> {
                 ssim: Some(rounded(ssim)),
                 lpips,
                 bytes: Some(bundle_bytes),
-                program,
+                program: made_by(&program).to_owned(),
                 ..Row::default()
             });
         }

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::{Block, Workspace};
 use crate::ops::Pinhole;
 use crate::ops::heads::neural_gaussians::Gaussian;
+use crate::ops::image::project::cross;
 use crate::real::Real;
 
 impl<R: Real> Workspace<R> {
@@ -25,7 +26,7 @@ impl<R: Real> Block<R> {
         let of_gaussian = |i: &u32| {
             let (gaussian, d) = (&self.gaussians[*i as usize], &self.d_gaussians[*i as usize]);
             let by_place = camera.turned(d.centre);
-            let by_turn = cross(camera.to_cam(gaussian.centre), by_place);
+            let by_turn = cross(&camera.to_cam(gaussian.centre), &by_place);
             let by_axes = camera.turned(rotation_gradient(gaussian, d));
             let [x, y, z] = [0, 1, 2].map(|axis| by_turn[axis] + by_axes[axis]);
             [x, y, z, by_place[0], by_place[1], by_place[2]]
@@ -38,15 +39,11 @@ fn added<R: Real>(a: [R; 6], b: [R; 6]) -> [R; 6] {
     std::array::from_fn(|i| a[i] + b[i])
 }
 
-fn cross<R: Real>(a: [R; 3], b: [R; 3]) -> [R; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
 /// dL/dφ of a Gaussian that turns by φ in the world: its rotation q = (w, v) becomes (1, φ/2)·q, so it is (w·dv − v·dw + v × dv)/2.
 fn rotation_gradient<R: Real>(gaussian: &Gaussian<R>, d: &Gaussian<R>) -> [R; 3] {
     let ([w, x, y, z], [dw, dx, dy, dz]) = (gaussian.rotation, d.rotation);
     let (v, dv) = ([x, y, z], [dx, dy, dz]);
-    let crossed = cross(v, dv);
+    let crossed = cross(&v, &dv);
     [0, 1, 2].map(|axis| R::real(0.5) * (w * dv[axis] - v[axis] * dw + crossed[axis]))
 }
 

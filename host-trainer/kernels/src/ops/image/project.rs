@@ -70,7 +70,7 @@ fn dot<R: Real>(a: &[R; 3], b: &[R; 3]) -> R {
 }
 
 #[inline(always)]
-fn cross<R: Real>(a: &[R; 3], b: &[R; 3]) -> [R; 3] {
+pub(crate) fn cross<R: Real>(a: &[R; 3], b: &[R; 3]) -> [R; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 

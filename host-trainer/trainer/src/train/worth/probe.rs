@@ -54,7 +54,9 @@ pub struct Probe<'a> {
 }
 
 impl Probe<'_> {
-    /// [`Self::errors`], and what the offsets and anchors cost.
+    /// Probes the training views, see [`Workspace::probe`]: those of [`probed`]. Says also what the offsets and anchors cost.
+    ///
+    /// Cost: a forward and a backward pass of the rasteriser a view.
     ///
     /// One bit more raises the rate term λ·(mean bits of a value) by λ/(n·C), n anchors of C values; the image's loss L is
     /// about proportional to the root of the mean squared error E, so dL/dE = L/(2E). Hence a bit is worth

@@ -2,11 +2,12 @@
 
 #![expect(clippy::disallowed_macros, reason = "cargo reads what a build script prints")]
 
-use std::path::Path;
+use std::path::PathBuf;
 use std::process::Command;
 
 fn main() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    // Asked while it runs: working trees that share a target folder share this program.
+    let root = PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").unwrap_or_default()).join("../..");
     // A package lies in nobody's repository, or in another's.
     if !root.join(".git").exists() {
         println!("cargo:rerun-if-changed=build.rs");

@@ -8,12 +8,13 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-jobs=(fmt clippy doc pages test viewer core-embedded format-doc package link-gate digests reader fuzz firmware boards c demo many-runs)
+jobs=(fmt clippy doc pages test viewer core-embedded format-doc package link-gate digests reader fuzz firmware boards c demo python many-runs)
 
 embedded_target=thumbv7em-none-eabihf
 defmt_print_version=1.2.0
 flip_link_version=0.1.12
 axe_core_version=4.14.1
+python_tools=(maturin==1.16.0 mypy==2.4.1 numpy==2.4.6 nbclient==0.11.0 nbformat==5.11.1 ipykernel==7.4.0)
 # One folder for everything that is built, so that a clean-up is one `rm`; the bare-metal workspaces build below it.
 target=${CARGO_TARGET_DIR:-$PWD/target}
 case $target in /*) ;; *) target=$PWD/$target ;; esac
@@ -103,6 +104,11 @@ need_tool() { # CRATE VERSION
   cargo install "$1" --version "$2" --locked --debug --root "$target/tools" --target-dir "$target/tools/build" ||
     fail "$1 is missing: run \`cargo install $1 --version $2 --locked\`"
   rm -rf "$target/tools/build"
+}
+
+need_python() {
+  need_command python3 python3 python3-venv
+  python3 -c 'import ensurepip' 2>/dev/null || fail "python3 makes no virtual environments: install it (Debian: apt-get install python3-venv)"
 }
 
 # One of this repository's programs, of the tests' build: built alone it would want its libraries once more, with other features.
@@ -261,7 +267,7 @@ job_package() {
   local sources=$target/packages/sources
   rm -rf "$target/packages"
   mkdir -p "$sources"
-  cargo package --workspace --exclude conformance --exclude tools --allow-dirty --locked --no-verify --target-dir "$target/packages"
+  cargo package --workspace --exclude conformance --exclude tools --exclude pocketsplat-python --allow-dirty --locked --no-verify --target-dir "$target/packages"
   # -m: packed times are of 2006, and to cargo a file that old has been checked.
   for file in "$target"/packages/package/*.crate; do tar -xzmf "$file" -C "$sources"; done
   cp Cargo.lock "$sources"
@@ -492,11 +498,27 @@ job_demo() {
   cargo run --release --locked -- demo --output "$target/demo" --size 64 --iterations 400
 }
 
+# The wheel, as a user of Python gets it: of the size and in the time that are asked, with the command, and with types.
+job_python() {
+  local environment=$target/python wheel
+  need_python
+  [ -x "$environment/bin/maturin" ] || python3 -m venv "$environment"
+  "$environment/bin/pip" install -q --disable-pip-version-check "${python_tools[@]}"
+  rm -rf "$target/wheels"
+  (cd python && "$environment/bin/maturin" build --release --locked --target-dir "$target" --out "$target/wheels")
+  wheel=$(echo "$target"/wheels/*.whl)
+  [ "$(stat -c %s "$wheel")" -le 15000000 ] || fail "the wheel has $(stat -c %s "$wheel") bytes, 15,000,000 are allowed"
+  "$environment/bin/pip" install -q --disable-pip-version-check --force-reinstall --no-deps "$wheel"
+  (cd python && "$environment/bin/mypy" pocketsplat tests/test_pocketsplat.py)
+  # Elsewhere, so that the sources are not taken for the package.
+  (cd "$target" && REPOSITORY=$OLDPWD "$environment/bin/python" -m unittest discover "$OLDPWD/python/tests")
+  (cd "$target" && "$environment/bin/python" "$OLDPWD/python/tests/run_notebook.py" "$OLDPWD/python/notebook.ipynb")
+}
+
 # A plan of runs, killed at a random moment under either executor, ends in the same tables.
 job_many-runs() {
-  need_command python3 python3 python3-venv
   need_command pkill procps
-  python3 -c 'import ensurepip' 2>/dev/null || fail "python3 makes no virtual environments: install it (Debian: apt-get install python3-venv)"
+  need_python
   cargo build -q --release --locked
   tests/many-runs/test.sh "$target/release/pocketsplat" "$target/many-runs"
 }

@@ -9,7 +9,7 @@ use std::fs;
 use std::path::Path;
 
 /// The folder of each crate's sources, and its rooms; one may import those to its left.
-const CRATES: [(&str, &[&str]); 13] = [
+const CRATES: [(&str, &[&str]); 14] = [
     ("decoder-format/src", &["error", "rules", "math", "stopwatch", "camera", "bytes", "entropy", "context", "bundle"]),
     (
         "decoder-core/src",
@@ -64,6 +64,7 @@ const CRATES: [(&str, &[&str]); 13] = [
     ("host-trainer/instructions/src", &["context", "level"]),
     ("viewer/src", &["figures", "focus", "scene", "exports", "package", "page"]),
     ("host-trainer/cli/src", &["say", "program", "plot", "config", "command"]),
+    ("python/src", &["error", "camera", "bundle"]),
 ];
 
 /// Rooms with rooms inside: the sources' folder of the crate, the module, and what lies in it in order.

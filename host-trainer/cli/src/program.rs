@@ -1,10 +1,24 @@
 //! Which program a figure is of.
 
-use std::sync::LazyLock;
+use std::path::PathBuf;
+use std::sync::{LazyLock, OnceLock};
 
 use pocketsplat_trainer::{REVISION, revision_of};
 
 use crate::say::say;
+
+static PATH: OnceLock<PathBuf> = OnceLock::new();
+
+/// Says once which file starts this command again.
+pub(crate) fn set_path(path: Option<PathBuf>) {
+    // A second command in one process keeps the first one's.
+    let _ = path.map(|path| PATH.set(path));
+}
+
+/// The file that starts this command again.
+pub(crate) fn path() -> Option<PathBuf> {
+    PATH.get().cloned()
+}
 
 /// Version and revision of training, as a bundle keeps them: programs that agree in both give the same bundle of the same run.
 pub(crate) fn training() -> String {

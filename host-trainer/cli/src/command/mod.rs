@@ -42,6 +42,7 @@ mod view;
 mod watch;
 mod workflow;
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use anyhow::{Context, Result};
@@ -88,10 +89,13 @@ enum Command {
 }
 
 /// Parses the command line, runs the command, and says what failed: as JSON on stdout where results go there as JSON.
-pub(crate) fn run() -> ExitCode {
-    let as_json = std::env::args_os().any(|arg| arg == "--json");
-    let parsed =
-        help::grouped(help::own_options(Cli::command())).mut_subcommands(accepting_negative_numbers).try_get_matches();
+///
+/// * `arguments`: without the program's name.
+pub(crate) fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    let as_json = arguments.iter().any(|arg| arg == "--json");
+    let command = help::grouped(help::own_options(Cli::command())).mut_subcommands(accepting_negative_numbers);
+    let parsed = command.no_binary_name(true).try_get_matches_from(arguments);
     let cli = match parsed.and_then(|matches| Cli::from_arg_matches(&matches)) {
         Ok(cli) => cli,
         Err(error) => {

@@ -146,9 +146,12 @@ mod tests {
     #[test]
     fn the_plans_that_lie_ready_can_be_trained() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/plans");
-        for (name, n_runs, n_methods) in
-            [("rates.toml", 12, 1), ("modules.toml", 84, 7), ("synthetic_nerf.toml", 12, 1), ("photographs.toml", 156, 1)]
-        {
+        for (name, n_runs, n_methods) in [
+            ("rates.toml", 12, 1),
+            ("modules.toml", 84, 7),
+            ("synthetic_nerf.toml", 12, 1),
+            ("photographs.toml", 156, 1),
+        ] {
             let runs = Spec::read(&folder.join(name)).unwrap().runs().unwrap();
             let mut methods: Vec<&str> = runs.iter().map(|run| run.method.as_str()).collect();
             methods.sort_unstable();

@@ -180,7 +180,7 @@ impl Planner {
             arguments: merge,
             files: files.iter().map(|(file, _)| (*file).to_owned()).collect(),
         };
-        let program = std::env::current_exe().context("this program has no path")?;
+        let program = crate::program::path().context("this program has no path")?;
         let plan = serde_json::to_string_pretty(&Plan { program, runs: self.runs.clone(), merge })? + "\n";
         write_changed(&folder.join(PLAN.0), PLAN.1, &plan)?;
         write_changed(&folder.join("Snakefile"), RULES, SNAKEFILE)?;

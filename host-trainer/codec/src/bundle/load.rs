@@ -29,7 +29,11 @@ pub fn load(path: &Path) -> Result<Vec<u8>, LoadError> {
     Ok(bytes)
 }
 
-fn check(bytes: &[u8]) -> Result<(), DecodeError> {
+/// Checks all of a bundle, every chunk's checksum included.
+///
+/// # Errors
+/// As [`Bundle::parse`], and that of the first damaged chunk.
+pub fn check(bytes: &[u8]) -> Result<(), DecodeError> {
     let bundle = Bundle::parse(bytes)?;
     bundle.chunks().try_for_each(|chunk| chunk.check())
 }

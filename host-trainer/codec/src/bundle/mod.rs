@@ -35,7 +35,7 @@ pub(crate) use channels::ContextWork;
 pub use decoded::{decoded_heads, decoded_scene, for_each_chunk, normalisation_of, shape_of};
 pub use error::WriteError;
 pub use layout::{CodedScene, Written};
-pub use load::{LoadError, load};
+pub use load::{LoadError, check, load};
 pub use mean_steps::mean_steps;
 pub use order::check_pruning_rates;
 pub use pocketsplat_kernels::ops::rate::file_order::PRUNING_RATES;

@@ -1,0 +1,150 @@
+"""Training, as a process of its own."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ._bundle import Bundle
+
+_POLL_S = 0.2
+
+
+class TrainError(RuntimeError):
+    """Training failed; the message is the command's own."""
+
+
+@dataclass(frozen=True)
+class Progress:
+    """One row of the run's progress.csv."""
+
+    iteration: int
+    loss: float
+    psnr_db: float
+    """Of the training view of this iteration."""
+    n_anchors: int
+    seconds: float
+    """Time spent on iterations so far."""
+
+
+class Training:
+    """A run that goes on in another process. Iterate over it for its progress; `bundle()` waits for its end.
+
+    Left early it goes on by itself; `stop()` ends it with a checkpoint, from which `pocketsplat train --resume` goes on.
+    """
+
+    def __init__(self, command: list[str], output: Path) -> None:
+        self.output: Path = output
+        """The bundle, once it is there."""
+        self.run: Path = output.with_suffix(".run")
+        """The folder of the run: report.html, result.json, checkpoints."""
+        self._error = ""
+        self._said = tempfile.TemporaryFile(mode="w+", encoding="utf-8", errors="replace")
+        # The package is found there as it is here.
+        packages = [str(Path(__file__).parent.parent), os.environ.get("PYTHONPATH", "")]
+        environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, packages))}
+        self._process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=self._said, env=environment)
+
+    def __iter__(self) -> Iterator[Progress]:
+        """Yields a row each time the run writes one, until it ends.
+
+        Raises TrainError where it fails.
+        """
+        n_seen = 0
+        while True:
+            # Asked before the rows are read, so that the last ones are not missed.
+            has_ended = self._process.poll() is not None
+            rows = self._rows()
+            yield from rows[n_seen:]
+            n_seen = max(n_seen, len(rows))
+            if has_ended:
+                self._check()
+                return
+            time.sleep(_POLL_S)
+
+    def wait(self) -> dict[str, Any]:
+        """Waits for the end and gives the content of result.json: psnr_db, ssim, bundle_bytes, views and so on.
+
+        Raises TrainError where the run fails.
+        """
+        self._process.wait()
+        self._check()
+        result: dict[str, Any] = json.loads((self.run / "result.json").read_text(encoding="utf-8"))
+        return result
+
+    def bundle(self) -> Bundle:
+        """Waits for the end and opens the bundle.
+
+        Raises TrainError where the run fails.
+        """
+        self.wait()
+        return Bundle.open(self.output)
+
+    def stop(self) -> None:
+        """Ends the run with a checkpoint, and waits for that."""
+        self._process.send_signal(signal.SIGINT)
+        self._process.wait()
+
+    def _rows(self) -> list[Progress]:
+        try:
+            text = (self.run / "progress.csv").read_text(encoding="utf-8")
+        except OSError:
+            return []
+        # The last line may be half written.
+        lines = text[: text.rfind("\n") + 1].splitlines()
+        return [
+            Progress(
+                iteration=int(row["iteration"]),
+                loss=float(row["loss"]),
+                psnr_db=float(row["psnr_db"]),
+                n_anchors=int(row["anchors"]),
+                seconds=float(row["seconds"]),
+            )
+            for row in csv.DictReader(lines)
+        ]
+
+    def _check(self) -> None:
+        if not self._said.closed:
+            self._said.seek(0)
+            said = self._said.read().strip()
+            self._said.close()
+            at = said.find("error: ")
+            self._error = said[at:] if at >= 0 else said
+        code = self._process.returncode
+        if code != 0:
+            raise TrainError(self._error or f"training ended with exit code {code}")
+
+
+def train(capture: str | os.PathLike[str], output: str | os.PathLike[str], **options: Any) -> Training:
+    """Trains a scene from a folder of photographs with poses, in a process of its own.
+
+        training = pocketsplat.train("capture", "scene.psb", preset="quick", lambda_=0.004)
+        for progress in training:
+            print(progress.iteration, progress.psnr_db)
+        bundle = training.bundle()
+
+    Options are those of `pocketsplat train`, with underscores: `max_resolution=400` is `--max-resolution 400`, `overwrite=True` is
+    `--overwrite`, lists are joined by commas. An underscore at the end keeps words of Python apart: `lambda_`.
+    """
+    # By its path: `-m pocketsplat` would look into the working folder first.
+    program = Path(__file__).with_name("__main__.py")
+    command = [sys.executable, str(program), "train", os.fspath(capture), "-o", os.fspath(output)]
+    for name, value in options.items():
+        option = "--" + name.rstrip("_").replace("_", "-")
+        if value is True:
+            command.append(option)
+        elif value is not False and value is not None:
+            is_list = isinstance(value, (list, tuple))
+            # `=` keeps values that begin with a hyphen apart from options.
+            command.append(f"{option}={','.join(map(str, value)) if is_list else value}")
+    return Training(command, Path(output))

@@ -8,12 +8,13 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-jobs=(fmt clippy doc pages test viewer core-embedded format-doc package link-gate digests reader fuzz firmware boards c demo python many-runs)
+jobs=(fmt clippy doc pages test viewer npm core-embedded format-doc package link-gate digests reader fuzz firmware boards c demo python many-runs)
 
 embedded_target=thumbv7em-none-eabihf
 defmt_print_version=1.2.0
 flip_link_version=0.1.12
 axe_core_version=4.14.1
+npm_tools=(typescript@5.9.3 vite@6.4.6)
 python_tools=(maturin==1.16.0 mypy==2.4.1 numpy==2.4.6 nbclient==0.11.0 nbformat==5.11.1 ipykernel==7.4.0)
 # One folder for everything that is built, so that a clean-up is one `rm`; the bare-metal workspaces build below it.
 target=${CARGO_TARGET_DIR:-$PWD/target}
@@ -196,6 +197,25 @@ job_viewer() {
   viewer/build.sh "$built"
   cmp "$built" viewer/pocketsplat.wasm ||
     fail "viewer/pocketsplat.wasm is not what its source builds; run \`tools/ci.sh bless-viewer\` and commit it"
+}
+
+# The package as users of npm get it: packed, its types checked, bundled.
+job_npm() {
+  local folder=$target/npm
+  need_command npm nodejs npm
+  rm -rf "$folder"
+  mkdir -p "$folder"
+  program pocketsplat view tests/golden/static.psb --package "$folder/package"
+  (cd "$folder" && npm pack --silent ./package)
+  cp -r viewer/tests/bundled "$folder/user"
+  (
+    cd "$folder/user"
+    echo '{ "name": "user", "private": true, "type": "module" }' >package.json
+    npm install --silent --no-fund --no-audit "$folder"/pocketsplat-*.tgz "${npm_tools[@]}"
+    npx tsc
+    npx vite build --logLevel warn
+    ls dist/assets/pocketsplat-*.wasm dist/assets/worker-*.js
+  )
 }
 
 # Not one of `jobs`, part of `test`: the kernels alone.

@@ -5,6 +5,10 @@ pub const MODULE: &[u8] = include_bytes!("../pocketsplat.wasm");
 pub(crate) const CHECK: &str = include_str!("../web/check.js");
 pub(crate) const POCKETSPLAT: &str = include_str!("../web/pocketsplat.js");
 pub(crate) const ORBIT: &str = include_str!("../web/orbit.js");
+pub(crate) const VIEW: &str = include_str!("../web/view.js");
+pub(crate) const MOTION: &str = include_str!("../web/motion.js");
+pub(crate) const SHARPNESS: &str = include_str!("../web/sharpness.js");
+pub(crate) const WORKER: &str = include_str!("../web/worker.js");
 
 /// A file of the package.
 #[derive(Clone, Copy, Debug)]
@@ -16,15 +20,20 @@ pub struct PackageFile {
 }
 
 /// The files of the package. Its example draws the bundle `scene.psb` beside them.
-pub fn package() -> [PackageFile; 9] {
+pub fn package() -> [PackageFile; 15] {
     const MANIFEST: &str = concat!(
         "{\n  \"name\": \"pocketsplat\",\n  \"version\": \"",
         env!("CARGO_PKG_VERSION"),
         "\",\n  \"description\": \"Draws pocketsplat bundles with the decoder that runs on microcontrollers\",\n  \"license\": \"",
         env!("CARGO_PKG_LICENSE"),
-        "\",\n  \"type\": \"module\",\n  \"sideEffects\": false,\n  \"exports\": {\n    \".\": \"./pocketsplat.js\",\n",
-        "    \"./orbit\": \"./orbit.js\",\n    \"./pocketsplat.wasm\": \"./pocketsplat.wasm\"\n  },\n",
-        "  \"types\": \"./pocketsplat.d.ts\"\n}\n"
+        "\",\n  \"repository\": \"",
+        env!("CARGO_PKG_REPOSITORY"),
+        "\",\n  \"type\": \"module\",\n  \"sideEffects\": [\"./element.js\", \"./worker.js\"],\n  \"exports\": {\n",
+        "    \".\": { \"types\": \"./pocketsplat.d.ts\", \"default\": \"./pocketsplat.js\" },\n",
+        "    \"./orbit\": { \"types\": \"./orbit.d.ts\", \"default\": \"./orbit.js\" },\n",
+        "    \"./element\": { \"types\": \"./element.d.ts\", \"default\": \"./element.js\" },\n",
+        "    \"./pocketsplat.wasm\": \"./pocketsplat.wasm\"\n  },\n  \"types\": \"./pocketsplat.d.ts\",\n",
+        "  \"files\": [\"*.js\", \"*.d.ts\", \"*.wasm\", \"example.html\"]\n}\n"
     );
     [
         ("pocketsplat.wasm", MODULE),
@@ -33,6 +42,12 @@ pub fn package() -> [PackageFile; 9] {
         ("check.js", CHECK.as_bytes()),
         ("orbit.js", ORBIT.as_bytes()),
         ("orbit.d.ts", include_bytes!("../web/orbit.d.ts")),
+        ("element.js", include_bytes!("../web/element.js")),
+        ("element.d.ts", include_bytes!("../web/element.d.ts")),
+        ("view.js", VIEW.as_bytes()),
+        ("motion.js", MOTION.as_bytes()),
+        ("sharpness.js", SHARPNESS.as_bytes()),
+        ("worker.js", WORKER.as_bytes()),
         ("package.json", MANIFEST.as_bytes()),
         ("README.md", include_bytes!("../web/README.md")),
         ("example.html", include_bytes!("../web/example.html")),

@@ -1,19 +1,11 @@
 //! One HTML file that draws bundles, with everything inside.
 
-use crate::package::{CHECK, MODULE, ORBIT, POCKETSPLAT};
+use crate::package::{CHECK, MODULE, MOTION, ORBIT, POCKETSPLAT, SHARPNESS, VIEW, WORKER};
 
 const PAGE: &str = include_str!("../web/page.html");
 const STYLE: &str = include_str!("../web/style.css");
-const WORKER: &str = include_str!("../web/worker.js");
-const SCRIPTS: [&str; 7] = [
-    CHECK,
-    ORBIT,
-    include_str!("../web/motion.js"),
-    include_str!("../web/sharpness.js"),
-    include_str!("../web/view.js"),
-    include_str!("../web/figures.js"),
-    include_str!("../web/viewer.js"),
-];
+const SCRIPTS: [&str; 7] =
+    [CHECK, ORBIT, MOTION, SHARPNESS, VIEW, include_str!("../web/figures.js"), include_str!("../web/viewer.js")];
 
 /// A bundle and what the page calls it.
 #[derive(Clone, Copy, Debug)]

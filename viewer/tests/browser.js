@@ -91,6 +91,15 @@ async function hands() {
   check(String(orbit.target) !== String(orbit.home.target), 'Shift and an arrow key pan');
   press('0');
   check(orbit.yaw === orbit.home.yaw && orbit.distance === orbit.home.distance, '0 resets');
+  await sleep(600);
+  check(location.hash.slice(1) === orbit.place, 'the address has the camera once it rests');
+  location.hash = '#0.5,0.25,3,0.1,0.2,0.3';
+  await sleep(200);
+  check(orbit.place === '0.5,0.25,3,0.1,0.2,0.3', 'an address moves the camera');
+  location.hash = '#section-2';
+  await sleep(200);
+  check(orbit.place === '0.5,0.25,3,0.1,0.2,0.3', 'what is no camera moves nothing');
+  press('0');
   const eye = (camera) => camera.rotation.concat(camera.translation).map((x) => x.toFixed(6)).join();
   const [seen, far] = [eye(orbit.camera(64, 64)), orbit.distance];
   orbit.refocus(far + 1);

@@ -6,10 +6,6 @@ use std::process::Command;
 
 use pocketsplat_viewer::package;
 
-/// Of the page alone, as modules.
-const OF_THE_PAGE: [(&str, &str); 2] =
-    [("motion.js", include_str!("../web/motion.js")), ("sharpness.js", include_str!("../web/sharpness.js"))];
-
 #[test]
 fn numbers_are_checked_and_motion_keeps_its_limits() {
     if Command::new("node").arg("--version").output().is_err() {
@@ -19,9 +15,8 @@ fn numbers_are_checked_and_motion_keeps_its_limits() {
     }
     let folder = tempfile::tempdir().expect("a folder");
     let files = package().into_iter().map(|file| (file.name, file.bytes));
-    let page = OF_THE_PAGE.into_iter().map(|(name, text)| (name, text.as_bytes()));
     let scene: &[u8] = include_bytes!("../../tests/golden/static.psb");
-    for (name, bytes) in files.chain(page).chain([("scene.psb", scene)]) {
+    for (name, bytes) in files.chain([("scene.psb", scene)]) {
         std::fs::write(folder.path().join(name), bytes).expect("written");
     }
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/package.mjs");

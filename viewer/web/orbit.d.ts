@@ -10,6 +10,8 @@ export class Orbit {
   distance: number;
   /** The point it turns around, normalised units. */
   target: number[];
+  /** Where it stands, as text that an address can hold; setting what is none throws a `RangeError` and moves nothing. */
+  place: string;
   reset(): void;
   /** Turns around the point at another distance from now on; the picture stays as it is. */
   refocus(distance: number): void;

@@ -1,5 +1,5 @@
 // A camera that turns around a point, and what hands do to it.
-import { list, positive, real, whole } from './check.js';
+import { list, positive, real, refuse, whole } from './check.js';
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -7,6 +7,8 @@ const scaled = (a, factor) => a.map((x) => x * factor);
 const sum = (...vectors) => [0, 1, 2].map((i) => vectors.reduce((total, vector) => total + vector[i], 0));
 const clamp = (x, least, most) => Math.min(most, Math.max(least, x));
 
+/** No camera stands this far out, nor turns this far. */
+const MOST_NUMBER = 1e5;
 /** Never straight above or below, where up has no direction. */
 const MOST_PITCH = (88 * Math.PI) / 180;
 
@@ -56,6 +58,22 @@ export class Orbit {
       pose.target = sum(pose.target, scaled(this.axes(pose).forward, further));
       pose.distance += further;
     }
+  }
+
+  /** Where it stands, as text that an address can hold: yaw, pitch, distance and the point it turns around. */
+  get place() {
+    const { yaw, pitch, distance, target } = this;
+    return [yaw, pitch, distance, ...target].map((number) => Number(number.toPrecision(5))).join(',');
+  }
+
+  /** Goes to a place; what is none moves nothing. */
+  set place(text) {
+    const numbers = String(text).split(',').map((number) => (number.trim() === '' ? NaN : Number(number)));
+    if (numbers.length !== 6 || !numbers.every((number) => Math.abs(number) < MOST_NUMBER) || numbers[2] <= 0) {
+      refuse('place', text, 'six numbers between commas: yaw, pitch, distance and a point, as `orbit.place` gives them');
+    }
+    const [yaw, pitch, distance, ...target] = numbers;
+    Object.assign(this, { yaw, pitch: clamp(pitch, -MOST_PITCH, MOST_PITCH), distance, target });
   }
 
   /** Directions of the camera: right, down and forward in the picture. */

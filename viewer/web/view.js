@@ -13,8 +13,8 @@ class Drawer {
   #waiting = new Map();
   #count = 0;
 
-  constructor(address) {
-    this.#worker = new Worker(address);
+  constructor(worker) {
+    this.#worker = worker;
     this.#worker.onmessage = ({ data: { id, answer, error } }) => {
       const { resolve, reject } = this.#waiting.get(id);
       this.#waiting.delete(id);
@@ -31,6 +31,10 @@ class Drawer {
     const id = this.#count++;
     this.#worker.postMessage({ id, question, ...argument });
     return new Promise((resolve, reject) => this.#waiting.set(id, { resolve, reject }));
+  }
+
+  close() {
+    this.#worker.terminate();
   }
 
   /** Plans within `settings` unless they are the last ones; then draws, unless the plan was refused. */
@@ -73,13 +77,27 @@ export class View {
   }
 
   /** Adds a worker; with two of them, one draws the next frame while the other finishes this one. */
-  async open(address, module, bundle) {
-    const drawer = new Drawer(address);
+  async open(worker, module, bundle) {
+    const drawer = new Drawer(worker);
     Object.assign(this, await drawer.ask('open', { module, bundle }));
     const { centreX, centreY, centreZ, scale, backgroundRed, backgroundGreen, backgroundBlue } = this.bundle;
     this.normalisation = { centre: [centreX, centreY, centreZ], scale };
     this.figure.style.setProperty('--behind', `rgb(${backgroundRed} ${backgroundGreen} ${backgroundBlue})`);
     this.#drawers.push(drawer);
+  }
+
+  /** Ends its workers. */
+  close() {
+    for (const drawer of this.#drawers) drawer.close();
+    this.#drawers = [];
+  }
+
+  /** The size of a frame that fills a place of a page, as far as the scene has detail for it. */
+  sizeFor({ clientWidth, clientHeight }) {
+    const { widthPx, heightPx } = this.bundle;
+    const longest = Math.max(clientWidth, clientHeight, 1);
+    const most = Math.min(1024, Math.max(256, 2 * Math.max(widthPx, heightPx)), longest * devicePixelRatio);
+    return [clientWidth, clientHeight].map((side) => Math.max(16, Math.round((side * most) / longest)));
   }
 
   /** Whether it is drawing. */

@@ -8,6 +8,8 @@ import { bytes, caption, count, percent, showFrames, showInstructions, showPlans
 const DISPLAYS = [[96, 64], [128, 128], [160, 120], [160, 128], [240, 240], [320, 240], [480, 320], [640, 480]];
 const NO_LIMIT = 200;
 const FIGURES_MS = 200;
+/** How long the camera rests before the address has it. */
+const PLACE_MS = 400;
 /** How long a picture stands still before it sways. */
 const LOOK_MS = 1000;
 
@@ -28,15 +30,8 @@ function decoded(text) {
 
 // --- What is to be drawn ---------------------------------------------------------------------------------------------
 
-/** The frame's size: the display's, or what the window has, as far as the scene has detail for it. */
-function frameSize() {
-  if (state.device) return state.size;
-  const { clientWidth, clientHeight } = views[0].figure;
-  const { widthPx, heightPx } = views[0].bundle;
-  const longest = Math.max(clientWidth, clientHeight, 1);
-  const most = Math.min(1024, Math.max(256, 2 * Math.max(widthPx, heightPx)), longest * devicePixelRatio);
-  return [clientWidth, clientHeight].map((side) => Math.max(16, Math.round((side * most) / longest)));
-}
+/** The frame's size: the display's, or what the window has. */
+const frameSize = () => (state.device ? state.size : views[0].sizeFor(views[0].figure));
 
 function settingsOf(view, [widthPx, heightPx]) {
   const nTiers = view.tiers.length;
@@ -121,6 +116,17 @@ function draw() {
 function moved() {
   stopSpinning();
   motion.touch();
+  clearTimeout(figures.placed);
+  figures.placed = setTimeout(() => keep(orbit.place), PLACE_MS);
+}
+
+/** Puts the camera into the address, so that a copy of it shows the same; pages inside other pages have none of their own. */
+function keep(place) {
+  try {
+    history.replaceState(null, '', `#${place}`);
+  } catch {
+    // Not allowed here.
+  }
 }
 
 // --- Settings --------------------------------------------------------------------------------------------------------
@@ -200,12 +206,15 @@ function listen() {
     if (event.target.closest('select')) return;
     if (event.key === ' ') spin();
     else if (event.key === 'd' || event.key === 'D') setDevice(!state.device);
+    else if ((event.key === 'f' || event.key === 'F') && document.fullscreenEnabled) stage.requestFullscreen();
     else return;
     event.preventDefault();
   });
   $('spin').addEventListener('click', spin);
   $('quarter').addEventListener('click', () => (quarter(), moved()));
   $('reset').addEventListener('click', () => (orbit.reset(), moved()));
+  $('full').hidden = !document.fullscreenEnabled;
+  $('full').addEventListener('click', () => stage.requestFullscreen());
   $('save').addEventListener('click', save);
   $('target').addEventListener('change', () => showInstructions($('stages'), views, $('target').value));
   $('size').addEventListener('change', (event) => ((state.size = event.target.value.split(',').map(Number)), motion.touch()));
@@ -249,7 +258,7 @@ async function start() {
     views.push(Object.assign(new View(dataset.bundle, stage), { spread, sharpness: new Sharpness() }));
   }
   const bundles = sources.map((element) => decoded(element.textContent));
-  const open = () => Promise.all(views.map((view, i) => view.open(address, module, bundles[i])));
+  const open = () => Promise.all(views.map((view, i) => view.open(new Worker(address), module, bundles[i])));
   await open();
   const [first, ...others] = views;
   orbit = new Orbit(first.preview);
@@ -265,10 +274,26 @@ async function start() {
   // What takes a moment comes after the first picture.
   orbit.refocus(await first.focus());
   for (const view of others) view.orbit?.refocus(await view.focus());
+  const placed = place();
+  addEventListener('hashchange', place);
   // A second worker for each where cores are idle.
   if (navigator.hardwareConcurrency >= 4 * views.length) await open();
   know();
-  if (!matchMedia('(prefers-reduced-motion: reduce)').matches) motion.swayAfter(LOOK_MS);
+  if (!placed && !matchMedia('(prefers-reduced-motion: reduce)').matches) motion.swayAfter(LOOK_MS);
+}
+
+/** Stands where the address says; whether it says so. */
+function place() {
+  if (location.hash.length < 2) return false;
+  try {
+    orbit.place = decodeURIComponent(location.hash.slice(1));
+  } catch {
+    // Another program's.
+    return false;
+  }
+  stopSpinning();
+  motion.touch();
+  return true;
 }
 
 /** Tells the motion where the cameras stood. */

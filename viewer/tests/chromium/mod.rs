@@ -1,6 +1,9 @@
 //! A page in Chromium, and what it says.
 
+#![expect(dead_code, reason = "each suite takes what it needs of it")]
+
 pub(crate) mod axe;
+mod served;
 
 use std::io::{BufRead as _, BufReader};
 use std::path::Path;
@@ -29,11 +32,7 @@ pub(crate) fn said_by(page: &str, script: &str) -> Option<Vec<String>> {
 
 /// The same, on a screen.
 pub(crate) fn said_on(screen: Screen, page: &str, script: &str) -> Option<Vec<String>> {
-    let Some(browser) = browser() else {
-        assert!(std::env::var_os("POCKETSPLAT_NEEDS_BROWSER").is_none(), "no Chromium: apt-get install chromium");
-        println!("SKIPPED: no Chromium (apt-get install chromium), so the page was not opened");
-        return None;
-    };
+    let browser = needed()?;
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("page.html");
     // The last one: a page may hold another as text.
@@ -41,7 +40,32 @@ pub(crate) fn said_on(screen: Screen, page: &str, script: &str) -> Option<Vec<St
     let text = format!("{before}<script type=\"module\">{script}</script></body>{after}");
     let text = if screen.is_phone { in_frame(&text) } else { text };
     std::fs::write(&file, text).expect("written");
-    let mut child = start(screen, &browser, &file, &folder.path().join("profile"));
+    Some(said_at(screen, &browser, &format!("file://{}", file.display())))
+}
+
+/// Serves a folder's files, opens `example.html` of it with a script at its end, and returns what it says, as [`said_by`].
+pub(crate) fn said_of_example(mut files: Vec<(&'static str, Vec<u8>)>, script: &str) -> Option<Vec<String>> {
+    let browser = needed()?;
+    let (_, page) = files.iter_mut().find(|(name, _)| *name == "example.html").expect("an example");
+    page.extend(format!("<script type=\"module\">{script}</script>").bytes());
+    let address = served::serve(files);
+    Some(said_at(Screen::default(), &browser, &format!("{address}/example.html")))
+}
+
+/// The browser; without one nothing is checked, and that is said.
+fn needed() -> Option<String> {
+    let found = browser();
+    if found.is_none() {
+        assert!(std::env::var_os("POCKETSPLAT_NEEDS_BROWSER").is_none(), "no Chromium: apt-get install chromium");
+        println!("SKIPPED: no Chromium (apt-get install chromium), so the page was not opened");
+    }
+    found
+}
+
+/// What the page at an address says up to `done`.
+fn said_at(screen: Screen, browser: &str, address: &str) -> Vec<String> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut child = start(screen, browser, address, folder.path());
     let stderr = BufReader::new(child.0.stderr.take().expect("piped"));
     let (sender, lines) = mpsc::channel();
     std::thread::spawn(move || stderr.lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
@@ -57,7 +81,7 @@ pub(crate) fn said_on(screen: Screen, page: &str, script: &str) -> Option<Vec<St
         let text = message.split_once("] \"").map_or(message, |(_, text)| text);
         let text = text.rsplit_once("\", source:").map_or(text, |(text, _)| text);
         match text.strip_prefix("pocketsplat: ") {
-            Some("done") => return Some(said),
+            Some("done") => return said,
             Some(text) if !text.starts_with("FAILED") => said.push(text.to_owned()),
             _ => panic!("the page says {text:?}, after {said:#?}"),
         }
@@ -82,7 +106,7 @@ fn in_frame(page: &str) -> String {
     )
 }
 
-fn start(screen: Screen, browser: &str, file: &Path, profile: &Path) -> Browser {
+fn start(screen: Screen, browser: &str, address: &str, profile: &Path) -> Browser {
     const FLAGS: [&str; 12] = [
         "--headless",
         "--no-sandbox",
@@ -99,7 +123,7 @@ fn start(screen: Screen, browser: &str, file: &Path, profile: &Path) -> Browser 
     ];
     let mut command = Command::new(browser);
     command.arg(format!("--blink-settings=preferredColorScheme={}", u8::from(!screen.is_dark)));
-    command.args(FLAGS).arg(format!("--user-data-dir={}", profile.display())).arg(format!("file://{}", file.display()));
+    command.args(FLAGS).arg(format!("--user-data-dir={}", profile.display())).arg(address);
     Browser(command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("started"))
 }
 

@@ -26,6 +26,7 @@ use serde::Serialize;
 use super::bundle::BundleFile;
 use super::capture::CaptureArgs;
 use super::gaussians::{AxesArgs, GaussiansFile, write_gaussians};
+use super::loss::{LossArgs, loss_at_30_db};
 use super::output;
 use super::outputs::{OverwriteArgs, command_that_makes, gaussians, reading_capture};
 use super::progress::bar_of;
@@ -59,6 +60,8 @@ pub(crate) struct Args {
     iterations: Option<u32>,
     #[command(flatten)]
     axes: AxesArgs,
+    #[command(flatten)]
+    loss: LossArgs,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
@@ -167,6 +170,7 @@ impl<'a> Source<'a> {
 pub(crate) fn run(args: &Args) -> Result<()> {
     let started = Instant::now();
     let format = Format::of_path(&args.output).ok_or_else(|| no_format(args))?;
+    args.loss.check()?;
     let outputs = args.overwrite.outputs().reading(&args.bundle);
     let mut outputs = args.dataset.iter().fold(outputs, |outputs, dataset| {
         let capture = CaptureArgs { dataset: dataset.clone(), options: args.options.clone() };
@@ -223,7 +227,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         &Losses {
             fitting_db: bundle_psnr_db.zip(unrounded_psnr_db).map(|(bundle, fitted)| bundle - fitted),
             rounding_db: unrounded_psnr_db.zip(file_psnr_db).map_or_else(
-                || rounding::loss_db(rounding::mean_psnr_db(&pictures, &unrounded)),
+                || loss_at_30_db(rounding::mean_psnr_db(&pictures, &unrounded)),
                 |(fitted, file)| fitted - file,
             ),
             rounding: Rounding {
@@ -253,7 +257,13 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         split: cameras.split,
         seconds: started.elapsed().as_secs_f64(),
     };
-    output::print(&export, args.json)
+    output::print(&export, args.json)?;
+    let loss_db = export.loss_db.unwrap_or_else(|| loss_at_30_db(export.psnr_to_bundle_db));
+    args.loss.hold(
+        &args.output,
+        loss_db,
+        "more --iterations or a higher --sh-degree may lose less, and a .ply rounds nothing",
+    )
 }
 
 /// The Gaussians of what was written, as others read them: not from the output, which may be a FIFO.

@@ -18,6 +18,7 @@ use serde::Serialize;
 
 use super::devices::DeviceOption;
 use super::gaussians::{AxesArgs, GaussiansFile};
+use super::loss::{LossArgs, loss_at_30_db};
 use super::outputs::{BUNDLE, OverwriteArgs, check_name};
 use super::settings::QualityOptions;
 use super::stand::{StandArgs, bulk_of};
@@ -83,6 +84,8 @@ pub(crate) struct Args {
     #[arg(long, help_heading = OUTPUT)]
     json: bool,
     #[command(flatten)]
+    loss: LossArgs,
+    #[command(flatten)]
     quality: QualityOptions,
     /// Rate weight: a larger one makes smaller files [default: 0.0005; chosen by --bytes or --flash]
     #[arg(long, value_name = "X", help_heading = QUALITY)]
@@ -114,6 +117,8 @@ struct ImportResult {
     drawn_offsets: usize,
     /// Of the bundle's frames to the original's, from cameras that training did not have.
     psnr_to_original_db: f64,
+    /// What splats 30 dB from their photographs lose by that.
+    loss_at_30_db: f64,
     ssim_to_original: f64,
     n_held_out_views: usize,
     n_training_views: usize,
@@ -127,6 +132,7 @@ struct ImportResult {
 pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     // What another format needs is written of the file that is imported.
     check_name(&args.output, BUNDLE, GaussiansFile::is_one(&args.output).then_some(&args.points))?;
+    args.loss.check()?;
     let mut config = configured(args)?;
     let outputs = args.overwrite.outputs().reading(&args.points);
     let mut outputs = args.cameras.iter().fold(outputs, |outputs, path| outputs.reading(path));
@@ -151,7 +157,13 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     let Some(trained) = train_in(folder, &config, &capture, start, attempt, &output)? else {
         return Ok(ExitCode::from(stop::INTERRUPTED));
     };
-    output::print(&result(&file, &bulk, &capture, trained)?, args.json)?;
+    let result = result(&file, &bulk, &capture, trained)?;
+    output::print(&result, args.json)?;
+    args.loss.hold(
+        &args.output,
+        result.loss_at_30_db,
+        "a smaller --lambda, more --iterations or the photographs' own --cameras lose less",
+    )?;
     if output.is_file() {
         say!("see it:  pocketsplat view {} -o scene.html", shell_word(&args.output));
     }
@@ -247,6 +259,7 @@ fn result(file: &GaussiansFile, bulk: &Bulk, capture: &Capture, trained: TrainRe
         n_anchors,
         drawn_offsets,
         psnr_to_original_db: psnr_db,
+        loss_at_30_db: loss_at_30_db(psnr_db),
         ssim_to_original: ssim,
         n_held_out_views: n_test_views,
         n_training_views: capture.train.len(),

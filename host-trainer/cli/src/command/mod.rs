@@ -19,6 +19,7 @@ mod help;
 mod import;
 mod inspect;
 mod loaded;
+mod loss;
 mod lpips;
 mod output;
 mod outputs;

@@ -85,6 +85,13 @@ fn what_a_conversion_loses_is_measured_and_its_reason_named() {
     assert!(report["loss_at_30_db"].as_f64().unwrap() > 0.5, "{report}");
     assert!(said.contains("lie beyond ±1") && said.contains("lie beyond ±3.33"), "{said}");
     assert!(said.contains("by which a scene of 30 dB loses") && said.contains("most of it in its "), "{said}");
+    let again = home.join("loud-again.spz");
+    let said = fails(convert(&loud, &again).args(["--max-loss", "0.5"]));
+    assert!(said.contains("loud-again.spz is written and loses") && said.contains("a .ply loses none"), "{said}");
+    assert_eq!(fs::read(&again).unwrap(), fs::read(home.join("loud.spz")).unwrap(), "written all the same");
+    measured(convert(&loud, &home.join("same.ply")).args(["--max-loss", "0"]));
+    let said = fails(convert(&loud, &home.join("none.ply")).args(["--max-loss", "-1"]));
+    assert!(said.contains("--max-loss -1: needs a number of decibels") && !home.join("none.ply").exists(), "{said}");
 }
 
 #[test]

@@ -7,9 +7,10 @@ use pocketsplat_trainer::explicit::frame;
 use serde::Serialize;
 
 use super::super::gaussians::{GaussiansFile, write_gaussians};
+use super::super::loss::loss_at_30_db;
 use super::super::output::print;
 use super::cameras::{Around, around_gaussians};
-use super::rounding::{self, Rounding};
+use super::rounding::Rounding;
 use super::{Args, FrameRecord, LARGE_LOSS_DB, read_again};
 use crate::config::CaptureOptions;
 use crate::say::say;
@@ -65,10 +66,10 @@ pub(super) fn run(args: &Args, format: Format, output: &Output) -> Result<()> {
         compensation: notes.compensation,
     };
     let psnr_to_source_db = rounding.psnr_db();
-    let loss_at_30_db = rounding::loss_db(psnr_to_source_db);
-    if loss_at_30_db > LARGE_LOSS_DB {
+    let loss_db = loss_at_30_db(psnr_to_source_db);
+    if loss_db > LARGE_LOSS_DB {
         say!(
-            "warning: {}: its pictures are {psnr_to_source_db:.2} dB from those of {}, by which a scene of 30 dB loses {loss_at_30_db:.2} dB, \
+            "warning: {}: its pictures are {psnr_to_source_db:.2} dB from those of {}, by which a scene of 30 dB loses {loss_db:.2} dB, \
              {}; a .ply loses none",
             args.output.display(),
             args.bundle.display(),
@@ -83,9 +84,10 @@ pub(super) fn run(args: &Args, format: Format, output: &Output) -> Result<()> {
         n_left_out: here.len() - there.len(),
         sh_degree: there.degree.number(),
         psnr_to_source_db,
-        loss_at_30_db,
+        loss_at_30_db: loss_db,
         n_views: cameras.len(),
         frame: FrameRecord::of(&written.frame),
     };
-    print(&conversion, args.json)
+    print(&conversion, args.json)?;
+    args.loss.hold(&args.output, loss_db, "a .ply loses none")
 }

@@ -9,15 +9,8 @@ use rayon::prelude::*;
 
 /// Pictures that are the same have this PSNR, dB.
 const SAME_DB: f64 = 100.0;
-/// PSNR of the scene whose loss [`loss_db`] says, dB: what photographs of rooms reach.
-const SCENE_DB: f64 = 30.0;
 /// Cameras that decide which number loses most.
 const N_CAMERAS: usize = 8;
-
-/// What a scene 30 dB from its photographs loses by pictures `psnr_db` from its own, where the errors have nothing to do with each other.
-pub(super) fn loss_db(psnr_db: f64) -> f64 {
-    10.0 * (1.0 + 10f64.powf((SCENE_DB - psnr_db) / 10.0)).log10()
-}
 
 /// Mean over pictures.
 pub(super) fn mean_psnr_db(pictures: &[Image], of: &[Image]) -> f64 {
@@ -95,7 +88,7 @@ mod tests {
     use pocketsplat_capture::camera::Camera;
     use pocketsplat_gaussians::{Degree, Gaussians};
 
-    use super::{Rounding, loss_db};
+    use super::Rounding;
 
     fn cloud() -> Gaussians {
         // Each at a depth of its own: what lies at one is drawn in the order of the file.
@@ -154,10 +147,5 @@ mod tests {
         }
         let (said, _) = worst(|_| {}, all[..12].to_vec());
         assert!(said.starts_with("most of it in what is left out"), "{said}");
-    }
-
-    #[test]
-    fn errors_add_up() {
-        assert!((loss_db(30.0) - 3.0103).abs() < 1e-3 && loss_db(100.0) < 1e-6);
     }
 }

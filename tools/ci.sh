@@ -518,7 +518,7 @@ job_demo() {
   cargo run --release --locked -- demo --output "$target/demo" --size 64 --iterations 400
 }
 
-# The wheel, as a user of Python gets it: of the size and in the time that are asked, with the command, and with types.
+# The wheel, as a user of Python gets it: small, with the command, and with types.
 job_python() {
   local environment=$target/python wheel
   need_python

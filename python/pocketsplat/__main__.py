@@ -15,11 +15,18 @@ def main() -> None:
     # The command answers Ctrl-C itself: training saves what there is.
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
-    program = os.path.join(sysconfig.get_path("scripts"), "pocketsplat")
-    code = run_command(program, sys.argv[1:])
+    code = run_command(_program(), sys.argv[1:])
     sys.stdout.flush()
     # Not `sys.exit`: nothing of Python's is left to do, and threads of the command may still wait.
     os._exit(code)
+
+
+def _program() -> str:
+    """The script that starts the command again: this one, or the one that was installed with the package."""
+    this = os.path.abspath(sys.argv[0])
+    if os.path.basename(this) == "pocketsplat" and os.path.exists(this):
+        return this
+    return os.path.join(sysconfig.get_path("scripts"), "pocketsplat")
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, TypedDict
 
 from . import _native
-from ._camera import Camera, _as_tuple, _of_tuple
+from ._camera import Camera, _as_tuple, _of_tuple, _view_of
 
 if TYPE_CHECKING:
     import numpy
@@ -142,7 +142,7 @@ class Bundle:
         """
         import numpy
 
-        view = numpy.asarray(viewmat, dtype=float)[:3]
+        view = _view_of(viewmat)
         # x = R·c + t with c = n / scale + centre; times scale, as a picture does not change with it.
         translation = (view[:, 3] + view[:, :3] @ self.header.normalisation_centre) * self.header.normalisation_scale
         return Camera.from_matrices(numpy.column_stack([view[:, :3], translation]), K, width_px, height_px)
@@ -195,10 +195,7 @@ class Bundle:
     def gaussians(self, camera: Camera | None = None) -> GaussianArrays:
         """The Gaussians that a camera sees, as the heads make them for it; without a camera the preview's.
 
-        They lie in the normalised frame, like the camera. For gsplat:
-
-            gsplat.rasterization(**bundle.gaussians(camera), viewmats=camera.viewmat[None], Ks=camera.K[None],
-                                 width=camera.width_px, height=camera.height_px)
+        They lie in the normalised frame, like the camera. How gsplat draws them stands in the package's README.
         """
         import numpy
 
@@ -225,7 +222,7 @@ class Bundle:
     def _repr_html_(self) -> str:
         """Shows the scene in a notebook, to be turned by the mouse."""
         page = html.escape(self.page(), quote=True)
-        return f'<iframe srcdoc="{page}" sandbox="allow-scripts" style="width: 100%; height: 480px; border: 0"></iframe>'
+        return f'<iframe srcdoc="{page}" sandbox="allow-scripts allow-downloads" style="width: 100%; height: 480px; border: 0"></iframe>'
 
     def __repr__(self) -> str:
         header = self.header

@@ -39,13 +39,11 @@ class Camera:
         """Takes the matrices of gsplat: `viewmat` [4, 4] or [3, 4], scene to camera; `K` [3, 3], pixels."""
         import numpy
 
-        view, intrinsics = numpy.asarray(viewmat, dtype=float), numpy.asarray(K, dtype=float)
-        if view.shape not in ((4, 4), (3, 4)) or intrinsics.shape != (3, 3):
-            raise ValueError(
-                f"viewmat of shape {view.shape} and K of shape {intrinsics.shape}; needed: [4, 4] or [3, 4], and [3, 3]"
-            )
-        rows: Any = tuple(tuple(map(float, row)) for row in view[:3, :3])
-        translation: Any = tuple(map(float, view[:3, 3]))
+        view, intrinsics = _view_of(viewmat), numpy.asarray(K, dtype=float)
+        if intrinsics.shape != (3, 3):
+            raise ValueError(f"K of shape {intrinsics.shape}; needed: [3, 3]")
+        rows: Any = tuple(tuple(map(float, row)) for row in view[:, :3])
+        translation: Any = tuple(map(float, view[:, 3]))
         focal = (float(intrinsics[0, 0]), float(intrinsics[1, 1]))
         principal = (float(intrinsics[0, 2]), float(intrinsics[1, 2]))
         return cls(rows, translation, focal, principal, width_px, height_px)
@@ -69,15 +67,26 @@ class Camera:
         return numpy.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]], dtype=numpy.float32)
 
     def resized(self, width_px: int, height_px: int) -> Camera:
-        """The same camera with its picture scaled to another size, pixels."""
-        x, y = width_px / self.width_px, height_px / self.height_px
-        focal = (self.focal_px[0] * x, self.focal_px[1] * y)
-        principal = (self.principal_px[0] * x, self.principal_px[1] * y)
-        return replace(self, focal_px=focal, principal_px=principal, width_px=width_px, height_px=height_px)
+        """The same camera for pictures of another size, pixels: nothing of its picture is cut, and nothing is stretched."""
+        scale = min(width_px / self.width_px, height_px / self.height_px)
+        focal = (self.focal_px[0] * scale, self.focal_px[1] * scale)
+        x = width_px / 2 + (self.principal_px[0] - self.width_px / 2) * scale
+        y = height_px / 2 + (self.principal_px[1] - self.height_px / 2) * scale
+        return replace(self, focal_px=focal, principal_px=(x, y), width_px=width_px, height_px=height_px)
 
     def orbited(self, angle: float) -> Camera:
         """The camera carried around the scene by `angle`, radians; from above it moves counter-clockwise."""
         return _of_tuple(_native.orbited(_as_tuple(self), angle))
+
+
+def _view_of(viewmat: ArrayLike) -> NDArray[numpy.float64]:
+    """The upper three rows of a matrix from a frame to the camera."""
+    import numpy
+
+    view = numpy.asarray(viewmat, dtype=numpy.float64)
+    if view.shape not in ((4, 4), (3, 4)):
+        raise ValueError(f"viewmat of shape {view.shape}; needed: [4, 4] or [3, 4]")
+    return view[:3]
 
 
 def _as_tuple(camera: Camera) -> CameraTuple:

@@ -31,7 +31,7 @@ class Progress:
     iteration: int
     loss: float
     psnr_db: float
-    """Of the training view of this iteration."""
+    """Mean over the training views since the row before, as `loss` is."""
     n_anchors: int
     seconds: float
     """Time spent on iterations so far."""
@@ -40,20 +40,26 @@ class Progress:
 class Training:
     """A run that goes on in another process. Iterate over it for its progress; `bundle()` waits for its end.
 
-    Left early it goes on by itself; `stop()` ends it with a checkpoint, from which `pocketsplat train --resume` goes on.
+    Left early, by an interrupt too, it goes on by itself; `stop()` ends it with a checkpoint, from which
+    `pocketsplat train --resume` goes on.
     """
 
-    def __init__(self, command: list[str], output: Path) -> None:
+    def __init__(self, command: list[str], output: Path, run: Path) -> None:
         self.output: Path = output
         """The bundle, once it is there."""
-        self.run: Path = output.with_suffix(".run")
+        self.run: Path = run
         """The folder of the run: report.html, result.json, checkpoints."""
+        # What lies in the folder of an earlier run is no progress of this one.
+        self._started = time.time()
         self._error = ""
         self._said = tempfile.TemporaryFile(mode="w+", encoding="utf-8", errors="replace")
         # The package is found there as it is here.
         packages = [str(Path(__file__).parent.parent), os.environ.get("PYTHONPATH", "")]
         environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, packages))}
-        self._process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=self._said, env=environment)
+        # In a session of its own, so that Ctrl-C and a notebook's interrupt stop what waits for it and not the run.
+        self._process = subprocess.Popen(
+            command, stdout=subprocess.DEVNULL, stderr=self._said, env=environment, start_new_session=True
+        )
 
     def __iter__(self) -> Iterator[Progress]:
         """Yields a row each time the run writes one, until it ends.
@@ -91,13 +97,18 @@ class Training:
         return Bundle.open(self.output)
 
     def stop(self) -> None:
-        """Ends the run with a checkpoint, and waits for that."""
+        """Ends the run with a checkpoint, and waits for that; one that has not begun to train is let begin."""
+        while self._process.poll() is None and not self._rows():
+            time.sleep(_POLL_S)
         self._process.send_signal(signal.SIGINT)
         self._process.wait()
 
     def _rows(self) -> list[Progress]:
+        path = self.run / "progress.csv"
         try:
-            text = (self.run / "progress.csv").read_text(encoding="utf-8")
+            if path.stat().st_mtime < self._started:
+                return []
+            text = path.read_text(encoding="utf-8")
         except OSError:
             return []
         # The last line may be half written.
@@ -147,4 +158,6 @@ def train(capture: str | os.PathLike[str], output: str | os.PathLike[str], **opt
             is_list = isinstance(value, (list, tuple))
             # `=` keeps values that begin with a hyphen apart from options.
             command.append(f"{option}={','.join(map(str, value)) if is_list else value}")
-    return Training(command, Path(output))
+    bundle = Path(output).absolute()
+    run = Path(options["run"]).absolute() if options.get("run") else bundle.with_suffix(".run")
+    return Training(command, bundle, run)

@@ -1,6 +1,6 @@
-//! The native half of the Python package: what [`python/pocketsplat`](https://docs.python.org/3/extending/) makes arrays and classes of.
+//! The native half of the Python package: what the modules in `python/pocketsplat` make arrays and classes of.
 //!
-//! Numbers go over as bytes and tuples, so that this half needs no array library. Nothing here holds Python's lock while it works.
+//! Numbers go over as bytes and tuples, so that this half needs no array library. What takes long does not hold Python's lock.
 
 mod bundle;
 mod camera;

@@ -125,6 +125,9 @@ class Bundles(unittest.TestCase):
         camera = bundle.preview.resized(80, 60)
         again = Camera.from_matrices(camera.viewmat, camera.K, 80, 60)
         self.assertEqual(bundle.render(camera).shape, (60, 80, 3))
+        wide = bundle.preview.resized(160, 60)
+        self.assertEqual(wide.focal_px, camera.focal_px, "not stretched")
+        self.assertTrue((bundle.render(wide)[:, 40:120] == bundle.render(camera)).mean() > 0.99, "not cut")
         self.assertTrue((bundle.render(camera) == bundle.render(again)).all())
         centre, scale = numpy.array(bundle.header.normalisation_centre), bundle.header.normalisation_scale
         # The same camera in the frame of the capture: x = R·(c - centre)·scale + t, divided by scale.
@@ -135,6 +138,8 @@ class Bundles(unittest.TestCase):
         numpy.testing.assert_allclose(posed.viewmat, camera.viewmat, atol=1e-6)
         with self.assertRaisesRegex(ValueError, r"\(2, 2\)"):
             Camera.from_matrices(numpy.eye(2), camera.K, 80, 60)
+        with self.assertRaisesRegex(ValueError, r"\(1, 4, 4\)"):
+            bundle.camera(view[None], camera.K, 80, 60)
         with self.assertRaisesRegex(ValueError, "2 sizes"):
             bundle.render([camera, bundle.preview])
         sheared = Camera(((1, 1, 0), (0, 1, 0), (0, 0, 1)), (0, 0, 4), (100, 100), (40, 30), 80, 60)
@@ -173,6 +178,17 @@ class TrainingRuns(unittest.TestCase):
         result, bundle = training.wait(), training.bundle()
         self.assertEqual(result["bundle_bytes"], bundle.header.n_bytes)
         self.assertEqual(len(bundle.tiers), 2)
+        # Once more in the same place: the rows of the run before are not this one's.
+        again = pocketsplat.train(self.capture, training.output, iterations=60, no_report=True)
+        iterations = [row.iteration for row in again]
+        self.assertEqual((iterations[-1], iterations), (60, sorted(set(iterations))))
+        self.assertEqual(again.wait()["iterations"], 60)
+
+    def test_a_run_may_lie_elsewhere(self) -> None:
+        run = Path(self.folder.name, "notes")
+        training = pocketsplat.train(self.capture, Path(self.folder.name, "e.psb"), iterations=60, no_report=True, run=run)
+        self.assertEqual(list(training)[-1].iteration, 60)
+        self.assertEqual((training.run, training.wait()["iterations"]), (run, 60))
 
     def test_a_run_that_cannot_begin_says_why(self) -> None:
         training = pocketsplat.train(Path(self.folder.name, "nothing"), Path(self.folder.name, "b.psb"))

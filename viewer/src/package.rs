@@ -20,7 +20,7 @@ pub struct PackageFile {
 }
 
 /// The files of the package. Its example draws the bundle `scene.psb` beside them.
-pub fn package() -> [PackageFile; 15] {
+pub fn package() -> [PackageFile; 17] {
     const MANIFEST: &str = concat!(
         "{\n  \"name\": \"pocketsplat\",\n  \"version\": \"",
         env!("CARGO_PKG_VERSION"),
@@ -33,7 +33,7 @@ pub fn package() -> [PackageFile; 15] {
         "    \"./orbit\": { \"types\": \"./orbit.d.ts\", \"default\": \"./orbit.js\" },\n",
         "    \"./element\": { \"types\": \"./element.d.ts\", \"default\": \"./element.js\" },\n",
         "    \"./pocketsplat.wasm\": \"./pocketsplat.wasm\"\n  },\n  \"types\": \"./pocketsplat.d.ts\",\n",
-        "  \"files\": [\"*.js\", \"*.d.ts\", \"*.wasm\", \"example.html\"]\n}\n"
+        "  \"files\": [\"*.js\", \"*.d.ts\", \"*.wasm\", \"example.html\", \"LICENSE-*\"]\n}\n"
     );
     [
         ("pocketsplat.wasm", MODULE),
@@ -49,6 +49,8 @@ pub fn package() -> [PackageFile; 15] {
         ("sharpness.js", SHARPNESS.as_bytes()),
         ("worker.js", WORKER.as_bytes()),
         ("package.json", MANIFEST.as_bytes()),
+        ("LICENSE-MIT", include_bytes!("../LICENSE-MIT")),
+        ("LICENSE-APACHE", include_bytes!("../LICENSE-APACHE")),
         ("README.md", include_bytes!("../web/README.md")),
         ("example.html", include_bytes!("../web/example.html")),
     ]

@@ -56,7 +56,12 @@ check(await isSame('scene.psb', { tiers: 1 }), 'fewer tiers');
 view.removeAttribute('tiers');
 view.setAttribute('quality', 'draft');
 check(await isSame('scene.psb', { quality: 'draft' }), 'another quality');
+view.setAttribute('quality', 'fast');
+await sleep(500);
+check(!message().hidden && message().textContent.includes('"fast"'), `what is refused is said: ${message().textContent}`);
+check(getComputedStyle(message()).color === 'rgb(255, 255, 255)', 'and can be read');
 view.removeAttribute('quality');
+check((await isSame('scene.psb')) && message().hidden, 'and forgotten');
 
 let said = next();
 view.src = 'other.psb';

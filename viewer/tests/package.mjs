@@ -87,13 +87,17 @@ refuses(() => orbit.pan(0, Infinity), 'y is Infinity');
 for (const factor of [0, -1, NaN, 'x']) refuses(() => orbit.zoom(factor), 'factor', String(factor));
 for (const side of [0, 320.5, -1, 65536, NaN]) refuses(() => orbit.camera(side, 240), 'width', String(side), 'from 1 to 65535');
 refuses(() => lensOf({ ...camera, focalPx: [0, 1] }, 10, 10), 'focalPx[0]');
-for (const place of ['', '1,2,3', '1,2,0,0,0,0', '1,2,3,4,5,', 'a,b,c,d,e,f', '1e9,0,1,0,0,0', 5]) refuses(() => (orbit.place = place), 'place', 'six numbers');
+for (const place of ['', '1,2,3', '1,2,3,4,5,6,4', '1,2,3,4,5,6,0.5', '1,2,3,4,5,6,0,0', '1,2,0,0,0,0', '1,2,3,4,5,', 'a,b,c,d,e,f', '1e9,0,1,0,0,0', 5]) refuses(() => (orbit.place = place), 'place', 'six numbers');
 assert.equal(JSON.stringify(orbit), before, 'what is refused moves nothing');
 const other = new Orbit(scene.preview, scene.focus());
 other.turn(0.3, 0.1);
 other.pan(0.1, 0.2);
 orbit.place = other.place;
 assert.equal(orbit.place, other.place);
+other.quarter();
+other.turn(0.2, 0);
+orbit.place = other.place;
+assert.equal(orbit.quarters, 1, 'a turned picture is turned there too');
 const [here, there] = [orbit, other].map((each) => each.camera(64, 48).translation);
 assert.ok(here.every((x, i) => Math.abs(x - there[i]) < 1e-3), `a place is the camera: ${here} and ${there}`);
 

@@ -6,10 +6,12 @@ import { View } from './view.js';
 
 const STYLE = `
   :host { display: block; position: relative; aspect-ratio: 4 / 3; overflow: hidden; }
+  :host([hidden]) { display: none; }
   figure { margin: 0; width: 100%; height: 100%; background: var(--behind, #000); touch-action: none; cursor: grab; }
+  figure:focus-visible { outline: 3px solid Highlight; outline-offset: -3px; }
   canvas { display: block; width: 100%; height: 100%; }
   figcaption { display: none; }
-  p { position: absolute; inset: 0; margin: auto; height: fit-content; padding: 1em; text-align: center; font: 1em system-ui; pointer-events: none; }
+  p { position: absolute; inset: 0; margin: auto; height: fit-content; padding: 1em; text-align: center; font: 1em system-ui; color: #fff; background: #000b; pointer-events: none; }
 `;
 
 /** The decoder, compiled once for all elements of a page. */
@@ -18,7 +20,13 @@ let compiled;
 function decoder() {
   const address = new URL('./pocketsplat.wasm', import.meta.url);
   // A host may serve it as another type than application/wasm, which streaming refuses.
-  compiled ??= WebAssembly.compileStreaming(fetch(address)).catch(async () => WebAssembly.compile(await bytesAt(address)));
+  compiled ??= WebAssembly.compileStreaming(fetch(address))
+    .catch(async () => WebAssembly.compile(await bytesAt(address)))
+    .catch((error) => {
+      // The next element tries again.
+      compiled = undefined;
+      throw error;
+    });
   return compiled;
 }
 
@@ -86,7 +94,7 @@ export class PocketsplatView extends HTMLElement {
     if (!this.isConnected || before === after) return;
     const { view, motion } = this.#shown ?? {};
     if (name === 'src') this.#open();
-    else if (name === 'alt') view?.canvas.setAttribute('aria-label', after ?? this.#name());
+    else if (name === 'alt') view?.canvas.setAttribute('aria-label', this.#name());
     else if (name === 'spin' && motion) this.#spin();
     else motion?.touch();
   }
@@ -107,7 +115,10 @@ export class PocketsplatView extends HTMLElement {
     if (!this.src) return this.#say('');
     const shown = { view: new View(this.#name(), this.#place), sharpness: new Sharpness() };
     this.#shown = shown;
-    shown.view.figure.tabIndex = 0;
+    const { figure } = shown.view;
+    figure.tabIndex = 0;
+    figure.setAttribute('role', 'group');
+    figure.setAttribute('aria-label', 'Scene: drag to turn, or use the arrow keys');
     this.#say('Loading');
     try {
       const [module, bundle] = await Promise.all([decoder(), bytesAt(new URL(this.src, document.baseURI))]);
@@ -125,17 +136,15 @@ export class PocketsplatView extends HTMLElement {
         shown.motion.touch();
       });
       shown.motion.touch();
-      await shown.view.first;
-      if (this.#shown !== shown) return;
-      if (shown.view.refused) throw new Error(shown.view.refused);
-      this.#say('');
-      this.dispatchEvent(new Event('load'));
       this.#spin();
     } catch (error) {
-      if (this.#shown !== shown) return;
-      this.#say(`Cannot draw ${this.src}: ${error.message}`);
-      this.dispatchEvent(new ErrorEvent('error', { error, message: error.message }));
+      if (this.#shown === shown) this.#fail(error.message);
     }
+  }
+
+  #fail(message) {
+    this.#say(`Cannot draw ${this.src}: ${message}`);
+    this.dispatchEvent(new ErrorEvent('error', { message }));
   }
 
   #say(text) {
@@ -150,7 +159,8 @@ export class PocketsplatView extends HTMLElement {
     else motion.stop();
   }
 
-  #follow({ view, orbit, motion, sharpness }) {
+  #follow(shown) {
+    const { view, orbit, motion, sharpness } = shown;
     const next = () => {
       const [widthPx, heightPx] = view.sizeFor(this);
       const tiers = this.hasAttribute('tiers') ? Number(this.getAttribute('tiers')) : undefined;
@@ -161,8 +171,12 @@ export class PocketsplatView extends HTMLElement {
     };
     view.follow(next, () => {
       const { frame, refused } = view;
-      if (refused) this.#say(`Cannot draw ${this.src}: ${refused}`);
-      else if (frame) sharpness.took(frame.milliseconds, frame.widthPx * frame.heightPx);
+      if (this.#shown !== shown) return;
+      if (refused) return this.#fail(refused);
+      this.#say('');
+      sharpness.took(frame.milliseconds, frame.widthPx * frame.heightPx);
+      if (!shown.isLoaded) this.dispatchEvent(new Event('load'));
+      shown.isLoaded = true;
     });
   }
 }

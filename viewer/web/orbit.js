@@ -16,11 +16,14 @@ const MOST_PITCH = (88 * Math.PI) / 180;
 export class Orbit {
   constructor(preview, distance) {
     this.#begin(preview, distance);
+    /** By so many quarters the picture was turned. */
+    this.quarters = 0;
   }
 
   /** Turns the picture by a quarter, clockwise, and begins anew: for scenes whose photographs lie on their side. */
   quarter() {
     this.#begin(rolled(this.preview), this.home.distance);
+    this.quarters = (this.quarters + 1) % 4;
   }
 
   #begin(preview, given) {
@@ -60,20 +63,23 @@ export class Orbit {
     }
   }
 
-  /** Where it stands, as text that an address can hold: yaw, pitch, distance and the point it turns around. */
+  /** Where it stands, as text that an address can hold: yaw, pitch, distance, the point it turns around, and quarters where there are some. */
   get place() {
-    const { yaw, pitch, distance, target } = this;
-    return [yaw, pitch, distance, ...target].map((number) => Number(number.toPrecision(5))).join(',');
+    const { yaw, pitch, distance, target, quarters } = this;
+    const numbers = [yaw, pitch, distance, ...target].map((number) => Number(number.toPrecision(5)));
+    return (quarters ? [...numbers, quarters] : numbers).join(',');
   }
 
   /** Goes to a place; what is none moves nothing. */
   set place(text) {
     const numbers = String(text).split(',').map((number) => (number.trim() === '' ? NaN : Number(number)));
-    if (numbers.length !== 6 || !numbers.every((number) => Math.abs(number) < MOST_NUMBER) || numbers[2] <= 0) {
+    const [yaw, pitch, distance, x, y, z, quarters = 0] = numbers;
+    const isPlace = (numbers.length === 6 || numbers.length === 7) && numbers.every((number) => Math.abs(number) < MOST_NUMBER);
+    if (!isPlace || distance <= 0 || ![0, 1, 2, 3].includes(quarters)) {
       refuse('place', text, 'six numbers between commas: yaw, pitch, distance and a point, as `orbit.place` gives them');
     }
-    const [yaw, pitch, distance, ...target] = numbers;
-    Object.assign(this, { yaw, pitch: clamp(pitch, -MOST_PITCH, MOST_PITCH), distance, target });
+    while (this.quarters !== quarters) this.quarter();
+    Object.assign(this, { yaw, pitch: clamp(pitch, -MOST_PITCH, MOST_PITCH), distance, target: [x, y, z] });
   }
 
   /** Directions of the camera: right, down and forward in the picture. */

@@ -52,6 +52,8 @@ class Drawer {
 /** A bundle in its place on the page. It draws the latest of what it is asked for and skips what came between. */
 export class View {
   #drawers = [];
+  /** Those that read the bundle. */
+  #opening = new Set();
   /** What was asked for last. */
   #asked;
   /** Frames asked for, and the number of the one on the canvas. */
@@ -79,7 +81,15 @@ export class View {
   /** Adds a worker; with two of them, one draws the next frame while the other finishes this one. */
   async open(worker, module, bundle) {
     const drawer = new Drawer(worker);
-    Object.assign(this, await drawer.ask('open', { module, bundle }));
+    this.#opening.add(drawer);
+    try {
+      Object.assign(this, await drawer.ask('open', { module, bundle }));
+    } catch (error) {
+      drawer.close();
+      throw error;
+    } finally {
+      this.#opening.delete(drawer);
+    }
     const { centreX, centreY, centreZ, scale, backgroundRed, backgroundGreen, backgroundBlue } = this.bundle;
     this.normalisation = { centre: [centreX, centreY, centreZ], scale };
     this.figure.style.setProperty('--behind', `rgb(${backgroundRed} ${backgroundGreen} ${backgroundBlue})`);
@@ -88,7 +98,7 @@ export class View {
 
   /** Ends its workers. */
   close() {
-    for (const drawer of this.#drawers) drawer.close();
+    for (const drawer of [...this.#drawers, ...this.#opening]) drawer.close();
     this.#drawers = [];
   }
 

@@ -116,8 +116,6 @@ function draw() {
 function moved() {
   stopSpinning();
   motion.touch();
-  clearTimeout(figures.placed);
-  figures.placed = setTimeout(() => keep(orbit.place), PLACE_MS);
 }
 
 /** Puts the camera into the address, so that a copy of it shows the same; pages inside other pages have none of their own. */
@@ -169,12 +167,20 @@ function setDevice(device) {
 function stopSpinning() {
   motion.stop();
   $('spin').setAttribute('aria-pressed', 'false');
+  clearTimeout(figures.placed);
+  figures.placed = setTimeout(() => keep(orbit.place), PLACE_MS);
 }
 
 function spin() {
   if ($('spin').getAttribute('aria-pressed') === 'true') return stopSpinning();
   $('spin').setAttribute('aria-pressed', 'true');
   return motion.spin();
+}
+
+/** The scene alone on the screen, or the page again; who may not keeps what there is. */
+function fillScreen() {
+  const done = document.fullscreenElement ? document.exitFullscreen() : stage.requestFullscreen();
+  done.catch(() => {});
 }
 
 function offer() {
@@ -206,7 +212,7 @@ function listen() {
     if (event.target.closest('select')) return;
     if (event.key === ' ') spin();
     else if (event.key === 'd' || event.key === 'D') setDevice(!state.device);
-    else if ((event.key === 'f' || event.key === 'F') && document.fullscreenEnabled) stage.requestFullscreen();
+    else if ((event.key === 'f' || event.key === 'F') && document.fullscreenEnabled) fillScreen();
     else return;
     event.preventDefault();
   });
@@ -214,7 +220,7 @@ function listen() {
   $('quarter').addEventListener('click', () => (quarter(), moved()));
   $('reset').addEventListener('click', () => (orbit.reset(), moved()));
   $('full').hidden = !document.fullscreenEnabled;
-  $('full').addEventListener('click', () => stage.requestFullscreen());
+  $('full').addEventListener('click', fillScreen);
   $('save').addEventListener('click', save);
   $('target').addEventListener('change', () => showInstructions($('stages'), views, $('target').value));
   $('size').addEventListener('change', (event) => ((state.size = event.target.value.split(',').map(Number)), motion.touch()));
@@ -285,11 +291,19 @@ async function start() {
 /** Stands where the address says; whether it says so. */
 function place() {
   if (location.hash.length < 2) return false;
+  const { quarters } = orbit;
   try {
     orbit.place = decodeURIComponent(location.hash.slice(1));
   } catch {
     // Another program's.
     return false;
+  }
+  if (orbit.quarters !== quarters) {
+    for (const view of views) {
+      while (view.orbit && view.orbit.quarters !== orbit.quarters) view.orbit.quarter();
+      view.spread = undefined;
+    }
+    know();
   }
   stopSpinning();
   motion.touch();

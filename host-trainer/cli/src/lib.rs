@@ -14,7 +14,7 @@ use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Runs the command line, as the process that it is alone in: it takes the signals and the threads, and ends the process for wrong usage.
+/// Runs the command line, as the process that it is alone in: it takes the signals and the threads.
 ///
 /// * `program`: the file that starts this command again, where there is one; workflows name it.
 /// * `arguments`: without the program's name.

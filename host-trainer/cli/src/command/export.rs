@@ -5,6 +5,7 @@ mod conversion;
 mod rounding;
 
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 use std::time::Instant;
 
 use anyhow::{Context, Result, anyhow, bail};
@@ -167,7 +168,7 @@ impl<'a> Source<'a> {
     }
 }
 
-pub(crate) fn run(args: &Args) -> Result<()> {
+pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     let started = Instant::now();
     let format = Format::of_path(&args.output).ok_or_else(|| no_format(args))?;
     args.loss.check()?;
@@ -259,11 +260,8 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     };
     output::print(&export, args.json)?;
     let loss_db = export.loss_db.unwrap_or_else(|| loss_at_30_db(export.psnr_to_bundle_db));
-    args.loss.hold(
-        &args.output,
-        loss_db,
-        "more --iterations or a higher --sh-degree may lose less, and a .ply rounds nothing",
-    )
+    let remedy = "more --iterations or a higher --sh-degree may lose less, and a .ply rounds nothing";
+    Ok(args.loss.hold(&args.output, loss_db, remedy))
 }
 
 /// The Gaussians of what was written, as others read them: not from the output, which may be a FIFO.

@@ -159,15 +159,11 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     };
     let result = result(&file, &bulk, &capture, trained)?;
     output::print(&result, args.json)?;
-    args.loss.hold(
-        &args.output,
-        result.loss_at_30_db,
-        "a smaller --lambda, more --iterations or the photographs' own --cameras lose less",
-    )?;
     if output.is_file() {
         say!("see it:  pocketsplat view {} -o scene.html", shell_word(&args.output));
     }
-    Ok(ExitCode::SUCCESS)
+    let remedy = "a smaller --lambda, more --iterations or the photographs' own --cameras lose less";
+    Ok(args.loss.hold(&args.output, result.loss_at_30_db, remedy))
 }
 
 /// What is trained: as `train` does it, with the effects that every scene can have.

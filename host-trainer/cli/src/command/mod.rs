@@ -14,6 +14,7 @@ mod estimate;
 mod eval;
 mod export;
 mod fit;
+mod foreign;
 mod gaussians;
 mod help;
 mod import;
@@ -96,15 +97,21 @@ pub(crate) fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
     let as_json = arguments.iter().any(|arg| arg == "--json");
     let command = help::grouped(help::own_options(Cli::command())).mut_subcommands(accepting_negative_numbers);
-    let parsed = command.no_binary_name(true).try_get_matches_from(arguments);
+    let parsed = command.no_binary_name(true).try_get_matches_from(&arguments);
     let cli = match parsed.and_then(|matches| Cli::from_arg_matches(&matches)) {
         Ok(cli) => cli,
         Err(error) => {
+            let hint = foreign::hint(&arguments, &error);
             if as_json && error.use_stderr() {
                 let said = error.render().to_string();
-                print_failure(said.trim_start_matches("error: "), &[]);
+                print_failure(said.trim_start_matches("error: "), hint.map(str::to_owned).as_slice());
             }
-            error.exit()
+            // Nobody can be told where this fails.
+            let _ = error.print();
+            if let Some(hint) = hint {
+                say!("hint: {hint}");
+            }
+            return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
         }
     };
     dispatch(cli).unwrap_or_else(|error| {
@@ -152,10 +159,10 @@ fn dispatch(cli: Cli) -> Result<ExitCode> {
         Command::Verify(args) => return verify::run(&args),
         Command::Doctor(args) => return doctor::run(&args),
         Command::Poses(args) => return poses::run(&args),
+        Command::Export(args) => return export::run(&args),
         Command::Eval(args) => eval::run(&args),
         Command::Render(args) => render::run(&args),
         Command::View(args) => view::run(&args),
-        Command::Export(args) => export::run(&args),
         Command::Report(args) => report::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Fit(args) => fit::run(&args),
@@ -174,6 +181,8 @@ fn dispatch(cli: Cli) -> Result<ExitCode> {
 
 #[cfg(test)]
 mod tests {
+    use std::ffi::OsString;
+
     use clap::{Arg, CommandFactory as _};
 
     use super::Cli;
@@ -194,6 +203,21 @@ mod tests {
         let headings: Vec<&str> = help.lines().filter(|line| line.ends_with(':') && !line.starts_with(' ')).collect();
         let expected = ["Arguments:", "Options:", "Input:", "Output:", "Quality:", "Device:", "Run:"];
         assert_eq!(headings, expected, "{help}");
+    }
+
+    #[test]
+    fn options_of_other_trainers_are_told_ours() {
+        let train = commands().into_iter().find(|command| command.get_name() == "train").expect("train");
+        super::foreign::check(&train);
+        let hint_of = |command: &str, given: &str| {
+            let arguments = ["--threads", "2", command, "photos", given].map(OsString::from);
+            let parsed = Cli::command().no_binary_name(true).try_get_matches_from(&arguments);
+            super::foreign::hint(&arguments, &parsed.expect_err(given))
+        };
+        let hint = |given: &str| hint_of("train", given);
+        assert!(hint("--max_steps=7000").is_some_and(|hint| hint.contains("--iterations")));
+        assert!(hint("--data").is_some_and(|hint| hint.contains("train PHOTOS")));
+        assert_eq!([hint("--nothing-of-ours"), hint("--lambda"), hint_of("render", "--steps=5")], [None; 3]);
     }
 
     #[test]

@@ -86,8 +86,12 @@ fn what_a_conversion_loses_is_measured_and_its_reason_named() {
     assert!(said.contains("lie beyond ±1") && said.contains("lie beyond ±3.33"), "{said}");
     assert!(said.contains("by which a scene of 30 dB loses") && said.contains("most of it in its "), "{said}");
     let again = home.join("loud-again.spz");
-    let said = fails(convert(&loud, &again).args(["--max-loss", "0.5"]));
+    let refused = convert(&loud, &again).args(["--max-loss", "0.5", "--json"]).output().unwrap();
+    let said = String::from_utf8(refused.stderr).unwrap();
+    assert_eq!(refused.status.code(), Some(1), "{said}");
     assert!(said.contains("loud-again.spz is written and loses") && said.contains("a .ply loses none"), "{said}");
+    let printed: serde_json::Value = serde_json::from_slice(&refused.stdout).expect("the result alone");
+    assert_eq!(printed["loss_at_30_db"], report["loss_at_30_db"]);
     assert_eq!(fs::read(&again).unwrap(), fs::read(home.join("loud.spz")).unwrap(), "written all the same");
     measured(convert(&loud, &home.join("same.ply")).args(["--max-loss", "0"]));
     let said = fails(convert(&loud, &home.join("none.ply")).args(["--max-loss", "-1"]));

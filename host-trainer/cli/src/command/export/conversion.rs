@@ -1,5 +1,7 @@
 //! A file of Gaussians in another format, and what that lost.
 
+use std::process::ExitCode;
+
 use anyhow::{Result, bail};
 use pocketsplat_files::Output;
 use pocketsplat_gaussians::{Degree, Format, Notes};
@@ -39,7 +41,7 @@ struct Conversion {
 const BACKGROUND: [f32; 3] = [0.5; 3];
 
 /// Writes the Gaussians of a file in another format; nothing is fitted.
-pub(super) fn run(args: &Args, format: Format, output: &Output) -> Result<()> {
+pub(super) fn run(args: &Args, format: Format, output: &Output) -> Result<ExitCode> {
     if args.dataset.is_some() || args.iterations.is_some() || args.options != CaptureOptions::default() {
         bail!(
             "{} holds Gaussians, which are written as they are; leave CAPTURE, --iterations and options of photographs out",
@@ -89,5 +91,5 @@ pub(super) fn run(args: &Args, format: Format, output: &Output) -> Result<()> {
         frame: FrameRecord::of(&written.frame),
     };
     print(&conversion, args.json)?;
-    args.loss.hold(&args.output, loss_db, "a .ply loses none")
+    Ok(args.loss.hold(&args.output, loss_db, "a .ply loses none"))
 }

@@ -5,6 +5,7 @@ mod buffer;
 mod coded;
 pub mod coding;
 mod context;
+mod draw;
 pub mod example;
 mod exposure;
 mod fault;
@@ -21,13 +22,10 @@ mod target;
 use std::mem;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use pocketsplat_format::context::N_LEVELS;
 use rayon::prelude::*;
 
 use crate::ops::Pinhole;
-use crate::ops::image::project::{Footprint, Splat};
-use crate::ops::image::rasterise::{DrawCounts, TiledImage};
-use crate::ops::image::{prefilter, rasterise, tiles};
+use crate::ops::image::project::Splat;
 use crate::ops::loss::volume;
 use crate::ops::simd::Level;
 use crate::real::Real;
@@ -37,6 +35,7 @@ use coded::{Network, Weights};
 pub use coding::Phase;
 use coding::{Coding, RateReport};
 pub use context::ContextGradients;
+use draw::SplatsOfView;
 pub use exposure::{Exposure, ExposureSums};
 pub use fault::DeviceFault;
 use image::CpuImage;
@@ -51,10 +50,6 @@ pub use stages::StageSeconds;
 use stages::StageTimer;
 pub use target::clear_masked;
 pub use target::{TargetView, image_of_planes, planes};
-
-/// Anchors one task evaluates together; also the unit in which the gradients of the heads are summed, so that the sums
-/// do not depend on the number of threads.
-const BLOCK: usize = 256;
 
 /// What a step gives back, besides the gradients it leaves in the [`Workspace`].
 #[derive(Clone, Copy, Debug)]
@@ -77,23 +72,8 @@ pub struct StepReport<R> {
     pub stages: StageSeconds,
 }
 
-/// A drawn view and what its backward pass needs.
-struct DrawnView<R> {
-    image: TiledImage<R>,
-    lists: tiles::TileLists,
-    splats: Vec<Splat<R>>,
-    footprints: Vec<Footprint<R>>,
-}
-
 /// A device that several steps use in turns.
 pub type SharedDevice<R> = Arc<Mutex<dyn StepDevice<R>>>;
-
-/// Splats of a view, and the time that they took.
-struct SplatsOfView<R> {
-    stages: StageSeconds,
-    splats: Vec<Splat<R>>,
-    footprints: Vec<Footprint<R>>,
-}
 
 /// Buffers and gradients of a step. Clones share their device.
 #[derive(Clone, Debug)]
@@ -158,132 +138,6 @@ impl<R: Real> Workspace<R> {
     /// The blocks of visible anchors of the last step, with their gradients; anchors of a level ascend through them.
     pub fn blocks(&self) -> &[Block<R>] {
         &self.blocks[..self.n_blocks]
-    }
-
-    /// Draws the view on the CPU.
-    fn draw(
-        &mut self,
-        scene: &Scene<R>,
-        camera: &Pinhole<R>,
-        background: [R; 3],
-        coding: &Coding<'_, R>,
-        network: Option<Network<'_, R>>,
-        pruned_share: f32,
-    ) -> DrawnView<R> {
-        let SplatsOfView { splats, footprints, .. } = self.splats_of(scene, camera, coding, network, pruned_share);
-        let lists = tiles::build(&splats, &footprints, camera.size_px);
-        let image = rasterise::forward(self.level, &splats, &footprints, &lists, background);
-        DrawnView { image, lists, splats, footprints }
-    }
-
-    /// From the visible anchors to their splats.
-    fn splats_of(
-        &mut self,
-        scene: &Scene<R>,
-        camera: &Pinhole<R>,
-        coding: &Coding<'_, R>,
-        network: Option<Network<'_, R>>,
-        pruned_share: f32,
-    ) -> SplatsOfView<R> {
-        let mut timer = StageTimer::start();
-        let is_kept = |a: usize| scene.anchors.prune_rank.get(a).is_none_or(|place| *place >= pruned_share);
-        let visible: Vec<u32> = (0..scene.anchors.len())
-            .into_par_iter()
-            .with_min_len(1024)
-            .filter(|a| is_kept(*a) && scene.anchors.has_drawn(*a) && prefilter::shows(scene, *a, camera))
-            .map(|a| u32::try_from(a).expect("fewer than 2³² anchors"))
-            .collect();
-        let level = self.level;
-        let mut parents = mem::take(&mut self.parents);
-        let by_level = match network.and_then(|network| Some((network, network.model.shifts?))) {
-            Some((network, shifts)) => {
-                parents.update(&scene.shape, &scene.anchors, shifts, &network.model.frame);
-                self.code_parents(scene, coding, network, &mut parents);
-                let of = |l: usize| visible.iter().copied().filter(|a| parents.level(*a) == l).collect();
-                (0..N_LEVELS).map(of).collect()
-            }
-            None => {
-                parents = Parents::default();
-                vec![visible]
-            }
-        };
-        self.code_blocks(scene, &by_level, coding, network, &parents);
-        self.parents = parents;
-        let context = timer.lap();
-        self.blocks[..self.n_blocks].par_iter_mut().for_each(|block| block.forward(level, scene, camera));
-        let splats = self.blocks().iter().map(|b| b.splats.as_slice()).collect::<Vec<_>>().concat();
-        let footprints = self.blocks().iter().map(|b| b.footprints.as_slice()).collect::<Vec<_>>().concat();
-        let anchors = timer.lap();
-        SplatsOfView { stages: StageSeconds { context, anchors, ..StageSeconds::default() }, splats, footprints }
-    }
-
-    /// Copies anchors into blocks, each of one level, and codes them.
-    fn code_blocks(
-        &mut self,
-        scene: &Scene<R>,
-        by_level: &[Vec<u32>],
-        coding: &Coding<'_, R>,
-        network: Option<Network<'_, R>>,
-        parents: &Parents<R>,
-    ) {
-        let parts: Vec<&[u32]> = by_level.iter().flat_map(|anchors| anchors.chunks(BLOCK)).collect();
-        self.n_blocks = parts.len();
-        while self.blocks.len() < self.n_blocks {
-            self.blocks.push(Block::new(&scene.shape));
-        }
-        let level = self.level;
-        self.blocks.par_iter_mut().zip(parts).for_each(|(block, anchors)| {
-            block.gather(scene, anchors);
-            block.code(level, scene, coding, network, parents);
-        });
-    }
-
-    /// Codes all anchors that others follow, the coarsest level first, wherever they stand: what they give is then known.
-    fn code_parents(
-        &mut self,
-        scene: &Scene<R>,
-        coding: &Coding<'_, R>,
-        network: Network<'_, R>,
-        parents: &mut Parents<R>,
-    ) {
-        let rounded = matches!(coding, Coding::Context { exact: Some(_), .. });
-        for level in (1..N_LEVELS).rev() {
-            let anchors = parents.of_level(level);
-            self.code_blocks(scene, &[anchors], coding, Some(network), parents);
-            for block in self.blocks() {
-                block.give(network.model, rounded, parents);
-            }
-        }
-    }
-
-    /// The image of a view, planes `[3, height, width]`, not clamped.
-    pub fn image(&mut self, scene: &Scene<R>, camera: &Pinhole<R>, background: [R; 3]) -> Vec<R> {
-        self.draw(scene, camera, background, &Coding::Raw, None, 0.0).image.to_planes(camera.size_px)
-    }
-
-    /// What drawing a view is to the rasteriser.
-    pub fn count(&mut self, scene: &Scene<R>, camera: &Pinhole<R>) -> DrawCounts {
-        let SplatsOfView { splats, footprints, .. } = self.splats_of(scene, camera, &Coding::Raw, None, 0.0);
-        rasterise::count(&splats, &footprints, &tiles::build(&splats, &footprints, camera.size_px))
-    }
-
-    /// What [`Self::image`] projects, left in [`Self::blocks`], without any pixel.
-    pub fn project(&mut self, scene: &Scene<R>, camera: &Pinhole<R>) {
-        self.splats_of(scene, camera, &Coding::Raw, None, 0.0);
-    }
-
-    /// Σ of α·T over the pixels of a view, for each splat: block by block, in the order of [`Block::drawn`].
-    ///
-    /// It is the derivative of the sum of a channel of the image by the splat's colour in it.
-    pub fn contributions(&mut self, scene: &Scene<R>, camera: &Pinhole<R>) -> Vec<R> {
-        let drawing = self.draw(scene, camera, [R::ZERO; 3], &Coding::Raw, None, 0.0);
-        let mut d_image = vec![R::ZERO; 3 * camera.size_px[0] * camera.size_px[1]];
-        let n_pixels = d_image.len() / 3;
-        d_image[..n_pixels].fill(R::ONE);
-        let d_tiled = TiledImage::from_planes(&d_image, camera.size_px);
-        let DrawnView { image, lists, splats, footprints } = &drawing;
-        let d_splats = rasterise::backward(self.level, splats, footprints, lists, image, &d_tiled);
-        d_splats.iter().map(|d| d.colour[0]).collect()
     }
 
     /// Loss and gradients of one view.

@@ -1,7 +1,8 @@
 //! What a view would lose with each Gaussian.
 
+use super::draw::DrawnView;
 use super::target::clear_masked;
-use super::{Coding, DrawnView, LossWeights, TargetView, Workspace};
+use super::{Coding, LossWeights, TargetView, Workspace};
 use crate::ops::image::rasterise;
 use crate::ops::image::rasterise::TiledImage;
 use crate::ops::loss::{l1, ssim};

@@ -7,6 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use pocketsplat_format::context::{GridFrame, GridLevel, Group, LevelKind};
 
 use super::coding::{IntegerModel, RateTerms};
+use super::draw::BLOCK;
 use super::example::{camera, flatten, gradients, scene, shapes, step_with, truth};
 use super::*;
 use crate::finite_difference::{assert_piecewise_gradient, random};

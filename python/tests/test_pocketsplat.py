@@ -221,7 +221,9 @@ class Command(unittest.TestCase):
         self.assertEqual(module.stdout, said.stdout)
 
     def test_exit_codes_go_through(self) -> None:
-        self.assertEqual(self.run_command("train").returncode, 2)
+        wrong = self.run_command("train")
+        self.assertEqual(wrong.returncode, 2)
+        self.assertIn("Usage: pocketsplat train ", wrong.stderr)
         self.assertEqual(self.run_command("inspect", "nothing.psb").returncode, 1)
         self.assertEqual(self.run_command("inspect", str(GOLDEN / "static.psb")).returncode, 0)
 

@@ -97,7 +97,8 @@ pub(crate) fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
     let as_json = arguments.iter().any(|arg| arg == "--json");
     let command = help::grouped(help::own_options(Cli::command())).mut_subcommands(accepting_negative_numbers);
-    let parsed = command.no_binary_name(true).try_get_matches_from(&arguments);
+    // Usage begins with the name.
+    let parsed = command.try_get_matches_from([OsString::from("pocketsplat")].iter().chain(&arguments));
     let cli = match parsed.and_then(|matches| Cli::from_arg_matches(&matches)) {
         Ok(cli) => cli,
         Err(error) => {

@@ -1,10 +1,10 @@
 //! A bundle in memory.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::OnceLock;
 
 use pocketsplat_codec::bundle::{check, decoded_scene};
 use pocketsplat_codec::render::decoder::image_of;
-use pocketsplat_core::{Budget, Bundle as Parsed, Camera, DecodeError, Decoder, Plan, Quality};
+use pocketsplat_core::{Budget, Bundle as Parsed, Camera, DecodeError, Decoder, MaxSplats, Plan, Quality};
 use pocketsplat_kernels::camera::host_camera;
 use pocketsplat_kernels::ops::Pinhole;
 use pocketsplat_kernels::scene::Scene;
@@ -32,7 +32,7 @@ type GaussianArrays = [Vec<u8>; 5];
 pub(crate) struct Bundle {
     bytes: Vec<u8>,
     /// The scene as [`Bundle::gaussians`] evaluates it, decoded when it is first asked for.
-    scene: OnceLock<Arc<Scene<f32>>>,
+    scene: OnceLock<Scene<f32>>,
 }
 
 impl Bundle {
@@ -124,13 +124,13 @@ impl Bundle {
         let (bundle, camera) = (self.parsed()?, camera_of(&camera)?);
         py.detach(|| {
             let scene = match self.scene.get() {
-                Some(scene) => Arc::clone(scene),
+                Some(scene) => scene,
                 None => {
-                    let scene = Arc::new(decoded_scene(&bundle)?);
-                    Arc::clone(self.scene.get_or_init(|| scene))
+                    let decoded = decoded_scene(&bundle)?;
+                    self.scene.get_or_init(|| decoded)
                 }
             };
-            Ok(seen(&scene, &camera))
+            Ok(seen(scene, &camera))
         })
         .map_err(raised)
     }
@@ -157,7 +157,7 @@ fn budget((size_px, ram_bytes, tiers, quality): &Limits) -> PyResult<Budget> {
     Ok(match ram_bytes {
         Some(bytes) => budget.in_bytes(*bytes),
         // A PC has memory for every splat.
-        None => budget.with_max_splats(pocketsplat_core::MaxSplats::Worst),
+        None => budget.with_max_splats(MaxSplats::Worst),
     })
 }
 

@@ -93,7 +93,7 @@ fn prepare() -> Result<(), Box<dyn Error>> {
     let settings = format!(
         "const BOARD: &str = {name:?};\nconst RAM_KIB: usize = {ram_kib};\nconst STACK_LEN: usize = {stack_len};\n\
          pub(crate) const SCRATCH_LEN: usize = {scratch_len};\npub(crate) const WIDTH_PX: usize = {width_px};\n\
-         pub(crate) const HEIGHT_PX: usize = {height_px};\nconst N_FRAMES: u8 = {n_frames};\n\
+         pub(crate) const HEIGHT_PX: usize = {height_px};\npub(crate) const N_FRAMES: u8 = {n_frames};\n\
          const VIEWS: &[Camera] = &[{views}];\nconst QUALITY: Quality = Quality::{quality};\n\
          fn asked(budget: Budget) -> Budget {{ budget.with_quality(QUALITY){budget} }}\n\
          type Chosen = pocketsplat_core::{arithmetic};\n"

@@ -483,6 +483,9 @@ measure_firmware() { # CSV
     cargo clippy -q "${options[@]}" -- -D warnings
     cargo build -q "${options[@]}"
     ./qemu.sh "$embedded/$embedded_target/release/two_buffers" || fail "two tile buffers do not draw what render draws"
+    options=(--release --locked --bin steps --target-dir "$embedded")
+    cargo build -q "${options[@]}"
+    ./qemu.sh "$embedded/$embedded_target/release/steps" || fail "a step of a frame takes too long"
     export PSB_BUNDLE=$bundle
     for out in "$embedded_target" riscv32imac-unknown-none-elf; do
       cargo clippy -q --release --locked --target "$out" --target-dir "$embedded" -- -D warnings

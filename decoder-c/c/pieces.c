@@ -34,7 +34,16 @@ static int matches(const psb_pixels *piece, uint32_t format, const uint8_t *fram
   return 1;
 }
 
-/* A whole frame in one format: so many single tiles and then a row, over and over; without rows for 255. */
+/* The next tile by small steps, as psb_next_tile gives it. */
+static psb_status next_tile_by_steps(psb_decoder *decoder, psb_pixels *tile, psb_report *report, psb_message *message) {
+  psb_progress progress = PSB_PROGRESS_WORKING;
+  psb_status status = PSB_STATUS_OK;
+  while (status == PSB_STATUS_OK && progress == PSB_PROGRESS_WORKING) status = psb_advance(decoder, &progress, tile, report, message);
+  return status;
+}
+
+/* A whole frame in one format: so many single tiles and then a row, over and over; without rows for 255. Every third single tile comes by
+ * small steps. */
 static psb_status draw(psb_decoder *decoder, const psb_camera *camera, uint32_t format, unsigned n_single, const uint8_t *frame,
                        int *is_same, psb_report *report, psb_message *message) {
   const size_t bytes_per_pixel = format == PSB_FORMAT_RGB888 ? 3 : 2;
@@ -43,7 +52,7 @@ static psb_status draw(psb_decoder *decoder, const psb_camera *camera, uint32_t 
   psb_status status = psb_begin(decoder, camera, format, message);
   for (unsigned turn = 0; status == PSB_STATUS_OK; turn++) {
     if (n_single == 255 || turn % (n_single + 1) < n_single) {
-      status = psb_next_tile(decoder, &piece, report, message);
+      status = (turn % 3 ? psb_next_tile : next_tile_by_steps)(decoder, &piece, report, message);
     } else {
       uint8_t *row = rows[turn % 2];
       status = psb_next_tile_row(decoder, row, bytes_per_pixel * 16 * camera->width_px, &piece, report, message);

@@ -65,6 +65,20 @@ static void misordered(psb_decoder *decoder, const psb_camera *camera) {
   CHECK(n_tiles == 12 && report.splats > 0 && message.text[0] == 0);
   CHECK(psb_next_tile(decoder, &piece, NULL, NULL) == PSB_STATUS_OK && piece.bytes == NULL);
   CHECK(psb_next_tile_row(decoder, row, 0, &piece, NULL, NULL) == PSB_STATUS_OK && piece.bytes == NULL);
+  /* Small steps: most show nothing, and what they come to is said in each. */
+  psb_progress progress;
+  CHECK(psb_advance(decoder, &progress, &piece, NULL, NULL) == PSB_STATUS_OK && progress == PSB_PROGRESS_COMPLETE && piece.bytes == NULL);
+  CHECK(psb_begin(decoder, camera, PSB_FORMAT_RGB888, NULL) == PSB_STATUS_OK);
+  CHECK(psb_advance(decoder, NULL, &piece, NULL, NULL) == PSB_STATUS_MISUSE && psb_advance(decoder, &progress, NULL, NULL, NULL) == PSB_STATUS_MISUSE);
+  CHECK(psb_advance(NULL, &progress, &piece, NULL, NULL) == PSB_STATUS_MISUSE);
+  CHECK(psb_advance(decoder, &progress, &piece, NULL, NULL) == PSB_STATUS_OK && progress == PSB_PROGRESS_WORKING && piece.bytes == NULL);
+  unsigned n_steps = 1;
+  for (n_tiles = 0; progress != PSB_PROGRESS_COMPLETE && n_steps < 10000; n_steps++) {
+    CHECK(psb_advance(decoder, &progress, &piece, &report, &message) == PSB_STATUS_OK);
+    CHECK((progress == PSB_PROGRESS_TILE) == (piece.bytes != NULL));
+    n_tiles += progress == PSB_PROGRESS_TILE;
+  }
+  CHECK(n_tiles == 12 && n_steps > 14 && report.splats > 0);
   /* Given up in the middle, and the memory with it. */
   CHECK(psb_begin(decoder, camera, PSB_FORMAT_RGB888, NULL) == PSB_STATUS_OK);
   CHECK(psb_next_tile(decoder, &piece, NULL, NULL) == PSB_STATUS_OK);
@@ -101,6 +115,12 @@ static void misuse(const uint8_t *bundle, size_t len) {
   budget.ram_bytes = plan.scratch_bytes;
   CHECK(psb_make_plan(bundle, len, &budget, &plan, &message) == PSB_STATUS_OK && message.text[0] == 0);
   uint8_t *scratch = malloc(plan.scratch_bytes);
+  /* A frame that takes more work than the budget allows ends, and says what it took. */
+  budget.most_work = 100000;
+  CHECK(psb_bind(place, PSB_DECODER_BYTES, bundle, len, &budget, scratch, plan.scratch_bytes, NULL, 0, &decoder, &message) == PSB_STATUS_OK);
+  CHECK(psb_preview(bundle, len, 64, 48, &camera, &message) == PSB_STATUS_OK);
+  CHECK(psb_render(decoder, &camera, take, NULL, NULL, &message) == PSB_STATUS_OVER_BUDGET && strstr(message.text, "budget has 97"));
+  budget.most_work = UINT64_MAX;
   CHECK(psb_bind(NULL, PSB_DECODER_BYTES, bundle, len, &budget, scratch, plan.scratch_bytes, NULL, 0, &decoder, &message) == PSB_STATUS_MISUSE);
   CHECK(psb_decoder_bytes() <= PSB_DECODER_BYTES);
   CHECK(psb_bind(place, psb_decoder_bytes() - 1, bundle, len, &budget, scratch, plan.scratch_bytes, NULL, 0, &decoder, &message) == PSB_STATUS_MISUSE);

@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 // Bytes that suffice for a psb_decoder on every target.
-#define PSB_DECODER_BYTES 2560
+#define PSB_DECODER_BYTES 3072
 
 // Alignment that suffices for a psb_decoder on every target.
 #define PSB_DECODER_ALIGN 8
@@ -33,6 +33,16 @@ typedef enum psb_status {
   // A mistake in pocketsplat; please report it.
   PSB_STATUS_INTERNAL = 6,
 } psb_status;
+
+// What a call of psb_advance came to.
+typedef enum psb_progress {
+  // Nothing to show yet.
+  PSB_PROGRESS_WORKING = 0,
+  // The next tile.
+  PSB_PROGRESS_TILE = 1,
+  // The frame is complete.
+  PSB_PROGRESS_COMPLETE = 2,
+} psb_progress;
 
 // How exactly a frame is drawn.
 typedef enum psb_quality {
@@ -64,6 +74,9 @@ typedef struct psb_decoder psb_decoder;
 
 // What there is to draw with. Begin with psb_budget_for_frame.
 typedef struct psb_budget {
+  // The most that a frame may take, model instructions: about as many as a Cortex-M4 executes. A frame that takes more ends with
+  // PSB_STATUS_OVER_BUDGET. UINT64_MAX for no limit.
+  uint64_t most_work;
   // Bytes of scratch memory that there are.
   size_t ram_bytes;
   // Bytes of slower memory beside it, such as PSRAM or SDRAM; 0 where there is none. It has to be normal memory: where it is Device memory
@@ -275,6 +288,21 @@ enum psb_status psb_next_tile(struct psb_decoder *decoder,
                               struct psb_pixels *tile,
                               struct psb_report *report,
                               struct psb_message *message);
+
+// Does a small part of the frame that was begun: a few anchors, the sort of a strip, or a few splats of a tile. Between two calls the processor
+// is free, for a watchdog, USB or another task; psb_next_tile does as many at once as a tile takes.
+//
+// progress: gets what the call came to. tile: gets the tile, as psb_next_tile gives it; NULL there unless progress is PSB_PROGRESS_TILE.
+// report: NULL, or where to say, when the frame is complete, what it consisted of. message: NULL, or where to say what was wrong;
+// PSB_STATUS_MISUSE when no frame is begun.
+//
+// # Safety
+// Pointers are NULL or point to what the call says; the decoder is bound.
+enum psb_status psb_advance(struct psb_decoder *decoder,
+                            enum psb_progress *progress,
+                            struct psb_pixels *tile,
+                            struct psb_report *report,
+                            struct psb_message *message);
 
 // Draws the next row of tiles into memory of the caller, so that one transfer sends 16 whole lines of the frame, fewer at the bottom. After
 // single tiles of a row it draws the rest of the row.

@@ -3,7 +3,7 @@
 use core::ptr;
 use core::slice;
 
-use pocketsplat_core::{ByteOrder, Drawing, PixelFormat, Rounding};
+use pocketsplat_core::{ByteOrder, Drawing, PixelFormat, Progress as CoreProgress, Rounding};
 
 use crate::camera::Camera;
 use crate::decoder::{Begun, Decoder, Report};
@@ -23,6 +23,18 @@ pub enum Format {
     Rgb565BigEndianDithered = 3,
     /// As PSB_FORMAT_RGB565_LITTLE_ENDIAN, by the same pattern.
     Rgb565LittleEndianDithered = 4,
+}
+
+/// What a call of psb_advance came to.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Progress {
+    /// Nothing to show yet.
+    Working = 0,
+    /// The next tile.
+    Tile = 1,
+    /// The frame is complete.
+    Complete = 2,
 }
 
 /// A finished part of a frame: a tile, or a row of tiles.
@@ -120,6 +132,52 @@ pub unsafe extern "C" fn psb_next_tile(
             }
             None => say_report(drawing, report),
         }
+        Ok(())
+    })();
+    status_of(outcome, message)
+}
+
+/// Does a small part of the frame that was begun: a few anchors, a part of the sort of a strip, or a few splats of a tile. Between two calls the processor
+/// is free, for a watchdog, USB or another task; psb_next_tile does as many at once as a tile takes.
+///
+/// progress: gets what the call came to. tile: gets the tile, as psb_next_tile gives it; NULL there unless progress is PSB_PROGRESS_TILE.
+/// report: NULL, or where to say, when the frame is complete, what it consisted of. message: NULL, or where to say what was wrong;
+/// PSB_STATUS_MISUSE when no frame is begun.
+///
+/// # Safety
+/// Pointers are NULL or point to what the call says; the decoder is bound.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn psb_advance(
+    decoder: *mut Decoder,
+    progress: *mut Progress,
+    tile: *mut Pixels,
+    report: *mut Report,
+    message: *mut Message,
+) -> Status {
+    // SAFETY: the caller's promise.
+    let (tile, report, message) = unsafe { (tile.as_mut(), report.as_mut(), message.as_mut()) };
+    let outcome = (|| {
+        let out = tile.ok_or(Failure::Misuse("tile is NULL"))?;
+        *out = Pixels::NONE;
+        if progress.is_null() {
+            return Err(Failure::Misuse("progress is NULL"));
+        }
+        // SAFETY: NULL or a bound decoder, the caller's promise.
+        let Begun { drawing, format } = unsafe { Decoder::begun(decoder) }?;
+        let found = match drawing.advance()? {
+            CoreProgress::Working => Progress::Working,
+            CoreProgress::Tile(tile) => {
+                let place = [tile.x_px, tile.y_px, tile.width, tile.height];
+                *out = Pixels::new(place, tile.into_bytes(*format));
+                Progress::Tile
+            }
+            CoreProgress::Complete => {
+                say_report(drawing, report);
+                Progress::Complete
+            }
+        };
+        // SAFETY: not NULL; the rest is the caller's promise. Written, never read: what was there may be no progress.
+        unsafe { progress.write(found) };
         Ok(())
     })();
     status_of(outcome, message)

@@ -17,7 +17,7 @@ mod status;
 
 pub use camera::{Camera, psb_orbit, psb_preview};
 pub use decoder::{DECODER_ALIGN, DECODER_BYTES, Decoder, Report, TileFn, psb_bind, psb_decoder_bytes, psb_render};
-pub use drawing::{Format, Pixels, psb_begin, psb_next_tile, psb_next_tile_row};
+pub use drawing::{Format, Pixels, Progress, psb_advance, psb_begin, psb_next_tile, psb_next_tile_row};
 pub use plan::{Budget, Plan, Quality, psb_budget_for_frame, psb_make_plan};
 pub use status::{Message, Status, psb_status_name};
 

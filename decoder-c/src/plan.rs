@@ -22,6 +22,9 @@ pub enum Quality {
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct Budget {
+    /// The most that a frame may take, model instructions: about as many as a Cortex-M4 executes. A frame that takes more ends with
+    /// PSB_STATUS_OVER_BUDGET. UINT64_MAX for no limit.
+    pub most_work: u64,
     /// Bytes of scratch memory that there are.
     pub ram_bytes: usize,
     /// Bytes of slower memory beside it, such as PSRAM or SDRAM; 0 where there is none. It has to be normal memory: where it is Device memory
@@ -80,7 +83,8 @@ impl Budget {
         };
         let frame = pocketsplat_core::Budget::for_frame(self.width_px, self.height_px);
         let memory = frame.in_bytes(self.ram_bytes).with_slow_bytes(self.slow_bytes);
-        Ok(memory.with_tiers(self.tiers).with_quality(quality).with_overflow(overflow))
+        let scene = memory.with_tiers(self.tiers).with_quality(quality).with_overflow(overflow);
+        Ok(scene.with_most_work(self.most_work))
     }
 }
 
@@ -122,7 +126,16 @@ pub(crate) unsafe fn bytes_of(bytes: *const u8, len: usize) -> Option<&'static [
 /// A budget for frames of at most width_px by height_px within ram_bytes, everything else as good as memory allows.
 #[unsafe(no_mangle)]
 pub extern "C" fn psb_budget_for_frame(width_px: u16, height_px: u16, ram_bytes: usize) -> Budget {
-    Budget { ram_bytes, slow_bytes: 0, width_px, height_px, tiers: u8::MAX, quality: Quality::Exact as u8, slabs: 0 }
+    Budget {
+        most_work: u64::MAX,
+        ram_bytes,
+        slow_bytes: 0,
+        width_px,
+        height_px,
+        tiers: u8::MAX,
+        quality: Quality::Exact as u8,
+        slabs: 0,
+    }
 }
 
 /// Checks a bundle and says how many bytes the best plan within a budget takes.

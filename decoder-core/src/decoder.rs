@@ -1,10 +1,12 @@
 //! The façade: a bundle, a plan and the caller's memory bound together, drawing frames.
 
 mod bind;
+mod collect;
 mod count;
 mod first_come;
 mod frame;
-mod gather;
+mod overflow;
+mod pass;
 mod pixel_format;
 mod render_error;
 mod report;
@@ -20,7 +22,7 @@ mod tests;
 mod tile;
 
 pub use count::{count_gaussians, count_scratch_len};
-pub use frame::Drawing;
+pub use frame::{Drawing, Progress};
 pub use pixel_format::{ByteOrder, PixelFormat, Rounding};
 pub use render_error::RenderError;
 pub use report::FrameReport;
@@ -30,12 +32,12 @@ pub use tile::{Tile, TileSink};
 
 use core::fmt;
 
-use pocketsplat_format::bundle::Chunk;
 use pocketsplat_format::{Bundle, Camera, DecodeError, Stopwatch};
 
 use crate::arithmetic::{Arithmetic, ReferenceArithmetic};
 use crate::budget::Plan;
 use crate::raster::Pixel;
+use pass::PlannedChunks;
 use source::GaussianSource;
 use splats::SplatStore;
 
@@ -186,15 +188,9 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
         self.plan.budget().skips_damage
     }
 
-    /// The chunks of the tiers that are drawn, each with the number of its first anchor.
-    fn planned_chunks(&self) -> impl Iterator<Item = (Chunk<'b>, u32)> + use<'b, 's, A> {
-        let n_chunks = self.bundle.up_to_tier(self.plan.n_tiers()).n_chunks;
-        let mut n_anchors = 0_u32;
-        self.bundle.chunks().take(n_chunks as usize).map(move |chunk| {
-            let first = n_anchors;
-            n_anchors = n_anchors.saturating_add(chunk.n_anchors().into());
-            (chunk, first)
-        })
+    /// The chunks of the tiers that are drawn.
+    fn planned_chunks(&self) -> PlannedChunks<'b> {
+        PlannedChunks::new(self.bundle.chunks(), self.bundle.up_to_tier(self.plan.n_tiers()).n_chunks)
     }
 }
 

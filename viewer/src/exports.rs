@@ -163,6 +163,9 @@ extern "C" fn numbers() -> *const f64 {
     MODULE.with_borrow(|module| module.numbers.as_ptr())
 }
 
+/// The most that a frame may take, model instructions: a minute or two, after which a file asks for more than anyone waits for.
+const MOST_WORK: u64 = 100_000_000_000;
+
 fn budget(ram: f64, [width, height]: [u16; 2], tiers: u8, slabs: u32, quality: (u8, u32)) -> Budget {
     let (alpha_cut, detail) = quality;
     let overflow = if slabs == 0 { Overflow::LeaveOut } else { Overflow::Slabs };
@@ -172,6 +175,7 @@ fn budget(ram: f64, [width, height]: [u16; 2], tiers: u8, slabs: u32, quality: (
         .with_tiers(tiers)
         .with_overflow(overflow)
         .with_quality(Quality { alpha_cut, detail: detail != 0 })
+        .with_most_work(MOST_WORK)
 }
 
 fn camera_of(numbers: &[f32; CAMERA_LEN]) -> Result<Camera, DecodeError> {

@@ -1,5 +1,7 @@
 //! Baked Gaussians in memory, chunk by chunk.
 
+use core::ops::Range;
+
 use pocketsplat_format::bundle::Effects;
 use pocketsplat_format::{DecodeError, Field, saturate};
 
@@ -85,22 +87,20 @@ impl BakedGaussians<'_> {
 
     /// Gaussians of a chunk.
     pub(crate) fn n_of_chunk(&self, chunk: u32) -> u32 {
-        let [first, end] = self.range(chunk);
-        end.saturating_sub(first)
+        self.numbers_of_chunk(chunk).len() as u32
     }
 
-    /// The Gaussians of a chunk in the order of the file, each with its number.
-    pub(crate) fn of_chunk(&self, chunk: u32, effects: Effects) -> impl Iterator<Item = (u32, Gaussian)> {
-        let [first, end] = self.range(chunk);
-        let records = self.records.get(first as usize..end as usize).unwrap_or_default();
-        (first..).zip(records).map(move |(number, record)| (number, record.unpack(effects)))
-    }
-
-    fn range(&self, chunk: u32) -> [u32; 2] {
+    /// The numbers of the Gaussians of a chunk, in the order of the file.
+    pub(crate) fn numbers_of_chunk(&self, chunk: u32) -> Range<u32> {
         match self.starts.get(chunk as usize..) {
-            Some([first, end, ..]) => [first & !DAMAGED, end & !DAMAGED],
-            _ => [0; 2],
+            Some([first, end, ..]) => first & !DAMAGED..end & !DAMAGED,
+            _ => 0..0,
         }
+    }
+
+    /// The Gaussian of this number, if there is one.
+    pub(crate) fn gaussian(&self, number: u32, effects: Effects) -> Option<Gaussian> {
+        Some(self.records.get(number as usize)?.unpack(effects))
     }
 }
 

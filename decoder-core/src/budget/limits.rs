@@ -104,6 +104,8 @@ pub struct Budget {
     pub quality: Quality,
     /// Whether damaged chunks are left out, and each frame that needs some says so in its report; if not, they are errors.
     pub skips_damage: bool,
+    /// The most that a frame may take, model instructions; [`u64::MAX`] for no limit.
+    pub most_work: u64,
 }
 
 impl Budget {
@@ -129,6 +131,7 @@ impl Budget {
             overflow: Overflow::LeaveOut,
             quality: Quality::EXACT,
             skips_damage: false,
+            most_work: u64::MAX,
         }
     }
 
@@ -192,6 +195,13 @@ impl Budget {
     #[must_use]
     pub const fn skipping_damage(self) -> Self {
         Self { skips_damage: true, ..self }
+    }
+
+    /// Ends a frame that takes more than so many [model instructions](crate::FrameReport::instructions), about as many as a Cortex-M4
+    /// executes, with [`DecodeError::TooMuchWork`]: a file may ask for any number of them, whatever its manifest says.
+    #[must_use]
+    pub const fn with_most_work(self, most_work: u64) -> Self {
+        Self { most_work, ..self }
     }
 
     /// Frame, tiers, strips, quality and the places of slabs lie within their limits.

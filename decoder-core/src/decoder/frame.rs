@@ -6,7 +6,8 @@ use pocketsplat_format::rules::TILE_PX;
 use pocketsplat_format::{Camera, DecodeError, Field, Stage, Stopwatch, in_range, saturate};
 
 use super::first_come::FirstCome;
-use super::gather::{Frame, OverflowPolicy};
+use super::overflow::{Frame, OverflowPolicy};
+use super::pass::Pass;
 use super::render_error::RenderError;
 use super::slab_index::IndexState;
 use super::splats::{Slab, SplatStore};
@@ -17,7 +18,7 @@ use super::{Decoder, FrameReport};
 use crate::arithmetic::{Arithmetic, ReferenceArithmetic};
 use crate::budget::Overflow;
 use crate::project::{TILE_PIXELS, TileRect, View};
-use crate::raster::{BlendRule, EMPTY, TileRegion, blend_tile, finish_tile};
+use crate::raster::{BlendRule, DIGITS, EMPTY, TileRegion, blend_tile, finish_tile};
 
 /// Strips of a frame that is worth an index of its chunks.
 const LEAST_STRIPS_INDEXED: u8 = 3;
@@ -50,19 +51,54 @@ pub struct Drawing<'d, 'b, 's, A: Arithmetic = ReferenceArithmetic> {
     size_px: [u16; 2],
     frame: Frame,
     rule: BlendRule,
+    next: Next<'b>,
     strip: Strip,
     slab: Slab,
     /// The next tile: its place in the frame, and its number in the strip.
     row: u8,
     column: u8,
     n_tiles: usize,
-    /// Splats of the current row, at the front of the spare list.
+    /// Splats of the current row, at the front of the spare list, and those of them that the next tile has.
     n_in_row: usize,
+    n_listed: usize,
     /// Pixels of the slab that are not finished.
     alive: u32,
     /// Splats of the strip, and the most in memory at once.
     in_strip: u32,
     most_in_memory: u32,
+}
+
+/// What a call of [`Drawing::advance`] came to.
+#[derive(Debug)]
+pub enum Progress<'t> {
+    /// Nothing to show yet.
+    Working,
+    /// The next tile.
+    Tile(Tile<'t>),
+    /// The frame is complete.
+    Complete,
+}
+
+/// What a frame does next.
+#[expect(clippy::large_enum_variant, reason = "a frame has one, and there is no allocator to box with")]
+enum Next<'b> {
+    /// The slab behind this one, or the strip below.
+    Slab,
+    /// More anchors.
+    Anchors(Pass<'b>),
+    /// Their splats in the order of these and later digits of their depths.
+    Order { shift: u32 },
+    /// More splats of the next tile.
+    Tile,
+    /// Nothing.
+    End,
+}
+
+/// What one step came to.
+enum Step {
+    Working,
+    Tile(TileRegion),
+    Complete,
 }
 
 impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
@@ -88,7 +124,8 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
             OverflowPolicy::FirstCome { first_come, strips_of_chunks: StripsOfChunks::NONE }
         };
         let rule = BlendRule::new(budget.quality.alpha_cut);
-        let mut frame = Frame { view, strips, policy, report: FrameReport::default() };
+        let cost = self.bundle.model_cost();
+        let mut frame = Frame { view, strips, policy, report: FrameReport::default(), cost, in_vain: 0 };
         if self.skips_damage() && matches!(frame.policy, OverflowPolicy::Slabs { .. }) {
             self.note_damage(&mut frame);
         }
@@ -97,12 +134,14 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
             size_px: [camera.width_px, camera.height_px],
             frame,
             rule,
+            next: Next::Slab,
             strip: Strip::BEFORE,
             slab: Slab::behind(0.0),
             row: 0,
             column: 0,
             n_tiles: 0,
             n_in_row: 0,
+            n_listed: 0,
             alive: 0,
             in_strip: 0,
             most_in_memory: 0,
@@ -132,7 +171,8 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
     /// the last.
     ///
     /// # Errors
-    /// [`DecodeError::ChunkStream`] for a chunk that no writer makes; no tile comes after it.
+    /// [`DecodeError::ChunkStream`] for a chunk that no writer makes, [`DecodeError::TooMuchWork`] beyond the
+    /// [budget's](crate::Budget::with_most_work); no tile comes after either.
     ///
     /// # Budget
     /// As [`Decoder::render`], divided among its tiles: the first of a strip, or of each of its slabs, takes the decoding and
@@ -141,25 +181,102 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
         self.next_tile_watched(&mut ())
     }
 
+    /// Does a small part of the frame: a few anchors, a part of the sort of a strip, or a few splats of a tile. Between two calls the processor is
+    /// free; [`next_tile`](Self::next_tile) does as many at once as a tile takes.
+    ///
+    /// ```
+    /// # fn main() -> Result<(), pocketsplat_core::DecodeError> {
+    /// # let bytes = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/example.psb"));
+    /// # let mut scratch = [0; 8 * 1024];
+    /// use pocketsplat_core::{Budget, Bundle, Decoder, Plan, Progress};
+    ///
+    /// let bundle = Bundle::parse(bytes)?;
+    /// let plan = Plan::new(&bundle, &Budget::for_frame(32, 24).with_most_work(1_000_000))?;
+    /// let mut decoder = Decoder::bind(&bundle, plan, &mut scratch)?;
+    /// let mut drawing = decoder.begin(&bundle.header().preview)?;
+    /// let mut n_pixels = 0;
+    /// loop {
+    ///     match drawing.advance()? {
+    ///         Progress::Working => {} // or: feed the watchdog, poll USB, yield to other tasks
+    ///         Progress::Tile(tile) => n_pixels += tile.rgb.len(),
+    ///         Progress::Complete => break,
+    ///     }
+    /// }
+    /// assert_eq!(n_pixels, 32 * 24);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// As for [`next_tile`](Self::next_tile).
+    ///
+    /// # Budget
+    /// About 200,000 [model instructions](FrameReport::instructions), one anchor's more, and at most 64 splats of a tile; a part of
+    /// the sort about 40 instructions a splat, and where damage is skipped, a checksum about 8 a byte of its chunk.
+    pub fn advance(&mut self) -> Result<Progress<'_>, DecodeError> {
+        Ok(match self.step(&mut ())? {
+            Step::Working => Progress::Working,
+            Step::Tile(place) => Progress::Tile(self.tile(place)),
+            Step::Complete => Progress::Complete,
+        })
+    }
+
     /// As [`next_tile`](Self::next_tile), and tells `watch` where the work goes.
     fn next_tile_watched(&mut self, watch: &mut impl Stopwatch) -> Result<Option<Tile<'_>>, DecodeError> {
         let place = loop {
-            if u16::from(self.row) >= self.strip.end_row {
-                if !self.next_slab(watch)? {
-                    return Ok(None);
-                }
-                continue;
-            }
-            let Some(place) = self.draw_tile(watch) else { return Err(DecodeError::Internal) };
-            if !self.slab.ends() {
-                break place;
+            match self.step(watch)? {
+                Step::Working => {}
+                Step::Tile(place) => break place,
+                Step::Complete => return Ok(None),
             }
         };
-        watch.enter(Stage::Output);
-        let TileRegion { column, row, width, height } = place;
+        Ok(Some(self.tile(place)))
+    }
+
+    /// The tile that was finished last.
+    fn tile(&mut self, TileRegion { column, row, width, height }: TileRegion) -> Tile<'_> {
         let [x_px, y_px] = [column, row].map(|index| u16::from(index) * TILE_PX);
         let rgb = self.decoder.rgb.get_mut(..usize::from(width) * usize::from(height)).unwrap_or_default();
-        Ok(Some(Tile { x_px, y_px, width, height, rgb }))
+        Tile { x_px, y_px, width, height, rgb }
+    }
+
+    /// Does the next part of the frame; after an error nothing.
+    // Not inlined: it is long, and has two callers.
+    #[inline(never)]
+    fn step(&mut self, watch: &mut impl Stopwatch) -> Result<Step, DecodeError> {
+        let step = match &mut self.next {
+            Next::Slab => Ok(self.begin_slab()),
+            Next::Anchors(pass) => self.decoder.go_on(pass, &mut self.frame, watch).map(|is_complete| {
+                if is_complete {
+                    self.end_pass();
+                }
+                Step::Working
+            }),
+            Next::Order { shift } => {
+                watch.enter(Stage::Sort);
+                self.decoder.splats.order_by(*shift);
+                let later = DIGITS.into_iter().find(|digit| digit > shift);
+                self.next = later.map_or(Next::Tile, |shift| Next::Order { shift });
+                Ok(Step::Working)
+            }
+            Next::Tile => self.draw_tile(watch).ok_or(DecodeError::Internal),
+            Next::End => return Ok(Step::Complete),
+        };
+        let step = step.and_then(|step| self.check_work().map(|()| step));
+        if step.is_err() {
+            self.next = Next::End;
+        }
+        step
+    }
+
+    /// The frame took no more than the budget allows.
+    fn check_work(&self) -> Result<(), DecodeError> {
+        let (needed, most) = (self.frame.instructions(), self.decoder.plan.budget().most_work);
+        if needed > most {
+            let [needed_so_far, limit] = [needed, most].map(kilo);
+            return Err(DecodeError::TooMuchWork { needed_so_far, limit });
+        }
+        Ok(())
     }
 
     /// What the frame consisted of and took; of a frame that is not finished so far.
@@ -174,16 +291,21 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
         report
     }
 
-    /// What is left of the current row of tiles: its first column and row, its width and height, pixels; `None` after the last row.
+    /// What is left of the row of tiles that is handed out: its first column and row, its width and height, pixels; `None` after the
+    /// last row.
     pub(super) fn rest_of_row(&self) -> Option<[u16; 4]> {
         let [width_px, height_px] = self.size_px;
-        let [x_px, y_px] = [self.column, self.row].map(|index| u16::from(index) * TILE_PX);
-        let is_over = u16::from(self.row) >= self.frame.strips.n_rows();
-        (!is_over).then(|| [x_px, y_px, width_px.saturating_sub(x_px), size_along(height_px, self.row)])
+        // Of a strip whose slabs are not all drawn nothing is handed out.
+        let [column, row] =
+            if self.slab.ends() { [0, self.strip.first_row] } else { [self.column, self.row].map(u16::from) };
+        let is_over = matches!(self.next, Next::End) || row >= self.frame.strips.n_rows();
+        let [x_px, y_px] = [column, row].map(|index| index * TILE_PX);
+        // A frame has 255 rows at most.
+        (!is_over).then(|| [x_px, y_px, width_px.saturating_sub(x_px), size_along(height_px, row as u8)])
     }
 
-    /// Gathers and orders the splats of the next slab, of this strip or of the next one; false when there is none.
-    fn next_slab(&mut self, watch: &mut impl Stopwatch) -> Result<bool, DecodeError> {
+    /// Begins with the next slab, of this strip or of the next one, if there is one.
+    fn begin_slab(&mut self) -> Step {
         let Self { decoder, frame, .. } = self;
         let from = if self.slab.ends() {
             self.slab.end
@@ -193,7 +315,10 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
                 frame.report.max_splats = frame.report.max_splats.max(self.in_strip);
             }
             self.in_strip = 0;
-            let Some(strip) = frame.strips.after(self.strip) else { return Ok(false) };
+            let Some(strip) = frame.strips.after(self.strip) else {
+                self.next = Next::End;
+                return Step::Complete;
+            };
             self.strip = match &frame.policy {
                 // What a damaged chunk would have made room for is gone.
                 OverflowPolicy::FirstCome { .. } if decoder.skips_damage() => strip,
@@ -210,43 +335,48 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
         if from > 0.0 && self.alive == 0 {
             // Nothing behind can be seen: the strip goes out as it is.
             decoder.splats.n = 0;
-            self.slab = Slab::behind(from);
+            self.begin_tiles(Slab::behind(from));
         } else {
-            self.slab = match decoder.gather(&mut self.strip, from, frame, watch) {
-                Ok(slab) => slab,
-                Err(error) => {
-                    // As after the last strip.
-                    (self.slab, self.strip.end_row, self.row) = (Slab::behind(0.0), frame.strips.n_rows(), u8::MAX);
-                    return Err(error);
-                }
-            };
-            frame.report.slabs = frame.report.slabs.saturating_add(1);
-            let n = decoder.splats.n;
-            self.in_strip = self.in_strip.saturating_add(n);
-            // There were more when it let go of some.
-            let most = n.max(decoder.splats.most).saturating_add(decoder.splats.places_of_index);
-            self.most_in_memory = most.max(self.most_in_memory);
-            let rects = decoder.splats.rects.iter().take(n as usize);
-            let n_first_here =
-                rects.filter(|rect| *frame.strips.touched(**rect).start() >= self.strip.index.into()).count() as u32;
-            frame.report.splats = frame.report.splats.saturating_add(n_first_here);
+            self.next = Next::Anchors(decoder.begin_pass(self.strip, from, frame));
         }
-        watch.enter(Stage::Sort);
-        decoder.splats.sort();
-        // A frame has 255 rows at most.
-        self.row = self.strip.first_row as u8;
-        (self.column, self.n_tiles, self.alive) = (0, 0, 0);
-        Ok(true)
+        Step::Working
     }
 
-    /// Draws the slab's splats into the next tile, and finishes it if the slab is the strip's last.
-    fn draw_tile(&mut self, watch: &mut impl Stopwatch) -> Option<TileRegion> {
+    /// Counts the splats of a pass that is complete.
+    fn end_pass(&mut self) {
+        let Next::Anchors(Pass { target, .. }) = &self.next else { return };
+        self.strip = target.strip;
+        let slab = target.slab;
+        let Self { decoder, frame, .. } = self;
+        frame.report.slabs = frame.report.slabs.saturating_add(1);
+        let n = decoder.splats.n;
+        self.in_strip = self.in_strip.saturating_add(n);
+        // There were more when it let go of some.
+        let most = n.max(decoder.splats.most).saturating_add(decoder.splats.places_of_index);
+        self.most_in_memory = most.max(self.most_in_memory);
+        let rects = decoder.splats.rects.iter().take(n as usize);
+        let n_first_here =
+            rects.filter(|rect| *frame.strips.touched(**rect).start() >= self.strip.index.into()).count() as u32;
+        frame.report.splats = frame.report.splats.saturating_add(n_first_here);
+        self.begin_tiles(slab);
+    }
+
+    /// The tiles of a slab come next, once its splats are in order.
+    fn begin_tiles(&mut self, slab: Slab) {
+        (self.next, self.slab) = (Next::Order { shift: 0 }, slab);
+        // A frame has 255 rows at most.
+        self.row = self.strip.first_row as u8;
+        (self.column, self.n_tiles, self.n_listed, self.alive) = (0, 0, 0, 0);
+    }
+
+    /// Draws more of the slab's splats into the next tile, and finishes it if they are the strip's last.
+    fn draw_tile(&mut self, watch: &mut impl Stopwatch) -> Option<Step> {
         let [width_px, height_px] = self.size_px;
         let decoder = &mut *self.decoder;
         let SplatStore { splats, rects, n, order, spare, .. } = &mut decoder.splats;
         let n = *n as usize;
         let (splats, rects) = (splats.get(..n)?, rects.get(..n)?);
-        if self.column == 0 {
+        if self.column == 0 && self.n_listed == 0 {
             watch.enter(Stage::Sort);
             self.n_in_row = gather_row(order.get(..n)?, rects, self.row, spare.get_mut(..n)?);
         }
@@ -256,29 +386,39 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
         // One after the other, or all at once.
         let slot = if decoder.plan.shape().frame.canvas_tiles > 1 { self.n_tiles } else { 0 };
         let pixels = decoder.pixels.chunks_exact_mut(TILE_PIXELS).nth(slot)?;
-        if self.slab.from == 0.0 {
+        if self.slab.from == 0.0 && self.n_listed == 0 {
             pixels.fill(EMPTY);
         }
-        let list = spare.get(..self.n_in_row)?;
+        let list = spare.get(self.n_listed..self.n_in_row)?;
         let work = blend_tile::<A::Functions>(place, splats, rects, list, &self.rule, pixels);
-        self.alive += work.alive;
         let report = &mut self.frame.report;
         report.tile_splats = report.tile_splats.saturating_add(work.splats);
         report.row_splats = report.row_splats.saturating_add(work.rows);
         report.pixel_splats = report.pixel_splats.saturating_add(work.pixels);
-        if !self.slab.ends() {
-            let header = decoder.bundle.header();
-            let has_background = header.features.effects.background;
-            let background = has_background.then(|| header.background.map(|byte| f32::from(byte) / 255.0));
-            finish_tile(place, pixels, background, decoder.rgb);
+        if work.listed < list.len() {
+            self.n_listed += work.listed;
+            return Some(Step::Working);
         }
+        self.alive += work.alive;
+        self.n_listed = 0;
         self.n_tiles += 1;
         self.column += 1;
         if u16::from(self.column) >= width_px.div_ceil(TILE_PX) {
             self.column = 0;
             self.row += 1;
+            if u16::from(self.row) >= self.strip.end_row {
+                self.next = Next::Slab;
+            }
         }
-        Some(place)
+        if self.slab.ends() {
+            return Some(Step::Working);
+        }
+        let header = decoder.bundle.header();
+        let has_background = header.features.effects.background;
+        let background = has_background.then(|| header.background.map(|byte| f32::from(byte) / 255.0));
+        finish_tile(place, pixels, background, decoder.rgb);
+        watch.enter(Stage::Output);
+        Some(Step::Tile(place))
     }
 }
 
@@ -289,6 +429,12 @@ impl<A: Arithmetic> fmt::Debug for Drawing<'_, '_, '_, A> {
             .field("report", &self.report())
             .finish_non_exhaustive()
     }
+}
+
+/// Thousands of model instructions.
+fn kilo(instructions: u64) -> u32 {
+    // A division of 64 bits would link a kilobyte of text.
+    u32::try_from(instructions >> 10).unwrap_or(u32::MAX)
 }
 
 /// Size of a tile along an axis, pixels.

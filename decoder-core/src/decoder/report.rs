@@ -1,6 +1,13 @@
 //! What a frame took.
 
+use pocketsplat_format::bundle::ModelCost;
+
 use crate::budget::Work;
+
+/// Model instructions of an anchor that is read from memory, in place of those of one that is decoded.
+const FROM_MEMORY: u32 = 1100;
+/// Those of a row of pixels of a tile that a splat reaches: a pair counts with 16.
+const ROW: u32 = ModelCost::PAIR.div_ceil(16);
 
 /// What a frame consisted of and what it cost.
 ///
@@ -61,5 +68,24 @@ impl FrameReport {
             decoded_anchors: self.anchors_decoded.into(),
             pixel_splats: self.pixel_splats.into(),
         }
+    }
+
+    /// What it took in [model instructions](pocketsplat_format::bundle::levels): those of section 5 of `MANIFEST.md`, with the frame's own
+    /// counts in place of the most of all views, rows of pixels in place of pairs with all 16, Gaussians before they are projected in
+    /// place of splats, 1,100 for an anchor that waits in memory, and without what lists and pixels take of every frame.
+    // Not inlined: it has several callers.
+    #[inline(never)]
+    #[must_use]
+    pub fn instructions(&self, cost: ModelCost) -> u64 {
+        let from_memory = self.anchors_read.saturating_sub(self.anchors_decoded);
+        let of = |n: u32, each: u32| u64::from(n) * u64::from(each);
+        // A cost is below 2²⁰, so that no sum comes near the end of 64 bits.
+        of(self.anchors_decoded, cost.decoded)
+            + of(from_memory, FROM_MEMORY)
+            + of(self.anchors_visible, ModelCost::VISIBLE)
+            + of(self.gaussians, ModelCost::GAUSSIAN)
+            + of(self.row_splats, ROW)
+            + of(self.pixel_splats, ModelCost::PIXEL)
+            + self.head_macs.saturating_mul(ModelCost::HEAD_MAC.into()).min(1 << 62)
     }
 }

@@ -1,6 +1,8 @@
 //! Where a frame's Gaussians come from: anchors decoded again or kept in memory, or Gaussians kept in memory.
 
-use pocketsplat_format::bundle::{AnchorModels, AnchorRecords, AnchorSite, Chunk};
+use core::ops::Range;
+
+use pocketsplat_format::bundle::{AnchorModels, AnchorRecords, AnchorSite, Chunk, SuspendedReader};
 use pocketsplat_format::{DecodeError, Stage, Stopwatch};
 
 use crate::bake::BakedGaussians;
@@ -45,39 +47,52 @@ impl<'b> AnchorSource<'b, '_> {
         matches!(self, Self::Resident(_))
     }
 
-    /// Calls `each` with the number in the file, the site and the values of each anchor of `chunk`, in order.
+    /// What reads the anchors of a chunk; `None` where they wait in memory.
+    pub(super) fn open(&mut self, chunk: &Chunk<'b>) -> Option<SuspendedReader<'b>> {
+        match self {
+            Self::Streamed(models) => Some(chunk.anchors(models).suspend()),
+            Self::Resident(_) => None,
+        }
+    }
+
+    /// Calls `each` with the number in the file, the site and the values of the next anchors of a chunk, until it returns false;
+    /// returns whether the chunk is at its end.
     ///
-    /// * `first`: the number of the chunk's first anchor. * `row`: `[n_channels]`.
+    /// * `numbers`: of the anchors to come. * `reader`: that of [`open`](Self::open). * `row`: `[n_channels]`.
     ///
     /// # Errors
     /// [`DecodeError::ChunkStream`] after the last anchor when they were not sound; never when resident.
-    pub(super) fn for_each<W: Stopwatch>(
+    pub(super) fn go_on<W: Stopwatch>(
         &mut self,
-        chunk: &Chunk<'b>,
-        first: u32,
+        numbers: &mut Range<u32>,
+        reader: &mut Option<SuspendedReader<'b>>,
         row: &mut [f32],
         watch: &mut W,
-        mut each: impl FnMut(u32, AnchorSite, &[f32], &mut W) -> Result<(), DecodeError>,
-    ) -> Result<(), DecodeError> {
-        let numbers = (first..).take(chunk.n_anchors().into());
+        mut each: impl FnMut(u32, AnchorSite, &[f32], &mut W) -> Result<bool, DecodeError>,
+    ) -> Result<bool, DecodeError> {
         match self {
             Self::Streamed(models) => {
-                let mut anchors = chunk.anchors(models);
+                let mut anchors = reader.take().ok_or(DecodeError::Internal)?.resume(models);
                 for number in numbers {
                     watch.enter(Stage::Decode);
                     let site = anchors.site();
                     anchors.values_watched(row, watch);
-                    each(number, site, row, watch)?;
+                    if !each(number, site, row, watch)? {
+                        *reader = Some(anchors.suspend());
+                        return Ok(false);
+                    }
                 }
-                anchors.finish()
+                anchors.finish().map(|()| true)
             }
             Self::Resident(records) => {
                 for number in numbers {
                     watch.enter(Stage::Decode);
                     let site = records.read(number, row).ok_or(DecodeError::Internal)?;
-                    each(number, site, row, watch)?;
+                    if !each(number, site, row, watch)? {
+                        return Ok(false);
+                    }
                 }
-                Ok(())
+                Ok(true)
             }
         }
     }

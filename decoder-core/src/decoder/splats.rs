@@ -7,7 +7,7 @@ use pocketsplat_format::saturate;
 use super::slab_index::{ChunkExtent, DepthCounts};
 use super::strip::Strip;
 use crate::project::{PackedSplat, Splat, TileRect};
-use crate::raster::sort_by_depth;
+use crate::raster::{DIGITS, order_by_digit};
 
 /// The splats of the current strip, or of a slab of its depth, in the order of the file.
 pub(super) struct SplatStore<'s> {
@@ -140,14 +140,12 @@ impl SplatStore<'_> {
         self.push(splat, rect);
     }
 
-    /// Puts the indices of the splats into `order`, nearest first.
-    pub(super) fn sort(&mut self) {
+    /// Puts the indices of the splats into the `order` of one of the [`DIGITS`] of their depths; after the last the nearest is first.
+    pub(super) fn order_by(&mut self, shift: u32) {
         let n = self.n as usize;
         let (Some(splats), Some(order)) = (self.splats.get(..n), self.order.get_mut(..n)) else { return };
         let Some(spare) = self.spare.get_mut(..n) else { return };
-        let before = order.as_ptr();
-        let (sorted, _) = sort_by_depth(splats, order, spare, self.counts);
-        if sorted.as_ptr() != before {
+        if order_by_digit(splats, order, spare, self.counts, shift) {
             core::mem::swap(&mut self.order, &mut self.spare);
         }
     }
@@ -156,10 +154,9 @@ impl SplatStore<'_> {
     // Not inlined, here and below: rare, in the middle of a loop that is not.
     #[inline(never)]
     fn earlier_end(&mut self, depth: f32) -> Option<f32> {
+        DIGITS.into_iter().for_each(|shift| self.order_by(shift));
         let n = self.n as usize;
-        let splats = self.splats.get(..n)?;
-        let (order, spare) = (self.order.get_mut(..n)?, self.spare.get_mut(..n)?);
-        let (order, _) = sort_by_depth(splats, order, spare, self.counts);
+        let (splats, order) = (self.splats.get(..n)?, self.order.get(..n)?);
         let depth_of = |index: &u32| splats.get(*index as usize).map_or(0.0, PackedSplat::depth);
         let nearest = order.first().map_or(depth, depth_of);
         let nearest = if depth < nearest { depth } else { nearest };

@@ -7,7 +7,7 @@ use std::vec::Vec;
 use pocketsplat_format::{Bundle, Camera, DecodeError, ErrorClass, Field, Rotation};
 
 use super::render_error::RenderError;
-use super::{ByteOrder, Decoder, PixelFormat, Rounding, Tile, TileRow, TileSink};
+use super::{ByteOrder, Decoder, PixelFormat, Progress, Rounding, Tile, TileRow, TileSink};
 use crate::budget::{Budget, MaxSplats, Overflow, Plan, Residency, Strips};
 
 const EXAMPLE: &[u8] = include_bytes!("../../examples/example.psb");
@@ -224,6 +224,96 @@ fn a_buffer_too_short_for_a_row_of_tiles_is_refused_and_the_row_comes_later() {
         }
         assert_eq!(drawing.next_tile_row(format, &mut []), Ok(None), "after the last row no buffer is needed");
     }
+}
+
+/// At each of its calls a frame that advances may be asked for whole rows instead, and nothing is handed out twice or left out.
+#[test]
+fn rows_go_on_where_small_steps_came_to() {
+    let bundle = example();
+    let (width, height) = (100_u16, 75_u16);
+    let camera = bundle.header().preview.resized(width, height);
+    let frame = Budget::for_frame(width, height);
+    let in_slabs = frame.with_max_splats(MaxSplats::AtMost(3)).with_overflow(Overflow::Slabs);
+    for budget in [frame, frame.with_strips(Strips::Exactly(8)), in_slabs, in_slabs.with_strips(Strips::Exactly(2))] {
+        let plan = Plan::new(&bundle, &budget).expect("a plan");
+        let mut scratch = vec![0; plan.scratch_len()];
+        let mut decoder = Decoder::bind(&bundle, plan, &mut scratch).expect("planned memory");
+        let mut expected = Tiles::default();
+        let report = decoder.render(&camera, &mut expected).expect("drawn");
+        let mut n_steps = 0;
+        loop {
+            let mut drawing = decoder.begin(&camera).expect("a sound camera");
+            let mut found = Tiles::default();
+            let mut is_complete = false;
+            for _ in 0..n_steps {
+                match drawing.advance().expect("drawn") {
+                    Progress::Working => {}
+                    Progress::Tile(tile) => found.tile(tile).expect("infallible"),
+                    Progress::Complete => is_complete = true,
+                }
+            }
+            let n_tiles = found.0.len();
+            assert_eq!(found.0, expected.0[..n_tiles], "{budget:?}: {n_steps} steps");
+            let mut next = n_tiles;
+            let mut buffer = vec![0; 16 * usize::from(width) * 3];
+            while let Some(row) = drawing.next_tile_row(PixelFormat::Rgb888, &mut buffer).expect("drawn") {
+                let ([x_px, y_px, ..], _) = expected.0[next];
+                assert_eq!([row.x_px, row.y_px], [x_px, y_px], "{budget:?}: {n_steps} steps");
+                next += usize::from(row.width.div_ceil(16));
+            }
+            assert!(drawing.next_tile().expect("drawn").is_none(), "the rows are the frame");
+            assert_eq!((next, drawing.report()), (expected.0.len(), report), "{budget:?}: {n_steps} steps");
+            if is_complete {
+                break;
+            }
+            n_steps += 1;
+        }
+        assert!(n_steps > 2 * expected.0.len() / 3, "{budget:?}: {n_steps} steps are small ones");
+    }
+}
+
+#[test]
+fn a_frame_that_takes_more_than_its_work_ends_and_the_next_does_not_mind() {
+    let bundle = example();
+    let preview = bundle.header().preview;
+    let needed = {
+        let plan = Plan::new(&bundle, &Budget::for_frame(32, 24)).expect("a plan");
+        let mut scratch = vec![0; plan.scratch_len()];
+        let report = Decoder::bind(&bundle, plan, &mut scratch).expect("bound").render(&preview, &mut Tally::default());
+        report.expect("drawn").instructions(bundle.model_cost())
+    };
+    let drawn = |most_work| draw_all(&Budget::for_frame(32, 24).with_most_work(most_work));
+    assert_eq!(drawn(needed), Ok(32 * 24), "exactly so much");
+    for most_work in [0, 1, needed / 2, needed - 1] {
+        let error = drawn(most_work).expect_err("too little");
+        let limit = (most_work >> 10) as u32;
+        assert!(matches!(error, DecodeError::TooMuchWork { limit: found, .. } if found == limit), "{error}");
+        assert_eq!(error.class(), ErrorClass::OverBudget);
+    }
+}
+
+/// Pixels of a frame of the example, twice where it fails.
+fn draw_all(budget: &Budget) -> Result<usize, DecodeError> {
+    let bundle = example();
+    let plan = Plan::new(&bundle, budget).expect("a plan");
+    let mut scratch = vec![0; plan.scratch_len()];
+    let mut decoder = Decoder::bind(&bundle, plan, &mut scratch).expect("planned memory");
+    let mut frame = || {
+        let mut drawing = decoder.begin(&bundle.header().preview).expect("a sound camera");
+        let mut n_pixels = 0;
+        let end = loop {
+            match drawing.next_tile() {
+                Ok(Some(tile)) => n_pixels += tile.rgb.len(),
+                Ok(None) => break Ok(n_pixels),
+                Err(error) => break Err(error),
+            }
+        };
+        assert!(drawing.next_tile().is_ok_and(|tile| tile.is_none()), "nothing comes after the end");
+        end
+    };
+    let first = frame();
+    assert_eq!(frame(), first, "frames do not depend on those before");
+    first
 }
 
 #[test]

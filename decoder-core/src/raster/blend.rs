@@ -54,15 +54,20 @@ pub(crate) struct TileWork {
     pub(crate) pixels: u32,
     /// Pixels that are not finished.
     pub(crate) alive: u32,
+    /// Entries of the list that it has seen to; all when no pixel is left.
+    pub(crate) listed: usize,
 }
 
-/// Draws the splats of `list`, in its order, behind what is in a tile.
+/// Splats that one call blends at most.
+const SPLATS_OF_STEP: u32 = 64;
+
+/// Draws the first splats of `list` that lie in a tile, in its order, behind what is in it.
 ///
 /// * `list`: indices into `splats` and `rects`, nearest first; entries beside the tile's columns are skipped.
 /// * `pixels`: `[TILE_PIXELS]`, [`EMPTY`] at first.
 ///
 /// # Budget
-/// Per splat and row of pixels two exponentials, per pixel two multiplications and the blend.
+/// Per splat and row of pixels two exponentials, per pixel two multiplications and the blend; at most [`SPLATS_OF_STEP`] splats.
 pub(crate) fn blend_tile<F: Functions>(
     place: TileRegion,
     splats: &[PackedSplat],
@@ -76,10 +81,9 @@ pub(crate) fn blend_tile<F: Functions>(
     let mut alive = in_tile.filter(|[.., transmittance]| *transmittance > 0.0).count() as u32;
     let mut work = TileWork::default();
     let at = [place.column, place.row].map(|index| f32::from(u16::from(index) * TILE_PX));
-    for &index in list {
-        if alive == 0 {
-            break;
-        }
+    let mut entries = list.iter();
+    while alive > 0 && work.splats < SPLATS_OF_STEP {
+        let Some(&index) = entries.next() else { break };
         let (Some(rect), Some(splat)) = (rects.get(index as usize), splats.get(index as usize)) else { continue };
         if place.column < rect.first_column || place.column > rect.last_column {
             continue;
@@ -89,7 +93,8 @@ pub(crate) fn blend_tile<F: Functions>(
         work.rows += rows;
         work.pixels = work.pixels.saturating_add(evaluated);
     }
-    TileWork { alive, ..work }
+    let listed = if alive > 0 { list.len() - entries.len() } else { list.len() };
+    TileWork { alive, listed, ..work }
 }
 
 /// Puts the background behind a tile, if there is one, and rounds to bytes, `[height, width]` row by row.

@@ -5,55 +5,56 @@ use crate::project::PackedSplat;
 /// Values of one digit.
 pub(crate) const N_RADIX: usize = 256;
 
-/// Fills `order` with the indices of `splats`, nearest first; equal depths keep their order.
+/// Shifts of the digits, the least significant first.
+pub(crate) const DIGITS: [u32; 4] = [0, 8, 16, 24];
+
+/// Puts the indices of `splats` into the order of one digit of their depths, those of equal digits as they were; returns whether the
+/// result is in `spare`, and not in `order`. After all [`DIGITS`], with the slices in their new roles, the nearest splat is first: a
+/// positive float's bits ascend with its value.
 ///
-/// Least significant digit first over the bits of the depths: a positive float's bits ascend with its value. A digit
-/// that all depths share costs no pass.
-///
-/// * `order`, `spare`: one entry a splat; the result may end in either, so the slices come back in their new roles.
-/// * `counts`: [`N_RADIX`] entries.
+/// * `order`, `spare`: one entry a splat; at the first digit `order` needs no content. * `counts`: [`N_RADIX`] entries.
 ///
 /// # Budget
-/// At most eight passes over the splats.
+/// Two passes over the splats; one where all share the digit.
 // Not inlined: it has two callers.
 #[inline(never)]
-pub(crate) fn sort_by_depth<'o>(
+pub(crate) fn order_by_digit(
     splats: &[PackedSplat],
-    mut order: &'o mut [u32],
-    mut spare: &'o mut [u32],
+    order: &mut [u32],
+    spare: &mut [u32],
     counts: &mut [u32],
-) -> (&'o mut [u32], &'o mut [u32]) {
-    for (index, slot) in (0..).zip(order.iter_mut()) {
-        *slot = index;
+    shift: u32,
+) -> bool {
+    if shift == 0 {
+        for (index, slot) in (0..).zip(order.iter_mut()) {
+            *slot = index;
+        }
     }
-    let digit_of = |index: u32, shift: u32| {
+    let digit_of = |index: u32| {
         let bits = splats.get(index as usize).map_or(0, |splat| splat.depth().to_bits());
         ((bits >> shift) & 0xFF) as usize
     };
-    for shift in [0, 8, 16, 24] {
-        counts.fill(0);
-        for splat in splats {
-            if let Some(count) = counts.get_mut(((splat.depth().to_bits() >> shift) & 0xFF) as usize) {
-                *count += 1;
-            }
+    counts.fill(0);
+    for splat in splats {
+        if let Some(count) = counts.get_mut(((splat.depth().to_bits() >> shift) & 0xFF) as usize) {
+            *count += 1;
         }
-        if counts.iter().any(|&count| count as usize == splats.len()) {
-            continue;
-        }
-        let mut start = 0;
-        for count in counts.iter_mut() {
-            start += core::mem::replace(count, start);
-        }
-        for &index in order.iter() {
-            let Some(start) = counts.get_mut(digit_of(index, shift)) else { continue };
-            if let Some(slot) = spare.get_mut(*start as usize) {
-                *slot = index;
-            }
-            *start += 1;
-        }
-        core::mem::swap(&mut order, &mut spare);
     }
-    (order, spare)
+    if counts.iter().any(|&count| count as usize == splats.len()) {
+        return false;
+    }
+    let mut start = 0;
+    for count in counts.iter_mut() {
+        start += core::mem::replace(count, start);
+    }
+    for &index in order.iter() {
+        let Some(start) = counts.get_mut(digit_of(index)) else { continue };
+        if let Some(slot) = spare.get_mut(*start as usize) {
+            *slot = index;
+        }
+        *start += 1;
+    }
+    true
 }
 
 #[cfg(test)]
@@ -62,7 +63,7 @@ mod tests {
 
     use bytemuck::Zeroable;
 
-    use super::{N_RADIX, sort_by_depth};
+    use super::{DIGITS, N_RADIX, order_by_digit};
     use crate::project::{PackedSplat, Splat};
 
     #[test]
@@ -75,10 +76,15 @@ mod tests {
             })
             .collect();
         let (mut a, mut b) = ([0; 1000], [0; 1000]);
-        let (order, _) = sort_by_depth(&splats, &mut a, &mut b, &mut [0; N_RADIX]);
+        let (mut order, mut spare) = (&mut a, &mut b);
+        for shift in DIGITS {
+            if order_by_digit(&splats, order, spare, &mut [0; N_RADIX], shift) {
+                std::mem::swap(&mut order, &mut spare);
+            }
+        }
         // The standard library's sort is stable.
         let mut expected: Vec<u32> = (0..1000).collect();
         expected.sort_by(|&i, &j| splats[i as usize].depth().total_cmp(&splats[j as usize].depth()));
-        assert_eq!(order, expected);
+        assert_eq!(order[..], expected);
     }
 }

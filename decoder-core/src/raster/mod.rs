@@ -6,4 +6,4 @@ mod blend;
 mod depth;
 
 pub(crate) use blend::{BlendRule, EMPTY, Pixel, TileRegion, blend_tile, finish_tile};
-pub(crate) use depth::{N_RADIX, sort_by_depth};
+pub(crate) use depth::{DIGITS, N_RADIX, order_by_digit};

@@ -42,10 +42,17 @@ pub struct AnchorModels<'b, 's> {
 #[derive(Debug)]
 #[must_use = "only `finish` tells whether the anchors were sound"]
 pub struct AnchorReader<'b, 's, 'm> {
+    at: SuspendedReader<'b>,
+    models: &'m mut AnchorModels<'b, 's>,
+}
+
+/// Where in a chunk an [`AnchorReader`] is, between two anchors; it borrows no models.
+#[derive(Clone, Copy, Debug)]
+#[must_use = "only `AnchorReader::finish` tells whether the anchors were sound"]
+pub struct SuspendedReader<'b> {
     chunk: u32,
     codes: TrieReader<'b>,
     symbols: AnsReader<'b>,
-    models: &'m mut AnchorModels<'b, 's>,
     code: u64,
     /// No channels were read yet.
     is_first: bool,
@@ -144,31 +151,36 @@ impl AnchorModels<'_, '_> {
 
 impl<'b, 's, 'm> AnchorReader<'b, 's, 'm> {
     pub(super) fn new(chunk: u32, words: &'b [[u8; 2]], models: &'m mut AnchorModels<'b, 's>) -> Self {
-        let codes = models.lattice.trie.codes();
-        Self {
+        let at = SuspendedReader {
             chunk,
-            codes,
+            codes: models.lattice.trie.codes(),
             symbols: AnsReader::new(words),
-            models,
             code: 0,
             is_first: true,
             site: AnchorSite::default(),
-        }
+        };
+        Self { at, models }
+    }
+
+    /// Lets go of the models between two anchors.
+    pub fn suspend(self) -> SuspendedReader<'b> {
+        self.at
     }
 
     /// Where the next anchor stands; one call an anchor, before its channels.
     // Not inlined: it has several callers, and an anchor's channels take a hundred times as long as a call.
     #[inline(never)]
     pub fn site(&mut self) -> AnchorSite {
-        self.code = self.codes.next(&mut self.symbols);
-        let lattice = self.models.lattice.cell(self.code);
+        let SuspendedReader { codes, symbols, code, site, .. } = &mut self.at;
+        *code = codes.next(symbols);
+        let lattice = self.models.lattice.cell(*code);
         let mask = match &self.models.masks {
-            Some(masks) => masks.mask(&mut self.symbols),
+            Some(masks) => masks.mask(symbols),
             // There are 1 to 32 offsets.
             None => u32::MAX.wrapping_shr(u32::BITS.wrapping_sub(self.models.n_offsets.into())),
         };
-        self.site = AnchorSite { lattice, mask };
-        self.site
+        *site = AnchorSite { lattice, mask };
+        *site
     }
 
     /// The anchor's symbols, one a channel; one call of this or of [`values`](Self::values) an anchor.
@@ -187,14 +199,14 @@ impl<'b, 's, 'm> AnchorReader<'b, 's, 'm> {
     }
 
     fn read(&mut self, row: &mut [impl Channel], watch: &mut impl Stopwatch) {
-        let is_first = core::mem::take(&mut self.is_first);
+        let SuspendedReader { symbols, is_first, site, .. } = &mut self.at;
         let n_scalars = self.models.n_scalars.into();
-        self.symbols = self.models.channels.read(self.site, n_scalars, is_first, self.symbols, row, watch);
+        *symbols = self.models.channels.read(*site, n_scalars, core::mem::take(is_first), *symbols, row, watch);
     }
 
     /// The code of the cell that [`site`](Self::site) came to.
     pub(crate) fn code(&self) -> u64 {
-        self.code
+        self.at.code
     }
 
     /// The exponents of the quantisation steps of the anchor whose channels were read last, as [`Steps::to_bits`] has
@@ -211,11 +223,20 @@ impl<'b, 's, 'm> AnchorReader<'b, 's, 'm> {
     /// [`DecodeError::ChunkStream`] when anchors are missing or too many, their symbols do not end where the bytes end, or one is
     /// beyond the header's bits.
     pub fn finish(self) -> Result<(), DecodeError> {
-        let chunk = self.chunk;
-        match self.symbols.finish() {
-            Ok(()) if self.codes.is_complete() => Ok(()),
+        let SuspendedReader { chunk, codes, symbols, .. } = self.at;
+        match symbols.finish() {
+            Ok(()) if codes.is_complete() => Ok(()),
             Ok(()) => Err(DecodeError::ChunkStream { chunk, left_bytes: 0 }),
             Err(left) => Err(DecodeError::ChunkStream { chunk, left_bytes: saturate(left) }),
         }
+    }
+}
+
+impl<'b> SuspendedReader<'b> {
+    /// Goes on where the reader was.
+    ///
+    /// * `models`: those it had, which read nothing else since; with others the anchors have no meaning.
+    pub fn resume<'m, 's>(self, models: &'m mut AnchorModels<'b, 's>) -> AnchorReader<'b, 's, 'm> {
+        AnchorReader { at: self, models }
     }
 }

@@ -18,8 +18,9 @@ pub struct Chunk<'a> {
     words: &'a [[u8; 2]],
 }
 
-/// The chunks of a file, one after the other.
-pub(super) struct Chunks<'a> {
+/// The chunks of a file, one after the other; made by [`Bundle::chunks`](super::Bundle::chunks).
+#[derive(Clone, Debug)]
+pub struct Chunks<'a> {
     pub(super) directory: Directory<'a>,
     /// The chunks section.
     pub(super) chunks: &'a [u8],

@@ -29,13 +29,16 @@ mod heads;
 mod lattice;
 mod manifest;
 mod masks;
+mod model_cost;
 mod section;
 mod sections;
 mod tables;
 
 pub use crate::bytes::crc32;
-pub use anchor::{AnchorModels, AnchorReader, AnchorRecords, AnchorSite, RecordLayout, RecordMemory, model_words};
-pub use chunk::Chunk;
+pub use anchor::{
+    AnchorModels, AnchorReader, AnchorRecords, AnchorSite, RecordLayout, RecordMemory, SuspendedReader, model_words,
+};
+pub use chunk::{Chunk, Chunks};
 pub use cut::cut_after;
 pub use directory::{CHUNK_RECORD_LEN, ChunkRecord, Directory, INK_FRAME_LEN, InkFrame, TIER_RECORD_LEN, Tier};
 pub use features::{Effects, Features};
@@ -46,6 +49,7 @@ pub use header::{
 pub use heads::{CodedHeads, Halves, HeadView, HeadsView, LayerWeights, WeightReader};
 pub use lattice::{Lattice, MAX_LATTICE_BITS, MAX_LATTICE_MIN};
 pub use manifest::{MANIFEST_RECORD_LEN, MAX_LEVEL, STRIPS, TierMeasures};
+pub use model_cost::ModelCost;
 pub use section::{ALIGNMENT, PROTOCOL_CODE, SECTION_LEN, Section};
 pub use sections::SectionBytes;
 pub use tables::{FrequencyTable, Tables};
@@ -53,7 +57,6 @@ pub use tables::{FrequencyTable, Tables};
 use crate::context::Context;
 use crate::entropy::MaskModel;
 use crate::error::{DecodeError, SectionKind, saturate};
-use chunk::Chunks;
 use gaussians::GaussianCounts;
 
 /// Where the models of the channels come from.
@@ -280,7 +283,7 @@ impl<'a> Bundle<'a> {
     }
 
     /// All chunks in the file, in order.
-    pub fn chunks(&self) -> impl Iterator<Item = Chunk<'a>> + use<'a> {
+    pub fn chunks(&self) -> Chunks<'a> {
         Chunks { directory: self.directory, chunks: self.chunks, numbers: 0..self.n_chunks(), offset: 0 }
     }
 

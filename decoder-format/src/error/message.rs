@@ -91,6 +91,11 @@ impl fmt::Display for DecodeError {
                 f,
                 "the plan ({planned} bytes) was made for another bundle; this one needs {needed}, plan with it"
             ),
+            Self::TooMuchWork { needed_so_far, limit } => write!(
+                f,
+                "the frame took {needed_so_far} · 1024 model instructions and is not complete, the budget has {limit} · 1024: allow more \
+                 work, or draw fewer tiers or a smaller frame"
+            ),
             Self::BufferTooShort { field, needed, available } => {
                 write!(f, "{field} holds {available} elements, {needed} are needed")
             }

@@ -15,7 +15,7 @@ pub enum ErrorClass {
     Malformed,
     /// A sound bundle that needs a newer or a fuller decoder.
     Unsupported,
-    /// The bundle is fine and the memory planned is not enough.
+    /// The memory or the work planned is not enough for the bundle.
     OverBudget,
     /// The call was wrong: an argument lies outside its limits.
     Misuse,
@@ -194,6 +194,13 @@ pub enum DecodeError {
         /// Bytes in the plan.
         planned: u32,
     },
+    /// A frame took more than its budget of work.
+    TooMuchWork {
+        /// What it took when it ended, 1,024 model instructions.
+        needed_so_far: u32,
+        /// The budget's, 1,024 model instructions.
+        limit: u32,
+    },
     /// A buffer passed to a decoding function is too short.
     BufferTooShort {
         /// Which.
@@ -223,9 +230,10 @@ impl DecodeError {
             Self::UnsupportedVersion { .. } | Self::UnsupportedFeatures { .. } | Self::NotBuilt { .. } => {
                 ErrorClass::Unsupported
             }
-            Self::PlanTooLarge { .. } | Self::ScratchTooSmall { .. } | Self::BudgetTooSmall { .. } => {
-                ErrorClass::OverBudget
-            }
+            Self::PlanTooLarge { .. }
+            | Self::ScratchTooSmall { .. }
+            | Self::BudgetTooSmall { .. }
+            | Self::TooMuchWork { .. } => ErrorClass::OverBudget,
             Self::NoSuchChunk { .. } | Self::PlanMismatch { .. } | Self::NotBakeable | Self::BufferTooShort { .. } => {
                 ErrorClass::Misuse
             }

@@ -5,9 +5,7 @@
 use std::fmt;
 
 use pocketsplat_core::{Budget, Bundle, Plan, Residency, Strips};
-use pocketsplat_format::bundle::{Features, STRIPS, TierMeasures};
-
-use crate::context::ContextShape;
+use pocketsplat_format::bundle::{Features, ModelCost, STRIPS, TierMeasures};
 
 /// A set of decoder tools.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -188,14 +186,9 @@ fn head_macs(measures: &TierMeasures) -> u64 {
     1024 * u64::from(measures.max_head_kilo_macs)
 }
 
-/// Model instructions of a frame in `n_strips` strips: costs of the decoder on a Cortex-M4 when version 4 of the format was made,
-/// rounded up. They belong to the format, and do not follow `costs.csv`.
+/// Model instructions of a frame in `n_strips` strips.
 fn instructions(bundle: &Bundle<'_>, measures: &TierMeasures, n_strips: u8) -> u64 {
     let [width_px, height_px] = bundle.header().training_px.map(u64::from);
-    let channels = bundle.header().n_channels() as u64;
-    let coding = ContextShape::of(bundle.coder()).map_or(8 * channels, |context| {
-        45 * channels + 83 * context.corners + 44 * context.units(1, channels) + 4 * context.macs(1, channels)
-    });
     let [decoded, visible, splats, pairs, kilo_pixels] = [
         measures.max_decoded_anchors,
         measures.max_visible_anchors,
@@ -208,9 +201,15 @@ fn instructions(bundle: &Bundle<'_>, measures: &TierMeasures, n_strips: u8) -> u
     let strip_splats = u64::from(strip_splats.map_or(0, |(_, splats)| splats));
     let n_strips = u64::from(n_strips);
     let tile_rows = height_px.div_ceil(16).div_ceil(n_strips);
-    let anchors = decoded * (3330 + coding) + visible * 580 + head_macs(measures) * 3 + splats * 1560;
+    let of = |n: u64, each: u32| n * u64::from(each);
+    let anchors = of(decoded, bundle.model_cost().decoded)
+        + of(visible, ModelCost::VISIBLE)
+        + of(head_macs(measures), ModelCost::HEAD_MAC)
+        + of(splats, ModelCost::GAUSSIAN);
     let sorting = strip_splats * (125 + 17 * tile_rows);
-    let blending = pairs * 1511 + 1024 * kilo_pixels * 34 + width_px * height_px * 93;
+    let blending = of(pairs, ModelCost::PAIR)
+        + of(1024 * kilo_pixels, ModelCost::PIXEL)
+        + of(width_px * height_px, ModelCost::FRAME_PIXEL);
     n_strips * (anchors + sorting) + blending
 }
 

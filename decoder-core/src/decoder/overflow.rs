@@ -1,0 +1,108 @@
+//! What a frame does where there may not be places for all of its splats.
+
+use pocketsplat_format::bundle::{Chunk, ModelCost};
+
+use super::first_come::FirstCome;
+use super::slab_index::IndexState;
+use super::source::{AnchorSource, Anchors, GaussianSource};
+use super::strip::{Strip, StripLayout};
+use super::strips_of_chunks::StripsOfChunks;
+use super::{Decoder, FrameReport};
+use crate::arithmetic::Arithmetic;
+use crate::project::{Band, View};
+
+/// The current frame.
+pub(super) struct Frame {
+    pub(super) view: View,
+    pub(super) strips: StripLayout,
+    pub(super) policy: OverflowPolicy,
+    pub(super) report: FrameReport,
+    /// What the scene is worth in model instructions.
+    pub(super) cost: ModelCost,
+    /// Model instructions of damaged chunks, which the report does not have.
+    pub(super) in_vain: u64,
+}
+
+/// Which splats are drawn where there may not be places for all.
+#[expect(clippy::large_enum_variant, reason = "a frame has one, and there is no allocator to box with")]
+pub(super) enum OverflowPolicy {
+    /// All: each strip surely has places enough.
+    Fits,
+    /// Those that have a place in every strip; the first strip goes over the whole scene to find out which, and which strips its chunks
+    /// lie in.
+    FirstCome { first_come: FirstCome, strips_of_chunks: StripsOfChunks },
+    /// All, in slabs of depth, as many as it takes.
+    Slabs { index: IndexState },
+}
+
+impl OverflowPolicy {
+    /// Which splats were counted and admitted so far.
+    pub(super) fn first_come(&self) -> Option<FirstCome> {
+        match self {
+            Self::FirstCome { first_come, .. } => Some(*first_come),
+            Self::Fits | Self::Slabs { .. } => None,
+        }
+    }
+}
+
+impl Frame {
+    /// Model instructions so far.
+    pub(super) fn instructions(&self) -> u64 {
+        self.report.instructions(self.cost).saturating_add(self.in_vain)
+    }
+
+    /// What the pass of a strip has to look at.
+    pub(super) fn band(&self, strip: Strip) -> Option<Band> {
+        let whole = strip.end_row - strip.first_row == self.strips.n_rows()
+            || (strip.index == 0 && matches!(self.policy, OverflowPolicy::FirstCome { .. }));
+        (!whole).then(|| self.view.band(self.strips.pixels(strip)))
+    }
+
+    /// Whether the pass of a strip needs a chunk.
+    pub(super) fn needs(&self, strip: Strip, chunk: &Chunk<'_>) -> bool {
+        self.band(strip).is_none_or(|band| band.sees_box(chunk.ink_box()))
+    }
+}
+
+impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
+    /// Whether each strip surely has a place for all of its splats: all baked Gaussians, or all offsets of all anchors, of the
+    /// chunks it sees.
+    ///
+    /// # Budget
+    /// About 100 multiplications a chunk and strip; reads the directory alone.
+    pub(super) fn surely_fits(&self, view: &View, strips: StripLayout) -> bool {
+        let n_offsets = u64::from(self.bundle.header().n_offsets);
+        strips.iter().all(|strip| {
+            let band = view.band(strips.pixels(strip));
+            let seen = self.planned_chunks().map(|(chunk, _)| chunk);
+            let seen = seen.filter(|chunk| view.sees_box(chunk.ink_box()) && band.sees_box(chunk.ink_box()));
+            let most_of = |chunk: Chunk<'_>| match &self.source {
+                GaussianSource::Baked(baked) if cfg!(feature = "baked") => baked.n_of_chunk(chunk.index()).into(),
+                _ => u64::from(chunk.n_anchors()).saturating_mul(n_offsets),
+            };
+            let most: u64 = seen.map(most_of).sum();
+            most <= self.splats.places().into()
+        })
+    }
+
+    /// Notes the damaged chunks in view, before strips are drawn in slabs, whose passes look at a chunk any number of times.
+    pub(super) fn note_damage(&self, frame: &mut Frame) {
+        let in_view =
+            self.planned_chunks().map(|(chunk, _)| chunk).filter(|chunk| frame.view.sees_box(chunk.ink_box()));
+        for chunk in in_view.filter(|chunk| !self.is_sound(chunk)) {
+            frame.report.chunks_damaged += 1;
+            frame.report.first_damaged = frame.report.first_damaged.or(Some(chunk.index()));
+        }
+    }
+
+    /// Whether a chunk is known to be undamaged, or damage is an error.
+    pub(super) fn is_sound(&self, chunk: &Chunk<'b>) -> bool {
+        match &self.source {
+            GaussianSource::Baked(baked) => !(cfg!(feature = "baked") && baked.is_damaged(chunk.index())),
+            GaussianSource::Anchors(Anchors { source: AnchorSource::Resident(records), .. }) => {
+                !records.is_damaged(chunk.index())
+            }
+            GaussianSource::Anchors(_) => !self.skips_damage() || chunk.check().is_ok(),
+        }
+    }
+}

@@ -122,7 +122,7 @@ program() { # NAME ARGUMENTS…
 
 job_fmt() {
   cargo fmt --all --check
-  (cd firmware-example && cargo fmt --check)
+  (cd firmware-example && cargo fmt --check && cd cycles && cargo fmt --check)
   (cd boards && cargo fmt --all --check)
   (cd tests/link-gate && cargo fmt --check)
   (cd tests/digest && cargo fmt --check)
@@ -486,11 +486,19 @@ measure_firmware() { # CSV
     options=(--release --locked --bin steps --target-dir "$embedded")
     cargo build -q "${options[@]}"
     ./qemu.sh "$embedded/$embedded_target/release/steps" || fail "a step of a frame takes too long"
+    cargo clippy -q "${options[@]}" -- -D warnings
     export PSB_BUNDLE=$bundle
     for out in "$embedded_target" riscv32imac-unknown-none-elf; do
       cargo clippy -q --release --locked --target "$out" --target-dir "$embedded" -- -D warnings
     done
   )
+  # A program of this machine, unlike the others there.
+  for check in "test" "clippy --all-targets"; do
+    # shellcheck disable=SC2086 # a command and its option
+    cargo $check -q --locked --manifest-path firmware-example/cycles/Cargo.toml --target-dir "$target/cycles"
+  done
+  CARGO_TARGET_DIR=$embedded firmware-example/cycles.sh "$target/firmware/sample-static.psb" 256 >"$target/firmware/cycles.csv"
+  [ "$(wc -l <"$target/firmware/cycles.csv")" = 5 ] || fail "cycles.sh counted no four frames"
 }
 
 # Firmware for real boards builds (clippy would build their large HALs once more), and a display of memory gets the pixels of `render`.

@@ -289,7 +289,7 @@ enum psb_status psb_next_tile(struct psb_decoder *decoder,
                               struct psb_report *report,
                               struct psb_message *message);
 
-// Does a small part of the frame that was begun: a few anchors, the sort of a strip, or a few splats of a tile. Between two calls the processor
+// Does a small part of the frame that was begun: a few anchors, a part of the sort of a strip, or a few splats of a tile. Between two calls the processor
 // is free, for a watchdog, USB or another task; psb_next_tile does as many at once as a tile takes.
 //
 // progress: gets what the call came to. tile: gets the tile, as psb_next_tile gives it; NULL there unless progress is PSB_PROGRESS_TILE.

@@ -2,8 +2,9 @@
 
 use core::ptr;
 use core::slice;
+use core::task::Poll;
 
-use pocketsplat_core::{ByteOrder, Drawing, PixelFormat, Progress as CoreProgress, Rounding};
+use pocketsplat_core::{ByteOrder, Drawing, PixelFormat, Rounding};
 
 use crate::camera::Camera;
 use crate::decoder::{Begun, Decoder, Report};
@@ -165,13 +166,13 @@ pub unsafe extern "C" fn psb_advance(
         // SAFETY: NULL or a bound decoder, the caller's promise.
         let Begun { drawing, format } = unsafe { Decoder::begun(decoder) }?;
         let found = match drawing.advance()? {
-            CoreProgress::Working => Progress::Working,
-            CoreProgress::Tile(tile) => {
+            Poll::Pending => Progress::Working,
+            Poll::Ready(Some(tile)) => {
                 let place = [tile.x_px, tile.y_px, tile.width, tile.height];
                 *out = Pixels::new(place, tile.into_bytes(*format));
                 Progress::Tile
             }
-            CoreProgress::Complete => {
+            Poll::Ready(None) => {
                 say_report(drawing, report);
                 Progress::Complete
             }

@@ -22,7 +22,7 @@ mod tests;
 mod tile;
 
 pub use count::{count_gaussians, count_scratch_len};
-pub use frame::{Drawing, Progress};
+pub use frame::Drawing;
 pub use pixel_format::{ByteOrder, PixelFormat, Rounding};
 pub use render_error::RenderError;
 pub use report::FrameReport;
@@ -178,9 +178,10 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
     /// [`DecodeError::OutOfRange`] for a frame larger than planned and [`DecodeError::BadFloat`] for an unusable camera.
     ///
     /// # Budget
-    /// No memory beyond the bound one, but for about 500 bytes of the drawing itself.
+    /// No memory beyond the bound one, but for the drawing itself, under 1 KiB.
     pub fn begin(&mut self, camera: &Camera) -> Result<Drawing<'_, 'b, 's, A>, DecodeError> {
-        self.begin_frame(camera)
+        let view = self.view_of(camera)?;
+        Ok(self.begin_frame(camera, view))
     }
 
     /// Whether damaged chunks are left out.

@@ -32,8 +32,8 @@ pub use budget::{
     RecordShape, Residency, Resident, ScratchShape, Strips, Work,
 };
 pub use decoder::{
-    ByteOrder, Decoder, Drawing, FrameReport, PixelFormat, Progress, RenderError, Rounding, Scratch, Tile, TileRow,
-    TileSink, count_gaussians, count_scratch_len,
+    ByteOrder, Decoder, Drawing, FrameReport, PixelFormat, RenderError, Rounding, Scratch, Tile, TileRow, TileSink,
+    count_gaussians, count_scratch_len,
 };
 #[cfg(feature = "embedded-graphics")]
 pub use display::DisplaySink;

@@ -74,7 +74,7 @@ fn by_the_document(shape: &ScratchShape) -> usize {
 
     let [n_tables, n_in, n_hidden, n_kept] =
         [coder.n_tables, coder.context_inputs, coder.context_hidden, coder.context_kept].map(usize::from);
-    let models = if n_tables > 0 { 52 * n_tables } else { (n_in + n_hidden + n_kept).div_ceil(2) };
+    let models = if n_tables > 0 { 36 * n_tables } else { (n_in + n_hidden + n_kept).div_ceil(2) };
 
     let tiles = 1024 * frame.canvas_tiles as usize + 192 + 256;
     let drawn = tiles + 10 * frame.max_splats as usize;

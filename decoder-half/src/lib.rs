@@ -20,8 +20,8 @@ pub use chosen::rows::{
     BlendConstants, Exponential, ROW_LEN, RowSplat, RowsWork, SLACK_PX, blend_rows, blend_rows_with, span, sqrt_above,
 };
 pub use chosen::symbols::{
-    ChannelTables, Entries, FREQUENCY_TOTAL, LEVELS_AT_ONCE, LevelFrequencies, MAX_ENTRIES, NODE_CONTEXTS,
-    PRECISION_BITS, STATE_MIN, Stream, TABLE_WORDS, descend, read_values,
+    ChannelTables, Entries, FREQUENCY_TOTAL, LEVELS_AT_ONCE, LevelFrequencies, NODE_CONTEXTS, PRECISION_BITS,
+    STATE_MIN, Stream, TABLE_WORDS, descend, read_values,
 };
 pub use chosen::{IN_HARDWARE, add_products, from_half, from_halves, to_half};
 pub use portable::is_finite_half;

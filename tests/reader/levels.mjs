@@ -41,7 +41,7 @@ function contextShape({ header, context }) {
 /** Scratch bytes of a streamed plan for frames of the training size in strips of at most `most` splats. */
 function scratchBytes(bundle, tier, most) {
   const shape = contextShape(bundle);
-  const models = shape ? Math.ceil((shape.inputs + shape.hidden + shape.kept) / 2) : 52 * bundle.tables.tables.length;
+  const models = shape ? Math.ceil((shape.inputs + shape.hidden + shape.kept) / 2) : 36 * bundle.tables.tables.length;
   const enough = bundle.gaussians ? bundle.gaussians[tier] : bundle.tiers[tier].nAnchors * bundle.header.K;
   const places = Math.min(Math.max(most + Math.ceil(most / 16), 2), enough);
   const tiles = 1024 + 192 + 256;

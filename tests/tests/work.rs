@@ -1,12 +1,13 @@
 //! Is the time of a frame bounded, whatever a file asks for, and does no step of one take long?
 
+use std::task::Poll;
+
 use conformance::frame::Frame;
 use conformance::pack::draft::Draft;
 use conformance::pack::heads::Widths;
 use conformance::pack::models::Anchor;
 use pocketsplat_core::{
-    Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, MaxSplats, Overflow, Plan, Progress, Residency, Strips,
-    TileSink,
+    Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, MaxSplats, Overflow, Plan, Residency, Strips, TileSink,
 };
 use pocketsplat_format::bundle::Effects;
 
@@ -29,9 +30,9 @@ fn advanced(bundle: &Bundle<'_>, budget: &Budget, camera: &Camera) -> Result<(Fr
     let (mut before, mut most) = (0, 0);
     loop {
         match drawing.advance()? {
-            Progress::Working => {}
-            Progress::Tile(tile) => frame.tile(tile).expect("infallible"),
-            Progress::Complete => break,
+            Poll::Pending => {}
+            Poll::Ready(Some(tile)) => frame.tile(tile).expect("infallible"),
+            Poll::Ready(None) => break,
         }
         let now = drawing.report().instructions(bundle.model_cost());
         // What damage took is in no report.

@@ -1,6 +1,7 @@
 //! Drawing a frame: strip after strip, slab after slab, tile after tile.
 
 use core::fmt;
+use core::task::Poll;
 
 use pocketsplat_format::rules::TILE_PX;
 use pocketsplat_format::{Camera, DecodeError, Field, Stage, Stopwatch, in_range, saturate};
@@ -68,17 +69,6 @@ pub struct Drawing<'d, 'b, 's, A: Arithmetic = ReferenceArithmetic> {
     most_in_memory: u32,
 }
 
-/// What a call of [`Drawing::advance`] came to.
-#[derive(Debug)]
-pub enum Progress<'t> {
-    /// Nothing to show yet.
-    Working,
-    /// The next tile.
-    Tile(Tile<'t>),
-    /// The frame is complete.
-    Complete,
-}
-
 /// What a frame does next.
 #[expect(clippy::large_enum_variant, reason = "a frame has one, and there is no allocator to box with")]
 enum Next<'b> {
@@ -102,13 +92,22 @@ enum Step {
 }
 
 impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
-    /// Checks the camera and prepares a frame, without drawing any of it.
-    #[inline(always)]
-    pub(super) fn begin_frame(&mut self, camera: &Camera) -> Result<Drawing<'_, 'b, 's, A>, DecodeError> {
+    /// The view of a camera that is as it has to be.
+    #[inline(never)]
+    pub(super) fn view_of(&self, camera: &Camera) -> Result<View, DecodeError> {
         let budget = self.plan.budget();
         let view = View::of(self.bundle.header(), camera)?.cutting_at(budget.quality.alpha_cut);
         in_range(Field::FrameWidth, camera.width_px.into(), 1, budget.width_px.into())?;
         in_range(Field::FrameHeight, camera.height_px.into(), 1, budget.height_px.into())?;
+        Ok(view)
+    }
+
+    /// Prepares a frame, without drawing any of it.
+    ///
+    /// * `view`: of `camera`. Checked before: a drawing in a `Result` would be on the stack twice.
+    #[inline(always)]
+    pub(super) fn begin_frame(&mut self, camera: &Camera, view: View) -> Drawing<'_, 'b, 's, A> {
+        let budget = self.plan.budget();
         let strips = StripLayout::new(camera.height_px, self.plan.n_strips());
         (self.splats.n_indexed, self.splats.places_of_index) = (0, 0);
         let policy = if budget.overflow == Overflow::Slabs {
@@ -129,7 +128,7 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
         if self.skips_damage() && matches!(frame.policy, OverflowPolicy::Slabs { .. }) {
             self.note_damage(&mut frame);
         }
-        Ok(Drawing {
+        Drawing {
             decoder: self,
             size_px: [camera.width_px, camera.height_px],
             frame,
@@ -145,7 +144,7 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
             alive: 0,
             in_strip: 0,
             most_in_memory: 0,
-        })
+        }
     }
 
     /// As [`render_watched`](Self::render_watched).
@@ -158,7 +157,8 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
         watch: &mut impl Stopwatch,
     ) -> Result<FrameReport, RenderError<S::Error>> {
         watch.enter(Stage::Project);
-        let mut drawing = self.begin_frame(camera)?;
+        let view = self.view_of(camera)?;
+        let mut drawing = self.begin_frame(camera, view);
         while let Some(tile) = drawing.next_tile_watched(watch)? {
             sink.tile(tile).map_err(RenderError::Sink)?;
         }
@@ -181,14 +181,16 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
         self.next_tile_watched(&mut ())
     }
 
-    /// Does a small part of the frame: a few anchors, a part of the sort of a strip, or a few splats of a tile. Between two calls the processor is
-    /// free; [`next_tile`](Self::next_tile) does as many at once as a tile takes.
+    /// Does a small part of the frame: a few anchors, a part of the sort of a strip, or a few splats of a tile. `Pending`
+    /// while there is nothing to show, and `None` when the frame is complete. Between two calls the processor is free; [`next_tile`](Self::next_tile) does as many at once as a tile takes.
     ///
     /// ```
     /// # fn main() -> Result<(), pocketsplat_core::DecodeError> {
     /// # let bytes = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/example.psb"));
     /// # let mut scratch = [0; 8 * 1024];
-    /// use pocketsplat_core::{Budget, Bundle, Decoder, Plan, Progress};
+    /// use std::task::Poll;
+    ///
+    /// use pocketsplat_core::{Budget, Bundle, Decoder, Plan};
     ///
     /// let bundle = Bundle::parse(bytes)?;
     /// let plan = Plan::new(&bundle, &Budget::for_frame(32, 24).with_most_work(1_000_000))?;
@@ -197,9 +199,9 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
     /// let mut n_pixels = 0;
     /// loop {
     ///     match drawing.advance()? {
-    ///         Progress::Working => {} // or: feed the watchdog, poll USB, yield to other tasks
-    ///         Progress::Tile(tile) => n_pixels += tile.rgb.len(),
-    ///         Progress::Complete => break,
+    ///         Poll::Pending => {} // or: feed the watchdog, poll USB, yield to other tasks
+    ///         Poll::Ready(Some(tile)) => n_pixels += tile.rgb.len(),
+    ///         Poll::Ready(None) => break,
     ///     }
     /// }
     /// assert_eq!(n_pixels, 32 * 24);
@@ -213,11 +215,11 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
     /// # Budget
     /// About 200,000 [model instructions](FrameReport::instructions), one anchor's more, and at most 64 splats of a tile; a part of
     /// the sort about 40 instructions a splat, and where damage is skipped, a checksum about 8 a byte of its chunk.
-    pub fn advance(&mut self) -> Result<Progress<'_>, DecodeError> {
+    pub fn advance(&mut self) -> Result<Poll<Option<Tile<'_>>>, DecodeError> {
         Ok(match self.step(&mut ())? {
-            Step::Working => Progress::Working,
-            Step::Tile(place) => Progress::Tile(self.tile(place)),
-            Step::Complete => Progress::Complete,
+            Step::Working => Poll::Pending,
+            Step::Tile(place) => Poll::Ready(Some(self.tile(place))),
+            Step::Complete => Poll::Ready(None),
         })
     }
 
@@ -305,6 +307,8 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
     }
 
     /// Begins with the next slab, of this strip or of the next one, if there is one.
+    // Not inlined: a caller's stack frame would keep the pass a second time.
+    #[inline(never)]
     fn begin_slab(&mut self) -> Step {
         let Self { decoder, frame, .. } = self;
         let from = if self.slab.ends() {

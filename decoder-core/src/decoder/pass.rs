@@ -116,19 +116,17 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
                     self.open(chunk, first_anchor, pass, frame, watch);
                 }
             }
-            if let Some(mut open) = pass.open.take() {
-                match self.go_on_in(&mut open, &mut pass.target, frame, end, watch) {
-                    Ok(true) => {}
-                    Ok(false) => {
-                        pass.open = Some(open);
-                        return Ok(false);
-                    }
-                    Err(DecodeError::ChunkStream { .. }) if open.before.is_some() => {
-                        self.leave_out(&open.chunk, open.before, &pass.target, frame);
-                        return Ok(false);
-                    }
-                    Err(error) => return Err(error),
+            let Pass { target, open, .. } = pass;
+            let Some(chunk) = open else { continue };
+            match self.go_on_in(chunk, target, frame, end, watch) {
+                Ok(true) => *open = None,
+                Ok(false) => return Ok(false),
+                Err(DecodeError::ChunkStream { .. }) if chunk.before.is_some() => {
+                    self.leave_out(&chunk.chunk, chunk.before.as_ref(), target, frame);
+                    *open = None;
+                    return Ok(false);
                 }
+                Err(error) => return Err(error),
             }
         }
         Ok(false)
@@ -149,6 +147,7 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
     }
 
     /// Begins with a chunk, unless it is known to be damaged and that is allowed.
+    #[inline(never)]
     fn open(
         &mut self,
         chunk: Chunk<'b>,
@@ -166,7 +165,7 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
             report: frame.report,
         });
         if !self.is_sound(&chunk) {
-            self.leave_out(&chunk, before, &pass.target, frame);
+            self.leave_out(&chunk, before.as_ref(), &pass.target, frame);
             return;
         }
         let anchors = first_anchor..first_anchor.saturating_add(chunk.n_anchors().into());
@@ -189,7 +188,9 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
     }
 
     /// Undoes what a damaged chunk did, and notes it in the report; nothing where that cannot be undone.
-    fn leave_out(&mut self, chunk: &Chunk<'b>, before: Option<Before>, target: &Target, frame: &mut Frame) {
+    // Not inlined, here and above: a caller's stack frame would keep what only this needs.
+    #[inline(never)]
+    fn leave_out(&mut self, chunk: &Chunk<'b>, before: Option<&Before>, target: &Target, frame: &mut Frame) {
         let Some(before) = before else { return };
         let [now, then] = [&frame.report, &before.report].map(|report| report.instructions(frame.cost));
         frame.in_vain = frame.in_vain.saturating_add(now.saturating_sub(then));

@@ -1,13 +1,14 @@
 //! Frames of all sizes, and sinks that fail.
 
 use core::convert::Infallible;
+use core::task::Poll;
 use std::vec;
 use std::vec::Vec;
 
 use pocketsplat_format::{Bundle, Camera, DecodeError, ErrorClass, Field, Rotation};
 
 use super::render_error::RenderError;
-use super::{ByteOrder, Decoder, PixelFormat, Progress, Rounding, Tile, TileRow, TileSink};
+use super::{ByteOrder, Decoder, PixelFormat, Rounding, Tile, TileRow, TileSink};
 use crate::budget::{Budget, MaxSplats, Overflow, Plan, Residency, Strips};
 
 const EXAMPLE: &[u8] = include_bytes!("../../examples/example.psb");
@@ -247,9 +248,9 @@ fn rows_go_on_where_small_steps_came_to() {
             let mut is_complete = false;
             for _ in 0..n_steps {
                 match drawing.advance().expect("drawn") {
-                    Progress::Working => {}
-                    Progress::Tile(tile) => found.tile(tile).expect("infallible"),
-                    Progress::Complete => is_complete = true,
+                    Poll::Pending => {}
+                    Poll::Ready(Some(tile)) => found.tile(tile).expect("infallible"),
+                    Poll::Ready(None) => is_complete = true,
                 }
             }
             let n_tiles = found.0.len();

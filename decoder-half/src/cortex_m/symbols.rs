@@ -5,14 +5,14 @@ use core::mem::offset_of;
 
 use crate::portable::symbols::SymbolTable;
 pub use crate::portable::symbols::{
-    ChannelTables, Entries, FREQUENCY_TOTAL, LEVELS_AT_ONCE, LevelFrequencies, MAX_ENTRIES, NODE_CONTEXTS,
-    PRECISION_BITS, STATE_MIN, Stream, TABLE_WORDS,
+    ChannelTables, Entries, FREQUENCY_TOTAL, LEVELS_AT_ONCE, LevelFrequencies, NODE_CONTEXTS, PRECISION_BITS,
+    STATE_MIN, Stream, TABLE_WORDS,
 };
 
 /// As [`read_values`](crate::portable::symbols::read_values).
 ///
 /// # Budget
-/// 28 instructions a value, 3 for each entry walked past, and 6 for a word of the stream.
+/// 31 instructions a value, 3 for each entry walked past, and 6 for a word of the stream.
 // Not inlined: it takes all registers.
 #[inline(never)]
 pub fn read_values(tables: &ChannelTables<'_, '_>, first: usize, values: &mut [f32], stream: &mut Stream<'_>) -> usize {
@@ -26,28 +26,32 @@ pub fn read_values(tables: &ChannelTables<'_, '_>, first: usize, values: &mut [f
     let (mut word, start) = (range.start, values.as_mut_ptr());
     let mut value = start;
     // SAFETY: reads `n` numbers, which there are, and the tables that they name, which there are, as `ChannelTables::new` made
-    // sure; of a table short cuts by 6 bits of the state, and bounds from one of them on up to the first that is larger than a
-    // number of 12 bits: the last is, and no short cut lies beyond the pair of the last two. Reads words up to the end of `words`.
+    // sure; of a table short cuts by 6 bits of the state, and in the section bounds from one of them on up to the first that is larger
+    // than a number of 12 bits: the last is, and no short cut lies beyond the pair of the last two. Reads words up to the end of `words`.
     // Writes at most `n` values. Loads may lie at any address. Registers are given as clobbered.
     unsafe {
-        // A pair holds where an entry begins and, above, where it ends.
+        // A pair holds where an entry begins and, above, where it ends. A table has nine times 16 bytes.
         asm!(
             "vmov s3, {end}",
             "2:",
             "ldrh {table}, [{number}], #2",
             "ubfx {q}, {state}, #0, #12",
-            "mla {table}, {table}, {len}, {tables}",
-            "add {pair}, {table}, {q}, lsr #6",
-            "ldrb {pair}, [{pair}, #-{origin}]",
-            "add {at}, {table}, {pair}, lsl #1",
-            "ldr {pair}, [{at}, #{bounds}]!",
+            "add {table}, {table}, {table}, lsl #3",
+            "add {table}, {tables}, {table}, lsl #4",
+            "lsr {pair}, {q}, #6",
+            "ldr {base}, [{table}, #{bounds}]",
+            "add {pair}, {table}, {pair}, lsl #1",
+            "ldrh {pair}, [{pair}, #-{origin}]",
+            "add {base}, {section}, {base}",
+            "add {at}, {base}, {pair}, lsl #1",
+            "ldr {pair}, [{at}]",
             "cmp {q}, {pair}, lsr #16",
             "bhs 5f",
             "3:",
             "cmp {pair}, #0x10000000",
             "bhs 9f",
             "uxth {end}, {pair}",
-            "sub {at}, {at}, {table}",
+            "sub {at}, {at}, {base}",
             "sub {q}, {q}, {end}",
             "rsb {end}, {end}, {pair}, lsr #16",
             "lsr {state}, {state}, #12",
@@ -60,9 +64,10 @@ pub fn read_values(tables: &ChannelTables<'_, '_>, first: usize, values: &mut [f
             "vcvt.f32.s32 s0, s0",
             "beq 6f",
             "4:",
-            "vmla.f32 s1, s0, s2",
-            "vstmia {value}!, {{s1}}",
+            "vmul.f32 s0, s0, s2",
             "subs {n}, {n}, #1",
+            "vadd.f32 s1, s1, s0",
+            "vstmia {value}!, {{s1}}",
             "bne 2b",
             "b 9f",
             "5:",
@@ -84,7 +89,8 @@ pub fn read_values(tables: &ChannelTables<'_, '_>, first: usize, values: &mut [f
             n = inout(reg) n => _,
             value = inout(reg) value,
             tables = in(reg) tables.tables.as_ptr().wrapping_byte_add(offset_of!(SymbolTable, origin)),
-            len = in(reg) size_of::<SymbolTable>(),
+            section = in(reg) tables.section.as_ptr(),
+            base = out(reg) _,
             end = inout(reg) range.end => _,
             table = out(reg) _,
             q = out(reg) _,

@@ -1,5 +1,7 @@
 //! Symbols of asymmetric numeral systems (Duda 2013): runs of symbols of tables, and paths of a trie.
 
+use core::ops::Range;
+
 use bytemuck::{Pod, Zeroable};
 
 /// The frequencies of a model add up to this; frequencies are multiples of its inverse.
@@ -13,13 +15,6 @@ pub const STATE_MIN: u32 = 1 << 16;
 const N_SHORT_CUTS: usize = 64;
 /// Bits of a quantile within such a piece.
 const PIECE_BITS: u32 = PRECISION_BITS - N_SHORT_CUTS.ilog2();
-/// Bounds of a table in memory.
-const N_BOUNDS: usize = 66;
-/// The short cut of a piece whose symbols are not in memory: its entry ends at [`FREQUENCY_TOTAL`].
-const RARE: u8 = N_BOUNDS as u8 - 2;
-
-/// Most entries of a table in memory: a bound more says where the last of them ends, and one ends every search.
-pub const MAX_ENTRIES: usize = N_BOUNDS - 2;
 /// Words of a table in memory.
 pub const TABLE_WORDS: usize = size_of::<SymbolTable>() / 4;
 
@@ -33,72 +28,82 @@ pub const LEVELS_AT_ONCE: usize = 32;
 /// child 0", the others "only child 1". Little-endian.
 pub type LevelFrequencies = [[[u8; 2]; 2]; 3];
 
-/// The entries of a table that are to be in memory, neighbours all of them.
-#[derive(Clone, Copy, Debug)]
-pub struct Entries<'t> {
+/// A table in the file.
+#[derive(Clone, Debug)]
+pub struct Entries {
     /// Value of symbol 0.
     pub origin: f32,
     /// Distance between neighbouring symbols' values.
     pub step: f32,
     /// The symbol of the first entry.
     pub first_symbol: i32,
-    /// `[n_entries + 1]` where the entries begin and where the last ends, little-endian, without falling and below
-    /// [`FREQUENCY_TOTAL`]; more than [`MAX_ENTRIES`] entries are left out.
-    pub bounds: &'t [[u8; 2]],
+    /// Where its bounds lie in the section, bytes: `[n_entries + 2]` where the entries begin, where the escape begins, and
+    /// [`FREQUENCY_TOTAL`]; little-endian, from 0 without falling.
+    pub bounds: Range<usize>,
+    /// The entries that short cuts lead to; a piece of the range with another one has none.
+    pub usual: Range<usize>,
 }
 
-/// A table in memory.
+/// Short cuts into the bounds of a table.
 ///
-/// Two things hold of every one, which [`ChannelTables::new`] makes: no short cut is beyond [`RARE`], and the last bound is
-/// [`FREQUENCY_TOTAL`]. So every search ends within the bounds.
+/// [`ChannelTables::new`] makes sure of every one: its bounds lie in the section, the last is [`FREQUENCY_TOTAL`], and no short cut is
+/// beyond the pair of the last two. So every search ends within the bounds.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct SymbolTable {
-    /// For each piece of the range the last entry that begins at or before its start; [`RARE`] where there is none.
-    short_cuts: [u8; N_SHORT_CUTS],
-    /// The symbol of the first entry, less [`PLACES_BEFORE`](Self::PLACES_BEFORE).
-    first_symbol: i32,
+    /// For each piece of the range the last entry that begins at or before its start; the escape where there is none.
+    pub(crate) short_cuts: [u16; N_SHORT_CUTS],
+    /// The symbol of the first entry.
+    pub(crate) first_symbol: i32,
     pub(crate) origin: f32,
     step: f32,
-    /// Where the entries begin, where the last ends, and then [`FREQUENCY_TOTAL`].
-    pub(crate) bounds: [u16; N_BOUNDS],
+    /// Where the bounds begin, bytes of the section.
+    pub(crate) bounds: u32,
 }
 
 impl SymbolTable {
-    /// Pairs of bytes from `origin` to the first bound.
-    const PLACES_BEFORE: i32 = 4;
-
-    fn new(entries: &Entries<'_>) -> Self {
-        let mut bounds = [FREQUENCY_TOTAL; N_BOUNDS];
-        for (bound, &stored) in bounds.iter_mut().take(MAX_ENTRIES + 1).zip(entries.bounds) {
-            *bound = u16::from_le_bytes(stored);
+    /// Nothing where the bounds are not as they have to be.
+    fn new(entries: &Entries, section: &[u8]) -> Option<Self> {
+        let (bounds, _) = section.get(entries.bounds.clone())?.as_chunks();
+        let [.., last] = bounds else { return None };
+        let escape = bounds.len().checked_sub(2)?;
+        if u16::from_le_bytes(*last) != FREQUENCY_TOTAL || escape > u16::MAX.into() {
+            return None;
         }
-        let mut short_cuts = [RARE; N_SHORT_CUTS];
+        let entry_at = |quantile: u16| {
+            let next = bounds.partition_point(|&bound| u16::from_le_bytes(bound) <= quantile);
+            next.saturating_sub(1).min(escape)
+        };
+        let mut short_cuts = [escape as u16; N_SHORT_CUTS];
         for (piece, short_cut) in (0_u16..).zip(&mut short_cuts) {
             let start = piece << PIECE_BITS;
-            let next = bounds.partition_point(|&bound| bound <= start);
-            *short_cut = next.checked_sub(1).map_or(RARE, |entry| (entry as u8).min(RARE));
+            let (first, last) = (entry_at(start), entry_at(start | ((1 << PIECE_BITS) - 1)));
+            // Where the escape is in the piece, a search comes to its end.
+            let last_symbol = last.min(escape.saturating_sub(1));
+            if entries.usual.contains(&first) && entries.usual.contains(&last_symbol) {
+                *short_cut = first as u16;
+            }
         }
-        let first_symbol = entries.first_symbol.wrapping_sub(Self::PLACES_BEFORE);
-        Self { short_cuts, first_symbol, origin: entries.origin, step: entries.step, bounds }
+        let Entries { origin, step, first_symbol, .. } = *entries;
+        Some(Self { short_cuts, first_symbol, origin, step, bounds: u32::try_from(entries.bounds.start).ok()? })
     }
 
-    /// Symbol, start and frequency of the entry that has the quantile, found by walking from the short cut of its piece;
-    /// `None` when it is not in memory.
+    /// The symbol, start and frequency of the entry that has the quantile, found by walking from the short cut of its piece;
+    /// `None` for the escape, and where there is no short cut.
     #[inline(always)]
-    fn slot(&self, quantile: u32) -> Option<(i32, u32, u32)> {
-        let bound = |index: u32| self.bounds.get(index as usize).map_or(u32::MAX, |&bound| bound.into());
+    fn slot(&self, section: &[u8], quantile: u32) -> Option<(i32, u32, u32)> {
+        let (bounds, _) = section.get(self.bounds as usize..)?.as_chunks();
+        let bound = |index: u32| bounds.get(index as usize).map_or(u32::MAX, |&bound| u16::from_le_bytes(bound).into());
         let mut entry = u32::from(*self.short_cuts.get((quantile >> PIECE_BITS) as usize)?);
         let mut start = bound(entry);
         loop {
-            entry = entry.wrapping_add(1);
-            let end = bound(entry);
+            let end = bound(entry.wrapping_add(1));
             if quantile < end {
-                // No entry in memory ends there.
-                let symbol = self.first_symbol.wrapping_add(entry as i32).wrapping_add(Self::PLACES_BEFORE - 1);
+                // The escape ends there, and so may the last entry before one that has no slots.
+                let symbol = self.first_symbol.wrapping_add(entry as i32);
                 return (end < FREQUENCY_TOTAL.into()).then_some((symbol, start, end.wrapping_sub(start)));
             }
-            start = end;
+            (entry, start) = (entry.wrapping_add(1), end);
         }
     }
 }
@@ -109,29 +114,32 @@ pub struct ChannelTables<'b, 's> {
     pub(crate) tables: &'s [SymbolTable],
     /// `[n_channels]` the table of each channel, little-endian; all are in `tables`.
     pub(crate) numbers: &'b [[u8; 2]],
+    /// What the bounds lie in.
+    pub(crate) section: &'b [u8],
 }
 
 impl<'b, 's> ChannelTables<'b, 's> {
-    /// Unpacks tables into `memory`.
+    /// Makes short cuts into tables in `memory`.
     ///
     /// * `memory`: [`TABLE_WORDS`] a table. * `tables`: as many as there is memory for. * `numbers`: `[n_channels]` the table of each
-    ///   channel, little-endian.
+    ///   channel, little-endian. * `section`: what the tables' bounds lie in.
     ///
-    /// Nothing when there are fewer tables than that, or a channel names one that there is not.
+    /// Nothing when there are fewer tables than that, a channel names one that there is not, or bounds are not as they have to be.
     #[must_use]
-    pub fn new<'t>(
+    pub fn new(
         memory: &'s mut [u32],
-        tables: impl Iterator<Item = Entries<'t>>,
+        tables: impl Iterator<Item = Entries>,
         numbers: &'b [[u8; 2]],
+        section: &'b [u8],
     ) -> Option<Self> {
         let slots: &mut [SymbolTable] = bytemuck::try_cast_slice_mut(memory).ok()?;
         let mut n_tables = 0;
         for (slot, table) in slots.iter_mut().zip(tables) {
-            *slot = SymbolTable::new(&table);
+            *slot = SymbolTable::new(&table, section)?;
             n_tables += 1;
         }
         let exist = numbers.iter().all(|&number| usize::from(u16::from_le_bytes(number)) < n_tables);
-        (exist && n_tables == slots.len()).then_some(Self { tables: slots, numbers })
+        (exist && n_tables == slots.len()).then_some(Self { tables: slots, numbers, section })
     }
 
     /// Number of channels.
@@ -166,7 +174,7 @@ impl<'b, 's> ChannelTables<'b, 's> {
         let mut n_done = 0;
         for (value, &number) in values.iter_mut().zip(self.numbers.get(first..).unwrap_or_default()) {
             let Some(table) = self.tables.get(usize::from(u16::from_le_bytes(number))) else { break };
-            let Some((symbol, start, frequency)) = table.slot(local.quantile()) else { break };
+            let Some((symbol, start, frequency)) = table.slot(self.section, local.quantile()) else { break };
             local.advance(start, frequency);
             *value = value_of(symbol, table.origin, table.step);
             n_done += 1;
@@ -176,10 +184,11 @@ impl<'b, 's> ChannelTables<'b, 's> {
     }
 }
 
-/// Fills `values` from channel `first` on; returns how many, which is fewer at a symbol that is not in memory: the stream is before it.
+/// Fills `values` from channel `first` on; returns how many, which is fewer at an escape and at a symbol without a short cut: the stream
+/// is before it.
 ///
 /// # Budget
-/// About 55 instructions a value; with the assembly of a Cortex-M 28, and 3 for each entry walked past.
+/// About 55 instructions a value; with the assembly of a Cortex-M 31, and 3 for each entry walked past.
 #[inline(always)]
 pub fn read_values(tables: &ChannelTables<'_, '_>, first: usize, values: &mut [f32], stream: &mut Stream<'_>) -> usize {
     tables.read_values_with(first, values, stream, |symbol, origin, step| origin + symbol as f32 * step)
@@ -260,55 +269,82 @@ pub fn descend(levels: &[LevelFrequencies], both: u32, stream: &mut Stream<'_>) 
 mod tests {
     use std::vec::Vec;
 
-    use super::{
-        ChannelTables, Entries, FREQUENCY_TOTAL, MAX_ENTRIES, PIECE_BITS, Stream, TABLE_WORDS, descend, read_values,
-    };
+    use super::{ChannelTables, Entries, FREQUENCY_TOTAL, PIECE_BITS, Stream, TABLE_WORDS, descend, read_values};
 
-    /// The symbol that a quantile stands for, and how far into its slot it lies, by a look at every entry.
+    /// The symbol that a quantile stands for, and how far into its slot it lies, by a look at every entry but the escape.
     fn expected(first_symbol: i32, bounds: &[u16], quantile: u32) -> Option<(i32, u32, u32)> {
-        let pairs = bounds.windows(2).take(MAX_ENTRIES).zip(first_symbol..);
+        let pairs = bounds.windows(2).take(bounds.len() - 2).zip(first_symbol..);
         let mut found = pairs.filter(|(pair, _)| (u32::from(pair[0])..u32::from(pair[1])).contains(&quantile));
         found.next().map(|(pair, symbol)| (symbol, u32::from(pair[1] - pair[0]), quantile - u32::from(pair[0])))
+    }
+
+    fn entries(first_symbol: i32, start: usize, n_bounds: usize) -> Entries {
+        let bounds = start..start + 2 * n_bounds;
+        Entries { origin: 0.5, step: 0.25, first_symbol, bounds, usual: 0..n_bounds.saturating_sub(2) }
     }
 
     #[test]
     fn every_quantile_leads_to_its_entry_or_nowhere() {
         let even = |n: u16, step: u16| (0..=n).map(move |i| i * step).collect::<Vec<_>>();
-        let lists = [even(1, 4095), even(64, 63), even(80, 50), std::vec![900, 901, 901, 1000, 4095], std::vec![5]];
-        for (first_symbol, bounds) in (-40..).zip(lists) {
-            let bytes: Vec<[u8; 2]> = bounds.iter().map(|bound| bound.to_le_bytes()).collect();
-            let entries = Entries { origin: 0.5, step: 0.25, first_symbol, bounds: &bytes };
-            let mut memory = [0; TABLE_WORDS];
-            let numbers = [[0; 2]];
-            let tables = ChannelTables::new(&mut memory, [entries].into_iter(), &numbers).expect("one table");
-            for quantile in 0..u32::from(FREQUENCY_TOTAL) {
-                let before = 1 << 28 | quantile;
-                let mut stream = Stream { state: before, words: &[] };
-                let mut values = [f32::NAN];
-                let n = read_values(&tables, 0, &mut values, &mut stream);
-                // The piece that the first entry begins in is left out where it begins within.
-                let piece_start = quantile >> PIECE_BITS << PIECE_BITS;
-                let is_left_out = piece_start < u32::from(bounds[0]);
-                match expected(first_symbol, &bounds, quantile).filter(|_| !is_left_out) {
-                    Some((symbol, frequency, offset)) => {
-                        assert_eq!((n, values[0]), (1, 0.5 + symbol as f32 * 0.25), "{bounds:?}, {quantile}");
-                        assert_eq!(stream.state, (1 << 16) * frequency + offset, "{bounds:?}, {quantile}");
+        let lists = [
+            even(1, 4095),
+            even(64, 63),
+            even(80, 50),
+            even(2000, 2),
+            even(1, 4096),
+            std::vec![0],
+            std::vec![0, 901, 901, 1000, 4095],
+        ];
+        for (first_symbol, mut bounds) in (-40..).zip(lists) {
+            bounds.push(FREQUENCY_TOTAL);
+            // At any address.
+            let section: Vec<u8> =
+                [9, 9, 9].into_iter().chain(bounds.iter().flat_map(|bound| bound.to_le_bytes())).collect();
+            for usual in [0..bounds.len() - 2, 1..bounds.len() - 2, 0..(bounds.len() - 2) / 2] {
+                let entries = Entries { usual: usual.clone(), ..entries(first_symbol, 3, bounds.len()) };
+                let mut memory = [0; TABLE_WORDS];
+                let numbers = [[0; 2]];
+                let tables =
+                    ChannelTables::new(&mut memory, [entries].into_iter(), &numbers, &section).expect("one table");
+                for quantile in 0..u32::from(FREQUENCY_TOTAL) {
+                    let before = 1 << 28 | quantile;
+                    let mut stream = Stream { state: before, words: &[] };
+                    let mut values = [f32::NAN];
+                    let n = read_values(&tables, 0, &mut values, &mut stream);
+                    let found = expected(first_symbol, &bounds, quantile);
+                    // A piece with an entry that is not usual is left out, and so is what ends where everything does.
+                    let piece = quantile >> PIECE_BITS << PIECE_BITS;
+                    let in_piece = (piece..piece + (1 << PIECE_BITS)).filter_map(|q| expected(0, &bounds, q));
+                    let is_usual = in_piece.clone().count() > 0
+                        && in_piece.into_iter().all(|(entry, ..)| usual.contains(&(entry as usize)));
+                    let ends = |(_, frequency, offset): &(i32, u32, u32)| quantile - offset + frequency;
+                    match found.filter(|slot| is_usual && ends(slot) < FREQUENCY_TOTAL.into()) {
+                        Some((symbol, frequency, offset)) => {
+                            assert_eq!((n, values[0]), (1, 0.5 + symbol as f32 * 0.25), "{bounds:?}, {quantile}");
+                            assert_eq!(stream.state, (1 << 16) * frequency + offset, "{bounds:?}, {quantile}");
+                        }
+                        None => assert_eq!((n, stream.state), (0, before), "{usual:?} of {bounds:?}, {quantile}"),
                     }
-                    None => assert_eq!((n, stream.state), (0, before), "{bounds:?}, {quantile}"),
                 }
             }
         }
     }
 
     #[test]
-    fn tables_that_are_missing_are_refused() {
-        let bytes = [[0, 0], [255, 15]];
-        let entries = Entries { origin: 0.0, step: 1.0, first_symbol: 0, bounds: &bytes };
+    fn tables_that_are_missing_or_end_early_are_refused() {
+        let section = [0, 0, 255, 15, 0, 16, 0, 0];
         let mut memory = [0; 2 * TABLE_WORDS];
-        assert!(ChannelTables::new(&mut memory, [entries].into_iter(), &[[0, 0]]).is_none(), "one of two tables");
-        assert!(ChannelTables::new(&mut memory, [entries; 2].into_iter(), &[[2, 0]]).is_none(), "no table 2");
-        assert!(ChannelTables::new(&mut memory, [entries; 2].into_iter(), &[[1, 0]]).is_some(), "table 1");
-        assert!(ChannelTables::new(&mut memory[1..], [entries; 2].into_iter(), &[]).is_none(), "half a table");
+        let table = || entries(0, 0, 3);
+        let is_made = |memory: &mut [u32], tables: &[Entries], numbers: &[[u8; 2]]| {
+            ChannelTables::new(memory, tables.iter().cloned(), numbers, &section).is_some()
+        };
+        assert!(!is_made(&mut memory, &[table()], &[[0, 0]]), "one of two tables");
+        assert!(!is_made(&mut memory, &[table(), table()], &[[2, 0]]), "no table 2");
+        assert!(is_made(&mut memory, &[table(), table()], &[[1, 0]]), "table 1");
+        assert!(!is_made(&mut memory[1..], &[table(), table()], &[]), "half a table");
+        for wrong in [entries(0, 0, 2), entries(0, 2, 3), entries(0, 0, 1), entries(0, 0, 0), entries(0, 6, 3)] {
+            assert!(!is_made(&mut memory, &[table(), wrong.clone()], &[[1, 0]]), "{wrong:?}");
+        }
     }
 
     #[test]

@@ -8,13 +8,15 @@ mod thumb;
 use std::ffi::{CString, c_char, c_int, c_uint, c_void};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use thumb::{Cost, REFILL, cost};
+use thumb::{Cost, cost};
 
 type Id = u64;
 /// Opaque: a block of instructions that QEMU translates at once, and one of them.
 type TranslationBlock = c_void;
 type Instruction = c_void;
 
+/// Cycles to refill the pipeline after a branch that is taken: the manual says 1 to 3.
+const REFILL: u64 = 2;
 /// No register is looked at.
 const NO_REGISTERS: c_int = 0;
 
@@ -107,7 +109,7 @@ extern "C" fn translated(_: Id, block: *mut TranslationBlock) {
 extern "C" fn executed(_: c_uint, block: *mut c_void) {
     // SAFETY: what `translated` gave, which is never freed.
     let block = unsafe { &*block.cast::<Block>() };
-    let refill = if END.swap(block.end, Ordering::Relaxed) == block.start { 0 } else { u64::from(REFILL) };
+    let refill = if END.swap(block.end, Ordering::Relaxed) == block.start { 0 } else { REFILL };
     INSTRUCTIONS.fetch_add(block.n_instructions, Ordering::Relaxed);
     CYCLES.fetch_add(block.cycles + refill, Ordering::Relaxed);
 }

@@ -1,10 +1,7 @@
 //! What a Thumb instruction takes on a Cortex-M4: "Cortex-M4 Technical Reference Manual", tables 3-1 and 7-1 (ARM 100166, 100165).
 //!
-//! Zero wait states. A branch that is taken refills the pipeline, which the manual gives as 1 to 3 cycles; [`REFILL`] is counted. A
-//! division takes 2 to 12; [`DIVIDE`] is counted.
+//! Zero wait states. A division takes 2 to 12 cycles; [`DIVIDE`] is counted.
 
-/// Cycles to refill the pipeline.
-pub const REFILL: u32 = 2;
 /// Cycles of an integer division.
 pub const DIVIDE: u32 = 8;
 

@@ -11,11 +11,12 @@ mod stop;
 
 use core::convert::Infallible;
 use core::f32::consts::TAU;
+use core::task::Poll;
 
 #[cfg(target_arch = "arm")]
 use cortex_m as _;
 use defmt_semihosting as _;
-use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, Overflow, Plan, Progress, Tile, TileSink};
+use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, Overflow, Plan, Tile, TileSink};
 #[cfg(target_arch = "riscv32")]
 use riscv as _;
 use static_cell::ConstStaticCell;
@@ -79,7 +80,7 @@ fn measure() -> Result<bool, DecodeError> {
         let mut drawing = decoder.begin(&camera)?;
         let (mut n_steps, mut most, mut last) = (0_u32, 0, board::instructions());
         let begin = last - start;
-        while !matches!(drawing.advance()?, Progress::Complete) {
+        while !matches!(drawing.advance()?, Poll::Ready(None)) {
             let now = board::instructions();
             (n_steps, most, last) = (n_steps + 1, most.max(now - last), now);
         }

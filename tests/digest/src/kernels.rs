@@ -1,8 +1,8 @@
 //! One number for layers, roots and blended rows, which some targets have in assembly.
 
 use pocketsplat_half::{
-    BlendConstants, ChannelTables, Entries, Exponential, LANES, LevelFrequencies, ROW_LEN, RowSplat, Stream,
-    TABLE_WORDS, add_products_of_two_rows, blend_rows, descend, outputs, read_values, rectified_units, sqrt,
+    BlendConstants, ChannelTables, Entries, Exponential, FREQUENCY_TOTAL, LANES, LevelFrequencies, ROW_LEN, RowSplat,
+    Stream, TABLE_WORDS, add_products_of_two_rows, blend_rows, descend, outputs, read_values, rectified_units, sqrt,
 };
 
 use super::digest::Digest;
@@ -100,26 +100,31 @@ fn add_symbols(random: &mut Random, digest: &mut Digest) {
     let mut stream = Stream { state: 0, words: &words };
     stream.refill();
     stream.refill();
-    // Of 3, 20 and 64 entries, some of them empty, the first from 0 on.
-    let bounds = [3_u16, 20, 64].map(|n| {
+    // Of 3, 20 and 200 entries, some of them empty, and an escape.
+    let mut section = [0; 2 * (3 + 20 + 200 + 3 * 2)];
+    let mut rest = section.as_chunks_mut::<2>().0;
+    let mut start = 0;
+    let tables = [3_u16, 20, 200].map(|n| {
+        let n_bounds = usize::from(n) + 2;
         let most = 4000.0 / f32::from(n);
         let mut bound = 0;
-        let mut bounds = [[0; 2]; 65];
-        for (i, slot) in (0..=n).zip(&mut bounds) {
+        let (bounds, after) = core::mem::take(&mut rest).split_at_mut(n_bounds);
+        for (i, slot) in (0..=n).zip(&mut *bounds) {
             *slot = u16::to_le_bytes(bound);
             bound += random.between(if i % 5 == 0 { 0.0 } else { most * 0.5 }, most) as u16;
         }
-        (usize::from(n) + 1, bounds)
-    });
-    let tables = bounds.iter().map(|(n, bounds)| Entries {
-        origin: 0.1,
-        step: 0.7,
-        first_symbol: -9,
-        bounds: bounds.get(..*n).unwrap_or_default(),
+        if let [.., last] = bounds {
+            *last = FREQUENCY_TOTAL.to_le_bytes();
+        }
+        let end = start + 2 * n_bounds;
+        let bounds = core::mem::replace(&mut start, end)..end;
+        rest = after;
+        // Of the last one some entries have no short cut.
+        Entries { origin: 0.1, step: 0.7, first_symbol: -9, bounds, usual: 0..usize::from(n.min(190)) }
     });
     let mut memory = [0; 3 * TABLE_WORDS];
     let numbers: [[u8; 2]; 24] = core::array::from_fn(|channel| [(channel * 7 % 3) as u8, 0]);
-    let Some(tables) = ChannelTables::new(&mut memory, tables, &numbers) else { return };
+    let Some(tables) = ChannelTables::new(&mut memory, tables.into_iter(), &numbers, &section) else { return };
     let levels: [LevelFrequencies; 40] = core::array::from_fn(|_| {
         core::array::from_fn(|_| {
             let end_both = random.between(0.0, 3000.0);

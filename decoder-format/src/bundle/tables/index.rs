@@ -1,14 +1,14 @@
-//! Tables unpacked into scratch memory, with short cuts into them: what a symbol costs least with.
+//! Tables with short cuts in scratch memory: what a symbol costs least with.
 
-use pocketsplat_half::{ChannelTables, Entries, MAX_ENTRIES};
+use pocketsplat_half::{ChannelTables, Entries};
 
-use super::{FrequencyTable, Tables};
+use super::{FrequencyTable, TABLE_HEAD_LEN, Tables};
 use crate::bundle::Header;
 use crate::context::N_GROUPS;
 use crate::entropy::AnsReader;
 use crate::error::DecodeError;
 
-/// All tables of a bundle, the most frequent entries of each unpacked.
+/// All tables of a bundle, with short cuts into each.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::bundle) struct IndexedTables<'a, 's> {
     tables: Tables<'a>,
@@ -19,36 +19,32 @@ pub(in crate::bundle) struct IndexedTables<'a, 's> {
     group_ends: [usize; N_GROUPS - 1],
 }
 
-/// The most frequent entries of a table, neighbours all of them; the others are looked up in the file.
+/// What short cuts are made of.
 ///
-/// * `bits`: symbols of more are left in the file. * `scaled`: if not, the value of a symbol is the symbol.
-fn most_frequent<'a>(table: &FrequencyTable<'a>, bits: u8, scaled: bool) -> Entries<'a> {
-    let inner = table.bounds.split_last().map_or(&[][..], |(_, inner)| inner);
+/// * `start`: where the table's bounds begin in the section. * `bits`: symbols of more have none. * `scaled`: if not, the value of a symbol
+///   is the symbol.
+fn entries(table: &FrequencyTable<'_>, start: usize, bits: u8, scaled: bool) -> Entries {
     // Entries from the one of the least symbol of so many bits to that of the largest.
     let beyond = 1_i32.wrapping_shl(u32::from(bits).wrapping_sub(1));
     let entry_of = |symbol: i32| {
         let entry = symbol.wrapping_sub(table.min_symbol.into()).max(0) as usize;
         entry.min(table.n_symbols())
     };
-    let skipped = entry_of(beyond.wrapping_neg());
-    let inner = inner.get(skipped..=entry_of(beyond)).unwrap_or_default();
-    let n_entries = inner.len().saturating_sub(1).min(MAX_ENTRIES);
-    // The entries with the most slots.
-    let slots = |bounds: &[[u8; 2]]| {
-        let [first, last] = [bounds.first(), bounds.last()].map(|b| b.map_or(0, |&b| u16::from_le_bytes(b)));
-        last.wrapping_sub(first)
-    };
-    let windows = (0..).zip(inner.windows(n_entries.saturating_add(1)));
-    let (first, bounds) = windows.max_by_key(|(_, window)| slots(window)).unwrap_or_default();
-    let FrequencyTable { origin, step, min_symbol, .. } = *table;
-    // `FrequencyTable::check` made sure that the symbol of every entry is an i16.
-    let first_symbol = i32::from(min_symbol).wrapping_add(skipped as i32).wrapping_add(first);
+    let FrequencyTable { origin, step, min_symbol, bounds } = *table;
     let [origin, step] = if scaled { [origin, step] } else { [0.0, 1.0] };
-    Entries { origin, step, first_symbol, bounds }
+    let end = start.saturating_add(bounds.as_flattened().len());
+    // `FrequencyTable::check` made sure that the symbol of every entry is an i16.
+    Entries {
+        origin,
+        step,
+        first_symbol: min_symbol.into(),
+        bounds: start..end,
+        usual: entry_of(beyond.wrapping_neg())..entry_of(beyond),
+    }
 }
 
 impl<'a, 's> IndexedTables<'a, 's> {
-    /// Unpacks `tables` into `memory`, of [`TABLE_WORDS`](pocketsplat_half::TABLE_WORDS) each.
+    /// Makes short cuts in `memory`, of [`TABLE_WORDS`](pocketsplat_half::TABLE_WORDS) each.
     ///
     /// * `scaled`: if not, the value of a symbol is the symbol.
     pub(in crate::bundle) fn new(
@@ -59,12 +55,13 @@ impl<'a, 's> IndexedTables<'a, 's> {
     ) -> Result<Self, DecodeError> {
         let numbers = tables.channel_tables;
         let unpacked = (0_u16..).zip(0..tables.len()).map_while(|(number, index)| {
-            // What all channels of a table have room for stays in memory, and needs no comparison there.
+            // What all channels of a table have room for needs no comparison.
             let users = numbers.iter().enumerate().filter(|&(_, &user)| u16::from_le_bytes(user) == number);
             let bits = users.map(|(channel, _)| header.symbol_bits_of(channel)).min().unwrap_or(16);
-            Some(most_frequent(&tables.get(index)?, bits, scaled))
+            let start = (u32::from_le_bytes(*tables.offsets.get(index)?) as usize).saturating_add(TABLE_HEAD_LEN);
+            Some(entries(&tables.get(index)?, start, bits, scaled))
         });
-        let in_memory = ChannelTables::new(memory, unpacked, numbers).ok_or(DecodeError::Internal)?;
+        let in_memory = ChannelTables::new(memory, unpacked, numbers, tables.section).ok_or(DecodeError::Internal)?;
         let group_ends = [header.feature_dim.into(), header.n_scalars()];
         Ok(Self { tables: *tables, in_memory, symbol_bits: header.symbol_bits, group_ends })
     }
@@ -72,10 +69,10 @@ impl<'a, 's> IndexedTables<'a, 's> {
     /// Fills `run` with the next symbols of `reader`, of the channels from `first` on. A symbol of more bits than its channel has
     /// has the stream refused.
     ///
-    /// * `read`: fills as many as are in memory, in order, and returns how many. * `value_of`: the value of a symbol, by origin and step.
+    /// * `read`: fills as many as there are short cuts to, in order, and returns how many. * `value_of`: the value of a symbol, by origin and step.
     ///
     /// # Budget
-    /// About 32 instructions a symbol on a Cortex-M4; 200 for one that has no entry in memory.
+    /// About 38 instructions a symbol on a Cortex-M4; 200 for one that has no short cut.
     #[inline(always)]
     pub(in crate::bundle) fn read_run<'b, T>(
         &self,
@@ -118,9 +115,9 @@ fn rare_symbol(tables: &Tables<'_>, number: usize, bits: u8, reader: &mut AnsRea
 mod tests {
     use std::{vec, vec::Vec};
 
-    use pocketsplat_half::{ChannelTables, MAX_ENTRIES, Stream, TABLE_WORDS};
+    use pocketsplat_half::{ChannelTables, Stream, TABLE_WORDS};
 
-    use super::most_frequent;
+    use super::entries;
     use crate::bundle::FrequencyTable;
     use crate::entropy::{FREQUENCY_TOTAL, Slot, SymbolModel};
 
@@ -141,12 +138,12 @@ mod tests {
             .into()
     }
 
-    /// The symbol of each quantile that is in memory, after a comparison of its slot with that of the bisection.
+    /// The symbol of each quantile that has a short cut, after a comparison of its slot with that of the bisection.
     fn symbols_in_memory(bounds: &[[u8; 2]], bits: u8) -> Vec<Option<i32>> {
         let table = FrequencyTable { origin: 0.0, step: 1.0, min_symbol: -7, bounds };
         let mut memory = [0; TABLE_WORDS];
-        let entries = most_frequent(&table, bits, true);
-        let in_memory = ChannelTables::new(&mut memory, [entries].into_iter(), &[[0; 2]]).expect("one table");
+        let made = [entries(&table, 0, bits, true)].into_iter();
+        let in_memory = ChannelTables::new(&mut memory, made, &[[0; 2]], bounds.as_flattened()).expect("one table");
         let symbol_of = |quantile: u16| {
             let mut stream = Stream { state: 1 << 28 | u32::from(quantile), words: &[] };
             let mut symbol = [i32::MAX];
@@ -169,17 +166,10 @@ mod tests {
     fn short_cuts_lead_where_bisection_leads_or_nowhere() {
         for bounds in tables() {
             let found = symbols_in_memory(&bounds, 16);
-            // The fullest entries are those of the window that was taken; of it the piece that it begins in may be left out.
-            let bound = |index: usize| u16::from_le_bytes(bounds[index]);
-            let most = (MAX_ENTRIES..bounds.len() - 1).map(|last| bound(last) - bound(last - MAX_ENTRIES)).max();
-            let most = usize::from(most.unwrap_or(bound(bounds.len() - 2)));
+            // All but the escape, and what ends where it would begin.
+            let n_coded = bounds.iter().map(|&bound| u16::from_le_bytes(bound)).filter(|&b| b < FREQUENCY_TOTAL).max();
             let n_found = found.iter().flatten().count();
-            let n_left = if found[0].is_some() { 0 } else { 63 };
-            assert!(
-                (most.saturating_sub(n_left)..=most).contains(&n_found),
-                "{n_found} of {most}, {} bounds",
-                bounds.len()
-            );
+            assert_eq!(n_found, usize::from(n_coded.unwrap_or(0)), "{} bounds", bounds.len());
         }
     }
 

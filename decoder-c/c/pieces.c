@@ -36,7 +36,7 @@ static int matches(const psb_pixels *piece, uint32_t format, const uint8_t *fram
 
 /* The next tile by small steps, as psb_next_tile gives it. */
 static psb_status next_tile_by_steps(psb_decoder *decoder, psb_pixels *tile, psb_report *report, psb_message *message) {
-  psb_progress progress = PSB_PROGRESS_WORKING;
+  uint8_t progress = PSB_PROGRESS_WORKING;
   psb_status status = PSB_STATUS_OK;
   while (status == PSB_STATUS_OK && progress == PSB_PROGRESS_WORKING) status = psb_advance(decoder, &progress, tile, report, message);
   return status;

@@ -34,16 +34,6 @@ typedef enum psb_status {
   PSB_STATUS_INTERNAL = 6,
 } psb_status;
 
-// What a call of psb_advance came to.
-typedef enum psb_progress {
-  // Nothing to show yet.
-  PSB_PROGRESS_WORKING = 0,
-  // The next tile.
-  PSB_PROGRESS_TILE = 1,
-  // The frame is complete.
-  PSB_PROGRESS_COMPLETE = 2,
-} psb_progress;
-
 // How exactly a frame is drawn.
 typedef enum psb_quality {
   // Every splat, wherever it shows.
@@ -67,6 +57,16 @@ typedef enum psb_format {
   // As PSB_FORMAT_RGB565_LITTLE_ENDIAN, by the same pattern.
   PSB_FORMAT_RGB565_LITTLE_ENDIAN_DITHERED = 4,
 } psb_format;
+
+// What a call of psb_advance came to.
+typedef enum psb_progress {
+  // Nothing to show yet.
+  PSB_PROGRESS_WORKING = 0,
+  // The next tile.
+  PSB_PROGRESS_TILE = 1,
+  // The frame is complete.
+  PSB_PROGRESS_COMPLETE = 2,
+} psb_progress;
 
 // A decoder that is bound to a bundle and to its scratch memory. It lies in memory of the caller, has nothing to free, and may be
 // forgotten at any time; its scratch memory is then the caller's again.
@@ -292,14 +292,14 @@ enum psb_status psb_next_tile(struct psb_decoder *decoder,
 // Does a small part of the frame that was begun: a few anchors, a part of the sort of a strip, or a few splats of a tile. Between two calls the processor
 // is free, for a watchdog, USB or another task; psb_next_tile does as many at once as a tile takes.
 //
-// progress: gets what the call came to. tile: gets the tile, as psb_next_tile gives it; NULL there unless progress is PSB_PROGRESS_TILE.
+// progress: gets a psb_progress, PSB_PROGRESS_WORKING with every error. tile: gets the tile, as psb_next_tile gives it; NULL there unless progress is PSB_PROGRESS_TILE.
 // report: NULL, or where to say, when the frame is complete, what it consisted of. message: NULL, or where to say what was wrong;
 // PSB_STATUS_MISUSE when no frame is begun.
 //
 // # Safety
 // Pointers are NULL or point to what the call says; the decoder is bound.
 enum psb_status psb_advance(struct psb_decoder *decoder,
-                            enum psb_progress *progress,
+                            uint8_t *progress,
                             struct psb_pixels *tile,
                             struct psb_report *report,
                             struct psb_message *message);

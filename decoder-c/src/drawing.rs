@@ -141,7 +141,7 @@ pub unsafe extern "C" fn psb_next_tile(
 /// Does a small part of the frame that was begun: a few anchors, a part of the sort of a strip, or a few splats of a tile. Between two calls the processor
 /// is free, for a watchdog, USB or another task; psb_next_tile does as many at once as a tile takes.
 ///
-/// progress: gets what the call came to. tile: gets the tile, as psb_next_tile gives it; NULL there unless progress is PSB_PROGRESS_TILE.
+/// progress: gets a psb_progress, PSB_PROGRESS_WORKING with every error. tile: gets the tile, as psb_next_tile gives it; NULL there unless progress is PSB_PROGRESS_TILE.
 /// report: NULL, or where to say, when the frame is complete, what it consisted of. message: NULL, or where to say what was wrong;
 /// PSB_STATUS_MISUSE when no frame is begun.
 ///
@@ -150,19 +150,20 @@ pub unsafe extern "C" fn psb_next_tile(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn psb_advance(
     decoder: *mut Decoder,
-    progress: *mut Progress,
+    progress: *mut u8,
     tile: *mut Pixels,
     report: *mut Report,
     message: *mut Message,
 ) -> Status {
     // SAFETY: the caller's promise.
-    let (tile, report, message) = unsafe { (tile.as_mut(), report.as_mut(), message.as_mut()) };
+    let (progress, tile) = unsafe { (progress.as_mut(), tile.as_mut()) };
+    // SAFETY: the same.
+    let (report, message) = unsafe { (report.as_mut(), message.as_mut()) };
     let outcome = (|| {
         let out = tile.ok_or(Failure::Misuse("tile is NULL"))?;
         *out = Pixels::NONE;
-        if progress.is_null() {
-            return Err(Failure::Misuse("progress is NULL"));
-        }
+        let progress = progress.ok_or(Failure::Misuse("progress is NULL"))?;
+        *progress = Progress::Working as u8;
         // SAFETY: NULL or a bound decoder, the caller's promise.
         let Begun { drawing, format } = unsafe { Decoder::begun(decoder) }?;
         let found = match drawing.advance()? {
@@ -177,8 +178,7 @@ pub unsafe extern "C" fn psb_advance(
                 Progress::Complete
             }
         };
-        // SAFETY: not NULL; the rest is the caller's promise. Written, never read: what was there may be no progress.
-        unsafe { progress.write(found) };
+        *progress = found as u8;
         Ok(())
     })();
     status_of(outcome, message)

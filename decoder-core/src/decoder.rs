@@ -3,6 +3,7 @@
 mod bind;
 mod collect;
 mod count;
+mod drawing;
 mod first_come;
 mod frame;
 mod overflow;
@@ -22,7 +23,7 @@ mod tests;
 mod tile;
 
 pub use count::{count_gaussians, count_scratch_len};
-pub use frame::Drawing;
+pub use drawing::Drawing;
 pub use pixel_format::{ByteOrder, PixelFormat, Rounding};
 pub use render_error::RenderError;
 pub use report::FrameReport;
@@ -178,7 +179,8 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
     /// [`DecodeError::OutOfRange`] for a frame larger than planned and [`DecodeError::BadFloat`] for an unusable camera.
     ///
     /// # Budget
-    /// No memory beyond the bound one, but for the drawing itself, under 1 KiB.
+    /// No memory beyond the bound one, but for the drawing itself, under 1 KiB. A look at each record of the directory for each strip;
+    /// where damage is skipped in slabs, also the checksums of the chunks in view.
     pub fn begin(&mut self, camera: &Camera) -> Result<Drawing<'_, 'b, 's, A>, DecodeError> {
         let view = self.view_of(camera)?;
         Ok(self.begin_frame(camera, view))

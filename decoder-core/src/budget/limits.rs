@@ -197,8 +197,9 @@ impl Budget {
         Self { skips_damage: true, ..self }
     }
 
-    /// Ends a frame that takes more than so many [model instructions](crate::FrameReport::instructions), about as many as a Cortex-M4
-    /// executes, with [`DecodeError::TooMuchWork`]: a file may ask for any number of them, whatever its manifest says.
+    /// Ends a frame that takes more than so many [model instructions](crate::FrameReport::instructions) with
+    /// [`DecodeError::TooMuchWork`]: a file may ask for any number of them, whatever its manifest says. A Cortex-M4 executes about as
+    /// many, and some more for the lists of splats, which there is memory for, and for the pixels of the frame.
     #[must_use]
     pub const fn with_most_work(self, most_work: u64) -> Self {
         Self { most_work, ..self }

@@ -58,6 +58,8 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
             rects,
             n: 0,
             most: 0,
+            full_at: None,
+            work: 0,
             n_indexed: 0,
             places_of_index: 0,
             order,

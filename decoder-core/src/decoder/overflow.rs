@@ -19,7 +19,7 @@ pub(super) struct Frame {
     pub(super) report: FrameReport,
     /// What the scene is worth in model instructions.
     pub(super) cost: ModelCost,
-    /// Model instructions of damaged chunks, which the report does not have.
+    /// Model instructions that the report does not have: of damaged chunks, checksums, and making room for splats.
     pub(super) in_vain: u64,
 }
 

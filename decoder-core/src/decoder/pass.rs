@@ -5,7 +5,7 @@ use core::marker::PhantomData;
 use core::ops::Range;
 
 use pocketsplat_format::bundle::{Chunk, Chunks, SuspendedReader};
-use pocketsplat_format::{DecodeError, Stage, Stopwatch};
+use pocketsplat_format::{DecodeError, Stage, Stopwatch, saturate};
 
 use super::collect::{GaussianCollector, SplatCollector, Target};
 use super::first_come::FirstCome;
@@ -22,8 +22,8 @@ use crate::scene::Anchor;
 const STEP: u64 = 200_000;
 /// Chunks that it looks at in the meantime, in view or not.
 const CHUNKS_OF_STEP: usize = 256;
-/// Baked Gaussians that it goes over in the meantime.
-const GAUSSIANS_OF_STEP: usize = 128;
+/// Model instructions of a byte whose checksum is compared.
+const CHECKSUM_BYTE: u32 = 8;
 
 /// A pass that is not complete.
 pub(super) struct Pass<'b> {
@@ -79,7 +79,7 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
     /// Empties the splat memory, and begins to fill it with the splats of `strip` from depth `from` on: all of them when there are
     /// places enough, or when splats are left out instead; else those of the slab that there are places for.
     pub(super) fn begin_pass(&mut self, strip: Strip, from: f32, frame: &mut Frame) -> Pass<'b> {
-        (self.splats.n, self.splats.most) = (0, 0);
+        (self.splats.n, self.splats.most, self.splats.full_at) = (0, 0, None);
         let mut target = Target { strip, slab: Slab::behind(from), band: frame.band(strip), makes_index: false };
         let is_indexed = matches!(frame.policy, OverflowPolicy::Slabs { index: IndexState::Made });
         if is_indexed {
@@ -103,8 +103,11 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
         frame: &mut Frame,
         watch: &mut impl Stopwatch,
     ) -> Result<bool, DecodeError> {
-        let end = frame.report.instructions(frame.cost).saturating_add(STEP);
+        let until = frame.instructions().saturating_add(STEP);
         for _ in 0..CHUNKS_OF_STEP {
+            if frame.instructions() >= until {
+                break;
+            }
             if pass.open.is_none() {
                 let Some((chunk, first_anchor)) = pass.chunks.next() else {
                     let Slab { n_left_out, .. } = pass.target.slab;
@@ -118,13 +121,15 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
             }
             let Pass { target, open, .. } = pass;
             let Some(chunk) = open else { continue };
-            match self.go_on_in(chunk, target, frame, end, watch) {
+            let end = until.saturating_sub(frame.in_vain);
+            let outcome = self.go_on_in(chunk, target, frame, end, watch);
+            frame.in_vain = frame.in_vain.saturating_add(core::mem::take(&mut self.splats.work));
+            match outcome {
                 Ok(true) => *open = None,
                 Ok(false) => return Ok(false),
                 Err(DecodeError::ChunkStream { .. }) if chunk.before.is_some() => {
                     self.leave_out(&chunk.chunk, chunk.before.as_ref(), target, frame);
                     *open = None;
-                    return Ok(false);
                 }
                 Err(error) => return Err(error),
             }
@@ -164,17 +169,17 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
             first_come: frame.policy.first_come(),
             report: frame.report,
         });
+        if self.skips_damage() && self.source.is_streamed() {
+            let n_bytes = saturate(chunk.n_bytes());
+            frame.in_vain = frame.in_vain.saturating_add(u64::from(n_bytes) * u64::from(CHECKSUM_BYTE));
+        }
         if !self.is_sound(&chunk) {
             self.leave_out(&chunk, before.as_ref(), &pass.target, frame);
             return;
         }
         let anchors = first_anchor..first_anchor.saturating_add(chunk.n_anchors().into());
         let (numbers, reader) = match &mut self.source {
-            GaussianSource::Baked(baked) if cfg!(feature = "baked") => {
-                let numbers = baked.numbers_of_chunk(chunk.index());
-                frame.report.gaussians = frame.report.gaussians.saturating_add(numbers.len() as u32);
-                (numbers, None)
-            }
+            GaussianSource::Baked(baked) if cfg!(feature = "baked") => (baked.numbers_of_chunk(chunk.index()), None),
             GaussianSource::Baked(_) => (0..0, None),
             GaussianSource::Anchors(Anchors { source, evaluator, .. }) => {
                 evaluator.discard_waiting();
@@ -233,11 +238,15 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
             GaussianSource::Baked(_) if !cfg!(feature = "baked") => return Err(DecodeError::Internal),
             GaussianSource::Baked(baked) => {
                 watch.enter(Stage::Project);
-                let splats = &mut gaussians.splats;
-                for number in numbers.by_ref().take(GAUSSIANS_OF_STEP) {
+                let GaussianCollector { splats, report, .. } = &mut gaussians;
+                for number in numbers.by_ref() {
+                    report.gaussians = report.gaussians.saturating_add(1);
                     let gaussian = baked.gaussian(number, effects).ok_or(DecodeError::Internal)?;
                     if splats.target.band.is_none_or(|band| band.sees_gaussian(&gaussian)) {
                         splats.project::<A::Functions>(number, &gaussian, effects);
+                    }
+                    if report.instructions(*cost).saturating_add(splats.splats.work) >= end {
+                        break;
                     }
                 }
                 return Ok(numbers.start >= numbers.end);
@@ -264,7 +273,8 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
                 report.anchors_visible = report.anchors_visible.saturating_add(1);
                 evaluator.visit::<A::Functions>(number, &anchor, (effects, view.eye), watch, &mut gaussians);
             }
-            Ok(gaussians.report.instructions(*cost) < end)
+            let GaussianCollector { splats, report, .. } = &gaussians;
+            Ok(report.instructions(*cost).saturating_add(splats.splats.work) < end)
         })?;
         if is_complete {
             evaluator.finish::<A::Functions>(effects, watch, &mut gaussians);

@@ -79,7 +79,7 @@ impl FrameReport {
     pub fn instructions(&self, cost: ModelCost) -> u64 {
         let from_memory = self.anchors_read.saturating_sub(self.anchors_decoded);
         let of = |n: u32, each: u32| u64::from(n) * u64::from(each);
-        // A cost is below 2²⁰, so that no sum comes near the end of 64 bits.
+        // A cost is below 2²¹, so that no sum comes near the end of 64 bits.
         of(self.anchors_decoded, cost.decoded)
             + of(from_memory, FROM_MEMORY)
             + of(self.anchors_visible, ModelCost::VISIBLE)

@@ -2,7 +2,7 @@
 
 use pocketsplat_format::{DecodeError, Field, saturate};
 
-use super::frame::Drawing;
+use super::drawing::Drawing;
 use super::pixel_format::PixelFormat;
 use crate::arithmetic::Arithmetic;
 

@@ -9,6 +9,10 @@ use super::strip::Strip;
 use crate::project::{PackedSplat, Splat, TileRect};
 use crate::raster::{DIGITS, order_by_digit};
 
+/// Model instructions of sorting a splat, and of going over one to let go of some.
+const SORT: u32 = 130;
+const LET_GO: u32 = 30;
+
 /// The splats of the current strip, or of a slab of its depth, in the order of the file.
 pub(super) struct SplatStore<'s> {
     pub(super) splats: &'s mut [PackedSplat],
@@ -16,6 +20,10 @@ pub(super) struct SplatStore<'s> {
     pub(super) n: u32,
     /// The most that there were in this pass, before it let go of some.
     pub(super) most: u32,
+    /// The depth of all splats, where there is no place left and they have but one.
+    pub(super) full_at: Option<f32>,
+    /// Model instructions of making room, which no report has.
+    pub(super) work: u64,
     /// Chunks in the index, and the last places, which the index takes.
     pub(super) n_indexed: u32,
     pub(super) places_of_index: u32,
@@ -118,7 +126,8 @@ impl SplatStore<'_> {
     /// makes room: about the farthest eighth.
     ///
     /// # Budget
-    /// When there is no place a sort, which as many splats as an eighth of the places pay for: a slab less saves far more.
+    /// When there is no place a sort, which as a rule an eighth of the places pay for: a slab less saves far more. None where all lie at
+    /// one depth.
     pub(super) fn push_into(&mut self, slab: &mut Slab, splat: &Splat, rect: TileRect) {
         let lies_in = |slab: &Slab| slab.from <= splat.depth && splat.depth < slab.end;
         if !lies_in(slab) {
@@ -154,11 +163,16 @@ impl SplatStore<'_> {
     // Not inlined, here and below: rare, in the middle of a loop that is not.
     #[inline(never)]
     fn earlier_end(&mut self, depth: f32) -> Option<f32> {
+        if let Some(at) = self.full_at {
+            return if depth == at { None } else { Some(if depth > at { depth } else { at }) };
+        }
         DIGITS.into_iter().for_each(|shift| self.order_by(shift));
+        self.work = self.work.saturating_add(u64::from(self.n) * u64::from(SORT));
         let n = self.n as usize;
         let (splats, order) = (self.splats.get(..n)?, self.order.get(..n)?);
         let depth_of = |index: &u32| splats.get(*index as usize).map_or(0.0, PackedSplat::depth);
         let nearest = order.first().map_or(depth, depth_of);
+        self.full_at = order.last().map(depth_of).filter(|farthest| *farthest == nearest);
         let nearest = if depth < nearest { depth } else { nearest };
         let mut later = order.get(n - n.div_ceil(8)..).unwrap_or_default().iter().map(depth_of);
         later.find(|&end| end > nearest).or((depth > nearest).then_some(depth))
@@ -183,6 +197,7 @@ impl SplatStore<'_> {
     /// Keeps some of the splats, in their order.
     fn retain(&mut self, keeps: impl Fn(&PackedSplat, &TileRect) -> bool) {
         self.most = self.most.max(self.n);
+        self.work = self.work.saturating_add(u64::from(self.n) * u64::from(LET_GO));
         let mut n_kept = 0;
         for i in 0..self.n as usize {
             let Some((before, [splat, ..])) = self.splats.split_at_mut_checked(i) else { break };
@@ -198,7 +213,9 @@ impl SplatStore<'_> {
                 n_kept += 1;
             }
         }
-        self.n = n_kept as u32;
+        if n_kept as u32 != self.n {
+            (self.n, self.full_at) = (n_kept as u32, None);
+        }
     }
 }
 
@@ -208,7 +225,7 @@ mod tests {
 
     use bytemuck::Zeroable;
 
-    use super::{Slab, SplatStore};
+    use super::{LET_GO, SORT, Slab, SplatStore};
     use crate::project::{PackedSplat, Splat, TileRect};
     use crate::raster::N_RADIX;
 
@@ -235,6 +252,8 @@ mod tests {
                 rects: &mut std::vec![RECT; n_places],
                 n: 0,
                 most: 0,
+                full_at: None,
+                work: 0,
                 n_indexed: 0,
                 places_of_index: 0,
                 order: &mut std::vec![0; n_places],
@@ -287,6 +306,34 @@ mod tests {
     fn slabs_hold_the_farthest_depth_that_there_is() {
         let (slabs, n_dropped) = slabs(&[f32::MAX, 2.0, 1.0], 2);
         assert_eq!((slabs, n_dropped), (std::vec![std::vec![2.0, 1.0], std::vec![f32::MAX]], 0));
+    }
+
+    /// Else each of the many that find no place would sort all that have one.
+    #[test]
+    fn splats_at_one_depth_are_sorted_once() {
+        const N: usize = 40;
+        let mut store = SplatStore {
+            splats: &mut [PackedSplat::zeroed(); N],
+            rects: &mut [RECT; N],
+            n: 0,
+            most: 0,
+            full_at: None,
+            work: 0,
+            n_indexed: 0,
+            places_of_index: 0,
+            order: &mut [0; N],
+            spare: &mut [0; N],
+            counts: &mut [0; N_RADIX],
+        };
+        let mut slab = Slab::behind(0.0);
+        (0..1000).for_each(|_| store.push_into(&mut slab, &splat(2.0), RECT));
+        assert_eq!((store.work, slab.n_left_out), (u64::from(SORT) * N as u64, 960), "one sort");
+        // What lies farther ends the slab, each time nearer, and makes no place.
+        (0..100).for_each(|i| store.push_into(&mut slab, &splat(4.0 - 0.01 * i as f32), RECT));
+        assert!((slab.end - 3.01).abs() < 1e-6 && store.n == 40, "{slab:?}");
+        assert!(store.work <= u64::from(SORT + 101 * LET_GO) * N as u64, "no sort more: {}", store.work);
+        store.push_into(&mut slab, &splat(1.0), RECT);
+        assert_eq!((slab.end, store.n, slab.n_left_out), (2.0, 1, 0), "those behind a nearer one let go");
     }
 
     #[test]

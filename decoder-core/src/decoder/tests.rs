@@ -269,7 +269,8 @@ fn rows_go_on_where_small_steps_came_to() {
             }
             n_steps += 1;
         }
-        assert!(n_steps > 2 * expected.0.len() / 3, "{budget:?}: {n_steps} steps are small ones");
+        // Its tiles, and at least once the beginning, the anchors and four digits of a sort.
+        assert!(n_steps >= expected.0.len() + 6, "{budget:?}: {n_steps} steps are small ones");
     }
 }
 

@@ -58,8 +58,9 @@ pub(crate) struct TileWork {
     pub(crate) listed: usize,
 }
 
-/// Splats that one call blends at most.
+/// Splats that one call blends at most, and entries of a list that it looks at.
 const SPLATS_OF_STEP: u32 = 64;
+const ENTRIES_OF_STEP: usize = 8192;
 
 /// Draws the first splats of `list` that lie in a tile, in its order, behind what is in it.
 ///
@@ -82,7 +83,8 @@ pub(crate) fn blend_tile<F: Functions>(
     let mut work = TileWork::default();
     let at = [place.column, place.row].map(|index| f32::from(u16::from(index) * TILE_PX));
     let mut entries = list.iter();
-    while alive > 0 && work.splats < SPLATS_OF_STEP {
+    let n_left = list.len().saturating_sub(ENTRIES_OF_STEP);
+    while alive > 0 && work.splats < SPLATS_OF_STEP && entries.len() > n_left {
         let Some(&index) = entries.next() else { break };
         let (Some(rect), Some(splat)) = (rects.get(index as usize), splats.get(index as usize)) else { continue };
         if place.column < rect.first_column || place.column > rect.last_column {

@@ -32,7 +32,7 @@ impl Bundle<'_> {
     /// What its frames are worth in model instructions.
     #[must_use]
     pub fn model_cost(&self) -> ModelCost {
-        // At most 358 channels, 12 levels, 272 inputs, 256 hidden units: below 2²⁰.
+        // At most 358 channels, 12 levels, 272 inputs, 256 hidden units, 2¹⁵ taps: below 2²¹.
         let channels = self.header().n_channels() as u32;
         let coding = match self.coder() {
             Coder::Static(_) => channels.saturating_mul(8),

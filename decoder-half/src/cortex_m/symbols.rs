@@ -1,4 +1,4 @@
-//! Symbols of tables and of tries: the state of the stream stays in a register, and a table's memory is read without a comparison.
+//! Symbols of tables and of tries: the state of the stream stays in a register, and a table's bounds are read without a comparison.
 
 use core::arch::asm;
 use core::mem::offset_of;
@@ -8,6 +8,9 @@ pub use crate::portable::symbols::{
     ChannelTables, Entries, FREQUENCY_TOTAL, LEVELS_AT_ONCE, LevelFrequencies, NODE_CONTEXTS, PRECISION_BITS,
     STATE_MIN, Stream, TABLE_WORDS,
 };
+
+// The assembly multiplies by it with shifts.
+const _: () = assert!(size_of::<SymbolTable>() == 9 * 16);
 
 /// As [`read_values`](crate::portable::symbols::read_values).
 ///

@@ -15,6 +15,9 @@ pub const STATE_MIN: u32 = 1 << 16;
 const N_SHORT_CUTS: usize = 64;
 /// Bits of a quantile within such a piece.
 const PIECE_BITS: u32 = PRECISION_BITS - N_SHORT_CUTS.ilog2();
+/// Entries that a search goes over at most. Of a piece with more, which entries without slots make, none has a short cut.
+const MOST_IN_PIECE: usize = 1 << PIECE_BITS;
+
 /// Words of a table in memory.
 pub const TABLE_WORDS: usize = size_of::<SymbolTable>() / 4;
 
@@ -80,7 +83,8 @@ impl SymbolTable {
             let (first, last) = (entry_at(start), entry_at(start | ((1 << PIECE_BITS) - 1)));
             // Where the escape is in the piece, a search comes to its end.
             let last_symbol = last.min(escape.saturating_sub(1));
-            if entries.usual.contains(&first) && entries.usual.contains(&last_symbol) {
+            let is_short = last.saturating_sub(first) <= MOST_IN_PIECE;
+            if is_short && entries.usual.contains(&first) && entries.usual.contains(&last_symbol) {
                 *short_cut = first as u16;
             }
         }
@@ -327,6 +331,23 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    /// Each of thousands of entries without slots would be a step.
+    #[test]
+    fn a_piece_of_many_entries_has_no_short_cut() {
+        for (n_empty, is_short) in [(62, true), (1500, false), (60_000, false)] {
+            let bounds = [0, 70].into_iter().chain(core::iter::repeat_n(71, n_empty)).chain([4000, FREQUENCY_TOTAL]);
+            let section: Vec<u8> = bounds.flat_map(u16::to_le_bytes).collect();
+            let mut memory = [0; TABLE_WORDS];
+            let entries = [entries(0, 0, section.len() / 2)].into_iter();
+            let tables = ChannelTables::new(&mut memory, entries, &[[0, 0]], &section).expect("one table");
+            let found = [10, 64, 80, 128].map(|quantile| {
+                let mut stream = Stream { state: 1 << 28 | quantile, words: &[] };
+                read_values(&tables, 0, &mut [0.0], &mut stream) == 1
+            });
+            assert_eq!(found, [true, is_short, is_short, true], "{n_empty} entries without slots in the second piece");
         }
     }
 

@@ -72,7 +72,11 @@ fn wide(first: u16, second: u16) -> Cost {
             Cost::single(if by_register { 2 } else { 1 })
         }
         0b111_1101 => multiply(first, second),
+        // Coprocessor 10, and of 11, whose registers are two each, loads and stores.
         0b111_0110 | 0b111_0111 if second & 0x0F00 == 0x0A00 => vfp(first, second),
+        0b111_0110 if second & 0x0F00 == 0x0B00 => {
+            Cost::of(1 + u32::from(if first & 0x0120 == 0x0100 { 2 } else { second & 0xFF }))
+        }
         _ => Cost::of(1),
     }
 }

@@ -53,6 +53,8 @@ fn instructions_take_what_the_manual_says() {
         ("vcvt.u32.f32 s0, s1", &[0xEEBC, 0x0AE0], 1),
         ("vmov r0, s1", &[0xEE10, 0x0A90], 1),
         ("vmov r0, r1, s2, s3", &[0xEC51, 0x0A11], 2),
+        ("vpush {d8-d15}", &[0xED2D, 0x8B10], 17),
+        ("vldr d0, [r0]", &[0xED90, 0x0B00], 3),
         ("vldr s0, [r0]", &[0xED90, 0x0A00], 2),
         ("vldmia r0!, {s8-s11}", &[0xECB0, 0x4A04], 5),
         ("vstmia r0!, {s4-s7}", &[0xECA0, 0x2A04], 5),

@@ -43,7 +43,7 @@ pub(super) trait Channel: Copy {
     /// The same for values without an origin.
     fn from_scaled(symbol: i32, step: f32) -> Self;
 
-    /// Fills `run` from channel `first` on with symbols of tables in memory; returns how many there are before one that is not.
+    /// Fills `run` from channel `first` on with symbols of tables that have a short cut; returns how many there are before one that has none.
     fn read_tables(
         tables: &ChannelTables<'_, '_>,
         first: usize,

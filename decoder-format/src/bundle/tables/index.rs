@@ -12,7 +12,7 @@ use crate::error::DecodeError;
 #[derive(Clone, Copy, Debug)]
 pub(in crate::bundle) struct IndexedTables<'a, 's> {
     tables: Tables<'a>,
-    in_memory: ChannelTables<'a, 's>,
+    short_cuts: ChannelTables<'a, 's>,
     /// Bits of the symbols of a feature, of a log-scale, of a coordinate of an offset.
     symbol_bits: [u8; N_GROUPS],
     /// Where features end, and where log-scales do.
@@ -54,16 +54,17 @@ impl<'a, 's> IndexedTables<'a, 's> {
         scaled: bool,
     ) -> Result<Self, DecodeError> {
         let numbers = tables.channel_tables;
-        let unpacked = (0_u16..).zip(0..tables.len()).map_while(|(number, index)| {
+        let entries_of_all = (0_u16..).zip(0..tables.len()).map_while(|(number, index)| {
             // What all channels of a table have room for needs no comparison.
             let users = numbers.iter().enumerate().filter(|&(_, &user)| u16::from_le_bytes(user) == number);
             let bits = users.map(|(channel, _)| header.symbol_bits_of(channel)).min().unwrap_or(16);
             let start = (u32::from_le_bytes(*tables.offsets.get(index)?) as usize).saturating_add(TABLE_HEAD_LEN);
             Some(entries(&tables.get(index)?, start, bits, scaled))
         });
-        let in_memory = ChannelTables::new(memory, unpacked, numbers, tables.section).ok_or(DecodeError::Internal)?;
+        let short_cuts =
+            ChannelTables::new(memory, entries_of_all, numbers, tables.section).ok_or(DecodeError::Internal)?;
         let group_ends = [header.feature_dim.into(), header.n_scalars()];
-        Ok(Self { tables: *tables, in_memory, symbol_bits: header.symbol_bits, group_ends })
+        Ok(Self { tables: *tables, short_cuts, symbol_bits: header.symbol_bits, group_ends })
     }
 
     /// Fills `run` with the next symbols of `reader`, of the channels from `first` on. A symbol of more bits than its channel has
@@ -83,7 +84,7 @@ impl<'a, 's> IndexedTables<'a, 's> {
         value_of: impl Fn(i32, [f32; 2]) -> T,
     ) {
         while !run.is_empty() {
-            let n = read(&self.in_memory, first, run, reader);
+            let n = read(&self.short_cuts, first, run, reader);
             let Some((value, rest)) = run.get_mut(n..).and_then(<[T]>::split_first_mut) else { return };
             let channel = first.wrapping_add(n);
             let [features_end, log_scales_end] = self.group_ends;
@@ -95,8 +96,8 @@ impl<'a, 's> IndexedTables<'a, 's> {
             } else {
                 offset
             };
-            let symbol = rare_symbol(&self.tables, self.in_memory.number_of(channel), bits, reader);
-            *value = value_of(symbol, self.in_memory.scale_of(channel));
+            let symbol = rare_symbol(&self.tables, self.short_cuts.number_of(channel), bits, reader);
+            *value = value_of(symbol, self.short_cuts.scale_of(channel));
             (first, run) = (channel.wrapping_add(1), rest);
         }
     }
@@ -139,15 +140,15 @@ mod tests {
     }
 
     /// The symbol of each quantile that has a short cut, after a comparison of its slot with that of the bisection.
-    fn symbols_in_memory(bounds: &[[u8; 2]], bits: u8) -> Vec<Option<i32>> {
+    fn symbols_with_short_cut(bounds: &[[u8; 2]], bits: u8) -> Vec<Option<i32>> {
         let table = FrequencyTable { origin: 0.0, step: 1.0, min_symbol: -7, bounds };
         let mut memory = [0; TABLE_WORDS];
         let made = [entries(&table, 0, bits, true)].into_iter();
-        let in_memory = ChannelTables::new(&mut memory, made, &[[0; 2]], bounds.as_flattened()).expect("one table");
+        let short_cuts = ChannelTables::new(&mut memory, made, &[[0; 2]], bounds.as_flattened()).expect("one table");
         let symbol_of = |quantile: u16| {
             let mut stream = Stream { state: 1 << 28 | u32::from(quantile), words: &[] };
             let mut symbol = [i32::MAX];
-            let n = in_memory.read_values_with(0, &mut symbol, &mut stream, |symbol, _, _| symbol);
+            let n = short_cuts.read_values_with(0, &mut symbol, &mut stream, |symbol, _, _| symbol);
             (n == 1).then(|| {
                 let Slot { symbol: expected, start, frequency } = table.slot(quantile);
                 let state = (1 << 16) * u32::from(frequency) + u32::from(quantile - start);
@@ -165,7 +166,7 @@ mod tests {
     #[test]
     fn short_cuts_lead_where_bisection_leads_or_nowhere() {
         for bounds in tables() {
-            let found = symbols_in_memory(&bounds, 16);
+            let found = symbols_with_short_cut(&bounds, 16);
             // All but the escape, and what ends where it would begin.
             let n_coded = bounds.iter().map(|&bound| u16::from_le_bytes(bound)).filter(|&b| b < FREQUENCY_TOTAL).max();
             let n_found = found.iter().flatten().count();
@@ -176,7 +177,7 @@ mod tests {
     #[test]
     fn symbols_beyond_the_bits_of_a_channel_stay_in_the_file() {
         for (bounds, bits) in tables().into_iter().flat_map(|bounds| (1..=16).map(move |bits| (bounds.clone(), bits))) {
-            let found = symbols_in_memory(&bounds, bits);
+            let found = symbols_with_short_cut(&bounds, bits);
             let within = -1 << (bits - 1)..1 << (bits - 1);
             assert!(found.into_iter().flatten().all(|symbol| within.contains(&symbol)), "{bits} bits");
         }

@@ -167,10 +167,13 @@ mod tests {
     fn short_cuts_lead_where_bisection_leads_or_nowhere() {
         for bounds in tables() {
             let found = symbols_with_short_cut(&bounds, 16);
-            // All but the escape, and what ends where it would begin.
-            let n_coded = bounds.iter().map(|&bound| u16::from_le_bytes(bound)).filter(|&b| b < FREQUENCY_TOTAL).max();
-            let n_found = found.iter().flatten().count();
-            assert_eq!(n_found, usize::from(n_coded.unwrap_or(0)), "{} bounds", bounds.len());
+            // All but the escape, what ends where it would begin, and what shares 64 quantiles with more than as many entries.
+            let bound = |index: usize| u16::from_le_bytes(bounds[index]);
+            let n_coded = (0..bounds.len()).map(bound).filter(|&bound| bound < FREQUENCY_TOTAL).max().unwrap_or(0);
+            let entry_at = |quantile: u16| (0..bounds.len()).rfind(|&index| bound(index) <= quantile).unwrap_or(0);
+            let is_short = |piece: u16| entry_at(piece | 63) - entry_at(piece) <= 64;
+            let expected = (0..n_coded).filter(|quantile| is_short(quantile & !63)).count();
+            assert_eq!(found.iter().flatten().count(), expected, "{} bounds", bounds.len());
         }
     }
 

@@ -53,19 +53,7 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
         let source = source?;
         let FrameMemory { tiles, splats, lists } = FrameMemory::take(plan.shape(), &mut regions)?;
         let (TileMemory { pixels, rgb, counts }, ListMemory { rects, order, spare }) = (tiles, lists);
-        let splats = SplatStore {
-            splats: splats.splats,
-            rects,
-            n: 0,
-            most: 0,
-            full_at: None,
-            work: 0,
-            n_indexed: 0,
-            places_of_index: 0,
-            order,
-            spare,
-            counts,
-        };
+        let splats = SplatStore::new(splats.splats, rects, [order, spare], counts);
         Ok(Self { bundle: *bundle, plan, source, pixels, rgb, splats })
     }
 }

@@ -57,7 +57,7 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
         };
         let rule = BlendRule::new(budget.quality.alpha_cut);
         let cost = self.bundle.model_cost();
-        let mut frame = Frame { view, strips, policy, report: FrameReport::default(), cost, in_vain: 0 };
+        let mut frame = Frame { view, strips, policy, report: FrameReport::default(), cost, unreported: 0 };
         if self.skips_damage() && matches!(frame.policy, OverflowPolicy::Slabs { .. }) {
             self.note_damage(&mut frame);
         }
@@ -114,8 +114,10 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
         self.next_tile_watched(&mut ())
     }
 
-    /// Does a small part of the frame: a few anchors, a part of the sort of a strip, or a few splats of a tile. `Pending`
-    /// while there is nothing to show, and `None` when the frame is complete. Between two calls the processor is free; [`next_tile`](Self::next_tile) does as many at once as a tile takes.
+    /// Does a small part of the frame: a few anchors, a part of the sort of a strip, or a few splats of a tile.
+    ///
+    /// `Pending` while there is nothing to show, `None` when the frame is complete. Between two calls the processor is free;
+    /// [`next_tile`](Self::next_tile) does as many parts at once as a tile takes.
     ///
     /// ```
     /// # fn main() -> Result<(), pocketsplat_core::DecodeError> {

@@ -20,7 +20,7 @@ pub(super) struct Frame {
     /// What the scene is worth in model instructions.
     pub(super) cost: ModelCost,
     /// Model instructions that the report does not have: of damaged chunks, checksums, and making room for splats.
-    pub(super) in_vain: u64,
+    pub(super) unreported: u64,
 }
 
 /// Which splats are drawn where there may not be places for all.
@@ -48,7 +48,7 @@ impl OverflowPolicy {
 impl Frame {
     /// Model instructions so far.
     pub(super) fn instructions(&self) -> u64 {
-        self.report.instructions(self.cost).saturating_add(self.in_vain)
+        self.report.instructions(self.cost).saturating_add(self.unreported)
     }
 
     /// What the pass of a strip has to look at.

@@ -35,7 +35,6 @@ pub(super) struct Pass<'b> {
 }
 
 /// The chunks of the tiers that are drawn, each with the number of its first anchor.
-#[derive(Clone)]
 pub(super) struct PlannedChunks<'b> {
     chunks: Take<Chunks<'b>>,
     n_anchors: u32,
@@ -121,9 +120,9 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
             }
             let Pass { target, open, .. } = pass;
             let Some(chunk) = open else { continue };
-            let end = until.saturating_sub(frame.in_vain);
+            let end = until.saturating_sub(frame.unreported);
             let outcome = self.go_on_in(chunk, target, frame, end, watch);
-            frame.in_vain = frame.in_vain.saturating_add(core::mem::take(&mut self.splats.work));
+            frame.unreported = frame.unreported.saturating_add(core::mem::take(&mut self.splats.work));
             match outcome {
                 Ok(true) => *open = None,
                 Ok(false) => return Ok(false),
@@ -171,7 +170,7 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
         });
         if self.skips_damage() && self.source.is_streamed() {
             let n_bytes = saturate(chunk.n_bytes());
-            frame.in_vain = frame.in_vain.saturating_add(u64::from(n_bytes) * u64::from(CHECKSUM_BYTE));
+            frame.unreported = frame.unreported.saturating_add(u64::from(n_bytes) * u64::from(CHECKSUM_BYTE));
         }
         if !self.is_sound(&chunk) {
             self.leave_out(&chunk, before.as_ref(), &pass.target, frame);
@@ -198,7 +197,7 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
     fn leave_out(&mut self, chunk: &Chunk<'b>, before: Option<&Before>, target: &Target, frame: &mut Frame) {
         let Some(before) = before else { return };
         let [now, then] = [&frame.report, &before.report].map(|report| report.instructions(frame.cost));
-        frame.in_vain = frame.in_vain.saturating_add(now.saturating_sub(then));
+        frame.unreported = frame.unreported.saturating_add(now.saturating_sub(then));
         (self.splats.n, frame.report) = (before.n_splats, before.report);
         if let (OverflowPolicy::FirstCome { first_come, .. }, Some(admitted)) = (&mut frame.policy, before.first_come) {
             *first_come = admitted;

@@ -54,7 +54,21 @@ impl Slab {
     }
 }
 
-impl SplatStore<'_> {
+impl<'s> SplatStore<'s> {
+    /// No splats yet; as many places as there are `splats`, and one entry of `rects`, `order` and `spare` for each.
+    ///
+    /// * `counts`: [`N_RADIX`](crate::raster::N_RADIX) entries.
+    #[inline(always)]
+    pub(super) fn new(
+        splats: &'s mut [PackedSplat],
+        rects: &'s mut [TileRect],
+        [order, spare]: [&'s mut [u32]; 2],
+        counts: &'s mut [u32],
+    ) -> Self {
+        let (n_indexed, places_of_index) = (0, 0);
+        Self { splats, rects, n: 0, most: 0, full_at: None, work: 0, n_indexed, places_of_index, order, spare, counts }
+    }
+
     /// Splats that there is memory for.
     pub(super) fn places(&self) -> u32 {
         saturate(self.splats.len()).saturating_sub(self.places_of_index)
@@ -247,19 +261,11 @@ mod tests {
     fn slabs(depths: &[f32], n_places: usize) -> (Vec<Vec<f32>>, u32) {
         let (mut slabs, mut n_dropped, mut from) = (Vec::new(), 0, 0.0);
         loop {
-            let mut store = SplatStore {
-                splats: &mut std::vec![PackedSplat::zeroed(); n_places],
-                rects: &mut std::vec![RECT; n_places],
-                n: 0,
-                most: 0,
-                full_at: None,
-                work: 0,
-                n_indexed: 0,
-                places_of_index: 0,
-                order: &mut std::vec![0; n_places],
-                spare: &mut std::vec![0; n_places],
-                counts: &mut [0; N_RADIX],
-            };
+            let mut splats = std::vec![PackedSplat::zeroed(); n_places];
+            let (mut rects, mut order, mut spare) =
+                (std::vec![RECT; n_places], std::vec![0; n_places], std::vec![0; n_places]);
+            let mut counts = [0; N_RADIX];
+            let mut store = SplatStore::new(&mut splats, &mut rects, [&mut order, &mut spare], &mut counts);
             let mut slab = Slab::behind(from);
             for &depth in depths {
                 store.push_into(&mut slab, &splat(depth), RECT);
@@ -312,19 +318,9 @@ mod tests {
     #[test]
     fn splats_at_one_depth_are_sorted_once() {
         const N: usize = 40;
-        let mut store = SplatStore {
-            splats: &mut [PackedSplat::zeroed(); N],
-            rects: &mut [RECT; N],
-            n: 0,
-            most: 0,
-            full_at: None,
-            work: 0,
-            n_indexed: 0,
-            places_of_index: 0,
-            order: &mut [0; N],
-            spare: &mut [0; N],
-            counts: &mut [0; N_RADIX],
-        };
+        let (mut splats, mut rects, mut counts) = ([PackedSplat::zeroed(); N], [RECT; N], [0; N_RADIX]);
+        let (mut order, mut spare) = ([0; N], [0; N]);
+        let mut store = SplatStore::new(&mut splats, &mut rects, [&mut order, &mut spare], &mut counts);
         let mut slab = Slab::behind(0.0);
         (0..1000).for_each(|_| store.push_into(&mut slab, &splat(2.0), RECT));
         assert_eq!((store.work, slab.n_left_out), (u64::from(SORT) * N as u64, 960), "one sort");

@@ -192,7 +192,7 @@ impl<'b, 's> ChannelTables<'b, 's> {
 /// is before it.
 ///
 /// # Budget
-/// About 55 instructions a value; with the assembly of a Cortex-M 31, and 3 for each entry walked past.
+/// About 55 instructions a value; with the assembly of a Cortex-M 33, and 3 for each entry walked past.
 #[inline(always)]
 pub fn read_values(tables: &ChannelTables<'_, '_>, first: usize, values: &mut [f32], stream: &mut Stream<'_>) -> usize {
     tables.read_values_with(first, values, stream, |symbol, origin, step| origin + symbol as f32 * step)

@@ -5,13 +5,13 @@ use std::ffi::OsString;
 use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
 
 /// Names of 3DGS, nerfstudio, gsplat, brush and LichtFeld Studio, and what says the same here.
-const NAMES: [(&[&str], &str); 7] = [
+const NAMES: [(&[&str], &str); 9] = [
     (
         &["data", "data-path", "data_dir", "data-dir", "source_path", "source-path"],
         "photographs are given without an option: `pocketsplat train PHOTOS -o scene.psb`",
     ),
     (
-        &["max-steps", "max_steps", "total-steps", "steps", "max-num-iterations", "iter"],
+        &["max-steps", "max_steps", "total-steps", "steps", "max-num-iterations", "total-train-iters", "iter"],
         "`--iterations N` is its name here",
     ),
     (
@@ -25,6 +25,14 @@ const NAMES: [(&[&str], &str); 7] = [
         "`--max-resolution PX` says the longest side",
     ),
     (&["white_background", "white-background"], "`--background white` is its name here"),
+    (
+        &["cap_max", "cap-max", "max-cap", "max-splats"],
+        "`--max-anchors N` bounds a scene; an anchor has up to ten Gaussians",
+    ),
+    (
+        &["start_checkpoint", "load-checkpoint", "load-dir", "ckpt", "resume-from"],
+        "`--resume` goes on from the run's own checkpoint",
+    ),
 ];
 
 /// What says the same here, where somebody gave `train` another trainer's option.
@@ -37,6 +45,19 @@ pub(super) fn hint(arguments: &[OsString], error: &Error) -> Option<&'static str
     let Some(ContextValue::String(given)) = error.get(ContextKind::InvalidArg) else { return None };
     let name = given.trim_start_matches('-').split('=').next().unwrap_or_default();
     NAMES.iter().find(|(names, _)| names.contains(&name)).map(|(_, hint)| *hint)
+}
+
+/// The names as docs/commands.md lists them.
+#[cfg(test)]
+pub(super) fn table() -> String {
+    let rows = NAMES.iter().map(|(names, hint)| {
+        let names: Vec<String> = names.iter().map(|name| format!("`--{name}`")).collect();
+        format!("| {} | {hint} |\n", names.join(", "))
+    });
+    format!(
+        "\nOptions of 3DGS, nerfstudio, gsplat, brush and LichtFeld Studio are not taken; the error says what is:\n\n| there | here |\n|---|---|\n{}",
+        rows.collect::<String>()
+    )
 }
 
 /// The hints name options that there are, and no name is one of ours.

@@ -132,6 +132,9 @@ mod tests {
             let _ = writeln!(text, "\n## {group}");
             for name in names {
                 text += &section(cli.find_subcommand(name).expect("a command"));
+                if *name == "train" {
+                    text += &crate::command::foreign::table();
+                }
             }
         }
         let page = std::fs::read_to_string(PAGE).expect("the page");

@@ -546,6 +546,28 @@ job_python() {
   (cd "$target" && "$environment/bin/python" "$OLDPWD/python/tests/run_notebook.py" "$OLDPWD/python/notebook.ipynb")
 }
 
+# Not one of `jobs`: the files of a release for this machine's target, in target/release-files. CONTRIBUTING says what becomes of them.
+job_release() {
+  local version host name files=$target/release-files
+  job_npm
+  job_python
+  cargo build --release --locked
+  version=$(sed -n 's/^version = "\(.*\)"$/\1/p' Cargo.toml)
+  host=$(rustc --print host-tuple)
+  # As `cargo binstall` looks for it.
+  name=pocketsplat-$host-v$version
+  rm -rf "$files"
+  mkdir -p "$files/$name"
+  cp "$target/release/pocketsplat" README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE "$files/$name"
+  "$target/release/pocketsplat" man "$files/$name/man"
+  for shell in bash zsh fish; do "$target/release/pocketsplat" completions $shell >"$files/$name/pocketsplat.$shell"; done
+  tar -C "$files" --owner=0 --group=0 -czf "$files/$name.tgz" "$name"
+  rm -r "${files:?}/$name"
+  cp "$target"/wheels/*.whl "$target"/npm/pocketsplat-*.tgz "$files"
+  (cd "$files" && sha256sum -- * >SHA256SUMS)
+  ls -l "$files"
+}
+
 # A plan of runs, killed at a random moment under either executor, ends in the same tables.
 job_many-runs() {
   need_command pkill procps

@@ -1,0 +1,18 @@
+# The command with what it drives: COLMAP and ffmpeg for `poses`, a Vulkan loader for GPUs that the container is given.
+#
+#   docker build -t pocketsplat .
+#   docker run --rm -v "$PWD:/work" pocketsplat train PHOTOS -o scene.psb
+#
+# Outputs belong to root unless `--user "$(id -u):$(id -g)"` is given too.
+FROM rust:1.95-bookworm AS build
+COPY . /source
+WORKDIR /source
+RUN cargo install --locked --path host-trainer/cli --root /installed
+
+FROM debian:bookworm-slim
+RUN apt-get update \
+    && apt-get install -y --no-install-recommends colmap ffmpeg libvulkan1 \
+    && rm -rf /var/lib/apt/lists/*
+COPY --from=build /installed/bin/pocketsplat /usr/local/bin/
+WORKDIR /work
+ENTRYPOINT ["pocketsplat"]

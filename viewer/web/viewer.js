@@ -10,6 +10,8 @@ const NO_LIMIT = 200;
 const FIGURES_MS = 200;
 /** How long the camera rests before the address has it. */
 const PLACE_MS = 400;
+/** The part of its pixels on a side that the first picture gets, drawn while the browser still compiles; a sharp one follows. */
+const FIRST_PART = 0.5;
 /** How long a picture stands still before it sways. */
 const LOOK_MS = 1000;
 
@@ -59,7 +61,7 @@ function isSameCapture({ centre: a, scale }, { centre: b, scale: other }) {
 function next(view) {
   const size = frameSize();
   const settings = settingsOf(view, size);
-  const sharpness = state.device ? 1 : view.sharpness.part(size[0] * size[1], motion.isMoving);
+  const sharpness = state.device ? 1 : view.frame ? view.sharpness.part(size[0] * size[1], motion.isMoving) : FIRST_PART;
   const camera = cameraOf(view, ...size.map((side) => Math.max(16, Math.round(side * sharpness))));
   return { settings, camera, key: JSON.stringify([settings, state.ramStep, camera]) };
 }

@@ -61,7 +61,7 @@ const CRATES: [(&str, &[&str]); 14] = [
     ),
     ("host-trainer/codec/src", &["bundle", "render", "manifest", "verify"]),
     ("host-trainer/trainer/src", &["train", "explicit", "export", "device", "encode", "effects", "cost"]),
-    ("host-trainer/instructions/src", &["context", "level"]),
+    ("host-trainer/instructions/src", &["context", "processor", "board", "level"]),
     ("viewer/src", &["figures", "focus", "scene", "exports", "package", "page"]),
     ("host-trainer/cli/src", &["say", "program", "plot", "config", "command"]),
     ("python/src", &["error", "camera", "bundle"]),

@@ -1,5 +1,8 @@
 //! One HTML file that draws bundles, with everything inside.
 
+use pocketsplat_instructions::InstructionSet;
+use pocketsplat_instructions::board::{BOARDS, Board};
+
 use crate::package::{CHECK, MODULE, MOTION, ORBIT, POCKETSPLAT, SHARPNESS, VIEW, WORKER};
 
 const PAGE: &str = include_str!("../web/page.html");
@@ -38,8 +41,27 @@ pub fn page(title: &str, scenes: &[SceneFile<'_>]) -> String {
         .replace("{{MODULE}}", &base64(MODULE))
         .replace("{{WORKER}}", &joined(&[CHECK, POCKETSPLAT, WORKER]))
         .replace("{{SCRIPT}}", &joined(&SCRIPTS))
+        .replace("{{BOARDS}}", &boards())
         .replace("{{TITLE}}", &escaped(title))
         .replace("{{BUNDLES}}", &bundles.join("\n"))
+}
+
+/// An option for each board, with what the page takes of it.
+fn boards() -> String {
+    let options = BOARDS.iter().map(|board| {
+        let Board { chip, clock_mhz, ram_bytes, frame_px: [width, height], processor, .. } = board;
+        let set = match processor.instruction_set() {
+            InstructionSet::CortexM => "cortexM",
+            InstructionSet::RiscV32 => "riscv32",
+        };
+        let hertz = u64::from(*clock_mhz) * 1_000_000;
+        format!(
+            "          <option value=\"{set}\" data-size=\"{width},{height}\" data-ram=\"{ram_bytes}\" data-hertz=\"{hertz}\" data-cycles=\"{}\">{}</option>",
+            processor.cycles_per_instruction(),
+            escaped(chip)
+        )
+    });
+    options.collect::<Vec<_>>().join("\n")
 }
 
 /// Modules as one script: what one exports the next ones see, so nothing is imported.

@@ -153,6 +153,13 @@ async function hands() {
   document.querySelector('input[value="draft"]').click();
   await settled();
   check(state.quality === 'draft' && view.frame.splats > 0, 'quality plans anew');
+  const boards = document.getElementById('target');
+  const pico = [...boards.options].find((option) => option.textContent.startsWith('Pico 2'));
+  pico.selected = true;
+  boards.dispatchEvent(new Event('change'));
+  await settled();
+  check(state.device && view.canvas.width === 240 && view.plan.scratchBytes <= state.ramBytes, 'a board sets display and memory');
+  check(state.ramBytes === 500 * 1024 && / s$/.test(document.querySelector('#stages b').textContent), 'a board has seconds');
   const turned = orbit.yaw;
   press(' ');
   for (let i = 0; i < 50 && orbit.yaw === turned; i++) await sleep(100);

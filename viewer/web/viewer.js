@@ -94,7 +94,7 @@ function showFigures() {
   }
   showPlans($('plan'), views);
   showFrames($('frame'), views);
-  showInstructions($('stages'), views, $('target').value);
+  showInstructions($('stages'), views, $('target').selectedOptions[0]);
   showRam();
 }
 
@@ -166,6 +166,18 @@ function setDevice(device) {
   motion.touch();
 }
 
+/** Takes the display and the memory of a board. */
+function takeBoard({ size, ram }) {
+  if (![...$('size').options].some((option) => option.value === size)) $('size').add(new Option(size.replace(',', '×'), size));
+  $('size').value = size;
+  state.size = size.split(',').map(Number);
+  state.ramBytes = Number(ram);
+  const [least, most] = ramRange();
+  const step = most > least ? Math.round((NO_LIMIT - 1) * (Math.log(ram / least) / Math.log(most / least))) : 0;
+  state.ramStep = $('ram').value = Math.min(Math.max(step, 0), NO_LIMIT - 1);
+  setDevice(true);
+}
+
 function stopSpinning() {
   motion.stop();
   $('spin').setAttribute('aria-pressed', 'false');
@@ -224,7 +236,11 @@ function listen() {
   $('full').hidden = !document.fullscreenEnabled;
   $('full').addEventListener('click', fillScreen);
   $('save').addEventListener('click', save);
-  $('target').addEventListener('change', () => showInstructions($('stages'), views, $('target').value));
+  $('target').addEventListener('change', () => {
+    const [{ dataset }] = $('target').selectedOptions;
+    if (dataset.size) takeBoard(dataset);
+    showFigures();
+  });
   $('size').addEventListener('change', (event) => ((state.size = event.target.value.split(',').map(Number)), motion.touch()));
   $('slabs').addEventListener('change', (event) => ((state.slabs = event.target.checked), motion.touch()));
   $('ram').addEventListener('input', (event) => {

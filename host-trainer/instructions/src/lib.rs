@@ -3,12 +3,15 @@
 //! The costs are fitted to counts of emulated boards by `cargo run -p tools --bin fit_instructions`; they are instructions, not
 //! cycles.
 
+pub mod board;
 mod context;
 pub mod level;
+mod processor;
 
 use pocketsplat_core::{Bundle, FrameReport, Plan, Stage};
 
 use context::ContextShape;
+pub use processor::Processor;
 
 use Stage::{Blend, Context, Decode, Heads, Output, Project, Sort};
 

@@ -10,11 +10,11 @@ use bytesize::ByteSize;
 use pocketsplat_capture::dataset::{Capture, Split, View};
 use pocketsplat_codec::render::reference::ReferenceScene;
 use pocketsplat_core::{Budget, Bundle, Camera, MaxSplats};
+use pocketsplat_instructions::Processor;
 use pocketsplat_kernels::camera::core_camera;
 use pocketsplat_trainer::cost::{
     CountError, Counter, Instructions, MOST_VIEWS, Measured, Setting, Sight, measure, parameters, quality_grid,
 };
-use pocketsplat_trainer::device::Processor;
 use rayon::prelude::*;
 
 use self::machine::Machine;

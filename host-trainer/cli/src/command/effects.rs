@@ -9,7 +9,7 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use pocketsplat_capture::dataset::Capture;
 use pocketsplat_files::shell_word;
-use pocketsplat_trainer::device::Processor;
+use pocketsplat_instructions::Processor;
 use pocketsplat_trainer::effects::{Effect, PilotCapture, PilotError, Pilots, measure};
 use pocketsplat_trainer::train::run::RunFolder;
 use serde::{Deserialize, Serialize};

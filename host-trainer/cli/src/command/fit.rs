@@ -9,13 +9,13 @@ use bytesize::ByteSize;
 use pocketsplat_capture::dataset::FrameSize;
 use pocketsplat_codec::verify::Trial;
 use pocketsplat_core::{Budget, Bundle, DecodeError, Overflow, Plan};
-use pocketsplat_instructions::predict;
-use pocketsplat_trainer::device::Processor;
+use pocketsplat_instructions::{Processor, predict};
 use serde::Serialize;
 
 use super::bundle::BundleFile;
 use super::output;
-use crate::config::named::{TARGETS, level_number, one_of};
+use crate::config::named::level_number;
+use crate::config::target::{BoardOrCore, board_or_core};
 use level::LevelFit;
 
 /// Plan memory and work for a device.
@@ -41,9 +41,10 @@ pub(crate) struct Args {
     /// Device level to check each tier against, at the training size: says which fit, and what is over by how much.
     #[arg(long, value_name = "N", value_parser = level_number(), conflicts_with_all = ["ram", "resolution", "slabs", "target"])]
     level: Option<u8>,
-    /// Processor for which to predict the instructions of the preview frame [default: none]
-    #[arg(long, value_parser = one_of::<Processor>(TARGETS))]
-    target: Option<Processor>,
+    /// Board, which sets --ram and --resolution where these are not given, and of which instructions and seconds of the preview frame are
+    /// predicted; or a kind of processor, for its instructions alone [default: none]
+    #[arg(long, value_name = "NAME", value_parser = board_or_core())]
+    target: Option<BoardOrCore>,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
@@ -75,6 +76,9 @@ pub(crate) struct Point {
     /// Of the preview, predicted; anchors kept in memory were decoded before.
     #[serde(skip_serializing_if = "Option::is_none")]
     instructions: Option<u64>,
+    /// Of the preview on the board, from its instructions, the cycles of one and the clock.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    seconds: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -95,19 +99,31 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         return if args.json { output::print(&fit, true) } else { output::print_text(&fit.table()) };
     }
     let overflow = if args.slabs { Overflow::Slabs } else { Overflow::LeaveOut };
-    let frame = frame_budget(&bundle, args.resolution)?.with_overflow(overflow);
-    let plans = if args.ram.is_empty() {
+    let board = args.target.and_then(BoardOrCore::board);
+    let size = args.resolution.or(board.map(|board| {
+        let [width_px, height_px] = board.frame_px.map(u32::from);
+        FrameSize { width_px, height_px }
+    }));
+    let rams: Vec<u64> = match board {
+        Some(board) if args.ram.is_empty() => vec![board.ram_bytes],
+        _ => args.ram.iter().map(ByteSize::as_u64).collect(),
+    };
+    let frame = frame_budget(&bundle, size)?.with_overflow(overflow);
+    let plans = if rams.is_empty() {
         ladder(&bundle, &frame)?
     } else {
-        let within = |ram: &ByteSize| {
-            let plan = plan_within(&bundle, &frame, ram.as_u64()).with_context(|| format!("{ram} do not suffice"))?;
-            Ok((ram.as_u64(), plan))
+        let within = |ram_bytes: u64| {
+            let plan = plan_within(&bundle, &frame, ram_bytes)
+                .with_context(|| format!("{} do not suffice", ByteSize(ram_bytes)))?;
+            Ok((ram_bytes, plan))
         };
-        args.ram.iter().map(within).collect::<Result<_>>()?
+        rams.into_iter().map(within).collect::<Result<_>>()?
     };
     let points = plans.iter().map(|(ram_bytes, plan)| {
-        let instructions = args.target.map(|target| preview_instructions(&bundle, plan, target)).transpose()?;
-        Ok(Point { instructions, ..point(&bundle, *ram_bytes, plan) })
+        let processor = args.target.map(BoardOrCore::processor);
+        let instructions = processor.map(|processor| preview_instructions(&bundle, plan, processor)).transpose()?;
+        let seconds = board.zip(instructions).map(|(board, instructions)| board.seconds(instructions as f64));
+        Ok(Point { instructions, seconds, ..point(&bundle, *ram_bytes, plan) })
     });
     let points = points.collect::<Result<_>>()?;
     let fit = Fit {
@@ -154,11 +170,11 @@ pub(crate) fn plan_within(bundle: &Bundle<'_>, frame: &Budget, ram_bytes: u64) -
 }
 
 /// Draws the preview in the plan's size, and predicts from what it consists of.
-fn preview_instructions(bundle: &Bundle<'_>, plan: &Plan, target: Processor) -> Result<u64> {
+fn preview_instructions(bundle: &Bundle<'_>, plan: &Plan, processor: Processor) -> Result<u64> {
     let Budget { width_px, height_px, .. } = *plan.budget();
     let camera = bundle.header().preview.resized(width_px, height_px);
     let Trial { report, .. } = Trial::run(bundle, *plan, &camera, 0, 0)?;
-    let stages = predict(target.instruction_set(), bundle, plan, &report, [width_px, height_px]);
+    let stages = predict(processor.instruction_set(), bundle, plan, &report, [width_px, height_px]);
     Ok(stages.iter().sum::<f64>() as u64)
 }
 
@@ -181,6 +197,7 @@ fn point(bundle: &Bundle<'_>, ram_bytes: u64, plan: &Plan) -> Point {
         decoded_anchors: work.map(|work| work.decoded_anchors),
         pixel_splats: work.map(|work| work.pixel_splats),
         instructions: None,
+        seconds: None,
     }
 }
 
@@ -207,7 +224,7 @@ fn ladder(bundle: &Bundle<'_>, frame: &Budget) -> Result<Vec<(u64, Plan)>> {
 
 fn table(fit: &Fit) -> String {
     let mut text = format!(
-        "{}: {} bytes, {} anchors, frames of {}x{} px\n\n{:>10}{:>10}{:>8}{:>9}{:>10}{:>7}{:>6}{:>9}{:>8}{:>11}{:>9}{:>12}{:>9}\n",
+        "{}: {} bytes, {} anchors, frames of {}x{} px\n\n{:>10}{:>10}{:>8}{:>9}{:>10}{:>7}{:>6}{:>9}{:>8}{:>11}{:>9}{:>12}{:>9}{:>9}\n",
         fit.bundle.display(),
         fit.bundle_bytes,
         fit.n_anchors,
@@ -225,14 +242,15 @@ fn table(fit: &Fit) -> String {
         "head MMAC",
         "decoded",
         "Mpixels",
-        if fit.points.iter().any(|point| point.instructions.is_some()) { "Minstr" } else { "" }
+        if fit.points.iter().any(|point| point.instructions.is_some()) { "Minstr" } else { "" },
+        if fit.points.iter().any(|point| point.seconds.is_some()) { "seconds" } else { "" }
     );
     for point in &fit.points {
         let psnr = point.psnr_db.map_or_else(|| "-".to_owned(), |psnr| format!("{psnr:.2}"));
         let millions = |count: Option<u64>| count.map_or_else(|| "-".to_owned(), |n| format!("{:.2}", n as f64 / 1e6));
         let decoded = point.decoded_anchors.map_or_else(|| "-".to_owned(), |n| n.to_string());
         text += &format!(
-            "{:>10}{:>10}{:>7.1}%{:>9}{:>10}{:>7}{:>6}{:>9}{psnr:>8}{:>11}{decoded:>9}{:>12}{:>9}\n",
+            "{:>10}{:>10}{:>7.1}%{:>9}{:>10}{:>7}{:>6}{:>9}{psnr:>8}{:>11}{decoded:>9}{:>12}{:>9}{:>9}\n",
             point.ram_bytes,
             point.scratch_bytes,
             100.0 * point.pruning_rate,
@@ -248,6 +266,7 @@ fn table(fit: &Fit) -> String {
             millions(point.head_macs),
             millions(point.pixel_splats),
             point.instructions.map_or_else(String::new, |n| format!("{:.1}", n as f64 / 1e6)),
+            point.seconds.map_or_else(String::new, |seconds| format!("{seconds:.2}")),
         );
     }
     text

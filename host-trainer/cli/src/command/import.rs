@@ -16,6 +16,7 @@ use pocketsplat_trainer::train::config::ExposureChoice;
 use pocketsplat_trainer::train::run::RunFolder;
 use serde::Serialize;
 
+use super::device_args::DeviceArgs;
 use super::devices::DeviceOption;
 use super::gaussians::{AxesArgs, GaussiansFile};
 use super::loss::{LossArgs, loss_at_30_db};
@@ -23,7 +24,7 @@ use super::outputs::{BUNDLE, OverwriteArgs, check_name};
 use super::settings::QualityOptions;
 use super::stand::{StandArgs, bulk_of};
 use super::train::{Attempt, GoesOn, HeldOut, TrainResult, begun_or_new, train_in};
-use super::train_args::{DeviceArgs, check_lambda, run_folder};
+use super::train_args::{check_lambda, run_folder};
 use super::{output, process, stop};
 use crate::config::heading::{INPUT, OUTPUT, QUALITY, RUN};
 use crate::config::named::{BACKGROUNDS, one_of};

@@ -7,6 +7,7 @@ mod compare;
 mod completions;
 mod cost;
 mod demo;
+mod device_args;
 mod devices;
 mod doctor;
 mod effects;

@@ -3,23 +3,21 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
-use bytesize::ByteSize;
-use pocketsplat_capture::dataset::{Background, FrameSize};
+use pocketsplat_capture::dataset::Background;
 use pocketsplat_codec::bundle::PRUNING_RATES;
 use pocketsplat_files::{Content, Output};
-use pocketsplat_instructions::level::{Bound, Level};
 use pocketsplat_kernels::step::SharedDevice;
-use pocketsplat_trainer::device::{Limits, ModelChoice, Processor, choose};
+use pocketsplat_trainer::device::Limits;
 use pocketsplat_trainer::effects::Price;
 use pocketsplat_trainer::train::config::Backbone;
 use pocketsplat_trainer::train::run::is_file_of_run;
 
 use super::capture::CaptureArgs;
+use super::device_args::DeviceArgs;
 use super::devices::{DeviceChoice, DeviceOption};
 use super::outputs::{OverwriteArgs, check_name, reading_capture};
 use super::settings::{QualityOptions, RunOptions, applied};
-use crate::config::heading::{DEVICE, INPUT, OUTPUT, QUALITY, RUN};
-use crate::config::named::{TARGETS, level_number, one_of};
+use crate::config::heading::{INPUT, OUTPUT, QUALITY, RUN};
 use crate::config::{CaptureOptions, EXPLICIT, ExplicitRunConfig, Preset, RunConfig, absolute};
 use crate::say::say;
 
@@ -96,111 +94,9 @@ pub(crate) struct Args {
     options: RunOptions,
 }
 
-/// What the device has that the bundle is for; what else the command line leaves open is chosen by it.
-#[derive(clap::Args)]
-pub(crate) struct DeviceArgs {
-    /// Device class 1 (64 KiB) to 5 (8 MiB): sets --ram, --flash, --resolution and --target, which may ask for less
-    /// [default: none]
-    #[arg(long, value_name = "N", value_parser = level_number(), help_heading = DEVICE)]
-    level: Option<u8>,
-    /// Scratch bytes of the decoder, as 192KiB, excluding stack and frame buffer; the whole scene is guaranteed to fit
-    /// [default: no limit]
-    #[arg(long, value_name = "BYTES", help_heading = DEVICE)]
-    ram: Option<ByteSize>,
-    /// Size of the bundle, as 300kB or 1MiB; the scene is trained to fill it [default: no limit]
-    #[arg(long, visible_alias = "bytes", value_name = "BYTES", help_heading = DEVICE)]
-    flash: Option<ByteSize>,
-    /// Processor, which limits the instructions of a frame [default: no limit]
-    #[arg(long, value_parser = one_of::<Processor>(TARGETS), help_heading = DEVICE)]
-    target: Option<Processor>,
-}
-
-impl DeviceArgs {
-    /// The limits asked for: those of the level, where the other options do not ask for less.
-    fn limits(&self) -> Result<Limits> {
-        let [ram_bytes, flash_bytes] = [self.ram, self.flash].map(|bytes| bytes.map(|bytes| bytes.as_u64()));
-        let given = Limits { ram_bytes, flash_bytes, processor: self.target, level: None };
-        let Some(level) = self.level.and_then(Level::numbered) else { return Ok(given) };
-        let of_level = Limits::of_level(level);
-        for (option, given, bound) in [("--ram", ram_bytes, Bound::Scratch), ("--flash", flash_bytes, Bound::Flash)] {
-            refuse_more(level, option, given, bound)?;
-        }
-        if let (Some(given), Some(needed)) = (given.processor, of_level.processor)
-            && given != needed
-        {
-            bail!(
-                "--target contradicts --level {}, which has a target of its own; leave one of them out",
-                level.number
-            );
-        }
-        Ok(Limits {
-            ram_bytes: ram_bytes.or(of_level.ram_bytes),
-            flash_bytes: flash_bytes.or(of_level.flash_bytes),
-            processor: self.target.or(of_level.processor),
-            ..of_level
-        })
-    }
-
-    /// The frame to train for: the one given, or the level's.
-    ///
-    /// * `is_sized`: whether another option says how large images are.
-    pub(crate) fn frame(&self, given: Option<FrameSize>, is_sized: bool) -> Result<Option<FrameSize>> {
-        let Some(level) = self.level.and_then(Level::numbered) else { return Ok(given) };
-        let pixels = given.map(|FrameSize { width_px, height_px }| u64::from(width_px) * u64::from(height_px));
-        refuse_more(level, "--resolution", pixels, Bound::Frame)?;
-        let [width_px, height_px] = level.frame_px.map(u32::from);
-        Ok(given.or((!is_sized).then_some(FrameSize { width_px, height_px })))
-    }
-
-    /// Sets the limits, and what they afford where the options leave it open; nothing without limits.
-    pub(crate) fn choose(&self, quality: &QualityOptions, lambda: Option<f64>, config: &mut RunConfig) -> Result<()> {
-        let limits = self.limits()?;
-        if limits.is_none() {
-            return Ok(());
-        }
-        config.encoding.limits = limits;
-        if let (None, None, Some(bytes)) = (limits.ram_bytes, limits.processor, limits.flash_bytes) {
-            quality.choose_width(&mut config.train, bytes)?;
-            let width = config.train.shape.feature_dim;
-            match config.train.modules.rdo {
-                Some(_) => say!(
-                    "to fill this size: features of width {width}; the number of anchors and lambda are found while it trains"
-                ),
-                None => say!(
-                    "warning: without rdo-pruning the scene is not trained to this size (features of width {width}); anchors \
-                     that have no room are left out in the end"
-                ),
-            }
-            return Ok(());
-        }
-        let choice = choose(&limits)?;
-        quality.choose(&mut config.train, &choice);
-        config.train.hac.lambda = lambda.unwrap_or(choice.lambda);
-        let ModelChoice { feature_dim, n_offsets, max_anchors, lambda, binding } = choice;
-        say!(
-            "for this device: features of width {feature_dim}, {n_offsets} offsets, about {max_anchors} anchors (limited by \
-             {binding}), lambda {lambda} at first; options override these"
-        );
-        Ok(())
-    }
-}
-
 fn is_same_folder(one: &Path, other: &Path) -> bool {
     let absolute = |path: &Path| path.canonicalize().or_else(|_| std::path::absolute(path)).ok();
     absolute(one) == absolute(other)
-}
-
-/// Refuses an option that allows more than the level does.
-fn refuse_more(level: &Level, option: &str, given: Option<u64>, bound: Bound) -> Result<()> {
-    let most = level.most(bound);
-    if let Some(given) = given.filter(|given| *given > most) {
-        bail!(
-            "{option} asks for {given} {name}, and --level {} allows {most}; leave one of them out, or ask for less",
-            level.number,
-            name = bound.name()
-        );
-    }
-    Ok(())
 }
 
 /// Refuses a weight of bits where none are weighed.
@@ -381,21 +277,14 @@ impl Args {
 
     /// `config` with everything replaced that the command line says.
     pub(crate) fn applied_to_explicit(&self, mut config: ExplicitRunConfig) -> Result<ExplicitRunConfig> {
-        let DeviceArgs { level, ram, flash, target } = &self.device;
         let mut refused = self.quality.of_anchors();
-        let device = [
-            ("--level", level.is_some()),
-            ("--ram", ram.is_some()),
-            ("--flash", flash.is_some()),
-            ("--target", target.is_some()),
-        ];
         let others = [
             ("--lambda", self.lambda.is_some()),
             ("--refine", self.refine),
             ("--watch", self.watch.is_some()),
             ("--device", matches!(self.trainer.trains_on, DeviceChoice::Gpu(_))),
         ];
-        let given = others.into_iter().chain(device).filter(|(_, given)| *given);
+        let given = others.into_iter().chain(self.device.given()).filter(|(_, given)| *given);
         refused.extend(given.map(|(name, _)| name));
         if !refused.is_empty() {
             bail!(

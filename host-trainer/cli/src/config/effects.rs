@@ -1,6 +1,6 @@
 //! How a run comes to its effects.
 
-use pocketsplat_trainer::device::Processor;
+use pocketsplat_instructions::Processor;
 use pocketsplat_trainer::effects::{LEAST_ITERATIONS, Price};
 use serde::{Deserialize, Serialize};
 

@@ -8,6 +8,7 @@ pub(crate) mod named;
 mod preset;
 mod protocol;
 mod spread;
+pub(crate) mod target;
 
 use std::path::{Path, PathBuf};
 

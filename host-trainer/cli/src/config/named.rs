@@ -12,7 +12,7 @@ pub(crate) const EXPLICIT: &str = "3dgs";
 // Names of the choices, in the order in which help shows them.
 pub(crate) const SURFACES: &[&str] = &["matte", "mixed", "glossy"];
 pub(crate) const CODERS: &[&str] = &["auto", "static", "context"];
-pub(crate) const TARGETS: &[&str] = &["cortex-m4", "cortex-m7", "riscv32imac"];
+pub(crate) const CORES: &[&str] = &["cortex-m4", "cortex-m7", "riscv32imac"];
 pub(crate) const BACKBONES: &[&str] = &["scaffold", "hac", "hac-plus", "contextgs", EXPLICIT];
 pub(crate) const SPLITS: &[&str] = &["test", "train"];
 pub(crate) const BACKGROUNDS: &[&str] = &["black", "white", "learned"];
@@ -27,10 +27,13 @@ pub(crate) fn one_of<T>(names: &'static [&'static str]) -> impl TypedValueParser
 where
     T: DeserializeOwned + Clone + Send + Sync + 'static,
 {
-    PossibleValuesParser::new(names).try_map(|name| {
-        let name: StrDeserializer<'_, Error> = name.as_str().into_deserializer();
-        T::deserialize(name)
-    })
+    PossibleValuesParser::new(names).try_map(|name| named(&name))
+}
+
+/// What serde calls so.
+pub(crate) fn named<T: DeserializeOwned>(name: &str) -> Result<T, Error> {
+    let name: StrDeserializer<'_, Error> = name.into_deserializer();
+    T::deserialize(name)
 }
 
 /// Parses the number of a level that there is.
@@ -42,8 +45,8 @@ pub(crate) fn level_number() -> impl TypedValueParser<Value = u8> {
 mod tests {
     use pocketsplat_capture::dataset::{Background, PointsChoice, SceneKind, Split};
     use pocketsplat_capture::synth::SurfaceFinish;
+    use pocketsplat_instructions::Processor;
     use pocketsplat_metrics::InputRange;
-    use pocketsplat_trainer::device::Processor;
     use pocketsplat_trainer::encode::CoderChoice;
 
     use super::*;
@@ -60,7 +63,7 @@ mod tests {
     fn every_name_shown_is_parsed() {
         all_parse::<SurfaceFinish>(SURFACES);
         all_parse::<CoderChoice>(CODERS);
-        all_parse::<Processor>(TARGETS);
+        all_parse::<Processor>(CORES);
         all_parse::<Split>(SPLITS);
         all_parse::<Background>(BACKGROUNDS);
         all_parse::<SceneKind>(SCENES);

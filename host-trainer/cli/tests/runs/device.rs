@@ -77,6 +77,23 @@ fn what_no_device_can_do_is_refused_with_the_nearest_that_can() {
 }
 
 #[test]
+fn a_board_sets_what_other_options_leave_open() {
+    let home = folder("board");
+    let output = home.join("a.psb");
+    succeeds(train(&output).args(["--target", "stm32f411", "--resolution", "32x32", "--flash", "20000"]));
+    let config = fs::read_to_string(home.join("a.run/config.toml")).unwrap();
+    for line in ["ram_bytes = 119808", "flash_bytes = 20000", "processor = \"cortex-m4\"", "resolution = \"32x32\""] {
+        assert!(config.contains(line), "{line}: {config}");
+    }
+    let fit = pocketsplat().args(["fit", "--target", "stm32f411", "--json"]).arg(&output).output().unwrap();
+    let fit: serde_json::Value = serde_json::from_slice(&fit.stdout).unwrap();
+    let point = &fit["points"][0];
+    assert_eq!((&fit["width_px"], &point["ram_bytes"]), (&128.into(), &119_808.into()), "the board's frame and memory");
+    let [instructions, seconds] = ["instructions", "seconds"].map(|name| point[name].as_f64().unwrap());
+    assert!((seconds - instructions * 1.54 / 100e6).abs() < 1e-9, "{point}");
+}
+
+#[test]
 fn a_level_sets_limits_that_hold_and_are_declared() {
     let home = folder("level");
     let output = home.join("a.psb");
@@ -84,6 +101,7 @@ fn a_level_sets_limits_that_hold_and_are_declared() {
         ("--ram", "60000", "--level 1 allows 54272"),
         ("--flash", "1MiB", "--level 1 allows 32768"),
         ("--target", "cortex-m7", "--target contradicts --level 1"),
+        ("--target", "rp2350", "--target rp2350 sets what --level 1 sets too"),
         ("--resolution", "160x120", "--level 1 allows 12288"),
     ] {
         let said = fails(train(&output).args(["--level", "1", option, value]));

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use pocketsplat_format::{Camera, Stage};
+use pocketsplat_instructions::Processor;
 
 use super::{Setting, Stages};
-use crate::device::Processor;
 
 /// What `firmware-example` keeps of its RAM for itself: stack and other statics, bytes.
 const FIRMWARE_BYTES: usize = 10 * 1024 + 512;

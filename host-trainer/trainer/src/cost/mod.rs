@@ -16,10 +16,9 @@ pub use counter::{CountError, Counter, MOST_VIEWS};
 pub use front::on_front;
 pub use setting::{Setting, parameters, quality_grid};
 
-use crate::device::Processor;
 use pocketsplat_capture::dataset::{Image, Photograph};
 use pocketsplat_codec::render::decoder::image_of;
-use pocketsplat_instructions::predict;
+use pocketsplat_instructions::{Processor, predict};
 use pocketsplat_metrics::{psnr_db, psnr_db_masked};
 
 /// A view to draw, and what it is compared with.

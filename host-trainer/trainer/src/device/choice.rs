@@ -3,8 +3,9 @@
 use std::fmt;
 
 use pocketsplat_core::ScratchShape;
+use pocketsplat_instructions::Processor;
 
-use super::{Limits, Processor};
+use super::Limits;
 
 /// Feature widths F and offsets K, widest first, and the splats that an anchor of them draws in the fullest view.
 ///

@@ -12,7 +12,7 @@ pub use width::{bytes_of_heads, widest_within};
 
 use serde::{Deserialize, Serialize};
 
-use pocketsplat_instructions::InstructionSet;
+use pocketsplat_instructions::Processor;
 use pocketsplat_instructions::level::{Bound, Level};
 
 /// What a device has.
@@ -51,36 +51,5 @@ impl Limits {
     /// Whether there is any.
     pub fn is_none(&self) -> bool {
         *self == Self::default()
-    }
-}
-
-/// A kind of processor, with the frame that it is meant for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Processor {
-    /// A Cortex-M4 with FPU: frames of 80 million instructions.
-    CortexM4,
-    /// A Cortex-M7: frames of 250 million instructions.
-    CortexM7,
-    /// RISC-V without an FPU (RV32IMAC): frames of 1,000 million instructions.
-    Riscv32imac,
-}
-
-impl Processor {
-    /// Instructions of a frame at most.
-    pub fn frame_instructions(self) -> u64 {
-        match self {
-            Self::CortexM4 => 80_000_000,
-            Self::CortexM7 => 250_000_000,
-            Self::Riscv32imac => 1_000_000_000,
-        }
-    }
-
-    /// Instructions whose costs it has.
-    pub fn instruction_set(self) -> InstructionSet {
-        match self {
-            Self::CortexM4 | Self::CortexM7 => InstructionSet::CortexM,
-            Self::Riscv32imac => InstructionSet::RiscV32,
-        }
     }
 }

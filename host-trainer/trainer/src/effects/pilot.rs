@@ -7,14 +7,14 @@ use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, MaxSplats, 
 
 use super::search::{Pilots, search};
 use super::{Effect, PilotFigures, Price};
-use crate::device::{Limits, Processor};
+use crate::device::Limits;
 use crate::encode::{CoderChoice, EncodeError, Encoding};
 use crate::train::config::{Backbone, ExposureChoice, MIN_VIEWS_TO_HOLD_OUT};
 use crate::train::modules::Modules;
 use crate::train::{TrainConfig, TrainError, Trainer};
 use pocketsplat_capture::dataset::{Capture, Image, PhotographError, View};
 use pocketsplat_codec::render::decoder::image_of;
-use pocketsplat_instructions::predict;
+use pocketsplat_instructions::{Processor, predict};
 use pocketsplat_kernels::camera::core_camera;
 use pocketsplat_metrics::psnr_db_masked;
 

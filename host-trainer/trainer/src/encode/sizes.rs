@@ -4,10 +4,10 @@ use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::Capture;
 use pocketsplat_core::{Budget, Bundle, DecodeError, Decoder, Plan, Residency, Strips};
 use pocketsplat_instructions::level::{Bound, Level, Need};
-use pocketsplat_instructions::predict;
+use pocketsplat_instructions::{Processor, predict};
 
 use super::{EncodeError, Encoding};
-use crate::device::{Limits, Processor};
+use crate::device::Limits;
 use crate::train::limits::{Finished, LimitProbe, LimitShares, MeasuredShares};
 use pocketsplat_codec::bundle::WriteError;
 use pocketsplat_codec::manifest::{cameras_to_measure, count};

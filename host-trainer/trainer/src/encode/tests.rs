@@ -1,9 +1,10 @@
 use pocketsplat_capture::dataset::Capture;
 use pocketsplat_format::Bundle;
+use pocketsplat_instructions::Processor;
 
 use super::sizes::{DevicePlans, frame_of};
 use super::{CoderChoice, EncodeError, Encoding, Fitted};
-use crate::device::{Limits, Processor};
+use crate::device::Limits;
 use crate::train::config::Backbone;
 use crate::train::limits::Finished;
 use crate::train::modules::{Modules, Rdo};

@@ -3,8 +3,8 @@
 use std::fmt;
 
 use clap::ValueEnum;
+use pocketsplat_instructions::Processor;
 use pocketsplat_trainer::cost::Measured;
-use pocketsplat_trainer::device::Processor;
 
 /// Where frames are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

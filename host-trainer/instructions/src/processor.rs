@@ -1,0 +1,63 @@
+//! Kinds of processors: how long a frame may be, and what its instructions are worth in cycles.
+
+use crate::InstructionSet;
+
+/// A kind of processor, with the frame that it is meant for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
+pub enum Processor {
+    /// A Cortex-M4 with FPU: frames of 80 million instructions.
+    CortexM4,
+    /// A Cortex-M7: frames of 250 million instructions.
+    CortexM7,
+    /// RISC-V without an FPU (RV32IMAC): frames of 1,000 million instructions.
+    Riscv32imac,
+}
+
+impl Processor {
+    /// Instructions of a frame at most.
+    pub fn frame_instructions(self) -> u64 {
+        match self {
+            Self::CortexM4 => 80_000_000,
+            Self::CortexM7 => 250_000_000,
+            Self::Riscv32imac => 1_000_000_000,
+        }
+    }
+
+    /// Instructions whose costs it has.
+    pub fn instruction_set(self) -> InstructionSet {
+        match self {
+            Self::CortexM4 | Self::CortexM7 => InstructionSet::CortexM,
+            Self::Riscv32imac => InstructionSet::RiscV32,
+        }
+    }
+
+    /// Cycles of an instruction, the mean over a frame.
+    ///
+    /// Of a Cortex-M4 by ARM's table with zero wait states: `cycles.csv` holds what `firmware-example/cycles.sh` counted. Of the others
+    /// nothing was counted, so it is one.
+    pub fn cycles_per_instruction(self) -> f64 {
+        match self {
+            Self::CortexM4 => 1.54,
+            Self::CortexM7 | Self::Riscv32imac => 1.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Processor;
+
+    #[test]
+    fn every_frame_that_was_counted_takes_its_cycles_within_5_percent() {
+        let mut n_frames = 0;
+        for row in include_str!("cycles.csv").lines().skip(1) {
+            let counts: Vec<f64> = row.split(',').skip(2).filter_map(|count| count.parse().ok()).collect();
+            let [instructions, cycles] = counts[..] else { panic!("{row}") };
+            let error = instructions * Processor::CortexM4.cycles_per_instruction() / cycles - 1.0;
+            assert!(error.abs() < 0.05, "{row}: {error}");
+            n_frames += 1;
+        }
+        assert_eq!(n_frames, 28);
+    }
+}

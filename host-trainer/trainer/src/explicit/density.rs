@@ -108,7 +108,7 @@ fn split(cloud: &mut Cloud<f32>, i: usize, divisor: f64, rng: &mut ChaCha8Rng) {
 }
 
 /// A draw from the standard normal distribution (Box and Muller 1958).
-fn normal(rng: &mut ChaCha8Rng) -> f64 {
+pub fn normal(rng: &mut ChaCha8Rng) -> f64 {
     // Not 0, whose logarithm is infinite.
     let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
     radius * (TAU * rng.random::<f64>()).cos()

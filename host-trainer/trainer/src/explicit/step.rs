@@ -100,18 +100,33 @@ fn splat<R: Real>(cloud: &Cloud<R>, camera: &Pinhole<R>, index: usize) -> Option
 ///
 /// * `dssim`: λ.
 pub fn step<R: Real>(level: Level, cloud: &Cloud<R>, target: &TargetView<'_, R>, dssim: f64) -> CloudGradients<R> {
+    let size_px = target.camera.size_px;
+    let lambda = R::real(dssim);
+    step_of(level, cloud, target, |image, d_image| {
+        let (similarity, partials) = ssim::forward(level, image, target.truth(), size_px);
+        l1::backward(image, target.truth(), R::ONE - lambda, d_image);
+        ssim::backward(level, image, target.truth(), size_px, &partials, -lambda, d_image);
+        (R::ONE - lambda) * l1::forward(image, target.truth()) + lambda * (R::ONE - similarity)
+    })
+}
+
+/// Loss and gradients of one view, for any loss of its picture.
+///
+/// * `loss`: given planes `[3, height, width]`, which are 0 where pixels do not count, and as many zeros, to which it adds its gradient.
+pub fn step_of<R: Real>(
+    level: Level,
+    cloud: &Cloud<R>,
+    target: &TargetView<'_, R>,
+    loss: impl FnOnce(&[R], &mut [R]) -> R,
+) -> CloudGradients<R> {
     let camera = target.camera;
     let size_px = camera.size_px;
     let drawing = draw(level, cloud, camera, target.background);
     let mut image = drawing.image.to_planes(size_px);
     clear_masked(&mut image, target.mask);
-    let lambda = R::real(dssim);
-    let (similarity, partials) = ssim::forward(level, &image, target.truth(), size_px);
     let mut d_image = vec![R::ZERO; image.len()];
-    l1::backward(&image, target.truth(), R::ONE - lambda, &mut d_image);
-    ssim::backward(level, &image, target.truth(), size_px, &partials, -lambda, &mut d_image);
+    let loss = loss(&image, &mut d_image);
     clear_masked(&mut d_image, target.mask);
-    let loss = (R::ONE - lambda) * l1::forward(&image, target.truth()) + lambda * (R::ONE - similarity);
 
     let d_tiled = TiledImage::from_planes(&d_image, size_px);
     let Drawing { image: tiled, drawn, splats, footprints, lists } = drawing;

@@ -189,7 +189,7 @@ impl CloudTrainer<'_> {
 }
 
 /// Why gradients may not be applied.
-fn fault(gradients: &CloudGradients<f32>) -> Option<Cause> {
+pub fn fault(gradients: &CloudGradients<f32>) -> Option<Cause> {
     let CloudGradients { loss, stored, harmonics, screen, .. } = gradients;
     let sound = |values: &[f32]| watchdog::sound(values);
     let all_sound = stored.iter().all(|d| {

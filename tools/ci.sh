@@ -267,7 +267,7 @@ job_format-doc() {
 
 # Every crate builds from nothing but what the packages hold, and they hold what a user reads.
 job_package() {
-  local crate file files crates=(pocketsplat pocketsplat-{core,format,half,files,capture,gaussians,instructions,kernels,metrics,gpu,codec,trainer,viewer})
+  local crate file files crates=(pocketsplat pocketsplat-{core,format,half,files,capture,gaussians,instructions,kernels,metrics,gpu,codec,trainer,baselines,viewer})
   files=$(cargo package -p pocketsplat-core --allow-dirty --locked --list)
   for file in README.md CHANGELOG.md examples/{draw_png.rs,example.psb}; do
     grep -qx "$file" <<<"$files" || fail "the package of pocketsplat-core lacks $file"

@@ -9,7 +9,7 @@ use std::fs;
 use std::path::Path;
 
 /// The folder of each crate's sources, and its rooms; one may import those to its left.
-const CRATES: [(&str, &[&str]); 14] = [
+const CRATES: [(&str, &[&str]); 15] = [
     ("decoder-format/src", &["error", "rules", "math", "stopwatch", "camera", "bytes", "entropy", "context", "bundle"]),
     (
         "decoder-core/src",
@@ -61,6 +61,7 @@ const CRATES: [(&str, &[&str]); 14] = [
     ),
     ("host-trainer/codec/src", &["bundle", "render", "manifest", "verify"]),
     ("host-trainer/trainer/src", &["train", "explicit", "export", "device", "encode", "effects", "cost"]),
+    ("host-trainer/baselines/src", &["baseline", "packed", "octree", "voxels", "k_means", "tuning", "light_gaussian"]),
     ("host-trainer/instructions/src", &["context", "processor", "board", "level"]),
     ("viewer/src", &["figures", "focus", "scene", "exports", "package", "page"]),
     ("host-trainer/cli/src", &["say", "program", "plot", "config", "command"]),

@@ -1,0 +1,17 @@
+//! Published methods that compress explicit Gaussians, each as its paper describes it: what the project's own files are compared with.
+//!
+//! [`Baseline`] is what a method does, and each has a folder of its own: [`light_gaussian`]. They share the steps that come after
+//! training (`tuning`), k-means (`k_means`), and files: lattice places (`voxels`) in an `octree`, numbers in columns, deflated (`packed`).
+
+mod baseline;
+mod k_means;
+pub mod light_gaussian;
+mod octree;
+mod packed;
+#[cfg(test)]
+mod test_scenes;
+mod tuning;
+mod voxels;
+
+pub use baseline::{Baseline, TrainedScene, Unreadable};
+pub use light_gaussian::LightGaussian;

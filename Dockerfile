@@ -1,4 +1,4 @@
-# The command with what it drives: COLMAP and ffmpeg for `poses`, a Vulkan loader for GPUs that the container is given.
+# The command, which trains on the processor here, and what it drives: COLMAP and ffmpeg for `poses`.
 #
 #   docker build -t pocketsplat .
 #   docker run --rm -v "$PWD:/work" pocketsplat train PHOTOS -o scene.psb
@@ -11,7 +11,7 @@ RUN cargo install --locked --path host-trainer/cli --root /installed
 
 FROM debian:bookworm-slim
 RUN apt-get update \
-    && apt-get install -y --no-install-recommends colmap ffmpeg libvulkan1 \
+    && apt-get install -y --no-install-recommends colmap ffmpeg \
     && rm -rf /var/lib/apt/lists/*
 COPY --from=build /installed/bin/pocketsplat /usr/local/bin/
 WORKDIR /work

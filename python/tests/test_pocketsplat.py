@@ -199,7 +199,7 @@ class TrainingRuns(unittest.TestCase):
 
     def test_a_run_that_is_stopped_goes_on(self) -> None:
         output = Path(self.folder.name, "d.psb")
-        training = pocketsplat.train(self.capture, output, iterations=600)
+        training = pocketsplat.train(self.capture, output, iterations=3000)
         next(iter(training))
         training.stop()
         self.assertFalse(output.exists())

@@ -76,8 +76,8 @@ export function showFrames(table, views) {
   fill(table, views, rows);
 }
 
-/** Predicted instructions by stage, of a board its seconds too: a bar for each view, one legend. */
-export function showInstructions(place, views, { value: target, dataset: { hertz, cycles } }) {
+/** Predicted instructions by stage, of a board's own display its seconds too: a bar for each view, one legend. */
+export function showInstructions(place, views, { value: target, dataset: { hertz, cycles } }, isDevice) {
   const parts = [];
   for (const view of views) {
     if (!view.frame || view.refused) continue;
@@ -85,7 +85,7 @@ export function showInstructions(place, views, { value: target, dataset: { hertz
     const all = Object.values(stages).reduce((sum, n) => sum + n, 0);
     const total = document.createElement('div');
     total.className = 'total';
-    const seconds = hertz ? `, ${((all * cycles) / hertz).toFixed(2)} s` : '';
+    const seconds = hertz && isDevice ? `, ${((all * cycles) / hertz).toFixed(2)} s` : '';
     const textContent = instructions(all) + seconds;
     total.append(views.length > 1 ? view.name : 'Predicted', Object.assign(document.createElement('b'), { textContent }));
     const bar = document.createElement('div');

@@ -10,7 +10,7 @@ const NO_LIMIT = 200;
 const FIGURES_MS = 200;
 /** How long the camera rests before the address has it. */
 const PLACE_MS = 400;
-/** The part of its pixels on a side that the first picture gets, drawn while the browser still compiles; a sharp one follows. */
+/** Width and height of the first picture, as a share of the full ones: the browser still compiles while it is drawn. */
 const FIRST_PART = 0.5;
 /** How long a picture stands still before it sways. */
 const LOOK_MS = 1000;
@@ -85,6 +85,7 @@ function shown(view) {
 }
 
 function showFigures() {
+  clearTimeout(figures.timer);
   Object.assign(figures, { timer: undefined, shownAt: performance.now() });
   for (const view of views) {
     if (!view.frame && !view.refused) continue;
@@ -94,7 +95,7 @@ function showFigures() {
   }
   showPlans($('plan'), views);
   showFrames($('frame'), views);
-  showInstructions($('stages'), views, $('target').selectedOptions[0]);
+  showInstructions($('stages'), views, $('target').selectedOptions[0], state.device);
   showRam();
 }
 
@@ -168,6 +169,7 @@ function setDevice(device) {
 
 /** Takes the display and the memory of a board. */
 function takeBoard({ size, ram }) {
+  state.isBoard = true;
   if (![...$('size').options].some((option) => option.value === size)) $('size').add(new Option(size.replace(',', '×'), size));
   $('size').value = size;
   state.size = size.split(',').map(Number);
@@ -176,6 +178,15 @@ function takeBoard({ size, ram }) {
   const step = most > least ? Math.round((NO_LIMIT - 1) * (Math.log(ram / least) / Math.log(most / least))) : 0;
   state.ramStep = $('ram').value = Math.min(Math.max(step, 0), NO_LIMIT - 1);
   setDevice(true);
+}
+
+/** Another processor has no memory of its own. */
+function leaveBoard() {
+  state.isBoard = false;
+  state.ramBytes = Infinity;
+  state.ramStep = $('ram').value = NO_LIMIT;
+  showFigures();
+  motion.touch();
 }
 
 function stopSpinning() {
@@ -239,7 +250,8 @@ function listen() {
   $('target').addEventListener('change', () => {
     const [{ dataset }] = $('target').selectedOptions;
     if (dataset.size) takeBoard(dataset);
-    showFigures();
+    else if (state.isBoard) leaveBoard();
+    else showFigures();
   });
   $('size').addEventListener('change', (event) => ((state.size = event.target.value.split(',').map(Number)), motion.touch()));
   $('slabs').addEventListener('change', (event) => ((state.slabs = event.target.checked), motion.touch()));

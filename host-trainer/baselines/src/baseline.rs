@@ -40,7 +40,7 @@ pub trait Baseline {
     /// The Gaussians of a file, normalised frame of the capture; a method whose colours a network gives writes them as harmonics here.
     ///
     /// # Errors
-    /// [`Unreadable`] for bytes that [`Self::encode`] did not write. Memory follows the bytes that are there, never a count in them.
+    /// [`Unreadable`] for bytes that [`Self::encode`] did not write. Memory follows what the bytes inflate to, 1 GiB at most, never a count in them.
     fn decode(bytes: &[u8]) -> Result<Gaussians, Unreadable>;
 }
 

@@ -15,6 +15,8 @@ use crate::baseline::Unreadable;
 /// The first bytes of a file.
 pub(crate) type Mark = [u8; 4];
 
+/// Bytes of a body at most: of ten million Gaussians.
+const MOST_BODY: u64 = 1 << 30;
 /// Bytes of the mark and the checksum.
 const HEADER: usize = 8;
 
@@ -43,7 +45,7 @@ pub(crate) fn opened(mark: Mark, bytes: &[u8]) -> Result<Vec<u8>, Unreadable> {
         )));
     }
     let mut body = Vec::new();
-    match DeflateDecoder::new(deflated).read_to_end(&mut body) {
+    match DeflateDecoder::new(deflated).take(MOST_BODY).read_to_end(&mut body) {
         Ok(_) => Ok(body),
         Err(fault) => Err(Unreadable(format!("the file's body cannot be inflated: {fault}; write the file again"))),
     }

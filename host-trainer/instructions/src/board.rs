@@ -15,7 +15,7 @@ pub struct Board {
     pub chip: &'static str,
     /// Clock of one core, MHz.
     pub clock_mhz: u32,
-    /// Memory in one piece, less 10 KiB of stack and what the example firmware keeps, bytes.
+    /// Scratch memory to give, bytes: less than the chip has in one piece, for stack and statics.
     pub ram_bytes: u64,
     /// Flash for the bundle, bytes.
     pub flash_bytes: u64,
@@ -31,7 +31,7 @@ const MIB: u64 = 1024 * KIB;
 /// The boards there are, by core and memory.
 pub const BOARDS: [Board; 11] = [
     board("rp2350", "Pico 2 (RP2350, M33)", 150, [500 * KIB, MIB], [240, 240], CortexM4),
-    board("stm32f411", "STM32F411, F446 (M4)", 100, [117 * KIB, 64 * KIB], [128, 128], CortexM4),
+    board("stm32f411", "STM32F411 (M4)", 100, [117 * KIB, 64 * KIB], [128, 128], CortexM4),
     board(
         "stm32f429",
         "STM32F429 (M4), stack in core-coupled memory",
@@ -42,7 +42,7 @@ pub const BOARDS: [Board; 11] = [
     ),
     board("stm32f767", "STM32F767 (M7)", 216, [490 * KIB, 512 * KIB], [320, 240], CortexM7),
     board("stm32h743", "STM32H743 (M7), stack in DTCM", 480, [510 * KIB, MIB], [320, 240], CortexM7),
-    board("stm32h7a3", "STM32H7A3 (M7), stack in DTCM", 280, [1013 * KIB, MIB], [320, 240], CortexM7),
+    board("stm32h7a3", "STM32H7A3 (M7)", 280, [1013 * KIB, MIB], [320, 240], CortexM7),
     board("stm32n657", "STM32N657 (M55), bundle in external flash", 800, [2 * MIB, 2 * MIB], [480, 320], CortexM7),
     board("esp32-p4", "ESP32-P4 (RISC-V with FPU), scratch in PSRAM", 400, [4 * MIB, MIB], [320, 240], CortexM7),
     board("esp32-s3", "ESP32-S3 (Xtensa), scratch in PSRAM", 240, [2 * MIB, 512 * KIB], [240, 240], CortexM4),

@@ -56,7 +56,8 @@ fn of_body(bytes: &[u8]) -> Result<Quantised, Unreadable> {
     let n_codes = u32::from_le_bytes(body.four("the number of codes")?) as usize;
     let mut number = || Ok::<_, Unreadable>(f32::from_le_bytes(body.four("the lattice")?));
     let (corner, voxel) = ([number()?, number()?, number()?], number()?);
-    if !corner.iter().chain([&voxel]).all(|number| number.is_finite()) {
+    let far = corner.map(|number| number + voxel * (1 << octree::DEPTH) as f32);
+    if !(voxel > 0.0 && corner.iter().chain(&far).all(|number| number.is_finite())) {
         return Err(Unreadable("the lattice has a number that is not finite; write the file again".to_owned()));
     }
     let again = body.bits(n.saturating_sub(1), "voxels that come again")?;

@@ -13,10 +13,8 @@
 //!   stand 4.5 units from the middle. Every step has a new one. All parameters learn from them.
 //! * **Who has a code** is decided by the significance of the Gaussians that are left, which k-means weighs by. Codes hold all 27
 //!   coefficients. Nothing else moves in their steps: places and shapes are rounded before.
-//! * **Shapes and colours** are halves. Of 734 MB of 3DGS for Mip-NeRF 360, 236 bytes a Gaussian, 42 MB are 40 bytes for each that is
-//!   left; the 40 % of colours without a code would take 43 in single precision, and take 22 as halves.
-//! * **The share that goes** can hardly be 66 % in Synthetic-NeRF: 7.84 MB are 196,000 Gaussians of 40 bytes, about as many as MesonGS
-//!   keeps of it (207,100 and more). So it is the one setting of the method.
+//! * **Shapes and colours** are halves, as the paper's sizes suggest; a codebook takes two bytes a number too.
+//! * **The share that goes** is the one setting of the method, so that published sizes can be met.
 //! * **Voxels** are 2⁻²⁰ of the smallest cube around all centres: a thousandth of a unit where the farthest lie 500 units away. Gaussians
 //!   that share one all stay. Deflate codes the octree, in place of the arithmetic coder of G-PCC.
 
@@ -42,7 +40,7 @@ const RECOVERY_STEPS: u32 = 5_000;
 /// The method.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightGaussian {
-    /// Share of the Gaussians that go.
+    /// Share of the Gaussians that go, 0 to 1.
     pub pruned_share: f64,
 }
 

@@ -21,7 +21,7 @@ const CODED_SHARE: f64 = 0.6;
 /// Codes.
 const N_CODES: usize = 8192;
 
-/// Rounds of k-means; later ones move its cost by less than a hundredth.
+/// Rounds of k-means.
 const ROUNDS: usize = 10;
 
 /// Steps that move the codes, beside a run of 30,000.

@@ -45,9 +45,7 @@ impl DeviceArgs {
             level: None,
         };
         let Some(level) = self.level.and_then(Level::numbered) else { return Ok(given) };
-        if let Some(board) = board {
-            bail!("--target {} sets what --level {} sets too; leave one of them out", board.name, level.number);
-        }
+        self.refuse_board_beside(level.number)?;
         let of_level = Limits::of_level(level);
         for (option, given, bound) in [("--ram", ram_bytes, Bound::Scratch), ("--flash", flash_bytes, Bound::Flash)] {
             refuse_more(level, option, given, bound)?;
@@ -83,6 +81,14 @@ impl DeviceArgs {
         let pixels = given.map(|FrameSize { width_px, height_px }| u64::from(width_px) * u64::from(height_px));
         refuse_more(level, "--resolution", pixels, Bound::Frame)?;
         Ok(sized(level.frame_px))
+    }
+
+    /// Refuses a board where a level has set the limits: of the command line, or of a configuration.
+    pub(super) fn refuse_board_beside(&self, level: u8) -> Result<()> {
+        match self.target.and_then(BoardOrCore::board) {
+            None => Ok(()),
+            Some(board) => bail!("--target {} sets what level {level} sets too; leave one of them out", board.name),
+        }
     }
 
     /// The options, and whether each is given.

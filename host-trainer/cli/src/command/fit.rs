@@ -41,8 +41,8 @@ pub(crate) struct Args {
     /// Device level to check each tier against, at the training size: says which fit, and what is over by how much.
     #[arg(long, value_name = "N", value_parser = level_number(), conflicts_with_all = ["ram", "resolution", "slabs", "target"])]
     level: Option<u8>,
-    /// Board, which sets --ram and --resolution where these are not given, and of which instructions and seconds of the preview frame are
-    /// predicted; or a kind of processor, for its instructions alone [default: none]
+    /// Board or kind of processor for which to predict the preview frame: its instructions, and on a board its seconds; a board also
+    /// sets --ram and --resolution where these are not given [default: none]
     #[arg(long, value_name = "NAME", value_parser = board_or_core())]
     target: Option<BoardOrCore>,
     /// Print the result as JSON.

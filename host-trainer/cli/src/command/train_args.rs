@@ -236,6 +236,9 @@ impl Args {
             }
         }
         let (given, before) = (self.device.limits()?, config.encoding.limits);
+        if let Some(level) = before.level {
+            self.device.refuse_board_beside(level)?;
+        }
         config.encoding.limits = Limits {
             ram_bytes: given.ram_bytes.or(before.ram_bytes),
             flash_bytes: given.flash_bytes.or(before.flash_bytes),

@@ -101,7 +101,7 @@ fn a_level_sets_limits_that_hold_and_are_declared() {
         ("--ram", "60000", "--level 1 allows 54272"),
         ("--flash", "1MiB", "--level 1 allows 32768"),
         ("--target", "cortex-m7", "--target contradicts --level 1"),
-        ("--target", "rp2350", "--target rp2350 sets what --level 1 sets too"),
+        ("--target", "rp2350", "--target rp2350 sets what level 1 sets too"),
         ("--resolution", "160x120", "--level 1 allows 12288"),
     ] {
         let said = fails(train(&output).args(["--level", "1", option, value]));
@@ -118,6 +118,10 @@ fn a_level_sets_limits_that_hold_and_are_declared() {
     for line in ["ram_bytes = 54272", "flash_bytes = 20000", "processor = \"cortex-m4\"", "level = 1"] {
         assert!(config.contains(line), "{line}: {config}");
     }
+    let mut of_level = pocketsplat();
+    of_level.args(["train", "--target", "rp2350", "--config"]).arg(home.join("a.run/config.toml"));
+    let said = fails(of_level.arg("-o").arg(home.join("b.psb")));
+    assert!(said.contains("--target rp2350 sets what level 1 sets too"), "{said}");
     let json = |args: &[&str]| -> serde_json::Value {
         let run = pocketsplat().args(args).arg(&output).arg("--json").output().unwrap();
         serde_json::from_slice(&run.stdout).unwrap()

@@ -564,7 +564,7 @@ job_release() {
   tar -C "$files" --owner=0 --group=0 -czf "$files/$name.tgz" "$name"
   rm -r "${files:?}/$name"
   cp "$target"/wheels/*.whl "$target"/npm/pocketsplat-*.tgz "$files"
-  (cd "$files" && sha256sum -- * >SHA256SUMS)
+  (cd "$files" && sha256sum -- * >"../SHA256SUMS-$host" && mv "../SHA256SUMS-$host" .)
   ls -l "$files"
 }
 

@@ -13,7 +13,7 @@ const BLOCK: usize = 256;
 
 /// `n_codes` codes, or one for each vector, which locally minimise Σᵢ wᵢ·‖vᵢ − c(vᵢ)‖²; and the code c of each vector, its nearest.
 ///
-/// They start as vectors drawn at random. Then `n_rounds` times each becomes the weighted mean of those that are nearest to it, and
+/// They start as vectors drawn at random, first among those that weigh anything. Then `n_rounds` times each becomes the weighted mean of those that are nearest to it, and
 /// stays where there is none. Cost: `n · n_codes · WIDTH` products a round.
 ///
 /// * `vectors`: finite. * `weights`: of each, 0 or more.
@@ -27,6 +27,8 @@ pub(crate) fn k_means<const WIDTH: usize>(
     let n_codes = n_codes.min(vectors.len());
     let mut order: Vec<usize> = (0..vectors.len()).collect();
     order.shuffle(rng);
+    // A code among vectors that count for nothing would stay there.
+    order.sort_by_key(|i| weights[*i] <= 0.0);
     let mut codes: Vec<_> = order[..n_codes].iter().map(|i| vectors[*i]).collect();
     for _ in 0..n_rounds {
         let mut sums = vec![([0.0; WIDTH], 0.0); n_codes];
@@ -120,6 +122,9 @@ mod tests {
         assert_eq!((codes, nearest), (vec![[1.0]], vec![0, 0]));
         let (codes, nearest) = k_means(&vectors, &[0.0, 0.0], 9, 3, &mut ChaCha8Rng::seed_from_u64(1));
         assert_eq!(nearest.iter().map(|code| codes[*code]).collect::<Vec<_>>(), vectors, "a code for each");
+        let (codes, _) =
+            k_means(&[[1.0], [2.0], [3.0], [4.0]], &[0.0, 1.0, 0.0, 1.0], 2, 0, &mut ChaCha8Rng::seed_from_u64(1));
+        assert!(codes.contains(&[2.0]) && codes.contains(&[4.0]), "{codes:?}");
         assert_eq!(k_means::<1>(&[], &[], 9, 3, &mut ChaCha8Rng::seed_from_u64(1)), (vec![], vec![]));
     }
 }

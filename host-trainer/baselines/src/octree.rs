@@ -76,9 +76,17 @@ mod tests {
         }
 
         #[test]
-        fn any_bytes_are_leaves_or_an_error(bytes: Vec<u8>) {
+        fn a_damaged_octree_is_another_or_an_error(
+            set in prop::collection::btree_set(0..1u64 << (3 * DEPTH), 1..9), at: prop::sample::Index, byte: u8
+        ) {
+            let mut bytes = Vec::new();
+            put_leaves(&set.into_iter().collect::<Vec<_>>(), &mut bytes);
+            let at = at.index(bytes.len());
+            bytes[at] = byte;
             if let Ok(leaves) = read(&bytes) {
-                prop_assert!(leaves.len() <= 8 * bytes.len() && leaves.is_sorted());
+                let mut again = Vec::new();
+                put_leaves(&leaves, &mut again);
+                prop_assert_eq!(again, bytes);
             }
         }
     }

@@ -46,6 +46,9 @@ pub(crate) fn opened(mark: Mark, bytes: &[u8]) -> Result<Vec<u8>, Unreadable> {
     }
     let mut body = Vec::new();
     match DeflateDecoder::new(deflated).take(MOST_BODY).read_to_end(&mut body) {
+        Ok(n) if n as u64 == MOST_BODY => Err(Unreadable(format!(
+            "the file's body has {MOST_BODY} bytes or more, needed: fewer; write the file again"
+        ))),
         Ok(_) => Ok(body),
         Err(fault) => Err(Unreadable(format!("the file's body cannot be inflated: {fault}; write the file again"))),
     }

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 use pocketsplat_capture::camera::Camera;
-use pocketsplat_capture::dataset::{Capture, EXTENT, Normalisation, Photograph, PointsOrigin, SceneKind, View};
+use pocketsplat_capture::dataset::{Capture, Photograph, View};
 use pocketsplat_gaussians::{Degree, Gaussians};
 use pocketsplat_kernels::finite_difference::random;
 use pocketsplat_trainer::explicit::CloudConfig;
@@ -43,17 +43,5 @@ pub(crate) fn capture_of(gaussians: &Gaussians, n: u32) -> Capture {
         let image = renderer.image(&camera, [0.0; 3]);
         View::new(i.to_string(), camera, Photograph { image, mask: None })
     };
-    Capture {
-        train: (0..n).map(view).collect(),
-        test: Vec::new(),
-        points: vec![DVec3::ZERO],
-        point_colours: Vec::new(),
-        points_origin: PointsOrigin::Random,
-        made_points: None,
-        scene: SceneKind::Object,
-        normalisation: Normalisation { centre: DVec3::ZERO, scale: 1.0 },
-        extent: EXTENT,
-        background: [0.0; 3],
-        shown: 1.0,
-    }
+    Capture::of_views((0..n).map(view).collect(), vec![DVec3::ZERO])
 }

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 use pocketsplat_capture::camera::Camera;
-use pocketsplat_capture::dataset::{Capture, EXTENT, Image, Normalisation, Photograph, PointsOrigin, SceneKind, View};
+use pocketsplat_capture::dataset::{Capture, Image, Photograph, View};
 use pocketsplat_kernels::scene::ModelShape;
 use pocketsplat_trainer::train::config::{Densification, LearningRate, Rates};
 use pocketsplat_trainer::train::{TrainConfig, TrainError, Trainer};
@@ -37,19 +37,7 @@ fn capture(pixel: impl Fn(u32, u32, u32) -> [u8; 3], points: Vec<DVec3>) -> Capt
         let image = Image { width_px: SIZE_PX, height_px: SIZE_PX, rgb };
         View::new(format!("view_{i}"), camera, Photograph { image, mask: None })
     };
-    Capture {
-        train: (0..5).map(view).collect(),
-        test: Vec::new(),
-        points,
-        point_colours: Vec::new(),
-        points_origin: PointsOrigin::Random,
-        made_points: None,
-        scene: SceneKind::Object,
-        normalisation: Normalisation { centre: DVec3::ZERO, scale: 1.0 },
-        extent: EXTENT,
-        background: [0.0; 3],
-        shown: 1.0,
-    }
+    Capture::of_views((0..5).map(view).collect(), points)
 }
 
 fn cloud() -> Vec<DVec3> {

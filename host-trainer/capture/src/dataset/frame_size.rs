@@ -15,6 +15,13 @@ pub struct FrameSize {
     pub height_px: u32,
 }
 
+impl From<[u16; 2]> for FrameSize {
+    /// Of width and height.
+    fn from([width_px, height_px]: [u16; 2]) -> Self {
+        Self { width_px: width_px.into(), height_px: height_px.into() }
+    }
+}
+
 impl fmt::Display for FrameSize {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}x{}", self.width_px, self.height_px)

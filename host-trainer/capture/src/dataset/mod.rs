@@ -164,6 +164,23 @@ pub const EXTENT: f64 = 5.0;
 const NEAR: f64 = 2.5;
 
 impl Capture {
+    /// Views of the normalised frame, none of them held out: an object on black, with points that say nothing about it.
+    pub fn of_views(train: Vec<View>, points: Vec<DVec3>) -> Self {
+        Self {
+            train,
+            test: Vec::new(),
+            points,
+            point_colours: Vec::new(),
+            points_origin: PointsOrigin::Random,
+            made_points: None,
+            scene: SceneKind::Object,
+            normalisation: Normalisation { centre: DVec3::ZERO, scale: 1.0 },
+            extent: EXTENT,
+            background: [0.0; 3],
+            shown: 1.0,
+        }
+    }
+
     /// Size of the training view of most pixels.
     pub fn largest_px(&self) -> [u32; 2] {
         let sizes = self.train.iter().map(|view| [view.camera.width_px, view.camera.height_px]);

@@ -75,7 +75,7 @@ fn captures_that_are_sound_but_for_their_form_are_the_sound_one() {
 #[test]
 fn captures_with_a_fault_say_which() {
     for (name, says) in [
-        ("apostrophe-in-the-folder/Ann's photographs", &["--image_path '", "Ann'\\''s photographs/images'"][..]),
+        ("apostrophe-in-the-folder/Ann's photographs", &["pocketsplat poses '", "Ann'\\''s photographs' -o "][..]),
         (
             "colmap-radial-of-a-failed-calibration/capture",
             &["warning[bad-intrinsics]", "the distortion moves a ray by "],

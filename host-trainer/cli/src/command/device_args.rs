@@ -16,7 +16,7 @@ use crate::say::say;
 /// What the device has that the bundle is for; what else the command line leaves open is chosen by it.
 #[derive(clap::Args)]
 pub(crate) struct DeviceArgs {
-    /// Device class 1 (64 KiB) to 5 (8 MiB): sets --ram, --flash, --resolution and --target, which may ask for less
+    /// Device class 1 (64 KiB) to 5 (8 MiB): sets the processor and --ram, --flash and --resolution, which may ask for less
     /// [default: none]
     #[arg(long, value_name = "N", value_parser = level_number(), help_heading = DEVICE)]
     level: Option<u8>,
@@ -70,10 +70,7 @@ impl DeviceArgs {
     ///
     /// * `is_sized`: whether another option says how large images are.
     pub(crate) fn frame(&self, given: Option<FrameSize>, is_sized: bool) -> Result<Option<FrameSize>> {
-        let sized = |[width_px, height_px]: [u16; 2]| {
-            let frame = FrameSize { width_px: width_px.into(), height_px: height_px.into() };
-            given.or((!is_sized).then_some(frame))
-        };
+        let sized = |frame_px: [u16; 2]| given.or((!is_sized).then(|| frame_px.into()));
         if let Some(board) = self.target.and_then(BoardOrCore::board) {
             return Ok(sized(board.frame_px));
         }

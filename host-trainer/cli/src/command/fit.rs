@@ -100,10 +100,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     }
     let overflow = if args.slabs { Overflow::Slabs } else { Overflow::LeaveOut };
     let board = args.target.and_then(BoardOrCore::board);
-    let size = args.resolution.or(board.map(|board| {
-        let [width_px, height_px] = board.frame_px.map(u32::from);
-        FrameSize { width_px, height_px }
-    }));
+    let size = args.resolution.or(board.map(|board| board.frame_px.into()));
     let rams: Vec<u64> = match board {
         Some(board) if args.ram.is_empty() => vec![board.ram_bytes],
         _ => args.ram.iter().map(ByteSize::as_u64).collect(),

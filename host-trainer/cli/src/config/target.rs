@@ -68,7 +68,12 @@ mod tests {
                 "| `{name}` | {chip} | {clock_mhz} | {ram} | {flash} | {width}x{height} | {millions} | {seconds:.1} |"
             );
         }
-        table.push('\n');
+        let _ = writeln!(
+            table,
+            "\nCycles of an instruction: {} on a Cortex-M4, by ARM's table and the count of an emulated one. For a Cortex-M33 the same is assumed; for all others \
+             one, since none are counted.\n",
+            Processor::CortexM4.cycles_per_instruction()
+        );
         let page = std::fs::read_to_string(PAGE).expect("the page");
         let (before, rest) = page.split_once(MARK).expect("the mark");
         let (found, after) = rest.split_once(END).expect("the end");

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use pocketsplat_capture::camera::Camera;
-use pocketsplat_capture::dataset::{Capture, EXTENT, Photograph, PointsOrigin, SceneKind, View};
+use pocketsplat_capture::dataset::{Capture, Photograph, PointsOrigin, SceneKind, View};
 use pocketsplat_gaussians::Gaussians;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -57,17 +57,12 @@ pub fn capture(
         cameras.par_iter().enumerate().map(view).collect()
     };
     Some(Capture {
-        train: take((train, "train")),
         test: take((test, "test")),
-        points,
-        point_colours: Vec::new(),
         points_origin: PointsOrigin::Capture,
-        made_points: None,
         scene: SceneKind::Room,
         normalisation,
-        extent: EXTENT,
         background: how.background,
-        shown: 1.0,
+        ..Capture::of_views(take((train, "train")), points)
     })
 }
 

@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3};
 use super::TrainConfig;
 use super::config::{Backbone, Densification};
 use pocketsplat_capture::camera::Camera;
-use pocketsplat_capture::dataset::{Capture, EXTENT, Image, Normalisation, Photograph, PointsOrigin, SceneKind, View};
+use pocketsplat_capture::dataset::{Capture, Image, Photograph, View};
 use pocketsplat_kernels::scene::ModelShape;
 
 pub(crate) const SIZE_PX: u32 = 24;
@@ -43,19 +43,7 @@ pub(crate) fn many_views(n: u32) -> Capture {
         let t = f64::from(i);
         DVec3::new((t * 0.73).sin(), (t * 1.37).sin(), (t * 2.11).sin()) * 0.8
     });
-    Capture {
-        train: (0..n).map(view).collect(),
-        test: Vec::new(),
-        points: points.collect(),
-        point_colours: Vec::new(),
-        points_origin: PointsOrigin::Random,
-        made_points: None,
-        scene: SceneKind::Object,
-        normalisation: Normalisation { centre: DVec3::ZERO, scale: 1.0 },
-        extent: EXTENT,
-        background: [0.0; 3],
-        shown: 1.0,
-    }
+    Capture::of_views((0..n).map(view).collect(), points.collect())
 }
 
 /// Changes the photograph of a view.

@@ -558,7 +558,9 @@ job_release() {
   name=pocketsplat-$host-v$version
   rm -rf "$files"
   mkdir -p "$files/$name"
-  cp "$target/release/pocketsplat" README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE "$files/$name"
+  cp README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE "$files/$name"
+  # Debugging information is four fifths of it.
+  strip -o "$files/$name/pocketsplat" "$target/release/pocketsplat"
   "$target/release/pocketsplat" man "$files/$name/man"
   for shell in bash zsh fish; do "$target/release/pocketsplat" completions $shell >"$files/$name/pocketsplat.$shell"; done
   tar -C "$files" --owner=0 --group=0 -czf "$files/$name.tgz" "$name"

@@ -29,7 +29,11 @@ impl Numbers {
         record.masks = up_to(1) == 1;
         shape.resident = match up_to(if cfg!(feature = "baked") { 2 } else { 1 }) {
             0 => Resident::Nothing,
-            1 => Resident::Anchors { n_anchors: 1 + self.below(30_000), n_chunks: 1 + self.below(200) },
+            1 => Resident::Anchors {
+                n_anchors: 1 + self.below(30_000),
+                n_chunks: 1 + self.below(200),
+                with_sums: self.below(2) == 1,
+            },
             _ => Resident::Gaussians { n_gaussians: self.below(200_000), n_chunks: 1 + self.below(200) },
         };
         [shape.frame.canvas_tiles, shape.frame.max_splats] = [1 + self.below(100), self.below(60_000)];
@@ -80,13 +84,18 @@ fn by_the_document(shape: &ScratchShape) -> usize {
     let drawn = tiles + 10 * frame.max_splats as usize;
     let (kept, bound) = match resident {
         Resident::Nothing => (heads + models, 0),
-        Resident::Anchors { n_anchors, n_chunks } => {
+        Resident::Anchors { n_anchors, n_chunks, with_sums } => {
             let [b_f, b_s, b_o] = record.symbol_bits.map(usize::from);
             let masks = if record.masks { k } else { 0 };
             let steps = if n_tables > 0 { 0 } else { 16 };
             let bits = f * b_f + s * b_s + 3 * k * b_o + 3 * usize::from(record.lattice_bits) + masks + steps;
             let words = (2 * bits.div_ceil(16) * n_anchors as usize).div_ceil(4);
-            (heads + words + (n_chunks as usize).div_ceil(32) + 2 * n_tables, models)
+            let sums = if with_sums && cfg!(feature = "baked") {
+                n_anchors as usize * (2 * up8(f) + up8(h_c) + up8(h_d))
+            } else {
+                0
+            };
+            (heads + words + (n_chunks as usize).div_ceil(32) + 2 * n_tables + sums, models)
         }
         Resident::Gaussians { n_gaussians, n_chunks } => {
             (8 * n_gaussians as usize + n_chunks as usize + 1, heads + models)

@@ -4,6 +4,8 @@ pub mod integer;
 pub mod layer;
 pub mod root;
 pub mod rows;
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64", target_family = "wasm"))]
+mod rows_in_fours;
 pub mod symbols;
 
 /// Whether the processor converts halves itself.

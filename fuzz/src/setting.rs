@@ -97,7 +97,8 @@ impl Setting {
             max_splats: if places == 0 { MaxSplats::Worst } else { MaxSplats::AtMost(u32::from(places) + 1) },
             n_strips,
             overflow: if has(0) { Overflow::Slabs } else { Overflow::LeaveOut },
-            residency: [Residency::Resident, Residency::Baked, Residency::Streamed][usize::from(residency % 3)],
+            residency: [Residency::Resident, Residency::Baked, Residency::Streamed, Residency::AutoWithSums]
+                [usize::from(residency % 4)],
             fast_share,
             has_wide_boxes: has(1),
             tiers: if tiers == 0 { u8::MAX } else { tiers },

@@ -112,7 +112,9 @@ fn predicted_work_bounds_the_work_of_the_views_measured_closely() {
             ] {
                 assert!(most <= bound, "{}: {most} {what} of {bound}: {plan:?}", case.name);
                 let closely = plan.n_strips() == 1 && what != "pixels";
-                assert!(!closely || most * 10 >= bound * 9, "{}: {most} {what} of {bound}: {plan:?}", case.name);
+                // The manifest says how many they are without sums, of which an anchor saves more or less.
+                let least = if plan.keeps_sums() { bound / 2 } else { bound * 9 / 10 };
+                assert!(!closely || most >= least, "{}: {most} {what} of {bound}: {plan:?}", case.name);
             }
         }
     }

@@ -99,10 +99,12 @@ fn a_damaged_chunk_takes_no_place_and_leaves_no_anchor_behind() {
         let bundle = Bundle::parse(&bytes).expect("checksums are right");
         for (n_strips, n_places) in [(1, 40), (1, 400), (2, 300), (8, 100), (8, 2000)] {
             let streamed = budget(n_strips, n_places, Overflow::LeaveOut).skipping_damage();
-            let resident = streamed.with_residency(Residency::Resident);
+            let [resident, summed] =
+                [Residency::Resident, Residency::AutoWithSums].map(|residency| streamed.with_residency(residency));
             let f32s = |budget| Plan::new(&bundle, budget).expect("memory without limit");
+            let halves = |budget| in_halves(&bundle, budget);
             for plans in
-                [[&streamed, &resident].map(f32s), [&streamed, &resident].map(|budget| in_halves(&bundle, budget))]
+                [[&streamed, &resident].map(f32s), [&streamed, &summed].map(f32s), [&streamed, &resident].map(halves)]
             {
                 let [(frame, report), (expected, expected_report)] =
                     plans.map(|plan| drawn(&bundle, plan, &preview).expect("damage is left out"));
@@ -126,7 +128,7 @@ fn a_frame_in_slabs_touches_no_more_bytes_than_it_says() {
     let preview = bundle.header().preview;
     let (mut n_full, mut n_less) = (0, 0);
     for (n_strips, n_places) in [(1, 60), (1, 400), (1, 2000), (2, 150), (4, 320), (8, 440), (8, 600)] {
-        for residency in [Residency::Streamed, Residency::Resident] {
+        for residency in [Residency::Streamed, Residency::Resident, Residency::AutoWithSums] {
             let budget = budget(n_strips, n_places, Overflow::Slabs).with_residency(residency);
             let plan = Plan::new(&bundle, &budget).expect("planned");
             let mut said = 0;

@@ -51,7 +51,7 @@ fn frames_in_small_steps_are_those_of_render() {
         let few = all.with_max_splats(MaxSplats::AtMost(200));
         let in_slabs = few.with_overflow(Overflow::Slabs);
         for budget in [all, few, in_slabs, in_slabs.with_strips(Strips::Exactly(4)), all.skipping_damage()] {
-            for residency in [Residency::Auto, Residency::Resident, Residency::Streamed] {
+            for residency in [Residency::Auto, Residency::AutoWithSums, Residency::Resident, Residency::Streamed] {
                 let budget = budget.with_residency(residency);
                 let plan = Plan::new(&bundle, &budget).expect("planned");
                 let mut scratch = vec![0; plan.scratch_len()];

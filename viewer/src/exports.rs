@@ -7,7 +7,7 @@
 
 use std::cell::RefCell;
 
-use pocketsplat_core::{Budget, Camera, DecodeError, Overflow, Quality, Rotation};
+use pocketsplat_core::{Budget, Camera, DecodeError, Overflow, Quality, Residency, Rotation};
 
 use crate::{Figures, Scene};
 
@@ -169,10 +169,13 @@ const MOST_WORK: u64 = 100_000_000_000;
 fn budget(ram: f64, [width, height]: [u16; 2], tiers: u8, slabs: u32, quality: (u8, u32)) -> Budget {
     let (alpha_cut, detail) = quality;
     let overflow = if slabs == 0 { Overflow::LeaveOut } else { Overflow::Slabs };
+    // Without a limit it is no device's memory but the browser's.
+    let residency = if ram.is_finite() { Residency::Auto } else { Residency::AutoWithSums };
     Budget::for_frame(width, height)
         // Saturates.
         .in_bytes(ram as usize)
         .with_tiers(tiers)
+        .with_residency(residency)
         .with_overflow(overflow)
         .with_quality(Quality { alpha_cut, detail: detail != 0 })
         .with_most_work(MOST_WORK)

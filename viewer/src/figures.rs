@@ -49,6 +49,7 @@ pub(crate) fn of_plan(bundle: &Bundle<'_>, plan: &Plan) -> Figures {
         ("nSlabs", plan.n_slabs().into()),
         ("maxSplats", plan.max_splats().into()),
         ("isResident", flag(plan.is_resident())),
+        ("keepsSums", flag(plan.keeps_sums())),
         ("isBaked", flag(plan.is_baked())),
         ("halfWeights", flag(plan.head_weights() == HeadWeights::F16)),
     ];

@@ -3,7 +3,9 @@
 use std::convert::Infallible;
 use std::slice;
 
-use pocketsplat_core::{Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, Plan, Region, Tile, TileSink};
+use pocketsplat_core::{
+    Budget, Bundle, Camera, DecodeError, Decoder, FrameReport, Plan, Region, Residency, Tile, TileSink,
+};
 use pocketsplat_instructions::Costs;
 
 use crate::figures::{self, Figures};
@@ -48,11 +50,12 @@ impl Scene {
         self.bundle.header().preview
     }
 
-    /// The least memory that draws anything within the other limits of `budget`, and the most that is of use, bytes.
+    /// The least memory with which a device draws anything within the other limits of `budget`, and the most that is of use, bytes.
     ///
     /// # Errors
     /// As [`Plan::new`].
     pub fn limits(&self, budget: &Budget) -> Result<Figures, DecodeError> {
+        let budget = budget.with_residency(Residency::Auto);
         let least = match Plan::new(&self.bundle, &budget.in_bytes(0)) {
             Err(DecodeError::BudgetTooSmall { needed, .. }) => needed.into(),
             Err(error) => return Err(error),

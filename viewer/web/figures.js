@@ -46,6 +46,11 @@ function fill(table, views, rows) {
   table.replaceChildren(...lines);
 }
 
+function anchorsAre({ isBaked, keepsSums, isResident }) {
+  if (isBaked) return 'baked';
+  return keepsSums ? 'in memory, with sums' : isResident ? 'in memory' : 'streamed';
+}
+
 export function showPlans(table, views) {
   const of = (cell) => (view) => (view.plan && !view.refused ? cell(view.plan, view) : undefined);
   const rows = [
@@ -54,7 +59,7 @@ export function showPlans(table, views) {
     ['Anchors drawn', of((plan) => count(plan.nAnchors))],
     ['Pruning rate', of((plan) => percent(plan.pruningRate))],
     ['PSNR, measured', of((plan) => (Number.isFinite(plan.psnrDb) ? `${plan.psnrDb.toFixed(2)} dB` : undefined))],
-    ['Anchors are', of(({ isBaked, isResident }) => (isBaked ? 'baked' : isResident ? 'in memory' : 'streamed'))],
+    ['Anchors are', of(anchorsAre)],
     ['Strips', of((plan) => count(plan.nStrips))],
     ['Slabs, at most', of((plan) => count(plan.nSlabs))],
     ['Room for splats', of((plan) => count(plan.maxSplats))],

@@ -79,6 +79,8 @@ export interface Plan extends Tier {
   maxSplats: number;
   /** Whether anchors are decoded once, not in every frame. */
   isResident: boolean;
+  /** Whether the sums over anchors' features are kept too, which they are where `ramBytes` is Infinity. */
+  keepsSums: boolean;
   /** Whether Gaussians are evaluated once. */
   isBaked: boolean;
   /** Whether the networks' weights are kept in 16 bits. */

@@ -155,8 +155,9 @@ function numbersOf(camera, bound) {
   return [...rotation, ...translation, ...focalPx, ...principalPx, widthPx, heightPx];
 }
 
-function planOf({ isResident, isBaked, halfWeights, ...plan }) {
-  return { ...plan, isResident: isResident === 1, isBaked: isBaked === 1, halfWeights: halfWeights === 1 };
+function planOf({ isResident, keepsSums, isBaked, halfWeights, ...plan }) {
+  const flags = { isResident, keepsSums, isBaked, halfWeights };
+  return { ...plan, ...Object.fromEntries(Object.entries(flags).map(([name, flag]) => [name, flag === 1])) };
 }
 
 /** Gathers `cortexMBlend` and its like as `cortexM.blend`. */

@@ -38,7 +38,9 @@ const frameSize = () => (state.device ? state.size : views[0].sizeFor(views[0].f
 function settingsOf(view, [widthPx, heightPx]) {
   const nTiers = view.tiers.length;
   const tiers = Math.max(1, nTiers - Math.min(state.pruning, nTiers - 1));
-  return { widthPx, heightPx, ramBytes: state.ramBytes, tiers, slabs: state.slabs, quality: state.quality };
+  // A device has a limit, however large: what only a browser has room for is not counted as its memory.
+  const ramBytes = state.device ? Math.min(state.ramBytes, Number.MAX_SAFE_INTEGER) : state.ramBytes;
+  return { widthPx, heightPx, ramBytes, tiers, slabs: state.slabs, quality: state.quality };
 }
 
 /** One camera for all: in the world's frame where the bundles are of one capture, else around each scene by itself. */

@@ -34,6 +34,10 @@ pub enum Residency {
     /// [look the same](crate::Bundle::n_gaussians) from everywhere. Evaluated in the
     /// [reference arithmetic](crate::ReferenceArithmetic), whatever the frame is drawn in.
     Baked,
+    /// As [`Auto`](Self::Auto), and if there is room, beside each anchor in memory what no camera changes of its heads' first layers:
+    /// `b₁ + W₁·feature`. The same pixels with about a third of the heads' multiply-adds; for memory of megabytes, since an anchor of 50 features
+    /// takes 672 bytes more. Of no use to heads in halves or in [integers](crate::WithoutFpu), and `Auto` without the cargo feature `baked`.
+    AutoWithSums,
     /// In memory, as integers, decoded once when bound.
     Resident,
     /// In the bundle; each frame decodes those in view again, one at a time.

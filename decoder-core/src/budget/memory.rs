@@ -56,6 +56,11 @@ slices! {
         scales: [[f32; 2]; shape.coder.n_tables as usize],
     }
 
+    /// The sums of anchors' features between frames.
+    SumsMemory: sums_words, take_sums(shape) {
+        sums: [f32; shape.sums_len()],
+    }
+
     /// Gaussians between frames, and where those of each chunk begin and end.
     BakedMemory: baked_words, take_baked(shape) {
         records: [BakedGaussian; shape.resident.len()],
@@ -104,6 +109,12 @@ pub(crate) struct ModelMemory<'s> {
     pub(crate) words: &'s mut [u32],
 }
 
+/// Memory of sums.
+pub(crate) struct SumsMemory<'s> {
+    /// Of all anchors, one after the other; empty where none are kept.
+    pub(crate) sums: &'s mut [f32],
+}
+
 /// Memory that tiles are drawn in.
 pub(crate) struct TileMemory<'s> {
     /// `[TILE_PIXELS]` of the current tile, or of each tile of a strip that is drawn in slabs.
@@ -145,7 +156,7 @@ pub(crate) enum SceneMemory<'s, 'f> {
     /// Each frame decodes.
     Streamed { anchor: AnchorMemory<'s>, models: ModelMemory<'s> },
     /// Binding decodes.
-    Resident { anchor: AnchorMemory<'s>, records: RecordMemory<'s>, models: ModelMemory<'f> },
+    Resident { anchor: AnchorMemory<'s>, records: RecordMemory<'s>, sums: SumsMemory<'s>, models: ModelMemory<'f> },
     /// Binding decodes and evaluates.
     Baked { baked: BakedMemory<'s>, anchor: AnchorMemory<'f>, models: ModelMemory<'f> },
 }
@@ -165,8 +176,9 @@ impl<'s, 'f> SceneMemory<'s, 'f> {
         let anchor = take_anchor(shape, regions.of(Part::Heads))?;
         if shape.resident.is_anchors() {
             let records = take_records(shape, regions.of(Part::Scene))?;
+            let sums = take_sums(shape, regions.of(Part::Scene))?;
             let models = take_models(shape, regions.borrow().of(Part::Models))?;
-            return Ok(Self::Resident { anchor, records, models });
+            return Ok(Self::Resident { anchor, records, sums, models });
         }
         Ok(Self::Streamed { anchor, models: take_models(shape, regions.of(Part::Models))? })
     }
@@ -293,7 +305,7 @@ impl ScratchShape {
             Part::Heads => (if is_baked { When::Bound } else { When::Kept }, anchor_words(self)),
             Part::Models => (if is_baked || is_resident { When::Bound } else { When::Kept }, models_words(self)),
             Part::Scene if is_baked => (When::Kept, baked_words(self)),
-            Part::Scene if is_resident => (When::Kept, record_words(self)),
+            Part::Scene if is_resident => (When::Kept, record_words(self).saturating_add(sums_words(self))),
             Part::Scene => (When::Kept, 0),
             Part::Tiles => (When::Frame, tile_words(self)),
             Part::Splats => (When::Frame, splat_words(self)),
@@ -356,7 +368,11 @@ mod tests {
                 },
                 resident: match kept {
                     0 => Resident::Nothing,
-                    1 => Resident::Anchors { n_anchors: 1 + self.below(most / 3), n_chunks: 1 + self.below(200) },
+                    1 => Resident::Anchors {
+                        n_anchors: 1 + self.below(most / 3),
+                        n_chunks: 1 + self.below(200),
+                        with_sums: self.below(2) == 1,
+                    },
                     _ => Resident::Gaussians { n_gaussians: self.below(2 * most), n_chunks: 1 + self.below(200) },
                 },
                 frame: FrameShape { canvas_tiles: 1 + self.below(100), max_splats: self.below(most) },
@@ -393,9 +409,13 @@ mod tests {
             },
             resident: match (a.resident, b.resident) {
                 (
-                    Resident::Anchors { n_anchors, n_chunks },
-                    Resident::Anchors { n_anchors: more_anchors, n_chunks: more_chunks },
-                ) => Resident::Anchors { n_anchors: n_anchors.max(more_anchors), n_chunks: n_chunks.max(more_chunks) },
+                    Resident::Anchors { n_anchors, n_chunks, with_sums },
+                    Resident::Anchors { n_anchors: more_anchors, n_chunks: more_chunks, with_sums: more_sums },
+                ) => Resident::Anchors {
+                    n_anchors: n_anchors.max(more_anchors),
+                    n_chunks: n_chunks.max(more_chunks),
+                    with_sums: with_sums | more_sums,
+                },
                 (
                     Resident::Gaussians { n_gaussians, n_chunks },
                     Resident::Gaussians { n_gaussians: more_gaussians, n_chunks: more_chunks },
@@ -468,7 +488,8 @@ mod tests {
     fn splats_within_a_length_fill_it() {
         for resident in [
             Resident::Nothing,
-            Resident::Anchors { n_anchors: 40, n_chunks: 40 },
+            Resident::Anchors { n_anchors: 40, n_chunks: 40, with_sums: false },
+            Resident::Anchors { n_anchors: 4, n_chunks: 4, with_sums: true },
             Resident::Gaussians { n_gaussians: 40, n_chunks: 40 },
         ] {
             let shape = ScratchShape { resident, ..ScratchShape::most(16, 4) }.with_splats(5000);

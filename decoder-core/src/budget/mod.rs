@@ -17,7 +17,7 @@ mod work;
 
 pub use crate::mlp::HeadWeights;
 pub use limits::{Budget, MaxSplats, Overflow, Residency, Strips};
-pub(crate) use memory::{AnchorMemory, FrameMemory, ListMemory, ModelMemory, SceneMemory, TileMemory};
+pub(crate) use memory::{AnchorMemory, FrameMemory, ListMemory, ModelMemory, SceneMemory, SumsMemory, TileMemory};
 pub use placement::{Part, PartMemory};
 pub(crate) use placement::{Placement, Regions};
 pub use plan::Plan;

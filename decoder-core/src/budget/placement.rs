@@ -19,7 +19,7 @@ pub enum Part {
     Lists,
     /// The splats, 28 bytes each: once for each tile that they touch.
     Splats,
-    /// Anchors or Gaussians in memory: once for each strip.
+    /// Anchors, with their sums, or Gaussians in memory: once for each strip.
     Scene,
 }
 

@@ -106,6 +106,12 @@ impl Plan {
         self.shape.resident.is_anchors()
     }
 
+    /// Whether the [sums](Residency::AutoWithSums) of resident anchors' features are in memory.
+    #[must_use]
+    pub fn keeps_sums(&self) -> bool {
+        self.shape.resident.has_sums()
+    }
+
     /// Whether Gaussians are evaluated once when bound; if not, every frame runs the heads of the anchors in view.
     #[must_use]
     pub fn is_baked(&self) -> bool {
@@ -165,8 +171,8 @@ impl Plan {
     /// [weights of the heads](Plan::head_weights) in f32 before halves, and among these plan variants the one of least predicted work.
     ///
     /// Work is predicted in multiply-adds. One strip goes over the scene once, several together about twice; going over it
-    /// costs the heads' (from the manifest, else of all anchors), and decoding when anchors are streamed; or 150 a Gaussian when
-    /// they are baked. Of equals the fewest strips are taken, or the most where they share passes. The frame's size decides about
+    /// costs the heads' (from the manifest, else of all anchors; the share that [sums](Residency::AutoWithSums) leave at most), and decoding when
+    /// anchors are streamed; or 150 a Gaussian when they are baked. Of equals the fewest strips are taken, or the most where they share passes. The frame's size decides about
     /// memory only through the splats of a strip, because tiles leave one by one; a splat takes 40 bytes.
     ///
     /// When [slabs](Overflow::Slabs) are allowed, fewer places than splats will do, down to 256: then nearly every scene fits
@@ -274,6 +280,10 @@ impl Planner<'_, '_> {
         let residencies = match &self.budget.residency {
             Residency::Auto if bakeable => &[Residency::Baked, Residency::Resident, Residency::Streamed][..],
             Residency::Auto => &[Residency::Resident, Residency::Streamed],
+            Residency::AutoWithSums if bakeable => {
+                &[Residency::Baked, Residency::AutoWithSums, Residency::Resident, Residency::Streamed]
+            }
+            Residency::AutoWithSums => &[Residency::AutoWithSums, Residency::Resident, Residency::Streamed],
             given => slice::from_ref(given),
         };
         strips.iter().flat_map(move |&n_strips| residencies.iter().map(move |&residency| (n_strips, residency)))
@@ -296,7 +306,7 @@ impl Planner<'_, '_> {
         let measures = self.measures(n_tiers);
         let in_slabs = budget.overflow == Overflow::Slabs;
         let canvas_tiles = if in_slabs { tiles_of_strip([budget.width_px, budget.height_px], n_strips) } else { 1 };
-        let resident = self.resident(residency, n_tiers, tier);
+        let resident = self.resident(residency, n_tiers, tier, weights);
         // Gaussians are evaluated once, with weights in f32.
         let weights = if resident.is_gaussians() { HeadWeights::F32 } else { weights };
         let wanted = self.splats_to_hold(budget.max_splats, n_tiers, n_strips, weights);
@@ -329,7 +339,7 @@ impl Planner<'_, '_> {
             slow_len,
             least_splats: shape.frame.max_splats,
             pruning_rate: 1.0 - tier.n_anchors as f32 / header.n_anchors.max(1) as f32,
-            work: measures.map(|m| Work::most(&m, header.training_px, budget, passes, resident)),
+            work: measures.map(|m| Work::most(&m, header.training_px, budget, passes, &shape)),
         };
         let (head_macs, n_decoded) = match measures {
             Some(measures) => {
@@ -346,7 +356,7 @@ impl Planner<'_, '_> {
             Resident::Gaussians { n_gaussians, .. } if cfg!(feature = "baked") => {
                 READING_MACS.saturating_mul(n_gaussians.into())
             }
-            Resident::Gaussians { .. } | Resident::Anchors { .. } => head_macs,
+            Resident::Gaussians { .. } | Resident::Anchors { .. } => shape.evaluated_macs(head_macs),
             Resident::Nothing => head_macs.saturating_add(decoding),
         };
         let times = u64::from(n_slabs).saturating_mul(if n_strips > 1 { 2 } else { 1 });
@@ -354,14 +364,19 @@ impl Planner<'_, '_> {
     }
 
     /// What a residency keeps in memory of the first `n_tiers` tiers, which `tier` sums up.
-    fn resident(&self, residency: Residency, n_tiers: u8, Tier { n_anchors, n_chunks, .. }: Tier) -> Resident {
+    fn resident(&self, residency: Residency, n_tiers: u8, tier: Tier, weights: HeadWeights) -> Resident {
+        let Tier { n_anchors, n_chunks, .. } = tier;
         match residency {
             _ if n_chunks == 0 => Resident::Nothing,
             Residency::Baked if cfg!(feature = "baked") => {
                 let n_gaussians = self.bundle.n_gaussians(n_tiers).unwrap_or_default();
                 Resident::Gaussians { n_gaussians, n_chunks }
             }
-            Residency::Resident => Resident::Anchors { n_anchors, n_chunks },
+            Residency::AutoWithSums | Residency::Resident => {
+                let with_sums =
+                    cfg!(feature = "baked") && residency == Residency::AutoWithSums && weights == HeadWeights::F32;
+                Resident::Anchors { n_anchors, n_chunks, with_sums }
+            }
             _ => Resident::Nothing,
         }
     }

@@ -102,6 +102,8 @@ pub enum Resident {
         n_anchors: u32,
         /// Chunks of them.
         n_chunks: u32,
+        /// Whether the sums of their features are too.
+        with_sums: bool,
     },
     /// Gaussians, evaluated when bound.
     Gaussians {
@@ -157,6 +159,16 @@ impl Resident {
     /// Whether anchors are in memory.
     pub(super) const fn is_anchors(&self) -> bool {
         matches!(self, Self::Anchors { .. })
+    }
+
+    /// Anchors whose features' sums are in memory.
+    const fn n_summed(&self) -> usize {
+        if self.has_sums() { self.len() } else { 0 }
+    }
+
+    /// Whether the sums of the anchors' features are in memory; never without the feature `baked`.
+    pub(super) const fn has_sums(&self) -> bool {
+        cfg!(feature = "baked") && matches!(self, Self::Anchors { with_sums: true, .. })
     }
 
     /// Whether Gaussians are; never without the feature `baked`.
@@ -232,6 +244,17 @@ impl ScratchShape {
     #[must_use]
     pub const fn resident_anchor_len(&self) -> usize {
         self.record_layout().n_words().saturating_mul(2)
+    }
+
+    /// Floats of the sums of all features in memory.
+    pub(super) const fn sums_len(&self) -> usize {
+        self.resident.n_summed().saturating_mul(self.heads().anchor_sums_len())
+    }
+
+    /// At most what is left of multiply-adds of the heads, where the sums of features may be in memory.
+    pub(super) const fn evaluated_macs(&self, head_macs: u64) -> u64 {
+        let share = if self.resident.has_sums() { self.heads().summed_share() } else { 1024 };
+        head_macs.div_ceil(1024).saturating_mul(share as u64)
     }
 
     /// Widths of the heads that are converted.

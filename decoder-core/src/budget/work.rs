@@ -5,7 +5,7 @@ use pocketsplat_format::bundle::{Coder, TierMeasures};
 use pocketsplat_format::context::first_tap;
 
 use super::limits::Budget;
-use super::shape::Resident;
+use super::shape::{Resident, ScratchShape};
 
 /// What a symbol takes in multiply-adds of f32, of which each takes 2.5 instructions on a Cortex-M4; a symbol takes 64.
 const SYMBOL_MACS: usize = 26;
@@ -36,7 +36,7 @@ impl Work {
         training_px: [u16; 2],
         budget: &Budget,
         passes: u64,
-        resident: Resident,
+        shape: &ScratchShape,
     ) -> Self {
         let sides = [budget.width_px, budget.height_px].into_iter().zip(training_px);
         let area = |[width, height]: [u16; 2]| u32::from(width).saturating_mul(height.into());
@@ -46,10 +46,10 @@ impl Work {
             pixels.saturating_mul((u32::from(planned) << 10).div_ceil(u32::from(measured).max(1)).into())
         });
         let pixels = u64::from(measures.max_kilo_pixels).saturating_mul(1024);
-        let anchors = if resident == Resident::Nothing { measures.max_decoded_anchors } else { 0 };
-        let kilo_macs = if resident.is_gaussians() { 0 } else { measures.max_head_kilo_macs };
+        let anchors = if shape.resident == Resident::Nothing { measures.max_decoded_anchors } else { 0 };
+        let kilo_macs = if shape.resident.is_gaussians() { 0 } else { measures.max_head_kilo_macs };
         Self {
-            head_macs: u64::from(kilo_macs).saturating_mul(1024).saturating_mul(passes),
+            head_macs: shape.evaluated_macs(u64::from(kilo_macs).saturating_mul(1024)).saturating_mul(passes),
             decoded_anchors: u64::from(anchors).saturating_mul(passes),
             pixel_splats: if is_larger { larger.div_ceil(1024) } else { pixels },
         }

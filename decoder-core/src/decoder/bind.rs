@@ -11,9 +11,10 @@ use crate::arena::Arena;
 use crate::arithmetic::Arithmetic;
 use crate::bake::{BakedGaussians, BakedMemory, Baker, bake};
 use crate::budget::{
-    AnchorMemory, FrameMemory, ListMemory, ModelMemory, Part, Plan, Regions, SceneMemory, ScratchShape, TileMemory,
+    AnchorMemory, FrameMemory, ListMemory, ModelMemory, Part, Plan, Regions, SceneMemory, ScratchShape, SumsMemory,
+    TileMemory,
 };
-use crate::mlp::{F32, HeadFormat, Heads};
+use crate::mlp::{F32, FeatureSums, HeadFormat, Heads};
 use crate::scene::{Evaluator, Pair, Workspace};
 
 impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
@@ -98,7 +99,7 @@ fn bind_scene<'b, 's, N: HeadFormat>(
             return bind_baked(bundle, shape, baked, anchor, models, skip_damage).map(GaussianSource::Baked);
         }
         SceneMemory::Streamed { anchor, models } => (anchor, AnchorStorage::Models(models)),
-        SceneMemory::Resident { anchor, records, .. } => (anchor, AnchorStorage::Anchors(records)),
+        SceneMemory::Resident { anchor, records, sums, .. } => (anchor, AnchorStorage::Anchors(records, sums)),
     };
     let evaluator = evaluator(bundle, shape, anchor, regions.of(Part::Tiles).borrow());
     anchors(bundle, shape, kept, evaluator)
@@ -108,8 +109,8 @@ fn bind_scene<'b, 's, N: HeadFormat>(
 enum AnchorStorage<'s> {
     /// Nothing but what decodes them.
     Models(ModelMemory<'s>),
-    /// They.
-    Anchors(RecordMemory<'s>),
+    /// They, and the sums of their features.
+    Anchors(RecordMemory<'s>, SumsMemory<'s>),
 }
 
 /// What evaluates anchors, and `[n_channels]` of one.
@@ -125,14 +126,38 @@ fn anchors<'b, 's, N: HeadFormat>(
     kept: AnchorStorage<'s>,
     evaluator: Result<EvaluatorAndRow<'s, N>, DecodeError>,
 ) -> Result<GaussianSource<'b, 's, N>, DecodeError> {
-    let (evaluator, row) = evaluator?;
+    let (mut evaluator, row) = evaluator?;
     let source = match kept {
         AnchorStorage::Models(models) => AnchorSource::Streamed(bundle.anchor_models(models.words)?),
-        AnchorStorage::Anchors(records) => {
-            AnchorSource::Resident(AnchorRecords::new(bundle, shape.record_layout(), records)?)
+        AnchorStorage::Anchors(records, SumsMemory { sums }) => {
+            let mut records = AnchorRecords::new(bundle, shape.record_layout(), records)?;
+            if cfg!(feature = "baked") && N::READS_SUMS && !sums.is_empty() {
+                evaluator.sums = Some(sums_of(&records, &evaluator.heads, row, sums)?);
+                // Nothing reads them any more.
+                records = records.without_features();
+            }
+            AnchorSource::Resident(records)
         }
     };
     Ok(GaussianSource::Anchors(Anchors { source, row, evaluator }))
+}
+
+/// Fills `sums` with those of all anchors.
+///
+/// * `row`: `[n_channels]`, to work in.
+#[inline(never)]
+fn sums_of<'s, N: HeadFormat>(
+    records: &AnchorRecords<'_, '_>,
+    heads: &Heads<'_, N>,
+    row: &mut [f32],
+    sums: &'s mut [f32],
+) -> Result<FeatureSums<'s>, DecodeError> {
+    let len = heads.shape.anchor_sums_len();
+    for (number, sums) in (0..).zip(sums.chunks_exact_mut(len.max(1))) {
+        records.read(number, row).ok_or(DecodeError::Internal)?;
+        heads.begin(row.get(..heads.shape.feature).unwrap_or_default(), sums);
+    }
+    Ok(FeatureSums::new(sums, len))
 }
 
 /// Gaussians that are evaluated once.
@@ -176,7 +201,7 @@ fn evaluator_of<'s, N: HeadFormat>(
 ) -> Result<EvaluatorAndRow<'s, N>, DecodeError> {
     let heads = heads?;
     let pair = if heads.takes_two() { Pair::take(&mut arena, shape.heads()) } else { None };
-    Ok((Evaluator { heads, inputs, work, pair }, row))
+    Ok((Evaluator { heads, inputs, work, pair, sums: None }, row))
 }
 
 /// Decodes the planned tiers if they are resident, and if they are streamed compares their checksums; Gaussians are baked later.
@@ -185,7 +210,7 @@ fn read_chunks(bundle: &Bundle<'_>, plan: &Plan, [fast, slow]: [&mut [u8]; 2]) -
     let (shape, skip_damage) = (plan.shape(), plan.budget().skips_damage);
     let mut regions = Regions::new(fast, slow, plan.placement());
     match SceneMemory::take(shape, &mut regions)? {
-        SceneMemory::Resident { anchor, mut records, models } => {
+        SceneMemory::Resident { anchor, mut records, models, .. } => {
             let n_chunks = shape.resident.n_chunks();
             records.decode(bundle, n_chunks, &shape.record_layout(), anchor.row, models.words, skip_damage)
         }

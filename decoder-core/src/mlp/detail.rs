@@ -3,9 +3,8 @@
 use pocketsplat_format::DecodeError;
 use pocketsplat_format::bundle::{HeadView, WeightReader};
 
-use super::block::{HeadWeights, continued};
+use super::block::HeadWeights;
 use super::head::Head;
-use super::weight::LANES;
 use crate::arena::Arena;
 
 /// `W2·relu(W1·[feature, colour] + b1) + b2`.
@@ -31,23 +30,14 @@ impl<'s> Detail<'s> {
     ///
     /// * `sums`: [`sums_len`](super::HeadShape::sums_len) floats.
     pub(crate) fn begin(&self, feature: &[f32], sums: &mut [f32]) {
-        for (sums, block) in sums.as_chunks_mut::<LANES>().0.iter_mut().zip(self.head.hidden.blocks.floats()) {
-            *sums = pocketsplat_half::outputs(block, feature);
-        }
+        self.head.hidden.begin(feature, sums);
     }
 
     /// The part per Gaussian: what is added to `colour`.
     ///
     /// * `sums`: as [`Self::begin`] left them. * `hidden`: at least as many floats.
     pub(crate) fn residual(&self, colour: [f32; 3], sums: &[f32], hidden: &mut [f32]) -> [f32; 3] {
-        let units = hidden.as_chunks_mut::<LANES>().0.iter_mut();
-        for ((units, sums), block) in units.zip(sums.as_chunks::<LANES>().0).zip(self.head.hidden.blocks.floats()) {
-            // The row of biases, then one an input.
-            let rows = block.get(1..).and_then(|rows| rows.get(self.feature_dim..)).unwrap_or_default();
-            for (unit, sum) in units.iter_mut().zip(continued(*sums, rows, &colour)) {
-                *unit = if sum > 0.0 { sum } else { 0.0 };
-            }
-        }
+        self.head.hidden.go_on(sums, self.feature_dim, &colour, hidden);
         let hidden = hidden.get(..self.head.hidden.n_units).unwrap_or_default();
         self.head.output.outputs(0, hidden).unwrap_or_default()
     }

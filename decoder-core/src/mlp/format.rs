@@ -16,6 +16,8 @@ pub(crate) struct I16;
 
 /// A format of the heads.
 pub(crate) trait HeadFormat {
+    /// Whether hidden layers go on from sums over the feature.
+    const READS_SUMS: bool;
     /// What a layer reads.
     type Values<'v>: Copy;
     /// A head of B outputs an offset.
@@ -40,6 +42,9 @@ pub(crate) trait MlpHead<'s, N: HeadFormat + ?Sized, const B: usize>: Sized {
         head: &HeadView<'_>,
         weights: &mut WeightReader<'_>,
     ) -> Result<Self, DecodeError>;
+
+    /// Fills `sums` with `b₁ + W₁·feature`, whole blocks, if layers [go on](HeadFormat::READS_SUMS) from that.
+    fn begin(&self, feature: &[f32], sums: &mut [f32]);
 
     /// Fills `hidden` with the hidden units, and returns what the output layer reads of them.
     ///

@@ -3,7 +3,7 @@
 use pocketsplat_format::DecodeError;
 use pocketsplat_format::bundle::{HeadView, WeightReader};
 
-use super::block::{Blocks, HeadWeights};
+use super::block::{Blocks, HeadWeights, continued};
 use super::format::{F32, HeadFormat, MlpHead};
 use super::pair::Role;
 use super::weight;
@@ -24,6 +24,7 @@ pub(super) struct Hidden<'s> {
 
 /// Floats read floats.
 impl HeadFormat for F32 {
+    const READS_SUMS: bool = true;
     type Values<'v> = &'v [f32];
     type Head<'s, const B: usize> = Head<'s, B>;
 
@@ -52,6 +53,10 @@ where
         Self::convert(arena, kept_as, head, weights)
     }
 
+    fn begin(&self, feature: &[f32], sums: &mut [f32]) {
+        self.hidden.begin(feature, sums);
+    }
+
     fn activate<'h>(&self, number: usize, inputs: &[f32], hidden: &'h mut [f32], role: &'h mut Role<'_>) -> &'h [f32] {
         self.hidden.activate(number, inputs, hidden, role)
     }
@@ -70,7 +75,10 @@ impl Hidden<'_> {
     // Not inlined: one of it serves all heads.
     #[inline(never)]
     fn activate<'h>(&self, number: usize, inputs: &[f32], hidden: &'h mut [f32], role: &'h mut Role<'_>) -> &'h [f32] {
-        if !self.blocks.takes_two() {
+        if let Some(sums) = role.sums() {
+            let (sums, n_in) = sums.of_head(number);
+            self.go_on(sums, n_in, inputs.get(n_in..).unwrap_or_default(), hidden);
+        } else if !self.blocks.takes_two() {
             self.blocks.rectify(inputs, hidden);
         } else if let Some((second_inputs, second)) = role.second(number, hidden.len()) {
             // Not zipped: blocks are of a length that the compiler does not know, and their number would be a division, which it may take
@@ -90,6 +98,29 @@ impl Hidden<'_> {
             self.finish(inputs, hidden);
         }
         hidden.get(..self.n_units).unwrap_or_default()
+    }
+
+    /// Fills `sums` with `b₁ + W₁·inputs`, of the first inputs alone.
+    ///
+    /// * `sums`: whole blocks.
+    pub(super) fn begin(&self, inputs: &[f32], sums: &mut [f32]) {
+        for (sums, block) in sums.as_chunks_mut::<LANES>().0.iter_mut().zip(self.blocks.floats()) {
+            *sums = pocketsplat_half::outputs(block, inputs);
+        }
+    }
+
+    /// Makes units of `sums`, as [`begin`](Self::begin) left them, and of the inputs behind the first `n_in`.
+    // Not inlined: one of it serves all heads.
+    #[inline(never)]
+    pub(super) fn go_on(&self, sums: &[f32], n_in: usize, inputs: &[f32], hidden: &mut [f32]) {
+        let units = hidden.as_chunks_mut::<LANES>().0.iter_mut();
+        for ((units, sums), block) in units.zip(sums.as_chunks::<LANES>().0).zip(self.blocks.floats()) {
+            // The row of biases, then one an input.
+            let rows = block.get(1..).and_then(|rows| rows.get(n_in..)).unwrap_or_default();
+            for (unit, sum) in units.iter_mut().zip(continued(*sums, rows, inputs)) {
+                *unit = relu(sum);
+            }
+        }
     }
 
     /// Makes units of the sums of halves, which are not finite if an input was too large to be scaled.

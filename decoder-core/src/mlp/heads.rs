@@ -28,6 +28,16 @@ pub(crate) enum CovarianceHead<'s, N: HeadFormat> {
 }
 
 impl<'s, N: HeadFormat> CovarianceHead<'s, N> {
+    /// As [`MlpHead::begin`].
+    fn begin(&self, feature: &[f32], sums: &mut [f32]) {
+        match self {
+            Self::Isotropic(head) => head.begin(feature, sums),
+            // Unreachable without the feature; this arm drops the code, here and below.
+            Self::Anisotropic(_) if !cfg!(feature = "anisotropy") => {}
+            Self::Anisotropic(head) => head.begin(feature, sums),
+        }
+    }
+
     /// As [`MlpHead::activate`].
     pub(crate) fn activate<'h>(
         &self,
@@ -38,7 +48,6 @@ impl<'s, N: HeadFormat> CovarianceHead<'s, N> {
     ) -> N::Values<'h> {
         match self {
             Self::Isotropic(head) => head.activate(number, inputs, hidden, role),
-            // Unreachable without the feature; this arm drops the code, here and below.
             Self::Anisotropic(_) if !cfg!(feature = "anisotropy") => N::values(hidden),
             Self::Anisotropic(head) => head.activate(number, inputs, hidden, role),
         }
@@ -58,6 +67,22 @@ impl<'s, N: HeadFormat> Heads<'s, N> {
     /// Whether two anchors at a time cost less than one after the other.
     pub(crate) fn takes_two(&self) -> bool {
         self.opacity.takes_two()
+    }
+
+    /// Fills `sums` with what no camera changes of an anchor's hidden layers, see [`FeatureSums`](super::FeatureSums).
+    ///
+    /// * `sums`: [`anchor_sums_len`](HeadShape::anchor_sums_len) floats.
+    pub(crate) fn begin(&self, feature: &[f32], sums: &mut [f32]) {
+        // Each fills what is its own, and no more.
+        let [opacity, covariance, colour, detail_sums] = self.shape.head_sums(sums);
+        self.opacity.begin(feature, opacity);
+        self.covariance.begin(feature, covariance);
+        self.colour.begin(feature, colour);
+        if cfg!(feature = "detail")
+            && let Some(detail) = &self.detail
+        {
+            detail.begin(feature, detail_sums);
+        }
     }
 
     /// Converts the file's weights; takes as many words as [`HeadShape`] says.

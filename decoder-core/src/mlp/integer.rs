@@ -101,6 +101,8 @@ pub(crate) struct IntegerHead<'s, const B: usize> {
 
 /// Integers read integers; the detail head stays in floats.
 impl HeadFormat for I16 {
+    // One scale serves all inputs, those that a camera decides too.
+    const READS_SUMS: bool = false;
     type Values<'v> = Quantised<'v>;
     type Head<'s, const B: usize> = IntegerHead<'s, B>;
 
@@ -155,6 +157,8 @@ where
         }
         Ok(Self { hidden, pairs_per_unit, output, pairs_per_output, ends, n_hidden })
     }
+
+    fn begin(&self, _: &[f32], _: &mut [f32]) {}
 
     fn activate<'h>(
         &self,

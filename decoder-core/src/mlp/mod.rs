@@ -12,6 +12,7 @@ mod heads;
 mod integer;
 mod pair;
 mod shape;
+mod sums;
 mod weight;
 
 pub use block::HeadWeights;
@@ -19,3 +20,4 @@ pub(crate) use format::{F32, HeadFormat, I16, MlpHead};
 pub(crate) use heads::Heads;
 pub(crate) use pair::Role;
 pub(crate) use shape::HeadShape;
+pub(crate) use sums::FeatureSums;

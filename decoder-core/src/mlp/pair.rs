@@ -1,9 +1,14 @@
-//! Two anchors whose hidden layers are computed together, so that each weight is widened once for both.
+//! What an anchor's hidden layers are computed with: two anchors' together, so that each weight is widened once for both, or from sums in
+//! memory.
+
+use super::sums::AnchorSums;
 
 /// What an anchor's hidden layers are computed with.
 pub(crate) enum Role<'p> {
     /// By themselves.
     Alone,
+    /// From what they begin with.
+    Begun(AnchorSums<'p>),
     /// With those of a second anchor.
     First {
         /// What the second anchor's heads read.
@@ -34,6 +39,14 @@ impl<'p> Role<'p> {
     /// Floats of the second anchor's hidden units.
     pub(crate) const fn units_len(hidden_len: usize) -> usize {
         3 * hidden_len
+    }
+
+    /// What the hidden layers begin with, if that is in memory.
+    pub(crate) fn sums(&self) -> Option<&AnchorSums<'p>> {
+        match self {
+            Self::Begun(sums) if cfg!(feature = "baked") => Some(sums),
+            _ => None,
+        }
     }
 
     /// The second anchor's hidden units of head `number`, if they were computed with the first one's.

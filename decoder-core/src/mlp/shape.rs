@@ -84,6 +84,42 @@ impl HeadShape {
         self.detail.next_multiple_of(LANES)
     }
 
+    /// Floats of what [`FeatureSums`](super::FeatureSums) keep of an anchor: of the hidden units of three heads, and of the detail head.
+    pub(crate) const fn anchor_sums_len(&self) -> usize {
+        self.head_sums_at(3) + self.sums_len()
+    }
+
+    /// Where among them those of head `number` begin, opacity, covariance and colour; of 3 those of the detail head.
+    pub(super) const fn head_sums_at(&self, number: usize) -> usize {
+        let geometry = self.feature.next_multiple_of(LANES);
+        if number < 3 { number * geometry } else { 2 * geometry + self.colour.next_multiple_of(LANES) }
+    }
+
+    /// Those of one anchor by heads.
+    pub(super) fn head_sums<'p>(&self, sums: &'p mut [f32]) -> [&'p mut [f32]; 4] {
+        let (opacity, rest) = sums.split_at_mut_checked(self.head_sums_at(1)).unwrap_or_default();
+        let (covariance, rest) = rest.split_at_mut_checked(self.head_sums_at(1)).unwrap_or_default();
+        let colour_len = self.head_sums_at(3) - self.head_sums_at(2);
+        let (colour, detail) = rest.split_at_mut_checked(colour_len).unwrap_or_default();
+        [opacity, covariance, colour, detail]
+    }
+
+    /// Multiply-adds over the feature, which sums in memory save: of the opacity head, and of the others.
+    pub(crate) const fn feature_macs(&self) -> [usize; 2] {
+        let Self { feature: f, colour: c, detail: d, .. } = *self;
+        [f * f, f * (f + c + d)]
+    }
+
+    /// The largest share, in 1024ths, that sums in memory leave of an anchor's multiply-adds. They save as much whatever its offsets are, so
+    /// it is an anchor of K offsets, all of them open or none.
+    pub(crate) const fn summed_share(&self) -> u32 {
+        let [opacity, others] = self.feature_macs();
+        let closed = self.opacity_macs(self.offsets);
+        let open = closed + self.open_macs(self.offsets);
+        let [closed, open] = [share_left(closed, opacity), share_left(open, opacity + others)];
+        if closed > open { closed } else { open }
+    }
+
     /// Multiply-adds of the opacity head, which every visible anchor takes, with `n_drawn` offsets.
     pub(crate) const fn opacity_macs(&self, n_drawn: usize) -> usize {
         self.feature * (self.geometry_inputs + n_drawn)
@@ -96,4 +132,10 @@ impl HeadShape {
         let per_gaussian = v * f + 3 * c + 6 * d;
         per_anchor + n_open * per_gaussian
     }
+}
+
+/// What is left of `all` without `saved`, in 1024ths, rounded up.
+const fn share_left(all: usize, saved: usize) -> u32 {
+    // Widths of 256 and 32 offsets take less than 2¹⁹ multiply-adds.
+    ((all - saved) as u32 * 1024).div_ceil(if all == 0 { 1 } else { all as u32 })
 }

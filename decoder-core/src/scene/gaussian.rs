@@ -88,7 +88,8 @@ impl<H: HeadFormat> Evaluation<'_, '_, H> {
     ) {
         let Self { heads, work, effects } = self;
         let Workspace { hidden, detail_sums, outputs } = work;
-        let mut macs = heads.shape.opacity_macs(anchor.mask.count_ones() as usize);
+        let [opacity_saved, saved] = if role.sums().is_some() { heads.shape.feature_macs() } else { [0; 2] };
+        let mut macs = heads.shape.opacity_macs(anchor.mask.count_ones() as usize) - opacity_saved;
         let units = heads.opacity.activate(0, inputs, hidden, role);
         let visible = fill_opacities::<H, F>(anchor, heads, units, outputs);
         if visible != 0 {
@@ -105,7 +106,13 @@ impl<H: HeadFormat> Evaluation<'_, '_, H> {
             if cfg!(feature = "detail")
                 && let Some(detail) = &heads.detail
             {
-                detail.begin(anchor.feature, detail_sums);
+                let detail_sums = match role.sums() {
+                    Some(sums) => sums.of_detail(),
+                    None => {
+                        detail.begin(anchor.feature, detail_sums);
+                        detail_sums
+                    }
+                };
                 for (_, output) in visible_only(outputs, visible) {
                     let [r, g, b] = detail.residual(output.colour, detail_sums, hidden);
                     let [plain_r, plain_g, plain_b] = output.colour;
@@ -118,7 +125,7 @@ impl<H: HeadFormat> Evaluation<'_, '_, H> {
                     sink.gaussian(number, k, &gaussian::<F>(anchor, *effects, *offset, output));
                 }
             }
-            macs += heads.shape.open_macs(visible.count_ones() as usize);
+            macs += heads.shape.open_macs(visible.count_ones() as usize) - saved;
         }
         sink.head_macs(macs as u64);
     }

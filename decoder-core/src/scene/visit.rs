@@ -7,7 +7,7 @@ use super::Anchor;
 use super::gaussian::{Evaluation, GaussianSink, Workspace, fill_inputs};
 use crate::arena::Arena;
 use crate::functions::Functions;
-use crate::mlp::{HeadFormat, HeadShape, Heads, Role};
+use crate::mlp::{FeatureSums, HeadFormat, HeadShape, Heads, Role};
 
 /// What evaluates anchors.
 pub(crate) struct Evaluator<'s, N: HeadFormat> {
@@ -17,6 +17,8 @@ pub(crate) struct Evaluator<'s, N: HeadFormat> {
     pub(crate) work: Workspace<'s>,
     /// Where anchors are evaluated two at a time.
     pub(crate) pair: Option<Pair<'s>>,
+    /// What the heads begin with, where that is in memory.
+    pub(crate) sums: Option<FeatureSums<'s>>,
 }
 
 /// Two anchors at a time: the first waits for the second.
@@ -72,11 +74,13 @@ impl<N: HeadFormat> Evaluator<'_, N> {
         sink: &mut impl GaussianSink,
     ) {
         watch.enter(Stage::Heads);
-        let Self { heads, inputs, work, pair } = self;
+        let Self { heads, inputs, work, pair, sums } = self;
         let mut evaluation = Evaluation { heads, work, effects };
         let Some(Pair { offsets, inputs: second_inputs, units, waiting }) = pair else {
             fill_inputs(anchor, effects, eye, inputs);
-            evaluation.run::<F>(number, anchor, N::values(inputs), &mut Role::Alone, watch, sink);
+            let sums = sums.as_ref().filter(|_| cfg!(feature = "baked")).and_then(|sums| sums.of(number, &heads.shape));
+            let mut role = sums.map_or(Role::Alone, Role::Begun);
+            evaluation.run::<F>(number, anchor, N::values(inputs), &mut role, watch, sink);
             return;
         };
         let Some(first) = waiting.take() else {
@@ -109,7 +113,7 @@ impl<N: HeadFormat> Evaluator<'_, N> {
         watch: &mut impl Stopwatch,
         sink: &mut impl GaussianSink,
     ) {
-        let Self { heads, inputs, work, pair } = self;
+        let Self { heads, inputs, work, pair, .. } = self;
         let Some(Pair { offsets, waiting, .. }) = pair else { return };
         if let (Some(first), Some(values)) = (waiting.take(), N::floats(inputs)) {
             watch.enter(Stage::Heads);

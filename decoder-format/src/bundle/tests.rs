@@ -268,6 +268,10 @@ fn anchors_in_memory_have_the_values_of_the_file() {
                 anchors.values(&mut expected);
                 assert_eq!(records.read(index, &mut row), Some(site), "{variant:?}: site of anchor {index}");
                 assert_eq!(row.map(f32::to_bits), expected.map(f32::to_bits), "{variant:?}: values of anchor {index}");
+                let (mut row, n_features) = ([f32::NAN; C], usize::from(bundle.header().feature_dim));
+                assert_eq!(records.without_features().read(index, &mut row), Some(site));
+                assert!(row[..n_features].iter().all(|x| x.is_nan()), "{variant:?}: features of anchor {index}");
+                assert_eq!(row[n_features..], expected[n_features..], "{variant:?}: the rest of anchor {index}");
                 index += 1;
             }
         }

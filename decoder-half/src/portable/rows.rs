@@ -6,7 +6,7 @@ pub const ROW_LEN: usize = 16;
 /// Slack for rounding of a span's ends, pixels.
 pub const SLACK_PX: f32 = 1e-3;
 /// Rounds a span's beginning up when added before digits are cut off, except for the last thousandth of a pixel.
-const ALMOST_ONE: f32 = 0.999;
+pub(super) const ALMOST_ONE: f32 = 0.999;
 
 /// A splat over the rows of a tile: at row dy from its centre alpha is a Gaussian of x around `centre_x + shear·dy`.
 #[derive(Clone, Copy, Debug)]
@@ -57,10 +57,10 @@ pub struct Exponential {
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct BlendConstants {
-    exponential: Exponential,
+    pub(super) exponential: Exponential,
     slack_px: f32,
     almost_one: f32,
-    alpha_max: f32,
+    pub(super) alpha_max: f32,
     transmittance_min: f32,
     /// A splat whose log opacity is below this reaches `alpha_max` nowhere, whatever is rounded.
     pub(crate) log_opacity_below_max: f32,
@@ -121,6 +121,9 @@ pub fn blend_rows(
     rows: &mut [[[f32; 4]; ROW_LEN]],
     width: u16,
 ) -> RowsWork {
+    #[cfg(any(target_arch = "x86_64", target_arch = "aarch64", target_family = "wasm"))]
+    return super::rows_in_fours::blend_rows(splat, constants, rows, width);
+    #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64", target_family = "wasm")))]
     blend_rows_with(splat, constants, |x| constants.exponential.near(x), rows, width)
 }
 
@@ -180,6 +183,19 @@ fn blend_pixel(pixel: &mut [f32; 4], gauss: f32, splat: &RowSplat, constants: &B
         *pixel = [r + weight * red, g + weight * green, b + weight * blue, next];
         return false;
     }
+    finish_pixel(pixel, weight, next, splat, constants)
+}
+
+/// What a splat of `weight` leaves of a pixel that hardly more than `next` comes through; returns whether it is finished by it.
+#[inline(always)]
+pub(super) fn finish_pixel(
+    pixel: &mut [f32; 4],
+    weight: f32,
+    next: f32,
+    splat: &RowSplat,
+    constants: &BlendConstants,
+) -> bool {
+    let ([r, g, b, transmittance], [red, green, blue]) = (*pixel, splat.colour);
     let alive = transmittance > 0.0;
     if alive {
         *pixel = if next >= constants.transmittance_min {

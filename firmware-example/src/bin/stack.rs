@@ -1,7 +1,7 @@
 //! How much stack each call of the decoder takes: before each, what is free is painted; how deep the call went shows in the paint.
 //!
-//! Anchors are resident, streamed, or in a scene that is the same from everywhere evaluated once; of those that the bundle allows, the
-//! most counts. `../../stack.sh` prints it for several ways to build.
+//! Anchors are resident, with or without sums, streamed, or in a scene that is the same from everywhere evaluated once; of those that the
+//! bundle allows, the most counts. `../../stack.sh` prints it for several ways to build.
 #![no_std]
 #![no_main]
 
@@ -61,7 +61,7 @@ fn measure() -> Result<[usize; CALLS.len()], DecodeError> {
     let [parse, plan, bind, render, begin, next_tile] = &mut most;
     let bundle = of(parse, || Bundle::parse(BUNDLE))?;
     let camera = bundle.header().preview;
-    for residency in [Residency::Resident, Residency::Streamed, Residency::Baked] {
+    for residency in [Residency::AutoWithSums, Residency::Resident, Residency::Streamed, Residency::Baked] {
         let budget = Budget::for_frame(camera.width_px, camera.height_px).with_residency(residency);
         let Ok(planned) = of(plan, || Plan::new(&bundle, &budget.in_bytes(scratch.len()))) else { continue };
         let mut decoder = of(bind, || Decoder::bind(&bundle, planned, &mut *scratch))?;

@@ -63,7 +63,7 @@ fn main() -> anyhow::Result<()> {
     let [width_px, height_px] = bundle.header().training_px;
     let mut variants = Vec::new();
     let baked = bundle.n_gaussians(0).map(|_| Residency::Baked);
-    for residency in baked.into_iter().chain([Residency::Resident, Residency::Streamed]) {
+    for residency in baked.into_iter().chain([Residency::AutoWithSums, Residency::Resident, Residency::Streamed]) {
         for n_strips in STRIPS {
             let budget = Budget::for_frame(width_px, height_px)
                 .with_tiers(args.tiers)

@@ -34,6 +34,15 @@ impl<'r> BitReader<'r> {
         (self.unsigned(n).wrapping_shl(unused).cast_signed()).wrapping_shr(unused)
     }
 
+    /// Passes over `n` bits.
+    pub(super) fn skip(&mut self, n: u32) {
+        let n_here = n.min(self.n_left);
+        self.unsigned(n_here);
+        let rest = n.wrapping_sub(n_here);
+        self.words = self.words.as_slice().get((rest / 16) as usize..).unwrap_or_default().iter();
+        self.unsigned(rest % 16);
+    }
+
     /// A number of `n` bits, up to 64, in pieces.
     pub(super) fn wide(&mut self, n: u32) -> u64 {
         let (mut number, mut n_done) = (0_u64, 0_u32);
@@ -123,6 +132,13 @@ mod tests {
                 assert_eq!(reader.unsigned(n), number, "{n} bits");
             }
             assert_eq!((reader.wide(n_wide), reader.unsigned(16)), (wide, 0), "{n_wide} bits, then nothing");
+            let n_skipped = random() as usize % 40;
+            let mut reader = BitReader::new(&words[..n_words]);
+            let [before, skipped] = [&widths[..n_skipped / 2], &widths[n_skipped / 2..n_skipped]];
+            before.iter().for_each(|n| _ = reader.unsigned(*n));
+            reader.skip(skipped.iter().sum());
+            let n = widths[n_skipped];
+            assert_eq!(reader.unsigned(n), numbers[n_skipped], "{n} bits behind {skipped:?}");
         }
     }
 

@@ -40,6 +40,8 @@ pub struct AnchorRecords<'b, 's> {
     lattice: Lattice<'b>,
     /// The mask of an anchor that stores none.
     full_mask: u32,
+    /// Whether features are passed over.
+    without_features: bool,
     values: Values<'b, 's>,
 }
 
@@ -163,8 +165,15 @@ impl<'b, 's> AnchorRecords<'b, 's> {
             lattice: *bundle.lattice(),
             // There are 1 to 32 offsets.
             full_mask: u32::MAX.wrapping_shr(u32::BITS.wrapping_sub(bundle.header().n_offsets.into())),
+            without_features: false,
             values,
         })
+    }
+
+    /// The same, whose [`read`](Self::read) leaves the features of a row as they are.
+    #[must_use]
+    pub fn without_features(self) -> Self {
+        Self { without_features: true, ..self }
     }
 
     /// Whether a chunk was left out because of damage.
@@ -182,15 +191,21 @@ impl<'b, 's> AnchorRecords<'b, 's> {
     pub fn read(&self, index: u32, row: &mut [f32]) -> Option<AnchorSite> {
         let start = (index as usize).checked_mul(self.layout.n_words())?;
         let record = self.records.get(start..)?.get(..self.layout.n_words())?;
-        let RecordLayout { code_bits, mask_bits, step_bits, groups } = self.layout;
+        let RecordLayout { code_bits, mask_bits, step_bits, mut groups } = self.layout;
         let mut reader = BitReader::new(record);
         let code = reader.wide(code_bits.into());
         let mask = if mask_bits == 0 { self.full_mask } else { reader.wide(mask_bits.into()) as u32 };
         let step_bits = reader.unsigned(step_bits.into());
-        let mut slots = row.iter_mut();
+        let mut n_skipped = 0;
+        if cfg!(feature = "baked") && self.without_features {
+            let [(n_features, bits), ..] = &mut groups;
+            reader.skip(u32::from(*n_features).wrapping_mul((*bits).into()));
+            n_skipped = usize::from(core::mem::take(n_features));
+        }
+        let mut slots = row.get_mut(n_skipped..).unwrap_or_default().iter_mut();
         match self.values {
             Values::Static { table_of_channel, scales } => {
-                let mut tables = table_of_channel.iter();
+                let mut tables = table_of_channel.get(n_skipped..).unwrap_or_default().iter();
                 for (n, bits) in groups {
                     for (slot, &table) in slots.by_ref().zip(&mut tables).take(n.into()) {
                         let [origin, step] =
@@ -198,7 +213,7 @@ impl<'b, 's> AnchorRecords<'b, 's> {
                         *slot = f32::from_symbol(reader.signed(bits.into()), origin, step);
                     }
                 }
-                let [(n_features, _), (n_log_scales, _), _] = groups;
+                let [(n_features, _), (n_log_scales, _), _] = self.layout.groups;
                 let offsets = row.get_mut(usize::from(n_features).saturating_add(n_log_scales.into())..);
                 for (k, offset) in (0..).zip(offsets.unwrap_or_default().as_chunks_mut::<3>().0) {
                     if mask.wrapping_shr(k) & 1 == 0 {

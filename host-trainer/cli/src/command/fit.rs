@@ -62,6 +62,8 @@ pub(crate) struct Point {
     n_anchors: u32,
     /// Whether anchors are decoded once, not in every frame.
     resident: bool,
+    /// And their heads' first layers begun.
+    sums: bool,
     baked: bool,
     n_strips: u8,
     /// Slabs of depth of the fullest strip, at most.
@@ -185,6 +187,7 @@ fn point(bundle: &Bundle<'_>, ram_bytes: u64, plan: &Plan) -> Point {
         pruning_rate: plan.pruning_rate(),
         n_anchors: tier.and_then(|tier| bundle.tier(tier)).map_or(0, |tier| tier.n_anchors),
         resident: plan.is_resident(),
+        sums: plan.keeps_sums(),
         baked: plan.is_baked(),
         n_strips: plan.n_strips(),
         n_slabs: plan.n_slabs(),
@@ -252,9 +255,10 @@ fn table(fit: &Fit) -> String {
             point.scratch_bytes,
             100.0 * point.pruning_rate,
             point.n_anchors,
-            match (point.baked, point.resident) {
-                (true, _) => "baked",
-                (_, true) => "memory",
+            match (point.baked, point.sums, point.resident) {
+                (true, ..) => "baked",
+                (_, true, _) => "sums",
+                (_, _, true) => "memory",
                 _ => "bundle",
             },
             point.n_strips,

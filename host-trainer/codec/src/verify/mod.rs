@@ -23,7 +23,7 @@ pub fn plan_variants(bundle: &Bundle<'_>, budget: Budget) -> impl Iterator<Item 
     let baked = bundle.n_gaussians(0).map(|_| Residency::Baked);
     baked
         .into_iter()
-        .chain([Residency::Resident, Residency::Streamed])
+        .chain([Residency::AutoWithSums, Residency::Resident, Residency::Streamed])
         .flat_map(move |residency| strips.map(|strips| budget.with_residency(residency).with_strips(strips)))
         .map(|budget| budget.in_bytes(usize::MAX))
 }

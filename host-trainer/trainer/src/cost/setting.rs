@@ -75,9 +75,9 @@ pub fn parameters(bundle: &Bundle<'_>) -> Vec<Setting> {
         all.push(Setting { parameter: "pruning rate", name, tiers, pruning_rate, ..exact.clone() });
     }
     let baked = bundle.n_gaussians(0).map(|_| ("baked", Residency::Baked));
-    for (name, residency) in
-        baked.into_iter().chain([("resident", Residency::Resident), ("streamed", Residency::Streamed)])
-    {
+    let anchors =
+        [("with sums", Residency::AutoWithSums), ("resident", Residency::Resident), ("streamed", Residency::Streamed)];
+    for (name, residency) in baked.into_iter().chain(anchors) {
         let strips = Strips::Exactly(1);
         all.push(Setting { parameter: "residency", name: name.to_owned(), residency, strips, ..exact.clone() });
     }

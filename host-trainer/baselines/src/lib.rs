@@ -1,6 +1,6 @@
 //! Published methods that compress explicit Gaussians, each as its paper describes it: what the project's own files are compared with.
 //!
-//! [`Baseline`] is what a method does, and each has a folder of its own: [`light_gaussian`]. They share the steps that come after
+//! [`Baseline`] is what a method does, and each has a folder of its own: [`light_gaussian`], [`self_organizing`]. They share the steps that come after
 //! training (`tuning`), k-means (`k_means`), and files: lattice places (`voxels`) in an `octree`, numbers in columns, deflated (`packed`).
 
 mod baseline;
@@ -8,6 +8,7 @@ mod k_means;
 pub mod light_gaussian;
 mod octree;
 mod packed;
+pub mod self_organizing;
 #[cfg(test)]
 mod test_scenes;
 mod tuning;
@@ -15,3 +16,4 @@ mod voxels;
 
 pub use baseline::{Baseline, TrainedScene, Unreadable};
 pub use light_gaussian::LightGaussian;
+pub use self_organizing::SelfOrganizing;

@@ -79,6 +79,15 @@ impl CloudOptimiser {
         }
     }
 
+    /// Puts the moments of Gaussian `order[i]` in row `i`.
+    pub fn reorder(&mut self, order: &[usize]) {
+        for (moments, width) in self.each_mut() {
+            for values in [&mut moments.first, &mut moments.second] {
+                *values = order.iter().flat_map(|row| &values[row * width..][..width]).copied().collect();
+            }
+        }
+    }
+
     /// Forgets where opacities were going.
     pub fn forget_opacities(&mut self) {
         self.opacity_logits.first.fill(0.0);
@@ -151,5 +160,20 @@ impl Group<'_> {
                 },
             );
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn moments_go_where_their_gaussians_go() {
+        let mut optimiser = CloudOptimiser::new(3);
+        optimiser.centres.first = vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0];
+        optimiser.opacity_logits.second = vec![5.0, 6.0, 7.0];
+        optimiser.reorder(&[2, 0, 1]);
+        assert_eq!(optimiser.centres.first, [2.0, 2.0, 2.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0]);
+        assert_eq!(optimiser.opacity_logits.second, [7.0, 5.0, 6.0]);
     }
 }

@@ -14,18 +14,21 @@ const GROUPS: [(&str, &[&str]); 5] = [
     ("Create", &["train", "import", "export"]),
     ("Look", &["eval", "render", "view", "report", "inspect"]),
     ("Device", &["fit", "verify", "cost"]),
-    ("Research", &["plan-runs", "tables", "compare", "plot"]),
+    ("Research", &["plan-runs", "tables", "compare", "survey", "plot"]),
     ("Captures and this machine", &["poses", "doctor", "synth", "demo", "devices", "bench", "completions", "man"]),
 ];
 
 /// Commands that look at what was trained, as it was.
 const LOOKING: &[&str] = &["eval", "render", "verify", "cost", "export"];
 /// Defaults in which commands that share an option differ.
-const DEFAULTS: [(&[&str], &str, &str); 10] = [
+const DEFAULTS: [(&[&str], &str, &str); 13] = [
     (&["train"], "max_resolution", "by the preset"),
     (LOOKING, "max_resolution", "the training size of the bundle"),
     (&["train"], "background", "black; white for 3dgs on a Blender capture"),
     (LOOKING, "background", "the bundle's"),
+    (&["survey"], "max_resolution", "200"),
+    (&["survey"], "background", "black; white on a Blender capture"),
+    (&["survey"], "points", "the capture's; else of its depth maps; else matched, or random on a Blender capture"),
     (&["train"], "iterations", "by the preset"),
     (&["import"], "iterations", "5000"),
     (&["train"], "effects", "auto"),
@@ -45,9 +48,11 @@ pub(super) fn own_options(mut command: Command) -> Command {
         let hidden = |command, id| with(command, id, |arg| arg.hide(true));
         command = command.mut_subcommand(name, |command| hidden(hidden(command, "scene"), "points"));
     }
+    let drawn = |arg: Arg| arg.value_parser(one_of::<Background>(DRAWN_BACKGROUNDS));
+    command = command.mut_subcommand("survey", |command| with(command, "background", drawn));
     command.mut_subcommand("import", |command| {
         let command = with(command, "backbone", |arg| arg.value_parser(backbone_of_anchors()));
-        with(command, "background", |arg| arg.value_parser(one_of::<Background>(DRAWN_BACKGROUNDS)))
+        with(command, "background", drawn)
     })
 }
 
@@ -108,7 +113,7 @@ mod tests {
                 );
                 let offers = |value: &str| arg.get_possible_values().iter().any(|other| other.get_name() == value);
                 assert!(!offers("3dgs") || command.get_name() == "train", "{}", command.get_name());
-                assert!(!offers("learned") || command.get_name() != "import");
+                assert!(!offers("learned") || !["import", "survey"].contains(&command.get_name()));
             }
         }
     }

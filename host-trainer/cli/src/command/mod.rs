@@ -36,6 +36,7 @@ mod report;
 mod settings;
 mod stand;
 mod stop;
+mod survey;
 mod synth;
 mod tables;
 mod train;
@@ -81,6 +82,7 @@ enum Command {
     PlanRuns(plan_runs::Args),
     Tables(tables::Args),
     Compare(compare::Args),
+    Survey(survey::Args),
     Poses(poses::Args),
     Synth(synth::Args),
     Demo(demo::Args),
@@ -156,6 +158,7 @@ fn dispatch(cli: Cli) -> Result<ExitCode> {
     match cli.command {
         Command::Train(args) => return train::run(args),
         Command::PlanRuns(args) => return plan_runs::run(&args),
+        Command::Survey(args) => return survey::run(&args),
         Command::Import(args) => return import::run(&args),
         Command::Demo(args) => return demo::run(&args),
         Command::Verify(args) => return verify::run(&args),

@@ -111,13 +111,7 @@ fn run_here(args: &Args, planner: &Planner, folder: &Path, spec: &Spec, outputs:
 
 /// The configuration that `train` makes of a run's options, and what is to train it.
 fn configured(run: &AskedRun, output: PathBuf) -> Result<(RunConfig, DeviceChoice)> {
-    let command = train_args::Args::augment_args(clap::Command::new("train")).allow_negative_numbers(true);
-    let mut words = vec!["train".to_owned()];
-    words.extend(run.options());
-    words.extend(["--output".to_owned(), output.display().to_string(), "--".to_owned()]);
-    words.push(run.folder.display().to_string());
-    let args = command.try_get_matches_from(words).and_then(|matches| train_args::Args::from_arg_matches(&matches));
-    let args = args.map_err(|error| anyhow::anyhow!(in_one_line(&error.to_string())))?;
+    let args = args_of_train(run.options(), &run.folder, &output)?;
     if args.is_explicit() {
         bail!("--backbone 3dgs makes no bundle; train it with `pocketsplat train` alone");
     }
@@ -129,6 +123,17 @@ fn configured(run: &AskedRun, output: PathBuf) -> Result<(RunConfig, DeviceChoic
         bail!("runs that are compared need the same effects; force them, as effects = \"+view-colour\"");
     }
     Ok((config, args.device_choice()))
+}
+
+/// The command line of `train` with these options.
+pub(super) fn args_of_train(options: Vec<String>, capture: &Path, output: &Path) -> Result<train_args::Args> {
+    let command = train_args::Args::augment_args(clap::Command::new("train")).allow_negative_numbers(true);
+    let mut words = vec!["train".to_owned()];
+    words.extend(options);
+    words.extend(["--output".to_owned(), output.display().to_string(), "--".to_owned()]);
+    words.push(capture.display().to_string());
+    let args = command.try_get_matches_from(words).and_then(|matches| train_args::Args::from_arg_matches(&matches));
+    args.map_err(|error| anyhow::anyhow!(in_one_line(&error.to_string())))
 }
 
 /// An error of the command line without its usage, which a plan does not have.

@@ -3,8 +3,8 @@
 mod comparison;
 mod curves;
 mod differences;
-mod finished;
-mod published;
+pub(super) mod finished;
+pub(super) mod published;
 mod survey;
 
 use std::path::{Path, PathBuf};

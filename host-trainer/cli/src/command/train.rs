@@ -1,6 +1,6 @@
 //! `pocketsplat train`: a capture in, a bundle out.
 
-mod explicit;
+pub(super) mod explicit;
 mod in_folder;
 mod limits;
 mod loading;

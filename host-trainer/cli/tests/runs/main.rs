@@ -23,6 +23,7 @@ mod remedies;
 mod report;
 mod similarity;
 mod splats;
+mod survey;
 mod terminal;
 mod view;
 mod watch;

@@ -95,6 +95,6 @@ impl FinishedRun<'_> {
 }
 
 /// To the six decimals of tables.
-pub(super) fn rounded(value: f64) -> f64 {
+pub(in crate::command) fn rounded(value: f64) -> f64 {
     (1e6 * value).round() / 1e6
 }

@@ -9,26 +9,26 @@ use crate::plot::{Named, ResultRow, gathered};
 
 /// One published result, of a scene or the mean of a dataset.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-pub(super) struct PublishedRow {
+pub(in crate::command) struct PublishedRow {
     #[serde(rename = "Dataset")]
-    pub(super) dataset: String,
+    pub(in crate::command) dataset: String,
     /// Empty for the mean.
     #[serde(rename = "Scene")]
-    pub(super) scene: String,
+    pub(in crate::command) scene: String,
     #[serde(rename = "Method")]
-    pub(super) method: String,
+    pub(in crate::command) method: String,
     #[serde(rename = "Submethod")]
-    pub(super) submethod: String,
+    pub(in crate::command) submethod: String,
     #[serde(rename = "PSNR")]
-    pub(super) psnr_db: f64,
+    pub(in crate::command) psnr_db: f64,
     #[serde(rename = "SSIM")]
-    pub(super) ssim: Option<f64>,
+    pub(in crate::command) ssim: Option<f64>,
     #[serde(rename = "LPIPS")]
-    pub(super) lpips: Option<f64>,
+    pub(in crate::command) lpips: Option<f64>,
     #[serde(rename = "Size [Bytes]")]
-    pub(super) size_bytes: Option<f64>,
+    pub(in crate::command) size_bytes: Option<f64>,
     #[serde(rename = "#Gaussians")]
-    n_gaussians: Option<f64>,
+    pub(in crate::command) n_gaussians: Option<f64>,
     /// Where it stands.
     #[serde(rename = "Source")]
     source: String,
@@ -36,7 +36,7 @@ pub(super) struct PublishedRow {
 
 impl PublishedRow {
     /// Reads a table of them.
-    pub(super) fn read_all(path: &Path) -> Result<Vec<Self>> {
+    pub(in crate::command) fn read_all(path: &Path) -> Result<Vec<Self>> {
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(path);
         let reader = reader.as_mut().map_err(|error| anyhow::anyhow!("{error}"));
         let rows = reader.and_then(|reader| Ok(reader.deserialize().collect::<Result<Vec<Self>, _>>()?));
@@ -50,11 +50,11 @@ impl PublishedRow {
     }
 
     /// As it is called where one name has to do.
-    pub(super) fn name(&self) -> String {
+    pub(in crate::command) fn name(&self) -> String {
         if self.submethod.is_empty() { self.method.clone() } else { format!("{} {}", self.method, self.submethod) }
     }
 
-    fn result(&self) -> Option<ResultRow> {
+    pub(in crate::command) fn result(&self) -> Option<ResultRow> {
         Some(ResultRow {
             submethod: self.submethod.clone(),
             psnr_db: self.psnr_db,
@@ -71,7 +71,7 @@ impl PublishedRow {
 const BACKBONES: [&str; 4] = ["Scaffold-GS", "HAC", "HAC++", "ContextGS"];
 
 /// Published curves of a scene, or with an empty name of a dataset's mean: those of the backbones, and whatever no other result beats.
-pub(super) fn curves(rows: &[PublishedRow], dataset: &str, scene: &str) -> Vec<Named<Vec<ResultRow>>> {
+pub(in crate::command) fn curves(rows: &[PublishedRow], dataset: &str, scene: &str) -> Vec<Named<Vec<ResultRow>>> {
     let here: Vec<&PublishedRow> = rows.iter().filter(|row| row.dataset == dataset && row.scene == scene).collect();
     let is_beaten = |row: &PublishedRow| {
         here.iter().any(|other| match (other.size_bytes, row.size_bytes) {

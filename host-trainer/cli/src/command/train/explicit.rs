@@ -7,12 +7,12 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::{Background, Capture, Split};
-use pocketsplat_files::{Output, shell_word};
+use pocketsplat_files::{Output, Outputs, shell_word};
 use pocketsplat_gaussians::{Format, Notes};
 use pocketsplat_trainer::device::Limits;
 use pocketsplat_trainer::explicit::CloudTrainer;
 use pocketsplat_trainer::explicit::frame;
-use pocketsplat_trainer::train::run::{Ending, LoggedStep, RunFolder};
+use pocketsplat_trainer::train::run::{Ending, LoggedStep, RunError, RunFolder};
 use serde::Serialize;
 
 use super::super::capture::CaptureArgs;
@@ -140,6 +140,51 @@ fn load(config: &ExplicitRunConfig, run: &Path) -> Result<Capture> {
     Ok(capture)
 }
 
+/// Brings a run to its end in the folder beside its output, from wherever it stands; false when it was interrupted before.
+///
+/// # Errors
+/// Another process works in the folder, or the run in it is not the one that is asked for.
+pub(crate) fn trained(config: &ExplicitRunConfig, capture: &Capture, stop: &AtomicBool) -> Result<bool> {
+    let path = config.output.with_extension("run");
+    let (folder, trainer) = match RunFolder::reopen(&path) {
+        Ok(folder) => {
+            refuse_other(&folder.config()?, config, &path)?;
+            let trainer = resumed(&folder, config.gaussians, capture, |_: &mut CloudTrainer<'_>| Ok(()))?;
+            (folder, trainer)
+        }
+        Err(RunError::Finished { .. }) if config.output.is_file() => {
+            let text = std::fs::read_to_string(path.join("config.toml"));
+            refuse_other(&text.with_context(|| format!("could not read {}", path.display()))?, config, &path)?;
+            say!("trained before");
+            return Ok(true);
+        }
+        // Finished without its file: somebody removed it.
+        Err(RunError::NoRun { .. } | RunError::Finished { .. }) => {
+            let folder = RunFolder::start(&path, &config.to_toml()?, false)?;
+            (folder, CloudTrainer::new(capture, config.gaussians)?)
+        }
+        Err(error) => return Err(error.into()),
+    };
+    let output =
+        Outputs::new(true).reading_folder(&config.dataset).file(&config.output, gaussians(format_of(config)?))?;
+    Ok(train_in(folder, config, capture, trainer, (stop, GoesOn::SameCommand), &output)?.is_some())
+}
+
+/// Stops where the run in a folder is not the one that is asked for.
+fn refuse_other(begun: &str, config: &ExplicitRunConfig, folder: &Path) -> Result<()> {
+    let begun = ExplicitRunConfig::parse(begun)
+        .with_context(|| format!("could not use the config.toml in {}", folder.display()))?;
+    let of_another = || format!("its capture is {}, not {}", begun.dataset.display(), config.dataset.display());
+    match begun.difference(config, IN_RUN_AND_ON_COMMAND_LINE)? {
+        None if begun.dataset == config.dataset => Ok(()),
+        difference => bail!(
+            "the run in {} is not the one that is asked for: {}; choose another --output",
+            folder.display(),
+            difference.unwrap_or_else(of_another)
+        ),
+    }
+}
+
 fn train(
     args: &Args,
     folder: RunFolder,
@@ -150,7 +195,7 @@ fn train(
 ) -> Result<ExitCode> {
     // Not before: until here there is nothing to keep, and Ctrl-C may end the process at once.
     let stop = stop::flag()?;
-    let Some(result) = train_in(folder, config, capture, trainer, &stop, output)? else {
+    let Some(result) = train_in(folder, config, capture, trainer, (&stop, GoesOn::Resume), output)? else {
         return Ok(ExitCode::from(stop::INTERRUPTED));
     };
     let (_, path) = args.named_paths(&config.dataset, &config.output);
@@ -169,12 +214,12 @@ fn train_in(
     config: &ExplicitRunConfig,
     capture: &Capture,
     mut trainer: CloudTrainer<'_>,
-    stop: &AtomicBool,
+    (stop, goes_on): (&AtomicBool, GoesOn),
     output: &Output,
 ) -> Result<Option<ExplicitResult>> {
     folder.write_config(&config.to_toml()?)?;
     keep_points(capture, folder.path());
-    let how_to_go_on = GoesOn::Resume.said(folder.path());
+    let how_to_go_on = goes_on.said(folder.path());
     let mut progress = Progress::new(trainer.iteration(), trainer.iterations());
     let ended =
         to_the_end(&mut folder, &mut trainer, config.checkpoint_every, &how_to_go_on, |folder, trainer, interval| {

@@ -26,6 +26,9 @@ const MARK: Mark = *b"PSO1";
 /// Bytes that deflate makes of one at most.
 const MOST_EXPANSION: usize = 1032;
 
+/// Of a place, as files have it: ln of the largest number.
+const MOST_CONTRACTED: f32 = 88.7;
+
 /// Bytes that a PNG's decoder may take beside the pixels.
 const MOST_DECODER: u64 = 1 << 24;
 
@@ -70,9 +73,13 @@ fn of_body(bytes: &[u8]) -> Result<Quantised, Unreadable> {
     let mut bound = || Ok::<_, Unreadable>(f32::from_le_bytes(body.four("ranges")?));
     let n_planes = bands(degree).end;
     let ranges = (0..n_planes).map(|_| Ok([bound()?, bound()?])).collect::<Result<Vec<_>, _>>()?;
-    if let Some([least, largest]) = ranges.iter().find(|range| !range.iter().all(|bound| bound.abs() < 80.0)) {
+    let faulty = |(of, range): &(usize, &[f32; 2])| {
+        let most = if CENTRE.contains(of) { MOST_CONTRACTED } else { f32::MAX };
+        !range.iter().all(|bound| bound.abs() <= most)
+    };
+    if let Some((of, [least, largest])) = ranges.iter().enumerate().find(faulty) {
         return Err(Unreadable(format!(
-            "a plane's numbers lie from {least} to {largest}, needed: between −80 and 80; write the file again"
+            "plane {of} lies from {least} to {largest}, needed: finite numbers, of places {MOST_CONTRACTED} at most; write the file again"
         )));
     }
     let mut planes = vec![Vec::new(); n_planes];

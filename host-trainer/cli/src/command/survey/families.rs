@@ -5,11 +5,14 @@ use pocketsplat_baselines::{Baseline, LightGaussian, SelfOrganizing, TrainedScen
 use pocketsplat_gaussians::{Degree, Gaussians};
 use pocketsplat_trainer::train::TrainError;
 
+/// Makes the bytes of a method's file.
+type Compress = dyn Fn(&TrainedScene<'_>) -> Result<Vec<u8>, TrainError>;
+
 /// Compresses the scene that 3D Gaussian Splatting made.
 pub(super) struct Compressor {
     pub(super) method: &'static str,
     pub(super) rate: &'static str,
-    compress: Box<dyn Fn(&TrainedScene<'_>) -> Result<Vec<u8>, TrainError>>,
+    compress: Box<Compress>,
     decode: fn(&[u8]) -> Result<Gaussians, Unreadable>,
 }
 

@@ -1,11 +1,14 @@
 //! Published methods that compress explicit Gaussians, each as its paper describes it: what the project's own files are compared with.
 //!
-//! [`Baseline`] is what a method does, and each has a folder of its own: [`light_gaussian`], [`self_organizing`]. They share the steps that come after
-//! training (`tuning`), k-means (`k_means`), and files: lattice places (`voxels`) in an `octree`, numbers in columns, deflated (`packed`).
+//! [`Baseline`] is what a method does, and each has a folder of its own: [`compact_3dgs`], whose `masks` are any method's,
+//! [`light_gaussian`] and [`self_organizing`]. They share the steps that come after training (`tuning`), k-means (`k_means`), and files:
+//! lattice places (`voxels`) in an `octree`, numbers in columns, deflated (`packed`).
 
 mod baseline;
+pub mod compact_3dgs;
 mod k_means;
 pub mod light_gaussian;
+mod masks;
 mod octree;
 mod packed;
 pub mod self_organizing;
@@ -15,5 +18,6 @@ mod tuning;
 mod voxels;
 
 pub use baseline::{Baseline, TrainedScene, Unreadable};
+pub use compact_3dgs::Compact3dgs;
 pub use light_gaussian::LightGaussian;
 pub use self_organizing::SelfOrganizing;

@@ -40,7 +40,7 @@ pub(crate) struct Turn<'a> {
     pub(crate) scene: &'a TrainedScene<'a>,
     pub(crate) level: Level,
     pub(crate) view: &'a View,
-    camera: &'a Pinhole<f32>,
+    pub(crate) camera: &'a Pinhole<f32>,
     /// Share of the learning rates' path that is behind.
     progress: f64,
 }
@@ -75,11 +75,18 @@ impl<'a> Tuning<'a> {
         rng
     }
 
+    /// Steps of a stage.
+    ///
+    /// * `published`: beside a run of 30,000 iterations; a shorter run has stages that are shorter by as much.
+    pub(crate) fn length(&self, published: u32) -> u32 {
+        let n = u64::from(published) * u64::from(self.scene.config.iterations) / PUBLISHED_ITERATIONS;
+        u32::try_from(n).unwrap_or(u32::MAX)
+    }
+
     /// A stage: `step` for one training view after the other, each once in a pass, until so many are done. Rates go on where the run
     /// and the stages before ended.
     ///
-    /// * `published`: steps beside a run of 30,000 iterations; a shorter run has stages that are shorter by as much.
-    /// * `step`: moves something, or says why not.
+    /// * `published`: see [`Self::length`]. * `step`: moves something, or says why not.
     pub(crate) fn stage(
         &mut self,
         published: u32,
@@ -87,7 +94,7 @@ impl<'a> Tuning<'a> {
     ) -> Result<(), TrainError> {
         let mut rng = self.random();
         let TrainedScene { capture, config, .. } = self.scene;
-        let n = u64::from(published) * u64::from(config.iterations) / PUBLISHED_ITERATIONS;
+        let n = self.length(published);
         let (mut queue, mut n_in_a_row) = (Vec::new(), 0);
         for _ in 0..n {
             if queue.is_empty() {

@@ -1,0 +1,194 @@
+//! The file: `PC31`, a checksum, and a deflated body, all little-endian:
+//!
+//! | what | bytes |
+//! |---|---|
+//! | N, the number of codes of a codebook of scales, of rotations | 4 each |
+//! | log₂ of the rows of a level at most | 1 |
+//! | least and step of the opacity logits, then of the grid | 4 each |
+//! | centres, in columns | 2 for each of 3 numbers |
+//! | opacity logits | 1 each |
+//! | scales, then rotations: for each stage its codebook, in columns, and a code for each Gaussian | 2 a number, 1 a code |
+//! | grid, level by level, all first channels of all rows before the second | 1 a number |
+//! | network | 2 a number |
+
+use half::f16;
+
+use super::grid::{self, CHANNELS};
+use super::network::N_WEIGHTS;
+use super::quantised::{Bytes, Quantised};
+use super::residual_codes::{CODES, ResidualCodes, STAGES};
+use crate::baseline::Unreadable;
+use crate::packed::{Body, Mark, opened, put_rows, sealed};
+
+const MARK: Mark = *b"PC31";
+
+/// log₂ of a level's rows at most: all levels then have fewer than 2³² numbers.
+const MOST_LOG2_ROWS: u8 = 24;
+
+/// The file of quantised Gaussians.
+pub(super) fn written(quantised: &Quantised) -> Vec<u8> {
+    sealed(MARK, &body(quantised))
+}
+
+/// The Gaussians of a file.
+pub(super) fn read(bytes: &[u8]) -> Result<Quantised, Unreadable> {
+    of_body(&opened(MARK, bytes)?)
+}
+
+fn body(quantised: &Quantised) -> Vec<u8> {
+    let Quantised { centres, opacity_logits, log_scales, rotations, log2_rows, rows, weights } = quantised;
+    let mut body = Vec::new();
+    for count in [centres.len(), log_scales.books[0].len(), rotations.books[0].len()] {
+        body.extend(u32::try_from(count).expect("fewer than 2³² Gaussians").to_le_bytes());
+    }
+    body.push(*log2_rows);
+    for range in [opacity_logits, rows] {
+        [range.least, range.step].iter().for_each(|number| body.extend(number.to_le_bytes()));
+    }
+    put_rows(centres, &mut body);
+    body.extend(&opacity_logits.bytes);
+    put_codes(log_scales, &mut body);
+    put_codes(rotations, &mut body);
+    (0..CHANNELS).for_each(|channel| body.extend(rows.bytes.iter().skip(channel).step_by(CHANNELS)));
+    put_rows(&weights.iter().map(|weight| [*weight]).collect::<Vec<_>>(), &mut body);
+    body
+}
+
+fn put_codes<const WIDTH: usize>(codes: &ResidualCodes<WIDTH>, body: &mut Vec<u8>) {
+    for stage in 0..STAGES {
+        put_rows(&codes.halves(stage), body);
+        body.extend(codes.codes.iter().map(|codes| codes[stage]));
+    }
+}
+
+fn of_body(bytes: &[u8]) -> Result<Quantised, Unreadable> {
+    let mut body = Body(bytes);
+    let mut count = |what| Ok::<_, Unreadable>(u32::from_le_bytes(body.four(what)?) as usize);
+    let n = count("the number of Gaussians")?;
+    let [n_scales, n_rotations] = [count("the number of codes")?, count("the number of codes")?];
+    let log2_rows = body.bytes(1, "the size of the grid")?[0];
+    if log2_rows > MOST_LOG2_ROWS {
+        return Err(Unreadable(format!(
+            "a level has 2^{log2_rows} rows, needed: 2^{MOST_LOG2_ROWS} at most; write the file again"
+        )));
+    }
+    let [of_opacities, of_rows] = [range(&mut body)?, range(&mut body)?];
+    let bytes_of = |[least, step]: [f32; 2], bytes: Vec<u8>| Bytes { least, step, bytes };
+    let centres = body.rows::<3>(n, "centres")?;
+    let opacity_logits = bytes_of(of_opacities, body.bytes(n, "opacities")?.to_vec());
+    let log_scales = codes(&mut body, n, n_scales)?;
+    let rotations = codes(&mut body, n, n_rotations)?;
+    let n_rows = grid::n_rows(&grid::levels(log2_rows));
+    let columns = body.bytes(CHANNELS * n_rows, "the grid")?;
+    let row = |i: usize| (0..CHANNELS).map(move |channel| columns[channel * n_rows + i]);
+    let rows = bytes_of(of_rows, (0..n_rows).flat_map(row).collect());
+    let weights = body.rows::<1>(N_WEIGHTS, "the network")?.into_iter().map(|[weight]| weight).collect();
+    body.end()?;
+    Ok(Quantised { centres, opacity_logits, log_scales, rotations, log2_rows, rows, weights })
+}
+
+fn range(body: &mut Body<'_>) -> Result<[f32; 2], Unreadable> {
+    let mut number = || Ok::<_, Unreadable>(f32::from_le_bytes(body.four("a range")?));
+    let [least, step] = [number()?, number()?];
+    if !(least.is_finite() && step >= 0.0 && (least + 255.0 * step).is_finite()) {
+        return Err(Unreadable(format!(
+            "a range begins at {least} in steps of {step}, needed: finite numbers, steps of 0 or more; write the file again"
+        )));
+    }
+    Ok([least, step])
+}
+
+fn codes<const WIDTH: usize>(
+    body: &mut Body<'_>,
+    n: usize,
+    n_codes: usize,
+) -> Result<ResidualCodes<WIDTH>, Unreadable> {
+    if n_codes > CODES || (n > 0 && n_codes == 0) {
+        return Err(Unreadable(format!("a codebook has {n_codes} codes, needed: 1 to {CODES}; write the file again")));
+    }
+    let mut books = [const { Vec::new() }; STAGES];
+    let mut codes = vec![[0; STAGES]; n];
+    for (stage, book) in books.iter_mut().enumerate() {
+        let rows = body.rows::<WIDTH>(n_codes, "a codebook")?;
+        *book = rows.into_iter().map(|code| code.map(f16::to_f32)).collect();
+        let column = body.bytes(n, "codes")?;
+        if let Some(code) = column.iter().find(|code| usize::from(**code) >= n_codes) {
+            return Err(Unreadable(format!("a code is {code}, needed: less than {n_codes}; write the file again")));
+        }
+        codes.iter_mut().zip(column).for_each(|(codes, code)| codes[stage] = *code);
+    }
+    Ok(ResidualCodes { books, codes })
+}
+
+#[cfg(test)]
+mod tests {
+    use pocketsplat_kernels::finite_difference::random;
+    use proptest::prelude::*;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::packed::halved;
+
+    #[expect(clippy::cast_possible_truncation, reason = "any numbers")]
+    fn quantised(n: usize) -> Quantised {
+        let numbers: Vec<f32> = random(3, 7 * n + 1).into_iter().map(|x| x as f32).collect();
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let row = |i: usize| &numbers[7 * i..][..7];
+        let log_scales: Vec<[f32; 3]> = (0..n).map(|i| std::array::from_fn(|at| row(i)[at])).collect();
+        let rotations: Vec<[f32; 4]> = (0..n).map(|i| std::array::from_fn(|at| row(i)[at + 3])).collect();
+        let grid = random(4, CHANNELS * grid::n_rows(&grid::levels(2)));
+        Quantised {
+            centres: log_scales.iter().map(|row| row.map(halved)).collect(),
+            opacity_logits: Bytes::of(&numbers[..n]),
+            log_scales: ResidualCodes::of(&log_scales, &mut rng).rounded(),
+            rotations: ResidualCodes::of(&rotations, &mut rng).rounded(),
+            log2_rows: 2,
+            rows: Bytes::of(&grid.iter().map(|x| *x as f32).collect::<Vec<_>>()),
+            weights: random(5, N_WEIGHTS).into_iter().map(|x| halved(x as f32)).collect(),
+        }
+    }
+
+    #[test]
+    fn what_was_written_is_read_and_written_again_the_same() {
+        for n in [0, 1, 2, 100] {
+            let before = quantised(n);
+            let bytes = written(&before);
+            let read = read(&bytes).unwrap();
+            assert_eq!(read, before, "{n}");
+            assert_eq!(written(&read), bytes);
+            assert_eq!(read.gaussians().len(), n);
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn a_damaged_file_is_refused(at: prop::sample::Index, flip in 1..=255u8) {
+            let mut bytes = written(&quantised(20));
+            let at = at.index(bytes.len());
+            prop_assert!(read(&bytes[..at]).is_err());
+            bytes[at] ^= flip;
+            prop_assert!(read(&bytes).is_err());
+        }
+
+        #[test]
+        fn a_damaged_body_is_gaussians_or_an_error(at: prop::sample::Index, near in 0..1500usize, flip in 1..=255u8, count: u32) {
+            let sound = body(&quantised(20));
+            // Most of a body is the network: half of the damage is before it.
+            for at in [at.index(sound.len()), near] {
+                prop_assert!(of_body(&sound[..at]).is_err());
+                let mut damaged = sound.clone();
+                damaged[at] ^= flip;
+                if let Ok(read) = of_body(&damaged) {
+                    prop_assert_eq!(read.gaussians().len(), 20);
+                }
+            }
+            for place in [0, 4, 8, 9] {
+                let mut lied = sound.clone();
+                lied[place..place + 4].copy_from_slice(&count.to_le_bytes());
+                prop_assert!(of_body(&lied).is_err() || lied == sound);
+            }
+        }
+    }
+}

@@ -11,6 +11,9 @@ use pocketsplat_instructions::Costs;
 use crate::figures::{self, Figures};
 use crate::focus;
 
+/// Bytes with which a page may keep sums; a browser may have less than a scene of a million anchors would take.
+const MOST_WITH_SUMS: usize = 256 << 20;
+
 /// A bundle that is drawn within one plan after another.
 pub struct Scene {
     bundle: Bundle<'static>,
@@ -81,7 +84,10 @@ impl Scene {
     pub fn bind(&mut self, budget: &Budget) -> Result<Figures, DecodeError> {
         // Its memory is free before the next one's is taken.
         self.bound = None;
-        let plan = Plan::new(&self.bundle, budget)?;
+        let mut plan = Plan::new(&self.bundle, budget)?;
+        if plan.keeps_sums() && plan.scratch_len() > MOST_WITH_SUMS {
+            plan = Plan::new(&self.bundle, &budget.with_residency(Residency::Auto))?;
+        }
         self.bound = Some(Bound::new(&self.bundle, plan)?);
         Ok(figures::of_plan(&self.bundle, &plan))
     }

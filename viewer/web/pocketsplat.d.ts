@@ -79,7 +79,7 @@ export interface Plan extends Tier {
   maxSplats: number;
   /** Whether anchors are decoded once, not in every frame. */
   isResident: boolean;
-  /** Whether the sums over anchors' features are kept too, which they are where `ramBytes` is Infinity. */
+  /** Whether the sums over anchors' features are kept too, which they may be where `ramBytes` is Infinity. */
   keepsSums: boolean;
   /** Whether Gaussians are evaluated once. */
   isBaked: boolean;
@@ -138,7 +138,7 @@ export class Scene {
    * there are none. Decodes up to 16,384 anchors.
    */
   focus(): number;
-  /** The least memory that draws anything within the other limits, and the most that is of use. */
+  /** The least memory with which a device draws anything within the other limits, and the most that is of use to it. */
   limits(settings: Settings): { leastBytes: number; mostBytes: number };
   /** What a decoder would do. */
   plan(settings: Settings): Plan;

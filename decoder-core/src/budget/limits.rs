@@ -35,8 +35,9 @@ pub enum Residency {
     /// [reference arithmetic](crate::ReferenceArithmetic), whatever the frame is drawn in.
     Baked,
     /// As [`Auto`](Self::Auto), and if there is room, beside each anchor in memory what no camera changes of its heads' first layers:
-    /// `b₁ + W₁·feature`. The same pixels with about a third of the heads' multiply-adds; for memory of megabytes, since an anchor of 50 features
-    /// takes 672 bytes more. Of no use to heads in halves or in [integers](crate::WithoutFpu), and `Auto` without the cargo feature `baked`.
+    /// `b₁ + W₁·feature`. The pixels of [`Resident`](Self::Resident), and of 50 features about a third of the heads' multiply-adds; for memory of
+    /// megabytes, since an anchor takes 672 bytes more then. Of no use to heads in halves or in [integers](crate::WithoutFpu), for which a
+    /// plan's [work](crate::Plan::work) is that of `Resident`; `Auto` without the cargo feature `baked`.
     AutoWithSums,
     /// In memory, as integers, decoded once when bound.
     Resident,

@@ -106,7 +106,7 @@ impl Plan {
         self.shape.resident.is_anchors()
     }
 
-    /// Whether the [sums](Residency::AutoWithSums) of resident anchors' features are in memory.
+    /// Whether the [sums](Residency::AutoWithSums) of resident anchors' features are in memory, for heads in f32.
     #[must_use]
     pub fn keeps_sums(&self) -> bool {
         self.shape.resident.has_sums()
@@ -153,7 +153,7 @@ impl Plan {
     /// A bound on the work of a frame: of the views in the manifest, for cameras of at most the budget's size; another
     /// view may need more. `None` when the manifest is not measured.
     ///
-    /// With n strips, or slabs of them, heads and decoding count n times, because each may need every anchor; most need few.
+    /// With [sums](Residency::AutoWithSums) it counts heads in f32, which alone go on from them. With n strips, or slabs of them, heads and decoding count n times, because each may need every anchor; most need few.
     #[must_use]
     pub fn work(&self) -> Option<Work> {
         self.work
@@ -286,7 +286,12 @@ impl Planner<'_, '_> {
             Residency::AutoWithSums => &[Residency::AutoWithSums, Residency::Resident, Residency::Streamed],
             given => slice::from_ref(given),
         };
-        strips.iter().flat_map(move |&n_strips| residencies.iter().map(move |&residency| (n_strips, residency)))
+        // Sums go before one strip: what strips repeat beside the heads is not counted.
+        let may_sum = move |n_strips| n_strips == 1 || strips.len() == 1;
+        strips
+            .iter()
+            .flat_map(move |&n_strips| residencies.iter().map(move |&residency| (n_strips, residency)))
+            .filter(move |&(n_strips, residency)| residency != Residency::AutoWithSums || may_sum(n_strips))
     }
 
     /// A plan with its predicted cost.

@@ -167,7 +167,7 @@ impl Resident {
     }
 
     /// Whether the sums of the anchors' features are in memory; never without the feature `baked`.
-    pub(super) const fn has_sums(&self) -> bool {
+    pub(crate) const fn has_sums(&self) -> bool {
         cfg!(feature = "baked") && matches!(self, Self::Anchors { with_sums: true, .. })
     }
 

@@ -37,7 +37,10 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
     #[inline(never)]
     fn prepare(bundle: &Bundle<'b>, plan: Plan, [fast, slow]: [&'s mut [u8]; 2]) -> Result<Self, DecodeError> {
         let mut regions = Regions::new(fast, slow, plan.placement());
-        let source = bind_scene(bundle, &plan, &mut regions);
+        let mut source = bind_scene(bundle, &plan, &mut regions);
+        if let Ok(GaussianSource::Anchors(anchors)) = &mut source {
+            anchors.fill_sums()?;
+        }
         Self::of_parts(bundle, plan, source, regions)
     }
 
@@ -92,16 +95,16 @@ fn bind_scene<'b, 's, N: HeadFormat>(
     regions: &mut Regions<'s>,
 ) -> Result<GaussianSource<'b, 's, N>, DecodeError> {
     let (shape, skip_damage) = (plan.shape(), plan.budget().skips_damage);
-    let (anchor, kept) = match SceneMemory::take(shape, regions)? {
+    let (anchor, kept, sums) = match SceneMemory::take(shape, regions)? {
         // Unreachable without the feature; this arm drops the code.
         SceneMemory::Baked { .. } if !cfg!(feature = "baked") => return Err(DecodeError::Internal),
         SceneMemory::Baked { baked, anchor, models } => {
             return bind_baked(bundle, shape, baked, anchor, models, skip_damage).map(GaussianSource::Baked);
         }
-        SceneMemory::Streamed { anchor, models } => (anchor, AnchorStorage::Models(models)),
-        SceneMemory::Resident { anchor, records, sums, .. } => (anchor, AnchorStorage::Anchors(records, sums)),
+        SceneMemory::Streamed { anchor, models } => (anchor, AnchorStorage::Models(models), None),
+        SceneMemory::Resident { anchor, records, sums, .. } => (anchor, AnchorStorage::Anchors(records), Some(sums)),
     };
-    let evaluator = evaluator(bundle, shape, anchor, regions.of(Part::Tiles).borrow());
+    let evaluator = evaluator(bundle, shape, anchor, sums, regions.of(Part::Tiles).borrow());
     anchors(bundle, shape, kept, evaluator)
 }
 
@@ -109,8 +112,8 @@ fn bind_scene<'b, 's, N: HeadFormat>(
 enum AnchorStorage<'s> {
     /// Nothing but what decodes them.
     Models(ModelMemory<'s>),
-    /// They, and the sums of their features.
-    Anchors(RecordMemory<'s>, SumsMemory<'s>),
+    /// They.
+    Anchors(RecordMemory<'s>),
 }
 
 /// What evaluates anchors, and `[n_channels]` of one.
@@ -126,38 +129,14 @@ fn anchors<'b, 's, N: HeadFormat>(
     kept: AnchorStorage<'s>,
     evaluator: Result<EvaluatorAndRow<'s, N>, DecodeError>,
 ) -> Result<GaussianSource<'b, 's, N>, DecodeError> {
-    let (mut evaluator, row) = evaluator?;
+    let (evaluator, row) = evaluator?;
     let source = match kept {
         AnchorStorage::Models(models) => AnchorSource::Streamed(bundle.anchor_models(models.words)?),
-        AnchorStorage::Anchors(records, SumsMemory { sums }) => {
-            let mut records = AnchorRecords::new(bundle, shape.record_layout(), records)?;
-            if cfg!(feature = "baked") && N::READS_SUMS && !sums.is_empty() {
-                evaluator.sums = Some(sums_of(&records, &evaluator.heads, row, sums)?);
-                // Nothing reads them any more.
-                records = records.without_features();
-            }
-            AnchorSource::Resident(records)
+        AnchorStorage::Anchors(records) => {
+            AnchorSource::Resident(AnchorRecords::new(bundle, shape.record_layout(), records)?)
         }
     };
     Ok(GaussianSource::Anchors(Anchors { source, row, evaluator }))
-}
-
-/// Fills `sums` with those of all anchors.
-///
-/// * `row`: `[n_channels]`, to work in.
-#[inline(never)]
-fn sums_of<'s, N: HeadFormat>(
-    records: &AnchorRecords<'_, '_>,
-    heads: &Heads<'_, N>,
-    row: &mut [f32],
-    sums: &'s mut [f32],
-) -> Result<FeatureSums<'s>, DecodeError> {
-    let len = heads.shape.anchor_sums_len();
-    for (number, sums) in (0..).zip(sums.chunks_exact_mut(len.max(1))) {
-        records.read(number, row).ok_or(DecodeError::Internal)?;
-        heads.begin(row.get(..heads.shape.feature).unwrap_or_default(), sums);
-    }
-    Ok(FeatureSums::new(sums, len))
 }
 
 /// Gaussians that are evaluated once.
@@ -181,13 +160,16 @@ fn evaluator<'s, N: HeadFormat>(
     bundle: &Bundle<'_>,
     shape: &ScratchShape,
     memory: AnchorMemory<'s>,
+    sums: Option<SumsMemory<'s>>,
     mut free: Arena<'_>,
 ) -> Result<EvaluatorAndRow<'s, N>, DecodeError> {
     let AnchorMemory { heads, row, inputs, hidden, detail_sums, outputs } = memory;
     let mut arena = Arena::of_words(heads);
     let heads = Heads::convert(&mut arena, &mut free, shape.model.head_weights, bundle.heads(), shape.heads());
     let work = Workspace { hidden, detail_sums, outputs };
-    evaluator_of(heads, arena, shape, (inputs, row), work)
+    let sums = sums.filter(|_| cfg!(feature = "baked") && N::READS_SUMS && shape.resident.has_sums());
+    let sums = sums.map(|memory| FeatureSums::new(memory.sums, shape.heads().anchor_sums_len()));
+    evaluator_of(heads, arena, shape, (inputs, row), (work, sums))
 }
 
 /// * `heads`: not unpacked by the caller, whose stack frame would hold it twice. * `arena`: what they left.
@@ -197,11 +179,11 @@ fn evaluator_of<'s, N: HeadFormat>(
     mut arena: Arena<'s>,
     shape: &ScratchShape,
     (inputs, row): (&'s mut [f32], &'s mut [f32]),
-    work: Workspace<'s>,
+    (work, sums): (Workspace<'s>, Option<FeatureSums<'s>>),
 ) -> Result<EvaluatorAndRow<'s, N>, DecodeError> {
     let heads = heads?;
     let pair = if heads.takes_two() { Pair::take(&mut arena, shape.heads()) } else { None };
-    Ok((Evaluator { heads, inputs, work, pair, sums: None }, row))
+    Ok((Evaluator { heads, inputs, work, pair, sums }, row))
 }
 
 /// Decodes the planned tiers if they are resident, and if they are streamed compares their checksums; Gaussians are baked later.
@@ -229,7 +211,7 @@ pub(super) fn evaluate_scene<'s>(
     models: ModelMemory<'_>,
     skip_damage: bool,
 ) -> Result<Baker<'s>, DecodeError> {
-    let (mut evaluator, row) = evaluator::<F32>(bundle, shape, anchor, Arena::of_words(&mut []))?;
+    let (mut evaluator, row) = evaluator::<F32>(bundle, shape, anchor, None, Arena::of_words(&mut []))?;
     let mut models = bundle.anchor_models(models.words)?;
     bake(bundle, shape.resident.n_chunks(), baked, &mut models, (&mut evaluator, row), skip_damage)
 }

@@ -41,6 +41,21 @@ impl<N: HeadFormat> GaussianSource<'_, '_, N> {
     }
 }
 
+impl<N: HeadFormat> Anchors<'_, '_, N> {
+    /// Makes the sums of all anchors' features, where they are kept; nothing reads the features after that.
+    #[inline(never)]
+    pub(super) fn fill_sums(&mut self) -> Result<(), DecodeError> {
+        let Self { source: AnchorSource::Resident(records), row, evaluator } = self else { return Ok(()) };
+        let Some(sums) = evaluator.sums.as_mut().filter(|_| cfg!(feature = "baked")) else { return Ok(()) };
+        for (number, sums) in (0..).zip(sums.each_mut()) {
+            records.read(number, row).ok_or(DecodeError::Internal)?;
+            evaluator.heads.begin(row.get(..evaluator.heads.shape.feature).unwrap_or_default(), sums);
+        }
+        *records = records.without_features();
+        Ok(())
+    }
+}
+
 impl<'b> AnchorSource<'b, '_> {
     /// Whether anchors wait in memory.
     pub(super) fn is_resident(&self) -> bool {

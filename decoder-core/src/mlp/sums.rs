@@ -7,7 +7,7 @@ use super::shape::HeadShape;
 
 /// The sums of all anchors.
 pub(crate) struct FeatureSums<'s> {
-    sums: &'s [f32],
+    sums: &'s mut [f32],
     len: usize,
 }
 
@@ -20,9 +20,14 @@ pub(crate) struct AnchorSums<'p> {
 }
 
 impl<'s> FeatureSums<'s> {
-    /// * `sums`: as [`Heads::begin`](super::Heads::begin) left those of each anchor.
-    pub(crate) fn new(sums: &'s [f32], len: usize) -> Self {
+    /// * `sums`: memory of any content. * `len`: of an anchor.
+    pub(crate) fn new(sums: &'s mut [f32], len: usize) -> Self {
         Self { sums, len }
+    }
+
+    /// Those of each anchor, to be filled by [`Heads::begin`](super::Heads::begin).
+    pub(crate) fn each_mut(&mut self) -> impl Iterator<Item = &mut [f32]> {
+        self.sums.chunks_exact_mut(self.len.max(1))
     }
 
     /// Those of anchor `number` of the file.

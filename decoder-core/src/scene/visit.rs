@@ -78,8 +78,14 @@ impl<N: HeadFormat> Evaluator<'_, N> {
         let mut evaluation = Evaluation { heads, work, effects };
         let Some(Pair { offsets, inputs: second_inputs, units, waiting }) = pair else {
             fill_inputs(anchor, effects, eye, inputs);
-            let sums = sums.as_ref().filter(|_| cfg!(feature = "baked")).and_then(|sums| sums.of(number, &heads.shape));
-            let mut role = sums.map_or(Role::Alone, Role::Begun);
+            let mut role = match sums {
+                Some(sums) if cfg!(feature = "baked") => match sums.of(number, &heads.shape) {
+                    Some(sums) => Role::Begun(sums),
+                    // Unreachable, for all anchors have sums; its feature was not read.
+                    None => return,
+                },
+                _ => Role::Alone,
+            };
             evaluation.run::<F>(number, anchor, N::values(inputs), &mut role, watch, sink);
             return;
         };

@@ -17,7 +17,7 @@ struct Beginnings {
     ratio: [f32; LANES],
 }
 
-/// As [`blend_rows_with`](super::rows::blend_rows_with) the exponential function of `constants`, bit for bit.
+/// As [`blend_rows_with`](super::rows::blend_rows_with) the exponential function of `constants`, bit for bit where variances are positive.
 pub(super) fn blend_rows(
     splat: &RowSplat,
     constants: &BlendConstants,

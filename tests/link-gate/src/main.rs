@@ -51,6 +51,7 @@ fn draw(bytes: &[u8], camera: &Camera, scratch: &mut [u8]) -> Result<FrameReport
             0 => Residency::Auto,
             1 => Residency::Resident,
             2 => Residency::Baked,
+            3 => Residency::AutoWithSums,
             _ => Residency::Streamed,
         })
         .with_strips(if strips == 0 { Strips::Auto } else { Strips::Exactly(strips) });

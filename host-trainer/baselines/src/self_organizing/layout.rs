@@ -26,6 +26,9 @@ const MARK: Mark = *b"PSO1";
 /// Bytes that deflate makes of one at most.
 const MOST_EXPANSION: usize = 1032;
 
+/// Pixels of an image.
+const MOST_PIXELS: usize = 1 << 30;
+
 /// Of a place, as files have it: ln of the largest number.
 const MOST_CONTRACTED: f32 = 88.7;
 
@@ -114,9 +117,14 @@ fn png(rows: &[u8], side: usize) -> Vec<u8> {
     png
 }
 
-/// The pixels of an image of `n_planes`; memory follows its bytes.
+/// The pixels of an image of `n_planes`: 1 GiB of them at most, and no more than its bytes can stand for.
 fn pixels(png: &[u8], side: usize, n_planes: usize) -> Result<Vec<u8>, Unreadable> {
     let n_pixels = side.saturating_mul(side).saturating_mul(n_planes);
+    if n_pixels > MOST_PIXELS {
+        return Err(Unreadable(format!(
+            "an image has {n_planes} planes of {side} × {side} pixels, needed: {MOST_PIXELS} pixels at most; write the file again"
+        )));
+    }
     if n_pixels > png.len().saturating_mul(MOST_EXPANSION) {
         let n_bytes = png.len();
         return Err(Unreadable(format!(
@@ -168,9 +176,13 @@ mod tests {
     #[test]
     fn images_larger_than_their_bytes_and_ranges_without_end_are_refused() {
         let mut faulty = body(&grid(3, Degree::Zero));
-        faulty[..4].copy_from_slice(&60_000u32.to_le_bytes());
-        let said = of_body(&faulty).unwrap_err().to_string();
-        assert!(said.contains("too few for 3 planes of 60000 × 60000 pixels"), "{said}");
+        for (side, cause) in
+            [(6000_u32, "too few for 3 planes of 6000 × 6000 pixels"), (60_000, "needed: 1073741824 pixels at most")]
+        {
+            faulty[..4].copy_from_slice(&side.to_le_bytes());
+            let said = of_body(&faulty).unwrap_err().to_string();
+            assert!(said.contains(cause), "{said}");
+        }
         faulty[..4].copy_from_slice(&2u32.to_le_bytes());
         let said = of_body(&faulty).unwrap_err().to_string();
         assert!(said.contains("needed: [2, 6] of L8"), "{said}");

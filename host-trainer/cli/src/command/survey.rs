@@ -12,6 +12,7 @@ use std::process::ExitCode;
 use anyhow::{Context as _, Result, bail};
 use pocketsplat_capture::dataset::Background;
 use pocketsplat_files::{Output, Outputs};
+use pocketsplat_trainer::explicit::CloudConfig;
 
 use super::capture::CaptureArgs;
 use super::eval::Measurements;
@@ -104,7 +105,7 @@ fn configured(args: &Args, folder: &Path) -> Result<ExplicitRunConfig> {
     }
     // The same for all methods, said or not.
     config.capture.background.get_or_insert(Background::Black);
-    (config.gaussians.iterations, config.gaussians.seed) = (args.iterations, args.seed);
+    config.gaussians = CloudConfig { seed: args.seed, ..CloudConfig::hurried(args.iterations) };
     config.gaussians.validate()?;
     Ok(config)
 }

@@ -145,9 +145,8 @@ impl CloudConfig {
         f64::from(iteration.min(self.rates_until)) / f64::from(self.rates_until)
     }
 
-    /// The default, all of whose schedules run through within `iterations`: for tests, which have few.
-    #[cfg(test)]
-    pub(crate) fn hurried(iterations: u32) -> Self {
+    /// The default, all of whose schedules run through within `iterations`, as those of anchors do.
+    pub fn hurried(iterations: u32) -> Self {
         let mut config = Self { iterations, ..Self::default() };
         let hurry = |counted: &mut u32| *counted = (u64::from(*counted) * u64::from(iterations) / 30_000).max(1) as u32;
         let DensityControl { from, until, reset_every, .. } = &mut config.density;

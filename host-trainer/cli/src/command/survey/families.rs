@@ -21,8 +21,8 @@ pub(super) fn compressors() -> Vec<Compressor> {
     vec![
         of("pruned=0.66", LightGaussian::default()),
         of("pruned=0.85", LightGaussian { pruned_share: 0.85 }),
-        of("degree=3", SelfOrganizing::default()),
-        of("degree=0", SelfOrganizing { degree: Degree::Zero, ..SelfOrganizing::default() }),
+        of("harmonics", SelfOrganizing::default()),
+        of("no harmonics", SelfOrganizing { degree: Degree::Zero, ..SelfOrganizing::default() }),
     ]
 }
 
@@ -66,5 +66,6 @@ const fn anchors(method: &'static str, rate: &'static str, options: &'static [&'
     Anchors { method, rate, options }
 }
 
-/// What all of them share: heads that see the view, Gaussians of three deviations.
-pub(super) const SHARED: [&str; 2] = ["--modules=none", "--effects=+view-colour,+view-geometry,+anisotropy"];
+/// What all of them share: heads that see the view, Gaussians of three deviations, and photographs as they are, which the explicit methods
+/// take too.
+pub(super) const SHARED: [&str; 2] = ["--modules=none", "--effects=+view-colour,+view-geometry,+anisotropy,-exposure"];

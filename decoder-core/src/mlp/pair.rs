@@ -36,11 +36,6 @@ impl<'p> Role<'p> {
         }
     }
 
-    /// Floats of the second anchor's hidden units.
-    pub(crate) const fn units_len(hidden_len: usize) -> usize {
-        3 * hidden_len
-    }
-
     /// What the hidden layers begin with, if that is in memory.
     pub(crate) fn sums(&self) -> Option<&AnchorSums<'p>> {
         match self {

@@ -1,7 +1,6 @@
 //! Widths of the heads, and what follows from them: floats in memory and multiply-adds.
 
 use super::block::{HeadWeights, n_rows};
-use super::pair::Role;
 use super::weight::LANES;
 
 /// Widths of the heads of a scene.
@@ -60,7 +59,12 @@ impl HeadShape {
 
     /// Words of the anchor that waits for a second one, and of what is computed for the second one beside the first.
     const fn pair_words(&self) -> usize {
-        3 * self.offsets + self.inputs() + Role::units_len(self.hidden_len())
+        3 * self.offsets + self.inputs() + self.pair_units_len()
+    }
+
+    /// Floats of the second anchor's hidden units where two are evaluated at a time.
+    pub(crate) const fn pair_units_len(&self) -> usize {
+        3 * self.hidden_len()
     }
 
     /// Words of the heads in integers.

@@ -47,7 +47,7 @@ impl<'s> Pair<'s> {
         Some(Self {
             offsets: arena.take(shape.offsets).ok()?,
             inputs: arena.take(shape.inputs()).ok()?,
-            units: arena.take(Role::units_len(shape.hidden_len())).ok()?,
+            units: arena.take(shape.pair_units_len()).ok()?,
             waiting: None,
         })
     }

@@ -1,10 +1,10 @@
 //! Sums of features in memory: the same pixels for fewer multiply-adds, as many as the widths say.
 
 use conformance::bundles::{CODERS, tiered};
-use conformance::frame::{budget_for, to_core};
+use conformance::frame::{Frame, budget_for, to_core};
 use conformance::scenes::{CASES, cameras};
 use pocketsplat_codec::verify::Trial;
-use pocketsplat_core::{Bundle, HeadWeights, Plan, Residency, WithoutFpu};
+use pocketsplat_core::{Bundle, Decoder, HeadWeights, Plan, Residency, Strips, WithoutFpu};
 
 #[test]
 fn sums_change_no_pixel_and_save_what_the_widths_say() {
@@ -67,6 +67,19 @@ fn where_sums_have_no_room_the_plan_is_the_usual_one() {
 }
 
 #[test]
+fn sums_go_before_one_strip() {
+    let bytes = tiered(&CASES[0], CODERS[0], 64);
+    let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
+    let one_strip = budget_for(&to_core(&cameras()[0].1)).with_residency(Residency::AutoWithSums);
+    let any_strips = one_strip.with_strips(Strips::Auto);
+    let whole = Plan::new(&bundle, &any_strips).expect("planned");
+    let plans = (0..whole.scratch_len()).step_by(200).filter_map(|n| Plan::new(&bundle, &any_strips.in_bytes(n)).ok());
+    assert!(whole.keeps_sums() && plans.filter(Plan::keeps_sums).all(|plan| plan.n_strips() == 1), "of its own accord");
+    let asked = Plan::new(&bundle, &one_strip.with_strips(Strips::Exactly(4))).expect("planned");
+    assert!(asked.keeps_sums(), "strips that are asked for have sums");
+}
+
+#[test]
 fn integers_do_without() {
     let bytes = tiered(&CASES[0], CODERS[0], 64);
     let bundle = Bundle::parse(&bytes).expect("the writer's bundle is sound");
@@ -74,8 +87,8 @@ fn integers_do_without() {
     let [summed, resident] = [Residency::AutoWithSums, Residency::Resident].map(|residency| {
         let plan = Plan::new(&bundle, &budget_for(&camera).with_residency(residency)).expect("planned");
         let mut scratch = vec![0; plan.scratch_len()];
-        let mut frame = conformance::frame::Frame::new(camera.width_px, camera.height_px);
-        let mut decoder = pocketsplat_core::Decoder::bind_in::<WithoutFpu>(&bundle, plan, &mut scratch).expect("bound");
+        let mut frame = Frame::new(camera.width_px, camera.height_px);
+        let mut decoder = Decoder::bind_in::<WithoutFpu>(&bundle, plan, &mut scratch).expect("bound");
         let report = decoder.render(&camera, &mut frame).expect("drawn");
         (frame.rgb, report.head_macs)
     });

@@ -73,8 +73,16 @@ impl Scene {
     /// # Errors
     /// As [`Plan::new`].
     pub fn plan(&self, budget: &Budget) -> Result<Figures, DecodeError> {
+        Ok(figures::of_plan(&self.bundle, &self.planned(budget)?))
+    }
+
+    /// The plan, without sums where they would take too much of a page's memory.
+    fn planned(&self, budget: &Budget) -> Result<Plan, DecodeError> {
         let plan = Plan::new(&self.bundle, budget)?;
-        Ok(figures::of_plan(&self.bundle, &plan))
+        if plan.keeps_sums() && plan.scratch_len() > MOST_WITH_SUMS {
+            return Plan::new(&self.bundle, &budget.with_residency(Residency::Auto));
+        }
+        Ok(plan)
     }
 
     /// Plans, and makes the decoder that the next frames are drawn by, in exactly the plan's bytes.
@@ -84,10 +92,7 @@ impl Scene {
     pub fn bind(&mut self, budget: &Budget) -> Result<Figures, DecodeError> {
         // Its memory is free before the next one's is taken.
         self.bound = None;
-        let mut plan = Plan::new(&self.bundle, budget)?;
-        if plan.keeps_sums() && plan.scratch_len() > MOST_WITH_SUMS {
-            plan = Plan::new(&self.bundle, &budget.with_residency(Residency::Auto))?;
-        }
+        let plan = self.planned(budget)?;
         self.bound = Some(Bound::new(&self.bundle, plan)?);
         Ok(figures::of_plan(&self.bundle, &plan))
     }

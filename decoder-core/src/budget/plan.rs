@@ -153,7 +153,8 @@ impl Plan {
     /// A bound on the work of a frame: of the views in the manifest, for cameras of at most the budget's size; another
     /// view may need more. `None` when the manifest is not measured.
     ///
-    /// With [sums](Residency::AutoWithSums) it counts heads in f32, which alone go on from them. With n strips, or slabs of them, heads and decoding count n times, because each may need every anchor; most need few.
+    /// With n strips, or slabs of them, heads and decoding count n times, because each may need every anchor; most need few. With
+    /// [sums](Residency::AutoWithSums) it counts heads in f32, which alone go on from them.
     #[must_use]
     pub fn work(&self) -> Option<Work> {
         self.work
@@ -171,9 +172,10 @@ impl Plan {
     /// [weights of the heads](Plan::head_weights) in f32 before halves, and among these plan variants the one of least predicted work.
     ///
     /// Work is predicted in multiply-adds. One strip goes over the scene once, several together about twice; going over it
-    /// costs the heads' (from the manifest, else of all anchors; the share that [sums](Residency::AutoWithSums) leave at most), and decoding when
-    /// anchors are streamed; or 150 a Gaussian when they are baked. Of equals the fewest strips are taken, or the most where they share passes. The frame's size decides about
-    /// memory only through the splats of a strip, because tiles leave one by one; a splat takes 40 bytes.
+    /// costs the heads' (from the manifest, else of all anchors; the share that [sums](Residency::AutoWithSums) leave at most), and
+    /// decoding when anchors are streamed; or 150 a Gaussian when they are baked. Of equals the fewest strips are taken, or the most
+    /// where they share passes, and sums are kept in one strip alone unless the caller says how many there are. The frame's size decides
+    /// about memory only through the splats of a strip, because tiles leave one by one; a splat takes 40 bytes.
     ///
     /// When [slabs](Overflow::Slabs) are allowed, fewer places than splats will do, down to 256: then nearly every scene fits
     /// whole, and going over it counts once more for each slab.

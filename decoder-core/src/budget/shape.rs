@@ -161,11 +161,6 @@ impl Resident {
         matches!(self, Self::Anchors { .. })
     }
 
-    /// Anchors whose features' sums are in memory.
-    const fn n_summed(&self) -> usize {
-        if self.has_sums() { self.len() } else { 0 }
-    }
-
     /// Whether the sums of the anchors' features are in memory; never without the feature `baked`.
     pub(crate) const fn has_sums(&self) -> bool {
         cfg!(feature = "baked") && matches!(self, Self::Anchors { with_sums: true, .. })
@@ -248,7 +243,7 @@ impl ScratchShape {
 
     /// Floats of the sums of all features in memory.
     pub(super) const fn sums_len(&self) -> usize {
-        self.resident.n_summed().saturating_mul(self.heads().anchor_sums_len())
+        if self.resident.has_sums() { self.resident.len().saturating_mul(self.heads().anchor_sums_len()) } else { 0 }
     }
 
     /// At most what is left of multiply-adds of the heads, where the sums of features may be in memory.

@@ -167,7 +167,7 @@ fn evaluator<'s, N: HeadFormat>(
     let mut arena = Arena::of_words(heads);
     let heads = Heads::convert(&mut arena, &mut free, shape.model.head_weights, bundle.heads(), shape.heads());
     let work = Workspace { hidden, detail_sums, outputs };
-    let sums = sums.filter(|_| cfg!(feature = "baked") && N::READS_SUMS && shape.resident.has_sums());
+    let sums = sums.filter(|_| N::READS_SUMS && shape.resident.has_sums());
     let sums = sums.map(|memory| FeatureSums::new(memory.sums, shape.heads().anchor_sums_len()));
     evaluator_of(heads, arena, shape, (inputs, row), (work, sums))
 }

@@ -28,6 +28,7 @@
 
 use crate::functions::{Functions, Reference, Table};
 use crate::mlp::{F32, HeadFormat, I16};
+use crate::raster::{Blending, FloatBlending, IntegerBlending};
 
 /// [`ReferenceArithmetic`] or [`WithoutFpu`].
 #[expect(private_bounds, reason = "sealed: what a choice decides is the decoder's own affair")]
@@ -41,23 +42,26 @@ pub(crate) trait Choices: 'static {
     type Heads: HeadFormat;
     /// The transcendental functions.
     type Functions: Functions;
+    /// How splats become pixels.
+    type Blending: Blending;
 }
 
 /// As the reference, within the rounding of f32, and of halves for splats in memory.
 #[derive(Clone, Copy, Debug)]
 pub struct ReferenceArithmetic;
 
-/// For processors without an FPU: heads in integers and functions from a table take half the instructions or less of the
-/// stages that they are in.
+/// For processors without an FPU: heads and pixels in integers, and functions from a table.
 #[derive(Clone, Copy, Debug)]
 pub struct WithoutFpu;
 
 impl Choices for ReferenceArithmetic {
     type Heads = F32;
     type Functions = Reference;
+    type Blending = FloatBlending;
 }
 
 impl Choices for WithoutFpu {
     type Heads = I16;
     type Functions = Table;
+    type Blending = IntegerBlending;
 }

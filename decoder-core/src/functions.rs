@@ -1,30 +1,11 @@
 //! Exponential, logarithm and the heads' activations, to two accuracies.
 
-use pocketsplat_format::math::{self, EXP_MAX, EXP_MIN, EXPONENTIAL};
-use pocketsplat_half::{BlendConstants, ROW_LEN, RowSplat, RowsWork, blend_rows_with};
+use pocketsplat_format::math::{self, EXP_MAX, EXP_MIN};
 
 /// The transcendental functions of a frame; none returns NaN or infinity for a number.
 pub(crate) trait Functions {
     /// eˣ, x held within [`EXP_MIN`] and [`EXP_MAX`].
     fn exp(x: f32) -> f32;
-
-    /// eˣ for x known to lie there.
-    #[inline(always)]
-    fn exp_near(x: f32) -> f32 {
-        Self::exp(x)
-    }
-
-    /// Blends a splat into rows of pixels by this exponential function.
-    // Not inlined: among everything that a frame needs its loops would not stay in registers.
-    #[inline(never)]
-    fn blend_rows(
-        splat: &mut RowSplat,
-        constants: &BlendConstants,
-        rows: &mut [[[f32; 4]; ROW_LEN]],
-        width: u16,
-    ) -> RowsWork {
-        blend_rows_with(splat, constants, Self::exp_near, rows, width)
-    }
 
     /// The natural logarithm of a positive number that is not subnormal.
     fn ln(x: f32) -> f32;
@@ -53,21 +34,6 @@ impl Functions for Reference {
     }
 
     #[inline(always)]
-    fn exp_near(x: f32) -> f32 {
-        EXPONENTIAL.near(x)
-    }
-
-    #[inline(always)]
-    fn blend_rows(
-        splat: &mut RowSplat,
-        constants: &BlendConstants,
-        rows: &mut [[[f32; 4]; ROW_LEN]],
-        width: u16,
-    ) -> RowsWork {
-        pocketsplat_half::blend_rows(splat, constants, rows, width)
-    }
-
-    #[inline(always)]
     fn ln(x: f32) -> f32 {
         libm::logf(x)
     }
@@ -90,11 +56,7 @@ pub(crate) struct Table;
 impl Functions for Table {
     #[inline(always)]
     fn exp(x: f32) -> f32 {
-        Self::exp_near(clamped(x))
-    }
-
-    #[inline(always)]
-    fn exp_near(x: f32) -> f32 {
+        let x = clamped(x);
         let shifted = x * (core::f32::consts::LOG2_E * 64.0) + ROUNDER;
         let r = x - (shifted - ROUNDER) * (core::f32::consts::LN_2 / 64.0);
         let bits = shifted.to_bits();

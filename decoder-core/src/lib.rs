@@ -11,7 +11,7 @@ compile_error!(
      target with SSE2, such as i686"
 );
 
-// Each module imports only modules before it in this list: arena · functions · mlp · scene · project · raster · arithmetic · bake · budget ·
+// Each module imports only modules before it in this list: arena · fixed · functions · mlp · scene · project · raster · arithmetic · bake · budget ·
 // decoder · display. `tests/tests/rooms.rs` holds the crate to it, and counts the names below.
 mod arena;
 mod arithmetic;
@@ -20,6 +20,7 @@ mod budget;
 mod decoder;
 #[cfg(feature = "embedded-graphics")]
 mod display;
+mod fixed;
 mod functions;
 mod mlp;
 mod project;

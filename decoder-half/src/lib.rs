@@ -17,7 +17,7 @@ pub use chosen::integer::add_products_of_two_rows;
 pub use chosen::layer::{LANES, outputs, rectified_units};
 pub use chosen::root::sqrt;
 pub use chosen::rows::{
-    BlendConstants, Exponential, ROW_LEN, RowSplat, RowsWork, SLACK_PX, blend_rows, blend_rows_with, span, sqrt_above,
+    BlendConstants, Exponential, ROW_LEN, RowSplat, RowsWork, SLACK_PX, blend_rows, span, sqrt_above,
 };
 pub use chosen::symbols::{
     ChannelTables, Entries, FREQUENCY_TOTAL, LEVELS_AT_ONCE, LevelFrequencies, NODE_CONTEXTS, PRECISION_BITS,

@@ -15,6 +15,7 @@ const CRATES: [(&str, &[&str]); 15] = [
         "decoder-core/src",
         &[
             "arena",
+            "fixed",
             "functions",
             "mlp",
             "scene",

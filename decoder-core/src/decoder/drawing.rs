@@ -10,7 +10,7 @@ use super::splats::{Slab, SplatStore};
 use super::strip::Strip;
 use crate::arithmetic::{Arithmetic, ReferenceArithmetic};
 use crate::project::{TILE_PIXELS, TileRect};
-use crate::raster::{BlendRule, DIGITS, EMPTY, TileRegion, blend_tile, finish_tile};
+use crate::raster::{Blending, DIGITS, TileRegion, blend_tile, finish_tile};
 
 /// A frame that comes tile by tile, each when it is asked for; made by [`Decoder::begin`].
 ///
@@ -39,7 +39,7 @@ pub struct Drawing<'d, 'b, 's, A: Arithmetic = ReferenceArithmetic> {
     pub(super) decoder: &'d mut Decoder<'b, 's, A>,
     pub(super) size_px: [u16; 2],
     pub(super) frame: Frame,
-    pub(super) rule: BlendRule,
+    pub(super) rule: <A::Blending as Blending>::Rule,
     pub(super) next: Next<'b>,
     pub(super) strip: Strip,
     pub(super) slab: Slab,
@@ -204,10 +204,10 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
         let slot = if decoder.plan.shape().frame.canvas_tiles > 1 { self.n_tiles } else { 0 };
         let pixels = decoder.pixels.chunks_exact_mut(TILE_PIXELS).nth(slot)?;
         if self.slab.from == 0.0 && self.n_listed == 0 {
-            pixels.fill(EMPTY);
+            pixels.fill(A::Blending::EMPTY);
         }
         let list = spare.get(self.n_listed..self.n_in_row)?;
-        let work = blend_tile::<A::Functions>(place, splats, rects, list, &self.rule, pixels);
+        let work = blend_tile::<A::Blending>(place, splats, rects, list, &self.rule, pixels);
         let report = &mut self.frame.report;
         report.tile_splats = report.tile_splats.saturating_add(work.splats);
         report.row_splats = report.row_splats.saturating_add(work.rows);
@@ -233,7 +233,7 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
         let header = decoder.bundle.header();
         let has_background = header.features.effects.background;
         let background = has_background.then(|| header.background.map(|byte| f32::from(byte) / 255.0));
-        finish_tile(place, pixels, background, decoder.rgb);
+        finish_tile::<A::Blending>(place, pixels, background, decoder.rgb);
         watch.enter(Stage::Output);
         Some(Step::Tile(place))
     }

@@ -19,7 +19,7 @@ use super::{Decoder, FrameReport};
 use crate::arithmetic::Arithmetic;
 use crate::budget::Overflow;
 use crate::project::View;
-use crate::raster::{BlendRule, TileRegion};
+use crate::raster::{Blending, TileRegion};
 
 /// Strips of a frame that is worth an index of its chunks.
 const LEAST_STRIPS_INDEXED: u8 = 3;
@@ -55,7 +55,7 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
             let first_come = FirstCome::new(self.splats.places());
             OverflowPolicy::FirstCome { first_come, strips_of_chunks: StripsOfChunks::NONE }
         };
-        let rule = BlendRule::new(budget.quality.alpha_cut);
+        let rule = A::Blending::rule(budget.quality.alpha_cut);
         let cost = self.bundle.model_cost();
         let mut frame = Frame { view, strips, policy, report: FrameReport::default(), cost, unreported: 0 };
         if self.skips_damage() && matches!(frame.policy, OverflowPolicy::Slabs { .. }) {

@@ -5,6 +5,7 @@ use pocketsplat_format::math::to_half;
 use pocketsplat_half::from_halves;
 
 use super::splat::Splat;
+use crate::fixed::fixed_half;
 
 /// Bits of 2⁻⁶¹, which stands for every smaller precision: a deviation of 1.5·10⁹ px.
 const LEAST_PRECISION: u32 = (127 - 61) << 23;
@@ -37,6 +38,19 @@ impl PackedSplat {
     #[inline]
     pub(crate) fn unpack(&self) -> Splat {
         self.rest.unpack(self.mean, self.depth, self.shear)
+    }
+
+    /// Centre, shear, and the precisions along a row and across rows, as in [`Splat`].
+    #[inline(always)]
+    pub(crate) fn shape(&self) -> ([f32; 2], f32, [f32; 2]) {
+        (self.mean, self.shear, [self.rest.row_precision, self.rest.column_precision].map(unpack_precision))
+    }
+
+    /// Natural logarithm of the opacity, and the colour, with so many bits behind the point.
+    #[inline(always)]
+    pub(crate) fn fixed(&self, opacity_bits: i32, colour_bits: i32) -> (i32, [i32; 3]) {
+        let colour = self.rest.colour.map(|half| fixed_half(half, colour_bits));
+        (fixed_half(self.rest.log_opacity, opacity_bits), colour)
     }
 
     /// z in the camera frame, positive.

@@ -3,7 +3,13 @@
 //! All memory is the caller's; the module knows nothing of cameras and anchors.
 
 mod blend;
+mod blending;
 mod depth;
+mod float_blending;
+mod integer_blending;
 
-pub(crate) use blend::{BlendRule, EMPTY, Pixel, TileRegion, blend_tile, finish_tile};
+pub(crate) use blend::{TileRegion, blend_tile, finish_tile};
+pub(crate) use blending::{Blending, Pixel};
 pub(crate) use depth::{DIGITS, N_RADIX, order_by_digit};
+pub(crate) use float_blending::FloatBlending;
+pub(crate) use integer_blending::IntegerBlending;

@@ -3,9 +3,7 @@
 
 use core::arch::asm;
 
-pub use crate::portable::rows::{
-    BlendConstants, Exponential, ROW_LEN, RowSplat, RowsWork, SLACK_PX, blend_rows_with, span, sqrt_above,
-};
+pub use crate::portable::rows::{BlendConstants, Exponential, ROW_LEN, RowSplat, RowsWork, SLACK_PX, span, sqrt_above};
 
 /// As [`blend_rows`](crate::portable::rows::blend_rows).
 // Not inlined: it takes all registers.

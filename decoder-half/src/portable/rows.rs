@@ -112,7 +112,7 @@ impl Exponential {
     }
 }
 
-/// [`blend_rows_with`] the exponential function of `constants`.
+/// As [`blend_rows_one_by_one`], four rows at once where there are vectors.
 // Not inlined: among everything that a frame needs its loops would not stay in registers.
 #[inline(never)]
 pub fn blend_rows(
@@ -124,7 +124,7 @@ pub fn blend_rows(
     #[cfg(any(target_arch = "x86_64", target_arch = "aarch64", target_family = "wasm"))]
     return super::rows_in_fours::blend_rows(splat, constants, rows, width);
     #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64", target_family = "wasm")))]
-    blend_rows_with(splat, constants, |x| constants.exponential.near(x), rows, width)
+    blend_rows_one_by_one(splat, constants, rows, width)
 }
 
 /// Blends a splat into rows of pixels, front to back.
@@ -132,19 +132,19 @@ pub fn blend_rows(
 /// Along a row alpha is a Gaussian of x, so the step from pixel to pixel is a factor, which itself changes by a constant
 /// factor: two multiplications replace an exponential. Over 16 pixels the rounding grows to about 1e-5 of alpha.
 ///
-/// * `exp_near`: eˣ. * `rows`: red, green, blue and transmittance of each pixel; the transmittance of a finished one
+/// * `rows`: red, green, blue and transmittance of each pixel; the transmittance of a finished one
 ///   is negated. * `width`: pixels of a row that are drawn, at most [`ROW_LEN`].
 ///
 /// # Budget
 /// Two exponentials a row, two multiplications and the blend a pixel.
 #[inline(always)]
-pub fn blend_rows_with(
+pub fn blend_rows_one_by_one(
     splat: &RowSplat,
     constants: &BlendConstants,
-    exp_near: impl Fn(f32) -> f32,
     rows: &mut [[[f32; 4]; ROW_LEN]],
     width: u16,
 ) -> RowsWork {
+    let exp_near = |x| constants.exponential.near(x);
     let mut work = RowsWork::default();
     let mut dy = splat.dy;
     for row in rows {

@@ -17,7 +17,7 @@ struct Beginnings {
     ratio: [f32; LANES],
 }
 
-/// As [`blend_rows_with`](super::rows::blend_rows_with) the exponential function of `constants`, bit for bit where variances are positive.
+/// As [`blend_rows_one_by_one`](super::rows::blend_rows_one_by_one), bit for bit where variances are positive.
 pub(super) fn blend_rows(
     splat: &RowSplat,
     constants: &BlendConstants,
@@ -114,7 +114,7 @@ fn sqrt_above(x: f32x4) -> f32x4 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::rows::blend_rows_with;
+    use super::super::rows::blend_rows_one_by_one;
     use super::*;
 
     const EXPONENTIAL: Exponential = Exponential {
@@ -181,9 +181,8 @@ mod tests {
             let mut expected = ours;
             for _ in 0..30 {
                 let splat = random.splat();
-                let near = |x| EXPONENTIAL.near(x);
                 let work = blend_rows(&splat, &CONSTANTS, &mut ours[..n_rows], width);
-                let one_by_one = blend_rows_with(&splat, &CONSTANTS, near, &mut expected[..n_rows], width);
+                let one_by_one = blend_rows_one_by_one(&splat, &CONSTANTS, &mut expected[..n_rows], width);
                 assert_eq!(work, one_by_one, "{splat:?}, {width} wide, {n_rows} rows");
                 // The sign and digits of what is no number are the processor's affair.
                 let bits = |x: f32| if x.is_nan() { u32::MAX } else { x.to_bits() };

@@ -10,12 +10,13 @@ use crate::difference::worse;
 use crate::frame::{draw, draw_in, info_for, to_core};
 
 const ANSWER: &str = "\
-Without an FPU a frame is drawn with functions of a table and integer heads. Functions of a table change a channel by a step where the reference arithmetic draws everything, and no tile visibly. Integer heads turn the
-longest needles by a tenth of a pixel, which is seen along their edges alone.";
+Without an FPU a frame is drawn with functions of a table, and heads and pixels in integers. Functions of a table and pixels in integers change a channel by a step where the reference arithmetic draws everything,
+and no tile visibly. Integer heads turn the longest needles by a tenth of a pixel, which is seen along their edges alone.";
 
 const ANALYSIS: &str = "\
 All pictures of the families above are drawn by the decoder in another arithmetic and compared with those of the reference arithmetic, in steps of
-8 bits. Functions right to 10⁻⁴ move every alpha by a part in 5,000, which is nothing in a sum. But a contribution at 1/255 may be
+8 bits. Functions right to 10⁻⁴ move every alpha by a part in 5,000, and pixels in integers by up to 0.2 %, either way: half a step
+where a layer is half opaque, and nothing in a sum. But a contribution at 1/255 may be
 drawn in one and not in the other: a step, and half a step of rounding on either side. So may the last layer of an opaque stack: 2.5
 steps, over whole tiles. That makes 4.5 steps, and 3.2 in a tile's mean.
 

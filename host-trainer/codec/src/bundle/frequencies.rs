@@ -9,7 +9,7 @@ use pocketsplat_format::entropy::FREQUENCY_TOTAL;
 ///
 /// Rounds the ideal frequencies, then moves single slots where they change the coded length least. At most
 /// [`FREQUENCY_TOTAL`] counts may be used. Cost: `O(n²)` at worst.
-pub(super) fn frequencies(counts: &[u64], always: Option<usize>) -> Vec<u32> {
+pub fn frequencies(counts: &[u64], always: Option<usize>) -> Vec<u32> {
     let total = counts.iter().sum::<u64>().max(1) as f64;
     let slots = u32::from(FREQUENCY_TOTAL);
     let ideal = |n: u64| n as f64 / total * f64::from(slots);

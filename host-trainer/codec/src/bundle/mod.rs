@@ -34,6 +34,7 @@ pub use channels::ChannelName;
 pub(crate) use channels::ContextWork;
 pub use decoded::{decoded_heads, decoded_scene, for_each_chunk, normalisation_of, shape_of};
 pub use error::WriteError;
+pub use frequencies::frequencies;
 pub use layout::{CodedScene, Written};
 pub use load::{LoadError, check, load};
 pub use mean_steps::mean_steps;
@@ -41,7 +42,7 @@ pub use order::check_pruning_rates;
 pub use pocketsplat_kernels::ops::rate::file_order::PRUNING_RATES;
 pub use quantise::check_steps;
 pub use size::{SizePart, SizeReport};
-pub use stream::PartBits;
+pub use stream::{PartBits, SlotList};
 pub use write::{ChannelCoding, WriteOptions, code, write};
 
 use pocketsplat_capture::camera::Camera;

@@ -64,7 +64,7 @@ impl AddAssign for PartBits {
 
 /// The slots of one stream, in the order in which a decoder meets them.
 #[derive(Clone, Debug, Default)]
-pub(super) struct SlotList {
+pub struct SlotList {
     slots: Vec<FixedSlot>,
     pub(super) bits: PartBits,
 }
@@ -76,8 +76,8 @@ impl SlotList {
         *self.bits.of(part) += f64::from(FREQUENCY_TOTAL).log2() - f64::from(slot.frequency).log2();
     }
 
-    /// Appends a slot without counting its bits.
-    pub(super) fn append<S>(&mut self, slot: &Slot<S>) {
+    /// Appends a slot without counting its bits; its frequency is at least 1.
+    pub fn append<S>(&mut self, slot: &Slot<S>) {
         debug_assert!(slot.frequency > 0, "a slot that cannot be coded");
         // What is certain changes no state and takes no bits.
         if slot.frequency < FREQUENCY_TOTAL {
@@ -91,8 +91,8 @@ impl SlotList {
         self.slots.iter().map(|slot| [slot.start, slot.frequency])
     }
 
-    /// The words of the stream in reading order, as bytes.
-    pub(super) fn into_bytes(self) -> Vec<u8> {
+    /// The words of the stream in reading order, as bytes: what [`AnsReader`](pocketsplat_format::entropy::AnsReader) reads.
+    pub fn into_bytes(self) -> Vec<u8> {
         let mut coder = AnsCoder::<u16, u32>::new();
         // A stack: what is read first is written last. Memory takes any number of words, and a slot without frequency,
         // which `push` rules out, would show when the bundle is read back.

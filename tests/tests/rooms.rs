@@ -67,9 +67,11 @@ const CRATES: [(&str, &[&str]); 15] = [
         &[
             "baseline",
             "packed",
+            "bytes",
             "octree",
             "voxels",
             "k_means",
+            "rotations",
             "tuning",
             "masks",
             "compact_3dgs",

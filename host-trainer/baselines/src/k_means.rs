@@ -30,9 +30,10 @@ pub(crate) fn k_means<const WIDTH: usize>(
     // A code among vectors that count for nothing would stay there.
     order.sort_by_key(|i| weights[*i] <= 0.0);
     let mut codes: Vec<_> = order[..n_codes].iter().map(|i| vectors[*i]).collect();
+    let free = vec![0.0; n_codes];
     for _ in 0..n_rounds {
         let mut sums = vec![([0.0; WIDTH], 0.0); n_codes];
-        for ((vector, weight), code) in vectors.iter().zip(weights).zip(nearest(vectors, &codes)) {
+        for ((vector, weight), code) in vectors.iter().zip(weights).zip(cheapest(vectors, &codes, &free)) {
             let (sum, total) = &mut sums[code];
             sum.iter_mut().zip(vector).for_each(|(sum, value)| *sum += weight * f64::from(*value));
             *total += weight;
@@ -42,44 +43,60 @@ pub(crate) fn k_means<const WIDTH: usize>(
             code.iter_mut().zip(sum).for_each(|(code, sum)| *code = (sum / total) as f32);
         }
     }
-    let nearest = nearest(vectors, &codes);
+    let nearest = cheapest(vectors, &codes, &free);
     (codes, nearest)
 }
 
-/// For each vector the first of the codes at the smallest distance.
-fn nearest<const WIDTH: usize>(vectors: &[[f32; WIDTH]], codes: &[[f32; WIDTH]]) -> Vec<usize> {
+/// For each vector v the first of the codes c with the least ‖v − c‖² + cost(c).
+///
+/// * `costs`: of each code, 0 or more.
+pub(crate) fn cheapest<const WIDTH: usize>(
+    vectors: &[[f32; WIDTH]],
+    codes: &[[f32; WIDTH]],
+    costs: &[f32],
+) -> Vec<usize> {
     // Lanes without a code are infinitely far away.
-    let lanes: Vec<[[f32; LANES]; WIDTH]> = codes
+    let lanes: Vec<_> = codes
         .chunks(LANES)
-        .map(|codes| {
-            std::array::from_fn(|i| std::array::from_fn(|lane| codes.get(lane).map_or(f32::INFINITY, |c| c[i])))
+        .zip(costs.chunks(LANES))
+        .map(|(codes, costs)| Lanes {
+            codes: std::array::from_fn(|i| {
+                std::array::from_fn(|lane| codes.get(lane).map_or(f32::INFINITY, |code| code[i]))
+            }),
+            costs: std::array::from_fn(|lane| costs.get(lane).copied().unwrap_or(f32::INFINITY)),
         })
         .collect();
     let level = Level::detect();
-    let mut nearest = vec![0; vectors.len()];
-    nearest.par_chunks_mut(BLOCK).zip(vectors.par_chunks(BLOCK)).for_each(|(nearest, vectors)| {
+    let mut cheapest = vec![0; vectors.len()];
+    cheapest.par_chunks_mut(BLOCK).zip(vectors.par_chunks(BLOCK)).for_each(|(cheapest, vectors)| {
         level.run(
             #[inline(always)]
-            || nearest.iter_mut().zip(vectors).for_each(|(nearest, vector)| *nearest = nearest_of(vector, &lanes)),
+            || cheapest.iter_mut().zip(vectors).for_each(|(cheapest, vector)| *cheapest = cheapest_of(vector, &lanes)),
         );
     });
-    nearest
+    cheapest
+}
+
+/// Codes that are compared at once, and what each costs.
+struct Lanes<const WIDTH: usize> {
+    codes: [[f32; LANES]; WIDTH],
+    costs: [f32; LANES],
 }
 
 #[inline(always)]
-fn nearest_of<const WIDTH: usize>(vector: &[f32; WIDTH], lanes: &[[[f32; LANES]; WIDTH]]) -> usize {
+fn cheapest_of<const WIDTH: usize>(vector: &[f32; WIDTH], lanes: &[Lanes<WIDTH>]) -> usize {
     let (mut best, mut at) = ([f32::INFINITY; LANES], [0; LANES]);
-    for (block, codes) in (0u32..).zip(lanes) {
-        let mut squared = [0.0; LANES];
-        for (value, codes) in vector.iter().zip(codes) {
+    for (block, lanes) in (0u32..).zip(lanes) {
+        let mut sum = lanes.costs;
+        for (value, codes) in vector.iter().zip(&lanes.codes) {
             for lane in 0..LANES {
                 let d = *value - codes[lane];
-                squared[lane] += d * d;
+                sum[lane] += d * d;
             }
         }
         for lane in 0..LANES {
-            at[lane] = if squared[lane] < best[lane] { block } else { at[lane] };
-            best[lane] = best[lane].min(squared[lane]);
+            at[lane] = if sum[lane] < best[lane] { block } else { at[lane] };
+            best[lane] = best[lane].min(sum[lane]);
         }
     }
     let code = |lane: usize| at[lane] as usize * LANES + lane;
@@ -113,6 +130,14 @@ mod tests {
         };
         let [start, once, often] = [0, 1, 10].map(after);
         assert!(once < 0.9 * start && often < 0.95 * once, "{start}, {once}, {often}");
+    }
+
+    #[test]
+    fn what_costs_more_is_taken_from_nearer() {
+        let (codes, vectors) = ([[0.0f32], [1.0]], [[0.4f32], [0.6], [0.8]]);
+        assert_eq!(cheapest(&vectors, &codes, &[0.0, 0.0]), [0, 1, 1]);
+        // (0.6 − 0)² = 0.36 against (0.6 − 1)² + 0.3 = 0.46; (0.8 − 0)² = 0.64 against 0.34.
+        assert_eq!(cheapest(&vectors, &codes, &[0.0, 0.3]), [0, 0, 1]);
     }
 
     #[test]

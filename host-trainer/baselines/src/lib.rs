@@ -1,16 +1,18 @@
 //! Published methods that compress explicit Gaussians, each as its paper describes it: what the project's own files are compared with.
 //!
-//! [`Baseline`] is what a method does, and each has a folder of its own: [`compact_3dgs`], whose `masks` are any method's,
-//! [`light_gaussian`] and [`self_organizing`]. They share the steps that come after training (`tuning`), k-means (`k_means`), and files:
-//! lattice places (`voxels`) in an `octree`, numbers in columns, deflated (`packed`).
+//! [`Baseline`] is what a method does, and each has a folder of its own: [`compact_3dgs`], [`light_gaussian`] and
+//! [`self_organizing`]. They share the steps that come after training (`tuning`), `masks` that are learned, k-means (`k_means`),
+//! `rotations` of one sign, and files: lattice places (`voxels`) in an `octree`, numbers as `bytes` or in columns, deflated (`packed`).
 
 mod baseline;
+mod bytes;
 pub mod compact_3dgs;
 mod k_means;
 pub mod light_gaussian;
 mod masks;
 mod octree;
 mod packed;
+mod rotations;
 pub mod self_organizing;
 #[cfg(test)]
 mod test_scenes;

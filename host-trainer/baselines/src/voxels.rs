@@ -47,6 +47,14 @@ impl Lattice {
     }
 }
 
+/// The places' indices along Morton's curve; those in one voxel in their order.
+pub(crate) fn along_the_curve(places: &[[f32; 3]]) -> Vec<usize> {
+    let lattice = Lattice::around(places);
+    let mut order: Vec<usize> = (0..places.len()).collect();
+    order.sort_by_cached_key(|i| lattice.voxel_of(places[*i]));
+    order
+}
+
 /// The bits of three numbers in turn, x lowest: places of neighbours in a file are neighbours in space (Morton 1966).
 pub(crate) fn morton(place: [u64; 3]) -> u64 {
     let bit = |i: u32, axis: u32| (place[axis as usize] >> i & 1) << (3 * i + axis);
@@ -93,5 +101,6 @@ mod tests {
         assert_eq!(lattice.middle_of(lattice.voxel_of(place)), place);
         assert_eq!(Lattice::around(&[]).voxel, 1.0);
         assert_eq!(morton([1, 0, 1]), 0b101);
+        assert_eq!(along_the_curve(&[[9.0, 9.0, 0.0], [0.0; 3], [9.0, 0.0, 0.0], [0.0; 3]]), [1, 3, 2, 0]);
     }
 }

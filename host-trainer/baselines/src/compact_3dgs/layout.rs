@@ -15,9 +15,10 @@ use half::f16;
 
 use super::grid::{self, CHANNELS};
 use super::network::N_WEIGHTS;
-use super::quantised::{Bytes, Quantised};
+use super::quantised::Quantised;
 use super::residual_codes::{CODES, ResidualCodes, STAGES};
 use crate::baseline::Unreadable;
+use crate::bytes::{Bytes, put_range, range};
 use crate::packed::{Body, Mark, opened, put_rows, sealed};
 
 const MARK: Mark = *b"PC31";
@@ -42,9 +43,8 @@ fn body(quantised: &Quantised) -> Vec<u8> {
         body.extend(u32::try_from(count).expect("fewer than 2³² Gaussians").to_le_bytes());
     }
     body.push(*log2_rows);
-    for range in [opacity_logits, rows] {
-        [range.least, range.step].iter().for_each(|number| body.extend(number.to_le_bytes()));
-    }
+    put_range(opacity_logits, &mut body);
+    put_range(rows, &mut body);
     put_rows(centres, &mut body);
     body.extend(&opacity_logits.bytes);
     put_codes(log_scales, &mut body);
@@ -85,17 +85,6 @@ fn of_body(bytes: &[u8]) -> Result<Quantised, Unreadable> {
     let weights = body.rows::<1>(N_WEIGHTS, "the network")?.into_iter().map(|[weight]| weight).collect();
     body.end()?;
     Ok(Quantised { centres, opacity_logits, log_scales, rotations, log2_rows, rows, weights })
-}
-
-fn range(body: &mut Body<'_>) -> Result<[f32; 2], Unreadable> {
-    let mut number = || Ok::<_, Unreadable>(f32::from_le_bytes(body.four("a range")?));
-    let [least, step] = [number()?, number()?];
-    if !(least.is_finite() && step >= 0.0 && (least + 255.0 * step).is_finite()) {
-        return Err(Unreadable(format!(
-            "a range begins at {least} in steps of {step}, needed: finite numbers, steps of 0 or more; write the file again"
-        )));
-    }
-    Ok([least, step])
 }
 
 fn codes<const WIDTH: usize>(

@@ -1,4 +1,4 @@
-//! Numbers of few bits: halves, bytes between the least and the greatest, sums of codes; and the codes' own steps.
+//! Numbers of few bits: halves, bytes, sums of codes; and the codes' own steps.
 
 use half::f16;
 use pocketsplat_gaussians::{Degree, Gaussians};
@@ -11,9 +11,11 @@ use super::grid::{self, CHANNELS};
 use super::learning::{Learned, gradients};
 use super::projection::harmonics;
 use super::residual_codes::ResidualCodes;
+use crate::bytes::Bytes;
 use crate::packed::halved;
+use crate::rotations::upright;
 use crate::tuning::{Tuning, picked};
-use crate::voxels::Lattice;
+use crate::voxels::along_the_curve;
 
 /// Steps in which codes and network make up for the rounding, beside a run of 30,000.
 const STEPS: u32 = 1_000;
@@ -26,38 +28,6 @@ const NETWORK_RATE: f64 = 3e-4;
 
 /// Numbers of the grid that are smaller become 0.
 const PRUNED: f32 = 0.1;
-
-/// Numbers as bytes b: least + b·step.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Bytes {
-    pub(super) least: f32,
-    pub(super) step: f32,
-    pub(super) bytes: Vec<u8>,
-}
-
-impl Bytes {
-    /// The nearest of 256 numbers from the least to the greatest, moved by less than a step so that 0 is one of them where it lies between.
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a cast saturates")]
-    pub(super) fn of(values: &[f32]) -> Self {
-        let least = values.iter().copied().fold(f32::INFINITY, f32::min);
-        let greatest = values.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-        if values.is_empty() {
-            return Self { least: 0.0, step: 1.0, bytes: Vec::new() };
-        }
-        let step = ((greatest - least) / 255.0).max(f32::MIN_POSITIVE);
-        let least = if least < 0.0 && greatest > 0.0 { (least / step).round() * step } else { least };
-        let bytes = values.iter().map(|value| ((value - least) / step).round() as u8).collect();
-        Self { least, step, bytes }
-    }
-
-    pub(super) fn value(&self, index: usize) -> f32 {
-        self.least + f32::from(self.bytes[index]) * self.step
-    }
-
-    fn values(&self) -> Vec<f32> {
-        (0..self.bytes.len()).map(|i| self.value(i)).collect()
-    }
-}
 
 /// N Gaussians as their file has them, along Morton's curve, and the field of their colours.
 #[derive(Clone, Debug, PartialEq)]
@@ -100,10 +70,7 @@ impl Quantised {
 /// Rounds everything; then codes and network learn, with all else as it was rounded.
 pub(super) fn quantised(tuning: &mut Tuning<'_>, learned: Learned, log2_rows: u8) -> Result<Quantised, TrainError> {
     let Learned { cloud, mut field } = learned;
-    let lattice = Lattice::around(&cloud.centres);
-    let mut order: Vec<usize> = (0..cloud.len()).collect();
-    order.sort_by_cached_key(|i| lattice.voxel_of(cloud.centres[*i]));
-    let mut cloud = picked(&cloud, order);
+    let mut cloud = picked(&cloud, along_the_curve(&cloud.centres));
     let centres: Vec<_> = cloud.centres.iter().map(|centre| centre.map(halved)).collect();
     cloud.centres = centres.iter().map(|centre| centre.map(f16::to_f32)).collect();
     let opacity_logits = Bytes::of(&cloud.opacity_logits);
@@ -140,34 +107,4 @@ pub(super) fn quantised(tuning: &mut Tuning<'_>, learned: Learned, log2_rows: u8
     let weights = learned.field.weights.iter().map(|weight| halved(*weight)).collect();
     let (log_scales, rotations) = (log_scales.rounded(), rotations.rounded());
     Ok(Quantised { centres, opacity_logits, log_scales, rotations, log2_rows, rows, weights })
-}
-
-/// The quaternion of length 1 and with w ≥ 0 that turns the same way.
-fn upright(rotation: &[f32; 4]) -> [f32; 4] {
-    let length = rotation.iter().map(|q| q * q).sum::<f32>().sqrt();
-    let factor = if rotation[0] < 0.0 { -1.0 } else { 1.0 } / length.max(f32::MIN_POSITIVE);
-    if length > 0.0 { rotation.map(|q| q * factor) } else { *rotation }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn bytes_have_zero_and_are_half_a_step_off_at_most_between_the_ends() {
-        let values = [-0.37, 0.0, 0.2, 1.0, 0.51];
-        let found = Bytes::of(&values);
-        assert!(found.value(1).abs() < 1e-7, "{}", found.value(1));
-        for (i, value) in values.iter().enumerate() {
-            assert!((found.value(i) - value).abs() < 1.01 * found.step, "{i}");
-        }
-        assert_eq!(Bytes::of(&[3.0, 3.0]).values(), [3.0, 3.0]);
-        assert_eq!(Bytes::of(&[]).values(), [0.0; 0]);
-    }
-
-    #[test]
-    fn rotations_of_either_sign_are_one() {
-        assert_eq!(upright(&[-2.0, 0.0, 0.0, 0.0]), [1.0, -0.0, -0.0, -0.0]);
-        assert_eq!(upright(&[0.0; 4]), [0.0; 4]);
-    }
 }

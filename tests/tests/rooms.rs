@@ -76,6 +76,7 @@ const CRATES: [(&str, &[&str]); 15] = [
             "masks",
             "compact_3dgs",
             "light_gaussian",
+            "rdo_gaussian",
             "self_organizing",
         ],
     ),

@@ -64,6 +64,11 @@ fn of_gaussian<R: Real>(stored: &Stored<R>, d: &Stored<R>) -> R {
     x + y + z + d.opacity_logit * (R::ONE + stored.opacity_logit.exp())
 }
 
+/// dL/dM of values that are on, where M multiplies them: Σ x·dL/dx.
+pub(crate) fn of_values<R: Real>(values: &[R], d_values: &[R]) -> R {
+    values.iter().zip(d_values).fold(R::ZERO, |sum, (value, d)| sum + *value * *d)
+}
+
 /// dL/dM `[N]` of the Gaussians themselves; 0 for those that did not reach the image.
 ///
 /// * `opacity_logits`: `[N]`.
@@ -105,6 +110,15 @@ mod tests {
             };
             assert_gradient("mask", &[1.0], &[of_gaussian(&stored, &found)], loss);
         }
+    }
+
+    #[test]
+    fn the_gradient_of_a_mask_of_values_agrees_with_finite_differences() {
+        let (values, at) = (random(1, 9), random(2, 9));
+        // L = ½·‖M·x − y‖².
+        let d: Vec<f64> = values.iter().zip(&at).map(|(x, y)| x - y).collect();
+        let loss = |m: &[f64]| values.iter().zip(&at).map(|(x, y)| 0.5 * (m[0] * x - y).powi(2)).sum::<f64>();
+        assert_gradient("mask", &[1.0], &[of_values(&values, &d)], loss);
     }
 
     #[test]

@@ -83,6 +83,17 @@ impl<'a> Tuning<'a> {
         u32::try_from(n).unwrap_or(u32::MAX)
     }
 
+    /// The rate of what has a place to go to in so few steps, as masks have: η·√(published steps / steps) in a shorter run.
+    ///
+    /// In t steps of Adam a steady push moves a value by η·t, gradients of either sign by about η·√t. What they are worth is unknown until
+    /// they are summed: were the first kept as published, the second would turn off by chance what is useful.
+    ///
+    /// * `published`: η.
+    pub(crate) fn hurried(&self, published: f64) -> f64 {
+        let shorter = PUBLISHED_ITERATIONS as f64 / f64::from(self.scene.config.iterations);
+        published * shorter.max(1.0).sqrt()
+    }
+
     /// A stage: `step` for one training view after the other, each once in a pass, until so many are done. Rates go on where the run
     /// and the stages before ended.
     ///

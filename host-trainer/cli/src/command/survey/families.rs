@@ -1,7 +1,7 @@
 //! What a survey has: the families of methods, each at its rates.
 
 use anyhow::{Context as _, Result};
-use pocketsplat_baselines::{Baseline, LightGaussian, SelfOrganizing, TrainedScene, Unreadable};
+use pocketsplat_baselines::{Baseline, LightGaussian, RdoGaussian, SelfOrganizing, TrainedScene, Unreadable};
 use pocketsplat_gaussians::{Degree, Gaussians};
 use pocketsplat_trainer::train::TrainError;
 
@@ -21,6 +21,8 @@ pub(super) fn compressors() -> Vec<Compressor> {
     vec![
         of("pruned=0.66", LightGaussian::default()),
         of("pruned=0.85", LightGaussian { pruned_share: 0.85 }),
+        of("lambda=0.0001", RdoGaussian::default()),
+        of("lambda=0.0005", RdoGaussian { rate_weight: 5e-4 }),
         of("harmonics", SelfOrganizing::default()),
         of("no harmonics", SelfOrganizing { degree: Degree::Zero, ..SelfOrganizing::default() }),
     ]

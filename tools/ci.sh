@@ -424,7 +424,8 @@ job_fuzz() {
   done
 }
 
-# Boards with the RAM that they get, KiB: as much as such a device has, and so little that anchors are decoded in each frame.
+# Boards with the RAM that they get, KiB: as much as such a device has, and so little that anchors are decoded in each frame. The one
+# without an FPU draws as firmware without one does.
 firmware_runs=("mps2-an386 256" "mps2-an386 76" "mps2-an500 1024" "virt 76")
 # The same of a bundle whose Gaussians are evaluated once.
 baked_runs=("mps2-an386 256" "virt 256")
@@ -446,7 +447,7 @@ job_bless-instructions() {
 }
 
 measure_firmware() { # CSV
-  local coder run runs options bundle out bytes frame
+  local coder run runs options bundle out bytes frame arithmetic orbit
   need_embedded_target
   need_target riscv32imac-unknown-none-elf
   need_command qemu-system-arm qemu-system-arm
@@ -465,10 +466,12 @@ measure_firmware() { # CSV
     program sample_bundle "${options[@]}" "$bundle"
     for run in "${runs[@]}"; do
       out=$target/firmware/$coder-${run/ /-}
+      arithmetic=ReferenceArithmetic orbit=()
+      [ "${run% *}" != virt ] || arithmetic=WithoutFpu orbit=(--without-fpu)
       # shellcheck disable=SC2086 # a board and its RAM
-      CARGO_TARGET_DIR=$embedded firmware-example/measure.sh "$bundle" $run "" "$out" >"$out.csv"
+      ARITHMETIC=$arithmetic CARGO_TARGET_DIR=$embedded firmware-example/measure.sh "$bundle" $run "" "$out" >"$out.csv"
       bytes=$(sed -n 's/.*scratch: \([0-9]*\) bytes.*/\1/p' "$out/log.txt")
-      program draw_orbit "$bundle" "$out/host" --bytes "$bytes" >/dev/null
+      program draw_orbit "$bundle" "$out/host" --bytes "$bytes" "${orbit[@]}" >/dev/null
       for frame in "$out"/frame*.ppm; do
         cmp "$frame" "$out/host/${frame##*/}" || fail "a frame of $run KiB differs from this machine's, sample $coder"
       done

@@ -20,7 +20,7 @@ use Stage::{Blend, Context, Decode, Heads, Output, Project, Sort};
 pub enum InstructionSet {
     /// Cortex-M4 and M7 with an FPU of single precision: `thumbv7em-none-eabihf`.
     CortexM,
-    /// RISC-V without an FPU: `riscv32imac-unknown-none-elf`.
+    /// RISC-V without an FPU, drawing with `WithoutFpu`: `riscv32imac-unknown-none-elf`.
     RiscV32,
 }
 

@@ -10,7 +10,7 @@ pub enum Processor {
     CortexM4,
     /// A Cortex-M7: frames of 250 million instructions.
     CortexM7,
-    /// RISC-V without an FPU (RV32IMAC): frames of 1,000 million instructions.
+    /// RISC-V without an FPU (RV32IMAC), drawing with `WithoutFpu`: frames of 250 million instructions.
     Riscv32imac,
 }
 
@@ -20,7 +20,7 @@ impl Processor {
         match self {
             Self::CortexM4 => 80_000_000,
             Self::CortexM7 => 250_000_000,
-            Self::Riscv32imac => 1_000_000_000,
+            Self::Riscv32imac => 250_000_000,
         }
     }
 

@@ -7,7 +7,7 @@ use anyhow::Context as _;
 use clap::Parser;
 use pocketsplat_codec::bundle;
 use pocketsplat_codec::render::decoder::image_of;
-use pocketsplat_core::{Budget, Bundle, Decoder, Overflow, Plan};
+use pocketsplat_core::{Arithmetic, Budget, Bundle, Decoder, Overflow, Plan, ReferenceArithmetic, WithoutFpu};
 
 /// Draws an orbit of a bundle's preview, as PPM files `frame0.ppm` and so on.
 #[derive(Parser)]
@@ -25,6 +25,9 @@ struct Args {
     /// Frames of the orbit.
     #[arg(long, default_value_t = 4)]
     frames: u8,
+    /// Draw with `WithoutFpu`.
+    #[arg(long)]
+    without_fpu: bool,
 }
 
 fn size(text: &str) -> Result<[u16; 2], String> {
@@ -34,6 +37,10 @@ fn size(text: &str) -> Result<[u16; 2], String> {
 
 fn main() -> anyhow::Result<()> {
     let args = Args::parse();
+    if args.without_fpu { draw::<WithoutFpu>(&args) } else { draw::<ReferenceArithmetic>(&args) }
+}
+
+fn draw<A: Arithmetic>(args: &Args) -> anyhow::Result<()> {
     let bytes = bundle::load(&args.bundle)?;
     let bundle = Bundle::parse(&bytes)?;
     let preview = bundle.header().preview;
@@ -42,7 +49,7 @@ fn main() -> anyhow::Result<()> {
     let budget = Budget::for_frame(width_px, height_px).in_bytes(args.bytes);
     let plan = Plan::new(&bundle, &budget).or_else(|_| Plan::new(&bundle, &budget.with_overflow(Overflow::Slabs)))?;
     let mut scratch = vec![0; plan.scratch_len()];
-    let mut decoder = Decoder::bind(&bundle, plan, &mut scratch)?;
+    let mut decoder = Decoder::bind_in::<A>(&bundle, plan, &mut scratch)?;
     fs::create_dir_all(&args.out).with_context(|| format!("cannot make {}", args.out.display()))?;
     for frame in 0..args.frames {
         let camera = preview.orbited(std::f32::consts::TAU * f32::from(frame) / f32::from(args.frames));

@@ -65,8 +65,8 @@ pub struct Measured {
     pub psnr_db: f64,
     /// Time of a frame on this machine, s.
     pub host_s: f64,
-    /// Instructions of a frame on each target, of the views that [count](Sight::counts); predicted ones are of the reference arithmetic
-    /// alone, to which the costs were fitted.
+    /// Instructions of a frame on each target, of the views that [count](Sight::counts); predicted ones are of the
+    /// [arithmetic whose costs were counted](counted_arithmetic) alone.
     pub instructions: Vec<Option<Instructions>>,
     /// Scratch memory of the plan, bytes.
     pub scratch_bytes: usize,
@@ -147,9 +147,18 @@ fn measure_in<A: Arithmetic>(of: &Measurement<'_, '_>) -> Result<Measured, Decod
             }
         }
     }
-    if setting.arithmetic == ArithmeticChoice::Reference {
-        measured.instructions =
-            predicted.into_iter().map(|stages| Some(Instructions { stages, counted: false })).collect();
-    }
+    let of_target = |(stages, target): ([f64; Stage::ALL.len()], &Processor)| {
+        let is_counted = setting.arithmetic == counted_arithmetic(*target);
+        is_counted.then_some(Instructions { stages, counted: false })
+    };
+    measured.instructions = predicted.into_iter().zip(targets).map(of_target).collect();
     Ok(measured)
+}
+
+/// What frames were drawn with whose instructions were counted: what firmware for the processor should take.
+fn counted_arithmetic(target: Processor) -> ArithmeticChoice {
+    match target {
+        Processor::CortexM4 | Processor::CortexM7 => ArithmeticChoice::Reference,
+        Processor::Riscv32imac => ArithmeticChoice::WithoutFpu,
+    }
 }

@@ -89,8 +89,12 @@ mod tests {
     use pocketsplat_kernels::finite_difference::{assert_gradient, random};
     use pocketsplat_kernels::ops::heads::neural_gaussians::Gaussian;
     use pocketsplat_kernels::ops::image::explicit_gaussians::{backward, shape};
+    use pocketsplat_trainer::explicit::CloudConfig;
 
     use super::*;
+    use crate::baseline::TrainedScene;
+    use crate::test_scenes::{capture_of, gaussians};
+    use crate::tuning::Tuning;
 
     #[test]
     fn the_gradient_of_a_mask_agrees_with_finite_differences() {
@@ -131,5 +135,26 @@ mod tests {
         masks.retain(&[false, true]);
         assert_eq!((masks.are_on(), masks.moments.first.len()), (vec![true], 1));
         assert!(masks.len() == 1 && masks.logits[0] > 3.0);
+    }
+
+    #[test]
+    #[expect(clippy::cast_possible_truncation, reason = "any numbers")]
+    fn in_runs_of_any_length_what_only_costs_goes_and_chance_turns_nothing_off() {
+        let gaussians = gaussians(1);
+        let capture = capture_of(&gaussians, 1);
+        for iterations in [300, 2_000, 30_000, 60_000] {
+            let config = CloudConfig { iterations, ..CloudConfig::default() };
+            let scene = TrainedScene { gaussians: &gaussians, capture: &capture, config: &config };
+            let tuning = Tuning::new(&scene).unwrap();
+            let (rate, n_steps) = (tuning.hurried(1e-2), tuning.length(13_000) as usize);
+            let mut masks = Masks::new(40);
+            // Half of them pay in some steps what they cost in others.
+            for d in random(9, 20 * n_steps).chunks_exact(20) {
+                let d: Vec<f32> = d.iter().map(|d| *d as f32).chain([1e-3; 20]).collect();
+                masks.step(rate, &d);
+            }
+            let on = masks.are_on();
+            assert!(on[..20].iter().all(|on| *on) && !on[20..].contains(&true), "{iterations}: {on:?}");
+        }
     }
 }

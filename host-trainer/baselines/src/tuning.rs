@@ -83,10 +83,10 @@ impl<'a> Tuning<'a> {
         u32::try_from(n).unwrap_or(u32::MAX)
     }
 
-    /// The rate of what has a place to go to in so few steps, as masks have: η·√(published steps / steps) in a shorter run.
+    /// The rate of values that have some way to go, as masks have: η·√(published steps / steps) in a run that is shorter, else η.
     ///
-    /// In t steps of Adam a steady push moves a value by η·t, gradients of either sign by about η·√t. What they are worth is unknown until
-    /// they are summed: were the first kept as published, the second would turn off by chance what is useful.
+    /// In t steps of Adam a steady push moves a value by η·t, and gradients of either sign by about η·√t. The root leaves the second as it
+    /// was published: with as much as would keep the first, chance turns off what is useful.
     ///
     /// * `published`: η.
     pub(crate) fn hurried(&self, published: f64) -> f64 {

@@ -20,7 +20,7 @@ const FIELD_STEPS: u32 = 2_000;
 /// Steps in which everything does.
 const STEPS: u32 = 13_000;
 
-/// Rate of the field and of the masks.
+/// Rate of the field, and of the masks in a run of 30,000.
 const RATE: f64 = 1e-2;
 
 /// What the field's rate is multiplied by, and the shares of all steps after which it is.
@@ -56,6 +56,7 @@ fn rate_at(share: f64) -> f64 {
 
 /// The field learns the colours; then masks learn too, and what they turn off goes at once.
 pub(super) fn learned(tuning: &mut Tuning<'_>, log2_rows: u8, mask_weight: f64) -> Result<Learned, TrainError> {
+    let mask_rate = tuning.hurried(RATE);
     let n_all = f64::from(tuning.length(FIELD_STEPS) + tuning.length(STEPS)).max(1.0);
     let cloud = Cloud { degree: Degree::Zero, ..tuning.cloud() };
     let field = Field::new(log2_rows, &mut tuning.random());
@@ -86,7 +87,7 @@ pub(super) fn learned(tuning: &mut Tuning<'_>, log2_rows: u8, mask_weight: f64) 
             #[expect(clippy::cast_possible_truncation, reason = "single precision")]
             let d_cost = (mask_weight / masks.len() as f64) as f32;
             d_masks.iter_mut().for_each(|d| *d += d_cost);
-            masks.step(RATE, &d_masks);
+            masks.step(mask_rate, &d_masks);
             let on = masks.are_on();
             if on.contains(&false) {
                 learned.cloud = picked(&learned.cloud, (0..on.len()).filter(|i| on[*i]));
@@ -101,6 +102,8 @@ pub(super) fn learned(tuning: &mut Tuning<'_>, log2_rows: u8, mask_weight: f64) 
 
 #[cfg(test)]
 mod tests {
+    use pocketsplat_trainer::explicit::CloudConfig;
+
     use super::*;
     use crate::baseline::TrainedScene;
     use crate::test_scenes::{capture_of, gaussians, short_config};
@@ -135,6 +138,18 @@ mod tests {
             })
             .unwrap();
         assert!(losses[1] < 0.3 * losses[0], "{losses:?}");
+    }
+
+    #[test]
+    fn in_a_short_run_what_does_not_show_goes_and_what_shows_stays() {
+        let mut before = gaussians(100);
+        before.opacity_logits.iter_mut().step_by(2).for_each(|logit| *logit = -9.0);
+        let capture = capture_of(&before, 20);
+        let config = CloudConfig { iterations: 600, ..CloudConfig::default() };
+        let scene = TrainedScene { gaussians: &before, capture: &capture, config: &config };
+        let found = learned(&mut Tuning::new(&scene).unwrap(), 8, 4e-3).unwrap();
+        let faint = found.cloud.opacity_logits.iter().filter(|logit| **logit < -6.0).count();
+        assert!(faint == 0 && found.cloud.len() >= 48, "{} are left, {faint} of them faint", found.cloud.len());
     }
 
     #[test]

@@ -12,7 +12,8 @@
 //!
 //! * **From a trained scene.** The paper trains from the first iteration on. Here the field alone learns for 2,000 steps, then everything for
 //!   13,000: as many as a run has after its last densification. Rates of Gaussians go on where training ended.
-//! * **Masks** begin at σ(m) = ½. What is off has no gradient but that of its cost, so it goes at once.
+//! * **Masks** begin at σ(m) = ½. What is off has no gradient but that of its cost, so it goes at once. In shorter runs their rate is larger
+//!   (`tuning`). The field's is not: it learns less by a larger one.
 //! * **Synthetic scenes** have the rates of real ones too.
 //! * **The field's places** are contracted outside of the ball of cameras. Places learn nothing by way of their colours.
 //! * **Directions** go into the network as three numbers, and 1 stands in for all biases. Harmonics hold no more than degree 3 of its answer.

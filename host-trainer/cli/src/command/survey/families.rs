@@ -1,7 +1,9 @@
 //! What a survey has: the families of methods, each at its rates.
 
 use anyhow::{Context as _, Result};
-use pocketsplat_baselines::{Baseline, LightGaussian, RdoGaussian, SelfOrganizing, TrainedScene, Unreadable};
+use pocketsplat_baselines::{
+    Baseline, Compact3dgs, LightGaussian, RdoGaussian, SelfOrganizing, TrainedScene, Unreadable,
+};
 use pocketsplat_gaussians::{Degree, Gaussians};
 use pocketsplat_trainer::train::TrainError;
 
@@ -25,6 +27,8 @@ pub(super) fn compressors() -> Vec<Compressor> {
         of("lambda=0.0005", RdoGaussian { rate_weight: 5e-4 }),
         of("harmonics", SelfOrganizing::default()),
         of("no harmonics", SelfOrganizing { degree: Degree::Zero, ..SelfOrganizing::default() }),
+        of("mask=0.0005", Compact3dgs::default()),
+        of("mask=0.004", Compact3dgs::SYNTHETIC),
     ]
 }
 

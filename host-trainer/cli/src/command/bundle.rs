@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Background, Capture, View};
-use pocketsplat_codec::bundle::{for_each_chunk, normalisation_of, protocol_of};
+use pocketsplat_codec::bundle::{normalisation_of, protocol_of};
 use pocketsplat_files::FileKind;
 use pocketsplat_format::Bundle;
 use pocketsplat_format::bundle::crc32;
@@ -142,15 +142,5 @@ impl BundleFile {
         let centre_world = view.camera.centre_world() / capture.normalisation.scale + capture.normalisation.centre;
         let translation = -(view.camera.rotation * own.point(centre_world));
         Camera { translation, ..view.camera.clone() }
-    }
-
-    /// Entropy-decodes every chunk once, as a decoder that keeps its anchors in memory would; returns the number of Gaussians
-    /// that there are to draw: the offsets that no mask takes away.
-    pub(crate) fn decode_all(&self, bundle: &Bundle<'_>) -> Result<u64> {
-        let mut n_drawn = 0;
-        for_each_chunk(bundle, |_, sites, _| {
-            n_drawn += sites.iter().map(|site| u64::from(site.mask.count_ones())).sum::<u64>();
-        })?;
-        Ok(n_drawn)
     }
 }

@@ -8,7 +8,7 @@ use anyhow::Result;
 use pocketsplat_baselines::TrainedScene;
 use pocketsplat_capture::dataset::{Capture, Split};
 use pocketsplat_format::bundle::crc32;
-use pocketsplat_gaussians::{Gaussians, Notes};
+use pocketsplat_gaussians::{Format, Gaussians, Notes};
 use pocketsplat_trainer::explicit::frame;
 use serde::{Deserialize, Serialize};
 
@@ -16,7 +16,7 @@ use super::families::{Compressor, compressors};
 use super::point::{Figures, Point, keep_figures, keep_picture, path_of, read, with_ending};
 use crate::command::capture::{CaptureArgs, views_of};
 use crate::command::eval::explicit::measure;
-use crate::command::eval::{Evaluation, Measurements, lpips_of};
+use crate::command::eval::{Evaluation, Measurements, lpips_of, timed};
 use crate::command::gaussians::GaussiansFile;
 use crate::command::outputs::keep;
 use crate::command::train;
@@ -71,8 +71,10 @@ pub(super) fn points(
     if !train::explicit::trained(config, capture, stop)? {
         return Ok(false);
     }
-    let file = GaussiansFile::read(&config.output)?;
-    let crc = crc32(&std::fs::read(&config.output)?);
+    let bytes = std::fs::read(&config.output)?;
+    let ((gaussians, notes), read_s) = timed(|| Ok(Format::Ply.read(&bytes, None)?))?;
+    let file = GaussiansFile { n_bytes: bytes.len(), gaussians, notes, read_s };
+    let crc = crc32(&bytes);
     let RunResult { train_s } = read(&config.output.with_extension("run").join("result.json"))?;
     let mut gaussians = file.gaussians.clone();
     frame::to_normalised(&mut gaussians, &frame::of_file(&file.notes.frame, &capture.normalisation));
@@ -112,9 +114,7 @@ impl Start<'_> {
         let bytes = compressor.file_of(&scene)?;
         let train_s = self.train_s + started.elapsed().as_secs_f64();
         keep(&file, &bytes)?;
-        let started = Instant::now();
-        let gaussians = compressor.gaussians_of(&bytes)?;
-        let read_s = started.elapsed().as_secs_f64();
+        let (gaussians, read_s) = timed(|| compressor.gaussians_of(&bytes))?;
         let protocol = Protocol::of(capture, &config.capture);
         let notes = GaussiansFile::notes_of(Some(&protocol), capture.train.iter().map(|view| &view.camera))?;
         let notes = Notes { frame: frame::of_normalised(&capture.normalisation), ..notes };

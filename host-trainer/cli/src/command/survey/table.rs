@@ -32,6 +32,7 @@ struct Line {
     /// Memory in which a bundle's frames are drawn.
     ram_bytes: Option<usize>,
     decode_s: Option<f64>,
+    /// From the bytes of the file to what every view is drawn of, in memory: Gaussians, or anchors and heads. The fastest of a few times.
     train_s: Option<f64>,
     program: String,
 }

@@ -31,7 +31,7 @@ use crate::say::say;
 use in_folder::IN_RUN_AND_ON_COMMAND_LINE;
 pub(crate) use in_folder::{Attempt, GoesOn, Start, begun_or_new, train_in};
 use loading::source_of;
-pub(crate) use loading::{clear_photographs, decide, load};
+pub(crate) use loading::{clear_photographs, decide, keep_points, load};
 pub(crate) use result::{HeldOut, TrainResult};
 pub(crate) use run_status::RunStatus;
 use summary::Summary;

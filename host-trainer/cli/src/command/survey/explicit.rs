@@ -66,6 +66,8 @@ pub(super) fn points(
     say!("{METHOD}");
     let source = CaptureArgs { dataset: config.dataset.clone(), options: config.capture.clone() };
     let capture = &source.load_to_train(config.gaussians.seed, Some(folder), &[folder])?;
+    // The methods of anchors have the same ones.
+    train::keep_points(capture, folder);
     let photograph = views_of(capture, Split::Test)?[0].photograph()?;
     keep_picture(folder, "photograph", || Ok(photograph.image.clone()))?;
     if !train::explicit::trained(config, capture, stop)? {

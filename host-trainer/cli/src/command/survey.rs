@@ -24,6 +24,7 @@ use crate::config::{ExplicitRunConfig, Preset, absolute};
 use crate::say::say;
 use families::ANCHORS;
 use point::Point;
+use table::{Line, Table};
 
 /// Train published methods on one capture, and compare them.
 ///
@@ -76,9 +77,10 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     Outputs::folder(&folder.join(point::PICTURES))?;
     let outputs = args.published.iter().fold(args.overwrite.outputs(), |outputs, path| outputs.reading(path));
     let mut outputs = outputs.reading_folder(&config.dataset);
-    let table = outputs.file(&folder.join("survey.csv"), table_file(&["Method,"]))?;
+    let csv = outputs.file(&folder.join("survey.csv"), table_file(&[table::BEGINNING]))?;
     let figure = outputs.file(&folder.join("survey.svg"), FIGURE)?;
-    let mut survey = Survey { table, figure, published, points: Vec::new() };
+    let table = Table::begun(csv.path(), &published)?;
+    let mut survey = Survey { csv, figure, table };
     let (stop, what) = (stop::flag()?, Measurements { lpips: lpips.as_ref(), ..Measurements::default() });
     let is_done = explicit::points(&config, &folder, &what, &stop, |point| survey.add(point))?
         && anchors::points(&config, &folder, lpips.as_ref(), |point| survey.add(point))?;
@@ -87,7 +89,7 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
         return Ok(ExitCode::from(stop::INTERRUPTED));
     }
     train::clear_photographs(&folder, ExitCode::SUCCESS);
-    output::print_text(&table::text(&survey.points, &survey.published))?;
+    output::print_text(&survey.table.text())?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -110,19 +112,18 @@ fn configured(args: &Args, folder: &Path) -> Result<ExplicitRunConfig> {
     Ok(config)
 }
 
-/// What is there, and where it is tabulated.
+/// What is there, and where it is written.
 struct Survey {
-    table: Output,
+    csv: Output,
     figure: Output,
-    published: Vec<PublishedRow>,
-    points: Vec<Point>,
+    table: Table,
 }
 
 impl Survey {
     /// Adds a point, and writes table and figure anew.
     fn add(&mut self, point: Point) -> Result<()> {
-        self.points.push(point);
-        self.table.write(&table::csv(&self.points, &self.published)?)?;
-        Ok(self.figure.write(table::figure(&self.points)?.as_bytes())?)
+        self.table.add(Line::of(&point));
+        self.csv.write(&self.table.csv()?)?;
+        Ok(self.figure.write(self.table.figure()?.as_bytes())?)
     }
 }

@@ -62,6 +62,13 @@ fn a_survey_that_is_killed_goes_on_and_ends_in_the_same_table() {
     assert_eq!(ply(), before, "what is done is not done again");
     assert_eq!(table(&killed), rows);
 
+    // A command that ends before the end leaves the table whole.
+    let kept = killed.join("sog-harmonics.json");
+    fs::write(&kept, "{}").unwrap();
+    let said = fails(survey(&killed).arg("--published").arg(&published));
+    assert!(said.contains("has no figures of a run"), "{said}");
+    assert_eq!(table(&killed), rows);
+
     let said = fails(survey(&killed).args(["--seed", "7"]));
     assert!(said.contains("`gaussians.seed` is 42 in the run, 7 on the command line"), "{said}");
     assert!(said.contains("choose another --output"), "{said}");

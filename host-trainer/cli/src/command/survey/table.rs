@@ -1,9 +1,10 @@
 //! The table of a survey, and its figure.
 
 use std::fmt::Write as _;
+use std::path::Path;
 
-use anyhow::Result;
-use serde::Serialize;
+use anyhow::{Context as _, Result};
+use serde::{Deserialize, Serialize};
 
 use super::point::Point;
 use crate::command::output;
@@ -12,8 +13,8 @@ use crate::command::tables::published::PublishedRow;
 use crate::plot::{Named, ResultRow, SizeAxis, gathered, rate_distortion_svg};
 
 /// One line: a method at one rate, measured here or published.
-#[derive(Serialize)]
-struct Line {
+#[derive(Serialize, Deserialize)]
+pub(super) struct Line {
     #[serde(rename = "Method")]
     method: String,
     #[serde(rename = "Submethod")]
@@ -31,14 +32,21 @@ struct Line {
     n_anchors: Option<u32>,
     /// Memory in which a bundle's frames are drawn.
     ram_bytes: Option<usize>,
-    decode_s: Option<f64>,
     /// From the bytes of the file to what every view is drawn of, in memory: Gaussians, or anchors and heads. The fastest of a few times.
+    decode_s: Option<f64>,
+    /// Of training; a method that compresses has that of its scene on top.
     train_s: Option<f64>,
     program: String,
 }
 
+/// How a table begins.
+pub(super) const BEGINNING: &str = "Method,";
+
+/// Ends the name of a method whose line is published.
+const PUBLISHED: &str = " (published)";
+
 impl Line {
-    fn of(point: &Point) -> Self {
+    pub(super) fn of(point: &Point) -> Self {
         let Point { method, rate, figures } = point;
         let run = &figures.evaluation;
         Self {
@@ -57,9 +65,23 @@ impl Line {
         }
     }
 
+    /// Its method, and a point of that method's curve.
+    fn result(&self) -> Option<(String, ResultRow)> {
+        let row = ResultRow {
+            submethod: self.submethod.clone(),
+            psnr_db: self.psnr_db,
+            ssim: self.ssim,
+            lpips: self.lpips,
+            size_bytes: self.size_bytes?,
+            n_gaussians: self.n_gaussians,
+            program: Some(self.program.clone()),
+        };
+        Some((self.method.clone(), row))
+    }
+
     fn published(row: &PublishedRow) -> Self {
         Self {
-            method: format!("{} (published)", row.method),
+            method: format!("{}{PUBLISHED}", row.method),
             submethod: row.submethod.clone(),
             psnr_db: row.psnr_db,
             ssim: row.ssim,
@@ -75,25 +97,59 @@ impl Line {
     }
 }
 
-/// PSNR over size, a curve for each method that was trained here: published images have other sizes.
-pub(super) fn figure(points: &[Point]) -> Result<String> {
-    let row = |point: &Point| (point.method.to_owned(), point.figures.evaluation.result_row(point.rate.to_owned()));
-    let curves: Vec<Named<Vec<ResultRow>>> = gathered(points.iter().map(row));
-    rate_distortion_svg(&curves, SizeAxis::Logarithmic)
+/// The lines of a survey.
+pub(super) struct Table {
+    /// What was measured, in the order of the methods.
+    measured: Vec<Line>,
+    /// What an earlier command measured, and this one has not reached.
+    earlier: Vec<Line>,
+    published: Vec<Line>,
 }
 
-/// What was measured, and then what is published.
-fn lines(points: &[Point], published: &[PublishedRow]) -> impl Iterator<Item = Line> {
-    points.iter().map(Line::of).chain(published.iter().map(Line::published))
+impl Table {
+    /// What the table at `path` has of an earlier command, and what is published.
+    pub(super) fn begun(path: &Path, published: &[PublishedRow]) -> Result<Self> {
+        let bytes = if path.is_file() { std::fs::read(path)? } else { Vec::new() };
+        // A file of another kind is there to be replaced.
+        let bytes = if bytes.starts_with(BEGINNING.as_bytes()) { &bytes[..] } else { &[] };
+        let earlier: Result<Vec<Line>, _> = csv::Reader::from_reader(bytes).deserialize().collect();
+        let mut earlier = earlier.with_context(|| {
+            format!("{} has no lines of a survey; move it away, and give the command again", path.display())
+        })?;
+        earlier.retain(|line| !line.method.ends_with(PUBLISHED));
+        Ok(Self { earlier, published: published.iter().map(Line::published).collect(), measured: Vec::new() })
+    }
+
+    /// Adds what was measured, in place of what an earlier command measured of the same.
+    pub(super) fn add(&mut self, line: Line) {
+        self.earlier.retain(|earlier| (&earlier.method, &earlier.submethod) != (&line.method, &line.submethod));
+        self.measured.push(line);
+    }
+
+    /// What was measured here, now or earlier.
+    fn ours(&self) -> impl Iterator<Item = &Line> {
+        self.measured.iter().chain(&self.earlier)
+    }
+
+    /// As CSV.
+    pub(super) fn csv(&self) -> Result<Vec<u8>> {
+        output::csv(self.ours().chain(&self.published))
+    }
+
+    /// PSNR over size, a curve for each method that was trained here: published images have other sizes.
+    pub(super) fn figure(&self) -> Result<String> {
+        let curves: Vec<Named<Vec<ResultRow>>> = gathered(self.ours().filter_map(Line::result));
+        rate_distortion_svg(&curves, SizeAxis::Logarithmic)
+    }
+
+    /// For people.
+    pub(super) fn text(&self) -> String {
+        text(self.ours().chain(&self.published))
+    }
 }
 
-/// The table as CSV.
-pub(super) fn csv(points: &[Point], published: &[PublishedRow]) -> Result<Vec<u8>> {
-    output::csv(lines(points, published))
-}
-
-/// The table for people.
-pub(super) fn text(points: &[Point], published: &[PublishedRow]) -> String {
+/// A line each, in columns.
+fn text<'a>(lines: impl Iterator<Item = &'a Line>) -> String {
     let heads = [
         "method",
         "rate",
@@ -109,10 +165,10 @@ pub(super) fn text(points: &[Point], published: &[PublishedRow]) -> String {
     ];
     let or_dash = |text: Option<String>| text.unwrap_or_else(|| "–".to_owned());
     let fixed = |value: Option<f64>, digits: usize| or_dash(value.map(|value| format!("{value:.digits$}")));
-    let cells = |line: Line| {
+    let cells = |line: &Line| {
         [
-            line.method,
-            line.submethod,
+            line.method.clone(),
+            line.submethod.clone(),
             format!("{:.2}", line.psnr_db),
             fixed(line.ssim, 3),
             fixed(line.lpips, 3),
@@ -124,8 +180,7 @@ pub(super) fn text(points: &[Point], published: &[PublishedRow]) -> String {
             fixed(line.train_s, 0),
         ]
     };
-    let rows: Vec<[String; 11]> =
-        std::iter::once(heads.map(str::to_owned)).chain(lines(points, published).map(cells)).collect();
+    let rows: Vec<[String; 11]> = std::iter::once(heads.map(str::to_owned)).chain(lines.map(cells)).collect();
     let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
     let widths: [usize; 11] = std::array::from_fn(width);
     let mut text = String::new();

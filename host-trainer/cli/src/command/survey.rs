@@ -62,8 +62,11 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     let folder = absolute(&args.output)?;
     let config = configured(args, &folder)?;
     // All that may be refused, before the first is trained for an hour.
+    point::refuse_other_program(&config.output)?;
     for of in &ANCHORS {
-        anchors::configured(of, &folder, &config).with_context(|| format!("{} is no run", of.method))?;
+        let configured = anchors::configured(of, &folder, &config);
+        let (config, _) = configured.with_context(|| format!("{} is no run", of.method))?;
+        point::refuse_other_program(&config.output)?;
     }
     let name = config.dataset.file_name().unwrap_or_default().to_string_lossy();
     let published = args.published.as_deref().map(PublishedRow::read_all).transpose()?.unwrap_or_default();

@@ -64,10 +64,29 @@ fn a_survey_that_is_killed_goes_on_and_ends_in_the_same_table() {
 
     // A command that ends before the end leaves the table whole.
     let kept = killed.join("sog-harmonics.json");
+    let figures = fs::read_to_string(&kept).unwrap();
     fs::write(&kept, "{}").unwrap();
     let said = fails(survey(&killed).arg("--published").arg(&published));
     assert!(said.contains("has no figures of a run"), "{said}");
     assert_eq!(table(&killed), rows);
+
+    // Figures and runs of a program that trains otherwise are none of ours.
+    let program: Vec<&str> = rows[1].last().unwrap().split(' ').take(2).collect();
+    let by_another = |text: &str| text.replace(&program.join(" "), "0.0.9 r1");
+    fs::write(&kept, by_another(&figures)).unwrap();
+    let said = succeeds(survey(&killed).arg("--published").arg(&published));
+    assert!(said.contains("the figures are of pocketsplat 0.0.9 r1"), "{said}");
+    assert_eq!(table(&killed), rows);
+    assert!(!fs::read_to_string(&kept).unwrap().contains("0.0.9"));
+    for run in ["3dgs.run", "contextgs-lambda=0.004.run"] {
+        let result = killed.join(run).join("result.json");
+        let ours = fs::read_to_string(&result).unwrap();
+        fs::write(&result, by_another(&ours)).unwrap();
+        let said = fails(&mut survey(&killed));
+        assert!(said.contains("was trained by pocketsplat 0.0.9 r1, and this is"), "{said}");
+        assert!(said.contains("choose another --output, or go on with that program"), "{said}");
+        fs::write(&result, ours).unwrap();
+    }
 
     let said = fails(survey(&killed).args(["--seed", "7"]));
     assert!(said.contains("`gaussians.seed` is 42 in the run, 7 on the command line"), "{said}");

@@ -2,13 +2,12 @@
 
 use std::path::Path;
 
-use anyhow::{Context as _, Result};
+use anyhow::Result;
 use pocketsplat_codec::render::decoder::core_image;
 use pocketsplat_metrics::Lpips;
 
-use super::explicit::RunResult;
 use super::families::{ANCHORS, Anchors, SHARED};
-use super::point::{Figures, Point, keep_picture, path_of, read, with_ending};
+use super::point::{Figures, Point, RunResult, keep_picture, path_of, with_ending};
 use crate::command::bundle::BundleFile;
 use crate::command::devices::DeviceChoice;
 use crate::command::loaded::LoadedCapture;
@@ -56,8 +55,7 @@ pub(super) fn points(
         keep_picture(folder, of.method, || {
             Ok(core_image(&bundle, &file.camera(&bundle, capture, &capture.test[0]))?.image)
         })?;
-        let result = config.output.with_extension("run").join("result.json");
-        let RunResult { train_s } = read(&result).context("the run does not say what it took")?;
+        let RunResult { train_s, .. } = RunResult::of(&config.output)?;
         done(Point { method: of.method, rate: of.rate, figures: Figures { train_s, evaluation } })?;
     }
     Ok(true)

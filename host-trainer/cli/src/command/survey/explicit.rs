@@ -13,7 +13,7 @@ use pocketsplat_trainer::explicit::frame;
 use serde::{Deserialize, Serialize};
 
 use super::families::{Compressor, compressors};
-use super::point::{Figures, Point, keep_figures, keep_picture, path_of, read, with_ending};
+use super::point::{Figures, Point, RunResult, is_alike, keep_figures, keep_picture, path_of, read, with_ending};
 use crate::command::capture::{CaptureArgs, views_of};
 use crate::command::eval::explicit::measure;
 use crate::command::eval::{Evaluation, Measurements, lpips_of, timed};
@@ -27,13 +27,7 @@ use crate::say::say;
 const ONE_RATE: &str = "default";
 const METHOD: &str = "3DGS";
 
-/// What a finished run says.
-#[derive(Deserialize)]
-pub(super) struct RunResult {
-    pub(super) train_s: f64,
-}
-
-/// Figures, and what they are of: another file, another scene or another LPIPS has figures of its own.
+/// Figures, and what they are of: another file, another scene, another LPIPS or another program has figures of its own.
 #[derive(Serialize, Deserialize)]
 struct Kept {
     scene_crc: u32,
@@ -77,7 +71,7 @@ pub(super) fn points(
     let ((gaussians, notes), read_s) = timed(|| Ok(Format::Ply.read(&bytes, None)?))?;
     let file = GaussiansFile { n_bytes: bytes.len(), gaussians, notes, read_s };
     let crc = crc32(&bytes);
-    let RunResult { train_s } = read(&config.output.with_extension("run").join("result.json"))?;
+    let RunResult { train_s, .. } = RunResult::of(&config.output)?;
     let mut gaussians = file.gaussians.clone();
     frame::to_normalised(&mut gaussians, &frame::of_file(&file.notes.frame, &capture.normalisation));
     let start = Start { config, capture, what, gaussians, crc, train_s };
@@ -148,7 +142,11 @@ impl Start<'_> {
             return Ok(None);
         }
         let Kept { scene_crc, file_crc, figures } = read(path)?;
-        let Evaluation { lpips_of: measured, .. } = &figures.evaluation;
+        let Evaluation { lpips_of: measured, program, .. } = &figures.evaluation;
+        if !is_alike(program) {
+            say!("the figures are of pocketsplat {program}; this one takes its own");
+            return Ok(None);
+        }
         let has_lpips = self.what.lpips.is_none_or(|lpips| *measured == Some(lpips_of(lpips)));
         Ok((scene_crc == self.crc && file_crc == crc && has_lpips).then_some(figures))
     }

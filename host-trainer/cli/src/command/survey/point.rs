@@ -2,13 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, ensure};
 use pocketsplat_capture::dataset::Image;
+use pocketsplat_trainer::revision_of;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use crate::command::eval::Evaluation;
 use crate::command::output;
 use crate::command::outputs::{keep, marked_png};
+use crate::program;
 
 /// A method at one rate that is trained and measured.
 pub(super) struct Point {
@@ -23,6 +25,46 @@ pub(super) struct Figures {
     /// Seconds of training, with those of the scene that it starts from.
     pub(super) train_s: f64,
     pub(super) evaluation: Evaluation,
+}
+
+/// What a finished run says.
+#[derive(Deserialize)]
+pub(super) struct RunResult {
+    program: String,
+    pub(super) train_s: f64,
+}
+
+impl RunResult {
+    /// * `output`: of the run.
+    pub(super) fn of(output: &Path) -> Result<Self> {
+        read(&result_of(output))
+    }
+}
+
+fn result_of(output: &Path) -> PathBuf {
+    output.with_extension("run").join("result.json")
+}
+
+/// Whether a program, as tables name it, trains as this one does.
+pub(super) fn is_alike(program: &str) -> bool {
+    revision_of(program) == program::training()
+}
+
+/// Stops where a program that trains otherwise has finished a run: a table of both would compare programs.
+///
+/// * `output`: of the run, if there is one.
+pub(super) fn refuse_other_program(output: &Path) -> Result<()> {
+    if result_of(output).is_file() {
+        let RunResult { program, .. } = RunResult::of(output)?;
+        ensure!(
+            is_alike(&program),
+            "{} was trained by pocketsplat {}, and this is {}; choose another --output, or go on with that program",
+            output.display(),
+            revision_of(&program),
+            program::training()
+        );
+    }
+    Ok(())
 }
 
 /// The folder of pictures.

@@ -32,7 +32,7 @@ use table::{Line, Table};
 /// photographs, steps and seed; methods that compress take theirs on top.
 ///
 /// Writes survey.csv, survey.svg, a picture of the first test view for each method, and every file that was measured. The same command
-/// again goes on where it was stopped.
+/// again goes on where it was stopped, but begins a compression anew.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     #[command(flatten)]

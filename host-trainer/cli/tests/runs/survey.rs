@@ -94,6 +94,19 @@ fn a_survey_that_is_killed_goes_on_and_ends_in_the_same_table() {
 }
 
 #[test]
+fn points_are_matched_once() {
+    let home = folder("survey_points");
+    let capture = home.join("capture");
+    succeeds(pocketsplat().arg("synth").arg(&capture).args(["--size", "96", "--train-views", "16"]));
+    let mut command = pocketsplat();
+    command.arg("survey").arg(&capture).arg("-o").arg(home.join("out"));
+    let said = succeeds(command.args(["--iterations", "2", "--points", "matched"]));
+    let times = |what: &str| said.matches(what).count();
+    assert_eq!(times("initial points matched"), 2, "for 3DGS and for anchors: {said}");
+    assert_eq!(times("matched between the photographs by an earlier run"), 1, "{said}");
+}
+
+#[test]
 fn what_no_survey_can_use_is_refused_before_any_work() {
     let output = folder("survey_refused").join("out");
     let refused = |option: &str, value: &str| fails(survey(&output).args([option, value]));

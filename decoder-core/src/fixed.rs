@@ -23,7 +23,8 @@ pub(crate) fn fixed(x: f32, bits: i32) -> i32 {
 pub(crate) fn fixed_half(half: u16, bits: i32) -> i32 {
     let half = u32::from(half);
     // The exponents' biases differ by 112.
-    fixed(f32::from_bits((half & 0x8000) << 16 | ((half & 0x7FFF) << 13) + (112 << 23)), bits)
+    let magnitude = ((half & 0x7FFF) << 13) + (112 << 23);
+    fixed(f32::from_bits((half & 0x8000) << 16 | magnitude), bits)
 }
 
 #[cfg(test)]

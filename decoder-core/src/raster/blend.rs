@@ -2,17 +2,8 @@
 
 use pocketsplat_format::rules::TILE_PX;
 
-use super::blending::{Blending, Pixel};
+use super::blending::{Blending, Pixel, TileRegion};
 use crate::project::{PackedSplat, TileRect};
-
-/// Where a tile lies; it ends early at the frame's right and lower border.
-#[derive(Clone, Copy)]
-pub(crate) struct TileRegion {
-    pub(crate) column: u8,
-    pub(crate) row: u8,
-    pub(crate) width: u16,
-    pub(crate) height: u16,
-}
 
 /// What a tile cost.
 #[derive(Clone, Copy, Default)]

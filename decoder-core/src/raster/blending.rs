@@ -1,10 +1,18 @@
 //! What it takes to blend splats into pixels.
 
-use super::blend::TileRegion;
 use crate::project::PackedSplat;
 
 /// A pixel while it is drawn; what its four words are is for a [`Blending`] to say.
 pub(crate) type Pixel = [f32; 4];
+
+/// Where a tile lies; it ends early at the frame's right and lower border.
+#[derive(Clone, Copy)]
+pub(crate) struct TileRegion {
+    pub(crate) column: u8,
+    pub(crate) row: u8,
+    pub(crate) width: u16,
+    pub(crate) height: u16,
+}
 
 /// How splats are blended into pixels, front to back.
 pub(crate) trait Blending {

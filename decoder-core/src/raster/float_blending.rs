@@ -4,8 +4,7 @@ use pocketsplat_format::math::EXPONENTIAL;
 use pocketsplat_format::rules::{self, TILE_PX};
 use pocketsplat_half::{BlendConstants, ROW_LEN, RowSplat, SLACK_PX, blend_rows, span, sqrt_above};
 
-use super::blend::TileRegion;
-use super::blending::{Blending, Pixel, SplatWork};
+use super::blending::{Blending, Pixel, SplatWork, TileRegion};
 use crate::project::{PackedSplat, log_cut};
 
 const TRANSMITTANCE_MIN: f32 = rules::TRANSMITTANCE_MIN as f32;

@@ -12,8 +12,7 @@
 
 use pocketsplat_format::rules::{self, TILE_PX};
 
-use super::blend::TileRegion;
-use super::blending::{Blending, Pixel, SplatWork};
+use super::blending::{Blending, Pixel, SplatWork, TileRegion};
 use crate::fixed::fixed;
 use crate::project::{PackedSplat, log_cut};
 

@@ -66,7 +66,7 @@ pub struct Measured {
     /// Time of a frame on this machine, s.
     pub host_s: f64,
     /// Instructions of a frame on each target, of the views that [count](Sight::counts); predicted ones are of the
-    /// [arithmetic whose costs were counted](counted_arithmetic) alone.
+    /// arithmetic whose costs were counted alone: the reference, and on RISC-V that without an FPU.
     pub instructions: Vec<Option<Instructions>>,
     /// Scratch memory of the plan, bytes.
     pub scratch_bytes: usize,

@@ -1,6 +1,6 @@
 //! Numbers with a fixed point, made without arithmetic of floats.
 
-/// The integer nearest to x·2^`bits`, the larger of two in magnitude; the largest or smallest where it is beyond them, or x not a number.
+/// The integer nearest to x·2^`bits`, the larger of two in magnitude; ±(2³¹ − 1) where it is beyond, or x not a number.
 ///
 /// # Budget
 /// About 15 instructions, of integers alone.
@@ -18,7 +18,8 @@ pub(crate) fn fixed(x: f32, bits: i32) -> i32 {
     if word >> 31 == 0 { magnitude } else { -magnitude }
 }
 
-/// As [`fixed`], of the half with these bits; below 2⁻¹⁴ in magnitude it may be 2⁻¹⁴ off.
+/// As [`fixed`], of the half with these bits; below 2⁻¹⁴ in magnitude it may be 2⁻¹⁴ off, and what is
+/// infinite or no number counts as 65,536 or more.
 #[inline]
 pub(crate) fn fixed_half(half: u16, bits: i32) -> i32 {
     let half = u32::from(half);

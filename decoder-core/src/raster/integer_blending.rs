@@ -43,13 +43,13 @@ const TRANSMITTANCE_MIN: i32 = share(rules::TRANSMITTANCE_MIN);
 /// −log₂ 0.99: below this exponent alpha is the largest.
 const EXPONENT_MIN: i32 = (0.014_499_569_695_115_09 * (1 << PIXEL_BITS) as f64) as i32;
 
-/// No precision is larger, px⁻²: that is what their 16 bits hold. A splat whose exponent is at most 9 somewhere in a tile, 21.3 px from
-/// corner to corner, is at most (√9 + 21.3·√(½·log₂ e·8))² = 2,920 at its first pixel, and (√9 + 15·√(½·log₂ e·8))² = 1,522 at the first
-/// of a row that it reaches.
-const MOST_OF_TILE: i32 = 2920 << ROW_BITS;
-const MOST_OF_ROW: i32 = 1522 << ROW_BITS;
+/// Dilation leaves no direction a precision of more than 6 px⁻². Were it 8, a splat whose exponent is at most 9 somewhere in a tile, whose
+/// pixels are 21.2 px apart at most, would be at most (√9 + 21.2·√(½·log₂ e·8))² = 2,912 at the tile's first pixel, and
+/// (√9 + 15·√(½·log₂ e·8))² = 1,524 at the first of a row that it reaches.
+const MOST_OF_TILE: i32 = 2912 << ROW_BITS;
+const MOST_OF_ROW: i32 = 1524 << ROW_BITS;
 
-/// 2^(−i/256), [`TRANSMITTANCE_BITS`] behind the point; the first, which no exponent reaches, would be one more.
+/// 2^(−i/256), [`TRANSMITTANCE_BITS`] behind the point; the first is one too small, for 16 bits.
 static POWERS: [u16; (1 << INDEX_BITS) + 1] = {
     let mut powers = [u16::MAX; (1 << INDEX_BITS) + 1];
     let (mut power, mut i) = (65_536.0_f64, 1);
@@ -81,7 +81,7 @@ impl Blending for IntegerBlending {
     }
 
     /// # Budget
-    /// On RV32IMAC about 1,200 instructions a splat, 80 a row and 35 a pixel.
+    /// On RV32IMAC about 1,400 instructions a splat, 120 a row and 40 a pixel.
     // Not inlined: among everything that a frame needs its loops would not stay in registers.
     #[inline(never)]
     fn blend(

@@ -15,7 +15,8 @@ use crate::baseline::Unreadable;
 /// The first bytes of a file.
 pub(crate) type Mark = [u8; 4];
 
-/// Bytes of a body at most: of ten million Gaussians.
+/// Gaussians of a file at most, and bytes of its body: what is damaged asks for no more memory than so many take.
+const MOST_GAUSSIANS: usize = 10_000_000;
 const MOST_BODY: u64 = 1 << 30;
 /// Bytes of the mark and the checksum.
 const HEADER: usize = 8;
@@ -95,6 +96,17 @@ impl<'a> Body<'a> {
         Ok(std::array::from_fn(|i| bytes[i]))
     }
 
+    /// How many Gaussians follow.
+    pub(crate) fn n_gaussians(&mut self) -> Result<usize, Unreadable> {
+        let n = u32::from_le_bytes(self.four("the number of Gaussians")?) as usize;
+        if n > MOST_GAUSSIANS {
+            return Err(Unreadable(format!(
+                "there are {n} Gaussians, needed: {MOST_GAUSSIANS} at most; write the file again"
+            )));
+        }
+        Ok(n)
+    }
+
     /// A column of `n`.
     pub(crate) fn words(&mut self, n: usize, what: &str) -> Result<Vec<u16>, Unreadable> {
         let (low, high) = self.bytes(n.saturating_mul(2), what)?.split_at(n);
@@ -163,6 +175,9 @@ mod tests {
     fn counts_beyond_the_bytes_and_infinities_are_refused() {
         assert!(Body(&[0; 9]).words(usize::MAX, "words").is_err());
         assert!(Body(&[0; 9]).bits(usize::MAX, "bits").is_err());
+        assert_eq!(Body(&10_000_000_u32.to_le_bytes()).n_gaussians(), Ok(10_000_000));
+        let said = Body(&10_000_001_u32.to_le_bytes()).n_gaussians().unwrap_err().to_string();
+        assert_eq!(said, "there are 10000001 Gaussians, needed: 10000000 at most; write the file again");
         let mut body = Vec::new();
         put_rows(&[[halved(1.0), f16::INFINITY]], &mut body);
         let said = Body(&body).rows::<2>(1, "rows").unwrap_err().to_string();

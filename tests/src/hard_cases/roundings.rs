@@ -15,7 +15,7 @@ and no tile visibly. Integer heads turn the longest needles by a tenth of a pixe
 
 const ANALYSIS: &str = "\
 All pictures of the families above are drawn by the decoder in another arithmetic and compared with those of the reference arithmetic, in steps of
-8 bits. Functions right to 10⁻⁴ move every alpha by a part in 5,000, and pixels in integers by one in 65,536, which is nothing in a sum. But a contribution at 1/255 may be
+8 bits. Functions right to 10⁻⁴ move every alpha by a part in 5,000, and pixels in integers by one in 1,000, which is nothing in a sum. But a contribution at 1/255 may be
 drawn in one and not in the other: a step, and half a step of rounding on either side. So may the last layer of an opaque stack: 2.5
 steps, over whole tiles. That makes 4.5 steps, and 3.2 in a tile's mean.
 

@@ -63,8 +63,8 @@ fn put_codes<const WIDTH: usize>(codes: &ResidualCodes<WIDTH>, body: &mut Vec<u8
 
 fn of_body(bytes: &[u8]) -> Result<Quantised, Unreadable> {
     let mut body = Body(bytes);
+    let n = body.n_gaussians()?;
     let mut count = |what| Ok::<_, Unreadable>(u32::from_le_bytes(body.four(what)?) as usize);
-    let n = count("the number of Gaussians")?;
     let [n_scales, n_rotations] = [count("the number of codes")?, count("the number of codes")?];
     let log2_rows = body.bytes(1, "the size of the grid")?[0];
     if log2_rows > MOST_LOG2_ROWS {

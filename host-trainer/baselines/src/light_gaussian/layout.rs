@@ -52,7 +52,7 @@ fn body(quantised: &Quantised) -> Vec<u8> {
 
 fn of_body(bytes: &[u8]) -> Result<Quantised, Unreadable> {
     let mut body = Body(bytes);
-    let n = u32::from_le_bytes(body.four("the number of Gaussians")?) as usize;
+    let n = body.n_gaussians()?;
     let n_codes = u32::from_le_bytes(body.four("the number of codes")?) as usize;
     let mut number = || Ok::<_, Unreadable>(f32::from_le_bytes(body.four("the lattice")?));
     let (corner, voxel) = ([number()?, number()?, number()?], number()?);

@@ -63,7 +63,7 @@ fn put_counted(symbols: &[u16], body: &mut Vec<u8>) {
 
 fn of_body(bytes: &[u8]) -> Result<Quantised, Unreadable> {
     let mut body = Body(bytes);
-    let n = u32::from_le_bytes(body.four("the number of Gaussians")?) as usize;
+    let n = body.n_gaussians()?;
     let number = usize::from(body.bytes(1, "the degree")?[0]);
     let Some(degree) = Degree::ALL.get(number).copied() else {
         return Err(Unreadable(format!("the degree is {number}, needed: 0 to 3; write the file again")));

@@ -1,7 +1,7 @@
 //! The steps on the photographs: Gaussians, masks, codes and their distributions learn together, by one loss.
 //!
 //! L = D + λ·R/N₀, with the published loss D of the picture that the codes draw, R = Σᵢ Mᵢ·(fixed + Σₐ Mᵢₐ·(−log₂ pₐ(kᵢₐ))) bits, and the N₀
-//! Gaussians of the start. Gradients go through a code to what it stands for as if it were that (Bengio et al. 2013, straight-through).
+//! Gaussians of the start; distributions by R alone, which the steps of Adam do not tell from λ·R/N₀. Gradients go through a code to what it stands for as if it were that (Bengio et al. 2013, straight-through).
 
 use pocketsplat_kernels::real::Real;
 use pocketsplat_trainer::explicit::Cloud;
@@ -24,7 +24,7 @@ const CHOICE_EVERY: u32 = 20;
 /// Rate of masks and distributions.
 const RATE: f64 = 0.01;
 
-/// λ of the choice of codes in units of λ, as if a squared distance of 1 added a quarter to the loss.
+/// λ of the choice of codes in units of λ, as if a squared distance of 1 for each Gaussian of the start added a quarter.
 const PRICE: f64 = 4.0;
 
 /// Bits of what has no codebook: a centre in halves, an opacity in a byte.

@@ -14,7 +14,7 @@
 //! * **One λ** weighs all bits, those of masks too: a Gaussian costs its 56 bits of centre and opacity and those of its codes, a degree those
 //!   of its code. They are counted for each Gaussian of the start, so that a bit costs the same whoever has gone.
 //! * **Distances** are of log-scales, quaternions of length 1 with w ≥ 0, and coefficients as they are. In the choice λ is 4 times that of
-//!   the loss, as if a squared distance of 1 added a quarter to it: with more, codes of less detail cost more quality than fewer Gaussians do.
+//!   the loss, as if a squared distance of 1 for each Gaussian of the start added a quarter: with more, codes of less detail cost more quality than fewer Gaussians do.
 //! * **λ** is 10⁻⁴, and 5·10⁻⁴ for a lower rate, in this program's unit. Published files of lower rates have fewer Gaussians too, with as many
 //!   bits or more for each.
 //! * **Masks** are those of Compact3DGS: ε = 0.01, from σ(m) = ½ at a rate of 0.01, and what is off goes at once. The distributions have

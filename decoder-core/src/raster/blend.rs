@@ -71,7 +71,7 @@ pub(crate) fn finish_tile<B: Blending>(
     background: Option<[f32; 3]>,
     rgb: &mut [[u8; 3]],
 ) {
-    match background {
+    match background.map(B::background) {
         Some(background) => finish(place, pixels, rgb, |pixel| B::rgb_before(pixel, background)),
         None => finish(place, pixels, rgb, B::rgb),
     }

@@ -18,6 +18,8 @@ pub(crate) struct TileRegion {
 pub(crate) trait Blending {
     /// What is the same for all splats of a frame.
     type Rule;
+    /// A colour that shows where light comes through.
+    type Background: Copy;
 
     /// Nothing drawn yet.
     const EMPTY: Pixel;
@@ -42,8 +44,11 @@ pub(crate) trait Blending {
     /// A pixel's colour in bytes, before black.
     fn rgb(pixel: Pixel) -> [u8; 3];
 
-    /// The same before a background.
-    fn rgb_before(pixel: Pixel, background: [f32; 3]) -> [u8; 3];
+    /// * `rgb`: 0 to 1.
+    fn background(rgb: [f32; 3]) -> Self::Background;
+
+    /// A pixel's colour in bytes, before a background.
+    fn rgb_before(pixel: Pixel, background: Self::Background) -> [u8; 3];
 }
 
 /// What a splat took in a tile.

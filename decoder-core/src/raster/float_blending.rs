@@ -23,6 +23,7 @@ pub(crate) struct FloatBlending;
 impl Blending for FloatBlending {
     /// −ln of the least alpha.
     type Rule = f32;
+    type Background = [f32; 3];
 
     const EMPTY: Pixel = [0.0, 0.0, 0.0, 1.0];
 
@@ -82,6 +83,11 @@ impl Blending for FloatBlending {
     fn rgb([red, green, blue, _]: Pixel) -> [u8; 3] {
         // A float cast saturates: negative becomes 0, and so does NaN; 255.5 and more become 255.
         [red, green, blue].map(|channel| (channel * 255.0 + 0.5) as u8)
+    }
+
+    #[inline(always)]
+    fn background(rgb: [f32; 3]) -> [f32; 3] {
+        rgb
     }
 
     #[inline(always)]

@@ -67,6 +67,8 @@ pub(crate) struct IntegerBlending;
 impl Blending for IntegerBlending {
     /// −log₂ of the least alpha, [`PIXEL_BITS`] behind the point.
     type Rule = i32;
+    /// [`COLOUR_BITS`] behind the point.
+    type Background = [i32; 3];
 
     const EMPTY: Pixel = [0.0, 0.0, 0.0, f32::from_bits(1 << TRANSMITTANCE_BITS)];
 
@@ -117,11 +119,15 @@ impl Blending for IntegerBlending {
     }
 
     #[inline(always)]
-    fn rgb_before(pixel: Pixel, background: [f32; 3]) -> [u8; 3] {
-        let [red, green, blue, transmittance] = integers(pixel);
-        let through = transmittance.wrapping_abs();
-        let [back_red, back_green, back_blue] = background.map(|back| through.wrapping_mul(fixed(back, COLOUR_BITS)));
-        [red.wrapping_add(back_red), green.wrapping_add(back_green), blue.wrapping_add(back_blue)].map(rounded)
+    fn background(rgb: [f32; 3]) -> [i32; 3] {
+        rgb.map(|channel| fixed(channel, COLOUR_BITS))
+    }
+
+    #[inline(always)]
+    fn rgb_before(pixel: Pixel, [back_r, back_g, back_b]: [i32; 3]) -> [u8; 3] {
+        let [r, g, b, transmittance] = integers(pixel);
+        let behind = |sum: i32, back: i32| sum.wrapping_add(transmittance.wrapping_abs().wrapping_mul(back));
+        [behind(r, back_r), behind(g, back_g), behind(b, back_b)].map(rounded)
     }
 }
 
@@ -403,9 +409,10 @@ mod tests {
         let half = f32::from_bits(1 << (TRANSMITTANCE_BITS - 1));
         let channel = |x: f32| f32::from_bits(((x * 268_435_456.0) as i32).cast_unsigned());
         let pixel = [channel(0.25), channel(-0.5), channel(3.0), half];
+        let rgb_before = |pixel, rgb| IntegerBlending::rgb_before(pixel, IntegerBlending::background(rgb));
         assert_eq!(IntegerBlending::rgb(pixel), [64, 0, 255]);
-        assert_eq!(IntegerBlending::rgb_before(pixel, [1.0, 1.0, 0.0]), [191, 0, 255]);
-        assert_eq!(IntegerBlending::rgb_before(IntegerBlending::EMPTY, [0.2, 0.6, 1.0]), [51, 153, 255]);
+        assert_eq!(rgb_before(pixel, [1.0, 1.0, 0.0]), [191, 0, 255]);
+        assert_eq!(rgb_before(IntegerBlending::EMPTY, [0.2, 0.6, 1.0]), [51, 153, 255]);
     }
 
     #[test]

@@ -16,6 +16,8 @@ pub mod rdo_gaussian;
 mod rotations;
 pub mod self_organizing;
 #[cfg(test)]
+mod test_files;
+#[cfg(test)]
 mod test_scenes;
 mod tuning;
 mod voxels;

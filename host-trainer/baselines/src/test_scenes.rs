@@ -8,8 +8,6 @@ use pocketsplat_kernels::finite_difference::random;
 use pocketsplat_trainer::explicit::CloudConfig;
 use pocketsplat_trainer::explicit::render::Renderer;
 
-use crate::baseline::{Baseline, TrainedScene, Unreadable};
-
 /// A run of 60 iterations, and stages to match.
 pub(crate) fn short_config() -> CloudConfig {
     CloudConfig { iterations: 60, ..CloudConfig::default() }
@@ -46,32 +44,4 @@ pub(crate) fn capture_of(gaussians: &Gaussians, n: u32) -> Capture {
         View::new(i.to_string(), camera, Photograph { image, mask: None })
     };
     Capture::of_views((0..n).map(view).collect(), vec![DVec3::ZERO])
-}
-
-/// The Gaussians of a method's file for a scene of `n`: the file draws what was compressed, bit for bit, with any number of threads.
-///
-/// * `gaussians_of`: what is scored. * `read`: what a file holds.
-pub(crate) fn gaussians_of_file<B: Baseline<Compressed: Send> + Sync>(
-    method: &B,
-    n: usize,
-    gaussians_of: fn(&B::Compressed) -> Gaussians,
-    read: fn(&[u8]) -> Result<B::Compressed, Unreadable>,
-) -> Gaussians {
-    let gaussians = gaussians(n);
-    let (capture, config) = (capture_of(&gaussians, 4), short_config());
-    let scene = TrainedScene { gaussians: &gaussians, capture: &capture, config: &config };
-    let compressed = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| method.compress(&scene).unwrap())
-    };
-    let quantised = compressed(1);
-    let bytes = B::encode(&quantised);
-    let decoded = B::decode(&bytes).unwrap();
-    let camera = &capture.train[2].camera;
-    let [scored, drawn] = [&gaussians_of(&quantised), &decoded]
-        .map(|g| Renderer::new(g).planes(camera, [0.1; 3]).into_iter().map(f32::to_bits).collect::<Vec<_>>());
-    assert!(scored == drawn, "the same bits");
-    assert!(B::encode(&read(&bytes).unwrap()) == bytes, "and the same bytes");
-    assert!(B::encode(&compressed(3)) == bytes, "and with three threads");
-    decoded
 }

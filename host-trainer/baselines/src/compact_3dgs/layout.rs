@@ -118,6 +118,7 @@ mod tests {
 
     use super::*;
     use crate::packed::halved;
+    use crate::test_files::{damage_of_a_body_is_noticed, other_counts_are_refused};
 
     #[expect(clippy::cast_possible_truncation, reason = "any numbers")]
     fn quantised(n: usize) -> Quantised {
@@ -153,31 +154,13 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(64))]
         #[test]
-        fn a_damaged_file_is_refused(at: prop::sample::Index, flip in 1..=255u8) {
-            let mut bytes = written(&quantised(20));
-            let at = at.index(bytes.len());
-            prop_assert!(read(&bytes[..at]).is_err());
-            bytes[at] ^= flip;
-            prop_assert!(read(&bytes).is_err());
-        }
-
-        #[test]
         fn a_damaged_body_is_gaussians_or_an_error(at: prop::sample::Index, near in 0..1500usize, flip in 1..=255u8, count: u32) {
             let sound = body(&quantised(20));
             // Most of a body is the network: half of the damage is before it.
             for at in [at.index(sound.len()), near] {
-                prop_assert!(of_body(&sound[..at]).is_err());
-                let mut damaged = sound.clone();
-                damaged[at] ^= flip;
-                if let Ok(read) = of_body(&damaged) {
-                    prop_assert_eq!(read.gaussians().len(), 20);
-                }
+                damage_of_a_body_is_noticed(&sound, (at, flip), of_body, Quantised::gaussians);
             }
-            for place in [0, 4, 8, 9] {
-                let mut lied = sound.clone();
-                lied[place..place + 4].copy_from_slice(&count.to_le_bytes());
-                prop_assert!(of_body(&lied).is_err() || lied == sound);
-            }
+            other_counts_are_refused(&sound, &[0, 4, 8, 9], count, of_body);
         }
     }
 }

@@ -85,7 +85,7 @@ mod tests {
     use pocketsplat_gaussians::Degree;
 
     use super::*;
-    use crate::test_scenes::gaussians_of_file;
+    use crate::test_files::gaussians_of_file;
 
     #[test]
     fn the_file_draws_what_was_compressed_bit_for_bit_with_any_number_of_threads() {

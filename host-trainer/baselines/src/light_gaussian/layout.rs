@@ -96,6 +96,7 @@ mod tests {
 
     use super::*;
     use crate::packed::halved;
+    use crate::test_files::{damage_of_a_body_is_noticed, other_counts_are_refused};
 
     /// `n` Gaussians, of which some share a voxel and every third has a code.
     #[expect(clippy::cast_possible_truncation, reason = "any numbers")]
@@ -135,29 +136,10 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_damaged_file_is_refused(at: prop::sample::Index, flip in 1..=255u8) {
-            let mut bytes = written(&quantised(20));
-            let at = at.index(bytes.len());
-            prop_assert!(read(&bytes[..at]).is_err());
-            bytes[at] ^= flip;
-            prop_assert!(read(&bytes).is_err());
-        }
-
-        #[test]
         fn a_damaged_body_is_gaussians_or_an_error(at: prop::sample::Index, flip in 1..=255u8, count: u32) {
-            let mut body = body(&quantised(20));
-            let at = at.index(body.len());
-            prop_assert!(of_body(&body[..at]).is_err());
-            body[at] ^= flip;
-            if let Ok(read) = of_body(&body) {
-                prop_assert_eq!(read.gaussians().len(), 20);
-            }
-            body[at] ^= flip;
-            for place in [0, 4] {
-                let mut lied = body.clone();
-                lied[place..place + 4].copy_from_slice(&count.to_le_bytes());
-                prop_assert!(of_body(&lied).is_err() || lied == body);
-            }
+            let sound = body(&quantised(20));
+            damage_of_a_body_is_noticed(&sound, (at.index(sound.len()), flip), of_body, Quantised::gaussians);
+            other_counts_are_refused(&sound, &[0, 4], count, of_body);
         }
     }
 }

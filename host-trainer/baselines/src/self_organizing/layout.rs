@@ -156,6 +156,7 @@ mod tests {
 
     use super::super::quantisation::quantised;
     use super::*;
+    use crate::test_files::damage_of_a_body_is_noticed;
     use crate::test_scenes::gaussians;
 
     fn grid(side: usize, degree: Degree) -> Quantised {
@@ -194,23 +195,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_damaged_file_is_refused(at: prop::sample::Index, flip in 1..=255u8) {
-            let mut bytes = written(&grid(4, Degree::Zero));
-            let at = at.index(bytes.len());
-            prop_assert!(read(&bytes[..at]).is_err());
-            bytes[at] ^= flip;
-            prop_assert!(read(&bytes).is_err());
-        }
-
-        #[test]
         fn a_damaged_body_is_gaussians_or_an_error(at: prop::sample::Index, flip in 1..=255u8) {
-            let mut body = body(&grid(4, Degree::One));
-            let at = at.index(body.len());
-            prop_assert!(of_body(&body[..at]).is_err());
-            body[at] ^= flip;
-            if let Ok(read) = of_body(&body) {
-                prop_assert_eq!(read.gaussians().len(), 16);
-            }
+            let sound = body(&grid(4, Degree::One));
+            damage_of_a_body_is_noticed(&sound, (at.index(sound.len()), flip), of_body, Quantised::gaussians);
         }
     }
 }

@@ -144,7 +144,8 @@ fn with_unit_rotations(mut cloud: Cloud<f32>) -> Cloud<f32> {
 mod tests {
 
     use super::*;
-    use crate::test_scenes::{gaussians, gaussians_of_file};
+    use crate::test_files::gaussians_of_file;
+    use crate::test_scenes::gaussians;
 
     #[test]
     fn the_file_draws_what_was_compressed_bit_for_bit_with_any_number_of_threads() {

@@ -13,7 +13,8 @@ use pocketsplat_core::{Budget, Bundle, Camera, MaxSplats};
 use pocketsplat_instructions::Processor;
 use pocketsplat_kernels::camera::core_camera;
 use pocketsplat_trainer::cost::{
-    CountError, Counter, Instructions, MOST_VIEWS, Measured, Setting, Sight, measure, parameters, quality_grid,
+    ArithmeticChoice, CountError, Counter, Instructions, MOST_VIEWS, Measured, Setting, Sight, measure, parameters,
+    quality_grid,
 };
 use rayon::prelude::*;
 
@@ -32,7 +33,7 @@ use crate::say::say;
 /// Settings change one at a time, those of quality in all combinations. Writes cost.csv, cost.svg and cost.md: for each setting PSNR to the f64 reference and to the photographs, the time of a
 /// frame here, and the instructions of each stage on each target. Where the firmware's folder and QEMU are at hand, the firmware
 /// counts them for each setting by itself; else, and for the combinations, they are predicted from what the frames consist of, if the
-/// arithmetic is the one whose costs were counted.
+/// arithmetic is the one whose costs were counted. Targets that all lack an FPU draw without one.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// The bundle.
@@ -91,7 +92,8 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         Some(ram) => budget.in_bytes(usize::try_from(ram.as_u64()).unwrap_or(usize::MAX)),
     };
     let counted: Vec<Camera> = sights.iter().filter(|sight| sight.counts).map(|sight| sight.camera).collect();
-    let (parameters, grid) = (parameters(&bundle), quality_grid(&bundle));
+    let arithmetic = ArithmeticChoice::of_all(&targets);
+    let (parameters, grid) = (parameters(&bundle, arithmetic), quality_grid(&bundle, arithmetic));
     let n_parameters = parameters.len();
     let settings: Vec<Setting> = parameters.into_iter().chain(grid).collect();
     let mut measured = Vec::new();

@@ -1,6 +1,7 @@
 //! The decoder's choices of arithmetic by name: types there, values here.
 
 use pocketsplat_core::{Arithmetic, ReferenceArithmetic, WithoutFpu};
+use pocketsplat_instructions::Processor;
 
 /// What a frame is computed with.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -22,6 +23,20 @@ pub trait WithArithmetic {
 }
 
 impl ArithmeticChoice {
+    /// What firmware for a processor draws with, unless it asks for another.
+    pub fn of(processor: Processor) -> Self {
+        match processor {
+            Processor::CortexM4 | Processor::CortexM7 => Self::Reference,
+            Processor::Riscv32imac => Self::WithoutFpu,
+        }
+    }
+
+    /// The same of several: that of the first if they agree, else that of `Decoder::bind`.
+    pub fn of_all(processors: &[Processor]) -> Self {
+        let mut all = processors.iter().map(|processor| Self::of(*processor));
+        all.next().filter(|first| all.all(|other| other == *first)).unwrap_or_default()
+    }
+
     /// The name of the type that it stands for.
     pub fn type_name(self) -> &'static str {
         match self {
@@ -35,6 +50,20 @@ impl ArithmeticChoice {
         match self {
             Self::Reference => with.call::<ReferenceArithmetic>(),
             Self::WithoutFpu => with.call::<WithoutFpu>(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{ArithmeticChoice, Processor};
+
+    #[test]
+    fn processors_that_all_lack_an_fpu_draw_without_one() {
+        use Processor::{CortexM4, CortexM7, Riscv32imac};
+        assert_eq!(ArithmeticChoice::of_all(&[Riscv32imac]), ArithmeticChoice::WithoutFpu);
+        for others in [&[][..], &[CortexM4, CortexM7], &[Riscv32imac, CortexM4], &[CortexM7, Riscv32imac]] {
+            assert_eq!(ArithmeticChoice::of_all(others), ArithmeticChoice::Reference, "{others:?}");
         }
     }
 }

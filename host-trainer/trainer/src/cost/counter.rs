@@ -165,6 +165,7 @@ fn stages(table: &str, n_frames: usize) -> Option<Stages> {
 mod tests {
     use pocketsplat_core::{Quality, Residency, Strips};
 
+    use super::super::ArithmeticChoice;
     use super::*;
 
     #[test]
@@ -174,7 +175,7 @@ mod tests {
             tiers: 2,
             residency: Residency::Streamed,
             strips: Strips::Exactly(4),
-            ..Setting::exact()
+            ..Setting::exact(ArithmeticChoice::Reference)
         };
         assert_eq!(
             budget(&setting),

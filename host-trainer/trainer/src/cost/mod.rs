@@ -65,8 +65,8 @@ pub struct Measured {
     pub psnr_db: f64,
     /// Time of a frame on this machine, s.
     pub host_s: f64,
-    /// Instructions of a frame on each target, of the views that [count](Sight::counts); predicted ones are of the
-    /// arithmetic whose costs were counted alone: the reference, and on RISC-V that without an FPU.
+    /// Instructions of a frame on each target, of the views that [count](Sight::counts); predicted ones are of the target's
+    /// [arithmetic](ArithmeticChoice::of) alone, whose costs were counted.
     pub instructions: Vec<Option<Instructions>>,
     /// Scratch memory of the plan, bytes.
     pub scratch_bytes: usize,
@@ -124,7 +124,7 @@ fn measure_in<A: Arithmetic>(of: &Measurement<'_, '_>) -> Result<Measured, Decod
         worst_channel: 0,
         psnr_db: 0.0,
         host_s: 0.0,
-        instructions: vec![None; targets.len()],
+        instructions: Vec::new(),
         scratch_bytes: plan.scratch_len(),
         splats_dropped: 0,
     };
@@ -148,17 +148,9 @@ fn measure_in<A: Arithmetic>(of: &Measurement<'_, '_>) -> Result<Measured, Decod
         }
     }
     let of_target = |(stages, target): ([f64; Stage::ALL.len()], &Processor)| {
-        let is_counted = setting.arithmetic == counted_arithmetic(*target);
+        let is_counted = setting.arithmetic == ArithmeticChoice::of(*target);
         is_counted.then_some(Instructions { stages, counted: false })
     };
     measured.instructions = predicted.into_iter().zip(targets).map(of_target).collect();
     Ok(measured)
-}
-
-/// What frames were drawn with whose instructions were counted: what firmware for the processor should take.
-fn counted_arithmetic(target: Processor) -> ArithmeticChoice {
-    match target {
-        Processor::CortexM4 | Processor::CortexM7 => ArithmeticChoice::Reference,
-        Processor::Riscv32imac => ArithmeticChoice::WithoutFpu,
-    }
 }

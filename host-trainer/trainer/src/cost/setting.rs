@@ -26,7 +26,7 @@ pub struct Setting {
 
 impl Setting {
     /// As trained, and as the budget plans it.
-    pub fn exact() -> Self {
+    pub fn exact(arithmetic: ArithmeticChoice) -> Self {
         Self {
             parameter: "level",
             name: "exact".to_owned(),
@@ -35,7 +35,7 @@ impl Setting {
             pruning_rate: 0.0,
             residency: Residency::Auto,
             strips: Strips::Auto,
-            arithmetic: ArithmeticChoice::Reference,
+            arithmetic,
         }
     }
 
@@ -55,8 +55,8 @@ fn pruning_rate(bundle: &Bundle<'_>, tiers: u8) -> Option<f64> {
 }
 
 /// Each parameter by itself, [exact](Setting::exact) first.
-pub fn parameters(bundle: &Bundle<'_>) -> Vec<Setting> {
-    let exact = Setting::exact();
+pub fn parameters(bundle: &Bundle<'_>, arithmetic: ArithmeticChoice) -> Vec<Setting> {
+    let exact = Setting::exact(arithmetic);
     let mut all = vec![exact.clone()];
     for (name, quality) in [("balanced", Quality::BALANCED), ("draft", Quality::DRAFT)] {
         all.push(Setting { parameter: "level", name: name.to_owned(), quality, ..exact.clone() });
@@ -85,13 +85,16 @@ pub fn parameters(bundle: &Bundle<'_>) -> Vec<Setting> {
         let strips = Strips::Exactly(n_strips);
         all.push(Setting { parameter: "strips", name: n_strips.to_string(), strips, ..exact.clone() });
     }
-    let arithmetic = ArithmeticChoice::WithoutFpu;
-    all.push(Setting { parameter: "arithmetic", name: "without FPU".to_owned(), arithmetic, ..exact });
+    let (name, arithmetic) = match arithmetic {
+        ArithmeticChoice::Reference => ("without FPU", ArithmeticChoice::WithoutFpu),
+        ArithmeticChoice::WithoutFpu => ("reference", ArithmeticChoice::Reference),
+    };
+    all.push(Setting { parameter: "arithmetic", name: name.to_owned(), arithmetic, ..exact });
     all
 }
 
 /// Alpha cuts, the detail head and the first tiers in all combinations.
-pub fn quality_grid(bundle: &Bundle<'_>) -> Vec<Setting> {
+pub fn quality_grid(bundle: &Bundle<'_>, arithmetic: ArithmeticChoice) -> Vec<Setting> {
     let details: &[bool] = if bundle.header().detail_hidden > 0 { &[true, false] } else { &[true] };
     let mut all = Vec::new();
     for tiers in (1..=bundle.n_tiers()).rev() {
@@ -101,7 +104,14 @@ pub fn quality_grid(bundle: &Bundle<'_>) -> Vec<Setting> {
                 let no_detail = if detail { "" } else { ", no detail" };
                 let name = format!("{:.0} % pruned, alpha {alpha_cut}/255{no_detail}", 100.0 * pruning_rate);
                 let quality = Quality { alpha_cut, detail };
-                all.push(Setting { parameter: "quality", name, quality, tiers, pruning_rate, ..Setting::exact() });
+                all.push(Setting {
+                    parameter: "quality",
+                    name,
+                    quality,
+                    tiers,
+                    pruning_rate,
+                    ..Setting::exact(arithmetic)
+                });
             }
         }
     }

@@ -50,7 +50,7 @@ pub(crate) trait Choices: 'static {
 #[derive(Clone, Copy, Debug)]
 pub struct ReferenceArithmetic;
 
-/// For processors without an FPU: heads and pixels in integers, and functions from a table.
+/// For processors without an FPU: heads, functions and pixels in integers.
 #[derive(Clone, Copy, Debug)]
 pub struct WithoutFpu;
 

@@ -1,25 +1,25 @@
 //! `pocketsplat eval`: how good a bundle or a file of Gaussians is, how large, how fast.
 
+mod drawn;
+mod evaluation;
 pub(crate) mod explicit;
 mod summary;
 
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::time::Instant;
 
-use crate::plot::ResultRow;
 use anyhow::{Result, bail};
 use pocketsplat_capture::camera::Camera;
-use pocketsplat_capture::dataset::{Capture, Image, Photograph, Split, View};
+use pocketsplat_capture::dataset::{Capture, Image, Split, View};
 use pocketsplat_codec::bundle::decoded_scene;
 use pocketsplat_codec::render::decoder::{core_image, core_image_of_tiers};
 use pocketsplat_codec::render::reference::{ReferenceScene, to_image};
 use pocketsplat_format::Bundle;
 use pocketsplat_format::bundle::crc32;
-use pocketsplat_metrics::{Lpips, colour_corrected, half_size_enlarged, psnr_db, psnr_db_masked, ssim_masked};
+use pocketsplat_metrics::{Lpips, psnr_db, psnr_db_masked};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
+use self::drawn::{drawn_views, mean, view_evaluations};
 use super::bundle::BundleFile;
 use super::capture::{CaptureArgs, views_of};
 use super::gaussians::{AxesArgs, GaussiansFile};
@@ -28,6 +28,8 @@ use super::output;
 use crate::config::named::{SPLITS, one_of};
 use crate::config::{CaptureOptions, Protocol};
 use crate::program;
+
+pub(crate) use evaluation::{Evaluation, TierEvaluation, ViewEvaluation};
 
 /// What draws the frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -80,102 +82,12 @@ pub(crate) struct Args {
     json: bool,
 }
 
-/// Figures of a bundle over a split of a capture; PSNR, SSIM and LPIPS are means over views of 8-bit images.
-#[derive(Debug, Serialize, Deserialize)]
-pub(crate) struct Evaluation {
-    /// What trained the bundle, and what measured it where that is another program.
-    #[serde(default)]
-    pub(crate) program: String,
-    pub(crate) psnr_db: f64,
-    /// With the colours of each frame brought to its photograph's by an affine map: the field's "cc".
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) cc_psnr_db: Option<f64>,
-    pub(crate) ssim: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) lpips: Option<f64>,
-    /// Which LPIPS: a figure of another network or range is another figure.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) lpips_of: Option<String>,
-    /// Of a copy of each photograph at half the size, enlarged again: what no detail at all scores.
-    pub(crate) half_size_copy_psnr_db: f64,
-    /// Of the file, bundle or not.
-    pub(crate) bundle_bytes: usize,
-    /// Checksum of a bundle: the figures are of this file and no other.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) bundle_crc: Option<u32>,
-    /// 0 where there are explicit Gaussians.
-    pub(crate) n_anchors: u32,
-    /// What there is to draw: offsets that no mask takes away.
-    pub(crate) n_gaussians: u64,
-    pub(crate) n_views: usize,
-    pub(crate) split: String,
-    pub(crate) renderer: String,
-    pub(crate) width_px: u32,
-    pub(crate) height_px: u32,
-    pub(crate) background: String,
-    /// From the bytes to what every view is drawn of, in memory: Gaussians, or the anchors whose heads give them view by view. The
-    /// fastest of a few times; `eval` of a file of Gaussians takes the one time in which it was read.
-    pub(crate) decode_s: f64,
-    /// Of the first view, which is drawn alone.
-    pub(crate) render_s_per_view: f64,
-    pub(crate) scratch_bytes: usize,
-    /// Of a .spz that shows another scene: with the other axes.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) psnr_with_other_axes_db: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) psnr_to_reference_db: Option<f64>,
-    /// The scene of each tier and those before it, where asked for.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub(crate) tiers: Vec<TierEvaluation>,
-    /// How the photographs were prepared, and the fingerprint of the capture.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) protocol: Option<Protocol>,
-    /// Each view by itself, in the order of the capture.
-    #[serde(default)]
-    pub(crate) views: Vec<ViewEvaluation>,
-}
-
-/// Figures of one view.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub(crate) struct ViewEvaluation {
-    pub(crate) name: String,
-    pub(crate) psnr_db: f64,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) cc_psnr_db: Option<f64>,
-    pub(crate) ssim: f64,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) lpips: Option<f64>,
-}
-
-/// Figures of the scene that consists of a tier and those before it.
-#[derive(Debug, Serialize, Deserialize)]
-pub(crate) struct TierEvaluation {
-    /// Share of the anchors that it leaves out.
-    pub(crate) pruning_rate: f64,
-    pub(crate) psnr_db: f64,
-}
-
 /// What is measured besides PSNR and SSIM.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Measurements<'a> {
     pub(crate) against_reference: bool,
     pub(crate) per_tier: bool,
     pub(crate) lpips: Option<&'a Lpips>,
-}
-
-impl Evaluation {
-    /// The figures as a row of results.
-    pub(crate) fn result_row(&self, submethod: String) -> ResultRow {
-        ResultRow {
-            submethod,
-            psnr_db: self.psnr_db,
-            ssim: Some(self.ssim),
-            lpips: self.lpips,
-            size_bytes: self.bundle_bytes as f64,
-            n_gaussians: Some(self.n_gaussians as f64),
-            program: Some(self.program.clone()),
-        }
-    }
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
@@ -213,20 +125,6 @@ pub(crate) fn timed<T>(decode: impl Fn() -> Result<T>) -> Result<(T, f64)> {
         decode_s = decode_s.min(seconds);
     }
     Ok((decoded, decode_s))
-}
-
-/// One drawn view and how it compares.
-#[derive(Clone)]
-struct DrawnView {
-    /// To draw it; the first view alone is not drawn beside others.
-    seconds: f64,
-    scratch_bytes: usize,
-    psnr_db: f64,
-    cc_psnr_db: f64,
-    ssim: f64,
-    lpips: Option<f64>,
-    psnr_to_reference_db: f64,
-    half_size_copy_psnr_db: f64,
 }
 
 /// The f64 reference's frame on the bundle's background, 8 bit.
@@ -331,67 +229,4 @@ pub(crate) fn measure(
         protocol: Some(Protocol::of(loaded, options)),
         views: of_views,
     })
-}
-
-/// Draws every view and compares it: the first alone, so that its time says something, then the others side by side.
-///
-/// * `draw`: the picture of a view, and the bytes of scratch that it took. * `to_reference`: PSNR of a picture to another renderer's.
-fn drawn_views(
-    views: &[View],
-    draw: impl Fn(&View) -> Result<(Image, usize)> + Sync,
-    to_reference: impl Fn(&Image, &View) -> f64 + Sync,
-    lpips: Option<&Lpips>,
-) -> Result<Vec<DrawnView>> {
-    let drawn = |view: &View| -> Result<(DrawnView, Image, Arc<Photograph>)> {
-        let started = Instant::now();
-        let (image, scratch_bytes) = draw(view)?;
-        let seconds = started.elapsed().as_secs_f64();
-        let photograph = view.photograph()?;
-        let (truth, mask) = (&photograph.image, photograph.mask.as_ref());
-        let row = DrawnView {
-            seconds,
-            scratch_bytes,
-            psnr_db: psnr_db_masked(&image, truth, mask),
-            cc_psnr_db: psnr_db_masked(&colour_corrected(&image, truth, mask), truth, mask),
-            ssim: ssim_masked(&image, truth, mask),
-            lpips: None,
-            psnr_to_reference_db: to_reference(&image, view),
-            half_size_copy_psnr_db: psnr_db_masked(&half_size_enlarged(truth), truth, mask),
-        };
-        Ok((row, image, photograph))
-    };
-    let (first, others) = views.split_at(1.min(views.len()));
-    let Some(lpips) = lpips else {
-        let side_by_side = |views: &[View]| views.par_iter().map(|view| Ok(drawn(view)?.0)).collect::<Result<Vec<_>>>();
-        return Ok([side_by_side(first)?, side_by_side(others)?].concat());
-    };
-    let mut rows = Vec::with_capacity(views.len());
-    // A few pictures at a time: those of all views may be more than the memory holds.
-    for views in std::iter::once(first).chain(others.chunks(rayon::current_num_threads())) {
-        let drawn = views.par_iter().map(&drawn).collect::<Result<Vec<_>>>()?;
-        // One view after another: the features of a view fill hundreds of bytes a pixel, and fill every thread by themselves.
-        for (row, image, photograph) in drawn {
-            let distance = lpips.distance(&image, &photograph.image, photograph.mask.as_ref())?;
-            rows.push(DrawnView { lpips: Some(distance), ..row });
-        }
-    }
-    Ok(rows)
-}
-
-fn mean(rows: &[DrawnView], value: fn(&DrawnView) -> f64) -> f64 {
-    rows.iter().map(value).sum::<f64>() / rows.len() as f64
-}
-
-/// Each view by itself, and the mean LPIPS where it is measured.
-fn view_evaluations(rows: &[DrawnView], views: &[View]) -> (Option<f64>, Vec<ViewEvaluation>) {
-    let of_view = |(row, view): (&DrawnView, &View)| ViewEvaluation {
-        name: view.name.clone(),
-        psnr_db: row.psnr_db,
-        cc_psnr_db: Some(row.cc_psnr_db),
-        ssim: row.ssim,
-        lpips: row.lpips,
-    };
-    let distances: Option<Vec<f64>> = rows.iter().map(|row| row.lpips).collect();
-    let mean = distances.map(|values| values.iter().sum::<f64>() / values.len() as f64);
-    (mean, rows.iter().zip(views).map(of_view).collect())
 }

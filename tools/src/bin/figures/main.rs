@@ -9,16 +9,18 @@
 //! A block begins with `<!-- table NAME -->` and ends with `<!-- end of table -->`.
 
 mod blocks;
+mod board;
 mod guides;
 mod links;
+mod picture;
 mod plan;
 mod rows;
 mod run;
 
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
+use std::process::{Command, ExitCode};
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use clap::{Parser, Subcommand};
 
 /// Runs, writes and checks the figures of the pages.
@@ -58,4 +60,11 @@ fn main() -> Result<ExitCode> {
 /// A path within the repository.
 fn in_repository(path: impl AsRef<Path>) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
+}
+
+/// What a command prints; it says what it does on the terminal.
+fn said_by(command: &mut Command) -> Result<Vec<u8>> {
+    let done = command.stderr(std::process::Stdio::piped()).output()?;
+    ensure!(done.status.success(), "{command:?} failed:\n{}", String::from_utf8_lossy(&done.stderr));
+    Ok(done.stdout)
 }

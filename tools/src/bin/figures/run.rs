@@ -6,21 +6,17 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result, ensure};
-use image::codecs::jpeg::JpegEncoder;
-use image::imageops::replace;
-use image::{Rgb, RgbImage};
 use pocketsplat_trainer::revision_of;
 use serde::Deserialize;
 use serde_json::Value;
 
+use super::picture::side_by_side;
 use super::plan::{Group, Plan};
 use super::rows::{self, Row};
-use super::{blocks, in_repository};
+use super::{blocks, board, in_repository, said_by};
 
 /// The capture that `synth` makes, where no folder is asked for.
 const PROCEDURAL: &str = "procedural";
-const GAP_PX: u32 = 6;
-const JPEG_QUALITY: u8 = 85;
 
 #[derive(clap::Args)]
 pub(super) struct Args {
@@ -253,27 +249,7 @@ impl GroupRuns<'_> {
 
     /// Of the slowest frame on the group's board, where it has one.
     fn instructions(&self, bundle: &Path, out: &Path) -> Result<Option<f64>> {
-        let Some((board, ram_kib)) = &self.group.board else { return Ok(None) };
-        let table = out.join("table.csv");
-        if !table.exists() {
-            fs::create_dir_all(out)?;
-            let mut script = Command::new(in_repository("firmware-example/measure.sh"));
-            script.arg(bundle).args([board, &ram_kib.to_string(), ""]).arg(out);
-            // Where `tools/ci.sh firmware` installs what the firmware is linked and read with.
-            let tools = in_repository("target/tools/bin").display().to_string();
-            script.env("PATH", format!("{tools}:{}", std::env::var("PATH").unwrap_or_default()));
-            fs::write(&table, said_by(&mut script)?)?;
-        }
-        let mut frames: Vec<(String, f64)> = Vec::new();
-        for record in csv::Reader::from_path(&table)?.into_records() {
-            let record = record?;
-            let (frame, instructions) = (&record[7], record[9].parse::<f64>()?);
-            match frames.iter_mut().find(|(other, _)| other == frame) {
-                Some((_, sum)) => *sum += instructions,
-                None => frames.push((frame.to_owned(), instructions)),
-            }
-        }
-        Ok(frames.iter().filter(|(frame, _)| frame != "-").map(|(_, sum)| *sum).reduce(f64::max))
+        self.group.board.as_ref().map(|(board, ram_kib)| board::instructions(bundle, board, *ram_kib, out)).transpose()
     }
 
     fn kept_curve(&self) -> Result<()> {
@@ -304,15 +280,8 @@ impl GroupRuns<'_> {
             self.call("render", &options)?;
             images.push(image::open(&png)?.to_rgb8());
         }
-        let width = images.iter().map(|image| image.width() + GAP_PX).sum::<u32>().saturating_sub(GAP_PX);
-        let height = images.iter().map(RgbImage::height).max().unwrap_or(0);
-        let (mut all, mut left_px) = (RgbImage::from_pixel(width, height, Rgb([255; 3])), 0);
-        for image in &images {
-            replace(&mut all, image, left_px, 0);
-            left_px += i64::from(image.width() + GAP_PX);
-        }
-        let file = fs::File::create(in_repository(format!("docs/results/figures/{}.jpg", self.group.name)))?;
-        Ok(JpegEncoder::new_with_quality(file, JPEG_QUALITY).encode_image(&all)?)
+        let file = in_repository(format!("docs/results/figures/{}.jpg", self.group.name));
+        side_by_side(&images, &file)
     }
 
     fn call(&self, command: &str, arguments: &[&std::ffi::OsStr]) -> Result<()> {
@@ -322,13 +291,6 @@ impl GroupRuns<'_> {
     fn output(&self, command: &str, arguments: &[&std::ffi::OsStr]) -> Result<Vec<u8>> {
         said_by(Command::new(self.program).arg(command).args(arguments))
     }
-}
-
-/// What a command prints; it says what it does on the terminal.
-fn said_by(command: &mut Command) -> Result<Vec<u8>> {
-    let done = command.stderr(std::process::Stdio::piped()).output()?;
-    ensure!(done.status.success(), "{command:?} failed:\n{}", String::from_utf8_lossy(&done.stderr));
-    Ok(done.stdout)
 }
 
 /// A run without its figures.

@@ -41,11 +41,13 @@ use crate::raster::Pixel;
 use pass::PlannedChunks;
 use source::GaussianSource;
 use splats::SplatStore;
+use strip::Painter;
 
 /// Draws frames of one bundle with the memory it was bound to, computed as `A` says.
 pub struct Decoder<'b, 's, A: Arithmetic = ReferenceArithmetic> {
     bundle: Bundle<'b>,
     plan: Plan,
+    painter: Painter,
     source: GaussianSource<'b, 's, A::Heads>,
     /// `[TILE_PIXELS]` of the current tile, or of each tile of a strip when strips are drawn in slabs.
     pixels: &'s mut [Pixel],
@@ -129,6 +131,50 @@ impl<'b, 's> Decoder<'b, 's> {
         scratch: impl Into<Scratch<'s>>,
     ) -> Result<Decoder<'b, 's, A>, DecodeError> {
         Decoder::bind_regions(bundle, plan, scratch.into())
+    }
+
+    /// As [`bind_in`](Self::bind_in), for two cores: two decoders of one scene, of which the first draws the upper half of a frame's rows of
+    /// tiles and the second the lower half, at the same time. No call of one waits for the other.
+    ///
+    /// ```
+    /// # fn main() -> Result<(), pocketsplat_core::DecodeError> {
+    /// # let bytes = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/example.psb"));
+    /// # let mut scratch = [0; 16 * 1024];
+    /// use pocketsplat_core::{Budget, Bundle, Decoder, Plan, ReferenceArithmetic};
+    ///
+    /// let bundle = Bundle::parse(bytes)?;
+    /// let plan = Plan::new(&bundle, &Budget::for_frame(32, 24).with_two_painters())?;
+    /// let decoders = Decoder::bind_two::<ReferenceArithmetic>(&bundle, plan, &mut scratch)?;
+    /// let camera = &bundle.header().preview;
+    /// let draw = |mut decoder: Decoder<'_, '_>| -> Result<usize, pocketsplat_core::DecodeError> {
+    ///     let mut drawing = decoder.begin(camera)?;
+    ///     let mut n_pixels = 0;
+    ///     while let Some(tile) = drawing.next_tile()? {
+    ///         n_pixels += tile.rgb.len();
+    ///     }
+    ///     Ok(n_pixels)
+    /// };
+    /// let n_pixels = std::thread::scope(|scope| {
+    ///     let threads = decoders.map(|decoder| scope.spawn(|| draw(decoder)));
+    ///     threads.map(|thread| thread.join().expect("no panic"))
+    /// });
+    /// assert_eq!(n_pixels, [Ok(32 * 16), Ok(32 * 8)]);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// As for [`bind`](Self::bind); [`DecodeError::PlanMismatch`] also for a plan without
+    /// [two painters](crate::Budget::with_two_painters), as `bind` has it for one with two.
+    ///
+    /// # Budget
+    /// As for [`bind`](Self::bind).
+    pub fn bind_two<A: Arithmetic>(
+        bundle: &Bundle<'b>,
+        plan: Plan,
+        scratch: impl Into<Scratch<'s>>,
+    ) -> Result<[Decoder<'b, 's, A>; 2], DecodeError> {
+        Decoder::bind_two_regions(bundle, plan, scratch.into())
     }
 }
 

@@ -28,6 +28,7 @@ pub(crate) struct Baker<'s> {
 }
 
 /// Gaussians evaluated when bound.
+#[derive(Clone, Copy)]
 pub(crate) struct BakedGaussians<'s> {
     records: &'s [BakedGaussian],
     starts: &'s [u32],

@@ -111,6 +111,8 @@ pub struct Budget {
     pub skips_damage: bool,
     /// The most that a frame may take, model instructions; [`u64::MAX`] for no limit.
     pub most_work: u64,
+    /// Whether two painters draw a frame, see [`with_two_painters`](Self::with_two_painters).
+    pub two_painters: bool,
 }
 
 impl Budget {
@@ -137,6 +139,7 @@ impl Budget {
             quality: Quality::EXACT,
             skips_damage: false,
             most_work: u64::MAX,
+            two_painters: false,
         }
     }
 
@@ -208,6 +211,17 @@ impl Budget {
     #[must_use]
     pub const fn with_most_work(self, most_work: u64) -> Self {
         Self { most_work, ..self }
+    }
+
+    /// Has two painters draw a frame at the same time, the first its upper rows of tiles, the second the lower ones: two cores, each with one of the
+    /// decoders that [`Decoder::bind_two`](crate::Decoder::bind_two) makes. The scene is in memory once; what the second painter has of its
+    /// own is a [part](crate::Part::SecondPainter) of the plan. [Strips](Self::with_strips), [splats](Self::with_max_splats) and
+    /// [work](Self::with_most_work) are then those of a painter.
+    ///
+    /// The pixels are those of one painter, unless splats are left out: each painter leaves out its own.
+    #[must_use]
+    pub const fn with_two_painters(self) -> Self {
+        Self { two_painters: true, ..self }
     }
 
     /// Frame, tiers, strips, quality and the places of slabs lie within their limits.

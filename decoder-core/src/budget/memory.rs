@@ -34,9 +34,13 @@ macro_rules! slices {
 }
 
 slices! {
-    /// The heads' weights, and the anchor that they are evaluated for.
+    /// The heads' weights.
+    HeadMemory: head_words, take_heads(shape) {
+        weights: [u32; shape.heads().words(shape.model.head_weights)],
+    }
+
+    /// The anchor that they are evaluated for.
     AnchorMemory: anchor_words, take_anchor(shape) {
-        heads: [u32; shape.heads().words(shape.model.head_weights)],
         row: [f32; shape.n_channels()],
         inputs: [f32; shape.heads().inputs()],
         hidden: [f32; shape.heads().hidden_len()],
@@ -47,6 +51,12 @@ slices! {
     /// What the models of the symbols work in.
     ModelMemory: models_words, take_models(shape) {
         words: [u32; shape.coder.words()],
+    }
+
+    /// What a second reader of anchors has of its own: a context's numbers, and the anchor that waits for another.
+    ReaderMemory: reader_words, take_reader(shape) {
+        models: [u32; if shape.resident.is_anchors() { 0 } else { shape.coder.own_words() }],
+        pair: [u32; shape.pair_words()],
     }
 
     /// Anchors between frames: their records, a bit a chunk, and the scale of each table.
@@ -87,10 +97,14 @@ slices! {
     }
 }
 
+/// Memory of the heads.
+pub(crate) struct HeadMemory<'s> {
+    /// The weights, in whatever format the arithmetic keeps them, and behind them the anchor that waits for another.
+    pub(crate) weights: &'s mut [u32],
+}
+
 /// Memory that anchors are evaluated in.
 pub(crate) struct AnchorMemory<'s> {
-    /// The weights, in whatever format the arithmetic keeps them.
-    pub(crate) heads: &'s mut [u32],
     /// `[n_channels]` of the current anchor.
     pub(crate) row: &'s mut [f32],
     /// The inputs of the head that sees most.
@@ -107,6 +121,14 @@ pub(crate) struct AnchorMemory<'s> {
 pub(crate) struct ModelMemory<'s> {
     /// As many as [`Bundle::anchor_scratch_words`](crate::Bundle::anchor_scratch_words) says.
     pub(crate) words: &'s mut [u32],
+}
+
+/// Memory of a second reader of anchors.
+pub(crate) struct ReaderMemory<'s> {
+    /// What the models of the symbols do not share; empty where nothing is decoded.
+    pub(crate) models: &'s mut [u32],
+    /// The anchor that waits for another, where two are evaluated at a time.
+    pub(crate) pair: &'s mut [u32],
 }
 
 /// Memory of sums.
@@ -151,14 +173,28 @@ pub(crate) struct FrameMemory<'s> {
     pub(crate) lists: ListMemory<'s>,
 }
 
+/// What the second painter has of its own.
+pub(crate) struct PainterMemory<'s> {
+    /// To read and evaluate anchors; `None` where Gaussians are in memory.
+    pub(crate) anchors: Option<(AnchorMemory<'s>, ReaderMemory<'s>)>,
+    /// To draw in.
+    pub(crate) frame: FrameMemory<'s>,
+}
+
 /// Memory of the scene: what stays between frames (`'s`), and what binding works in (`'f`).
 pub(crate) enum SceneMemory<'s, 'f> {
     /// Each frame decodes.
-    Streamed { anchor: AnchorMemory<'s>, models: ModelMemory<'s> },
+    Streamed { heads: HeadMemory<'s>, anchor: AnchorMemory<'s>, models: ModelMemory<'s> },
     /// Binding decodes.
-    Resident { anchor: AnchorMemory<'s>, records: RecordMemory<'s>, sums: SumsMemory<'s>, models: ModelMemory<'f> },
+    Resident {
+        heads: HeadMemory<'s>,
+        anchor: AnchorMemory<'s>,
+        records: RecordMemory<'s>,
+        sums: SumsMemory<'s>,
+        models: ModelMemory<'f>,
+    },
     /// Binding decodes and evaluates.
-    Baked { baked: BakedMemory<'s>, anchor: AnchorMemory<'f>, models: ModelMemory<'f> },
+    Baked { baked: BakedMemory<'s>, heads: HeadMemory<'f>, anchor: AnchorMemory<'f>, models: ModelMemory<'f> },
 }
 
 impl<'s, 'f> SceneMemory<'s, 'f> {
@@ -170,17 +206,19 @@ impl<'s, 'f> SceneMemory<'s, 'f> {
         if shape.resident.is_gaussians() {
             let baked = take_baked(shape, regions.of(Part::Scene))?;
             let mut free = regions.borrow();
+            let heads = take_heads(shape, free.of(Part::Heads))?;
             let anchor = take_anchor(shape, free.of(Part::Heads))?;
-            return Ok(Self::Baked { baked, anchor, models: take_models(shape, free.of(Part::Models))? });
+            return Ok(Self::Baked { baked, heads, anchor, models: take_models(shape, free.of(Part::Models))? });
         }
+        let heads = take_heads(shape, regions.of(Part::Heads))?;
         let anchor = take_anchor(shape, regions.of(Part::Heads))?;
         if shape.resident.is_anchors() {
             let records = take_records(shape, regions.of(Part::Scene))?;
             let sums = take_sums(shape, regions.of(Part::Scene))?;
             let models = take_models(shape, regions.borrow().of(Part::Models))?;
-            return Ok(Self::Resident { anchor, records, sums, models });
+            return Ok(Self::Resident { heads, anchor, records, sums, models });
         }
-        Ok(Self::Streamed { anchor, models: take_models(shape, regions.of(Part::Models))? })
+        Ok(Self::Streamed { heads, anchor, models: take_models(shape, regions.of(Part::Models))? })
     }
 }
 
@@ -194,6 +232,31 @@ impl<'s> FrameMemory<'s> {
         let splats = take_splats(shape, regions.of(Part::Splats))?;
         Ok(Self { tiles, splats, lists: take_lists(shape, regions.of(Part::Lists))? })
     }
+}
+
+impl<'s> PainterMemory<'s> {
+    /// Takes the memory of the second painter from what [`FrameMemory::take`] left.
+    ///
+    /// # Errors
+    /// As for [`SceneMemory::take`].
+    pub(crate) fn take(shape: &ScratchShape, regions: &mut Regions<'s>) -> Result<Self, DecodeError> {
+        let arena = regions.of(Part::SecondPainter);
+        let anchors = if shape.resident.is_gaussians() {
+            None
+        } else {
+            Some((take_anchor(shape, arena)?, take_reader(shape, arena)?))
+        };
+        let (tiles, splats) = (take_tiles(shape, arena)?, take_splats(shape, arena)?);
+        Ok(Self { anchors, frame: FrameMemory { tiles, splats, lists: take_lists(shape, arena)? } })
+    }
+}
+
+/// Words of what [`PainterMemory::take`] takes.
+const fn painter_words(shape: &ScratchShape) -> usize {
+    let anchors =
+        if shape.resident.is_gaussians() { 0 } else { anchor_words(shape).saturating_add(reader_words(shape)) };
+    let lists = splat_words(shape).saturating_add(list_words(shape));
+    anchors.saturating_add(tile_words(shape)).saturating_add(lists)
 }
 
 /// When a part is needed.
@@ -298,11 +361,14 @@ impl ScratchShape {
         [fast, slow]
     }
 
-    /// Words of a part, in the order that [`SceneMemory::take`] and [`FrameMemory::take`] take them.
+    /// Words of a part, as [`SceneMemory::take`], [`FrameMemory::take`] and [`PainterMemory::take`] take them.
     const fn words_of(&self, part: Part) -> (When, usize) {
         let (is_baked, is_resident) = (self.resident.is_gaussians(), self.resident.is_anchors());
         match part {
-            Part::Heads => (if is_baked { When::Bound } else { When::Kept }, anchor_words(self)),
+            Part::Heads => {
+                let words = head_words(self).saturating_add(anchor_words(self));
+                (if is_baked { When::Bound } else { When::Kept }, words)
+            }
             Part::Models => (if is_baked || is_resident { When::Bound } else { When::Kept }, models_words(self)),
             Part::Scene if is_baked => (When::Kept, baked_words(self)),
             Part::Scene if is_resident => (When::Kept, record_words(self).saturating_add(sums_words(self))),
@@ -310,6 +376,8 @@ impl ScratchShape {
             Part::Tiles => (When::Frame, tile_words(self)),
             Part::Splats => (When::Frame, splat_words(self)),
             Part::Lists => (When::Frame, list_words(self)),
+            Part::SecondPainter if self.frame.two_painters => (When::Frame, painter_words(self)),
+            Part::SecondPainter => (When::Frame, 0),
         }
     }
 }
@@ -328,8 +396,9 @@ const fn bytes_for(words: usize) -> usize {
 mod tests {
     use std::vec;
 
-    use super::{FrameMemory, Placement, Regions, SceneMemory};
+    use super::{FrameMemory, PainterMemory, Placement, Regions, SceneMemory};
     use crate::budget::{CoderShape, FrameShape, HeadWeights, ModelShape, RecordShape, Resident, ScratchShape};
+    use pocketsplat_format::DecodeError;
 
     /// A stream of numbers, the same every time.
     struct Numbers(u32);
@@ -375,7 +444,11 @@ mod tests {
                     },
                     _ => Resident::Gaussians { n_gaussians: self.below(2 * most), n_chunks: 1 + self.below(200) },
                 },
-                frame: FrameShape { canvas_tiles: 1 + self.below(100), max_splats: self.below(most) },
+                frame: FrameShape {
+                    canvas_tiles: 1 + self.below(100),
+                    max_splats: self.below(most),
+                    two_painters: self.below(2) == 1,
+                },
             }
         }
     }
@@ -428,6 +501,7 @@ mod tests {
             frame: FrameShape {
                 canvas_tiles: a.frame.canvas_tiles.max(b.frame.canvas_tiles),
                 max_splats: a.frame.max_splats.max(b.frame.max_splats),
+                two_painters: a.frame.two_painters | b.frame.two_painters,
             },
         }
     }
@@ -449,16 +523,20 @@ mod tests {
         let random = &mut Numbers(7);
         for round in 0..600 {
             let shape = random.shape(round % 3, 300);
-            let n_placement = random.below(64) as usize;
-            for placement in [Placement::FAST].into_iter().chain(Placement::to_try(true).nth(n_placement)) {
+            let n_placement = random.below(128) as usize;
+            for placement in [Placement::FAST].into_iter().chain(Placement::to_try(true, true).nth(n_placement)) {
                 let lens = shape.lens(placement);
                 let mut memory = lens.map(|len| vec![0; len]);
                 let mut take_all = |less: [usize; 2]| {
                     let [fast, slow] = &mut memory;
                     let [end_fast, end_slow] = [0, 1].map(|region| lens[region].saturating_sub(less[region]));
-                    let mut regions = Regions::new(&mut fast[..end_fast], &mut slow[..end_slow], placement);
+                    let mut regions = Regions::new([&mut fast[..end_fast], &mut slow[..end_slow]], placement);
                     SceneMemory::take(&shape, &mut regions)?;
-                    FrameMemory::take(&shape, &mut regions).map(|_| regions.n_words())
+                    FrameMemory::take(&shape, &mut regions)?;
+                    if shape.frame.two_painters {
+                        PainterMemory::take(&shape, &mut regions)?;
+                    }
+                    Ok::<_, DecodeError>(regions.n_words())
                 };
                 for (region, less) in [[7, 0], [0, 7]].into_iter().enumerate().filter(|(region, _)| lens[*region] > 7) {
                     assert!(take_all(less).is_err(), "a word less of region {region}: {placement:?} of {shape:?}");

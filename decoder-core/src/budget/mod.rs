@@ -17,7 +17,10 @@ mod work;
 
 pub use crate::mlp::HeadWeights;
 pub use limits::{Budget, MaxSplats, Overflow, Residency, Strips};
-pub(crate) use memory::{AnchorMemory, FrameMemory, ListMemory, ModelMemory, SceneMemory, SumsMemory, TileMemory};
+pub(crate) use memory::{
+    AnchorMemory, FrameMemory, HeadMemory, ListMemory, ModelMemory, PainterMemory, ReaderMemory, SceneMemory,
+    SumsMemory, TileMemory,
+};
 pub use placement::{Part, PartMemory};
 pub(crate) use placement::{Placement, Regions};
 pub use plan::Plan;

@@ -21,6 +21,9 @@ pub enum Part {
     Splats,
     /// Anchors, with their sums, or Gaussians in memory: once for each strip.
     Scene,
+    /// What the second of [two painters](crate::Budget::with_two_painters) has of its own: the current anchor, a context's numbers, tiles, lists
+    /// and splats. It reads heads, tables and the scene where the first does.
+    SecondPainter,
 }
 
 /// Where one part of the scratch memory lies, and how many bytes it takes.
@@ -38,11 +41,12 @@ pub struct PartMemory {
 
 impl Part {
     /// All, in this order.
-    pub const ALL: [Self; 6] = [Self::Heads, Self::Models, Self::Tiles, Self::Lists, Self::Splats, Self::Scene];
+    pub const ALL: [Self; 7] =
+        [Self::Heads, Self::Models, Self::Tiles, Self::Lists, Self::Splats, Self::Scene, Self::SecondPainter];
 
     /// Its bit in a [`Placement`]: the first part has the highest.
     const fn bit(self) -> u8 {
-        0b10_0000 >> self as u8
+        0b100_0000 >> self as u8
     }
 }
 
@@ -53,12 +57,14 @@ pub(crate) struct Placement(u8);
 
 impl Placement {
     /// Everything in fast memory.
-    pub(crate) const FAST: Self = Self(0b11_1111);
+    pub(crate) const FAST: Self = Self(0b111_1111);
 
     /// Those to choose from, the largest first: all of them, or [`FAST`](Self::FAST) alone where nothing is slow.
-    pub(super) fn to_try(has_slow: bool) -> impl Iterator<Item = Self> {
+    ///
+    /// * `two_painters`: if not, the second one's part is nowhere, and need not be tried in both.
+    pub(super) fn to_try(has_slow: bool, two_painters: bool) -> impl Iterator<Item = Self> {
         let last = if has_slow { 0 } else { Self::FAST.0 };
-        (last..=Self::FAST.0).rev().map(Self)
+        (last..=Self::FAST.0).rev().step_by(if two_painters { 1 } else { 2 }).map(Self)
     }
 
     /// Where a part lies.
@@ -76,7 +82,7 @@ pub(crate) struct Regions<'s> {
 
 impl<'s> Regions<'s> {
     /// Memory for a placement.
-    pub(crate) fn new(fast: &'s mut [u8], slow: &'s mut [u8], placement: Placement) -> Self {
+    pub(crate) fn new([fast, slow]: [&'s mut [u8]; 2], placement: Placement) -> Self {
         Self { fast: Arena::new(fast), slow: Arena::new(slow), placement }
     }
 
@@ -107,10 +113,14 @@ mod tests {
 
     #[test]
     fn placements_prefer_the_parts_that_come_first_in_fast_memory() {
-        let all: std::vec::Vec<_> = Placement::to_try(true).collect();
-        assert_eq!((all.len(), all.first()), (64, Some(&Placement::FAST)), "every one, all fast first");
+        let all: std::vec::Vec<_> = Placement::to_try(true, true).collect();
+        assert_eq!((all.len(), all.first()), (128, Some(&Placement::FAST)), "every one, all fast first");
         let fast = |placement: &Placement| Part::ALL.map(|part| placement.region(part) == Region::Fast);
         assert!(all.is_sorted_by(|a, b| fast(a) > fast(b)), "then without the last part, then without the one before");
-        assert_eq!(Placement::to_try(false).collect::<std::vec::Vec<_>>(), [Placement::FAST]);
+        let of_one: std::vec::Vec<_> = Placement::to_try(true, false).collect();
+        assert!(of_one.len() == 64 && of_one.iter().all(|placement| placement.0 & 1 == 1), "no second painter");
+        for two_painters in [false, true] {
+            assert_eq!(Placement::to_try(false, two_painters).collect::<std::vec::Vec<_>>(), [Placement::FAST]);
+        }
     }
 }

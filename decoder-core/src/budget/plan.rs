@@ -125,7 +125,7 @@ impl Plan {
         self.shape.model.head_weights
     }
 
-    /// Horizontal strips of a frame.
+    /// Horizontal strips of a frame; of [two painters](Budget::with_two_painters) of each one's rows.
     #[must_use]
     pub fn n_strips(&self) -> u8 {
         self.n_strips
@@ -138,7 +138,7 @@ impl Plan {
         self.n_slabs
     }
 
-    /// Splats that there is memory for at once.
+    /// Splats that there is memory for at once; of [two painters](Budget::with_two_painters) for each.
     #[must_use]
     pub fn max_splats(&self) -> u32 {
         self.shape.frame.max_splats
@@ -228,7 +228,7 @@ impl Planner<'_, '_> {
         // Halves before fewer tiers.
         for (n_tiers, weights) in tiers.flat_map(|n| [(n, HeadWeights::F32), (n, HeadWeights::F16)]) {
             let mut best: Option<(u64, Plan)> = None;
-            for placement in Placement::to_try(has_slow) {
+            for placement in Placement::to_try(has_slow, budget.two_painters) {
                 for (n_strips, residency) in self.variants() {
                     let (cost, plan) = self.variant(n_tiers, n_strips, residency, weights, placement);
                     let needed = match region {
@@ -312,12 +312,18 @@ impl Planner<'_, '_> {
         let tier = bundle.up_to_tier(n_tiers);
         let measures = self.measures(n_tiers);
         let in_slabs = budget.overflow == Overflow::Slabs;
-        let canvas_tiles = if in_slabs { tiles_of_strip([budget.width_px, budget.height_px], n_strips) } else { 1 };
+        let strips_of_frame = n_strips.saturating_mul(if budget.two_painters { 2 } else { 1 });
+        let canvas_tiles =
+            if in_slabs { tiles_of_strip([budget.width_px, budget.height_px], strips_of_frame) } else { 1 };
         let resident = self.resident(residency, n_tiers, tier, weights);
         // Gaussians are evaluated once, with weights in f32.
         let weights = if resident.is_gaussians() { HeadWeights::F32 } else { weights };
-        let wanted = self.splats_to_hold(budget.max_splats, n_tiers, n_strips, weights);
-        let mut shape = ScratchShape::of(bundle, resident, FrameShape { canvas_tiles, max_splats: wanted });
+        let wanted = self.splats_to_hold(budget.max_splats, n_tiers, strips_of_frame, weights);
+        let mut shape = ScratchShape::of(
+            bundle,
+            resident,
+            FrameShape { canvas_tiles, max_splats: wanted, two_painters: budget.two_painters },
+        );
         shape.model.head_weights = weights;
         if !budget.quality.detail {
             shape.model.detail_hidden = 0;
@@ -328,7 +334,7 @@ impl Planner<'_, '_> {
         }
         // Each slab but the last keeps at least half of the places.
         let fullest = match budget.max_splats {
-            MaxSplats::AtMost(_) => self.splats_to_hold(MaxSplats::Measured, n_tiers, n_strips, weights),
+            MaxSplats::AtMost(_) => self.splats_to_hold(MaxSplats::Measured, n_tiers, strips_of_frame, weights),
             MaxSplats::Measured | MaxSplats::Worst => wanted,
         };
         let places = shape.frame.max_splats.max(1);
@@ -394,6 +400,8 @@ impl Planner<'_, '_> {
     }
 
     /// Splats of a strip to have memory for.
+    ///
+    /// * `n_strips`: of the frame.
     fn splats_to_hold(&self, max_splats: MaxSplats, n_tiers: u8, n_strips: u8, weights: HeadWeights) -> u32 {
         let header = self.bundle.header();
         // At most 2²⁴ anchors of 32 offsets.

@@ -122,6 +122,8 @@ pub struct FrameShape {
     pub canvas_tiles: u32,
     /// Splats in memory.
     pub max_splats: u32,
+    /// Whether there are two [painters](crate::Budget::with_two_painters), each with as much.
+    pub two_painters: bool,
 }
 
 /// Inputs of a context at most: of a grid, or of a parent that gives `n_parent`.
@@ -135,6 +137,11 @@ impl CoderShape {
     /// Words that the models of the symbols work in.
     pub(super) const fn words(&self) -> usize {
         model_words(self.n_tables, self.context_inputs, self.context_hidden, self.context_kept)
+    }
+
+    /// Those of them that are one reader's own: tables are read alone.
+    pub(super) const fn own_words(&self) -> usize {
+        model_words(0, self.context_inputs, self.context_hidden, self.context_kept)
     }
 }
 
@@ -195,7 +202,7 @@ impl ScratchShape {
             },
             record: RecordShape { symbol_bits: [16; 3], lattice_bits: MAX_LATTICE_BITS, masks: true },
             resident: Resident::Nothing,
-            frame: FrameShape { canvas_tiles: 1, max_splats: 0 },
+            frame: FrameShape { canvas_tiles: 1, max_splats: 0, two_painters: false },
         }
     }
 
@@ -265,6 +272,14 @@ impl ScratchShape {
             detail: limited(model.detail_hidden, MAX_FEATURE_DIM),
             offsets: limited(model.n_offsets, MAX_OFFSETS),
         }
+    }
+
+    /// Words of a second painter's anchor that waits for another, where two are evaluated at a time, which is where weights are halves. Never
+    /// so many that floats would take less; with fewer it evaluates one at a time.
+    pub(super) const fn pair_words(&self) -> usize {
+        let heads = self.heads();
+        let saved = heads.words(HeadWeights::F32).saturating_sub(heads.words(self.model.head_weights));
+        if saved < heads.pair_words() { saved } else { heads.pair_words() }
     }
 
     /// Channels of an anchor: features, log-scales, offsets.

@@ -7,12 +7,13 @@ use super::Decoder;
 use super::scratch::Scratch;
 use super::source::{AnchorSource, Anchors, GaussianSource};
 use super::splats::SplatStore;
+use super::strip::Painter;
 use crate::arena::Arena;
 use crate::arithmetic::Arithmetic;
 use crate::bake::{BakedGaussians, BakedMemory, Baker, bake};
 use crate::budget::{
-    AnchorMemory, FrameMemory, ListMemory, ModelMemory, Part, Plan, Regions, SceneMemory, ScratchShape, SumsMemory,
-    TileMemory,
+    AnchorMemory, Budget, FrameMemory, HeadMemory, ListMemory, ModelMemory, PainterMemory, Part, Plan, Regions,
+    SceneMemory, ScratchShape, SumsMemory, TileMemory,
 };
 use crate::mlp::{F32, FeatureSums, HeadFormat, Heads};
 use crate::scene::{Evaluator, Pair, Workspace};
@@ -24,27 +25,48 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
         plan: Plan,
         Scratch { fast, slow }: Scratch<'s>,
     ) -> Result<Self, DecodeError> {
-        check_plan(bundle, &plan)?;
-        let fast = front(fast, plan.scratch_len(), Region::Fast)?;
-        let slow = front(slow, plan.slow_scratch_len(), Region::Slow)?;
-        // Before anything else, in memory that is taken again after it: the deepest calls come while no result waits on the stack.
-        read_chunks(bundle, &plan, [&mut *fast, &mut *slow])?;
-        Self::prepare(bundle, plan, [fast, slow])
+        let regions = read_scene(bundle, &plan, [fast, slow], false)?;
+        Self::prepare(bundle, plan, regions)
     }
 
-    /// The same, after resident anchors were decoded.
+    /// The same of both painters.
+    pub(super) fn bind_two_regions(
+        bundle: &Bundle<'b>,
+        plan: Plan,
+        Scratch { fast, slow }: Scratch<'s>,
+    ) -> Result<[Self; 2], DecodeError> {
+        let regions = read_scene(bundle, &plan, [fast, slow], true)?;
+        Self::prepare_two(bundle, plan, regions)
+    }
+
+    /// The decoder, after resident anchors were decoded.
     // Not inlined, here and below: a caller's stack frame would keep what only one of the steps needs.
     #[inline(never)]
-    fn prepare(bundle: &Bundle<'b>, plan: Plan, [fast, slow]: [&'s mut [u8]; 2]) -> Result<Self, DecodeError> {
-        let mut regions = Regions::new(fast, slow, plan.placement());
+    fn prepare(bundle: &Bundle<'b>, plan: Plan, regions: [&'s mut [u8]; 2]) -> Result<Self, DecodeError> {
+        let mut regions = Regions::new(regions, plan.placement());
         let mut source = bind_scene(bundle, &plan, &mut regions);
         if let Ok(GaussianSource::Anchors(anchors)) = &mut source {
             anchors.fill_sums()?;
         }
-        Self::of_parts(bundle, plan, source, regions)
+        let frame = FrameMemory::take(plan.shape(), &mut regions);
+        Self::of_parts(bundle, plan, source, frame, Painter::Alone)
     }
 
-    /// The decoder of a scene; what is left of `regions` is for frames.
+    /// The same of both painters.
+    #[inline(never)]
+    fn prepare_two(bundle: &Bundle<'b>, plan: Plan, regions: [&'s mut [u8]; 2]) -> Result<[Self; 2], DecodeError> {
+        let mut regions = Regions::new(regions, plan.placement());
+        let mut source = bind_scene(bundle, &plan, &mut regions)?;
+        if let GaussianSource::Anchors(anchors) = &mut source {
+            anchors.fill_sums()?;
+        }
+        let frame = FrameMemory::take(plan.shape(), &mut regions);
+        let PainterMemory { anchors, frame: second_frame } = PainterMemory::take(plan.shape(), &mut regions)?;
+        let second = Self::of_parts(bundle, plan, source.shared(anchors), Ok(second_frame), Painter::Second)?;
+        Ok([Self::of_parts(bundle, plan, Ok(source), frame, Painter::First)?, second])
+    }
+
+    /// The decoder of a scene.
     ///
     /// * `source`: not unpacked by the caller, whose stack frame would hold it twice.
     #[inline(never)]
@@ -52,20 +74,37 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
         bundle: &Bundle<'b>,
         plan: Plan,
         source: Result<GaussianSource<'b, 's, A::Heads>, DecodeError>,
-        mut regions: Regions<'s>,
+        frame: Result<FrameMemory<'s>, DecodeError>,
+        painter: Painter,
     ) -> Result<Self, DecodeError> {
         let source = source?;
-        let FrameMemory { tiles, splats, lists } = FrameMemory::take(plan.shape(), &mut regions)?;
+        let FrameMemory { tiles, splats, lists } = frame?;
         let (TileMemory { pixels, rgb, counts }, ListMemory { rects, order, spare }) = (tiles, lists);
         let splats = SplatStore::new(splats.splats, rects, [order, spare], counts);
-        Ok(Self { bundle: *bundle, plan, source, pixels, rgb, splats })
+        Ok(Self { bundle: *bundle, plan, painter, source, pixels, rgb, splats })
     }
 }
 
-/// Whether `plan` is one of this bundle.
+/// The front of the memory, as long as the plan says, with resident anchors decoded in it.
+#[inline(always)]
+fn read_scene<'s>(
+    bundle: &Bundle<'_>,
+    plan: &Plan,
+    [fast, slow]: [&'s mut [u8]; 2],
+    two_painters: bool,
+) -> Result<[&'s mut [u8]; 2], DecodeError> {
+    check_plan(bundle, plan, two_painters)?;
+    let fast = front(fast, plan.scratch_len(), Region::Fast)?;
+    let slow = front(slow, plan.slow_scratch_len(), Region::Slow)?;
+    // Before anything else, in memory that is taken again after it: the deepest calls come while no result waits on the stack.
+    read_chunks(bundle, plan, [&mut *fast, &mut *slow])?;
+    Ok([fast, slow])
+}
+
+/// Whether `plan` is one of this bundle, for as many painters.
 #[inline(never)]
-fn check_plan(bundle: &Bundle<'_>, plan: &Plan) -> Result<(), DecodeError> {
-    let needed = Plan::new(bundle, plan.budget())?;
+fn check_plan(bundle: &Bundle<'_>, plan: &Plan, two_painters: bool) -> Result<(), DecodeError> {
+    let needed = Plan::new(bundle, &Budget { two_painters, ..*plan.budget() })?;
     if !needed.draws_as(plan) {
         let [needed, planned] =
             [&needed, plan].map(|plan| saturate(plan.scratch_len().saturating_add(plan.slow_scratch_len())));
@@ -98,11 +137,14 @@ fn bind_scene<'b, 's, N: HeadFormat>(
     let (anchor, kept, sums) = match SceneMemory::take(shape, regions)? {
         // Unreachable without the feature; this arm drops the code.
         SceneMemory::Baked { .. } if !cfg!(feature = "baked") => return Err(DecodeError::Internal),
-        SceneMemory::Baked { baked, anchor, models } => {
+        SceneMemory::Baked { baked, heads, anchor, models } => {
+            let anchor = (heads, anchor);
             return bind_baked(bundle, shape, baked, anchor, models, skip_damage).map(GaussianSource::Baked);
         }
-        SceneMemory::Streamed { anchor, models } => (anchor, AnchorStorage::Models(models), None),
-        SceneMemory::Resident { anchor, records, sums, .. } => (anchor, AnchorStorage::Anchors(records), Some(sums)),
+        SceneMemory::Streamed { heads, anchor, models } => ((heads, anchor), AnchorStorage::Models(models), None),
+        SceneMemory::Resident { heads, anchor, records, sums, .. } => {
+            ((heads, anchor), AnchorStorage::Anchors(records), Some(sums))
+        }
     };
     let evaluator = evaluator(bundle, shape, anchor, sums, regions.of(Part::Tiles).borrow());
     anchors(bundle, shape, kept, evaluator)
@@ -145,7 +187,7 @@ fn bind_baked<'s>(
     bundle: &Bundle<'_>,
     shape: &ScratchShape,
     baked: BakedMemory<'s>,
-    anchor: AnchorMemory<'_>,
+    anchor: (HeadMemory<'_>, AnchorMemory<'_>),
     models: ModelMemory<'_>,
     skip_damage: bool,
 ) -> Result<BakedGaussians<'s>, DecodeError> {
@@ -159,12 +201,12 @@ fn bind_baked<'s>(
 fn evaluator<'s, N: HeadFormat>(
     bundle: &Bundle<'_>,
     shape: &ScratchShape,
-    memory: AnchorMemory<'s>,
+    (HeadMemory { weights }, memory): (HeadMemory<'s>, AnchorMemory<'s>),
     sums: Option<SumsMemory<'s>>,
     mut free: Arena<'_>,
 ) -> Result<EvaluatorAndRow<'s, N>, DecodeError> {
-    let AnchorMemory { heads, row, inputs, hidden, detail_sums, outputs } = memory;
-    let mut arena = Arena::of_words(heads);
+    let AnchorMemory { row, inputs, hidden, detail_sums, outputs } = memory;
+    let mut arena = Arena::of_words(weights);
     let heads = Heads::convert(&mut arena, &mut free, shape.model.head_weights, bundle.heads(), shape.heads());
     let work = Workspace { hidden, detail_sums, outputs };
     let sums = sums.filter(|_| N::READS_SUMS && shape.resident.has_sums());
@@ -190,7 +232,7 @@ fn evaluator_of<'s, N: HeadFormat>(
 #[inline(never)]
 fn read_chunks(bundle: &Bundle<'_>, plan: &Plan, [fast, slow]: [&mut [u8]; 2]) -> Result<(), DecodeError> {
     let (shape, skip_damage) = (plan.shape(), plan.budget().skips_damage);
-    let mut regions = Regions::new(fast, slow, plan.placement());
+    let mut regions = Regions::new([fast, slow], plan.placement());
     match SceneMemory::take(shape, &mut regions)? {
         SceneMemory::Resident { anchor, mut records, models, .. } => {
             let n_chunks = shape.resident.n_chunks();
@@ -207,7 +249,7 @@ pub(super) fn evaluate_scene<'s>(
     bundle: &Bundle<'_>,
     shape: &ScratchShape,
     baked: BakedMemory<'s>,
-    anchor: AnchorMemory<'_>,
+    anchor: (HeadMemory<'_>, AnchorMemory<'_>),
     models: ModelMemory<'_>,
     skip_damage: bool,
 ) -> Result<Baker<'s>, DecodeError> {

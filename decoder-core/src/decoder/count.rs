@@ -23,11 +23,11 @@ pub fn count_scratch_len(bundle: &Bundle<'_>) -> usize {
 /// [`count_scratch_len`] bytes of `scratch`. Decodes and evaluates every anchor.
 pub fn count_gaussians(bundle: &Bundle<'_>, scratch: &mut [u8]) -> Result<[u32; MAX_TIERS as usize], DecodeError> {
     let shape = shape(bundle);
-    let mut regions = Regions::new(scratch, &mut [], Placement::FAST);
-    let SceneMemory::Baked { baked, anchor, models } = SceneMemory::take(&shape, &mut regions)? else {
+    let mut regions = Regions::new([scratch, &mut []], Placement::FAST);
+    let SceneMemory::Baked { baked, heads, anchor, models } = SceneMemory::take(&shape, &mut regions)? else {
         return Err(DecodeError::NotBakeable);
     };
-    let baker = bind::evaluate_scene(bundle, &shape, baked, anchor, models, false)?;
+    let baker = bind::evaluate_scene(bundle, &shape, baked, (heads, anchor), models, false)?;
     let mut counts = [0; MAX_TIERS as usize];
     for (tier, count) in (1..).zip(&mut counts) {
         *count = baker.n_of_first(bundle.up_to_tier(tier).n_chunks);
@@ -38,5 +38,5 @@ pub fn count_gaussians(bundle: &Bundle<'_>, scratch: &mut [u8]) -> Result<[u32; 
 /// Memory that keeps no Gaussian.
 fn shape(bundle: &Bundle<'_>) -> ScratchShape {
     let resident = Resident::Gaussians { n_gaussians: 0, n_chunks: bundle.n_chunks() };
-    ScratchShape::of(bundle, resident, FrameShape { canvas_tiles: 1, max_splats: 0 })
+    ScratchShape::of(bundle, resident, FrameShape { canvas_tiles: 1, max_splats: 0, two_painters: false })
 }

@@ -88,7 +88,8 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
             target.end_earlier(&frame.view);
         }
         if let OverflowPolicy::Slabs { index: index @ IndexState::Due } = &mut frame.policy {
-            (*index, target.band, target.makes_index) = (IndexState::Made, None, true);
+            *index = IndexState::Made;
+            (target.band, target.makes_index) = (frame.band_of_all(), true);
         }
         let decodes = u8::from(self.source.is_streamed());
         frame.report.decode_passes = frame.report.decode_passes.saturating_add(decodes);

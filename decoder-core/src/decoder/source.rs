@@ -6,8 +6,9 @@ use pocketsplat_format::bundle::{AnchorModels, AnchorRecords, AnchorSite, Chunk,
 use pocketsplat_format::{DecodeError, Stage, Stopwatch};
 
 use crate::bake::BakedGaussians;
+use crate::budget::{AnchorMemory, ReaderMemory};
 use crate::mlp::HeadFormat;
-use crate::scene::Evaluator;
+use crate::scene::{Evaluator, Workspace};
 
 /// The scene of the planned tiers.
 #[expect(clippy::large_enum_variant, reason = "a decoder has one, and there is no allocator to box with")]
@@ -41,16 +42,44 @@ impl<N: HeadFormat> GaussianSource<'_, '_, N> {
     }
 }
 
+impl<'s, N: HeadFormat> GaussianSource<'_, 's, N> {
+    /// The same scene for a second painter, which reads it at the same time.
+    ///
+    /// * `memory`: what it needs of its own to read anchors.
+    pub(super) fn shared(&self, memory: Option<(AnchorMemory<'s>, ReaderMemory<'s>)>) -> Result<Self, DecodeError> {
+        Ok(match (self, memory) {
+            // Unreachable without the feature; this arm drops the code.
+            (Self::Baked(baked), _) if cfg!(feature = "baked") => Self::Baked(*baked),
+            (Self::Anchors(anchors), Some(memory)) => Self::Anchors(anchors.shared(memory)?),
+            _ => return Err(DecodeError::Internal),
+        })
+    }
+}
+
+impl<'s, N: HeadFormat> Anchors<'_, 's, N> {
+    /// The same anchors and heads for a second painter.
+    fn shared(&self, (anchor, reader): (AnchorMemory<'s>, ReaderMemory<'s>)) -> Result<Self, DecodeError> {
+        let AnchorMemory { row, inputs, hidden, detail_sums, outputs } = anchor;
+        let source = match &self.source {
+            AnchorSource::Streamed(models) => AnchorSource::Streamed(models.shared(reader.models)?),
+            AnchorSource::Resident(records) => AnchorSource::Resident(*records),
+        };
+        let evaluator = self.evaluator.shared(inputs, Workspace { hidden, detail_sums, outputs }, reader.pair);
+        Ok(Self { source, row, evaluator })
+    }
+}
+
 impl<N: HeadFormat> Anchors<'_, '_, N> {
     /// Makes the sums of all anchors' features, where they are kept; nothing reads the features after that.
     #[inline(never)]
     pub(super) fn fill_sums(&mut self) -> Result<(), DecodeError> {
         let Self { source: AnchorSource::Resident(records), row, evaluator } = self else { return Ok(()) };
         let Some(sums) = evaluator.sums.as_mut().filter(|_| cfg!(feature = "baked")) else { return Ok(()) };
-        for (number, sums) in (0..).zip(sums.each_mut()) {
+        sums.fill(|number, sums| {
             records.read(number, row).ok_or(DecodeError::Internal)?;
             evaluator.heads.begin(row.get(..evaluator.heads.shape.feature).unwrap_or_default(), sums);
-        }
+            Ok::<_, DecodeError>(())
+        })?;
         *records = records.without_features();
         Ok(())
     }

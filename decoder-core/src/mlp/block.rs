@@ -18,12 +18,14 @@ pub enum HeadWeights {
 }
 
 /// A dense layer: `[n_blocks, 1 + n_in, B]`, each block beginning with its biases.
+#[derive(Clone, Copy)]
 pub(crate) struct Blocks<'s, const B: usize> {
     rows_per_block: usize,
     rows: Rows<'s, B>,
 }
 
 /// Rows of weights.
+#[derive(Clone, Copy)]
 enum Rows<'s, const B: usize> {
     F32(&'s [[f32; B]]),
     F16(&'s [[Half; B]]),

@@ -10,6 +10,7 @@ use crate::arena::Arena;
 /// `W2·relu(W1·[feature, colour] + b1) + b2`.
 ///
 /// Inputs are taken in ascending order, so the sums over the feature are the same for all Gaussians of an anchor.
+#[derive(Clone, Copy)]
 pub(crate) struct Detail<'s> {
     // In f32 whatever the other heads are kept in: what it reads of them comes from their outputs.
     head: Head<'s, 3>,

@@ -15,13 +15,13 @@ pub(crate) struct F32;
 pub(crate) struct I16;
 
 /// A format of the heads.
-pub(crate) trait HeadFormat {
+pub(crate) trait HeadFormat: Copy {
     /// Whether hidden layers go on from sums over the feature.
     const READS_SUMS: bool;
     /// What a layer reads.
     type Values<'v>: Copy;
-    /// A head of B outputs an offset.
-    type Head<'s, const B: usize>: MlpHead<'s, Self, B>;
+    /// A head of B outputs an offset; it reads its weights alone, so that several painters may have the same.
+    type Head<'s, const B: usize>: MlpHead<'s, Self, B> + Copy;
 
     /// Puts the heads' inputs into this format, in their own memory.
     fn values(inputs: &mut [f32]) -> Self::Values<'_>;

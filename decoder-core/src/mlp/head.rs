@@ -11,12 +11,14 @@ use super::weight::LANES;
 use crate::arena::Arena;
 
 /// One head in floats; its output layer has blocks of `B` outputs.
+#[derive(Clone, Copy)]
 pub(crate) struct Head<'s, const B: usize> {
     pub(super) hidden: Hidden<'s>,
     pub(super) output: Blocks<'s, B>,
 }
 
 /// The hidden layer of a head.
+#[derive(Clone, Copy)]
 pub(super) struct Hidden<'s> {
     pub(super) blocks: Blocks<'s, LANES>,
     pub(super) n_units: usize,

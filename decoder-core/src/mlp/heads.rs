@@ -11,6 +11,7 @@ use super::shape::HeadShape;
 use crate::arena::Arena;
 
 /// The heads, one block of outputs an offset: none is computed for an offset that is not drawn.
+#[derive(Clone, Copy)]
 pub(crate) struct Heads<'s, N: HeadFormat> {
     pub(crate) shape: HeadShape,
     pub(crate) opacity: N::Head<'s, 1>,
@@ -20,6 +21,7 @@ pub(crate) struct Heads<'s, N: HeadFormat> {
 }
 
 /// The covariance head.
+#[derive(Clone, Copy)]
 pub(crate) enum CovarianceHead<'s, N: HeadFormat> {
     /// A scale logit an offset.
     Isotropic(N::Head<'s, 1>),

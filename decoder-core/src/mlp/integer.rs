@@ -87,6 +87,7 @@ impl<'v> Quantised<'v> {
 }
 
 /// One head; its output layer has blocks of `B` outputs.
+#[derive(Clone, Copy)]
 pub(crate) struct IntegerHead<'s, const B: usize> {
     /// `[n_blocks, ⌈(1 + n_in)/2⌉, LANES]`, the bias before the weights.
     hidden: &'s [[Pair; LANES]],

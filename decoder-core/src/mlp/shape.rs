@@ -58,7 +58,7 @@ impl HeadShape {
     }
 
     /// Words of the anchor that waits for a second one, and of what is computed for the second one beside the first.
-    const fn pair_words(&self) -> usize {
+    pub(crate) const fn pair_words(&self) -> usize {
         3 * self.offsets + self.inputs() + self.pair_units_len()
     }
 

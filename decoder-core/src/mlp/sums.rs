@@ -7,7 +7,9 @@ use super::shape::HeadShape;
 
 /// The sums of all anchors.
 pub(crate) struct FeatureSums<'s> {
-    sums: &'s mut [f32],
+    /// Memory that is not filled yet.
+    empty: &'s mut [f32],
+    sums: &'s [f32],
     len: usize,
 }
 
@@ -22,12 +24,22 @@ pub(crate) struct AnchorSums<'p> {
 impl<'s> FeatureSums<'s> {
     /// * `sums`: memory of any content. * `len`: of an anchor.
     pub(crate) fn new(sums: &'s mut [f32], len: usize) -> Self {
-        Self { sums, len }
+        Self { empty: sums, sums: &[], len }
     }
 
-    /// Those of each anchor, to be filled by [`Heads::begin`](super::Heads::begin).
-    pub(crate) fn each_mut(&mut self) -> impl Iterator<Item = &mut [f32]> {
-        self.sums.chunks_exact_mut(self.len.max(1))
+    /// Fills those of each anchor, as [`Heads::begin`](super::Heads::begin) does.
+    pub(crate) fn fill<E>(&mut self, mut fill: impl FnMut(u32, &mut [f32]) -> Result<(), E>) -> Result<(), E> {
+        let memory = core::mem::take(&mut self.empty);
+        for (number, sums) in (0..).zip(memory.chunks_exact_mut(self.len.max(1))) {
+            fill(number, sums)?;
+        }
+        self.sums = memory;
+        Ok(())
+    }
+
+    /// The same for another painter, once they are filled.
+    pub(crate) fn shared(&self) -> Self {
+        Self { empty: &mut [], ..*self }
     }
 
     /// Those of anchor `number` of the file.

@@ -62,6 +62,17 @@ impl Waiting {
     }
 }
 
+impl<'s, N: HeadFormat> Evaluator<'s, N> {
+    /// The same heads, for a second painter.
+    ///
+    /// * `pair`: words for the anchor that waits, if there is room for one.
+    pub(crate) fn shared(&self, inputs: &'s mut [f32], work: Workspace<'s>, pair: &'s mut [u32]) -> Self {
+        let heads = self.heads;
+        let pair = if heads.takes_two() { Pair::take(&mut Arena::of_words(pair), heads.shape) } else { None };
+        Self { heads, inputs, work, pair, sums: self.sums.as_ref().map(FeatureSums::shared) }
+    }
+}
+
 impl<N: HeadFormat> Evaluator<'_, N> {
     /// Hands the Gaussians of `anchor` that a camera at `eye` can see to `sink`, now or when the next anchor comes; in the order of
     /// the anchors.

@@ -141,7 +141,28 @@ fn context_lens(context: &Context<'_>) -> [usize; 3] {
     [context.n_inputs(), context.n_hidden(), context.n_kept()]
 }
 
-impl AnchorModels<'_, '_> {
+impl<'b, 's> AnchorModels<'b, 's> {
+    /// The same models for another reader, which reads other anchors at the same time: tables are read by both, a context works in `scratch`.
+    ///
+    /// * `scratch`: what [`model_words`] says of no table, and of the context if there is one; of any content.
+    ///
+    /// # Errors
+    /// [`DecodeError::BufferTooShort`].
+    pub fn shared(&self, scratch: &'s mut [u32]) -> Result<Self, DecodeError> {
+        let channels = match &self.channels {
+            ChannelModels::Static(tables) => ChannelModels::Static(*tables),
+            ChannelModels::Context(_) if !cfg!(feature = "context") => return Err(DecodeError::Internal),
+            ChannelModels::Context(models) => {
+                let halves: &'s mut [i16] = bytemuck::try_cast_slice_mut(scratch).map_err(|_| DecodeError::Internal)?;
+                let [needed, available] = [models.numbers.len(), halves.len()].map(|n| saturate(n.div_ceil(2)));
+                let too_short = DecodeError::BufferTooShort { field: Field::ModelBuffer, needed, available };
+                let numbers = halves.get_mut(..models.numbers.len()).ok_or(too_short)?;
+                ChannelModels::Context(ContextModels { numbers, ..*models })
+            }
+        };
+        Ok(Self { channels, ..*self })
+    }
+
     /// Channels of an anchor.
     #[must_use]
     pub fn n_channels(&self) -> usize {

@@ -1,0 +1,351 @@
+//! Two painters, each in a thread of its own: the tiles of one decoder, in memory that the plan tells exactly.
+
+use std::convert::Infallible;
+use std::fs;
+use std::path::Path;
+use std::thread;
+
+use pocketsplat_core::{
+    Arithmetic, Budget, Bundle, Camera, DecodeError, Decoder, ErrorClass, FrameReport, HeadWeights, MaxSplats,
+    Overflow, Part, Plan, ReferenceArithmetic, Region, Residency, Strips, Tile, TileSink, WithoutFpu,
+};
+
+/// Every tile in the order in which it comes: its place and size, and its pixels.
+#[derive(Default, PartialEq)]
+struct Tiles(Vec<([u16; 4], Vec<[u8; 3]>)>);
+
+impl TileSink for Tiles {
+    type Error = Infallible;
+
+    fn tile(&mut self, tile: Tile<'_>) -> Result<(), Infallible> {
+        self.0.push(([tile.x_px, tile.y_px, tile.width, tile.height], tile.rgb.to_vec()));
+        Ok(())
+    }
+}
+
+type Drawn = Result<(Tiles, FrameReport), DecodeError>;
+
+fn draw<A: Arithmetic>(mut decoder: Decoder<'_, '_, A>, camera: &Camera) -> Drawn {
+    let mut tiles = Tiles::default();
+    let report = decoder.render(camera, &mut tiles)?;
+    Ok((tiles, report))
+}
+
+fn by_one<A: Arithmetic>(bundle: &Bundle<'_>, budget: &Budget, camera: &Camera) -> Drawn {
+    let plan = Plan::new(bundle, budget)?;
+    draw(Decoder::bind_in::<A>(bundle, plan, &mut vec![0; plan.scratch_len()])?, camera)
+}
+
+/// Both halves at the same time.
+fn by_two<A>(bundle: &Bundle<'_>, plan: Plan, camera: &Camera, fewer: [usize; 2]) -> Result<[Drawn; 2], DecodeError>
+where
+    for<'b, 's> Decoder<'b, 's, A>: Send,
+    A: Arithmetic,
+{
+    let lens = [plan.scratch_len() - fewer[0], plan.slow_scratch_len() - fewer[1]];
+    let [mut fast, mut slow] = lens.map(|len| vec![0xA5; len]);
+    let decoders = Decoder::bind_two::<A>(bundle, plan, [&mut fast, &mut slow])?;
+    Ok(thread::scope(|scope| {
+        let threads = decoders.map(|decoder| scope.spawn(|| draw(decoder, camera)));
+        threads.map(|thread| thread.join().expect("no painter panics"))
+    }))
+}
+
+/// The tiles of both, the first one's before the second one's, and what each reports.
+fn together<A: Arithmetic>(
+    bundle: &Bundle<'_>,
+    plan: Plan,
+    camera: &Camera,
+) -> Result<(Tiles, [FrameReport; 2]), DecodeError>
+where
+    for<'b, 's> Decoder<'b, 's, A>: Send,
+{
+    let [first, second] = by_two::<A>(bundle, plan, camera, [0, 0])?;
+    let ((Tiles(mut tiles), first), (Tiles(below), second)) = (first?, second?);
+    tiles.extend(below);
+    Ok((Tiles(tiles), [first, second]))
+}
+
+/// The golden bundles and those of the conformance pack.
+fn files() -> impl Iterator<Item = (String, Vec<u8>)> {
+    let folders = ["golden", "pack/bundles"].map(|folder| Path::new(env!("CARGO_MANIFEST_DIR")).join(folder));
+    let mut files: Vec<_> = folders
+        .iter()
+        .flat_map(|folder| fs::read_dir(folder).expect("a folder of the repository"))
+        .map(|entry| entry.expect("readable").path())
+        .filter(|path| path.extension().is_some_and(|extension| extension == "psb"))
+        .collect();
+    files.sort();
+    assert!(files.len() > 50, "{} bundles", files.len());
+    files.into_iter().map(|path| (path.display().to_string(), fs::read(&path).expect("readable")))
+}
+
+fn golden(name: &str) -> Vec<u8> {
+    fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("golden").join(name)).expect("a committed bundle")
+}
+
+/// The preview, and from elsewhere a frame with a row of tiles in the middle and one of a single row.
+fn cameras(bundle: &Bundle<'_>) -> [Camera; 3] {
+    let preview = bundle.header().preview;
+    [preview, preview.orbited(2.0).resized(40, 72), preview.orbited(4.0).resized(50, 16)]
+}
+
+fn budget_for(camera: &Camera) -> Budget {
+    Budget::for_frame(camera.width_px, camera.height_px).with_max_splats(MaxSplats::Worst)
+}
+
+/// Every residency of a bundle in one strip a painter, in several, and in slabs without notes of where splats lie and with them.
+fn ways(bundle: &Bundle<'_>, camera: &Camera) -> Vec<Budget> {
+    let residencies = [Residency::Streamed, Residency::Resident, Residency::AutoWithSums, Residency::Baked];
+    let mut ways = Vec::new();
+    for residency in residencies {
+        if residency == Residency::Baked && bundle.n_gaussians(0).is_none() {
+            continue;
+        }
+        let budget = budget_for(camera).with_residency(residency);
+        ways.extend([1, 2, 8].map(|n_strips| budget.with_strips(Strips::Exactly(n_strips))));
+        ways.extend([(1, 150), (4, 320)].map(|(n_strips, most)| {
+            let slabs = budget.with_overflow(Overflow::Slabs).with_max_splats(MaxSplats::AtMost(most));
+            slabs.with_strips(Strips::Exactly(n_strips))
+        }));
+    }
+    ways
+}
+
+fn compare<A: Arithmetic>(name: &str, bundle: &Bundle<'_>, camera: &Camera, budget: &Budget) -> Option<[u32; 2]>
+where
+    for<'b, 's> Decoder<'b, 's, A>: Send,
+{
+    let (expected, of_one) = by_one::<A>(bundle, budget, camera).expect("drawn by one");
+    let plan = Plan::new(bundle, &budget.with_two_painters()).expect("memory without limit");
+    let (tiles, of_two) = together::<A>(bundle, plan, camera).expect("drawn by two");
+    // Too many at one depth have no room in a slab; the slabs of each painter are its own.
+    if of_one.splats_dropped > 0 || of_two.iter().any(|report| report.splats_dropped > 0) {
+        assert_eq!(budget.overflow, Overflow::Slabs, "{name}, {budget:?}: {of_one:?}, {of_two:?}");
+        return None;
+    }
+    assert!(tiles == expected, "{name}: other pixels, {budget:?}");
+    let sum = |count: fn(&FrameReport) -> u32| of_two.iter().map(count).sum::<u32>();
+    if budget.overflow == Overflow::LeaveOut {
+        let rows_and_pixels = [sum(|report| report.row_splats), sum(|report| report.pixel_splats)];
+        assert_eq!(rows_and_pixels, [of_one.row_splats, of_one.pixel_splats], "{name}: {of_two:?} for {of_one:?}");
+    }
+    assert!(sum(|report| report.splats) >= of_one.splats, "{name}: {of_two:?} for {of_one:?}");
+    assert!(of_two.iter().all(|report| report.splats <= of_one.splats), "{name}: {of_two:?} for {of_one:?}");
+    Some(of_two.map(|report| report.splats))
+}
+
+#[test]
+fn two_painters_draw_what_one_draws() {
+    let [mut n_frames, mut n_shared] = [0; 2];
+    for (name, bytes) in files() {
+        let Ok(bundle) = Bundle::parse(&bytes) else { continue };
+        for camera in &cameras(&bundle) {
+            for budget in ways(&bundle, camera) {
+                let drawn = [
+                    compare::<ReferenceArithmetic>(&name, &bundle, camera, &budget),
+                    compare::<WithoutFpu>(&name, &bundle, camera, &budget),
+                ];
+                for splats in drawn.into_iter().flatten() {
+                    n_frames += 1;
+                    n_shared += u32::from(splats.iter().all(|n| *n > 0));
+                }
+            }
+        }
+    }
+    assert!(n_frames > 4000 && n_shared > 1000, "{n_shared} of {n_frames} frames had work for both");
+}
+
+#[test]
+fn heads_in_halves_draw_what_one_draws_with_them() {
+    for name in ["static.psb", "context.psb"] {
+        let bytes = golden(name);
+        let bundle = Bundle::parse(&bytes).expect("a committed bundle is sound");
+        for camera in &cameras(&bundle) {
+            let free = budget_for(camera).with_residency(Residency::Streamed).with_strips(Strips::Exactly(1));
+            let [one, two] = [free, free.with_two_painters()].map(|budget| {
+                let whole = Plan::new(&bundle, &budget).expect("memory without limit");
+                let halves = budget.in_bytes(whole.scratch_len() - 1);
+                let plan = Plan::new(&bundle, &halves).expect("halves do");
+                assert_eq!(plan.head_weights(), HeadWeights::F16, "{name}");
+                (halves, plan)
+            });
+            let (expected, _) = by_one::<ReferenceArithmetic>(&bundle, &one.0, camera).expect("drawn by one");
+            let (tiles, _) = together::<ReferenceArithmetic>(&bundle, two.1, camera).expect("drawn by two");
+            assert!(tiles == expected, "{name}: other pixels");
+        }
+    }
+}
+
+/// A frame can be drawn again after another, tile by tile as well as at once, and in small steps.
+#[test]
+fn frames_follow_one_another() {
+    let bytes = golden("context.psb");
+    let bundle = Bundle::parse(&bytes).expect("a committed bundle is sound");
+    let preview = bundle.header().preview;
+    let plan = Plan::new(&bundle, &budget_for(&preview).with_two_painters()).expect("memory without limit");
+    let mut scratch = vec![0; plan.scratch_len()];
+    let mut decoders: [Decoder<'_, '_>; 2] = Decoder::bind_two(&bundle, plan, &mut scratch).expect("its own bytes do");
+    for angle in [0.0, 1.0, 0.0] {
+        let camera = preview.orbited(angle);
+        let (expected, _) = by_one::<ReferenceArithmetic>(&bundle, &budget_for(&camera), &camera).expect("drawn");
+        let mut tiles = Tiles::default();
+        for decoder in &mut decoders {
+            let mut drawing = decoder.begin(&camera).expect("a sound camera");
+            while let Some(tile) = drawing.next_tile().expect("drawn") {
+                tiles.tile(tile).expect("infallible");
+            }
+        }
+        assert!(tiles == expected, "{angle}: other pixels");
+        let mut rows = decoders.each_mut().map(|decoder| {
+            let mut drawing = decoder.begin(&camera).expect("a sound camera");
+            let mut buffer = vec![0; 16 * 3 * usize::from(camera.width_px)];
+            let mut rows = Vec::new();
+            while let Some(row) =
+                drawing.next_tile_row(pocketsplat_core::PixelFormat::Rgb888, &mut buffer).expect("drawn")
+            {
+                rows.push((row.y_px, row.bytes.to_vec()));
+            }
+            rows
+        });
+        let [first, second] = &mut rows;
+        first.append(second);
+        let heights: Vec<u16> = (0..camera.height_px).step_by(16).collect();
+        assert_eq!(first.iter().map(|(y_px, _)| *y_px).collect::<Vec<_>>(), heights, "each row once, from the top");
+    }
+}
+
+#[test]
+fn the_second_painters_memory_is_a_part_of_the_plan_and_exact() {
+    let [mut n_plans, mut n_slow] = [0; 2];
+    for (name, bytes) in files() {
+        let Ok(bundle) = Bundle::parse(&bytes) else { continue };
+        let [camera, ..] = cameras(&bundle);
+        for budget in ways(&bundle, &camera) {
+            let one = Plan::new(&bundle, &budget).expect("memory without limit");
+            let budget = budget.with_two_painters();
+            let plan = Plan::new(&bundle, &budget).expect("memory without limit");
+            let bytes_of = |plan: &Plan, part| {
+                let found = plan.memory().find(|memory| memory.part == part);
+                found.expect("every part is told").n_bytes
+            };
+            assert_eq!(bytes_of(&one, Part::SecondPainter), 0, "{name}: {budget:?}");
+            assert!(bytes_of(&plan, Part::SecondPainter) > 0, "{name}: {budget:?}");
+            for part in [Part::Heads, Part::Scene] {
+                assert_eq!(bytes_of(&plan, part), bytes_of(&one, part), "{name}: what is shared is there once");
+            }
+            let sum: usize = plan.memory().map(|memory| memory.n_bytes).sum();
+            assert!(sum + 3 <= plan.scratch_len(), "{name}: {sum} of {}", plan.scratch_len());
+            // As much in the fast memory as all but the second painter takes.
+            let fast = plan.scratch_len() - bytes_of(&plan, Part::SecondPainter);
+            let split = Plan::new(&bundle, &budget.in_bytes(fast).with_slow_bytes(plan.scratch_len()));
+            let (expected, _) = together::<ReferenceArithmetic>(&bundle, plan, &camera).expect("its own bytes do");
+            for plan in [plan].into_iter().chain(split) {
+                let lens = [plan.scratch_len(), plan.slow_scratch_len()];
+                for (region, len, fewer) in [(Region::Fast, lens[0], [1, 0]), (Region::Slow, lens[1], [0, 1])] {
+                    if len > 0 {
+                        let [needed, available] = [len, len - 1].map(|n| n as u32);
+                        let error = by_two::<ReferenceArithmetic>(&bundle, plan, &camera, fewer);
+                        let expected = DecodeError::ScratchTooSmall { region, needed, available };
+                        assert_eq!(error.map(|_| ()), Err(expected), "{name}: {budget:?}");
+                    }
+                }
+                n_slow += u32::from(lens[1] > 0);
+                n_plans += 1;
+            }
+            // Slabs have as many places as there is memory.
+            if let (Ok(split), Overflow::LeaveOut) = (split, budget.overflow) {
+                let (tiles, _) = together::<ReferenceArithmetic>(&bundle, split, &camera).expect("its own bytes do");
+                assert!(
+                    tiles == expected || split.head_weights() != plan.head_weights(),
+                    "{name}: other pixels, {split:?}"
+                );
+            }
+        }
+    }
+    assert!(n_plans > 1000 && n_slow > 400, "{n_slow} of {n_plans} plans used slow memory");
+}
+
+#[test]
+fn too_little_memory_is_refused_by_the_number_that_would_do() {
+    for name in ["static.psb", "context.psb", "isotropic.psb", "matte.psb"] {
+        let bytes = golden(name);
+        let bundle = Bundle::parse(&bytes).expect("a committed bundle is sound");
+        let [camera, ..] = cameras(&bundle);
+        let budget = Budget::for_frame(camera.width_px, camera.height_px);
+        let needed = |budget: Budget| match Plan::new(&bundle, &budget.in_bytes(1)) {
+            Err(DecodeError::BudgetTooSmall { needed, available: 1, .. }) => needed as usize,
+            other => panic!("{name}: {other:?}"),
+        };
+        let (one, two) = (needed(budget), needed(budget.with_two_painters()));
+        assert!(one < two, "{name}: {one} for one, {two} for two");
+        let plan = Plan::new(&bundle, &budget.with_two_painters().in_bytes(two)).expect("so many do");
+        assert_eq!(plan.scratch_len(), two, "{name}");
+        let error = Plan::new(&bundle, &budget.with_two_painters().in_bytes(two - 1)).expect_err("one fewer");
+        assert_eq!(error.class(), ErrorClass::OverBudget, "{name}: {error}");
+    }
+}
+
+#[test]
+fn a_plan_is_bound_by_as_many_painters_as_it_has() {
+    let bytes = golden("static.psb");
+    let bundle = Bundle::parse(&bytes).expect("a committed bundle is sound");
+    let [camera, ..] = cameras(&bundle);
+    let budget = Budget::for_frame(camera.width_px, camera.height_px);
+    let [one, two] =
+        [budget, budget.with_two_painters()].map(|budget| Plan::new(&bundle, &budget).expect("memory without limit"));
+    let mut scratch = vec![0; two.scratch_len()];
+    let [one_len, two_len] = [one, two].map(|plan| plan.scratch_len() as u32);
+    let error = Decoder::bind(&bundle, two, &mut scratch).map(|_| ()).expect_err("a plan of two");
+    assert_eq!(error, DecodeError::PlanMismatch { needed: one_len, planned: two_len });
+    let error = Decoder::bind_two::<ReferenceArithmetic>(&bundle, one, &mut scratch).map(|_| ()).expect_err("of one");
+    assert_eq!(error, DecodeError::PlanMismatch { needed: two_len, planned: one_len });
+}
+
+#[test]
+fn damage_is_left_out_as_one_leaves_it_out() {
+    let mut n_damaged = 0;
+    for name in ["static.psb", "context.psb", "matte.psb"] {
+        let sound = golden(name);
+        let chunks = Bundle::parse(&sound).expect("a committed bundle is sound");
+        let section = chunks.sections().last().expect("chunks come last").offset as usize;
+        for chunk in 0..chunks.n_chunks() {
+            let mut bytes = sound.clone();
+            bytes[section + chunks.chunk(chunk).expect("in the file").offset() as usize + 8] ^= 0x55;
+            let bundle = Bundle::parse(&bytes).expect("chunks are not looked at");
+            let [camera, ..] = cameras(&bundle);
+            for budget in ways(&bundle, &camera) {
+                let two = budget.with_two_painters();
+                let plan = Plan::new(&bundle, &two).expect("memory without limit");
+                let error = by_two::<ReferenceArithmetic>(&bundle, plan, &camera, [0, 0]).map(|_| ());
+                assert!(matches!(error, Err(DecodeError::ChunkChecksum { .. })), "{name}: {error:?}");
+                let (expected, of_one) =
+                    by_one::<ReferenceArithmetic>(&bundle, &budget.skipping_damage(), &camera).expect("left out");
+                let plan = Plan::new(&bundle, &two.skipping_damage()).expect("memory without limit");
+                let (tiles, of_two) = together::<ReferenceArithmetic>(&bundle, plan, &camera).expect("left out");
+                assert!(tiles == expected, "{name}, chunk {chunk}: other pixels, {budget:?}");
+                let most = of_two.iter().map(|report| report.chunks_damaged).max().unwrap_or_default();
+                assert_eq!(most, of_one.chunks_damaged, "{name}, chunk {chunk}: {of_two:?}");
+                n_damaged += most;
+            }
+        }
+    }
+    assert!(n_damaged > 50, "{n_damaged} frames lacked a chunk");
+}
+
+#[test]
+fn each_painter_leaves_out_what_it_has_no_place_for() {
+    let bytes = golden("static.psb");
+    let bundle = Bundle::parse(&bytes).expect("a committed bundle is sound");
+    let [camera, ..] = cameras(&bundle);
+    let budget = budget_for(&camera).with_strips(Strips::Exactly(1));
+    let free = Plan::new(&bundle, &budget.with_two_painters()).expect("memory without limit");
+    let (_, all) = together::<ReferenceArithmetic>(&bundle, free, &camera).expect("drawn");
+    let [most, fewer] = if all[0].splats > all[1].splats { [0, 1] } else { [1, 0] };
+    let places = MaxSplats::AtMost(all[fewer].splats);
+    let few = Plan::new(&bundle, &budget.with_max_splats(places).with_two_painters()).expect("memory without limit");
+    let (_, reports) = together::<ReferenceArithmetic>(&bundle, few, &camera).expect("drawn");
+    assert_eq!((reports[fewer].splats, reports[fewer].splats_dropped), (all[fewer].splats, 0), "it has places");
+    assert!(reports[most].splats_dropped > 0, "{reports:?}");
+    assert_eq!(reports[most].max_splats, all[most].splats, "the number to plan for");
+}

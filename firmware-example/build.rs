@@ -3,9 +3,9 @@
 //! | variable | what | without it |
 //! |---|---|---|
 //! | `PSB_BUNDLE` | absolute path of the bundle | an error |
-//! | `BOARD` | `mps2-an386`, `mps2-an500`, or `virt` for RISC-V | `mps2-an386`; for RISC-V `virt` |
-//! | `RAM_KIB` | RAM in all: statics, scratch memory, stack | 256, 1024, 512 |
-//! | `STACK_KIB` | of which the stack's | 10 |
+//! | `BOARD` | `mps2-an386`, `mps2-an500`, `mps2-an521`, or `virt` for RISC-V | `mps2-an386`; for RISC-V `virt` |
+//! | `RAM_KIB` | RAM in all: statics, scratch memory, stack | 256, 1024, 520, 512 |
+//! | `STACK_KIB` | of which the stack's, for each core | 10 |
 //! | `SIZE` | frames, `WIDTHxHEIGHT` | the preview's |
 //! | `FRAMES` | frames of the orbit, at most 10 | 4 |
 //! | `VIEWS` | absolute path of cameras to draw instead, at most 10: a line each of the numbers of a `Camera`, in its order | an orbit |
@@ -21,13 +21,16 @@ use pocketsplat_core::Bundle;
 
 /// KiB reserved for the stack; the firmware fails when it comes near.
 const STACK_KIB: usize = 10;
+/// The board with two cores, each of which has a stack.
+const TWO_CORES: &str = "mps2-an521";
 /// Bytes of all statics beside the scratch memory, which gets the rest: the logger's and the flags of the cells.
 const OTHER_STATICS: usize = 512;
 
 /// A board: its name, the architecture of its processor, RAM of its usual device class in KiB, memory.
-const BOARDS: [(&str, &str, usize, &str); 3] = [
+const BOARDS: [(&str, &str, usize, &str); 4] = [
     ("mps2-an386", "arm", 256, include_str!("src/board/mps2-an386.x")),
     ("mps2-an500", "arm", 1024, include_str!("src/board/mps2-an500.x")),
+    ("mps2-an521", "arm", 520, include_str!("src/board/mps2-an521.x")),
     ("virt", "riscv32", 512, include_str!("src/board/virt.x")),
 ];
 
@@ -86,9 +89,10 @@ fn prepare() -> Result<(), Box<dyn Error>> {
     // Names that are none are errors of the compiler's.
     let budget = variable("BUDGET").unwrap_or_default();
     let arithmetic = variable("ARITHMETIC").unwrap_or_else(|| "ReferenceArithmetic".into());
-    let scratch_len = (ram_kib * 1024)
-        .checked_sub(stack_len + OTHER_STATICS)
-        .ok_or_else(|| format!("RAM_KIB={ram_kib} leaves no scratch memory beside {stack_len} bytes of stack"))?;
+    let scratch_len =
+        (ram_kib * 1024)
+            .checked_sub(stack_len * if name == TWO_CORES { 2 } else { 1 } + OTHER_STATICS)
+            .ok_or_else(|| format!("RAM_KIB={ram_kib} leaves no scratch memory beside {stack_len} bytes of stack"))?;
     let views = views.concat();
     let settings = format!(
         "const BOARD: &str = {name:?};\nconst RAM_KIB: usize = {ram_kib};\nconst STACK_LEN: usize = {stack_len};\n\

@@ -15,4 +15,4 @@ cargo build -q --release --locked --bin steps --target-dir "$target" >&2
 echo bundle,frame,instructions,cycles
 timeout "${QEMU_TIMEOUT_S:-300}" qemu-system-arm -M "$BOARD" -icount shift=0 -display none -monitor none -serial none \
   -semihosting-config enable=on,target=native -d plugin -D /dev/stderr -plugin "$target/cycles/release/libcycles.so" \
-  -kernel "$target/thumbv7em-none-eabihf/release/steps" 2>&1 >/dev/null </dev/null | sed -n "s/^cycles,/$(basename "$bundle" .psb),/p"
+  -kernel "$target/thumbv7em-none-eabihf/release/steps" 2>&1 >/dev/null </dev/null | sed -n "s/^cycles,0,/$(basename "$bundle" .psb),/p"

@@ -1,6 +1,7 @@
 //! The façade: a bundle, a plan and the caller's memory bound together, drawing frames.
 
 mod bind;
+mod by_two;
 mod collect;
 mod count;
 mod drawing;
@@ -13,6 +14,7 @@ mod render_error;
 mod report;
 mod row;
 mod scratch;
+mod share;
 mod slab_index;
 mod source;
 mod splats;
@@ -41,13 +43,11 @@ use crate::raster::Pixel;
 use pass::PlannedChunks;
 use source::GaussianSource;
 use splats::SplatStore;
-use strip::Painter;
 
 /// Draws frames of one bundle with the memory it was bound to, computed as `A` says.
 pub struct Decoder<'b, 's, A: Arithmetic = ReferenceArithmetic> {
     bundle: Bundle<'b>,
     plan: Plan,
-    painter: Painter,
     source: GaussianSource<'b, 's, A::Heads>,
     /// `[TILE_PIXELS]` of the current tile, or of each tile of a strip when strips are drawn in slabs.
     pixels: &'s mut [Pixel],
@@ -133,35 +133,7 @@ impl<'b, 's> Decoder<'b, 's> {
         Decoder::bind_regions(bundle, plan, scratch.into())
     }
 
-    /// As [`bind_in`](Self::bind_in), for two cores: two decoders of one scene, of which the first draws the upper half of a frame's rows of
-    /// tiles and the second the lower half, at the same time. No call of one waits for the other.
-    ///
-    /// ```
-    /// # fn main() -> Result<(), pocketsplat_core::DecodeError> {
-    /// # let bytes = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/example.psb"));
-    /// # let mut scratch = [0; 16 * 1024];
-    /// use pocketsplat_core::{Budget, Bundle, Decoder, Plan, ReferenceArithmetic};
-    ///
-    /// let bundle = Bundle::parse(bytes)?;
-    /// let plan = Plan::new(&bundle, &Budget::for_frame(32, 24).with_two_painters())?;
-    /// let decoders = Decoder::bind_two::<ReferenceArithmetic>(&bundle, plan, &mut scratch)?;
-    /// let camera = &bundle.header().preview;
-    /// let draw = |mut decoder: Decoder<'_, '_>| -> Result<usize, pocketsplat_core::DecodeError> {
-    ///     let mut drawing = decoder.begin(camera)?;
-    ///     let mut n_pixels = 0;
-    ///     while let Some(tile) = drawing.next_tile()? {
-    ///         n_pixels += tile.rgb.len();
-    ///     }
-    ///     Ok(n_pixels)
-    /// };
-    /// let n_pixels = std::thread::scope(|scope| {
-    ///     let threads = decoders.map(|decoder| scope.spawn(|| draw(decoder)));
-    ///     threads.map(|thread| thread.join().expect("no panic"))
-    /// });
-    /// assert_eq!(n_pixels, [Ok(32 * 16), Ok(32 * 8)]);
-    /// # Ok(())
-    /// # }
-    /// ```
+    /// As [`bind_in`](Self::bind_in), for two cores: two decoders that share the scene, and draw frames [together](Self::render_by_two).
     ///
     /// # Errors
     /// As for [`bind`](Self::bind); [`DecodeError::PlanMismatch`] also for a plan without
@@ -217,6 +189,59 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
         watch: &mut impl Stopwatch,
     ) -> Result<FrameReport, RenderError<S::Error>> {
         self.draw_frame(camera, sink, watch)
+    }
+
+    /// Draws a frame on two cores: the pixels of [`render`](Self::render), of which the first sink gets some tiles, row by row from the top,
+    /// and the second sink those behind them, at the same time. Returns what each painter did.
+    ///
+    /// * `painters`: what [`bind_two`](Self::bind_two) made. * `join`: does both of what it is given, at the same time, and returns when both are
+    ///   done: the first thing here, the second on the other core. A frame calls it twice, to gather splats and to blend them.
+    ///
+    /// ```
+    /// # fn main() -> Result<(), pocketsplat_core::DecodeError> {
+    /// # let bytes = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/example.psb"));
+    /// # let mut scratch = [0; 24 * 1024];
+    /// # struct Pixels(usize);
+    /// # impl pocketsplat_core::TileSink for Pixels {
+    /// #     type Error = core::convert::Infallible;
+    /// #     fn tile(&mut self, tile: pocketsplat_core::Tile<'_>) -> Result<(), Self::Error> { self.0 += tile.rgb.len(); Ok(()) }
+    /// # }
+    /// use pocketsplat_core::{Budget, Bundle, Decoder, Plan};
+    ///
+    /// let bundle = Bundle::parse(bytes)?;
+    /// let plan = Plan::new(&bundle, &Budget::for_frame(32, 24).with_two_painters())?;
+    /// let mut painters: [Decoder; 2] = Decoder::bind_two(&bundle, plan, &mut scratch)?;
+    /// let (mut above, mut below) = (Pixels(0), Pixels(0)); // sinks
+    /// let camera = &bundle.header().preview;
+    /// let reports = Decoder::render_by_two(&mut painters, camera, [&mut above, &mut below], |here, there| {
+    ///     std::thread::scope(|scope| {
+    ///         scope.spawn(there);
+    ///         here();
+    ///     });
+    /// })?;
+    /// assert_eq!(reports[0].splats + reports[1].splats, 5);
+    /// assert_eq!(above.0 + below.0, 32 * 24);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// As for [`render`](Self::render); after an error one of the sinks may have got more tiles than the other.
+    ///
+    /// # Budget
+    /// As [`render`](Self::render), half of it each: of the anchors that wait in memory every second, of those that are decoded every second
+    /// chunk, then the tiles that half of the splats lie in.
+    pub fn render_by_two<S>(
+        painters: &mut [Self; 2],
+        camera: &Camera,
+        sinks: [&mut S; 2],
+        join: impl FnMut(&mut (dyn FnMut() + Send), &mut (dyn FnMut() + Send)),
+    ) -> Result<[FrameReport; 2], RenderError<S::Error>>
+    where
+        S: TileSink + Send,
+        S::Error: Send,
+    {
+        Self::draw_by_two(painters, camera, sinks, join)
     }
 
     /// Begins a frame that comes tile by tile, each when it is asked for: the same pixels as [`render`](Self::render)'s.

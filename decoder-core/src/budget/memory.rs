@@ -92,8 +92,9 @@ slices! {
     /// What lists and sorts them.
     ListMemory: list_words, take_lists(shape) {
         rects: [TileRect; shape.frame.max_splats as usize],
-        order: [u32; shape.frame.max_splats as usize],
-        spare: [u32; shape.frame.max_splats as usize],
+        order: [u32; shape.list_len()],
+        spare: [u32; shape.list_len()],
+        ends: [u32; shape.frame.shared_chunks as usize],
     }
 }
 
@@ -161,6 +162,8 @@ pub(crate) struct ListMemory<'s> {
     pub(crate) order: &'s mut [u32],
     /// The order before.
     pub(crate) spare: &'s mut [u32],
+    /// Of two painters: where the splats of each chunk end.
+    pub(crate) ends: &'s mut [u32],
 }
 
 /// Memory that a frame is drawn in.
@@ -376,7 +379,7 @@ impl ScratchShape {
             Part::Tiles => (When::Frame, tile_words(self)),
             Part::Splats => (When::Frame, splat_words(self)),
             Part::Lists => (When::Frame, list_words(self)),
-            Part::SecondPainter if self.frame.two_painters => (When::Frame, painter_words(self)),
+            Part::SecondPainter if self.frame.shared_chunks > 0 => (When::Frame, painter_words(self)),
             Part::SecondPainter => (When::Frame, 0),
         }
     }
@@ -447,7 +450,7 @@ mod tests {
                 frame: FrameShape {
                     canvas_tiles: 1 + self.below(100),
                     max_splats: self.below(most),
-                    two_painters: self.below(2) == 1,
+                    shared_chunks: self.below(2) * self.below(200),
                 },
             }
         }
@@ -501,7 +504,7 @@ mod tests {
             frame: FrameShape {
                 canvas_tiles: a.frame.canvas_tiles.max(b.frame.canvas_tiles),
                 max_splats: a.frame.max_splats.max(b.frame.max_splats),
-                two_painters: a.frame.two_painters | b.frame.two_painters,
+                shared_chunks: a.frame.shared_chunks.max(b.frame.shared_chunks),
             },
         }
     }
@@ -533,7 +536,7 @@ mod tests {
                     let mut regions = Regions::new([&mut fast[..end_fast], &mut slow[..end_slow]], placement);
                     SceneMemory::take(&shape, &mut regions)?;
                     FrameMemory::take(&shape, &mut regions)?;
-                    if shape.frame.two_painters {
+                    if shape.frame.shared_chunks > 0 {
                         PainterMemory::take(&shape, &mut regions)?;
                     }
                     Ok::<_, DecodeError>(regions.n_words())

@@ -125,7 +125,7 @@ impl Plan {
         self.shape.model.head_weights
     }
 
-    /// Horizontal strips of a frame; of [two painters](Budget::with_two_painters) of each one's rows.
+    /// Horizontal strips of a frame.
     #[must_use]
     pub fn n_strips(&self) -> u8 {
         self.n_strips
@@ -312,18 +312,22 @@ impl Planner<'_, '_> {
         let tier = bundle.up_to_tier(n_tiers);
         let measures = self.measures(n_tiers);
         let in_slabs = budget.overflow == Overflow::Slabs;
-        let strips_of_frame = n_strips.saturating_mul(if budget.two_painters { 2 } else { 1 });
-        let canvas_tiles =
-            if in_slabs { tiles_of_strip([budget.width_px, budget.height_px], strips_of_frame) } else { 1 };
+        let canvas_tiles = if in_slabs { tiles_of_strip([budget.width_px, budget.height_px], n_strips) } else { 1 };
         let resident = self.resident(residency, n_tiers, tier, weights);
         // Gaussians are evaluated once, with weights in f32.
         let weights = if resident.is_gaussians() { HeadWeights::F32 } else { weights };
-        let wanted = self.splats_to_hold(budget.max_splats, n_tiers, strips_of_frame, weights);
-        let mut shape = ScratchShape::of(
-            bundle,
-            resident,
-            FrameShape { canvas_tiles, max_splats: wanted, two_painters: budget.two_painters },
-        );
+        let wanted = self.splats_to_hold(budget.max_splats, n_tiers, n_strips, weights);
+        let (shared_chunks, wanted) = if budget.two_painters {
+            let n_chunks = tier.n_chunks.max(1);
+            // Whole chunks are shared out where they are decoded.
+            let whole = if resident == Resident::Nothing { wanted.div_ceil(n_chunks) } else { 0 };
+            let is_measured = budget.max_splats == MaxSplats::Measured;
+            (n_chunks, if is_measured { half_with_reserve(wanted, whole) } else { wanted })
+        } else {
+            (0, wanted)
+        };
+        let mut shape =
+            ScratchShape::of(bundle, resident, FrameShape { canvas_tiles, max_splats: wanted, shared_chunks });
         shape.model.head_weights = weights;
         if !budget.quality.detail {
             shape.model.detail_hidden = 0;
@@ -334,7 +338,7 @@ impl Planner<'_, '_> {
         }
         // Each slab but the last keeps at least half of the places.
         let fullest = match budget.max_splats {
-            MaxSplats::AtMost(_) => self.splats_to_hold(MaxSplats::Measured, n_tiers, strips_of_frame, weights),
+            MaxSplats::AtMost(_) => self.splats_to_hold(MaxSplats::Measured, n_tiers, n_strips, weights),
             MaxSplats::Measured | MaxSplats::Worst => wanted,
         };
         let places = shape.frame.max_splats.max(1);
@@ -400,8 +404,6 @@ impl Planner<'_, '_> {
     }
 
     /// Splats of a strip to have memory for.
-    ///
-    /// * `n_strips`: of the frame.
     fn splats_to_hold(&self, max_splats: MaxSplats, n_tiers: u8, n_strips: u8, weights: HeadWeights) -> u32 {
         let header = self.bundle.header();
         // At most 2²⁴ anchors of 32 offsets.
@@ -427,6 +429,11 @@ impl Planner<'_, '_> {
 /// Places for so many measured splats and a sixteenth more; a manifest may have measured views without any.
 fn with_reserve(n_splats: u32) -> u32 {
     n_splats.saturating_add(n_splats.div_ceil(16)).max(Budget::MIN_SLAB_PLACES)
+}
+
+/// Places of one of two painters that share so many splats, `whole` of which they cannot divide.
+fn half_with_reserve(n_splats: u32, whole: u32) -> u32 {
+    n_splats.div_ceil(2).saturating_add(n_splats.div_ceil(16)).saturating_add(whole).min(n_splats)
 }
 
 /// Tiles of a strip.

@@ -122,8 +122,8 @@ pub struct FrameShape {
     pub canvas_tiles: u32,
     /// Splats in memory.
     pub max_splats: u32,
-    /// Whether there are two [painters](crate::Budget::with_two_painters), each with as much.
-    pub two_painters: bool,
+    /// Chunks of a scene that [two painters](crate::Budget::with_two_painters) draw, each in as much memory, at least 1; 0 for one painter.
+    pub shared_chunks: u32,
 }
 
 /// Inputs of a context at most: of a grid, or of a parent that gives `n_parent`.
@@ -202,7 +202,7 @@ impl ScratchShape {
             },
             record: RecordShape { symbol_bits: [16; 3], lattice_bits: MAX_LATTICE_BITS, masks: true },
             resident: Resident::Nothing,
-            frame: FrameShape { canvas_tiles: 1, max_splats: 0, two_painters: false },
+            frame: FrameShape { canvas_tiles: 1, max_splats: 0, shared_chunks: 0 },
         }
     }
 
@@ -280,6 +280,11 @@ impl ScratchShape {
         let heads = self.heads();
         let saved = heads.words(HeadWeights::F32).saturating_sub(heads.words(self.model.head_weights));
         if saved < heads.pair_words() { saved } else { heads.pair_words() }
+    }
+
+    /// Entries of each list of splats: those of both painters.
+    pub(super) const fn list_len(&self) -> usize {
+        (self.frame.max_splats as usize).saturating_mul(if self.frame.shared_chunks > 0 { 2 } else { 1 })
     }
 
     /// Channels of an anchor: features, log-scales, offsets.

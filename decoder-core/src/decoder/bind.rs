@@ -7,7 +7,6 @@ use super::Decoder;
 use super::scratch::Scratch;
 use super::source::{AnchorSource, Anchors, GaussianSource};
 use super::splats::SplatStore;
-use super::strip::Painter;
 use crate::arena::Arena;
 use crate::arithmetic::Arithmetic;
 use crate::bake::{BakedGaussians, BakedMemory, Baker, bake};
@@ -49,7 +48,7 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
             anchors.fill_sums()?;
         }
         let frame = FrameMemory::take(plan.shape(), &mut regions);
-        Self::of_parts(bundle, plan, source, frame, Painter::Alone)
+        Self::of_parts(bundle, plan, source, frame)
     }
 
     /// The same of both painters.
@@ -62,8 +61,8 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
         }
         let frame = FrameMemory::take(plan.shape(), &mut regions);
         let PainterMemory { anchors, frame: second_frame } = PainterMemory::take(plan.shape(), &mut regions)?;
-        let second = Self::of_parts(bundle, plan, source.shared(anchors), Ok(second_frame), Painter::Second)?;
-        Ok([Self::of_parts(bundle, plan, Ok(source), frame, Painter::First)?, second])
+        let second = Self::of_parts(bundle, plan, source.shared(anchors), Ok(second_frame))?;
+        Ok([Self::of_parts(bundle, plan, Ok(source), frame)?, second])
     }
 
     /// The decoder of a scene.
@@ -75,13 +74,12 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
         plan: Plan,
         source: Result<GaussianSource<'b, 's, A::Heads>, DecodeError>,
         frame: Result<FrameMemory<'s>, DecodeError>,
-        painter: Painter,
     ) -> Result<Self, DecodeError> {
         let source = source?;
         let FrameMemory { tiles, splats, lists } = frame?;
-        let (TileMemory { pixels, rgb, counts }, ListMemory { rects, order, spare }) = (tiles, lists);
-        let splats = SplatStore::new(splats.splats, rects, [order, spare], counts);
-        Ok(Self { bundle: *bundle, plan, painter, source, pixels, rgb, splats })
+        let (TileMemory { pixels, rgb, counts }, ListMemory { rects, order, spare, ends }) = (tiles, lists);
+        let splats = SplatStore::new(splats.splats, rects, [order, spare, ends], counts);
+        Ok(Self { bundle: *bundle, plan, source, pixels, rgb, splats })
     }
 }
 
@@ -104,7 +102,8 @@ fn read_scene<'s>(
 /// Whether `plan` is one of this bundle, for as many painters.
 #[inline(never)]
 fn check_plan(bundle: &Bundle<'_>, plan: &Plan, two_painters: bool) -> Result<(), DecodeError> {
-    let needed = Plan::new(bundle, &Budget { two_painters, ..*plan.budget() })?;
+    let budget = Budget { two_painters: false, ..*plan.budget() };
+    let needed = Plan::new(bundle, &if two_painters { budget.with_two_painters() } else { budget })?;
     if !needed.draws_as(plan) {
         let [needed, planned] =
             [&needed, plan].map(|plan| saturate(plan.scratch_len().saturating_add(plan.slow_scratch_len())));

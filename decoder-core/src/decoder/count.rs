@@ -38,5 +38,5 @@ pub fn count_gaussians(bundle: &Bundle<'_>, scratch: &mut [u8]) -> Result<[u32; 
 /// Memory that keeps no Gaussian.
 fn shape(bundle: &Bundle<'_>) -> ScratchShape {
     let resident = Resident::Gaussians { n_gaussians: 0, n_chunks: bundle.n_chunks() };
-    ScratchShape::of(bundle, resident, FrameShape { canvas_tiles: 1, max_splats: 0, two_painters: false })
+    ScratchShape::of(bundle, resident, FrameShape { canvas_tiles: 1, max_splats: 0, shared_chunks: 0 })
 }

@@ -4,13 +4,13 @@ use pocketsplat_format::rules::TILE_PX;
 use pocketsplat_format::{DecodeError, Stage, Stopwatch};
 
 use super::Decoder;
-use super::overflow::{Frame, OverflowPolicy};
+use super::overflow::{Frame, OverflowPolicy, check_work};
 use super::pass::Pass;
 use super::splats::{Slab, SplatStore};
 use super::strip::Strip;
 use crate::arithmetic::{Arithmetic, ReferenceArithmetic};
-use crate::project::{TILE_PIXELS, TileRect};
-use crate::raster::{Blending, DIGITS, TileRegion, blend_tile, finish_tile};
+use crate::project::TILE_PIXELS;
+use crate::raster::{Blending, DIGITS, Splats, TileRegion, blend_tile, finish_tile};
 
 /// A frame that comes tile by tile, each when it is asked for; made by [`Decoder::begin`].
 ///
@@ -102,21 +102,12 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
             Next::Tile => self.draw_tile(watch).ok_or(DecodeError::Internal),
             Next::End => return Ok(Step::Complete),
         };
-        let step = step.and_then(|step| self.check_work().map(|()| step));
+        let work = self.frame.instructions();
+        let step = step.and_then(|step| check_work(work, self.decoder.plan.budget().most_work).map(|()| step));
         if step.is_err() {
             self.next = Next::End;
         }
         step
-    }
-
-    /// The frame took no more than the budget allows.
-    fn check_work(&self) -> Result<(), DecodeError> {
-        let (needed, most) = (self.frame.instructions(), self.decoder.plan.budget().most_work);
-        if needed > most {
-            let [needed_so_far, limit] = [needed, most].map(kilo);
-            return Err(DecodeError::TooMuchWork { needed_so_far, limit });
-        }
-        Ok(())
     }
 
     /// Begins with the next slab, of this strip or of the next one, if there is one.
@@ -195,7 +186,7 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
         let (splats, rects) = (splats.get(..n)?, rects.get(..n)?);
         if self.column == 0 && self.n_listed == 0 {
             watch.enter(Stage::Sort);
-            self.n_in_row = gather_row(order.get(..n)?, rects, self.row, spare.get_mut(..n)?);
+            self.n_in_row = gather_row(order.get(..n)?, &(splats, rects), self.row, spare.get_mut(..n)?);
         }
         watch.enter(Stage::Blend);
         let (row, column) = (self.row, self.column);
@@ -207,7 +198,7 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
             pixels.fill(A::Blending::EMPTY);
         }
         let list = spare.get(self.n_listed..self.n_in_row)?;
-        let work = blend_tile::<A::Blending>(place, splats, rects, list, &self.rule, pixels);
+        let work = blend_tile::<A::Blending>(place, &(splats, rects), list, &self.rule, pixels);
         let report = &mut self.frame.report;
         report.tile_splats = report.tile_splats.saturating_add(work.splats);
         report.row_splats = report.row_splats.saturating_add(work.rows);
@@ -239,12 +230,6 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
     }
 }
 
-/// In units of 1,024.
-fn kilo(instructions: u64) -> u32 {
-    // A division of 64 bits would link a kilobyte of text.
-    u32::try_from(instructions >> 10).unwrap_or(u32::MAX)
-}
-
 /// Size of a tile along an axis, pixels.
 pub(super) fn size_along(size_px: u16, index: u8) -> u16 {
     TILE_PX.min(size_px.saturating_sub(u16::from(index) * TILE_PX))
@@ -253,10 +238,10 @@ pub(super) fn size_along(size_px: u16, index: u8) -> u16 {
 /// Copies the splats that touch tile row `row` from `order` to the front of `list`, in order; returns how many.
 // Not inlined: its loop would not stay in registers.
 #[inline(never)]
-fn gather_row(order: &[u32], rects: &[TileRect], row: u8, list: &mut [u32]) -> usize {
+pub(super) fn gather_row(order: &[u32], splats: &impl Splats, row: u8, list: &mut [u32]) -> usize {
     let mut n = 0;
     for &index in order {
-        let Some(rect) = rects.get(index as usize) else { continue };
+        let Some(rect) = splats.rect(index) else { continue };
         if rect.first_row <= row
             && row <= rect.last_row
             && let Some(slot) = list.get_mut(n)

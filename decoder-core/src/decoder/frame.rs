@@ -12,7 +12,7 @@ use super::overflow::{Frame, OverflowPolicy};
 use super::render_error::RenderError;
 use super::slab_index::IndexState;
 use super::splats::Slab;
-use super::strip::StripLayout;
+use super::strip::{Strip, StripLayout};
 use super::strips_of_chunks::StripsOfChunks;
 use super::tile::{Tile, TileSink};
 use super::{Decoder, FrameReport};
@@ -41,8 +41,7 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
     #[inline(always)]
     pub(super) fn begin_frame(&mut self, camera: &Camera, view: View) -> Drawing<'_, 'b, 's, A> {
         let budget = self.plan.budget();
-        let strips = StripLayout::new(camera.height_px, self.painter, self.plan.n_strips());
-        let view = view.within_rows(strips.pixels(strips.all()));
+        let strips = StripLayout::new(camera.height_px, self.plan.n_strips());
         (self.splats.n_indexed, self.splats.places_of_index) = (0, 0);
         let policy = if budget.overflow == Overflow::Slabs {
             // Decoding costs most, and each of many passes would do it again. Of fewer the first costs more than the others save.
@@ -68,10 +67,9 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
             frame,
             rule,
             next: Next::Slab,
-            strip: strips.before(),
+            strip: Strip::BEFORE,
             slab: Slab::behind(0.0),
-            // A frame has 255 rows at most.
-            row: strips.before().first_row as u8,
+            row: 0,
             column: 0,
             n_tiles: 0,
             n_in_row: 0,
@@ -198,7 +196,7 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
         // Of a strip whose slabs are not all drawn nothing is handed out.
         let [column, row] =
             if self.slab.ends() { [0, self.strip.first_row] } else { [self.column, self.row].map(u16::from) };
-        let is_over = matches!(self.next, Next::End) || row >= self.frame.strips.end_row();
+        let is_over = matches!(self.next, Next::End) || row >= self.frame.strips.n_rows();
         let [x_px, y_px] = [column, row].map(|index| index * TILE_PX);
         // A frame has 255 rows at most.
         (!is_over).then(|| [x_px, y_px, width_px.saturating_sub(x_px), size_along(height_px, row as u8)])

@@ -1,5 +1,6 @@
 //! What a frame does where there may not be places for all of its splats.
 
+use pocketsplat_format::DecodeError;
 use pocketsplat_format::bundle::{Chunk, ModelCost};
 
 use super::first_come::FirstCome;
@@ -45,6 +46,21 @@ impl OverflowPolicy {
     }
 }
 
+/// A frame took no more model instructions than the budget allows.
+pub(super) fn check_work(needed: u64, most: u64) -> Result<(), DecodeError> {
+    if needed > most {
+        let [needed_so_far, limit] = [needed, most].map(kilo);
+        return Err(DecodeError::TooMuchWork { needed_so_far, limit });
+    }
+    Ok(())
+}
+
+/// In units of 1,024.
+fn kilo(instructions: u64) -> u32 {
+    // A division of 64 bits would link a kilobyte of text.
+    u32::try_from(instructions >> 10).unwrap_or(u32::MAX)
+}
+
 impl Frame {
     /// Model instructions so far.
     pub(super) fn instructions(&self) -> u64 {
@@ -53,18 +69,9 @@ impl Frame {
 
     /// What the pass of a strip has to look at.
     pub(super) fn band(&self, strip: Strip) -> Option<Band> {
-        let is_first = strip.index == 0 && matches!(self.policy, OverflowPolicy::FirstCome { .. });
-        self.band_of_rows(if is_first { self.strips.all() } else { strip })
-    }
-
-    /// What a pass over all that the painter draws has to look at.
-    pub(super) fn band_of_all(&self) -> Option<Band> {
-        self.band_of_rows(self.strips.all())
-    }
-
-    /// What can be seen in the rows of a strip, unless that is the whole frame.
-    fn band_of_rows(&self, strip: Strip) -> Option<Band> {
-        (!self.strips.is_frame(strip)).then(|| self.view.band(self.strips.pixels(strip)))
+        let whole = strip.end_row - strip.first_row == self.strips.n_rows()
+            || (strip.index == 0 && matches!(self.policy, OverflowPolicy::FirstCome { .. }));
+        (!whole).then(|| self.view.band(self.strips.pixels(strip)))
     }
 
     /// Whether the pass of a strip needs a chunk.
@@ -96,13 +103,9 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
 
     /// Notes the damaged chunks in view, before strips are drawn in slabs, whose passes look at a chunk any number of times.
     pub(super) fn note_damage(&self, frame: &mut Frame) {
-        let band = frame.band_of_all();
-        for chunk in self.planned_chunks().map(|(chunk, _)| chunk) {
-            let ink_box = chunk.ink_box();
-            let is_needed = frame.view.sees_box(ink_box) && band.as_ref().is_none_or(|band| band.sees_box(ink_box));
-            if !is_needed || self.is_sound(&chunk) {
-                continue;
-            }
+        let in_view =
+            self.planned_chunks().map(|(chunk, _)| chunk).filter(|chunk| frame.view.sees_box(chunk.ink_box()));
+        for chunk in in_view.filter(|chunk| !self.is_sound(chunk)) {
             frame.report.chunks_damaged += 1;
             frame.report.first_damaged = frame.report.first_damaged.or(Some(chunk.index()));
         }

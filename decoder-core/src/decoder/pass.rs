@@ -10,6 +10,7 @@ use pocketsplat_format::{DecodeError, Stage, Stopwatch, saturate};
 use super::collect::{GaussianCollector, SplatCollector, Target};
 use super::first_come::FirstCome;
 use super::overflow::{Frame, OverflowPolicy};
+use super::share::Share;
 use super::slab_index::IndexState;
 use super::source::{Anchors, GaussianSource};
 use super::splats::Slab;
@@ -30,6 +31,8 @@ pub(super) struct Pass<'b> {
     pub(super) target: Target,
     /// Whether its chunks are looked up in the index.
     is_indexed: bool,
+    /// What of the scene it goes over.
+    pub(super) share: Share,
     chunks: PlannedChunks<'b>,
     open: Option<OpenChunk<'b>>,
 }
@@ -88,12 +91,11 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
             target.end_earlier(&frame.view);
         }
         if let OverflowPolicy::Slabs { index: index @ IndexState::Due } = &mut frame.policy {
-            *index = IndexState::Made;
-            (target.band, target.makes_index) = (frame.band_of_all(), true);
+            (*index, target.band, target.makes_index) = (IndexState::Made, None, true);
         }
         let decodes = u8::from(self.source.is_streamed());
         frame.report.decode_passes = frame.report.decode_passes.saturating_add(decodes);
-        Pass { target, is_indexed, chunks: self.planned_chunks(), open: None }
+        Pass { target, is_indexed, share: Share::All, chunks: self.planned_chunks(), open: None }
     }
 
     /// Goes on with a pass for about [`STEP`] model instructions; whether it is complete.
@@ -115,7 +117,7 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
                     return Ok(true);
                 };
                 watch.enter(Stage::Project);
-                if self.is_needed(&chunk, pass, frame) {
+                if self.is_needed(&chunk, pass, frame) && pass.share.takes(&chunk, self.source.is_streamed()) {
                     self.open(chunk, first_anchor, pass, frame, watch);
                 }
             }
@@ -125,7 +127,10 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
             let outcome = self.go_on_in(chunk, target, frame, end, watch);
             frame.unreported = frame.unreported.saturating_add(core::mem::take(&mut self.splats.work));
             match outcome {
-                Ok(true) => *open = None,
+                Ok(true) => {
+                    self.splats.end_chunk(chunk.chunk.index());
+                    *open = None;
+                }
                 Ok(false) => return Ok(false),
                 Err(DecodeError::ChunkStream { .. }) if chunk.before.is_some() => {
                     self.leave_out(&chunk.chunk, chunk.before.as_ref(), target, frame);
@@ -189,6 +194,7 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
                 (anchors, reader)
             }
         };
+        let numbers = if reader.is_some() { numbers } else { pass.share.of(numbers, chunk.index()) };
         pass.open = Some(OpenChunk { chunk, numbers, reader, before });
     }
 

@@ -30,6 +30,8 @@ pub(super) struct SplatStore<'s> {
     pub(super) order: &'s mut [u32],
     pub(super) spare: &'s mut [u32],
     pub(super) counts: &'s mut [u32],
+    /// Of two painters: where the splats of each chunk end, 0 for none; empty where there is one painter.
+    pub(super) ends: &'s mut [u32],
 }
 
 /// A slab of depth: what lies at its beginning or behind it, and before its end.
@@ -62,11 +64,11 @@ impl<'s> SplatStore<'s> {
     pub(super) fn new(
         splats: &'s mut [PackedSplat],
         rects: &'s mut [TileRect],
-        [order, spare]: [&'s mut [u32]; 2],
+        [order, spare, ends]: [&'s mut [u32]; 3],
         counts: &'s mut [u32],
     ) -> Self {
-        let (n_indexed, places_of_index) = (0, 0);
-        Self { splats, rects, n: 0, most: 0, full_at: None, work: 0, n_indexed, places_of_index, order, spare, counts }
+        let (n, most, n_indexed, places_of_index) = (0, 0, 0, 0);
+        Self { splats, rects, n, most, full_at: None, work: 0, n_indexed, places_of_index, order, spare, counts, ends }
     }
 
     /// Splats that there is memory for.
@@ -124,6 +126,13 @@ impl<'s> SplatStore<'s> {
             words.get_mut(..(self.n_indexed as usize).checked_mul(size_of::<ChunkExtent>() / size_of::<u32>())?)?;
         let counts: &mut [DepthCounts] = bytemuck::try_cast_slice_mut(counts).ok()?;
         Some((counts.first_mut()?, bytemuck::try_cast_slice_mut(extents).ok()?))
+    }
+
+    /// Notes where the splats of a chunk end, for another painter.
+    pub(super) fn end_chunk(&mut self, chunk: u32) {
+        if let Some(end) = self.ends.get_mut(chunk as usize) {
+            *end = self.n;
+        }
     }
 
     /// Keeps a splat; the caller has counted that there is a place.
@@ -265,7 +274,7 @@ mod tests {
             let (mut rects, mut order, mut spare) =
                 (std::vec![RECT; n_places], std::vec![0; n_places], std::vec![0; n_places]);
             let mut counts = [0; N_RADIX];
-            let mut store = SplatStore::new(&mut splats, &mut rects, [&mut order, &mut spare], &mut counts);
+            let mut store = SplatStore::new(&mut splats, &mut rects, [&mut order, &mut spare, &mut []], &mut counts);
             let mut slab = Slab::behind(from);
             for &depth in depths {
                 store.push_into(&mut slab, &splat(depth), RECT);
@@ -320,7 +329,7 @@ mod tests {
         const N: usize = 40;
         let (mut splats, mut rects, mut counts) = ([PackedSplat::zeroed(); N], [RECT; N], [0; N_RADIX]);
         let (mut order, mut spare) = ([0; N], [0; N]);
-        let mut store = SplatStore::new(&mut splats, &mut rects, [&mut order, &mut spare], &mut counts);
+        let mut store = SplatStore::new(&mut splats, &mut rects, [&mut order, &mut spare, &mut []], &mut counts);
         let mut slab = Slab::behind(0.0);
         (0..1000).for_each(|_| store.push_into(&mut slab, &splat(2.0), RECT));
         assert_eq!((store.work, slab.n_left_out), (u64::from(SORT) * N as u64, 960), "one sort");

@@ -6,24 +6,10 @@ use pocketsplat_format::rules::TILE_PX;
 
 use crate::project::TileRect;
 
-/// Which rows of tiles of a frame a decoder draws.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Painter {
-    /// All.
-    Alone,
-    /// The upper half of them, and the one in the middle.
-    First,
-    /// The lower half.
-    Second,
-}
-
-/// How the rows of tiles that a painter draws are cut into strips.
+/// How a frame is cut into strips of whole rows of tiles.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StripLayout {
     height_px: u16,
-    /// Those of the painter: the first, and the one after the last.
-    first_row: u16,
-    end_row: u16,
     rows_per_strip: u16,
 }
 
@@ -38,6 +24,9 @@ pub(super) struct Strip {
 }
 
 impl Strip {
+    /// The one that the first comes after.
+    pub(super) const BEFORE: Self = Self { index: 0, end_index: 0, first_row: 0, end_row: 0 };
+
     /// The bits of its strips.
     pub(super) fn bits(self) -> u32 {
         strip_bits(self.index.into()..=self.end_index.saturating_sub(1).into())
@@ -51,48 +40,26 @@ pub(super) fn strip_bits(strips: RangeInclusive<usize>) -> u32 {
 }
 
 impl StripLayout {
-    /// `n_strips` strips of ⌈the painter's tile rows / `n_strips`⌉ rows; fewer when the first ones hold all.
-    pub(super) fn new(height_px: u16, painter: Painter, n_strips: u8) -> Self {
-        let n_rows = height_px.div_ceil(TILE_PX);
-        let middle = n_rows.div_ceil(2);
-        let (first_row, end_row) = match painter {
-            Painter::Alone => (0, n_rows),
-            Painter::First => (0, middle),
-            Painter::Second => (middle, n_rows),
-        };
-        let rows_per_strip = (end_row - first_row).div_ceil(u16::from(n_strips).max(1)).max(1);
-        Self { height_px, first_row, end_row, rows_per_strip }
+    /// `n_strips` strips of ⌈tile rows / `n_strips`⌉ rows; fewer when the first ones hold all.
+    pub(super) fn new(height_px: u16, n_strips: u8) -> Self {
+        let rows_per_strip = height_px.div_ceil(TILE_PX).div_ceil(u16::from(n_strips).max(1)).max(1);
+        Self { height_px, rows_per_strip }
     }
 
     /// Number of strips.
     pub(super) fn len(&self) -> u8 {
         // At most as many as asked for.
-        (self.end_row - self.first_row).div_ceil(self.rows_per_strip.max(1)) as u8
-    }
-
-    /// The one that the first comes after.
-    pub(super) fn before(self) -> Strip {
-        self.between(0, 0)
-    }
-
-    /// All of them.
-    pub(super) fn all(self) -> Strip {
-        self.between(0, self.len())
-    }
-
-    /// Whether a strip is the whole frame.
-    pub(super) fn is_frame(&self, strip: Strip) -> bool {
-        strip.end_row - strip.first_row == self.height_px.div_ceil(TILE_PX)
+        self.n_rows().div_ceil(self.rows_per_strip.max(1)) as u8
     }
 
     /// The strip below another one.
     pub(super) fn after(self, strip: Strip) -> Option<Strip> {
-        (strip.end_row < self.end_row).then(|| self.between(strip.end_index, strip.end_index + 1))
+        (strip.end_row < self.n_rows()).then(|| self.between(strip.end_index, strip.end_index + 1))
     }
 
     /// The strips from `index` up to `end_index`.
     pub(super) fn between(self, index: u8, end_index: u8) -> Strip {
-        let row = |index: u8| (self.first_row + u16::from(index) * self.rows_per_strip).min(self.end_row);
+        let row = |index: u8| (u16::from(index) * self.rows_per_strip).min(self.n_rows());
         Strip { index, end_index, first_row: row(index), end_row: row(end_index) }
     }
 
@@ -101,9 +68,9 @@ impl StripLayout {
         (0..self.len()).map(move |index| self.between(index, index + 1))
     }
 
-    /// The strips that a splat of the painter's rows lies in.
+    /// The strips that a splat lies in.
     pub(super) fn touched(&self, rect: TileRect) -> RangeInclusive<usize> {
-        let strip = |row: u8| usize::from(u16::from(row).wrapping_sub(self.first_row) / self.rows_per_strip.max(1));
+        let strip = |row: u8| usize::from(u16::from(row) / self.rows_per_strip.max(1));
         strip(rect.first_row)..=strip(rect.last_row)
     }
 
@@ -112,9 +79,9 @@ impl StripLayout {
         [strip.first_row * TILE_PX, (strip.end_row * TILE_PX).min(self.height_px)]
     }
 
-    /// The row of tiles after the painter's last.
-    pub(super) fn end_row(&self) -> u16 {
-        self.end_row
+    /// Rows of tiles.
+    pub(super) fn n_rows(&self) -> u16 {
+        self.height_px.div_ceil(TILE_PX)
     }
 }
 
@@ -122,17 +89,16 @@ impl StripLayout {
 mod tests {
     use std::vec::Vec;
 
-    use super::{Painter, StripLayout, strip_bits};
+    use super::{StripLayout, strip_bits};
     use crate::project::TileRect;
 
     #[test]
     fn strips_fill_the_frame_from_the_top() {
         for height_px in [1, 16, 17, 120, 200, 4080] {
             for n_strips in 1..=8 {
-                let layout = StripLayout::new(height_px, Painter::Alone, n_strips);
+                let layout = StripLayout::new(height_px, n_strips);
                 let strips: Vec<_> = layout.iter().collect();
                 assert!(strips.len() <= usize::from(n_strips), "{height_px} px in {n_strips}");
-                assert!(layout.is_frame(layout.all()), "{height_px} px in {n_strips}");
                 let mut next_px = 0;
                 for &strip in &strips {
                     let [first_px, end_px] = layout.pixels(strip);
@@ -145,32 +111,13 @@ mod tests {
     }
 
     #[test]
-    fn two_painters_share_the_rows_and_the_first_has_the_one_in_the_middle() {
-        let rows = |height_px, n_strips| {
-            [Painter::First, Painter::Second].map(|painter| {
-                let layout = StripLayout::new(height_px, painter, n_strips);
-                let strips: Vec<_> = layout.iter().map(|strip| (strip.first_row, strip.end_row)).collect();
-                assert_eq!(strips.len(), usize::from(layout.len()), "{height_px} px in {n_strips}");
-                assert_eq!(strips.first().is_some(), layout.after(layout.before()).is_some());
-                strips
-            })
-        };
-        assert_eq!(rows(120, 1), [[(0, 4)], [(4, 8)]], "half each");
-        assert_eq!(rows(130, 2), [[(0, 3), (3, 5)], [(5, 7), (7, 9)]], "nine rows");
-        assert_eq!(rows(16, 4), [std::vec![(0, 1)], std::vec![]], "one row is the first one's");
-        let second = StripLayout::new(130, Painter::Second, 2);
-        let rect = TileRect { first_column: 0, last_column: 0, first_row: 6, last_row: 8 };
-        assert_eq!((second.touched(rect), second.pixels(second.all())), (0..=1, [80, 130]), "strips are its own");
-    }
-
-    #[test]
     fn the_first_and_the_last_strip_are_among_the_bits() {
         assert_eq!((strip_bits(0..=7), strip_bits(3..=3)), (0xFF, 8));
     }
 
     #[test]
     fn a_splat_lies_in_the_strips_of_its_rows() {
-        let layout = StripLayout::new(120, Painter::Alone, 4);
+        let layout = StripLayout::new(120, 4);
         let rect = TileRect { first_column: 0, last_column: 0, first_row: 1, last_row: 6 };
         assert_eq!(layout.touched(rect), 0..=3, "rows 1 to 6 of 8, two a strip");
         assert_eq!(layout.touched(TileRect { first_row: 2, last_row: 3, ..rect }), 1..=1, "the second strip");

@@ -21,7 +21,7 @@ pub(crate) trait HeadFormat: Copy {
     /// What a layer reads.
     type Values<'v>: Copy;
     /// A head of B outputs an offset; it reads its weights alone, so that several painters may have the same.
-    type Head<'s, const B: usize>: MlpHead<'s, Self, B> + Copy;
+    type Head<'s, const B: usize>: MlpHead<'s, Self, B> + Copy + Send;
 
     /// Puts the heads' inputs into this format, in their own memory.
     fn values(inputs: &mut [f32]) -> Self::Values<'_>;

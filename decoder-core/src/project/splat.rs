@@ -65,7 +65,7 @@ impl View {
         let mean = self.to_image(point);
         let half_extent =
             [pocketsplat_half::sqrt(reach * covariance.xx), pocketsplat_half::sqrt(reach * covariance.yy)];
-        let rect = TileRect::covering(mean, half_extent, self.size_px, self.rows_px)?;
+        let rect = TileRect::covering(mean, half_extent, self.size_px)?;
         let splat = Splat {
             mean,
             shear: covariance.xy / covariance.yy,

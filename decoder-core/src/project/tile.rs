@@ -20,35 +20,27 @@ pub(crate) struct TileRect {
 }
 
 impl TileRect {
-    /// The tiles around a splat's box, as far as they lie in `rows_px`; `None` when the box misses all pixel centres there.
-    ///
-    /// * `rows_px`: the first row of a tile, and the row after the last one.
-    pub(crate) fn covering(
-        mean: [f32; 2],
-        half_extent: [f32; 2],
-        [width, _]: [f32; 2],
-        rows_px: [f32; 2],
-    ) -> Option<Self> {
+    /// The tiles around a splat's box; `None` when the box misses all pixel centres.
+    pub(crate) fn covering(mean: [f32; 2], half_extent: [f32; 2], size_px: [f32; 2]) -> Option<Self> {
         let [u, v] = mean;
         let [half_u, half_v] = half_extent;
-        let (first_column, last_column) = tiles(u, half_u, [0.0, width])?;
-        let (first_row, last_row) = tiles(v, half_v, rows_px)?;
+        let [width, height] = size_px;
+        let (first_column, last_column) = tiles(u, half_u, width)?;
+        let (first_row, last_row) = tiles(v, half_v, height)?;
         Some(Self { first_column, last_column, first_row, last_row })
     }
 }
 
-/// First and last tile along one axis, from the pixel `from_px` up to `end_px`.
-#[inline(always)]
-fn tiles(mean: f32, half_extent: f32, [from_px, end_px]: [f32; 2]) -> Option<(u8, u8)> {
+/// First and last tile along one axis.
+fn tiles(mean: f32, half_extent: f32, size_px: f32) -> Option<(u8, u8)> {
     // Pixel i has its centre at i + 0.5.
     let low = mean - half_extent - 0.5 - SLACK_PX;
     let high = mean + half_extent - 0.5 + SLACK_PX;
     // Written so that NaN leaves as well.
-    if !(high >= from_px && low <= end_px - 1.0) {
+    if !(high >= 0.0 && low <= size_px - 1.0) {
         return None;
     }
-    let last_px = if high < end_px - 1.0 { high } else { end_px - 1.0 };
-    let low = if low > from_px { low } else { from_px };
+    let last_px = if high < size_px - 1.0 { high } else { size_px - 1.0 };
     // Float casts saturate at 0; frames have at most 255 tiles a side, so the quotients fit.
     let first = (low as u16) / TILE_PX;
     let last = (last_px as u16) / TILE_PX;
@@ -61,29 +53,15 @@ mod tests {
 
     #[test]
     fn boxes_clip_to_the_frame() {
-        let rect = TileRect::covering([20.0, 20.0], [100.0, 2.0], [48.0, 32.0], [0.0, 32.0]);
+        let rect = TileRect::covering([20.0, 20.0], [100.0, 2.0], [48.0, 32.0]);
         let all = TileRect { first_column: 0, last_column: 2, first_row: 1, last_row: 1 };
         assert_eq!(rect, Some(all), "as wide as the frame, one row");
-        let rows = |v: f32, rows_px| {
-            TileRect::covering([20.0, v], [1.0, 20.0], [48.0, 90.0], rows_px)
-                .map(|rect| (rect.first_row, rect.last_row))
-        };
-        assert_eq!(rows(40.0, [0.0, 90.0]), Some((1, 3)), "of the whole frame");
-        assert_eq!([[0.0, 32.0], [32.0, 90.0]].map(|half| rows(40.0, half)), [Some((1, 1)), Some((2, 3))], "in parts");
-        assert_eq!([rows(10.0, [32.0, 90.0]), rows(70.0, [0.0, 32.0])], [None, None], "in the other part");
     }
 
     #[test]
     fn boxes_beside_the_frame_are_dropped() {
-        assert_eq!(
-            TileRect::covering([-3.0, 8.0], [3.4, 9.0], [32.0; 2], [0.0, 32.0]),
-            None,
-            "ends before pixel 0's centre"
-        );
-        assert!(
-            TileRect::covering([-3.0, 8.0], [3.6, 9.0], [32.0; 2], [0.0, 32.0]).is_some(),
-            "reaches pixel 0's centre"
-        );
-        assert_eq!(TileRect::covering([f32::NAN, 8.0], [1.0, 1.0], [32.0; 2], [0.0, 32.0]), None, "not a number");
+        assert_eq!(TileRect::covering([-3.0, 8.0], [3.4, 9.0], [32.0, 32.0]), None, "ends before pixel 0's centre");
+        assert!(TileRect::covering([-3.0, 8.0], [3.6, 9.0], [32.0, 32.0]).is_some(), "reaches pixel 0's centre");
+        assert_eq!(TileRect::covering([f32::NAN, 8.0], [1.0, 1.0], [32.0, 32.0]), None, "not a number");
     }
 }

@@ -26,8 +26,6 @@ pub(crate) struct View {
     pub(super) focal_px: [f32; 2],
     pub(super) principal_px: [f32; 2],
     pub(super) size_px: [f32; 2],
-    /// Rows of pixels that splats are drawn in: the first, and the one after the last.
-    pub(super) rows_px: [f32; 2],
     /// Limits of x/z and y/z in the Jacobian.
     pub(super) slope_min: [f32; 2],
     pub(super) slope_max: [f32; 2],
@@ -60,7 +58,6 @@ impl View {
             focal_px: camera.focal_px,
             principal_px: camera.principal_px,
             size_px: [width, height],
-            rows_px: [0.0, height],
             slope_min: [-(cx / fx + margin_x), -(cy / fy + margin_y)],
             slope_max: [(width - cx) / fx + margin_x, (height - cy) / fy + margin_y],
             dilation: Dilation::AS_TRAINED,
@@ -76,11 +73,6 @@ impl View {
     pub(crate) fn cutting_at(self, steps: u8) -> Self {
         let lost_opacity = f32::from(steps.saturating_sub(1)) / 255.0;
         Self { log_cut: log_cut(steps), lost_opacity, ..self }
-    }
-
-    /// The same with splats that are drawn in some whole rows of tiles alone; everything else is that of the whole image.
-    pub(crate) fn within_rows(self, rows_px: [u16; 2]) -> Self {
-        Self { rows_px: rows_px.map(f32::from), ..self }
     }
 
     /// Takes a point of the normalised frame to the camera's.

@@ -5,6 +5,29 @@ use pocketsplat_format::rules::TILE_PX;
 use super::blending::{Blending, Pixel, TileRegion};
 use crate::project::{PackedSplat, TileRect};
 
+/// Splats and their tiles, each by the number that lists have of it.
+pub(crate) trait Splats {
+    /// Splat `number`, if there is one.
+    fn splat(&self, number: u32) -> Option<(&TileRect, &PackedSplat)>;
+
+    /// Its tiles.
+    fn rect(&self, number: u32) -> Option<&TileRect>;
+}
+
+/// Numbered as they lie in memory.
+impl Splats for (&[PackedSplat], &[TileRect]) {
+    #[inline(always)]
+    fn splat(&self, number: u32) -> Option<(&TileRect, &PackedSplat)> {
+        let (Some(rect), Some(splat)) = (self.1.get(number as usize), self.0.get(number as usize)) else { return None };
+        Some((rect, splat))
+    }
+
+    #[inline(always)]
+    fn rect(&self, number: u32) -> Option<&TileRect> {
+        self.1.get(number as usize)
+    }
+}
+
 /// What a tile cost.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct TileWork {
@@ -26,15 +49,14 @@ const ENTRIES_OF_STEP: usize = 8192;
 
 /// Draws the first splats of `list` that lie in a tile, in its order, behind what is in it.
 ///
-/// * `list`: indices into `splats` and `rects`, nearest first; entries beside the tile's columns are skipped.
+/// * `list`: numbers of `splats`, nearest first; entries beside the tile's columns are skipped.
 /// * `pixels`: `[TILE_PIXELS]`, [empty](Blending::EMPTY) at first.
 ///
 /// # Budget
 /// As [`Blending::blend`] for at most [`SPLATS_OF_STEP`] splats.
 pub(crate) fn blend_tile<B: Blending>(
     place: TileRegion,
-    splats: &[PackedSplat],
-    rects: &[TileRect],
+    splats: &impl Splats,
     list: &[u32],
     rule: &B::Rule,
     pixels: &mut [Pixel],
@@ -48,7 +70,7 @@ pub(crate) fn blend_tile<B: Blending>(
     let n_left = list.len().saturating_sub(ENTRIES_OF_STEP);
     while alive > 0 && work.splats < SPLATS_OF_STEP && entries.len() > n_left {
         let Some(&index) = entries.next() else { break };
-        let (Some(rect), Some(splat)) = (rects.get(index as usize), splats.get(index as usize)) else { continue };
+        let Some((rect, splat)) = splats.splat(index) else { continue };
         if place.column < rect.first_column || place.column > rect.last_column {
             continue;
         }

@@ -1,5 +1,6 @@
 //! Order by depth: a radix sort of indices, stable, without recursion.
 
+use super::blend::Splats;
 use crate::project::PackedSplat;
 
 /// Values of one digit.
@@ -51,6 +52,42 @@ pub(crate) fn order_by_digit(
         let Some(start) = counts.get_mut(digit_of(index)) else { continue };
         if let Some(slot) = spare.get_mut(*start as usize) {
             *slot = index;
+        }
+        *start += 1;
+    }
+    true
+}
+
+/// The same of the splats of a list, whose content is in `order` from the first digit on.
+#[inline(never)]
+pub(crate) fn order_list_by_digit(
+    splats: &impl Splats,
+    order: &[u32],
+    spare: &mut [u32],
+    counts: &mut [u32],
+    shift: u32,
+) -> bool {
+    let digit_of = |number: u32| {
+        let bits = splats.splat(number).map_or(0, |(_, splat)| splat.depth().to_bits());
+        ((bits >> shift) & 0xFF) as usize
+    };
+    counts.fill(0);
+    for &number in order {
+        if let Some(count) = counts.get_mut(digit_of(number)) {
+            *count += 1;
+        }
+    }
+    if counts.iter().any(|&count| count as usize == order.len()) {
+        return false;
+    }
+    let mut start = 0;
+    for count in counts.iter_mut() {
+        start += core::mem::replace(count, start);
+    }
+    for &number in order {
+        let Some(start) = counts.get_mut(digit_of(number)) else { continue };
+        if let Some(slot) = spare.get_mut(*start as usize) {
+            *slot = number;
         }
         *start += 1;
     }

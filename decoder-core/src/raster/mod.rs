@@ -8,8 +8,8 @@ mod depth;
 mod float_blending;
 mod integer_blending;
 
-pub(crate) use blend::{blend_tile, finish_tile};
+pub(crate) use blend::{Splats, blend_tile, finish_tile};
 pub(crate) use blending::{Blending, Pixel, TileRegion};
-pub(crate) use depth::{DIGITS, N_RADIX, order_by_digit};
+pub(crate) use depth::{DIGITS, N_RADIX, order_by_digit, order_list_by_digit};
 pub(crate) use float_blending::FloatBlending;
 pub(crate) use integer_blending::IntegerBlending;

@@ -1,7 +1,7 @@
 #![doc = "Counts the cycles that a program takes on a Cortex-M4 by ARM's table, while QEMU runs it: `-plugin libcycles.so`."]
 //!
-//! `dbg #1` begins a stretch of code, `dbg #2` ends it; each prints one row, `cycles,NUMBER,INSTRUCTIONS,CYCLES`. On a processor both do
-//! nothing. The interface is that of QEMU's `qemu-plugin.h`, version 1.
+//! `dbg #1` begins a stretch of code, `dbg #2` ends it; each prints one row, `cycles,CORE,NUMBER,INSTRUCTIONS,CYCLES`. Cores count each for
+//! itself. On a processor both do nothing. The interface is that of QEMU's `qemu-plugin.h`, version 1.
 
 mod thumb;
 
@@ -55,13 +55,25 @@ struct Block {
     end: u64,
 }
 
-static INSTRUCTIONS: AtomicU64 = AtomicU64::new(0);
-static CYCLES: AtomicU64 = AtomicU64::new(0);
-/// The end of the block before.
-static END: AtomicU64 = AtomicU64::new(0);
-/// Both counts where the stretch began, and how many stretches there were.
-static BEGAN: [AtomicU64; 2] = [AtomicU64::new(0), AtomicU64::new(0)];
-static N_STRETCHES: AtomicU64 = AtomicU64::new(0);
+/// What is counted of a core.
+struct Counts {
+    instructions: AtomicU64,
+    cycles: AtomicU64,
+    /// The end of the block before.
+    end: AtomicU64,
+    /// Both counts where the stretch began, and how many stretches there were.
+    began: [AtomicU64; 2],
+    n_stretches: AtomicU64,
+}
+
+impl Counts {
+    const fn new() -> Self {
+        let [instructions, cycles, end, n_stretches] = [const { AtomicU64::new(0) }; 4];
+        Self { instructions, cycles, end, began: [const { AtomicU64::new(0) }; 2], n_stretches }
+    }
+}
+
+static COUNTS: [Counts; 2] = [const { Counts::new() }; 2];
 
 /// QEMU calls it once.
 #[unsafe(no_mangle)]
@@ -106,26 +118,29 @@ extern "C" fn translated(_: Id, block: *mut TranslationBlock) {
     }
 }
 
-extern "C" fn executed(_: c_uint, block: *mut c_void) {
+extern "C" fn executed(core: c_uint, block: *mut c_void) {
     // SAFETY: what `translated` gave, which is never freed.
     let block = unsafe { &*block.cast::<Block>() };
-    let refill = if END.swap(block.end, Ordering::Relaxed) == block.start { 0 } else { REFILL };
-    INSTRUCTIONS.fetch_add(block.n_instructions, Ordering::Relaxed);
-    CYCLES.fetch_add(block.cycles + refill, Ordering::Relaxed);
+    let Some(counts) = COUNTS.get(core as usize) else { return };
+    let refill = if counts.end.swap(block.end, Ordering::Relaxed) == block.start { 0 } else { REFILL };
+    counts.instructions.fetch_add(block.n_instructions, Ordering::Relaxed);
+    counts.cycles.fetch_add(block.cycles + refill, Ordering::Relaxed);
 }
 
-extern "C" fn began(_: c_uint, _: *mut c_void) {
-    for (began, count) in BEGAN.iter().zip([&INSTRUCTIONS, &CYCLES]) {
+extern "C" fn began(core: c_uint, _: *mut c_void) {
+    let Some(counts) = COUNTS.get(core as usize) else { return };
+    for (began, count) in counts.began.iter().zip([&counts.instructions, &counts.cycles]) {
         began.store(count.load(Ordering::Relaxed), Ordering::Relaxed);
     }
 }
 
-extern "C" fn ended(_: c_uint, _: *mut c_void) {
-    let number = N_STRETCHES.fetch_add(1, Ordering::Relaxed);
+extern "C" fn ended(core: c_uint, _: *mut c_void) {
+    let Some(counts) = COUNTS.get(core as usize) else { return };
+    let number = counts.n_stretches.fetch_add(1, Ordering::Relaxed);
     let spent = |index: usize, count: &AtomicU64| {
-        count.load(Ordering::Relaxed).wrapping_sub(BEGAN[index].load(Ordering::Relaxed))
+        count.load(Ordering::Relaxed).wrapping_sub(counts.began[index].load(Ordering::Relaxed))
     };
-    let row = format!("cycles,{number},{},{}\n", spent(0, &INSTRUCTIONS), spent(1, &CYCLES));
+    let row = format!("cycles,{core},{number},{},{}\n", spent(0, &counts.instructions), spent(1, &counts.cycles));
     if let Ok(row) = CString::new(row) {
         // SAFETY: a string that ends with a zero.
         unsafe { qemu_plugin_outs(row.as_ptr()) };

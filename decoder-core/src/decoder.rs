@@ -137,7 +137,8 @@ impl<'b, 's> Decoder<'b, 's> {
     ///
     /// # Errors
     /// As for [`bind`](Self::bind); [`DecodeError::PlanMismatch`] also for a plan without
-    /// [two painters](crate::Budget::with_two_painters), as `bind` has it for one with two.
+    /// [two painters](crate::Budget::with_two_painters), or with strips or slabs asked for after that. (With a plan of two `bind` makes the first
+    /// painter alone.)
     ///
     /// # Budget
     /// As for [`bind`](Self::bind).

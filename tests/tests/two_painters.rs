@@ -6,7 +6,7 @@ use std::path::Path;
 use std::thread;
 
 use pocketsplat_core::{
-    Arithmetic, Budget, Bundle, Camera, DecodeError, Decoder, ErrorClass, Field, FrameReport, HeadWeights, MaxSplats,
+    Arithmetic, Budget, Bundle, Camera, DecodeError, Decoder, ErrorClass, FrameReport, HeadWeights, MaxSplats,
     Overflow, Part, Plan, ReferenceArithmetic, Region, Residency, Strips, Tile, TileSink, WithoutFpu,
 };
 
@@ -204,24 +204,6 @@ fn an_error_of_either_painter_ends_the_frame() {
 }
 
 #[test]
-fn strips_and_slabs_are_for_one_painter() {
-    let bytes = golden("context.psb");
-    let bundle = Bundle::parse(&bytes).expect("a committed bundle is sound");
-    let [camera, ..] = cameras(&bundle);
-    let two = budget_for(&camera).with_strips(Strips::Exactly(8)).with_overflow(Overflow::Slabs).with_two_painters();
-    assert_eq!(Plan::new(&bundle, &two).map(|plan| plan.n_strips()), Ok(1), "whatever was asked for before");
-    for other in [
-        two.with_strips(Strips::Auto),
-        two.with_strips(Strips::Exactly(2)),
-        two.with_strips(Strips::Exactly(0)),
-        two.with_overflow(Overflow::Slabs),
-    ] {
-        let error = Plan::new(&bundle, &other).expect_err("not in one strip");
-        assert!(matches!(error, DecodeError::OutOfRange { field: Field::Strips, limit: 1, .. }), "{error}");
-    }
-}
-
-#[test]
 fn the_second_painters_memory_is_a_part_of_the_plan_and_exact() {
     let [mut n_plans, mut n_slow] = [0; 2];
     for (name, bytes) in files() {
@@ -294,19 +276,26 @@ fn too_little_memory_is_refused_by_the_number_that_would_do() {
 }
 
 #[test]
-fn a_plan_is_bound_by_as_many_painters_as_it_has() {
+fn two_are_bound_with_a_plan_of_two_in_one_strip() {
     let bytes = golden("static.psb");
     let bundle = Bundle::parse(&bytes).expect("a committed bundle is sound");
     let [camera, ..] = cameras(&bundle);
-    let budget = Budget::for_frame(camera.width_px, camera.height_px);
-    let [one, two] =
-        [budget, budget.with_two_painters()].map(|budget| Plan::new(&bundle, &budget).expect("memory without limit"));
-    let mut scratch = vec![0; two.scratch_len()];
-    let [one_len, two_len] = [one, two].map(|plan| plan.scratch_len() as u32);
-    let error = Decoder::bind(&bundle, two, &mut scratch).map(|_| ()).expect_err("a plan of two");
-    assert_eq!(error, DecodeError::PlanMismatch { needed: one_len, planned: two_len });
-    let error = Decoder::bind_two::<ReferenceArithmetic>(&bundle, one, &mut scratch).map(|_| ()).expect_err("of one");
-    assert_eq!(error, DecodeError::PlanMismatch { needed: two_len, planned: one_len });
+    let one = budget_for(&camera).with_strips(Strips::Exactly(8)).with_overflow(Overflow::Slabs);
+    let two = one.with_two_painters();
+    let plan = |budget: &Budget| Plan::new(&bundle, budget).expect("memory without limit");
+    let of_two = plan(&two);
+    assert_eq!((of_two.n_strips(), of_two.n_slabs()), (1, 1), "whatever was asked for before");
+    let mut scratch = vec![0; 1 << 20];
+    for other in
+        [one, two.with_strips(Strips::Auto), two.with_strips(Strips::Exactly(2)), two.with_overflow(Overflow::Slabs)]
+    {
+        let planned = plan(&other);
+        let error =
+            Decoder::bind_two::<ReferenceArithmetic>(&bundle, planned, &mut scratch).map(|_| ()).expect_err("no");
+        let [needed, planned] = [of_two, planned].map(|plan| plan.scratch_len() as u32);
+        assert_eq!(error, DecodeError::PlanMismatch { needed, planned }, "{other:?}");
+    }
+    assert!(Decoder::bind(&bundle, of_two, &mut scratch).is_ok(), "the first painter alone");
 }
 
 #[test]

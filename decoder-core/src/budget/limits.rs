@@ -215,7 +215,7 @@ impl Budget {
 
     /// Has two painters draw each frame, on a core each: [`Decoder::bind_two`](crate::Decoder::bind_two) makes them, and
     /// [`Decoder::render_by_two`](crate::Decoder::render_by_two) draws. The scene is in memory once; what the second painter has of its own is
-    /// a [part](crate::Part::SecondPainter) of the plan. Frames are drawn in one strip. The [work](Self::with_most_work) that ends a frame is
+    /// a [part](crate::Part::SecondPainter) of the plan. Frames are drawn in one strip, so that nothing else may be asked for afterwards. The [work](Self::with_most_work) that ends a frame is
     /// that of one painter, and so are the places for splats: of [those measured](MaxSplats::Measured) half, and an eighth of that more.
     ///
     /// The pixels are those of one decoder, unless splats are left out: each painter leaves out its own.
@@ -234,14 +234,9 @@ impl Budget {
         if let (Overflow::Slabs, MaxSplats::AtMost(n)) = (self.overflow, self.max_splats) {
             in_range(Field::SlabSplats, n, Self::MIN_SLAB_PLACES, u32::MAX)?;
         }
-        let n_strips = match self.strips {
-            Strips::Exactly(n) => n,
-            // Neither is one strip.
-            Strips::Auto if self.two_painters => u8::MAX,
-            Strips::Auto => 1,
-        };
-        let in_slabs = self.two_painters && self.overflow == Overflow::Slabs;
-        let most_strips = if self.two_painters { 1 } else { Self::MAX_STRIPS };
-        in_range(Field::Strips, if in_slabs { u8::MAX } else { n_strips }.into(), 1, most_strips.into())
+        match self.strips {
+            Strips::Auto => Ok(()),
+            Strips::Exactly(n) => in_range(Field::Strips, n.into(), 1, Self::MAX_STRIPS.into()),
+        }
     }
 }

@@ -254,14 +254,6 @@ impl<'s> PainterMemory<'s> {
     }
 }
 
-/// Words of what [`PainterMemory::take`] takes.
-const fn painter_words(shape: &ScratchShape) -> usize {
-    let anchors =
-        if shape.resident.is_gaussians() { 0 } else { anchor_words(shape).saturating_add(reader_words(shape)) };
-    let lists = splat_words(shape).saturating_add(list_words(shape));
-    anchors.saturating_add(tile_words(shape)).saturating_add(lists)
-}
-
 /// When a part is needed.
 #[derive(Clone, Copy)]
 enum When {
@@ -312,10 +304,8 @@ impl ScratchShape {
 
     /// Bytes of a part while frames are drawn.
     pub(super) const fn part_len(&self, part: Part) -> usize {
-        match self.words_of(part) {
-            (When::Kept | When::Frame, words) => words.saturating_mul(4),
-            (When::Bound, _) => 0,
-        }
+        let [_, Words { kept, frame, .. }] = self.words(Placement::all_fast_but(part));
+        kept.saturating_add(frame).saturating_mul(4)
     }
 
     /// The most splats, up to those of the shape, that `lens` bytes of fast and slow memory have places for when the parts are
@@ -346,13 +336,18 @@ impl ScratchShape {
     // Not inlined: each caller would have a copy.
     #[inline(never)]
     const fn words(&self, placement: Placement) -> [Words; 2] {
-        let ([mut fast, mut slow], mut parts) = ([Words::NONE; 2], Part::ALL.as_slice());
+        let ([mut fast, mut slow], mut parts, mut of_one) = ([Words::NONE; 2], Part::ALL.as_slice(), 0_usize);
         while let [part, rest @ ..] = parts {
             let region = match placement.region(*part) {
                 Region::Fast => &mut fast,
                 Region::Slow => &mut slow,
             };
-            let (when, words) = self.words_of(*part);
+            let (when, words, own) = match part {
+                // The last part: what one painter has of its own once more, in the order of [`PainterMemory::take`].
+                Part::SecondPainter if self.frame.shared_chunks > 0 => (When::Frame, of_one, 0),
+                part => self.words_of(*part),
+            };
+            of_one = of_one.saturating_add(own);
             let sum = match when {
                 When::Kept => &mut region.kept,
                 When::Bound => &mut region.bound,
@@ -364,24 +359,27 @@ impl ScratchShape {
         [fast, slow]
     }
 
-    /// Words of a part, as [`SceneMemory::take`], [`FrameMemory::take`] and [`PainterMemory::take`] take them.
-    const fn words_of(&self, part: Part) -> (When, usize) {
+    /// Words of a part, as [`SceneMemory::take`] and [`FrameMemory::take`] take them, and how many of them are for one painter alone.
+    const fn words_of(&self, part: Part) -> (When, usize, usize) {
         let (is_baked, is_resident) = (self.resident.is_gaussians(), self.resident.is_anchors());
-        match part {
+        let (when, words) = match part {
             Part::Heads => {
-                let words = head_words(self).saturating_add(anchor_words(self));
-                (if is_baked { When::Bound } else { When::Kept }, words)
+                let (heads, anchor) = (head_words(self), anchor_words(self));
+                return if is_baked {
+                    (When::Bound, heads.saturating_add(anchor), 0)
+                } else {
+                    (When::Kept, heads.saturating_add(anchor), anchor.saturating_add(reader_words(self)))
+                };
             }
             Part::Models => (if is_baked || is_resident { When::Bound } else { When::Kept }, models_words(self)),
             Part::Scene if is_baked => (When::Kept, baked_words(self)),
             Part::Scene if is_resident => (When::Kept, record_words(self).saturating_add(sums_words(self))),
-            Part::Scene => (When::Kept, 0),
+            Part::Scene | Part::SecondPainter => (When::Kept, 0),
             Part::Tiles => (When::Frame, tile_words(self)),
             Part::Splats => (When::Frame, splat_words(self)),
             Part::Lists => (When::Frame, list_words(self)),
-            Part::SecondPainter if self.frame.shared_chunks > 0 => (When::Frame, painter_words(self)),
-            Part::SecondPainter => (When::Frame, 0),
-        }
+        };
+        (when, words, if matches!(when, When::Frame) { words } else { 0 })
     }
 }
 
@@ -533,7 +531,7 @@ mod tests {
                 let mut take_all = |less: [usize; 2]| {
                     let [fast, slow] = &mut memory;
                     let [end_fast, end_slow] = [0, 1].map(|region| lens[region].saturating_sub(less[region]));
-                    let mut regions = Regions::new([&mut fast[..end_fast], &mut slow[..end_slow]], placement);
+                    let mut regions = Regions::new(&mut fast[..end_fast], &mut slow[..end_slow], placement);
                     SceneMemory::take(&shape, &mut regions)?;
                     FrameMemory::take(&shape, &mut regions)?;
                     if shape.frame.shared_chunks > 0 {

@@ -67,6 +67,11 @@ impl Placement {
         (last..=Self::FAST.0).rev().step_by(if two_painters { 1 } else { 2 }).map(Self)
     }
 
+    /// All but one in fast memory.
+    pub(super) const fn all_fast_but(part: Part) -> Self {
+        Self(Self::FAST.0 & !part.bit())
+    }
+
     /// Where a part lies.
     pub(super) const fn region(self, part: Part) -> Region {
         if self.0 & part.bit() == 0 { Region::Slow } else { Region::Fast }
@@ -82,7 +87,7 @@ pub(crate) struct Regions<'s> {
 
 impl<'s> Regions<'s> {
     /// Memory for a placement.
-    pub(crate) fn new([fast, slow]: [&'s mut [u8]; 2], placement: Placement) -> Self {
+    pub(crate) fn new(fast: &'s mut [u8], slow: &'s mut [u8], placement: Placement) -> Self {
         Self { fast: Arena::new(fast), slow: Arena::new(slow), placement }
     }
 

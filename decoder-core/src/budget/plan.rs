@@ -76,6 +76,11 @@ impl Plan {
         fast.saturating_add(slow)
     }
 
+    /// Bytes of both regions.
+    pub(crate) fn len(&self) -> u32 {
+        saturate(self.scratch_len.saturating_add(self.slow_len))
+    }
+
     /// Whether a decoder of this plan does what one of `other` does, in the same memory.
     pub(crate) fn draws_as(&self, other: &Self) -> bool {
         // The rest is the budget, which the plan was made from, and what is said about it.

@@ -11,8 +11,8 @@ use crate::arena::Arena;
 use crate::arithmetic::Arithmetic;
 use crate::bake::{BakedGaussians, BakedMemory, Baker, bake};
 use crate::budget::{
-    AnchorMemory, Budget, FrameMemory, HeadMemory, ListMemory, ModelMemory, PainterMemory, Part, Plan, Regions,
-    SceneMemory, ScratchShape, SumsMemory, TileMemory,
+    AnchorMemory, FrameMemory, HeadMemory, ListMemory, ModelMemory, PainterMemory, Part, Plan, Regions, SceneMemory,
+    ScratchShape, SumsMemory, TileMemory,
 };
 use crate::mlp::{F32, FeatureSums, HeadFormat, Heads};
 use crate::scene::{Evaluator, Pair, Workspace};
@@ -24,48 +24,53 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
         plan: Plan,
         Scratch { fast, slow }: Scratch<'s>,
     ) -> Result<Self, DecodeError> {
-        let regions = read_scene(bundle, &plan, [fast, slow], false)?;
-        Self::prepare(bundle, plan, regions)
+        check_plan(bundle, &plan)?;
+        let fast = front(fast, plan.scratch_len(), Region::Fast)?;
+        let slow = front(slow, plan.slow_scratch_len(), Region::Slow)?;
+        // Before anything else, in memory that is taken again after it: the deepest calls come while no result waits on the stack.
+        read_chunks(bundle, &plan, [&mut *fast, &mut *slow])?;
+        Self::prepare(bundle, plan, [fast, slow])
     }
 
-    /// The same of both painters.
+    /// The same of two painters.
     pub(super) fn bind_two_regions(
         bundle: &Bundle<'b>,
         plan: Plan,
         Scratch { fast, slow }: Scratch<'s>,
     ) -> Result<[Self; 2], DecodeError> {
-        let regions = read_scene(bundle, &plan, [fast, slow], true)?;
-        Self::prepare_two(bundle, plan, regions)
+        check_plan_of_two(bundle, &plan)?;
+        let fast = front(fast, plan.scratch_len(), Region::Fast)?;
+        let slow = front(slow, plan.slow_scratch_len(), Region::Slow)?;
+        read_chunks(bundle, &plan, [&mut *fast, &mut *slow])?;
+        Self::prepare_two(bundle, plan, [fast, slow])
     }
 
     /// The decoder, after resident anchors were decoded.
     // Not inlined, here and below: a caller's stack frame would keep what only one of the steps needs.
     #[inline(never)]
-    fn prepare(bundle: &Bundle<'b>, plan: Plan, regions: [&'s mut [u8]; 2]) -> Result<Self, DecodeError> {
-        let mut regions = Regions::new(regions, plan.placement());
+    fn prepare(bundle: &Bundle<'b>, plan: Plan, [fast, slow]: [&'s mut [u8]; 2]) -> Result<Self, DecodeError> {
+        let mut regions = Regions::new(fast, slow, plan.placement());
         let mut source = bind_scene(bundle, &plan, &mut regions);
         if let Ok(GaussianSource::Anchors(anchors)) = &mut source {
             anchors.fill_sums()?;
         }
-        let frame = FrameMemory::take(plan.shape(), &mut regions);
-        Self::of_parts(bundle, plan, source, frame)
+        Self::of_parts(bundle, plan, source, regions)
     }
 
-    /// The same of both painters.
+    /// The same of two painters.
     #[inline(never)]
-    fn prepare_two(bundle: &Bundle<'b>, plan: Plan, regions: [&'s mut [u8]; 2]) -> Result<[Self; 2], DecodeError> {
-        let mut regions = Regions::new(regions, plan.placement());
+    fn prepare_two(bundle: &Bundle<'b>, plan: Plan, [fast, slow]: [&'s mut [u8]; 2]) -> Result<[Self; 2], DecodeError> {
+        let mut regions = Regions::new(fast, slow, plan.placement());
         let mut source = bind_scene(bundle, &plan, &mut regions)?;
         if let GaussianSource::Anchors(anchors) = &mut source {
             anchors.fill_sums()?;
         }
-        let frame = FrameMemory::take(plan.shape(), &mut regions);
-        let PainterMemory { anchors, frame: second_frame } = PainterMemory::take(plan.shape(), &mut regions)?;
-        let second = Self::of_parts(bundle, plan, source.shared(anchors), Ok(second_frame))?;
-        Ok([Self::of_parts(bundle, plan, Ok(source), frame)?, second])
+        let PainterMemory { anchors, frame } = PainterMemory::take(plan.shape(), &mut regions)?;
+        let second = Self::of_memory(bundle, plan, source.shared(anchors)?, frame);
+        Ok([Self::of_parts(bundle, plan, Ok(source), regions)?, second])
     }
 
-    /// The decoder of a scene.
+    /// The decoder of a scene; what is left of `regions` is for frames.
     ///
     /// * `source`: not unpacked by the caller, whose stack frame would hold it twice.
     #[inline(never)]
@@ -73,43 +78,45 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
         bundle: &Bundle<'b>,
         plan: Plan,
         source: Result<GaussianSource<'b, 's, A::Heads>, DecodeError>,
-        frame: Result<FrameMemory<'s>, DecodeError>,
+        mut regions: Regions<'s>,
     ) -> Result<Self, DecodeError> {
         let source = source?;
-        let FrameMemory { tiles, splats, lists } = frame?;
+        Ok(Self::of_memory(bundle, plan, source, FrameMemory::take(plan.shape(), &mut regions)?))
+    }
+
+    #[inline(always)]
+    fn of_memory(
+        bundle: &Bundle<'b>,
+        plan: Plan,
+        source: GaussianSource<'b, 's, A::Heads>,
+        FrameMemory { tiles, splats, lists }: FrameMemory<'s>,
+    ) -> Self {
         let (TileMemory { pixels, rgb, counts }, ListMemory { rects, order, spare, ends }) = (tiles, lists);
         let splats = SplatStore::new(splats.splats, rects, [order, spare, ends], counts);
-        Ok(Self { bundle: *bundle, plan, source, pixels, rgb, splats })
+        Self { bundle: *bundle, plan, source, pixels, rgb, splats }
     }
 }
 
-/// The front of the memory, as long as the plan says, with resident anchors decoded in it.
-#[inline(always)]
-fn read_scene<'s>(
-    bundle: &Bundle<'_>,
-    plan: &Plan,
-    [fast, slow]: [&'s mut [u8]; 2],
-    two_painters: bool,
-) -> Result<[&'s mut [u8]; 2], DecodeError> {
-    check_plan(bundle, plan, two_painters)?;
-    let fast = front(fast, plan.scratch_len(), Region::Fast)?;
-    let slow = front(slow, plan.slow_scratch_len(), Region::Slow)?;
-    // Before anything else, in memory that is taken again after it: the deepest calls come while no result waits on the stack.
-    read_chunks(bundle, plan, [&mut *fast, &mut *slow])?;
-    Ok([fast, slow])
-}
-
-/// Whether `plan` is one of this bundle, for as many painters.
+/// Whether `plan` is one of this bundle.
 #[inline(never)]
-fn check_plan(bundle: &Bundle<'_>, plan: &Plan, two_painters: bool) -> Result<(), DecodeError> {
-    let budget = Budget { two_painters: false, ..*plan.budget() };
-    let needed = Plan::new(bundle, &if two_painters { budget.with_two_painters() } else { budget })?;
+fn check_plan(bundle: &Bundle<'_>, plan: &Plan) -> Result<(), DecodeError> {
+    let needed = Plan::new(bundle, plan.budget())?;
     if !needed.draws_as(plan) {
-        let [needed, planned] =
-            [&needed, plan].map(|plan| saturate(plan.scratch_len().saturating_add(plan.slow_scratch_len())));
+        let [needed, planned] = [&needed, plan].map(Plan::len);
         return Err(DecodeError::PlanMismatch { needed, planned });
     }
     Ok(())
+}
+
+/// Whether it is one of two painters, in one strip.
+fn check_plan_of_two(bundle: &Bundle<'_>, plan: &Plan) -> Result<(), DecodeError> {
+    let budget = plan.budget();
+    if *budget == budget.with_two_painters() {
+        return check_plan(bundle, plan);
+    }
+    let needed = Plan::new(bundle, &budget.with_two_painters())?;
+    let [needed, planned] = [&needed, plan].map(Plan::len);
+    Err(DecodeError::PlanMismatch { needed, planned })
 }
 
 /// Compares the checksum of every chunk of the first `n_tiers`.
@@ -231,7 +238,7 @@ fn evaluator_of<'s, N: HeadFormat>(
 #[inline(never)]
 fn read_chunks(bundle: &Bundle<'_>, plan: &Plan, [fast, slow]: [&mut [u8]; 2]) -> Result<(), DecodeError> {
     let (shape, skip_damage) = (plan.shape(), plan.budget().skips_damage);
-    let mut regions = Regions::new([fast, slow], plan.placement());
+    let mut regions = Regions::new(fast, slow, plan.placement());
     match SceneMemory::take(shape, &mut regions)? {
         SceneMemory::Resident { anchor, mut records, models, .. } => {
             let n_chunks = shape.resident.n_chunks();

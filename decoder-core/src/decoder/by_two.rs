@@ -9,7 +9,7 @@ use pocketsplat_format::{Bundle, Camera, DecodeError, saturate};
 use super::drawing::{gather_row, size_along};
 use super::overflow::{OverflowPolicy, check_work};
 use super::render_error::RenderError;
-use super::share::{Painter, Share};
+use super::share::{Half, Painter};
 use super::tile::{Tile, TileSink};
 use super::{Decoder, FrameReport};
 use crate::arithmetic::Arithmetic;
@@ -113,8 +113,8 @@ impl<A: Arithmetic> Decoder<'_, '_, A> {
         let mut frame = self.begin_frame(camera, view).frame;
         let strip = frame.strips.between(0, frame.strips.len());
         let mut pass = self.begin_pass(strip, 0.0, &mut frame);
-        pass.share = Share::half(painter);
-        while !self.go_on(&mut pass, &mut frame, &mut ())? {
+        let mut share = Half::of(painter);
+        while !self.go_on(&mut pass, &mut frame, &mut share, &mut ())? {
             check_work(frame.instructions(), self.plan.budget().most_work)?;
         }
         let n = self.splats.n;
@@ -268,7 +268,7 @@ fn paint<A: Arithmetic, S: TileSink>(
     let background = has_background.then(|| header.background.map(|byte| f32::from(byte) / 255.0));
     let cost = canvas.bundle.model_cost();
     for row in rows {
-        let n_in_row = gather_row(order, &both, row, spare);
+        let n_in_row = gather_row(order, both, row, spare);
         let first = u32::from(row) * n_columns;
         let columns = tiles.start.saturating_sub(first)..tiles.end.saturating_sub(first).min(n_columns);
         for column in columns.start as u8..columns.end as u8 {
@@ -278,7 +278,7 @@ fn paint<A: Arithmetic, S: TileSink>(
             let mut list = spare.get(..n_in_row).unwrap_or_default();
             let report = &mut spent.report;
             loop {
-                let work = blend_tile::<A::Blending>(place, &both, list, &rule, pixels);
+                let work = blend_tile::<A::Blending>(place, both, list, &rule, pixels);
                 report.tile_splats = report.tile_splats.saturating_add(work.splats);
                 report.row_splats = report.row_splats.saturating_add(work.rows);
                 report.pixel_splats = report.pixel_splats.saturating_add(work.pixels);

@@ -23,7 +23,7 @@ pub fn count_scratch_len(bundle: &Bundle<'_>) -> usize {
 /// [`count_scratch_len`] bytes of `scratch`. Decodes and evaluates every anchor.
 pub fn count_gaussians(bundle: &Bundle<'_>, scratch: &mut [u8]) -> Result<[u32; MAX_TIERS as usize], DecodeError> {
     let shape = shape(bundle);
-    let mut regions = Regions::new([scratch, &mut []], Placement::FAST);
+    let mut regions = Regions::new(scratch, &mut [], Placement::FAST);
     let SceneMemory::Baked { baked, heads, anchor, models } = SceneMemory::take(&shape, &mut regions)? else {
         return Err(DecodeError::NotBakeable);
     };

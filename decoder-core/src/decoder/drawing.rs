@@ -6,6 +6,7 @@ use pocketsplat_format::{DecodeError, Stage, Stopwatch};
 use super::Decoder;
 use super::overflow::{Frame, OverflowPolicy, check_work};
 use super::pass::Pass;
+use super::share::All;
 use super::splats::{Slab, SplatStore};
 use super::strip::Strip;
 use crate::arithmetic::{Arithmetic, ReferenceArithmetic};
@@ -86,7 +87,7 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
     pub(super) fn step(&mut self, watch: &mut impl Stopwatch) -> Result<Step, DecodeError> {
         let step = match &mut self.next {
             Next::Slab => Ok(self.begin_slab()),
-            Next::Anchors(pass) => self.decoder.go_on(pass, &mut self.frame, watch).map(|is_complete| {
+            Next::Anchors(pass) => self.decoder.go_on(pass, &mut self.frame, &mut All, watch).map(|is_complete| {
                 if is_complete {
                     self.end_pass();
                 }
@@ -186,7 +187,7 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
         let (splats, rects) = (splats.get(..n)?, rects.get(..n)?);
         if self.column == 0 && self.n_listed == 0 {
             watch.enter(Stage::Sort);
-            self.n_in_row = gather_row(order.get(..n)?, &(splats, rects), self.row, spare.get_mut(..n)?);
+            self.n_in_row = gather_row(order.get(..n)?, (splats, rects), self.row, spare.get_mut(..n)?);
         }
         watch.enter(Stage::Blend);
         let (row, column) = (self.row, self.column);
@@ -198,7 +199,7 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
             pixels.fill(A::Blending::EMPTY);
         }
         let list = spare.get(self.n_listed..self.n_in_row)?;
-        let work = blend_tile::<A::Blending>(place, &(splats, rects), list, &self.rule, pixels);
+        let work = blend_tile::<A::Blending>(place, (splats, rects), list, &self.rule, pixels);
         let report = &mut self.frame.report;
         report.tile_splats = report.tile_splats.saturating_add(work.splats);
         report.row_splats = report.row_splats.saturating_add(work.rows);
@@ -238,7 +239,7 @@ pub(super) fn size_along(size_px: u16, index: u8) -> u16 {
 /// Copies the splats that touch tile row `row` from `order` to the front of `list`, in order; returns how many.
 // Not inlined: its loop would not stay in registers.
 #[inline(never)]
-pub(super) fn gather_row(order: &[u32], splats: &impl Splats, row: u8, list: &mut [u32]) -> usize {
+pub(super) fn gather_row(order: &[u32], splats: impl Splats, row: u8, list: &mut [u32]) -> usize {
     let mut n = 0;
     for &index in order {
         let Some(rect) = splats.rect(index) else { continue };

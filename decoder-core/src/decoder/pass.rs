@@ -31,8 +31,6 @@ pub(super) struct Pass<'b> {
     pub(super) target: Target,
     /// Whether its chunks are looked up in the index.
     is_indexed: bool,
-    /// What of the scene it goes over.
-    pub(super) share: Share,
     chunks: PlannedChunks<'b>,
     open: Option<OpenChunk<'b>>,
 }
@@ -95,14 +93,17 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
         }
         let decodes = u8::from(self.source.is_streamed());
         frame.report.decode_passes = frame.report.decode_passes.saturating_add(decodes);
-        Pass { target, is_indexed, share: Share::All, chunks: self.planned_chunks(), open: None }
+        Pass { target, is_indexed, chunks: self.planned_chunks(), open: None }
     }
 
     /// Goes on with a pass for about [`STEP`] model instructions; whether it is complete.
+    ///
+    /// * `share`: what of the scene it goes over.
     pub(super) fn go_on(
         &mut self,
         pass: &mut Pass<'b>,
         frame: &mut Frame,
+        share: &mut impl Share,
         watch: &mut impl Stopwatch,
     ) -> Result<bool, DecodeError> {
         let until = frame.instructions().saturating_add(STEP);
@@ -117,8 +118,8 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
                     return Ok(true);
                 };
                 watch.enter(Stage::Project);
-                if self.is_needed(&chunk, pass, frame) && pass.share.takes(&chunk, self.source.is_streamed()) {
-                    self.open(chunk, first_anchor, pass, frame, watch);
+                if self.is_needed(&chunk, pass, frame) && share.takes(&chunk, self.source.is_streamed()) {
+                    self.open(chunk, first_anchor, pass, frame, share, watch);
                 }
             }
             let Pass { target, open, .. } = pass;
@@ -128,7 +129,7 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
             frame.unreported = frame.unreported.saturating_add(core::mem::take(&mut self.splats.work));
             match outcome {
                 Ok(true) => {
-                    self.splats.end_chunk(chunk.chunk.index());
+                    share.end_chunk(&mut self.splats, chunk.chunk.index());
                     *open = None;
                 }
                 Ok(false) => return Ok(false),
@@ -164,6 +165,7 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
         first_anchor: u32,
         pass: &mut Pass<'b>,
         frame: &mut Frame,
+        share: &impl Share,
         watch: &mut impl Stopwatch,
     ) {
         watch.enter(Stage::Decode);
@@ -194,7 +196,7 @@ impl<'b, A: Arithmetic> Decoder<'b, '_, A> {
                 (anchors, reader)
             }
         };
-        let numbers = if reader.is_some() { numbers } else { pass.share.of(numbers, chunk.index()) };
+        let numbers = if reader.is_some() { numbers } else { share.of(numbers, chunk.index()) };
         pass.open = Some(OpenChunk { chunk, numbers, reader, before });
     }
 

@@ -4,17 +4,29 @@ use core::ops::Range;
 
 use pocketsplat_format::bundle::Chunk;
 
-/// What of the scene a pass goes over. Chunks hold anchors that are near one another, so that halves of chunks are halves of what is seen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Share {
-    /// All.
-    All,
-    /// One half: of each chunk whose anchors or Gaussians wait in memory; else of the chunks.
-    Half {
-        painter: Painter,
-        /// Anchors that the first painter was to decode so far, less those of the second.
-        ahead: i32,
-    },
+use super::splats::SplatStore;
+
+/// What of the scene a pass goes over. A type, so that one painter alone pays nothing for it.
+pub(super) trait Share {
+    /// Whether the pass goes over some of a chunk; both painters ask for the same chunks in the same order.
+    fn takes(&mut self, chunk: &Chunk<'_>, is_streamed: bool) -> bool;
+
+    /// Its part of what waits in memory of a chunk.
+    fn of(&self, numbers: Range<u32>, chunk: u32) -> Range<u32>;
+
+    /// Notes where the splats of a chunk end.
+    fn end_chunk(&self, splats: &mut SplatStore<'_>, chunk: u32);
+}
+
+/// The whole scene.
+pub(super) struct All;
+
+/// Half of it: of each chunk whose anchors or Gaussians wait in memory; else of the chunks. Chunks hold anchors that are near one another, so that
+/// halves of chunks are halves of what is seen.
+pub(super) struct Half {
+    painter: Painter,
+    /// Anchors that the first painter was to decode so far, less those of the second.
+    ahead: i32,
 }
 
 /// One of two painters.
@@ -32,40 +44,57 @@ impl Painter {
     }
 }
 
-impl Share {
-    /// A painter's half.
-    pub(super) fn half(painter: Painter) -> Self {
-        Self::Half { painter, ahead: 0 }
+impl Share for All {
+    #[inline(always)]
+    fn takes(&mut self, _: &Chunk<'_>, _: bool) -> bool {
+        true
     }
 
-    /// Whether the pass goes over some of a chunk; both painters ask for the same chunks in the same order.
-    pub(super) fn takes(&mut self, chunk: &Chunk<'_>, is_streamed: bool) -> bool {
-        let Self::Half { painter, ahead } = self else { return true };
+    #[inline(always)]
+    fn of(&self, numbers: Range<u32>, _: u32) -> Range<u32> {
+        numbers
+    }
+
+    #[inline(always)]
+    fn end_chunk(&self, _: &mut SplatStore<'_>, _: u32) {}
+}
+
+impl Half {
+    pub(super) fn of(painter: Painter) -> Self {
+        Self { painter, ahead: 0 }
+    }
+}
+
+impl Share for Half {
+    fn takes(&mut self, chunk: &Chunk<'_>, is_streamed: bool) -> bool {
         if !is_streamed {
             return true;
         }
         let n = i32::from(chunk.n_anchors());
-        let whose = if *ahead <= 0 { Painter::First } else { Painter::Second };
-        *ahead = ahead.saturating_add(if whose == Painter::First { n } else { -n });
-        whose == *painter
+        let whose = if self.ahead <= 0 { Painter::First } else { Painter::Second };
+        self.ahead = self.ahead.saturating_add(if whose == Painter::First { n } else { -n });
+        whose == self.painter
     }
 
-    /// Its part of what waits in memory of a chunk.
-    pub(super) fn of(self, numbers: Range<u32>, chunk: u32) -> Range<u32> {
-        let Self::Half { painter, .. } = self else { return numbers };
+    fn of(&self, numbers: Range<u32>, chunk: u32) -> Range<u32> {
         let middle = numbers.start.saturating_add(numbers.end.saturating_sub(numbers.start) / 2);
-        if painter == Painter::ahead_in(chunk) { numbers.start..middle } else { middle..numbers.end }
+        if self.painter == Painter::ahead_in(chunk) { numbers.start..middle } else { middle..numbers.end }
+    }
+
+    fn end_chunk(&self, splats: &mut SplatStore<'_>, chunk: u32) {
+        splats.end_chunk(chunk);
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Painter, Share};
+    use super::{All, Half, Painter, Share};
 
     #[test]
     fn two_halves_are_all_of_a_chunk() {
-        let halves = |chunk| [Painter::First, Painter::Second].map(|painter| Share::half(painter).of(10..17, chunk));
+        let halves =
+            |chunk| [Painter::First, Painter::Second].map(|painter| Share::of(&Half::of(painter), 10..17, chunk));
         assert_eq!((halves(0), halves(1)), ([10..13, 13..17], [13..17, 10..13]), "by turns");
-        assert_eq!(Share::All.of(10..17, 0), 10..17);
+        assert_eq!(All.of(10..17, 0), 10..17);
     }
 }

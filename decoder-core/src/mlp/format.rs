@@ -31,7 +31,7 @@ pub(crate) trait HeadFormat: Copy {
 }
 
 /// A head: a hidden layer with ReLU, and an output layer of one block of B outputs an offset.
-pub(crate) trait MlpHead<'s, N: HeadFormat + ?Sized, const B: usize>: Sized {
+pub(crate) trait MlpHead<'s, N: HeadFormat, const B: usize>: Sized {
     /// Converts the file's weights; takes no more memory than [`HeadShape`](super::HeadShape) says.
     ///
     /// * `free`: memory to work in, two rows of weights.

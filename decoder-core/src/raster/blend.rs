@@ -6,7 +6,7 @@ use super::blending::{Blending, Pixel, TileRegion};
 use crate::project::{PackedSplat, TileRect};
 
 /// Splats and their tiles, each by the number that lists have of it.
-pub(crate) trait Splats {
+pub(crate) trait Splats: Copy {
     /// Splat `number`, if there is one.
     fn splat(&self, number: u32) -> Option<(&TileRect, &PackedSplat)>;
 
@@ -56,7 +56,7 @@ const ENTRIES_OF_STEP: usize = 8192;
 /// As [`Blending::blend`] for at most [`SPLATS_OF_STEP`] splats.
 pub(crate) fn blend_tile<B: Blending>(
     place: TileRegion,
-    splats: &impl Splats,
+    splats: impl Splats,
     list: &[u32],
     rule: &B::Rule,
     pixels: &mut [Pixel],

@@ -5,7 +5,7 @@
 //! | `PSB_BUNDLE` | absolute path of the bundle | an error |
 //! | `BOARD` | `mps2-an386`, `mps2-an500`, `mps2-an521`, or `virt` for RISC-V | `mps2-an386`; for RISC-V `virt` |
 //! | `RAM_KIB` | RAM in all: statics, scratch memory, stack | 256, 1024, 520, 512 |
-//! | `STACK_KIB` | of which the stack's, for each core | 10 |
+//! | `STACK_KIB` | of which the stack's, for each core | 10; with two cores 16 |
 //! | `SIZE` | frames, `WIDTHxHEIGHT` | the preview's |
 //! | `FRAMES` | frames of the orbit, at most 10 | 4 |
 //! | `VIEWS` | absolute path of cameras to draw instead, at most 10: a line each of the numbers of a `Camera`, in its order | an orbit |
@@ -19,8 +19,9 @@ use std::{env, fs};
 
 use pocketsplat_core::Bundle;
 
-/// KiB reserved for the stack; the firmware fails when it comes near.
+/// KiB reserved for the stack, and with two cores for each one's; the firmware fails when it comes near.
 const STACK_KIB: usize = 10;
+const STACK_KIB_OF_TWO: usize = 16;
 /// The board with two cores, each of which has a stack.
 const TWO_CORES: &str = "mps2-an521";
 /// Bytes of all statics beside the scratch memory, which gets the rest: the logger's and the flags of the cells.
@@ -60,8 +61,9 @@ fn prepare() -> Result<(), Box<dyn Error>> {
         .into_iter()
         .find(|board| board.0 == name && board.1 == arch)
         .ok_or_else(|| format!("BOARD={name} is no board of architecture {arch}: see build.rs"))?;
+    let (n_stacks, usual_stack_kib) = if name == TWO_CORES { (2, STACK_KIB_OF_TWO) } else { (1, STACK_KIB) };
     let ram_kib = variable("RAM_KIB").map_or(Ok(usual_ram_kib), |text| text.parse())?;
-    let stack_len = variable("STACK_KIB").map_or(Ok(STACK_KIB), |text| text.parse())? * 1024;
+    let stack_len = variable("STACK_KIB").map_or(Ok(usual_stack_kib), |text| text.parse())? * 1024;
     lay_out(memory, ram_kib, stack_len, &out)?;
 
     let path = variable("PSB_BUNDLE")
@@ -89,10 +91,9 @@ fn prepare() -> Result<(), Box<dyn Error>> {
     // Names that are none are errors of the compiler's.
     let budget = variable("BUDGET").unwrap_or_default();
     let arithmetic = variable("ARITHMETIC").unwrap_or_else(|| "ReferenceArithmetic".into());
-    let scratch_len =
-        (ram_kib * 1024)
-            .checked_sub(stack_len * if name == TWO_CORES { 2 } else { 1 } + OTHER_STATICS)
-            .ok_or_else(|| format!("RAM_KIB={ram_kib} leaves no scratch memory beside {stack_len} bytes of stack"))?;
+    let scratch_len = (ram_kib * 1024)
+        .checked_sub(n_stacks * stack_len + OTHER_STATICS)
+        .ok_or_else(|| format!("RAM_KIB={ram_kib} leaves no scratch memory beside {stack_len} bytes of stack"))?;
     let views = views.concat();
     let settings = format!(
         "const BOARD: &str = {name:?};\nconst RAM_KIB: usize = {ram_kib};\nconst STACK_LEN: usize = {stack_len};\n\

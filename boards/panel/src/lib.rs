@@ -9,7 +9,7 @@ use embedded_hal::digital::OutputPin;
 use mipidsi::Display;
 use mipidsi::interface::{Interface, InterfacePixelFormat};
 use mipidsi::models::Model;
-use pocketsplat_core::{Arithmetic, ByteOrder, Camera, Decoder, FrameReport, RenderError, Rounding};
+use pocketsplat_core::{Arithmetic, ByteOrder, Camera, Decoder, FrameReport, RenderError, Rounding, Tile};
 
 /// The camera with the largest frame of its proportions that a panel of `width_px × height_px` shows.
 #[must_use]
@@ -50,18 +50,32 @@ where
     Rgb565: InterfacePixelFormat<I::Word>,
     R: OutputPin,
 {
+    let mut drawing = decoder.begin(camera)?;
+    while let Some(tile) = drawing.next_tile()? {
+        send(display, camera, tile).map_err(RenderError::Sink)?;
+    }
+    Ok(drawing.report())
+}
+
+/// Sends a tile of what the camera sees to where it belongs in the middle of the display.
+///
+/// # Errors
+/// The bus of the display.
+pub fn send<I, M, R>(display: &mut Display<I, M, R>, camera: &Camera, tile: Tile<'_>) -> Result<(), I::Error>
+where
+    I: Interface,
+    M: Model<ColorFormat = Rgb565>,
+    Rgb565: InterfacePixelFormat<I::Word>,
+    R: OutputPin,
+{
     let size = display.size();
     // No panel has a side of 65,536 pixels.
     let [left, top] = [(size.width, camera.width_px), (size.height, camera.height_px)]
         .map(|(panel, frame)| panel.saturating_sub(frame.into()) as u16 / 2);
-    let mut drawing = decoder.begin(camera)?;
-    while let Some(tile) = drawing.next_tile()? {
-        let (x, y) = (left + tile.x_px, top + tile.y_px);
-        let (last_x, last_y) = (x + (tile.width - 1), y + (tile.height - 1));
-        // Dithered, because a gradient in 32 steps shows bands.
-        let bytes = tile.into_rgb565(ByteOrder::BigEndian, Rounding::Dithered);
-        let pixels = bytes.as_chunks().0.iter().map(|&pixel| Rgb565::from(RawU16::new(u16::from_be_bytes(pixel))));
-        display.set_pixels(x, y, last_x, last_y, pixels).map_err(RenderError::Sink)?;
-    }
-    Ok(drawing.report())
+    let (x, y) = (left + tile.x_px, top + tile.y_px);
+    let (last_x, last_y) = (x + (tile.width - 1), y + (tile.height - 1));
+    // Dithered, because a gradient in 32 steps shows bands.
+    let bytes = tile.into_rgb565(ByteOrder::BigEndian, Rounding::Dithered);
+    let pixels = bytes.as_chunks().0.iter().map(|&pixel| Rgb565::from(RawU16::new(u16::from_be_bytes(pixel))));
+    display.set_pixels(x, y, last_x, last_y, pixels)
 }

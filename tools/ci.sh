@@ -450,6 +450,7 @@ measure_firmware() { # CSV
   local coder run runs options bundle out bytes frame arithmetic orbit
   need_embedded_target
   need_target riscv32imac-unknown-none-elf
+  need_target thumbv8m.main-none-eabihf
   need_command qemu-system-arm qemu-system-arm
   need_command qemu-system-riscv32 qemu-system-misc
   need_tool defmt-print "$defmt_print_version"
@@ -486,6 +487,8 @@ measure_firmware() { # CSV
     cargo clippy -q "${options[@]}" -- -D warnings
     cargo build -q "${options[@]}"
     ./qemu.sh "$embedded/$embedded_target/release/two_buffers" || fail "two tile buffers do not draw what render draws"
+    options=(--release --locked --bin two_cores --features two-cores --target thumbv8m.main-none-eabihf --target-dir "$embedded")
+    BOARD=mps2-an521 cargo clippy -q "${options[@]}" -- -D warnings
     options=(--release --locked --bin steps --target-dir "$embedded")
     cargo build -q "${options[@]}"
     ./qemu.sh "$embedded/$embedded_target/release/steps" || fail "a step of a frame takes too long"
@@ -502,6 +505,10 @@ measure_firmware() { # CSV
   done
   CARGO_TARGET_DIR=$embedded firmware-example/cycles.sh "$target/firmware/sample-static.psb" 256 >"$target/firmware/cycles.csv"
   [ "$(wc -l <"$target/firmware/cycles.csv")" = 5 ] || fail "cycles.sh counted no four frames"
+  CARGO_TARGET_DIR=$embedded firmware-example/two_cores.sh "$target/firmware/sample-static.psb" 520 >"$target/firmware/two-cores.csv" ||
+    fail "two cores draw something else than one"
+  awk -F, 'NR > 1 && $NF < 1.7 { slow = 1 } END { exit slow || NR != 5 }' "$target/firmware/two-cores.csv" ||
+    fail "a frame of two cores takes more than 1/1.7 of one core's: $(cat "$target/firmware/two-cores.csv")"
 }
 
 # Firmware for real boards builds (clippy would build their large HALs once more), and a display of memory gets the pixels of `render`.

@@ -12,6 +12,7 @@
 //! * `malformed`: does a damaged bundle fail and name the place, or report the damaged chunk, and never draw another
 //!   picture in silence?
 //! * `passes`: does a frame go over its scene as seldom as it can, in no more memory than it says, and does damage leave nothing behind?
+//! * `two_painters`: do two decoders that share a scene draw together what one draws, in memory that the plan tells exactly?
 //! * `tiers`: is each tier's scene part of the next one's, and is a file cut at its end that scene?
 //! * `sizes`: does a frame that is larger or smaller than those of training show the same picture?
 //! * `digests`: do symbols not depend on the number of threads?

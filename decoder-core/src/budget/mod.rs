@@ -18,8 +18,8 @@ mod work;
 pub use crate::mlp::HeadWeights;
 pub use limits::{Budget, MaxSplats, Overflow, Residency, Strips};
 pub(crate) use memory::{
-    AnchorMemory, FrameMemory, HeadMemory, ListMemory, ModelMemory, PainterMemory, ReaderMemory, SceneMemory,
-    SumsMemory, TileMemory,
+    AnchorMemory, FrameMemory, ListMemory, ModelMemory, PainterMemory, ReaderMemory, SceneMemory, SumsMemory,
+    TileMemory,
 };
 pub use placement::{Part, PartMemory};
 pub(crate) use placement::{Placement, Regions};

@@ -22,7 +22,7 @@ pub enum Part {
     /// Anchors, with their sums, or Gaussians in memory: once for each strip.
     Scene,
     /// What the second of [two painters](crate::Budget::with_two_painters) has of its own: the current anchor, a context's numbers, tiles, lists
-    /// and splats. It reads heads, tables and the scene where the first does.
+    /// and splats; it lies where the first one's [splats](Self::Splats) lie. Heads, tables and the scene it reads where the first does.
     SecondPainter,
 }
 
@@ -44,9 +44,10 @@ impl Part {
     pub const ALL: [Self; 7] =
         [Self::Heads, Self::Models, Self::Tiles, Self::Lists, Self::Splats, Self::Scene, Self::SecondPainter];
 
-    /// Its bit in a [`Placement`]: the first part has the highest.
+    /// Its bit in a [`Placement`]: the first part has the highest; that of the splats is the second painter's too.
     const fn bit(self) -> u8 {
-        0b100_0000 >> self as u8
+        let place = if matches!(self, Self::SecondPainter) { Self::Splats } else { self };
+        0b10_0000 >> place as u8
     }
 }
 
@@ -57,19 +58,12 @@ pub(crate) struct Placement(u8);
 
 impl Placement {
     /// Everything in fast memory.
-    pub(crate) const FAST: Self = Self(0b111_1111);
+    pub(crate) const FAST: Self = Self(0b11_1111);
 
     /// Those to choose from, the largest first: all of them, or [`FAST`](Self::FAST) alone where nothing is slow.
-    ///
-    /// * `two_painters`: if not, the second one's part is nowhere, and need not be tried in both.
-    pub(super) fn to_try(has_slow: bool, two_painters: bool) -> impl Iterator<Item = Self> {
+    pub(super) fn to_try(has_slow: bool) -> impl Iterator<Item = Self> {
         let last = if has_slow { 0 } else { Self::FAST.0 };
-        (last..=Self::FAST.0).rev().step_by(if two_painters { 1 } else { 2 }).map(Self)
-    }
-
-    /// All but one in fast memory.
-    pub(super) const fn all_fast_but(part: Part) -> Self {
-        Self(Self::FAST.0 & !part.bit())
+        (last..=Self::FAST.0).rev().map(Self)
     }
 
     /// Where a part lies.
@@ -118,14 +112,10 @@ mod tests {
 
     #[test]
     fn placements_prefer_the_parts_that_come_first_in_fast_memory() {
-        let all: std::vec::Vec<_> = Placement::to_try(true, true).collect();
-        assert_eq!((all.len(), all.first()), (128, Some(&Placement::FAST)), "every one, all fast first");
+        let all: std::vec::Vec<_> = Placement::to_try(true).collect();
+        assert_eq!((all.len(), all.first()), (64, Some(&Placement::FAST)), "every one, all fast first");
         let fast = |placement: &Placement| Part::ALL.map(|part| placement.region(part) == Region::Fast);
         assert!(all.is_sorted_by(|a, b| fast(a) > fast(b)), "then without the last part, then without the one before");
-        let of_one: std::vec::Vec<_> = Placement::to_try(true, false).collect();
-        assert!(of_one.len() == 64 && of_one.iter().all(|placement| placement.0 & 1 == 1), "no second painter");
-        for two_painters in [false, true] {
-            assert_eq!(Placement::to_try(false, two_painters).collect::<std::vec::Vec<_>>(), [Placement::FAST]);
-        }
+        assert_eq!(Placement::to_try(false).collect::<std::vec::Vec<_>>(), [Placement::FAST]);
     }
 }

@@ -233,7 +233,7 @@ impl Planner<'_, '_> {
         // Halves before fewer tiers.
         for (n_tiers, weights) in tiers.flat_map(|n| [(n, HeadWeights::F32), (n, HeadWeights::F16)]) {
             let mut best: Option<(u64, Plan)> = None;
-            for placement in Placement::to_try(has_slow, budget.two_painters) {
+            for placement in Placement::to_try(has_slow) {
                 for (n_strips, residency) in self.variants() {
                     let (cost, plan) = self.variant(n_tiers, n_strips, residency, weights, placement);
                     let needed = match region {

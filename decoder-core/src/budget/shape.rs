@@ -274,12 +274,9 @@ impl ScratchShape {
         }
     }
 
-    /// Words of a second painter's anchor that waits for another, where two are evaluated at a time, which is where weights are halves. Never
-    /// so many that floats would take less; with fewer it evaluates one at a time.
+    /// Words of a second painter's anchor that waits for another, where two are evaluated at a time, which is where weights are halves.
     pub(super) const fn pair_words(&self) -> usize {
-        let heads = self.heads();
-        let saved = heads.words(HeadWeights::F32).saturating_sub(heads.words(self.model.head_weights));
-        if saved < heads.pair_words() { saved } else { heads.pair_words() }
+        if matches!(self.model.head_weights, HeadWeights::F16) { self.heads().pair_words() } else { 0 }
     }
 
     /// Entries of each list of splats: those of both painters.

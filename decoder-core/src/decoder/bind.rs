@@ -11,8 +11,8 @@ use crate::arena::Arena;
 use crate::arithmetic::Arithmetic;
 use crate::bake::{BakedGaussians, BakedMemory, Baker, bake};
 use crate::budget::{
-    AnchorMemory, FrameMemory, HeadMemory, ListMemory, ModelMemory, PainterMemory, Part, Plan, Regions, SceneMemory,
-    ScratchShape, SumsMemory, TileMemory,
+    AnchorMemory, FrameMemory, ListMemory, ModelMemory, PainterMemory, Part, Plan, Regions, SceneMemory, ScratchShape,
+    SumsMemory, TileMemory,
 };
 use crate::mlp::{F32, FeatureSums, HeadFormat, Heads};
 use crate::scene::{Evaluator, Pair, Workspace};
@@ -143,14 +143,11 @@ fn bind_scene<'b, 's, N: HeadFormat>(
     let (anchor, kept, sums) = match SceneMemory::take(shape, regions)? {
         // Unreachable without the feature; this arm drops the code.
         SceneMemory::Baked { .. } if !cfg!(feature = "baked") => return Err(DecodeError::Internal),
-        SceneMemory::Baked { baked, heads, anchor, models } => {
-            let anchor = (heads, anchor);
+        SceneMemory::Baked { baked, anchor, models } => {
             return bind_baked(bundle, shape, baked, anchor, models, skip_damage).map(GaussianSource::Baked);
         }
-        SceneMemory::Streamed { heads, anchor, models } => ((heads, anchor), AnchorStorage::Models(models), None),
-        SceneMemory::Resident { heads, anchor, records, sums, .. } => {
-            ((heads, anchor), AnchorStorage::Anchors(records), Some(sums))
-        }
+        SceneMemory::Streamed { anchor, models } => (anchor, AnchorStorage::Models(models), None),
+        SceneMemory::Resident { anchor, records, sums, .. } => (anchor, AnchorStorage::Anchors(records), Some(sums)),
     };
     let evaluator = evaluator(bundle, shape, anchor, sums, regions.of(Part::Tiles).borrow());
     anchors(bundle, shape, kept, evaluator)
@@ -193,7 +190,7 @@ fn bind_baked<'s>(
     bundle: &Bundle<'_>,
     shape: &ScratchShape,
     baked: BakedMemory<'s>,
-    anchor: (HeadMemory<'_>, AnchorMemory<'_>),
+    anchor: AnchorMemory<'_>,
     models: ModelMemory<'_>,
     skip_damage: bool,
 ) -> Result<BakedGaussians<'s>, DecodeError> {
@@ -207,12 +204,12 @@ fn bind_baked<'s>(
 fn evaluator<'s, N: HeadFormat>(
     bundle: &Bundle<'_>,
     shape: &ScratchShape,
-    (HeadMemory { weights }, memory): (HeadMemory<'s>, AnchorMemory<'s>),
+    memory: AnchorMemory<'s>,
     sums: Option<SumsMemory<'s>>,
     mut free: Arena<'_>,
 ) -> Result<EvaluatorAndRow<'s, N>, DecodeError> {
-    let AnchorMemory { row, inputs, hidden, detail_sums, outputs } = memory;
-    let mut arena = Arena::of_words(weights);
+    let AnchorMemory { heads, row, inputs, hidden, detail_sums, outputs } = memory;
+    let mut arena = Arena::of_words(heads);
     let heads = Heads::convert(&mut arena, &mut free, shape.model.head_weights, bundle.heads(), shape.heads());
     let work = Workspace { hidden, detail_sums, outputs };
     let sums = sums.filter(|_| N::READS_SUMS && shape.resident.has_sums());
@@ -255,7 +252,7 @@ pub(super) fn evaluate_scene<'s>(
     bundle: &Bundle<'_>,
     shape: &ScratchShape,
     baked: BakedMemory<'s>,
-    anchor: (HeadMemory<'_>, AnchorMemory<'_>),
+    anchor: AnchorMemory<'_>,
     models: ModelMemory<'_>,
     skip_damage: bool,
 ) -> Result<Baker<'s>, DecodeError> {

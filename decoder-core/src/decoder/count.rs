@@ -24,10 +24,10 @@ pub fn count_scratch_len(bundle: &Bundle<'_>) -> usize {
 pub fn count_gaussians(bundle: &Bundle<'_>, scratch: &mut [u8]) -> Result<[u32; MAX_TIERS as usize], DecodeError> {
     let shape = shape(bundle);
     let mut regions = Regions::new(scratch, &mut [], Placement::FAST);
-    let SceneMemory::Baked { baked, heads, anchor, models } = SceneMemory::take(&shape, &mut regions)? else {
+    let SceneMemory::Baked { baked, anchor, models } = SceneMemory::take(&shape, &mut regions)? else {
         return Err(DecodeError::NotBakeable);
     };
-    let baker = bind::evaluate_scene(bundle, &shape, baked, (heads, anchor), models, false)?;
+    let baker = bind::evaluate_scene(bundle, &shape, baked, anchor, models, false)?;
     let mut counts = [0; MAX_TIERS as usize];
     for (tier, count) in (1..).zip(&mut counts) {
         *count = baker.n_of_first(bundle.up_to_tier(tier).n_chunks);

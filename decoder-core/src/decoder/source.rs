@@ -6,7 +6,7 @@ use pocketsplat_format::bundle::{AnchorModels, AnchorRecords, AnchorSite, Chunk,
 use pocketsplat_format::{DecodeError, Stage, Stopwatch};
 
 use crate::bake::BakedGaussians;
-use crate::budget::{AnchorMemory, ReaderMemory};
+use crate::budget::ReaderMemory;
 use crate::mlp::HeadFormat;
 use crate::scene::{Evaluator, Workspace};
 
@@ -46,7 +46,7 @@ impl<'s, N: HeadFormat> GaussianSource<'_, 's, N> {
     /// The same scene for a second painter, which reads it at the same time.
     ///
     /// * `memory`: what it needs of its own to read anchors.
-    pub(super) fn shared(&self, memory: Option<(AnchorMemory<'s>, ReaderMemory<'s>)>) -> Result<Self, DecodeError> {
+    pub(super) fn shared(&self, memory: Option<ReaderMemory<'s>>) -> Result<Self, DecodeError> {
         Ok(match (self, memory) {
             // Unreachable without the feature; this arm drops the code.
             (Self::Baked(baked), _) if cfg!(feature = "baked") => Self::Baked(*baked),
@@ -58,13 +58,13 @@ impl<'s, N: HeadFormat> GaussianSource<'_, 's, N> {
 
 impl<'s, N: HeadFormat> Anchors<'_, 's, N> {
     /// The same anchors and heads for a second painter.
-    fn shared(&self, (anchor, reader): (AnchorMemory<'s>, ReaderMemory<'s>)) -> Result<Self, DecodeError> {
-        let AnchorMemory { row, inputs, hidden, detail_sums, outputs } = anchor;
+    fn shared(&self, memory: ReaderMemory<'s>) -> Result<Self, DecodeError> {
+        let ReaderMemory { models: own, row, inputs, hidden, detail_sums, outputs, pair } = memory;
         let source = match &self.source {
-            AnchorSource::Streamed(models) => AnchorSource::Streamed(models.shared(reader.models)?),
+            AnchorSource::Streamed(models) => AnchorSource::Streamed(models.shared(own)?),
             AnchorSource::Resident(records) => AnchorSource::Resident(*records),
         };
-        let evaluator = self.evaluator.shared(inputs, Workspace { hidden, detail_sums, outputs }, reader.pair);
+        let evaluator = self.evaluator.shared(inputs, Workspace { hidden, detail_sums, outputs }, pair);
         Ok(Self { source, row, evaluator })
     }
 }

@@ -37,6 +37,7 @@ impl Numbers {
             _ => Resident::Gaussians { n_gaussians: self.below(200_000), n_chunks: 1 + self.below(200) },
         };
         [shape.frame.canvas_tiles, shape.frame.max_splats] = [1 + self.below(100), self.below(60_000)];
+        shape.frame.shared_chunks = self.below(2) * (1 + self.below(200));
         shape
     }
 }
@@ -81,7 +82,17 @@ fn by_the_document(shape: &ScratchShape) -> usize {
     let models = if n_tables > 0 { 36 * n_tables } else { (n_in + n_hidden + n_kept).div_ceil(2) };
 
     let tiles = 1024 * frame.canvas_tiles as usize + 192 + 256;
-    let drawn = tiles + 10 * frame.max_splats as usize;
+    let (places, shared_chunks) = (frame.max_splats as usize, frame.shared_chunks as usize);
+    let own = if resident == Resident::Nothing && n_tables == 0 { models } else { 0 };
+    let pair = if model.head_weights == HeadWeights::F16 { 3 * k + n_g.max(n_c) + 3 * u } else { 0 };
+    let reader = match resident {
+        Resident::Gaussians { .. } => 0,
+        _ => c + n_g.max(n_c) + u + up8(h_d) + 11 * k + own + pair,
+    };
+    let drawn = match shared_chunks {
+        0 => tiles + 10 * places,
+        _ => 2 * (tiles + 12 * places + shared_chunks) + reader,
+    };
     let (kept, bound) = match resident {
         Resident::Nothing => (heads + models, 0),
         Resident::Anchors { n_anchors, n_chunks, with_sums } => {

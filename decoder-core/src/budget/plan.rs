@@ -322,17 +322,19 @@ impl Planner<'_, '_> {
         // Gaussians are evaluated once, with weights in f32.
         let weights = if resident.is_gaussians() { HeadWeights::F32 } else { weights };
         let wanted = self.splats_to_hold(budget.max_splats, n_tiers, n_strips, weights);
-        let (shared_chunks, wanted) = if budget.two_painters {
-            let n_chunks = tier.n_chunks.max(1);
-            // Whole chunks are shared out where they are decoded.
-            let whole = if resident == Resident::Nothing { wanted.div_ceil(n_chunks) } else { 0 };
-            let is_measured = budget.max_splats == MaxSplats::Measured;
-            (n_chunks, if is_measured { half_with_reserve(wanted, whole) } else { wanted })
-        } else {
-            (0, wanted)
-        };
         let mut shape =
-            ScratchShape::of(bundle, resident, FrameShape { canvas_tiles, max_splats: wanted, shared_chunks });
+            ScratchShape::of(bundle, resident, FrameShape { canvas_tiles, max_splats: wanted, shared_chunks: 0 });
+        if budget.two_painters {
+            let n_chunks = tier.n_chunks.max(1);
+            shape.frame.shared_chunks = n_chunks;
+            // What was measured is shared; what is always enough for one may be needed by either.
+            if budget.max_splats == MaxSplats::Measured && measures.is_some() {
+                // Chunks that are decoded are shared out whole, of others an anchor is.
+                let whole =
+                    if resident == Resident::Nothing { wanted.div_ceil(n_chunks) } else { header.n_offsets.into() };
+                shape.frame.max_splats = half_with_reserve(wanted, whole);
+            }
+        }
         shape.model.head_weights = weights;
         if !budget.quality.detail {
             shape.model.detail_hidden = 0;
@@ -438,7 +440,8 @@ fn with_reserve(n_splats: u32) -> u32 {
 
 /// Places of one of two painters that share so many splats, `whole` of which they cannot divide.
 fn half_with_reserve(n_splats: u32, whole: u32) -> u32 {
-    n_splats.div_ceil(2).saturating_add(n_splats.div_ceil(16)).saturating_add(whole).min(n_splats)
+    // At most 2²⁴ anchors of 32 offsets.
+    n_splats.div_ceil(2).wrapping_add(n_splats.div_ceil(16)).wrapping_add(whole).min(n_splats)
 }
 
 /// Tiles of a strip.

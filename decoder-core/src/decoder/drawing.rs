@@ -103,8 +103,9 @@ impl<A: Arithmetic> Drawing<'_, '_, '_, A> {
             Next::Tile => self.draw_tile(watch).ok_or(DecodeError::Internal),
             Next::End => return Ok(Step::Complete),
         };
-        let work = self.frame.instructions();
-        let step = step.and_then(|step| check_work(work, self.decoder.plan.budget().most_work).map(|()| step));
+        let step = step.and_then(|step| {
+            check_work(self.frame.instructions(), self.decoder.plan.budget().most_work).map(|()| step)
+        });
         if step.is_err() {
             self.next = Next::End;
         }

@@ -330,8 +330,7 @@ impl Planner<'_, '_> {
             // What was measured is shared; what is always enough for one may be needed by either.
             if budget.max_splats == MaxSplats::Measured && measures.is_some() {
                 // Chunks that are decoded are shared out whole, of others an anchor is.
-                let whole =
-                    if resident == Resident::Nothing { wanted.div_ceil(n_chunks) } else { header.n_offsets.into() };
+                let whole = if resident == Resident::Nothing { wanted / n_chunks } else { header.n_offsets.into() };
                 shape.frame.max_splats = half_with_reserve(wanted, whole);
             }
         }
@@ -441,7 +440,7 @@ fn with_reserve(n_splats: u32) -> u32 {
 /// Places of one of two painters that share so many splats, `whole` of which they cannot divide.
 fn half_with_reserve(n_splats: u32, whole: u32) -> u32 {
     // At most 2²⁴ anchors of 32 offsets.
-    n_splats.div_ceil(2).wrapping_add(n_splats.div_ceil(16)).wrapping_add(whole).min(n_splats)
+    n_splats.div_ceil(2).wrapping_add(n_splats / 16).wrapping_add(whole).wrapping_add(1).min(n_splats)
 }
 
 /// Tiles of a strip.

@@ -134,10 +134,10 @@ impl Power {
         const FINE_BITS: i32 = EXPONENT_BITS - INDEX_BITS;
         let x = x.clamp((EXP_MIN as i32) << EXPONENT_BITS, (EXP_MAX as i32) << EXPONENT_BITS);
         let x = product(x, LOG2_E, ONE_BITS);
-        let index = (x >> FINE_BITS & ((1 << INDEX_BITS) - 1)) as usize;
+        let index = ((x >> FINE_BITS) & ((1 << INDEX_BITS) - 1)) as usize;
         let &[low, high] = TWO_TO_SIXTY_FOURTHS.get(index..).and_then(<[u32]>::first_chunk).unwrap_or(&[1 << 23; 2]);
         let fine = (x & ((1 << FINE_BITS) - 1)) as u32;
-        Self { fraction: low + ((high - low) * fine >> FINE_BITS), exponent: x >> EXPONENT_BITS }
+        Self { fraction: low + (((high - low) * fine) >> FINE_BITS), exponent: x >> EXPONENT_BITS }
     }
 
     /// Its float; the fraction's first bit is one more of the exponent.
@@ -164,14 +164,14 @@ impl Power {
 /// x·y, of both bits behind the point so many fewer.
 #[inline]
 fn product(x: i32, y: i32, bits: i32) -> i32 {
-    (i64::from(x) * i64::from(y) >> bits) as i32
+    ((i64::from(x) * i64::from(y)) >> bits) as i32
 }
 
 /// 1/d for d from 1 to 2, both with [`ONE_BITS`]: a division of 32 bits and a step of Newton's method.
 #[inline]
 fn reciprocal(d: u32) -> u32 {
     let near = (u32::MAX / (d >> 15)) as i32;
-    let error = ((1_i64 << 31) - (i64::from(d) * i64::from(near) >> 16)) as i32;
+    let error = ((1_i64 << 31) - ((i64::from(d) * i64::from(near)) >> 16)) as i32;
     ((near << 13) + (near.wrapping_mul(error >> 4) >> 14)) as u32
 }
 

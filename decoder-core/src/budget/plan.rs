@@ -325,12 +325,12 @@ impl Planner<'_, '_> {
         let mut shape =
             ScratchShape::of(bundle, resident, FrameShape { canvas_tiles, max_splats: wanted, shared_chunks: 0 });
         if budget.two_painters {
-            let n_chunks = tier.n_chunks.max(1);
-            shape.frame.shared_chunks = n_chunks;
+            shape.frame.shared_chunks = tier.n_chunks.max(1);
             // What was measured is shared; what is always enough for one may be needed by either.
             if budget.max_splats == MaxSplats::Measured && measures.is_some() {
                 // Chunks that are decoded are shared out whole, of others an anchor is.
-                let whole = if resident == Resident::Nothing { wanted / n_chunks } else { header.n_offsets.into() };
+                let of_a_chunk = wanted.checked_div(tier.n_chunks).unwrap_or(wanted);
+                let whole = if resident == Resident::Nothing { of_a_chunk } else { header.n_offsets.into() };
                 shape.frame.max_splats = half_with_reserve(wanted, whole);
             }
         }

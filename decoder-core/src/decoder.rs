@@ -228,10 +228,12 @@ impl<'b, 's, A: Arithmetic> Decoder<'b, 's, A> {
     ///
     /// # Errors
     /// As for [`render`](Self::render); after an error one of the sinks may have got more tiles than the other.
+    /// [`DecodeError::PlanMismatch`] for decoders that [`bind_two`](Self::bind_two) did not make, [`DecodeError::Internal`] when `join` leaves one
+    /// of the two undone.
     ///
     /// # Budget
-    /// As [`render`](Self::render), half of it each: of the anchors that wait in memory every second, of those that are decoded every second
-    /// chunk, then the tiles that half of the splats lie in.
+    /// As [`render`](Self::render), about half of it each: of each chunk that waits in memory half, of those that are decoded chunks with half of
+    /// the anchors, then the tiles that half of the splats lie in. Each sorts the splats of its tiles, and the first finds where they are divided.
     pub fn render_by_two<S>(
         painters: &mut [Self; 2],
         camera: &Camera,

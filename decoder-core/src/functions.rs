@@ -85,7 +85,7 @@ impl Functions for Table {
     /// (1 − e⁻²ˣ)/(1 + e⁻²ˣ).
     #[inline]
     fn tanh(x: f32) -> f32 {
-        let power = Power::of_e(-fixed(x, EXPONENT_BITS + 1));
+        let power = Power::of_e(-fixed(x, EXPONENT_BITS + 1).max(0));
         let one_and = power.one_and();
         let one_less = (2 << ONE_BITS) - one_and;
         float(product(one_less as i32, reciprocal(one_and) as i32, ONE_BITS), ONE_BITS)

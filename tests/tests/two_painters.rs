@@ -203,6 +203,40 @@ fn an_error_of_either_painter_ends_the_frame() {
     }
 }
 
+/// A frame of one tile, which the second painter blends alone: the first is still held to its work.
+#[test]
+fn a_painter_without_tiles_keeps_the_limit_of_work_too() {
+    let bytes = golden("context.psb");
+    let bundle = Bundle::parse(&bytes).expect("a committed bundle is sound");
+    let camera = bundle.header().preview.resized(16, 16);
+    let drawn = |most_work: u64| {
+        let budget = budget_for(&camera).with_most_work(most_work).with_two_painters();
+        let plan = Plan::new(&bundle, &budget).expect("memory without limit");
+        let mut scratch = vec![0; plan.scratch_len()];
+        let mut painters =
+            Decoder::bind_two::<ReferenceArithmetic>(&bundle, plan, &mut scratch).expect("its own bytes");
+        together(&mut painters, &camera).map(|(_, reports)| reports)
+    };
+    let spent = drawn(u64::MAX).expect("drawn").map(|report| report.instructions(bundle.model_cost()));
+    let most = spent.into_iter().max().expect("two");
+    assert!(drawn(most).is_ok(), "{spent:?}");
+    let error = drawn(most - 1).expect_err("one less than either takes");
+    assert!(matches!(error, DecodeError::TooMuchWork { .. }), "{error}");
+}
+
+#[test]
+fn two_decoders_that_are_no_pair_are_refused() {
+    let bytes = golden("static.psb");
+    let bundle = Bundle::parse(&bytes).expect("a committed bundle is sound");
+    let camera = bundle.header().preview;
+    let plan = Plan::new(&bundle, &budget_for(&camera)).expect("memory without limit");
+    let [mut first, mut second] = [(); 2].map(|()| vec![0; plan.scratch_len()]);
+    let mut both = [&mut first, &mut second]
+        .map(|scratch| Decoder::bind_in::<ReferenceArithmetic>(&bundle, plan, scratch).expect("its own bytes"));
+    let error = together(&mut both, &camera).err();
+    assert!(matches!(error, Some(DecodeError::PlanMismatch { .. })), "{error:?}");
+}
+
 #[test]
 fn the_second_painters_memory_is_a_part_of_the_plan_and_exact() {
     let [mut n_plans, mut n_slow] = [0; 2];

@@ -73,12 +73,17 @@ impl<A: Arithmetic> Decoder<'_, '_, A> {
         S: TileSink + Send,
         S::Error: Send,
     {
+        check_pair(first, second)?;
         let [mut by_first, mut by_second] = [(); 2].map(|()| Err(DecodeError::Internal));
         join(&mut || by_first = first.gather(camera, Painter::First), &mut || {
             by_second = second.gather(camera, Painter::Second);
         });
         let (mut of_first, mut of_second) = (by_first?, by_second?);
-
+        // Both have as many places.
+        let most = of_first.report.splats.max(of_second.report.splats);
+        for spent in [&mut of_first, &mut of_second] {
+            spent.report.scratch_used = saturate(first.plan.len_with_splats(most));
+        }
         let budget = *first.plan.budget();
         let canvas = Canvas {
             bundle: &first.bundle.clone(),
@@ -114,8 +119,12 @@ impl<A: Arithmetic> Decoder<'_, '_, A> {
         let strip = frame.strips.between(0, frame.strips.len());
         let mut pass = self.begin_pass(strip, 0.0, &mut frame);
         let mut share = Half::of(painter);
-        while !self.go_on(&mut pass, &mut frame, &mut share, &mut ())? {
+        loop {
+            let is_complete = self.go_on(&mut pass, &mut frame, &mut share, &mut ())?;
             check_work(frame.instructions(), self.plan.budget().most_work)?;
+            if is_complete {
+                break;
+            }
         }
         let n = self.splats.n;
         let mut report = frame.report;
@@ -123,7 +132,6 @@ impl<A: Arithmetic> Decoder<'_, '_, A> {
         if let OverflowPolicy::FirstCome { first_come, .. } = &frame.policy {
             (report.splats_dropped, report.max_splats) = (first_come.n_dropped(), first_come.max_demand());
         }
-        report.scratch_used = saturate(self.plan.len_with_splats(n));
         if painter == Painter::Second && !self.source.is_streamed() {
             // The first one has looked at the same chunks.
             report.chunks_damaged = 0;
@@ -224,6 +232,17 @@ impl<'d> OfBoth<'d> {
         }
         n
     }
+}
+
+/// Whether two decoders were made as painters of one scene.
+fn check_pair<'b, 's, A: Arithmetic>(
+    first: &Decoder<'b, 's, A>,
+    second: &Decoder<'b, 's, A>,
+) -> Result<(), DecodeError> {
+    let both = [first, second];
+    let is_pair = both.iter().all(|painter| painter.plan.budget().two_painters) && first.plan.draws_as(&second.plan);
+    let [needed, planned] = both.map(|painter| painter.plan.len());
+    if is_pair { Ok(()) } else { Err(DecodeError::PlanMismatch { needed, planned }) }
 }
 
 /// How many of the first `costs` sum up to no more than `left`, of which they are taken.

@@ -43,11 +43,12 @@ impl<'t> Tile<'t> {
         (u32::try_from(rgb.len()) == Ok(n_pixels)).then_some(Self { x_px, y_px, width, height, rgb })
     }
 
-    /// A quarter of the tile, each pixel as four: while a scene moves, a frame of half the width and height fills a display so.
+    /// A quarter of a tile of at most 16×16 pixels, each pixel as four: while a scene moves, a frame of half the width and height fills a display
+    /// so.
     ///
     /// * `quarter`: from 0 to 3, those above before those below. * `rgb`: memory for 256 pixels.
     ///
-    /// `None` where the tile, at the frame's right or lower edge, ends before that quarter, and where `rgb` is too short.
+    /// `None` where the tile, at the frame's right or lower edge, ends before that quarter, for a quarter above 3, and where `rgb` is too short.
     ///
     /// ```
     /// # fn main() -> Result<(), pocketsplat_core::DecodeError> {
@@ -78,6 +79,9 @@ impl<'t> Tile<'t> {
     #[must_use]
     pub fn doubled<'q>(&self, quarter: u8, rgb: &'q mut [[u8; 3]]) -> Option<Tile<'q>> {
         const HALF: u16 = TILE_PX / 2;
+        if quarter > 3 {
+            return None;
+        }
         let (left, top) = (u16::from(quarter & 1) * HALF, u16::from(quarter >> 1) * HALF);
         let [width, height] = [self.width.checked_sub(left)?, self.height.checked_sub(top)?].map(|size| size.min(HALF));
         let rgb = rgb.get_mut(..4 * usize::from(width) * usize::from(height)).filter(|rgb| !rgb.is_empty())?;
@@ -134,7 +138,9 @@ mod tests {
         let mut pixels = [[0; 3]; 64];
         let tile = Tile::new([0, 0], [8, 8], &mut pixels).expect("its pixels");
         assert!(tile.doubled(0, &mut [[0; 3]; 255]).is_none() && tile.doubled(1, &mut [[0; 3]; 256]).is_none());
-        assert!(tile.doubled(9, &mut [[0; 3]; 256]).is_none(), "no such quarter");
+        let mut high = [[0; 3]; 40];
+        let tile = Tile::new([0, 0], [1, 40], &mut high).expect("its pixels");
+        assert!(tile.doubled(4, &mut [[0; 3]; 256]).is_none(), "no such quarter");
         let far = Tile::new([u16::MAX, 0], [8, 8], &mut pixels).expect("its pixels");
         assert!(far.doubled(0, &mut [[0; 3]; 256]).is_none(), "beyond all frames");
     }

@@ -147,7 +147,10 @@ impl<'b, 's> AnchorModels<'b, 's> {
     /// * `scratch`: what [`model_words`] says of no table, and of the context if there is one; of any content.
     ///
     /// # Errors
-    /// [`DecodeError::BufferTooShort`].
+    /// [`DecodeError::BufferTooShort`]; [`DecodeError::Internal`] of a context where the crate is built without.
+    ///
+    /// # Budget
+    /// Constant; no table is copied.
     pub fn shared(&self, scratch: &'s mut [u32]) -> Result<Self, DecodeError> {
         let channels = match &self.channels {
             ChannelModels::Static(tables) => ChannelModels::Static(*tables),

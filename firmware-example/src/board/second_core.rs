@@ -52,6 +52,8 @@ impl SecondCore {
         // SAFETY: registers of the chip, which nothing else writes; the table stays where it is.
         unsafe {
             INITSVTOR1.write_volatile(ptr::from_mut(vectors) as u32);
+            // Table and stack are written before the core reads them.
+            cortex_m::asm::dsb();
             CPUWAIT.write_volatile(0);
         }
         Self(())

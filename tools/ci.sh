@@ -443,7 +443,7 @@ job_firmware() {
 
 # Not one of `jobs`: writes the table that `firmware` compares with.
 job_bless-instructions() {
-  # Moved at the end: programs are built with the table, and would be built anew for each of its rows.
+  # At the end, so that the table stays whole where this is stopped.
   measure_firmware "$target/firmware/blessed.csv"
   cp "$target/firmware/blessed.csv" docs/results/instructions.csv
 }

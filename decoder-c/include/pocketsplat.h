@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 // Bytes that suffice for a psb_decoder on every target.
-#define PSB_DECODER_BYTES 3072
+#define PSB_DECODER_BYTES 3328
 
 // Alignment that suffices for a psb_decoder on every target.
 #define PSB_DECODER_ALIGN 8

@@ -11,7 +11,7 @@ use crate::plan::{Budget, bytes_of, planned};
 use crate::status::{Failure, Message, Status, status_of};
 
 /// Bytes that suffice for a psb_decoder on every target.
-pub const DECODER_BYTES: usize = 3072;
+pub const DECODER_BYTES: usize = 3328;
 
 /// Alignment that suffices for a psb_decoder on every target.
 pub const DECODER_ALIGN: usize = 8;

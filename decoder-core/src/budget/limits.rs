@@ -215,8 +215,9 @@ impl Budget {
 
     /// Has two painters draw each frame, on a core each: [`Decoder::bind_two`](crate::Decoder::bind_two) makes them, and
     /// [`Decoder::render_by_two`](crate::Decoder::render_by_two) draws. The scene is in memory once; what the second painter has of its own is
-    /// a [part](crate::Part::SecondPainter) of the plan. Frames are drawn in one strip; `bind_two` refuses a plan for which strips or slabs were asked for afterwards. The [work](Self::with_most_work) that ends a frame is
-    /// that of one painter, and so are the places for splats: of [those measured](MaxSplats::Measured) half, and an eighth of that more.
+    /// a [part](crate::Part::SecondPainter) of the plan. Frames are drawn in one strip; `bind_two` refuses a plan for which strips or slabs were
+    /// asked for afterwards. The limit of [work](Self::with_most_work) is that of each painter. Of the [measured](MaxSplats::Measured) splats each
+    /// has places for half, and an eighth of that more.
     ///
     /// The pixels are those of one decoder, unless splats are left out: each painter leaves out its own.
     #[must_use]

@@ -10,6 +10,8 @@ pub mod compact_3dgs;
 mod k_means;
 pub mod light_gaussian;
 mod masks;
+#[cfg(test)]
+mod modules_trial;
 mod octree;
 mod packed;
 pub mod rdo_gaussian;

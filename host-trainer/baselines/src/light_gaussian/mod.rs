@@ -21,7 +21,7 @@
 mod distillation;
 mod layout;
 mod quantisation;
-mod significance;
+pub(crate) mod significance;
 
 pub use quantisation::Quantised;
 

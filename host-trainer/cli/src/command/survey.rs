@@ -1,4 +1,4 @@
-//! `pocketsplat survey`: published methods side by side on one capture.
+//! `pocketsplat survey`: published methods and this program's side by side on one capture.
 
 mod anchors;
 mod explicit;
@@ -28,8 +28,8 @@ use table::{Line, Table};
 
 /// Train published methods on one capture, and compare them.
 ///
-/// 3DGS, methods that compress its scene, Scaffold-GS, HAC, HAC++ and ContextGS, at two rates where a method has them. All have the same
-/// photographs, steps and seed; methods that compress take theirs on top.
+/// 3DGS, methods that compress its scene, Scaffold-GS, HAC, HAC++, ContextGS, and what `train` does by itself, at two rates where a method
+/// has them. All have the same photographs, steps and seed; methods that compress take theirs on top.
 ///
 /// Writes survey.csv, survey.svg, a picture of the first test view for each method, and every file that was measured. The same command
 /// again goes on where it was stopped, but begins a compression anew.

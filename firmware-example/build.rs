@@ -3,7 +3,7 @@
 //! | variable | what | without it |
 //! |---|---|---|
 //! | `PSB_BUNDLE` | absolute path of the bundle | an error |
-//! | `BOARD` | `mps2-an386`, `mps2-an500`, `mps2-an521`, or `virt` for RISC-V | `mps2-an386`; for RISC-V `virt` |
+//! | `BOARD` | `mps2-an385`, `mps2-an386`, `mps2-an500`, `mps2-an521`, or `virt` and `virt-fpu` for RISC-V | `mps2-an386`; for RISC-V `virt` |
 //! | `RAM_KIB` | RAM in all: statics, scratch memory, stack | 256, 1024, 520, 512 |
 //! | `STACK_KIB` | of which the stack's, for each core | 10; with two cores 16 |
 //! | `SIZE` | frames, `WIDTHxHEIGHT` | the preview's |
@@ -28,11 +28,13 @@ const TWO_CORES: &str = "mps2-an521";
 const OTHER_STATICS: usize = 512;
 
 /// A board: its name, the architecture of its processor, RAM of its usual device class in KiB, memory.
-const BOARDS: [(&str, &str, usize, &str); 4] = [
+const BOARDS: [(&str, &str, usize, &str); 6] = [
     ("mps2-an386", "arm", 256, include_str!("src/board/mps2-an386.x")),
+    ("mps2-an385", "arm", 256, include_str!("src/board/mps2-an386.x")),
     ("mps2-an500", "arm", 1024, include_str!("src/board/mps2-an500.x")),
     ("mps2-an521", "arm", 520, include_str!("src/board/mps2-an521.x")),
     ("virt", "riscv32", 512, include_str!("src/board/virt.x")),
+    ("virt-fpu", "riscv32", 512, include_str!("src/board/virt.x")),
 ];
 
 /// The display's memory, and room for the stack; the symbols are those of the boards' start-up code.

@@ -6,11 +6,16 @@
 # Frames and log stay in OUT, which is target/measured here without it. FRAMES is 4 when it is not set; VIEWS, QUALITY,
 # BUDGET and ARITHMETIC are build.rs's.
 set -euo pipefail
-usage="usage: measure.sh BUNDLE mps2-an386|mps2-an500|virt RAM_KIB [WIDTHxHEIGHT] [OUT]"
+usage="usage: measure.sh BUNDLE mps2-an385|mps2-an386|mps2-an500|virt|virt-fpu RAM_KIB [WIDTHxHEIGHT] [OUT]"
 bundle=$(realpath "${1:?$usage}") ram_kib=${3:?$usage} size=${4:-}
 export BOARD=${2:?$usage} RAM_KIB=$ram_kib PSB_BUNDLE=$bundle
 [ -z "$size" ] || export SIZE=$size
-[ "$BOARD" = virt ] && processor=riscv32imac-unknown-none-elf || processor=thumbv7em-none-eabihf
+case $BOARD in
+virt) processor=riscv32imac-unknown-none-elf ;;
+virt-fpu) processor=riscv32imafc-unknown-none-elf ;;
+mps2-an385) processor=thumbv6m-none-eabi ;;
+*) processor=thumbv7em-none-eabihf ;;
+esac
 mkdir -p "${5:-${CARGO_TARGET_DIR:-target}/measured}"
 out=$(realpath "${5:-${CARGO_TARGET_DIR:-target}/measured}")
 

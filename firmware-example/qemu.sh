@@ -5,7 +5,7 @@ set -euo pipefail
 elf=${1:?usage: qemu.sh ELF}
 
 case ${BOARD:-} in
-virt) qemu=(qemu-system-riscv32 -M virt -bios none) ;;
+virt | virt-fpu) qemu=(qemu-system-riscv32 -M virt -bios none) ;;
 # Its first core has neither FPU nor the instructions for 16 bits unless asked for.
 mps2-an521) qemu=(qemu-system-arm -M "$BOARD" -global sse-200.CPU0_FPU=on -global sse-200.CPU0_DSP=on) ;;
 mps2-*) qemu=(qemu-system-arm -M "$BOARD") ;;
@@ -13,7 +13,7 @@ mps2-*) qemu=(qemu-system-arm -M "$BOARD") ;;
   *riscv32*) qemu=(qemu-system-riscv32 -M virt -bios none) ;;
   *) qemu=(qemu-system-arm -M mps2-an386) ;;
   esac ;;
-*) echo "qemu.sh: BOARD=$BOARD is none of mps2-an386, mps2-an500, mps2-an521, virt" >&2 && exit 2 ;;
+*) echo "qemu.sh: BOARD=$BOARD is none of mps2-an385, mps2-an386, mps2-an500, mps2-an521, virt, virt-fpu" >&2 && exit 2 ;;
 esac
 read -ra more <<<"${QEMU_ARGS:-}"
 # QEMU waits for ever on a firmware that hangs.

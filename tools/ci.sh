@@ -424,9 +424,9 @@ job_fuzz() {
   done
 }
 
-# Boards with the RAM that they get, KiB: as much as such a device has, and so little that anchors are decoded in each frame. The one
-# without an FPU draws as firmware without one does.
-firmware_runs=("mps2-an386 256" "mps2-an386 76" "mps2-an500 1024" "virt 76")
+# Boards with the RAM that they get, KiB: as much as such a device has, and so little that anchors are decoded in each frame. Those
+# without an FPU draw as firmware without one does.
+firmware_runs=("mps2-an386 256" "mps2-an386 76" "mps2-an500 1024" "mps2-an385 256" "virt 76" "virt-fpu 256")
 # The same of a bundle whose Gaussians are evaluated once.
 baked_runs=("mps2-an386 256" "virt 256")
 
@@ -452,6 +452,8 @@ measure_firmware() { # CSV
   local coder run runs options bundle out bytes frame arithmetic orbit
   need_embedded_target
   need_target riscv32imac-unknown-none-elf
+  need_target riscv32imafc-unknown-none-elf
+  need_target thumbv6m-none-eabi
   need_target thumbv8m.main-none-eabihf
   need_command qemu-system-arm qemu-system-arm
   need_command qemu-system-riscv32 qemu-system-misc
@@ -470,7 +472,7 @@ measure_firmware() { # CSV
     for run in "${runs[@]}"; do
       out=$target/firmware/$coder-${run/ /-}
       arithmetic=ReferenceArithmetic orbit=()
-      [ "${run% *}" != virt ] || arithmetic=WithoutFpu orbit=(--without-fpu)
+      case $run in "virt "* | "mps2-an385 "*) arithmetic=WithoutFpu orbit=(--without-fpu) ;; esac
       # shellcheck disable=SC2086 # a board and its RAM
       ARITHMETIC=$arithmetic CARGO_TARGET_DIR=$embedded firmware-example/measure.sh "$bundle" $run "" "$out" >"$out.csv"
       bytes=$(sed -n 's/.*scratch: \([0-9]*\) bytes.*/\1/p' "$out/log.txt")
@@ -496,7 +498,7 @@ measure_firmware() { # CSV
     ./qemu.sh "$embedded/$embedded_target/release/steps" || fail "a step of a frame takes too long"
     cargo clippy -q "${options[@]}" -- -D warnings
     export PSB_BUNDLE=$bundle
-    for out in "$embedded_target" riscv32imac-unknown-none-elf; do
+    for out in "$embedded_target" riscv32imac-unknown-none-elf riscv32imafc-unknown-none-elf thumbv6m-none-eabi; do
       cargo clippy -q --release --locked --target "$out" --target-dir "$embedded" -- -D warnings
     done
   )

@@ -57,7 +57,7 @@ pub(crate) fn of_plan(bundle: &Bundle<'_>, plan: &Plan) -> Figures {
     figures
 }
 
-/// What a frame consisted of, and the instructions that two families of processors would take for it, by stage.
+/// What a frame consisted of, and the instructions that each family of processors would take for it, by stage.
 pub(crate) fn of_frame(
     costs: &Costs,
     bundle: &Bundle<'_>,
@@ -76,32 +76,34 @@ pub(crate) fn of_frame(
         ("scratchUsed", report.scratch_used.into()),
     ];
     let terms = terms(bundle, plan, report, [camera.width_px, camera.height_px]);
-    let targets = [(InstructionSet::CortexM, CORTEX_M), (InstructionSet::RiscV32, RISCV32)];
-    for (target, names) in targets {
-        figures.extend(names.into_iter().zip(costs.predict(target, &terms)));
+    for set in InstructionSet::ALL {
+        figures.extend(stages_of(set).into_iter().zip(costs.predict(set, &terms)));
     }
     figures
 }
 
-/// The stages in the order of [`Stage::ALL`].
-const CORTEX_M: [&str; Stage::ALL.len()] = [
-    "cortexMDecode",
-    "cortexMContext",
-    "cortexMHeads",
-    "cortexMProject",
-    "cortexMSort",
-    "cortexMBlend",
-    "cortexMOutput",
-];
-const RISCV32: [&str; Stage::ALL.len()] = [
-    "riscv32Decode",
-    "riscv32Context",
-    "riscv32Heads",
-    "riscv32Project",
-    "riscv32Sort",
-    "riscv32Blend",
-    "riscv32Output",
-];
+/// The instructions of each stage on processors of a set, in the order of [`Stage::ALL`].
+fn stages_of(set: InstructionSet) -> [&'static str; Stage::ALL.len()] {
+    macro_rules! stages {
+        ($set:literal) => {
+            [
+                concat!($set, ".decode"),
+                concat!($set, ".context"),
+                concat!($set, ".heads"),
+                concat!($set, ".project"),
+                concat!($set, ".sort"),
+                concat!($set, ".blend"),
+                concat!($set, ".output"),
+            ]
+        };
+    }
+    match set {
+        InstructionSet::CortexM => stages!("cortexM"),
+        InstructionSet::CortexM0Plus => stages!("cortexM0Plus"),
+        InstructionSet::RiscV32 => stages!("riscv32"),
+        InstructionSet::RiscV32Fpu => stages!("riscv32Fpu"),
+    }
+}
 
 fn flag(holds: bool) -> f64 {
     f64::from(u8::from(holds))

@@ -52,7 +52,9 @@ fn boards() -> String {
         let Board { chip, clock_mhz, ram_bytes, frame_px: [width, height], processor, .. } = board;
         let set = match processor.instruction_set() {
             InstructionSet::CortexM => "cortexM",
+            InstructionSet::CortexM0Plus => "cortexM0Plus",
             InstructionSet::RiscV32 => "riscv32",
+            InstructionSet::RiscV32Fpu => "riscv32Fpu",
         };
         let hertz = u64::from(*clock_mhz) * 1_000_000;
         format!(

@@ -209,7 +209,7 @@ mod tests {
         let rgb: Vec<u8> = scene.rgba().as_chunks::<4>().0.iter().flat_map(|&[r, g, b, _]| [r, g, b]).collect();
         let golden = include_str!("../../tests/golden/frames.csv").lines().nth(1).expect("a first row");
         assert_eq!(format!("static,1,0,{:08x}", crc32(&rgb)), golden);
-        assert!(figure(&figures, "splats") > 0.0 && figure(&figures, "cortexMBlend") > 1000.0, "{figures:?}");
+        assert!(figure(&figures, "splats") > 0.0 && figure(&figures, "cortexM.blend") > 1000.0, "{figures:?}");
     }
 
     #[test]

@@ -115,8 +115,8 @@ export interface Frame {
   slabs: number;
   /** Bytes of the planned memory that this frame needed. */
   scratchUsed: number;
-  /** What two families of microcontrollers would take for it, predicted. */
-  instructions: { cortexM: Stages; riscv32: Stages };
+  /** What families of microcontrollers would take for it, predicted; those without an FPU draw with `WithoutFpu`. */
+  instructions: { cortexM: Stages; cortexM0Plus: Stages; riscv32: Stages; riscv32Fpu: Stages };
 }
 
 /**

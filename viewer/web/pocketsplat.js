@@ -92,10 +92,9 @@ export class Scene {
     if (!this.#bound) throw new Error('no decoder is bound; call bind({ widthPx, heightPx }) before render');
     this.#camera().set(numbersOf(camera, this.#bound));
     const { widthPx, heightPx } = camera;
-    const report = this.#answer(this.#wasm.render());
-    const { cortexM, riscv32, ...counts } = byStage(report);
+    const report = byStage(this.#answer(this.#wasm.render()));
     const pixels = new Uint8ClampedArray(this.#wasm.memory.buffer, this.#wasm.pixels(), 4 * widthPx * heightPx).slice();
-    return { ...counts, instructions: { cortexM, riscv32 }, widthPx, heightPx, pixels };
+    return { ...report, widthPx, heightPx, pixels };
   }
 
   #camera() {
@@ -160,14 +159,14 @@ function planOf({ isResident, keepsSums, isBaked, halfWeights, ...plan }) {
   return { ...plan, ...Object.fromEntries(Object.entries(flags).map(([name, flag]) => [name, flag === 1])) };
 }
 
-/** Gathers `cortexMBlend` and its like as `cortexM.blend`. */
+/** Gathers `cortexM.blend` and its like in `instructions`. */
 function byStage(report) {
-  const targets = { cortexM: {}, riscv32: {} };
+  const instructions = {};
   const counts = {};
   for (const [name, number] of Object.entries(report)) {
-    const target = Object.keys(targets).find((target) => name.startsWith(target));
-    if (!target) counts[name] = number;
-    else targets[target][name[target.length].toLowerCase() + name.slice(target.length + 1)] = number;
+    const [target, stage] = name.split('.');
+    if (stage === undefined) counts[name] = number;
+    else (instructions[target] ??= {})[stage] = number;
   }
-  return { ...counts, ...targets };
+  return { ...counts, instructions };
 }

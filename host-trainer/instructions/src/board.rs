@@ -2,7 +2,7 @@
 //!
 //! Memory, clock and display follow from data sheets. `docs/firmware.md` shows the table.
 
-use Processor::{CortexM4, CortexM7, Riscv32imac};
+use Processor::{CortexM0Plus, CortexM4, CortexM7, Riscv32imac, Riscv32imafc};
 
 use crate::Processor;
 
@@ -44,10 +44,10 @@ pub const BOARDS: [Board; 11] = [
     board("stm32h743", "STM32H743 (M7), stack in DTCM", 480, [510 * KIB, MIB], [320, 240], CortexM7),
     board("stm32h7a3", "STM32H7A3 (M7)", 280, [1013 * KIB, MIB], [320, 240], CortexM7),
     board("stm32n657", "STM32N657 (M55), bundle in external flash", 800, [2 * MIB, 2 * MIB], [480, 320], CortexM7),
-    board("esp32-p4", "ESP32-P4 (RISC-V with FPU), scratch in PSRAM", 400, [4 * MIB, MIB], [320, 240], CortexM7),
+    board("esp32-p4", "ESP32-P4 (RISC-V with FPU), scratch in PSRAM", 400, [4 * MIB, MIB], [320, 240], Riscv32imafc),
     board("esp32-s3", "ESP32-S3 (Xtensa), scratch in PSRAM", 240, [2 * MIB, 512 * KIB], [240, 240], CortexM4),
     board("esp32-c6", "ESP32-C6 (RISC-V, no FPU)", 160, [380 * KIB, 256 * KIB], [160, 120], Riscv32imac),
-    board("rp2040", "RP2040 (M0+, no FPU)", 133, [245 * KIB, 96 * KIB], [128, 128], Riscv32imac),
+    board("rp2040", "RP2040 (M0+, no FPU)", 133, [245 * KIB, 96 * KIB], [128, 128], CortexM0Plus),
 ];
 
 const fn board(

@@ -20,23 +20,42 @@ use Stage::{Blend, Context, Decode, Heads, Output, Project, Sort};
 pub enum InstructionSet {
     /// Cortex-M4 and M7 with an FPU of single precision: `thumbv7em-none-eabihf`.
     CortexM,
+    /// Cortex-M0+, drawing with `WithoutFpu`: `thumbv6m-none-eabi`.
+    CortexM0Plus,
     /// RISC-V without an FPU, drawing with `WithoutFpu`: `riscv32imac-unknown-none-elf`.
     RiscV32,
+    /// RISC-V with an FPU of single precision: `riscv32imafc-unknown-none-elf`.
+    RiscV32Fpu,
 }
 
 impl InstructionSet {
+    /// All, in the order of the columns of `costs.csv`.
+    pub const ALL: [Self; 4] = [Self::CortexM, Self::CortexM0Plus, Self::RiscV32, Self::RiscV32Fpu];
+
+    /// The column of `costs.csv`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::CortexM => "cortex-m",
+            Self::CortexM0Plus => "cortex-m0plus",
+            Self::RiscV32 => "riscv32",
+            Self::RiscV32Fpu => "riscv32-fpu",
+        }
+    }
+
     /// The target of a board of `firmware-example`.
     pub fn of_board(board: &str) -> Option<Self> {
         match board {
+            "mps2-an385" => Some(Self::CortexM0Plus),
             "mps2-an386" | "mps2-an500" => Some(Self::CortexM),
             "virt" => Some(Self::RiscV32),
+            "virt-fpu" => Some(Self::RiscV32Fpu),
             _ => None,
         }
     }
 }
 
 /// Parts of a frame that have a cost, in the order of `costs.csv`.
-pub const N_TERMS: usize = 22;
+pub const N_TERMS: usize = 20;
 
 /// One part of a frame, and how much of it there is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,7 +91,6 @@ pub fn terms(bundle: &Bundle<'_>, plan: &Plan, report: &FrameReport, size_px: [u
     // Strips that fit in memory together are drawn in one pass.
     let n_passes = report.slabs.clamp(1, plan.n_strips().max(1).into());
     let rows_of_pass = f64::from(u32::from(size_px[1].div_ceil(16)).div_ceil(n_passes));
-    let chunk_tests = f64::from(bundle.n_chunks()) * count(report.slabs);
     let term = |stage, name, count| Term { name, stage, count };
     [
         term(Decode, "anchor decoded", decoded),
@@ -84,9 +102,7 @@ pub fn terms(bundle: &Bundle<'_>, plan: &Plan, report: &FrameReport, size_px: [u
         term(Context, "unit of the context", units),
         term(Context, "multiply-add of the context", macs),
         term(Heads, "multiply-add of the heads", report.head_macs as f64),
-        term(Heads, "visible anchor", count(report.anchors_visible)),
         term(Heads, "Gaussian", evaluated),
-        term(Project, "chunk and slab", chunk_tests),
         term(Project, "anchor", count(report.anchors_read)),
         term(Project, "Gaussian", evaluated),
         term(Project, "Gaussian from memory", count(report.gaussians) - evaluated),
@@ -103,7 +119,7 @@ pub fn terms(bundle: &Bundle<'_>, plan: &Plan, report: &FrameReport, size_px: [u
 
 /// Instructions of each term on each target.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Costs([[f64; N_TERMS]; 2]);
+pub struct Costs([[f64; N_TERMS]; InstructionSet::ALL.len()]);
 
 impl Costs {
     /// Those that were measured.
@@ -116,7 +132,7 @@ impl Costs {
 
     /// All zero.
     pub fn none() -> Self {
-        Self([[0.0; N_TERMS]; 2])
+        Self([[0.0; N_TERMS]; InstructionSet::ALL.len()])
     }
 
     /// Reads a table, whose rows are the terms in their order; `None` when it is another's.
@@ -134,10 +150,10 @@ impl Costs {
 
     /// The table of `terms`.
     pub fn to_csv(&self, terms: &[Term; N_TERMS]) -> String {
-        let mut csv = String::from("stage,term,cortex-m,riscv32\n");
-        let [cortex_m, riscv32] = &self.0;
-        for ((term, m), v) in terms.iter().zip(cortex_m).zip(riscv32) {
-            csv += &format!("{},{},{m:.2},{v:.2}\n", term.stage.name(), term.name);
+        let mut csv = format!("stage,term,{}\n", InstructionSet::ALL.map(InstructionSet::name).join(","));
+        for (i, term) in terms.iter().enumerate() {
+            let costs = self.0.map(|of_set| format!("{:.2}", of_set[i]));
+            csv += &format!("{},{},{}\n", term.stage.name(), term.name, costs.join(","));
         }
         csv
     }
@@ -198,8 +214,13 @@ mod tests {
         let mut costs = Costs::measured();
         assert!(costs.of(InstructionSet::CortexM).iter().all(|cost| *cost >= 0.0), "no part saves instructions");
         // Projection of a Gaussian.
-        let mut of_gaussian = |set| costs.of(set)[13];
+        let mut of_gaussian = |set| costs.of(set)[11];
         assert!(of_gaussian(InstructionSet::RiscV32) > 10.0 * of_gaussian(InstructionSet::CortexM), "without an FPU");
-        assert_eq!(Costs::parse("stage,term,cortex-m,riscv32\n"), None, "rows are missing");
+        assert!(of_gaussian(InstructionSet::RiscV32) > 10.0 * of_gaussian(InstructionSet::RiscV32Fpu), "with one");
+        let table = include_str!("costs.csv");
+        let names = InstructionSet::ALL.map(InstructionSet::name).join(",");
+        assert!(table.starts_with(&format!("stage,term,{names}\n")), "columns in the order of the sets");
+        let (head, _) = table.split_once('\n').unwrap();
+        assert_eq!(Costs::parse(head), None, "rows are missing");
     }
 }

@@ -6,29 +6,63 @@ use crate::InstructionSet;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "kebab-case"))]
 pub enum Processor {
+    /// A Cortex-M0+, drawing with `WithoutFpu`: frames of 250 million instructions.
+    #[cfg_attr(feature = "serde", serde(rename = "cortex-m0plus"))]
+    CortexM0Plus,
     /// A Cortex-M4 with FPU: frames of 80 million instructions.
     CortexM4,
     /// A Cortex-M7: frames of 250 million instructions.
     CortexM7,
     /// RISC-V without an FPU (RV32IMAC), drawing with `WithoutFpu`: frames of 250 million instructions.
     Riscv32imac,
+    /// RISC-V with an FPU (RV32IMAFC): frames of 250 million instructions.
+    Riscv32imafc,
 }
 
 impl Processor {
+    /// All.
+    pub const ALL: [Self; 5] =
+        [Self::CortexM0Plus, Self::CortexM4, Self::CortexM7, Self::Riscv32imac, Self::Riscv32imafc];
+
+    /// As options and configurations have it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::CortexM0Plus => "cortex-m0plus",
+            Self::CortexM4 => "cortex-m4",
+            Self::CortexM7 => "cortex-m7",
+            Self::Riscv32imac => "riscv32imac",
+            Self::Riscv32imafc => "riscv32imafc",
+        }
+    }
+
+    /// The one of this name, if there is one.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|processor| processor.name() == name)
+    }
+
     /// Instructions of a frame at most.
     pub fn frame_instructions(self) -> u64 {
         match self {
             Self::CortexM4 => 80_000_000,
-            Self::CortexM7 => 250_000_000,
-            Self::Riscv32imac => 250_000_000,
+            Self::CortexM0Plus | Self::CortexM7 | Self::Riscv32imac | Self::Riscv32imafc => 250_000_000,
+        }
+    }
+
+    /// Whether it computes with floats by itself; the others draw with `WithoutFpu`.
+    pub fn has_fpu(self) -> bool {
+        match self {
+            Self::CortexM4 | Self::CortexM7 | Self::Riscv32imafc => true,
+            Self::CortexM0Plus | Self::Riscv32imac => false,
         }
     }
 
     /// Instructions whose costs it has.
     pub fn instruction_set(self) -> InstructionSet {
         match self {
+            Self::CortexM0Plus => InstructionSet::CortexM0Plus,
             Self::CortexM4 | Self::CortexM7 => InstructionSet::CortexM,
             Self::Riscv32imac => InstructionSet::RiscV32,
+            Self::Riscv32imafc => InstructionSet::RiscV32Fpu,
         }
     }
 
@@ -39,7 +73,7 @@ impl Processor {
     pub fn cycles_per_instruction(self) -> f64 {
         match self {
             Self::CortexM4 => 1.54,
-            Self::CortexM7 | Self::Riscv32imac => 1.0,
+            Self::CortexM0Plus | Self::CortexM7 | Self::Riscv32imac | Self::Riscv32imafc => 1.0,
         }
     }
 }

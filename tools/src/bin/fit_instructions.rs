@@ -46,7 +46,8 @@ fn main() -> anyhow::Result<()> {
     }
     let mut costs = Costs::measured();
     if let Some(path) = &args.write {
-        for target in [InstructionSet::CortexM, InstructionSet::RiscV32] {
+        // Sets without a frame keep their costs.
+        for target in InstructionSet::ALL {
             let of_target: Vec<&Frame> = frames.iter().filter(|frame| frame.target == target).collect();
             for stage in Stage::ALL {
                 fit(&of_target, stage, costs.of(target));

@@ -18,7 +18,7 @@ use pocketsplat_trainer::cost::{
 };
 use rayon::prelude::*;
 
-use self::machine::Machine;
+use self::machine::{Machine, machine};
 use self::report::{Report, ReportFiles};
 use super::bundle::BundleFile;
 use super::capture::{CaptureArgs, views_of};
@@ -52,8 +52,8 @@ pub(crate) struct Args {
     /// Scratch memory of the decoder, as 192KiB or 65536 [default: no limit]
     #[arg(long, value_name = "BYTES")]
     ram: Option<ByteSize>,
-    /// Machines whose time is compared.
-    #[arg(long, value_enum, value_delimiter = ',', value_name = "NAME,…", default_values_t = [Machine::CortexM4])]
+    /// Machines whose time is compared: boards in milliseconds, kinds of processors in instructions.
+    #[arg(long, value_parser = machine(), value_delimiter = ',', value_name = "NAME,…", default_value = "cortex-m4")]
     target: Vec<Machine>,
     /// Views, at most 10, whose instructions the firmware counts [default: 2 where it can, else none]
     #[arg(long, value_name = "VIEWS")]

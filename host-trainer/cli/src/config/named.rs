@@ -12,7 +12,6 @@ pub(crate) const EXPLICIT: &str = "3dgs";
 // Names of the choices, in the order in which help shows them.
 pub(crate) const SURFACES: &[&str] = &["matte", "mixed", "glossy"];
 pub(crate) const CODERS: &[&str] = &["auto", "static", "context"];
-pub(crate) const CORES: &[&str] = &["cortex-m4", "cortex-m7", "riscv32imac"];
 pub(crate) const BACKBONES: &[&str] = &["scaffold", "hac", "hac-plus", "contextgs", EXPLICIT];
 pub(crate) const SPLITS: &[&str] = &["test", "train"];
 pub(crate) const BACKGROUNDS: &[&str] = &["black", "white", "learned"];
@@ -63,11 +62,13 @@ mod tests {
     fn every_name_shown_is_parsed() {
         all_parse::<SurfaceFinish>(SURFACES);
         all_parse::<CoderChoice>(CODERS);
-        all_parse::<Processor>(CORES);
         all_parse::<Split>(SPLITS);
         all_parse::<Background>(BACKGROUNDS);
         all_parse::<SceneKind>(SCENES);
         all_parse::<PointsChoice>(POINTS);
         all_parse::<InputRange>(LPIPS_RANGES);
+        for processor in Processor::ALL {
+            assert_eq!(named::<Processor>(processor.name()), Ok(processor));
+        }
     }
 }

@@ -4,8 +4,6 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use pocketsplat_instructions::Processor;
 use pocketsplat_instructions::board::{BOARDS, Board};
 
-use super::named::{CORES, named};
-
 /// What a frame is drawn on.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum BoardOrCore {
@@ -32,12 +30,19 @@ impl BoardOrCore {
 
 /// Parses the name of a board or of a kind of processor.
 pub(crate) fn board_or_core() -> impl TypedValueParser<Value = BoardOrCore> {
-    let cores = CORES.iter().copied().map(PossibleValue::new);
+    PossibleValuesParser::new(boards_and_cores()).try_map(|name| board_or_core_named(&name).ok_or("no such board"))
+}
+
+/// The names of all, with help.
+pub(crate) fn boards_and_cores() -> impl Iterator<Item = PossibleValue> {
     let boards = BOARDS.iter().map(|board| PossibleValue::new(board.name).help(board.chip));
-    PossibleValuesParser::new(boards.chain(cores)).try_map(|name| match Board::named(&name) {
-        Some(board) => Ok(BoardOrCore::Board(board)),
-        None => named::<Processor>(&name).map(BoardOrCore::Core),
-    })
+    boards.chain(Processor::ALL.map(|processor| PossibleValue::new(processor.name())))
+}
+
+/// The board, or else the kind of processor, of this name.
+pub(crate) fn board_or_core_named(name: &str) -> Option<BoardOrCore> {
+    let board = Board::named(name).map(BoardOrCore::Board);
+    board.or_else(|| Processor::named(name).map(BoardOrCore::Core))
 }
 
 #[cfg(test)]

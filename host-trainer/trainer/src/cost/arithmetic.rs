@@ -25,10 +25,7 @@ pub trait WithArithmetic {
 impl ArithmeticChoice {
     /// What firmware for a processor draws with, unless it asks for another.
     pub fn of(processor: Processor) -> Self {
-        match processor {
-            Processor::CortexM4 | Processor::CortexM7 => Self::Reference,
-            Processor::Riscv32imac => Self::WithoutFpu,
-        }
+        if processor.has_fpu() { Self::Reference } else { Self::WithoutFpu }
     }
 
     /// The same of several: that of the first if they agree, else that of `Decoder::bind`.
@@ -60,9 +57,9 @@ mod tests {
 
     #[test]
     fn processors_that_all_lack_an_fpu_draw_without_one() {
-        use Processor::{CortexM4, CortexM7, Riscv32imac};
-        assert_eq!(ArithmeticChoice::of_all(&[Riscv32imac]), ArithmeticChoice::WithoutFpu);
-        for others in [&[][..], &[CortexM4, CortexM7], &[Riscv32imac, CortexM4], &[CortexM7, Riscv32imac]] {
+        use Processor::{CortexM0Plus, CortexM4, CortexM7, Riscv32imac, Riscv32imafc};
+        assert_eq!(ArithmeticChoice::of_all(&[Riscv32imac, CortexM0Plus]), ArithmeticChoice::WithoutFpu);
+        for others in [&[][..], &[CortexM4, Riscv32imafc], &[Riscv32imac, CortexM4], &[CortexM7, CortexM0Plus]] {
             assert_eq!(ArithmeticChoice::of_all(others), ArithmeticChoice::Reference, "{others:?}");
         }
     }

@@ -110,17 +110,20 @@ impl Counter {
 /// The emulated board that stands for a target.
 fn board(target: Processor) -> &'static str {
     match target {
+        Processor::CortexM0Plus => "mps2-an385",
         Processor::CortexM4 => "mps2-an386",
         Processor::CortexM7 => "mps2-an500",
         Processor::Riscv32imac => "virt",
+        Processor::Riscv32imafc => "virt-fpu",
     }
 }
 
 fn programs(target: Processor) -> [&'static str; 4] {
-    match target {
-        Processor::CortexM4 | Processor::CortexM7 => ["bash", "flip-link", "defmt-print", "qemu-system-arm"],
-        Processor::Riscv32imac => ["bash", "flip-link", "defmt-print", "qemu-system-riscv32"],
-    }
+    let emulator = match target {
+        Processor::CortexM0Plus | Processor::CortexM4 | Processor::CortexM7 => "qemu-system-arm",
+        Processor::Riscv32imac | Processor::Riscv32imafc => "qemu-system-riscv32",
+    };
+    ["bash", "flip-link", "defmt-print", emulator]
 }
 
 /// Cameras as the firmware's build script reads them.

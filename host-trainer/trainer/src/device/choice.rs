@@ -212,7 +212,7 @@ mod tests {
         #[test]
         fn a_chosen_model_keeps_its_limits_and_what_does_not_do_is_named(
             ram in 0_u64..4_000_000, flash in 0_u64..2_000_000,
-            processor in prop::sample::select(vec![Processor::CortexM4, Processor::CortexM7, Processor::Riscv32imac])
+            processor in prop::sample::select(Processor::ALL.to_vec())
         ) {
             let limits = Limits { ram_bytes: Some(ram), flash_bytes: Some(flash), processor: Some(processor), level: None };
             match choose(&limits) {

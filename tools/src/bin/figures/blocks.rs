@@ -50,11 +50,7 @@ fn column(name: &str) -> Result<Column> {
 
 /// Of the processor that a group is named for; of others one.
 fn cycles_per_instruction(row: &Row) -> f64 {
-    match row.group.as_str() {
-        "cortex-m4" => Processor::CortexM4.cycles_per_instruction(),
-        "cortex-m7" => Processor::CortexM7.cycles_per_instruction(),
-        _ => 1.0,
-    }
+    Processor::named(&row.group).map_or(1.0, Processor::cycles_per_instruction)
 }
 
 /// A published result.

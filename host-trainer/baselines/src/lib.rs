@@ -10,8 +10,6 @@ pub mod compact_3dgs;
 mod k_means;
 pub mod light_gaussian;
 mod masks;
-#[cfg(test)]
-mod modules_trial;
 mod octree;
 mod packed;
 pub mod rdo_gaussian;

@@ -21,7 +21,7 @@
 mod distillation;
 mod layout;
 mod quantisation;
-pub(crate) mod significance;
+mod significance;
 
 pub use quantisation::Quantised;
 

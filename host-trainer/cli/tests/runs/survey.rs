@@ -100,7 +100,7 @@ fn points_are_matched_once() {
     succeeds(pocketsplat().arg("synth").arg(&capture).args(["--size", "96", "--train-views", "16"]));
     let mut command = pocketsplat();
     command.arg("survey").arg(&capture).arg("-o").arg(home.join("out"));
-    let said = succeeds(command.args(["--iterations", "2", "--points", "matched"]));
+    let said = succeeds(command.args(["--iterations", "6", "--points", "matched"]));
     let times = |what: &str| said.matches(what).count();
     assert_eq!(times("initial points matched"), 2, "for 3DGS and for anchors: {said}");
     assert_eq!(times("matched between the photographs by an earlier run"), 1, "{said}");

@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | `PSB_BUNDLE` | absolute path of the bundle | an error |
 //! | `BOARD` | `mps2-an385`, `mps2-an386`, `mps2-an500`, `mps2-an521`, or `virt` and `virt-fpu` for RISC-V | `mps2-an386`; for RISC-V `virt` |
-//! | `RAM_KIB` | RAM in all: statics, scratch memory, stack | 256, 1024, 520, 512 |
+//! | `RAM_KIB` | RAM in all: statics, scratch memory, stack | what README.md has of the board |
 //! | `STACK_KIB` | of which the stack's, for each core | 10; with two cores 16 |
 //! | `SIZE` | frames, `WIDTHxHEIGHT` | the preview's |
 //! | `FRAMES` | frames of the orbit, at most 10 | 4 |

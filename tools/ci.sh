@@ -426,9 +426,9 @@ job_fuzz() {
 
 # Boards with the RAM that they get, KiB: as much as such a device has, and so little that anchors are decoded in each frame. Those
 # without an FPU draw as firmware without one does.
-firmware_runs=("mps2-an386 256" "mps2-an386 76" "mps2-an500 1024" "mps2-an385 256" "virt 76" "virt-fpu 256")
+firmware_runs=("mps2-an386 256" "mps2-an386 76" "mps2-an500 1024" "mps2-an385 76" "virt 76" "virt-fpu 76")
 # The same of a bundle whose Gaussians are evaluated once.
-baked_runs=("mps2-an386 256" "virt 256")
+baked_runs=("mps2-an386 256" "mps2-an385 256" "virt 256" "virt-fpu 256")
 
 # Every board draws an orbit of a bundle of either coder in its RAM, byte for byte as this machine does, and takes as many
 # instructions as it took when docs/results/instructions.csv was written, within 1 % or what the clock resolves, and as are

@@ -82,6 +82,12 @@ pub(crate) fn of_frame(
     figures
 }
 
+/// A set as the page and `pocketsplat.js` call it.
+#[cfg(not(target_arch = "wasm32"))]
+pub(crate) fn name_of(set: InstructionSet) -> &'static str {
+    stages_of(set)[0].split('.').next().unwrap_or_default()
+}
+
 /// The instructions of each stage on processors of a set, in the order of [`Stage::ALL`].
 fn stages_of(set: InstructionSet) -> [&'static str; Stage::ALL.len()] {
     macro_rules! stages {

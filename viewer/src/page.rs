@@ -1,8 +1,8 @@
 //! One HTML file that draws bundles, with everything inside.
 
-use pocketsplat_instructions::InstructionSet;
 use pocketsplat_instructions::board::{BOARDS, Board};
 
+use crate::figures::name_of;
 use crate::package::{CHECK, MODULE, MOTION, ORBIT, POCKETSPLAT, SHARPNESS, VIEW, WORKER};
 
 const PAGE: &str = include_str!("../web/page.html");
@@ -50,12 +50,7 @@ pub fn page(title: &str, scenes: &[SceneFile<'_>]) -> String {
 fn boards() -> String {
     let options = BOARDS.iter().map(|board| {
         let Board { chip, clock_mhz, ram_bytes, frame_px: [width, height], processor, .. } = board;
-        let set = match processor.instruction_set() {
-            InstructionSet::CortexM => "cortexM",
-            InstructionSet::CortexM0Plus => "cortexM0Plus",
-            InstructionSet::RiscV32 => "riscv32",
-            InstructionSet::RiscV32Fpu => "riscv32Fpu",
-        };
+        let set = name_of(processor.instruction_set());
         let hertz = u64::from(*clock_mhz) * 1_000_000;
         format!(
             "          <option value=\"{set}\" data-size=\"{width},{height}\" data-ram=\"{ram_bytes}\" data-hertz=\"{hertz}\" data-cycles=\"{}\">{}</option>",
@@ -94,12 +89,21 @@ pub fn base64(bytes: &[u8]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{SceneFile, base64, page};
+    use pocketsplat_instructions::InstructionSet;
+
+    use super::{PAGE, SceneFile, base64, name_of, page};
 
     #[test]
     fn base64_is_the_standards() {
         for (bytes, text) in [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")] {
             assert_eq!(base64(bytes.as_bytes()), text);
+        }
+    }
+
+    #[test]
+    fn every_set_of_instructions_can_be_chosen() {
+        for set in InstructionSet::ALL {
+            assert!(PAGE.contains(&format!("<option value=\"{}\">", name_of(set))), "{set:?}");
         }
     }
 

@@ -173,10 +173,10 @@ impl Plan {
     /// where they share passes, and sums are kept in one strip alone unless the caller says how many there are. The frame's size decides
     /// about memory only through the splats of a strip, because tiles leave one by one; a splat takes 40 bytes.
     ///
-    /// When [slabs](Overflow::Slabs) are allowed, fewer places than splats will do, down to 256: then nearly every scene fits
+    /// When [slabs](crate::Overflow::Slabs) are allowed, fewer places than splats will do, down to 256: then nearly every scene fits
     /// whole, and going over it counts once more for each slab.
     ///
-    /// Strips [share passes](Strips::Auto) where the plan chose their number: a frame draws as many in a pass as there are places for.
+    /// Strips [share passes](crate::Strips::Auto) where the plan chose their number: a frame draws as many in a pass as there are places for.
     /// Such a plan gives its splats all of the budget that is left, which saves passes; [`Plan::least_len`] bytes would do.
     ///
     /// With [slow bytes](Budget::slow_bytes) each [part](Part) of the memory lies in one of two regions: of the equal plan variants

@@ -35,6 +35,17 @@ impl Processor {
         }
     }
 
+    /// What help says of it.
+    pub fn description(self) -> &'static str {
+        match self {
+            Self::CortexM0Plus => "Cortex-M0+",
+            Self::CortexM4 => "Cortex-M4 with FPU",
+            Self::CortexM7 => "Cortex-M7 with FPU",
+            Self::Riscv32imac => "RISC-V without FPU (RV32IMAC)",
+            Self::Riscv32imafc => "RISC-V with FPU (RV32IMAFC)",
+        }
+    }
+
     /// The one of this name, if there is one.
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|processor| processor.name() == name)

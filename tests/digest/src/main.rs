@@ -33,14 +33,15 @@ fn run(print: impl Fn(fmt::Arguments<'_>)) -> Result<(), DecodeError> {
     for (name, bytes) in BUNDLES {
         let bundle = Bundle::parse(bytes)?;
         let [symbols, values] = digest::digests(&bundle, &mut scratch)?;
-        let [frame, with_halves] = frame::frame_digests(&bundle, &mut memory)?;
+        let [frame, with_halves, without_fpu] = frame::frame_digests(&bundle, &mut memory)?;
         print(format_args!(
-            "{name}: {} anchors, symbols {:016x}, values {:016x}, frame {:016x}, with halves {:016x}",
+            "{name}: {} anchors, symbols {:016x}, values {:016x}, frame {:016x}, with halves {:016x}, without FPU {:016x}",
             bundle.n_anchors(),
             symbols.0,
             values.0,
             frame.0,
-            with_halves.0
+            with_halves.0,
+            without_fpu.0
         ));
     }
     Ok(())

@@ -52,7 +52,8 @@ pub(crate) struct Args {
     /// Scratch memory of the decoder, as 192KiB or 65536 [default: no limit]
     #[arg(long, value_name = "BYTES")]
     ram: Option<ByteSize>,
-    /// Machines whose time is compared: boards in milliseconds, kinds of processors in instructions.
+    /// Machines whose time is compared: boards in milliseconds, kinds of processors in instructions; a board sets neither --ram nor
+    /// --resolution here.
     #[arg(long, value_parser = machine(), value_delimiter = ',', value_name = "NAME,…", default_value = "cortex-m4")]
     target: Vec<Machine>,
     /// Views, at most 10, whose instructions the firmware counts [default: 2 where it can, else none]
@@ -75,6 +76,12 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let files = ReportFiles::checked(&args.output, &mut outputs)?;
     let targets: Vec<Processor> = args.target.iter().filter_map(|machine| machine.device()).collect();
     let counter = args.counter(&targets)?;
+    if targets.iter().any(|target| target.has_fpu()) && !targets.iter().all(|target| target.has_fpu()) {
+        say!(
+            "warning: not all targets have an FPU, so all draw as with one; name those without in a call of their own, which draws as \
+             their firmware should"
+        );
+    }
     let (_, capture) = file.load(&bundle, &args.capture)?;
     let views = picked(views_of(&capture, args.split)?, args.views);
     let mut sights = sights(&file, &bundle, &capture, &views)?;
@@ -149,9 +156,14 @@ impl Args {
 
 /// Replaces what was predicted by what the firmware counts, where it can.
 fn count(counter: &Counter, targets: &[Processor], cameras: &[Camera], point: &mut Measured) {
-    for (instructions, target) in point.instructions.iter_mut().zip(targets) {
+    for (i, target) in targets.iter().enumerate() {
+        // Boards may have the same processor.
+        if let Some(before) = targets[..i].iter().position(|counted| counted == target) {
+            point.instructions[i] = point.instructions[before];
+            continue;
+        }
         match counter.count(*target, &point.setting, cameras, point.scratch_bytes) {
-            Ok(stages) => *instructions = Some(Instructions { stages, counted: true }),
+            Ok(stages) => point.instructions[i] = Some(Instructions { stages, counted: true }),
             Err(error) => say!("  not counted: {error}"),
         }
     }

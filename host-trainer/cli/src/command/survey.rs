@@ -28,8 +28,9 @@ use table::{Line, Table};
 
 /// Train published methods on one capture, and compare them.
 ///
-/// 3DGS, methods that compress its scene, Scaffold-GS, HAC, HAC++, ContextGS, and what `train` does by itself, at two rates where a method
-/// has them. All have the same photographs, steps and seed; methods that compress take theirs on top.
+/// 3DGS, methods that compress its scene, Scaffold-GS, HAC, HAC++, ContextGS, and as `pocketsplat` HAC with this program's own pruning, the
+/// default of `train`; at two rates where a method has them. All have the same photographs, steps, seed and effects; methods that compress
+/// take their steps on top.
 ///
 /// Writes survey.csv, survey.svg, a picture of the first test view for each method, and every file that was measured. The same command
 /// again goes on where it was stopped, but begins a compression anew.
@@ -40,7 +41,7 @@ pub(crate) struct Args {
     /// Folder for the table and all that is trained.
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// Training steps of each method.
+    /// Training steps of each method, at least 6.
     #[arg(long, value_name = "N", default_value_t = Preset::Quick.iterations())]
     iterations: u32,
     /// Random points that all methods start from, on captures of Blender.

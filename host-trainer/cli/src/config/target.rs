@@ -36,7 +36,7 @@ pub(crate) fn board_or_core() -> impl TypedValueParser<Value = BoardOrCore> {
 /// The names of all, with help.
 pub(crate) fn boards_and_cores() -> impl Iterator<Item = PossibleValue> {
     let boards = BOARDS.iter().map(|board| PossibleValue::new(board.name).help(board.chip));
-    boards.chain(Processor::ALL.map(|processor| PossibleValue::new(processor.name())))
+    boards.chain(Processor::ALL.map(|core| PossibleValue::new(core.name()).help(core.description())))
 }
 
 /// The board, or else the kind of processor, of this name.
@@ -75,8 +75,8 @@ mod tests {
         }
         let _ = writeln!(
             table,
-            "\nCycles of an instruction: {} on a Cortex-M4, by ARM's table and the count of an emulated one. For a Cortex-M33 the same is assumed; for all others \
-             one, since none are counted.\n",
+            "\nCycles of an instruction: {} on a Cortex-M4, by ARM's table and the count of an emulated one. For the RP2350 and the ESP32-S3 the \
+             same is assumed; for all others one, since none are counted.\n",
             Processor::CortexM4.cycles_per_instruction()
         );
         let page = std::fs::read_to_string(PAGE).expect("the page");

@@ -152,8 +152,9 @@ impl Report<'_> {
         let exact = &self.measured[0];
         let mut text = format!(
             "{TITLE}: {}\n\nMeans over {} views; instructions of a frame in millions, means over {} of them, \
-             counted on an emulated board or, after ≈, predicted; of a board its milliseconds, computed from instructions and clock; \
-             host: milliseconds of a frame on this machine, one thread. PSNR to the f64 reference is the worst view's, the largest difference of a channel of all views is in 255ths.\n\n\
+             counted on an emulated board or, after ≈, predicted; boards: milliseconds, computed from instructions and clock; \
+             host: milliseconds of a frame on this machine, one thread. PSNR to the f64 reference is the worst view's, the \
+             largest difference of a channel of all views is in 255ths.\n\n\
              | knob | setting | PSNR, dB | to the reference, dB | worst | scratch |",
             self.bundle_name, self.n_views, self.n_counted,
         );

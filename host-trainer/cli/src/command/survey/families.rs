@@ -57,8 +57,8 @@ pub(super) struct Anchors {
     pub(super) options: &'static [&'static str],
 }
 
-/// The methods of anchors, as published: with the weights of the bits of their papers' ends, and no module of this program. Then what this
-/// program trains by itself.
+/// The methods of anchors, as published: with the weights of the bits of their papers' ends, and no module of this program. Then the default
+/// backbone and module of `train`.
 pub(super) const ANCHORS: [Anchors; 9] = [
     anchors("Scaffold-GS", "default", &[PUBLISHED, "--backbone=scaffold"]),
     anchors("HAC", "lambda=0.0005", &[PUBLISHED, "--backbone=hac", "--lambda=0.0005"]),

@@ -27,7 +27,7 @@ cargo test -q --locked
 bundles=(static context matte isotropic)
 flags=(-std=c11 -Wall -Wextra -Wpedantic -Werror -O1 -g -Iinclude)
 cargo build -q --release --locked
-cc "${flags[@]}" -fsanitize=address,undefined -fno-sanitize-recover=all c/test.c c/draw.c c/pieces.c "$out/release/libpocketsplat.a" -lm -o "$out/test"
+cc "${flags[@]}" -pthread -fsanitize=address,undefined -fno-sanitize-recover=all c/test.c c/draw.c c/pieces.c "$out/release/libpocketsplat.a" -lm -o "$out/test"
 arguments=()
 for bundle in "${bundles[@]}"; do arguments+=("$bundle=$golden/$bundle.psb"); done
 "$out/test" "${arguments[@]}" >"$out/host.csv"

@@ -12,6 +12,7 @@ static uint8_t scratch[MAX_SCRATCH_BYTES];
 static uint8_t slow[MAX_SCRATCH_BYTES];
 static uint8_t frame[MAX_FRAME_BYTES];
 static _Alignas(PSB_DECODER_ALIGN) uint8_t place[PSB_DECODER_BYTES];
+static _Alignas(PSB_DECODER_ALIGN) uint8_t place_of_two[PSB_PAIR_BYTES];
 static psb_message message;
 
 /* Copies a tile into the frame buffer; user is the frame's width. A display would get it by its bus. */
@@ -76,6 +77,26 @@ static int differs_in_two_regions(const uint8_t *bundle, size_t bundle_len, psb_
   return crc32(frame, 3 * (size_t)camera->width_px * camera->height_px) != crc;
 }
 
+/* The same frame by two painters: 1 if a pixel or the number of splats differs, if a byte fewer is not refused, or if there is no such plan. */
+static int differs_by_two(const uint8_t *bundle, size_t bundle_len, psb_budget budget, const psb_camera *camera, uint32_t n_splats, uint32_t crc) {
+  psb_plan plan;
+  psb_pair *pair;
+  psb_report reports[2];
+  void *width = (void *)&camera->width_px;
+  budget.slabs = 0;
+  budget.two_painters = 1;
+  if (psb_make_plan(bundle, bundle_len, &budget, &plan, &message) != PSB_STATUS_OK) return 1;
+  if (psb_bind_two(place_of_two, sizeof place_of_two, bundle, bundle_len, &budget, scratch, plan.scratch_bytes - 1, NULL, 0, &pair, &message) !=
+      PSB_STATUS_OVER_BUDGET)
+    return 1;
+  if (psb_bind_two(place_of_two, sizeof place_of_two, bundle, bundle_len, &budget, scratch, plan.scratch_bytes, NULL, 0, &pair, &message) != PSB_STATUS_OK)
+    return 1;
+  clear_frame();
+  if (psb_render_by_two(pair, camera, take_tile, width, width, do_both, NULL, reports, &message) != PSB_STATUS_OK) return 1;
+  if (reports[0].splats + reports[1].splats != n_splats) return 1;
+  return crc32(frame, 3 * (size_t)camera->width_px * camera->height_px) != crc;
+}
+
 int draw_orbit(const char *name, const uint8_t *bundle, size_t bundle_len) {
   psb_budget budget;
   psb_plan whole, plan;
@@ -114,6 +135,12 @@ int draw_orbit(const char *name, const uint8_t *bundle, size_t bundle_len) {
       }
       crc = crc32(frame, 3 * (size_t)camera.width_px * camera.height_px);
       say_row(name, tiers, side, crc);
+    }
+    if (differs_by_two(bundle, bundle_len, budget, &camera, report.splats, crc)) {
+      say("two painters do not draw the frame: ");
+      say(message.text);
+      say("\n");
+      return 1;
     }
     if (differs_in_two_regions(bundle, bundle_len, budget, &camera, plan.scratch_bytes, crc)) {
       say("memory in two regions does not draw the frame: ");

@@ -19,6 +19,13 @@ static int semihost(int operation, const void *argument) {
 
 void say(const char *text) { semihost(4, text); }
 
+/* There is one core. */
+void do_both(void *user, psb_task here, psb_task there) {
+  (void)user;
+  there.run(there.state);
+  here.run(here.state);
+}
+
 _Noreturn static void leave(int failed) {
   /* SYS_EXIT: ADP_Stopped_ApplicationExit, or a run-time error. */
   semihost(0x18, (const void *)(uintptr_t)(failed ? 0x20023 : 0x20026));

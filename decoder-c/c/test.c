@@ -1,4 +1,5 @@
 /* On a PC, with the sanitisers: the golden frames, and calls that must fail without harm. `test NAME=FILE.psb ...` */
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,6 +16,27 @@
   } while (0)
 
 void say(const char *text) { fputs(text, stdout); }
+
+static void *run(void *task) {
+  const psb_task *of_thread = task;
+  of_thread->run(of_thread->state);
+  return NULL;
+}
+
+void do_both(void *user, psb_task here, psb_task there) {
+  pthread_t thread;
+  (void)user;
+  CHECK(pthread_create(&thread, NULL, run, &there) == 0);
+  here.run(here.state);
+  CHECK(pthread_join(thread, NULL) == 0);
+}
+
+/* Leaves one of its tasks undone, or does the other twice. */
+static void do_one(void *user, psb_task here, psb_task there) {
+  const int first = *(const int *)user;
+  run(first ? &here : &there);
+  run(first ? &here : &there);
+}
 
 static int32_t refuse(void *user, uint16_t x, uint16_t y, uint16_t width, uint16_t height, const uint8_t *rgb) {
   (void)x, (void)y, (void)width, (void)height, (void)rgb;
@@ -83,6 +105,48 @@ static void misordered(psb_decoder *decoder, const psb_camera *camera) {
   CHECK(psb_begin(decoder, camera, PSB_FORMAT_RGB888, NULL) == PSB_STATUS_OK);
   CHECK(psb_next_tile(decoder, &piece, NULL, NULL) == PSB_STATUS_OK);
   free(row);
+}
+
+/* What goes wrong with two painters alone. */
+static void misuse_by_two(const uint8_t *bundle, size_t len, psb_budget budget, const psb_camera *camera) {
+  psb_plan plan;
+  psb_message message;
+  psb_pair *pair = NULL;
+  psb_decoder *decoder = NULL;
+  int32_t n_tiles = 0;
+  int first = 0;
+  void *place = aligned_alloc(PSB_DECODER_ALIGN, PSB_PAIR_BYTES);
+  budget.ram_bytes = 1 << 20;
+  budget.slabs = budget.two_painters = 1;
+  CHECK(psb_make_plan(bundle, len, &budget, &plan, &message) == PSB_STATUS_MISUSE && strstr(message.text, "slabs needs to be 0"));
+  budget.slabs = 0;
+  budget.two_painters = 2;
+  CHECK(psb_make_plan(bundle, len, &budget, &plan, &message) == PSB_STATUS_MISUSE && strstr(message.text, "two_painters needs to be 0 or 1; found 2"));
+  budget.two_painters = 1;
+  CHECK(psb_make_plan(bundle, len, &budget, &plan, &message) == PSB_STATUS_OK);
+  uint8_t *scratch = malloc(plan.scratch_bytes);
+  CHECK(psb_bind(place, PSB_PAIR_BYTES, bundle, len, &budget, scratch, plan.scratch_bytes, NULL, 0, &decoder, &message) == PSB_STATUS_MISUSE);
+  CHECK(strstr(message.text, "psb_bind_two") && decoder == NULL);
+  CHECK(psb_pair_bytes() <= PSB_PAIR_BYTES);
+  CHECK(psb_bind_two(place, psb_pair_bytes() - 1, bundle, len, &budget, scratch, plan.scratch_bytes, NULL, 0, &pair, &message) == PSB_STATUS_MISUSE);
+  CHECK(strstr(message.text, "psb_pair_bytes") && pair == NULL);
+  CHECK(psb_bind_two(place, PSB_PAIR_BYTES, bundle, len, &budget, scratch, plan.scratch_bytes, NULL, 0, NULL, &message) == PSB_STATUS_MISUSE);
+  budget.two_painters = 0;
+  CHECK(psb_bind_two(place, PSB_PAIR_BYTES, bundle, len, &budget, scratch, plan.scratch_bytes, NULL, 0, &pair, &message) == PSB_STATUS_MISUSE);
+  CHECK(strstr(message.text, "two_painters needs to be 1"));
+  budget.two_painters = 1;
+  CHECK(psb_bind_two(place, psb_pair_bytes(), bundle, len, &budget, scratch, plan.scratch_bytes, NULL, 0, &pair, &message) == PSB_STATUS_OK);
+  CHECK(psb_render_by_two(NULL, camera, take, NULL, NULL, do_both, NULL, NULL, NULL) == PSB_STATUS_MISUSE);
+  CHECK(psb_render_by_two(pair, NULL, take, NULL, NULL, do_both, NULL, NULL, NULL) == PSB_STATUS_MISUSE);
+  CHECK(psb_render_by_two(pair, camera, NULL, NULL, NULL, do_both, NULL, NULL, NULL) == PSB_STATUS_MISUSE);
+  CHECK(psb_render_by_two(pair, camera, take, NULL, NULL, NULL, NULL, NULL, &message) == PSB_STATUS_MISUSE && strcmp(message.text, "join is NULL") == 0);
+  for (; first < 2; first++)
+    CHECK(psb_render_by_two(pair, camera, take, NULL, NULL, do_one, &first, NULL, &message) == PSB_STATUS_MISUSE && strstr(message.text, "join returned"));
+  int32_t other = 100;
+  CHECK(psb_render_by_two(pair, camera, refuse, &n_tiles, &other, do_both, NULL, NULL, &message) == PSB_STATUS_STOPPED && n_tiles == 2);
+  CHECK(psb_render_by_two(pair, camera, take, NULL, NULL, do_both, NULL, NULL, &message) == PSB_STATUS_OK);
+  free(scratch);
+  free(place);
 }
 
 /* Every argument that may be wrong, and damaged bytes, each in memory of its own so that the sanitiser sees a byte too many. */
@@ -161,6 +225,7 @@ static void misuse(const uint8_t *bundle, size_t len) {
   CHECK(n_tiles == 2 && strstr(message.text, "returned 77"));
   CHECK(psb_render(decoder, &camera, refuse, &n_tiles, NULL, NULL) == PSB_STATUS_OK);
   misordered(decoder, &camera);
+  misuse_by_two(bundle, len, budget, &camera);
   camera.rotation[0] += 0.5f;
   CHECK(psb_begin(decoder, &camera, PSB_FORMAT_RGB888, &message) == PSB_STATUS_MISUSE && message.text[0]);
   CHECK(psb_render(decoder, &camera, refuse, &n_tiles, &report, &message) == PSB_STATUS_MISUSE && message.text[0]);

@@ -16,6 +16,9 @@
 // Alignment that suffices for a psb_decoder on every target.
 #define PSB_DECODER_ALIGN 8
 
+// Bytes that suffice for a psb_pair on every target.
+#define PSB_PAIR_BYTES 4096
+
 // How a call ended, and whose fault it is if not well.
 typedef enum psb_status {
   // Done.
@@ -72,6 +75,10 @@ typedef enum psb_progress {
 // forgotten at any time; its scratch memory is then the caller's again.
 typedef struct psb_decoder psb_decoder;
 
+// Two decoders that draw frames of one scene together, bound by psb_bind_two. They lie in memory of the caller, have nothing to free, and may be
+// forgotten at any time; their scratch memory is then the caller's again.
+typedef struct psb_pair psb_pair;
+
 // What there is to draw with. Begin with psb_budget_for_frame.
 typedef struct psb_budget {
   // The most that a frame may take, model instructions: about as many as a Cortex-M4 executes. A frame that takes more ends with
@@ -92,13 +99,15 @@ typedef struct psb_budget {
   uint8_t quality;
   // 1 to draw strips with too many splats in slabs of depth, which takes longer; 0 to leave splats out.
   uint8_t slabs;
+  // 1 to draw on two cores, by psb_bind_two, in one strip and without slabs; 0 for one.
+  uint8_t two_painters;
 } psb_budget;
 
 // What fits into a budget.
 typedef struct psb_plan {
-  // Bytes of scratch memory that psb_bind takes; where nothing fits, those that would do.
+  // Bytes of scratch memory that psb_bind or psb_bind_two takes; where nothing fits, those that would do.
   size_t scratch_bytes;
-  // Bytes of slower memory that psb_bind takes beside them, 0 where everything lies in the first; where nothing fits and there is
+  // Bytes of slower memory that it takes beside them, 0 where everything lies in the first; where nothing fits and there is
   // slower memory, those that would do.
   size_t slow_scratch_bytes;
   // Share of the anchors that is not drawn.
@@ -180,6 +189,18 @@ typedef struct psb_pixels {
   uint16_t height;
 } psb_pixels;
 
+// What one core is to do: call run with state, once.
+typedef struct psb_task {
+  // Does it.
+  void (*run)(void *state);
+  // What run takes.
+  void *state;
+} psb_task;
+
+// Does both tasks at the same time, here on the core that calls and there on the other, and returns when both are done. What either wrote has to
+// be seen by the core that goes on: with a barrier where the cores need one.
+typedef void (*psb_join)(void *user, struct psb_task here, struct psb_task there);
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -190,7 +211,7 @@ const char *psb_status_name(uint32_t status);
 // A budget for frames of at most width_px by height_px within ram_bytes, everything else as good as memory allows.
 struct psb_budget psb_budget_for_frame(uint16_t width_px, uint16_t height_px, size_t ram_bytes);
 
-// Checks a bundle and says how many bytes the best plan within a budget takes.
+// Checks a bundle and says how many bytes the best plan within a budget takes; of two painters, both.
 //
 // bundle: bundle_len bytes of a .psb. message: NULL, or where to say what was wrong.
 //
@@ -320,6 +341,46 @@ enum psb_status psb_next_tile_row(struct psb_decoder *decoder,
                                   size_t len,
                                   struct psb_pixels *row,
                                   struct psb_report *report,
+                                  struct psb_message *message);
+
+// Bytes of a psb_pair on this target, PSB_PAIR_BYTES at most; its alignment is PSB_DECODER_ALIGN at most.
+size_t psb_pair_bytes(void);
+
+// Checks a bundle, plans for it, and binds two decoders to it, which draw frames together by psb_render_by_two.
+//
+// place: place_len bytes for both, psb_pair_bytes() or PSB_PAIR_BYTES, aligned to PSB_DECODER_ALIGN. budget: with two_painters 1. pair: gets them, NULL
+// where the call fails. The rest as psb_bind has it.
+//
+// # Safety
+// As for psb_bind.
+enum psb_status psb_bind_two(void *place,
+                             size_t place_len,
+                             const uint8_t *bundle,
+                             size_t bundle_len,
+                             const struct psb_budget *budget,
+                             uint8_t *scratch,
+                             size_t scratch_len,
+                             uint8_t *slow,
+                             size_t slow_len,
+                             struct psb_pair **pair,
+                             struct psb_message *message);
+
+// Draws the scene as a camera sees it on two cores: the same pixels as psb_render.
+//
+// tile: is called on both cores, with here_user on this one and there_user on the other; each tile comes once. join: does two tasks at the same
+// time, see psb_join; a frame calls it twice. join_user: passed on to it. reports: NULL, or two, where to say what each core did. message: NULL, or
+// where to say what was wrong. After an error the next frame is drawn as if nothing had been.
+//
+// # Safety
+// Pointers are NULL or point to what the call says; the pair is bound, and neither function uses it.
+enum psb_status psb_render_by_two(struct psb_pair *pair,
+                                  const struct psb_camera *camera,
+                                  psb_tile tile,
+                                  void *here_user,
+                                  void *there_user,
+                                  psb_join join,
+                                  void *join_user,
+                                  struct psb_report *reports,
                                   struct psb_message *message);
 
 #ifdef __cplusplus

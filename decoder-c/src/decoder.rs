@@ -4,7 +4,7 @@ use core::ffi::c_void;
 use core::mem::{align_of, size_of};
 use core::slice;
 
-use pocketsplat_core::{Drawing, FrameReport, PixelFormat, RenderError, Tile, TileSink};
+use pocketsplat_core::{Bundle, DecodeError, Drawing, FrameReport, PixelFormat, Plan, Tile, TileSink};
 
 use crate::camera::Camera;
 use crate::plan::{Budget, bytes_of, planned};
@@ -116,9 +116,9 @@ pub type TileFn = Option<
 >;
 
 /// Hands tiles to the caller's function.
-struct Tiles {
-    function: unsafe extern "C" fn(*mut c_void, u16, u16, u16, u16, *const u8) -> i32,
-    user: *mut c_void,
+pub(crate) struct Tiles {
+    pub(crate) function: unsafe extern "C" fn(*mut c_void, u16, u16, u16, u16, *const u8) -> i32,
+    pub(crate) user: *mut c_void,
 }
 
 impl TileSink for Tiles {
@@ -140,6 +140,81 @@ impl TileSink for Tiles {
 unsafe fn memory_of(bytes: *mut u8, len: usize) -> &'static mut [u8] {
     // SAFETY: not NULL; the rest is the caller's promise.
     if bytes.is_null() { &mut [] } else { unsafe { slice::from_raw_parts_mut(bytes, len) } }
+}
+
+/// What is made in the caller's memory.
+pub(crate) trait Placed: Sized {
+    /// How the call and its arguments are named.
+    const NULL: &'static str;
+    const TOO_SHORT: &'static str;
+    /// What the budget has to say, and what is wrong where it does not.
+    const TWO_PAINTERS: u8;
+    const OTHER_CALL: &'static str;
+
+    fn bound(bundle: &Bundle<'static>, plan: Plan, regions: [&'static mut [u8]; 2]) -> Result<Self, DecodeError>;
+}
+
+impl Placed for Decoder {
+    const NULL: &'static str = "decoder is NULL";
+    const TOO_SHORT: &'static str = "place_len needs to be psb_decoder_bytes() at least";
+    const TWO_PAINTERS: u8 = 0;
+    const OTHER_CALL: &'static str = "two_painters needs to be 0 for psb_bind; psb_bind_two takes 1";
+
+    fn bound(bundle: &Bundle<'static>, plan: Plan, regions: [&'static mut [u8]; 2]) -> Result<Self, DecodeError> {
+        Ok(Self { begun: None, bound: pocketsplat_core::Decoder::bind(bundle, plan, regions)? })
+    }
+}
+
+/// The caller's memory: begin and length.
+pub(crate) type Memory<T> = (*mut T, usize);
+
+/// Checks a bundle, plans for it, and makes a `T` in `place`.
+///
+/// # Safety
+/// As for [`psb_bind`].
+pub(crate) unsafe fn bind<T: Placed>(
+    (place, place_len): Memory<c_void>,
+    (bundle, bundle_len): (*const u8, usize),
+    budget: *const Budget,
+    (scratch, scratch_len): Memory<u8>,
+    (slow, slow_len): Memory<u8>,
+    made: *mut *mut T,
+    message: *mut Message,
+) -> Status {
+    // SAFETY: the caller's promise.
+    let (bundle, budget, made, message) =
+        unsafe { (bytes_of(bundle, bundle_len), budget.as_ref(), made.as_mut(), message.as_mut()) };
+    let outcome = (|| {
+        let made = made.ok_or(Failure::Misuse(T::NULL))?;
+        *made = core::ptr::null_mut();
+        let place = place.cast::<T>();
+        if place.is_null() || !place.is_aligned() {
+            return Err(Failure::Misuse("place is NULL or not aligned to PSB_DECODER_ALIGN"));
+        }
+        if place_len < size_of::<T>() {
+            return Err(Failure::Number(T::TOO_SHORT, place_len));
+        }
+        if let Some(Budget { two_painters: found @ 0..2, .. }) = budget
+            && *found != T::TWO_PAINTERS
+        {
+            return Err(Failure::Misuse(T::OTHER_CALL));
+        }
+        let (bundle, plan) = planned(bundle, budget)?;
+        if scratch.is_null() && plan.scratch_len() > 0 {
+            return Err(Failure::Misuse("scratch is NULL"));
+        }
+        if slow.is_null() && plan.slow_scratch_len() > 0 {
+            return Err(Failure::Misuse("slow is NULL, and the plan takes slow memory"));
+        }
+        // SAFETY: the caller's promise.
+        let regions = unsafe { [memory_of(scratch, scratch_len), memory_of(slow, slow_len)] };
+        let bound = T::bound(&bundle, plan, regions)?;
+        // SAFETY: long enough and aligned, as was checked.
+        unsafe { place.write(bound) };
+        *made = place;
+        Ok(())
+    })();
+    status_of(outcome, message)
 }
 
 /// Checks a bundle, plans for it, and binds a decoder to it.
@@ -165,35 +240,9 @@ pub unsafe extern "C" fn psb_bind(
     decoder: *mut *mut Decoder,
     message: *mut Message,
 ) -> Status {
+    let (place, bundle) = ((place, place_len), (bundle, bundle_len));
     // SAFETY: the caller's promise.
-    let (bundle, budget, decoder, message) =
-        unsafe { (bytes_of(bundle, bundle_len), budget.as_ref(), decoder.as_mut(), message.as_mut()) };
-    let outcome = (|| {
-        let decoder = decoder.ok_or(Failure::Misuse("decoder is NULL"))?;
-        *decoder = core::ptr::null_mut();
-        let place = place.cast::<Decoder>();
-        if place.is_null() || !place.is_aligned() {
-            return Err(Failure::Misuse("place is NULL or not aligned to PSB_DECODER_ALIGN"));
-        }
-        if place_len < size_of::<Decoder>() {
-            return Err(Failure::Number("place_len needs to be psb_decoder_bytes() at least", place_len));
-        }
-        let (bundle, plan) = planned(bundle, budget)?;
-        if scratch.is_null() && plan.scratch_len() > 0 {
-            return Err(Failure::Misuse("scratch is NULL"));
-        }
-        if slow.is_null() && plan.slow_scratch_len() > 0 {
-            return Err(Failure::Misuse("slow is NULL, and the plan takes slow memory"));
-        }
-        // SAFETY: the caller's promise.
-        let regions = unsafe { [memory_of(scratch, scratch_len), memory_of(slow, slow_len)] };
-        let bound = pocketsplat_core::Decoder::bind(&bundle, plan, regions)?;
-        // SAFETY: long enough and aligned, as was checked.
-        unsafe { place.write(Decoder { begun: None, bound }) };
-        *decoder = place;
-        Ok(())
-    })();
-    status_of(outcome, message)
+    unsafe { bind(place, bundle, budget, (scratch, scratch_len), (slow, slow_len), decoder, message) }
 }
 
 /// Draws the scene as a camera sees it and hands it to a function tile by tile.
@@ -219,10 +268,7 @@ pub unsafe extern "C" fn psb_render(
         let bound = unsafe { Decoder::bound(decoder) }?;
         let camera = camera.ok_or(Failure::Misuse("camera is NULL"))?.to_core()?;
         let function = tile.ok_or(Failure::Misuse("tile is NULL"))?;
-        let found = bound.render(&camera, &mut Tiles { function, user }).map_err(|error| match error {
-            RenderError::Decode(error) => Failure::Decode(error),
-            RenderError::Sink(code) => Failure::Stopped(code),
-        })?;
+        let found = bound.render(&camera, &mut Tiles { function, user })?;
         if let Some(report) = report {
             *report = found.into();
         }

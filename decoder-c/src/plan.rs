@@ -40,15 +40,17 @@ pub struct Budget {
     pub quality: u8,
     /// 1 to draw strips with too many splats in slabs of depth, which takes longer; 0 to leave splats out.
     pub slabs: u8,
+    /// 1 to draw on two cores, by psb_bind_two, in one strip and without slabs; 0 for one.
+    pub two_painters: u8,
 }
 
 /// What fits into a budget.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Plan {
-    /// Bytes of scratch memory that psb_bind takes; where nothing fits, those that would do.
+    /// Bytes of scratch memory that psb_bind or psb_bind_two takes; where nothing fits, those that would do.
     pub scratch_bytes: usize,
-    /// Bytes of slower memory that psb_bind takes beside them, 0 where everything lies in the first; where nothing fits and there is
+    /// Bytes of slower memory that it takes beside them, 0 where everything lies in the first; where nothing fits and there is
     /// slower memory, those that would do.
     pub slow_scratch_bytes: usize,
     /// Share of the anchors that is not drawn.
@@ -84,7 +86,13 @@ impl Budget {
         let frame = pocketsplat_core::Budget::for_frame(self.width_px, self.height_px);
         let memory = frame.in_bytes(self.ram_bytes).with_slow_bytes(self.slow_bytes);
         let scene = memory.with_tiers(self.tiers).with_quality(quality).with_overflow(overflow);
-        Ok(scene.with_most_work(self.most_work))
+        let scene = scene.with_most_work(self.most_work);
+        match (self.two_painters, self.slabs) {
+            (0, _) => Ok(scene),
+            (1, 0) => Ok(scene.with_two_painters()),
+            (1, slabs) => Err(Failure::Number("slabs needs to be 0 where two_painters is 1", usize::from(slabs))),
+            (other, _) => Err(Failure::Number("two_painters needs to be 0 or 1", usize::from(other))),
+        }
     }
 }
 
@@ -135,10 +143,11 @@ pub extern "C" fn psb_budget_for_frame(width_px: u16, height_px: u16, ram_bytes:
         tiers: u8::MAX,
         quality: Quality::Exact as u8,
         slabs: 0,
+        two_painters: 0,
     }
 }
 
-/// Checks a bundle and says how many bytes the best plan within a budget takes.
+/// Checks a bundle and says how many bytes the best plan within a budget takes; of two painters, both.
 ///
 /// bundle: bundle_len bytes of a .psb. message: NULL, or where to say what was wrong.
 ///

@@ -3,7 +3,7 @@
 use core::ffi::{CStr, c_char};
 use core::fmt::{self, Write as _};
 
-use pocketsplat_core::{DecodeError, ErrorClass};
+use pocketsplat_core::{DecodeError, ErrorClass, RenderError};
 
 /// How a call ended, and whose fault it is if not well.
 #[repr(C)]
@@ -54,6 +54,15 @@ pub(crate) enum Failure {
     Number(&'static str, usize),
     /// The caller's function returned this number.
     Stopped(i32),
+}
+
+impl From<RenderError<i32>> for Failure {
+    fn from(error: RenderError<i32>) -> Self {
+        match error {
+            RenderError::Decode(error) => Self::Decode(error),
+            RenderError::Sink(code) => Self::Stopped(code),
+        }
+    }
 }
 
 impl From<DecodeError> for Failure {

@@ -9,7 +9,7 @@ use embedded_hal::digital::OutputPin;
 use mipidsi::Display;
 use mipidsi::interface::{Interface, InterfacePixelFormat};
 use mipidsi::models::Model;
-use pocketsplat_core::{Arithmetic, ByteOrder, Camera, Decoder, FrameReport, RenderError, Rounding, Tile};
+use pocketsplat_core::{Arithmetic, ByteOrder, Camera, DecodeError, Decoder, FrameReport, RenderError, Rounding, Tile};
 
 /// The camera with the largest frame of its proportions that a panel of `width_px × height_px` shows.
 #[must_use]
@@ -54,6 +54,19 @@ where
     while let Some(tile) = drawing.next_tile()? {
         send(display, camera, tile).map_err(RenderError::Sink)?;
     }
+    Ok(drawing.report())
+}
+
+/// Draws what the camera sees to nowhere: what drawing takes without a display.
+///
+/// # Errors
+/// As [`Decoder::begin`] has it.
+pub fn draw_unseen<A: Arithmetic>(
+    decoder: &mut Decoder<'_, '_, A>,
+    camera: &Camera,
+) -> Result<FrameReport, DecodeError> {
+    let mut drawing = decoder.begin(camera)?;
+    while drawing.next_tile()?.is_some() {}
     Ok(drawing.report())
 }
 

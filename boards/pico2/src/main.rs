@@ -10,6 +10,7 @@ mod second_core;
 use core::convert::Infallible;
 use core::f32::consts::TAU;
 
+use cortex_m::peripheral::DWT;
 use defmt::Display2Format;
 use defmt_rtt as _;
 use embedded_hal::digital::OutputPin as _;
@@ -35,6 +36,8 @@ const SPI_HZ: u32 = 40_000_000;
 const CRYSTAL_HZ: u32 = 12_000_000;
 /// Frames of a turn around the scene.
 const N_FRAMES: u16 = 120;
+/// Frames at first whose cycles are counted.
+const N_COUNTED: u16 = 4;
 /// RAM of the chip, less 26 KiB for stacks and other statics; the linker refuses when it does not fit.
 const SCRATCH_LEN: usize = (520 - 26) * 1024;
 
@@ -52,6 +55,7 @@ static IMAGE_DEF: hal::block::ImageDef = hal::block::ImageDef::secure_exe();
 #[hal::entry]
 fn main() -> ! {
     let mut chip = defmt::unwrap!(hal::pac::Peripherals::take());
+    let mut core = defmt::unwrap!(cortex_m::Peripherals::take());
     let resets = &mut chip.RESETS;
     // The processor at 150 MHz.
     let mut watchdog = Watchdog::new(chip.WATCHDOG);
@@ -86,12 +90,22 @@ fn main() -> ! {
     let two = two.filter(|two| two.pruning_rate() == one.pruning_rate() && two.head_weights() == one.head_weights());
 
     pocketsplat_panel::blank(&mut display).unwrap_or_else(|_| defmt::panic!("the bus of the display failed"));
-    let views =
-        (0..N_FRAMES).map(|frame| (frame, camera.orbited(TAU * f32::from(frame) / f32::from(N_FRAMES)))).cycle();
+    let orbit = |n: u16| (0..n).map(move |frame| (frame, camera.orbited(TAU * f32::from(frame) / f32::from(n))));
+    let views = orbit(N_FRAMES).cycle();
+    core.DCB.enable_trace();
+    core.DWT.enable_cycle_counter();
     if let Some(plan) = two {
         defmt::info!("two cores: {}", plan);
         let mut second = defmt::unwrap!(SecondCore::start(&mut chip.PSM, &mut chip.PPB, &mut sio.fifo));
         let mut painters: [Decoder<'_, '_>; 2] = Decoder::bind_two(&bundle, plan, scratch).unwrap_or_else(stop);
+        for (_, view) in orbit(N_COUNTED) {
+            let start = DWT::cycle_count();
+            let reports = Decoder::render_by_two(&mut painters, &view, [&mut Nowhere, &mut Nowhere], |here, there| {
+                second.meanwhile(here, there);
+            });
+            let reports = reports.unwrap_or_else(stop);
+            defmt::info!("without display: {} cycles, {}", DWT::cycle_count().wrapping_sub(start), reports);
+        }
         let display = ByTurns::new(display);
         for (frame, view) in views {
             let start = timer.get_counter();
@@ -110,6 +124,11 @@ fn main() -> ! {
     } else {
         defmt::info!("one core: {}", one);
         let mut decoder = Decoder::bind(&bundle, one, scratch).unwrap_or_else(stop);
+        for (_, view) in orbit(N_COUNTED) {
+            let start = DWT::cycle_count();
+            let report = pocketsplat_panel::draw_unseen(&mut decoder, &view).unwrap_or_else(stop);
+            defmt::info!("without display: {} cycles, {}", DWT::cycle_count().wrapping_sub(start), report);
+        }
         for (frame, view) in views {
             let start = timer.get_counter();
             let report = pocketsplat_panel::draw(&mut decoder, &view, &mut display).unwrap_or_else(stop);
@@ -118,6 +137,17 @@ fn main() -> ! {
         }
     }
     defmt::panic!("views do not end")
+}
+
+/// Takes no tile, for the time of drawing alone.
+struct Nowhere;
+
+impl TileSink for Nowhere {
+    type Error = Infallible;
+
+    fn tile(&mut self, _: Tile<'_>) -> Result<(), Infallible> {
+        Ok(())
+    }
 }
 
 /// Sends tiles from whichever core has them.

@@ -6,7 +6,7 @@
 
 use core::f32::consts::TAU;
 
-use cortex_m as _;
+use cortex_m::peripheral::DWT;
 use defmt::Display2Format;
 use defmt_rtt as _;
 use embedded_hal_bus::spi::ExclusiveDevice;
@@ -30,6 +30,8 @@ const SPI_HZ: u32 = 5_625_000;
 const CRYSTAL_HZ: u32 = 8_000_000;
 /// Frames of a turn around the scene.
 const N_FRAMES: u16 = 120;
+/// Frames at first whose cycles are counted.
+const N_COUNTED: u16 = 4;
 /// RAM of the chip beside the core-coupled memory, less 2 KiB for other statics; the linker refuses when it does not fit.
 const SCRATCH_LEN: usize = (192 - 2) * 1024;
 
@@ -41,7 +43,7 @@ static SPI_BUFFER: ConstStaticCell<[u8; 512]> = ConstStaticCell::new([0; 512]);
 #[cortex_m_rt::entry]
 fn main() -> ! {
     let chip = defmt::unwrap!(Peripherals::take());
-    let core = defmt::unwrap!(CorePeripherals::take());
+    let mut core = defmt::unwrap!(CorePeripherals::take());
     // The processor at 180 MHz.
     let mut rcc = chip.RCC.freeze(Config::hse(CRYSTAL_HZ.Hz()).sysclk(180.MHz()));
     let mut delay = core.SYST.delay(&rcc.clocks);
@@ -73,6 +75,15 @@ fn main() -> ! {
         .unwrap_or_else(stop);
     defmt::info!("{}", plan);
     let mut decoder = Decoder::bind(&bundle, plan, SCRATCH.take()).unwrap_or_else(stop);
+
+    core.DCB.enable_trace();
+    core.DWT.enable_cycle_counter();
+    for frame in 0..N_COUNTED {
+        let view = camera.orbited(TAU * f32::from(frame) / f32::from(N_COUNTED));
+        let start = DWT::cycle_count();
+        let report = pocketsplat_panel::draw_unseen(&mut decoder, &view).unwrap_or_else(stop);
+        defmt::info!("without display: {} cycles, {}", DWT::cycle_count().wrapping_sub(start), report);
+    }
 
     pocketsplat_panel::blank(&mut display).unwrap_or_else(|_| defmt::panic!("the bus of the display failed"));
     loop {

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The checks of a change, by name; without a name all of them, in this order. Installs what it lacks.
 #
-#   tools/ci.sh              everything (half an hour at most on two cores)
+#   tools/ci.sh              everything (an hour at most on two cores, from a clean clone)
 #   tools/ci.sh fmt clippy   some
 #   tools/ci.sh quick        fmt, clippy, pages, and the unit tests of the crates that changed (four minutes after a build)
 #   tools/ci.sh --list       their names

@@ -1,7 +1,9 @@
 //! What decides how a run trains, as options of every command that trains; each may also stand in a configuration.
 
+mod backbone;
+mod modules;
+
 use anyhow::{Result, bail};
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 use pocketsplat_capture::dataset::Background;
 use pocketsplat_kernels::scene::{ModelShape, QuantisationSteps};
 use pocketsplat_trainer::device::{ModelChoice, bytes_of_heads, widest_within};
@@ -9,16 +11,15 @@ use pocketsplat_trainer::effects::{Effect, Request};
 use pocketsplat_trainer::encode::CoderChoice;
 use pocketsplat_trainer::explicit::CloudConfig;
 use pocketsplat_trainer::train::TrainConfig;
-use pocketsplat_trainer::train::config::Backbone;
-use pocketsplat_trainer::train::modules::pruning::Rank;
-use pocketsplat_trainer::train::modules::{Distribution, Modules, Pruning, Rdo};
 
 use crate::config::heading::{OUTPUT, QUALITY, RUN};
-use crate::config::named::{BACKBONES, CODERS, one_of};
+use crate::config::named::{CODERS, one_of};
 use crate::config::{CaptureOptions, EXPLICIT, ExplicitRunConfig, RunConfig};
-use serde::Deserialize as _;
-use serde::de::IntoDeserializer as _;
-use serde::de::value::StrDeserializer;
+
+use backbone::backbone_choice;
+pub(super) use backbone::{BackboneChoice, backbone_of_anchors};
+pub(super) use modules::tiers_of;
+use modules::{TrainingModule, attach};
 
 /// How good a scene becomes, and how large.
 #[derive(Clone, clap::Args)]
@@ -70,35 +71,6 @@ pub(crate) struct QualityOptions {
     validation_every: Option<u32>,
 }
 
-/// What `--backbone` names.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum BackboneChoice {
-    /// Anchors, which make a bundle.
-    Anchors(Backbone),
-    /// Explicit Gaussians, which make a file of Gaussians.
-    Explicit,
-}
-
-fn backbone_choice() -> impl TypedValueParser<Value = BackboneChoice> {
-    backbone_among(BACKBONES)
-}
-
-/// The same without explicit Gaussians, for commands that make bundles.
-pub(super) fn backbone_of_anchors() -> impl TypedValueParser<Value = BackboneChoice> {
-    backbone_among(&BACKBONES[..BACKBONES.len() - 1])
-}
-
-fn backbone_among(names: &'static [&'static str]) -> impl TypedValueParser<Value = BackboneChoice> {
-    let named = |name: String| -> Result<BackboneChoice, serde::de::value::Error> {
-        if name == EXPLICIT {
-            return Ok(BackboneChoice::Explicit);
-        }
-        let name: StrDeserializer<'_, serde::de::value::Error> = name.as_str().into_deserializer();
-        Backbone::deserialize(name).map(BackboneChoice::Anchors)
-    };
-    PossibleValuesParser::new(names).try_map(named)
-}
-
 /// How a run proceeds.
 #[derive(clap::Args)]
 pub(crate) struct RunOptions {
@@ -118,22 +90,6 @@ pub(crate) struct RunOptions {
     /// Keep the checkpoints after these iterations, for other runs to begin from with --from [default: none]
     #[arg(long, value_name = "STEPS", value_delimiter = ',', help_heading = RUN, hide_short_help = true)]
     fork_at: Option<Vec<u32>>,
-}
-
-/// A training module as `--modules` names it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum TrainingModule {
-    /// No module.
-    None,
-    /// Distribution regularisation: features near a normal distribution.
-    Distribution,
-    /// Pruning that deletes 30 % of the anchors half-way.
-    HardPruning,
-    /// Pruning that deletes nothing and trains one scene for every pruning rate up to 40 %.
-    TieredPruning,
-    /// Pruning of the offsets and anchors that are not worth their bits, in place of learned masks; needs a backbone that is trained
-    /// for size.
-    RdoPruning,
 }
 
 /// A help text with the value that stands where the option is not given.
@@ -290,26 +246,6 @@ fn keep(train: &mut TrainConfig, most: usize) {
     }
 }
 
-/// Tiers beside the other modules: after the last rate–distortion pruning, ranked by worth.
-pub(super) fn tiers_of(modules: &Modules) -> Pruning {
-    let tiered = Pruning::tiered();
-    modules.rdo.map_or(tiered, |rdo| Pruning { at: rdo.until, rank: Rank::Worth, ..tiered })
-}
-
-/// Attaches these training modules with their defaults in place of those that are attached; effects stay.
-fn attach(modules: &mut Modules, names: &[TrainingModule]) -> Result<()> {
-    let named = |module| names.contains(&module);
-    modules.distribution = named(TrainingModule::Distribution).then(Distribution::default);
-    modules.rdo = named(TrainingModule::RdoPruning).then(Rdo::default);
-    modules.pruning = match (named(TrainingModule::HardPruning), named(TrainingModule::TieredPruning)) {
-        (true, true) => bail!("--modules names hard-pruning and tiered-pruning, needs one of the two at most"),
-        (true, false) => Some(Pruning::default()),
-        (false, true) => Some(tiers_of(modules)),
-        (false, false) => None,
-    };
-    Ok(())
-}
-
 impl RunOptions {
     /// The same for explicit Gaussians.
     pub(crate) fn applied_to_explicit(&self, mut config: ExplicitRunConfig) -> Result<ExplicitRunConfig> {
@@ -362,26 +298,17 @@ fn with_key(config: &RunConfig, key: &str) -> Result<RunConfig> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use pocketsplat_trainer::train::config::Backbone;
+    use pocketsplat_trainer::train::modules::Rdo;
 
     #[test]
-    fn every_backbone_that_help_shows_is_parsed() {
-        for name in BACKBONES {
-            let parsed = backbone_choice().parse_ref(&clap::Command::new("test"), None, name.as_ref());
-            assert_eq!(parsed.expect(name) == BackboneChoice::Explicit, *name == EXPLICIT);
-        }
-    }
-
-    #[test]
-    fn what_stays_and_what_ranks_it_follows_pruning_by_worth() {
+    fn what_stays_follows_pruning_by_worth() {
         let mut train = TrainConfig::of(Backbone::Hac);
         keep(&mut train, 700);
         assert_eq!(train.densification.kept_anchors, Some(700));
-        assert_eq!(tiers_of(&train.modules), Pruning::tiered());
         train.densification.kept_anchors = None;
         train.modules.rdo = Some(Rdo::default());
         keep(&mut train, 700);
         assert_eq!((train.modules.rdo.unwrap().anchors, train.densification.kept_anchors), (Some(700), None));
-        let tiers = tiers_of(&train.modules);
-        assert_eq!((tiers.at, tiers.rank), (Rdo::default().until, Rank::Worth));
     }
 }

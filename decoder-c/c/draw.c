@@ -93,7 +93,7 @@ static int differs_by_two(const uint8_t *bundle, size_t bundle_len, psb_budget b
     return 1;
   clear_frame();
   if (psb_render_by_two(pair, camera, take_tile, width, width, do_both, NULL, reports, &message) != PSB_STATUS_OK) return 1;
-  if (reports[0].splats + reports[1].splats != n_splats) return 1;
+  if (!reports[0].splats || !reports[1].splats || reports[0].splats + reports[1].splats != n_splats) return 1;
   return crc32(frame, 3 * (size_t)camera->width_px * camera->height_px) != crc;
 }
 

@@ -31,11 +31,27 @@ void do_both(void *user, psb_task here, psb_task there) {
   CHECK(pthread_join(thread, NULL) == 0);
 }
 
-/* Leaves one of its tasks undone, or does the other twice. */
+/* Does each task twice, of which the second time does nothing. */
+static void do_twice(void *user, psb_task here, psb_task there) {
+  (void)user;
+  for (int i = 0; i < 2; i++) run(&there), run(&here);
+}
+
+/* Which task is left undone, and at which call. */
+struct undone {
+  int at_call, is_here;
+};
+
 static void do_one(void *user, psb_task here, psb_task there) {
-  const int first = *(const int *)user;
-  run(first ? &here : &there);
-  run(first ? &here : &there);
+  struct undone *undone = user;
+  const int is_whole = undone->at_call-- != 0;
+  if (is_whole || !undone->is_here) run(&here);
+  if (is_whole || undone->is_here) run(&there);
+}
+
+static int32_t count(void *user, uint16_t x, uint16_t y, uint16_t width, uint16_t height, const uint8_t *rgb) {
+  (void)x, (void)y, (void)width, (void)height, (void)rgb;
+  return ++*(int32_t *)user, 0;
 }
 
 static int32_t refuse(void *user, uint16_t x, uint16_t y, uint16_t width, uint16_t height, const uint8_t *rgb) {
@@ -111,11 +127,9 @@ static void misordered(psb_decoder *decoder, const psb_camera *camera) {
 static void misuse_by_two(const uint8_t *bundle, size_t len, psb_budget budget, const psb_camera *camera) {
   psb_plan plan;
   psb_message message;
-  psb_pair *pair = NULL;
-  psb_decoder *decoder = NULL;
-  int32_t n_tiles = 0;
-  int first = 0;
   void *place = aligned_alloc(PSB_DECODER_ALIGN, PSB_PAIR_BYTES);
+  psb_pair *pair = place;
+  psb_decoder *decoder = place;
   budget.ram_bytes = 1 << 20;
   budget.slabs = budget.two_painters = 1;
   CHECK(psb_make_plan(bundle, len, &budget, &plan, &message) == PSB_STATUS_MISUSE && strstr(message.text, "slabs needs to be 0"));
@@ -140,11 +154,21 @@ static void misuse_by_two(const uint8_t *bundle, size_t len, psb_budget budget, 
   CHECK(psb_render_by_two(pair, NULL, take, NULL, NULL, do_both, NULL, NULL, NULL) == PSB_STATUS_MISUSE);
   CHECK(psb_render_by_two(pair, camera, NULL, NULL, NULL, do_both, NULL, NULL, NULL) == PSB_STATUS_MISUSE);
   CHECK(psb_render_by_two(pair, camera, take, NULL, NULL, NULL, NULL, NULL, &message) == PSB_STATUS_MISUSE && strcmp(message.text, "join is NULL") == 0);
-  for (; first < 2; first++)
-    CHECK(psb_render_by_two(pair, camera, take, NULL, NULL, do_one, &first, NULL, &message) == PSB_STATUS_MISUSE && strstr(message.text, "join returned"));
-  int32_t other = 100;
-  CHECK(psb_render_by_two(pair, camera, refuse, &n_tiles, &other, do_both, NULL, NULL, &message) == PSB_STATUS_STOPPED && n_tiles == 2);
-  CHECK(psb_render_by_two(pair, camera, take, NULL, NULL, do_both, NULL, NULL, &message) == PSB_STATUS_OK);
+  /* Either task, while splats are gathered and while they are blended. */
+  for (int i = 0; i < 4; i++) {
+    struct undone undone = {i / 2, i % 2};
+    CHECK(psb_render_by_two(pair, camera, take, NULL, NULL, do_one, &undone, NULL, &message) == PSB_STATUS_MISUSE && strstr(message.text, "undone"));
+  }
+  /* A display of either core that refuses its second tile. */
+  for (int other = 0; other < 2; other++) {
+    int32_t refused = 0, taken = 100;
+    int32_t *here = other ? &taken : &refused, *there = other ? &refused : &taken;
+    CHECK(psb_render_by_two(pair, camera, refuse, here, there, do_both, NULL, NULL, &message) == PSB_STATUS_STOPPED);
+    CHECK(refused == 2 && taken > 100 && strstr(message.text, "returned 77"));
+  }
+  int32_t n_here = 0, n_there = 0;
+  CHECK(psb_render_by_two(pair, camera, count, &n_here, &n_there, do_twice, NULL, NULL, &message) == PSB_STATUS_OK);
+  CHECK(n_here + n_there == 12 && n_here > 0 && n_there > 0);
   free(scratch);
   free(place);
 }

@@ -99,7 +99,7 @@ typedef struct psb_budget {
   uint8_t quality;
   // 1 to draw strips with too many splats in slabs of depth, which takes longer; 0 to leave splats out.
   uint8_t slabs;
-  // 1 to draw on two cores, by psb_bind_two, in one strip and without slabs; 0 for one.
+  // 1 to draw on two cores, by psb_bind_two: in a single strip, without slabs. 0 to draw on one core.
   uint8_t two_painters;
 } psb_budget;
 
@@ -107,12 +107,12 @@ typedef struct psb_budget {
 typedef struct psb_plan {
   // Bytes of scratch memory that psb_bind or psb_bind_two takes; where nothing fits, those that would do.
   size_t scratch_bytes;
-  // Bytes of slower memory that it takes beside them, 0 where everything lies in the first; where nothing fits and there is
+  // Bytes of slower memory that the same call takes beside them, 0 where everything lies in the first; where nothing fits and there is
   // slower memory, those that would do.
   size_t slow_scratch_bytes;
   // Share of the anchors that is not drawn.
   float pruning_rate;
-  // Places for splats.
+  // Places for splats, on two cores for each.
   uint32_t max_splats;
   // Tiers that are drawn.
   uint8_t n_tiers;
@@ -197,8 +197,8 @@ typedef struct psb_task {
   void *state;
 } psb_task;
 
-// Does both tasks at the same time, here on the core that calls and there on the other, and returns when both are done. What either wrote has to
-// be seen by the core that goes on: with a barrier where the cores need one.
+// Does both tasks at the same time, here on the core that calls and there on the other, and returns when both are done. A task has to
+// see what was written before it, and the core that goes on what the task wrote: with barriers where the cores need them.
 typedef void (*psb_join)(void *user, struct psb_task here, struct psb_task there);
 
 #ifdef __cplusplus
@@ -211,7 +211,7 @@ const char *psb_status_name(uint32_t status);
 // A budget for frames of at most width_px by height_px within ram_bytes, everything else as good as memory allows.
 struct psb_budget psb_budget_for_frame(uint16_t width_px, uint16_t height_px, size_t ram_bytes);
 
-// Checks a bundle and says how many bytes the best plan within a budget takes; of two painters, both.
+// Checks a bundle and says how many bytes the best plan within a budget takes, on two cores both together.
 //
 // bundle: bundle_len bytes of a .psb. message: NULL, or where to say what was wrong.
 //
@@ -254,7 +254,7 @@ size_t psb_decoder_bytes(void);
 //
 // place: place_len bytes for the decoder, psb_decoder_bytes() or PSB_DECODER_BYTES, aligned to PSB_DECODER_ALIGN. scratch: scratch_len bytes of any
 // alignment, as many as psb_make_plan said or more. slow: likewise slow_len bytes of slower memory; NULL where slow_scratch_bytes of the plan is
-// 0. decoder: gets the decoder, NULL where the call fails. message: NULL, or where to say what was wrong.
+// 0. budget: with two_painters 0. decoder: gets the decoder, NULL where the call fails. message: NULL, or where to say what was wrong.
 //
 // # Safety
 // Pointers are NULL or point to what the call says. Bundle, place, scratch and slow lie apart, stay where they are, and nobody else writes
@@ -367,12 +367,14 @@ enum psb_status psb_bind_two(void *place,
 
 // Draws the scene as a camera sees it on two cores: the same pixels as psb_render.
 //
-// tile: is called on both cores, with here_user on this one and there_user on the other; each tile comes once. join: does two tasks at the same
-// time, see psb_join; a frame calls it twice. join_user: passed on to it. reports: NULL, or two, where to say what each core did. message: NULL, or
-// where to say what was wrong. After an error the next frame is drawn as if nothing had been.
+// tile: is called on both cores, with here_user on this one and there_user on the other; each tile comes once. Where it does not return 0, its core
+// draws no more; the other one finishes its part. join: does two tasks at the same time, see psb_join; a frame calls it twice at most. join_user: passed on to
+// it. reports: NULL, or two, where to say what each core did; scratch_used of either is that of both. message: NULL, or where to say what was wrong. After
+// an error the next frame is drawn as if nothing had been.
 //
 // # Safety
-// Pointers are NULL or point to what the call says; the pair is bound, and neither function uses it.
+// Pointers are NULL or point to what the call says; the pair is bound, and neither function uses it. join runs each task on one core at a time,
+// returns only when both have ended, and runs none after that.
 enum psb_status psb_render_by_two(struct psb_pair *pair,
                                   const struct psb_camera *camera,
                                   psb_tile tile,

@@ -40,8 +40,8 @@ pub struct Task {
     pub state: *mut c_void,
 }
 
-/// Does both tasks at the same time, here on the core that calls and there on the other, and returns when both are done. What either wrote has to
-/// be seen by the core that goes on: with a barrier where the cores need one.
+/// Does both tasks at the same time, here on the core that calls and there on the other, and returns when both are done. A task has to
+/// see what was written before it, and the core that goes on what the task wrote: with barriers where the cores need them.
 pub type JoinFn = Option<unsafe extern "C" fn(user: *mut c_void, here: Task, there: Task)>;
 
 /// A task that is done once, however often it is called.
@@ -107,12 +107,14 @@ pub unsafe extern "C" fn psb_bind_two(
 
 /// Draws the scene as a camera sees it on two cores: the same pixels as psb_render.
 ///
-/// tile: is called on both cores, with here_user on this one and there_user on the other; each tile comes once. join: does two tasks at the same
-/// time, see psb_join; a frame calls it twice. join_user: passed on to it. reports: NULL, or two, where to say what each core did. message: NULL, or
-/// where to say what was wrong. After an error the next frame is drawn as if nothing had been.
+/// tile: is called on both cores, with here_user on this one and there_user on the other; each tile comes once. Where it does not return 0, its core
+/// draws no more; the other one finishes its part. join: does two tasks at the same time, see psb_join; a frame calls it twice at most. join_user: passed on to
+/// it. reports: NULL, or two, where to say what each core did; scratch_used of either is that of both. message: NULL, or where to say what was wrong. After
+/// an error the next frame is drawn as if nothing had been.
 ///
 /// # Safety
-/// Pointers are NULL or point to what the call says; the pair is bound, and neither function uses it.
+/// Pointers are NULL or point to what the call says; the pair is bound, and neither function uses it. join runs each task on one core at a time,
+/// returns only when both have ended, and runs none after that.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn psb_render_by_two(
     pair: *mut Pair,
@@ -142,7 +144,7 @@ pub unsafe extern "C" fn psb_render_by_two(
                 is_undone |= here.is_some() || there.is_some();
             });
         if is_undone {
-            return Err(Failure::Misuse("join returned before both of its tasks were run"));
+            return Err(Failure::Misuse("join left a task undone"));
         }
         let found = found?;
         if !reports.is_null() {

@@ -221,7 +221,7 @@ pub(crate) unsafe fn bind<T: Placed>(
 ///
 /// place: place_len bytes for the decoder, psb_decoder_bytes() or PSB_DECODER_BYTES, aligned to PSB_DECODER_ALIGN. scratch: scratch_len bytes of any
 /// alignment, as many as psb_make_plan said or more. slow: likewise slow_len bytes of slower memory; NULL where slow_scratch_bytes of the plan is
-/// 0. decoder: gets the decoder, NULL where the call fails. message: NULL, or where to say what was wrong.
+/// 0. budget: with two_painters 0. decoder: gets the decoder, NULL where the call fails. message: NULL, or where to say what was wrong.
 ///
 /// # Safety
 /// Pointers are NULL or point to what the call says. Bundle, place, scratch and slow lie apart, stay where they are, and nobody else writes

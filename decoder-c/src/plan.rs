@@ -40,7 +40,7 @@ pub struct Budget {
     pub quality: u8,
     /// 1 to draw strips with too many splats in slabs of depth, which takes longer; 0 to leave splats out.
     pub slabs: u8,
-    /// 1 to draw on two cores, by psb_bind_two, in one strip and without slabs; 0 for one.
+    /// 1 to draw on two cores, by psb_bind_two: in a single strip, without slabs. 0 to draw on one core.
     pub two_painters: u8,
 }
 
@@ -50,12 +50,12 @@ pub struct Budget {
 pub struct Plan {
     /// Bytes of scratch memory that psb_bind or psb_bind_two takes; where nothing fits, those that would do.
     pub scratch_bytes: usize,
-    /// Bytes of slower memory that it takes beside them, 0 where everything lies in the first; where nothing fits and there is
+    /// Bytes of slower memory that the same call takes beside them, 0 where everything lies in the first; where nothing fits and there is
     /// slower memory, those that would do.
     pub slow_scratch_bytes: usize,
     /// Share of the anchors that is not drawn.
     pub pruning_rate: f32,
-    /// Places for splats.
+    /// Places for splats, on two cores for each.
     pub max_splats: u32,
     /// Tiers that are drawn.
     pub n_tiers: u8,
@@ -147,7 +147,7 @@ pub extern "C" fn psb_budget_for_frame(width_px: u16, height_px: u16, ram_bytes:
     }
 }
 
-/// Checks a bundle and says how many bytes the best plan within a budget takes; of two painters, both.
+/// Checks a bundle and says how many bytes the best plan within a budget takes, on two cores both together.
 ///
 /// bundle: bundle_len bytes of a .psb. message: NULL, or where to say what was wrong.
 ///

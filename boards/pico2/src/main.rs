@@ -94,18 +94,17 @@ fn main() -> ! {
     let views = orbit(N_FRAMES).cycle();
     core.DCB.enable_trace();
     core.DWT.enable_cycle_counter();
+    // By one core, which does not sleep: what predictions are of.
+    let mut alone = Decoder::bind(&bundle, one, &mut *scratch).unwrap_or_else(stop);
+    for (_, view) in orbit(N_COUNTED) {
+        let start = DWT::cycle_count();
+        let report = pocketsplat_panel::draw_unseen(&mut alone, &view).unwrap_or_else(stop);
+        defmt::info!("one core, without display: {} cycles, {}", DWT::cycle_count().wrapping_sub(start), report);
+    }
     if let Some(plan) = two {
         defmt::info!("two cores: {}", plan);
         let mut second = defmt::unwrap!(SecondCore::start(&mut chip.PSM, &mut chip.PPB, &mut sio.fifo));
         let mut painters: [Decoder<'_, '_>; 2] = Decoder::bind_two(&bundle, plan, scratch).unwrap_or_else(stop);
-        for (_, view) in orbit(N_COUNTED) {
-            let start = DWT::cycle_count();
-            let reports = Decoder::render_by_two(&mut painters, &view, [&mut Nowhere, &mut Nowhere], |here, there| {
-                second.meanwhile(here, there);
-            });
-            let reports = reports.unwrap_or_else(stop);
-            defmt::info!("without display: {} cycles, {}", DWT::cycle_count().wrapping_sub(start), reports);
-        }
         let display = ByTurns::new(display);
         for (frame, view) in views {
             let start = timer.get_counter();
@@ -124,11 +123,6 @@ fn main() -> ! {
     } else {
         defmt::info!("one core: {}", one);
         let mut decoder = Decoder::bind(&bundle, one, scratch).unwrap_or_else(stop);
-        for (_, view) in orbit(N_COUNTED) {
-            let start = DWT::cycle_count();
-            let report = pocketsplat_panel::draw_unseen(&mut decoder, &view).unwrap_or_else(stop);
-            defmt::info!("without display: {} cycles, {}", DWT::cycle_count().wrapping_sub(start), report);
-        }
         for (frame, view) in views {
             let start = timer.get_counter();
             let report = pocketsplat_panel::draw(&mut decoder, &view, &mut display).unwrap_or_else(stop);
@@ -137,17 +131,6 @@ fn main() -> ! {
         }
     }
     defmt::panic!("views do not end")
-}
-
-/// Takes no tile, for the time of drawing alone.
-struct Nowhere;
-
-impl TileSink for Nowhere {
-    type Error = Infallible;
-
-    fn tile(&mut self, _: Tile<'_>) -> Result<(), Infallible> {
-        Ok(())
-    }
 }
 
 /// Sends tiles from whichever core has them.

@@ -82,7 +82,7 @@ fn main() -> ! {
         let view = camera.orbited(TAU * f32::from(frame) / f32::from(N_COUNTED));
         let start = DWT::cycle_count();
         let report = pocketsplat_panel::draw_unseen(&mut decoder, &view).unwrap_or_else(stop);
-        defmt::info!("without display: {} cycles, {}", DWT::cycle_count().wrapping_sub(start), report);
+        defmt::info!("one core, without display: {} cycles, {}", DWT::cycle_count().wrapping_sub(start), report);
     }
 
     pocketsplat_panel::blank(&mut display).unwrap_or_else(|_| defmt::panic!("the bus of the display failed"));

@@ -1,4 +1,4 @@
-//! What `--backbone` names.
+//! Backbones as options.
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::Deserialize as _;

@@ -24,7 +24,7 @@ fn timeless(trainer: &Trainer<'_>) -> Vec<u8> {
     saved(&trainer)
 }
 
-/// A run of each backbone, stopped after ten random iterations and each time taken up again by a new trainer.
+/// Runs of each backbone, each stopped at ten random iterations and every time taken up again by a new trainer.
 #[test]
 fn a_run_taken_up_again_ends_in_the_same_bits() {
     taken_up_again(tiny_config(90), None);

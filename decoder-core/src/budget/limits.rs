@@ -241,3 +241,42 @@ impl Budget {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_option_is_kept() {
+        let asked = Budget::for_frame(64, 48)
+            .in_bytes(1)
+            .with_slow_bytes(2)
+            .with_tiers(3)
+            .with_max_splats(MaxSplats::AtMost(4))
+            .with_residency(Residency::Streamed)
+            .with_strips(Strips::Exactly(5))
+            .with_overflow(Overflow::Slabs)
+            .with_quality(Quality::DRAFT)
+            .skipping_damage()
+            .with_most_work(6);
+        let expected = Budget {
+            ram_bytes: 1,
+            slow_bytes: 2,
+            width_px: 64,
+            height_px: 48,
+            tiers: 3,
+            max_splats: MaxSplats::AtMost(4),
+            residency: Residency::Streamed,
+            strips: Strips::Exactly(5),
+            overflow: Overflow::Slabs,
+            quality: Quality::DRAFT,
+            skips_damage: true,
+            most_work: 6,
+            two_painters: false,
+        };
+        assert_eq!(asked, expected);
+        let by_two =
+            Budget { strips: Strips::Exactly(1), overflow: Overflow::LeaveOut, two_painters: true, ..expected };
+        assert_eq!(asked.with_two_painters(), by_two);
+    }
+}

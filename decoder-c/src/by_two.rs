@@ -3,7 +3,7 @@
 use core::ffi::c_void;
 use core::mem::{align_of, size_of};
 
-use pocketsplat_core::{Bundle, DecodeError, Plan, Tile, TileSink};
+use pocketsplat_core::{Bundle, DecodeError, Plan};
 
 use crate::camera::Camera;
 use crate::decoder::{DECODER_ALIGN, Placed, Report, TileFn, Tiles, bind};
@@ -57,20 +57,6 @@ fn task_of(once: &mut Once<'_>) -> Task {
         }
     }
     Task { run: Some(run), state: core::ptr::from_mut(once).cast() }
-}
-
-/// Tiles of one core.
-struct TilesOfCore(Tiles);
-
-// SAFETY: the caller's function is called on the other core with the pointer that is meant for it, as its description says.
-unsafe impl Send for TilesOfCore {}
-
-impl TileSink for TilesOfCore {
-    type Error = i32;
-
-    fn tile(&mut self, tile: Tile<'_>) -> Result<(), i32> {
-        self.0.tile(tile)
-    }
 }
 
 /// Bytes of a psb_pair on this target, PSB_PAIR_BYTES at most; its alignment is PSB_DECODER_ALIGN at most.
@@ -134,7 +120,7 @@ pub unsafe extern "C" fn psb_render_by_two(
         let camera = camera.ok_or(Failure::Misuse("camera is NULL"))?.to_core()?;
         let function = tile.ok_or(Failure::Misuse("tile is NULL"))?;
         let join = join.ok_or(Failure::Misuse("join is NULL"))?;
-        let [mut here, mut there] = [here_user, there_user].map(|user| TilesOfCore(Tiles { function, user }));
+        let [mut here, mut there] = [here_user, there_user].map(|user| Tiles { function, user });
         let mut is_undone = false;
         let found =
             pocketsplat_core::Decoder::render_by_two(painters, &camera, [&mut here, &mut there], |here, there| {

@@ -121,6 +121,9 @@ pub(crate) struct Tiles {
     pub(crate) user: *mut c_void,
 }
 
+// SAFETY: where psb_render_by_two calls the function on the other core, `user` is the pointer that the caller gave for that core.
+unsafe impl Send for Tiles {}
+
 impl TileSink for Tiles {
     type Error = i32;
 

@@ -1,11 +1,13 @@
 //! The C interface of `pocketsplat-core`: `include/pocketsplat.h` and a static library.
 //!
 //! The order of calls is that of the Rust crate: [`psb_make_plan`] says how many bytes a scene takes, [`psb_bind`] takes them, [`psb_render`]
-//! draws frames, or [`psb_begin`] and [`psb_next_tile`] piece by piece, or [`psb_bind_two`] and [`psb_render_by_two`] on two cores. Nothing is allocated, no panic crosses, and a pointer that is NULL
+//! draws frames, or [`psb_begin`] and [`psb_next_tile`] piece by piece; [`psb_bind_two`] and [`psb_render_by_two`] do on two cores what
+//! [`psb_bind`] and [`psb_render`] do on one. Nothing is allocated, no panic crosses, and a pointer that is NULL
 //! where it must not be is an error.
 //!
 //! What the caller promises, since no code can check it: pointers that are not NULL point to as many bytes as the call says; bundle and
-//! scratch memory stay where they are, unchanged and apart from each other, as long as the decoder is used; one thread at a time uses it, but for the tasks of [`psb_render_by_two`].
+//! scratch memory stay where they are, unchanged and apart from each other, as long as the decoder is used; one thread at a
+//! time uses it, but for the tasks of [`psb_render_by_two`].
 #![cfg_attr(not(test), no_std)]
 #![deny(unsafe_op_in_unsafe_fn)]
 

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use toml::Table;
 
 use super::named::EXPLICIT;
-use super::{CaptureOptions, Preset, keys_of, merge, refuse_unknown};
+use super::{CaptureOptions, Preset, keys_of, merge, refuse_unknown, table_of};
 
 /// Random points that training starts from on captures of Blender, as published.
 const PUBLISHED_POINTS: usize = 100_000;
@@ -54,7 +54,7 @@ impl ExplicitRunConfig {
 
     /// Reads what [`Self::to_toml`] wrote.
     pub(crate) fn parse(text: &str) -> Result<Self> {
-        let config: Self = toml::from_str(text)?;
+        let config: Self = super::parse(text)?;
         if config.backbone != EXPLICIT {
             bail!("`backbone` is {}, needs {EXPLICIT}", config.backbone);
         }
@@ -69,10 +69,10 @@ impl ExplicitRunConfig {
 
     /// The same with some keys set, each given as `table.key=value`.
     pub(crate) fn with_keys(&self, keys: &[String]) -> Result<Self> {
-        let (mut all, given) = (Table::try_from(self)?, keys_of(keys)?);
+        let (mut all, given) = (table_of(self)?, keys_of(keys)?);
         merge(&mut all, &given);
         let config: Self = all.try_into()?;
-        refuse_unknown(&given, &Table::try_from(&config)?, "")?;
+        refuse_unknown(&given, &table_of(&config)?, "")?;
         Ok(config)
     }
 
@@ -82,7 +82,7 @@ impl ExplicitRunConfig {
     pub(crate) fn difference(&self, other: &Self, places: [&str; 2]) -> Result<Option<String>> {
         let deciding = |config: &Self| {
             let Self { capture, gaussians, .. } = config.clone();
-            Table::try_from(Self::new(PathBuf::new(), PathBuf::new(), capture, gaussians))
+            table_of(&Self::new(PathBuf::new(), PathBuf::new(), capture, gaussians))
         };
         let differences = super::table_differences(&deciding(self)?, &deciding(other)?);
         Ok(differences.first().map(|difference| difference.at(places)))

@@ -17,6 +17,7 @@ use pocketsplat_capture::dataset::Background;
 use pocketsplat_trainer::encode::Encoding;
 use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::config::Backbone;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
@@ -67,6 +68,18 @@ pub(crate) fn absolute(path: &Path) -> Result<PathBuf> {
     std::path::absolute(path).with_context(|| format!("`{}` is no path", path.display()))
 }
 
+/// A configuration as tables of TOML.
+///
+/// Through its text, and read through tables: a second way to write or to read would be compiled for each type that a configuration has.
+fn table_of(config: &impl Serialize) -> Result<Table> {
+    Ok(toml::to_string(config)?.parse()?)
+}
+
+/// Reads what [`toml::to_string`] wrote; through tables, for the reason of [`table_of`].
+pub(crate) fn parse<T: DeserializeOwned>(text: &str) -> Result<T> {
+    Ok(text.parse::<Table>()?.try_into()?)
+}
+
 /// Keys that every written configuration has.
 const ALWAYS_WRITTEN: [&str; 7] = ["dataset", "output", "keep_checkpoints", "capture", "train", "encoding", "effects"];
 
@@ -90,14 +103,14 @@ impl RunConfig {
         let mut given: Table = text.parse()?;
         let unset: Vec<String> = given.remove("unset").map_or(Ok(Vec::new()), Value::try_into)?;
         let base = Self::base_of(&given)?;
-        let mut all = Table::try_from(&base)?;
+        let mut all = table_of(&base)?;
         for key in &unset {
             remove(&mut all, key).with_context(|| format!("`unset` names `{key}`, which the preset does not have"))?;
         }
         merge(&mut all, &given);
         let config: Self = all.try_into()?;
         // What is not written again was not understood.
-        refuse_unknown(&given, &Table::try_from(&config)?, "")?;
+        refuse_unknown(&given, &table_of(&config)?, "")?;
         Ok(Self { scales_lambda: base.scales_lambda && !says_lambda(&given), ..config })
     }
 
@@ -137,23 +150,23 @@ impl RunConfig {
 
     /// The same with some keys set, each given as `table.key=value`; what is no TOML value is taken as text.
     pub(crate) fn with_keys(&self, keys: &[String]) -> Result<Self> {
-        let mut all = Table::try_from(self)?;
+        let mut all = table_of(self)?;
         let given = keys_of(keys)?;
         merge(&mut all, &given);
         if given.contains_key("preset") {
             bail!("--set preset changes no other key; give --preset, or the key in a configuration");
         }
         let config = Self { scales_lambda: self.scales_lambda && !says_lambda(&given), ..all.try_into()? };
-        refuse_unknown(&given, &Table::try_from(&config)?, "")?;
+        refuse_unknown(&given, &table_of(&config)?, "")?;
         Ok(config)
     }
 
     /// As TOML that [`Self::parse`] reads back; `unset` names the keys of the preset that the run does not have.
     pub(crate) fn to_toml(&self) -> Result<String> {
-        let own = Table::try_from(self)?;
-        let mut unset = Vec::new();
-        collect_missing(&Table::try_from(Self::base_of(&own)?)?, &own, "", &mut unset);
         let keys = toml::to_string(self)?;
+        let own: Table = keys.parse()?;
+        let mut unset = Vec::new();
+        collect_missing(&table_of(&Self::base_of(&own)?)?, &own, "", &mut unset);
         Ok(if unset.is_empty() { keys } else { format!("unset = {}\n{keys}", Value::from(unset)) })
     }
 
@@ -236,7 +249,7 @@ fn differences(
     other: &RunConfig,
     deciding: impl Fn(RunConfig) -> RunConfig,
 ) -> Result<Vec<Difference>> {
-    let table = |config: &RunConfig| Table::try_from(deciding(config.clone()));
+    let table = |config: &RunConfig| table_of(&deciding(config.clone()));
     Ok(table_differences(&table(one)?, &table(other)?))
 }
 

@@ -66,7 +66,7 @@ impl Protocol {
 
     /// Reads the section; what other versions may have added is passed over.
     pub(crate) fn parse(text: &str) -> Result<Self> {
-        Ok(toml::from_str(text)?)
+        super::parse(text)
     }
 
     /// Where two differ besides the options: the capture, and the version of the program.

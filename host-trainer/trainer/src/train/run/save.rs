@@ -75,7 +75,9 @@ impl<'a, M: Method> Run<'a, M> {
         compare: Comparison,
     ) -> Result<Restored<'a, M>, RestoreError> {
         let (config, rest): (String, _) = part(content(bytes, M::MAGIC)?)?;
-        let config: M::Config = toml::from_str(&config)
+        let config: M::Config = config
+            .parse()
+            .and_then(toml::Table::try_into)
             .map_err(|e| CheckpointFault::Form { what: "configuration", why: e.message().to_owned() })?;
         let ((written_by, begun_with), rest): ((Kernels, CaptureSignature), _) = part(rest)?;
         let mut run = Self::without_scene(capture, config)?;

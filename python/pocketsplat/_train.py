@@ -100,7 +100,8 @@ class Training:
         """Ends the run with a checkpoint, and waits for that; one that has not begun to train is let begin."""
         while self._process.poll() is None and not self._rows():
             time.sleep(_POLL_S)
-        self._process.send_signal(signal.SIGINT)
+        # Not SIGINT, which all ignore that a shell started in the background, such as the server of a notebook.
+        self._process.send_signal(signal.SIGTERM)
         self._process.wait()
 
     def _rows(self) -> list[Progress]:

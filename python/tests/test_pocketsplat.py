@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -199,6 +200,9 @@ class TrainingRuns(unittest.TestCase):
 
     def test_a_run_that_is_stopped_goes_on(self) -> None:
         output = Path(self.folder.name, "d.psb")
+        # As under a server that a shell started in the background.
+        before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+        self.addCleanup(signal.signal, signal.SIGINT, before)
         training = pocketsplat.train(self.capture, output, iterations=3000)
         next(iter(training))
         training.stop()

@@ -70,12 +70,12 @@ pub(crate) fn absolute(path: &Path) -> Result<PathBuf> {
 
 /// A configuration as tables of TOML.
 ///
-/// Through its text, and read through tables: a second way to write or to read would be compiled for each type that a configuration has.
+/// Through its text, since another way of writing would be compiled once more for each type that a configuration has.
 fn table_of(config: &impl Serialize) -> Result<Table> {
     Ok(toml::to_string(config)?.parse()?)
 }
 
-/// Reads what [`toml::to_string`] wrote; through tables, for the reason of [`table_of`].
+/// Reads what [`toml::to_string`] wrote. Through tables, as [`RunConfig::parse`] has to: another way of reading would be compiled too.
 pub(crate) fn parse<T: DeserializeOwned>(text: &str) -> Result<T> {
     Ok(text.parse::<Table>()?.try_into()?)
 }

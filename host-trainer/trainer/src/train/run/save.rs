@@ -75,6 +75,7 @@ impl<'a, M: Method> Run<'a, M> {
         compare: Comparison,
     ) -> Result<Restored<'a, M>, RestoreError> {
         let (config, rest): (String, _) = part(content(bytes, M::MAGIC)?)?;
+        // Through tables, as the command reads configurations: another way would be compiled for each of its types.
         let config: M::Config = config
             .parse()
             .and_then(toml::Table::try_into)

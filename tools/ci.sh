@@ -543,17 +543,22 @@ job_c() {
 
 # The main job in small: the same path as `cargo run --release -- demo`, a few hundred steps on small images.
 job_demo() {
-  cargo run --release --locked -- demo --output "$target/demo" --size 64 --iterations 400
+  program pocketsplat demo --output "$target/demo" --size 64 --iterations 400
 }
 
-# The wheel, as a user of Python gets it: small, with the command, and with types.
+# The wheel, as a user of Python gets it: small, with the command, and with types; made of the tests' build.
 job_python() {
+  program pocketsplat --version
+  wheel --features as-in-tests
+}
+
+wheel() { # OPTIONS_OF_MATURIN…
   local environment=$target/python wheel
   need_python
   [ -x "$environment/bin/maturin" ] || python3 -m venv "$environment"
   "$environment/bin/pip" install -q --disable-pip-version-check "${python_tools[@]}"
   rm -rf "$target/wheels"
-  (cd python && "$environment/bin/maturin" build --release --locked --target-dir "$target" --out "$target/wheels")
+  (cd python && "$environment/bin/maturin" build --locked --target-dir "$target" --out "$target/wheels" "$@")
   wheel=$(echo "$target"/wheels/*.whl)
   [ "$(stat -c %s "$wheel")" -le 15000000 ] || fail "the wheel has $(stat -c %s "$wheel") bytes, 15,000,000 are allowed"
   "$environment/bin/pip" install -q --disable-pip-version-check --force-reinstall --no-deps "$wheel"
@@ -567,8 +572,8 @@ job_python() {
 job_release() {
   local version host name files=$target/release-files
   job_npm
-  job_python
   cargo build --release --locked
+  wheel --release
   version=$(sed -n 's/^version = "\(.*\)"$/\1/p' Cargo.toml)
   host=$(rustc --print host-tuple)
   # As `cargo binstall` looks for it.
@@ -591,8 +596,8 @@ job_release() {
 job_many-runs() {
   need_command pkill procps
   need_python
-  cargo build -q --release --locked
-  tests/many-runs/test.sh "$target/release/pocketsplat" "$target/many-runs"
+  program pocketsplat --version
+  tests/many-runs/test.sh "$target/debug/pocketsplat" "$target/many-runs"
 }
 
 # --- Running them ----------------------------------------------------------------------------------------------------

@@ -21,6 +21,7 @@ mod views;
 pub use finding::Finding;
 pub use pixels::MaskedView;
 pub(super) use pixels::doubts as doubts_of_pixels;
+pub use views::MAX_FOCAL_RATIO;
 
 /// What was found out about a capture; displays as lines to print, serialises for programs.
 #[derive(Clone, Debug, PartialEq, Serialize)]

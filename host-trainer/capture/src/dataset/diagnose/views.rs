@@ -13,8 +13,9 @@ use crate::dataset::{LoadOptions, Severity, Split};
 /// With fewer views than this, most places are seen from too few sides to be more than guessed.
 const FEW_TRAIN_VIEWS: usize = 20;
 
-/// Focal lengths differ by more than this factor only where pixels are no squares.
-const MAX_FOCAL_RATIO: f64 = 1.25;
+/// Pixels of photographs are square: focal lengths along x and y that differ by more than this factor are of an image that was stretched, or
+/// of a lens that was fitted badly, together with poses that are wrong too.
+pub const MAX_FOCAL_RATIO: f64 = 1.05;
 
 /// What a report on loading names by itself.
 pub(super) fn not_used(listing: &Listing, findings: &mut Vec<Finding>) {
@@ -122,7 +123,8 @@ fn lenses(listing: &Listing, findings: &mut Vec<Finding>) {
             "images whose focal lengths along x and y differ by more than {:.0} %",
             100.0 * (MAX_FOCAL_RATIO - 1.0)
         ),
-        "check fl_x and fl_y: pixels of photographs are square, so they are nearly the same",
+        "check fl_x and fl_y: pixels of photographs are square, so they are nearly the same; if they were found together with the poses, \
+         these are wrong too: look for them anew",
     ));
     let outside: Vec<_> = listing
         .sound()

@@ -85,9 +85,9 @@ pub(super) fn cases() -> Vec<Case> {
             Nerfstudio,
             Doubt,
             "focal-lengths",
-            &["images whose focal lengths along x and y differ by more than 25 %: 1 (images/p_03.png)"],
+            &["images whose focal lengths along x and y differ by more than 5 %: 1 (images/p_03.png)"],
             |f| {
-                f.photos[3].extra = "\"fl_y\": 60, ".to_owned();
+                f.photos[3].extra = "\"fl_y\": 22, ".to_owned();
                 f.write_files();
             },
         ),

@@ -25,15 +25,11 @@ impl Search<'_> {
             }
             let Some(mut best) = self.mapped(&first, true)? else { return Ok(None) };
             let n = self.place.state.photographs.len();
-            let n_in = |models: &[Model]| models.first().map_or(0, |model| model.names.len());
-            if (n_in(&best) as f64) < USEFUL_SHARE * n as f64 {
-                // Four numbers of distortion are too many for the few points of a first pair: they take up what the poses should.
-                say!(
-                    "{} of {n} photographs have poses; once more, with the distortion of the lens left for the end",
-                    n_in(&best)
-                );
+            // Four numbers of distortion are too many for the few points of a first pair: they take up what the poses should.
+            if let Some(doubt) = doubt_about(&best, n) {
+                say!("{doubt}; once more, with the distortion of the lens left for the end");
                 let Some(others) = self.mapped(&second, false)? else { return Ok(None) };
-                if n_in(&others) > n_in(&best) {
+                if are_better(&others, &best) {
                     best = others;
                     if !self.adjusted(&best[0])? {
                         return Ok(None);
@@ -90,5 +86,61 @@ impl Search<'_> {
                 Ok(true)
             }
         }
+    }
+}
+
+/// Why the largest of some models of `n` photographs is probably wrong.
+fn doubt_about(models: &[Model], n: usize) -> Option<String> {
+    let largest = models.first();
+    let n_posed = n_in(models);
+    if (n_posed as f64) < USEFUL_SHARE * n as f64 {
+        return Some(format!("{n_posed} of {n} photographs have poses"));
+    }
+    largest.filter(|model| !model.has_square_pixels()).map(|model| {
+        let percent = 100.0 * (model.focal_ratio - 1.0);
+        format!("the focal lengths of the lens differ by {percent:.0} %, and those of a camera do not")
+    })
+}
+
+/// Whether to take some models in place of others: one of a lens that there can be, also where it has somewhat fewer photographs; else the
+/// larger one.
+fn are_better(models: &[Model], than: &[Model]) -> bool {
+    let is_sound = |models: &[Model]| models.first().is_some_and(Model::has_square_pixels);
+    let (n, n_of_others) = (n_in(models), n_in(than));
+    match (is_sound(models), is_sound(than)) {
+        (true, false) => n as f64 >= USEFUL_SHARE * n_of_others as f64,
+        (false, true) => false,
+        _ => n > n_of_others,
+    }
+}
+
+/// Photographs in the largest.
+fn n_in(models: &[Model]) -> usize {
+    models.first().map_or(0, |model| model.names.len())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn models(n: usize, focal_ratio: f64) -> Vec<Model> {
+        let names = (0..n).map(|i| format!("{i:02}.jpg")).collect();
+        vec![Model { folder: "0".into(), names, n_points: 900, error_px: Some(0.7), focal_ratio }]
+    }
+
+    #[test]
+    fn few_photographs_and_lenses_that_nobody_makes_are_doubted() {
+        assert_eq!(doubt_about(&models(30, 1.01), 40), None);
+        assert_eq!(doubt_about(&models(20, 1.01), 40).unwrap(), "20 of 40 photographs have poses");
+        assert_eq!(doubt_about(&[], 40).unwrap(), "0 of 40 photographs have poses");
+        let said = doubt_about(&models(31, 1.147), 37).unwrap();
+        assert!(said.starts_with("the focal lengths of the lens differ by 15 %"), "{said}");
+    }
+
+    #[test]
+    fn a_lens_that_there_can_be_is_worth_some_photographs() {
+        assert!(are_better(&models(21, 1.0), &models(20, 1.0)) && !are_better(&models(20, 1.0), &models(20, 1.0)));
+        assert!(are_better(&models(20, 1.0), &models(31, 1.15)) && !are_better(&models(10, 1.0), &models(31, 1.15)));
+        assert!(!are_better(&models(40, 1.15), &models(10, 1.0)) && !are_better(&[], &models(10, 1.15)));
     }
 }

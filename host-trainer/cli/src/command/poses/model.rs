@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
+use pocketsplat_capture::dataset::MAX_FOCAL_RATIO;
 
 /// A model of some of the photographs.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,6 +15,8 @@ pub(super) struct Model {
     pub(super) n_points: usize,
     /// Mean over its points, pixels; none without points.
     pub(super) error_px: Option<f64>,
+    /// The longer focal length of a camera over the shorter, where it is largest.
+    pub(super) focal_ratio: f64,
 }
 
 impl Model {
@@ -27,7 +30,13 @@ impl Model {
         names.sort_unstable();
         let errors = errors_in(&bytes("points3D.bin")?).with_context(cut)?;
         let error_px = (!errors.is_empty()).then(|| errors.iter().sum::<f64>() / errors.len() as f64);
-        Ok(Self { folder: folder.to_owned(), names, n_points: errors.len(), error_px })
+        let focal_ratio = focal_ratio_in(&bytes("cameras.bin")?).with_context(cut)?;
+        Ok(Self { folder: folder.to_owned(), names, n_points: errors.len(), error_px, focal_ratio })
+    }
+
+    /// Whether its lenses are such as are made.
+    pub(super) fn has_square_pixels(&self) -> bool {
+        self.focal_ratio <= MAX_FOCAL_RATIO
     }
 }
 
@@ -108,13 +117,47 @@ fn errors_in(bytes: &[u8]) -> Option<Vec<f64>> {
     (0..n).map(point).collect()
 }
 
+/// The largest quotient of two focal lengths in `cameras.bin`: a count; of each camera a number and its model (4 bytes each), width and
+/// height (8 bytes each), and its parameters: four of SIMPLE_RADIAL, whose focal length is one, and eight of OPENCV, two focal lengths first.
+fn focal_ratio_in(bytes: &[u8]) -> Option<f64> {
+    const SIMPLE_RADIAL: u32 = 2;
+    const OPENCV: u32 = 4;
+    let mut bytes = Bytes(bytes);
+    let n = bytes.count()?;
+    let camera = |_| {
+        bytes.take(4)?;
+        let model = u32::from_le_bytes(bytes.take(4)?.try_into().ok()?);
+        bytes.take(2 * 8)?;
+        let first = bytes.float()?;
+        match model {
+            SIMPLE_RADIAL => bytes.take(3 * 8).map(|_| 1.0),
+            OPENCV => {
+                let second = bytes.float()?;
+                bytes.take(6 * 8)?;
+                Some((first / second).max(second / first))
+            }
+            _ => None,
+        }
+    };
+    (0..n).map(camera).try_fold(1.0, |most: f64, ratio| Some(most.max(ratio?)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// A model as COLMAP writes it.
+    /// A model as COLMAP writes it, of one lens for some photographs and one for each of the others.
     fn write(folder: &Path, names: &[&str], errors: &[f64]) {
         fs::create_dir_all(folder).unwrap();
+        let mut cameras = 2_u64.to_le_bytes().to_vec();
+        for (number, model, parameters) in
+            [(1_u32, 2_u32, &[90.0, 12.0, 8.0, 0.1][..]), (2, 4, &[90.0, 99.0, 12.0, 8.0, 0.1, 0.0, 0.0, 0.0])]
+        {
+            cameras.extend([number.to_le_bytes(), model.to_le_bytes()].concat());
+            cameras.extend([24_u64.to_le_bytes(), 16_u64.to_le_bytes()].concat());
+            cameras.extend(parameters.iter().flat_map(|value: &f64| value.to_le_bytes()));
+        }
+        fs::write(folder.join("cameras.bin"), cameras).unwrap();
         let mut images = (names.len() as u64).to_le_bytes().to_vec();
         for name in names {
             images.extend([0; 4 + 7 * 8 + 4]);
@@ -146,6 +189,7 @@ mod tests {
         let sizes: Vec<_> = found.iter().map(|model| (model.names.len(), model.n_points, model.error_px)).collect();
         assert_eq!(sizes, [(2, 2, Some(0.75)), (1, 1, Some(1.0)), (1, 0, None)]);
         assert_eq!(found[0].names, ["a.jpg", "c.jpg"]);
+        assert!((found[0].focal_ratio - 1.1).abs() < 1e-9 && !found[0].has_square_pixels());
         keep(&found, &sparse).unwrap();
         assert_eq!(models_in(&sparse).unwrap()[0].folder, sparse.join("0"));
         let whole = fs::read(sparse.join("0/images.bin")).unwrap();

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The checks of a change, by name; without a name all of them, in this order. Installs what it lacks.
 #
-#   tools/ci.sh              everything (an hour at most on two cores, from a clean clone)
+#   tools/ci.sh              everything, some of it side by side (an hour at most on two cores, from a clean clone)
 #   tools/ci.sh fmt clippy   some
 #   tools/ci.sh quick        fmt, clippy, pages, and the unit tests of the crates that changed (four minutes after a build)
 #   tools/ci.sh --list       their names
@@ -9,6 +9,8 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 
 jobs=(fmt clippy doc pages test viewer npm core-embedded format-doc package link-gate digests reader fuzz firmware boards c demo python many-runs)
+# Of all jobs, `test` waits most: for browsers, and for runs that are to be killed. These go on beside it; of what it builds they build nothing.
+beside_test=(viewer npm core-embedded format-doc package link-gate digests reader fuzz firmware boards c)
 
 embedded_target=thumbv7em-none-eabihf
 defmt_print_version=1.2.0
@@ -46,7 +48,9 @@ need_command() { # COMMAND PACKAGE…
     as_root=(sudo -n)
   fi
   echo "ci: $command is missing; installing $*"
-  log=$("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive sh -c 'apt-get update && apt-get install -y --no-install-recommends "$@"' \
+  # One after the other, where two jobs want something.
+  mkdir -p "$target"
+  log=$(flock "$target/apt.lock" "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive sh -c 'apt-get update && apt-get install -y --no-install-recommends "$@"' \
     sh "$@" 2>&1) || fail "$command is missing and \`apt-get install $*\` failed: ${log##*$'\n'}"
 }
 
@@ -606,23 +610,41 @@ if [ "${1:-}" = --list ]; then
   printf '%s\n' "${jobs[@]}"
   exit
 fi
-[ $# -gt 0 ] || set -- "${jobs[@]}"
-[ "$*" != all ] || set -- "${jobs[@]}"
 for job in "$@"; do
   declare -F "job_$job" >/dev/null || fail "no job is called $job; there are: ${jobs[*]}"
 done
-# What the commands so far have taken of all cores, which other work on the machine changes little.
-processor_seconds() {
+
+# What a process waited for has taken of all cores, which other work on the machine changes little.
+processor_seconds() { # PROCESS
   local fields
-  read -ra fields <"/proc/$$/stat"
+  read -ra fields <"/proc/$1/stat"
   echo $(((fields[15] + fields[16]) / $(getconf CLK_TCK)))
 }
 
+run() { # JOB…
+  local job start processor shell=$BASHPID
+  for job in "$@"; do
+    echo "== $job"
+    start=$SECONDS processor=$(processor_seconds "$shell")
+    "job_$job"
+    echo "== $job: passed in $((SECONDS - start)) s, $(($(processor_seconds "$shell") - processor)) processor seconds"
+  done
+}
+
 need_cargo
-for job in "$@"; do
-  echo "== $job"
-  start=$SECONDS processor=$(processor_seconds)
-  "job_$job"
-  echo "== $job: passed in $((SECONDS - start)) s, $(($(processor_seconds) - processor)) processor seconds"
-done
-echo "== all passed in $SECONDS s, $(processor_seconds) processor seconds: $*"
+if [ $# -gt 0 ]; then
+  run "$@"
+else
+  run fmt clippy doc pages
+  mkdir -p "$target"
+  (run "${beside_test[@]}") >"$target/beside-test.log" 2>&1 &
+  beside=$!
+  trap 'kill $beside 2>/dev/null' EXIT
+  run test
+  passed=1
+  wait $beside || passed=
+  cat "$target/beside-test.log"
+  [ -n "$passed" ] || fail "a job beside the tests failed; its words stand above"
+  run demo python many-runs
+fi
+echo "== all passed in $SECONDS s, $(processor_seconds $$) processor seconds: ${*:-${jobs[*]}}"

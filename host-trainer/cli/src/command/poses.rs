@@ -154,7 +154,7 @@ fn found(inputs: &[PathBuf], capture: &Path, options: Options, overwrite: bool) 
         return stopped();
     }
     say!("3 of 4  matches between them");
-    if !search.matches(of_film)? {
+    if !search.matches()? {
         return stopped();
     }
     say!("4 of 4  poses and points");

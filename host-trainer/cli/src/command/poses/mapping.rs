@@ -19,8 +19,8 @@ impl Search<'_> {
     pub(super) fn models(&mut self) -> Result<Option<Vec<Model>>> {
         let sparse = self.place.sparse();
         if !self.place.state.is_done(Stage::Model) {
-            let [first, second] = self.place.models();
-            for folder in [&first, &second, &sparse] {
+            let [first, second, third] = self.place.models();
+            for folder in [&first, &second, &third, &sparse] {
                 remove(folder)?;
             }
             let Some(mut best) = self.mapped(&first, true)? else { return Ok(None) };
@@ -28,12 +28,14 @@ impl Search<'_> {
             // Four numbers of distortion are too many for the few points of a first pair: they take up what the poses should.
             if let Some(doubt) = doubt_about(&best, n) {
                 say!("{doubt}; once more, with the distortion of the lens left for the end");
-                let Some(others) = self.mapped(&second, false)? else { return Ok(None) };
-                if are_better(&others, &best) {
-                    best = others;
-                    if !self.adjusted(&best[0])? {
-                        return Ok(None);
-                    }
+                if !self.improved(&mut best, &second)? {
+                    return Ok(None);
+                }
+            }
+            if let Some(doubt) = doubt_about(&best, n).filter(|_| self.may_compare_each()) {
+                say!("{doubt}; once more, with each of them compared with each other one");
+                if !self.matched_each()? || !self.improved(&mut best, &third)? {
+                    return Ok(None);
                 }
             }
             if best.is_empty() {
@@ -44,7 +46,7 @@ impl Search<'_> {
                 );
             }
             keep(&best, &sparse)?;
-            for folder in [first, second] {
+            for folder in [first, second, third] {
                 remove(&folder)?;
             }
             self.place.finish(Stage::Model)?;
@@ -73,6 +75,17 @@ impl Search<'_> {
             Told::Well => {}
         }
         models_in(models).map(Some)
+    }
+
+    /// Takes the models that the mapper makes with a lens without distortion at first in place of others, if they are better; `false` where
+    /// it was stopped.
+    fn improved(&mut self, best: &mut Vec<Model>, folder: &Path) -> Result<bool> {
+        let Some(others) = self.mapped(folder, false)? else { return Ok(false) };
+        if !are_better(&others, best) {
+            return Ok(true);
+        }
+        *best = others;
+        self.adjusted(&best[0])
     }
 
     /// Fits all of a model together, the distortion of its lens too; `false` where it was stopped.

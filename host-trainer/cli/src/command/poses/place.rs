@@ -14,7 +14,7 @@ use super::state::{FILE, Settings, Stage, State};
 /// What other programs said.
 const LOG: &str = "poses.log";
 /// Where models lie until the largest is known: those of a first and of a second attempt.
-const MODELS: [&str; 2] = ["models", "models-2"];
+const MODELS: [&str; 3] = ["models", "models-2", "models-3"];
 
 /// Lists of photographs and of pairs, while COLMAP reads them.
 pub(super) const LIST: &str = "poses-list.txt";
@@ -71,7 +71,7 @@ impl Place {
         self.folder.join("sparse")
     }
 
-    pub(super) fn models(&self) -> [PathBuf; 2] {
+    pub(super) fn models(&self) -> [PathBuf; 3] {
         MODELS.map(|name| self.folder.join(name))
     }
 

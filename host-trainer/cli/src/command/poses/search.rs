@@ -11,7 +11,7 @@ use super::colmap::{Colmap, Paths, Shared};
 use super::heard::{fault_in, step_in};
 use super::place::{LIST, PAIRS, Place, remove};
 use super::progress::Progress;
-use super::state::{Cameras, Matching, Stage};
+use super::state::{Cameras, Matching, Stage, State};
 use super::taking::Taken;
 use crate::say::say;
 
@@ -82,12 +82,12 @@ impl Search<'_> {
     }
 
     /// Compares photographs; `false` where it was stopped.
-    pub(super) fn matches(&mut self, of_film: bool) -> Result<bool> {
+    pub(super) fn matches(&mut self) -> Result<bool> {
         if self.place.state.is_done(Stage::Matches) {
             return Ok(true);
         }
         let n = self.place.state.photographs.len();
-        let how = self.place.state.settings.matching.unwrap_or_else(|| matching(n, of_film));
+        let how = self.place.state.settings.matching.unwrap_or_else(|| matching(&self.place.state.photographs));
         say!(
             "{}",
             match how {
@@ -97,9 +97,7 @@ impl Search<'_> {
             }
         );
         let is_done = match how {
-            Matching::Exhaustive => {
-                self.matched("matches", |colmap, paths, on_gpu| colmap.exhaustive(paths, n, on_gpu))?
-            }
+            Matching::Exhaustive => self.matched_each()?,
             Matching::Sequential => {
                 self.matched("matches", |colmap, paths, on_gpu| colmap.sequential(paths, on_gpu))?
                     && self.matched_afar()?
@@ -109,6 +107,18 @@ impl Search<'_> {
             self.place.finish(Stage::Matches)?;
         }
         Ok(is_done)
+    }
+
+    /// Whether photographs were compared in their order because they are of a film, and are few enough to compare each with each other one.
+    pub(super) fn may_compare_each(&self) -> bool {
+        let State { settings, photographs, .. } = &self.place.state;
+        settings.matching.is_none() && is_film(photographs) && photographs.len() <= MOST_EXHAUSTIVE
+    }
+
+    /// Compares each photograph with each other one; pairs that are compared already are not compared again.
+    pub(super) fn matched_each(&mut self) -> Result<bool> {
+        let n = self.place.state.photographs.len();
+        self.matched("matches", |colmap, paths, on_gpu| colmap.exhaustive(paths, n, on_gpu))
     }
 
     /// Compares photographs that are far apart in their order.
@@ -218,8 +228,16 @@ pub(super) enum Told {
 }
 
 /// How photographs are compared where nobody says it.
-fn matching(n: usize, of_film: bool) -> Matching {
-    if of_film || n > MOST_EXHAUSTIVE { Matching::Sequential } else { Matching::Exhaustive }
+fn matching(photographs: &[Taken]) -> Matching {
+    if is_film(photographs) || photographs.len() > MOST_EXHAUSTIVE {
+        Matching::Sequential
+    } else {
+        Matching::Exhaustive
+    }
+}
+
+fn is_film(photographs: &[Taken]) -> bool {
+    photographs.iter().any(|taken| taken.at_s.is_some())
 }
 
 /// Pairs of photographs that are spread over an order, as COLMAP reads them: two names and a space between, which a name cannot hold.
@@ -241,16 +259,21 @@ fn number_in(text: &str) -> Option<usize> {
 mod tests {
     use super::*;
 
+    fn taken(i: usize) -> Taken {
+        Taken { name: format!("{i:03}.jpg"), from: String::new(), at_s: None }
+    }
+
     #[test]
     fn films_and_many_photographs_are_compared_in_their_order() {
-        assert_eq!(matching(150, true), Matching::Sequential);
-        assert_eq!(matching(200, false), Matching::Exhaustive);
-        assert_eq!(matching(201, false), Matching::Sequential);
+        let photographs: Vec<Taken> = (0..201).map(taken).collect();
+        let film: Vec<Taken> = (0..2).map(|i| Taken { at_s: Some(0.5 * i as f64), ..taken(i) }).collect();
+        assert_eq!(matching(&film), Matching::Sequential);
+        assert_eq!(matching(&photographs[..200]), Matching::Exhaustive);
+        assert_eq!(matching(&photographs), Matching::Sequential);
     }
 
     #[test]
     fn keys_close_a_walk_that_comes_back() {
-        let taken = |i: usize| Taken { name: format!("{i:03}.jpg"), from: String::new(), at_s: None };
         let few: Vec<Taken> = (0..12).map(taken).collect();
         assert_eq!(key_pairs(&few), ["000.jpg 005.jpg", "000.jpg 010.jpg", "005.jpg 010.jpg"]);
         let many: Vec<Taken> = (0..1000).map(taken).collect();

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,6 +53,7 @@ class Training:
         # What lies in the folder of an earlier run is no progress of this one.
         self._started = time.time()
         self._error = ""
+        self._warnings: list[str] = []
         self._said = tempfile.TemporaryFile(mode="w+", encoding="utf-8", errors="replace")
         # The package is found there as it is here.
         packages = [str(Path(__file__).parent.parent), os.environ.get("PYTHONPATH", "")]
@@ -81,7 +83,7 @@ class Training:
     def wait(self) -> dict[str, Any]:
         """Waits for the end and gives the content of result.json: psnr_db, ssim, bundle_bytes, views and so on.
 
-        Raises TrainError where the run fails.
+        What the command warned of is warned of here. Raises TrainError where the run fails.
         """
         self._process.wait()
         self._check()
@@ -132,9 +134,12 @@ class Training:
             self._said.close()
             at = said.find("error: ")
             self._error = said[at:] if at >= 0 else said
+            self._warnings = [line for line in said.splitlines() if line.startswith("warning: ")]
         code = self._process.returncode
         if code != 0:
             raise TrainError(self._error or f"training ended with exit code {code}")
+        while self._warnings:
+            warnings.warn(self._warnings.pop(0).removeprefix("warning: "), stacklevel=3)
 
 
 def train(capture: str | os.PathLike[str], output: str | os.PathLike[str], **options: Any) -> Training:
@@ -146,8 +151,15 @@ def train(capture: str | os.PathLike[str], output: str | os.PathLike[str], **opt
         bundle = training.bundle()
 
     Options are those of `pocketsplat train`, with underscores: `max_resolution=400` is `--max-resolution 400`, `overwrite=True` is
-    `--overwrite`, lists are joined by commas. An underscore at the end keeps words of Python apart: `lambda_`.
+    `--overwrite`, lists are joined by commas, but that of `set_` is several `--set`. An underscore at the end keeps words of Python
+    apart: `lambda_`.
+
+    Raises ValueError for `dry_run`, `help` and `version`, which train nothing.
     """
+    for name in ("dry_run", "help", "version"):
+        if options.get(name):
+            option = name.replace("_", "-")
+            raise ValueError(f"{name} trains nothing; give it to the command: `python -m pocketsplat train CAPTURE --{option}`")
     # By its path: `-m pocketsplat` would look into the working folder first.
     program = Path(__file__).with_name("__main__.py")
     command = [sys.executable, str(program), "train", os.fspath(capture), "-o", os.fspath(output)]
@@ -156,9 +168,9 @@ def train(capture: str | os.PathLike[str], output: str | os.PathLike[str], **opt
         if value is True:
             command.append(option)
         elif value is not False and value is not None:
-            is_list = isinstance(value, (list, tuple))
+            values = [str(one) for one in value] if isinstance(value, (list, tuple)) else [str(value)]
             # `=` keeps values that begin with a hyphen apart from options.
-            command.append(f"{option}={','.join(map(str, value)) if is_list else value}")
+            command += [f"{option}={one}" for one in (values if option == "--set" else [",".join(values)])]
     bundle = Path(output).absolute()
     run = Path(options["run"]).absolute() if options.get("run") else bundle.with_suffix(".run")
     return Training(command, bundle, run)

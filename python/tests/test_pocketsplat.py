@@ -198,6 +198,20 @@ class TrainingRuns(unittest.TestCase):
         with self.assertRaisesRegex(pocketsplat.TrainError, "--no-such-option"):
             pocketsplat.train(self.capture, "c.psb", no_such_option=1).bundle()
 
+    def test_what_trains_nothing_is_refused(self) -> None:
+        for name in ("dry_run", "help"):
+            with self.assertRaisesRegex(ValueError, "trains nothing"):
+                pocketsplat.train(self.capture, "c.psb", **{name: True})
+
+    def test_warnings_and_several_keys_come_through(self) -> None:
+        keys = ["train.shape.n_offsets=2", "train.shape.feature_dim=4"]
+        training = pocketsplat.train(
+            self.capture, Path(self.folder.name, "f.psb"), iterations=20, no_report=True, set_=keys, images="none"
+        )
+        with self.assertWarnsRegex(UserWarning, "--images has no effect"):
+            training.wait()
+        self.assertEqual(training.bundle().header.feature_dim, 4)
+
     def test_a_run_that_is_stopped_goes_on(self) -> None:
         output = Path(self.folder.name, "d.psb")
         # As under a server that a shell started in the background.

@@ -30,7 +30,7 @@ const MIB: u64 = 1024 * KIB;
 
 /// The boards there are, by core and memory.
 pub const BOARDS: [Board; 11] = [
-    board("rp2350", "Pico 2 (RP2350, M33)", 150, [500 * KIB, MIB], [240, 240], CortexM4),
+    board("rp2350", "Pico 2 (RP2350, M33)", 150, [494 * KIB, MIB], [240, 240], CortexM4),
     board("stm32f411", "STM32F411 (M4)", 100, [117 * KIB, 64 * KIB], [128, 128], CortexM4),
     board(
         "stm32f429",

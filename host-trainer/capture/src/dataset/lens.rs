@@ -42,6 +42,9 @@ pub(super) struct Lens {
     pub(super) tangential: [f64; 2],
 }
 
+/// Focal lengths of cameras without a fisheye, in the image's longer side: fields of view of 157 to 0.6 degrees.
+pub(super) const USUAL_FOCAL_LENGTHS: [f64; 2] = [0.1, 100.0];
+
 impl Lens {
     /// A lens without distortion, its principal point in the middle.
     pub(super) fn central(size_px: (u32, u32), focal_px: [f64; 2]) -> Self {
@@ -55,6 +58,14 @@ impl Lens {
             divisor: [0.0; 3],
             tangential: [0.0; 2],
         }
+    }
+
+    /// Whether its focal length can be a camera's; a fisheye's says nothing of its field of view.
+    pub(super) fn has_usual_field_of_view(&self) -> bool {
+        let longer_px = f64::from(self.size_px.0.max(self.size_px.1));
+        let [least, most] = USUAL_FOCAL_LENGTHS.map(|focal| focal * longer_px);
+        self.projection != Projection::Perspective
+            || self.focal_px.iter().all(|focal_px| (least..=most).contains(focal_px))
     }
 
     /// Whether straight lines stay straight.

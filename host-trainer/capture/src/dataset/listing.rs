@@ -63,6 +63,15 @@ impl Note {
             "no test views, so test PSNR cannot be computed; hold out every 8th image with `--test-every 8`",
         )
     }
+
+    /// The same of a capture whose own split has none under this key.
+    pub(super) fn no_test_views_named(key: &str) -> Self {
+        let text = format!(
+            "no test views, so test PSNR cannot be computed: the capture has a split of its own, and its `{key}` names none; name some \
+             there, or remove the lists of the split to hold out every n-th image with `--test-every`"
+        );
+        Self::warning("no-test-views", text)
+    }
 }
 
 /// One view of a listing.

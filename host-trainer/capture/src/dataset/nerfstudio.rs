@@ -47,7 +47,13 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
     }
     let mut listing = Listing { layout: Layout::Nerfstudio, source, views, points, unposed, notes };
     if !listing.has_test_views() {
-        listing.notes.push(Note::no_test_views());
+        let [train, val, test] = &transforms.splits;
+        let has_own_split = train.is_some() || val.is_some() || test.is_some();
+        listing.notes.push(if has_own_split {
+            Note::no_test_views_named("test_filenames")
+        } else {
+            Note::no_test_views()
+        });
     }
     Ok(listing)
 }
@@ -58,7 +64,8 @@ fn splits(transforms: &Transforms, options: &LoadOptions, notes: &mut Vec<Note>)
     if train.is_none() && val.is_none() && test.is_none() {
         return (0..transforms.frames.len()).map(|i| Some(every_nth(options.test_every, i))).collect();
     }
-    let held_out = test.as_ref().or(val.as_ref());
+    let test = test.as_ref().filter(|names| !names.is_empty());
+    let held_out = test.or(val.as_ref());
     if test.is_some()
         && let Some(val) = val
     {

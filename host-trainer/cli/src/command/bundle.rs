@@ -68,9 +68,11 @@ impl BundleFile {
         }
     }
 
-    /// Checks the file; says so when it is cut at the end of a tier.
+    /// Checks the file, each of its chunks too; says so when it is cut at the end of a tier.
     pub(crate) fn parse(&self) -> Result<Bundle<'_>> {
-        let bundle = Bundle::parse(&self.bytes).with_context(|| format!("{} cannot be used", self.path.display()))?;
+        let bundle = Bundle::parse(&self.bytes);
+        let sound = bundle.and_then(|bundle| bundle.chunks().try_for_each(|chunk| chunk.check()).map(|()| bundle));
+        let bundle = sound.with_context(|| format!("{} cannot be used", self.path.display()))?;
         let (n_tiers, n_written) = (bundle.n_tiers(), bundle.header().n_tiers);
         if n_tiers < n_written {
             say!(

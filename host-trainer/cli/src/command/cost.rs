@@ -9,7 +9,7 @@ use anyhow::{Context, Result};
 use bytesize::ByteSize;
 use pocketsplat_capture::dataset::{Capture, Split, View};
 use pocketsplat_codec::render::reference::ReferenceScene;
-use pocketsplat_core::{Budget, Bundle, Camera, MaxSplats};
+use pocketsplat_core::{Budget, Bundle, Camera, MaxSplats, Plan};
 use pocketsplat_instructions::Processor;
 use pocketsplat_kernels::camera::core_camera;
 use pocketsplat_trainer::cost::{
@@ -106,6 +106,11 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let mut measured = Vec::new();
     for (i, setting) in settings.iter().enumerate() {
         say!("{} of {}  {}: {}", i + 1, settings.len(), setting.parameter, setting.name);
+        // The base is whatever the memory has room for.
+        if i > 0 && Plan::new(&bundle, &setting.of(budget)).is_ok_and(|plan| !setting.is_kept_by(&plan)) {
+            say!("  left out: this memory has no room for it");
+            continue;
+        }
         let mut point = match measure(&bundle, &sights, setting, budget, &targets) {
             // Splats that are larger than plans reckon with, and memory without limit.
             Ok(point) if point.splats_dropped > 0 && args.ram.is_none() => {

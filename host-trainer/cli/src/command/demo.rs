@@ -46,6 +46,8 @@ pub(crate) struct Args {
 
 /// Where the demo's capture lies.
 const CAPTURE: &str = "capture";
+/// The same while it is being made.
+const BEGUN: &str = ".capture-being-made";
 /// Lies in a capture that a demo made, and only there: without it nothing is removed.
 const MARKER: &str = ".made-by-pocketsplat-demo";
 
@@ -58,8 +60,14 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     let picture_output = outputs.file(&folder.join("truth_reference_decoder.png"), PNG)?;
     clear_capture(&capture_folder)?;
     say!("1 of 4  ray-tracing a capture into {}", capture_folder.display());
-    write_capture(&capture_folder, &SynthOptions { size_px: args.size, ..SynthOptions::default() })?;
-    keep(&capture_folder.join(MARKER), b"")?;
+    // Under another name until it is whole, so that what an interrupt leaves is known to be nobody else's.
+    let begun = folder.join(BEGUN);
+    if begun.exists() {
+        std::fs::remove_dir_all(&begun).with_context(|| format!("could not remove {}", begun.display()))?;
+    }
+    write_capture(&begun, &SynthOptions { size_px: args.size, ..SynthOptions::default() })?;
+    keep(&begun.join(MARKER), b"")?;
+    std::fs::rename(&begun, &capture_folder).with_context(|| format!("could not make {}", capture_folder.display()))?;
 
     say!("2 of 4  training {} steps", args.iterations);
     let bundle_path = bundle_output.path();

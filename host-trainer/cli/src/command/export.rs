@@ -91,6 +91,9 @@ struct Export {
     /// The bundle's less the file's.
     #[serde(skip_serializing_if = "Option::is_none")]
     loss_db: Option<f64>,
+    /// What a scene of 30 dB loses by that, where there are no photographs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    loss_at_30_db: Option<f64>,
     /// Of the file's pictures to the bundle's.
     psnr_to_bundle_db: f64,
     /// The same before numbers were rounded to the file's.
@@ -241,6 +244,8 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
             },
         },
     );
+    let loss_db = bundle_psnr_db.zip(file_psnr_db).map(|(bundle, file)| bundle - file);
+    let psnr_to_bundle_db = to_bundle(&pictures);
     let export = Export {
         format: format.extension(),
         bytes: file_bytes.bytes.len(),
@@ -250,8 +255,9 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
         sh_degree: args.sh_degree,
         psnr_db: file_psnr_db,
         bundle_psnr_db,
-        loss_db: bundle_psnr_db.zip(file_psnr_db).map(|(bundle, file)| bundle - file),
-        psnr_to_bundle_db: to_bundle(&pictures),
+        loss_db,
+        loss_at_30_db: loss_db.is_none().then(|| loss_at_30_db(psnr_to_bundle_db)),
+        psnr_to_bundle_db,
         unrounded_psnr_to_bundle_db: to_bundle(&unrounded),
         frame: FrameRecord::of(&file_bytes.frame),
         n_views: cameras.judged.len(),
@@ -259,9 +265,13 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
         seconds: started.elapsed().as_secs_f64(),
     };
     output::print(&export, args.json)?;
-    let loss_db = export.loss_db.unwrap_or_else(|| loss_at_30_db(export.psnr_to_bundle_db));
-    let remedy = "more --iterations or a higher --sh-degree may lose less, and a .ply rounds nothing";
-    Ok(args.loss.hold(&args.output, loss_db, remedy))
+    let loss_db = loss_db.unwrap_or_else(|| loss_at_30_db(psnr_to_bundle_db));
+    let degree = if args.sh_degree < 3 { " or a higher --sh-degree" } else { "" };
+    Ok(args.loss.hold(
+        &args.output,
+        loss_db,
+        &format!("more --iterations{degree} may lose less, and a .ply rounds nothing"),
+    ))
 }
 
 /// The Gaussians of what was written, as others read them: not from the output, which may be a FIFO.

@@ -18,7 +18,7 @@ pub(crate) struct LpipsArgs {
     #[arg(long, value_name = "FILE")]
     lpips_weights: Option<PathBuf>,
     /// Range of black to white given to LPIPS: papers of this field use zero-to-one, LPIPS was trained on minus-one-to-one.
-    #[arg(long, value_parser = one_of::<InputRange>(LPIPS_RANGES), default_value = LPIPS_RANGES[0])]
+    #[arg(long, value_parser = one_of::<InputRange>(LPIPS_RANGES), default_value = LPIPS_RANGES[0], requires = "lpips_weights")]
     lpips_range: InputRange,
 }
 

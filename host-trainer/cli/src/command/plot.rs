@@ -65,6 +65,9 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     if args.log_x && curves.is_empty() {
         bail!("--log-x is for the sizes of rate-distortion curves");
     }
+    if args.json && curves.is_empty() {
+        bail!("--json prints how far rate-distortion curves lie apart; leave it out");
+    }
     match (runs.is_empty(), panels.is_empty()) {
         (false, _) => Ok(output.write(learning_curves_svg(&runs)?.as_bytes())?),
         (_, false) => Ok(output.write(cost_svg(&panels)?.as_bytes())?),
@@ -76,7 +79,7 @@ fn draw_rate_distortion(args: &Args, output: &Output, curves: &[Named<Vec<Result
     let axis = if args.log_x { SizeAxis::Logarithmic } else { SizeAxis::Linear };
     output.write(rate_distortion_svg(curves, axis)?.as_bytes())?;
     let [reference, others @ ..] = curves else { return Ok(()) };
-    if others.is_empty() {
+    if others.is_empty() && !args.json {
         return Ok(());
     }
     let points = |curve: &Named<Vec<ResultRow>>| of_rates(&curve.what);

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::AtomicBool;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use pocketsplat_capture::dataset::{Capture, Split};
 use pocketsplat_files::Outputs;
 use pocketsplat_format::bundle::crc32;
@@ -31,6 +31,14 @@ pub(super) fn trained(config: &RunConfig, capture: &Capture, device: DeviceChoic
         }
         RunStatus::Begun(folder) => (folder, Start::Resumed, device.open()?),
         RunStatus::Finished => {
+            let folder = config.output.with_extension("run");
+            let file = BundleFile::of_run(&folder, config)?;
+            if let Some(why) = file.protocol(&file.parse()?).and_then(|protocol| protocol.contradiction(capture)) {
+                bail!(
+                    "the run in {} is not the one that is asked for: {why}; choose another --output",
+                    folder.display()
+                );
+            }
             say!("trained before");
             return Ok(true);
         }
@@ -46,22 +54,31 @@ pub(super) fn measured(config: &RunConfig, lpips: Option<&Lpips>) -> Result<Eval
     let file = BundleFile::read(&config.output)?;
     let path = config.output.with_extension("json");
     let bundle_crc = Some(crc32(&file.bytes));
+    let own = file.protocol(&file.parse()?);
+    let mut is_free = true;
     if path.is_file() {
         let kept = serde_json::from_slice::<Evaluation>(&std::fs::read(&path)?);
         let kept = kept.with_context(|| format!("{} has no figures of a bundle; move it away", path.display()))?;
-        let as_loaded = |protocol: &Protocol| Protocol::said(&config.capture) == protocol.options;
+        let is_own = |protocol: &Protocol| own.as_ref().is_none_or(|own| own.is_of_capture_of(protocol));
+        let as_loaded = |protocol: &Protocol| Protocol::said(&config.capture) == protocol.options && is_own(protocol);
         let is_alike = kept.split == Split::Test.to_string()
             && kept.renderer == Renderer::Core.name()
-            && kept.protocol.as_ref().is_some_and(as_loaded)
-            && lpips.is_none_or(|lpips| kept.lpips_of == Some(lpips_of(lpips)));
-        if kept.bundle_crc == bundle_crc && is_alike {
+            && kept.protocol.as_ref().is_some_and(as_loaded);
+        let has_all = lpips.is_none_or(|lpips| kept.lpips_of == Some(lpips_of(lpips)));
+        if kept.bundle_crc == bundle_crc && is_alike && has_all {
             return Ok(kept);
         }
+        is_free = is_alike || kept.bundle_crc != bundle_crc;
     }
     let capture = CaptureArgs { dataset: config.dataset.clone(), options: config.capture.clone() };
     let what = Measurements { per_tier: has_trained_tiers(config), lpips, ..Measurements::default() };
     let evaluation = evaluate(&file, &capture, Split::Test, Renderer::Core, &what)?;
-    keep(&path, output::json(&evaluation)?.as_bytes())?;
+    let is_own = own.zip(evaluation.protocol.as_ref()).is_none_or(|(own, of)| own.is_of_capture_of(of));
+    if !is_free {
+        say!("{} has figures of other views of this bundle, and stays as it is", path.display());
+    } else if is_own {
+        keep(&path, output::json(&evaluation)?.as_bytes())?;
+    }
     Ok(evaluation)
 }
 

@@ -124,6 +124,10 @@ fn write(folder: &Path, config: &RunConfig, capture: Option<&Capture>, output: &
     })?;
     let result = serde_json::from_str(&text).with_context(|| format!("{} is no result of a run", result.display()))?;
     let file = BundleFile::of_run(folder, config)?;
+    let protocol = file.protocol(&file.parse()?);
+    if let Some(why) = protocol.zip(capture).and_then(|(protocol, capture)| protocol.contradiction(capture)) {
+        bail!("{why}; give the folder of those that it was trained on as CAPTURE");
+    }
     let photographs = capture
         .filter(|capture| !capture.test.is_empty())
         .map(|capture| photographs(&file, capture, &config.capture))

@@ -16,6 +16,7 @@ use super::gaussians::GaussiansFile;
 use super::output;
 use super::outputs::{ANYTHING, OverwriteArgs, PAGE, check_name};
 use super::stand::StandArgs;
+use crate::say::say;
 
 /// Write a web page that draws bundles.
 ///
@@ -144,7 +145,8 @@ fn open(path: &Path) -> Result<()> {
             .iter()
             .any(|name| std::env::var_os(name).is_some_and(|value| !value.is_empty()));
     if !has_desktop {
-        bail!("there is no desktop here to open {}; open the file in a browser", path.display());
+        say!("warning: there is no desktop here to open {}; open the file in a browser", path.display());
+        return Ok(());
     }
     let path = fs::canonicalize(path).with_context(|| format!("could not find {}", path.display()))?;
     let program = match std::env::consts::OS {

@@ -78,6 +78,11 @@ impl Protocol {
             .collect()
     }
 
+    /// Whether two are of one capture.
+    pub(crate) fn is_of_capture_of(&self, other: &Self) -> bool {
+        self.capture == other.capture
+    }
+
     /// Why a capture is not the one that the bundle was trained on.
     pub(crate) fn contradiction(&self, capture: &Capture) -> Option<String> {
         let found = fingerprint(capture);

@@ -75,9 +75,14 @@ pub(super) fn curves(reader: &mut csv::Reader<&[u8]>) -> Result<Vec<Named<Vec<Re
         let number = |column: usize| {
             let value = &record[column];
             let line = record.position().map_or(0, csv::Position::line);
-            value.parse::<f64>().with_context(|| format!("`{value}` is no number (line {line}, {})", &header[column]))
+            let number = value.parse::<f64>().ok().filter(|number| number.is_finite());
+            number.with_context(|| format!("`{value}` is no number (line {line}, {})", &header[column]))
         };
         let (psnr_db, size_bytes) = (number(psnr)?, number(size)?);
+        if size_bytes <= 0.0 {
+            let line = record.position().map_or(0, csv::Position::line);
+            bail!("a size is {size_bytes} bytes, needed: more than 0 (line {line}, {})", &header[size]);
+        }
         let submethod = match rate {
             Some(column) if header[column].eq_ignore_ascii_case("lambda") => format!("lambda={}", &record[column]),
             Some(column) => record[column].to_owned(),

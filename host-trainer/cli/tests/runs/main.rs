@@ -14,6 +14,7 @@ mod fixture;
 mod gpu;
 mod import;
 mod interruption;
+mod mistaken;
 mod modules;
 mod outputs;
 mod plan;

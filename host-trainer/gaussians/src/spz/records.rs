@@ -72,7 +72,7 @@ impl Records {
                 signs: axes.signs(),
                 axes: Some(axes),
                 said: format!(
-                    "it does not say which axes it has: they are taken {}; `{AXES_OPTION} {}` takes them {}",
+                    "it does not say which axes it has: they are taken {}; `{AXES_OPTION} {}` of `export`, `import` and `eval` takes them {}",
                     words(axes),
                     other.name(),
                     words(other)

@@ -1,7 +1,7 @@
 //! The parameters of decoder-core, each by itself, and those of quality together.
 
 use super::ArithmeticChoice;
-use pocketsplat_core::{Budget, Bundle, Quality, Residency, Strips};
+use pocketsplat_core::{Budget, Bundle, Plan, Quality, Residency, Strips};
 
 /// One way to draw a bundle.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,6 +37,16 @@ impl Setting {
             strips: Strips::Auto,
             arithmetic,
         }
+    }
+
+    /// Whether a plan has the tiers and strips that are asked for: in little memory a plan leaves out more anchors, or draws in more strips.
+    pub fn is_kept_by(&self, plan: &Plan) -> bool {
+        let has_tiers = self.tiers == u8::MAX || self.tiers == plan.n_tiers();
+        let has_strips = match self.strips {
+            Strips::Exactly(n) => n == plan.n_strips(),
+            _ => true,
+        };
+        has_tiers && has_strips
     }
 
     /// `budget` with these parameters.

@@ -50,6 +50,11 @@ pub(super) fn weights(gaussians: &Gaussians) -> Vec<f64> {
     sizes.into_iter().zip(opacities).map(|(size, opacity)| size.min(most) * opacity).collect()
 }
 
+/// Whether no Gaussian is opaque enough to be drawn.
+pub fn shows_nothing(gaussians: &Gaussians) -> bool {
+    weights(gaussians).iter().all(|weight| *weight == 0.0)
+}
+
 impl Bulk {
     /// `None` where nothing is opaque, or all of it is in one point.
     pub fn of(gaussians: &Gaussians) -> Option<Self> {

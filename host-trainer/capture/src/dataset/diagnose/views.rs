@@ -7,6 +7,7 @@ use pocketsplat_files::shown;
 
 use super::Finding;
 use crate::dataset::error::{MIN_TRAIN_VIEWS, first_few, more_training_views};
+use crate::dataset::lens::USUAL_FOCAL_LENGTHS;
 use crate::dataset::listing::{ListedView, Listing, commonest};
 use crate::dataset::{LoadOptions, Severity, Split};
 
@@ -130,15 +131,28 @@ fn lenses(listing: &Listing, findings: &mut Vec<Finding>) {
         .sound()
         .filter(|(_, shot)| {
             let ([x, y], (width_px, height_px)) = (shot.lens.principal_px, shot.lens.size_px);
-            !(0.0..=f64::from(width_px)).contains(&x) || !(0.0..=f64::from(height_px)).contains(&y)
+            let is_inside = (0.0..=f64::from(width_px)).contains(&x) && (0.0..=f64::from(height_px)).contains(&y);
+            let is_at_corner = x.max(y) <= 1.0 && width_px.max(height_px) > 4;
+            !is_inside || is_at_corner
         })
         .collect();
     findings.extend(Finding::about(
         &outside,
         Severity::Warning,
         "principal-point",
-        "images whose principal point lies outside them",
-        "check cx and cy: they are pixels from the image's corner, for the size that the intrinsics give",
+        "images whose principal point lies outside them or in their corner",
+        "check cx and cy: they are pixels from the image's corner, for the size that the intrinsics give, and no shares of it",
+    ));
+    let absurd: Vec<_> = listing.sound().filter(|(_, shot)| !shot.lens.has_usual_field_of_view()).collect();
+    findings.extend(Finding::about(
+        &absurd,
+        Severity::Warning,
+        "field-of-view",
+        &format!(
+            "images whose focal length is none of a camera, which has {} to {} times the image's longer side",
+            USUAL_FOCAL_LENGTHS[0], USUAL_FOCAL_LENGTHS[1]
+        ),
+        "check fl_x and fl_y, or camera_angle_x: a focal length is in pixels, for the size that the intrinsics give, and an angle in radians",
     ));
 }
 

@@ -91,6 +91,32 @@ pub(super) fn cases() -> Vec<Case> {
                 f.write_files();
             },
         ),
+        case(
+            "lenses in shares of the image",
+            Nerfstudio,
+            Doubt,
+            "field-of-view",
+            &[
+                "warning[field-of-view]: images whose focal length is none of a camera, which has 0.1 to 100 times",
+                "warning[principal-point]: images whose principal point lies outside them or in their corner: 1 (images/p_03.png)",
+            ],
+            |f| {
+                f.photos[3].extra = "\"fl_x\": 0.83, \"fl_y\": 0.83, \"cx\": 0.5, \"cy\": 0.5, ".to_owned();
+                f.write_files();
+            },
+        ),
+        case(
+            "a split of its own without views to test",
+            Nerfstudio,
+            Doubt,
+            "no-test-views",
+            &["has a split of its own, and its `test_filenames` names none"],
+            |f| {
+                let names: Vec<String> = (0..12).map(|i| format!("\"images/p_{i:02}.png\"")).collect();
+                f.shared.push_str(&format!(", \"train_filenames\": [{}], \"test_filenames\": []", names.join(", ")));
+                f.write_files();
+            },
+        ),
         case("JSON cut", Blender, Fatal, "bad-transforms", &["EOF while parsing", "at line 2 column"], |f| {
             cut(f.write_files(), "transforms_train.json", 300);
         }),

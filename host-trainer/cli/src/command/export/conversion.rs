@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use anyhow::{Result, bail};
 use pocketsplat_files::Output;
 use pocketsplat_gaussians::{Degree, Format, Notes};
+use pocketsplat_trainer::explicit::bulk::shows_nothing;
 use pocketsplat_trainer::explicit::frame;
 use serde::Serialize;
 
@@ -49,6 +50,13 @@ pub(super) fn run(args: &Args, format: Format, output: &Output) -> Result<ExitCo
         );
     }
     let file = GaussiansFile::read_as(&args.bundle, args.axes.spz_axes)?;
+    if shows_nothing(&file.gaussians) {
+        bail!(
+            "nothing in {} can be seen, so no picture tells what another format loses: 0 of {} Gaussians are opaque, needed: 1",
+            args.bundle.display(),
+            file.gaussians.len()
+        );
+    }
     let gaussians = file.gaussians.reduced_to(Degree::ALL[usize::from(args.sh_degree)]);
     let notes = Notes { spz_axes: args.axes.spz_axes.or(file.notes.spz_axes), ..file.notes.clone() };
     let written = write_gaussians(format, output, &gaussians, &notes)?;

@@ -3,12 +3,16 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use pocketsplat_files::FileKind;
+use pocketsplat_files::{FileKind, shown};
+
+use crate::say::say;
 
 /// Folders that photographs are kept in, the one given last.
 const FOLDERS: [&str; 5] = ["images", "input", "rgb", "photos", "."];
 /// Extensions of films, for those whose first bytes say nothing.
 const FILMS: [&str; 5] = ["mp4", "mov", "mkv", "avi", "webm"];
+/// Extensions of photographs, for those whose first bytes say nothing.
+const PHOTOGRAPHS: [&str; 7] = ["jpg", "jpeg", "png", "webp", "heic", "heif", "avif"];
 /// What becomes of a photograph.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Treatment {
@@ -57,7 +61,7 @@ fn files_of(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let is_shown = |path: &PathBuf| path.file_name().is_some_and(|name| !name.as_encoded_bytes().starts_with(b"."));
     let mut files: Vec<PathBuf> =
-        entries.map(|entry| entry.path()).filter(|path| is_shown(path) && path.is_file()).collect();
+        entries.map(|entry| entry.path()).filter(|path| is_shown(path) && !path.is_dir()).collect();
     files.sort_unstable();
     files
 }
@@ -67,17 +71,28 @@ pub(super) fn films_in(folder: &Path) -> Vec<PathBuf> {
     files_of(folder).into_iter().filter(|file| matches!(kind_of(file), Some(Kind::Film))).collect()
 }
 
-/// The photographs of a folder, or of the first folder in it that has some; and the pictures there that are of other formats.
+/// The photographs of a folder, or of the first folder in it that has some; and the pictures there that are of other formats. Says which
+/// files are called photographs and are none.
 pub(super) fn photographs_in(folder: &Path) -> (Vec<(PathBuf, Treatment)>, Vec<PathBuf>) {
     for name in FOLDERS {
         let folder = if name == "." { folder.to_owned() } else { folder.join(name) };
-        let (mut photographs, mut foreign) = (Vec::new(), Vec::new());
+        let (mut photographs, mut foreign, mut damaged) = (Vec::new(), Vec::new(), Vec::new());
         for path in files_of(&folder) {
             match kind_of(&path) {
                 Some(Kind::Photograph(treatment)) => photographs.push((path, treatment)),
                 Some(Kind::Foreign) => foreign.push(path),
+                None if PHOTOGRAPHS.contains(&extension(&path.to_string_lossy()).as_str()) => {
+                    damaged.push(shown(&path))
+                }
                 _ => {}
             }
+        }
+        if let Some(first) = damaged.first() {
+            say!(
+                "warning: {} files are called photographs and hold none, the first `{first}`: they are left out; copy them anew, or run \
+                 `git lfs pull` where they are pointers of Git LFS",
+                damaged.len()
+            );
         }
         if !(photographs.is_empty() && foreign.is_empty()) {
             return (photographs, foreign);

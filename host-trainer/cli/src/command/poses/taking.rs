@@ -98,8 +98,9 @@ fn frames_of(
     let chosen = choose(&candidates, n_wanted);
     let mut command = FFMPEG.command();
     command.args(["-nostdin", "-v", "error", "-y", "-i"]).arg(path_argument(&film.path)).args(["-map", "0:v:0"]);
-    // Behind the choice time is counted anew, one frame a step: nothing is left out or doubled to keep a rate.
-    let filters = format!("fps={rate:.6},select={},setpts=N/(25*TB),{}", is_one_of(&chosen), film.to_8_bit());
+    // Behind the choice time is counted anew, one frame a tick: nothing is left out or doubled to keep a rate. (Ticks of `fps` are as long
+    // as its frames, so a time in them would be rounded.)
+    let filters = format!("fps={rate:.6},select={},settb=1/25,setpts=N,{}", is_one_of(&chosen), film.to_8_bit());
     command.args(["-vf", &filters, "-r", "25", "-q:v", "2", "-start_number", &(n_before + 1).to_string()]);
     // A name with `%` would be taken for a pattern, so the program works in the folder.
     command.current_dir(images).arg("frame_%04d.jpg");
@@ -179,10 +180,43 @@ mod tests {
     const PICTURES: [&str; 4] = ["-f", "lavfi", "-i", "testsrc2=s=128x96:r=10:d=2"];
 
     fn taken_of(film: Film, images: &Path) -> Vec<Taken> {
+        some_taken_of(film, 5, images)
+    }
+
+    fn some_taken_of(film: Film, n: usize, images: &Path) -> Vec<Taken> {
         let folder = tempfile::tempdir().unwrap();
         let log = crate::command::poses::log::Log::open(&folder.path().join("poses.log")).unwrap();
         let stop = std::sync::atomic::AtomicBool::new(false);
-        frames(&[film], Some(5), images, Work { log: &log, stop: &stop }).unwrap().unwrap()
+        frames(&[film], Some(n), images, Work { log: &log, stop: &stop }).unwrap().unwrap()
+    }
+
+    /// Of few looks a second and many frames, as a long film has them.
+    #[test]
+    fn frames_are_those_of_their_times_whatever_the_rate() {
+        let home = tempfile::tempdir().unwrap();
+        let options = ["-f", "lavfi", "-i", "testsrc2=s=64x48:r=30:d=37", "-g", "30", "-pix_fmt", "yuv420p"];
+        let Some(film) = made(home.path(), "long.mp4", &options) else { return };
+        let rate = film.candidates_per_s(40);
+        assert!(rate < 9.0 && 25.0 % rate > 0.1, "{rate}");
+        let film_path = film.path.clone();
+        let taken = some_taken_of(film, 40, home.path());
+        assert!(taken.len() > 30, "{}", taken.len());
+        for Taken { name, at_s, .. } in &taken {
+            let select = format!("fps={rate:.6},select=eq(n\\,{})", (at_s.unwrap() * rate).round());
+            let mut command = FFMPEG.command();
+            command.args(["-nostdin", "-v", "error", "-y", "-i"]).arg(&film_path).args([
+                "-vf",
+                &select,
+                "-frames:v",
+                "1",
+            ]);
+            assert!(command.arg(home.path().join("truth.png")).status().unwrap().success());
+            let pixels = |name: &str| image::open(home.path().join(name)).unwrap().into_rgb8();
+            let (found, truth) = (pixels(name), pixels("truth.png"));
+            let off = found.iter().zip(truth.iter()).map(|(a, b)| u64::from(a.abs_diff(*b))).sum::<u64>();
+            let off = off as f64 / truth.len() as f64;
+            assert!(off < 4.0, "{name} is off by {off:.1}");
+        }
     }
 
     #[test]

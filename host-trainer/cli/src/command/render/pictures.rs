@@ -9,6 +9,7 @@ use pocketsplat_capture::dataset::Image;
 use pocketsplat_files::{Output, Outputs};
 
 use super::super::outputs::{GIF, JPEG, PNG, command_that_makes, marked_jpeg, marked_png};
+use crate::say::say;
 
 /// Pictures of an animation a second.
 const FRAMES_PER_S: u16 = 15;
@@ -122,6 +123,15 @@ fn write_numbered(pictures: &[Image], folder: &Path, mut outputs: Outputs) -> Re
     for (output, picture) in checked.iter().zip(pictures) {
         let png = picture.to_png().with_context(|| format!("could not write {}", output.path().display()))?;
         output.write(&marked_png(&png))?;
+    }
+    let n = pictures.len();
+    let n_older = (n..).take_while(|&i| numbered(folder, i).exists()).count();
+    if n_older > 0 {
+        say!(
+            "warning: {} holds {n_older} pictures more, from {} on, which an earlier command drew; remove them if they are not of this film",
+            folder.display(),
+            numbered(Path::new(""), n).display()
+        );
     }
     Ok(())
 }

@@ -1,0 +1,202 @@
+//! Files and captures that are not what a command takes them for: figures of them would look right and be wrong.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use crate::fixture::{capture, fails, folder, pocketsplat, starts, succeeds, text, undisturbed_run};
+use crate::interruption::signal;
+
+/// A copy of the undisturbed run and its bundle.
+fn copied_run(home: &Path) -> (PathBuf, PathBuf) {
+    let (run, bundle) = (undisturbed_run(), undisturbed_run().with_extension("psb"));
+    let copy = home.join("a.run");
+    assert!(Command::new("cp").arg("-r").arg(run).arg(&copy).status().unwrap().success());
+    fs::copy(bundle, home.join("a.psb")).unwrap();
+    (copy, home.join("a.psb"))
+}
+
+fn another_capture(home: &Path) -> PathBuf {
+    let path = home.join("another");
+    let mut synth = pocketsplat();
+    synth.arg("synth").arg(&path).args(["--size", "32", "--train-views", "6", "--seed", "9"]);
+    succeeds(&mut synth);
+    path
+}
+
+#[test]
+fn a_damaged_bundle_is_refused_by_what_only_looks_at_it() {
+    let home = folder("mistaken-damage");
+    let (_, bundle) = copied_run(&home);
+    let mut bytes = fs::read(&bundle).unwrap();
+    let last = bytes.len() - 9;
+    bytes[last] ^= 16;
+    fs::write(&bundle, bytes).unwrap();
+    let page = home.join("a.html");
+    for command in [&["fit"][..], &["view", "-o", page.to_str().unwrap()], &["inspect"]] {
+        let said = fails(pocketsplat().arg(command[0]).arg(&bundle).args(&command[1..]));
+        assert!(said.contains("is damaged: CRC") && said.contains("copy the file again"), "{command:?}: {said}");
+    }
+    assert!(!page.exists());
+}
+
+#[test]
+fn a_report_is_of_the_runs_own_photographs() {
+    let home = folder("mistaken-report");
+    let (run, _) = copied_run(&home);
+    succeeds(pocketsplat().arg("report").arg(&run));
+    let page = run.join("report.html");
+    let before = fs::read(&page).unwrap();
+    let said = fails(pocketsplat().arg("report").arg(&run).arg(another_capture(&home)));
+    assert!(said.contains("this is another capture") && said.contains("as CAPTURE"), "{said}");
+    assert_eq!(fs::read(&page).unwrap(), before);
+}
+
+#[test]
+fn compare_keeps_figures_of_its_own_capture_and_views_alone() {
+    let home = folder("mistaken-compare");
+    let (run, bundle) = copied_run(&home);
+    let other = another_capture(&home);
+    let kept = bundle.with_extension("json");
+    let eval = |of: &Path, options: &[&str]| {
+        let output = pocketsplat().arg("eval").arg(&bundle).arg(of).args(options).arg("--json").output().unwrap();
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        fs::write(&kept, &output.stdout).unwrap();
+        serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap()["psnr_db"].as_f64().unwrap()
+    };
+    let compared = || {
+        succeeds(pocketsplat().arg("compare").arg(&run).arg("-o").arg(home.join("c")));
+        let table = fs::read_to_string(home.join("c/runs.csv")).unwrap();
+        let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
+        let place = rows[0].iter().position(|name| *name == "PSNR" || *name == "psnr_db").expect("a column of PSNR");
+        rows[1][place].parse::<f64>().unwrap()
+    };
+    let right = eval(capture(), &[]);
+    assert!((compared() - right).abs() < 1e-9);
+    let wrong = eval(&other, &[]);
+    let before = fs::read(&kept).unwrap();
+    assert!((wrong - right).abs() > 0.1, "{wrong} {right}");
+    assert!((compared() - right).abs() < 1e-9, "figures of another capture are not taken");
+    assert_eq!(fs::read(&kept).unwrap(), before, "and not lost");
+    eval(capture(), &["--split", "train"]);
+    let before = fs::read(&kept).unwrap();
+    assert!((compared() - right).abs() < 1e-9);
+    assert_eq!(fs::read(&kept).unwrap(), before);
+}
+
+#[test]
+fn a_plan_takes_no_file_of_another_run_for_its_own() {
+    let home = folder("mistaken-plan");
+    let own = home.join("capture");
+    assert!(Command::new("cp").arg("-r").arg(capture()).arg(&own).status().unwrap().success());
+    let plan = home.join("plan.toml");
+    let text = "[captures.S]\na = \"capture\"\n[options]\niterations = 20\nlambda = 0.002\nfeature-dim = 8\noffsets = 3\n[vary]\nseed = [1, 2]\n";
+    fs::write(&plan, text).unwrap();
+    let runs = home.join("runs");
+    let run = || {
+        let mut command = pocketsplat();
+        command.args(["--threads", "1", "plan-runs"]).arg(&plan).arg("-o").arg(&runs).arg("--run");
+        command
+    };
+    succeeds(&mut run());
+    let (one, two) = (runs.join("a/seed-1.psb"), runs.join("a/seed-2.psb"));
+    let before = fs::read(&two).unwrap();
+    fs::copy(&one, &two).unwrap();
+    let said = fails(&mut run());
+    assert!(said.contains("another run has replaced it"), "{said}");
+    fs::write(&two, before).unwrap();
+    fs::remove_dir_all(&own).unwrap();
+    fs::rename(another_capture(&home), &own).unwrap();
+    let said = fails(&mut run());
+    assert!(said.contains("another capture") && said.contains("choose another --output"), "{said}");
+}
+
+#[test]
+fn a_demo_goes_on_that_was_stopped_while_it_made_its_capture() {
+    let home = folder("mistaken-demo");
+    let demo = |size: &str| {
+        let mut command = pocketsplat();
+        command.arg("demo").arg("-o").arg(home.join("demo")).args(["--iterations", "20", "--size", size]);
+        command
+    };
+    let mut child = starts(&mut demo("512"));
+    while !home.join("demo/.capture-being-made").exists() {
+        assert!(child.try_wait().unwrap().is_none(), "ended before");
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    signal(&child, "KILL");
+    child.wait().unwrap();
+    assert!(!home.join("demo/capture").exists());
+    succeeds(&mut demo("32"));
+    assert!(home.join("demo/scene.psb").is_file() && !home.join("demo/.capture-being-made").exists());
+}
+
+#[test]
+fn what_shows_nothing_is_not_converted_without_loss() {
+    let home = folder("mistaken-nothing");
+    let names = "x y z f_dc_0 f_dc_1 f_dc_2 opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3";
+    let properties: String = names.split(' ').map(|name| format!("property float {name}\n")).collect();
+    let mut ply = format!("ply\nformat ascii 1.0\nelement vertex 2\n{properties}end_header\n");
+    for x in ["0.1", "0.7"] {
+        ply += &format!("{x} 0.2 0.3 0.5 0.5 0.5 -20 -3 -3 -3 1 0 0 0\n");
+    }
+    let faint = home.join("faint.ply");
+    fs::write(&faint, ply).unwrap();
+    let said = fails(pocketsplat().arg("export").arg(&faint).arg("-o").arg(home.join("a.spz")));
+    assert!(said.contains("can be seen") && said.contains("0 of 2 Gaussians are opaque"), "{said}");
+    assert!(!home.join("a.spz").exists());
+}
+
+#[test]
+fn a_shorter_turn_tells_of_the_pictures_of_a_longer_one() {
+    let home = folder("mistaken-turn");
+    let (_, bundle) = copied_run(&home);
+    let turn = |n: &str| {
+        let mut command = pocketsplat();
+        command
+            .arg("render")
+            .arg(&bundle)
+            .args(["--orbit", n, "--resolution", "16x16"])
+            .arg("-o")
+            .arg(home.join("film"));
+        succeeds(&mut command)
+    };
+    assert!(!turn("6").contains("warning"));
+    let said = turn("4");
+    assert!(said.contains("2 pictures more, from 0004.png on"), "{said}");
+}
+
+#[test]
+fn costs_name_what_was_drawn() {
+    let home = folder("mistaken-cost");
+    let (_, bundle) = copied_run(&home);
+    let fit: serde_json::Value =
+        serde_json::from_slice(&pocketsplat().arg("fit").arg(&bundle).arg("--json").output().unwrap().stdout).unwrap();
+    let least =
+        fit["points"].as_array().unwrap().iter().map(|point| point["ram_bytes"].as_u64().unwrap()).min().unwrap();
+    let mut cost = pocketsplat();
+    cost.arg("cost").arg(&bundle).arg(capture()).arg("-o").arg(home.join("c")).args(["--count", "0", "--views", "1"]);
+    let said = succeeds(cost.args(["--ram", &least.to_string()]));
+    assert!(said.contains("left out: this memory has no room for it"), "{said}");
+    let table = fs::read_to_string(home.join("c/cost.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
+    let rates = |knob: &str| rows.iter().filter(|row| row[0] == knob).map(|row| row[2]).collect::<Vec<_>>();
+    assert!(rates("level").iter().all(|rate| rate.parse::<f64>().unwrap() > 0.2), "{table}");
+    assert!(rates("pruning rate").len() <= 1, "{table}");
+}
+
+#[test]
+fn a_figure_is_of_numbers_alone() {
+    let home = folder("mistaken-figure");
+    let table = home.join("r.csv");
+    let plot = |rows: &str| {
+        fs::write(&table, format!("Submethod,PSNR,Size [Bytes]\n{rows}")).unwrap();
+        let mut command = pocketsplat();
+        command.arg("plot").arg(&table).arg("-o").arg(home.join("r.svg"));
+        command
+    };
+    assert!(fails(&mut plot("a,30,1000\nb,NaN,2000\n")).contains("`NaN` is no number (line 3, PSNR)"));
+    assert!(fails(&mut plot("a,30,1000\nb,31,0\n")).contains("a size is 0 bytes, needed: more than 0 (line 3"));
+    let said = plot("a,30,1000\nb,31,2000\n").arg("--json").output().unwrap();
+    assert!(serde_json::from_slice::<serde_json::Value>(&said.stdout).is_ok_and(|said| said.is_object()));
+}

@@ -166,7 +166,7 @@ pub(super) fn cases() -> Vec<Case> {
             ColmapText,
             Doubt,
             "principal-point",
-            &["images whose principal point lies outside them: 12"],
+            &["images whose principal point lies outside them or in their corner: 12"],
             |f| {
                 f.cameras[0].parameters[2] = 48.0;
                 f.write_files();

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The checks of a change, by name; without a name all of them, in this order. Installs what it lacks.
+# The checks of a change, by name; without a name all of them. Installs what it lacks.
 #
 #   tools/ci.sh              everything, some of it side by side (an hour at most on two cores, from a clean clone)
 #   tools/ci.sh fmt clippy   some
@@ -8,9 +8,11 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-jobs=(fmt clippy doc pages test viewer npm core-embedded format-doc package link-gate digests reader fuzz firmware boards c demo python many-runs)
-# Of all jobs, `test` waits most: for browsers, and for runs that are to be killed. These go on beside it; of what it builds they build nothing.
+before_test=(fmt clippy doc pages)
+# Of all jobs, `test` waits most: for browsers, and for runs that are to be killed. These go on beside it. They build nothing that it builds.
 beside_test=(viewer npm core-embedded format-doc package link-gate digests reader fuzz firmware boards c)
+after_test=(demo python many-runs)
+jobs=("${before_test[@]}" test "${beside_test[@]}" "${after_test[@]}")
 
 embedded_target=thumbv7em-none-eabihf
 defmt_print_version=1.2.0
@@ -635,16 +637,21 @@ need_cargo
 if [ $# -gt 0 ]; then
   run "$@"
 else
-  run fmt clippy doc pages
+  run "${before_test[@]}"
   mkdir -p "$target"
-  (run "${beside_test[@]}") >"$target/beside-test.log" 2>&1 &
+  log=$target/beside-test.log
+  # A process group of its own, so that all of it ends where a test fails.
+  set -m
+  (run "${beside_test[@]}") >"$log" 2>&1 &
   beside=$!
-  trap 'kill $beside 2>/dev/null' EXIT
+  set +m
+  trap 'kill -- "-$beside" 2>/dev/null || true; echo "ci: what ran beside the tests said: $log" >&2' EXIT
   run test
+  trap - EXIT
   passed=1
-  wait $beside || passed=
-  cat "$target/beside-test.log"
+  wait "$beside" || passed=
+  cat "$log"
   [ -n "$passed" ] || fail "a job beside the tests failed; its words stand above"
-  run demo python many-runs
+  run "${after_test[@]}"
 fi
 echo "== all passed in $SECONDS s, $(processor_seconds $$) processor seconds: ${*:-${jobs[*]}}"

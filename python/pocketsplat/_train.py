@@ -83,7 +83,7 @@ class Training:
     def wait(self) -> dict[str, Any]:
         """Waits for the end and gives the content of result.json: psnr_db, ssim, bundle_bytes, views and so on.
 
-        What the command warned of is warned of here. Raises TrainError where the run fails.
+        What the command warned of is warned of at its end, here, in `bundle()` and where one iterates. Raises TrainError where the run fails.
         """
         self._process.wait()
         self._check()
@@ -95,7 +95,8 @@ class Training:
 
         Raises TrainError where the run fails.
         """
-        self.wait()
+        self._process.wait()
+        self._check()
         return Bundle.open(self.output)
 
     def stop(self) -> None:
@@ -156,9 +157,9 @@ def train(capture: str | os.PathLike[str], output: str | os.PathLike[str], **opt
 
     Raises ValueError for `dry_run`, `help` and `version`, which train nothing.
     """
-    for name in ("dry_run", "help", "version"):
-        if options.get(name):
-            option = name.replace("_", "-")
+    for name, value in options.items():
+        option = name.rstrip("_").replace("_", "-")
+        if value and option in ("dry-run", "help", "version"):
             raise ValueError(f"{name} trains nothing; give it to the command: `python -m pocketsplat train CAPTURE --{option}`")
     # By its path: `-m pocketsplat` would look into the working folder first.
     program = Path(__file__).with_name("__main__.py")

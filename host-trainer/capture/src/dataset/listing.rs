@@ -64,13 +64,13 @@ impl Note {
         )
     }
 
-    /// The same of a capture whose own split has none under this key.
-    pub(super) fn no_test_views_named(key: &str) -> Self {
-        let text = format!(
-            "no test views, so test PSNR cannot be computed: the capture has a split of its own, and its `{key}` names none; name some \
-             there, or remove the lists of the split to hold out every n-th image with `--test-every`"
-        );
-        Self::warning("no-test-views", text)
+    /// The same of a capture of nerfstudio's with a split of its own.
+    pub(super) fn no_test_views_in_own_split() -> Self {
+        Self::warning(
+            "no-test-views",
+            "no test views, so test PSNR cannot be computed: the capture has a split of its own, and no frame is in its `test_filenames`; \
+             name some there as `file_path` spells them, or remove the three lists to hold out every n-th image with `--test-every`",
+        )
     }
 }
 

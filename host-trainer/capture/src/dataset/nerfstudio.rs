@@ -49,11 +49,7 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
     if !listing.has_test_views() {
         let [train, val, test] = &transforms.splits;
         let has_own_split = train.is_some() || val.is_some() || test.is_some();
-        listing.notes.push(if has_own_split {
-            Note::no_test_views_named("test_filenames")
-        } else {
-            Note::no_test_views()
-        });
+        listing.notes.push(if has_own_split { Note::no_test_views_in_own_split() } else { Note::no_test_views() });
     }
     Ok(listing)
 }

@@ -55,7 +55,6 @@ pub(super) fn measured(config: &RunConfig, lpips: Option<&Lpips>) -> Result<Eval
     let path = config.output.with_extension("json");
     let bundle_crc = Some(crc32(&file.bytes));
     let own = file.protocol(&file.parse()?);
-    let mut is_free = true;
     if path.is_file() {
         let kept = serde_json::from_slice::<Evaluation>(&std::fs::read(&path)?);
         let kept = kept.with_context(|| format!("{} has no figures of a bundle; move it away", path.display()))?;
@@ -68,15 +67,18 @@ pub(super) fn measured(config: &RunConfig, lpips: Option<&Lpips>) -> Result<Eval
         if kept.bundle_crc == bundle_crc && is_alike && has_all {
             return Ok(kept);
         }
-        is_free = is_alike || kept.bundle_crc != bundle_crc;
+        if kept.bundle_crc == bundle_crc && !is_alike {
+            bail!(
+                "{} has figures of this bundle that were taken otherwise, or of another capture; move it away",
+                path.display()
+            );
+        }
     }
     let capture = CaptureArgs { dataset: config.dataset.clone(), options: config.capture.clone() };
     let what = Measurements { per_tier: has_trained_tiers(config), lpips, ..Measurements::default() };
     let evaluation = evaluate(&file, &capture, Split::Test, Renderer::Core, &what)?;
     let is_own = own.zip(evaluation.protocol.as_ref()).is_none_or(|(own, of)| own.is_of_capture_of(of));
-    if !is_free {
-        say!("{} has figures of other views of this bundle, and stays as it is", path.display());
-    } else if is_own {
+    if is_own {
         keep(&path, output::json(&evaluation)?.as_bytes())?;
     }
     Ok(evaluation)

@@ -95,7 +95,17 @@ pub(crate) fn run(args: &Args) -> Result<()> {
             say!("warning: the page will lack photographs: {error:#}; give the folder as CAPTURE if it has moved");
         })
         .ok();
-    let n_bytes = write(&args.run, &config, capture.as_ref(), &output)?;
+    let file = BundleFile::of_run(&args.run, &config)?;
+    let protocol = file.protocol(&file.parse()?);
+    let why = protocol.zip(capture.as_ref()).and_then(|(protocol, capture)| protocol.contradiction(capture));
+    if let Some(why) = &why {
+        let (dataset, remedy) = (source.dataset.display(), "give the folder of the run's own photographs as CAPTURE");
+        if args.dataset.is_some() {
+            bail!("{dataset}: {why}; {remedy}");
+        }
+        say!("warning: the page will lack photographs: {dataset}: {why}; {remedy}");
+    }
+    let n_bytes = write(&args.run, &config, capture.as_ref().filter(|_| why.is_none()), &output)?;
     output::print_text(&format!("{}: {:.2} MB; open it in a browser\n", output.path().display(), n_bytes as f64 / 1e6))
 }
 
@@ -124,10 +134,6 @@ fn write(folder: &Path, config: &RunConfig, capture: Option<&Capture>, output: &
     })?;
     let result = serde_json::from_str(&text).with_context(|| format!("{} is no result of a run", result.display()))?;
     let file = BundleFile::of_run(folder, config)?;
-    let protocol = file.protocol(&file.parse()?);
-    if let Some(why) = protocol.zip(capture).and_then(|(protocol, capture)| protocol.contradiction(capture)) {
-        bail!("{why}; give the folder of those that it was trained on as CAPTURE");
-    }
     let photographs = capture
         .filter(|capture| !capture.test.is_empty())
         .map(|capture| photographs(&file, capture, &config.capture))

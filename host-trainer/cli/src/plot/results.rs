@@ -72,16 +72,16 @@ pub(super) fn curves(reader: &mut csv::Reader<&[u8]>) -> Result<Vec<Named<Vec<Re
     let naming: Vec<usize> = NAMING.iter().filter_map(|names| place(&header, names)).filter(differs).collect();
     let rate = place(&header, RATE);
     let row = |record: &&StringRecord| {
+        let line = record.position().map_or(0, csv::Position::line);
+        let remedy = "correct it, or leave the cell empty to pass the row over";
         let number = |column: usize| {
             let value = &record[column];
-            let line = record.position().map_or(0, csv::Position::line);
             let number = value.parse::<f64>().ok().filter(|number| number.is_finite());
-            number.with_context(|| format!("`{value}` is no number (line {line}, {})", &header[column]))
+            number.with_context(|| format!("`{value}` is no number (line {line}, {}); {remedy}", &header[column]))
         };
         let (psnr_db, size_bytes) = (number(psnr)?, number(size)?);
         if size_bytes <= 0.0 {
-            let line = record.position().map_or(0, csv::Position::line);
-            bail!("a size is {size_bytes} bytes, needed: more than 0 (line {line}, {})", &header[size]);
+            bail!("a size is {size_bytes} bytes, needed: more than 0 (line {line}, {}); {remedy}", &header[size]);
         }
         let submethod = match rate {
             Some(column) if header[column].eq_ignore_ascii_case("lambda") => format!("lambda={}", &record[column]),

@@ -119,7 +119,10 @@ fn measure_in<A: Arithmetic>(of: &Measurement<'_, '_>) -> Result<Measured, Decod
     let (n, n_counted) = (sights.len() as f64, sights.iter().filter(|sight| sight.counts).count() as f64);
     let mut predicted = vec![[0.0; Stage::ALL.len()]; targets.len()];
     let mut measured = Measured {
-        setting: Setting { pruning_rate: plan.pruning_rate().into(), ..setting.clone() },
+        setting: Setting {
+            pruning_rate: setting::pruning_rate(bundle, plan.n_tiers()).unwrap_or_default(),
+            ..setting.clone()
+        },
         psnr_to_reference_db: f64::INFINITY,
         worst_channel: 0,
         psnr_db: 0.0,

@@ -39,14 +39,15 @@ impl Setting {
         }
     }
 
-    /// Whether a plan has the tiers and strips that are asked for: in little memory a plan leaves out more anchors, or draws in more strips.
+    /// Whether a plan has the tiers, the strips and the sums that are asked for: in little memory a plan leaves out more anchors, draws in
+    /// more strips, or keeps no sums.
     pub fn is_kept_by(&self, plan: &Plan) -> bool {
         let has_tiers = self.tiers == u8::MAX || self.tiers == plan.n_tiers();
         let has_strips = match self.strips {
             Strips::Exactly(n) => n == plan.n_strips(),
             _ => true,
         };
-        has_tiers && has_strips
+        has_tiers && has_strips && (self.residency != Residency::AutoWithSums || plan.keeps_sums())
     }
 
     /// `budget` with these parameters.
@@ -59,7 +60,7 @@ impl Setting {
 const ALPHA_CUTS: [u8; 5] = [2, 3, 4, 6, 8];
 
 /// The share of the anchors that the first `tiers` tiers leave out.
-fn pruning_rate(bundle: &Bundle<'_>, tiers: u8) -> Option<f64> {
+pub(super) fn pruning_rate(bundle: &Bundle<'_>, tiers: u8) -> Option<f64> {
     let tier = bundle.tier(tiers.checked_sub(1)?)?;
     Some(1.0 - f64::from(tier.n_anchors) / f64::from(bundle.n_anchors().max(1)))
 }

@@ -124,8 +124,8 @@ fn lenses(listing: &Listing, findings: &mut Vec<Finding>) {
             "images whose focal lengths along x and y differ by more than {:.0} %",
             100.0 * (MAX_FOCAL_RATIO - 1.0)
         ),
-        "check fl_x and fl_y: pixels of photographs are square, so they are nearly the same; if they were found together with the poses, \
-         these are wrong too: look for them anew",
+        "pixels of photographs are square: if the images were stretched, nothing is wrong; else check the focal lengths (fl_x and fl_y), and \
+         if they were found together with the poses, find both anew",
     ));
     let outside: Vec<_> = listing
         .sound()
@@ -149,7 +149,7 @@ fn lenses(listing: &Listing, findings: &mut Vec<Finding>) {
         Severity::Warning,
         "field-of-view",
         &format!(
-            "images whose focal length is none of a camera, which has {} to {} times the image's longer side",
+            "images whose focal length is not {} to {} times their longer side",
             USUAL_FOCAL_LENGTHS[0], USUAL_FOCAL_LENGTHS[1]
         ),
         "check fl_x and fl_y, or camera_angle_x: a focal length is in pixels, for the size that the intrinsics give, and an angle in radians",

@@ -97,7 +97,7 @@ pub(super) fn cases() -> Vec<Case> {
             Doubt,
             "field-of-view",
             &[
-                "warning[field-of-view]: images whose focal length is none of a camera, which has 0.1 to 100 times",
+                "warning[field-of-view]: images whose focal length is not 0.1 to 100 times their longer side: 1 (images/p_03.png)",
                 "warning[principal-point]: images whose principal point lies outside them or in their corner: 1 (images/p_03.png)",
             ],
             |f| {
@@ -110,7 +110,7 @@ pub(super) fn cases() -> Vec<Case> {
             Nerfstudio,
             Doubt,
             "no-test-views",
-            &["has a split of its own, and its `test_filenames` names none"],
+            &["has a split of its own, and no frame is in its `test_filenames`"],
             |f| {
                 let names: Vec<String> = (0..12).map(|i| format!("\"images/p_{i:02}.png\"")).collect();
                 f.shared.push_str(&format!(", \"train_filenames\": [{}], \"test_filenames\": []", names.join(", ")));

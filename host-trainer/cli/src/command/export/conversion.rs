@@ -52,7 +52,8 @@ pub(super) fn run(args: &Args, format: Format, output: &Output) -> Result<ExitCo
     let file = GaussiansFile::read_as(&args.bundle, args.axes.spz_axes)?;
     if shows_nothing(&file.gaussians) {
         bail!(
-            "nothing in {} can be seen, so no picture tells what another format loses: 0 of {} Gaussians are opaque, needed: 1",
+            "nothing in {} can be seen, so no picture tells what another format loses: 0 of {} Gaussians are opaque enough to be drawn, \
+             needed: 1; check that its opacities are those before the sigmoid, as 3DGS writes them",
             args.bundle.display(),
             file.gaussians.len()
         );

@@ -6,11 +6,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use pocketsplat_files::{shell_word, shown};
 
-use super::kinds::{Kind, Treatment, extension, films_in, kind_of, photographs_in, stem};
+use super::kinds::{AS_THEY_ARE, Kind, Treatment, extension, films_in, kind_of, photographs_in, stem};
 use super::programs::{FFMPEG, FFPROBE, HEIF_CONVERT, HEIF_DEC, Needed};
-
-/// Extensions of photographs that are taken as they are.
-const AS_THEY_ARE: [&str; 4] = ["png", "jpg", "jpeg", "webp"];
 
 /// A photograph that is given.
 #[derive(Clone, Debug, PartialEq)]

@@ -11,8 +11,10 @@ use crate::say::say;
 const FOLDERS: [&str; 5] = ["images", "input", "rgb", "photos", "."];
 /// Extensions of films, for those whose first bytes say nothing.
 const FILMS: [&str; 5] = ["mp4", "mov", "mkv", "avi", "webm"];
-/// Extensions of photographs, for those whose first bytes say nothing.
-const PHOTOGRAPHS: [&str; 7] = ["jpg", "jpeg", "png", "webp", "heic", "heif", "avif"];
+/// Extensions of photographs that are taken as they are.
+pub(super) const AS_THEY_ARE: [&str; 4] = ["png", "jpg", "jpeg", "webp"];
+/// Extensions of those that are converted.
+const CONVERTED: [&str; 3] = ["heic", "heif", "avif"];
 /// What becomes of a photograph.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Treatment {
@@ -42,6 +44,11 @@ pub(super) fn stem(name: &str) -> &str {
     name.rsplit_once('.').map_or(name, |(stem, _)| stem)
 }
 
+fn is_called_photograph(path: &Path) -> bool {
+    let extension = extension(&path.to_string_lossy());
+    AS_THEY_ARE.into_iter().chain(CONVERTED).any(|name| name == extension)
+}
+
 /// By its first bytes; by its name where these say nothing.
 pub(super) fn kind_of(path: &Path) -> Option<Kind> {
     let is_film = FILMS.contains(&extension(&path.file_name()?.to_string_lossy()).as_str());
@@ -56,12 +63,19 @@ pub(super) fn kind_of(path: &Path) -> Option<Kind> {
     }
 }
 
+/// Whether it is a link to nothing.
+fn is_broken(path: &Path) -> bool {
+    path.is_symlink() && !path.exists()
+}
+
 /// The files of a folder that are not hidden, sorted.
 fn files_of(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let is_shown = |path: &PathBuf| path.file_name().is_some_and(|name| !name.as_encoded_bytes().starts_with(b"."));
-    let mut files: Vec<PathBuf> =
-        entries.map(|entry| entry.path()).filter(|path| is_shown(path) && !path.is_dir()).collect();
+    let mut files: Vec<PathBuf> = entries
+        .map(|entry| entry.path())
+        .filter(|path| is_shown(path) && (path.is_file() || is_broken(path)))
+        .collect();
     files.sort_unstable();
     files
 }
@@ -81,15 +95,13 @@ pub(super) fn photographs_in(folder: &Path) -> (Vec<(PathBuf, Treatment)>, Vec<P
             match kind_of(&path) {
                 Some(Kind::Photograph(treatment)) => photographs.push((path, treatment)),
                 Some(Kind::Foreign) => foreign.push(path),
-                None if PHOTOGRAPHS.contains(&extension(&path.to_string_lossy()).as_str()) => {
-                    damaged.push(shown(&path))
-                }
+                None if is_called_photograph(&path) => damaged.push(shown(&path)),
                 _ => {}
             }
         }
         if let Some(first) = damaged.first() {
             say!(
-                "warning: {} files are called photographs and hold none, the first `{first}`: they are left out; copy them anew, or run \
+                "warning: {} of the files called photographs cannot be read as such, the first `{first}`: left out; copy them anew, or run \
                  `git lfs pull` where they are pointers of Git LFS",
                 damaged.len()
             );

@@ -34,8 +34,12 @@ impl Search<'_> {
             }
             if let Some(doubt) = doubt_about(&best, n).filter(|_| self.may_compare_each()) {
                 say!("{doubt}; once more, with each of them compared with each other one");
-                if !self.matched_each()? || !self.improved(&mut best, &third)? {
-                    return Ok(None);
+                match self.matched_each() {
+                    Ok(true) if self.improved(&mut best, &third)? => {}
+                    Ok(_) => return Ok(None),
+                    // What there is already is worth more than nothing.
+                    Err(error) if !best.is_empty() => say!("warning: {error:#}"),
+                    Err(error) => return Err(error),
                 }
             }
             if best.is_empty() {
@@ -84,8 +88,11 @@ impl Search<'_> {
         if !are_better(&others, best) {
             return Ok(true);
         }
-        *best = others;
-        self.adjusted(&best[0])
+        if !self.adjusted(&others[0])? {
+            return Ok(false);
+        }
+        *best = models_in(folder)?;
+        Ok(true)
     }
 
     /// Fits all of a model together, the distortion of its lens too; `false` where it was stopped.

@@ -13,7 +13,7 @@ use super::state::{FILE, Settings, Stage, State};
 
 /// What other programs said.
 const LOG: &str = "poses.log";
-/// Where models lie until the largest is known: those of a first and of a second attempt.
+/// Where models lie until the largest is known: those of each attempt.
 const MODELS: [&str; 3] = ["models", "models-2", "models-3"];
 
 /// Lists of photographs and of pairs, while COLMAP reads them.
@@ -130,8 +130,8 @@ fn refuse_foreign(folder: &Path, lies_here: bool) -> Result<()> {
     let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
     // A log is what is left of a search that was killed before it wrote anything else.
     let names: Vec<String> = names.filter(|name| name != LOG).collect();
-    let ours = ["database.db", "sparse", MODELS[0], MODELS[1], LIST, PAIRS];
-    let in_the_way = |name: &&String| !lies_here || ours.contains(&name.as_str());
+    let ours = ["database.db", "sparse", LIST, PAIRS];
+    let in_the_way = |name: &&String| !lies_here || ours.into_iter().chain(MODELS).any(|ours| ours == *name);
     if let Some(name) = names.iter().find(in_the_way) {
         bail!(
             "`{path}` holds {name} and no {FILE}, so it is no capture that this command began; choose another --output, as {}",

@@ -128,7 +128,7 @@ fn write_numbered(pictures: &[Image], folder: &Path, mut outputs: Outputs) -> Re
     let n_older = (n..).take_while(|&i| numbered(folder, i).exists()).count();
     if n_older > 0 {
         say!(
-            "warning: {} holds {n_older} pictures more, from {} on, which an earlier command drew; remove them if they are not of this film",
+            "warning: {} also holds {n_older} numbered pictures that are not of this command, from {} on; remove them if you do not want them",
             folder.display(),
             numbered(Path::new(""), n).display()
         );

@@ -95,8 +95,9 @@ pub(crate) fn run(args: &Args) -> Result<()> {
             say!("warning: the page will lack photographs: {error:#}; give the folder as CAPTURE if it has moved");
         })
         .ok();
-    let file = BundleFile::of_run(&args.run, &config)?;
-    let protocol = file.protocol(&file.parse()?);
+    // Of a run without a bundle `write` says what to do.
+    let file = BundleFile::of_run(&args.run, &config).ok();
+    let protocol = file.and_then(|file| file.protocol(&file.parse().ok()?));
     let why = protocol.zip(capture.as_ref()).and_then(|(protocol, capture)| protocol.contradiction(capture));
     if let Some(why) = &why {
         let (dataset, remedy) = (source.dataset.display(), "give the folder of the run's own photographs as CAPTURE");

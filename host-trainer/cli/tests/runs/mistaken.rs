@@ -12,8 +12,14 @@ fn copied_run(home: &Path) -> (PathBuf, PathBuf) {
     let (run, bundle) = (undisturbed_run(), undisturbed_run().with_extension("psb"));
     let copy = home.join("a.run");
     assert!(Command::new("cp").arg("-r").arg(run).arg(&copy).status().unwrap().success());
-    fs::copy(bundle, home.join("a.psb")).unwrap();
-    (copy, home.join("a.psb"))
+    let moved = home.join("a.psb");
+    fs::copy(&bundle, &moved).unwrap();
+    let config = copy.join("config.toml");
+    let text = fs::read_to_string(&config).unwrap();
+    let of_copy = text.replace(bundle.to_str().unwrap(), moved.to_str().unwrap());
+    assert_ne!(of_copy, text);
+    fs::write(&config, of_copy).unwrap();
+    (copy, moved)
 }
 
 fn another_capture(home: &Path) -> PathBuf {

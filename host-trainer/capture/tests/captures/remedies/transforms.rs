@@ -166,7 +166,7 @@ fn remedies_for_transforms() {
         trouble(
             "a focal length of pixels that are no squares",
             Nerfstudio,
-            "check fl_x and fl_y",
+            "check the focal lengths (fl_x and fl_y)",
             |f| {
                 f.shared = "\"fl_x\": 20, \"fl_y\": 60".to_owned();
                 f.write_files();

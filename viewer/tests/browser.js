@@ -159,7 +159,7 @@ async function hands() {
   boards.dispatchEvent(new Event('change'));
   await settled();
   check(state.device && view.canvas.width === 240 && view.plan.scratchBytes <= state.ramBytes, 'a board sets display and memory');
-  check(state.ramBytes === 500 * 1024 && / s$/.test(document.querySelector('#stages b').textContent), 'a board has seconds');
+  check(state.ramBytes === 494 * 1024 && / s$/.test(document.querySelector('#stages b').textContent), 'a board has seconds');
   const turned = orbit.yaw;
   press(' ');
   for (let i = 0; i < 50 && orbit.yaw === turned; i++) await sleep(100);

@@ -642,7 +642,7 @@ else
   log=$target/beside-test.log
   # A process group of its own, so that all of it ends where a test fails.
   set -m
-  (run "${beside_test[@]}") >"$log" 2>&1 &
+  (run "${beside_test[@]}") >"$log" 2>&1 </dev/null &
   beside=$!
   set +m
   trap 'kill -- "-$beside" 2>/dev/null || true; echo "ci: what ran beside the tests said: $log" >&2' EXIT

@@ -47,8 +47,7 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
     }
     let mut listing = Listing { layout: Layout::Nerfstudio, source, views, points, unposed, notes };
     if !listing.has_test_views() {
-        let [train, val, test] = &transforms.splits;
-        let has_own_split = train.is_some() || val.is_some() || test.is_some();
+        let has_own_split = transforms.splits.iter().any(Option::is_some);
         listing.notes.push(if has_own_split { Note::no_test_views_in_own_split() } else { Note::no_test_views() });
     }
     Ok(listing)
@@ -57,7 +56,7 @@ pub(super) fn list(folder: &Path, options: &LoadOptions) -> Result<Listing, Data
 /// The split of every frame: as the file gives it, or every n-th held out; `None` for frames of no used split.
 fn splits(transforms: &Transforms, options: &LoadOptions, notes: &mut Vec<Note>) -> Vec<Option<Split>> {
     let [train, val, test] = &transforms.splits;
-    if train.is_none() && val.is_none() && test.is_none() {
+    if transforms.splits.iter().all(Option::is_none) {
         return (0..transforms.frames.len()).map(|i| Some(every_nth(options.test_every, i))).collect();
     }
     let test = test.as_ref().filter(|names| !names.is_empty());

@@ -58,26 +58,28 @@ pub(super) fn measured(config: &RunConfig, lpips: Option<&Lpips>) -> Result<Eval
     if path.is_file() {
         let kept = serde_json::from_slice::<Evaluation>(&std::fs::read(&path)?);
         let kept = kept.with_context(|| format!("{} has no figures of a bundle; move it away", path.display()))?;
-        let is_own = |protocol: &Protocol| own.as_ref().is_none_or(|own| own.is_of_capture_of(protocol));
+        let is_own = |protocol: &Protocol| own.as_ref().is_none_or(|own| own.shares_capture_with(protocol));
         let as_loaded = |protocol: &Protocol| Protocol::said(&config.capture) == protocol.options && is_own(protocol);
         let is_alike = kept.split == Split::Test.to_string()
             && kept.renderer == Renderer::Core.name()
             && kept.protocol.as_ref().is_some_and(as_loaded);
         let has_all = lpips.is_none_or(|lpips| kept.lpips_of == Some(lpips_of(lpips)));
-        if kept.bundle_crc == bundle_crc && is_alike && has_all {
-            return Ok(kept);
-        }
-        if kept.bundle_crc == bundle_crc && !is_alike {
-            bail!(
-                "{} has figures of this bundle that were taken otherwise, or of another capture; move it away",
-                path.display()
-            );
+        if kept.bundle_crc == bundle_crc {
+            if !is_alike {
+                bail!(
+                    "{} has figures of this bundle that were taken otherwise, or of another capture; move it away",
+                    path.display()
+                );
+            }
+            if has_all {
+                return Ok(kept);
+            }
         }
     }
     let capture = CaptureArgs { dataset: config.dataset.clone(), options: config.capture.clone() };
     let what = Measurements { per_tier: has_trained_tiers(config), lpips, ..Measurements::default() };
     let evaluation = evaluate(&file, &capture, Split::Test, Renderer::Core, &what)?;
-    let is_own = own.zip(evaluation.protocol.as_ref()).is_none_or(|(own, of)| own.is_of_capture_of(of));
+    let is_own = own.zip(evaluation.protocol.as_ref()).is_none_or(|(own, of)| own.shares_capture_with(of));
     if is_own {
         keep(&path, output::json(&evaluation)?.as_bytes())?;
     }

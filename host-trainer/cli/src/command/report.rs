@@ -95,18 +95,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
             say!("warning: the page will lack photographs: {error:#}; give the folder as CAPTURE if it has moved");
         })
         .ok();
-    // Of a run without a bundle `write` says what to do.
-    let file = BundleFile::of_run(&args.run, &config).ok();
-    let protocol = file.and_then(|file| file.protocol(&file.parse().ok()?));
-    let why = protocol.zip(capture.as_ref()).and_then(|(protocol, capture)| protocol.contradiction(capture));
-    if let Some(why) = &why {
-        let (dataset, remedy) = (source.dataset.display(), "give the folder of the run's own photographs as CAPTURE");
-        if args.dataset.is_some() {
-            bail!("{dataset}: {why}; {remedy}");
-        }
-        say!("warning: the page will lack photographs: {dataset}: {why}; {remedy}");
-    }
-    let n_bytes = write(&args.run, &config, capture.as_ref().filter(|_| why.is_none()), &output)?;
+    let n_bytes = write(&args.run, &config, (capture.as_ref(), args.dataset.as_deref()), &output)?;
     output::print_text(&format!("{}: {:.2} MB; open it in a browser\n", output.path().display(), n_bytes as f64 / 1e6))
 }
 
@@ -115,7 +104,7 @@ pub(super) fn write_into(folder: &Path, config: &RunConfig, capture: &Capture) -
     let path = folder.join(FILE);
     // The folder is the run's own.
     let written = Outputs::new(true).file(&path, outputs::PAGE).map_err(anyhow::Error::from);
-    let written = written.and_then(|page| write(folder, config, Some(capture), &page));
+    let written = written.and_then(|page| write(folder, config, (Some(capture), None), &page));
     match written {
         Ok(_) => say!("its report:   {}", path.display()),
         Err(error) => say!("warning: there is no report: {error:#}"),
@@ -124,7 +113,14 @@ pub(super) fn write_into(folder: &Path, config: &RunConfig, capture: &Capture) -
 }
 
 /// Returns the length of the page.
-fn write(folder: &Path, config: &RunConfig, capture: Option<&Capture>, output: &Output) -> Result<usize> {
+///
+/// * `given`: where the capture lies, if somebody says so. It is refused then if it is another one, and else left out with a word.
+fn write(
+    folder: &Path,
+    config: &RunConfig,
+    (capture, given): (Option<&Capture>, Option<&Path>),
+    output: &Output,
+) -> Result<usize> {
     let result = folder.join("result.json");
     let text = std::fs::read_to_string(&result).with_context(|| {
         format!(
@@ -135,8 +131,18 @@ fn write(folder: &Path, config: &RunConfig, capture: Option<&Capture>, output: &
     })?;
     let result = serde_json::from_str(&text).with_context(|| format!("{} is no result of a run", result.display()))?;
     let file = BundleFile::of_run(folder, config)?;
+    let protocol = file.protocol(&file.parse()?);
+    let another = protocol.zip(capture).and_then(|(protocol, capture)| protocol.contradiction(capture));
+    if let Some(why) = &another {
+        let dataset = given.unwrap_or(&config.dataset).display();
+        let why = format!("{dataset}: {why}; give the folder of the run's own photographs as CAPTURE");
+        if given.is_some() {
+            bail!(why);
+        }
+        say!("warning: the page will lack photographs: {why}");
+    }
     let photographs = capture
-        .filter(|capture| !capture.test.is_empty())
+        .filter(|capture| another.is_none() && !capture.test.is_empty())
         .map(|capture| photographs(&file, capture, &config.capture))
         .transpose()?;
     let run = Run { folder, config, result, file, photographs };

@@ -79,7 +79,7 @@ impl Protocol {
     }
 
     /// Whether two are of one capture.
-    pub(crate) fn is_of_capture_of(&self, other: &Self) -> bool {
+    pub(crate) fn shares_capture_with(&self, other: &Self) -> bool {
         self.capture == other.capture
     }
 

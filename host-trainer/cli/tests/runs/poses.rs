@@ -16,7 +16,7 @@ use crate::similarity::{Pose, offsets};
 
 /// Photographs, all around and above.
 const PHOTOGRAPHS: u32 = 40;
-/// Frames of a film, each of which is compared with its neighbours alone: of 40, one film of ten ended in poses that were bent.
+/// Frames of a film, each of which is compared with its neighbours: with 40, which lie farther apart, some films end in poses that are bent.
 const FRAMES: u32 = 60;
 /// Frames in a second of the film.
 const RATE: f64 = 10.0;

@@ -13,6 +13,9 @@ const JPEG_QUALITY: u8 = 95;
 /// Bytes that a decoded photograph may take, 1,400 megapixels; a file that asks for more is damaged.
 const MOST_DECODED_BYTES: u64 = 4 << 30;
 
+/// The profiles of sRGB that programs write differ by less than this in XYZ, and Display P3 differs by 0.08.
+const SAME_PRIMARIES: f64 = 0.02;
+
 /// What an image file says about itself before its pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct ImageHeader {
@@ -26,6 +29,8 @@ pub(super) struct ImageHeader {
     pub(super) is_depth_like: bool,
     /// The EXIF orientation, 1 to 8; 1 means upright, and so does its absence.
     pub(super) exif_orientation: u8,
+    /// Whether it brings a colour profile whose primaries are not those of sRGB.
+    pub(super) has_other_primaries: bool,
 }
 
 /// Reads the header of the image file `path`.
@@ -36,6 +41,7 @@ pub(super) fn read_header(path: &Path) -> Result<ImageHeader, String> {
     let reader = ::image::ImageReader::open(path).and_then(|reader| reader.with_guessed_format());
     let mut decoder = reader.map_err(in_words)?.into_decoder().map_err(in_words)?;
     let exif_orientation = decoder.orientation().map_or(1, |orientation| orientation.to_exif());
+    let has_other_primaries = decoder.icc_profile().is_ok_and(|icc| icc.is_some_and(|icc| has_other_primaries(&icc)));
     let colour = decoder.color_type();
     let is_grey = !colour.has_color();
     Ok(ImageHeader {
@@ -44,7 +50,22 @@ pub(super) fn read_header(path: &Path) -> Result<ImageHeader, String> {
         is_grey,
         is_depth_like: is_grey && colour.bytes_per_pixel() > 1 + u8::from(colour.has_alpha()),
         exif_orientation,
+        has_other_primaries,
     })
+}
+
+/// Whether a colour profile says that red, green and blue are not those of sRGB; one that cannot be read says nothing.
+fn has_other_primaries(icc: &[u8]) -> bool {
+    let Ok(profile) = moxcms::ColorProfile::new_from_slice(icc) else { return false };
+    let primaries = |of: &moxcms::ColorProfile| {
+        [of.red_colorant, of.green_colorant, of.blue_colorant].map(|colorant| [colorant.x, colorant.y, colorant.z])
+    };
+    let pairs = primaries(&profile)
+        .into_iter()
+        .flatten()
+        .zip(primaries(&moxcms::ColorProfile::new_srgb()).into_iter().flatten());
+    profile.color_space == moxcms::DataColorSpace::Rgb
+        && pairs.map(|(own, srgb)| (own - srgb).abs()).fold(0.0, f64::max) > SAME_PRIMARIES
 }
 
 /// Decodes an image as it is stored: an EXIF orientation is not applied, because poses and intrinsics are for the

@@ -124,10 +124,14 @@ impl Listing {
         self.shots(Split::Test).next().is_some()
     }
 
-    /// How many views to test on can be used, if it is `test_every` that holds them out and not the capture.
+    /// Whether it is `test_every` that splits the views, and not the capture.
+    pub(super) fn is_split_by(&self, test_every: u32) -> bool {
+        self.views.iter().enumerate().all(|(i, view)| view.split == every_nth(test_every, i))
+    }
+
+    /// How many views to test on can be used, if it is `test_every` that holds them out.
     pub(super) fn n_held_out_by(&self, test_every: u32) -> usize {
-        let is_by_it = self.views.iter().enumerate().all(|(i, view)| view.split == every_nth(test_every, i));
-        if is_by_it { self.shots(Split::Test).count() } else { 0 }
+        if self.is_split_by(test_every) { self.shots(Split::Test).count() } else { 0 }
     }
 
     /// How many views the capture lists for a split, sound or not.

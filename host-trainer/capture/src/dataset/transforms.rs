@@ -54,6 +54,7 @@ pub fn cameras_of_transforms(path: &Path, side_px: u32) -> Result<Vec<FrameCamer
             is_grey: false,
             is_depth_like: false,
             exif_orientation: 1,
+            has_other_primaries: false,
         };
         let lens = camera::lens(&frame.own, &shared, path, &header)?;
         let (focal_px, principal_px) = (lens.focal_px, lens.principal_px);

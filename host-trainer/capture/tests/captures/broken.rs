@@ -92,6 +92,16 @@ fn turned_image(fixture: &Fixture, name: &str) {
     encoder.write_image(&rgb, width_px, height_px, image::ExtendedColorType::Rgb8).expect("an image");
 }
 
+/// A PNG with a colour profile.
+fn profiled_image(fixture: &Fixture, name: &str, profile: &moxcms::ColorProfile) {
+    let (width_px, height_px) = SIZE_PX;
+    let rgb: Vec<u8> = (0..width_px * height_px * 3).map(|i| (i % 251) as u8).collect();
+    let file = BufWriter::new(std::fs::File::create(fixture.at(name)).expect("a file"));
+    let mut encoder = image::codecs::png::PngEncoder::new(file);
+    encoder.set_icc_profile(profile.encode().expect("a profile")).expect("PNG holds profiles");
+    encoder.write_image(&rgb, width_px, height_px, image::ExtendedColorType::Rgb8).expect("an image");
+}
+
 /// A turn of every pose by a half about y around its own camera: all look away from the scene.
 fn look_away(fixture: &mut Fixture) {
     fixture.photos.iter_mut().for_each(|photo| photo.rotation *= DMat3::from_rotation_y(std::f64::consts::PI));

@@ -70,7 +70,17 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         Ok(RunConfig { output: BundleFile::of_run(run, &config)?.path, ..config })
     };
     let configs = args.runs.iter().map(config).collect::<Result<Vec<_>>>()?;
-    let evaluations = configs.iter().map(|config| point::measured(config, None)).collect::<Result<Vec<_>>>()?;
+    let measured = |(run, config): (&PathBuf, &RunConfig)| {
+        point::measured(config, None).with_context(|| {
+            let config = run.join("config.toml");
+            format!(
+                "{} cannot be measured; if its capture has moved, name it as `dataset` in {}",
+                run.display(),
+                config.display()
+            )
+        })
+    };
+    let evaluations = args.runs.iter().zip(&configs).map(measured).collect::<Result<Vec<_>>>()?;
     let runs = args.runs.iter().zip(configs.iter().zip(&evaluations));
     let lines = runs.map(|(run, compared)| line(run, compared, (&configs[0], &evaluations[0])));
     let lines = lines.collect::<Result<Vec<_>>>()?;

@@ -13,6 +13,9 @@ use crate::config::named::level_number;
 use crate::config::target::{BoardOrCore, board_or_core};
 use crate::say::say;
 
+/// Decoders for devices count bytes in 32 bits.
+const MOST_BYTES: u64 = u32::MAX as u64;
+
 /// What the device has that the bundle is for; what else the command line leaves open is chosen by it.
 #[derive(clap::Args)]
 pub(crate) struct DeviceArgs {
@@ -37,6 +40,11 @@ impl DeviceArgs {
     /// The limits asked for: those of the level, where the other options do not ask for less.
     pub(super) fn limits(&self) -> Result<Limits> {
         let [ram_bytes, flash_bytes] = [self.ram, self.flash].map(|bytes| bytes.map(|bytes| bytes.as_u64()));
+        for (option, given) in [("--ram", ram_bytes), ("--flash", flash_bytes)] {
+            if let Some(given) = given.filter(|given| *given > MOST_BYTES) {
+                bail!("{option} asks for {given} bytes, needed: at most {MOST_BYTES}; leave it out for no limit");
+            }
+        }
         let board = self.target.and_then(BoardOrCore::board);
         let given = Limits {
             ram_bytes: ram_bytes.or(board.map(|board| board.ram_bytes)),

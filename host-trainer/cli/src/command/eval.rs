@@ -8,7 +8,7 @@ mod summary;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Capture, Image, Split, View};
 use pocketsplat_codec::bundle::decoded_scene;
@@ -94,9 +94,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     if GaussiansFile::is_one(&args.bundle) {
         return explicit::run(args);
     }
-    if args.axes.spz_axes.is_some() {
-        bail!("{} is no .spz; leave --spz-axes out", args.bundle.display());
-    }
+    args.axes.refuse_unless(false, &args.bundle)?;
     let file = BundleFile::read(&args.bundle)?;
     let lpips = args.lpips.load()?;
     let what =

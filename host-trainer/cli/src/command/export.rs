@@ -187,6 +187,7 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     if args.dataset.is_none() && args.options != CaptureOptions::default() {
         bail!("options of photographs need a capture; give its folder as CAPTURE, or leave them out");
     }
+    args.axes.refuse_unless(format == Format::Spz, &args.output)?;
     let file = BundleFile::read(&args.bundle)?;
     let bundle = file.parse()?;
     let source = Source::new(&bundle);

@@ -25,6 +25,11 @@ use level::LevelFit;
 /// Quality is the manifest's, measured over test views when the bundle was made (over training views that were held out, where
 /// --validation-every said so). Work is a bound over the views
 /// in the manifest.
+///
+/// RAM is the memory given, scratch what is taken of it, pruned the share of the anchors that is not drawn. Anchors are kept in the
+/// bundle, and decoded for every frame; in memory; there with the sums of their first layers; or baked, as Gaussians. A frame is drawn in
+/// strips, a strip in slabs of depth, with at most so many splats at once. Head MMAC are millions of multiply-adds of the heads, decoded the
+/// anchors that are decoded, Mpixels the millions of pixels of all splats; Minstr and seconds are predicted.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// The bundle.
@@ -155,15 +160,20 @@ pub(crate) fn frame_budget(bundle: &Bundle<'_>, size: Option<FrameSize>) -> Resu
 
 /// The best plan within `ram_bytes`; an error that names the bytes that would do.
 pub(crate) fn plan_within(bundle: &Bundle<'_>, frame: &Budget, ram_bytes: u64) -> Result<Plan> {
-    let budget = frame.in_bytes(usize::try_from(ram_bytes).unwrap_or(usize::MAX));
-    Plan::new(bundle, &budget).map_err(|error| match error {
-        DecodeError::BudgetTooSmall { needed, .. } => anyhow::anyhow!(
-            "the smallest scene of this bundle takes {needed} bytes for {}x{} px; give --ram {needed} or more, a smaller \
-             --resolution, {}or train a bundle for this memory with --ram {ram_bytes}",
-            frame.width_px,
-            frame.height_px,
-            if frame.overflow == Overflow::Slabs { "" } else { "time for `fit --slabs`, " }
-        ),
+    let in_bytes =
+        |frame: &Budget| Plan::new(bundle, &frame.in_bytes(usize::try_from(ram_bytes).unwrap_or(usize::MAX)));
+    in_bytes(frame).map_err(|error| match error {
+        DecodeError::BudgetTooSmall { needed, .. } => {
+            // A smaller frame needs no less: what is drawn at once is a strip.
+            let slabs = in_bytes(&frame.with_overflow(Overflow::Slabs)).is_ok();
+            anyhow::anyhow!(
+                "the smallest scene of this bundle takes {needed} bytes for {}x{} px; give --ram {needed} or more, {}or train a bundle for this \
+                 memory with --ram {ram_bytes}",
+                frame.width_px,
+                frame.height_px,
+                if slabs { "time for `fit --slabs`, " } else { "" },
+            )
+        }
         error => error.into(),
     })
 }

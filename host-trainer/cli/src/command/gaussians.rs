@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::Instant;
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result, anyhow, bail};
 use pocketsplat_capture::camera::Camera;
 use pocketsplat_capture::dataset::{Background, Capture, Normalisation};
 use pocketsplat_files::Output;
@@ -30,6 +30,16 @@ pub(crate) struct AxesArgs {
     pub(crate) spz_axes: Option<SpzAxes>,
 }
 
+impl AxesArgs {
+    /// Fails where they are given for another file.
+    pub(crate) fn refuse_unless(self, is_spz: bool, path: &Path) -> Result<()> {
+        if self.spz_axes.is_some() && !is_spz {
+            bail!("{} is no .spz; leave --spz-axes out", path.display());
+        }
+        Ok(())
+    }
+}
+
 /// A file of Gaussians, read.
 pub(crate) struct GaussiansFile {
     pub(crate) n_bytes: usize,
@@ -47,12 +57,16 @@ impl GaussiansFile {
     }
 
     /// Reads a file, and says on stderr what was not read as it stands.
-    pub(crate) fn read(path: &Path) -> Result<Self> {
-        Self::read_as(path, None)
+    pub(crate) fn read(path: &Path, axes: AxesArgs) -> Result<Self> {
+        let file = Self::read_to_convert(path, axes.spz_axes)?;
+        axes.refuse_unless(file.notes.spz_axes.is_some(), path)?;
+        Ok(file)
     }
 
+    /// The same for a file that may become a .spz.
+    ///
     /// * `spz_axes`: of a .spz, whatever its record says.
-    pub(crate) fn read_as(path: &Path, spz_axes: Option<SpzAxes>) -> Result<Self> {
+    pub(crate) fn read_to_convert(path: &Path, spz_axes: Option<SpzAxes>) -> Result<Self> {
         let started = Instant::now();
         let (gaussians, notes) = pocketsplat_gaussians::read(path, spz_axes)?;
         let read_s = started.elapsed().as_secs_f64();

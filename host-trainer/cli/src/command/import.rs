@@ -141,7 +141,7 @@ pub(crate) fn run(args: &Args) -> Result<ExitCode> {
     let folder = run_folder(args.run.as_deref(), &args.output)?;
     // Whose folder it is, before pictures are drawn for minutes; which run is in it says the configuration.
     RunFolder::check(&folder, true)?;
-    let file = GaussiansFile::read_as(&args.points, args.axes.spz_axes)?;
+    let file = GaussiansFile::read(&args.points, args.axes)?;
     let Seen { bulk, train, test } = seen(args, config.capture.resolution, &file)?;
     let capture = captured(args, &file, &bulk, [&train, &test])?;
     say!(
@@ -183,6 +183,7 @@ fn configured(args: &Args) -> Result<RunConfig> {
         bail!("import measures no effects; name them, as --effects +view-colour, and leave auto to train");
     }
     check_lambda(args.lambda, config.train.backbone)?;
+    args.quality.check_feature_step(config.train.backbone)?;
     args.device.choose(&args.quality, args.lambda, &mut config)?;
     config.capture = CaptureOptions {
         max_resolution: None,

@@ -42,6 +42,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     if GaussiansFile::is_one(&args.bundle) {
         return splats::run(args);
     }
+    args.axes.refuse_unless(false, &args.bundle)?;
     let file = BundleFile::read(&args.bundle)?;
     let bundle = file.parse()?;
     if args.hexdump {

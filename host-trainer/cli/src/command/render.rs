@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use super::bundle::BundleFile;
 use super::capture::{CaptureArgs, views_of};
 use super::eval::{Renderer, reference_image};
-use super::gaussians::GaussiansFile;
+use super::gaussians::{AxesArgs, GaussiansFile};
 use super::output;
 use super::outputs::{OverwriteArgs, reading_capture};
 use super::stand::StandArgs;
@@ -49,6 +49,8 @@ pub(crate) struct Args {
     options: CaptureOptions,
     #[command(flatten)]
     stand: StandArgs,
+    #[command(flatten)]
+    axes: AxesArgs,
     /// Which view of the split, from 0.
     #[arg(long, value_name = "I")]
     view: Option<usize>,
@@ -90,6 +92,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         scene.draw()
     } else {
         args.stand.refuse("a bundle has a camera of its own")?;
+        args.axes.refuse_unless(false, &args.bundle)?;
         let file = BundleFile::read(&args.bundle)?;
         let bundle = file.parse()?;
         let shots = shots(args, &file, &bundle)?;

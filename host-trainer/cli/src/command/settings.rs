@@ -4,17 +4,18 @@ mod backbone;
 mod modules;
 
 use anyhow::{Result, bail};
-use pocketsplat_capture::dataset::Background;
 use pocketsplat_kernels::scene::{ModelShape, QuantisationSteps};
 use pocketsplat_trainer::device::{ModelChoice, bytes_of_heads, widest_within};
 use pocketsplat_trainer::effects::{Effect, Request};
 use pocketsplat_trainer::encode::CoderChoice;
 use pocketsplat_trainer::explicit::CloudConfig;
 use pocketsplat_trainer::train::TrainConfig;
+use pocketsplat_trainer::train::config::Backbone;
+use serde::Serialize;
 
 use crate::config::heading::{OUTPUT, QUALITY, RUN};
 use crate::config::named::{CODERS, one_of};
-use crate::config::{CaptureOptions, EXPLICIT, ExplicitRunConfig, RunConfig};
+use crate::config::{Difference, EXPLICIT, ExplicitRunConfig, RunConfig, said_otherwise};
 
 use backbone::backbone_choice;
 pub(super) use backbone::{BackboneChoice, backbone_of_anchors};
@@ -71,13 +72,16 @@ pub(crate) struct QualityOptions {
     validation_every: Option<u32>,
 }
 
+/// The largest number that a configuration can hold.
+const MOST_SEED: u64 = i64::MAX as u64;
+
 /// How a run proceeds.
 #[derive(clap::Args)]
 pub(crate) struct RunOptions {
     /// Set a key of the configuration, as train.modules.pruning.rate=0.2; may be given several times.
     #[arg(long, value_name = "KEY=VALUE", help_heading = RUN, hide_short_help = true)]
     set: Vec<String>,
-    #[arg(long, value_name = "N", help_heading = RUN,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=MOST_SEED), help_heading = RUN,
         help = with_default("Seed of all random numbers: the same seed on the same machine gives the same bundle",
         TrainConfig::default().seed))]
     seed: Option<u64>,
@@ -97,29 +101,18 @@ pub(super) fn with_default(help: &str, default: impl std::fmt::Display) -> Strin
     format!("{help} [default: {default}]")
 }
 
-/// `config` with everything replaced that the options of a command say.
-///
-/// # Errors
-/// A key that is unknown or belongs to an effect; two forms of pruning.
-pub(crate) fn applied(
-    capture: &CaptureOptions,
-    quality: &QualityOptions,
-    run: &RunOptions,
-    mut config: RunConfig,
-) -> Result<RunConfig> {
-    config.capture = capture.or(&config.capture);
-    config.train.learns_background = match capture.background {
-        Some(background) => background == Background::Learned,
-        None => config.train.learns_background || config.capture.background == Some(Background::Learned),
-    };
-    quality.apply_to(&mut config)?;
-    let mut config = run.applied_to(config)?;
-    // As a run keeps it: the same options again are no other setting.
-    config.train.shape = config.train.modules.shape(config.train.shape);
-    Ok(config)
-}
-
 impl QualityOptions {
+    /// Refuses a step for features that have steps of their own.
+    pub(crate) fn check_feature_step(&self, backbone: Backbone) -> Result<()> {
+        if self.feature_step.is_some() && backbone.is_coded() {
+            bail!(
+                "--feature-step rounds the features of scaffold scenes, and those of other backbones learn their steps; leave it out, \
+                 or make smaller files with a larger --lambda"
+            );
+        }
+        Ok(())
+    }
+
     /// Whether explicit Gaussians are asked for in place of anchors.
     pub(crate) fn is_explicit(&self) -> bool {
         self.backbone == Some(BackboneChoice::Explicit)
@@ -255,20 +248,47 @@ impl RunOptions {
         config.checkpoint_every = self.checkpoint_every.or(config.checkpoint_every);
         config.keep_checkpoints |= self.keep_checkpoints;
         config.gaussians.seed = self.seed.unwrap_or(config.gaussians.seed);
-        if self.set.is_empty() { Ok(config) } else { config.with_keys(&self.set) }
+        Ok(config)
     }
 
-    fn applied_to(&self, mut config: RunConfig) -> Result<RunConfig> {
+    /// Sets what the options say, but for `--set`.
+    pub(crate) fn apply_to(&self, config: &mut RunConfig) {
         config.checkpoint_every = self.checkpoint_every.or(config.checkpoint_every);
         config.keep_checkpoints |= self.keep_checkpoints;
-        config.fork_at = self.fork_at.clone().unwrap_or(config.fork_at);
+        config.fork_at = self.fork_at.clone().unwrap_or_else(|| std::mem::take(&mut config.fork_at));
         config.train.seed = self.seed.unwrap_or(config.train.seed);
-        self.with_set(config)
+    }
+
+    /// `config` as the other options change it, then with what `--set` says.
+    ///
+    /// * `set`: the latter.
+    ///
+    /// # Errors
+    /// Those of both; a key that an option and `--set` give two values.
+    pub(crate) fn set_after<C: Clone + Serialize>(
+        &self,
+        config: C,
+        options: impl Fn(C) -> Result<C>,
+        set: impl Fn(&Self, C) -> Result<C>,
+    ) -> Result<C> {
+        let set_last = set(self, options(config.clone())?)?;
+        // A key for which the order matters is one that both say. An order that fails was not asked for.
+        if let Ok(set_first) = set(self, config).and_then(options)
+            && let Some(Difference { key, one, other }) = said_otherwise(&set_last, &set_first)?
+        {
+            bail!("`{key}` is {other} by an option and {one} by --set; leave one of them out");
+        }
+        Ok(set_last)
     }
 
     /// `config` with what `--set` says.
     pub(crate) fn with_set(&self, config: RunConfig) -> Result<RunConfig> {
         self.set.iter().try_fold(config, |config, key| with_key(&config, key.trim_start()))
+    }
+
+    /// The same for explicit Gaussians.
+    pub(crate) fn with_set_explicit(&self, config: ExplicitRunConfig) -> Result<ExplicitRunConfig> {
+        if self.set.is_empty() { Ok(config) } else { config.with_keys(&self.set) }
     }
 }
 
@@ -298,7 +318,6 @@ fn with_key(config: &RunConfig, key: &str) -> Result<RunConfig> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pocketsplat_trainer::train::config::Backbone;
     use pocketsplat_trainer::train::modules::Rdo;
 
     #[test]

@@ -16,7 +16,7 @@ use super::capture::CaptureArgs;
 use super::device_args::DeviceArgs;
 use super::devices::{DeviceChoice, DeviceOption};
 use super::outputs::{OverwriteArgs, check_name, reading_capture};
-use super::settings::{QualityOptions, RunOptions, applied};
+use super::settings::{QualityOptions, RunOptions};
 use crate::config::heading::{INPUT, OUTPUT, QUALITY, RUN};
 use crate::config::{CaptureOptions, EXPLICIT, ExplicitRunConfig, Preset, RunConfig, absolute};
 use crate::say::say;
@@ -213,6 +213,12 @@ impl Args {
             }
         }
         check_lambda(self.lambda, config.train.backbone)?;
+        self.quality.check_feature_step(config.train.backbone)?;
+        if self.from.is_some() && self.capture.points.is_some() {
+            bail!(
+                "--points says where training starts, and a run of --from starts with the scene of another; leave it out"
+            );
+        }
         config.check()?;
         if config.train.backbone == Backbone::ContextGs && config.encoding.tiers != PRUNING_RATES {
             say!(
@@ -228,7 +234,19 @@ impl Args {
     }
 
     /// `config` with everything replaced that the command line says.
-    pub(crate) fn applied_to(&self, mut config: RunConfig) -> Result<RunConfig> {
+    pub(crate) fn applied_to(&self, config: RunConfig) -> Result<RunConfig> {
+        let mut config = self.options.set_after(config, |config| self.with_options(config), RunOptions::with_set)?;
+        config.train.learns_background = match self.capture.background {
+            Some(background) => background == Background::Learned,
+            None => config.train.learns_background || config.capture.background == Some(Background::Learned),
+        };
+        // As a run keeps it: the same options again are no other setting.
+        config.train.shape = config.train.modules.shape(config.train.shape);
+        Ok(config)
+    }
+
+    /// The same, but for what `--set` says.
+    fn with_options(&self, mut config: RunConfig) -> Result<RunConfig> {
         // Absolute, so that the run can go on from any folder.
         for (into, given) in [(&mut config.dataset, &self.dataset), (&mut config.output, &self.output)] {
             if let Some(path) = given {
@@ -256,7 +274,10 @@ impl Args {
             Some(_) => self.quality.keeping_width(&config.train.shape),
             None => self.quality.clone(),
         };
-        applied(&capture, &quality, &self.options, config)
+        config.capture = capture.or(&config.capture);
+        quality.apply_to(&mut config)?;
+        self.options.apply_to(&mut config);
+        Ok(config)
     }
 
     /// Whether explicit Gaussians are asked for.
@@ -298,9 +319,12 @@ impl Args {
         if self.capture.background == Some(Background::Learned) {
             bail!("--background learned works with anchors alone; choose black or white with --backbone {EXPLICIT}");
         }
-        config.capture = self.capture.or(&config.capture);
-        self.quality.apply_to_explicit(&mut config.gaussians);
-        config = self.options.applied_to_explicit(config)?;
+        let with_options = |mut config: ExplicitRunConfig| {
+            config.capture = self.capture.or(&config.capture);
+            self.quality.apply_to_explicit(&mut config.gaussians);
+            self.options.applied_to_explicit(config)
+        };
+        config = self.options.set_after(config, with_options, RunOptions::with_set_explicit)?;
         for (into, given) in [(&mut config.dataset, &self.dataset), (&mut config.output, &self.output)] {
             let path = given.as_ref().unwrap_or(into);
             // Absolute, so that the run can go on from any folder.

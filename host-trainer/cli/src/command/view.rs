@@ -12,7 +12,7 @@ use pocketsplat_format::Bundle;
 use pocketsplat_viewer::{SceneFile, package, page};
 
 use super::bundle::BundleFile;
-use super::gaussians::GaussiansFile;
+use super::gaussians::{AxesArgs, GaussiansFile};
 use super::output;
 use super::outputs::{ANYTHING, OverwriteArgs, PAGE, check_name};
 use super::stand::StandArgs;
@@ -41,6 +41,8 @@ pub(crate) struct Args {
     overwrite: OverwriteArgs,
     #[command(flatten)]
     stand: StandArgs,
+    #[command(flatten)]
+    axes: AxesArgs,
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
@@ -48,6 +50,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         return run_splats(args, path);
     }
     args.stand.refuse("a bundle has a camera of its own")?;
+    args.axes.refuse_unless(false, &args.bundles[0])?;
     let files = args.bundles.iter().map(|path| BundleFile::read(path)).collect::<Result<Vec<_>>>()?;
     let bundles = files.iter().map(BundleFile::parse).collect::<Result<Vec<_>>>()?;
     let mut outputs = args.bundles.iter().fold(args.overwrite.outputs(), |outputs, path| outputs.reading(path));
@@ -79,7 +82,7 @@ fn run_splats(args: &Args, splats: &Path) -> Result<()> {
     }
     let mut outputs = args.overwrite.outputs().reading(splats);
     let page = checked_page(page, splats, &mut outputs)?;
-    let text = splats::page(splats, &args.stand)?;
+    let text = splats::page(splats, args.axes, &args.stand)?;
     write(&page, &text)?;
     if args.open { open(page.path()) } else { Ok(()) }
 }

@@ -153,9 +153,6 @@ impl RunConfig {
         let mut all = table_of(self)?;
         let given = keys_of(keys)?;
         merge(&mut all, &given);
-        if given.contains_key("preset") {
-            bail!("--set preset changes no other key; give --preset, or the key in a configuration");
-        }
         let config = Self { scales_lambda: self.scales_lambda && !says_lambda(&given), ..all.try_into()? };
         refuse_unknown(&given, &table_of(&config)?, "")?;
         Ok(config)
@@ -240,6 +237,15 @@ fn keys_of(keys: &[String]) -> Result<Table> {
             merge(&mut given, &nested);
         }
     }
+    for (key, instead) in [
+        ("preset", "would change no other key; give --preset, or the key in a configuration"),
+        ("dataset", "is said by DATASET; give it there"),
+        ("output", "is said by --output; give it there"),
+    ] {
+        if given.contains_key(key) {
+            bail!("`{key}` cannot be set: it {instead}");
+        }
+    }
     Ok(given)
 }
 
@@ -251,6 +257,16 @@ fn differences(
 ) -> Result<Vec<Difference>> {
     let table = |config: &RunConfig| table_of(&deciding(config.clone()));
     Ok(table_differences(&table(one)?, &table(other)?))
+}
+
+/// The first key that two ways of applying options and keys give two values, beside those of modules: an option attaches these, keys set
+/// them up.
+pub(crate) fn said_otherwise(one: &impl Serialize, other: &impl Serialize) -> Result<Option<Difference>> {
+    let all = table_differences(&table_of(one)?, &table_of(other)?);
+    // What is no number differs from itself; it is refused elsewhere.
+    let is_said =
+        |difference: &Difference| difference.one != difference.other && !difference.key.starts_with("train.modules.");
+    Ok(all.into_iter().find(is_said))
 }
 
 /// All keys at which two tables differ.

@@ -209,3 +209,109 @@ fn a_figure_is_of_numbers_alone() {
     let said = plot("a,30,1000\nb,31,2000\n").arg("--json").output().unwrap();
     assert!(serde_json::from_slice::<serde_json::Value>(&said.stdout).is_ok_and(|said| said.is_object()));
 }
+
+#[test]
+fn an_option_and_a_key_do_not_say_two_things() {
+    let home = folder("mistaken-set");
+    let train = |options: &[&str]| {
+        let mut command = pocketsplat();
+        command.arg("train").arg(capture()).arg("-o").arg(home.join("a.psb")).arg("--dry-run").args(options);
+        command
+    };
+    let twice = "is 60 by an option and 50 by --set; leave one of them out";
+    let said = fails(&mut train(&["--iterations", "60", "--set", "train.iterations=50"]));
+    assert!(said.contains("`train.iterations`") && said.contains(twice), "{said}");
+    // The default too, where somebody gives it.
+    let said = fails(&mut train(&["--lambda", "0.002", "--set", "train.hac.lambda=0.004"]));
+    assert!(said.contains("`train.hac.lambda` is 0.002 by an option and 0.004 by --set"), "{said}");
+    let explicit = ["--backbone", "3dgs", "--iterations", "60", "--set", "gaussians.iterations=50"];
+    let mut command = pocketsplat();
+    command.arg("train").arg(capture()).arg("-o").arg(home.join("a.ply")).args(explicit);
+    assert!(fails(&mut command).contains(twice));
+    for key in ["dataset", "output", "preset"] {
+        let said = fails(&mut train(&["--set", &format!("{key}=x")]));
+        assert!(said.contains(&format!("`{key}` cannot be set: it ")), "{said}");
+    }
+    let both = ["--iterations", "60", "--modules", "tiered-pruning", "--set", "train.modules.pruning.rate=0.3"];
+    succeeds(train(&both).args(["--set", "train.iterations=60"]));
+}
+
+#[test]
+fn options_that_change_nothing_are_refused() {
+    let home = folder("mistaken-nothing-changed");
+    let train = |options: &[&str]| {
+        let mut command = pocketsplat();
+        command.arg("train").arg(capture()).arg("-o").arg(home.join("a.psb")).arg("--dry-run").args(options);
+        fails(&mut command)
+    };
+    let said = train(&["--feature-step", "0.1"]);
+    assert!(
+        said.contains("--feature-step rounds the features of scaffold scenes") && said.contains("leave it out"),
+        "{said}"
+    );
+    let mut seed = pocketsplat();
+    let output = seed.args(["train", "x", "-o", "a.psb", "--seed", "9223372036854775808"]).output().unwrap();
+    assert!(text(&output.stderr).contains("9223372036854775808 is not in 0..=9223372036854775807"));
+    let said = train(&["--ram", "10EiB"]);
+    assert!(said.contains("--ram asks for 11529215046068469760 bytes"), "{said}");
+    let mut fork = pocketsplat();
+    fork.arg("train")
+        .arg("--from")
+        .arg(undisturbed_run())
+        .args(["--at", "10", "--points", "random", "-o"])
+        .arg(home.join("b.psb"));
+    let said = fails(&mut fork);
+    assert!(said.contains("--points says where training starts") && said.contains("leave it out"), "{said}");
+    let bundle = undisturbed_run().with_extension("psb");
+    for command in [&["render", "--preview"][..], &["view"], &["inspect"], &["export"]] {
+        let mut with_axes = pocketsplat();
+        with_axes.arg(command[0]).arg(&bundle).args(&command[1..]).args(["--spz-axes", "as-in-ply"]);
+        if command[0] != "inspect" {
+            let name = match command[0] {
+                "render" => "c.png",
+                "view" => "c.html",
+                _ => "c.ply",
+            };
+            with_axes.arg("-o").arg(home.join(name));
+        }
+        let said = fails(&mut with_axes);
+        assert!(said.contains("is no .spz; leave --spz-axes out"), "{command:?}: {said}");
+    }
+}
+
+#[test]
+fn what_fit_advises_works() {
+    let bundle = undisturbed_run().with_extension("psb");
+    let fit = |ram: &str, options: &[&str]| {
+        let mut command = pocketsplat();
+        command.arg("fit").arg(&bundle).args(["--ram", ram]).args(options);
+        command
+    };
+    let said = fails(&mut fit("9000", &[]));
+    let needed = said.split("give --ram ").nth(1).and_then(|rest| rest.split(' ').next()).expect("a number");
+    succeeds(&mut fit(needed, &[]));
+    assert!(!said.contains("--slabs") && !said.contains("--resolution"), "neither would do: {said}");
+    fails(&mut fit("9000", &["--slabs"]));
+    fails(&mut fit("9000", &["--resolution", "16x16"]));
+    let little_less = (needed.parse::<u64>().expect("a number") - 1).to_string();
+    assert!(fails(&mut fit(&little_less, &[])).contains("time for `fit --slabs`"));
+    succeeds(&mut fit(&little_less, &["--slabs"]));
+}
+
+#[test]
+fn a_comparison_says_what_to_do_where_a_capture_has_moved() {
+    let home = folder("mistaken-moved");
+    let (run, _) = copied_run(&home);
+    let config = run.join("config.toml");
+    let text = fs::read_to_string(&config).unwrap();
+    fs::write(&config, text.replace(capture().to_str().unwrap(), "/gone")).unwrap();
+    let compare = || {
+        let mut command = pocketsplat();
+        command.arg("compare").arg(&run).arg("-o").arg(home.join("c"));
+        command
+    };
+    let said = fails(&mut compare());
+    assert!(said.contains("if its capture has moved, name it as `dataset` in"), "{said}");
+    fs::write(&config, text).unwrap();
+    succeeds(&mut compare());
+}

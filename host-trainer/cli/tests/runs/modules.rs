@@ -39,7 +39,7 @@ fn modules_and_effects_of_the_command_line_replace_those_of_a_configuration_and_
     let home = folder("modules-replaced");
     let detailed = home.join("detailed.psb");
     let given = ["--modules", "distribution", "--effects", "+detail"];
-    succeeds(train(&detailed).args(given).args(["--set", "train.iterations=5"]));
+    succeeds(train(&detailed).args(given));
     let config = home.join("detailed.run/config.toml");
     assert!(fs::read_to_string(&config).unwrap().contains("detail_hidden = 32"));
     for (modules, effects, detail) in

@@ -26,11 +26,13 @@ pub(super) fn not_used(listing: &Listing, findings: &mut Vec<Finding>) {
 
 pub(super) fn check(listing: &Listing, options: &LoadOptions, findings: &mut Vec<Finding>) {
     counts(listing, listing.n_held_out_by(options.test_every), findings);
+    own_split(listing, options.test_every, findings);
     repeated_names(listing, findings);
     lenses(listing, findings);
     alpha(listing, findings);
     depth_maps(listing, findings);
     orientation(listing, findings);
+    colours(listing, findings);
     sizes(listing, findings);
 }
 
@@ -200,6 +202,26 @@ fn orientation(listing: &Listing, findings: &mut Vec<Finding>) {
         "images with an EXIF orientation, which is not applied: pixels are taken as they are stored",
         "if the poses were made from upright images, store the pixels upright and remove the tag",
     ));
+}
+
+fn colours(listing: &Listing, findings: &mut Vec<Finding>) {
+    let other: Vec<_> = listing.sound().filter(|(_, shot)| shot.header.has_other_primaries).collect();
+    findings.extend(Finding::about(
+        &other,
+        Severity::Warning,
+        "colour-profile",
+        "images with a colour profile other than sRGB, as Display P3; their values are taken for sRGB, so the scene is drawn paler than they are",
+        "convert them to sRGB before, without changing their sizes",
+    ));
+}
+
+/// Where the capture has a split of its own, `--test-every` says nothing.
+fn own_split(listing: &Listing, test_every: u32, findings: &mut Vec<Finding>) {
+    if test_every != LoadOptions::default().test_every && !listing.is_split_by(test_every) {
+        let message = format!("the capture has a split of its own, so `--test-every {test_every}` holds out nothing");
+        let remedy = "leave it out, or take the split out of the capture";
+        findings.push(Finding::new(Severity::Warning, "own-split", message, remedy));
+    }
 }
 
 fn sizes(listing: &Listing, findings: &mut Vec<Finding>) {

@@ -175,8 +175,14 @@ fn focal(own: &Intrinsics, shared: &Intrinsics, size_px: (u32, u32)) -> Result<[
 mod tests {
     use super::*;
 
-    const HEADER: ImageHeader =
-        ImageHeader { size_px: (48, 36), has_alpha: false, is_grey: false, is_depth_like: false, exif_orientation: 1 };
+    const HEADER: ImageHeader = ImageHeader {
+        size_px: (48, 36),
+        has_alpha: false,
+        is_grey: false,
+        is_depth_like: false,
+        exif_orientation: 1,
+        has_other_primaries: false,
+    };
 
     /// Size, focal lengths and principal point of the lens for an image of 48×36 px, or what is wrong.
     fn found(own: &str, shared: &str) -> Result<([f64; 2], [f64; 2]), String> {

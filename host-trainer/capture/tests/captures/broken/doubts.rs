@@ -1,9 +1,10 @@
 //! Captures that load but are doubtful.
 
 use glam::{DMat3, DVec3};
+use moxcms::ColorProfile;
 
 use super::Harm::Doubt;
-use super::{Case, case, flat_image, look_away, turned_image};
+use super::{Case, case, flat_image, look_away, profiled_image, turned_image};
 use crate::exports::write_record3d;
 use crate::fixture::Kind::{Blender, ColmapBinary, ColmapText, Nerfstudio};
 use crate::fixture::SIZE_PX;
@@ -218,6 +219,19 @@ pub(super) fn cases() -> Vec<Case> {
             &["images with an EXIF orientation, which is not applied", ": 1 (p_03.png)"],
             |f| {
                 turned_image(f.write_files(), "images/p_03.png");
+            },
+        ),
+        case(
+            "a colour profile of a phone",
+            ColmapText,
+            Doubt,
+            "colour-profile",
+            &["images with a colour profile other than sRGB, as Display P3", ": 2 (p_03.png, p_04.png)"],
+            |f| {
+                let f = f.write_files();
+                profiled_image(f, "images/p_02.png", &ColorProfile::new_srgb());
+                profiled_image(f, "images/p_03.png", &ColorProfile::new_display_p3());
+                profiled_image(f, "images/p_04.png", &ColorProfile::new_adobe_rgb());
             },
         ),
         case(

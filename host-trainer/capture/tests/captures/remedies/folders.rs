@@ -71,6 +71,15 @@ fn options_without_effect_are_left_out() {
     let said = |options: &LoadOptions| fixture.load_with(options).expect("a capture").1.to_string();
     let ignored = LoadOptions { images: Some("rgb_2".to_owned()), ..LoadOptions::default() };
     assert!(said(&ignored).contains("leave it out") && !said(&LoadOptions::default()).contains("leave it out"));
+    let with_own_split = Fixture::new(Blender, N_VIEWS);
+    with_own_split.write_files();
+    let said = |fixture: &Fixture, test_every| {
+        let options = LoadOptions { test_every, ..LoadOptions::default() };
+        fixture.load_with(&options).expect("a capture").1.to_string()
+    };
+    let warning = "a split of its own, so `--test-every 5` holds out nothing; leave it out";
+    assert!(said(&with_own_split, 5).contains(warning) && !said(&with_own_split, 8).contains("leave it out"));
+    assert!(!said(&fixture, 5).contains("leave it out"));
 }
 
 #[test]

@@ -29,7 +29,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
             args.bundle.display()
         );
     }
-    let file = GaussiansFile::read_as(&args.bundle, args.axes.spz_axes)?;
+    let file = GaussiansFile::read(&args.bundle, args.axes)?;
     let lpips = args.lpips.load()?;
     let (options, capture) = file.load(&args.capture)?;
     let what = Measurements { lpips: lpips.as_ref(), ..Measurements::default() };

@@ -49,7 +49,8 @@ pub(super) fn run(args: &Args, format: Format, output: &Output) -> Result<ExitCo
             args.bundle.display()
         );
     }
-    let file = GaussiansFile::read_as(&args.bundle, args.axes.spz_axes)?;
+    let file = GaussiansFile::read_to_convert(&args.bundle, args.axes.spz_axes)?;
+    args.axes.refuse_unless(format == Format::Spz || file.notes.spz_axes.is_some(), &args.output)?;
     if shows_nothing(&file.gaussians) {
         bail!(
             "nothing in {} can be seen, so no picture tells what another format loses: 0 of {} Gaussians are opaque enough to be drawn, \

@@ -136,7 +136,7 @@ pub(super) fn run(args: &Args) -> Result<()> {
     if args.hexdump {
         bail!("{} holds Gaussians and no bundle; leave out --hexdump", args.bundle.display());
     }
-    let file = GaussiansFile::read_as(&args.bundle, args.axes.spz_axes)?;
+    let file = GaussiansFile::read(&args.bundle, args.axes)?;
     let account = pocketsplat_gaussians::account(&args.bundle)?;
     let facts = facts(&file, &account);
     if args.json {

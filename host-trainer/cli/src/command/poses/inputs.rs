@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use pocketsplat_files::{shell_word, shown};
 
-use super::kinds::{AS_THEY_ARE, Kind, Treatment, extension, films_in, kind_of, photographs_in, stem};
+use super::kinds::{
+    AS_THEY_ARE, Kind, Treatment, extension, films_in, kind_of, photographs_in, stem, with_photographs_below,
+};
 use super::programs::{FFMPEG, FFPROBE, HEIF_CONVERT, HEIF_DEC, Needed};
 
 /// A photograph that is given.
@@ -136,6 +138,15 @@ fn nothing_at(paths: &[PathBuf], left_out: &[PathBuf]) -> anyhow::Error {
     if !left_out.is_empty() {
         return must_be_converted(left_out);
     }
+    let below: Vec<PathBuf> =
+        paths.iter().flat_map(|path| with_photographs_below(path)).map(|(folder, _)| folder).collect();
+    if !below.is_empty() {
+        let folders: Vec<String> = below.iter().map(|folder| shell_word(folder).to_string()).collect();
+        return anyhow::anyhow!(
+            "the photographs lie one folder further in; give these in its place: {}",
+            folders.join(" ")
+        );
+    }
     let names: Vec<String> = paths.iter().map(|path| format!("`{}`", shown(path))).collect();
     anyhow::anyhow!(
         "there are neither photographs nor films in {}; give a folder of JPEG, PNG, WebP, HEIC or AVIF photographs, or a film",
@@ -210,6 +221,11 @@ mod tests {
         let home = folder(&[("x/a.jpg", JPEG), ("y/a.jpg", JPEG)]);
         let twice = Given::at(&[home.path().join("x"), home.path().join("y")]).unwrap_err().to_string();
         assert!(twice.contains("would both be called a.jpg"), "{twice}");
+        let rolls = folder(&[("roll 1/a.jpg", JPEG), ("roll 2/b.jpg", JPEG), ("empty/c.txt", b"hello")]);
+        let further = said(&rolls);
+        assert!(further.contains("one folder further in") && further.contains("/roll 1' '"), "{further}");
+        let both = Given::at(&["roll 1", "roll 2"].map(|name| rolls.path().join(name))).unwrap();
+        assert_eq!(both.files().len(), 2);
         let gone = Given::at(&[home.path().join("z")]).unwrap_err().to_string();
         assert!(gone.contains("is not there; give a folder of photographs, or a film"), "{gone}");
     }

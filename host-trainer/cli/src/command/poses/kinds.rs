@@ -80,6 +80,21 @@ fn files_of(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
+/// The folders in a folder that hold photographs, and how many.
+pub(super) fn with_photographs_below(folder: &Path) -> Vec<(PathBuf, usize)> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut folders: Vec<PathBuf> = entries.map(|entry| entry.path()).filter(|path| path.is_dir()).collect();
+    folders.sort_unstable();
+    let is_photograph = |path: &PathBuf| matches!(kind_of(path), Some(Kind::Photograph(_)));
+    let n_of = |folder: &Path| files_of(folder).iter().filter(|path| is_photograph(path)).count();
+    folders
+        .into_iter()
+        .map(|folder| (n_of(&folder), folder))
+        .filter(|(n, _)| *n > 0)
+        .map(|(n, folder)| (folder, n))
+        .collect()
+}
+
 /// The films of a folder.
 pub(super) fn films_in(folder: &Path) -> Vec<PathBuf> {
     files_of(folder).into_iter().filter(|file| matches!(kind_of(file), Some(Kind::Film))).collect()
@@ -107,6 +122,12 @@ pub(super) fn photographs_in(folder: &Path) -> (Vec<(PathBuf, Treatment)>, Vec<P
             );
         }
         if !(photographs.is_empty() && foreign.is_empty()) {
+            for (below, n) in with_photographs_below(&folder) {
+                say!(
+                    "note: {n} photographs in `{}` are not taken; give that folder too, if they are of this scene",
+                    shown(&below)
+                );
+            }
             return (photographs, foreign);
         }
     }

@@ -31,7 +31,7 @@ impl Shown {
         if args.renderer == Renderer::Reference {
             bail!("{} holds Gaussians and no bundle; leave out --renderer", args.bundle.display());
         }
-        let file = GaussiansFile::read(&args.bundle)?;
+        let file = GaussiansFile::read(&args.bundle, args.axes)?;
         if let Some(dataset) = &args.dataset {
             args.stand.refuse("the capture has cameras")?;
             return Self::of_capture(

@@ -8,7 +8,7 @@ use pocketsplat_trainer::explicit::views::{Side, Stand};
 use pocketsplat_viewer::{base64, escaped};
 use rayon::prelude::*;
 
-use super::super::gaussians::GaussiansFile;
+use super::super::gaussians::{AxesArgs, GaussiansFile};
 use super::super::stand::StandArgs;
 
 const PAGE: &str = include_str!("splats.html");
@@ -19,9 +19,9 @@ const N_PICTURES: u16 = 36;
 const SIDE_PX: u32 = 480;
 
 /// The page of the splats in the file at `path`.
-pub(super) fn page(path: &Path, args: &StandArgs) -> Result<String> {
-    let file = GaussiansFile::read(path)?;
-    let stand = args.stand(path, &file)?;
+pub(super) fn page(path: &Path, axes: AxesArgs, stand: &StandArgs) -> Result<String> {
+    let file = GaussiansFile::read(path, axes)?;
+    let stand = stand.stand(path, &file)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let text = PAGE
         .replace("{{N}}", &N_PICTURES.to_string())

@@ -39,9 +39,8 @@ pub(crate) struct QualityOptions {
     /// Training modules to attach in place of those of the configuration
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum, help_heading = QUALITY)]
     modules: Option<Vec<TrainingModule>>,
-    /// Feature width of an anchor, and hidden width of the heads [default: 32 with scaffold, else 50; by the limits for a
-    /// device; with --from that of its run]
-    #[arg(long, value_name = "F", help_heading = QUALITY, hide_short_help = true)]
+    #[arg(long, value_name = "F", help_heading = QUALITY, hide_short_help = true, help = with_default(
+        "Feature width of an anchor, and hidden width of the heads", TrainConfig::default().shape.feature_dim))]
     feature_dim: Option<usize>,
     #[arg(long, value_name = "K", help_heading = QUALITY, hide_short_help = true,
         help = with_default("Gaussians of an anchor", TrainConfig::default().shape.n_offsets))]
@@ -298,12 +297,11 @@ fn with_key(config: &RunConfig, key: &str) -> Result<RunConfig> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pocketsplat_trainer::train::config::Backbone;
     use pocketsplat_trainer::train::modules::Rdo;
 
     #[test]
     fn what_stays_follows_pruning_by_worth() {
-        let mut train = TrainConfig::of(Backbone::Hac);
+        let mut train = TrainConfig::default();
         keep(&mut train, 700);
         assert_eq!(train.densification.kept_anchors, Some(700));
         train.densification.kept_anchors = None;

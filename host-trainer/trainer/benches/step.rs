@@ -11,7 +11,7 @@ use pocketsplat_kernels::scene::Scene;
 use pocketsplat_kernels::step::coding::Coding;
 use pocketsplat_kernels::step::{Loss, LossWeights, StageSeconds, StepReport, TargetView, Workspace};
 use pocketsplat_trainer::train::bench_scene;
-use pocketsplat_trainer::train::config::{Backbone, Rates};
+use pocketsplat_trainer::train::config::Rates;
 use pocketsplat_trainer::train::optimiser::Optimiser;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -19,7 +19,7 @@ use rand_chacha::ChaCha8Rng;
 const SIZE_PX: u32 = 400;
 
 fn benchmark(criterion: &mut Criterion) {
-    steps(criterion, "scaffold", &bench_scene::scene(Backbone::Scaffold, 20_000), &Coding::Raw);
+    steps(criterion, "scaffold", &bench_scene::scene(20_000), &Coding::Raw);
     steps(criterion, "hac", &bench_scene::coded(50_000), &bench_scene::coding());
 }
 

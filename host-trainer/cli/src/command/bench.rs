@@ -12,7 +12,7 @@ use pocketsplat_kernels::scene::Scene;
 use pocketsplat_kernels::step::coding::Coding;
 use pocketsplat_kernels::step::{Loss, LossWeights, SharedDevice, StageSeconds, StepReport, TargetView, Workspace};
 use pocketsplat_trainer::train::bench_scene;
-use pocketsplat_trainer::train::config::{Backbone, LearningRate, Rates};
+use pocketsplat_trainer::train::config::{LearningRate, Rates};
 use pocketsplat_trainer::train::density::Statistics;
 use pocketsplat_trainer::train::optimiser::Optimiser;
 use pocketsplat_trainer::train::run::device_sync::trained;
@@ -135,7 +135,7 @@ struct Step {
 impl Step {
     /// For the image alone.
     fn plain(n_splats: usize) -> Self {
-        let scene = bench_scene::scene(Backbone::Scaffold, n_anchors(n_splats, bench_scene::SPLATS_PER_ANCHOR));
+        let scene = bench_scene::scene(n_anchors(n_splats, bench_scene::SPLATS_PER_ANCHOR));
         Self { name: "plain", scene, coding: Coding::Raw }
     }
 

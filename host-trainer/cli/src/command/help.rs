@@ -32,9 +32,9 @@ const DEFAULTS: [(&[&str], &str, &str); 13] = [
     (&["train"], "iterations", "by the preset"),
     (&["import"], "iterations", "5000"),
     (&["train"], "effects", "auto"),
+    (&["train"], "feature_dim", "32; by the limits for a device; with --from that of its run"),
     (&["import"], "effects", "view-colour,view-geometry,anisotropy"),
     (&["train", "import"], "modules", "rdo-pruning, with tiered-pruning for a device"),
-    (&["import"], "feature_dim", "32 with scaffold, else 50"),
 ];
 
 /// The commands with what is each one's own: its defaults, and no choice that it refuses or that changes nothing for it.

@@ -4,7 +4,7 @@ mod backbone;
 mod modules;
 
 use anyhow::{Result, bail};
-use pocketsplat_kernels::scene::{ModelShape, QuantisationSteps};
+use pocketsplat_kernels::scene::QuantisationSteps;
 use pocketsplat_trainer::device::{ModelChoice, bytes_of_heads, widest_within};
 use pocketsplat_trainer::effects::{Effect, Request};
 use pocketsplat_trainer::encode::CoderChoice;
@@ -40,9 +40,8 @@ pub(crate) struct QualityOptions {
     /// Training modules to attach in place of those of the configuration
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum, help_heading = QUALITY)]
     modules: Option<Vec<TrainingModule>>,
-    /// Feature width of an anchor, and hidden width of the heads [default: 32 with scaffold, else 50; by the limits for a
-    /// device; with --from that of its run]
-    #[arg(long, value_name = "F", help_heading = QUALITY, hide_short_help = true)]
+    #[arg(long, value_name = "F", help_heading = QUALITY, hide_short_help = true, help = with_default(
+        "Feature width of an anchor, and hidden width of the heads", TrainConfig::default().shape.feature_dim))]
     feature_dim: Option<usize>,
     #[arg(long, value_name = "K", help_heading = QUALITY, hide_short_help = true,
         help = with_default("Gaussians of an anchor", TrainConfig::default().shape.n_offsets))]
@@ -185,11 +184,6 @@ impl QualityOptions {
         Ok(())
     }
 
-    /// The same for a run that branches off one of this shape: its features have their width, whatever another backbone's default is.
-    pub(crate) fn keeping_width(&self, shape: &ModelShape) -> Self {
-        Self { feature_dim: self.feature_dim.or(Some(shape.feature_dim)), ..self.clone() }
-    }
-
     /// Sets the width of features for a bundle of so many bytes, where the command line leaves it open.
     ///
     /// # Errors
@@ -322,7 +316,7 @@ mod tests {
 
     #[test]
     fn what_stays_follows_pruning_by_worth() {
-        let mut train = TrainConfig::of(Backbone::Hac);
+        let mut train = TrainConfig::default();
         keep(&mut train, 700);
         assert_eq!(train.densification.kept_anchors, Some(700));
         train.densification.kept_anchors = None;

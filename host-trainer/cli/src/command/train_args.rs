@@ -270,12 +270,8 @@ impl Args {
         config.train.refine_poses |= self.refine;
         let frame = self.device.frame(self.capture.resolution, self.capture.max_resolution.is_some())?;
         let capture = CaptureOptions { resolution: frame, ..self.capture.clone() };
-        let quality = match self.from {
-            Some(_) => self.quality.keeping_width(&config.train.shape),
-            None => self.quality.clone(),
-        };
         config.capture = capture.or(&config.capture);
-        quality.apply_to(&mut config)?;
+        self.quality.apply_to(&mut config)?;
         self.options.apply_to(&mut config);
         Ok(config)
     }

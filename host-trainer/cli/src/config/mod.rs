@@ -123,7 +123,7 @@ impl RunConfig {
             // Of a run that began before presets were a key: whatever it does not say it does not have.
             None if ALWAYS_WRITTEN.iter().all(|key| given.contains_key(*key)) => {
                 let capture = CaptureOptions { background: Some(Background::Black), ..CaptureOptions::default() };
-                let train = TrainConfig::of(backbone.unwrap_or_default());
+                let train = TrainConfig { backbone: backbone.unwrap_or_default(), ..TrainConfig::default() };
                 return Ok(Self { capture, train, scales_lambda: false, ..Self::default() });
             }
             None => Preset::default(),
@@ -140,7 +140,7 @@ impl RunConfig {
 
     /// The same with another backbone.
     pub(crate) fn with_backbone(mut self, backbone: Backbone) -> Self {
-        self.train = self.train.with_backbone(backbone);
+        self.train.backbone = backbone;
         if !backbone.is_coded() {
             // Nothing is worth its bits where there are none.
             self.train.modules.rdo = None;

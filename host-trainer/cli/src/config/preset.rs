@@ -67,10 +67,11 @@ impl Preset {
                 ..CaptureOptions::default()
             },
             train: TrainConfig {
+                backbone: Backbone::Hac,
                 iterations: self.iterations(),
                 half_size: HalfSize { until: self.half_size_until(), ..HalfSize::default() },
                 modules: Modules { rdo: Some(Rdo::default()), ..Modules::default() },
-                ..TrainConfig::of(Backbone::Hac)
+                ..TrainConfig::default()
             },
             encoding: Encoding::default(),
             effects: EffectsConfig::default(),

@@ -80,11 +80,11 @@ fn a_few_keys_are_enough() {
 }
 
 #[test]
-fn what_is_missing_follows_the_backbone() {
+fn a_backbone_changes_nothing_else() {
     let config = RunConfig::parse("[train]\nbackbone = \"hac\"\niterations = 7").unwrap();
     assert_eq!(config.train, TrainConfig { iterations: 7, ..RunConfig::default().train });
-    let config = RunConfig::parse("[train]\nbackbone = \"hac\"\n[train.shape]\nfeature_dim = 32").unwrap();
-    assert_eq!(config.train.shape.feature_dim, 32);
+    let config = RunConfig::parse("[train]\nbackbone = \"hac\"\n[train.shape]\nfeature_dim = 50").unwrap();
+    assert_eq!(config.train.shape.feature_dim, 50);
     assert_eq!(RunConfig::parse(&config.to_toml().unwrap()).unwrap().train, config.train);
 }
 

@@ -3,7 +3,7 @@
 use pocketsplat_kernels::scene::{Head, Heads, ModelShape};
 
 /// Widths to choose from, widest first.
-const WIDTHS: [usize; 5] = [50, 32, 24, 16, 8];
+const WIDTHS: [usize; 4] = [32, 24, 16, 8];
 /// The heads of a model take at most this part of its bundle: lego at 80 px gains 4.3 dB at 20 kB by features of 16 in place of 50,
 /// and 0.8 dB at 40 kB by 24 (`docs/experiments/2026-11-23-scenes-that-fill-a-budget.md`).
 const HEADS_AT_MOST: u64 = 6;
@@ -27,11 +27,11 @@ mod tests {
 
     #[test]
     fn heads_take_a_sixth_at_most() {
-        let shape = ModelShape::plain(50, 10);
-        let widths = [5_000, 20_000, 40_000, 60_000, 1_000_000].map(|bytes| widest_within(bytes, &shape));
-        assert_eq!(widths, [8, 16, 24, 32, 50]);
+        let shape = ModelShape::plain(32, 10);
+        let widths = [5_000, 20_000, 40_000, 1_000_000].map(|bytes| widest_within(bytes, &shape));
+        assert_eq!(widths, [8, 16, 24, 32]);
         assert!(widths.is_sorted());
-        assert_eq!(widest_within(1_000_000, &ModelShape::plain(32, 10)), 32, "no wider than the model");
+        assert_eq!(widest_within(1_000_000, &ModelShape::plain(16, 10)), 16, "no wider than the model");
         assert_eq!(widest_within(1_000, &ModelShape::plain(4, 10)), 4);
     }
 }

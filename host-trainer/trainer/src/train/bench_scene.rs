@@ -6,7 +6,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::TrainConfig;
-use super::config::{Backbone, Hac};
+use super::config::Hac;
 use super::context::start::initial_context;
 use pocketsplat_kernels::ops::rate::noise::Stream;
 use pocketsplat_kernels::scene::Scene;
@@ -33,12 +33,12 @@ pub fn camera([width_px, height_px]: [u32; 2]) -> Camera {
 }
 
 /// Anchors on a sphere's surface, about half of their Gaussians opaque, as in a trained scene.
-pub fn scene(backbone: Backbone, n_anchors: usize) -> Scene<f32> {
+pub fn scene(n_anchors: usize) -> Scene<f32> {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let points: Vec<DVec3> = (0..n_anchors)
         .map(|_| DVec3::from(std::array::from_fn(|_| rng.random_range(-1.0..1.0))).normalize_or(DVec3::X) * 1.1)
         .collect();
-    let mut scene = initial_scene(TrainConfig::of(backbone).shape, 0.001, &points, &mut rng);
+    let mut scene = initial_scene(TrainConfig::default().shape, 0.001, &points, &mut rng);
     for value in scene.anchors.features.iter_mut().chain(&mut scene.anchors.offsets) {
         *value = rng.random_range(-1.0..1.0);
     }
@@ -50,9 +50,9 @@ pub fn scene(backbone: Backbone, n_anchors: usize) -> Scene<f32> {
     scene
 }
 
-/// The same for [`Backbone::Hac`] after pruning: three of four offsets are masked, and there is a context model.
+/// The same after pruning: three of four offsets are masked, and there is a context model.
 pub fn coded(n_anchors: usize) -> Scene<f32> {
-    let mut scene = scene(Backbone::Hac, n_anchors);
+    let mut scene = scene(n_anchors);
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     for logit in &mut scene.anchors.mask_logits {
         *logit = if rng.random::<f32>() < 0.75 { -6.0 } else { 1.0 };

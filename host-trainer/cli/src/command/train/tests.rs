@@ -20,7 +20,7 @@ fn attempt(stop: &AtomicBool) -> Attempt<'_> {
 }
 
 fn config(home: &Path, name: &str) -> RunConfig {
-    let mut train = TrainConfig { iterations: 80, ..TrainConfig::of(Backbone::Hac) };
+    let mut train = TrainConfig { backbone: Backbone::Hac, iterations: 80, ..TrainConfig::default() };
     (train.shape.feature_dim, train.shape.n_offsets) = (8, 3);
     let output = home.join(name).with_extension("psb");
     RunConfig { dataset: home.join("capture"), output, train, checkpoint_every: Some(10), ..RunConfig::default() }
@@ -114,8 +114,9 @@ fn a_fork_on_another_backbone_keeps_the_width_of_its_run() {
         args.resolved().unwrap().train.shape.feature_dim
     };
     let config = config(home.path(), "a");
-    let published = RunConfig { train: TrainConfig::of(Backbone::Hac), ..config.clone() };
-    assert_eq!(width(&published, &[]), 50);
+    let published =
+        RunConfig { train: TrainConfig { backbone: Backbone::Hac, ..TrainConfig::default() }, ..config.clone() };
+    assert_eq!(width(&published, &[]), 32);
     assert_eq!(width(&config, &[]), 8);
     assert_eq!(width(&published, &["--set", "train.shape.feature_dim=16"]), 16, "which the run refuses");
 }

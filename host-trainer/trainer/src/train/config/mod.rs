@@ -78,31 +78,6 @@ impl Default for TrainConfig {
 }
 
 impl TrainConfig {
-    /// The defaults of a backbone: anchors of HAC, HAC++ and ContextGS have 50 features.
-    ///
-    /// (Published HAC also shows the heads the distance of view. On lego that costs 0.3 dB in short runs, so it is an option
-    /// here.)
-    pub fn of(backbone: Backbone) -> Self {
-        let scaffold = Self::default();
-        match backbone {
-            Backbone::Scaffold => scaffold,
-            Backbone::Hac | Backbone::HacPlus | Backbone::ContextGs => {
-                let shape = ModelShape { feature_dim: 50, ..scaffold.shape };
-                Self { backbone, shape, ..scaffold }
-            }
-        }
-    }
-
-    /// The same with another backbone; what stands at the default of the former takes that of the latter.
-    pub fn with_backbone(self, backbone: Backbone) -> Self {
-        let (from, to) = (Self::of(self.backbone).shape, Self::of(backbone).shape);
-        let mut shape = self.shape;
-        if shape.feature_dim == from.feature_dim {
-            shape.feature_dim = to.feature_dim;
-        }
-        Self { backbone, shape, ..self }
-    }
-
     /// Refuses what no run can use, before any work starts.
     ///
     /// # Errors

@@ -16,25 +16,13 @@ fn a_rate_stays_and_then_falls_on_a_geometric_path() {
 #[test]
 fn the_defaults_of_each_backbone_are_accepted() {
     for backbone in [Backbone::Scaffold, Backbone::Hac, Backbone::HacPlus, Backbone::ContextGs] {
-        assert_eq!(TrainConfig::of(backbone).validate(), Ok(()));
-        assert_eq!(TrainConfig::of(backbone).backbone, backbone);
+        assert_eq!(TrainConfig { backbone, ..TrainConfig::default() }.validate(), Ok(()));
     }
-    assert_eq!(TrainConfig::of(Backbone::Scaffold), TrainConfig::default());
-}
-
-#[test]
-fn only_what_stands_at_its_default_follows_the_backbone() {
-    assert_eq!(TrainConfig::default().with_backbone(Backbone::Hac), TrainConfig::of(Backbone::Hac));
-    let mut chosen = TrainConfig::default();
-    chosen.shape.feature_dim = 16;
-    let hac = chosen.with_backbone(Backbone::Hac);
-    assert_eq!(hac.shape.feature_dim, 16);
-    assert_eq!(hac.with_backbone(Backbone::Scaffold), chosen);
 }
 
 #[test]
 fn phases_follow_each_other_at_their_shares_of_the_run() {
-    let config = TrainConfig { iterations: 30_000, ..TrainConfig::of(Backbone::Hac) };
+    let config = TrainConfig { backbone: Backbone::Hac, iterations: 30_000, ..TrainConfig::default() };
     for (iteration, phase) in [
         (1, Phase::Raw),
         (3_000, Phase::Raw),

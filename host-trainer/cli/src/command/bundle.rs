@@ -31,6 +31,12 @@ pub(crate) struct BundleFile {
 impl BundleFile {
     pub(crate) fn read(path: &Path) -> Result<Self> {
         refuse_gaussians(path)?;
+        if path.is_dir() {
+            let Ok(run) = RunConfig::of_run(path) else {
+                bail!("{} is a folder; give a bundle (.psb)", path.display())
+            };
+            bail!("{} is the folder of a run; give its bundle, {}", path.display(), run.output.display());
+        }
         let bytes = std::fs::read(path).with_context(|| format!("could not read the bundle {}", path.display()))?;
         if let Some(kind) = FileKind::of(&bytes).filter(|kind| *kind != FileKind::Bundle) {
             let remedy = kind.remedy().unwrap_or("give a .psb file");

@@ -66,7 +66,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let csv = outputs.file(&args.output.join("runs.csv"), outputs::table(&["run,"]))?;
     let svg = outputs.file(&args.output.join("runs.svg"), FIGURE)?;
     let config = |run: &PathBuf| {
-        let config = RunConfig::read(&run.join("config.toml"))?;
+        let config = RunConfig::of_run(run)?;
         Ok(RunConfig { output: BundleFile::of_run(run, &config)?.path, ..config })
     };
     let configs = args.runs.iter().map(config).collect::<Result<Vec<_>>>()?;

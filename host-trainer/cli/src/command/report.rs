@@ -79,7 +79,7 @@ struct Photographs<'a> {
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
-    let config = RunConfig::read(&args.run.join("config.toml"))?;
+    let config = RunConfig::of_run(&args.run)?;
     let output = args.output.clone().unwrap_or_else(|| args.run.join(FILE));
     check_name(&output, outputs::PAGE, None)?;
     let mut outputs = args.overwrite.outputs().reading_folder(&args.run).reading(&config.output);

@@ -18,7 +18,7 @@ use super::devices::{DeviceChoice, DeviceOption};
 use super::outputs::{OverwriteArgs, check_name, reading_capture};
 use super::settings::{QualityOptions, RunOptions};
 use crate::config::heading::{INPUT, OUTPUT, QUALITY, RUN};
-use crate::config::{CaptureOptions, EXPLICIT, ExplicitRunConfig, Preset, RunConfig, absolute};
+use crate::config::{CaptureOptions, EXPLICIT, EffectsConfig, ExplicitRunConfig, Preset, RunConfig, absolute};
 use crate::say::say;
 
 /// Train a scene from a capture and write it as a bundle.
@@ -191,7 +191,11 @@ impl Args {
     pub(crate) fn resolved(&self) -> Result<RunConfig> {
         let mut base = match (&self.config, &self.from) {
             (Some(path), _) => RunConfig::read(path)?,
-            (None, Some(run)) => RunConfig { fork_at: Vec::new(), ..RunConfig::of_run(run)? },
+            (None, Some(run)) => {
+                let run = RunConfig::of_run(run)?;
+                // What was decided on the way stays: effects are not chosen again.
+                RunConfig { fork_at: Vec::new(), effects: EffectsConfig { auto: false, ..run.effects }, ..run }
+            }
             (None, None) => self.preset.unwrap_or_default().config(),
         };
         let limits = self.device.limits()?;

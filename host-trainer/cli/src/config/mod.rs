@@ -17,6 +17,7 @@ use pocketsplat_capture::dataset::Background;
 use pocketsplat_trainer::encode::Encoding;
 use pocketsplat_trainer::train::TrainConfig;
 use pocketsplat_trainer::train::config::Backbone;
+use pocketsplat_trainer::train::run::RunError;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
@@ -91,11 +92,13 @@ impl RunConfig {
         Self::parse(&text).with_context(|| format!("the configuration {} cannot be used", path.display()))
     }
 
-    /// That of the run in a folder, with what was decided on the way: effects are not chosen again.
+    /// That of the run in a folder, as it was written.
     pub(crate) fn of_run(folder: &Path) -> Result<Self> {
-        let mut config = Self::read(&folder.join("config.toml"))?;
-        config.effects.auto = false;
-        Ok(config)
+        let path = folder.join("config.toml");
+        if !path.is_file() {
+            return Err(RunError::NoRun { path: folder.to_owned() }.into());
+        }
+        Self::read(&path)
     }
 
     /// As [`Self::read`], from its text.

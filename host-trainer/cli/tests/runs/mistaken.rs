@@ -315,3 +315,20 @@ fn a_comparison_says_what_to_do_where_a_capture_has_moved() {
     fs::write(&config, text).unwrap();
     succeeds(&mut compare());
 }
+
+#[test]
+fn a_run_and_its_bundle_are_told_apart() {
+    let home = folder("mistaken-run");
+    let (run, bundle) = copied_run(&home);
+    for command in [&["report"][..], &["train", "-o", "b.psb", "--at", "10", "--from"], &["train", "--resume"]] {
+        let said = fails(pocketsplat().args(command).arg(&bundle));
+        assert!(said.contains(&format!("is no run folder (it has no config.toml); give {}", run.display())), "{said}");
+    }
+    let said = fails(pocketsplat().arg("compare").arg(&run).arg(capture()).arg("-o").arg(home.join("c")));
+    assert!(said.contains("is no run folder") && said.contains("OUT.run"), "{said}");
+    for command in ["fit", "inspect", "verify"] {
+        let said = fails(pocketsplat().arg(command).arg(&run));
+        assert!(said.contains(&format!("is the folder of a run; give its bundle, {}", bundle.display())), "{said}");
+        assert!(fails(pocketsplat().arg(command).arg(capture())).contains("is a folder; give a bundle (.psb)"));
+    }
+}

@@ -32,7 +32,7 @@ impl RunStatus {
                 Ok(Self::Begun(folder))
             }
             Err(RunError::Finished { .. }) if config.output.is_file() => {
-                refuse_other(&RunConfig::read(&path.join("config.toml"))?, config, path)?;
+                refuse_other(&RunConfig::of_run(path)?, config, path)?;
                 Ok(Self::Finished)
             }
             // Finished without its bundle: somebody removed it.

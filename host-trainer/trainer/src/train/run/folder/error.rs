@@ -50,8 +50,7 @@ pub enum RunError {
         path: PathBuf,
     },
     /// Nothing to go on with.
-    #[error("{} is no run folder (it has no config.toml); give the folder that `train` made beside the bundle, OUT.run",
-        path.display())]
+    #[error("{} is no run folder (it has no config.toml); give {}", path.display(), run_beside(path))]
     NoRun {
         /// The folder.
         path: PathBuf,
@@ -104,4 +103,12 @@ impl RunError {
     pub(super) fn io(action: &'static str, path: &Path, source: std::io::Error) -> Self {
         Self::Io { action, path: path.to_owned(), source }
     }
+}
+
+/// Which folder is one, where another path was given: that of a bundle by its name, where it is there.
+fn run_beside(path: &Path) -> String {
+    let beside = path.with_extension("run");
+    let is_one = beside != path && beside.join(super::CONFIG).is_file();
+    let unnamed = "the folder that `train` made beside the bundle, OUT.run";
+    if is_one { shell_word(&beside) } else { unnamed.to_owned() }
 }

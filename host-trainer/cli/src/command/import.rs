@@ -183,7 +183,6 @@ fn configured(args: &Args) -> Result<RunConfig> {
         bail!("import measures no effects; name them, as --effects +view-colour, and leave auto to train");
     }
     check_lambda(args.lambda, config.train.backbone)?;
-    args.quality.check_feature_step(config.train.backbone)?;
     args.device.choose(&args.quality, args.lambda, &mut config)?;
     config.capture = CaptureOptions {
         max_resolution: None,

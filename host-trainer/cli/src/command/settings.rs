@@ -4,13 +4,11 @@ mod backbone;
 mod modules;
 
 use anyhow::{Result, bail};
-use pocketsplat_kernels::scene::QuantisationSteps;
 use pocketsplat_trainer::device::{ModelChoice, bytes_of_heads, widest_within};
 use pocketsplat_trainer::effects::{Effect, Request};
 use pocketsplat_trainer::encode::CoderChoice;
 use pocketsplat_trainer::explicit::CloudConfig;
 use pocketsplat_trainer::train::TrainConfig;
-use pocketsplat_trainer::train::config::Backbone;
 use serde::Serialize;
 
 use crate::config::heading::{OUTPUT, QUALITY, RUN};
@@ -56,9 +54,6 @@ pub(crate) struct QualityOptions {
     /// that are worth most at its last event [default: all]
     #[arg(long, value_name = "N", help_heading = QUALITY, hide_short_help = true)]
     keep_anchors: Option<usize>,
-    #[arg(long, value_name = "STEP", help_heading = QUALITY, hide_short_help = true,
-        help = with_default("Quantisation step of the features of a scaffold scene", QuantisationSteps::default().feature))]
-    feature_step: Option<f32>,
     /// Entropy coder: static tables (fast on a device), the context model (smaller), or auto [default: auto]
     #[arg(long, value_parser = one_of::<CoderChoice>(CODERS), help_heading = OUTPUT, hide_short_help = true)]
     coder: Option<CoderChoice>,
@@ -101,17 +96,6 @@ pub(super) fn with_default(help: &str, default: impl std::fmt::Display) -> Strin
 }
 
 impl QualityOptions {
-    /// Refuses a step for features that have steps of their own.
-    pub(crate) fn check_feature_step(&self, backbone: Backbone) -> Result<()> {
-        if self.feature_step.is_some() && backbone.is_coded() {
-            bail!(
-                "--feature-step rounds the features of scaffold scenes, and those of other backbones learn their steps; leave it out, \
-                 or make smaller files with a larger --lambda"
-            );
-        }
-        Ok(())
-    }
-
     /// Whether explicit Gaussians are asked for in place of anchors.
     pub(crate) fn is_explicit(&self) -> bool {
         self.backbone == Some(BackboneChoice::Explicit)
@@ -125,7 +109,7 @@ impl QualityOptions {
     /// The given options that say nothing about explicit Gaussians.
     pub(crate) fn of_anchors(&self) -> Vec<&'static str> {
         let Self { backbone: _, iterations: _, effects, modules, feature_dim, offsets, voxel_size, .. } = self;
-        let Self { max_anchors, keep_anchors, feature_step, coder, tiers, validation_every, .. } = self;
+        let Self { max_anchors, keep_anchors, coder, tiers, validation_every, .. } = self;
         [
             ("--effects", effects.is_some()),
             ("--modules", modules.is_some()),
@@ -134,7 +118,6 @@ impl QualityOptions {
             ("--voxel-size", voxel_size.is_some()),
             ("--max-anchors", max_anchors.is_some()),
             ("--keep-anchors", keep_anchors.is_some()),
-            ("--feature-step", feature_step.is_some()),
             ("--coder", coder.is_some()),
             ("--tiers", tiers.is_some()),
             ("--validation-every", validation_every.is_some()),
@@ -160,7 +143,6 @@ impl QualityOptions {
             *config = config.clone().with_backbone(backbone);
         }
         let (encoding, train) = (&mut config.encoding, &mut config.train);
-        set(&mut encoding.quantisation.feature, &self.feature_step);
         set(&mut encoding.coder, &self.coder);
         set(&mut encoding.tiers, &self.tiers);
         set(&mut train.iterations, &self.iterations);

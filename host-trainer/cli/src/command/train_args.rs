@@ -217,7 +217,6 @@ impl Args {
             }
         }
         check_lambda(self.lambda, config.train.backbone)?;
-        self.quality.check_feature_step(config.train.backbone)?;
         if self.from.is_some() && self.capture.points.is_some() {
             bail!(
                 "--points says where training starts, and a run of --from starts with the scene of another; leave it out"

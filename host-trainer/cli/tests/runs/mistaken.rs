@@ -244,11 +244,6 @@ fn options_that_change_nothing_are_refused() {
         command.arg("train").arg(capture()).arg("-o").arg(home.join("a.psb")).arg("--dry-run").args(options);
         fails(&mut command)
     };
-    let said = train(&["--feature-step", "0.1"]);
-    assert!(
-        said.contains("--feature-step rounds the features of scaffold scenes") && said.contains("leave it out"),
-        "{said}"
-    );
     let mut seed = pocketsplat();
     let output = seed.args(["train", "x", "-o", "a.psb", "--seed", "9223372036854775808"]).output().unwrap();
     assert!(text(&output.stderr).contains("9223372036854775808 is not in 0..=9223372036854775807"));

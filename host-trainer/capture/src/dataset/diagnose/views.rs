@@ -211,7 +211,7 @@ fn colours(listing: &Listing, findings: &mut Vec<Finding>) {
         Severity::Warning,
         "colour-profile",
         "images with a colour profile other than sRGB, as Display P3; their values are taken for sRGB, so the scene is drawn paler than they are",
-        "convert them to sRGB before, without changing their sizes",
+        "convert them to sRGB, as `jpgicc -q95 IN.jpg OUT.jpg` of Little CMS does (package liblcms2-utils); their sizes must stay",
     ));
 }
 

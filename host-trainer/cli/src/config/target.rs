@@ -76,7 +76,7 @@ mod tests {
         let _ = writeln!(
             table,
             "\nCycles of an instruction: {} on a Cortex-M4, by ARM's table and the count of an emulated one. For the RP2350 and the ESP32-S3 the \
-             same is assumed; for all others one, since there are no public tables of theirs.\n",
+             same is assumed; for all others one, since none are counted.\n",
             Processor::CortexM4.cycles_per_instruction()
         );
         let page = std::fs::read_to_string(PAGE).expect("the page");

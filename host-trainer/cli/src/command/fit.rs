@@ -26,10 +26,10 @@ use level::LevelFit;
 /// --validation-every said so). Work is a bound over the views
 /// in the manifest.
 ///
-/// RAM is the memory given, scratch what is taken of it, pruned the share of the anchors that is not drawn. Anchors are kept in the
-/// bundle, and decoded for every frame; in memory; there with the sums of their first layers; or baked, as Gaussians. A frame is drawn in
-/// strips, a strip in slabs of depth, with at most so many splats at once. Head MMAC are millions of multiply-adds of the heads, decoded the
-/// anchors that are decoded, Mpixels the millions of pixels of all splats; Minstr and seconds are predicted.
+/// RAM is the memory given, scratch what is taken of it, pruned the share of the anchors that is not drawn. "Kept in" says where anchors
+/// are: in the bundle (decoded for every frame), in memory (decoded once), with the sums of their first layers, or baked as Gaussians. A
+/// frame is drawn in strips, a strip in slabs of depth, each of at most so many splats. Head MMAC are millions of multiply-adds, decoded
+/// the anchors that are decoded, Mpixels the millions of pixels of all splats. Minstr and seconds are predicted.
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// The bundle.

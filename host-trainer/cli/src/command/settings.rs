@@ -231,7 +231,9 @@ impl RunOptions {
     pub(crate) fn apply_to(&self, config: &mut RunConfig) {
         config.checkpoint_every = self.checkpoint_every.or(config.checkpoint_every);
         config.keep_checkpoints |= self.keep_checkpoints;
-        config.fork_at = self.fork_at.clone().unwrap_or_else(|| std::mem::take(&mut config.fork_at));
+        if let Some(fork_at) = &self.fork_at {
+            config.fork_at.clone_from(fork_at);
+        }
         config.train.seed = self.seed.unwrap_or(config.train.seed);
     }
 
@@ -247,6 +249,9 @@ impl RunOptions {
         options: impl Fn(C) -> Result<C>,
         set: impl Fn(&Self, C) -> Result<C>,
     ) -> Result<C> {
+        if self.set.is_empty() {
+            return options(config);
+        }
         let set_last = set(self, options(config.clone())?)?;
         // A key for which the order matters is one that both say. An order that fails was not asked for.
         if let Ok(set_first) = set(self, config).and_then(options)
@@ -264,7 +269,7 @@ impl RunOptions {
 
     /// The same for explicit Gaussians.
     pub(crate) fn with_set_explicit(&self, config: ExplicitRunConfig) -> Result<ExplicitRunConfig> {
-        if self.set.is_empty() { Ok(config) } else { config.with_keys(&self.set) }
+        config.with_keys(&self.set)
     }
 }
 

@@ -234,6 +234,8 @@ fn an_option_and_a_key_do_not_say_two_things() {
     }
     let both = ["--iterations", "60", "--modules", "tiered-pruning", "--set", "train.modules.pruning.rate=0.3"];
     succeeds(train(&both).args(["--set", "train.iterations=60"]));
+    let learned = train(&["--set", "capture.background=learned"]).output().unwrap();
+    assert!(text(&learned.stdout).contains("learns_background = true"), "{}", text(&learned.stderr));
 }
 
 #[test]

@@ -87,12 +87,11 @@ pub(super) fn with_photographs_below(folder: &Path) -> Vec<(PathBuf, usize)> {
     folders.sort_unstable();
     let is_photograph = |path: &PathBuf| matches!(kind_of(path), Some(Kind::Photograph(_)));
     let n_of = |folder: &Path| files_of(folder).iter().filter(|path| is_photograph(path)).count();
-    folders
-        .into_iter()
-        .map(|folder| (n_of(&folder), folder))
-        .filter(|(n, _)| *n > 0)
-        .map(|(n, folder)| (folder, n))
-        .collect()
+    let counted = folders.into_iter().map(|folder| {
+        let n = n_of(&folder);
+        (folder, n)
+    });
+    counted.filter(|(_, n)| *n > 0).collect()
 }
 
 /// The films of a folder.

@@ -7,8 +7,10 @@
 mod kind;
 mod output;
 pub mod ply;
+mod reach;
 mod shell;
 
 pub use kind::FileKind;
 pub use output::{Content, MARK, Output, OutputError, Outputs, write_whole};
+pub use reach::{closed_folder, out_of_reach};
 pub use shell::{beside, shell_word, shown};

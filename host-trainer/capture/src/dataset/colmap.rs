@@ -147,7 +147,7 @@ fn shot(
     let camera = cameras.get(&camera_id).ok_or(ViewFault::NoCamera { camera_id })?;
     let path = NamedPath::new(&image.name)
         .image(names, folder, None)
-        .ok_or_else(|| ViewFault::Missing { path: folder.join(&image.name), listed_in: "the model" })?;
+        .ok_or_else(|| ViewFault::of_missing(folder.join(&image.name), "the model"))?;
     let header = match read_header(&path) {
         Ok(header) => header,
         Err(message) => return Err(ViewFault::of_header(path, message)),

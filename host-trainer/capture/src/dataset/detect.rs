@@ -2,12 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use pocketsplat_files::shown;
+use pocketsplat_files::{closed_folder, shown};
 
 use super::{
     DatasetError, Layout, blender, bundler, colmap, llff, metashape, nerfstudio, no_poses, nsvf, opensfm, polycam,
     realitycapture, record3d,
 };
+
+/// How far below a capture's folder the folders of its layout lie, as `sparse/0`.
+const DEPTH: u32 = 2;
 
 /// The layout of the folder `path`, told by the files in it; none where it is no capture.
 pub fn layout_of(path: &Path) -> Option<Layout> {
@@ -49,6 +52,9 @@ fn whole_of(path: &Path) -> Option<PathBuf> {
 /// The error of a folder that is no capture; looks whether a folder in it is one, and what else it may be.
 pub(super) fn unknown_layout(path: &Path) -> DatasetError {
     let entries = std::fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path());
+    if let Some((path, why)) = closed_folder(path, DEPTH) {
+        return DatasetError::OutOfReach { path, why };
+    }
     let inside = entries.filter(|path| path.is_dir() && layout_of(path).is_some()).min();
     if inside.is_none()
         && let Some(whole) = path.canonicalize().ok().and_then(|path| whole_of(&path))

@@ -15,6 +15,9 @@ pub enum DatasetError {
     /// The path is no folder.
     #[error("`{}` is not a folder; give the folder that holds the capture", shown(path))]
     NotAFolder { path: PathBuf },
+    /// Something is there and cannot be reached.
+    #[error("cannot reach `{}`: {why}; mend the link, or allow it: `chmod -R u+rX {}`", shown(path), shell_word(path))]
+    OutOfReach { path: PathBuf, why: String },
     /// No known layout fits the folder.
     #[error(
         "`{}` is no capture that can be read: looked for {} and found none of them; {}",
@@ -183,7 +186,7 @@ impl DatasetError {
             Self::NotAFolder { .. } => "not-a-folder",
             Self::UnknownLayout { .. } => "unknown-layout",
             Self::NoCapture { .. } => "no-capture",
-            Self::Read { .. } | Self::NotText { .. } => "unreadable-file",
+            Self::Read { .. } | Self::OutOfReach { .. } | Self::NotText { .. } => "unreadable-file",
             Self::OtherKind { code, .. } => code,
             Self::Transforms { .. } => "bad-transforms",
             Self::Json { .. } => "bad-export",

@@ -10,6 +10,7 @@
 use std::path::Path;
 
 use glam::DVec3;
+use pocketsplat_files::out_of_reach;
 
 mod apart;
 mod assemble;
@@ -233,7 +234,11 @@ fn list(path: &Path, options: &LoadOptions) -> Result<listing::Listing, DatasetE
         if let Some(found) = no_poses::file_instead(path).filter(|_| path.is_file()) {
             return Err(DatasetError::NoCapture { found });
         }
-        return Err(DatasetError::NotAFolder { path: path.to_owned() });
+        let path = path.to_owned();
+        return Err(match out_of_reach(&path) {
+            Some(why) => DatasetError::OutOfReach { path, why },
+            None => DatasetError::NotAFolder { path },
+        });
     }
     let mut listing = match detect::layout_of(path) {
         Some(Layout::Blender) => blender::list(path, options),

@@ -142,10 +142,9 @@ impl Frame {
         if let Some(model) = unknown_model(&self.own) {
             return Err(ViewFault::CameraModel { model });
         }
-        let path = self.image(names, folder, images).ok_or_else(|| ViewFault::Missing {
-            path: self.path().expected(folder, images),
-            listed_in: "the transforms file",
-        })?;
+        let path = self
+            .image(names, folder, images)
+            .ok_or_else(|| ViewFault::of_missing(self.path().expected(folder, images), "the transforms file"))?;
         let header = match read_header(&path) {
             Ok(header) => header,
             Err(message) => return Err(ViewFault::of_header(path, message)),
@@ -153,10 +152,8 @@ impl Frame {
         let lens = camera::lens(&self.own, shared, &path, &header)?;
         let mut masks: Vec<MaskFile> = MaskFile::dynamic(names, &path).into_iter().collect();
         if let Some(named) = self.mask_path.as_deref().map(NamedPath::new) {
-            masks.push(MaskFile::new(named.mask(names, folder).ok_or_else(|| ViewFault::Mask {
-                path: named.expected(folder, None),
-                message: "does not exist".to_owned(),
-            })?));
+            let missing = || ViewFault::of_missing_mask(named.expected(folder, None));
+            masks.push(MaskFile::new(named.mask(names, folder).ok_or_else(missing)?));
         }
         Ok(Shot { path, header, rotation, translation, lens, masks, depth: None })
     }

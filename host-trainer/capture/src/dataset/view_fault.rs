@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use pocketsplat_files::{FileKind, shown};
+use pocketsplat_files::{FileKind, out_of_reach, shown};
 
 use super::PoseFault;
 use super::camera_models::READABLE_MODELS;
@@ -20,6 +20,9 @@ pub enum ViewFault {
         shown(path), EXTENSIONS.join(" or ")
     )]
     Missing { path: PathBuf, listed_in: &'static str },
+    /// The image is there, or a link in its place, and cannot be reached.
+    #[error("image out of reach: `{}`: {why}; mend the link or the permissions", shown(path))]
+    OutOfReach { path: PathBuf, why: String },
     /// The file is also another photograph's.
     #[error(
         "its name is `{written}`, and the file found for it, `{}`, is also found for `{other}`, but one file is not two \
@@ -92,6 +95,21 @@ pub enum ViewFault {
 }
 
 impl ViewFault {
+    /// The fault of an image that was not found at `path`.
+    pub(super) fn of_missing(path: PathBuf, listed_in: &'static str) -> Self {
+        match out_of_reach(&path) {
+            Some(why) => Self::OutOfReach { path, why },
+            None => Self::Missing { path, listed_in },
+        }
+    }
+
+    /// The fault of a mask that was not found at `path`.
+    pub(super) fn of_missing_mask(path: PathBuf) -> Self {
+        let message =
+            out_of_reach(&path).map_or_else(|| "does not exist".to_owned(), |why| format!("cannot be reached: {why}"));
+        Self::Mask { path, message }
+    }
+
     /// The fault of an image with an unreadable header.
     pub(super) fn of_header(path: PathBuf, message: String) -> Self {
         match FileKind::of_file(&path).ok().flatten() {
@@ -109,7 +127,7 @@ impl ViewFault {
         match self {
             Self::Missing { .. } => "missing-image",
             Self::SharedFile { .. } => "shared-image",
-            Self::Unreadable { .. } | Self::Kind { .. } => "unreadable-image",
+            Self::Unreadable { .. } | Self::OutOfReach { .. } | Self::Kind { .. } => "unreadable-image",
             Self::Format { .. } => "image-format",
             Self::Size { .. } | Self::Small { .. } => "image-size",
             Self::Shape { .. } => "image-shape",
@@ -126,6 +144,7 @@ impl ViewFault {
     pub(super) fn path(&self) -> Option<&Path> {
         match self {
             Self::Missing { path, .. }
+            | Self::OutOfReach { path, .. }
             | Self::SharedFile { path, .. }
             | Self::Unreadable { path, .. }
             | Self::Kind { path, .. }

@@ -15,6 +15,25 @@ pub(super) fn cases() -> Vec<Case> {
             &["looked for `transforms_train.json` (Blender), `sparse/0/cameras.bin`", "none of them; give the folder"],
             |f| std::fs::remove_dir_all(f.at("images")).expect("images"),
         ),
+        #[cfg(unix)]
+        case(
+            "a model behind a link that leads nowhere",
+            ColmapBinary,
+            Fatal,
+            "unreadable-file",
+            &["cannot reach `", "the link `", "/sparse` leads to `/gone/sparse`, which is not there; mend the link"],
+            |f| std::os::unix::fs::symlink("/gone/sparse", f.at("sparse")).expect("a link"),
+        ),
+        #[cfg(unix)]
+        case(
+            "a model in a folder that cannot be looked into",
+            ColmapText,
+            Fatal,
+            "unreadable-file",
+            &["cannot reach `", "/sparse`: ", "allow it: `chmod -R u+rX /"],
+            // A permission would not stop the system's administrator, whom tests may be run by.
+            |f| std::os::unix::fs::symlink("sparse", f.at("sparse")).expect("a link"),
+        ),
         case(
             "photographs without poses",
             ColmapBinary,

@@ -34,6 +34,21 @@ pub(super) fn cases() -> Vec<Case> {
                 (0..N_VIEWS).for_each(|i| f.remove(&format!("images/p_{i:02}.png")));
             },
         ),
+        #[cfg(unix)]
+        case(
+            "images behind links that lead nowhere",
+            ColmapText,
+            Views,
+            "unreadable-image",
+            &[
+                "p_03.png: image out of reach: `",
+                "/p_03.png` leads to `/gone/p_03.png`, which is not there; mend the link",
+            ],
+            |f| {
+                f.write_files().remove("images/p_03.png");
+                std::os::unix::fs::symlink("/gone/p_03.png", f.at("images/p_03.png")).expect("a link");
+            },
+        ),
         case(
             "an image missing that another folder has",
             ColmapText,

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-use pocketsplat_files::{shell_word, shown};
+use pocketsplat_files::{closed_folder, shell_word, shown};
 
 use super::kinds::{
     AS_THEY_ARE, Kind, Treatment, extension, films_in, kind_of, photographs_in, stem, with_photographs_below,
@@ -137,6 +137,9 @@ fn named(found: Vec<(PathBuf, Treatment)>) -> Result<Vec<Photograph>> {
 fn nothing_at(paths: &[PathBuf], left_out: &[PathBuf]) -> anyhow::Error {
     if !left_out.is_empty() {
         return must_be_converted(left_out);
+    }
+    if let Some((path, why)) = paths.iter().find_map(|path| closed_folder(path, 1)) {
+        return anyhow::anyhow!("cannot reach `{}`: {why}; mend the link or the permissions", shown(&path));
     }
     let below: Vec<PathBuf> =
         paths.iter().flat_map(|path| with_photographs_below(path)).map(|(folder, _)| folder).collect();
